@@ -1,0 +1,32 @@
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "polygon_mesh.h"
+
+namespace tandem::build {
+
+enum class Reader { automatic, tandem, assimp };
+
+struct ImportOptions {
+  Reader reader = Reader::automatic;
+  double time_limit_seconds = 120;                          ///< of the child process that runs assimp
+  std::uint64_t memory_limit_bytes = std::uint64_t{8} << 30;  ///< address space of that child
+};
+
+struct ImportResult {
+  bool ok = false;
+  PolygonMesh mesh;
+  std::string error;  ///< when not ok: the reason without the file's name, "line 12: ...", "byte 84: ...", "the reader crashed (signal 11)"
+};
+
+/// Reads the polygons of a mesh file.
+///
+/// Effect: opens `path` for reading; assimp runs in a child process under the limits of `options`, so that its crashes,
+/// endless loops and appetite become errors. Leaves no file, process or signal handler behind.
+/// Result: never throws; a file that holds no face at all is ok with no faces.
+/// Must be called while the process has a single thread (it may fork).
+ImportResult import_mesh(const std::filesystem::path& path, const ImportOptions& options);
+
+}  // namespace tandem::build

@@ -1,0 +1,59 @@
+#pragma once
+#include "tandem/formats/block.h"
+
+namespace tandem {
+
+/// An axis-aligned box as a node stores it: the set [center - half_extent, center + half_extent] in real
+/// arithmetic.
+struct Box {
+  float center[3];
+  float half_extent[3];
+};
+
+/// One corner point of a triangle, or any other stored position.
+using Position = float[3];
+
+/// The largest magnitude of a stored coordinate. It is 2^-12 below the largest float, so that no box
+/// overflows: a node's box grows by at most an ulp for its centre and one for its half-extent on each of
+/// kMaxDepth levels, 2^7 * 2^104 in all, and 2^115 are spare.
+inline constexpr float kMaxCoordinate = 0x1.fffp127f;
+
+/// The box around the rounded midpoint that contains lo and hi exactly, with the smallest half-extents that
+/// do. Condition: lo[k] <= hi[k], magnitudes at most kMaxCoordinate. Then the result is finite.
+Box enclose(const Position& lo, const Position& hi);
+
+/// A box that contains the boxes of all real nodes of `block` in real arithmetic, with the smallest
+/// half-extents around its centre. Condition: the block has a real node. The result is finite if the boxes
+/// come from enclose() (see kMaxCoordinate).
+Box enclose(const Block& block);
+
+/// Whether [c - h, c + h] on every axis contains the point, in real arithmetic: no rounding decides it.
+bool contains(const Box& box, const Position& point);
+
+/// Whether `outer` contains `inner`, in real arithmetic: |c_i - c_o| + h_i <= h_o on every axis.
+bool contains(const Box& outer, const Box& inner);
+
+inline Box box_of(const Block& block, int node) {
+  return {{block.center[0][node], block.center[1][node], block.center[2][node]},
+          {block.half_extent[0][node], block.half_extent[1][node], block.half_extent[2][node]}};
+}
+
+/// Writes a real node; `index` is a child block or a triangle.
+inline void set_node(Block& block, int node, const Box& box, std::uint32_t index, NodeKind kind) {
+  for (int k = 0; k < 3; ++k) {
+    block.center[k][node] = box.center[k];
+    block.half_extent[k][node] = box.half_extent[k];
+  }
+  block.index[node] = index;
+  block.kind[node] = kind;
+}
+
+/// Writes an imaginary node.
+inline void set_imaginary(Block& block, int node) {
+  set_node(block, node,
+           {{kImaginaryCenter, kImaginaryCenter, kImaginaryCenter},
+            {kImaginaryHalfExtent, kImaginaryHalfExtent, kImaginaryHalfExtent}},
+           kNoIndex, NodeKind::imaginary);
+}
+
+}  // namespace tandem

@@ -1,0 +1,69 @@
+#pragma once
+#include <cstdint>
+
+namespace tandem {
+
+/// What can be wrong with a .bvh file or with loading it: one name per defect.
+/// The checker tests for the defects in this order; the first that it finds is returned.
+enum class [[nodiscard]] Status : std::uint32_t{
+    kOk = 0,
+    // Getting at the bytes.
+    kFileNotFound,
+    kNotARegularFile,
+    kCannotOpen,
+    kCannotRead,
+    kOutOfMemory,
+    kMisaligned,  ///< bytes in memory must start at a multiple of 128
+    // What kind of file it is.
+    kBiovisionMotionCapture,  ///< the other .bvh: starts with HIERARCHY
+    kNotTandem,
+    kDamagedByTextTransfer,  ///< ours, but line ends were rewritten on the way
+    kWrongByteOrder,
+    kUnsupportedVersion,
+    kTruncated,       ///< fewer bytes than the header says
+    kTrailingBytes,   ///< more bytes than the header says
+    kContentChanged,  ///< the hash differs: some byte is not what was written
+    // Header and sections. From here on the hash is right, so the writer is wrong or hostile.
+    kBadHeader,            ///< a reserved byte is set, a count is zero or past its limit
+    kBadSectionTable,      ///< the table itself does not fit
+    kUnknownSection,       ///< a kind that this version does not define
+    kSectionMisaligned,    ///< offset no multiple of 256
+    kSectionOutOfBounds,   ///< reaches past the end of the file, or its size overflows
+    kSectionsOverlap,      ///< or are not in ascending order
+    kSectionSizeMismatch,  ///< bytes differ from count times element size
+    kSectionMissing,
+    kSectionDuplicated,
+    kBadGap,    ///< bytes between sections are not zero or more than alignment asks for
+    kBadLevel,    ///< counts of a level that contradict each other or its sections
+    kBadPart,     ///< a part whose strings or faces lie outside
+    // The tree.
+    kBadNodeKind,
+    kImaginaryBeforeReal,  ///< imaginary nodes come last in a block
+    kEmptyBlock,           ///< a block of imaginary nodes only
+    kPartialLeafBlock,     ///< leaves and internal nodes in one block
+    kBadImaginaryNode,     ///< box or index of an imaginary node are not the prescribed ones
+    kBadBox,               ///< a real node's box is not finite or has a negative half-extent
+    kChildOutOfRange,      ///< index past the last block
+    kChildNotAfterParent,  ///< would allow a cycle
+    kChildShared,          ///< a block with two parents
+    kBlockUnreachable,
+    kTooDeep,            ///< deeper than kMaxDepth
+    kDepthMismatch,      ///< depth differs from what the level says
+    kLeafCountMismatch,  ///< leaves, or leaf blocks, differ in number from what the level says
+    kTriangleOrder,      ///< leaves, in the order of blocks, must name the triangles 0, 1, 2, ...
+    kTriangleNotFinite,
+    kTriangleOutsideLeafBox,
+    kChildOutsideParentBox,
+    kBadFace,         ///< source face or part out of range, or a reserved lane set
+    kBoundsMismatch,  ///< the header's bounds are not those of the triangles
+    // Uploading.
+    kCudaFailed,
+};
+
+/// The name of a defect as written above without the k, for logs and JSON: "ChildShared".
+const char* name(Status status);
+
+/// One sentence for people, without a full stop: "a block has two parents".
+const char* explain(Status status);
+
+}  // namespace tandem

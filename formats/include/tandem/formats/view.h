@@ -1,0 +1,41 @@
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "tandem/formats/file.h"
+
+namespace tandem {
+
+/// Looks at one level of detail of an asset; owns nothing. Pointers are of the CPU or of the GPU alike.
+struct LevelView {
+  const Block* blocks = nullptr;  ///< block 0 is the root
+  const Triangle* triangles = nullptr;
+  std::uint32_t block_count = 0;
+  std::uint32_t triangle_count = 0;
+  std::uint32_t leaf_block_count = 0;
+  std::uint32_t depth = 0;
+  double error_bound = 0;
+};
+
+/// Looks at a checked asset in CPU memory; owns nothing and lives no longer than the bytes.
+struct AssetView {
+  const FileHeader* header = nullptr;
+  std::span<const Section> sections;
+  std::span<const Level> levels;
+  std::span<const Part> parts;
+  std::string_view strings;
+  std::string_view provenance;  ///< JSON
+
+  /// Level `i` of detail. Condition: i < levels.size().
+  LevelView level(std::uint32_t i = 0) const;
+
+  std::string_view name_of(const Part& part) const {
+    return strings.substr(part.name_offset, part.name_bytes);
+  }
+  std::string_view path_of(const Part& part) const {
+    return strings.substr(part.path_offset, part.path_bytes);
+  }
+};
+
+}  // namespace tandem

@@ -1,0 +1,24 @@
+#include "tandem/formats/view.h"
+
+namespace tandem {
+
+LevelView AssetView::level(std::uint32_t i) const {
+  LevelView view;
+  const auto* base = reinterpret_cast<const unsigned char*>(header);
+  for (const Section& section : sections) {
+    if (section.level != i) continue;
+    if (section.kind == SectionKind::blocks)
+      view.blocks = reinterpret_cast<const Block*>(base + section.offset);
+    if (section.kind == SectionKind::triangles)
+      view.triangles = reinterpret_cast<const Triangle*>(base + section.offset);
+  }
+  const Level& level = levels[i];
+  view.block_count = level.block_count;
+  view.triangle_count = level.triangle_count;
+  view.leaf_block_count = level.leaf_block_count;
+  view.depth = level.depth;
+  view.error_bound = level.error_bound;
+  return view;
+}
+
+}  // namespace tandem

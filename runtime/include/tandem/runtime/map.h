@@ -1,0 +1,53 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+
+#include "tandem/formats/check.h"
+
+namespace tandem {
+
+/// How a file gets into memory.
+enum class Access : std::uint8_t {
+  map,   ///< mmap, read-only: pages are shared with every process that maps the file; falls back to read
+  read,  ///< one read into memory of its own: for file systems and platforms that cannot map
+};
+
+/// Owns the bytes of a .bvh file in CPU memory and hands out views of them. Movable, not copyable. Throws
+/// nothing.
+///
+/// While an asset is mapped, its file must not be cut short (tools that replace it by a rename, as bvhbuild
+/// does, are safe): reading a page that is gone ends a process. For a file already in memory there is nothing
+/// to own: call check() of tandem/formats/check.h.
+class MappedAsset {
+ public:
+  MappedAsset() = default;
+  MappedAsset(MappedAsset&& other) noexcept { *this = static_cast<MappedAsset&&>(other); }
+  MappedAsset& operator=(MappedAsset&& other) noexcept;
+  ~MappedAsset() { close(); }
+
+  /// Brings the file into memory and checks all of it; closes what was open before.
+  /// Result: kOk, or the first defect; then nothing is open and where() tells the section, block, ... that is
+  /// defective. `path` is handed to the operating system as it is.
+  Status open(const char* path, Access access = Access::map);
+
+  /// Gives the bytes back; every view of them ends.
+  void close();
+
+  /// The checked asset. Condition: the last open() returned kOk.
+  const AssetView& view() const { return asset_; }
+  std::uint64_t where() const { return where_; }
+  const void* data() const { return data_; }
+  std::size_t bytes() const { return bytes_; }
+  bool is_mapped() const { return mapped_; }
+
+ private:
+  Status acquire(const char* path, Access access);
+
+  void* data_ = nullptr;
+  std::size_t bytes_ = 0;
+  bool mapped_ = false;
+  std::uint64_t where_ = 0;
+  AssetView asset_;
+};
+
+}  // namespace tandem

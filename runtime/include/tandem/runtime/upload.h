@@ -1,0 +1,41 @@
+#pragma once
+#include <cuda_runtime_api.h>
+
+#include <cstddef>
+
+#include "tandem/formats/check.h"
+
+namespace tandem {
+
+/// Owns a copy of an asset in GPU memory: one allocation, one copy of the file as it is. Movable, not
+/// copyable. Throws nothing.
+class DeviceAsset {
+ public:
+  DeviceAsset() = default;
+  DeviceAsset(DeviceAsset&& other) noexcept { *this = static_cast<DeviceAsset&&>(other); }
+  DeviceAsset& operator=(DeviceAsset&& other) noexcept;
+  ~DeviceAsset() { free(); }
+
+  /// Allocates on the current device and queues the copy on `stream`; what was uploaded before is freed.
+  /// Result: kOk, kOutOfMemory, or kCudaFailed with cuda_error() telling more.
+  /// Condition: the bytes of `asset`, a checked one, stay until the copy is done. They may be pageable (a
+  /// mapped file); CUDA then stages them and returns when it has read them.
+  Status upload(const AssetView& asset, cudaStream_t stream);
+
+  void free();
+
+  /// Level `i` with pointers into GPU memory. Condition: upload() returned kOk, i < level_count().
+  LevelView level(std::uint32_t i = 0) const { return levels_[i]; }
+  std::uint32_t level_count() const { return level_count_; }
+  std::size_t bytes() const { return bytes_; }
+  cudaError_t cuda_error() const { return error_; }
+
+ private:
+  void* data_ = nullptr;
+  std::size_t bytes_ = 0;
+  std::uint32_t level_count_ = 0;
+  LevelView levels_[kMaxLevels];
+  cudaError_t error_ = cudaSuccess;
+};
+
+}  // namespace tandem

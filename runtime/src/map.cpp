@@ -1,0 +1,138 @@
+#include "tandem/runtime/map.h"
+
+#include <cerrno>
+#include <cstdio>
+#include <limits>
+#include <new>
+#include <utility>
+
+#if __has_include(<sys/mman.h>)
+#define TANDEM_HAS_MMAP 1
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#else
+#define TANDEM_HAS_MMAP 0
+#endif
+
+namespace tandem {
+namespace {
+
+struct Bytes {
+  Status status = Status::kOk;
+  void* data = nullptr;
+  std::size_t size = 0;
+};
+
+constexpr std::align_val_t kAlignment{alignof(Block)};
+
+Status status_of_open_error() {
+  if (errno == ENOENT || errno == ENOTDIR) return Status::kFileNotFound;
+  return errno == EISDIR ? Status::kNotARegularFile : Status::kCannotOpen;
+}
+
+// The size of an open file, -1 if it has none (a pipe, a folder).
+long size_of(std::FILE* file) {
+  if (std::fseek(file, 0, SEEK_END) != 0) return -1;
+  const long size = std::ftell(file);
+  return std::fseek(file, 0, SEEK_SET) == 0 && size < std::numeric_limits<long>::max() ? size : -1;
+}
+
+Bytes read_all(std::FILE* file) {
+  const long size = size_of(file);
+  if (size < 0) return {Status::kNotARegularFile};
+  const auto bytes = static_cast<std::size_t>(size);
+  void* data = ::operator new(bytes + 1, kAlignment, std::nothrow);  // + 1: an empty file has an address too
+  if (data == nullptr) return {Status::kOutOfMemory};
+  if (std::fread(data, 1, bytes, file) == bytes) return {Status::kOk, data, bytes};
+  ::operator delete(data, kAlignment);
+  return {Status::kCannotRead};
+}
+
+Bytes read_file(const char* path) {
+  std::FILE* file = std::fopen(path, "rb");
+  if (file == nullptr) return {status_of_open_error()};
+  const Bytes bytes = read_all(file);
+  std::fclose(file);
+  return bytes;
+}
+
+#if TANDEM_HAS_MMAP
+Bytes map_file(const char* path) {
+  const int file = ::open(
+      path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);  // not blocking: a pipe must be refused, not waited for
+  if (file < 0) return {status_of_open_error()};
+  struct stat info {};
+  Bytes bytes;
+  if (::fstat(file, &info) != 0 || !S_ISREG(info.st_mode)) {
+    bytes.status = Status::kNotARegularFile;
+  } else {
+    bytes.size = static_cast<std::size_t>(info.st_size);
+    bytes.data = ::mmap(nullptr, bytes.size, PROT_READ, MAP_PRIVATE, file, 0);
+    if (bytes.data == MAP_FAILED) bytes = {Status::kCannotRead};
+  }
+  ::close(file);
+  return bytes;
+}
+
+void unmap(void* data, std::size_t size) {
+  ::munmap(data, size);
+}
+#else
+Bytes map_file(const char*) {
+  return {Status::kCannotRead};
+}
+void unmap(void*, std::size_t) {}
+#endif
+
+}  // namespace
+
+MappedAsset& MappedAsset::operator=(MappedAsset&& other) noexcept {
+  if (this == &other) return *this;
+  close();
+  data_ = std::exchange(other.data_, nullptr);
+  bytes_ = std::exchange(other.bytes_, 0);
+  mapped_ = std::exchange(other.mapped_, false);
+  where_ = std::exchange(other.where_, 0);
+  asset_ = std::exchange(other.asset_, {});
+  return *this;
+}
+
+Status MappedAsset::acquire(const char* path, Access access) {
+  Bytes bytes;
+  if (access == Access::map) {
+    bytes = map_file(path);
+    mapped_ = bytes.status == Status::kOk;
+  }
+  const bool try_reading = access == Access::read || bytes.status == Status::kCannotRead;
+  if (try_reading) bytes = read_file(path);
+  data_ = bytes.data;
+  bytes_ = bytes.size;
+  return bytes.status;
+}
+
+Status MappedAsset::open(const char* path, Access access) {
+  close();
+  if (const Status status = acquire(path, access); status != Status::kOk) return status;
+  const CheckResult result = check(data_, bytes_);
+  if (result.status != Status::kOk) close();
+  asset_ = result.asset;
+  where_ = result.where;
+  return result.status;
+}
+
+void MappedAsset::close() {
+  if (mapped_) {
+    unmap(data_, bytes_);
+  } else {
+    ::operator delete(data_, kAlignment);
+  }
+  data_ = nullptr;
+  bytes_ = 0;
+  mapped_ = false;
+  where_ = 0;
+  asset_ = {};
+}
+
+}  // namespace tandem

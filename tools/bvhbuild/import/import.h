@@ -1,9 +1,8 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
-#include <string>
 
-#include "polygon_mesh.h"
+#include "import/read_result.h"
 
 namespace tandem::build {
 
@@ -15,11 +14,7 @@ struct ImportOptions {
   std::uint64_t memory_limit_bytes = std::uint64_t{8} << 30;  ///< address space of that child
 };
 
-struct ImportResult {
-  bool ok = false;
-  PolygonMesh mesh;
-  std::string error;  ///< when not ok: the reason without the file's name, "line 12: ...", "byte 84: ...", "the reader crashed (signal 11)"
-};
+using ImportResult = ReadResult;
 
 /// Reads the polygons of a mesh file.
 ///

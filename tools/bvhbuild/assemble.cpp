@@ -1,0 +1,199 @@
+#include "assemble.h"
+
+#include <algorithm>
+#include <cstring>
+#include <new>
+#include <stdexcept>
+#include <vector>
+
+#include "tandem/formats/check.h"
+
+namespace tandem::build {
+namespace {
+
+constexpr std::align_val_t kAlignment{kSectionAlignment};
+
+std::uint64_t align_up(std::uint64_t offset) {
+  return (offset + kSectionAlignment - 1) / kSectionAlignment * kSectionAlignment;
+}
+
+// The section table, with offsets in the order in which sections are added.
+class Plan {
+ public:
+  explicit Plan(std::size_t section_count)
+      : end_(sizeof(FileHeader) + section_count * sizeof(Section)), expected_(section_count) {}
+
+  void add(SectionKind kind, std::uint32_t level, std::uint64_t count, std::uint64_t element_bytes) {
+    const std::uint64_t offset = align_up(end_);
+    sections_.push_back({kind, level, offset, count * element_bytes, count});
+    end_ = offset + count * element_bytes;
+  }
+
+  const std::vector<Section>& sections() const {
+    if (sections_.size() != expected_)
+      throw std::logic_error("the section table has another size than planned");
+    return sections_;
+  }
+  std::uint64_t file_bytes() const { return align_up(end_); }
+
+ private:
+  std::vector<Section> sections_;
+  std::uint64_t end_;
+  std::size_t expected_;
+};
+
+// Names and paths of the parts, one after the other.
+struct PartTable {
+  std::vector<Part> parts;
+  std::string strings;
+
+  explicit PartTable(std::span<const SourcePart> source) {
+    for (const SourcePart& part : source) {
+      Part row{};
+      append(part.name, row.name_offset, row.name_bytes);
+      append(part.node_path, row.path_offset, row.path_bytes);
+      row.first_face = part.first_face;
+      row.face_count = part.face_count;
+      parts.push_back(row);
+    }
+  }
+
+ private:
+  void append(const std::string& text, std::uint32_t& offset, std::uint32_t& bytes) {
+    if (strings.size() + text.size() >= kNoIndex)
+      throw std::length_error("the names of the parts exceed 4 GiB");
+    offset = static_cast<std::uint32_t>(strings.size());
+    bytes = static_cast<std::uint32_t>(text.size());
+    strings += text;
+  }
+};
+
+std::uint32_t part_of(std::span<const Part> parts, std::uint32_t face) {
+  const auto after = std::upper_bound(parts.begin(), parts.end(), face,
+                                      [](std::uint32_t f, const Part& part) { return f < part.first_face; });
+  return static_cast<std::uint32_t>(after - parts.begin() - 1);
+}
+
+void write_triangles(const AssetLevel& level, std::span<const Part> parts, Triangle* out) {
+  for (const std::uint32_t source : level.tree->order) {
+    Triangle triangle{};
+    for (int i = 0; i < 3; ++i) {
+      const auto& point = level.geometry.points[level.geometry.triangles[source][i]];
+      std::copy(point.begin(), point.end(), triangle.corner[i].position);
+    }
+    triangle.corner[0].w = level.face[source];
+    triangle.corner[1].w = part_of(parts, level.face[source]);
+    *out++ = triangle;
+  }
+}
+
+void write_bounds(const AssetLevel& level, FileHeader& header) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  std::fill_n(header.lower, 3, kInfinity);
+  std::fill_n(header.upper, 3, -kInfinity);
+  for (const auto& corners : level.geometry.triangles) {
+    for (const std::uint32_t vertex : corners) {
+      for (int k = 0; k < 3; ++k) {
+        header.lower[k] = std::min(header.lower[k], level.geometry.points[vertex][k]);
+        header.upper[k] = std::max(header.upper[k], level.geometry.points[vertex][k]);
+      }
+    }
+  }
+}
+
+Plan plan_sections(const PartTable& table, const AssetSource& source, std::span<const AssetLevel> levels) {
+  Plan plan(2 * levels.size() + 4);
+  plan.add(SectionKind::levels, 0, levels.size(), sizeof(Level));
+  for (std::uint32_t i = 0; i < levels.size(); ++i) {
+    plan.add(SectionKind::blocks, i, levels[i].tree->blocks.size(), sizeof(Block));
+    plan.add(SectionKind::triangles, i, levels[i].geometry.triangles.size(), sizeof(Triangle));
+  }
+  plan.add(SectionKind::parts, 0, table.parts.size(), sizeof(Part));
+  plan.add(SectionKind::strings, 0, table.strings.size(), 1);
+  plan.add(SectionKind::provenance, 0, source.provenance.size(), 1);
+  return plan;
+}
+
+FileHeader make_header(const AssetSource& source, std::span<const AssetLevel> levels, const Plan& plan) {
+  FileHeader header{};
+  std::copy_n(kMagic, sizeof kMagic, header.magic);
+  header.byte_order = kByteOrder;
+  header.version_major = kVersionMajor;
+  header.version_minor = kVersionMinor;
+  header.file_bytes = plan.file_bytes();
+  std::copy(source.origin.begin(), source.origin.end(), header.origin);
+  write_bounds(levels[0], header);
+  header.source_faces = source.source_faces;
+  header.rounding_error = source.rounding_error;
+  header.section_count = static_cast<std::uint32_t>(plan.sections().size());
+  header.level_count = static_cast<std::uint32_t>(levels.size());
+  return header;
+}
+
+Level make_level(const AssetLevel& level) {
+  Level row{};
+  row.triangle_count = static_cast<std::uint32_t>(level.geometry.triangles.size());
+  row.block_count = static_cast<std::uint32_t>(level.tree->blocks.size());
+  row.leaf_block_count = level.tree->leaf_block_count;
+  row.depth = level.tree->depth;
+  row.error_bound = level.error_bound;
+  return row;
+}
+
+// Copies into the image and checks that the copy fills its section exactly.
+void fill(Image& image, const Section& section, const void* data, std::size_t bytes) {
+  if (bytes != section.bytes) throw std::logic_error("a section has another size than planned");
+  if (bytes != 0) std::memcpy(image.data() + section.offset, data, bytes);
+}
+
+}  // namespace
+
+Image::Image(std::size_t bytes)
+    : data_(static_cast<std::byte*>(::operator new(bytes, kAlignment))), size_(bytes) {
+  std::memset(data_.get(), 0, bytes);
+}
+
+void Image::Delete::operator()(std::byte* data) const {
+  ::operator delete(data, kAlignment);
+}
+
+Image assemble(const AssetSource& source, std::span<const AssetLevel> levels) {
+  const PartTable table(source.parts);
+  const Plan plan = plan_sections(table, source, levels);
+  Image image(plan.file_bytes());
+  const FileHeader header = make_header(source, levels, plan);
+  std::memcpy(image.data(), &header, sizeof header);
+  std::memcpy(image.data() + sizeof header, plan.sections().data(), plan.sections().size() * sizeof(Section));
+
+  std::vector<Level> rows;
+  for (const AssetLevel& level : levels) rows.push_back(make_level(level));
+  for (const Section& section : plan.sections()) {
+    switch (section.kind) {
+      case SectionKind::levels:
+        fill(image, section, rows.data(), rows.size() * sizeof(Level));
+        break;
+      case SectionKind::blocks: {
+        const std::vector<Block>& blocks = levels[section.level].tree->blocks;
+        fill(image, section, blocks.data(), blocks.size() * sizeof(Block));
+        break;
+      }
+      case SectionKind::triangles:
+        write_triangles(levels[section.level], table.parts,
+                        reinterpret_cast<Triangle*>(image.data() + section.offset));
+        break;
+      case SectionKind::parts:
+        fill(image, section, table.parts.data(), table.parts.size() * sizeof(Part));
+        break;
+      case SectionKind::strings:
+        fill(image, section, table.strings.data(), table.strings.size());
+        break;
+      case SectionKind::provenance:
+        fill(image, section, source.provenance.data(), source.provenance.size());
+        break;
+    }
+  }
+  seal(image.data());
+  return image;
+}
+
+}  // namespace tandem::build

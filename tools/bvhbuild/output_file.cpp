@@ -1,0 +1,101 @@
+#include "output_file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <system_error>
+
+namespace tandem::build {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string reason_of(int error) {
+  return std::system_category().message(error);
+}
+
+// The temporary file that a signal must remove; empty when there is none. Plain memory, because a signal
+// handler reads it.
+std::array<char, 4096> g_temporary{};
+
+void remove_temporary_and_die(int signal) {
+  if (g_temporary[0] != '\0') ::unlink(g_temporary.data());
+  ::signal(signal, SIG_DFL);
+  ::raise(signal);
+}
+
+// While it lives, a deadly signal removes the temporary file first.
+class SignalGuard {
+ public:
+  explicit SignalGuard(const std::string& temporary) {
+    std::strncpy(g_temporary.data(), temporary.c_str(), g_temporary.size() - 1);
+    struct sigaction action {};
+    action.sa_handler = remove_temporary_and_die;
+    for (std::size_t i = 0; i < kSignals.size(); ++i) {
+      ::sigaction(kSignals[i], nullptr, &previous_[i]);
+      if (previous_[i].sa_handler != SIG_IGN) ::sigaction(kSignals[i], &action, nullptr);
+    }
+  }
+  ~SignalGuard() {
+    for (std::size_t i = 0; i < kSignals.size(); ++i) ::sigaction(kSignals[i], &previous_[i], nullptr);
+    g_temporary[0] = '\0';
+  }
+  SignalGuard(const SignalGuard&) = delete;
+  SignalGuard& operator=(const SignalGuard&) = delete;
+
+ private:
+  static constexpr std::array<int, 3> kSignals = {SIGINT, SIGTERM, SIGHUP};
+  std::array<struct sigaction, 3> previous_{};
+};
+
+// Writes everything; 0 or an error number.
+int write_all(int file, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(file, bytes.data(), bytes.size());
+    if (written < 0 && errno != EINTR) return errno;
+    if (written > 0) bytes = bytes.subspan(static_cast<std::size_t>(written));
+  }
+  return 0;
+}
+
+std::string write_in_place(const fs::path& path, std::span<const std::byte> bytes) {
+  const int file = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
+  if (file < 0) return reason_of(errno);
+  int error = write_all(file, bytes);
+  if (::close(file) != 0 && error == 0) error = errno;
+  return error == 0 ? std::string() : reason_of(error);
+}
+
+std::string write_and_rename(const fs::path& target, std::span<const std::byte> bytes) {
+  const std::string temporary = target.string() + ".tmp" + std::to_string(::getpid());
+  if (temporary.size() >= g_temporary.size()) return reason_of(ENAMETOOLONG);
+  ::unlink(temporary.c_str());  // left behind by a killed process that had our number
+  const SignalGuard guard(temporary);
+  const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (file < 0) return reason_of(errno);
+  int error = write_all(file, bytes);
+  if (error == 0 && ::fsync(file) != 0) error = errno;
+  if (::close(file) != 0 && error == 0) error = errno;
+  if (error == 0 && ::rename(temporary.c_str(), target.c_str()) != 0) error = errno;
+  if (error != 0) ::unlink(temporary.c_str());
+  return error == 0 ? std::string() : reason_of(error);
+}
+
+}  // namespace
+
+std::string write_whole_file(const fs::path& path, std::span<const std::byte> bytes) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (fs::is_directory(status)) return "is a folder";
+  if (fs::exists(status) && !fs::is_regular_file(status)) return write_in_place(path, bytes);
+  const fs::path target =
+      fs::is_symlink(fs::symlink_status(path, error)) ? fs::weakly_canonical(path, error) : path;
+  return write_and_rename(target.empty() ? path : target, bytes);
+}
+
+}  // namespace tandem::build

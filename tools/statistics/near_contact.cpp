@@ -1,0 +1,150 @@
+#include <array>
+#include <cmath>
+
+#include "statistics.h"
+#include "tandem/kernels/box_test.h"
+
+namespace tandem {
+namespace {
+
+using Vector = std::array<double, 3>;
+using Matrix = std::array<Vector, 3>;
+
+// SplitMix64 (Steele, Lea and Flood 2014): the same numbers on every platform, which standard distributions
+// are not.
+class Random {
+ public:
+  double uniform() {  // in [0, 1)
+    std::uint64_t z = state_ += 0x9E3779B97F4A7C15u;
+    z = (z ^ z >> 30) * 0xBF58476D1CE4E5B9u;
+    z = (z ^ z >> 27) * 0x94D049BB133111EBu;
+    return static_cast<double>((z ^ z >> 31) >> 11) * 0x1p-53;
+  }
+
+ private:
+  std::uint64_t state_ = 2009;
+};
+
+// A uniformly distributed rotation from a random unit quaternion (Shoemake 1992).
+Matrix random_rotation(Random& random) {
+  constexpr double kTurn = 6.283185307179586;
+  const double u = random.uniform(), v = kTurn * random.uniform(), w = kTurn * random.uniform();
+  const double x = std::sqrt(1 - u) * std::sin(v), y = std::sqrt(1 - u) * std::cos(v);
+  const double z = std::sqrt(u) * std::sin(w), s = std::sqrt(u) * std::cos(w);
+  return {{{1 - 2 * (y * y + z * z), 2 * (x * y - s * z), 2 * (x * z + s * y)},
+           {2 * (x * y + s * z), 1 - 2 * (x * x + z * z), 2 * (y * z - s * x)},
+           {2 * (x * z - s * y), 2 * (y * z + s * x), 1 - 2 * (x * x + y * y)}}};
+}
+
+Vector random_direction(Random& random) {
+  const double z = 2 * random.uniform() - 1, angle = 6.283185307179586 * random.uniform(),
+               r = std::sqrt(1 - z * z);
+  return {r * std::cos(angle), r * std::sin(angle), z};
+}
+
+struct Work {
+  std::uint64_t block_pairs = 0, candidates = 0;
+};
+
+// Plain depth-first tandem traversal of a tree against itself, posed. A leaf block keeps still while the
+// other side descends; `mask` says which of its leaves take part, so that no pair is met twice (the paper's
+// figures 3 and 4).
+class TandemWalk {
+ public:
+  TandemWalk(const Block* blocks, const RelativePose& b_in_a, bool stop_at_first)
+      : blocks_(blocks), b_in_a_(b_in_a), stop_at_first_(stop_at_first) {}
+
+  Work run() {
+    visit(0, 0, kAll, kAll);
+    return work_;
+  }
+
+ private:
+  static constexpr unsigned kAll = 15;
+
+  void visit(std::uint32_t a, std::uint32_t b, unsigned mask_a, unsigned mask_b) {
+    if (stop_at_first_ && work_.candidates > 0) return;
+    ++work_.block_pairs;
+    const Block &block_a = blocks_[a], &block_b = blocks_[b];
+    unsigned hits[kNodesPerBlock] = {};  // of each node of a: the nodes of b that it overlaps
+    for (int i = 0; i < kNodesPerBlock; ++i) {
+      for (int j = 0; j < kNodesPerBlock; ++j) {
+        const bool in_mask = (mask_a >> i & mask_b >> j & 1) != 0;
+        if (in_mask && overlap_15_axes(box_of(block_a, i), box_of(block_b, j), b_in_a_)) hits[i] |= 1u << j;
+      }
+    }
+    descend(a, b, hits);
+  }
+
+  void descend(std::uint32_t a, std::uint32_t b, const unsigned* hits) {
+    const Block &block_a = blocks_[a], &block_b = blocks_[b];
+    const bool leaves_a = block_a.is_leaf_block(), leaves_b = block_b.is_leaf_block();
+    for (int i = 0; i < kNodesPerBlock; ++i) {
+      if (!leaves_a && leaves_b && hits[i] != 0) visit(block_a.index[i], b, kAll, hits[i]);
+      for (int j = 0; j < kNodesPerBlock; ++j) {
+        if ((hits[i] >> j & 1) == 0) continue;
+        if (leaves_a && leaves_b) ++work_.candidates;
+        if (!leaves_a && !leaves_b) visit(block_a.index[i], block_b.index[j], kAll, kAll);
+      }
+    }
+    if (!leaves_a || leaves_b) return;
+    for (int j = 0; j < kNodesPerBlock; ++j) {
+      unsigned mask_a = 0;
+      for (int i = 0; i < kNodesPerBlock; ++i) mask_a |= (hits[i] >> j & 1) << i;
+      if (mask_a != 0) visit(a, block_b.index[j], mask_a, kAll);
+    }
+  }
+
+  const Block* blocks_;
+  RelativePose b_in_a_;
+  bool stop_at_first_;
+  Work work_;
+};
+
+// Turns about the centre of the bounds, then moves by `distance` along `direction`.
+RelativePose make_pose(const Matrix& rotation, const Vector& direction, double distance,
+                       const Vector& center) {
+  RelativePose pose{};
+  for (int i = 0; i < 3; ++i) {
+    double t = center[i] + distance * direction[i];
+    for (int j = 0; j < 3; ++j) {
+      pose.rotation[i][j] = static_cast<float>(rotation[i][j]);
+      t -= rotation[i][j] * center[j];
+    }
+    pose.translation[i] = static_cast<float>(t);
+  }
+  return pose;
+}
+
+}  // namespace
+
+ExpectedWork sample_near_contact(const LevelView& level, const float* lower, const float* upper,
+                                 std::uint32_t poses) {
+  Vector center{};
+  double radius = 0;
+  for (int k = 0; k < 3; ++k) {
+    center[k] = 0.5 * (static_cast<double>(lower[k]) + upper[k]);
+    radius = std::hypot(radius, 0.5 * (static_cast<double>(upper[k]) - lower[k]));
+  }
+  Random random;
+  ExpectedWork sum;
+  sum.poses = poses;
+  for (std::uint32_t i = 0; i < poses; ++i) {
+    const Matrix rotation = random_rotation(random);
+    const Vector direction = random_direction(random);
+    const auto work_at = [&](double distance, bool stop_at_first) {
+      return TandemWalk(level.blocks, make_pose(rotation, direction, distance, center), stop_at_first).run();
+    };
+    double touching = 0, apart = 2.1 * radius;
+    for (int step = 0; step < 20; ++step) {
+      const double middle = 0.5 * (touching + apart);
+      (work_at(middle, true).candidates > 0 ? touching : apart) = middle;
+    }
+    const Work work = work_at(touching - 0.05 * random.uniform() * radius, false);
+    sum.block_pairs += static_cast<double>(work.block_pairs) / poses;
+    sum.candidates += static_cast<double>(work.candidates) / poses;
+  }
+  return sum;
+}
+
+}  // namespace tandem

@@ -1,0 +1,41 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "tandem/formats/view.h"
+
+namespace tandem {
+
+/// What is worth knowing of a tree before it is queried. Meanings in docs/statistics.md.
+struct TreeStatistics {
+  std::uint64_t triangles = 0;
+  std::uint64_t nodes = 0;  ///< of all kinds
+  std::uint64_t leaf_nodes = 0, internal_nodes = 0, imaginary_nodes = 0;
+  std::uint64_t imaginary_minimum = 0;  ///< the fewest that a pure tree over this many triangles can have
+  double imaginary_fraction = 0;        ///< imaginary_nodes / nodes
+  std::uint64_t leaf_blocks = 0, internal_blocks = 0, partial_leaf_blocks = 0;
+  std::uint32_t depth = 0;  ///< blocks from the root block to the deepest leaf block, both counted
+  double leaf_fill = 0;     ///< leaves / (4 * leaf_blocks)
+  double sah_cost = 0;      ///< 1 + sum of the surfaces of internal nodes / surface of the bounds: expected
+                            ///< blocks that a random ray visits
+  std::vector<std::uint64_t> leaf_blocks_at_depth;  ///< index d: leaf blocks at depth d + 1
+  std::uint64_t blocks_with_fill[5] = {};           ///< index n: blocks with n nodes that are not imaginary
+};
+
+/// Counts everything in one pass over the blocks. Condition: a checked asset's level and its bounds.
+TreeStatistics measure_tree(const LevelView& level, const float* lower, const float* upper);
+
+/// The mean work of a tandem query of a tree against itself, over poses close to first contact.
+struct ExpectedWork {
+  double block_pairs = 0;  ///< units of 4 x 4 box tests
+  double candidates = 0;   ///< leaf pairs whose boxes overlap
+  std::uint32_t poses = 0;
+};
+
+/// Samples poses: a random rotation, a random direction, the distance at which the first leaf boxes begin to
+/// overlap, found by bisection, then pushed in by 0 to 5 % of the radius of the bounds. Seeded, so the same
+/// tree always gets the same figures.
+ExpectedWork sample_near_contact(const LevelView& level, const float* lower, const float* upper,
+                                 std::uint32_t poses = 64);
+
+}  // namespace tandem

@@ -1,0 +1,146 @@
+#include "clean.h"
+
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <bit>
+
+#include "exact_predicates.h"
+#include "index_table.h"
+
+namespace tandem::build {
+namespace {
+
+/// Calls visit(i, hash(i)) in order for all i below `count`, with the table's slots on their way from memory:
+/// welding is bound by cache misses, and a batch waits for them together.
+template <class Hash, class Visit>
+void for_each_prefetched(std::size_t count, const IndexTable& table, const Hash& hash, const Visit& visit) {
+  constexpr std::size_t kBatch = 32;
+  std::array<std::uint64_t, kBatch> hashes;
+  for (std::size_t first = 0; first < count; first += kBatch) {
+    const std::size_t batch = std::min(kBatch, count - first);
+    for (std::size_t i = 0; i < batch; ++i) table.prefetch(hashes[i] = hash(first + i));
+    for (std::size_t i = 0; i < batch; ++i) visit(static_cast<std::uint32_t>(first + i), hashes[i]);
+  }
+}
+
+/// The same place with one spelling of zero, so that equal places are equal bit by bit.
+Point normalised(const Point& p) {
+  return {p[0] + 0.0, p[1] + 0.0, p[2] + 0.0};
+}
+
+std::uint64_t hash_place(const Point& p) {
+  return hash_words(std::bit_cast<std::uint64_t>(p[0]), std::bit_cast<std::uint64_t>(p[1]),
+                    std::bit_cast<std::uint64_t>(p[2]));
+}
+
+/// For each point: 0 when a triangle uses it, else kNoVertex.
+std::vector<std::uint32_t> mark_used(const TriangleMesh& mesh) {
+  std::vector<std::uint32_t> mark(mesh.points.size(), kNoVertex);
+  for (const Triangle& triangle : mesh.triangles)
+    for (const std::uint32_t corner : triangle) mark[corner] = 0;
+  return mark;
+}
+
+void rename_corners(TriangleMesh& mesh, const std::vector<std::uint32_t>& new_index) {
+  for (Triangle& triangle : mesh.triangles)
+    for (std::uint32_t& corner : triangle) corner = new_index[corner];
+}
+
+/// Points move to the front as they are found to be new, which never overtakes the reading: a new index is at
+/// most the old.
+void weld(TriangleMesh& mesh, CleanReport& report) {
+  std::vector<std::uint32_t> new_index = mark_used(mesh);
+  IndexTable table(mesh.points.size());
+  std::uint32_t kept = 0;
+  std::uint64_t used = 0;
+  const auto hash = [&](std::size_t i) { return hash_place(normalised(mesh.points[i])); };
+  for_each_prefetched(mesh.points.size(), table, hash, [&](std::uint32_t i, std::uint64_t hash_i) {
+    if (new_index[i] == kNoVertex) return;
+    ++used;
+    const Point place = normalised(mesh.points[i]);
+    new_index[i] =
+        table.find_or_insert(hash_i, kept, [&](std::uint32_t k) { return mesh.points[k] == place; });
+    if (new_index[i] == kept) mesh.points[kept++] = place;
+  });
+  mesh.points.resize(kept);
+  mesh.points.shrink_to_fit();
+  rename_corners(mesh, new_index);
+  report.vertices_welded += used - kept;
+}
+
+bool degenerate(const TriangleMesh& mesh, const Triangle& t) {
+  if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) return true;
+  return collinear(mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]]);
+}
+
+void drop_degenerate(TriangleMesh& mesh, CleanReport& report) {
+  const tbb::blocked_range<std::size_t> all(0, mesh.triangles.size(), 4096);
+  tbb::parallel_for(all, [&](const tbb::blocked_range<std::size_t>& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i)
+      if (degenerate(mesh, mesh.triangles[i])) mesh.triangles[i][0] = kNoVertex;
+  });
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    if (mesh.triangles[i][0] == kNoVertex) continue;
+    mesh.triangles[kept] = mesh.triangles[i];
+    mesh.face[kept++] = mesh.face[i];
+  }
+  report.triangles_degenerate += mesh.triangles.size() - kept;
+  mesh.triangles.resize(kept);
+  mesh.face.resize(kept);
+}
+
+void drop_unused_points(TriangleMesh& mesh) {
+  std::vector<std::uint32_t> new_index = mark_used(mesh);
+  std::uint32_t kept = 0;
+  for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+    if (new_index[i] == kNoVertex) continue;
+    mesh.points[kept] = mesh.points[i];
+    new_index[i] = kept++;
+  }
+  if (kept == mesh.points.size()) return;
+  mesh.points.resize(kept);
+  rename_corners(mesh, new_index);
+}
+
+/// The corners rotated so that the smallest comes first: the same for all spellings of one orientation.
+Triangle rotated(const Triangle& t) {
+  if (t[0] < t[1] && t[0] < t[2]) return t;
+  if (t[1] < t[2]) return {t[1], t[2], t[0]};
+  return {t[2], t[0], t[1]};
+}
+
+/// The orientation of the two in which the middle corner is smaller than the last.
+Triangle unoriented(const Triangle& t) {
+  const Triangle r = rotated(t);
+  return r[1] < r[2] ? r : Triangle{r[0], r[2], r[1]};
+}
+
+void count_duplicates(const TriangleMesh& mesh, CleanReport& report) {
+  IndexTable table(mesh.triangles.size());
+  const auto hash = [&](std::size_t i) {
+    const Triangle t = unoriented(mesh.triangles[i]);
+    return hash_words(t[0], t[1], t[2]);
+  };
+  for_each_prefetched(mesh.triangles.size(), table, hash, [&](std::uint32_t i, std::uint64_t hash_i) {
+    const Triangle mine = unoriented(mesh.triangles[i]);
+    const auto same = [&](std::uint32_t k) { return unoriented(mesh.triangles[k]) == mine; };
+    const std::uint32_t earlier = table.find_or_insert(hash_i, i, same);
+    if (earlier == i) return;
+    ++report.triangles_duplicate;
+    if (rotated(mesh.triangles[earlier]) != rotated(mesh.triangles[i])) ++report.triangles_duplicate_reversed;
+  });
+}
+
+}  // namespace
+
+void clean(TriangleMesh& mesh, CleanReport& report) {
+  weld(mesh, report);
+  drop_degenerate(mesh, report);
+  drop_unused_points(mesh);
+  count_duplicates(mesh, report);
+}
+
+}  // namespace tandem::build

@@ -1,0 +1,57 @@
+#include "clean_report.h"
+
+namespace tandem::build {
+namespace {
+
+/// "1 face is bad", "3 faces are bad", "1,234 ..." without separators: numbers stay easy to search for.
+std::string sentence(std::uint64_t count, const char* noun_one, const char* noun_many, const char* verb_one,
+                     const char* verb_many, const char* rest) {
+  const bool one = count == 1;
+  return std::to_string(count) + " " + (one ? noun_one : noun_many) + " " + (one ? verb_one : verb_many) +
+         " " + rest;
+}
+
+std::string faces(std::uint64_t count, const char* one, const char* many, const char* rest) {
+  return sentence(count, "face", "faces", one, many, rest);
+}
+
+std::string vertices(std::uint64_t count, const char* one, const char* many, const char* rest) {
+  return sentence(count, "vertex", "vertices", one, many, rest);
+}
+
+std::string triangles(std::uint64_t count, const char* one, const char* many, const char* rest) {
+  return sentence(count, "triangle", "triangles", one, many, rest);
+}
+
+}  // namespace
+
+std::vector<Finding> findings(const CleanReport& r) {
+  return {
+      {"faces_index_out_of_range", r.faces_index_out_of_range,
+       faces(r.faces_index_out_of_range, "names", "name", "a vertex that the file does not have; dropped"),
+       true},
+      {"faces_not_finite", r.faces_not_finite,
+       faces(r.faces_not_finite, "has", "have", "a coordinate that is NaN or infinite; dropped"), true},
+      {"faces_too_large", r.faces_too_large,
+       faces(r.faces_too_large, "has", "have", "a coordinate too large for float32; dropped"), true},
+      {"faces_not_simple", r.faces_not_simple,
+       faces(r.faces_not_simple, "has", "have", "an outline that crosses itself; split as a fan"), true},
+      {"vertices_unreferenced", r.vertices_unreferenced,
+       vertices(r.vertices_unreferenced, "belongs", "belong", "to no face; dropped"), true},
+      {"vertices_welded", r.vertices_welded,
+       vertices(r.vertices_welded, "lies", "lie", "exactly on an earlier one; welded"), false},
+      {"triangles_degenerate", r.triangles_degenerate,
+       triangles(r.triangles_degenerate, "has", "have", "all corners on one line; dropped"), true},
+      {"triangles_duplicate", r.triangles_duplicate,
+       triangles(r.triangles_duplicate, "repeats", "repeat", "an earlier one, in either direction; kept"),
+       true},
+      {"triangles_duplicate_reversed", r.triangles_duplicate_reversed,
+       triangles(r.triangles_duplicate_reversed, "repeats", "repeat",
+                 "an earlier one with the opposite orientation; kept"),
+       true},
+      {"triangles_flattened", r.triangles_flattened,
+       triangles(r.triangles_flattened, "becomes", "become", "flat when rounded to float32; kept"), true},
+  };
+}
+
+}  // namespace tandem::build

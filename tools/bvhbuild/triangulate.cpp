@@ -1,0 +1,203 @@
+#include "triangulate.h"
+
+#include <algorithm>
+#include <cfloat>
+#include <cmath>
+#include <optional>
+#include <span>
+
+#include "exact_predicates.h"
+#include "polygon_cdt.h"
+
+namespace tandem::build {
+namespace {
+
+using Corners = std::span<const std::uint32_t>;
+
+/// Newell's normal, up to a positive factor. The factor, a power of two, keeps the products away from
+/// underflow.
+Point newell_normal(std::span<const Point> p) {
+  double size = 0;
+  for (const Point& q : p)
+    for (int k = 0; k < 3; ++k) size = std::max(size, std::abs(q[k] - p[0][k]));
+  const double scale = size > 0 ? std::scalbn(1.0, -std::max(std::ilogb(size), -1000)) : 1.0;
+  const auto at = [&](std::size_t i, int k) { return (p[i][k] - p[0][k]) * scale; };
+  Point normal{};
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    const std::size_t j = i + 1 < p.size() ? i + 1 : 0;
+    for (int k = 0; k < 3; ++k) {
+      const int u = (k + 1) % 3;
+      const int v = (k + 2) % 3;
+      normal[k] += at(i, u) * at(j, v) - at(j, u) * at(i, v);
+    }
+  }
+  return normal;
+}
+
+/// The axes worth projecting along, best first, then -1. An outline seen nearly edge-on (beyond about 75
+/// degrees) says nothing.
+std::array<int, 3> projection_axes(std::span<const Point> corners) {
+  const Point normal = newell_normal(corners);
+  const auto length = [&](int k) { return std::abs(normal[k]); };
+  std::array<int, 3> axes{0, 1, 2};
+  std::stable_sort(axes.begin(), axes.end(), [&](int a, int b) { return length(a) > length(b); });
+  const double least = length(axes[0]) / 4;
+  for (int& axis : axes)
+    if (length(axis) < least) axis = -1;
+  return axes;
+}
+
+double squared_distance(const Point& a, const Point& b) {
+  const double x = a[0] - b[0];
+  const double y = a[1] - b[1];
+  const double z = a[2] - b[2];
+  return x * x + y * y + z * z;
+}
+
+/// How well two triangles fit side by side: 2 both face the same way, 1 one of them is flat, 0 they overlap
+/// or are flat.
+int fit(int first, int second) {
+  if (first == 0 && second == 0) return 0;
+  return first * second + 1;
+}
+
+/// Whether to cut a quad from corner 0 to 2 (true) or from 1 to 3 (false); nothing when both diagonals leave
+/// it. Of a simple quad at least one diagonal lies inside, and the pieces on its two sides then have the same
+/// orientation.
+std::optional<bool> inner_diagonal(std::span<const Point> p, int axis) {
+  std::array<Point2, 4> q;
+  for (int i = 0; i < 4; ++i) q[i] = {p[i][(axis + 1) % 3], p[i][(axis + 2) % 3]};
+  const int fit_02 = fit(orientation(q[0], q[1], q[2]), orientation(q[0], q[2], q[3]));
+  const int fit_13 = fit(orientation(q[0], q[1], q[3]), orientation(q[1], q[2], q[3]));
+  if (fit_02 == 0 && fit_13 == 0) return std::nullopt;
+  if (fit_02 != fit_13) return fit_02 > fit_13;
+  return squared_distance(p[0], p[2]) <= squared_distance(p[1], p[3]);
+}
+
+class Triangulator {
+ public:
+  Triangulator(const PolygonMesh& mesh, TriangleMesh& out, CleanReport& report)
+      : mesh_(mesh), out_(out), report_(report) {}
+
+  void add(std::uint32_t face) {
+    const Corners corners =
+        Corners(mesh_.corners)
+            .subspan(mesh_.face_begin[face], mesh_.face_begin[face + 1] - mesh_.face_begin[face]);
+    if (corners.size() < 3 || !usable(corners)) return;
+    if (corners.size() == 3) return emit(face, {corners[0], corners[1], corners[2]});
+    gather(corners);
+    if (points_.size() < 3) return emit(face, {corners[0], corners[0], corners[0]});
+    split();
+    for (const Triangle& t : pieces_) emit(face, {vertices_[t[0]], vertices_[t[1]], vertices_[t[2]]});
+  }
+
+ private:
+  bool usable(Corners corners) {
+    for (const std::uint32_t corner : corners)
+      if (corner >= mesh_.points.size()) return drop(report_.faces_index_out_of_range);
+    bool finite = true;
+    bool small = true;
+    for (const std::uint32_t corner : corners)
+      for (const double x : mesh_.points[corner]) {
+        finite &= std::isfinite(x);
+        small &= std::abs(x) <= double{FLT_MAX};
+      }
+    if (!finite) return drop(report_.faces_not_finite);
+    return small || drop(report_.faces_too_large);
+  }
+
+  static bool drop(std::uint64_t& count) {
+    ++count;
+    return false;
+  }
+
+  void emit(std::uint32_t face, const Triangle& triangle) {
+    out_.triangles.push_back(triangle);
+    out_.face.push_back(face);
+  }
+
+  /// The face's corners without those at the place of their predecessor. A face all in one place keeps one
+  /// corner.
+  void gather(Corners corners) {
+    points_.clear();
+    vertices_.clear();
+    for (const std::uint32_t corner : corners) {
+      if (!points_.empty() && points_.back() == mesh_.points[corner]) continue;
+      points_.push_back(mesh_.points[corner]);
+      vertices_.push_back(corner);
+    }
+    while (points_.size() > 1 && points_.back() == points_.front()) {
+      points_.pop_back();
+      vertices_.pop_back();
+    }
+  }
+
+  void split() {
+    pieces_.clear();
+    if (points_.size() == 3) {
+      pieces_.push_back({0, 1, 2});
+      return;
+    }
+    for (const int axis : projection_axes(points_))
+      if (axis >= 0 && (points_.size() == 4 ? split_quad(axis) : cdt_.triangulate(points_, axis, pieces_)))
+        return;
+    fan();
+  }
+
+  bool split_quad(int axis) {
+    const std::optional<bool> diagonal = inner_diagonal(points_, axis);
+    if (!diagonal) return false;
+    const std::uint32_t apex = *diagonal ? 0 : 3;
+    pieces_.push_back({apex, *diagonal ? 1u : 0u, *diagonal ? 2u : 1u});
+    pieces_.push_back({apex, *diagonal ? 2u : 1u, *diagonal ? 3u : 2u});
+    return true;
+  }
+
+  /// Faces on one line end here as well; their triangles are degenerate and counted as such.
+  void fan() {
+    for (std::uint32_t i = 2; i < points_.size(); ++i) pieces_.push_back({0, i - 1, i});
+    const bool on_a_line = std::all_of(points_.begin(), points_.end(),
+                                       [&](const Point& p) { return collinear(points_[0], points_[1], p); });
+    if (!on_a_line) ++report_.faces_not_simple;
+  }
+
+  const PolygonMesh& mesh_;
+  TriangleMesh& out_;
+  CleanReport& report_;
+  PolygonCdt cdt_;
+  std::vector<Point> points_;            ///< corners of the face at hand
+  std::vector<std::uint32_t> vertices_;  ///< their indices
+  std::vector<Triangle> pieces_;         ///< of the face at hand, by corner
+};
+
+std::uint64_t count_unreferenced(const PolygonMesh& mesh) {
+  std::vector<bool> referenced(mesh.points.size(), false);
+  for (const std::uint32_t corner : mesh.corners)
+    if (corner < referenced.size()) referenced[corner] = true;
+  return static_cast<std::uint64_t>(std::count(referenced.begin(), referenced.end(), false));
+}
+
+/// Each face of n corners makes at most n - 2 triangles, but for outlines that touch themselves.
+std::size_t expected_triangles(const PolygonMesh& mesh) {
+  return mesh.corners.size() - std::min(mesh.corners.size(), 2 * mesh.face_count());
+}
+
+}  // namespace
+
+TriangleMesh triangulate(PolygonMesh& mesh, CleanReport& report) {
+  report.faces = mesh.face_count();
+  report.vertices = mesh.points.size();
+  report.vertices_unreferenced = count_unreferenced(mesh);
+  TriangleMesh out;
+  out.triangles.reserve(expected_triangles(mesh));
+  out.face.reserve(expected_triangles(mesh));
+  Triangulator triangulator(mesh, out, report);
+  for (std::uint32_t face = 0; face < mesh.face_count(); ++face) triangulator.add(face);
+  out.points = std::move(mesh.points);
+  mesh.points = {};
+  mesh.corners = {};
+  mesh.face_begin = {0};
+  return out;
+}
+
+}  // namespace tandem::build

@@ -1,0 +1,22 @@
+#pragma once
+#include "clean_report.h"
+#include "polygon_mesh.h"
+#include "triangle_mesh.h"
+
+namespace tandem::build {
+
+/// Splits the faces of a file into triangles.
+///
+/// Effect: takes points, corners and face_begin out of `mesh` (name, parts and remarks stay) and counts in
+/// `report`. Result: the triangles in the order of the faces. Faces with an index out of range, a coordinate
+/// that is not finite or one beyond +-FLT_MAX are left out, each counted once, under the first of these that
+/// holds.
+///
+/// Triangles stay as they are. A corner at the same place as the one before it is skipped in larger faces. A
+/// quad is cut along the diagonal that lies inside, the shorter one if both do. A larger face is projected
+/// along the main axis of its Newell normal (Newell in Sutherland, Sproull & Schumacker 1974) and
+/// triangulated exactly, holes reached by bridges included. Only the face's own vertices appear, and its
+/// orientation stays. An outline that crosses itself makes a fan. The same input gives the same triangles.
+TriangleMesh triangulate(PolygonMesh& mesh, CleanReport& report);
+
+}  // namespace tandem::build

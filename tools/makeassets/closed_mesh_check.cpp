@@ -19,7 +19,8 @@ using SurfaceMesh = CGAL::Surface_mesh<Kernel::Point_3>;
 
 bool has_flat_triangle(const SurfaceMesh& surface) {
   const auto all = faces(surface);
-  return std::any_of(all.begin(), all.end(), [&](auto f) { return pmp::is_degenerate_triangle_face(f, surface); });
+  return std::any_of(all.begin(), all.end(),
+                     [&](auto f) { return pmp::is_degenerate_triangle_face(f, surface); });
 }
 
 std::size_t component_count(SurfaceMesh& surface) {
@@ -36,7 +37,8 @@ long euler_characteristic(const SurfaceMesh& surface) {
 
 std::string closed_mesh_defect(const Mesh& mesh, std::size_t triangles) {
   if (mesh.triangles.size() != triangles) {
-    return "it has " + std::to_string(mesh.triangles.size()) + " triangles instead of " + std::to_string(triangles);
+    return "it has " + std::to_string(mesh.triangles.size()) + " triangles instead of " +
+           std::to_string(triangles);
   }
   if (!pmp::is_polygon_soup_a_polygon_mesh(mesh.triangles)) return "it is not an oriented 2-manifold";
   std::vector<Kernel::Point_3> points;

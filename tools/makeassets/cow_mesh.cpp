@@ -19,14 +19,16 @@ namespace simplification = CGAL::Surface_mesh_simplification;
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using SurfaceMesh = CGAL::Surface_mesh<Kernel::Point_3>;
 
-// Half the radius of the thinnest part (a horn's tip): finer than any feature, coarse enough to build in seconds.
+// Half the radius of the thinnest part (a horn's tip): finer than any feature, coarse enough to build in
+// seconds.
 constexpr double kCell = 0.006;
 
 SurfaceMesh to_surface_mesh(const Mesh& mesh) {
   SurfaceMesh surface;
   for (const auto& [x, y, z] : mesh.points) surface.add_vertex({x, y, z});
   for (const auto& [a, b, c] : mesh.triangles)
-    surface.add_face(SurfaceMesh::Vertex_index(a), SurfaceMesh::Vertex_index(b), SurfaceMesh::Vertex_index(c));
+    surface.add_face(SurfaceMesh::Vertex_index(a), SurfaceMesh::Vertex_index(b),
+                     SurfaceMesh::Vertex_index(c));
   return surface;
 }
 
@@ -50,12 +52,13 @@ void remesh(SurfaceMesh& surface) {
                                                      CGAL::parameters::number_of_iterations(2));
 }
 
-// Plane quadrics give most triangles to horns, head and hooves, where the surface bends most. The filter refuses a
-// collapse that would fold the surface over.
+// Plane quadrics give most triangles to horns, head and hooves, where the surface bends most. The filter
+// refuses a collapse that would fold the surface over.
 void reduce(SurfaceMesh& surface, std::size_t triangles) {
   using Policies = simplification::GarlandHeckbert_plane_policies<SurfaceMesh, Kernel>;
   Policies policies(surface);
-  // A closed mesh has 3 edges for 2 triangles, and a collapse takes 3 edges; the predicate stops *below* its number.
+  // A closed mesh has 3 edges for 2 triangles, and a collapse takes 3 edges; the predicate stops *below* its
+  // number.
   const simplification::Count_stop_predicate<SurfaceMesh> stop(triangles / 2 * 3 + 1);
   simplification::edge_collapse(surface, stop,
                                 CGAL::parameters::get_cost(policies.get_cost())

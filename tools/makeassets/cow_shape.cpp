@@ -18,8 +18,9 @@ double distance(const CowShape::Ellipsoid& e, const Point& p) {
   return length(scaled) * (length(scaled) - 1) / steepness;
 }
 
-// The distance to a cone of spheres along an axis. A point belongs to the sphere whose centre it meets when it is
-// moved to the axis along the normal of the cone, which leans by (r0 - r1) / |axis| from the perpendicular.
+// The distance to a cone of spheres along an axis. A point belongs to the sphere whose centre it meets when
+// it is moved to the axis along the normal of the cone, which leans by (r0 - r1) / |axis| from the
+// perpendicular.
 double distance(const CowShape::RoundCone& c, const Point& p) {
   const double stretch = 1 / c.squeeze - 1;
   const auto unsqueeze = [&](const Point& v) { return v + (stretch * dot(v, c.across)) * c.across; };
@@ -46,9 +47,9 @@ CowShape::CowShape() {
   add_trunk();
   add_neck_and_head();
   for (const double side : {-1.0, 1.0}) add_ear_and_horn(side);
-  // A slow walk: each leg can be told from its neighbour when seen from the side.
-  add_fore_leg(1, 0.09);
-  add_fore_leg(-1, -0.07);
+  // A slow walk: all four legs can be told apart from the side and from the front.
+  add_fore_leg(1, -0.06);
+  add_fore_leg(-1, 0.07);
   add_hind_leg(1, -0.08);
   add_hind_leg(-1, 0.08);
   add_udder();
@@ -59,37 +60,47 @@ double CowShape::operator()(const Point& p) const {
   double d = 1e9;
   for (const auto& [shape, blend] : ellipsoids_) d = smooth_min(d, distance(shape, p), blend);
   for (const auto& [shape, blend] : cones_) d = smooth_min(d, distance(shape, p), blend);
+  for (const RoundCone& nostril : nostrils_) d = std::max(d, -distance(nostril, p));
   return std::max(d, -p[2]);  // the hooves are cut flat by the ground
 }
 
-Bounds CowShape::bounds() const { return {{-0.66, -0.32, -0.02}, {0.96, 0.32, 1.06}}; }
+Bounds CowShape::bounds() const {
+  return {{-0.66, -0.32, -0.02}, {0.96, 0.32, 1.06}};
+}
 
 void CowShape::add_trunk() {
-  add(Ellipsoid{{-0.05, 0, 0.560}, {0.42, 0.190, 0.245}}, 0.08);    // barrel
-  add(Ellipsoid{{-0.06, 0, 0.460}, {0.29, 0.180, 0.170}}, 0.08);    // belly
-  add(Ellipsoid{{0.26, 0, 0.585}, {0.16, 0.155, 0.225}}, 0.08);     // shoulders
-  add(Ellipsoid{{-0.34, 0, 0.630}, {0.155, 0.155, 0.165}}, 0.08);   // rump
-  add(Ellipsoid{{0.36, 0, 0.450}, {0.085, 0.070, 0.105}}, 0.08);    // brisket
+  add(Ellipsoid{{-0.05, 0, 0.560}, {0.42, 0.190, 0.245}}, 0.08);            // barrel
+  add(Ellipsoid{{-0.06, 0, 0.460}, {0.29, 0.180, 0.170}}, 0.08);            // belly
+  add(Ellipsoid{{0.26, 0, 0.585}, {0.16, 0.155, 0.225}}, 0.08);             // shoulders
+  add(Ellipsoid{{-0.34, 0, 0.630}, {0.155, 0.155, 0.165}}, 0.08);           // rump
+  add(Ellipsoid{{0.36, 0, 0.450}, {0.085, 0.070, 0.105}}, 0.08);            // brisket
   add(RoundCone{{-0.42, 0, 0.755}, 0.045, {0.26, 0, 0.770}, 0.045}, 0.07);  // back
   for (const double side : {-1.0, 1.0}) {
-    add(RoundCone{{-0.24, side * 0.11, 0.755}, 0.040, {-0.42, side * 0.07, 0.735}, 0.038}, 0.05);  // hip to pin bone
+    add(RoundCone{{-0.245, side * 0.105, 0.745}, 0.042, {-0.42, side * 0.07, 0.730}, 0.040},
+        0.09);  // hip to pin bone
   }
 }
 
 void CowShape::add_neck_and_head() {
   add(RoundCone{{0.27, 0, 0.63}, 0.165, {0.56, 0, 0.765}, 0.090, {0, 1, 0}, 0.72}, 0.07);
-  add(RoundCone{{0.38, 0, 0.46}, 0.030, {0.56, 0, 0.650}, 0.020}, 0.06);  // dewlap
+  add(RoundCone{{0.38, 0, 0.46}, 0.030, {0.56, 0, 0.650}, 0.020}, 0.06);                      // dewlap
   add(RoundCone{{0.600, 0, 0.785}, 0.088, {0.770, 0, 0.610}, 0.060, {0, 1, 0}, 0.95}, 0.05);  // skull
-  add(RoundCone{{0.600, 0, 0.720}, 0.060, {0.755, 0, 0.585}, 0.045}, 0.03);                  // jaw
-  add(RoundCone{{0.795, -0.032, 0.585}, 0.056, {0.795, 0.032, 0.585}, 0.056}, 0.03);         // muzzle
-  for (const double side : {-1.0, 1.0})                                                     // brow
-    add(RoundCone{{0.615, side * 0.060, 0.830}, 0.022, {0.680, side * 0.066, 0.775}, 0.020}, 0.02);
+  add(RoundCone{{0.600, 0, 0.720}, 0.060, {0.755, 0, 0.585}, 0.045}, 0.03);                   // jaw
+  add(RoundCone{{0.795, -0.032, 0.585}, 0.056, {0.795, 0.032, 0.585}, 0.056}, 0.03);          // muzzle
+  for (const double side : {-1.0, 1.0}) {
+    add(RoundCone{{0.620, side * 0.040, 0.700}, 0.050, {0.700, side * 0.030, 0.635}, 0.040}, 0.04);   // cheek
+    add(RoundCone{{0.625, side * 0.062, 0.825}, 0.020, {0.675, side * 0.062, 0.795}, 0.018}, 0.02);   // brow
+    add(RoundCone{{0.655, side * 0.076, 0.775}, 0.019, {0.662, side * 0.076, 0.769}, 0.019}, 0.006);  // eye
+    nostrils_.push_back({{0.850, side * 0.036, 0.607}, 0.018, {0.838, side * 0.050, 0.615}, 0.012});
+  }
 }
 
 void CowShape::add_ear_and_horn(double side) {
   const Point leaf_normal = {0.8, 0, 0.6};
-  add(RoundCone{{0.565, side * 0.075, 0.815}, 0.022, {0.550, side * 0.150, 0.800}, 0.044, leaf_normal, 0.4}, 0.015);
-  add(RoundCone{{0.550, side * 0.150, 0.800}, 0.044, {0.545, side * 0.225, 0.770}, 0.012, leaf_normal, 0.4}, 0.005);
+  add(RoundCone{{0.565, side * 0.075, 0.815}, 0.022, {0.550, side * 0.155, 0.800}, 0.050, leaf_normal, 0.4},
+      0.015);
+  add(RoundCone{{0.550, side * 0.155, 0.800}, 0.050, {0.545, side * 0.240, 0.765}, 0.012, leaf_normal, 0.4},
+      0.005);
   add(RoundCone{{0.575, side * 0.040, 0.860}, 0.030, {0.580, side * 0.115, 0.885}, 0.025}, 0.015);
   add(RoundCone{{0.580, side * 0.115, 0.885}, 0.025, {0.605, side * 0.170, 0.920}, 0.018}, 0.010);
   add(RoundCone{{0.605, side * 0.170, 0.920}, 0.018, {0.635, side * 0.175, 0.980}, 0.007}, 0.005);

@@ -6,8 +6,9 @@
 
 namespace tandem::makeassets {
 
-// A solid cow as a smooth union of simple parts, given by a function that is negative inside. The body is about 1 m
-// long, faces +x and stands on the plane z = 0. Only + - * / and sqrt are used: no result depends on a maths library.
+// A solid cow as a smooth union of simple parts, given by a function that is negative inside. The body is
+// about 1 m long, faces +x and stands on the plane z = 0. Only + - * / and sqrt are used: no result depends
+// on a maths library.
 class CowShape {
  public:
   CowShape();
@@ -52,6 +53,7 @@ class CowShape {
 
   std::vector<BlendedEllipsoid> ellipsoids_;
   std::vector<BlendedCone> cones_;
+  std::vector<RoundCone> nostrils_;  // taken out of the union
 };
 
 }  // namespace tandem::makeassets

@@ -3,7 +3,6 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
-#include <limits>
 
 #include "closed_mesh_check.h"
 #include "cow_mesh.h"
@@ -16,12 +15,13 @@ using namespace tandem::makeassets;
 
 enum ExitCode { kDone = 0, kUsage = 1, kNotWritten = 4, kInternal = 5 };
 
-constexpr const char* kCowComment = "Tandem's cow, MIT licence. Units: metres. Axes: x forward, y left, z up.";
+constexpr const char* kCowComment =
+    "Tandem's cow, MIT licence. Units: metres. Axes: x forward, y left, z up.";
 constexpr const char* kBoxComment = "Unit cube centred at the origin, MIT licence. Units: metres.";
 constexpr const char* kTerrainComment = "Uneven ground, MIT licence. Units: metres. Axes: z up.";
 
-// A multiple of 4e-6: the midpoints of two subdivisions are then multiples of 1e-6, which six decimals hold exactly,
-// so that all three cows are one and the same surface.
+// A multiple of 4e-6: the midpoints of two subdivisions are then multiples of 1e-6, which six decimals hold
+// exactly, so that all three cows are one and the same surface.
 constexpr double kCowGridPerMetre = 250'000;
 
 int report(const std::filesystem::path& path, const std::string& reason, ExitCode code) {
@@ -56,12 +56,17 @@ int write_all(const std::filesystem::path& folder) {
 
   Mesh cow = cow_mesh(1500);
   snap_to_grid(cow, kCowGridPerMetre);
-  int code = write_levels(std::move(cow), 1500, kCowComment, folder, {"cow_1500.obj", "cow.obj", "cow_24000.obj"});
+  int code =
+      write_levels(std::move(cow), 1500, kCowComment, folder, {"cow_1500.obj", "cow.obj", "cow_24000.obj"});
   if (code != kDone) return code;
   code = write_levels(unit_cube(), 12, kBoxComment, folder, {"box_12.obj", "box_48.obj", "box_192.obj"});
   if (code != kDone) return code;
   return write(terrain({100, 100}, 60, 1), kTerrainComment, folder / "ground.obj");
 }
+
+// Of any shape, a sheet of so many triangles has fewer than 2^32 vertices: (x + 1) * (y + 1) <= triangles
+// + 2.
+constexpr std::uint64_t kMaxTriangles = 2'000'000'000;
 
 struct TerrainOptions {
   std::uint64_t triangles = 20'000;
@@ -71,15 +76,15 @@ struct TerrainOptions {
 };
 
 int write_terrain(const TerrainOptions& options) {
-  return write(terrain(cells_for(options.triangles), options.side, options.seed), kTerrainComment, options.path);
+  if (options.triangles % 2 != 0)
+    throw CLI::ValidationError("--triangles", "must be even: a cell has two triangles");
+  return write(terrain(cells_for(options.triangles), options.side, options.seed), kTerrainComment,
+               options.path);
 }
 
-// Vertex indices are 32 bits wide; the bound keeps (x + 1) * (y + 1) below 2^32 for every shape of sheet.
-std::string triangle_count_defect(const std::string& text) {
-  std::uint64_t count = 0;
-  if (!CLI::detail::lexical_cast(text, count) || count < 2 || count > 2'000'000'000 || count % 2 != 0)
-    return "must be an even number from 2 to 2000000000";
-  return {};
+std::string ending_defect(const std::string& path) {
+  const std::filesystem::path ending = std::filesystem::path(path).extension();
+  return ending == ".obj" || ending == ".ply" ? "" : "must end in .obj or .ply";
 }
 
 }  // namespace
@@ -95,11 +100,15 @@ int main(int argc, char** argv) {
   TerrainOptions options;
   CLI::App* sheet = app.add_subcommand("terrain", "Write one sheet of uneven ground");
   sheet->add_option("--triangles", options.triangles, "Twice a number of cells")
-      ->check(triangle_count_defect)
+      ->check(CLI::Range(std::uint64_t{2}, kMaxTriangles))
       ->capture_default_str();
-  sheet->add_option("--size", options.side, "Side in metres")->check(CLI::Range(1e-3, 1e6))->capture_default_str();
+  sheet->add_option("--size", options.side, "Side in metres")
+      ->check(CLI::Range(1.0, 1e6))
+      ->capture_default_str();
   sheet->add_option("--seed", options.seed, "Number of the landscape")->capture_default_str();
-  sheet->add_option("-o,--output", options.path, "File: .obj, or .ply for binary PLY")->required();
+  sheet->add_option("-o,--output", options.path, "File: .obj, or .ply for binary PLY")
+      ->check(ending_defect)
+      ->required();
 
   try {
     app.parse(argc, argv);

@@ -15,8 +15,8 @@ struct Mesh {
   std::vector<Triangle> triangles;
 };
 
-// Splits each triangle into four at the midpoints of its edges; the surface stays the same. The points of `mesh`
-// keep their indices; the midpoints follow in the order in which the triangles name them.
+// Splits each triangle into four at the midpoints of its edges; the surface stays the same. The points of
+// `mesh` keep their indices; the midpoints follow in the order in which the triangles name them.
 [[nodiscard]] Mesh midpoint_subdivision(const Mesh& mesh);
 
 // Moves each coordinate to the nearest multiple of 1 / per_metre.

@@ -12,8 +12,8 @@ namespace {
 using Corner = std::array<std::uint32_t, 3>;
 using Tetrahedron = std::array<Corner, 4>;
 
-// Freudenthal's division: one tetrahedron for each order in which a walk from corner 000 to corner 111 can take
-// the three axes. The division is the same on both sides of every face, hence no cracks and a manifold.
+// Freudenthal's division: one tetrahedron for each order in which a walk from corner 000 to corner 111 can
+// take the three axes. The division is the same on both sides of every face, hence no cracks and a manifold.
 constexpr std::array<std::array<int, 3>, 6> kAxisOrders = {
     {{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}};
 
@@ -67,7 +67,8 @@ class Marcher {
   }
 
   void march_tetrahedron(Tetrahedron& t) {
-    const auto outside = std::stable_partition(t.begin(), t.end(), [&](const Corner& c) { return value(c) < 0; });
+    const auto outside =
+        std::stable_partition(t.begin(), t.end(), [&](const Corner& c) { return value(c) < 0; });
     const Point outwards = position(t[3]) - position(t[0]);
     switch (outside - t.begin()) {
       case 1:

@@ -16,7 +16,9 @@ double lattice_height(std::int64_t x, std::int64_t y, std::uint64_t seed) {
 }
 
 // Perlin's quintic: first and second derivatives vanish at 0 and 1, so that cells join without a crease.
-double fade(double t) { return t * t * t * (t * (t * 6 - 15) + 10); }
+double fade(double t) {
+  return t * t * t * (t * (t * 6 - 15) + 10);
+}
 
 double value_noise(double x, double y, std::uint64_t seed) {
   const double floor_x = std::floor(x), floor_y = std::floor(y);
@@ -33,7 +35,8 @@ double ground_height(double x, double y, std::uint32_t seed) {
   constexpr int kOctaves = 5;
   double height = 0, amplitude = 0.6, wavelength = 15;
   for (int octave = 0; octave < kOctaves; ++octave) {
-    height += amplitude * value_noise(x / wavelength, y / wavelength, std::uint64_t{seed} * kOctaves + octave);
+    height +=
+        amplitude * value_noise(x / wavelength, y / wavelength, std::uint64_t{seed} * kOctaves + octave);
     amplitude *= 0.4;
     wavelength *= 0.5;
   }

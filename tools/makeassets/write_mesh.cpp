@@ -15,7 +15,9 @@ constexpr int kDecimals = 6;
 
 class Output {
  public:
-  explicit Output(const std::filesystem::path& path) : file_(path, std::ios::binary) { buffer_.reserve(kBufferBytes); }
+  explicit Output(const std::filesystem::path& path) : file_(path, std::ios::binary) {
+    buffer_.reserve(kBufferBytes);
+  }
 
   void text(const std::string& s) { append(s.data(), s.size()); }
 
@@ -106,13 +108,13 @@ std::string write_mesh(const Mesh& mesh, const std::string& comment, const std::
     write_obj(mesh, comment, out);
   std::error_code error;
   if (!out.finish()) {
-    const std::string reason = errno != 0 ? std::strerror(errno) : "could not be written";
+    std::string reason = errno != 0 ? std::strerror(errno) : "could not be written";
     std::filesystem::remove(aside, error);
     return reason;
   }
   std::filesystem::rename(aside, path, error);
   if (!error) return {};
-  const std::string reason = error.message();
+  std::string reason = error.message();
   std::filesystem::remove(aside, error);
   return reason;
 }

@@ -66,4 +66,7 @@ const char* name(Status status);
 /// One sentence for people, without a full stop: "a block has two parents".
 const char* explain(Status status);
 
+/// What the number that comes with a defect counts: "section", "level", "part", "block", "byte"; null where there is no number.
+const char* subject(Status status);
+
 }  // namespace tandem

@@ -1,0 +1,40 @@
+#include <cstdio>
+#include <exception>
+#include <new>
+
+#include "pipeline.h"
+#include "report.h"
+
+namespace {
+
+using namespace tandem;
+using namespace tandem::build;
+
+Outcome run(const Options& options) {
+  Outcome outcome;
+  try {
+    return run_pipeline(options);
+  } catch (const std::bad_alloc&) {
+    outcome.error = options.input.string() + ": not enough memory";
+  } catch (const std::exception& defect) {
+    outcome.error = options.input.string() + ": internal error: " + defect.what();
+  }
+  outcome.exit_code = kInternal;
+  return outcome;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  int exit_code = kDone;
+  const auto options = parse_options(argc, argv, exit_code);
+  if (!options) return exit_code;
+  const Outcome outcome = run(*options);
+  if (outcome.exit_code != kDone) std::fprintf(stderr, "bvhbuild: %s\n", outcome.error.c_str());
+  if (options->json) {
+    std::fputs(json_report(*options, outcome).c_str(), stdout);
+  } else if (!options->quiet && outcome.exit_code == kDone) {
+    std::fputs(text_report(*options, outcome).c_str(), stdout);
+  }
+  return outcome.exit_code;
+}

@@ -1,0 +1,78 @@
+#include "options.h"
+
+#include <CLI/CLI.hpp>
+#include <map>
+
+#include "exit_code.h"
+
+namespace tandem::build {
+namespace {
+
+const std::map<std::string, Imaginary> kImaginaryNames = {{"minimal", Imaginary::minimal},
+                                                          {"free", Imaginary::free}};
+const std::map<std::string, Reader> kReaderNames = {
+    {"auto", Reader::automatic}, {"tandem", Reader::tandem}, {"assimp", Reader::assimp}};
+
+constexpr const char* kFooter =
+    R"(Exit codes: 0 done, 1 usage, 2 input could not be read (or --strict found something),
+3 input holds no usable triangle, 4 output could not be written, 5 internal error.
+
+Example: bvhbuild cow.obj -o cow.bvh && bvhinfo cow.bvh)";
+
+void add_options(CLI::App& app, Options& options, double& memory_gib) {
+  app.add_option("MESH", options.input,
+                 "mesh file: OBJ, PLY, STL, OFF, glTF/GLB, DAE and what else assimp reads")
+      ->required();
+  app.add_option("-o,--output", options.output, "the .bvh file to write; appears whole or not at all")
+      ->required();
+  app.add_option("--imaginary", options.imaginary,
+                 "where padding nodes may be: 'minimal' (the proven fewest) or 'free'")
+      ->transform(CLI::Transformer(kImaginaryNames))
+      ->option_text("minimal|free [minimal]");
+  app.add_flag("--strict", options.strict, "take anything dropped or found amiss in the mesh for an error");
+  app.add_flag("--json", options.json, "print the report as JSON");
+  app.add_flag("-q,--quiet", options.quiet, "print nothing but errors");
+  app.add_option("--threads", options.threads, "threads for building; the result does not depend on them")
+      ->check(CLI::Range(1, 4096))
+      ->option_text("N [all]");
+  app.add_option("--reader", options.import.reader, "who reads the mesh")
+      ->transform(CLI::Transformer(kReaderNames))
+      ->option_text("auto|tandem|assimp [auto]");
+  app.add_option("--time-limit", options.import.time_limit_seconds, "seconds that assimp may take")
+      ->check(CLI::Range(0.01, 1e6))
+      ->option_text("S [120]");
+  app.add_option("--memory-limit", memory_gib, "GiB of memory that assimp may take")
+      ->check(CLI::Range(0.1, 1e6))
+      ->option_text("GIB [8]");
+  app.set_version_flag("--version", "bvhbuild " TANDEM_VERSION);
+  app.footer(kFooter);
+}
+
+}  // namespace
+
+std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
+  CLI::App app("Turns a mesh into an optimised 4-ary blocked AABB tree for exact tandem collision queries.",
+               "bvhbuild");
+  Options options;
+  double memory_gib = static_cast<double>(options.import.memory_limit_bytes) / 0x1p30;
+  add_options(app, options, memory_gib);
+  exit_code = kDone;
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& done) {  // --help, --version
+    app.exit(done);
+    return std::nullopt;
+  } catch (const CLI::ParseError& error) {
+    std::cerr << "bvhbuild: " << error.what() << "\nTry 'bvhbuild --help'.\n";
+    exit_code = kUsage;
+    return std::nullopt;
+  }
+  options.import.memory_limit_bytes = static_cast<std::uint64_t>(memory_gib * 0x1p30);
+  return options;
+}
+
+const char* name(Imaginary imaginary) {
+  return imaginary == Imaginary::minimal ? "minimal" : "free";
+}
+
+}  // namespace tandem::build

@@ -1,0 +1,27 @@
+#pragma once
+#include <filesystem>
+#include <optional>
+
+#include "import/import.h"
+#include "tree.h"
+
+namespace tandem::build {
+
+/// The command line of bvhbuild.
+struct Options {
+  std::filesystem::path input, output;
+  Imaginary imaginary = Imaginary::minimal;
+  ImportOptions import;
+  bool strict = false;
+  bool json = false;
+  bool quiet = false;
+  int threads = 0;  ///< 0: as many as the machine has
+};
+
+/// Parses the command line. Nothing to run: prints help, the version or what is wrong, and sets `exit_code`.
+std::optional<Options> parse_options(int argc, char** argv, int& exit_code);
+
+/// "minimal" or "free", as on the command line.
+const char* name(Imaginary imaginary);
+
+}  // namespace tandem::build

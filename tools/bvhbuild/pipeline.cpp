@@ -1,0 +1,160 @@
+#include "pipeline.h"
+
+#include <oneapi/tbb/global_control.h>
+
+#include <chrono>
+#include <stdexcept>
+#include <thread>
+
+#include "assemble.h"
+#include "clean.h"
+#include "import/import.h"
+#include "output_file.h"
+#include "progress.h"
+#include "provenance.h"
+#include "statistics_json.h"
+#include "stored_mesh.h"
+#include "tandem/formats/check.h"
+#include "triangulate.h"
+
+namespace tandem::build {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Adds the time since it was made to `seconds`.
+class Stopwatch {
+ public:
+  explicit Stopwatch(double& seconds) : seconds_(seconds) {}
+  ~Stopwatch() {
+    seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+
+ private:
+  double& seconds_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+Outcome& fail(Outcome& outcome, ExitCode code, const fs::path& file, const std::string& reason) {
+  outcome.exit_code = code;
+  outcome.error = file.string() + ": " + reason;
+  return outcome;
+}
+
+// What can be known to be wrong with the output before hours of work go into it.
+std::string output_defect(const Options& options, ExitCode& code) {
+  std::error_code error;
+  code = kUsage;
+  if (fs::equivalent(options.input, options.output, error)) return "is the input; it would be overwritten";
+  code = kUnwritableOutput;
+  const fs::path folder = options.output.has_parent_path() ? options.output.parent_path() : ".";
+  if (!fs::exists(folder, error)) return "there is no folder " + folder.string();
+  if (fs::is_directory(options.output, error)) return "is a folder";
+  return {};
+}
+
+std::uint64_t defects(const CleanReport& report) {
+  std::uint64_t sum = 0;
+  for (const Finding& finding : findings(report)) sum += finding.defect ? finding.count : 0;
+  return sum;
+}
+
+std::string first_defect(const CleanReport& report) {
+  for (const Finding& finding : findings(report)) {
+    if (finding.defect && finding.count > 0) return finding.sentence;
+  }
+  return {};
+}
+
+StoredMesh prepare(PolygonMesh& polygons, Outcome& outcome) {
+  const Stopwatch watch(outcome.seconds.clean);
+  TriangleMesh triangles = triangulate(polygons, outcome.clean);
+  clean(triangles, outcome.clean);
+  StoredMesh mesh = to_single_precision(triangles, outcome.clean);
+  std::copy(mesh.origin.begin(), mesh.origin.end(), outcome.origin);
+  outcome.rounding_error = mesh.largest_rounding_error;
+  return mesh;
+}
+
+// Builds the tree and the file's bytes, and has the checker prove both: what this program writes, every other
+// one can load.
+Image build_image(const Options& options, const PolygonMesh& polygons, const StoredMesh& mesh,
+                  Outcome& outcome) {
+  const Stopwatch watch(outcome.seconds.build);
+  const Geometry geometry{mesh.points, mesh.triangles};
+  const Tree tree = build_tree(geometry, options.imaginary);
+  AssetSource source;
+  source.origin = mesh.origin;
+  source.rounding_error = mesh.largest_rounding_error;
+  source.source_faces = outcome.clean.faces;
+  source.parts = polygons.parts;
+  source.provenance = provenance_json(options, outcome);
+  const AssetLevel level{geometry, mesh.face, &tree, 0};
+  Image image = assemble(source, {&level, 1});
+
+  const CheckResult checked = check(image.data(), image.size());
+  if (checked.status != Status::kOk) {
+    throw std::logic_error(std::string("the tree that was built is not sound: ") + explain(checked.status));
+  }
+  const FileHeader& header = *checked.asset.header;
+  outcome.tree = measure_tree(checked.asset.level(), header.lower, header.upper);
+  outcome.hash = hexadecimal(header.hash);
+  outcome.file_bytes = header.file_bytes;
+  return image;
+}
+
+}  // namespace
+
+Outcome run_pipeline(const Options& options) {
+  Outcome outcome;
+  if (const std::string defect = output_defect(options, outcome.exit_code); !defect.empty()) {
+    return fail(outcome, outcome.exit_code, options.output, defect);
+  }
+  outcome.exit_code = kDone;
+  Progress progress(!options.quiet, options.input.filename().string());
+
+  progress.step("import");
+  ImportResult imported;
+  {
+    const Stopwatch watch(outcome.seconds.import);
+    imported = import_mesh(options.input, options.import);
+    outcome.input = digest_of(options.input);
+  }
+  if (!imported.ok) return fail(outcome, kUnreadableInput, options.input, imported.error);
+  PolygonMesh& polygons = imported.mesh;
+  outcome.reader = polygons.reader;
+  outcome.single_precision = polygons.single_precision;
+  outcome.remarks = polygons.remarks;
+  outcome.parts = polygons.parts.size();
+
+  // Threads begin here: import may fork, and must be alone.
+  using oneapi::tbb::global_control;
+  const auto threads =
+      static_cast<std::size_t>(options.threads > 0 ? options.threads : std::thread::hardware_concurrency());
+  const global_control limit(global_control::max_allowed_parallelism, std::max<std::size_t>(threads, 1));
+
+  progress.step("clean");
+  const StoredMesh mesh = prepare(polygons, outcome);
+  if (options.strict && (defects(outcome.clean) > 0 || !outcome.remarks.empty())) {
+    const std::string found = outcome.remarks.empty() ? first_defect(outcome.clean) : outcome.remarks.front();
+    return fail(outcome, kUnreadableInput, options.input, found + " (--strict)");
+  }
+  if (mesh.triangles.empty()) {
+    const std::string found = first_defect(outcome.clean);
+    return fail(outcome, kNoTriangle, options.input,
+                "holds no usable triangle" + (found.empty() ? std::string() : ": " + found));
+  }
+
+  progress.step("build");
+  const Image image = build_image(options, polygons, mesh, outcome);
+
+  progress.step("write");
+  const Stopwatch watch(outcome.seconds.write);
+  const std::string error = write_whole_file(options.output, {image.data(), image.size()});
+  if (!error.empty()) return fail(outcome, kUnwritableOutput, options.output, error);
+  return outcome;
+}
+
+}  // namespace tandem::build

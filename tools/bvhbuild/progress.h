@@ -1,0 +1,27 @@
+#pragma once
+#include <string>
+
+namespace tandem::build {
+
+/// One line on a terminal that says what is going on: "bvhbuild: build cow.obj ...". Prints nothing where
+/// standard error is no terminal. Starts no thread, because import may fork.
+class Progress {
+ public:
+  Progress(bool wanted, std::string what);
+  ~Progress() { clear(); }
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  /// Replaces the line by that of the next step.
+  void step(const char* name);
+
+  /// Takes the line away; call before printing anything else.
+  void clear();
+
+ private:
+  bool shown_;
+  std::string what_;
+  int step_ = 0;
+};
+
+}  // namespace tandem::build

@@ -1,0 +1,26 @@
+#include "provenance.h"
+
+#include "statistics_json.h"
+
+namespace tandem::build {
+
+std::string provenance_json(const Options& options, const Outcome& outcome) {
+  Json found = Json::object();
+  for (const Finding& finding : findings(outcome.clean)) {
+    if (finding.count > 0) found[finding.key] = finding.count;
+  }
+  const Json json = {{"tool", "bvhbuild"},
+                     {"version", TANDEM_VERSION},
+                     {"input",
+                      {{"file", options.input.filename().string()},
+                       {"bytes", outcome.input.bytes},
+                       {"xxh64", hexadecimal(outcome.input.hash)},
+                       {"reader", outcome.reader},
+                       {"faces", outcome.clean.faces},
+                       {"vertices", outcome.clean.vertices}}},
+                     {"options", {{"imaginary", name(options.imaginary)}}},
+                     {"findings", found}};
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+}  // namespace tandem::build

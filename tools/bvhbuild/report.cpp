@@ -1,0 +1,103 @@
+#include "report.h"
+
+#include <sys/resource.h>
+
+#include <cstdio>
+#include <sstream>
+
+#include "statistics_json.h"
+
+namespace tandem::build {
+namespace {
+
+std::uint64_t peak_memory_bytes() {
+  struct rusage usage {};
+  ::getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+}
+
+std::string number(const char* format, double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+std::string rounding_line(const Outcome& outcome) {
+  std::string line;
+  if (outcome.rounding_error == 0) {
+    line = "coordinates stored exactly";
+  } else {
+    line = "coordinates rounded to float32 by at most " + number("%.2g", outcome.rounding_error);
+  }
+  const double* o = outcome.origin;
+  if (o[0] != 0 || o[1] != 0 || o[2] != 0) {
+    line += " around the origin (" + number("%.10g", o[0]) + ", " + number("%.10g", o[1]) + ", " +
+            number("%.10g", o[2]) + ")";
+  }
+  if (outcome.single_precision) line += "; the reader keeps float32 only";
+  return line;
+}
+
+Json findings_json(const CleanReport& report) {
+  Json json = Json::object();
+  for (const Finding& finding : findings(report)) json[finding.key] = finding.count;
+  return json;
+}
+
+void add_results(const Outcome& outcome, Json& json) {
+  json["parts"] = outcome.parts;
+  json["origin"] = outcome.origin;
+  json["rounding_error"] = outcome.rounding_error;
+  json["tree"] = to_json(outcome.tree);
+  json["bytes"] = outcome.file_bytes;
+  json["hash"] = outcome.hash;
+}
+
+}  // namespace
+
+std::string text_report(const Options& options, const Outcome& outcome) {
+  const TreeStatistics& tree = outcome.tree;
+  std::ostringstream out;
+  out << options.output.string() << ": " << with_commas(tree.triangles)
+      << (tree.triangles == 1 ? " triangle" : " triangles") << " in "
+      << with_commas(tree.leaf_blocks + tree.internal_blocks) << " blocks, "
+      << human_bytes(outcome.file_bytes) << "\n";
+  out << "  read     " << with_commas(outcome.clean.faces) << " faces, "
+      << with_commas(outcome.clean.vertices) << " vertices from " << options.input.filename().string() << " ("
+      << outcome.reader << ")\n";
+  for (const std::string& remark : outcome.remarks) out << "  note     " << remark << "\n";
+  for (const Finding& finding : findings(outcome.clean)) {
+    if (finding.count > 0) out << "  found    " << finding.sentence << "\n";
+  }
+  out << "  stored   " << rounding_line(outcome) << "\n";
+  out << "  tree     " << tree.imaginary_nodes << " of " << with_commas(tree.nodes)
+      << " nodes imaginary (minimum " << tree.imaginary_minimum << "), depth " << tree.depth << ", SAH cost "
+      << number("%.2f", tree.sah_cost) << "\n";
+  const Outcome::Seconds& s = outcome.seconds;
+  out << "  took     import " << number("%.2f", s.import) << " s, clean " << number("%.2f", s.clean)
+      << " s, build " << number("%.2f", s.build) << " s, write " << number("%.2f", s.write)
+      << " s; peak memory " << human_bytes(peak_memory_bytes()) << "\n";
+  return out.str();
+}
+
+std::string json_report(const Options& options, const Outcome& outcome) {
+  Json json = {{"tool", "bvhbuild"},
+               {"version", TANDEM_VERSION},
+               {"exit_code", static_cast<int>(outcome.exit_code)},
+               {"error", outcome.error.empty() ? Json() : Json(outcome.error)},
+               {"input", options.input.string()},
+               {"output", options.output.string()},
+               {"reader", outcome.reader},
+               {"single_precision_reader", outcome.single_precision},
+               {"faces", outcome.clean.faces},
+               {"vertices", outcome.clean.vertices},
+               {"remarks", outcome.remarks},
+               {"findings", findings_json(outcome.clean)}};
+  if (outcome.exit_code == kDone) add_results(outcome, json);
+  const Outcome::Seconds& s = outcome.seconds;
+  json["seconds"] = {{"import", s.import}, {"clean", s.clean}, {"build", s.build}, {"write", s.write}};
+  json["peak_memory_bytes"] = peak_memory_bytes();
+  return pretty(json) + "\n";
+}
+
+}  // namespace tandem::build

@@ -1,0 +1,83 @@
+#include "page.h"
+
+namespace tandem {
+namespace {
+
+const char* name(SectionKind kind) {
+  switch (kind) {
+    case SectionKind::levels:
+      return "levels";
+    case SectionKind::blocks:
+      return "blocks";
+    case SectionKind::triangles:
+      return "triangles";
+    case SectionKind::parts:
+      return "parts";
+    case SectionKind::strings:
+      return "strings";
+    case SectionKind::provenance:
+      return "provenance";
+  }
+  return "unknown";
+}
+
+Json sections_json(const AssetView& view) {
+  Json sections = Json::array();
+  for (const Section& s : view.sections) {
+    sections.push_back({{"kind", name(s.kind)},
+                        {"level", s.level},
+                        {"offset", s.offset},
+                        {"bytes", s.bytes},
+                        {"count", s.count}});
+  }
+  return sections;
+}
+
+Json levels_json(const AssetView& view) {
+  Json levels = Json::array();
+  for (const Level& level : view.levels) {
+    levels.push_back({{"triangles", level.triangle_count},
+                      {"blocks", level.block_count},
+                      {"depth", level.depth},
+                      {"error_bound", level.error_bound}});
+  }
+  return levels;
+}
+
+Json parts_json(const AssetView& view) {
+  Json parts = Json::array();
+  for (const Part& part : view.parts) {
+    parts.push_back({{"name", view.name_of(part)},
+                     {"path", view.path_of(part)},
+                     {"first_face", part.first_face},
+                     {"face_count", part.face_count}});
+  }
+  return parts;
+}
+
+}  // namespace
+
+Json to_json(const Inspection& inspection) {
+  const AssetView& view = inspection.asset.view();
+  const FileHeader& header = *view.header;
+  Json json = {{"file", inspection.path},
+               {"version", std::to_string(header.version_major) + "." + std::to_string(header.version_minor)},
+               {"hash", hexadecimal(header.hash)},
+               {"bytes", header.file_bytes}};
+  json.update(to_json(inspection.tree));
+  json["expected_block_pairs"] = inspection.work.block_pairs;
+  json["expected_candidates"] = inspection.work.candidates;
+  json["leaf_blocks_at_depth"] = inspection.tree.leaf_blocks_at_depth;
+  json["blocks_with_fill"] = inspection.tree.blocks_with_fill;
+  json["bounds"] = {{"lower", header.lower}, {"upper", header.upper}};
+  json["origin"] = header.origin;
+  json["rounding_error"] = header.rounding_error;
+  json["source_faces"] = header.source_faces;
+  json["source"] = inspection.source;
+  json["parts"] = parts_json(view);
+  json["levels"] = levels_json(view);
+  json["sections"] = sections_json(view);
+  return json;
+}
+
+}  // namespace tandem

@@ -1,0 +1,95 @@
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <string>
+#include <vector>
+
+#include "exit_code.h"
+#include "page.h"
+
+namespace {
+
+using namespace tandem;
+
+struct Options {
+  std::vector<std::string> files;
+  bool json = false;
+  bool verify = false;
+};
+
+Json verdict(const Inspection& inspection) {
+  const bool sound = inspection.status == Status::kOk;
+  return {{"file", inspection.path},
+          {"sound", sound},
+          {"status", name(inspection.status)},
+          {"where", sound ? Json() : Json(inspection.asset.where())},
+          {"error", sound ? Json() : Json(defect_of(inspection))},
+          {"bytes", inspection.asset.bytes()},
+          {"check_seconds", inspection.check_seconds}};
+}
+
+void print_verdict(const Inspection& inspection) {
+  if (inspection.status != Status::kOk) return;
+  const double seconds = inspection.check_seconds;
+  std::printf("%s: sound (%s checked in %.1f ms, %.2f GB/s)\n", inspection.path.c_str(),
+              human_bytes(inspection.asset.bytes()).c_str(), 1e3 * seconds,
+              static_cast<double>(inspection.asset.bytes()) / seconds / 1e9);
+}
+
+void print(const Options& options, const std::vector<Inspection>& inspections, bool all_sound) {
+  if (options.json) {
+    Json output = Json::array();
+    for (const Inspection& inspection : inspections) {
+      const bool whole = inspection.status == Status::kOk && !options.verify;
+      output.push_back(whole ? to_json(inspection) : verdict(inspection));
+    }
+    std::puts(pretty(inspections.size() == 1 ? output[0] : output).c_str());
+  } else if (options.verify) {
+    for (const Inspection& inspection : inspections) print_verdict(inspection);
+  } else if (inspections.size() > 1 && all_sound) {
+    std::fputs(comparison(inspections).c_str(), stdout);
+  } else if (all_sound) {
+    std::fputs(page(inspections[0]).c_str(), stdout);
+  }
+}
+
+ExitCode run(const Options& options) {
+  std::vector<Inspection> inspections;
+  bool all_sound = true;
+  for (const std::string& file : options.files) {
+    inspections.push_back(inspect(file, options.verify));
+    if (inspections.back().status == Status::kOk) continue;
+    all_sound = false;
+    std::fprintf(stderr, "bvhinfo: %s\n", defect_of(inspections.back()).c_str());
+  }
+  print(options, inspections, all_sound);
+  return all_sound ? kDone : kUnreadableInput;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Shows what is in a Tandem .bvh file. Two or more files are set side by side.", "bvhinfo");
+  Options options;
+  app.add_option("FILE", options.files, ".bvh files")->required();
+  app.add_flag("--json", options.json, "print JSON: an object for one file, an array for several");
+  app.add_flag("--verify", options.verify, "only check the files and say whether they are sound");
+  app.set_version_flag("--version", "bvhinfo " TANDEM_VERSION);
+  app.footer(
+      "Every file is checked in full before anything else is read.\nExit codes: 0 all sound, 1 usage, 2 a "
+      "file is not, 5 internal error.");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& done) {
+    return app.exit(done);
+  } catch (const CLI::ParseError& error) {
+    std::fprintf(stderr, "bvhinfo: %s\nTry 'bvhinfo --help'.\n", error.what());
+    return kUsage;
+  }
+  try {
+    return run(options);
+  } catch (const std::exception& defect) {
+    std::fprintf(stderr, "bvhinfo: internal error: %s\n", defect.what());
+    return kInternal;
+  }
+}

@@ -1,0 +1,170 @@
+#include "page.h"
+
+#include <algorithm>
+#include <cstdarg>
+#include <cstdio>
+#include <filesystem>
+
+namespace tandem {
+namespace {
+
+constexpr std::size_t kPartsShown = 12;
+
+[[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...) {
+  char text[512];
+  va_list arguments;
+  va_start(arguments, pattern);
+  std::vsnprintf(text, sizeof text, pattern, arguments);
+  va_end(arguments);
+  return text;
+}
+
+std::string point(const float* p) {
+  return format("(%.7g, %.7g, %.7g)", p[0], p[1], p[2]);
+}
+std::string point(const double* p) {
+  return format("(%.12g, %.12g, %.12g)", p[0], p[1], p[2]);
+}
+
+// The string under a key, without throwing at what some other tool may have put there.
+std::string text_of(const Json& json, const char* key) {
+  const auto found = json.is_object() ? json.find(key) : json.end();
+  if (!json.is_object() || found == json.end()) return "?";
+  return found->is_string() ? found->get<std::string>() : found->dump();
+}
+
+std::string source_lines(const Inspection& inspection) {
+  const Json& source = inspection.source;
+  if (!source.is_object() || !source.contains("input")) return "  source       unknown\n";
+  const Json& input = source["input"];
+  std::string text = "  source       " + text_of(input, "file") + ", " + text_of(input, "bytes") +
+                     " bytes, XXH64 " + text_of(input, "xxh64") + ", read by " + text_of(input, "reader") +
+                     "\n";
+  text += "  built by     " + text_of(source, "tool") + " " + text_of(source, "version");
+  if (source.contains("options")) text += ", imaginary nodes " + text_of(source["options"], "imaginary");
+  return text + "\n";
+}
+
+std::string part_lines(const AssetView& view) {
+  std::string text = format("  parts        %zu\n", view.parts.size());
+  for (std::size_t i = 0; i < std::min(view.parts.size(), kPartsShown); ++i) {
+    const Part& part = view.parts[i];
+    const std::string path(view.path_of(part)), name(view.name_of(part));
+    text += "               " + (path.empty() ? "" : path + " : ") + (name.empty() ? "(no name)" : name) +
+            format("  faces %s to %s\n", with_commas(part.first_face).c_str(),
+                   with_commas(part.first_face + std::max<std::uint64_t>(part.face_count, 1) - 1).c_str());
+  }
+  if (view.parts.size() > kPartsShown)
+    text += format("               and %zu more\n", view.parts.size() - kPartsShown);
+  return text;
+}
+
+std::string tree_lines(const TreeStatistics& tree, const ExpectedWork& work) {
+  std::string text = "  triangles    " + with_commas(tree.triangles) + "\n";
+  text += "  nodes        " + with_commas(tree.nodes) + ": " + with_commas(tree.leaf_nodes) + " leaves, " +
+          with_commas(tree.internal_nodes) + " internal, " + with_commas(tree.imaginary_nodes) +
+          format(" imaginary (%.2f %%, minimum %llu)\n", 100 * tree.imaginary_fraction,
+                 static_cast<unsigned long long>(tree.imaginary_minimum));
+  text += "  blocks       " + with_commas(tree.leaf_blocks) + " leaf, " + with_commas(tree.internal_blocks) +
+          " internal, " + with_commas(tree.partial_leaf_blocks) + " partial leaf\n";
+  text += format("  depth        %u blocks\n  leaf fill    %.2f %%\n  SAH cost     %.3f\n", tree.depth,
+                 100 * tree.leaf_fill, tree.sah_cost);
+  text += format("  query work   %.1f block pairs, %.1f candidates expected near contact (%u poses)\n",
+                 work.block_pairs, work.candidates, work.poses);
+  return text;
+}
+
+std::string bar(std::uint64_t count, std::uint64_t largest) {
+  constexpr std::uint64_t kWidth = 40;
+  const std::uint64_t length = largest == 0 ? 0 : (count * kWidth + largest - 1) / largest;
+  return std::string(length, '#');
+}
+
+template <typename Counts>
+std::string histogram(const char* title, const Counts& counts, std::size_t first, std::size_t label_offset) {
+  const std::uint64_t largest = *std::max_element(std::begin(counts), std::end(counts));
+  std::string text = std::string("  ") + title + "\n";
+  for (std::size_t i = first; i < std::size(counts); ++i) {
+    if (counts[i] == 0) continue;
+    text += format("  %11zu  %12s  ", i + label_offset, with_commas(counts[i]).c_str()) +
+            bar(counts[i], largest) + "\n";
+  }
+  return text;
+}
+
+std::string section_lines(const Json& sections) {
+  std::string text = "  sections\n";
+  for (const Json& section : sections) {
+    text += format("  %11s  level %u  offset %12s  %12s bytes  %10s elements\n",
+                   section["kind"].get<std::string>().c_str(), section["level"].get<unsigned>(),
+                   with_commas(section["offset"].get<std::uint64_t>()).c_str(),
+                   with_commas(section["bytes"].get<std::uint64_t>()).c_str(),
+                   with_commas(section["count"].get<std::uint64_t>()).c_str());
+  }
+  return text;
+}
+
+// The figures that people compare when they tune, in the order of the page.
+constexpr const char* kCompared[] = {"bytes",
+                                     "triangles",
+                                     "nodes",
+                                     "leaf_nodes",
+                                     "internal_nodes",
+                                     "imaginary_nodes",
+                                     "imaginary_minimum",
+                                     "imaginary_fraction",
+                                     "leaf_blocks",
+                                     "internal_blocks",
+                                     "depth",
+                                     "leaf_fill",
+                                     "sah_cost",
+                                     "expected_block_pairs",
+                                     "expected_candidates",
+                                     "rounding_error"};
+
+std::string figure(const Json& value) {
+  return value.is_number_integer() ? with_commas(value.get<std::uint64_t>())
+                                   : format("%.4g", value.get<double>());
+}
+
+}  // namespace
+
+std::string page(const Inspection& inspection) {
+  const AssetView& view = inspection.asset.view();
+  const FileHeader& header = *view.header;
+  std::string text = inspection.path + ": Tandem tree, format " + std::to_string(header.version_major) + "." +
+                     std::to_string(header.version_minor) + ", " + human_bytes(header.file_bytes) +
+                     ", hash " + hexadecimal(header.hash) + "\n";
+  text += source_lines(inspection);
+  text += part_lines(view);
+  text += "  bounds       " + point(header.lower) + " to " + point(header.upper) + "\n";
+  text += "  origin       " + point(header.origin) + format(", rounding error %.3g\n", header.rounding_error);
+  text += tree_lines(inspection.tree, inspection.work);
+  text += histogram("leaf blocks at depth", inspection.tree.leaf_blocks_at_depth, 0, 1);
+  text +=
+      histogram("blocks with so many nodes that are not imaginary", inspection.tree.blocks_with_fill, 1, 0);
+  return text + section_lines(to_json(inspection)["sections"]);
+}
+
+std::string comparison(const std::vector<Inspection>& inspections) {
+  std::vector<Json> files;
+  std::string text = format("%-22s", "");
+  for (const Inspection& inspection : inspections) {
+    files.push_back(to_json(inspection));
+    text += format(" %24.24s", std::filesystem::path(inspection.path).filename().string().c_str());
+  }
+  text += "\n";
+  for (const char* key : kCompared) {
+    text += format("%-22s", key);
+    const double base = files[0][key].get<double>();
+    for (std::size_t i = 0; i < files.size(); ++i) {
+      const std::string value = figure(files[i][key]);
+      const std::string ratio = i > 0 && base != 0 ? format("x%.3f", files[i][key].get<double>() / base) : "";
+      text += format(" %14s %9s", value.c_str(), ratio.c_str());
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+}  // namespace tandem

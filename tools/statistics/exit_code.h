@@ -1,0 +1,15 @@
+#pragma once
+
+namespace tandem {
+
+/// What the tools return to the shell. Stable.
+enum ExitCode : int {
+  kDone = 0,
+  kUsage = 1,             ///< the command line is wrong
+  kUnreadableInput = 2,   ///< the input is missing, malformed or, under --strict, not flawless
+  kNoTriangle = 3,        ///< the input holds no usable triangle
+  kUnwritableOutput = 4,  ///< the output could not be written
+  kInternal = 5,          ///< a defect of the program, or not enough memory
+};
+
+}  // namespace tandem

@@ -1,0 +1,16 @@
+#pragma once
+#include <filesystem>
+
+#include "import/read_result.h"
+
+namespace tandem::build {
+
+/// Reads a mesh file with assimp, in this process: it may crash, hang, or take all memory (see
+/// assimp_child.h).
+///
+/// Result: the meshes of all nodes, depth first, each instance by itself, with the node transforms applied in
+/// float64; polygons as the file has them; points and lines left out. A part is one mesh at one node. An
+/// index that names no vertex of its mesh becomes kNoVertex.
+ReadResult read_assimp_scene(const std::filesystem::path& path);
+
+}  // namespace tandem::build

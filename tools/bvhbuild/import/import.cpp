@@ -1,0 +1,99 @@
+#include "import/import.h"
+
+#include <algorithm>
+#include <exception>
+#include <new>
+#include <string_view>
+#include <utility>
+
+#include "import/assimp_child.h"
+#include "import/input_file.h"
+#include "import/read_obj.h"
+#include "import/read_off.h"
+#include "import/read_ply.h"
+#include "import/read_result.h"
+#include "import/read_stl.h"
+
+namespace tandem::build {
+namespace {
+
+using ReadBytes = ReadResult (*)(std::string_view);
+
+/// The file's ending in lower case, with its dot.
+std::string lower_extension(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return extension;
+}
+
+std::string_view first_line(std::string_view head) {
+  return head.substr(0, head.find_first_of("\r\n"));
+}
+
+/// Of a file whose ending says nothing.
+ReadBytes reader_by_content(std::string_view head) {
+  const std::string_view line = first_line(head);
+  if (line == "ply") return read_ply;
+  const std::string_view keyword = line.substr(0, line.find_first_of(" \t"));
+  if (keyword == "OFF" || keyword == "COFF" || keyword == "NOFF" || keyword == "STOFF") return read_off;
+  return nullptr;
+}
+
+ReadBytes own_reader(const std::string& extension, std::string_view head) {
+  if (extension == ".obj") return read_obj;
+  if (extension == ".ply") return read_ply;
+  if (extension == ".stl") return read_stl;
+  if (extension == ".off") return read_off;
+  return reader_by_content(head);
+}
+
+/// Why a file that is something else than a mesh is refused; empty when it may be one.
+std::string refusal(const std::string& extension, std::string_view head) {
+  if (head.starts_with("\x89"
+                       "BVH"))
+    return "is already a Tandem tree, not a mesh";
+  if (extension != ".bvh") return {};
+  const std::size_t word = std::min(head.find_first_not_of(" \t\r\n"), head.size());
+  if (head.substr(word).starts_with("HIERARCHY"))
+    return "is Biovision motion capture (it starts with HIERARCHY), not a mesh";
+  return "ends in .bvh but is neither a Tandem tree nor a mesh";
+}
+
+ReadResult read_with(ReadBytes reader, InputFile& file, const ImportOptions& options) {
+  if (file.size() > options.memory_limit_bytes)
+    return read_failure("holds " + std::to_string(file.size()) +
+                        " bytes, more than the memory limit (--memory-limit)");
+  const std::string problem = file.read_all();
+  return problem.empty() ? reader(file.bytes()) : read_failure(problem);
+}
+
+ReadResult read(const std::filesystem::path& path, const ImportOptions& options) {
+  InputFile file;
+  const std::string problem = file.open(path);
+  if (!problem.empty()) return read_failure(problem);
+  const std::string extension = lower_extension(path);
+  const std::string head = file.head();
+  const std::string no_mesh = refusal(extension, head);
+  if (!no_mesh.empty()) return read_failure(no_mesh);
+  const ReadBytes reader = own_reader(extension, head);
+  if (options.reader == Reader::assimp) return read_in_assimp_child(path, options);
+  if (reader != nullptr) return read_with(reader, file, options);
+  if (options.reader == Reader::automatic) return read_in_assimp_child(path, options);
+  return read_failure("Tandem's own readers know OBJ, PLY, STL and OFF files only");
+}
+
+}  // namespace
+
+ImportResult import_mesh(const std::filesystem::path& path, const ImportOptions& options) {
+  try {
+    ReadResult result = read(path, options);
+    return {result.ok, std::move(result.mesh), std::move(result.error)};
+  } catch (const std::bad_alloc&) {
+    return {false, {}, "not enough memory to read it"};
+  } catch (const std::exception& error) {
+    return {false, {}, error.what()};
+  }
+}
+
+}  // namespace tandem::build

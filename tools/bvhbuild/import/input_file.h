@@ -1,0 +1,40 @@
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace tandem::build {
+
+/// A regular file opened for reading. Not copyable; closes itself.
+class InputFile {
+ public:
+  InputFile() = default;
+  ~InputFile();
+  InputFile(const InputFile&) = delete;
+  InputFile& operator=(const InputFile&) = delete;
+
+  /// Result: empty when the file is open, else the reason: "no such file", "is a folder", "permission
+  /// denied", "the file is empty", ...
+  std::string open(const std::filesystem::path& path);
+
+  std::uint64_t size() const { return size_; }
+
+  /// The first bytes, at most 64. Empty when they cannot be read.
+  std::string head() const;
+
+  /// Effect: reads the whole file, or what is left of it when it shrinks meanwhile. (Read, not mapped: a file
+  /// that shrinks under a mapping kills the process.) Result: empty when bytes() holds it, else the reason.
+  std::string read_all();
+
+  std::string_view bytes() const { return {bytes_.get(), bytes_read_}; }
+
+ private:
+  int descriptor_ = -1;
+  std::uint64_t size_ = 0;
+  std::unique_ptr<char[]> bytes_;
+  std::size_t bytes_read_ = 0;
+};
+
+}  // namespace tandem::build

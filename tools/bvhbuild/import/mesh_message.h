@@ -1,0 +1,26 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+
+#include "import/read_result.h"
+
+namespace tandem::build {
+
+/// Takes bytes of a message.
+using MessageSink = std::function<void(const void* bytes, std::size_t count)>;
+/// Gives exactly `count` bytes of a message; false when there are no more.
+using MessageSource = std::function<bool(void* to, std::size_t count)>;
+
+/// What a child process says to its parent: a mesh or the reason why there is none, in the byte order of
+/// both.
+void write_message(const ReadResult& result, const MessageSink& sink);
+
+/// Reads what write_message() wrote, believing nothing: a mesh that comes back has the shape that PolygonMesh
+/// promises (face_begin ascends, faces have three corners or more, the parts cover the faces), and memory is
+/// taken as bytes come in.
+///
+/// Result: false when the message ends early, contradicts itself or announces more than `most_bytes`.
+bool read_message(const MessageSource& source, std::uint64_t most_bytes, ReadResult& result);
+
+}  // namespace tandem::build

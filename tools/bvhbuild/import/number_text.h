@@ -7,8 +7,9 @@ namespace tandem::build {
 ///
 /// Effect: `value` becomes the float64 nearest to the text: infinite when it is too large, zero when it is
 /// too small. "nan", "inf", "infinity", "nan(...)" and the "1.#INF", "-1.#IND00", "1.#QNAN" of old Windows
-/// programs are numbers too, in any case. Result: one past the number's last character, or nullptr (`value`
-/// unchanged) where no number starts. The caller decides what may follow: of "0x10" this reads the 0.
+/// programs are numbers too, in upper and lower case.
+/// Result: one past the number's last character, or nullptr (`value` unchanged) where no number starts.
+/// The caller decides what may follow: of "0x10" this reads the 0.
 const char* parse_real(const char* first, const char* last, double& value);
 
 /// Parses the integer that starts at `first`, as parse_real does. A magnitude beyond 10^17 comes out as

@@ -69,9 +69,10 @@ ReadResult OffReader::read() {
 bool OffReader::header() {
   text_.skip_space_and_comments();
   const std::string_view word = text_.word();
-  const bool counts_come_first = !word.empty() && word[0] >= '0' && word[0] <= '9';
-  if (counts_come_first) return true;
-  if (!word.ends_with("OFF")) return fail_here("'OFF'");
+  if (!word.ends_with("OFF")) {
+    const bool counts_come_first = !word.empty() && word[0] >= '0' && word[0] <= '9';
+    return counts_come_first || fail_here("'OFF'");
+  }
   if (!keyword(word.substr(0, word.size() - 3))) return false;
   text_.skip_word();
   text_.skip_blanks();

@@ -202,12 +202,12 @@ template <class Values>
 void PlyReader<Values>::remark_index(std::int64_t index) {
   std::string place;
   if constexpr (std::is_same_v<Values, PlyTextValues>) {
-    place = values_.line() + ": ";
+    place = values_.line() + ": face index";
   } else {
-    place = std::string(element_->name) + " " + std::to_string(record_) + ": ";
+    place = std::string(element_->name) + " " + std::to_string(record_) + ": index";
   }
-  if (index == kNoIndex) return mesh_.remark_index(place + "a vertex index that is no integer");
-  mesh_.remark_index(place + "face index", index, vertices_promised_);
+  if (index == kNoIndex) return mesh_.remark_index(place + " is no integer");
+  mesh_.remark_index(place, index, vertices_promised_);
 }
 
 template <class Values>

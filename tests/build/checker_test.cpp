@@ -1,0 +1,353 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "sample_asset.h"
+
+namespace tandem {
+namespace {
+
+using test::Bytes;
+using test::make_file;
+using test::random_mesh;
+
+// 30 triangles: 8 leaf blocks, 3 internal blocks, 3 levels of blocks at most, 2 + 2 imaginary nodes.
+Bytes sample() {
+  return Bytes(make_file(random_mesh(30, 1)));
+}
+
+std::uint32_t first_leaf_block(Bytes& file) {
+  std::uint32_t b = 0;
+  while (!file.blocks()[b].is_leaf_block()) ++b;
+  return b;
+}
+
+std::uint32_t block_with_imaginary_leaf(Bytes& file) {
+  std::uint32_t b = 0;
+  while (!(file.blocks()[b].is_leaf_block() && file.blocks()[b].kind[3] == NodeKind::imaginary)) ++b;
+  return b;
+}
+
+TEST(Check, AcceptsWhatTheBuilderWrites) {
+  for (const std::uint32_t n : {1u, 4u, 5u, 30u, 1000u}) {
+    const Bytes file(make_file(random_mesh(n, n)));
+    const CheckResult result = file.check();
+    ASSERT_EQ(result.status, Status::kOk) << n << " " << name(result.status);
+    EXPECT_EQ(result.asset.level().triangle_count, n);
+    EXPECT_EQ(result.asset.name_of(result.asset.parts[1]), "right");
+    EXPECT_EQ(result.asset.path_of(result.asset.parts[0]), "scene/left");
+    EXPECT_EQ(result.asset.provenance, "{\"tool\":\"test\"}");
+  }
+}
+
+TEST(Check, RejectsTruncatedAtEveryByte) {
+  Bytes file = sample();
+  for (std::size_t size = 0; size < file.size(); ++size) {
+    const Bytes cut(file.data(), size);
+    const Status status = cut.check().status;
+    ASSERT_NE(status, Status::kOk) << size;
+    if (size >= 8) {
+      ASSERT_EQ(status, Status::kTruncated) << size;
+    }
+  }
+}
+
+TEST(Check, RejectsEverySingleByteChange) {
+  const Bytes original(make_file(random_mesh(4, 1)));
+  Bytes file(original);
+  for (std::size_t i = 0; i < file.size(); ++i) {
+    for (unsigned change = 1; change < 256; ++change) {
+      file.data()[i] ^= static_cast<unsigned char>(change);
+      ASSERT_NE(file.check().status, Status::kOk) << i << " ^ " << change;
+      file.data()[i] ^= static_cast<unsigned char>(change);
+    }
+  }
+  EXPECT_EQ(file.check().status, Status::kOk);
+}
+
+// A hostile writer computes the hash too. Whatever the checker lets pass must be safe to walk.
+TEST(Check, EverySealedSingleByteChangeIsRejectedOrHarmless) {
+  Bytes file = sample();
+  for (std::size_t i = 16; i < file.size(); ++i) {
+    for (const unsigned change : {0x01u, 0x80u, 0xFFu}) {
+      file.data()[i] ^= static_cast<unsigned char>(change);
+      seal(file.data(), file.size());
+      const CheckResult result = file.check();
+      if (result.status == Status::kOk) {
+        EXPECT_EQ(result.asset.level().triangle_count, 30u);
+        for (const Part& part : result.asset.parts) EXPECT_LE(result.asset.name_of(part).size(), file.size());
+      }
+      file.data()[i] ^= static_cast<unsigned char>(change);
+    }
+  }
+}
+
+TEST(Check, RejectsMisalignedBytes) {
+  Bytes file = sample();
+  EXPECT_EQ(check(file.data() + 16, file.size() - 16).status, Status::kMisaligned);
+}
+
+TEST(Check, NamesForeignFiles) {
+  const auto status_of = [](std::string text) { return Bytes(text.data(), text.size()).check().status; };
+  EXPECT_EQ(status_of("HIERARCHY\nROOT Hips\n{\n"), Status::kBiovisionMotionCapture);
+  EXPECT_EQ(status_of(""), Status::kNotTandem);
+  EXPECT_EQ(status_of("\x89"
+                      "BV"),
+            Status::kNotTandem);
+  EXPECT_EQ(status_of("OFF\n3 1 0\n"), Status::kNotTandem);
+  EXPECT_EQ(status_of("\x89"
+                      "BVH\n\x1a\n and so on"),
+            Status::kDamagedByTextTransfer);
+  EXPECT_EQ(status_of(std::string(500, 'x')), Status::kNotTandem);
+}
+
+TEST(Check, RejectsTrailingBytes) {
+  Bytes file = sample();
+  std::string longer(reinterpret_cast<char*>(file.data()), file.size());
+  longer += '\0';
+  EXPECT_EQ(Bytes(longer.data(), longer.size()).check().status, Status::kTrailingBytes);
+}
+
+// What a hostile writer may do, each with the defect that must be named. Hashes are right.
+struct Attack {
+  const char* what;
+  Status expected;
+  std::function<void(Bytes&)> apply;
+};
+
+void set_box(Block& block, int node, float center, float half_extent) {
+  for (int k = 0; k < 3; ++k) {
+    block.center[k][node] = center;
+    block.half_extent[k][node] = half_extent;
+  }
+}
+
+const Attack kHeaderAttacks[] = {
+    {"byte order", Status::kWrongByteOrder, [](Bytes& f) { f.header().byte_order = 0x04030201; }},
+    {"major version", Status::kUnsupportedVersion, [](Bytes& f) { f.header().version_major = 2; }},
+    {"minor version", Status::kUnsupportedVersion, [](Bytes& f) { f.header().version_minor = 1; }},
+    {"reserved byte", Status::kBadHeader, [](Bytes& f) { f.header().reserved[23] = 1; }},
+    {"no level", Status::kBadHeader, [](Bytes& f) { f.header().level_count = 0; }},
+    {"too many levels", Status::kBadHeader, [](Bytes& f) { f.header().level_count = kMaxLevels + 1; }},
+    {"levels that are not there", Status::kBadLevel, [](Bytes& f) { f.header().level_count = 2; }},
+    {"too many sections", Status::kBadHeader, [](Bytes& f) { f.header().section_count = 0xFFFFFFFF; }},
+    {"fewer sections", Status::kBadGap, [](Bytes& f) { f.header().section_count = 5; }},
+    {"no faces", Status::kBadHeader, [](Bytes& f) { f.header().source_faces = 0; }},
+    {"origin NaN", Status::kBadHeader, [](Bytes& f) { f.header().origin[1] = std::nan(""); }},
+    {"negative error", Status::kBadHeader, [](Bytes& f) { f.header().rounding_error = -1; }},
+    {"bounds too wide", Status::kBoundsMismatch, [](Bytes& f) { f.header().upper[0] += 1; }},
+    {"bounds NaN", Status::kBoundsMismatch, [](Bytes& f) { f.header().lower[2] = std::nanf(""); }},
+};
+
+const Attack kSectionAttacks[] = {
+    {"unknown kind", Status::kUnknownSection,
+     [](Bytes& f) { f.section(0).kind = static_cast<SectionKind>(77); }},
+    {"kind 0", Status::kUnknownSection, [](Bytes& f) { f.section(3).kind = static_cast<SectionKind>(0); }},
+    {"level past the last", Status::kBadLevel, [](Bytes& f) { f.section(SectionKind::blocks).level = 1; }},
+    {"level of a file section", Status::kBadLevel, [](Bytes& f) { f.section(SectionKind::parts).level = 1; }},
+    {"offset off the grid", Status::kSectionMisaligned, [](Bytes& f) { f.section(1).offset += 16; }},
+    {"offset past the end", Status::kSectionOutOfBounds,
+     [](Bytes& f) { f.section(1).offset = 256 * f.header().file_bytes; }},
+    {"offset near 2^64", Status::kSectionOutOfBounds,
+     [](Bytes& f) { f.section(1).offset = ~std::uint64_t{255}; }},
+    {"bytes past the end", Status::kSectionOutOfBounds,
+     [](Bytes& f) { f.section(5).bytes = f.header().file_bytes; }},
+    {"bytes near 2^64", Status::kSectionOutOfBounds,
+     [](Bytes& f) { f.section(5).bytes = ~std::uint64_t{0}; }},
+    {"count whose product overflows", Status::kSectionSizeMismatch,
+     [](Bytes& f) { f.section(SectionKind::blocks).count += std::uint64_t{1} << 57; }},
+    {"bytes no multiple", Status::kSectionSizeMismatch,
+     [](Bytes& f) { f.section(SectionKind::blocks).bytes -= 1; }},
+    {"overlap", Status::kSectionsOverlap,
+     [](Bytes& f) { f.section(SectionKind::triangles).offset = f.section(SectionKind::blocks).offset; }},
+    {"over the header", Status::kSectionsOverlap, [](Bytes& f) { f.section(0).offset = 0; }},
+    {"out of order", Status::kBadGap, [](Bytes& f) { std::swap(f.section(1), f.section(2)); }},
+    {"twice", Status::kSectionDuplicated,
+     [](Bytes& f) {
+       f.section(SectionKind::strings) = {SectionKind::levels, 0, f.section(SectionKind::strings).offset, 32,
+                                          1};
+     }},
+    {"a byte in a gap", Status::kBadGap,
+     [](Bytes& f) { f.data()[f.section(SectionKind::levels).offset + sizeof(Level)] = 1; }},
+    {"a byte behind the last section", Status::kBadGap, [](Bytes& f) { f.data()[f.size() - 1] = 1; }},
+};
+
+const Attack kLevelAttacks[] = {
+    {"block count", Status::kBadLevel, [](Bytes& f) { ++f.level().block_count; }},
+    {"triangle count", Status::kBadLevel, [](Bytes& f) { --f.level().triangle_count; }},
+    {"more leaf blocks than blocks", Status::kBadLevel, [](Bytes& f) { f.level().leaf_block_count = 1000; }},
+    {"leaf blocks", Status::kLeafCountMismatch, [](Bytes& f) { --f.level().leaf_block_count; }},
+    {"depth", Status::kDepthMismatch, [](Bytes& f) { ++f.level().depth; }},
+    {"error bound of level 0", Status::kBadLevel, [](Bytes& f) { f.level().error_bound = 1; }},
+    {"error bound NaN", Status::kBadLevel, [](Bytes& f) { f.level().error_bound = std::nan(""); }},
+    {"reserved", Status::kBadLevel, [](Bytes& f) { f.level().reserved[0] = 1; }},
+    {"part name", Status::kBadPart,
+     [](Bytes& f) { f.elements<Part>(SectionKind::parts)[0].name_bytes = 1000; }},
+    {"part name overflow", Status::kBadPart,
+     [](Bytes& f) { f.elements<Part>(SectionKind::parts)[1].name_offset = 0xFFFFFFFF; }},
+    {"part path", Status::kBadPart,
+     [](Bytes& f) { f.elements<Part>(SectionKind::parts)[1].path_offset = 1000; }},
+    {"part gap", Status::kBadPart, [](Bytes& f) { f.elements<Part>(SectionKind::parts)[1].first_face += 1; }},
+    {"part too long", Status::kBadPart,
+     [](Bytes& f) { f.elements<Part>(SectionKind::parts)[1].face_count += 1; }},
+    {"parts too short", Status::kBadPart,
+     [](Bytes& f) { f.elements<Part>(SectionKind::parts)[1].face_count -= 1; }},
+};
+
+const Attack kTreeAttacks[] = {
+    {"kind 3", Status::kBadNodeKind, [](Bytes& f) { f.blocks()[0].kind[1] = static_cast<NodeKind>(3); }},
+    {"imaginary first", Status::kImaginaryBeforeReal,
+     [](Bytes& f) { set_imaginary(f.blocks()[first_leaf_block(f)], 0); }},
+    {"imaginary only", Status::kEmptyBlock,
+     [](Bytes& f) {
+       for (int i = 0; i < 4; ++i) set_imaginary(f.blocks()[0], i);
+     }},
+    {"partial leaf block", Status::kPartialLeafBlock,
+     [](Bytes& f) { f.blocks()[first_leaf_block(f)].kind[1] = NodeKind::internal; }},
+    {"partial leaf block at the root", Status::kPartialLeafBlock,
+     [](Bytes& f) { f.blocks()[0].kind[1] = NodeKind::leaf; }},
+    {"imaginary with a box", Status::kBadImaginaryNode,
+     [](Bytes& f) { f.blocks()[block_with_imaginary_leaf(f)].half_extent[1][3] = 1; }},
+    {"imaginary with NaN", Status::kBadImaginaryNode,
+     [](Bytes& f) { f.blocks()[block_with_imaginary_leaf(f)].center[0][3] = std::nanf(""); }},
+    {"imaginary with an index", Status::kBadImaginaryNode,
+     [](Bytes& f) { f.blocks()[block_with_imaginary_leaf(f)].index[3] = 0; }},
+    {"box NaN", Status::kBadBox, [](Bytes& f) { f.blocks()[0].center[0][0] = std::nanf(""); }},
+    {"box infinite", Status::kBadBox,
+     [](Bytes& f) { f.blocks()[0].half_extent[0][0] = std::numeric_limits<float>::infinity(); }},
+    {"negative half-extent", Status::kBadBox, [](Bytes& f) { f.blocks()[0].half_extent[2][0] *= -1; }},
+    {"child past the end", Status::kChildOutOfRange,
+     [](Bytes& f) { f.blocks()[0].index[1] = f.level().block_count; }},
+    {"child at 2^32 - 1", Status::kChildOutOfRange, [](Bytes& f) { f.blocks()[0].index[1] = kNoIndex; }},
+    {"cycle to the root", Status::kChildNotAfterParent, [](Bytes& f) { f.blocks()[0].index[0] = 0; }},
+    {"shared child", Status::kChildShared, [](Bytes& f) { f.blocks()[0].index[1] = f.blocks()[0].index[0]; }},
+    {"unreachable block", Status::kBlockUnreachable,
+     [](Bytes& f) {
+       Block& root = f.blocks()[0];
+       int last = 3;
+       while (root.kind[last] == NodeKind::imaginary) --last;
+       set_imaginary(root, last);
+     }},
+    {"triangle twice", Status::kTriangleOrder,
+     [](Bytes& f) { f.blocks()[first_leaf_block(f)].index[1] = 0; }},
+    {"triangle past the end", Status::kTriangleOrder,
+     [](Bytes& f) { f.blocks()[first_leaf_block(f)].index[0] = 30; }},
+    {"triangle left out", Status::kLeafCountMismatch,
+     [](Bytes& f) {
+       std::uint32_t b = f.level().block_count - 1;
+       int last = 3;
+       while (f.blocks()[b].kind[last] == NodeKind::imaginary) --last;
+       set_imaginary(f.blocks()[b], last);
+     }},
+    {"triangle NaN", Status::kTriangleNotFinite,
+     [](Bytes& f) { f.triangles()[7].corner[1].position[2] = std::nanf(""); }},
+    {"triangle too far", Status::kTriangleNotFinite,
+     [](Bytes& f) { f.triangles()[7].corner[1].position[2] = 3.4028e38f; }},
+    {"triangle outside its leaf by one float", Status::kTriangleOutsideLeafBox,
+     [](Bytes& f) {
+       const Box box = box_of(f.blocks()[first_leaf_block(f)], 0);
+       f.triangles()[0].corner[0].position[0] = std::nextafter(box.center[0] + box.half_extent[0], 10.0f);
+     }},
+    {"child outside its parent", Status::kChildOutsideParentBox,
+     [](Bytes& f) { set_box(f.blocks()[first_leaf_block(f)], 0, 0.5f, 2); }},
+    {"parent smaller by one float", Status::kChildOutsideParentBox,
+     [](Bytes& f) {
+       float& h = f.blocks()[0].half_extent[1][0];
+       h = std::nextafter(h, 0.0f);
+     }},
+    {"source face past the end", Status::kBadFace, [](Bytes& f) { f.triangles()[3].corner[0].w = 30; }},
+    {"part past the end", Status::kBadFace, [](Bytes& f) { f.triangles()[3].corner[1].w = 2; }},
+    {"face of another part", Status::kBadFace, [](Bytes& f) { f.triangles()[3].corner[1].w ^= 1; }},
+    {"reserved lane", Status::kBadFace, [](Bytes& f) { f.triangles()[3].corner[2].w = 1; }},
+};
+
+void expect_all_named(std::span<const Attack> attacks) {
+  for (const Attack& attack : attacks) {
+    Bytes file = sample();
+    attack.apply(file);
+    const Status status = file.check_sealed();
+    EXPECT_EQ(status, attack.expected) << attack.what << ": " << name(status);
+  }
+}
+
+TEST(Check, NamesHostileHeaders) {
+  expect_all_named(kHeaderAttacks);
+}
+TEST(Check, NamesHostileSections) {
+  expect_all_named(kSectionAttacks);
+}
+TEST(Check, NamesHostileLevelsAndParts) {
+  expect_all_named(kLevelAttacks);
+}
+TEST(Check, NamesHostileTrees) {
+  expect_all_named(kTreeAttacks);
+}
+
+TEST(Check, FileSizeInTheHeaderMustBeTheFilesSize) {
+  Bytes file = sample();
+  file.header().file_bytes += 256;
+  EXPECT_EQ(file.check().status, Status::kTruncated);
+  file.header().file_bytes = 16;
+  EXPECT_EQ(file.check().status, Status::kTruncated);
+}
+
+TEST(Check, RejectsAFileWithoutParts) {
+  const test::Mesh mesh = random_mesh(1, 1);
+  const build::Tree tree = build::build_tree(mesh.geometry(), build::Imaginary::minimal);
+  const std::vector<std::uint32_t> face = {0};
+  const build::AssetLevel level{mesh.geometry(), face, &tree, 0};
+  build::AssetSource source;
+  source.source_faces = 1;
+  const Bytes file(build::assemble(source, {&level, 1}));
+  EXPECT_EQ(file.check().status, Status::kSectionMissing);
+}
+
+// A chain of blocks, each with one child, that is one block too deep.
+TEST(Check, RejectsATreePastTheDepthLimit) {
+  for (const std::uint32_t depth : {kMaxDepth, kMaxDepth + 1}) {
+    test::Mesh mesh = random_mesh(1, 1);
+    build::Tree tree = build::build_tree(mesh.geometry(), build::Imaginary::minimal);
+    const Block leaf = tree.blocks[0];
+    tree.blocks.assign(depth, Block{});
+    tree.blocks.back() = leaf;
+    for (std::uint32_t b = depth - 1; b-- > 0;) {
+      for (int i = 1; i < kNodesPerBlock; ++i) set_imaginary(tree.blocks[b], i);
+      set_node(tree.blocks[b], 0, box_of(leaf, 0), b + 1, NodeKind::internal);
+    }
+    tree.depth = depth;
+    const std::vector<std::uint32_t> face = {0};
+    const std::vector<build::SourcePart> parts = {{"", "", 0, 1}};
+    build::AssetSource source;
+    source.source_faces = 1;
+    source.parts = parts;
+    const build::AssetLevel level{mesh.geometry(), face, &tree, 0};
+    const Bytes file(build::assemble(source, {&level, 1}));
+    EXPECT_EQ(file.check().status, depth <= kMaxDepth ? Status::kOk : Status::kTooDeep) << depth;
+  }
+}
+
+TEST(Check, AcceptsSeveralLevelsOfDetailAndRejectsErrorsThatFall) {
+  const test::Mesh fine = random_mesh(40, 1), coarse = random_mesh(10, 2);
+  const build::Tree fine_tree = build::build_tree(fine.geometry(), build::Imaginary::minimal);
+  const build::Tree coarse_tree = build::build_tree(coarse.geometry(), build::Imaginary::minimal);
+  const std::vector<std::uint32_t> face(40, 0);
+  const std::vector<build::SourcePart> parts = {{"all", "", 0, 1}};
+  build::AssetSource source;
+  source.source_faces = 1;
+  source.parts = parts;
+  const build::AssetLevel levels[] = {{fine.geometry(), face, &fine_tree, 0},
+                                      {coarse.geometry(), face, &coarse_tree, 0.5}};
+  Bytes file(build::assemble(source, levels));
+  const CheckResult result = file.check();
+  ASSERT_EQ(result.status, Status::kOk) << name(result.status);
+  EXPECT_EQ(result.asset.level(1).triangle_count, 10u);
+  EXPECT_EQ(result.asset.level(1).error_bound, 0.5);
+  EXPECT_NE(result.asset.level(0).blocks, result.asset.level(1).blocks);
+  file.elements<Level>(SectionKind::levels)[1].error_bound = -0.5;
+  EXPECT_EQ(file.check_sealed(), Status::kBadLevel);
+}
+
+}  // namespace
+}  // namespace tandem

@@ -1,0 +1,50 @@
+#include "sample_asset.h"
+
+#include <numeric>
+#include <random>
+
+namespace tandem::test {
+
+void Mesh::add(std::array<float, 3> a, std::array<float, 3> b, std::array<float, 3> c) {
+  const auto first = static_cast<std::uint32_t>(points.size());
+  points.insert(points.end(), {a, b, c});
+  triangles.push_back({first, first + 1, first + 2});
+}
+
+Mesh random_mesh(std::uint32_t triangles, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  const auto uniform = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
+  Mesh mesh;
+  for (std::uint32_t t = 0; t < triangles; ++t) {
+    const std::array<float, 3> a = {uniform(), uniform(), uniform()};
+    const auto near = [&] {
+      return std::array<float, 3>{a[0] + 0.1f * uniform(), a[1] + 0.1f * uniform(), a[2] + 0.1f * uniform()};
+    };
+    const auto b = near();
+    mesh.add(a, b, near());
+  }
+  return mesh;
+}
+
+build::Image make_file(const Mesh& mesh, build::Imaginary imaginary) {
+  const std::size_t n = mesh.triangles.size();
+  const build::Tree tree = build::build_tree(mesh.geometry(), imaginary);
+  std::vector<std::uint32_t> face(n);
+  std::iota(face.begin(), face.end(), 0u);
+  const std::vector<build::SourcePart> parts = {{"left", "scene/left", 0, n / 2},
+                                                {"right", "", n / 2, n - n / 2}};
+  build::AssetSource source;
+  source.source_faces = n;
+  source.parts = parts;
+  source.provenance = "{\"tool\":\"test\"}";
+  const build::AssetLevel level{mesh.geometry(), face, &tree, 0};
+  return build::assemble(source, {&level, 1});
+}
+
+Section& Bytes::section(SectionKind kind) {
+  std::size_t i = 0;
+  while (section(i).kind != kind) ++i;
+  return section(i);
+}
+
+}  // namespace tandem::test

@@ -1,0 +1,68 @@
+#pragma once
+#include <array>
+#include <cstring>
+#include <new>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "assemble.h"
+#include "tandem/formats/box.h"
+#include "tandem/formats/check.h"
+
+namespace tandem::test {
+
+/// Triangles to build trees over, with the arrays that Geometry looks at.
+struct Mesh {
+  std::vector<std::array<float, 3>> points;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+
+  build::Geometry geometry() const { return {points, triangles}; }
+  void add(std::array<float, 3> a, std::array<float, 3> b, std::array<float, 3> c);
+};
+
+/// Small triangles scattered in the unit cube.
+Mesh random_mesh(std::uint32_t triangles, std::uint64_t seed);
+
+/// The bytes of a whole file over this mesh: source face i is triangle i, in two parts.
+build::Image make_file(const Mesh& mesh, build::Imaginary imaginary = build::Imaginary::minimal);
+
+/// Bytes in an allocation of exactly their size, aligned as the checker wants: an overrun by one is seen by
+/// the sanitizer.
+class Bytes {
+ public:
+  Bytes(const void* data, std::size_t size)
+      : data_(static_cast<unsigned char*>(::operator new (size, std::align_val_t{128}))), size_(size) {
+    if (size != 0) std::memcpy(data_, data, size);
+  }
+  explicit Bytes(const build::Image& image) : Bytes(image.data(), image.size()) {}
+  Bytes(const Bytes& other) : Bytes(other.data_, other.size_) {}
+  Bytes& operator=(const Bytes&) = delete;
+  ~Bytes() { ::operator delete (data_, std::align_val_t{128}); }
+
+  unsigned char* data() { return data_; }
+  std::size_t size() const { return size_; }
+  FileHeader& header() { return *reinterpret_cast<FileHeader*>(data_); }
+  Section& section(std::size_t i) { return reinterpret_cast<Section*>(data_ + sizeof(FileHeader))[i]; }
+  Section& section(SectionKind kind);
+
+  template <typename Element>
+  Element* elements(SectionKind kind) {
+    return reinterpret_cast<Element*>(data_ + section(kind).offset);
+  }
+  Block* blocks() { return elements<Block>(SectionKind::blocks); }
+  Triangle* triangles() { return elements<Triangle>(SectionKind::triangles); }
+  Level& level() { return *elements<Level>(SectionKind::levels); }
+
+  CheckResult check() const { return tandem::check(data_, size_); }
+  Status check_sealed() {
+    seal(data_, size_);
+    return check().status;
+  }
+
+ private:
+  unsigned char* data_;
+  std::size_t size_;
+};
+
+}  // namespace tandem::test

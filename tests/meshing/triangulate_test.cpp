@@ -1,0 +1,304 @@
+#include "triangulate.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cfloat>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "meshing/polygons.h"
+
+namespace tandem::build {
+namespace {
+
+struct Outcome {
+  TriangleMesh mesh;
+  CleanReport report;
+};
+
+Outcome run(PolygonMesh mesh) {
+  Outcome outcome;
+  outcome.mesh = triangulate(mesh, outcome.report);
+  return outcome;
+}
+
+GridPolygon reversed(GridPolygon polygon) {
+  std::reverse(polygon.begin(), polygon.end());
+  return polygon;
+}
+
+GridPolygon rotated_by(GridPolygon polygon, std::size_t steps) {
+  std::rotate(polygon.begin(), polygon.begin() + static_cast<std::ptrdiff_t>(steps), polygon.end());
+  return polygon;
+}
+
+/// From every first corner, in both directions.
+void expect_tiled_however_written(const GridPolygon& polygon) {
+  for (std::size_t steps = 0; steps < polygon.size(); ++steps)
+    for (const GridPolygon& p : {rotated_by(polygon, steps), reversed(rotated_by(polygon, steps))}) {
+      const Outcome outcome = run(flat_face(p));
+      EXPECT_EQ(outcome.mesh.triangles.size(), p.size() - 2) << "from corner " << steps;
+      EXPECT_TRUE(tiles(outcome.mesh.triangles, p)) << "from corner " << steps;
+      EXPECT_EQ(outcome.report.faces_not_simple, 0u);
+    }
+}
+
+double twice_signed_area_xy(const TriangleMesh& mesh) {
+  double sum = 0;
+  for (const Triangle& t : mesh.triangles) {
+    const Point& a = mesh.points[t[0]];
+    const Point& b = mesh.points[t[1]];
+    const Point& c = mesh.points[t[2]];
+    sum += (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+  }
+  return sum;
+}
+
+TEST(Triangulate, LeavesTrianglesAsTheyAreAndInOrder) {
+  PolygonMesh mesh;
+  mesh.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  add_face(mesh, {2, 0, 1});
+  add_face(mesh, {3, 3, 1});
+  add_face(mesh, {0, 3, 2});
+  const Outcome outcome = run(mesh);
+  EXPECT_EQ(outcome.mesh.triangles, (std::vector<Triangle>{{2, 0, 1}, {3, 3, 1}, {0, 3, 2}}));
+  EXPECT_EQ(outcome.mesh.face, (std::vector<std::uint32_t>{0, 1, 2}));
+}
+
+TEST(Triangulate, EmptyMeshGivesNothing) {
+  const Outcome outcome = run({});
+  EXPECT_TRUE(outcome.mesh.triangles.empty());
+  EXPECT_EQ(outcome.report.faces, 0u);
+}
+
+TEST(Triangulate, CutsConcaveQuadInside) { expect_tiled_however_written({{0, 0}, {10, 4}, {0, 8}, {3, 4}}); }
+
+TEST(Triangulate, CutsQuadWithStraightCornerInside) { expect_tiled_however_written({{0, 0}, {5, 0}, {10, 0}, {4, 7}}); }
+
+TEST(Triangulate, CutsConvexQuadAlongShorterDiagonal) {
+  const Outcome outcome = run(flat_face({{0, 0}, {10, 0}, {12, 5}, {2, 5}}));
+  EXPECT_EQ(outcome.mesh.triangles, (std::vector<Triangle>{{3, 0, 1}, {3, 1, 2}}));
+}
+
+TEST(Triangulate, CutsSquareFromItsFirstCorner) {
+  const Outcome outcome = run(flat_face({{0, 0}, {1, 0}, {1, 1}, {0, 1}}));
+  EXPECT_EQ(outcome.mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}}));
+}
+
+TEST(Triangulate, CutsSaddleQuadWithoutTurningAPieceOver) {
+  PolygonMesh mesh;
+  mesh.points = {{0, 0, 0}, {1, 0, 2}, {1, 1, 0}, {0, 1, 2}};
+  add_face(mesh, {0, 1, 2, 3});
+  const Outcome outcome = run(mesh);
+  ASSERT_EQ(outcome.mesh.triangles.size(), 2u);
+  EXPECT_EQ(twice_signed_area_xy(outcome.mesh), 2);
+  EXPECT_EQ(outcome.report.faces_not_simple, 0u);
+}
+
+TEST(Triangulate, TilesConcavePolygons) {
+  expect_tiled_however_written({{0, 0}, {10, 0}, {10, 10}, {5, 3}, {0, 10}});
+  expect_tiled_however_written({{0, 0}, {4, 0}, {4, 1}, {1, 1}, {1, 4}, {0, 4}});
+  expect_tiled_however_written({{0, -10}, {2, -3}, {9, -3}, {4, 1}, {6, 8}, {0, 4}, {-6, 8}, {-4, 1}, {-9, -3}, {-2, -3}});
+}
+
+TEST(Triangulate, TilesSpiral) {
+  GridPolygon spiral;
+  for (int turn = 0; turn < 12; ++turn) {
+    const std::int64_t r = 4 * (turn + 1);
+    spiral.insert(spiral.end(), {{r, -r + 4}, {r, r}, {-r, r}, {-r, -r}});
+  }
+  for (int turn = 11; turn >= 0; --turn) {
+    const std::int64_t r = 4 * (turn + 1) - 2;
+    spiral.insert(spiral.end(), {{-r, -r - (turn == 11 ? 2 : 0)}, {-r, r}, {r, r}, {r, -r + 4}});
+  }
+  ASSERT_GT(std::abs(twice_area(spiral)), 0);
+  expect_tiled_however_written(spiral);
+}
+
+TEST(Triangulate, TilesStraightRunsOfCorners) {
+  expect_tiled_however_written({{0, 0}, {1, 0}, {2, 0}, {3, 0}, {3, 1}, {3, 2}, {3, 3}, {0, 3}, {0, 1}});
+}
+
+TEST(Triangulate, LeavesHoleBehindBridgeOpen) {
+  PolygonMesh mesh = flat_face({{0, 0}, {9, 0}, {9, 9}, {0, 9}, {3, 3}, {3, 6}, {6, 6}, {6, 3}});
+  mesh.corners = {0, 1, 2, 3, 0, 4, 5, 6, 7, 4};
+  mesh.face_begin = {0, 10};
+  const Outcome outcome = run(mesh);
+  EXPECT_EQ(outcome.mesh.triangles.size(), 8u);
+  EXPECT_EQ(twice_signed_area_xy(outcome.mesh), 2 * (81 - 9));
+  EXPECT_EQ(outcome.report.faces_not_simple, 0u);
+}
+
+TEST(Triangulate, LeavesHoleOpenWhenBridgeHasItsOwnVertices) {
+  const Outcome outcome =
+      run(flat_face({{0, 0}, {9, 0}, {9, 9}, {0, 9}, {0, 0}, {3, 3}, {3, 6}, {6, 6}, {6, 3}, {3, 3}}));
+  EXPECT_EQ(outcome.mesh.triangles.size(), 8u);
+  EXPECT_EQ(twice_signed_area_xy(outcome.mesh), 2 * (81 - 9));
+}
+
+TEST(Triangulate, LeavesTwoHolesOpenAndKeepsOrientation) {
+  GridPolygon polygon{{0, 0}, {20, 0}, {20, 9},  {0, 9},  {0, 0}, {3, 3},  {3, 6},  {6, 6},
+                      {6, 3}, {12, 3}, {12, 6}, {15, 6}, {15, 3}, {12, 3}, {6, 3}, {3, 3}};
+  for (const GridPolygon& p : {polygon, reversed(polygon)}) {
+    const Outcome outcome = run(flat_face(p));
+    EXPECT_EQ(outcome.mesh.triangles.size(), p.size() - 2);
+    EXPECT_EQ(twice_signed_area_xy(outcome.mesh), static_cast<double>(twice_area(p)));
+    EXPECT_EQ(outcome.report.faces_not_simple, 0u);
+  }
+}
+
+TEST(Triangulate, TakesLobesThatMeetInOneVertex) {
+  PolygonMesh mesh = flat_face({{0, 0}, {4, -1}, {4, 1}, {-1, 4}, {-1, 5}, {-4, -1}, {-4, -2}});
+  mesh.corners = {0, 1, 2, 0, 3, 4, 0, 5, 6};
+  mesh.face_begin = {0, 9};
+  const Outcome outcome = run(mesh);
+  EXPECT_EQ(outcome.mesh.triangles.size(), 3u);
+  EXPECT_EQ(outcome.report.faces_not_simple, 0u);
+}
+
+TEST(Triangulate, SkipsCornersThatRepeatTheirPredecessor) {
+  PolygonMesh mesh = flat_face({{0, 0}, {4, 0}, {4, 4}, {0, 4}, {4, 4}, {0, 0}});
+  mesh.corners = {0, 0, 1, 2, 4, 3, 5};  // 4 lies on 2, 5 on 0
+  mesh.face_begin = {0, 7};
+  const Outcome outcome = run(mesh);
+  EXPECT_EQ(outcome.mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}}));
+}
+
+TEST(Triangulate, KeepsFaceOnOnePlaceAsOneDegenerateTriangle) {
+  PolygonMesh mesh = flat_face({{1, 1}, {1, 1}, {1, 1}, {1, 1}});
+  const Outcome outcome = run(mesh);
+  EXPECT_EQ(outcome.mesh.triangles, (std::vector<Triangle>{{0, 0, 0}}));
+  EXPECT_EQ(outcome.report.faces_not_simple, 0u);
+}
+
+TEST(Triangulate, FansOutlinesThatCrossThemselvesAndCountsThem) {
+  PolygonMesh mesh = flat_face({{0, 0}, {4, 0}, {0, 3}, {4, 3}, {2, 7}, {9, 1}});
+  mesh.corners = {0, 1, 2, 3, 0, 3, 1, 4, 2, 5};
+  mesh.face_begin = {0, 4, 10};
+  const Outcome outcome = run(mesh);
+  EXPECT_EQ(outcome.report.faces_not_simple, 2u);
+  EXPECT_EQ(outcome.mesh.triangles.size(), 2u + 4u);
+  EXPECT_EQ(outcome.mesh.triangles[0], (Triangle{0, 1, 2}));
+}
+
+TEST(Triangulate, FansPentagram) {
+  const Outcome outcome = run(flat_face({{0, 10}, {6, -8}, {-10, 3}, {10, 3}, {-6, -8}}));
+  EXPECT_EQ(outcome.report.faces_not_simple, 1u);
+  EXPECT_EQ(outcome.mesh.triangles.size(), 3u);
+}
+
+TEST(Triangulate, DoesNotCallFaceOnALineCrossed) {
+  PolygonMesh mesh;
+  for (int i = 0; i < 6; ++i) mesh.points.push_back({1.0 * (i * i % 5), 2.0 * (i * i % 5), -1.0 * (i * i % 5)});
+  add_face(mesh, {0, 1, 2, 3, 4});
+  add_face(mesh, {0, 1, 2, 5});
+  EXPECT_EQ(run(mesh).report.faces_not_simple, 0u);
+}
+
+TEST(Triangulate, SplitsHelixWhoseEndsCoverEachOther) {
+  // Seen along z the first and the last corner coincide; they must not be taken for each other.
+  PolygonMesh mesh;
+  mesh.points = {{0, 0, 0}, {4, 0, 1}, {4, 4, 2}, {0, 4, 3}, {0, 0, 4}};
+  add_face(mesh, {0, 1, 2, 3, 4});
+  const Outcome outcome = run(mesh);
+  ASSERT_EQ(outcome.mesh.triangles.size(), 3u);
+  std::vector<bool> used(5, false);
+  for (const Triangle& t : outcome.mesh.triangles)
+    for (const std::uint32_t corner : t) used[corner] = true;
+  EXPECT_EQ(std::count(used.begin(), used.end(), true), 5);
+}
+
+TEST(Triangulate, WorksInEveryPlaneAndAtEveryScale) {
+  const GridPolygon star{{0, -10}, {2, -3}, {9, -3}, {4, 1}, {6, 8}, {0, 4}, {-6, 8}, {-4, 1}, {-9, -3}, {-2, -3}};
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double scale : {1.0, 0x1p-1060, 0x1p-500, 0x1p100, 0x1p123}) {
+      PolygonMesh mesh = flat_face(star);
+      for (Point& p : mesh.points) {
+        const Point q{p[0] * scale, p[1] * scale, 0};
+        for (int k = 0; k < 3; ++k) p[(k + axis) % 3] = q[k];
+      }
+      const Outcome outcome = run(mesh);
+      EXPECT_TRUE(tiles(outcome.mesh.triangles, star)) << axis << " " << scale;
+    }
+}
+
+TEST(Triangulate, DropsEachBadFaceOnceUnderItsFirstReason) {
+  PolygonMesh mesh;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double infinity = std::numeric_limits<double>::infinity();
+  mesh.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {nan, 0, 0}, {0, -infinity, 0}, {0, 0, 1e39}, {0, 0, double{FLT_MAX}}, {9, 9, 9}};
+  add_face(mesh, {0, 1, 2});
+  add_face(mesh, {0, 3, kNoVertex, 5});  // all three: counted as an index
+  add_face(mesh, {0, 8, 1});
+  add_face(mesh, {3, 5, 4});  // counted as not finite
+  add_face(mesh, {0, 1, 2, 4});
+  add_face(mesh, {0, 1, 5});
+  add_face(mesh, {0, 1, 6});
+  const Outcome outcome = run(mesh);
+  EXPECT_EQ(outcome.report.faces, 7u);
+  EXPECT_EQ(outcome.report.faces_index_out_of_range, 2u);
+  EXPECT_EQ(outcome.report.faces_not_finite, 2u);
+  EXPECT_EQ(outcome.report.faces_too_large, 1u);
+  EXPECT_EQ(outcome.mesh.face, (std::vector<std::uint32_t>{0, 6}));
+  EXPECT_EQ(outcome.report.vertices, 8u);
+  EXPECT_EQ(outcome.report.vertices_unreferenced, 1u);
+}
+
+TEST(Triangulate, NumbersTrianglesByTheFaceTheyCameFrom) {
+  PolygonMesh mesh = flat_face({{0, 0}, {4, 0}, {4, 4}, {2, 6}, {0, 4}});
+  add_face(mesh, {0, 1, 2});
+  add_face(mesh, {0, 1, 2, 4});
+  EXPECT_EQ(run(mesh).mesh.face, (std::vector<std::uint32_t>{0, 0, 0, 1, 2, 2}));
+}
+
+PolygonMesh one_face(std::vector<Point> points) {
+  PolygonMesh mesh;
+  mesh.points = std::move(points);
+  for (std::uint32_t i = 0; i < mesh.points.size(); ++i) mesh.corners.push_back(i);
+  mesh.face_begin.push_back(static_cast<std::uint32_t>(mesh.corners.size()));
+  return mesh;
+}
+
+Point on_circle(double radius, double turn) {
+  const double angle = 2 * std::numbers::pi * turn;
+  return {radius * std::cos(angle), radius * std::sin(angle), 0.25 * radius * std::cos(angle)};
+}
+
+TEST(Triangulate, SplitsFacesOfManyCorners) {
+  constexpr int kCorners = 20000;
+  std::vector<Point> circle;
+  std::vector<Point> star;
+  std::vector<Point> comb{{-1, -1, 0}};
+  for (int i = 0; i < kCorners; ++i) {
+    circle.push_back(on_circle(1, i / double{kCorners}));
+    star.push_back(on_circle(i % 2 ? 0.01 : 1, i / double{kCorners}));
+    comb.push_back({i + 0.5 * (i % 2), i % 2 ? 1e5 : 0.0, 0});
+  }
+  comb.push_back({kCorners, -1, 0});
+  std::reverse(comb.begin(), comb.end());
+  for (const auto& points : {circle, star, comb}) {
+    const Outcome outcome = run(one_face(points));
+    EXPECT_EQ(outcome.mesh.triangles.size(), points.size() - 2);
+    EXPECT_EQ(outcome.report.faces_not_simple, 0u);
+    EXPECT_GT(twice_signed_area_xy(outcome.mesh), 0);
+  }
+}
+
+TEST(Triangulate, GivesTheSameTrianglesEachTime) {
+  std::vector<Point> gear;
+  for (int i = 0; i < 3000; ++i) gear.push_back(on_circle(i % 4 < 2 ? 1 : 0.9, i / 3000.0));
+  const std::vector<Triangle> first = run(one_face(gear)).mesh.triangles;
+  PolygonMesh twice = one_face(gear);  // after other faces, in memory that was used before
+  add_face(twice, {0, 1, 2, 3, 4, 5, 6});
+  twice.corners.insert(twice.corners.end(), twice.corners.begin(), twice.corners.begin() + 3000);
+  twice.face_begin.push_back(static_cast<std::uint32_t>(twice.corners.size()));
+  const std::vector<Triangle> both = run(twice).mesh.triangles;
+  ASSERT_EQ(first.size(), 2998u);
+  EXPECT_TRUE(std::equal(first.begin(), first.end(), both.begin()));
+  EXPECT_TRUE(std::equal(first.rbegin(), first.rend(), both.rbegin()));
+}
+
+}  // namespace
+}  // namespace tandem::build

@@ -42,6 +42,11 @@ struct Expected {
   std::size_t points;
 };
 
+// What a test calls its parameter.
+void PrintTo(const Expected& expected, std::ostream* stream) {
+  *stream << expected.file;
+}
+
 class CollectedMesh : public testing::TestWithParam<Expected> {};
 
 TEST_P(CollectedMesh, HasItsTriangles) {
@@ -95,6 +100,17 @@ TEST(CollectedMeshes, BrokenOnesAreRefusedWithTheirDefect) {
   EXPECT_EQ(error_of("w_truncated.ply"), "the header promises 1000 faces, the data ends after 519");
   EXPECT_EQ(error_of("w_ply_header_cut.ply"),
             "the header has no 'end_header' line: the file was cut in its header");
+}
+
+ReadResult read_data(const char* name) {
+  const fs::path file = fs::path(TANDEM_SOURCE_DIR) / "tests/data" / name;
+  return read_from(reader_of(file), bytes_of(file));
+}
+
+TEST(FixedBugs, AFaceElementWithoutFacesNeedsNoIndices) {
+  const ReadResult result = read_data("no_faces_no_indices.ply");
+  EXPECT_TRUE(result.ok) << result.error;
+  EXPECT_EQ(result.mesh.points.size(), 1u);
 }
 
 }  // namespace

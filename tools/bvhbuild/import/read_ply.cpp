@@ -121,8 +121,9 @@ ReadResult PlyReader<Values>::read() {
 
 template <class Values>
 bool PlyReader<Values>::element(const PlyElement& element) {
-  // Records without properties take no bytes: a count of them may be anything.
-  if (element.properties.empty()) return true;
+  // Records without properties take no bytes: a count of them may be anything. Without records, an element
+  // need not have the properties that a mesh needs.
+  if (element.properties.empty() || element.count == 0) return true;
   if (!has_room(element)) return false;
   element_ = &element;
   kind_ = kind_of(element);

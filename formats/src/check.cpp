@@ -203,10 +203,10 @@ CheckResult check(const void* data_pointer, std::size_t bytes) {
   return step.status == Status::kOk ? result : step;
 }
 
-void seal(void* data) {
+void seal(void* data, std::size_t bytes) {
   auto* header = static_cast<FileHeader*>(data);
   header->hash =
-      xxh64(static_cast<const unsigned char*>(data) + kHashedFrom, header->file_bytes - kHashedFrom);
+      xxh64(static_cast<const unsigned char*>(data) + kHashedFrom, bytes - kHashedFrom);
 }
 
 }  // namespace tandem

@@ -192,7 +192,7 @@ Image assemble(const AssetSource& source, std::span<const AssetLevel> levels) {
         break;
     }
   }
-  seal(image.data());
+  seal(image.data(), image.size());
   return image;
 }
 

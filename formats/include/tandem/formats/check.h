@@ -24,7 +24,7 @@ struct CheckResult {
 CheckResult check(const void* data, std::size_t bytes);
 
 /// Writes the content hash into the header, the last step of writing a file.
-/// Condition: `data` holds a header whose file_bytes is right.
-void seal(void* data);
+/// Condition: `data` holds `bytes` bytes, at least a header.
+void seal(void* data, std::size_t bytes);
 
 }  // namespace tandem

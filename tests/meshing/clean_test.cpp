@@ -25,8 +25,9 @@ CleanReport cleaned(TriangleMesh& mesh) {
 
 TEST(Clean, WeldsVerticesAtExactlyTheSamePlaceAndNoOthers) {
   const double next = std::nextafter(1.0, 2.0);
-  TriangleMesh mesh = mesh_of({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 0, 0}, {0, 1, 0}, {next, 1, 0}, {1, 0, 5e-324}},
-                              {{0, 1, 2}, {3, 5, 4}, {6, 5, 0}});
+  TriangleMesh mesh =
+      mesh_of({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 0, 0}, {0, 1, 0}, {next, 1, 0}, {1, 0, 5e-324}},
+              {{0, 1, 2}, {3, 5, 4}, {6, 5, 0}});
   const CleanReport report = cleaned(mesh);
   EXPECT_EQ(report.vertices_welded, 2u);
   EXPECT_EQ(mesh.points, (std::vector<Point>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {next, 1, 0}, {1, 0, 5e-324}}));
@@ -45,9 +46,17 @@ TEST(Clean, WeldsNegativeZeroToZero) {
 
 TEST(Clean, DropsExactlyDegenerateTrianglesOnly) {
   // The triangles of the shared file w_degenerate.obj.
-  TriangleMesh mesh = mesh_of(
-      {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {0, 1, 0}, {1, 1e-30, 0}, {5, 5, 5}, {5, 5, 5}, {1e-42, 0, 0}, {1, 1, 1}},
-      {{0, 1, 2}, {0, 0, 1}, {5, 6, 5}, {5, 5, 5}, {0, 1, 4}, {0, 7, 3}, {0, 1, 3}, {1, 8, 3}});
+  TriangleMesh mesh =
+      mesh_of({{0, 0, 0},
+               {1, 0, 0},
+               {2, 0, 0},
+               {0, 1, 0},
+               {1, 1e-30, 0},
+               {5, 5, 5},
+               {5, 5, 5},
+               {1e-42, 0, 0},
+               {1, 1, 1}},
+              {{0, 1, 2}, {0, 0, 1}, {5, 6, 5}, {5, 5, 5}, {0, 1, 4}, {0, 7, 3}, {0, 1, 3}, {1, 8, 3}});
   const CleanReport report = cleaned(mesh);
   EXPECT_EQ(report.triangles_degenerate, 4u);
   EXPECT_EQ(mesh.face, (std::vector<std::uint32_t>{4, 5, 6, 7}));
@@ -84,7 +93,8 @@ TriangleMesh random_soup(std::uint32_t seed, std::uint32_t triangles) {
   TriangleMesh mesh;
   for (std::uint32_t i = 0; i < triangles; ++i) {
     for (int k = 0; k < 3; ++k)
-      mesh.points.push_back({coordinate(random) * 0.25, coordinate(random) * 0.25, coordinate(random) * -0.0});
+      mesh.points.push_back(
+          {coordinate(random) * 0.25, coordinate(random) * 0.25, coordinate(random) * -0.0});
     mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
     mesh.face.push_back(i);
   }

@@ -10,18 +10,24 @@ namespace {
 
 constexpr double kInfinity = HUGE_VAL;
 
-Point scaled(const Point& p, double scale) { return {p[0] * scale, p[1] * scale, p[2] * scale}; }
+Point scaled(const Point& p, double scale) {
+  return {p[0] * scale, p[1] * scale, p[2] * scale};
+}
 
-/// Multiples of one integer vector, moved: exactly on one line in float64 at every scale that is a power of two.
+/// Multiples of one integer vector, moved: exactly on one line in float64 at every scale that is a power of
+/// two.
 TEST(Collinear, HoldsExactlyForIntegerLinesAtEveryScale) {
   std::mt19937 random(7);
   std::uniform_int_distribution<int> number(-1000, 1000);
   for (int i = 0; i < 2000; ++i) {
     const Point base{double(number(random)), double(number(random)), double(number(random))};
     const Point step{double(number(random)), double(number(random)), double(number(random))};
-    const auto at = [&](int k) { return Point{base[0] + k * step[0], base[1] + k * step[1], base[2] + k * step[2]}; };
+    const auto at = [&](int k) {
+      return Point{base[0] + k * step[0], base[1] + k * step[1], base[2] + k * step[2]};
+    };
     for (const double scale : {1.0, 0x1p-1074, 0x1p-1000, 0x1p-540, 0x1p500, 0x1p990})
-      EXPECT_TRUE(collinear(scaled(at(number(random)), scale), scaled(at(number(random)), scale), scaled(at(1), scale)));
+      EXPECT_TRUE(collinear(scaled(at(number(random)), scale), scaled(at(number(random)), scale),
+                            scaled(at(1), scale)));
   }
 }
 
@@ -73,11 +79,14 @@ TEST(Orientation, AgreesWithIntegerArithmetic) {
   std::uniform_int_distribution<std::int64_t> number(-(std::int64_t{1} << 52), std::int64_t{1} << 52);
   std::uniform_int_distribution<std::int64_t> small(-3, 3);
   for (int i = 0; i < 20000; ++i) {
-    const std::int64_t ax = number(random), ay = number(random), bx = number(random) / 2, by = number(random) / 2;
+    const std::int64_t ax = number(random), ay = number(random), bx = number(random) / 2,
+                       by = number(random) / 2;
     const std::int64_t cx = ax / 2 + bx / 2 + small(random), cy = ay / 2 + by / 2 + small(random);
-    const __int128 area = static_cast<__int128>(bx - ax) * (cy - ay) - static_cast<__int128>(by - ay) * (cx - ax);
+    const __int128 area =
+        static_cast<__int128>(bx - ax) * (cy - ay) - static_cast<__int128>(by - ay) * (cx - ax);
     const int expected = (area > 0) - (area < 0);
-    EXPECT_EQ(orientation({double(ax), double(ay)}, {double(bx), double(by)}, {double(cx), double(cy)}), expected);
+    EXPECT_EQ(orientation({double(ax), double(ay)}, {double(bx), double(by)}, {double(cx), double(cy)}),
+              expected);
   }
 }
 

@@ -25,7 +25,8 @@ StoredMesh stored(TriangleMesh mesh) {
   return to_single_precision(mesh, report);
 }
 
-std::vector<Point> random_points(std::uint32_t seed, const Point& centre, const Point& half, int count = 300) {
+std::vector<Point> random_points(std::uint32_t seed, const Point& centre, const Point& half,
+                                 int count = 300) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> unit(-1, 1);
   std::vector<Point> points(count);
@@ -34,7 +35,8 @@ std::vector<Point> random_points(std::uint32_t seed, const Point& centre, const 
   return points;
 }
 
-/// The largest |origin + point - vertex|, in long double: 64 bits hold these sums well enough to compare with.
+/// The largest |origin + point - vertex|, in long double: 64 bits hold these sums well enough to compare
+/// with.
 double slow_largest_error(const std::vector<Point>& points, const StoredMesh& mesh) {
   long double largest = 0;
   for (std::size_t i = 0; i < points.size(); ++i)
@@ -72,7 +74,8 @@ TEST(ToSinglePrecision, MovesOnlyTheAxesThatLieFarOut) {
 TEST(ToSinglePrecision, KeepsTheDetailOfMapCoordinates) {
   const std::vector<Point> points = random_points(5, {432187.53, 5811430.07, 34.2}, {250, 250, 20});
   const StoredMesh mesh = stored(strip(points));
-  // Half a last bit of a float32 number of the size of the half extent (and of the height, which stays where it is).
+  // Half a last bit of a float32 number of the size of the half extent (and of the height, which stays where
+  // it is).
   const double half_last_bit = (std::nextafter(256.0f, 512.0f) - 256.0) / 2;
   EXPECT_LE(mesh.largest_rounding_error, half_last_bit * 1.00001);
   EXPECT_GT(mesh.largest_rounding_error, 0);

@@ -11,10 +11,13 @@
 namespace tandem::build {
 namespace {
 
-int sign(std::int64_t x) { return (x > 0) - (x < 0); }
+int sign(std::int64_t x) {
+  return (x > 0) - (x < 0);
+}
 
 bool within(const GridPoint& a, const GridPoint& b, const GridPoint& p) {
-  return std::min(a.x, b.x) <= p.x && p.x <= std::max(a.x, b.x) && std::min(a.y, b.y) <= p.y && p.y <= std::max(a.y, b.y);
+  return std::min(a.x, b.x) <= p.x && p.x <= std::max(a.x, b.x) && std::min(a.y, b.y) <= p.y &&
+         p.y <= std::max(a.y, b.y);
 }
 
 /// Whether the closed segments ab and cd meet.
@@ -41,8 +44,8 @@ std::array<std::size_t, 2> first_crossing(const GridPolygon& p) {
   return {0, 0};
 }
 
-/// Random points joined at random, then untangled by reversing the stretch between two crossing edges. Empty when that
-/// does not end soon.
+/// Random points joined at random, then untangled by reversing the stretch between two crossing edges. Empty
+/// when that does not end soon.
 GridPolygon random_polygon(std::mt19937& random, std::size_t corners, int grid) {
   std::uniform_int_distribution<int> coordinate(0, grid);
   GridPolygon polygon;
@@ -54,13 +57,15 @@ GridPolygon random_polygon(std::mt19937& random, std::size_t corners, int grid) 
     auto [i, j] = first_crossing(polygon);
     if (i == j) return polygon;
     if (i > j) std::swap(i, j);
-    std::reverse(polygon.begin() + static_cast<std::ptrdiff_t>(i + 1), polygon.begin() + static_cast<std::ptrdiff_t>(j + 1));
+    std::reverse(polygon.begin() + static_cast<std::ptrdiff_t>(i + 1),
+                 polygon.begin() + static_cast<std::ptrdiff_t>(j + 1));
     if (j == i + 1) std::swap(polygon[i], polygon[(j + 1) % corners]);
   }
   return {};
 }
 
-/// The polygon in a steep plane through integer points: still exact, and x, y and z take turns as the main axis.
+/// The polygon in a steep plane through integer points: still exact, and x, y and z take turns as the main
+/// axis.
 PolygonMesh tilted_face(const GridPolygon& polygon, std::int64_t a, std::int64_t b) {
   PolygonMesh mesh = flat_face(polygon);
   for (std::size_t i = 0; i < polygon.size(); ++i)
@@ -89,13 +94,17 @@ int expect_random_polygons_tiled(std::uint32_t seed, int count, std::size_t most
   return tested;
 }
 
-TEST(TriangulateRandom, TilesSimplePolygons) { EXPECT_GT(expect_random_polygons_tiled(1, 3000, 40, 1000), 2000); }
+TEST(TriangulateRandom, TilesSimplePolygons) {
+  EXPECT_GT(expect_random_polygons_tiled(1, 3000, 40, 1000), 2000);
+}
 
 TEST(TriangulateRandom, TilesSimplePolygonsWithManyAlignedCorners) {
   EXPECT_GT(expect_random_polygons_tiled(2, 6000, 14, 6), 2000);
 }
 
-TEST(TriangulateRandom, TilesSimpleQuads) { EXPECT_GT(expect_random_polygons_tiled(3, 5000, 4, 4), 2000); }
+TEST(TriangulateRandom, TilesSimpleQuads) {
+  EXPECT_GT(expect_random_polygons_tiled(3, 5000, 4, 4), 2000);
+}
 
 }  // namespace
 }  // namespace tandem::build

@@ -18,11 +18,10 @@ struct CleanReport {
   std::uint64_t vertices_unreferenced = 0;     ///< dropped: no face of the file names them
   std::uint64_t vertices_welded = 0;           ///< merged with an earlier vertex at exactly the same place
 
-  std::uint64_t triangles_degenerate = 0;  ///< dropped: the corners lie exactly on one line
-  std::uint64_t triangles_duplicate = 0;   ///< kept: same three places as an earlier triangle
-  std::uint64_t triangles_duplicate_reversed =
-      0;                                  ///< kept: those of triangles_duplicate that face the other way
-  std::uint64_t triangles_flattened = 0;  ///< kept: on one line only once rounded to float32
+  std::uint64_t triangles_degenerate = 0;          ///< dropped: the corners lie exactly on one line
+  std::uint64_t triangles_duplicate = 0;           ///< kept: same three places as an earlier triangle
+  std::uint64_t triangles_duplicate_reversed = 0;  ///< kept: those of the above that face the other way
+  std::uint64_t triangles_flattened = 0;           ///< kept: on one line only once rounded to float32
 };
 
 /// One line of a report.

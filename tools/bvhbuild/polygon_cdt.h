@@ -18,10 +18,13 @@ class PolygonCdt {
   PolygonCdt& operator=(const PolygonCdt&) = delete;
 
   /// Effect: on success appends the triangles to `out`, as indices into `corners`, oriented as the polygon
-  /// goes. Result: false, with `out` as it was, when two edges cross in the projection, when corners at
-  /// different places project to one point, or when nothing is inside. The outline may touch itself and may
-  /// walk an edge to and fro (a bridge to a hole): the inside is what it winds round an odd number of times.
-  /// A simple polygon of n corners gives exactly n - 2 triangles.
+  /// goes.
+  ///
+  /// Result: false, with `out` as it was, when two edges cross in the projection, when corners or edges that
+  /// are apart in space touch in it, or when nothing is inside.
+  ///
+  /// The outline may touch itself and may walk an edge to and fro (a bridge to a hole): the inside is what it
+  /// winds round an odd number of times. A simple polygon of n corners gives exactly n - 2 triangles.
   ///
   /// corners: at least 3, finite, no two consecutive ones at the same place
   /// axis: 0, 1 or 2, the coordinate that the projection leaves out

@@ -8,9 +8,10 @@ namespace tandem::build {
 /// Splits the faces of a file into triangles.
 ///
 /// Effect: takes points, corners and face_begin out of `mesh` (name, parts and remarks stay) and counts in
-/// `report`. Result: the triangles in the order of the faces. Faces with an index out of range, a coordinate
-/// that is not finite or one beyond +-FLT_MAX are left out, each counted once, under the first of these that
-/// holds.
+/// `report`.
+///
+/// Result: the triangles in the order of the faces. Faces with an index out of range, a coordinate that is
+/// not finite or one beyond +-FLT_MAX are left out, each counted once, under the first of these that holds.
 ///
 /// Triangles stay as they are. A corner at the same place as the one before it is skipped in larger faces. A
 /// quad is cut along the diagonal that lies inside, the shorter one if both do. A larger face is projected

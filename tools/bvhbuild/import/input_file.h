@@ -25,7 +25,9 @@ class InputFile {
   std::string head() const;
 
   /// Effect: reads the whole file, or what is left of it when it shrinks meanwhile. (Read, not mapped: a file
-  /// that shrinks under a mapping kills the process.) Result: empty when bytes() holds it, else the reason.
+  /// that shrinks under a mapping kills the process.)
+  ///
+  /// Result: empty when bytes() holds it, else the reason.
   std::string read_all();
 
   std::string_view bytes() const { return {bytes_.get(), bytes_read_}; }

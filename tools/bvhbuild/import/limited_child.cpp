@@ -11,6 +11,8 @@
 #include <cerrno>
 #include <cmath>
 #include <csignal>
+#include <cstdint>
+#include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <new>
@@ -39,12 +41,25 @@ void limit(int resource, rlim_t value) {
   setrlimit(static_cast<__rlimit_resource_t>(resource), &now);
 }
 
+/// Bytes of address space that this process has taken; 0 when the system does not say.
+std::uint64_t address_space_taken() {
+  char text[32] = {};
+  const int file = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
+  if (file < 0) return 0;
+  const ssize_t got = read(file, text, sizeof text - 1);
+  close(file);
+  if (got <= 0) return 0;
+  return std::strtoull(text, nullptr, 10) * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+}
+
 void limit_resources(const ChildLimits& limits) {
   limit(RLIMIT_CORE, 0);
   limit(RLIMIT_FSIZE, 0);  // of files; a pipe has no size
   // Only a second line of defence behind the parent's clock, for a parent that is stopped.
   limit(RLIMIT_CPU, static_cast<rlim_t>(std::ceil(std::clamp(limits.seconds, 0.0, 1e9))) + 1);
-  if (kLimitsMemory) limit(RLIMIT_AS, limits.memory_bytes);
+  constexpr std::uint64_t kLeast = 1 << 20;  // less leaves no room for the stack to say so
+  constexpr std::uint64_t kMost = INT64_MAX / 2;
+  if (kLimitsMemory) limit(RLIMIT_AS, address_space_taken() + std::clamp(limits.memory_bytes, kLeast, kMost));
 }
 
 /// Signals back to their defaults: Ctrl-C ends the child too, and a crash is a crash, whatever handlers were

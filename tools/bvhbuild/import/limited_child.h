@@ -11,7 +11,7 @@ namespace tandem::build {
 
 struct ChildLimits {
   double seconds = 120;                                 ///< of the wall clock, from start()
-  std::uint64_t memory_bytes = std::uint64_t{8} << 30;  ///< of address space
+  std::uint64_t memory_bytes = std::uint64_t{8} << 30;  ///< of address space, beyond what the parent has
 };
 
 /// How a child came to its end.

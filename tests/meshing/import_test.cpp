@@ -1,0 +1,196 @@
+#include "import/import.h"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+namespace tandem::build {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder of its own for each test.
+class Import : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::path(::testing::TempDir()) / "tandem_import_XXXXXX").string();
+    ASSERT_NE(mkdtemp(name.data()), nullptr);
+    folder_ = name;
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  fs::path write(const std::string& name, const std::string& bytes) const {
+    std::ofstream(folder_ / name, std::ios::binary) << bytes;
+    return folder_ / name;
+  }
+
+  std::string error(const fs::path& path, Reader reader = Reader::automatic) const {
+    ImportOptions options;
+    options.reader = reader;
+    const ImportResult result = import_mesh(path, options);
+    EXPECT_FALSE(result.ok);
+    return result.error;
+  }
+
+  fs::path folder_;
+};
+
+constexpr const char* kTriangleObj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+constexpr const char* kTrianglePly =
+    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+constexpr const char* kTriangleOff = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+constexpr const char* kPentagonObj =
+    "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 1 1 0\nv 0 2 0\nf 1 2 3 4 5\nf 1 2 3\np 1\nl 1 2\n";
+
+/// A node with a mesh, moved by the node above it and turned by its own rotation; a second node has the same
+/// mesh.
+constexpr const char* kInstancesGltf = R"({
+  "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+  "nodes": [
+    {"name": "world", "translation": [10, 0, 0], "children": [1, 2]},
+    {"name": "left", "mesh": 0, "rotation": [0, 0, 1, 0]},
+    {"name": "right", "mesh": 0, "scale": [-2, 2, 2]}],
+  "meshes": [{"name": "tile", "primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+  "buffers": [{"byteLength": 42, "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIA"}],
+  "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 6}],
+  "accessors": [
+    {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]},
+    {"bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR"}]})";
+
+TEST_F(Import, NamesWhyAFileCannotBeOpened) {
+  EXPECT_EQ(error(folder_ / "absent.obj"), "no such file");
+  EXPECT_EQ(error(folder_), "is a folder");
+  EXPECT_EQ(error(write("empty.obj", "")), "the file is empty");
+  EXPECT_EQ(error("/dev/null"), "is not a regular file");
+  const fs::path pipe = folder_ / "pipe.obj";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(error(pipe), "is not a regular file");
+}
+
+TEST_F(Import, NamesAMissingPermission) {
+  if (geteuid() == 0) GTEST_SKIP() << "root may read everything";
+  const fs::path path = write("closed.obj", kTriangleObj);
+  fs::permissions(path, fs::perms::none);
+  EXPECT_EQ(error(path), "permission denied");
+}
+
+TEST_F(Import, ChoosesTheReaderByEndingInAnyCase) {
+  for (const auto& [name, bytes] : {std::pair{"a.obj", kTriangleObj},
+                                    {"a.OBJ", kTriangleObj},
+                                    {"a.Ply", kTrianglePly},
+                                    {"a.off", kTriangleOff}}) {
+    const ImportResult result = import_mesh(write(name, bytes), {});
+    EXPECT_TRUE(result.ok) << name << ": " << result.error;
+    EXPECT_EQ(result.mesh.face_count(), 1u);
+    EXPECT_EQ(result.mesh.reader.find("tandem"), 0u) << result.mesh.reader;
+  }
+}
+
+TEST_F(Import, LooksInsideWhenTheEndingSaysNothing) {
+  for (const auto& [name, bytes] : {std::pair{"mesh", kTrianglePly}, {"mesh.data", kTriangleOff}}) {
+    const ImportResult result = import_mesh(write(name, bytes), {});
+    EXPECT_TRUE(result.ok) << name << ": " << result.error;
+    EXPECT_EQ(result.mesh.reader.find("tandem"), 0u) << result.mesh.reader;
+  }
+}
+
+TEST_F(Import, RefusesMotionCaptureAndTreesByName) {
+  EXPECT_NE(error(write("walk.bvh", "HIERARCHY\nROOT hip\n")).find("Biovision motion capture"),
+            std::string::npos);
+  EXPECT_NE(error(write("walk.BVH", "\r\nHIERARCHY\n")).find("Biovision motion capture"), std::string::npos);
+  EXPECT_NE(error(write("cow.bvh",
+                        "\x89"
+                        "BVH\r\n\x1a\n"))
+                .find("already a Tandem tree"),
+            std::string::npos);
+  EXPECT_NE(error(write("cow.obj",
+                        "\x89"
+                        "BVH\r\n\x1a\n"))
+                .find("already a Tandem tree"),
+            std::string::npos);
+  EXPECT_NE(error(write("x.bvh", "something")).find("neither"), std::string::npos);
+}
+
+TEST_F(Import, KeepsToItsOwnReadersWhenTold) {
+  EXPECT_NE(error(write("a.gltf", kInstancesGltf), Reader::tandem).find("OBJ, PLY, STL and OFF"),
+            std::string::npos);
+}
+
+TEST_F(Import, DoesNotReadMoreThanTheMemoryLimit) {
+  ImportOptions options;
+  options.memory_limit_bytes = 10;
+  const ImportResult result = import_mesh(write("a.obj", kTriangleObj), options);
+  EXPECT_FALSE(result.ok);
+  EXPECT_NE(result.error.find("--memory-limit"), std::string::npos);
+}
+
+ImportOptions with_assimp(double seconds = 20) {
+  ImportOptions options;
+  options.reader = Reader::assimp;
+  options.time_limit_seconds = seconds;
+  return options;
+}
+
+TEST_F(Import, TakesPolygonsFromAssimpAsTheyAre) {
+  const ImportResult result = import_mesh(write("a.obj", kPentagonObj), with_assimp());
+  ASSERT_TRUE(result.ok) << result.error;
+  EXPECT_EQ(result.mesh.reader.find("assimp "), 0u);
+  EXPECT_TRUE(result.mesh.single_precision);
+  EXPECT_EQ(result.mesh.face_begin, (std::vector<std::uint32_t>{0, 5, 8}));
+}
+
+TEST_F(Import, AppliesNodeTransformsAndRepeatsInstances) {
+  const ImportResult result = import_mesh(write("a.gltf", kInstancesGltf), {});
+  ASSERT_TRUE(result.ok) << result.error;
+  const PolygonMesh& mesh = result.mesh;
+  ASSERT_EQ(mesh.face_count(), 2u);
+  ASSERT_EQ(mesh.parts.size(), 2u);
+  EXPECT_EQ(mesh.parts[0].name, "tile");
+  EXPECT_EQ(mesh.parts[0].node_path, "world/left");
+  EXPECT_EQ(mesh.parts[1].node_path, "world/right");
+  const std::vector<Point> expected{{10, 0, 0}, {9, 0, 0}, {10, -1, 0}, {10, 0, 0}, {8, 0, 0}, {10, 2, 0}};
+  ASSERT_EQ(mesh.points.size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i)
+    for (int k = 0; k < 3; ++k) EXPECT_EQ(mesh.points[i][k], expected[i][k]) << i << " " << k;
+  // The second node mirrors its mesh; the order of the corners stays.
+  EXPECT_EQ(mesh.corners, (std::vector<std::uint32_t>{0, 1, 2, 3, 4, 5}));
+}
+
+TEST_F(Import, PassesOnWhatAssimpSays) {
+  const ImportResult result =
+      import_mesh(write("a.glb", "not a glb file at all, but long enough to look"), {});
+  EXPECT_FALSE(result.ok);
+  EXPECT_EQ(result.error.find("assimp: "), 0u) << result.error;
+}
+
+TEST_F(Import, StopsAssimpWhenItHangs) {
+  // assimp 5.2.5 never ends on a PLY file that is cut inside its header. A repaired one may say so instead.
+  const fs::path path = write("cut.ply", "ply\nformat ascii 1.0\nelement vertex 8\nproperty float");
+  const ImportResult result = import_mesh(path, with_assimp(0.5));
+  EXPECT_FALSE(result.ok);
+  const bool stopped = result.error == "assimp did not finish within 0.5 s (--time-limit)";
+  EXPECT_TRUE(stopped || result.error.find("assimp: ") == 0) << result.error;
+}
+
+TEST_F(Import, StopsAssimpAtItsMemoryLimit) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers need the address space that this limits";
+#endif
+  std::string many = "v 0 0 0\n";
+  for (int i = 0; i < 200000; ++i) many += "v 1 2 3\n";
+  for (int i = 1; i < 200000; ++i) many += "f " + std::to_string(i) + " 1 2\n";
+  ImportOptions options = with_assimp();
+  options.memory_limit_bytes = 8 << 20;
+  const ImportResult result = import_mesh(write("many.obj", many), options);
+  EXPECT_FALSE(result.ok);
+  EXPECT_EQ(result.error, "assimp needed more than 8 MiB of memory (--memory-limit)");
+}
+
+}  // namespace
+}  // namespace tandem::build

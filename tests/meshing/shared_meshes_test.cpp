@@ -1,0 +1,188 @@
+// Every file of a folder of meshes, good and bad, from import to the triangles that are stored. The folder is
+// named by the environment variable TANDEM_MESHES; without it, it is looked for beside the source tree.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+
+#include "clean.h"
+#include "import/import.h"
+#include "stored_mesh.h"
+#include "triangulate.h"
+
+namespace tandem::build {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path mesh_folder() {
+  if (const char* named = std::getenv("TANDEM_MESHES")) return named;
+  return fs::path(TANDEM_SOURCE_DIR) / ".." / "shared" / "meshes";
+}
+
+struct Expected {
+  const char* file;
+  int triangles;             ///< that are stored; -1 when the file cannot be read
+  const char* finding = "";  ///< a count that the report must show ...
+  std::uint64_t count = 0;   ///< ... and its value
+};
+
+constexpr Expected kExpected[] = {
+    {"spot.obj", 5856},
+    {"cow.obj", 5804},
+    {"teapot.obj", 6320},
+    {"bun_zipper.ply", 69451, "vertices_unreferenced", 1113},
+    {"armadillo.obj", 29170},
+    {"koala.obj", 99994},
+    {"featuretype.STL", 3476},
+    {"cycloidal.ply", 43368},
+    {"scallop.glb", 120000},
+    {"link5.stl", 300},
+    {"forearm.stl", 1050},
+    {"CesiumMilkTruck.glb", 3624},
+    {"CubeHierarchy.gltf", 48},
+    {"spheres_scaled_instances.gltf", 672},
+    {"ballA.off", 3796},
+    {"ballB.off", 3796},
+    {"self_intersectA.obj", 17160},
+    {"self_intersectB.obj", 17160},
+    {"Star_ascii.stl", 68},
+    {"Spider_ascii.stl", 1312, "triangles_degenerate", 56},
+    {"triple_vierbein.obj", 108},
+    {"moebius.obj", 448},
+    {"dodecahedron_poly.obj", 36},
+    {"busted.STL", 3878},
+    {"negative_indices.obj", 12},
+    {"cubevt.obj", 12},
+    {"test-nan.obj", 34, "faces_not_finite", 1},
+    {"issue-295-trianguation-failure.obj", 28},
+    {"empty.obj", -1},
+    {"stl_empty_bin.stl", 0},
+    {"ply_points_bin.ply", 0},
+    {"test_lines.obj", 0},
+    {"Mesh_PrimitiveMode_00.gltf", 0},
+    {"malformed.obj", 7, "faces_index_out_of_range", 2},
+    {"IndexOutOfRange.gltf", 11},
+    {"crash-30d6d0f7c529b3b66b4131700b7a4580cd7082df.ply", -1},
+    {"cube_binary_starts_with_nl.ply", 12},
+    {"elephant.ply", 39290},
+    {"w_degtri_four.off", 3, "triangles_degenerate", 1},
+    {"w_duplicates.obj", 48, "triangles_duplicate", 36},
+    {"w_degenerate.obj", 4, "triangles_degenerate", 4},
+    {"w_huge_coords.stl", 12},
+    {"w_count_lies.stl", -1},
+    {"w_truncated.stl", -1},
+    {"w_truncated.ply", -1},
+    {"w_nan.ply", 8, "faces_not_finite", 4},
+    {"w_index_oob.ply", 11, "faces_index_out_of_range", 1},
+    {"w_index_oob.off", 2, "faces_index_out_of_range", 2},
+    {"w_ply_header_cut.ply", -1},
+};
+
+std::uint64_t count_of(const CleanReport& report, const std::string& key) {
+  for (const Finding& finding : findings(report))
+    if (finding.key == key) return finding.count;
+  ADD_FAILURE() << "no finding is called " << key;
+  return 0;
+}
+
+struct Walked {
+  ImportResult imported;
+  CleanReport report;
+  StoredMesh stored;
+};
+
+Walked walk(const fs::path& path, const ImportOptions& options = {}) {
+  Walked walked;
+  walked.imported = import_mesh(path, options);
+  TriangleMesh mesh = triangulate(walked.imported.mesh, walked.report);
+  clean(mesh, walked.report);
+  walked.stored = to_single_precision(mesh, walked.report);
+  return walked;
+}
+
+/// gtest_discover_tests runs the tests one by one, so a file that is missing skips its own test alone.
+class SharedMesh : public ::testing::TestWithParam<Expected> {
+ protected:
+  void SetUp() override {
+    path_ = mesh_folder() / GetParam().file;
+    if (!fs::exists(path_)) GTEST_SKIP() << path_ << " is not here (set TANDEM_MESHES)";
+  }
+  fs::path path_;
+};
+
+TEST_P(SharedMesh, GivesTheTrianglesThatItHolds) {
+  const Expected& expected = GetParam();
+  const Walked walked = walk(path_);
+  EXPECT_EQ(walked.imported.ok, expected.triangles >= 0) << walked.imported.error;
+  if (!walked.imported.ok) {
+    EXPECT_FALSE(walked.imported.error.empty());
+    return;
+  }
+  EXPECT_EQ(walked.stored.triangles.size(), static_cast<std::size_t>(expected.triangles));
+  EXPECT_EQ(walked.stored.face.size(), walked.stored.triangles.size());
+  if (*expected.finding != '\0') {
+    EXPECT_EQ(count_of(walked.report, expected.finding), expected.count);
+  }
+}
+
+/// Whatever assimp does with it, this process survives, in little time, with a mesh or a reason.
+TEST_P(SharedMesh, EndsWellWithAssimpToo) {
+  ImportOptions options;
+  options.reader = Reader::assimp;
+  options.time_limit_seconds = 2;
+  const Walked walked = walk(path_, options);
+  EXPECT_NE(walked.imported.ok, !walked.imported.error.empty());
+  for (const Triangle& t : walked.stored.triangles)
+    for (const std::uint32_t corner : t) ASSERT_LT(corner, walked.stored.points.size());
+}
+
+INSTANTIATE_TEST_SUITE_P(Files, SharedMesh, ::testing::ValuesIn(kExpected), [](const auto& test) {
+  std::string name = test.param.file;
+  std::replace_if(
+      name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
+  return name;
+});
+
+struct Box {
+  Point low{1e300, 1e300, 1e300};
+  Point high{-1e300, -1e300, -1e300};
+};
+
+Box box_of_part(const PolygonMesh& mesh, const SourcePart& part) {
+  Box box;
+  for (std::uint32_t c = mesh.face_begin[part.first_face];
+       c < mesh.face_begin[part.first_face + part.face_count]; ++c)
+    for (int k = 0; k < 3; ++k) {
+      box.low[k] = std::min(box.low[k], mesh.points[mesh.corners[c]][k]);
+      box.high[k] = std::max(box.high[k], mesh.points[mesh.corners[c]][k]);
+    }
+  return box;
+}
+
+/// The boxes follow from the matrices of the file: unit cubes, turned about x by each node and moved along x
+/// or y.
+TEST(SharedMeshes, CubeHierarchyStandsWhereItsNodesSay) {
+  const fs::path path = mesh_folder() / "CubeHierarchy.gltf";
+  if (!fs::exists(path)) GTEST_SKIP() << path << " is not here (set TANDEM_MESHES)";
+  const ImportResult result = import_mesh(path, {});
+  ASSERT_TRUE(result.ok) << result.error;
+  ASSERT_EQ(result.mesh.parts.size(), 4u);
+  const Box expected[] = {{{1.5, -0.5, -0.5}, {2.5, 0.5, 0.5}},
+                          {{-0.5, -0.5, -2.5}, {0.5, 0.5, -1.5}},
+                          {{-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}},
+                          {{-0.5, 1.5, -0.5}, {0.5, 2.5, 0.5}}};
+  for (int i = 0; i < 4; ++i) {
+    const Box box = box_of_part(result.mesh, result.mesh.parts[i]);
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_NEAR(box.low[k], expected[i].low[k], 1e-6) << i << " " << k;
+      EXPECT_NEAR(box.high[k], expected[i].high[k], 1e-6) << i << " " << k;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tandem::build

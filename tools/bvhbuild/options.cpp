@@ -2,15 +2,18 @@
 
 #include <CLI/CLI.hpp>
 #include <map>
+#include <string>
 
 #include "exit_code.h"
 
 namespace tandem::build {
 namespace {
 
-const std::map<std::string, Imaginary> kImaginaryNames = {{"minimal", Imaginary::minimal},
-                                                          {"free", Imaginary::free}};
-const std::map<std::string, Reader> kReaderNames = {
+template <typename T>
+using Names = std::map<std::string, T>;
+
+const Names<Imaginary> kImaginaryNames = {{"minimal", Imaginary::minimal}, {"free", Imaginary::free}};
+const Names<Reader> kReaderNames = {
     {"auto", Reader::automatic}, {"tandem", Reader::tandem}, {"assimp", Reader::assimp}};
 
 constexpr const char* kFooter =
@@ -19,15 +22,40 @@ constexpr const char* kFooter =
 
 Example: bvhbuild cow.obj -o cow.bvh && bvhinfo cow.bvh)";
 
+// An option whose values are the names and nothing else: CLI::Transformer would take an enumeration's numbers
+// too.
+template <typename T>
+CLI::Option* add_choice(CLI::App& app, const char* flag, const Names<T>& names, T& chosen, const char* help) {
+  const auto choose = [&names, &chosen](const std::string& word) { chosen = names.at(word); };
+  return app.add_option_function<std::string>(flag, choose, help)->check(CLI::IsMember(&names));
+}
+
+// As CLI::Range, which NaN passes.
+CLI::Validator between(double lower, double upper) {
+  const auto defect = [lower, upper](const std::string& text) {
+    double value = 0;
+    if (CLI::detail::lexical_cast(text, value) && value >= lower && value <= upper) return std::string();
+    return text + " is no number from " + CLI::detail::to_string(lower) + " to " +
+           CLI::detail::to_string(upper);
+  };
+  return CLI::Validator(defect, "");
+}
+
+CLI::Validator file_name() {
+  return CLI::Validator(
+      [](const std::string& text) { return text.empty() ? "a file needs a name" : std::string(); }, "");
+}
+
 void add_options(CLI::App& app, Options& options, double& memory_gib) {
   app.add_option("MESH", options.input,
                  "mesh file: OBJ, PLY, STL, OFF, glTF/GLB, DAE and what else assimp reads")
-      ->required();
+      ->required()
+      ->check(file_name());
   app.add_option("-o,--output", options.output, "the .bvh file to write; appears whole or not at all")
-      ->required();
-  app.add_option("--imaginary", options.imaginary,
-                 "where padding nodes may be: 'minimal' (the proven fewest) or 'free'")
-      ->transform(CLI::Transformer(kImaginaryNames))
+      ->required()
+      ->check(file_name());
+  add_choice(app, "--imaginary", kImaginaryNames, options.imaginary,
+             "where padding nodes may be: 'minimal' (the proven fewest) or 'free'")
       ->option_text("minimal|free [minimal]");
   app.add_flag("--strict", options.strict, "take anything dropped or found amiss in the mesh for an error");
   app.add_flag("--json", options.json, "print the report as JSON");
@@ -35,14 +63,13 @@ void add_options(CLI::App& app, Options& options, double& memory_gib) {
   app.add_option("--threads", options.threads, "threads for building; the result does not depend on them")
       ->check(CLI::Range(1, 4096))
       ->option_text("N [all]");
-  app.add_option("--reader", options.import.reader, "who reads the mesh")
-      ->transform(CLI::Transformer(kReaderNames))
+  add_choice(app, "--reader", kReaderNames, options.import.reader, "who reads the mesh")
       ->option_text("auto|tandem|assimp [auto]");
   app.add_option("--time-limit", options.import.time_limit_seconds, "seconds that assimp may take")
-      ->check(CLI::Range(0.01, 1e6))
+      ->check(between(0.01, 1e6))
       ->option_text("S [120]");
   app.add_option("--memory-limit", memory_gib, "GiB of memory that assimp may take")
-      ->check(CLI::Range(0.1, 1e6))
+      ->check(between(0.1, 1e6))
       ->option_text("GIB [8]");
   app.set_version_flag("--version", "bvhbuild " TANDEM_VERSION);
   app.footer(kFooter);

@@ -29,7 +29,8 @@ void remove_temporary_and_die(int signal) {
   ::raise(signal);
 }
 
-// While it lives, a deadly signal removes the temporary file first.
+// While it lives, a deadly signal removes the temporary file first; the signal of a file that outgrows its
+// limit is ignored, so that write() fails instead.
 class SignalGuard {
  public:
   explicit SignalGuard(const std::string& temporary) {
@@ -37,6 +38,7 @@ class SignalGuard {
     struct sigaction action {};
     action.sa_handler = remove_temporary_and_die;
     for (std::size_t i = 0; i < kSignals.size(); ++i) {
+      if (kSignals[i] == SIGXFSZ) action.sa_handler = SIG_IGN;
       ::sigaction(kSignals[i], nullptr, &previous_[i]);
       if (previous_[i].sa_handler != SIG_IGN) ::sigaction(kSignals[i], &action, nullptr);
     }
@@ -49,8 +51,8 @@ class SignalGuard {
   SignalGuard& operator=(const SignalGuard&) = delete;
 
  private:
-  static constexpr std::array<int, 3> kSignals = {SIGINT, SIGTERM, SIGHUP};
-  std::array<struct sigaction, 3> previous_{};
+  static constexpr std::array<int, 6> kSignals = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXCPU, SIGXFSZ};
+  std::array<struct sigaction, kSignals.size()> previous_{};
 };
 
 // Writes everything; 0 or an error number.
@@ -71,8 +73,15 @@ std::string write_in_place(const fs::path& path, std::span<const std::byte> byte
   return error == 0 ? std::string() : reason_of(error);
 }
 
+// A file beside the target that no other process writes to. File systems take names of 255 bytes.
+std::string temporary_beside(const fs::path& target) {
+  constexpr std::size_t kLongestStem = 230;
+  const std::string stem = target.filename().string().substr(0, kLongestStem);
+  return (target.parent_path() / (stem + ".tmp" + std::to_string(::getpid()))).string();
+}
+
 std::string write_and_rename(const fs::path& target, std::span<const std::byte> bytes) {
-  const std::string temporary = target.string() + ".tmp" + std::to_string(::getpid());
+  const std::string temporary = temporary_beside(target);
   if (temporary.size() >= g_temporary.size()) return reason_of(ENAMETOOLONG);
   ::unlink(temporary.c_str());  // left behind by a killed process that had our number
   const SignalGuard guard(temporary);

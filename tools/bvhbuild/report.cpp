@@ -57,11 +57,11 @@ void add_results(const Outcome& outcome, Json& json) {
 
 std::string text_report(const Options& options, const Outcome& outcome) {
   const TreeStatistics& tree = outcome.tree;
+  const std::uint64_t blocks = tree.leaf_blocks + tree.internal_blocks;
   std::ostringstream out;
   out << options.output.string() << ": " << with_commas(tree.triangles)
-      << (tree.triangles == 1 ? " triangle" : " triangles") << " in "
-      << with_commas(tree.leaf_blocks + tree.internal_blocks) << " blocks, "
-      << human_bytes(outcome.file_bytes) << "\n";
+      << (tree.triangles == 1 ? " triangle" : " triangles") << " in " << with_commas(blocks)
+      << (blocks == 1 ? " block, " : " blocks, ") << human_bytes(outcome.file_bytes) << "\n";
   out << "  read     " << with_commas(outcome.clean.faces) << " faces, "
       << with_commas(outcome.clean.vertices) << " vertices from " << options.input.filename().string() << " ("
       << outcome.reader << ")\n";

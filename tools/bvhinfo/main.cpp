@@ -22,9 +22,9 @@ Json verdict(const Inspection& inspection) {
   return {{"file", inspection.path},
           {"sound", sound},
           {"status", name(inspection.status)},
-          {"where", sound ? Json() : Json(inspection.asset.where())},
+          {"where", subject(inspection.status) == nullptr ? Json() : Json(inspection.asset.where())},
           {"error", sound ? Json() : Json(defect_of(inspection))},
-          {"bytes", inspection.asset.bytes()},
+          {"bytes", sound ? Json(inspection.asset.bytes()) : Json()},
           {"check_seconds", inspection.check_seconds}};
 }
 
@@ -63,6 +63,10 @@ ExitCode run(const Options& options) {
     std::fprintf(stderr, "bvhinfo: %s\n", defect_of(inspections.back()).c_str());
   }
   print(options, inspections, all_sound);
+  if (std::fflush(stdout) != 0) {
+    std::perror("bvhinfo: standard output");
+    return kUnwritableOutput;
+  }
   return all_sound ? kDone : kUnreadableInput;
 }
 
@@ -77,7 +81,7 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", "bvhinfo " TANDEM_VERSION);
   app.footer(
       "Every file is checked in full before anything else is read.\nExit codes: 0 all sound, 1 usage, 2 a "
-      "file is not, 5 internal error.");
+      "file is not, 4 the output could not be written, 5 internal error.");
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& done) {

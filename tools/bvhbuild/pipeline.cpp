@@ -151,8 +151,11 @@ Outcome run_pipeline(const Options& options) {
   const Image image = build_image(options, polygons, mesh, outcome);
 
   progress.step("write");
-  const Stopwatch watch(outcome.seconds.write);
-  const std::string error = write_whole_file(options.output, {image.data(), image.size()});
+  std::string error;
+  {
+    const Stopwatch watch(outcome.seconds.write);
+    error = write_whole_file(options.output, {image.data(), image.size()});
+  }
   if (!error.empty()) return fail(outcome, kUnwritableOutput, options.output, error);
   return outcome;
 }

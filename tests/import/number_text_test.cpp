@@ -57,6 +57,8 @@ TEST(NumberText, TooLargeIsInfiniteAndTooSmallIsZero) {
   EXPECT_EQ(real("0e99999999999999999999999"), 0.0);
   EXPECT_EQ(real(std::string(400, '9')), kInf);
   EXPECT_EQ(real("0." + std::string(400, '0') + "1"), 0.0);
+  EXPECT_EQ(real("0." + std::string(1000, '0') + "1e400"), 0.0);
+  EXPECT_EQ(real("1" + std::string(1000, '0') + "e-400"), kInf);
 }
 
 TEST(NumberText, ReadsNonFiniteNumbersOfAnyProgram) {

@@ -49,8 +49,8 @@ TEST(ObjReader, RelativeIndicesCountFromTheCurrentEnd) {
 }
 
 TEST(ObjReader, FacesMayComeBeforeTheirVertices) {
-  const ReadResult result = read("f 1 2 3\n" + kFourVertices);
-  EXPECT_EQ(faces_of(result), (std::vector<Face>{{0, 1, 2}}));
+  const ReadResult result = read("f 1 2 4\n" + kFourVertices);
+  EXPECT_EQ(faces_of(result), (std::vector<Face>{{0, 1, 3}}));
   EXPECT_TRUE(result.mesh.remarks.empty());
 }
 
@@ -62,6 +62,11 @@ TEST(ObjReader, RemarksIndicesThatNameNoVertexAndKeepsTheFace) {
             (std::vector<std::string>{"line 5: face index 99 of 4 vertices",
                                       "line 6: face index 0, but OBJ counts vertices from 1",
                                       "line 7: face index -9 counts back past the first vertex"}));
+}
+
+TEST(ObjReader, RemarksTheFirstIndexPastTheLastVertex) {
+  EXPECT_EQ(read(kFourVertices + "f 1 2 4\nf 1 2 5\n").mesh.remarks,
+            (std::vector<std::string>{"line 6: face index 5 of 4 vertices"}));
 }
 
 TEST(ObjReader, IndicesTooLargeForTheirTypeNameNoVertex) {

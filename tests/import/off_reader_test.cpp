@@ -8,7 +8,7 @@
 namespace tandem::build {
 namespace {
 
-const std::string kThreeVertices = "0 0 0\n1 0 0\n0 1 0.1\n";
+const std::string kThreeVertices = "5 0 0\n1 0 0\n0 1 0.1\n";
 
 ReadResult read(const std::string& file) {
   return read_from(read_off, file);
@@ -48,8 +48,12 @@ TEST(OffReader, ReadsPointsAndFacesInOrder) {
 TEST(OffReader, CountsMayStandOnTheKeywordsLineOrWithoutIt) {
   for (const char* head : {"OFF 3 1 0\n", "OFF 3 1\n", "OFF\n3 1\n", "OFF\n3\n1\n0\n", "3 1 0\n", "3 1\n",
                            "OFF\n3 1 0 # edges\n", "OFF\n3 1 # no edges\n", "OFF\r\n\r\n3 1 0\r\n",
-                           "\xEF\xBB\xBFOFF\r3 1 0\r", "# c\nOFF # c\n# c\n3 1 0\n"})
-    expect_faces(head + kThreeVertices + "3 0 1 2\n", {{0, 1, 2}});
+                           "\xEF\xBB\xBFOFF\r3 1 0\r", "# c\nOFF # c\n# c\n3 1 0\n"}) {
+    const ReadResult result = read(head + kThreeVertices + "3 0 1 2\n");
+    ASSERT_TRUE(result.ok) << result.error << head;
+    EXPECT_EQ(faces_of(result), (std::vector<Face>{{0, 1, 2}}));
+    EXPECT_EQ(result.mesh.points[0], (Point{5, 0, 0})) << head;
+  }
 }
 
 TEST(OffReader, FacesMaySpreadOverLines) {
@@ -79,10 +83,10 @@ TEST(OffReader, RefusesOtherDimensionsByName) {
 }
 
 TEST(OffReader, RemarksIndicesThatNameNoVertexAndKeepsTheFace) {
-  const ReadResult result = read("OFF\n3 2 0\n" + kThreeVertices + "3 0 1 77\n3\n-1 4294967295\n 2\n");
+  const ReadResult result = read("OFF\n3 2 0\n" + kThreeVertices + "3 0 1 3\n3\n-1 4294967295\n 2\n");
   ASSERT_TRUE(result.ok) << result.error;
-  EXPECT_EQ(faces_of(result), (std::vector<Face>{{0, 1, 77}, {kNoVertex, kNoVertex, 2}}));
-  EXPECT_EQ(result.mesh.remarks, (std::vector<std::string>{"line 6: face index 77 of 3 vertices",
+  EXPECT_EQ(faces_of(result), (std::vector<Face>{{0, 1, 3}, {kNoVertex, kNoVertex, 2}}));
+  EXPECT_EQ(result.mesh.remarks, (std::vector<std::string>{"line 6: face index 3 of 3 vertices",
                                                            "line 8: face index -1 of 3 vertices",
                                                            "line 8: face index 4294967295 of 3 vertices"}));
 }

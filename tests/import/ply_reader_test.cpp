@@ -130,6 +130,13 @@ TEST(PlyReader, AStripBeginsAnewAtMinusOne) {
   EXPECT_TRUE(read(strips("9 0 1 2 3 -1 4 5 6 7\n")).mesh.remarks.empty());
 }
 
+TEST(PlyReader, EachStripBeginsAnew) {
+  const std::string two = header(
+      "ascii", "element vertex 1\n" + kXyz + "element tristrips 2\nproperty list int uint vertex_indices\n");
+  expect_faces(two + "0 0 0\n4 0 1 2 3\n3 4 5 6\n", {{0, 1, 2}, {2, 1, 3}, {4, 5, 6}});
+  expect_faces(two + "0 0 0\n8 0 1 2 3 4294967295 4 5 6\n0\n", {{0, 1, 2}, {2, 1, 3}, {4, 5, 6}});
+}
+
 TEST(PlyReader, StitchesOfAStripAreNoFacesButKeepTheRhythm) {
   expect_faces(strips("8 0 1 2 2 3 3 4 5\n"), {{0, 1, 2}, {4, 3, 5}});
   expect_faces(strips("7 0 1 2 2 3 4 5\n"), {{0, 1, 2}, {3, 2, 4}, {3, 4, 5}});
@@ -171,6 +178,17 @@ TEST(PlyReader, BinaryDataMayBeginWithALineEnd) {
   }
 }
 
+TEST(PlyReader, PassesOverAByteOrderMark) {
+  expect_faces("\xEF\xBB\xBF" + text(3, 1, kThreeVertices + "3 0 1 2\n"), {{0, 1, 2}});
+}
+
+TEST(PlyReader, TheFirstListOfIndicesCounts) {
+  expect_faces(header("ascii", "element vertex 3\n" + kXyz + "element face 1\n" + kIndices +
+                                   "property list uchar int vertex_index\n") +
+                   kThreeVertices + "3 0 1 2 4 2 2 2 2\n",
+               {{0, 1, 2}});
+}
+
 TEST(PlyReader, CommentsMayStandAnywhereInTheHeader) {
   expect_faces("ply\ncomment a\nformat ascii 1.0\nobj_info b\n\nelement vertex 3\ncomment element face 9\n" +
                    kXyz + "comment end_header \nelement face 1\n" + kIndices + "comment\nend_header\n" +
@@ -187,10 +205,10 @@ TEST(PlyReader, PointsAloneAreNoError) {
 }
 
 TEST(PlyReader, RemarksIndicesThatNameNoVertexAndKeepsTheFace) {
-  const ReadResult result = read(text(3, 2, kThreeVertices + "3 0 1 99\n3 -1 1 2\n"));
+  const ReadResult result = read(text(3, 2, kThreeVertices + "3 0 1 3\n3 -1 1 2\n"));
   ASSERT_TRUE(result.ok) << result.error;
-  EXPECT_EQ(faces_of(result), (std::vector<Face>{{0, 1, 99}, {kNoVertex, 1, 2}}));
-  EXPECT_EQ(result.mesh.remarks, (std::vector<std::string>{"line 13: face index 99 of 3 vertices",
+  EXPECT_EQ(faces_of(result), (std::vector<Face>{{0, 1, 3}, {kNoVertex, 1, 2}}));
+  EXPECT_EQ(result.mesh.remarks, (std::vector<std::string>{"line 13: face index 3 of 3 vertices",
                                                            "line 14: face index -1 of 3 vertices"}));
   std::string file = binary<float, std::uint8_t, std::uint8_t>(false, "float", "uchar", "uchar");
   file.back() = 9;
@@ -224,6 +242,8 @@ TEST(PlyReader, NamesTheLineOfEachDefectInTheHeader) {
 
 TEST(PlyReader, RefusesElementsThatMakeNoMesh) {
   EXPECT_EQ(read("ply\nelement vertex 0\nend_header\n").error, "the header has no 'format' line");
+  EXPECT_EQ(read(header("ascii", "element vertex 0\n" + kXyz + "element vertex 0\n" + kXyz)).error,
+            "the header has 2 elements 'vertex', not one");
   EXPECT_EQ(read(header("ascii", "")).error, "the header has 0 elements 'vertex', not one");
   EXPECT_EQ(read(header("ascii", "element vertex 1\nproperty float x\nproperty float y\n")).error,
             "the element 'vertex' has no x, y and z");
@@ -237,6 +257,8 @@ TEST(PlyReader, RefusesCountsThatTheFileHasNoRoomFor) {
   EXPECT_EQ(
       read(header("binary_little_endian", "element vertex 4000000000\n" + kXyz) + "abcdefghijklmnop").error,
       "the header promises 4000000000 vertices, the file has room for at most 1");
+  EXPECT_EQ(read(header("binary_little_endian", "element vertex 2\n" + kXyz) + "abcdefghijklmnop").error,
+            "the header promises 2 vertices, the file has room for at most 1");
   EXPECT_EQ(read(text(3, 1'000'000'000, kThreeVertices + "3 0 1 2\n")).error,
             "the header promises 1000000000 faces, the file has room for at most 5");
 }

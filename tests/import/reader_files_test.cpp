@@ -113,5 +113,9 @@ TEST(FixedBugs, AFaceElementWithoutFacesNeedsNoIndices) {
   EXPECT_EQ(result.mesh.points.size(), 1u);
 }
 
+TEST(FixedBugs, AnErrorNamesAnElementInCleanText) {
+  EXPECT_EQ(read_data("negative_list_odd_name.ply").error, "K\uFFFDhe 0 has a list of length -1");
+}
+
 }  // namespace
 }  // namespace tandem::build

@@ -221,12 +221,14 @@ void PlyReader<Values>::remark_long_line() {
 
 template <class Values>
 bool PlyReader<Values>::check_record() {
+  constexpr std::size_t kMostNameBytes = 40;
   if (values_.state() == PlyState::bad) return fail(values_.reason());
   if (values_.state() == PlyState::ended)
     return fail("the header promises " + counted(element_->count, element_->name) + ", the data ends after " +
                 std::to_string(record_));
   if (!defect_.empty())
-    return fail(std::string(element_->name) + " " + std::to_string(record_) + " has " + defect_);
+    return fail(printable(element_->name, kMostNameBytes) + " " + std::to_string(record_) + " has " +
+                defect_);
   return true;
 }
 

@@ -6,6 +6,7 @@
 #include <cctype>
 #include <cstdlib>
 #include <filesystem>
+#include <ostream>
 #include <string>
 
 #include "clean.h"
@@ -29,6 +30,10 @@ struct Expected {
   const char* finding = "";  ///< a count that the report must show ...
   std::uint64_t count = 0;   ///< ... and its value
 };
+
+void PrintTo(const Expected& expected, std::ostream* out) {
+  *out << expected.file;
+}
 
 constexpr Expected kExpected[] = {
     {"spot.obj", 5856},

@@ -20,7 +20,6 @@
 namespace tandem::build {
 namespace {
 
-// A sanitizer reserves terabytes of address space, which no limit would let it have.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr bool kLimitsMemory = false;
 #elif defined(__has_feature)
@@ -109,6 +108,10 @@ void write_all(int pipe, const void* bytes, std::size_t count) {
 }
 
 }  // namespace
+
+bool limits_memory() {
+  return kLimitsMemory;
+}
 
 LimitedChild::~LimitedChild() {
   if (pipe_ >= 0) close(pipe_);

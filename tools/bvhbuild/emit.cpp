@@ -1,5 +1,6 @@
 #include "emit.h"
 
+#include <algorithm>
 #include <bit>
 
 #include "tandem/formats/box.h"

@@ -1,5 +1,4 @@
 #pragma once
-#include "sweep.h"
 #include "tandem/formats/block.h"
 #include "tree.h"
 

@@ -3,7 +3,7 @@
 #include <oneapi/tbb/parallel_invoke.h>
 
 #include "emit.h"
-#include "sweep.h"
+#include "splitter.h"
 #include "tandem/formats/box.h"
 
 namespace tandem::build {
@@ -24,7 +24,7 @@ struct BinaryNode {
 class BinaryTree {
  public:
   explicit BinaryTree(const Geometry& geometry)
-      : sorted_(geometry), nodes_(2 * geometry.triangles.size() - 1) {
+      : splitter_(geometry), nodes_(2 * geometry.triangles.size() - 1) {
     build(0, {0, static_cast<std::uint32_t>(geometry.triangles.size())}, 1);
     for (std::size_t node = nodes_.size(); node-- > 0;) collapse(static_cast<std::uint32_t>(node));
   }
@@ -32,7 +32,7 @@ class BinaryTree {
   const BinaryNode& operator[](std::uint32_t node) const { return nodes_[node]; }
   std::uint32_t left(std::uint32_t node) const { return node + 1; }
   std::uint32_t right(std::uint32_t node) const { return node + 2 * nodes_[node].left_triangles; }
-  std::vector<std::uint32_t> take_order() { return sorted_.take_order(); }
+  std::vector<std::uint32_t> take_order() { return splitter_.take_order(); }
 
  private:
   Bounds build(std::uint32_t node, Range range, std::uint32_t depth) {
@@ -40,12 +40,12 @@ class BinaryTree {
     self.triangles = range.size();
     if (range.size() == 1) {
       self.left_triangles = 0;
-      const Bounds bounds = sorted_.bounds_of(sorted_.order(0, range)[0]);
+      const Bounds bounds = splitter_.bounds_of(splitter_.order(range)[0]);
       self.surface = bounds.surface();
       return bounds;
     }
     const Split split = choose(range, depth);
-    sorted_.apply(range, split);
+    splitter_.apply(range, split);
     self.left_triangles = split.left;
     const std::uint32_t middle = range.begin + split.left;
     Bounds bounds, other;
@@ -65,8 +65,8 @@ class BinaryTree {
   Split choose(Range range, std::uint32_t depth) {
     const auto any = [](std::uint32_t) { return true; };
     Split best;
-    if (!must_split_evenly(depth, range.size())) best = sorted_.best_split(range, any);
-    return best.left != 0 ? best : sorted_.even_split(range, any);
+    if (!must_split_evenly(depth, range.size())) best = splitter_.best_split(range, any);
+    return best.left != 0 ? best : splitter_.even_split(range, any);
   }
 
   // The cheapest way to share `slots` between the children.
@@ -105,7 +105,7 @@ class BinaryTree {
     }
   }
 
-  SortedTriangles sorted_;
+  TriangleSplitter splitter_;
   std::vector<BinaryNode> nodes_;
 };
 

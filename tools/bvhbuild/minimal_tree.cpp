@@ -4,7 +4,7 @@
 
 #include "emit.h"
 #include "legal_splits.h"
-#include "sweep.h"
+#include "splitter.h"
 #include "tandem/formats/box.h"
 
 namespace tandem::build {
@@ -32,13 +32,13 @@ void maybe_parallel(bool parallel, const Left& left, const Right& right) {
 
 class Builder {
  public:
-  explicit Builder(const Geometry& geometry) : geometry_(geometry), sorted_(geometry) {}
+  explicit Builder(const Geometry& geometry) : geometry_(geometry), splitter_(geometry) {}
 
   Tree run() {
     const auto n = static_cast<std::uint32_t>(geometry_.triangles.size());
     tree_.blocks.resize(blocks_for(n));
     build_block({0, n}, 0, 1);
-    tree_.order = sorted_.take_order();
+    tree_.order = splitter_.take_order();
     measure(tree_);
     return std::move(tree_);
   }
@@ -47,7 +47,7 @@ class Builder {
   // Builds the tree over the group into blocks [block, block + blocks_for(n)).
   void build_block(Range range, std::uint32_t block, std::uint32_t depth) {
     if (range.size() <= kNodesPerBlock) {
-      emit_leaf_block(tree_.blocks[block], geometry_, sorted_.order(0, {0, 0}).data(), range.begin,
+      emit_leaf_block(tree_.blocks[block], geometry_, splitter_.order({0, 0}).data(), range.begin,
                       range.size());
       return;
     }
@@ -80,9 +80,9 @@ class Builder {
     const LegalSplits legal(range.size(), slots);
     const auto is_legal = [&](std::uint32_t left) { return legal.left_slots(left) != 0; };
     Split best;
-    if (!must_split_evenly(depth, range.size())) best = sorted_.best_split(range, is_legal);
-    if (best.left == 0) best = sorted_.even_split(range, is_legal);
-    sorted_.apply(range, best);
+    if (!must_split_evenly(depth, range.size())) best = splitter_.best_split(range, is_legal);
+    if (best.left == 0) best = splitter_.even_split(range, is_legal);
+    splitter_.apply(range, best);
 
     const std::uint32_t left_slots = legal.left_slots(best.left), middle = range.begin + best.left;
     Groups left, right;
@@ -99,7 +99,7 @@ class Builder {
   }
 
   Geometry geometry_;
-  SortedTriangles sorted_;
+  TriangleSplitter splitter_;
   Tree tree_;
 };
 

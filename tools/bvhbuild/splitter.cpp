@@ -1,0 +1,185 @@
+#include "splitter.h"
+
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+namespace tandem::build {
+namespace {
+
+using oneapi::tbb::blocked_range;
+using oneapi::tbb::parallel_for;
+
+Bounds bounds_of_triangle(const Geometry& geometry, std::uint32_t triangle, float scale) {
+  Bounds bounds;
+  for (const std::uint32_t vertex : geometry.triangles[triangle]) {
+    for (int k = 0; k < 3; ++k) {
+      const float x = geometry.points[vertex][k] * scale;
+      bounds.lo[k] = std::min(bounds.lo[k], x);
+      bounds.hi[k] = std::max(bounds.hi[k], x);
+    }
+  }
+  return bounds;
+}
+
+// A power of two that brings the longest edge of the mesh's box to about 1, so that surfaces of huge or tiny
+// meshes neither overflow nor vanish. Scaling by it is exact, but for what underflows beside the rest.
+float normalizing_scale(const Geometry& geometry) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  double lo[3] = {kInfinity, kInfinity, kInfinity}, hi[3] = {-kInfinity, -kInfinity, -kInfinity};
+  for (const auto& triangle : geometry.triangles) {
+    for (const std::uint32_t vertex : triangle) {
+      for (int k = 0; k < 3; ++k) {
+        lo[k] = std::min<double>(lo[k], geometry.points[vertex][k]);
+        hi[k] = std::max<double>(hi[k], geometry.points[vertex][k]);
+      }
+    }
+  }
+  const double longest = std::max({hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]});
+  if (longest == 0) return 1;
+  return static_cast<float>(std::ldexp(1.0, -std::clamp(std::ilogb(longest), -126, 127)));
+}
+
+// Calls body(0), body(1), body(2), at once if the group is large.
+template <typename Body>
+void for_each_axis(Range range, const Body& body) {
+  if (range.size() < kSerialSize) {
+    for (int axis = 0; axis < 3; ++axis) body(axis);
+  } else {
+    parallel_for(0, 3, body);
+  }
+}
+
+}  // namespace
+
+TriangleSplitter::TriangleSplitter(const Geometry& geometry) {
+  const auto n = static_cast<std::uint32_t>(geometry.triangles.size());
+  bounds_.resize(n);
+  goes_left_.resize(n);
+  const float scale = normalizing_scale(geometry);
+  parallel_for(blocked_range<std::uint32_t>(0, n), [&](const auto& part) {
+    for (std::uint32_t t = part.begin(); t != part.end(); ++t)
+      bounds_[t] = bounds_of_triangle(geometry, t, scale);
+  });
+  for (int axis = 0; axis < 3; ++axis) {
+    scratch_[axis].resize(n);
+    order_[axis].resize(n);
+  }
+  std::iota(order_[0].begin(), order_[0].end(), 0u);
+  if (n <= kSweepSize) sort({0, n});
+}
+
+// Fills all three orders of a group from the first.
+void TriangleSplitter::sort(Range range) {
+  const std::vector<std::uint32_t> triangles(order_[0].begin() + range.begin, order_[0].begin() + range.end);
+  for_each_axis(range, [&](int axis) {
+    std::vector<std::pair<float, std::uint32_t>> keys;
+    keys.reserve(triangles.size());
+    for (const std::uint32_t t : triangles) keys.emplace_back(center(t, axis), t);
+    std::sort(keys.begin(), keys.end());
+    std::uint32_t* order = order_[axis].data() + range.begin;
+    for (const auto& key : keys) *order++ = key.second;
+  });
+}
+
+Split TriangleSplitter::best_split(Range range, const IsLegal& is_legal) {
+  if (range.size() > kSweepSize) return best_binned_split(range, is_legal);
+  Split splits[3];
+  for_each_axis(range, [&](int axis) { splits[axis] = sweep(axis, range, is_legal); });
+  return *std::min_element(splits, splits + 3,
+                           [](const Split& a, const Split& b) { return a.cost < b.cost; });
+}
+
+Split TriangleSplitter::even_split(Range range, const IsLegal& is_legal) const {
+  Bounds bounds;
+  for (const std::uint32_t t : order(range)) bounds.grow(bounds_[t]);
+  Split split;
+  for (int axis = 1; axis < 3; ++axis) {
+    if (bounds.hi[axis] - bounds.lo[axis] > bounds.hi[split.axis] - bounds.lo[split.axis]) split.axis = axis;
+  }
+  const std::uint32_t n = range.size(), middle = n / 2;
+  for (std::uint32_t distance = 0; split.left == 0 && distance <= middle; ++distance) {
+    if (distance < middle && is_legal(middle - distance)) split.left = middle - distance;
+    if (split.left == 0 && middle + distance < n && is_legal(middle + distance))
+      split.left = middle + distance;
+  }
+  return split;
+}
+
+// One axis, all splits: costs of right sides from the right, then left sides from the left.
+Split TriangleSplitter::sweep(int axis, Range range, const IsLegal& is_legal) {
+  const std::uint32_t n = range.size();
+  const std::uint32_t* order = order_[axis].data() + range.begin;
+  std::uint32_t* right_cost = scratch_[axis].data() + range.begin;
+  Bounds right;
+  for (std::uint32_t i = n - 1; i > 0; --i) {
+    right.grow(bounds_[order[i]]);
+    right_cost[i] = std::bit_cast<std::uint32_t>(right.surface() * static_cast<float>(n - i));
+  }
+  Split best;
+  best.axis = axis;
+  Bounds left;
+  const UnevenPenalty penalty(n);
+  for (std::uint32_t i = 1; i < n; ++i) {
+    left.grow(bounds_[order[i - 1]]);
+    const float surface_cost = left.surface() * static_cast<float>(i) + std::bit_cast<float>(right_cost[i]);
+    const float cost = surface_cost * penalty.factor(i);
+    if (cost < best.cost && is_legal(i)) {
+      best.cost = cost;
+      best.left = i;
+    }
+  }
+  return best;
+}
+
+// Sets goes_left_ of all triangles of the group.
+void TriangleSplitter::mark_left_side(Range range, const Split& split) {
+  if (range.size() <= kSweepSize) {
+    const std::uint32_t* sorted = order_[split.axis].data() + range.begin;
+    for (std::uint32_t i = 0; i < range.size(); ++i) goes_left_[sorted[i]] = i < split.left;
+    return;
+  }
+  std::vector<std::pair<float, std::uint32_t>> keys;
+  keys.reserve(range.size());
+  for (const std::uint32_t t : order(range)) keys.emplace_back(center(t, split.axis), t);
+  std::nth_element(keys.begin(), keys.begin() + split.left, keys.end());
+  for (std::uint32_t i = 0; i < range.size(); ++i) goes_left_[keys[i].second] = i < split.left;
+}
+
+// Brings the left side's triangles to the front, keeping the order on both sides.
+void TriangleSplitter::partition(int axis, Range range, std::uint32_t left) {
+  std::uint32_t* order = order_[axis].data() + range.begin;
+  std::uint32_t* right = scratch_[axis].data() + range.begin;
+  std::uint32_t lefts = 0, rights = 0;
+  for (std::uint32_t i = 0; i < range.size(); ++i) {
+    const std::uint32_t t = order[i];
+    const bool goes_left = goes_left_[t] != 0;
+    order[lefts] = t;  // overwritten by the next one if this one goes right
+    right[rights] = t;
+    lefts += goes_left;
+    rights += !goes_left;
+  }
+  std::copy(right, right + rights, order + left);
+}
+
+void TriangleSplitter::apply(Range range, const Split& split) {
+  mark_left_side(range, split);
+  if (range.size() <= kSweepSize) {
+    for_each_axis(range, [&](int axis) {
+      if (axis != split.axis) partition(axis, range, split.left);
+    });
+    return;
+  }
+  partition(0, range, split.left);
+  const std::uint32_t middle = range.begin + split.left;
+  for (const Range side : {Range{range.begin, middle}, Range{middle, range.end}}) {
+    if (side.size() <= kSweepSize) sort(side);
+  }
+}
+
+}  // namespace tandem::build

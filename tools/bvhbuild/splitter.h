@@ -1,0 +1,93 @@
+#pragma once
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "bounds.h"
+#include "tree.h"
+
+namespace tandem::build {
+
+/// A group of triangles during a top-down build: positions [begin, end) of the splitter's order.
+struct Range {
+  std::uint32_t begin, end;
+  std::uint32_t size() const { return end - begin; }
+};
+
+/// Where a group is cut: its first `left` triangles by box centre along `axis` (ties by index) go left.
+struct Split {
+  int axis = 0;
+  std::uint32_t left = 0;  ///< 0: no split was found
+  float cost = std::numeric_limits<float>::infinity();
+};
+
+/// Groups below this size are worked on by one thread.
+inline constexpr std::uint32_t kSerialSize = 8192;
+
+/// Groups up to this size are swept, larger ones binned (docs/decisions.md has the measurement).
+inline constexpr std::uint32_t kSweepSize = 1 << 16;
+
+/// A trace of a penalty for uneven splits. It decides where costs are equal, as among coincident triangles,
+/// which would otherwise be peeled off one by one.
+class UnevenPenalty {
+ public:
+  explicit UnevenPenalty(std::uint32_t n) : n_(static_cast<float>(n)), weight_(1e-5f / n_) {}
+  float factor(std::uint32_t left) const { return 1 + weight_ * std::abs(n_ - 2 * static_cast<float>(left)); }
+
+ private:
+  float n_, weight_;
+};
+
+/// Finds and applies the splits of a top-down build. Different groups may be worked on by different threads;
+/// nothing depends on which, or on how many.
+class TriangleSplitter {
+ public:
+  /// Says whether a group may be cut behind so many triangles. Called from several threads.
+  using IsLegal = std::function<bool(std::uint32_t left)>;
+
+  explicit TriangleSplitter(const Geometry& geometry);
+
+  /// The triangles of a group.
+  std::span<const std::uint32_t> order(Range range) const {
+    return {order_[0].data() + range.begin, range.size()};
+  }
+  const Bounds& bounds_of(std::uint32_t triangle) const { return bounds_[triangle]; }
+
+  /// The cheapest split by the surface-area heuristic, surface times number of triangles, among the legal
+  /// ones on all axes; of equal costs the more even one, then the lower axis. Up to kSweepSize triangles all
+  /// splits are tried, beyond that those nearest to 31 planes an axis. left == 0 where none is found.
+  Split best_split(Range range, const IsLegal& is_legal);
+
+  /// The legal split nearest to the middle, along the longest edge of the group's box: what keeps a tree from
+  /// growing too deep.
+  Split even_split(Range range, const IsLegal& is_legal) const;
+
+  /// Cuts the group in two: afterwards its left part is [begin, begin + split.left).
+  void apply(Range range, const Split& split);
+
+  /// Once the build is done, the leaves' order: each leaf is a range of it.
+  std::vector<std::uint32_t> take_order() { return std::move(order_[0]); }
+
+ private:
+  float center(std::uint32_t triangle, int axis) const {
+    return bounds_[triangle].lo[axis] + bounds_[triangle].hi[axis];
+  }
+  void sort(Range range);
+  Split sweep(int axis, Range range, const IsLegal& is_legal);
+  Split best_binned_split(Range range, const IsLegal& is_legal) const;
+  void mark_left_side(Range range, const Split& split);
+  void partition(int axis, Range range, std::uint32_t left);
+
+  std::vector<Bounds> bounds_;
+  // Of a group up to kSweepSize: its triangles by centre along x, y and z. Of a larger one: the first alone,
+  // by index, so that going through it goes through memory in order.
+  std::vector<std::uint32_t> order_[3];
+  std::vector<std::uint32_t>
+      scratch_[3];  // bits of the right sides' costs; one side's triangles while partitioning
+  std::vector<std::uint8_t> goes_left_;  // by triangle
+};
+
+}  // namespace tandem::build

@@ -1,0 +1,200 @@
+"""A reader of .bvh files, version 1, that shares no code with the project: what the tests hold the tools against."""
+import dataclasses
+import json
+import struct
+from fractions import Fraction
+
+import numpy as np
+
+MAGIC = b"\x89BVH\r\n\x1a\n"
+HEADER = struct.Struct("<8sQIHHQ3d3f3fQdII24s")
+SECTION = struct.Struct("<IIQQQ")
+LEVEL = np.dtype([("triangles", "<u4"), ("blocks", "<u4"), ("leaf_blocks", "<u4"), ("depth", "<u4"),
+                  ("error_bound", "<f8"), ("reserved", "<u8")])
+BLOCK = np.dtype([("center", "<f4", (3, 4)), ("half_extent", "<f4", (3, 4)), ("index", "<u4", 4), ("kind", "<u4", 4)])
+TRIANGLE = np.dtype([("corner", [("position", "<f4", 3), ("w", "<u4")], 3)])
+PART = np.dtype([("name_offset", "<u4"), ("name_bytes", "<u4"), ("path_offset", "<u4"), ("path_bytes", "<u4"),
+                 ("first_face", "<u8"), ("face_count", "<u8")])
+KINDS = {1: ("levels", LEVEL), 2: ("blocks", BLOCK), 3: ("triangles", TRIANGLE), 4: ("parts", PART),
+         5: ("strings", np.dtype("u1")), 6: ("provenance", np.dtype("u1"))}
+INTERNAL, LEAF, IMAGINARY = 0, 1, 2
+NO_INDEX = 0xFFFFFFFF
+
+assert HEADER.size == 128 and SECTION.size == 32 and LEVEL.itemsize == 32
+assert BLOCK.itemsize == 128 and TRIANGLE.itemsize == 48 and PART.itemsize == 32
+
+
+@dataclasses.dataclass
+class BvhFile:
+    """One file; level 0 only. Corner positions are relative to `origin`."""
+    raw: bytes
+    hash: int
+    origin: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    source_faces: int
+    rounding_error: float
+    levels: np.ndarray
+    blocks: np.ndarray
+    triangles: np.ndarray
+    parts: list
+    provenance: dict
+
+    @property
+    def corners(self):
+        """float32[triangles, 3 corners, 3]."""
+        return self.triangles["corner"]["position"]
+
+    @property
+    def world(self):
+        """float64[triangles, 3 corners, 3]: the file's coordinates."""
+        return self.corners.astype(np.float64) + self.origin
+
+    @property
+    def source_face(self):
+        return self.triangles["corner"]["w"][:, 0]
+
+    @property
+    def part(self):
+        return self.triangles["corner"]["w"][:, 1]
+
+
+def read(path):
+    with open(path, "rb") as file:
+        return parse(file.read())
+
+
+def parse(raw):
+    (magic, content_hash, order, major, minor, size, ox, oy, oz, *rest) = HEADER.unpack_from(raw)
+    lower, upper = rest[0:3], rest[3:6]
+    source_faces, rounding_error, section_count, level_count, reserved = rest[6:]
+    assert magic == MAGIC and order == 0x01020304 and (major, minor) == (1, 0)
+    assert size == len(raw) and reserved == bytes(24) and level_count == 1
+    found = {}
+    end = HEADER.size + section_count * SECTION.size
+    for i in range(section_count):
+        kind, level, offset, length, count = SECTION.unpack_from(raw, HEADER.size + i * SECTION.size)
+        name, dtype = KINDS[kind]
+        assert level == 0 and offset % 256 == 0 and offset >= end and length == count * dtype.itemsize
+        assert not any(raw[end:offset]), "gaps are zero"
+        assert name not in found
+        found[name] = np.frombuffer(raw, dtype, count, offset)
+        end = offset + length
+    assert not any(raw[end:])
+    strings = found["strings"].tobytes() if "strings" in found else b""
+
+    def text(offset, length):
+        return strings[offset:offset + length].decode()
+
+    parts = [(text(p["name_offset"], p["name_bytes"]), text(p["path_offset"], p["path_bytes"]),
+              int(p["first_face"]), int(p["face_count"])) for p in found["parts"]]
+    return BvhFile(raw, content_hash, np.array([ox, oy, oz]), np.array(lower, np.float32), np.array(upper, np.float32),
+                   source_faces, rounding_error, found["levels"], found["blocks"], found["triangles"], parts,
+                   json.loads(found["provenance"].tobytes()))
+
+
+def imaginary_minimum(triangles):
+    """((-N) mod 4) + ((1 - L) mod 3), with L = ceil(N / 4) leaf blocks."""
+    return -triangles % 4 + (1 - (triangles + 3) // 4) % 3
+
+
+def xxh64(data, seed=0):
+    """XXH64 after its specification."""
+    mask = (1 << 64) - 1
+    p1, p2, p3, p4, p5 = (0x9E3779B185EBCA87, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9, 0x85EBCA77C2B2AE63,
+                          0x27D4EB2F165667C5)
+
+    def rotl(x, bits):
+        return (x << bits | x >> (64 - bits)) & mask
+
+    def step(lane, word):
+        return rotl((lane + word * p2) & mask, 31) * p1 & mask
+
+    at = 0
+    if len(data) >= 32:
+        lanes = [(seed + p1 + p2) & mask, (seed + p2) & mask, seed, (seed - p1) & mask]
+        for words in struct.iter_unpack("<4Q", data[:len(data) // 32 * 32]):
+            lanes = [step(lane, word) for lane, word in zip(lanes, words)]
+        at = len(data) // 32 * 32
+        result = sum(rotl(lane, bits) for lane, bits in zip(lanes, (1, 7, 12, 18))) & mask
+        for lane in lanes:
+            result = ((result ^ step(0, lane)) * p1 + p4) & mask
+    else:
+        result = (seed + p5) & mask
+    result = (result + len(data)) & mask
+    for (word,) in struct.iter_unpack("<Q", data[at:at + (len(data) - at) // 8 * 8]):
+        result = (rotl(result ^ step(0, word), 27) * p1 + p4) & mask
+        at += 8
+    if len(data) - at >= 4:
+        result = (rotl(result ^ struct.unpack_from("<I", data, at)[0] * p1 & mask, 23) * p2 + p3) & mask
+        at += 4
+    for byte in data[at:]:
+        result = rotl(result ^ byte * p5 & mask, 11) * p1 & mask
+    result = (result ^ result >> 33) * p2 & mask
+    result = (result ^ result >> 29) * p3 & mask
+    return result ^ result >> 32
+
+
+def interval(block, node, axis):
+    center, half = (Fraction(float(block[key][axis, node])) for key in ("center", "half_extent"))
+    return center - half, center + half
+
+
+def walk(file):
+    """Follows the tree from the root and yields (block index, depth, block); a block that comes twice is an error."""
+    seen = set()
+    pending = [(0, 1)]
+    while pending:
+        index, depth = pending.pop()
+        assert index not in seen, f"block {index} has two parents"
+        seen.add(index)
+        block = file.blocks[index]
+        yield index, depth, block
+        pending += [(int(child), depth + 1) for child, kind in zip(block["index"], block["kind"]) if kind == INTERNAL]
+
+
+def defects_of_tree(file):
+    """Sentences about everything that is wrong with the tree but for the boxes."""
+    defects, reached, depths, visited = [], [], [], 0
+    for index, depth, block in walk(file):
+        visited += 1
+        depths.append(depth)
+        kinds = block["kind"].tolist()
+        real = [kind for kind in kinds if kind != IMAGINARY]
+        if len(set(real)) != 1 or not set(real) <= {INTERNAL, LEAF}:
+            defects.append(f"block {index} is not pure: {kinds}")
+        if kinds != sorted(kinds):
+            defects.append(f"block {index}: imaginary nodes come last: {kinds}")
+        for node, kind in enumerate(kinds):
+            if kind == LEAF:
+                reached.append(int(block["index"][node]))
+            empty = (block["half_extent"][:, node] == -np.inf).all() and (block["center"][:, node] == 0).all()
+            if (kind == IMAGINARY) != bool(empty and block["index"][node] == NO_INDEX):
+                defects.append(f"block {index}, node {node}: an imaginary node and the empty box go together")
+    if sorted(reached) != list(range(len(file.triangles))):
+        defects.append("not every triangle is reached once")
+    if visited != len(file.blocks):
+        defects.append("not every block is reached")
+    if max(depths) != file.levels[0]["depth"]:
+        defects.append("the depth is not what the level says")
+    return defects
+
+
+def defects_of_boxes(file):
+    """Sentences about every box that does not contain what lies below it, in exact arithmetic. Slow: small files."""
+    defects = []
+    for index, _, block in walk(file):
+        for node, kind in enumerate(block["kind"]):
+            below = int(block["index"][node])
+            for axis in range(3):
+                if kind == LEAF:
+                    inner = [(Fraction(float(x)),) * 2 for x in file.corners[below, :, axis]]
+                elif kind == INTERNAL:
+                    child = file.blocks[below]
+                    inner = [interval(child, i, axis) for i in range(4) if child["kind"][i] != IMAGINARY]
+                else:
+                    continue
+                lower, upper = interval(block, node, axis)
+                if any(low < lower or high > upper for low, high in inner):
+                    defects.append(f"block {index}, node {node}, axis {axis}: the box does not contain what is below")
+    return defects

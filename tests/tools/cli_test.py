@@ -1,0 +1,498 @@
+#!/usr/bin/python3
+"""bvhbuild and bvhinfo from the outside: exit codes, messages, streams, odd paths, outputs that cannot be written.
+
+Environment: TANDEM_BVHBUILD, TANDEM_BVHINFO (the binaries), TANDEM_SOURCE_DIR.
+"""
+import json
+import os
+import pty
+import resource
+import signal
+import subprocess
+import time
+import unittest
+
+from tool_test import (BVHBUILD, BVHINFO, CUBE_OBJ, DONE, NO_TRIANGLE, TRIANGLE_OBJ, UNREADABLE_INPUT, UNWRITABLE_OUTPUT,
+                       USAGE, ToolTest, grid_ply, scattered_obj)
+
+# assimp reads this for ever.
+ENDLESS_PLY = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x"
+NOBODY = 65534
+
+
+class Usage(ToolTest):
+    def test_help_names_every_option_and_exit_code(self):
+        for tool, words in ((BVHBUILD, ("MESH", "--output", "--imaginary", "minimal|free", "--strict", "--json",
+                                        "--quiet", "--threads", "--reader", "--time-limit", "--memory-limit",
+                                        "--version", "Exit codes: 0 done")),
+                            (BVHINFO, ("FILE", "--json", "--verify", "--version", "Exit codes: 0 all sound"))):
+            result = self.run_tool(tool, "--help")
+            self.assertEqual((result.returncode, result.stderr), (DONE, b""))
+            for word in words:
+                self.assertIn(word.encode(), result.stdout)
+
+    def test_version_is_one_line_with_a_number(self):
+        for tool, name in ((BVHBUILD, "bvhbuild"), (BVHINFO, "bvhinfo")):
+            result = self.run_tool(tool, "--version")
+            self.assertEqual((result.returncode, result.stderr), (DONE, b""))
+            self.assertRegex(result.stdout.decode(), rf"^{name} \d+\.\d+\.\d+\n$")
+
+    def test_no_arguments_are_refused(self):
+        self.assert_fails(self.build(), USAGE, "MESH is required")
+        self.assert_fails(self.info(), USAGE, "FILE is required")
+
+    def test_an_output_is_required(self):
+        self.assert_fails(self.build(self.write("a.obj", TRIANGLE_OBJ)), USAGE, "--output")
+
+    def test_unknown_options_and_surplus_arguments_are_named(self):
+        mesh = self.write("a.obj", TRIANGLE_OBJ)
+        self.assert_fails(self.build(mesh, "-o", self.out, "--fast"), USAGE, "--fast")
+        self.assert_fails(self.build(mesh, "second.obj", "-o", self.out), USAGE, "second.obj")
+        self.assert_fails(self.info("--fast", mesh), USAGE, "--fast")
+        self.assert_nothing_written()
+
+    def test_bad_values_are_refused_by_option(self):
+        mesh = self.write("a.obj", TRIANGLE_OBJ)
+        for option, values in {"--imaginary": ["some", "1", ""], "--reader": ["cgal", "0"],
+                               "--threads": ["0", "-1", "two", "1e9"], "--time-limit": ["0", "-5", "nan", "soon"],
+                               "--memory-limit": ["0", "nan", "inf", "8GiB"]}.items():
+            for value in values:
+                with self.subTest(option=option, value=value):
+                    self.assert_fails(self.build(mesh, "-o", self.out, f"{option}={value}"), USAGE, option)
+        self.assert_nothing_written()
+
+    def test_empty_names_are_refused(self):
+        self.assert_fails(self.build("", "-o", self.out), USAGE, "MESH")
+        self.assert_fails(self.build(self.write("a.obj", TRIANGLE_OBJ), "-o", ""), USAGE, "--output")
+
+
+class UnreadableInput(ToolTest):
+    def assert_refused(self, path, *words, code=UNREADABLE_INPUT, **options):
+        self.assert_fails(self.build(path, "-o", self.out, **options), code, path, *words)
+        self.assert_nothing_written()
+
+    def test_a_missing_file_is_named(self):
+        self.assert_refused(self.inputs / "none.obj", "no such file")
+
+    def test_a_folder_is_no_mesh(self):
+        self.assert_refused(self.inputs, "is a folder")
+
+    def test_an_empty_file_is_named(self):
+        for ending in ("obj", "ply", "stl", "off", "gltf", "glb", "dae"):
+            self.assert_refused(self.write(f"empty.{ending}", b""), "empty")
+
+    def test_a_pipe_is_refused_instead_of_waited_for(self):
+        os.mkfifo(self.inputs / "pipe.obj")
+        self.assert_refused(self.inputs / "pipe.obj", "not a regular file")
+
+    def test_a_file_without_permission_is_named(self):
+        path = self.write("secret.obj", TRIANGLE_OBJ)
+        path.chmod(0)
+        self.outputs.chmod(0o777)
+        self.assert_refused(path, "permission denied", **unprivileged(self))
+
+    def test_garbage_with_the_ending_of_a_mesh_is_refused(self):
+        garbage = bytes((i * 197 + i * i * 31) % 256 for i in range(3000))
+        for ending in ("ply", "stl", "off", "gltf", "glb", "dae", "fbx", "3ds", "blend"):
+            with self.subTest(ending=ending):
+                self.assert_refused(self.write(f"garbage.{ending}", garbage))
+        result = self.build(self.write("garbage.obj", garbage), "-o", self.out)
+        self.assertIn(result.returncode, (UNREADABLE_INPUT, NO_TRIANGLE))
+        self.assert_nothing_written()
+
+    def test_an_unknown_ending_is_refused(self):
+        self.assert_refused(self.write("notes.xyz", "hello\n"))
+        self.assert_refused(self.write("noending", "hello\n"))
+
+    def test_motion_capture_is_refused_by_name(self):
+        path = self.write("walk.bvh", "HIERARCHY\nROOT Hips\n{\n}\n")
+        self.assert_refused(path, "Biovision motion capture")
+        self.assert_fails(self.info(path), UNREADABLE_INPUT, path, "Biovision motion capture")
+
+    def test_a_tree_of_ours_is_no_mesh(self):
+        tree = self.built("a.obj", TRIANGLE_OBJ).rename(self.inputs / "a.bvh")
+        self.assert_refused(tree, "already a Tandem tree")
+        self.assert_refused(tree.rename(self.inputs / "a.obj"), "already a Tandem tree")
+
+    def test_lines_and_points_alone_hold_no_triangle(self):
+        self.assert_refused(self.write("l.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2 3\np 1\n"), "no usable triangle",
+                            code=NO_TRIANGLE)
+        points = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+        self.assert_refused(self.write("p.ply", points + "end_header\n0 0 0\n"), "no usable triangle", code=NO_TRIANGLE)
+        self.assert_refused(self.write("p.off", "OFF\n2 0 0\n0 0 0\n1 1 1\n"), "no usable triangle", code=NO_TRIANGLE)
+
+    def test_flat_triangles_alone_are_no_usable_ones_and_say_why(self):
+        self.assert_refused(self.write("f.obj", "v 0 0 0\nv 1 1 1\nv 2 2 2\nf 1 2 3\n"), "on one line", code=NO_TRIANGLE)
+
+    def test_the_time_limit_ends_an_endless_import(self):
+        path = self.write("endless.ply", ENDLESS_PLY)
+        result = self.build(path, "-o", self.out, "--reader", "assimp", "--time-limit", "0.3")
+        self.assert_fails(result, UNREADABLE_INPUT, path, "0.3 s (--time-limit)")
+        self.assert_nothing_written()
+
+    def test_a_file_beyond_the_memory_limit_is_refused(self):
+        path = self.write("sparse.obj", b"")
+        os.truncate(path, 1 << 28)
+        result = self.build(path, "-o", self.out, "--memory-limit", "0.2")
+        self.assert_fails(result, UNREADABLE_INPUT, path, "--memory-limit")
+
+
+class UnwritableOutput(ToolTest):
+    def setUp(self):
+        super().setUp()
+        self.mesh = self.write("mesh.obj", scattered_obj(2000))
+
+    def assert_refused(self, out, *words, code=UNWRITABLE_OUTPUT, **options):
+        self.assert_fails(self.build(self.mesh, "-o", out, **options), code, out, *words)
+        self.assert_nothing_written()
+
+    def test_a_missing_folder_is_named(self):
+        self.assert_refused(self.outputs / "none" / "a.bvh", "there is no folder")
+
+    def test_a_folder_is_no_output(self):
+        self.assert_refused(self.outputs, "is a folder")
+
+    def test_a_file_is_no_folder(self):
+        self.assert_fails(self.build(self.mesh, "-o", self.mesh / "a.bvh"), UNWRITABLE_OUTPUT, self.mesh / "a.bvh")
+
+    def test_the_input_is_never_overwritten(self):
+        before = self.mesh.read_bytes()
+        os.symlink(self.mesh, self.inputs / "link.bvh")
+        os.link(self.mesh, self.inputs / "hard.bvh")
+        for out in (self.mesh, self.inputs / "link.bvh", self.inputs / "hard.bvh", self.inputs / ".." / "in" / "mesh.obj"):
+            self.assert_refused(out, "is the input", code=USAGE)
+        self.assertEqual(self.mesh.read_bytes(), before)
+
+    def test_a_full_device_is_told(self):
+        self.assert_refused("/dev/full", "No space left on device")
+
+    def test_a_folder_without_permission_is_told(self):
+        options = unprivileged(self)
+        self.outputs.chmod(0o555)
+        self.assert_refused(self.out, "ermission denied", **options)
+
+    def test_a_file_size_limit_is_told_and_leaves_nothing(self):
+        def limit():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (16384, 16384))
+            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        self.assert_refused(self.out, "File too large", preexec_fn=limit)
+
+    def test_a_full_disk_is_told_and_leaves_nothing(self):
+        script = ('mount -t tmpfs -o size=64k tandem "$1" || exit 77; "$2" "$3" -o "$1/a.bvh"; code=$?; ls -A "$1"; '
+                  'exit $code')
+        result = self.run_tool("unshare", "-m", "sh", "-c", script, "sh", self.outputs, BVHBUILD, self.mesh)
+        if result.returncode in (1, 77):
+            self.skipTest("no file system may be mounted here")
+        self.assertEqual((result.returncode, result.stdout), (UNWRITABLE_OUTPUT, b""))
+        self.assertIn(b"No space left on device", result.stderr)
+
+    def test_a_failed_build_leaves_an_older_file_as_it_was(self):
+        self.out.write_bytes(b"older")
+        self.assertEqual(self.build(self.write("bad.ply", "ply\n"), "-o", self.out).returncode, UNREADABLE_INPUT)
+        self.assertEqual(self.out.read_bytes(), b"older")
+        self.assertEqual(os.listdir(self.outputs), [self.out.name])
+
+    def test_a_successful_build_replaces_an_older_file_and_leaves_nothing_else(self):
+        self.out.write_bytes(b"older")
+        self.assertEqual(self.build(self.mesh, "-o", self.out).returncode, DONE)
+        self.assertGreater(self.out.stat().st_size, 5)
+        self.assertEqual(os.listdir(self.outputs), [self.out.name])
+
+
+class Paths(ToolTest):
+    NAMES = ["with space", "ümlaut-é-日本", "qu'ot\"es", "new\nline", "tab\there", "$HOME;`ls`", "[a,b]", "%s%n", "-dash",
+             "--json", os.fsdecode(b"not-utf8-\xff")]
+
+    def test_odd_names_are_read_and_written(self):
+        for name in self.NAMES:
+            with self.subTest(name=name):
+                mesh, out = self.write(name + ".obj", TRIANGLE_OBJ), self.outputs / (name + ".bvh")
+                self.assertEqual(self.build(mesh, "-o", out).returncode, DONE)
+                self.assertEqual(self.info(out).returncode, DONE)
+                report = self.build(mesh, "-o", out, "--json")
+                self.assertEqual(json.loads(report.stdout)["exit_code"], DONE)
+                self.assertIn("triangles", json.loads(self.info(out, "--json").stdout))
+        self.assertEqual(sorted(os.listdir(self.outputs)), sorted(name + ".bvh" for name in self.NAMES))
+
+    def test_a_leading_dash_may_follow_a_double_dash(self):
+        self.write("-o.obj", TRIANGLE_OBJ)
+        result = self.build("--output=-out.bvh", "--", "-o.obj", cwd=self.inputs)
+        self.assertEqual(result.returncode, DONE, result.stderr)
+        result = self.info("--json", "--", "-out.bvh", cwd=self.inputs)
+        self.assertEqual(json.loads(result.stdout)["triangles"], 1)
+
+    def test_a_relative_name_without_folder_is_written_to_the_working_folder(self):
+        mesh = self.write("a.obj", TRIANGLE_OBJ)
+        self.assertEqual(self.build(mesh, "-o", "a.bvh", cwd=self.outputs).returncode, DONE)
+        self.assertEqual(os.listdir(self.outputs), ["a.bvh"])
+
+    def test_the_longest_name_of_a_file_system_is_written(self):
+        name = "n" * 251 + ".bvh"
+        self.assertEqual(self.build(self.write("a.obj", TRIANGLE_OBJ), "-o", self.outputs / name).returncode, DONE)
+        self.assertEqual(os.listdir(self.outputs), [name])
+
+
+class Signals(ToolTest):
+    def start(self, *arguments, **options):
+        return subprocess.Popen([BVHBUILD, *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **options)
+
+    def test_a_signal_during_import_ends_all_processes_and_leaves_nothing(self):
+        path = self.write("endless.ply", ENDLESS_PLY)
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            with self.subTest(signal=number):
+                # The reading end sees the end of the pipe once every process that inherited it is gone.
+                reading, writing = os.pipe()
+                process = self.start(path, "-o", self.out, "--reader", "assimp", "--time-limit", "50",
+                                     pass_fds=[writing])
+                os.close(writing)
+                while not children_of(process.pid):
+                    time.sleep(0.001)
+                process.send_signal(number)
+                self.assertEqual(process.wait(20), -number)
+                self.assertEqual(os.read(reading, 1), b"")
+                os.close(reading)
+                self.assert_nothing_written()
+
+    def test_a_signal_during_writing_leaves_no_part_of_a_file(self):
+        mesh = self.write("large.ply", grid_ply(400))
+        killed = 0
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+            process = self.start(mesh, "-o", self.out)
+            while not os.listdir(self.outputs) and process.poll() is None:
+                pass
+            process.send_signal(number)
+            code = process.wait(60)
+            self.assertIn(code, (-number, DONE))
+            killed += code != DONE
+            if self.out.exists():  # the signal came after the rename
+                self.assertEqual(self.info("--verify", self.out).returncode, DONE)
+                self.out.unlink()
+            self.assert_nothing_written()
+        self.assertGreater(killed, 0, "no signal came in time: the test shows nothing")
+
+
+class Streams(ToolTest):
+    def test_quiet_prints_nothing(self):
+        result = self.build(self.write("a.obj", CUBE_OBJ), "-o", self.out, "--quiet")
+        self.assertEqual((result.returncode, result.stdout, result.stderr), (DONE, b"", b""))
+
+    def test_quiet_still_tells_errors(self):
+        self.assert_fails(self.build(self.inputs / "none.obj", "-o", self.out, "-q"), UNREADABLE_INPUT, "no such file")
+
+    def test_a_pipe_gets_the_report_on_standard_output_and_no_progress(self):
+        result = self.build(self.write("a.obj", CUBE_OBJ), "-o", self.out)
+        self.assertEqual(result.stderr, b"")
+        for word in (b"mesh.bvh: 12 triangles", b"6 faces, 8 vertices", b"imaginary", b"import"):
+            self.assertIn(word, result.stdout)
+        self.assertNotIn(b"\x1b", result.stdout)
+        self.assertNotIn(b"\r", result.stdout)
+
+    def on_terminal(self, *arguments):
+        """Runs bvhbuild with a terminal as standard error; the exit code and what the terminal got."""
+        ours, theirs = pty.openpty()
+        result = self.build(*arguments, stderr=theirs)
+        os.close(theirs)
+        text = b""
+        try:
+            while chunk := os.read(ours, 4096):
+                text += chunk
+        except OSError:  # the end, on a terminal
+            pass
+        os.close(ours)
+        return result, text
+
+    def test_a_terminal_sees_the_four_steps_and_a_clean_line_at_the_end(self):
+        result, text = self.on_terminal(self.write("a.obj", CUBE_OBJ), "-o", self.out)
+        self.assertEqual(result.returncode, DONE)
+        for step in (b"import a.obj", b"clean", b"build", b"write"):
+            self.assertIn(step, text)
+        self.assertTrue(text.endswith(b"\r\x1b[K"), text)
+        self.assertNotIn(b"\x1b", result.stdout)
+
+    def test_a_terminal_sees_nothing_of_a_quiet_build(self):
+        _, text = self.on_terminal(self.write("a.obj", CUBE_OBJ), "-o", self.out, "--quiet")
+        self.assertEqual(text, b"")
+
+    def test_an_error_on_a_terminal_stands_on_a_line_of_its_own(self):
+        result, text = self.on_terminal(self.write("bad.ply", "ply\n"), "-o", self.out)
+        self.assertEqual(result.returncode, UNREADABLE_INPUT)
+        self.assertIn(b"\r\x1b[Kbvhbuild: ", text)
+
+    def test_a_report_that_cannot_be_printed_is_an_error(self):
+        out = self.built("a.obj", CUBE_OBJ)
+        with open("/dev/full", "wb") as full:
+            for arguments in ([out], [out, "--json"], [out, "--verify"]):
+                self.assertEqual(self.info(*arguments, stdout=full).returncode, UNWRITABLE_OUTPUT)
+
+
+class BuildJson(ToolTest):
+    ALWAYS = {"tool", "version", "exit_code", "error", "input", "output", "reader", "single_precision_reader", "faces",
+              "vertices", "remarks", "findings", "seconds", "peak_memory_bytes"}
+    AFTER_SUCCESS = {"parts", "origin", "rounding_error", "tree", "bytes", "hash"}
+    FINDINGS = {"faces_index_out_of_range", "faces_not_finite", "faces_too_large", "faces_not_simple",
+                "vertices_unreferenced", "vertices_welded", "triangles_degenerate", "triangles_duplicate",
+                "triangles_duplicate_reversed", "triangles_flattened"}
+
+    def test_a_success_has_all_keys(self):
+        report = self.built_json("a.obj", CUBE_OBJ)
+        self.assertEqual(set(report), self.ALWAYS | self.AFTER_SUCCESS)
+        self.assertEqual(set(report["findings"]), self.FINDINGS)
+        self.assertEqual(set(report["seconds"]), {"import", "clean", "build", "write"})
+        self.assertEqual((report["exit_code"], report["error"]), (DONE, None))
+        self.assertEqual((report["faces"], report["vertices"], report["tree"]["triangles"]), (6, 8, 12))
+        self.assertEqual(report["bytes"], self.out.stat().st_size)
+        self.assertEqual(report["hash"], json.loads(self.info(self.out, "--json").stdout)["hash"])
+
+    def test_a_failure_has_its_reason_on_both_streams(self):
+        for path, out, code in ((self.inputs / "none.obj", self.out, UNREADABLE_INPUT),
+                                (self.write("l.obj", "v 0 0 0\n"), self.out, NO_TRIANGLE),
+                                (self.write("a.obj", CUBE_OBJ), "/dev/full", UNWRITABLE_OUTPUT)):
+            result = self.build(path, "-o", out, "--json")
+            report = json.loads(result.stdout)
+            self.assertEqual((result.returncode, report["exit_code"]), (code, code))
+            self.assertEqual(set(report), self.ALWAYS)
+            self.assertEqual(result.stderr.decode(), f"bvhbuild: {report['error']}\n")
+
+    def test_a_mesh_with_defects_counts_them(self):
+        unclean = CUBE_OBJ + "v 0 0 0\nv 5 5 5\nf 1 2 2\nf 1 2 99\nf 4 3 2 9\n"
+        found = self.built_json("a.obj", unclean)["findings"]
+        self.assertEqual(found["faces_index_out_of_range"], 1)
+        self.assertEqual(found["vertices_unreferenced"], 1)
+        self.assertEqual(found["vertices_welded"], 1)
+        self.assertEqual(found["triangles_degenerate"], 1)
+        self.assertEqual(found["triangles_duplicate"], 2)
+
+
+class Strict(ToolTest):
+    def test_a_clean_mesh_passes(self):
+        self.built("a.obj", CUBE_OBJ, "--strict")
+
+    def test_every_defect_is_an_error_that_says_what_was_found(self):
+        for name, content, words in (
+                ("flat.obj", CUBE_OBJ + "f 1 2 2\n", "on one line"),
+                ("loose.obj", CUBE_OBJ + "v 9 9 9\n", "to no face"),
+                ("range.obj", CUBE_OBJ + "f 1 2 99\n", "99"),
+                ("twice.obj", CUBE_OBJ + "f 4 3 2 1\n", "earlier one"),
+                ("nan.obj", CUBE_OBJ + "v nan 0 0\nf 1 2 9\n", "NaN")):
+            with self.subTest(name=name):
+                path = self.write(name, content)
+                self.assertEqual(self.build(path, "-o", self.outputs / "x.bvh").returncode, DONE)
+                (self.outputs / "x.bvh").unlink()
+                self.assert_fails(self.build(path, "-o", self.out, "--strict"), UNREADABLE_INPUT, path, words, "--strict")
+                self.assert_nothing_written()
+
+    def test_welding_is_no_defect(self):
+        soup = "".join(f"v {x} {y} 0\n" for x, y in ((0, 0), (1, 0), (0, 1), (1, 0), (1, 1), (0, 1)))
+        self.built("soup.obj", soup + "f 1 2 3\nf 4 5 6\n", "--strict")
+
+
+class Info(ToolTest):
+    KEYS = {"file", "version", "hash", "bytes", "triangles", "nodes", "leaf_nodes", "internal_nodes", "imaginary_nodes",
+            "imaginary_minimum", "imaginary_fraction", "leaf_blocks", "internal_blocks", "partial_leaf_blocks", "depth",
+            "leaf_fill", "sah_cost", "expected_block_pairs", "expected_candidates", "leaf_blocks_at_depth",
+            "blocks_with_fill", "bounds", "origin", "rounding_error", "source_faces", "source", "parts", "levels",
+            "sections"}
+    VERDICT_KEYS = {"file", "sound", "status", "where", "error", "bytes", "check_seconds"}
+
+    def json_of(self, *arguments):
+        return json.loads(self.info("--json", *arguments).stdout)
+
+    def test_the_page_shows_what_people_look_for(self):
+        page = self.info(self.built("cube.obj", CUBE_OBJ))
+        self.assertEqual((page.returncode, page.stderr), (DONE, b""))
+        for word in ("cube.obj", "triangles    12", "1 imaginary", "minimum 1", "0 partial leaf", "depth", "SAH cost",
+                     "block pairs", "bounds", "origin", "sections", "provenance"):
+            self.assertIn(word, page.stdout.decode())
+
+    def test_json_of_one_file_is_an_object_with_all_keys(self):
+        info = self.json_of(self.built("cube.obj", CUBE_OBJ))
+        self.assertEqual(set(info), self.KEYS)
+        self.assertEqual((info["triangles"], info["imaginary_nodes"], info["partial_leaf_blocks"]), (12, 1, 0))
+        self.assertEqual(info["bounds"], {"lower": [0, 0, 0], "upper": [1, 1, 1]})
+        self.assertEqual(info["source"]["input"]["file"], "cube.obj")
+
+    def test_json_of_two_files_is_an_array(self):
+        out = self.built("cube.obj", CUBE_OBJ)
+        pair = self.json_of(out, out)
+        self.assertEqual([info["triangles"] for info in pair], [12, 12])
+
+    def test_two_files_are_set_side_by_side(self):
+        a = self.built("cube.obj", CUBE_OBJ).rename(self.outputs / "a.bvh")
+        b = self.built("cube.obj", CUBE_OBJ, "--imaginary", "free").rename(self.outputs / "b.bvh")
+        table = self.info(a, b)
+        self.assertEqual(table.returncode, DONE)
+        rows = {line.split()[0]: line.split()[1:] for line in table.stdout.decode().splitlines()}
+        self.assertEqual(rows["a.bvh"], ["b.bvh"])
+        self.assertEqual(rows["triangles"], ["12", "12", "x1.000"])
+        counts = [info["imaginary_nodes"] for info in self.json_of(a, b)]
+        self.assertEqual(rows["imaginary_nodes"][:2], [str(count) for count in counts])
+
+    def test_verify_says_that_a_file_is_sound(self):
+        out = self.built("cube.obj", CUBE_OBJ)
+        result = self.info("--verify", out)
+        self.assertEqual(result.returncode, DONE)
+        self.assertIn(f"{out}: sound", result.stdout.decode())
+        verdict = self.json_of("--verify", out)
+        self.assertEqual(set(verdict), self.VERDICT_KEYS)
+        self.assertEqual((verdict["sound"], verdict["status"], verdict["error"]), (True, "Ok", None))
+
+    def damaged(self):
+        whole = self.built("cube.obj", CUBE_OBJ).read_bytes()
+        flipped = bytearray(whole)
+        flipped[-700] ^= 1
+        return {"Truncated": whole[:-1], "TrailingBytes": whole + b"\0", "ContentChanged": bytes(flipped),
+                "NotTandem": b"solid cube\n", "BiovisionMotionCapture": b"HIERARCHY\nROOT Hips\n",
+                "DamagedByTextTransfer": whole[:4] + whole[4:].replace(b"\r\n", b"\n"),
+                "UnsupportedVersion": whole[:20] + b"\2\0" + whole[22:],
+                "WrongByteOrder": whole[:16] + b"\1\2\3\4" + whole[20:]}
+
+    def test_a_file_that_is_not_sound_is_refused_by_the_name_of_its_defect(self):
+        for status, content in self.damaged().items():
+            for option in ([], ["--verify"]):
+                with self.subTest(status=status, option=option):
+                    path = self.write(f"{status}.bvh", content)
+                    self.assert_fails(self.info(path, *option), UNREADABLE_INPUT, path, status)
+                    result = self.info(path, "--json", *option)
+                    verdict = json.loads(result.stdout)
+                    self.assertEqual(result.returncode, UNREADABLE_INPUT)
+                    self.assertEqual(set(verdict), self.VERDICT_KEYS)
+                    self.assertEqual((verdict["sound"], verdict["status"]), (False, status))
+                    self.assertEqual(result.stderr.decode(), f"bvhinfo: {verdict['error']}\n")
+
+    def test_a_bad_file_beside_a_good_one_is_told(self):
+        out, missing = self.built("cube.obj", CUBE_OBJ), self.inputs / "none.bvh"
+        self.assert_fails(self.info(out, missing), UNREADABLE_INPUT, missing, "no such file")
+        sound = [verdict["sound"] for verdict in self.json_of("--verify", out, missing)]
+        self.assertEqual(sound, [True, False])
+
+    def test_folders_pipes_and_empty_files_are_refused(self):
+        os.mkfifo(self.inputs / "pipe.bvh")
+        self.assert_fails(self.info(self.inputs / "pipe.bvh"), UNREADABLE_INPUT, "not a regular file")
+        self.assert_fails(self.info(self.inputs), UNREADABLE_INPUT, "not a regular file")
+        self.assert_fails(self.info(self.write("empty.bvh", b"")), UNREADABLE_INPUT, "not a Tandem .bvh file")
+
+
+def unprivileged(test):
+    """Options of subprocess that take the rights of root away, which no permission binds."""
+    if os.geteuid() != 0:
+        return {}
+    for folder in (test.root, test.inputs):
+        folder.chmod(0o755)
+    options = {"user": NOBODY, "group": NOBODY, "extra_groups": []}
+    try:
+        subprocess.run([BVHBUILD, "--version"], stdout=subprocess.DEVNULL, check=True, **options)
+    except (OSError, subprocess.SubprocessError):
+        test.skipTest("runs as root, and nobody else may run the tool")
+    return options
+
+
+def children_of(process):
+    try:
+        with open(f"/proc/{process}/task/{process}/children", encoding="ascii") as file:
+            return file.read().split()
+    except FileNotFoundError:
+        return []
+
+
+if __name__ == "__main__":
+    unittest.main()

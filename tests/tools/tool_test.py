@@ -1,0 +1,97 @@
+"""What the tests of the command-line tools share: running them in a folder of their own, and tiny meshes."""
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+import numpy as np
+
+BVHBUILD = os.environ["TANDEM_BVHBUILD"]
+BVHINFO = os.environ["TANDEM_BVHINFO"]
+SOURCE_DIR = pathlib.Path(os.environ["TANDEM_SOURCE_DIR"])
+DONE, USAGE, UNREADABLE_INPUT, NO_TRIANGLE, UNWRITABLE_OUTPUT, INTERNAL = range(6)
+
+TRIANGLE_OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+CUBE_OBJ = """v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1
+f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"""
+
+
+class ToolTest(unittest.TestCase):
+    """Each test has an empty folder for its inputs and one for its outputs, which both go with it."""
+
+    def setUp(self):
+        self.root = pathlib.Path(tempfile.mkdtemp(prefix="tandem test "))
+        self.addCleanup(shutil.rmtree, self.root, ignore_errors=True)
+        self.inputs, self.outputs = self.root / "in", self.root / "out"
+        self.inputs.mkdir()
+        self.outputs.mkdir()
+        self.out = self.outputs / "mesh.bvh"
+
+    def run_tool(self, tool, *arguments, **options):
+        options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "stdin": subprocess.DEVNULL, "timeout": 60,
+                   **options}
+        return subprocess.run([tool, *arguments], **options)
+
+    def build(self, *arguments, **options):
+        return self.run_tool(BVHBUILD, *arguments, **options)
+
+    def info(self, *arguments, **options):
+        return self.run_tool(BVHINFO, *arguments, **options)
+
+    def write(self, name, content):
+        path = self.inputs / name
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return path
+
+    def built(self, name, content, *arguments):
+        """The .bvh file made of a mesh with this content."""
+        result = self.build(self.write(name, content), "-o", self.out, *arguments)
+        self.assertEqual(result.returncode, DONE, result.stderr)
+        self.assertEqual(result.stderr, b"")
+        return self.out
+
+    def built_json(self, name, content, *arguments):
+        result = self.build(self.write(name, content), "-o", self.out, "--json", *arguments)
+        self.assertEqual(result.returncode, DONE, result.stderr)
+        return json.loads(result.stdout)
+
+    def assert_fails(self, result, code, *words):
+        """The exit code is `code`, standard output empty, and standard error one line that holds all words."""
+        self.assertEqual(result.returncode, code, result.stderr)
+        self.assertEqual(result.stdout, b"")
+        message = os.fsdecode(result.stderr)
+        self.assertTrue(message.startswith(f"{pathlib.Path(result.args[0]).name}: "), message)
+        for word in words:
+            self.assertIn(os.fspath(word), message)
+        lines = message.removesuffix("\n").removesuffix("\nTry 'bvhbuild --help'.").removesuffix(
+            "\nTry 'bvhinfo --help'.")
+        self.assertEqual(len(lines.split("\n")), 1, message)
+
+    def assert_nothing_written(self):
+        self.assertEqual(os.listdir(self.outputs), [])
+
+
+def grid_ply(cells):
+    """A binary PLY of 2 * cells^2 triangles: a wavy sheet."""
+    x, y = np.meshgrid(np.arange(cells + 1, dtype=np.float32), np.arange(cells + 1, dtype=np.float32))
+    points = np.stack([x, y, np.sin(x / 7) * np.cos(y / 5)], axis=-1).reshape(-1, 3).astype("<f4")
+    corner = (np.arange(cells)[:, None] * (cells + 1) + np.arange(cells)).reshape(-1)
+    right, above = corner + 1, corner + cells + 1
+    triangles = np.stack([np.stack([corner, right, above], 1), np.stack([right, above + 1, above], 1)], 1)
+    faces = np.zeros(2 * cells * cells, dtype=[("count", "u1"), ("index", "<i4", 3)])
+    faces["count"], faces["index"] = 3, triangles.reshape(-1, 3)
+    header = (f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\nproperty float x\nproperty float y\n"
+              f"property float z\nelement face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n")
+    return header.encode() + points.tobytes() + faces.tobytes()
+
+
+def scattered_obj(triangles, seed=1):
+    """Small triangles at random places, each with vertices of its own."""
+    random = np.random.default_rng(seed)
+    corners = random.random((triangles, 1, 3)) + 0.1 * random.random((triangles, 3, 3))
+    lines = ["v %.9g %.9g %.9g" % tuple(point) for point in corners.reshape(-1, 3)]
+    lines += [f"f {3 * i + 1} {3 * i + 2} {3 * i + 3}" for i in range(triangles)]
+    return "\n".join(lines) + "\n"

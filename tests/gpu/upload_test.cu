@@ -1,0 +1,140 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+#include <random>
+#include <vector>
+
+#include "build/sample_asset.h"
+#include "tandem/kernels/box_test.h"
+#include "tandem/runtime/upload.h"
+
+namespace tandem {
+namespace {
+
+class Gpu : public testing::Test {
+ protected:
+  void SetUp() override {
+    int count = 0;
+    if (cudaGetDeviceCount(&count) != cudaSuccess || count == 0) {
+      static_cast<void>(cudaGetLastError());
+      GTEST_SKIP() << "no GPU here";
+    }
+  }
+};
+
+template <typename Value>
+std::vector<Value> download(const Value* device, std::size_t count) {
+  std::vector<Value> host(count);
+  EXPECT_EQ(cudaMemcpy(host.data(), device, count * sizeof(Value), cudaMemcpyDeviceToHost), cudaSuccess);
+  return host;
+}
+
+TEST_F(Gpu, AnUploadedLevelHasTheSameBytes) {
+  const build::Image image = test::make_file(test::random_mesh(5000, 1));
+  const CheckResult checked = check(image.data(), image.size());
+  ASSERT_EQ(checked.status, Status::kOk);
+  const LevelView host = checked.asset.level();
+  DeviceAsset asset;
+  ASSERT_EQ(asset.upload(checked.asset, nullptr), Status::kOk) << cudaGetErrorString(asset.cuda_error());
+  ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
+  EXPECT_EQ(asset.bytes(), image.size());
+  const LevelView device = asset.level();
+  ASSERT_EQ(device.block_count, host.block_count);
+  const auto blocks = download(device.blocks, device.block_count);
+  const auto triangles = download(device.triangles, device.triangle_count);
+  EXPECT_EQ(std::memcmp(blocks.data(), host.blocks, blocks.size() * sizeof(Block)), 0);
+  EXPECT_EQ(std::memcmp(triangles.data(), host.triangles, triangles.size() * sizeof(Triangle)), 0);
+  EXPECT_EQ(reinterpret_cast<std::uintptr_t>(device.blocks) % alignof(Block), 0u);
+}
+
+TEST_F(Gpu, AssetsMoveAndUploadAgain) {
+  const build::Image image = test::make_file(test::random_mesh(100, 1));
+  const AssetView view = check(image.data(), image.size()).asset;
+  DeviceAsset first;
+  ASSERT_EQ(first.upload(view, nullptr), Status::kOk);
+  DeviceAsset second = std::move(first);
+  EXPECT_EQ(first.level_count(), 0u);
+  ASSERT_EQ(second.upload(view, nullptr), Status::kOk);
+  EXPECT_EQ(second.level().triangle_count, 100u);
+  second.free();
+  EXPECT_EQ(second.bytes(), 0u);
+}
+
+// One thread a block: counts leaves by walking lanes on the device.
+__global__ void count_leaves(LevelView level, unsigned* leaves) {
+  const unsigned b = blockIdx.x * blockDim.x + threadIdx.x;
+  if (b >= level.block_count || !level.blocks[b].is_leaf_block()) return;
+  for (int i = 0; i < kNodesPerBlock; ++i) {
+    if (level.blocks[b].kind[i] == NodeKind::leaf && level.blocks[b].index[i] < level.triangle_count)
+      atomicAdd(leaves, 1u);
+  }
+}
+
+TEST_F(Gpu, KernelsReadTheTreeInPlace) {
+  const build::Image image = test::make_file(test::random_mesh(5001, 2));
+  DeviceAsset asset;
+  ASSERT_EQ(asset.upload(check(image.data(), image.size()).asset, nullptr), Status::kOk);
+  unsigned* leaves = nullptr;
+  ASSERT_EQ(cudaMalloc(&leaves, sizeof(unsigned)), cudaSuccess);
+  ASSERT_EQ(cudaMemset(leaves, 0, sizeof(unsigned)), cudaSuccess);
+  const LevelView level = asset.level();
+  count_leaves<<<(level.block_count + 127) / 128, 128>>>(level, leaves);
+  ASSERT_EQ(cudaGetLastError(), cudaSuccess);
+  EXPECT_EQ(download(leaves, 1)[0], 5001u);
+  cudaFree(leaves);
+}
+
+struct Trial {
+  Box other;
+  RelativePose pose;
+};
+
+// Fused multiply-adds and the device's fabs included: no box test may accept an imaginary node.
+__global__ void test_imaginary(const Trial* trials, int count, unsigned* accepted) {
+  const int i = blockIdx.x * blockDim.x + threadIdx.x;
+  if (i >= count) return;
+  const Box imaginary = {{kImaginaryCenter, kImaginaryCenter, kImaginaryCenter},
+                         {kImaginaryHalfExtent, kImaginaryHalfExtent, kImaginaryHalfExtent}};
+  const Trial& t = trials[i];
+  const bool any = overlap_6_axes(imaginary, t.other, t.pose) || overlap_6_axes(t.other, imaginary, t.pose) ||
+                   overlap_15_axes(imaginary, t.other, t.pose) ||
+                   overlap_15_axes(t.other, imaginary, t.pose) || overlap_aligned(imaginary, t.other) ||
+                   overlap_aligned(t.other, imaginary);
+  if (any) atomicAdd(accepted, 1u);
+}
+
+TEST_F(Gpu, ImaginaryNodesAreRejectedAgainstEveryOtherBox) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity(),
+                  kLargest = std::numeric_limits<float>::max();
+  const float special[] = {0.0f, -0.0f, 1e-45f, 1.0f, -1.0f, kLargest, -kLargest, kInfinity, -kInfinity, NAN};
+  std::mt19937_64 random(3);
+  const auto pick = [&] { return special[random() % std::size(special)]; };
+  std::vector<Trial> trials(1 << 20);
+  for (Trial& trial : trials) {
+    const bool aligned = random() % 3 == 0;
+    for (int i = 0; i < 3; ++i) {
+      trial.other.center[i] = pick();
+      trial.other.half_extent[i] = pick();
+      trial.pose.translation[i] = pick();
+      for (int j = 0; j < 3; ++j) trial.pose.rotation[i][j] = aligned ? static_cast<float>(i == j) : pick();
+    }
+    trial.pose.slack = random() % 2 == 0 ? 0 : pick();
+  }
+  Trial* device = nullptr;
+  unsigned* accepted = nullptr;
+  ASSERT_EQ(cudaMalloc(&device, trials.size() * sizeof(Trial)), cudaSuccess);
+  ASSERT_EQ(cudaMalloc(&accepted, sizeof(unsigned)), cudaSuccess);
+  ASSERT_EQ(cudaMemset(accepted, 0, sizeof(unsigned)), cudaSuccess);
+  ASSERT_EQ(cudaMemcpy(device, trials.data(), trials.size() * sizeof(Trial), cudaMemcpyHostToDevice),
+            cudaSuccess);
+  const int count = static_cast<int>(trials.size());
+  test_imaginary<<<(count + 255) / 256, 256>>>(device, count, accepted);
+  ASSERT_EQ(cudaGetLastError(), cudaSuccess);
+  EXPECT_EQ(download(accepted, 1)[0], 0u);
+  cudaFree(device);
+  cudaFree(accepted);
+}
+
+}  // namespace
+}  // namespace tandem

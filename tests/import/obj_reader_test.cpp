@@ -69,6 +69,12 @@ TEST(ObjReader, RemarksTheFirstIndexPastTheLastVertex) {
             (std::vector<std::string>{"line 6: face index 5 of 4 vertices"}));
 }
 
+TEST(ObjReader, RemarksAnIndexThatNeverCameAmongThoseThatCameLater) {
+  EXPECT_EQ(read("f 1 2 4\nf 1 99 2\nf 2 0 99\n" + kFourVertices).mesh.remarks,
+            (std::vector<std::string>{"line 2: face index 99 of 4 vertices",
+                                      "line 3: face index 0, but OBJ counts vertices from 1"}));
+}
+
 TEST(ObjReader, IndicesTooLargeForTheirTypeNameNoVertex) {
   expect_faces(kFourVertices + "f 1 2 4294967296\nf 1 2 4294967295\nf 1 2 99999999999999999999999\n",
                {{0, 1, kNoVertex}, {0, 1, kNoVertex - 1}, {0, 1, kNoVertex}});

@@ -21,6 +21,9 @@ class ObjReader {
   struct Suspect {
     const char* place;
     std::int64_t written;  // as the file writes it: from 1, or negative to count back
+
+    // What may still come is the less likely to come, the larger it is; the others never come.
+    std::int64_t doubt() const { return written > 0 ? written : INT64_MAX; }
   };
 
   bool statement();
@@ -39,7 +42,7 @@ class ObjReader {
   bool part_begins_ = false;
   bool any_statement_ = false;
   bool any_surface_ = false;
-  std::optional<Suspect> suspect_in_face_;
+  std::optional<Suspect> suspect_in_face_;  // the most doubtful one
   std::vector<Suspect> suspects_;
   std::string error_;
 };
@@ -102,7 +105,9 @@ void ObjReader::corner(std::int64_t written, const char* place) {
   if (written == 0) index = -1;
   mesh_.add_corner(index);
   const bool is_defined = index >= 0 && index < defined;
-  if (!is_defined && !suspect_in_face_) suspect_in_face_ = Suspect{place, written};
+  if (is_defined) return;
+  const Suspect suspect{place, written};
+  if (!suspect_in_face_ || suspect.doubt() > suspect_in_face_->doubt()) suspect_in_face_ = suspect;
 }
 
 void ObjReader::name(std::string_view& target) {

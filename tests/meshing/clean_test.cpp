@@ -11,7 +11,7 @@
 namespace tandem::build {
 namespace {
 
-TriangleMesh mesh_of(std::vector<Point> points, std::vector<Triangle> triangles) {
+TriangleMesh mesh_of(std::vector<Point> points, std::vector<TriangleIndices> triangles) {
   TriangleMesh mesh{std::move(points), std::move(triangles), {}};
   for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) mesh.face.push_back(i);
   return mesh;
@@ -31,7 +31,7 @@ TEST(Clean, WeldsVerticesAtExactlyTheSamePlaceAndNoOthers) {
   const CleanReport report = cleaned(mesh);
   EXPECT_EQ(report.vertices_welded, 2u);
   EXPECT_EQ(mesh.points, (std::vector<Point>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {next, 1, 0}, {1, 0, 5e-324}}));
-  EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {1, 3, 2}, {4, 3, 0}}));
+  EXPECT_EQ(mesh.triangles, (std::vector<TriangleIndices>{{0, 1, 2}, {1, 3, 2}, {4, 3, 0}}));
 }
 
 TEST(Clean, WeldsNegativeZeroToZero) {
@@ -61,7 +61,7 @@ TEST(Clean, DropsExactlyDegenerateTrianglesOnly) {
   EXPECT_EQ(report.triangles_degenerate, 4u);
   EXPECT_EQ(mesh.face, (std::vector<std::uint32_t>{4, 5, 6, 7}));
   EXPECT_EQ(mesh.points.size(), 6u);
-  for (const Triangle& t : mesh.triangles)
+  for (const TriangleIndices& t : mesh.triangles)
     for (const std::uint32_t corner : t) EXPECT_LT(corner, mesh.points.size());
 }
 
@@ -109,7 +109,7 @@ TEST(Clean, AgreesWithASlowCountOnRandomSoup) {
     std::map<std::set<Point>, int> seen;
     std::uint64_t degenerate = 0;
     std::uint64_t duplicate = 0;
-    for (const Triangle& t : mesh.triangles) {
+    for (const TriangleIndices& t : mesh.triangles) {
       const Point &a = mesh.points[t[0]], &b = mesh.points[t[1]], &c = mesh.points[t[2]];
       places.insert({a, b, c});
       if ((b[0] - a[0]) * (c[1] - a[1]) == (b[1] - a[1]) * (c[0] - a[0]))

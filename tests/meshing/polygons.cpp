@@ -34,11 +34,11 @@ PolygonMesh flat_face(const GridPolygon& polygon) {
   return mesh;
 }
 
-bool tiles(const std::vector<Triangle>& triangles, const GridPolygon& polygon) {
+bool tiles(const std::vector<TriangleIndices>& triangles, const GridPolygon& polygon) {
   const std::int64_t area = twice_area(polygon);
   std::int64_t sum = 0;
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> balance;
-  for (const Triangle& t : triangles) {
+  for (const TriangleIndices& t : triangles) {
     const std::int64_t piece = twice_area(polygon[t[0]], polygon[t[1]], polygon[t[2]]);
     if (piece == 0 || (piece > 0) != (area > 0)) return false;
     sum += piece;

@@ -30,6 +30,6 @@ PolygonMesh flat_face(const GridPolygon& polygon);
 /// Whether the triangles, as indices into `polygon`, tile it: all have its orientation and some area, their
 /// areas add up exactly, and each edge of the outline belongs to one of them while every other edge belongs
 /// to two, once in each direction.
-bool tiles(const std::vector<Triangle>& triangles, const GridPolygon& polygon);
+bool tiles(const std::vector<TriangleIndices>& triangles, const GridPolygon& polygon);
 
 }  // namespace tandem::build

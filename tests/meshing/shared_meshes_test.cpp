@@ -141,7 +141,7 @@ TEST_P(SharedMesh, EndsWellWithAssimpToo) {
   options.time_limit_seconds = 2;
   const Walked walked = walk(path_, options);
   EXPECT_NE(walked.imported.ok, !walked.imported.error.empty());
-  for (const Triangle& t : walked.stored.triangles)
+  for (const TriangleIndices& t : walked.stored.triangles)
     for (const std::uint32_t corner : t) ASSERT_LT(corner, walked.stored.points.size());
 }
 

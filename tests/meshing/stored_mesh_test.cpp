@@ -3,9 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cfloat>
 #include <cmath>
 #include <random>
+
+#include "tandem/formats/box.h"
 
 namespace tandem::build {
 namespace {
@@ -113,7 +114,7 @@ TEST(ToSinglePrecision, MovesToTheCentreWhenTheBoxIsAFewLastBitsWide) {
 }
 
 TEST(ToSinglePrecision, DoesNotOverflow) {
-  const double huge = double{FLT_MAX};
+  const double huge = double{kMaxCoordinate};
   const double below = std::nextafter(huge, 0);
   for (const std::vector<Point>& points :
        {std::vector<Point>{{huge, -huge, below}, {-huge, huge, 0}, {below, 0.1, huge}},
@@ -121,7 +122,7 @@ TEST(ToSinglePrecision, DoesNotOverflow) {
         std::vector<Point>{{huge, 1, 2}, {below, 3, 1}, {0.4 * huge, 2, 2}}}) {
     const StoredMesh mesh = stored(strip(points));
     for (const auto& p : mesh.points)
-      for (const float x : p) EXPECT_TRUE(std::isfinite(x));
+      for (const float x : p) EXPECT_TRUE(std::isfinite(x) && std::abs(x) <= kMaxCoordinate);
   }
 }
 

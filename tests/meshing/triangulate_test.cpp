@@ -3,12 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cfloat>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
 #include "meshing/polygons.h"
+#include "tandem/formats/box.h"
 
 namespace tandem::build {
 namespace {
@@ -47,7 +47,7 @@ void expect_tiled_however_written(const GridPolygon& polygon) {
 
 double twice_signed_area_xy(const TriangleMesh& mesh) {
   double sum = 0;
-  for (const Triangle& t : mesh.triangles) {
+  for (const TriangleIndices& t : mesh.triangles) {
     const Point& a = mesh.points[t[0]];
     const Point& b = mesh.points[t[1]];
     const Point& c = mesh.points[t[2]];
@@ -63,7 +63,7 @@ TEST(Triangulate, LeavesTrianglesAsTheyAreAndInOrder) {
   add_face(mesh, {3, 3, 1});
   add_face(mesh, {0, 3, 2});
   const Outcome outcome = run(mesh);
-  EXPECT_EQ(outcome.mesh.triangles, (std::vector<Triangle>{{2, 0, 1}, {3, 3, 1}, {0, 3, 2}}));
+  EXPECT_EQ(outcome.mesh.triangles, (std::vector<TriangleIndices>{{2, 0, 1}, {3, 3, 1}, {0, 3, 2}}));
   EXPECT_EQ(outcome.mesh.face, (std::vector<std::uint32_t>{0, 1, 2}));
 }
 
@@ -83,12 +83,12 @@ TEST(Triangulate, CutsQuadWithStraightCornerInside) {
 
 TEST(Triangulate, CutsConvexQuadAlongShorterDiagonal) {
   const Outcome outcome = run(flat_face({{0, 0}, {10, 0}, {12, 5}, {2, 5}}));
-  EXPECT_EQ(outcome.mesh.triangles, (std::vector<Triangle>{{3, 0, 1}, {3, 1, 2}}));
+  EXPECT_EQ(outcome.mesh.triangles, (std::vector<TriangleIndices>{{3, 0, 1}, {3, 1, 2}}));
 }
 
 TEST(Triangulate, CutsSquareFromItsFirstCorner) {
   const Outcome outcome = run(flat_face({{0, 0}, {1, 0}, {1, 1}, {0, 1}}));
-  EXPECT_EQ(outcome.mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}}));
+  EXPECT_EQ(outcome.mesh.triangles, (std::vector<TriangleIndices>{{0, 1, 2}, {0, 2, 3}}));
 }
 
 TEST(Triangulate, CutsSaddleQuadWithoutTurningAPieceOver) {
@@ -165,13 +165,13 @@ TEST(Triangulate, SkipsCornersThatRepeatTheirPredecessor) {
   mesh.corners = {0, 0, 1, 2, 4, 3, 5};  // 4 lies on 2, 5 on 0
   mesh.face_begin = {0, 7};
   const Outcome outcome = run(mesh);
-  EXPECT_EQ(outcome.mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}}));
+  EXPECT_EQ(outcome.mesh.triangles, (std::vector<TriangleIndices>{{0, 1, 2}, {0, 2, 3}}));
 }
 
 TEST(Triangulate, KeepsFaceOnOnePlaceAsOneDegenerateTriangle) {
   PolygonMesh mesh = flat_face({{1, 1}, {1, 1}, {1, 1}, {1, 1}});
   const Outcome outcome = run(mesh);
-  EXPECT_EQ(outcome.mesh.triangles, (std::vector<Triangle>{{0, 0, 0}}));
+  EXPECT_EQ(outcome.mesh.triangles, (std::vector<TriangleIndices>{{0, 0, 0}}));
   EXPECT_EQ(outcome.report.faces_not_simple, 0u);
 }
 
@@ -182,7 +182,7 @@ TEST(Triangulate, FansOutlinesThatCrossThemselvesAndCountsThem) {
   const Outcome outcome = run(mesh);
   EXPECT_EQ(outcome.report.faces_not_simple, 2u);
   EXPECT_EQ(outcome.mesh.triangles.size(), 2u + 4u);
-  EXPECT_EQ(outcome.mesh.triangles[0], (Triangle{0, 1, 2}));
+  EXPECT_EQ(outcome.mesh.triangles[0], (TriangleIndices{0, 1, 2}));
 }
 
 TEST(Triangulate, FansPentagram) {
@@ -209,7 +209,7 @@ TEST(Triangulate, SplitsHelixWhoseEndsCoverEachOther) {
   const Outcome outcome = run(mesh);
   ASSERT_EQ(outcome.mesh.triangles.size(), 3u);
   std::vector<bool> used(5, false);
-  for (const Triangle& t : outcome.mesh.triangles)
+  for (const TriangleIndices& t : outcome.mesh.triangles)
     for (const std::uint32_t corner : t) used[corner] = true;
   EXPECT_EQ(std::count(used.begin(), used.end(), true), 5);
 }
@@ -245,9 +245,14 @@ TEST(Triangulate, DropsEachBadFaceOnceUnderItsFirstReason) {
   PolygonMesh mesh;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double infinity = std::numeric_limits<double>::infinity();
-  mesh.points = {
-      {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {nan, 0, 0}, {0, -infinity, 0}, {0, 0, 1e39}, {0, 0, double{FLT_MAX}},
-      {9, 9, 9}};
+  mesh.points = {{0, 0, 0},
+                 {1, 0, 0},
+                 {0, 1, 0},
+                 {nan, 0, 0},
+                 {0, -infinity, 0},
+                 {0, 0, 1e39},
+                 {0, 0, double{kMaxCoordinate}},
+                 {9, 9, 9}};
   add_face(mesh, {0, 1, 2});
   add_face(mesh, {0, 3, kNoVertex, 5});  // all three: counted as an index
   add_face(mesh, {0, 8, 1});
@@ -308,12 +313,12 @@ TEST(Triangulate, SplitsFacesOfManyCorners) {
 TEST(Triangulate, GivesTheSameTrianglesEachTime) {
   std::vector<Point> gear;
   for (int i = 0; i < 3000; ++i) gear.push_back(on_circle(i % 4 < 2 ? 1 : 0.9, i / 3000.0));
-  const std::vector<Triangle> first = run(one_face(gear)).mesh.triangles;
+  const std::vector<TriangleIndices> first = run(one_face(gear)).mesh.triangles;
   PolygonMesh twice = one_face(gear);  // after other faces, in memory that was used before
   add_face(twice, {0, 1, 2, 3, 4, 5, 6});
   twice.corners.insert(twice.corners.end(), twice.corners.begin(), twice.corners.begin() + 3000);
   twice.face_begin.push_back(static_cast<std::uint32_t>(twice.corners.size()));
-  const std::vector<Triangle> both = run(twice).mesh.triangles;
+  const std::vector<TriangleIndices> both = run(twice).mesh.triangles;
   ASSERT_EQ(first.size(), 2998u);
   EXPECT_TRUE(std::equal(first.begin(), first.end(), both.begin()));
   EXPECT_TRUE(std::equal(first.rbegin(), first.rend(), both.rbegin()));

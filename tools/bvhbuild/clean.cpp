@@ -38,13 +38,13 @@ std::uint64_t hash_place(const Point& p) {
 /// For each point: 0 when a triangle uses it, else kNoVertex.
 std::vector<std::uint32_t> mark_used(const TriangleMesh& mesh) {
   std::vector<std::uint32_t> mark(mesh.points.size(), kNoVertex);
-  for (const Triangle& triangle : mesh.triangles)
+  for (const TriangleIndices& triangle : mesh.triangles)
     for (const std::uint32_t corner : triangle) mark[corner] = 0;
   return mark;
 }
 
 void rename_corners(TriangleMesh& mesh, const std::vector<std::uint32_t>& new_index) {
-  for (Triangle& triangle : mesh.triangles)
+  for (TriangleIndices& triangle : mesh.triangles)
     for (std::uint32_t& corner : triangle) corner = new_index[corner];
 }
 
@@ -70,7 +70,7 @@ void weld(TriangleMesh& mesh, CleanReport& report) {
   report.vertices_welded += used - kept;
 }
 
-bool degenerate(const TriangleMesh& mesh, const Triangle& t) {
+bool degenerate(const TriangleMesh& mesh, const TriangleIndices& t) {
   if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) return true;
   return collinear(mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]]);
 }
@@ -106,26 +106,26 @@ void drop_unused_points(TriangleMesh& mesh) {
 }
 
 /// The corners rotated so that the smallest comes first: the same for all spellings of one orientation.
-Triangle rotated(const Triangle& t) {
+TriangleIndices rotated(const TriangleIndices& t) {
   if (t[0] < t[1] && t[0] < t[2]) return t;
   if (t[1] < t[2]) return {t[1], t[2], t[0]};
   return {t[2], t[0], t[1]};
 }
 
 /// The orientation of the two in which the middle corner is smaller than the last.
-Triangle unoriented(const Triangle& t) {
-  const Triangle r = rotated(t);
-  return r[1] < r[2] ? r : Triangle{r[0], r[2], r[1]};
+TriangleIndices unoriented(const TriangleIndices& t) {
+  const TriangleIndices r = rotated(t);
+  return r[1] < r[2] ? r : TriangleIndices{r[0], r[2], r[1]};
 }
 
 void count_duplicates(const TriangleMesh& mesh, CleanReport& report) {
   IndexTable table(mesh.triangles.size());
   const auto hash = [&](std::size_t i) {
-    const Triangle t = unoriented(mesh.triangles[i]);
+    const TriangleIndices t = unoriented(mesh.triangles[i]);
     return hash_words(t[0], t[1], t[2]);
   };
   for_each_prefetched(mesh.triangles.size(), table, hash, [&](std::uint32_t i, std::uint64_t hash_i) {
-    const Triangle mine = unoriented(mesh.triangles[i]);
+    const TriangleIndices mine = unoriented(mesh.triangles[i]);
     const auto same = [&](std::uint32_t k) { return unoriented(mesh.triangles[k]) == mine; };
     const std::uint32_t earlier = table.find_or_insert(hash_i, i, same);
     if (earlier == i) return;

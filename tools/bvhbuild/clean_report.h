@@ -13,7 +13,7 @@ struct CleanReport {
 
   std::uint64_t faces_index_out_of_range = 0;  ///< dropped: a corner names no vertex
   std::uint64_t faces_not_finite = 0;          ///< dropped: a corner is NaN or infinite
-  std::uint64_t faces_too_large = 0;           ///< dropped: a corner lies beyond +-FLT_MAX
+  std::uint64_t faces_too_large = 0;           ///< dropped: a corner lies beyond +-kMaxCoordinate
   std::uint64_t faces_not_simple = 0;          ///< kept: the outline crosses itself, so it was split as a fan
   std::uint64_t vertices_unreferenced = 0;     ///< dropped: no face of the file names them
   std::uint64_t vertices_welded = 0;           ///< merged with an earlier vertex at exactly the same place

@@ -63,7 +63,7 @@ struct PolygonCdt::State {
   bool count_walks(Cdt::Vertex_handle from, Cdt::Vertex_handle to);
   bool lies_on(const VertexInfo& vertex, const VertexInfo& from, const VertexInfo& to) const;
   void find_windings();
-  bool emit(std::vector<Triangle>& out) const;
+  bool emit(std::vector<TriangleIndices>& out) const;
 };
 
 /// What coincides in the projection is one thing if the coordinate that was left out differs by rounding
@@ -162,7 +162,8 @@ bool PolygonCdt::State::count_walks(Cdt::Vertex_handle from, Cdt::Vertex_handle 
 }
 
 /// Of a vertex on the edge in the projection.
-bool PolygonCdt::State::lies_on(const VertexInfo& vertex, const VertexInfo& from, const VertexInfo& to) const {
+bool PolygonCdt::State::lies_on(const VertexInfo& vertex, const VertexInfo& from,
+                                const VertexInfo& to) const {
   const Point& p = corners[vertex.corner];
   const Point& a = corners[from.corner];
   const Point& b = corners[to.corner];
@@ -190,7 +191,7 @@ void PolygonCdt::State::find_windings() {
   }
 }
 
-bool PolygonCdt::State::emit(std::vector<Triangle>& out) const {
+bool PolygonCdt::State::emit(std::vector<TriangleIndices>& out) const {
   const std::size_t before = out.size();
   for (auto face = cdt.finite_faces_begin(); face != cdt.finite_faces_end(); ++face) {
     const std::int32_t winding = face->info().winding;
@@ -205,7 +206,7 @@ bool PolygonCdt::State::emit(std::vector<Triangle>& out) const {
 PolygonCdt::PolygonCdt() : state_(std::make_unique<State>()) {}
 PolygonCdt::~PolygonCdt() = default;
 
-bool PolygonCdt::triangulate(std::span<const Point> corners, int axis, std::vector<Triangle>& out) {
+bool PolygonCdt::triangulate(std::span<const Point> corners, int axis, std::vector<TriangleIndices>& out) {
   State& s = *state_;
   s.begin(corners, axis);
   s.group_corners();

@@ -28,7 +28,7 @@ class PolygonCdt {
   ///
   /// corners: at least 3, finite, no two consecutive ones at the same place
   /// axis: 0, 1 or 2, the coordinate that the projection leaves out
-  bool triangulate(std::span<const Point> corners, int axis, std::vector<Triangle>& out);
+  bool triangulate(std::span<const Point> corners, int axis, std::vector<TriangleIndices>& out);
 
  private:
   struct State;

@@ -59,8 +59,8 @@ Box bounding_box(const TriangleMesh& mesh) {
 ///   below those of v, and v - o is inexact only if |v - o| >= 2^53 q, when no float64 could hold it. If q >
 ///   G, v - o is a multiple of G, and |v - o| <= H (1 + 1/32) < 33 G is far below 2^53 G: exact.
 /// An H of a few last bits of c makes G meaningless (c / G infinite or too large to round): then o = c and
-/// Sterbenz holds. No overflow: with h the half extent here, |v - o| <= h + G/2 <= (FLT_MAX - |c|) + H/32 <
-/// FLT_MAX because |c| > H.
+/// Sterbenz holds. No overflow: with h the half extent here, |v - o| <= h + G/2 <= (kMaxCoordinate - |c|) +
+/// H/32 < kMaxCoordinate because |c| > H.
 double axis_origin(double centre, double longest) {
   if (std::abs(centre) <= longest) return 0;
   const double grid = longest > 0 ? std::scalbn(1.0, std::ilogb(longest) - 4) : 0;
@@ -106,7 +106,7 @@ std::uint64_t count_flat(const StoredMesh& mesh) {
   using Range = tbb::blocked_range<std::size_t>;
   const auto count = [&](const Range& range, std::uint64_t flat) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      const Triangle& t = mesh.triangles[i];
+      const TriangleIndices& t = mesh.triangles[i];
       flat += collinear(widened(mesh.points[t[0]]), widened(mesh.points[t[1]]), widened(mesh.points[t[2]]));
     }
     return flat;

@@ -12,7 +12,7 @@ namespace tandem::build {
 struct StoredMesh {
   Point origin{};                            ///< float64; zero when every coordinate is a float32 number
   std::vector<std::array<float, 3>> points;  ///< relative to origin, finite
-  std::vector<Triangle> triangles;
+  std::vector<TriangleIndices> triangles;
   std::vector<std::uint32_t> face;    ///< source face of each triangle
   double largest_rounding_error = 0;  ///< of any coordinate: |origin + point - vertex|, in the file's unit
 };

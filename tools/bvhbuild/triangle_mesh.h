@@ -7,13 +7,14 @@
 
 namespace tandem::build {
 
-using Triangle = std::array<std::uint32_t, 3>;  ///< vertex indices, in the order that the face goes round
+using TriangleIndices =
+    std::array<std::uint32_t, 3>;  ///< vertex indices, in the order that the face goes round
 
 /// The triangles of a file with its float64 coordinates. Every index is below points.size(), every coordinate
-/// that a triangle uses is finite and at most FLT_MAX in magnitude.
+/// that a triangle uses is finite and at most kMaxCoordinate in magnitude.
 struct TriangleMesh {
   std::vector<Point> points;
-  std::vector<Triangle> triangles;
+  std::vector<TriangleIndices> triangles;
   std::vector<std::uint32_t> face;  ///< of each triangle: the face of the file that it is a piece of
 };
 

@@ -1,13 +1,13 @@
 #include "triangulate.h"
 
 #include <algorithm>
-#include <cfloat>
 #include <cmath>
 #include <optional>
 #include <span>
 
 #include "exact_predicates.h"
 #include "polygon_cdt.h"
+#include "tandem/formats/box.h"
 
 namespace tandem::build {
 namespace {
@@ -88,7 +88,7 @@ class Triangulator {
     gather(corners);
     if (points_.size() < 3) return emit(face, {corners[0], corners[0], corners[0]});
     split();
-    for (const Triangle& t : pieces_) emit(face, {vertices_[t[0]], vertices_[t[1]], vertices_[t[2]]});
+    for (const TriangleIndices& t : pieces_) emit(face, {vertices_[t[0]], vertices_[t[1]], vertices_[t[2]]});
   }
 
  private:
@@ -100,7 +100,7 @@ class Triangulator {
     for (const std::uint32_t corner : corners)
       for (const double x : mesh_.points[corner]) {
         finite &= std::isfinite(x);
-        small &= std::abs(x) <= double{FLT_MAX};
+        small &= std::abs(x) <= double{kMaxCoordinate};
       }
     if (!finite) return drop(report_.faces_not_finite);
     return small || drop(report_.faces_too_large);
@@ -111,7 +111,7 @@ class Triangulator {
     return false;
   }
 
-  void emit(std::uint32_t face, const Triangle& triangle) {
+  void emit(std::uint32_t face, const TriangleIndices& triangle) {
     out_.triangles.push_back(triangle);
     out_.face.push_back(face);
   }
@@ -167,7 +167,7 @@ class Triangulator {
   PolygonCdt cdt_;
   std::vector<Point> points_;            ///< corners of the face at hand
   std::vector<std::uint32_t> vertices_;  ///< their indices
-  std::vector<Triangle> pieces_;         ///< of the face at hand, by corner
+  std::vector<TriangleIndices> pieces_;  ///< of the face at hand, by corner
 };
 
 std::uint64_t count_unreferenced(const PolygonMesh& mesh) {

@@ -11,7 +11,8 @@ namespace tandem::build {
 /// `report`.
 ///
 /// Result: the triangles in the order of the faces. Faces with an index out of range, a coordinate that is
-/// not finite or one beyond +-FLT_MAX are left out, each counted once, under the first of these that holds.
+/// not finite or one beyond +-kMaxCoordinate are left out, each counted once, under the first of these that
+/// holds.
 ///
 /// Triangles stay as they are. A corner at the same place as the one before it is skipped in larger faces. A
 /// quad is cut along the diagonal that lies inside, the shorter one if both do. A larger face is projected

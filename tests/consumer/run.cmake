@@ -1,0 +1,41 @@
+# Installs the libraries with every package of the tools out of reach, builds the consumer against the installation and
+# runs it on a file that bvhbuild writes. Variables: SOURCE, FOLDER (to work in), COMPILER, BVHBUILD.
+cmake_minimum_required(VERSION 3.25)
+
+function(run)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE code OUTPUT_VARIABLE output ERROR_VARIABLE output)
+  if(NOT code EQUAL 0)
+    message(FATAL_ERROR "${ARGN}: ${code}\n${output}")
+  endif()
+  set(output "${output}" PARENT_SCOPE)
+endfunction()
+
+file(READ ${SOURCE}/tests/consumer/main.cpp program)
+file(READ ${SOURCE}/README.md readme)
+string(FIND "${readme}" "```cpp\n${program}```" place)
+if(place EQUAL -1)
+  message(FATAL_ERROR "README.md does not show tests/consumer/main.cpp as it is")
+endif()
+
+file(REMOVE_RECURSE ${FOLDER})
+foreach(package assimp CGAL CLI11 CUDAToolkit GTest HDF5 nlohmann_json TBB Threads)
+  list(APPEND no_packages -DCMAKE_DISABLE_FIND_PACKAGE_${package}=ON)
+endforeach()
+run(${CMAKE_COMMAND} -S ${SOURCE} -B ${FOLDER}/build -DCMAKE_CXX_COMPILER=${COMPILER} ${no_packages}
+  -DTANDEM_TOOLS=OFF -DTANDEM_TESTS=OFF -DTANDEM_CUDA=OFF -DTANDEM_WARNINGS_AS_ERRORS=ON)
+run(${CMAKE_COMMAND} --build ${FOLDER}/build)
+run(${CMAKE_COMMAND} --install ${FOLDER}/build --prefix ${FOLDER}/prefix)
+
+run(${CMAKE_COMMAND} -S ${SOURCE}/tests/consumer -B ${FOLDER}/consumer -DCMAKE_CXX_COMPILER=${COMPILER} ${no_packages}
+  -DCMAKE_PREFIX_PATH=${FOLDER}/prefix)
+run(${CMAKE_COMMAND} --build ${FOLDER}/consumer)
+
+run(${BVHBUILD} ${SOURCE}/assets/box_12.obj -o ${FOLDER}/box.bvh --quiet)
+run(${FOLDER}/consumer/consumer ${FOLDER}/box.bvh)
+if(NOT output STREQUAL "12 triangles in 4 blocks\n")
+  message(FATAL_ERROR "the consumer says: ${output}")
+endif()
+execute_process(COMMAND ${FOLDER}/consumer/consumer ${SOURCE}/README.md RESULT_VARIABLE code OUTPUT_VARIABLE output)
+if(NOT code EQUAL 1 OR NOT output STREQUAL "${SOURCE}/README.md: not a Tandem .bvh file\n")
+  message(FATAL_ERROR "the consumer says of a file that is no tree: ${code}, ${output}")
+endif()

@@ -1,11 +1,14 @@
 // The checker must tell sound files from all others without reading a byte outside of them, and what it calls
 // sound must hold what its documentation promises.
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <new>
+#include <random>
+#include <string_view>
 #include <vector>
 
 #include "tandem/formats/check.h"
@@ -111,7 +114,29 @@ void examine(const CheckResult& result) {
   read_text(asset.provenance);
 }
 
+// Copies a node, child, kind and box, over another one of the same 128 bytes or of any others: the changes
+// that make two parents of one block, or leaves beside internal nodes, and keep the rest sound.
+void copy_node(std::uint8_t* data, std::size_t size, std::minstd_rand& random) {
+  constexpr std::size_t kLane = sizeof(float), kRow = kLane * kNodesPerBlock;
+  const std::size_t blocks = size / sizeof(Block);
+  const std::size_t to = random() % blocks * sizeof(Block) + random() % kNodesPerBlock * kLane;
+  const std::size_t from_block = random() % 2 == 0 ? to / sizeof(Block) : random() % blocks;
+  const std::size_t from = from_block * sizeof(Block) + random() % kNodesPerBlock * kLane;
+  for (std::size_t row = 0; row < sizeof(Block); row += kRow)
+    std::memmove(data + to + row, data + from + row, kLane);
+}
+
 }  // namespace
+
+extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t max_size);
+
+extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t max_size,
+                                               unsigned seed) {
+  std::minstd_rand random(seed);
+  if (random() % 4 != 0 || size < sizeof(Block)) return LLVMFuzzerMutate(data, size, max_size);
+  copy_node(data, size, random);
+  return size;
+}
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   Bytes bytes(data, size);

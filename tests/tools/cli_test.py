@@ -404,6 +404,12 @@ class Info(ToolTest):
                      "block pairs", "bounds", "origin", "sections", "provenance"):
             self.assertIn(word, page.stdout.decode())
 
+    def test_the_page_sends_no_control_characters_of_a_file_to_a_terminal(self):
+        page = self.info(self.built("red\x1b[31m\x07.obj", "o part\x1b[2J\n" + CUBE_OBJ)).stdout
+        self.assertIn(b"red?[31m?.obj", page)
+        self.assertNotIn(b"\x1b", page)
+        self.assertNotIn(b"\x07", page)
+
     def test_json_of_one_file_is_an_object_with_all_keys(self):
         info = self.json_of(self.built("cube.obj", CUBE_OBJ))
         self.assertEqual(set(info), self.KEYS)

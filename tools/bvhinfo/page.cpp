@@ -26,11 +26,19 @@ std::string point(const double* p) {
   return format("(%.12g, %.12g, %.12g)", p[0], p[1], p[2]);
 }
 
+// Text that a file brings along, fit for a terminal.
+std::string harmless(std::string text) {
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) c = '?';
+  }
+  return text;
+}
+
 // The string under a key, without throwing at what some other tool may have put there.
 std::string text_of(const Json& json, const char* key) {
   const auto found = json.is_object() ? json.find(key) : json.end();
   if (!json.is_object() || found == json.end()) return "?";
-  return found->is_string() ? found->get<std::string>() : found->dump();
+  return harmless(found->is_string() ? found->get<std::string>() : found->dump());
 }
 
 std::string source_lines(const Inspection& inspection) {
@@ -49,7 +57,8 @@ std::string part_lines(const AssetView& view) {
   std::string text = format("  parts        %zu\n", view.parts.size());
   for (std::size_t i = 0; i < std::min(view.parts.size(), kPartsShown); ++i) {
     const Part& part = view.parts[i];
-    const std::string path(view.path_of(part)), name(view.name_of(part));
+    const std::string path = harmless(std::string(view.path_of(part)));
+    const std::string name = harmless(std::string(view.name_of(part)));
     text += "               " + (path.empty() ? "" : path + " : ") + (name.empty() ? "(no name)" : name) +
             format("  faces %s to %s\n", with_commas(part.first_face).c_str(),
                    with_commas(part.first_face + std::max<std::uint64_t>(part.face_count, 1) - 1).c_str());

@@ -145,7 +145,7 @@ TEST(Tree, TakesTheLargestTheSmallestAndTheFarthestCoordinates) {
 }
 
 TEST(Tree, BytesAreTheSameForOneThreadAndForMany) {
-  const Mesh mesh = test::random_mesh(3 * kSweepSize, 3);  // binned and swept
+  const Mesh mesh = test::random_mesh(50 * kSweepSize, 3);  // binned and swept
   for (const Imaginary imaginary : {Imaginary::minimal, Imaginary::free}) {
     std::vector<Image> files;
     for (const std::size_t threads : {1, 2, 8}) {

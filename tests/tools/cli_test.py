@@ -12,7 +12,7 @@ import subprocess
 import time
 import unittest
 
-from tool_test import (BVHBUILD, BVHINFO, CUBE_OBJ, DONE, NO_TRIANGLE, TRIANGLE_OBJ, UNREADABLE_INPUT, UNWRITABLE_OUTPUT,
+from tool_test import (BVHBUILD, BVHINFO, COLLADA_TRIANGLE, CUBE_OBJ, DONE, NO_TRIANGLE, TRIANGLE_OBJ, UNREADABLE_INPUT, UNWRITABLE_OUTPUT,
                        USAGE, ToolTest, grid_ply, scattered_obj)
 
 # assimp reads this for ever.
@@ -323,6 +323,17 @@ class Streams(ToolTest):
         with open("/dev/full", "wb") as full:
             for arguments in ([out], [out, "--json"], [out, "--verify"]):
                 self.assertEqual(self.info(*arguments, stdout=full).returncode, UNWRITABLE_OUTPUT)
+            for arguments in ([], ["--json"]):
+                result = self.build(self.inputs / "a.obj", "-o", out, *arguments, stdout=full)
+                self.assertEqual(result.returncode, UNWRITABLE_OUTPUT)
+            self.assertEqual(self.build(self.inputs / "a.obj", "-o", out, "--quiet", stdout=full).returncode, DONE)
+
+    def test_closed_standard_streams_do_no_harm(self):
+        mesh = self.write("a.dae", COLLADA_TRIANGLE)  # read by assimp, through a pipe
+        closed = 'exec "$@" <&- >&- 2>&-'
+        result = self.run_tool("sh", "-c", closed, "sh", BVHBUILD, mesh, "-o", self.out)
+        self.assertEqual(result.returncode, DONE)
+        self.assertEqual(self.info(self.out, "--verify").returncode, DONE)
 
 
 class BuildJson(ToolTest):

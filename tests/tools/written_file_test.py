@@ -10,7 +10,8 @@ import unittest
 import bvh_file
 import numpy as np
 
-from tool_test import CUBE_OBJ, DONE, SOURCE_DIR, TRIANGLE_OBJ, ToolTest, grid_ply, scattered_obj
+from tool_test import (COLLADA_TRIANGLE, CUBE_OBJ, DONE, SOURCE_DIR, TRIANGLE_OBJ, ToolTest, grid_ply,
+                       scattered_obj)
 
 
 def corner_sets(file):
@@ -202,6 +203,12 @@ class Scenes(ToolTest):
         file = bvh_file.read(self.built("a.gltf", self.gltf(nodes, [0])))
         np.testing.assert_allclose(sorted(file.world[0].tolist()), sorted([[9, 2, 0], [7, 0, 0], [9, 0, 2]]), atol=1e-5)
         self.assertIn("outer/inner", file.parts[0][1])
+
+    def test_units_axes_and_nodes_of_a_collada_file_are_applied(self):
+        file = bvh_file.read(self.built("a.dae", COLLADA_TRIANGLE))
+        y_up = [[1, 0, 0], [1.1, 0, 0], [1, 0, -0.1]]  # assimp turns z up into y up
+        np.testing.assert_allclose(sorted(file.world[0].tolist()), sorted(y_up), atol=1e-6)
+        self.assertIn("n", file.parts[0][1])  # assimp names the node by its id
 
     def test_an_instanced_mesh_is_one_part_for_each_node(self):
         nodes = [{"name": "left", "mesh": 0, "translation": [-5, 0, 0]},

@@ -28,7 +28,7 @@ struct Split {
 inline constexpr std::uint32_t kSerialSize = 8192;
 
 /// Groups up to this size are swept, larger ones binned (docs/decisions.md has the measurement).
-inline constexpr std::uint32_t kSweepSize = 1 << 16;
+inline constexpr std::uint32_t kSweepSize = 1 << 12;
 
 /// A trace of a penalty for uneven splits. It decides where costs are equal, as among coincident triangles,
 /// which would otherwise be peeled off one by one.

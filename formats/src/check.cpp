@@ -205,8 +205,7 @@ CheckResult check(const void* data_pointer, std::size_t bytes) {
 
 void seal(void* data, std::size_t bytes) {
   auto* header = static_cast<FileHeader*>(data);
-  header->hash =
-      xxh64(static_cast<const unsigned char*>(data) + kHashedFrom, bytes - kHashedFrom);
+  header->hash = xxh64(static_cast<const unsigned char*>(data) + kHashedFrom, bytes - kHashedFrom);
 }
 
 }  // namespace tandem

@@ -1,5 +1,5 @@
-#include <cstdio>
 #include <tandem/runtime/map.h>
+#include <cstdio>
 
 int main(int, char** argv) {
   tandem::MappedAsset cow;

@@ -26,7 +26,8 @@ Outcome run(const Options& options) {
   return outcome;
 }
 
-// A file opened while a standard descriptor is closed would take its number, and messages would be written into it.
+// A file opened while a standard descriptor is closed would take its number, and messages would be written
+// into it.
 void occupy_standard_descriptors() {
   int descriptor = 0;
   do {

@@ -34,8 +34,8 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kSectionMissing,
     kSectionDuplicated,
     kBadGap,    ///< bytes between sections are not zero or more than alignment asks for
-    kBadLevel,    ///< counts of a level that contradict each other or its sections
-    kBadPart,     ///< a part whose strings or faces lie outside
+    kBadLevel,  ///< counts of a level that contradict each other or its sections
+    kBadPart,   ///< a part whose strings or faces lie outside
     // The tree.
     kBadNodeKind,
     kImaginaryBeforeReal,  ///< imaginary nodes come last in a block
@@ -66,7 +66,8 @@ const char* name(Status status);
 /// One sentence for people, without a full stop: "a block has two parents".
 const char* explain(Status status);
 
-/// What the number that comes with a defect counts: "section", "level", "part", "block", "byte"; null where there is no number.
+/// What the number that comes with a defect counts: "section", "level", "part", "block", "byte"; null where
+/// there is no number.
 const char* subject(Status status);
 
 }  // namespace tandem

@@ -1,8 +1,10 @@
 #include <array>
+#include <bit>
 #include <cmath>
 
 #include "statistics.h"
 #include "tandem/kernels/box_test.h"
+#include "tandem/kernels/traversal.h"
 
 namespace tandem {
 namespace {
@@ -46,60 +48,25 @@ struct Work {
   std::uint64_t block_pairs = 0, candidates = 0;
 };
 
-// Plain depth-first tandem traversal of a tree against itself, posed. A leaf block keeps still while the
-// other side descends; `mask` says which of its leaves take part, so that no pair is met twice (the paper's
-// figures 3 and 4).
-class TandemWalk {
- public:
-  TandemWalk(const Block* blocks, const RelativePose& b_in_a, bool stop_at_first)
-      : blocks_(blocks), b_in_a_(b_in_a), stop_at_first_(stop_at_first) {}
-
-  Work run() {
-    visit(0, 0, kAll, kAll);
-    return work_;
-  }
-
- private:
-  static constexpr unsigned kAll = 15;
-
-  void visit(std::uint32_t a, std::uint32_t b, unsigned mask_a, unsigned mask_b) {
-    if (stop_at_first_ && work_.candidates > 0) return;
-    ++work_.block_pairs;
-    const Block &block_a = blocks_[a], &block_b = blocks_[b];
-    unsigned hits[kNodesPerBlock] = {};  // of each node of a: the nodes of b that it overlaps
+// The traversal that queries make, of a tree against itself, posed.
+Work query(const LevelView& tree, const RelativePose& b_in_a, bool stop_at_first) {
+  const auto test = [&](const Block& a, const Block& b) {
+    std::uint32_t mask = 0;
     for (int i = 0; i < kNodesPerBlock; ++i) {
       for (int j = 0; j < kNodesPerBlock; ++j) {
-        const bool in_mask = (mask_a >> i & mask_b >> j & 1) != 0;
-        if (in_mask && overlap_15_axes(box_of(block_a, i), box_of(block_b, j), b_in_a_)) hits[i] |= 1u << j;
+        const bool overlap = overlap_15_axes(box_of(a, i), box_of(b, j), b_in_a);
+        mask |= static_cast<std::uint32_t>(overlap) << (4 * i + j);
       }
     }
-    descend(a, b, hits);
-  }
-
-  void descend(std::uint32_t a, std::uint32_t b, const unsigned* hits) {
-    const Block &block_a = blocks_[a], &block_b = blocks_[b];
-    const bool leaves_a = block_a.is_leaf_block(), leaves_b = block_b.is_leaf_block();
-    for (int i = 0; i < kNodesPerBlock; ++i) {
-      if (!leaves_a && leaves_b && hits[i] != 0) visit(block_a.index[i], b, kAll, hits[i]);
-      for (int j = 0; j < kNodesPerBlock; ++j) {
-        if ((hits[i] >> j & 1) == 0) continue;
-        if (leaves_a && leaves_b) ++work_.candidates;
-        if (!leaves_a && !leaves_b) visit(block_a.index[i], block_b.index[j], kAll, kAll);
-      }
-    }
-    if (!leaves_a || leaves_b) return;
-    for (int j = 0; j < kNodesPerBlock; ++j) {
-      unsigned mask_a = 0;
-      for (int i = 0; i < kNodesPerBlock; ++i) mask_a |= (hits[i] >> j & 1) << i;
-      if (mask_a != 0) visit(a, block_b.index[j], mask_a, kAll);
-    }
-  }
-
-  const Block* blocks_;
-  RelativePose b_in_a_;
-  bool stop_at_first_;
-  Work work_;
-};
+    return mask;
+  };
+  Work work;
+  work.block_pairs = traverse(tree, tree, test, [&](std::uint32_t, std::uint32_t, std::uint32_t mask) {
+    work.candidates += static_cast<std::uint64_t>(std::popcount(mask));
+    return !stop_at_first;
+  });
+  return work;
+}
 
 // Turns about the centre of the bounds, then moves by `distance` along `direction`.
 RelativePose make_pose(const Matrix& rotation, const Vector& direction, double distance,
@@ -133,7 +100,7 @@ ExpectedWork sample_near_contact(const LevelView& level, const float* lower, con
     const Matrix rotation = random_rotation(random);
     const Vector direction = random_direction(random);
     const auto work_at = [&](double distance, bool stop_at_first) {
-      return TandemWalk(level.blocks, make_pose(rotation, direction, distance, center), stop_at_first).run();
+      return query(level, make_pose(rotation, direction, distance, center), stop_at_first);
     };
     double touching = 0, apart = 2.1 * radius;
     for (int step = 0; step < 20; ++step) {

@@ -73,6 +73,7 @@ constexpr Entry kEntries[] = {
     {Status::kBadFace, "BadFace", "block", "a triangle names a source face or part that does not exist"},
     {Status::kBoundsMismatch, "BoundsMismatch", nullptr,
      "the header's bounds are not those of the triangles"},
+    {Status::kOutOfRange, "OutOfRange", nullptr, "a coordinate is not finite or too large for a query"},
     {Status::kCudaFailed, "CudaFailed", nullptr, "a CUDA call failed"},
 };
 

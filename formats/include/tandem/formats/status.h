@@ -56,7 +56,9 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kChildOutsideParentBox,
     kBadFace,         ///< source face or part out of range, or a reserved lane set
     kBoundsMismatch,  ///< the header's bounds are not those of the triangles
-    // Uploading.
+    // Querying.
+  kOutOfRange,  ///< a coordinate that is NaN or larger than the query can take
+  // Uploading.
     kCudaFailed,
 };
 

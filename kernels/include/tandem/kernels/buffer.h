@@ -1,0 +1,70 @@
+#pragma once
+#include <cstddef>
+#include <cstdlib>
+#include <span>
+#include <type_traits>
+#include <utility>
+
+namespace tandem {
+
+/// Memory that grows and is kept: a vector for code that must not throw. Elements are plain data and start
+/// uninitialised. Aligned to 128 bytes. Movable, not copyable.
+template <typename Value>
+class Buffer {
+  static_assert(std::is_trivially_copyable_v<Value>);
+
+ public:
+  Buffer() = default;
+  Buffer(Buffer&& other) noexcept { *this = std::move(other); }
+  Buffer& operator=(Buffer&& other) noexcept {
+    std::swap(data_, other.data_);
+    std::swap(size_, other.size_);
+    std::swap(capacity_, other.capacity_);
+    return *this;
+  }
+  ~Buffer() { std::free(data_); }
+
+  /// Makes room for `size` elements and forgets what was in it, unless there was room. False: out of memory,
+  /// nothing changed.
+  [[nodiscard]] bool resize(std::size_t size) {
+    if (size > capacity_ && !reallocate(size, 0)) return false;
+    size_ = size;
+    return true;
+  }
+
+  /// Adds an element; grows by half. False: out of memory, nothing changed.
+  [[nodiscard]] bool push(const Value& value) {
+    if (size_ == capacity_ && !reallocate(capacity_ + capacity_ / 2 + 64, size_)) return false;
+    data_[size_++] = value;
+    return true;
+  }
+
+  void clear() { size_ = 0; }
+  Value* data() { return data_; }
+  const Value* data() const { return data_; }
+  std::size_t size() const { return size_; }
+  std::size_t capacity() const { return capacity_; }
+  Value& operator[](std::size_t i) { return data_[i]; }
+  const Value& operator[](std::size_t i) const { return data_[i]; }
+  std::span<const Value> view() const { return {data_, size_}; }
+
+ private:
+  static constexpr std::size_t kAlignment = 128;
+
+  bool reallocate(std::size_t capacity, std::size_t kept) {
+    if (capacity > static_cast<std::size_t>(-1) / 2 / sizeof(Value)) return false;
+    const std::size_t bytes = (capacity * sizeof(Value) + kAlignment - 1) / kAlignment * kAlignment;
+    auto* data = static_cast<Value*>(std::aligned_alloc(kAlignment, bytes));
+    if (data == nullptr) return false;
+    for (std::size_t i = 0; i < kept; ++i) data[i] = data_[i];
+    std::free(data_);
+    data_ = data;
+    capacity_ = capacity;
+    return true;
+  }
+
+  Value* data_ = nullptr;
+  std::size_t size_ = 0, capacity_ = 0;
+};
+
+}  // namespace tandem

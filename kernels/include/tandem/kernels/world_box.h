@@ -1,0 +1,42 @@
+#pragma once
+#include "tandem/kernels/pose.h"
+
+namespace tandem {
+
+/// An axis-aligned box in world coordinates, float64, ends included.
+struct WorldBox {
+  double lo[3], hi[3];
+};
+
+/// The box around an instance: contains every posed vertex of an asset with these bounds (stored
+/// coordinates), and so every posed triangle.
+///
+/// Without any slack, because rounding is monotone. apply() computes fl(fl(fl(fl(r0 x) + fl(r1 y)) + fl(r2
+/// z)) + t). Each product is at least the smaller and at most the larger of its values at the two ends of x,
+/// y or z; each rounded sum of smaller terms is not larger. So the same formula over the smaller products
+/// gives a float64 number that no posed vertex lies below, and over the larger ones above. pose: of stored
+/// coordinates (for_stored_coordinates).
+TANDEM_HD inline WorldBox world_box(const Pose& pose, const float* lower, const float* upper) {
+  WorldBox box;
+  for (int i = 0; i < 3; ++i) {
+    double least[3], most[3];
+    for (int j = 0; j < 3; ++j) {
+      const double a = detail::times(pose.rotation[i][j], lower[j]),
+                   b = detail::times(pose.rotation[i][j], upper[j]);
+      least[j] = a < b ? a : b;
+      most[j] = a < b ? b : a;
+    }
+    box.lo[i] = detail::plus(detail::plus(detail::plus(least[0], least[1]), least[2]), pose.translation[i]);
+    box.hi[i] = detail::plus(detail::plus(detail::plus(most[0], most[1]), most[2]), pose.translation[i]);
+  }
+  return box;
+}
+
+/// Whether two world boxes meet, touching included.
+TANDEM_HD inline bool overlap(const WorldBox& a, const WorldBox& b) {
+  bool overlap = true;
+  for (int k = 0; k < 3; ++k) overlap = overlap && a.lo[k] <= b.hi[k] && b.lo[k] <= a.hi[k];
+  return overlap;
+}
+
+}  // namespace tandem

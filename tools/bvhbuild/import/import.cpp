@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "import/assimp_child.h"
+#include "import/gltf_child.h"
+#include "import/gltf_support.h"
 #include "import/input_file.h"
 #include "import/read_obj.h"
 #include "import/read_off.h"
@@ -68,6 +70,17 @@ ReadResult read_with(ReadBytes reader, InputFile& file, const ImportOptions& opt
   return problem.empty() ? reader(file.bytes()) : read_failure(problem);
 }
 
+bool is_gltf(const std::string& extension, std::string_view head) {
+  return extension == ".gltf" || extension == ".glb" || head.starts_with("glTF");
+}
+
+ReadResult read_gltf_file(const std::filesystem::path& path, const ImportOptions& options) {
+  ReadResult result = read_in_gltf_child(path, options);
+  const bool may_ask_assimp = !result.ok && options.reader == Reader::automatic;
+  return may_ask_assimp && is_for_another_gltf_reader(result.error) ? read_in_assimp_child(path, options)
+                                                                    : result;
+}
+
 ReadResult read(const std::filesystem::path& path, const ImportOptions& options) {
   InputFile file;
   const std::string problem = file.open(path);
@@ -79,8 +92,9 @@ ReadResult read(const std::filesystem::path& path, const ImportOptions& options)
   const ReadBytes reader = own_reader(extension, head);
   if (options.reader == Reader::assimp) return read_in_assimp_child(path, options);
   if (reader != nullptr) return read_with(reader, file, options);
+  if (is_gltf(extension, head)) return read_gltf_file(path, options);
   if (options.reader == Reader::automatic) return read_in_assimp_child(path, options);
-  return read_failure("Tandem's own readers know OBJ, PLY, STL and OFF files only");
+  return read_failure("Tandem's own readers know OBJ, PLY, STL, OFF and glTF files only");
 }
 
 }  // namespace

@@ -1,0 +1,274 @@
+// What a glTF file is made of: JSON, containers, buffers; first in this process, where sanitizers see the
+// reader, then through import_mesh() and its child process.
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gltf_file.h"
+#include "import/import.h"
+
+namespace tandem::build {
+namespace {
+
+TEST_F(GltfFile, NamesMembersOfTheWrongType) {
+  Gltf file = square({0, 1, 2});
+  for (const auto& [nodes, words] :
+       {std::pair{R"({}, {"mesh": "0"})", "nodes[1].mesh is not an unsigned integer"},
+        {R"({"mesh": 4294967296})", "nodes[0].mesh is not an unsigned integer below 2147483648"},
+        {R"({"mesh": -1})", "nodes[0].mesh is not"},
+        {R"({"mesh": 0.0})", "nodes[0].mesh is not"},
+        {R"({"mesh": 0, "children": 1})", "nodes[0].children is not an array"},
+        {R"({"mesh": 0, "children": [1, [2]]})", "nodes[0].children[1] is not"},
+        {"5", "nodes[0] is not an object"}}) {
+    file.nodes = nodes;
+    expect_error(file, words);
+  }
+  file = square({0, 1, 2});
+  file.nodes = R"({"name": null, "mesh": 0, "rotation": null, "extras": {"mesh": "x", "nodes[].mesh": "y"}})";
+  EXPECT_EQ(mesh(file).face_count(), 1u);
+}
+
+TEST_F(GltfFile, RefusesWhatIsNoGltf) {
+  for (const auto& [text, words] :
+       {std::pair{"hello", "its JSON cannot be read: parse error at line 1, column 1"},
+        {"[]", "its JSON is not an object"},
+        {"{}", "is no glTF: its JSON names no asset.version"},
+        {R"({"asset": {"version": 2}})", "asset.version is not a text"},
+        {R"({"asset": {"version": "3.0"}})", "is glTF '3.0'; Tandem reads glTF 2"},
+        {R"({"asset": {"version": "1.0"}})", "is glTF 1"},
+        {"{\"asset\": {\"version\": \"2.0\", \"x\": \"\xFF\"}}", "its JSON cannot be read"}}) {
+    const ReadResult result = read(text);
+    EXPECT_FALSE(result.ok);
+    EXPECT_NE(result.error.find(words), std::string::npos) << result.error;
+  }
+  EXPECT_EQ(read_gltf(folder_ / "absent.gltf", kMostBytes).error, "no such file");
+}
+
+TEST_F(GltfFile, RefusesJsonNestedWithoutEnd) {
+  Gltf file = square({0, 1, 2});
+  file.more = R"("extras": )" + std::string(100000, '[') + std::string(100000, ']');
+  EXPECT_EQ(error(file), "its JSON is nested more than 500 deep");
+}
+
+TEST_F(GltfFile, OpensNoImages) {
+  Gltf file = square({0, 1, 2});
+  file.more = R"("images": [{"uri": "absent.png"}, {"uri": "data:image/png;base64,AAAA"},
+                            {"bufferView": 0, "mimeType": "image/jpeg"}], "textures": [{"source": 0}])";
+  EXPECT_EQ(mesh(file).face_count(), 1u);
+}
+
+TEST_F(GltfFile, NamesRequiredExtensionsThatHideTriangles) {
+  Gltf file = square({0, 1, 2});
+  const std::string scene = file.more;
+  for (const char* name :
+       {"KHR_draco_mesh_compression", "EXT_meshopt_compression", "EXT_mesh_gpu_instancing"}) {
+    file.more = scene + R"(, "extensionsRequired": [")" + name + "\"]";
+    expect_error(file, name);
+  }
+  file.more = scene + R"(, "extensionsRequired": ["KHR_mesh_quantization", "KHR_materials_unlit", "FB_odd"])";
+  EXPECT_EQ(joined(mesh(file).remarks), "requires the extension 'FB_odd', which is passed over\n");
+}
+
+TEST_F(GltfFile, NamesDracoWhereOnlyItHoldsTheTriangles) {
+  Gltf file = square({0, 1, 2});
+  file.more += R"(, "extensionsUsed": ["KHR_draco_mesh_compression"])";
+  file.meshes = R"({"primitives": [{"attributes": {"POSITION": 0}, "indices": 1,
+      "extensions": {"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {"POSITION": 0}}}}]})";
+  EXPECT_EQ(mesh(file).face_count(), 1u);  // the plain accessors are there too
+  file.accessors = R"({"componentType": 5126, "count": 4, "type": "VEC3"},
+                      {"componentType": 5123, "count": 3, "type": "SCALAR"})";
+  expect_error(file, "KHR_draco_mesh_compression");
+}
+
+TEST_F(GltfFile, ReadsBuffersBesideIt) {
+  Gltf file = square({0, 1, 2});
+  const std::string bytes = kSquare + bytes_of<std::uint16_t>({0, 1, 2});
+  write("a b+c.bin", bytes + "more than the buffer has");
+  file.buffers = R"({"byteLength": 54, "uri": "a%20b+c.bin"})";
+  EXPECT_EQ(mesh(file).face_count(), 1u);
+  fs::create_directory(folder_ / "sub");
+  write("sub/d.bin", bytes);
+  file.buffers = R"({"byteLength": 54, "uri": "sub/../sub/d.bin"})";
+  EXPECT_EQ(mesh(file).face_count(), 1u);
+}
+
+TEST_F(GltfFile, KnowsEachBufferByItsPlace) {
+  // The second buffer lies in a file, between two that do not.
+  Gltf file = square({0, 1, 2});
+  write("b.bin", kSquare);
+  file.buffers = data_buffer(bytes_of<std::uint16_t>({0, 1, 2})) +
+                 R"(, {"byteLength": 48, "uri": "b.bin"}, )" + data_buffer("other");
+  file.views = R"({"buffer": 1, "byteLength": 48}, {"buffer": 0, "byteLength": 6})";
+  expect_points(mesh(file), {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}});
+}
+
+TEST_F(GltfFile, NamesBuffersThatAreNotThere) {
+  Gltf file = square({0, 1, 2});
+  file.buffers = R"({"byteLength": 54, "uri": "wheel.bin", "name": "wheel"})";
+  EXPECT_EQ(error(file), "buffers[0] 'wheel': 'wheel.bin': no such file");
+  write("wheel.bin", "short");
+  EXPECT_EQ(error(file), "buffers[0] 'wheel': 'wheel.bin': holds 5 bytes, 54 are needed");
+  ASSERT_EQ(mkfifo((folder_ / "pipe.bin").c_str(), 0600), 0);
+  file.buffers = R"({"byteLength": 54, "uri": "pipe.bin"})";
+  EXPECT_EQ(error(file), "buffers[0]: 'pipe.bin': is not a regular file");
+  file.buffers = R"({"byteLength": 54, "uri": "https://example.org/wheel.bin"})";
+  expect_error(file, "is not a file beside the glTF");
+  file.buffers = R"({"byteLength": 54, "uri": "data:text/html;base64,AAAA"})";
+  expect_error(file, "is not the kind of data that a buffer has");
+  file.buffers = R"({"byteLength": 54})";
+  EXPECT_EQ(error(file), "buffers[0] has no uri, so its bytes are nowhere");
+  file.buffers = R"({"byteLength": 54, "uri": "data:application/octet-stream;base64,AAA*AAAA"})";
+  EXPECT_EQ(error(file), "buffers[0]: its data URI holds 2 bytes, its byteLength says 54");
+  file.buffers = R"({"uri": "wheel.bin"})";
+  EXPECT_EQ(error(file), "buffers[0] has no byteLength");
+}
+
+std::string square_glb() {
+  Gltf file = square({0, 1, 2, 2, 1, 3});
+  file.buffers = R"({"byteLength": 60})";
+  return glb(file.json(), kSquare + bytes_of<std::uint16_t>({0, 1, 2, 2, 1, 3}));
+}
+
+TEST_F(GltfFile, ReadsBinaryContainers) {
+  const ReadResult result = read(square_glb());
+  ASSERT_TRUE(result.ok) << result.error;
+  EXPECT_EQ(faces_of(result.mesh), (std::vector<Face>{{0, 1, 2}, {2, 1, 3}}));
+  EXPECT_TRUE(read(glb(square({0, 1, 2}).json(), "")).ok);
+}
+
+TEST_F(GltfFile, RefusesContainersCutAnywhere) {
+  const std::string whole = square_glb();
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    const ReadResult cut = read(whole.substr(0, size));
+    EXPECT_FALSE(cut.ok) << size;
+    EXPECT_FALSE(cut.error.empty()) << size;
+  }
+}
+
+TEST_F(GltfFile, RefusesChunksThatReachOutOfTheFile) {
+  const std::string whole = square_glb();
+  const std::size_t binary = whole.find(std::string("BIN\0", 4)) - 4;
+  for (const std::uint32_t more : {4u, 8u, 4096u, 0xFFFFFF00u}) {
+    std::string longer = whole;
+    std::uint32_t length = 0;
+    std::memcpy(&length, &longer[binary], 4);
+    length += more;
+    std::memcpy(&longer[binary], &length, 4);
+    EXPECT_EQ(read(longer).error, "its binary chunk is cut short") << more;
+  }
+  std::string other = whole;
+  other[4] = 7;
+  EXPECT_EQ(read(other).error, "is glTF '7.0'; Tandem reads glTF 2");
+  Gltf file = square({0, 1, 2});
+  file.buffers = R"({"byteLength": 60})";
+  EXPECT_NE(read(glb(file.json(), kSquare)).error.find("byteLength"), std::string::npos);
+}
+
+TEST_F(GltfFile, IsReadByTinygltfWhateverItsEndingSays) {
+  ImportOptions own;
+  own.reader = Reader::tandem;
+  for (const char* name : {"a.glb", "a.GLTF", "a.mesh"})
+    for (const ImportOptions& options : {ImportOptions{}, own}) {
+      const ImportResult result = import_mesh(write(name, square_glb()), options);
+      ASSERT_TRUE(result.ok) << result.error;
+      EXPECT_EQ(result.mesh.reader.find("tinygltf"), 0u) << result.mesh.reader;
+      EXPECT_EQ(result.mesh.face_count(), 2u);
+    }
+}
+
+TEST_F(GltfFile, GoesToAssimpWhenAskedOrWhenOnlyAssimpMayKnow) {
+  ImportOptions options;
+  options.reader = Reader::assimp;
+  const ImportResult asked = import_mesh(write("a.glb", square_glb()), options);
+  EXPECT_EQ(asked.mesh.reader.find("assimp"), 0u) << asked.error;
+  Gltf file = square({0, 1, 2});
+  file.more += R"(, "extensionsRequired": ["KHR_draco_mesh_compression"])";
+  const fs::path draco = write("draco.gltf", file.json());
+  const ImportResult automatic = import_mesh(draco, {});
+  EXPECT_TRUE(automatic.ok || automatic.error.find("assimp") == 0) << automatic.error;
+  options.reader = Reader::tandem;
+  EXPECT_NE(import_mesh(draco, options).error.find("KHR_draco_mesh_compression"), std::string::npos);
+}
+
+/// Bytes changed, cut out, doubled and put in, at places drawn from a seed.
+std::string mutated(std::string bytes, std::mt19937& random) {
+  const auto below = [&](std::size_t bound) { return random() % std::max<std::size_t>(bound, 1); };
+  for (std::size_t change = 0; change <= below(4); ++change) {
+    const std::size_t at = below(bytes.size()), count = std::min(below(12), bytes.size() - at);
+    switch (below(4)) {
+      case 0:
+        bytes[at] = static_cast<char>(random());
+        break;
+      case 1:
+        bytes.erase(at, count);
+        break;
+      case 2:
+        bytes.insert(at, bytes.substr(at, count));
+        break;
+      default:
+        bytes[at] = "0123456789-[]{},:\"e.\xFF"[below(21)];
+    }
+  }
+  return bytes;
+}
+
+TEST_F(GltfFile, AnswersEveryMutatedFileWithAMeshOrAReason) {
+  Gltf rich = square({0, 1, 2, 3, 2, 1}, "5");
+  rich.nodes = R"({"mesh": 0, "children": [1], "matrix": [1, 0, 0, 0,  0, 1, 0, 0,  0, 0, 1, 0,  0, 0, 0, 1]},
+                  {"mesh": 0, "rotation": [0, 0, 0, 1], "skin": 0, "extras": {"a": [1, {"b": null}]}})";
+  rich.accessors =
+      R"({"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "sparse": {"count": 1,
+      "indices": {"bufferView": 1, "componentType": 5123}, "values": {"bufferView": 0}}},
+      {"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"})";
+  const std::string seeds[] = {square_glb(), rich.json()};
+  std::mt19937 random(20240229);
+  ImportOptions options;
+  options.memory_limit_bytes = std::uint64_t{1} << 28;
+  int meshes = 0;
+  for (int i = 0; i < 400; ++i) {
+    const std::string bytes = mutated(seeds[i % 2], random);
+    const ImportResult result = import_mesh(write("a.gltf", bytes), options);
+    ASSERT_NE(result.ok, !result.error.empty()) << bytes;
+    ASSERT_EQ(result.error.find("crashed"), std::string::npos) << result.error << "\n" << bytes;
+    ASSERT_EQ(result.error.find("without a usable result"), std::string::npos) << bytes;
+    ASSERT_EQ(result.error.find("time limit"), std::string::npos) << bytes;
+    meshes += result.ok ? 1 : 0;
+  }
+  EXPECT_GT(meshes, 10);
+  EXPECT_LT(meshes, 390);
+}
+
+/// Looked for as in shared_meshes_test.cpp.
+fs::path mesh_folder() {
+  if (const char* named = std::getenv("TANDEM_MESHES")) return named;
+  return fs::path(TANDEM_SOURCE_DIR) / ".." / "shared" / "meshes";
+}
+
+TEST(SharedGltf, HoldTheFacesThatTheirAuthorsWrote) {
+  for (const auto& [name, faces] : {std::pair<const char*, std::size_t>{"CesiumMilkTruck.glb", 3624},
+                                    {"CubeHierarchy.gltf", 48},
+                                    {"spheres_scaled_instances.gltf", 672},
+                                    {"scallop.glb", 120000},
+                                    {"IndexOutOfRange.gltf", 12},
+                                    {"Mesh_PrimitiveMode_00.gltf", 0}}) {
+    const fs::path path = mesh_folder() / name;
+    if (!fs::exists(path)) GTEST_SKIP() << path << " is not here (set TANDEM_MESHES)";
+    const ReadResult result = read_gltf(path, std::uint64_t{1} << 30);
+    ASSERT_TRUE(result.ok) << name << ": " << result.error;
+    EXPECT_EQ(result.mesh.face_count(), faces) << name;
+    EXPECT_EQ(std::count(result.mesh.corners.begin(), result.mesh.corners.end(), kNoVertex),
+              name == std::string("IndexOutOfRange.gltf") ? 1 : 0);
+  }
+}
+
+}  // namespace
+}  // namespace tandem::build

@@ -1,0 +1,43 @@
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "import/gltf_model.h"
+#include "polygon_mesh.h"
+
+namespace tandem::build {
+
+/// How glTF numbers the types of an accessor's components (glTF 2.0, section 3.6.2.2). It has no int; double
+/// is no part of the standard, but its number is taken and its meaning plain.
+enum ComponentType {
+  kInt8 = 5120,
+  kUint8 = 5121,
+  kInt16 = 5122,
+  kUint16 = 5123,
+  kUint32 = 5125,
+  kFloat32 = 5126,
+  kFloat64 = 5130
+};
+
+/// Whether an accessor can be read as what it is used for: its type fits, and all its elements, those of its
+/// sparse part included, lie inside its buffer views, and these inside their buffers.
+///
+/// Result: empty, or what is wrong: "accessors[3] ends at byte 700 of bufferViews[1], which has 648".
+std::string check_positions(const GltfModel& model, int accessor);
+std::string check_indices(const GltfModel& model, int accessor);
+
+/// Effect: fills `points` with the elements of an accessor that check_positions() found good: floats, or
+/// integers as KHR_mesh_quantization has them, whole or normalised.
+///
+/// Result: empty, or what is wrong with its sparse indices.
+std::string read_positions(const GltfModel& model, int accessor, std::vector<Point>& points);
+
+/// Effect: fills `indices` with the elements of an accessor that check_indices() found good. The largest
+/// number of its type, which restarts a primitive where that is allowed and in glTF means nothing, becomes
+/// kNoVertex.
+///
+/// Result: empty, or what is wrong with its sparse indices.
+std::string read_indices(const GltfModel& model, int accessor, std::vector<std::uint32_t>& indices);
+
+}  // namespace tandem::build

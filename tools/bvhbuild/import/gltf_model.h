@@ -1,0 +1,74 @@
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "import/affine.h"
+
+namespace tandem::build {
+
+/// The parts of a glTF file that say where its triangles are, as the file has them: no index, offset or count
+/// in here is checked. An index of -1 stands for a member that the file leaves out.
+
+struct GltfView {
+  int buffer = -1;
+  std::uint64_t offset = 0;
+  std::uint64_t bytes = 0;
+  std::uint64_t stride = 0;  ///< 0: elements lie side by side
+};
+
+/// Values of their own for a few elements of an accessor.
+struct GltfSparse {
+  std::uint64_t count = 0;
+  int index_view = -1;
+  std::uint64_t index_offset = 0;
+  int index_type = 0;
+  int value_view = -1;
+  std::uint64_t value_offset = 0;
+};
+
+struct GltfAccessor {
+  int view = -1;  ///< -1: all zero
+  std::uint64_t offset = 0;
+  std::uint64_t count = 0;
+  int component_type = 0;  ///< glTF's number, see ComponentType
+  int components = 0;      ///< 1 of a SCALAR, 3 of a VEC3
+  bool normalized = false;
+  std::optional<GltfSparse> sparse;
+};
+
+struct GltfPrimitive {
+  int mode = 4;
+  int positions = -1;  ///< accessor of POSITION
+  int indices = -1;    ///< accessor; -1: the vertices in their order
+};
+
+struct GltfMesh {
+  std::string name;
+  std::vector<GltfPrimitive> primitives;
+  bool has_morph_weights = false;  ///< that differ from zero
+};
+
+struct GltfNode {
+  std::string name;
+  int mesh = -1;
+  std::vector<int> children;
+  Affine local = kIdentity;
+  bool has_skin = false;
+  bool has_morph_weights = false;  ///< that differ from zero
+  bool is_instanced = false;       ///< by EXT_mesh_gpu_instancing
+};
+
+struct GltfModel {
+  std::string reader;  ///< who read it, for the report
+  std::vector<std::vector<unsigned char>> buffers;
+  std::vector<GltfView> views;
+  std::vector<GltfAccessor> accessors;
+  std::vector<GltfMesh> meshes;
+  std::vector<GltfNode> nodes;
+  std::vector<int> roots;            ///< nodes of the scene
+  std::vector<std::string> remarks;  ///< for the report, at most a few
+};
+
+}  // namespace tandem::build

@@ -1,0 +1,308 @@
+#include "import/gltf_scene.h"
+
+#include <map>
+#include <memory>
+#include <string_view>
+#include <utility>
+
+#include "import/gltf_accessor.h"
+#include "import/mesh_assembly.h"
+#include "import/printable.h"
+#include "import/triangle_strip.h"
+
+namespace tandem::build {
+namespace {
+
+enum Mode { kTriangles = 4, kTriangleStrip = 5, kTriangleFan = 6 };
+
+constexpr std::uint64_t kMostCorners = kNoVertex - 1;
+constexpr int kMostRemarksOfAKind = 4;
+
+std::string numbered(const char* list, std::size_t index) {
+  return std::string(list) + "[" + std::to_string(index) + "]";
+}
+
+std::string described(const char* list, std::size_t index, std::string_view name) {
+  return name.empty() ? numbered(list, index) : numbered(list, index) + " " + quoted(name);
+}
+
+/// Nodes and meshes without a name are told apart by their number.
+std::string name_or_number(const std::string& name, const char* list, std::size_t index) {
+  return name.empty() ? numbered(list, index) : name;
+}
+
+std::string child_path(const std::string& parent, const std::string& name) {
+  constexpr std::size_t kLongEnough = 2000;
+  if (parent.size() > kLongEnough) return parent;
+  return parent.empty() ? name : parent + "/" + name;
+}
+
+/// Where a node stands.
+struct Place {
+  Affine world;
+  std::string path;
+};
+
+/// A node on the way through the forest. The way is kept in a list: trees of hostile files are deeper than a
+/// stack.
+struct Step {
+  int node;
+  std::shared_ptr<const Place> parent;
+};
+
+void push_backwards(const std::vector<int>& nodes, const std::shared_ptr<const Place>& parent,
+                    std::vector<Step>& pending) {
+  for (std::size_t i = nodes.size(); i-- > 0;) pending.push_back({nodes[i], parent});
+}
+
+/// Calls `visit(index, place)` for all nodes of the scene, depth first; stops at the first error and returns
+/// it. No node is visited twice, so the way ends.
+template <class Visit>
+std::string walk(const GltfModel& model, const Visit& visit) {
+  std::vector<bool> seen(model.nodes.size());
+  std::vector<Step> pending;
+  push_backwards(model.roots, std::make_shared<Place>(Place{kIdentity, {}}), pending);
+  while (!pending.empty()) {
+    const Step step = std::move(pending.back());
+    pending.pop_back();
+    const auto index = static_cast<std::size_t>(step.node);
+    if (step.node < 0 || index >= model.nodes.size())
+      return numbered("nodes", index) + " is named, but there are " + std::to_string(model.nodes.size());
+    const GltfNode& node = model.nodes[index];
+    if (seen[index])
+      return described("nodes", index, node.name) +
+             " is reached twice: nodes must form trees, without cycles and second parents";
+    seen[index] = true;
+    const auto place = std::make_shared<const Place>(
+        Place{combined(step.parent->world, node.local),
+              child_path(step.parent->path, name_or_number(node.name, "nodes", index))});
+    std::string wrong = visit(index, *place);
+    if (!wrong.empty()) return wrong;
+    push_backwards(node.children, place, pending);
+  }
+  return {};
+}
+
+/// What a mesh adds to the result each time that a node shows it.
+struct Size {
+  std::uint64_t points = 0;
+  std::uint64_t triangles = 0;  ///< at most
+};
+
+class SceneReader {
+ public:
+  SceneReader(const GltfModel& model, std::uint64_t most_bytes)
+      : model_(model), most_bytes_(most_bytes), out_(model.reader, kMostNameBytes) {}
+
+  ReadResult read();
+
+ private:
+  static constexpr std::size_t kMostNameBytes = std::size_t{64} << 20;
+
+  std::string measure();
+  std::string measure_node(std::size_t node_index);
+  std::string measure_mesh(std::size_t index, Size& size);
+  std::string measure_primitive(const GltfPrimitive& primitive, const std::string& name,
+                                std::map<int, std::uint64_t>& points, Size& size);
+  std::string check_total() const;
+  void remark_left_over(const GltfPrimitive& primitive, const std::string& name, std::uint64_t vertices);
+  void remark_pose(const GltfNode& node, const std::string& name);
+
+  std::string add_node(std::size_t node_index, const Place& place);
+  std::string add_primitive(const GltfPrimitive& primitive, const std::string& name, const Affine& world,
+                            std::map<int, std::uint64_t>& first_points);
+  std::string read_vertices(const GltfPrimitive& primitive);
+  std::int64_t corner(std::uint32_t index, const std::string& name, std::uint64_t first,
+                      std::uint64_t vertices);
+  void add_faces(const GltfPrimitive& primitive, const std::string& name, std::uint64_t first);
+
+  const GltfModel& model_;
+  std::uint64_t most_bytes_;
+  MeshAssembly out_;
+  std::map<std::size_t, Size> sizes_;  ///< of the meshes that nodes show
+  Size total_;
+  int remarks_ = 0;
+  bool pose_remarked_ = false;
+  std::vector<Point> points_;           ///< of the primitive at hand
+  std::vector<std::uint32_t> indices_;  ///< of the primitive at hand
+};
+
+bool has_triangles(const GltfPrimitive& primitive) {
+  return primitive.mode >= kTriangles && primitive.mode <= kTriangleFan;
+}
+
+std::uint64_t triangles_of(int mode, std::uint64_t vertices) {
+  if (mode == kTriangles) return vertices / 3;
+  return vertices < 3 ? 0 : vertices - 2;
+}
+
+ReadResult SceneReader::read() {
+  for (const std::string& remark : model_.remarks) out_.remark(remark);
+  std::string wrong = measure();
+  if (!wrong.empty()) return read_failure(std::move(wrong));
+  out_.reserve_points(total_.points);
+  out_.reserve_faces(total_.triangles, 3 * total_.triangles);
+  wrong = walk(model_, [this](std::size_t node, const Place& place) { return add_node(node, place); });
+  if (!wrong.empty()) return read_failure(std::move(wrong));
+  return out_.finish();
+}
+
+/// Before anything is stored: a small file can show a mesh a million times.
+std::string SceneReader::measure() {
+  return walk(model_, [this](std::size_t node, const Place&) { return measure_node(node); });
+}
+
+std::string SceneReader::measure_node(std::size_t node_index) {
+  const GltfNode& node = model_.nodes[node_index];
+  if (node.mesh == -1) return {};
+  const auto index = static_cast<std::size_t>(node.mesh);
+  if (node.mesh < 0 || index >= model_.meshes.size())
+    return described("nodes", node_index, node.name) + " names " + numbered("meshes", index) + " of " +
+           std::to_string(model_.meshes.size());
+  const auto [known, is_new] = sizes_.try_emplace(index);
+  if (is_new) {
+    std::string wrong = measure_mesh(index, known->second);
+    if (!wrong.empty()) return wrong;
+  }
+  total_.points += known->second.points;
+  total_.triangles += known->second.triangles;
+  remark_pose(node, described("nodes", node_index, node.name));
+  return check_total();
+}
+
+std::string SceneReader::check_total() const {
+  if (total_.points > kMostCorners || total_.triangles > kMostCorners / 3)
+    return "the scene has more than 4294967294 vertices or corners, counting each instance of a mesh";
+  const std::uint64_t bytes = total_.points * sizeof(Point) + total_.triangles * 4 * sizeof(std::uint32_t);
+  if (bytes > most_bytes_)
+    return "its triangles, counting each instance of a mesh, take " + std::to_string(bytes >> 20) +
+           " MiB, more than the memory limit (--memory-limit)";
+  return {};
+}
+
+std::string SceneReader::measure_mesh(std::size_t index, Size& size) {
+  const GltfMesh& mesh = model_.meshes[index];
+  std::map<int, std::uint64_t> points;
+  for (std::size_t i = 0; i < mesh.primitives.size(); ++i) {
+    const std::string name = described("meshes", index, mesh.name) + ", primitive " + std::to_string(i);
+    std::string wrong = measure_primitive(mesh.primitives[i], name, points, size);
+    if (!wrong.empty()) return name + ": " + wrong;
+  }
+  return {};
+}
+
+/// `points` has the accessors that earlier primitives of the mesh took their vertices from.
+std::string SceneReader::measure_primitive(const GltfPrimitive& primitive, const std::string& name,
+                                           std::map<int, std::uint64_t>& points, Size& size) {
+  if (primitive.mode < 0 || primitive.mode > kTriangleFan)
+    return "mode " + std::to_string(primitive.mode) + " is none of glTF";
+  if (!has_triangles(primitive)) return {};
+  if (primitive.positions == -1) {
+    if (remarks_++ < kMostRemarksOfAKind) out_.remark(name + " has no POSITION and is passed over");
+    return {};
+  }
+  std::string wrong = check_positions(model_, primitive.positions);
+  if (wrong.empty() && primitive.indices != -1) wrong = check_indices(model_, primitive.indices);
+  if (!wrong.empty()) return wrong;
+  const std::uint64_t count = model_.accessors[primitive.positions].count;
+  const std::uint64_t vertices = primitive.indices == -1 ? count : model_.accessors[primitive.indices].count;
+  // Each alone is bounded here, so that no sum of theirs overflows before check_total() sees it.
+  if (count > kMostCorners || vertices > kMostCorners) return "it has more than 4294967294 vertices";
+  if (points.emplace(primitive.positions, count).second) size.points += count;
+  size.triangles += triangles_of(primitive.mode, vertices);
+  remark_left_over(primitive, name, vertices);
+  return {};
+}
+
+void SceneReader::remark_left_over(const GltfPrimitive& primitive, const std::string& name,
+                                   std::uint64_t vertices) {
+  const std::uint64_t rest = primitive.mode == kTriangles ? vertices % 3 : (vertices < 3 ? vertices : 0);
+  if (rest == 0 || remarks_++ >= kMostRemarksOfAKind) return;
+  out_.remark(name + ": the last " + std::to_string(rest) + " of " + std::to_string(vertices) +
+              (primitive.indices == -1 ? " vertices" : " indices") + " make no triangle");
+}
+
+void SceneReader::remark_pose(const GltfNode& node, const std::string& name) {
+  const bool is_morphed = node.has_morph_weights || model_.meshes[node.mesh].has_morph_weights;
+  if (pose_remarked_ || !(node.has_skin || is_morphed || node.is_instanced)) return;
+  pose_remarked_ = true;
+  if (node.is_instanced)
+    out_.remark(name + " repeats its mesh by EXT_mesh_gpu_instancing; it is read once");
+  else
+    out_.remark(name + " has a " + (node.has_skin ? "skin" : "morphed mesh") + "; its mesh is read " +
+                (node.has_skin ? "unposed" : "unmorphed"));
+}
+
+std::string SceneReader::add_node(std::size_t node_index, const Place& place) {
+  if (model_.nodes[node_index].mesh == -1) return {};
+  const auto index = static_cast<std::size_t>(model_.nodes[node_index].mesh);
+  const GltfMesh& mesh = model_.meshes[index];
+  out_.begin_part(name_or_number(mesh.name, "meshes", index), place.path);
+  std::map<int, std::uint64_t> first_points;
+  for (std::size_t i = 0; i < mesh.primitives.size(); ++i) {
+    const GltfPrimitive& primitive = mesh.primitives[i];
+    if (!has_triangles(primitive) || primitive.positions == -1) continue;
+    const std::string name = described("meshes", index, mesh.name) + ", primitive " + std::to_string(i);
+    std::string wrong = add_primitive(primitive, name, place.world, first_points);
+    if (!wrong.empty()) return name + ": " + wrong;
+  }
+  return {};
+}
+
+/// Primitives of a mesh often share their vertices, and these are stored once.
+std::string SceneReader::add_primitive(const GltfPrimitive& primitive, const std::string& name,
+                                       const Affine& world, std::map<int, std::uint64_t>& first_points) {
+  const auto [shared, is_new] = first_points.try_emplace(primitive.positions, out_.point_count());
+  if (is_new) {
+    std::string wrong = read_positions(model_, primitive.positions, points_);
+    if (!wrong.empty()) return wrong;
+    for (const Point& point : points_) out_.add_point(transformed(world, point));
+  }
+  if (primitive.indices != -1) {
+    std::string wrong = read_indices(model_, primitive.indices, indices_);
+    if (!wrong.empty()) return wrong;
+  }
+  add_faces(primitive, name, shared->second);
+  return {};
+}
+
+/// An index that names no vertex becomes a negative number of its own, so that strips tell two of them apart.
+std::int64_t SceneReader::corner(std::uint32_t index, const std::string& name, std::uint64_t first,
+                                 std::uint64_t vertices) {
+  if (index < vertices && index != kNoVertex) return static_cast<std::int64_t>(first + index);
+  if (out_.wants_index_remark()) {
+    if (index == kNoVertex)
+      out_.remark_index(name + ": an index is the largest of its type, which names no vertex");
+    else
+      out_.remark_index(name + ": index", index, vertices);
+  }
+  return -1 - std::int64_t{index};
+}
+
+void SceneReader::add_faces(const GltfPrimitive& primitive, const std::string& name, std::uint64_t first) {
+  const std::uint64_t vertices = model_.accessors[primitive.positions].count;
+  const bool indexed = primitive.indices != -1;
+  const std::uint64_t count = indexed ? indices_.size() : vertices;
+  const auto at = [&](std::uint64_t i) {
+    return indexed ? corner(indices_[i], name, first, vertices) : static_cast<std::int64_t>(first + i);
+  };
+  if (primitive.mode == kTriangleStrip) {
+    TriangleStrip strip(out_);
+    if (count >= 3)
+      for (std::uint64_t i = 0; i < count; ++i) strip.add(at(i));
+    return;
+  }
+  for (std::uint64_t t = 0; t < triangles_of(primitive.mode, count); ++t) {
+    const bool is_fan = primitive.mode == kTriangleFan;
+    for (std::uint64_t k = 0; k < 3; ++k) out_.add_corner(at(is_fan ? (k == 2 ? 0 : t + k + 1) : 3 * t + k));
+    out_.end_face();
+  }
+}
+
+}  // namespace
+
+ReadResult flatten_gltf(const GltfModel& model, std::uint64_t most_bytes) {
+  return SceneReader(model, most_bytes).read();
+}
+
+}  // namespace tandem::build

@@ -1,0 +1,20 @@
+#pragma once
+#include <cstdint>
+
+#include "import/gltf_model.h"
+#include "import/read_result.h"
+
+namespace tandem::build {
+
+/// Collects the triangles of a glTF scene, believing nothing the model says.
+///
+/// Result: the meshes of all nodes, depth first in the file's order, each instance by itself, with the node
+/// transforms accumulated and applied in float64; a node that mirrors its mesh leaves the order of the
+/// corners as it is. A part is one mesh at one node. Triangles, strips and fans become faces; points and
+/// lines none. A strip's triangle that names a vertex twice only leads the strip elsewhere and is no face. An
+/// index that names no vertex of its primitive becomes kNoVertex. Skins and morph targets are not applied.
+/// Errors: accessors that reach outside their buffers; nodes that are no tree; more than 2^32 - 2 vertices or
+/// corners, or more than `most_bytes` bytes of them, counting each instance.
+ReadResult flatten_gltf(const GltfModel& model, std::uint64_t most_bytes);
+
+}  // namespace tandem::build

@@ -86,10 +86,10 @@ TEST(ObjReader, RemarksAtMostFourIndices) {
   EXPECT_EQ(read(file).mesh.remarks.size(), 4u);
 }
 
-TEST(ObjReader, CountsNoPointsLinesAndFacesOfTwoCorners) {
-  const ReadResult result = read(kFourVertices + "p 1\nl 1 2 3\nf 1 2\nf 1\nf\nf 99 98\nf 2 3 4\n");
-  EXPECT_EQ(faces_of(result), (std::vector<Face>{{1, 2, 3}}));
-  EXPECT_TRUE(result.mesh.remarks.empty());
+TEST(ObjReader, CountsFacesOfAnyNumberOfCornersButNoPointsAndLines) {
+  const ReadResult result = read(kFourVertices + "p 1\nl 1 2 3\nf 1 2\nf 1\nf\nf 99 2\nf 2 3 4\n");
+  EXPECT_EQ(faces_of(result), (std::vector<Face>{{0, 1}, {0}, {}, {98, 1}, {1, 2, 3}}));
+  EXPECT_EQ(result.mesh.remarks.size(), 1u);
 }
 
 TEST(ObjReader, ReadsAllLineEnds) {

@@ -91,8 +91,8 @@ TEST(OffReader, RemarksIndicesThatNameNoVertexAndKeepsTheFace) {
                                                            "line 8: face index 4294967295 of 3 vertices"}));
 }
 
-TEST(OffReader, FacesOfTwoCornersDoNotCount) {
-  expect_faces("OFF\n3 4 0\n" + kThreeVertices + "2 0 1\n0\n1 2\n3 0 1 2\n", {{0, 1, 2}});
+TEST(OffReader, CountsFacesOfAnyNumberOfCorners) {
+  expect_faces("OFF\n3 4 0\n" + kThreeVertices + "2 0 1\n0\n1 2\n3 0 1 2\n", {{0, 1}, {}, {2}, {0, 1, 2}});
 }
 
 TEST(OffReader, RefusesCountsThatAreNotThoseOfTheData) {

@@ -215,8 +215,8 @@ TEST(PlyReader, RemarksIndicesThatNameNoVertexAndKeepsTheFace) {
   EXPECT_EQ(read(file).mesh.remarks, (std::vector<std::string>{"face 1: index 9 of 3 vertices"}));
 }
 
-TEST(PlyReader, FacesOfTwoCornersDoNotCount) {
-  expect_faces(text(3, 3, kThreeVertices + "2 0 1\n0\n3 0 1 2\n"), {{0, 1, 2}});
+TEST(PlyReader, CountsFacesOfAnyNumberOfCorners) {
+  expect_faces(text(3, 3, kThreeVertices + "2 0 1\n0\n3 0 1 2\n"), {{0, 1}, {}, {0, 1, 2}});
 }
 
 TEST(PlyReader, RefusesAHeaderThatIsCut) {

@@ -100,11 +100,11 @@ TEST(StlReader, SolidsBecomeParts) {
   EXPECT_EQ(result.mesh.parts[1].face_count, 2u);
 }
 
-TEST(StlReader, FacetsOfMoreVerticesArePolygonsAndOfFewerNone) {
+TEST(StlReader, FacetsOfMoreOrFewerVerticesAreFacesToo) {
   const ReadResult result = read("solid\n" + facet(kCorners + "vertex 0 0 1\n") +
                                  facet("vertex 0 0 0\nvertex 1 1 1\n") + facet(kCorners) + "endsolid\n");
   ASSERT_TRUE(result.ok) << result.error;
-  EXPECT_EQ(faces_of(result), (std::vector<Face>{{0, 1, 2, 3}, {6, 7, 8}}));
+  EXPECT_EQ(faces_of(result), (std::vector<Face>{{0, 1, 2, 3}, {4, 5}, {6, 7, 8}}));
 }
 
 TEST(StlReader, PassesOverComments) {

@@ -30,6 +30,8 @@ std::vector<Finding> findings(const CleanReport& r) {
       {"faces_index_out_of_range", r.faces_index_out_of_range,
        faces(r.faces_index_out_of_range, "names", "name", "a vertex that the file does not have; dropped"),
        true},
+      {"faces_too_few_corners", r.faces_too_few_corners,
+       faces(r.faces_too_few_corners, "has", "have", "fewer than three corners; dropped"), true},
       {"faces_not_finite", r.faces_not_finite,
        faces(r.faces_not_finite, "has", "have", "a coordinate that is NaN or infinite; dropped"), true},
       {"faces_too_large", r.faces_too_large,

@@ -12,6 +12,7 @@ struct CleanReport {
   std::uint64_t vertices = 0;  ///< of the file
 
   std::uint64_t faces_index_out_of_range = 0;  ///< dropped: a corner names no vertex
+  std::uint64_t faces_too_few_corners = 0;     ///< dropped: two corners or fewer
   std::uint64_t faces_not_finite = 0;          ///< dropped: a corner is NaN or infinite
   std::uint64_t faces_too_large = 0;           ///< dropped: a corner lies beyond +-kMaxCoordinate
   std::uint64_t faces_not_simple = 0;          ///< kept: the outline crosses itself, so it was split as a fan

@@ -77,7 +77,8 @@ void add_mesh(const aiMesh& mesh, const Visit& visit, MeshAssembly& out) {
   for (const aiVector3D& v : std::span(mesh.mVertices, mesh.mNumVertices))
     out.add_point(transformed(visit.world, v));
   for (const aiFace& face : std::span(mesh.mFaces, mesh.mNumFaces)) {
-    for (const unsigned index : std::span(face.mIndices, face.mIndices ? face.mNumIndices : 0))
+    if (face.mIndices == nullptr || face.mNumIndices < 3) continue;  // points and lines
+    for (const unsigned index : std::span(face.mIndices, face.mNumIndices))
       out.add_corner(index < mesh.mNumVertices ? static_cast<std::int64_t>(first + index) : -1);
     out.end_face();
   }

@@ -16,16 +16,6 @@ void MeshAssembly::reserve_faces(std::size_t faces, std::size_t corners) {
   mesh_.corners.reserve(mesh_.corners.size() + corners);
 }
 
-bool MeshAssembly::end_face() {
-  const std::size_t begin = mesh_.face_begin.back();
-  if (mesh_.corners.size() - begin < 3) {
-    mesh_.corners.resize(begin);
-    return false;
-  }
-  mesh_.face_begin.push_back(static_cast<std::uint32_t>(mesh_.corners.size()));
-  return true;
-}
-
 void MeshAssembly::begin_part(std::string_view name, std::string_view node_path) {
   constexpr std::size_t kMostNameBytes = 1000;
   SourcePart part{printable(name, kMostNameBytes), printable(node_path, kMostNameBytes), 0, 0};

@@ -27,8 +27,8 @@ class MeshAssembly {
     const bool is_representable = static_cast<std::uint64_t>(index) < kNoVertex;
     mesh_.corners.push_back(is_representable ? static_cast<std::uint32_t>(index) : kNoVertex);
   }
-  /// Ends the face at hand; false when it has fewer than three corners, which makes it none.
-  bool end_face();
+  /// Ends the face at hand, however many corners it has.
+  void end_face() { mesh_.face_begin.push_back(static_cast<std::uint32_t>(mesh_.corners.size())); }
 
   /// Faces from here on belong to a part of this name, or go on with the last part when that has the same
   /// name.

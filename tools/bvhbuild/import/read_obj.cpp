@@ -94,7 +94,8 @@ bool ObjReader::face() {
     if (text_.peek() == '/') text_.skip_word();
     corner(written, place);
   }
-  if (mesh_.end_face() && suspect_in_face_) suspects_.push_back(*suspect_in_face_);
+  mesh_.end_face();
+  if (suspect_in_face_) suspects_.push_back(*suspect_in_face_);
   text_.skip_to_line_end();
   return true;
 }

@@ -56,7 +56,6 @@ class OffReader {
   MeshAssembly mesh_;
   OffKind kind_;
   OffCounts promised_;
-  std::int64_t faces_read_ = 0;  // those of fewer than three corners too
   bool is_binary_ = false;
   std::string error_;
 };
@@ -179,7 +178,6 @@ bool OffReader::text_face() {
   for (std::int64_t i = 0; i < corners; ++i)
     if (!text_index()) return false;
   mesh_.end_face();
-  ++faces_read_;
   text_.skip_to_line_end();
   return true;
 }
@@ -223,7 +221,7 @@ bool OffReader::binary_face() {
   std::int64_t corners = 0;
   if (!take_int(corners)) return too_few_faces();
   if (corners < 0)
-    return fail("face " + std::to_string(faces_read_) + " has " + std::to_string(corners) + " corners");
+    return fail("face " + std::to_string(mesh_.face_count()) + " has " + std::to_string(corners) + " corners");
   for (std::int64_t i = 0; i < corners; ++i) {
     std::int64_t index = 0;
     if (!take_int(index)) return too_few_faces();
@@ -235,7 +233,6 @@ bool OffReader::binary_face() {
   const std::size_t left = text_.bytes_left() / kNumberBytes;
   if (colour_numbers < 0 || static_cast<std::size_t>(colour_numbers) > left) return too_few_faces();
   text_.skip_bytes(static_cast<std::size_t>(colour_numbers) * kNumberBytes);
-  ++faces_read_;
   return true;
 }
 
@@ -251,7 +248,7 @@ void OffReader::corner(std::int64_t index) {
   const bool names_a_vertex = index >= 0 && index < promised_.vertices;
   if (names_a_vertex || !mesh_.wants_index_remark()) return;
   const std::string place =
-      is_binary_ ? "face " + std::to_string(faces_read_) + ": index" : text_.line() + ": face index";
+      is_binary_ ? "face " + std::to_string(mesh_.face_count()) + ": index" : text_.line() + ": face index";
   mesh_.remark_index(place, index, mesh_.point_count());
 }
 
@@ -262,7 +259,7 @@ bool OffReader::too_few_vertices() {
 
 bool OffReader::too_few_faces() {
   return fail("the header promises " + std::to_string(promised_.faces) + " faces, the data ends after " +
-              std::to_string(faces_read_));
+              std::to_string(mesh_.face_count()));
 }
 
 bool OffReader::fail_here(std::string_view expected) {

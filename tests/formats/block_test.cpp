@@ -47,9 +47,11 @@ RelativePose any_pose(std::mt19937_64& random) {
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j)
       pose.rotation[i][j] = axis_aligned ? static_cast<float>(i == j) : pick(random);
+    for (int j = 0; j < 3; ++j) pose.abs_rotation[i][j] = std::fabs(pose.rotation[i][j]);
     pose.translation[i] = pick(random);
+    pose.slack_a[i] = random() % 2 == 0 ? 0 : pick(random);
+    pose.slack_b[i] = random() % 2 == 0 ? 0 : pick(random);
   }
-  pose.slack = random() % 2 == 0 ? 0 : pick(random);
   return pose;
 }
 
@@ -76,10 +78,10 @@ TEST(ImaginaryNode, IsRejectedOnEachAxisAlone) {
     const RelativePose pose = any_pose(random);
     const auto there = detail::distance(imaginary, other, pose),
                back = detail::distance(other, imaginary, pose);
-    ASSERT_FALSE(detail::overlap_on_face_axes(imaginary, other, pose, there)) << i;
-    ASSERT_FALSE(detail::overlap_on_face_axes(other, imaginary, pose, back)) << i;
-    ASSERT_FALSE(detail::overlap_on_edge_axes(imaginary, other, pose, there)) << i;
-    ASSERT_FALSE(detail::overlap_on_edge_axes(other, imaginary, pose, back)) << i;
+    ASSERT_FALSE(detail::overlap_on_face_axes(there, pose)) << i;
+    ASSERT_FALSE(detail::overlap_on_face_axes(back, pose)) << i;
+    ASSERT_FALSE(detail::overlap_on_edge_axes(there, pose)) << i;
+    ASSERT_FALSE(detail::overlap_on_edge_axes(back, pose)) << i;
   }
 }
 
@@ -92,7 +94,7 @@ TEST(ImaginaryNode, IsTheNeutralElementOfAUnion) {
 // The tests above would pass if nothing ever overlapped.
 TEST(BoxTest, RealBoxesThatTouchOverlap) {
   const Box unit = {{0, 0, 0}, {1, 1, 1}}, beside = {{2, 0, 0}, {1, 1, 1}}, apart = {{2.5f, 0, 0}, {1, 1, 1}};
-  const RelativePose same = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0, 0, 0}, 0};
+  const RelativePose same = without_slack(kIdentityPose.rotation, kIdentityPose.translation);
   EXPECT_TRUE(overlap_15_axes(unit, beside, same));
   EXPECT_TRUE(overlap_aligned(unit, beside));
   EXPECT_FALSE(overlap_15_axes(unit, apart, same));
@@ -102,10 +104,10 @@ TEST(BoxTest, RealBoxesThatTouchOverlap) {
 // Two long rods crossing at a right angle, rolled by 45 degrees: only the cross product of their edges
 // separates them.
 TEST(BoxTest, EdgeAxesSeparateWhatFacesDoNot) {
-  const float s = std::sqrt(0.5f);
+  const double s = std::sqrt(0.5);
   const Box rod = {{0, 0, 0}, {10, 1, 1}};
   // b's axes in a's frame: turned by 45 degrees about x for both, then across.
-  const RelativePose crossed = {{{0, s, -s}, {s, 0.5f, 0.5f}, {-s, 0.5f, 0.5f}}, {0, 2.1f, 2.1f}, 0};
+  const RelativePose crossed = without_slack({{0, s, -s}, {s, 0.5, 0.5}, {-s, 0.5, 0.5}}, {0, 2.1, 2.1});
   EXPECT_TRUE(overlap_6_axes(rod, rod, crossed));
   EXPECT_FALSE(overlap_15_axes(rod, rod, crossed));
 }

@@ -117,9 +117,13 @@ TEST_F(Gpu, ImaginaryNodesAreRejectedAgainstEveryOtherBox) {
       trial.other.center[i] = pick();
       trial.other.half_extent[i] = pick();
       trial.pose.translation[i] = pick();
-      for (int j = 0; j < 3; ++j) trial.pose.rotation[i][j] = aligned ? static_cast<float>(i == j) : pick();
+      trial.pose.slack_a[i] = random() % 2 == 0 ? 0 : pick();
+      trial.pose.slack_b[i] = random() % 2 == 0 ? 0 : pick();
+      for (int j = 0; j < 3; ++j) {
+        trial.pose.rotation[i][j] = aligned ? static_cast<float>(i == j) : pick();
+        trial.pose.abs_rotation[i][j] = std::fabs(trial.pose.rotation[i][j]);
+      }
     }
-    trial.pose.slack = random() % 2 == 0 ? 0 : pick();
   }
   Trial* device = nullptr;
   unsigned* accepted = nullptr;

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "statistics.h"
-#include "tandem/kernels/box_test.h"
+#include "tandem/kernels/block_pair.h"
 #include "tandem/kernels/traversal.h"
 
 namespace tandem {
@@ -50,16 +50,8 @@ struct Work {
 
 // The traversal that queries make, of a tree against itself, posed.
 Work query(const LevelView& tree, const RelativePose& b_in_a, bool stop_at_first) {
-  const auto test = [&](const Block& a, const Block& b) {
-    std::uint32_t mask = 0;
-    for (int i = 0; i < kNodesPerBlock; ++i) {
-      for (int j = 0; j < kNodesPerBlock; ++j) {
-        const bool overlap = overlap_15_axes(box_of(a, i), box_of(b, j), b_in_a);
-        mask |= static_cast<std::uint32_t>(overlap) << (4 * i + j);
-      }
-    }
-    return mask;
-  };
+  const BlockPairTest of_blocks = block_pair_test();
+  const auto test = [&](const Block& a, const Block& b) { return of_blocks(a, b, b_in_a); };
   Work work;
   work.block_pairs = traverse(tree, tree, test, [&](std::uint32_t, std::uint32_t, std::uint32_t mask) {
     work.candidates += static_cast<std::uint64_t>(std::popcount(mask));
@@ -71,16 +63,15 @@ Work query(const LevelView& tree, const RelativePose& b_in_a, bool stop_at_first
 // Turns about the centre of the bounds, then moves by `distance` along `direction`.
 RelativePose make_pose(const Matrix& rotation, const Vector& direction, double distance,
                        const Vector& center) {
-  RelativePose pose{};
+  double matrix[3][3], translation[3];
   for (int i = 0; i < 3; ++i) {
-    double t = center[i] + distance * direction[i];
+    translation[i] = center[i] + distance * direction[i];
     for (int j = 0; j < 3; ++j) {
-      pose.rotation[i][j] = static_cast<float>(rotation[i][j]);
-      t -= rotation[i][j] * center[j];
+      matrix[i][j] = rotation[i][j];
+      translation[i] -= rotation[i][j] * center[j];
     }
-    pose.translation[i] = static_cast<float>(t);
   }
-  return pose;
+  return without_slack(matrix, translation);
 }
 
 }  // namespace

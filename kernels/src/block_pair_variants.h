@@ -1,0 +1,21 @@
+#pragma once
+#include <cstdint>
+
+#include "tandem/formats/block.h"
+#include "tandem/kernels/relative_pose.h"
+
+// Vectors of GCC and clang; a compiler without them builds the scalar way alone.
+#if defined(__GNUC__) && defined(__has_builtin)
+#if __has_builtin(__builtin_shufflevector)
+#define TANDEM_HAVE_LANES 1
+#endif
+#endif
+
+namespace tandem {
+
+// Each defined in a file of its own, which is compiled for machines that have the instructions.
+std::uint16_t block_pair_mask_lanes4(const Block& a, const Block& b, const RelativePose& b_in_a);
+std::uint16_t block_pair_mask_avx2(const Block& a, const Block& b, const RelativePose& b_in_a);
+std::uint16_t block_pair_mask_avx512(const Block& a, const Block& b, const RelativePose& b_in_a);
+
+}  // namespace tandem

@@ -69,7 +69,8 @@ bool belongs_to_level(SectionKind kind) {
 Status check_section(const Section& section, const FileHeader& header) {
   const std::uint64_t element = element_bytes(section.kind);
   if (element == 0) return Status::kUnknownSection;
-  if (section.level >= (belongs_to_level(section.kind) ? header.level_count : 1)) return Status::kBadLevel;
+  if (section.level >= (belongs_to_level(section.kind) ? header.level_count : 1))
+    return Status::kUnknownSection;
   if (section.offset % kSectionAlignment != 0) return Status::kSectionMisaligned;
   if (section.offset > header.file_bytes || section.bytes > header.file_bytes - section.offset) {
     return Status::kSectionOutOfBounds;
@@ -96,7 +97,9 @@ CheckResult check_section_table(const unsigned char* data, const FileHeader& hea
         return {Status::kSectionDuplicated, i, {}};
     }
   }
-  if (!all_zero(data + end, data + header.file_bytes) || header.file_bytes - end >= kSectionAlignment) {
+  const bool ends_aligned =
+      header.file_bytes % kSectionAlignment == 0 && header.file_bytes - end < kSectionAlignment;
+  if (!ends_aligned || !all_zero(data + end, data + header.file_bytes)) {
     return {Status::kBadGap, end, {}};
   }
   return {};

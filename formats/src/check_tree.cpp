@@ -26,7 +26,8 @@ bool is_real_box(const Box& box) {
 bool is_imaginary_box(const Box& box) {
   bool sound = true;
   for (int k = 0; k < 3; ++k)
-    sound = sound && box.center[k] == 0 && box.half_extent[k] == kImaginaryHalfExtent;
+    sound = sound && box.center[k] == 0 && !std::signbit(box.center[k]) &&
+            box.half_extent[k] == kImaginaryHalfExtent;
   return sound;
 }
 

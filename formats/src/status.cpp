@@ -33,7 +33,7 @@ constexpr Entry kEntries[] = {
     {Status::kBadHeader, "BadHeader", nullptr, "a field of the header is impossible"},
     {Status::kBadSectionTable, "BadSectionTable", nullptr, "the section table does not fit"},
     {Status::kUnknownSection, "UnknownSection", "section",
-     "a section is of no kind that this version defines"},
+     "a section is of a kind or level that does not exist"},
     {Status::kSectionMisaligned, "SectionMisaligned", "section",
      "a section does not start at a multiple of 256"},
     {Status::kSectionOutOfBounds, "SectionOutOfBounds", "section",

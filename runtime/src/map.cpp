@@ -50,8 +50,26 @@ Bytes read_all(std::FILE* file) {
   return {Status::kCannotRead};
 }
 
+#if TANDEM_HAS_MMAP
+// Without blocking: a pipe must be refused, not waited for.
+int open_descriptor(const char* path) {
+  return ::open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+}
+
+std::FILE* open_stream(const char* path) {
+  const int file = open_descriptor(path);
+  std::FILE* stream = file >= 0 ? ::fdopen(file, "rb") : nullptr;
+  if (file >= 0 && stream == nullptr) ::close(file);
+  return stream;
+}
+#else
+std::FILE* open_stream(const char* path) {
+  return std::fopen(path, "rb");
+}
+#endif
+
 Bytes read_file(const char* path) {
-  std::FILE* file = std::fopen(path, "rb");
+  std::FILE* file = open_stream(path);
   if (file == nullptr) return {status_of_open_error()};
   const Bytes bytes = read_all(file);
   std::fclose(file);
@@ -60,8 +78,7 @@ Bytes read_file(const char* path) {
 
 #if TANDEM_HAS_MMAP
 Bytes map_file(const char* path) {
-  const int file = ::open(
-      path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);  // not blocking: a pipe must be refused, not waited for
+  const int file = open_descriptor(path);
   if (file < 0) return {status_of_open_error()};
   struct stat info {};
   Bytes bytes;

@@ -145,8 +145,10 @@ const Attack kSectionAttacks[] = {
     {"unknown kind", Status::kUnknownSection,
      [](Bytes& f) { f.section(0).kind = static_cast<SectionKind>(77); }},
     {"kind 0", Status::kUnknownSection, [](Bytes& f) { f.section(3).kind = static_cast<SectionKind>(0); }},
-    {"level past the last", Status::kBadLevel, [](Bytes& f) { f.section(SectionKind::blocks).level = 1; }},
-    {"level of a file section", Status::kBadLevel, [](Bytes& f) { f.section(SectionKind::parts).level = 1; }},
+    {"level past the last", Status::kUnknownSection,
+     [](Bytes& f) { f.section(SectionKind::blocks).level = 1; }},
+    {"level of a file section", Status::kUnknownSection,
+     [](Bytes& f) { f.section(SectionKind::parts).level = 1; }},
     {"offset off the grid", Status::kSectionMisaligned, [](Bytes& f) { f.section(1).offset += 16; }},
     {"offset past the end", Status::kSectionOutOfBounds,
      [](Bytes& f) { f.section(1).offset = 256 * f.header().file_bytes; }},
@@ -291,6 +293,19 @@ TEST(Check, FileSizeInTheHeaderMustBeTheFilesSize) {
   EXPECT_EQ(file.check().status, Status::kTruncated);
   file.header().file_bytes = 16;
   EXPECT_EQ(file.check().status, Status::kTruncated);
+}
+
+TEST(Check, TheFileEndsAtTheFirstMultipleOf256AfterTheLastSection) {
+  Bytes file = sample();
+  const std::size_t end = file.section(5).offset + file.section(5).bytes;
+  ASSERT_LT(end, file.size());
+  for (const std::size_t size : {end, end + 1, file.size() - 1, file.size() + 10, file.size() + 256}) {
+    std::string bytes(reinterpret_cast<char*>(file.data()), file.size());
+    bytes.resize(size, '\0');
+    Bytes other(bytes.data(), bytes.size());
+    other.header().file_bytes = size;
+    EXPECT_EQ(other.check_sealed(), Status::kBadGap) << size;
+  }
 }
 
 TEST(Check, RejectsAFileWithoutParts) {

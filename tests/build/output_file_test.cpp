@@ -52,6 +52,20 @@ TEST_F(OutputFile, KeepsASymbolicLink) {
   EXPECT_EQ(fs::file_size(folder_ / "target"), 7u);
 }
 
+TEST_F(OutputFile, FollowsALinkToNothing) {
+  fs::create_symlink("target", folder_ / "link");
+  EXPECT_EQ(write_whole_file(folder_ / "link", bytes(7)), "");
+  EXPECT_TRUE(fs::is_symlink(folder_ / "link"));
+  EXPECT_EQ(fs::file_size(folder_ / "target"), 7u);
+}
+
+TEST_F(OutputFile, KeepsThePermissionsOfAFileThatItReplaces) {
+  std::ofstream(folder_ / "a") << "old";
+  fs::permissions(folder_ / "a", fs::perms::owner_read | fs::perms::owner_write);
+  EXPECT_EQ(write_whole_file(folder_ / "a", bytes(5)), "");
+  EXPECT_EQ(fs::status(folder_ / "a").permissions(), fs::perms::owner_read | fs::perms::owner_write);
+}
+
 TEST_F(OutputFile, NamesTheReasonOfAFailureAndLeavesNothing) {
   EXPECT_EQ(write_whole_file(folder_, bytes(5)), "is a folder");
   EXPECT_EQ(write_whole_file(folder_ / "missing" / "a", bytes(5)), "No such file or directory");

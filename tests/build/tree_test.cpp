@@ -141,6 +141,9 @@ TEST(Tree, TakesTheLargestTheSmallestAndTheFarthestCoordinates) {
     expect_sound(scaled(1e-44f, 0), imaginary, "denormal");
     expect_sound(scaled(1, 1e7f), imaginary, "far");
     expect_sound(scaled(1, -1e30f), imaginary, "all in one point, far away");
+    Mesh sheet = scaled(1e-20f, 0);  // 10^40 times farther away than large
+    for (auto& point : sheet.points) point[1] = 1e20f;
+    expect_sound(sheet, imaginary, "a tiny sheet far away");
   }
 }
 

@@ -85,6 +85,7 @@ TEST(MapPipe, IsRefusedWithoutWaiting) {
   ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
   MappedAsset asset;
   EXPECT_EQ(asset.open(path.c_str()), Status::kNotARegularFile);
+  EXPECT_EQ(asset.open(path.c_str(), Access::read), Status::kNotARegularFile);
   fs::remove(path);
 }
 

@@ -19,7 +19,7 @@ struct alignas(16) Bounds {
 
   /// What the surface-area heuristic weighs: half the surface, plus a trace of the edge lengths and a
   /// constant, so that flat, thin and point-like sets are still told apart and no cost is zero. Condition:
-  /// coordinates are scaled to about 1 (see TriangleBounds).
+  /// coordinates are scaled to about 1 (see Normalization in splitter.cpp).
   float surface() const {
     const float x = hi[0] - lo[0], y = hi[1] - lo[1], z = hi[2] - lo[2];
     return x * y + (y + x) * z + 1e-6f * (x + y + z) + 1e-20f;

@@ -69,13 +69,12 @@ class BinaryTree {
     return best.left != 0 ? best : splitter_.even_split(range, any);
   }
 
-  // The cheapest way to share `slots` between the children.
+  // The cheapest way to share `slots`, 2 to 4, between the children.
   float cheapest_share(std::uint32_t node, std::uint32_t slots, std::uint8_t& left_slots) const {
     float best = std::numeric_limits<float>::infinity();
     for (std::uint32_t k = 1; k < slots; ++k) {
-      if (k > 3 || slots - k > 3) continue;
       const float cost = nodes_[left(node)].cost[k - 1] + nodes_[right(node)].cost[slots - k - 1];
-      if (cost < best) {
+      if (k == 1 || cost < best) {  // whatever the costs are, some share is chosen
         best = cost;
         left_slots = static_cast<std::uint8_t>(k);
       }

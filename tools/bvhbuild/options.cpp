@@ -68,7 +68,7 @@ void add_options(CLI::App& app, Options& options, double& memory_gib) {
   app.add_option("--time-limit", options.import.time_limit_seconds, "seconds that assimp may take")
       ->check(between(0.01, 1e6))
       ->option_text("S [120]");
-  app.add_option("--memory-limit", memory_gib, "GiB of memory that assimp may take")
+  app.add_option("--memory-limit", memory_gib, "GiB of memory that reading may take")
       ->check(between(0.1, 1e6))
       ->option_text("GIB [8]");
   app.set_version_flag("--version", "bvhbuild " TANDEM_VERSION);

@@ -80,6 +80,22 @@ std::string temporary_beside(const fs::path& target) {
   return (target.parent_path() / (stem + ".tmp" + std::to_string(::getpid()))).string();
 }
 
+// Where a chain of symbolic links ends, whether or not anything is there.
+fs::path follow_links(fs::path path) {
+  constexpr int kLongestChain = 40;
+  std::error_code error;
+  for (int i = 0; i < kLongestChain && fs::is_symlink(fs::symlink_status(path, error)); ++i) {
+    path = path.parent_path() / fs::read_symlink(path, error);
+  }
+  return path;
+}
+
+// A file that is replaced keeps its permissions.
+int copy_permissions(const fs::path& from, int to) {
+  struct stat info {};
+  return ::stat(from.c_str(), &info) != 0 || ::fchmod(to, info.st_mode & 07777) == 0 ? 0 : errno;
+}
+
 std::string write_and_rename(const fs::path& target, std::span<const std::byte> bytes) {
   const std::string temporary = temporary_beside(target);
   if (temporary.size() >= g_temporary.size()) return reason_of(ENAMETOOLONG);
@@ -87,7 +103,8 @@ std::string write_and_rename(const fs::path& target, std::span<const std::byte> 
   const SignalGuard guard(temporary);
   const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   if (file < 0) return reason_of(errno);
-  int error = write_all(file, bytes);
+  int error = copy_permissions(target, file);
+  if (error == 0) error = write_all(file, bytes);
   if (error == 0 && ::fsync(file) != 0) error = errno;
   if (::close(file) != 0 && error == 0) error = errno;
   if (error == 0 && ::rename(temporary.c_str(), target.c_str()) != 0) error = errno;
@@ -102,9 +119,7 @@ std::string write_whole_file(const fs::path& path, std::span<const std::byte> by
   const fs::file_status status = fs::status(path, error);
   if (fs::is_directory(status)) return "is a folder";
   if (fs::exists(status) && !fs::is_regular_file(status)) return write_in_place(path, bytes);
-  const fs::path target =
-      fs::is_symlink(fs::symlink_status(path, error)) ? fs::weakly_canonical(path, error) : path;
-  return write_and_rename(target.empty() ? path : target, bytes);
+  return write_and_rename(follow_links(path), bytes);
 }
 
 }  // namespace tandem::build

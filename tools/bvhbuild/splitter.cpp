@@ -15,35 +15,42 @@ namespace {
 using oneapi::tbb::blocked_range;
 using oneapi::tbb::parallel_for;
 
-Bounds bounds_of_triangle(const Geometry& geometry, std::uint32_t triangle, float scale) {
-  Bounds bounds;
-  for (const std::uint32_t vertex : geometry.triangles[triangle]) {
-    for (int k = 0; k < 3; ++k) {
-      const float x = geometry.points[vertex][k] * scale;
-      bounds.lo[k] = std::min(bounds.lo[k], x);
-      bounds.hi[k] = std::max(bounds.hi[k], x);
-    }
-  }
-  return bounds;
-}
-
-// A power of two that brings the longest edge of the mesh's box to about 1, so that surfaces of huge or tiny
-// meshes neither overflow nor vanish. Scaling by it is exact, but for what underflows beside the rest.
-float normalizing_scale(const Geometry& geometry) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  double lo[3] = {kInfinity, kInfinity, kInfinity}, hi[3] = {-kInfinity, -kInfinity, -kInfinity};
-  for (const auto& triangle : geometry.triangles) {
-    for (const std::uint32_t vertex : triangle) {
-      for (int k = 0; k < 3; ++k) {
-        lo[k] = std::min<double>(lo[k], geometry.points[vertex][k]);
-        hi[k] = std::max<double>(hi[k], geometry.points[vertex][k]);
+// Brings the mesh's box to its lower corner and its longest edge to between 1 and 2, so that surfaces of
+// huge, tiny or far meshes neither overflow nor vanish. Coordinates are finite floats; their differences and
+// the scaled ones are taken in float64.
+class Normalization {
+ public:
+  explicit Normalization(const Geometry& geometry) {
+    double upper[3] = {-kInfinity, -kInfinity, -kInfinity};
+    for (const auto& triangle : geometry.triangles) {
+      for (const std::uint32_t vertex : triangle) {
+        for (int k = 0; k < 3; ++k) {
+          lower_[k] = std::min<double>(lower_[k], geometry.points[vertex][k]);
+          upper[k] = std::max<double>(upper[k], geometry.points[vertex][k]);
+        }
       }
     }
+    const double longest = std::max({upper[0] - lower_[0], upper[1] - lower_[1], upper[2] - lower_[2]});
+    if (longest > 0) scale_ = std::ldexp(1.0, -std::ilogb(longest));
   }
-  const double longest = std::max({hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]});
-  if (longest == 0) return 1;
-  return static_cast<float>(std::ldexp(1.0, -std::clamp(std::ilogb(longest), -126, 127)));
-}
+
+  Bounds bounds_of(const Geometry& geometry, std::uint32_t triangle) const {
+    Bounds bounds;
+    for (const std::uint32_t vertex : geometry.triangles[triangle]) {
+      for (int k = 0; k < 3; ++k) {
+        const auto x = static_cast<float>((geometry.points[vertex][k] - lower_[k]) * scale_);
+        bounds.lo[k] = std::min(bounds.lo[k], x);
+        bounds.hi[k] = std::max(bounds.hi[k], x);
+      }
+    }
+    return bounds;
+  }
+
+ private:
+  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  double lower_[3] = {kInfinity, kInfinity, kInfinity};
+  double scale_ = 1;
+};
 
 // Calls body(0), body(1), body(2), at once if the group is large.
 template <typename Body>
@@ -61,10 +68,10 @@ TriangleSplitter::TriangleSplitter(const Geometry& geometry) {
   const auto n = static_cast<std::uint32_t>(geometry.triangles.size());
   bounds_.resize(n);
   goes_left_.resize(n);
-  const float scale = normalizing_scale(geometry);
+  const Normalization normalization(geometry);
   parallel_for(blocked_range<std::uint32_t>(0, n), [&](const auto& part) {
     for (std::uint32_t t = part.begin(); t != part.end(); ++t)
-      bounds_[t] = bounds_of_triangle(geometry, t, scale);
+      bounds_[t] = normalization.bounds_of(geometry, t);
   });
   for (int axis = 0; axis < 3; ++axis) {
     scratch_[axis].resize(n);

@@ -4,6 +4,19 @@
 
 namespace tandem {
 
+namespace {
+
+// Null where it is no JSON. What is nested deeper than any tool would write is left out: a file may bring
+// brackets by the million, and everything that walks such a value does so recursively.
+Json parse_provenance(std::string_view text) {
+  constexpr int kDeepest = 16;
+  const auto keep = [](int depth, Json::parse_event_t, const Json&) { return depth <= kDeepest; };
+  Json json = Json::parse(text, keep, false);
+  return json.is_discarded() ? Json() : json;
+}
+
+}  // namespace
+
 Inspection inspect(const std::string& path, bool only_verify) {
   Inspection inspection;
   inspection.path = path;
@@ -14,8 +27,7 @@ Inspection inspect(const std::string& path, bool only_verify) {
   const AssetView& view = inspection.asset.view();
   inspection.tree = measure_tree(view.level(), view.header->lower, view.header->upper);
   inspection.work = sample_near_contact(view.level(), view.header->lower, view.header->upper);
-  inspection.source = Json::parse(view.provenance, nullptr, false);
-  if (inspection.source.is_discarded()) inspection.source = nullptr;
+  inspection.source = parse_provenance(view.provenance);
   return inspection;
 }
 

@@ -54,11 +54,10 @@ static_assert(offsetof(Block, half_extent) == 48 && offsetof(Block, index) == 96
 /// rotation and the translation are, and whatever the order of summation, fused or not. |d| is at least 0 or
 /// NaN, and no ordered comparison of such a |d| with -inf or with NaN is true: rejected, on the first axis.
 /// Slack derived from the half-extents (|h| times an epsilon) is +inf or NaN: r is NaN, rejected too.
-/// Interval tests (lo_a <= hi_b && lo_b <= hi_a) meet lo = +inf and hi = -inf: lo <= hi' needs hi' = +inf,
-/// which the box of a checked file never has, and hi = -inf is below every lo' but -inf; of two imaginary
-/// boxes +inf <= -inf is false. A test must therefore never be written as "separated if |d| > r, else
-/// overlapping": NaN would pass it. The same values make an imaginary box the neutral element of the union of
-/// boxes by min and max.
+/// Interval tests (lo_a <= hi_b && lo_b <= hi_a) meet lo = +inf and hi = -inf: both hold on an axis only if
+/// the other interval is [-inf, +inf], and c - h and c + h cannot both overflow for finite c and h. A test
+/// must therefore never be written as "separated if |d| > r, else overlapping": NaN would pass it. The same
+/// values make an imaginary box the neutral element of the union of boxes by min and max.
 inline constexpr float kImaginaryCenter = 0.0f;
 inline constexpr float kImaginaryHalfExtent = -std::numeric_limits<float>::infinity();
 

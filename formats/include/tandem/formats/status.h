@@ -24,10 +24,10 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kTrailingBytes,   ///< more bytes than the header says
     kContentChanged,  ///< the hash differs: some byte is not what was written
     // Header and sections. From here on the hash is right, so the writer is wrong or hostile.
-    kBadHeader,            ///< a reserved byte is set, a count is zero or past its limit
-    kBadSectionTable,      ///< the table itself does not fit
-    kUnknownSection,       ///< a kind that this version does not define
-    kSectionMisaligned,    ///< offset no multiple of 256
+    kBadHeader,          ///< a reserved byte is set, a count is zero or past its limit
+    kBadSectionTable,    ///< the table itself does not fit
+    kUnknownSection,     ///< of a kind that this version does not define, or of a level that the file has not
+    kSectionMisaligned,  ///< offset no multiple of 256
     kSectionOutOfBounds,   ///< reaches past the end of the file, or its size overflows
     kSectionsOverlap,      ///< or are not in ascending order
     kSectionSizeMismatch,  ///< bytes differ from count times element size
@@ -57,8 +57,8 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kBadFace,         ///< source face or part out of range, or a reserved lane set
     kBoundsMismatch,  ///< the header's bounds are not those of the triangles
     // Querying.
-  kOutOfRange,  ///< a coordinate that is NaN or larger than the query can take
-  // Uploading.
+    kOutOfRange,  ///< a coordinate that is NaN or larger than the query can take
+                  // Uploading.
     kCudaFailed,
 };
 

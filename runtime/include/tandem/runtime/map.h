@@ -15,9 +15,9 @@ enum class Access : std::uint8_t {
 /// Owns the bytes of a .bvh file in CPU memory and hands out views of them. Movable, not copyable. Throws
 /// nothing.
 ///
-/// While an asset is mapped, its file must not be cut short (tools that replace it by a rename, as bvhbuild
-/// does, are safe): reading a page that is gone ends a process. For a file already in memory there is nothing
-/// to own: call check() of tandem/formats/check.h.
+/// While an asset is mapped, nobody may write into its file or cut it short: what was checked would no longer
+/// hold, and reading a page that is gone ends a process. Tools that replace a file by a rename, as bvhbuild does,
+/// are safe. For a file already in memory there is nothing to own: call check() of tandem/formats/check.h.
 class MappedAsset {
  public:
   MappedAsset() = default;

@@ -1,5 +1,5 @@
 # Installs the libraries with every package of the tools out of reach, builds the consumer against the installation and
-# runs it on a file that bvhbuild writes. Variables: SOURCE, FOLDER (to work in), COMPILER, BVHBUILD.
+# runs it on a file that bvhbuild writes. Variables: SOURCE, FOLDER (to work in), COMPILER, GENERATOR, BVHBUILD.
 cmake_minimum_required(VERSION 3.25)
 
 function(run)
@@ -21,12 +21,12 @@ file(REMOVE_RECURSE ${FOLDER})
 foreach(package assimp CGAL CLI11 CUDAToolkit GTest HDF5 nlohmann_json TBB Threads)
   list(APPEND no_packages -DCMAKE_DISABLE_FIND_PACKAGE_${package}=ON)
 endforeach()
-run(${CMAKE_COMMAND} -S ${SOURCE} -B ${FOLDER}/build -DCMAKE_CXX_COMPILER=${COMPILER} ${no_packages}
+run(${CMAKE_COMMAND} -S ${SOURCE} -B ${FOLDER}/build -G ${GENERATOR} -DCMAKE_CXX_COMPILER=${COMPILER} ${no_packages}
   -DTANDEM_TOOLS=OFF -DTANDEM_TESTS=OFF -DTANDEM_CUDA=OFF -DTANDEM_WARNINGS_AS_ERRORS=ON)
 run(${CMAKE_COMMAND} --build ${FOLDER}/build)
 run(${CMAKE_COMMAND} --install ${FOLDER}/build --prefix ${FOLDER}/prefix)
 
-run(${CMAKE_COMMAND} -S ${SOURCE}/tests/consumer -B ${FOLDER}/consumer -DCMAKE_CXX_COMPILER=${COMPILER} ${no_packages}
+run(${CMAKE_COMMAND} -S ${SOURCE}/tests/consumer -B ${FOLDER}/consumer -G ${GENERATOR} -DCMAKE_CXX_COMPILER=${COMPILER} ${no_packages}
   -DCMAKE_PREFIX_PATH=${FOLDER}/prefix)
 run(${CMAKE_COMMAND} --build ${FOLDER}/consumer)
 

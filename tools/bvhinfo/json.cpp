@@ -65,8 +65,9 @@ Json to_json(const Inspection& inspection) {
                {"hash", hexadecimal(header.hash)},
                {"bytes", header.file_bytes}};
   json.update(to_json(inspection.tree));
-  json["expected_block_pairs"] = inspection.work.block_pairs;
-  json["expected_candidates"] = inspection.work.candidates;
+  const bool sampled = inspection.work.poses > 0;
+  json["expected_block_pairs"] = sampled ? Json(inspection.work.block_pairs) : Json();
+  json["expected_candidates"] = sampled ? Json(inspection.work.candidates) : Json();
   json["leaf_blocks_at_depth"] = inspection.tree.leaf_blocks_at_depth;
   json["blocks_with_fill"] = inspection.tree.blocks_with_fill;
   json["bounds"] = {{"lower", header.lower}, {"upper", header.upper}};

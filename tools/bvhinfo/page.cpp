@@ -78,6 +78,7 @@ std::string tree_lines(const TreeStatistics& tree, const ExpectedWork& work) {
           " internal, " + with_commas(tree.partial_leaf_blocks) + " partial leaf\n";
   text += format("  depth        %u blocks\n  leaf fill    %.2f %%\n  SAH cost     %.3f\n", tree.depth,
                  100 * tree.leaf_fill, tree.sah_cost);
+  if (work.poses == 0) return text + "  query work   too much to sample: the mesh overlaps itself\n";
   text += format("  query work   %.1f block pairs, %.1f candidates expected near contact (%u poses)\n",
                  work.block_pairs, work.candidates, work.poses);
   return text;
@@ -132,6 +133,7 @@ constexpr const char* kCompared[] = {"bytes",
                                      "rounding_error"};
 
 std::string figure(const Json& value) {
+  if (value.is_null()) return "-";
   return value.is_number_integer() ? with_commas(value.get<std::uint64_t>())
                                    : format("%.4g", value.get<double>());
 }
@@ -165,10 +167,12 @@ std::string comparison(const std::vector<Inspection>& inspections) {
   text += "\n";
   for (const char* key : kCompared) {
     text += format("%-22s", key);
-    const double base = files[0][key].get<double>();
+    const double base = files[0][key].is_null() ? 0 : files[0][key].get<double>();
     for (std::size_t i = 0; i < files.size(); ++i) {
       const std::string value = figure(files[i][key]);
-      const std::string ratio = i > 0 && base != 0 ? format("x%.3f", files[i][key].get<double>() / base) : "";
+      const std::string ratio = i > 0 && base != 0 && !files[i][key].is_null()
+                                    ? format("x%.3f", files[i][key].get<double>() / base)
+                                    : "";
       text += format(" %14s %9s", value.c_str(), ratio.c_str());
     }
     text += "\n";

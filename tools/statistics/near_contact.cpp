@@ -44,14 +44,23 @@ Vector random_direction(Random& random) {
   return {r * std::cos(angle), r * std::sin(angle), z};
 }
 
+// What a sample may cost, a second or so: a mesh whose triangles all lie in one place would take their number
+// squared.
+constexpr std::uint64_t kMostBlockPairs = 5'000'000;
+
 struct Work {
   std::uint64_t block_pairs = 0, candidates = 0;
 };
 
 // The traversal that queries make, of a tree against itself, posed.
-Work query(const LevelView& tree, const RelativePose& b_in_a, bool stop_at_first) {
+// Once `budget`, a number of block pairs, is used up, nothing is met any more.
+Work query(const LevelView& tree, const RelativePose& b_in_a, bool stop_at_first, std::uint64_t& budget) {
   const BlockPairTest of_blocks = block_pair_test();
-  const auto test = [&](const Block& a, const Block& b) { return of_blocks(a, b, b_in_a); };
+  const auto test = [&](const Block& a, const Block& b) -> std::uint32_t {
+    if (budget == 0) return 0;
+    --budget;
+    return of_blocks(a, b, b_in_a);
+  };
   Work work;
   work.block_pairs = traverse(tree, tree, test, [&](std::uint32_t, std::uint32_t, std::uint32_t mask) {
     work.candidates += static_cast<std::uint64_t>(std::popcount(mask));
@@ -87,11 +96,12 @@ ExpectedWork sample_near_contact(const LevelView& level, const float* lower, con
   Random random;
   ExpectedWork sum;
   sum.poses = poses;
+  std::uint64_t budget = kMostBlockPairs;
   for (std::uint32_t i = 0; i < poses; ++i) {
     const Matrix rotation = random_rotation(random);
     const Vector direction = random_direction(random);
     const auto work_at = [&](double distance, bool stop_at_first) {
-      return query(level, make_pose(rotation, direction, distance, center), stop_at_first);
+      return query(level, make_pose(rotation, direction, distance, center), stop_at_first, budget);
     };
     double touching = 0, apart = 2.1 * radius;
     for (int step = 0; step < 20; ++step) {
@@ -99,6 +109,7 @@ ExpectedWork sample_near_contact(const LevelView& level, const float* lower, con
       (work_at(middle, true).candidates > 0 ? touching : apart) = middle;
     }
     const Work work = work_at(touching - 0.05 * random.uniform() * radius, false);
+    if (budget == 0) return {};
     sum.block_pairs += static_cast<double>(work.block_pairs) / poses;
     sum.candidates += static_cast<double>(work.candidates) / poses;
   }

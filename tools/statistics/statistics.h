@@ -29,7 +29,7 @@ TreeStatistics measure_tree(const LevelView& level, const float* lower, const fl
 struct ExpectedWork {
   double block_pairs = 0;  ///< units of 4 x 4 box tests
   double candidates = 0;   ///< leaf pairs whose boxes overlap
-  std::uint32_t poses = 0;
+  std::uint32_t poses = 0;  ///< 0: a mesh overlaps itself so much that sampling was given up; no figures then
 };
 
 /// Samples poses: a random rotation, a random direction, the distance at which the first leaf boxes begin to

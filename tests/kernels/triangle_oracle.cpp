@@ -38,6 +38,17 @@ bool meet(const A& a, const B& b) {
   return CGAL::do_intersect(a, b);
 }
 
+CGAL::Gmpq rational_volume(const double* p, const double* q, const double* r, const double* s) {
+  CGAL::Gmpq d[3][3];
+  const double* point[] = {q, r, s};
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) d[i][k] = CGAL::Gmpq(point[i][k]) - CGAL::Gmpq(p[k]);
+  }
+  return d[0][0] * (d[1][1] * d[2][2] - d[1][2] * d[2][1]) -
+         d[0][1] * (d[1][0] * d[2][2] - d[1][2] * d[2][0]) +
+         d[0][2] * (d[1][0] * d[2][1] - d[1][1] * d[2][0]);
+}
+
 }  // namespace
 
 bool oracle_contact(const TrianglePair& pair) {
@@ -45,15 +56,19 @@ bool oracle_contact(const TrianglePair& pair) {
 }
 
 int oracle_volume_sign(const double* p, const double* q, const double* r, const double* s) {
-  CGAL::Gmpq d[3][3];
-  const double* point[] = {q, r, s};
-  for (int i = 0; i < 3; ++i) {
-    for (int k = 0; k < 3; ++k) d[i][k] = CGAL::Gmpq(point[i][k]) - CGAL::Gmpq(p[k]);
-  }
-  const CGAL::Gmpq determinant = d[0][0] * (d[1][1] * d[2][2] - d[1][2] * d[2][1]) -
-                                 d[0][1] * (d[1][0] * d[2][2] - d[1][2] * d[2][0]) +
-                                 d[0][2] * (d[1][0] * d[2][1] - d[1][1] * d[2][0]);
-  return CGAL::sign(determinant);
+  return CGAL::sign(rational_volume(p, q, r, s));
+}
+
+double oracle_volume_error(const double* p, const double* q, const double* r, const double* s,
+                           double computed) {
+  return CGAL::to_double(CGAL::abs(CGAL::Gmpq(computed) - rational_volume(p, q, r, s)));
+}
+
+double oracle_area_error(const double* p, const double* q, const double* r, int k, double computed) {
+  const int i = (k + 1) % 3, j = (k + 2) % 3;
+  const auto minus = [&](const double* x, int axis) { return CGAL::Gmpq(x[axis]) - CGAL::Gmpq(p[axis]); };
+  const CGAL::Gmpq area = minus(q, i) * minus(r, j) - minus(q, j) * minus(r, i);
+  return CGAL::to_double(CGAL::abs(CGAL::Gmpq(computed) - area));
 }
 
 }  // namespace tandem

@@ -7,6 +7,13 @@ namespace tandem {
 /// point that it is.
 bool oracle_contact(const TrianglePair& pair);
 
+/// |computed - det(q - p, r - p, s - p)|, by rational numbers, rounded at the end.
+double oracle_volume_error(const double* p, const double* q, const double* r, const double* s,
+                           double computed);
+
+/// The same for component k of (q - p) x (r - p).
+double oracle_area_error(const double* p, const double* q, const double* r, int k, double computed);
+
 /// The sign of det(q - p, r - p, s - p), by rational numbers.
 int oracle_volume_sign(const double* p, const double* q, const double* r, const double* s);
 

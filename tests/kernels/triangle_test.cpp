@@ -181,6 +181,24 @@ TEST(ExactSigns, ExpansionsAgreeWithWideIntegersInTheirRange) {
   }
 }
 
+/// A determinant of one unit cubed, and none, of numbers of 53 bits at the lower end of the range: the last
+/// bit of the last product is the smallest float64 there is.
+TEST(ExactSigns, ExpansionsKeepTheLastBitOfTheSmallestNumbers) {
+  Random random(10);
+  constexpr double kUnit = detail::kSmallestInRange * 0x1p-52;
+  constexpr double kOrigin[3] = {0, 0, 0};
+  for (int i = 0; i < 1000; ++i) {
+    const double m = kUnit * (0x1p52 + 2 + std::floor(uniform(random, 0.0, 0x1p51)));
+    const double more = m + kUnit, less = m - kUnit;
+    const double u[3] = {m, less, m}, v[3] = {more, m, more};  // u x v = {-1, 0, 1} units squared
+    for (const double w_z : {less, m, more}) {
+      const double w[3] = {m, m, w_z};
+      ASSERT_EQ(detail::expansion_volume_sign(kOrigin, u, v, w), (w_z > m) - (w_z < m)) << m / kUnit;
+      ASSERT_EQ(detail::wide_volume_sign(kOrigin, u, v, w), (w_z > m) - (w_z < m)) << m / kUnit;
+    }
+  }
+}
+
 /// The ends of the range in which expansions are exact: the smallest and largest numbers of full width.
 TEST(ExactSigns, ExpansionsAreExactAtTheEndsOfTheirRange) {
   Random random(9);

@@ -61,12 +61,12 @@ TANDEM_HD inline Real bounded_size(Real x) {
 /// The sign of a computed value, or 0 where it is uncertain.
 template <class Real>
 TANDEM_HD inline int certain_sign(Real value, Real bound) {
-  return value > bound ? 1 : -value > bound ? -1 : 0;
+  return static_cast<int>(value > bound) - static_cast<int>(-value > bound);
 }
 
 template <class Real>
 TANDEM_HD inline int computed_sign(Real value) {
-  return value > 0 ? 1 : value < 0 ? -1 : 0;
+  return static_cast<int>(value > 0) - static_cast<int>(value < 0);
 }
 
 /// The plane through p, q and r: the minors that volume(p, q, r, s) is made of, and their permanents.

@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
-"""Writes seed files for the fuzzers of the readers: make_corpus.py FOLDER makes FOLDER/obj, /ply, /stl and /off.
+"""Writes seed files for the fuzzers of the readers: make_corpus.py FOLDER makes FOLDER/obj, /ply, /stl, /off and /gltf.
 
 The seeds are small and together use every feature of their format, so that a fuzzer finds the far corners soon.
 """
+import base64
 import itertools
+import json
 import pathlib
 import struct
 import sys
@@ -82,9 +84,36 @@ def off_seeds():
     yield off_binary()
 
 
+def gltf_document(buffer, **more):
+    """A tetrahedron as triangles and a strip, at nodes with all kinds of transforms; a sparse accessor moves a corner."""
+    accessors = [{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
+                 {"bufferView": 1, "componentType": 5121, "count": 12, "type": "SCALAR"},
+                 {"componentType": 5123, "count": 4, "type": "VEC3", "normalized": True,
+                  "sparse": {"count": 1, "indices": {"bufferView": 1, "componentType": 5121}, "values": {"bufferView": 0}}}]
+    primitives = [{"attributes": {"POSITION": 0}, "indices": 1}, {"attributes": {"POSITION": 2}, "indices": 1, "mode": 5},
+                  {"attributes": {"POSITION": 0}, "mode": 6}, {"attributes": {}, "mode": 0}]
+    nodes = [{"children": [1, 2], "translation": [1, 2, 3], "rotation": [0, 0, 1, 0], "scale": [1, 1, -2.5e-1]},
+             {"name": "n", "mesh": 0, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]},
+             {"mesh": 0, "skin": 0, "weights": [1], "extensions": {"EXT_mesh_gpu_instancing": {}}}]
+    views = [{"buffer": 0, "byteLength": 48, "byteStride": 12}, {"buffer": 0, "byteOffset": 48, "byteLength": 12}]
+    return json.dumps({"asset": {"version": "2.0"}, "nodes": nodes, "meshes": [{"name": "m", "primitives": primitives}],
+                       "accessors": accessors, "bufferViews": views, "buffers": [dict(buffer, byteLength=60)], **more})
+
+
+def gltf_seeds():
+    data = b"".join(struct.pack("<3f", *point) for point in POINTS) + bytes(itertools.chain(*FACES))
+    uri = "data:application/octet-stream;base64," + base64.b64encode(data).decode()
+    yield gltf_document({"uri": uri})
+    yield gltf_document({"uri": uri, "name": "b"}, scene=0, scenes=[{"nodes": [1]}, {}], extensionsRequired=["KHR_mesh_quantization"])
+    yield gltf_document({"uri": "a%20b.bin"})
+    text = gltf_document({}).encode()
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(data), b"BIN\0") + data
+    yield b"glTF" + struct.pack("<2I", 2, 12 + len(chunks)) + chunks
+
+
 def main():
     folder = pathlib.Path(sys.argv[1])
-    for kind, seeds in [("obj", obj_seeds()), ("ply", ply_seeds()), ("stl", stl_seeds()), ("off", off_seeds())]:
+    for kind, seeds in [("obj", obj_seeds()), ("ply", ply_seeds()), ("stl", stl_seeds()), ("off", off_seeds()), ("gltf", gltf_seeds())]:
         (folder / kind).mkdir(parents=True, exist_ok=True)
         for number, seed in enumerate(seeds):
             data = seed if isinstance(seed, bytes) else seed.encode()

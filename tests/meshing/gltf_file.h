@@ -114,7 +114,7 @@ class GltfFile : public ::testing::Test {
   }
 
   ReadResult read(const std::string& bytes, std::uint64_t most_bytes = kMostBytes) const {
-    return read_gltf(write("a.gltf", bytes), most_bytes);
+    return read_gltf(bytes, folder_, most_bytes);
   }
   PolygonMesh mesh(const Gltf& file) const {
     ReadResult result = read(file.json());

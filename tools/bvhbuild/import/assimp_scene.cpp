@@ -5,7 +5,6 @@
 #include <assimp/scene.h>
 #include <assimp/version.h>
 
-#include <array>
 #include <assimp/Importer.hpp>
 #include <exception>
 #include <new>
@@ -15,47 +14,23 @@
 #include <utility>
 #include <vector>
 
+#include "import/affine.h"
 #include "import/mesh_assembly.h"
 #include "import/printable.h"
 
 namespace tandem::build {
 namespace {
 
-/// Rows of an affine map: x' = a[0] x + a[1] y + a[2] z + a[3].
-using Transform = std::array<std::array<double, 4>, 3>;
-
-constexpr Transform kIdentity{{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
-
-Transform local_transform(const aiNode& node) {
+Affine local_transform(const aiNode& node) {
   const auto& m = node.mTransformation;
   return {{{m.a1, m.a2, m.a3, m.a4}, {m.b1, m.b2, m.b3, m.b4}, {m.c1, m.c2, m.c3, m.c4}}};
-}
-
-/// First `inner`, then `outer`.
-Transform combined(const Transform& outer, const Transform& inner) {
-  Transform result{};
-  for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 4; ++column) {
-      double sum = column == 3 ? outer[row][3] : 0;
-      for (int k = 0; k < 3; ++k) sum += outer[row][k] * inner[k][column];
-      result[row][column] = sum;
-    }
-  return result;
-}
-
-/// An identity stays out of the arithmetic, so that a coordinate that is not finite spoils no other one.
-Point transformed(const Transform& t, const aiVector3D& v) {
-  if (t == kIdentity) return {v.x, v.y, v.z};
-  Point p;
-  for (int row = 0; row < 3; ++row) p[row] = t[row][0] * v.x + t[row][1] * v.y + t[row][2] * v.z + t[row][3];
-  return p;
 }
 
 /// A node on the way through the tree. The way is kept in a list: trees of hostile files are deeper than a
 /// stack.
 struct Visit {
   const aiNode* node;
-  Transform world;
+  Affine world;
   std::string path;
 };
 
@@ -75,7 +50,7 @@ void add_mesh(const aiMesh& mesh, const Visit& visit, MeshAssembly& out) {
   out.begin_part(text(mesh.mName), visit.path);
   const std::size_t first = out.point_count();
   for (const aiVector3D& v : std::span(mesh.mVertices, mesh.mNumVertices))
-    out.add_point(transformed(visit.world, v));
+    out.add_point(transformed(visit.world, {v.x, v.y, v.z}));
   for (const aiFace& face : std::span(mesh.mFaces, mesh.mNumFaces)) {
     if (face.mIndices == nullptr || face.mNumIndices < 3) continue;  // points and lines
     for (const unsigned index : std::span(face.mIndices, face.mNumIndices))

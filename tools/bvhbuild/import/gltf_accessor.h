@@ -1,6 +1,5 @@
 #pragma once
 #include <cstdint>
-#include <string>
 #include <vector>
 
 #include "import/gltf_model.h"
@@ -20,24 +19,20 @@ enum ComponentType {
   kFloat64 = 5130
 };
 
-/// Whether an accessor can be read as what it is used for: its type fits, and all its elements, those of its
-/// sparse part included, lie inside its buffer views, and these inside their buffers.
-///
-/// Result: empty, or what is wrong: "accessors[3] ends at byte 700 of bufferViews[1], which has 648".
-std::string check_positions(const GltfModel& model, int accessor);
-std::string check_indices(const GltfModel& model, int accessor);
+/// Throws a GltfError unless an accessor can be read as what it is used for: its type fits, and all its
+/// elements, those of its sparse part included, lie inside its buffer views, and these inside their buffers:
+/// "accessors[3] ends at byte 700 of bufferViews[1], which has 648".
+void check_positions(const GltfModel& model, int accessor);
+void check_indices(const GltfModel& model, int accessor);
 
 /// Effect: fills `points` with the elements of an accessor that check_positions() found good: floats, or
-/// integers as KHR_mesh_quantization has them, whole or normalised.
-///
-/// Result: empty, or what is wrong with its sparse indices.
-std::string read_positions(const GltfModel& model, int accessor, std::vector<Point>& points);
+/// integers as KHR_mesh_quantization has them, whole or normalised. Throws a GltfError for sparse indices out
+/// of range.
+void read_positions(const GltfModel& model, int accessor, std::vector<Point>& points);
 
 /// Effect: fills `indices` with the elements of an accessor that check_indices() found good. The largest
 /// number of its type, which restarts a primitive where that is allowed and in glTF means nothing, becomes
-/// kNoVertex.
-///
-/// Result: empty, or what is wrong with its sparse indices.
-std::string read_indices(const GltfModel& model, int accessor, std::vector<std::uint32_t>& indices);
+/// kNoVertex. Throws a GltfError for sparse indices out of range.
+void read_indices(const GltfModel& model, int accessor, std::vector<std::uint32_t>& indices);
 
 }  // namespace tandem::build

@@ -4,55 +4,52 @@
 #include <cstdint>
 
 #include "import/binary_number.h"
+#include "import/gltf_model.h"
 
 namespace tandem::build {
 namespace {
 
 constexpr std::uint64_t kHeaderBytes = 12;  // magic, version, length of the file
-constexpr std::uint64_t kChunkBytes = 8;    // length of the chunk, type
+constexpr std::uint32_t kJson = 0x4E4F534A, kBinary = 0x004E4942;
 
-std::uint64_t word(std::string_view bytes, std::uint64_t offset) {
+std::uint32_t word(std::string_view bytes, std::uint64_t offset) {
   return load_number<std::uint32_t, std::endian::little>(bytes.data() + offset);
 }
 
-GltfContainer failure(std::string error) {
-  GltfContainer container;
-  container.error = std::move(error);
-  return container;
-}
+struct Chunk {
+  std::uint32_t type;
+  std::string_view bytes;
+};
 
-/// Whether a chunk that begins at `offset` lies before `end`.
-bool holds_chunk(std::string_view bytes, std::uint64_t offset, std::uint64_t end) {
-  return offset + kChunkBytes <= end && word(bytes, offset) <= end - offset - kChunkBytes;
-}
-
-GltfContainer open_binary(std::string_view bytes) {
-  constexpr std::uint64_t kJson = 0x4E4F534A;
-  if (bytes.size() < kHeaderBytes) return failure("its GLB header is cut short");
-  GltfContainer container;
-  container.is_binary = true;
-  container.version = static_cast<unsigned>(word(bytes, 4));
-  if (container.version != 2) return container;
-  const std::uint64_t promised = word(bytes, 8);
-  if (promised > bytes.size())
-    return failure("its GLB header promises " + std::to_string(promised) + " bytes, the file holds " +
-                   std::to_string(bytes.size()));
-  if (!holds_chunk(bytes, kHeaderBytes, promised)) return failure("its JSON chunk is cut short");
-  if (word(bytes, kHeaderBytes + 4) != kJson) return failure("its first chunk is not JSON");
-  const std::uint64_t json_bytes = word(bytes, kHeaderBytes);
-  container.json = bytes.substr(kHeaderBytes + kChunkBytes, json_bytes);
-  const std::uint64_t next = kHeaderBytes + kChunkBytes + json_bytes;
-  if (next != promised && !holds_chunk(bytes, next, promised))
-    return failure("its binary chunk is cut short");
-  return container;
+/// Takes a chunk off the front of what is left of a file.
+Chunk take_chunk(std::string_view& left, const char* name) {
+  constexpr std::uint64_t kHead = 8;  // length of the chunk, type
+  if (left.size() < kHead || word(left, 0) > left.size() - kHead)
+    throw GltfError("its " + std::string(name) + " chunk is cut short");
+  const Chunk chunk{word(left, 4), left.substr(kHead, word(left, 0))};
+  left.remove_prefix(kHead + chunk.bytes.size());
+  return chunk;
 }
 
 }  // namespace
 
 GltfContainer open_gltf_container(std::string_view bytes) {
-  if (bytes.starts_with("glTF")) return open_binary(bytes);
-  GltfContainer container;
-  container.json = bytes;
+  if (!bytes.starts_with("glTF")) return {false, bytes, {}};
+  if (bytes.size() < kHeaderBytes) throw GltfError("its GLB header is cut short");
+  check_gltf_version(std::to_string(word(bytes, 4)) + ".0");
+  const std::uint64_t promised = word(bytes, 8);
+  if (promised > bytes.size())
+    throw GltfError("its GLB header promises " + std::to_string(promised) + " bytes, the file holds " +
+                    std::to_string(bytes.size()));
+  std::string_view left = bytes.substr(0, promised);
+  left.remove_prefix(std::min<std::uint64_t>(kHeaderBytes, promised));
+  const Chunk json = take_chunk(left, "JSON");
+  if (json.type != kJson) throw GltfError("its first chunk is not JSON");
+  GltfContainer container{true, json.bytes, {}};
+  while (!left.empty() && container.chunk.empty()) {
+    const Chunk chunk = take_chunk(left, "binary");
+    if (chunk.type == kBinary) container.chunk = chunk.bytes;
+  }
   return container;
 }
 

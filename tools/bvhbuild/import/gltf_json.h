@@ -1,33 +1,55 @@
 #pragma once
 #include <cstdint>
+#include <functional>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace tandem::build {
 
-/// A buffer as the JSON of a glTF file announces it.
-struct GltfBufferSource {
-  std::string name;
-  std::string uri;  ///< empty: the binary chunk of a GLB file
-  std::uint64_t bytes = 0;
-};
-
-/// What must be known of a glTF file's JSON before a library is let at it.
-struct GltfJson {
-  std::string error;  ///< empty, or what is wrong with it
-  std::string version;
-  std::vector<GltfBufferSource> buffers;
-  std::vector<std::string> extensions_used;
-  std::vector<std::string> extensions_required;
-};
-
-/// Scans the JSON of a glTF file without building anything of it.
+/// An object in the JSON of a glTF file. It knows its way there, so that errors name it.
 ///
-/// tinygltf passes over what has the wrong type (a mesh "0" leaves its node without one) and cuts integers to
-/// 32 bits, so all members that say where triangles are must have their type here. Null counts as left out.
-/// Errors: text that is no JSON or nested more than 500 deep (what walks through it may recurse); a member
-/// of the wrong type: "nodes[3].mesh is no unsigned integer below 2147483648".
-GltfJson scan_gltf_json(std::string_view text);
+/// Members that are null count as left out: numbers are `otherwise` or 0, texts and lists empty then. Members
+/// of a wrong type throw a GltfError: "nodes[3].mesh is not an unsigned integer below 2147483648".
+class GltfObject {
+ public:
+  /// Throws a GltfError when `json` is no object.
+  explicit GltfObject(const nlohmann::json& json) : GltfObject(json, nullptr, {}, -1) {}
+
+  bool has(const char* name) const { return find(name) != nullptr; }
+  int index(const char* name, int otherwise = -1) const;
+  std::uint64_t size(const char* name) const;
+  std::uint64_t required_size(const char* name) const;
+  bool truth(const char* name) const;
+  std::string text(const char* name) const;
+  std::vector<int> indices(const char* name) const;
+  std::vector<double> numbers(const char* name) const;
+  std::vector<std::string> texts(const char* name) const;
+
+  using Use = std::function<void(const GltfObject&)>;
+  /// Calls `use` with the object that a member is.
+  void with(const char* name, const Use& use) const;
+  /// Calls `use` with each object of the array that a member is.
+  void each(const char* name, const Use& use) const;
+
+  /// The way to a member: "accessors[2].sparse.count".
+  std::string path(const char* name, std::int64_t item = -1) const;
+
+ private:
+  GltfObject(const nlohmann::json& json, const GltfObject* parent, const char* name, std::int64_t item);
+  const nlohmann::json* find(const char* name) const;
+  template <class Item, class Convert>
+  std::vector<Item> list(const char* name, const Convert& convert) const;
+
+  const nlohmann::json& json_;
+  const GltfObject* parent_;  ///< of the document: nullptr
+  const char* name_;          ///< in its parent
+  std::int64_t item_;         ///< in the array of that name; -1: it is no array
+};
+
+/// Throws a GltfError for text that is no JSON, nested more than 500 deep, or of so many values that they and
+/// what is made of them may take more than `most_bytes` bytes.
+nlohmann::json parse_gltf_json(std::string_view text, std::uint64_t most_bytes);
 
 }  // namespace tandem::build

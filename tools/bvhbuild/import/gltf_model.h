@@ -1,12 +1,21 @@
 #pragma once
 #include <cstdint>
 #include <optional>
+#include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "import/affine.h"
+#include "import/gltf_buffer.h"
+#include "import/gltf_json.h"
 
 namespace tandem::build {
+
+/// Why a glTF file cannot be read. read_gltf() makes a ReadResult of it.
+struct GltfError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
 
 /// The parts of a glTF file that say where its triangles are, as the file has them: no index, offset or count
 /// in here is checked. An index of -1 stands for a member that the file leaves out.
@@ -42,6 +51,7 @@ struct GltfPrimitive {
   int mode = 4;
   int positions = -1;  ///< accessor of POSITION
   int indices = -1;    ///< accessor; -1: the vertices in their order
+  bool has_draco = false;
 };
 
 struct GltfMesh {
@@ -61,8 +71,7 @@ struct GltfNode {
 };
 
 struct GltfModel {
-  std::string reader;  ///< who read it, for the report
-  std::vector<std::vector<unsigned char>> buffers;
+  std::vector<GltfBuffer> buffers;
   std::vector<GltfView> views;
   std::vector<GltfAccessor> accessors;
   std::vector<GltfMesh> meshes;
@@ -70,5 +79,17 @@ struct GltfModel {
   std::vector<int> roots;            ///< nodes of the scene
   std::vector<std::string> remarks;  ///< for the report, at most a few
 };
+
+/// Reads the model out of a glTF file's JSON, and the buffers from where they are.
+///
+/// Throws a GltfError for another version than 2; extensions that hide the triangles from us, by name;
+/// buffers that are missing or too short; members of a wrong type; transforms that are none.
+GltfModel read_gltf_model(const GltfObject& root, GltfBufferPlaces places);
+
+/// Throws a GltfError for another version than 2.
+void check_gltf_version(const std::string& version);
+
+/// Whether an error is one that assimp may not have: glTF 1, or Draco.
+bool is_for_another_gltf_reader(std::string_view error);
 
 }  // namespace tandem::build

@@ -17,6 +17,7 @@ enum Mode { kTriangles = 4, kTriangleStrip = 5, kTriangleFan = 6 };
 
 constexpr std::uint64_t kMostCorners = kNoVertex - 1;
 constexpr int kMostRemarksOfAKind = 4;
+constexpr std::size_t kLongEnough = 2000;  ///< of names, more than any report shows
 
 std::string numbered(const char* list, std::size_t index) {
   return std::string(list) + "[" + std::to_string(index) + "]";
@@ -26,22 +27,24 @@ std::string described(const char* list, std::size_t index, std::string_view name
   return name.empty() ? numbered(list, index) : numbered(list, index) + " " + quoted(name);
 }
 
-/// Nodes and meshes without a name are told apart by their number.
+/// Nodes and meshes without a name are told apart by their number. Nobody sees the end of a long name.
 std::string name_or_number(const std::string& name, const char* list, std::size_t index) {
-  return name.empty() ? numbered(list, index) : name;
+  return name.empty() ? numbered(list, index) : name.substr(0, kLongEnough);
 }
 
-std::string child_path(const std::string& parent, const std::string& name) {
-  constexpr std::size_t kLongEnough = 2000;
-  if (parent.size() > kLongEnough) return parent;
-  return parent.empty() ? name : parent + "/" + name;
-}
-
-/// Where a node stands.
+/// Where a node stands. Below a long path, nodes share it.
 struct Place {
-  Affine world;
-  std::string path;
+  Affine world = kIdentity;
+  std::shared_ptr<const std::string> path = std::make_shared<std::string>();
 };
+
+Place child_place(const Place& parent, const GltfNode& node, std::size_t index) {
+  Place place{combined(parent.world, node.local), parent.path};
+  if (parent.path->size() < kLongEnough)
+    place.path = std::make_shared<std::string>(*parent.path + (parent.path->empty() ? "" : "/") +
+                                               name_or_number(node.name, "nodes", index));
+  return place;
+}
 
 /// A node on the way through the forest. The way is kept in a list: trees of hostile files are deeper than a
 /// stack.
@@ -55,63 +58,59 @@ void push_backwards(const std::vector<int>& nodes, const std::shared_ptr<const P
   for (std::size_t i = nodes.size(); i-- > 0;) pending.push_back({nodes[i], parent});
 }
 
-/// Calls `visit(index, place)` for all nodes of the scene, depth first; stops at the first error and returns
-/// it. No node is visited twice, so the way ends.
+/// Calls `visit(index, place)` for all nodes of the scene, depth first. No node is visited twice, so the way
+/// ends.
 template <class Visit>
-std::string walk(const GltfModel& model, const Visit& visit) {
+void walk(const GltfModel& model, const Visit& visit) {
   std::vector<bool> seen(model.nodes.size());
   std::vector<Step> pending;
-  push_backwards(model.roots, std::make_shared<Place>(Place{kIdentity, {}}), pending);
+  push_backwards(model.roots, std::make_shared<Place>(), pending);
   while (!pending.empty()) {
     const Step step = std::move(pending.back());
     pending.pop_back();
     const auto index = static_cast<std::size_t>(step.node);
     if (step.node < 0 || index >= model.nodes.size())
-      return numbered("nodes", index) + " is named, but there are " + std::to_string(model.nodes.size());
+      throw GltfError(numbered("nodes", index) + " is named, but there are " +
+                      std::to_string(model.nodes.size()));
     const GltfNode& node = model.nodes[index];
     if (seen[index])
-      return described("nodes", index, node.name) +
-             " is reached twice: nodes must form trees, without cycles and second parents";
+      throw GltfError(described("nodes", index, node.name) +
+                      " is reached twice: nodes must form trees, without cycles and second parents");
     seen[index] = true;
-    const auto place = std::make_shared<const Place>(
-        Place{combined(step.parent->world, node.local),
-              child_path(step.parent->path, name_or_number(node.name, "nodes", index))});
-    std::string wrong = visit(index, *place);
-    if (!wrong.empty()) return wrong;
+    const auto place = std::make_shared<const Place>(child_place(*step.parent, node, index));
+    visit(index, *place);
     push_backwards(node.children, place, pending);
   }
-  return {};
 }
 
 /// What a mesh adds to the result each time that a node shows it.
 struct Size {
   std::uint64_t points = 0;
-  std::uint64_t triangles = 0;  ///< at most
+  std::uint64_t triangles = 0;   ///< at most
+  std::uint64_t primitives = 0;  ///< which take time even where they add nothing
 };
 
 class SceneReader {
  public:
   SceneReader(const GltfModel& model, std::uint64_t most_bytes)
-      : model_(model), most_bytes_(most_bytes), out_(model.reader, kMostNameBytes) {}
+      : model_(model), most_bytes_(most_bytes), out_("tandem glTF", kMostNameBytes) {}
 
   ReadResult read();
 
  private:
   static constexpr std::size_t kMostNameBytes = std::size_t{64} << 20;
 
-  std::string measure();
-  std::string measure_node(std::size_t node_index);
-  std::string measure_mesh(std::size_t index, Size& size);
-  std::string measure_primitive(const GltfPrimitive& primitive, const std::string& name,
-                                std::map<int, std::uint64_t>& points, Size& size);
-  std::string check_total() const;
+  void measure_node(std::size_t node_index);
+  void measure_mesh(std::size_t index, Size& size);
+  void measure_primitive(const GltfPrimitive& primitive, const std::string& name,
+                         std::map<int, std::uint64_t>& points, Size& size);
+  void check_total() const;
   void remark_left_over(const GltfPrimitive& primitive, const std::string& name, std::uint64_t vertices);
   void remark_pose(const GltfNode& node, const std::string& name);
 
-  std::string add_node(std::size_t node_index, const Place& place);
-  std::string add_primitive(const GltfPrimitive& primitive, const std::string& name, const Affine& world,
-                            std::map<int, std::uint64_t>& first_points);
-  std::string read_vertices(const GltfPrimitive& primitive);
+  void add_node(std::size_t node_index, const Place& place);
+  void add_primitive(const GltfPrimitive& primitive, const std::string& name, const Affine& world,
+                     std::map<int, std::uint64_t>& first_points);
   std::int64_t corner(std::uint32_t index, const std::string& name, std::uint64_t first,
                       std::uint64_t vertices);
   void add_faces(const GltfPrimitive& primitive, const std::string& name, std::uint64_t first);
@@ -136,82 +135,84 @@ std::uint64_t triangles_of(int mode, std::uint64_t vertices) {
   return vertices < 3 ? 0 : vertices - 2;
 }
 
+/// Measures before anything is stored: a small file can show a mesh a million times.
 ReadResult SceneReader::read() {
   for (const std::string& remark : model_.remarks) out_.remark(remark);
-  std::string wrong = measure();
-  if (!wrong.empty()) return read_failure(std::move(wrong));
+  walk(model_, [this](std::size_t node, const Place&) { measure_node(node); });
   out_.reserve_points(total_.points);
   out_.reserve_faces(total_.triangles, 3 * total_.triangles);
-  wrong = walk(model_, [this](std::size_t node, const Place& place) { return add_node(node, place); });
-  if (!wrong.empty()) return read_failure(std::move(wrong));
+  walk(model_, [this](std::size_t node, const Place& place) { add_node(node, place); });
   return out_.finish();
 }
 
-/// Before anything is stored: a small file can show a mesh a million times.
-std::string SceneReader::measure() {
-  return walk(model_, [this](std::size_t node, const Place&) { return measure_node(node); });
-}
-
-std::string SceneReader::measure_node(std::size_t node_index) {
+void SceneReader::measure_node(std::size_t node_index) {
   const GltfNode& node = model_.nodes[node_index];
-  if (node.mesh == -1) return {};
+  if (node.mesh == -1) return;
   const auto index = static_cast<std::size_t>(node.mesh);
   if (node.mesh < 0 || index >= model_.meshes.size())
-    return described("nodes", node_index, node.name) + " names " + numbered("meshes", index) + " of " +
-           std::to_string(model_.meshes.size());
+    throw GltfError(described("nodes", node_index, node.name) + " names " + numbered("meshes", index) +
+                    " of " + std::to_string(model_.meshes.size()));
   const auto [known, is_new] = sizes_.try_emplace(index);
-  if (is_new) {
-    std::string wrong = measure_mesh(index, known->second);
-    if (!wrong.empty()) return wrong;
-  }
+  if (is_new) measure_mesh(index, known->second);
   total_.points += known->second.points;
   total_.triangles += known->second.triangles;
+  total_.primitives += known->second.primitives;
   remark_pose(node, described("nodes", node_index, node.name));
-  return check_total();
+  check_total();
 }
 
-std::string SceneReader::check_total() const {
+void SceneReader::check_total() const {
   if (total_.points > kMostCorners || total_.triangles > kMostCorners / 3)
-    return "the scene has more than 4294967294 vertices or corners, counting each instance of a mesh";
-  const std::uint64_t bytes = total_.points * sizeof(Point) + total_.triangles * 4 * sizeof(std::uint32_t);
+    throw GltfError(
+        "the scene has more than 4294967294 vertices or corners, counting each instance of a mesh");
+  constexpr std::uint64_t kBytesOfAPrimitive = 64;  // none, but the limit on memory limits the time too
+  const std::uint64_t bytes = total_.points * sizeof(Point) + total_.triangles * 4 * sizeof(std::uint32_t) +
+                              total_.primitives * kBytesOfAPrimitive;
   if (bytes > most_bytes_)
-    return "its triangles, counting each instance of a mesh, take " + std::to_string(bytes >> 20) +
-           " MiB, more than the memory limit (--memory-limit)";
-  return {};
+    throw GltfError("its triangles, counting each instance of a mesh, take " + std::to_string(bytes >> 20) +
+                    " MiB, more than the memory limit (--memory-limit)");
 }
 
-std::string SceneReader::measure_mesh(std::size_t index, Size& size) {
+/// Calls `use`; its errors begin with the name of a primitive.
+template <class Use>
+void in_primitive(const std::string& name, const Use& use) {
+  try {
+    use();
+  } catch (const GltfError& error) {
+    throw GltfError(name + ": " + error.what());
+  }
+}
+
+void SceneReader::measure_mesh(std::size_t index, Size& size) {
   const GltfMesh& mesh = model_.meshes[index];
   std::map<int, std::uint64_t> points;
+  size.primitives = mesh.primitives.size();
   for (std::size_t i = 0; i < mesh.primitives.size(); ++i) {
     const std::string name = described("meshes", index, mesh.name) + ", primitive " + std::to_string(i);
-    std::string wrong = measure_primitive(mesh.primitives[i], name, points, size);
-    if (!wrong.empty()) return name + ": " + wrong;
+    in_primitive(name, [&] { measure_primitive(mesh.primitives[i], name, points, size); });
   }
-  return {};
 }
 
 /// `points` has the accessors that earlier primitives of the mesh took their vertices from.
-std::string SceneReader::measure_primitive(const GltfPrimitive& primitive, const std::string& name,
-                                           std::map<int, std::uint64_t>& points, Size& size) {
+void SceneReader::measure_primitive(const GltfPrimitive& primitive, const std::string& name,
+                                    std::map<int, std::uint64_t>& points, Size& size) {
   if (primitive.mode < 0 || primitive.mode > kTriangleFan)
-    return "mode " + std::to_string(primitive.mode) + " is none of glTF";
-  if (!has_triangles(primitive)) return {};
+    throw GltfError("mode " + std::to_string(primitive.mode) + " is none of glTF");
+  if (!has_triangles(primitive)) return;
   if (primitive.positions == -1) {
     if (remarks_++ < kMostRemarksOfAKind) out_.remark(name + " has no POSITION and is passed over");
-    return {};
+    return;
   }
-  std::string wrong = check_positions(model_, primitive.positions);
-  if (wrong.empty() && primitive.indices != -1) wrong = check_indices(model_, primitive.indices);
-  if (!wrong.empty()) return wrong;
+  check_positions(model_, primitive.positions);
+  if (primitive.indices != -1) check_indices(model_, primitive.indices);
   const std::uint64_t count = model_.accessors[primitive.positions].count;
   const std::uint64_t vertices = primitive.indices == -1 ? count : model_.accessors[primitive.indices].count;
   // Each alone is bounded here, so that no sum of theirs overflows before check_total() sees it.
-  if (count > kMostCorners || vertices > kMostCorners) return "it has more than 4294967294 vertices";
+  if (count > kMostCorners || vertices > kMostCorners)
+    throw GltfError("it has more than 4294967294 vertices");
   if (points.emplace(primitive.positions, count).second) size.points += count;
   size.triangles += triangles_of(primitive.mode, vertices);
   remark_left_over(primitive, name, vertices);
-  return {};
 }
 
 void SceneReader::remark_left_over(const GltfPrimitive& primitive, const std::string& name,
@@ -233,37 +234,30 @@ void SceneReader::remark_pose(const GltfNode& node, const std::string& name) {
                 (node.has_skin ? "unposed" : "unmorphed"));
 }
 
-std::string SceneReader::add_node(std::size_t node_index, const Place& place) {
-  if (model_.nodes[node_index].mesh == -1) return {};
+void SceneReader::add_node(std::size_t node_index, const Place& place) {
+  if (model_.nodes[node_index].mesh == -1) return;
   const auto index = static_cast<std::size_t>(model_.nodes[node_index].mesh);
   const GltfMesh& mesh = model_.meshes[index];
-  out_.begin_part(name_or_number(mesh.name, "meshes", index), place.path);
+  out_.begin_part(name_or_number(mesh.name, "meshes", index), *place.path);
   std::map<int, std::uint64_t> first_points;
   for (std::size_t i = 0; i < mesh.primitives.size(); ++i) {
     const GltfPrimitive& primitive = mesh.primitives[i];
     if (!has_triangles(primitive) || primitive.positions == -1) continue;
     const std::string name = described("meshes", index, mesh.name) + ", primitive " + std::to_string(i);
-    std::string wrong = add_primitive(primitive, name, place.world, first_points);
-    if (!wrong.empty()) return name + ": " + wrong;
+    in_primitive(name, [&] { add_primitive(primitive, name, place.world, first_points); });
   }
-  return {};
 }
 
 /// Primitives of a mesh often share their vertices, and these are stored once.
-std::string SceneReader::add_primitive(const GltfPrimitive& primitive, const std::string& name,
-                                       const Affine& world, std::map<int, std::uint64_t>& first_points) {
+void SceneReader::add_primitive(const GltfPrimitive& primitive, const std::string& name, const Affine& world,
+                                std::map<int, std::uint64_t>& first_points) {
   const auto [shared, is_new] = first_points.try_emplace(primitive.positions, out_.point_count());
   if (is_new) {
-    std::string wrong = read_positions(model_, primitive.positions, points_);
-    if (!wrong.empty()) return wrong;
+    read_positions(model_, primitive.positions, points_);
     for (const Point& point : points_) out_.add_point(transformed(world, point));
   }
-  if (primitive.indices != -1) {
-    std::string wrong = read_indices(model_, primitive.indices, indices_);
-    if (!wrong.empty()) return wrong;
-  }
+  if (primitive.indices != -1) read_indices(model_, primitive.indices, indices_);
   add_faces(primitive, name, shared->second);
-  return {};
 }
 
 /// An index that names no vertex becomes a negative number of its own, so that strips tell two of them apart.

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "import/assimp_child.h"
-#include "import/gltf_child.h"
-#include "import/gltf_support.h"
+#include "import/gltf_model.h"
 #include "import/input_file.h"
+#include "import/read_gltf.h"
 #include "import/read_obj.h"
 #include "import/read_off.h"
 #include "import/read_ply.h"
@@ -62,11 +62,14 @@ std::string refusal(const std::string& extension, std::string_view head) {
   return "ends in .bvh but is neither a Tandem tree nor a mesh";
 }
 
+/// Effect: reads the file. Result: empty, or why not.
+std::string load(InputFile& file, const ImportOptions& options) {
+  if (file.size() <= options.memory_limit_bytes) return file.read_all();
+  return "holds " + std::to_string(file.size()) + " bytes, more than the memory limit (--memory-limit)";
+}
+
 ReadResult read_with(ReadBytes reader, InputFile& file, const ImportOptions& options) {
-  if (file.size() > options.memory_limit_bytes)
-    return read_failure("holds " + std::to_string(file.size()) +
-                        " bytes, more than the memory limit (--memory-limit)");
-  const std::string problem = file.read_all();
+  const std::string problem = load(file, options);
   return problem.empty() ? reader(file.bytes()) : read_failure(problem);
 }
 
@@ -74,8 +77,10 @@ bool is_gltf(const std::string& extension, std::string_view head) {
   return extension == ".gltf" || extension == ".glb" || head.starts_with("glTF");
 }
 
-ReadResult read_gltf_file(const std::filesystem::path& path, const ImportOptions& options) {
-  ReadResult result = read_in_gltf_child(path, options);
+ReadResult read_gltf_file(const std::filesystem::path& path, InputFile& file, const ImportOptions& options) {
+  const std::string problem = load(file, options);
+  if (!problem.empty()) return read_failure(problem);
+  ReadResult result = read_gltf(file.bytes(), path.parent_path(), options.memory_limit_bytes);
   const bool may_ask_assimp = !result.ok && options.reader == Reader::automatic;
   return may_ask_assimp && is_for_another_gltf_reader(result.error) ? read_in_assimp_child(path, options)
                                                                     : result;
@@ -92,7 +97,7 @@ ReadResult read(const std::filesystem::path& path, const ImportOptions& options)
   const ReadBytes reader = own_reader(extension, head);
   if (options.reader == Reader::assimp) return read_in_assimp_child(path, options);
   if (reader != nullptr) return read_with(reader, file, options);
-  if (is_gltf(extension, head)) return read_gltf_file(path, options);
+  if (is_gltf(extension, head)) return read_gltf_file(path, file, options);
   if (options.reader == Reader::automatic) return read_in_assimp_child(path, options);
   return read_failure("Tandem's own readers know OBJ, PLY, STL, OFF and glTF files only");
 }

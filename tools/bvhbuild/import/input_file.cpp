@@ -77,4 +77,12 @@ std::string InputFile::read_all() {
   return {};
 }
 
+std::string InputFile::read_first(std::uint64_t count, std::vector<char>& bytes) const {
+  bytes.resize(count);
+  const ssize_t got = read_fully(descriptor_, bytes.data(), bytes.size(), 0);
+  if (got < 0) return reason(errno);
+  bytes.resize(static_cast<std::size_t>(got));
+  return {};
+}
+
 }  // namespace tandem::build

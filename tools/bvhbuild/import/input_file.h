@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace tandem::build {
 
@@ -29,6 +30,11 @@ class InputFile {
   ///
   /// Result: empty when bytes() holds it, else the reason.
   std::string read_all();
+
+  /// Effect: fills `bytes` with the first `count` bytes, or with all that there are.
+  ///
+  /// Result: empty, or the reason why they cannot be read.
+  std::string read_first(std::uint64_t count, std::vector<char>& bytes) const;
 
   std::string_view bytes() const { return {bytes_.get(), bytes_read_}; }
 

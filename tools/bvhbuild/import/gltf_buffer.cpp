@@ -1,0 +1,118 @@
+#include "import/gltf_buffer.h"
+
+#include <algorithm>
+#include <array>
+
+#include "import/gltf_model.h"
+#include "import/input_file.h"
+#include "import/printable.h"
+
+namespace tandem::build {
+namespace {
+
+int hex_digit(char c) {
+  if (c >= '0' && c <= '9') return c - '0';
+  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
+  return -1;
+}
+
+constexpr std::string_view kBase64 = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+
+/// The value of each sign, -1 of those that are no digits.
+constexpr std::array<signed char, 256> base64_values() {
+  std::array<signed char, 256> values{};
+  values.fill(-1);
+  for (std::size_t i = 0; i < kBase64.size(); ++i)
+    values[static_cast<unsigned char>(kBase64[i])] = static_cast<signed char>(i);
+  return values;
+}
+
+bool has_scheme(std::string_view uri) {
+  const std::size_t colon = uri.find(':');
+  return colon != std::string_view::npos && uri.substr(0, colon).find('/') == std::string_view::npos &&
+         colon > 1;
+}
+
+void check_length(const GltfBufferSource& source, const char* holder, std::uint64_t held) {
+  if (held < source.bytes)
+    throw GltfError(source.name + ": " + holder + " holds " + std::to_string(held) +
+                    " bytes, its byteLength says " + std::to_string(source.bytes));
+}
+
+std::vector<char> bytes_of_data_uri(const GltfBufferSource& source) {
+  const std::string_view uri = source.uri;
+  const std::size_t comma = std::min(uri.find(','), uri.size());
+  if (!uri.substr(0, comma).ends_with(";base64"))
+    throw GltfError(source.name + ": " + build::quoted(uri) + " is not the kind of data that a buffer has");
+  const std::string_view text = uri.substr(std::min(comma + 1, uri.size()));
+  const bool is_escaped = text.find('%') != std::string_view::npos;
+  std::vector<char> bytes = base64_decoded(is_escaped ? percent_decoded(text) : text, source.bytes);
+  check_length(source, "its data URI", bytes.size());
+  return bytes;
+}
+
+std::vector<char> bytes_of_file(const GltfBufferSource& source, GltfBufferPlaces& places) {
+  if (has_scheme(source.uri))
+    throw GltfError(source.name + ": " + build::quoted(source.uri) + " is not a file beside the glTF");
+  const std::string name = percent_decoded(source.uri);
+  InputFile file;
+  std::vector<char> bytes;
+  std::string wrong = name.find('\0') == std::string::npos ? file.open(places.folder / name) : "no such file";
+  if (wrong.empty() && file.size() < source.bytes)
+    wrong =
+        "holds " + std::to_string(file.size()) + " bytes, " + std::to_string(source.bytes) + " are needed";
+  if (wrong.empty() && source.bytes > places.most_bytes_in_files)
+    wrong = "its bytes take more than the memory limit (--memory-limit)";
+  if (wrong.empty()) wrong = file.read_first(source.bytes, bytes);
+  if (!wrong.empty()) throw GltfError(source.name + ": " + build::quoted(name) + ": " + wrong);
+  places.most_bytes_in_files -= source.bytes;
+  return bytes;
+}
+
+}  // namespace
+
+GltfBuffer read_gltf_buffer(const GltfBufferSource& source, GltfBufferPlaces& places) {
+  GltfBuffer buffer;
+  if (source.bytes == 0) throw GltfError(source.name + " has no byteLength");
+  if (!source.uri.empty()) {
+    buffer.own = source.uri.starts_with("data:") ? bytes_of_data_uri(source) : bytes_of_file(source, places);
+    buffer.bytes = {buffer.own.data(), buffer.own.size()};
+    return buffer;
+  }
+  if (!places.is_binary) throw GltfError(source.name + " has no uri, so its bytes are nowhere");
+  check_length(source, "the binary chunk", places.chunk.size());
+  buffer.bytes = places.chunk.substr(0, source.bytes);
+  return buffer;
+}
+
+std::string percent_decoded(std::string_view text) {
+  std::string decoded;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const bool is_escape =
+        text[i] == '%' && i + 2 < text.size() && hex_digit(text[i + 1]) >= 0 && hex_digit(text[i + 2]) >= 0;
+    decoded += is_escape ? static_cast<char>(hex_digit(text[i + 1]) * 16 + hex_digit(text[i + 2])) : text[i];
+    if (is_escape) i += 2;
+  }
+  return decoded;
+}
+
+std::vector<char> base64_decoded(std::string_view text, std::uint64_t most_bytes) {
+  static constexpr std::array<signed char, 256> kValues = base64_values();
+  std::vector<char> bytes;
+  bytes.reserve(std::min<std::uint64_t>(text.size() / 4 * 3 + 2, most_bytes));
+  std::uint32_t bits = 0;  // the low `count` ones are not yet written
+  int count = 0;
+  for (const char sign : text) {
+    const int value = kValues[static_cast<unsigned char>(sign)];
+    if (value < 0 || bytes.size() == most_bytes) break;
+    bits = bits << 6 | static_cast<std::uint32_t>(value);
+    count += 6;
+    if (count < 8) continue;
+    count -= 8;
+    bytes.push_back(static_cast<char>(bits >> count & 0xFFu));
+  }
+  return bytes;
+}
+
+}  // namespace tandem::build

@@ -185,9 +185,10 @@ struct CompleteTest {
     return !edge_separates(b, a, k, orientation_b) && !edge_separates(a, b, k, orientation_a);
   }
 
-  /// Whether two segments or points meet. Four points that span a volume are on two skew lines. In one plane
-  /// but not on one line, some triple has an area along some axis, and seen along it segments meet iff each
-  /// has the ends of the other on both sides or on it. On one line, points are in lexicographic order.
+  /// Whether two segments or points meet whose bounding boxes do. Four points that span a volume are on two
+  /// skew lines. In one plane but not on one line, some triple has an area along some axis, and seen along it
+  /// segments meet iff each has the ends of the other on both sides or on it. On one line, a gap between them
+  /// would part the boxes along every axis along which the line moves.
   TANDEM_HD static bool segments_meet(const Extent& s, const Extent& t) {
     if (Signs::volume(s.p, s.q, t.p, t.q) != 0) return false;
     for (int k = 0; k < 3; ++k) {
@@ -195,7 +196,7 @@ struct CompleteTest {
       const int sp = Signs::area(t.p, t.q, s.p, k), sq = Signs::area(t.p, t.q, s.q, k);
       if (tp != 0 || tq != 0 || sp != 0 || sq != 0) return tp * tq <= 0 && sp * sq <= 0;
     }
-    return !lexicographically_less(s.q, t.p) && !lexicographically_less(t.q, s.p);
+    return true;
   }
 
   /// An axis along which the triangle is not flat, and its orientation along it; 3 if it is flat.

@@ -20,6 +20,7 @@ TEST(Findings, ListEveryCountUnderItsOwnKey) {
   report.triangles_duplicate = 8;
   report.triangles_duplicate_reversed = 9;
   report.triangles_flattened = 10;
+  report.faces_too_few_corners = 11;
   std::set<std::string> keys;
   std::set<std::uint64_t> counts;
   for (const Finding& finding : findings(report)) {
@@ -27,8 +28,8 @@ TEST(Findings, ListEveryCountUnderItsOwnKey) {
     counts.insert(finding.count);
     EXPECT_EQ(finding.sentence.find(std::to_string(finding.count) + " "), 0u);
   }
-  EXPECT_EQ(keys.size(), 10u);
-  EXPECT_EQ(counts.size(), 10u);
+  EXPECT_EQ(keys.size(), 11u);
+  EXPECT_EQ(counts.size(), 11u);
 }
 
 TEST(Findings, SpeakOfOneAndOfMany) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <set>
 
 #include "meshing/polygons.h"
 #include "tandem/formats/box.h"
@@ -214,6 +215,72 @@ TEST(Triangulate, SplitsHelixWhoseEndsCoverEachOther) {
   EXPECT_EQ(std::count(used.begin(), used.end(), true), 5);
 }
 
+/// Both corners of each bridge end, one raised by less than what counts as apart, must stay in use: with its
+/// own corner in each angle, the triangles tile the outline index by index.
+TEST(Triangulate, UsesEachCornerInItsOwnAngleWhereCornersMeetInProjection) {
+  const GridPolygon one_hole{{0, 0}, {9, 0}, {9, 9}, {0, 9}, {0, 0}, {3, 3}, {3, 6}, {6, 6}, {6, 3}, {3, 3}};
+  const GridPolygon two_holes{{0, 0}, {20, 0}, {20, 9}, {0, 9},  {0, 0},  {3, 3},  {3, 6}, {6, 6},
+                              {6, 3}, {12, 3}, {12, 6}, {15, 6}, {15, 3}, {12, 3}, {6, 3}, {3, 3}};
+  for (const GridPolygon& whole : {one_hole, two_holes, reversed(one_hole), reversed(two_holes)})
+    for (std::size_t steps = 0; steps < whole.size(); ++steps)
+      for (const double height : {0.0, 1e-7, 5e-324}) {
+        const GridPolygon polygon = rotated_by(whole, steps);
+        PolygonMesh mesh = flat_face(polygon);
+        for (std::size_t i = 0; i < mesh.points.size(); i += 2) mesh.points[i][2] = height;
+        const Outcome outcome = run(mesh);
+        EXPECT_EQ(outcome.report.faces_not_simple, 0u);
+        EXPECT_TRUE(tiles(outcome.mesh.triangles, polygon))
+            << "from corner " << steps << " height " << height;
+      }
+}
+
+TEST(Triangulate, UsesEachCornerOfLobesThatMeetInProjection) {
+  const GridPolygon lobes{{0, 0}, {4, -1}, {4, 1}, {0, 0}, {-1, 4}, {-1, 5}, {0, 0}, {-4, -1}, {-4, -2}};
+  for (const GridPolygon& polygon : {lobes, reversed(lobes)}) {
+    PolygonMesh mesh = flat_face(polygon);
+    for (std::size_t i = 0; i < mesh.points.size(); ++i) mesh.points[i][2] = 1e-9 * static_cast<double>(i);
+    const Outcome outcome = run(mesh);
+    EXPECT_EQ(outcome.report.faces_not_simple, 0u);
+    ASSERT_EQ(outcome.mesh.triangles.size(), 3u);
+    for (TriangleIndices t : outcome.mesh.triangles) {  // each lobe is three consecutive corners
+      std::sort(t.begin(), t.end());
+      EXPECT_TRUE(t[2] - t[0] == 2 || (t[0] == 0 && t[1] + 1 == t[2] && t[2] == 8) ||
+                  (t[0] == 0 && t[1] == 1 && t[2] == 8))
+          << t[0] << " " << t[1] << " " << t[2];
+    }
+  }
+}
+
+TEST(Triangulate, TurnsSpikesIntoDegenerateTriangles) {
+  // A square; 4 is a spike inside, 5 outside across an edge, 6 and 7 a spike with a branch.
+  PolygonMesh mesh = flat_face({{0, 0}, {9, 0}, {9, 9}, {0, 9}, {4, 5}, {20, -3}, {6, 1}, {7, 2}, {7, 0}});
+  mesh.corners = {0, 4, 0, 1, 6, 7, 6, 8, 6, 1, 2, 5, 2, 3};
+  mesh.face_begin = {0, 14};
+  for (std::size_t steps = 0; steps < 14; ++steps) {
+    const Outcome outcome = run(mesh);
+    EXPECT_EQ(outcome.report.faces_not_simple, 0u);
+    std::size_t spikes = 0;
+    for (const TriangleIndices& t : outcome.mesh.triangles) spikes += t[0] == t[2] && t[0] != t[1];
+    EXPECT_EQ(spikes, 5u) << "from corner " << steps;
+    EXPECT_EQ(outcome.mesh.triangles.size(), 7u);
+    EXPECT_EQ(twice_signed_area_xy(outcome.mesh), 2 * 81);
+    std::rotate(mesh.corners.begin(), mesh.corners.begin() + 1, mesh.corners.end());
+  }
+}
+
+TEST(Triangulate, TurnsFaceOfSpikesIntoDegenerateTriangles) {
+  PolygonMesh mesh = flat_face({{0, 0}, {9, 0}, {9, 9}, {0, 9}});
+  add_face(mesh, {0, 1, 2, 1});
+  add_face(mesh, {0, 1, 2, 3, 2, 1});
+  add_face(mesh, {0, 1, 0, 2, 0, 3});
+  mesh.corners.erase(mesh.corners.begin(), mesh.corners.begin() + 4);
+  mesh.face_begin = {0, 4, 10, 16};
+  const Outcome outcome = run(mesh);
+  EXPECT_EQ(outcome.report.faces_not_simple, 0u);
+  for (const TriangleIndices& t : outcome.mesh.triangles) EXPECT_EQ(t[0], t[2]);
+  EXPECT_EQ(std::set<std::uint32_t>(outcome.mesh.face.begin(), outcome.mesh.face.end()).size(), 3u);
+}
+
 TEST(Triangulate, OverlooksTheLastBitsWhereAnOutlineTouchesItself) {
   // A roof with a hole behind a bridge from the middle of an edge; its heights are rounded, and differ where
   // they meet.
@@ -270,6 +337,23 @@ TEST(Triangulate, DropsEachBadFaceOnceUnderItsFirstReason) {
   EXPECT_EQ(outcome.report.vertices_unreferenced, 1u);
 }
 
+TEST(Triangulate, DropsFacesOfFewerThanThreeCornersAndKeepsCount) {
+  PolygonMesh mesh;
+  mesh.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {std::numeric_limits<double>::infinity(), 0, 0}};
+  add_face(mesh, {});
+  add_face(mesh, {0});
+  add_face(mesh, {0, 1, 2});
+  add_face(mesh, {0, 3});  // not finite as well: counted once
+  add_face(mesh, {0, 4});  // counted as an index
+  add_face(mesh, {2, 1, 0});
+  const Outcome outcome = run(mesh);
+  EXPECT_EQ(outcome.report.faces, 6u);
+  EXPECT_EQ(outcome.report.faces_too_few_corners, 3u);
+  EXPECT_EQ(outcome.report.faces_index_out_of_range, 1u);
+  EXPECT_EQ(outcome.report.faces_not_finite, 0u);
+  EXPECT_EQ(outcome.mesh.face, (std::vector<std::uint32_t>{2, 5}));
+}
+
 TEST(Triangulate, NumbersTrianglesByTheFaceTheyCameFrom) {
   PolygonMesh mesh = flat_face({{0, 0}, {4, 0}, {4, 4}, {2, 6}, {0, 4}});
   add_face(mesh, {0, 1, 2});
@@ -308,6 +392,58 @@ TEST(Triangulate, SplitsFacesOfManyCorners) {
     EXPECT_EQ(outcome.report.faces_not_simple, 0u);
     EXPECT_GT(twice_signed_area_xy(outcome.mesh), 0);
   }
+}
+
+/// Each of these took quadratic time, minutes at this size.
+TEST(Triangulate, TakesLinesOfManyCorners) {
+  constexpr std::uint32_t kCorners = 100000;
+  std::vector<Point> diagonal;
+  std::vector<Point> shuffled;  // on the x axis, to and fro
+  for (std::uint32_t i = 0; i < kCorners; ++i) {
+    diagonal.push_back({1.0 * i, 1.0 * i, 0});
+    shuffled.push_back({1.0 * (i * 2919u % kCorners), 0, 0});
+  }
+  for (const auto& points : {diagonal, shuffled}) {
+    const Outcome outcome = run(one_face(points));
+    EXPECT_EQ(outcome.mesh.triangles.size(), kCorners - 2);
+    EXPECT_EQ(outcome.report.faces_not_simple, 0u);
+  }
+  for (std::uint32_t i = 0; i < kCorners; ++i) diagonal[i] = {1.0 * i, 0, 0};
+  diagonal.push_back({5, 1, 0});  // a triangle, one side of which has all the other corners
+  const Outcome triangle = run(one_face(diagonal));
+  EXPECT_EQ(triangle.mesh.triangles.size(), kCorners - 1);
+  EXPECT_EQ(twice_signed_area_xy(triangle.mesh), kCorners - 1);
+  EXPECT_EQ(triangle.report.faces_not_simple, 0u);
+  shuffled.push_back({5, 1, 0});
+  EXPECT_EQ(run(one_face(shuffled)).report.faces_not_simple, 1u);
+}
+
+TEST(Triangulate, TakesHubsOfManyEdges) {
+  constexpr std::uint32_t kRim = 50000;
+  std::vector<Point> wheel;
+  for (std::uint32_t i = 0; i < kRim; ++i) {
+    const double x = 1 + i % 200;
+    const double y = 1 + i / 200;
+    wheel.push_back({x, y, 0});
+  }
+  wheel.push_back({0, 0, 0});
+  PolygonMesh spiked = one_face(wheel);   // hub, rim, hub, rim, ...
+  PolygonMesh crossed = one_face(wheel);  // through the hub from one side to the other, again and again
+  spiked.corners.clear();
+  crossed.corners.clear();
+  for (std::uint32_t i = 0; i < kRim; ++i) {
+    spiked.corners.insert(spiked.corners.end(), {kRim, i});
+    const auto opposite = static_cast<std::uint32_t>(crossed.points.size());
+    crossed.points.push_back({-wheel[i][0], -wheel[i][1], 0});
+    crossed.corners.insert(crossed.corners.end(), {i, opposite});
+  }
+  crossed.corners.push_back(kRim);
+  spiked.face_begin.back() = static_cast<std::uint32_t>(spiked.corners.size());
+  crossed.face_begin.back() = static_cast<std::uint32_t>(crossed.corners.size());
+  const Outcome spikes = run(std::move(spiked));
+  EXPECT_EQ(spikes.report.faces_not_simple, 0u);
+  EXPECT_EQ(twice_signed_area_xy(spikes.mesh), 0);
+  EXPECT_EQ(run(std::move(crossed)).report.faces_not_simple, 1u);
 }
 
 TEST(Triangulate, GivesTheSameTrianglesEachTime) {

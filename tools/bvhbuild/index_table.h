@@ -6,15 +6,17 @@
 
 namespace tandem::build {
 
-/// Mixes three words into a hash whose high bits are as good as its low ones (multiply and fold, as wyhash
-/// does).
+/// Mixes three words into a hash whose high bits are as good as its low ones: rounds of SplitMix64 (Steele,
+/// Lea & Flood 2014). Each round is a bijection, so with two of the words fixed, different third words never
+/// collide: no value of one word can make another drop out.
 inline std::uint64_t hash_words(std::uint64_t a, std::uint64_t b, std::uint64_t c) {
-  const auto fold = [](std::uint64_t x, std::uint64_t y) {
-    const auto product = static_cast<unsigned __int128>(x) * y;
-    return static_cast<std::uint64_t>(product) ^ static_cast<std::uint64_t>(product >> 64);
+  const auto mix = [](std::uint64_t x) {
+    x += 0x9e3779b97f4a7c15u;
+    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+    return x ^ (x >> 31);
   };
-  return fold(fold(a ^ 0xa0761d6478bd642fu, b ^ 0xe7037ed1a0b428dbu) ^ 0x8ebc6af09c88c6e3u,
-              c ^ 0x589965cc75374cc3u);
+  return mix(mix(mix(a) + b) + c);
 }
 
 /// Open addressing over indices: the things themselves stay with the caller, a slot costs four bytes.

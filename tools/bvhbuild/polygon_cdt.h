@@ -21,10 +21,12 @@ class PolygonCdt {
   /// goes.
   ///
   /// Result: false, with `out` as it was, when two edges cross in the projection, when corners or edges that
-  /// are apart in space touch in it, or when nothing is inside.
+  /// are apart in space touch in it, when all corners lie on one line in it, when nothing is inside, or when
+  /// more than 10,000 corners run along each other again and again, which would take quadratic time.
   ///
   /// The outline may touch itself and may walk an edge to and fro (a bridge to a hole): the inside is what it
-  /// winds round an odd number of times. A simple polygon of n corners gives exactly n - 2 triangles.
+  /// winds round an odd number of times. A simple polygon of n corners gives exactly n - 2 triangles. Where
+  /// several corners meet in the projection, a triangle uses the one whose angle it lies in.
   ///
   /// corners: at least 3, finite, no two consecutive ones at the same place
   /// axis: 0, 1 or 2, the coordinate that the projection leaves out

@@ -83,9 +83,9 @@ class Triangulator {
     const Corners corners =
         Corners(mesh_.corners)
             .subspan(mesh_.face_begin[face], mesh_.face_begin[face + 1] - mesh_.face_begin[face]);
-    if (corners.size() < 3 || !usable(corners)) return;
+    if (!usable(corners)) return;
     if (corners.size() == 3) return emit(face, {corners[0], corners[1], corners[2]});
-    gather(corners);
+    gather(face, corners);
     if (points_.size() < 3) return emit(face, {corners[0], corners[0], corners[0]});
     split();
     for (const TriangleIndices& t : pieces_) emit(face, {vertices_[t[0]], vertices_[t[1]], vertices_[t[2]]});
@@ -95,6 +95,7 @@ class Triangulator {
   bool usable(Corners corners) {
     for (const std::uint32_t corner : corners)
       if (corner >= mesh_.points.size()) return drop(report_.faces_index_out_of_range);
+    if (corners.size() < 3) return drop(report_.faces_too_few_corners);
     bool finite = true;
     bool small = true;
     for (const std::uint32_t corner : corners)
@@ -116,20 +117,46 @@ class Triangulator {
     out_.face.push_back(face);
   }
 
-  /// The face's corners without those at the place of their predecessor. A face all in one place keeps one
-  /// corner.
-  void gather(Corners corners) {
+  /// The face's corners without those at the place of their predecessor, and without spikes, where the
+  /// outline goes to a place and straight back: a spike has no area and becomes a degenerate triangle, so
+  /// that it is counted. A face all in one place keeps one corner.
+  void gather(std::uint32_t face, Corners corners) {
     points_.clear();
     vertices_.clear();
-    for (const std::uint32_t corner : corners) {
-      if (!points_.empty() && points_.back() == mesh_.points[corner]) continue;
-      points_.push_back(mesh_.points[corner]);
-      vertices_.push_back(corner);
+    for (const std::uint32_t corner : corners) add_corner(face, corner);
+    std::size_t first = 0;
+    while (points_.size() - first > 2) {
+      if (points_.back() == points_[first]) {
+        drop_corner();
+      } else if (points_.end()[-2] == points_[first]) {
+        emit(face, {vertices_.end()[-2], vertices_.back(), vertices_[first]});
+        drop_corner();
+      } else if (points_.back() == points_[first + 1]) {
+        emit(face, {vertices_.back(), vertices_[first], vertices_[first + 1]});
+        ++first;
+      } else {
+        break;
+      }
     }
-    while (points_.size() > 1 && points_.back() == points_.front()) {
-      points_.pop_back();
-      vertices_.pop_back();
+    if (points_.size() - first == 2 && points_.back() == points_[first]) drop_corner();
+    points_.erase(points_.begin(), points_.begin() + static_cast<std::ptrdiff_t>(first));
+    vertices_.erase(vertices_.begin(), vertices_.begin() + static_cast<std::ptrdiff_t>(first));
+  }
+
+  void add_corner(std::uint32_t face, std::uint32_t corner) {
+    const Point& place = mesh_.points[corner];
+    if (!points_.empty() && points_.back() == place) return;
+    if (points_.size() > 1 && points_.end()[-2] == place) {
+      emit(face, {vertices_.end()[-2], vertices_.back(), corner});
+      return drop_corner();
     }
+    points_.push_back(place);
+    vertices_.push_back(corner);
+  }
+
+  void drop_corner() {
+    points_.pop_back();
+    vertices_.pop_back();
   }
 
   void split() {
@@ -138,10 +165,12 @@ class Triangulator {
       pieces_.push_back({0, 1, 2});
       return;
     }
+    if (on_a_line()) return fan();
     for (const int axis : projection_axes(points_))
       if (axis >= 0 && (points_.size() == 4 ? split_quad(axis) : cdt_.triangulate(points_, axis, pieces_)))
         return;
     fan();
+    ++report_.faces_not_simple;
   }
 
   bool split_quad(int axis) {
@@ -153,12 +182,14 @@ class Triangulator {
     return true;
   }
 
-  /// Faces on one line end here as well; their triangles are degenerate and counted as such.
+  /// The triangles of a face on one line are degenerate and counted as such.
   void fan() {
     for (std::uint32_t i = 2; i < points_.size(); ++i) pieces_.push_back({0, i - 1, i});
-    const bool on_a_line = std::all_of(points_.begin(), points_.end(),
-                                       [&](const Point& p) { return collinear(points_[0], points_[1], p); });
-    if (!on_a_line) ++report_.faces_not_simple;
+  }
+
+  bool on_a_line() const {
+    return std::all_of(points_.begin() + 2, points_.end(),
+                       [&](const Point& p) { return collinear(points_[0], points_[1], p); });
   }
 
   const PolygonMesh& mesh_;

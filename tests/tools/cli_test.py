@@ -351,7 +351,7 @@ class BuildJson(ToolTest):
     ALWAYS = {"tool", "version", "exit_code", "error", "input", "output", "reader", "single_precision_reader", "faces",
               "vertices", "remarks", "findings", "seconds", "peak_memory_bytes"}
     AFTER_SUCCESS = {"parts", "origin", "rounding_error", "tree", "bytes", "hash"}
-    FINDINGS = {"faces_index_out_of_range", "faces_not_finite", "faces_too_large", "faces_not_simple",
+    FINDINGS = {"faces_index_out_of_range", "faces_too_few_corners", "faces_not_finite", "faces_too_large", "faces_not_simple",
                 "vertices_unreferenced", "vertices_welded", "triangles_degenerate", "triangles_duplicate",
                 "triangles_duplicate_reversed", "triangles_flattened"}
 

@@ -221,7 +221,8 @@ bool OffReader::binary_face() {
   std::int64_t corners = 0;
   if (!take_int(corners)) return too_few_faces();
   if (corners < 0)
-    return fail("face " + std::to_string(mesh_.face_count()) + " has " + std::to_string(corners) + " corners");
+    return fail("face " + std::to_string(mesh_.face_count()) + " has " + std::to_string(corners) +
+                " corners");
   for (std::int64_t i = 0; i < corners; ++i) {
     std::int64_t index = 0;
     if (!take_int(index)) return too_few_faces();

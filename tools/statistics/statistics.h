@@ -27,8 +27,8 @@ TreeStatistics measure_tree(const LevelView& level, const float* lower, const fl
 
 /// The mean work of a tandem query of a tree against itself, over poses close to first contact.
 struct ExpectedWork {
-  double block_pairs = 0;  ///< units of 4 x 4 box tests
-  double candidates = 0;   ///< leaf pairs whose boxes overlap
+  double block_pairs = 0;   ///< units of 4 x 4 box tests
+  double candidates = 0;    ///< leaf pairs whose boxes overlap
   std::uint32_t poses = 0;  ///< 0: a mesh overlaps itself so much that sampling was given up; no figures then
 };
 

@@ -16,8 +16,9 @@ enum class Access : std::uint8_t {
 /// nothing.
 ///
 /// While an asset is mapped, nobody may write into its file or cut it short: what was checked would no longer
-/// hold, and reading a page that is gone ends a process. Tools that replace a file by a rename, as bvhbuild does,
-/// are safe. For a file already in memory there is nothing to own: call check() of tandem/formats/check.h.
+/// hold, and reading a page that is gone ends a process. Tools that replace a file by a rename, as bvhbuild
+/// does, are safe. For a file already in memory there is nothing to own: call check() of
+/// tandem/formats/check.h.
 class MappedAsset {
  public:
   MappedAsset() = default;

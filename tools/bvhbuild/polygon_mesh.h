@@ -24,9 +24,8 @@ struct SourcePart {
 
 /// What a reader hands over: the polygons of a file, in the file's order, with the file's float64
 /// coordinates. Nothing in it is checked but its shape: indices may be out of range, coordinates not finite,
-/// polygons degenerate. Points, lines and faces of fewer than three corners are left out and do not count as
-/// faces, but a face of three or more corners counts whatever its corners are: face f is the f-th that the
-/// modeller wrote.
+/// polygons degenerate. Points and lines of formats that tell them from faces are left out. Whatever the file
+/// calls a face counts, also one of fewer than three corners: face f is the f-th that the modeller wrote.
 struct PolygonMesh {
   std::vector<Point> points;
   std::vector<std::uint32_t> corners;        ///< vertex indices of all faces, one face after the other

@@ -8,20 +8,15 @@
 #include <fstream>
 #include <vector>
 
+#include "temp_folder.h"
+
 namespace tandem::build {
 namespace {
 
 namespace fs = std::filesystem;
 
-// A folder of its own that goes with the test.
 class OutputFile : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() / ("tandem output " + std::to_string(::getpid()));
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   static std::vector<std::byte> bytes(std::size_t size) {
     return std::vector<std::byte>(size, std::byte{42});
   }
@@ -29,7 +24,8 @@ class OutputFile : public testing::Test {
     return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), {}));
   }
 
-  fs::path folder_;
+  test::TempFolder temporary_;
+  fs::path folder_ = temporary_.path();
 };
 
 TEST_F(OutputFile, WritesAllBytesAndLeavesNothingElse) {

@@ -1,16 +1,15 @@
 #pragma once
 #include <gtest/gtest.h>
-#include <stdlib.h>
 
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "import/read_gltf.h"
+#include "temp_folder.h"
 
 namespace tandem::build {
 namespace fs = std::filesystem;
@@ -101,16 +100,8 @@ class GltfFile : public ::testing::Test {
  protected:
   static constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 30;
 
-  void SetUp() override {
-    std::string name = (fs::path(::testing::TempDir()) / "tandem_gltf_XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    folder_ = name;
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   fs::path write(const std::string& name, const std::string& bytes) const {
-    std::ofstream(folder_ / name, std::ios::binary) << bytes;
-    return folder_ / name;
+    return temporary_.write(name, bytes);
   }
 
   ReadResult read(const std::string& bytes, std::uint64_t most_bytes = kMostBytes) const {
@@ -132,7 +123,8 @@ class GltfFile : public ::testing::Test {
     EXPECT_NE(text.find(words), std::string::npos) << "'" << text << "' lacks '" << words << "'";
   }
 
-  fs::path folder_;
+  test::TempFolder temporary_;
+  fs::path folder_ = temporary_.path();
 };
 
 inline std::vector<Face> faces_of(const PolygonMesh& mesh) {

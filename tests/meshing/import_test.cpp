@@ -10,6 +10,7 @@
 #include <string>
 
 #include "import/limited_child.h"
+#include "temp_folder.h"
 
 namespace tandem::build {
 namespace {
@@ -19,16 +20,8 @@ namespace fs = std::filesystem;
 /// A folder of its own for each test.
 class Import : public ::testing::Test {
  protected:
-  void SetUp() override {
-    std::string name = (fs::path(::testing::TempDir()) / "tandem_import_XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    folder_ = name;
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   fs::path write(const std::string& name, const std::string& bytes) const {
-    std::ofstream(folder_ / name, std::ios::binary) << bytes;
-    return folder_ / name;
+    return temporary_.write(name, bytes);
   }
 
   std::string error(const fs::path& path, Reader reader = Reader::automatic) const {
@@ -39,7 +32,8 @@ class Import : public ::testing::Test {
     return result.error;
   }
 
-  fs::path folder_;
+  test::TempFolder temporary_;
+  fs::path folder_ = temporary_.path();
 };
 
 constexpr const char* kTriangleObj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";

@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "build/sample_asset.h"
+#include "temp_folder.h"
 
 namespace tandem {
 namespace {
@@ -16,24 +17,16 @@ namespace fs = std::filesystem;
 
 class Map : public testing::TestWithParam<Access> {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() / ("tandem map " + std::to_string(::getpid()));
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   std::string write(const char* file, const void* data, std::size_t size) const {
-    const fs::path path = folder_ / file;
-    std::ofstream(path, std::ios::binary)
-        .write(static_cast<const char*>(data), static_cast<std::streamsize>(size));
-    return path.string();
+    return temporary_.write(file, {static_cast<const char*>(data), size}).string();
   }
   std::string write_asset(const char* file, std::uint32_t triangles) const {
     const build::Image image = test::make_file(test::random_mesh(triangles, 1));
     return write(file, image.data(), image.size());
   }
 
-  fs::path folder_;
+  test::TempFolder temporary_;
+  fs::path folder_ = temporary_.path();
 };
 
 INSTANTIATE_TEST_SUITE_P(Access, Map, testing::Values(Access::map, Access::read));

@@ -73,7 +73,11 @@ constexpr Entry kEntries[] = {
     {Status::kBadFace, "BadFace", "block", "a triangle names a source face or part that does not exist"},
     {Status::kBoundsMismatch, "BoundsMismatch", nullptr,
      "the header's bounds are not those of the triangles"},
-    {Status::kOutOfRange, "OutOfRange", nullptr, "a coordinate is not finite or too large for a query"},
+    {Status::kOutOfRange, "OutOfRange", "instance", "a coordinate is not finite or too large for a query"},
+    {Status::kUnknownAsset, "UnknownAsset", "instance", "an instance of an asset that does not exist"},
+    {Status::kUnknownInstance, "UnknownInstance", "pair", "a pair names an instance that does not exist"},
+    {Status::kPoseNotRigid, "PoseNotRigid", "instance", "a pose is not a rotation and a translation"},
+    {Status::kCannotStartThread, "CannotStartThread", nullptr, "a thread could not be started"},
     {Status::kCudaFailed, "CudaFailed", nullptr, "a CUDA call failed"},
 };
 

@@ -1,45 +1,12 @@
 #pragma once
-#include "block_pair_variants.h"
+#include "lanes.h"
 
 #ifdef TANDEM_HAVE_LANES
-#if defined(__SSE2__)
-#include <immintrin.h>
-#elif defined(__aarch64__)
-#include <arm_neon.h>
-#endif
-
 #include "tandem/kernels/box_test.h"
 
-// A block pair in vectors of 4, 8 or 16 lanes. Included by files that are compiled for different machines:
-// all of it has internal linkage, also what is instantiated from box_terms with the types of this file, so
-// that no function compiled for one machine is linked into code for another.
+// A block pair in vectors of 4, 8 or 16 lanes.
 namespace tandem {
 namespace {
-
-#define TANDEM_INLINE [[gnu::always_inline]] inline
-
-template <int kCount>
-struct Lanes {
-  using Floats [[gnu::vector_size(4 * kCount)]] = float;
-  using Bits [[gnu::vector_size(4 * kCount)]] = std::int32_t;
-  Floats v;
-
-  TANDEM_INLINE friend Lanes operator+(const Lanes& a, const Lanes& b) { return {a.v + b.v}; }
-  TANDEM_INLINE friend Lanes operator+(const Lanes& a, float b) { return {a.v + b}; }
-  TANDEM_INLINE friend Lanes operator-(const Lanes& a, const Lanes& b) { return {a.v - b.v}; }
-  TANDEM_INLINE friend Lanes operator*(float a, const Lanes& b) { return {a * b.v}; }
-  TANDEM_INLINE Lanes abs() const {
-    return {reinterpret_cast<Floats>(reinterpret_cast<Bits>(v) & 0x7FFFFFFF)};
-  }
-};
-
-using Lanes4 = Lanes<4>;
-
-TANDEM_INLINE Lanes4 load(const float* four) {
-  Lanes4 out;
-  __builtin_memcpy(&out, four, sizeof out);
-  return out;
-}
 
 #if defined(__AVX512F__)
 // The forms with a mask: GCC 12 takes the others for uses of an uninitialised variable (GCC bug 105593).
@@ -78,42 +45,6 @@ TANDEM_INLINE Lanes<kCount> nodes_of_b(const Lanes4& four) {
   if constexpr (kCount == 4) return four;
 }
 
-// The lanes in which every comparison |d| <= r so far was true.
-template <int kCount>
-struct Overlaps {
-  typename Lanes<kCount>::Bits bits = ~typename Lanes<kCount>::Bits{};
-
-  TANDEM_INLINE void require(const Lanes<kCount>& d, const Lanes<kCount>& r) { bits &= d.abs().v <= r.v; }
-  TANDEM_INLINE unsigned mask() const {
-#if defined(__AVX__)
-    if constexpr (kCount == 8)
-      return static_cast<unsigned>(_mm256_movemask_ps(reinterpret_cast<__m256>(bits)));
-#endif
-#if defined(__SSE2__)
-    if constexpr (kCount == 4) return static_cast<unsigned>(_mm_movemask_ps(reinterpret_cast<__m128>(bits)));
-#elif defined(__aarch64__)
-    const typename Lanes<4>::Bits place = {1, 2, 4, 8};
-    return static_cast<unsigned>(vaddvq_s32(reinterpret_cast<int32x4_t>(bits & place)));
-#endif
-    unsigned out = 0;
-    for (int i = 0; i < kCount; ++i) out |= (bits[i] & 1u) << i;
-    return out;
-  }
-};
-
-#if defined(__AVX512F__)
-template <>
-struct Overlaps<16> {
-  __mmask16 bits = 0xFFFF;
-
-  TANDEM_INLINE void require(const Lanes<16>& d, const Lanes<16>& r) {
-    bits = _mm512_mask_cmp_ps_mask(bits, reinterpret_cast<__m512>(d.abs().v), reinterpret_cast<__m512>(r.v),
-                                   _CMP_LE_OQ);
-  }
-  TANDEM_INLINE unsigned mask() const { return bits; }
-};
-#endif
-
 template <int kCount>
 class BlockPairLanes {
  public:
@@ -134,24 +65,24 @@ class BlockPairLanes {
   // exits cost more than they save (docs/decisions.md).
   template <int kPart>
   TANDEM_INLINE unsigned part() const {
-    Overlaps<kCount> overlaps;
+    LaneMask<kCount> overlaps = LaneMask<kCount>::all();
     Lanes<kCount> d[3];
 #pragma GCC unroll 3
     for (int i = 0; i < 3; ++i) {
       d[i] = of_b(posed_b_[i]) - of_a<kPart>(center_a_[i]);
-      overlaps.require(d[i],
+      overlaps.require(magnitude(d[i]),
                        of_a<kPart>(half_extent_a_[i]) + of_b(box_terms::b_on_face(pose_, i, half_extent_b_)));
     }
 #pragma GCC unroll 3
     for (int j = 0; j < 3; ++j) {
-      overlaps.require(box_terms::distance_on_face(pose_, j, d),
+      overlaps.require(magnitude(box_terms::distance_on_face(pose_, j, d)),
                        of_b(half_extent_b_[j]) + of_a<kPart>(box_terms::a_on_face(pose_, j, half_extent_a_)));
     }
 #pragma GCC unroll 3
     for (int i = 0; i < 3; ++i) {
 #pragma GCC unroll 3
       for (int j = 0; j < 3; ++j) {
-        overlaps.require(box_terms::distance_on_edge(pose_, i, j, d),
+        overlaps.require(magnitude(box_terms::distance_on_edge(pose_, i, j, d)),
                          of_a<kPart>(box_terms::a_on_edge(pose_, i, j, half_extent_a_)) +
                              of_b(box_terms::b_on_edge(pose_, i, j, half_extent_b_)));
       }

@@ -1,15 +1,9 @@
 #pragma once
 #include <cstdint>
 
+#include "lanes.h"
 #include "tandem/formats/block.h"
 #include "tandem/kernels/relative_pose.h"
-
-// Vectors of GCC and clang; a compiler without them builds the scalar way alone.
-#if defined(__GNUC__) && defined(__has_builtin)
-#if __has_builtin(__builtin_shufflevector)
-#define TANDEM_HAVE_LANES 1
-#endif
-#endif
 
 namespace tandem {
 

@@ -1,7 +1,6 @@
 #include "tandem/kernels/broad_phase.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -11,8 +10,6 @@
 
 namespace tandem {
 namespace {
-
-constexpr double kLargest = 1e300;
 
 // How much each node's half-extent is widened. Coordinates are normalised to [0, 1], so an operation on them
 // rounds by at most 2^-24. A node's box is made of a sum, a difference and halves of numbers that are off by
@@ -163,11 +160,11 @@ bool BroadPhase::collect(std::span<const WorldBox> boxes) {
   };
   bool enough = true;
   found_.clear();
-  traverse(tree, tree, test, [&](std::uint32_t block_a, std::uint32_t block_b, std::uint32_t mask) {
+  traverse(tree, tree, test, [&](const Block& leaves_a, const Block& leaves_b, std::uint32_t mask) {
     for (; mask != 0; mask &= mask - 1) {
-      const int bit = std::countr_zero(mask);
-      const std::uint32_t a = keys_[blocks_[block_a].index[bit / 4]].box;
-      const std::uint32_t b = keys_[blocks_[block_b].index[bit % 4]].box;
+      const int bit = lowest_bit(mask);
+      const std::uint32_t a = keys_[leaves_a.index[bit / 4]].box;
+      const std::uint32_t b = keys_[leaves_b.index[bit % 4]].box;
       if (overlap(boxes[a], boxes[b])) enough = enough && found_.push({std::min(a, b), std::max(a, b)});
     }
     return enough;
@@ -194,10 +191,12 @@ Status BroadPhase::find_pairs(std::span<const WorldBox> boxes) {
   pairs_.clear();
   if (boxes.size() >= kNoIndex) return Status::kOutOfRange;
   double longest = 0;
+  for (const WorldBox& box : boxes) {
+    if (!in_range(box)) return Status::kOutOfRange;
+  }
   for (int k = 0; k < 3; ++k) {
     double lo = std::numeric_limits<double>::infinity(), hi = -lo;
     for (const WorldBox& box : boxes) {
-      if (!(std::fabs(box.lo[k]) <= kLargest && std::fabs(box.hi[k]) <= kLargest)) return Status::kOutOfRange;
       lo = std::min(lo, box.lo[k]);
       hi = std::max(hi, box.hi[k]);
     }

@@ -30,12 +30,12 @@ using Candidates =
 
 Candidates walk(const LevelView& a, const LevelView& b) {
   Candidates candidates;
-  traverse(a, b, aligned_mask, [&](std::uint32_t block_a, std::uint32_t block_b, std::uint32_t mask) {
+  traverse(a, b, aligned_mask, [&](const Block& block_a, const Block& block_b, std::uint32_t mask) {
     for (int i = 0; i < kNodesPerBlock; ++i) {
       for (int j = 0; j < kNodesPerBlock; ++j) {
         if ((mask >> (4 * i + j) & 1) == 0) continue;
-        const Triangle& triangle_a = a.triangles[a.blocks[block_a].index[i]];
-        const Triangle& triangle_b = b.triangles[b.blocks[block_b].index[j]];
+        const Triangle& triangle_a = a.triangles[block_a.index[i]];
+        const Triangle& triangle_b = b.triangles[block_b.index[j]];
         ++candidates[{triangle_a.source_face(), triangle_b.source_face()}];
       }
     }
@@ -91,10 +91,10 @@ TEST(Traversal, StopsWhenAsked) {
   const Bytes file(test::make_file(test::random_mesh(400, 1)));
   const LevelView tree = file.check().asset.level();
   int calls = 0;
-  const auto once = [&](std::uint32_t, std::uint32_t, std::uint32_t) { return ++calls < 1; };
+  const auto once = [&](const Block&, const Block&, std::uint32_t) { return ++calls < 1; };
   const std::uint64_t until_first = traverse(tree, tree, aligned_mask, once);
   EXPECT_EQ(calls, 1);
-  const auto all = [](std::uint32_t, std::uint32_t, std::uint32_t) { return true; };
+  const auto all = [](const Block&, const Block&, std::uint32_t) { return true; };
   EXPECT_LT(until_first, traverse(tree, tree, aligned_mask, all));
 }
 
@@ -140,7 +140,7 @@ struct DeepTree {
 TEST(Traversal, TheStackHoldsTheDeepestTrees) {
   const DeepTree tree(kMaxDepth);
   std::uint64_t leaf_pairs = 0;
-  traverse(tree.view(), tree.view(), aligned_mask, [&](std::uint32_t, std::uint32_t, std::uint32_t mask) {
+  traverse(tree.view(), tree.view(), aligned_mask, [&](const Block&, const Block&, std::uint32_t mask) {
     leaf_pairs += static_cast<std::uint64_t>(__builtin_popcount(mask));
     return true;
   });

@@ -62,7 +62,7 @@ Work query(const LevelView& tree, const RelativePose& b_in_a, bool stop_at_first
     return of_blocks(a, b, b_in_a);
   };
   Work work;
-  work.block_pairs = traverse(tree, tree, test, [&](std::uint32_t, std::uint32_t, std::uint32_t mask) {
+  work.block_pairs = traverse(tree, tree, test, [&](const Block&, const Block&, std::uint32_t mask) {
     work.candidates += static_cast<std::uint64_t>(std::popcount(mask));
     return !stop_at_first;
   });

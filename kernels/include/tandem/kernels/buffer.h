@@ -34,10 +34,14 @@ class Buffer {
 
   /// Adds an element; grows by half. False: out of memory, nothing changed.
   [[nodiscard]] bool push(const Value& value) {
-    if (size_ == capacity_ && !reallocate(capacity_ + capacity_ / 2 + 64, size_)) return false;
+    if (size_ == capacity_ && !grow(size_)) return false;
     data_[size_++] = value;
     return true;
   }
+
+  /// Makes room for half as many more elements as there is room for, and keeps the first `kept`. False: out
+  /// of memory, nothing changed.
+  [[nodiscard]] bool grow(std::size_t kept) { return reallocate(capacity_ + capacity_ / 2 + 64, kept); }
 
   void clear() { size_ = 0; }
   Value* data() { return data_; }

@@ -1,4 +1,5 @@
 #pragma once
+#include <bit>
 #include <cstdint>
 
 #include "tandem/formats/platform.h"
@@ -26,6 +27,35 @@ TANDEM_HD constexpr std::uint32_t traversal_stack_size(std::uint32_t depth_a, st
 }
 inline constexpr std::uint32_t kTraversalStackSize = traversal_stack_size(kMaxDepth, kMaxDepth);
 
+/// Position of the lowest set bit. Condition: bits != 0.
+TANDEM_HD inline int lowest_bit(std::uint32_t bits) {
+#ifdef __CUDA_ARCH__
+  return __ffs(static_cast<int>(bits)) - 1;
+#else
+  return std::countr_zero(bits);
+#endif
+}
+
+/// The block pairs that wait. A CPU has faster ones, with the same order.
+class BlockPairStack {
+ public:
+  TANDEM_HD bool empty() const { return height_ == 0; }
+  TANDEM_HD BlockPair pop() { return pairs_[--height_]; }
+  TANDEM_HD void push(const BlockPair& pair) { pairs_[height_++] = pair; }
+
+  /// A pair of child blocks for each hit, two internal blocks given.
+  TANDEM_HD void push_children(const Block& a, const Block& b, std::uint32_t hits) {
+    for (; hits != 0; hits &= hits - 1) {
+      const int bit = lowest_bit(hits);
+      push({a.index[bit / 4], b.index[bit % 4], kAllNodePairs});
+    }
+  }
+
+ private:
+  BlockPair pairs_[kTraversalStackSize];
+  std::uint32_t height_ = 0;
+};
+
 /// Visits every block pair that the test leads to, each once, and hands leaf pairs on.
 ///
 /// Two internal blocks: one new pair for each hit, both sides descend. Two leaf blocks: on_leaves gets the
@@ -34,43 +64,37 @@ inline constexpr std::uint32_t kTraversalStackSize = traversal_stack_size(kMaxDe
 /// against nodes further down, and no leaf pair is met twice (the paper's figures 3 and 4).
 ///
 /// test(block_a, block_b) -> mask of node pairs whose boxes may overlap; imaginary nodes never do.
-/// on_leaves(a, b, mask) -> bool: blocks a and b are leaf blocks, mask is not 0; false ends the traversal.
+/// on_leaves(block_a, block_b, mask) -> bool: two leaf blocks, mask is not 0; false ends the traversal.
 /// Result: the number of block pairs tested. Order: depth first, later nodes first; the same on every run.
-template <typename Test, typename OnLeaves>
+template <typename Stack = BlockPairStack, typename Test, typename OnLeaves>
 TANDEM_HD std::uint64_t traverse(const LevelView& tree_a, const LevelView& tree_b, const Test& test,
                                  const OnLeaves& on_leaves) {
-  BlockPair stack[kTraversalStackSize];
-  std::uint32_t height = 0;
-  stack[height++] = {0, 0, kAllNodePairs};
+  Stack stack;
+  stack.push({0, 0, kAllNodePairs});
   std::uint64_t tested = 0;
-  while (height > 0) {
-    const BlockPair pair = stack[--height];
-    const Block &block_a = tree_a.blocks[pair.a], &block_b = tree_b.blocks[pair.b];
-    const std::uint32_t hits = test(block_a, block_b) & pair.mask;
+  while (!stack.empty()) {
+    const BlockPair pair = stack.pop();
+    const Block &a = tree_a.blocks[pair.a], &b = tree_b.blocks[pair.b];
+    const std::uint32_t hits = test(a, b) & pair.mask;
     ++tested;
     if (hits == 0) continue;
-    const bool leaves_a = block_a.is_leaf_block(), leaves_b = block_b.is_leaf_block();
+    const bool leaves_a = a.is_leaf_block(), leaves_b = b.is_leaf_block();
     if (leaves_a && leaves_b) {
-      if (!on_leaves(pair.a, pair.b, hits)) break;
+      if (!on_leaves(a, b, hits)) break;
     } else if (leaves_b) {
       for (int i = 0; i < kNodesPerBlock; ++i) {
-        const std::uint32_t row =
-            hits >> 4 * i & 0xFu;  // leaves of b that node i hits: the new pair's columns
-        if (row != 0) stack[height++] = {block_a.index[i], pair.b, row * 0x1111u};
+        // Leaves of b that node i hits: the new pair's columns.
+        const std::uint32_t row = hits >> 4 * i & 0xFu;
+        if (row != 0) stack.push({a.index[i], pair.b, row * 0x1111u});
       }
     } else if (leaves_a) {
       for (int j = 0; j < kNodesPerBlock; ++j) {
-        const std::uint32_t column =
-            hits >> j & 0x1111u;  // leaves of a that node j hits: the new pair's rows
-        if (column != 0) stack[height++] = {pair.a, block_b.index[j], column * 0xFu};
+        // Leaves of a that node j hits: the new pair's rows.
+        const std::uint32_t column = hits >> j & 0x1111u;
+        if (column != 0) stack.push({pair.a, b.index[j], column * 0xFu});
       }
     } else {
-      for (int i = 0; i < kNodesPerBlock; ++i) {
-        for (int j = 0; j < kNodesPerBlock; ++j) {
-          if ((hits >> (4 * i + j) & 1u) != 0)
-            stack[height++] = {block_a.index[i], block_b.index[j], kAllNodePairs};
-        }
-      }
+      stack.push_children(a, b, hits);
     }
   }
   return tested;

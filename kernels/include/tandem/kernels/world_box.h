@@ -15,8 +15,9 @@ struct WorldBox {
 /// z)) + t). Each product is at least the smaller and at most the larger of its values at the two ends of x,
 /// y or z; each rounded sum of smaller terms is not larger. So the same formula over the smaller products
 /// gives a float64 number that no posed vertex lies below, and over the larger ones above. pose: of stored
-/// coordinates (for_stored_coordinates).
-TANDEM_HD inline WorldBox world_box(const Pose& pose, const float* lower, const float* upper) {
+/// coordinates (for_stored_coordinates). Real: float or double.
+template <typename Real>
+TANDEM_HD inline WorldBox world_box(const Pose& pose, const Real* lower, const Real* upper) {
   WorldBox box;
   for (int i = 0; i < 3; ++i) {
     double least[3], most[3];
@@ -30,6 +31,19 @@ TANDEM_HD inline WorldBox world_box(const Pose& pose, const float* lower, const 
     box.hi[i] = detail::plus(detail::plus(detail::plus(most[0], most[1]), most[2]), pose.translation[i]);
   }
   return box;
+}
+
+/// The largest coordinate of a world box that queries take.
+inline constexpr double kLargestWorldCoordinate = 1e300;
+
+/// Whether queries take this box; NaN is not in range.
+TANDEM_HD inline bool in_range(const WorldBox& box) {
+  bool in_range = true;
+  for (int k = 0; k < 3; ++k) {
+    in_range = in_range && std::fabs(box.lo[k]) <= kLargestWorldCoordinate &&
+               std::fabs(box.hi[k]) <= kLargestWorldCoordinate;
+  }
+  return in_range;
 }
 
 /// Whether two world boxes meet, touching included.

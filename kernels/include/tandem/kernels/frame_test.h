@@ -1,0 +1,217 @@
+#pragma once
+#include <cmath>
+
+#include "tandem/kernels/box_test.h"
+#include "tandem/kernels/relative_pose.h"
+
+/// The first stage of the triangle test: float32 in the frame of the first instance, with an error bound, for
+/// CPU and GPU. Decides nearly all candidates of ordinary scenes; right whenever it decides.
+///
+/// Templates over Value: float, or a vector with a candidate in each lane, which has the same operators; the
+/// results are the same, bit by bit. A vector type brings, in its own namespace, select(mask, x, y),
+/// larger(x, y), magnitude(x) and comparisons whose results combine by & | ^ !.
+///
+/// **Proof.** Let X be the posed float64 points that a query is about, and T(X) = n (X - t_a), n being the
+/// float64 inverse of a's rotation that relative_pose() works with. T is affine and det n > 0 for rigid
+/// poses, so a volume of posed points has the sign of the volume of their images. The slack along a's axes
+/// bounds, in each coordinate, how far the image of a corner of a is from the corner as stored, plus how far
+/// that of a corner of b is from box_terms::posed_center() of it (docs/box_test.md), with 1.001 and 2^-88 to
+/// spare. Let E be the largest of the three.
+///
+/// Let u = 2^-24 and ~ mark what is computed. A difference x~ of two corners of one mesh is off by at most e =
+/// 2E + u m, where m is at least its magnitude; of corners of different meshes by E + u |x~|.
+/// A normal, n~ = u~ x v~, of differences bounded by m: each component is off by at most 2 (2 m e + e^2) for
+/// its factors and 4 u m^2 (1 + u) for its rounding; nu = 4 m (e + u m) + 2 e^2. The volume, a product w~ . n~
+/// with a difference of corners of different meshes, is then off by at most
+///
+///     sum |n~_k| (E + u |w~_k|) + nu sum (|w~_k| + E + u |w~_k|) + ((1 + u)^3 - 1) sum |n~_k| |w~_k|
+///       <= E |n~|_1 + nu (|w~|_1 + 3 E) (1 + u) + 4 u (1 + 2 u) sum |n~_k w~_k|.
+///
+/// The bound as computed makes up for its own at most 20 roundings, and the factors 1 + 2 u, by 1.001.
+/// Underflow, flushed to zero or not, costs at most 2^-126 an operation. Coordinates, translations and slack
+/// are at most 2^30 (frame_error()), so differences are below 2^32, and three of them in a normal, seven in a
+/// volume and eleven in its bound come to less than 2^-88; the bound has 2^-80 to spare for that. Nothing
+/// overflows: a volume is below 6 * 2^96.
+namespace tandem {
+
+/// The largest coordinate, distance and slack that this stage takes.
+inline constexpr double kLargestInFrame = 0x1p30;
+
+/// E of the proof; infinite where the proof's conditions do not hold: then the stage decides nothing.
+TANDEM_HD inline float frame_error(const RelativePose& b_in_a, const TreeExtent& tree_a,
+                                   const TreeExtent& tree_b) {
+  double error = 0, largest = 0;
+  for (int k = 0; k < 3; ++k) {
+    error = std::fmax(error, static_cast<double>(b_in_a.slack_a[k]));
+    largest = std::fmax(largest, std::fmax(tree_a.reach[k], tree_b.reach[k]));
+    largest = std::fmax(largest, std::fabs(static_cast<double>(b_in_a.translation[k])));
+  }
+  // Images of b's corners reach as far as 2^0.8 reach_b + translation.
+  if (!(largest <= kLargestInFrame / 4 && error <= kLargestInFrame / 4)) return INFINITY;
+  return static_cast<float>(error * (1 + 0x1p-20));
+}
+
+namespace frame {
+
+TANDEM_HD inline float magnitude(float x) {
+  return std::fabs(x);
+}
+TANDEM_HD inline float larger(float x, float y) {
+  return x < y ? y : x;
+}
+TANDEM_HD inline float select(bool mask, float x, float y) {
+  return mask ? x : y;
+}
+
+/// A point for each lane.
+template <typename Value>
+struct Point {
+  Value x[3];
+};
+
+template <typename Value, typename Mask>
+TANDEM_HD inline Point<Value> select_point(Mask mask, const Point<Value>& p, const Point<Value>& q) {
+  return {{select(mask, p.x[0], q.x[0]), select(mask, p.x[1], q.x[1]), select(mask, p.x[2], q.x[2])}};
+}
+
+template <typename Value>
+TANDEM_HD inline Point<Value> difference(const Point<Value>& p, const Point<Value>& q) {
+  return {{p.x[0] - q.x[0], p.x[1] - q.x[1], p.x[2] - q.x[2]}};
+}
+
+template <typename Value>
+TANDEM_HD inline Value sum_of_magnitudes(const Value (&x)[3]) {
+  return (magnitude(x[0]) + magnitude(x[1])) + magnitude(x[2]);
+}
+
+template <typename Value>
+TANDEM_HD inline Value largest_magnitude(const Value (&x)[3]) {
+  return larger(larger(magnitude(x[0]), magnitude(x[1])), magnitude(x[2]));
+}
+
+/// A volume and the bound of its error.
+template <typename Value>
+struct Volume {
+  Value value, bound;
+};
+
+/// A plane through three corners. Without kBounded, volumes come without bounds: taken as computed.
+template <typename Value, bool kBounded>
+struct Plane {
+  Point<Value> origin;
+  Value normal[3];
+  Value normal_size;   ///< E |n|_1 of the proof
+  Value normal_error;  ///< nu of the proof
+
+  TANDEM_HD Plane(const Point<Value>& p, const Point<Value>& q, const Point<Value>& r, float error)
+      : origin(p) {
+    const Point<Value> u = difference(q, p), v = difference(r, p);
+    for (int k = 0; k < 3; ++k) {
+      const int i = (k + 1) % 3, j = (k + 2) % 3;
+      normal[k] = u.x[i] * v.x[j] - u.x[j] * v.x[i];
+    }
+    if constexpr (!kBounded) return;
+    constexpr float kU = 0x1p-24f;
+    const Value m = larger(largest_magnitude(u.x), largest_magnitude(v.x));
+    const Value e = kU * m + 2 * error;
+    normal_size = error * sum_of_magnitudes(normal);
+    normal_error = 4 * (m * (kU * m + e)) + 2 * (e * e);
+  }
+
+  /// volume(p, q, r, s), s being a corner of another mesh than p.
+  TANDEM_HD Volume<Value> volume(const Point<Value>& s, float error) const {
+    const Point<Value> w = difference(s, origin);
+    const Value term[3] = {w.x[0] * normal[0], w.x[1] * normal[1], w.x[2] * normal[2]};
+    const Value value = (term[0] + term[1]) + term[2];
+    if constexpr (!kBounded) return {value, Value{}};
+    constexpr float kU = 0x1p-24f, kUnderflow = 0x1p-80f;
+    const Value far = sum_of_magnitudes(w.x) + 3 * error;
+    const Value bound = (normal_size + normal_error * far) + 4 * kU * sum_of_magnitudes(term);
+    return {value, 1.001f * bound + kUnderflow};
+  }
+};
+
+/// On which side of a plane the corners of a triangle lie, where that is certain.
+template <typename Mask>
+struct Sides {
+  Mask above[3], below[3];
+
+  TANDEM_HD Mask strictly_one() const {
+    return (above[0] & above[1] & above[2]) | (below[0] & below[1] & below[2]);
+  }
+  TANDEM_HD Mask all_certain() const {
+    return (above[0] | below[0]) & (above[1] | below[1]) & (above[2] | below[2]);
+  }
+  /// Of three certain sides that are not one: whether corner i has one side to itself.
+  TANDEM_HD Mask alone(int i) const {
+    return (above[i] ^ above[(i + 1) % 3]) & (above[i] ^ above[(i + 2) % 3]);
+  }
+};
+
+template <typename Value, bool kBounded>
+TANDEM_HD inline auto sides_of(const Plane<Value, kBounded>& plane, const Point<Value> (&t)[3], float error) {
+  using Mask = decltype(plane.normal_size < plane.normal_size);
+  Sides<Mask> sides;
+  for (int i = 0; i < 3; ++i) {
+    const Volume<Value> v = plane.volume(t[i], error);
+    sides.above[i] = v.bound < v.value;
+    sides.below[i] = v.value < -v.bound;
+  }
+  return sides;
+}
+
+/// The corners with the lone one first, as they go round.
+template <typename Value, typename Mask>
+TANDEM_HD inline void lone_first(const Point<Value> (&t)[3], const Sides<Mask>& sides,
+                                 Point<Value> (&out)[3]) {
+  const Mask first = sides.alone(0), second = sides.alone(1);
+  for (int i = 0; i < 3; ++i) {
+    out[i] = select_point(first, t[i], select_point(second, t[(i + 1) % 3], t[(i + 2) % 3]));
+  }
+}
+
+/// The answer, lane by lane; apart where neither is set.
+template <typename Mask>
+struct Verdicts {
+  Mask contact, undecided;
+};
+
+/// Decides what the error bound allows. a: corners as stored. b: images of the corners in a's frame by
+/// box_terms::posed_center(). error: frame_error(). The method is that of detail::decide() in
+/// triangle_test.h; of the corners q and r only b's are exchanged, where one of the two orders asks for it,
+/// and a's orientation turns the signs instead. Without kBounded signs are taken as computed, and what is
+/// undecided are ties.
+template <bool kBounded, typename Value>
+TANDEM_HD inline auto decide(const Point<Value> (&a)[3], const Point<Value> (&b)[3], float error) {
+  using PlaneOf = Plane<Value, kBounded>;
+  const PlaneOf plane_a(a[0], a[1], a[2], error), plane_b(b[0], b[1], b[2], error);
+  const auto sides_of_b = sides_of(plane_a, b, error);
+  const auto sides_of_a = sides_of(plane_b, a, error);
+  using Mask = decltype(sides_of_a.strictly_one());
+  const Mask possible = !(sides_of_b.strictly_one() | sides_of_a.strictly_one());
+  const Mask certain = sides_of_a.all_certain() & sides_of_b.all_certain();
+
+  Point<Value> oa[3], ob[3];
+  lone_first(a, sides_of_a, oa);
+  lone_first(b, sides_of_b, ob);
+  const auto lone_below = [](const Sides<Mask>& sides) {
+    const Mask first = sides.alone(0), second = sides.alone(1), third = !(first | second);
+    return (first & sides.below[0]) | (second & sides.below[1]) | (third & sides.below[2]);
+  };
+  const Mask turned_a = lone_below(sides_of_b), turned_b = lone_below(sides_of_a);
+  const Mask exchange = turned_a ^ turned_b;
+  const Point<Value> q = select_point(exchange, ob[2], ob[1]), r = select_point(exchange, ob[1], ob[2]);
+  const Volume<Value> lower = PlaneOf(oa[0], ob[0], oa[1], error).volume(q, error);
+  const Volume<Value> upper = PlaneOf(oa[0], ob[0], oa[2], error).volume(r, error);
+  const Value lower_value = select(turned_a, -lower.value, lower.value);
+  const Value upper_value = select(turned_a, -upper.value, upper.value);
+  const Mask apart = (lower_value < -lower.bound) | (upper.bound < upper_value);
+  const Mask meet = (lower.bound < lower_value) & (upper_value < -upper.bound);
+  Verdicts<Mask> verdicts;
+  verdicts.contact = possible & certain & meet;
+  verdicts.undecided = possible & !(certain & (apart | meet));
+  return verdicts;
+}
+
+}  // namespace frame
+}  // namespace tandem

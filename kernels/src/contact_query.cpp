@@ -1,0 +1,282 @@
+#include "tandem/kernels/contact_query.h"
+
+#include <algorithm>
+#include <atomic>
+#include <new>
+
+#include "narrow_phase.h"
+#include "tandem/kernels/block_pair.h"
+#include "tandem/kernels/frame_test.h"
+#include "worker_threads.h"
+
+namespace tandem {
+namespace {
+
+constexpr std::uint32_t kMostThreads = 1024;
+
+// Object pairs that a thread takes at a time.
+constexpr std::uint32_t kPairsPerChunk = 16;
+
+struct Asset {
+  LevelView tree;
+  TreeExtent extent;
+  double origin[3];
+  float lower[3], upper[3];
+};
+
+// The contacts of one chunk within those of the worker that took it.
+struct ChunkResult {
+  std::uint32_t worker;
+  std::size_t begin, end;
+};
+
+struct alignas(64) Worker {
+  Buffer<Contact> contacts;
+  QueryCounters counters;
+  bool enough_memory = true;
+};
+
+bool grow_contacts(ContactSink& sink) {
+  auto& contacts = *static_cast<Buffer<Contact>*>(sink.owner);
+  const std::size_t used = static_cast<std::size_t>(sink.next - contacts.data());
+  if (!contacts.grow(used)) return false;
+  sink.next = contacts.data() + used;
+  sink.end = contacts.data() + contacts.capacity();
+  return true;
+}
+
+NarrowPhase best_narrow_phase() {
+  NarrowPhase best = nullptr;
+  for (const BlockPairVariant variant : kBlockPairVariants) {
+    if (const NarrowPhase way = narrow_phase(variant); way != nullptr) best = way;
+  }
+  return best;
+}
+
+void add_to(QueryCounters& sum, const QueryCounters& part) {
+  sum.object_pairs += part.object_pairs;
+  sum.block_pairs += part.block_pairs;
+  sum.candidates += part.candidates;
+  sum.decided_by_float32 += part.decided_by_float32;
+  sum.decided_by_float64 += part.decided_by_float64;
+  sum.decided_exactly += part.decided_exactly;
+  sum.contacts += part.contacts;
+}
+
+}  // namespace
+
+struct ContactQuery::State {
+  Buffer<Asset> assets;
+  Buffer<PosedTree> instances;
+  Buffer<WorldBox> boxes;
+  BroadPhase broad_phase;
+  Buffer<ObjectPair> pairs;
+  Buffer<Contact> contacts;
+  QueryCounters counters;
+  std::uint64_t where = 0;
+
+  NarrowPhase narrow_phase = best_narrow_phase();
+  QueryOptions options;
+  WorkerThreads threads;
+  std::unique_ptr<Worker[]> workers;
+  std::uint32_t worker_count = 0;
+  Buffer<ChunkResult> chunks;
+  std::atomic<std::uint32_t> next_chunk;
+
+  Status fail(Status status, std::uint64_t at) {
+    where = at;
+    forget_results();
+    return status;
+  }
+
+  void forget_results() {
+    pairs.clear();
+    contacts.clear();
+    counters = {};
+  }
+
+  Status pose_instances(std::span<const Instance> posed);
+  Status find_pairs();
+  Status take_pairs(std::span<const ObjectPair> given);
+  Status find_contacts_of_pairs();
+  bool provide_workers();
+  PairTask task_of(std::uint32_t pair) const;
+  void work(std::uint32_t worker);
+  Status collect();
+};
+
+// Poses of stored coordinates, and world boxes.
+Status ContactQuery::State::pose_instances(std::span<const Instance> posed) {
+  if (posed.size() >= kNoIndex) return fail(Status::kOutOfRange, kNoIndex);
+  if (!instances.resize(posed.size()) || !boxes.resize(posed.size())) return fail(Status::kOutOfMemory, 0);
+  for (std::size_t i = 0; i < posed.size(); ++i) {
+    if (posed[i].asset >= assets.size()) return fail(Status::kUnknownAsset, i);
+    if (!is_rigid(posed[i].pose)) return fail(Status::kPoseNotRigid, i);
+    const Asset& asset = assets[posed[i].asset];
+    instances[i] = {asset.tree, asset.extent, for_stored_coordinates(posed[i].pose, asset.origin)};
+    boxes[i] = world_box(instances[i].pose, asset.lower, asset.upper);
+    if (!in_range(boxes[i])) return fail(Status::kOutOfRange, i);
+  }
+  return Status::kOk;
+}
+
+Status ContactQuery::State::find_pairs() {
+  if (const Status status = broad_phase.find_pairs(boxes.view()); status != Status::kOk) return fail(status, 0);
+  const std::span<const ObjectPair> found = broad_phase.pairs();
+  const std::size_t selves = options.self_pairs ? instances.size() : 0;
+  if (!pairs.resize(found.size() + selves)) return fail(Status::kOutOfMemory, 0);
+  std::size_t next = 0;
+  std::uint32_t self = 0;  // the next to come
+  for (const ObjectPair& pair : found) {
+    for (; self < selves && self <= pair.a; ++self) pairs[next++] = {self, self};
+    pairs[next++] = pair;
+  }
+  for (; self < selves; ++self) pairs[next++] = {self, self};
+  return Status::kOk;
+}
+
+Status ContactQuery::State::take_pairs(std::span<const ObjectPair> given) {
+  if (!pairs.resize(given.size())) return fail(Status::kOutOfMemory, 0);
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    if (given[i].a >= instances.size() || given[i].b >= instances.size()) return fail(Status::kUnknownInstance, i);
+    pairs[i] = given[i];
+  }
+  return Status::kOk;
+}
+
+bool ContactQuery::State::provide_workers() {
+  const std::uint32_t wanted = std::clamp(options.threads, 1u, kMostThreads);
+  if (wanted == worker_count) return true;
+  workers.reset(new (std::nothrow) Worker[wanted]);
+  worker_count = workers != nullptr ? wanted : 0;
+  return workers != nullptr;
+}
+
+PairTask ContactQuery::State::task_of(std::uint32_t pair) const {
+  const PosedTree &a = instances[pairs[pair].a], &b = instances[pairs[pair].b];
+  PairTask task;
+  task.a = &a;
+  task.b = &b;
+  task.pair = pair;
+  task.mode = options.mode;
+  task.first_contact_only = options.first_contact_only;
+  task.self = &a == &b;
+  task.in_frame = relative_pose(a.pose, a.extent, b.pose, b.extent, task.b_in_a) == RelativePoseStatus::kOk;
+  task.frame_error = task.in_frame ? frame_error(task.b_in_a, a.extent, b.extent) : 0;
+  return task;
+}
+
+// Takes chunks of pairs until none is left.
+void ContactQuery::State::work(std::uint32_t worker) {
+  Worker& self = workers[worker];
+  ContactSink sink;
+  sink.owner = &self.contacts;
+  sink.grow = grow_contacts;
+  sink.next = self.contacts.data();
+  sink.end = self.contacts.data() + self.contacts.capacity();
+  self.enough_memory = true;
+  const auto used = [&] { return static_cast<std::size_t>(sink.next - self.contacts.data()); };
+  for (;;) {
+    const std::uint32_t chunk = next_chunk.fetch_add(1, std::memory_order_relaxed);
+    if (chunk >= chunks.size() || !self.enough_memory) break;
+    const std::size_t begin = used(), first = static_cast<std::size_t>(chunk) * kPairsPerChunk;
+    const std::size_t end = std::min(pairs.size(), first + kPairsPerChunk);
+    for (std::size_t pair = first; pair < end && self.enough_memory; ++pair) {
+      const PairTask task = task_of(static_cast<std::uint32_t>(pair));
+      self.enough_memory = (task.in_frame ? narrow_phase : narrow_phase_by_world_boxes)(task, sink);
+    }
+    chunks[chunk] = {worker, begin, used()};
+  }
+  self.counters = sink.counters;
+  (void)self.contacts.resize(used());
+}
+
+// The contacts of all workers in the order of pairs.
+Status ContactQuery::State::collect() {
+  std::size_t total = 0;
+  counters = {};
+  counters.object_pairs = pairs.size();
+  for (std::uint32_t i = 0; i < worker_count; ++i) {
+    if (!workers[i].enough_memory) return fail(Status::kOutOfMemory, 0);
+    add_to(counters, workers[i].counters);
+    total += workers[i].contacts.size();
+  }
+  if (worker_count == 1) {
+    std::swap(contacts, workers[0].contacts);
+    return Status::kOk;
+  }
+  if (!contacts.resize(total)) return fail(Status::kOutOfMemory, 0);
+  Contact* out = contacts.data();
+  for (const ChunkResult& chunk : chunks.view()) {
+    const Contact* from = workers[chunk.worker].contacts.data();
+    out = std::copy(from + chunk.begin, from + chunk.end, out);
+  }
+  return Status::kOk;
+}
+
+Status ContactQuery::State::find_contacts_of_pairs() {
+  if (pairs.size() >= kNoIndex) return fail(Status::kOutOfRange, 0);
+  if (!provide_workers()) return fail(Status::kOutOfMemory, 0);
+  if (!chunks.resize((pairs.size() + kPairsPerChunk - 1) / kPairsPerChunk)) return fail(Status::kOutOfMemory, 0);
+  next_chunk.store(0, std::memory_order_relaxed);
+  const auto work = [](void* state, std::uint32_t worker) { static_cast<State*>(state)->work(worker); };
+  if (!threads.run(worker_count, work, this)) return fail(Status::kCannotStartThread, 0);
+  return collect();
+}
+
+ContactQuery::ContactQuery() : state_(new (std::nothrow) State) {}
+ContactQuery::ContactQuery(ContactQuery&&) noexcept = default;
+ContactQuery& ContactQuery::operator=(ContactQuery&&) noexcept = default;
+ContactQuery::~ContactQuery() = default;
+
+Status ContactQuery::set_assets(std::span<const AssetView> assets) {
+  if (state_ == nullptr || !state_->assets.resize(assets.size())) return Status::kOutOfMemory;
+  for (std::size_t i = 0; i < assets.size(); ++i) {
+    Asset& asset = state_->assets[i];
+    asset.tree = assets[i].level();
+    asset.extent = extent_of(asset.tree.blocks[0]);
+    const FileHeader& header = *assets[i].header;
+    for (int k = 0; k < 3; ++k) {
+      asset.origin[k] = header.origin[k];
+      asset.lower[k] = header.lower[k];
+      asset.upper[k] = header.upper[k];
+    }
+  }
+  return Status::kOk;
+}
+
+Status ContactQuery::find_contacts(std::span<const Instance> instances, const QueryOptions& options) {
+  if (state_ == nullptr) return Status::kOutOfMemory;
+  state_->options = options;
+  Status status = state_->pose_instances(instances);
+  if (status == Status::kOk) status = state_->find_pairs();
+  return status == Status::kOk ? state_->find_contacts_of_pairs() : status;
+}
+
+Status ContactQuery::find_contacts(std::span<const Instance> instances, std::span<const ObjectPair> pairs,
+                                   const QueryOptions& options) {
+  if (state_ == nullptr) return Status::kOutOfMemory;
+  state_->options = options;
+  Status status = state_->pose_instances(instances);
+  if (status == Status::kOk) status = state_->take_pairs(pairs);
+  return status == Status::kOk ? state_->find_contacts_of_pairs() : status;
+}
+
+std::span<const ObjectPair> ContactQuery::pairs() const {
+  return state_ != nullptr ? state_->pairs.view() : std::span<const ObjectPair>();
+}
+
+std::span<const Contact> ContactQuery::contacts() const {
+  return state_ != nullptr ? state_->contacts.view() : std::span<const Contact>();
+}
+
+const QueryCounters& ContactQuery::counters() const {
+  static constexpr QueryCounters kNone;
+  return state_ != nullptr ? state_->counters : kNone;
+}
+
+std::uint64_t ContactQuery::where() const {
+  return state_ != nullptr ? state_->where : 0;
+}
+
+}  // namespace tandem

@@ -1,0 +1,139 @@
+#pragma once
+
+// Vectors of GCC and clang; a compiler without them builds the scalar ways alone.
+#if defined(__GNUC__) && defined(__has_builtin)
+#if __has_builtin(__builtin_shufflevector)
+#define TANDEM_HAVE_LANES 1
+#endif
+#endif
+
+#ifdef TANDEM_HAVE_LANES
+#if defined(__SSE2__)
+#include <immintrin.h>
+#elif defined(__aarch64__)
+#include <arm_neon.h>
+#endif
+#include <cstdint>
+
+// Vectors of 4, 8 or 16 float32. Included by files that are compiled for different machines: all of it has
+// internal linkage, also what is instantiated with the types of this file, so that no function compiled for
+// one machine is linked into code for another.
+namespace tandem {
+namespace {
+
+#define TANDEM_INLINE [[gnu::always_inline]] inline
+
+template <int kCount>
+struct Vector {
+  using Floats [[gnu::vector_size(4 * kCount)]] = float;
+  using Bits [[gnu::vector_size(4 * kCount)]] = std::int32_t;
+};
+
+template <int kCount>
+struct Lanes;
+
+/// A truth value for each lane.
+template <int kCount>
+struct LaneMask {
+  using Bits = typename Vector<kCount>::Bits;
+  Bits bits;
+
+  TANDEM_INLINE static LaneMask all() { return {~Bits{}}; }
+  TANDEM_INLINE friend LaneMask operator&(LaneMask a, LaneMask b) { return {a.bits & b.bits}; }
+  TANDEM_INLINE friend LaneMask operator|(LaneMask a, LaneMask b) { return {a.bits | b.bits}; }
+  TANDEM_INLINE friend LaneMask operator^(LaneMask a, LaneMask b) { return {a.bits ^ b.bits}; }
+  TANDEM_INLINE friend LaneMask operator!(LaneMask a) { return {~a.bits}; }
+
+  /// Drops the lanes where x <= y is not true.
+  TANDEM_INLINE void require(const Lanes<kCount>& x, const Lanes<kCount>& y) { bits &= x.v <= y.v; }
+
+  /// Bit i for lane i.
+  TANDEM_INLINE unsigned mask() const {
+#if defined(__AVX__)
+    if constexpr (kCount == 8)
+      return static_cast<unsigned>(_mm256_movemask_ps(reinterpret_cast<__m256>(bits)));
+#endif
+#if defined(__SSE2__)
+    if constexpr (kCount == 4) return static_cast<unsigned>(_mm_movemask_ps(reinterpret_cast<__m128>(bits)));
+#elif defined(__aarch64__)
+    const typename LaneMask<4>::Bits place = {1, 2, 4, 8};
+    return static_cast<unsigned>(vaddvq_s32(reinterpret_cast<int32x4_t>(bits & place)));
+#endif
+    unsigned out = 0;
+    for (int i = 0; i < kCount; ++i) out |= (bits[i] & 1u) << i;
+    return out;
+  }
+};
+
+#if defined(__AVX512F__)
+template <>
+struct LaneMask<16> {
+  __mmask16 bits;
+
+  TANDEM_INLINE static LaneMask all() { return {0xFFFF}; }
+  TANDEM_INLINE friend LaneMask operator&(LaneMask a, LaneMask b) { return {_kand_mask16(a.bits, b.bits)}; }
+  TANDEM_INLINE friend LaneMask operator|(LaneMask a, LaneMask b) { return {_kor_mask16(a.bits, b.bits)}; }
+  TANDEM_INLINE friend LaneMask operator^(LaneMask a, LaneMask b) { return {_kxor_mask16(a.bits, b.bits)}; }
+  TANDEM_INLINE friend LaneMask operator!(LaneMask a) { return {_knot_mask16(a.bits)}; }
+  TANDEM_INLINE void require(const Lanes<16>& x, const Lanes<16>& y);
+  TANDEM_INLINE unsigned mask() const { return bits; }
+};
+#endif
+
+template <int kCount>
+struct Lanes {
+  using Floats = typename Vector<kCount>::Floats;
+  using Bits = typename Vector<kCount>::Bits;
+  Floats v;
+
+  TANDEM_INLINE friend Lanes operator+(const Lanes& a, const Lanes& b) { return {a.v + b.v}; }
+  TANDEM_INLINE friend Lanes operator+(const Lanes& a, float b) { return {a.v + b}; }
+  TANDEM_INLINE friend Lanes operator-(const Lanes& a, const Lanes& b) { return {a.v - b.v}; }
+  TANDEM_INLINE friend Lanes operator-(const Lanes& a) { return {-a.v}; }
+  TANDEM_INLINE friend Lanes operator*(const Lanes& a, const Lanes& b) { return {a.v * b.v}; }
+  TANDEM_INLINE friend Lanes operator*(float a, const Lanes& b) { return {a * b.v}; }
+  TANDEM_INLINE friend LaneMask<kCount> operator<(const Lanes& a, const Lanes& b) {
+#if defined(__AVX512F__)
+    if constexpr (kCount == 16) {
+      return {_mm512_cmp_ps_mask(reinterpret_cast<__m512>(a.v), reinterpret_cast<__m512>(b.v), _CMP_LT_OQ)};
+    } else
+#endif
+    {
+      return {a.v < b.v};
+    }
+  }
+  TANDEM_INLINE friend Lanes magnitude(const Lanes& a) {
+    return {reinterpret_cast<Floats>(reinterpret_cast<Bits>(a.v) & 0x7FFFFFFF)};
+  }
+  TANDEM_INLINE friend Lanes select(LaneMask<kCount> mask, const Lanes& a, const Lanes& b) {
+#if defined(__AVX512F__)
+    if constexpr (kCount == 16) {
+      return {reinterpret_cast<Floats>(_mm512_mask_blend_ps(mask.bits, reinterpret_cast<__m512>(b.v),
+                                                            reinterpret_cast<__m512>(a.v)))};
+    } else
+#endif
+    {
+      return {mask.bits ? a.v : b.v};
+    }
+  }
+  TANDEM_INLINE friend Lanes larger(const Lanes& a, const Lanes& b) { return select(a < b, b, a); }
+};
+
+#if defined(__AVX512F__)
+TANDEM_INLINE void LaneMask<16>::require(const Lanes<16>& x, const Lanes<16>& y) {
+  bits = _mm512_mask_cmp_ps_mask(bits, reinterpret_cast<__m512>(x.v), reinterpret_cast<__m512>(y.v),
+                                 _CMP_LE_OQ);
+}
+#endif
+
+using Lanes4 = Lanes<4>;
+
+TANDEM_INLINE Lanes4 load(const float* four) {
+  Lanes4 out;
+  __builtin_memcpy(&out, four, sizeof out);
+  return out;
+}
+
+}  // namespace
+}  // namespace tandem
+#endif

@@ -1,0 +1,63 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+
+#include "lanes.h"
+#include "tandem/formats/view.h"
+#include "tandem/kernels/block_pair.h"
+#include "tandem/kernels/contact_query.h"
+#include "tandem/kernels/relative_pose.h"
+
+// The contacts of one object pair: traversal, then the cascade on its candidates.
+namespace tandem {
+
+/// An instance as the narrow phase sees it.
+struct PosedTree {
+  LevelView tree;
+  TreeExtent extent;
+  Pose pose;  ///< of stored coordinates
+};
+
+/// An object pair, and what is asked about it.
+struct PairTask {
+  const PosedTree *a, *b;
+  std::uint32_t pair;
+  QueryMode mode;
+  bool first_contact_only;
+  bool self;             ///< a and b are one instance: every two triangles once, none with itself
+  bool in_frame;         ///< float32 in a's frame can take the pair; else what follows has no meaning
+  RelativePose b_in_a;
+  float frame_error;     ///< see frame_test.h
+};
+
+/// Where contacts go: room that grows.
+struct ContactSink {
+  Contact* next = nullptr;
+  Contact* end = nullptr;
+  void* owner = nullptr;
+  bool (*grow)(ContactSink&) = nullptr;  ///< makes room for at least one; false: out of memory
+  QueryCounters counters;
+};
+
+/// Adds the contacts of a pair to the sink, and what was done to its counters. False: out of memory.
+using NarrowPhase = bool (*)(const PairTask&, ContactSink&);
+
+/// The named way, or null where this machine or this build lacks it; all give the same contacts in the same
+/// order, and the same counters. Condition: task.in_frame.
+NarrowPhase narrow_phase(BlockPairVariant variant);
+
+/// For pairs that are not in_frame: boxes of nodes in world coordinates, float64. Slow, and right for all
+/// posed points that are finite.
+bool narrow_phase_by_world_boxes(const PairTask& task, ContactSink& sink);
+
+/// What the first stage left: decides on the posed vertices, by float64, then exactly. In fast mode, by
+/// float32 in a's frame.
+bool meet(const PairTask& task, std::uint32_t triangle_a, std::uint32_t triangle_b, QueryCounters& counters);
+
+// Each defined in a file of its own, which is compiled for machines that have the instructions.
+bool narrow_phase_scalar(const PairTask& task, ContactSink& sink);
+bool narrow_phase_lanes4(const PairTask& task, ContactSink& sink);
+bool narrow_phase_avx2(const PairTask& task, ContactSink& sink);
+bool narrow_phase_avx512(const PairTask& task, ContactSink& sink);
+
+}  // namespace tandem

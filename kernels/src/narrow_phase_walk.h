@@ -1,0 +1,108 @@
+#pragma once
+#include "narrow_phase.h"
+#include "tandem/kernels/traversal.h"
+
+// The walk that all variants of the narrow phase share. Included by files that are compiled for different
+// machines: internal linkage, see lanes.h.
+namespace tandem {
+namespace {
+
+constexpr std::uint32_t kBatch = 16;
+
+/// Candidates that wait until there are kBatch of them. The room above is for one more pair of leaf blocks,
+/// written in whole vectors.
+struct Candidates {
+  alignas(64) std::uint32_t a[2 * kBatch];
+  alignas(64) std::uint32_t b[2 * kBatch];
+  std::uint32_t count = 0;
+
+  /// Forgets the first batch.
+  void drop_batch() {
+    count -= kBatch;
+    for (std::uint32_t i = 0; i < kBatch; ++i) {
+      a[i] = a[kBatch + i];
+      b[i] = b[kBatch + i];
+    }
+  }
+};
+
+/// Bits of a batch.
+struct BatchVerdicts {
+  std::uint32_t contact, undecided;
+};
+
+/// Node pairs of a block with itself: each once, and no leaf with itself.
+inline constexpr std::uint32_t kUpperWithDiagonal = 0x8CEFu, kUpper = 0x08CEu;
+
+/// The means of a variant are made of a task and bring: Stack; test(a, b), see block_pair_mask();
+/// append(candidates, a, b, hits); decide(candidates), the verdicts on the first kBatch candidates, any where
+/// there are fewer.
+template <typename Means>
+class PairWalk {
+ public:
+  PairWalk(const PairTask& task, ContactSink& sink) : task_(task), sink_(sink), means_(task) {}
+
+  bool run() {
+    const auto test = [this](const Block& a, const Block& b) -> std::uint32_t {
+      const std::uint32_t hits = means_.test(a, b);
+      if (!task_.self || &a != &b) return hits;
+      return hits & (a.is_leaf_block() ? kUpper : kUpperWithDiagonal);
+    };
+    const auto on_leaves = [this](const Block& a, const Block& b, std::uint32_t hits) {
+      means_.append(candidates_, a, b, hits);
+      return candidates_.count < kBatch || settle(kBatch);
+    };
+    sink_.counters.block_pairs += traverse<typename Means::Stack>(task_.a->tree, task_.b->tree, test, on_leaves);
+    if (!done_ && candidates_.count > 0) settle(candidates_.count);
+    return enough_memory_;
+  }
+
+ private:
+  /// Decides the first `count` candidates. False: the pair is done with.
+  bool settle(std::uint32_t count) {
+    QueryCounters& counters = sink_.counters;
+    const std::uint32_t given = (2u << (count - 1)) - 1;
+    BatchVerdicts verdicts = {given, 0};
+    if (task_.mode != QueryMode::boxes) {
+      verdicts = means_.decide(candidates_);
+      verdicts.contact &= given;
+      verdicts.undecided &= given;
+    }
+    counters.candidates += count;
+    if (task_.mode != QueryMode::boxes)
+      counters.decided_by_float32 += count - static_cast<std::uint32_t>(std::popcount(verdicts.undecided));
+    for (std::uint32_t open = verdicts.contact | verdicts.undecided; open != 0 && !done_; open &= open - 1) {
+      const int i = lowest_bit(open);
+      const std::uint32_t a = candidates_.a[i], b = candidates_.b[i];
+      if ((verdicts.undecided >> i & 1u) != 0 && !meet(task_, a, b, counters)) continue;
+      add(a, b);
+    }
+    if (candidates_.count > kBatch) candidates_.drop_batch(); else candidates_.count = 0;
+    return !done_;
+  }
+
+  void add(std::uint32_t a, std::uint32_t b) {
+    if (task_.self && a > b) {
+      const std::uint32_t lower = b;
+      b = a;
+      a = lower;
+    }
+    if (sink_.next == sink_.end && !sink_.grow(sink_)) {
+      enough_memory_ = false;
+      done_ = true;
+      return;
+    }
+    *sink_.next++ = {task_.pair, a, b, task_.a->tree.triangles[a].corner[0].w, task_.b->tree.triangles[b].corner[0].w};
+    ++sink_.counters.contacts;
+    done_ = task_.first_contact_only;
+  }
+
+  const PairTask& task_;
+  ContactSink& sink_;
+  const Means means_;
+  Candidates candidates_;
+  bool done_ = false, enough_memory_ = true;
+};
+
+}  // namespace
+}  // namespace tandem

@@ -78,15 +78,6 @@ class BlockPairLanes {
       overlaps.require(magnitude(box_terms::distance_on_face(pose_, j, d)),
                        of_b(half_extent_b_[j]) + of_a<kPart>(box_terms::a_on_face(pose_, j, half_extent_a_)));
     }
-#pragma GCC unroll 3
-    for (int i = 0; i < 3; ++i) {
-#pragma GCC unroll 3
-      for (int j = 0; j < 3; ++j) {
-        overlaps.require(magnitude(box_terms::distance_on_edge(pose_, i, j, d)),
-                         of_a<kPart>(box_terms::a_on_edge(pose_, i, j, half_extent_a_)) +
-                             of_b(box_terms::b_on_edge(pose_, i, j, half_extent_b_)));
-      }
-    }
     return overlaps.mask() << (kCount * kPart);
   }
 

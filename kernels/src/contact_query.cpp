@@ -121,7 +121,8 @@ Status ContactQuery::State::pose_instances(std::span<const Instance> posed) {
 }
 
 Status ContactQuery::State::find_pairs() {
-  if (const Status status = broad_phase.find_pairs(boxes.view()); status != Status::kOk) return fail(status, 0);
+  if (const Status status = broad_phase.find_pairs(boxes.view()); status != Status::kOk)
+    return fail(status, 0);
   const std::span<const ObjectPair> found = broad_phase.pairs();
   const std::size_t selves = options.self_pairs ? instances.size() : 0;
   if (!pairs.resize(found.size() + selves)) return fail(Status::kOutOfMemory, 0);
@@ -138,7 +139,8 @@ Status ContactQuery::State::find_pairs() {
 Status ContactQuery::State::take_pairs(std::span<const ObjectPair> given) {
   if (!pairs.resize(given.size())) return fail(Status::kOutOfMemory, 0);
   for (std::size_t i = 0; i < given.size(); ++i) {
-    if (given[i].a >= instances.size() || given[i].b >= instances.size()) return fail(Status::kUnknownInstance, i);
+    if (given[i].a >= instances.size() || given[i].b >= instances.size())
+      return fail(Status::kUnknownInstance, i);
     pairs[i] = given[i];
   }
   return Status::kOk;
@@ -217,7 +219,8 @@ Status ContactQuery::State::collect() {
 Status ContactQuery::State::find_contacts_of_pairs() {
   if (pairs.size() >= kNoIndex) return fail(Status::kOutOfRange, 0);
   if (!provide_workers()) return fail(Status::kOutOfMemory, 0);
-  if (!chunks.resize((pairs.size() + kPairsPerChunk - 1) / kPairsPerChunk)) return fail(Status::kOutOfMemory, 0);
+  if (!chunks.resize((pairs.size() + kPairsPerChunk - 1) / kPairsPerChunk))
+    return fail(Status::kOutOfMemory, 0);
   next_chunk.store(0, std::memory_order_relaxed);
   const auto work = [](void* state, std::uint32_t worker) { static_cast<State*>(state)->work(worker); };
   if (!threads.run(worker_count, work, this)) return fail(Status::kCannotStartThread, 0);

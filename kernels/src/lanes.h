@@ -108,21 +108,23 @@ struct Lanes {
   TANDEM_INLINE friend Lanes select(LaneMask<kCount> mask, const Lanes& a, const Lanes& b) {
 #if defined(__AVX512F__)
     if constexpr (kCount == 16) {
-      return {reinterpret_cast<Floats>(_mm512_mask_blend_ps(mask.bits, reinterpret_cast<__m512>(b.v),
-                                                            reinterpret_cast<__m512>(a.v)))};
+      return {reinterpret_cast<Floats>(
+          _mm512_mask_blend_ps(mask.bits, reinterpret_cast<__m512>(b.v), reinterpret_cast<__m512>(a.v)))};
     } else
 #endif
     {
       return {mask.bits ? a.v : b.v};
     }
   }
-  TANDEM_INLINE friend Lanes larger(const Lanes& a, const Lanes& b) { return select(a < b, b, a); }
+  TANDEM_INLINE friend Lanes larger(const Lanes& a, const Lanes& b) {
+    return select(a < b, b, a);
+  }
 };
 
 #if defined(__AVX512F__)
 TANDEM_INLINE void LaneMask<16>::require(const Lanes<16>& x, const Lanes<16>& y) {
-  bits = _mm512_mask_cmp_ps_mask(bits, reinterpret_cast<__m512>(x.v), reinterpret_cast<__m512>(y.v),
-                                 _CMP_LE_OQ);
+  bits =
+      _mm512_mask_cmp_ps_mask(bits, reinterpret_cast<__m512>(x.v), reinterpret_cast<__m512>(y.v), _CMP_LE_OQ);
 }
 #endif
 

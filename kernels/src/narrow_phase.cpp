@@ -131,14 +131,9 @@ bool meet(const PairTask& task, std::uint32_t triangle_a, std::uint32_t triangle
     ++counters.decided_by_float32;
     return decide_fast(framed_pair(task, triangle_a, triangle_b)) == Verdict::contact;
   }
-  const TrianglePair pair = posed_pair(task, triangle_a, triangle_b);
-  const Verdict verdict = decide_float64(pair);
-  if (verdict != Verdict::undecided) {
-    ++counters.decided_by_float64;
-    return verdict == Verdict::contact;
-  }
-  ++counters.decided_exactly;
-  return decide_exact(pair) == Verdict::contact;
+  const Decision decision = decide(posed_pair(task, triangle_a, triangle_b));
+  ++(decision.exactly ? counters.decided_exactly : counters.decided_by_float64);
+  return decision.verdict == Verdict::contact;
 }
 
 bool narrow_phase_scalar(const PairTask& task, ContactSink& sink) {
@@ -152,15 +147,20 @@ bool narrow_phase_by_world_boxes(const PairTask& task, ContactSink& sink) {
 NarrowPhase narrow_phase(BlockPairVariant variant) {
   if (block_pair_test(variant) == nullptr) return nullptr;
   switch (variant) {
-    case BlockPairVariant::scalar: return narrow_phase_scalar;
+    case BlockPairVariant::scalar:
+      return narrow_phase_scalar;
 #ifdef TANDEM_HAVE_LANES
-    case BlockPairVariant::lanes4: return narrow_phase_lanes4;
+    case BlockPairVariant::lanes4:
+      return narrow_phase_lanes4;
 #ifdef __x86_64__
-    case BlockPairVariant::avx2: return narrow_phase_avx2;
-    case BlockPairVariant::avx512: return narrow_phase_avx512;
+    case BlockPairVariant::avx2:
+      return narrow_phase_avx2;
+    case BlockPairVariant::avx512:
+      return narrow_phase_avx512;
 #endif
 #endif
-    default: return nullptr;
+    default:
+      return nullptr;
   }
 }
 

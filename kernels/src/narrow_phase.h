@@ -24,10 +24,10 @@ struct PairTask {
   std::uint32_t pair;
   QueryMode mode;
   bool first_contact_only;
-  bool self;             ///< a and b are one instance: every two triangles once, none with itself
-  bool in_frame;         ///< float32 in a's frame can take the pair; else what follows has no meaning
+  bool self;      ///< a and b are one instance: every two triangles once, none with itself
+  bool in_frame;  ///< float32 in a's frame can take the pair; else what follows has no meaning
   RelativePose b_in_a;
-  float frame_error;     ///< see frame_test.h
+  float frame_error;  ///< see frame_test.h
 };
 
 /// Where contacts go: room that grows.

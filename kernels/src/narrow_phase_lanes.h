@@ -36,7 +36,8 @@ TANDEM_INLINE Lanes<16> join(const Lanes<8>& low, const Lanes<8>& high) {
 
 /// A corner of kCount triangles, by their indices.
 template <int kCount>
-TANDEM_INLINE frame::Point<Lanes<kCount>> gather(const Triangle* triangles, const std::uint32_t* index, int corner) {
+TANDEM_INLINE frame::Point<Lanes<kCount>> gather(const Triangle* triangles, const std::uint32_t* index,
+                                                 int corner) {
   if constexpr (kCount == 4) {
     Lanes4 rows[4];
     for (int i = 0; i < 4; ++i) rows[i] = load(triangles[index[i]].corner[corner].position);
@@ -50,7 +51,8 @@ TANDEM_INLINE frame::Point<Lanes<kCount>> gather(const Triangle* triangles, cons
 }
 
 template <int kCount, bool kBounded>
-TANDEM_INLINE BatchVerdicts decide_lanes(const PairTask& task, const std::uint32_t* index_a, const std::uint32_t* index_b) {
+TANDEM_INLINE BatchVerdicts decide_lanes(const PairTask& task, const std::uint32_t* index_a,
+                                         const std::uint32_t* index_b) {
   frame::Point<Lanes<kCount>> a[3], b[3];
   for (int corner = 0; corner < 3; ++corner) {
     a[corner] = gather<kCount>(task.a->tree.triangles, index_a, corner);
@@ -127,12 +129,17 @@ class LaneMeans {
 
   TANDEM_INLINE std::uint32_t test(const Block& a, const Block& b) const {
     const BlockPairLanes<kCount> pair(a, b, task_.b_in_a);
-    if constexpr (kCount == 16) return pair.template part<0>();
-    else if constexpr (kCount == 8) return pair.template part<0>() | pair.template part<1>();
-    else return pair.template part<0>() | pair.template part<1>() | pair.template part<2>() | pair.template part<3>();
+    if constexpr (kCount == 16)
+      return pair.template part<0>();
+    else if constexpr (kCount == 8)
+      return pair.template part<0>() | pair.template part<1>();
+    else
+      return pair.template part<0>() | pair.template part<1>() | pair.template part<2>() |
+             pair.template part<3>();
   }
 
-  TANDEM_INLINE void append(Candidates& candidates, const Block& a, const Block& b, std::uint32_t hits) const {
+  TANDEM_INLINE void append(Candidates& candidates, const Block& a, const Block& b,
+                            std::uint32_t hits) const {
 #if defined(__AVX512F__)
     store_chosen(candidates.a + candidates.count, hits, indices_of_a(a));
     store_chosen(candidates.b + candidates.count, hits, indices_of_b(b));

@@ -52,7 +52,8 @@ class PairWalk {
       means_.append(candidates_, a, b, hits);
       return candidates_.count < kBatch || settle(kBatch);
     };
-    sink_.counters.block_pairs += traverse<typename Means::Stack>(task_.a->tree, task_.b->tree, test, on_leaves);
+    sink_.counters.block_pairs +=
+        traverse<typename Means::Stack>(task_.a->tree, task_.b->tree, test, on_leaves);
     if (!done_ && candidates_.count > 0) settle(candidates_.count);
     return enough_memory_;
   }
@@ -77,7 +78,10 @@ class PairWalk {
       if ((verdicts.undecided >> i & 1u) != 0 && !meet(task_, a, b, counters)) continue;
       add(a, b);
     }
-    if (candidates_.count > kBatch) candidates_.drop_batch(); else candidates_.count = 0;
+    if (candidates_.count > kBatch)
+      candidates_.drop_batch();
+    else
+      candidates_.count = 0;
     return !done_;
   }
 
@@ -92,7 +96,8 @@ class PairWalk {
       done_ = true;
       return;
     }
-    *sink_.next++ = {task_.pair, a, b, task_.a->tree.triangles[a].corner[0].w, task_.b->tree.triangles[b].corner[0].w};
+    *sink_.next++ = {task_.pair, a, b, task_.a->tree.triangles[a].corner[0].w,
+                     task_.b->tree.triangles[b].corner[0].w};
     ++sink_.counters.contacts;
     done_ = task_.first_contact_only;
   }

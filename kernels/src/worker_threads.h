@@ -17,8 +17,8 @@ class WorkerThreads {
   WorkerThreads& operator=(const WorkerThreads&) = delete;
   ~WorkerThreads() { stop(); }
 
-  /// Calls work(context, 0) on this thread and work(context, 1 .. workers - 1) on others; returns when all are
-  /// done. False: a thread could not be started, and nothing was called.
+  /// Calls work(context, 0) on this thread and work(context, 1 .. workers - 1) on others; returns when all
+  /// are done. False: a thread could not be started, and nothing was called.
   [[nodiscard]] bool run(std::uint32_t workers, Work work, void* context);
 
  private:
@@ -33,7 +33,7 @@ class WorkerThreads {
   std::condition_variable work_came_, work_done_;
   Work work_ = nullptr;
   void* context_ = nullptr;
-  std::uint64_t round_ = 0;     // of work; a worker that has seen less has work to do
+  std::uint64_t round_ = 0;  // of work; a worker that has seen less has work to do
   std::uint32_t working_ = 0;
   bool stopping_ = false;
 };

@@ -7,14 +7,15 @@
 /// The box tests of a block pair, all 16 at once.
 namespace tandem {
 
-/// Bit 4 i + j is set when node i of a and node j of b may overlap: 15 axes each, conservative as
-/// relative_pose() says. Imaginary nodes never do. This one works node by node, for CPU and GPU; a CPU has
-/// faster ones, see block_pair_test(), with the same results.
+/// Bit 4 i + j is set when node i of a and node j of b may overlap: 6 axes each, conservative as
+/// relative_pose() says. Imaginary nodes never do. The other 9 axes would spare a ninth of the block pairs
+/// and an eighth of the candidates, and cost more than that (docs/decisions.md). This one works node by node,
+/// for CPU and GPU; a CPU has faster ones, see block_pair_test(), with the same results.
 TANDEM_HD inline std::uint16_t block_pair_mask(const Block& a, const Block& b, const RelativePose& b_in_a) {
   unsigned mask = 0;
   for (int i = 0; i < kNodesPerBlock; ++i) {
     for (int j = 0; j < kNodesPerBlock; ++j) {
-      if (overlap_15_axes(box_of(a, i), box_of(b, j), b_in_a)) mask |= 1u << (4 * i + j);
+      if (overlap_6_axes(box_of(a, i), box_of(b, j), b_in_a)) mask |= 1u << (4 * i + j);
     }
   }
   return static_cast<std::uint16_t>(mask);

@@ -78,7 +78,8 @@ class ContactQuery {
   Status find_contacts(std::span<const Instance> instances, std::span<const ObjectPair> pairs,
                        const QueryOptions& options = {});
 
-  /// The object pairs of the last call: a < b, or a = b for self pairs, sorted, where the query found them; as given else.
+  /// The object pairs of the last call: a < b, or a = b for self pairs, sorted, where the query found them;
+  /// as given else.
   std::span<const ObjectPair> pairs() const;
 
   /// The contacts of the last call, by ascending pair; within a pair in an order that is the same on every

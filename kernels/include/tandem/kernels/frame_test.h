@@ -18,11 +18,11 @@
 /// that of a corner of b is from box_terms::posed_center() of it (docs/box_test.md), with 1.001 and 2^-88 to
 /// spare. Let E be the largest of the three.
 ///
-/// Let u = 2^-24 and ~ mark what is computed. A difference x~ of two corners of one mesh is off by at most e =
-/// 2E + u m, where m is at least its magnitude; of corners of different meshes by E + u |x~|.
-/// A normal, n~ = u~ x v~, of differences bounded by m: each component is off by at most 2 (2 m e + e^2) for
-/// its factors and 4 u m^2 (1 + u) for its rounding; nu = 4 m (e + u m) + 2 e^2. The volume, a product w~ . n~
-/// with a difference of corners of different meshes, is then off by at most
+/// Let u = 2^-24 and ~ mark what is computed. A difference x~ of two corners of one mesh is off by at most e
+/// = 2E + u m, where m is at least its magnitude; of corners of different meshes by E + u |x~|. A normal, n~
+/// = u~ x v~, of differences bounded by m: each component is off by at most 2 (2 m e + e^2) for its factors
+/// and 4 u m^2 (1 + u) for its rounding; nu = 4 m (e + u m) + 2 e^2. The volume, a product w~ . n~ with a
+/// difference of corners of different meshes, is then off by at most
 ///
 ///     sum |n~_k| (E + u |w~_k|) + nu sum (|w~_k| + E + u |w~_k|) + ((1 + u)^3 - 1) sum |n~_k| |w~_k|
 ///       <= E |n~|_1 + nu (|w~|_1 + 3 E) (1 + u) + 4 u (1 + 2 u) sum |n~_k w~_k|.
@@ -177,7 +177,7 @@ struct Verdicts {
 };
 
 /// Decides what the error bound allows. a: corners as stored. b: images of the corners in a's frame by
-/// box_terms::posed_center(). error: frame_error(). The method is that of detail::decide() in
+/// box_terms::posed_center(). error: frame_error(). The method is that of detail::decide_bounded() in
 /// triangle_test.h; of the corners q and r only b's are exchanged, where one of the two orders asks for it,
 /// and a's orientation turns the signs instead. Without kBounded signs are taken as computed, and what is
 /// undecided are ties.

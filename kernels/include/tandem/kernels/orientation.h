@@ -118,6 +118,16 @@ TANDEM_HD inline Real area(const double* p, const double* q, const double* r, in
   return ui * vj - uj * vi;
 }
 
+/// Whether each product of volume(p, q, r, s) has a factor that is exactly zero, as where four points have
+/// one coordinate in common. float64 numbers differ exactly when their difference as computed is not zero.
+TANDEM_HD inline bool vanishes(const double* p, const double* q, const double* r, const double* s) {
+  const bool u0 = q[0] != p[0], u1 = q[1] != p[1], u2 = q[2] != p[2];
+  const bool v0 = r[0] != p[0], v1 = r[1] != p[1], v2 = r[2] != p[2];
+  const bool w0 = s[0] != p[0], w1 = s[1] != p[1], w2 = s[2] != p[2];
+  return !((w0 && ((u1 && v2) || (u2 && v1))) || (w1 && ((u2 && v0) || (u0 && v2))) ||
+           (w2 && ((u0 && v1) || (u1 && v0))));
+}
+
 /// Signs of exact arithmetic, for all finite points: float64 where its bound allows, expansions in their
 /// range, wide integers outside.
 struct ExactSigns {
@@ -135,6 +145,7 @@ struct ExactSigns {
 
   TANDEM_OUT_OF_LINE TANDEM_HD static int volume_without_bound(const double* p, const double* q,
                                                                const double* r, const double* s) {
+    if (vanishes(p, q, r, s)) return 0;
     if (in_range(p) && in_range(q) && in_range(r) && in_range(s)) return expansion_volume_sign(p, q, r, s);
     return wide_volume_sign(p, q, r, s);
   }
@@ -146,16 +157,17 @@ struct ExactSigns {
   }
 };
 
-/// Signs as float32 computes them, right or wrong.
-struct FastSigns {
+/// Signs as Real computes them: right where nothing is rounded.
+template <class Real>
+struct ComputedSigns {
   TANDEM_HD static int volume(const double* p, const double* q, const double* r, const double* s) {
-    float bound;
-    return computed_sign(Plane<float>(p, q, r).volume(s, bound));
+    Real bound;
+    return computed_sign(Plane<Real>(p, q, r).volume(s, bound));
   }
 
   TANDEM_HD static int area(const double* p, const double* q, const double* r, int k) {
-    float bound;
-    return computed_sign(detail::area<float>(p, q, r, k, bound));
+    Real bound;
+    return computed_sign(detail::area<Real>(p, q, r, k, bound));
   }
 };
 

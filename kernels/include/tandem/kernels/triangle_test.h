@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <cstring>
 
 #include "tandem/kernels/orientation.h"
 
@@ -7,7 +8,8 @@
 /// hull of its corners, a segment or a point. The corners are float64 points, and the answer is that of exact
 /// arithmetic on them, for all finite points; host code must be compiled with -ffp-contract=off.
 ///
-/// A cascade: decide_float32 and decide_float64 decide what their error bounds allow, decide_exact the rest.
+/// A cascade: decide_float64 decides what its error bound allows, decide_exact the rest. In a query the
+/// float32 stage of frame_test.h comes before them and leaves them little.
 namespace tandem {
 
 /// The corners of two triangles.
@@ -17,10 +19,10 @@ struct TrianglePair {
 
 enum class Verdict : std::uint8_t { apart, contact, undecided };
 
-/// What the cascade found, and which stage did: 1 float32, 2 float64, 3 exact.
+/// What the cascade found, and whether it took the last stage.
 struct Decision {
   Verdict verdict;
-  std::uint8_t stage;
+  bool exactly;
 };
 
 namespace detail {
@@ -86,23 +88,31 @@ TANDEM_HD inline void order_corners(const double (*a)[3], const double (*b)[3], 
   ob = lone_first(b, lone_b, lone_is_below(side_of_a, lone_a));
 }
 
+/// Least and greatest of numbers that are not NaN. (std::fmin is a call where NaN matters.)
+TANDEM_HD inline double least(double x, double y, double z) {
+  const double smaller = y < x ? y : x;
+  return z < smaller ? z : smaller;
+}
+
+TANDEM_HD inline double greatest(double x, double y, double z) {
+  const double larger = x < y ? y : x;
+  return larger < z ? z : larger;
+}
+
 /// Whether the bounding boxes are apart; comparisons only, so exact.
 TANDEM_HD inline bool boxes_apart(const double (*a)[3], const double (*b)[3]) {
   bool apart = false;
   for (int k = 0; k < 3; ++k) {
-    const double lower_a = std::fmin(std::fmin(a[0][k], a[1][k]), a[2][k]);
-    const double upper_a = std::fmax(std::fmax(a[0][k], a[1][k]), a[2][k]);
-    const double lower_b = std::fmin(std::fmin(b[0][k], b[1][k]), b[2][k]);
-    const double upper_b = std::fmax(std::fmax(b[0][k], b[1][k]), b[2][k]);
-    apart = apart || upper_a < lower_b || upper_b < lower_a;
+    apart = apart || greatest(a[0][k], a[1][k], a[2][k]) < least(b[0][k], b[1][k], b[2][k]) ||
+            greatest(b[0][k], b[1][k], b[2][k]) < least(a[0][k], a[1][k], a[2][k]);
   }
   return apart;
 }
 
-/// The cascade's first two stages. Only certain signs count, so neither triangle can be flat, nor both in one
+/// The stage with an error bound. Only certain signs count, so neither triangle can be flat, nor both in one
 /// plane, where this goes on to the line that both planes share.
 template <class Real>
-TANDEM_HD inline Verdict decide(const TrianglePair& t) {
+TANDEM_HD inline Verdict decide_bounded(const TrianglePair& t) {
   int side_of_b[3], side_of_a[3];
   const Plane<Real> plane_a(t.a[0], t.a[1], t.a[2]);
   for (int i = 0; i < 3; ++i) side_of_b[i] = plane_a.side(t.b[i]);
@@ -243,14 +253,52 @@ struct CompleteTest {
 
 }  // namespace detail
 
-/// The first stage: float32 with an error bound. Right whenever it decides.
-TANDEM_HD inline Verdict decide_float32(const TrianglePair& t) {
-  return detail::decide<float>(t);
+namespace detail {
+
+/// The largest power of two that is not above x. Condition: x is positive and normal.
+TANDEM_HD inline double power_of_two_below(double x) {
+  std::uint64_t bits;
+  memcpy(&bits, &x, sizeof bits);
+  bits &= 0x7FF0000000000000u;
+  memcpy(&x, &bits, sizeof x);
+  return x;
 }
 
-/// The second stage: float64 with an error bound. Right whenever it decides.
+/// Whether all corners lie on a grid so coarse that float64 computes every volume and area of them without
+/// rounding: coordinates are multiples of a power of two G, and differ by less than 2^16 G. A difference is
+/// then exact, a product of two at most 2^32 G^2, one of three 2^48 G^3, and a sum of six of these a multiple
+/// of G^3 below 2^51 G^3. x is a multiple of G where adding 1.5 * 2^52 G and taking it away changes nothing:
+/// the sum is in a range where float64 numbers are multiples of G, or of more.
+TANDEM_HD inline bool on_coarse_grid(const TrianglePair& t) {
+  double extent = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double lower_a = least(t.a[0][k], t.a[1][k], t.a[2][k]),
+                 lower_b = least(t.b[0][k], t.b[1][k], t.b[2][k]);
+    const double upper_a = greatest(t.a[0][k], t.a[1][k], t.a[2][k]),
+                 upper_b = greatest(t.b[0][k], t.b[1][k], t.b[2][k]);
+    extent = greatest(extent, upper_a - lower_b, upper_b - lower_a);
+    extent = greatest(extent, upper_a - lower_a, upper_b - lower_b);
+  }
+  if (!(extent >= 0x1p-300 && extent <= 0x1p300)) return false;  // G^3 and its multiples are normal numbers
+  const double shift = 1.5 * 0x1p52 * 0x1p-15 * power_of_two_below(extent);
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      if (minus(plus(t.a[i][k], shift), shift) != t.a[i][k]) return false;
+      if (minus(plus(t.b[i][k], shift), shift) != t.b[i][k]) return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace detail
+
+/// The first of these stages: float64 with an error bound, or without any error where corners lie on a coarse
+/// grid, as in a stack of boxes: then it decides all. Right whenever it decides.
 TANDEM_HD inline Verdict decide_float64(const TrianglePair& t) {
-  return detail::decide<double>(t);
+  if (detail::boxes_apart(t.a, t.b)) return Verdict::apart;
+  if (!detail::on_coarse_grid(t)) return detail::decide_bounded<double>(t);
+  return detail::CompleteTest<detail::ComputedSigns<double>>::meet(t.a, t.b) ? Verdict::contact
+                                                                             : Verdict::apart;
 }
 
 /// The last stage: always right, never undecided.
@@ -261,14 +309,15 @@ TANDEM_HD inline Verdict decide_exact(const TrianglePair& t) {
 /// float32 throughout, signs taken as they come out, ties included: may err where rounding does, and may
 /// differ between CPU and GPU there.
 TANDEM_HD inline Verdict decide_fast(const TrianglePair& t) {
-  return detail::CompleteTest<detail::FastSigns>::meet(t.a, t.b) ? Verdict::contact : Verdict::apart;
+  return detail::CompleteTest<detail::ComputedSigns<float>>::meet(t.a, t.b) ? Verdict::contact
+                                                                            : Verdict::apart;
 }
 
-/// The cascade: each stage decides what the one before left.
+/// Always right: float64, and what that leaves exactly.
 TANDEM_HD inline Decision decide(const TrianglePair& t) {
-  if (const Verdict v = decide_float32(t); v != Verdict::undecided) return {v, 1};
-  if (const Verdict v = decide_float64(t); v != Verdict::undecided) return {v, 2};
-  return {decide_exact(t), 3};
+  const Verdict verdict = decide_float64(t);
+  if (verdict != Verdict::undecided) return {verdict, false};
+  return {decide_exact(t), true};
 }
 
 }  // namespace tandem

@@ -213,6 +213,11 @@ Status ContactQuery::State::collect() {
     const Contact* from = workers[chunk.worker].contacts.data();
     out = std::copy(from + chunk.begin, from + chunk.end, out);
   }
+  // Which worker takes which chunk is chance: so that no call of the same scene allocates, there is room for
+  // all in each.
+  for (std::uint32_t i = 0; i < worker_count; ++i) {
+    if (!workers[i].contacts.resize(total)) break;  // then it will grow when it has to
+  }
   return Status::kOk;
 }
 

@@ -92,7 +92,7 @@ struct Lanes {
   TANDEM_INLINE friend Lanes operator-(const Lanes& a) { return {-a.v}; }
   TANDEM_INLINE friend Lanes operator*(const Lanes& a, const Lanes& b) { return {a.v * b.v}; }
   TANDEM_INLINE friend Lanes operator*(float a, const Lanes& b) { return {a * b.v}; }
-  TANDEM_INLINE friend LaneMask<kCount> operator<(const Lanes& a, const Lanes& b) {
+  TANDEM_INLINE friend LaneMask<kCount> less(const Lanes& a, const Lanes& b) {
 #if defined(__AVX512F__)
     if constexpr (kCount == 16) {
       return {_mm512_cmp_ps_mask(reinterpret_cast<__m512>(a.v), reinterpret_cast<__m512>(b.v), _CMP_LT_OQ)};
@@ -117,7 +117,7 @@ struct Lanes {
     }
   }
   TANDEM_INLINE friend Lanes larger(const Lanes& a, const Lanes& b) {
-    return select(a < b, b, a);
+    return select(less(a, b), b, a);
   }
 };
 

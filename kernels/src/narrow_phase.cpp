@@ -1,5 +1,7 @@
 #include "narrow_phase.h"
 
+#include <algorithm>
+
 #include "narrow_phase_walk.h"
 #include "tandem/kernels/block_pair.h"
 #include "tandem/kernels/frame_test.h"
@@ -17,20 +19,17 @@ void append_one_by_one(Candidates& candidates, const Block& a, const Block& b, s
   }
 }
 
-frame::Point<float> corner_of(const Triangle& triangle, int corner) {
-  const float* p = triangle.corner[corner].position;
-  return {{p[0], p[1], p[2]}};
-}
+// A triangle in a's frame: one of a as it is stored, one of b as its image.
+struct FramedTriangle {
+  frame::Point<float> corner[3];
 
-// The corners of a candidate in a's frame.
-struct FramePair {
-  frame::Point<float> a[3], b[3];
-
-  FramePair(const PairTask& task, std::uint32_t triangle_a, std::uint32_t triangle_b) {
-    for (int corner = 0; corner < 3; ++corner) {
-      a[corner] = corner_of(task.a->tree.triangles[triangle_a], corner);
-      const frame::Point<float> stored = corner_of(task.b->tree.triangles[triangle_b], corner);
-      for (int i = 0; i < 3; ++i) b[corner].x[i] = box_terms::posed_center(task.b_in_a, i, stored.x);
+  explicit FramedTriangle(const Triangle& triangle) {
+    for (int i = 0; i < 3; ++i) std::copy_n(triangle.corner[i].position, 3, corner[i].x);
+  }
+  FramedTriangle(const Triangle& triangle, const RelativePose& b_in_a) {
+    const FramedTriangle stored(triangle);
+    for (int i = 0; i < 3; ++i) {
+      for (int k = 0; k < 3; ++k) corner[i].x[k] = box_terms::posed_center(b_in_a, k, stored.corner[i].x);
     }
   }
 };
@@ -42,23 +41,55 @@ class ScalarMeans {
   explicit ScalarMeans(const PairTask& task) : task_(task) {}
 
   std::uint32_t test(const Block& a, const Block& b) const { return block_pair_mask(a, b, task_.b_in_a); }
+  std::uint32_t drop_beyond_planes(const Block& a, const Block& b, std::uint32_t hits) const {
+    const bool leaves_a = a.is_leaf_block();
+    std::uint32_t left = hits;
+    for (; hits != 0; hits &= hits - 1) {
+      const int bit = lowest_bit(hits), i = bit / 4, j = bit % 4;
+      if (leaves_a ? is_beyond(triangle_of_a(a.index[i]), box_of_b(b, j))
+                   : is_beyond(triangle_of_b(b.index[j]), box_of(a, i))) {
+        left &= ~(1u << bit);
+      }
+    }
+    return left;
+  }
   void append(Candidates& candidates, const Block& a, const Block& b, std::uint32_t hits) const {
     append_one_by_one(candidates, a, b, hits);
   }
   BatchVerdicts decide(const Candidates& candidates) const {
     BatchVerdicts out = {0, 0};
     for (std::uint32_t i = 0; i < kBatch && i < candidates.count; ++i) {
-      const FramePair pair(task_, candidates.a[i], candidates.b[i]);
-      const frame::Verdicts<bool> verdicts = task_.mode == QueryMode::fast
-                                                 ? frame::decide<false>(pair.a, pair.b, 0.0f)
-                                                 : frame::decide<true>(pair.a, pair.b, task_.frame_error);
-      out.contact |= static_cast<std::uint32_t>(verdicts.contact) << i;
-      out.undecided |= static_cast<std::uint32_t>(verdicts.undecided) << i;
+      const FramedTriangle a = triangle_of_a(candidates.a[i]), b = triangle_of_b(candidates.b[i]);
+      const auto verdicts = task_.mode == QueryMode::fast
+                                ? frame::decide<false>(a.corner, b.corner, 0.0f)
+                                : frame::decide<true>(a.corner, b.corner, task_.frame_error);
+      out.contact |= static_cast<std::uint32_t>(verdicts.contact.set) << i;
+      out.undecided |= static_cast<std::uint32_t>(verdicts.undecided.set) << i;
     }
     return out;
   }
 
  private:
+  FramedTriangle triangle_of_a(std::uint32_t triangle) const {
+    return FramedTriangle(task_.a->tree.triangles[triangle]);
+  }
+  FramedTriangle triangle_of_b(std::uint32_t triangle) const {
+    return FramedTriangle(task_.b->tree.triangles[triangle], task_.b_in_a);
+  }
+  Box box_of_b(const Block& b, int node) const {
+    const Box stored = box_of(b, node);
+    Box framed;
+    for (int k = 0; k < 3; ++k) {
+      framed.center[k] = box_terms::posed_center(task_.b_in_a, k, stored.center);
+      framed.half_extent[k] = box_terms::b_on_face(task_.b_in_a, k, stored.half_extent);
+    }
+    return framed;
+  }
+  bool is_beyond(const FramedTriangle& t, const Box& box) const {
+    const frame::Plane<float, true> plane(t.corner[0], t.corner[1], t.corner[2], task_.frame_error);
+    return frame::beyond(plane, box.center, box.half_extent, task_.frame_error);
+  }
+
   const PairTask& task_;
 };
 
@@ -95,6 +126,7 @@ class WorldBoxMeans {
   void append(Candidates& candidates, const Block& a, const Block& b, std::uint32_t hits) const {
     append_one_by_one(candidates, a, b, hits);
   }
+  std::uint32_t drop_beyond_planes(const Block&, const Block&, std::uint32_t hits) const { return hits; }
   BatchVerdicts decide(const Candidates&) const { return {0, 0xFFFF}; }
 
  private:
@@ -113,12 +145,13 @@ TrianglePair posed_pair(const PairTask& task, std::uint32_t triangle_a, std::uin
 }
 
 TrianglePair framed_pair(const PairTask& task, std::uint32_t triangle_a, std::uint32_t triangle_b) {
-  const FramePair framed(task, triangle_a, triangle_b);
+  const FramedTriangle a(task.a->tree.triangles[triangle_a]);
+  const FramedTriangle b(task.b->tree.triangles[triangle_b], task.b_in_a);
   TrianglePair pair;
   for (int corner = 0; corner < 3; ++corner) {
     for (int k = 0; k < 3; ++k) {
-      pair.a[corner][k] = static_cast<double>(framed.a[corner].x[k]);
-      pair.b[corner][k] = static_cast<double>(framed.b[corner].x[k]);
+      pair.a[corner][k] = static_cast<double>(a.corner[corner].x[k]);
+      pair.b[corner][k] = static_cast<double>(b.corner[corner].x[k]);
     }
   }
   return pair;

@@ -50,6 +50,75 @@ TANDEM_INLINE frame::Point<Lanes<kCount>> gather(const Triangle* triangles, cons
   }
 }
 
+/// Lane i, in every lane.
+TANDEM_INLINE Lanes4 spread(const Lanes4& four, int i) {
+  const float value = four.v[i];
+  return {Lanes4::Floats{value, value, value, value}};
+}
+
+/// The plane of lane i, in every lane.
+TANDEM_INLINE frame::Plane<Lanes4, true> spread(const frame::Plane<Lanes4, true>& planes, int i) {
+  frame::Plane<Lanes4, true> out = planes;
+  for (int k = 0; k < 3; ++k) {
+    out.origin.x[k] = spread(planes.origin.x[k], i);
+    out.normal[k] = spread(planes.normal[k], i);
+  }
+  out.normal_size = spread(planes.normal_size, i);
+  out.normal_error = spread(planes.normal_error, i);
+  return out;
+}
+
+/// The four boxes of a block in a's frame.
+struct FourBoxes {
+  Lanes4 center[3], half_extent[3];
+
+  explicit FourBoxes(const Block& a) {
+    for (int k = 0; k < 3; ++k) {
+      center[k] = load(a.center[k]);
+      half_extent[k] = load(a.half_extent[k]);
+    }
+  }
+  FourBoxes(const Block& b, const RelativePose& b_in_a) {
+    const FourBoxes stored(b);
+    for (int k = 0; k < 3; ++k) {
+      center[k] = box_terms::posed_center(b_in_a, k, stored.center);
+      half_extent[k] = box_terms::b_on_face(b_in_a, k, stored.half_extent);
+    }
+  }
+};
+
+/// The corners of the four triangles of a leaf block; where a node is imaginary, of any other.
+TANDEM_INLINE void gather_leaves(const Triangle* triangles, const Block& block,
+                                 frame::Point<Lanes4> (&corners)[3]) {
+  std::uint32_t index[kNodesPerBlock];
+  for (int i = 0; i < kNodesPerBlock; ++i)
+    index[i] = block.kind[i] == NodeKind::leaf ? block.index[i] : block.index[0];
+  for (int corner = 0; corner < 3; ++corner) corners[corner] = gather<4>(triangles, index, corner);
+}
+
+// Not inlined, not to crowd the test of boxes out of registers.
+[[gnu::noinline]] std::uint32_t without_beyond_planes(const PairTask& task, const Block& a, const Block& b,
+                                                      std::uint32_t hits) {
+  const bool leaves_a = a.is_leaf_block();
+  frame::Point<Lanes4> corners[3];
+  gather_leaves((leaves_a ? task.a : task.b)->tree.triangles, leaves_a ? a : b, corners);
+  if (!leaves_a) {
+    for (frame::Point<Lanes4>& corner : corners) {
+      const frame::Point<Lanes4> stored = corner;
+      for (int k = 0; k < 3; ++k) corner.x[k] = box_terms::posed_center(task.b_in_a, k, stored.x);
+    }
+  }
+  const frame::Plane<Lanes4, true> planes(corners[0], corners[1], corners[2], task.frame_error);
+  const FourBoxes boxes = leaves_a ? FourBoxes(b, task.b_in_a) : FourBoxes(a);
+  for (int i = 0; i < kNodesPerBlock; ++i) {
+    if ((hits & (leaves_a ? row(0xF, i) : column(0xF, i))) == 0) continue;
+    const std::uint32_t four =
+        frame::beyond(spread(planes, i), boxes.center, boxes.half_extent, task.frame_error).mask();
+    hits &= ~(leaves_a ? row(four, i) : column(four, i));
+  }
+  return hits;
+}
+
 template <int kCount, bool kBounded>
 TANDEM_INLINE BatchVerdicts decide_lanes(const PairTask& task, const std::uint32_t* index_a,
                                          const std::uint32_t* index_b) {
@@ -136,6 +205,10 @@ class LaneMeans {
     else
       return pair.template part<0>() | pair.template part<1>() | pair.template part<2>() |
              pair.template part<3>();
+  }
+
+  std::uint32_t drop_beyond_planes(const Block& a, const Block& b, std::uint32_t hits) const {
+    return without_beyond_planes(task_, a, b, hits);
   }
 
   TANDEM_INLINE void append(Candidates& candidates, const Block& a, const Block& b,

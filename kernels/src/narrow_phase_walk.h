@@ -31,12 +31,23 @@ struct BatchVerdicts {
   std::uint32_t contact, undecided;
 };
 
+/// The node pairs of node i of a.
+constexpr std::uint32_t row(std::uint32_t four, int i) {
+  return four << 4 * i;
+}
+
+/// The node pairs of node j of b.
+constexpr std::uint32_t column(std::uint32_t four, int j) {
+  return ((four & 1u) | (four & 2u) << 3 | (four & 4u) << 6 | (four & 8u) << 9) << j;
+}
+
 /// Node pairs of a block with itself: each once, and no leaf with itself.
 inline constexpr std::uint32_t kUpperWithDiagonal = 0x8CEFu, kUpper = 0x08CEu;
 
 /// The means of a variant are made of a task and bring: Stack; test(a, b), see block_pair_mask();
-/// append(candidates, a, b, hits); decide(candidates), the verdicts on the first kBatch candidates, any where
-/// there are fewer.
+/// drop_beyond_planes(a, b, hits), of a leaf block and an internal one: less the hits of nodes that lie
+/// beyond the plane of the triangle, see frame::beyond(); append(candidates, a, b, hits); decide(candidates),
+/// the verdicts on the first kBatch candidates, any where there are fewer.
 template <typename Means>
 class PairWalk {
  public:
@@ -52,13 +63,26 @@ class PairWalk {
       means_.append(candidates_, a, b, hits);
       return candidates_.count < kBatch || settle(kBatch);
     };
+    const auto narrow = [this](const Block& a, const Block& b, std::uint32_t hits) {
+      return worth_planes(a, b) ? means_.drop_beyond_planes(a, b, hits) : hits;
+    };
     sink_.counters.block_pairs +=
-        traverse<typename Means::Stack>(task_.a->tree, task_.b->tree, test, on_leaves);
+        traverse<typename Means::Stack>(task_.a->tree, task_.b->tree, test, on_leaves, narrow);
     if (!done_ && candidates_.count > 0) settle(candidates_.count);
     return enough_memory_;
   }
 
  private:
+  // A triangle's plane tells more than its box where the other mesh's nodes are much smaller: under bodies of
+  // 24,000 triangles on a ground it spares 40 % of the block pairs and 60 % of the candidates
+  // (docs/decisions.md). The candidates of boxes mode are what boxes say.
+  bool worth_planes(const Block& a, const Block& b) const {
+    constexpr float kTimesLarger = 4;
+    if (task_.mode == QueryMode::boxes) return false;
+    const float size_a = size_of(a), size_b = size_of(b);
+    return a.is_leaf_block() ? size_a > kTimesLarger * size_b : size_b > kTimesLarger * size_a;
+  }
+
   /// Decides the first `count` candidates. False: the pair is done with.
   bool settle(std::uint32_t count) {
     QueryCounters& counters = sink_.counters;

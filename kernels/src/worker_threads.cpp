@@ -1,7 +1,7 @@
 #include "worker_threads.h"
 
+#include <exception>
 #include <new>
-#include <system_error>
 
 namespace tandem {
 
@@ -37,7 +37,7 @@ bool WorkerThreads::start(std::uint32_t threads) {
       threads_[thread_count_] = std::thread([this, worker] { wait_for_work(worker); });
       ++thread_count_;
     }
-  } catch (const std::system_error&) {
+  } catch (const std::exception&) {  // the system's refusal, or no memory
     stop();
     return false;
   }

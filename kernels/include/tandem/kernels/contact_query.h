@@ -43,7 +43,7 @@ struct QueryOptions {
 struct QueryCounters {
   std::uint64_t object_pairs = 0;
   std::uint64_t block_pairs = 0;  ///< 16 box tests each
-  std::uint64_t candidates = 0;
+  std::uint64_t candidates = 0;   ///< in boxes mode; otherwise less those that planes of leaves tell apart
   std::uint64_t decided_by_float32 = 0;  ///< candidates, by the stage of the cascade that decided
   std::uint64_t decided_by_float64 = 0;
   std::uint64_t decided_exactly = 0;

@@ -9,7 +9,7 @@
 ///
 /// Templates over Value: float, or a vector with a candidate in each lane, which has the same operators; the
 /// results are the same, bit by bit. A vector type brings, in its own namespace, select(mask, x, y),
-/// larger(x, y), magnitude(x) and comparisons whose results combine by & | ^ !.
+/// larger(x, y), magnitude(x) and less(x, y), whose results combine by & | ^ !.
 ///
 /// **Proof.** Let X be the posed float64 points that a query is about, and T(X) = n (X - t_a), n being the
 /// float64 inverse of a's rotation that relative_pose() works with. T is affine and det n > 0 for rigid
@@ -53,13 +53,27 @@ TANDEM_HD inline float frame_error(const RelativePose& b_in_a, const TreeExtent&
 
 namespace frame {
 
+/// A bool whose & | ^ are those of a mask of lanes.
+struct Flag {
+  bool set;
+
+  TANDEM_HD operator bool() const { return set; }
+  TANDEM_HD friend Flag operator&(Flag a, Flag b) { return {a.set && b.set}; }
+  TANDEM_HD friend Flag operator|(Flag a, Flag b) { return {a.set || b.set}; }
+  TANDEM_HD friend Flag operator^(Flag a, Flag b) { return {a.set != b.set}; }
+  TANDEM_HD friend Flag operator!(Flag a) { return {!a.set}; }
+};
+
+TANDEM_HD inline Flag less(float x, float y) {
+  return {x < y};
+}
 TANDEM_HD inline float magnitude(float x) {
   return std::fabs(x);
 }
 TANDEM_HD inline float larger(float x, float y) {
   return x < y ? y : x;
 }
-TANDEM_HD inline float select(bool mask, float x, float y) {
+TANDEM_HD inline float select(Flag mask, float x, float y) {
   return mask ? x : y;
 }
 
@@ -131,6 +145,28 @@ struct Plane {
   }
 };
 
+/// Whether boxes lie strictly on one side of a plane, with all corners of triangles within them: then none of
+/// these meets the triangle that the plane was made of. The boxes hold stored corners of a or, as
+/// box_terms::posed_center() and b_on_face(), images of b's, where the plane is of the other mesh.
+/// The volume of a corner in a box, whose centre is at w, is off by at most what the proof above says of a
+/// difference bounded by |w| + h; that of the centre is computed, and the box reaches sum |n_k| h_k from it.
+template <typename Value>
+TANDEM_HD inline auto beyond(const Plane<Value, true>& plane, const Value (&center)[3],
+                             const Value (&half_extent)[3], float error) {
+  constexpr float kU = 0x1p-24f, kUnderflow = 0x1p-80f;
+  Value w[3], term[3], reach[3];
+  for (int k = 0; k < 3; ++k) {
+    w[k] = center[k] - plane.origin.x[k];
+    term[k] = w[k] * plane.normal[k];
+    reach[k] = magnitude(plane.normal[k]) * half_extent[k];
+  }
+  const Value far = sum_of_magnitudes(w) + ((half_extent[0] + half_extent[1]) + half_extent[2]) + 3 * error;
+  const Value reached = (reach[0] + reach[1]) + reach[2];
+  const Value bound =
+      (plane.normal_size + plane.normal_error * far) + 4 * kU * (sum_of_magnitudes(term) + reached);
+  return less(1.001f * (reached + bound) + kUnderflow, magnitude((term[0] + term[1]) + term[2]));
+}
+
 /// On which side of a plane the corners of a triangle lie, where that is certain.
 template <typename Mask>
 struct Sides {
@@ -150,12 +186,12 @@ struct Sides {
 
 template <typename Value, bool kBounded>
 TANDEM_HD inline auto sides_of(const Plane<Value, kBounded>& plane, const Point<Value> (&t)[3], float error) {
-  using Mask = decltype(plane.normal_size < plane.normal_size);
+  using Mask = decltype(less(plane.normal_size, plane.normal_size));
   Sides<Mask> sides;
   for (int i = 0; i < 3; ++i) {
     const Volume<Value> v = plane.volume(t[i], error);
-    sides.above[i] = v.bound < v.value;
-    sides.below[i] = v.value < -v.bound;
+    sides.above[i] = less(v.bound, v.value);
+    sides.below[i] = less(v.value, -v.bound);
   }
   return sides;
 }
@@ -205,8 +241,8 @@ TANDEM_HD inline auto decide(const Point<Value> (&a)[3], const Point<Value> (&b)
   const Volume<Value> upper = PlaneOf(oa[0], ob[0], oa[2], error).volume(r, error);
   const Value lower_value = select(turned_a, -lower.value, lower.value);
   const Value upper_value = select(turned_a, -upper.value, upper.value);
-  const Mask apart = (lower_value < -lower.bound) | (upper.bound < upper_value);
-  const Mask meet = (lower.bound < lower_value) & (upper_value < -upper.bound);
+  const Mask apart = less(lower_value, -lower.bound) | less(upper.bound, upper_value);
+  const Mask meet = less(lower.bound, lower_value) & less(upper_value, -upper.bound);
   Verdicts<Mask> verdicts;
   verdicts.contact = possible & certain & meet;
   verdicts.undecided = possible & !(certain & (apart | meet));

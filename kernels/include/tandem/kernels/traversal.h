@@ -65,40 +65,72 @@ class BlockPairStack {
   std::uint32_t height_ = 0;
 };
 
-/// The block pairs below one that hits, not both of whose blocks are leaf blocks.
+/// The sum of half-extents of the largest node: how large what is in a block may be.
+TANDEM_HD inline float size_of(const Block& block) {
+  float size = 0;  // imaginary nodes have -infinity
+  for (int i = 0; i < kNodesPerBlock; ++i) {
+    const float sum = (block.half_extent[0][i] + block.half_extent[1][i]) + block.half_extent[2][i];
+    if (sum > size) size = sum;
+  }
+  return size;
+}
+
+/// How many times larger one of two internal blocks must be to descend alone. Bodies on a ground: a third of
+/// the block pairs. Any factor from 1.5 to 4 does about as well (docs/decisions.md).
+inline constexpr float kDescendsAlone = 2;
+
+/// Pairs of the children of a with b. hits: of a and b.
 template <typename Stack>
-TANDEM_HD void push_below(Stack& stack, const BlockPair& pair, const Block& a, const Block& b,
-                          std::uint32_t hits) {
-  if (b.is_leaf_block()) {
-    for (int i = 0; i < kNodesPerBlock; ++i) {
-      // Leaves of b that node i hits: the new pair's columns.
-      const std::uint32_t row = hits >> 4 * i & 0xFu;
-      if (row != 0) stack.push({a.index[i], pair.b, row * 0x1111u});
-    }
-  } else if (a.is_leaf_block()) {
-    for (int j = 0; j < kNodesPerBlock; ++j) {
-      // Leaves of a that node j hits: the new pair's rows.
-      const std::uint32_t column = hits >> j & 0x1111u;
-      if (column != 0) stack.push({pair.a, b.index[j], column * 0xFu});
-    }
-  } else {
-    stack.push_children(a, b, hits);
+TANDEM_HD void descend_a(Stack& stack, const BlockPair& pair, const Block& a, std::uint32_t hits) {
+  for (int i = 0; i < kNodesPerBlock; ++i) {
+    // Nodes of b that node i hits: the new pair's columns.
+    const std::uint32_t row = hits >> 4 * i & 0xFu;
+    if (row != 0) stack.push({a.index[i], pair.b, row * 0x1111u});
   }
 }
 
+/// Pairs of a with the children of b.
+template <typename Stack>
+TANDEM_HD void descend_b(Stack& stack, const BlockPair& pair, const Block& b, std::uint32_t hits) {
+  for (int j = 0; j < kNodesPerBlock; ++j) {
+    // Nodes of a that node j hits: the new pair's rows.
+    const std::uint32_t column = hits >> j & 0x1111u;
+    if (column != 0) stack.push({pair.a, b.index[j], column * 0xFu});
+  }
+}
+
+/// The block pairs below one that hits, not both of whose blocks are leaf blocks.
+template <typename Stack>
+TANDEM_HD void descend(Stack& stack, const BlockPair& pair, const Block& a, const Block& b,
+                       std::uint32_t hits) {
+  if (b.is_leaf_block()) return descend_a(stack, pair, a, hits);
+  if (a.is_leaf_block()) return descend_b(stack, pair, b, hits);
+  const float size_a = size_of(a), size_b = size_of(b);
+  if (size_a > kDescendsAlone * size_b) return descend_a(stack, pair, a, hits);
+  if (size_b > kDescendsAlone * size_a) return descend_b(stack, pair, b, hits);
+  stack.push_children(a, b, hits);
+}
+
+/// Drops no hit.
+struct KeepHits {
+  TANDEM_HD std::uint32_t operator()(const Block&, const Block&, std::uint32_t hits) const { return hits; }
+};
+
 /// Visits every block pair that the test leads to, each once, and hands leaf pairs on.
 ///
-/// Two internal blocks: one new pair for each hit, both sides descend. Two leaf blocks: on_leaves gets the
-/// hits. An internal block against a leaf block: the internal side descends alone, one new pair for each of
-/// its nodes that hits at all, and the mask keeps which leaves it hit. So a node pair is tested again only
-/// against nodes further down, and no leaf pair is met twice (the paper's figures 3 and 4).
+/// Two leaf blocks: on_leaves gets the hits. Two internal blocks: one new pair for each hit, both sides
+/// descend; unless one is larger by kDescendsAlone. Then, and where the other is a leaf block, it descends
+/// alone, one new pair for each of its nodes that hits at all, and the mask keeps which nodes it hit. So a
+/// node pair is tested again only against nodes further down, and no leaf pair is met twice (the paper's
+/// figures 3 and 4).
 ///
 /// test(block_a, block_b) -> mask of node pairs whose boxes may overlap; imaginary nodes never do.
 /// on_leaves(block_a, block_b, mask) -> bool: two leaf blocks, mask is not 0; false ends the traversal.
+/// narrow(block_a, block_b, mask) -> mask: of a leaf block and an internal one, less hits that lead nowhere.
 /// Result: the number of block pairs tested. Order: deeper ones first; the same on every run and machine.
-template <typename Stack = BlockPairStack, typename Test, typename OnLeaves>
+template <typename Stack = BlockPairStack, typename Test, typename OnLeaves, typename Narrow = KeepHits>
 TANDEM_HD std::uint64_t traverse(const LevelView& tree_a, const LevelView& tree_b, const Test& test,
-                                 const OnLeaves& on_leaves) {
+                                 const OnLeaves& on_leaves, const Narrow& narrow = {}) {
   Stack stack;
   stack.push({0, 0, kAllNodePairs});
   std::uint64_t tested = 0;
@@ -113,10 +145,11 @@ TANDEM_HD std::uint64_t traverse(const LevelView& tree_a, const LevelView& tree_
     for (std::uint32_t i = 0; i < count; ++i) {
       if (hits[i] == 0) continue;
       const Block &a = tree_a.blocks[taken[i].a], &b = tree_b.blocks[taken[i].b];
-      if (!a.is_leaf_block() || !b.is_leaf_block()) {
-        push_below(stack, taken[i], a, b, hits[i]);
-      } else if (!on_leaves(a, b, hits[i])) {
-        return tested;
+      const bool leaves_a = a.is_leaf_block(), leaves_b = b.is_leaf_block();
+      if (leaves_a && leaves_b) {
+        if (!on_leaves(a, b, hits[i])) return tested;
+      } else {
+        descend(stack, taken[i], a, b, leaves_a == leaves_b ? hits[i] : narrow(a, b, hits[i]));
       }
     }
   }

@@ -265,10 +265,11 @@ TANDEM_HD inline double power_of_two_below(double x) {
 }
 
 /// Whether all corners lie on a grid so coarse that float64 computes every volume and area of them without
-/// rounding: coordinates are multiples of a power of two G, and differ by less than 2^16 G. A difference is
-/// then exact, a product of two at most 2^32 G^2, one of three 2^48 G^3, and a sum of six of these a multiple
-/// of G^3 below 2^51 G^3. x is a multiple of G where adding 1.5 * 2^52 G and taking it away changes nothing:
-/// the sum is in a range where float64 numbers are multiples of G, or of more.
+/// rounding: coordinates are multiples of G / 2, G a power of two, and differ by less than 2^15 G. A
+/// difference is then exact, a product of two is below 2^32 (G / 2)^2, one of three below 2^48 (G / 2)^3, and
+/// a sum of six of these a multiple of (G / 2)^3 below 2^51 of it. x is a multiple of G / 2 where adding 1.5
+/// * 2^52 G and taking it away changes nothing: from 2^52 G on every float64 number is one; below, the sum is
+/// above 2^51 G, where again every float64 number is one, and x differs from the sum by another.
 TANDEM_HD inline bool on_coarse_grid(const TrianglePair& t) {
   double extent = 0;
   for (int k = 0; k < 3; ++k) {
@@ -280,7 +281,7 @@ TANDEM_HD inline bool on_coarse_grid(const TrianglePair& t) {
     extent = greatest(extent, upper_a - lower_a, upper_b - lower_b);
   }
   if (!(extent >= 0x1p-300 && extent <= 0x1p300)) return false;  // G^3 and its multiples are normal numbers
-  const double shift = 1.5 * 0x1p52 * 0x1p-15 * power_of_two_below(extent);
+  const double shift = 1.5 * 0x1p52 * 0x1p-14 * power_of_two_below(extent);
   for (int i = 0; i < 3; ++i) {
     for (int k = 0; k < 3; ++k) {
       if (minus(plus(t.a[i][k], shift), shift) != t.a[i][k]) return false;

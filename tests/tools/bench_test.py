@@ -1,0 +1,537 @@
+#!/usr/bin/python3
+"""bvhbench scene and bvhbench query from the outside: what is in their files, and what they refuse.
+
+Environment: that of tool_test.py, and TANDEM_BVHBENCH.
+"""
+import json
+import os
+import re
+import resource
+import shutil
+import unittest
+
+import h5py
+import numpy as np
+
+import bvh_file
+from tool_test import (CUBE_OBJ, DONE, SOURCE_DIR, UNREADABLE_INPUT, UNWRITABLE_OUTPUT, USAGE, ToolTest)
+
+BVHBENCH = os.environ["TANDEM_BVHBENCH"]
+SHEET_OBJ = "v -30 -30 0\nv 30 -30 0.5\nv 30 30 0\nv -30 30 0.5\nf 1 2 3\nf 1 3 4\n"
+IDENTITY = np.eye(3)
+
+
+class BenchTest(ToolTest):
+    """Each test has the unit cube, in/cube.bvh, and names for a scene and for contacts."""
+
+    built_meshes = {}
+
+    def setUp(self):
+        super().setUp()
+        self.mesh = self.mesh_of("cube", CUBE_OBJ)
+        self.scene, self.contacts = self.outputs / "scene.h5", self.outputs / "contacts.h5"
+
+    def mesh_of(self, name, content):
+        path = self.inputs / f"{name}.bvh"
+        if content not in self.built_meshes:
+            result = self.build(self.write(f"{name}.obj", content), "-o", path)
+            self.assertEqual(result.returncode, DONE, result.stderr)
+            self.built_meshes[content] = path.read_bytes()
+        return self.write(path.name, self.built_meshes[content])
+
+    def bench(self, *arguments, **options):
+        return self.run_tool(BVHBENCH, *map(os.fspath, arguments), **options)
+
+    def passes(self, *arguments, **options):
+        result = self.bench(*arguments, **options)
+        self.assertEqual((result.returncode, result.stderr), (DONE, b""))
+        return result.stdout.decode()
+
+    def make(self, kind, *arguments, out=None):
+        return self.passes("scene", kind, "--mesh", self.mesh, *arguments, "-o", out or self.scene)
+
+    def query(self, *arguments):
+        return json.loads(self.passes("query", self.scene, "--json", *arguments))
+
+    def write_scene(self, asset=(0, 0), rotation=(IDENTITY, IDENTITY), translation=((0, 0, 0), (0.5, 0.5, 0.5)),
+                    assets=("../in/cube.bvh",), **datasets):
+        """A scene of two cubes that overlap. Other datasets by name with _ for /; None leaves one out."""
+        fixed = isinstance(assets, np.ndarray)
+        contents = {"assets": assets if fixed else np.array(assets, dtype=h5py.string_dtype()),
+                    "instances/asset": np.array(asset, dtype="u4"), "instances/rotation": np.array(rotation, "f8"),
+                    "instances/translation": np.array(translation, "f8")}
+        contents.update({name.replace("_", "/"): data for name, data in datasets.items()})
+        with h5py.File(self.scene, "w") as file:
+            for name, data in contents.items():
+                if data is not None:
+                    file[name] = data
+
+    def assert_refused(self, code, *words, arguments=(), **options):
+        """The query fails with one line that names the scene file and holds the words."""
+        result = self.bench("query", self.scene, "--out", self.contacts, *arguments, **options)
+        self.assert_fails(result, code, *words)
+        self.assertFalse(self.contacts.exists())
+
+
+def drop_hint(result):
+    result.stderr = re.sub(rb"\nTry 'bvhbench --help'\.", b"", result.stderr)
+    return result
+
+
+def table_of(path):
+    with h5py.File(path) as file:
+        return {name: file[name][:] for name in ("pairs", "contacts/pair", "contacts/face_a", "contacts/face_b")}
+
+
+class Scenes(BenchTest):
+    KINDS = {"stack": ["--count", "27"], "pile": ["--count", "60"], "coincident": ["--count", "5"],
+             "slide": ["--count", "20", "--ground", None]}
+
+    def arguments(self, kind):
+        sheet = self.mesh_of("sheet", SHEET_OBJ)
+        return [sheet if word is None else word for word in self.KINDS[kind]]
+
+    def test_the_same_arguments_give_the_same_bytes_and_another_seed_other_poses(self):
+        other = self.outputs / "other.h5"
+        for kind in self.KINDS:
+            with self.subTest(kind):
+                arguments = self.arguments(kind)
+                self.make(kind, *arguments)
+                self.make(kind, *arguments, out=other)
+                self.assertEqual(self.scene.read_bytes(), other.read_bytes())
+                self.make(kind, *arguments, "--seed", "2", out=other)
+                with h5py.File(self.scene) as one, h5py.File(other) as two:
+                    self.assertTrue((one["instances/translation"][:] != two["instances/translation"][:]).any())
+
+    def test_poses_are_rigid_and_shapes_are_as_documented(self):
+        for kind in self.KINDS:
+            with self.subTest(kind):
+                text = self.make(kind, *self.arguments(kind))
+                with h5py.File(self.scene) as file:
+                    rotation, count = file["instances/rotation"][:], len(file["instances/asset"])
+                    self.assertEqual(file["instances/asset"].dtype, "u4")
+                    self.assertEqual((rotation.shape, rotation.dtype), ((count, 3, 3), "f8"))
+                    self.assertEqual(file["instances/translation"].shape, (count, 3))
+                    self.assertEqual(file["assets"].asstr()[0], "../in/cube.bvh")
+                product = rotation.transpose(0, 2, 1) @ rotation
+                self.assertLess(np.abs(product - IDENTITY).max(), 1e-14)
+                self.assertTrue((np.linalg.det(rotation) > 0.99).all())
+                self.assertIn(f"{count} instances", text)
+
+    def test_an_offset_is_added_to_every_translation(self):
+        other = self.outputs / "other.h5"
+        for kind in self.KINDS:
+            self.make(kind, *self.arguments(kind))
+            self.make(kind, *self.arguments(kind), "--offset", "-1000.5", "2e6", "3", out=other)
+            with h5py.File(self.scene) as one, h5py.File(other) as two:
+                moved = one["instances/translation"][:] + [-1000.5, 2e6, 3]
+                self.assertTrue(np.allclose(two["instances/translation"][:], moved, rtol=1e-15, atol=1e-9))
+
+    def test_faces_of_an_exact_stack_coincide_wherever_it_stands(self):
+        corners, quads = CUBE_OBJ.split("f", 1)
+        self.mesh = self.mesh_of("odd", corners.replace(" 1", " 1.1") + "f" + quads)
+        page = json.loads(self.info(self.mesh, "--json").stdout)
+        for offset in (("0", "0", "0"), ("1234567.8", "-0.3", "1e-3")):
+            self.make("stack", "--count", "64", "--exact", "--offset", *offset)
+            with h5py.File(self.scene) as file:
+                translation = file["instances/translation"][:]
+            for axis, start in enumerate(map(float, offset)):
+                row = np.unique(translation[:, axis])
+                self.assertEqual((len(row), row[0]), (4, start))
+                placed = page["origin"][axis] + row
+                lower, upper = (page["bounds"][end][axis] for end in ("lower", "upper"))
+                self.assertEqual((upper + placed[:-1]).tolist(), (lower + placed[1:]).tolist())
+            neighbours = 3 * 3 * 16 + 6 * 9 * 4 + 4 * 27  # across faces, edges, corners
+            self.assertEqual(self.query()["object_pairs"], neighbours)
+
+    def test_a_jittered_stack_touches_its_neighbours_alone(self):
+        self.make("stack", "--count", "27", "--jitter", "0.01")
+        with h5py.File(self.scene) as file:
+            moved = file["instances/translation"][:] - np.round(file["instances/translation"][:])
+            self.assertTrue((file["instances/rotation"][:] == IDENTITY).all())
+        self.assertLessEqual(np.abs(moved).max(), 0.01)
+        self.assertGreater(np.abs(moved).max(), 0.005)
+
+    def test_a_pile_has_the_wanted_neighbours(self):
+        for wanted in (2, 6.5):
+            self.make("pile", "--count", "2000", "--neighbours", str(wanted))
+            found = 2 * self.query("--mode", "boxes")["object_pairs"] / 2000
+            self.assertLess(abs(found / wanted - 1), 0.01)
+
+    def test_every_body_of_a_slide_touches_the_ground_and_lies_above_it(self):
+        self.make("slide", *self.arguments("slide"), "--tilt", "15")
+        self.query("--out", self.contacts)
+        table = table_of(self.contacts)
+        touched = table["pairs"][np.unique(table["contacts/pair"])]
+        with h5py.File(self.scene) as file:
+            self.assertEqual(file["instances/asset"][:].tolist(), [1] + [0] * 20)
+            normal = file["instances/rotation"][0][:, 2]
+        self.assertEqual(sorted(touched[touched[:, 0] == 0][:, 1]), list(range(1, 21)))
+        self.assertAlmostEqual(normal[0], np.sin(np.radians(15)))
+
+    def test_a_slide_of_many_bodies_has_several_sheets_that_do_not_touch(self):
+        arguments = self.arguments("slide")
+        arguments[1] = "8000"
+        self.make("slide", *arguments)
+        with h5py.File(self.scene) as file:
+            self.assertEqual((file["instances/asset"][:] == 1).sum(), 4)
+        self.query("--out", self.contacts)
+        self.assertGreaterEqual(table_of(self.contacts)["pairs"][:, 1].min(), 4)
+
+    def test_coincident_pairs_share_a_pose_and_touch_no_others(self):
+        self.make("coincident", "--count", "5")
+        with h5py.File(self.scene) as file:
+            for name in ("instances/rotation", "instances/translation"):
+                self.assertTrue((file[name][0::2] == file[name][1::2]).all())
+        self.query("--out", self.contacts)
+        self.assertEqual(table_of(self.contacts)["pairs"].tolist(), [[2 * i, 2 * i + 1] for i in range(5)])
+
+    def test_wrong_arguments_are_told(self):
+        self.assert_fails(drop_hint(self.bench("scene")), USAGE)
+        self.assert_fails(drop_hint(self.bench("scene", "heap")), USAGE)
+        sheet = self.mesh_of("sheet", SHEET_OBJ)
+        for kind, words, told in (("stack", ["--count", "1001"], "1000"), ("stack", ["--count", "0"], "--count"),
+                                  ("stack", ["--jitter", "nan"], "--jitter"), ("stack", ["--seed", "-1"], "--seed"),
+                                  ("stack", ["--offset", "1", "2"], "--offset"),
+                                  ("stack", ["--offset", "1", "2", "inf"], "--offset"),
+                                  ("pile", ["--neighbours", "0"], "--neighbours"),
+                                  ("pile", ["--count", "3"], "3 bodies"), ("slide", [], "--ground"),
+                                  ("slide", ["--ground", self.mesh], "too small"),
+                                  ("slide", ["--ground", sheet, "--tilt", "91"], "--tilt")):
+            with self.subTest(words=words):
+                result = self.bench("scene", kind, "--mesh", self.mesh, "-o", self.scene, *words)
+                self.assert_fails(drop_hint(result), USAGE, told)
+        self.assert_nothing_written()
+
+    def test_a_mesh_that_cannot_be_read_is_named(self):
+        for path, told in ((self.inputs / "none.bvh", "no such file"), (self.write("cube.obj", CUBE_OBJ), "not a Tandem")):
+            self.assert_fails(self.bench("scene", "pile", "--mesh", path, "-o", self.scene), UNREADABLE_INPUT, path, told)
+        self.assert_nothing_written()
+
+
+class Query(BenchTest):
+    def test_the_contacts_file_is_sorted_and_of_the_documented_types(self):
+        self.make("pile", "--count", "50")
+        self.query("--out", self.contacts)
+        table = table_of(self.contacts)
+        pairs = table["pairs"]
+        self.assertEqual((pairs.dtype, pairs.shape[1]), ("u4", 2))
+        self.assertTrue((pairs[:, 0] < pairs[:, 1]).all())
+        self.assertEqual(pairs.tolist(), sorted(pairs.tolist()))
+        rows = np.stack([table[f"contacts/{name}"] for name in ("pair", "face_a", "face_b")], 1)
+        self.assertEqual(rows.dtype, "u4")
+        self.assertGreater(len(rows), 50)
+        self.assertEqual(rows.tolist(), sorted(rows.tolist()))
+        self.assertLess(rows[:, 0].max(), len(pairs))
+        self.assertLess(rows[:, 1:].max(), 6)
+
+    def test_the_attributes_say_what_was_done(self):
+        self.write_scene()
+        report = self.query("--out", self.contacts, "--repeat", "3", "--threads", "2", "--mode", "boxes")
+        with h5py.File(self.contacts) as file:
+            attributes = dict(file.attrs)
+        for key in ("mode", "backend", "threads", "hash", "object_pairs", "block_pairs", "candidates",
+                    "decided_by_float32", "decided_by_float64", "decided_exactly", "contacts"):
+            self.assertEqual(attributes[key], report[key], key)
+        self.assertEqual((attributes["mode"], attributes["backend"], attributes["repeats"]), ("boxes", "cpu", 3))
+        self.assertEqual(attributes["tandem_version"], report["version"])
+        self.assertEqual(attributes["best_seconds"], min(report["seconds"]["all"]))
+        self.assertEqual(attributes["median_seconds"], sorted(report["seconds"]["all"])[1])
+        self.assertEqual(len(report["seconds"]["all"]), 3)
+
+    def test_the_hash_is_that_of_the_documentation(self):
+        self.write_scene()
+        hash_of_query = self.query("--out", self.contacts)["hash"]
+        arrays = b"".join(column.astype("<u4").tobytes() for column in table_of(self.contacts).values())
+        self.assertEqual(f"{bvh_file.xxh64(arrays):016x}", hash_of_query)
+
+    def test_the_scene_of_the_documentation_is_one(self):
+        snippet = (SOURCE_DIR / "docs" / "scenes.md").read_text().split("```python\n")[1].split("```")[0]
+        self.mesh.rename(self.outputs / "cow.bvh")
+        exec(snippet.replace('"scene.h5"', "path"), {"h5py": h5py, "np": np, "path": self.scene})
+        self.assertGreater(self.query()["contacts"], 0)
+
+    def test_the_keys_of_json_are_those_of_its_documentation(self):
+        self.write_scene()
+        page = (SOURCE_DIR / "docs" / "json.md").read_text().split("## `bvhbench query")[1].split("\n## ")[0]
+        documented = [key for line in page.split("\n") if line.startswith("| `")
+                      for key in re.findall(r"`(\w+)`", line.split("|")[1])]
+        self.assertEqual(list(self.query()), documented)
+
+    def test_two_cubes_cross_where_they_should(self):
+        self.write_scene()
+        self.query("--out", self.contacts)
+        table = table_of(self.contacts)
+        self.assertEqual(table["pairs"].tolist(), [[0, 1]])
+        # Quads 1, 3, 4 of the lower cube (z, x, y = 1) meet 0, 5, 2 (z, x, y = 0) of the upper, not the parallel ones.
+        met = set(zip(table["contacts/face_a"].tolist(), table["contacts/face_b"].tolist()))
+        self.assertEqual(met, {(1, 5), (1, 2), (3, 0), (3, 2), (4, 0), (4, 5)})
+
+    def test_cubes_apart_have_no_contacts(self):
+        self.write_scene(translation=((0, 0, 0), (3, 0, 0)))
+        report = self.query("--out", self.contacts)
+        self.assertEqual((report["object_pairs"], report["contacts"]), (0, 0))
+        self.assertEqual([len(column) for column in table_of(self.contacts).values()], [0, 0, 0, 0])
+
+    def test_a_scene_of_nothing_has_no_contacts(self):
+        self.write_scene((), np.zeros((0, 3, 3)), np.zeros((0, 3)), ())
+        self.assertEqual(self.query()["contacts"], 0)
+
+    def test_given_pairs_in_any_order_give_the_contacts_of_found_ones(self):
+        self.make("pile", "--count", "40")
+        self.query("--out", self.contacts)
+        found = table_of(self.contacts)
+        for pairs in (found["pairs"], found["pairs"][::-1, ::-1], np.repeat(found["pairs"], 2, axis=0)[:, ::-1]):
+            with h5py.File(self.scene, "a") as file:
+                if "pairs" in file:
+                    del file["pairs"]
+                file["pairs"] = pairs
+            report = self.query("--out", self.contacts)
+            self.assertTrue(report["given_pairs"])
+            for name, column in table_of(self.contacts).items():
+                self.assertEqual(column.tolist(), found[name].tolist())
+
+    def test_threads_and_repeats_change_nothing_but_time(self):
+        self.make("pile", "--count", "60")
+        hashes = {self.query("--threads", str(threads), "--repeat", "2")["hash"] for threads in (1, 2, 7)}
+        self.assertEqual(len(hashes), 1)
+
+    def test_first_contact_asks_only_whether_they_touch(self):
+        self.make("pile", "--count", "50")
+        self.query("--out", self.contacts)
+        touching = set(table_of(self.contacts)["contacts/pair"].tolist())
+        self.query("--first-contact", "--out", self.contacts)
+        self.assertEqual(table_of(self.contacts)["contacts/pair"].tolist(), sorted(touching))
+
+    def test_boxes_miss_no_contact(self):
+        self.make("pile", "--count", "50")
+        rows = []
+        for mode in ("exact", "boxes"):
+            self.query("--mode", mode, "--out", self.contacts)
+            table = table_of(self.contacts)
+            rows.append(set(zip(*(table[f"contacts/{name}"].tolist() for name in ("pair", "face_a", "face_b")))))
+        self.assertLessEqual(rows[0], rows[1])
+
+    def test_self_adds_each_instance_with_itself(self):
+        self.write_scene()
+        report = self.query("--self", "--out", self.contacts)
+        table = table_of(self.contacts)
+        self.assertTrue(report["self_pairs"])
+        self.assertEqual(table["pairs"].tolist(), [[0, 0], [0, 1], [1, 1]])
+        itself = table["contacts/pair"] != 1
+        self.assertTrue(itself.any())
+        self.assertTrue((table["contacts/face_a"][itself] <= table["contacts/face_b"][itself]).all())
+
+    def test_the_summary_is_for_people(self):
+        self.write_scene()
+        text = self.passes("query", self.scene)
+        for word in ("instances", "object pairs", "block pairs", "candidates", "contacts", "milliseconds"):
+            self.assertIn(word, text)
+
+    def test_a_folder_with_scene_and_mesh_can_move(self):
+        folder = self.root / "Kühe & 牛 grasen"
+        folder.mkdir()
+        shutil.move(self.mesh, folder / "Kuh 1.bvh")
+        self.mesh, self.scene = folder / "Kuh 1.bvh", folder / "Szene ñ.h5"
+        self.make("coincident", "--count", "1")
+        with h5py.File(os.fsencode(self.scene)) as file:
+            self.assertEqual(file["assets"].asstr()[0], "Kuh 1.bvh")
+        before = self.query()
+        self.scene = folder.rename(self.root / "moved") / self.scene.name
+        self.assertEqual(self.query("--out", folder.parent / "Kontakte ö.h5")["hash"], before["hash"])
+
+    def test_integers_and_floats_of_other_sizes_and_fixed_strings_are_taken(self):
+        self.write_scene()
+        expected = self.query()["hash"]
+        self.write_scene(assets=np.array([b"../in/cube.bvh"]), instances_asset=np.zeros(2, "<i8"),
+                         instances_rotation=np.array([IDENTITY] * 2, ">f4"),
+                         instances_translation=np.array([[0, 0, 0], [0.5] * 3], "f2"))
+        self.assertEqual(self.query()["hash"], expected)
+
+    def test_compressed_datasets_are_read(self):
+        self.make("pile", "--count", "500")
+        expected = self.query()["hash"]
+        with h5py.File(self.scene, "a") as file:
+            for name in ("rotation", "translation", "asset"):
+                data = file[f"instances/{name}"][:]
+                del file[f"instances/{name}"]
+                file["instances"].create_dataset(name, data=data, compression="gzip", shuffle=True)
+        self.assertEqual(self.query()["hash"], expected)
+
+
+class WrongScenes(BenchTest):
+    def test_what_is_no_file_is_told(self):
+        self.assert_refused(UNREADABLE_INPUT, self.scene, "no such file")
+        self.scene.mkdir()
+        self.assert_refused(UNREADABLE_INPUT, self.scene, "is a folder")
+        self.scene.rmdir()
+        os.mkfifo(self.scene)
+        self.assert_refused(UNREADABLE_INPUT, self.scene, "not a regular file")
+
+    def test_what_is_no_hdf5_is_told(self):
+        for content in (b"", b"\x89HDF\r\n\x1a", b"hello\n" * 1000, self.mesh.read_bytes()):
+            self.scene.write_bytes(content)
+            self.assert_refused(UNREADABLE_INPUT, self.scene, "not an HDF5 file")
+
+    def test_a_missing_dataset_is_named(self):
+        for name in ("assets", "instances_asset", "instances_rotation", "instances_translation"):
+            self.write_scene()
+            with h5py.File(self.scene, "a") as file:
+                del file[name.replace("_", "/")]
+            self.assert_refused(UNREADABLE_INPUT, self.scene, "/" + name.replace("_", "/"), "no such dataset")
+
+    def test_a_wrong_shape_or_type_is_named(self):
+        for change, words in (({"instances_rotation": np.zeros((2, 9))}, ("/instances/rotation", "expected 3 dimensions, found 2")),
+                              ({"instances_rotation": np.zeros((2, 3, 4))}, ("expected n x 3 x 3, found 2 x 3 x 4",)),
+                              ({"instances_translation": np.zeros((3, 3))}, ("2 assets, 2 rotations and 3 translations",)),
+                              ({"instances_translation": np.zeros((2, 2))}, ("expected n x 3, found 2 x 2",)),
+                              ({"instances_asset": np.uint32(0)}, ("expected 1 dimension, found 0",)),
+                              ({"instances_asset": np.zeros(2)}, ("expected integers, found floating-point",)),
+                              ({"instances_asset": np.zeros(2, bool)}, ("found an enumeration",)),
+                              ({"instances_asset": np.array([0, -1])}, ("/instances/asset",)),
+                              ({"instances_asset": np.array([0, 1 << 40])}, ("/instances/asset",)),
+                              ({"instances_asset": h5py.Empty("u4")}, ("expected 1 dimension, found 0",)),
+                              ({"instances_rotation": np.zeros((2, 3, 3), "S1")}, ("found strings",)),
+                              ({"instances_translation": np.zeros((2, 3), np.longdouble)}, ("more than 64 bits",)),
+                              ({"instances_translation": np.full((2, 3), (1 << 62) + 1)}, ("/instances/translation",)),
+                              ({"pairs": np.zeros((1, 3), "u4")}, ("/pairs", "expected n x 2, found 1 x 3")),
+                              ({"pairs_x": np.zeros(1)}, ("/pairs", "not a dataset"))):
+            with self.subTest(words=words):
+                self.write_scene(**change)
+                self.assert_refused(UNREADABLE_INPUT, self.scene, *words)
+
+    def test_indices_out_of_range_are_named(self):
+        self.write_scene(asset=(0, 1))
+        self.assert_refused(UNREADABLE_INPUT, self.scene, "instance 1 is of asset 1 of 1")
+        self.write_scene(pairs=np.array([[0, 1], [2, 0]], "u4"))
+        self.assert_refused(UNREADABLE_INPUT, self.scene, "/pairs: row 1 names instance 2 of 2")
+
+    def test_a_pose_that_is_not_rigid_is_named(self):
+        mirror, scaled, broken = np.diag([1.0, 1, -1]), 2 * IDENTITY, IDENTITY * np.nan
+        for rotation in (mirror, scaled, broken, np.zeros((3, 3))):
+            self.write_scene(rotation=(IDENTITY, rotation))
+            self.assert_refused(UNREADABLE_INPUT, self.scene, "instance 1: a pose is not a rotation and a translation")
+        for place in (np.nan, np.inf):
+            self.write_scene(translation=((0, place, 0), (0, 0, 0)))
+            self.assert_refused(UNREADABLE_INPUT, self.scene, "instance 0: ")
+        self.write_scene(translation=((0, 0, 0), (0, 1e305, 0)))
+        self.assert_refused(UNREADABLE_INPUT, self.scene, "instance 1: ")
+
+    def test_an_asset_that_cannot_be_read_is_named(self):
+        whole = self.mesh.read_bytes()
+        for name, content, told in (("none.bvh", None, "no such file"), ("cut.bvh", whole[:-1], "shorter"),
+                                    ("flipped.bvh", whole[:600] + bytes([whole[600] ^ 1]) + whole[601:], "hash"),
+                                    ("walk.bvh", b"HIERARCHY\nROOT Hips\n", "motion capture")):
+            if content is not None:
+                self.write(name, content)
+            self.write_scene(assets=(f"../in/{name}",))
+            self.assert_refused(UNREADABLE_INPUT, self.scene, name, told)
+        self.write_scene(assets=("",))
+        self.assert_refused(UNREADABLE_INPUT, self.scene, "/assets: row 0 is empty")
+
+    def test_more_values_than_the_file_holds_are_refused_before_they_are_allocated(self):
+        for layout in ({}, {"chunks": (1000, 3, 3)}, {"chunks": (1000, 3, 3), "compression": "gzip"},
+                       {"maxshape": (None, 3, 3), "chunks": (1 << 24, 3, 3), "compression": "gzip"}):
+            self.write_scene(instances_rotation=None)
+            with h5py.File(self.scene, "a") as file:
+                file["instances"].create_dataset("rotation", (1 << 40, 3, 3), "f8", **layout)
+            self.assert_refused(UNREADABLE_INPUT, self.scene, "/instances/rotation", "more values than the file holds")
+
+    def test_values_in_other_files_are_not_read(self):
+        secret = self.write("secret", np.zeros(2, "u4").tobytes())
+        self.write_scene(instances_asset=None)
+        with h5py.File(self.scene, "a") as file:
+            file["instances"].create_dataset("asset", (2,), "u4", external=[(os.fsencode(secret), 0, 8)])
+        self.assert_refused(UNREADABLE_INPUT, "/instances/asset", "other files")
+        other = self.inputs / "other.h5"
+        with h5py.File(other, "w") as file:
+            file["asset"] = np.zeros(2, "u4")
+        self.write_scene(instances_asset=h5py.ExternalLink(os.fspath(other), "asset"))
+        self.assert_refused(UNREADABLE_INPUT, "/instances/asset")
+
+    def test_no_damage_to_a_scene_crashes_the_query(self):
+        self.write_scene()
+        whole = self.scene.read_bytes()
+        random = np.random.default_rng(7)
+        for length in range(0, len(whole), len(whole) // 6):
+            self.scene.write_bytes(whole[:length])
+            self.assertEqual(self.bench("query", self.scene).returncode, UNREADABLE_INPUT)
+        for _ in range(30):
+            damaged = bytearray(whole)
+            for place in random.integers(0, len(whole), 3):
+                damaged[place] = random.integers(256)
+            self.scene.write_bytes(damaged)
+            self.assertIn(self.bench("query", self.scene).returncode, (DONE, UNREADABLE_INPUT))
+
+
+class BenchUsage(BenchTest):
+    def test_help_names_commands_and_options(self):
+        for arguments, words in (([], ("scene", "query", "Exit codes")), (["scene"], ("stack", "pile", "slide", "coincident")),
+                                 (["query"], ("SCENE", "--mode", "--first-contact", "--self", "--threads", "--repeat",
+                                              "--out", "--json", "--backend"))):
+            text = self.passes(*arguments, "--help")
+            for word in words:
+                self.assertIn(word, text)
+        self.assertRegex(self.passes("--version"), r"^bvhbench \d+\.\d+\.\d+\n$")
+
+    def test_wrong_arguments_are_told(self):
+        self.write_scene()
+        self.assert_fails(drop_hint(self.bench()), USAGE)
+        self.assert_fails(drop_hint(self.bench("query")), USAGE, "SCENE")
+        for words, told in ((["--backend", "cuda"], "GPU"), (["--backend", "abacus"], "abacus"), (["--mode", "0"], "--mode"),
+                            (["--threads", "0"], "--threads"), (["--repeat", "0"], "--repeat"), (["--out", ""], "--out"),
+                            (["more.h5"], "more.h5"), (["--fast"], "--fast")):
+            with self.subTest(words=words):
+                self.assert_fails(drop_hint(self.bench("query", self.scene, *words)), USAGE, told)
+
+    def test_self_with_given_pairs_is_refused(self):
+        self.write_scene(pairs=np.array([[0, 1]], "u4"))
+        self.assert_refused(USAGE, self.scene, "--self", arguments=["--self"])
+
+
+class BenchOutput(BenchTest):
+    def failing(self, path, *words, **options):
+        self.write_scene()
+        for command in (["query", self.scene, "--out", path], ["scene", "pile", "--mesh", self.mesh, "-o", path]):
+            self.assert_fails(self.bench(*command, **options), UNWRITABLE_OUTPUT, path, *words)
+
+    def test_outputs_that_cannot_be_written_are_told(self):
+        self.failing("/dev/full", "No space left on device")
+        self.failing(self.outputs / "none" / "a.h5", "No such file or directory")
+        self.failing(self.inputs, "is a folder")
+
+    def test_a_file_size_limit_is_told_and_leaves_nothing(self):
+        def limit():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (1024, 1024))
+            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        self.failing(self.outputs / "a.h5", "File too large", preexec_fn=limit)
+        self.assertEqual(os.listdir(self.outputs), ["scene.h5"])
+
+    def test_a_full_disk_is_told_and_leaves_nothing(self):
+        script = ('mount -t tmpfs -o size=64k tandem "$1" || exit 77; "$2" scene pile --mesh "$3" -o "$1/a.h5"; '
+                  'code=$?; ls -A "$1"; exit $code')
+        result = self.run_tool("unshare", "-m", "sh", "-c", script, "sh", self.outputs, BVHBENCH, self.mesh)
+        if result.returncode in (1, 77):
+            self.skipTest("no file system may be mounted here")
+        self.assertEqual((result.returncode, result.stdout), (UNWRITABLE_OUTPUT, b""))
+        self.assertIn(b"No space left on device", result.stderr)
+
+    def test_an_output_that_cannot_be_written_is_left_as_it_was(self):
+        self.contacts.write_bytes(b"older")
+        self.write_scene(rotation=(IDENTITY, 2 * IDENTITY))
+        self.assertEqual(self.bench("query", self.scene, "--out", self.contacts).returncode, UNREADABLE_INPUT)
+        self.assertEqual(self.contacts.read_bytes(), b"older")
+
+    def test_a_summary_that_cannot_be_printed_is_an_error(self):
+        self.write_scene()
+        with open("/dev/full", "wb") as full:
+            self.assertEqual(self.bench("query", self.scene, stdout=full).returncode, UNWRITABLE_OUTPUT)
+
+    def test_only_the_output_is_written(self):
+        self.make("pile", "--count", "30")
+        self.query("--out", self.contacts)
+        self.assertEqual(sorted(os.listdir(self.outputs)), ["contacts.h5", "scene.h5"])
+
+
+if __name__ == "__main__":
+    unittest.main()

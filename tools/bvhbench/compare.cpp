@@ -1,0 +1,194 @@
+#include "compare.h"
+
+#include <malloc.h>
+
+#include <algorithm>
+#include <cfenv>
+#include <chrono>
+#include <filesystem>
+
+#include "contacts_file.h"
+#include "tandem/formats/hash.h"
+#include "tandem/kernels/broad_phase.h"
+
+namespace tandem::bench {
+namespace {
+
+using Contacts = std::optional<std::vector<TriangleContact>>;
+
+// Libraries change rounding and denormal modes; what follows them must not notice.
+class SavedFloatingPoint {
+ public:
+  SavedFloatingPoint() { std::fegetenv(&saved_); }
+  SavedFloatingPoint(const SavedFloatingPoint&) = delete;
+  SavedFloatingPoint& operator=(const SavedFloatingPoint&) = delete;
+  ~SavedFloatingPoint() { std::fesetenv(&saved_); }
+
+ private:
+  std::fenv_t saved_;
+};
+
+template <class Work>
+double seconds_of(const Work& work) {
+  const SavedFloatingPoint saved;
+  const auto begin = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+// Bytes that malloc has handed out, large mappings included.
+std::uint64_t heap_bytes() {
+  const struct mallinfo2 info = mallinfo2();
+  return info.uordblks + info.hblkhd;
+}
+
+std::uint64_t growth(std::uint64_t before, std::uint64_t after) {
+  return after > before ? after - before : 0;
+}
+
+struct Frame {
+  const Scene& scene;
+  std::vector<AssetView> assets;
+  std::vector<ObjectPair> pairs;
+
+  std::span<const Instance> instances() const { return scene.description.instances; }
+};
+
+void check_instances(const std::string& path, const Scene& scene) {
+  const auto& instances = scene.description.instances;
+  for (std::size_t i = 0; i < instances.size(); ++i) {
+    const std::string which = path + ": instance " + std::to_string(i) + ": ";
+    if (instances[i].asset >= scene.assets.size()) throw FileError(which + "no such asset");
+    if (!is_rigid(instances[i].pose)) throw FileError(which + "the pose is not rigid");
+  }
+}
+
+std::vector<ObjectPair> given_pairs(const std::string& path, const Scene& scene) {
+  const std::vector<ObjectPair> pairs = normalised(*scene.description.pairs);
+  for (const ObjectPair& pair : pairs) {
+    if (pair.b >= scene.description.instances.size()) throw FileError(path + ": /pairs: no such instance");
+    if (pair.a == pair.b)
+      throw FileError(path + ": /pairs: an instance with itself, which only Tandem can do");
+  }
+  return pairs;
+}
+
+std::vector<ObjectPair> found_pairs(const std::string& path, const Scene& scene) {
+  std::vector<WorldBox> boxes;
+  for (const Instance& instance : scene.description.instances) {
+    const FileHeader& header = *scene.assets[instance.asset].view().header;
+    boxes.push_back(
+        world_box(for_stored_coordinates(instance.pose, header.origin), header.lower, header.upper));
+  }
+  BroadPhase broad_phase;
+  if (const Status status = broad_phase.find_pairs(boxes); status != Status::kOk) {
+    throw FileError(path + ": " + explain(status));
+  }
+  return {broad_phase.pairs().begin(), broad_phase.pairs().end()};
+}
+
+void prepare(Peer& peer, const Frame& frame, PeerResult& result) {
+  result.name = peer.name();
+  result.settings = peer.settings();
+  const std::uint64_t before = heap_bytes();
+  result.build_seconds = seconds_of([&] { peer.build(frame.assets, frame.instances()); });
+  const auto update = [&] { return seconds_of([&] { peer.update(frame.instances()); }); };
+  result.update_seconds = update();
+  constexpr double kLong = 1;  // seconds: repeating it would tell little more
+  for (int i = 1; i < 3 && result.update_seconds < kLong; ++i) {
+    result.update_seconds = std::min(result.update_seconds, update());
+  }
+  result.memory_bytes = growth(before, heap_bytes()) + peer.bytes_beside_heap();
+}
+
+// The first query, which makes room for what it finds, is not timed; nor is anything else but a query.
+Contacts answer_of(Peer& peer, const Frame& frame, PeerResult& result) {
+  const std::uint64_t before = heap_bytes() + peer.bytes_beside_heap();
+  const double seconds = seconds_of([&] { peer.query(frame.pairs); });
+  result.work_bytes = growth(before, heap_bytes() + peer.bytes_beside_heap());
+  if (peer.is_reference()) result.query_seconds = {seconds};
+  result.counters = peer.counters();
+  Contacts contacts = peer.contacts();
+  if (contacts) {
+    result.contacts = contacts->size();
+    result.hash = xxh64(contacts->data(), contacts->size() * sizeof(TriangleContact));
+  }
+  return contacts;
+}
+
+// In a, and not in b.
+std::uint64_t count_missing(const std::vector<TriangleContact>& a, const std::vector<TriangleContact>& b) {
+  std::vector<TriangleContact> difference;
+  std::set_difference(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(difference));
+  return difference.size();
+}
+
+std::size_t find_reference(std::span<const std::unique_ptr<Peer>> peers) {
+  const auto find = [&](const auto& matches) {
+    return static_cast<std::size_t>(std::find_if(peers.begin(), peers.end(), matches) - peers.begin());
+  };
+  const std::size_t independent = find([](const auto& peer) { return peer->is_reference(); });
+  if (independent < peers.size()) return independent;
+  return find([](const auto& peer) { return peer->name() == "Tandem exact"; });
+}
+
+void judge(SceneComparison& comparison, const std::vector<Contacts>& answers, std::size_t reference) {
+  if (reference >= answers.size()) return;
+  comparison.reference = comparison.peers[reference].name;
+  const std::vector<TriangleContact>& truth = *answers[reference];
+  for (std::size_t i = 0; i < answers.size(); ++i) {
+    if (!answers[i]) continue;
+    comparison.peers[i].missed = count_missing(truth, *answers[i]);
+    comparison.peers[i].invented = count_missing(*answers[i], truth);
+  }
+}
+
+void race(std::span<const std::unique_ptr<Peer>> peers, const Frame& frame, unsigned repeats,
+          std::vector<PeerResult>& results) {
+  for (unsigned repeat = 0; repeat < repeats; ++repeat) {
+    for (std::size_t i = 0; i < peers.size(); ++i) {
+      if (peers[i]->is_reference()) continue;
+      results[i].query_seconds.push_back(seconds_of([&] { peers[i]->query(frame.pairs); }));
+    }
+  }
+}
+
+}  // namespace
+
+double PeerResult::best_seconds() const {
+  return *std::min_element(query_seconds.begin(), query_seconds.end());
+}
+
+double PeerResult::median_seconds() const {
+  std::vector<double> sorted = query_seconds;
+  std::sort(sorted.begin(), sorted.end());
+  const std::size_t middle = sorted.size() / 2;
+  return sorted.size() % 2 == 1 ? sorted[middle] : (sorted[middle - 1] + sorted[middle]) / 2;
+}
+
+SceneComparison compare(const std::string& path, std::span<const std::unique_ptr<Peer>> peers,
+                        unsigned repeats) {
+  const Scene scene = read_scene(path);
+  check_instances(path, scene);
+  const Frame frame = {scene, scene.views(),
+                       scene.description.pairs ? given_pairs(path, scene) : found_pairs(path, scene)};
+
+  SceneComparison comparison;
+  comparison.name = std::filesystem::path(path).stem().string();
+  comparison.instances = frame.instances().size();
+  for (const Instance& i : frame.instances())
+    comparison.triangles += frame.assets[i.asset].level().triangle_count;
+  comparison.object_pairs = frame.pairs.size();
+  comparison.peers.resize(peers.size());
+  std::vector<Contacts> answers;
+  for (std::size_t i = 0; i < peers.size(); ++i) {
+    prepare(*peers[i], frame, comparison.peers[i]);
+    answers.push_back(answer_of(*peers[i], frame, comparison.peers[i]));
+  }
+  judge(comparison, answers, find_reference(peers));
+  answers.clear();
+  race(peers, frame, repeats, comparison.peers);
+  return comparison;
+}
+
+}  // namespace tandem::bench

@@ -1,0 +1,90 @@
+#include "compare_command.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <set>
+
+#include "compare_results.h"
+
+namespace tandem::bench {
+namespace {
+
+struct CompareArguments {
+  std::vector<std::string> scenes, engines;
+  unsigned repeats = 5;
+  std::string out;
+  bool json = false;
+};
+
+std::string join(const std::vector<std::string_view>& words) {
+  std::string joined;
+  for (const std::string_view word : words) joined += (joined.empty() ? "" : ",") + std::string(word);
+  return joined;
+}
+
+std::string processor() {
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);) {
+    if (line.starts_with("model name")) return line.substr(std::min(line.find(": ") + 2, line.size()));
+  }
+  return "unknown";
+}
+
+std::vector<std::unique_ptr<Peer>> chosen_peers(const std::vector<std::string>& chosen) {
+  std::vector<std::unique_ptr<Peer>> peers;
+  for (const std::string_view engine : engines()) {
+    if (!chosen.empty() && std::find(chosen.begin(), chosen.end(), engine) == chosen.end()) continue;
+    for (auto& peer : make_peers(engine)) peers.push_back(std::move(peer));
+  }
+  return peers;
+}
+
+// Results are filed under the scenes' names.
+void check_names(const std::vector<std::string>& scenes) {
+  std::set<std::string> names;
+  for (const std::string& scene : scenes) {
+    if (names.insert(std::filesystem::path(scene).stem().string()).second) continue;
+    throw UsageError(scene + ": another scene has the same name");
+  }
+}
+
+ExitCode run_compare(const CompareArguments& arguments) {
+  check_names(arguments.scenes);
+  const char* commit = std::getenv("TANDEM_COMMIT");
+  CompareResults results = {processor(), commit == nullptr ? "" : commit, arguments.repeats, {}};
+  for (const std::string& scene : arguments.scenes) {
+    results.scenes.push_back(compare(scene, chosen_peers(arguments.engines), arguments.repeats));
+    if (arguments.json) continue;
+    std::printf("%s%s", results.scenes.size() > 1 ? "\n" : "", to_text(results.scenes.back()).c_str());
+    std::fflush(stdout);
+  }
+  if (!arguments.out.empty()) write_results(arguments.out, results);
+  if (arguments.json) std::puts(pretty(to_json(results)).c_str());
+  return kDone;
+}
+
+}  // namespace
+
+CLI::App* add_compare(CLI::App& app, Run& run) {
+  CLI::App* command =
+      app.add_subcommand("compare", "Runs scenes through Tandem and other libraries, side by side");
+  const auto arguments = std::make_shared<CompareArguments>();
+  command->add_option("SCENE", arguments->scenes, "scene files, .h5")->required()->check(file_name());
+  command->add_option("--peers", arguments->engines, "engines, all unless given: " + join(engines()))
+      ->delimiter(',')
+      ->check(CLI::IsMember(engines()));
+  command->add_option("--repeat", arguments->repeats, "timed queries of each")
+      ->check(CLI::Range(1u, 100000u))
+      ->capture_default_str();
+  command->add_option("--out", arguments->out, "write the results here, as HDF5")->check(file_name());
+  command->add_flag("--json", arguments->json, "print JSON");
+  command->footer("Times are of one thread. docs/comparison.md says what is compared, and how.");
+  command->final_callback([arguments, &run] { run = [arguments] { return run_compare(*arguments); }; });
+  return command;
+}
+
+}  // namespace tandem::bench

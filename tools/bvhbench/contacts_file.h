@@ -1,0 +1,44 @@
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tandem/kernels/contact_query.h"
+
+namespace tandem::bench {
+
+/// The answer of a query in the order of a contacts file, by source faces, so that the answers of different
+/// programs can be compared.
+struct ContactTable {
+  std::vector<ObjectPair> pairs;      ///< sorted; a < b, or a = b for an instance with itself
+  std::vector<std::uint32_t> pair;    ///< a row of pairs for each contact; contacts are sorted by pair,
+  std::vector<std::uint32_t> face_a;  ///< then face_a, source face of pairs[pair].a,
+  std::vector<std::uint32_t> face_b;  ///< then face_b; of an instance with itself face_a <= face_b
+};
+
+/// Each pair once, a <= b, sorted.
+std::vector<ObjectPair> normalised(std::span<const ObjectPair> pairs);
+
+/// Condition on pairs: normalised.
+ContactTable make_table(std::span<const ObjectPair> pairs, std::span<const Contact> contacts);
+
+/// XXH64 of pairs, pair, face_a and face_b, one after the other, as little-endian 32-bit numbers.
+std::uint64_t hash_of(const ContactTable& table);
+
+/// How the contacts came about: the attributes of a contacts file.
+struct QueryRecord {
+  std::string mode, backend;
+  bool first_contact = false, self_pairs = false, given_pairs = false;
+  std::uint64_t threads = 1;
+  std::vector<double> seconds;  ///< of each repeat, at least one
+  QueryCounters counters;
+
+  double best_seconds() const;
+  double median_seconds() const;
+};
+
+/// Writes a contacts file (docs/scenes.md), whole or not at all. Throws OutputError.
+void write_contacts(const std::string& path, const ContactTable& table, const QueryRecord& record);
+
+}  // namespace tandem::bench

@@ -1,0 +1,66 @@
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <new>
+
+#include "command.h"
+#include "compare_command.h"
+#include "hdf5_file.h"
+#include "query_command.h"
+#include "scene_command.h"
+
+namespace {
+
+using namespace tandem;
+using namespace tandem::bench;
+
+constexpr const char* kFooter =
+    "Exit codes: 0 done, 1 usage, 2 an input could not be read, 4 the output could not be written,\n"
+    "5 internal error.";
+
+ExitCode fail(ExitCode code, const char* reason) {
+  std::fprintf(stderr, "bvhbench: %s\n", reason);
+  return code;
+}
+
+ExitCode run_and_report(const Run& run) {
+  try {
+    const ExitCode code = run();
+    if (std::fflush(stdout) == 0) return code;
+    std::perror("bvhbench: standard output");
+    return kUnwritableOutput;
+  } catch (const UsageError& error) {
+    return fail(kUsage, error.what());
+  } catch (const OutputError& error) {
+    return fail(kUnwritableOutput, error.what());
+  } catch (const FileError& error) {
+    return fail(kUnreadableInput, error.what());
+  } catch (const std::bad_alloc&) {
+    return fail(kInternal, "not enough memory");
+  } catch (const std::exception& defect) {
+    return fail(kInternal, (std::string("internal error: ") + defect.what()).c_str());
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Makes scenes of posed meshes and finds their contacts.", "bvhbench");
+  app.set_version_flag("--version", "bvhbench " TANDEM_VERSION);
+  app.footer(kFooter);
+  app.require_subcommand(1);
+  Run run;
+  // Each subcommand is a header and a line here.
+  add_scene(app, run);
+  add_query(app, run);
+  add_compare(app, run);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& done) {
+    return app.exit(done);
+  } catch (const CLI::ParseError& error) {
+    std::fprintf(stderr, "bvhbench: %s\nTry 'bvhbench --help'.\n", error.what());
+    return kUsage;
+  }
+  return run_and_report(run);
+}

@@ -1,0 +1,120 @@
+#include "scene_child.h"
+
+#include <filesystem>
+#include <new>
+
+#include "import/limited_child.h"
+
+namespace tandem::bench {
+namespace {
+
+using build::ChildEnd;
+using build::LimitedChild;
+
+// A scene on its way through the pipe: arrays, each led by the number of its elements.
+using Sink = LimitedChild::Sink;
+
+template <typename Array>
+void send(const Sink& sink, const Array& array) {
+  const std::uint64_t count = array.size();
+  sink(&count, sizeof count);
+  sink(array.data(), count * sizeof(*array.data()));
+}
+
+void send(const Sink& sink, const SceneDescription& scene) {
+  std::string names;
+  for (const std::string& name : scene.assets) names += name + '\0';
+  send(sink, names);
+  send(sink, scene.instances);
+  const std::uint8_t given = scene.pairs.has_value();
+  sink(&given, 1);
+  if (given != 0) send(sink, *scene.pairs);
+}
+
+// The error that there was, or nothing, and then the scene.
+void send_outcome(const Sink& sink, const std::string& path,
+                  const std::function<SceneDescription(const std::string&)>& read) {
+  SceneDescription scene;
+  std::string error;
+  try {
+    scene = read(path);
+  } catch (const FileError& defect) {
+    error = defect.what();
+  }
+  send(sink, error);
+  if (error.empty()) send(sink, scene);
+}
+
+// Reads what was sent; each function returns false where the child ended before.
+class Receiver {
+ public:
+  Receiver(LimitedChild& child, std::uint64_t most_bytes) : child_(child), most_bytes_(most_bytes) {}
+
+  template <typename Array>
+  bool receive(Array& array) {
+    std::uint64_t count = 0;
+    if (!child_.read(&count, sizeof count) || count > most_bytes_ / sizeof(*array.data())) return false;
+    array.resize(count);
+    return child_.read(array.data(), count * sizeof(*array.data()));
+  }
+
+  bool receive(SceneDescription& scene) {
+    std::string names;
+    std::uint8_t given = 0;
+    if (!receive(names) || !receive(scene.instances) || !child_.read(&given, 1)) return false;
+    for (std::size_t begin = 0; begin < names.size();) {
+      scene.assets.emplace_back(&names[begin]);
+      begin += scene.assets.back().size() + 1;
+    }
+    if (given == 0) return true;
+    scene.pairs.emplace();
+    return receive(*scene.pairs);
+  }
+
+ private:
+  LimitedChild& child_;
+  std::uint64_t most_bytes_;
+};
+
+std::string explanation(ChildEnd end) {
+  switch (end) {
+    case ChildEnd::out_of_time:
+      return "reading it takes too long";
+    case ChildEnd::out_of_memory:
+      return "reading it takes more memory than a file of its size should";
+    case ChildEnd::crashed:
+      return "damaged: the HDF5 library crashed on it";
+    case ChildEnd::finished:
+    case ChildEnd::lost:
+      break;
+  }
+  return "damaged: the HDF5 library gave up on it";
+}
+
+// A gigabyte serves any scene; more is for files that are large themselves.
+std::uint64_t memory_for(const std::string& path) {
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(path, error);
+  return (std::uint64_t{1} << 30) + (error ? 0 : 16 * bytes);
+}
+
+}  // namespace
+
+SceneDescription read_in_child(const std::string& path,
+                               const std::function<SceneDescription(const std::string&)>& read) {
+  constexpr double kSeconds = 300;
+  const std::uint64_t memory = memory_for(path);
+  LimitedChild child;
+  const auto work = [&](const Sink& sink) { send_outcome(sink, path, read); };
+  const std::string no_child = child.start({kSeconds, memory}, work);
+  if (!no_child.empty()) throw std::runtime_error(no_child);
+  Receiver receiver(child, memory);
+  std::string error;
+  SceneDescription scene;
+  if (!receiver.receive(error)) throw FileError(path + ": " + explanation(child.finish()));
+  if (!error.empty()) throw FileError(error);
+  if (!receiver.receive(scene)) throw FileError(path + ": " + explanation(child.finish()));
+  return scene;
+}
+
+}  // namespace tandem::bench

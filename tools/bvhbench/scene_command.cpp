@@ -1,0 +1,152 @@
+#include "scene_command.h"
+
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+
+#include "make_scene.h"
+#include "make_scene_parts.h"
+#include "scene_file.h"
+#include "statistics_json.h"
+
+namespace tandem::bench {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct SceneArguments {
+  std::string mesh, ground, output;
+  std::uint32_t count = 0;
+  double jitter = 0.001, neighbours = 6.5, tilt = 20;
+  bool exact = false;
+  std::uint64_t seed = 1;
+  std::vector<double> offset = {0, 0, 0};
+
+  SceneSeed scene_seed() const { return {seed, {offset[0], offset[1], offset[2]}}; }
+};
+
+using Assets = std::vector<AssetView>;
+using Maker = std::function<std::vector<Instance>(const SceneArguments&, const Assets&)>;
+
+MappedAsset open_mesh(const std::string& path) {
+  MappedAsset asset;
+  const Status status = asset.open(path.c_str());
+  if (status != Status::kOk) throw FileError(path + ": " + explain(status));
+  return asset;
+}
+
+// The path from the scene file's folder, so that both can move together.
+std::string seen_from(const std::string& scene, const std::string& mesh) {
+  const fs::path folder = fs::absolute(scene).parent_path();
+  std::error_code error;
+  const fs::path relative = fs::proximate(mesh, folder, error);
+  return error ? fs::absolute(mesh).string() : relative.string();
+}
+
+ExitCode run(const SceneArguments& arguments, const Maker& make) {
+  std::vector<MappedAsset> meshes;
+  Assets assets;
+  SceneDescription scene;
+  for (const std::string& path : {arguments.mesh, arguments.ground}) {
+    if (path.empty()) continue;
+    meshes.push_back(open_mesh(path));
+    assets.push_back(meshes.back().view());
+    scene.assets.push_back(seen_from(arguments.output, path));
+  }
+  std::uint64_t pairs = 0;
+  try {
+    scene.instances = make(arguments, assets);
+    pairs = count_box_pairs(assets, scene.instances);
+  } catch (const std::runtime_error& impossible) {
+    throw UsageError(arguments.mesh + ": " + impossible.what());
+  }
+  write_scene(arguments.output, scene);
+  std::printf("%s: %s instances, %s object pairs, %.2f neighbours each\n", arguments.output.c_str(),
+              with_commas(scene.instances.size()).c_str(), with_commas(pairs).c_str(),
+              2 * static_cast<double>(pairs) / static_cast<double>(scene.instances.size()));
+  return kDone;
+}
+
+CLI::Validator cube_of_a_whole_number() {
+  const auto defect = [](const std::string& text) -> std::string {
+    std::uint32_t count = 0;
+    if (!CLI::detail::lexical_cast(text, count)) return {};  // told by its type
+    const std::uint32_t side = root_above(count, 3);
+    if (side * side * side == count) return {};
+    return text + " is no cube of a whole number; " + std::to_string((side - 1) * (side - 1) * (side - 1)) +
+           " and " + std::to_string(side * side * side) + " are";
+  };
+  return CLI::Validator(defect, "");
+}
+
+// A subcommand for a kind of scene, with the options that all kinds have.
+CLI::App* add_kind(CLI::App& scene, Run& run_later, const std::shared_ptr<SceneArguments>& arguments,
+                   const char* kind, const char* help, std::uint32_t count, const Maker& make) {
+  CLI::App* command = scene.add_subcommand(kind, help);
+  command->add_option("--mesh", arguments->mesh, ".bvh file of the bodies")->required()->check(file_name());
+  command->add_option("--count", arguments->count, "how many")
+      ->check(CLI::Range(1, 10'000'000))
+      ->option_text("N [" + std::to_string(count) + "]");
+  command->add_option("--seed", arguments->seed, "another scene of the kind")
+      ->check(CLI::NonNegativeNumber)
+      ->option_text("N [1]");
+  command->add_option("--offset", arguments->offset, "added to every translation")
+      ->expected(3)
+      ->check(between(-1e300, 1e300))
+      ->option_text("X Y Z [0 0 0]");
+  command
+      ->add_option("-o,--output", arguments->output, "the scene file to write; appears whole or not at all")
+      ->required()
+      ->check(file_name());
+  command->final_callback([=, &run_later] {
+    if (arguments->count == 0) arguments->count = count;
+    run_later = [arguments, make] { return run(*arguments, make); };
+  });
+  return command;
+}
+
+}  // namespace
+
+CLI::App* add_scene(CLI::App& app, Run& run_later) {
+  const auto arguments = std::make_shared<SceneArguments>();
+  CLI::App* scene = app.add_subcommand("scene", "make a scene file of many posed meshes");
+  scene->require_subcommand(1);
+  const auto add = [&](const char* kind, const char* help, std::uint32_t count, const Maker& make) {
+    return add_kind(*scene, run_later, arguments, kind, help, count, make);
+  };
+
+  CLI::App* stack =
+      add("stack", "a cube of boxes, face to face", 1000, [](const auto& a, const Assets& assets) {
+        return make_stack(assets[0], root_above(a.count, 3), a.exact ? 0 : a.jitter, a.scene_seed());
+      });
+  stack->get_option("--count")->check(cube_of_a_whole_number());
+  stack->add_option("--jitter", arguments->jitter, "how far boxes are moved at most, in box lengths")
+      ->check(between(0, 0.5))
+      ->option_text("J [0.001]");
+  stack->add_flag("--exact", arguments->exact, "faces coincide exactly");
+
+  CLI::App* pile = add("pile", "bodies at random rotations, close together", 1000,
+                       [](const auto& a, const Assets& assets) {
+                         return make_pile(assets[0], a.count, a.neighbours, a.scene_seed());
+                       });
+  pile->add_option("--neighbours", arguments->neighbours,
+                   "bodies whose world box meets that of a body, on average")
+      ->check(between(0.01, 1000))
+      ->option_text("N [6.5]");
+
+  CLI::App* slide = add("slide", "bodies strewn on a tilted sheet of ground", 2500,
+                        [](const auto& a, const Assets& assets) {
+                          return make_slide(assets[0], assets[1], a.count, a.tilt, a.scene_seed());
+                        });
+  slide->add_option("--ground", arguments->ground, ".bvh file of the sheet")->required()->check(file_name());
+  slide->add_option("--tilt", arguments->tilt, "slope of the ground along x")
+      ->check(between(-90, 90))
+      ->option_text("DEGREES [20]");
+
+  add("coincident", "pairs of bodies in exactly the same pose", 50, [](const auto& a, const Assets& assets) {
+    return make_coincident(assets[0], a.count, a.scene_seed());
+  });
+  return scene;
+}
+
+}  // namespace tandem::bench

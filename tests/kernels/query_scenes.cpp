@@ -9,7 +9,6 @@
 #include <stdexcept>
 #include <utility>
 
-
 namespace tandem::test {
 namespace {
 
@@ -295,7 +294,8 @@ Scene on_ground(RandomPoses& random) {
   Mesh ground = soup(random, 1 + static_cast<std::uint32_t>(random.below(9)), 1);
   scale(ground, pick(random, {5.0, 50.0, 1e4}));
   scene.assets.add(ground);
-  scene.assets.add(soup(random, 17 + static_cast<std::uint32_t>(random.below(40)), pick(random, {0.05, 0.3})));
+  scene.assets.add(
+      soup(random, 17 + static_cast<std::uint32_t>(random.below(40)), pick(random, {0.05, 0.3})));
   scene.instances = {{0, near_origin(random, 1 + far)}, {1, any_rotation(random)}};
   const auto grounds = posed_triangles(scene, 0);
   const PosedTriangle& under = grounds[random.below(grounds.size())];

@@ -293,9 +293,25 @@ TANDEM_HD inline bool on_coarse_grid(const TrianglePair& t) {
 
 }  // namespace detail
 
-/// The first of these stages: float64 with an error bound, or without any error where corners lie on a coarse
-/// grid, as in a stack of boxes: then it decides all. Right whenever it decides.
+namespace detail {
+
+/// Whether a corner of a and one of b are the same point: then the triangles meet, flat or not.
+TANDEM_HD inline bool share_corner(const TrianglePair& t) {
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      if (t.a[i][0] == t.b[j][0] && t.a[i][1] == t.b[j][1] && t.a[i][2] == t.b[j][2]) return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace detail
+
+/// The first of these stages: float64 with an error bound. Without any error where corners lie on a coarse
+/// grid, as in a stack of boxes; and corners in common, as of two copies of a mesh in one place, are
+/// contacts. Right whenever it decides.
 TANDEM_HD inline Verdict decide_float64(const TrianglePair& t) {
+  if (detail::share_corner(t)) return Verdict::contact;
   if (detail::boxes_apart(t.a, t.b)) return Verdict::apart;
   if (!detail::on_coarse_grid(t)) return detail::decide_bounded<double>(t);
   return detail::CompleteTest<detail::ComputedSigns<double>>::meet(t.a, t.b) ? Verdict::contact

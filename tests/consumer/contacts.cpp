@@ -15,14 +15,17 @@ int main(int, char** argv) {
 
   std::vector<tandem::Instance> bodies(10, {.asset = 0, .pose = tandem::kIdentityPose});
   for (const double spacing : {1.5, 1.0, 0.5}) {
-    for (std::size_t i = 0; i < bodies.size(); ++i) bodies[i].pose.translation[0] = spacing * static_cast<double>(i);
+    for (std::size_t i = 0; i < bodies.size(); ++i)
+      bodies[i].pose.translation[0] = spacing * static_cast<double>(i);
     if (const tandem::Status status = query.find_contacts(bodies); status != tandem::Status::kOk) {
       return std::printf("body %d: %s\n", static_cast<int>(query.where()), tandem::explain(status)), 1;
     }
-    std::printf("spacing %.1f: %zu pairs of bodies, %zu of triangles\n", spacing, query.pairs().size(), query.contacts().size());
+    std::printf("spacing %.1f: %zu pairs of bodies, %zu of triangles\n", spacing, query.pairs().size(),
+                query.contacts().size());
     if (query.contacts().empty()) continue;
     const tandem::Contact& first = query.contacts()[0];
     const tandem::ObjectPair& pair = query.pairs()[first.pair];
-    std::printf("  such as face %u of body %u and face %u of body %u\n", first.face_a, pair.a, first.face_b, pair.b);
+    std::printf("  such as face %u of body %u and face %u of body %u\n", first.face_a, pair.a, first.face_b,
+                pair.b);
   }
 }

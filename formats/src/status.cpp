@@ -77,6 +77,8 @@ constexpr Entry kEntries[] = {
     {Status::kUnknownAsset, "UnknownAsset", "instance", "an instance of an asset that does not exist"},
     {Status::kUnknownInstance, "UnknownInstance", "pair", "a pair names an instance that does not exist"},
     {Status::kPoseNotRigid, "PoseNotRigid", "instance", "a pose is not a rotation and a translation"},
+    {Status::kTooManyInstances, "TooManyInstances", nullptr, "there are 2^32 - 1 instances or more"},
+    {Status::kTooManyPairs, "TooManyPairs", nullptr, "there are 2^32 - 1 pairs of instances or more"},
     {Status::kCannotStartThread, "CannotStartThread", nullptr, "a thread could not be started"},
     {Status::kCudaFailed, "CudaFailed", nullptr, "a CUDA call failed"},
 };

@@ -3,7 +3,7 @@
 #include "block_pair_variants.h"
 
 // Vectors of 8 and 16 lanes are compiled for x86-64 with the flags that kernels/CMakeLists.txt gives.
-#if defined(TANDEM_HAVE_LANES) && defined(__x86_64__)
+#if defined(TANDEM_HAVE_LANES) && defined(TANDEM_X86_LANES)
 #define TANDEM_HAVE_X86_LANES 1
 #endif
 

@@ -1,65 +1,102 @@
 #include "tandem/kernels/broad_phase.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <utility>
 
-#include "tandem/formats/box.h"
 #include "tandem/kernels/traversal.h"
 
 namespace tandem {
 namespace {
 
-// How much each node's half-extent is widened. Coordinates are normalised to [0, 1], so an operation on them
-// rounds by at most 2^-24. A node's box is made of a sum, a difference and halves of numbers that are off by
-// as much, and tested by a difference and a sum: less than 2^-21 together, and every level of the tree is
-// widened anew.
-constexpr float kMargin = 0x1p-20f;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-constexpr int kCurveBits = 10;  // for each axis
-constexpr std::uint32_t kCells = 1u << kCurveBits;
-
-// Node pairs of a block with itself: each once, and no leaf with itself.
-constexpr std::uint32_t kUpperWithDiagonal = 0x8CEFu;
-constexpr std::uint32_t kUpper = 0x08CEu;
-
-// Spreads ten bits to every third.
-std::uint32_t spread(std::uint32_t x) {
-  x = (x | x << 16) & 0x030000FFu;
-  x = (x | x << 8) & 0x0300F00Fu;
-  x = (x | x << 4) & 0x030C30C3u;
-  return (x | x << 2) & 0x09249249u;
+std::size_t groups_over(std::size_t count) {
+  return (count + 3) / 4;
 }
 
-std::uint32_t blocks_over(std::uint32_t count) {
-  return (count + kNodesPerBlock - 1) / kNodesPerBlock;
-}
+}  // namespace
 
-// The union of the boxes in a block, widened.
-Box box_above(const Block& block) {
-  Box box;
-  for (int k = 0; k < 3; ++k) {
-    float lo = std::numeric_limits<float>::infinity(), hi = -lo;
-    for (int i = 0; i < kNodesPerBlock; ++i) {  // an imaginary node changes neither
-      lo = std::min(lo, block.center[k][i] - block.half_extent[k][i]);
-      hi = std::max(hi, block.center[k][i] + block.half_extent[k][i]);
-    }
-    box.center[k] = 0.5f * (lo + hi);
-    box.half_extent[k] = 0.5f * (hi - lo) + kMargin;
+// Brings items into the order of the tree: `units` runs of `unit` items, the last of which may be shorter,
+// each again split into four. A unit is a power of four.
+void BroadPhase::split(Item* items, std::size_t count, std::size_t unit, std::size_t units) {
+  if (count <= 1) return;
+  if (units == 1) {
+    if (unit > 1) split(items, count, unit / kGroup, (count + unit / kGroup - 1) / (unit / kGroup));
+    return;
   }
-  return box;
+  double lo[3] = {kInfinity, kInfinity, kInfinity}, hi[3] = {-kInfinity, -kInfinity, -kInfinity};
+  for (std::size_t i = 0; i < count; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      const double c = items[i].center[k];
+      lo[k] = c < lo[k] ? c : lo[k];
+      hi[k] = c > hi[k] ? c : hi[k];
+    }
+  }
+  int axis = 0;
+  for (int k = 1; k < 3; ++k) {
+    if (hi[k] - lo[k] > hi[axis] - lo[axis]) axis = k;
+  }
+  const std::size_t left_units = (units + 1) / 2, left = left_units * unit;
+  std::nth_element(items, items + left, items + count,
+                   [axis](const Item& x, const Item& y) { return x.center[axis] < y.center[axis]; });
+  split(items, left, unit, left_units);
+  split(items + left, count - left, unit, units - left_units);
 }
 
-// All 16 aligned box tests, four lanes at a time. Imaginary nodes fail the ordered comparison.
-std::uint32_t aligned_mask(const Block& a, const Block& b) {
+// Boxes in the order of the tree, then the groups over them, level by level: group g of a level holds
+// the boxes of 4 g to 4 g + 3 of the level below.
+bool BroadPhase::build(std::span<const WorldBox> boxes) {
+  const std::size_t count = boxes.size();
+  std::size_t total = 0;
+  levels_ = 0;
+  for (std::size_t below = count; levels_ == 0 || below > 1; below = groups_over(below)) {
+    level_begin_[levels_++] = total;
+    total += groups_over(below);
+  }
+  if (!items_.resize(count) || !groups_.resize(total)) return false;
+  for (std::uint32_t b = 0; b < count; ++b) {
+    for (int k = 0; k < 3; ++k) items_[b].center[k] = 0.5 * boxes[b].lo[k] + 0.5 * boxes[b].hi[k];
+    items_[b].box = b;
+  }
+  std::size_t unit = 1;
+  while (unit * kGroup < count) unit *= kGroup;
+  split(items_.data(), count, unit, (count + unit - 1) / unit);
+
+  std::size_t below = count;
+  for (int level = 0; level < levels_; ++level, below = groups_over(below)) {
+    for (std::size_t i = 0; i < groups_over(below) * kGroup; ++i) {
+      Group& group = groups_[level_begin_[level] + i / kGroup];
+      for (int k = 0; k < 3; ++k) {
+        double &lo = group.lo[k][i % kGroup], &hi = group.hi[k][i % kGroup];
+        lo = kInfinity;
+        hi = -kInfinity;
+        if (i >= below) continue;
+        if (level == 0) {
+          lo = boxes[items_[i].box].lo[k];
+          hi = boxes[items_[i].box].hi[k];
+          continue;
+        }
+        const Group& child = groups_[level_begin_[level - 1] + i];
+        for (int c = 0; c < kGroup; ++c) {
+          lo = child.lo[k][c] < lo ? child.lo[k][c] : lo;
+          hi = child.hi[k][c] > hi ? child.hi[k][c] : hi;
+        }
+      }
+    }
+  }
+  return true;
+}
+
+// Bit 4 i + j: box i of a meets box j of b.
+std::uint32_t BroadPhase::meeting(const Group& a, const Group& b) {
   std::uint32_t mask = 0;
-  for (int i = 0; i < kNodesPerBlock; ++i) {
-    std::uint32_t hit[kNodesPerBlock] = {1, 1, 1, 1};
+  for (int i = 0; i < kGroup; ++i) {
+    std::uint32_t hit[kGroup] = {1, 1, 1, 1};
     for (int k = 0; k < 3; ++k) {
-      for (int j = 0; j < kNodesPerBlock; ++j) {
-        const float distance = std::fabs(a.center[k][i] - b.center[k][j]);
-        hit[j] &= static_cast<std::uint32_t>(distance <= a.half_extent[k][i] + b.half_extent[k][j]);
+      for (int j = 0; j < kGroup; ++j) {
+        hit[j] &= static_cast<std::uint32_t>(a.lo[k][i] <= b.hi[k][j]) &
+                  static_cast<std::uint32_t>(b.lo[k][j] <= a.hi[k][i]);
       }
     }
     mask |= (hit[0] | hit[1] << 1 | hit[2] << 2 | hit[3] << 3) << 4 * i;
@@ -67,109 +104,37 @@ std::uint32_t aligned_mask(const Block& a, const Block& b) {
   return mask;
 }
 
-}  // namespace
-
-bool BroadPhase::reserve(std::uint32_t boxes) {
-  std::uint32_t blocks = 0;
-  for (std::uint32_t level = boxes; blocks == 0 || level > 1; blocks += level) level = blocks_over(level);
-  bool enough = keys_.resize(boxes) && scratch_.resize(boxes) && blocks_.resize(blocks);
-  for (Buffer<float>& ends : ends_) enough = enough && ends.resize(boxes);
-  return enough;
-}
-
-// Monotone, so that boxes which meet still do.
-float BroadPhase::normalise(double x, int axis) const {
-  return static_cast<float>((x - origin_[axis]) * scale_);
-}
-
-void BroadPhase::sort_along_curve(std::span<const WorldBox> boxes) {
-  for (std::uint32_t b = 0; b < boxes.size(); ++b) {
-    std::uint32_t curve = 0;
-    for (int k = 0; k < 3; ++k) {
-      const float center = 0.5f * (normalise(boxes[b].lo[k], k) + normalise(boxes[b].hi[k], k));
-      const auto cell = static_cast<std::uint32_t>(center * static_cast<float>(kCells));
-      curve |= spread(std::min(cell, kCells - 1)) << k;
-    }
-    keys_[b] = {curve, b};
-  }
-  for (int shift = 0; shift < 3 * kCurveBits; shift += kCurveBits) {  // radix sort: stable, least digit first
-    std::uint32_t start[kCells] = {};
-    const auto digit = [&](const Key& key) { return key.curve >> shift & (kCells - 1); };
-    for (const Key& key : keys_.view()) ++start[digit(key)];
-    std::uint32_t sum = 0;
-    for (std::uint32_t& s : start) sum += std::exchange(s, sum);
-    for (const Key& key : keys_.view()) scratch_[start[digit(key)]++] = key;
-    std::swap(keys_, scratch_);
-  }
-  for (std::uint32_t i = 0; i < boxes.size(); ++i) {
-    for (int k = 0; k < 3; ++k) {
-      ends_[k][i] = normalise(boxes[keys_[i].box].lo[k], k);
-      ends_[3 + k][i] = normalise(boxes[keys_[i].box].hi[k], k);
-    }
-  }
-}
-
-Box BroadPhase::box_of_leaf(std::uint32_t leaf) const {
-  Box box;
-  for (int k = 0; k < 3; ++k) {
-    box.center[k] = 0.5f * (ends_[k][leaf] + ends_[3 + k][leaf]);
-    box.half_extent[k] = 0.5f * (ends_[3 + k][leaf] - ends_[k][leaf]) + kMargin;
-  }
-  return box;
-}
-
-// Writes blocks [begin, begin + blocks_over(children)): node by node the children, which are leaves or blocks
-// from first_child on.
-void BroadPhase::build_level(std::uint32_t begin, std::uint32_t children, std::uint32_t first_child,
-                             NodeKind kind) {
-  for (std::uint32_t child = 0; child < blocks_over(children) * kNodesPerBlock; ++child) {
-    Block& block = blocks_[begin + child / kNodesPerBlock];
-    const int node = static_cast<int>(child % kNodesPerBlock);
-    if (child >= children) {
-      set_imaginary(block, node);
-    } else if (kind == NodeKind::leaf) {
-      set_node(block, node, box_of_leaf(child), child, kind);
-    } else {
-      set_node(block, node, box_above(blocks_[first_child + child]), first_child + child, kind);
-    }
-  }
-}
-
-// A complete tree over the sorted boxes, from the leaf blocks, which lie last, up to the root, block 0.
-void BroadPhase::build_tree() {
-  auto children = static_cast<std::uint32_t>(keys_.size());
-  auto begin = static_cast<std::uint32_t>(blocks_.size());
-  std::uint32_t first_child = 0;
-  for (NodeKind kind = NodeKind::leaf; begin > 0; kind = NodeKind::internal) {
-    begin -= blocks_over(children);
-    build_level(begin, children, first_child, kind);
-    first_child = begin;
-    children = blocks_over(children);
-  }
-}
-
-// A traversal of the tree against itself. What it leads to is decided by the boxes as they were given.
-bool BroadPhase::collect(std::span<const WorldBox> boxes) {
-  LevelView tree;
-  tree.blocks = blocks_.data();
-  tree.block_count = static_cast<std::uint32_t>(blocks_.size());
-  const auto test = [](const Block& a, const Block& b) {
-    const std::uint32_t mask = aligned_mask(a, b);
-    if (&a != &b) return mask;
-    return mask & (a.is_leaf_block() ? kUpper : kUpperWithDiagonal);
+// The tree against itself. Both groups of a pair are on one level, and each pair taken off puts at most 16 of
+// the level below on, of which at most 15 wait while the last one's are worked on: 15 for each level above
+// the leaves, and one.
+bool BroadPhase::collect() {
+  struct GroupPair {
+    std::uint32_t a, b;  // within their level; a <= b
+    int level;
   };
-  bool enough = true;
+  GroupPair stack[15 * std::size(level_begin_) + 1];
+  std::size_t height = 0;
+  stack[height++] = {0, 0, levels_ - 1};
   found_.clear();
-  traverse(tree, tree, test, [&](const Block& leaves_a, const Block& leaves_b, std::uint32_t mask) {
+  group_pairs_ = 0;
+  while (height > 0) {
+    const GroupPair pair = stack[--height];
+    const std::size_t begin = level_begin_[pair.level];
+    std::uint32_t mask = meeting(groups_[begin + pair.a], groups_[begin + pair.b]);
+    if (pair.a == pair.b) mask &= pair.level == 0 ? kNodePairsAbove : kNodePairsAbove | kNodePairsEqual;
+    ++group_pairs_;
     for (; mask != 0; mask &= mask - 1) {
-      const int bit = lowest_bit(mask);
-      const std::uint32_t a = keys_[leaves_a.index[bit / 4]].box;
-      const std::uint32_t b = keys_[leaves_b.index[bit % 4]].box;
-      if (overlap(boxes[a], boxes[b])) enough = enough && found_.push({std::min(a, b), std::max(a, b)});
+      const auto bit = static_cast<std::uint32_t>(lowest_bit(mask));
+      const std::uint32_t a = pair.a * kGroup + bit / 4, b = pair.b * kGroup + bit % 4;
+      if (pair.level > 0) {
+        stack[height++] = {a, b, pair.level - 1};
+      } else if (!found_.push(
+                     {std::min(items_[a].box, items_[b].box), std::max(items_[a].box, items_[b].box)})) {
+        return false;
+      }
     }
-    return enough;
-  });
-  return enough && found_.size() < kNoIndex;
+  }
+  return true;
 }
 
 // Counting sort by a; the few pairs of each a are then sorted by b.
@@ -189,26 +154,15 @@ bool BroadPhase::sort_pairs(std::size_t boxes) {
 
 Status BroadPhase::find_pairs(std::span<const WorldBox> boxes) {
   pairs_.clear();
-  if (boxes.size() >= kNoIndex) return Status::kOutOfRange;
-  double longest = 0;
+  group_pairs_ = 0;
+  if (boxes.size() >= kNoIndex) return Status::kTooManyInstances;
   for (const WorldBox& box : boxes) {
     if (!in_range(box)) return Status::kOutOfRange;
   }
-  for (int k = 0; k < 3; ++k) {
-    double lo = std::numeric_limits<double>::infinity(), hi = -lo;
-    for (const WorldBox& box : boxes) {
-      lo = std::min(lo, box.lo[k]);
-      hi = std::max(hi, box.hi[k]);
-    }
-    origin_[k] = lo;
-    longest = std::max(longest, hi - lo);
-  }
   if (boxes.size() < 2) return Status::kOk;
-  scale_ = longest > 1e-300 ? 1 / longest : 0;  // in a scene that small every box may meet every other
-  if (!reserve(static_cast<std::uint32_t>(boxes.size()))) return Status::kOutOfMemory;
-  sort_along_curve(boxes);
-  build_tree();
-  return collect(boxes) && sort_pairs(boxes.size()) ? Status::kOk : Status::kOutOfMemory;
+  if (!build(boxes) || !collect()) return Status::kOutOfMemory;
+  if (found_.size() >= kNoIndex) return Status::kTooManyPairs;
+  return sort_pairs(boxes.size()) ? Status::kOk : Status::kOutOfMemory;
 }
 
 }  // namespace tandem

@@ -12,10 +12,8 @@
 namespace tandem {
 namespace {
 
-constexpr std::uint32_t kMostThreads = 1024;
-
-// Object pairs that a thread takes at a time.
-constexpr std::uint32_t kPairsPerChunk = 16;
+// Object pairs that a thread takes at a time, where there are enough for every thread to come back often.
+constexpr std::size_t kMostPairsInChunk = 16, kChunksForEach = 8;
 
 struct Asset {
   LevelView tree;
@@ -79,7 +77,9 @@ struct ContactQuery::State {
   QueryOptions options;
   WorkerThreads threads;
   std::unique_ptr<Worker[]> workers;
-  std::uint32_t worker_count = 0;
+  std::uint32_t worker_count = 0;    // that there are
+  std::uint32_t active_workers = 0;  // in this call
+  std::size_t pairs_in_chunk = 1;
   Buffer<ChunkResult> chunks;
   std::atomic<std::uint32_t> next_chunk;
 
@@ -107,7 +107,7 @@ struct ContactQuery::State {
 
 // Poses of stored coordinates, and world boxes.
 Status ContactQuery::State::pose_instances(std::span<const Instance> posed) {
-  if (posed.size() >= kNoIndex) return fail(Status::kOutOfRange, kNoIndex);
+  if (posed.size() >= kNoIndex) return fail(Status::kTooManyInstances, 0);
   if (!instances.resize(posed.size()) || !boxes.resize(posed.size())) return fail(Status::kOutOfMemory, 0);
   for (std::size_t i = 0; i < posed.size(); ++i) {
     if (posed[i].asset >= assets.size()) return fail(Status::kUnknownAsset, i);
@@ -146,11 +146,15 @@ Status ContactQuery::State::take_pairs(std::span<const ObjectPair> given) {
   return Status::kOk;
 }
 
+// As many as asked for, but no more than there are chunks. Those that there are stay.
 bool ContactQuery::State::provide_workers() {
-  const std::uint32_t wanted = std::clamp(options.threads, 1u, kMostThreads);
-  if (wanted == worker_count) return true;
-  workers.reset(new (std::nothrow) Worker[wanted]);
-  worker_count = workers != nullptr ? wanted : 0;
+  const std::size_t wanted = std::clamp(options.threads, 1u, kMostQueryThreads);
+  pairs_in_chunk = std::clamp(pairs.size() / (kChunksForEach * wanted), std::size_t{1}, kMostPairsInChunk);
+  if (!chunks.resize((pairs.size() + pairs_in_chunk - 1) / pairs_in_chunk)) return false;
+  active_workers = static_cast<std::uint32_t>(std::clamp(chunks.size(), std::size_t{1}, wanted));
+  if (active_workers <= worker_count) return true;
+  workers.reset(new (std::nothrow) Worker[active_workers]);
+  worker_count = workers != nullptr ? active_workers : 0;
   return workers != nullptr;
 }
 
@@ -181,8 +185,8 @@ void ContactQuery::State::work(std::uint32_t worker) {
   for (;;) {
     const std::uint32_t chunk = next_chunk.fetch_add(1, std::memory_order_relaxed);
     if (chunk >= chunks.size() || !self.enough_memory) break;
-    const std::size_t begin = used(), first = static_cast<std::size_t>(chunk) * kPairsPerChunk;
-    const std::size_t end = std::min(pairs.size(), first + kPairsPerChunk);
+    const std::size_t begin = used(), first = chunk * pairs_in_chunk;
+    const std::size_t end = std::min(pairs.size(), first + pairs_in_chunk);
     for (std::size_t pair = first; pair < end && self.enough_memory; ++pair) {
       const PairTask task = task_of(static_cast<std::uint32_t>(pair));
       self.enough_memory = (task.in_frame ? narrow_phase : narrow_phase_by_world_boxes)(task, sink);
@@ -198,12 +202,12 @@ Status ContactQuery::State::collect() {
   std::size_t total = 0;
   counters = {};
   counters.object_pairs = pairs.size();
-  for (std::uint32_t i = 0; i < worker_count; ++i) {
+  for (std::uint32_t i = 0; i < active_workers; ++i) {
     if (!workers[i].enough_memory) return fail(Status::kOutOfMemory, 0);
     add_to(counters, workers[i].counters);
     total += workers[i].contacts.size();
   }
-  if (worker_count == 1) {
+  if (active_workers == 1) {
     std::swap(contacts, workers[0].contacts);
     return Status::kOk;
   }
@@ -215,7 +219,7 @@ Status ContactQuery::State::collect() {
   }
   // Which worker takes which chunk is chance: so that no call of the same scene allocates, there is room for
   // all in each.
-  for (std::uint32_t i = 0; i < worker_count; ++i) {
+  for (std::uint32_t i = 0; i < active_workers; ++i) {
     if (!workers[i].contacts.resize(total)) break;  // then it will grow when it has to
   }
   return Status::kOk;
@@ -224,11 +228,9 @@ Status ContactQuery::State::collect() {
 Status ContactQuery::State::find_contacts_of_pairs() {
   if (pairs.size() >= kNoIndex) return fail(Status::kOutOfRange, 0);
   if (!provide_workers()) return fail(Status::kOutOfMemory, 0);
-  if (!chunks.resize((pairs.size() + kPairsPerChunk - 1) / kPairsPerChunk))
-    return fail(Status::kOutOfMemory, 0);
   next_chunk.store(0, std::memory_order_relaxed);
   const auto work = [](void* state, std::uint32_t worker) { static_cast<State*>(state)->work(worker); };
-  if (!threads.run(worker_count, work, this)) return fail(Status::kCannotStartThread, 0);
+  if (!threads.run(active_workers, work, this)) return fail(Status::kCannotStartThread, 0);
   return collect();
 }
 
@@ -238,7 +240,14 @@ ContactQuery& ContactQuery::operator=(ContactQuery&&) noexcept = default;
 ContactQuery::~ContactQuery() = default;
 
 Status ContactQuery::set_assets(std::span<const AssetView> assets) {
-  if (state_ == nullptr || !state_->assets.resize(assets.size())) return Status::kOutOfMemory;
+  if (state_ == nullptr) return Status::kOutOfMemory;
+  state_->forget_results();
+  state_->assets.clear();
+  for (std::size_t i = 0; i < assets.size(); ++i) {
+    if (assets[i].header == nullptr || assets[i].levels.empty())
+      return state_->fail(Status::kUnknownAsset, i);
+  }
+  if (!state_->assets.resize(assets.size())) return Status::kOutOfMemory;
   for (std::size_t i = 0; i < assets.size(); ++i) {
     Asset& asset = state_->assets[i];
     asset.tree = assets[i].level();
@@ -253,11 +262,16 @@ Status ContactQuery::set_assets(std::span<const AssetView> assets) {
   return Status::kOk;
 }
 
-Status ContactQuery::find_contacts(std::span<const Instance> instances, const QueryOptions& options) {
+Status ContactQuery::find_pairs(std::span<const Instance> instances, const QueryOptions& options) {
   if (state_ == nullptr) return Status::kOutOfMemory;
+  state_->forget_results();
   state_->options = options;
-  Status status = state_->pose_instances(instances);
-  if (status == Status::kOk) status = state_->find_pairs();
+  const Status status = state_->pose_instances(instances);
+  return status == Status::kOk ? state_->find_pairs() : status;
+}
+
+Status ContactQuery::find_contacts(std::span<const Instance> instances, const QueryOptions& options) {
+  const Status status = find_pairs(instances, options);
   return status == Status::kOk ? state_->find_contacts_of_pairs() : status;
 }
 

@@ -185,7 +185,7 @@ NarrowPhase narrow_phase(BlockPairVariant variant) {
 #ifdef TANDEM_HAVE_LANES
     case BlockPairVariant::lanes4:
       return narrow_phase_lanes4;
-#ifdef __x86_64__
+#ifdef TANDEM_X86_LANES
     case BlockPairVariant::avx2:
       return narrow_phase_avx2;
     case BlockPairVariant::avx512:

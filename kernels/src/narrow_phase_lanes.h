@@ -185,13 +185,16 @@ class CompressingStack {
 };
 #endif
 
+/// A stack of this machine's own, so that what is made of it is too.
+class LocalStack : public BlockPairStack {};
+
 template <int kCount>
 class LaneMeans {
  public:
 #if defined(__AVX512F__)
   using Stack = CompressingStack;
 #else
-  using Stack = BlockPairStack;
+  using Stack = LocalStack;
 #endif
 
   explicit LaneMeans(const PairTask& task) : task_(task) {}

@@ -41,9 +41,6 @@ constexpr std::uint32_t column(std::uint32_t four, int j) {
   return ((four & 1u) | (four & 2u) << 3 | (four & 4u) << 6 | (four & 8u) << 9) << j;
 }
 
-/// Node pairs of a block with itself: each once, and no leaf with itself.
-inline constexpr std::uint32_t kUpperWithDiagonal = 0x8CEFu, kUpper = 0x08CEu;
-
 /// The means of a variant are made of a task and bring: Stack; test(a, b), see block_pair_mask();
 /// drop_beyond_planes(a, b, hits), of a leaf block and an internal one: less the hits of nodes that lie
 /// beyond the plane of the triangle, see frame::beyond(); append(candidates, a, b, hits); decide(candidates),
@@ -57,7 +54,7 @@ class PairWalk {
     const auto test = [this](const Block& a, const Block& b) -> std::uint32_t {
       const std::uint32_t hits = means_.test(a, b);
       if (!task_.self || &a != &b) return hits;
-      return hits & (a.is_leaf_block() ? kUpper : kUpperWithDiagonal);
+      return hits & (a.is_leaf_block() ? kNodePairsAbove : kNodePairsAbove | kNodePairsEqual);
     };
     const auto on_leaves = [this](const Block& a, const Block& b, std::uint32_t hits) {
       means_.append(candidates_, a, b, hits);
@@ -93,14 +90,18 @@ class PairWalk {
       verdicts.contact &= given;
       verdicts.undecided &= given;
     }
-    counters.candidates += count;
-    if (task_.mode != QueryMode::boxes)
-      counters.decided_by_float32 += count - static_cast<std::uint32_t>(std::popcount(verdicts.undecided));
+    std::uint32_t considered = given;
     for (std::uint32_t open = verdicts.contact | verdicts.undecided; open != 0 && !done_; open &= open - 1) {
       const int i = lowest_bit(open);
       const std::uint32_t a = candidates_.a[i], b = candidates_.b[i];
       if ((verdicts.undecided >> i & 1u) != 0 && !meet(task_, a, b, counters)) continue;
       add(a, b);
+      if (done_) considered = (2u << i) - 1;  // what comes after the first contact does not count
+    }
+    counters.candidates += static_cast<std::uint32_t>(std::popcount(considered));
+    if (task_.mode != QueryMode::boxes) {
+      counters.decided_by_float32 +=
+          static_cast<std::uint32_t>(std::popcount(considered & ~verdicts.undecided));
     }
     if (candidates_.count > kBatch)
       candidates_.drop_batch();

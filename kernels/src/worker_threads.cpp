@@ -6,18 +6,18 @@
 namespace tandem {
 
 bool WorkerThreads::run(std::uint32_t workers, Work work, void* context) {
-  const std::uint32_t others = workers - 1;
-  if (others != thread_count_ && !start(others)) return false;
-  if (others > 0) {
+  if (workers > thread_count_ + 1 && !start(workers - 1)) return false;
+  if (workers > 1) {
     const std::lock_guard lock(mutex_);
     work_ = work;
     context_ = context;
-    working_ = others;
+    workers_ = workers;
+    working_ = workers - 1;
     ++round_;
     work_came_.notify_all();
   }
   work(context, 0);
-  if (others > 0) {
+  if (workers > 1) {
     std::unique_lock lock(mutex_);
     work_done_.wait(lock, [this] { return working_ == 0; });
   }
@@ -26,7 +26,6 @@ bool WorkerThreads::run(std::uint32_t workers, Work work, void* context) {
 
 bool WorkerThreads::start(std::uint32_t threads) {
   stop();
-  if (threads == 0) return true;
   threads_.reset(new (std::nothrow) std::thread[threads]);
   if (threads_ == nullptr) return false;
   stopping_ = false;
@@ -62,6 +61,7 @@ void WorkerThreads::wait_for_work(std::uint32_t worker) {
     work_came_.wait(lock, [&] { return stopping_ || round_ > seen; });
     if (stopping_) return;
     seen = round_;
+    if (worker >= workers_) continue;
     lock.unlock();
     work_(context_, worker);
     lock.lock();

@@ -7,7 +7,7 @@
 
 namespace tandem {
 
-/// Threads that wait for work, kept from call to call. Throws nothing.
+/// Threads that wait for work, kept from call to call: as many as were ever asked for. Throws nothing.
 class WorkerThreads {
  public:
   using Work = void (*)(void* context, std::uint32_t worker);
@@ -33,7 +33,8 @@ class WorkerThreads {
   std::condition_variable work_came_, work_done_;
   Work work_ = nullptr;
   void* context_ = nullptr;
-  std::uint64_t round_ = 0;  // of work; a worker that has seen less has work to do
+  std::uint64_t round_ = 0;    // of work; a worker that has seen less has work to do
+  std::uint32_t workers_ = 0;  // of this round, the caller's thread included
   std::uint32_t working_ = 0;
   bool stopping_ = false;
 };

@@ -163,5 +163,42 @@ TEST(PoseOf, IsRigidOnlyIfItsRotationIs) {
   EXPECT_FALSE(is_rigid(lost));
 }
 
+// Work counted, not timed: what is far away, or very large, or much denser than the rest, must not spoil the
+// order of all others.
+TEST(BroadPhase, WorkDoesNotDependOnOutliers) {
+  constexpr std::size_t kCount = 20'000;
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> uniform(0, 29);
+  std::vector<WorldBox> boxes(kCount);
+  for (WorldBox& box : boxes) {
+    for (int k = 0; k < 3; ++k) {
+      box.lo[k] = uniform(random);
+      box.hi[k] = box.lo[k] + 1;
+    }
+  }
+  BroadPhase broad_phase;
+  ASSERT_EQ(broad_phase.find_pairs(boxes), Status::kOk);
+  const std::uint64_t usual = broad_phase.group_pairs();
+  EXPECT_LT(usual, 20 * kCount);
+  for (const double far : {1e6, 1e12, 1e299}) {
+    std::vector<WorldBox> with_outlier = boxes;
+    for (int k = 0; k < 3; ++k) with_outlier[7].lo[k] = with_outlier[7].hi[k] = far;
+    ASSERT_EQ(broad_phase.find_pairs(with_outlier), Status::kOk);
+    EXPECT_LT(broad_phase.group_pairs(), usual + usual / 2) << far;
+    std::vector<WorldBox> two_places = boxes;
+    for (std::size_t b = 0; b < kCount; b += 2) {
+      two_places[b].lo[0] += far;
+      two_places[b].hi[0] += far;
+    }
+    if (far > 1e15) continue;  // there, boxes of size 1 are points in one place
+    ASSERT_EQ(broad_phase.find_pairs(two_places), Status::kOk);
+    EXPECT_LT(broad_phase.group_pairs(), usual + usual / 2) << far;
+  }
+  std::vector<WorldBox> with_ground = boxes;
+  with_ground[7] = {{-1e9, -1e9, -1e9}, {1e9, 1e9, 1e9}};
+  ASSERT_EQ(broad_phase.find_pairs(with_ground), Status::kOk);
+  EXPECT_LT(broad_phase.group_pairs(), 2 * usual);
+}
+
 }  // namespace
 }  // namespace tandem

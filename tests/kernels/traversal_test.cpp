@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <utility>
 
@@ -145,6 +146,50 @@ TEST(Traversal, TheStackHoldsTheDeepestTrees) {
     return true;
   });
   EXPECT_EQ(leaf_pairs, tree.triangles.size() * tree.triangles.size());
+}
+
+/// Records how high it ever was.
+class RecordingStack : public BlockPairStack {
+ public:
+  static inline std::uint32_t highest = 0;
+
+  BlockPair pop() {
+    --height_;
+    return BlockPairStack::pop();
+  }
+  void push(const BlockPair& pair) {
+    highest = std::max(highest, ++height_);
+    ASSERT_LE(height_, kTraversalStackSize);
+    BlockPairStack::push(pair);
+  }
+  void push_children(const Block& a, const Block& b, std::uint32_t hits) {
+    for (; hits != 0; hits &= hits - 1) {
+      const int bit = lowest_bit(hits);
+      push({a.index[bit / 4], b.index[bit % 4], kAllNodePairs});
+    }
+  }
+
+ private:
+  std::uint32_t height_ = 0;
+};
+
+// All children of a block are one block: no tree, but as deep, and full everywhere.
+TEST(Traversal, TheStackHoldsWhatFullTreesOfTheGreatestDepthPutOn) {
+  std::vector<Block> blocks(kMaxDepth);
+  for (std::uint32_t level = 0; level < kMaxDepth; ++level) {
+    const NodeKind kind = level + 1 < kMaxDepth ? NodeKind::internal : NodeKind::leaf;
+    for (int i = 0; i < kNodesPerBlock; ++i) {
+      set_node(blocks[level], i, {{0, 0, 0}, {1, 1, 1}}, kind == NodeKind::internal ? level + 1 : 0, kind);
+    }
+  }
+  LevelView view;
+  view.blocks = blocks.data();
+  view.block_count = kMaxDepth;
+  RecordingStack::highest = 0;
+  const auto stop = [](const Block&, const Block&, std::uint32_t) { return false; };
+  traverse<RecordingStack>(view, view, aligned_mask, stop);
+  EXPECT_GT(RecordingStack::highest, 63u * 15u * 3u);
+  EXPECT_LE(RecordingStack::highest, kTraversalStackSize);
 }
 
 }  // namespace

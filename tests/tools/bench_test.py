@@ -191,7 +191,8 @@ class Scenes(BenchTest):
         self.assert_fails(drop_hint(self.bench("scene", "heap")), USAGE)
         sheet = self.mesh_of("sheet", SHEET_OBJ)
         for kind, words, told in (("stack", ["--count", "1001"], "1000"), ("stack", ["--count", "0"], "--count"),
-                                  ("stack", ["--jitter", "nan"], "--jitter"), ("stack", ["--seed", "-1"], "--seed"),
+                                  ("stack", ["--jitter", "nan"], "--jitter"),
+                                  ("stack", ["--exact", "--jitter", "0.1"], "--exact"), ("stack", ["--seed", "-1"], "--seed"),
                                   ("stack", ["--offset", "1", "2"], "--offset"),
                                   ("stack", ["--offset", "1", "2", "inf"], "--offset"),
                                   ("pile", ["--neighbours", "0"], "--neighbours"),
@@ -202,6 +203,14 @@ class Scenes(BenchTest):
                 result = self.bench("scene", kind, "--mesh", self.mesh, "-o", self.scene, *words)
                 self.assert_fails(drop_hint(result), USAGE, told)
         self.assert_nothing_written()
+
+    def test_a_mesh_is_not_overwritten_by_its_scene(self):
+        with open(self.mesh, "rb") as file:
+            before = file.read()
+        result = self.bench("scene", "pile", "--mesh", self.mesh, "-o", self.mesh)
+        self.assert_fails(result, USAGE, "would be overwritten")
+        with open(self.mesh, "rb") as file:
+            self.assertEqual(file.read(), before)
 
     def test_a_mesh_that_cannot_be_read_is_named(self):
         for path, told in ((self.inputs / "none.bvh", "no such file"), (self.write("cube.obj", CUBE_OBJ), "not a Tandem")):

@@ -1,5 +1,7 @@
 #include "command.h"
 
+#include <filesystem>
+
 namespace tandem::bench {
 
 CLI::Validator between(double lower, double upper) {
@@ -10,6 +12,15 @@ CLI::Validator between(double lower, double upper) {
            CLI::detail::to_string(upper);
   };
   return CLI::Validator(defect, "");
+}
+
+void keep_inputs(const std::string& output, const std::vector<std::string>& inputs) {
+  for (const std::string& input : inputs) {
+    std::error_code missing;  // then nothing can be overwritten
+    if (std::filesystem::equivalent(output, input, missing)) {
+      throw UsageError(output + ": would be overwritten, and is read too");
+    }
+  }
 }
 
 CLI::Validator file_name() {

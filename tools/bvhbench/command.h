@@ -4,6 +4,7 @@
 #include <map>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "exit_code.h"
 
@@ -28,6 +29,9 @@ CLI::Option* add_choice(CLI::App& app, const char* flag, const std::map<std::str
 
 /// Refuses what is no number from lower to upper, NaN included.
 CLI::Validator between(double lower, double upper);
+
+/// Throws UsageError where writing `output` would overwrite one of the inputs.
+void keep_inputs(const std::string& output, const std::vector<std::string>& inputs);
 
 /// Refuses an empty name.
 CLI::Validator file_name();

@@ -54,6 +54,7 @@ void check_names(const std::vector<std::string>& scenes) {
 
 ExitCode run_compare(const CompareArguments& arguments) {
   check_names(arguments.scenes);
+  if (!arguments.out.empty()) keep_inputs(arguments.out, arguments.scenes);
   const char* commit = std::getenv("TANDEM_COMMIT");
   CompareResults results = {processor(), commit == nullptr ? "" : commit, arguments.repeats, {}};
   for (const std::string& scene : arguments.scenes) {
@@ -71,15 +72,16 @@ ExitCode run_compare(const CompareArguments& arguments) {
 
 CLI::App* add_compare(CLI::App& app, Run& run) {
   CLI::App* command =
-      app.add_subcommand("compare", "Runs scenes through Tandem and other libraries, side by side");
+      app.add_subcommand("compare", "run scenes through Tandem and other libraries, side by side");
   const auto arguments = std::make_shared<CompareArguments>();
   command->add_option("SCENE", arguments->scenes, "scene files, .h5")->required()->check(file_name());
-  command->add_option("--peers", arguments->engines, "engines, all unless given: " + join(engines()))
+  command->add_option("--peers", arguments->engines, "engines, all unless given")
       ->delimiter(',')
-      ->check(CLI::IsMember(engines()));
+      ->check(CLI::IsMember(engines()))
+      ->option_text(join(engines()));
   command->add_option("--repeat", arguments->repeats, "timed queries of each")
       ->check(CLI::Range(1u, 100000u))
-      ->capture_default_str();
+      ->option_text("N [5]");
   command->add_option("--out", arguments->out, "write the results here, as HDF5")->check(file_name());
   command->add_flag("--json", arguments->json, "print JSON");
   command->footer("Times are of one thread. docs/comparison.md says what is compared, and how.");

@@ -44,6 +44,7 @@ std::string seen_from(const std::string& scene, const std::string& mesh) {
 }
 
 ExitCode run(const SceneArguments& arguments, const Maker& make) {
+  keep_inputs(arguments.output, {arguments.mesh, arguments.ground});
   std::vector<MappedAsset> meshes;
   Assets assets;
   SceneDescription scene;
@@ -123,7 +124,8 @@ CLI::App* add_scene(CLI::App& app, Run& run_later) {
   stack->add_option("--jitter", arguments->jitter, "how far boxes are moved at most, in box lengths")
       ->check(between(0, 0.5))
       ->option_text("J [0.001]");
-  stack->add_flag("--exact", arguments->exact, "faces coincide exactly");
+  stack->add_flag("--exact", arguments->exact, "faces coincide exactly")
+      ->excludes(stack->get_option("--jitter"));
 
   CLI::App* pile = add("pile", "bodies at random rotations, close together", 1000,
                        [](const auto& a, const Assets& assets) {

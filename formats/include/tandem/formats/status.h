@@ -57,10 +57,12 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kBadFace,         ///< source face or part out of range, or a reserved lane set
     kBoundsMismatch,  ///< the header's bounds are not those of the triangles
     // Querying.
-    kOutOfRange,       ///< a coordinate that is NaN or larger than the query can take
-    kUnknownAsset,     ///< an instance of an asset that the query was not given
-    kUnknownInstance,  ///< an object pair that names an instance there is none of
-    kPoseNotRigid,     ///< not a rotation and a translation, to kRigidTolerance
+    kOutOfRange,        ///< a coordinate that is NaN or larger than the query can take
+    kUnknownAsset,      ///< an instance of an asset that the query was not given
+    kUnknownInstance,   ///< an object pair that names an instance there is none of
+    kPoseNotRigid,      ///< not a rotation and a translation, to kRigidTolerance
+    kTooManyInstances,  ///< 2^32 - 1 or more
+    kTooManyPairs,      ///< 2^32 - 1 object pairs or more
     kCannotStartThread,
     // Uploading.
     kCudaFailed,

@@ -2,7 +2,6 @@
 #include <cstdint>
 #include <span>
 
-#include "tandem/formats/box.h"
 #include "tandem/formats/status.h"
 #include "tandem/kernels/buffer.h"
 #include "tandem/kernels/world_box.h"
@@ -17,38 +16,48 @@ struct ObjectPair {
 /// Finds all pairs of world boxes that meet. Keeps its memory from call to call: in a steady state nothing is
 /// allocated. Throws nothing. One thread.
 ///
-/// Boxes are sorted along a space-filling curve and grouped by four into a blocked tree, level by level,
-/// which is then traversed in tandem with itself. Nothing is assumed of sizes or distribution; O(n log n) for
-/// boxes of bounded overlap.
+/// Boxes are split into four again and again, at medians along the longest extent, which makes a complete
+/// tree of groups of four; it is traversed in tandem with itself. O(n log n) for boxes of bounded overlap,
+/// whatever their distribution: one that is far from all others costs no more than the rest. All in float64,
+/// so that the tree's answer is exact.
 class BroadPhase {
  public:
-  /// Result: kOk; kOutOfMemory; kOutOfRange where a coordinate is NaN or beyond 1e300, or the boxes are 2^32
-  /// - 1 or more. The pairs are those whose float64 boxes meet, touching included, no more and no fewer,
-  /// sorted by a, then b.
+  /// Result: kOk; kOutOfMemory; kOutOfRange where a coordinate is NaN or beyond kLargestWorldCoordinate;
+  /// kTooManyInstances, kTooManyPairs: 2^32 - 1 boxes or pairs, or more. The pairs are those whose boxes
+  /// meet, touching included, no more and no fewer, sorted by a, then b.
   Status find_pairs(std::span<const WorldBox> boxes);
 
   /// Of the last call that returned kOk; valid until the next call.
   std::span<const ObjectPair> pairs() const { return pairs_.view(); }
 
+  /// Pairs of groups that the last call looked at: the work that it did, without time.
+  std::uint64_t group_pairs() const { return group_pairs_; }
+
  private:
-  struct Key {
-    std::uint32_t curve;  // position on the space-filling curve
+  static constexpr int kGroup = 4;
+
+  /// A box on its way to its place in the tree.
+  struct Item {
+    double center[3];
     std::uint32_t box;
   };
 
-  bool reserve(std::uint32_t boxes);
-  float normalise(double x, int axis) const;
-  void sort_along_curve(std::span<const WorldBox> boxes);
-  Box box_of_leaf(std::uint32_t leaf) const;
-  void build_level(std::uint32_t begin, std::uint32_t children, std::uint32_t first_child, NodeKind kind);
-  void build_tree();
-  bool collect(std::span<const WorldBox> boxes);
+  /// Four boxes, or the boxes of four groups; where there are fewer, of empty ones, [inf, -inf].
+  struct alignas(64) Group {
+    double lo[3][kGroup], hi[3][kGroup];
+  };
+
+  static void split(Item* items, std::size_t count, std::size_t unit, std::size_t units);
+  static std::uint32_t meeting(const Group& a, const Group& b);
+  bool build(std::span<const WorldBox> boxes);
+  bool collect();
   bool sort_pairs(std::size_t boxes);
 
-  double origin_[3] = {}, scale_ = 0;  // of normalise()
-  Buffer<float> ends_[6];  // of each box in the order of the curve: lo x y z, hi x y z, normalised
-  Buffer<Key> keys_, scratch_;
-  Buffer<Block> blocks_;
+  Buffer<Item> items_;                // in the order of the tree
+  Buffer<Group> groups_;              // level by level from the leaves
+  std::size_t level_begin_[17] = {};  // where each level of groups begins
+  int levels_ = 0;
+  std::uint64_t group_pairs_ = 0;
   Buffer<ObjectPair> found_, pairs_;
   Buffer<std::uint32_t> first_;  // of each box, where its pairs begin
 };

@@ -24,10 +24,11 @@ class Buffer {
   }
   ~Buffer() { std::free(data_); }
 
-  /// Makes room for `size` elements and forgets what was in it, unless there was room. False: out of memory,
-  /// nothing changed.
+  /// Makes room for `size` elements and forgets what was in it, unless there was room; grows by half at
+  /// least. False: out of memory, nothing changed.
   [[nodiscard]] bool resize(std::size_t size) {
-    if (size > capacity_ && !reallocate(size, 0)) return false;
+    const std::size_t grown = capacity_ + capacity_ / 2;
+    if (size > capacity_ && !reallocate(size > grown ? size : grown, 0)) return false;
     size_ = size;
     return true;
   }

@@ -32,11 +32,13 @@ struct Contact {
   friend bool operator==(const Contact&, const Contact&) = default;
 };
 
+inline constexpr std::uint32_t kMostQueryThreads = 1024;
+
 struct QueryOptions {
   QueryMode mode = QueryMode::exact;
   bool first_contact_only = false;  ///< at most one contact for each object pair: do they touch?
   bool self_pairs = false;          ///< also each instance with itself, where the query finds the pairs
-  std::uint32_t threads = 1;        ///< the caller's included; the results do not depend on it
+  std::uint32_t threads = 1;  ///< the caller's included, kMostQueryThreads at most; results are the same
 };
 
 /// What a query did. Independent of threads, and of the machine.
@@ -54,7 +56,8 @@ struct QueryCounters {
 
 /// Finds every pair of triangles that meet, of many posed instances of few assets, on the CPU. Keeps its
 /// memory from call to call: in a steady state nothing is allocated. Throws nothing. Movable, not copyable;
-/// one query at a time, several objects side by side.
+/// one query at a time, several objects side by side. Takes about 100 KB of the calling thread's stack.
+/// Rounds to nearest and keeps subnormals: the floating-point environment that every thread starts with.
 class ContactQuery {
  public:
   ContactQuery();
@@ -63,18 +66,25 @@ class ContactQuery {
   ~ContactQuery();
 
   /// Names the assets that instances refer to; level 0 of each is looked at. What the views look at must
-  /// outlive the queries. Result: kOk, or kOutOfMemory.
+  /// outlive the queries. Result: kOk, kUnknownAsset (a view of nothing: where() is its place in the list),
+  /// or kOutOfMemory; then there are no assets.
   Status set_assets(std::span<const AssetView> assets);
 
-  /// Finds the object pairs whose world boxes overlap, and their contacts. Result: kOk, or
-  /// kUnknownAsset, kPoseNotRigid, kOutOfRange: where() is the instance; (beyond about 1e300)
-  /// kOutOfMemory, kCannotStartThread.
-  /// After an error there are no pairs and no contacts.
+  /// Finds the object pairs whose world boxes overlap, and not their contacts: for those who want to leave
+  /// some out. Result: kOk, or kUnknownAsset, kPoseNotRigid, kOutOfRange (beyond kLargestWorldCoordinate):
+  /// where() is the instance; kTooManyInstances, kTooManyPairs, kOutOfMemory. After an error there are no
+  /// pairs and no contacts.
+  Status find_pairs(std::span<const Instance> instances, const QueryOptions& options = {});
+
+  /// Finds the object pairs whose world boxes overlap, and their contacts. Result: as above, or
+  /// kCannotStartThread.
   Status find_contacts(std::span<const Instance> instances, const QueryOptions& options = {});
 
   /// Finds the contacts of the given object pairs, in either order of a and b. A pair of an instance with
   /// itself asks for the contacts within it: each pair of two different triangles once, neighbours in the
-  /// mesh included, which touch. Result: as above, or kUnknownInstance: where() is the pair.
+  /// mesh included, which touch. `pairs` may be
+  /// pairs(), or a part of them.Result: as above, or
+  /// kUnknownInstance: where() is the pair.
   Status find_contacts(std::span<const Instance> instances, std::span<const ObjectPair> pairs,
                        const QueryOptions& options = {});
 

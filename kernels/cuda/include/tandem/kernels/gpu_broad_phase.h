@@ -1,0 +1,110 @@
+#pragma once
+#include <cuda_runtime_api.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+#include "tandem/kernels/broad_phase.h"
+#include "tandem/kernels/gpu_contact_query.h"
+#include "tandem/kernels/world_box.h"
+
+namespace tandem {
+
+/// What a broad phase needs to know of an asset: stored coordinates, as the file's header has them.
+struct AssetBounds {
+  double origin[3];
+  float lower[3], upper[3];
+};
+
+/// Asset bounds as an array in GPU memory.
+struct GpuAssetBounds {
+  const AssetBounds* bounds;
+  std::uint32_t count;
+};
+
+struct GpuBroadPhaseOptions {
+  /// Pairs come sorted by a, then b, as BroadPhase has them. Else they come in an order that may differ from
+  /// run to run, neighbours in space close to each other.
+  bool sorted = false;
+};
+
+/// How many boxes and pairs there is room for.
+struct GpuBroadPhaseCapacity {
+  std::uint32_t boxes = 0;      ///< or instances: 50 bytes each, and a little for sorting
+  std::uint32_t pairs = 0;      ///< 8 bytes each, 16 where sorted
+  std::uint32_t instances = 0;  ///< whose boxes are to be computed: 48 bytes more each
+};
+
+/// What became of a broad phase. Lies in GPU memory, and in CPU memory once the stream has come so far.
+struct GpuBroadPhaseReport {
+  Status status;           ///< kOk, or kOutOfRange, kUnknownAsset, kPoseNotRigid; then there are no pairs
+  std::uint32_t complete;  ///< 0: there was no room for all pairs; those stored are some of them
+  std::uint32_t where;     ///< the box or instance to blame for an error: of several, the first
+  std::uint32_t count;     ///< pairs that there are, room or not; 2^32 - 1 where they are as many or more
+  std::uint64_t found;     ///< pairs that there are
+};
+
+/// Finds all pairs of world boxes that meet, on the GPU: the same set as BroadPhase. Nothing of enqueue()
+/// waits for the GPU, allocates, or asks the CPU. Throws nothing. Movable, not copyable. One broad phase at a
+/// time: enqueue the next on the same stream, or after it; several objects side by side.
+///
+/// Boxes are sorted by class of size, then along a space-filling curve, and grouped by 32 into a tree of
+/// fan-out 32. One warp takes a group and walks the part of the tree that lies behind it, so a pair is found
+/// once, by the smaller box: one huge box among many small ones costs each of them a test. O(n log n) for
+/// boxes of bounded overlap.
+class GpuBroadPhase {
+ public:
+  GpuBroadPhase();
+  GpuBroadPhase(GpuBroadPhase&&) noexcept;
+  GpuBroadPhase& operator=(GpuBroadPhase&&) noexcept;
+  ~GpuBroadPhase();  ///< waits for the device
+
+  /// Makes room for at least so much on the current device, waiting for it where memory grows. `options`:
+  /// those of the calls to come. Result: kOk, kOutOfRange (2^32 - 1 boxes), kOutOfMemory, kCudaFailed; after
+  /// an error there is the room that there was, or less.
+  Status reserve(const GpuBroadPhaseCapacity& capacity, const GpuBroadPhaseOptions& options = {});
+
+  /// Queues a broad phase of the boxes behind what `stream` holds; may be captured into a graph. `boxes`, in
+  /// GPU memory at a multiple of 16 bytes, must stay until it is done. Result: kOk, kMisaligned, kOutOfRange
+  /// (more than reserved for) or kCudaFailed; what the GPU finds wrong is in the report. kOutOfRange there: a
+  /// coordinate that is NaN or beyond kLargestWorldCoordinate. Condition: reserve() with these options.
+  Status enqueue(const WorldBox* boxes, std::uint32_t count, const GpuBroadPhaseOptions& options,
+                 cudaStream_t stream);
+
+  /// Computes the instances' world boxes first, with the bits that ContactQuery has. In the report also
+  /// kUnknownAsset, kPoseNotRigid.
+  Status enqueue(const GpuInstances& instances, const GpuAssetBounds& assets,
+                 const GpuBroadPhaseOptions& options, cudaStream_t stream);
+
+  /// enqueue(), waits, makes room where there was too little, and again: at most twice, and in a steady state
+  /// once. Room grows by a quarter more than needed. Result: that of the report or of a call that failed;
+  /// kOutOfMemory where there are 2^32 - 1 pairs or more.
+  Status find_pairs(const WorldBox* boxes, std::uint32_t count, const GpuBroadPhaseOptions& options,
+                    cudaStream_t stream);
+  Status find_pairs(const GpuInstances& instances, const GpuAssetBounds& assets,
+                    const GpuBroadPhaseOptions& options, cudaStream_t stream);
+
+  /// Pairs, a < b, and their number, in GPU memory; complete where the number is at most the capacity. Valid
+  /// until reserve(). Condition: reserve() returned kOk.
+  GpuPairs pairs() const;
+
+  /// The world boxes that enqueue() computed of instances, in GPU memory.
+  const WorldBox* boxes() const;
+
+  const GpuBroadPhaseReport* device_report() const;
+
+  /// In CPU memory. Condition: the stream has come to the end of the broad phase.
+  const GpuBroadPhaseReport& report() const;
+
+  GpuBroadPhaseCapacity capacity() const;
+  std::size_t bytes() const;  ///< GPU memory held
+  cudaError_t cuda_error() const;
+
+ private:
+  struct State;
+  bool provide_state();
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace tandem

@@ -1,0 +1,153 @@
+#include "gpu_query_data.h"
+#include "tandem/kernels/box_test.h"
+#include "tandem/kernels/triangle_test.h"
+
+// What the walks left undecided: float64, then exactly. The exact stage needs 3 KB of stack a thread, so it
+// has a kernel of its own, which scenes without hard cases leave at once.
+namespace tandem::gpu {
+namespace {
+
+constexpr std::uint32_t kThreads = 128;
+
+__device__ const Triangle& triangle_a(const PairRecord& record, const Candidate& candidate) {
+  return record.triangles_a[candidate.a];
+}
+__device__ const Triangle& triangle_b(const PairRecord& record, const Candidate& candidate) {
+  return record.triangles_b[candidate.b];
+}
+
+__device__ TrianglePair posed_pair(const QueryArgs& args, const PairRecord& record,
+                                   const Candidate& candidate) {
+  const Pose pose_a = stored_pose(args, record.instance_a), pose_b = stored_pose(args, record.instance_b);
+  TrianglePair pair;
+  for (int corner = 0; corner < 3; ++corner) {
+    const float* p = triangle_a(record, candidate).corner[corner].position;
+    const float* q = triangle_b(record, candidate).corner[corner].position;
+    apply(pose_a, p[0], p[1], p[2], pair.a[corner]);
+    apply(pose_b, q[0], q[1], q[2], pair.b[corner]);
+  }
+  return pair;
+}
+
+__device__ TrianglePair framed_pair(const PairRecord& record, const Candidate& candidate) {
+  TrianglePair pair;
+  for (int corner = 0; corner < 3; ++corner) {
+    const float* p = triangle_a(record, candidate).corner[corner].position;
+    const float* q = triangle_b(record, candidate).corner[corner].position;
+    for (int i = 0; i < 3; ++i) {
+      const float4 row = record.rotation[i];
+      pair.a[corner][i] = static_cast<double>(p[i]);
+      pair.b[corner][i] = static_cast<double>(((row.x * q[0] + row.y * q[1]) + row.z * q[2]) + row.w);
+    }
+  }
+  return pair;
+}
+
+__device__ std::uint32_t stored(Counter counted, std::uint64_t room) {
+  return static_cast<std::uint32_t>(counted < room ? counted : room);
+}
+
+/// All lanes of the warp take part.
+__device__ void add_contact(const QueryArgs& args, const PairRecord& record, const Candidate& candidate,
+                            bool contact) {
+  if (contact) contact = is_wanted(args, candidate.pair);
+  const Counter place = place_for(contact, &args.state->contacts);
+  if (!contact || place >= args.capacity.contacts) return;
+  args.contacts[place] =
+      make_contact(candidate.pair, record.instance_a == record.instance_b, candidate.a, candidate.b,
+                   triangle_a(record, candidate).source_face(), triangle_b(record, candidate).source_face());
+}
+
+/// Adds up over the warp.
+__device__ void count(bool counts, Counter* counter) {
+  const std::uint32_t lanes = __ballot_sync(kAllLanes, counts);
+  if (lane_id() == 0 && lanes != 0) atomicAdd(counter, static_cast<Counter>(__popc(lanes)));
+}
+
+template <bool kFast>
+__global__ void __launch_bounds__(kThreads) decide_by_float64(const __grid_constant__ QueryArgs args) {
+  if (failed(args)) return;
+  const std::uint32_t total = stored(args.state->undecided, args.capacity.undecided);
+  for (std::uint32_t first = blockIdx.x * kThreads; first < total; first += gridDim.x * kThreads) {
+    const std::uint32_t i = first + threadIdx.x;
+    const Candidate candidate = args.undecided[i < total ? i : first];
+    const PairRecord& record = args.pairs[candidate.pair];
+    Verdict verdict = Verdict::apart;
+    bool by_float64 = false;
+    if (i < total) {
+      if (kFast && record.in_frame != 0) {
+        verdict = decide_fast(framed_pair(record, candidate));
+      } else {
+        verdict = decide_float64(posed_pair(args, record, candidate));
+        by_float64 = verdict != Verdict::undecided;
+      }
+    }
+    count(by_float64, &args.state->decided_by_float64);
+    const Counter place = place_for(verdict == Verdict::undecided, &args.state->unresolved);
+    if (verdict == Verdict::undecided) args.unresolved[place] = candidate;
+    add_contact(args, record, candidate, verdict == Verdict::contact);
+  }
+}
+
+__device__ void write_report(const QueryArgs& args) {
+  const QueryState& state = *args.state;
+  const Counter contacts = *static_cast<const volatile Counter*>(&state.contacts);
+  const Counter exactly = *static_cast<const volatile Counter*>(&state.unresolved);
+  const std::uint32_t pairs = *args.given.count;
+  GpuQueryReport report = {};
+  report.needed = {pairs, contacts, state.undecided};
+  report.complete = pairs <= args.given.capacity && pairs <= args.capacity.pairs &&
+                    contacts <= args.capacity.contacts && state.undecided <= args.capacity.undecided;
+  report.contacts = contacts < args.capacity.contacts ? contacts : args.capacity.contacts;
+  report.world_pairs = state.world_pairs;
+  QueryCounters& counters = report.counters;
+  counters.object_pairs = pair_count(args);
+  counters.block_pairs = state.block_pairs;
+  counters.candidates = state.candidates;
+  counters.decided_by_float64 = state.decided_by_float64;
+  counters.decided_exactly = exactly;
+  if (args.mode != QueryMode::boxes)
+    counters.decided_by_float32 = state.candidates - state.decided_by_float64 - exactly;
+  counters.contacts = contacts;
+  if (state.error != 0) {
+    const Counter error = ~state.error;
+    report = {};
+    report.status = static_cast<Status>(error & 0xFFu);
+    report.where = error >> 8 & 0xFFFFFFFFu;
+  }
+  args.state->report = report;
+}
+
+/// The block that ends last writes the report.
+__global__ void __launch_bounds__(kThreads) decide_exactly(const __grid_constant__ QueryArgs args) {
+  const std::uint32_t total = failed(args) ? 0 : static_cast<std::uint32_t>(args.state->unresolved);
+  for (std::uint32_t first = blockIdx.x * kThreads; first < total; first += gridDim.x * kThreads) {
+    const std::uint32_t i = first + threadIdx.x;
+    const Candidate candidate = args.unresolved[i < total ? i : first];
+    const PairRecord& record = args.pairs[candidate.pair];
+    const bool contact = i < total && decide_exact(posed_pair(args, record, candidate)) == Verdict::contact;
+    add_contact(args, record, candidate, contact);
+  }
+  __threadfence();
+  __syncthreads();
+  if (threadIdx.x == 0 && atomicAdd(&args.state->finished_blocks, 1u) == gridDim.x - 1) write_report(args);
+}
+
+}  // namespace
+
+cudaError_t decide_rest(const QueryArgs& args, cudaStream_t stream) {
+  int device = 0, processors = 0;
+  if (const cudaError_t error = cudaGetDevice(&device); error != cudaSuccess) return error;
+  if (const cudaError_t error = cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device);
+      error != cudaSuccess)
+    return error;
+  const auto blocks = static_cast<unsigned>(processors) * 4;
+  if (args.mode == QueryMode::fast)
+    decide_by_float64<true><<<blocks, kThreads, 0, stream>>>(args);
+  else if (args.mode == QueryMode::exact)
+    decide_by_float64<false><<<blocks, kThreads, 0, stream>>>(args);
+  decide_exactly<<<blocks, kThreads, 0, stream>>>(args);
+  return cudaGetLastError();
+}
+
+}  // namespace tandem::gpu

@@ -1,0 +1,418 @@
+#include "tandem/kernels/gpu_broad_phase.h"
+
+#include <algorithm>
+#include <bit>
+#include <cub/device/device_radix_sort.cuh>
+#include <new>
+
+#include "broad_phase_keys.cuh"
+#include "broad_phase_tree.cuh"
+#include "broad_phase_walk.cuh"
+
+namespace tandem {
+namespace {
+
+// ---------------------------------------------------------------------------------------------------------
+// World boxes of instances. Compiled without fused operations, so that is_rigid() is the CPU's too.
+
+__global__ void pose_boxes(GpuInstances instances, GpuAssetBounds assets, WorldBox* boxes,
+                           Counters* counters) {
+  const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
+  if (i >= instances.count) return;
+  WorldBox box = {};
+  const std::uint32_t asset = instances.asset[i];
+  const Pose pose = instances.pose[i];
+  if (asset >= assets.count) {
+    blame(counters, i, Status::kUnknownAsset);
+  } else if (!is_rigid(pose)) {
+    blame(counters, i, Status::kPoseNotRigid);
+  } else {
+    const AssetBounds bounds = assets.bounds[asset];
+    box = world_box(for_stored_coordinates(pose, bounds.origin), bounds.lower, bounds.upper);
+  }
+  boxes[i] = box;  // make_keys() checks its range
+}
+
+// ---------------------------------------------------------------------------------------------------------
+// The tree. A block of 1,024 threads writes as many leaves, the 32 nodes above them and the one above those.
+
+__global__ void __launch_bounds__(kFanOut* kFanOut)
+    build_lower_levels(const WorldBox* boxes, const Key* sorted, int index_bits, const Survey* survey,
+                       const __grid_constant__ Tree tree) {
+  __shared__ Node above[kFanOut];
+  const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
+  const std::uint32_t lane = threadIdx.x % kFanOut, warp = threadIdx.x / kFanOut;
+  Node node = nothing();
+  if (i < tree.count[0]) {
+    const Scale scale = scale_of(*survey);
+    node.box = static_cast<std::uint32_t>(sorted[i] & ((1ull << index_bits) - 1));
+    const WorldBox box = load(boxes, node.box);
+    for (int k = 0; k < 3; ++k) {
+      node.lo[k] = scale(box.lo[k], k);
+      node.hi[k] = scale(box.hi[k], k);
+    }
+    tree.level(0)[i] = node;
+  }
+  node = union_of_warp(node);
+  const std::uint32_t parent = i / kFanOut;
+  if (lane == 0) {
+    above[warp] = node;
+    if (parent < tree.count[1]) tree.level(1)[parent] = node;
+  }
+  if (tree.top < 2) return;
+  __syncthreads();
+  if (warp != 0) return;
+  node = union_of_warp(above[lane]);
+  if (lane == 0) tree.level(2)[blockIdx.x] = node;
+}
+
+__global__ void __launch_bounds__(kFanOut* kFanOut) build_upper_levels(const __grid_constant__ Tree tree) {
+  const std::uint32_t lane = threadIdx.x % kFanOut, warp = threadIdx.x / kFanOut;
+  for (int level = 3; level <= tree.top; ++level) {
+    for (std::uint32_t i = warp; i < tree.count[level]; i += kFanOut) {
+      const std::uint32_t child = i * kFanOut + lane;
+      const Node node =
+          union_of_warp(child < tree.count[level - 1] ? tree.level(level - 1)[child] : nothing());
+      if (lane == 0) tree.level(level)[i] = node;
+    }
+    __syncthreads();
+  }
+}
+
+// ---------------------------------------------------------------------------------------------------------
+// The end.
+
+// Writes the report, and readies the counters for the next time.
+__global__ void report_pairs(Counters* counters, std::uint32_t capacity, GpuBroadPhaseReport* report) {
+  const unsigned long long error = counters->error;
+  const unsigned long long found = error == kNoError ? counters->found : 0;
+  *counters = kFreshCounters;
+  report->status = error == kNoError ? Status::kOk : static_cast<Status>(error & 0xFFFFFFFFu);
+  report->where = error == kNoError ? kNoIndex : static_cast<std::uint32_t>(error >> 32);
+  report->complete = found <= capacity;
+  report->found = found;
+  report->count = static_cast<std::uint32_t>(min(found, 0xFFFFFFFFull));
+}
+
+// Keys of no pair: they come last, because of two numbers of so many bits that a < b not both are all ones.
+__global__ void fill_rest(unsigned long long* keys, std::uint32_t capacity,
+                          const GpuBroadPhaseReport* report) {
+  const std::uint64_t i = static_cast<std::uint64_t>(blockIdx.x) * blockDim.x + threadIdx.x;
+  if (i >= report->count && i < capacity) keys[i] = ~0ull;
+}
+
+__global__ void unpack_keys(const unsigned long long* keys, std::uint32_t capacity, int bits,
+                            ObjectPair* pairs, const GpuBroadPhaseReport* report) {
+  const std::uint64_t i = static_cast<std::uint64_t>(blockIdx.x) * blockDim.x + threadIdx.x;
+  if (i >= report->count || i >= capacity) return;
+  const unsigned long long key = keys[i];
+  pairs[i] = {static_cast<std::uint32_t>(key >> bits),
+              static_cast<std::uint32_t>(key & ((1ull << bits) - 1))};
+}
+
+// ---------------------------------------------------------------------------------------------------------
+// Memory.
+
+// GPU memory that grows and is kept; what is in it is lost then. On error: empty.
+template <typename Element>
+class DeviceBuffer {
+ public:
+  DeviceBuffer() = default;
+  DeviceBuffer(const DeviceBuffer&) = delete;
+  DeviceBuffer& operator=(const DeviceBuffer&) = delete;
+  ~DeviceBuffer() { free(); }
+
+  cudaError_t reserve(std::size_t size) {
+    if (size <= size_) return cudaSuccess;
+    free();
+    const cudaError_t error = cudaMalloc(&data_, size * sizeof(Element));
+    if (error == cudaSuccess) size_ = size;
+    return error;
+  }
+
+  Element* data() const { return data_; }
+  std::size_t size() const { return size_; }
+  std::size_t bytes() const { return size_ * sizeof(Element); }
+
+ private:
+  void free() {
+    if (size_ != 0) static_cast<void>(cudaFree(data_));
+    data_ = nullptr;
+    size_ = 0;
+  }
+
+  Element* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+std::uint32_t blocks_for(std::uint64_t threads, std::uint32_t size) {
+  return static_cast<std::uint32_t>((threads + size - 1) / size);
+}
+
+// Bits of an index of a box.
+int index_bits(std::uint32_t boxes) {
+  return static_cast<int>(std::bit_width(std::max(boxes, 2u) - 1));
+}
+
+// The lowest bit that keys are sorted by. Eight bits cost one pass of the sort; the fewer boxes, the less it
+// matters that some lie in one cell of the curve.
+int first_bit(std::uint32_t boxes) {
+  const int passes = boxes <= 1u << 14 ? 3 : boxes <= 1u << 18 ? 4 : 6;
+  return std::max(64 - 8 * passes, index_bits(boxes));
+}
+
+// Warps that share a group: so many that small scenes fill a GPU too.
+std::uint32_t split_of(std::uint32_t groups) {
+  constexpr std::uint32_t kEnoughWarps = 8192;
+  std::uint32_t split = 1;
+  while (split < 8 && groups * split < kEnoughWarps) split *= 2;
+  return split;
+}
+
+}  // namespace
+
+struct GpuBroadPhase::State {
+  DeviceBuffer<WorldBox> boxes;
+  DeviceBuffer<Key> keys[2];
+  DeviceBuffer<Node> nodes;
+  DeviceBuffer<unsigned long long> pairs, sorted_pairs;
+  DeviceBuffer<unsigned char> sorting;  // CUB's
+  DeviceBuffer<Survey> survey;
+  DeviceBuffer<Counters> counters;
+  DeviceBuffer<GpuBroadPhaseReport> report;
+  GpuBroadPhaseReport* host_report = nullptr;
+  GpuBroadPhaseCapacity capacity;
+  cudaError_t error = cudaSuccess;
+
+  ~State() {
+    if (host_report != nullptr) static_cast<void>(cudaFreeHost(host_report));
+  }
+
+  // Of a call: true, or what went wrong is kept.
+  bool ok(cudaError_t result) {
+    if (result == cudaSuccess) return true;
+    error = result;
+    static_cast<void>(cudaGetLastError());  // later calls must not report it again
+    return false;
+  }
+  bool launched() { return ok(cudaGetLastError()); }
+  Status failure() const {
+    return error == cudaErrorMemoryAllocation ? Status::kOutOfMemory : Status::kCudaFailed;
+  }
+
+  bool reserve_fixed();
+  bool reserve_boxes(std::uint32_t count);
+  bool reserve_pairs(std::uint32_t count, bool sorted);
+  bool reserve_sorting();
+  bool make_tree(const WorldBox* given, const Tree& tree, cudaStream_t stream);
+  bool collect(const WorldBox* given, const Tree& tree, bool sorted, cudaStream_t stream);
+  bool sort_pairs(std::uint32_t count, cudaStream_t stream);
+  bool run(const WorldBox* given, std::uint32_t count, bool sorted, cudaStream_t stream);
+  template <typename Enqueue>
+  Status find(GpuBroadPhase& self, GpuBroadPhaseCapacity wanted, const GpuBroadPhaseOptions& options,
+              cudaStream_t stream, const Enqueue& enqueue);
+};
+
+bool GpuBroadPhase::State::reserve_fixed() {
+  if (host_report != nullptr) return true;
+  if (!ok(survey.reserve(1)) || !ok(counters.reserve(1)) || !ok(report.reserve(1)) ||
+      !ok(cudaMemset(report.data(), 0, report.bytes())) ||
+      !ok(cudaMemcpy(counters.data(), &kFreshCounters, sizeof kFreshCounters, cudaMemcpyHostToDevice)))
+    return false;
+  if (!ok(cudaMallocHost(&host_report, sizeof *host_report))) {
+    host_report = nullptr;
+    return false;
+  }
+  *host_report = {};
+  return true;
+}
+
+bool GpuBroadPhase::State::reserve_boxes(std::uint32_t count) {
+  if (count <= capacity.boxes) return true;
+  capacity.boxes = 0;
+  for (int i = 0; i < 2; ++i) {
+    if (!ok(keys[i].reserve(count))) return false;
+  }
+  if (!ok(nodes.reserve(nodes_of(tree_over(count, nullptr))))) return false;
+  capacity.boxes = count;
+  return reserve_sorting();
+}
+
+bool GpuBroadPhase::State::reserve_pairs(std::uint32_t count, bool sorted) {
+  const std::uint32_t before = capacity.pairs;
+  if (count > before) {
+    capacity.pairs = 0;
+    if (!ok(pairs.reserve(count))) return false;
+    capacity.pairs = count;
+  }
+  if (!sorted || sorted_pairs.size() >= capacity.pairs) return true;
+  return ok(sorted_pairs.reserve(capacity.pairs)) && reserve_sorting();
+}
+
+// As much as sorting up to the capacity takes: CUB asks for a part that does not depend on the number, and
+// one that grows with it.
+bool GpuBroadPhase::State::reserve_sorting() {
+  std::size_t bytes = 0, pair_bytes = 0;
+  cub::DoubleBuffer<Key> key(keys[0].data(), keys[1].data());
+  if (!ok(cub::DeviceRadixSort::SortKeys(nullptr, bytes, key, capacity.boxes))) return false;
+  if (sorted_pairs.size() != 0) {
+    cub::DoubleBuffer<unsigned long long> pair(pairs.data(), sorted_pairs.data());
+    if (!ok(cub::DeviceRadixSort::SortKeys(nullptr, pair_bytes, pair, capacity.pairs))) return false;
+  }
+  return ok(sorting.reserve(std::max(bytes, pair_bytes)));
+}
+
+bool GpuBroadPhase::State::make_tree(const WorldBox* given, const Tree& tree, cudaStream_t stream) {
+  const std::uint32_t count = tree.count[0];
+  const int bits = index_bits(count);
+  survey_boxes<<<4, kSamples * kThreadsPerSample, 0, stream>>>(given, count, survey.data());
+  make_keys<<<blocks_for(count, 256), 256, 0, stream>>>(given, count, bits, survey.data(), keys[0].data(),
+                                                        counters.data());
+  if (!launched()) return false;
+  cub::DoubleBuffer<Key> key(keys[0].data(), keys[1].data());
+  std::size_t bytes = sorting.size();
+  if (!ok(cub::DeviceRadixSort::SortKeys(sorting.data(), bytes, key, count, first_bit(count), 64, stream)))
+    return false;
+  constexpr std::uint32_t kThreads = kFanOut * kFanOut;
+  build_lower_levels<<<blocks_for(count, kThreads), kThreads, 0, stream>>>(given, key.Current(), bits,
+                                                                           survey.data(), tree);
+  if (tree.top > 2) build_upper_levels<<<1, kThreads, 0, stream>>>(tree);
+  return launched();
+}
+
+bool GpuBroadPhase::State::collect(const WorldBox* given, const Tree& tree, bool sorted,
+                                   cudaStream_t stream) {
+  const Output output = {pairs.data(), capacity.pairs, sorted ? index_bits(tree.count[0]) : 0,
+                         sorted ? 0 : 32};
+  const std::uint32_t split = split_of(tree.count[1]);
+  const std::uint32_t blocks = blocks_for(static_cast<std::uint64_t>(tree.count[1]) * split, kWarps);
+  collect_pairs<<<blocks, kWarps * kFanOut, 0, stream>>>(tree, split, given, output, counters.data());
+  return launched();
+}
+
+// Sorts as many keys as there is room for, because the CPU does not know their number.
+bool GpuBroadPhase::State::sort_pairs(std::uint32_t count, cudaStream_t stream) {
+  if (capacity.pairs == 0) return true;
+  const int bits = index_bits(count);
+  const std::uint32_t blocks = blocks_for(capacity.pairs, 256);
+  fill_rest<<<blocks, 256, 0, stream>>>(pairs.data(), capacity.pairs, report.data());
+  if (!launched()) return false;
+  cub::DoubleBuffer<unsigned long long> key(pairs.data(), sorted_pairs.data());
+  std::size_t bytes = sorting.size();
+  if (!ok(cub::DeviceRadixSort::SortKeys(sorting.data(), bytes, key, capacity.pairs, 0, 2 * bits, stream)))
+    return false;
+  unpack_keys<<<blocks, 256, 0, stream>>>(key.Current(), capacity.pairs, bits,
+                                          reinterpret_cast<ObjectPair*>(pairs.data()), report.data());
+  return launched();
+}
+
+bool GpuBroadPhase::State::run(const WorldBox* given, std::uint32_t count, bool sorted, cudaStream_t stream) {
+  const Tree tree = tree_over(count, nodes.data());
+  if (count > 0 && (!make_tree(given, tree, stream) || !collect(given, tree, sorted, stream))) return false;
+  report_pairs<<<1, 1, 0, stream>>>(counters.data(), capacity.pairs, report.data());
+  if (!launched() || (sorted && !sort_pairs(count, stream))) return false;
+  return ok(cudaMemcpyAsync(host_report, report.data(), sizeof *host_report, cudaMemcpyDeviceToHost, stream));
+}
+
+// The first guess of room is four pairs for each box.
+template <typename Enqueue>
+Status GpuBroadPhase::State::find(GpuBroadPhase& self, GpuBroadPhaseCapacity wanted,
+                                  const GpuBroadPhaseOptions& options, cudaStream_t stream,
+                                  const Enqueue& enqueue) {
+  std::uint64_t room = capacity.pairs > 0 ? capacity.pairs : 4ull * wanted.boxes + 1024;
+  for (;;) {
+    wanted.pairs = static_cast<std::uint32_t>(std::min<std::uint64_t>(room, kNoIndex - 1));
+    if (const Status status = self.reserve(wanted, options); status != Status::kOk) return status;
+    if (const Status status = enqueue(); status != Status::kOk) return status;
+    if (!ok(cudaStreamSynchronize(stream))) return failure();
+    if (host_report->status != Status::kOk || host_report->complete != 0) return host_report->status;
+    if (host_report->found >= kNoIndex) return Status::kOutOfMemory;
+    room = host_report->found + host_report->found / 4;
+  }
+}
+
+GpuBroadPhase::GpuBroadPhase() = default;
+GpuBroadPhase::GpuBroadPhase(GpuBroadPhase&&) noexcept = default;
+GpuBroadPhase& GpuBroadPhase::operator=(GpuBroadPhase&&) noexcept = default;
+GpuBroadPhase::~GpuBroadPhase() = default;
+
+bool GpuBroadPhase::provide_state() {
+  if (state_ == nullptr) state_.reset(new (std::nothrow) State);
+  return state_ != nullptr;
+}
+
+Status GpuBroadPhase::reserve(const GpuBroadPhaseCapacity& capacity, const GpuBroadPhaseOptions& options) {
+  if (capacity.boxes == kNoIndex) return Status::kOutOfRange;
+  if (!provide_state()) return Status::kOutOfMemory;
+  const bool enough = state_->reserve_fixed() && state_->reserve_boxes(capacity.boxes) &&
+                      state_->reserve_pairs(capacity.pairs, options.sorted) &&
+                      state_->ok(state_->boxes.reserve(capacity.instances));
+  return enough ? Status::kOk : state_->failure();
+}
+
+Status GpuBroadPhase::enqueue(const WorldBox* boxes, std::uint32_t count, const GpuBroadPhaseOptions& options,
+                              cudaStream_t stream) {
+  if (state_ == nullptr || count > state_->capacity.boxes) return Status::kOutOfRange;
+  if (reinterpret_cast<std::uintptr_t>(boxes) % 16 != 0) return Status::kMisaligned;
+  if (options.sorted && state_->sorted_pairs.size() < state_->capacity.pairs) return Status::kOutOfRange;
+  return state_->run(boxes, count, options.sorted, stream) ? Status::kOk : state_->failure();
+}
+
+Status GpuBroadPhase::enqueue(const GpuInstances& instances, const GpuAssetBounds& assets,
+                              const GpuBroadPhaseOptions& options, cudaStream_t stream) {
+  if (state_ == nullptr || instances.count > state_->boxes.size()) return Status::kOutOfRange;
+  State& state = *state_;
+  if (instances.count > 0) {
+    pose_boxes<<<blocks_for(instances.count, 256), 256, 0, stream>>>(instances, assets, state.boxes.data(),
+                                                                     state.counters.data());
+    if (!state.launched()) return state.failure();
+  }
+  return enqueue(state.boxes.data(), instances.count, options, stream);
+}
+
+Status GpuBroadPhase::find_pairs(const WorldBox* boxes, std::uint32_t count,
+                                 const GpuBroadPhaseOptions& options, cudaStream_t stream) {
+  if (!provide_state()) return Status::kOutOfMemory;
+  return state_->find(*this, {count, 0, 0}, options, stream,
+                      [&] { return enqueue(boxes, count, options, stream); });
+}
+
+Status GpuBroadPhase::find_pairs(const GpuInstances& instances, const GpuAssetBounds& assets,
+                                 const GpuBroadPhaseOptions& options, cudaStream_t stream) {
+  if (!provide_state()) return Status::kOutOfMemory;
+  return state_->find(*this, {instances.count, 0, instances.count}, options, stream,
+                      [&] { return enqueue(instances, assets, options, stream); });
+}
+
+GpuPairs GpuBroadPhase::pairs() const {
+  return {reinterpret_cast<const ObjectPair*>(state_->pairs.data()), &state_->report.data()->count,
+          state_->capacity.pairs};
+}
+
+const WorldBox* GpuBroadPhase::boxes() const {
+  return state_->boxes.data();
+}
+const GpuBroadPhaseReport* GpuBroadPhase::device_report() const {
+  return state_->report.data();
+}
+const GpuBroadPhaseReport& GpuBroadPhase::report() const {
+  return *state_->host_report;
+}
+
+GpuBroadPhaseCapacity GpuBroadPhase::capacity() const {
+  return state_ == nullptr ? GpuBroadPhaseCapacity{} : state_->capacity;
+}
+
+std::size_t GpuBroadPhase::bytes() const {
+  if (state_ == nullptr) return 0;
+  const State& s = *state_;
+  return s.boxes.bytes() + s.keys[0].bytes() + s.keys[1].bytes() + s.nodes.bytes() + s.pairs.bytes() +
+         s.sorted_pairs.bytes() + s.sorting.bytes() + s.survey.bytes() + s.counters.bytes() +
+         s.report.bytes();
+}
+
+cudaError_t GpuBroadPhase::cuda_error() const {
+  return state_ == nullptr ? cudaSuccess : state_->error;
+}
+
+}  // namespace tandem

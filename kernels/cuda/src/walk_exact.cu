@@ -1,0 +1,11 @@
+#include "walk.cuh"
+
+// Exact mode alone: nvcc may fuse multiplies and adds here. The proofs of box tests (docs/box_test.md) and of
+// the first stage (frame_test.h) allow it, and what they leave is decided elsewhere.
+namespace tandem::gpu {
+
+cudaError_t walk_exact(const QueryArgs& args, cudaStream_t stream) {
+  return launch_walk<InFrame<QueryMode::exact>>(args, stream);
+}
+
+}  // namespace tandem::gpu

@@ -1,0 +1,16 @@
+#include "walk.cuh"
+
+// Whatever must give the same bits as the CPU: compiled without fused operations.
+namespace tandem::gpu {
+
+cudaError_t walk_unfused(const QueryArgs& args, cudaStream_t stream) {
+  return args.mode == QueryMode::boxes ? launch_walk<InFrame<QueryMode::boxes>>(args, stream)
+                                       : launch_walk<InFrame<QueryMode::fast>>(args, stream);
+}
+
+cudaError_t walk_world(const QueryArgs& args, cudaStream_t stream) {
+  return args.mode == QueryMode::boxes ? launch_walk<InWorld<QueryMode::boxes>>(args, stream)
+                                       : launch_walk<InWorld<QueryMode::exact>>(args, stream);
+}
+
+}  // namespace tandem::gpu

@@ -2,11 +2,13 @@
 
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <new>
 #include <thread>
 
 #include "contacts_file.h"
+#include "gpu_query.h"
 #include "hdf5_file.h"
 #include "scene_file.h"
 #include "statistics_json.h"
@@ -14,59 +16,96 @@
 namespace tandem::bench {
 namespace {
 
+#ifdef TANDEM_BENCH_CUDA
+constexpr bool kHaveCuda = true;
+#else
+constexpr bool kHaveCuda = false;
+#endif
+
 struct QueryArguments {
   std::string scene, out, backend = "cpu";
   QueryOptions options;
+  GpuEngine engine = GpuEngine::tandem;
   std::uint32_t repeats = 1;
-  bool json = false;
+  bool json = false, threads_given = false;
+
+  bool on_gpu() const { return backend == "cuda"; }
+};
+
+// What any backend answers.
+struct Answer {
+  QueryRecord record;
+  ContactTable table;
+  GpuAnswer gpu;  // empty on a CPU
 };
 
 const std::map<std::string, QueryMode> kModes = {
     {"exact", QueryMode::exact}, {"fast", QueryMode::fast}, {"boxes", QueryMode::boxes}};
 
-std::string name_of(QueryMode mode) {
-  for (const auto& [name, value] : kModes) {
-    if (value == mode) return name;
+const std::map<std::string, GpuEngine> kEngines = {
+    {"tandem", GpuEngine::tandem}, {"paper", GpuEngine::paper}, {"paper-bits", GpuEngine::paper_bits}};
+
+template <typename Value>
+std::string name_of(Value wanted, const std::map<std::string, Value>& names) {
+  for (const auto& [name, value] : names) {
+    if (value == wanted) return name;
   }
   return {};
-}
-
-[[noreturn]] void refuse(const std::string& scene, Status status, std::uint64_t where) {
-  if (status == Status::kOutOfMemory) throw std::bad_alloc();
-  const char* unit = subject(status);
-  const std::string blamed = unit == nullptr ? "" : std::string(unit) + " " + std::to_string(where) + ": ";
-  const std::string text = scene + ": " + blamed + explain(status);
-  if (status == Status::kCannotStartThread) throw std::runtime_error(text);
-  throw FileError(text);
 }
 
 void check(const std::string& scene, Status status, const ContactQuery& query) {
   if (status != Status::kOk) refuse(scene, status, query.where());
 }
 
+QueryRecord record_of(const QueryArguments& arguments, const Scene& scene) {
+  QueryRecord record;
+  record.mode = name_of(arguments.options.mode, kModes);
+  record.backend = arguments.backend;
+  record.first_contact = arguments.options.first_contact_only;
+  record.self_pairs = arguments.options.self_pairs;
+  record.given_pairs = scene.description.pairs.has_value();
+  record.threads = arguments.on_gpu() ? 0 : arguments.options.threads;
+  return record;
+}
+
 // Runs the query as often as asked; the answer is the last run's, which is every run's.
-QueryRecord run_query(const QueryArguments& arguments, const Scene& scene, ContactQuery& query) {
+Answer answer_of_cpu(const QueryArguments& arguments, const Scene& scene) {
   const SceneDescription& description = scene.description;
   const std::vector<ObjectPair> pairs = normalised(description.pairs.value_or(std::vector<ObjectPair>()));
   const std::vector<AssetView> views = scene.views();
-  QueryRecord record;
+  Answer answer = {record_of(arguments, scene), {}, {}};
+  ContactQuery query;
   check(arguments.scene, query.set_assets(views), query);
   for (std::uint32_t i = 0; i < arguments.repeats; ++i) {
     const auto start = std::chrono::steady_clock::now();
     const Status status = description.pairs
                               ? query.find_contacts(description.instances, pairs, arguments.options)
                               : query.find_contacts(description.instances, arguments.options);
-    record.seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    const auto end = std::chrono::steady_clock::now();
+    answer.record.seconds.push_back(std::chrono::duration<double>(end - start).count());
     check(arguments.scene, status, query);
   }
-  record.mode = name_of(arguments.options.mode);
-  record.backend = arguments.backend;
-  record.first_contact = arguments.options.first_contact_only;
-  record.self_pairs = arguments.options.self_pairs;
-  record.given_pairs = description.pairs.has_value();
-  record.threads = arguments.options.threads;
-  record.counters = query.counters();
-  return record;
+  answer.record.counters = query.counters();
+  answer.table = make_table(query.pairs(), query.contacts());
+  return answer;
+}
+
+Answer answer_of_gpu(const QueryArguments& arguments, const Scene& scene) {
+  if constexpr (kHaveCuda) {
+    const bool given = scene.description.pairs.has_value();
+    const std::vector<ObjectPair> pairs =
+        normalised(scene.description.pairs.value_or(std::vector<ObjectPair>()));
+    Answer answer = {record_of(arguments, scene), {}, {}};
+    const QueryOptions& options = arguments.options;
+    answer.gpu =
+        query_on_gpu(arguments.scene, scene, given ? &pairs : nullptr,
+                     {arguments.engine, options.mode, options.first_contact_only, arguments.repeats});
+    answer.record.seconds = answer.gpu.whole;
+    answer.record.counters = answer.gpu.counters;
+    answer.table = make_table(answer.gpu.pairs, answer.gpu.contacts);
+    return answer;
+  }
+  throw std::logic_error("a backend that is not there");
 }
 
 std::uint64_t triangles_of(const Scene& scene) {
@@ -77,43 +116,69 @@ std::uint64_t triangles_of(const Scene& scene) {
   return triangles;
 }
 
-Json to_json(const QueryArguments& arguments, const Scene& scene, const QueryRecord& record,
-             std::uint64_t hash) {
+Json times(const std::vector<double>& seconds) {
+  if (seconds.empty()) return {};
+  QueryRecord record;
+  record.seconds = seconds;
+  return {{"best", record.best_seconds()}, {"median", record.median_seconds()}, {"all", seconds}};
+}
+
+Json to_json(const QueryArguments& arguments, const Scene& scene, const Answer& answer) {
+  const QueryRecord& record = answer.record;
   const QueryCounters& counters = record.counters;
-  return {{"tool", "bvhbench query"},
-          {"version", TANDEM_VERSION},
-          {"scene", arguments.scene},
-          {"output", arguments.out.empty() ? Json() : Json(arguments.out)},
-          {"backend", record.backend},
-          {"mode", record.mode},
-          {"first_contact", record.first_contact},
-          {"self_pairs", record.self_pairs},
-          {"given_pairs", record.given_pairs},
-          {"threads", record.threads},
-          {"assets", scene.assets.size()},
-          {"instances", scene.description.instances.size()},
-          {"triangles", triangles_of(scene)},
-          {"object_pairs", counters.object_pairs},
-          {"block_pairs", counters.block_pairs},
-          {"candidates", counters.candidates},
-          {"decided_by_float32", counters.decided_by_float32},
-          {"decided_by_float64", counters.decided_by_float64},
-          {"decided_exactly", counters.decided_exactly},
-          {"contacts", counters.contacts},
-          {"hash", hexadecimal(hash)},
-          {"seconds",
-           {{"best", record.best_seconds()}, {"median", record.median_seconds()}, {"all", record.seconds}}}};
+  Json json = {{"tool", "bvhbench query"},
+               {"version", TANDEM_VERSION},
+               {"scene", arguments.scene},
+               {"output", arguments.out.empty() ? Json() : Json(arguments.out)},
+               {"backend", record.backend},
+               {"mode", record.mode},
+               {"first_contact", record.first_contact},
+               {"self_pairs", record.self_pairs},
+               {"given_pairs", record.given_pairs},
+               {"threads", record.threads},
+               {"assets", scene.assets.size()},
+               {"instances", scene.description.instances.size()},
+               {"triangles", triangles_of(scene)},
+               {"object_pairs", counters.object_pairs},
+               {"block_pairs", counters.block_pairs},
+               {"candidates", counters.candidates},
+               {"decided_by_float32", counters.decided_by_float32},
+               {"decided_by_float64", counters.decided_by_float64},
+               {"decided_exactly", counters.decided_exactly},
+               {"contacts", counters.contacts},
+               {"hash", hexadecimal(hash_of(answer.table))},
+               {"seconds", times(record.seconds)}};
+  if (arguments.on_gpu()) {
+    json["engine"] = name_of(arguments.engine, kEngines);
+    json["gpu"] = answer.gpu.gpu;
+    json["gpu_bytes"] = answer.gpu.bytes;
+    json["upload_seconds"] = answer.gpu.upload;
+    json["broad_phase_seconds"] = times(answer.gpu.broad_phase);
+    json["contacts_seconds"] = times(answer.gpu.narrow);
+  }
+  return json;
 }
 
 void print_row(const char* label, std::uint64_t value, const char* remark = "") {
   std::printf("  %-14s %15s%s\n", label, with_commas(value).c_str(), remark);
 }
 
-void print_summary(const QueryArguments& arguments, const Scene& scene, const QueryRecord& record,
-                   std::uint64_t hash) {
+void print_times(const char* label, const Json& seconds, const char* remark = "") {
+  if (seconds.is_null()) return;
+  std::printf("  %-14s %15.3f  best of %zu, median %.3f%s\n", label, 1e3 * seconds["best"].get<double>(),
+              seconds["all"].size(), 1e3 * seconds["median"].get<double>(), remark);
+}
+
+std::string place_of(const QueryArguments& arguments, const Answer& answer) {
+  if (arguments.on_gpu()) return name_of(arguments.engine, kEngines) + ", " + answer.gpu.gpu;
+  return with_commas(answer.record.threads) + (answer.record.threads == 1 ? " thread" : " threads");
+}
+
+void print_summary(const QueryArguments& arguments, const Scene& scene, const Answer& answer) {
+  const QueryRecord& record = answer.record;
   const QueryCounters& counters = record.counters;
-  std::printf("%s: %s on %s, %s %s\n", arguments.scene.c_str(), record.mode.c_str(), record.backend.c_str(),
-              with_commas(record.threads).c_str(), record.threads == 1 ? "thread" : "threads");
+  std::printf("%s: %s on %s, %s\n", arguments.scene.c_str(), record.mode.c_str(), record.backend.c_str(),
+              place_of(arguments, answer).c_str());
   print_row("instances", scene.description.instances.size());
   print_row("triangles", triangles_of(scene));
   print_row("object pairs", counters.object_pairs, record.given_pairs ? "  given" : "  found");
@@ -125,38 +190,77 @@ void print_summary(const QueryArguments& arguments, const Scene& scene, const Qu
     print_row("  exactly", counters.decided_exactly);
   }
   print_row("contacts", counters.contacts);
-  std::printf("  %-14s %15.3f  best of %zu, median %.3f%s\n", "milliseconds", 1e3 * record.best_seconds(),
-              record.seconds.size(), 1e3 * record.median_seconds(),
-              record.given_pairs ? "; without the broad phase" : "");
-  std::printf("  %-14s %s\n", "hash", hexadecimal(hash).c_str());
+  print_times("milliseconds", times(record.seconds), record.given_pairs ? "; without the broad phase" : "");
+  if (arguments.on_gpu()) {
+    print_times("  broad phase", times(answer.gpu.broad_phase));
+    print_times("  contacts", times(answer.gpu.narrow));
+    std::printf("  %-14s %15.3f  once\n", "upload", 1e3 * answer.gpu.upload);
+    print_row("GPU bytes", answer.gpu.bytes);
+  }
+  std::printf("  %-14s %s\n", "hash", hexadecimal(hash_of(answer.table)).c_str());
+}
+
+// What a backend cannot do.
+void check_arguments(const QueryArguments& arguments, const Scene& scene) {
+  if (arguments.options.self_pairs && scene.description.pairs) {
+    throw UsageError(arguments.scene + ": gives its object pairs, so --self has nothing to add");
+  }
+  const bool tandem = arguments.engine == GpuEngine::tandem;
+  if (!arguments.on_gpu()) {
+    if (!tandem) throw UsageError("--engine is for the backend cuda");
+    return;
+  }
+  if (!tandem && arguments.options.first_contact_only) {
+    throw UsageError("--first-contact is for the engine tandem");
+  }
+  if (arguments.options.self_pairs) {
+    throw UsageError("--self is for the backend cpu; /pairs of a scene may name an instance twice");
+  }
+  if (arguments.threads_given) throw UsageError("--threads is for the backend cpu");
+}
+
+// The scene file and its assets, as paths from here.
+std::vector<std::string> files_of(const std::string& path, const Scene& scene) {
+  std::vector<std::string> files = {path};
+  for (const std::string& asset : scene.description.assets) {
+    files.push_back((std::filesystem::path(path).parent_path() / asset).string());
+  }
+  return files;
 }
 
 ExitCode run(const QueryArguments& arguments) {
   const Scene scene = read_scene(arguments.scene);
-  if (arguments.options.self_pairs && scene.description.pairs) {
-    throw UsageError(arguments.scene + ": gives its object pairs, so --self has nothing to add");
-  }
-  ContactQuery query;
-  const QueryRecord record = run_query(arguments, scene, query);
-  const ContactTable table = make_table(query.pairs(), query.contacts());
-  if (!arguments.out.empty()) write_contacts(arguments.out, table, record);
+  if (!arguments.out.empty()) keep_inputs(arguments.out, files_of(arguments.scene, scene));
+  check_arguments(arguments, scene);
+  const Answer answer = (arguments.on_gpu() ? answer_of_gpu : answer_of_cpu)(arguments, scene);
+  if (!arguments.out.empty()) write_contacts(arguments.out, answer.table, answer.record);
   if (arguments.json) {
-    std::puts(pretty(to_json(arguments, scene, record, hash_of(table))).c_str());
+    std::puts(pretty(to_json(arguments, scene, answer)).c_str());
   } else {
-    print_summary(arguments, scene, record, hash_of(table));
+    print_summary(arguments, scene, answer);
   }
   return kDone;
 }
 
 CLI::Validator backend() {
   const auto defect = [](const std::string& word) -> std::string {
-    if (word == "cpu") return {};
-    return word == "cuda" ? "queries on a GPU are not there yet" : word + " is neither cpu nor cuda";
+    if (word == "cpu" || (kHaveCuda && word == "cuda")) return {};
+    return word == "cuda" ? "this bvhbench was built without CUDA, so it has no GPU"
+                          : word + " is neither cpu nor cuda";
   };
   return CLI::Validator(defect, "");
 }
 
 }  // namespace
+
+void refuse(const std::string& scene, Status status, std::uint64_t where) {
+  if (status == Status::kOutOfMemory) throw std::bad_alloc();
+  const char* unit = subject(status);
+  const std::string blamed = unit == nullptr ? "" : std::string(unit) + " " + std::to_string(where) + ": ";
+  const std::string text = scene + ": " + blamed + explain(status);
+  if (status == Status::kCannotStartThread) throw std::runtime_error(text);
+  throw FileError(text);
+}
 
 CLI::App* add_query(CLI::App& app, Run& run_later) {
   const auto arguments = std::make_shared<QueryArguments>();
@@ -166,23 +270,32 @@ CLI::App* add_query(CLI::App& app, Run& run_later) {
   command->add_option("SCENE", arguments->scene, "scene file (HDF5)")->required()->check(file_name());
   command->add_option("--backend", arguments->backend, "what the query runs on")
       ->check(backend())
-      ->option_text("cpu [cpu]");
+      ->option_text(kHaveCuda ? "cpu|cuda [cpu]" : "cpu [cpu]");
+  if constexpr (kHaveCuda) {
+    add_choice(*command, "--engine", kEngines, arguments->engine,
+               "on a GPU: Tandem's, or the paper's scheme, the yardstick")
+        ->option_text("tandem|paper|paper-bits [tandem]");
+  }
   add_choice(*command, "--mode", kModes, options.mode,
              "'exact' contacts, 'fast' ones by float32, or 'boxes': candidates")
       ->option_text("exact|fast|boxes [exact]");
   command->add_flag("--first-contact", options.first_contact_only,
                     "one contact for each object pair at most");
   command->add_flag("--self", options.self_pairs, "also each instance with itself");
-  command->add_option("--threads", options.threads, "threads; the contacts do not depend on them")
-      ->check(CLI::Range(1, 4096))
-      ->option_text("N [all]");
+  CLI::Option* threads =
+      command->add_option("--threads", options.threads, "threads; the contacts do not depend on them")
+          ->check(CLI::Range(1u, kMostQueryThreads))
+          ->option_text("N [all]");
   command->add_option("--repeat", arguments->repeats, "times to run the query, for its timing")
       ->check(CLI::Range(1, 1000000))
       ->option_text("N [1]");
   command->add_option("--out", arguments->out, "the contacts file to write; appears whole or not at all")
       ->check(file_name());
   command->add_flag("--json", arguments->json, "print the summary as JSON");
-  command->final_callback([arguments, &run_later] { run_later = [arguments] { return run(*arguments); }; });
+  command->final_callback([arguments, threads, &run_later] {
+    arguments->threads_given = threads->count() > 0;
+    run_later = [arguments] { return run(*arguments); };
+  });
   return command;
 }
 

@@ -1,0 +1,471 @@
+#include "tandem/kernels/gpu_broad_phase.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace tandem {
+namespace {
+
+class GpuBroadPhaseTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    int count = 0;
+    if (cudaGetDeviceCount(&count) != cudaSuccess || count == 0) {
+      static_cast<void>(cudaGetLastError());
+      GTEST_SKIP() << "no GPU here";
+    }
+  }
+};
+
+// A copy in GPU memory.
+template <typename Value>
+class OnDevice {
+ public:
+  explicit OnDevice(const std::vector<Value>& values) {
+    EXPECT_EQ(cudaMalloc(&data_, std::max<std::size_t>(values.size(), 1) * sizeof(Value)), cudaSuccess);
+    write(values);
+  }
+  OnDevice(const OnDevice&) = delete;
+  OnDevice& operator=(const OnDevice&) = delete;
+  ~OnDevice() { cudaFree(data_); }
+
+  void write(const std::vector<Value>& values) {
+    EXPECT_EQ(cudaMemcpy(data_, values.data(), values.size() * sizeof(Value), cudaMemcpyHostToDevice),
+              cudaSuccess);
+  }
+  Value* data() const { return data_; }
+
+ private:
+  Value* data_ = nullptr;
+};
+
+template <typename Value>
+std::vector<Value> download(const Value* device, std::size_t count) {
+  std::vector<Value> host(count);
+  EXPECT_EQ(cudaMemcpy(host.data(), device, count * sizeof(Value), cudaMemcpyDeviceToHost), cudaSuccess);
+  return host;
+}
+
+using Boxes = std::vector<WorldBox>;
+using Pairs = std::vector<ObjectPair>;
+
+bool before(const ObjectPair& x, const ObjectPair& y) {
+  return x.a != y.a ? x.a < y.a : x.b < y.b;
+}
+
+bool same(const Pairs& x, const Pairs& y) {
+  return x.size() == y.size() && (x.empty() || std::memcmp(x.data(), y.data(), x.size() * sizeof x[0]) == 0);
+}
+
+Pairs of_cpu(const Boxes& boxes) {
+  BroadPhase broad_phase;
+  EXPECT_EQ(broad_phase.find_pairs(boxes), Status::kOk);
+  return {broad_phase.pairs().begin(), broad_phase.pairs().end()};
+}
+
+// What the last call stored.
+Pairs stored(const GpuBroadPhase& broad_phase) {
+  const GpuPairs pairs = broad_phase.pairs();
+  return download(pairs.pairs, std::min(download(pairs.count, 1)[0], pairs.capacity));
+}
+
+Pairs of_gpu(GpuBroadPhase& broad_phase, const Boxes& boxes, bool sorted) {
+  const OnDevice<WorldBox> device(boxes);
+  EXPECT_EQ(
+      broad_phase.find_pairs(device.data(), static_cast<std::uint32_t>(boxes.size()), {sorted}, nullptr),
+      Status::kOk)
+      << cudaGetErrorString(broad_phase.cuda_error());
+  EXPECT_EQ(broad_phase.report().complete, 1u);
+  Pairs pairs = stored(broad_phase);
+  EXPECT_EQ(pairs.size(), broad_phase.report().found);
+  if (!sorted) std::sort(pairs.begin(), pairs.end(), before);
+  return pairs;
+}
+
+void expect_same_as_cpu(GpuBroadPhase& broad_phase, const Boxes& boxes, const std::string& what) {
+  const Pairs expected = of_cpu(boxes);
+  EXPECT_TRUE(same(of_gpu(broad_phase, boxes, false), expected))
+      << what << ", " << expected.size() << " pairs";
+  EXPECT_TRUE(same(of_gpu(broad_phase, boxes, true), expected)) << what << ", sorted";
+}
+
+// The edge of equal cubes in the unit cube that have so many neighbours each.
+double edge_for(std::size_t count, double neighbours) {
+  return 0.5 * std::cbrt(neighbours / static_cast<double>(count));
+}
+
+// Boxes in the unit cube, edges up to `edge`, `spread` orders of magnitude apart.
+Boxes scattered(std::size_t count, double edge, double spread, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  Boxes boxes(count);
+  for (WorldBox& box : boxes) {
+    const double size = edge * std::pow(10, -spread * uniform(random));
+    for (int k = 0; k < 3; ++k) {
+      box.lo[k] = uniform(random);
+      box.hi[k] = box.lo[k] + size * (0.5 + uniform(random));
+    }
+  }
+  return boxes;
+}
+
+Boxes transformed(Boxes boxes, double scale, double offset) {
+  for (WorldBox& box : boxes) {
+    for (int k = 0; k < 3; ++k) {
+      box.lo[k] = box.lo[k] * scale + offset;
+      box.hi[k] = box.hi[k] * scale + offset;
+    }
+  }
+  return boxes;
+}
+
+// Unit cubes on a lattice, each of which touches 26 others exactly.
+Boxes lattice(int side, double offset) {
+  Boxes boxes;
+  for (int i = 0; i < side * side * side; ++i) {
+    const double x = offset + i % side, y = offset + i / side % side, z = offset + i / side / side;
+    boxes.push_back({{x, y, z}, {x + 1, y + 1, z + 1}});
+  }
+  return boxes;
+}
+
+TEST_F(GpuBroadPhaseTest, FewBoxes) {
+  GpuBroadPhase broad_phase;
+  for (const std::size_t count :
+       {0, 1, 2, 3, 4, 5, 31, 32, 33, 64, 65, 1000, 1023, 1024, 1025, 3000, 33000}) {
+    for (const double spread : {0.0, 3.0}) {
+      const double edge = 4 * edge_for(count + 1, 6);
+      expect_same_as_cpu(broad_phase, scattered(count, edge, spread, count), std::to_string(count));
+    }
+  }
+}
+
+TEST_F(GpuBroadPhaseTest, ManyDistributions) {
+  constexpr std::size_t kCount = 100000;
+  const double edge = edge_for(kCount, 6.5);
+  GpuBroadPhase broad_phase;
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal;
+  const auto check = [&](const char* what, const Boxes& boxes) {
+    expect_same_as_cpu(broad_phase, boxes, what);
+  };
+
+  check("uniform", scattered(kCount, edge, 0, 1));
+  check("twenty neighbours", scattered(kCount, edge_for(kCount, 20), 0, 2));
+  check("six orders of size", scattered(kCount, 30 * edge, 6, 3));
+  check("far", transformed(scattered(kCount, edge, 0, 4), 100, 1e7));
+  check("very far", transformed(scattered(kCount, edge, 0, 5), 100, 1e15));
+  check("huge", transformed(scattered(kCount, edge, 1, 6), 1e299, -1e299));
+  check("tiny", transformed(scattered(kCount, edge, 1, 7), 1e-300, 0));
+  check("touching", lattice(46, 0.1));
+  check("touching, far", lattice(46, 1e15));
+
+  Boxes plane = scattered(kCount, edge_for(kCount, 6.5), 0, 8);
+  for (WorldBox& box : plane) {
+    box.lo[2] = 0;
+    box.hi[2] = edge;
+  }
+  check("plane", plane);
+
+  // Fewer where the CPU's way is quadratic.
+  constexpr std::size_t kFewer = 20000;
+  Boxes clusters = scattered(kFewer, edge, 0, 9);
+  for (std::size_t i = 0; i < kFewer; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      const double shift = i % 7 == 0 ? 0 : std::pow(10, static_cast<double>(i % 7));
+      clusters[i].lo[k] += shift;
+      clusters[i].hi[k] += shift;
+    }
+  }
+  check("clusters", clusters);
+
+  Boxes flown = scattered(kFewer, edge_for(kFewer, 6.5), 0, 10);
+  for (std::size_t i = 0; i < 5; ++i) {
+    flown[i * 1000].lo[0] = std::pow(10, 60.0 * static_cast<double>(i));
+    flown[i * 1000].hi[0] = 2 * flown[i * 1000].lo[0];
+  }
+  check("some flown away", flown);
+
+  Boxes bell = scattered(kCount, 0.01, 1, 11);
+  for (WorldBox& box : bell) {
+    for (int k = 0; k < 3; ++k) {
+      const double shift = std::pow(normal(random), 3);
+      box.lo[k] += shift;
+      box.hi[k] += shift;
+    }
+  }
+  check("dense in the middle", bell);
+
+  Boxes sticks = scattered(kCount, edge / 2, 0, 12);
+  for (std::size_t i = 0; i < kCount; i += 100) sticks[i].hi[i / 100 % 3] += 1;
+  check("sticks", sticks);
+
+  Boxes grounds = scattered(kFewer, edge_for(kFewer, 6.5), 0, 13);
+  grounds[0] = {{-1e12, -1e12, -1e12}, {1e12, 1e12, 0.5}};
+  grounds[kFewer - 1] = {{-1, -1, -1}, {2, 2, 0.01}};
+  grounds[kFewer / 2] = {{-1e300, -1e300, -1e300}, {1e300, 1e300, 1e300}};
+  check("grounds", grounds);
+}
+
+TEST_F(GpuBroadPhaseTest, BoxesInOnePlace) {
+  GpuBroadPhase broad_phase;
+  expect_same_as_cpu(broad_phase, Boxes(3000, {{1, 2, 3}, {1, 2, 3}}), "points");
+  expect_same_as_cpu(broad_phase, Boxes(3000, {{-1, -1, -1}, {1, 1, 1}}), "cubes");
+  expect_same_as_cpu(broad_phase, Boxes(3000, {{0, 0, 0}, {0, 0, 0}}), "nothing");
+  Boxes nested;
+  for (int i = 0; i < 3000; ++i) {
+    const double size = std::pow(1.1, i);
+    nested.push_back({{-size, -size, -size}, {size, size, size}});
+  }
+  expect_same_as_cpu(broad_phase, nested, "nested");
+}
+
+TEST_F(GpuBroadPhaseTest, SubnormalNumbersAreDecidedAsTheyAre) {
+  constexpr double kLeast = std::numeric_limits<double>::denorm_min();
+  GpuBroadPhase broad_phase;
+  Boxes boxes = lattice(20, 0);
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    for (int k = 0; k < 3; ++k) {
+      boxes[i].lo[k] *= 3 * kLeast;
+      boxes[i].hi[k] = boxes[i].lo[k] + static_cast<double>(i % 4) * kLeast;
+    }
+  }
+  expect_same_as_cpu(broad_phase, boxes, "all subnormal");
+  boxes.push_back({{-1, -1, -1}, {1, 1, 1}});
+  boxes.push_back({{kLeast, -1, -1}, {1, 1, 1}});
+  expect_same_as_cpu(broad_phase, boxes, "subnormal in the middle of a large one");
+}
+
+TEST_F(GpuBroadPhaseTest, TouchingByTheLastBitIsMeeting) {
+  GpuBroadPhase broad_phase;
+  for (const double x : {1.0, 0.1, 1e7 + 0.1, -3e-200, 1e299}) {
+    const double next = std::nextafter(x, 1e300), size = std::fmax(1, std::fabs(x));
+    const Boxes boxes = {{{x - size, 0, 0}, {x, 1, 1}},
+                         {{x, 0, 0}, {x + size, 1, 1}},
+                         {{next, 0, 0}, {x + size, 1, 1}},
+                         {{x - 1e3, 5, 5}, {x + 1e3, 6, 6}}};
+    const Pairs pairs = of_gpu(broad_phase, boxes, true);
+    EXPECT_TRUE(same(pairs, {{0, 1}, {1, 2}})) << x;
+  }
+}
+
+TEST_F(GpuBroadPhaseTest, AMillionBoxes) {
+  constexpr std::size_t kCount = 1000000;
+  GpuBroadPhase broad_phase;
+  expect_same_as_cpu(broad_phase, scattered(kCount, edge_for(kCount, 6.5), 0, 21), "uniform");
+  Boxes boxes = scattered(kCount, 3 * edge_for(kCount, 6.5), 2, 22);
+  boxes[77] = {{-10, -10, -10}, {10, 10, 10}};
+  expect_same_as_cpu(broad_phase, boxes, "mixed sizes on a ground");
+}
+
+TEST_F(GpuBroadPhaseTest, OverflowIsReportedAndARetryLosesNothing) {
+  const Boxes boxes = scattered(20000, edge_for(20000, 20), 0, 31);
+  const auto count = static_cast<std::uint32_t>(boxes.size());
+  const Pairs expected = of_cpu(boxes);
+  const OnDevice<WorldBox> device(boxes);
+  for (const bool sorted : {false, true}) {
+    GpuBroadPhase broad_phase;
+    for (const std::uint32_t room : {0u, 1u, 1000u, static_cast<std::uint32_t>(expected.size()) - 1}) {
+      ASSERT_EQ(broad_phase.reserve({count, room}, {sorted}), Status::kOk);
+      ASSERT_EQ(broad_phase.enqueue(device.data(), count, {sorted}, nullptr), Status::kOk);
+      ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
+      EXPECT_EQ(broad_phase.report().status, Status::kOk);
+      EXPECT_EQ(broad_phase.report().complete, 0u);
+      EXPECT_EQ(broad_phase.report().found, expected.size());
+      Pairs some = stored(broad_phase);  // room for them: each is one of the expected, and none comes twice
+      ASSERT_EQ(some.size(), room);
+      std::sort(some.begin(), some.end(), before);
+      EXPECT_TRUE(std::includes(expected.begin(), expected.end(), some.begin(), some.end(), before));
+    }
+    ASSERT_EQ(broad_phase.reserve({count, broad_phase.report().count}, {sorted}), Status::kOk);
+    ASSERT_EQ(broad_phase.enqueue(device.data(), count, {sorted}, nullptr), Status::kOk);
+    ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
+    EXPECT_EQ(broad_phase.report().complete, 1u);
+    Pairs all = stored(broad_phase);
+    if (!sorted) std::sort(all.begin(), all.end(), before);
+    EXPECT_TRUE(same(all, expected));
+  }
+}
+
+TEST_F(GpuBroadPhaseTest, NamesTheFirstBoxThatItCannotTakeAndGoesOnAfterwards) {
+  GpuBroadPhase broad_phase;
+  for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity(), -1.0000001e300}) {
+    for (const std::size_t count : {1, 40, 5000}) {
+      Boxes boxes = scattered(count, 0.1, 0, 41);
+      const Boxes good = boxes;
+      boxes[count - 1].hi[1] = boxes[count / 2].lo[2] = bad;
+      const OnDevice<WorldBox> device(boxes);
+      EXPECT_EQ(broad_phase.find_pairs(device.data(), static_cast<std::uint32_t>(count), {}, nullptr),
+                Status::kOutOfRange);
+      EXPECT_EQ(broad_phase.report().where, count / 2);
+      EXPECT_EQ(stored(broad_phase).size(), 0u);
+      EXPECT_EQ(broad_phase.report().found, 0u);
+      expect_same_as_cpu(broad_phase, good, "after an error");
+    }
+  }
+  const OnDevice<WorldBox> device(Boxes(10, {{0, 0, 0}, {1, 1, 1}}));
+  GpuBroadPhase unprepared;
+  EXPECT_EQ(unprepared.enqueue(device.data(), 10, {}, nullptr), Status::kOutOfRange);
+  const auto* shifted = reinterpret_cast<const WorldBox*>(reinterpret_cast<const char*>(device.data()) + 8);
+  EXPECT_EQ(broad_phase.enqueue(shifted, 9, {}, nullptr), Status::kMisaligned);
+}
+
+Boxes moved(const Boxes& boxes, const std::vector<std::array<double, 3>>& speeds, double time) {
+  Boxes result = boxes;
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    for (int k = 0; k < 3; ++k) {
+      result[i].lo[k] += time * speeds[i][k];
+      result[i].hi[k] += time * speeds[i][k];
+    }
+  }
+  return result;
+}
+
+TEST_F(GpuBroadPhaseTest, FramesOfMovingBoxesTakeNoNewMemory) {
+  const Boxes start = scattered(30000, edge_for(30000, 6.5), 1, 51);
+  std::mt19937_64 random(52);
+  std::normal_distribution<double> normal(0, 0.01);
+  std::vector<std::array<double, 3>> speeds(start.size());
+  for (auto& speed : speeds) speed = {normal(random), normal(random), normal(random)};
+  GpuBroadPhase broad_phase;
+  const auto count = static_cast<std::uint32_t>(start.size());
+  ASSERT_EQ(broad_phase.reserve({count, 8 * count}, {true}), Status::kOk);
+  const std::size_t bytes = broad_phase.bytes();
+  const ObjectPair* place = broad_phase.pairs().pairs;
+  for (int frame = 0; frame < 20; ++frame)
+    expect_same_as_cpu(broad_phase, moved(start, speeds, frame), std::to_string(frame));
+  EXPECT_EQ(broad_phase.bytes(), bytes);
+  EXPECT_EQ(broad_phase.pairs().pairs, place);
+}
+
+TEST_F(GpuBroadPhaseTest, ObjectsOnSeveralStreamsAndThreadsDoNotDisturbEachOther) {
+  const auto work = [](std::uint64_t seed) {
+    const Boxes boxes = scattered(20000, edge_for(20000, 10), 1, seed);
+    const Pairs expected = of_cpu(boxes);
+    const auto count = static_cast<std::uint32_t>(boxes.size());
+    const OnDevice<WorldBox> device(boxes);
+    cudaStream_t stream;
+    ASSERT_EQ(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), cudaSuccess);
+    {
+      GpuBroadPhase first;
+      ASSERT_EQ(first.reserve({count, 10 * count}, {true}), Status::kOk);
+      GpuBroadPhase broad_phase = std::move(first);
+      for (int i = 0; i < 20; ++i)
+        ASSERT_EQ(broad_phase.enqueue(device.data(), count, {true}, stream), Status::kOk);
+      ASSERT_EQ(cudaStreamSynchronize(stream), cudaSuccess);
+      EXPECT_EQ(broad_phase.report().complete, 1u);
+      EXPECT_TRUE(same(stored(broad_phase), expected));
+    }
+    EXPECT_EQ(cudaStreamDestroy(stream), cudaSuccess);
+  };
+  std::vector<std::thread> threads;
+  for (std::uint64_t seed = 61; seed < 64; ++seed) threads.emplace_back(work, seed);
+  for (std::thread& thread : threads) thread.join();
+}
+
+TEST_F(GpuBroadPhaseTest, MayBeCapturedIntoAGraph) {
+  const Boxes boxes = scattered(20000, edge_for(20000, 10), 1, 71), later = scattered(20000, 0.02, 0, 72);
+  const auto count = static_cast<std::uint32_t>(boxes.size());
+  const OnDevice<WorldBox> device(boxes);
+  GpuBroadPhase broad_phase;
+  ASSERT_EQ(broad_phase.reserve({count, 10 * count}, {true}), Status::kOk);
+  cudaStream_t stream;
+  ASSERT_EQ(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), cudaSuccess);
+  ASSERT_EQ(cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal), cudaSuccess);
+  EXPECT_EQ(broad_phase.enqueue(device.data(), count, {true}, stream), Status::kOk);
+  cudaGraph_t graph;
+  ASSERT_EQ(cudaStreamEndCapture(stream, &graph), cudaSuccess);
+  cudaGraphExec_t run;
+  ASSERT_EQ(cudaGraphInstantiate(&run, graph, 0), cudaSuccess);
+  for (const Boxes* frame : {&boxes, &later, &boxes}) {
+    OnDevice<WorldBox> upload(*frame);
+    ASSERT_EQ(cudaMemcpy(device.data(), upload.data(), count * sizeof(WorldBox), cudaMemcpyDeviceToDevice),
+              cudaSuccess);
+    ASSERT_EQ(cudaDeviceSynchronize(), cudaSuccess);
+    ASSERT_EQ(cudaGraphLaunch(run, stream), cudaSuccess);
+    ASSERT_EQ(cudaStreamSynchronize(stream), cudaSuccess);
+    EXPECT_TRUE(same(stored(broad_phase), of_cpu(*frame)));
+  }
+  cudaGraphExecDestroy(run);
+  cudaGraphDestroy(graph);
+  cudaStreamDestroy(stream);
+}
+
+Pose random_pose(std::mt19937_64& random, double distance) {
+  std::normal_distribution<double> normal;
+  double q[4], length = 0;
+  for (double& x : q) {
+    x = normal(random);
+    length += x * x;
+  }
+  for (double& x : q) x /= std::sqrt(length);
+  const auto [w, x, y, z] = q;
+  return {{{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
+           {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
+           {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}},
+          {distance * normal(random), distance * normal(random), distance * normal(random)}};
+}
+
+struct Instances {
+  std::vector<std::uint32_t> asset;
+  std::vector<Pose> pose;
+};
+
+Status find_pairs(GpuBroadPhase& broad_phase, const Instances& instances,
+                  const std::vector<AssetBounds>& bounds) {
+  const OnDevice<std::uint32_t> asset(instances.asset);
+  const OnDevice<Pose> pose(instances.pose);
+  const OnDevice<AssetBounds> assets(bounds);
+  return broad_phase.find_pairs(
+      {asset.data(), pose.data(), static_cast<std::uint32_t>(instances.asset.size())},
+      {assets.data(), static_cast<std::uint32_t>(bounds.size())}, {true}, nullptr);
+}
+
+TEST_F(GpuBroadPhaseTest, PosesInstancesBitByBitAsTheCpu) {
+  const std::vector<AssetBounds> bounds = {{{0, 0, 0}, {-1, -0.5f, -0.25f}, {1, 0.5f, 0.75f}},
+                                           {{1e6, -2e6, 0.1}, {0, 0, 0}, {3, 2, 1}},
+                                           {{0, 0, 0}, {1e-40f, -1e-30f, 0}, {1e-39f, 0, 7}}};
+  std::mt19937_64 random(81);
+  Instances instances;
+  for (int i = 0; i < 20000; ++i) {
+    instances.asset.push_back(random() % 3);
+    instances.pose.push_back(random_pose(random, i % 2 == 0 ? 20 : 1e9));
+  }
+  Boxes boxes;
+  for (std::size_t i = 0; i < instances.asset.size(); ++i) {
+    const AssetBounds& asset = bounds[instances.asset[i]];
+    boxes.push_back(
+        world_box(for_stored_coordinates(instances.pose[i], asset.origin), asset.lower, asset.upper));
+  }
+  GpuBroadPhase broad_phase;
+  ASSERT_EQ(find_pairs(broad_phase, instances, bounds), Status::kOk);
+  const Boxes posed = download(broad_phase.boxes(), boxes.size());
+  EXPECT_EQ(std::memcmp(posed.data(), boxes.data(), boxes.size() * sizeof(WorldBox)), 0);
+  const Pairs expected = of_cpu(boxes);
+  EXPECT_GT(expected.size(), 1000u);
+  EXPECT_TRUE(same(stored(broad_phase), expected));
+
+  instances.pose[700].translation[0] = 1e301;
+  instances.pose[600].rotation[1][1] += 1e-3;
+  instances.asset[500] = 3;
+  EXPECT_EQ(find_pairs(broad_phase, instances, bounds), Status::kUnknownAsset);
+  EXPECT_EQ(broad_phase.report().where, 500u);
+  instances.asset[500] = 2;
+  EXPECT_EQ(find_pairs(broad_phase, instances, bounds), Status::kPoseNotRigid);
+  EXPECT_EQ(broad_phase.report().where, 600u);
+  instances.pose[600] = kIdentityPose;
+  EXPECT_EQ(find_pairs(broad_phase, instances, bounds), Status::kOutOfRange);
+  EXPECT_EQ(broad_phase.report().where, 700u);
+}
+
+}  // namespace
+}  // namespace tandem

@@ -1,0 +1,468 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cctype>
+#include <map>
+#include <memory>
+#include <tuple>
+#include <vector>
+
+#include "kernels/query_scenes.h"
+#include "kernels/triangle_families.h"
+#include "tandem/kernels/contact_query.h"
+#include "tandem/kernels/gpu_contact_query.h"
+#include "tandem/kernels/triangle_test.h"
+#include "tandem/runtime/upload.h"
+
+namespace tandem {
+namespace {
+
+using test::RandomPoses;
+using test::Scene;
+
+constexpr QueryMode kModes[] = {QueryMode::exact, QueryMode::fast, QueryMode::boxes};
+
+/// An array in GPU memory.
+template <typename Element>
+class OnGpu {
+ public:
+  explicit OnGpu(const std::vector<Element>& host) : size_(host.size()) {
+    void* memory = nullptr;
+    EXPECT_EQ(cudaMalloc(&memory, std::max<std::size_t>(size_, 1) * sizeof(Element)), cudaSuccess);
+    data_ = static_cast<Element*>(memory);
+    EXPECT_EQ(cudaMemcpy(data_, host.data(), size_ * sizeof(Element), cudaMemcpyHostToDevice), cudaSuccess);
+  }
+  OnGpu(const OnGpu&) = delete;
+  OnGpu& operator=(const OnGpu&) = delete;
+  ~OnGpu() { cudaFree(data_); }
+
+  Element* data() const { return data_; }
+
+ private:
+  Element* data_ = nullptr;
+  std::size_t size_;
+};
+
+template <typename Value>
+std::vector<Value> download(const Value* device, std::size_t count) {
+  std::vector<Value> host(count);
+  EXPECT_EQ(cudaMemcpy(host.data(), device, count * sizeof(Value), cudaMemcpyDeviceToHost), cudaSuccess);
+  return host;
+}
+
+auto key(const Contact& c) {
+  return std::tie(c.pair, c.triangle_a, c.triangle_b, c.face_a, c.face_b);
+}
+
+std::vector<Contact> sorted(std::vector<Contact> contacts) {
+  std::sort(contacts.begin(), contacts.end(),
+            [](const Contact& x, const Contact& y) { return key(x) < key(y); });
+  return contacts;
+}
+
+/// A scene, all of it in GPU memory, and its object pairs.
+class GpuScene {
+ public:
+  GpuScene(const test::SampleAssets& assets, const std::vector<Instance>& instances,
+           const std::vector<ObjectPair>& pairs)
+      : asset_(assets_of(instances)),
+        pose_(poses_of(instances)),
+        pairs_(pairs),
+        count_({static_cast<std::uint32_t>(pairs.size())}),
+        instance_count_(static_cast<std::uint32_t>(instances.size())),
+        pair_count_(static_cast<std::uint32_t>(pairs.size())) {
+    for (const AssetView& view : assets.views()) {
+      uploads_.push_back(std::make_unique<DeviceAsset>());
+      EXPECT_EQ(uploads_.back()->upload(view, nullptr), Status::kOk);
+      views_.push_back(gpu_asset(uploads_.back()->level(), *view.header));
+    }
+  }
+
+  std::span<const GpuAsset> assets() const { return views_; }
+  GpuInstances instances() const { return {asset_.data(), pose_.data(), instance_count_}; }
+  GpuPairs pairs() const { return {pairs_.data(), count_.data(), pair_count_}; }
+
+ private:
+  static std::vector<std::uint32_t> assets_of(const std::vector<Instance>& instances) {
+    std::vector<std::uint32_t> out;
+    for (const Instance& instance : instances) out.push_back(instance.asset);
+    return out;
+  }
+  static std::vector<Pose> poses_of(const std::vector<Instance>& instances) {
+    std::vector<Pose> out;
+    for (const Instance& instance : instances) out.push_back(instance.pose);
+    return out;
+  }
+
+  std::vector<std::unique_ptr<DeviceAsset>> uploads_;
+  std::vector<GpuAsset> views_;
+  OnGpu<std::uint32_t> asset_;
+  OnGpu<Pose> pose_;
+  OnGpu<ObjectPair> pairs_;
+  OnGpu<std::uint32_t> count_;
+  std::uint32_t instance_count_, pair_count_;
+};
+
+std::vector<Contact> contacts_of(const GpuContactQuery& query) {
+  return sorted(download(query.contacts(), query.report().contacts));
+}
+
+/// Both answers to the same question.
+struct Answers {
+  Status cpu_status, gpu_status;
+  std::uint64_t cpu_where = 0, gpu_where = 0;
+  std::vector<Contact> cpu, gpu;
+  QueryCounters cpu_counters, gpu_counters;
+};
+
+Answers ask(const test::SampleAssets& assets, const std::vector<Instance>& instances,
+            const std::vector<ObjectPair>& pairs, QueryMode mode, bool first_contact_only = false) {
+  Answers out;
+  ContactQuery cpu;
+  EXPECT_EQ(cpu.set_assets(assets.views()), Status::kOk);
+  QueryOptions options;
+  options.mode = mode;
+  options.first_contact_only = first_contact_only;
+  out.cpu_status = cpu.find_contacts(instances, pairs, options);
+  out.cpu_where = cpu.where();
+  out.cpu = sorted({cpu.contacts().begin(), cpu.contacts().end()});
+  out.cpu_counters = cpu.counters();
+
+  const GpuScene scene(assets, instances, pairs);
+  GpuContactQuery gpu;
+  EXPECT_EQ(gpu.set_assets(scene.assets(), nullptr), Status::kOk) << cudaGetErrorString(gpu.cuda_error());
+  out.gpu_status = gpu.find_contacts(scene.instances(), scene.pairs(), {mode, first_contact_only}, nullptr);
+  EXPECT_EQ(gpu.cuda_error(), cudaSuccess) << cudaGetErrorString(gpu.cuda_error());
+  out.gpu_where = gpu.report().where;
+  out.gpu = contacts_of(gpu);
+  out.gpu_counters = gpu.report().counters;
+  return out;
+}
+
+void expect_equal(const Answers& answers, QueryMode mode) {
+  ASSERT_EQ(answers.gpu_status, answers.cpu_status);
+  if (answers.cpu_status != Status::kOk) EXPECT_EQ(answers.gpu_where, answers.cpu_where);
+  ASSERT_EQ(answers.gpu.size(), answers.cpu.size());
+  EXPECT_EQ(answers.gpu, answers.cpu);
+  EXPECT_EQ(answers.gpu_counters.contacts, answers.cpu_counters.contacts);
+  EXPECT_EQ(answers.gpu_counters.object_pairs, answers.cpu_counters.object_pairs);
+  if (mode == QueryMode::exact) return;  // fused operations may shift candidates within the slack
+  EXPECT_EQ(answers.gpu_counters.block_pairs, answers.cpu_counters.block_pairs);
+  EXPECT_EQ(answers.gpu_counters.candidates, answers.cpu_counters.candidates);
+  EXPECT_EQ(answers.gpu_counters.decided_by_float32, answers.cpu_counters.decided_by_float32);
+}
+
+/// Every two instances, in either order, and with `selves` each with itself.
+std::vector<ObjectPair> all_pairs(const std::vector<Instance>& instances, bool selves, RandomPoses& random) {
+  std::vector<ObjectPair> pairs;
+  const auto count = static_cast<std::uint32_t>(instances.size());
+  for (std::uint32_t a = 0; a < count; ++a) {
+    for (std::uint32_t b = selves ? a : a + 1; b < count; ++b) {
+      pairs.push_back(random.below(2) == 0 ? ObjectPair{a, b} : ObjectPair{b, a});
+    }
+  }
+  return pairs;
+}
+
+bool no_gpu() {
+  int count = 0;
+  if (cudaGetDeviceCount(&count) == cudaSuccess && count > 0) return false;
+  static_cast<void>(cudaGetLastError());
+  return true;
+}
+
+class GpuContacts : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (no_gpu()) GTEST_SKIP() << "no GPU here";
+  }
+};
+
+class GpuContactsOf : public testing::TestWithParam<test::SceneFamily> {
+ protected:
+  void SetUp() override {
+    if (no_gpu()) GTEST_SKIP() << "no GPU here";
+  }
+};
+
+TEST_P(GpuContactsOf, AreThoseOfTheCpu) {
+  RandomPoses random(1);
+  for (int trial = 0; trial < test::trials(25, 20); ++trial) {
+    const Scene scene = GetParam().make(random);
+    const std::vector<ObjectPair> pairs = all_pairs(scene.instances, trial % 2 == 0, random);
+    for (const QueryMode mode : kModes) {
+      SCOPED_TRACE(testing::Message() << "trial " << trial << " mode " << static_cast<int>(mode) << '\n'
+                                      << test::text(scene));
+      expect_equal(ask(scene.assets, scene.instances, pairs, mode), mode);
+      if (HasFatalFailure() || HasNonfatalFailure()) return;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(, GpuContactsOf, testing::ValuesIn(test::scene_families()),
+                         [](const auto& family) { return std::string(family.param.name); });
+
+/// Bodies at random places, close enough to meet.
+Scene pile(std::uint32_t bodies, std::uint32_t triangles, double spread, std::uint64_t seed) {
+  RandomPoses random(seed);
+  Scene scene;
+  scene.assets.add(test::soup(random, triangles, 0.1));
+  scene.assets.add(test::cube(0.5f, 12));
+  for (std::uint32_t i = 0; i < bodies; ++i) {
+    scene.instances.push_back({i % 2, random.pose({1, 1, spread, 0, 4})});
+  }
+  return scene;
+}
+
+TEST_F(GpuContacts, OfAPileAreThoseOfTheCpu) {
+  RandomPoses random(2);
+  const Scene scene = pile(150, 3000, 4, 7);
+  const auto pairs = all_pairs(scene.instances, false, random);
+  for (const QueryMode mode : kModes) {
+    const Answers answers = ask(scene.assets, scene.instances, pairs, mode);
+    EXPECT_GT(answers.cpu.size(), 10000u);
+    expect_equal(answers, mode);
+  }
+}
+
+// One object pair: its work must be shared out among warps, and all of its triangles are hard cases.
+TEST_F(GpuContacts, OfCoincidentBodiesAreThoseOfTheCpu) {
+  RandomPoses random(3);
+  Scene scene;
+  scene.assets.add(test::cube(0.5f, 30));
+  scene.assets.add(test::soup(random, 8000, 0.05));
+  const Pose pose = random.pose({1, 1, 10, 0, 4});
+  scene.instances = {{0, pose}, {0, pose}, {1, pose}, {1, pose}};
+  for (const std::vector<ObjectPair>& pairs :
+       {std::vector<ObjectPair>{{0, 1}}, std::vector<ObjectPair>{{3, 2}, {1, 1}}}) {
+    for (const QueryMode mode : kModes) {
+      const Answers answers = ask(scene.assets, scene.instances, pairs, mode);
+      EXPECT_GT(answers.cpu.size(), 10000u);
+      expect_equal(answers, mode);
+    }
+  }
+}
+
+// Every node pair hits, so that stacks grow as fast as they can.
+TEST_F(GpuContacts, OfRepeatedTrianglesAreAllPairs) {
+  Scene scene;
+  test::Mesh mesh;
+  for (int i = 0; i < 700; ++i) mesh.add({0, 0, 0}, {1, 0, 0}, {0, 1, 0.5f});
+  scene.assets.add(mesh);
+  scene.instances = {{0, kIdentityPose}, {0, kIdentityPose}};
+  for (const QueryMode mode : {QueryMode::exact, QueryMode::boxes}) {
+    const Answers answers = ask(scene.assets, scene.instances, {{0, 1}}, mode);
+    EXPECT_EQ(answers.gpu.size(), 700u * 700u);
+    expect_equal(answers, mode);
+  }
+}
+
+TEST_F(GpuContacts, FarAwayAreThoseOfTheCpu) {
+  RandomPoses random(4);
+  for (const double far : {1e4, 1e7, 1e52}) {
+    Scene scene = pile(20, far > 1e10 ? 40 : 1000, 1, 8);
+    for (Instance& instance : scene.instances) instance.pose.translation[1] += far;
+    const auto pairs = all_pairs(scene.instances, false, random);
+    for (const QueryMode mode : kModes) expect_equal(ask(scene.assets, scene.instances, pairs, mode), mode);
+  }
+}
+
+TEST_F(GpuContacts, FirstOnesAreOfThePairsThatHaveAny) {
+  RandomPoses random(5);
+  const Scene scene = pile(60, 800, 3, 9);
+  const auto pairs = all_pairs(scene.instances, false, random);
+  for (const QueryMode mode : kModes) {
+    const Answers all = ask(scene.assets, scene.instances, pairs, mode);
+    const Answers first = ask(scene.assets, scene.instances, pairs, mode, true);
+    std::map<std::uint32_t, int> wanted, found;
+    for (const Contact& contact : all.cpu) wanted[contact.pair] = 1;
+    for (const Contact& contact : first.gpu) {
+      ++found[contact.pair];
+      EXPECT_TRUE(std::binary_search(all.cpu.begin(), all.cpu.end(), contact,
+                                     [](const Contact& x, const Contact& y) { return key(x) < key(y); }));
+    }
+    EXPECT_EQ(found, wanted);
+    EXPECT_EQ(first.gpu_counters.contacts, wanted.size());
+    EXPECT_LE(first.gpu_counters.block_pairs, all.gpu_counters.block_pairs);
+  }
+}
+
+TEST_F(GpuContacts, ThatDoNotFitAreAskedForAndFoundOnTheRetry) {
+  RandomPoses random(6);
+  const Scene scene = pile(40, 800, 2, 10);
+  const auto pairs = all_pairs(scene.instances, false, random);
+  const GpuScene on_gpu(scene.assets, scene.instances, pairs);
+  const Answers expected = ask(scene.assets, scene.instances, pairs, QueryMode::exact);
+  GpuContactQuery query;
+  ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
+  ASSERT_EQ(query.reserve({10, 100, 0}), Status::kOk);
+  ASSERT_EQ(query.enqueue(on_gpu.instances(), on_gpu.pairs(), {}, nullptr), Status::kOk);
+  ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
+  EXPECT_EQ(query.report().status, Status::kOk);
+  EXPECT_EQ(query.report().complete, 0u);
+  EXPECT_EQ(query.report().needed.pairs, pairs.size());
+  EXPECT_LE(query.report().contacts, 100u);
+
+  ASSERT_EQ(query.reserve({query.report().needed.pairs, 100, 0}), Status::kOk);
+  ASSERT_EQ(query.enqueue(on_gpu.instances(), on_gpu.pairs(), {}, nullptr), Status::kOk);
+  ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
+  EXPECT_EQ(query.report().complete, 0u);
+  EXPECT_EQ(query.report().contacts, 100u);
+  EXPECT_GT(query.report().needed.contacts, 100u);
+  EXPECT_LE(query.report().needed.contacts, expected.cpu.size());
+
+  ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, nullptr), Status::kOk);
+  EXPECT_EQ(query.report().complete, 1u);
+  EXPECT_EQ(contacts_of(query), expected.cpu);
+  const GpuQueryCapacity settled = query.capacity();
+  ASSERT_EQ(query.enqueue(on_gpu.instances(), on_gpu.pairs(), {}, nullptr), Status::kOk);
+  ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
+  EXPECT_EQ(query.report().complete, 1u);
+  EXPECT_EQ(contacts_of(query), expected.cpu);
+  EXPECT_EQ(query.capacity().contacts, settled.contacts);
+}
+
+TEST_F(GpuContacts, OfMorePairsThanTheirArrayHoldsAreNotComplete) {
+  const Scene scene = pile(4, 100, 1, 11);
+  const GpuScene on_gpu(scene.assets, scene.instances, {{0, 1}, {0, 2}, {0, 3}});
+  GpuContactQuery query;
+  ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
+  GpuPairs pairs = on_gpu.pairs();
+  pairs.capacity = 2;
+  EXPECT_EQ(query.find_contacts(on_gpu.instances(), pairs, {}, nullptr), Status::kOutOfRange);
+  EXPECT_EQ(query.report().complete, 0u);
+  EXPECT_EQ(query.report().needed.pairs, 3u);
+}
+
+TEST_F(GpuContacts, OfNothingAreNone) {
+  const Scene scene = pile(2, 100, 1, 11);
+  for (const bool instances : {false, true}) {
+    const GpuScene on_gpu(scene.assets, instances ? scene.instances : std::vector<Instance>(), {});
+    GpuContactQuery query;
+    ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
+    ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, nullptr), Status::kOk);
+    EXPECT_EQ(query.report().contacts, 0u);
+    EXPECT_EQ(query.report().counters, QueryCounters());
+  }
+}
+
+TEST_F(GpuContacts, NameWhatIsWrong) {
+  Scene scene = pile(50, 100, 1, 12);
+  std::vector<ObjectPair> pairs;
+  for (std::uint32_t i = 1; i < 50; ++i) pairs.push_back({0, i});
+  const auto expect = [&](Status status, std::uint64_t where) {
+    const Answers answers = ask(scene.assets, scene.instances, pairs, QueryMode::exact);
+    EXPECT_EQ(answers.gpu_status, status);
+    EXPECT_EQ(answers.gpu_where, where);
+    EXPECT_TRUE(answers.gpu.empty());
+    EXPECT_EQ(answers.cpu_status, status);
+    EXPECT_EQ(answers.cpu_where, where);
+  };
+  pairs[20].b = 50;
+  expect(Status::kUnknownInstance, 20);
+  scene.instances[40].asset = 2;
+  expect(Status::kUnknownAsset, 40);
+  scene.instances[33].pose.rotation[1][1] += 1e-3;
+  expect(Status::kPoseNotRigid, 33);
+  scene.instances[32].pose.translation[2] = NAN;
+  expect(Status::kPoseNotRigid, 32);
+  scene.instances[31].pose.translation[2] = 1e301;
+  expect(Status::kOutOfRange, 31);
+}
+
+TEST_F(GpuContacts, AreTheSameOnEveryRunSideBySideAndInAGraph) {
+  RandomPoses random(13);
+  const Scene scene = pile(100, 1500, 3, 13);
+  const auto pairs = all_pairs(scene.instances, false, random);
+  const Answers expected = ask(scene.assets, scene.instances, pairs, QueryMode::exact);
+  const GpuScene on_gpu(scene.assets, scene.instances, pairs);
+  constexpr int kQueries = 3;
+  GpuContactQuery queries[kQueries];
+  cudaStream_t streams[kQueries];
+  for (int i = 0; i < kQueries; ++i) {
+    ASSERT_EQ(cudaStreamCreateWithFlags(&streams[i], cudaStreamNonBlocking), cudaSuccess);
+    ASSERT_EQ(queries[i].set_assets(on_gpu.assets(), streams[i]), Status::kOk);
+    ASSERT_EQ(queries[i].find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, streams[i]), Status::kOk);
+  }
+  for (int run = 0; run < 10; ++run) {
+    for (int i = 0; i < kQueries; ++i) {
+      ASSERT_EQ(queries[i].enqueue(on_gpu.instances(), on_gpu.pairs(), {}, streams[i]), Status::kOk);
+    }
+    for (int i = 0; i < kQueries; ++i) {
+      ASSERT_EQ(cudaStreamSynchronize(streams[i]), cudaSuccess);
+      EXPECT_EQ(queries[i].report().complete, 1u);
+      ASSERT_EQ(contacts_of(queries[i]), expected.cpu);
+    }
+  }
+  cudaGraph_t graph = nullptr;
+  cudaGraphExec_t ready = nullptr;
+  ASSERT_EQ(cudaStreamBeginCapture(streams[0], cudaStreamCaptureModeGlobal), cudaSuccess);
+  ASSERT_EQ(queries[0].enqueue(on_gpu.instances(), on_gpu.pairs(), {}, streams[0]), Status::kOk);
+  ASSERT_EQ(cudaStreamEndCapture(streams[0], &graph), cudaSuccess);
+  ASSERT_EQ(cudaGraphInstantiate(&ready, graph, 0), cudaSuccess);
+  for (int run = 0; run < 3; ++run) {
+    ASSERT_EQ(cudaGraphLaunch(ready, streams[0]), cudaSuccess);
+    ASSERT_EQ(cudaStreamSynchronize(streams[0]), cudaSuccess);
+    EXPECT_EQ(contacts_of(queries[0]), expected.cpu);
+  }
+  cudaGraphExecDestroy(ready);
+  cudaGraphDestroy(graph);
+  for (cudaStream_t stream : streams) cudaStreamDestroy(stream);
+}
+
+TEST_F(GpuContacts, MoveFromOneOwnerToAnother) {
+  const Scene scene = pile(10, 300, 1, 14);
+  const GpuScene on_gpu(scene.assets, scene.instances, {{0, 1}, {2, 3}});
+  GpuContactQuery first;
+  ASSERT_EQ(first.set_assets(on_gpu.assets(), nullptr), Status::kOk);
+  ASSERT_EQ(first.find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, nullptr), Status::kOk);
+  const auto expected = contacts_of(first);
+  GpuContactQuery second = std::move(first);
+  EXPECT_EQ(contacts_of(second), expected);
+  ASSERT_EQ(second.find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, nullptr), Status::kOk);
+  EXPECT_EQ(contacts_of(second), expected);
+}
+
+struct Decided {
+  Verdict float64, exact;
+};
+
+__global__ void decide_all(const TrianglePair* pairs, int count, Decided* out) {
+  const int i = blockIdx.x * blockDim.x + threadIdx.x;
+  if (i < count) out[i] = {decide_float64(pairs[i]), decide_exact(pairs[i])};
+}
+
+class GpuTriangles : public testing::TestWithParam<TriangleFamily> {
+ protected:
+  void SetUp() override {
+    if (no_gpu()) GTEST_SKIP() << "no GPU here";
+  }
+};
+
+TEST_P(GpuTriangles, AreDecidedAsOnTheCpu) {
+  Random random(1);
+  std::vector<TrianglePair> pairs;
+  for (int i = 0; i < test::trials(20000, 50); ++i) pairs.push_back(GetParam().make(random));
+  const int count = static_cast<int>(pairs.size());
+  const OnGpu<TrianglePair> device(pairs);
+  const OnGpu<Decided> decided(std::vector<Decided>(pairs.size()));
+  decide_all<<<(count + 63) / 64, 64>>>(device.data(), count, decided.data());
+  ASSERT_EQ(cudaGetLastError(), cudaSuccess);
+  ASSERT_EQ(cudaDeviceSynchronize(), cudaSuccess);
+  const std::vector<Decided> found = download(decided.data(), pairs.size());
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const Verdict expected = decide_exact(pairs[i]);
+    ASSERT_EQ(found[i].exact, expected) << "pair " << i;
+    if (found[i].float64 != Verdict::undecided) ASSERT_EQ(found[i].float64, expected) << "pair " << i;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(, GpuTriangles, testing::ValuesIn(triangle_families()), [](const auto& family) {
+  std::string name = family.param.name;
+  std::replace_if(
+      name.begin(), name.end(), [](char c) { return std::isalnum(static_cast<unsigned char>(c)) == 0; }, '_');
+  return name;
+});
+
+}  // namespace
+}  // namespace tandem

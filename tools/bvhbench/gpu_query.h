@@ -1,0 +1,53 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "scene_file.h"
+
+namespace tandem::bench {
+
+/// What finds the contacts.
+enum class GpuEngine : std::uint8_t {
+  tandem,      ///< GpuContactQuery
+  paper,       ///< PaperEngine, the yardstick
+  paper_bits,  ///< the same with bit arrays of flags
+};
+
+struct GpuQueryRequest {
+  GpuEngine engine = GpuEngine::tandem;
+  QueryMode mode = QueryMode::exact;
+  bool first_contact_only = false;
+  std::uint32_t repeats = 1;
+};
+
+/// Seconds of a step, one for each repeat.
+using Seconds = std::vector<double>;
+
+/// What a GPU found, on the CPU, and how long it took there.
+struct GpuAnswer {
+  std::vector<ObjectPair> pairs;  ///< sorted
+  std::vector<Contact> contacts;  ///< of rows of pairs, in no order
+  QueryCounters counters;
+  std::string gpu;              ///< name of the device
+  double upload = 0;            ///< seconds for assets and instances, allocation included
+  Seconds broad_phase, narrow;  ///< object pairs, empty where they are given; contacts
+  Seconds whole;                ///< both, and what it takes to start them
+  std::size_t bytes = 0;        ///< of GPU memory: assets, instances, and the room of both steps
+};
+
+/// Finds the contacts of a scene on the current GPU. `given`: normalised object pairs, null where the GPU is
+/// to find them. The query runs until everything has room, then again for each repeat, timed by events: as a
+/// CUDA graph that is replayed, but for the paper's engine, which asks the CPU after each level. Throws
+/// FileError: no usable GPU, or an instance or pair is wrong, as on the CPU; std::runtime_error: CUDA failed,
+/// or too little GPU memory. Condition: this program has CUDA; not first_contact_only but with
+/// GpuEngine::tandem.
+GpuAnswer query_on_gpu(const std::string& path, const Scene& scene, const std::vector<ObjectPair>* given,
+                       const GpuQueryRequest& request);
+
+/// Throws what a status other than kOk calls for. `where`: the instance or pair that is to blame.
+[[noreturn]] void refuse(const std::string& scene, Status status, std::uint64_t where);
+
+}  // namespace tandem::bench

@@ -1,0 +1,146 @@
+#pragma once
+#include <cuda_runtime.h>
+
+#include <cstddef>
+#include <cstdint>
+
+#include "paper_engine.h"
+#include "tandem/kernels/relative_pose.h"
+
+// What the kernels of the paper's engine share, all of it in GPU memory.
+namespace tandem::bench::paper {
+
+using Counter = unsigned long long;  // what atomicAdd takes
+
+struct Asset {
+  GpuAsset asset;
+  TreeExtent extent;
+};
+
+/// What an object pair index leads to.
+struct alignas(16) PairRecord {
+  float4 rotation[3];      ///< of RelativePose; w: translation
+  float4 abs_rotation[3];  ///< w: slack_a
+  float slack_b[3];
+  float frame_error;
+  const Block *blocks_a, *blocks_b;
+  const Triangle *triangles_a, *triangles_b;
+  std::uint32_t instance_a, instance_b;
+};
+
+/// The paper's collision pair: an object pair and a block of each tree. Also its triangle pair: a and b are
+/// triangles then.
+struct Entry {
+  std::uint32_t pair, a, b;
+};
+
+inline constexpr std::uint32_t kThreadsOfPair = 16;
+
+/// Flags are numbered by 32 bits.
+inline constexpr std::uint64_t kMostBlockPairs = (1u << 28) - 1;
+
+enum FlagArray { kCollision, kLeaf };
+
+/// A level of the traversal. Prefix sums have one place for each flag, or for each word of bits, and one more
+/// for the total.
+struct Level {
+  const Entry* pairs;
+  std::uint32_t count;
+  const PairRecord* records;
+  void* flags[2];          ///< by FlagArray
+  std::uint32_t* sums[2];  ///< by FlagArray: exclusive prefix sums over the flags
+};
+
+inline std::size_t sum_count(PaperFlags kind, std::size_t block_pairs) {
+  return 1 + (kind == PaperFlags::bits ? (block_pairs + 1) / 2 : block_pairs * kThreadsOfPair);
+}
+inline std::size_t flag_bytes(PaperFlags kind) {
+  return kind == PaperFlags::bytes ? 1 : 4;
+}
+
+/// Zero when a query begins.
+struct Outcome {
+  Counter error;  ///< complement of (what, where, status), 0 where there is none: the first wins
+  Counter contacts, undecided, unresolved, decided_by_float64;
+};
+
+struct QueryArgs {
+  const Asset* assets;
+  std::uint32_t asset_count;
+  GpuInstances instances;
+  GpuPairs given;
+  PairRecord* records;
+  std::uint32_t record_room;
+  Outcome* outcome;
+};
+
+/// The candidates and what becomes of them.
+struct TriangleArgs {
+  const Entry* candidates;
+  std::uint64_t count;
+  Contact* contacts;
+  std::uint64_t contact_room;
+  Entry *undecided, *unresolved;
+  std::uint64_t undecided_room;
+};
+
+/// Fills in the extents of assets.
+cudaError_t measure_assets(Asset* assets, std::uint32_t count, cudaStream_t stream);
+
+/// Checks instances and pairs, makes the records and the first level.
+cudaError_t prepare(const QueryArgs& args, Entry* first_level, cudaStream_t stream);
+
+/// The collision kernel: tests the boxes of all block pairs and writes both flag arrays.
+cudaError_t collide(const Level& level, const PaperOptions& options, cudaStream_t stream);
+
+/// Prefix sums over both flag arrays. Without scratch memory: writes how many bytes of it are needed.
+cudaError_t scan(const Level& level, PaperFlags kind, void* scratch, std::size_t& scratch_bytes,
+                 cudaStream_t stream);
+
+/// The collection kernel: writes the next level and adds to the candidates.
+cudaError_t collect(const Level& level, PaperFlags kind, Entry* next, Entry* candidates, cudaStream_t stream);
+
+/// Decides what float32 can, and lists the rest; in boxes mode takes all.
+cudaError_t decide_by_float32(const QueryArgs& args, const TriangleArgs& triangles, QueryMode mode,
+                              cudaStream_t stream);
+
+/// Decides the rest.
+cudaError_t decide_rest(const QueryArgs& args, const TriangleArgs& triangles, QueryMode mode,
+                        cudaStream_t stream);
+
+#ifdef __CUDACC__
+
+inline constexpr std::uint32_t kThreads = 128;
+inline constexpr std::uint32_t kAllLanes = 0xFFFFFFFFu;
+
+__device__ inline std::uint32_t lanes_below() {
+  return (1u << threadIdx.x % 32) - 1;
+}
+
+/// A place for each lane that asks for one, all lanes of a warp taking part: one atomic a warp.
+__device__ inline Counter place_for(bool wanted, Counter* counter) {
+  const std::uint32_t lanes = __ballot_sync(kAllLanes, wanted);
+  if (lanes == 0) return 0;
+  Counter first = 0;
+  if (threadIdx.x % 32 == 0) first = atomicAdd(counter, static_cast<Counter>(__popc(lanes)));
+  return __shfl_sync(kAllLanes, first, 0) + __popc(lanes & lanes_below());
+}
+
+/// All lanes of the warp take part. In a pair of an instance with itself the triangle with the lower index
+/// comes first.
+__device__ inline void add_contact(const QueryArgs& args, const TriangleArgs& triangles,
+                                   const Entry& candidate, bool contact) {
+  const Counter place = place_for(contact, &args.outcome->contacts);
+  if (!contact || place >= triangles.contact_room) return;
+  const PairRecord& record = args.records[candidate.pair];
+  const std::uint32_t a = candidate.a, b = candidate.b;
+  const std::uint32_t face_a = record.triangles_a[a].source_face(),
+                      face_b = record.triangles_b[b].source_face();
+  const bool turned = record.instance_a == record.instance_b && a > b;
+  triangles.contacts[place] =
+      turned ? Contact{candidate.pair, b, a, face_b, face_a} : Contact{candidate.pair, a, b, face_a, face_b};
+}
+
+#endif
+
+}  // namespace tandem::bench::paper

@@ -182,6 +182,7 @@ class Walk {
         meet = surely_meet(own, theirs) || overlap(boxes_[a], boxes_[b]);
       }
       const std::uint32_t meeting = __ballot_sync(kAllLanes, meet);
+      __syncwarp();  // all have read what may now be overwritten
       if (meet) {
         memory_.waiting[decided + count_of(meeting & lanes_below())] =
             static_cast<unsigned long long>(a) << output_.shift_a | static_cast<unsigned long long>(b)

@@ -4,29 +4,15 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "pair_record.h"
 #include "paper_engine.h"
-#include "tandem/kernels/relative_pose.h"
 
 // What the kernels of the paper's engine share, all of it in GPU memory.
 namespace tandem::bench::paper {
 
-using Counter = unsigned long long;  // what atomicAdd takes
-
-struct Asset {
-  GpuAsset asset;
-  TreeExtent extent;
-};
-
-/// What an object pair index leads to.
-struct alignas(16) PairRecord {
-  float4 rotation[3];      ///< of RelativePose; w: translation
-  float4 abs_rotation[3];  ///< w: slack_a
-  float slack_b[3];
-  float frame_error;
-  const Block *blocks_a, *blocks_b;
-  const Triangle *triangles_a, *triangles_b;
-  std::uint32_t instance_a, instance_b;
-};
+using gpu::Asset;
+using gpu::Counter;
+using gpu::PairRecord;
 
 /// The paper's collision pair: an object pair and a block of each tree. Also its triangle pair: a and b are
 /// triangles then.
@@ -111,23 +97,11 @@ cudaError_t decide_rest(const QueryArgs& args, const TriangleArgs& triangles, Qu
 #ifdef __CUDACC__
 
 inline constexpr std::uint32_t kThreads = 128;
-inline constexpr std::uint32_t kAllLanes = 0xFFFFFFFFu;
+using gpu::kAllLanes;
+using gpu::lanes_below;
+using gpu::place_for;
 
-__device__ inline std::uint32_t lanes_below() {
-  return (1u << threadIdx.x % 32) - 1;
-}
-
-/// A place for each lane that asks for one, all lanes of a warp taking part: one atomic a warp.
-__device__ inline Counter place_for(bool wanted, Counter* counter) {
-  const std::uint32_t lanes = __ballot_sync(kAllLanes, wanted);
-  if (lanes == 0) return 0;
-  Counter first = 0;
-  if (threadIdx.x % 32 == 0) first = atomicAdd(counter, static_cast<Counter>(__popc(lanes)));
-  return __shfl_sync(kAllLanes, first, 0) + __popc(lanes & lanes_below());
-}
-
-/// All lanes of the warp take part. In a pair of an instance with itself the triangle with the lower index
-/// comes first.
+/// All lanes of the warp take part.
 __device__ inline void add_contact(const QueryArgs& args, const TriangleArgs& triangles,
                                    const Entry& candidate, bool contact) {
   const Counter place = place_for(contact, &args.outcome->contacts);
@@ -136,9 +110,8 @@ __device__ inline void add_contact(const QueryArgs& args, const TriangleArgs& tr
   const std::uint32_t a = candidate.a, b = candidate.b;
   const std::uint32_t face_a = record.triangles_a[a].source_face(),
                       face_b = record.triangles_b[b].source_face();
-  const bool turned = record.instance_a == record.instance_b && a > b;
   triangles.contacts[place] =
-      turned ? Contact{candidate.pair, b, a, face_b, face_a} : Contact{candidate.pair, a, b, face_a, face_b};
+      gpu::make_contact(candidate.pair, record.instance_a == record.instance_b, a, b, face_a, face_b);
 }
 
 #endif

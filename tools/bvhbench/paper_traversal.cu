@@ -21,20 +21,7 @@ constexpr std::uint32_t kHalfExtent = offsetof(Block, half_extent) / sizeof(floa
 constexpr std::uint32_t kKind0 = offsetof(Block, kind) / sizeof(float);
 constexpr auto kLeafKind = static_cast<std::uint32_t>(NodeKind::leaf);
 
-__device__ RelativePose pose_of(const PairRecord& record) {
-  RelativePose pose;
-#pragma unroll
-  for (int i = 0; i < 3; ++i) {
-    const float4 r = __ldg(&record.rotation[i]), m = __ldg(&record.abs_rotation[i]);
-    pose.rotation[i][0] = r.x, pose.rotation[i][1] = r.y, pose.rotation[i][2] = r.z;
-    pose.translation[i] = r.w;
-    pose.abs_rotation[i][0] = m.x, pose.abs_rotation[i][1] = m.y, pose.abs_rotation[i][2] = m.z;
-    pose.slack_a[i] = m.w;
-  }
-  const float4 last = __ldg(reinterpret_cast<const float4*>(record.slack_b));
-  pose.slack_b[0] = last.x, pose.slack_b[1] = last.y, pose.slack_b[2] = last.z;
-  return pose;
-}
+using gpu::pose_of;
 
 /// Where a thread's two flags are.
 template <PaperFlags kKind>

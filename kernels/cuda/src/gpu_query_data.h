@@ -3,32 +3,10 @@
 
 #include <cstdint>
 
-#include "tandem/kernels/gpu_contact_query.h"
-#include "tandem/kernels/relative_pose.h"
+#include "pair_record.h"
 
 // What the kernels of a query share, all of it in GPU memory.
 namespace tandem::gpu {
-
-using Counter = unsigned long long;  // what atomicAdd takes
-
-struct Asset {
-  GpuAsset asset;
-  TreeExtent extent;
-};
-
-/// What the walk needs to know of an object pair, in whole float4.
-struct alignas(16) PairRecord {
-  float4 rotation[3];      ///< of RelativePose; w: translation
-  float4 abs_rotation[3];  ///< w: slack_a
-  float slack_b[3];
-  float frame_error;
-  const Block *blocks_a, *blocks_b;
-  const Triangle *triangles_a, *triangles_b;
-  std::uint32_t instance_a, instance_b;
-  std::uint32_t in_frame;  ///< float32 can take the pair
-  std::uint32_t unused;
-};
-static_assert(sizeof(PairRecord) == 160);
 
 /// Two leaves whose boxes overlap, of an object pair.
 struct Candidate {
@@ -99,15 +77,6 @@ cudaError_t decide_rest(const QueryArgs& args, cudaStream_t stream);
 
 #ifdef __CUDACC__
 
-__device__ inline std::uint32_t lane_id() {
-  return threadIdx.x % 32;
-}
-inline constexpr std::uint32_t kAllLanes = 0xFFFFFFFFu;
-
-__device__ inline std::uint32_t lanes_below() {
-  return (1u << lane_id()) - 1;
-}
-
 __device__ inline std::uint32_t pair_count(const QueryArgs& args) {
   const std::uint32_t count = *args.given.count;
   const std::uint32_t room =
@@ -125,24 +94,9 @@ __device__ inline Pose stored_pose(const QueryArgs& args, std::uint32_t instance
                                 args.assets[args.instances.asset[instance]].asset.origin);
 }
 
-/// A place for each lane that asks for one, all lanes of a warp taking part: one atomic a warp.
-__device__ inline Counter place_for(bool wanted, Counter* counter) {
-  const std::uint32_t lanes = __ballot_sync(kAllLanes, wanted);
-  if (lanes == 0) return 0;
-  Counter first = 0;
-  if (lane_id() == 0) first = atomicAdd(counter, static_cast<Counter>(__popc(lanes)));
-  return __shfl_sync(kAllLanes, first, 0) + __popc(lanes & lanes_below());
-}
-
 /// Whether the contact counts: where only the first is asked for, the first of its pair.
 __device__ inline bool is_wanted(const QueryArgs& args, std::uint32_t pair) {
   return !args.first_contact_only || atomicExch(&args.met[pair], 1u) == 0;
-}
-
-/// In a pair of an instance with itself the triangle with the lower index comes first.
-__device__ inline Contact make_contact(std::uint32_t pair, bool self, std::uint32_t a, std::uint32_t b,
-                                       std::uint32_t face_a, std::uint32_t face_b) {
-  return self && a > b ? Contact{pair, b, a, face_b, face_a} : Contact{pair, a, b, face_a, face_b};
 }
 
 #endif

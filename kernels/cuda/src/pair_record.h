@@ -1,0 +1,76 @@
+#pragma once
+#include <cuda_runtime.h>
+
+#include <cstdint>
+
+#include "tandem/kernels/gpu_contact_query.h"
+#include "tandem/kernels/relative_pose.h"
+
+// What every engine on the GPU keeps of assets and object pairs, and how its lanes share an array.
+namespace tandem::gpu {
+
+using Counter = unsigned long long;  // what atomicAdd takes
+
+struct Asset {
+  GpuAsset asset;
+  TreeExtent extent;
+};
+
+/// What the walk needs to know of an object pair, in whole float4.
+struct alignas(16) PairRecord {
+  float4 rotation[3];      ///< of RelativePose; w: translation
+  float4 abs_rotation[3];  ///< w: slack_a
+  float slack_b[3];
+  float frame_error;
+  const Block *blocks_a, *blocks_b;
+  const Triangle *triangles_a, *triangles_b;
+  std::uint32_t instance_a, instance_b;
+  std::uint32_t in_frame;  ///< float32 can take the pair
+  std::uint32_t unused;
+};
+static_assert(sizeof(PairRecord) == 160);
+
+#ifdef __CUDACC__
+
+__device__ inline std::uint32_t lane_id() {
+  return threadIdx.x % 32;
+}
+inline constexpr std::uint32_t kAllLanes = 0xFFFFFFFFu;
+
+__device__ inline std::uint32_t lanes_below() {
+  return (1u << lane_id()) - 1;
+}
+
+/// A place for each lane that asks for one, all lanes of a warp taking part: one atomic a warp.
+__device__ inline Counter place_for(bool wanted, Counter* counter) {
+  const std::uint32_t lanes = __ballot_sync(kAllLanes, wanted);
+  if (lanes == 0) return 0;
+  Counter first = 0;
+  if (lane_id() == 0) first = atomicAdd(counter, static_cast<Counter>(__popc(lanes)));
+  return __shfl_sync(kAllLanes, first, 0) + __popc(lanes & lanes_below());
+}
+
+/// In a pair of an instance with itself the triangle with the lower index comes first.
+__device__ inline Contact make_contact(std::uint32_t pair, bool self, std::uint32_t a, std::uint32_t b,
+                                       std::uint32_t face_a, std::uint32_t face_b) {
+  return self && a > b ? Contact{pair, b, a, face_b, face_a} : Contact{pair, a, b, face_a, face_b};
+}
+
+__device__ inline RelativePose pose_of(const PairRecord& record) {
+  RelativePose pose;
+#pragma unroll
+  for (int i = 0; i < 3; ++i) {
+    const float4 r = __ldg(&record.rotation[i]), m = __ldg(&record.abs_rotation[i]);
+    pose.rotation[i][0] = r.x, pose.rotation[i][1] = r.y, pose.rotation[i][2] = r.z;
+    pose.translation[i] = r.w;
+    pose.abs_rotation[i][0] = m.x, pose.abs_rotation[i][1] = m.y, pose.abs_rotation[i][2] = m.z;
+    pose.slack_a[i] = m.w;
+  }
+  const float4 last = __ldg(reinterpret_cast<const float4*>(record.slack_b));
+  pose.slack_b[0] = last.x, pose.slack_b[1] = last.y, pose.slack_b[2] = last.z;
+  return pose;
+}
+
+#endif
+
+}  // namespace tandem::gpu

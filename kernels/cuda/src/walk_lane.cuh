@@ -1,0 +1,208 @@
+#pragma once
+#include "gpu_query_data.h"
+#include "tandem/kernels/frame_test.h"
+#include "tandem/kernels/traversal.h"
+#include "tandem/kernels/world_box.h"
+
+// What one lane of a walk does with a block pair and with a candidate, in the frame of the first of a pair or in
+// world coordinates.
+//
+// Included by files that are compiled with and without fused operations: internal linkage.
+namespace tandem::gpu {
+namespace {
+
+struct Four {
+  float v[4];
+};
+
+__device__ inline Four four(const float4& x) {
+  return {{x.x, x.y, x.z, x.w}};
+}
+
+/// size_of(), of half-extents.
+__device__ inline float size_of(const Four (&h)[3]) {
+  float size = 0;
+#pragma unroll
+  for (int i = 0; i < 4; ++i) size = fmaxf(size, (h[0].v[i] + h[1].v[i]) + h[2].v[i]);
+  return size;
+}
+
+/// block_pair_mask(), and size_of() both, in whole float4.
+__device__ inline std::uint32_t mask_of_block_pair(const Block& block_a, const Block& block_b,
+                                                   const RelativePose& pose, float& size_a, float& size_b) {
+  const auto* a = reinterpret_cast<const float4*>(&block_a);
+  const auto* b = reinterpret_cast<const float4*>(&block_b);
+  float posed_b[4][3], radius_b[4][3], half_b[4][3];
+  {
+    Four c[3], h[3];
+#pragma unroll
+    for (int k = 0; k < 3; ++k) c[k] = four(__ldg(b + k)), h[k] = four(__ldg(b + 3 + k));
+    size_b = size_of(h);
+#pragma unroll
+    for (int j = 0; j < 4; ++j) {
+      const float center[3] = {c[0].v[j], c[1].v[j], c[2].v[j]};
+#pragma unroll
+      for (int k = 0; k < 3; ++k) half_b[j][k] = h[k].v[j] + pose.slack_b[k];
+#pragma unroll
+      for (int i = 0; i < 3; ++i) {
+        posed_b[j][i] = box_terms::posed_center(pose, i, center);
+        radius_b[j][i] = box_terms::b_on_face(pose, i, half_b[j]);
+      }
+    }
+  }
+  Four c[3], h[3];
+#pragma unroll
+  for (int k = 0; k < 3; ++k) c[k] = four(__ldg(a + k)), h[k] = four(__ldg(a + 3 + k));
+  size_a = size_of(h);
+  std::uint32_t mask = 0;
+#pragma unroll
+  for (int i = 0; i < 4; ++i) {
+    float half_a[3], radius_a[3];
+#pragma unroll
+    for (int k = 0; k < 3; ++k) half_a[k] = h[k].v[i] + pose.slack_a[k];
+#pragma unroll
+    for (int k = 0; k < 3; ++k) radius_a[k] = box_terms::a_on_face(pose, k, half_a);
+#pragma unroll
+    for (int j = 0; j < 4; ++j) {
+      bool overlap = true;
+      float d[3];
+#pragma unroll
+      for (int k = 0; k < 3; ++k) {
+        d[k] = posed_b[j][k] - c[k].v[i];
+        overlap = overlap & (fabsf(d[k]) <= half_a[k] + radius_b[j][k]);
+      }
+#pragma unroll
+      for (int k = 0; k < 3; ++k) {
+        overlap = overlap & (fabsf(box_terms::distance_on_face(pose, k, d)) <= half_b[j][k] + radius_a[k]);
+      }
+      if (overlap) mask |= 1u << (4 * i + j);
+    }
+  }
+  return mask;
+}
+
+__device__ inline frame::Point<float> corner(const float4& p) {
+  return {{p.x, p.y, p.z}};
+}
+
+__device__ inline frame::Point<float> posed_corner(const float4 (&rows)[3], const float4& p) {
+  frame::Point<float> out;
+#pragma unroll
+  for (int i = 0; i < 3; ++i) out.x[i] = ((rows[i].x * p.x + rows[i].y * p.y) + rows[i].z * p.z) + rows[i].w;
+  return out;
+}
+
+/// What a lane holds of a candidate.
+struct Judged {
+  std::uint32_t face_a, face_b;
+  bool contact, undecided;
+};
+
+/// Boxes and triangles in the frame of the first of a pair, float32.
+template <QueryMode kMode>
+struct InFrame {
+  static constexpr bool kWorld = false;
+  static constexpr bool kBounded = kMode == QueryMode::exact;
+
+  __device__ static std::uint32_t test(const QueryArgs&, const PairRecord& record, const Block* a,
+                                       const Block* b, float& size_a, float& size_b) {
+    return mask_of_block_pair(*a, *b, pose_of(record), size_a, size_b);
+  }
+
+  /// Of a leaf block and an internal one: less the hits of nodes that lie beyond the plane of the triangle.
+  __device__ __noinline__ static std::uint32_t drop_beyond_planes(const PairRecord& record, const Block& a,
+                                                                  const Block& b, bool leaf_a,
+                                                                  std::uint32_t hits) {
+    if constexpr (kMode == QueryMode::boxes) return hits;
+    const RelativePose pose = pose_of(record);
+    std::uint32_t left = hits;
+#pragma unroll 1
+    for (; hits != 0; hits &= hits - 1) {
+      const int bit = __ffs(static_cast<int>(hits)) - 1, i = bit / 4, j = bit % 4;
+      const Triangle& triangle = leaf_a ? record.triangles_a[a.index[i]] : record.triangles_b[b.index[j]];
+      const Box stored = leaf_a ? box_of(b, j) : box_of(a, i);
+      frame::Point<float> t[3];
+      for (int c = 0; c < 3; ++c) {
+        const float* p = triangle.corner[c].position;
+        for (int k = 0; k < 3; ++k) t[c].x[k] = p[k];
+        if (leaf_a) continue;
+        const float x[3] = {p[0], p[1], p[2]};
+        for (int k = 0; k < 3; ++k) t[c].x[k] = box_terms::posed_center(pose, k, x);
+      }
+      Box box = stored;
+      if (leaf_a) {
+        for (int k = 0; k < 3; ++k) {
+          box.center[k] = box_terms::posed_center(pose, k, stored.center);
+          box.half_extent[k] = box_terms::b_on_face(pose, k, stored.half_extent);
+        }
+      }
+      const frame::Plane<float, true> plane(t[0], t[1], t[2], record.frame_error);
+      if (frame::beyond(plane, box.center, box.half_extent, record.frame_error)) left &= ~(1u << bit);
+    }
+    return left;
+  }
+
+  __device__ static Judged judge(const PairRecord& record, std::uint32_t a, std::uint32_t b) {
+    const auto* triangle_a = reinterpret_cast<const float4*>(record.triangles_a + a);
+    const auto* triangle_b = reinterpret_cast<const float4*>(record.triangles_b + b);
+    const float4 a0 = __ldg(triangle_a), b0 = __ldg(triangle_b);
+    Judged out = {__float_as_uint(a0.w), __float_as_uint(b0.w), true, false};
+    if constexpr (kMode == QueryMode::boxes) return out;
+    const float4 rows[3] = {__ldg(&record.rotation[0]), __ldg(&record.rotation[1]),
+                            __ldg(&record.rotation[2])};
+    const frame::Point<float> corners_a[3] = {corner(a0), corner(__ldg(triangle_a + 1)),
+                                              corner(__ldg(triangle_a + 2))};
+    const frame::Point<float> corners_b[3] = {posed_corner(rows, b0),
+                                              posed_corner(rows, __ldg(triangle_b + 1)),
+                                              posed_corner(rows, __ldg(triangle_b + 2))};
+    const auto verdicts =
+        frame::decide<kBounded>(corners_a, corners_b, kBounded ? __ldg(&record.frame_error) : 0.0f);
+    out.contact = verdicts.contact;
+    out.undecided = verdicts.undecided;
+    return out;
+  }
+};
+
+/// Boxes in world coordinates, float64; leaves every candidate undecided.
+template <QueryMode kMode>
+struct InWorld {
+  static constexpr bool kWorld = true;
+
+  __device__ static WorldBox box(const Pose& pose, const Block& block, int node) {
+    double lower[3], upper[3];
+    for (int k = 0; k < 3; ++k) {
+      const double center = block.center[k][node], half_extent = block.half_extent[k][node];
+      lower[k] = center - half_extent;
+      upper[k] = center + half_extent;
+    }
+    return world_box(pose, lower, upper);
+  }
+
+  __device__ static std::uint32_t test(const QueryArgs& args, const PairRecord& record, const Block* a,
+                                       const Block* b, float& size_a, float& size_b) {
+    const Pose pose_a = stored_pose(args, record.instance_a), pose_b = stored_pose(args, record.instance_b);
+    std::uint32_t mask = 0;
+#pragma unroll 1
+    for (int pair = 0; pair < 16; ++pair) {
+      const int i = pair / 4, j = pair % 4;
+      if (a->kind[i] == NodeKind::imaginary || b->kind[j] == NodeKind::imaginary) continue;
+      if (overlap(box(pose_a, *a, i), box(pose_b, *b, j))) mask |= 1u << pair;
+    }
+    size_a = tandem::size_of(*a);
+    size_b = tandem::size_of(*b);
+    return mask;
+  }
+
+  __device__ static std::uint32_t drop_beyond_planes(const PairRecord&, const Block&, const Block&, bool,
+                                                     std::uint32_t hits) {
+    return hits;
+  }
+
+  __device__ static Judged judge(const PairRecord& record, std::uint32_t a, std::uint32_t b) {
+    return {record.triangles_a[a].corner[0].w, record.triangles_b[b].corner[0].w, kMode == QueryMode::boxes,
+            kMode != QueryMode::boxes};
+  }
+};
+
+}  // namespace
+}  // namespace tandem::gpu

@@ -1,0 +1,74 @@
+#!/usr/bin/python3
+"""bvhbench query --backend cuda from the outside. Environment: that of bench_test.py."""
+import os
+import re
+import unittest
+
+import numpy as np
+
+from bench_test import IDENTITY, BenchTest, drop_hint, table_of
+from tool_test import DONE, SOURCE_DIR, UNREADABLE_INPUT, USAGE
+
+
+class BenchGpu(BenchTest):
+    """The backend cuda: with a GPU, without one, and where bvhbench was built without CUDA."""
+
+    ON_GPU = ("--backend", "cuda")
+
+    def setUp(self):
+        super().setUp()
+        self.built = "--backend cpu|cuda" in self.passes("query", "--help")
+
+    def test_without_a_gpu_the_reason_is_told(self):
+        self.write_scene()
+        hidden = {**os.environ, "CUDA_VISIBLE_DEVICES": ""}
+        result = self.bench("query", self.scene, *self.ON_GPU, "--out", self.contacts, env=hidden)
+        if self.built:
+            self.assert_fails(result, UNREADABLE_INPUT, "no GPU can be used: ")
+        else:
+            self.assert_fails(drop_hint(result), USAGE, "built without CUDA")
+        self.assertFalse(self.contacts.exists())
+
+    def test_options_of_another_backend_or_engine_are_refused(self):
+        if not self.built:
+            self.skipTest("built without CUDA")
+        self.write_scene()
+        for words in ([*self.ON_GPU, "--self"], [*self.ON_GPU, "--threads", "2"], ["--engine", "paper"],
+                      [*self.ON_GPU, "--engine", "paper", "--first-contact"]):
+            with self.subTest(words=words):
+                self.assert_fails(self.bench("query", self.scene, *words), USAGE, words[-2] if words[-1] == "2" else "--")
+
+    def need_gpu(self):
+        self.write_scene()
+        if self.bench("query", self.scene, *self.ON_GPU).returncode != DONE:
+            self.skipTest("no GPU can be used")
+
+    def test_the_gpu_finds_what_the_cpu_finds(self):
+        self.need_gpu()
+        self.make("pile", "--count", "60")
+        for mode in ("exact", "fast", "boxes"):
+            expected = self.query("--mode", mode, "--out", self.contacts)
+            contacts = table_of(self.contacts)
+            report = self.query("--mode", mode, "--repeat", "3", "--out", self.contacts, *self.ON_GPU)
+            self.assertEqual((report["hash"], report["backend"]), (expected["hash"], "cuda"))
+            self.assertEqual(len(report["contacts_seconds"]["all"]), 3)
+            for name, column in table_of(self.contacts).items():
+                self.assertEqual(column.tolist(), contacts[name].tolist())
+        self.assertEqual(self.query("--engine", "paper", *self.ON_GPU)["hash"], self.query()["hash"])
+
+    def test_the_gpu_names_the_instance_that_is_wrong(self):
+        self.need_gpu()
+        for pairs in ({}, {"pairs": np.array([[0, 1]], "u4")}):
+            self.write_scene(rotation=(IDENTITY, 2 * IDENTITY), **pairs)
+            self.assert_refused(UNREADABLE_INPUT, self.scene, "instance 1: a pose is not a rotation", arguments=self.ON_GPU)
+
+    def test_the_keys_of_json_are_those_of_its_documentation(self):
+        page = (SOURCE_DIR / "docs" / "gpu.md").read_text()
+        added = [key for line in page.split("\n") if line.startswith("| `") and "`k" not in line
+                 for key in re.findall(r"`(\w+)`", line.split("|")[1])]
+        self.need_gpu()
+        self.assertEqual(list(self.query(*self.ON_GPU)), [*self.query(), *added])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,8 +1,6 @@
 #include <BulletCollision/CollisionShapes/btTriangleIndexVertexArray.h>
 #include <BulletCollision/Gimpact/btGImpactShape.h>
 
-#include <algorithm>
-
 #include "peer.h"
 #include "peer_mesh.h"
 
@@ -58,7 +56,7 @@ bool triangles_collide(const btGImpactMeshShapePart& part_a, const btTransform& 
   return a.overlap_test_conservative(b) && a.find_triangle_collision_clip_method(b, contact);
 }
 
-class BulletPeer final : public Peer {
+class BulletPeer final : public TellingPeer {
  public:
   std::string name() const override { return "Bullet"; }
   std::string settings() const override {
@@ -81,12 +79,6 @@ class BulletPeer final : public Peer {
     contacts_.clear();
     candidates_ = 0;
     for (std::uint32_t pair = 0; pair < pairs.size(); ++pair) collide(pair, pairs[pair]);
-  }
-
-  std::optional<std::vector<TriangleContact>> contacts() const override {
-    std::vector<TriangleContact> sorted = contacts_;
-    std::sort(sorted.begin(), sorted.end());
-    return sorted;
   }
 
   std::vector<Counter> counters() const override { return {{"candidates", candidates_}}; }
@@ -114,7 +106,6 @@ class BulletPeer final : public Peer {
   std::vector<const btGImpactMeshShapePart*> part_of_;
   btAlignedObjectArray<btTransform> transforms_;
   btPairSet found_;
-  std::vector<TriangleContact> contacts_;
   std::uint64_t candidates_ = 0;
 };
 

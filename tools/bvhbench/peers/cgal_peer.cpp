@@ -105,7 +105,7 @@ struct Reaching {
 };
 
 /// The answer that the others are held against: boxes compared in float64, triangles in exact arithmetic.
-class CgalPeer final : public Peer {
+class CgalPeer final : public TellingPeer {
  public:
   std::string name() const override { return "CGAL"; }
   std::string settings() const override {
@@ -133,12 +133,6 @@ class CgalPeer final : public Peer {
     for (std::uint32_t pair = 0; pair < pairs.size(); ++pair) collide(pair, pairs[pair]);
   }
 
-  std::optional<std::vector<TriangleContact>> contacts() const override {
-    std::vector<TriangleContact> sorted = contacts_;
-    std::sort(sorted.begin(), sorted.end());
-    return sorted;
-  }
-
   std::vector<Counter> counters() const override { return {{"candidates", candidates_}}; }
   bool is_reference() const override { return true; }
 
@@ -161,7 +155,6 @@ class CgalPeer final : public Peer {
   std::vector<std::uint32_t> asset_of_;
   std::vector<Pose> poses_;
   std::vector<CGAL::Bbox_3> boxes_;
-  std::vector<TriangleContact> contacts_;
   std::uint64_t candidates_ = 0;
 };
 

@@ -83,7 +83,7 @@ void decide(void* user, RTCCollision* found, unsigned count) {
 /// How the trees follow the bodies: made anew each frame, or their boxes fitted again.
 enum class Following { rebuild, refit };
 
-class EmbreePeer final : public Peer {
+class EmbreePeer final : public TellingPeer {
  public:
   explicit EmbreePeer(Following following)
       : following_(following), device_(rtcNewDevice("threads=1,set_affinity=0")) {
@@ -138,12 +138,6 @@ class EmbreePeer final : public Peer {
     throw_on_error();
   }
 
-  std::optional<std::vector<TriangleContact>> contacts() const override {
-    std::vector<TriangleContact> sorted = contacts_;
-    std::sort(sorted.begin(), sorted.end());
-    return sorted;
-  }
-
   std::vector<Counter> counters() const override { return {{"candidates", candidates_}}; }
 
  private:
@@ -174,7 +168,6 @@ class EmbreePeer final : public Peer {
   std::span<const AssetView> assets_;
   std::vector<IndexedMesh> meshes_;
   std::vector<EmbreeBody> bodies_;
-  std::vector<TriangleContact> contacts_;
   std::uint64_t candidates_ = 0;
 };
 

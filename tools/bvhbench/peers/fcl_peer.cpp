@@ -1,7 +1,6 @@
 #include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/narrowphase/collision.h>
 
-#include <algorithm>
 #include <limits>
 
 #include "peer.h"
@@ -38,7 +37,7 @@ fcl::Transform3d transform(const Pose& pose) {
   return out;
 }
 
-class FclPeer final : public Peer {
+class FclPeer final : public TellingPeer {
  public:
   std::string name() const override { return "FCL"; }
   std::string settings() const override {
@@ -73,18 +72,11 @@ class FclPeer final : public Peer {
     }
   }
 
-  std::optional<std::vector<TriangleContact>> contacts() const override {
-    std::vector<TriangleContact> sorted = contacts_;
-    std::sort(sorted.begin(), sorted.end());
-    return sorted;
-  }
-
  private:
   std::span<const AssetView> assets_;
   std::vector<std::shared_ptr<Model>> models_;
   std::vector<const Model*> model_of_;
   std::vector<fcl::Transform3d, Eigen::aligned_allocator<fcl::Transform3d>> transforms_;
-  std::vector<TriangleContact> contacts_;
 };
 
 }  // namespace

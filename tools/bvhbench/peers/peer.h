@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <compare>
 #include <cstdint>
 #include <memory>
@@ -55,6 +56,19 @@ class Peer {
 
   /// Whether contacts() is the exact answer, found without Tandem's own code; asked once, not raced.
   virtual bool is_reference() const { return false; }
+};
+
+/// A peer that tells its contacts: query() clears and fills contacts_.
+class TellingPeer : public Peer {
+ public:
+  std::optional<std::vector<TriangleContact>> contacts() const override {
+    std::vector<TriangleContact> sorted = contacts_;
+    std::sort(sorted.begin(), sorted.end());
+    return sorted;
+  }
+
+ protected:
+  std::vector<TriangleContact> contacts_;
 };
 
 /// The engines that this program was built with, by the names that --peers takes, in the order of the charts.

@@ -251,10 +251,6 @@ struct CompleteTest {
   }
 };
 
-}  // namespace detail
-
-namespace detail {
-
 /// The largest power of two that is not above x. Condition: x is positive and normal.
 TANDEM_HD inline double power_of_two_below(double x) {
   std::uint64_t bits;
@@ -290,10 +286,6 @@ TANDEM_HD inline bool on_coarse_grid(const TrianglePair& t) {
   }
   return true;
 }
-
-}  // namespace detail
-
-namespace detail {
 
 /// Whether a corner of a and one of b are the same point: then the triangles meet, flat or not.
 TANDEM_HD inline bool share_corner(const TrianglePair& t) {

@@ -6,6 +6,7 @@
 #include "command.h"
 #include "compare_command.h"
 #include "hdf5_file.h"
+#include "poses_command.h"
 #include "query_command.h"
 #include "scene_command.h"
 
@@ -54,6 +55,7 @@ int main(int argc, char** argv) {
   add_scene(app, run);
   add_query(app, run);
   add_compare(app, run);
+  add_poses(app, run);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& done) {

@@ -1,17 +1,13 @@
 #pragma once
-#include <array>
 #include <cstdint>
 #include <vector>
 
-#include "tandem/formats/view.h"
-#include "tandem/kernels/contact_query.h"
+#include "random_pose.h"
 
 /// Generators of posed snapshots. The same arguments give the same poses on every platform: random numbers
 /// are SplitMix64's, and arithmetic is float64 with +, -, *, / and square roots alone. docs/scenes.md
 /// describes the scenes.
 namespace tandem::bench {
-
-using Vector = std::array<double, 3>;
 
 /// What every scene is told. The mesh is asset 0.
 struct SceneSeed {

@@ -4,43 +4,6 @@
 /// What the generators share.
 namespace tandem::bench {
 
-using Rotation = std::array<Vector, 3>;
-
-/// SplitMix64 (Steele, Lea and Flood 2014).
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : state_(seed) {}
-
-  double uniform();                            ///< in [0, 1), a multiple of 2^-53
-  double between(double lower, double upper);  ///< uniform
-
- private:
-  std::uint64_t state_;
-};
-
-/// Of a unit quaternion, uniformly distributed: a point of the unit ball of four dimensions, found by
-/// rejection.
-Rotation random_rotation(Random& random);
-
-/// Of the quaternion (w, x, y, z) of any length but 0.
-Rotation rotation_of(double w, double x, double y, double z);
-
-Rotation multiply(const Rotation& a, const Rotation& b);
-Vector multiply(const Rotation& a, const Vector& x);
-
-/// A body's bounds in the file's coordinates.
-struct Bounds {
-  Vector lower, upper;
-
-  Vector centre() const;
-  double diagonal() const;
-};
-
-Bounds bounds_of(const AssetView& asset);
-
-/// An instance turned by `rotation` whose point `centre`, of the file's coordinates, lies at `position`.
-Instance place(std::uint32_t asset, const Rotation& rotation, const Vector& centre, const Vector& position);
-
 /// Adds the offset to every translation.
 void move(std::vector<Instance>& instances, const Vector& offset);
 

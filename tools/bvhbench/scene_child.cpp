@@ -21,14 +21,24 @@ void send(const Sink& sink, const Array& array) {
   sink(array.data(), count * sizeof(*array.data()));
 }
 
+// Without the zeros that a string may hold: no path does, and nothing else that is sent.
+void send(const Sink& sink, const std::vector<std::string>& strings) {
+  std::string all;
+  for (const std::string& text : strings) all.append(text.c_str()) += '\0';
+  send(sink, all);
+}
+
 void send(const Sink& sink, const SceneDescription& scene) {
-  std::string names;
-  for (const std::string& name : scene.assets) names += name + '\0';
-  send(sink, names);
+  send(sink, scene.assets);
   send(sink, scene.instances);
-  const std::uint8_t given = scene.pairs.has_value();
-  sink(&given, 1);
-  if (given != 0) send(sink, *scene.pairs);
+  const std::uint8_t pairs = scene.pairs.has_value(), poses = scene.poses.has_value();
+  sink(&pairs, 1);
+  if (pairs != 0) send(sink, *scene.pairs);
+  sink(&poses, 1);
+  if (poses == 0) return;
+  send(sink, scene.poses->geometry);
+  send(sink, scene.poses->stream);
+  send(sink, scene.poses->depth);
 }
 
 // The error that there was, or nothing, and then the scene.
@@ -58,17 +68,29 @@ class Receiver {
     return child_.read(array.data(), count * sizeof(*array.data()));
   }
 
-  bool receive(SceneDescription& scene) {
-    std::string names;
-    std::uint8_t given = 0;
-    if (!receive(names) || !receive(scene.instances) || !child_.read(&given, 1)) return false;
-    for (std::size_t begin = 0; begin < names.size();) {
-      scene.assets.emplace_back(&names[begin]);
-      begin += scene.assets.back().size() + 1;
+  bool receive(std::vector<std::string>& strings) {
+    std::string all;
+    if (!receive(all)) return false;
+    for (std::size_t begin = 0; begin < all.size();) {
+      strings.emplace_back(&all[begin]);
+      begin += strings.back().size() + 1;
     }
-    if (given == 0) return true;
-    scene.pairs.emplace();
-    return receive(*scene.pairs);
+    return true;
+  }
+
+  bool receive(PoseNotes& notes) {
+    return receive(notes.geometry) && receive(notes.stream) && receive(notes.depth);
+  }
+
+  bool receive(SceneDescription& scene) {
+    return receive(scene.assets) && receive(scene.instances) && receive(scene.pairs) && receive(scene.poses);
+  }
+
+  template <typename Part>
+  bool receive(std::optional<Part>& part) {
+    std::uint8_t given = 0;
+    if (!child_.read(&given, 1)) return false;
+    return given == 0 || receive(part.emplace());
   }
 
  private:

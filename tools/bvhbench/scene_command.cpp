@@ -1,7 +1,6 @@
 #include "scene_command.h"
 
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 
 #include "make_scene.h"
@@ -11,8 +10,6 @@
 
 namespace tandem::bench {
 namespace {
-
-namespace fs = std::filesystem;
 
 struct SceneArguments {
   std::string mesh, ground, output;
@@ -27,21 +24,6 @@ struct SceneArguments {
 
 using Assets = std::vector<AssetView>;
 using Maker = std::function<std::vector<Instance>(const SceneArguments&, const Assets&)>;
-
-MappedAsset open_mesh(const std::string& path) {
-  MappedAsset asset;
-  const Status status = asset.open(path.c_str());
-  if (status != Status::kOk) throw FileError(path + ": " + explain(status));
-  return asset;
-}
-
-// The path from the scene file's folder, so that both can move together.
-std::string seen_from(const std::string& scene, const std::string& mesh) {
-  const fs::path folder = fs::absolute(scene).parent_path();
-  std::error_code error;
-  const fs::path relative = fs::proximate(mesh, folder, error);
-  return error ? fs::absolute(mesh).string() : relative.string();
-}
 
 ExitCode run(const SceneArguments& arguments, const Maker& make) {
   keep_inputs(arguments.output, {arguments.mesh, arguments.ground});

@@ -36,12 +36,18 @@ std::vector<ObjectPair> read_pairs(const Hdf5Input& file) {
   return pairs;
 }
 
-SceneDescription read_description(const std::string& path) {
+PoseNotes read_notes(const Hdf5Input& file) {
+  return {file.read_strings("/poses/geometry"), file.read_strings("/poses/stream"),
+          file.read_f64("/poses/depth")};
+}
+
+SceneDescription read_file(const std::string& path) {
   const Hdf5Input file(path);
   SceneDescription scene;
   scene.assets = file.read_strings("/assets");
   scene.instances = read_instances(file, path);
   if (file.has("/pairs")) scene.pairs = read_pairs(file);
+  if (file.has("/poses")) scene.poses = read_notes(file);
   return scene;
 }
 
@@ -84,17 +90,36 @@ std::vector<AssetView> Scene::views() const {
   return views;
 }
 
+MappedAsset open_mesh(const std::string& path) {
+  MappedAsset asset;
+  const Status status = asset.open(path.c_str());
+  if (status != Status::kOk) throw FileError(path + ": " + explain(status));
+  return asset;
+}
+
+std::string seen_from(const std::string& scene, const std::string& mesh) {
+  const fs::path folder = fs::absolute(scene).parent_path();
+  std::error_code error;
+  const fs::path relative = fs::proximate(mesh, folder, error);
+  return error ? fs::absolute(mesh).string() : relative.string();
+}
+
+SceneDescription read_description(const std::string& path) {
+  SceneDescription scene = read_in_child(path, read_file);
+  check_indices(scene, path);
+  return scene;
+}
+
 Scene read_scene(const std::string& path) {
   Scene scene;
-  scene.description = read_in_child(path, read_description);
-  check_indices(scene.description, path);
+  scene.description = read_description(path);
   for (std::size_t i = 0; i < scene.description.assets.size(); ++i) {
     scene.assets.push_back(open_asset(path, scene.description.assets, i));
   }
   return scene;
 }
 
-void write_scene(const std::string& path, const SceneDescription& scene) {
+void add_scene(Hdf5Output& file, const SceneDescription& scene) {
   std::vector<std::uint32_t> asset, pairs;
   std::vector<double> rotation, translation;
   for (const Instance& instance : scene.instances) {
@@ -103,7 +128,6 @@ void write_scene(const std::string& path, const SceneDescription& scene) {
     rotation.insert(rotation.end(), first, first + 9);
     translation.insert(translation.end(), instance.pose.translation, instance.pose.translation + 3);
   }
-  Hdf5Output file(path);
   file.add("/assets", scene.assets);
   file.add("/instances/asset", {asset.size()}, asset);
   file.add("/instances/rotation", {asset.size(), 3, 3}, rotation);
@@ -112,6 +136,16 @@ void write_scene(const std::string& path, const SceneDescription& scene) {
     for (const ObjectPair& pair : *scene.pairs) pairs.insert(pairs.end(), {pair.a, pair.b});
     file.add("/pairs", {scene.pairs->size(), 2}, pairs);
   }
+  if (scene.poses) {
+    file.add("/poses/geometry", scene.poses->geometry);
+    file.add("/poses/stream", scene.poses->stream);
+    file.add("/poses/depth", {scene.poses->depth.size()}, scene.poses->depth);
+  }
+}
+
+void write_scene(const std::string& path, const SceneDescription& scene) {
+  Hdf5Output file(path);
+  add_scene(file, scene);
   file.write();
 }
 

@@ -14,11 +14,19 @@ struct FileError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// What a file of poses tells of them beyond its scene (docs/poses.md).
+struct PoseNotes {
+  std::vector<std::string> geometry;  ///< of each asset: geometry_hash() in hexadecimal
+  std::vector<std::string> stream;    ///< the set, "training" or "validation", and the seed
+  std::vector<double> depth;          ///< of each pose, see NearContactPose
+};
+
 /// What a scene file holds (docs/scenes.md).
 struct SceneDescription {
   std::vector<std::string> assets;  ///< .bvh paths, relative to the scene file
   std::vector<Instance> instances;
   std::optional<std::vector<ObjectPair>> pairs;  ///< without them the broad phase makes the pairs
+  std::optional<PoseNotes> poses;                ///< of files of poses
 };
 
 /// A scene with its assets mapped and checked.
@@ -29,8 +37,22 @@ struct Scene {
   std::vector<AssetView> views() const;
 };
 
+/// The .bvh file at a path. Throws FileError.
+MappedAsset open_mesh(const std::string& path);
+
+/// The path of `mesh` from the scene file's folder, so that both can move together.
+std::string seen_from(const std::string& scene, const std::string& mesh);
+
+/// The file without its assets. Throws FileError.
+SceneDescription read_description(const std::string& path);
+
 /// Throws FileError: of the scene file, or of the asset that is to blame.
 Scene read_scene(const std::string& path);
+
+class Hdf5Output;
+
+/// Adds what a scene file holds to a file in the making. Throws FileError.
+void add_scene(Hdf5Output& file, const SceneDescription& scene);
 
 /// Appears whole or not at all. Throws FileError.
 void write_scene(const std::string& path, const SceneDescription& scene);

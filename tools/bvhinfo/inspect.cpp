@@ -26,7 +26,7 @@ Inspection inspect(const std::string& path, bool only_verify) {
   if (inspection.status != Status::kOk || only_verify) return inspection;
   const AssetView& view = inspection.asset.view();
   inspection.tree = measure_tree(view.level(), view.header->lower, view.header->upper);
-  inspection.work = sample_near_contact(view.level(), view.header->lower, view.header->upper);
+  inspection.work = sample_expected_work(view);
   inspection.source = parse_provenance(view.provenance);
   return inspection;
 }

@@ -78,7 +78,8 @@ std::string tree_lines(const TreeStatistics& tree, const ExpectedWork& work) {
           " internal, " + with_commas(tree.partial_leaf_blocks) + " partial leaf\n";
   text += format("  depth        %u blocks\n  leaf fill    %.2f %%\n  SAH cost     %.3f\n", tree.depth,
                  100 * tree.leaf_fill, tree.sah_cost);
-  if (work.poses == 0) return text + "  query work   too much to sample: the mesh overlaps itself\n";
+  if (work.poses == 0)
+    return text + "  query work   not sampled: the mesh overlaps itself too much, or is too large\n";
   text += format("  query work   %.1f block pairs, %.1f candidates expected near contact (%u poses)\n",
                  work.block_pairs, work.candidates, work.poses);
   return text;

@@ -29,13 +29,11 @@ TreeStatistics measure_tree(const LevelView& level, const float* lower, const fl
 struct ExpectedWork {
   double block_pairs = 0;   ///< units of 4 x 4 box tests
   double candidates = 0;    ///< leaf pairs whose boxes overlap
-  std::uint32_t poses = 0;  ///< 0: a mesh overlaps itself so much that sampling was given up; no figures then
+  std::uint32_t poses = 0;  ///< 0: no figures; a mesh overlaps itself so much that sampling was given up, or
+                            ///< its coordinates are too large for float32 box tests
 };
 
-/// Samples poses: a random rotation, a random direction, the distance at which the first leaf boxes begin to
-/// overlap, found by bisection, then pushed in by 0 to 5 % of the radius of the bounds. Seeded, so the same
-/// tree always gets the same figures.
-ExpectedWork sample_near_contact(const LevelView& level, const float* lower, const float* upper,
-                                 std::uint32_t poses = 64);
+/// Samples the first validation poses of seed 1 (near_contact.h). The same mesh always gets the same poses.
+ExpectedWork sample_expected_work(const AssetView& asset, std::uint32_t poses = 64);
 
 }  // namespace tandem

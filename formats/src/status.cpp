@@ -80,6 +80,11 @@ constexpr Entry kEntries[] = {
     {Status::kTooManyInstances, "TooManyInstances", nullptr, "there are 2^32 - 1 instances or more"},
     {Status::kTooManyPairs, "TooManyPairs", nullptr, "there are 2^32 - 1 pairs of instances or more"},
     {Status::kCannotStartThread, "CannotStartThread", nullptr, "a thread could not be started"},
+    {Status::kNoGpu, "NoGpu", nullptr, "there is no GPU that can be used"},
+    {Status::kDriverTooOld, "DriverTooOld", nullptr, "the GPU's driver is too old for this program"},
+    {Status::kGpuNotSupported, "GpuNotSupported", nullptr,
+     "this program was not built for a GPU of this kind"},
+    {Status::kOutOfGpuMemory, "OutOfGpuMemory", nullptr, "not enough GPU memory"},
     {Status::kCudaFailed, "CudaFailed", nullptr, "a CUDA call failed"},
 };
 

@@ -75,6 +75,18 @@ TEST_F(OutputFile, AFullDeviceIsAFailureAndStaysADevice) {
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
 }
 
+TEST_F(OutputFile, TryingTellsWhatWritingWouldAndChangesNothing) {
+  EXPECT_EQ(try_whole_file(folder_ / "a"), "");
+  EXPECT_EQ(try_whole_file(folder_), "is a folder");
+  EXPECT_EQ(try_whole_file(folder_ / "missing" / "a"), "No such file or directory");
+  EXPECT_EQ(files(), 0u);
+  std::ofstream(folder_ / "a") << "old";
+  EXPECT_EQ(try_whole_file(folder_ / "a"), "");
+  EXPECT_EQ(fs::file_size(folder_ / "a"), 3u);
+  EXPECT_EQ(files(), 1u);
+  EXPECT_EQ(try_whole_file("/dev/null"), "");
+}
+
 // A child writes for ever; the signal must take its temporary file along.
 TEST_F(OutputFile, ASignalRemovesTheTemporaryFile) {
   const pid_t child = ::fork();

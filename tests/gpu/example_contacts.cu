@@ -1,3 +1,4 @@
+#include <tandem/formats/gpu_status.h>
 #include <tandem/kernels/gpu_broad_phase.h>
 #include <tandem/kernels/gpu_contact_query.h>
 #include <tandem/runtime/map.h>
@@ -37,7 +38,7 @@ int main(int argc, char** argv) {
     return fail(path, status, cudaSuccess);
   cudaStream_t stream;
   if (const cudaError_t error = cudaStreamCreate(&stream); error != cudaSuccess)
-    return fail("no GPU can be used", tandem::Status::kCudaFailed, error);
+    return fail("a stream", tandem::status_of(error), error);
   tandem::DeviceAsset cow;  // one allocation, one copy
   tandem::Status status = cow.upload(file.view(), stream);
   if (status != tandem::Status::kOk) return fail("upload", status, cow.cuda_error());
@@ -45,18 +46,13 @@ int main(int argc, char** argv) {
   // The scene, all of it in GPU memory: the asset's bounds, and for each body the asset and a pose.
   const tandem::FileHeader& header = *file.view().header;
   const tandem::GpuAsset asset = tandem::gpu_asset(cow.level(), header);
-  tandem::AssetBounds bounds;
-  for (int k = 0; k < 3; ++k) {
-    bounds.origin[k] = header.origin[k];
-    bounds.lower[k] = header.lower[k];
-    bounds.upper[k] = header.upper[k];
-  }
+  const tandem::AssetBounds bounds = tandem::asset_bounds(header);
   auto* gpu_bounds = gpu_array<tandem::AssetBounds>(1);
   auto* asset_of_body = gpu_array<std::uint32_t>(kBodies);
   auto* poses = gpu_array<tandem::Pose>(kBodies);
   auto* history = gpu_array<tandem::GpuQueryReport>(kSteps);
   if (!gpu_bounds || !asset_of_body || !poses || !history)
-    return fail("scene", tandem::Status::kOutOfMemory, cudaSuccess);
+    return fail("scene", tandem::Status::kOutOfGpuMemory, cudaErrorMemoryAllocation);
   cudaMemcpyAsync(gpu_bounds, &bounds, sizeof bounds, cudaMemcpyHostToDevice, stream);
   cudaMemsetAsync(asset_of_body, 0, kBodies * sizeof *asset_of_body, stream);
   const tandem::GpuInstances bodies = {asset_of_body, poses, kBodies};
@@ -86,7 +82,7 @@ int main(int argc, char** argv) {
   std::vector<tandem::GpuQueryReport> reports(kSteps);
   cudaMemcpyAsync(reports.data(), history, kSteps * sizeof *history, cudaMemcpyDeviceToHost, stream);
   if (const cudaError_t error = cudaStreamSynchronize(stream); error != cudaSuccess)
-    return fail("steps", tandem::Status::kCudaFailed, error);
+    return fail("steps", tandem::status_of(error), error);
   for (int step = 0; step < kSteps; ++step) {
     const tandem::GpuQueryReport& report = reports[step];
     if (report.status != tandem::Status::kOk) {

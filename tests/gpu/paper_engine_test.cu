@@ -110,7 +110,7 @@ struct CpuAnswer {
 CpuAnswer ask_cpu(const Scene& scene, const std::vector<ObjectPair>& pairs) {
   ContactQuery query;
   EXPECT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-  const Status status = query.find_contacts(scene.instances, pairs);
+  const Status status = query.find_contacts(scene.instances, pairs, {});
   return {status, query.where(), sorted({query.contacts().begin(), query.contacts().end()}),
           query.counters()};
 }

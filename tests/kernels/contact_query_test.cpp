@@ -92,7 +92,9 @@ TEST_F(Query, AnswersBeforeAnythingIsGiven) {
   expect_nothing();
   EXPECT_EQ(query_.find_contacts({}), Status::kOk);
   expect_nothing();
-  EXPECT_EQ(query_.find_contacts({}, std::span<const ObjectPair>()), Status::kOk);
+  EXPECT_EQ(query_.find_contacts({}, {}), Status::kOk);
+  expect_nothing();
+  EXPECT_EQ(query_.find_contacts({}, std::span<const ObjectPair>(), {}), Status::kOk);
   expect_nothing();
 }
 
@@ -333,7 +335,7 @@ class QueryErrors : public Query {
       expect_nothing();
       expect_usable();
       const std::vector<ObjectPair> pairs = {{0, 1}, {1, 2}};
-      EXPECT_EQ(query_.find_contacts(scene.instances, pairs), status);
+      EXPECT_EQ(query_.find_contacts(scene.instances, pairs, {}), status);
       EXPECT_EQ(query_.where(), place);
       expect_nothing();
       expect_usable();
@@ -413,14 +415,14 @@ TEST_F(QueryErrors, NameAnUnknownInstance) {
       std::vector<ObjectPair> pairs = {{0, 1}, {1, 2}, {0, 2}};
       pairs[place] = bad;
       ASSERT_EQ(query_.set_assets(scene.assets.views()), Status::kOk);
-      EXPECT_EQ(query_.find_contacts(scene.instances, pairs), Status::kUnknownInstance);
+      EXPECT_EQ(query_.find_contacts(scene.instances, pairs, {}), Status::kUnknownInstance);
       EXPECT_EQ(query_.where(), place);
       expect_nothing();
       expect_usable();
     }
   }
   const std::vector<ObjectPair> pairs = {{0, 0}};
-  EXPECT_EQ(query_.find_contacts({}, pairs), Status::kUnknownInstance);
+  EXPECT_EQ(query_.find_contacts({}, pairs, {}), Status::kUnknownInstance);
 }
 
 /// The largest of everything that is in range.
@@ -439,7 +441,7 @@ TEST_F(QueryErrors, AreOfInstancesBeforePairs) {
   scene.instances[1].asset = 9;
   const std::vector<ObjectPair> pairs = {{0, 7}};
   ASSERT_EQ(query_.set_assets(scene.assets.views()), Status::kOk);
-  EXPECT_EQ(query_.find_contacts(scene.instances, pairs), Status::kUnknownAsset);
+  EXPECT_EQ(query_.find_contacts(scene.instances, pairs, {}), Status::kUnknownAsset);
   EXPECT_EQ(query_.where(), 1u);
 }
 
@@ -468,7 +470,7 @@ TEST_F(Query, SaysNoOnceItIsMovedFrom) {
   EXPECT_EQ(query_.where(), 0u);
   EXPECT_EQ(query_.set_assets(scene.assets.views()), Status::kOutOfMemory);
   EXPECT_EQ(query_.find_contacts(scene.instances), Status::kOutOfMemory);
-  EXPECT_EQ(query_.find_contacts(scene.instances, std::span<const ObjectPair>()), Status::kOutOfMemory);
+  EXPECT_EQ(query_.find_contacts(scene.instances, std::span<const ObjectPair>(), {}), Status::kOutOfMemory);
   query_ = ContactQuery();
   expect_usable();
 }

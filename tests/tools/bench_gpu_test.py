@@ -7,7 +7,7 @@ import unittest
 import numpy as np
 
 from bench_test import IDENTITY, BenchTest, drop_hint, table_of
-from tool_test import DONE, SOURCE_DIR, UNREADABLE_INPUT, USAGE
+from tool_test import DONE, SOURCE_DIR, UNREADABLE_INPUT, UNUSABLE_GPU, USAGE
 
 
 class BenchGpu(BenchTest):
@@ -22,12 +22,24 @@ class BenchGpu(BenchTest):
     def test_without_a_gpu_the_reason_is_told(self):
         self.write_scene()
         hidden = {**os.environ, "CUDA_VISIBLE_DEVICES": ""}
-        result = self.bench("query", self.scene, *self.ON_GPU, "--out", self.contacts, env=hidden)
         if self.built:
-            self.assert_fails(result, UNREADABLE_INPUT, "no GPU can be used: ")
+            self.assert_refused_on_gpu("there is no GPU that can be used: ", env=hidden)
         else:
+            result = self.bench("query", self.scene, *self.ON_GPU, env=hidden)
             self.assert_fails(drop_hint(result), USAGE, "built without CUDA")
-        self.assertFalse(self.contacts.exists())
+
+    def test_a_driver_that_is_too_old_is_told_with_its_version(self):
+        if not self.built:
+            self.skipTest("built without CUDA")
+        self.write_scene()
+        libraries = f"{os.environ['TANDEM_OLD_DRIVER']}:{os.environ.get('LD_LIBRARY_PATH', '')}"
+        self.assert_refused_on_gpu("the GPU's driver is too old", "it is for CUDA 8.0", env={**os.environ, "LD_LIBRARY_PATH": libraries})
+
+    def assert_refused_on_gpu(self, *words, **options):
+        for engine in ("tandem", "paper"):
+            result = self.bench("query", self.scene, *self.ON_GPU, "--engine", engine, "--out", self.contacts, **options)
+            self.assert_fails(result, UNUSABLE_GPU, "--backend cuda: ", *words)
+            self.assertFalse(self.contacts.exists())
 
     def test_options_of_another_backend_or_engine_are_refused(self):
         if not self.built:

@@ -154,7 +154,7 @@ class CompareTest(ToolTest):
                 ([heap, heap], USAGE, ["heap.h5", "same name"]), ([self.outputs / "none.h5"], UNREADABLE_INPUT, ["none.h5"]),
                 ([itself], UNREADABLE_INPUT, ["itself.h5", "/pairs"]),
                 ([skewed], UNREADABLE_INPUT, ["skewed.h5", "instance 0", "rigid"]),
-                ([heap, "--peers", "tandem", "--json", "--out", "/none/r.h5"], UNWRITABLE_OUTPUT, ["/none/r.h5"])]:
+                ([heap, "--peers", "tandem", "--out", "/none/r.h5"], UNWRITABLE_OUTPUT, ["/none/r.h5"])]:
             with self.subTest(words):
                 self.assert_refuses(arguments, code, *words)
 

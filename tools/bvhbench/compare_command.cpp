@@ -9,6 +9,7 @@
 #include <set>
 
 #include "compare_results.h"
+#include "hdf5_file.h"
 
 namespace tandem::bench {
 namespace {
@@ -54,7 +55,10 @@ void check_names(const std::vector<std::string>& scenes) {
 
 ExitCode run_compare(const CompareArguments& arguments) {
   check_names(arguments.scenes);
-  if (!arguments.out.empty()) keep_inputs(arguments.out, arguments.scenes);
+  if (!arguments.out.empty()) {
+    keep_inputs(arguments.out, arguments.scenes);
+    try_output(arguments.out);
+  }
   const char* commit = std::getenv("TANDEM_COMMIT");
   CompareResults results = {processor(), commit == nullptr ? "" : commit, arguments.repeats, {}};
   for (const std::string& scene : arguments.scenes) {

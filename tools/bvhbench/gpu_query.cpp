@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <chrono>
+#include <new>
 #include <numeric>
 #include <stdexcept>
 #include <tuple>
 
 #include "paper_engine.h"
+#include "tandem/formats/gpu_status.h"
 #include "tandem/kernels/gpu_broad_phase.h"
 #include "tandem/kernels/gpu_contact_query.h"
 #include "tandem/runtime/upload.h"
@@ -16,18 +18,48 @@
 namespace tandem::bench {
 namespace {
 
-void require(cudaError_t error, const char* what) {
-  if (error == cudaSuccess) return;
-  throw std::runtime_error(std::string("the GPU: ") + what + ": " + cudaGetErrorString(error));
+std::string free_memory() {
+  std::size_t free = 0, total = 0;
+  if (cudaMemGetInfo(&free, &total) != cudaSuccess) return {};
+  return ": " + std::to_string(free >> 20) + " of " + std::to_string(total >> 20) + " MiB are free";
 }
 
-// Of a Status of the libraries that is not about the scene.
-void require(Status status, cudaError_t error, const char* what) {
-  if (status == Status::kOk) return;
-  if (status == Status::kOutOfMemory) {
-    throw std::runtime_error(std::string("the GPU: ") + what + ": not enough GPU memory");
+std::string version(int number) {
+  return std::to_string(number / 1000) + "." + std::to_string(number % 1000 / 10);
+}
+
+// CUDA calls a driver that is missing too old.
+std::string driver_defect() {
+  int driver = 0, runtime = 0;
+  if (cudaDriverGetVersion(&driver) != cudaSuccess || driver == 0) return "no NVIDIA driver is installed";
+  static_cast<void>(cudaRuntimeGetVersion(&runtime));
+  return "it is for CUDA " + version(driver) + ", the program for CUDA " + version(runtime);
+}
+
+// Of a status that is not about the scene.
+[[noreturn]] void fail(Status status, cudaError_t error, const char* what) {
+  const std::string reason =
+      error == cudaErrorInsufficientDriver ? driver_defect() : cudaGetErrorString(error);
+  switch (status) {
+    case Status::kOutOfMemory:
+      throw std::bad_alloc();
+    case Status::kOutOfGpuMemory:
+      throw GpuError(std::string("--backend cuda: ") + what + ": " + explain(status) + free_memory());
+    case Status::kNoGpu:
+    case Status::kDriverTooOld:
+    case Status::kGpuNotSupported:
+      throw GpuError(std::string("--backend cuda: ") + explain(status) + ": " + reason);
+    default:
+      throw std::runtime_error(std::string("the GPU: ") + what + ": " + reason);
   }
-  require(error == cudaSuccess ? cudaErrorUnknown : error, what);
+}
+
+void require(cudaError_t error, const char* what) {
+  if (error != cudaSuccess) fail(status_of(error), error, what);
+}
+
+void require(Status status, cudaError_t error, const char* what) {
+  if (status != Status::kOk) fail(status, error, what);
 }
 
 // An array in GPU memory.
@@ -132,8 +164,9 @@ class GpuScene {
             list<std::uint32_t>(count(scene), [&](auto i) { return scene.description.instances[i].asset; }),
             stream),
         pose_(list<Pose>(count(scene), [&](auto i) { return scene.description.instances[i].pose; }), stream),
-        bounds_(list<AssetBounds>(scene.assets.size(), [&](auto i) { return bounds_of(*header(scene, i)); }),
-                stream),
+        bounds_(
+            list<AssetBounds>(scene.assets.size(), [&](auto i) { return asset_bounds(*header(scene, i)); }),
+            stream),
         pairs_(pairs, stream),
         pair_count_({static_cast<std::uint32_t>(pairs.size())}, stream) {
     for (std::size_t i = 0; i < uploads_.size(); ++i) {
@@ -156,13 +189,6 @@ class GpuScene {
  private:
   static std::size_t count(const Scene& scene) { return scene.description.instances.size(); }
   static const FileHeader* header(const Scene& scene, std::size_t i) { return scene.assets[i].view().header; }
-  static AssetBounds bounds_of(const FileHeader& header) {
-    AssetBounds bounds = {};
-    std::copy_n(header.origin, 3, bounds.origin);
-    std::copy_n(header.lower, 3, bounds.lower);
-    std::copy_n(header.upper, 3, bounds.upper);
-    return bounds;
-  }
 
   std::vector<DeviceAsset> uploads_;
   std::vector<GpuAsset> views_;
@@ -184,6 +210,7 @@ class PairsStep {
     if (given_) return;
     const Status status = broad_.find_pairs(scene_.instances(), scene_.bounds(), {}, stream_);
     if (subject(status) != nullptr) refuse(path, status, broad_.report().where);
+    if (status == Status::kTooManyPairs) refuse(path, status, 0);
     require(status, broad_.cuda_error(), "broad phase");
   }
 
@@ -293,18 +320,13 @@ void sort_pairs(GpuAnswer& answer) {
   for (Contact& contact : answer.contacts) contact.pair = row[contact.pair];
 }
 
-std::string name_of_gpu() {
-  int count = 0, driver = 0, device = 0;
-  const cudaError_t error = cudaGetDeviceCount(&count);
-  if (error != cudaSuccess || count == 0) {
-    const bool none = cudaDriverGetVersion(&driver) == cudaSuccess && driver == 0;
-    const char* reason = none ? "no NVIDIA driver is installed" : cudaGetErrorString(error);
-    throw FileError(std::string("--backend cuda: no GPU can be used: ") + reason);
-  }
+// Makes the context, so that upload is not charged with it.
+std::string start_gpu() {
+  int device = 0;
   cudaDeviceProp properties;
-  require(cudaGetDevice(&device), "its name");
-  require(cudaGetDeviceProperties(&properties, device), "its name");
-  require(cudaFree(nullptr), "start");  // makes the context, so that upload is not charged with it
+  require(cudaFree(nullptr), "start");
+  require(cudaGetDevice(&device), "start");
+  require(cudaGetDeviceProperties(&properties, device), "start");
   return properties.name;
 }
 
@@ -313,7 +335,7 @@ std::string name_of_gpu() {
 GpuAnswer query_on_gpu(const std::string& path, const Scene& scene, const std::vector<ObjectPair>* given,
                        const GpuQueryRequest& request) {
   GpuAnswer answer;
-  answer.gpu = name_of_gpu();
+  answer.gpu = start_gpu();
   const Stream stream;
   const auto start = std::chrono::steady_clock::now();
   const GpuScene on_gpu(scene, given != nullptr ? *given : std::vector<ObjectPair>(), stream.handle);

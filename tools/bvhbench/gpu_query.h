@@ -2,6 +2,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -38,12 +39,16 @@ struct GpuAnswer {
   std::size_t bytes = 0;        ///< of GPU memory: assets, instances, and the room of both steps
 };
 
+/// No GPU can be used, or it has too little memory; what() says why.
+struct GpuError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
 /// Finds the contacts of a scene on the current GPU. `given`: normalised object pairs, null where the GPU is
 /// to find them. The query runs until everything has room, then again for each repeat, timed by events: as a
 /// CUDA graph that is replayed, but for the paper's engine, which asks the CPU after each level. Throws
-/// FileError: no usable GPU, or an instance or pair is wrong, as on the CPU; std::runtime_error: CUDA failed,
-/// or too little GPU memory. Condition: this program has CUDA; not first_contact_only but with
-/// GpuEngine::tandem.
+/// GpuError; FileError: an instance or pair is wrong, as on the CPU; std::runtime_error: CUDA failed.
+/// Condition: this program has CUDA; not first_contact_only but with GpuEngine::tandem.
 GpuAnswer query_on_gpu(const std::string& path, const Scene& scene, const std::vector<ObjectPair>* given,
                        const GpuQueryRequest& request);
 

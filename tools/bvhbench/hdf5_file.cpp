@@ -282,6 +282,11 @@ std::vector<std::string> Hdf5Input::read_variable(const Dataset& dataset) const 
   return strings;
 }
 
+void try_output(const std::string& path) {
+  const std::string reason = build::try_whole_file(path);
+  if (!reason.empty()) throw OutputError(path + ": " + reason);
+}
+
 Hdf5Output::Hdf5Output(const std::string& path) : path_(path) {
   constexpr std::size_t kGrowth = std::size_t{1} << 20;
   silence();

@@ -16,6 +16,10 @@ struct OutputError : FileError {
   using FileError::FileError;
 };
 
+/// Throws OutputError where a file that is written later could not appear at this path, as far as can be
+/// told.
+void try_output(const std::string& path);
+
 /// Lengths of a dataset's dimensions, outermost first.
 using Shape = std::vector<std::uint64_t>;
 

@@ -5,6 +5,7 @@
 
 #include "command.h"
 #include "compare_command.h"
+#include "gpu_query.h"
 #include "hdf5_file.h"
 #include "poses_command.h"
 #include "query_command.h"
@@ -17,7 +18,7 @@ using namespace tandem::bench;
 
 constexpr const char* kFooter =
     "Exit codes: 0 done, 1 usage, 2 an input could not be read, 4 the output could not be written,\n"
-    "5 internal error.";
+    "5 internal error, 6 no GPU can be used, or it has too little memory.";
 
 ExitCode fail(ExitCode code, const char* reason) {
   std::fprintf(stderr, "bvhbench: %s\n", reason);
@@ -36,6 +37,8 @@ ExitCode run_and_report(const Run& run) {
     return fail(kUnwritableOutput, error.what());
   } catch (const FileError& error) {
     return fail(kUnreadableInput, error.what());
+  } catch (const GpuError& error) {
+    return fail(kUnusableGpu, error.what());
   } catch (const std::bad_alloc&) {
     return fail(kInternal, "not enough memory");
   } catch (const std::exception& defect) {

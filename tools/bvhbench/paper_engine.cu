@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "paper_engine_data.h"
+#include "tandem/formats/gpu_status.h"
 
 namespace tandem::bench {
 
@@ -102,10 +103,7 @@ struct PaperEngine::State {
     return error == cudaSuccess;
   }
 
-  Status status() const {
-    if (error == cudaSuccess) return Status::kOk;
-    return error == cudaErrorMemoryAllocation ? Status::kOutOfMemory : Status::kCudaFailed;
-  }
+  Status status() const { return status_of(error); }
 
   bool provide() {
     if (!ok(outcome.grow(1))) return false;
@@ -195,7 +193,7 @@ Status PaperEngine::State::traverse(const PaperOptions& options, cudaStream_t st
   std::uint64_t count = answers->pair_count;
   candidate_count = 0;
   for (int current = 0; count != 0; current = 1 - current) {
-    if (count > paper::kMostBlockPairs) return Status::kOutOfMemory;
+    if (count > paper::kMostBlockPairs) return Status::kOutOfGpuMemory;
     paper::Level level = {levels[current].data(), static_cast<std::uint32_t>(count), records.data(), {}, {}};
     if (!test_level(level, options, stream)) return status();
     report.levels += 1;

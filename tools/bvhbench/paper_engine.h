@@ -48,14 +48,14 @@ class PaperEngine {
   ~PaperEngine();
 
   /// Names the assets that instances refer to, on the current device. What the trees point to must outlive
-  /// the queries. Result: kOk, kOutOfMemory, kCudaFailed.
+  /// the queries. Result: kOk, kOutOfMemory, or one that status_of() of gpu_status.h names.
   Status set_assets(std::span<const GpuAsset> assets, cudaStream_t stream);
 
   /// Waits for the stream, once for each level of the trees and twice more. Keeps its memory from call to
   /// call: in a steady state nothing is allocated. Result: kOk; what find_contacts() of ContactQuery names;
-  /// kOutOfRange of a pair out of reach of float32 too, and where pairs.capacity is too small; kOutOfMemory
-  /// of a level beyond 2^28 - 1 block pairs too; kCudaFailed. After an error there are no contacts.
-  /// Condition: set_assets() went well.
+  /// kOutOfRange of a pair out of reach of float32 too, and where pairs.capacity is too small;
+  /// kOutOfGpuMemory of a level beyond 2^28 - 1 block pairs too; kCudaFailed. After an error there are no
+  /// contacts. Condition: set_assets() went well.
   Status find_contacts(const GpuInstances& instances, const GpuPairs& pairs, const PaperOptions& options,
                        cudaStream_t stream);
 

@@ -232,6 +232,7 @@ ExitCode run(const QueryArguments& arguments) {
   const Scene scene = read_scene(arguments.scene);
   if (!arguments.out.empty()) keep_inputs(arguments.out, files_of(arguments.scene, scene));
   check_arguments(arguments, scene);
+  if (!arguments.out.empty()) try_output(arguments.out);
   const Answer answer = (arguments.on_gpu() ? answer_of_gpu : answer_of_cpu)(arguments, scene);
   if (!arguments.out.empty()) write_contacts(arguments.out, answer.table, answer.record);
   if (arguments.json) {

@@ -96,7 +96,8 @@ int copy_permissions(const fs::path& from, int to) {
   return ::stat(from.c_str(), &info) != 0 || ::fchmod(to, info.st_mode & 07777) == 0 ? 0 : errno;
 }
 
-std::string write_and_rename(const fs::path& target, std::span<const std::byte> bytes) {
+// `replace`: else the temporary file is only tried and removed.
+std::string write_and_rename(const fs::path& target, std::span<const std::byte> bytes, bool replace) {
   const std::string temporary = temporary_beside(target);
   if (temporary.size() >= g_temporary.size()) return reason_of(ENAMETOOLONG);
   ::unlink(temporary.c_str());  // left behind by a killed process that had our number
@@ -105,10 +106,10 @@ std::string write_and_rename(const fs::path& target, std::span<const std::byte> 
   if (file < 0) return reason_of(errno);
   int error = copy_permissions(target, file);
   if (error == 0) error = write_all(file, bytes);
-  if (error == 0 && ::fsync(file) != 0) error = errno;
+  if (error == 0 && replace && ::fsync(file) != 0) error = errno;
   if (::close(file) != 0 && error == 0) error = errno;
-  if (error == 0 && ::rename(temporary.c_str(), target.c_str()) != 0) error = errno;
-  if (error != 0) ::unlink(temporary.c_str());
+  if (error == 0 && replace && ::rename(temporary.c_str(), target.c_str()) != 0) error = errno;
+  if (error != 0 || !replace) ::unlink(temporary.c_str());
   return error == 0 ? std::string() : reason_of(error);
 }
 
@@ -119,7 +120,17 @@ std::string write_whole_file(const fs::path& path, std::span<const std::byte> by
   const fs::file_status status = fs::status(path, error);
   if (fs::is_directory(status)) return "is a folder";
   if (fs::exists(status) && !fs::is_regular_file(status)) return write_in_place(path, bytes);
-  return write_and_rename(follow_links(path), bytes);
+  return write_and_rename(follow_links(path), bytes, true);
+}
+
+std::string try_whole_file(const fs::path& path) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (fs::is_directory(status)) return "is a folder";
+  if (fs::exists(status) && !fs::is_regular_file(status)) {
+    return ::access(path.c_str(), W_OK) == 0 ? std::string() : reason_of(errno);
+  }
+  return write_and_rename(follow_links(path), {}, false);
 }
 
 }  // namespace tandem::build

@@ -10,6 +10,7 @@ enum ExitCode : int {
   kNoTriangle = 3,        ///< the input holds no usable triangle
   kUnwritableOutput = 4,  ///< the output could not be written
   kInternal = 5,          ///< a defect of the program, or not enough memory
+  kUnusableGpu = 6,       ///< no GPU can be used, or it has too little memory
 };
 
 }  // namespace tandem

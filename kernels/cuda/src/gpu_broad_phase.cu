@@ -8,6 +8,7 @@
 #include "broad_phase_keys.cuh"
 #include "broad_phase_tree.cuh"
 #include "broad_phase_walk.cuh"
+#include "tandem/formats/gpu_status.h"
 
 namespace tandem {
 namespace {
@@ -196,9 +197,7 @@ struct GpuBroadPhase::State {
     return false;
   }
   bool launched() { return ok(cudaGetLastError()); }
-  Status failure() const {
-    return error == cudaErrorMemoryAllocation ? Status::kOutOfMemory : Status::kCudaFailed;
-  }
+  Status failure() const { return status_of(error); }
 
   bool reserve_fixed();
   bool reserve_boxes(std::uint32_t count);
@@ -326,7 +325,7 @@ Status GpuBroadPhase::State::find(GpuBroadPhase& self, GpuBroadPhaseCapacity wan
     if (const Status status = enqueue(); status != Status::kOk) return status;
     if (!ok(cudaStreamSynchronize(stream))) return failure();
     if (host_report->status != Status::kOk || host_report->complete != 0) return host_report->status;
-    if (host_report->found >= kNoIndex) return Status::kOutOfMemory;
+    if (host_report->found >= kNoIndex) return Status::kTooManyPairs;
     room = host_report->found + host_report->found / 4;
   }
 }

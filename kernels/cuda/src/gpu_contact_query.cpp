@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "gpu_query_data.h"
+#include "tandem/formats/gpu_status.h"
 
 namespace tandem {
 namespace {
@@ -32,6 +33,8 @@ GpuContactQuery& GpuContactQuery::operator=(GpuContactQuery&& other) noexcept {
   std::swap(asset_count_, other.asset_count_);
   std::swap(asset_room_, other.asset_room_);
   std::swap(depth_, other.depth_);
+  std::swap(most_triangles_, other.most_triangles_);
+  std::swap(most_faces_, other.most_faces_);
   std::swap(state_, other.state_);
   std::swap(chunks_, other.chunks_);
   std::swap(pairs_, other.pairs_);
@@ -39,6 +42,11 @@ GpuContactQuery& GpuContactQuery::operator=(GpuContactQuery&& other) noexcept {
   std::swap(met_, other.met_);
   std::swap(contacts_, other.contacts_);
   std::swap(undecided_, other.undecided_);
+  std::swap(unsorted_, other.unsorted_);
+  std::swap(order_, other.order_);
+  std::swap(sorting_, other.sorting_);
+  std::swap(sorted_room_, other.sorted_room_);
+  std::swap(sorting_bytes_, other.sorting_bytes_);
   std::swap(host_report_, other.host_report_);
   std::swap(capacity_, other.capacity_);
   std::swap(error_, other.error_);
@@ -47,9 +55,8 @@ GpuContactQuery& GpuContactQuery::operator=(GpuContactQuery&& other) noexcept {
 
 Status GpuContactQuery::fail(cudaError_t error) {
   error_ = error;
-  if (error == cudaSuccess) return Status::kOk;
-  static_cast<void>(cudaGetLastError());  // one that failed is not to be reported again by later calls
-  return error == cudaErrorMemoryAllocation ? Status::kOutOfMemory : Status::kCudaFailed;
+  if (error != cudaSuccess) static_cast<void>(cudaGetLastError());  // later calls must not report it again
+  return status_of(error);
 }
 
 template <typename Element>
@@ -75,7 +82,15 @@ void GpuContactQuery::free_room() {
   static_cast<void>(cudaFree(std::exchange(met_, nullptr)));
   static_cast<void>(cudaFree(std::exchange(contacts_, nullptr)));
   static_cast<void>(cudaFree(std::exchange(undecided_, nullptr)));
+  free_sorting();
   capacity_ = {};
+}
+
+void GpuContactQuery::free_sorting() {
+  static_cast<void>(cudaFree(std::exchange(unsorted_, nullptr)));
+  static_cast<void>(cudaFree(std::exchange(order_, nullptr)));
+  static_cast<void>(cudaFree(std::exchange(sorting_, nullptr)));
+  sorted_room_ = sorting_bytes_ = 0;
 }
 
 Status GpuContactQuery::provide_fixed_memory() {
@@ -90,7 +105,7 @@ Status GpuContactQuery::provide_fixed_memory() {
   chunks_ = chunks;
   void* report = nullptr;
   status = fail(cudaMallocHost(&report, sizeof(GpuQueryReport)));
-  if (status != Status::kOk) return status;
+  if (status != Status::kOk) return status == Status::kOutOfGpuMemory ? Status::kOutOfMemory : status;
   host_report_ = new (report) GpuQueryReport{};
   return Status::kOk;
 }
@@ -98,10 +113,13 @@ Status GpuContactQuery::provide_fixed_memory() {
 Status GpuContactQuery::set_assets(std::span<const GpuAsset> assets, cudaStream_t stream) {
   Status status = provide_fixed_memory();
   if (status != Status::kOk) return status;
-  std::uint32_t depth = 1;
+  std::uint32_t depth = 1, triangles = 0;
+  std::uint64_t faces = 0;
   for (const GpuAsset& asset : assets) {
     if (asset.tree.block_count >= kMostBlocks) return Status::kOutOfRange;
     depth = std::max(depth, asset.tree.depth);
+    triangles = std::max(triangles, asset.tree.triangle_count);
+    faces = std::max(faces, asset.source_faces);
   }
   if (assets.size() >= kNoIndex) return Status::kOutOfRange;
   const auto count = static_cast<std::uint32_t>(assets.size());
@@ -116,6 +134,8 @@ Status GpuContactQuery::set_assets(std::span<const GpuAsset> assets, cudaStream_
   }
   asset_count_ = count;
   depth_ = depth;
+  most_triangles_ = triangles;
+  most_faces_ = faces;
   if (count == 0) return Status::kOk;
   auto* table = static_cast<gpu::Asset*>(assets_);
   status = fail(cudaMemcpy2DAsync(table, sizeof(gpu::Asset), assets.data(), sizeof(GpuAsset),
@@ -125,8 +145,8 @@ Status GpuContactQuery::set_assets(std::span<const GpuAsset> assets, cudaStream_
   return status;
 }
 
-Status GpuContactQuery::reserve(const GpuQueryCapacity& wanted) {
-  if (wanted.undecided > kMostUndecided) return Status::kOutOfMemory;
+Status GpuContactQuery::reserve(const GpuQueryCapacity& wanted, const GpuQueryOptions& options) {
+  if (wanted.undecided > kMostUndecided) return Status::kOutOfGpuMemory;
   if (pairs_ == nullptr || wanted.pairs > capacity_.pairs) {
     const std::uint32_t count = grown(wanted.pairs, capacity_.pairs);
     capacity_.pairs = 0;
@@ -145,7 +165,7 @@ Status GpuContactQuery::reserve(const GpuQueryCapacity& wanted) {
     const std::uint64_t count = grown(wanted.contacts, capacity_.contacts);
     capacity_.contacts = 0;
     static_cast<void>(cudaFree(std::exchange(contacts_, nullptr)));
-    const Status status = allocate(contacts_, count);
+    const Status status = allocate(contacts_, count + gpu::kContactsForKeys);
     if (status != Status::kOk) return status;
     capacity_.contacts = count;
   }
@@ -159,11 +179,33 @@ Status GpuContactQuery::reserve(const GpuQueryCapacity& wanted) {
     if (status != Status::kOk) return status;
     capacity_.undecided = count;
   }
+  return options.sorted ? reserve_sorting() : Status::kOk;
+}
+
+Status GpuContactQuery::reserve_sorting() {
+  if (capacity_.contacts <= sorted_room_ && sorting_ != nullptr) return Status::kOk;
+  if (capacity_.contacts >= kNoIndex) return Status::kOutOfRange;
+  free_sorting();
+  std::size_t bytes = 0;
+  unsigned char* sorting = nullptr;
+  Status status = fail(gpu::sorting_bytes(capacity_.contacts, bytes));
+  if (status == Status::kOk) status = allocate(unsorted_, capacity_.contacts);
+  if (status == Status::kOk) status = allocate(order_, 2 * capacity_.contacts);
+  if (status == Status::kOk) status = allocate(sorting, bytes);
+  sorting_ = sorting;
+  if (status != Status::kOk) {
+    free_sorting();
+    return status;
+  }
+  sorted_room_ = capacity_.contacts;
+  sorting_bytes_ = bytes;
   return Status::kOk;
 }
 
 Status GpuContactQuery::enqueue(const GpuInstances& instances, const GpuPairs& pairs,
                                 const GpuQueryOptions& options, cudaStream_t stream) {
+  if (options.sorted && (sorting_ == nullptr || sorted_room_ < capacity_.contacts))
+    return Status::kOutOfRange;
   gpu::QueryArgs args = {};
   args.assets = static_cast<const gpu::Asset*>(assets_);
   args.asset_count = asset_count_;
@@ -177,9 +219,10 @@ Status GpuContactQuery::enqueue(const GpuInstances& instances, const GpuPairs& p
   args.pairs = static_cast<gpu::PairRecord*>(pairs_);
   args.world_pairs = world_pairs_;
   args.met = met_;
-  args.contacts = contacts_;
+  args.contacts = options.sorted ? unsorted_ : contacts_;
   args.undecided = static_cast<gpu::Candidate*>(undecided_);
   args.unresolved = args.undecided + capacity_.undecided;
+  args.most_blocks = options.most_blocks;
   args.stack_reserve = 15 * (depth_ - 1) + 64;  // 64: what candidates take meanwhile
   args.stack_size = args.stack_reserve + kStackSize;
   cudaError_t error = cudaMemsetAsync(args.state, 0, sizeof(gpu::QueryState), stream);
@@ -188,6 +231,10 @@ Status GpuContactQuery::enqueue(const GpuInstances& instances, const GpuPairs& p
     error = (options.mode == QueryMode::exact ? gpu::walk_exact : gpu::walk_unfused)(args, stream);
   if (error == cudaSuccess) error = gpu::walk_world(args, stream);
   if (error == cudaSuccess) error = gpu::decide_rest(args, stream);
+  if (error == cudaSuccess && options.sorted) {
+    const gpu::SortingRoom room = {contacts_, order_, sorting_, sorting_bytes_, most_triangles_, most_faces_};
+    error = gpu::sort_contacts(args, room, stream);
+  }
   if (error == cudaSuccess)
     error = cudaMemcpyAsync(host_report_, &args.state->report, sizeof(GpuQueryReport), cudaMemcpyDeviceToHost,
                             stream);
@@ -197,7 +244,7 @@ Status GpuContactQuery::enqueue(const GpuInstances& instances, const GpuPairs& p
 Status GpuContactQuery::find_contacts(const GpuInstances& instances, const GpuPairs& pairs,
                                       const GpuQueryOptions& options, cudaStream_t stream) {
   for (;;) {
-    Status status = reserve(capacity_);  // where nothing was reserved yet
+    Status status = reserve(capacity_, options);  // where nothing was reserved yet
     if (status == Status::kOk) status = enqueue(instances, pairs, options, stream);
     if (status == Status::kOk) status = fail(cudaStreamSynchronize(stream));
     if (status != Status::kOk) return status;
@@ -205,7 +252,7 @@ Status GpuContactQuery::find_contacts(const GpuInstances& instances, const GpuPa
     if (report().complete != 0) return Status::kOk;
     const GpuQueryCapacity needed = report().needed;
     if (needed.pairs > pairs.capacity) return Status::kOutOfRange;
-    status = reserve(needed);
+    status = reserve(needed, options);
     if (status != Status::kOk) return status;
   }
 }
@@ -220,6 +267,8 @@ std::size_t GpuContactQuery::bytes() const {
   if (chunks_ != nullptr) bytes += gpu::kChunks * sizeof(gpu::Chunk);
   bytes += capacity_.pairs * (sizeof(gpu::PairRecord) + 2 * sizeof(std::uint32_t));
   bytes += capacity_.contacts * sizeof(Contact) + capacity_.undecided * 2 * sizeof(gpu::Candidate);
+  if (contacts_ != nullptr) bytes += gpu::kContactsForKeys * sizeof(Contact);
+  bytes += sorted_room_ * (sizeof(Contact) + 2 * sizeof(std::uint32_t)) + sorting_bytes_;
   return bytes;
 }
 

@@ -57,7 +57,21 @@ struct QueryArgs {
   Contact* contacts;
   Candidate *undecided, *unresolved;
   std::uint32_t stack_size, stack_reserve;  ///< see walk.cuh
+  std::uint32_t most_blocks;                ///< of the walk's grid; 0: as many as the GPU holds
 };
+
+/// What sorting takes besides args.contacts, which it reads: all of as many contacts.
+struct SortingRoom {
+  Contact* out;          ///< kContactsForKeys more
+  std::uint32_t* order;  ///< twice as many
+  void* scratch;
+  std::size_t scratch_bytes;
+  std::uint32_t most_triangles;  ///< of an asset
+  std::uint64_t most_faces;
+};
+
+/// Sorting keeps two rows of 64-bit keys where its result is to come, each row aligned.
+inline constexpr std::size_t kContactsForKeys = 32;
 
 /// Fills in the extents of assets.
 cudaError_t measure_assets(Asset* assets, std::uint32_t count, cudaStream_t stream);
@@ -74,6 +88,12 @@ cudaError_t walk_world(const QueryArgs& args, cudaStream_t stream);
 
 /// Decides what the walks left, and writes the report.
 cudaError_t decide_rest(const QueryArgs& args, cudaStream_t stream);
+
+/// Bytes of scratch memory for so many contacts.
+cudaError_t sorting_bytes(std::uint64_t contacts, std::size_t& bytes);
+
+/// Sorts the contacts that the report counts into room.out.
+cudaError_t sort_contacts(const QueryArgs& args, const SortingRoom& room, cudaStream_t stream);
 
 #ifdef __CUDACC__
 

@@ -446,6 +446,7 @@ cudaError_t launch_walk(const QueryArgs& args, cudaStream_t stream) {
     error = cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel, 32 * kWarpsPerBlock, bytes);
   if (error != cudaSuccess) return error;
   blocks = std::min(blocks * processors, static_cast<int>(kChunks / 2 / kWarpsPerBlock));
+  if (args.most_blocks != 0) blocks = std::min(blocks, static_cast<int>(args.most_blocks));
   kernel<<<static_cast<unsigned>(blocks), 32 * kWarpsPerBlock, bytes, stream>>>(args);
   return cudaGetLastError();
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "tandem/formats/gpu_status.h"
+
 namespace tandem {
 namespace {
 
@@ -34,14 +36,14 @@ Status DeviceAsset::upload(const AssetView& asset, cudaStream_t stream) {
     data_ = nullptr;
     static_cast<void>(
         cudaGetLastError());  // an allocation that failed is not sticky; later calls must not report it again
-    return error_ == cudaErrorMemoryAllocation ? Status::kOutOfMemory : Status::kCudaFailed;
+    return status_of(error_);
   }
   error_ = cudaMemcpyAsync(data_, asset.header, bytes, cudaMemcpyHostToDevice, stream);
   if (error_ != cudaSuccess) {
     const cudaError_t error = error_;
     free();
     error_ = error;
-    return Status::kCudaFailed;
+    return status_of(error);
   }
   bytes_ = bytes;
   level_count_ = static_cast<std::uint32_t>(asset.levels.size());

@@ -8,18 +8,13 @@ namespace tandem {
 enum class [[nodiscard]] Status : std::uint32_t{
     kOk = 0,
     // Getting at the bytes.
-    kFileNotFound,
-    kNotARegularFile,
-    kCannotOpen,
-    kCannotRead,
-    kOutOfMemory,
+    kFileNotFound, kNotARegularFile, kCannotOpen, kCannotRead, kOutOfMemory,
     kMisaligned,  ///< bytes in memory must start at a multiple of 128
     // What kind of file it is.
     kBiovisionMotionCapture,  ///< the other .bvh: starts with HIERARCHY
     kNotTandem,
     kDamagedByTextTransfer,  ///< ours, but line ends were rewritten on the way
-    kWrongByteOrder,
-    kUnsupportedVersion,
+    kWrongByteOrder, kUnsupportedVersion,
     kTruncated,       ///< fewer bytes than the header says
     kTrailingBytes,   ///< more bytes than the header says
     kContentChanged,  ///< the hash differs: some byte is not what was written
@@ -31,8 +26,7 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kSectionOutOfBounds,   ///< reaches past the end of the file, or its size overflows
     kSectionsOverlap,      ///< or are not in ascending order
     kSectionSizeMismatch,  ///< bytes differ from count times element size
-    kSectionMissing,
-    kSectionDuplicated,
+    kSectionMissing, kSectionDuplicated,
     kBadGap,    ///< bytes between sections are not zero or more than alignment asks for
     kBadLevel,  ///< counts of a level that contradict each other or its sections
     kBadPart,   ///< a part whose strings or faces lie outside
@@ -51,9 +45,7 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kDepthMismatch,      ///< depth differs from what the level says
     kLeafCountMismatch,  ///< leaves, or leaf blocks, differ in number from what the level says
     kTriangleOrder,      ///< leaves, in the order of blocks, must name the triangles 0, 1, 2, ...
-    kTriangleNotFinite,
-    kTriangleOutsideLeafBox,
-    kChildOutsideParentBox,
+    kTriangleNotFinite, kTriangleOutsideLeafBox, kChildOutsideParentBox,
     kBadFace,         ///< source face or part out of range, or a reserved lane set
     kBoundsMismatch,  ///< the header's bounds are not those of the triangles
     // Querying.
@@ -64,8 +56,12 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kTooManyInstances,  ///< 2^32 - 1 or more
     kTooManyPairs,      ///< 2^32 - 1 object pairs or more
     kCannotStartThread,
-    // Uploading.
-    kCudaFailed,
+    // On a GPU; status_of() of gpu_status.h names CUDA's errors.
+    kNoGpu,            ///< none here, none that this process may use, or no driver
+    kDriverTooOld,     ///< for the CUDA version that the program was built with
+    kGpuNotSupported,  ///< the program holds no code for a GPU of this kind
+    kOutOfGpuMemory,
+    kCudaFailed,  ///< a call of CUDA failed for another reason
 };
 
 /// The name of a defect as written above without the k, for logs and JSON: "ChildShared".

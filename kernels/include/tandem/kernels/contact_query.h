@@ -82,11 +82,10 @@ class ContactQuery {
 
   /// Finds the contacts of the given object pairs, in either order of a and b. A pair of an instance with
   /// itself asks for the contacts within it: each pair of two different triangles once, neighbours in the
-  /// mesh included, which touch. `pairs` may be
-  /// pairs(), or a part of them.Result: as above, or
+  /// mesh included, which touch. `pairs` may be pairs(), or a part of them. Result: as above, or
   /// kUnknownInstance: where() is the pair.
   Status find_contacts(std::span<const Instance> instances, std::span<const ObjectPair> pairs,
-                       const QueryOptions& options = {});
+                       const QueryOptions& options);
 
   /// The object pairs of the last call: a < b, or a = b for self pairs, sorted, where the query found them;
   /// as given else.

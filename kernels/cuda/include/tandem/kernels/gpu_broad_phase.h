@@ -5,23 +5,11 @@
 #include <cstdint>
 #include <memory>
 
-#include "tandem/kernels/broad_phase.h"
-#include "tandem/kernels/gpu_contact_query.h"
+#include "tandem/formats/status.h"
+#include "tandem/kernels/gpu_scene.h"
 #include "tandem/kernels/world_box.h"
 
 namespace tandem {
-
-/// What a broad phase needs to know of an asset: stored coordinates, as the file's header has them.
-struct AssetBounds {
-  double origin[3];
-  float lower[3], upper[3];
-};
-
-/// Asset bounds as an array in GPU memory.
-struct GpuAssetBounds {
-  const AssetBounds* bounds;
-  std::uint32_t count;
-};
 
 struct GpuBroadPhaseOptions {
   /// Pairs come sorted by a, then b, as BroadPhase has them. Else they come in an order that may differ from
@@ -31,10 +19,17 @@ struct GpuBroadPhaseOptions {
 
 /// How many boxes and pairs there is room for.
 struct GpuBroadPhaseCapacity {
-  std::uint32_t boxes = 0;      ///< or instances: 50 bytes each, and a little for sorting
-  std::uint32_t pairs = 0;      ///< 8 bytes each, 16 where sorted
-  std::uint32_t instances = 0;  ///< whose boxes are to be computed: 48 bytes more each
+  std::uint32_t boxes = 0;  ///< or instances
+  std::uint32_t pairs = 0;
+  std::uint32_t instances = 0;  ///< whose boxes are to be computed
 };
+
+/// GPU memory that a broad phase with room for so much holds at most: the bound of GpuBroadPhase::bytes().
+constexpr std::size_t most_broad_phase_bytes(const GpuBroadPhaseCapacity& capacity, bool sorted) {
+  constexpr std::size_t kFixed = std::size_t{1} << 20;
+  return kFixed + 52 * std::size_t{capacity.boxes} + 48 * std::size_t{capacity.instances} +
+         (sorted ? 17 : 8) * std::size_t{capacity.pairs};
+}
 
 /// What became of a broad phase. Lies in GPU memory, and in CPU memory once the stream has come so far.
 struct GpuBroadPhaseReport {
@@ -61,8 +56,9 @@ class GpuBroadPhase {
   ~GpuBroadPhase();  ///< waits for the device
 
   /// Makes room for at least so much on the current device, waiting for it where memory grows. `options`:
-  /// those of the calls to come. Result: kOk, kOutOfRange (2^32 - 1 boxes), kOutOfMemory, kCudaFailed; after
-  /// an error there is the room that there was, or less.
+  /// those of the calls to come. Result: kOk, kOutOfRange (2^32 - 1 boxes), kOutOfGpuMemory, kOutOfMemory, or
+  /// another that status_of() of gpu_status.h names: kNoGpu, kDriverTooOld, kGpuNotSupported, kCudaFailed;
+  /// after an error there is the room that there was, or less.
   Status reserve(const GpuBroadPhaseCapacity& capacity, const GpuBroadPhaseOptions& options = {});
 
   /// Queues a broad phase of the boxes behind what `stream` holds; may be captured into a graph. `boxes`, in
@@ -79,7 +75,7 @@ class GpuBroadPhase {
 
   /// enqueue(), waits, makes room where there was too little, and again: at most twice, and in a steady state
   /// once. Room grows by a quarter more than needed. Result: that of the report or of a call that failed;
-  /// kOutOfMemory where there are 2^32 - 1 pairs or more.
+  /// kTooManyPairs where there are 2^32 - 1 or more.
   Status find_pairs(const WorldBox* boxes, std::uint32_t count, const GpuBroadPhaseOptions& options,
                     cudaStream_t stream);
   Status find_pairs(const GpuInstances& instances, const GpuAssetBounds& assets,
@@ -98,7 +94,7 @@ class GpuBroadPhase {
   const GpuBroadPhaseReport& report() const;
 
   GpuBroadPhaseCapacity capacity() const;
-  std::size_t bytes() const;  ///< GPU memory held
+  std::size_t bytes() const;  ///< GPU memory held, at most most_broad_phase_bytes()
   cudaError_t cuda_error() const;
 
  private:

@@ -5,57 +5,41 @@
 #include <cstdint>
 #include <span>
 
-#include "tandem/formats/view.h"
-#include "tandem/kernels/broad_phase.h"
 #include "tandem/kernels/contact_query.h"
-#include "tandem/kernels/pose.h"
+#include "tandem/kernels/gpu_scene.h"
 
 namespace tandem {
-
-/// An asset as a query on the GPU sees it; owns nothing.
-struct GpuAsset {
-  LevelView tree;  ///< pointers into GPU memory, as DeviceAsset::level() gives them
-  double origin[3];
-  float lower[3], upper[3];
-};
-
-/// The asset whose level `tree` lies in GPU memory and whose header lies in CPU memory.
-inline GpuAsset gpu_asset(const LevelView& tree, const FileHeader& header) {
-  GpuAsset asset = {tree, {}, {}, {}};
-  for (int k = 0; k < 3; ++k) {
-    asset.origin[k] = header.origin[k];
-    asset.lower[k] = header.lower[k];
-    asset.upper[k] = header.upper[k];
-  }
-  return asset;
-}
-
-/// Instances as arrays in GPU memory, which a simulation may write there. Poses speak of the file's
-/// coordinates.
-struct GpuInstances {
-  const std::uint32_t* asset;  ///< by place in the list given to set_assets()
-  const Pose* pose;
-  std::uint32_t count;
-};
-
-/// Object pairs in GPU memory, their number too: what a broad phase on the GPU leaves there.
-struct GpuPairs {
-  const ObjectPair* pairs;
-  const std::uint32_t* count;  ///< in GPU memory
-  std::uint32_t capacity;      ///< room in `pairs`; where *count is more, the query is not complete
-};
 
 struct GpuQueryOptions {
   QueryMode mode = QueryMode::exact;
   bool first_contact_only = false;  ///< one contact for each object pair that has any; which one is open
+
+  /// Contacts come sorted by pair, face_a, face_b, triangle_a, triangle_b: the same bytes on every run, and
+  /// the order of a contacts file where the pairs are sorted too. Within an instance itself face_a <= face_b
+  /// then. Takes time for as many contacts as there is room for, not for those found. Else they come in no
+  /// order.
+  bool sorted = false;
+
+  /// Thread blocks, of 128 threads, that may look for contacts at a time; 0: as many as the GPU holds. Fewer
+  /// leave multiprocessors to what runs beside the query, and let tools run that are slow where warps wait.
+  std::uint32_t most_blocks = 0;
 };
 
 /// How much a query has room for, and how much one needs.
 struct GpuQueryCapacity {
-  std::uint32_t pairs = 0;      ///< 168 bytes each
-  std::uint64_t contacts = 0;   ///< 20 bytes each
-  std::uint64_t undecided = 0;  ///< candidates that float32 cannot decide; 24 bytes each
+  std::uint32_t pairs = 0;
+  std::uint64_t contacts = 0;
+  std::uint64_t undecided = 0;  ///< candidates that float32 cannot decide
 };
+
+/// GPU memory that a query with room for so much holds at most: the bound of GpuContactQuery::bytes().
+/// Instances cost it nothing; the pairs of a moment bound it, whatever the trees' sizes.
+constexpr std::size_t most_query_bytes(const GpuQueryCapacity& capacity, bool sorted, std::size_t assets) {
+  constexpr std::size_t kFixed = std::size_t{4} << 20;  // work that warps give to each other, and the report
+  const std::size_t per_contact = sorted ? 20 + 29 : 20;
+  return kFixed + 256 * assets + 168 * std::size_t{capacity.pairs} + per_contact * capacity.contacts +
+         24 * capacity.undecided;
+}
 
 /// What became of a query. Lies in GPU memory, and in CPU memory once the stream has come so far.
 struct GpuQueryReport {
@@ -80,17 +64,20 @@ class GpuContactQuery {
   ~GpuContactQuery() { free(); }
 
   /// Names the assets that instances refer to, on the current device, after what `stream` holds; returns when
-  /// that is done. What the trees point to must outlive the queries. Result: kOk, kOutOfMemory, kOutOfRange
-  /// (a tree of 2^29 blocks or more), kCudaFailed.
+  /// that is done. What the trees point to must outlive the queries. Result: kOk, kOutOfRange (a tree of 2^29
+  /// blocks or more), kOutOfGpuMemory, kOutOfMemory, or another that status_of() of gpu_status.h names:
+  /// kNoGpu, kDriverTooOld, kGpuNotSupported, kCudaFailed.
   Status set_assets(std::span<const GpuAsset> assets, cudaStream_t stream);
 
-  /// Makes room for at least so much, waiting for the device where it grows. Result: kOk, kOutOfMemory,
-  /// kCudaFailed; after an error there is the room that there was, or none. Condition: set_assets().
-  Status reserve(const GpuQueryCapacity& capacity);
+  /// Makes room for at least so much, waiting for the device where it grows. `options`: those of the calls to
+  /// come. Result: kOk, kOutOfRange (sorted contacts: 2^32 - 1 or more), kOutOfGpuMemory, kCudaFailed; after
+  /// an error there is the room that there was, or none. Condition: set_assets().
+  Status reserve(const GpuQueryCapacity& capacity, const GpuQueryOptions& options = {});
 
   /// Queues a query behind what `stream` holds; may be captured into a graph. The arrays must stay until it
-  /// is done. A pair of an instance with itself asks for the contacts within it. Result: kOk or kCudaFailed;
-  /// what the GPU finds wrong is in the report. Condition: set_assets() and reserve().
+  /// is done. A pair of an instance with itself asks for the contacts within it. Result: kOk, kOutOfRange
+  /// (sorted, and reserved without), kCudaFailed; what the GPU finds wrong is in the report. Condition:
+  /// set_assets() and reserve().
   Status enqueue(const GpuInstances& instances, const GpuPairs& pairs, const GpuQueryOptions& options,
                  cudaStream_t stream);
 
@@ -100,7 +87,7 @@ class GpuContactQuery {
   Status find_contacts(const GpuInstances& instances, const GpuPairs& pairs, const GpuQueryOptions& options,
                        cudaStream_t stream);
 
-  /// In GPU memory: report().contacts of them, in no order.
+  /// In GPU memory: report().contacts of them.
   const Contact* contacts() const { return contacts_; }
   const GpuQueryReport* device_report() const;
 
@@ -108,19 +95,23 @@ class GpuContactQuery {
   const GpuQueryReport& report() const { return *host_report_; }
 
   const GpuQueryCapacity& capacity() const { return capacity_; }
-  std::size_t bytes() const;  ///< GPU memory held
+  std::size_t bytes() const;  ///< GPU memory held, at most most_query_bytes()
   cudaError_t cuda_error() const { return error_; }
 
  private:
   void free();
   void free_room();
+  void free_sorting();
   Status fail(cudaError_t error);
   template <typename Element>
   Status allocate(Element*& out, std::size_t count);
   Status provide_fixed_memory();
+  Status reserve_sorting();
 
   void* assets_ = nullptr;
   std::uint32_t asset_count_ = 0, asset_room_ = 0, depth_ = 1;
+  std::uint32_t most_triangles_ = 0;
+  std::uint64_t most_faces_ = 0;
   void* state_ = nullptr;
   void* chunks_ = nullptr;
   void* pairs_ = nullptr;
@@ -128,6 +119,11 @@ class GpuContactQuery {
   std::uint32_t* met_ = nullptr;
   Contact* contacts_ = nullptr;
   void* undecided_ = nullptr;
+  Contact* unsorted_ = nullptr;
+  std::uint32_t* order_ = nullptr;
+  void* sorting_ = nullptr;
+  std::uint64_t sorted_room_ = 0;
+  std::size_t sorting_bytes_ = 0;
   GpuQueryReport* host_report_ = nullptr;
   GpuQueryCapacity capacity_;
   cudaError_t error_ = cudaSuccess;

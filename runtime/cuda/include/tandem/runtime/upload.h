@@ -17,7 +17,8 @@ class DeviceAsset {
   ~DeviceAsset() { free(); }
 
   /// Allocates on the current device and queues the copy on `stream`; what was uploaded before is freed.
-  /// Result: kOk, kOutOfMemory, or kCudaFailed with cuda_error() telling more.
+  /// Result: kOk, kOutOfGpuMemory, or another that status_of() of gpu_status.h names: kNoGpu, kDriverTooOld,
+  /// kGpuNotSupported, kCudaFailed; then nothing is held, and cuda_error() tells more.
   /// Condition: the bytes of `asset`, a checked one, stay until the copy is done. They may be pageable (a
   /// mapped file); CUDA then stages them and returns when it has read them.
   Status upload(const AssetView& asset, cudaStream_t stream);

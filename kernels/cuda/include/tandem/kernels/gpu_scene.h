@@ -1,0 +1,64 @@
+#pragma once
+#include <algorithm>
+#include <cstdint>
+
+#include "tandem/formats/view.h"
+#include "tandem/kernels/broad_phase.h"
+#include "tandem/kernels/pose.h"
+
+// A scene as queries on a GPU take it: arrays in GPU memory that belong to the caller.
+namespace tandem {
+
+/// An asset as a query on the GPU sees it; owns nothing.
+struct GpuAsset {
+  LevelView tree;  ///< pointers into GPU memory, as DeviceAsset::level() gives them
+  double origin[3];
+  float lower[3], upper[3];
+  std::uint64_t source_faces;  ///< that sorted contacts can name
+};
+
+/// The asset whose level `tree` lies in GPU memory and whose header lies in CPU memory.
+inline GpuAsset gpu_asset(const LevelView& tree, const FileHeader& header) {
+  GpuAsset asset = {tree, {}, {}, {}, header.source_faces};
+  std::copy_n(header.origin, 3, asset.origin);
+  std::copy_n(header.lower, 3, asset.lower);
+  std::copy_n(header.upper, 3, asset.upper);
+  return asset;
+}
+
+/// What a broad phase needs to know of an asset: stored coordinates, as the file's header has them.
+struct AssetBounds {
+  double origin[3];
+  float lower[3], upper[3];
+};
+
+inline AssetBounds asset_bounds(const FileHeader& header) {
+  AssetBounds bounds = {};
+  std::copy_n(header.origin, 3, bounds.origin);
+  std::copy_n(header.lower, 3, bounds.lower);
+  std::copy_n(header.upper, 3, bounds.upper);
+  return bounds;
+}
+
+/// Asset bounds as an array in GPU memory.
+struct GpuAssetBounds {
+  const AssetBounds* bounds;
+  std::uint32_t count;
+};
+
+/// Instances as arrays in GPU memory, which a simulation may write there. Poses speak of the file's
+/// coordinates.
+struct GpuInstances {
+  const std::uint32_t* asset;  ///< by place in the list of assets, or of their bounds
+  const Pose* pose;
+  std::uint32_t count;
+};
+
+/// Object pairs in GPU memory, their number too: what a broad phase on the GPU leaves there.
+struct GpuPairs {
+  const ObjectPair* pairs;
+  const std::uint32_t* count;  ///< in GPU memory
+  std::uint32_t capacity;      ///< room in `pairs`; where *count is more, the query is not complete
+};
+
+}  // namespace tandem

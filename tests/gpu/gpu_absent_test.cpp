@@ -1,0 +1,68 @@
+// What is said where no GPU can be used. ctest hides the GPUs, or puts a driver that is too old in the way
+// (old_driver.cpp): environment variable TANDEM_EXPECTED_STATUS, a name of Status.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <string>
+
+#include "build/sample_asset.h"
+#include "tandem/formats/gpu_status.h"
+#include "tandem/kernels/gpu_broad_phase.h"
+#include "tandem/kernels/gpu_contact_query.h"
+#include "tandem/runtime/upload.h"
+
+namespace tandem {
+namespace {
+
+class GpuAbsent : public testing::Test {
+ protected:
+  void SetUp() override {
+    const char* name = std::getenv("TANDEM_EXPECTED_STATUS");
+    if (name == nullptr) GTEST_SKIP() << "TANDEM_EXPECTED_STATUS is not set";
+    expected_ = name;
+  }
+
+  std::string expected_;
+};
+
+TEST(GpuStatus, CudasErrorsHaveNamesOfTheirOwn) {
+  constexpr int kSomeDriver = 12000;
+  EXPECT_EQ(status_of(cudaSuccess, kSomeDriver), Status::kOk);
+  EXPECT_EQ(status_of(cudaErrorNoDevice, kSomeDriver), Status::kNoGpu);
+  EXPECT_EQ(status_of(cudaErrorDevicesUnavailable, kSomeDriver), Status::kNoGpu);
+  EXPECT_EQ(status_of(cudaErrorInsufficientDriver, 0), Status::kNoGpu);
+  EXPECT_EQ(status_of(cudaErrorInsufficientDriver, kSomeDriver), Status::kDriverTooOld);
+  EXPECT_EQ(status_of(cudaErrorUnsupportedPtxVersion, kSomeDriver), Status::kDriverTooOld);
+  EXPECT_EQ(status_of(cudaErrorSystemDriverMismatch, kSomeDriver), Status::kDriverTooOld);
+  EXPECT_EQ(status_of(cudaErrorNoKernelImageForDevice, kSomeDriver), Status::kGpuNotSupported);
+  EXPECT_EQ(status_of(cudaErrorMemoryAllocation, kSomeDriver), Status::kOutOfGpuMemory);
+  EXPECT_EQ(status_of(cudaErrorIllegalAddress, kSomeDriver), Status::kCudaFailed);
+}
+
+TEST_F(GpuAbsent, AnUploadSaysSo) {
+  const build::Image image = test::make_file(test::random_mesh(10, 1));
+  DeviceAsset asset;
+  EXPECT_EQ(name(asset.upload(check(image.data(), image.size()).asset, nullptr)), expected_);
+  EXPECT_NE(asset.cuda_error(), cudaSuccess);
+  EXPECT_EQ(asset.bytes(), 0u);
+}
+
+TEST_F(GpuAbsent, ABroadPhaseSaysSo) {
+  GpuBroadPhase broad;
+  EXPECT_EQ(name(broad.reserve({10, 10, 10})), expected_);
+  EXPECT_EQ(name(broad.find_pairs(nullptr, 10, {}, nullptr)), expected_);
+  EXPECT_NE(broad.cuda_error(), cudaSuccess);
+  EXPECT_EQ(broad.bytes(), 0u);
+}
+
+TEST_F(GpuAbsent, AContactQuerySaysSo) {
+  GpuContactQuery query;
+  EXPECT_EQ(name(query.set_assets({}, nullptr)), expected_);
+  EXPECT_EQ(name(query.reserve({10, 10, 10})), expected_);
+  EXPECT_EQ(name(query.find_contacts({}, {}, {}, nullptr)), expected_);
+  EXPECT_NE(query.cuda_error(), cudaSuccess);
+  EXPECT_EQ(query.bytes(), 0u);
+}
+
+}  // namespace
+}  // namespace tandem

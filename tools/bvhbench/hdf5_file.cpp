@@ -224,12 +224,24 @@ void Hdf5Input::read(const Dataset& dataset, std::int64_t memory_type, void* val
   }
 }
 
-std::vector<std::uint32_t> Hdf5Input::read_u32(const std::string& name, const Shape& row) const {
-  const Dataset dataset = open(name, row);
+Hdf5Input::Dataset Hdf5Input::open_integers(const std::string& name, const Shape& row) const {
+  Dataset dataset = open(name, row);
   const H5T_class_t type = dataset.type_class();
   if (type != H5T_INTEGER) refuse(name, std::string("expected integers, found ") + words_for(type));
+  return dataset;
+}
+
+std::vector<std::uint32_t> Hdf5Input::read_u32(const std::string& name, const Shape& row) const {
+  const Dataset dataset = open_integers(name, row);
   std::vector<std::uint32_t> values(dataset.count());
   read(dataset, H5T_NATIVE_UINT32, values.data());
+  return values;
+}
+
+std::vector<std::uint64_t> Hdf5Input::read_u64(const std::string& name, const Shape& row) const {
+  const Dataset dataset = open_integers(name, row);
+  std::vector<std::uint64_t> values(dataset.count());
+  read(dataset, H5T_NATIVE_UINT64, values.data());
   return values;
 }
 
@@ -287,6 +299,22 @@ void try_output(const std::string& path) {
   if (!reason.empty()) throw OutputError(path + ": " + reason);
 }
 
+std::string Hdf5Input::read_attribute(const std::string& name) const {
+  const std::string where = "attribute " + name;
+  if (H5Aexists(file_, name.c_str()) <= 0) refuse(where, "there is none");
+  const Handle attribute(H5Aopen(file_, name.c_str(), H5P_DEFAULT), H5Aclose);
+  if (attribute < 0) refuse(where, last_reason());
+  const Handle type(H5Aget_type(attribute), H5Tclose), space(H5Aget_space(attribute), H5Sclose);
+  if (type < 0 || space < 0) refuse(where, last_reason());
+  if (H5Tis_variable_str(type) <= 0 || H5Sget_simple_extent_npoints(space) != 1)
+    refuse(where, "not one string");
+  char* text = nullptr;
+  if (H5Aread(attribute, type, &text) < 0 || text == nullptr) refuse(where, last_reason());
+  const std::string value = text;
+  H5free_memory(text);
+  return value;
+}
+
 Hdf5Output::Hdf5Output(const std::string& path) : path_(path) {
   constexpr std::size_t kGrowth = std::size_t{1} << 20;
   silence();
@@ -318,6 +346,10 @@ void Hdf5Output::add(const std::string& name, const Shape& shape, std::int64_t t
 
 void Hdf5Output::add(const std::string& name, const Shape& shape, std::span<const std::uint32_t> values) {
   add(name, shape, H5T_STD_U32LE, values.data());
+}
+
+void Hdf5Output::add(const std::string& name, const Shape& shape, std::span<const std::uint64_t> values) {
+  add(name, shape, H5T_STD_U64LE, values.data());
 }
 
 void Hdf5Output::add(const std::string& name, const Shape& shape, std::span<const double> values) {

@@ -39,14 +39,20 @@ class Hdf5Input {
   /// A dataset of integers of any type whose values fit, n rows of shape `row`, in row-major order.
   std::vector<std::uint32_t> read_u32(const std::string& name, const Shape& row = {}) const;
 
+  std::vector<std::uint64_t> read_u64(const std::string& name, const Shape& row = {}) const;
+
   /// The same of numbers that float64 holds without loss.
   std::vector<double> read_f64(const std::string& name, const Shape& row = {}) const;
 
   /// A dataset of n strings, of fixed or variable length.
   std::vector<std::string> read_strings(const std::string& name) const;
 
+  /// An attribute of the root group that is one string, as Hdf5Output writes it.
+  std::string read_attribute(const std::string& name) const;
+
  private:
   struct Dataset;
+  Dataset open_integers(const std::string& name, const Shape& row) const;
   Dataset open(const std::string& name, const Shape& row) const;
   void check_extent(const Dataset& dataset) const;
   void read(const Dataset& dataset, std::int64_t memory_type, void* values) const;
@@ -70,6 +76,7 @@ class Hdf5Output {
 
   /// Adds a dataset, and the groups in its name. Condition: as many values as the shape says.
   void add(const std::string& name, const Shape& shape, std::span<const std::uint32_t> values);
+  void add(const std::string& name, const Shape& shape, std::span<const std::uint64_t> values);
   void add(const std::string& name, const Shape& shape, std::span<const double> values);
   void add(const std::string& name, const std::vector<std::string>& strings);  ///< fixed length, UTF-8
 

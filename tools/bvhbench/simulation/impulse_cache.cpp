@@ -1,0 +1,120 @@
+#include "simulation/impulse_cache.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace tandem::simulation {
+namespace {
+
+using Eigen::Vector3d;
+
+template <typename Contact>
+std::pair<std::uint32_t, std::uint32_t> pair_of(const Contact& contact) {
+  return {contact.body_a, contact.body_b};
+}
+
+Vector3d into_body(const BodyState& state, const Vector3d& point) {
+  return state.orientation.conjugate() * (point - state.position);
+}
+
+// The contacts of one pair of bodies, old and new.
+class PairMatch {
+ public:
+  PairMatch(std::span<const CachedImpulse> old, std::span<const ContactPoint> now,
+            std::span<ContactImpulse> out)
+      : old_(old), now_(now), out_(out), is_taken_(old.size(), 0), has_one_(now.size(), 0) {}
+
+  void by_feature() {
+    for (std::size_t i = 0; i < now_.size(); ++i) {
+      if (now_[i].feature == 0) continue;
+      for (std::size_t j = 0; j < old_.size(); ++j) {
+        if (is_taken_[j] || old_[j].feature != now_[i].feature) continue;
+        take(i, j);
+        break;
+      }
+    }
+  }
+
+  void by_position(const BodyState& a, const BodyState& b, double reach) {
+    for (std::size_t i = 0; i < now_.size(); ++i) {
+      if (has_one_[i]) continue;
+      const Vector3d in_a = into_body(a, now_[i].position), in_b = into_body(b, now_[i].position);
+      std::size_t nearest = old_.size();
+      double least = reach * reach;
+      for (std::size_t j = 0; j < old_.size(); ++j) {
+        const double apart =
+            std::min((old_[j].in_a - in_a).squaredNorm(), (old_[j].in_b - in_b).squaredNorm());
+        if (!is_taken_[j] && apart < least) least = apart, nearest = j;
+      }
+      if (nearest < old_.size()) take(i, nearest);
+    }
+  }
+
+  void share_rest() {
+    double rest = 0;
+    for (std::size_t j = 0; j < old_.size(); ++j) {
+      if (!is_taken_[j]) rest += old_[j].impulse.normal;
+    }
+    const auto without = static_cast<double>(std::count(has_one_.begin(), has_one_.end(), 0));
+    for (std::size_t i = 0; i < now_.size(); ++i) {
+      if (!has_one_[i]) out_[i].normal = rest / without;
+    }
+  }
+
+ private:
+  void take(std::size_t now, std::size_t old) {
+    is_taken_[old] = has_one_[now] = 1;
+    out_[now] = old_[old].impulse;
+  }
+
+  std::span<const CachedImpulse> old_;
+  std::span<const ContactPoint> now_;
+  std::span<ContactImpulse> out_;
+  std::vector<char> is_taken_, has_one_;
+};
+
+}  // namespace
+
+std::vector<ContactImpulse> ImpulseCache::match(std::span<const ContactPoint> contacts,
+                                                std::span<const BodyProperties> bodies,
+                                                std::span<const BodyState> states) const {
+  constexpr double kReach = 0.1;  // of the smaller body's radius
+  std::vector<ContactImpulse> impulses(contacts.size());
+  std::size_t old = 0;
+  for (std::size_t begin = 0, end = 0; begin < contacts.size(); begin = end) {
+    const auto pair = pair_of(contacts[begin]);
+    while (end < contacts.size() && pair_of(contacts[end]) == pair) ++end;
+    while (old < entries_.size() && pair_of(entries_[old]) < pair) ++old;
+    std::size_t old_end = old;
+    while (old_end < entries_.size() && pair_of(entries_[old_end]) == pair) ++old_end;
+    if (old == old_end) continue;
+    PairMatch match({entries_.data() + old, old_end - old}, contacts.subspan(begin, end - begin),
+                    {impulses.data() + begin, end - begin});
+    match.by_feature();
+    match.by_position(states[pair.first], states[pair.second],
+                      kReach * std::min(bodies[pair.first].radius, bodies[pair.second].radius));
+    match.share_rest();
+    old = old_end;
+  }
+  return impulses;
+}
+
+void ImpulseCache::remember(std::span<const ContactPoint> contacts, std::span<const ContactImpulse> impulses,
+                            std::span<const BodyState> states, std::span<const std::uint8_t> idle) {
+  std::vector<CachedImpulse> kept, fresh;
+  for (const CachedImpulse& entry : entries_) {
+    if (!idle.empty() && idle[entry.body_a] && idle[entry.body_b]) kept.push_back(entry);
+  }
+  fresh.reserve(contacts.size());
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const ContactPoint& contact = contacts[i];
+    fresh.push_back({contact.body_a, contact.body_b, contact.feature,
+                     into_body(states[contact.body_a], contact.position),
+                     into_body(states[contact.body_b], contact.position), impulses[i]});
+  }
+  const auto by_pair = [](const auto& x, const auto& y) { return pair_of(x) < pair_of(y); };
+  entries_.resize(kept.size() + fresh.size());
+  std::merge(kept.begin(), kept.end(), fresh.begin(), fresh.end(), entries_.begin(), by_pair);
+}
+
+}  // namespace tandem::simulation

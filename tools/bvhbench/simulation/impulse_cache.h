@@ -1,0 +1,50 @@
+#pragma once
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "simulation/contact_point.h"
+#include "simulation/rigid_body.h"
+
+namespace tandem::simulation {
+
+/// What a contact did in a step: an impulse on b, the opposite one on a.
+struct ContactImpulse {
+  double normal = 0;                                     ///< along the contact's normal, >= 0
+  Eigen::Vector3d tangential = Eigen::Vector3d::Zero();  ///< across it, in the world
+};
+
+/// An impulse and what its contact is known by in the next step.
+struct CachedImpulse {
+  std::uint32_t body_a, body_b;
+  std::uint64_t feature;
+  Eigen::Vector3d in_a, in_b;  ///< the position, in the bodies' frames about their centres of mass
+  ContactImpulse impulse;
+};
+
+/// Remembers impulses from step to step, so that a solver starts where it stopped.
+class ImpulseCache {
+ public:
+  /// The impulse to start each contact with: that of the last step's contact between the same bodies with the
+  /// same feature, or else of the nearest one that is within a tenth of the smaller body's radius; each is
+  /// given once. What then is left of a pair's normal impulse is shared out among its contacts that found
+  /// none, so that a pair pushes as it did although its points have changed. Condition: both lists come by
+  /// ascending pair.
+  std::vector<ContactImpulse> match(std::span<const ContactPoint> contacts,
+                                    std::span<const BodyProperties> bodies,
+                                    std::span<const BodyState> states) const;
+
+  /// Forgets all but the pairs of two idle bodies, which no engine looks at, and remembers these contacts.
+  /// Condition: idle is empty or has an entry for each body.
+  void remember(std::span<const ContactPoint> contacts, std::span<const ContactImpulse> impulses,
+                std::span<const BodyState> states, std::span<const std::uint8_t> idle);
+
+  std::span<const CachedImpulse> entries() const { return entries_; }
+  void restore(std::vector<CachedImpulse> entries) { entries_ = std::move(entries); }
+
+ private:
+  std::vector<CachedImpulse> entries_;  // by ascending pair
+};
+
+}  // namespace tandem::simulation

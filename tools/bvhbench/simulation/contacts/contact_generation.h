@@ -16,10 +16,11 @@ struct ContactOptions {
 /// What became of a list of triangle pairs.
 struct ContactStatistics {
   std::uint64_t triangle_pairs = 0;
-  std::uint64_t segments = 0;          ///< triangle pairs whose intersection has a length
-  std::uint64_t patches = 0;           ///< connected regions of contact
-  std::uint64_t open_curves = 0;       ///< patches whose intersection curves do not close
-  std::uint64_t candidate_points = 0;  ///< before the reduction
+  std::uint64_t segments = 0;           ///< triangle pairs whose intersection has a length
+  std::uint64_t patches = 0;            ///< connected regions of contact
+  std::uint64_t open_curves = 0;        ///< patches whose intersection curves do not close
+  std::uint64_t ambiguous_touches = 0;  ///< of corner on corner or edge along edge, which give no point
+  std::uint64_t candidate_points = 0;   ///< before the reduction
   std::uint64_t points = 0;
   double area = 0;   ///< of all patches, seen along their normals
   double depth = 0;  ///< the largest

@@ -1,0 +1,431 @@
+#include "contact_patch.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace tandem::simulation {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+// An area vector below this part of length times largest coordinate is rounding: the surfaces only touch.
+constexpr double kNoArea = 0x1p-40;
+
+// Faces in so few directions on either side make a patch one of flat faces; otherwise it is a smooth one.
+constexpr std::size_t kMostDirections = 5;
+
+// Directions closer than this are the same: sine of half a milliradian, and its cosine.
+constexpr double kSameDirection = 1 - 1e-7;
+
+// How far a line that sounds the depth at the rim is moved inwards, as a part of the way to the middle, so
+// that it does not run along a wall that made the rim.
+constexpr double kInwards = 0.02;
+
+// Triangles that the normal grazes at less than this sine are walls, which have no height.
+constexpr double kWall = 0.01;
+
+// How far beside a line a triangle's plane is taken where the line hits none, as a part of the patch's
+// extent.
+constexpr double kBeside = 0.1;
+
+// Points of a patch closer than this part of the smaller body's diagonal are one.
+constexpr double kNear = 0.005;
+
+// An inner point is kept where it lies deeper than the rim by this factor.
+constexpr double kDeeper = 1.25;
+
+std::uint64_t mixed(std::uint64_t x) {  // SplitMix64's finish
+  x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
+  x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
+  return x ^ (x >> 31);
+}
+
+std::uint64_t feature_hash(std::uint64_t x, std::uint64_t y) {
+  return std::max<std::uint64_t>(1, mixed(mixed(x + 0x9E3779B97F4A7C15u) ^ y));
+}
+
+}  // namespace
+
+// Of several curves around one region, those whose area vectors oppose each other go through a body: then
+// only those count that push the bodies to the sides on which their middles are.
+void ContactPatches::keep_curves(std::uint32_t group) {
+  current_ = group;
+  const auto curves = curves_->curves();
+  Vector3d sum = Vector3d::Zero();
+  double sizes = 0;
+  std::size_t members = 0;
+  for (std::size_t i = 0; i < curves.size(); ++i) {
+    kept_[i] = in_group(static_cast<std::uint32_t>(i));
+    if (kept_[i] == 0) continue;
+    sum += curves[i].area;
+    sizes += curves[i].area.norm();
+    ++members;
+  }
+  if (members < 2 || sum.norm() >= sizes / 2) return;
+  const Vector3d apart = b_->center() - a_->center();
+  const auto agrees = [&](std::size_t i) { return kept_[i] != 0 && curves[i].area.dot(apart) > 0; };
+  bool any = false;
+  for (std::size_t i = 0; i < curves.size(); ++i) any = any || agrees(i);
+  for (std::size_t i = 0; any && i < curves.size(); ++i) kept_[i] = agrees(i);
+}
+
+void ContactPatches::gather_candidates() {
+  candidates_.clear();
+  const auto pieces = curves_->pieces();
+  for (const CurvePiece& piece : pieces) {
+    if (!in_patch(piece.curve)) continue;
+    const std::uint64_t both = std::uint64_t{piece.triangle[0]} << 32 | piece.triangle[1];
+    if (piece.kind == Meeting::Kind::polygon) {
+      std::uint64_t corner = 8;
+      if (piece.facing) {
+        for (const Vector3d& x : curves_->corners(piece)) {
+          candidates_.push_back({x, feature_hash(both, corner++)});
+        }
+      }
+      continue;
+    }
+    // Closed curves have each end twice.
+    const Curve& curve = curves_->curves()[piece.curve];
+    const int ends = curve.closed && !curve.degenerate ? 1 : 2;
+    for (int end = 0; end < ends; ++end) {
+      const TriangleFeature& f = piece.feature[end];
+      const Surface& own = (f.of_b ? b_ : a_)->shape().surface;
+      const std::uint32_t t = piece.triangle[f.of_b ? 1 : 0];
+      const std::uint64_t number = f.is_corner ? own.corner[t][f.number] : own.edge_of[t][f.number];
+      const std::uint64_t key = number << 32 | piece.triangle[f.of_b ? 0 : 1];
+      candidates_.push_back(
+          {piece.end[end], feature_hash(key, (f.of_b ? 2u : 0u) + (f.is_corner ? 1u : 0u))});
+    }
+  }
+}
+
+// How far the patch, with all that is enclosed, reaches along n.
+double ContactPatches::width(const Vector3d& n) const {
+  double lowest = INFINITY, highest = -INFINITY;
+  const auto take = [&](const Vector3d& x) {
+    const double h = n.dot(x - candidates_[0].x);
+    lowest = std::min(lowest, h);
+    highest = std::max(highest, h);
+  };
+  for (const Candidate& candidate : candidates_) take(candidate.x);
+  for (const BodySide* side : {a_, b_}) {
+    for (const BodySide::Enclosed& v : side->enclosed()) {
+      if (in_group(v.curve)) take(v.position);
+    }
+  }
+  return highest - lowest;
+}
+
+// Where few flat faces meet, as boxes do, the curve's own normal leans a little, by depth over length: along
+// the face normal that separates the bodies soonest they stay upright.
+Vector3d ContactPatches::face_nearest(const Vector3d& smooth) {
+  directions_.clear();
+  std::size_t own[2] = {0, 0};
+  for (const CurvePiece& piece : curves_->pieces()) {
+    if (!in_patch(piece.curve)) continue;
+    for (int side = 0; side < 2; ++side) {
+      const Vector3d n = side == 0 ? a_->at(piece.slot[0]).normal : Vector3d(-b_->at(piece.slot[1]).normal);
+      const bool known = std::any_of(directions_.begin(), directions_.end(),
+                                     [&](const Vector3d& d) { return d.dot(n) > kSameDirection; });
+      if (known) continue;
+      if (++own[side] > kMostDirections) return smooth;
+      directions_.push_back(n);
+    }
+  }
+  const Vector3d apart = b_->center() - a_->center();
+  Vector3d best = smooth;
+  double least = width(smooth) * (1 + 1e-9);
+  for (const Vector3d& n : directions_) {
+    const double cosine = n.dot(smooth);
+    if (cosine < 0.1 && (cosine < -0.1 || n.dot(apart) <= 0)) continue;
+    const double of_n = width(n);
+    if (of_n < least) best = n, least = of_n * (1 - 1e-9);
+  }
+  return best;
+}
+
+// Bodies that touch without a patch: the one direction, of those of their faces there and of crossings of
+// their edges, that has all of a's triangles there on one side and b's on the other.
+bool ContactPatches::normal_of_touch() {
+  directions_.clear();
+  const double tolerance = 0x1p-40 * std::max(a_->reach(), b_->reach());
+  const auto separates = [&](const Vector3d& n, const Vector3d& x) {
+    for (const CurvePiece& piece : curves_->pieces()) {
+      if (!in_patch(piece.curve)) continue;
+      for (int k = 0; k < 3; ++k) {
+        if (n.dot(a_->at(piece.slot[0]).corner[k] - x) > tolerance) return false;
+        if (n.dot(b_->at(piece.slot[1]).corner[k] - x) < -tolerance) return false;
+      }
+    }
+    return true;
+  };
+  const auto consider = [&](const Vector3d& n, const Vector3d& x) {
+    const bool known = std::any_of(directions_.begin(), directions_.end(),
+                                   [&](const Vector3d& d) { return d.dot(n) > kSameDirection; });
+    if (!known && separates(n, x)) directions_.push_back(n);
+  };
+  for (const CurvePiece& piece : curves_->pieces()) {
+    if (!in_patch(piece.curve) || directions_.size() > 1) continue;
+    const WorldTriangle &a = a_->at(piece.slot[0]), &b = b_->at(piece.slot[1]);
+    consider(a.normal, piece.end[0]);
+    consider(-b.normal, piece.end[0]);
+  }
+  for (const CurvePiece& piece : curves_->pieces()) {
+    if (!in_patch(piece.curve) || !directions_.empty()) continue;
+    const WorldTriangle &a = a_->at(piece.slot[0]), &b = b_->at(piece.slot[1]);
+    for (int i = 0; i < 9; ++i) {
+      const Vector3d e = a.corner[(i / 3 + 1) % 3] - a.corner[i / 3],
+                     f = b.corner[(i % 3 + 1) % 3] - b.corner[i % 3];
+      const Vector3d n = e.cross(f);
+      if (n.norm() <= 1e-6 * e.norm() * f.norm()) continue;
+      consider(n.normalized(), piece.end[0]);
+      consider(-n.normalized(), piece.end[0]);
+    }
+  }
+  if (directions_.size() != 1)
+    return false;  // corner on corner, or edges along each other: nothing to lean on
+  normal_ = directions_[0];
+  return true;
+}
+
+bool ContactPatches::choose_normal() {
+  const auto curves = curves_->curves();
+  Vector3d area = Vector3d::Zero(), sheet = Vector3d::Zero();
+  double length = 0;
+  bool closes = true;
+  for (std::size_t i = 0; i < curves.size(); ++i) {
+    if (kept_[i] == 0) continue;
+    area += curves[i].area;
+    sheet += curves[i].sheet_normal;
+    length += curves[i].length;
+    closes = closes && curves[i].closed;
+  }
+  area_ = area;
+  const double reach = std::max(a_->reach(), b_->reach());
+  touch_ = closes ? area.norm() <= kNoArea * reach * length : sheet.norm() <= kNoArea * length;
+  if (candidates_.empty()) return false;
+  if (touch_ || !(length > 0) || !std::isfinite(length)) {
+    const double polygons = area.norm();
+    if (!touch_ || !(polygons > kNoArea * reach * reach)) {
+      touch_ = true;
+      return normal_of_touch();
+    }
+    touch_ = false;
+  }
+  normal_ = face_nearest((closes ? area : sheet).normalized());
+  return true;
+}
+
+void ContactPatches::make_frame(const Vector3d& n) {
+  frame_.origin = candidates_[0].x;
+  frame_.n = n;
+  frame_.u = n.unitOrthogonal();
+  frame_.v = n.cross(frame_.u);
+  width_ = width(n);
+}
+
+void ContactPatches::add_cast_triangle(const Vector3d* corner, const Vector3d& normal, bool of_b) {
+  const double cosine = normal.dot(frame_.n);
+  if (of_b ? cosine > -kWall : cosine < kWall) return;
+  CastTriangle out;
+  for (int k = 0; k < 3; ++k) out.corner[k] = frame_.flat(corner[k]);
+  if (twice_area(out.corner[0], out.corner[1], out.corner[2]) < 0) std::swap(out.corner[1], out.corner[2]);
+  for (int k = 0; k < 3; ++k) {
+    out.per_length[k] = 1 / std::max((out.corner[(k + 1) % 3] - out.corner[k]).norm(), 1e-300);
+  }
+  out.slope = -Vector2d(frame_.u.dot(normal), frame_.v.dot(normal)) / cosine;
+  out.level = normal.dot(corner[0] - frame_.origin) / cosine;
+  (of_b ? lower_ : upper_).push_back(out);
+}
+
+void ContactPatches::gather_cast_triangles() {
+  upper_.clear();
+  lower_.clear();
+  std::uint32_t last[2] = {kNoIndex, kNoIndex};
+  for (const CurvePiece& piece : curves_->pieces()) {
+    if (!in_group(piece.curve)) continue;
+    for (int side = 0; side < 2; ++side) {
+      if (last[side] == piece.slot[side]) continue;
+      last[side] = piece.slot[side];
+      const WorldTriangle& t = (side == 0 ? a_ : b_)->at(piece.slot[side]);
+      add_cast_triangle(t.corner, t.normal, side == 1);
+    }
+  }
+  for (const BodySide* side : {a_, b_}) {
+    for (const BodySide::EnclosedTriangle& t : side->enclosed_triangles()) {
+      if (!in_group(t.curve)) continue;
+      Vector3d corner[3];
+      for (int k = 0; k < 3; ++k) corner[k] = side->enclosed()[t.corner[k]].position;
+      const Vector3d normal = (corner[1] - corner[0]).cross(corner[2] - corner[0]);
+      const double scale = (t.turned ? -1 : 1) / std::max(normal.norm(), 1e-300);
+      add_cast_triangle(corner, scale * normal, side == b_);
+    }
+  }
+}
+
+// The highest or lowest triangle on the line; where there is none, the plane of the nearest one beside it.
+// Little is amiss then but where corners of one body lie in faces of the other: rounding may keep triangles
+// of a whole side out of the contacts.
+void ContactPatches::cast(const std::vector<CastTriangle>& triangles, const Vector2d& x, bool highest,
+                          double& height) const {
+  bool hit = false;
+  double nearest = nearest_;
+  for (const CastTriangle& t : triangles) {
+    double beside = 0;  // how far x lies outside
+    for (int k = 0; k < 3; ++k) {
+      const Vector2d side = t.corner[(k + 1) % 3] - t.corner[k], to = x - t.corner[k];
+      const double outside = (side.y() * to.x() - side.x() * to.y()) * t.per_length[k];
+      beside = std::max(beside, outside);
+    }
+    if (beside > (hit ? 0 : nearest)) continue;
+    const double h = t.level + t.slope.dot(x);
+    if (beside > 0) {
+      nearest = beside;
+      height = h;
+    } else if (!hit || (highest ? h > height : h < height)) {
+      height = h;
+      hit = true;
+    }
+  }
+}
+
+ContactPatches::Chosen ContactPatches::sounded(const Vector2d& at, const Vector2d& sounded_at, double height,
+                                               std::uint64_t feature) const {
+  double top = height, bottom = height;
+  cast(upper_, sounded_at, true, top);
+  cast(lower_, sounded_at, false, bottom);
+  if (top <= bottom) return {at, height, 0, feature, false};
+  return {at, (top + bottom) / 2, std::min(top - bottom, width_), feature, false};
+}
+
+void ContactPatches::choose_rim(std::size_t most) {
+  flat_.clear();
+  for (std::uint32_t i = 0; i < candidates_.size(); ++i) flat_.push_back({frame_.flat(candidates_[i].x), i});
+  convex_hull(flat_, hull_);
+  simplify_hull(hull_, most, 1e-4);
+  Vector2d middle = Vector2d::Zero();
+  for (const PlanePoint& p : hull_) middle += p.x / static_cast<double>(hull_.size());
+  double spread = 0;
+  for (const PlanePoint& p : hull_) spread = std::max(spread, (p.x - middle).norm());
+  const bool degenerate = std::any_of(curves_->curves().begin(), curves_->curves().end(),
+                                      [](const Curve& curve) { return curve.degenerate; });
+  nearest_ = (degenerate ? 1 : kBeside) * spread;
+  chosen_.clear();
+  for (const PlanePoint& p : hull_) {
+    const Candidate& candidate = candidates_[p.index];
+    const double height = frame_.height(candidate.x);
+    chosen_.push_back(touch_ ? Chosen{p.x, height, 0, candidate.feature, false}
+                             : sounded(p.x, p.x + kInwards * (middle - p.x), height, candidate.feature));
+  }
+}
+
+// Of b's lowest enclosed vertex, a's highest, and the middle of the rim the one where the overlap is largest.
+ContactPatches::Chosen ContactPatches::deepest() const {
+  Vector2d middle = Vector2d::Zero();
+  double height = 0;
+  for (const Chosen& c : chosen_) {
+    middle += c.x / static_cast<double>(chosen_.size());
+    height += c.height / static_cast<double>(chosen_.size());
+  }
+  Chosen best = sounded(middle, middle, height, feature_hash(current_, 4));
+  for (const BodySide* side : {a_, b_}) {
+    const double upwards = side == a_ ? 1 : -1;
+    const BodySide::Enclosed* extreme = nullptr;
+    double reach = 0;
+    for (const BodySide::Enclosed& v : side->enclosed()) {
+      if (!in_group(v.curve)) continue;
+      const double of_v = upwards * frame_.height(v.position);
+      if (extreme == nullptr || of_v > reach) extreme = &v, reach = of_v;
+    }
+    if (extreme == nullptr) continue;
+    const Vector2d x = frame_.flat(extreme->position);
+    const Chosen c =
+        sounded(x, x, frame_.height(extreme->position), feature_hash(extreme->vertex, side == a_ ? 5 : 6));
+    if (c.depth > best.depth) best = c;
+  }
+  return best;
+}
+
+// Deeper points come first, then those further out; of points near each other the first stays.
+void ContactPatches::merge_near(double distance) {
+  Vector2d middle = Vector2d::Zero();
+  for (const Chosen& c : chosen_) middle += c.x / static_cast<double>(chosen_.size());
+  std::stable_sort(chosen_.begin(), chosen_.end(), [&](const Chosen& x, const Chosen& y) {
+    if (x.depth != y.depth) return x.depth > y.depth;
+    return (x.x - middle).squaredNorm() > (y.x - middle).squaredNorm();
+  });
+  std::size_t kept = 0;
+  for (const Chosen& c : chosen_) {
+    const bool near = std::any_of(chosen_.begin(), chosen_.begin() + static_cast<std::ptrdiff_t>(kept),
+                                  [&](const Chosen& k) { return (k.x - c.x).norm() < distance; });
+    if (!near) chosen_[kept++] = c;
+  }
+  chosen_.resize(kept);
+}
+
+// What a point is called: of all candidates so near that no other point can have them the one of the least
+// number, so that it does not matter which of several at one corner was chosen.
+void ContactPatches::name_points(double distance) {
+  for (Chosen& c : chosen_) {
+    if (c.inner) continue;
+    for (const PlanePoint& p : flat_) {
+      if ((p.x - c.x).norm() < distance) c.feature = std::min(c.feature, candidates_[p.index].feature);
+    }
+  }
+}
+
+void ContactPatches::choose_points() {
+  const std::size_t most = options_.points_per_patch;
+  choose_rim(std::max<std::size_t>(most, 2) - (touch_ ? 0 : 1));
+  if (!touch_) {
+    Chosen inner = deepest();
+    inner.inner = true;
+    double of_rim = 0;
+    for (const Chosen& c : chosen_) of_rim = std::max(of_rim, c.depth);
+    if (inner.depth > kDeeper * of_rim) chosen_.push_back(inner);
+  }
+  const double near = kNear * std::min(a_->shape().diagonal, b_->shape().diagonal);
+  merge_near(near);
+  if (chosen_.size() > most) chosen_.resize(most);
+  name_points(near / 2);
+}
+
+void ContactPatches::add(ContactCurves& curves, const BodySide& a, const BodySide& b,
+                         const ObjectPair& bodies, const ContactOptions& options,
+                         std::vector<ContactPoint>& points, ContactStatistics& statistics) {
+  curves_ = &curves;
+  a_ = &a, b_ = &b;
+  options_ = options;
+  const auto count = static_cast<std::uint32_t>(curves.curves().size());
+  group_.resize(count);
+  kept_.assign(count, 0);
+  for (std::uint32_t i = 0; i < count; ++i) group_[i] = curves.group_of(i);
+  statistics.segments += curves.segments();
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (group_[i] != i) continue;
+    keep_curves(i);
+    gather_candidates();
+    if (!choose_normal()) {
+      ++statistics.ambiguous_touches;
+      continue;
+    }
+    make_frame(normal_);
+    if (!touch_) gather_cast_triangles();
+    choose_points();
+    ++statistics.patches;
+    statistics.candidate_points += candidates_.size();
+    statistics.area += touch_ ? 0 : std::fabs(area_.dot(normal_));
+    for (std::uint32_t c = 0; c < count; ++c)
+      statistics.open_curves += kept_[c] != 0 && !curves.curves()[c].closed;
+    for (const Chosen& c : chosen_) {
+      points.push_back({bodies.a, bodies.b, frame_.at(c.x, c.height), normal_, c.depth,
+                        feature_hash(std::uint64_t{bodies.a} << 32 | bodies.b, c.feature)});
+      statistics.depth = std::max(statistics.depth, c.depth);
+    }
+    statistics.points += chosen_.size();
+  }
+}
+
+}  // namespace tandem::simulation

@@ -2,6 +2,8 @@
 
 #include <filesystem>
 
+#include "make_scene_parts.h"
+
 namespace tandem::bench {
 
 CLI::Validator between(double lower, double upper) {
@@ -26,6 +28,18 @@ void keep_inputs(const std::string& output, const std::vector<std::string>& inpu
 CLI::Validator file_name() {
   return CLI::Validator(
       [](const std::string& text) { return text.empty() ? "a file needs a name" : std::string(); }, "");
+}
+
+CLI::Validator cube_of_a_whole_number() {
+  const auto defect = [](const std::string& text) -> std::string {
+    std::uint32_t count = 0;
+    if (!CLI::detail::lexical_cast(text, count)) return {};  // told by its type
+    const std::uint32_t side = root_above(count, 3);
+    if (side * side * side == count) return {};
+    return text + " is no cube of a whole number; " + std::to_string((side - 1) * (side - 1) * (side - 1)) +
+           " and " + std::to_string(side * side * side) + " are";
+  };
+  return CLI::Validator(defect, "");
 }
 
 }  // namespace tandem::bench

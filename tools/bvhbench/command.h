@@ -33,6 +33,9 @@ CLI::Validator between(double lower, double upper);
 /// Throws UsageError where writing `output` would overwrite one of the inputs.
 void keep_inputs(const std::string& output, const std::vector<std::string>& inputs);
 
+/// Refuses what is no cube of a whole number.
+CLI::Validator cube_of_a_whole_number();
+
 /// Refuses an empty name.
 CLI::Validator file_name();
 

@@ -5,11 +5,13 @@
 
 #include "command.h"
 #include "compare_command.h"
+#include "frame_command.h"
 #include "gpu_query.h"
 #include "hdf5_file.h"
 #include "poses_command.h"
 #include "query_command.h"
 #include "scene_command.h"
+#include "simulate_command.h"
 
 namespace {
 
@@ -49,7 +51,7 @@ ExitCode run_and_report(const Run& run) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Makes scenes of posed meshes and finds their contacts.", "bvhbench");
+  CLI::App app("Makes scenes of posed meshes, finds their contacts, and lets them move.", "bvhbench");
   app.set_version_flag("--version", "bvhbench " TANDEM_VERSION);
   app.footer(kFooter);
   app.require_subcommand(1);
@@ -58,6 +60,8 @@ int main(int argc, char** argv) {
   add_scene(app, run);
   add_query(app, run);
   add_compare(app, run);
+  add_simulate(app, run);
+  add_frame(app, run);
   add_poses(app, run);
   try {
     app.parse(argc, argv);

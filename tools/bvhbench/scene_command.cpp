@@ -50,18 +50,6 @@ ExitCode run(const SceneArguments& arguments, const Maker& make) {
   return kDone;
 }
 
-CLI::Validator cube_of_a_whole_number() {
-  const auto defect = [](const std::string& text) -> std::string {
-    std::uint32_t count = 0;
-    if (!CLI::detail::lexical_cast(text, count)) return {};  // told by its type
-    const std::uint32_t side = root_above(count, 3);
-    if (side * side * side == count) return {};
-    return text + " is no cube of a whole number; " + std::to_string((side - 1) * (side - 1) * (side - 1)) +
-           " and " + std::to_string(side * side * side) + " are";
-  };
-  return CLI::Validator(defect, "");
-}
-
 // A subcommand for a kind of scene, with the options that all kinds have.
 CLI::App* add_kind(CLI::App& scene, Run& run_later, const std::shared_ptr<SceneArguments>& arguments,
                    const char* kind, const char* help, std::uint32_t count, const Maker& make) {

@@ -6,7 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
+
+#include "random_pose.h"
 
 namespace tandem::simulation {
 
@@ -174,16 +175,9 @@ double residual_of(const Row& row, double target, double lower, double upper, co
   return std::fabs(std::clamp(wanted, lower, upper) - row.impulse) * moves;
 }
 
-// SplitMix64 (Steele, Lea and Flood 2014).
-std::uint64_t next_random(std::uint64_t& state) {
-  std::uint64_t z = state += 0x9E3779B97F4A7C15u;
-  z = (z ^ z >> 30) * 0xBF58476D1CE4E5B9u;
-  z = (z ^ z >> 27) * 0x94D049BB133111EBu;
-  return z ^ z >> 31;
-}
-
 void shuffle(std::vector<std::uint32_t>& order, std::uint64_t seed) {
-  for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[next_random(seed) % i]);
+  Random random(seed);
+  for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.next() % i]);
 }
 
 struct Residuals {

@@ -17,7 +17,8 @@ struct StepRecord {
   std::uint64_t segments = 0, patches = 0, open_curves = 0, candidate_points = 0, contacts = 0;
   std::uint64_t islands = 0, sleeping = 0, reentered = 0;
 
-  double contact_ratio = 0;  ///< pairs of triangles that meet, by all triangles: Figure 6 of the paper
+  double contact_ratio =
+      0;  ///< pairs of triangles that meet, by the triangles of dynamic bodies: the paper's Figure 6
   double contact_area = 0;
   double penetration_max = 0, penetration_mean = 0;  ///< over the contacts
   double residual_max = 0, residual_rms = 0;         ///< SolverStatistics

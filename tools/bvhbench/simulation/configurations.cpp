@@ -10,7 +10,6 @@
 namespace tandem::simulation {
 namespace {
 
-
 // Bodies near the points of a cubic lattice.
 class Lattice {
  public:
@@ -104,8 +103,7 @@ Configuration unstructured_pile(const AssetView& body, const AssetView& ground, 
   Random random(seed);
   std::vector<Instance> bodies(count);
   double spacing = kClosest * bounds_of(body).diagonal();
-  while (!spread(Lattice(body, bounds_of(ground), count, spacing), query, random, bodies))
-    spacing *= kWider;
+  while (!spread(Lattice(body, bounds_of(ground), count, spacing), query, random, bodies)) spacing *= kWider;
   Configuration pile;
   pile.add({1, kIdentityPose}, Motion::fixed);
   for (const Instance& instance : bodies) pile.add(instance, Motion::dynamic);

@@ -1,0 +1,230 @@
+#!/usr/bin/python3
+"""bvhbench simulate and bvhbench frame from the outside: runs, what they keep, stopping, going on, replay.
+
+Environment: that of tool_test.py, and TANDEM_BVHBENCH.
+"""
+import json
+import os
+import signal
+import subprocess
+import time
+import unittest
+
+import h5py
+import numpy as np
+
+from tool_test import DONE, SOURCE_DIR, UNREADABLE_INPUT, USAGE, ToolTest
+
+BVHBENCH = os.environ["TANDEM_BVHBENCH"]
+SLAB_OBJ = ("v -30 -30 -5\nv 30 -30 -5\nv 30 30 -5\nv -30 30 -5\nv -30 -30 0\nv 30 -30 0\nv 30 30 0\nv -30 30 0\n"
+            "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n")
+MEASURED = "/frames/seconds/"  # what no two runs have in common
+
+
+class SimulateTest(ToolTest):
+    """Each test has the cubes, a cow, a slab and a sheet, and a name for a run."""
+
+    built_meshes = {}
+
+    def setUp(self):
+        super().setUp()
+        self.run_file = self.outputs / "run.h5"
+        self.cube = self.mesh_of("cube", (SOURCE_DIR / "assets/box_12.obj").read_bytes())
+
+    def mesh_of(self, name, content):
+        path = self.inputs / f"{name}.bvh"
+        if content not in self.built_meshes:
+            result = self.build(self.write(f"{name}.obj", content), "-o", path)
+            self.assertEqual(result.returncode, DONE, result.stderr)
+            self.built_meshes[content] = path.read_bytes()
+        return self.write(path.name, self.built_meshes[content])
+
+    def asset(self, name):
+        return self.mesh_of(name, (SOURCE_DIR / f"assets/{name}.obj").read_bytes())
+
+    def bench(self, *arguments, **options):
+        result = self.run_tool(BVHBENCH, *map(os.fspath, arguments), **options)
+        result.stderr = result.stderr.replace(b"\nTry 'bvhbench --help'.", b"")
+        return result
+
+    def passes(self, *arguments):
+        result = self.bench(*arguments)
+        self.assertEqual((result.returncode, result.stderr), (DONE, b""))
+        return result.stdout.decode()
+
+    def simulate(self, kind, *arguments, out=None):
+        return self.passes("simulate", kind, *arguments, "-o", out or self.run_file)
+
+    def stack(self, *arguments, out=None):
+        return self.simulate("stack", "--mesh", self.cube, "--count", "27", *arguments, out=out)
+
+    def contents(self, path):
+        """All datasets and attributes but what is measured in seconds."""
+        found = {}
+        with h5py.File(path) as file:
+            file.visititems(lambda name, item: found.update({"/" + name: item[()].tobytes()})
+                            if isinstance(item, h5py.Dataset) else None)
+            found.update({name: str(value) for name, value in file.attrs.items()})
+        return {name: value for name, value in found.items() if not name.startswith(MEASURED)}
+
+    def assert_same_run(self, first, second):
+        a, b = self.contents(first), self.contents(second)
+        self.assertEqual(sorted(a), sorted(b))
+        self.assertEqual([name for name in a if a[name] != b[name]], [])
+
+
+class RunTest(SimulateTest):
+    def test_a_stack_stands_and_says_so(self):
+        summary = json.loads(self.stack("--frames", "120", "--json"))
+        self.assertEqual((summary["bodies"], summary["triangles"], summary["steps"]), (36, 27 * 12, 120))
+        self.assertLess(summary["last"]["speed_max"], 1e-3)
+        with h5py.File(self.run_file) as file:
+            self.assertEqual(file.attrs["configuration"], "stack")
+            self.assertEqual(file.attrs["iterations"], 30)
+            self.assertIn("tandem_version", file.attrs)
+            ratio = file["/frames/contact_ratio"][:]
+            self.assertTrue(np.array_equal(ratio, file["/frames/triangle_pairs"][:] / (27 * 12)))
+            energy = file["/frames/kinetic_energy"][:] + file["/frames/potential_energy"][:]
+            self.assertLessEqual(energy[-1], energy[0] + 1e-3 * abs(energy[0]))
+            self.assertTrue((file["/frames/seconds/step"][:] > 0).all())
+
+    def test_threads_do_not_change_the_results(self):
+        others = self.outputs / "others.h5"
+        cow, ground = self.asset("cow_1500"), self.asset("ground")
+        pile = ["--mesh", cow, "--ground", ground, "--count", "20", "--frames", "90", "--trajectory", "10"]
+        self.simulate("pile", *pile, "--threads", "1")
+        self.simulate("pile", *pile, "--threads", "4", out=others)
+        self.assert_same_run(self.run_file, others)
+
+    def test_another_seed_gives_another_pile(self):
+        cow, ground = self.asset("cow_1500"), self.asset("ground")
+        others = self.outputs / "others.h5"
+        pile = ["--mesh", cow, "--ground", ground, "--count", "8", "--frames", "1", "--trajectory", "1"]
+        self.simulate("pile", *pile)
+        self.simulate("pile", *pile, "--seed", "2", out=others)
+        self.assertNotEqual(self.contents(self.run_file)["start"], self.contents(others)["start"])
+
+    def test_rocks_that_leave_the_slide_come_back_at_its_top(self):
+        cow, ground = self.asset("cow_1500"), self.asset("ground")
+        self.simulate("slide", "--mesh", cow, "--ground", ground, "--count", "100", "--tilt", "45", "--friction", "0.1",
+                      "--frames", "60", "--trajectory", "1")
+        with h5py.File(self.run_file) as file:
+            self.assertGreater(file["/frames/reentered"][:].sum(), 0)
+            x = file["/trajectory/position"][:, file["/bodies/motion"][:] == 0, 0]
+            self.assertLess(np.diff(x, axis=0).min(), -30)
+            self.assertLess(np.abs(x).max(), 25)
+
+    def test_a_scene_moves_as_its_file_says(self):
+        slab = self.mesh_of("slab", SLAB_OBJ)
+        scene = self.outputs / "scene.h5"
+        with h5py.File(scene, "w") as file:
+            file["assets"] = [os.fspath(slab), os.fspath(self.cube)]
+            file["instances/asset"] = np.array([0, 1, 1], "u4")
+            file["instances/rotation"] = np.stack([np.eye(3)] * 3)
+            file["instances/translation"] = np.array([[0, 0, 0], [0, 0, 0.5], [5, 0, 20.0]])
+            file["simulation/motion"] = np.array([1, 0, 2], "u4")
+            file["simulation/velocity"] = np.array([[0, 0, 0], [2, 0, 0], [0, 1.5, 0]])
+            file["simulation/density"] = np.array([1, 500.0, 1])
+        self.simulate("scene", scene, "--frames", "60", "--trajectory", "60", "--friction", "0.25")
+        with h5py.File(self.run_file) as file:
+            moved = file["/trajectory/position"][1] - file["/trajectory/position"][0]
+            self.assertEqual(list(moved[0]), [0, 0, 0])
+            self.assertAlmostEqual(file["/bodies/mass"][1], 500, places=6)
+            # 2 m/s braked by 0.25 g come to rest after 0.82 s, 0.815 m further on.
+            self.assertAlmostEqual(moved[1, 0], 2**2 / (2 * 0.25 * 9.81), delta=0.03)
+            np.testing.assert_allclose(moved[2], [0, 1.5, 0], atol=1e-12)
+
+    def test_usage_errors_say_what_is_wrong(self):
+        self.assert_fails(self.bench("simulate", "stack", "--mesh", self.cube, "--count", "26", "--frames", "1", "-o",
+                                     self.run_file), USAGE, "26 is no cube of a whole number")
+        self.assert_fails(self.bench("simulate", "stack", "--mesh", self.cube, "--frames", "1", "--engine", "magic",
+                                     "-o", self.run_file), USAGE, "magic", "tandem")
+        self.assert_fails(self.bench("simulate", "stack", "--mesh", self.inputs / "none.bvh", "--frames", "1", "-o",
+                                     self.run_file), UNREADABLE_INPUT, "none.bvh", "no such file")
+        self.assert_nothing_written()
+
+
+class ResumeTest(SimulateTest):
+    OPTIONS = ["--frames", "100", "--trajectory", "5", "--sleep"]
+
+    def start(self, *arguments):
+        """A run in the background that writes a checkpoint after every step."""
+        return subprocess.Popen(
+            list(map(os.fspath, [BVHBENCH, "simulate", "stack", "--mesh", self.cube, "--count", "64", *arguments,
+                                 "--checkpoint", "0", "-o", self.run_file])),
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+    def wait_for_part(self):
+        part = self.outputs / "run.h5.part"
+        for _ in range(600):
+            if part.exists():
+                return part
+            time.sleep(0.01)
+        self.fail("no part file")
+
+    def steps(self, path):
+        with h5py.File(path) as file:
+            return int(file.attrs["steps"])
+
+    def test_a_stopped_run_goes_on_to_the_same_results(self):
+        whole = self.outputs / "whole.h5"
+        self.simulate("stack", "--mesh", self.cube, "--count", "64", *self.OPTIONS, out=whole)
+        for sent in (signal.SIGTERM, signal.SIGINT, signal.SIGKILL):
+            with self.subTest(signal=sent):
+                process = self.start(*self.OPTIONS)
+                part = self.wait_for_part()
+                process.send_signal(sent)
+                process.communicate(timeout=60)
+                self.assertEqual(process.returncode, -sent)
+                self.assertFalse(self.run_file.exists())
+                self.assertLess(self.steps(part), 100)
+                self.simulate("stack", "--mesh", self.cube, "--count", "64", *self.OPTIONS, "--resume")
+                self.assertFalse(part.exists())
+                self.assert_same_run(whole, self.run_file)
+                self.run_file.unlink()
+
+    def test_resume_starts_where_nothing_is_and_leaves_what_is_done(self):
+        self.stack("--frames", "3", "--resume")
+        before = self.run_file.read_bytes()
+        self.assertIn("is done", self.stack("--frames", "3", "--resume"))
+        self.assertEqual(self.run_file.read_bytes(), before)
+
+    def test_resume_refuses_the_part_of_another_run(self):
+        process = self.start(*self.OPTIONS)
+        part = self.wait_for_part()
+        process.terminate()
+        process.communicate(timeout=60)
+        before = part.read_bytes()
+        result = self.bench("simulate", "stack", "--mesh", self.cube, "--count", "64", *self.OPTIONS, "--resume",
+                            "--friction", "0.75", "-o", self.run_file)
+        self.assert_fails(result, UNREADABLE_INPUT, "run.h5.part", "friction is 0.5, not 0.75")
+        self.assertEqual(part.read_bytes(), before)
+
+
+class FrameTest(SimulateTest):
+    def test_a_frame_is_a_scene_with_the_contacts_of_the_run(self):
+        cow, ground = self.asset("cow_1500"), self.asset("ground")
+        self.simulate("pile", "--mesh", cow, "--ground", ground, "--count", "20", "--frames", "80", "--trajectory",
+                      "20")
+        for frame in (0, 60):
+            scene = self.outputs / f"frame{frame}.h5"
+            self.passes("frame", self.run_file, "--frame", str(frame), "-o", scene)
+            found = json.loads(self.passes("query", scene, "--json"))
+            with h5py.File(self.run_file) as file:
+                self.assertEqual(found["contacts"],
+                                 int(file["/frames/triangle_pairs"][frame]))
+        self.assertGreater(found["contacts"], 0)
+        self.assertIn("Tandem exact", self.passes("compare", scene))
+
+    def test_a_frame_that_is_not_kept_is_refused_with_those_that_are(self):
+        self.stack("--frames", "4", "--trajectory", "2")
+        scene = self.outputs / "scene.h5"
+        self.assert_fails(self.bench("frame", self.run_file, "--frame", "3", "-o", scene), UNREADABLE_INPUT, "run.h5",
+                          "no frame 3", "0 to 4, every 2")
+        self.stack("--frames", "1")
+        self.assert_fails(self.bench("frame", self.run_file, "--frame", "0", "-o", scene), UNREADABLE_INPUT,
+                          "keeps no trajectory")
+
+
+if __name__ == "__main__":
+    unittest.main()

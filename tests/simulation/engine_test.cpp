@@ -2,50 +2,13 @@
 
 #include <algorithm>
 
-#include "contact_scene.h"
-#include "simulation/contacts/collision_engine.h"
+#include "engine_pile.h"
 
 namespace tandem::test {
 namespace {
 
-using simulation::CollisionEngine;
-using simulation::ContactList;
 using simulation::is_built_in;
 using simulation::make_engine;
-
-// A pile of cows over a sheet, in successive steps.
-struct Pile {
-  SampleAssets assets;
-  std::vector<Instance> bodies;
-  RandomPoses random{11};
-
-  explicit Pile(int cows = 60) {
-    assets.add(sheet(8, 20));
-    assets.add(project_mesh("cow_1500.obj"), {0, 0, 0});
-    bodies.push_back({0, kIdentityPose});
-    for (int i = 0; i < cows; ++i) {
-      bodies.push_back({1, to_pose(at(random.symmetric(2), random.symmetric(2), random.uniform(-0.3, 1.5)) *
-                                   random_motion(random, 0))});
-    }
-  }
-  void step() {
-    for (std::size_t i = 1; i < bodies.size(); ++i) {
-      for (double& x : bodies[i].pose.translation) x += random.symmetric(0.05);
-    }
-  }
-};
-
-ContactList found_by(CollisionEngine& engine, const Pile& pile, std::span<const std::uint8_t> idle = {}) {
-  ContactList list;
-  engine.find(pile.bodies, idle, list);
-  return list;
-}
-
-bool operator==(const ContactList& x, const ContactList& y) {
-  return x.triangles == y.triangles &&
-         std::equal(x.pairs.begin(), x.pairs.end(), y.pairs.begin(), y.pairs.end(),
-                    [](const ObjectPair& p, const ObjectPair& q) { return p.a == q.a && p.b == q.b; });
-}
 
 class Engine : public testing::TestWithParam<std::string_view> {
  protected:
@@ -75,7 +38,7 @@ TEST_P(Engine, FindsThePairsThatContactQueryFindsStepAfterStep) {
     }
     std::sort(expected.triangles.begin(), expected.triangles.end());
     EXPECT_GT(list.triangles.size(), 500u);
-    EXPECT_TRUE(list == expected) << list.triangles.size() << " of " << expected.triangles.size();
+    EXPECT_TRUE(same(list, expected)) << list.triangles.size() << " of " << expected.triangles.size();
     EXPECT_EQ(engine->counters().contacts, list.triangles.size());
     EXPECT_EQ(engine->counters().object_pairs, list.pairs.size());
     EXPECT_GT(engine->times().sum(), 0);
@@ -88,8 +51,7 @@ TEST_P(Engine, LeavesOutPairsOfIdleBodies) {
   const auto engine = make_engine(GetParam());
   engine->set_shapes(pile.assets.views());
   const ContactList all = found_by(*engine, pile);
-  std::vector<std::uint8_t> idle(pile.bodies.size());
-  for (std::size_t i = 0; i < idle.size(); ++i) idle[i] = i % 3 != 1;
+  const std::vector<std::uint8_t> idle = pile.idle();
   const auto both_idle = [&](const ObjectPair& pair) { return idle[pair.a] != 0 && idle[pair.b] != 0; };
   const ContactList some = found_by(*engine, pile, idle);
   EXPECT_TRUE(std::none_of(some.pairs.begin(), some.pairs.end(), both_idle));
@@ -109,7 +71,7 @@ TEST_P(Engine, FollowsBodiesThatComeAndGo) {
   pile.bodies.back().asset = 0;
   const auto fresh = make_engine("tandem");
   fresh->set_shapes(pile.assets.views());
-  EXPECT_TRUE(found_by(*engine, pile) == found_by(*fresh, pile));
+  EXPECT_TRUE(same(found_by(*engine, pile), found_by(*fresh, pile)));
 }
 
 INSTANTIATE_TEST_SUITE_P(Engines, Engine, testing::ValuesIn(simulation::engine_names()),
@@ -167,7 +129,7 @@ TEST(Engines, FindTheSameWithThreads) {
     engine->set_shapes(pile.assets.views());
     engine->find(pile.bodies, {}, lists[threads == 1 ? 0 : 1]);
   }
-  EXPECT_TRUE(lists[0] == lists[1]);
+  EXPECT_TRUE(same(lists[0], lists[1]));
 }
 
 }  // namespace

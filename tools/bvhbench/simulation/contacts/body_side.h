@@ -50,15 +50,12 @@ class BodySide {
 
   /// Finds the enclosed vertices: the ends of pierced edges whose nearest piercing they lie behind; and from
   /// those of curves that may spread, all that edges without piercings lead to. joined(c, d): vertices of
-  /// curves c and d turned out to be the same.
+  /// curves c and d turned out to be the same. No more than `most` are looked for beyond the first.
   template <typename MaySpread, typename Joined>
-  void find_enclosed(const MaySpread& may_spread, const Joined& joined);
+  void find_enclosed(std::size_t most, const MaySpread& may_spread, const Joined& joined);
 
   std::span<const Enclosed> enclosed() const { return enclosed_; }
   std::span<const EnclosedTriangle> enclosed_triangles() const { return enclosed_triangles_; }
-
-  /// More vertices than this are not looked for: the depth of such an overlap is then a lower bound.
-  static constexpr std::size_t kMostEnclosed = 8192;
 
  private:
   struct PiercedEdge {
@@ -106,22 +103,20 @@ void BodySide::enclose(std::uint32_t vertex, std::uint32_t curve, const Joined& 
 }
 
 template <typename MaySpread, typename Joined>
-void BodySide::find_enclosed(const MaySpread& may_spread, const Joined& joined) {
+void BodySide::find_enclosed(std::size_t most, const MaySpread& may_spread, const Joined& joined) {
   const Surface& surface = shape_->surface;
   for (const PiercedEdge& p : pierced_) {
     const Surface::Edge& edge = surface.edge[p.edge];
     if (p.lower_inside) enclose(edge.lower, p.lower_curve, joined);
     if (p.upper_inside) enclose(edge.upper, p.upper_curve, joined);
   }
-  for (std::size_t i = 0; i < enclosed_.size() && enclosed_.size() < kMostEnclosed; ++i) {
+  for (std::size_t i = 0; i < enclosed_.size() && enclosed_.size() < most; ++i) {
     const auto [vertex, curve] = std::pair(enclosed_[i].vertex, enclosed_[i].curve);
     if (!may_spread(curve)) continue;
-    for (const std::uint32_t t : surface.around(vertex)) {
-      for (int k = 0; k < 3; ++k) {
-        const std::uint32_t from = surface.corner[t][k], to = surface.corner[t][(k + 1) % 3];
-        if ((from != vertex && to != vertex) || edge_slots_.has(surface.edge_of[t][k])) continue;
-        enclose(from == vertex ? to : from, curve, joined);
-      }
+    for (const std::uint32_t e : surface.edges_at(vertex)) {
+      if (edge_slots_.has(e)) continue;
+      const Surface::Edge& edge = surface.edge[e];
+      enclose(edge.lower == vertex ? edge.upper : edge.lower, curve, joined);
     }
   }
   add_enclosed_triangles();

@@ -15,6 +15,11 @@ constexpr double kInPlane = 0x1p-44;
 // A curve whose ends are apart by less than this part of its length closes.
 constexpr double kClosed = 1e-6;
 
+// Vertices inside the other body that are looked for, from the curve inwards: at most so many, and so many
+// more for each triangle pair, so that work grows with the contacts however deep bodies overlap. Of what
+// reaches further inside the depth is a lower bound.
+constexpr std::size_t kMostEnclosed = 256, kMostEnclosedForEach = 6;
+
 }  // namespace
 
 void ContactCurves::add(const TriangleContact& contact, double tolerance, BodySide& a, BodySide& b) {
@@ -139,8 +144,9 @@ void ContactCurves::find_enclosed(BodySide& a, BodySide& b) {
   }
   const auto may_spread = [&](std::uint32_t i) { return curves_[i].closed && !curves_[i].degenerate; };
   const auto joined = [&](std::uint32_t i, std::uint32_t j) { groups_.join(i, j); };
-  a.find_enclosed(may_spread, joined);
-  b.find_enclosed(may_spread, joined);
+  const std::size_t most = kMostEnclosed + kMostEnclosedForEach * pieces_.size();
+  a.find_enclosed(most, may_spread, joined);
+  b.find_enclosed(most, may_spread, joined);
 }
 
 void ContactCurves::find(std::span<const TriangleContact> contacts, BodySide& a, BodySide& b) {

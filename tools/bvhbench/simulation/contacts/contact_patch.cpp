@@ -26,7 +26,7 @@ constexpr double kInwards = 0.02;
 // Triangles that the normal grazes at less than this sine are walls, which have no height.
 constexpr double kWall = 0.01;
 
-// How far beside a line a triangle's plane is taken where the line hits none, as a part of the patch's
+// How far beside a line a triangle may lie that stands in where the line hits none, as a part of the patch's
 // extent.
 constexpr double kBeside = 0.1;
 
@@ -44,6 +44,22 @@ std::uint64_t mixed(std::uint64_t x) {  // SplitMix64's finish
 
 std::uint64_t feature_hash(std::uint64_t x, std::uint64_t y) {
   return std::max<std::uint64_t>(1, mixed(mixed(x + 0x9E3779B97F4A7C15u) ^ y));
+}
+
+// Moves `x` to the nearest point of a counter-clockwise triangle, and says how far.
+double nearest_point(const Vector2d* corner, Vector2d& x) {
+  const Vector2d from = x;
+  double least = INFINITY;
+  bool outside = false;
+  for (int k = 0; k < 3; ++k) {
+    const Vector2d side = corner[(k + 1) % 3] - corner[k], to = from - corner[k];
+    if (side.x() * to.y() - side.y() * to.x() >= 0) continue;
+    outside = true;
+    const Vector2d at = corner[k] + std::clamp(side.dot(to) / side.squaredNorm(), 0.0, 1.0) * side;
+    const double distance = (at - from).norm();
+    if (distance < least) least = distance, x = at;
+  }
+  return outside ? least : 0;
 }
 
 }  // namespace
@@ -226,81 +242,13 @@ void ContactPatches::make_frame(const Vector3d& n) {
   width_ = width(n);
 }
 
-void ContactPatches::add_cast_triangle(const Vector3d* corner, const Vector3d& normal, bool of_b) {
-  const double cosine = normal.dot(frame_.n);
-  if (of_b ? cosine > -kWall : cosine < kWall) return;
-  CastTriangle out;
-  for (int k = 0; k < 3; ++k) out.corner[k] = frame_.flat(corner[k]);
-  if (twice_area(out.corner[0], out.corner[1], out.corner[2]) < 0) std::swap(out.corner[1], out.corner[2]);
-  for (int k = 0; k < 3; ++k) {
-    out.per_length[k] = 1 / std::max((out.corner[(k + 1) % 3] - out.corner[k]).norm(), 1e-300);
-  }
-  out.slope = -Vector2d(frame_.u.dot(normal), frame_.v.dot(normal)) / cosine;
-  out.level = normal.dot(corner[0] - frame_.origin) / cosine;
-  (of_b ? lower_ : upper_).push_back(out);
+void ContactPatches::add_sounding(const Vector2d& at, const Vector2d& sounded_at, double height,
+                                  std::uint64_t feature, bool inner) {
+  soundings_.push_back({at, sounded_at, height, feature, inner, height, height, nearest_, nearest_});
 }
 
-void ContactPatches::gather_cast_triangles() {
-  upper_.clear();
-  lower_.clear();
-  std::uint32_t last[2] = {kNoIndex, kNoIndex};
-  for (const CurvePiece& piece : curves_->pieces()) {
-    if (!in_group(piece.curve)) continue;
-    for (int side = 0; side < 2; ++side) {
-      if (last[side] == piece.slot[side]) continue;
-      last[side] = piece.slot[side];
-      const WorldTriangle& t = (side == 0 ? a_ : b_)->at(piece.slot[side]);
-      add_cast_triangle(t.corner, t.normal, side == 1);
-    }
-  }
-  for (const BodySide* side : {a_, b_}) {
-    for (const BodySide::EnclosedTriangle& t : side->enclosed_triangles()) {
-      if (!in_group(t.curve)) continue;
-      Vector3d corner[3];
-      for (int k = 0; k < 3; ++k) corner[k] = side->enclosed()[t.corner[k]].position;
-      const Vector3d normal = (corner[1] - corner[0]).cross(corner[2] - corner[0]);
-      const double scale = (t.turned ? -1 : 1) / std::max(normal.norm(), 1e-300);
-      add_cast_triangle(corner, scale * normal, side == b_);
-    }
-  }
-}
-
-// The highest or lowest triangle on the line; where there is none, the plane of the nearest one beside it.
-// Little is amiss then but where corners of one body lie in faces of the other: rounding may keep triangles
-// of a whole side out of the contacts.
-void ContactPatches::cast(const std::vector<CastTriangle>& triangles, const Vector2d& x, bool highest,
-                          double& height) const {
-  bool hit = false;
-  double nearest = nearest_;
-  for (const CastTriangle& t : triangles) {
-    double beside = 0;  // how far x lies outside
-    for (int k = 0; k < 3; ++k) {
-      const Vector2d side = t.corner[(k + 1) % 3] - t.corner[k], to = x - t.corner[k];
-      const double outside = (side.y() * to.x() - side.x() * to.y()) * t.per_length[k];
-      beside = std::max(beside, outside);
-    }
-    if (beside > (hit ? 0 : nearest)) continue;
-    const double h = t.level + t.slope.dot(x);
-    if (beside > 0) {
-      nearest = beside;
-      height = h;
-    } else if (!hit || (highest ? h > height : h < height)) {
-      height = h;
-      hit = true;
-    }
-  }
-}
-
-ContactPatches::Chosen ContactPatches::sounded(const Vector2d& at, const Vector2d& sounded_at, double height,
-                                               std::uint64_t feature) const {
-  double top = height, bottom = height;
-  cast(upper_, sounded_at, true, top);
-  cast(lower_, sounded_at, false, bottom);
-  if (top <= bottom) return {at, height, 0, feature, false};
-  return {at, (top + bottom) / 2, std::min(top - bottom, width_), feature, false};
-}
-
-void ContactPatches::choose_rim(std::size_t most) {
+// The corners of the hull of all candidates.
+void ContactPatches::gather_rim(std::size_t most) {
   flat_.clear();
   for (std::uint32_t i = 0; i < candidates_.size(); ++i) flat_.push_back({frame_.flat(candidates_[i].x), i});
   convex_hull(flat_, hull_);
@@ -311,25 +259,21 @@ void ContactPatches::choose_rim(std::size_t most) {
   for (const PlanePoint& p : hull_) spread = std::max(spread, (p.x - middle).norm());
   const bool degenerate = std::any_of(curves_->curves().begin(), curves_->curves().end(),
                                       [](const Curve& curve) { return curve.degenerate; });
-  nearest_ = (degenerate ? 1 : kBeside) * spread;
-  chosen_.clear();
+  nearest_ = (degenerate ? 2 : kBeside) * spread;
+  soundings_.clear();
   for (const PlanePoint& p : hull_) {
     const Candidate& candidate = candidates_[p.index];
-    const double height = frame_.height(candidate.x);
-    chosen_.push_back(touch_ ? Chosen{p.x, height, 0, candidate.feature, false}
-                             : sounded(p.x, p.x + kInwards * (middle - p.x), height, candidate.feature));
+    add_sounding(p.x, p.x + kInwards * (middle - p.x), frame_.height(candidate.x), candidate.feature, false);
   }
 }
 
-// Of b's lowest enclosed vertex, a's highest, and the middle of the rim the one where the overlap is largest.
-ContactPatches::Chosen ContactPatches::deepest() const {
+// b's lowest enclosed vertex, a's highest, and the middle of the rim: at one of them the overlap is largest,
+// or nearly.
+void ContactPatches::gather_inner() {
   Vector2d middle = Vector2d::Zero();
   double height = 0;
-  for (const Chosen& c : chosen_) {
-    middle += c.x / static_cast<double>(chosen_.size());
-    height += c.height / static_cast<double>(chosen_.size());
-  }
-  Chosen best = sounded(middle, middle, height, feature_hash(current_, 4));
+  const auto rim = static_cast<double>(soundings_.size());
+  for (const Sounding& s : soundings_) middle += s.at / rim, height += s.height / rim;
   for (const BodySide* side : {a_, b_}) {
     const double upwards = side == a_ ? 1 : -1;
     const BodySide::Enclosed* extreme = nullptr;
@@ -341,11 +285,84 @@ ContactPatches::Chosen ContactPatches::deepest() const {
     }
     if (extreme == nullptr) continue;
     const Vector2d x = frame_.flat(extreme->position);
-    const Chosen c =
-        sounded(x, x, frame_.height(extreme->position), feature_hash(extreme->vertex, side == a_ ? 5 : 6));
-    if (c.depth > best.depth) best = c;
+    add_sounding(x, x, upwards * reach, feature_hash(extreme->vertex, side == a_ ? 5 : 6), true);
   }
-  return best;
+  add_sounding(middle, middle, height, feature_hash(current_, 4), true);
+}
+
+// Of a the highest triangle that faces along the normal counts, of b the lowest that faces against it; where
+// a line hits none, the plane of the nearest one beside it. Little is amiss then but where corners of one
+// body lie in faces of the other: rounding may keep triangles of a whole side out of the contacts.
+void ContactPatches::sound_cut_triangles() {
+  std::uint32_t last[2] = {kNoIndex, kNoIndex};
+  for (const CurvePiece& piece : curves_->pieces()) {
+    if (!in_group(piece.curve)) continue;
+    for (int side = 0; side < 2; ++side) {
+      if (last[side] == piece.slot[side]) continue;
+      last[side] = piece.slot[side];
+      const WorldTriangle& triangle = (side == 0 ? a_ : b_)->at(piece.slot[side]);
+      const double cosine = triangle.normal.dot(frame_.n);
+      if (side == 0 ? cosine < kWall : cosine > -kWall) continue;
+      sound_cut_triangle(triangle, cosine, side == 1);
+    }
+  }
+}
+
+void ContactPatches::sound_cut_triangle(const WorldTriangle& triangle, double cosine, bool of_b) {
+  Vector2d corner[3];
+  for (int k = 0; k < 3; ++k) corner[k] = frame_.flat(triangle.corner[k]);
+  if (twice_area(corner[0], corner[1], corner[2]) < 0) std::swap(corner[1], corner[2]);
+  const Vector2d slope = -Vector2d(frame_.u.dot(triangle.normal), frame_.v.dot(triangle.normal)) / cosine;
+  const double level = triangle.normal.dot(triangle.corner[0] - frame_.origin) / cosine;
+  const Vector2d reach = Vector2d::Constant(nearest_);
+  const Vector2d lower = corner[0].cwiseMin(corner[1]).cwiseMin(corner[2]) - reach,
+                 upper = corner[0].cwiseMax(corner[1]).cwiseMax(corner[2]) + reach;
+  for (Sounding& s : soundings_) {
+    const Vector2d& x = s.sounded_at;
+    if (x.x() < lower.x() || x.x() > upper.x() || x.y() < lower.y() || x.y() > upper.y()) continue;
+    Vector2d at = x;
+    const double beside = nearest_point(corner, at);
+    double &nearest = of_b ? s.beside_bottom : s.beside_top, &known = of_b ? s.bottom : s.top;
+    if (beside > nearest) continue;
+    const double height = level + slope.dot(at);
+    if (beside < nearest || (of_b ? height < known : height > known)) known = height;
+    nearest = beside;
+  }
+}
+
+void ContactPatches::sound_enclosed(const BodySide& side) {
+  const bool of_b = &side == b_;
+  const auto vertices = side.enclosed();
+  flat_vertices_.resize(vertices.size());
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    if (!in_group(vertices[i].curve)) continue;
+    flat_vertices_[i] = {frame_.flat(vertices[i].position), frame_.height(vertices[i].position)};
+  }
+  for (const BodySide::EnclosedTriangle& t : side.enclosed_triangles()) {
+    if (!in_group(t.curve)) continue;
+    const FlatVertex &p = flat_vertices_[t.corner[0]], &q = flat_vertices_[t.corner[1]],
+                     &r = flat_vertices_[t.corner[2]];
+    const double area = twice_area(p.x, q.x, r.x);
+    if (area == 0 || (area > 0) == (of_b != t.turned)) continue;  // faces the other way
+    const Vector2d lower = p.x.cwiseMin(q.x).cwiseMin(r.x), upper = p.x.cwiseMax(q.x).cwiseMax(r.x);
+    for (Sounding& s : soundings_) {
+      const Vector2d& x = s.sounded_at;
+      if (x.x() < lower.x() || x.x() > upper.x() || x.y() < lower.y() || x.y() > upper.y()) continue;
+      const double of_p = twice_area(q.x, r.x, x) / area, of_q = twice_area(r.x, p.x, x) / area,
+                   of_r = 1 - of_p - of_q;
+      if (of_p < -1e-12 || of_q < -1e-12 || of_r < -1e-12) continue;
+      const double height = of_p * p.height + of_q * q.height + of_r * r.height;
+      double &nearest = of_b ? s.beside_bottom : s.beside_top, &known = of_b ? s.bottom : s.top;
+      if (nearest > 0 || (of_b ? height < known : height > known)) known = height;
+      nearest = 0;
+    }
+  }
+}
+
+void ContactPatches::sound() {
+  sound_cut_triangles();
+  sound_enclosed(*a_);
+  sound_enclosed(*b_);
 }
 
 // Deeper points come first, then those further out; of points near each other the first stays.
@@ -378,14 +395,28 @@ void ContactPatches::name_points(double distance) {
 
 void ContactPatches::choose_points() {
   const std::size_t most = options_.points_per_patch;
-  choose_rim(std::max<std::size_t>(most, 2) - (touch_ ? 0 : 1));
+  gather_rim(std::max<std::size_t>(most, 2) - (touch_ ? 0 : 1));
   if (!touch_) {
-    Chosen inner = deepest();
-    inner.inner = true;
-    double of_rim = 0;
-    for (const Chosen& c : chosen_) of_rim = std::max(of_rim, c.depth);
-    if (inner.depth > kDeeper * of_rim) chosen_.push_back(inner);
+    gather_inner();
+    sound();
   }
+  chosen_.clear();
+  const Sounding* deepest = nullptr;
+  double of_rim = 0;
+  const auto depth_of = [&](const Sounding& s) { return std::clamp(s.top - s.bottom, 0.0, width_); };
+  const auto choose = [&](const Sounding& s) {
+    const double depth = depth_of(s);
+    chosen_.push_back({s.at, depth > 0 ? (s.top + s.bottom) / 2 : s.height, depth, s.feature, s.inner});
+  };
+  for (const Sounding& s : soundings_) {
+    if (s.inner) {
+      if (deepest == nullptr || depth_of(s) > depth_of(*deepest)) deepest = &s;
+      continue;
+    }
+    choose(s);
+    of_rim = std::max(of_rim, chosen_.back().depth);
+  }
+  if (deepest != nullptr && depth_of(*deepest) > kDeeper * of_rim) choose(*deepest);
   const double near = kNear * std::min(a_->shape().diagonal, b_->shape().diagonal);
   merge_near(near);
   if (chosen_.size() > most) chosen_.resize(most);
@@ -412,7 +443,6 @@ void ContactPatches::add(ContactCurves& curves, const BodySide& a, const BodySid
       continue;
     }
     make_frame(normal_);
-    if (!touch_) gather_cast_triangles();
     choose_points();
     ++statistics.patches;
     statistics.candidate_points += candidates_.size();

@@ -21,11 +21,10 @@ class ContactPatches {
     Eigen::Vector3d x;
     std::uint64_t feature;
   };
-  // A triangle that a line along the normal may hit, seen along it: its height is level + slope * x.
-  struct CastTriangle {
-    Eigen::Vector2d corner[3];  // counter-clockwise
-    Eigen::Vector2d slope;
-    double level, per_length[3];  // one by the length of each side
+  // A vertex of the patch seen along the normal.
+  struct FlatVertex {
+    Eigen::Vector2d x;
+    double height;
   };
   struct Frame {
     Eigen::Vector3d origin, u, v, n;
@@ -39,11 +38,20 @@ class ContactPatches {
       return origin + x.x() * u + x.y() * v + h * n;
     }
   };
+  // A line along the normal, and where it meets the surfaces.
+  struct Sounding {
+    Eigen::Vector2d at, sounded_at;  // the point, and the line beside it that stands for it
+    double height;                   // of the point, where the line misses
+    std::uint64_t feature;
+    bool inner;                        // not of the rim
+    double top, bottom;                // of a's surface, of b's
+    double beside_top, beside_bottom;  // how far beside the line that is: 0 of a hit
+  };
   struct Chosen {
     Eigen::Vector2d x;
     double height, depth;  // half-way between the surfaces
     std::uint64_t feature;
-    bool inner;  // not of the rim
+    bool inner;
   };
 
   void keep_curves(std::uint32_t group);
@@ -55,14 +63,14 @@ class ContactPatches {
   Eigen::Vector3d face_nearest(const Eigen::Vector3d& smooth);
   double width(const Eigen::Vector3d& n) const;
   void make_frame(const Eigen::Vector3d& n);
-  void gather_cast_triangles();
-  void add_cast_triangle(const Eigen::Vector3d* corner, const Eigen::Vector3d& normal, bool of_b);
-  void cast(const std::vector<CastTriangle>& triangles, const Eigen::Vector2d& x, bool highest,
-            double& height) const;
-  Chosen sounded(const Eigen::Vector2d& at, const Eigen::Vector2d& sounded_at, double height,
-                 std::uint64_t feature) const;
-  void choose_rim(std::size_t most);
-  Chosen deepest() const;
+  void gather_rim(std::size_t most);
+  void gather_inner();
+  void sound();
+  void sound_cut_triangles();
+  void sound_cut_triangle(const WorldTriangle& triangle, double cosine, bool of_b);
+  void sound_enclosed(const BodySide& side);
+  void add_sounding(const Eigen::Vector2d& at, const Eigen::Vector2d& sounded_at, double height,
+                    std::uint64_t feature, bool inner);
   void choose_points();
   void merge_near(double distance);
   void name_points(double distance);
@@ -83,7 +91,8 @@ class ContactPatches {
   double width_ = 0;    // of the patch along its normal, with all that is enclosed
   double nearest_ = 0;  // how far beside a line triangles are looked at where it hits none
   std::vector<PlanePoint> flat_, hull_;
-  std::vector<CastTriangle> upper_, lower_;  // of a, facing along the normal; of b, facing against it
+  std::vector<FlatVertex> flat_vertices_;
+  std::vector<Sounding> soundings_;
   std::vector<Chosen> chosen_;
 };
 

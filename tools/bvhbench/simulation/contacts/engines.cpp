@@ -11,9 +11,6 @@ namespace {
 constexpr bool kHaveCuda = true;
 #else
 constexpr bool kHaveCuda = false;
-std::unique_ptr<CollisionEngine> no_gpu_engine() {
-  throw std::logic_error("an engine that is not there");
-}
 #endif
 
 enum class Needs : std::uint8_t { nothing, cuda, fcl, embree };
@@ -90,11 +87,8 @@ std::unique_ptr<CollisionEngine> make_engine(std::string_view name, const Engine
   }
   switch (engine->needs) {
     case Needs::cuda:
-#ifdef TANDEM_BENCH_CUDA
-      return make_gpu_engine(engine->name, options);
-#else
-      return no_gpu_engine();
-#endif
+      if constexpr (kHaveCuda) return make_gpu_engine(engine->name, options);
+      throw std::logic_error("an engine that is not there");
     case Needs::fcl:
       return make_peer_engine(engine->name, "fcl", 0);
     case Needs::embree:

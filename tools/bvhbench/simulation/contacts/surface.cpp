@@ -67,17 +67,32 @@ void find_edges(Surface& surface) {
   }
 }
 
-void find_fans(Surface& surface) {
-  surface.fan_begin.assign(surface.vertex_count() + 1, 0);
-  for (const auto& corners : surface.corner) {
-    for (const std::uint32_t v : corners) ++surface.fan_begin[v + 1];
+// Lists, vertex by vertex, what names it: list[begin[v]] to list[begin[v + 1] - 1]. names(i): the vertices of
+// i.
+template <typename Names>
+void list_by_vertex(std::uint32_t vertices, std::size_t count, const Names& names,
+                    std::vector<std::uint32_t>& begin, std::vector<std::uint32_t>& list) {
+  begin.assign(vertices + 1, 0);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    for (const std::uint32_t v : names(i)) ++begin[v + 1];
   }
-  std::partial_sum(surface.fan_begin.begin(), surface.fan_begin.end(), surface.fan_begin.begin());
-  surface.fan.resize(3 * surface.corner.size());
-  std::vector<std::uint32_t> next(surface.fan_begin.begin(), surface.fan_begin.end() - 1);
-  for (std::uint32_t t = 0; t < surface.triangle_count(); ++t) {
-    for (const std::uint32_t v : surface.corner[t]) surface.fan[next[v]++] = t;
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  list.resize(begin.back());
+  std::vector<std::uint32_t> next(begin.begin(), begin.end() - 1);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    for (const std::uint32_t v : names(i)) list[next[v]++] = i;
   }
+}
+
+void find_surroundings(Surface& surface) {
+  const std::uint32_t vertices = surface.vertex_count();
+  list_by_vertex(
+      vertices, surface.corner.size(), [&](auto t) { return surface.corner[t]; }, surface.fan_begin,
+      surface.fan);
+  const auto ends = [&](auto e) {
+    return std::array<std::uint32_t, 2>{surface.edge[e].lower, surface.edge[e].upper};
+  };
+  list_by_vertex(vertices, surface.edge.size(), ends, surface.spoke_begin, surface.spoke);
 }
 
 // Triangles that have an edge, by edge.
@@ -242,7 +257,7 @@ Surface make_surface(const LevelView& level) {
   Surface surface;
   weld(level, surface);
   find_edges(surface);
-  find_fans(surface);
+  find_surroundings(surface);
   orient_components(EdgeTriangles(surface), surface);
   count_defects(surface);
   turn_components(surface);

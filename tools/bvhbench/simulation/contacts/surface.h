@@ -21,9 +21,10 @@ struct Surface {
   std::vector<std::array<std::uint32_t, 3>> corner;   ///< vertices of each triangle
   std::vector<std::array<std::uint32_t, 3>> edge_of;  ///< edges of each triangle; k joins corners k, k + 1
   std::vector<Edge> edge;
-  std::vector<std::uint32_t> fan_begin, fan;  ///< triangles around vertex v: fan[fan_begin[v]] to ...
-  std::vector<std::uint32_t> component;       ///< of each triangle: parts joined by edges
-  std::vector<std::uint8_t> turned;           ///< of each triangle: its winding is against the rest's
+  std::vector<std::uint32_t> fan_begin, fan;      ///< triangles around vertex v: fan[fan_begin[v]] to ...
+  std::vector<std::uint32_t> spoke_begin, spoke;  ///< edges at vertex v, likewise
+  std::vector<std::uint32_t> component;           ///< of each triangle: parts joined by edges
+  std::vector<std::uint8_t> turned;               ///< of each triangle: its winding is against the rest's
   std::uint32_t components = 0;
 
   std::uint64_t boundary_edges = 0;  ///< of an odd number of triangles
@@ -38,6 +39,9 @@ struct Surface {
   std::uint32_t triangle_count() const { return static_cast<std::uint32_t>(corner.size()); }
   std::span<const std::uint32_t> around(std::uint32_t vertex) const {
     return std::span(fan).subspan(fan_begin[vertex], fan_begin[vertex + 1] - fan_begin[vertex]);
+  }
+  std::span<const std::uint32_t> edges_at(std::uint32_t vertex) const {
+    return std::span(spoke).subspan(spoke_begin[vertex], spoke_begin[vertex + 1] - spoke_begin[vertex]);
   }
 };
 

@@ -7,6 +7,7 @@
 #include <tuple>
 #include <vector>
 
+#include "gpu_scene_fixture.h"
 #include "kernels/query_scenes.h"
 #include "kernels/triangle_families.h"
 #include "tandem/kernels/contact_query.h"
@@ -17,38 +18,15 @@
 namespace tandem {
 namespace {
 
+using test::download;
+using test::GpuScene;
+using test::no_gpu;
+using test::OnGpu;
+using test::pile;
 using test::RandomPoses;
 using test::Scene;
 
 constexpr QueryMode kModes[] = {QueryMode::exact, QueryMode::fast, QueryMode::boxes};
-
-/// An array in GPU memory.
-template <typename Element>
-class OnGpu {
- public:
-  explicit OnGpu(const std::vector<Element>& host) : size_(host.size()) {
-    void* memory = nullptr;
-    EXPECT_EQ(cudaMalloc(&memory, std::max<std::size_t>(size_, 1) * sizeof(Element)), cudaSuccess);
-    data_ = static_cast<Element*>(memory);
-    EXPECT_EQ(cudaMemcpy(data_, host.data(), size_ * sizeof(Element), cudaMemcpyHostToDevice), cudaSuccess);
-  }
-  OnGpu(const OnGpu&) = delete;
-  OnGpu& operator=(const OnGpu&) = delete;
-  ~OnGpu() { cudaFree(data_); }
-
-  Element* data() const { return data_; }
-
- private:
-  Element* data_ = nullptr;
-  std::size_t size_;
-};
-
-template <typename Value>
-std::vector<Value> download(const Value* device, std::size_t count) {
-  std::vector<Value> host(count);
-  EXPECT_EQ(cudaMemcpy(host.data(), device, count * sizeof(Value), cudaMemcpyDeviceToHost), cudaSuccess);
-  return host;
-}
 
 auto key(const Contact& c) {
   return std::tie(c.pair, c.triangle_a, c.triangle_b, c.face_a, c.face_b);
@@ -59,49 +37,6 @@ std::vector<Contact> sorted(std::vector<Contact> contacts) {
             [](const Contact& x, const Contact& y) { return key(x) < key(y); });
   return contacts;
 }
-
-/// A scene, all of it in GPU memory, and its object pairs.
-class GpuScene {
- public:
-  GpuScene(const test::SampleAssets& assets, const std::vector<Instance>& instances,
-           const std::vector<ObjectPair>& pairs)
-      : asset_(assets_of(instances)),
-        pose_(poses_of(instances)),
-        pairs_(pairs),
-        count_({static_cast<std::uint32_t>(pairs.size())}),
-        instance_count_(static_cast<std::uint32_t>(instances.size())),
-        pair_count_(static_cast<std::uint32_t>(pairs.size())) {
-    for (const AssetView& view : assets.views()) {
-      uploads_.push_back(std::make_unique<DeviceAsset>());
-      EXPECT_EQ(uploads_.back()->upload(view, nullptr), Status::kOk);
-      views_.push_back(gpu_asset(uploads_.back()->level(), *view.header));
-    }
-  }
-
-  std::span<const GpuAsset> assets() const { return views_; }
-  GpuInstances instances() const { return {asset_.data(), pose_.data(), instance_count_}; }
-  GpuPairs pairs() const { return {pairs_.data(), count_.data(), pair_count_}; }
-
- private:
-  static std::vector<std::uint32_t> assets_of(const std::vector<Instance>& instances) {
-    std::vector<std::uint32_t> out;
-    for (const Instance& instance : instances) out.push_back(instance.asset);
-    return out;
-  }
-  static std::vector<Pose> poses_of(const std::vector<Instance>& instances) {
-    std::vector<Pose> out;
-    for (const Instance& instance : instances) out.push_back(instance.pose);
-    return out;
-  }
-
-  std::vector<std::unique_ptr<DeviceAsset>> uploads_;
-  std::vector<GpuAsset> views_;
-  OnGpu<std::uint32_t> asset_;
-  OnGpu<Pose> pose_;
-  OnGpu<ObjectPair> pairs_;
-  OnGpu<std::uint32_t> count_;
-  std::uint32_t instance_count_, pair_count_;
-};
 
 std::vector<Contact> contacts_of(const GpuContactQuery& query) {
   return sorted(download(query.contacts(), query.report().contacts));
@@ -131,7 +66,8 @@ Answers ask(const test::SampleAssets& assets, const std::vector<Instance>& insta
   const GpuScene scene(assets, instances, pairs);
   GpuContactQuery gpu;
   EXPECT_EQ(gpu.set_assets(scene.assets(), nullptr), Status::kOk) << cudaGetErrorString(gpu.cuda_error());
-  out.gpu_status = gpu.find_contacts(scene.instances(), scene.pairs(), {mode, first_contact_only}, nullptr);
+  const GpuQueryOptions gpu_options = test::gpu_options(mode, first_contact_only);
+  out.gpu_status = gpu.find_contacts(scene.instances(), scene.pairs(), gpu_options, nullptr);
   EXPECT_EQ(gpu.cuda_error(), cudaSuccess) << cudaGetErrorString(gpu.cuda_error());
   out.gpu_where = gpu.report().where;
   out.gpu = contacts_of(gpu);
@@ -164,13 +100,6 @@ std::vector<ObjectPair> all_pairs(const std::vector<Instance>& instances, bool s
   return pairs;
 }
 
-bool no_gpu() {
-  int count = 0;
-  if (cudaGetDeviceCount(&count) == cudaSuccess && count > 0) return false;
-  static_cast<void>(cudaGetLastError());
-  return true;
-}
-
 class GpuContacts : public testing::Test {
  protected:
   void SetUp() override {
@@ -201,18 +130,6 @@ TEST_P(GpuContactsOf, AreThoseOfTheCpu) {
 
 INSTANTIATE_TEST_SUITE_P(, GpuContactsOf, testing::ValuesIn(test::scene_families()),
                          [](const auto& family) { return std::string(family.param.name); });
-
-/// Bodies at random places, close enough to meet.
-Scene pile(std::uint32_t bodies, std::uint32_t triangles, double spread, std::uint64_t seed) {
-  RandomPoses random(seed);
-  Scene scene;
-  scene.assets.add(test::soup(random, triangles, 0.1));
-  scene.assets.add(test::cube(0.5f, 12));
-  for (std::uint32_t i = 0; i < bodies; ++i) {
-    scene.instances.push_back({i % 2, random.pose({1, 1, spread, 0, 4})});
-  }
-  return scene;
-}
 
 TEST_F(GpuContacts, OfAPileAreThoseOfTheCpu) {
   RandomPoses random(2);
@@ -284,6 +201,20 @@ TEST_F(GpuContacts, FirstOnesAreOfThePairsThatHaveAny) {
     EXPECT_EQ(found, wanted);
     EXPECT_EQ(first.gpu_counters.contacts, wanted.size());
     EXPECT_LE(first.gpu_counters.block_pairs, all.gpu_counters.block_pairs);
+  }
+}
+
+// For tools that are too slow for more.
+TEST_F(GpuContacts, OfASmallSceneInEveryMode) {
+  RandomPoses random(15);
+  const Scene scene = pile(10, 150, 0.7, 15);
+  const auto pairs = all_pairs(scene.instances, true, random);
+  for (const QueryMode mode : kModes) {
+    const Answers all = ask(scene.assets, scene.instances, pairs, mode);
+    EXPECT_GT(all.cpu.size(), 100u);
+    expect_equal(all, mode);
+    const Answers first = ask(scene.assets, scene.instances, pairs, mode, true);
+    EXPECT_EQ(first.gpu.size(), first.cpu.size());
   }
 }
 

@@ -6,7 +6,7 @@ import unittest
 
 import numpy as np
 
-from bench_test import IDENTITY, BenchTest, drop_hint, table_of
+from bench_test import BVHBENCH, IDENTITY, BenchTest, drop_hint, table_of
 from tool_test import DONE, SOURCE_DIR, UNREADABLE_INPUT, UNUSABLE_GPU, USAGE
 
 
@@ -45,8 +45,8 @@ class BenchGpu(BenchTest):
         if not self.built:
             self.skipTest("built without CUDA")
         self.write_scene()
-        for words in ([*self.ON_GPU, "--self"], [*self.ON_GPU, "--threads", "2"], ["--engine", "paper"],
-                      [*self.ON_GPU, "--engine", "paper", "--first-contact"]):
+        for words in ([*self.ON_GPU, "--self"], [*self.ON_GPU, "--threads", "2"], ["--engine", "paper"], ["--sorted"],
+                      ["--traversal"], *([*self.ON_GPU, "--engine", "paper", word] for word in ("--first-contact", "--sorted", "--traversal"))):
             with self.subTest(words=words):
                 self.assert_fails(self.bench("query", self.scene, *words), USAGE, words[-2] if words[-1] == "2" else "--")
 
@@ -66,7 +66,20 @@ class BenchGpu(BenchTest):
             self.assertEqual(len(report["contacts_seconds"]["all"]), 3)
             for name, column in table_of(self.contacts).items():
                 self.assertEqual(column.tolist(), contacts[name].tolist())
-        self.assertEqual(self.query("--engine", "paper", *self.ON_GPU)["hash"], self.query()["hash"])
+        exact = self.query()["hash"]
+        self.assertEqual(self.query("--engine", "paper", *self.ON_GPU)["hash"], exact)
+        report = self.query("--sorted", "--traversal", "--repeat", "2", *self.ON_GPU)
+        self.assertEqual((report["hash"], len(report["traversal_seconds"]["all"])), (exact, 2))
+        self.assertLessEqual(report["gpu_bytes"], report["gpu_bytes_bound"])
+
+    def test_gpu_memory_that_runs_out_is_told(self):
+        self.need_gpu()
+        self.make("lattice", "--count", "3000", "--spacing", "0.01")  # 4.5 million object pairs, 800 MB
+        for megabytes in ("0", "1200"):
+            command = [os.environ["TANDEM_FULL_GPU"], megabytes, BVHBENCH, "query", self.scene, *self.ON_GPU, "--mode", "boxes"]
+            result = self.run_tool(*map(os.fspath, command))
+            self.assertEqual((result.returncode, result.stdout), (UNUSABLE_GPU, b""))
+            self.assertRegex(result.stderr, rb"^bvhbench: --backend cuda: [a-z ]+: not enough GPU memory")
 
     def test_the_gpu_names_the_instance_that_is_wrong(self):
         self.need_gpu()

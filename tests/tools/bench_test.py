@@ -84,7 +84,7 @@ def table_of(path):
 
 
 class Scenes(BenchTest):
-    KINDS = {"stack": ["--count", "27"], "pile": ["--count", "60"], "coincident": ["--count", "5"],
+    KINDS = {"stack": ["--count", "27"], "pile": ["--count", "60"], "coincident": ["--count", "5"], "lattice": ["--count", "30"],
              "slide": ["--count", "20", "--ground", None]}
 
     def arguments(self, kind):
@@ -484,7 +484,7 @@ class WrongScenes(BenchTest):
 
 class BenchUsage(BenchTest):
     def test_help_names_commands_and_options(self):
-        for arguments, words in (([], ("scene", "query", "Exit codes")), (["scene"], ("stack", "pile", "slide", "coincident")),
+        for arguments, words in (([], ("scene", "query", "Exit codes")), (["scene"], ("stack", "pile", "lattice", "slide", "coincident")),
                                  (["query"], ("SCENE", "--mode", "--first-contact", "--self", "--threads", "--repeat",
                                               "--out", "--json", "--backend"))):
             text = self.passes(*arguments, "--help")

@@ -62,6 +62,12 @@ void require(Status status, cudaError_t error, const char* what) {
   if (status != Status::kOk) fail(status, error, what);
 }
 
+std::size_t free_bytes() {
+  std::size_t free = 0, total = 0;
+  require(cudaMemGetInfo(&free, &total), "memory");
+  return free;
+}
+
 // An array in GPU memory.
 template <typename Element>
 class GpuArray {
@@ -202,13 +208,13 @@ class GpuScene {
 // The object pairs of a scene: given, or found on the GPU.
 class PairsStep {
  public:
-  PairsStep(const GpuScene& scene, bool given, cudaStream_t stream)
-      : scene_(scene), given_(given), stream_(stream) {}
+  PairsStep(const GpuScene& scene, bool given, bool sorted, cudaStream_t stream)
+      : scene_(scene), given_(given), options_{sorted}, stream_(stream) {}
 
   // Until there is room for all.
   void settle(const std::string& path) {
     if (given_) return;
-    const Status status = broad_.find_pairs(scene_.instances(), scene_.bounds(), {}, stream_);
+    const Status status = broad_.find_pairs(scene_.instances(), scene_.bounds(), options_, stream_);
     if (subject(status) != nullptr) refuse(path, status, broad_.report().where);
     if (status == Status::kTooManyPairs) refuse(path, status, 0);
     require(status, broad_.cuda_error(), "broad phase");
@@ -216,7 +222,7 @@ class PairsStep {
 
   void enqueue() {
     if (given_) return;
-    const Status status = broad_.enqueue(scene_.instances(), scene_.bounds(), {}, stream_);
+    const Status status = broad_.enqueue(scene_.instances(), scene_.bounds(), options_, stream_);
     require(status, broad_.cuda_error(), "broad phase");
   }
 
@@ -225,10 +231,14 @@ class PairsStep {
     return download(pairs().pairs, given_ ? pairs().capacity : broad_.report().count);
   }
   std::size_t bytes() const { return broad_.bytes(); }
+  std::size_t bytes_bound() const {
+    return given_ ? 0 : most_broad_phase_bytes(broad_.capacity(), options_.sorted);
+  }
 
  private:
   const GpuScene& scene_;
   bool given_;
+  GpuBroadPhaseOptions options_;
   cudaStream_t stream_;
   GpuBroadPhase broad_;
 };
@@ -241,6 +251,7 @@ struct Setting {
   const GpuQueryRequest& request;
   cudaStream_t stream;
   bool given;
+  std::size_t free_before;  // bytes of GPU memory, before anything was uploaded
 };
 
 // Times what `run` queues, which records the event between the two steps.
@@ -258,9 +269,42 @@ void time_repeats(const Setting& setting, const Event& between, const Run& run, 
   }
 }
 
+// The walk of both trees with what float32 decides left out: boxes that meet are counted, none is stored.
+void time_traversal(const Setting& setting, GpuAnswer& answer) {
+  const GpuQueryOptions options = {.mode = QueryMode::boxes};
+  GpuContactQuery query;
+  require(query.set_assets(setting.scene.assets(), setting.stream), query.cuda_error(), "assets");
+  require(query.reserve({.pairs = static_cast<std::uint32_t>(answer.counters.object_pairs)}, options),
+          query.cuda_error(), "traversal");
+  const Graph graph(setting.stream, [&] {
+    const Status status =
+        query.enqueue(setting.scene.instances(), setting.pairs.pairs(), options, setting.stream);
+    require(status, query.cuda_error(), "traversal");
+  });
+  const Event begin, end;
+  for (std::uint32_t i = 0; i < setting.request.repeats; ++i) {
+    require(cudaEventRecord(begin.handle, setting.stream), "an event");
+    graph.launch(setting.stream);
+    require(cudaEventRecord(end.handle, setting.stream), "an event");
+    require(cudaStreamSynchronize(setting.stream), "traversal");
+    answer.traversal.push_back(seconds_between(begin, end));
+  }
+}
+
+// Of what the GPU was to sort.
+void check_order(const std::vector<Contact>& contacts) {
+  const auto key = [](const Contact& c) {
+    return std::tie(c.pair, c.face_a, c.face_b, c.triangle_a, c.triangle_b);
+  };
+  const auto after = [&](const Contact& x, const Contact& y) { return key(x) >= key(y); };
+  if (std::adjacent_find(contacts.begin(), contacts.end(), after) == contacts.end()) return;
+  throw std::runtime_error("the GPU: its contacts are not sorted");
+}
+
 void ask_tandem(const Setting& setting, GpuAnswer& answer) {
   const GpuInstances instances = setting.scene.instances();
-  const GpuQueryOptions options = {setting.request.mode, setting.request.first_contact_only};
+  const GpuQueryOptions options = {setting.request.mode, setting.request.first_contact_only,
+                                   setting.request.sorted};
   GpuContactQuery query;
   Status status = query.set_assets(setting.scene.assets(), setting.stream);
   require(status, query.cuda_error(), "assets");
@@ -281,7 +325,11 @@ void ask_tandem(const Setting& setting, GpuAnswer& answer) {
   }
   answer.counters = query.report().counters;
   answer.bytes += query.bytes();
+  answer.bytes_bound = most_query_bytes(query.capacity(), options.sorted, setting.scene.assets().size());
+  answer.bytes_taken = setting.free_before - free_bytes();
   answer.contacts = download(query.contacts(), query.report().contacts);
+  if (options.sorted) check_order(answer.contacts);
+  if (setting.request.traversal) time_traversal(setting, answer);
 }
 
 void ask_paper(const Setting& setting, GpuAnswer& answer) {
@@ -306,6 +354,7 @@ void ask_paper(const Setting& setting, GpuAnswer& answer) {
   time_repeats(setting, between, run, answer);
   answer.counters = query.report().counters;
   answer.bytes += query.bytes();
+  answer.bytes_taken = setting.free_before - free_bytes();
   answer.contacts = download(query.contacts(), query.report().counters.contacts);
 }
 
@@ -336,16 +385,18 @@ GpuAnswer query_on_gpu(const std::string& path, const Scene& scene, const std::v
                        const GpuQueryRequest& request) {
   GpuAnswer answer;
   answer.gpu = start_gpu();
+  const std::size_t free_before = free_bytes();
   const Stream stream;
   const auto start = std::chrono::steady_clock::now();
   const GpuScene on_gpu(scene, given != nullptr ? *given : std::vector<ObjectPair>(), stream.handle);
   answer.upload = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  PairsStep pairs(on_gpu, given != nullptr, stream.handle);
+  PairsStep pairs(on_gpu, given != nullptr, request.sorted, stream.handle);
   pairs.settle(path);
   const auto ask = request.engine == GpuEngine::tandem ? ask_tandem : ask_paper;
-  ask({path, on_gpu, pairs, request, stream.handle, given != nullptr}, answer);
+  ask({path, on_gpu, pairs, request, stream.handle, given != nullptr, free_before}, answer);
   answer.pairs = pairs.read();
   answer.bytes += on_gpu.bytes() + pairs.bytes();
+  if (answer.bytes_bound != 0) answer.bytes_bound += on_gpu.bytes() + pairs.bytes_bound();
   sort_pairs(answer);
   return answer;
 }

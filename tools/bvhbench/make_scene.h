@@ -25,6 +25,11 @@ std::vector<Instance> make_stack(const AssetView& box, std::uint32_t side, doubl
 std::vector<Instance> make_pile(const AssetView& body, std::uint32_t count, double neighbours,
                                 const SceneSeed&);
 
+/// `count` bodies at random rotations on a cubic lattice, each moved along each axis by up to a quarter of
+/// the spacing, which is in lengths of the body's longest side.
+std::vector<Instance> make_lattice(const AssetView& body, std::uint32_t count, double spacing,
+                                   const SceneSeed&);
+
 /// Bodies strewn on a sheet of ground whose heights are its z, the whole tilted about the y axis by `tilt`
 /// degrees. Instances of asset 1, the sheet, come first: one, or a square of them where the bodies need it.
 /// Throws std::runtime_error where a sheet is smaller than a body.

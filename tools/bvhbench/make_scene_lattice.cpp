@@ -5,7 +5,7 @@
 
 #include "make_scene_parts.h"
 
-// Scenes on a cubic lattice: stack, pile, coincident.
+// Scenes on a cubic lattice: stack, pile, lattice, coincident.
 namespace tandem::bench {
 namespace {
 
@@ -60,13 +60,13 @@ struct Draft {
   std::vector<Vector> positions;
 };
 
-Draft draft_pile(std::uint32_t count, Random& random) {
-  constexpr double kJitter = 0.75;  // of the spacing
+// jitter: in spacings.
+Draft draft_pile(std::uint32_t count, double jitter, Random& random) {
   const std::uint32_t side = root_above(count, 3);
   Draft draft;
   for (std::uint32_t i = 0; i < count; ++i) {
     Vector position = cell(i, side);
-    for (double& x : position) x += random.between(-kJitter, kJitter);
+    for (double& x : position) x += random.between(-jitter, jitter);
     draft.positions.push_back(position);
     draft.rotations.push_back(random_rotation(random));
   }
@@ -114,7 +114,7 @@ std::vector<Instance> make_pile(const AssetView& body, std::uint32_t count, doub
     throw std::runtime_error(std::to_string(count) + " bodies cannot have so many neighbours each");
   }
   Random random(seed.seed);
-  const Draft draft = draft_pile(count, random);
+  const Draft draft = draft_pile(count, 0.75, random);
   const Bounds bounds = bounds_of(body);
   double too_close = 0, too_wide = HUGE_VAL, best_miss = HUGE_VAL;
   double spacing = bounds.diagonal(), best = spacing;
@@ -130,6 +130,18 @@ std::vector<Instance> make_pile(const AssetView& body, std::uint32_t count, doub
     if (spacing <= too_close || spacing >= too_wide) spacing = 0.5 * (too_close + too_wide);
   }
   std::vector<Instance> instances = spread(draft, bounds.centre(), best);
+  move(instances, seed.offset);
+  return instances;
+}
+
+std::vector<Instance> make_lattice(const AssetView& body, std::uint32_t count, double spacing,
+                                   const SceneSeed& seed) {
+  Random random(seed.seed);
+  const Draft draft = draft_pile(count, 0.25, random);
+  const Bounds bounds = bounds_of(body);
+  double length = 0;
+  for (int k = 0; k < 3; ++k) length = std::max(length, bounds.upper[k] - bounds.lower[k]);
+  std::vector<Instance> instances = spread(draft, bounds.centre(), spacing * length);
   move(instances, seed.offset);
   return instances;
 }

@@ -27,6 +27,7 @@ struct QueryArguments {
   QueryOptions options;
   GpuEngine engine = GpuEngine::tandem;
   std::uint32_t repeats = 1;
+  bool sorted = false, traversal = false;
   bool json = false, threads_given = false;
 
   bool on_gpu() const { return backend == "cuda"; }
@@ -97,9 +98,9 @@ Answer answer_of_gpu(const QueryArguments& arguments, const Scene& scene) {
         normalised(scene.description.pairs.value_or(std::vector<ObjectPair>()));
     Answer answer = {record_of(arguments, scene), {}, {}};
     const QueryOptions& options = arguments.options;
-    answer.gpu =
-        query_on_gpu(arguments.scene, scene, given ? &pairs : nullptr,
-                     {arguments.engine, options.mode, options.first_contact_only, arguments.repeats});
+    answer.gpu = query_on_gpu(arguments.scene, scene, given ? &pairs : nullptr,
+                              {arguments.engine, options.mode, options.first_contact_only, arguments.sorted,
+                               arguments.traversal, arguments.repeats});
     answer.record.seconds = answer.gpu.whole;
     answer.record.counters = answer.gpu.counters;
     answer.table = make_table(answer.gpu.pairs, answer.gpu.contacts);
@@ -151,10 +152,14 @@ Json to_json(const QueryArguments& arguments, const Scene& scene, const Answer& 
   if (arguments.on_gpu()) {
     json["engine"] = name_of(arguments.engine, kEngines);
     json["gpu"] = answer.gpu.gpu;
+    json["sorted"] = arguments.sorted;
     json["gpu_bytes"] = answer.gpu.bytes;
+    json["gpu_bytes_bound"] = answer.gpu.bytes_bound == 0 ? Json() : Json(answer.gpu.bytes_bound);
+    json["gpu_bytes_taken"] = answer.gpu.bytes_taken;
     json["upload_seconds"] = answer.gpu.upload;
     json["broad_phase_seconds"] = times(answer.gpu.broad_phase);
     json["contacts_seconds"] = times(answer.gpu.narrow);
+    json["traversal_seconds"] = times(answer.gpu.traversal);
   }
   return json;
 }
@@ -194,6 +199,7 @@ void print_summary(const QueryArguments& arguments, const Scene& scene, const An
   if (arguments.on_gpu()) {
     print_times("  broad phase", times(answer.gpu.broad_phase));
     print_times("  contacts", times(answer.gpu.narrow));
+    print_times("  traversal", times(answer.gpu.traversal), " alone");
     std::printf("  %-14s %15.3f  once\n", "upload", 1e3 * answer.gpu.upload);
     print_row("GPU bytes", answer.gpu.bytes);
   }
@@ -208,10 +214,12 @@ void check_arguments(const QueryArguments& arguments, const Scene& scene) {
   const bool tandem = arguments.engine == GpuEngine::tandem;
   if (!arguments.on_gpu()) {
     if (!tandem) throw UsageError("--engine is for the backend cuda");
+    if (arguments.sorted) throw UsageError("--sorted is for the backend cuda");
+    if (arguments.traversal) throw UsageError("--traversal is for the backend cuda");
     return;
   }
-  if (!tandem && arguments.options.first_contact_only) {
-    throw UsageError("--first-contact is for the engine tandem");
+  if (!tandem && (arguments.options.first_contact_only || arguments.sorted || arguments.traversal)) {
+    throw UsageError("--first-contact, --sorted and --traversal are for the engine tandem");
   }
   if (arguments.options.self_pairs) {
     throw UsageError("--self is for the backend cpu; /pairs of a scene may name an instance twice");
@@ -276,6 +284,10 @@ CLI::App* add_query(CLI::App& app, Run& run_later) {
     add_choice(*command, "--engine", kEngines, arguments->engine,
                "on a GPU: Tandem's, or the paper's scheme, the yardstick")
         ->option_text("tandem|paper|paper-bits [tandem]");
+    command->add_flag("--sorted", arguments->sorted,
+                      "on a GPU: sort pairs and contacts there, and time that too");
+    command->add_flag("--traversal", arguments->traversal,
+                      "on a GPU: also time the trees' walk alone, without triangle tests");
   }
   add_choice(*command, "--mode", kModes, options.mode,
              "'exact' contacts, 'fast' ones by float32, or 'boxes': candidates")

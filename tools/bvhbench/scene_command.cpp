@@ -14,7 +14,7 @@ namespace {
 struct SceneArguments {
   std::string mesh, ground, output;
   std::uint32_t count = 0;
-  double jitter = 0.001, neighbours = 6.5, tilt = 20;
+  double jitter = 0.001, neighbours = 6.5, spacing = 0.7, tilt = 20;
   bool exact = false;
   std::uint64_t seed = 1;
   std::vector<double> offset = {0, 0, 0};
@@ -105,6 +105,15 @@ CLI::App* add_scene(CLI::App& app, Run& run_later) {
                    "bodies whose world box meets that of a body, on average")
       ->check(between(0.01, 1000))
       ->option_text("N [6.5]");
+
+  CLI::App* lattice = add("lattice", "bodies at random rotations on a lattice of a given spacing", 1000,
+                          [](const auto& a, const Assets& assets) {
+                            return make_lattice(assets[0], a.count, a.spacing, a.scene_seed());
+                          });
+  lattice
+      ->add_option("--spacing", arguments->spacing, "of the lattice, in lengths of the body's longest side")
+      ->check(between(0.01, 1000))
+      ->option_text("S [0.7]");
 
   CLI::App* slide = add("slide", "bodies strewn on a tilted sheet of ground", 2500,
                         [](const auto& a, const Assets& assets) {

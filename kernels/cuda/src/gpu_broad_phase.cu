@@ -399,7 +399,10 @@ const GpuBroadPhaseReport& GpuBroadPhase::report() const {
 }
 
 GpuBroadPhaseCapacity GpuBroadPhase::capacity() const {
-  return state_ == nullptr ? GpuBroadPhaseCapacity{} : state_->capacity;
+  if (state_ == nullptr) return {};
+  GpuBroadPhaseCapacity capacity = state_->capacity;
+  capacity.instances = static_cast<std::uint32_t>(state_->boxes.size());
+  return capacity;
 }
 
 std::size_t GpuBroadPhase::bytes() const {

@@ -250,7 +250,9 @@ Status GpuContactQuery::find_contacts(const GpuInstances& instances, const GpuPa
     if (status != Status::kOk) return status;
     if (report().status != Status::kOk) return report().status;
     if (report().complete != 0) return Status::kOk;
-    const GpuQueryCapacity needed = report().needed;
+    GpuQueryCapacity needed = report().needed;
+    // What is looked at before a pair's first contact is found differs from run to run.
+    if (options.first_contact_only) needed.undecided += needed.undecided / 2 + 1024;
     if (needed.pairs > pairs.capacity) return Status::kOutOfRange;
     status = reserve(needed, options);
     if (status != Status::kOk) return status;

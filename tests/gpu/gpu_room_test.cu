@@ -1,0 +1,140 @@
+// GPU memory: how much is taken, and what becomes of those who ask when there is none.
+#include <gtest/gtest.h>
+
+#include "gpu_scene_fixture.h"
+#include "tandem/kernels/gpu_broad_phase.h"
+
+namespace tandem {
+namespace {
+
+using test::GpuScene;
+using test::Scene;
+
+/// Takes all GPU memory that is left.
+class FullGpu {
+ public:
+  FullGpu() {
+    for (std::size_t bytes = std::size_t{1} << 34; bytes >= 4096; bytes /= 2) {
+      void* memory = nullptr;
+      while (cudaMalloc(&memory, bytes) == cudaSuccess) taken_.push_back(memory);
+    }
+    static_cast<void>(cudaGetLastError());
+  }
+  FullGpu(const FullGpu&) = delete;
+  FullGpu& operator=(const FullGpu&) = delete;
+  ~FullGpu() {
+    for (void* memory : taken_) cudaFree(memory);
+  }
+
+ private:
+  std::vector<void*> taken_;
+};
+
+class GpuRoom : public test::GpuTest {};
+
+std::vector<ObjectPair> pairs_of(std::uint32_t bodies) {
+  std::vector<ObjectPair> pairs;
+  for (std::uint32_t a = 0; a < bodies; ++a) {
+    for (std::uint32_t b = a + 1; b < bodies; ++b) pairs.push_back({a, b});
+  }
+  return pairs;
+}
+
+TEST_F(GpuRoom, AFullGpuIsToldByItsNameAndIsNoEnd) {
+  const Scene scene = test::pile(100, 3000, 1, 31);
+  const std::vector<ObjectPair> pairs = pairs_of(100);
+  const build::Image large = test::make_file(test::random_mesh(100000, 1));
+  const AssetView large_view = check(large.data(), large.size()).asset;
+  const GpuScene on_gpu(scene.assets, scene.instances, pairs);
+  GpuContactQuery query, another;
+  ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
+  ASSERT_EQ(query.reserve({1, 1, 1}), Status::kOk);
+  GpuBroadPhase broad;
+  DeviceAsset asset;
+  {
+    const FullGpu full;
+    EXPECT_EQ(asset.upload(large_view, nullptr), Status::kOutOfGpuMemory);
+    EXPECT_EQ(asset.bytes(), 0u);
+    EXPECT_EQ(broad.reserve({1'000'000, 1'000'000, 1'000'000}), Status::kOutOfGpuMemory);
+    EXPECT_EQ(broad.cuda_error(), cudaErrorMemoryAllocation);
+    EXPECT_EQ(another.set_assets(on_gpu.assets(), nullptr), Status::kOutOfGpuMemory);
+    EXPECT_EQ(query.reserve({1'000'000, 1'000'000, 1'000'000}), Status::kOutOfGpuMemory);
+    EXPECT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {.sorted = true}, nullptr),
+              Status::kOutOfGpuMemory);
+    EXPECT_EQ(query.cuda_error(), cudaErrorMemoryAllocation);
+    EXPECT_EQ(cudaGetLastError(), cudaSuccess);  // nothing that failed is left behind
+  }
+  EXPECT_EQ(asset.upload(large_view, nullptr), Status::kOk);
+  EXPECT_EQ(broad.reserve({1'000'000, 1'000'000, 1'000'000}), Status::kOk);
+  for (GpuContactQuery* each : {&query, &another}) {
+    ASSERT_EQ(each->set_assets(on_gpu.assets(), nullptr), Status::kOk);
+    EXPECT_EQ(each->find_contacts(on_gpu.instances(), on_gpu.pairs(), {.sorted = true}, nullptr),
+              Status::kOk);
+    EXPECT_GT(each->report().contacts, 100000u);
+  }
+}
+
+/// GPU memory taken since then, by the driver's count. It gives out 2 MiB at a time, to small arrays
+/// together.
+class Taken {
+ public:
+  std::size_t bytes() const { return before_ - free(); }
+  static constexpr std::size_t kSlack = std::size_t{40} << 20;
+
+ private:
+  static std::size_t free() {
+    std::size_t free = 0, total = 0;
+    EXPECT_EQ(cudaMemGetInfo(&free, &total), cudaSuccess);
+    return free;
+  }
+  std::size_t before_ = free();
+};
+
+TEST_F(GpuRoom, AQueryHoldsNoMoreThanItsRuleSays) {
+  const Scene scene = test::pile(4, 100, 1, 32);
+  const GpuScene on_gpu(scene.assets, scene.instances, pairs_of(4));
+  for (const bool sorted : {false, true}) {
+    for (const GpuQueryCapacity wanted :
+         {GpuQueryCapacity{}, GpuQueryCapacity{1, 1, 1}, GpuQueryCapacity{3, 70, 9},
+          GpuQueryCapacity{1'000'000, 100, 100}, GpuQueryCapacity{100, 50'000'000, 100},
+          GpuQueryCapacity{10'000, 2'000'000, 5'000'000}}) {
+      const Taken taken;
+      GpuContactQuery query;
+      ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
+      ASSERT_EQ(query.reserve(wanted, {.sorted = sorted}), Status::kOk);
+      const std::size_t most = most_query_bytes(query.capacity(), sorted, on_gpu.assets().size());
+      EXPECT_LE(query.bytes(), most) << wanted.contacts << " contacts, sorted " << sorted;
+      EXPECT_LE(taken.bytes(), query.bytes() + Taken::kSlack);
+      EXPECT_LE(most, query.bytes() + query.bytes() / 5 + (5 << 20));  // a rule, not just something large
+    }
+  }
+}
+
+TEST_F(GpuRoom, AQueryThatGrewHoldsNoMoreThanItsRuleSays) {
+  const Scene scene = test::pile(100, 3000, 1, 33);
+  const GpuScene on_gpu(scene.assets, scene.instances, pairs_of(100));
+  GpuContactQuery query;
+  ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
+  ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {.sorted = true}, nullptr), Status::kOk);
+  EXPECT_LE(query.bytes(), most_query_bytes(query.capacity(), true, 2));
+}
+
+TEST_F(GpuRoom, ABroadPhaseHoldsNoMoreThanItsRuleSays) {
+  for (const bool sorted : {false, true}) {
+    for (const GpuBroadPhaseCapacity wanted :
+         {GpuBroadPhaseCapacity{}, GpuBroadPhaseCapacity{1, 1, 1}, GpuBroadPhaseCapacity{1000, 10, 1000},
+          GpuBroadPhaseCapacity{10, 5'000'000, 10}, GpuBroadPhaseCapacity{3'000'000, 7'000'000, 3'000'000}}) {
+      const Taken taken;
+      GpuBroadPhase broad;
+      ASSERT_EQ(broad.reserve(wanted, {sorted}), Status::kOk);
+      const std::size_t most = most_broad_phase_bytes(broad.capacity(), sorted);
+      EXPECT_LE(broad.bytes(), most) << wanted.boxes << " boxes, " << wanted.pairs << " pairs, sorted "
+                                     << sorted;
+      EXPECT_LE(taken.bytes(), broad.bytes() + Taken::kSlack);
+      EXPECT_LE(most, broad.bytes() + broad.bytes() / 5 + (2 << 20));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tandem

@@ -197,6 +197,24 @@ TEST(ContactGeneration, CrossedEdgesPushAcrossBoth) {
   }
 }
 
+// A tip is narrower than it is deep, and has few faces: no reason to push it sideways.
+TEST(ContactGeneration, ASharpTipInAFacePushesAlongTheFace) {
+  Mesh tip;
+  tip.add({0, 0, 0}, {-0.125f, 0.125f, 1}, {0.125f, 0.0625f, 1});
+  tip.add({0, 0, 0}, {0.125f, 0.0625f, 1}, {0, -0.125f, 1});
+  tip.add({0, 0, 0}, {0, -0.125f, 1}, {-0.125f, 0.125f, 1});
+  tip.add({-0.125f, 0.125f, 1}, {0, -0.125f, 1}, {0.125f, 0.0625f, 1});
+  for (const bool ground : {true, false}) {
+    ContactScene scene;
+    scene.add_body(scene.add_shape(ground ? sheet(1, 1) : cube(0.5f)), at(0, 0, ground ? 0 : -0.5));
+    scene.add_body(scene.add_shape(tip), at(0.1, 0.2, -0.05) * turned(0.4, kX));
+    const auto points = scene.points();
+    EXPECT_EQ(points.size(), 4u);  // the tip, and three around it, where the depth ends
+    for (const ContactPoint& p : points) EXPECT_LT((p.normal - kZ).norm(), 1e-9);
+    EXPECT_NEAR(scene.statistics().depth, 0.05, 1e-9);
+  }
+}
+
 TEST(ContactGeneration, ABoxOnATiltedSheetStandsOnItsFourCorners) {
   const Isometry3d slope = turned(0.35, Vector3d(0.3, 1, 0));
   for (const int cells : {1, 7, 40}) {

@@ -117,21 +117,33 @@ void ContactPatches::gather_candidates() {
   }
 }
 
-// How far the patch, with all that is enclosed, reaches along n.
-double ContactPatches::width(const Vector3d& n) const {
-  double lowest = INFINITY, highest = -INFINITY;
-  const auto take = [&](const Vector3d& x) {
-    const double h = n.dot(x - candidates_[0].x);
-    lowest = std::min(lowest, h);
-    highest = std::max(highest, h);
-  };
-  for (const Candidate& candidate : candidates_) take(candidate.x);
-  for (const BodySide* side : {a_, b_}) {
-    for (const BodySide::Enclosed& v : side->enclosed()) {
-      if (in_group(v.curve)) take(v.position);
+// The corners of a's triangles in the patch, and of b's, with all that is enclosed.
+void ContactPatches::gather_supports() {
+  for (auto& supports : supports_) supports.clear();
+  std::uint32_t last[2] = {kNoIndex, kNoIndex};
+  for (const CurvePiece& piece : curves_->pieces()) {
+    if (!in_patch(piece.curve)) continue;
+    for (int side = 0; side < 2; ++side) {
+      if (last[side] == piece.slot[side]) continue;
+      last[side] = piece.slot[side];
+      const auto& corner = (side == 0 ? a_ : b_)->at(piece.slot[side]).corner;
+      supports_[side].insert(supports_[side].end(), corner, corner + 3);
     }
   }
-  return highest - lowest;
+  for (int side = 0; side < 2; ++side) {
+    for (const BodySide::Enclosed& v : (side == 0 ? a_ : b_)->enclosed()) {
+      if (in_group(v.curve)) supports_[side].push_back(v.position);
+    }
+  }
+}
+
+// How far b must move along n until a plane across n lies between all of the triangles there. The overlap
+// alone would not do: the tip of a pyramid in the ground is narrower than it is deep, yet the ground goes on.
+double ContactPatches::width(const Vector3d& n) const {
+  double highest_a = -INFINITY, lowest_b = INFINITY;
+  for (const Vector3d& x : supports_[0]) highest_a = std::max(highest_a, n.dot(x - candidates_[0].x));
+  for (const Vector3d& x : supports_[1]) lowest_b = std::min(lowest_b, n.dot(x - candidates_[0].x));
+  return highest_a - lowest_b;
 }
 
 // Where few flat faces meet, as boxes do, the curve's own normal leans a little, by depth over length: along
@@ -230,6 +242,7 @@ bool ContactPatches::choose_normal() {
     }
     touch_ = false;
   }
+  gather_supports();
   normal_ = face_nearest((closes ? area : sheet).normalized());
   return true;
 }
@@ -239,7 +252,7 @@ void ContactPatches::make_frame(const Vector3d& n) {
   frame_.n = n;
   frame_.u = n.unitOrthogonal();
   frame_.v = n.cross(frame_.u);
-  width_ = width(n);
+  width_ = touch_ ? 0 : width(n);
 }
 
 void ContactPatches::add_sounding(const Vector2d& at, const Vector2d& sounded_at, double height,

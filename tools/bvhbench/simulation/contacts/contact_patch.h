@@ -61,6 +61,7 @@ class ContactPatches {
   bool choose_normal();
   bool normal_of_touch();
   Eigen::Vector3d face_nearest(const Eigen::Vector3d& smooth);
+  void gather_supports();
   double width(const Eigen::Vector3d& n) const;
   void make_frame(const Eigen::Vector3d& n);
   void gather_rim(std::size_t most);
@@ -86,9 +87,9 @@ class ContactPatches {
   bool touch_ = false;
   Eigen::Vector3d area_ = Eigen::Vector3d::Zero(), normal_ = Eigen::Vector3d::Zero();
   std::vector<Candidate> candidates_;
-  std::vector<Eigen::Vector3d> directions_;
+  std::vector<Eigen::Vector3d> directions_, supports_[2];
   Frame frame_;
-  double width_ = 0;    // of the patch along its normal, with all that is enclosed
+  double width_ = 0;    // what separates the patch along its normal
   double nearest_ = 0;  // how far beside a line triangles are looked at where it hits none
   std::vector<PlanePoint> flat_, hull_;
   std::vector<FlatVertex> flat_vertices_;

@@ -116,7 +116,9 @@ __device__ inline Pose stored_pose(const QueryArgs& args, std::uint32_t instance
 
 /// Whether the contact counts: where only the first is asked for, the first of its pair.
 __device__ inline bool is_wanted(const QueryArgs& args, std::uint32_t pair) {
-  return !args.first_contact_only || atomicExch(&args.met[pair], 1u) == 0;
+  if (!args.first_contact_only) return true;
+  // Looked at before it is written: many contacts of few pairs would queue up at them.
+  return *static_cast<volatile std::uint32_t*>(&args.met[pair]) == 0 && atomicExch(&args.met[pair], 1u) == 0;
 }
 
 #endif

@@ -24,7 +24,7 @@ using namespace simulation;
 struct SimulateArguments {
   std::string mesh, ground, scene, engine = "tandem";
   std::uint32_t count = 0;
-  double jitter = 0.001, tilt = 30, density = 1000, gravity = 9.81, slop = -1;
+  double jitter = 0.0005, tilt = 30, density = 1000, gravity = 9.81, slop = -1;
   std::uint64_t seed = 1;
   bool fast = false, json = false, cold = false;
   SimulatorOptions simulator;
@@ -388,7 +388,7 @@ CLI::App* add_simulate(CLI::App& app, Run& run_later) {
       ->add_option("--jitter", standing->jitter,
                    "how far boxes are moved along x and y at most, in box lengths")
       ->check(between(0, 0.1))
-      ->option_text("J [0.001]");
+      ->option_text("J [0.0005]");
 
   const auto [scene, any] = add("scene", "the bodies of a scene file", set_up_scene);
   scene->add_option("SCENE", any->scene, "scene file (HDF5)")->required()->check(file_name());

@@ -150,6 +150,7 @@ Joint make_joint(const ContactPoint& contact, std::span<const BodyState> states,
   joint.tangent[1] = make_row(contact.normal.cross(first), from_a, from_b, a, b);
   joint.normal = make_row(contact.normal, from_a, from_b, a, b);
   joint.target = approach > kBouncesAbove * step.gravity_speed ? options.restitution * approach : 0;
+  if (contact.depth < 0) joint.target = contact.depth / step.dt;
   joint.push = options.correction * std::max(0.0, contact.depth - options.slop) / step.dt;
   joint.push_impulse = 0;
   return joint;

@@ -17,6 +17,26 @@ Vector3d into_body(const BodyState& state, const Vector3d& point) {
   return state.orientation.conjugate() * (point - state.position);
 }
 
+Vector3d into_world(const BodyState& state, const Vector3d& point) {
+  return state.position + state.orientation * point;
+}
+
+// Where the bodies have carried a contact.
+ContactPoint moved_with_bodies(const CachedImpulse& entry, std::span<const BodyState> states) {
+  const BodyState &a = states[entry.body_a], &b = states[entry.body_b];
+  const Vector3d on_a = into_world(a, entry.in_a), on_b = into_world(b, entry.in_b);
+  const Vector3d normal = (a.orientation * entry.normal_in_a).normalized();
+  return {entry.body_a, entry.body_b, 0.5 * (on_a + on_b), normal, entry.depth - normal.dot(on_b - on_a),
+          entry.feature};
+}
+
+// How far the bodies have carried its two sides apart across the normal.
+double across(const CachedImpulse& entry, const ContactPoint& moved, std::span<const BodyState> states) {
+  const Vector3d apart =
+      into_world(states[entry.body_b], entry.in_b) - into_world(states[entry.body_a], entry.in_a);
+  return (apart - moved.normal.dot(apart) * moved.normal).norm();
+}
+
 // The contacts of one pair of bodies, old and new.
 class PairMatch {
  public:
@@ -99,6 +119,39 @@ std::vector<ContactImpulse> ImpulseCache::match(std::span<const ContactPoint> co
   return impulses;
 }
 
+std::vector<ContactPoint> ImpulseCache::with_those_just_lost(std::span<const ContactPoint> contacts,
+                                                             std::span<const BodyProperties> bodies,
+                                                             std::span<const BodyState> states,
+                                                             std::span<const std::uint8_t> idle,
+                                                             double gap) const {
+  constexpr double kNear = 0.02;  // of the smaller body's radius
+  std::vector<ContactPoint> all;
+  all.reserve(contacts.size() + entries_.size() / 8);
+  auto next = contacts.begin();
+  for (auto begin = entries_.begin(); begin != entries_.end();) {
+    const auto pair = pair_of(*begin);
+    const auto end =
+        std::find_if(begin, entries_.end(), [&](const auto& entry) { return pair_of(entry) != pair; });
+    while (next != contacts.end() && pair_of(*next) < pair) all.push_back(*next++);
+    const std::size_t first = all.size();
+    while (next != contacts.end() && pair_of(*next) == pair) all.push_back(*next++);
+    const std::size_t found_end = all.size();
+    if (!idle.empty() && idle[pair.first] && idle[pair.second]) begin = end;
+    const double near = kNear * std::min(bodies[pair.first].radius, bodies[pair.second].radius);
+    for (; begin != end; ++begin) {
+      const ContactPoint moved = moved_with_bodies(*begin, states);
+      const bool is_close = moved.depth < 0 && moved.depth >= -gap && across(*begin, moved, states) <= near;
+      const auto same = [&](const ContactPoint& one) {
+        return (one.position - moved.position).norm() <= near;
+      };
+      const auto found = std::span(all).subspan(first, found_end - first);
+      if (is_close && std::none_of(found.begin(), found.end(), same)) all.push_back(moved);
+    }
+  }
+  all.insert(all.end(), next, contacts.end());
+  return all;
+}
+
 void ImpulseCache::remember(std::span<const ContactPoint> contacts, std::span<const ContactImpulse> impulses,
                             std::span<const BodyState> states, std::span<const std::uint8_t> idle) {
   std::vector<CachedImpulse> kept, fresh;
@@ -108,9 +161,10 @@ void ImpulseCache::remember(std::span<const ContactPoint> contacts, std::span<co
   fresh.reserve(contacts.size());
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     const ContactPoint& contact = contacts[i];
-    fresh.push_back({contact.body_a, contact.body_b, contact.feature,
-                     into_body(states[contact.body_a], contact.position),
-                     into_body(states[contact.body_b], contact.position), impulses[i]});
+    fresh.push_back(
+        {contact.body_a, contact.body_b, contact.feature, into_body(states[contact.body_a], contact.position),
+         into_body(states[contact.body_b], contact.position),
+         states[contact.body_a].orientation.conjugate() * contact.normal, contact.depth, impulses[i]});
   }
   const auto by_pair = [](const auto& x, const auto& y) { return pair_of(x) < pair_of(y); };
   entries_.resize(kept.size() + fresh.size());

@@ -19,7 +19,9 @@ struct ContactImpulse {
 struct CachedImpulse {
   std::uint32_t body_a, body_b;
   std::uint64_t feature;
-  Eigen::Vector3d in_a, in_b;  ///< the position, in the bodies' frames about their centres of mass
+  Eigen::Vector3d in_a, in_b;   ///< the position, in the bodies' frames about their centres of mass
+  Eigen::Vector3d normal_in_a;  ///< the normal, likewise
+  double depth;
   ContactImpulse impulse;
 };
 
@@ -34,6 +36,16 @@ class ImpulseCache {
   std::vector<ContactImpulse> match(std::span<const ContactPoint> contacts,
                                     std::span<const BodyProperties> bodies,
                                     std::span<const BodyState> states) const;
+
+  /// The contacts, and with them those of the last step that are not among them because their bodies have
+  /// come apart a little since: by no more than `gap` along the normal and a fiftieth of the smaller body's
+  /// radius across it, and no contact of the pair is that near. Their depth is negative. Without them a body
+  /// that is lifted off by a hair falls freely for a whole step, and deeper than it was. By ascending pair.
+  /// Pairs of two idle bodies are left out. Conditions as for match() and remember(); gap >= 0.
+  std::vector<ContactPoint> with_those_just_lost(std::span<const ContactPoint> contacts,
+                                                 std::span<const BodyProperties> bodies,
+                                                 std::span<const BodyState> states,
+                                                 std::span<const std::uint8_t> idle, double gap) const;
 
   /// Forgets all but the pairs of two idle bodies, which no engine looks at, and remembers these contacts.
   /// Condition: idle is empty or has an entry for each body.

@@ -163,7 +163,8 @@ Trajectory read_trajectory(const Hdf5Input& file, const std::string& path, std::
 }
 
 void write_state(Hdf5Output& file, const SimulatorState& state) {
-  std::vector<double> position, orientation, velocity, spin, in_a, in_b, normal, tangential;
+  std::vector<double> position, orientation, velocity, spin, in_a, in_b, normal_in_a, depth, normal,
+      tangential;
   for (const BodyState& body : state.states) {
     append(position, body.position), append(orientation, body.orientation);
     append(velocity, body.velocity), append(spin, body.angular_velocity);
@@ -173,7 +174,8 @@ void write_state(Hdf5Output& file, const SimulatorState& state) {
   for (const CachedImpulse& entry : state.impulses) {
     pair.insert(pair.end(), {entry.body_a, entry.body_b});
     feature.push_back(entry.feature);
-    append(in_a, entry.in_a), append(in_b, entry.in_b);
+    append(in_a, entry.in_a), append(in_b, entry.in_b), append(normal_in_a, entry.normal_in_a);
+    depth.push_back(entry.depth);
     normal.push_back(entry.impulse.normal), append(tangential, entry.impulse.tangential);
   }
   const std::size_t bodies = state.states.size(), impulses = state.impulses.size();
@@ -189,19 +191,25 @@ void write_state(Hdf5Output& file, const SimulatorState& state) {
   file.add("/state/impulses/feature", {impulses}, feature);
   file.add("/state/impulses/in_a", {impulses, 3}, in_a);
   file.add("/state/impulses/in_b", {impulses, 3}, in_b);
+  file.add("/state/impulses/normal_in_a", {impulses, 3}, normal_in_a);
+  file.add("/state/impulses/depth", {impulses}, depth);
   file.add("/state/impulses/normal", {impulses}, normal);
   file.add("/state/impulses/tangential", {impulses, 3}, tangential);
 }
 
-std::vector<CachedImpulse> read_impulses(const Hdf5Input& file) {
+std::vector<CachedImpulse> read_impulses(const Hdf5Input& file, const std::string& path) {
   const auto pair = file.read_u32("/state/impulses/pair", {2});
   const auto feature = file.read_u64("/state/impulses/feature");
-  const auto in_a = file.read_f64("/state/impulses/in_a", {3}),
-             in_b = file.read_f64("/state/impulses/in_b", {3});
-  const auto normal = file.read_f64("/state/impulses/normal");
+  const auto in_a = file.read_f64("/state/impulses/in_a", {3});
+  const auto in_b = file.read_f64("/state/impulses/in_b", {3});
+  const auto normal_in_a = file.read_f64("/state/impulses/normal_in_a", {3});
+  const auto depth = file.read_f64("/state/impulses/depth"), normal = file.read_f64("/state/impulses/normal");
   const auto tangential = file.read_f64("/state/impulses/tangential", {3});
-  const std::size_t count = std::min({pair.size() / 2, feature.size(), in_a.size() / 3, in_b.size() / 3,
-                                      normal.size(), tangential.size() / 3});
+  const std::size_t count = feature.size();
+  for (const std::size_t rows : {pair.size() / 2, in_a.size() / 3, in_b.size() / 3, normal_in_a.size() / 3,
+                                 depth.size(), normal.size(), tangential.size() / 3}) {
+    if (rows != count) throw FileError(path + ": /state/impulses: datasets of different lengths");
+  }
   std::vector<CachedImpulse> impulses;
   for (std::size_t i = 0; i < count; ++i) {
     impulses.push_back({pair[2 * i],
@@ -209,6 +217,8 @@ std::vector<CachedImpulse> read_impulses(const Hdf5Input& file) {
                         feature[i],
                         vector_at(in_a, i),
                         vector_at(in_b, i),
+                        vector_at(normal_in_a, i),
+                        depth[i],
                         {normal[i], vector_at(tangential, i)}});
   }
   return impulses;
@@ -223,7 +233,7 @@ SimulatorState read_state(const Hdf5Input& file, const std::string& path, std::s
   SimulatorState state;
   state.quiet = file.read_f64("/state/quiet_seconds");
   state.groups = file.read_u32("/state/sleeping_group");
-  state.impulses = read_impulses(file);
+  state.impulses = read_impulses(file, path);
   const bool fits = step.size() == 1 && position.size() == 3 * bodies && orientation.size() == 4 * bodies &&
                     velocity.size() == 3 * bodies && spin.size() == 3 * bodies &&
                     state.quiet.size() == bodies && state.groups.size() == bodies;

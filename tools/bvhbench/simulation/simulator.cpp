@@ -64,21 +64,24 @@ StepRecord Simulator::step_in_arena() {
 }
 
 void Simulator::find_contacts(StepRecord& record) {
-  contacts_ = &finder_->find(poses(), idle());
+  constexpr double kFall = 2;  // times what gravity lets a body fall in a step
+  const std::vector<ContactPoint>& found = finder_->find(poses(), idle());
   take(record, finder_->report());
-  record.contacts = contacts_->size();
-  for (const ContactPoint& contact : *contacts_) {
+  record.contacts = found.size();
+  for (const ContactPoint& contact : found) {
     record.penetration_max = std::max(record.penetration_max, contact.depth);
-    record.penetration_mean += contact.depth / static_cast<double>(contacts_->size());
+    record.penetration_mean += contact.depth / static_cast<double>(found.size());
   }
+  const double gap = kFall * options_.gravity.norm() * options_.dt * options_.dt;
+  contacts_ = cache_.with_those_just_lost(found, bodies_, states_, idle(), gap);
 }
 
 void Simulator::solve(StepRecord& record) {
-  islands_ = find_islands(acting_, *contacts_);
-  std::vector<ContactImpulse> impulses(contacts_->size());
-  if (options_.solver.warm_start) impulses = cache_.match(*contacts_, bodies_, states_);
+  islands_ = find_islands(acting_, contacts_);
+  std::vector<ContactImpulse> impulses(contacts_.size());
+  if (options_.solver.warm_start) impulses = cache_.match(contacts_, bodies_, states_);
   const double dt = options_.dt / options_.substeps;
-  FollowedContacts followed(*contacts_, states_);
+  FollowedContacts followed(contacts_, states_);
   for (std::uint32_t i = 0; i < options_.substeps; ++i) {
     if (i > 0) followed.follow(states_);
     for (std::size_t body = 0; body < states_.size(); ++body) {
@@ -88,6 +91,7 @@ void Simulator::solve(StepRecord& record) {
                   {dt, dt * options_.gravity.norm(), step_ * options_.substeps + i});
     move(dt);
   }
+  followed.follow(states_);
   cache_.remember(followed.contacts(), impulses, states_, idle());
   record.residual_max = solver_.statistics().residual;
   record.residual_rms = solver_.statistics().residual_rms;
@@ -103,7 +107,7 @@ void Simulator::move(double dt) {
 
 void Simulator::sleep() {
   if (!options_.sleep.enabled) return;
-  sleep_.wake_touched(acting_, *contacts_);
+  sleep_.wake_touched(acting_, contacts_);
   sleep_.fall_asleep(bodies_, states_, islands_, options_.sleep, options_.dt);
   for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
     acting_[i].motion = sleep_.sleeps(i) ? Motion::fixed : bodies_[i].motion;

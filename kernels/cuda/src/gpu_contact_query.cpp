@@ -222,8 +222,8 @@ Status GpuContactQuery::enqueue(const GpuInstances& instances, const GpuPairs& p
   args.contacts = options.sorted ? unsorted_ : contacts_;
   args.undecided = static_cast<gpu::Candidate*>(undecided_);
   args.unresolved = args.undecided + capacity_.undecided;
-  args.most_blocks = options.most_blocks;
-  args.stack_reserve = 15 * (depth_ - 1) + 64;  // 64: what candidates take meanwhile
+  args.most_blocks = std::min(options.most_blocks, gpu::kChunks);  // a grid never has as many
+  args.stack_reserve = 15 * (depth_ - 1) + 64;                     // 64: what candidates take meanwhile
   args.stack_size = args.stack_reserve + kStackSize;
   cudaError_t error = cudaMemsetAsync(args.state, 0, sizeof(gpu::QueryState), stream);
   if (error == cudaSuccess) error = gpu::prepare_pairs(args, stream);

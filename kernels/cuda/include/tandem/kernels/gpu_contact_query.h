@@ -76,8 +76,9 @@ class GpuContactQuery {
 
   /// Queues a query behind what `stream` holds; may be captured into a graph. The arrays must stay until it
   /// is done. A pair of an instance with itself asks for the contacts within it. Result: kOk, kOutOfRange
-  /// (sorted, and reserved without), kCudaFailed; what the GPU finds wrong is in the report. Condition:
-  /// set_assets() and reserve().
+  /// (sorted, and reserved without), kCudaFailed, or, where CUDA loads a kernel at its first launch and the
+  /// GPU is full, kOutOfGpuMemory; what the GPU finds wrong is in the report. Condition: set_assets() and
+  /// reserve().
   Status enqueue(const GpuInstances& instances, const GpuPairs& pairs, const GpuQueryOptions& options,
                  cudaStream_t stream);
 

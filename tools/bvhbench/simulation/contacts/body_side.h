@@ -44,6 +44,7 @@ class BodySide {
   /// The slot of a triangle among those asked for.
   std::uint32_t triangle(std::uint32_t index);
   const WorldTriangle& at(std::uint32_t slot) const { return triangles_[slot]; }
+  std::span<const WorldTriangle> triangles() const { return triangles_; }
 
   /// An edge that pierces the other's surface, `at` between its lower and upper vertex.
   void add_piercing(std::uint32_t edge, double at, bool lower_inside, std::uint32_t curve);

@@ -1,10 +1,10 @@
 #include "engine_parts.h"
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
+#include <bit>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "tandem/formats/status.h"
 
@@ -18,27 +18,39 @@ void keep_active(std::span<const ObjectPair> pairs, std::span<const std::uint8_t
   }
 }
 
-void sort_contacts(std::size_t pairs, std::vector<TriangleContact>& contacts) {
-  std::vector<std::size_t> begin(pairs + 1, 0);
-  for (const TriangleContact& contact : contacts) ++begin[contact.pair + 1];
-  for (std::size_t i = 0; i < pairs; ++i) begin[i + 1] += begin[i];
-  const auto by_pair = [](const TriangleContact& x, const TriangleContact& y) { return x.pair < y.pair; };
-  if (!std::is_sorted(contacts.begin(), contacts.end(), by_pair)) {
-    std::vector<TriangleContact> placed(contacts.size());
-    std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
-    for (const TriangleContact& contact : contacts) placed[next[contact.pair]++] = contact;
-    contacts.swap(placed);
+// By digits of the three numbers, packed as tightly as they allow: with 1,000 cows in half the time, or less,
+// that sorting each body pair's by comparison takes.
+void sort_contacts(std::vector<TriangleContact>& contacts) {
+  TriangleContact largest = {0, 0, 0};
+  for (const TriangleContact& c : contacts) {
+    largest = {largest.pair | c.pair, largest.triangle_a | c.triangle_a, largest.triangle_b | c.triangle_b};
   }
-  const auto by_triangles = [](const TriangleContact& x, const TriangleContact& y) {
-    const auto key = [](const TriangleContact& c) {
-      return std::uint64_t{c.triangle_a} << 32 | c.triangle_b;
-    };
-    return key(x) < key(y);
+  const int bits_b = std::bit_width(largest.triangle_b), bits_a = std::bit_width(largest.triangle_a);
+  const int bits = bits_b + bits_a + std::bit_width(largest.pair);
+  if (bits > 64) return std::sort(contacts.begin(), contacts.end());
+  std::vector<std::uint64_t> keys(contacts.size()), sorted(contacts.size());
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const TriangleContact& c = contacts[i];
+    keys[i] = (std::uint64_t{c.pair} << bits_a | c.triangle_a) << bits_b | c.triangle_b;
+  }
+  constexpr int kDigit = 11;
+  for (int shift = 0; shift < bits; shift += kDigit) {
+    const auto digit = [&](std::uint64_t key) { return key >> shift & ((1u << kDigit) - 1); };
+    std::size_t next[1 << kDigit] = {};
+    for (const std::uint64_t key : keys) ++next[digit(key)];
+    std::size_t begin = 0;
+    for (std::size_t& place : next) place = std::exchange(begin, begin + place);
+    for (const std::uint64_t key : keys) sorted[next[digit(key)]++] = key;
+    keys.swap(sorted);
+  }
+  const auto low = [](std::uint64_t key, int count) {
+    return static_cast<std::uint32_t>(key & ((std::uint64_t{1} << count) - 1));
   };
-  oneapi::tbb::parallel_for(std::size_t{0}, pairs, [&](std::size_t i) {
-    std::sort(contacts.begin() + static_cast<std::ptrdiff_t>(begin[i]),
-              contacts.begin() + static_cast<std::ptrdiff_t>(begin[i + 1]), by_triangles);
-  });
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const std::uint64_t key = keys[i];
+    contacts[i] = {static_cast<std::uint32_t>(key >> bits_b >> bits_a), low(key >> bits_b, bits_a),
+                   low(key, bits_b)};
+  }
 }
 
 void require(std::string_view engine, Status status, std::uint64_t where) {

@@ -27,8 +27,8 @@ class Stopwatch {
 void keep_active(std::span<const ObjectPair> pairs, std::span<const std::uint8_t> idle,
                  std::vector<ObjectPair>& kept);
 
-/// Brings triangle contacts, in any order, into that of a ContactList with so many pairs.
-void sort_contacts(std::size_t pairs, std::vector<TriangleContact>& contacts);
+/// Brings triangle contacts, in any order, into that of a ContactList.
+void sort_contacts(std::vector<TriangleContact>& contacts);
 
 /// Throws what a status other than kOk calls for. `where`: the body to blame, where there is one.
 void require(std::string_view engine, Status status, std::uint64_t where);

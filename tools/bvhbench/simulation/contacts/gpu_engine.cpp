@@ -195,7 +195,7 @@ class GpuEngine final : public CollisionEngine {
       const Contact& c = contacts_.host()[i];
       found.triangles[i] = {c.pair, c.triangle_a, c.triangle_b};
     }
-    sort_contacts(found.pairs.size(), found.triangles);
+    sort_contacts(found.triangles);
   }
 
   std::string name_;

@@ -74,7 +74,7 @@ Vector3d PatchNormal::face_nearest(const PatchRegion& region, const Vector3d& sm
   const auto flat = [&] { return std::max(own[0], own[1]) <= kMostDirections; };
   const auto accept = [&](std::uint32_t curve) { return flat() && region.in_patch(curve); };
   region.for_each_cut_triangle(accept, [&](int side, const WorldTriangle& t) {
-    own[side] += add_direction(side == 0 ? t.normal : Vector3d(-t.normal));
+    if (flat()) own[side] += add_direction(side == 0 ? t.normal : Vector3d(-t.normal));
   });
   if (!flat()) return smooth;
   Vector3d best = smooth;

@@ -25,6 +25,12 @@ struct PatchRegion {
   /// more than once.
   template <typename Accept, typename Visit>
   void for_each_cut_triangle(const Accept& accept, const Visit& visit) const {
+    if (curves->curves().size() == 1) {  // as mostly: then all that are posed, each once
+      for (int s = 0; s < 2 && accept(0); ++s) {
+        for (const WorldTriangle& triangle : side[s]->triangles()) visit(s, triangle);
+      }
+      return;
+    }
     std::uint32_t last[2] = {kNoIndex, kNoIndex};
     for (const CurvePiece& piece : curves->pieces()) {
       if (!accept(piece.curve)) continue;

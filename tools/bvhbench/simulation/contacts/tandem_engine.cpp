@@ -28,7 +28,7 @@ class TandemEngine final : public CollisionEngine {
     found.triangles.clear();
     for (const Contact& c : query_.contacts())
       found.triangles.push_back({c.pair, c.triangle_a, c.triangle_b});
-    sort_contacts(found.pairs.size(), found.triangles);
+    sort_contacts(found.triangles);
     times_.transfer = watch.lap();
     counters_ = query_.counters();
   }

@@ -180,7 +180,7 @@ void ContactPatches::choose_points(std::size_t most) {
     const double height = depth > 0 ? (s.surface[0] + s.surface[1]) / 2 : s.height;
     return Chosen{s.at, height, depth, s.feature, s.inner};
   };
-  Chosen inner = {};
+  Chosen inner = {Vector2d::Zero(), 0, 0, 0, true};
   double of_rim = 0;
   for (const Sounding& s : depth_.soundings) {
     const Chosen c = chosen(s);

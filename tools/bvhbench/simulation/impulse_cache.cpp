@@ -119,56 +119,57 @@ std::vector<ContactImpulse> ImpulseCache::match(std::span<const ContactPoint> co
   return impulses;
 }
 
-std::vector<ContactPoint> ImpulseCache::with_those_just_lost(std::span<const ContactPoint> contacts,
-                                                             std::span<const BodyProperties> bodies,
-                                                             std::span<const BodyState> states,
-                                                             std::span<const std::uint8_t> idle,
-                                                             double gap) const {
+KeptContacts ImpulseCache::with_those_just_lost(std::span<const ContactPoint> contacts,
+                                                std::span<const BodyProperties> bodies,
+                                                std::span<const BodyState> states,
+                                                std::span<const std::uint8_t> idle, double gap) const {
   constexpr double kNear = 0.02;  // of the smaller body's radius
-  std::vector<ContactPoint> all;
-  all.reserve(contacts.size() + entries_.size() / 8);
+  KeptContacts all;
   auto next = contacts.begin();
-  for (auto begin = entries_.begin(); begin != entries_.end();) {
-    const auto pair = pair_of(*begin);
-    const auto end =
-        std::find_if(begin, entries_.end(), [&](const auto& entry) { return pair_of(entry) != pair; });
-    while (next != contacts.end() && pair_of(*next) < pair) all.push_back(*next++);
-    const std::size_t first = all.size();
-    while (next != contacts.end() && pair_of(*next) == pair) all.push_back(*next++);
-    const std::size_t found_end = all.size();
-    if (!idle.empty() && idle[pair.first] && idle[pair.second]) begin = end;
+  for (std::size_t begin = 0, end = 0; begin < entries_.size(); begin = end) {
+    const auto pair = pair_of(entries_[begin]);
+    while (end < entries_.size() && pair_of(entries_[end]) == pair) ++end;
+    while (next != contacts.end() && pair_of(*next) < pair) all.add(*next++, KeptContacts::kFound);
+    const std::size_t first = all.contacts.size();
+    while (next != contacts.end() && pair_of(*next) == pair) all.add(*next++, KeptContacts::kFound);
+    if (!idle.empty() && idle[pair.first] && idle[pair.second]) continue;
     const double near = kNear * std::min(bodies[pair.first].radius, bodies[pair.second].radius);
-    for (; begin != end; ++begin) {
-      const ContactPoint moved = moved_with_bodies(*begin, states);
-      const bool is_close = moved.depth < 0 && moved.depth >= -gap && across(*begin, moved, states) <= near;
-      const auto same = [&](const ContactPoint& one) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const ContactPoint moved = moved_with_bodies(entries_[i], states);
+      if (moved.depth >= 0 || moved.depth < -gap || across(entries_[i], moved, states) > near) continue;
+      const auto is_near = [&](const ContactPoint& one) {
         return (one.position - moved.position).norm() <= near;
       };
-      const auto found = std::span(all).subspan(first, found_end - first);
-      if (is_close && std::none_of(found.begin(), found.end(), same)) all.push_back(moved);
+      const auto others = std::span(all.contacts).subspan(first);
+      if (std::none_of(others.begin(), others.end(), is_near)) all.add(moved, static_cast<std::uint32_t>(i));
     }
   }
-  all.insert(all.end(), next, contacts.end());
+  while (next != contacts.end()) all.add(*next++, KeptContacts::kFound);
   return all;
 }
 
-void ImpulseCache::remember(std::span<const ContactPoint> contacts, std::span<const ContactImpulse> impulses,
+void ImpulseCache::remember(const KeptContacts& kept, std::span<const ContactImpulse> impulses,
                             std::span<const BodyState> states, std::span<const std::uint8_t> idle) {
-  std::vector<CachedImpulse> kept, fresh;
+  std::vector<CachedImpulse> asleep, fresh;
   for (const CachedImpulse& entry : entries_) {
-    if (!idle.empty() && idle[entry.body_a] && idle[entry.body_b]) kept.push_back(entry);
+    if (!idle.empty() && idle[entry.body_a] && idle[entry.body_b]) asleep.push_back(entry);
   }
-  fresh.reserve(contacts.size());
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    const ContactPoint& contact = contacts[i];
-    fresh.push_back(
-        {contact.body_a, contact.body_b, contact.feature, into_body(states[contact.body_a], contact.position),
-         into_body(states[contact.body_b], contact.position),
-         states[contact.body_a].orientation.conjugate() * contact.normal, contact.depth, impulses[i]});
+  fresh.reserve(kept.contacts.size());
+  for (std::size_t i = 0; i < kept.contacts.size(); ++i) {
+    if (kept.entry[i] != KeptContacts::kFound) {
+      fresh.push_back(entries_[kept.entry[i]]);
+      fresh.back().impulse = impulses[i];
+      continue;
+    }
+    const ContactPoint& contact = kept.contacts[i];
+    const BodyState &a = states[contact.body_a], &b = states[contact.body_b];
+    fresh.push_back({contact.body_a, contact.body_b, contact.feature, into_body(a, contact.position),
+                     into_body(b, contact.position), a.orientation.conjugate() * contact.normal,
+                     contact.depth, impulses[i]});
   }
   const auto by_pair = [](const auto& x, const auto& y) { return pair_of(x) < pair_of(y); };
-  entries_.resize(kept.size() + fresh.size());
-  std::merge(kept.begin(), kept.end(), fresh.begin(), fresh.end(), entries_.begin(), by_pair);
+  entries_.resize(asleep.size() + fresh.size());
+  std::merge(asleep.begin(), asleep.end(), fresh.begin(), fresh.end(), entries_.begin(), by_pair);
 }
 
 }  // namespace tandem::simulation

@@ -25,6 +25,19 @@ struct CachedImpulse {
   ContactImpulse impulse;
 };
 
+/// Contacts of a step: those found, and those that are kept although they were not.
+struct KeptContacts {
+  static constexpr std::uint32_t kFound = 0xFFFFFFFFu;
+
+  std::vector<ContactPoint> contacts;
+  std::vector<std::uint32_t> entry;  ///< of each: kFound, or its place in ImpulseCache::entries()
+
+  void add(const ContactPoint& contact, std::uint32_t its_entry) {
+    contacts.push_back(contact);
+    entry.push_back(its_entry);
+  }
+};
+
 /// Remembers impulses from step to step, so that a solver starts where it stopped.
 class ImpulseCache {
  public:
@@ -37,19 +50,21 @@ class ImpulseCache {
                                     std::span<const BodyProperties> bodies,
                                     std::span<const BodyState> states) const;
 
-  /// The contacts, and with them those of the last step that are not among them because their bodies have
-  /// come apart a little since: by no more than `gap` along the normal and a fiftieth of the smaller body's
-  /// radius across it, and no contact of the pair is that near. Their depth is negative. Without them a body
-  /// that is lifted off by a hair falls freely for a whole step, and deeper than it was. By ascending pair.
-  /// Pairs of two idle bodies are left out. Conditions as for match() and remember(); gap >= 0.
-  std::vector<ContactPoint> with_those_just_lost(std::span<const ContactPoint> contacts,
-                                                 std::span<const BodyProperties> bodies,
-                                                 std::span<const BodyState> states,
-                                                 std::span<const std::uint8_t> idle, double gap) const;
+  /// The contacts, and with them those remembered that are not among them because their bodies have come
+  /// apart a little since they were found: by no more than `gap` along the normal and a fiftieth of the
+  /// smaller body's radius across it, and no other contact of the pair is that near. Their depth is negative.
+  /// Without them a body that is lifted off by a hair falls freely for a whole step, and deeper than it was.
+  /// By ascending pair. Pairs of two idle bodies are left out. Conditions as for match() and remember(); gap
+  /// >= 0.
+  KeptContacts with_those_just_lost(std::span<const ContactPoint> contacts,
+                                    std::span<const BodyProperties> bodies, std::span<const BodyState> states,
+                                    std::span<const std::uint8_t> idle, double gap) const;
 
-  /// Forgets all but the pairs of two idle bodies, which no engine looks at, and remembers these contacts.
-  /// Condition: idle is empty or has an entry for each body.
-  void remember(std::span<const ContactPoint> contacts, std::span<const ContactImpulse> impulses,
+  /// Forgets all but the pairs of two idle bodies, which no engine looks at, and remembers these contacts;
+  /// where they have an entry, that of the contact when it was found.
+  /// Conditions: kept is what with_those_just_lost() gave, its contacts moved with the bodies since; idle is
+  /// empty or has an entry for each body.
+  void remember(const KeptContacts& kept, std::span<const ContactImpulse> impulses,
                 std::span<const BodyState> states, std::span<const std::uint8_t> idle);
 
   std::span<const CachedImpulse> entries() const { return entries_; }

@@ -73,15 +73,15 @@ void Simulator::find_contacts(StepRecord& record) {
     record.penetration_mean += contact.depth / static_cast<double>(found.size());
   }
   const double gap = kFall * options_.gravity.norm() * options_.dt * options_.dt;
-  contacts_ = cache_.with_those_just_lost(found, bodies_, states_, idle(), gap);
+  kept_ = cache_.with_those_just_lost(found, bodies_, states_, idle(), gap);
 }
 
 void Simulator::solve(StepRecord& record) {
-  islands_ = find_islands(acting_, contacts_);
-  std::vector<ContactImpulse> impulses(contacts_.size());
-  if (options_.solver.warm_start) impulses = cache_.match(contacts_, bodies_, states_);
+  islands_ = find_islands(acting_, kept_.contacts);
+  std::vector<ContactImpulse> impulses(kept_.contacts.size());
+  if (options_.solver.warm_start) impulses = cache_.match(kept_.contacts, bodies_, states_);
   const double dt = options_.dt / options_.substeps;
-  FollowedContacts followed(contacts_, states_);
+  FollowedContacts followed(kept_.contacts, states_);
   for (std::uint32_t i = 0; i < options_.substeps; ++i) {
     if (i > 0) followed.follow(states_);
     for (std::size_t body = 0; body < states_.size(); ++body) {
@@ -92,7 +92,8 @@ void Simulator::solve(StepRecord& record) {
     move(dt);
   }
   followed.follow(states_);
-  cache_.remember(followed.contacts(), impulses, states_, idle());
+  kept_.contacts = followed.contacts();
+  cache_.remember(kept_, impulses, states_, idle());
   record.residual_max = solver_.statistics().residual;
   record.residual_rms = solver_.statistics().residual_rms;
   record.islands = solver_.statistics().islands;
@@ -107,7 +108,7 @@ void Simulator::move(double dt) {
 
 void Simulator::sleep() {
   if (!options_.sleep.enabled) return;
-  sleep_.wake_touched(acting_, contacts_);
+  sleep_.wake_touched(acting_, kept_.contacts);
   sleep_.fall_asleep(bodies_, states_, islands_, options_.sleep, options_.dt);
   for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
     acting_[i].motion = sleep_.sleeps(i) ? Motion::fixed : bodies_[i].motion;

@@ -69,7 +69,7 @@ class Simulator {
   std::unique_ptr<ContactFinder> finder_;
   SimulatorOptions options_;
   tbb::task_arena arena_;
-  std::vector<ContactPoint> contacts_;  // of the step under way
+  KeptContacts kept_;  // of the step under way
   Islands islands_;
   ContactSolver solver_;
   ImpulseCache cache_;

@@ -432,6 +432,31 @@ TEST(ContactGeneration, PushesLeadOutOfOverlaps) {
   EXPECT_GT(seen, 100);
 }
 
+// Soups of flat, coincident, huge and tiny triangles make no sense as bodies, and no harm either.
+class HostileScene : public testing::TestWithParam<SceneFamily> {};
+
+TEST_P(HostileScene, GivesUnitNormalsAndFiniteDepths) {
+  RandomPoses random(12);
+  for (int trial = 0; trial < trials(10, 20); ++trial) {
+    const Scene scene = GetParam().make(random);
+    const auto engine = simulation::make_engine("tandem");
+    engine->set_shapes(scene.assets.views());
+    simulation::ContactList found;
+    engine->find(scene.instances, {}, found);
+    simulation::ContactGenerator generator;
+    generator.set_shapes(scene.assets.views());
+    for (const ContactPoint& p : generator.generate(found, scene.instances)) {
+      ASSERT_TRUE(p.position.allFinite());
+      ASSERT_NEAR(p.normal.norm(), 1, 1e-9);
+      ASSERT_TRUE(p.depth >= 0 && std::isfinite(p.depth)) << p.depth;
+    }
+    EXPECT_LE(generator.statistics().segments, found.triangles.size());
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, HostileScene, testing::ValuesIn(scene_families()),
+                         [](const auto& tested) { return std::string(tested.param.name); });
+
 TEST(ContactGeneration, ThreadsDoNotChangeAByte) {
   ContactScene scene;
   RandomPoses random(7);

@@ -48,7 +48,7 @@ std::uint32_t BodySide::triangle(std::uint32_t index) {
   }
   const Vector3d normal = (out.corner[1] - out.corner[0]).cross(out.corner[2] - out.corner[0]);
   const double length = normal.norm();
-  const double scale = length > 0 ? (shape_->surface.turned[index] != 0 ? -1 : 1) / length : 0;
+  const double scale = length > 1e-290 ? (shape_->surface.turned[index] != 0 ? -1 : 1) / length : 0;
   out.normal = scale * normal;
   return slot;
 }

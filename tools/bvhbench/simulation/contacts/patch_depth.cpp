@@ -33,7 +33,8 @@ double nearest_point(const Vector2d* corner, Vector2d& x) {
     const Vector2d side = corner[(k + 1) % 3] - corner[k], to = from - corner[k];
     if (side.x() * to.y() - side.y() * to.x() >= 0) continue;
     outside = true;
-    const Vector2d at = corner[k] + std::clamp(side.dot(to) / side.squaredNorm(), 0.0, 1.0) * side;
+    const Vector2d at =
+        corner[k] + std::clamp(side.dot(to) / std::max(side.squaredNorm(), 1e-300), 0.0, 1.0) * side;
     const double distance = (at - from).norm();
     if (distance < least) least = distance, x = at;
   }

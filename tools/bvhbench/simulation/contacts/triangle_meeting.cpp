@@ -132,12 +132,13 @@ void meet_in_plane(const WorldTriangle& a, const WorldTriangle& b, double tolera
 }  // namespace
 
 void meet(const WorldTriangle& a, const WorldTriangle& b, double tolerance, Meeting& meeting) {
-  const Heights of_a(a, b, tolerance), of_b(b, a, tolerance);
   meeting.kind = Meeting::Kind::none;
   meeting.degenerate = meeting.facing = false;
   meeting.corners = meeting.piercings = 0;
   meeting.feature[0] = meeting.feature[1] = {};
   meeting.weight = 1;
+  if (a.normal.isZero(0) || b.normal.isZero(0)) return;  // flat: neighbours have its sides
+  const Heights of_a(a, b, tolerance), of_b(b, a, tolerance);
   if (of_a.beside() || of_b.beside()) return;
   if (of_a.zeros == 3 || of_b.zeros == 3) return meet_in_plane(a, b, tolerance, meeting);
   Vector3d line = a.normal.cross(b.normal);

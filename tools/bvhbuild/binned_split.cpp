@@ -47,14 +47,14 @@ std::uint32_t nearest_legal(std::uint32_t wanted, std::uint32_t n,
 }
 
 // The cheapest split of one axis between two bins. The few triangles between a bin's edge and the nearest
-// legal split hardly change the surfaces, so those of the bins stand for them.
+// legal split hardly change the costs, so those of the bins stand for them.
 Split best_of(int axis, const std::array<Bin, kBins>& bins, std::uint32_t n,
               const TriangleSplitter::IsLegal& is_legal) {
-  float right_surface[kBins];
+  float right_each[kBins];
   Bounds right;
   for (int b = kBins - 1; b > 0; --b) {
     right.grow(bins[b].bounds);
-    right_surface[b] = right.surface();
+    right_each[b] = right.visit_cost();
   }
   Split best;
   best.axis = axis;
@@ -66,9 +66,9 @@ Split best_of(int axis, const std::array<Bin, kBins>& bins, std::uint32_t n,
     count += bins[b - 1].count;
     if (count == 0 || count == n) continue;
     const std::uint32_t split = nearest_legal(count, n, is_legal);
-    const float surface_cost =
-        left.surface() * static_cast<float>(split) + right_surface[b] * static_cast<float>(n - split);
-    const float cost = surface_cost * penalty.factor(split);
+    const float total =
+        left.visit_cost() * static_cast<float>(split) + right_each[b] * static_cast<float>(n - split);
+    const float cost = total * penalty.factor(split);
     if (split != 0 && cost < best.cost) {
       best.cost = cost;
       best.left = split;

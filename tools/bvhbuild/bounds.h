@@ -1,5 +1,6 @@
 #pragma once
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace tandem::build {
@@ -17,12 +18,16 @@ struct alignas(16) Bounds {
     }
   }
 
-  /// What the surface-area heuristic weighs: half the surface, plus a trace of the edge lengths and a
-  /// constant, so that flat, thin and point-like sets are still told apart and no cost is zero. Condition:
-  /// coordinates are scaled to about 1 (see Normalization in splitter.cpp).
-  float surface() const {
+  /// What a block over these bounds costs in tandem queries: its surface to the power 3/4. Visits grow more
+  /// slowly than surfaces, since a block meets others of its own size; of the powers tried this one led to
+  /// the fewest block pairs (docs/decisions.md). A trace of the edge lengths and a constant are added to the
+  /// surface, so that flat, thin and point-like sets are still told apart and no cost is zero. Made of square
+  /// roots, which every machine rounds alike. Condition: coordinates are scaled to about 1
+  /// (normalized_bounds()).
+  float visit_cost() const {
     const float x = hi[0] - lo[0], y = hi[1] - lo[1], z = hi[2] - lo[2];
-    return x * y + (y + x) * z + 1e-6f * (x + y + z) + 1e-20f;
+    const float surface = x * y + (y + x) * z + 1e-6f * (x + y + z) + 1e-20f;
+    return std::sqrt(surface * std::sqrt(surface));
   }
 
  private:

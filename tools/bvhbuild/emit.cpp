@@ -1,13 +1,54 @@
 #include "emit.h"
 
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
+
 #include <algorithm>
-#include <bit>
 
 #include "tandem/formats/box.h"
 
 namespace tandem::build {
-
 namespace {
+
+// Where a block of the topology comes to lie, and its children.
+struct Place {
+  std::uint32_t block;           // of the topology
+  std::uint32_t first_triangle;  // of a leaf block: where its triangles start in the file
+  std::uint32_t child[kNodesPerBlock];
+};
+
+// All blocks, each after its parent, those below a node before those below the next one.
+class DepthFirst {
+ public:
+  explicit DepthFirst(const Topology& topology) : topology_(topology) {
+    places_.reserve(topology.size());
+    number(0, 1);
+  }
+
+  std::vector<Place> take() { return std::move(places_); }
+  std::uint32_t depth() const { return depth_; }
+
+ private:
+  std::uint32_t number(std::uint32_t block, std::uint32_t depth) {
+    const auto self = static_cast<std::uint32_t>(places_.size());
+    const TopologyBlock& from = topology_[block];
+    places_.push_back({block, triangles_, {}});
+    depth_ = std::max(depth_, depth);
+    if (from.is_leaf_block) {
+      triangles_ += from.count;
+    } else {
+      for (int i = 0; i < from.count; ++i) {
+        const std::uint32_t child = number(from.child[i], depth + 1);
+        places_[self].child[i] = child;
+      }
+    }
+    return self;
+  }
+
+  const Topology& topology_;
+  std::vector<Place> places_;
+  std::uint32_t triangles_ = 0, depth_ = 0;
+};
 
 Box box_of_triangle(const Geometry& geometry, std::uint32_t triangle) {
   const auto& corners = geometry.triangles[triangle];
@@ -21,41 +62,41 @@ Box box_of_triangle(const Geometry& geometry, std::uint32_t triangle) {
   return enclose(lo, hi);
 }
 
+void emit_leaf_block(const Geometry& geometry, const TopologyBlock& from, const Place& place, Tree& tree,
+                     Block& block) {
+  for (std::uint32_t i = 0; i < from.count; ++i) {
+    const std::uint32_t number = place.first_triangle + i;
+    tree.order[number] = from.child[i];
+    set_node(block, static_cast<int>(i), box_of_triangle(geometry, from.child[i]), number, NodeKind::leaf);
+  }
+}
+
 }  // namespace
 
-void emit_leaf_block(Block& block, const Geometry& geometry, const std::uint32_t* order, std::uint32_t first,
-                     std::uint32_t count) {
-  for (std::uint32_t i = 0; i < kNodesPerBlock; ++i) {
-    if (i < count) {
-      set_node(block, static_cast<int>(i), box_of_triangle(geometry, order[first + i]), first + i,
-               NodeKind::leaf);
-    } else {
-      set_imaginary(block, static_cast<int>(i));
+Tree emit(const Geometry& geometry, const Topology& topology) {
+  DepthFirst numbering(topology);
+  const std::vector<Place> places = numbering.take();
+  Tree tree;
+  tree.depth = numbering.depth();
+  tree.blocks.resize(places.size());
+  tree.order.resize(geometry.triangles.size());
+  using oneapi::tbb::blocked_range;
+  oneapi::tbb::parallel_for(blocked_range<std::size_t>(0, places.size()), [&](const auto& part) {
+    for (std::size_t b = part.begin(); b != part.end(); ++b) {
+      const TopologyBlock& from = topology[places[b].block];
+      for (int i = from.count; i < kNodesPerBlock; ++i) set_imaginary(tree.blocks[b], i);
+      if (from.is_leaf_block) emit_leaf_block(geometry, from, places[b], tree, tree.blocks[b]);
+    }
+  });
+  for (std::size_t b = places.size(); b-- > 0;) {  // children before parents, whose boxes enclose them
+    const TopologyBlock& from = topology[places[b].block];
+    tree.leaf_block_count += from.is_leaf_block;
+    for (int i = 0; i < from.count && !from.is_leaf_block; ++i) {
+      const std::uint32_t child = places[b].child[i];
+      set_node(tree.blocks[b], i, enclose(tree.blocks[child]), child, NodeKind::internal);
     }
   }
-}
-
-void emit_internal_node(std::vector<Block>& blocks, std::uint32_t block, int node, std::uint32_t child) {
-  set_node(blocks[block], node, enclose(blocks[child]), child, NodeKind::internal);
-}
-
-void measure(Tree& tree) {
-  std::vector<std::uint8_t> depth(tree.blocks.size(), 1);
-  tree.leaf_block_count = 0;
-  tree.depth = 1;
-  for (std::size_t b = 0; b < tree.blocks.size(); ++b) {
-    const Block& block = tree.blocks[b];
-    tree.depth = std::max<std::uint32_t>(tree.depth, depth[b]);
-    tree.leaf_block_count += block.is_leaf_block();
-    for (int i = 0; i < kNodesPerBlock && block.kind[i] == NodeKind::internal; ++i) {
-      depth[block.index[i]] = static_cast<std::uint8_t>(depth[b] + 1);
-    }
-  }
-}
-
-bool must_split_evenly(std::uint32_t depth, std::uint32_t n) {
-  constexpr std::uint32_t kReserve = 4;
-  return depth + static_cast<std::uint32_t>(std::bit_width(n)) + kReserve >= kMaxDepth;
+  return tree;
 }
 
 }  // namespace tandem::build

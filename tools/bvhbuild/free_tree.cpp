@@ -2,9 +2,10 @@
 
 #include <oneapi/tbb/parallel_invoke.h>
 
-#include "emit.h"
+#include <algorithm>
+
+#include "depth.h"
 #include "splitter.h"
-#include "tandem/formats/box.h"
 
 namespace tandem::build {
 namespace {
@@ -14,8 +15,8 @@ namespace {
 struct BinaryNode {
   std::uint32_t triangles;       // below this node
   std::uint32_t left_triangles;  // below the left child; 0 for a single triangle
-  float surface;
-  // cost[k - 1]: least sum of surfaces of the nodes at and below this one if it may take k slots of a block.
+  float visit_cost;
+  // cost[k - 1]: least sum of costs of the nodes at and below this one if it may take k slots of a block.
   float cost[3];
   std::uint8_t left_slots[3];  // how many of k slots the left child takes; 0: this node takes one itself
   std::uint8_t block_split;    // the same for the four slots of the block below this node
@@ -23,16 +24,17 @@ struct BinaryNode {
 
 class BinaryTree {
  public:
-  explicit BinaryTree(const Geometry& geometry)
-      : splitter_(geometry), nodes_(2 * geometry.triangles.size() - 1) {
-    build(0, {0, static_cast<std::uint32_t>(geometry.triangles.size())}, 1);
+  explicit BinaryTree(std::span<const Bounds> bounds) : splitter_(bounds), nodes_(2 * bounds.size() - 1) {
+    build(0, {0, static_cast<std::uint32_t>(bounds.size())}, 1);
     for (std::size_t node = nodes_.size(); node-- > 0;) collapse(static_cast<std::uint32_t>(node));
   }
 
   const BinaryNode& operator[](std::uint32_t node) const { return nodes_[node]; }
   std::uint32_t left(std::uint32_t node) const { return node + 1; }
   std::uint32_t right(std::uint32_t node) const { return node + 2 * nodes_[node].left_triangles; }
-  std::vector<std::uint32_t> take_order() { return splitter_.take_order(); }
+  std::span<const std::uint32_t> triangles(std::uint32_t first, std::uint32_t count) const {
+    return splitter_.order({first, first + count});
+  }
 
  private:
   Bounds build(std::uint32_t node, Range range, std::uint32_t depth) {
@@ -41,7 +43,7 @@ class BinaryTree {
     if (range.size() == 1) {
       self.left_triangles = 0;
       const Bounds bounds = splitter_.bounds_of(splitter_.order(range)[0]);
-      self.surface = bounds.surface();
+      self.visit_cost = bounds.visit_cost();
       return bounds;
     }
     const Split split = choose(range, depth);
@@ -58,7 +60,7 @@ class BinaryTree {
       build_right();
     }
     bounds.grow(other);
-    self.surface = bounds.surface();
+    self.visit_cost = bounds.visit_cost();
     return bounds;
   }
 
@@ -82,8 +84,8 @@ class BinaryTree {
     return best;
   }
 
-  // Dynamic programming from the leaves up. A node that takes one slot costs its surface, the chance that its
-  // child block is visited, and what lies below; up to four triangles make a leaf block, in which nothing
+  // Dynamic programming from the leaves up. A node that takes one slot costs what visits of its
+  // child block do, and what lies below; up to four triangles make a leaf block, in which nothing
   // more is visited.
   void collapse(std::uint32_t node) {
     BinaryNode& self = nodes_[node];
@@ -91,7 +93,7 @@ class BinaryTree {
     self.block_split = 0;
     const float below =
         self.triangles <= kNodesPerBlock ? 0 : cheapest_share(node, kNodesPerBlock, self.block_split);
-    self.cost[0] = self.surface + below;
+    self.cost[0] = self.visit_cost + below;
     self.left_slots[0] = 0;
     for (std::uint32_t slots = 2; slots <= 3; ++slots) {
       float& cost = self.cost[slots - 1];
@@ -110,15 +112,11 @@ class BinaryTree {
 
 class Collapse {
  public:
-  explicit Collapse(const Geometry& geometry) : geometry_(geometry), binary_(geometry) {}
+  explicit Collapse(std::span<const Bounds> bounds) : binary_(bounds) {}
 
-  Tree run() {
-    tree_.blocks.reserve(geometry_.triangles.size() / 2);
-    order_ = binary_.take_order();
+  Topology run() {
     emit_block(0, 0);
-    tree_.order = std::move(order_);
-    measure(tree_);
-    return std::move(tree_);
+    return std::move(topology_);
   }
 
  private:
@@ -144,36 +142,35 @@ class Collapse {
   }
 
   std::uint32_t emit_block(std::uint32_t node, std::uint32_t first) {
-    const auto block = static_cast<std::uint32_t>(tree_.blocks.size());
-    tree_.blocks.emplace_back();
+    const auto block = static_cast<std::uint32_t>(topology_.size());
+    TopologyBlock self;
     const BinaryNode& binary = binary_[node];
+    topology_.emplace_back();
     if (binary.triangles <= kNodesPerBlock) {
-      emit_leaf_block(tree_.blocks[block], geometry_, order_.data(), first, binary.triangles);
-      return block;
-    }
-    Children children;
-    gather(node, first, kNodesPerBlock, binary.block_split, children);
-    for (int i = 0; i < kNodesPerBlock; ++i) {
-      if (i < children.count) {
-        const std::uint32_t child = emit_block(children.child[i].node, children.child[i].first);
-        emit_internal_node(tree_.blocks, block, i, child);
-      } else {
-        set_imaginary(tree_.blocks[block], i);
+      const auto triangles = binary_.triangles(first, binary.triangles);
+      std::copy(triangles.begin(), triangles.end(), self.child.begin());
+      self.count = static_cast<std::uint8_t>(binary.triangles);
+      self.is_leaf_block = true;
+    } else {
+      Children children;
+      gather(node, first, kNodesPerBlock, binary.block_split, children);
+      self.count = static_cast<std::uint8_t>(children.count);
+      for (int i = 0; i < children.count; ++i) {
+        self.child[i] = emit_block(children.child[i].node, children.child[i].first);
       }
     }
+    topology_[block] = self;
     return block;
   }
 
-  Geometry geometry_;
   BinaryTree binary_;
-  std::vector<std::uint32_t> order_;
-  Tree tree_;
+  Topology topology_;
 };
 
 }  // namespace
 
-Tree build_free_tree(const Geometry& geometry) {
-  return Collapse(geometry).run();
+Topology build_free_tree(std::span<const Bounds> bounds) {
+  return Collapse(bounds).run();
 }
 
 }  // namespace tandem::build

@@ -1,9 +1,14 @@
 #pragma once
-#include "tree.h"
+#include <span>
+
+#include "bounds.h"
+#include "topology.h"
 
 namespace tandem::build {
 
-/// The tree of build_tree(geometry, Imaginary::free).
-Tree build_free_tree(const Geometry& geometry);
+/// The cheapest collapse of a free binary tree, with imaginary nodes wherever they fall, blocks in
+/// depth-first order. `bounds`: of each triangle, normalized_bounds(). Source: surface-area heuristic (Wald
+/// 2007), collapse by dynamic programming after Wald, Benthin and Boulos 2008.
+Topology build_free_tree(std::span<const Bounds> bounds);
 
 }  // namespace tandem::build

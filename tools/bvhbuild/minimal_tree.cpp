@@ -2,10 +2,11 @@
 
 #include <oneapi/tbb/parallel_invoke.h>
 
-#include "emit.h"
+#include <algorithm>
+
+#include "depth.h"
 #include "legal_splits.h"
 #include "splitter.h"
-#include "tandem/formats/box.h"
 
 namespace tandem::build {
 namespace {
@@ -32,36 +33,33 @@ void maybe_parallel(bool parallel, const Left& left, const Right& right) {
 
 class Builder {
  public:
-  explicit Builder(const Geometry& geometry) : geometry_(geometry), splitter_(geometry) {}
+  explicit Builder(std::span<const Bounds> bounds)
+      : splitter_(bounds), topology_(blocks_for(static_cast<std::uint32_t>(bounds.size()))) {}
 
-  Tree run() {
-    const auto n = static_cast<std::uint32_t>(geometry_.triangles.size());
-    tree_.blocks.resize(blocks_for(n));
-    build_block({0, n}, 0, 1);
-    tree_.order = splitter_.take_order();
-    measure(tree_);
-    return std::move(tree_);
+  Topology run(std::uint32_t triangles) {
+    build_block({0, triangles}, 0, 1);
+    return std::move(topology_);
   }
 
  private:
   // Builds the tree over the group into blocks [block, block + blocks_for(n)).
   void build_block(Range range, std::uint32_t block, std::uint32_t depth) {
+    TopologyBlock& self = topology_[block];
     if (range.size() <= kNodesPerBlock) {
-      emit_leaf_block(tree_.blocks[block], geometry_, splitter_.order({0, 0}).data(), range.begin,
-                      range.size());
+      const auto triangles = splitter_.order(range);
+      std::copy(triangles.begin(), triangles.end(), self.child.begin());
+      self.count = static_cast<std::uint8_t>(range.size());
+      self.is_leaf_block = true;
       return;
     }
     const Groups groups = split(range, kNodesPerBlock, depth);
-    std::uint32_t child[kNodesPerBlock + 1] = {block + 1};
-    for (int i = 0; i < groups.count; ++i) child[i + 1] = child[i] + blocks_for(groups.range[i].size());
-    build_children(groups, child, 0, groups.count, depth);
-    for (int i = 0; i < kNodesPerBlock; ++i) {
-      if (i < groups.count) {
-        emit_internal_node(tree_.blocks, block, i, child[i]);
-      } else {
-        set_imaginary(tree_.blocks[block], i);
-      }
+    self.count = static_cast<std::uint8_t>(groups.count);
+    std::uint32_t next = block + 1;
+    for (int i = 0; i < groups.count; ++i) {
+      self.child[i] = next;
+      next += blocks_for(groups.range[i].size());
     }
+    build_children(groups, self.child.data(), 0, groups.count, depth);
   }
 
   void build_children(const Groups& groups, const std::uint32_t* child, int first, int last,
@@ -98,15 +96,15 @@ class Builder {
     return left;
   }
 
-  Geometry geometry_;
   TriangleSplitter splitter_;
-  Tree tree_;
+  Topology topology_;
 };
 
 }  // namespace
 
-Tree build_minimal_tree(const Geometry& geometry) {
-  return Builder(geometry).run();
+Topology build_minimal_tree(std::span<const Bounds> bounds) {
+  const auto n = static_cast<std::uint32_t>(bounds.size());
+  return Builder(bounds).run(n);
 }
 
 }  // namespace tandem::build

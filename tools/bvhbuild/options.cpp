@@ -12,7 +12,8 @@ namespace {
 template <typename T>
 using Names = std::map<std::string, T>;
 
-const Names<Imaginary> kImaginaryNames = {{"minimal", Imaginary::minimal}, {"free", Imaginary::free}};
+const Names<Effort> kEffortNames = {
+    {"fast", Effort::fast}, {"default", Effort::standard}, {"best", Effort::best}};
 const Names<Reader> kReaderNames = {
     {"auto", Reader::automatic}, {"tandem", Reader::tandem}, {"assimp", Reader::assimp}};
 
@@ -46,6 +47,24 @@ CLI::Validator file_name() {
       [](const std::string& text) { return text.empty() ? "a file needs a name" : std::string(); }, "");
 }
 
+// "minimal", "free" or a number from 0 to 1; false if it is none of them.
+bool parse_imaginary(const std::string& text, Imaginary& imaginary) {
+  if (text == "minimal" || text == "free") {
+    imaginary = text == "free" ? Imaginary::free : Imaginary::minimal;
+    return true;
+  }
+  return CLI::detail::lexical_cast(text, imaginary.share) && imaginary.share >= 0 && imaginary.share <= 1;
+}
+
+CLI::Validator imaginary_share() {
+  return CLI::Validator(
+      [](const std::string& text) {
+        Imaginary imaginary;
+        return parse_imaginary(text, imaginary) ? "" : text + " is not minimal, free or a number from 0 to 1";
+      },
+      "");
+}
+
 void add_options(CLI::App& app, Options& options, double& memory_gib) {
   app.add_option("MESH", options.input,
                  "mesh file: OBJ, PLY, STL, OFF, glTF/GLB, DAE and what else assimp reads")
@@ -54,9 +73,16 @@ void add_options(CLI::App& app, Options& options, double& memory_gib) {
   app.add_option("-o,--output", options.output, "the .bvh file to write; appears whole or not at all")
       ->required()
       ->check(file_name());
-  add_choice(app, "--imaginary", kImaginaryNames, options.imaginary,
-             "where padding nodes may be: 'minimal' (the proven fewest) or 'free'")
-      ->option_text("minimal|free [minimal]");
+  app.add_option_function<std::string>(
+         "--imaginary", [&options](const std::string& text) { parse_imaginary(text, options.imaginary); },
+         "padding nodes: 'minimal' (the proven fewest), 'free', or at most a share of all nodes")
+      ->check(imaginary_share())
+      ->option_text("minimal|free|SHARE [minimal]");
+  add_choice(
+      app, "--effort", kEffortNames, options.effort,
+      "time that goes into a tree that is cheap to query; 'best' takes minutes for 100,000 triangles, and "
+      "Ctrl-C ends it with the best tree so far")
+      ->option_text("fast|default|best [default]");
   app.add_flag("--strict", options.strict, "take anything dropped or found amiss in the mesh for an error");
   app.add_flag("--json", options.json, "print the report as JSON");
   app.add_flag("-q,--quiet", options.quiet, "print nothing but errors");
@@ -98,8 +124,16 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   return options;
 }
 
-const char* name(Imaginary imaginary) {
-  return imaginary == Imaginary::minimal ? "minimal" : "free";
+std::string name(Imaginary imaginary) {
+  if (imaginary == Imaginary::minimal) return "minimal";
+  return imaginary == Imaginary::free ? "free" : CLI::detail::to_string(imaginary.share);
+}
+
+std::string name(Effort effort) {
+  for (const auto& [text, value] : kEffortNames) {
+    if (value == effort) return text;
+  }
+  return {};
 }
 
 }  // namespace tandem::build

@@ -1,6 +1,7 @@
 #pragma once
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "import/import.h"
 #include "tree.h"
@@ -11,6 +12,7 @@ namespace tandem::build {
 struct Options {
   std::filesystem::path input, output;
   Imaginary imaginary = Imaginary::minimal;
+  Effort effort = Effort::standard;
   ImportOptions import;
   bool strict = false;
   bool json = false;
@@ -21,7 +23,8 @@ struct Options {
 /// Parses the command line. Nothing to run: prints help, the version or what is wrong, and sets `exit_code`.
 std::optional<Options> parse_options(int argc, char** argv, int& exit_code);
 
-/// "minimal" or "free", as on the command line.
-const char* name(Imaginary imaginary);
+/// As on the command line: "minimal", "free" or a number; "fast", "default" or "best".
+std::string name(Imaginary imaginary);
+std::string name(Effort effort);
 
 }  // namespace tandem::build

@@ -9,6 +9,7 @@
 #include "assemble.h"
 #include "clean.h"
 #include "import/import.h"
+#include "interrupt.h"
 #include "output_file.h"
 #include "progress.h"
 #include "provenance.h"
@@ -78,13 +79,22 @@ StoredMesh prepare(PolygonMesh& polygons, Outcome& outcome) {
   return mesh;
 }
 
+Tree build_watched(const Geometry& geometry, const Options& options, Progress& progress, Outcome& outcome) {
+  OptimisationWatch watch;
+  watch.progress = [&](double share) { progress.share(share); };
+  const StopOnInterrupt interrupt(options.effort == Effort::best ? &watch.stop : nullptr);
+  Tree tree = build_tree(geometry, options.imaginary, options.effort, watch);
+  outcome.interrupted = watch.stop;
+  return tree;
+}
+
 // Builds the tree and the file's bytes, and has the checker prove both: what this program writes, every other
 // one can load.
 Image build_image(const Options& options, const PolygonMesh& polygons, const StoredMesh& mesh,
-                  Outcome& outcome) {
-  const Stopwatch watch(outcome.seconds.build);
+                  Progress& progress, Outcome& outcome) {
+  const Stopwatch stopwatch(outcome.seconds.build);
   const Geometry geometry{mesh.points, mesh.triangles};
-  const Tree tree = build_tree(geometry, options.imaginary);
+  const Tree tree = build_watched(geometry, options, progress, outcome);
   AssetSource source;
   source.origin = mesh.origin;
   source.rounding_error = mesh.largest_rounding_error;
@@ -148,7 +158,7 @@ Outcome run_pipeline(const Options& options) {
   }
 
   progress.step("build");
-  const Image image = build_image(options, polygons, mesh, outcome);
+  const Image image = build_image(options, polygons, mesh, progress, outcome);
 
   progress.step("write");
   std::string error;

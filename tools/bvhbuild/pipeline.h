@@ -24,6 +24,7 @@ struct Outcome {
   std::uint64_t parts = 0;
   double origin[3] = {};
   double rounding_error = 0;
+  bool interrupted = false;  ///< Ctrl-C ended the optimisation; the tree is the best until then
   TreeStatistics tree;
   std::uint64_t file_bytes = 0;
   std::string hash;  ///< of the output, 16 hexadecimal digits

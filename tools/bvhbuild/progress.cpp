@@ -12,8 +12,18 @@ Progress::Progress(bool wanted, std::string what)
 
 void Progress::step(const char* name) {
   ++step_;
+  name_ = name;
+  percent_ = 0;
   if (!shown_) return;
   std::fprintf(stderr, "\r\x1b[K[%d/4] %s %s ...", step_, name, what_.c_str());
+  std::fflush(stderr);
+}
+
+void Progress::share(double done) {
+  const int percent = static_cast<int>(100 * done);
+  if (!shown_ || percent == percent_) return;
+  percent_ = percent;
+  std::fprintf(stderr, "\r\x1b[K[%d/4] %s %s ... %d %%", step_, name_, what_.c_str(), percent);
   std::fflush(stderr);
 }
 

@@ -15,13 +15,17 @@ class Progress {
   /// Replaces the line by that of the next step.
   void step(const char* name);
 
+  /// Shows how much of the step is done, 0 to 1. One thread at a time.
+  void share(double done);
+
   /// Takes the line away; call before printing anything else.
   void clear();
 
  private:
   bool shown_;
   std::string what_;
-  int step_ = 0;
+  int step_ = 0, percent_ = 0;
+  const char* name_ = "";
 };
 
 }  // namespace tandem::build

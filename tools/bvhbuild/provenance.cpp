@@ -9,6 +9,8 @@ std::string provenance_json(const Options& options, const Outcome& outcome) {
   for (const Finding& finding : findings(outcome.clean)) {
     if (finding.count > 0) found[finding.key] = finding.count;
   }
+  Json shaping = {{"imaginary", name(options.imaginary)}, {"effort", name(options.effort)}};
+  if (outcome.interrupted) shaping["interrupted"] = true;
   const Json json = {{"tool", "bvhbuild"},
                      {"version", TANDEM_VERSION},
                      {"input",
@@ -18,7 +20,7 @@ std::string provenance_json(const Options& options, const Outcome& outcome) {
                        {"reader", outcome.reader},
                        {"faces", outcome.clean.faces},
                        {"vertices", outcome.clean.vertices}}},
-                     {"options", {{"imaginary", name(options.imaginary)}}},
+                     {"options", shaping},
                      {"findings", found}};
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }

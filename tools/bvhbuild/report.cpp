@@ -48,6 +48,7 @@ void add_results(const Outcome& outcome, Json& json) {
   json["parts"] = outcome.parts;
   json["origin"] = outcome.origin;
   json["rounding_error"] = outcome.rounding_error;
+  json["interrupted"] = outcome.interrupted;
   json["tree"] = to_json(outcome.tree);
   json["bytes"] = outcome.file_bytes;
   json["hash"] = outcome.hash;
@@ -73,6 +74,7 @@ std::string text_report(const Options& options, const Outcome& outcome) {
   out << "  tree     " << tree.imaginary_nodes << " of " << with_commas(tree.nodes)
       << " nodes imaginary (minimum " << tree.imaginary_minimum << "), depth " << tree.depth << ", SAH cost "
       << number("%.2f", tree.sah_cost) << "\n";
+  if (outcome.interrupted) out << "  note     interrupted: this is the best tree until then\n";
   const Outcome::Seconds& s = outcome.seconds;
   out << "  took     import " << number("%.2f", s.import) << " s, clean " << number("%.2f", s.clean)
       << " s, build " << number("%.2f", s.build) << " s, write " << number("%.2f", s.write)

@@ -15,43 +15,6 @@ namespace {
 using oneapi::tbb::blocked_range;
 using oneapi::tbb::parallel_for;
 
-// Brings the mesh's box to its lower corner and its longest edge to between 1 and 2, so that surfaces of
-// huge, tiny or far meshes neither overflow nor vanish. Coordinates are finite floats; their differences and
-// the scaled ones are taken in float64.
-class Normalization {
- public:
-  explicit Normalization(const Geometry& geometry) {
-    double upper[3] = {-kInfinity, -kInfinity, -kInfinity};
-    for (const auto& triangle : geometry.triangles) {
-      for (const std::uint32_t vertex : triangle) {
-        for (int k = 0; k < 3; ++k) {
-          lower_[k] = std::min<double>(lower_[k], geometry.points[vertex][k]);
-          upper[k] = std::max<double>(upper[k], geometry.points[vertex][k]);
-        }
-      }
-    }
-    const double longest = std::max({upper[0] - lower_[0], upper[1] - lower_[1], upper[2] - lower_[2]});
-    if (longest > 0) scale_ = std::ldexp(1.0, -std::ilogb(longest));
-  }
-
-  Bounds bounds_of(const Geometry& geometry, std::uint32_t triangle) const {
-    Bounds bounds;
-    for (const std::uint32_t vertex : geometry.triangles[triangle]) {
-      for (int k = 0; k < 3; ++k) {
-        const auto x = static_cast<float>((geometry.points[vertex][k] - lower_[k]) * scale_);
-        bounds.lo[k] = std::min(bounds.lo[k], x);
-        bounds.hi[k] = std::max(bounds.hi[k], x);
-      }
-    }
-    return bounds;
-  }
-
- private:
-  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  double lower_[3] = {kInfinity, kInfinity, kInfinity};
-  double scale_ = 1;
-};
-
 // Calls body(0), body(1), body(2), at once if the group is large.
 template <typename Body>
 void for_each_axis(Range range, const Body& body) {
@@ -64,15 +27,9 @@ void for_each_axis(Range range, const Body& body) {
 
 }  // namespace
 
-TriangleSplitter::TriangleSplitter(const Geometry& geometry) {
-  const auto n = static_cast<std::uint32_t>(geometry.triangles.size());
-  bounds_.resize(n);
+TriangleSplitter::TriangleSplitter(std::span<const Bounds> bounds) : bounds_(bounds) {
+  const auto n = static_cast<std::uint32_t>(bounds.size());
   goes_left_.resize(n);
-  const Normalization normalization(geometry);
-  parallel_for(blocked_range<std::uint32_t>(0, n), [&](const auto& part) {
-    for (std::uint32_t t = part.begin(); t != part.end(); ++t)
-      bounds_[t] = normalization.bounds_of(geometry, t);
-  });
   for (int axis = 0; axis < 3; ++axis) {
     scratch_[axis].resize(n);
     order_[axis].resize(n);
@@ -126,7 +83,7 @@ Split TriangleSplitter::sweep(int axis, Range range, const IsLegal& is_legal) {
   Bounds right;
   for (std::uint32_t i = n - 1; i > 0; --i) {
     right.grow(bounds_[order[i]]);
-    right_cost[i] = std::bit_cast<std::uint32_t>(right.surface() * static_cast<float>(n - i));
+    right_cost[i] = std::bit_cast<std::uint32_t>(right.visit_cost() * static_cast<float>(n - i));
   }
   Split best;
   best.axis = axis;
@@ -134,8 +91,8 @@ Split TriangleSplitter::sweep(int axis, Range range, const IsLegal& is_legal) {
   const UnevenPenalty penalty(n);
   for (std::uint32_t i = 1; i < n; ++i) {
     left.grow(bounds_[order[i - 1]]);
-    const float surface_cost = left.surface() * static_cast<float>(i) + std::bit_cast<float>(right_cost[i]);
-    const float cost = surface_cost * penalty.factor(i);
+    const float total = left.visit_cost() * static_cast<float>(i) + std::bit_cast<float>(right_cost[i]);
+    const float cost = total * penalty.factor(i);
     if (cost < best.cost && is_legal(i)) {
       best.cost = cost;
       best.left = i;

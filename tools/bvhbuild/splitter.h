@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "bounds.h"
-#include "tree.h"
 
 namespace tandem::build {
 
@@ -48,7 +47,8 @@ class TriangleSplitter {
   /// Says whether a group may be cut behind so many triangles. Called from several threads.
   using IsLegal = std::function<bool(std::uint32_t left)>;
 
-  explicit TriangleSplitter(const Geometry& geometry);
+  /// `bounds`: of each triangle, normalized_bounds(); they must outlive the splitter.
+  explicit TriangleSplitter(std::span<const Bounds> bounds);
 
   /// The triangles of a group.
   std::span<const std::uint32_t> order(Range range) const {
@@ -56,7 +56,7 @@ class TriangleSplitter {
   }
   const Bounds& bounds_of(std::uint32_t triangle) const { return bounds_[triangle]; }
 
-  /// The cheapest split by the surface-area heuristic, surface times number of triangles, among the legal
+  /// The cheapest split, visit_cost() times number of triangles of both sides, among the legal
   /// ones on all axes; of equal costs the more even one, then the lower axis. Up to kSweepSize triangles all
   /// splits are tried, beyond that those nearest to 31 planes an axis. left == 0 where none is found.
   Split best_split(Range range, const IsLegal& is_legal);
@@ -68,9 +68,6 @@ class TriangleSplitter {
   /// Cuts the group in two: afterwards its left part is [begin, begin + split.left).
   void apply(Range range, const Split& split);
 
-  /// Once the build is done, the leaves' order: each leaf is a range of it.
-  std::vector<std::uint32_t> take_order() { return std::move(order_[0]); }
-
  private:
   float center(std::uint32_t triangle, int axis) const {
     return bounds_[triangle].lo[axis] + bounds_[triangle].hi[axis];
@@ -81,7 +78,7 @@ class TriangleSplitter {
   void mark_left_side(Range range, const Split& split);
   void partition(int axis, Range range, std::uint32_t left);
 
-  std::vector<Bounds> bounds_;
+  std::span<const Bounds> bounds_;
   // Of a group up to kSweepSize: its triangles by centre along x, y and z. Of a larger one: the first alone,
   // by index, so that going through it goes through memory in order.
   std::vector<std::uint32_t> order_[3];

@@ -1,12 +1,34 @@
 #include "tree.h"
 
+#include "emit.h"
 #include "free_tree.h"
 #include "minimal_tree.h"
+#include "mixed_tree.h"
+#include "normalize.h"
+#include "optimise.h"
 
 namespace tandem::build {
 
-Tree build_tree(const Geometry& geometry, Imaginary imaginary) {
-  return imaginary == Imaginary::minimal ? build_minimal_tree(geometry) : build_free_tree(geometry);
+namespace {
+
+Topology build_topology(std::span<const Bounds> bounds, Imaginary imaginary) {
+  if (imaginary == Imaginary::minimal) return build_minimal_tree(bounds);
+  if (imaginary == Imaginary::free) return build_free_tree(bounds);
+  return build_mixed_tree(bounds, imaginary.share);
+}
+
+}  // namespace
+
+Tree build_tree(const Geometry& geometry, Imaginary imaginary, Effort effort) {
+  OptimisationWatch watch;
+  return build_tree(geometry, imaginary, effort, watch);
+}
+
+Tree build_tree(const Geometry& geometry, Imaginary imaginary, Effort effort, OptimisationWatch& watch) {
+  const std::vector<Bounds> bounds = normalized_bounds(geometry);
+  Topology topology = build_topology(bounds, imaginary);
+  optimise(topology, bounds, effort, watch);
+  return emit(geometry, topology);
 }
 
 }  // namespace tandem::build

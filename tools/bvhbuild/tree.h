@@ -4,16 +4,23 @@
 #include <span>
 #include <vector>
 
+#include "effort.h"
 #include "tandem/formats/block.h"
 
 namespace tandem::build {
 
-/// Where imaginary nodes may be.
-enum class Imaginary {
-  minimal,  ///< the proven minimum, minimal_imaginary_nodes(); greedy surface-area splits among the legal
-            ///< ones
-  free,     ///< wherever the cheapest collapse of a free binary tree puts them
+/// How many imaginary nodes a tree may have.
+struct Imaginary {
+  /// Of all nodes, beyond the minimum. 0: the proven minimum, minimal_imaginary_nodes(). 1: wherever the
+  /// cheapest collapse of a free binary tree puts them, about a fifth. Between: where a given number of them
+  /// saves most.
+  double share = 0;
+
+  static const Imaginary minimal, free;
+  bool operator==(const Imaginary&) const = default;
 };
+
+inline constexpr Imaginary Imaginary::minimal{0}, Imaginary::free{1};
 
 /// The blocks of one level of detail, as they will lie in the file, and the order in which its triangles must
 /// lie: triangle t of the file is triangle order[t] of the input.
@@ -31,11 +38,12 @@ struct Geometry {
   std::span<const std::array<std::uint32_t, 3>> triangles;
 };
 
-/// Builds the pure 4-ary tree of all triangles, blocks in depth-first order.
-/// The result depends on the triangles and `imaginary` alone, not on the number of threads, of which oneTBB
-/// gives what it may. Source: surface-area heuristic by full sweeps (Wald 2007); legal splits as in the
-/// project's design; collapse by dynamic programming after Wald, Benthin and Boulos 2008. Condition: at least
-/// one and fewer than 2^32 - 1 triangles; indices in range; coordinates at most kMaxCoordinate in magnitude.
-Tree build_tree(const Geometry& geometry, Imaginary imaginary);
+/// Builds the pure 4-ary tree of all triangles, blocks in depth-first order, and optimises it.
+/// The result depends on the triangles, `imaginary` and `effort` alone, not on the number of threads, of
+/// which oneTBB gives what it may (and on watch.stop, if somebody sets it). Condition: at least one and fewer
+/// than 2^32 - 1 triangles; indices in range; coordinates at most kMaxCoordinate in magnitude.
+Tree build_tree(const Geometry& geometry, Imaginary imaginary = Imaginary::minimal,
+                Effort effort = Effort::standard);
+Tree build_tree(const Geometry& geometry, Imaginary imaginary, Effort effort, OptimisationWatch& watch);
 
 }  // namespace tandem::build

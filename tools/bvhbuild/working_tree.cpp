@@ -1,0 +1,135 @@
+#include "working_tree.h"
+
+#include <algorithm>
+
+namespace tandem::build {
+namespace {
+
+bool same(const Bounds& a, const Bounds& b) {
+  for (int k = 0; k < 3; ++k) {
+    if (a.lo[k] != b.lo[k] || a.hi[k] != b.hi[k]) return false;
+  }
+  return true;
+}
+
+// All blocks of the topology, parents first.
+std::vector<std::uint32_t> parents_first(const Topology& topology) {
+  std::vector<std::uint32_t> order = {0};
+  order.reserve(topology.size());
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const TopologyBlock& block = topology[order[i]];
+    if (!block.is_leaf_block)
+      order.insert(order.end(), block.child.begin(), block.child.begin() + block.count);
+  }
+  return order;
+}
+
+}  // namespace
+
+WorkingTree::WorkingTree(const Topology& topology, std::span<const Bounds> triangles)
+    : blocks_(topology.size()), triangles_(triangles), triangle_parent_(triangles.size()) {
+  const std::vector<std::uint32_t> order = parents_first(topology);
+  for (auto b = order.rbegin(); b != order.rend(); ++b) {
+    Block& block = blocks_[*b];
+    block.child = topology[*b].child;
+    block.count = topology[*b].count;
+    block.is_leaf_block = topology[*b].is_leaf_block;
+    adopt(*b);
+    block.box = unite(block);
+    block.height = height_of(block);
+  }
+}
+
+Topology WorkingTree::topology() const {
+  Topology topology(blocks_.size());
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    topology[b] = {blocks_[b].child, blocks_[b].count, blocks_[b].is_leaf_block};
+  }
+  return topology;
+}
+
+double WorkingTree::cost_change(std::uint32_t block, std::uint32_t out, const Bounds& in,
+                                std::uint32_t top) const {
+  double change = 0;
+  Bounds replaced = in;
+  while (block != top) {
+    const Block& self = blocks_[block];
+    for (int i = 0; i < self.count; ++i) {
+      if (self.child[i] != out) replaced.grow(bounds_of(child(block, i)));
+    }
+    if (same(replaced, self.box)) break;  // nothing changes further up
+    change += double{replaced.visit_cost()} - double{self.box.visit_cost()};
+    out = block;
+    block = self.parent;
+  }
+  return change;
+}
+
+void WorkingTree::apply(const Exchange& exchange, std::uint32_t top) {
+  replace(exchange.first_parent, exchange.first.index, exchange.second);
+  replace(exchange.second_parent, exchange.second.index, exchange.first);
+  refit(exchange.first_parent, top);
+  refit(exchange.second_parent, top);
+}
+
+// Puts `in` where `out` was; either may be nothing.
+void WorkingTree::replace(std::uint32_t block, std::uint32_t out, Child in) {
+  Block& self = blocks_[block];
+  const auto begin = self.child.begin(), end = begin + self.count;
+  const auto place = out == kNoIndex ? end : std::find(begin, end, out);
+  if (in.index == kNoIndex) {
+    *place = *(end - 1);
+    --self.count;
+    return;
+  }
+  *place = in.index;
+  if (out == kNoIndex) ++self.count;
+  (in.is_triangle ? triangle_parent_[in.index] : blocks_[in.index].parent) = block;
+}
+
+void WorkingTree::refit(std::uint32_t block, std::uint32_t top) {
+  while (true) {
+    Block& self = blocks_[block];
+    const Bounds box = unite(self);
+    const std::uint8_t height = height_of(self);
+    if (same(box, self.box) && height == self.height) return;
+    self.box = box;
+    self.height = height;
+    if (block == top) return;
+    block = self.parent;
+  }
+}
+
+void WorkingTree::refresh_heights(std::uint32_t block) {
+  for (; block != kNoIndex; block = blocks_[block].parent) blocks_[block].height = height_of(blocks_[block]);
+}
+
+void WorkingTree::restore(std::span<const std::uint32_t> blocks, std::span<const Block> saved) {
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    blocks_[blocks[i]] = saved[i];
+    adopt(blocks[i]);
+  }
+}
+
+Bounds WorkingTree::unite(const Block& block) const {
+  Bounds box;
+  for (int i = 0; i < block.count; ++i) box.grow(bounds_of({block.child[i], block.is_leaf_block}));
+  return box;
+}
+
+std::uint8_t WorkingTree::height_of(const Block& block) const {
+  std::uint8_t highest = 0;
+  for (int i = 0; i < block.count && !block.is_leaf_block; ++i) {
+    highest = std::max(highest, blocks_[block.child[i]].height);
+  }
+  return static_cast<std::uint8_t>(highest + 1);
+}
+
+void WorkingTree::adopt(std::uint32_t block) {
+  const Block& self = blocks_[block];
+  for (int i = 0; i < self.count; ++i) {
+    (self.is_leaf_block ? triangle_parent_[self.child[i]] : blocks_[self.child[i]].parent) = block;
+  }
+}
+
+}  // namespace tandem::build

@@ -1,0 +1,81 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "bounds.h"
+#include "topology.h"
+
+namespace tandem::build {
+
+/// A child of a block: another block, or a triangle of a leaf block.
+struct Child {
+  std::uint32_t index = kNoIndex;
+  bool is_triangle = false;
+};
+
+/// Two children of the same kind that change places. `second` may be an empty place of `second_parent`
+/// (kNoIndex): then the first one only moves.
+struct Exchange {
+  Child first, second;
+  std::uint32_t first_parent = 0, second_parent = 0;
+};
+
+/// A tree whose children change places. Whatever is exchanged, the number of blocks, and with it that of
+/// imaginary nodes, stays. Disjoint subtrees may be worked on by different threads.
+class WorkingTree {
+ public:
+  struct alignas(64) Block {
+    Bounds box;
+    std::array<std::uint32_t, kNodesPerBlock> child{};
+    std::uint32_t parent = kNoIndex;
+    std::uint8_t count = 0;
+    bool is_leaf_block = false;
+    std::uint8_t height = 1;  // blocks from this one to the deepest leaf block below it, both counted
+  };
+
+  /// `triangles`: normalized_bounds(), which must outlive the tree.
+  WorkingTree(const Topology& topology, std::span<const Bounds> triangles);
+
+  Topology topology() const;
+  const Block& operator[](std::uint32_t block) const { return blocks_[block]; }
+  std::uint32_t size() const { return static_cast<std::uint32_t>(blocks_.size()); }
+
+  Child child(std::uint32_t block, int place) const {
+    return {blocks_[block].child[place], blocks_[block].is_leaf_block};
+  }
+  const Bounds& bounds_of(Child child) const {
+    return child.is_triangle ? triangles_[child.index] : blocks_[child.index].box;
+  }
+  std::uint32_t parent_of(Child child) const {
+    return child.is_triangle ? triangle_parent_[child.index] : blocks_[child.index].parent;
+  }
+
+  /// How much more the blocks from `block` up to, but without, `top` would cost if its child `out` were
+  /// replaced by something of bounds `in`. `out` may be kNoIndex, and `in` empty.
+  double cost_change(std::uint32_t block, std::uint32_t out, const Bounds& in, std::uint32_t top) const;
+
+  /// Makes the change; boxes and heights follow, up to the block `top`, below which both parents lie.
+  void apply(const Exchange& exchange, std::uint32_t top);
+
+  /// Recomputes the heights from `block` up to the root.
+  void refresh_heights(std::uint32_t block);
+
+  /// Brings blocks back as they were, with all that hung on them. Condition: `saved` are all blocks of a
+  /// subtree.
+  void restore(std::span<const std::uint32_t> blocks, std::span<const Block> saved);
+
+ private:
+  Bounds unite(const Block& block) const;
+  void replace(std::uint32_t block, std::uint32_t out, Child in);
+  void refit(std::uint32_t block, std::uint32_t top);
+  std::uint8_t height_of(const Block& block) const;
+  void adopt(std::uint32_t block);
+
+  std::vector<Block> blocks_;
+  std::span<const Bounds> triangles_;
+  std::vector<std::uint32_t> triangle_parent_;
+};
+
+}  // namespace tandem::build

@@ -3,6 +3,8 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cstdlib>
+#include <optional>
 
 #include "free_tree.h"
 #include "minimal_tree.h"
@@ -12,9 +14,11 @@
 namespace tandem::build {
 namespace {
 
-// Triangles of a subtree that is replaced: few, so that there is much to choose from; more than a few blocks,
-// or a free tree would have no freedom.
-constexpr std::uint32_t kMostTriangles = 64;
+// Triangles of the smallest subtrees that are replaced: of more than a few blocks, or a free tree would have
+// no freedom. The next larger ones have up to four times as many.
+constexpr std::uint32_t kFewTriangles = 64;
+
+using Builder = Topology (*)(std::span<const Bounds>);
 
 struct Replacement {
   std::uint32_t root = 0;  // of the subtree that it replaces
@@ -22,7 +26,9 @@ struct Replacement {
   double saving = 0;
   std::int64_t more_blocks = 0;
 
-  double worth() const { return saving / static_cast<double>(std::max<std::int64_t>(more_blocks, 1)); }
+  double worth() const {
+    return saving / static_cast<double>(std::max<std::int64_t>(std::abs(more_blocks), 1));
+  }
 };
 
 double cost_of(const WorkingTree& tree, std::uint32_t root, std::span<const std::uint32_t> blocks) {
@@ -31,8 +37,9 @@ double cost_of(const WorkingTree& tree, std::uint32_t root, std::span<const std:
   return cost;
 }
 
-// The free tree over what hangs below the region's root.
-Replacement free_instead_of(const WorkingTree& tree, const Region& region, std::span<const Bounds> bounds) {
+// Another tree over what hangs below the region's root.
+Replacement replacement_of(const WorkingTree& tree, const Region& region, std::span<const Bounds> bounds,
+                           const Builder& build) {
   std::vector<std::uint32_t> triangles;
   std::vector<Bounds> their_bounds;
   for (const Child child : region.children) {
@@ -42,10 +49,10 @@ Replacement free_instead_of(const WorkingTree& tree, const Region& region, std::
   }
   Replacement replacement;
   replacement.root = region.root;
-  replacement.topology = build_free_tree(their_bounds);
-  const WorkingTree free(replacement.topology, their_bounds);
-  const Region whole = cut_into_regions(free, ~0u).front();
-  replacement.saving = cost_of(tree, region.root, region.blocks) - cost_of(free, 0, whole.blocks);
+  replacement.topology = build(their_bounds);
+  const WorkingTree other(replacement.topology, their_bounds);
+  const Region whole = cut_into_regions(other, ~0u).front();
+  replacement.saving = cost_of(tree, region.root, region.blocks) - cost_of(other, 0, whole.blocks);
   replacement.more_blocks =
       static_cast<std::int64_t>(whole.blocks.size()) - static_cast<std::int64_t>(region.blocks.size());
   for (TopologyBlock& block : replacement.topology) {
@@ -54,12 +61,11 @@ Replacement free_instead_of(const WorkingTree& tree, const Region& region, std::
   return replacement;
 }
 
-// How many blocks more a tree over n triangles may have. Of its B blocks' 4 B nodes, n + B - 1 are not
-// imaginary.
-std::int64_t blocks_to_spend(std::size_t triangles, std::size_t blocks, double share) {
+// How many blocks a tree over n triangles has at most if no more than `share` of its nodes are imaginary: of
+// B blocks' 4 B nodes, n + B - 1 are not.
+std::int64_t blocks_within(std::size_t triangles, double share) {
   const auto n = static_cast<double>(triangles);
-  const double most = 3 - 4 * share > 0 ? (n - 1) / (3 - 4 * share) : 4 * n;
-  return static_cast<std::int64_t>(most) - static_cast<std::int64_t>(blocks);
+  return static_cast<std::int64_t>(3 - 4 * share > 0.1 ? (n - 1) / (3 - 4 * share) : 10 * n);
 }
 
 // Copies a tree, with other subtrees in the place of some.
@@ -90,28 +96,97 @@ class Splice {
   Topology result_;
 };
 
-}  // namespace
+// Which subtrees are replaced; none lies in another.
+class Replaced {
+ public:
+  explicit Replaced(const WorkingTree& tree)
+      : tree_(tree), instead_(tree.size(), nullptr), holds_one_(tree.size(), 0) {}
 
-Topology build_mixed_tree(std::span<const Bounds> bounds, double share) {
-  const Topology minimal = build_minimal_tree(bounds);
-  const WorkingTree tree(minimal, bounds);
-  const std::vector<Region> regions = cut_into_regions(tree, kMostTriangles);
+  bool is_free(std::uint32_t block) const {
+    if (holds_one_[block]) return false;
+    for (; block != kNoIndex; block = tree_[block].parent) {
+      if (instead_[block] != nullptr) return false;
+    }
+    return true;
+  }
+
+  void take(const Replacement& replacement) {
+    instead_[replacement.root] = &replacement.topology;
+    for (std::uint32_t b = replacement.root; b != kNoIndex; b = tree_[b].parent) holds_one_[b] = 1;
+  }
+
+  const std::vector<const Topology*>& instead() const { return instead_; }
+
+ private:
+  const WorkingTree& tree_;
+  std::vector<const Topology*> instead_;
+  std::vector<std::uint8_t> holds_one_;
+};
+
+// Other trees instead of the largest subtrees of at most `most_triangles` triangles.
+void add_replacements(const WorkingTree& tree, std::span<const Bounds> bounds, std::uint32_t most_triangles,
+                      const Builder& build, std::vector<Replacement>& all) {
+  const std::vector<Region> regions = cut_into_regions(tree, most_triangles);
   const std::size_t count = regions.size() - (regions.size() > 1);  // without the blocks above them
-  std::vector<Replacement> replacements(count);
+  const std::size_t first = all.size();
+  all.resize(first + count);
   oneapi::tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-    replacements[i] = free_instead_of(tree, regions[i], bounds);
+    all[first + i] = replacement_of(tree, regions[i], bounds, build);
   });
+}
+
+void sort_by_worth(std::vector<Replacement>& replacements) {
   std::sort(replacements.begin(), replacements.end(), [](const Replacement& a, const Replacement& b) {
     return a.worth() != b.worth() ? a.worth() > b.worth() : a.root < b.root;
   });
-  std::int64_t budget = blocks_to_spend(bounds.size(), minimal.size(), share);
-  std::vector<const Topology*> instead(minimal.size(), nullptr);
+}
+
+// The free tree with as many subtrees minimal as it takes, where that costs least; nothing if that does not
+// do.
+std::optional<Topology> mostly_free(std::span<const Bounds> bounds, std::int64_t most_blocks) {
+  const Topology free = build_free_tree(bounds);
+  const WorkingTree tree(free, bounds);
+  std::vector<Replacement> replacements;
+  add_replacements(tree, bounds, kFewTriangles, build_minimal_tree, replacements);
+  sort_by_worth(replacements);
+  std::int64_t too_many = static_cast<std::int64_t>(free.size()) - most_blocks;
+  Replaced replaced(tree);
   for (const Replacement& replacement : replacements) {
-    if (replacement.saving <= 0 || replacement.more_blocks > budget) continue;
-    budget -= replacement.more_blocks;
-    instead[replacement.root] = &replacement.topology;
+    if (too_many <= 0 && replacement.saving <= 0) break;
+    too_many += replacement.more_blocks;
+    replaced.take(replacement);
   }
-  return Splice(minimal, instead).run();
+  if (too_many > 0) return std::nullopt;
+  return Splice(free, replaced.instead()).run();
+}
+
+// The minimal tree with subtrees of all sizes free where that saves most for a block.
+Topology mostly_minimal(std::span<const Bounds> bounds, std::int64_t most_blocks) {
+  const Topology minimal = build_minimal_tree(bounds);
+  const WorkingTree tree(minimal, bounds);
+  std::vector<Replacement> replacements;
+  for (std::uint64_t size = kFewTriangles; size / 4 < bounds.size(); size *= 4) {
+    const auto most_triangles = static_cast<std::uint32_t>(std::min<std::uint64_t>(size, ~0u));
+    add_replacements(tree, bounds, most_triangles, build_free_tree, replacements);
+  }
+  sort_by_worth(replacements);
+  std::int64_t budget = most_blocks - static_cast<std::int64_t>(minimal.size());
+  Replaced replaced(tree);
+  for (const Replacement& replacement : replacements) {
+    if (replacement.saving <= 0 || replacement.more_blocks > budget || !replaced.is_free(replacement.root))
+      continue;
+    budget -= replacement.more_blocks;
+    replaced.take(replacement);
+  }
+  return Splice(minimal, replaced.instead()).run();
+}
+
+}  // namespace
+
+Topology build_mixed_tree(std::span<const Bounds> bounds, double share) {
+  const std::int64_t most_blocks = blocks_within(bounds.size(), share);
+  if (std::optional<Topology> tree = mostly_free(bounds, most_blocks)) return std::move(*tree);
+  return mostly_minimal(bounds, most_blocks);
 }
 
 }  // namespace tandem::build

@@ -26,9 +26,9 @@ Mesh random_mesh(std::uint32_t triangles, std::uint64_t seed) {
   return mesh;
 }
 
-build::Image make_file(const Mesh& mesh, build::Imaginary imaginary) {
+build::Image make_file(const Mesh& mesh, build::Imaginary imaginary, build::Effort effort) {
   const std::size_t n = mesh.triangles.size();
-  const build::Tree tree = build::build_tree(mesh.geometry(), imaginary);
+  const build::Tree tree = build::build_tree(mesh.geometry(), imaginary, effort);
   std::vector<std::uint32_t> face(n);
   std::iota(face.begin(), face.end(), 0u);
   const std::vector<build::SourcePart> parts = {{"left", "scene/left", 0, n / 2},

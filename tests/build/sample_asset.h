@@ -25,7 +25,8 @@ struct Mesh {
 Mesh random_mesh(std::uint32_t triangles, std::uint64_t seed);
 
 /// The bytes of a whole file over this mesh: source face i is triangle i, in two parts.
-build::Image make_file(const Mesh& mesh, build::Imaginary imaginary = build::Imaginary::minimal);
+build::Image make_file(const Mesh& mesh, build::Imaginary imaginary = build::Imaginary::minimal,
+                       build::Effort effort = build::Effort::standard);
 
 /// Bytes in an allocation of exactly their size, aligned as the checker wants: an overrun by one is seen by
 /// the sanitizer.

@@ -22,7 +22,7 @@ NOBODY = 65534
 
 class Usage(ToolTest):
     def test_help_names_every_option_and_exit_code(self):
-        for tool, words in ((BVHBUILD, ("MESH", "--output", "--imaginary", "minimal|free", "--strict", "--json",
+        for tool, words in ((BVHBUILD, ("MESH", "--output", "--imaginary", "minimal|free|SHARE", "--effort", "fast|default|best", "--strict", "--json",
                                         "--quiet", "--threads", "--reader", "--time-limit", "--memory-limit",
                                         "--version", "Exit codes: 0 done")),
                             (BVHINFO, ("FILE", "--json", "--verify", "--version", "Exit codes: 0 all sound"))):
@@ -53,7 +53,8 @@ class Usage(ToolTest):
 
     def test_bad_values_are_refused_by_option(self):
         mesh = self.write("a.obj", TRIANGLE_OBJ)
-        for option, values in {"--imaginary": ["some", "1", ""], "--reader": ["cgal", "0"],
+        for option, values in {"--imaginary": ["some", "1.5", "-0.1", "nan", ""], "--effort": ["slow", "0", ""],
+                               "--reader": ["cgal", "0"],
                                "--threads": ["0", "-1", "two", "1e9"], "--time-limit": ["0", "-5", "nan", "soon"],
                                "--memory-limit": ["0", "nan", "inf", "8GiB"]}.items():
             for value in values:
@@ -271,6 +272,27 @@ class Signals(ToolTest):
         self.assertGreater(killed, 0, "no signal came in time: the test shows nothing")
 
 
+    def test_ctrl_c_during_best_effort_keeps_the_best_tree_so_far(self):
+        mesh = self.write("large.ply", grid_ply(100))
+        try:
+            ours, theirs = pty.openpty()
+        except OSError as error:
+            self.skipTest(f"no terminal to be had: {error}")
+        process = subprocess.Popen([BVHBUILD, mesh, "-o", self.out, "--effort", "best", "--json"], stdout=subprocess.PIPE, stderr=theirs)
+        os.close(theirs)
+        text = b""
+        while b" %" not in text:  # optimisation is under way, and says how far it is
+            text += os.read(ours, 4096)
+        process.send_signal(signal.SIGINT)
+        report, _ = process.communicate(timeout=60)
+        os.close(ours)
+        self.assertEqual(process.returncode, DONE)
+        self.assertTrue(json.loads(report)["interrupted"])
+        self.assertEqual(self.info("--verify", self.out).returncode, DONE)
+        info = json.loads(self.info("--json", self.out).stdout)
+        self.assertEqual(info["imaginary_nodes"], info["imaginary_minimum"])
+
+
 class Streams(ToolTest):
     def test_quiet_prints_nothing(self):
         result = self.build(self.write("a.obj", CUBE_OBJ), "-o", self.out, "--quiet")
@@ -350,7 +372,7 @@ class Overlap(ToolTest):
 class BuildJson(ToolTest):
     ALWAYS = {"tool", "version", "exit_code", "error", "input", "output", "reader", "single_precision_reader", "faces",
               "vertices", "remarks", "findings", "seconds", "peak_memory_bytes"}
-    AFTER_SUCCESS = {"parts", "origin", "rounding_error", "tree", "bytes", "hash"}
+    AFTER_SUCCESS = {"interrupted", "parts", "origin", "rounding_error", "tree", "bytes", "hash"}
     FINDINGS = {"faces_index_out_of_range", "faces_too_few_corners", "faces_not_finite", "faces_too_large", "faces_not_simple",
                 "vertices_unreferenced", "vertices_welded", "triangles_degenerate", "triangles_duplicate",
                 "triangles_duplicate_reversed", "triangles_flattened"}

@@ -111,7 +111,7 @@ class Provenance(ToolTest):
         self.assertEqual(provenance["input"]["file"], "cube.obj")
         self.assertEqual(provenance["input"]["bytes"], len(CUBE_OBJ))
         self.assertEqual(int(provenance["input"]["xxh64"], 16), bvh_file.xxh64(CUBE_OBJ.encode()))
-        self.assertEqual(provenance["options"], {"imaginary": "minimal"})
+        self.assertEqual(provenance["options"], {"imaginary": "minimal", "effort": "default"})
         self.assertNotIn(str(self.root).encode(), self.out.read_bytes())
         self.assertNotIn(b"mesh.bvh", self.out.read_bytes())
 

@@ -8,6 +8,7 @@
 
 #include "random_pose.h"
 #include "tandem/kernels/box_test.h"
+#include "tandem/kernels/interval_test.h"
 
 namespace tandem {
 namespace {
@@ -141,8 +142,18 @@ double length(const float (&v)[3]) {
 struct Trial {
   Side a, b;
   RelativePose b_in_a;
+  IntervalPose intervals;
   double slack;
 };
+
+/// The poses of a trial. False: out of range.
+bool relate(Trial& trial, const TreeExtent& extent_a) {
+  const TreeExtent extent_b = test::extent_of(trial.b.box);
+  if (relative_pose(trial.a.pose, extent_a, trial.b.pose, extent_b, trial.b_in_a) != RelativePoseStatus::kOk)
+    return false;
+  trial.intervals = interval_pose(trial.b_in_a, extent_a, extent_b);
+  return true;
+}
 
 // Boxes whose gap along a random one of the 15 axes is within twice the slack, or exactly none.
 bool make_trial(RandomPoses& random, const Scale& scale, double largest_gap_in_slacks, Trial& trial) {
@@ -158,31 +169,35 @@ bool make_trial(RandomPoses& random, const Scale& scale, double largest_gap_in_s
   }
   const auto which = static_cast<int>(random.below(15));
   if (!place(random, a, b, which, 0)) return false;
-  const auto status = relative_pose(a.pose, extent_a, b.pose, test::extent_of(b.box), trial.b_in_a);
-  if (status != RelativePoseStatus::kOk) return false;
+  if (!relate(trial, extent_a)) return false;
   trial.slack = length(trial.b_in_a.slack_a) + length(trial.b_in_a.slack_b);
   if (random.below(4) == 0) return true;
   if (!place(random, a, b, which, random.symmetric(largest_gap_in_slacks) * trial.slack)) return false;
-  return relative_pose(a.pose, extent_a, b.pose, test::extent_of(b.box), trial.b_in_a) ==
-         RelativePoseStatus::kOk;
+  return relate(trial, extent_a);
 }
 
 TEST(BoxTest, WhatItCallsApartIsApartInExactArithmetic) {
   RandomPoses random(1);
-  std::uint64_t apart = 0, made = 0;
+  std::uint64_t apart = 0, apart_by_intervals = 0, made = 0;
   const std::uint64_t count = trials(100'000'000);
   for (std::uint64_t i = 0; i < count; ++i) {
     Trial trial;
     if (!make_trial(random, any_scale(random), 2, trial)) continue;
     ++made;
     ASSERT_TRUE(is_rigid(trial.a.pose) && is_rigid(trial.b.pose)) << i;
-    if (overlap_15_axes(trial.a.box, trial.b.box, trial.b_in_a)) continue;
+    const bool by_intervals = !overlap_intervals(trial.a.box, trial.b.box, trial.intervals);
+    apart_by_intervals += by_intervals;
+    if (overlap_15_axes(trial.a.box, trial.b.box, trial.b_in_a)) {
+      ASSERT_TRUE(!by_intervals || surely_apart(trial.a, trial.b)) << "trial " << i;
+      continue;
+    }
     ++apart;
     ASSERT_TRUE(surely_apart(trial.a, trial.b)) << "trial " << i;
   }
-  std::printf("%llu trials, %llu apart\n", static_cast<unsigned long long>(made),
-              static_cast<unsigned long long>(apart));
+  std::printf("%llu trials, %llu apart, %llu by intervals\n", static_cast<unsigned long long>(made),
+              static_cast<unsigned long long>(apart), static_cast<unsigned long long>(apart_by_intervals));
   EXPECT_GT(made, count / 2);
+  EXPECT_GT(apart_by_intervals, made / 100);
   EXPECT_GT(apart, made / 50);  // the trials are hard: most gaps lie within the slack
 }
 
@@ -251,8 +266,7 @@ bool make_contact(RandomPoses& random, const Scale& scale, Trial& trial) {
     end = static_cast<float>(end + (away > 0 ? 1 : -1) * random.uniform(0, scale.size));
   }
   b.box = enclose(b.lo, b.hi);
-  return relative_pose(a.pose, test::extent_of(a.box), b.pose, test::extent_of(b.box), trial.b_in_a) ==
-         RelativePoseStatus::kOk;
+  return relate(trial, test::extent_of(a.box));
 }
 
 TEST(BoxTest, ContactsByConstructionAreNeverCalledApart) {
@@ -264,6 +278,7 @@ TEST(BoxTest, ContactsByConstructionAreNeverCalledApart) {
     if (!make_contact(random, any_scale(random), trial)) continue;
     ++made;
     ASSERT_TRUE(overlap_15_axes(trial.a.box, trial.b.box, trial.b_in_a)) << "trial " << i;
+    ASSERT_TRUE(overlap_intervals(trial.a.box, trial.b.box, trial.intervals)) << "trial " << i;
   }
   std::printf("%llu contacts\n", static_cast<unsigned long long>(made));
   EXPECT_GT(made, count / 3);
@@ -327,6 +342,8 @@ TEST(RelativePose, HoldsBoxesApartAtAnyDistanceInRange) {
     ASSERT_EQ(relative_pose(kIdentityPose, test::extent_of(box), there, test::extent_of(box), out),
               RelativePoseStatus::kOk);
     EXPECT_FALSE(overlap_15_axes(box, box, out)) << t;
+    const IntervalPose intervals = interval_pose(out, test::extent_of(box), test::extent_of(box));
+    EXPECT_FALSE(overlap_intervals(box, box, intervals)) << t;
   }
 }
 

@@ -130,7 +130,7 @@ bool store(RandomPoses& random, TrianglePair pair, Stored& out) {
 }
 
 struct Tally {
-  long pairs = 0, contacts = 0, decided = 0;
+  long pairs = 0, contacts = 0, decided = 0, seen_apart = 0;
 };
 
 void expect_right(const Stored& stored, Tally& tally) {
@@ -138,6 +138,10 @@ void expect_right(const Stored& stored, Tally& tally) {
   const auto verdicts = frame::decide<true>(framed.a, framed.b, framed.error);
   ++tally.pairs;
   ASSERT_FALSE(verdicts.contact && verdicts.undecided);
+  if (frame::surely_apart(framed.a, framed.b, framed.error)) {
+    ++tally.seen_apart;
+    ASSERT_EQ(decide_exact(framed.posed), Verdict::apart) << text(stored);
+  }
   if (verdicts.undecided) return;
   ASSERT_TRUE(std::isfinite(framed.error));
   ++tally.decided;
@@ -146,9 +150,11 @@ void expect_right(const Stored& stored, Tally& tally) {
 }
 
 void print(const char* name, const Tally& tally) {
-  std::printf("%-18s %ld pairs, decided %.3f %%, of which contacts %.1f %%\n", name, tally.pairs,
-              100.0 * static_cast<double>(tally.decided) / static_cast<double>(tally.pairs),
-              100.0 * static_cast<double>(tally.contacts) / static_cast<double>(std::max(tally.decided, 1L)));
+  const double pairs = static_cast<double>(tally.pairs), decided = static_cast<double>(tally.decided);
+  std::printf("%-18s %ld pairs, decided %.3f %%, of which contacts %.1f %%; %.3f %% seen apart\n", name,
+              tally.pairs, 100 * decided / pairs,
+              100.0 * static_cast<double>(tally.contacts) / std::max(decided, 1.0),
+              100.0 * static_cast<double>(tally.seen_apart) / pairs);
 }
 
 class FrameFamilies : public testing::TestWithParam<TriangleFamily> {};
@@ -475,6 +481,7 @@ TEST(FrameTest, BoundIsReachedWherePosingRoundsMost) {
   const Framed framed(stored);
   EXPECT_EQ(decide_exact(framed.posed), Verdict::contact);
   EXPECT_TRUE(frame::decide<true>(framed.a, framed.b, framed.error).undecided);
+  EXPECT_FALSE(frame::surely_apart(framed.a, framed.b, framed.error));
 }
 
 /// Without an uphill walk: many more inputs.

@@ -325,7 +325,7 @@ void ask_tandem(const Setting& setting, GpuAnswer& answer) {
   }
   answer.counters = query.report().counters;
   answer.bytes += query.bytes();
-  answer.bytes_bound = most_query_bytes(query.capacity(), options.sorted, setting.scene.assets().size());
+  answer.bytes_bound = most_query_bytes(query.capacity(), options.sorted, setting.scene.assets());
   answer.bytes_taken = setting.free_before - free_bytes();
   answer.contacts = download(query.contacts(), query.report().contacts);
   if (options.sorted) check_order(answer.contacts);

@@ -66,6 +66,7 @@ __device__ void count(bool counts, Counter* counter) {
 
 template <bool kFast>
 __global__ void __launch_bounds__(kThreads) decide_by_float64(const __grid_constant__ QueryArgs args) {
+  wait_for_kernel_before();
   if (failed(args)) return;
   const std::uint32_t total = stored(args.state->undecided, args.capacity.undecided);
   for (std::uint32_t first = blockIdx.x * kThreads; first < total; first += gridDim.x * kThreads) {
@@ -116,10 +117,13 @@ __device__ void write_report(const QueryArgs& args) {
     report.where = error >> 8 & 0xFFFFFFFFu;
   }
   args.state->report = report;
+  *args.host_report = report;
+  __threadfence_system();
 }
 
 /// The block that ends last writes the report.
 __global__ void __launch_bounds__(kThreads) decide_exactly(const __grid_constant__ QueryArgs args) {
+  wait_for_kernel_before();
   const std::uint32_t total = failed(args) ? 0 : static_cast<std::uint32_t>(args.state->unresolved);
   for (std::uint32_t first = blockIdx.x * kThreads; first < total; first += gridDim.x * kThreads) {
     const std::uint32_t i = first + threadIdx.x;
@@ -142,12 +146,11 @@ cudaError_t decide_rest(const QueryArgs& args, cudaStream_t stream) {
       error != cudaSuccess)
     return error;
   const auto blocks = static_cast<unsigned>(processors) * 4;
-  if (args.mode == QueryMode::fast)
-    decide_by_float64<true><<<blocks, kThreads, 0, stream>>>(args);
-  else if (args.mode == QueryMode::exact)
-    decide_by_float64<false><<<blocks, kThreads, 0, stream>>>(args);
-  decide_exactly<<<blocks, kThreads, 0, stream>>>(args);
-  return cudaGetLastError();
+  cudaError_t error = cudaSuccess;
+  if (args.mode != QueryMode::boxes)
+    error = launch_after(args.mode == QueryMode::fast ? decide_by_float64<true> : decide_by_float64<false>,
+                         blocks, kThreads, 0, args, stream);
+  return error == cudaSuccess ? launch_after(decide_exactly, blocks, kThreads, 0, args, stream) : error;
 }
 
 }  // namespace tandem::gpu

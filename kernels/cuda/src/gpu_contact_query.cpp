@@ -13,10 +13,8 @@ namespace {
 // Blocks that an entry of the walk's stack can name.
 constexpr std::uint32_t kMostBlocks = 1u << 29;
 
-// Entries of a warp's stack beyond its reserve, which is there for the worst case alone: 32 block pairs at a
-// time put on some 64 net for each level, so a few hundred wait. With 280 a query of 10^5 cows takes 21 %
-// longer, because lanes idle; with 900 17 %, because the L1 cache shrinks.
-constexpr std::uint32_t kStackSize = 444;
+// Entries of a warp's stack beyond its reserve.
+constexpr std::uint32_t kStackSize = 208;
 
 template <typename Number>
 Number grown(Number wanted, Number present) {
@@ -32,6 +30,8 @@ GpuContactQuery& GpuContactQuery::operator=(GpuContactQuery&& other) noexcept {
   std::swap(assets_, other.assets_);
   std::swap(asset_count_, other.asset_count_);
   std::swap(asset_room_, other.asset_room_);
+  std::swap(walk_blocks_, other.walk_blocks_);
+  std::swap(block_room_, other.block_room_);
   std::swap(depth_, other.depth_);
   std::swap(most_triangles_, other.most_triangles_);
   std::swap(most_faces_, other.most_faces_);
@@ -69,11 +69,12 @@ Status GpuContactQuery::allocate(Element*& out, std::size_t count) {
 
 void GpuContactQuery::free() {
   free_room();
-  for (void** memory : {&assets_, &state_, &chunks_}) {
+  for (void** memory : {&assets_, &walk_blocks_, &state_, &chunks_}) {
     static_cast<void>(cudaFree(std::exchange(*memory, nullptr)));
   }
   static_cast<void>(cudaFreeHost(std::exchange(host_report_, nullptr)));
   asset_count_ = asset_room_ = 0;
+  block_room_ = 0;
 }
 
 void GpuContactQuery::free_room() {
@@ -115,7 +116,9 @@ Status GpuContactQuery::set_assets(std::span<const GpuAsset> assets, cudaStream_
   if (status != Status::kOk) return status;
   std::uint32_t depth = 1, triangles = 0;
   std::uint64_t faces = 0;
+  std::size_t block_count = 0;
   for (const GpuAsset& asset : assets) {
+    block_count += asset.tree.block_count;
     if (asset.tree.block_count >= kMostBlocks) return Status::kOutOfRange;
     depth = std::max(depth, asset.tree.depth);
     triangles = std::max(triangles, asset.tree.triangle_count);
@@ -132,6 +135,15 @@ Status GpuContactQuery::set_assets(std::span<const GpuAsset> assets, cudaStream_
     assets_ = table;
     asset_room_ = count;
   }
+  if (block_count > block_room_) {
+    static_cast<void>(cudaFree(std::exchange(walk_blocks_, nullptr)));
+    block_room_ = asset_count_ = 0;
+    gpu::WalkBlock* blocks = nullptr;
+    status = allocate(blocks, block_count);
+    if (status != Status::kOk) return status;
+    walk_blocks_ = blocks;
+    block_room_ = block_count;
+  }
   asset_count_ = count;
   depth_ = depth;
   most_triangles_ = triangles;
@@ -140,7 +152,11 @@ Status GpuContactQuery::set_assets(std::span<const GpuAsset> assets, cudaStream_
   auto* table = static_cast<gpu::Asset*>(assets_);
   status = fail(cudaMemcpy2DAsync(table, sizeof(gpu::Asset), assets.data(), sizeof(GpuAsset),
                                   sizeof(GpuAsset), count, cudaMemcpyHostToDevice, stream));
-  if (status == Status::kOk) status = fail(gpu::measure_assets(table, count, stream));
+  auto* blocks = static_cast<gpu::WalkBlock*>(walk_blocks_);
+  for (std::uint32_t i = 0; i < count && status == Status::kOk; ++i) {
+    status = fail(gpu::prepare_asset(table + i, assets[i].tree.block_count, blocks, stream));
+    blocks += assets[i].tree.block_count;
+  }
   if (status == Status::kOk) status = fail(cudaStreamSynchronize(stream));
   return status;
 }
@@ -215,6 +231,7 @@ Status GpuContactQuery::enqueue(const GpuInstances& instances, const GpuPairs& p
   args.first_contact_only = options.first_contact_only;
   args.capacity = capacity_;
   args.state = static_cast<gpu::QueryState*>(state_);
+  args.host_report = host_report_;
   args.chunks = static_cast<gpu::Chunk*>(chunks_);
   args.pairs = static_cast<gpu::PairRecord*>(pairs_);
   args.world_pairs = world_pairs_;
@@ -223,7 +240,7 @@ Status GpuContactQuery::enqueue(const GpuInstances& instances, const GpuPairs& p
   args.undecided = static_cast<gpu::Candidate*>(undecided_);
   args.unresolved = args.undecided + capacity_.undecided;
   args.most_blocks = std::min(options.most_blocks, gpu::kChunks);  // a grid never has as many
-  args.stack_reserve = 15 * (depth_ - 1) + 64;                     // 64: what candidates take meanwhile
+  args.stack_reserve = 2 * depth_ + 32;                            // see walk.cuh
   args.stack_size = args.stack_reserve + kStackSize;
   cudaError_t error = cudaMemsetAsync(args.state, 0, sizeof(gpu::QueryState), stream);
   if (error == cudaSuccess) error = gpu::prepare_pairs(args, stream);
@@ -235,9 +252,6 @@ Status GpuContactQuery::enqueue(const GpuInstances& instances, const GpuPairs& p
     const gpu::SortingRoom room = {contacts_, order_, sorting_, sorting_bytes_, most_triangles_, most_faces_};
     error = gpu::sort_contacts(args, room, stream);
   }
-  if (error == cudaSuccess)
-    error = cudaMemcpyAsync(host_report_, &args.state->report, sizeof(GpuQueryReport), cudaMemcpyDeviceToHost,
-                            stream);
   return fail(error);
 }
 
@@ -264,7 +278,7 @@ const GpuQueryReport* GpuContactQuery::device_report() const {
 }
 
 std::size_t GpuContactQuery::bytes() const {
-  std::size_t bytes = asset_room_ * sizeof(gpu::Asset);
+  std::size_t bytes = asset_room_ * sizeof(gpu::Asset) + block_room_ * sizeof(gpu::WalkBlock);
   if (state_ != nullptr) bytes += sizeof(gpu::QueryState);
   if (chunks_ != nullptr) bytes += gpu::kChunks * sizeof(gpu::Chunk);
   bytes += capacity_.pairs * (sizeof(gpu::PairRecord) + 2 * sizeof(std::uint32_t));

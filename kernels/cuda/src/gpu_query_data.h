@@ -13,9 +13,9 @@ struct Candidate {
   std::uint32_t pair, a, b;
 };
 
-/// Block pairs that one warp gives to another.
+/// Entries of the stack, see walk.cuh, that one warp gives to another.
 struct Chunk {
-  std::uint32_t pair[32], a[32], b[32];
+  uint4 entry[32];
 };
 inline constexpr std::uint32_t kChunks = 8192;
 
@@ -50,6 +50,7 @@ struct QueryArgs {
   bool first_contact_only;
   GpuQueryCapacity capacity;
   QueryState* state;
+  GpuQueryReport* host_report;  ///< in CPU memory
   Chunk* chunks;
   PairRecord* pairs;
   std::uint32_t* world_pairs;  ///< pairs that are not in_frame
@@ -73,8 +74,8 @@ struct SortingRoom {
 /// Sorting keeps two rows of 64-bit keys where its result is to come, each row aligned.
 inline constexpr std::size_t kContactsForKeys = 32;
 
-/// Fills in the extents of assets.
-cudaError_t measure_assets(Asset* assets, std::uint32_t count, cudaStream_t stream);
+/// Fills in what follows from the tree of an asset in the table, its walk blocks included.
+cudaError_t prepare_asset(Asset* asset, std::uint32_t block_count, WalkBlock* out, cudaStream_t stream);
 
 /// Checks instances and pairs and makes the records.
 cudaError_t prepare_pairs(const QueryArgs& args, cudaStream_t stream);
@@ -96,6 +97,38 @@ cudaError_t sorting_bytes(std::uint64_t contacts, std::size_t& bytes);
 cudaError_t sort_contacts(const QueryArgs& args, const SortingRoom& room, cudaStream_t stream);
 
 #ifdef __CUDACC__
+
+/// Launches a kernel that may get its blocks ready while the one before it in the stream ends, and calls
+/// wait_for_kernel_before() first of all.
+inline cudaError_t launch_after(void (*kernel)(QueryArgs), unsigned blocks, unsigned threads,
+                                std::size_t shared_bytes, const QueryArgs& args, cudaStream_t stream) {
+  cudaLaunchAttribute early = {};
+  early.id = cudaLaunchAttributeProgrammaticStreamSerialization;
+  early.val.programmaticStreamSerializationAllowed = 1;
+  cudaLaunchConfig_t config = {};
+  config.gridDim = blocks;
+  config.blockDim = threads;
+  config.dynamicSmemBytes = shared_bytes;
+  config.stream = stream;
+  config.attrs = &early;
+  config.numAttrs = 1;
+  return cudaLaunchKernelEx(&config, kernel, args);
+}
+
+/// The blocks of the next kernel may get ready as soon as all of this one have come here.
+__device__ inline void let_next_kernel_begin() {
+#if __CUDA_ARCH__ >= 900
+  asm volatile("griddepcontrol.launch_dependents;" ::: "memory");
+#endif
+}
+
+/// Waits until all that the kernel before did is done and seen.
+__device__ inline void wait_for_kernel_before() {
+  let_next_kernel_begin();
+#if __CUDA_ARCH__ >= 900
+  asm volatile("griddepcontrol.wait;" ::: "memory");
+#endif
+}
 
 __device__ inline std::uint32_t pair_count(const QueryArgs& args) {
   const std::uint32_t count = *args.given.count;

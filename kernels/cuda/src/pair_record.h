@@ -11,9 +11,25 @@ namespace tandem::gpu {
 
 using Counter = unsigned long long;  // what atomicAdd takes
 
+/// What a walk reads of a block: its boxes, component by component, and what its nodes lead to. 112 bytes, an
+/// odd number of float4: where the lanes of a warp read the same component of several blocks, the L1 cache
+/// serves them from several banks, which it cannot where blocks are 128 bytes apart.
+struct alignas(16) WalkBlock {
+  float center[3][kNodesPerBlock];
+  float half_extent[3][kNodesPerBlock];
+  std::uint32_t link[kNodesPerBlock];  ///< of a leaf: its triangle; of others: see Link
+};
+static_assert(sizeof(WalkBlock) == 112);
+
+/// A block, as links and the entries of stacks name it.
+inline constexpr std::uint32_t kIndexBits = 29, kIndexMask = (1u << kIndexBits) - 1;
+inline constexpr std::uint32_t kIsLeafBlock = 1u << 31;
+
 struct Asset {
   GpuAsset asset;
   TreeExtent extent;
+  const WalkBlock* walk_blocks;  ///< of GpuContactQuery
+  std::uint32_t root;            ///< its link
 };
 
 /// What the walk needs to know of an object pair, in whole float4.
@@ -22,13 +38,15 @@ struct alignas(16) PairRecord {
   float4 abs_rotation[3];  ///< w: slack_a
   float slack_b[3];
   float frame_error;
+  float back_translation[3];  ///< of IntervalPose, whose slack the record has then
+  std::uint32_t in_frame;     ///< float32 can take the pair
   const Block *blocks_a, *blocks_b;
   const Triangle *triangles_a, *triangles_b;
+  const WalkBlock *walk_a, *walk_b;
   std::uint32_t instance_a, instance_b;
-  std::uint32_t in_frame;  ///< float32 can take the pair
-  std::uint32_t unused;
+  std::uint32_t root_a, root_b;  ///< links
 };
-static_assert(sizeof(PairRecord) == 160);
+static_assert(sizeof(PairRecord) == 192);
 
 #ifdef __CUDACC__
 

@@ -3,9 +3,10 @@
 
 #include "walk_lane.cuh"
 
-// The walk of both trees of all object pairs, by warps that work on their own: each keeps the block pairs
-// that wait on a stack in shared memory, takes 32 off at a time, a block pair a lane, and puts on what is
-// below the hits. Candidates gather at the other end of the same memory until a warp is full of them. Nothing
+// The walk of both trees of all object pairs, by warps that work on their own. What waits lies on a stack in
+// shared memory: block pairs that were tested, each with the hits whose block pairs below are still to be
+// tested. A warp takes the next 32 of these off, one a lane, tests them, and puts those that hit on. Pairs of
+// leaf blocks gather at the other end of the same memory, until a warp is full of their candidates. Nothing
 // but contacts, and what float32 cannot decide, leaves the multiprocessor.
 //
 // A warp that has nothing left takes object pairs; when there are no more, it takes a number and waits at the
@@ -22,258 +23,379 @@ constexpr std::uint32_t kMostPairsAtOnce = 16;    // object pairs that a warp ta
 constexpr std::uint32_t kRoundsBetweenLooks = 2;  // at whether another warp waits
 constexpr std::uint32_t kFewestToShare = 32;
 constexpr std::uint32_t kMostGifts = 4;
-constexpr std::uint32_t kNoMore = 0xFFFFFFFFu;  // in a mailbox
+constexpr std::uint32_t kNobodyLeft = 0xFFFFFFFEu, kNoMore = 0xFFFFFFFFu;  // kNoMore: in a mailbox
 constexpr std::uint32_t kOutRoom = 64;
+constexpr std::uint32_t kWarpsPerBlock = 4, kBlocksPerProcessor = 4;
 constexpr float kTimesLarger = 4;  // where planes of leaves are worth it, as narrow_phase_walk.h says
 
-// An entry of the stack names two blocks by 29 bits each. The upper bits say which node pairs count, where a
-// leaf block met an internal one: a nibble of the leaf block's nodes, and which block that is.
-constexpr std::uint32_t kIndexBits = 29;
-constexpr std::uint32_t kIndexMask = (1u << kIndexBits) - 1;
-constexpr std::uint32_t kAllNodes = 15;
+// An entry of the stack: x: object pair; y: link to a's block, and in its free bits how the pair goes on; z:
+// link to b's block, and whether both are of one instance; w: a bit for each block pair below that is still
+// to be taken, and above them the hits. Where both descend these are the same; where a alone does, bit 4 i
+// stands for its child i against b's block, and the hits say against which nodes of it; where b alone does,
+// bit j for its child j.
+enum GoesOn : std::uint32_t { kBoth, kBAlone, kAAlone, kRoots };  // kRoots: the two blocks themselves
+constexpr std::uint32_t kSelf = 1u << kIndexBits;                 // in z
 
-struct Entry {
-  std::uint32_t a, b;
+// Shared memory by its own addresses: as pointers, the compiler would compute them anew all the time.
+__device__ inline std::uint32_t load_shared(std::uint32_t address) {
+  std::uint32_t word;
+  asm volatile("ld.shared.u32 %0, [%1];" : "=r"(word) : "r"(address));
+  return word;
+}
+__device__ inline uint4 load_shared4(std::uint32_t address) {
+  uint4 words;
+  asm volatile("ld.shared.v4.u32 {%0, %1, %2, %3}, [%4];"
+               : "=r"(words.x), "=r"(words.y), "=r"(words.z), "=r"(words.w)
+               : "r"(address));
+  return words;
+}
+__device__ inline void store_shared(std::uint32_t address, std::uint32_t word) {
+  asm volatile("st.shared.u32 [%0], %1;" ::"r"(address), "r"(word) : "memory");
+}
+__device__ inline void store_shared4(std::uint32_t address, const uint4& words) {
+  asm volatile("st.shared.v4.u32 [%0], {%1, %2, %3, %4};" ::"r"(address), "r"(words.x), "r"(words.y),
+               "r"(words.z), "r"(words.w)
+               : "memory");
+}
+
+__device__ inline std::uint32_t load_acquire(const std::uint32_t* from) {
+  std::uint32_t word;
+  asm volatile("ld.acquire.gpu.global.u32 %0, [%1];" : "=r"(word) : "l"(from) : "memory");
+  return word;
+}
+__device__ inline void store_release(std::uint32_t* to, std::uint32_t word) {
+  asm volatile("st.release.gpu.global.u32 [%0], %1;" ::"l"(to), "r"(word) : "memory");
+}
+
+/// A block pair as links, and which of its node pairs count.
+struct Below {
+  std::uint32_t a, b, nodes;
 };
 
-__device__ inline Entry make_entry(std::uint32_t a, std::uint32_t b, std::uint32_t nodes, bool nodes_of_a) {
-  return {a | nodes << kIndexBits, b | ((nodes >> 3) | static_cast<std::uint32_t>(nodes_of_a) << 1)
-                                           << kIndexBits};
+/// The block pair that a bit of an entry stands for.
+__device__ inline Below below_of(const WalkBlock* blocks_a, const WalkBlock* blocks_b, const uint4& entry,
+                                 std::uint32_t bit) {
+  constexpr std::uint32_t kLink = kIsLeafBlock | kIndexMask;
+  const std::uint32_t goes_on = entry.y >> kIndexBits & 3u, hits = entry.w >> 16;
+  Below below = {entry.y & kLink, entry.z & kLink, kAllNodePairs};
+  const std::uint32_t a = entry.y & kIndexMask, b = entry.z & kIndexMask;
+  if (goes_on == kBoth || goes_on == kAAlone) below.a = __ldg(&blocks_a[a].link[bit / 4]);
+  if (goes_on == kBoth || goes_on == kBAlone) below.b = __ldg(&blocks_b[b].link[bit % 4]);
+  if (goes_on == kAAlone) below.nodes = (hits >> bit & 0xFu) * 0x1111u;
+  if (goes_on == kBAlone) below.nodes = (hits >> bit & 0x1111u) * 0xFu;
+  return below;
 }
 
-__device__ inline std::uint32_t mask_of(const Entry& entry) {
-  const std::uint32_t high_b = entry.b >> kIndexBits;
-  const std::uint32_t nodes = entry.a >> kIndexBits | (high_b & 1u) << 3;
-  const std::uint32_t rows = (nodes & 1u) | (nodes & 2u) << 3 | (nodes & 4u) << 6 | (nodes & 8u) << 9;
-  return (high_b & 2u) != 0 ? rows * 0xFu : nodes * 0x1111u;
+struct WalkTrees {
+  const WalkBlock *a, *b;
+};
+
+__device__ inline WalkTrees trees_of(const PairRecord& record) {
+  const longlong2 both = __ldg(reinterpret_cast<const longlong2*>(&record.walk_a));
+  return {reinterpret_cast<const WalkBlock*>(both.x), reinterpret_cast<const WalkBlock*>(both.y)};
 }
 
-/// The nodes i of a with a bit 4 i in the mask.
-__device__ inline std::uint32_t nodes_of_column(std::uint32_t mask) {
-  return (mask & 1u) | (mask >> 3 & 2u) | (mask >> 6 & 4u) | (mask >> 9 & 8u);
+/// For each byte the positions of its bits that are set, three bits each, in ascending order.
+__device__ inline void fill_positions(std::uint32_t* positions) {
+  for (std::uint32_t byte = threadIdx.x; byte < 256; byte += blockDim.x) {
+    std::uint32_t word = 0, at = 0;
+    for (std::uint32_t bit = 0; bit < 8; ++bit) {
+      if ((byte >> bit & 1u) != 0) word |= bit << at, at += 3;
+    }
+    positions[byte] = word;
+  }
 }
 
-/// The shared memory of one warp, in words: the indices of the blocks at hand, contacts that wait, three
-/// arrays of `size` entries.
+/// Position of bit number `rank`, from 0, of those set in 16 bits. positions: address of the above.
+__device__ inline std::uint32_t position_of(std::uint32_t positions, std::uint32_t bits, std::uint32_t rank) {
+  const std::uint32_t in_low = __popc(bits & 0xFFu);
+  const bool high = rank >= in_low;
+  const std::uint32_t word = load_shared(positions + 4 * ((high ? bits >> 8 : bits) & 0xFFu));
+  return (word >> 3 * (high ? rank - in_low : rank) & 7u) | (high ? 8 : 0);
+}
+
+/// The shared memory of one warp, in words: contacts that wait, candidates that wait for the whole test, what
+/// was last seen of Balance, the stack.
 __host__ __device__ constexpr std::uint32_t warp_words(std::uint32_t size) {
-  return 8 * kFull + 5 * kOutRoom + (3 * size + 3) / 4 * 4;
+  return 5 * kOutRoom + 3 * kOutRoom + 4 + 4 * size;
 }
+constexpr std::uint32_t kSharedWords = 256;  // of all warps of a block: positions
 
 template <class Means>
 class Walk {
  public:
-  __device__ Walk(const QueryArgs& args, std::uint32_t* memory, std::uint32_t warps)
-      : args_(args),
-        balance_(Means::kWorld ? args.state->world : args.state->frame),
-        size_(args.stack_size),
-        index_rows_(reinterpret_cast<uint4*>(memory)),
-        out_(memory + 8 * kFull),
-        pair_(out_ + 5 * kOutRoom),
-        a_(pair_ + args.stack_size),
-        b_(a_ + args.stack_size),
-        warps_(warps) {}
-
-  __device__ void run() {
-    input_ = Means::kWorld ? args_.state->world_pairs : pair_count(args_);
-    if (input_ == 0) return;
-    more_input_ = true;
-    last_seen_ = 0;
-    if (lane_id() == 0) atomicAdd(&balance_.active, 1u);
-    for (;;) {
-      while (candidates_ >= kFull) settle(kFull);
-      if (height_ < kFull && more_input_) take_pairs();
-      if (height_ == 0) {
-        if (candidates_ != 0) settle(candidates_);
-        if (!more_input_ && !wait_for_gift()) break;
-        continue;
-      }
-      step();
-    }
-    flush(out_count_);
-    if (lane_id() == 0) {
-      atomicAdd(&args_.state->block_pairs, block_pairs_);
-      atomicAdd(&args_.state->candidates, candidates_seen_);
-    }
-  }
-
- private:
-  /// Takes a few object pairs, fewer as they run out.
-  __device__ void take_pairs() {
-    const std::uint32_t left = input_ - last_seen_;
-    std::uint32_t wanted = left / warps_;
-    wanted = wanted < 1 ? 1 : wanted > kMostPairsAtOnce ? kMostPairsAtOnce : wanted;
-    std::uint32_t first = 0;
-    if (lane_id() == 0) first = atomicAdd(&balance_.next_pair, wanted);
-    first = __shfl_sync(kAllLanes, first, 0);
-    if (first >= input_) {
-      more_input_ = false;
-      return;
-    }
-    last_seen_ = first;
-    const std::uint32_t got = wanted < input_ - first ? wanted : input_ - first;
-    bool mine = lane_id() < got;
-    std::uint32_t pair = first + lane_id();
-    if (mine && Means::kWorld) pair = args_.world_pairs[pair];
-    if (mine && !Means::kWorld) mine = args_.pairs[pair].in_frame != 0;
-    const std::uint32_t lanes = __ballot_sync(kAllLanes, mine);
-    if (mine) put(height_ + __popc(lanes & lanes_below()), pair, make_entry(0, 0, kAllNodes, false));
-    height_ += __popc(lanes);
+  /// memory: address of the warp's shared memory.
+  __device__ Walk(const QueryArgs& args, std::uint32_t positions, std::uint32_t memory)
+      : args_(args), balance_(Means::kWorld ? args.state->world : args.state->frame), positions_(positions) {
+    // Through memory, so that the compiler keeps them in registers and does not compute them anew.
+    store_shared(memory + 4 * (threadIdx.x % 32), threadIdx.x % 32);
+    store_shared(memory + 128, memory + 4 * warp_words(0));
+    __syncwarp();
+    lane_ = load_shared(memory + 4 * (threadIdx.x % 32));
+    stack_ = load_shared(memory + 128);
     __syncwarp();
   }
 
-  __device__ void put(std::uint32_t at, std::uint32_t pair, const Entry& entry) {
-    pair_[at] = pair;
-    a_[at] = entry.a;
-    b_[at] = entry.b;
+  __device__ void run() {
+    const std::uint32_t pairs = input();
+    if (pairs == 0) return;
+    if (lane_ == 0) atomicAdd(&balance_.active, 1u);
+    // The first without asking.
+    const std::uint32_t share = share_of(pairs);
+    more_input_ = share * warps() < pairs;
+    put_pairs(share * (blockIdx.x * kWarpsPerBlock + threadIdx.x / 32), share, pairs);
+    for (;;) {
+      // Each of these is called in one place: the code is to stay small, for the caches of instructions.
+      const std::uint32_t least = waiting_ == 0 && !more_input_ ? 1 : kFull;
+      while (candidates_ >= least || open_count_ >= least) {
+        if (candidates_ >= least && open_count_ < kFull)
+          settle(candidates_ < kFull ? candidates_ : kFull);
+        else
+          judge_open(open_count_ < kFull ? open_count_ : kFull);
+      }
+      if (waiting_ < kFull && more_input_) take_pairs();
+      if (waiting_ != 0)
+        step();
+      else if (least == 1 &&
+               !wait_for_gift())  // not where take_pairs() just found the end: see to the rest first
+        break;
+    }
+    flush(out_count_);
+    add_counters();
   }
 
-  /// Takes up to 32 block pairs off, tests them and puts on what is below: at most 16 for each, of children
-  /// or of candidates. Where that would not fit, as many as fit go on, and the others stay as they were, or
-  /// all but the last put on. A single one always fits into the reserve, and, being the last put on, so does
-  /// all that is below it: from there on a step puts 15 on net only where both sides go down a level, and at
-  /// most 3 where one does, so stack_reserve is 15 for each level of the deeper tree but one; candidates are
-  /// settled in between.
-  __device__ void step() {
-    const std::uint32_t count = height_ < kFull ? height_ : kFull;
-    const bool looks = ++rounds_ % kRoundsBetweenLooks == 0;
-    uint4 seen = {0, 0, 0, 0};
-    if (looks) seen = look();  // comes while the boxes are tested
-    bool mine = lane_id() < count;
-    std::uint32_t pair = 0;
-    Entry entry = {0, 0};
-    const Block *block_a = nullptr, *block_b = nullptr;
-    const PairRecord* record = nullptr;
-    if (mine) {
-      const std::uint32_t at = height_ - count + lane_id();
-      pair = pair_[at];
-      entry = {a_[at], b_[at]};
-      if (args_.first_contact_only) mine = *static_cast<volatile std::uint32_t*>(&args_.met[pair]) == 0;
+ private:
+  __device__ std::uint32_t lanes_below() const { return (1u << lane_) - 1; }
+  __device__ std::uint32_t out() const { return stack_ - 4 * warp_words(0); }
+  __device__ std::uint32_t open() const { return out() + 4 * 5 * kOutRoom; }
+  __device__ std::uint32_t seen() const { return stack_ - 16; }  ///< active, given, asked, next_pair
+
+  __device__ std::uint32_t input() const {
+    return Means::kWorld ? args_.state->world_pairs : pair_count(args_);
+  }
+
+  /// Adds what the lanes counted; before 32 bits are full.
+  __device__ void add_counters() {
+    const std::uint32_t high = __reduce_add_sync(kAllLanes, block_pairs_ >> 16),
+                        low = __reduce_add_sync(kAllLanes, block_pairs_ & 0xFFFFu);
+    const std::uint32_t high_seen = __reduce_add_sync(kAllLanes, candidates_seen_ >> 16),
+                        low_seen = __reduce_add_sync(kAllLanes, candidates_seen_ & 0xFFFFu);
+    if (lane_ == 0) {
+      atomicAdd(&args_.state->block_pairs, (static_cast<Counter>(high) << 16) + low);
+      atomicAdd(&args_.state->candidates, (static_cast<Counter>(high_seen) << 16) + low_seen);
     }
-    if (mine) {
-      record = &args_.pairs[pair];
-      block_a = record->blocks_a + (entry.a & kIndexMask);
-      block_b = record->blocks_b + (entry.b & kIndexMask);
-    }
-    std::uint32_t hits = 0, below = 0, leaves = 0;  // leaves: bit 0: a is a leaf block, bit 1: b is
-    if (mine) {
-      const bool leaf_a = is_leaf_block(block_a), leaf_b = is_leaf_block(block_b);
-      float size_a, size_b;
-      hits = Means::test(args_, *record, block_a, block_b, size_a, size_b) & mask_of(entry);
-      leaves = static_cast<std::uint32_t>(leaf_a) | static_cast<std::uint32_t>(leaf_b) << 1;
-      if (hits != 0) {
-        index_rows_[2 * lane_id()] = __ldg(reinterpret_cast<const uint4*>(block_a->index));
-        index_rows_[2 * lane_id() + 1] = __ldg(reinterpret_cast<const uint4*>(block_b->index));
-        if (((entry.a ^ entry.b) & kIndexMask) == 0 && record->instance_a == record->instance_b)
-          hits &= leaves != 0 ? kNodePairsAbove : kNodePairsAbove | kNodePairsEqual;
-        if (leaves == 1 ? size_a > kTimesLarger * size_b : leaves == 2 && size_b > kTimesLarger * size_a)
-          hits = Means::drop_beyond_planes(*record, *block_a, *block_b, leaf_a, hits);
-        if (leaves == 0)
-          leaves = size_a > kDescendsAlone * size_b ? 2 : size_b > kDescendsAlone * size_a ? 1 : 0;
+    block_pairs_ = candidates_seen_ = 0;
+  }
+
+  __device__ static std::uint32_t warps() { return gridDim.x * kWarpsPerBlock; }
+
+  /// How many object pairs each warp begins with.
+  __device__ static std::uint32_t share_of(std::uint32_t pairs) {
+    const std::uint32_t share = pairs / warps();
+    return share < 1 ? 1 : share < kMostPairsAtOnce ? share : kMostPairsAtOnce;
+  }
+
+  /// Takes a few of the other object pairs, fewer as they run out. next_pair counts these.
+  __device__ void take_pairs() {
+    const std::uint32_t pairs = input(), before = warps() * share_of(pairs), others = pairs - before;
+    std::uint32_t first = others, wanted = 0;
+    if (lane_ == 0) {
+      const std::uint32_t taken = *static_cast<volatile std::uint32_t*>(&balance_.next_pair);
+      if (taken < others) {
+        wanted = share_of(others - taken);
+        first = atomicAdd(&balance_.next_pair, wanted);
       }
+    }
+    first = __shfl_sync(kAllLanes, first, 0);
+    if (first >= others)
+      more_input_ = false;
+    else
+      put_pairs(before + first, __shfl_sync(kAllLanes, wanted, 0), pairs);
+  }
+
+  __device__ void put_pairs(std::uint32_t first, std::uint32_t count, std::uint32_t pairs) {
+    bool mine = lane_ < count && first < pairs && lane_ < pairs - first;
+    std::uint32_t pair = first + lane_;
+    if (mine && Means::kWorld) pair = args_.world_pairs[pair];
+    if (mine && !Means::kWorld) mine = args_.pairs[pair].in_frame != 0;
+    const std::uint32_t lanes = __ballot_sync(kAllLanes, mine);
+    if (mine) {
+      const PairRecord& record = args_.pairs[pair];
+      const std::uint32_t self = record.instance_a == record.instance_b ? kSelf : 0;
+      store_shared4(stack_ + 16 * (height_ + __popc(lanes & lanes_below())),
+                    {pair, record.root_a | kRoots << kIndexBits, record.root_b | self, 1});
+    }
+    height_ += __popc(lanes);
+    waiting_ += __popc(lanes);
+    __syncwarp();
+  }
+
+  /// What a lane got.
+  struct Taken {
+    uint4 entry;
+    std::uint32_t bit;
+    bool mine;
+  };
+
+  /// Takes `count` bits of the newest entries off, one a lane, neighbours from one entry. newest: address of
+  /// the newest entry; kOlder: the way to the one before it. entries: how many there are, before and after.
+  /// Condition: they have so many bits.
+  ///
+  /// Lane l looks at the l-th newest entry. Each has at least one bit, at most 16, so four ballots tell how
+  /// many bits those before it have. Numbered through, the first bits of the entries are starts: the entry
+  /// that lane l takes from is the one of the last start up to l.
+  template <int kOlder>
+  __device__ Taken take(std::uint32_t count, std::uint32_t newest, std::uint32_t& entries) {
+    constexpr auto kStep = static_cast<std::uint32_t>(kOlder * 16);
+    const bool there = lane_ < entries;
+    const std::uint32_t bits = there ? load_shared(newest + kStep * lane_ + 12) & 0xFFFFu : 1;
+    const std::uint32_t more = __popc(bits) - 1;  // than one
+    std::uint32_t before = lane_;
+#pragma unroll
+    for (int digit = 0; digit < 4; ++digit) {
+      before += __popc(__ballot_sync(kAllLanes, (more >> digit & 1u) != 0) & lanes_below()) << digit;
+    }
+    const std::uint32_t starts = __reduce_or_sync(kAllLanes, there && before < 32 ? 1u << before : 0);
+    const std::uint32_t emptied = __popc(__ballot_sync(kAllLanes, there && before + more < count));
+    Taken out = {{0, 0, 0, 0}, 0, lane_ < count};
+    std::uint32_t from = 0, left = 0;
+    if (out.mine) {
+      const std::uint32_t up_to = starts & (2 * lanes_below() + 1);
+      from = newest + kStep * (__popc(up_to) - 1);
+      out.entry = load_shared4(from);
+      out.bit = position_of(positions_, out.entry.w & 0xFFFFu, lane_ - (31 - __clz(static_cast<int>(up_to))));
+      left = out.entry.w & (0xFFFEu << out.bit & 0xFFFFu);
+    }
+    __syncwarp();  // what is overwritten from now on, all lanes have read
+    if (lane_ == count - 1 && left != 0) store_shared(from + 12, (out.entry.w & 0xFFFF0000u) | left);
+    entries -= emptied;
+    return out;
+  }
+
+  /// Takes up to 32 block pairs off, tests them and puts on those that hit: no more than were taken. Where
+  /// there is little room, fewer are taken, at last one at a time: from there on at most one entry for each
+  /// level of the two trees goes on before what was below is reached again, and at most 32 pairs of leaf
+  /// blocks, each with a candidate. So stack_reserve is the two depths and 32.
+  __device__ void step() {
+    const std::uint32_t room = args_.stack_size - height_ - leaf_pairs_, reserve = args_.stack_reserve;
+    std::uint32_t count = waiting_ < kFull ? waiting_ : kFull;
+    if (room < count + reserve) count = room > reserve ? room - reserve : 1;
+    const bool looks = ++rounds_ % kRoundsBetweenLooks == 0;
+    if (looks) look();  // comes while the boxes are tested
+    const Taken taken = take<-1>(count, stack_ + 16 * (height_ - 1), height_);
+    waiting_ -= count;
+    bool mine = taken.mine;
+    const std::uint32_t pair = taken.entry.x;
+    if (mine && args_.first_contact_only) mine = *static_cast<volatile std::uint32_t*>(&args_.met[pair]) == 0;
+    std::uint32_t hits = 0, below = 0, goes_on = kBoth;
+    bool of_leaves = false;
+    Below now = {0, 0, 0};
+    if (mine) {
+      const PairRecord& record = args_.pairs[pair];
+      const WalkTrees trees = trees_of(record);
+      now = below_of(trees.a, trees.b, taken.entry, taken.bit);
+      const std::uint32_t a = now.a & kIndexMask, b = now.b & kIndexMask;
+      float size_a, size_b;
+      hits = Means::test(args_, record, trees.a, trees.b, a, b, size_a, size_b) & now.nodes;
+      const bool leaf_a = (now.a & kIsLeafBlock) != 0, leaf_b = (now.b & kIsLeafBlock) != 0;
+      of_leaves = leaf_a & leaf_b;
+      if ((taken.entry.z & kSelf) != 0 && a == b)
+        hits &= leaf_a ? kNodePairsAbove : kNodePairsAbove | kNodePairsEqual;
+      // The larger of two alone; of a leaf block and another, the other.
+      const float times = leaf_a != leaf_b ? kTimesLarger : kDescendsAlone;
+      const bool larger_a = size_a > times * size_b, larger_b = size_b > times * size_a;
+      if (leaf_a != leaf_b && (leaf_a ? larger_a : larger_b) && hits != 0)
+        hits = Means::drop_beyond_planes(record, a, b, leaf_a, hits);
+      const bool a_alone = leaf_a == leaf_b ? larger_a : leaf_b,
+                 b_alone = leaf_a == leaf_b ? larger_b : leaf_a;
       below = hits;
-      if (leaves == 1) {
+      if (!of_leaves && b_alone) {
+        goes_on = kBAlone;
         below |= hits >> 4;
         below = (below | below >> 8) & 0xFu;
-      } else if (leaves == 2) {
+      }
+      if (!of_leaves && a_alone) {
+        goes_on = kAAlone;
         below |= hits >> 1;
         below = (below | below >> 2) & 0x1111u;
       }
     }
-    std::uint32_t sum = sum_below(below, leaves);
-    std::uint32_t total = __shfl_sync(kAllLanes, sum, 31), kept = 0;
-    const int room =
-        static_cast<int>(size_ - args_.stack_reserve) - static_cast<int>(candidates_ + height_ - count);
-    const int all = static_cast<int>((total & 0xFFFFu) + (total >> 16));
-    if (all > room) {
-      // Those before this lane would stay, with nothing put on for them.
-      const std::uint32_t before = sum - (__popc(below) << (leaves == 3 ? 16 : 0));
-      const int left =
-          all - static_cast<int>((before & 0xFFFFu) + (before >> 16)) + static_cast<int>(lane_id());
-      const std::uint32_t fits = __ballot_sync(kAllLanes, left <= room && lane_id() < count);
-      kept = fits != 0 ? __ffs(static_cast<int>(fits)) - 1 : count - 1;
-      if (lane_id() < kept) below = 0;
-      sum = sum_below(below, leaves);
-      total = __shfl_sync(kAllLanes, sum, 31);
-    }
-    block_pairs_ += __popc(__ballot_sync(kAllLanes, mine && lane_id() >= kept));
-    height_ -= count - kept;
-    expand(pair, entry, hits | leaves << 16, below, sum, total);
-    if (looks && height_ >= kFewestToShare) share(seen);
-  }
-
-  __device__ static bool is_leaf_block(const Block* block) {
-    return __ldg(reinterpret_cast<const std::uint32_t*>(block->kind)) ==
-           static_cast<std::uint32_t>(NodeKind::leaf);
-  }
-
-  /// How many come of this lane and those before it: children in the low half, candidates in the high one.
-  __device__ static std::uint32_t sum_below(std::uint32_t below, std::uint32_t leaves) {
-    std::uint32_t sum = __popc(below) << (leaves == 3 ? 16 : 0);
-#pragma unroll
-    for (int d = 1; d < 32; d *= 2) {
-      const std::uint32_t other = __shfl_up_sync(kAllLanes, sum, d);
-      if (static_cast<int>(lane_id()) >= d) sum += other;
-    }
-    return sum;
-  }
-
-  /// First each lane leaves a note, its number and a bit, wherever something of it is to come; then lanes
-  /// carry out the notes, 32 at a time.
-  __device__ void expand(std::uint32_t pair, const Entry& entry, std::uint32_t hits_and_leaves,
-                         std::uint32_t below, std::uint32_t sum, std::uint32_t total) {
-    __syncwarp();  // what is overwritten now, other lanes have read
-    const bool to_candidates = hits_and_leaves >> 16 == 3;
-    const std::uint32_t before = sum - (__popc(below) << (to_candidates ? 16 : 0));
-    std::uint32_t* at =
-        pair_ + (to_candidates ? size_ - 1 - candidates_ - (before >> 16) : height_ + (before & 0xFFFFu));
-    const int direction = to_candidates ? -1 : 1;
-    while (below != 0) {
-      const int bit = 31 - __clz(static_cast<int>(below));
-      *at = lane_id() * 16 + bit;
-      at += direction;
-      below ^= 1u << bit;
-    }
+    block_pairs_ += mine;
+    put({pair, now.a | goes_on << kIndexBits, now.b | (taken.entry.z & kSelf), below | hits << 16},
+        of_leaves);
+    if (!looks) return;
+    asm volatile("cp.async.wait_all;" ::: "memory");
     __syncwarp();
-    const std::uint32_t children = total & 0xFFFFu, all = children + (total >> 16);
-    for (std::uint32_t first = 0; first < all; first += kFull) {
-      const std::uint32_t k = first + lane_id();
-      const std::uint32_t slot = k < children ? height_ + k : size_ - 1 - candidates_ - (k - children);
-      const std::uint32_t note = k < all ? pair_[slot] : 0, bit = note % 16;
-      const int from = static_cast<int>(note / 16);
-      const std::uint32_t its_pair = __shfl_sync(kAllLanes, pair, from);
-      const Entry above = {__shfl_sync(kAllLanes, entry.a, from), __shfl_sync(kAllLanes, entry.b, from)};
-      const std::uint32_t flags = __shfl_sync(kAllLanes, hits_and_leaves, from);
-      if (k < all) put(slot, its_pair, below_of(above, from, flags, bit));
-    }
-    height_ += children;
-    candidates_ += total >> 16;
+    if (waiting_ >= kFewestToShare) share();
+    if (rounds_ >= 1u << 26) add_counters(), rounds_ = 0;
+  }
+
+  /// Puts on the entry of each lane that has something below.
+  __device__ void put(const uint4& entry, bool of_leaves) {
+    const std::uint32_t bits = __popc(entry.w & 0xFFFFu);
+    const std::uint32_t lanes = __ballot_sync(kAllLanes, bits != 0 && !of_leaves);
+    const std::uint32_t leaf_lanes = __ballot_sync(kAllLanes, bits != 0 && of_leaves);
+    const std::uint32_t all = __reduce_add_sync(kAllLanes, of_leaves ? bits << 16 : bits);
+    const std::uint32_t before = __popc((of_leaves ? leaf_lanes : lanes) & lanes_below());
+    const std::uint32_t at = of_leaves ? args_.stack_size - 1 - leaf_pairs_ - before : height_ + before;
+    if (bits != 0) store_shared4(stack_ + 16 * at, entry);
+    height_ += __popc(lanes);
+    leaf_pairs_ += __popc(leaf_lanes);
+    waiting_ += all & 0xFFFFu;
+    candidates_ += all >> 16;
     __syncwarp();
   }
 
-  /// What comes of a bit of a block pair that hits. flags: hits, and above them 3 for two leaf blocks, 2
-  /// where a descends alone, 1 where b does.
-  __device__ Entry below_of(const Entry& above, int lane, std::uint32_t flags, std::uint32_t bit) const {
-    const std::uint32_t i = bit / 4, j = bit % 4, a = above.a & kIndexMask, b = above.b & kIndexMask;
-    const auto* index = reinterpret_cast<const std::uint32_t*>(index_rows_ + 2 * lane);
-    const std::uint32_t leaves = flags >> 16, index_a = index[i], index_b = index[4 + j];
-    if (leaves == 3) return {index_a, index_b};
-    if (leaves == 0) return make_entry(index_a, index_b, kAllNodes, false);
-    if (leaves == 2) return make_entry(index_a, b, flags >> (4 * i) & 0xFu, false);
-    return make_entry(a, index_b, nodes_of_column(flags >> j & 0x1111u), true);
-  }
-
-  /// Decides the last candidates; count <= 32.
+  /// Decides the last candidates, or leaves what is not seen to be apart at once for a full warp; count
+  /// <= 32.
   __device__ void settle(std::uint32_t count) {
-    const bool mine = lane_id() < count;
-    Judged judged = {0, 0, false, false};
+    const Taken taken = take<1>(count, stack_ + 16 * (args_.stack_size - leaf_pairs_), leaf_pairs_);
+    candidates_ -= count;
+    candidates_seen_ += taken.mine;
+    Below now = {0, 0, 0};
+    const std::uint32_t pair = taken.entry.x;
+    if (taken.mine) {
+      const WalkTrees trees = trees_of(args_.pairs[pair]);
+      now = below_of(trees.a, trees.b, taken.entry, taken.bit);
+    }
+    if constexpr (Means::kScreens)
+      screen(taken.mine, pair, now.a, now.b);
+    else
+      judge(taken.mine, pair, now.a, now.b);
+  }
+
+  __device__ void screen(bool mine, std::uint32_t pair, std::uint32_t a, std::uint32_t b) {
+    bool left = false;
+    if (mine) left = !Means::apart(args_.pairs[pair], a, b);
+    const std::uint32_t lanes = __ballot_sync(kAllLanes, left);
+    if (left) {
+      const std::uint32_t at = open() + 4 * (open_count_ + __popc(lanes & lanes_below()));
+      store_shared(at, pair);
+      store_shared(at + 4 * kOutRoom, a);
+      store_shared(at + 8 * kOutRoom, b);
+    }
+    open_count_ += __popc(lanes);
+    __syncwarp();
+  }
+
+  /// Decides the last of the candidates that are left; count <= 32.
+  __device__ void judge_open(std::uint32_t count) {
+    open_count_ -= count;
+    const std::uint32_t at = open() + 4 * (open_count_ + lane_);
+    const bool mine = lane_ < count;
     std::uint32_t pair = 0, a = 0, b = 0;
     if (mine) {
-      const std::uint32_t at = size_ - candidates_ + lane_id();
-      pair = pair_[at], a = a_[at], b = b_[at];
-      judged = Means::judge(args_.pairs[pair], a, b);
+      pair = load_shared(at);
+      a = load_shared(at + 4 * kOutRoom);
+      b = load_shared(at + 8 * kOutRoom);
     }
-    candidates_ -= count;
-    candidates_seen_ += count;
+    __syncwarp();
+    judge(mine, pair, a, b);
+  }
+
+  __device__ void judge(bool mine, std::uint32_t pair, std::uint32_t a, std::uint32_t b) {
+    Judged judged = {0, 0, false, false};
+    if (mine) judged = Means::judge(args_.pairs[pair], a, b);
     if (__any_sync(kAllLanes, judged.undecided)) {
       const Counter place = place_for(judged.undecided, &args_.state->undecided);
       if (judged.undecided && place < args_.capacity.undecided) args_.undecided[place] = {pair, a, b};
@@ -282,14 +404,13 @@ class Walk {
     const std::uint32_t lanes = __ballot_sync(kAllLanes, judged.contact);
     if (lanes == 0) return;
     if (judged.contact) {
-      const std::uint32_t at = out_count_ + __popc(lanes & lanes_below());
       const bool self = args_.pairs[pair].instance_a == args_.pairs[pair].instance_b;
       const Contact contact = make_contact(pair, self, a, b, judged.face_a, judged.face_b);
-      out_[at] = contact.pair;
-      out_[kOutRoom + at] = contact.triangle_a;
-      out_[2 * kOutRoom + at] = contact.triangle_b;
-      out_[3 * kOutRoom + at] = contact.face_a;
-      out_[4 * kOutRoom + at] = contact.face_b;
+      const std::uint32_t words[5] = {contact.pair, contact.triangle_a, contact.triangle_b, contact.face_a,
+                                      contact.face_b};
+      const std::uint32_t at = out() + 4 * (out_count_ + __popc(lanes & lanes_below()));
+#pragma unroll
+      for (int i = 0; i < 5; ++i) store_shared(at + 4 * kOutRoom * i, words[i]);
     }
     out_count_ += __popc(lanes);
     __syncwarp();
@@ -301,33 +422,33 @@ class Walk {
     if (count == 0) return;
     out_count_ -= count;
     Counter first = 0;
-    if (lane_id() == 0) first = atomicAdd(&args_.state->contacts, static_cast<Counter>(count));
-    const Counter place = __shfl_sync(kAllLanes, first, 0) + lane_id();
-    const std::uint32_t at = out_count_ + lane_id();
-    if (lane_id() < count && place < args_.capacity.contacts) {
-      args_.contacts[place] = {out_[at], out_[kOutRoom + at], out_[2 * kOutRoom + at],
-                               out_[3 * kOutRoom + at], out_[4 * kOutRoom + at]};
-    }
+    if (lane_ == 0) first = atomicAdd(&args_.state->contacts, static_cast<Counter>(count));
+    const Counter place = __shfl_sync(kAllLanes, first, 0) + lane_;
+    std::uint32_t words[5];
+#pragma unroll
+    for (int i = 0; i < 5; ++i)
+      words[i] = load_shared(out() + 4 * (kOutRoom * i + (out_count_ + lane_) % kOutRoom));
+    if (lane_ < count && place < args_.capacity.contacts)
+      args_.contacts[place] = {words[0], words[1], words[2], words[3], words[4]};
     __syncwarp();
   }
 
-  __device__ uint4 look() const {
-    uint4 seen;
-    asm volatile("ld.volatile.global.v4.u32 {%0, %1, %2, %3}, [%4];"
-                 : "=r"(seen.x), "=r"(seen.y), "=r"(seen.z), "=r"(seen.w)
-                 : "l"(&balance_));
-    return seen;  // active, given, asked, next_pair
+  /// Begins to fetch the head of Balance.
+  __device__ void look() const {
+    if (lane_ == 0)
+      asm volatile("cp.async.cg.shared.global [%0], [%1], 16;" ::"r"(seen()), "l"(&balance_) : "memory");
   }
 
-  /// Gives the oldest block pairs, which have the most below them, to warps that wait for some.
-  __device__ void share(const uint4& seen) {
-    const int waiting = __shfl_sync(kAllLanes, static_cast<int>(seen.z - seen.y), 0);
-    if (waiting <= 0) return;
-    std::uint32_t gifts = height_ / kFewestToShare;
+  /// Gives the oldest entries, which have the most below them, to warps that wait for some.
+  __device__ void share() {
+    const auto waiting = static_cast<int>(load_shared(seen() + 8) - load_shared(seen() + 4));
+    if (waiting <= 0 || height_ < 2) return;
+    std::uint32_t gifts = waiting_ / kFewestToShare;
     gifts = gifts < kMostGifts ? gifts : kMostGifts;
     gifts = gifts < static_cast<std::uint32_t>(waiting) ? gifts : waiting;
+    gifts = gifts < height_ - 1 ? gifts : height_ - 1;
     std::uint32_t number = 0;
-    if (lane_id() == 0) {
+    if (lane_ == 0) {
       // Active and given at once: a gift counts as active from now on, on behalf of the one who gets it.
       const Counter before =
           atomicAdd(reinterpret_cast<Counter*>(&balance_.active), static_cast<Counter>(gifts) << 32 | gifts);
@@ -340,58 +461,53 @@ class Walk {
   }
 
   /// kChunks numbers ago the chunk and its mailbox served another warp, which has that number, and empties
-  /// the mailbox when it is done with the chunk.
+  /// the mailbox when it is done with the chunk. At least twice as many entries are there as are given.
   __device__ void give(std::uint32_t chunk, std::uint32_t count) {
-    auto* mailbox = static_cast<volatile std::uint32_t*>(&balance_.mailbox[chunk]);
-    const std::uint32_t lane = lane_id();
-    if (lane == 0) {
-      while (*mailbox != 0) {
+    std::uint32_t* const mailbox = &balance_.mailbox[chunk];
+    if (lane_ == 0) {
+      while (load_acquire(mailbox) != 0) {
       }
-      __threadfence();
     }
     __syncwarp();
-    Chunk& to = args_.chunks[chunk];
     height_ -= count;
-    if (lane < count) {
-      to.pair[lane] = pair_[lane], to.a[lane] = a_[lane], to.b[lane] = b_[lane];
+    std::uint32_t bits = 0;
+    if (lane_ < count) {
+      const uint4 entry = load_shared4(stack_ + 16 * lane_);
+      bits = __popc(entry.w & 0xFFFFu);
+      args_.chunks[chunk].entry[lane_] = entry;
       // The newest fill the gap.
-      const std::uint32_t last = height_ + lane;
-      put(lane, pair_[last], {a_[last], b_[last]});
+      store_shared4(stack_ + 16 * lane_, load_shared4(stack_ + 16 * (height_ + lane_)));
     }
-    __threadfence();
+    waiting_ -= __reduce_add_sync(kAllLanes, bits);
     __syncwarp();
-    if (lane == 0) *mailbox = count;
+    if (lane_ == 0) store_release(mailbox, count);
   }
 
-  /// Asks for block pairs that another warp gives away, and waits. False: no warp has any left.
+  /// Asks for entries that another warp gives away, and waits. False: no warp has any left.
   __device__ bool wait_for_gift() {
-    std::uint32_t number = 0, others = 0;
-    if (lane_id() == 0) {
+    std::uint32_t number = 0, count = 0;
+    if (lane_ == 0) {
       number = atomicAdd(&balance_.asked, 1u) % kChunks;
       __threadfence();
-      others = atomicSub(&balance_.active, 1u) - 1;
-    }
-    others = __shfl_sync(kAllLanes, others, 0);
-    if (others == 0) {
-      end_all();
-      return false;
+      if (atomicSub(&balance_.active, 1u) == 1)
+        count = kNobodyLeft;
+      else
+        while ((count = load_acquire(&balance_.mailbox[number])) == 0) __nanosleep(100);
     }
     number = __shfl_sync(kAllLanes, number, 0);
-    auto* mailbox = static_cast<volatile std::uint32_t*>(&balance_.mailbox[number]);
-    std::uint32_t count = 0;
-    if (lane_id() == 0) {
-      while ((count = *mailbox) == 0) __nanosleep(100);
-      __threadfence();
-    }
     count = __shfl_sync(kAllLanes, count, 0);
-    if (count == kNoMore) return false;
-    const Chunk& from = args_.chunks[number];
-    const std::uint32_t lane = lane_id();
-    if (lane < count) put(lane, __ldcg(&from.pair[lane]), {__ldcg(&from.a[lane]), __ldcg(&from.b[lane])});
+    if (count == kNobodyLeft) end_all();
+    if (count >= kNobodyLeft) return false;
+    std::uint32_t bits = 0;
+    if (lane_ < count) {
+      const uint4 entry = __ldcg(&args_.chunks[number].entry[lane_]);
+      store_shared4(stack_ + 16 * lane_, entry);
+      bits = __popc(entry.w & 0xFFFFu);
+    }
     height_ = count;
-    __threadfence();
+    waiting_ = __reduce_add_sync(kAllLanes, bits);
     __syncwarp();
-    if (lane == 0) *mailbox = 0;
+    if (lane_ == 0) store_release(&balance_.mailbox[number], 0);
     return true;
   }
 
@@ -399,42 +515,45 @@ class Walk {
   /// received. A warp that starts late turns active, finds nothing, and, when none else is active, comes
   /// here.
   __device__ void end_all() {
-    const uint4 seen = look();
-    for (std::uint32_t i = seen.y + lane_id(); i < seen.z; i += 32) {
+    const std::uint32_t given = *static_cast<volatile std::uint32_t*>(&balance_.given),
+                        asked = *static_cast<volatile std::uint32_t*>(&balance_.asked);
+    for (std::uint32_t i = given + lane_; i < asked; i += 32) {
       *static_cast<volatile std::uint32_t*>(&balance_.mailbox[i % kChunks]) = kNoMore;
     }
   }
 
   const QueryArgs& args_;
   Balance& balance_;
-  const std::uint32_t size_;
-  uint4* const index_rows_;
-  std::uint32_t *const out_, *const pair_, *const a_, *const b_;
-  const std::uint32_t warps_;
-  std::uint32_t input_ = 0, last_seen_ = 0, rounds_ = 0;
-  std::uint32_t height_ = 0, candidates_ = 0, out_count_ = 0;
-  Counter block_pairs_ = 0, candidates_seen_ = 0;
+  const std::uint32_t positions_;
+  std::uint32_t stack_;  // address
+  std::uint32_t lane_;
+  std::uint32_t rounds_ = 0;
+  std::uint32_t height_ = 0, leaf_pairs_ = 0;   // entries
+  std::uint32_t waiting_ = 0, candidates_ = 0;  // their bits
+  std::uint32_t open_count_ = 0, out_count_ = 0;
+  std::uint32_t block_pairs_ = 0, candidates_seen_ = 0;  // of this lane
   bool more_input_ = true;
 };
-
-// 16 warps of 128 registers fill a multiprocessor. With 96 registers and 20 warps spills cost 10 % more.
-constexpr std::uint32_t kWarpsPerBlock = 4, kBlocksPerProcessor = 4;
 
 template <class Means>
 __global__ void __launch_bounds__(32 * kWarpsPerBlock, kBlocksPerProcessor)
     walk(const __grid_constant__ QueryArgs args) {
   extern __shared__ float4 memory[];
+  fill_positions(reinterpret_cast<std::uint32_t*>(memory));
+  __syncthreads();
+  wait_for_kernel_before();
   if (failed(args)) return;
-  const std::uint32_t warp = threadIdx.x / 32;
-  Walk<Means> walk(args, reinterpret_cast<std::uint32_t*>(memory) + warp * warp_words(args.stack_size),
-                   gridDim.x * kWarpsPerBlock);
+  const auto positions = static_cast<std::uint32_t>(__cvta_generic_to_shared(memory));
+  Walk<Means> walk(args, positions,
+                   positions + 4 * (kSharedWords + threadIdx.x / 32 * warp_words(args.stack_size)));
   walk.run();
 }
 
 template <class Means>
 cudaError_t launch_walk(const QueryArgs& args, cudaStream_t stream) {
   const auto kernel = walk<Means>;
-  const std::size_t bytes = kWarpsPerBlock * warp_words(args.stack_size) * sizeof(std::uint32_t);
+  const std::size_t bytes =
+      (kSharedWords + kWarpsPerBlock * warp_words(args.stack_size)) * sizeof(std::uint32_t);
   int device = 0, processors = 0, blocks = 0;
   cudaError_t error = cudaGetDevice(&device);
   if (error == cudaSuccess)
@@ -447,8 +566,7 @@ cudaError_t launch_walk(const QueryArgs& args, cudaStream_t stream) {
   if (error != cudaSuccess) return error;
   blocks = std::min(blocks * processors, static_cast<int>(kChunks / 2 / kWarpsPerBlock));
   if (args.most_blocks != 0) blocks = std::min(blocks, static_cast<int>(args.most_blocks));
-  kernel<<<static_cast<unsigned>(blocks), 32 * kWarpsPerBlock, bytes, stream>>>(args);
-  return cudaGetLastError();
+  return launch_after(kernel, static_cast<unsigned>(blocks), 32 * kWarpsPerBlock, bytes, args, stream);
 }
 
 }  // namespace

@@ -1,11 +1,12 @@
 #pragma once
 #include "gpu_query_data.h"
 #include "tandem/kernels/frame_test.h"
+#include "tandem/kernels/interval_test.h"
 #include "tandem/kernels/traversal.h"
 #include "tandem/kernels/world_box.h"
 
-// What one lane of a walk does with a block pair and with a candidate, in the frame of the first of a pair or in
-// world coordinates.
+// What one lane of a walk does with a block pair and with a candidate, in the frame of the first of a pair or
+// in world coordinates.
 //
 // Included by files that are compiled with and without fused operations: internal linkage.
 namespace tandem::gpu {
@@ -28,7 +29,7 @@ __device__ inline float size_of(const Four (&h)[3]) {
 }
 
 /// block_pair_mask(), and size_of() both, in whole float4.
-__device__ inline std::uint32_t mask_of_block_pair(const Block& block_a, const Block& block_b,
+__device__ inline std::uint32_t mask_of_block_pair(const WalkBlock& block_a, const WalkBlock& block_b,
                                                    const RelativePose& pose, float& size_a, float& size_b) {
   const auto* a = reinterpret_cast<const float4*>(&block_a);
   const auto* b = reinterpret_cast<const float4*>(&block_b);
@@ -81,6 +82,57 @@ __device__ inline std::uint32_t mask_of_block_pair(const Block& block_a, const B
   return mask;
 }
 
+/// overlap_intervals() of all node pairs, and size_of() both.
+__device__ inline std::uint32_t interval_mask(const PairRecord& record, const WalkBlock& block_a,
+                                              const WalkBlock& block_b, float& size_a, float& size_b) {
+  const auto* a = reinterpret_cast<const float4*>(&block_a);
+  const auto* b = reinterpret_cast<const float4*>(&block_b);
+  const RelativePose pose = pose_of(record);
+  const float4 last = __ldg(reinterpret_cast<const float4*>(record.back_translation));
+  const float back[3] = {last.x, last.y, last.z};
+  Four cb[3], hb[3], ca[3], ha[3];
+#pragma unroll
+  for (int k = 0; k < 3; ++k) cb[k] = four(__ldg(b + k)), hb[k] = four(__ldg(b + 3 + k));
+#pragma unroll
+  for (int k = 0; k < 3; ++k) ca[k] = four(__ldg(a + k)), ha[k] = four(__ldg(a + 3 + k));
+  float posed[4][3], reach[4][3];
+#pragma unroll
+  for (int j = 0; j < 4; ++j) {
+    const float center[3] = {cb[0].v[j], cb[1].v[j], cb[2].v[j]};
+    const float half[3] = {hb[0].v[j], hb[1].v[j], hb[2].v[j]};
+#pragma unroll
+    for (int k = 0; k < 3; ++k) {
+      posed[j][k] = interval_terms::b_in_a(pose, k, center);
+      reach[j][k] = interval_terms::b_along_a(pose, k, half);
+    }
+  }
+  size_b = size_of(hb);
+  size_a = size_of(ha);
+  std::uint32_t mask = 0;
+#pragma unroll
+  for (int i = 0; i < 4; ++i) {
+    const float center[3] = {ca[0].v[i], ca[1].v[i], ca[2].v[i]};
+    const float half[3] = {ha[0].v[i], ha[1].v[i], ha[2].v[i]};
+    float in_b[3], along_b[3];
+#pragma unroll
+    for (int k = 0; k < 3; ++k) {
+      in_b[k] = interval_terms::a_in_b(pose, back, k, center);
+      along_b[k] = interval_terms::a_along_b(pose, k, half);
+    }
+#pragma unroll
+    for (int j = 0; j < 4; ++j) {
+      bool overlap = true;
+#pragma unroll
+      for (int k = 0; k < 3; ++k) {
+        overlap = overlap & (fabsf(posed[j][k] - center[k]) <= half[k] + reach[j][k]) &
+                  (fabsf(in_b[k] - cb[k].v[j]) <= hb[k].v[j] + along_b[k]);
+      }
+      if (overlap) mask |= 1u << (4 * i + j);
+    }
+  }
+  return mask;
+}
+
 __device__ inline frame::Point<float> corner(const float4& p) {
   return {{p.x, p.y, p.z}};
 }
@@ -102,18 +154,24 @@ struct Judged {
 template <QueryMode kMode>
 struct InFrame {
   static constexpr bool kWorld = false;
+  static constexpr bool kScreens =
+      kMode == QueryMode::exact;  ///< most candidates are cheaply seen to be apart
   static constexpr bool kBounded = kMode == QueryMode::exact;
 
-  __device__ static std::uint32_t test(const QueryArgs&, const PairRecord& record, const Block* a,
-                                       const Block* b, float& size_a, float& size_b) {
-    return mask_of_block_pair(*a, *b, pose_of(record), size_a, size_b);
+  /// a, b: numbers of blocks.
+  __device__ static std::uint32_t test(const QueryArgs&, const PairRecord& record, const WalkBlock* blocks_a,
+                                       const WalkBlock* blocks_b, std::uint32_t a, std::uint32_t b,
+                                       float& size_a, float& size_b) {
+    if constexpr (kBounded) return interval_mask(record, blocks_a[a], blocks_b[b], size_a, size_b);
+    return mask_of_block_pair(blocks_a[a], blocks_b[b], pose_of(record), size_a, size_b);
   }
 
   /// Of a leaf block and an internal one: less the hits of nodes that lie beyond the plane of the triangle.
-  __device__ __noinline__ static std::uint32_t drop_beyond_planes(const PairRecord& record, const Block& a,
-                                                                  const Block& b, bool leaf_a,
-                                                                  std::uint32_t hits) {
+  __device__ __noinline__ static std::uint32_t drop_beyond_planes(const PairRecord& record,
+                                                                  std::uint32_t at_a, std::uint32_t at_b,
+                                                                  bool leaf_a, std::uint32_t hits) {
     if constexpr (kMode == QueryMode::boxes) return hits;
+    const Block &a = record.blocks_a[at_a], &b = record.blocks_b[at_b];
     const RelativePose pose = pose_of(record);
     std::uint32_t left = hits;
 #pragma unroll 1
@@ -142,23 +200,39 @@ struct InFrame {
     return left;
   }
 
+  /// frame::surely_apart().
+  __device__ static bool apart(const PairRecord& record, std::uint32_t a, std::uint32_t b) {
+    const Framed framed = in_frame(record, a, b);
+    return frame::surely_apart(framed.a, framed.b, __ldg(&record.frame_error));
+  }
+
   __device__ static Judged judge(const PairRecord& record, std::uint32_t a, std::uint32_t b) {
-    const auto* triangle_a = reinterpret_cast<const float4*>(record.triangles_a + a);
-    const auto* triangle_b = reinterpret_cast<const float4*>(record.triangles_b + b);
-    const float4 a0 = __ldg(triangle_a), b0 = __ldg(triangle_b);
-    Judged out = {__float_as_uint(a0.w), __float_as_uint(b0.w), true, false};
+    Judged out = {record.triangles_a[a].corner[0].w, record.triangles_b[b].corner[0].w, true, false};
     if constexpr (kMode == QueryMode::boxes) return out;
-    const float4 rows[3] = {__ldg(&record.rotation[0]), __ldg(&record.rotation[1]),
-                            __ldg(&record.rotation[2])};
-    const frame::Point<float> corners_a[3] = {corner(a0), corner(__ldg(triangle_a + 1)),
-                                              corner(__ldg(triangle_a + 2))};
-    const frame::Point<float> corners_b[3] = {posed_corner(rows, b0),
-                                              posed_corner(rows, __ldg(triangle_b + 1)),
-                                              posed_corner(rows, __ldg(triangle_b + 2))};
+    const Framed framed = in_frame(record, a, b);
     const auto verdicts =
-        frame::decide<kBounded>(corners_a, corners_b, kBounded ? __ldg(&record.frame_error) : 0.0f);
+        frame::decide<kBounded>(framed.a, framed.b, kBounded ? __ldg(&record.frame_error) : 0.0f);
     out.contact = verdicts.contact;
     out.undecided = verdicts.undecided;
+    return out;
+  }
+
+ private:
+  struct Framed {
+    frame::Point<float> a[3], b[3];
+  };
+
+  __device__ static Framed in_frame(const PairRecord& record, std::uint32_t a, std::uint32_t b) {
+    const auto* triangle_a = reinterpret_cast<const float4*>(record.triangles_a + a);
+    const auto* triangle_b = reinterpret_cast<const float4*>(record.triangles_b + b);
+    const float4 rows[3] = {__ldg(&record.rotation[0]), __ldg(&record.rotation[1]),
+                            __ldg(&record.rotation[2])};
+    Framed out;
+#pragma unroll
+    for (int c = 0; c < 3; ++c) {
+      out.a[c] = corner(__ldg(triangle_a + c));
+      out.b[c] = posed_corner(rows, __ldg(triangle_b + c));
+    }
     return out;
   }
 };
@@ -167,6 +241,7 @@ struct InFrame {
 template <QueryMode kMode>
 struct InWorld {
   static constexpr bool kWorld = true;
+  static constexpr bool kScreens = false;
 
   __device__ static WorldBox box(const Pose& pose, const Block& block, int node) {
     double lower[3], upper[3];
@@ -178,8 +253,10 @@ struct InWorld {
     return world_box(pose, lower, upper);
   }
 
-  __device__ static std::uint32_t test(const QueryArgs& args, const PairRecord& record, const Block* a,
-                                       const Block* b, float& size_a, float& size_b) {
+  __device__ static std::uint32_t test(const QueryArgs& args, const PairRecord& record, const WalkBlock*,
+                                       const WalkBlock*, std::uint32_t at_a, std::uint32_t at_b,
+                                       float& size_a, float& size_b) {
+    const Block *a = record.blocks_a + at_a, *b = record.blocks_b + at_b;
     const Pose pose_a = stored_pose(args, record.instance_a), pose_b = stored_pose(args, record.instance_b);
     std::uint32_t mask = 0;
 #pragma unroll 1
@@ -193,7 +270,7 @@ struct InWorld {
     return mask;
   }
 
-  __device__ static std::uint32_t drop_beyond_planes(const PairRecord&, const Block&, const Block&, bool,
+  __device__ static std::uint32_t drop_beyond_planes(const PairRecord&, std::uint32_t, std::uint32_t, bool,
                                                      std::uint32_t hits) {
     return hits;
   }

@@ -58,8 +58,8 @@ struct Flag {
   bool set;
 
   TANDEM_HD operator bool() const { return set; }
-  TANDEM_HD friend Flag operator&(Flag a, Flag b) { return {a.set && b.set}; }
-  TANDEM_HD friend Flag operator|(Flag a, Flag b) { return {a.set || b.set}; }
+  TANDEM_HD friend Flag operator&(Flag a, Flag b) { return {static_cast<bool>(a.set & b.set)}; }
+  TANDEM_HD friend Flag operator|(Flag a, Flag b) { return {static_cast<bool>(a.set | b.set)}; }
   TANDEM_HD friend Flag operator^(Flag a, Flag b) { return {a.set != b.set}; }
   TANDEM_HD friend Flag operator!(Flag a) { return {!a.set}; }
 };
@@ -71,7 +71,11 @@ TANDEM_HD inline float magnitude(float x) {
   return std::fabs(x);
 }
 TANDEM_HD inline float larger(float x, float y) {
+#ifdef __CUDA_ARCH__
+  return fmaxf(x, y);  // one instruction; of NaN nothing is decided either way
+#else
   return x < y ? y : x;
+#endif
 }
 TANDEM_HD inline float select(Flag mask, float x, float y) {
   return mask ? x : y;
@@ -247,6 +251,51 @@ TANDEM_HD inline auto decide(const Point<Value> (&a)[3], const Point<Value> (&b)
   verdicts.contact = possible & certain & meet;
   verdicts.undecided = possible & !(certain & (apart | meet));
   return verdicts;
+}
+
+/// Whether the plane of one triangle has the other strictly on one side, for sure: then decide(), which costs
+/// three times as much, would say apart. Takes what decide() takes; may say no where decide() says apart.
+///
+/// **Proof.** As at decide()'s, with one bound for the volumes of all three corners. Let m be at least the
+/// components of the plane's two edges, d_0 = 0 and d_1, d_2 the other triangle's edges, F >= |w|_1 +
+/// |d_i|_1. The vector w~ + d~_i is off by at most E + 1.001 u (|w~_k| + |d~_k|) in coordinate k, n~ by nu;
+/// and the sum of at most six products, taken one after another, by 6.1 u |n~|_1 F. Together at most
+///
+///     |n~|_1 (E + 8 u F) + nu (F + 3 E),
+///
+/// with 1.001 and 2^-80 to spare as there. Where E is infinite the bound is infinite or NaN: no.
+template <typename Value>
+TANDEM_HD inline auto surely_apart(const Point<Value> (&a)[3], const Point<Value> (&b)[3], float error) {
+  constexpr float kU = 0x1p-24f, kUnderflow = 0x1p-80f;
+  const Point<Value> edges_a[2] = {difference(a[1], a[0]), difference(a[2], a[0])};
+  const Point<Value> edges_b[2] = {difference(b[1], b[0]), difference(b[2], b[0])};
+  const Point<Value> w = difference(b[0], a[0]);
+  const Value size_a = larger(sum_of_magnitudes(edges_a[0].x), sum_of_magnitudes(edges_a[1].x));
+  const Value size_b = larger(sum_of_magnitudes(edges_b[0].x), sum_of_magnitudes(edges_b[1].x));
+  const Value apart = sum_of_magnitudes(w.x);
+  const auto one_sided = [&](const Point<Value>(&plane)[2], const Point<Value>(&other)[2], Value m, Value far,
+                             float sign) {
+    Value n[3];
+    for (int k = 0; k < 3; ++k) {
+      const int i = (k + 1) % 3, j = (k + 2) % 3;
+      n[k] = plane[0].x[i] * plane[1].x[j] - plane[0].x[j] * plane[1].x[i];
+    }
+    const Value e = kU * m + 2 * error;
+    const Value normal_error = 4 * (m * (kU * m + e)) + 2 * (e * e);
+    const Value bound =
+        1.001f * (sum_of_magnitudes(n) * (8 * kU * far + error) + normal_error * (far + 3 * error)) +
+        kUnderflow;
+    const Value v = (n[0] * w.x[0] + n[1] * w.x[1]) + n[2] * w.x[2];
+    for (int k = 0; k < 3; ++k) n[k] = sign * n[k];
+    const auto along = [&](const Point<Value>& d) {
+      return ((v + n[0] * d.x[0]) + n[1] * d.x[1]) + n[2] * d.x[2];
+    };
+    const Value v1 = along(other[0]), v2 = along(other[1]);
+    return (less(bound, v) & less(bound, v1) & less(bound, v2)) |
+           (less(v, -bound) & less(v1, -bound) & less(v2, -bound));
+  };
+  return one_sided(edges_a, edges_b, size_a, apart + size_b, 1.0f) |
+         one_sided(edges_b, edges_a, size_b, apart + size_a, -1.0f);
 }
 
 }  // namespace frame

@@ -32,13 +32,16 @@ struct GpuQueryCapacity {
   std::uint64_t undecided = 0;  ///< candidates that float32 cannot decide
 };
 
-/// GPU memory that a query with room for so much holds at most: the bound of GpuContactQuery::bytes().
-/// Instances cost it nothing; the pairs of a moment bound it, whatever the trees' sizes.
-constexpr std::size_t most_query_bytes(const GpuQueryCapacity& capacity, bool sorted, std::size_t assets) {
-  constexpr std::size_t kFixed = std::size_t{4} << 20;  // work that warps give to each other, and the report
+/// GPU memory that a query of these assets with room for so much holds at most: the bound of
+/// GpuContactQuery::bytes(), where it was never given more blocks of trees. Instances cost it nothing.
+inline std::size_t most_query_bytes(const GpuQueryCapacity& capacity, bool sorted,
+                                    std::span<const GpuAsset> assets) {
+  constexpr std::size_t kFixed = std::size_t{5} << 20;  // work that warps give to each other, and the report
+  std::size_t blocks = 0;
+  for (const GpuAsset& asset : assets) blocks += asset.tree.block_count;
   const std::size_t per_contact = sorted ? 20 + 29 : 20;
-  return kFixed + 256 * assets + 168 * std::size_t{capacity.pairs} + per_contact * capacity.contacts +
-         24 * capacity.undecided;
+  return kFixed + 256 * assets.size() + 112 * blocks + 200 * std::size_t{capacity.pairs} +
+         per_contact * capacity.contacts + 24 * capacity.undecided;
 }
 
 /// What became of a query. Lies in GPU memory, and in CPU memory once the stream has come so far.
@@ -113,6 +116,8 @@ class GpuContactQuery {
   std::uint32_t asset_count_ = 0, asset_room_ = 0, depth_ = 1;
   std::uint32_t most_triangles_ = 0;
   std::uint64_t most_faces_ = 0;
+  void* walk_blocks_ = nullptr;  // of all assets
+  std::size_t block_room_ = 0;
   void* state_ = nullptr;
   void* chunks_ = nullptr;
   void* pairs_ = nullptr;

@@ -10,7 +10,7 @@
 // but contacts, and what float32 cannot decide, leaves the multiprocessor.
 //
 // A warp that has nothing left takes object pairs; when there are no more, it takes a number and waits at the
-// mailbox with that number. Warps that have enough look now and then whether numbers were given out, and fill
+// mailbox with that number. Warps that have enough look every round whether numbers were given out, and fill
 // the next mailbox. The last warp that runs out of work sends the others home. No warp waits for one that has
 // not started.
 //
@@ -18,14 +18,13 @@
 namespace tandem::gpu {
 namespace {
 
-constexpr std::uint32_t kFull = 32;               // block pairs or candidates of a full warp
-constexpr std::uint32_t kMostPairsAtOnce = 16;    // object pairs that a warp takes
-constexpr std::uint32_t kRoundsBetweenLooks = 2;  // at whether another warp waits
+constexpr std::uint32_t kFull = 32;             // block pairs or candidates of a full warp
+constexpr std::uint32_t kMostPairsAtOnce = 16;  // object pairs that a warp takes
 constexpr std::uint32_t kFewestToShare = 32;
 constexpr std::uint32_t kMostGifts = 4;
 constexpr std::uint32_t kNobodyLeft = 0xFFFFFFFEu, kNoMore = 0xFFFFFFFFu;  // kNoMore: in a mailbox
 constexpr std::uint32_t kOutRoom = 64;
-constexpr std::uint32_t kWarpsPerBlock = 4, kBlocksPerProcessor = 4;
+constexpr std::uint32_t kWarpsPerBlock = 16, kBlocksPerProcessor = 1;
 constexpr float kTimesLarger = 4;  // where planes of leaves are worth it, as narrow_phase_walk.h says
 
 // An entry of the stack: x: object pair; y: link to a's block, and in its free bits how the pair goes on; z:
@@ -280,8 +279,7 @@ class Walk {
     const std::uint32_t room = args_.stack_size - height_ - leaf_pairs_, reserve = args_.stack_reserve;
     std::uint32_t count = waiting_ < kFull ? waiting_ : kFull;
     if (room < count + reserve) count = room > reserve ? room - reserve : 1;
-    const bool looks = ++rounds_ % kRoundsBetweenLooks == 0;
-    if (looks) look();  // comes while the boxes are tested
+    look();  // comes while the boxes are tested
     const Taken taken = take<-1>(count, stack_ + 16 * (height_ - 1), height_);
     waiting_ -= count;
     bool mine = taken.mine;
@@ -323,11 +321,10 @@ class Walk {
     block_pairs_ += mine;
     put({pair, now.a | goes_on << kIndexBits, now.b | (taken.entry.z & kSelf), below | hits << 16},
         of_leaves);
-    if (!looks) return;
     asm volatile("cp.async.wait_all;" ::: "memory");
     __syncwarp();
     if (waiting_ >= kFewestToShare) share();
-    if (rounds_ >= 1u << 26) add_counters(), rounds_ = 0;
+    if (++rounds_ >= 1u << 26) add_counters(), rounds_ = 0;
   }
 
   /// Puts on the entry of each lane that has something below.
@@ -435,6 +432,7 @@ class Walk {
 
   /// Begins to fetch the head of Balance.
   __device__ void look() const {
+    __syncwarp();  // all lanes have read what was seen before
     if (lane_ == 0)
       asm volatile("cp.async.cg.shared.global [%0], [%1], 16;" ::"r"(seen()), "l"(&balance_) : "memory");
   }

@@ -20,7 +20,7 @@ struct GpuQueryOptions {
   /// order.
   bool sorted = false;
 
-  /// Thread blocks, of 128 threads, that may look for contacts at a time; 0: as many as the GPU holds. Fewer
+  /// Thread blocks, of 512 threads, that may look for contacts at a time; 0: as many as the GPU holds. Fewer
   /// leave multiprocessors to what runs beside the query, and let tools run that are slow where warps wait.
   std::uint32_t most_blocks = 0;
 };

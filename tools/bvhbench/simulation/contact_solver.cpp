@@ -69,30 +69,33 @@ double mobility(const Row& row, const Held& held) {
   return held.a * row.mobility_a + held.b * row.mobility_b;
 }
 
-// Visits one row: lambda = clamp(lambda - (w - target) / mobility). Returns nothing where nothing moves.
-void visit(const Joint& joint, Row& row, double target, double lower, double upper, Mover& a, Mover& b,
-           const Held& held) {
+// Visits one row: lambda = clamp(lambda - (w - target) / mobility). Result: by how much w has changed.
+double visit(const Joint& joint, Row& row, double target, double lower, double upper, Mover& a, Mover& b,
+             const Held& held) {
   const double moves = mobility(row, held);
-  if (moves <= 0) return;
+  if (moves <= 0) return 0;
   const double wanted = row.impulse - (relative_velocity(row, a, b) - target) / moves;
   const double impulse = std::clamp(wanted, lower, upper);
-  push_apart(joint, row, impulse - row.impulse, a, b, held);
+  const double change = impulse - row.impulse;
+  push_apart(joint, row, change, a, b, held);
   row.impulse = impulse;
+  return std::fabs(change) * moves;
 }
 
 constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
-void visit_velocity(Joint& joint, std::vector<Mover>& movers, double friction, const Held& held) {
+double visit_velocity(Joint& joint, std::vector<Mover>& movers, double friction, const Held& held) {
   Mover &a = movers[joint.a], &b = movers[joint.b];
   const double bound = friction * joint.normal.impulse;
-  for (Row& row : joint.tangent) visit(joint, row, 0, -bound, bound, a, b, held);
-  visit(joint, joint.normal, joint.target, 0, kUnbounded, a, b, held);
+  const double first = visit(joint, joint.tangent[0], 0, -bound, bound, a, b, held);
+  const double second = visit(joint, joint.tangent[1], 0, -bound, bound, a, b, held);
+  return std::max({first, second, visit(joint, joint.normal, joint.target, 0, kUnbounded, a, b, held)});
 }
 
-void visit_correction(Joint& joint, std::vector<Correction>& corrections, const Held& held) {
+double visit_correction(Joint& joint, std::vector<Correction>& corrections, const Held& held) {
   const Row& row = joint.normal;
   const double moves = mobility(row, held);
-  if (moves <= 0) return;
+  if (moves <= 0) return 0;
   Correction &a = corrections[joint.a], &b = corrections[joint.b];
   const double w = row.direction.dot(b.velocity - a.velocity) + row.arm_b.dot(b.angular_velocity) -
                    row.arm_a.dot(a.angular_velocity);
@@ -107,6 +110,7 @@ void visit_correction(Joint& joint, std::vector<Correction>& corrections, const 
     b.velocity += (change * joint.inverse_mass_b) * row.direction;
     b.angular_velocity += change * row.turn_b;
   }
+  return std::fabs(change) * moves;
 }
 
 // Any unit vector across the normal, the same for the same normal.
@@ -198,13 +202,16 @@ class IslandSolver {
 
   void shuffle_order(std::uint64_t seed) { shuffle(order_, seed); }
 
-  void solve() {
+  // still: sweeps that change no velocity by more than this are the last.
+  void solve(double still) {
     for (std::uint32_t i = 0; i < options_.iterations; ++i) {
-      sweep(i % 2 == 1, [&](Joint& joint) { visit_velocity(joint, movers_, options_.friction, {}); });
+      const auto visit = [&](Joint& joint) { return visit_velocity(joint, movers_, options_.friction, {}); };
+      if (sweep(i % 2 == 1, visit) <= still) break;
     }
     if (!needs_correction()) return;
     for (std::uint32_t i = 0; i < options_.position_iterations; ++i) {
-      sweep(i % 2 == 1, [&](Joint& joint) { visit_correction(joint, corrections_, {}); });
+      const auto visit = [&](Joint& joint) { return visit_correction(joint, corrections_, {}); };
+      if (sweep(i % 2 == 1, visit) <= still) break;
     }
   }
 
@@ -249,13 +256,16 @@ class IslandSolver {
     return std::any_of(order_.begin(), order_.end(), [&](std::uint32_t i) { return joints_[i].push > 0; });
   }
 
+  // Result: the largest change of a velocity.
   template <typename Visit>
-  void sweep(bool backwards, const Visit& visit) {
+  double sweep(bool backwards, const Visit& visit) {
+    double change = 0;
     if (backwards) {
-      for (auto i = order_.rbegin(); i != order_.rend(); ++i) visit(joints_[*i]);
+      for (auto i = order_.rbegin(); i != order_.rend(); ++i) change = std::max(change, visit(joints_[*i]));
     } else {
-      for (const std::uint32_t i : order_) visit(joints_[i]);
+      for (const std::uint32_t i : order_) change = std::max(change, visit(joints_[i]));
     }
+    return change;
   }
 
   std::vector<std::uint32_t> order_;
@@ -297,6 +307,7 @@ void ContactSolver::solve(std::span<const BodyProperties> bodies, std::span<Body
            [&](std::size_t i) { joints_[i] = make_joint(contacts[i], states, movers_, options, step); });
   const auto layers =
       options.shock_propagation ? find_layers(bodies, contacts) : std::vector<std::uint32_t>();
+  constexpr double kStill = 1e-9;  // of what gravity gives in a step
   std::vector<Residuals> residuals(islands.size());
   // Without contacts there is nothing to do, and most islands of a slide are such.
   tbb::parallel_for(std::size_t{0}, islands.size(), [&](std::size_t i) {
@@ -309,7 +320,7 @@ void ContactSolver::solve(std::span<const BodyProperties> bodies, std::span<Body
     if (options.order == ContactOrder::shuffled) {
       solver.shuffle_order(options.seed ^ (step.number * 0x9E3779B97F4A7C15u + members.front()));
     }
-    solver.solve();
+    solver.solve(kStill * step.gravity_speed);
     if (options.shock_propagation) solver.propagate_shock(layers);
     residuals[i] = solver.residuals();
   });

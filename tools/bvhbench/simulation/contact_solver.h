@@ -17,8 +17,8 @@ enum class ContactOrder : std::uint8_t {
 };
 
 struct SolverOptions {
-  std::uint32_t iterations = 30;           ///< sweeps over the contacts for velocities
-  std::uint32_t position_iterations = 30;  ///< sweeps for the correction of penetration
+  std::uint32_t iterations = 30;           ///< sweeps over the contacts for velocities, at most
+  std::uint32_t position_iterations = 30;  ///< the same for the correction of penetration
   double friction = 0.5;
   double restitution = 0;
   double slop = 5e-4;       ///< penetration that is left alone, a length
@@ -65,8 +65,9 @@ struct Correction {
 /// Penetration beyond the slop is taken away by a second set of velocities, which push along normals alone,
 /// move the bodies once, and never become kinetic energy (split impulses).
 ///
-/// Islands are solved side by side by the threads of the caller's oneTBB arena. The same bytes for any number
-/// of them.
+/// An island is done before all sweeps are made when one changes no velocity by more than 10⁻⁹ of what
+/// gravity gives in a step. Islands are solved side by side by the threads of the caller's oneTBB arena. The
+/// same bytes for any number of them.
 class ContactSolver {
  public:
   /// Solves for the velocities at the end of a step. `impulses`: what to start with, and then the solution.

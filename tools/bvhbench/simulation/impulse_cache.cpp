@@ -123,7 +123,8 @@ KeptContacts ImpulseCache::with_those_just_lost(std::span<const ContactPoint> co
                                                 std::span<const BodyProperties> bodies,
                                                 std::span<const BodyState> states,
                                                 std::span<const std::uint8_t> idle, double gap) const {
-  constexpr double kNear = 0.02;  // of the smaller body's radius
+  constexpr double kNear = 0.02;      // of the smaller body's radius
+  constexpr std::uint32_t kLife = 8;  // steps; boxes side by side would keep all that ever touched
   KeptContacts all;
   auto next = contacts.begin();
   for (std::size_t begin = 0, end = 0; begin < entries_.size(); begin = end) {
@@ -135,6 +136,7 @@ KeptContacts ImpulseCache::with_those_just_lost(std::span<const ContactPoint> co
     if (!idle.empty() && idle[pair.first] && idle[pair.second]) continue;
     const double near = kNear * std::min(bodies[pair.first].radius, bodies[pair.second].radius);
     for (std::size_t i = begin; i < end; ++i) {
+      if (entries_[i].lost >= kLife) continue;
       const ContactPoint moved = moved_with_bodies(entries_[i], states);
       if (moved.depth >= 0 || moved.depth < -gap || across(entries_[i], moved, states) > near) continue;
       const auto is_near = [&](const ContactPoint& one) {
@@ -159,13 +161,14 @@ void ImpulseCache::remember(const KeptContacts& kept, std::span<const ContactImp
     if (kept.entry[i] != KeptContacts::kFound) {
       fresh.push_back(entries_[kept.entry[i]]);
       fresh.back().impulse = impulses[i];
+      ++fresh.back().lost;
       continue;
     }
     const ContactPoint& contact = kept.contacts[i];
     const BodyState &a = states[contact.body_a], &b = states[contact.body_b];
     fresh.push_back({contact.body_a, contact.body_b, contact.feature, into_body(a, contact.position),
                      into_body(b, contact.position), a.orientation.conjugate() * contact.normal,
-                     contact.depth, impulses[i]});
+                     contact.depth, 0, impulses[i]});
   }
   const auto by_pair = [](const auto& x, const auto& y) { return pair_of(x) < pair_of(y); };
   entries_.resize(asleep.size() + fresh.size());

@@ -169,13 +169,13 @@ void write_state(Hdf5Output& file, const SimulatorState& state) {
     append(position, body.position), append(orientation, body.orientation);
     append(velocity, body.velocity), append(spin, body.angular_velocity);
   }
-  std::vector<std::uint32_t> pair;
+  std::vector<std::uint32_t> pair, lost;
   std::vector<std::uint64_t> feature;
   for (const CachedImpulse& entry : state.impulses) {
     pair.insert(pair.end(), {entry.body_a, entry.body_b});
     feature.push_back(entry.feature);
     append(in_a, entry.in_a), append(in_b, entry.in_b), append(normal_in_a, entry.normal_in_a);
-    depth.push_back(entry.depth);
+    depth.push_back(entry.depth), lost.push_back(entry.lost);
     normal.push_back(entry.impulse.normal), append(tangential, entry.impulse.tangential);
   }
   const std::size_t bodies = state.states.size(), impulses = state.impulses.size();
@@ -193,6 +193,7 @@ void write_state(Hdf5Output& file, const SimulatorState& state) {
   file.add("/state/impulses/in_b", {impulses, 3}, in_b);
   file.add("/state/impulses/normal_in_a", {impulses, 3}, normal_in_a);
   file.add("/state/impulses/depth", {impulses}, depth);
+  file.add("/state/impulses/lost", {impulses}, lost);
   file.add("/state/impulses/normal", {impulses}, normal);
   file.add("/state/impulses/tangential", {impulses, 3}, tangential);
 }
@@ -203,11 +204,12 @@ std::vector<CachedImpulse> read_impulses(const Hdf5Input& file, const std::strin
   const auto in_a = file.read_f64("/state/impulses/in_a", {3});
   const auto in_b = file.read_f64("/state/impulses/in_b", {3});
   const auto normal_in_a = file.read_f64("/state/impulses/normal_in_a", {3});
+  const auto lost = file.read_u32("/state/impulses/lost");
   const auto depth = file.read_f64("/state/impulses/depth"), normal = file.read_f64("/state/impulses/normal");
   const auto tangential = file.read_f64("/state/impulses/tangential", {3});
   const std::size_t count = feature.size();
   for (const std::size_t rows : {pair.size() / 2, in_a.size() / 3, in_b.size() / 3, normal_in_a.size() / 3,
-                                 depth.size(), normal.size(), tangential.size() / 3}) {
+                                 depth.size(), lost.size(), normal.size(), tangential.size() / 3}) {
     if (rows != count) throw FileError(path + ": /state/impulses: datasets of different lengths");
   }
   std::vector<CachedImpulse> impulses;
@@ -219,6 +221,7 @@ std::vector<CachedImpulse> read_impulses(const Hdf5Input& file, const std::strin
                         vector_at(in_b, i),
                         vector_at(normal_in_a, i),
                         depth[i],
+                        lost[i],
                         {normal[i], vector_at(tangential, i)}});
   }
   return impulses;

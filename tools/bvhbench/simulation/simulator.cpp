@@ -80,6 +80,9 @@ void Simulator::solve(StepRecord& record) {
   islands_ = find_islands(acting_, kept_.contacts);
   std::vector<ContactImpulse> impulses(kept_.contacts.size());
   if (options_.solver.warm_start) impulses = cache_.match(kept_.contacts, bodies_, states_);
+  constexpr std::uint32_t kCold = 10;
+  SolverOptions solver = options_.solver;
+  if (solver.warm_start && cache_.entries().empty()) solver.iterations *= kCold;  // or stacks sink at once
   const double dt = options_.dt / options_.substeps;
   FollowedContacts followed(kept_.contacts, states_);
   for (std::uint32_t i = 0; i < options_.substeps; ++i) {
@@ -87,7 +90,7 @@ void Simulator::solve(StepRecord& record) {
     for (std::size_t body = 0; body < states_.size(); ++body) {
       if (acting_[body].motion == Motion::dynamic) states_[body].velocity += dt * options_.gravity;
     }
-    solver_.solve(acting_, states_, followed.contacts(), islands_, impulses, options_.solver,
+    solver_.solve(acting_, states_, followed.contacts(), islands_, impulses, solver,
                   {dt, dt * options_.gravity.norm(), step_ * options_.substeps + i});
     move(dt);
   }

@@ -32,8 +32,8 @@ struct SimulatorState {
 };
 
 /// Moves rigid bodies, step by step: contacts where the bodies stand, velocities with gravity, contacts
-/// solved for, positions by the new velocities (semi-implicit Euler). The same bytes for any number of
-/// threads.
+/// solved for, positions by the new velocities (semi-implicit Euler). With warm start, a step that has no
+/// impulse of the step before makes ten times the sweeps. The same bytes for any number of threads.
 class Simulator {
  public:
   /// Condition: as many states as bodies.

@@ -1,0 +1,154 @@
+"""Scenes of scripts/stability, and runs of `bvhbench simulate` on them."""
+import functools
+import json
+import os
+import subprocess
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+TOOLS = ROOT / "build/release/tools"
+BVHBUILD = os.environ.get("TANDEM_BVHBUILD", TOOLS / "bvhbuild/bvhbuild")  # as the tests of the tools
+BVHBENCH = os.environ.get("TANDEM_BVHBENCH", TOOLS / "bvhbench/bvhbench")
+SLOP = 5e-4  # metres: that of every run of a scene
+GRAVITY = 9.81
+# Boxes by their lengths: the rest are files of assets/.
+BOXES = {"slab": (300, 40, 2), "flat": (1, 1, 0.2), "uneven": (1, 0.6, 0.2), "thin": (1, 1, 0.01), "target": (2, 2, 0.01)}
+
+
+def box_obj(lengths):
+    """A closed box around the origin."""
+    corners = [[(1 if i >> k & 1 else -1) * lengths[k] / 2 for k in range(3)] for i in range(8)]
+    faces = [(1, 5, 7, 3), (2, 4, 8, 6), (1, 2, 6, 5), (3, 7, 8, 4), (1, 3, 4, 2), (5, 6, 8, 7)]
+    return "".join(f"v {x} {y} {z}\n" for x, y, z in corners) + "".join("f " + " ".join(map(str, face)) + "\n" for face in faces)
+
+
+def rotation_about(axis, angle):
+    x, y, z = np.asarray(axis) / np.linalg.norm(axis)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def random_rotation(random):
+    w, x, y, z = (q := random.normal(size=4)) / np.linalg.norm(q)
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                     [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+
+
+class Scene:
+    """Bodies to come: meshes by name, poses of their files' coordinates."""
+
+    def __init__(self):
+        self.meshes, self.bodies = [], []
+
+    def add(self, mesh, at, turned=np.eye(3), fixed=False, density=1000, velocity=(0, 0, 0), spin=(0, 0, 0)):
+        if mesh not in self.meshes:
+            self.meshes.append(mesh)
+        self.bodies.append((self.meshes.index(mesh), at, turned, fixed, density, velocity, spin))
+        return self
+
+    def slab(self, turned=np.eye(3)):
+        """Fixed; its upper side goes through the origin."""
+        return self.add("slab", turned @ [0, 0, -BOXES["slab"][2] / 2], turned, fixed=True)
+
+    def write(self, path, mesh_file):
+        assets, at, turned, fixed, density, velocity, spin = zip(*self.bodies)
+        with h5py.File(path, "w") as file:
+            file["assets"] = [str(mesh_file(mesh)) for mesh in self.meshes]
+            file["instances/asset"] = np.array(assets, "u4")
+            file["instances/rotation"] = np.array(turned, float)
+            file["instances/translation"] = np.array(at, float)
+            file["simulation/motion"] = np.array(fixed, "u4")
+            file["simulation/density"] = np.array(density, float)
+            file["simulation/velocity"] = np.array(velocity, float)
+            file["simulation/angular_velocity"] = np.array(spin, float)
+
+
+class Run:
+    """What a run file holds."""
+
+    def __init__(self, path, command):
+        self.command = command
+        with h5py.File(path) as file:
+            self.options = json.loads(file.attrs["options"])
+            self.bodies = len(file["bodies/asset"])
+            self.moving = file["bodies/motion"][:] == 0
+            self.mass = file["bodies/mass"][:][self.moving]
+            self.frames = {}
+            file["frames"].visititems(lambda name, item: self.frames.update({name: item[:]}) if isinstance(item, h5py.Dataset) else None)
+            # [state kept, moving body, ...]
+            self.position = file["trajectory/position"][:][:, self.moving]
+            self.orientation = file["trajectory/orientation"][:][:, self.moving]
+        self.dt = self.options["dt"]
+        self.ms_per_step = 1e3 * np.median(self.frames["seconds/step"])
+
+    def last(self, seconds):
+        """A slice of the frames: the end of the run."""
+        return slice(-max(1, round(seconds / self.dt)), None)
+
+    def drift(self):
+        """For each state kept, how far the body that went farthest is from its start."""
+        return np.linalg.norm(self.position - self.position[0], axis=2).max(axis=1)
+
+    def sideways(self):
+        return np.linalg.norm((self.position - self.position[0])[..., :2], axis=2).max(axis=1)
+
+    def rms_speed(self, seconds):
+        """The speed at which all mass would have the kinetic energy, mean of squares over the end of the run: turning counts."""
+        return np.sqrt(np.mean(2 * self.frames["kinetic_energy"][self.last(seconds)]) / self.mass.sum())
+
+    def energy_gain(self, seconds):
+        """The largest rise of mechanical energy above what it was before, in the end of the run: the height that it would lift all bodies, metres."""
+        energy = (self.frames["kinetic_energy"] + self.frames["potential_energy"])[self.last(seconds)]
+        return (energy - np.minimum.accumulate(energy)).max() / (self.mass.sum() * GRAVITY)
+
+    def mean_of(self, name, seconds):
+        return self.frames[name][self.last(seconds)].mean()
+
+
+class Workshop:
+    """Builds meshes and makes runs in a folder of its own."""
+
+    def __init__(self, folder, quick):
+        self.folder, self.quick = Path(folder), quick
+
+    @functools.cache
+    def mesh(self, name):
+        source = ROOT / f"assets/{name}.obj"
+        if name in BOXES:
+            source = self.folder / f"{name}.obj"
+            source.write_text(box_obj(BOXES[name]))
+        built = self.folder / f"{name}.bvh"
+        self.call(BVHBUILD, source, "-o", built, "-q")
+        return built
+
+    def call(self, *command):
+        done = subprocess.run([str(part) for part in command], capture_output=True)
+        if done.returncode != 0:
+            raise SystemExit(f"{' '.join(map(str, command))}\n{done.stderr.decode().strip()}")
+
+    def bench(self, *arguments):
+        self.call(BVHBENCH, *arguments)
+
+    def scene_file(self, scene):
+        path = self.folder / "scene.h5"
+        scene.write(path, self.mesh)
+        return path
+
+    def simulate(self, scene, seconds, every=None, **settings):
+        """A run of a Scene, or of what ("stack", ...) says to simulate. Settings are options of bvhbench simulate; True is a flag, None is left out.
+        `every`: seconds between states that are kept; unless given, the first and the last."""
+        kind = ("scene", self.scene_file(scene), "--slop", SLOP) if isinstance(scene, Scene) else scene
+        dt = settings.get("dt") or 1 / 60
+        steps = max(1, round(seconds / dt))
+        options = []
+        for name, value in settings.items():
+            if value is not None and value is not False:
+                options += [f"--{name.replace('_', '-')}"] + ([] if value is True else [repr(value) if isinstance(value, float) else value])
+        output = self.folder / "run.h5"
+        keep = min(steps, max(1, round(every / dt))) if every else steps
+        self.bench("simulate", *kind, "--frames", steps, "--threads", 1, "--trajectory", keep, *options, "-o", output)
+        return Run(output, " ".join(map(str, options)))

@@ -73,7 +73,7 @@ class SimulateTest(ToolTest):
         self.assertEqual([name for name in a if a[name] != b[name]], [])
 
 
-class RunTest(SimulateTest):
+class Runs(SimulateTest):
     def test_a_stack_stands_and_says_so(self):
         summary = json.loads(self.stack("--frames", "120", "--json"))
         self.assertEqual((summary["bodies"], summary["triangles"], summary["steps"]), (36, 27 * 12, 120))
@@ -144,7 +144,7 @@ class RunTest(SimulateTest):
         self.assert_nothing_written()
 
 
-class ResumeTest(SimulateTest):
+class Resuming(SimulateTest):
     OPTIONS = ["--frames", "100", "--trajectory", "5", "--sleep"]
 
     def start(self, *arguments):
@@ -201,7 +201,7 @@ class ResumeTest(SimulateTest):
         self.assertEqual(part.read_bytes(), before)
 
 
-class FrameTest(SimulateTest):
+class Frames(SimulateTest):
     def test_a_frame_is_a_scene_with_the_contacts_of_the_run(self):
         cow, ground = self.asset("cow_1500"), self.asset("ground")
         self.simulate("pile", "--mesh", cow, "--ground", ground, "--count", "20", "--frames", "80", "--trajectory",

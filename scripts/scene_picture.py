@@ -1,0 +1,208 @@
+"""Pictures of many bodies: a camera on all of them, a sun with soft shadows, a sky that less open places see less of."""
+import dataclasses
+
+import numpy as np
+
+import render
+from render import unit
+
+SUPERSAMPLING = 3
+MARGIN = 0.03  # of the width, on either side
+FIELD_OF_VIEW = np.radians(24)
+COLOURS = ("bf826e", "d4ad7a", "9da985", "789997", "8294ac", "9f8aa3", "c69da1", "bcb693", "90a7b8", "a88673",
+           "decaa5", "838da2")
+GROUND = "cbc6b9"
+SKY_ABOVE, SKY_BELOW = "e4eaef", "fbfaf7"
+SUN, SUN_FROM = 0.88, (-0.62, 0.66, 0.52)  # its strength, and where: right, up and towards the eye
+AMBIENT = 0.56
+OUTLINE = 0.45  # of the light is left where a body ends
+SHADOW_PIXELS = 2048
+
+
+def of_colour(name):
+    """Linear light of an sRGB colour in hexadecimal, nearly enough."""
+    return (np.array([int(name[i:i + 2], 16) for i in (0, 2, 4)]) / 255) ** 2.2
+
+
+def colours(bodies):
+    """Linear light that each body reflects; hangs on its number alone."""
+    palette = np.array([of_colour(name) for name in COLOURS])
+    random = np.random.default_rng(7)
+    count = len(bodies.asset)
+    chosen = palette[random.integers(len(palette), size=count)] * random.uniform(0.85, 1.1, size=(count, 1))
+    return np.where(bodies.fixed[:, None], of_colour(GROUND), np.minimum(chosen, 1))
+
+
+def posed(bodies):
+    """All triangles in the world, the body of each, and whether it is of a closed shape."""
+    found, body, closed = [np.zeros((0, 3, 3))], [np.zeros(0, int)], [np.zeros(0, bool)]
+    for asset, shape in enumerate(bodies.shapes):
+        rows = np.nonzero(bodies.asset == asset)[0]
+        triangles = np.einsum("nij,tkj->ntki", bodies.rotation[rows], shape.triangles, optimize=True)
+        triangles += bodies.translation[rows, None, None]
+        found.append(triangles.reshape(-1, 3, 3))
+        body.append(np.repeat(rows, len(shape.triangles)))
+        closed.append(np.full(len(body[-1]), shape.closed))
+    return np.concatenate(found), np.concatenate(body), np.concatenate(closed)
+
+
+def box_corners(bodies):
+    """Corners of the boxes of what has to be in the picture."""
+    chosen = bodies.subject
+    boxes = np.array([shape.box for shape in bodies.shapes])[bodies.asset[chosen]]
+    corners = np.einsum("nij,nkj->nki", bodies.rotation[chosen], boxes) + bodies.translation[chosen, None]
+    return corners.reshape(-1, 3)
+
+
+@dataclasses.dataclass
+class Camera:
+    axes: np.ndarray  # rows: right, up, towards the eye
+    eye: np.ndarray
+    focal: float  # pixels of something as wide as it is far
+    size: tuple
+
+    def seen(self, points):
+        """In the camera's frame; the third is the distance."""
+        return (points - self.eye) @ (self.axes * [[1], [1], [-1]]).T
+
+    def project(self, points):
+        """x and y in pixels, and the inverse of the distance, which is linear on the screen."""
+        seen = self.seen(points)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            inverse = 1 / seen[..., 2]
+            x = self.size[0] / 2 + self.focal * seen[..., 0] * inverse
+            y = self.size[1] / 2 - self.focal * seen[..., 1] * inverse
+        return np.stack([x, y, inverse], -1)
+
+
+def camera_on(points, axes, size):
+    """As near to all the points as the margin allows."""
+    focal = size[0] / 2 / np.tan(FIELD_OF_VIEW / 2)
+    half = np.array(size) / 2 - MARGIN * size[0]
+    seen = points @ axes.T
+    middle = (seen.min(axis=0) + seen.max(axis=0))[:2] / 2
+    for _ in range(20):  # a fixed point: the distance for a middle, the middle at a distance
+        aside = seen[:, :2] - middle
+        distance = (seen[:, 2] + focal * (np.abs(aside) / half).max(axis=1)).max()
+        at = aside / (distance - seen[:, 2])[:, None]
+        middle = middle + 0.5 * (at.min(axis=0) + at.max(axis=0)) * (distance - seen[:, 2].mean())
+    return Camera(axes, np.append(middle, distance) @ axes, focal, size)
+
+
+def visible(triangles, closed, camera):
+    """Triangles in front of the eye that can be seen: those of closed shapes only from outside."""
+    faces_eye = np.einsum("ni,ni->n", area_vectors(triangles), camera.eye - triangles[:, 0]) > 0
+    nearest = 1e-3 * np.linalg.norm(camera.eye - triangles.mean(axis=(0, 1)))
+    in_front = camera.seen(triangles)[..., 2].min(axis=1) > nearest
+    return np.nonzero((faces_eye | ~closed) & in_front)[0]
+
+
+def area_vectors(triangles):
+    return np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+
+
+@dataclasses.dataclass
+class Samples:
+    """What the samples of a picture show that show anything: rows are samples, in the order of the picture."""
+    covered: np.ndarray  # bool [height, width]
+    row: np.ndarray
+    column: np.ndarray
+    distance: np.ndarray  # along the camera's axis
+    point: np.ndarray
+    normal: np.ndarray  # towards the eye
+    body: np.ndarray
+
+
+def take_samples(triangles, body, closed, camera):
+    kept = visible(triangles, closed, camera)
+    depth, nearest = render.rasterise(camera.project(triangles[kept]), camera.size)
+    covered = nearest >= 0
+    row, column = np.nonzero(covered)
+    distance = 1 / depth[covered]
+    on_plane = np.stack([(column + 0.5 - camera.size[0] / 2) / camera.focal,
+                         (row + 0.5 - camera.size[1] / 2) / camera.focal, np.ones(len(row))], 1)
+    point = ((on_plane * distance[:, None]) @ (camera.axes * [[1], [-1], [-1]]) + camera.eye).astype(np.float32)
+    normals = unit(area_vectors(triangles[kept]))
+    normals *= np.where(np.einsum("ni,ni->n", normals, camera.eye - triangles[kept, 0]) < 0, -1, 1)[:, None]
+    chosen = nearest[covered]
+    return Samples(covered, row, column, distance, point, normals.astype(np.float32)[chosen], body[kept][chosen])
+
+
+def lit(samples, casters, bounds, light):
+    """Which samples see the light; soft where the samples of a pixel are averaged."""
+    right = unit(np.cross([0.0, 0.0, 1.0], light))
+    axes = np.array([right, np.cross(light, right), light])
+    seen = bounds @ axes.T
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    scale = SHADOW_PIXELS / (high - low)[:2].max()
+    facing = casters[area_vectors(casters) @ light > 0]
+    depth, _ = render.rasterise((facing @ axes.T - low) * [scale, scale, 1], (SHADOW_PIXELS, SHADOW_PIXELS))
+    # Off the surface, which would shade itself: a place r pixels away on a plane at an angle t to the light is nearer to
+    # it by at most r tan t, and a lift of h clears h / cos t; r <= 2.5 + 0.7 of the pixel's own.
+    lifted = samples.point + samples.normal * np.float32(3.2 / scale)
+    at = lifted @ axes.T.astype(np.float32) - low.astype(np.float32)
+    # Each sample looks at a place of its own on a small disc: a low-discrepancy sequence.
+    index = np.arange(len(at))
+    radius, angle = 2.5 * np.sqrt(index * 0.754877 % 1), 2 * np.pi * (index * 0.569840 % 1)
+    column = np.floor(at[:, 0] * scale + radius * np.cos(angle)).astype(int)
+    row = np.floor(at[:, 1] * scale + radius * np.sin(angle)).astype(int)
+    inside = (np.minimum(column, row) >= 0) & (np.maximum(column, row) < SHADOW_PIXELS)
+    return ~(inside & (depth[np.where(inside, row, 0), np.where(inside, column, 0)] > at[:, 2]))
+
+
+def openness(samples, reach, camera):
+    """Part of the sky that nothing within reach hides, judged by what the picture shows. Each sample of a pixel looks
+    along directions of its own."""
+    height, width = samples.covered.shape
+    position = np.full((height * width, 3), np.float32(1e9))
+    position[samples.covered.ravel()] = samples.point
+    pixels = camera.focal * reach / samples.distance
+    place = (samples.column % SUPERSAMPLING) * SUPERSAMPLING + samples.row % SUPERSAMPLING
+    hidden = np.zeros(len(pixels), np.float32)
+    directions, steps = 3, 3
+    for k in range(directions):
+        angle = 2 * np.pi * (place / SUPERSAMPLING ** 2 + k) / directions
+        right, down = pixels * np.cos(angle), pixels * np.sin(angle)
+        highest = np.zeros(len(pixels), np.float32)
+        for step in range(1, steps + 1):
+            away = (step / steps) ** 1.5
+            x = np.clip((samples.column + away * right).astype(np.int32), 0, width - 1)
+            y = np.clip((samples.row + away * down).astype(np.int32), 0, height - 1)
+            ray = position[y * width + x] - samples.point
+            length = np.sqrt(np.einsum("ni,ni->n", ray, ray)) + np.float32(1e-9)
+            rise = np.einsum("ni,ni->n", ray, samples.normal) / length - np.float32(0.08)
+            highest = np.maximum(highest, rise * np.clip(2 - length / np.float32(reach), 0, 1))
+        hidden += np.maximum(highest, 0)
+    return 1 - hidden / directions
+
+
+def outlines(samples):
+    """Samples whose right or lower neighbour shows another body."""
+    shown = np.full(samples.covered.shape, -1)
+    shown[samples.covered] = samples.body
+    ends = np.zeros(shown.shape, bool)
+    ends[:, :-1] |= shown[:, :-1] != shown[:, 1:]
+    ends[:-1] |= shown[:-1] != shown[1:]
+    return ends[samples.covered]
+
+
+def backdrop(size):
+    down = np.linspace(0, 1, size[1])[:, None]
+    rows = (1 - down) * of_colour(SKY_ABOVE) + down * of_colour(SKY_BELOW)
+    return np.repeat(rows[:, None], size[0], axis=1)
+
+
+def picture(bodies, camera):
+    """sRGB in 0 to 1, [height, width, 3], of the camera's size divided by SUPERSAMPLING."""
+    triangles, body, closed = posed(bodies)
+    samples = take_samples(triangles, body, closed, camera)
+    light = unit(np.array(SUN_FROM) @ camera.axes)
+    subject = bodies.subject
+    sun = SUN * np.clip(samples.normal @ light, 0, 1) * lit(samples, triangles[subject[body]], box_corners(bodies), light)
+    sky = AMBIENT * (0.75 + 0.25 * samples.normal[:, 2])
+    sky *= openness(samples, 0.4 * np.median(bodies.diagonals[subject]), camera)
+    light_here = sun[:, None] * [1.05, 1.0, 0.93] + sky[:, None] * [0.95, 1.0, 1.07]
+    image = backdrop(camera.size)
+    image[samples.covered] = colours(bodies)[samples.body] * light_here
+    image[samples.covered] *= np.where(outlines(samples), OUTLINE, 1)[:, None]
+    return render.shrink(np.clip(image, 0, 1), SUPERSAMPLING) ** (1 / 2.2)

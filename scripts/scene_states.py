@@ -1,0 +1,114 @@
+"""Reads what stands where from scene files and from the states that runs of bvhbench simulate keep."""
+import dataclasses
+import struct
+
+import h5py
+import numpy as np
+
+import bvh_file
+
+
+@dataclasses.dataclass
+class Bodies:
+    """What stands where: rows of `asset`, `rotation` and `translation` are bodies."""
+    shapes: list  # Shape
+    asset: np.ndarray
+    fixed: np.ndarray
+    rotation: np.ndarray
+    translation: np.ndarray
+
+    @property
+    def diagonals(self):
+        return np.array([shape.diagonal for shape in self.shapes])[self.asset]
+
+    @property
+    def subject(self):
+        """What a picture shows: all but fixed ground, which is larger than four of the median body is."""
+        ground = self.fixed & (self.diagonals > 4 * np.median(self.diagonals))
+        return ~ground if not ground.all() else ground
+
+
+@dataclasses.dataclass
+class Shape:
+    triangles: np.ndarray  # [t,3,3]
+    closed: bool
+
+    @property
+    def box(self):
+        low, high = (self.triangles.min(axis=(0, 1)), self.triangles.max(axis=(0, 1)))
+        return np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)])
+
+    @property
+    def diagonal(self):
+        return np.linalg.norm(self.box[7] - self.box[0])
+
+
+def is_closed(triangles):
+    """Whether every edge has its opposite: then what faces away is never seen."""
+    points, corner = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    start = corner.reshape(-1, 3)
+    end = np.roll(start, -1, axis=1)
+    there, back = start * len(points) + end, end * len(points) + start
+    return np.array_equal(np.sort(there, axis=None), np.sort(back, axis=None))
+
+
+def read_shape(path):
+    try:
+        triangles = bvh_file.read(path).world
+    except (AssertionError, KeyError, struct.error) as error:
+        raise ValueError(f"{path}: not a .bvh file that can be read") from error
+    return Shape(triangles, is_closed(triangles))
+
+
+def read_shapes(path, names):
+    return [read_shape(path.parent / (name.decode() if isinstance(name, bytes) else name)) for name in names]
+
+
+def rotations(quaternions):
+    w, x, y, z = quaternions.T
+    rows = [[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def read_run(path, file, wanted):
+    """The states after the wanted numbers of steps; none wanted: the last."""
+    kept = file["trajectory/frame"][:].tolist() if "trajectory" in file else []
+    if not kept:
+        raise ValueError("keeps no state: simulate with --trajectory")
+    for frame in wanted:
+        if frame not in kept:
+            raise ValueError(f"does not keep the state after step {frame}, but every {kept[1] - kept[0]}th "
+                             f"up to {kept[-1]}" if len(kept) > 1 else "keeps the start alone")
+    shapes = read_shapes(path, file["assets"][:])
+    asset, fixed = file["bodies/asset"][:], file["bodies/motion"][:] == 1
+    centre = file["bodies/center_of_mass"][:]
+    states = []
+    for row in [kept.index(frame) for frame in wanted or kept[-1:]]:
+        rotation = rotations(file["trajectory/orientation"][row])
+        moved = np.einsum("nij,nj->ni", rotation, centre)
+        states.append(Bodies(shapes, asset, fixed, rotation, file["trajectory/position"][row] - moved))
+    return states
+
+
+def read_scene(path, file):
+    shapes = read_shapes(path, file["assets"][:])
+    asset = file["instances/asset"][:]
+    if "simulation/motion" in file:
+        fixed = file["simulation/motion"][:] == 1
+    else:
+        fixed = np.ones(len(asset), bool)
+    bodies = Bodies(shapes, asset, fixed, file["instances/rotation"][:], file["instances/translation"][:])
+    if "simulation/motion" not in file:
+        bodies.fixed = ~bodies.subject
+    return [bodies]
+
+
+def read(path, wanted):
+    with h5py.File(path) as file:
+        if "trajectory" in file or "bodies" in file:
+            return read_run(path, file, wanted)
+        if wanted:
+            raise ValueError("is a scene, which has no frames")
+        return read_scene(path, file)

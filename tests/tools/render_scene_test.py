@@ -1,0 +1,184 @@
+#!/usr/bin/python3
+"""scripts/render_scene: what stands where in its pictures.
+
+Environment: that of tool_test.py, TANDEM_BVHBENCH, and PYTHONPATH with scripts/.
+"""
+import os
+import sys
+import unittest
+
+import h5py
+import matplotlib.image
+import numpy as np
+
+import render
+from tool_test import CUBE_OBJ, DONE, SOURCE_DIR, UNREADABLE_INPUT, ToolTest
+
+BVHBENCH = os.environ["TANDEM_BVHBENCH"]
+SLAB_OBJ = "v -20 -20 0\nv 20 -20 0\nv 20 20 0\nv -20 20 0\nf 1 2 3 4\n"
+FROM_X = ("--azimuth", "0", "--elevation", "0", "--width", "120", "--height", "60")  # +y is right, +z up
+
+
+class RenderTest(ToolTest):
+    """Each test can render, and has a cube of side 1 that begins at the origin."""
+
+    def setUp(self):
+        super().setUp()
+        self.cube = self.built("cube.obj", CUBE_OBJ)
+        self.scene = self.outputs / "scene.h5"
+
+    def write_scene(self, translations, motion=None):
+        count = len(translations)
+        with h5py.File(self.scene, "w") as file:
+            file["assets"] = [self.cube.name]
+            file["instances/asset"] = np.zeros(count, "u4")
+            file["instances/rotation"] = np.stack([np.eye(3)] * count)
+            file["instances/translation"] = np.array(translations, float)
+            if motion:
+                file["simulation/motion"] = np.array(motion, "u4")
+
+    def render(self, source, *arguments, name="picture.png"):
+        output = self.outputs / name
+        result = self.run_tool(sys.executable, os.fspath(SOURCE_DIR / "scripts/render_scene"), os.fspath(source), "-o",
+                               os.fspath(output), *arguments)
+        return result, output
+
+    def picture(self, source, *arguments):
+        result, output = self.render(source, *arguments)
+        self.assertEqual((result.returncode, result.stderr), (DONE, b""))
+        return matplotlib.image.imread(output)[..., :3]
+
+    def bench(self, *arguments):
+        result = self.run_tool(BVHBENCH, *map(os.fspath, arguments))
+        self.assertEqual(result.returncode, DONE, result.stderr)
+
+    def pile(self):
+        cow, slab, run = self.inputs / "cow.bvh", self.inputs / "slab.bvh", self.outputs / "run.h5"
+        self.assertEqual(self.build(SOURCE_DIR / "assets/cow_1500.obj", "-o", cow).returncode, DONE)
+        self.assertEqual(self.build(self.write("slab.obj", SLAB_OBJ), "-o", slab).returncode, DONE)
+        self.bench("simulate", "pile", "--mesh", cow, "--ground", slab, "--count", "8", "--frames", "20",
+                   "--trajectory", "10", "-o", run)
+        return run
+
+    def is_backdrop(self, picture):
+        """Per pixel: whether it is as the backdrop is in the leftmost pixel of its row, which shows no body."""
+        return np.abs(picture - picture[:, :1]).max(axis=2) < 0.01
+
+
+class ZBuffer(RenderTest):
+    def test_samples_belong_to_the_nearest_triangle_that_holds_their_centres(self):
+        random = np.random.default_rng(1)
+        corners = random.uniform([-5, -5, 0], [25, 25, 1], (60, 3, 3))
+        depth, nearest = render.rasterise(corners, (20, 16))
+        for y in range(16):
+            for x in range(20):
+                expected = (-np.inf, -1)
+                for i, triangle in enumerate(corners):
+                    system = np.vstack([triangle[:, :2].T, np.ones(3)])
+                    weights = np.linalg.solve(system, [x + 0.5, y + 0.5, 1])
+                    if weights.min() >= 0:
+                        expected = max(expected, (weights @ triangle[:, 2], i))
+                self.assertEqual(nearest[y, x], expected[1], (x, y))
+                if expected[1] >= 0:
+                    self.assertAlmostEqual(depth[y, x], expected[0])
+
+    def test_triangles_without_area_and_beyond_the_picture_show_nothing(self):
+        flat = [[0, 0, 1], [5, 5, 1], [10, 10, 1]]
+        away = [[-9, 0, 1], [-1, 0, 1], [-1, 9, 1]]
+        _, nearest = render.rasterise(np.array([flat, away], float), (10, 10))
+        self.assertTrue((nearest == -1).all())
+
+
+class RenderedScenes(RenderTest):
+    def test_bodies_appear_where_they_are_and_nothing_is_cut_off(self):
+        self.write_scene([[0, 0, 0], [0, 3, 0]])
+        picture = self.picture(self.scene, *FROM_X)
+        self.assertEqual(picture.shape, (60, 120, 3))
+        empty = self.is_backdrop(picture)
+        columns = np.nonzero(~empty.all(axis=0))[0]
+        rows = np.nonzero(~empty.all(axis=1))[0]
+        # Four lengths from the left of the one to the right of the other fill the width but for 3 % on either side.
+        self.assertTrue(2 <= columns[0] <= 5 and 114 <= columns[-1] <= 117, columns)
+        self.assertAlmostEqual((rows[0] + rows[-1]) / 2, 29.5, delta=1)
+        gap = np.nonzero(empty.all(axis=0))[0]
+        gap = gap[(gap > columns[0]) & (gap < columns[-1])]
+        self.assertAlmostEqual((gap[0] + gap[-1]) / 2, 59.5, delta=1)
+        # Two lengths of four, seen between the far edges: 24 degrees wide, the picture is 10 lengths from the near ones.
+        self.assertAlmostEqual(len(gap) / (columns[-1] - columns[0] + 1), 2 / 4 * 10 / 11, delta=0.03)
+
+    def test_the_nearer_body_hides_the_other(self):
+        self.write_scene([[0, 0, 0], [4, 0, 0]])
+        both = self.picture(self.scene, *FROM_X)
+        self.write_scene([[0, 0, 0], [4, 0, 0]], motion=[0, 1])  # grey is what is fixed
+        second_is_grey = self.picture(self.scene, *FROM_X)
+        self.assertGreater(np.ptp(both[30, 60]), 2 * np.ptp(second_is_grey[30, 60]))
+        self.write_scene([[0, 0, 0], [4, 0, 0]], motion=[1, 0])
+        np.testing.assert_allclose(self.picture(self.scene, *FROM_X)[30, 60], both[30, 60], atol=0.01)
+
+    def test_a_shadow_falls_away_from_the_sun_which_is_on_the_left(self):
+        plate = self.inputs / "plate.bvh"
+        made = self.build(self.write("plate.obj", "v -1 -1 0\nv 2 -1 0\nv 2 2 0\nv -1 2 0\nf 1 2 3 4\n"), "-o", plate)
+        self.assertEqual(made.returncode, DONE)
+        self.write_scene([[0, 0, 0], [0, 0, 0]])
+        with h5py.File(self.scene, "r+") as file:
+            del file["assets"]
+            file["assets"] = [self.cube.name, os.fspath(plate)]
+            file["instances/asset"][:] = [0, 1]
+        picture = self.picture(self.scene, "--azimuth", "0", "--elevation", "70", "--width", "120", "--height", "120")
+        left, right = (picture[60:80, columns].mean() for columns in (slice(24, 30), slice(90, 96)))
+        self.assertLess(right, 0.8 * left)
+        self.assertGreater(right, 0.2)  # no black holes
+
+    def test_the_same_scene_gives_the_same_bytes(self):
+        self.write_scene([[0, 0, 0], [0, 3, 0]])
+        first = self.render(self.scene, *FROM_X, name="a.png")[1].read_bytes()
+        self.assertEqual(self.render(self.scene, *FROM_X, name="b.png")[1].read_bytes(), first)
+
+
+class RenderedRuns(RenderTest):
+    def test_a_state_of_a_run_looks_as_the_scene_made_of_it(self):
+        run = self.pile()
+        self.bench("frame", run, "--frame", "10", "-o", self.scene)
+        of_run = self.picture(run, "--frame", "10", "--width", "160")
+        self.assertLess(np.abs(of_run - self.picture(self.scene, "--width", "160")).max(axis=2).mean(), 1e-3)
+        self.assertGreater(np.abs(of_run - self.picture(run, "--width", "160")).max(axis=2).mean(), 1e-2)
+
+    def test_an_animation_shows_the_frames_in_real_time(self):
+        try:
+            import PIL.Image
+        except ImportError:
+            self.skipTest("python3-pil is not here")
+        run = self.pile()
+        for name in ("run.webp", "run.gif"):
+            result, output = self.render(run, "--frames", "0:20:10", "--width", "96", name=name)
+            self.assertEqual((result.returncode, result.stderr), (DONE, b""))
+            with PIL.Image.open(output) as animation:
+                self.assertEqual((animation.n_frames, animation.size), (3, (96, 60)))
+                animation.seek(1)
+                animation.load()
+                self.assertAlmostEqual(animation.info["duration"], 10 / 60 * 1000, delta=10)
+
+    def test_what_cannot_be_shown_is_said(self):
+        result, _ = self.render(self.pile(), "--frame", "7")
+        self.assertEqual(result.returncode, UNREADABLE_INPUT)
+        self.assertIn(b"does not keep the state after step 7, but every 10th up to 20", result.stderr)
+        result, _ = self.render(self.scene, name="picture.bmp")
+        self.assertIn(b"picture.bmp: neither .png nor .webp nor .gif", result.stderr)
+        result, _ = self.render(self.cube)
+        self.assertEqual(result.returncode, UNREADABLE_INPUT)
+        self.assertIn(b"mesh.bvh", result.stderr)
+
+
+class BrokenAssets(RenderTest):
+    def test_an_asset_that_is_not_one_is_named(self):
+        self.write_scene([[0, 0, 0]])
+        for broken in (b"", b"no asset", self.cube.read_bytes()[:-7]):
+            self.cube.write_bytes(broken)
+            result, output = self.render(self.scene)
+            self.assertEqual(result.returncode, UNREADABLE_INPUT)
+            self.assertIn(b"mesh.bvh: not a .bvh file", result.stderr)
+            self.assertFalse(output.exists())
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -30,25 +30,25 @@ def plane_of_weights(corners):
 
 def pixel_bounds(corners, size):
     """First and one past the last pixel, [n,2] each, whose centres can lie in a triangle."""
-    low = np.ceil(corners[..., :2].min(axis=1) - 0.5)
-    high = np.floor(corners[..., :2].max(axis=1) - 0.5) + 1
+    a, b, c = (corners[:, k, :2] for k in range(3))
+    low = np.ceil(np.minimum(np.minimum(a, b), c) - 0.5)
+    high = np.floor(np.maximum(np.maximum(a, b), c) - 0.5) + 1
     return (np.clip(edge, 0, size).astype(np.int64) for edge in (low, high))
 
 
 def fragments(weights, z, low, high, block):
     """Of triangles whose bounds fit in a block of pixels: triangle, x, y and depth of each pixel that lies in one."""
-    shape = (len(z), block[1], block[0])
     x = (low[:, 0, None] + np.arange(block[0]))[:, None, :]
     y = (low[:, 1, None] + np.arange(block[1]))[:, :, None]
     inside = (x < high[:, 0, None, None]) & (y < high[:, 1, None, None])
-    depth = np.zeros(shape)
     for k in range(3):
         cx, cy, c = (weights[:, k, i, None, None] for i in range(3))
-        weight = cx * (x + 0.5) + (cy * (y + 0.5) + c)
-        inside &= weight >= 0
-        depth += weight * z[:, k, None, None]
-    triangle, row, column = np.nonzero(inside)
-    return triangle, low[triangle, 0] + column, low[triangle, 1] + row, depth[inside]
+        inside &= cx * (x + 0.5) + (cy * (y + 0.5) + c) >= 0
+    triangle, pixel = np.divmod(np.flatnonzero(inside), block[0] * block[1])
+    row, column = np.divmod(pixel, block[0])
+    x, y = low[triangle, 0] + column, low[triangle, 1] + row
+    plane = np.einsum("nk,nki->ni", z, weights)[triangle]
+    return triangle, x, y, plane[:, 0] * (x + 0.5) + (plane[:, 1] * (y + 0.5) + plane[:, 2])
 
 
 def rasterise(corners, size):
@@ -63,12 +63,13 @@ def rasterise(corners, size):
     weights = plane_of_weights(corners)
     seen = np.all(low < high, axis=1) & np.isfinite(weights).all(axis=(1, 2))
     extent = np.ceil(np.log2(np.maximum(high - low, 1))).astype(int)  # blocks are powers of two
+    kind_of = extent[:, 0] * 64 + extent[:, 1]
     front_first = np.argsort(-corners[..., 2].max(axis=1), kind="stable")
     front_first = front_first[seen[front_first]]
-    for kind in np.unique(extent[front_first], axis=0):
-        block = 1 << kind
-        chosen = front_first[np.all(extent[front_first] == kind, axis=1)]
-        step = max(1, FRAGMENTS_AT_ONCE // int(block.prod()))
+    for kind in np.unique(kind_of[front_first]):
+        block = (1 << kind // 64, 1 << kind % 64)
+        chosen = front_first[kind_of[front_first] == kind]
+        step = max(1, FRAGMENTS_AT_ONCE // (block[0] * block[1]))
         for some in (chosen[i:i + step] for i in range(0, len(chosen), step)):
             triangle, x, y, z = fragments(weights[some], corners[some, :, 2], low[some], high[some], block)
             pixel = y * width + x

@@ -13,7 +13,8 @@ class ExchangeSearch {
  public:
   explicit ExchangeSearch(WorkingTree& tree) : tree_(tree), marks_(tree.size()) {}
 
-  /// For each child in turn, makes the exchange with another one below the region's root that saves most.
+  /// For each child in turn, makes the exchange with another one below the region's root that saves most;
+  /// ends early where searches take far longer than they do on ordinary meshes.
   /// Result: how many were made.
   std::uint32_t pass(const Region& region);
 
@@ -42,6 +43,7 @@ class ExchangeSearch {
   std::vector<Mark> marks_;  // of the first parent and the blocks above it
   std::uint32_t stamp_ = 0;
   std::vector<Waiting> waiting_;
+  std::uint64_t searched_ = 0;  // blocks, by the present pass
 };
 
 }  // namespace tandem::build

@@ -61,9 +61,9 @@ class Poses(PosesTest):
         for tree, path in ((self.minimal, self.file), (self.free, self.other)):
             self.passes("poses", tree, "--count", "50", "-o", path)
         with h5py.File(self.file) as one, h5py.File(self.other) as two:
-            for name in ("instances/rotation", "instances/translation", "poses/depth", "poses/geometry", "work/contacts"):
+            for name in ("instances/rotation", "instances/translation", "poses/depth", "poses/geometry", "counts/contacts"):
                 self.assertTrue((one[name][:] == two[name][:]).all(), name)
-            self.assertTrue((one["work/block_pairs"][:] != two["work/block_pairs"][:]).any())
+            self.assertTrue((one["counts/block_pairs"][:] != two["counts/block_pairs"][:]).any())
 
     def test_stored_poses_give_the_figures_that_made_poses_give(self):
         made = self.poses(self.minimal, self.free, "--count", "50", "--seed", "3", "--set", "training", "-o", self.file)
@@ -78,10 +78,10 @@ class Poses(PosesTest):
     def test_figures_are_those_of_the_rows(self):
         trees = self.poses(self.minimal, self.free, "--count", "101", "-o", self.file)["trees"]
         with h5py.File(self.file) as file:
-            self.assertEqual(list(file["work/trees"].asstr()), ["../in/minimal_1.bvh", "../in/free_1.bvh"])
+            self.assertEqual(list(file["counts/trees"].asstr()), ["../in/minimal_1.bvh", "../in/free_1.bvh"])
             self.assertTrue(((file["poses/depth"][:] >= 0) & (file["poses/depth"][:] < 0.05)).all())
             for name in COUNTERS:
-                rows = file[f"work/{name}"][:]
+                rows = file[f"counts/{name}"][:]
                 self.assertEqual((rows.dtype, rows.shape), ("u4", (2, 101)))
                 for tree, row in zip(trees, rows.astype(float)):
                     self.assertAlmostEqual(tree[name]["mean"], row.mean(), 9)

@@ -126,7 +126,7 @@ void write(const std::string& path, const Bodies& bodies, const Poses& poses,
   add_scene(file, scene);
   std::vector<std::string> names;
   for (const NamedAsset& tree : bodies.trees) names.push_back(seen_from(path, tree.path));
-  file.add("/work/trees", names);
+  file.add("/counts/trees", names);
   const auto add = [&](const char* name, std::vector<std::uint32_t> PoseWork::*column) {
     std::vector<std::uint32_t> all;
     for (const PoseWork& of_tree : work) {
@@ -134,9 +134,9 @@ void write(const std::string& path, const Bodies& bodies, const Poses& poses,
     }
     file.add(name, {work.size(), poses.of_b.size()}, all);
   };
-  add("/work/block_pairs", &PoseWork::block_pairs);
-  add("/work/candidates", &PoseWork::candidates);
-  add("/work/contacts", &PoseWork::contacts);
+  add("/counts/block_pairs", &PoseWork::block_pairs);
+  add("/counts/candidates", &PoseWork::candidates);
+  add("/counts/contacts", &PoseWork::contacts);
   file.write();
 }
 

@@ -192,6 +192,14 @@ TEST(ExchangeSearch, PredictsTheChangeOfTheWholeCost) {
   }
 }
 
+TEST(Imaginary, AShareNeverDeepensATreeBeyondWhatAFileMayHold) {
+  for (const double share : {0.001, 0.01, 0.03, 0.05, 0.08, 0.1, 0.15}) {
+    for (const std::uint32_t n : {100u, 300u, 900u, 4000u}) {
+      EXPECT_LE(statistics_of(nested(n), {share}, Effort::fast).depth, kMaxDepth);
+    }
+  }
+}
+
 TEST(Imaginary, AShareIsNeverExceededAndEachTreeIsSound) {
   const Mesh mesh = sheet(30);
   std::uint64_t blocks = 0;

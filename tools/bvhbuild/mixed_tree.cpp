@@ -25,6 +25,7 @@ struct Replacement {
   Topology topology;       // over the triangles of the whole mesh
   double saving = 0;
   std::int64_t more_blocks = 0;
+  bool fits = false;  // below the blocks above it, within kMaxDepth
 
   double worth() const {
     return saving / static_cast<double>(std::max<std::int64_t>(std::abs(more_blocks), 1));
@@ -55,6 +56,7 @@ Replacement replacement_of(const WorkingTree& tree, const Region& region, std::s
   replacement.saving = cost_of(tree, region.root, region.blocks) - cost_of(other, 0, whole.blocks);
   replacement.more_blocks =
       static_cast<std::int64_t>(whole.blocks.size()) - static_cast<std::int64_t>(region.blocks.size());
+  replacement.fits = region.depth + other[0].height - 1 <= kMaxDepth;
   for (TopologyBlock& block : replacement.topology) {
     for (int i = 0; i < block.count && block.is_leaf_block; ++i) block.child[i] = triangles[block.child[i]];
   }
@@ -135,7 +137,9 @@ void add_replacements(const WorkingTree& tree, std::span<const Bounds> bounds, s
   });
 }
 
+// Those that fit, the most worth first.
 void sort_by_worth(std::vector<Replacement>& replacements) {
+  std::erase_if(replacements, [](const Replacement& replacement) { return !replacement.fits; });
   std::sort(replacements.begin(), replacements.end(), [](const Replacement& a, const Replacement& b) {
     return a.worth() != b.worth() ? a.worth() > b.worth() : a.root < b.root;
   });

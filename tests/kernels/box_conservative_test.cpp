@@ -4,25 +4,22 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <cstdlib>
 
-#include "random_pose.h"
+#include "sure_verdicts.h"
 #include "tandem/kernels/box_test.h"
-#include "tandem/kernels/interval_test.h"
 
 namespace tandem {
 namespace {
 
+using test::any_scale;
+using test::cross;
+using test::Direction;
+using test::plane_separates;
+using test::Point;
 using test::RandomPoses;
+using test::Real;
 using test::Scale;
-using Real = long double;
-using Direction = std::array<Real, 3>;
-using Point = std::array<double, 3>;
-
-// Trials of this many with TANDEM_LONG=1, a hundredth otherwise.
-std::uint64_t trials(std::uint64_t many) {
-  return std::getenv("TANDEM_LONG") != nullptr ? many : many / 100;
-}
+using test::surely_inside;
 
 struct Side {
   Pose pose;
@@ -41,10 +38,6 @@ Direction column(const Pose& pose, int j) {
   return {pose.rotation[0][j], pose.rotation[1][j], pose.rotation[2][j]};
 }
 
-Direction cross(const Direction& a, const Direction& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
 // World directions that are across the faces of the posed boxes: 3 + 3 + 9. Sheared boxes have them across
 // their faces too.
 Direction axis(const Pose& a, const Pose& b, int which) {
@@ -59,27 +52,6 @@ Corners corners(const Side& side) {
   Corners out;
   for (int i = 0; i < 8; ++i) out[i] = side.corner(i);
   return out;
-}
-
-// Proves that a plane across `along` has the two hulls strictly on its two sides. Distances from one corner
-// are rounded once, products once, sums twice: 4 * 2^-64 of the sum of magnitudes, taken as 16.
-bool plane_separates(const Corners& a, const Corners& b, const Direction& along) {
-  Real lowest[2] = {HUGE_VALL, HUGE_VALL}, highest[2] = {-HUGE_VALL, -HUGE_VALL}, size = 0;
-  for (int side = 0; side < 2; ++side) {
-    for (const Point& point : side == 0 ? a : b) {
-      Real at = 0, magnitude = 0;
-      for (int k = 0; k < 3; ++k) {
-        const Real term = along[k] * (static_cast<Real>(point[k]) - static_cast<Real>(a[0][k]));
-        at += term;
-        magnitude += std::fabs(term);
-      }
-      lowest[side] = std::min(lowest[side], at);
-      highest[side] = std::max(highest[side], at);
-      size = std::max(size, magnitude);
-    }
-  }
-  const Real error = 16 * 0x1p-64L * size;
-  return lowest[0] > highest[1] + 2 * error || lowest[1] > highest[0] + 2 * error;
 }
 
 bool surely_apart(const Side& a, const Side& b) {
@@ -121,20 +93,6 @@ bool place(RandomPoses& random, const Side& a, Side& b, int which, double gap) {
   return true;
 }
 
-Scale any_scale(RandomPoses& random) {
-  constexpr double kSizes[] = {1, 1, 1, 1e-3, 1e3, 0x1p-60, 0x1p60, 0x1p-100, 0x1p-140, 0x1p110};
-  constexpr double kCenters[] = {0, 1, 1, 10, 1e3};
-  constexpr double kTranslations[] = {0, 1, 1, 1e4, 1e7, 1e12};
-  constexpr double kTurns[] = {4, 4, 0, 1e-9, 1e-7, 1e-5, 1e-3};
-  Scale scale;
-  scale.size = kSizes[random.below(std::size(kSizes))];
-  scale.center = scale.size * kCenters[random.below(std::size(kCenters))];
-  scale.translation = scale.size * kTranslations[random.below(std::size(kTranslations))];
-  scale.turn = kTurns[random.below(std::size(kTurns))];
-  scale.deviation = random.below(3) == 0 ? 1.2e-7 : 0;
-  return scale;
-}
-
 double length(const float (&v)[3]) {
   return std::hypot(v[0], v[1], v[2]);
 }
@@ -142,17 +100,14 @@ double length(const float (&v)[3]) {
 struct Trial {
   Side a, b;
   RelativePose b_in_a;
-  IntervalPose intervals;
   double slack;
 };
 
 /// The poses of a trial. False: out of range.
 bool relate(Trial& trial, const TreeExtent& extent_a) {
   const TreeExtent extent_b = test::extent_of(trial.b.box);
-  if (relative_pose(trial.a.pose, extent_a, trial.b.pose, extent_b, trial.b_in_a) != RelativePoseStatus::kOk)
-    return false;
-  trial.intervals = interval_pose(trial.b_in_a, extent_a, extent_b);
-  return true;
+  return relative_pose(trial.a.pose, extent_a, trial.b.pose, extent_b, trial.b_in_a) ==
+         RelativePoseStatus::kOk;
 }
 
 // Boxes whose gap along a random one of the 15 axes is within twice the slack, or exactly none.
@@ -178,49 +133,21 @@ bool make_trial(RandomPoses& random, const Scale& scale, double largest_gap_in_s
 
 TEST(BoxTest, WhatItCallsApartIsApartInExactArithmetic) {
   RandomPoses random(1);
-  std::uint64_t apart = 0, apart_by_intervals = 0, made = 0;
-  const std::uint64_t count = trials(100'000'000);
+  std::uint64_t apart = 0, made = 0;
+  const std::uint64_t count = test::hundredth_of(100'000'000);
   for (std::uint64_t i = 0; i < count; ++i) {
     Trial trial;
     if (!make_trial(random, any_scale(random), 2, trial)) continue;
     ++made;
     ASSERT_TRUE(is_rigid(trial.a.pose) && is_rigid(trial.b.pose)) << i;
-    const bool by_intervals = !overlap_intervals(trial.a.box, trial.b.box, trial.intervals);
-    apart_by_intervals += by_intervals;
-    if (overlap_15_axes(trial.a.box, trial.b.box, trial.b_in_a)) {
-      ASSERT_TRUE(!by_intervals || surely_apart(trial.a, trial.b)) << "trial " << i;
-      continue;
-    }
+    if (overlap_15_axes(trial.a.box, trial.b.box, trial.b_in_a)) continue;
     ++apart;
     ASSERT_TRUE(surely_apart(trial.a, trial.b)) << "trial " << i;
   }
-  std::printf("%llu trials, %llu apart, %llu by intervals\n", static_cast<unsigned long long>(made),
-              static_cast<unsigned long long>(apart), static_cast<unsigned long long>(apart_by_intervals));
+  std::printf("%llu trials, %llu apart\n", static_cast<unsigned long long>(made),
+              static_cast<unsigned long long>(apart));
   EXPECT_GT(made, count / 2);
-  EXPECT_GT(apart_by_intervals, made / 100);
   EXPECT_GT(apart, made / 50);  // the trials are hard: most gaps lie within the slack
-}
-
-// Whether the posed point `p` lies strictly inside the tetrahedron, for sure: signs of volumes, each a sum of
-// 6 products of 3 differences, with an error below 32 * 2^-64 of the product of sizes.
-bool surely_inside(const Point& p, const std::array<Point, 4>& tetrahedron) {
-  Direction to[4];
-  Real size = 0;
-  for (int i = 0; i < 4; ++i) {
-    for (int k = 0; k < 3; ++k) {
-      to[i][k] = static_cast<Real>(tetrahedron[i][k]) - p[k];
-      size = std::max(size, std::fabs(to[i][k]));
-    }
-  }
-  int positive = 0, negative = 0;
-  for (int i = 0; i < 4; ++i) {
-    const Direction n = cross(to[(i + 1) % 4], to[(i + 2) % 4]);
-    const Direction& v = to[(i + 3) % 4];
-    const Real volume = (n[0] * v[0] + n[1] * v[1] + n[2] * v[2]) * (i % 2 == 0 ? 1 : -1);
-    positive += volume > 0x1p-58L * size * size * size;
-    negative += volume < -0x1p-58L * size * size * size;
-  }
-  return positive == 4 || negative == 4;
 }
 
 // A corner of a lies inside a tetrahedron of b's vertices, a few units in the last place large, and both
@@ -272,13 +199,12 @@ bool make_contact(RandomPoses& random, const Scale& scale, Trial& trial) {
 TEST(BoxTest, ContactsByConstructionAreNeverCalledApart) {
   RandomPoses random(2);
   std::uint64_t made = 0;
-  const std::uint64_t count = trials(100'000'000);
+  const std::uint64_t count = test::hundredth_of(100'000'000);
   for (std::uint64_t i = 0; i < count; ++i) {
     Trial trial;
     if (!make_contact(random, any_scale(random), trial)) continue;
     ++made;
     ASSERT_TRUE(overlap_15_axes(trial.a.box, trial.b.box, trial.b_in_a)) << "trial " << i;
-    ASSERT_TRUE(overlap_intervals(trial.a.box, trial.b.box, trial.intervals)) << "trial " << i;
   }
   std::printf("%llu contacts\n", static_cast<unsigned long long>(made));
   EXPECT_GT(made, count / 3);
@@ -342,8 +268,6 @@ TEST(RelativePose, HoldsBoxesApartAtAnyDistanceInRange) {
     ASSERT_EQ(relative_pose(kIdentityPose, test::extent_of(box), there, test::extent_of(box), out),
               RelativePoseStatus::kOk);
     EXPECT_FALSE(overlap_15_axes(box, box, out)) << t;
-    const IntervalPose intervals = interval_pose(out, test::extent_of(box), test::extent_of(box));
-    EXPECT_FALSE(overlap_intervals(box, box, intervals)) << t;
   }
 }
 

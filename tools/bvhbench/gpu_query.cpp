@@ -269,9 +269,9 @@ void time_repeats(const Setting& setting, const Event& between, const Run& run, 
   }
 }
 
-// The walk of both trees with what float32 decides left out: boxes that meet are counted, none is stored.
+// The walk of both trees without candidates.
 void time_traversal(const Setting& setting, GpuAnswer& answer) {
-  const GpuQueryOptions options = {.mode = QueryMode::boxes};
+  const GpuQueryOptions options = {.walk_only = true};
   GpuContactQuery query;
   require(query.set_assets(setting.scene.assets(), setting.stream), query.cuda_error(), "assets");
   require(query.reserve({.pairs = static_cast<std::uint32_t>(answer.counters.object_pairs)}, options),

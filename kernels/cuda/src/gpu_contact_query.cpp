@@ -10,8 +10,8 @@
 namespace tandem {
 namespace {
 
-// Blocks that an entry of the walk's stack can name.
-constexpr std::uint32_t kMostBlocks = 1u << 29;
+// Walk blocks that an entry of the walk's stack can name.
+constexpr std::uint64_t kMostNumbers = std::uint64_t{1} << gpu::kNumberBits;
 
 // Entries of a warp's stack beyond its reserve.
 constexpr std::uint32_t kStackSize = 208;
@@ -31,6 +31,7 @@ GpuContactQuery& GpuContactQuery::operator=(GpuContactQuery&& other) noexcept {
   std::swap(asset_count_, other.asset_count_);
   std::swap(asset_room_, other.asset_room_);
   std::swap(walk_blocks_, other.walk_blocks_);
+  std::swap(file_blocks_, other.file_blocks_);
   std::swap(block_room_, other.block_room_);
   std::swap(depth_, other.depth_);
   std::swap(most_triangles_, other.most_triangles_);
@@ -69,11 +70,17 @@ Status GpuContactQuery::allocate(Element*& out, std::size_t count) {
 
 void GpuContactQuery::free() {
   free_room();
-  for (void** memory : {&assets_, &walk_blocks_, &state_, &chunks_}) {
+  free_walk_blocks();
+  for (void** memory : {&assets_, &state_, &chunks_}) {
     static_cast<void>(cudaFree(std::exchange(*memory, nullptr)));
   }
   static_cast<void>(cudaFreeHost(std::exchange(host_report_, nullptr)));
   asset_count_ = asset_room_ = 0;
+}
+
+void GpuContactQuery::free_walk_blocks() {
+  static_cast<void>(cudaFree(std::exchange(walk_blocks_, nullptr)));
+  static_cast<void>(cudaFree(std::exchange(file_blocks_, nullptr)));
   block_room_ = 0;
 }
 
@@ -116,15 +123,14 @@ Status GpuContactQuery::set_assets(std::span<const GpuAsset> assets, cudaStream_
   if (status != Status::kOk) return status;
   std::uint32_t depth = 1, triangles = 0;
   std::uint64_t faces = 0;
-  std::size_t block_count = 0;
+  std::uint64_t numbers = 0;
   for (const GpuAsset& asset : assets) {
-    block_count += asset.tree.block_count;
-    if (asset.tree.block_count >= kMostBlocks) return Status::kOutOfRange;
+    numbers += gpu::numbers_of(asset.tree);
     depth = std::max(depth, asset.tree.depth);
     triangles = std::max(triangles, asset.tree.triangle_count);
     faces = std::max(faces, asset.source_faces);
   }
-  if (assets.size() >= kNoIndex) return Status::kOutOfRange;
+  if (assets.size() >= kNoIndex || numbers > kMostNumbers) return Status::kOutOfRange;
   const auto count = static_cast<std::uint32_t>(assets.size());
   if (count > asset_room_) {
     static_cast<void>(cudaFree(std::exchange(assets_, nullptr)));
@@ -135,14 +141,15 @@ Status GpuContactQuery::set_assets(std::span<const GpuAsset> assets, cudaStream_
     assets_ = table;
     asset_room_ = count;
   }
-  if (block_count > block_room_) {
-    static_cast<void>(cudaFree(std::exchange(walk_blocks_, nullptr)));
-    block_room_ = asset_count_ = 0;
+  if (numbers > block_room_) {
+    free_walk_blocks();
+    asset_count_ = 0;
     gpu::WalkBlock* blocks = nullptr;
-    status = allocate(blocks, block_count);
-    if (status != Status::kOk) return status;
+    status = allocate(blocks, numbers);
     walk_blocks_ = blocks;
-    block_room_ = block_count;
+    if (status == Status::kOk) status = allocate(file_blocks_, numbers);
+    if (status != Status::kOk) return status;
+    block_room_ = numbers;
   }
   asset_count_ = count;
   depth_ = depth;
@@ -152,12 +159,22 @@ Status GpuContactQuery::set_assets(std::span<const GpuAsset> assets, cudaStream_
   auto* table = static_cast<gpu::Asset*>(assets_);
   status = fail(cudaMemcpy2DAsync(table, sizeof(gpu::Asset), assets.data(), sizeof(GpuAsset),
                                   sizeof(GpuAsset), count, cudaMemcpyHostToDevice, stream));
-  auto* blocks = static_cast<gpu::WalkBlock*>(walk_blocks_);
-  for (std::uint32_t i = 0; i < count && status == Status::kOk; ++i) {
-    status = fail(gpu::prepare_asset(table + i, assets[i].tree.block_count, blocks, stream));
-    blocks += assets[i].tree.block_count;
+  if (status == Status::kOk) status = make_walk_blocks(assets, stream);
+  return status;
+}
+
+Status GpuContactQuery::make_walk_blocks(std::span<const GpuAsset> assets, cudaStream_t stream) {
+  std::uint32_t most_blocks = 0, first = 0;
+  for (const GpuAsset& asset : assets) most_blocks = std::max(most_blocks, asset.tree.block_count);
+  std::uint32_t* number_of = nullptr;
+  Status status = allocate(number_of, most_blocks);
+  for (std::uint32_t i = 0; i < asset_count_ && status == Status::kOk; ++i) {
+    status = fail(gpu::make_walk_blocks(static_cast<gpu::Asset*>(assets_) + i, assets[i].tree, first,
+                                        static_cast<gpu::WalkBlock*>(walk_blocks_), file_blocks_, number_of, stream));
+    first += static_cast<std::uint32_t>(gpu::numbers_of(assets[i].tree));
   }
   if (status == Status::kOk) status = fail(cudaStreamSynchronize(stream));
+  static_cast<void>(cudaFree(number_of));
   return status;
 }
 
@@ -229,11 +246,14 @@ Status GpuContactQuery::enqueue(const GpuInstances& instances, const GpuPairs& p
   args.given = pairs;
   args.mode = options.mode;
   args.first_contact_only = options.first_contact_only;
+  args.walk_only = options.walk_only;
   args.capacity = capacity_;
   args.state = static_cast<gpu::QueryState*>(state_);
   args.host_report = host_report_;
   args.chunks = static_cast<gpu::Chunk*>(chunks_);
   args.pairs = static_cast<gpu::PairRecord*>(pairs_);
+  args.walk_blocks = static_cast<const gpu::WalkBlock*>(walk_blocks_);
+  args.file_blocks = file_blocks_;
   args.world_pairs = world_pairs_;
   args.met = met_;
   args.contacts = options.sorted ? unsorted_ : contacts_;
@@ -278,7 +298,8 @@ const GpuQueryReport* GpuContactQuery::device_report() const {
 }
 
 std::size_t GpuContactQuery::bytes() const {
-  std::size_t bytes = asset_room_ * sizeof(gpu::Asset) + block_room_ * sizeof(gpu::WalkBlock);
+  std::size_t bytes = asset_room_ * sizeof(gpu::Asset) + 
+                      block_room_ * (sizeof(gpu::WalkBlock) + sizeof(std::uint32_t));
   if (state_ != nullptr) bytes += sizeof(gpu::QueryState);
   if (chunks_ != nullptr) bytes += gpu::kChunks * sizeof(gpu::Chunk);
   bytes += capacity_.pairs * (sizeof(gpu::PairRecord) + 2 * sizeof(std::uint32_t));

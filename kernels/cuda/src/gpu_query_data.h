@@ -47,12 +47,14 @@ struct QueryArgs {
   GpuInstances instances;
   GpuPairs given;
   QueryMode mode;
-  bool first_contact_only;
+  bool first_contact_only, walk_only;
   GpuQueryCapacity capacity;
   QueryState* state;
   GpuQueryReport* host_report;  ///< in CPU memory
   Chunk* chunks;
   PairRecord* pairs;
+  const WalkBlock* walk_blocks;
+  const std::uint32_t* file_blocks;  ///< see make_walk_blocks()
   std::uint32_t* world_pairs;  ///< pairs that are not in_frame
   std::uint32_t* met;          ///< of a pair: not 0 once it has a contact; where only the first is asked for
   Contact* contacts;
@@ -74,8 +76,16 @@ struct SortingRoom {
 /// Sorting keeps two rows of 64-bit keys where its result is to come, each row aligned.
 inline constexpr std::size_t kContactsForKeys = 32;
 
-/// Fills in what follows from the tree of an asset in the table, its walk blocks included.
-cudaError_t prepare_asset(Asset* asset, std::uint32_t block_count, WalkBlock* out, cudaStream_t stream);
+/// Walk blocks of the tree of an asset in the table, and what else the table says of it. Walk blocks have
+/// numbers from `first` on, as many as numbers_of() says, and `file_blocks` tells of each the block it was
+/// made of. number_of: scratch, a word for each block of the tree.
+cudaError_t make_walk_blocks(Asset* asset, const LevelView& tree, std::uint32_t first, WalkBlock* out,
+                             std::uint32_t* file_blocks, std::uint32_t* number_of, cudaStream_t stream);
+
+/// Walk blocks are numbered in fours, one four for the children of a block.
+inline std::uint64_t numbers_of(const LevelView& tree) {
+  return 1 + std::uint64_t{kNodesPerBlock} * (tree.block_count - tree.leaf_block_count);
+}
 
 /// Checks instances and pairs and makes the records.
 cudaError_t prepare_pairs(const QueryArgs& args, cudaStream_t stream);

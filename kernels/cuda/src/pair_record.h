@@ -1,9 +1,11 @@
 #pragma once
 #include <cuda_runtime.h>
 
+#include <cstddef>
 #include <cstdint>
 
 #include "tandem/kernels/gpu_contact_query.h"
+#include "tandem/kernels/oriented_block.h"
 #include "tandem/kernels/relative_pose.h"
 
 // What every engine on the GPU keeps of assets and object pairs, and how its lanes share an array.
@@ -11,25 +13,27 @@ namespace tandem::gpu {
 
 using Counter = unsigned long long;  // what atomicAdd takes
 
-/// What a walk reads of a block: its boxes, component by component, and what its nodes lead to. 112 bytes, an
-/// odd number of float4: where the lanes of a warp read the same component of several blocks, the L1 cache
-/// serves them from several banks, which it cannot where blocks are 128 bytes apart.
+/// What a walk reads of a block: its boxes in a frame of its own, component by component, and what lies below
+/// them. The blocks below its nodes, or the triangles, have numbers that follow each other. 112 bytes, an odd
+/// number of float4: where the lanes of a warp read the same component of several blocks, the L1 cache serves
+/// them from several banks, which it cannot where blocks are 128 bytes apart.
 struct alignas(16) WalkBlock {
   float center[3][kNodesPerBlock];
   float half_extent[3][kNodesPerBlock];
-  std::uint32_t link[kNodesPerBlock];  ///< of a leaf: its triangle; of others: see Link
+  std::uint32_t first_below;  ///< number of the first node's block, or kIsLeafBlock and that of its triangle
+  float size;                 ///< of size_of()
+  BlockRotation rotation;
 };
-static_assert(sizeof(WalkBlock) == 112);
+static_assert(sizeof(WalkBlock) == 112 && offsetof(WalkBlock, first_below) == 96);
 
-/// A block, as links and the entries of stacks name it.
-inline constexpr std::uint32_t kIndexBits = 29, kIndexMask = (1u << kIndexBits) - 1;
+/// Walk blocks are numbered through all assets of a query.
+inline constexpr std::uint32_t kNumberBits = 29, kNumberMask = (1u << kNumberBits) - 1;
 inline constexpr std::uint32_t kIsLeafBlock = 1u << 31;
 
 struct Asset {
   GpuAsset asset;
   TreeExtent extent;
-  const WalkBlock* walk_blocks;  ///< of GpuContactQuery
-  std::uint32_t root;            ///< its link
+  std::uint32_t root;  ///< number of its walk block
 };
 
 /// What the walk needs to know of an object pair, in whole float4.
@@ -37,16 +41,15 @@ struct alignas(16) PairRecord {
   float4 rotation[3];      ///< of RelativePose; w: translation
   float4 abs_rotation[3];  ///< w: slack_a
   float slack_b[3];
+  float oriented_slack;
   float frame_error;
-  float back_translation[3];  ///< of IntervalPose, whose slack the record has then
-  std::uint32_t in_frame;     ///< float32 can take the pair
-  const Block *blocks_a, *blocks_b;
-  const Triangle *triangles_a, *triangles_b;
-  const WalkBlock *walk_a, *walk_b;
+  std::uint32_t in_frame;  ///< float32 can take the pair
   std::uint32_t instance_a, instance_b;
-  std::uint32_t root_a, root_b;  ///< links
+  const Triangle *triangles_a, *triangles_b;
+  const Block *blocks_a, *blocks_b;
+  std::uint32_t root_a, root_b;  ///< walk blocks
 };
-static_assert(sizeof(PairRecord) == 192);
+static_assert(sizeof(PairRecord) == 176);
 
 #ifdef __CUDACC__
 

@@ -1,6 +1,5 @@
 #include "gpu_query_data.h"
 #include "tandem/kernels/frame_test.h"
-#include "tandem/kernels/interval_test.h"
 #include "tandem/kernels/world_box.h"
 
 // Before the walk: what is wrong with instances and pairs, and how the two of a pair lie. Compiled without
@@ -31,24 +30,18 @@ __device__ PairRecord make_record(const QueryArgs& args, const ObjectPair& pair)
                                       b.extent, pose) == RelativePoseStatus::kOk;
   const float error = in_frame ? frame_error(pose, a.extent, b.extent) : 0;
   PairRecord record = {};
-  if (in_frame && args.mode == QueryMode::exact) {
-    const IntervalPose intervals = interval_pose(pose, a.extent, b.extent);
-    pose = intervals.b_in_a;
-    for (int k = 0; k < 3; ++k) record.back_translation[k] = intervals.back_translation[k];
-  }
   for (int i = 0; i < 3; ++i) {
     record.rotation[i] = {pose.rotation[i][0], pose.rotation[i][1], pose.rotation[i][2], pose.translation[i]};
     record.abs_rotation[i] = {pose.abs_rotation[i][0], pose.abs_rotation[i][1], pose.abs_rotation[i][2],
                               pose.slack_a[i]};
     record.slack_b[i] = pose.slack_b[i];
   }
+  if (in_frame) record.oriented_slack = oriented_slack(pose, a.extent, b.extent);
   record.frame_error = error;
   record.blocks_a = a.asset.tree.blocks;
   record.blocks_b = b.asset.tree.blocks;
   record.triangles_a = a.asset.tree.triangles;
   record.triangles_b = b.asset.tree.triangles;
-  record.walk_a = a.walk_blocks;
-  record.walk_b = b.walk_blocks;
   record.root_a = a.root;
   record.root_b = b.root;
   record.instance_a = pair.a;
@@ -81,32 +74,6 @@ __global__ void __launch_bounds__(kThreads) prepare(QueryArgs args) {
   }
 }
 
-__device__ std::uint32_t link_to(const LevelView& tree, std::uint32_t block) {
-  return block | (tree.blocks[block].is_leaf_block() ? kIsLeafBlock : 0);
-}
-
-__global__ void __launch_bounds__(kThreads) make_walk_blocks(Asset* asset, WalkBlock* out) {
-  const LevelView tree = asset->asset.tree;
-  const std::uint32_t i = blockIdx.x * kThreads + threadIdx.x;
-  if (i == 0) {
-    asset->extent = extent_of(tree.blocks[0]);
-    asset->walk_blocks = out;
-    asset->root = link_to(tree, 0);
-  }
-  if (i >= tree.block_count) return;
-  const Block& block = tree.blocks[i];
-  for (int k = 0; k < 3; ++k) {
-    for (int node = 0; node < kNodesPerBlock; ++node) {
-      out[i].center[k][node] = block.center[k][node];
-      out[i].half_extent[k][node] = block.half_extent[k][node];
-    }
-  }
-  for (int node = 0; node < kNodesPerBlock; ++node) {
-    out[i].link[node] =
-        block.kind[node] == NodeKind::internal ? link_to(tree, block.index[node]) : block.index[node];
-  }
-}
-
 }  // namespace
 
 cudaError_t prepare_pairs(const QueryArgs& args, cudaStream_t stream) {
@@ -116,11 +83,6 @@ cudaError_t prepare_pairs(const QueryArgs& args, cudaStream_t stream) {
       error != cudaSuccess)
     return error;
   prepare<<<static_cast<unsigned>(processors) * 8, kThreads, 0, stream>>>(args);
-  return cudaGetLastError();
-}
-
-cudaError_t prepare_asset(Asset* asset, std::uint32_t block_count, WalkBlock* out, cudaStream_t stream) {
-  make_walk_blocks<<<(block_count + kThreads - 1) / kThreads, kThreads, 0, stream>>>(asset, out);
   return cudaGetLastError();
 }
 

@@ -27,13 +27,14 @@ constexpr std::uint32_t kOutRoom = 64;
 constexpr std::uint32_t kWarpsPerBlock = 16, kBlocksPerProcessor = 1;
 constexpr float kTimesLarger = 4;  // where planes of leaves are worth it, as narrow_phase_walk.h says
 
-// An entry of the stack: x: object pair; y: link to a's block, and in its free bits how the pair goes on; z:
-// link to b's block, and whether both are of one instance; w: a bit for each block pair below that is still
-// to be taken, and above them the hits. Where both descend these are the same; where a alone does, bit 4 i
-// stands for its child i against b's block, and the hits say against which nodes of it; where b alone does,
-// bit j for its child j.
-enum GoesOn : std::uint32_t { kBoth, kBAlone, kAAlone, kRoots };  // kRoots: the two blocks themselves
-constexpr std::uint32_t kSelf = 1u << kIndexBits;                 // in z
+// An entry of the stack: x: object pair; y: what of a lies below, and in its free bits how the pair goes on;
+// z: what of b lies below, and whether both are of one instance; w: a bit for each block pair below that is
+// still to be taken, and above them the hits. Where both descend these are the same, and bit 4 i + j stands
+// for the blocks, or triangles, y + i and z + j. Where a alone does, z is b's block itself and bit 4 i stands
+// for y + i against it, and the hits say against which nodes of it; where b alone does, y is a's block and
+// bit j stands for z + j. Object pairs begin as if both roots were the only children.
+enum GoesOn : std::uint32_t { kBoth, kBAlone, kAAlone };
+constexpr std::uint32_t kSelf = 1u << kNumberBits;  // in z
 
 // Shared memory by its own addresses: as pointers, the compiler would compute them anew all the time.
 __device__ inline std::uint32_t load_shared(std::uint32_t address) {
@@ -66,32 +67,20 @@ __device__ inline void store_release(std::uint32_t* to, std::uint32_t word) {
   asm volatile("st.release.gpu.global.u32 [%0], %1;" ::"l"(to), "r"(word) : "memory");
 }
 
-/// A block pair as links, and which of its node pairs count.
+/// A block pair, by numbers of walk blocks, and which of its node pairs count.
 struct Below {
   std::uint32_t a, b, nodes;
 };
 
 /// The block pair that a bit of an entry stands for.
-__device__ inline Below below_of(const WalkBlock* blocks_a, const WalkBlock* blocks_b, const uint4& entry,
-                                 std::uint32_t bit) {
-  constexpr std::uint32_t kLink = kIsLeafBlock | kIndexMask;
-  const std::uint32_t goes_on = entry.y >> kIndexBits & 3u, hits = entry.w >> 16;
-  Below below = {entry.y & kLink, entry.z & kLink, kAllNodePairs};
-  const std::uint32_t a = entry.y & kIndexMask, b = entry.z & kIndexMask;
-  if (goes_on == kBoth || goes_on == kAAlone) below.a = __ldg(&blocks_a[a].link[bit / 4]);
-  if (goes_on == kBoth || goes_on == kBAlone) below.b = __ldg(&blocks_b[b].link[bit % 4]);
+__device__ inline Below below_of(const uint4& entry, std::uint32_t bit) {
+  const std::uint32_t goes_on = entry.y >> kNumberBits & 3u, hits = entry.w >> 16;
+  Below below = {entry.y & kNumberMask, entry.z & kNumberMask, kAllNodePairs};
+  if (goes_on != kBAlone) below.a += bit / 4;
+  if (goes_on != kAAlone) below.b += bit % 4;
   if (goes_on == kAAlone) below.nodes = (hits >> bit & 0xFu) * 0x1111u;
   if (goes_on == kBAlone) below.nodes = (hits >> bit & 0x1111u) * 0xFu;
   return below;
-}
-
-struct WalkTrees {
-  const WalkBlock *a, *b;
-};
-
-__device__ inline WalkTrees trees_of(const PairRecord& record) {
-  const longlong2 both = __ldg(reinterpret_cast<const longlong2*>(&record.walk_a));
-  return {reinterpret_cast<const WalkBlock*>(both.x), reinterpret_cast<const WalkBlock*>(both.y)};
 }
 
 /// For each byte the positions of its bits that are set, three bits each, in ascending order.
@@ -222,7 +211,7 @@ class Walk {
       const PairRecord& record = args_.pairs[pair];
       const std::uint32_t self = record.instance_a == record.instance_b ? kSelf : 0;
       store_shared4(stack_ + 16 * (height_ + __popc(lanes & lanes_below())),
-                    {pair, record.root_a | kRoots << kIndexBits, record.root_b | self, 1});
+                    {pair, record.root_a, record.root_b | self, 1});
     }
     height_ += __popc(lanes);
     waiting_ += __popc(lanes);
@@ -290,20 +279,20 @@ class Walk {
     Below now = {0, 0, 0};
     if (mine) {
       const PairRecord& record = args_.pairs[pair];
-      const WalkTrees trees = trees_of(record);
-      now = below_of(trees.a, trees.b, taken.entry, taken.bit);
-      const std::uint32_t a = now.a & kIndexMask, b = now.b & kIndexMask;
-      float size_a, size_b;
-      hits = Means::test(args_, record, trees.a, trees.b, a, b, size_a, size_b) & now.nodes;
-      const bool leaf_a = (now.a & kIsLeafBlock) != 0, leaf_b = (now.b & kIsLeafBlock) != 0;
+      now = below_of(taken.entry, taken.bit);
+      Side side_a, side_b;
+      hits = Means::test(args_, record, now.a, now.b, side_a, side_b) & now.nodes;
+      const bool leaf_a = (side_a.first_below & kIsLeafBlock) != 0,
+                 leaf_b = (side_b.first_below & kIsLeafBlock) != 0;
       of_leaves = leaf_a & leaf_b;
-      if ((taken.entry.z & kSelf) != 0 && a == b)
+      if ((taken.entry.z & kSelf) != 0 && now.a == now.b)
         hits &= leaf_a ? kNodePairsAbove : kNodePairsAbove | kNodePairsEqual;
       // The larger of two alone; of a leaf block and another, the other.
       const float times = leaf_a != leaf_b ? kTimesLarger : kDescendsAlone;
-      const bool larger_a = size_a > times * size_b, larger_b = size_b > times * size_a;
+      const bool larger_a = side_a.size > times * side_b.size,
+                 larger_b = side_b.size > times * side_a.size;
       if (leaf_a != leaf_b && (leaf_a ? larger_a : larger_b) && hits != 0)
-        hits = Means::drop_beyond_planes(record, a, b, leaf_a, hits);
+        hits = Means::drop_beyond_planes(args_, record, now.a, now.b, leaf_a, hits);
       const bool a_alone = leaf_a == leaf_b ? larger_a : leaf_b,
                  b_alone = leaf_a == leaf_b ? larger_b : leaf_a;
       below = hits;
@@ -317,10 +306,18 @@ class Walk {
         below |= hits >> 1;
         below = (below | below >> 2) & 0x1111u;
       }
+      if (goes_on != kBAlone) now.a = side_a.first_below & ~kIsLeafBlock;
+      if (goes_on != kAAlone) now.b = side_b.first_below & ~kIsLeafBlock;
+      if (!of_leaves) {
+        now.a |= goes_on << kNumberBits;
+        now.b |= taken.entry.z & kSelf;
+      }
     }
     block_pairs_ += mine;
-    put({pair, now.a | goes_on << kIndexBits, now.b | (taken.entry.z & kSelf), below | hits << 16},
-        of_leaves);
+    if constexpr (Means::kCountsOnly) {
+      if (of_leaves) candidates_seen_ += __popc(below), below = 0;
+    }
+    put({pair, now.a, now.b, below | hits << 16}, of_leaves);
     asm volatile("cp.async.wait_all;" ::: "memory");
     __syncwarp();
     if (waiting_ >= kFewestToShare) share();
@@ -349,16 +346,11 @@ class Walk {
     const Taken taken = take<1>(count, stack_ + 16 * (args_.stack_size - leaf_pairs_), leaf_pairs_);
     candidates_ -= count;
     candidates_seen_ += taken.mine;
-    Below now = {0, 0, 0};
-    const std::uint32_t pair = taken.entry.x;
-    if (taken.mine) {
-      const WalkTrees trees = trees_of(args_.pairs[pair]);
-      now = below_of(trees.a, trees.b, taken.entry, taken.bit);
-    }
+    const std::uint32_t a = taken.entry.y + taken.bit / 4, b = taken.entry.z + taken.bit % 4;
     if constexpr (Means::kScreens)
-      screen(taken.mine, pair, now.a, now.b);
+      screen(taken.mine, taken.entry.x, a, b);
     else
-      judge(taken.mine, pair, now.a, now.b);
+      judge(taken.mine, taken.entry.x, a, b);
   }
 
   __device__ void screen(bool mine, std::uint32_t pair, std::uint32_t a, std::uint32_t b) {

@@ -1,7 +1,7 @@
 #pragma once
 #include "gpu_query_data.h"
 #include "tandem/kernels/frame_test.h"
-#include "tandem/kernels/interval_test.h"
+#include "tandem/kernels/oriented_block.h"
 #include "tandem/kernels/traversal.h"
 #include "tandem/kernels/world_box.h"
 
@@ -29,7 +29,7 @@ __device__ inline float size_of(const Four (&h)[3]) {
 }
 
 /// block_pair_mask(), and size_of() both, in whole float4.
-__device__ inline std::uint32_t mask_of_block_pair(const WalkBlock& block_a, const WalkBlock& block_b,
+__device__ inline std::uint32_t mask_of_block_pair(const Block& block_a, const Block& block_b,
                                                    const RelativePose& pose, float& size_a, float& size_b) {
   const auto* a = reinterpret_cast<const float4*>(&block_a);
   const auto* b = reinterpret_cast<const float4*>(&block_b);
@@ -82,14 +82,40 @@ __device__ inline std::uint32_t mask_of_block_pair(const WalkBlock& block_a, con
   return mask;
 }
 
-/// overlap_intervals() of all node pairs, and size_of() both.
-__device__ inline std::uint32_t interval_mask(const PairRecord& record, const WalkBlock& block_a,
-                                              const WalkBlock& block_b, float& size_a, float& size_b) {
+/// What a test tells of a block besides.
+struct Side {
+  std::uint32_t first_below;  ///< of its WalkBlock
+  float size;
+};
+
+__device__ inline Side side_of(const WalkBlock& block) {
+  const uint2 words = __ldg(reinterpret_cast<const uint2*>(&block.first_below));
+  return {words.x, __uint_as_float(words.y)};
+}
+
+/// Translation and rotation of a record.
+__device__ inline void load_pose(const PairRecord& record, float (&rotation)[3][3], float (&translation)[3]) {
+#pragma unroll
+  for (int i = 0; i < 3; ++i) {
+    const float4 row = __ldg(&record.rotation[i]);
+    rotation[i][0] = row.x, rotation[i][1] = row.y, rotation[i][2] = row.z, translation[i] = row.w;
+  }
+}
+
+/// overlap_oriented() of all node pairs.
+__device__ inline std::uint32_t oriented_mask(const PairRecord& record, const WalkBlock& block_a,
+                                              const WalkBlock& block_b, Side& side_a, Side& side_b) {
   const auto* a = reinterpret_cast<const float4*>(&block_a);
   const auto* b = reinterpret_cast<const float4*>(&block_b);
-  const RelativePose pose = pose_of(record);
-  const float4 last = __ldg(reinterpret_cast<const float4*>(record.back_translation));
-  const float back[3] = {last.x, last.y, last.z};
+  const uint4 last_a = __ldg(reinterpret_cast<const uint4*>(a + 6)),
+              last_b = __ldg(reinterpret_cast<const uint4*>(b + 6));
+  side_a = {last_a.x, __uint_as_float(last_a.y)};
+  side_b = {last_b.x, __uint_as_float(last_b.y)};
+  float rotation[3][3], translation[3];
+  load_pose(record, rotation, translation);
+  const OrientedPose pose =
+      oriented_pose(rotation, translation, __ldg(&record.oriented_slack), frame_of({last_a.z, last_a.w}),
+                    frame_of({last_b.z, last_b.w}));
   Four cb[3], hb[3], ca[3], ha[3];
 #pragma unroll
   for (int k = 0; k < 3; ++k) cb[k] = four(__ldg(b + k)), hb[k] = four(__ldg(b + 3 + k));
@@ -102,12 +128,10 @@ __device__ inline std::uint32_t interval_mask(const PairRecord& record, const Wa
     const float half[3] = {hb[0].v[j], hb[1].v[j], hb[2].v[j]};
 #pragma unroll
     for (int k = 0; k < 3; ++k) {
-      posed[j][k] = interval_terms::b_in_a(pose, k, center);
-      reach[j][k] = interval_terms::b_along_a(pose, k, half);
+      posed[j][k] = oriented_terms::b_in_a(pose, k, center);
+      reach[j][k] = oriented_terms::b_along_a(pose, k, half);
     }
   }
-  size_b = size_of(hb);
-  size_a = size_of(ha);
   std::uint32_t mask = 0;
 #pragma unroll
   for (int i = 0; i < 4; ++i) {
@@ -116,8 +140,8 @@ __device__ inline std::uint32_t interval_mask(const PairRecord& record, const Wa
     float in_b[3], along_b[3];
 #pragma unroll
     for (int k = 0; k < 3; ++k) {
-      in_b[k] = interval_terms::a_in_b(pose, back, k, center);
-      along_b[k] = interval_terms::a_along_b(pose, k, half);
+      in_b[k] = oriented_terms::a_in_b(pose, k, center);
+      along_b[k] = oriented_terms::a_along_b(pose, k, half);
     }
 #pragma unroll
     for (int j = 0; j < 4; ++j) {
@@ -151,27 +175,32 @@ struct Judged {
 };
 
 /// Boxes and triangles in the frame of the first of a pair, float32.
-template <QueryMode kMode>
+template <QueryMode kMode, bool kWalksOnly = false>
 struct InFrame {
   static constexpr bool kWorld = false;
+  static constexpr bool kCountsOnly = kWalksOnly;  ///< candidates are counted, none decided
   static constexpr bool kScreens =
       kMode == QueryMode::exact;  ///< most candidates are cheaply seen to be apart
   static constexpr bool kBounded = kMode == QueryMode::exact;
 
-  /// a, b: numbers of blocks.
-  __device__ static std::uint32_t test(const QueryArgs&, const PairRecord& record, const WalkBlock* blocks_a,
-                                       const WalkBlock* blocks_b, std::uint32_t a, std::uint32_t b,
-                                       float& size_a, float& size_b) {
-    if constexpr (kBounded) return interval_mask(record, blocks_a[a], blocks_b[b], size_a, size_b);
-    return mask_of_block_pair(blocks_a[a], blocks_b[b], pose_of(record), size_a, size_b);
+  /// a, b: numbers of walk blocks.
+  __device__ static std::uint32_t test(const QueryArgs& args, const PairRecord& record, std::uint32_t a,
+                                       std::uint32_t b, Side& side_a, Side& side_b) {
+    if constexpr (kBounded)
+      return oriented_mask(record, args.walk_blocks[a], args.walk_blocks[b], side_a, side_b);
+    side_a = side_of(args.walk_blocks[a]);
+    side_b = side_of(args.walk_blocks[b]);
+    return mask_of_block_pair(record.blocks_a[args.file_blocks[a]], record.blocks_b[args.file_blocks[b]],
+                              pose_of(record), side_a.size, side_b.size);
   }
 
   /// Of a leaf block and an internal one: less the hits of nodes that lie beyond the plane of the triangle.
-  __device__ __noinline__ static std::uint32_t drop_beyond_planes(const PairRecord& record,
+  __device__ __noinline__ static std::uint32_t drop_beyond_planes(const QueryArgs& args,
+                                                                  const PairRecord& record,
                                                                   std::uint32_t at_a, std::uint32_t at_b,
                                                                   bool leaf_a, std::uint32_t hits) {
     if constexpr (kMode == QueryMode::boxes) return hits;
-    const Block &a = record.blocks_a[at_a], &b = record.blocks_b[at_b];
+    const Block &a = record.blocks_a[args.file_blocks[at_a]], &b = record.blocks_b[args.file_blocks[at_b]];
     const RelativePose pose = pose_of(record);
     std::uint32_t left = hits;
 #pragma unroll 1
@@ -241,6 +270,7 @@ struct InFrame {
 template <QueryMode kMode>
 struct InWorld {
   static constexpr bool kWorld = true;
+  static constexpr bool kCountsOnly = false;
   static constexpr bool kScreens = false;
 
   __device__ static WorldBox box(const Pose& pose, const Block& block, int node) {
@@ -253,10 +283,9 @@ struct InWorld {
     return world_box(pose, lower, upper);
   }
 
-  __device__ static std::uint32_t test(const QueryArgs& args, const PairRecord& record, const WalkBlock*,
-                                       const WalkBlock*, std::uint32_t at_a, std::uint32_t at_b,
-                                       float& size_a, float& size_b) {
-    const Block *a = record.blocks_a + at_a, *b = record.blocks_b + at_b;
+  __device__ static std::uint32_t test(const QueryArgs& args, const PairRecord& record, std::uint32_t at_a,
+                                       std::uint32_t at_b, Side& side_a, Side& side_b) {
+    const Block *a = record.blocks_a + args.file_blocks[at_a], *b = record.blocks_b + args.file_blocks[at_b];
     const Pose pose_a = stored_pose(args, record.instance_a), pose_b = stored_pose(args, record.instance_b);
     std::uint32_t mask = 0;
 #pragma unroll 1
@@ -265,13 +294,13 @@ struct InWorld {
       if (a->kind[i] == NodeKind::imaginary || b->kind[j] == NodeKind::imaginary) continue;
       if (overlap(box(pose_a, *a, i), box(pose_b, *b, j))) mask |= 1u << pair;
     }
-    size_a = tandem::size_of(*a);
-    size_b = tandem::size_of(*b);
+    side_a = {args.walk_blocks[at_a].first_below, tandem::size_of(*a)};
+    side_b = {args.walk_blocks[at_b].first_below, tandem::size_of(*b)};
     return mask;
   }
 
-  __device__ static std::uint32_t drop_beyond_planes(const PairRecord&, std::uint32_t, std::uint32_t, bool,
-                                                     std::uint32_t hits) {
+  __device__ static std::uint32_t drop_beyond_planes(const QueryArgs&, const PairRecord&, std::uint32_t,
+                                                     std::uint32_t, bool, std::uint32_t hits) {
     return hits;
   }
 

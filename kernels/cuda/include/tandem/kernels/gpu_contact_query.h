@@ -20,6 +20,10 @@ struct GpuQueryOptions {
   /// order.
   bool sorted = false;
 
+  /// Walks the trees as mode exact does, counts block pairs and candidates, and decides none: no contacts.
+  /// Tells what the walk takes of a query's time. The other modes do not know it.
+  bool walk_only = false;
+
   /// Thread blocks, of 512 threads, that may look for contacts at a time; 0: as many as the GPU holds. Fewer
   /// leave multiprocessors to what runs beside the query, and let tools run that are slow where warps wait.
   std::uint32_t most_blocks = 0;
@@ -105,11 +109,13 @@ class GpuContactQuery {
  private:
   void free();
   void free_room();
+  void free_walk_blocks();
   void free_sorting();
   Status fail(cudaError_t error);
   template <typename Element>
   Status allocate(Element*& out, std::size_t count);
   Status provide_fixed_memory();
+  Status make_walk_blocks(std::span<const GpuAsset> assets, cudaStream_t stream);
   Status reserve_sorting();
 
   void* assets_ = nullptr;
@@ -117,6 +123,7 @@ class GpuContactQuery {
   std::uint32_t most_triangles_ = 0;
   std::uint64_t most_faces_ = 0;
   void* walk_blocks_ = nullptr;  // of all assets
+  std::uint32_t* file_blocks_ = nullptr;
   std::size_t block_room_ = 0;
   void* state_ = nullptr;
   void* chunks_ = nullptr;

@@ -96,42 +96,9 @@ struct OrientedPose {
   float slack;                ///< added to what a box reaches along an axis of the other's
 };
 
-/// The slack of the tests of all blocks of two trees, from the pose that relative_pose() made of them.
-///
-/// **Proof.** Notation is that of docs/box_test.md: a contact has v in A and x in B with |v - (M x + t)| <= s,
-/// row by row, M and t being exact float32 numbers and s <= slack_a. Let the frames of two blocks be the
-/// exact rotations P and R. In them the points are y = P^T v and z = R^T x, which lie in boxes [c^a +- h^a]
-/// and [c^b +- h^b], and with K = P^T M R and T = P^T t
-///
-///     |y - (K z + T)|_i <= |s|,     |z - (K^T y + T')|_j <= mu |s| + |D|,     T' = -K^T T,          (1)
-///
-/// |.| of a vector being its length, mu >= |M| (as an operator), and D = (M^T M - I) x, whose parts are at
-/// most lack_of_orthonormality() of the reach. So a contact obeys, on a's axis i and on b's axis j,
-///
-///     |(K c^b + T)_i - c^a_i| <= h^a_i + sum_j |K_ij| h^b_j + |s|,                                  (2)
-///     |(K^T c^a + T')_j - c^b_j| <= h^b_j + sum_i |K_ij| h^a_i + mu |s| + |D|.                      (3)
-///
-/// *K as computed*, K~. n_P P and n_R R are exact, f = inverse_length of both, multiplied, is off by 5.01 u
-/// of itself. M (n_R R) passes three roundings an entry, each of at most the sum of magnitudes, in matrix
-/// norms: 3.01 u |M|_F |R|_F n_R <= 9.03 u mu n_R; the product with n_P P^T as many again, and the factor
-/// 6.02 u sqrt(3) mu. So |K~ - K| <= 29 u mu.
-/// *T as computed*: t inverse_length is off by 3.01 u, the sums by 3.01 u |P|_F |t|: 8.3 u |t|, and 2^-100
-/// for results below the normal range. *T'*: 29 u mu |t| + 8.3 u mu |t| + 3.01 u sqrt(3) mu |t| <= 43 u mu
-/// |t|.
-///
-/// *The test on a's axis i* is |P~_i - c^a_i| <= h^a_i + (((slack + Q_i0 h_0) + Q_i1 h_1) + Q_i2 h_2), Q =
-/// |K~|, P~_i = ((T~_i + K~_i0 c_0) + K~_i1 c_1) + K~_i2 c_2. P~ is off by 29 u mu |c^b| + 8.3 u |t| + 3.01 u
-/// |t| + 4.1 u mu |c^b|; sum Q h exceeds sum |K| h less 29 u mu |h^b|; what is computed of the right side
-/// loses at most 5.1 u mu |h^b| + u h^a_i + 4.1 u slack, and the left side gains u times the right side. With
-/// rho >= |c_j| + h_j for every box and axis, |c| + |h| <= sqrt(6) rho, so it is enough that
-/// slack >= 1.0001 (|s| + u (11.4 |t| + 86.5 mu rho_b + 2.1 rho_a)).
-/// *On b's axis j*, with T' and (3), 1.0001 (mu |s| + |D| + u (46.1 mu |t| + 86.5 mu rho_a + 2.1 rho_b)).
-///
-/// rho: no vertex of a tree is farther from its origin than the length of `reach`, in any frame, and
-/// `box_along()` rounds by less than 2^-20 of it. Boxes are so rounded outwards that they hold their
-/// vertices, but for 2^-140. *Imaginary boxes*: h = -infinity; Q h is -infinity or NaN, and the ordered
-/// comparison false. *Range*: rho < 2^121 and |t_i| <= 2^123, so nothing overflows; entries of M are 0 or at
-/// least 2^-32, so nothing of K falls below the normal range.
+/// The slack of the tests of all blocks of two trees, from the pose that relative_pose() made of them, such
+/// that what overlap_oriented() calls apart is apart. Proof: docs/box_test.md, section 5. Condition: the pose
+/// is in range.
 TANDEM_HD inline float oriented_slack(const RelativePose& b_in_a, const TreeExtent& tree_a,
                                       const TreeExtent& tree_b) {
   namespace d = relative_pose_detail;
@@ -155,13 +122,13 @@ TANDEM_HD inline float oriented_slack(const RelativePose& b_in_a, const TreeExte
   }
   const double mu = norm > 1 ? std::sqrt(norm) : 1;
   const double rho = std::sqrt(rho_a > rho_b ? rho_a : rho_b) * (1 + 0x1p-20);
-  const double rounding = d::kU * mu * (46.2 * std::sqrt(t) + 88.7 * rho);
+  const double rounding = d::kU * mu * (31 * std::sqrt(t) + 47.9 * rho);
   return static_cast<float>(d::kSafety * (mu * std::sqrt(s) + std::sqrt(lack_size) + rounding) +
                             d::kLeastSlack);
 }
 
 /// How two blocks lie. rotation, translation: of the RelativePose of their trees; slack: oriented_slack().
-/// The order of operations is open: the proof allows any, and fused ones.
+/// The proof allows sums in any order, and fused operations.
 TANDEM_HD inline OrientedPose oriented_pose(const float (&rotation)[3][3], const float (&translation)[3],
                                             float slack, const BlockFrame& a, const BlockFrame& b) {
   OrientedPose out;
@@ -239,7 +206,9 @@ TANDEM_HD inline bool overlap_oriented(const Box& a, const Box& b, const Oriente
 /// A coordinate in a block's frame: of a vertex along the frame's axis k, float64, off by at most 2^-49 of
 /// the vertex's distance from the origin.
 TANDEM_HD inline double along_axis(const BlockFrame& frame, int k, const float (&vertex)[3]) {
-  const auto at = [&](int i) { return static_cast<double>(frame.scaled[i][k]) * static_cast<double>(vertex[i]); };
+  const auto at = [&](int i) {
+    return static_cast<double>(frame.scaled[i][k]) * static_cast<double>(vertex[i]);
+  };
   double squared = 0;  // each column of `scaled` is as long as the quaternion, squared
   for (int i = 0; i < 3; ++i) {
     squared += static_cast<double>(frame.scaled[i][k]) * static_cast<double>(frame.scaled[i][k]);

@@ -141,7 +141,7 @@ def interval(block, node, axis):
 
 
 def walk(file):
-    """Follows the tree from the root and yields (block index, depth, block); a block that comes twice is an error."""
+    """Follows the tree depth first and yields (block index, depth, block); a block that comes twice is an error."""
     seen = set()
     pending = [(0, 1)]
     while pending:
@@ -150,13 +150,16 @@ def walk(file):
         seen.add(index)
         block = file.blocks[index]
         yield index, depth, block
-        pending += [(int(child), depth + 1) for child, kind in zip(block["index"], block["kind"]) if kind == INTERNAL]
+        children = [int(child) for child, kind in zip(block["index"], block["kind"]) if kind == INTERNAL]
+        pending += [(child, depth + 1) for child in reversed(children)]
 
 
 def defects_of_tree(file):
     """Sentences about everything that is wrong with the tree but for the boxes."""
     defects, reached, depths, visited = [], [], [], 0
     for index, depth, block in walk(file):
+        if index != visited:
+            defects.append(f"block {index} does not lie in depth-first order")
         visited += 1
         depths.append(depth)
         kinds = block["kind"].tolist()
@@ -171,8 +174,8 @@ def defects_of_tree(file):
             empty = (block["half_extent"][:, node] == -np.inf).all() and (block["center"][:, node] == 0).all()
             if (kind == IMAGINARY) != bool(empty and block["index"][node] == NO_INDEX):
                 defects.append(f"block {index}, node {node}: an imaginary node and the empty box go together")
-    if sorted(reached) != list(range(len(file.triangles))):
-        defects.append("not every triangle is reached once")
+    if reached != list(range(len(file.triangles))):
+        defects.append("the leaves do not name the triangles one after the other")
     if visited != len(file.blocks):
         defects.append("not every block is reached")
     if max(depths) != file.levels[0]["depth"]:

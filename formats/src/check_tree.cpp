@@ -2,17 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <memory>
 
 #include "tandem/formats/box.h"
 
 namespace tandem {
 namespace {
-
-struct Free {
-  void operator()(void* memory) const { std::free(memory); }
-};
 
 bool is_real_box(const Box& box) {
   bool sound = true;
@@ -67,20 +61,18 @@ Status check_triangle(const Triangle& triangle, const Box& leaf, std::uint64_t s
   return in_part ? Status::kOk : Status::kBadFace;
 }
 
-// Walks the blocks in their order, which is possible because children come after their parents.
+// Walks the blocks as they lie, which is depth first: at each block the nodes above it say which one it must
+// be.
 class TreeWalk {
  public:
-  TreeWalk(const LevelView& level, std::uint64_t source_faces, std::span<const Part> parts,
-           std::uint8_t* depth)
-      : level_(level), source_faces_(source_faces), parts_(parts), depth_(depth) {
-    depth_[0] = 1;
-  }
+  TreeWalk(const LevelView& level, std::uint64_t source_faces, std::span<const Part> parts)
+      : level_(level), source_faces_(source_faces), parts_(parts) {}
 
   CheckResult run() {
     for (std::uint32_t b = 0; b < level_.block_count; ++b) {
-      if (depth_[b] == 0) return {Status::kBlockUnreachable, b, {}};
-      if (const Status status = visit(b); status != Status::kOk) return {status, b, {}};
+      if (const Status status = visit(b); status != Status::kOk) return {status, where_, {}};
     }
+    if (awaits_child()) return {name_misplaced(level_.block_count), where_, {}};
     if (next_triangle_ != level_.triangle_count || leaf_blocks_ != level_.leaf_block_count) {
       return {Status::kLeafCountMismatch, 0, {}};
     }
@@ -89,11 +81,24 @@ class TreeWalk {
   }
 
  private:
+  // An internal block above the current one. Its node `next` is the first whose subtree was not begun yet.
+  struct Ancestor {
+    std::uint32_t block;
+    int next, real;
+  };
+
   Status visit(std::uint32_t b) {
+    where_ = b;
     const Block& block = level_.blocks[b];
+    if (b > 0 && !(awaits_child() && awaited_child() == b)) return name_misplaced(b);
     int real = 0;
     if (const Status status = check_nodes(block, real); status != Status::kOk) return status;
-    return block.is_leaf_block() ? visit_leaves(block, real) : visit_children(b, real);
+    if (b > 0 && !fits_in_its_node(block, real)) return Status::kChildOutsideParentBox;
+    deepest_ = std::max(deepest_, ancestor_count_ + 1);
+    if (block.is_leaf_block()) return visit_leaves(block, real);
+    if (ancestor_count_ == kMaxDepth - 1) return Status::kTooDeep;
+    ancestors_[ancestor_count_++] = {b, 0, real};
+    return Status::kOk;
   }
 
   Status visit_leaves(const Block& block, int real) {
@@ -108,51 +113,66 @@ class TreeWalk {
     return Status::kOk;
   }
 
-  Status visit_children(std::uint32_t b, int real) {
-    const Block& block = level_.blocks[b];
-    if (depth_[b] == kMaxDepth) return Status::kTooDeep;
-    for (int i = 0; i < real; ++i) {
-      const std::uint32_t child = block.index[i];
-      if (child >= level_.block_count) return Status::kChildOutOfRange;
-      if (child <= b) return Status::kChildNotAfterParent;
-      if (depth_[child] != 0) return Status::kChildShared;
-      depth_[child] = static_cast<std::uint8_t>(depth_[b] + 1);
-      deepest_ = std::max<std::uint32_t>(deepest_, depth_[child]);
-      if (!contains_children(box_of(block, i), level_.blocks[child])) return Status::kChildOutsideParentBox;
-    }
-    return Status::kOk;
+  // Leaves the ancestors all of whose nodes had their turn; whether a node is left.
+  bool awaits_child() {
+    while (ancestor_count_ > 0 && parent().next == parent().real) --ancestor_count_;
+    return ancestor_count_ > 0;
   }
 
-  // Nodes of the child that are not sound are found when the child is visited; here they only must do no
-  // harm.
-  static bool contains_children(const Box& box, const Block& child) {
-    for (int i = 0; i < kNodesPerBlock; ++i) {
-      if (child.kind[i] == NodeKind::imaginary) break;
-      const Box inner = box_of(child, i);
-      if (is_real_box(inner) && !contains(box, inner)) return false;
+  Ancestor& parent() { return ancestors_[ancestor_count_ - 1]; }
+  std::uint32_t awaited_child() { return level_.blocks[parent().block].index[parent().next]; }
+
+  // Whether the node whose turn it is contains the nodes of its child; the next node's turn comes.
+  bool fits_in_its_node(const Block& child, int real) {
+    const Box box = box_of(level_.blocks[parent().block], parent().next++);
+    for (int i = 0; i < real; ++i) {
+      if (!contains(box, box_of(child, i))) {
+        where_ = parent().block;
+        return false;
+      }
     }
     return true;
+  }
+
+  // Why block b, or the end of the blocks, is not the child that is awaited. Called once, when it is not.
+  Status name_misplaced(std::uint32_t b) {
+    if (ancestor_count_ == 0) return Status::kBlockUnreachable;
+    const std::uint32_t child = awaited_child();
+    where_ = parent().block;
+    if (child >= level_.block_count) return Status::kChildOutOfRange;
+    if (child <= parent().block) return Status::kChildNotAfterParent;
+    where_ = child;
+    if (child < b) return Status::kChildShared;  // it was the awaited child of another node already
+    where_ = b;
+    return is_named_above(b) ? Status::kBlockOrder : Status::kBlockUnreachable;
+  }
+
+  // Whether a node whose turn is yet to come names block b. No other block before b does: what the nodes
+  // before these name are the blocks 1 to b - 1.
+  bool is_named_above(std::uint32_t b) const {
+    for (std::uint32_t a = 0; a < ancestor_count_; ++a) {
+      const Ancestor& ancestor = ancestors_[a];
+      const std::uint32_t* index = level_.blocks[ancestor.block].index;
+      if (std::find(index + ancestor.next, index + ancestor.real, b) != index + ancestor.real) return true;
+    }
+    return false;
   }
 
   LevelView level_;
   std::uint64_t source_faces_;
   std::span<const Part> parts_;
-  std::uint8_t* depth_;  // of each block, 0 while it has no parent
+  Ancestor ancestors_[kMaxDepth - 1];  // from the root down; a leaf block at kMaxDepth has as many
+  std::uint32_t ancestor_count_ = 0;
   std::uint32_t next_triangle_ = 0;
   std::uint32_t leaf_blocks_ = 0;
-  std::uint32_t deepest_ = 1;
+  std::uint32_t deepest_ = 0;
+  std::uint32_t where_ = 0;  // the block that a defect speaks of
 };
-
-static_assert(kMaxDepth <= 255, "depths are kept in bytes");
 
 }  // namespace
 
 CheckResult check_tree(const LevelView& level, std::uint64_t source_faces, std::span<const Part> parts) {
-  // calloc instead of a container: formats/ throws nothing.
-  const std::unique_ptr<std::uint8_t, Free> depth(
-      static_cast<std::uint8_t*>(std::calloc(level.block_count, 1)));
-  if (depth == nullptr) return {Status::kOutOfMemory, 0, {}};
-  return TreeWalk(level, source_faces, parts, depth.get()).run();
+  return TreeWalk(level, source_faces, parts).run();
 }
 
 }  // namespace tandem

@@ -58,6 +58,7 @@ constexpr Entry kEntries[] = {
      "a child block does not come after its parent"},
     {Status::kChildShared, "ChildShared", "block", "a block has two parents"},
     {Status::kBlockUnreachable, "BlockUnreachable", "block", "a block has no parent"},
+    {Status::kBlockOrder, "BlockOrder", "block", "blocks are not in depth-first order"},
     {Status::kTooDeep, "TooDeep", "block", "the tree is deeper than the format allows"},
     {Status::kDepthMismatch, "DepthMismatch", nullptr, "the tree's depth is not what the level says"},
     {Status::kLeafCountMismatch, "LeafCountMismatch", nullptr,

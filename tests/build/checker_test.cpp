@@ -1,8 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <numeric>
+#include <random>
 
 #include "sample_asset.h"
 
@@ -28,6 +31,45 @@ std::uint32_t block_with_imaginary_leaf(Bytes& file) {
   std::uint32_t b = 0;
   while (!(file.blocks()[b].is_leaf_block() && file.blocks()[b].kind[3] == NodeKind::imaginary)) ++b;
   return b;
+}
+
+std::vector<std::uint32_t> children_of(const Block& block) {
+  std::vector<std::uint32_t> children;
+  for (int i = 0; i < kNodesPerBlock; ++i) {
+    if (block.kind[i] == NodeKind::internal) children.push_back(block.index[i]);
+  }
+  return children;
+}
+
+// Lays the blocks in another order, order[i] in place i, and the triangles as their leaves then come.
+void reorder(Bytes& file, const std::vector<std::uint32_t>& order) {
+  std::vector<std::uint32_t> place(order.size());
+  for (std::uint32_t i = 0; i < order.size(); ++i) place[order[i]] = i;
+  const std::vector<Block> blocks(file.blocks(), file.blocks() + order.size());
+  const std::vector<Triangle> triangles(file.triangles(), file.triangles() + file.level().triangle_count);
+  std::uint32_t next_triangle = 0;
+  for (std::uint32_t b = 0; b < order.size(); ++b) {
+    Block& block = file.blocks()[b] = blocks[order[b]];
+    for (int i = 0; i < kNodesPerBlock; ++i) {
+      if (block.kind[i] == NodeKind::internal) block.index[i] = place[block.index[i]];
+      if (block.kind[i] != NodeKind::leaf) continue;
+      file.triangles()[next_triangle] = triangles[block.index[i]];
+      block.index[i] = next_triangle++;
+    }
+  }
+}
+
+// An order of blocks, each after its parent. Of the blocks whose parents have their places, `take` picks the
+// next one, given their number.
+std::vector<std::uint32_t> parents_first(Bytes& file, const std::function<std::size_t(std::size_t)>& take) {
+  std::vector<std::uint32_t> order, ready = {0};
+  while (!ready.empty()) {
+    const auto next = ready.begin() + static_cast<std::ptrdiff_t>(take(ready.size()));
+    order.push_back(*next);
+    ready.erase(next);
+    for (const std::uint32_t child : children_of(file.blocks()[order.back()])) ready.push_back(child);
+  }
+  return order;
 }
 
 TEST(Check, AcceptsWhatTheBuilderWrites) {
@@ -232,6 +274,24 @@ const Attack kTreeAttacks[] = {
        while (root.kind[last] == NodeKind::imaginary) --last;
        set_imaginary(root, last);
      }},
+    {"unreachable block between others", Status::kBlockUnreachable,
+     [](Bytes& f) {  // the root's last child becomes the only one
+       Block& root = f.blocks()[0];
+       set_node(root, 0, box_of(root, 1), root.index[1], NodeKind::internal);
+       for (int i = 1; i < kNodesPerBlock; ++i) set_imaginary(root, i);
+     }},
+    {"breadth first", Status::kBlockOrder,
+     [](Bytes& f) { reorder(f, parents_first(f, [](std::size_t) { return std::size_t{0}; })); }},
+    {"the last child first", Status::kBlockOrder,
+     [](Bytes& f) { reorder(f, parents_first(f, [](std::size_t ready) { return ready - 1; })); }},
+    {"children that change places in their parent", Status::kBlockOrder,
+     [](Bytes& f) {
+       Block& root = f.blocks()[0];
+       const Box box = box_of(root, 0);
+       const std::uint32_t child = root.index[0];
+       set_node(root, 0, box_of(root, 1), root.index[1], NodeKind::internal);
+       set_node(root, 1, box, child, NodeKind::internal);
+     }},
     {"triangle twice", Status::kTriangleOrder,
      [](Bytes& f) { f.blocks()[first_leaf_block(f)].index[1] = 0; }},
     {"triangle past the end", Status::kTriangleOrder,
@@ -285,6 +345,45 @@ TEST(Check, NamesHostileLevelsAndParts) {
 }
 TEST(Check, NamesHostileTrees) {
   expect_all_named(kTreeAttacks);
+}
+
+// Of all orders in which children come after their parents, one is right.
+TEST(Check, AcceptsBlocksInDepthFirstOrderOnly) {
+  std::mt19937 random(1);
+  const Bytes original(make_file(random_mesh(24, 1)));  // 8 blocks
+  int accepted = 0;
+  for (int i = 0; i < 2000; ++i) {
+    Bytes file(original);
+    const std::vector<std::uint32_t> order =
+        parents_first(file, [&](std::size_t ready) { return random() % ready; });
+    std::vector<std::uint32_t> unchanged(order.size());
+    std::iota(unchanged.begin(), unchanged.end(), 0u);
+    reorder(file, order);
+    const Status status = file.check_sealed();
+    ASSERT_EQ(status, order == unchanged ? Status::kOk : Status::kBlockOrder) << name(status);
+    if (order != unchanged) {
+      const auto wrong = std::mismatch(order.begin(), order.end(), unchanged.begin()).first - order.begin();
+      ASSERT_EQ(file.check().where, static_cast<std::uint64_t>(wrong));
+    }
+    accepted += status == Status::kOk;
+  }
+  EXPECT_GT(accepted, 0);
+  EXPECT_LT(accepted, 2000);
+}
+
+// The tree of 5 triangles is a root with two leaf blocks and room for a third child.
+TEST(Check, NamesWhatIsWrongWithAChildForWhichNoBlockIsLeft) {
+  const Bytes original(make_file(random_mesh(5, 1)));
+  const auto expect_third_child = [&](std::uint32_t child, Status status, std::uint64_t where) {
+    Bytes file(original);
+    set_node(file.blocks()[0], 2, box_of(file.blocks()[0], 1), child, NodeKind::internal);
+    EXPECT_EQ(file.check_sealed(), status) << name(file.check().status);
+    EXPECT_EQ(file.check().where, where);
+  };
+  expect_third_child(0, Status::kChildNotAfterParent, 0);
+  expect_third_child(1, Status::kChildShared, 1);
+  expect_third_child(2, Status::kChildShared, 2);
+  expect_third_child(3, Status::kChildOutOfRange, 0);
 }
 
 TEST(Check, FileSizeInTheHeaderMustBeTheFilesSize) {

@@ -71,6 +71,38 @@ TEST(Optimise, KeepsTheMinimumOfImaginaryNodesWhateverTheEffort) {
   }
 }
 
+// Follows the subtree of block b; returns the block behind it. Each child must begin where the one before it
+// ends, and each leaf must name the next triangle.
+std::uint32_t expect_depth_first(const std::vector<Block>& blocks, std::uint32_t b,
+                                 std::uint32_t& next_triangle) {
+  std::uint32_t end = b + 1;
+  for (int i = 0; i < kNodesPerBlock && blocks[b].kind[i] != NodeKind::imaginary; ++i) {
+    const bool is_leaf = blocks[b].is_leaf_block();
+    EXPECT_EQ(blocks[b].index[i], is_leaf ? next_triangle : end) << "block " << b << ", node " << i;
+    if (is_leaf) {
+      ++next_triangle;
+    } else if (end < blocks.size()) {
+      end = expect_depth_first(blocks, end, next_triangle);
+    }
+  }
+  return end;
+}
+
+TEST(Optimise, BlocksLieDepthFirstWhateverTheEffort) {
+  for (const Effort effort : {Effort::fast, Effort::standard, Effort::best}) {
+    for (const Imaginary imaginary : {Imaginary::minimal, Imaginary{0.02}, Imaginary{0.1}, Imaginary::free}) {
+      for (const Mesh& mesh : {test::random_mesh(1, 1), test::random_mesh(5, 5), sheet(8), nested(100)}) {
+        Bytes file(test::make_file(mesh, imaginary, effort));
+        const std::vector<Block> blocks(file.blocks(), file.blocks() + file.level().block_count);
+        std::uint32_t triangles = 0;
+        EXPECT_EQ(expect_depth_first(blocks, 0, triangles), blocks.size());
+        EXPECT_EQ(triangles, mesh.triangles.size());
+        EXPECT_EQ(file.check().status, Status::kOk);
+      }
+    }
+  }
+}
+
 TEST(Optimise, MoreEffortNeverCostsMore) {
   for (const Mesh& mesh : {sheet(12), test::random_mesh(300, 5), nested(200)}) {
     const std::vector<Bounds> bounds = normalized_bounds(mesh.geometry());

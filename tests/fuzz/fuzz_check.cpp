@@ -60,34 +60,30 @@ void read_triangle(const AssetView& asset, const Triangle& triangle) {
   demand(triangle.part() < asset.parts.size(), "parts are in range");
 }
 
-// Follows every node from the root; ends because no block may come twice.
+// Follows every node from the root, depth first; ends because each block must lie behind the one before it.
 void walk(const AssetView& asset, const LevelView& level) {
   struct Visit {
     std::uint32_t block, depth;
   };
-  std::vector<bool> seen_block(level.block_count), seen_triangle(level.triangle_count);
   std::uint32_t blocks = 0, triangles = 0, deepest = 0;
   std::vector<Visit> pending = {{0, 1}};
   while (!pending.empty()) {
     const Visit visit = pending.back();
     pending.pop_back();
-    demand(visit.block < level.block_count && !seen_block[visit.block], "blocks are reached once");
-    seen_block[visit.block] = true;
-    ++blocks;
+    demand(visit.block == blocks++ && visit.block < level.block_count, "blocks lie depth first");
     deepest = std::max(deepest, visit.depth);
     const Block& block = level.blocks[visit.block];
     for (int i = 0; i < kNodesPerBlock; ++i) {
-      const std::uint32_t index = block.index[i];
       if (block.kind[i] == NodeKind::imaginary) {
         demand(block.half_extent[0][i] == kImaginaryHalfExtent, "imaginary boxes are empty");
-      } else if (block.kind[i] == NodeKind::internal) {
-        pending.push_back({index, visit.depth + 1});
-      } else {
-        demand(index < level.triangle_count && !seen_triangle[index], "triangles are reached once");
-        seen_triangle[index] = true;
-        ++triangles;
-        read_triangle(asset, level.triangles[index]);
+      } else if (block.kind[i] == NodeKind::leaf) {
+        demand(block.index[i] == triangles++ && block.index[i] < level.triangle_count,
+               "leaves name the triangles one after the other");
+        read_triangle(asset, level.triangles[block.index[i]]);
       }
+    }
+    for (int i = kNodesPerBlock; i-- > 0;) {  // the first child is taken first
+      if (block.kind[i] == NodeKind::internal) pending.push_back({block.index[i], visit.depth + 1});
     }
   }
   demand(blocks == level.block_count && triangles == level.triangle_count, "all is reached");

@@ -30,6 +30,10 @@ inline constexpr std::uint32_t kMaxDepth = 64;
 ///
 /// Node i has the box [center - half_extent, center + half_extent], in real arithmetic, relative to the
 /// asset's origin. Imaginary nodes come last.
+///
+/// The blocks of a tree lie depth first: the first child of block b is block b + 1, each further child begins
+/// where the subtree of the one before it ends. So the blocks of a subtree are consecutive, and so are the
+/// triangles below a block or a node.
 struct alignas(128) Block {
   float center[3][kNodesPerBlock];
   float half_extent[3][kNodesPerBlock];

@@ -16,10 +16,10 @@ struct CheckResult {
 
 /// Proves that the bytes are a sound .bvh file: hash, sizes, sections, tree, boxes, triangles. After kOk
 /// nothing in the view needs checking: every index is in range, the blocks form one tree of at most
-/// kMaxDepth, each triangle hangs below exactly one leaf and lies, as every box does, within all boxes above
-/// it in real arithmetic, and imaginary nodes have the box that every test rejects.
+/// kMaxDepth and lie depth first, each triangle hangs below exactly one leaf and lies, as every box does,
+/// within all boxes above it in real arithmetic, and imaginary nodes have the box that every test rejects.
 ///
-/// Reads the bytes twice and allocates one byte per block for the while; throws nothing.
+/// Reads the bytes twice; allocates and throws nothing.
 /// `data` must be aligned to 128 bytes (kMisaligned otherwise); it need not stay after a failure.
 CheckResult check(const void* data, std::size_t bytes);
 

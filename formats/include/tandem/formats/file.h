@@ -68,7 +68,8 @@ struct Level {
 };
 static_assert(sizeof(Level) == 32);
 
-/// A triangle, three float4, relative to the asset's origin. Triangles lie in leaf order.
+/// A triangle, three float4, relative to the asset's origin. Triangles lie in leaf order, so those below a
+/// block are consecutive.
 struct alignas(16) Triangle {
   struct Corner {
     float position[3];

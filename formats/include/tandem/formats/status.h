@@ -41,6 +41,7 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kChildNotAfterParent,  ///< would allow a cycle
     kChildShared,          ///< a block with two parents
     kBlockUnreachable,
+    kBlockOrder,         ///< a block whose parent comes before it, but not in depth-first order
     kTooDeep,            ///< deeper than kMaxDepth
     kDepthMismatch,      ///< depth differs from what the level says
     kLeafCountMismatch,  ///< leaves, or leaf blocks, differ in number from what the level says

@@ -9,8 +9,8 @@ namespace tandem {
 
 /// Looks at one level of detail of an asset; owns nothing. Pointers are of the CPU or of the GPU alike.
 struct LevelView {
-  const Block* blocks = nullptr;  ///< block 0 is the root
-  const Triangle* triangles = nullptr;
+  const Block* blocks = nullptr;        ///< block 0 is the root; the others follow depth first
+  const Triangle* triangles = nullptr;  ///< in leaf order: those below a block are consecutive
   std::uint32_t block_count = 0;
   std::uint32_t triangle_count = 0;
   std::uint32_t leaf_block_count = 0;

@@ -119,6 +119,20 @@ TEST_F(GpuRoom, AQueryThatGrewHoldsNoMoreThanItsRuleSays) {
   EXPECT_LE(query.bytes(), most_query_bytes(query.capacity(), true, on_gpu.assets()));
 }
 
+/// Blocks with imaginary nodes have room for children that they lack.
+TEST_F(GpuRoom, AQueryOfLargeTreesHoldsNoMoreThanItsRuleSays) {
+  test::RandomPoses random(34);
+  Scene scene;
+  scene.assets.add(test::soup(random, 600'000, 0.01), {}, build::Imaginary::free);
+  scene.instances = {{0, kIdentityPose}};
+  const GpuScene on_gpu(scene.assets, scene.instances, {});
+  GpuContactQuery query;
+  ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
+  const std::size_t most = most_query_bytes(query.capacity(), false, on_gpu.assets());
+  EXPECT_LE(query.bytes(), most);
+  EXPECT_LE(most, query.bytes() + query.bytes() / 5 + (1 << 20));
+}
+
 TEST_F(GpuRoom, ABroadPhaseHoldsNoMoreThanItsRuleSays) {
   for (const bool sorted : {false, true}) {
     for (const GpuBroadPhaseCapacity wanted :

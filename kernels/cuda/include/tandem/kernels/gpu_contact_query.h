@@ -41,10 +41,11 @@ struct GpuQueryCapacity {
 inline std::size_t most_query_bytes(const GpuQueryCapacity& capacity, bool sorted,
                                     std::span<const GpuAsset> assets) {
   constexpr std::size_t kFixed = std::size_t{5} << 20;  // work that warps give to each other, and the report
-  std::size_t blocks = 0;
-  for (const GpuAsset& asset : assets) blocks += asset.tree.block_count;
+  std::size_t blocks = assets.size();
+  for (const GpuAsset& asset : assets)
+    blocks += std::size_t{kNodesPerBlock} * (asset.tree.block_count - asset.tree.leaf_block_count);
   const std::size_t per_contact = sorted ? 20 + 29 : 20;
-  return kFixed + 256 * assets.size() + 112 * blocks + 200 * std::size_t{capacity.pairs} +
+  return kFixed + 256 * assets.size() + 116 * blocks + 200 * std::size_t{capacity.pairs} +
          per_contact * capacity.contacts + 24 * capacity.undecided;
 }
 

@@ -12,8 +12,14 @@
 #include <thread>
 #include <vector>
 
+#include "broad_phase_limits.h"
+
 namespace tandem {
 namespace {
+
+// Numbers of boxes: some that are tested each against each, some that a tree is made of.
+constexpr std::uint32_t kFew = 3000, kMany = 20000;
+static_assert(kFewPosed < kFew && kFew <= kFewBoxes && kFewBoxes < kMany);
 
 class GpuBroadPhaseTest : public testing::Test {
  protected:
@@ -138,10 +144,33 @@ Boxes lattice(int side, double offset) {
   return boxes;
 }
 
-TEST_F(GpuBroadPhaseTest, FewBoxes) {
+TEST_F(GpuBroadPhaseTest, AnyNumberOfBoxes) {
   GpuBroadPhase broad_phase;
-  for (const std::size_t count :
-       {0, 1, 2, 3, 4, 5, 31, 32, 33, 64, 65, 1000, 1023, 1024, 1025, 3000, 33000}) {
+  for (const std::uint32_t count : {0u,
+                                    1u,
+                                    2u,
+                                    3u,
+                                    4u,
+                                    5u,
+                                    31u,
+                                    32u,
+                                    33u,
+                                    63u,
+                                    64u,
+                                    65u,
+                                    127u,
+                                    128u,
+                                    129u,
+                                    1000u,
+                                    1023u,
+                                    1024u,
+                                    1025u,
+                                    kFew,
+                                    kFewBoxes - 1,
+                                    kFewBoxes,
+                                    kFewBoxes + 1,
+                                    2 * kFewBoxes,
+                                    33000u}) {
     for (const double spread : {0.0, 3.0}) {
       const double edge = 4 * edge_for(count + 1, 6);
       expect_same_as_cpu(broad_phase, scattered(count, edge, spread, count), std::to_string(count));
@@ -149,9 +178,10 @@ TEST_F(GpuBroadPhaseTest, FewBoxes) {
   }
 }
 
-TEST_F(GpuBroadPhaseTest, ManyDistributions) {
-  constexpr std::size_t kCount = 100000;
-  const double edge = edge_for(kCount, 6.5);
+// Fewer boxes where the CPU's way is quadratic.
+void check_distributions(const std::size_t count, const std::size_t fewer) {
+  const int side = static_cast<int>(std::cbrt(static_cast<double>(count)));
+  const double edge = edge_for(count, 6.5);
   GpuBroadPhase broad_phase;
   std::mt19937_64 random(7);
   std::normal_distribution<double> normal;
@@ -159,27 +189,25 @@ TEST_F(GpuBroadPhaseTest, ManyDistributions) {
     expect_same_as_cpu(broad_phase, boxes, what);
   };
 
-  check("uniform", scattered(kCount, edge, 0, 1));
-  check("twenty neighbours", scattered(kCount, edge_for(kCount, 20), 0, 2));
-  check("six orders of size", scattered(kCount, 30 * edge, 6, 3));
-  check("far", transformed(scattered(kCount, edge, 0, 4), 100, 1e7));
-  check("very far", transformed(scattered(kCount, edge, 0, 5), 100, 1e15));
-  check("huge", transformed(scattered(kCount, edge, 1, 6), 1e299, -1e299));
-  check("tiny", transformed(scattered(kCount, edge, 1, 7), 1e-300, 0));
-  check("touching", lattice(46, 0.1));
-  check("touching, far", lattice(46, 1e15));
+  check("uniform", scattered(count, edge, 0, 1));
+  check("twenty neighbours", scattered(count, edge_for(count, 20), 0, 2));
+  check("six orders of size", scattered(count, 30 * edge, 6, 3));
+  check("far", transformed(scattered(count, edge, 0, 4), 100, 1e7));
+  check("very far", transformed(scattered(count, edge, 0, 5), 100, 1e15));
+  check("huge", transformed(scattered(count, edge, 1, 6), 1e299, -1e299));
+  check("tiny", transformed(scattered(count, edge, 1, 7), 1e-300, 0));
+  check("touching", lattice(side, 0.1));
+  check("touching, far", lattice(side, 1e15));
 
-  Boxes plane = scattered(kCount, edge_for(kCount, 6.5), 0, 8);
+  Boxes plane = scattered(count, edge_for(count, 6.5), 0, 8);
   for (WorldBox& box : plane) {
     box.lo[2] = 0;
     box.hi[2] = edge;
   }
   check("plane", plane);
 
-  // Fewer where the CPU's way is quadratic.
-  constexpr std::size_t kFewer = 20000;
-  Boxes clusters = scattered(kFewer, edge, 0, 9);
-  for (std::size_t i = 0; i < kFewer; ++i) {
+  Boxes clusters = scattered(fewer, edge, 0, 9);
+  for (std::size_t i = 0; i < fewer; ++i) {
     for (int k = 0; k < 3; ++k) {
       const double shift = i % 7 == 0 ? 0 : std::pow(10, static_cast<double>(i % 7));
       clusters[i].lo[k] += shift;
@@ -188,14 +216,15 @@ TEST_F(GpuBroadPhaseTest, ManyDistributions) {
   }
   check("clusters", clusters);
 
-  Boxes flown = scattered(kFewer, edge_for(kFewer, 6.5), 0, 10);
+  Boxes flown = scattered(fewer, edge_for(fewer, 6.5), 0, 10);
   for (std::size_t i = 0; i < 5; ++i) {
-    flown[i * 1000].lo[0] = std::pow(10, 60.0 * static_cast<double>(i));
-    flown[i * 1000].hi[0] = 2 * flown[i * 1000].lo[0];
+    WorldBox& box = flown[i * fewer / 20];  // the first of all too
+    box.lo[0] = std::pow(10, 60.0 * static_cast<double>(i + 1) - 20);
+    box.hi[0] = 2 * box.lo[0];
   }
   check("some flown away", flown);
 
-  Boxes bell = scattered(kCount, 0.01, 1, 11);
+  Boxes bell = scattered(count, 0.01, 1, 11);
   for (WorldBox& box : bell) {
     for (int k = 0; k < 3; ++k) {
       const double shift = std::pow(normal(random), 3);
@@ -205,56 +234,76 @@ TEST_F(GpuBroadPhaseTest, ManyDistributions) {
   }
   check("dense in the middle", bell);
 
-  Boxes sticks = scattered(kCount, edge / 2, 0, 12);
-  for (std::size_t i = 0; i < kCount; i += 100) sticks[i].hi[i / 100 % 3] += 1;
+  Boxes sticks = scattered(count, edge / 2, 0, 12);
+  for (std::size_t i = 0; i < count; i += 100) sticks[i].hi[i / 100 % 3] += 1;
   check("sticks", sticks);
 
-  Boxes grounds = scattered(kFewer, edge_for(kFewer, 6.5), 0, 13);
+  Boxes grounds = scattered(fewer, edge_for(fewer, 6.5), 0, 13);
   grounds[0] = {{-1e12, -1e12, -1e12}, {1e12, 1e12, 0.5}};
-  grounds[kFewer - 1] = {{-1, -1, -1}, {2, 2, 0.01}};
-  grounds[kFewer / 2] = {{-1e300, -1e300, -1e300}, {1e300, 1e300, 1e300}};
+  grounds[fewer - 1] = {{-1, -1, -1}, {2, 2, 0.01}};
+  grounds[fewer / 2] = {{-1e300, -1e300, -1e300}, {1e300, 1e300, 1e300}};
   check("grounds", grounds);
+}
+
+TEST_F(GpuBroadPhaseTest, ManyDistributionsOfFewBoxes) {
+  check_distributions(kFew, kFew);
+}
+
+TEST_F(GpuBroadPhaseTest, ManyDistributionsOfManyBoxes) {
+  check_distributions(100000, kMany);
 }
 
 TEST_F(GpuBroadPhaseTest, BoxesInOnePlace) {
   GpuBroadPhase broad_phase;
-  expect_same_as_cpu(broad_phase, Boxes(3000, {{1, 2, 3}, {1, 2, 3}}), "points");
-  expect_same_as_cpu(broad_phase, Boxes(3000, {{-1, -1, -1}, {1, 1, 1}}), "cubes");
-  expect_same_as_cpu(broad_phase, Boxes(3000, {{0, 0, 0}, {0, 0, 0}}), "nothing");
+  expect_same_as_cpu(broad_phase, Boxes(kFew, {{1, 2, 3}, {1, 2, 3}}), "points");
+  expect_same_as_cpu(broad_phase, Boxes(kFew, {{-1, -1, -1}, {1, 1, 1}}), "cubes");
+  expect_same_as_cpu(broad_phase, Boxes(kFew, {{0, 0, 0}, {0, 0, 0}}), "nothing");
   Boxes nested;
-  for (int i = 0; i < 3000; ++i) {
+  for (std::uint32_t i = 0; i < kFew; ++i) {
     const double size = std::pow(1.1, i);
     nested.push_back({{-size, -size, -size}, {size, size, size}});
   }
   expect_same_as_cpu(broad_phase, nested, "nested");
+  Boxes places;
+  for (std::uint32_t i = 0; i < kMany; ++i) {
+    const double x = i % 25;
+    places.push_back({{x, 0, 0}, {x + 0.5 * (i % 2), 1, 1}});
+  }
+  expect_same_as_cpu(broad_phase, places, "in 25 places");
 }
 
 TEST_F(GpuBroadPhaseTest, SubnormalNumbersAreDecidedAsTheyAre) {
   constexpr double kLeast = std::numeric_limits<double>::denorm_min();
   GpuBroadPhase broad_phase;
-  Boxes boxes = lattice(20, 0);
-  for (std::size_t i = 0; i < boxes.size(); ++i) {
-    for (int k = 0; k < 3; ++k) {
-      boxes[i].lo[k] *= 3 * kLeast;
-      boxes[i].hi[k] = boxes[i].lo[k] + static_cast<double>(i % 4) * kLeast;
+  for (const int side : {14, 28}) {
+    Boxes boxes = lattice(side, 0);
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+      for (int k = 0; k < 3; ++k) {
+        boxes[i].lo[k] *= 3 * kLeast;
+        boxes[i].hi[k] = boxes[i].lo[k] + static_cast<double>(i % 4) * kLeast;
+      }
     }
+    expect_same_as_cpu(broad_phase, boxes, "all subnormal");
+    boxes.push_back({{-1, -1, -1}, {1, 1, 1}});
+    boxes.push_back({{kLeast, -1, -1}, {1, 1, 1}});
+    expect_same_as_cpu(broad_phase, boxes, "subnormal in the middle of a large one");
   }
-  expect_same_as_cpu(broad_phase, boxes, "all subnormal");
-  boxes.push_back({{-1, -1, -1}, {1, 1, 1}});
-  boxes.push_back({{kLeast, -1, -1}, {1, 1, 1}});
-  expect_same_as_cpu(broad_phase, boxes, "subnormal in the middle of a large one");
 }
 
 TEST_F(GpuBroadPhaseTest, TouchingByTheLastBitIsMeeting) {
   GpuBroadPhase broad_phase;
   for (const double x : {1.0, 0.1, 1e7 + 0.1, -3e-200, 1e299}) {
     const double next = std::nextafter(x, 1e300), size = std::fmax(1, std::fabs(x));
-    const Boxes boxes = {{{x - size, 0, 0}, {x, 1, 1}},
-                         {{x, 0, 0}, {x + size, 1, 1}},
-                         {{next, 0, 0}, {x + size, 1, 1}},
-                         {{x - 1e3, 5, 5}, {x + 1e3, 6, 6}}};
-    const Pairs pairs = of_gpu(broad_phase, boxes, true);
-    EXPECT_TRUE(same(pairs, {{0, 1}, {1, 2}})) << x;
+    Boxes boxes = {{{x - size, 0, 0}, {x, 1, 1}},
+                   {{x, 0, 0}, {x + size, 1, 1}},
+                   {{next, 0, 0}, {x + size, 1, 1}},
+                   {{x - 1e3, 5, 5}, {x + 1e3, 6, 6}}};
+    EXPECT_TRUE(same(of_gpu(broad_phase, boxes, true), {{0, 1}, {1, 2}})) << x;
+    for (std::uint32_t i = 0; i < kMany; ++i) {
+      const double y = 10 + 2.0 * i;
+      boxes.push_back({{x, y, 0}, {x, y + 1, 1}});
+    }
+    EXPECT_TRUE(same(of_gpu(broad_phase, boxes, true), {{0, 1}, {1, 2}})) << x << ", of many";
   }
 }
 
@@ -267,8 +316,7 @@ TEST_F(GpuBroadPhaseTest, AMillionBoxes) {
   expect_same_as_cpu(broad_phase, boxes, "mixed sizes on a ground");
 }
 
-TEST_F(GpuBroadPhaseTest, OverflowIsReportedAndARetryLosesNothing) {
-  const Boxes boxes = scattered(20000, edge_for(20000, 20), 0, 31);
+void expect_overflow_is_reported(const Boxes& boxes) {
   const auto count = static_cast<std::uint32_t>(boxes.size());
   const Pairs expected = of_cpu(boxes);
   const OnDevice<WorldBox> device(boxes);
@@ -290,22 +338,32 @@ TEST_F(GpuBroadPhaseTest, OverflowIsReportedAndARetryLosesNothing) {
     ASSERT_EQ(broad_phase.enqueue(device.data(), count, {sorted}, nullptr), Status::kOk);
     ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
     EXPECT_EQ(broad_phase.report().complete, 1u);
+    EXPECT_EQ(std::memcmp(download(broad_phase.device_report(), 1).data(), &broad_phase.report(),
+                          sizeof(GpuBroadPhaseReport)),
+              0);
     Pairs all = stored(broad_phase);
     if (!sorted) std::sort(all.begin(), all.end(), before);
     EXPECT_TRUE(same(all, expected));
+    EXPECT_LE(broad_phase.bytes(), most_broad_phase_bytes(broad_phase.capacity(), sorted));
   }
+}
+
+TEST_F(GpuBroadPhaseTest, OverflowIsReportedAndARetryLosesNothing) {
+  for (const std::uint32_t count : {kFew, kMany})
+    expect_overflow_is_reported(scattered(count, edge_for(count, 20), 0, 31));
+  expect_overflow_is_reported(Boxes(100, {{1, 2, 3}, {4, 5, 6}}));
+  expect_overflow_is_reported(Boxes(kFew, {{1, 2, 3}, {4, 5, 6}}));
 }
 
 TEST_F(GpuBroadPhaseTest, NamesTheFirstBoxThatItCannotTakeAndGoesOnAfterwards) {
   GpuBroadPhase broad_phase;
   for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity(), -1.0000001e300}) {
-    for (const std::size_t count : {1, 40, 5000}) {
+    for (const std::uint32_t count : {1u, 40u, kFew, kMany}) {
       Boxes boxes = scattered(count, 0.1, 0, 41);
       const Boxes good = boxes;
       boxes[count - 1].hi[1] = boxes[count / 2].lo[2] = bad;
       const OnDevice<WorldBox> device(boxes);
-      EXPECT_EQ(broad_phase.find_pairs(device.data(), static_cast<std::uint32_t>(count), {}, nullptr),
-                Status::kOutOfRange);
+      EXPECT_EQ(broad_phase.find_pairs(device.data(), count, {}, nullptr), Status::kOutOfRange);
       EXPECT_EQ(broad_phase.report().where, count / 2);
       EXPECT_EQ(stored(broad_phase).size(), 0u);
       EXPECT_EQ(broad_phase.report().found, 0u);
@@ -330,14 +388,13 @@ Boxes moved(const Boxes& boxes, const std::vector<std::array<double, 3>>& speeds
   return result;
 }
 
-TEST_F(GpuBroadPhaseTest, FramesOfMovingBoxesTakeNoNewMemory) {
-  const Boxes start = scattered(30000, edge_for(30000, 6.5), 1, 51);
+void expect_frames_take_no_new_memory(std::uint32_t count) {
+  const Boxes start = scattered(count, edge_for(count, 6.5), 1, 51);
   std::mt19937_64 random(52);
   std::normal_distribution<double> normal(0, 0.01);
   std::vector<std::array<double, 3>> speeds(start.size());
   for (auto& speed : speeds) speed = {normal(random), normal(random), normal(random)};
   GpuBroadPhase broad_phase;
-  const auto count = static_cast<std::uint32_t>(start.size());
   ASSERT_EQ(broad_phase.reserve({count, 8 * count}, {true}), Status::kOk);
   const std::size_t bytes = broad_phase.bytes();
   const ObjectPair* place = broad_phase.pairs().pairs;
@@ -347,11 +404,15 @@ TEST_F(GpuBroadPhaseTest, FramesOfMovingBoxesTakeNoNewMemory) {
   EXPECT_EQ(broad_phase.pairs().pairs, place);
 }
 
+TEST_F(GpuBroadPhaseTest, FramesOfMovingBoxesTakeNoNewMemory) {
+  for (const std::uint32_t count : {kFew, kMany}) expect_frames_take_no_new_memory(count);
+}
+
 TEST_F(GpuBroadPhaseTest, ObjectsOnSeveralStreamsAndThreadsDoNotDisturbEachOther) {
   const auto work = [](std::uint64_t seed) {
-    const Boxes boxes = scattered(20000, edge_for(20000, 10), 1, seed);
+    const std::uint32_t count = seed % 2 == 0 ? kFew : kMany;
+    const Boxes boxes = scattered(count, edge_for(count, 10), 1, seed);
     const Pairs expected = of_cpu(boxes);
-    const auto count = static_cast<std::uint32_t>(boxes.size());
     const OnDevice<WorldBox> device(boxes);
     cudaStream_t stream;
     ASSERT_EQ(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), cudaSuccess);
@@ -368,13 +429,12 @@ TEST_F(GpuBroadPhaseTest, ObjectsOnSeveralStreamsAndThreadsDoNotDisturbEachOther
     EXPECT_EQ(cudaStreamDestroy(stream), cudaSuccess);
   };
   std::vector<std::thread> threads;
-  for (std::uint64_t seed = 61; seed < 64; ++seed) threads.emplace_back(work, seed);
+  for (std::uint64_t seed = 61; seed < 65; ++seed) threads.emplace_back(work, seed);
   for (std::thread& thread : threads) thread.join();
 }
 
-TEST_F(GpuBroadPhaseTest, MayBeCapturedIntoAGraph) {
-  const Boxes boxes = scattered(20000, edge_for(20000, 10), 1, 71), later = scattered(20000, 0.02, 0, 72);
-  const auto count = static_cast<std::uint32_t>(boxes.size());
+void expect_graph_serves_frames(std::uint32_t count) {
+  const Boxes boxes = scattered(count, edge_for(count, 10), 1, 71), later = scattered(count, 0.02, 0, 72);
   const OnDevice<WorldBox> device(boxes);
   GpuBroadPhase broad_phase;
   ASSERT_EQ(broad_phase.reserve({count, 10 * count}, {true}), Status::kOk);
@@ -398,6 +458,10 @@ TEST_F(GpuBroadPhaseTest, MayBeCapturedIntoAGraph) {
   cudaGraphExecDestroy(run);
   cudaGraphDestroy(graph);
   cudaStreamDestroy(stream);
+}
+
+TEST_F(GpuBroadPhaseTest, MayBeCapturedIntoAGraph) {
+  for (const std::uint32_t count : {kFew, kMany}) expect_graph_serves_frames(count);
 }
 
 Pose random_pose(std::mt19937_64& random, double distance) {
@@ -430,15 +494,15 @@ Status find_pairs(GpuBroadPhase& broad_phase, const Instances& instances,
       {assets.data(), static_cast<std::uint32_t>(bounds.size())}, {true}, nullptr);
 }
 
-TEST_F(GpuBroadPhaseTest, PosesInstancesBitByBitAsTheCpu) {
+void expect_poses_as_the_cpu(GpuBroadPhase& broad_phase, std::uint32_t count) {
   const std::vector<AssetBounds> bounds = {{{0, 0, 0}, {-1, -0.5f, -0.25f}, {1, 0.5f, 0.75f}},
                                            {{1e6, -2e6, 0.1}, {0, 0, 0}, {3, 2, 1}},
                                            {{0, 0, 0}, {1e-40f, -1e-30f, 0}, {1e-39f, 0, 7}}};
   std::mt19937_64 random(81);
   Instances instances;
-  for (int i = 0; i < 20000; ++i) {
+  for (std::uint32_t i = 0; i < count; ++i) {
     instances.asset.push_back(random() % 3);
-    instances.pose.push_back(random_pose(random, i % 2 == 0 ? 20 : 1e9));
+    instances.pose.push_back(random_pose(random, i % 2 == 0 ? std::cbrt(0.4 * count) : 1e9));
   }
   Boxes boxes;
   for (std::size_t i = 0; i < instances.asset.size(); ++i) {
@@ -446,25 +510,34 @@ TEST_F(GpuBroadPhaseTest, PosesInstancesBitByBitAsTheCpu) {
     boxes.push_back(
         world_box(for_stored_coordinates(instances.pose[i], asset.origin), asset.lower, asset.upper));
   }
-  GpuBroadPhase broad_phase;
   ASSERT_EQ(find_pairs(broad_phase, instances, bounds), Status::kOk);
   const Boxes posed = download(broad_phase.boxes(), boxes.size());
   EXPECT_EQ(std::memcmp(posed.data(), boxes.data(), boxes.size() * sizeof(WorldBox)), 0);
   const Pairs expected = of_cpu(boxes);
-  EXPECT_GT(expected.size(), 1000u);
+  EXPECT_GT(expected.size(), count / 20);
   EXPECT_TRUE(same(stored(broad_phase), expected));
 
-  instances.pose[700].translation[0] = 1e301;
-  instances.pose[600].rotation[1][1] += 1e-3;
-  instances.asset[500] = 3;
+  instances.pose[count - 100].translation[0] = 1e301;
+  instances.pose[count - 200].rotation[1][1] += 1e-3;
+  instances.asset[count - 300] = 3;
   EXPECT_EQ(find_pairs(broad_phase, instances, bounds), Status::kUnknownAsset);
-  EXPECT_EQ(broad_phase.report().where, 500u);
-  instances.asset[500] = 2;
+  EXPECT_EQ(broad_phase.report().where, count - 300);
+  instances.asset[count - 300] = 2;
   EXPECT_EQ(find_pairs(broad_phase, instances, bounds), Status::kPoseNotRigid);
-  EXPECT_EQ(broad_phase.report().where, 600u);
-  instances.pose[600] = kIdentityPose;
+  EXPECT_EQ(broad_phase.report().where, count - 200);
+  instances.pose[count - 200] = kIdentityPose;
   EXPECT_EQ(find_pairs(broad_phase, instances, bounds), Status::kOutOfRange);
-  EXPECT_EQ(broad_phase.report().where, 700u);
+  EXPECT_EQ(broad_phase.report().where, count - 100);
+}
+
+TEST_F(GpuBroadPhaseTest, PosesInstancesBitByBitAsTheCpu) {
+  GpuBroadPhase broad_phase;
+  for (const std::uint32_t count : {1000u, kFewPosed, kFewPosed + 1, kFew, kFewBoxes, kFewBoxes + 1, kMany}) {
+    SCOPED_TRACE(count);
+    expect_poses_as_the_cpu(broad_phase, count);
+  }
+  EXPECT_EQ(find_pairs(broad_phase, {}, {}), Status::kOk);
+  EXPECT_EQ(broad_phase.report().found, 0u);
 }
 
 }  // namespace

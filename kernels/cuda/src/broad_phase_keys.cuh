@@ -1,7 +1,7 @@
 #pragma once
 #include <math_constants.h>
 
-#include "broad_phase_tree.cuh"
+#include "broad_phase_boxes.cuh"
 
 // What the broad phase sorts boxes by.
 namespace tandem {
@@ -13,15 +13,18 @@ namespace {
 constexpr std::uint32_t kSamples = 256;
 constexpr std::uint32_t kThreadsPerSample = 4;
 
+template <typename Boxes>
 __global__ void __launch_bounds__(kSamples* kThreadsPerSample)
-    survey_boxes(const WorldBox* boxes, std::uint32_t count, Survey* survey) {
+    survey_boxes(const __grid_constant__ Boxes boxes, std::uint32_t count, Survey* survey) {
+  gpu::wait_for_kernel_before();
   __shared__ double given[kSamples], samples[kSamples];
   const std::uint32_t taken = min(count, kSamples), axis = blockIdx.x;
   if (threadIdx.x < kSamples) {
     double sample = CUDART_INF;
     if (threadIdx.x < taken) {
       const std::uint64_t i = static_cast<std::uint64_t>(threadIdx.x) * count / taken;
-      const WorldBox box = load(boxes, static_cast<std::uint32_t>(i));
+      WorldBox box;
+      static_cast<void>(boxes.get(static_cast<std::uint32_t>(i), box));
       sample = axis == 0   ? centre(box, 0)
                : axis == 1 ? centre(box, 1)
                : axis == 2 ? centre(box, 2)
@@ -136,12 +139,15 @@ __device__ std::uint32_t class_of(double edge, const Survey& survey, const Scale
   return min(octaves / 2, (1u << kClassBits) - 1);
 }
 
-__global__ void __launch_bounds__(256) make_keys(const WorldBox* boxes, std::uint32_t count, int index_bits,
-                                                 const Survey* survey, Key* keys, Counters* counters) {
+template <typename Boxes>
+__global__ void __launch_bounds__(256)
+    make_keys(const __grid_constant__ Boxes boxes, std::uint32_t count, int index_bits, const Survey* survey,
+              Key* keys, Counters* counters) {
+  gpu::wait_for_kernel_before();
   const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
   if (i >= count) return;
-  const WorldBox box = load(boxes, i);
-  if (!in_range(box)) blame(counters, i, Status::kOutOfRange);
+  WorldBox box;
+  take(boxes, i, counters, box);
   const Survey known = *survey;
   const Scale scale = scale_of(known);
   std::uint32_t cell[3];

@@ -23,6 +23,19 @@ constexpr std::uint32_t kCells = 1u << kAxisBits;
 
 constexpr unsigned long long kNoError = ~0ull;
 
+__device__ std::uint32_t lane_index() {
+  return threadIdx.x % kFanOut;
+}
+__device__ std::uint32_t lanes_below() {
+  return (1u << lane_index()) - 1;
+}
+__device__ std::uint32_t count_of(std::uint32_t lanes) {
+  return static_cast<std::uint32_t>(__popc(lanes));
+}
+__device__ std::uint32_t lowest(std::uint32_t bits) {
+  return static_cast<std::uint32_t>(__ffs(static_cast<int>(bits)) - 1);
+}
+
 // ---------------------------------------------------------------------------------------------------------
 // Boxes in float32.
 //

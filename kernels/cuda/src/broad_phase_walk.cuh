@@ -1,16 +1,10 @@
 #pragma once
-#include "broad_phase_tree.cuh"
+#include "broad_phase_output.cuh"
+#include "launch.h"
 
 // The walk of the tree against itself.
 namespace tandem {
 namespace {
-
-// How pairs are written: a << shift_a | b << shift_b. An ObjectPair's bytes, or what sorts as it should.
-struct Output {
-  unsigned long long* pairs;
-  std::uint32_t capacity;
-  int shift_a, shift_b;
-};
 
 constexpr std::uint32_t kWarps = 4;      // of a thread block
 constexpr std::uint32_t kWaiting = 256;  // hits that a warp holds back
@@ -20,32 +14,13 @@ struct alignas(16) WarpMemory {
   unsigned long long waiting[kWaiting];  // hits: own << 32 | leaf; pairs, once decided
 };
 
-__device__ std::uint32_t lane_index() {
-  return threadIdx.x % kFanOut;
-}
-__device__ std::uint32_t lanes_below() {
-  return (1u << lane_index()) - 1;
-}
-__device__ std::uint32_t count_of(std::uint32_t lanes) {
-  return static_cast<std::uint32_t>(__popc(lanes));
-}
-__device__ std::uint32_t lowest(std::uint32_t bits) {
-  return static_cast<std::uint32_t>(__ffs(static_cast<int>(bits)) - 1);
-}
-
 // One group of 32 boxes against itself and all that come after, or a part of these.
 class Walk {
  public:
   // part: of the children of a node, which groups to take, a bit each.
-  __device__ Walk(const Tree& tree, const WorldBox* boxes, const Output& output, Counters* counters,
-                  WarpMemory& memory, std::uint32_t group, std::uint32_t part)
-      : tree_(tree),
-        boxes_(boxes),
-        output_(output),
-        counters_(counters),
-        memory_(memory),
-        group_(group),
-        part_(part) {
+  __device__ Walk(const Tree& tree, const WorldBox* boxes, const Output& output, WarpMemory& memory,
+                  std::uint32_t group, std::uint32_t part)
+      : tree_(tree), boxes_(boxes), output_(output), memory_(memory), group_(group), part_(part) {
     mine_ = leaf(group * kFanOut + lane_index());
     memory_.own[lane_index()] = mine_;
     around_ = tree_.level(1)[group];
@@ -184,9 +159,7 @@ class Walk {
       const std::uint32_t meeting = __ballot_sync(kAllLanes, meet);
       __syncwarp();  // all have read what may now be overwritten
       if (meet) {
-        memory_.waiting[decided + count_of(meeting & lanes_below())] =
-            static_cast<unsigned long long>(a) << output_.shift_a | static_cast<unsigned long long>(b)
-                                                                        << output_.shift_b;
+        memory_.waiting[decided + count_of(meeting & lanes_below())] = output_.key(a, b);
       }
       decided += count_of(meeting);
       __syncwarp();
@@ -199,7 +172,7 @@ class Walk {
     decide();
     unsigned long long begin = 0;
     if (lane_index() == 0 && count_ > 0)
-      begin = atomicAdd(&counters_->found, static_cast<unsigned long long>(count_));
+      begin = atomicAdd(&output_.counters->found, static_cast<unsigned long long>(count_));
     begin = __shfl_sync(kAllLanes, begin, 0);
     for (std::uint32_t i = lane_index(); i < count_; i += kFanOut) {
       if (begin + i < output_.capacity) output_.pairs[begin + i] = memory_.waiting[i];
@@ -211,7 +184,6 @@ class Walk {
   const Tree& tree_;
   const WorldBox* boxes_;
   const Output& output_;
-  Counters* counters_;
   WarpMemory& memory_;
   std::uint32_t group_, part_, count_ = 0;
   Node mine_, around_;
@@ -220,13 +192,14 @@ class Walk {
 // `split` warps share a group: a power of two, at most 16.
 __global__ void __launch_bounds__(kWarps* kFanOut)
     collect_pairs(const __grid_constant__ Tree tree, std::uint32_t split, const WorldBox* boxes,
-                  const __grid_constant__ Output output, Counters* counters) {
+                  const __grid_constant__ Output output) {
   __shared__ WarpMemory memories[kWarps];
+  gpu::wait_for_kernel_before();
   const std::uint32_t warp = threadIdx.x / kFanOut;
   const std::uint64_t task = static_cast<std::uint64_t>(blockIdx.x) * kWarps + warp;
-  if (task >= static_cast<std::uint64_t>(tree.count[1]) * split || counters->error != kNoError) return;
+  if (task >= static_cast<std::uint64_t>(tree.count[1]) * split || output.counters->error != kNoError) return;
   const std::uint32_t part = kAllLanes / ((1u << split) - 1) << task % split;  // every split-th bit
-  Walk(tree, boxes, output, counters, memories[warp], static_cast<std::uint32_t>(task / split), part).run();
+  Walk(tree, boxes, output, memories[warp], static_cast<std::uint32_t>(task / split), part).run();
 }
 
 }  // namespace

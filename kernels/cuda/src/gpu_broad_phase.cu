@@ -5,7 +5,10 @@
 #include <cub/device/device_radix_sort.cuh>
 #include <new>
 
+#include "broad_phase_boxes.cuh"
+#include "broad_phase_direct.cuh"
 #include "broad_phase_keys.cuh"
+#include "broad_phase_limits.h"
 #include "broad_phase_tree.cuh"
 #include "broad_phase_walk.cuh"
 #include "tandem/formats/gpu_status.h"
@@ -14,33 +17,13 @@ namespace tandem {
 namespace {
 
 // ---------------------------------------------------------------------------------------------------------
-// World boxes of instances. Compiled without fused operations, so that is_rigid() is the CPU's too.
-
-__global__ void pose_boxes(GpuInstances instances, GpuAssetBounds assets, WorldBox* boxes,
-                           Counters* counters) {
-  const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
-  if (i >= instances.count) return;
-  WorldBox box = {};
-  const std::uint32_t asset = instances.asset[i];
-  const Pose pose = instances.pose[i];
-  if (asset >= assets.count) {
-    blame(counters, i, Status::kUnknownAsset);
-  } else if (!is_rigid(pose)) {
-    blame(counters, i, Status::kPoseNotRigid);
-  } else {
-    const AssetBounds bounds = assets.bounds[asset];
-    box = world_box(for_stored_coordinates(pose, bounds.origin), bounds.lower, bounds.upper);
-  }
-  boxes[i] = box;  // make_keys() checks its range
-}
-
-// ---------------------------------------------------------------------------------------------------------
 // The tree. A block of 1,024 threads writes as many leaves, the 32 nodes above them and the one above those.
 
 __global__ void __launch_bounds__(kFanOut* kFanOut)
     build_lower_levels(const WorldBox* boxes, const Key* sorted, int index_bits, const Survey* survey,
                        const __grid_constant__ Tree tree) {
   __shared__ Node above[kFanOut];
+  gpu::wait_for_kernel_before();
   const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
   const std::uint32_t lane = threadIdx.x % kFanOut, warp = threadIdx.x / kFanOut;
   Node node = nothing();
@@ -68,6 +51,7 @@ __global__ void __launch_bounds__(kFanOut* kFanOut)
 }
 
 __global__ void __launch_bounds__(kFanOut* kFanOut) build_upper_levels(const __grid_constant__ Tree tree) {
+  gpu::wait_for_kernel_before();
   const std::uint32_t lane = threadIdx.x % kFanOut, warp = threadIdx.x / kFanOut;
   for (int level = 3; level <= tree.top; ++level) {
     for (std::uint32_t i = warp; i < tree.count[level]; i += kFanOut) {
@@ -83,27 +67,22 @@ __global__ void __launch_bounds__(kFanOut* kFanOut) build_upper_levels(const __g
 // ---------------------------------------------------------------------------------------------------------
 // The end.
 
-// Writes the report, and readies the counters for the next time.
-__global__ void report_pairs(Counters* counters, std::uint32_t capacity, GpuBroadPhaseReport* report) {
-  const unsigned long long error = counters->error;
-  const unsigned long long found = error == kNoError ? counters->found : 0;
-  *counters = kFreshCounters;
-  report->status = error == kNoError ? Status::kOk : static_cast<Status>(error & 0xFFFFFFFFu);
-  report->where = error == kNoError ? kNoIndex : static_cast<std::uint32_t>(error >> 32);
-  report->complete = found <= capacity;
-  report->found = found;
-  report->count = static_cast<std::uint32_t>(min(found, 0xFFFFFFFFull));
+__global__ void report_pairs(const __grid_constant__ Output output) {
+  gpu::wait_for_kernel_before();
+  write_report(output, output.counters->found);
 }
 
 // Keys of no pair: they come last, because of two numbers of so many bits that a < b not both are all ones.
 __global__ void fill_rest(unsigned long long* keys, std::uint32_t capacity,
                           const GpuBroadPhaseReport* report) {
+  gpu::wait_for_kernel_before();
   const std::uint64_t i = static_cast<std::uint64_t>(blockIdx.x) * blockDim.x + threadIdx.x;
   if (i >= report->count && i < capacity) keys[i] = ~0ull;
 }
 
 __global__ void unpack_keys(const unsigned long long* keys, std::uint32_t capacity, int bits,
                             ObjectPair* pairs, const GpuBroadPhaseReport* report) {
+  gpu::wait_for_kernel_before();
   const std::uint64_t i = static_cast<std::uint64_t>(blockIdx.x) * blockDim.x + threadIdx.x;
   if (i >= report->count || i >= capacity) return;
   const unsigned long long key = keys[i];
@@ -149,6 +128,9 @@ class DeviceBuffer {
 std::uint32_t blocks_for(std::uint64_t threads, std::uint32_t size) {
   return static_cast<std::uint32_t>((threads + size - 1) / size);
 }
+
+// So many blocks at most share the tests of each against each.
+constexpr std::uint32_t kMostDirectBlocks = 2048;
 
 // Bits of an index of a box.
 int index_bits(std::uint32_t boxes) {
@@ -196,17 +178,25 @@ struct GpuBroadPhase::State {
     static_cast<void>(cudaGetLastError());  // later calls must not report it again
     return false;
   }
-  bool launched() { return ok(cudaGetLastError()); }
   Status failure() const { return status_of(error); }
 
   bool reserve_fixed();
   bool reserve_boxes(std::uint32_t count);
   bool reserve_pairs(std::uint32_t count, bool sorted);
   bool reserve_sorting();
-  bool make_tree(const WorldBox* given, const Tree& tree, cudaStream_t stream);
+  Status refusal(std::uint32_t count, const GpuBroadPhaseOptions& options) const;
+  Output output(std::uint32_t count, bool sorted);
+  template <typename... Parameters, typename... Arguments>
+  bool launch(std::uint32_t blocks, std::uint32_t threads, cudaStream_t stream, void (*kernel)(Parameters...),
+              const Arguments&... arguments);
+  template <typename Boxes>
+  bool test_all(const Boxes& from, std::uint32_t count, bool sorted, cudaStream_t stream);
+  template <typename Boxes>
+  bool make_tree(const Boxes& from, const WorldBox* given, const Tree& tree, cudaStream_t stream);
   bool collect(const WorldBox* given, const Tree& tree, bool sorted, cudaStream_t stream);
   bool sort_pairs(std::uint32_t count, cudaStream_t stream);
-  bool run(const WorldBox* given, std::uint32_t count, bool sorted, cudaStream_t stream);
+  template <typename Boxes>
+  bool run(const Boxes& from, const WorldBox* given, std::uint32_t count, bool sorted, cudaStream_t stream);
   template <typename Enqueue>
   Status find(GpuBroadPhase& self, GpuBroadPhaseCapacity wanted, const GpuBroadPhaseOptions& options,
               cudaStream_t stream, const Enqueue& enqueue);
@@ -261,32 +251,59 @@ bool GpuBroadPhase::State::reserve_sorting() {
   return ok(sorting.reserve(std::max(bytes, pair_bytes)));
 }
 
-bool GpuBroadPhase::State::make_tree(const WorldBox* given, const Tree& tree, cudaStream_t stream) {
+// Why a call cannot be queued.
+Status GpuBroadPhase::State::refusal(std::uint32_t count, const GpuBroadPhaseOptions& options) const {
+  const bool enough = count <= capacity.boxes && (!options.sorted || sorted_pairs.size() >= capacity.pairs);
+  return enough ? Status::kOk : Status::kOutOfRange;
+}
+
+Output GpuBroadPhase::State::output(std::uint32_t count, bool sorted) {
+  return {pairs.data(),  capacity.pairs, sorted ? index_bits(count) : 0, sorted ? 0 : 32, counters.data(),
+          report.data(), host_report};
+}
+
+template <typename... Parameters, typename... Arguments>
+bool GpuBroadPhase::State::launch(std::uint32_t blocks, std::uint32_t threads, cudaStream_t stream,
+                                  void (*kernel)(Parameters...), const Arguments&... arguments) {
+  return ok(gpu::launch_after({blocks, threads, 0, stream}, kernel, arguments...));
+}
+
+template <typename Boxes>
+bool GpuBroadPhase::State::test_all(const Boxes& from, std::uint32_t count, bool sorted,
+                                    cudaStream_t stream) {
+  const std::uint32_t tiles = std::max(blocks_for(count, kTile), 1u), tasks = tiles * (tiles + 1) / 2,
+                      tasks_each = blocks_for(tasks, kMostDirectBlocks);
+  return launch(blocks_for(tasks, tasks_each), kTileThreads, stream, collect_directly<Boxes>, from, count,
+                output(count, sorted), tasks_each, tasks);
+}
+
+// from: where the boxes come from; given: where they lie once they have been taken.
+template <typename Boxes>
+bool GpuBroadPhase::State::make_tree(const Boxes& from, const WorldBox* given, const Tree& tree,
+                                     cudaStream_t stream) {
   const std::uint32_t count = tree.count[0];
   const int bits = index_bits(count);
-  survey_boxes<<<4, kSamples * kThreadsPerSample, 0, stream>>>(given, count, survey.data());
-  make_keys<<<blocks_for(count, 256), 256, 0, stream>>>(given, count, bits, survey.data(), keys[0].data(),
-                                                        counters.data());
-  if (!launched()) return false;
+  if (!launch(4, kSamples * kThreadsPerSample, stream, survey_boxes<Boxes>, from, count, survey.data()) ||
+      !launch(blocks_for(count, 256), 256, stream, make_keys<Boxes>, from, count, bits, survey.data(),
+              keys[0].data(), counters.data()))
+    return false;
   cub::DoubleBuffer<Key> key(keys[0].data(), keys[1].data());
   std::size_t bytes = sorting.size();
   if (!ok(cub::DeviceRadixSort::SortKeys(sorting.data(), bytes, key, count, first_bit(count), 64, stream)))
     return false;
   constexpr std::uint32_t kThreads = kFanOut * kFanOut;
-  build_lower_levels<<<blocks_for(count, kThreads), kThreads, 0, stream>>>(given, key.Current(), bits,
-                                                                           survey.data(), tree);
-  if (tree.top > 2) build_upper_levels<<<1, kThreads, 0, stream>>>(tree);
-  return launched();
+  return launch(blocks_for(count, kThreads), kThreads, stream, build_lower_levels, given, key.Current(), bits,
+                survey.data(), tree) &&
+         (tree.top <= 2 || launch(1, kThreads, stream, build_upper_levels, tree));
 }
 
 bool GpuBroadPhase::State::collect(const WorldBox* given, const Tree& tree, bool sorted,
                                    cudaStream_t stream) {
-  const Output output = {pairs.data(), capacity.pairs, sorted ? index_bits(tree.count[0]) : 0,
-                         sorted ? 0 : 32};
+  const Output out = output(tree.count[0], sorted);
   const std::uint32_t split = split_of(tree.count[1]);
   const std::uint32_t blocks = blocks_for(static_cast<std::uint64_t>(tree.count[1]) * split, kWarps);
-  collect_pairs<<<blocks, kWarps * kFanOut, 0, stream>>>(tree, split, given, output, counters.data());
-  return launched();
+  return launch(blocks, kWarps * kFanOut, stream, collect_pairs, tree, split, given, out) &&
+         launch(1, 1, stream, report_pairs, out);
 }
 
 // Sorts as many keys as there is room for, because the CPU does not know their number.
@@ -294,23 +311,25 @@ bool GpuBroadPhase::State::sort_pairs(std::uint32_t count, cudaStream_t stream) 
   if (capacity.pairs == 0) return true;
   const int bits = index_bits(count);
   const std::uint32_t blocks = blocks_for(capacity.pairs, 256);
-  fill_rest<<<blocks, 256, 0, stream>>>(pairs.data(), capacity.pairs, report.data());
-  if (!launched()) return false;
+  if (!launch(blocks, 256, stream, fill_rest, pairs.data(), capacity.pairs, report.data())) return false;
   cub::DoubleBuffer<unsigned long long> key(pairs.data(), sorted_pairs.data());
   std::size_t bytes = sorting.size();
   if (!ok(cub::DeviceRadixSort::SortKeys(sorting.data(), bytes, key, capacity.pairs, 0, 2 * bits, stream)))
     return false;
-  unpack_keys<<<blocks, 256, 0, stream>>>(key.Current(), capacity.pairs, bits,
-                                          reinterpret_cast<ObjectPair*>(pairs.data()), report.data());
-  return launched();
+  return launch(blocks, 256, stream, unpack_keys, key.Current(), capacity.pairs, bits,
+                reinterpret_cast<ObjectPair*>(pairs.data()), report.data());
 }
 
-bool GpuBroadPhase::State::run(const WorldBox* given, std::uint32_t count, bool sorted, cudaStream_t stream) {
-  const Tree tree = tree_over(count, nodes.data());
-  if (count > 0 && (!make_tree(given, tree, stream) || !collect(given, tree, sorted, stream))) return false;
-  report_pairs<<<1, 1, 0, stream>>>(counters.data(), capacity.pairs, report.data());
-  if (!launched() || (sorted && !sort_pairs(count, stream))) return false;
-  return ok(cudaMemcpyAsync(host_report, report.data(), sizeof *host_report, cudaMemcpyDeviceToHost, stream));
+template <typename Boxes>
+bool GpuBroadPhase::State::run(const Boxes& from, const WorldBox* given, std::uint32_t count, bool sorted,
+                               cudaStream_t stream) {
+  if (count <= kFewBoxes) {
+    if (!test_all(from, count, sorted, stream)) return false;
+  } else {
+    const Tree tree = tree_over(count, nodes.data());
+    if (!make_tree(from, given, tree, stream) || !collect(given, tree, sorted, stream)) return false;
+  }
+  return !sorted || sort_pairs(count, stream);
 }
 
 // The first guess of room is four pairs for each box.
@@ -351,22 +370,29 @@ Status GpuBroadPhase::reserve(const GpuBroadPhaseCapacity& capacity, const GpuBr
 
 Status GpuBroadPhase::enqueue(const WorldBox* boxes, std::uint32_t count, const GpuBroadPhaseOptions& options,
                               cudaStream_t stream) {
-  if (state_ == nullptr || count > state_->capacity.boxes) return Status::kOutOfRange;
+  if (state_ == nullptr) return Status::kOutOfRange;
+  if (const Status status = state_->refusal(count, options); status != Status::kOk) return status;
   if (reinterpret_cast<std::uintptr_t>(boxes) % 16 != 0) return Status::kMisaligned;
-  if (options.sorted && state_->sorted_pairs.size() < state_->capacity.pairs) return Status::kOutOfRange;
-  return state_->run(boxes, count, options.sorted, stream) ? Status::kOk : state_->failure();
+  const bool queued = state_->run(GivenBoxes{boxes}, boxes, count, options.sorted, stream);
+  return queued ? Status::kOk : state_->failure();
 }
 
 Status GpuBroadPhase::enqueue(const GpuInstances& instances, const GpuAssetBounds& assets,
                               const GpuBroadPhaseOptions& options, cudaStream_t stream) {
   if (state_ == nullptr || instances.count > state_->boxes.size()) return Status::kOutOfRange;
   State& state = *state_;
-  if (instances.count > 0) {
-    pose_boxes<<<blocks_for(instances.count, 256), 256, 0, stream>>>(instances, assets, state.boxes.data(),
-                                                                     state.counters.data());
-    if (!state.launched()) return state.failure();
+  const std::uint32_t count = instances.count;
+  if (const Status status = state.refusal(count, options); status != Status::kOk) return status;
+  WorldBox* const boxes = state.boxes.data();
+  const PosedBoxes posed = {instances, assets, boxes};
+  bool queued = false;
+  if (count <= kFewPosed || count > kFewBoxes) {
+    queued = state.run(posed, boxes, count, options.sorted, stream);
+  } else {
+    queued = state.launch(blocks_for(count, 256), 256, stream, pose_boxes, posed, state.counters.data()) &&
+             state.run(GivenBoxes{boxes}, boxes, count, options.sorted, stream);
   }
-  return enqueue(state.boxes.data(), instances.count, options, stream);
+  return queued ? Status::kOk : state.failure();
 }
 
 Status GpuBroadPhase::find_pairs(const WorldBox* boxes, std::uint32_t count,

@@ -13,7 +13,7 @@ namespace tandem {
 
 struct GpuBroadPhaseOptions {
   /// Pairs come sorted by a, then b, as BroadPhase has them. Else they come in an order that may differ from
-  /// run to run, neighbours in space close to each other.
+  /// run to run; of many boxes, neighbours in space close to each other.
   bool sorted = false;
 };
 
@@ -44,10 +44,10 @@ struct GpuBroadPhaseReport {
 /// waits for the GPU, allocates, or asks the CPU. Throws nothing. Movable, not copyable. One broad phase at a
 /// time: enqueue the next on the same stream, or after it; several objects side by side.
 ///
-/// Boxes are sorted by class of size, then along a space-filling curve, and grouped by 32 into a tree of
-/// fan-out 32. One warp takes a group and walks the part of the tree that lies behind it, so a pair is found
-/// once, by the smaller box: one huge box among many small ones costs each of them a test. O(n log n) for
-/// boxes of bounded overlap.
+/// Few boxes are tested each against each, by one kernel that poses them too. Many are sorted by class of
+/// size, then along a space-filling curve, and grouped by 32 into a tree of fan-out 32. One warp takes a group
+/// and walks the part of the tree that lies behind it, so a pair is found once, by the smaller box: one huge
+/// box among many small ones costs each of them a test. O(n log n) for boxes of bounded overlap.
 class GpuBroadPhase {
  public:
   GpuBroadPhase();

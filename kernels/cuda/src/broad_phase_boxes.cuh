@@ -1,0 +1,62 @@
+#pragma once
+#include "broad_phase_tree.cuh"
+#include "launch.h"
+
+// Where the world boxes of a broad phase come from. Compiled without fused operations, so that is_rigid() is
+// the CPU's too.
+namespace tandem {
+namespace {
+
+// They lie in GPU memory.
+struct GivenBoxes {
+  const WorldBox* boxes;
+
+  __device__ Status get(std::uint32_t i, WorldBox& box) const {
+    box = load(boxes, i);
+    return Status::kOk;
+  }
+  __device__ void keep(std::uint32_t, const WorldBox&) const {}
+  // Somewhere near the first box.
+  __device__ double near(int axis) const { return boxes[0].lo[axis]; }
+};
+
+// They are those of instances, and to be kept.
+struct PosedBoxes {
+  GpuInstances instances;
+  GpuAssetBounds assets;
+  WorldBox* kept;
+
+  __device__ Status get(std::uint32_t i, WorldBox& box) const {
+    box = {};
+    const std::uint32_t asset = instances.asset[i];
+    const Pose pose = instances.pose[i];
+    if (asset >= assets.count) return Status::kUnknownAsset;
+    if (!is_rigid(pose)) return Status::kPoseNotRigid;
+    const AssetBounds bounds = assets.bounds[asset];
+    box = world_box(for_stored_coordinates(pose, bounds.origin), bounds.lower, bounds.upper);
+    return Status::kOk;
+  }
+  __device__ void keep(std::uint32_t i, const WorldBox& box) const { kept[i] = box; }
+  __device__ double near(int axis) const { return instances.pose[0].translation[axis]; }
+};
+
+// Gets box i for good: says what is wrong with it, and keeps it. Result: whether nothing is.
+template <typename Boxes>
+__device__ bool take(const Boxes& boxes, std::uint32_t i, Counters* counters, WorldBox& box) {
+  Status status = boxes.get(i, box);
+  boxes.keep(i, box);
+  if (status == Status::kOk && !in_range(box)) status = Status::kOutOfRange;
+  if (status == Status::kOk) return true;
+  blame(counters, i, status);
+  return false;
+}
+
+__global__ void pose_boxes(const __grid_constant__ PosedBoxes boxes, Counters* counters) {
+  gpu::wait_for_kernel_before();
+  const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
+  WorldBox box;
+  if (i < boxes.instances.count) take(boxes, i, counters, box);
+}
+
+}  // namespace
+}  // namespace tandem

@@ -1,0 +1,52 @@
+#pragma once
+#include <cuda_runtime.h>
+
+#include <cstddef>
+#include <utility>
+
+// Kernels that get ready while the one before them ends.
+namespace tandem::gpu {
+
+struct Grid {
+  unsigned blocks, threads;
+  std::size_t shared_bytes;
+  cudaStream_t stream;
+};
+
+#ifdef __CUDACC__
+
+/// Launches a kernel that may get its blocks ready while the one before it in the stream ends, and calls
+/// wait_for_kernel_before() before it reads or writes what other kernels do.
+template <typename... Parameters, typename... Arguments>
+cudaError_t launch_after(const Grid& grid, void (*kernel)(Parameters...), Arguments&&... arguments) {
+  cudaLaunchAttribute early = {};
+  early.id = cudaLaunchAttributeProgrammaticStreamSerialization;
+  early.val.programmaticStreamSerializationAllowed = 1;
+  cudaLaunchConfig_t config = {};
+  config.gridDim = grid.blocks;
+  config.blockDim = grid.threads;
+  config.dynamicSmemBytes = grid.shared_bytes;
+  config.stream = grid.stream;
+  config.attrs = &early;
+  config.numAttrs = 1;
+  return cudaLaunchKernelEx(&config, kernel, std::forward<Arguments>(arguments)...);
+}
+
+/// The blocks of the next kernel may get ready as soon as all of this one have come here.
+__device__ inline void let_next_kernel_begin() {
+#if __CUDA_ARCH__ >= 900
+  asm volatile("griddepcontrol.launch_dependents;" ::: "memory");
+#endif
+}
+
+/// Waits until all that the kernel before did is done and seen.
+__device__ inline void wait_for_kernel_before() {
+  let_next_kernel_begin();
+#if __CUDA_ARCH__ >= 900
+  asm volatile("griddepcontrol.wait;" ::: "memory");
+#endif
+}
+
+#endif
+
+}  // namespace tandem::gpu

@@ -16,8 +16,8 @@ struct GivenBoxes {
     return Status::kOk;
   }
   __device__ void keep(std::uint32_t, const WorldBox&) const {}
-  // Somewhere near the first box.
-  __device__ double near(int axis) const { return boxes[0].lo[axis]; }
+  // Somewhere near the box.
+  __device__ double near(std::uint32_t i, int axis) const { return boxes[i].lo[axis]; }
 };
 
 // They are those of instances, and to be kept.
@@ -37,7 +37,7 @@ struct PosedBoxes {
     return Status::kOk;
   }
   __device__ void keep(std::uint32_t i, const WorldBox& box) const { kept[i] = box; }
-  __device__ double near(int axis) const { return instances.pose[0].translation[axis]; }
+  __device__ double near(std::uint32_t i, int axis) const { return instances.pose[i].translation[axis]; }
 };
 
 // Gets box i for good: says what is wrong with it, and keeps it. Result: whether nothing is.

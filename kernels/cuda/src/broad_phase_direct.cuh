@@ -4,7 +4,7 @@
 
 // Few boxes: each is tested against each, by one kernel that does all.
 //
-// Float32 ends as in the tree, by another monotone function, float(x) = fl32(fl(x - near)): boxes that meet
+// Float32 ends as in the tree, by another monotone function, float(x) = fl32(fl(x - middle)): boxes that meet
 // still do. The few that may meet are decided by float64. Boxes are numbered in tiles of 64, and a task is a
 // pair of tiles.
 namespace tandem {
@@ -22,6 +22,7 @@ constexpr int kFoundBits = 40;
 struct Tiles {
   WorldBox exact[2][kTile];  // of the own tile, of the other
   Node rounded[2][kTile];
+  Node around[kTileWarps];          // the own tile, for each warp
   std::uint32_t count[kTileWarps];  // pairs that a warp found
   unsigned long long begin;         // where the block's pairs go
 };
@@ -42,9 +43,12 @@ class Direct {
   __device__ void run(std::uint32_t task, std::uint32_t end) {
     begin_at(task);
     fetch(0, own_, threadIdx.x / kTile == 1);
+    bool fresh = true;  // the own tile
     for (;;) {
       fetch(1, other_, threadIdx.x / kTile == 0);
       __syncthreads();
+      if (fresh) surround_own();
+      fresh = false;
       const std::uint32_t hits = decided(hits_of_rounded());
       const bool last = ++task == end;
       store(hits, last);
@@ -53,6 +57,7 @@ class Direct {
       other_ = 0;
       ++own_;
       fetch(0, own_, threadIdx.x / kTile == 1);
+      fresh = true;
     }
   }
 
@@ -79,17 +84,42 @@ class Direct {
         static_cast<void>(boxes_.get(i, box));
       }
       for (int k = 0; k < 3; ++k) {
-        node.lo[k] = static_cast<float>(box.lo[k] - boxes_.near(k));
-        node.hi[k] = static_cast<float>(box.hi[k] - boxes_.near(k));
+        const double origin = middle(k);
+        node.lo[k] = static_cast<float>(box.lo[k] - origin);
+        node.hi[k] = static_cast<float>(box.hi[k] - origin);
       }
     }
     tiles_.exact[side][threadIdx.x % kTile] = box;
     tiles_.rounded[side][threadIdx.x % kTile] = node;
   }
 
+  // The median of three boxes: one that has flown away costs the others no resolution. Where it is not
+  // finite, one of them is not in range, and there are no pairs.
+  __device__ double middle(int axis) const {
+    const double a = boxes_.near(0, axis), b = boxes_.near(count_ / 2, axis),
+                 c = boxes_.near(count_ - 1, axis);
+    return fmax(fmin(a, b), fmin(fmax(a, b), c));
+  }
+
+  __device__ void surround_own() {
+    const Node a = tiles_.rounded[0][lane_], b = tiles_.rounded[0][lane_ + kFanOut];
+    Node both = {};
+    for (int k = 0; k < 3; ++k) {
+      both.lo[k] = fminf(a.lo[k], b.lo[k]);
+      both.hi[k] = fmaxf(a.hi[k], b.hi[k]);
+    }
+    both = union_of_warp(both);
+    if (lane_ == 0) tiles_.around[threadIdx.x / kFanOut] = both;
+    __syncwarp();
+  }
+
   // A lane has the own boxes `lane` and `lane + 32`: of these the boxes of the warp's share that they may
   // meet, 16 bits each.
   __device__ std::uint32_t hits_of_rounded() const {
+    // Neighbours in space that are neighbours by number too: most shares are out of the own tile's reach.
+    if (!__any_sync(kAllLanes, may_meet(tiles_.around[threadIdx.x / kFanOut],
+                                        tiles_.rounded[1][share_ + lane_ % kShare])))
+      return 0;
     const Node mine[2] = {tiles_.rounded[0][lane_], tiles_.rounded[0][lane_ + kFanOut]};
     std::uint32_t hits = 0;
 #pragma unroll
@@ -121,9 +151,11 @@ class Direct {
   // Writes the block's pairs; at the end of the last block, the report too.
   __device__ void store(std::uint32_t hits, bool last) {
     std::uint32_t end = count_of(hits);
-    for (std::uint32_t step = 1; step < kFanOut; step *= 2) {
-      const std::uint32_t before = __shfl_up_sync(kAllLanes, end, step);
-      end += lane_ >= step ? before : 0;
+    if (__any_sync(kAllLanes, hits != 0)) {
+      for (std::uint32_t step = 1; step < kFanOut; step *= 2) {
+        const std::uint32_t before = __shfl_up_sync(kAllLanes, end, step);
+        end += lane_ >= step ? before : 0;
+      }
     }
     if (lane_ == kFanOut - 1) tiles_.count[threadIdx.x / kFanOut] = end;
     // Who told of an error is seen to by the fence.

@@ -18,8 +18,6 @@ struct Extents {
   Real lowest[3] = {HUGE_VALL, HUGE_VALL, HUGE_VALL}, highest[3] = {-HUGE_VALL, -HUGE_VALL, -HUGE_VALL};
 
   Real of(int k) const { return highest[k] - lowest[k]; }
-  Real sum() const { return of(0) + of(1) + of(2); }
-  Real area() const { return of(0) * of(1) + of(1) * of(2) + of(2) * of(0); }
 };
 
 Extents extents_of(const std::vector<const Triangle*>& triangles, const std::array<Direction, 3>& axes) {
@@ -91,12 +89,17 @@ class Checker {
     for (const int part : q) ASSERT_LE(std::abs(part), kLargestQuaternionPart);
     ASSERT_NE(q, (Quaternion{0, 0, 0, 0}));
     const auto axes = axes_of(frame_of(walk.rotation));
-    constexpr std::array<Direction, 3> kMesh = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-    Real area = 0, area_of_mesh = 0, lengths = 0;
-    float size = 0;
+    const BlockRotation none = no_rotation();
+    // Along the mesh's own axes nothing is rounded, and boxes are those of the file.
+    const bool turned = walk.rotation.wx != none.wx || walk.rotation.yz != none.yz;
+    Real rim = 0, real_nodes = 0, surface = 0, cost = 0, cost_of_mesh = 0;
+    for (int node = 0; node < kNodesPerBlock && block.kind[node] != NodeKind::imaginary;
+         ++node, ++real_nodes) {
+      for (int k = 0; k < 3; ++k) rim += block.half_extent[k][node] / Real{2};
+    }
+    rim /= real_nodes;
     for (int node = 0; node < kNodesPerBlock; ++node) {
       const float h[3] = {walk.half_extent[0][node], walk.half_extent[1][node], walk.half_extent[2][node]};
-      size = std::max(size, (h[0] + h[1]) + h[2]);
       if (block.kind[node] == NodeKind::imaginary) {
         for (int k = 0; k < 3; ++k) {
           EXPECT_EQ(walk.center[k][node], kImaginaryCenter);
@@ -104,22 +107,30 @@ class Checker {
         }
         continue;
       }
-      const Extents own = extents_of(below[node], axes), of_mesh = extents_of(below[node], kMesh);
-      for (int k = 0; k < 3; ++k) check_interval(own, k, walk.center[k][node], h[k]);
-      area += own.area(), area_of_mesh += of_mesh.area(), lengths += own.sum() + of_mesh.sum();
+      const Extents own = extents_of(below[node], axes);
+      for (int k = 0; k < 3; ++k) {
+        check_interval(own, k, walk.center[k][node], h[k], turned);
+        if (turned) continue;
+        EXPECT_EQ(walk.center[k][node], block.center[k][node]);
+        EXPECT_EQ(h[k], block.half_extent[k][node]);
+      }
+      surface = std::max(surface, (Real{h[0]} * h[1] + Real{h[1]} * h[2]) + Real{h[2]} * h[0]);
+      cost += (h[0] + rim) * (h[1] + rim) * (h[2] + rim);
+      cost_of_mesh += (block.half_extent[0][node] + rim) * (block.half_extent[1][node] + rim) *
+                      (block.half_extent[2][node] + rim);
     }
-    EXPECT_EQ(walk.size, size);
-    // Judged in float32: coordinates to 6 units of roundoff, extents to 13, areas to 26 by as many lengths;
-    // and within its range alone.
-    const Real off = 0x1p-19L * farthest_;
-    if (farthest_ >= 0x1p60L) return;
-    EXPECT_LE(area, area_of_mesh * (1 + 0x1p-18L) + off * lengths + 24 * off * off + 0x1p-120L);
+    // Computed in float32, within whose range alone they mean anything.
+    if (farthest_ >= 0x1p60L || farthest_ <= 0x1p-60L) return;
+    EXPECT_LE(std::fabs(walk.size - std::sqrt(surface)), 1e-5L * std::sqrt(surface) + 0x1p-24L * rim);
+    EXPECT_LE(cost, cost_of_mesh * (1 + 1e-5L));
   }
 
-  void check_interval(const Extents& own, int k, float c, float h) {
-    // Coordinates here are off by less than 2^-61 of their size, and boxes hold 2^-49 of it more.
+  void check_interval(const Extents& own, int k, float c, float h, bool turned) {
+    // Coordinates here are off by less than 2^-61 of their size, and boxes of turned frames hold 2^-49 of it
+    // more.
     const Real below = c - own.lowest[k], above = own.highest[k] - c;
-    EXPECT_LE(std::max(below, above) + 0x1p-60L * farthest_, h + kTiny);
+    EXPECT_LE(std::max(below, above) + (turned ? 0x1p-60L * farthest_ : 0), h + kTiny);
+    if (!turned) return;
     EXPECT_LE(h, own.of(k) / 2 * (1 + 0x1p-21L) + 0x1p-23L * farthest_ + 2 * kTiny);
   }
 

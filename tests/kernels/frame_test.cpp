@@ -130,7 +130,7 @@ bool store(RandomPoses& random, TrianglePair pair, Stored& out) {
 }
 
 struct Tally {
-  long pairs = 0, contacts = 0, decided = 0, seen_apart = 0;
+  long pairs = 0, contacts = 0, decided = 0;
 };
 
 void expect_right(const Stored& stored, Tally& tally) {
@@ -138,10 +138,6 @@ void expect_right(const Stored& stored, Tally& tally) {
   const auto verdicts = frame::decide<true>(framed.a, framed.b, framed.error);
   ++tally.pairs;
   ASSERT_FALSE(verdicts.contact && verdicts.undecided);
-  if (frame::surely_apart(framed.a, framed.b, framed.error)) {
-    ++tally.seen_apart;
-    ASSERT_EQ(decide_exact(framed.posed), Verdict::apart) << text(stored);
-  }
   if (verdicts.undecided) return;
   ASSERT_TRUE(std::isfinite(framed.error));
   ++tally.decided;
@@ -151,10 +147,8 @@ void expect_right(const Stored& stored, Tally& tally) {
 
 void print(const char* name, const Tally& tally) {
   const double pairs = static_cast<double>(tally.pairs), decided = static_cast<double>(tally.decided);
-  std::printf("%-18s %ld pairs, decided %.3f %%, of which contacts %.1f %%; %.3f %% seen apart\n", name,
-              tally.pairs, 100 * decided / pairs,
-              100.0 * static_cast<double>(tally.contacts) / std::max(decided, 1.0),
-              100.0 * static_cast<double>(tally.seen_apart) / pairs);
+  std::printf("%-18s %ld pairs, decided %.3f %%, of which contacts %.1f %%\n", name, tally.pairs,
+              100 * decided / pairs, 100.0 * static_cast<double>(tally.contacts) / std::max(decided, 1.0));
 }
 
 class FrameFamilies : public testing::TestWithParam<TriangleFamily> {};
@@ -308,15 +302,21 @@ Wide volume(const double* p, const double* q, const double* r, const double* s) 
          d[0][2] * (d[1][0] * d[2][1] - d[1][1] * d[2][0]);
 }
 
-/// The volumes that decide() looks at: a plane of a against a corner of b, one of b against a corner of a,
-/// and one of two edges.
-enum class Kind { plane_of_a, plane_of_b, edges };
+/// Volumes: a plane of a against a corner of b, one of b against a corner of a, one of two edges, and those
+/// with one bound for three corners.
+enum class Kind { plane_of_a, plane_of_b, edges, corners_of_b, corners_of_a };
 
 void PrintTo(Kind kind, std::ostream* out) {
-  *out << (kind == Kind::plane_of_a ? "plane_of_a" : kind == Kind::plane_of_b ? "plane_of_b" : "edges");
+  constexpr const char* kNames[] = {"plane_of_a", "plane_of_b", "edges", "corners_of_b", "corners_of_a"};
+  *out << kNames[static_cast<int>(kind)];
 }
 
-/// |computed - exact volume of the images| / bound, for one volume of the given kind; 0 where there is none.
+double share_of_bound(float computed, Wide exact, float bound) {
+  return std::fabs(static_cast<double>(static_cast<Wide>(computed) - exact)) / static_cast<double>(bound);
+}
+
+/// |computed - exact volume of the images| / bound, for one volume of the given kind, or the most of three; 0
+/// where there is none.
 double share_of_bound(const Stored& stored, Kind kind) {
   const Framed framed(stored);
   if (!std::isfinite(framed.error)) return 0;
@@ -339,12 +339,25 @@ double share_of_bound(const Stored& stored, Kind kind) {
       computed = Plane(b[0], b[1], b[2], framed.error).volume(a[0], framed.error);
       exact = volume(pb[0], pb[1], pb[2], pa[0]);
       break;
-    default:
+    case Kind::edges:
       computed = Plane(a[0], b[0], a[1], framed.error).volume(b[1], framed.error);
       exact = volume(pa[0], pb[0], pa[1], pb[1]);
+      break;
+    default: {
+      const frame::Edges<float> edges_a(a), edges_b(b);
+      const auto w = frame::difference(b[0], a[0]);
+      const bool of_b = kind == Kind::corners_of_b;
+      const auto volumes = of_b ? frame::corner_volumes(edges_a, edges_b, w, 1, framed.error)
+                                : frame::corner_volumes(edges_b, edges_a, w, -1, framed.error);
+      double most = 0;
+      for (int i = 0; i < 3; ++i) {
+        exact = of_b ? volume(pa[0], pa[1], pa[2], pb[i]) : volume(pb[0], pb[1], pb[2], pa[i]);
+        most = std::max(most, share_of_bound(volumes.value[i], growth * exact, volumes.bound));
+      }
+      return most;
+    }
   }
-  const Wide error = static_cast<Wide>(computed.value) - growth * exact;
-  return std::fabs(static_cast<double>(error)) / static_cast<double>(computed.bound);
+  return share_of_bound(computed.value, growth * exact, computed.bound);
 }
 
 /// One number changed by a little, or by a lot.
@@ -459,10 +472,12 @@ class FrameBound : public testing::TestWithParam<Kind> {};
 TEST_P(FrameBound, HoldsUnderAttack) {
   const double share = largest_share(GetParam(), test::trials(60, 5), test::trials(3000, 10));
   EXPECT_LT(share, 1);
-  EXPECT_GT(share, 0.5);
+  EXPECT_GT(share, GetParam() >= Kind::corners_of_b ? 0.4 : 0.5);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, FrameBound, testing::Values(Kind::plane_of_a, Kind::plane_of_b, Kind::edges),
+INSTANTIATE_TEST_SUITE_P(All, FrameBound,
+                         testing::Values(Kind::plane_of_a, Kind::plane_of_b, Kind::edges, Kind::corners_of_b,
+                                         Kind::corners_of_a),
                          testing::PrintToStringParamName());
 
 /// Where posing rounds by as much as it can: corners of a go up by half a last bit, one of b down by as much,
@@ -481,7 +496,6 @@ TEST(FrameTest, BoundIsReachedWherePosingRoundsMost) {
   const Framed framed(stored);
   EXPECT_EQ(decide_exact(framed.posed), Verdict::contact);
   EXPECT_TRUE(frame::decide<true>(framed.a, framed.b, framed.error).undecided);
-  EXPECT_FALSE(frame::surely_apart(framed.a, framed.b, framed.error));
 }
 
 /// Without an uphill walk: many more inputs.

@@ -64,11 +64,78 @@ __device__ void count(bool counts, Counter* counter) {
   if (lane_id() == 0 && lanes != 0) atomicAdd(counter, static_cast<Counter>(__popc(lanes)));
 }
 
+/// What other blocks made of it.
+__device__ Counter now(const Counter& counter) {
+  return *static_cast<const volatile Counter*>(&counter);
+}
+
+__device__ void write_report(const QueryArgs& args) {
+  const QueryState& state = *args.state;
+  const Counter contacts = now(state.contacts), exactly = now(state.unresolved),
+                by_float64 = now(state.decided_by_float64);
+  const std::uint32_t pairs = *args.given.count;
+  GpuQueryReport report = {};
+  report.needed = {pairs, contacts, state.undecided};
+  report.complete = pairs <= args.given.capacity && pairs <= args.capacity.pairs &&
+                    contacts <= args.capacity.contacts && state.undecided <= args.capacity.undecided;
+  report.contacts = contacts < args.capacity.contacts ? contacts : args.capacity.contacts;
+  report.world_pairs = state.world_pairs;
+  QueryCounters& counters = report.counters;
+  counters.object_pairs = pair_count(args);
+  counters.block_pairs = state.block_pairs;
+  counters.candidates = state.candidates;
+  counters.decided_by_float64 = by_float64;
+  counters.decided_exactly = exactly;
+  if (args.mode != QueryMode::boxes) counters.decided_by_float32 = state.candidates - by_float64 - exactly;
+  counters.contacts = contacts;
+  if (state.error != 0) {
+    const Counter error = ~state.error;
+    report = {};
+    report.status = static_cast<Status>(error & 0xFFu);
+    report.where = error >> 8 & 0xFFFFFFFFu;
+  }
+  args.state->report = report;
+  *args.host_report = report;
+}
+
+/// What makes the state ready for the next query; the report stays.
+__device__ void clear_mailboxes(QueryState& state) {
+  for (std::uint32_t i = blockIdx.x * kThreads + threadIdx.x; i < kChunks; i += gridDim.x * kThreads) {
+    state.frame.mailbox[i] = state.world.mailbox[i] = 0;
+  }
+}
+__device__ void clear_counters(QueryState& state) {
+  for (Balance* balance : {&state.frame, &state.world}) {
+    balance->active = balance->given = balance->asked = balance->next_pair = 0;
+  }
+  state.error = state.contacts = state.undecided = state.unresolved = 0;
+  state.world_pairs = state.finished_blocks = 0;
+  state.block_pairs = state.candidates = state.decided_by_float64 = 0;
+}
+
+__device__ void finish(const QueryArgs& args) {
+  write_report(args);
+  clear_counters(*args.state);
+}
+
+/// Whether this is the first thread of the block that comes here last, all others being done.
+__device__ bool ends_last(const QueryArgs& args) {
+  __threadfence();
+  __syncthreads();
+  return threadIdx.x == 0 && atomicAdd(&args.state->finished_blocks, 1u) == gridDim.x - 1;
+}
+
+/// Where only boxes are asked for, nothing comes to the float64 stage.
+__host__ __device__ bool has_float64_stage(const QueryArgs& args) {
+  return args.mode != QueryMode::boxes && !args.walk_only;
+}
+
+/// Finishes the query where nothing is left to the exact stage.
 template <bool kFast>
 __global__ void __launch_bounds__(kThreads) decide_by_float64(const __grid_constant__ QueryArgs args) {
   wait_for_kernel_before();
-  if (failed(args)) return;
-  const std::uint32_t total = stored(args.state->undecided, args.capacity.undecided);
+  clear_mailboxes(*args.state);
+  const std::uint32_t total = failed(args) ? 0 : stored(args.state->undecided, args.capacity.undecided);
   for (std::uint32_t first = blockIdx.x * kThreads; first < total; first += gridDim.x * kThreads) {
     const std::uint32_t i = first + threadIdx.x;
     const Candidate candidate = args.undecided[i < total ? i : first];
@@ -88,43 +155,22 @@ __global__ void __launch_bounds__(kThreads) decide_by_float64(const __grid_const
     if (verdict == Verdict::undecided) args.unresolved[place] = candidate;
     add_contact(args, record, candidate, verdict == Verdict::contact);
   }
+  if (!ends_last(args)) return;
+  if (now(args.state->unresolved) == 0)
+    finish(args);
+  else
+    args.state->finished_blocks = 0;
 }
 
-__device__ void write_report(const QueryArgs& args) {
-  const QueryState& state = *args.state;
-  const Counter contacts = *static_cast<const volatile Counter*>(&state.contacts);
-  const Counter exactly = *static_cast<const volatile Counter*>(&state.unresolved);
-  const std::uint32_t pairs = *args.given.count;
-  GpuQueryReport report = {};
-  report.needed = {pairs, contacts, state.undecided};
-  report.complete = pairs <= args.given.capacity && pairs <= args.capacity.pairs &&
-                    contacts <= args.capacity.contacts && state.undecided <= args.capacity.undecided;
-  report.contacts = contacts < args.capacity.contacts ? contacts : args.capacity.contacts;
-  report.world_pairs = state.world_pairs;
-  QueryCounters& counters = report.counters;
-  counters.object_pairs = pair_count(args);
-  counters.block_pairs = state.block_pairs;
-  counters.candidates = state.candidates;
-  counters.decided_by_float64 = state.decided_by_float64;
-  counters.decided_exactly = exactly;
-  if (args.mode != QueryMode::boxes)
-    counters.decided_by_float32 = state.candidates - state.decided_by_float64 - exactly;
-  counters.contacts = contacts;
-  if (state.error != 0) {
-    const Counter error = ~state.error;
-    report = {};
-    report.status = static_cast<Status>(error & 0xFFu);
-    report.where = error >> 8 & 0xFFFFFFFFu;
-  }
-  args.state->report = report;
-  *args.host_report = report;
-  __threadfence_system();
-}
-
-/// The block that ends last writes the report.
+/// Finishes the query where the float64 stage did not.
 __global__ void __launch_bounds__(kThreads) decide_exactly(const __grid_constant__ QueryArgs args) {
   wait_for_kernel_before();
-  const std::uint32_t total = failed(args) ? 0 : static_cast<std::uint32_t>(args.state->unresolved);
+  const auto total = static_cast<std::uint32_t>(args.state->unresolved);
+  if (has_float64_stage(args)) {
+    if (total == 0) return;
+  } else {
+    clear_mailboxes(*args.state);
+  }
   for (std::uint32_t first = blockIdx.x * kThreads; first < total; first += gridDim.x * kThreads) {
     const std::uint32_t i = first + threadIdx.x;
     const Candidate candidate = args.unresolved[i < total ? i : first];
@@ -132,9 +178,7 @@ __global__ void __launch_bounds__(kThreads) decide_exactly(const __grid_constant
     const bool contact = i < total && decide_exact(posed_pair(args, record, candidate)) == Verdict::contact;
     add_contact(args, record, candidate, contact);
   }
-  __threadfence();
-  __syncthreads();
-  if (threadIdx.x == 0 && atomicAdd(&args.state->finished_blocks, 1u) == gridDim.x - 1) write_report(args);
+  if (ends_last(args)) finish(args);
 }
 
 }  // namespace
@@ -145,12 +189,12 @@ cudaError_t decide_rest(const QueryArgs& args, cudaStream_t stream) {
   if (const cudaError_t error = cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device);
       error != cudaSuccess)
     return error;
-  const auto blocks = static_cast<unsigned>(processors) * 4;
+  const Grid grid = {static_cast<unsigned>(processors) * 4, kThreads, 0, stream};
   cudaError_t error = cudaSuccess;
-  if (args.mode != QueryMode::boxes)
-    error = launch_after(args.mode == QueryMode::fast ? decide_by_float64<true> : decide_by_float64<false>,
-                         blocks, kThreads, 0, args, stream);
-  return error == cudaSuccess ? launch_after(decide_exactly, blocks, kThreads, 0, args, stream) : error;
+  if (has_float64_stage(args))
+    error = launch_after(
+        grid, args.mode == QueryMode::fast ? decide_by_float64<true> : decide_by_float64<false>, args);
+  return error == cudaSuccess ? launch_after(grid, decide_exactly, args) : error;
 }
 
 }  // namespace tandem::gpu

@@ -37,6 +37,7 @@ GpuContactQuery& GpuContactQuery::operator=(GpuContactQuery&& other) noexcept {
   std::swap(most_triangles_, other.most_triangles_);
   std::swap(most_faces_, other.most_faces_);
   std::swap(state_, other.state_);
+  std::swap(state_is_clear_, other.state_is_clear_);
   std::swap(chunks_, other.chunks_);
   std::swap(pairs_, other.pairs_);
   std::swap(world_pairs_, other.world_pairs_);
@@ -71,6 +72,7 @@ Status GpuContactQuery::allocate(Element*& out, std::size_t count) {
 void GpuContactQuery::free() {
   free_room();
   free_walk_blocks();
+  state_is_clear_ = false;
   for (void** memory : {&assets_, &state_, &chunks_}) {
     static_cast<void>(cudaFree(std::exchange(*memory, nullptr)));
   }
@@ -101,16 +103,26 @@ void GpuContactQuery::free_sorting() {
   sorted_room_ = sorting_bytes_ = 0;
 }
 
-Status GpuContactQuery::provide_fixed_memory() {
-  if (state_ != nullptr && chunks_ != nullptr && host_report_ != nullptr) return Status::kOk;
-  gpu::QueryState* state = nullptr;
-  gpu::Chunk* chunks = nullptr;
-  Status status = allocate(state, 1);
+Status GpuContactQuery::provide_fixed_memory(cudaStream_t stream) {
+  if (host_report_ != nullptr) return Status::kOk;
+  Status status = Status::kOk;
+  if (state_ == nullptr) {
+    gpu::QueryState* state = nullptr;
+    status = allocate(state, 1);
+    if (status != Status::kOk) return status;
+    state_ = state;
+  }
+  if (chunks_ == nullptr) {
+    gpu::Chunk* chunks = nullptr;
+    status = allocate(chunks, gpu::kChunks);
+    if (status != Status::kOk) return status;
+    chunks_ = chunks;
+  }
+  status = fail(cudaMemsetAsync(state_, 0, sizeof(gpu::QueryState), stream));
+  if (status == Status::kOk)
+    status = fail(cudaMemsetAsync(chunks_, 0, gpu::kChunks * sizeof(gpu::Chunk), stream));
   if (status != Status::kOk) return status;
-  state_ = state;
-  status = allocate(chunks, gpu::kChunks);
-  if (status != Status::kOk) return status;
-  chunks_ = chunks;
+  state_is_clear_ = true;
   void* report = nullptr;
   status = fail(cudaMallocHost(&report, sizeof(GpuQueryReport)));
   if (status != Status::kOk) return status == Status::kOutOfGpuMemory ? Status::kOutOfMemory : status;
@@ -119,7 +131,7 @@ Status GpuContactQuery::provide_fixed_memory() {
 }
 
 Status GpuContactQuery::set_assets(std::span<const GpuAsset> assets, cudaStream_t stream) {
-  Status status = provide_fixed_memory();
+  Status status = provide_fixed_memory(stream);
   if (status != Status::kOk) return status;
   std::uint32_t depth = 1, triangles = 0;
   std::uint64_t faces = 0;
@@ -170,7 +182,8 @@ Status GpuContactQuery::make_walk_blocks(std::span<const GpuAsset> assets, cudaS
   Status status = allocate(number_of, most_blocks);
   for (std::uint32_t i = 0; i < asset_count_ && status == Status::kOk; ++i) {
     status = fail(gpu::make_walk_blocks(static_cast<gpu::Asset*>(assets_) + i, assets[i].tree, first,
-                                        static_cast<gpu::WalkBlock*>(walk_blocks_), file_blocks_, number_of, stream));
+                                        static_cast<gpu::WalkBlock*>(walk_blocks_), file_blocks_, number_of,
+                                        stream));
     first += static_cast<std::uint32_t>(gpu::numbers_of(assets[i].tree));
   }
   if (status == Status::kOk) status = fail(cudaStreamSynchronize(stream));
@@ -262,12 +275,14 @@ Status GpuContactQuery::enqueue(const GpuInstances& instances, const GpuPairs& p
   args.most_blocks = std::min(options.most_blocks, gpu::kChunks);  // a grid never has as many
   args.stack_reserve = 2 * depth_ + 32;                            // see walk.cuh
   args.stack_size = args.stack_reserve + kStackSize;
-  cudaError_t error = cudaMemsetAsync(args.state, 0, sizeof(gpu::QueryState), stream);
+  cudaError_t error = cudaSuccess;
+  if (!state_is_clear_) error = cudaMemsetAsync(args.state, 0, sizeof(gpu::QueryState), stream);
   if (error == cudaSuccess) error = gpu::prepare_pairs(args, stream);
   if (error == cudaSuccess)
     error = (options.mode == QueryMode::exact ? gpu::walk_exact : gpu::walk_unfused)(args, stream);
   if (error == cudaSuccess) error = gpu::walk_world(args, stream);
   if (error == cudaSuccess) error = gpu::decide_rest(args, stream);
+  state_is_clear_ = error == cudaSuccess;
   if (error == cudaSuccess && options.sorted) {
     const gpu::SortingRoom room = {contacts_, order_, sorting_, sorting_bytes_, most_triangles_, most_faces_};
     error = gpu::sort_contacts(args, room, stream);
@@ -298,8 +313,8 @@ const GpuQueryReport* GpuContactQuery::device_report() const {
 }
 
 std::size_t GpuContactQuery::bytes() const {
-  std::size_t bytes = asset_room_ * sizeof(gpu::Asset) + 
-                      block_room_ * (sizeof(gpu::WalkBlock) + sizeof(std::uint32_t));
+  std::size_t bytes =
+      asset_room_ * sizeof(gpu::Asset) + block_room_ * (sizeof(gpu::WalkBlock) + sizeof(std::uint32_t));
   if (state_ != nullptr) bytes += sizeof(gpu::QueryState);
   if (chunks_ != nullptr) bytes += gpu::kChunks * sizeof(gpu::Chunk);
   bytes += capacity_.pairs * (sizeof(gpu::PairRecord) + 2 * sizeof(std::uint32_t));

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "launch.h"
 #include "pair_record.h"
 
 // What the kernels of a query share, all of it in GPU memory.
@@ -20,14 +21,13 @@ struct Chunk {
 inline constexpr std::uint32_t kChunks = 8192;
 
 /// How warps share work: how many have work, the chunks given, the numbers given out to those who wait, the
-/// first object pair that nobody took; and for each number how many block pairs its chunk holds, 0 until
-/// then.
+/// first object pair that nobody took; and mailboxes, see walk.cuh.
 struct alignas(128) Balance {
   std::uint32_t active, given, asked, next_pair;
   alignas(128) std::uint32_t mailbox[kChunks];
 };
 
-/// Zero when a query begins.
+/// Zero when a query begins: cleared by the one before it, the report excepted.
 struct QueryState {
   alignas(128) Counter error;  ///< complement of (what, where, status), 0 where there is none: the first wins
   std::uint32_t world_pairs, finished_blocks;
@@ -36,7 +36,7 @@ struct QueryState {
   alignas(128) Counter undecided;
   alignas(128) Counter unresolved;
   alignas(128) Counter block_pairs;
-  Counter candidates, decided_by_float64, decided_exactly;
+  Counter candidates, decided_by_float64;
   GpuQueryReport report;
 };
 
@@ -55,12 +55,13 @@ struct QueryArgs {
   PairRecord* pairs;
   const WalkBlock* walk_blocks;
   const std::uint32_t* file_blocks;  ///< see make_walk_blocks()
-  std::uint32_t* world_pairs;  ///< pairs that are not in_frame
-  std::uint32_t* met;          ///< of a pair: not 0 once it has a contact; where only the first is asked for
+  std::uint32_t* world_pairs;        ///< pairs that are not in_frame
+  std::uint32_t* met;  ///< of a pair: not 0 once it has a contact; where only the first is asked for
   Contact* contacts;
   Candidate *undecided, *unresolved;
   std::uint32_t stack_size, stack_reserve;  ///< see walk.cuh
   std::uint32_t most_blocks;                ///< of the walk's grid; 0: as many as the GPU holds
+  std::uint32_t mailbox_bits;               ///< they number the mailboxes in use
 };
 
 /// What sorting takes besides args.contacts, which it reads: all of as many contacts.
@@ -107,38 +108,6 @@ cudaError_t sorting_bytes(std::uint64_t contacts, std::size_t& bytes);
 cudaError_t sort_contacts(const QueryArgs& args, const SortingRoom& room, cudaStream_t stream);
 
 #ifdef __CUDACC__
-
-/// Launches a kernel that may get its blocks ready while the one before it in the stream ends, and calls
-/// wait_for_kernel_before() first of all.
-inline cudaError_t launch_after(void (*kernel)(QueryArgs), unsigned blocks, unsigned threads,
-                                std::size_t shared_bytes, const QueryArgs& args, cudaStream_t stream) {
-  cudaLaunchAttribute early = {};
-  early.id = cudaLaunchAttributeProgrammaticStreamSerialization;
-  early.val.programmaticStreamSerializationAllowed = 1;
-  cudaLaunchConfig_t config = {};
-  config.gridDim = blocks;
-  config.blockDim = threads;
-  config.dynamicSmemBytes = shared_bytes;
-  config.stream = stream;
-  config.attrs = &early;
-  config.numAttrs = 1;
-  return cudaLaunchKernelEx(&config, kernel, args);
-}
-
-/// The blocks of the next kernel may get ready as soon as all of this one have come here.
-__device__ inline void let_next_kernel_begin() {
-#if __CUDA_ARCH__ >= 900
-  asm volatile("griddepcontrol.launch_dependents;" ::: "memory");
-#endif
-}
-
-/// Waits until all that the kernel before did is done and seen.
-__device__ inline void wait_for_kernel_before() {
-  let_next_kernel_begin();
-#if __CUDA_ARCH__ >= 900
-  asm volatile("griddepcontrol.wait;" ::: "memory");
-#endif
-}
 
 __device__ inline std::uint32_t pair_count(const QueryArgs& args) {
   const std::uint32_t count = *args.given.count;

@@ -21,7 +21,7 @@ struct alignas(16) WalkBlock {
   float center[3][kNodesPerBlock];
   float half_extent[3][kNodesPerBlock];
   std::uint32_t first_below;  ///< number of the first node's block, or kIsLeafBlock and that of its triangle
-  float size;                 ///< of size_of()
+  float size;                 ///< square root of the surface of the largest box
   BlockRotation rotation;
 };
 static_assert(sizeof(WalkBlock) == 112 && offsetof(WalkBlock, first_below) == 96);

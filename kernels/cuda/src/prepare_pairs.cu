@@ -7,7 +7,7 @@
 namespace tandem::gpu {
 namespace {
 
-constexpr std::uint32_t kThreads = 128;
+constexpr std::uint32_t kThreads = 32;  // few, so that few pairs spread over all multiprocessors
 
 enum What : Counter { kInstance, kPair };  // the CPU's order of checks
 
@@ -62,8 +62,8 @@ __device__ void prepare_pair(const QueryArgs& args, std::uint32_t index) {
   if (record.in_frame == 0) args.world_pairs[atomicAdd(&args.state->world_pairs, 1u)] = index;
 }
 
-__global__ void __launch_bounds__(kThreads) prepare(QueryArgs args) {
-  let_next_kernel_begin();
+__global__ void __launch_bounds__(kThreads) prepare(const __grid_constant__ QueryArgs args) {
+  wait_for_kernel_before();
   const std::uint32_t first = blockIdx.x * kThreads + threadIdx.x, step = gridDim.x * kThreads;
   const std::uint32_t pairs = pair_count(args);
   for (std::uint32_t i = first; i < pairs; i += step) prepare_pair(args, i);
@@ -82,8 +82,7 @@ cudaError_t prepare_pairs(const QueryArgs& args, cudaStream_t stream) {
   if (const cudaError_t error = cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device);
       error != cudaSuccess)
     return error;
-  prepare<<<static_cast<unsigned>(processors) * 8, kThreads, 0, stream>>>(args);
-  return cudaGetLastError();
+  return launch_after({static_cast<unsigned>(processors) * 32, kThreads, 0, stream}, prepare, args);
 }
 
 }  // namespace tandem::gpu

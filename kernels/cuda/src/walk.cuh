@@ -1,5 +1,6 @@
 #pragma once
 #include <algorithm>
+#include <bit>
 
 #include "walk_lane.cuh"
 
@@ -19,10 +20,11 @@ namespace tandem::gpu {
 namespace {
 
 constexpr std::uint32_t kFull = 32;             // block pairs or candidates of a full warp
-constexpr std::uint32_t kMostPairsAtOnce = 16;  // object pairs that a warp takes
+constexpr std::uint32_t kFewestPairsAtOnce = 4, kMostPairsAtOnce = 16;  // object pairs that a warp takes
 constexpr std::uint32_t kFewestToShare = 32;
-constexpr std::uint32_t kMostGifts = 4;
+constexpr std::uint32_t kMostGifts = 3;  // at once
 constexpr std::uint32_t kNobodyLeft = 0xFFFFFFFEu, kNoMore = 0xFFFFFFFFu;  // kNoMore: in a mailbox
+constexpr std::uint32_t kNothing = 0xFFFFFFFFu, kTaken = 0xFFu;
 constexpr std::uint32_t kOutRoom = 64;
 constexpr std::uint32_t kWarpsPerBlock = 16, kBlocksPerProcessor = 1;
 constexpr float kTimesLarger = 4;  // where planes of leaves are worth it, as narrow_phase_walk.h says
@@ -63,6 +65,37 @@ __device__ inline std::uint32_t load_acquire(const std::uint32_t* from) {
   asm volatile("ld.acquire.gpu.global.u32 %0, [%1];" : "=r"(word) : "l"(from) : "memory");
   return word;
 }
+/// Without the order of an acquire, which empties the L1 cache every time.
+__device__ inline std::uint32_t load_relaxed(const std::uint32_t* from) {
+  std::uint32_t word;
+  asm volatile("ld.relaxed.gpu.global.u32 %0, [%1];" : "=r"(word) : "l"(from) : "memory");
+  return word;
+}
+/// The value before.
+__device__ inline std::uint32_t subtract_release(std::uint32_t* from, std::uint32_t amount) {
+  std::uint32_t before;
+  asm volatile("atom.add.release.gpu.global.u32 %0, [%1], %2;" : "=r"(before) : "l"(from), "r"(0u - amount) : "memory");
+  return before;
+}
+/// Entries that warps give to each other: all 16 bytes at once, so that they need no order with anything else.
+__device__ inline void store_entry(uint4* to, const uint4& entry) {
+  const std::uint64_t low = std::uint64_t{entry.y} << 32 | entry.x, high = std::uint64_t{entry.w} << 32 | entry.z;
+  asm volatile("{.reg .b128 all; mov.b128 all, {%1, %2}; st.relaxed.gpu.global.b128 [%0], all;}" ::"l"(to),
+               "l"(low), "l"(high)
+               : "memory");
+}
+__device__ inline uint4 load_entry(const uint4* from) {
+  std::uint64_t low, high;
+  asm volatile("{.reg .b128 all; ld.relaxed.gpu.global.b128 all, [%2]; mov.b128 {%0, %1}, all;}"
+               : "=l"(low), "=l"(high)
+               : "l"(from)
+               : "memory");
+  return {static_cast<std::uint32_t>(low), static_cast<std::uint32_t>(low >> 32),
+          static_cast<std::uint32_t>(high), static_cast<std::uint32_t>(high >> 32)};
+}
+__device__ inline void store_relaxed(std::uint32_t* to, std::uint32_t word) {
+  asm volatile("st.relaxed.gpu.global.u32 [%0], %1;" ::"l"(to), "r"(word) : "memory");
+}
 __device__ inline void store_release(std::uint32_t* to, std::uint32_t word) {
   asm volatile("st.release.gpu.global.u32 [%0], %1;" ::"l"(to), "r"(word) : "memory");
 }
@@ -102,10 +135,10 @@ __device__ inline std::uint32_t position_of(std::uint32_t positions, std::uint32
   return (word >> 3 * (high ? rank - in_low : rank) & 7u) | (high ? 8 : 0);
 }
 
-/// The shared memory of one warp, in words: contacts that wait, candidates that wait for the whole test, what
-/// was last seen of Balance, the stack.
+/// The shared memory of one warp, in words: contacts that wait, the number of the mailbox that the warp has
+/// not given back, what was last seen of Balance, the stack.
 __host__ __device__ constexpr std::uint32_t warp_words(std::uint32_t size) {
-  return 5 * kOutRoom + 3 * kOutRoom + 4 + 4 * size;
+  return 5 * kOutRoom + 4 + 4 + 4 * size;
 }
 constexpr std::uint32_t kSharedWords = 256;  // of all warps of a block: positions
 
@@ -122,6 +155,7 @@ class Walk {
     lane_ = load_shared(memory + 4 * (threadIdx.x % 32));
     stack_ = load_shared(memory + 128);
     __syncwarp();
+    if (lane_ == 0) store_shared(held(), kNothing);
   }
 
   __device__ void run() {
@@ -131,16 +165,11 @@ class Walk {
     // The first without asking.
     const std::uint32_t share = share_of(pairs);
     more_input_ = share * warps() < pairs;
-    put_pairs(share * (blockIdx.x * kWarpsPerBlock + threadIdx.x / 32), share, pairs);
+    put_pairs(share * (threadIdx.x / 32 * gridDim.x + blockIdx.x), share, pairs);
     for (;;) {
       // Each of these is called in one place: the code is to stay small, for the caches of instructions.
       const std::uint32_t least = waiting_ == 0 && !more_input_ ? 1 : kFull;
-      while (candidates_ >= least || open_count_ >= least) {
-        if (candidates_ >= least && open_count_ < kFull)
-          settle(candidates_ < kFull ? candidates_ : kFull);
-        else
-          judge_open(open_count_ < kFull ? open_count_ : kFull);
-      }
+      while (candidates_ >= least) settle(candidates_ < kFull ? candidates_ : kFull);
       if (waiting_ < kFull && more_input_) take_pairs();
       if (waiting_ != 0)
         step();
@@ -155,8 +184,8 @@ class Walk {
  private:
   __device__ std::uint32_t lanes_below() const { return (1u << lane_) - 1; }
   __device__ std::uint32_t out() const { return stack_ - 4 * warp_words(0); }
-  __device__ std::uint32_t open() const { return out() + 4 * 5 * kOutRoom; }
   __device__ std::uint32_t seen() const { return stack_ - 16; }  ///< active, given, asked, next_pair
+  __device__ std::uint32_t held() const { return stack_ - 32; }
 
   __device__ std::uint32_t input() const {
     return Means::kWorld ? args_.state->world_pairs : pair_count(args_);
@@ -180,7 +209,7 @@ class Walk {
   /// How many object pairs each warp begins with.
   __device__ static std::uint32_t share_of(std::uint32_t pairs) {
     const std::uint32_t share = pairs / warps();
-    return share < 1 ? 1 : share < kMostPairsAtOnce ? share : kMostPairsAtOnce;
+    return min(max(share, kFewestPairsAtOnce), kMostPairsAtOnce);
   }
 
   /// Takes a few of the other object pairs, fewer as they run out. next_pair counts these.
@@ -288,7 +317,7 @@ class Walk {
       if ((taken.entry.z & kSelf) != 0 && now.a == now.b)
         hits &= leaf_a ? kNodePairsAbove : kNodePairsAbove | kNodePairsEqual;
       // The larger of two alone; of a leaf block and another, the other.
-      const float times = leaf_a != leaf_b ? kTimesLarger : kDescendsAlone;
+      const float times = leaf_a != leaf_b ? kTimesLarger : Means::kDescends;
       const bool larger_a = side_a.size > times * side_b.size,
                  larger_b = side_b.size > times * side_a.size;
       if (leaf_a != leaf_b && (leaf_a ? larger_a : larger_b) && hits != 0)
@@ -340,46 +369,12 @@ class Walk {
     __syncwarp();
   }
 
-  /// Decides the last candidates, or leaves what is not seen to be apart at once for a full warp; count
-  /// <= 32.
+  /// Decides the last candidates; count <= 32.
   __device__ void settle(std::uint32_t count) {
     const Taken taken = take<1>(count, stack_ + 16 * (args_.stack_size - leaf_pairs_), leaf_pairs_);
     candidates_ -= count;
     candidates_seen_ += taken.mine;
-    const std::uint32_t a = taken.entry.y + taken.bit / 4, b = taken.entry.z + taken.bit % 4;
-    if constexpr (Means::kScreens)
-      screen(taken.mine, taken.entry.x, a, b);
-    else
-      judge(taken.mine, taken.entry.x, a, b);
-  }
-
-  __device__ void screen(bool mine, std::uint32_t pair, std::uint32_t a, std::uint32_t b) {
-    bool left = false;
-    if (mine) left = !Means::apart(args_.pairs[pair], a, b);
-    const std::uint32_t lanes = __ballot_sync(kAllLanes, left);
-    if (left) {
-      const std::uint32_t at = open() + 4 * (open_count_ + __popc(lanes & lanes_below()));
-      store_shared(at, pair);
-      store_shared(at + 4 * kOutRoom, a);
-      store_shared(at + 8 * kOutRoom, b);
-    }
-    open_count_ += __popc(lanes);
-    __syncwarp();
-  }
-
-  /// Decides the last of the candidates that are left; count <= 32.
-  __device__ void judge_open(std::uint32_t count) {
-    open_count_ -= count;
-    const std::uint32_t at = open() + 4 * (open_count_ + lane_);
-    const bool mine = lane_ < count;
-    std::uint32_t pair = 0, a = 0, b = 0;
-    if (mine) {
-      pair = load_shared(at);
-      a = load_shared(at + 4 * kOutRoom);
-      b = load_shared(at + 8 * kOutRoom);
-    }
-    __syncwarp();
-    judge(mine, pair, a, b);
+    judge(taken.mine, taken.entry.x, taken.entry.y + taken.bit / 4, taken.entry.z + taken.bit % 4);
   }
 
   __device__ void judge(bool mine, std::uint32_t pair, std::uint32_t a, std::uint32_t b) {
@@ -447,42 +442,71 @@ class Walk {
     number = __shfl_sync(kAllLanes, number, 0);
     std::uint32_t count = height_ / (gifts + 1);
     count = count < kFull ? count : kFull;
-    for (std::uint32_t i = 0; i < gifts; ++i) give((number + i) % kChunks, count);
+    for (std::uint32_t i = 0; i < gifts; ++i) give(number + i, count);
   }
 
-  /// kChunks numbers ago the chunk and its mailbox served another warp, which has that number, and empties
-  /// the mailbox when it is done with the chunk. At least twice as many entries are there as are given.
-  __device__ void give(std::uint32_t chunk, std::uint32_t count) {
-    std::uint32_t* const mailbox = &balance_.mailbox[chunk];
-    if (lane_ == 0) {
-      while (load_acquire(mailbox) != 0) {
+  /// Numbers take the mailboxes in turn. A mailbox tells which turn it serves, and of the number of that turn
+  /// how many entries it got, or kTaken once these were taken out; 0 before the first.
+  __device__ std::uint32_t place_of(std::uint32_t number) const {
+    return number & ((1u << args_.mailbox_bits) - 1);
+  }
+  __device__ std::uint32_t turn_of(std::uint32_t number) const { return number >> args_.mailbox_bits; }
+
+  /// Gives back the mailbox of the last gift, and the chunk with it. By lane 0: not when the gift is received,
+  /// because the fence takes as long as a hundred instructions, but when the warp is idle again.
+  __device__ void give_back() const {
+    const std::uint32_t number = load_shared(held());
+    if (number == kNothing) return;
+    store_release(&balance_.mailbox[place_of(number)], turn_of(number) << 8 | kTaken);
+    store_shared(held(), kNothing);
+  }
+
+  /// Where another number had the mailbox before, the warp with that number gives it back. So does this warp
+  /// before it waits for that: then none waits for another in a circle. At least twice as many entries are
+  /// there as are given.
+  __device__ void give(std::uint32_t number, std::uint32_t count) {
+    std::uint32_t* const mailbox = &balance_.mailbox[place_of(number)];
+    if (turn_of(number) != 0) {
+      if (lane_ == 0) {
+        give_back();
+        while (load_acquire(mailbox) != ((turn_of(number) - 1) << 8 | kTaken)) {
+        }
       }
+      __syncwarp();
     }
-    __syncwarp();
     height_ -= count;
     std::uint32_t bits = 0;
     if (lane_ < count) {
       const uint4 entry = load_shared4(stack_ + 16 * lane_);
       bits = __popc(entry.w & 0xFFFFu);
-      args_.chunks[chunk].entry[lane_] = entry;
+      store_entry(&args_.chunks[place_of(number)].entry[lane_], entry);
       // The newest fill the gap.
       store_shared4(stack_ + 16 * lane_, load_shared4(stack_ + 16 * (height_ + lane_)));
     }
     waiting_ -= __reduce_add_sync(kAllLanes, bits);
     __syncwarp();
-    if (lane_ == 0) store_release(mailbox, count);
+    if (lane_ == 0) store_relaxed(mailbox, turn_of(number) << 8 | count);
+  }
+
+  /// How many entries a mailbox has for the number of this turn, or kNoMore.
+  __device__ static std::uint32_t gift_in(std::uint32_t word, std::uint32_t turn) {
+    if (word == kNoMore) return kNoMore;
+    return word >> 8 == turn ? word & 0xFFu : 0;
   }
 
   /// Asks for entries that another warp gives away, and waits. False: no warp has any left.
   __device__ bool wait_for_gift() {
     std::uint32_t number = 0, count = 0;
     if (lane_ == 0) {
-      number = atomicAdd(&balance_.asked, 1u) % kChunks;
-      __threadfence();
-      if (atomicSub(&balance_.active, 1u) == 1)
+      give_back();
+      number = atomicAdd(&balance_.asked, 1u);
+      // Nobody sees that this warp is no longer active before its number is given out.
+      if (subtract_release(&balance_.active, 1) == 1) {
         count = kNobodyLeft;
-      else
-        while ((count = load_acquire(&balance_.mailbox[number])) == 0) __nanosleep(100);
+      } else {
+        const std::uint32_t* const mailbox = &balance_.mailbox[place_of(number)];
+        while ((count = gift_in(load_relaxed(mailbox), turn_of(number))) == 0) __nanosleep(100);
+      }
     }
     number = __shfl_sync(kAllLanes, number, 0);
     count = __shfl_sync(kAllLanes, count, 0);
@@ -490,14 +514,20 @@ class Walk {
     if (count >= kNobodyLeft) return false;
     std::uint32_t bits = 0;
     if (lane_ < count) {
-      const uint4 entry = __ldcg(&args_.chunks[number].entry[lane_]);
+      // The number may be there before the entries are, each of which has a bit.
+      uint4* const from = &args_.chunks[place_of(number)].entry[lane_];
+      uint4 entry;
+      do {
+        entry = load_entry(from);
+      } while (entry.w == 0);
+      store_entry(from, {0, 0, 0, 0});
       store_shared4(stack_ + 16 * lane_, entry);
       bits = __popc(entry.w & 0xFFFFu);
     }
     height_ = count;
     waiting_ = __reduce_add_sync(kAllLanes, bits);
+    if (lane_ == 0) store_shared(held(), number);
     __syncwarp();
-    if (lane_ == 0) store_release(&balance_.mailbox[number], 0);
     return true;
   }
 
@@ -505,10 +535,11 @@ class Walk {
   /// received. A warp that starts late turns active, finds nothing, and, when none else is active, comes
   /// here.
   __device__ void end_all() {
+    __threadfence();
     const std::uint32_t given = *static_cast<volatile std::uint32_t*>(&balance_.given),
                         asked = *static_cast<volatile std::uint32_t*>(&balance_.asked);
     for (std::uint32_t i = given + lane_; i < asked; i += 32) {
-      *static_cast<volatile std::uint32_t*>(&balance_.mailbox[i % kChunks]) = kNoMore;
+      *static_cast<volatile std::uint32_t*>(&balance_.mailbox[place_of(i)]) = kNoMore;
     }
   }
 
@@ -520,7 +551,7 @@ class Walk {
   std::uint32_t rounds_ = 0;
   std::uint32_t height_ = 0, leaf_pairs_ = 0;   // entries
   std::uint32_t waiting_ = 0, candidates_ = 0;  // their bits
-  std::uint32_t open_count_ = 0, out_count_ = 0;
+  std::uint32_t out_count_ = 0;
   std::uint32_t block_pairs_ = 0, candidates_seen_ = 0;  // of this lane
   bool more_input_ = true;
 };
@@ -554,9 +585,15 @@ cudaError_t launch_walk(const QueryArgs& args, cudaStream_t stream) {
   if (error == cudaSuccess)
     error = cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel, 32 * kWarpsPerBlock, bytes);
   if (error != cudaSuccess) return error;
-  blocks = std::min(blocks * processors, static_cast<int>(kChunks / 2 / kWarpsPerBlock));
+  // Each warp gives at most kMostGifts after what it saw last, so no more than that are given ahead of those
+  // who ask, and a number's mailbox was always asked for before.
+  constexpr std::uint32_t kGiftsPerBlock = kMostGifts * kWarpsPerBlock;
+  blocks = std::min(blocks * processors, static_cast<int>(kChunks / kGiftsPerBlock));
   if (args.most_blocks != 0) blocks = std::min(blocks, static_cast<int>(args.most_blocks));
-  return launch_after(kernel, static_cast<unsigned>(blocks), 32 * kWarpsPerBlock, bytes, args, stream);
+  QueryArgs with_mailboxes = args;
+  with_mailboxes.mailbox_bits =
+      static_cast<std::uint32_t>(std::bit_width(static_cast<std::uint32_t>(blocks) * kGiftsPerBlock - 1));
+  return launch_after({static_cast<unsigned>(blocks), 32 * kWarpsPerBlock, bytes, stream}, kernel, with_mailboxes);
 }
 
 }  // namespace

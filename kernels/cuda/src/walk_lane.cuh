@@ -179,9 +179,8 @@ template <QueryMode kMode, bool kWalksOnly = false>
 struct InFrame {
   static constexpr bool kWorld = false;
   static constexpr bool kCountsOnly = kWalksOnly;  ///< candidates are counted, none decided
-  static constexpr bool kScreens =
-      kMode == QueryMode::exact;  ///< most candidates are cheaply seen to be apart
   static constexpr bool kBounded = kMode == QueryMode::exact;
+  static constexpr float kDescends = kBounded ? 1.75f : kDescendsAlone;  ///< by a Side's size
 
   /// a, b: numbers of walk blocks.
   __device__ static std::uint32_t test(const QueryArgs& args, const PairRecord& record, std::uint32_t a,
@@ -229,12 +228,6 @@ struct InFrame {
     return left;
   }
 
-  /// frame::surely_apart().
-  __device__ static bool apart(const PairRecord& record, std::uint32_t a, std::uint32_t b) {
-    const Framed framed = in_frame(record, a, b);
-    return frame::surely_apart(framed.a, framed.b, __ldg(&record.frame_error));
-  }
-
   __device__ static Judged judge(const PairRecord& record, std::uint32_t a, std::uint32_t b) {
     Judged out = {record.triangles_a[a].corner[0].w, record.triangles_b[b].corner[0].w, true, false};
     if constexpr (kMode == QueryMode::boxes) return out;
@@ -270,8 +263,8 @@ struct InFrame {
 template <QueryMode kMode>
 struct InWorld {
   static constexpr bool kWorld = true;
+  static constexpr float kDescends = kDescendsAlone;
   static constexpr bool kCountsOnly = false;
-  static constexpr bool kScreens = false;
 
   __device__ static WorldBox box(const Pose& pose, const Block& block, int node) {
     double lower[3], upper[3];

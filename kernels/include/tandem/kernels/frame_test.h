@@ -188,16 +188,101 @@ struct Sides {
   }
 };
 
-template <typename Value, bool kBounded>
-TANDEM_HD inline auto sides_of(const Plane<Value, kBounded>& plane, const Point<Value> (&t)[3], float error) {
-  using Mask = decltype(less(plane.normal_size, plane.normal_size));
+/// Signs as computed.
+template <typename Value>
+TANDEM_HD inline auto sides_of(const Plane<Value, false>& plane, const Point<Value> (&t)[3]) {
+  using Mask = decltype(less(plane.normal[0], plane.normal[0]));
   Sides<Mask> sides;
   for (int i = 0; i < 3; ++i) {
-    const Volume<Value> v = plane.volume(t[i], error);
-    sides.above[i] = less(v.bound, v.value);
-    sides.below[i] = less(v.value, -v.bound);
+    const Value v = plane.volume(t[i], 0).value;
+    sides.above[i] = less(Value{}, v);
+    sides.below[i] = less(v, Value{});
   }
   return sides;
+}
+
+/// Two edges of a triangle from its first corner, and their sums of magnitudes: the larger, and both.
+template <typename Value>
+struct Edges {
+  Point<Value> of[2];
+  Value larger_size, both_sizes;
+
+  TANDEM_HD explicit Edges(const Point<Value> (&t)[3]) : of{difference(t[1], t[0]), difference(t[2], t[0])} {
+    const Value size[2] = {sum_of_magnitudes(of[0].x), sum_of_magnitudes(of[1].x)};
+    larger_size = larger(size[0], size[1]);
+    both_sizes = size[0] + size[1];
+  }
+};
+
+/// Three volumes, and a bound of the errors of all.
+template <typename Value>
+struct CornerVolumes {
+  Value value[3], bound;
+};
+
+/// volume() of the plane of one triangle and the corners of the other. sign * w: from the plane's first
+/// corner to the other triangle's.
+///
+/// **Proof.** As above, with e = 2E + u m and m the larger of |p~|_1 and |q~|_1, of the plane's edges p and
+/// q, whose sum is S. A component of p x q is off by at most e (|p_i| + |p_j| + |q_i| + |q_j|) + 2 e^2 <= S e
+/// + 2 e^2 for its factors and by 2.01 u |p|_1 |q|_1 <= 0.503 u S^2 for its rounding: nu = S (e + 0.51 u S) +
+/// 2 e^2. Let d_0 = 0 and d_1, d_2 be the other triangle's edges, F >= |w|_1 + |d_i|_1. In w~ + d~_i the
+/// corner that both start from cancels, so the sum is off by at most E + 1.001 u (|w~_k| + |d~_k|) in
+/// coordinate k; n~ by nu; and the sum of at most six products, taken one after another, by 6.1 u |n~|_1 F.
+/// Together at most
+///
+///     |n~|_1 (E + 8 u F) + nu (F + 3 E),
+///
+/// which is what the code computes; 1.001 and the underflow as there.
+template <typename Value>
+TANDEM_HD inline CornerVolumes<Value> corner_volumes(const Edges<Value>& plane, const Edges<Value>& other,
+                                                     const Point<Value>& w, float sign, float error) {
+  constexpr float kU = 0x1p-24f, kUnderflow = 0x1p-80f;
+  Value n[3];
+  for (int k = 0; k < 3; ++k) {
+    const int i = (k + 1) % 3, j = (k + 2) % 3;
+    n[k] = plane.of[0].x[i] * plane.of[1].x[j] - plane.of[0].x[j] * plane.of[1].x[i];
+  }
+  const Value far = sum_of_magnitudes(w.x) + other.larger_size;
+  const Value e = kU * plane.larger_size + 2 * error;
+  const Value normal_error = plane.both_sizes * (e + 0.51f * kU * plane.both_sizes) + 2 * (e * e);
+  const Value bound =
+      1.001f * (sum_of_magnitudes(n) * (8 * kU * far + error) + normal_error * (far + 3 * error)) +
+      kUnderflow;
+  const Value at = sign * ((n[0] * w.x[0] + n[1] * w.x[1]) + n[2] * w.x[2]);
+  const auto along = [&](const Point<Value>& d) {
+    return ((at + n[0] * d.x[0]) + n[1] * d.x[1]) + n[2] * d.x[2];
+  };
+  return {{at, along(other.of[0]), along(other.of[1])}, bound};
+}
+
+template <typename Value>
+TANDEM_HD inline auto sides_of(const CornerVolumes<Value>& volumes) {
+  using Mask = decltype(less(volumes.bound, volumes.bound));
+  Sides<Mask> sides;
+  for (int i = 0; i < 3; ++i) {
+    sides.above[i] = less(volumes.bound, volumes.value[i]);
+    sides.below[i] = less(volumes.value[i], -volumes.bound);
+  }
+  return sides;
+}
+
+/// sides_of() b's corners of a's plane, and a's of b's.
+template <bool kBounded, typename Value>
+TANDEM_HD inline auto sides_of_both(const Point<Value> (&a)[3], const Point<Value> (&b)[3], float error) {
+  using Mask = decltype(less(a[0].x[0], a[0].x[0]));
+  struct Both {
+    Sides<Mask> of_b, of_a;
+  };
+  if constexpr (!kBounded) {
+    return Both{sides_of(Plane<Value, false>(a[0], a[1], a[2], 0), b),
+                sides_of(Plane<Value, false>(b[0], b[1], b[2], 0), a)};
+  } else {
+    const Edges<Value> edges_a(a), edges_b(b);
+    const Point<Value> w = difference(b[0], a[0]);
+    return Both{sides_of(corner_volumes(edges_a, edges_b, w, 1.0f, error)),
+                sides_of(corner_volumes(edges_b, edges_a, w, -1.0f, error))};
+  }
 }
 
 /// The corners with the lone one first, as they go round.
@@ -224,9 +309,8 @@ struct Verdicts {
 template <bool kBounded, typename Value>
 TANDEM_HD inline auto decide(const Point<Value> (&a)[3], const Point<Value> (&b)[3], float error) {
   using PlaneOf = Plane<Value, kBounded>;
-  const PlaneOf plane_a(a[0], a[1], a[2], error), plane_b(b[0], b[1], b[2], error);
-  const auto sides_of_b = sides_of(plane_a, b, error);
-  const auto sides_of_a = sides_of(plane_b, a, error);
+  const auto sides = sides_of_both<kBounded>(a, b, error);
+  const auto &sides_of_a = sides.of_a, &sides_of_b = sides.of_b;
   using Mask = decltype(sides_of_a.strictly_one());
   const Mask possible = !(sides_of_b.strictly_one() | sides_of_a.strictly_one());
   const Mask certain = sides_of_a.all_certain() & sides_of_b.all_certain();
@@ -234,9 +318,9 @@ TANDEM_HD inline auto decide(const Point<Value> (&a)[3], const Point<Value> (&b)
   Point<Value> oa[3], ob[3];
   lone_first(a, sides_of_a, oa);
   lone_first(b, sides_of_b, ob);
-  const auto lone_below = [](const Sides<Mask>& sides) {
-    const Mask first = sides.alone(0), second = sides.alone(1), third = !(first | second);
-    return (first & sides.below[0]) | (second & sides.below[1]) | (third & sides.below[2]);
+  const auto lone_below = [](const Sides<Mask>& of) {
+    const Mask first = of.alone(0), second = of.alone(1), third = !(first | second);
+    return (first & of.below[0]) | (second & of.below[1]) | (third & of.below[2]);
   };
   const Mask turned_a = lone_below(sides_of_b), turned_b = lone_below(sides_of_a);
   const Mask exchange = turned_a ^ turned_b;
@@ -251,51 +335,6 @@ TANDEM_HD inline auto decide(const Point<Value> (&a)[3], const Point<Value> (&b)
   verdicts.contact = possible & certain & meet;
   verdicts.undecided = possible & !(certain & (apart | meet));
   return verdicts;
-}
-
-/// Whether the plane of one triangle has the other strictly on one side, for sure: then decide(), which costs
-/// three times as much, would say apart. Takes what decide() takes; may say no where decide() says apart.
-///
-/// **Proof.** As at decide()'s, with one bound for the volumes of all three corners. Let m be at least the
-/// components of the plane's two edges, d_0 = 0 and d_1, d_2 the other triangle's edges, F >= |w|_1 +
-/// |d_i|_1. The vector w~ + d~_i is off by at most E + 1.001 u (|w~_k| + |d~_k|) in coordinate k, n~ by nu;
-/// and the sum of at most six products, taken one after another, by 6.1 u |n~|_1 F. Together at most
-///
-///     |n~|_1 (E + 8 u F) + nu (F + 3 E),
-///
-/// with 1.001 and 2^-80 to spare as there. Where E is infinite the bound is infinite or NaN: no.
-template <typename Value>
-TANDEM_HD inline auto surely_apart(const Point<Value> (&a)[3], const Point<Value> (&b)[3], float error) {
-  constexpr float kU = 0x1p-24f, kUnderflow = 0x1p-80f;
-  const Point<Value> edges_a[2] = {difference(a[1], a[0]), difference(a[2], a[0])};
-  const Point<Value> edges_b[2] = {difference(b[1], b[0]), difference(b[2], b[0])};
-  const Point<Value> w = difference(b[0], a[0]);
-  const Value size_a = larger(sum_of_magnitudes(edges_a[0].x), sum_of_magnitudes(edges_a[1].x));
-  const Value size_b = larger(sum_of_magnitudes(edges_b[0].x), sum_of_magnitudes(edges_b[1].x));
-  const Value apart = sum_of_magnitudes(w.x);
-  const auto one_sided = [&](const Point<Value>(&plane)[2], const Point<Value>(&other)[2], Value m, Value far,
-                             float sign) {
-    Value n[3];
-    for (int k = 0; k < 3; ++k) {
-      const int i = (k + 1) % 3, j = (k + 2) % 3;
-      n[k] = plane[0].x[i] * plane[1].x[j] - plane[0].x[j] * plane[1].x[i];
-    }
-    const Value e = kU * m + 2 * error;
-    const Value normal_error = 4 * (m * (kU * m + e)) + 2 * (e * e);
-    const Value bound =
-        1.001f * (sum_of_magnitudes(n) * (8 * kU * far + error) + normal_error * (far + 3 * error)) +
-        kUnderflow;
-    const Value v = (n[0] * w.x[0] + n[1] * w.x[1]) + n[2] * w.x[2];
-    for (int k = 0; k < 3; ++k) n[k] = sign * n[k];
-    const auto along = [&](const Point<Value>& d) {
-      return ((v + n[0] * d.x[0]) + n[1] * d.x[1]) + n[2] * d.x[2];
-    };
-    const Value v1 = along(other[0]), v2 = along(other[1]);
-    return (less(bound, v) & less(bound, v1) & less(bound, v2)) |
-           (less(v, -bound) & less(v1, -bound) & less(v2, -bound));
-  };
-  return one_sided(edges_a, edges_b, size_a, apart + size_b, 1.0f) |
-         one_sided(edges_b, edges_a, size_b, apart + size_a, -1.0f);
 }
 
 }  // namespace frame

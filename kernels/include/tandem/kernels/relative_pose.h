@@ -80,9 +80,9 @@ TANDEM_HD inline void invert(const double (&r)[3][3], double (&out)[3][3]) {
       out[j][i] = r[i1][j1] * r[i2][j2] - r[i1][j2] * r[i2][j1];
     }
   }
-  const double determinant = r[0][0] * out[0][0] + r[0][1] * out[1][0] + r[0][2] * out[2][0];
+  const double factor = 1 / (r[0][0] * out[0][0] + r[0][1] * out[1][0] + r[0][2] * out[2][0]);
   for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) out[i][j] /= determinant;
+    for (int j = 0; j < 3; ++j) out[i][j] *= factor;
   }
 }
 

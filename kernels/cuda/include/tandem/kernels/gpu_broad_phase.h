@@ -45,9 +45,9 @@ struct GpuBroadPhaseReport {
 /// time: enqueue the next on the same stream, or after it; several objects side by side.
 ///
 /// Few boxes are tested each against each, by one kernel that poses them too. Many are sorted by class of
-/// size, then along a space-filling curve, and grouped by 32 into a tree of fan-out 32. One warp takes a group
-/// and walks the part of the tree that lies behind it, so a pair is found once, by the smaller box: one huge
-/// box among many small ones costs each of them a test. O(n log n) for boxes of bounded overlap.
+/// size, then along a space-filling curve, and grouped by 32 into a tree of fan-out 32. One warp takes a
+/// group and walks the part of the tree that lies behind it, so a pair is found once, by the smaller box: one
+/// huge box among many small ones costs each of them a test. O(n log n) for boxes of bounded overlap.
 class GpuBroadPhase {
  public:
   GpuBroadPhase();

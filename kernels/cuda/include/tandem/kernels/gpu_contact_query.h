@@ -115,7 +115,7 @@ class GpuContactQuery {
   Status fail(cudaError_t error);
   template <typename Element>
   Status allocate(Element*& out, std::size_t count);
-  Status provide_fixed_memory();
+  Status provide_fixed_memory(cudaStream_t stream);
   Status make_walk_blocks(std::span<const GpuAsset> assets, cudaStream_t stream);
   Status reserve_sorting();
 
@@ -127,6 +127,7 @@ class GpuContactQuery {
   std::uint32_t* file_blocks_ = nullptr;
   std::size_t block_room_ = 0;
   void* state_ = nullptr;
+  bool state_is_clear_ = false;  // a query that ends leaves it so
   void* chunks_ = nullptr;
   void* pairs_ = nullptr;
   std::uint32_t* world_pairs_ = nullptr;

@@ -13,10 +13,11 @@
 ///
 /// **Proof.** Let X be the posed float64 points that a query is about, and T(X) = n (X - t_a), n being the
 /// float64 inverse of a's rotation that relative_pose() works with. T is affine and det n > 0 for rigid
-/// poses, so a volume of posed points has the sign of the volume of their images. The slack along a's axes
-/// bounds, in each coordinate, how far the image of a corner of a is from the corner as stored, plus how far
-/// that of a corner of b is from box_terms::posed_center() of it (docs/box_test.md), with 1.001 and 2^-88 to
-/// spare. Let E be the largest of the three.
+/// poses, so a volume of posed points has the sign of the volume of their images. The slack along a's axes,
+/// 1.001 (s_i + epsilon_i + 4.1 u tau_i) + 2^-88 in docs/box_test.md, has s_i, which bounds how far the image
+/// of a corner of a is from the corner as stored, plus how far that of one of b is from posed exactly by what
+/// float32 keeps of the pose; epsilon_i, which bounds how far box_terms::posed_center() is from that; and a
+/// part for boxes alone. Let E be the largest of the three without that part, with 1.001 and 2^-88 to spare.
 ///
 /// Let u = 2^-24 and ~ mark what is computed. A difference x~ of two corners of one mesh is off by at most e
 /// = 2E + u m, where m is at least its magnitude; of corners of different meshes by E + u |x~|. A normal, n~
@@ -42,7 +43,13 @@ TANDEM_HD inline float frame_error(const RelativePose& b_in_a, const TreeExtent&
                                    const TreeExtent& tree_b) {
   double error = 0, largest = 0;
   for (int k = 0; k < 3; ++k) {
-    error = std::fmax(error, static_cast<double>(b_in_a.slack_a[k]));
+    double of_boxes = tree_a.half_extent[k];  // tau of the proof
+    for (int j = 0; j < 3; ++j) {
+      of_boxes += static_cast<double>(b_in_a.abs_rotation[k][j]) *
+                  (tree_b.half_extent[j] + static_cast<double>(b_in_a.slack_b[j]));
+    }
+    const double slack = static_cast<double>(b_in_a.slack_a[k]);
+    error = std::fmax(error, slack - 4.09 * relative_pose_detail::kU * of_boxes);
     largest = std::fmax(largest, std::fmax(tree_a.reach[k], tree_b.reach[k]));
     largest = std::fmax(largest, std::fabs(static_cast<double>(b_in_a.translation[k])));
   }

@@ -25,34 +25,34 @@ class WalkBlocks : public test::GpuTest {};
 /// What the GPU makes of the trees, numbered one after the other behind some numbers of others.
 void expect_sound(const SampleAssets& assets) {
   constexpr std::uint32_t kOthers = 7;
-  std::uint64_t numbers = kOthers;
-  std::uint32_t most_blocks = 0;
-  for (const AssetView& view : assets.views()) {
-    numbers += gpu::numbers_of(view.level());
-    most_blocks = std::max(most_blocks, view.level().block_count);
+  std::uint32_t numbers = kOthers, block_count = 0;
+  std::vector<DeviceAsset> uploads(assets.size());
+  std::vector<gpu::Asset> table;
+  for (std::uint32_t i = 0; i < assets.size(); ++i) {
+    const AssetView& view = assets.views()[i];
+    ASSERT_EQ(uploads[i].upload(view, nullptr), Status::kOk);
+    table.push_back({gpu_asset(uploads[i].level(), *view.header), {}, numbers, block_count});
+    numbers += static_cast<std::uint32_t>(gpu::numbers_of(view.level()));
+    block_count += view.level().block_count;
   }
   gpu::WalkBlock none;
   std::memset(&none, 0xCD, sizeof none);
   const OnGpu<gpu::WalkBlock> blocks(std::vector<gpu::WalkBlock>(numbers, none));
   const OnGpu<std::uint32_t> file_blocks(std::vector<std::uint32_t>(numbers, 0xCDCDCDCDu));
-  const OnGpu<std::uint32_t> scratch(std::vector<std::uint32_t>(most_blocks, 0xCDCDCDCDu));
+  const OnGpu<std::uint32_t> scratch(std::vector<std::uint32_t>(block_count, 0xCDCDCDCDu));
+  const OnGpu<gpu::Asset> on_gpu(table);
+  ASSERT_EQ(gpu::make_walk_blocks(on_gpu.data(), assets.size(), block_count, blocks.data(),
+                                  file_blocks.data(), scratch.data(), nullptr),
+            cudaSuccess);
+  const auto made = download(on_gpu.data(), table.size());
   std::vector<test::WalkTree> walks;
-  std::uint32_t first = kOthers;
-  for (const AssetView& view : assets.views()) {
-    DeviceAsset upload;
-    ASSERT_EQ(upload.upload(view, nullptr), Status::kOk);
-    const OnGpu<gpu::Asset> asset(std::vector<gpu::Asset>{{gpu_asset(upload.level(), *view.header), {}, 0}});
-    ASSERT_EQ(gpu::make_walk_blocks(asset.data(), upload.level(), first, blocks.data(), file_blocks.data(),
-                                    scratch.data(), nullptr),
-              cudaSuccess);
-    const gpu::Asset made = download(asset.data(), 1)[0];
-    const TreeExtent extent = extent_of(view.level().blocks[0]);
+  for (std::uint32_t i = 0; i < assets.size(); ++i) {
+    const TreeExtent extent = extent_of(assets.views()[i].level().blocks[0]);
     for (int k = 0; k < 3; ++k) {
-      EXPECT_EQ(made.extent.reach[k], extent.reach[k]);
-      EXPECT_EQ(made.extent.half_extent[k], extent.half_extent[k]);
+      EXPECT_EQ(made[i].extent.reach[k], extent.reach[k]);
+      EXPECT_EQ(made[i].extent.half_extent[k], extent.half_extent[k]);
     }
-    walks.push_back({first, made.root, {}, {}});
-    first += static_cast<std::uint32_t>(gpu::numbers_of(view.level()));
+    walks.push_back({table[i].root, made[i].root, {}, {}});
   }
   const auto all_blocks = download(blocks.data(), numbers);
   const auto all_file_blocks = download(file_blocks.data(), numbers);

@@ -1,6 +1,7 @@
 #include "tandem/kernels/gpu_contact_query.h"
 
 #include <algorithm>
+#include <memory>
 #include <new>
 #include <utility>
 
@@ -167,25 +168,30 @@ Status GpuContactQuery::set_assets(std::span<const GpuAsset> assets, cudaStream_
   depth_ = depth;
   most_triangles_ = triangles;
   most_faces_ = faces;
-  if (count == 0) return Status::kOk;
-  auto* table = static_cast<gpu::Asset*>(assets_);
-  status = fail(cudaMemcpy2DAsync(table, sizeof(gpu::Asset), assets.data(), sizeof(GpuAsset),
-                                  sizeof(GpuAsset), count, cudaMemcpyHostToDevice, stream));
-  if (status == Status::kOk) status = make_walk_blocks(assets, stream);
+  if (count != 0) status = make_walk_blocks(assets, stream);
+  if (status != Status::kOk) asset_count_ = 0;
   return status;
 }
 
 Status GpuContactQuery::make_walk_blocks(std::span<const GpuAsset> assets, cudaStream_t stream) {
-  std::uint32_t most_blocks = 0, first = 0;
-  for (const GpuAsset& asset : assets) most_blocks = std::max(most_blocks, asset.tree.block_count);
-  std::uint32_t* number_of = nullptr;
-  Status status = allocate(number_of, most_blocks);
-  for (std::uint32_t i = 0; i < asset_count_ && status == Status::kOk; ++i) {
-    status = fail(gpu::make_walk_blocks(static_cast<gpu::Asset*>(assets_) + i, assets[i].tree, first,
-                                        static_cast<gpu::WalkBlock*>(walk_blocks_), file_blocks_, number_of,
-                                        stream));
-    first += static_cast<std::uint32_t>(gpu::numbers_of(assets[i].tree));
+  const std::unique_ptr<gpu::Asset[]> table(new (std::nothrow) gpu::Asset[assets.size()]);
+  if (table == nullptr) return Status::kOutOfMemory;
+  std::uint32_t root = 0, blocks = 0;
+  for (std::size_t i = 0; i < assets.size(); ++i) {
+    table[i] = {assets[i], {}, root, blocks};
+    root += static_cast<std::uint32_t>(gpu::numbers_of(assets[i].tree));
+    blocks += assets[i].tree.block_count;
   }
+  auto* const on_gpu = static_cast<gpu::Asset*>(assets_);
+  std::uint32_t* number_of = nullptr;
+  Status status = allocate(number_of, blocks);
+  if (status != Status::kOk) return status;
+  status = fail(cudaMemcpyAsync(on_gpu, table.get(), assets.size() * sizeof(gpu::Asset),
+                                cudaMemcpyHostToDevice, stream));
+  if (status == Status::kOk)
+    status =
+        fail(gpu::make_walk_blocks(on_gpu, asset_count_, blocks, static_cast<gpu::WalkBlock*>(walk_blocks_),
+                                   file_blocks_, number_of, stream));
   if (status == Status::kOk) status = fail(cudaStreamSynchronize(stream));
   static_cast<void>(cudaFree(number_of));
   return status;

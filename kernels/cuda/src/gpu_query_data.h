@@ -77,10 +77,11 @@ struct SortingRoom {
 /// Sorting keeps two rows of 64-bit keys where its result is to come, each row aligned.
 inline constexpr std::size_t kContactsForKeys = 32;
 
-/// Walk blocks of the tree of an asset in the table, and what else the table says of it. Walk blocks have
-/// numbers from `first` on, as many as numbers_of() says, and `file_blocks` tells of each the block it was
-/// made of. number_of: scratch, a word for each block of the tree.
-cudaError_t make_walk_blocks(Asset* asset, const LevelView& tree, std::uint32_t first, WalkBlock* out,
+/// Makes the walk blocks of the assets in a table, and fills in their extents; `blocks` have their files in
+/// all. The walk blocks of an asset have numbers from its root on, as many as numbers_of() says, and
+/// `file_blocks` tells of each the block it was made of. number_of: scratch, a word for each block of the
+/// files.
+cudaError_t make_walk_blocks(Asset* assets, std::uint32_t asset_count, std::uint32_t blocks, WalkBlock* out,
                              std::uint32_t* file_blocks, std::uint32_t* number_of, cudaStream_t stream);
 
 /// Walk blocks are numbered in fours, one four for the children of a block.

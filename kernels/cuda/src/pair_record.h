@@ -33,7 +33,8 @@ inline constexpr std::uint32_t kIsLeafBlock = 1u << 31;
 struct Asset {
   GpuAsset asset;
   TreeExtent extent;
-  std::uint32_t root;  ///< number of its walk block
+  std::uint32_t root;         ///< number of its walk block
+  std::uint32_t first_block;  ///< how many blocks the assets before it have in their files
 };
 
 /// What the walk needs to know of an object pair, in whole float4.

@@ -13,15 +13,17 @@ constexpr std::uint32_t kMostVertices = 256;             // of a node, that fram
 constexpr int kRounds = 8;                               // of a search
 constexpr float kFirstStep = 0.276f, kNextStep = 0.58f;  // 3 steps of the first reach all frames of a cube
 
-/// Numbers the walk blocks: 1 + 4 times its place among the internal blocks for the first child of each.
+/// Numbers the walk blocks of an asset a thread block: 1 + 4 times its place among the internal blocks for
+/// the first child of each, after the root's.
 __global__ void __launch_bounds__(kNumbering)
-    number_blocks(Asset* asset, LevelView tree, std::uint32_t first, std::uint32_t* number_of,
-                  std::uint32_t* file_blocks) {
+    number_blocks(Asset* assets, std::uint32_t* all_numbers, std::uint32_t* file_blocks) {
   __shared__ std::uint32_t count_of[kNumbering / 32], before[kNumbering / 32], in_all;
-  const std::uint32_t warp = threadIdx.x / 32;
+  Asset& asset = assets[blockIdx.x];
+  const LevelView& tree = asset.asset.tree;
+  const std::uint32_t warp = threadIdx.x / 32, first = asset.root;
+  std::uint32_t* const number_of = all_numbers + asset.first_block;
   if (threadIdx.x == 0) {
-    asset->extent = extent_of(tree.blocks[0]);
-    asset->root = first;
+    asset.extent = extent_of(tree.blocks[0]);
     number_of[0] = first;
     file_blocks[first] = 0;
   }
@@ -301,23 +303,37 @@ class Fit {
   float rim_;
 };
 
-__global__ void __launch_bounds__(32)
-    fit_blocks(const Asset* asset, LevelView tree, const std::uint32_t* number_of, WalkBlock* out) {
+/// The last asset whose blocks begin at `block` or before.
+__device__ const Asset& asset_of(const Asset* assets, std::uint32_t count, std::uint32_t block) {
+  std::uint32_t at = 0;
+  while (count > 1) {
+    const std::uint32_t half = count / 2;
+    if (assets[at + half].first_block <= block) at += half;
+    count -= half;
+  }
+  return assets[at];
+}
+
+/// A warp a block of the files.
+__global__ void __launch_bounds__(32) fit_blocks(const Asset* assets, std::uint32_t asset_count,
+                                                 const std::uint32_t* number_of, WalkBlock* out) {
+  const Asset& asset = asset_of(assets, asset_count, blockIdx.x);
+  const LevelView& tree = asset.asset.tree;
   double squared = 0;
-  for (const double reach : asset->extent.reach) squared += reach * reach;
-  const std::uint32_t at = blockIdx.x;
+  for (const double reach : asset.extent.reach) squared += reach * reach;
+  const std::uint32_t at = blockIdx.x - asset.first_block, below = tree.blocks[at].index[0];
   WalkBlock block = Fit(tree, at).make(sqrt(squared));
-  const std::uint32_t below = tree.blocks[at].index[0];
-  block.first_below = tree.blocks[at].is_leaf_block() ? below | kIsLeafBlock : number_of[below];
-  if (threadIdx.x == 0) out[number_of[at]] = block;
+  block.first_below =
+      tree.blocks[at].is_leaf_block() ? below | kIsLeafBlock : number_of[asset.first_block + below];
+  if (threadIdx.x == 0) out[number_of[blockIdx.x]] = block;
 }
 
 }  // namespace
 
-cudaError_t make_walk_blocks(Asset* asset, const LevelView& tree, std::uint32_t first, WalkBlock* out,
+cudaError_t make_walk_blocks(Asset* assets, std::uint32_t asset_count, std::uint32_t blocks, WalkBlock* out,
                              std::uint32_t* file_blocks, std::uint32_t* number_of, cudaStream_t stream) {
-  number_blocks<<<1, kNumbering, 0, stream>>>(asset, tree, first, number_of, file_blocks);
-  fit_blocks<<<tree.block_count, 32, 0, stream>>>(asset, tree, number_of, out);
+  number_blocks<<<asset_count, kNumbering, 0, stream>>>(assets, number_of, file_blocks);
+  fit_blocks<<<blocks, 32, 0, stream>>>(assets, asset_count, number_of, out);
   return cudaGetLastError();
 }
 

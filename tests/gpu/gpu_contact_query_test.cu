@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <cctype>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
 #include <map>
 #include <memory>
+#include <thread>
 #include <tuple>
 #include <vector>
 
@@ -338,6 +342,68 @@ TEST_F(GpuContacts, AreTheSameOnEveryRunSideBySideAndInAGraph) {
   }
   cudaGraphExecDestroy(ready);
   cudaGraphDestroy(graph);
+  for (cudaStream_t stream : streams) cudaStreamDestroy(stream);
+}
+
+/// Keeps multiprocessors busy, each with a block that leaves no shared memory.
+__global__ void hold(const volatile int* released) {
+  while (*released == 0) __nanosleep(1000);
+}
+
+bool is_done_within_seconds(cudaStream_t stream, int seconds) {
+  for (int i = 0; i < 1000 * seconds; ++i) {
+    if (cudaStreamQuery(stream) != cudaErrorNotReady) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return false;
+}
+
+/// All multiprocessors but one are held, so that blocks run one after another, and those of the first block
+/// of the walk have nothing to do: it has gone home when the next, which have much to share, begin.
+TEST_F(GpuContacts, DoNotDependOnWhenBlocksBegin) {
+  if (std::getenv("TANDEM_GPU_BLOCKS") != nullptr) GTEST_SKIP() << "with few blocks none is late";
+  RandomPoses random(31);
+  Scene scene = pile(60, 1500, 2, 31);
+  const auto close = all_pairs(scene.instances, false, random);
+  const auto far = static_cast<std::uint32_t>(scene.instances.size());
+  scene.instances.push_back({0, random.pose({1, 1, 0, 0, 0})});
+  scene.instances[far].pose.translation[0] += 1000;
+  int processors = 0;
+  ASSERT_EQ(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, 0), cudaSuccess);
+  std::vector<ObjectPair> pairs;
+  for (int i = 0; i < 4000; ++i) {
+    const bool of_first_block = i / 4 % processors == 0;
+    pairs.push_back(of_first_block ? ObjectPair{0, far} : close[static_cast<std::size_t>(i) % close.size()]);
+  }
+  const Answers expected = ask(scene.assets, scene.instances, pairs, QueryMode::exact);
+  const GpuScene on_gpu(scene.assets, scene.instances, pairs);
+  cudaStream_t streams[2];
+  for (cudaStream_t& stream : streams) {
+    ASSERT_EQ(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), cudaSuccess);
+  }
+  GpuContactQuery query;
+  ASSERT_EQ(query.set_assets(on_gpu.assets(), streams[0]), Status::kOk);
+  ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, streams[0]), Status::kOk);
+  int bytes = 0;
+  ASSERT_EQ(cudaDeviceGetAttribute(&bytes, cudaDevAttrMaxSharedMemoryPerBlockOptin, 0), cudaSuccess);
+  ASSERT_EQ(cudaFuncSetAttribute(hold, cudaFuncAttributeMaxDynamicSharedMemorySize, bytes), cudaSuccess);
+  int* released = nullptr;
+  ASSERT_EQ(cudaMallocHost(&released, sizeof *released), cudaSuccess);
+  *released = 0;
+  hold<<<processors - 1, 32, bytes, streams[1]>>>(released);
+  ASSERT_EQ(cudaGetLastError(), cudaSuccess);
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  ASSERT_EQ(query.enqueue(on_gpu.instances(), on_gpu.pairs(), {}, streams[0]), Status::kOk);
+  const bool done = is_done_within_seconds(streams[0], 20);
+  *static_cast<volatile int*>(released) = 1;
+  if (!done && !is_done_within_seconds(streams[0], 2)) {
+    std::fprintf(stderr, "a query hangs where its blocks begin one after another\n");
+    std::_Exit(1);  // nothing else can be done with the GPU
+  }
+  EXPECT_TRUE(done);
+  EXPECT_EQ(contacts_of(query), expected.cpu);
+  ASSERT_EQ(cudaStreamSynchronize(streams[1]), cudaSuccess);
+  cudaFreeHost(released);
   for (cudaStream_t stream : streams) cudaStreamDestroy(stream);
 }
 

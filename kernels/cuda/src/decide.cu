@@ -64,6 +64,11 @@ __device__ void count(bool counts, Counter* counter) {
   if (lane_id() == 0 && lanes != 0) atomicAdd(counter, static_cast<Counter>(__popc(lanes)));
 }
 
+/// Where only boxes are asked for, nothing comes to the float64 stage.
+__host__ __device__ bool has_float64_stage(const QueryArgs& args) {
+  return args.mode != QueryMode::boxes && !args.walk_only;
+}
+
 /// What other blocks made of it.
 __device__ Counter now(const Counter& counter) {
   return *static_cast<const volatile Counter*>(&counter);
@@ -86,7 +91,7 @@ __device__ void write_report(const QueryArgs& args) {
   counters.candidates = state.candidates;
   counters.decided_by_float64 = by_float64;
   counters.decided_exactly = exactly;
-  if (args.mode != QueryMode::boxes) counters.decided_by_float32 = state.candidates - by_float64 - exactly;
+  if (has_float64_stage(args)) counters.decided_by_float32 = state.candidates - by_float64 - exactly;
   counters.contacts = contacts;
   if (state.error != 0) {
     const Counter error = ~state.error;
@@ -98,7 +103,7 @@ __device__ void write_report(const QueryArgs& args) {
   *args.host_report = report;
 }
 
-/// What makes the state ready for the next query; the report stays.
+// What makes the state ready for the next query; the report stays.
 __device__ void clear_mailboxes(QueryState& state) {
   for (std::uint32_t i = blockIdx.x * kThreads + threadIdx.x; i < kChunks; i += gridDim.x * kThreads) {
     state.frame.mailbox[i] = state.world.mailbox[i] = 0;
@@ -123,11 +128,6 @@ __device__ bool ends_last(const QueryArgs& args) {
   __threadfence();
   __syncthreads();
   return threadIdx.x == 0 && atomicAdd(&args.state->finished_blocks, 1u) == gridDim.x - 1;
-}
-
-/// Where only boxes are asked for, nothing comes to the float64 stage.
-__host__ __device__ bool has_float64_stage(const QueryArgs& args) {
-  return args.mode != QueryMode::boxes && !args.walk_only;
 }
 
 /// Finishes the query where nothing is left to the exact stage.

@@ -162,6 +162,7 @@ struct GpuBroadPhase::State {
   DeviceBuffer<unsigned char> sorting;  // CUB's
   DeviceBuffer<Survey> survey;
   DeviceBuffer<Counters> counters;
+  bool counters_are_fresh = false;  // a search that ends leaves them so
   DeviceBuffer<GpuBroadPhaseReport> report;
   GpuBroadPhaseReport* host_report = nullptr;
   GpuBroadPhaseCapacity capacity;
@@ -189,6 +190,9 @@ struct GpuBroadPhase::State {
   template <typename... Parameters, typename... Arguments>
   bool launch(std::uint32_t blocks, std::uint32_t threads, cudaStream_t stream, void (*kernel)(Parameters...),
               const Arguments&... arguments);
+  bool refresh(cudaStream_t stream);
+  bool begin(cudaStream_t stream) { return counters_are_fresh || refresh(stream); }
+  void end(bool queued, cudaStream_t stream);
   template <typename Boxes>
   bool test_all(const Boxes& from, std::uint32_t count, bool sorted, cudaStream_t stream);
   template <typename Boxes>
@@ -202,17 +206,30 @@ struct GpuBroadPhase::State {
               cudaStream_t stream, const Enqueue& enqueue);
 };
 
+bool GpuBroadPhase::State::refresh(cudaStream_t stream) {
+  return ok(cudaMemcpyAsync(counters.data(), &kFreshCounters, sizeof kFreshCounters, cudaMemcpyHostToDevice,
+                            stream));
+}
+
+// What is captured has not run: the counters are as before.
+void GpuBroadPhase::State::end(bool queued, cudaStream_t stream) {
+  cudaStreamCaptureStatus capture = cudaStreamCaptureStatusNone;
+  static_cast<void>(cudaStreamIsCapturing(stream, &capture));
+  if (capture == cudaStreamCaptureStatusNone) counters_are_fresh = queued;
+}
+
 bool GpuBroadPhase::State::reserve_fixed() {
   if (host_report != nullptr) return true;
   if (!ok(survey.reserve(1)) || !ok(counters.reserve(1)) || !ok(report.reserve(1)) ||
-      !ok(cudaMemset(report.data(), 0, report.bytes())) ||
-      !ok(cudaMemcpy(counters.data(), &kFreshCounters, sizeof kFreshCounters, cudaMemcpyHostToDevice)))
+      !ok(cudaMemset(report.data(), 0, report.bytes())) || !refresh(nullptr) ||
+      !ok(cudaStreamSynchronize(nullptr)))
     return false;
   if (!ok(cudaMallocHost(&host_report, sizeof *host_report))) {
     host_report = nullptr;
     return false;
   }
   *host_report = {};
+  counters_are_fresh = true;
   return true;
 }
 
@@ -373,7 +390,9 @@ Status GpuBroadPhase::enqueue(const WorldBox* boxes, std::uint32_t count, const 
   if (state_ == nullptr) return Status::kOutOfRange;
   if (const Status status = state_->refusal(count, options); status != Status::kOk) return status;
   if (reinterpret_cast<std::uintptr_t>(boxes) % 16 != 0) return Status::kMisaligned;
-  const bool queued = state_->run(GivenBoxes{boxes}, boxes, count, options.sorted, stream);
+  const bool queued =
+      state_->begin(stream) && state_->run(GivenBoxes{boxes}, boxes, count, options.sorted, stream);
+  state_->end(queued, stream);
   return queued ? Status::kOk : state_->failure();
 }
 
@@ -385,13 +404,14 @@ Status GpuBroadPhase::enqueue(const GpuInstances& instances, const GpuAssetBound
   if (const Status status = state.refusal(count, options); status != Status::kOk) return status;
   WorldBox* const boxes = state.boxes.data();
   const PosedBoxes posed = {instances, assets, boxes};
-  bool queued = false;
-  if (count <= kFewPosed || count > kFewBoxes) {
+  bool queued = state.begin(stream);
+  if (queued && (count <= kFewPosed || count > kFewBoxes)) {
     queued = state.run(posed, boxes, count, options.sorted, stream);
-  } else {
+  } else if (queued) {
     queued = state.launch(blocks_for(count, 256), 256, stream, pose_boxes, posed, state.counters.data()) &&
              state.run(GivenBoxes{boxes}, boxes, count, options.sorted, stream);
   }
+  state.end(queued, stream);
   return queued ? Status::kOk : state.failure();
 }
 

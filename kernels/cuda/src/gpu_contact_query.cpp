@@ -122,6 +122,7 @@ Status GpuContactQuery::provide_fixed_memory(cudaStream_t stream) {
   status = fail(cudaMemsetAsync(state_, 0, sizeof(gpu::QueryState), stream));
   if (status == Status::kOk)
     status = fail(cudaMemsetAsync(chunks_, 0, gpu::kChunks * sizeof(gpu::Chunk), stream));
+  if (status == Status::kOk) status = fail(cudaStreamSynchronize(stream));
   if (status != Status::kOk) return status;
   state_is_clear_ = true;
   void* report = nullptr;
@@ -265,7 +266,7 @@ Status GpuContactQuery::enqueue(const GpuInstances& instances, const GpuPairs& p
   args.given = pairs;
   args.mode = options.mode;
   args.first_contact_only = options.first_contact_only;
-  args.walk_only = options.walk_only;
+  args.walk_only = options.walk_only && options.mode == QueryMode::exact;
   args.capacity = capacity_;
   args.state = static_cast<gpu::QueryState*>(state_);
   args.host_report = host_report_;
@@ -283,12 +284,15 @@ Status GpuContactQuery::enqueue(const GpuInstances& instances, const GpuPairs& p
   args.stack_size = args.stack_reserve + kStackSize;
   cudaError_t error = cudaSuccess;
   if (!state_is_clear_) error = cudaMemsetAsync(args.state, 0, sizeof(gpu::QueryState), stream);
+  cudaStreamCaptureStatus capture = cudaStreamCaptureStatusNone;
+  if (error == cudaSuccess) error = cudaStreamIsCapturing(stream, &capture);
   if (error == cudaSuccess) error = gpu::prepare_pairs(args, stream);
   if (error == cudaSuccess)
     error = (options.mode == QueryMode::exact ? gpu::walk_exact : gpu::walk_unfused)(args, stream);
   if (error == cudaSuccess) error = gpu::walk_world(args, stream);
   if (error == cudaSuccess) error = gpu::decide_rest(args, stream);
-  state_is_clear_ = error == cudaSuccess;
+  // What is captured has not run: the state is as before.
+  if (capture == cudaStreamCaptureStatusNone) state_is_clear_ = error == cudaSuccess;
   if (error == cudaSuccess && options.sorted) {
     const gpu::SortingRoom room = {contacts_, order_, sorting_, sorting_bytes_, most_triangles_, most_faces_};
     error = gpu::sort_contacts(args, room, stream);

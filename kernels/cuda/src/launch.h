@@ -15,6 +15,14 @@ struct Grid {
 
 #ifdef __CUDACC__
 
+/// Whether all code that was compiled waits where wait_for_kernel_before() says so.
+inline constexpr bool kWaits = [] {
+  for (const int architecture : {__CUDA_ARCH_LIST__}) {
+    if (architecture < 900) return false;
+  }
+  return true;
+}();
+
 /// Launches a kernel that may get its blocks ready while the one before it in the stream ends, and calls
 /// wait_for_kernel_before() before it reads or writes what other kernels do.
 template <typename... Parameters, typename... Arguments>
@@ -28,7 +36,7 @@ cudaError_t launch_after(const Grid& grid, void (*kernel)(Parameters...), Argume
   config.dynamicSmemBytes = grid.shared_bytes;
   config.stream = grid.stream;
   config.attrs = &early;
-  config.numAttrs = 1;
+  config.numAttrs = kWaits ? 1 : 0;
   return cudaLaunchKernelEx(&config, kernel, std::forward<Arguments>(arguments)...);
 }
 

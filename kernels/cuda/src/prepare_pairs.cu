@@ -63,7 +63,7 @@ __device__ void prepare_pair(const QueryArgs& args, std::uint32_t index) {
 }
 
 __global__ void __launch_bounds__(kThreads) prepare(const __grid_constant__ QueryArgs args) {
-  wait_for_kernel_before();
+  let_next_kernel_begin();
   const std::uint32_t first = blockIdx.x * kThreads + threadIdx.x, step = gridDim.x * kThreads;
   const std::uint32_t pairs = pair_count(args);
   for (std::uint32_t i = first; i < pairs; i += step) prepare_pair(args, i);
@@ -82,7 +82,9 @@ cudaError_t prepare_pairs(const QueryArgs& args, cudaStream_t stream) {
   if (const cudaError_t error = cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device);
       error != cudaSuccess)
     return error;
-  return launch_after({static_cast<unsigned>(processors) * 32, kThreads, 0, stream}, prepare, args);
+  // After whatever kernel of the user's, and so after all of it.
+  prepare<<<static_cast<unsigned>(processors) * 32, kThreads, 0, stream>>>(args);
+  return cudaGetLastError();
 }
 
 }  // namespace tandem::gpu

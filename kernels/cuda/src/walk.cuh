@@ -13,7 +13,7 @@
 // A warp that has nothing left takes object pairs; when there are no more, it takes a number and waits at the
 // mailbox with that number. Warps that have enough look every round whether numbers were given out, and fill
 // the next mailbox. The last warp that runs out of work sends the others home. No warp waits for one that has
-// not started.
+// not started; those that start when all others have gone do what is theirs.
 //
 // Included by files that are compiled with and without fused operations: internal linkage.
 namespace tandem::gpu {
@@ -23,8 +23,8 @@ constexpr std::uint32_t kFull = 32;             // block pairs or candidates of 
 constexpr std::uint32_t kFewestPairsAtOnce = 4, kMostPairsAtOnce = 16;  // object pairs that a warp takes
 constexpr std::uint32_t kFewestToShare = 32;
 constexpr std::uint32_t kMostGifts = 3;  // at once
-constexpr std::uint32_t kNobodyLeft = 0xFFFFFFFEu, kNoMore = 0xFFFFFFFFu;  // kNoMore: in a mailbox
-constexpr std::uint32_t kNothing = 0xFFFFFFFFu, kTaken = 0xFFu;
+constexpr std::uint32_t kHome = 0xFEu, kTaken = 0xFFu;  // in a mailbox
+constexpr std::uint32_t kNothing = 0xFFFFFFFFu;
 constexpr std::uint32_t kOutRoom = 64;
 constexpr std::uint32_t kWarpsPerBlock = 16, kBlocksPerProcessor = 1;
 constexpr float kTimesLarger = 4;  // where planes of leaves are worth it, as narrow_phase_walk.h says
@@ -77,7 +77,9 @@ __device__ inline std::uint32_t subtract_release(std::uint32_t* from, std::uint3
   asm volatile("atom.add.release.gpu.global.u32 %0, [%1], %2;" : "=r"(before) : "l"(from), "r"(0u - amount) : "memory");
   return before;
 }
-/// Entries that warps give to each other: all 16 bytes at once, so that they need no order with anything else.
+/// Entries that warps give to each other: all 16 bytes at once, so that they need no order with a mailbox. Of an
+/// earlier turn none is left: it was cleared before the mailbox was given back, and a GPU's memory keeps the
+/// order of what comes to one address.
 __device__ inline void store_entry(uint4* to, const uint4& entry) {
   const std::uint64_t low = std::uint64_t{entry.y} << 32 | entry.x, high = std::uint64_t{entry.w} << 32 | entry.z;
   asm volatile("{.reg .b128 all; mov.b128 all, {%1, %2}; st.relaxed.gpu.global.b128 [%0], all;}" ::"l"(to),
@@ -446,7 +448,8 @@ class Walk {
   }
 
   /// Numbers take the mailboxes in turn. A mailbox tells which turn it serves, and of the number of that turn
-  /// how many entries it got, or kTaken once these were taken out; 0 before the first.
+  /// how many entries it got, kHome where there will be none, or kTaken once that was seen to; 0 before the
+  /// first.
   __device__ std::uint32_t place_of(std::uint32_t number) const {
     return number & ((1u << args_.mailbox_bits) - 1);
   }
@@ -469,7 +472,8 @@ class Walk {
     if (turn_of(number) != 0) {
       if (lane_ == 0) {
         give_back();
-        while (load_acquire(mailbox) != ((turn_of(number) - 1) << 8 | kTaken)) {
+        const std::uint32_t given_back = (turn_of(number) - 1) << 8 | kTaken;
+        while (load_relaxed(mailbox) != given_back || load_acquire(mailbox) != given_back) {
         }
       }
       __syncwarp();
@@ -488,30 +492,30 @@ class Walk {
     if (lane_ == 0) store_relaxed(mailbox, turn_of(number) << 8 | count);
   }
 
-  /// How many entries a mailbox has for the number of this turn, or kNoMore.
+  /// How many entries a mailbox has for the number of this turn, or kHome.
   __device__ static std::uint32_t gift_in(std::uint32_t word, std::uint32_t turn) {
-    if (word == kNoMore) return kNoMore;
     return word >> 8 == turn ? word & 0xFFu : 0;
   }
 
   /// Asks for entries that another warp gives away, and waits. False: no warp has any left.
   __device__ bool wait_for_gift() {
     std::uint32_t number = 0, count = 0;
+    bool last = false;
     if (lane_ == 0) {
       give_back();
       number = atomicAdd(&balance_.asked, 1u);
       // Nobody sees that this warp is no longer active before its number is given out.
-      if (subtract_release(&balance_.active, 1) == 1) {
-        count = kNobodyLeft;
-      } else {
-        const std::uint32_t* const mailbox = &balance_.mailbox[place_of(number)];
-        while ((count = gift_in(load_relaxed(mailbox), turn_of(number))) == 0) __nanosleep(100);
-      }
+      last = subtract_release(&balance_.active, 1) == 1;
     }
+    if (__shfl_sync(kAllLanes, last, 0)) send_home();
     number = __shfl_sync(kAllLanes, number, 0);
+    if (lane_ == 0) {
+      std::uint32_t* const mailbox = &balance_.mailbox[place_of(number)];
+      while ((count = gift_in(load_relaxed(mailbox), turn_of(number))) == 0) __nanosleep(100);
+      if (count == kHome) store_relaxed(mailbox, turn_of(number) << 8 | kTaken);
+    }
     count = __shfl_sync(kAllLanes, count, 0);
-    if (count == kNobodyLeft) end_all();
-    if (count >= kNobodyLeft) return false;
+    if (count == kHome) return false;
     std::uint32_t bits = 0;
     if (lane_ < count) {
       // The number may be there before the entries are, each of which has a bit.
@@ -531,15 +535,30 @@ class Walk {
     return true;
   }
 
-  /// Sends the waiting warps home. None is active, so nothing is given any more, and what was given has been
-  /// received. A warp that starts late turns active, finds nothing, and, when none else is active, comes
-  /// here.
-  __device__ void end_all() {
-    __threadfence();
-    const std::uint32_t given = *static_cast<volatile std::uint32_t*>(&balance_.given),
-                        asked = *static_cast<volatile std::uint32_t*>(&balance_.asked);
-    for (std::uint32_t i = given + lane_; i < asked; i += 32) {
-      *static_cast<volatile std::uint32_t*>(&balance_.mailbox[place_of(i)]) = kNoMore;
+  /// Sends the warps that wait home, this one among them, if still none is active: blocks that start late have
+  /// object pairs of their own. With active == 0 all that was given has been received, and all mailboxes of
+  /// earlier turns were given back. The numbers that go home count as given from then on, in one step with the
+  /// look at `active`, so that a warp that starts later gives nothing to those who have gone.
+  __device__ void send_home() {
+    std::uint32_t first = 0, end = 0;
+    if (lane_ == 0) {
+      __threadfence();
+      auto* const both = reinterpret_cast<Counter*>(&balance_.active);  // given in the upper half
+      for (;;) {
+        const Counter before = *static_cast<volatile Counter*>(both);
+        const std::uint32_t given = static_cast<std::uint32_t>(before >> 32),
+                            asked = *static_cast<volatile std::uint32_t*>(&balance_.asked);
+        if (static_cast<std::uint32_t>(before) != 0 || static_cast<int>(asked - given) <= 0) break;
+        if (atomicCAS(both, before, static_cast<Counter>(asked) << 32) == before) {
+          first = given, end = asked;
+          break;
+        }
+      }
+    }
+    first = __shfl_sync(kAllLanes, first, 0);
+    end = __shfl_sync(kAllLanes, end, 0);
+    for (std::uint32_t i = first + lane_; static_cast<int>(end - i) > 0; i += 32) {
+      store_relaxed(&balance_.mailbox[place_of(i)], turn_of(i) << 8 | kHome);
     }
   }
 
@@ -585,8 +604,8 @@ cudaError_t launch_walk(const QueryArgs& args, cudaStream_t stream) {
   if (error == cudaSuccess)
     error = cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel, 32 * kWarpsPerBlock, bytes);
   if (error != cudaSuccess) return error;
-  // Each warp gives at most kMostGifts after what it saw last, so no more than that are given ahead of those
-  // who ask, and a number's mailbox was always asked for before.
+  // Where more is given than was asked for, no look finds anybody waiting, so each warp gives once more at
+  // most: no more than kMostGifts a warp are given ahead, and the number that had a mailbox before was asked for.
   constexpr std::uint32_t kGiftsPerBlock = kMostGifts * kWarpsPerBlock;
   blocks = std::min(blocks * processors, static_cast<int>(kChunks / kGiftsPerBlock));
   if (args.most_blocks != 0) blocks = std::min(blocks, static_cast<int>(args.most_blocks));

@@ -9,6 +9,7 @@ cudaError_t walk_unfused(const QueryArgs& args, cudaStream_t stream) {
 }
 
 cudaError_t walk_world(const QueryArgs& args, cudaStream_t stream) {
+  if (args.walk_only) return launch_walk<InWorld<QueryMode::exact, true>>(args, stream);
   return args.mode == QueryMode::boxes ? launch_walk<InWorld<QueryMode::boxes>>(args, stream)
                                        : launch_walk<InWorld<QueryMode::exact>>(args, stream);
 }

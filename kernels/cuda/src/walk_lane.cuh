@@ -203,10 +203,10 @@ struct InFrame {
     const RelativePose pose = pose_of(record);
     std::uint32_t left = hits;
 #pragma unroll 1
-    for (int node = 0; node < kNodesPerBlock; ++node) {  // of the leaf block
-      std::uint32_t own = hits & (leaf_a ? 0xFu << 4 * node : 0x1111u << node);
-      if (own == 0) continue;
-      const Triangle& triangle = leaf_a ? record.triangles_a[a.index[node]] : record.triangles_b[b.index[node]];
+    for (; hits != 0; hits &= hits - 1) {
+      const int bit = __ffs(static_cast<int>(hits)) - 1, i = bit / 4, j = bit % 4;
+      const Triangle& triangle = leaf_a ? record.triangles_a[a.index[i]] : record.triangles_b[b.index[j]];
+      const Box stored = leaf_a ? box_of(b, j) : box_of(a, i);
       frame::Point<float> t[3];
       for (int c = 0; c < 3; ++c) {
         const float* p = triangle.corner[c].position;
@@ -215,20 +215,15 @@ struct InFrame {
         const float x[3] = {p[0], p[1], p[2]};
         for (int k = 0; k < 3; ++k) t[c].x[k] = box_terms::posed_center(pose, k, x);
       }
-      const frame::Plane<float, true> plane(t[0], t[1], t[2], record.frame_error);
-#pragma unroll 1
-      for (; own != 0; own &= own - 1) {
-        const int bit = __ffs(static_cast<int>(own)) - 1;
-        const Box stored = leaf_a ? box_of(b, bit % 4) : box_of(a, bit / 4);
-        Box box = stored;
-        if (leaf_a) {
-          for (int k = 0; k < 3; ++k) {
-            box.center[k] = box_terms::posed_center(pose, k, stored.center);
-            box.half_extent[k] = box_terms::b_on_face(pose, k, stored.half_extent);
-          }
+      Box box = stored;
+      if (leaf_a) {
+        for (int k = 0; k < 3; ++k) {
+          box.center[k] = box_terms::posed_center(pose, k, stored.center);
+          box.half_extent[k] = box_terms::b_on_face(pose, k, stored.half_extent);
         }
-        if (frame::beyond(plane, box.center, box.half_extent, record.frame_error)) left &= ~(1u << bit);
       }
+      const frame::Plane<float, true> plane(t[0], t[1], t[2], record.frame_error);
+      if (frame::beyond(plane, box.center, box.half_extent, record.frame_error)) left &= ~(1u << bit);
     }
     return left;
   }

@@ -345,6 +345,30 @@ TEST_F(GpuContacts, AreTheSameOnEveryRunSideBySideAndInAGraph) {
   for (cudaStream_t stream : streams) cudaStreamDestroy(stream);
 }
 
+/// Compiled apart from the whole query, with other operations fused, so the counts may differ by a little.
+TEST_F(GpuContacts, AreNoneWhereTheTreesAreWalkedOnly) {
+  RandomPoses random(21);
+  const Scene scene = pile(60, 1500, 3, 21);
+  const GpuScene on_gpu(scene.assets, scene.instances, all_pairs(scene.instances, false, random));
+  GpuContactQuery query;
+  ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
+  ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, nullptr), Status::kOk);
+  const auto contacts = contacts_of(query);
+  const QueryCounters whole = query.report().counters;
+  ASSERT_GT(contacts.size(), 100u);
+  ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {.walk_only = true}, nullptr),
+            Status::kOk);
+  const QueryCounters walk = query.report().counters;
+  EXPECT_EQ(query.report().contacts, 0u);
+  EXPECT_EQ(walk.decided_by_float32 + walk.decided_by_float64 + walk.decided_exactly, 0u);
+  EXPECT_NEAR(static_cast<double>(walk.block_pairs), static_cast<double>(whole.block_pairs),
+              1e-3 * static_cast<double>(whole.block_pairs));
+  EXPECT_NEAR(static_cast<double>(walk.candidates), static_cast<double>(whole.candidates),
+              1e-3 * static_cast<double>(whole.candidates));
+  ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, nullptr), Status::kOk);
+  EXPECT_EQ(contacts_of(query), contacts);
+}
+
 /// Keeps multiprocessors busy, each with a block that leaves no shared memory.
 __global__ void hold(const volatile int* released) {
   while (*released == 0) __nanosleep(1000);

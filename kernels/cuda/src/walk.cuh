@@ -20,7 +20,7 @@
 namespace tandem::gpu {
 namespace {
 
-constexpr std::uint32_t kFull = 32;             // block pairs or candidates of a full warp
+constexpr std::uint32_t kFull = 32;  // block pairs or candidates of a full warp
 constexpr std::uint32_t kFewestPairsAtOnce = 4, kMostPairsAtOnce = 16;  // object pairs that a warp takes
 constexpr std::uint32_t kFewestToShare = 32;                            // block pairs, for each gift
 constexpr std::uint32_t kMostGifts = 3;                                 // at once
@@ -257,8 +257,7 @@ class Walk {
         hits &= leaf_a ? kNodePairsAbove : kNodePairsAbove | kNodePairsEqual;
       // The larger of two alone; of a leaf block and another, the other.
       const float times = leaf_a != leaf_b ? kTimesLarger : Means::kDescends;
-      const bool larger_a = side_a.size > times * side_b.size,
-                 larger_b = side_b.size > times * side_a.size;
+      const bool larger_a = side_a.size > times * side_b.size, larger_b = side_b.size > times * side_a.size;
       if (leaf_a != leaf_b && (leaf_a ? larger_a : larger_b) && hits != 0)
         hits = Means::drop_beyond_planes(args_, record, now.a, now.b, leaf_a, hits);
       const bool a_alone = leaf_a == leaf_b ? larger_a : leaf_b,
@@ -390,10 +389,12 @@ class Walk {
   __device__ std::uint32_t place_of(std::uint32_t number) const {
     return number & ((1u << args_.mailbox_bits) - 1);
   }
-  __device__ std::uint32_t turn_of(std::uint32_t number) const { return number >> args_.mailbox_bits; }
+  __device__ std::uint32_t turn_of(std::uint32_t number) const {
+    return number >> args_.mailbox_bits;
+  }
 
-  /// Gives back the mailbox of the last gift, and the chunk with it. By lane 0: not when the gift is received,
-  /// because the fence takes as long as a hundred instructions, but when the warp is idle again.
+  /// Gives back the mailbox of the last gift, and the chunk with it. By lane 0: not when the gift is
+  /// received, because the fence takes as long as a hundred instructions, but when the warp is idle again.
   __device__ void give_back() const {
     const std::uint32_t number = load_shared(held());
     if (number == kNothing) return;
@@ -472,10 +473,10 @@ class Walk {
     return true;
   }
 
-  /// Sends the warps that wait home, this one among them, if still none is active: blocks that start late have
-  /// object pairs of their own. With active == 0 all that was given has been received, and all mailboxes of
-  /// earlier turns were given back. The numbers that go home count as given from then on, in one step with the
-  /// look at `active`, so that a warp that starts later gives nothing to those who have gone.
+  /// Sends the warps that wait home, this one among them, if still none is active: blocks that start late
+  /// have object pairs of their own. With active == 0 all that was given has been received, and all mailboxes
+  /// of earlier turns were given back. The numbers that go home count as given from then on, in one step with
+  /// the look at `active`, so that a warp that starts later gives nothing to those who have gone.
   __device__ void send_home() {
     std::uint32_t first = 0, end = 0;
     if (lane_ == 0) {
@@ -542,14 +543,16 @@ cudaError_t launch_walk(const QueryArgs& args, cudaStream_t stream) {
     error = cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel, 32 * kWarpsPerBlock, bytes);
   if (error != cudaSuccess) return error;
   // Where more is given than was asked for, no look finds anybody waiting, so each warp gives once more at
-  // most: no more than kMostGifts a warp are given ahead, and the number that had a mailbox before was asked for.
+  // most: no more than kMostGifts a warp are given ahead, and the number that had a mailbox before was asked
+  // for.
   constexpr std::uint32_t kGiftsPerBlock = kMostGifts * kWarpsPerBlock;
   blocks = std::min(blocks * processors, static_cast<int>(kChunks / kGiftsPerBlock));
   if (args.most_blocks != 0) blocks = std::min(blocks, static_cast<int>(args.most_blocks));
   QueryArgs with_mailboxes = args;
   with_mailboxes.mailbox_bits =
       static_cast<std::uint32_t>(std::bit_width(static_cast<std::uint32_t>(blocks) * kGiftsPerBlock - 1));
-  return launch_after({static_cast<unsigned>(blocks), 32 * kWarpsPerBlock, bytes, stream}, kernel, with_mailboxes);
+  return launch_after({static_cast<unsigned>(blocks), 32 * kWarpsPerBlock, bytes, stream}, kernel,
+                      with_mailboxes);
 }
 
 }  // namespace

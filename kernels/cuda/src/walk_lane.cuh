@@ -113,9 +113,8 @@ __device__ inline std::uint32_t oriented_mask(const PairRecord& record, const Wa
   side_b = {last_b.x, __uint_as_float(last_b.y)};
   float rotation[3][3], translation[3];
   load_pose(record, rotation, translation);
-  const OrientedPose pose =
-      oriented_pose(rotation, translation, __ldg(&record.oriented_slack), frame_of({last_a.z, last_a.w}),
-                    frame_of({last_b.z, last_b.w}));
+  const OrientedPose pose = oriented_pose(rotation, translation, __ldg(&record.oriented_slack),
+                                          frame_of({last_a.z, last_a.w}), frame_of({last_b.z, last_b.w}));
   Four cb[3], hb[3], ca[3], ha[3];
 #pragma unroll
   for (int k = 0; k < 3; ++k) cb[k] = four(__ldg(b + k)), hb[k] = four(__ldg(b + 3 + k));

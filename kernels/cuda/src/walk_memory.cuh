@@ -45,14 +45,18 @@ __device__ inline std::uint32_t load_relaxed(const std::uint32_t* from) {
 /// The value before.
 __device__ inline std::uint32_t subtract_release(std::uint32_t* from, std::uint32_t amount) {
   std::uint32_t before;
-  asm volatile("atom.add.release.gpu.global.u32 %0, [%1], %2;" : "=r"(before) : "l"(from), "r"(0u - amount) : "memory");
+  asm volatile("atom.add.release.gpu.global.u32 %0, [%1], %2;"
+               : "=r"(before)
+               : "l"(from), "r"(0u - amount)
+               : "memory");
   return before;
 }
-/// Entries that warps give to each other: all 16 bytes at once, so that they need no order with a mailbox. Of an
-/// earlier turn none is left: it was cleared before the mailbox was given back, and a GPU's memory keeps the
-/// order of what comes to one address.
+/// Entries that warps give to each other: all 16 bytes at once, so that they need no order with a mailbox. Of
+/// an earlier turn none is left: it was cleared before the mailbox was given back, and a GPU's memory keeps
+/// the order of what comes to one address.
 __device__ inline void store_entry(uint4* to, const uint4& entry) {
-  const std::uint64_t low = std::uint64_t{entry.y} << 32 | entry.x, high = std::uint64_t{entry.w} << 32 | entry.z;
+  const std::uint64_t low = std::uint64_t{entry.y} << 32 | entry.x,
+                      high = std::uint64_t{entry.w} << 32 | entry.z;
   asm volatile("{.reg .b128 all; mov.b128 all, {%1, %2}; st.relaxed.gpu.global.b128 [%0], all;}" ::"l"(to),
                "l"(low), "l"(high)
                : "memory");

@@ -1,4 +1,4 @@
-#include "legal_splits.h"
+#include "bvhbuild/tree/legal_splits.h"
 
 #include <gtest/gtest.h>
 

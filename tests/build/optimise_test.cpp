@@ -1,4 +1,4 @@
-#include "optimise.h"
+#include "bvhbuild/tree/optimise.h"
 
 #include <gtest/gtest.h>
 #include <oneapi/tbb/global_control.h>
@@ -7,13 +7,13 @@
 #include <cstring>
 #include <random>
 
-#include "exchange_search.h"
-#include "free_tree.h"
-#include "minimal_tree.h"
-#include "normalize.h"
-#include "region.h"
+#include "bvhbuild/tree/exchange_search.h"
+#include "bvhbuild/tree/free_tree.h"
+#include "bvhbuild/tree/minimal_tree.h"
+#include "bvhbuild/tree/normalize.h"
+#include "bvhbuild/tree/region.h"
 #include "sample_asset.h"
-#include "statistics.h"
+#include "statistics/statistics.h"
 
 namespace tandem::build {
 namespace {

@@ -6,7 +6,7 @@
 #include <system_error>
 #include <vector>
 
-#include "assemble.h"
+#include "bvhbuild/tree/assemble.h"
 #include "tandem/formats/box.h"
 #include "tandem/formats/check.h"
 

@@ -1,14 +1,14 @@
-#include "tree.h"
+#include "bvhbuild/tree/tree.h"
 
 #include <gtest/gtest.h>
 #include <oneapi/tbb/global_control.h>
 
 #include <cmath>
 
-#include "legal_splits.h"
+#include "bvhbuild/tree/legal_splits.h"
+#include "bvhbuild/tree/splitter.h"
 #include "sample_asset.h"
-#include "splitter.h"
-#include "statistics.h"
+#include "statistics/statistics.h"
 
 namespace tandem::build {
 namespace {

@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "import/read_gltf.h"
+#include "bvhbuild/import/read_gltf.h"
 #include "mesh_invariants.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string_view>
 
-#include "import/printable.h"
+#include "common/printable.h"
 
 namespace tandem::build {
 namespace {

@@ -2,7 +2,7 @@
 #include <cstddef>
 #include <string>
 
-#include "import/read_result.h"
+#include "bvhbuild/import/read_result.h"
 
 namespace tandem::build {
 

@@ -1,4 +1,4 @@
-#include "import/number_text.h"
+#include "bvhbuild/import/number_text.h"
 
 #include <gtest/gtest.h>
 

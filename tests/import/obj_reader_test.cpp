@@ -1,7 +1,7 @@
 #include <cmath>
 #include <string>
 
-#include "import/read_obj.h"
+#include "bvhbuild/import/read_obj.h"
 #include "reader_test.h"
 
 namespace tandem::build {

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <string>
 
-#include "import/read_off.h"
+#include "bvhbuild/import/read_off.h"
 #include "reader_test.h"
 
 namespace tandem::build {

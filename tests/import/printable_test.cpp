@@ -1,4 +1,4 @@
-#include "import/printable.h"
+#include "common/printable.h"
 
 #include <gtest/gtest.h>
 

@@ -6,10 +6,10 @@
 #include <iterator>
 #include <string>
 
-#include "import/read_obj.h"
-#include "import/read_off.h"
-#include "import/read_ply.h"
-#include "import/read_stl.h"
+#include "bvhbuild/import/read_obj.h"
+#include "bvhbuild/import/read_off.h"
+#include "bvhbuild/import/read_ply.h"
+#include "bvhbuild/import/read_stl.h"
 #include "reader_test.h"
 
 namespace tandem::build {

@@ -13,11 +13,11 @@
 #include <string>
 #include <vector>
 
-#include "clean.h"
-#include "import/import.h"
+#include "bvhbuild/import/import.h"
+#include "bvhbuild/meshing/clean.h"
+#include "bvhbuild/meshing/stored_mesh.h"
+#include "bvhbuild/meshing/triangulate.h"
 #include "query_scenes.h"
-#include "stored_mesh.h"
-#include "triangulate.h"
 
 namespace tandem {
 namespace {

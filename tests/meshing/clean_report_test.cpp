@@ -1,4 +1,4 @@
-#include "clean_report.h"
+#include "bvhbuild/meshing/clean_report.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "clean.h"
+#include "bvhbuild/meshing/clean.h"
 
 #include <gtest/gtest.h>
 #include <oneapi/tbb/global_control.h>

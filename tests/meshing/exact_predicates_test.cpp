@@ -1,4 +1,4 @@
-#include "exact_predicates.h"
+#include "bvhbuild/meshing/exact_predicates.h"
 
 #include <gtest/gtest.h>
 

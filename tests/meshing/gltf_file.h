@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "import/read_gltf.h"
+#include "bvhbuild/import/read_gltf.h"
 #include "temp_folder.h"
 
 namespace tandem::build {

@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
+#include "bvhbuild/import/gltf_buffer.h"
+#include "bvhbuild/import/import.h"
 #include "gltf_file.h"
-#include "import/gltf_buffer.h"
-#include "import/import.h"
 
 namespace tandem::build {
 namespace {

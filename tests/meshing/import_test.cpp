@@ -1,4 +1,4 @@
-#include "import/import.h"
+#include "bvhbuild/import/import.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -9,7 +9,7 @@
 #include <fstream>
 #include <string>
 
-#include "import/limited_child.h"
+#include "common/limited_child.h"
 #include "temp_folder.h"
 
 namespace tandem::build {

@@ -1,4 +1,4 @@
-#include "import/limited_child.h"
+#include "common/limited_child.h"
 
 #include <gtest/gtest.h>
 #include <sys/prctl.h>

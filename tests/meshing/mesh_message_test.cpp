@@ -1,4 +1,4 @@
-#include "import/mesh_message.h"
+#include "bvhbuild/import/mesh_message.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "meshing/polygons.h"
+#include "polygons.h"
 
 #include <map>
 #include <utility>

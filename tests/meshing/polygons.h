@@ -3,8 +3,8 @@
 #include <initializer_list>
 #include <vector>
 
-#include "polygon_mesh.h"
-#include "triangle_mesh.h"
+#include "bvhbuild/meshing/polygon_mesh.h"
+#include "bvhbuild/meshing/triangle_mesh.h"
 
 namespace tandem::build {
 

@@ -9,10 +9,10 @@
 #include <ostream>
 #include <string>
 
-#include "clean.h"
-#include "import/import.h"
-#include "stored_mesh.h"
-#include "triangulate.h"
+#include "bvhbuild/import/import.h"
+#include "bvhbuild/meshing/clean.h"
+#include "bvhbuild/meshing/stored_mesh.h"
+#include "bvhbuild/meshing/triangulate.h"
 
 namespace tandem::build {
 namespace {

@@ -1,4 +1,4 @@
-#include "stored_mesh.h"
+#include "bvhbuild/meshing/stored_mesh.h"
 
 #include <gtest/gtest.h>
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <random>
 
-#include "meshing/polygons.h"
-#include "triangulate.h"
+#include "bvhbuild/meshing/triangulate.h"
+#include "polygons.h"
 
 namespace tandem::build {
 namespace {

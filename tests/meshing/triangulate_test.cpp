@@ -1,4 +1,4 @@
-#include "triangulate.h"
+#include "bvhbuild/meshing/triangulate.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <numbers>
 #include <set>
 
-#include "meshing/polygons.h"
+#include "polygons.h"
 #include "tandem/formats/box.h"
 
 namespace tandem::build {

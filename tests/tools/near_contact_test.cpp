@@ -1,4 +1,4 @@
-#include "near_contact.h"
+#include "statistics/near_contact.h"
 
 #include <gtest/gtest.h>
 #include <oneapi/tbb/global_control.h>
@@ -8,8 +8,8 @@
 #include <set>
 
 #include "build/sample_asset.h"
-#include "pose_work.h"
-#include "statistics.h"
+#include "bvhbench/pose_work.h"
+#include "statistics/statistics.h"
 
 namespace tandem::bench {
 namespace {

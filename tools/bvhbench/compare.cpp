@@ -7,7 +7,7 @@
 #include <chrono>
 #include <filesystem>
 
-#include "contacts_file.h"
+#include "scenes/contacts_file.h"
 #include "tandem/formats/hash.h"
 #include "tandem/kernels/broad_phase.h"
 

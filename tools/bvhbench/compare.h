@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "peers/peer.h"
-#include "scene_file.h"
+#include "engines/peer.h"
+#include "scenes/scene_file.h"
 
 namespace tandem::bench {
 

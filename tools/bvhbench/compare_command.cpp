@@ -9,7 +9,7 @@
 #include <set>
 
 #include "compare_results.h"
-#include "hdf5_file.h"
+#include "scenes/hdf5_file.h"
 
 namespace tandem::bench {
 namespace {

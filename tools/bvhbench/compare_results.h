@@ -2,8 +2,8 @@
 #include <string>
 #include <vector>
 
+#include "common/json.h"
 #include "compare.h"
-#include "statistics_json.h"
 
 namespace tandem::bench {
 

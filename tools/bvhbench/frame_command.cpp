@@ -4,9 +4,9 @@
 #include <filesystem>
 #include <memory>
 
-#include "scene_file.h"
-#include "simulation/run_file.h"
-#include "statistics_json.h"
+#include "common/number_words.h"
+#include "scenes/scene_file.h"
+#include "simulator/run_file.h"
 
 namespace tandem::bench {
 namespace {

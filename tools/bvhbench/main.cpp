@@ -5,12 +5,12 @@
 
 #include "command.h"
 #include "compare_command.h"
+#include "engines/gpu_query.h"
 #include "frame_command.h"
-#include "gpu_query.h"
-#include "hdf5_file.h"
 #include "poses_command.h"
 #include "query_command.h"
 #include "scene_command.h"
+#include "scenes/hdf5_file.h"
 #include "simulate_command.h"
 
 namespace {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "near_contact.h"
-#include "scene_file.h"
+#include "scenes/scene_file.h"
+#include "statistics/near_contact.h"
 
 /// Poses of two bodies near contact, and what a query of each costs a tree (docs/poses.md).
 namespace tandem::bench {

@@ -8,9 +8,10 @@
 #include <memory>
 #include <thread>
 
-#include "hdf5_file.h"
+#include "common/json.h"
+#include "common/number_words.h"
 #include "pose_work.h"
-#include "statistics_json.h"
+#include "scenes/hdf5_file.h"
 
 namespace tandem::bench {
 namespace {

@@ -7,11 +7,12 @@
 #include <new>
 #include <thread>
 
-#include "contacts_file.h"
-#include "gpu_query.h"
-#include "hdf5_file.h"
-#include "scene_file.h"
-#include "statistics_json.h"
+#include "common/json.h"
+#include "common/number_words.h"
+#include "engines/gpu_query.h"
+#include "scenes/contacts_file.h"
+#include "scenes/hdf5_file.h"
+#include "scenes/scene_file.h"
 
 namespace tandem::bench {
 namespace {

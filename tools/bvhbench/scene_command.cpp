@@ -3,10 +3,10 @@
 #include <cstdio>
 #include <memory>
 
-#include "make_scene.h"
-#include "make_scene_parts.h"
-#include "scene_file.h"
-#include "statistics_json.h"
+#include "common/number_words.h"
+#include "scenes/make_scene.h"
+#include "scenes/make_scene_parts.h"
+#include "scenes/scene_file.h"
 
 namespace tandem::bench {
 namespace {

@@ -8,12 +8,13 @@
 #include <memory>
 #include <thread>
 
-#include "hdf5_file.h"
-#include "make_scene_parts.h"
-#include "scene_file.h"
-#include "simulation/preparation.h"
-#include "simulation/run.h"
-#include "statistics_json.h"
+#include "common/json.h"
+#include "common/number_words.h"
+#include "scenes/hdf5_file.h"
+#include "scenes/make_scene_parts.h"
+#include "scenes/scene_file.h"
+#include "simulator/preparation.h"
+#include "simulator/run.h"
 
 namespace tandem::bench {
 namespace {

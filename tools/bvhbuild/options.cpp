@@ -4,17 +4,15 @@
 #include <map>
 #include <string>
 
-#include "exit_code.h"
+#include "common/exit_code.h"
+#include "common/option_helpers.h"
 
 namespace tandem::build {
 namespace {
 
-template <typename T>
-using Names = std::map<std::string, T>;
-
-const Names<Effort> kEffortNames = {
+const std::map<std::string, Effort> kEffortNames = {
     {"fast", Effort::fast}, {"default", Effort::standard}, {"best", Effort::best}};
-const Names<Reader> kReaderNames = {
+const std::map<std::string, Reader> kReaderNames = {
     {"auto", Reader::automatic}, {"tandem", Reader::tandem}, {"assimp", Reader::assimp}};
 
 constexpr const char* kFooter =
@@ -22,30 +20,6 @@ constexpr const char* kFooter =
 3 input holds no usable triangle, 4 output could not be written, 5 internal error.
 
 Example: bvhbuild cow.obj -o cow.bvh && bvhinfo cow.bvh)";
-
-// An option whose values are the names and nothing else: CLI::Transformer would take an enumeration's numbers
-// too.
-template <typename T>
-CLI::Option* add_choice(CLI::App& app, const char* flag, const Names<T>& names, T& chosen, const char* help) {
-  const auto choose = [&names, &chosen](const std::string& word) { chosen = names.at(word); };
-  return app.add_option_function<std::string>(flag, choose, help)->check(CLI::IsMember(&names));
-}
-
-// As CLI::Range, which NaN passes.
-CLI::Validator between(double lower, double upper) {
-  const auto defect = [lower, upper](const std::string& text) {
-    double value = 0;
-    if (CLI::detail::lexical_cast(text, value) && value >= lower && value <= upper) return std::string();
-    return text + " is no number from " + CLI::detail::to_string(lower) + " to " +
-           CLI::detail::to_string(upper);
-  };
-  return CLI::Validator(defect, "");
-}
-
-CLI::Validator file_name() {
-  return CLI::Validator(
-      [](const std::string& text) { return text.empty() ? "a file needs a name" : std::string(); }, "");
-}
 
 // "minimal", "free" or a number from 0 to 1; false if it is none of them.
 bool parse_imaginary(const std::string& text, Imaginary& imaginary) {

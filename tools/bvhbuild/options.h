@@ -3,8 +3,8 @@
 #include <optional>
 #include <string>
 
-#include "import/import.h"
-#include "tree.h"
+#include "bvhbuild/import/import.h"
+#include "bvhbuild/tree/tree.h"
 
 namespace tandem::build {
 

@@ -6,17 +6,17 @@
 #include <stdexcept>
 #include <thread>
 
-#include "assemble.h"
-#include "clean.h"
-#include "import/import.h"
+#include "bvhbuild/import/import.h"
+#include "bvhbuild/meshing/clean.h"
+#include "bvhbuild/meshing/stored_mesh.h"
+#include "bvhbuild/meshing/triangulate.h"
+#include "bvhbuild/tree/assemble.h"
+#include "common/number_words.h"
+#include "common/output_file.h"
 #include "interrupt.h"
-#include "output_file.h"
 #include "progress.h"
 #include "provenance.h"
-#include "statistics_json.h"
-#include "stored_mesh.h"
 #include "tandem/formats/check.h"
-#include "triangulate.h"
 
 namespace tandem::build {
 namespace {

@@ -3,11 +3,11 @@
 #include <string>
 #include <vector>
 
-#include "clean_report.h"
-#include "exit_code.h"
+#include "bvhbuild/meshing/clean_report.h"
+#include "common/exit_code.h"
 #include "input_digest.h"
 #include "options.h"
-#include "statistics.h"
+#include "statistics/statistics.h"
 
 namespace tandem::build {
 

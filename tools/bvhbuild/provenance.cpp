@@ -1,6 +1,7 @@
 #include "provenance.h"
 
-#include "statistics_json.h"
+#include "common/json.h"
+#include "common/number_words.h"
 
 namespace tandem::build {
 

@@ -5,7 +5,9 @@
 #include <cstdio>
 #include <sstream>
 
-#include "statistics_json.h"
+#include "common/json.h"
+#include "common/number_words.h"
+#include "statistics/statistics_json.h"
 
 namespace tandem::build {
 namespace {

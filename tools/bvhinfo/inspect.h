@@ -1,7 +1,7 @@
 #pragma once
 #include <string>
 
-#include "statistics_json.h"
+#include "statistics/statistics_json.h"
 #include "tandem/runtime/map.h"
 
 namespace tandem {

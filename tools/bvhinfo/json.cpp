@@ -1,5 +1,7 @@
 #include "page.h"
 
+#include "common/number_words.h"
+
 namespace tandem {
 namespace {
 

@@ -4,7 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "exit_code.h"
+#include "common/exit_code.h"
+#include "common/number_words.h"
 #include "page.h"
 
 namespace {

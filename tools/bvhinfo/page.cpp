@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "common/number_words.h"
+
 namespace tandem {
 namespace {
 

@@ -3,7 +3,7 @@
 #include <functional>
 #include <optional>
 
-#include "random_pose.h"
+#include "common/random_pose.h"
 
 /// Random poses of two bodies close to first contact, by which trees are measured (docs/poses.md).
 namespace tandem {

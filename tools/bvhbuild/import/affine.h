@@ -1,7 +1,7 @@
 #pragma once
 #include <array>
 
-#include "polygon_mesh.h"
+#include "bvhbuild/meshing/polygon_mesh.h"
 
 namespace tandem::build {
 

@@ -1,11 +1,11 @@
-#include "import/assimp_child.h"
+#include "assimp_child.h"
 
 #include <csignal>
 #include <cstdio>
 
-#include "import/assimp_scene.h"
-#include "import/limited_child.h"
-#include "import/mesh_message.h"
+#include "assimp_scene.h"
+#include "common/limited_child.h"
+#include "mesh_message.h"
 
 namespace tandem::build {
 namespace {

@@ -1,8 +1,8 @@
 #pragma once
 #include <filesystem>
 
-#include "import/import.h"
-#include "import/read_result.h"
+#include "import.h"
+#include "read_result.h"
 
 namespace tandem::build {
 

@@ -1,4 +1,4 @@
-#include "import/assimp_scene.h"
+#include "assimp_scene.h"
 
 #include <assimp/config.h>
 #include <assimp/mesh.h>
@@ -14,9 +14,9 @@
 #include <utility>
 #include <vector>
 
-#include "import/affine.h"
-#include "import/mesh_assembly.h"
-#include "import/printable.h"
+#include "affine.h"
+#include "common/printable.h"
+#include "mesh_assembly.h"
 
 namespace tandem::build {
 namespace {

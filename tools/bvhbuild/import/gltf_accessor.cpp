@@ -1,4 +1,4 @@
-#include "import/gltf_accessor.h"
+#include "gltf_accessor.h"
 
 #include <algorithm>
 #include <bit>
@@ -7,7 +7,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "import/binary_number.h"
+#include "binary_number.h"
 
 namespace tandem::build {
 namespace {

@@ -2,8 +2,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "import/gltf_model.h"
-#include "polygon_mesh.h"
+#include "bvhbuild/meshing/polygon_mesh.h"
+#include "gltf_model.h"
 
 namespace tandem::build {
 

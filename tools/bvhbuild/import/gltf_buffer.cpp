@@ -1,11 +1,11 @@
-#include "import/gltf_buffer.h"
+#include "gltf_buffer.h"
 
 #include <algorithm>
 #include <array>
 
-#include "import/gltf_model.h"
-#include "import/input_file.h"
-#include "import/printable.h"
+#include "common/printable.h"
+#include "gltf_model.h"
+#include "input_file.h"
 
 namespace tandem::build {
 namespace {
@@ -44,7 +44,7 @@ std::vector<char> bytes_of_data_uri(const GltfBufferSource& source) {
   const std::string_view uri = source.uri;
   const std::size_t comma = std::min(uri.find(','), uri.size());
   if (!uri.substr(0, comma).ends_with(";base64"))
-    throw GltfError(source.name + ": " + build::quoted(uri) + " is not the kind of data that a buffer has");
+    throw GltfError(source.name + ": " + in_quotes(uri) + " is not the kind of data that a buffer has");
   const std::string_view text = uri.substr(std::min(comma + 1, uri.size()));
   const bool is_escaped = text.find('%') != std::string_view::npos;
   std::vector<char> bytes = base64_decoded(is_escaped ? percent_decoded(text) : text, source.bytes);
@@ -54,7 +54,7 @@ std::vector<char> bytes_of_data_uri(const GltfBufferSource& source) {
 
 std::vector<char> bytes_of_file(const GltfBufferSource& source, GltfBufferPlaces& places) {
   if (has_scheme(source.uri))
-    throw GltfError(source.name + ": " + build::quoted(source.uri) + " is not a file beside the glTF");
+    throw GltfError(source.name + ": " + in_quotes(source.uri) + " is not a file beside the glTF");
   const std::string name = percent_decoded(source.uri);
   InputFile file;
   std::vector<char> bytes;
@@ -65,7 +65,7 @@ std::vector<char> bytes_of_file(const GltfBufferSource& source, GltfBufferPlaces
   if (wrong.empty() && source.bytes > places.most_bytes_in_files)
     wrong = "its bytes take more than the memory limit (--memory-limit)";
   if (wrong.empty()) wrong = file.read_first(source.bytes, bytes);
-  if (!wrong.empty()) throw GltfError(source.name + ": " + build::quoted(name) + ": " + wrong);
+  if (!wrong.empty()) throw GltfError(source.name + ": " + in_quotes(name) + ": " + wrong);
   places.most_bytes_in_files -= source.bytes;
   return bytes;
 }

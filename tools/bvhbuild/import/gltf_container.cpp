@@ -1,10 +1,10 @@
-#include "import/gltf_container.h"
+#include "gltf_container.h"
 
 #include <bit>
 #include <cstdint>
 
-#include "import/binary_number.h"
-#include "import/gltf_model.h"
+#include "binary_number.h"
+#include "gltf_model.h"
 
 namespace tandem::build {
 namespace {

@@ -1,9 +1,9 @@
-#include "import/gltf_json.h"
+#include "gltf_json.h"
 
 #include <algorithm>
 
-#include "import/gltf_model.h"
-#include "import/printable.h"
+#include "common/printable.h"
+#include "gltf_model.h"
 
 namespace tandem::build {
 namespace {

@@ -1,10 +1,10 @@
-#include "import/gltf_model.h"
+#include "gltf_model.h"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "import/printable.h"
+#include "common/printable.h"
 
 namespace tandem::build {
 namespace {
@@ -30,13 +30,13 @@ void check_required_extensions(const std::vector<std::string>& required, std::ve
     if (name == "EXT_mesh_gpu_instancing")
       throw GltfError("its meshes are repeated by EXT_mesh_gpu_instancing, which Tandem does not read");
     if (!leaves_triangles_alone(name) && remarks.size() < kMostRemarks)
-      remarks.push_back("requires the extension " + build::quoted(name) + ", which is passed over");
+      remarks.push_back("requires the extension " + in_quotes(name) + ", which is passed over");
   }
 }
 
 GltfBufferSource buffer_source(const GltfObject& buffer, std::size_t index) {
   const std::string name = buffer.text("name");
-  return {"buffers[" + std::to_string(index) + "]" + (name.empty() ? "" : " " + build::quoted(name)),
+  return {"buffers[" + std::to_string(index) + "]" + (name.empty() ? "" : " " + in_quotes(name)),
           buffer.text("uri"), buffer.size("byteLength")};
 }
 
@@ -195,7 +195,7 @@ void check_gltf_version(const std::string& version) {
   if (version.empty()) throw GltfError("is no glTF: its JSON names no asset.version");
   if (version.starts_with("1.") || version == "1") throw GltfError(kGltf1);
   if (version.starts_with("2.") || version == "2") return;
-  throw GltfError("is glTF " + build::quoted(version) + "; Tandem reads glTF 2");
+  throw GltfError("is glTF " + in_quotes(version) + "; Tandem reads glTF 2");
 }
 
 GltfModel read_gltf_model(const GltfObject& root, GltfBufferPlaces places) {

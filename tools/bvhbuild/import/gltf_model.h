@@ -6,9 +6,9 @@
 #include <string_view>
 #include <vector>
 
-#include "import/affine.h"
-#include "import/gltf_buffer.h"
-#include "import/gltf_json.h"
+#include "affine.h"
+#include "gltf_buffer.h"
+#include "gltf_json.h"
 
 namespace tandem::build {
 

@@ -1,14 +1,14 @@
-#include "import/gltf_scene.h"
+#include "gltf_scene.h"
 
 #include <map>
 #include <memory>
 #include <string_view>
 #include <utility>
 
-#include "import/gltf_accessor.h"
-#include "import/mesh_assembly.h"
-#include "import/printable.h"
-#include "import/triangle_strip.h"
+#include "common/printable.h"
+#include "gltf_accessor.h"
+#include "mesh_assembly.h"
+#include "triangle_strip.h"
 
 namespace tandem::build {
 namespace {
@@ -24,7 +24,7 @@ std::string numbered(const char* list, std::size_t index) {
 }
 
 std::string described(const char* list, std::size_t index, std::string_view name) {
-  return name.empty() ? numbered(list, index) : numbered(list, index) + " " + quoted(name);
+  return name.empty() ? numbered(list, index) : numbered(list, index) + " " + in_quotes(name);
 }
 
 /// Nodes and meshes without a name are told apart by their number. Nobody sees the end of a long name.

@@ -1,8 +1,8 @@
 #pragma once
 #include <cstdint>
 
-#include "import/gltf_model.h"
-#include "import/read_result.h"
+#include "gltf_model.h"
+#include "read_result.h"
 
 namespace tandem::build {
 

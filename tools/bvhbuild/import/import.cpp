@@ -1,4 +1,4 @@
-#include "import/import.h"
+#include "import.h"
 
 #include <algorithm>
 #include <exception>
@@ -6,15 +6,15 @@
 #include <string_view>
 #include <utility>
 
-#include "import/assimp_child.h"
-#include "import/gltf_model.h"
-#include "import/input_file.h"
-#include "import/read_gltf.h"
-#include "import/read_obj.h"
-#include "import/read_off.h"
-#include "import/read_ply.h"
-#include "import/read_result.h"
-#include "import/read_stl.h"
+#include "assimp_child.h"
+#include "gltf_model.h"
+#include "input_file.h"
+#include "read_gltf.h"
+#include "read_obj.h"
+#include "read_off.h"
+#include "read_ply.h"
+#include "read_result.h"
+#include "read_stl.h"
 
 namespace tandem::build {
 namespace {

@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <filesystem>
 
-#include "import/read_result.h"
+#include "read_result.h"
 
 namespace tandem::build {
 

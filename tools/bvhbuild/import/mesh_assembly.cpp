@@ -1,8 +1,8 @@
-#include "import/mesh_assembly.h"
+#include "mesh_assembly.h"
 
 #include <utility>
 
-#include "import/printable.h"
+#include "common/printable.h"
 
 namespace tandem::build {
 

@@ -4,8 +4,8 @@
 #include <string>
 #include <string_view>
 
-#include "import/read_result.h"
-#include "polygon_mesh.h"
+#include "bvhbuild/meshing/polygon_mesh.h"
+#include "read_result.h"
 
 namespace tandem::build {
 

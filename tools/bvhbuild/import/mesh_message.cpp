@@ -1,4 +1,4 @@
-#include "import/mesh_message.h"
+#include "mesh_message.h"
 
 #include <algorithm>
 #include <limits>

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <functional>
 
-#include "import/read_result.h"
+#include "read_result.h"
 
 namespace tandem::build {
 

@@ -1,4 +1,4 @@
-#include "import/number_text.h"
+#include "number_text.h"
 
 #include <algorithm>
 #include <charconv>

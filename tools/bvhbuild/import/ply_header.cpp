@@ -1,11 +1,11 @@
-#include "import/ply_header.h"
+#include "ply_header.h"
 
 #include <algorithm>
 #include <utility>
 
-#include "import/number_text.h"
-#include "import/printable.h"
-#include "import/text_scanner.h"
+#include "common/printable.h"
+#include "number_text.h"
+#include "text_scanner.h"
 
 namespace tandem::build {
 namespace {
@@ -96,14 +96,14 @@ bool HeaderReader::statement() {
   if (keyword == "element") return element();
   if (keyword == "property") return property();
   if (keyword == "comment" || keyword == "obj_info" || keyword.empty()) return true;
-  return fail(quoted(keyword) + " is no keyword of a PLY header");
+  return fail(in_quotes(keyword) + " is no keyword of a PLY header");
 }
 
 bool HeaderReader::format() {
   const std::string_view name = take_word();
   const std::string_view version = take_word();
   has_format_ = true;
-  if (version != "1.0") return fail("PLY version " + quoted(version) + " is not 1.0");
+  if (version != "1.0") return fail("PLY version " + in_quotes(version) + " is not 1.0");
   if (name == "ascii") {
     header_.format = PlyFormat::ascii;
   } else if (name == "binary_little_endian") {
@@ -111,7 +111,7 @@ bool HeaderReader::format() {
   } else if (name == "binary_big_endian") {
     header_.format = PlyFormat::binary_big_endian;
   } else {
-    return fail(quoted(name) + " is no format of a PLY file");
+    return fail(in_quotes(name) + " is no format of a PLY file");
   }
   return true;
 }
@@ -123,7 +123,7 @@ bool HeaderReader::element() {
   const char* const end = word.data() + word.size();
   std::int64_t count = 0;
   const bool is_count = !word.empty() && parse_integer(word.data(), end, count) == end && count >= 0;
-  if (!is_count) return fail(quoted(word) + " is no count of " + quoted(element.name));
+  if (!is_count) return fail(in_quotes(word) + " is no count of " + in_quotes(element.name));
   element.count = static_cast<std::uint64_t>(count);
   header_.elements.push_back(std::move(element));
   return true;
@@ -153,7 +153,7 @@ bool HeaderReader::type(PlyType& type) {
     type = candidate.type;
     return true;
   }
-  return fail(quoted(word) + " is no type of a PLY property");
+  return fail(in_quotes(word) + " is no type of a PLY property");
 }
 
 std::string_view HeaderReader::take_word() {

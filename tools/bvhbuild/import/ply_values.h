@@ -7,10 +7,10 @@
 #include <string>
 #include <string_view>
 
-#include "import/binary_number.h"
-#include "import/ply_header.h"
-#include "import/printable.h"
-#include "import/text_scanner.h"
+#include "binary_number.h"
+#include "common/printable.h"
+#include "ply_header.h"
+#include "text_scanner.h"
 
 namespace tandem::build {
 
@@ -137,13 +137,13 @@ class PlyTextValues {
 
   double real(PlyType) {
     double value = 0;
-    if (at_value() && !text_.read_real(value)) fail(quoted(text_.word()) + " is not a number");
+    if (at_value() && !text_.read_real(value)) fail(in_quotes(text_.word()) + " is not a number");
     return value;
   }
   std::int64_t integer(PlyType type) {
     if (is_real(type)) return index_from_real(real(type));
     std::int64_t value = 0;
-    if (at_value() && !text_.read_integer(value)) fail(quoted(text_.word()) + " is not an integer");
+    if (at_value() && !text_.read_integer(value)) fail(in_quotes(text_.word()) + " is not an integer");
     return value;
   }
   void skip(PlyType, std::uint64_t count) {

@@ -1,9 +1,9 @@
-#include "import/read_gltf.h"
+#include "read_gltf.h"
 
-#include "import/gltf_container.h"
-#include "import/gltf_json.h"
-#include "import/gltf_model.h"
-#include "import/gltf_scene.h"
+#include "gltf_container.h"
+#include "gltf_json.h"
+#include "gltf_model.h"
+#include "gltf_scene.h"
 
 namespace tandem::build {
 namespace {

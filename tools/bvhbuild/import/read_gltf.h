@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <string_view>
 
-#include "import/read_result.h"
+#include "read_result.h"
 
 namespace tandem::build {
 

@@ -1,11 +1,11 @@
-#include "import/read_obj.h"
+#include "read_obj.h"
 
 #include <optional>
 #include <utility>
 
-#include "import/mesh_assembly.h"
-#include "import/printable.h"
-#include "import/text_scanner.h"
+#include "common/printable.h"
+#include "mesh_assembly.h"
+#include "text_scanner.h"
 
 namespace tandem::build {
 namespace {
@@ -76,7 +76,7 @@ bool ObjReader::vertex() {
   Point point;
   for (double& coordinate : point) {
     if (!at_value()) return fail("a vertex needs three coordinates");
-    if (!text_.read_real(coordinate)) return fail(quoted(text_.word()) + " is not a number");
+    if (!text_.read_real(coordinate)) return fail(in_quotes(text_.word()) + " is not a number");
   }
   mesh_.add_point(point);
   text_.skip_to_line_end();
@@ -90,7 +90,7 @@ bool ObjReader::face() {
   while (at_value()) {
     const char* const place = text_.cursor();
     std::int64_t written = 0;
-    if (!text_.read_integer(written, '/')) return fail(quoted(text_.word()) + " is not a vertex index");
+    if (!text_.read_integer(written, '/')) return fail(in_quotes(text_.word()) + " is not a vertex index");
     if (text_.peek() == '/') text_.skip_word();
     corner(written, place);
   }

@@ -1,12 +1,12 @@
-#include "import/read_off.h"
+#include "read_off.h"
 
 #include <algorithm>
 #include <utility>
 
-#include "import/binary_number.h"
-#include "import/mesh_assembly.h"
-#include "import/printable.h"
-#include "import/text_scanner.h"
+#include "binary_number.h"
+#include "common/printable.h"
+#include "mesh_assembly.h"
+#include "text_scanner.h"
 
 namespace tandem::build {
 namespace {
@@ -94,9 +94,10 @@ bool OffReader::keyword(std::string_view letters) {
       kind_.texture = true;
       used = 2;
     } else if (letters[0] == '4' || letters[0] == 'n') {
-      return fail(quoted(text_.word()) + " holds points of other than three dimensions, which are not read");
+      return fail(in_quotes(text_.word()) +
+                  " holds points of other than three dimensions, which are not read");
     } else {
-      return fail(quoted(text_.word()) + " is no kind of OFF file known here");
+      return fail(in_quotes(text_.word()) + " is no kind of OFF file known here");
     }
     letters.remove_prefix(used);
   }
@@ -264,7 +265,7 @@ bool OffReader::too_few_faces() {
 }
 
 bool OffReader::fail_here(std::string_view expected) {
-  const std::string found = text_.at_end() ? "the file ends" : quoted(text_.word());
+  const std::string found = text_.at_end() ? "the file ends" : in_quotes(text_.word());
   return fail(found + " where " + std::string(expected) + " is expected");
 }
 

@@ -1,13 +1,13 @@
-#include "import/read_ply.h"
+#include "read_ply.h"
 
 #include <algorithm>
 #include <utility>
 #include <vector>
 
-#include "import/mesh_assembly.h"
-#include "import/ply_header.h"
-#include "import/ply_values.h"
-#include "import/triangle_strip.h"
+#include "mesh_assembly.h"
+#include "ply_header.h"
+#include "ply_values.h"
+#include "triangle_strip.h"
 
 namespace tandem::build {
 namespace {
@@ -47,7 +47,7 @@ std::vector<Role> roles_of(const PlyElement& element) {
 std::string counted(std::uint64_t count, std::string_view element) {
   const std::string number = std::to_string(count) + " ";
   if (element == "vertex") return number + "vertices";
-  return number + (element == "face" ? "faces" : "elements " + quoted(element));
+  return number + (element == "face" ? "faces" : "elements " + in_quotes(element));
 }
 
 // The reason why the elements make no mesh, or nothing.
@@ -62,7 +62,7 @@ std::string defect_of(const PlyHeader& header) {
     const ElementKind kind = kind_of(element);
     if (element.count == 0 || kind == ElementKind::other) continue;
     if (kind != ElementKind::vertex && lacks(Role::corners))
-      return "the element " + quoted(element.name) + " has no list 'vertex_indices'";
+      return "the element " + in_quotes(element.name) + " has no list 'vertex_indices'";
     if (kind == ElementKind::vertex && (lacks(Role::x) || lacks(Role::y) || lacks(Role::z)))
       return "the element 'vertex' has no x, y and z";
   }
@@ -215,7 +215,7 @@ template <class Values>
 void PlyReader<Values>::remark_long_line() {
   if constexpr (std::is_same_v<Values, PlyTextValues>) {
     if (!std::exchange(any_long_line_, true))
-      mesh_.remark(values_.line() + ": more values than the header lists for " + quoted(element_->name));
+      mesh_.remark(values_.line() + ": more values than the header lists for " + in_quotes(element_->name));
   }
 }
 

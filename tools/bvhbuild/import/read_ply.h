@@ -1,7 +1,7 @@
 #pragma once
 #include <string_view>
 
-#include "import/read_result.h"
+#include "read_result.h"
 
 namespace tandem::build {
 

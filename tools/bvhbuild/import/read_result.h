@@ -2,7 +2,7 @@
 #include <string>
 #include <utility>
 
-#include "polygon_mesh.h"
+#include "bvhbuild/meshing/polygon_mesh.h"
 
 namespace tandem::build {
 

@@ -1,4 +1,4 @@
-#include "import/read_stl.h"
+#include "read_stl.h"
 
 #include <bit>
 #include <cmath>
@@ -6,10 +6,10 @@
 #include <cstring>
 #include <utility>
 
-#include "import/binary_number.h"
-#include "import/mesh_assembly.h"
-#include "import/printable.h"
-#include "import/text_scanner.h"
+#include "binary_number.h"
+#include "common/printable.h"
+#include "mesh_assembly.h"
+#include "text_scanner.h"
 
 namespace tandem::build {
 namespace {
@@ -159,7 +159,7 @@ bool TextReader::expect(std::string_view keyword) {
 }
 
 bool TextReader::fail_expecting(std::string_view what) {
-  const std::string found = text_.at_end() ? "the file ends" : quoted(text_.word());
+  const std::string found = text_.at_end() ? "the file ends" : in_quotes(text_.word());
   error_ = text_.line() + ": " + found + " where " + std::string(what) + " is expected";
   return false;
 }

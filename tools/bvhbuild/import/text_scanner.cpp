@@ -1,4 +1,4 @@
-#include "import/text_scanner.h"
+#include "text_scanner.h"
 
 #include <algorithm>
 

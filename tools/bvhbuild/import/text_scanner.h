@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "import/number_text.h"
+#include "number_text.h"
 
 namespace tandem::build {
 

@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "import/mesh_assembly.h"
+#include "mesh_assembly.h"
 
 namespace tandem::build {
 

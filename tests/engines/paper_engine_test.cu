@@ -1,0 +1,406 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "engines/paper/paper_engine.h"
+#include "kernels/query_scenes.h"
+#include "tandem/kernels/contact_query.h"
+#include "tandem/runtime/upload.h"
+
+namespace tandem::bench {
+namespace {
+
+using test::RandomPoses;
+using test::Scene;
+
+constexpr PaperFlags kFlags[] = {PaperFlags::words, PaperFlags::bytes, PaperFlags::bits};
+
+/// An array in GPU memory.
+template <typename Element>
+class OnGpu {
+ public:
+  explicit OnGpu(const std::vector<Element>& host) {
+    const std::size_t bytes = host.size() * sizeof(Element);
+    void* memory = nullptr;
+    EXPECT_EQ(cudaMalloc(&memory, std::max<std::size_t>(bytes, 1)), cudaSuccess);
+    data_ = static_cast<Element*>(memory);
+    EXPECT_EQ(cudaMemcpy(data_, host.data(), bytes, cudaMemcpyHostToDevice), cudaSuccess);
+  }
+  OnGpu(const OnGpu&) = delete;
+  OnGpu& operator=(const OnGpu&) = delete;
+  ~OnGpu() { cudaFree(data_); }
+
+  Element* data() const { return data_; }
+
+ private:
+  Element* data_ = nullptr;
+};
+
+auto key(const Contact& c) {
+  return std::tie(c.pair, c.triangle_a, c.triangle_b, c.face_a, c.face_b);
+}
+
+bool less(const Contact& x, const Contact& y) {
+  return key(x) < key(y);
+}
+
+std::vector<Contact> sorted(std::vector<Contact> contacts) {
+  std::sort(contacts.begin(), contacts.end(), less);
+  return contacts;
+}
+
+std::vector<Contact> contacts_of(const PaperEngine& engine) {
+  std::vector<Contact> contacts(engine.report().counters.contacts);
+  EXPECT_EQ(cudaMemcpy(contacts.data(), engine.contacts(), contacts.size() * sizeof(Contact),
+                       cudaMemcpyDeviceToHost),
+            cudaSuccess);
+  return sorted(contacts);
+}
+
+/// A scene, all of it in GPU memory, and its object pairs.
+class GpuScene {
+ public:
+  GpuScene(const Scene& scene, const std::vector<ObjectPair>& pairs)
+      : asset_(part(scene, &Instance::asset)),
+        pose_(part(scene, &Instance::pose)),
+        pairs_(pairs),
+        count_({static_cast<std::uint32_t>(pairs.size())}),
+        instance_count_(static_cast<std::uint32_t>(scene.instances.size())),
+        pair_count_(static_cast<std::uint32_t>(pairs.size())) {
+    for (const AssetView& view : scene.assets.views()) {
+      uploads_.push_back(std::make_unique<DeviceAsset>());
+      EXPECT_EQ(uploads_.back()->upload(view, nullptr), Status::kOk);
+      views_.push_back(gpu_asset(uploads_.back()->level(), *view.header));
+    }
+  }
+
+  std::span<const GpuAsset> assets() const { return views_; }
+  GpuInstances instances() const { return {asset_.data(), pose_.data(), instance_count_}; }
+  GpuPairs pairs() const { return {pairs_.data(), count_.data(), pair_count_}; }
+
+ private:
+  template <typename Value>
+  static std::vector<Value> part(const Scene& scene, Value Instance::*member) {
+    std::vector<Value> out;
+    for (const Instance& instance : scene.instances) out.push_back(instance.*member);
+    return out;
+  }
+
+  std::vector<std::unique_ptr<DeviceAsset>> uploads_;
+  std::vector<GpuAsset> views_;
+  OnGpu<std::uint32_t> asset_;
+  OnGpu<Pose> pose_;
+  OnGpu<ObjectPair> pairs_;
+  OnGpu<std::uint32_t> count_;
+  std::uint32_t instance_count_, pair_count_;
+};
+
+struct CpuAnswer {
+  Status status;
+  std::uint64_t where;
+  std::vector<Contact> contacts;
+  QueryCounters counters;
+};
+
+CpuAnswer ask_cpu(const Scene& scene, const std::vector<ObjectPair>& pairs) {
+  ContactQuery query;
+  EXPECT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+  const Status status = query.find_contacts(scene.instances, pairs, {});
+  return {status, query.where(), sorted({query.contacts().begin(), query.contacts().end()}),
+          query.counters()};
+}
+
+/// Every two instances, in either order, and with `selves` each with itself.
+std::vector<ObjectPair> all_pairs(const Scene& scene, bool selves, RandomPoses& random) {
+  std::vector<ObjectPair> pairs;
+  const auto count = static_cast<std::uint32_t>(scene.instances.size());
+  for (std::uint32_t a = 0; a < count; ++a) {
+    for (std::uint32_t b = selves ? a : a + 1; b < count; ++b) {
+      pairs.push_back(random.below(2) == 0 ? ObjectPair{a, b} : ObjectPair{b, a});
+    }
+  }
+  return pairs;
+}
+
+Status ask(PaperEngine& engine, const GpuScene& scene, const PaperOptions& options) {
+  const Status status = engine.find_contacts(scene.instances(), scene.pairs(), options, nullptr);
+  EXPECT_EQ(engine.cuda_error(), cudaSuccess) << cudaGetErrorString(engine.cuda_error());
+  return status;
+}
+
+/// The exact contacts, by every way of storing flags and both box tests.
+void expect_contacts(PaperEngine& engine, const GpuScene& scene, const CpuAnswer& expected) {
+  for (const bool six_axes : {false, true}) {
+    std::uint64_t block_pairs = 0;
+    for (const PaperFlags flags : kFlags) {
+      SCOPED_TRACE(testing::Message() << "flags " << static_cast<int>(flags) << " six axes " << six_axes);
+      ASSERT_EQ(ask(engine, scene, {QueryMode::exact, flags, six_axes}), Status::kOk);
+      const QueryCounters& counters = engine.report().counters;
+      ASSERT_EQ(counters.contacts, expected.contacts.size());
+      ASSERT_EQ(contacts_of(engine), expected.contacts);
+      EXPECT_EQ(counters.candidates,
+                counters.decided_by_float32 + counters.decided_by_float64 + counters.decided_exactly);
+      if (flags == kFlags[0]) block_pairs = counters.block_pairs;
+      EXPECT_EQ(counters.block_pairs, block_pairs);
+    }
+  }
+}
+
+void expect_contacts_of(const Scene& scene, const std::vector<ObjectPair>& pairs) {
+  const CpuAnswer expected = ask_cpu(scene, pairs);
+  const GpuScene on_gpu(scene, pairs);
+  PaperEngine engine;
+  ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk)
+      << cudaGetErrorString(engine.cuda_error());
+  if (expected.status == Status::kOk) return expect_contacts(engine, on_gpu, expected);
+  EXPECT_EQ(ask(engine, on_gpu, {}), expected.status);
+  EXPECT_EQ(engine.report().where, expected.where);
+}
+
+bool no_gpu() {
+  int count = 0;
+  if (cudaGetDeviceCount(&count) == cudaSuccess && count > 0) return false;
+  static_cast<void>(cudaGetLastError());
+  return true;
+}
+
+class PaperContacts : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (no_gpu()) GTEST_SKIP() << "no GPU here";
+  }
+};
+
+class PaperContactsOf : public testing::TestWithParam<test::SceneFamily> {
+ protected:
+  void SetUp() override {
+    if (no_gpu()) GTEST_SKIP() << "no GPU here";
+  }
+};
+
+/// Whether the float32 box tests take every pair, which is what the engine can do.
+bool in_reach(const Scene& scene, const std::vector<ObjectPair>& pairs) {
+  const auto pose = [&](const Instance& instance) {
+    return for_stored_coordinates(instance.pose, scene.assets.views()[instance.asset].header->origin);
+  };
+  const auto extent = [&](const Instance& instance) {
+    return extent_of(scene.assets.views()[instance.asset].level().blocks[0]);
+  };
+  return std::all_of(pairs.begin(), pairs.end(), [&](const ObjectPair& pair) {
+    const Instance &a = scene.instances[pair.a], &b = scene.instances[pair.b];
+    RelativePose out;
+    return relative_pose(pose(a), extent(a), pose(b), extent(b), out) == RelativePoseStatus::kOk;
+  });
+}
+
+TEST_P(PaperContactsOf, AreThoseOfTheCpu) {
+  RandomPoses random(1);
+  for (int trial = 0; trial < test::trials(15, 20); ++trial) {
+    const Scene scene = GetParam().make(random);
+    const std::vector<ObjectPair> pairs = all_pairs(scene, trial % 2 == 0, random);
+    SCOPED_TRACE(testing::Message() << "trial " << trial << '\n' << test::text(scene));
+    if (in_reach(scene, pairs)) {
+      expect_contacts_of(scene, pairs);
+    } else {
+      const GpuScene on_gpu(scene, pairs);
+      PaperEngine engine;
+      ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk);
+      EXPECT_EQ(ask(engine, on_gpu, {}), Status::kOutOfRange);
+    }
+    if (HasFatalFailure() || HasNonfatalFailure()) return;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(, PaperContactsOf, testing::ValuesIn(test::scene_families()),
+                         [](const auto& family) { return std::string(family.param.name); });
+
+/// Bodies at random places, close enough to meet.
+Scene pile(std::uint32_t bodies, std::uint32_t triangles, double spread, std::uint64_t seed) {
+  RandomPoses random(seed);
+  Scene scene;
+  scene.assets.add(test::soup(random, triangles, 0.1));
+  scene.assets.add(test::cube(0.5f, 12));
+  for (std::uint32_t i = 0; i < bodies; ++i) {
+    scene.instances.push_back({i % 2, random.pose({1, 1, spread, 0, 4})});
+  }
+  return scene;
+}
+
+/// Cubes that touch, face on face: every candidate is a hard case.
+Scene stack(int side, int cells) {
+  Scene scene;
+  scene.assets.add(test::cube(0.5f, cells));
+  for (int i = 0; i < side * side * side; ++i) {
+    Pose pose = kIdentityPose;
+    pose.translation[0] = i % side, pose.translation[1] = i / side % side,
+    pose.translation[2] = i / side / side;
+    scene.instances.push_back({0, pose});
+  }
+  return scene;
+}
+
+TEST_F(PaperContacts, OfAPileAreThoseOfTheCpu) {
+  RandomPoses random(2);
+  const Scene scene = pile(150, 3000, 4, 7);
+  const auto pairs = all_pairs(scene, false, random);
+  EXPECT_GT(ask_cpu(scene, pairs).contacts.size(), 10000u);
+  expect_contacts_of(scene, pairs);
+}
+
+TEST_F(PaperContacts, OfAnExactStackAreThoseOfTheCpu) {
+  RandomPoses random(3);
+  const Scene scene = stack(4, 3);
+  const auto pairs = all_pairs(scene, true, random);
+  EXPECT_GT(ask_cpu(scene, pairs).contacts.size(), 10000u);
+  expect_contacts_of(scene, pairs);
+}
+
+// Trees of different depths: one side descends alone for long.
+TEST_F(PaperContacts, OfALargeBodyAndASmallOneAreThoseOfTheCpu) {
+  RandomPoses random(4);
+  Scene scene;
+  scene.assets.add(test::soup(random, 8000, 0.05));
+  scene.assets.add(test::cube(0.5f));
+  test::Mesh one;
+  one.add({-2, 0, 0}, {2, 0, 0}, {0, 2, 0.5f});
+  scene.assets.add(one);
+  for (const std::uint32_t asset : {0u, 1u, 2u, 0u})
+    scene.instances.push_back({asset, random.pose({1, 1, 0.2, 0, 4})});
+  expect_contacts_of(scene, all_pairs(scene, true, random));
+}
+
+// The same candidates, each once, as every node pair of the leaves says: no flag is lost and none is double.
+TEST_F(PaperContacts, OfRepeatedTrianglesAreAllPairs) {
+  Scene scene;
+  test::Mesh mesh;
+  for (int i = 0; i < 700; ++i) mesh.add({0, 0, 0}, {1, 0, 0}, {0, 1, 0.5f});
+  scene.assets.add(mesh);
+  test::Mesh few;
+  for (int i = 0; i < 7; ++i) few.add({0, 0, 0}, {1, 0, 0}, {0, 1, 0.5f});
+  scene.assets.add(few);
+  scene.instances = {{0, kIdentityPose}, {0, kIdentityPose}, {1, kIdentityPose}};
+  const std::vector<ObjectPair> pairs = {{0, 1}, {2, 1}, {0, 2}};
+  const GpuScene on_gpu(scene, pairs);
+  PaperEngine engine;
+  ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk);
+  for (const PaperFlags flags : kFlags) {
+    for (const QueryMode mode : {QueryMode::boxes, QueryMode::exact, QueryMode::fast}) {
+      ASSERT_EQ(ask(engine, on_gpu, {mode, flags, false}), Status::kOk);
+      const std::vector<Contact> contacts = contacts_of(engine);
+      EXPECT_EQ(contacts.size(), 700u * 700u + 2u * 7u * 700u);
+      EXPECT_TRUE(std::adjacent_find(contacts.begin(), contacts.end()) == contacts.end());
+    }
+  }
+}
+
+TEST_F(PaperContacts, OfBoxesIncludeAllContacts) {
+  RandomPoses random(5);
+  const Scene scene = pile(60, 800, 3, 9);
+  const auto pairs = all_pairs(scene, true, random);
+  const CpuAnswer expected = ask_cpu(scene, pairs);
+  const GpuScene on_gpu(scene, pairs);
+  PaperEngine engine;
+  ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk);
+  std::vector<Contact> by_axes[2];
+  for (const bool six_axes : {false, true}) {
+    ASSERT_EQ(ask(engine, on_gpu, {QueryMode::boxes, PaperFlags::bits, six_axes}), Status::kOk);
+    by_axes[six_axes] = contacts_of(engine);
+    EXPECT_TRUE(std::adjacent_find(by_axes[six_axes].begin(), by_axes[six_axes].end()) ==
+                by_axes[six_axes].end());
+  }
+  const auto includes = [](const std::vector<Contact>& all, const std::vector<Contact>& some) {
+    return std::includes(all.begin(), all.end(), some.begin(), some.end(), less);
+  };
+  EXPECT_TRUE(includes(by_axes[0], expected.contacts));
+  EXPECT_TRUE(includes(by_axes[1], by_axes[0]));
+  EXPECT_LT(by_axes[0].size(), by_axes[1].size());
+}
+
+TEST_F(PaperContacts, OfLargerAndLargerScenesNeedNoNewEngine) {
+  RandomPoses random(6);
+  PaperEngine engine;
+  std::size_t bytes = 0;
+  for (const std::uint32_t bodies : {4u, 30u, 90u}) {
+    const Scene scene = pile(bodies, 800, 2, 10);
+    const auto pairs = all_pairs(scene, false, random);
+    const CpuAnswer expected = ask_cpu(scene, pairs);
+    const GpuScene on_gpu(scene, pairs);
+    ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk);
+    expect_contacts(engine, on_gpu, expected);
+    EXPECT_GT(engine.bytes(), bytes);
+    bytes = engine.bytes();
+    for (int again = 0; again < 3; ++again) expect_contacts(engine, on_gpu, expected);
+    EXPECT_EQ(engine.bytes(), bytes);  // settled
+  }
+  const Scene small = pile(3, 100, 1, 11);
+  const auto pairs = all_pairs(small, false, random);
+  const GpuScene on_gpu(small, pairs);
+  ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk);
+  expect_contacts(engine, on_gpu, ask_cpu(small, pairs));
+}
+
+TEST_F(PaperContacts, OfNothingAreNone) {
+  for (const bool instances : {false, true}) {
+    Scene scene = pile(2, 100, 1, 11);
+    if (!instances) scene.instances.clear();
+    const GpuScene on_gpu(scene, {});
+    PaperEngine engine;
+    ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk);
+    EXPECT_EQ(ask(engine, on_gpu, {}), Status::kOk);
+    EXPECT_EQ(engine.report().counters, QueryCounters());
+    EXPECT_EQ(engine.report().levels, 0u);
+  }
+}
+
+TEST_F(PaperContacts, NameWhatIsWrong) {
+  Scene scene = pile(50, 100, 1, 12);
+  std::vector<ObjectPair> pairs;
+  for (std::uint32_t i = 1; i < 50; ++i) pairs.push_back({0, i});
+  const auto expect = [&](Status status, std::uint64_t where) {
+    const CpuAnswer expected = ask_cpu(scene, pairs);
+    EXPECT_EQ(expected.status, status);
+    EXPECT_EQ(expected.where, where);
+    expect_contacts_of(scene, pairs);
+  };
+  pairs[20].b = 50;
+  expect(Status::kUnknownInstance, 20);
+  scene.instances[40].asset = 2;
+  expect(Status::kUnknownAsset, 40);
+  scene.instances[33].pose.rotation[1][1] += 1e-3;
+  expect(Status::kPoseNotRigid, 33);
+}
+
+TEST_F(PaperContacts, OutOfReachOfFloat32AreRefused) {
+  Scene scene = pile(4, 40, 1, 8);
+  for (Instance& instance : scene.instances) instance.pose.translation[1] += 1e52;
+  const GpuScene on_gpu(scene, {{0, 1}, {2, 3}});
+  PaperEngine engine;
+  ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk);
+  EXPECT_EQ(ask(engine, on_gpu, {}), Status::kOutOfRange);
+  EXPECT_EQ(engine.report().counters.contacts, 0u);
+  GpuPairs pairs = on_gpu.pairs();
+  pairs.capacity = 1;
+  EXPECT_EQ(engine.find_contacts(on_gpu.instances(), pairs, {}, nullptr), Status::kOutOfRange);
+}
+
+TEST_F(PaperContacts, MoveFromOneOwnerToAnother) {
+  const Scene scene = pile(10, 300, 1, 14);
+  const GpuScene on_gpu(scene, {{0, 1}, {2, 3}});
+  PaperEngine first;
+  ASSERT_EQ(first.set_assets(on_gpu.assets(), nullptr), Status::kOk);
+  ASSERT_EQ(ask(first, on_gpu, {}), Status::kOk);
+  const auto expected = contacts_of(first);
+  EXPECT_FALSE(expected.empty());
+  PaperEngine second = std::move(first);
+  EXPECT_EQ(contacts_of(second), expected);
+  ASSERT_EQ(ask(second, on_gpu, {}), Status::kOk);
+  EXPECT_EQ(contacts_of(second), expected);
+}
+
+}  // namespace
+}  // namespace tandem::bench

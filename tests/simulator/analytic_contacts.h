@@ -1,0 +1,24 @@
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "simulator/simulator.h"
+
+/// Contacts by formula, for tests of the simulator without meshes.
+namespace tandem::simulation {
+
+/// A box of this mass with its centre at the origin of its frame.
+BodyProperties box_body(const Eigen::Vector3d& size, double mass);
+
+/// A body that nothing moves.
+BodyProperties fixed_body();
+
+/// Body 0 is the half-space below the plane through the origin with this normal; the other bodies are boxes.
+/// The corners of each box that lie in the half-space are contacts, and so are those bottom corners of box i
+/// + 1 that lie below the top of box i, over its footprint in the frame of box i.
+std::unique_ptr<ContactFinder> boxes_on_plane(const Eigen::Vector3d& normal, const Eigen::Vector3d& size);
+
+/// No contacts.
+std::unique_ptr<ContactFinder> no_contacts();
+
+}  // namespace tandem::simulation

@@ -1,0 +1,485 @@
+#include "simulator/contacts/contact_generation.h"
+
+#include <gtest/gtest.h>
+#include <oneapi/tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "contact_scene.h"
+
+namespace tandem::test {
+namespace {
+
+using Eigen::Isometry3d;
+using Eigen::Vector3d;
+using simulation::ContactPoint;
+
+const Vector3d kX = Vector3d::UnitX(), kZ = Vector3d::UnitZ();
+
+// Whether some point lies at `x`, along the plane across `normal`.
+bool any_at(const std::vector<ContactPoint>& points, const Vector3d& x, double tolerance) {
+  return std::any_of(points.begin(), points.end(), [&](const ContactPoint& p) {
+    const Vector3d d = p.position - x;
+    return (d - d.dot(p.normal) * p.normal).norm() <= tolerance;
+  });
+}
+
+// All points have this normal and depth.
+void expect_all(const std::vector<ContactPoint>& points, const Vector3d& normal, double depth,
+                double tolerance) {
+  EXPECT_FALSE(points.empty());
+  for (const ContactPoint& p : points) {
+    EXPECT_LT((p.normal - normal).norm(), 1e-9);
+    EXPECT_NEAR(p.depth, depth, tolerance);
+    EXPECT_LT(p.body_a, p.body_b);
+    EXPECT_NE(p.feature, 0u);
+  }
+}
+
+struct BoxPair {
+  double depth, shift_x, shift_y;
+  int cells_a, cells_b;
+};
+
+void PrintTo(const BoxPair& pair, std::ostream* out) {
+  *out << "depth " << pair.depth << ", shift " << pair.shift_x << " " << pair.shift_y << ", cells "
+       << pair.cells_a << " on " << pair.cells_b;
+}
+
+class BoxOnBox : public testing::TestWithParam<BoxPair> {};
+
+TEST_P(BoxOnBox, HasTheOverlapsCornersItsNormalAndItsDepth) {
+  const BoxPair& pair = GetParam();
+  ContactScene scene;
+  scene.add_body(scene.add_shape(cube(0.5f, pair.cells_a)), at(0, 0, 0));
+  scene.add_body(scene.add_shape(cube(0.5f, pair.cells_b)), at(pair.shift_x, pair.shift_y, 1 - pair.depth));
+  RandomPoses random(1);
+  for (int trial = 0; trial < 20; ++trial) {
+    const Isometry3d motion = trial == 0 ? Isometry3d::Identity() : random_motion(random, 3);
+    const auto points = scene.points(motion);
+    expect_all(points, motion.linear() * kZ, pair.depth, 1e-13);
+    EXPECT_EQ(points.size(), 4u);
+    for (const double x : {-0.5, 0.5}) {
+      for (const double y : {-0.5, 0.5}) {
+        const Vector3d corner(x + (x * pair.shift_x < 0 ? pair.shift_x : 0),
+                              y + (y * pair.shift_y < 0 ? pair.shift_y : 0), 0.5 - pair.depth / 2);
+        EXPECT_TRUE(any_at(points, motion * corner, 1e-6)) << corner.transpose();
+      }
+    }
+    const double area = (1 - std::fabs(pair.shift_x)) * (1 - std::fabs(pair.shift_y));
+    if (trial > 0 && (pair.shift_x == 0 || pair.shift_y == 0)) {
+      // Faces in one plane are so no more to the last digit, and whether their triangles meet is chance.
+      EXPECT_LT(scene.statistics().area, area + 1e-9);
+    } else {
+      EXPECT_NEAR(scene.statistics().area, area, 1e-9);
+    }
+    EXPECT_NEAR(scene.statistics().depth, pair.depth, 1e-13);
+    EXPECT_EQ(scene.statistics().patches, 1u);
+  }
+}
+
+// Shifted, side faces of each cut the other's top or bottom; aligned, they lie in one plane.
+INSTANTIATE_TEST_SUITE_P(Overlaps, BoxOnBox,
+                         testing::Values(BoxPair{1e-6, 0.13, -0.07, 1, 1}, BoxPair{1e-3, 0.13, -0.07, 1, 1},
+                                         BoxPair{1e-3, 1e-3, -5e-4, 1, 1}, BoxPair{1e-3, 0.2, 0.1, 4, 4},
+                                         BoxPair{1e-3, 0.2, 0.1, 1, 4}, BoxPair{0.04, 0.3, 0.4, 2, 4},
+                                         BoxPair{1e-3, 0, 0, 1, 1}, BoxPair{1e-3, 0, 0, 4, 4},
+                                         BoxPair{1e-3, 0.25, 0, 4, 2}, BoxPair{1e-3, 0, 0.2, 1, 2}));
+
+TEST(ContactGeneration, BoxesThatTouchExactlyHaveTheCornersOfTheCommonFaceAtDepthZero) {
+  for (const auto& [x, y] : {std::pair(0.0, 0.0), std::pair(0.25, 0.0), std::pair(0.125, -0.375)}) {
+    for (const int cells : {1, 2, 4}) {
+      ContactScene scene;
+      const std::uint32_t shape = scene.add_shape(cube(0.5f, cells));
+      scene.add_body(shape, at(0, 0, 0));
+      scene.add_body(shape, at(x, y, 1));
+      const auto points = scene.points();
+      expect_all(points, kZ, 0, 0);
+      EXPECT_EQ(points.size(), 4u);
+      EXPECT_NEAR(scene.statistics().area, (1 - std::fabs(x)) * (1 - std::fabs(y)), 1e-12);
+      EXPECT_TRUE(any_at(points, Vector3d(-0.5 + x, 0.5 + std::min(y, 0.0), 0.5), 1e-9));
+    }
+  }
+}
+
+TEST(ContactGeneration, NeighboursInAStackPushAlongTheirFacesOnly) {
+  // A column of two, one at the side, one on the edge between: overlaps of different sizes each way.
+  RandomPoses random(2);
+  for (const int cells : {1, 2}) {
+    for (int trial = 0; trial < 50; ++trial) {
+      ContactScene scene;
+      const std::uint32_t shape = scene.add_shape(cube(0.5f, cells));
+      const double jitter = trial == 0 ? 0 : 1e-3;
+      std::vector<Vector3d> middle;
+      for (int i = 0; i < 8; ++i) {
+        middle.emplace_back((i & 1) + random.symmetric(jitter), (i >> 1 & 1) + random.symmetric(jitter),
+                            (i >> 2) + random.symmetric(jitter));
+        scene.add_body(shape, at(middle[i].x(), middle[i].y(), middle[i].z()));
+      }
+      for (const ContactPoint& p : scene.points()) {
+        EXPECT_GT(p.normal.cwiseAbs().maxCoeff(), 1 - 1e-12) << p.normal.transpose();
+        EXPECT_GT(p.normal.dot(middle[p.body_b] - middle[p.body_a]), 0.9);
+        EXPECT_LE(p.depth, 2 * jitter * 1.001);
+      }
+    }
+  }
+}
+
+TEST(ContactGeneration, BodiesThatTouchInAnEdgeOrACornerOfBothHaveNoPointAndAreCounted) {
+  for (const double z : {0.0, 1.0}) {
+    ContactScene scene;
+    const std::uint32_t shape = scene.add_shape(cube(0.5f));
+    scene.add_body(shape, at(0, 0, 0));
+    scene.add_body(shape, at(1, 1, z));
+    EXPECT_TRUE(scene.points().empty());
+    EXPECT_GT(scene.triangle_pairs(), 0u);
+    EXPECT_EQ(scene.statistics().ambiguous_touches, 1u);
+  }
+}
+
+TEST(ContactGeneration, ACornerThatTouchesAFaceExactlyHasThatFacesNormal) {
+  Mesh tip;  // a pyramid on its tip, above the origin
+  tip.add({0, 0, 0}, {-1, 1, 1}, {1, 1, 1});
+  tip.add({0, 0, 0}, {1, 1, 1}, {1, -1, 1});
+  tip.add({0, 0, 0}, {1, -1, 1}, {-1, -1, 1});
+  tip.add({0, 0, 0}, {-1, -1, 1}, {-1, 1, 1});
+  tip.add({-1, -1, 1}, {1, -1, 1}, {1, 1, 1});
+  tip.add({-1, -1, 1}, {1, 1, 1}, {-1, 1, 1});
+  for (const double x : {0.0, 0.125}) {  // on the diagonal between two triangles, and within one
+    ContactScene scene;
+    scene.add_body(scene.add_shape(cube(0.5f)), at(0, 0, 0));
+    scene.add_body(scene.add_shape(tip), at(x, 0, 0.5));
+    const auto points = scene.points();
+    expect_all(points, kZ, 0, 0);
+    ASSERT_EQ(points.size(), 1u);
+    EXPECT_LT((points[0].position - Vector3d(x, 0, 0.5)).norm(), 1e-12);
+  }
+}
+
+TEST(ContactGeneration, AnEdgeThatTouchesAFaceExactlyHasThatFacesNormalAndBothItsEnds) {
+  Mesh roof;  // lies on its ridge along y
+  roof.add({0, -0.25f, 0}, {1, -0.25f, 1}, {-1, -0.25f, 1});
+  roof.add({0, 0.25f, 0}, {-1, 0.25f, 1}, {1, 0.25f, 1});
+  roof.add({0, -0.25f, 0}, {0, 0.25f, 0}, {1, 0.25f, 1});
+  roof.add({0, -0.25f, 0}, {1, 0.25f, 1}, {1, -0.25f, 1});
+  roof.add({0, 0.25f, 0}, {0, -0.25f, 0}, {-1, -0.25f, 1});
+  roof.add({0, 0.25f, 0}, {-1, -0.25f, 1}, {-1, 0.25f, 1});
+  roof.add({-1, -0.25f, 1}, {1, -0.25f, 1}, {1, 0.25f, 1});
+  roof.add({-1, -0.25f, 1}, {1, 0.25f, 1}, {-1, 0.25f, 1});
+  ContactScene scene;
+  scene.add_body(scene.add_shape(cube(0.5f)), at(0, 0, 0));
+  scene.add_body(scene.add_shape(roof), at(0.125, 0, 0.5));
+  const auto points = scene.points();
+  expect_all(points, kZ, 0, 0);
+  EXPECT_EQ(points.size(), 2u);
+  EXPECT_TRUE(any_at(points, Vector3d(0.125, -0.25, 0.5), 1e-12));
+  EXPECT_TRUE(any_at(points, Vector3d(0.125, 0.25, 0.5), 1e-12));
+}
+
+TEST(ContactGeneration, CrossedEdgesPushAcrossBoth) {
+  // Two cubes on edges that cross at a right angle: overlap d along z, a patch of size d.
+  for (const double depth : {1e-5, 1e-2}) {
+    ContactScene scene;
+    const std::uint32_t shape = scene.add_shape(cube(0.5f));
+    const double half = std::sqrt(0.5);
+    scene.add_body(shape, turned(std::atan(1.0), kX));
+    scene.add_body(shape, at(0, 0, 2 * half - depth) * turned(std::atan(1.0), Vector3d::UnitY()));
+    const auto points = scene.points();
+    ASSERT_FALSE(points.empty());
+    double deepest = 0;
+    for (const ContactPoint& p : points) {
+      EXPECT_LT((p.normal - kZ).norm(), 1e-6);
+      deepest = std::max(deepest, p.depth);
+    }
+    EXPECT_NEAR(deepest, depth, 1e-6 * depth + 1e-12);
+  }
+}
+
+// A tip is narrower than it is deep, and has few faces: no reason to push it sideways.
+TEST(ContactGeneration, ASharpTipInAFacePushesAlongTheFace) {
+  Mesh tip;
+  tip.add({0, 0, 0}, {-0.125f, 0.125f, 1}, {0.125f, 0.0625f, 1});
+  tip.add({0, 0, 0}, {0.125f, 0.0625f, 1}, {0, -0.125f, 1});
+  tip.add({0, 0, 0}, {0, -0.125f, 1}, {-0.125f, 0.125f, 1});
+  tip.add({-0.125f, 0.125f, 1}, {0, -0.125f, 1}, {0.125f, 0.0625f, 1});
+  for (const bool ground : {true, false}) {
+    ContactScene scene;
+    scene.add_body(scene.add_shape(ground ? sheet(1, 1) : cube(0.5f)), at(0, 0, ground ? 0 : -0.5));
+    scene.add_body(scene.add_shape(tip), at(0.1, 0.2, -0.05) * turned(0.4, kX));
+    const auto points = scene.points();
+    EXPECT_EQ(points.size(), 4u);  // the tip, and three around it, where the depth ends
+    for (const ContactPoint& p : points) EXPECT_LT((p.normal - kZ).norm(), 1e-9);
+    EXPECT_NEAR(scene.statistics().depth, 0.05, 1e-9);
+  }
+}
+
+TEST(ContactGeneration, ABoxOnATiltedSheetStandsOnItsFourCorners) {
+  const Isometry3d slope = turned(0.35, Vector3d(0.3, 1, 0));
+  for (const int cells : {1, 7, 40}) {
+    for (const double depth : {1e-4, 0.02}) {
+      ContactScene scene;
+      scene.add_body(scene.add_shape(sheet(4, cells)), slope);
+      scene.add_body(scene.add_shape(cube(0.5f)), slope * at(0.31, 0.17, 0.5 - depth) * turned(0.6, kZ));
+      const auto points = scene.points();
+      expect_all(points, slope.linear() * kZ, depth, 1e-12);
+      EXPECT_EQ(points.size(), 4u) << cells;
+      EXPECT_NEAR(scene.statistics().area, 1, 1e-9);
+      EXPECT_EQ(scene.statistics().open_curves, 0u);
+    }
+  }
+}
+
+TEST(ContactGeneration, ABoxThatHangsOverASheetsBorderStandsOnTheSheet) {
+  ContactScene scene;
+  scene.add_body(scene.add_shape(sheet(4, 5)), at(0, 0, 0));
+  scene.add_body(scene.add_shape(cube(0.5f)), at(1.8, 0, 0.49));
+  const auto points = scene.points();
+  EXPECT_GT(scene.statistics().open_curves, 0u);
+  ASSERT_FALSE(points.empty());
+  for (const ContactPoint& p : points) {
+    EXPECT_LT((p.normal - kZ).norm(), 1e-9);
+    EXPECT_LE(p.depth, 0.01 + 1e-12);
+    EXPECT_LE(p.position.x(), 2 + 1e-9);
+  }
+}
+
+TEST(ContactGeneration, ATiltedBoxIsDeepWhereItsEdgeIs) {
+  ContactScene scene;
+  scene.add_body(scene.add_shape(sheet(4, 3)), at(0, 0, 0));
+  const double tilt = 0.1, depth = 0.01;  // about the y axis: the edge at +x goes down
+  const Isometry3d lean = turned(tilt, Vector3d::UnitY());
+  const double lowest = -(lean * Vector3d(0.5, 0, -0.5)).z();
+  scene.add_body(scene.add_shape(cube(0.5f)), at(0.1, 0.2, lowest - depth) * lean);
+  const auto points = scene.points();
+  ASSERT_GE(points.size(), 4u);
+  const double edge_x = 0.1 + (lean * Vector3d(0.5, 0, -0.5)).x();
+  for (const ContactPoint& p : points) {
+    EXPECT_LT((p.normal - kZ).norm(), 1e-9);
+    // The bottom face rises from the edge.
+    EXPECT_NEAR(p.depth, std::max(0.0, depth - (edge_x - p.position.x()) * std::tan(tilt)), 0.05 * depth);
+  }
+  EXPECT_NEAR(scene.statistics().depth, depth, 0.05 * depth);
+}
+
+TEST(ContactGeneration, SpheresPushAlongTheLineOfTheirMiddlesByTheirOverlap) {
+  RandomPoses random(3);
+  for (const double overlap : {0.01, 0.1, 0.6}) {
+    ContactScene scene;
+    scene.add_body(scene.add_shape(sphere(1, 5)), random_motion(random, 0));
+    scene.add_body(scene.add_shape(sphere(0.5, 4)), at(0, 0, 1.5 - overlap) * random_motion(random, 0));
+    const auto points = scene.points();
+    ASSERT_FALSE(points.empty());
+    double deepest = 0;
+    for (const ContactPoint& p : points) {
+      EXPECT_LT((p.normal - kZ).norm(), 0.03);
+      EXPECT_GE(p.depth, 0);
+      deepest = std::max(deepest, p.depth);
+    }
+    EXPECT_NEAR(deepest, overlap, 0.006);
+    const double height = (1 + (1.5 - overlap) * (1.5 - overlap) - 0.25) / (2 * (1.5 - overlap));
+    const double circle = 3.14159265358979323846 * (1 - height * height);
+    EXPECT_NEAR(scene.statistics().area, circle, 0.03 * circle + 0.01);
+    EXPECT_EQ(scene.statistics().patches, 1u);
+  }
+}
+
+TEST(ContactGeneration, LegsHaveAPatchEach) {
+  ContactScene scene;
+  const Mesh legs = joined(moved(box(0.2f, 0.2f, 1), -0.5f, 0, 0), moved(box(0.2f, 0.2f, 1), 0.5f, 0, 0));
+  scene.add_body(scene.add_shape(cube(2.0f)), at(0, 0, 0));
+  scene.add_body(scene.add_shape(legs), at(0.03, 0.02, 2.499));
+  expect_all(scene.points(), kZ, 1e-3, 1e-12);
+  EXPECT_EQ(scene.statistics().patches, 2u);
+  EXPECT_EQ(scene.statistics().points, 8u);
+}
+
+TEST(ContactGeneration, TheCowStandsOnItsFourHooves) {
+  for (const char* mesh : {"cow_1500.obj", "cow.obj"}) {
+    ContactScene scene;
+    scene.add_body(scene.add_shape(sheet(6, 10)), at(0, 0, 0));
+    scene.add_body(scene.add_shape(project_mesh(mesh)), at(0.05, 0.02, -0.004));
+    const auto points = scene.points();
+    EXPECT_EQ(scene.statistics().patches, 4u);
+    EXPECT_GE(points.size(), 12u);
+    EXPECT_NEAR(scene.statistics().depth, 0.004, 4e-4);
+    for (const ContactPoint& p : points) EXPECT_LT((p.normal - kZ).norm(), 1e-9);
+  }
+}
+
+// A body that went half through a plate is pushed out on the side on which its middle is.
+TEST(ContactGeneration, ABodyThatGoesThroughAPlateIsPushedToTheSideOfItsMiddle) {
+  for (const double z : {0.3, -0.3}) {
+    ContactScene scene;
+    scene.add_body(scene.add_shape(box(4, 4, 0.1f)), at(0, 0, 0));
+    scene.add_body(scene.add_shape(sphere(0.5, 3)), at(0.13, 0.07, z));
+    const auto points = scene.points();
+    ASSERT_FALSE(points.empty());
+    for (const ContactPoint& p : points) EXPECT_GT(p.normal.z() * (z > 0 ? 1 : -1), 0.99);
+  }
+}
+
+TEST(ContactGeneration, ABodyWithinAnotherIsNoContact) {
+  ContactScene scene;
+  scene.add_body(scene.add_shape(cube(0.5f)), at(0, 0, 0));
+  scene.add_body(scene.add_shape(cube(0.2f)), at(0.05, 0, 0));
+  EXPECT_TRUE(scene.points().empty());
+}
+
+TEST(ContactGeneration, InsideOutMeshesPushTheSameWay) {
+  Mesh inside_out = cube(0.5f, 2);
+  for (auto& t : inside_out.triangles) std::swap(t[1], t[2]);
+  ContactScene scene;
+  scene.add_body(scene.add_shape(cube(0.5f)), at(0, 0, 0));
+  scene.add_body(scene.add_shape(inside_out), at(0.1, 0.2, 0.999));
+  expect_all(scene.points(), kZ, 1e-3, 1e-12);
+}
+
+// Two cows that overlap in many ways.
+ContactScene two_cows(RandomPoses& random, const char* mesh) {
+  ContactScene scene;
+  const std::uint32_t cow = scene.add_shape(project_mesh(mesh));
+  scene.add_body(cow, random_motion(random, 0));
+  scene.add_body(cow, random_motion(random, 0.6));
+  return scene;
+}
+
+TEST(ContactGeneration, ExchangingTheBodiesTurnsNormalsAndNothingElse) {
+  RandomPoses random(4);
+  std::size_t seen = 0;
+  for (int trial = 0; trial < 40; ++trial) {
+    ContactScene scene = two_cows(random, "cow_1500.obj");
+    const auto points = scene.points();
+    const auto statistics = scene.statistics();
+    scene.swap_bodies();
+    const auto swapped = scene.points();
+    ASSERT_EQ(points.size(), swapped.size()) << trial;
+    EXPECT_NEAR(scene.statistics().area, statistics.area, 1e-9);
+    for (const ContactPoint& p : points) {
+      const bool found = std::any_of(swapped.begin(), swapped.end(), [&](const ContactPoint& q) {
+        return (p.position - q.position).norm() < 1e-9 && (p.normal + q.normal).norm() < 1e-9 &&
+               std::fabs(p.depth - q.depth) < 1e-9;
+      });
+      EXPECT_TRUE(found) << trial << ": " << p.position.transpose();
+    }
+    seen += points.size();
+  }
+  EXPECT_GT(seen, 100u);
+}
+
+TEST(ContactGeneration, PointsMoveWithTheBodies) {
+  RandomPoses random(5);
+  for (int trial = 0; trial < 20; ++trial) {
+    ContactScene scene = two_cows(random, "cow_1500.obj");
+    const auto points = scene.points();
+    const Isometry3d motion = random_motion(random, 10);
+    const auto moved = scene.points(motion);
+    ASSERT_EQ(points.size(), moved.size()) << trial;
+    for (const ContactPoint& p : points) {
+      const bool found = std::any_of(moved.begin(), moved.end(), [&](const ContactPoint& q) {
+        return (motion * p.position - q.position).norm() < 1e-7 &&
+               (motion.linear() * p.normal - q.normal).norm() < 1e-7 && std::fabs(p.depth - q.depth) < 1e-7 &&
+               p.feature == q.feature;
+      });
+      EXPECT_TRUE(found) << trial;
+    }
+  }
+}
+
+TEST(ContactGeneration, FeaturesLastWhileABoxSettles) {
+  ContactScene scene;
+  scene.add_body(scene.add_shape(cube(0.5f)), at(0, 0, 0));
+  scene.add_body(scene.add_shape(cube(0.5f)), at(0.1, 0.2, 0.999));
+  const auto before = scene.points();
+  scene.move_body(1, at(0.1 + 1e-5, 0.2 - 1e-5, 0.9985) * turned(1e-6, kX));
+  const auto after = scene.points();
+  ASSERT_EQ(before.size(), after.size());
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    for (std::size_t j = i + 1; j < before.size(); ++j) EXPECT_NE(before[i].feature, before[j].feature);
+    EXPECT_TRUE(std::any_of(after.begin(), after.end(), [&](const ContactPoint& p) {
+      return p.feature == before[i].feature && (p.position - before[i].position).norm() < 1e-3;
+    }));
+  }
+}
+
+// Pushed again and again by what the deepest point says, bodies come apart, however deep they overlap.
+TEST(ContactGeneration, PushesLeadOutOfOverlaps) {
+  RandomPoses random(6);
+  int seen = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    ContactScene scene;
+    const std::uint32_t ball = scene.add_shape(sphere(0.5, 3)), brick = scene.add_shape(box(1, 0.6f, 0.4f));
+    Isometry3d pose = random_motion(random, 0.6);
+    scene.add_body(trial % 2 == 0 ? ball : brick, random_motion(random, 0));
+    scene.add_body(brick, pose);
+    auto points = scene.points();
+    if (points.empty()) continue;
+    const double first = scene.statistics().depth;
+    ++seen;
+    int pushes = 0;
+    for (; pushes < 20 && scene.statistics().depth > 0.01 * first; ++pushes) {
+      const auto deepest =
+          std::max_element(points.begin(), points.end(),
+                           [](const ContactPoint& p, const ContactPoint& q) { return p.depth < q.depth; });
+      pose.translation() += 1.01 * deepest->depth * deepest->normal;
+      scene.move_body(1, pose);
+      points = scene.points();
+    }
+    EXPECT_LT(pushes, 20) << trial;
+    EXPECT_LT((pose.translation()).norm(), 1.6) << trial;
+  }
+  EXPECT_GT(seen, 100);
+}
+
+// Soups of flat, coincident, huge and tiny triangles make no sense as bodies, and no harm either.
+class HostileScene : public testing::TestWithParam<SceneFamily> {};
+
+TEST_P(HostileScene, GivesUnitNormalsAndFiniteDepths) {
+  RandomPoses random(12);
+  for (int trial = 0; trial < trials(10, 20); ++trial) {
+    const Scene scene = GetParam().make(random);
+    const auto engine = simulation::make_engine("tandem");
+    engine->set_shapes(scene.assets.views());
+    simulation::ContactList found;
+    engine->find(scene.instances, {}, found);
+    simulation::ContactGenerator generator;
+    generator.set_shapes(scene.assets.views());
+    for (const ContactPoint& p : generator.generate(found, scene.instances)) {
+      ASSERT_TRUE(p.position.allFinite());
+      ASSERT_NEAR(p.normal.norm(), 1, 1e-9);
+      ASSERT_TRUE(p.depth >= 0 && std::isfinite(p.depth)) << p.depth;
+    }
+    EXPECT_LE(generator.statistics().segments, found.triangles.size());
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, HostileScene, testing::ValuesIn(scene_families()),
+                         [](const auto& tested) { return std::string(tested.param.name); });
+
+TEST(ContactGeneration, ThreadsDoNotChangeAByte) {
+  ContactScene scene;
+  RandomPoses random(7);
+  const std::uint32_t cow = scene.add_shape(project_mesh("cow_1500.obj"));
+  for (int i = 0; i < 60; ++i) scene.add_body(cow, random_motion(random, 1.5));
+  const auto run = [&](std::size_t threads) {
+    const oneapi::tbb::global_control control(oneapi::tbb::global_control::max_allowed_parallelism, threads);
+    return scene.points();
+  };
+  const auto one = run(1);
+  const double area = scene.statistics().area;
+  for (const std::size_t threads : {2, 4}) {
+    const auto many = run(threads);
+    ASSERT_EQ(one.size(), many.size());
+    for (std::size_t i = 0; i < one.size(); ++i) {
+      EXPECT_EQ(one[i].position, many[i].position);
+      EXPECT_EQ(one[i].normal, many[i].normal);
+      EXPECT_EQ(one[i].depth, many[i].depth);
+      EXPECT_EQ(one[i].feature, many[i].feature);
+    }
+    EXPECT_EQ(area, scene.statistics().area);
+  }
+}
+
+}  // namespace
+}  // namespace tandem::test

@@ -1,0 +1,258 @@
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "analytic_contacts.h"
+
+namespace tandem::simulation {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kGravity = 9.81;
+const Vector3d kCube = {1, 1, 1};
+
+// Boxes on top of each other on the plane, each as deep in the next as the slop.
+std::vector<BodyState> tower(int boxes, double height, double slop) {
+  std::vector<BodyState> states(static_cast<std::size_t>(boxes) + 1);
+  for (int i = 1; i <= boxes; ++i) states[i].position.z() = height * (i - 0.5) - slop * i;
+  return states;
+}
+
+std::vector<BodyProperties> bodies_with(int boxes, const Vector3d& size) {
+  std::vector<BodyProperties> bodies(static_cast<std::size_t>(boxes) + 1, box_body(size, 1));
+  bodies[0] = fixed_body();
+  return bodies;
+}
+
+// A block on a slope that falls towards +x.
+struct Slope {
+  explicit Slope(double degrees) : angle(degrees * M_PI / 180), normal(std::sin(angle), 0, std::cos(angle)) {}
+
+  Vector3d downhill() const { return {std::cos(angle), 0, -std::sin(angle)}; }
+  BodyState resting(double height, double slop) const {
+    BodyState state;
+    state.orientation = Eigen::Quaterniond(Eigen::AngleAxisd(angle, Vector3d::UnitY()));
+    state.position = (0.5 * height - slop) * normal;
+    return state;
+  }
+
+  double angle;
+  Vector3d normal;
+};
+
+Simulator block_on(const Slope& slope, const Vector3d& size, const SimulatorOptions& options) {
+  return Simulator(bodies_with(1, size), {BodyState(), slope.resting(size.z(), options.solver.slop)},
+                   boxes_on_plane(slope.normal, size), options);
+}
+
+TEST(Slope, ABlockSlidesAsTheClosedFormSays) {
+  for (const auto& [degrees, friction] : {std::pair{30.0, 0.3}, {20.0, 0.1}, {40.0, 0.0}}) {
+    const Slope slope(degrees);
+    SimulatorOptions options;
+    options.solver.friction = friction;
+    const Vector3d flat = {1, 1, 0.2};
+    Simulator simulator = block_on(slope, flat, options);
+    const Vector3d start = simulator.states()[1].position;
+    constexpr int kSteps = 300;
+    for (int i = 0; i < kSteps; ++i) simulator.step();
+    const double time = kSteps * options.dt;
+    const double acceleration = kGravity * (std::sin(slope.angle) - friction * std::cos(slope.angle));
+    const BodyState& end = simulator.states()[1];
+    EXPECT_NEAR(end.velocity.dot(slope.downhill()) / (acceleration * time), 1, 1e-4);
+    EXPECT_NEAR((end.position - start).dot(slope.downhill()) / (0.5 * acceleration * time * time), 1, 0.01);
+  }
+}
+
+TEST(Slope, ABlockSticksBelowTheAngleOfFrictionAndSlipsAbove) {
+  const Vector3d flat = {1, 1, 0.2};
+  for (const double friction : {0.2, 0.5, 0.8}) {
+    const double limit = std::atan(friction) * 180 / M_PI;
+    SimulatorOptions options;
+    options.solver.friction = friction;
+    for (const double degrees : {0.99 * limit, 1.01 * limit}) {
+      Simulator simulator = block_on(Slope(degrees), flat, options);
+      const Vector3d start = simulator.states()[1].position;
+      for (int i = 0; i < 600; ++i) simulator.step();
+      const double moved = (simulator.states()[1].position - start).norm();
+      if (degrees < limit) {
+        EXPECT_LT(moved, 1e-4) << friction;
+      } else {
+        EXPECT_GT(moved, 0.5) << friction;
+      }
+    }
+  }
+}
+
+TEST(Resting, ABlockGainsNoEnergyInAMinute) {
+  SimulatorOptions options;
+  Simulator simulator(bodies_with(1, kCube), tower(1, 1, options.solver.slop),
+                      boxes_on_plane(Vector3d::UnitZ(), kCube), options);
+  const double start = simulator.step().potential_energy;
+  for (int i = 1; i < 3600; ++i) {
+    const StepRecord record = simulator.step();
+    ASSERT_LE(record.kinetic_energy, 1e-18);
+    ASSERT_LE(record.kinetic_energy + record.potential_energy, start + 1e-9);
+  }
+}
+
+TEST(Resting, AFallenBlockIsLiftedToTheSlopWithoutSpeed) {
+  SimulatorOptions options;
+  std::vector<BodyState> states = tower(1, 1, 0);
+  states[1].position.z() += 0.5;
+  Simulator simulator(bodies_with(1, kCube), states, boxes_on_plane(Vector3d::UnitZ(), kCube), options);
+  StepRecord record;
+  double energy = 1e9;
+  for (int i = 0; i < 600; ++i) {
+    record = simulator.step();
+    // Correction lifts, so potential energy may grow; speed must not.
+    if (record.contacts > 0) {
+      ASSERT_LE(record.kinetic_energy, energy + 1e-12);
+      energy = record.kinetic_energy;
+    }
+  }
+  EXPECT_LE(record.kinetic_energy, 1e-18);
+  EXPECT_NEAR(record.penetration_max, options.solver.slop, 1e-6);
+}
+
+TEST(Resting, RestitutionGivesTheSpeedBack) {
+  SimulatorOptions options;
+  options.solver.restitution = 0.5;
+  std::vector<BodyState> states = tower(1, 1, 0);
+  states[1].position.z() += 1e-9;
+  states[1].velocity.z() = -4;
+  options.gravity.setZero();
+  Simulator simulator(bodies_with(1, kCube), states, boxes_on_plane(Vector3d::UnitZ(), kCube), options);
+  for (int i = 0; i < 2; ++i) simulator.step();
+  EXPECT_NEAR(simulator.states()[1].velocity.z(), 2, 1e-9);
+}
+
+TEST(Resting, ATowerStands) {
+  constexpr int kBoxes = 10;
+  for (const bool shock : {false, true}) {
+    SCOPED_TRACE(shock ? "with shock propagation" : "without");
+    SimulatorOptions options;
+    options.solver.shock_propagation = shock;
+    const auto start = tower(kBoxes, 1, options.solver.slop);
+    Simulator simulator(bodies_with(kBoxes, kCube), start, boxes_on_plane(Vector3d::UnitZ(), kCube), options);
+    StepRecord record;
+    for (int i = 0; i < 3600; ++i) record = simulator.step();
+    for (int i = 1; i <= kBoxes; ++i) {
+      EXPECT_LT((simulator.states()[i].position - start[i].position).norm(), 0.01) << "box " << i;
+    }
+    EXPECT_LT(record.speed_max, 0.01);
+  }
+}
+
+TEST(Resting, WarmStartLeavesASmallerResidual) {
+  double residual[2];
+  for (const bool warm : {false, true}) {
+    SimulatorOptions options;
+    options.solver.warm_start = warm;
+    Simulator simulator(bodies_with(10, kCube), tower(10, 1, options.solver.slop),
+                        boxes_on_plane(Vector3d::UnitZ(), kCube), options);
+    for (int i = 0; i < 100; ++i) residual[warm] = simulator.step().residual_max;
+  }
+  EXPECT_LT(residual[1], 0.05 * residual[0]);
+}
+
+TEST(Resting, MoreIterationsLeaveASmallerResidual) {
+  double last = 1e9;
+  for (const std::uint32_t iterations : {5u, 20u, 80u}) {
+    SimulatorOptions options;
+    options.solver.iterations = iterations;
+    Simulator simulator(bodies_with(10, kCube), tower(10, 1, options.solver.slop),
+                        boxes_on_plane(Vector3d::UnitZ(), kCube), options);
+    const double residual = simulator.step().residual_max;
+    EXPECT_LT(residual, last);
+    last = residual;
+  }
+}
+
+// Towers side by side are islands.
+std::vector<BodyState> fallen_boxes(std::size_t count) {
+  std::vector<BodyState> states(count + 1);
+  for (std::size_t i = 1; i <= count; ++i) {
+    const double turn = static_cast<double>(i);
+    states[i].position = {3.0 * static_cast<double>(i / 4), 0.05 * std::sin(turn),
+                          0.6 + 1.2 * static_cast<double>(i % 4)};
+    states[i].orientation =
+        Eigen::Quaterniond(Eigen::AngleAxisd(0.02 * std::cos(turn), Vector3d(1, 2, 3).normalized()));
+  }
+  return states;
+}
+
+Simulator falling(std::uint32_t threads, const SimulatorOptions& common) {
+  constexpr int kBoxes = 39;
+  SimulatorOptions options = common;
+  options.threads = threads;
+  return Simulator(bodies_with(kBoxes, kCube), fallen_boxes(kBoxes), boxes_on_plane(Vector3d::UnitZ(), kCube),
+                   options);
+}
+
+bool same_bytes(std::span<const BodyState> a, std::span<const BodyState> b) {
+  const auto same = [](const auto& x, const auto& y) {
+    return std::memcmp(x.data(), y.data(), sizeof x) == 0;
+  };
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [&](const BodyState& x, const BodyState& y) {
+    return same(x.position, y.position) && same(x.orientation.coeffs(), y.orientation.coeffs()) &&
+           same(x.velocity, y.velocity) && same(x.angular_velocity, y.angular_velocity);
+  });
+}
+
+TEST(Determinism, ThreadsDoNotChangeABit) {
+  const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, 4);
+  for (const ContactOrder order : {ContactOrder::found, ContactOrder::shuffled}) {
+    SimulatorOptions options;
+    options.solver.order = order;
+    options.solver.shock_propagation = order == ContactOrder::found;
+    options.sleep.enabled = true;
+    Simulator one = falling(1, options), four = falling(4, options);
+    for (int i = 0; i < 200; ++i) {
+      one.step(), four.step();
+      ASSERT_TRUE(same_bytes(one.states(), four.states())) << "step " << i;
+    }
+  }
+}
+
+TEST(Determinism, TheSeedOfTheOrderMatters) {
+  SimulatorOptions options;
+  options.solver.order = ContactOrder::shuffled;
+  Simulator first = falling(1, options);
+  options.solver.seed = 2;
+  Simulator second = falling(1, options);
+  for (int i = 0; i < 100; ++i) first.step(), second.step();
+  EXPECT_FALSE(same_bytes(first.states(), second.states()));
+}
+
+TEST(Determinism, ARestoredSimulatorGoesOnWithTheSameBytes) {
+  SimulatorOptions options;
+  options.sleep.enabled = true;
+  Simulator whole = falling(1, options), second = falling(1, options);
+  for (int i = 0; i < 90; ++i) whole.step();
+  second.restore(whole.save());
+  for (int i = 0; i < 90; ++i) whole.step(), second.step();
+  EXPECT_TRUE(same_bytes(whole.states(), second.states()));
+}
+
+TEST(Sleep, ATowerFallsAsleepAndATouchWakesIt) {
+  SimulatorOptions options;
+  options.sleep.enabled = true;
+  auto states = tower(3, 1, options.solver.slop);
+  states[3].position.z() += 20;
+  Simulator simulator(bodies_with(3, kCube), states, boxes_on_plane(Vector3d::UnitZ(), kCube), options);
+  StepRecord record;
+  for (int i = 0; i < 60; ++i) record = simulator.step();
+  EXPECT_EQ(record.sleeping, 2u);
+  for (int i = 0; i < 70; ++i) record = simulator.step();
+  EXPECT_EQ(record.sleeping, 0u);
+  for (int i = 0; i < 200; ++i) record = simulator.step();
+  EXPECT_EQ(record.sleeping, 3u);
+  EXPECT_EQ(record.kinetic_energy, 0);
+}
+
+}  // namespace
+}  // namespace tandem::simulation

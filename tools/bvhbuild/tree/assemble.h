@@ -1,0 +1,52 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "bvhbuild/meshing/polygon_mesh.h"
+#include "tree.h"
+
+namespace tandem::build {
+
+/// One level of detail to be written: the triangles with the source face of each, and the tree over them.
+struct AssetLevel {
+  Geometry geometry;
+  std::span<const std::uint32_t> face;
+  const Tree* tree = nullptr;
+  double error_bound = 0;
+};
+
+/// Everything else that a file holds.
+struct AssetSource {
+  std::array<double, 3> origin{};
+  double rounding_error = 0;
+  std::uint64_t source_faces = 0;
+  std::span<const SourcePart> parts;  ///< ascending, without gaps, together source_faces faces
+  std::string provenance;             ///< JSON
+};
+
+/// The bytes of a whole .bvh file in memory, aligned as the checker wants them.
+class Image {
+ public:
+  explicit Image(std::size_t bytes);  ///< all zero
+  std::byte* data() { return data_.get(); }
+  const std::byte* data() const { return data_.get(); }
+  std::size_t size() const { return size_; }
+
+ private:
+  struct Delete {
+    void operator()(std::byte* data) const;
+  };
+  std::unique_ptr<std::byte[], Delete> data_;
+  std::size_t size_;
+};
+
+/// Lays a file out, fills it in and seals it with its hash. Throws std::bad_alloc, and std::logic_error
+/// should the bytes written differ from the bytes planned. Condition: 1 to kMaxLevels levels, each with at
+/// least one triangle; faces of triangles lie in parts.
+Image assemble(const AssetSource& source, std::span<const AssetLevel> levels);
+
+}  // namespace tandem::build

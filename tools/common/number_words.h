@@ -1,0 +1,17 @@
+#pragma once
+#include <cstdint>
+#include <string>
+
+/// Numbers as people read them.
+namespace tandem {
+
+/// 16 hexadecimal digits.
+std::string hexadecimal(std::uint64_t value);
+
+/// "5,804".
+std::string with_commas(std::uint64_t value);
+
+/// "527 KiB", "1.2 GiB".
+std::string human_bytes(std::uint64_t bytes);
+
+}  // namespace tandem

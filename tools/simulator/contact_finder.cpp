@@ -1,0 +1,42 @@
+#include "contact_finder.h"
+
+#include <chrono>
+
+namespace tandem::simulation {
+namespace {
+
+class MeshContactFinder : public ContactFinder {
+ public:
+  MeshContactFinder(std::unique_ptr<CollisionEngine> engine, std::span<const AssetView> shapes,
+                    const ContactOptions& options)
+      : engine_(std::move(engine)), options_(options) {
+    engine_->set_shapes(shapes);
+    generator_.set_shapes(shapes);
+  }
+
+  const std::vector<ContactPoint>& find(std::span<const BodyPose> bodies,
+                                        std::span<const std::uint8_t> idle) override {
+    engine_->find(bodies, idle, found_);
+    const auto start = std::chrono::steady_clock::now();
+    const std::vector<ContactPoint>& points = generator_.generate(found_, bodies, options_);
+    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+    report_ = {engine_->times(), taken.count(), engine_->counters(), generator_.statistics()};
+    return points;
+  }
+
+ private:
+  std::unique_ptr<CollisionEngine> engine_;
+  ContactGenerator generator_;
+  ContactOptions options_;
+  ContactList found_;
+};
+
+}  // namespace
+
+std::unique_ptr<ContactFinder> make_mesh_contact_finder(std::unique_ptr<CollisionEngine> engine,
+                                                        std::span<const AssetView> shapes,
+                                                        const ContactOptions& options) {
+  return std::make_unique<MeshContactFinder>(std::move(engine), shapes, options);
+}
+
+}  // namespace tandem::simulation

@@ -1,0 +1,352 @@
+#include "contact_solver.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "common/random_pose.h"
+
+namespace tandem::simulation {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+// A body while contacts are solved.
+struct ContactSolver::Mover {
+  Vector3d velocity, spin;
+  double inverse_mass;
+  Matrix3d inverse_inertia;  // in the world
+};
+
+// One direction of a contact: w = direction . (v_b - v_a) + arm_b . spin_b - arm_a . spin_a.
+struct ContactSolver::Row {
+  Vector3d direction, arm_a, arm_b;
+  Vector3d turn_a, turn_b;        // what an impulse of 1 adds to the spins, less the sign of a
+  double mobility_a, mobility_b;  // what it adds to w through either body
+  double impulse;
+};
+
+struct ContactSolver::Joint {
+  std::uint32_t a, b;
+  double inverse_mass_a, inverse_mass_b;
+  Row tangent[2], normal;
+  double target;        // of w along the normal
+  double push;          // of the correction along the normal
+  double push_impulse;  // that of the correction
+};
+
+namespace {
+
+using Row = ContactSolver::Row;
+using Joint = ContactSolver::Joint;
+using Mover = ContactSolver::Mover;
+
+// Which bodies of a contact an impulse moves: shock propagation holds the lower one.
+struct Held {
+  double a = 1, b = 1;
+};
+
+double relative_velocity(const Row& row, const Mover& a, const Mover& b) {
+  return row.direction.dot(b.velocity - a.velocity) + row.arm_b.dot(b.spin) - row.arm_a.dot(a.spin);
+}
+
+void push_apart(const Joint& joint, const Row& row, double impulse, Mover& a, Mover& b, const Held& held) {
+  // A body that nothing moves is shared by islands, so it is not written to.
+  if (joint.inverse_mass_a > 0 && held.a > 0) {
+    a.velocity -= (impulse * joint.inverse_mass_a) * row.direction;
+    a.spin -= impulse * row.turn_a;
+  }
+  if (joint.inverse_mass_b > 0 && held.b > 0) {
+    b.velocity += (impulse * joint.inverse_mass_b) * row.direction;
+    b.spin += impulse * row.turn_b;
+  }
+}
+
+double mobility(const Row& row, const Held& held) {
+  return held.a * row.mobility_a + held.b * row.mobility_b;
+}
+
+// Visits one row: lambda = clamp(lambda - (w - target) / mobility). Result: by how much w has changed.
+double visit(const Joint& joint, Row& row, double target, double lower, double upper, Mover& a, Mover& b,
+             const Held& held) {
+  const double moves = mobility(row, held);
+  if (moves <= 0) return 0;
+  const double wanted = row.impulse - (relative_velocity(row, a, b) - target) / moves;
+  const double impulse = std::clamp(wanted, lower, upper);
+  const double change = impulse - row.impulse;
+  push_apart(joint, row, change, a, b, held);
+  row.impulse = impulse;
+  return std::fabs(change) * moves;
+}
+
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
+
+double visit_velocity(Joint& joint, std::vector<Mover>& movers, double friction, const Held& held) {
+  Mover &a = movers[joint.a], &b = movers[joint.b];
+  const double bound = friction * joint.normal.impulse;
+  const double first = visit(joint, joint.tangent[0], 0, -bound, bound, a, b, held);
+  const double second = visit(joint, joint.tangent[1], 0, -bound, bound, a, b, held);
+  return std::max({first, second, visit(joint, joint.normal, joint.target, 0, kUnbounded, a, b, held)});
+}
+
+double visit_correction(Joint& joint, std::vector<Correction>& corrections, const Held& held) {
+  const Row& row = joint.normal;
+  const double moves = mobility(row, held);
+  if (moves <= 0) return 0;
+  Correction &a = corrections[joint.a], &b = corrections[joint.b];
+  const double w = row.direction.dot(b.velocity - a.velocity) + row.arm_b.dot(b.angular_velocity) -
+                   row.arm_a.dot(a.angular_velocity);
+  const double impulse = std::max(0.0, joint.push_impulse - (w - joint.push) / moves);
+  const double change = impulse - joint.push_impulse;
+  joint.push_impulse = impulse;
+  if (joint.inverse_mass_a > 0 && held.a > 0) {
+    a.velocity -= (change * joint.inverse_mass_a) * row.direction;
+    a.angular_velocity -= change * row.turn_a;
+  }
+  if (joint.inverse_mass_b > 0 && held.b > 0) {
+    b.velocity += (change * joint.inverse_mass_b) * row.direction;
+    b.angular_velocity += change * row.turn_b;
+  }
+  return std::fabs(change) * moves;
+}
+
+// Any unit vector across the normal, the same for the same normal.
+Vector3d across(const Vector3d& normal) {
+  int smallest = 0;
+  normal.cwiseAbs().minCoeff(&smallest);
+  return normal.cross(Vector3d::Unit(smallest)).normalized();
+}
+
+Row make_row(const Vector3d& direction, const Vector3d& from_a, const Vector3d& from_b, const Mover& a,
+             const Mover& b) {
+  Row row;
+  row.direction = direction;
+  row.arm_a = from_a.cross(direction);
+  row.arm_b = from_b.cross(direction);
+  row.turn_a = a.inverse_inertia * row.arm_a;
+  row.turn_b = b.inverse_inertia * row.arm_b;
+  row.mobility_a = a.inverse_mass + row.arm_a.dot(row.turn_a);
+  row.mobility_b = b.inverse_mass + row.arm_b.dot(row.turn_b);
+  row.impulse = 0;
+  return row;
+}
+
+Joint make_joint(const ContactPoint& contact, std::span<const BodyState> states,
+                 const std::vector<Mover>& movers, const SolverOptions& options, const SolverStep& step) {
+  constexpr double kSlips = 0.01;      // of what gravity gives in a step
+  constexpr double kBouncesAbove = 2;  // times that
+  const Mover &a = movers[contact.body_a], &b = movers[contact.body_b];
+  const Vector3d from_a = contact.position - states[contact.body_a].position;
+  const Vector3d from_b = contact.position - states[contact.body_b].position;
+  const Vector3d relative = b.velocity + b.spin.cross(from_b) - a.velocity - a.spin.cross(from_a);
+  const double approach = -relative.dot(contact.normal);
+  const Vector3d slip = relative + approach * contact.normal;
+  const double speed = slip.norm();
+  const Vector3d first =
+      speed > kSlips * step.gravity_speed ? Vector3d(slip / speed) : across(contact.normal);
+  Joint joint;
+  joint.a = contact.body_a, joint.b = contact.body_b;
+  joint.inverse_mass_a = a.inverse_mass, joint.inverse_mass_b = b.inverse_mass;
+  joint.tangent[0] = make_row(first, from_a, from_b, a, b);
+  joint.tangent[1] = make_row(contact.normal.cross(first), from_a, from_b, a, b);
+  joint.normal = make_row(contact.normal, from_a, from_b, a, b);
+  joint.target = approach > kBouncesAbove * step.gravity_speed ? options.restitution * approach : 0;
+  if (contact.depth < 0) joint.target = contact.depth / step.dt;
+  joint.push = options.correction * std::max(0.0, contact.depth - options.slop) / step.dt;
+  joint.push_impulse = 0;
+  return joint;
+}
+
+// Starts a contact with an impulse of the step before.
+void warm_start(Joint& joint, const ContactImpulse& impulse, double friction, std::vector<Mover>& movers) {
+  Mover &a = movers[joint.a], &b = movers[joint.b];
+  joint.normal.impulse = impulse.normal;
+  const double bound = friction * impulse.normal;
+  for (Row& row : joint.tangent)
+    row.impulse = std::clamp(row.direction.dot(impulse.tangential), -bound, bound);
+  for (const Row* row : {&joint.tangent[0], &joint.tangent[1], &joint.normal}) {
+    push_apart(joint, *row, row->impulse, a, b, {});
+  }
+}
+
+// What a visit would change, in metres per second.
+double residual_of(const Row& row, double target, double lower, double upper, const Mover& a,
+                   const Mover& b) {
+  const double moves = mobility(row, {});
+  const double wanted = row.impulse - (relative_velocity(row, a, b) - target) / moves;
+  return std::fabs(std::clamp(wanted, lower, upper) - row.impulse) * moves;
+}
+
+void shuffle(std::vector<std::uint32_t>& order, std::uint64_t seed) {
+  Random random(seed);
+  for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.next() % i]);
+}
+
+struct Residuals {
+  double largest = 0, squares = 0;
+};
+
+// The contacts of one island.
+class IslandSolver {
+ public:
+  IslandSolver(std::span<const std::uint32_t> contacts, std::vector<Joint>& joints,
+               std::vector<Mover>& movers, std::vector<Correction>& corrections, const SolverOptions& options)
+      : order_(contacts.begin(), contacts.end()),
+        joints_(joints),
+        movers_(movers),
+        corrections_(corrections),
+        options_(options) {}
+
+  void shuffle_order(std::uint64_t seed) { shuffle(order_, seed); }
+
+  // still: sweeps that change no velocity by more than this are the last.
+  void solve(double still) {
+    for (std::uint32_t i = 0; i < options_.iterations; ++i) {
+      const auto visit = [&](Joint& joint) { return visit_velocity(joint, movers_, options_.friction, {}); };
+      if (sweep(i % 2 == 1, visit) <= still) break;
+    }
+    if (!needs_correction()) return;
+    for (std::uint32_t i = 0; i < options_.position_iterations; ++i) {
+      const auto visit = [&](Joint& joint) { return visit_correction(joint, corrections_, {}); };
+      if (sweep(i % 2 == 1, visit) <= still) break;
+    }
+  }
+
+  // Layer by layer from the ground up, the lower body of each contact held (Guendelman, Bridson and Fedkiw
+  // 2003; Erleben 2007).
+  void propagate_shock(std::span<const std::uint32_t> layers) {
+    constexpr int kSweeps = 5;
+    const auto lower = [&](std::uint32_t i) { return std::min(layers[joints_[i].a], layers[joints_[i].b]); };
+    std::stable_sort(order_.begin(), order_.end(), [&](auto i, auto j) { return lower(i) < lower(j); });
+    for (std::size_t begin = 0, end = 0; begin < order_.size(); begin = end) {
+      while (end < order_.size() && lower(order_[end]) == lower(order_[begin])) ++end;
+      for (int i = 0; i < kSweeps; ++i) {
+        for (std::size_t at = begin; at < end; ++at) {
+          Joint& joint = joints_[order_[at]];
+          const Held held = {layers[joint.a] < layers[joint.b] ? 0.0 : 1.0,
+                             layers[joint.b] < layers[joint.a] ? 0.0 : 1.0};
+          visit_velocity(joint, movers_, options_.friction, held);
+          visit_correction(joint, corrections_, held);
+        }
+      }
+    }
+  }
+
+  Residuals residuals() const {
+    Residuals all;
+    const auto take = [&](double residual) {
+      all.largest = std::max(all.largest, residual);
+      all.squares += residual * residual;
+    };
+    for (const std::uint32_t i : order_) {
+      const Joint& joint = joints_[i];
+      const Mover &a = movers_[joint.a], &b = movers_[joint.b];
+      const double bound = options_.friction * joint.normal.impulse;
+      for (const Row& row : joint.tangent) take(residual_of(row, 0, -bound, bound, a, b));
+      take(residual_of(joint.normal, joint.target, 0, kUnbounded, a, b));
+    }
+    return all;
+  }
+
+ private:
+  bool needs_correction() const {
+    return std::any_of(order_.begin(), order_.end(), [&](std::uint32_t i) { return joints_[i].push > 0; });
+  }
+
+  // Result: the largest change of a velocity.
+  template <typename Visit>
+  double sweep(bool backwards, const Visit& visit) {
+    double change = 0;
+    if (backwards) {
+      for (auto i = order_.rbegin(); i != order_.rend(); ++i) change = std::max(change, visit(joints_[*i]));
+    } else {
+      for (const std::uint32_t i : order_) change = std::max(change, visit(joints_[i]));
+    }
+    return change;
+  }
+
+  std::vector<std::uint32_t> order_;
+  std::vector<Joint>& joints_;
+  std::vector<Mover>& movers_;
+  std::vector<Correction>& corrections_;
+  const SolverOptions& options_;
+};
+
+Mover make_mover(const BodyProperties& body, const BodyState& state) {
+  const bool moves = body.motion == Motion::dynamic;
+  const Vector3d still = Vector3d::Zero();
+  return {body.motion == Motion::fixed ? still : state.velocity,
+          body.motion == Motion::fixed ? still : state.angular_velocity, moves ? 1 / body.mass : 0,
+          world_inverse_inertia(body, state)};
+}
+
+template <typename Work>
+void for_each(std::size_t count, const Work& work) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 64), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) work(i);
+  });
+}
+
+}  // namespace
+
+ContactSolver::ContactSolver() = default;
+ContactSolver::~ContactSolver() = default;
+
+void ContactSolver::solve(std::span<const BodyProperties> bodies, std::span<BodyState> states,
+                          std::span<const ContactPoint> contacts, const Islands& islands,
+                          std::span<ContactImpulse> impulses, const SolverOptions& options,
+                          const SolverStep& step) {
+  movers_.resize(bodies.size());
+  joints_.resize(contacts.size());
+  corrections_.assign(bodies.size(), {});
+  for_each(bodies.size(), [&](std::size_t i) { movers_[i] = make_mover(bodies[i], states[i]); });
+  for_each(contacts.size(),
+           [&](std::size_t i) { joints_[i] = make_joint(contacts[i], states, movers_, options, step); });
+  const auto layers =
+      options.shock_propagation ? find_layers(bodies, contacts) : std::vector<std::uint32_t>();
+  constexpr double kStill = 1e-9;  // of what gravity gives in a step
+  std::vector<Residuals> residuals(islands.size());
+  // Without contacts there is nothing to do, and most islands of a slide are such.
+  tbb::parallel_for(std::size_t{0}, islands.size(), [&](std::size_t i) {
+    const auto members = islands.contacts_of(i);
+    if (members.empty()) return;
+    if (options.warm_start) {
+      for (const std::uint32_t j : members) warm_start(joints_[j], impulses[j], options.friction, movers_);
+    }
+    IslandSolver solver(members, joints_, movers_, corrections_, options);
+    if (options.order == ContactOrder::shuffled) {
+      solver.shuffle_order(options.seed ^ (step.number * 0x9E3779B97F4A7C15u + members.front()));
+    }
+    solver.solve(kStill * step.gravity_speed);
+    if (options.shock_propagation) solver.propagate_shock(layers);
+    residuals[i] = solver.residuals();
+  });
+
+  statistics_ = {};
+  for (std::size_t i = 0; i < islands.size(); ++i) {
+    statistics_.islands += islands.contacts_of(i).empty() ? 0 : 1;
+    statistics_.residual = std::max(statistics_.residual, residuals[i].largest);
+    statistics_.residual_rms += residuals[i].squares;
+  }
+  statistics_.contacts = islands.contacts.size();
+  if (statistics_.contacts > 0) {
+    statistics_.residual_rms =
+        std::sqrt(statistics_.residual_rms / (3 * static_cast<double>(statistics_.contacts)));
+  }
+  for_each(bodies.size(), [&](std::size_t i) {
+    if (bodies[i].motion != Motion::dynamic) return;
+    states[i].velocity = movers_[i].velocity;
+    states[i].angular_velocity = movers_[i].spin;
+  });
+  for_each(contacts.size(), [&](std::size_t i) {
+    const Joint& joint = joints_[i];
+    impulses[i].normal = joint.normal.impulse;
+    impulses[i].tangential = joint.tangent[0].impulse * joint.tangent[0].direction +
+                             joint.tangent[1].impulse * joint.tangent[1].direction;
+  });
+}
+
+}  // namespace tandem::simulation

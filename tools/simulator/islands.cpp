@@ -1,0 +1,103 @@
+#include "islands.h"
+
+#include <limits>
+#include <numeric>
+
+namespace tandem::simulation {
+namespace {
+
+constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+
+// Sets of bodies that grow together; the smallest member stands for its set.
+class UnionFind {
+ public:
+  explicit UnionFind(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0u); }
+
+  std::uint32_t find(std::uint32_t i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+  void join(std::uint32_t i, std::uint32_t j) {
+    i = find(i), j = find(j);
+    (i < j ? parent_[j] : parent_[i]) = std::min(i, j);
+  }
+
+ private:
+  std::vector<std::uint32_t> parent_;
+};
+
+bool moves(const BodyProperties& body) {
+  return body.motion == Motion::dynamic;
+}
+
+// Sorts things with an island each by island, keeping their order.
+void group(const std::vector<std::uint32_t>& island_of, std::size_t islands,
+           std::vector<std::uint32_t>& members, std::vector<std::uint32_t>& begin) {
+  begin.assign(islands + 1, 0);
+  for (const std::uint32_t island : island_of) {
+    if (island != kNone) ++begin[island + 1];
+  }
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  members.resize(begin.back());
+  std::vector<std::uint32_t> next(begin.begin(), begin.end() - 1);
+  for (std::uint32_t i = 0; i < island_of.size(); ++i) {
+    if (island_of[i] != kNone) members[next[island_of[i]]++] = i;
+  }
+}
+
+}  // namespace
+
+Islands find_islands(std::span<const BodyProperties> bodies, std::span<const ContactPoint> contacts) {
+  UnionFind sets(bodies.size());
+  for (const ContactPoint& contact : contacts) {
+    if (moves(bodies[contact.body_a]) && moves(bodies[contact.body_b]))
+      sets.join(contact.body_a, contact.body_b);
+  }
+  std::uint32_t count = 0;
+  std::vector<std::uint32_t> island_of_body(bodies.size(), kNone), island_of_contact(contacts.size(), kNone);
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+    if (!moves(bodies[i])) continue;
+    const std::uint32_t first = sets.find(i);  // never after i
+    island_of_body[i] = first == i ? count++ : island_of_body[first];
+  }
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const std::uint32_t a = island_of_body[contacts[i].body_a], b = island_of_body[contacts[i].body_b];
+    island_of_contact[i] = a != kNone ? a : b;
+  }
+  Islands islands;
+  group(island_of_body, count, islands.bodies, islands.body_begin);
+  group(island_of_contact, count, islands.contacts, islands.contact_begin);
+  return islands;
+}
+
+std::vector<std::uint32_t> find_layers(std::span<const BodyProperties> bodies,
+                                       std::span<const ContactPoint> contacts) {
+  std::vector<std::uint32_t> layer(bodies.size(), kNone), front, next;
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+    if (!moves(bodies[i])) layer[i] = 0;
+  }
+  std::vector<std::uint32_t> degree(bodies.size() + 1, 0), neighbours(2 * contacts.size());
+  for (const ContactPoint& contact : contacts) ++degree[contact.body_a + 1], ++degree[contact.body_b + 1];
+  std::partial_sum(degree.begin(), degree.end(), degree.begin());
+  std::vector<std::uint32_t> place(degree.begin(), degree.end() - 1);
+  for (const ContactPoint& contact : contacts) {
+    neighbours[place[contact.body_a]++] = contact.body_b;
+    neighbours[place[contact.body_b]++] = contact.body_a;
+  }
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+    if (layer[i] == 0) front.push_back(i);
+  }
+  for (; !front.empty(); front.swap(next), next.clear()) {
+    for (const std::uint32_t i : front) {
+      for (std::uint32_t at = degree[i]; at < degree[i + 1]; ++at) {
+        std::uint32_t& reached = layer[neighbours[at]];
+        if (reached != kNone) continue;
+        reached = layer[i] + 1;
+        next.push_back(neighbours[at]);
+      }
+    }
+  }
+  return layer;
+}
+
+}  // namespace tandem::simulation

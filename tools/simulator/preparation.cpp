@@ -1,0 +1,180 @@
+#include "preparation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+
+#include "scenes/hdf5_file.h"
+#include "tandem/formats/hash.h"
+
+namespace tandem::simulation {
+namespace {
+
+using bench::FileError;
+using Eigen::Vector3d;
+
+// The distance of the farthest vertex.
+double radius_about(const Vector3d& center, const AssetView& shape) {
+  const LevelView level = shape.level();
+  double squared = 0;
+  for (const Triangle& triangle : std::span(level.triangles, level.triangle_count)) {
+    for (const Triangle::Corner& corner : triangle.corner) {
+      Vector3d at;
+      for (int k = 0; k < 3; ++k) at[k] = corner.position[k] + shape.header->origin[k];
+      squared = std::max(squared, (at - center).squaredNorm());
+    }
+  }
+  return std::sqrt(squared);
+}
+
+// Bodies of each shape, of density 1.
+class Shapes {
+ public:
+  Shapes(std::span<const AssetView> shapes, std::span<const std::string> names)
+      : shapes_(shapes), names_(names), of_dynamic_(shapes.size()), of_fixed_(shapes.size()) {}
+
+  BodyProperties body(std::uint32_t shape, Motion motion, double density,
+                      std::vector<std::string>& findings) {
+    if (motion == Motion::fixed) {
+      if (!of_fixed_[shape]) of_fixed_[shape] = fixed(shape);
+      return *of_fixed_[shape];
+    }
+    if (!of_dynamic_[shape]) of_dynamic_[shape] = dynamic(shape, findings);
+    BodyProperties body = *of_dynamic_[shape];
+    body.motion = motion;
+    body.mass *= density;
+    body.inertia *= density;
+    body.inverse_inertia /= density;
+    return body;
+  }
+
+ private:
+  BodyProperties fixed(std::uint32_t shape) const {
+    BodyProperties body;
+    body.shape = shape;
+    body.motion = Motion::fixed;
+    body.radius = radius_about(body.center, shapes_[shape]);
+    return body;
+  }
+
+  BodyProperties dynamic(std::uint32_t shape, std::vector<std::string>& findings) const {
+    try {
+      const MassReport report = mass_properties(shapes_[shape]);
+      for (const std::string& finding : report.findings) findings.push_back(names_[shape] + ": " + finding);
+      BodyProperties body = body_properties(shape, report.properties, 1);
+      body.radius = radius_about(body.center, shapes_[shape]);
+      return body;
+    } catch (const std::runtime_error& impossible) {
+      throw FileError(names_[shape] + ": " + impossible.what());
+    }
+  }
+
+  std::span<const AssetView> shapes_;
+  std::span<const std::string> names_;
+  std::vector<std::optional<BodyProperties>> of_dynamic_, of_fixed_;
+};
+
+// What a scene file says of its bodies beyond their poses; empty where it is silent.
+struct SceneMotion {
+  std::vector<std::uint32_t> motion;
+  std::vector<double> density, velocity, angular_velocity;
+};
+
+SceneMotion read_motion(const std::string& path, std::size_t bodies) {
+  const bench::Hdf5Input file(path);
+  SceneMotion read;
+  const auto check = [&](const char* name, std::size_t rows) {
+    if (rows == bodies) return;
+    throw FileError(path + ": " + name + ": " + std::to_string(rows) + " rows for " + std::to_string(bodies) +
+                    " instances");
+  };
+  const auto read_f64 = [&](const char* name, const bench::Shape& row, std::vector<double>& values) {
+    if (!file.has(name)) return;
+    values = file.read_f64(name, row);
+    check(name, values.size() / (row.empty() ? 1 : row[0]));
+    const bool finite = std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
+    if (!finite) throw FileError(path + ": " + name + ": a number is not finite");
+  };
+  if (file.has("/simulation/motion")) {
+    read.motion = file.read_u32("/simulation/motion");
+    check("/simulation/motion", read.motion.size());
+    if (std::any_of(read.motion.begin(), read.motion.end(),
+                    [](std::uint32_t motion) { return motion > 2; })) {
+      throw FileError(path +
+                      ": /simulation/motion: a number that is none of 0 dynamic, 1 fixed, 2 kinematic");
+    }
+  }
+  read_f64("/simulation/density", {}, read.density);
+  if (std::any_of(read.density.begin(), read.density.end(), [](double density) { return density <= 0; })) {
+    throw FileError(path + ": /simulation/density: a density that is not above 0");
+  }
+  read_f64("/simulation/velocity", {3}, read.velocity);
+  read_f64("/simulation/angular_velocity", {3}, read.angular_velocity);
+  return read;
+}
+
+void add_body(Preparation& all, const BodyProperties& body, const Pose& pose, const AssetView& shape) {
+  all.bodies.push_back(body);
+  all.states.push_back(state_of(body, pose));
+  if (body.motion == Motion::dynamic) all.triangles += shape.level().triangle_count;
+}
+
+}  // namespace
+
+Preparation prepare(const Configuration& configuration, std::span<const AssetView> shapes,
+                    std::span<const std::string> names, double density) {
+  Preparation all;
+  Shapes bodies(shapes, names);
+  for (std::size_t i = 0; i < configuration.instances.size(); ++i) {
+    const Instance& instance = configuration.instances[i];
+    add_body(all, bodies.body(instance.asset, configuration.motion[i], density, all.findings), instance.pose,
+             shapes[instance.asset]);
+  }
+  return all;
+}
+
+Preparation prepare_scene(const std::string& path, const bench::Scene& scene, double density) {
+  const auto& instances = scene.description.instances;
+  const SceneMotion motion = read_motion(path, instances.size());
+  const std::vector<AssetView> shapes = scene.views();
+  Preparation all;
+  Shapes bodies(shapes, scene.description.assets);
+  for (std::size_t i = 0; i < instances.size(); ++i) {
+    if (!is_rigid(instances[i].pose)) {
+      throw FileError(path + ": instance " + std::to_string(i) + ": " + explain(Status::kPoseNotRigid));
+    }
+    const std::uint32_t shape = instances[i].asset;
+    const auto moved_by = motion.motion.empty() ? Motion::dynamic : static_cast<Motion>(motion.motion[i]);
+    const double body_density = motion.density.empty() ? density : motion.density[i];
+    add_body(all, bodies.body(shape, moved_by, body_density, all.findings), instances[i].pose, shapes[shape]);
+    const auto vector_of = [i](const std::vector<double>& numbers) {
+      return numbers.empty() ? Vector3d(Vector3d::Zero())
+                             : Vector3d(numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]);
+    };
+    if (moved_by == Motion::fixed) continue;
+    all.states.back().velocity = vector_of(motion.velocity);
+    all.states.back().angular_velocity = vector_of(motion.angular_velocity);
+  }
+  return all;
+}
+
+std::uint64_t hash_of(std::span<const BodyProperties> bodies, std::span<const BodyState> states,
+                      std::span<const AssetView> shapes) {
+  std::vector<double> numbers;
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    const BodyState& state = states[i];
+    numbers.push_back(static_cast<double>(bodies[i].shape));
+    numbers.push_back(static_cast<double>(bodies[i].motion));
+    numbers.push_back(bodies[i].mass);
+    for (const Vector3d& vector : {state.position, state.velocity, state.angular_velocity}) {
+      numbers.insert(numbers.end(), vector.data(), vector.data() + 3);
+    }
+    numbers.insert(numbers.end(), state.orientation.coeffs().data(), state.orientation.coeffs().data() + 4);
+  }
+  std::uint64_t hash = xxh64(numbers.data(), numbers.size() * sizeof(double));
+  for (const AssetView& shape : shapes) hash = xxh64(&shape.header->hash, sizeof shape.header->hash, hash);
+  return hash;
+}
+
+}  // namespace tandem::simulation

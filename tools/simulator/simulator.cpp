@@ -1,0 +1,182 @@
+#include "simulator.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "followed_contacts.h"
+
+namespace tandem::simulation {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+void take(StepRecord& record, const FinderReport& report) {
+  record.update_seconds = report.engine.update;
+  record.broad_phase_seconds = report.engine.broad_phase;
+  record.traversal_seconds = report.engine.traversal;
+  record.triangle_test_seconds = report.engine.triangle_tests;
+  record.transfer_seconds = report.engine.transfer;
+  record.contact_seconds = report.generation;
+  record.object_pairs = report.counters.object_pairs;
+  record.block_pairs = report.counters.block_pairs;
+  record.candidates = report.counters.candidates;
+  record.triangle_pairs = report.counters.contacts;
+  record.segments = report.contacts.segments;
+  record.patches = report.contacts.patches;
+  record.open_curves = report.contacts.open_curves;
+  record.candidate_points = report.contacts.candidate_points;
+  record.contact_area = report.contacts.area;
+}
+
+}  // namespace
+
+Simulator::Simulator(std::vector<BodyProperties> bodies, std::vector<BodyState> states,
+                     std::unique_ptr<ContactFinder> contacts, const SimulatorOptions& options)
+    : bodies_(std::move(bodies)),
+      acting_(bodies_),
+      states_(std::move(states)),
+      finder_(std::move(contacts)),
+      options_(options),
+      arena_(static_cast<int>(options.threads)) {
+  sleep_.start(bodies_.size());
+}
+
+StepRecord Simulator::step() {
+  return arena_.execute([&] { return step_in_arena(); });
+}
+
+StepRecord Simulator::step_in_arena() {
+  const Clock::time_point start = Clock::now();
+  StepRecord record;
+  find_contacts(record);
+  const Clock::time_point found = Clock::now();
+  solve(record);
+  sleep();
+  record.solver_seconds = seconds_since(found);
+  record.time = static_cast<double>(++step_) * options_.dt;
+  take_measures(record);
+  record.step_seconds = seconds_since(start);
+  return record;
+}
+
+void Simulator::find_contacts(StepRecord& record) {
+  constexpr double kFall = 2;  // times what gravity lets a body fall in a step
+  const std::vector<ContactPoint>& found = finder_->find(poses(), idle());
+  take(record, finder_->report());
+  record.contacts = found.size();
+  for (const ContactPoint& contact : found) {
+    record.penetration_max = std::max(record.penetration_max, contact.depth);
+    record.penetration_mean += contact.depth / static_cast<double>(found.size());
+  }
+  const double gap = kFall * options_.gravity.norm() * options_.dt * options_.dt;
+  kept_ = cache_.with_those_just_lost(found, bodies_, states_, idle(), gap);
+}
+
+void Simulator::solve(StepRecord& record) {
+  islands_ = find_islands(acting_, kept_.contacts);
+  std::vector<ContactImpulse> impulses(kept_.contacts.size());
+  if (options_.solver.warm_start) impulses = cache_.match(kept_.contacts, bodies_, states_);
+  constexpr std::uint32_t kCold = 10;
+  SolverOptions solver = options_.solver;
+  if (solver.warm_start && cache_.entries().empty()) solver.iterations *= kCold;  // or stacks sink at once
+  const double dt = options_.dt / options_.substeps;
+  FollowedContacts followed(kept_.contacts, states_);
+  for (std::uint32_t i = 0; i < options_.substeps; ++i) {
+    if (i > 0) followed.follow(states_);
+    for (std::size_t body = 0; body < states_.size(); ++body) {
+      if (acting_[body].motion == Motion::dynamic) states_[body].velocity += dt * options_.gravity;
+    }
+    solver_.solve(acting_, states_, followed.contacts(), islands_, impulses, solver,
+                  {dt, dt * options_.gravity.norm(), step_ * options_.substeps + i});
+    move(dt);
+  }
+  followed.follow(states_);
+  kept_.contacts = followed.contacts();
+  cache_.remember(kept_, impulses, states_, idle());
+  record.residual_max = solver_.statistics().residual;
+  record.residual_rms = solver_.statistics().residual_rms;
+  record.islands = solver_.statistics().islands;
+}
+
+void Simulator::move(double dt) {
+  const auto corrections = solver_.corrections();
+  for (std::size_t i = 0; i < states_.size(); ++i) {
+    advance(acting_[i], states_[i], corrections[i].velocity, corrections[i].angular_velocity, dt);
+  }
+}
+
+void Simulator::sleep() {
+  if (!options_.sleep.enabled) return;
+  sleep_.wake_touched(acting_, kept_.contacts);
+  sleep_.fall_asleep(bodies_, states_, islands_, options_.sleep, options_.dt);
+  for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
+    acting_[i].motion = sleep_.sleeps(i) ? Motion::fixed : bodies_[i].motion;
+  }
+}
+
+std::vector<std::uint8_t> Simulator::idle() const {
+  std::vector<std::uint8_t> idle(acting_.size());
+  for (std::size_t i = 0; i < idle.size(); ++i) idle[i] = acting_[i].motion == Motion::fixed ? 1 : 0;
+  return idle;
+}
+
+std::vector<BodyPose> Simulator::poses() const {
+  std::vector<BodyPose> poses;
+  poses.reserve(states_.size());
+  for (std::size_t i = 0; i < states_.size(); ++i) poses.push_back(pose_of(bodies_[i], states_[i]));
+  return poses;
+}
+
+void Simulator::take_measures(StepRecord& record) const {
+  std::size_t moving = 0;
+  for (std::size_t i = 0; i < states_.size(); ++i) {
+    if (bodies_[i].motion != Motion::dynamic) continue;
+    const BodyState& state = states_[i];
+    const double speed = state.velocity.norm();
+    record.kinetic_energy += kinetic_energy(bodies_[i], state);
+    record.potential_energy -= bodies_[i].mass * options_.gravity.dot(state.position);
+    record.linear_momentum += bodies_[i].mass * state.velocity;
+    record.angular_momentum += angular_momentum(bodies_[i], state);
+    record.speed_max = std::max(record.speed_max, speed);
+    record.speed_mean += speed;
+    record.spin_max = std::max(record.spin_max, bodies_[i].radius * state.angular_velocity.norm());
+    ++moving;
+  }
+  if (moving > 0) record.speed_mean /= static_cast<double>(moving);
+  record.sleeping = sleep_.count();
+}
+
+void Simulator::place(std::uint32_t body, const BodyState& state) {
+  states_[body] = state;
+  sleep_.wake(body);
+  for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
+    acting_[i].motion = sleep_.sleeps(i) ? Motion::fixed : bodies_[i].motion;
+  }
+}
+
+SimulatorState Simulator::save() const {
+  const auto entries = cache_.entries();
+  const auto quiet = sleep_.quiet();
+  const auto groups = sleep_.groups();
+  return {step_,
+          states_,
+          {entries.begin(), entries.end()},
+          {quiet.begin(), quiet.end()},
+          {groups.begin(), groups.end()}};
+}
+
+void Simulator::restore(SimulatorState state) {
+  step_ = state.step;
+  states_ = std::move(state.states);
+  cache_.restore(std::move(state.impulses));
+  sleep_.restore(std::move(state.quiet), std::move(state.groups));
+  for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
+    acting_[i].motion = sleep_.sleeps(i) ? Motion::fixed : bodies_[i].motion;
+  }
+}
+
+}  // namespace tandem::simulation

@@ -1,0 +1,80 @@
+#pragma once
+#include <tbb/task_arena.h>
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "contact_finder.h"
+#include "contact_solver.h"
+#include "sleep.h"
+#include "step_record.h"
+
+namespace tandem::simulation {
+
+struct SimulatorOptions {
+  double dt = 1.0 / 60;
+  std::uint32_t substeps = 1;  ///< parts of a step that share its contacts, whose points move with the bodies
+  Eigen::Vector3d gravity = {0, 0, -9.81};
+  SolverOptions solver;
+  SleepOptions sleep;
+  std::uint32_t threads = 1;  ///< at most; oneTBB starts no more than its max_allowed_parallelism
+};
+
+/// All that the next steps depend on, beside bodies and options.
+struct SimulatorState {
+  std::uint64_t step = 0;
+  std::vector<BodyState> states;
+  std::vector<CachedImpulse> impulses;
+  std::vector<double> quiet;          ///< of Sleep
+  std::vector<std::uint32_t> groups;  ///< of Sleep
+};
+
+/// Moves rigid bodies, step by step: contacts where the bodies stand, velocities with gravity, contacts
+/// solved for, positions by the new velocities (semi-implicit Euler). With warm start, a step that has no
+/// impulse of the step before makes ten times the sweeps. The same bytes for any number of threads.
+class Simulator {
+ public:
+  /// Condition: as many states as bodies.
+  Simulator(std::vector<BodyProperties> bodies, std::vector<BodyState> states,
+            std::unique_ptr<ContactFinder> contacts, const SimulatorOptions& options);
+
+  /// Throws what the contact finder throws.
+  StepRecord step();
+
+  std::span<const BodyProperties> bodies() const { return bodies_; }
+  std::span<const BodyState> states() const { return states_; }
+  std::vector<BodyPose> poses() const;
+
+  /// Puts a body somewhere else, awake.
+  void place(std::uint32_t body, const BodyState& state);
+
+  SimulatorState save() const;
+
+  /// Goes on where save() was called. Condition: of a simulator of the same bodies and options.
+  void restore(SimulatorState state);
+
+ private:
+  StepRecord step_in_arena();
+  void find_contacts(StepRecord& record);
+  void solve(StepRecord& record);
+  void move(double dt);
+  void sleep();
+  std::vector<std::uint8_t> idle() const;
+  void take_measures(StepRecord& record) const;
+
+  std::vector<BodyProperties> bodies_, acting_;  // acting_: what sleeps is fixed
+  std::vector<BodyState> states_;
+  std::unique_ptr<ContactFinder> finder_;
+  SimulatorOptions options_;
+  tbb::task_arena arena_;
+  KeptContacts kept_;  // of the step under way
+  Islands islands_;
+  ContactSolver solver_;
+  ImpulseCache cache_;
+  Sleep sleep_;
+  std::uint64_t step_ = 0;
+};
+
+}  // namespace tandem::simulation

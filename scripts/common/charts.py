@@ -1,7 +1,9 @@
 """The look of all charts: size, letters, colours, legends, files."""
+import io
 import math
 
 import matplotlib
+import PIL.Image
 
 matplotlib.use("Agg")
 matplotlib.rcParams.update({
@@ -47,6 +49,8 @@ def save(figure, out, legend=None, across=4, note=""):
         figure.legend(legend.values(), legend.keys(), loc="lower center", ncol=across, columnspacing=1.5, handletextpad=0.5, borderaxespad=0.2)
     if note:
         figure.text(0.01, 0.99, note, va="top")
-    figure.savefig(f"{out}.png", dpi=200, pil_kwargs={"optimize": True})
+    pixels = io.BytesIO()
+    figure.savefig(pixels, dpi=200)
+    PIL.Image.open(pixels).convert("RGB").quantize(96).save(f"{out}.png", optimize=True)  # a palette: a third of the bytes
     figure.savefig(f"{out}.svg", metadata={"Date": None})
     plt.close(figure)

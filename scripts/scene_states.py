@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 
 import bvh_file
+from common import rotations
 
 
 @dataclasses.dataclass
@@ -64,14 +65,6 @@ def read_shapes(path, names):
     return [read_shape(path.parent / (name.decode() if isinstance(name, bytes) else name)) for name in names]
 
 
-def rotations(quaternions):
-    w, x, y, z = quaternions.T
-    rows = [[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]
-    return np.moveaxis(np.array(rows), 2, 0)
-
-
 def read_run(path, file, wanted):
     """The states after the wanted numbers of steps; none wanted: the last."""
     kept = file["trajectory/frame"][:].tolist() if "trajectory" in file else []
@@ -86,7 +79,7 @@ def read_run(path, file, wanted):
     centre = file["bodies/center_of_mass"][:]
     states = []
     for row in [kept.index(frame) for frame in wanted or kept[-1:]]:
-        rotation = rotations(file["trajectory/orientation"][row])
+        rotation = rotations.of_quaternions(file["trajectory/orientation"][row])
         moved = np.einsum("nij,nj->ni", rotation, centre)
         states.append(Bodies(shapes, asset, fixed, rotation, file["trajectory/position"][row] - moved))
     return states

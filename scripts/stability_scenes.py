@@ -1,17 +1,14 @@
 """Scenes of scripts/stability, and runs of `bvhbench simulate` on them."""
 import functools
 import json
-import os
-import subprocess
 from pathlib import Path
 
 import h5py
 import numpy as np
 
-ROOT = Path(__file__).resolve().parent.parent
-TOOLS = ROOT / "build/release/tools"
-BVHBUILD = os.environ.get("TANDEM_BVHBUILD", TOOLS / "bvhbuild/bvhbuild")  # as the tests of the tools
-BVHBENCH = os.environ.get("TANDEM_BVHBENCH", TOOLS / "bvhbench/bvhbench")
+from common import tools
+
+BVHBENCH, BVHBUILD = tools.tool("bvhbench"), tools.tool("bvhbuild")
 SLOP = 5e-4  # metres: that of every run of a scene
 GRAVITY = 9.81
 # Boxes by their lengths: the rest are files of assets/.
@@ -23,19 +20,6 @@ def box_obj(lengths):
     corners = [[(1 if i >> k & 1 else -1) * lengths[k] / 2 for k in range(3)] for i in range(8)]
     faces = [(1, 5, 7, 3), (2, 4, 8, 6), (1, 2, 6, 5), (3, 7, 8, 4), (1, 3, 4, 2), (5, 6, 8, 7)]
     return "".join(f"v {x} {y} {z}\n" for x, y, z in corners) + "".join("f " + " ".join(map(str, face)) + "\n" for face in faces)
-
-
-def rotation_about(axis, angle):
-    x, y, z = np.asarray(axis) / np.linalg.norm(axis)
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
-
-
-def random_rotation(random):
-    w, x, y, z = (q := random.normal(size=4)) / np.linalg.norm(q)
-    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                     [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
 
 
 class Scene:
@@ -117,21 +101,13 @@ class Workshop:
 
     @functools.cache
     def mesh(self, name):
-        source = ROOT / f"assets/{name}.obj"
+        source = tools.ROOT / f"assets/{name}.obj"
         if name in BOXES:
             source = self.folder / f"{name}.obj"
             source.write_text(box_obj(BOXES[name]))
         built = self.folder / f"{name}.bvh"
-        self.call(BVHBUILD, source, "-o", built, "-q")
+        tools.run(BVHBUILD, source, "-o", built, "-q")
         return built
-
-    def call(self, *command):
-        done = subprocess.run([str(part) for part in command], capture_output=True)
-        if done.returncode != 0:
-            raise SystemExit(f"{' '.join(map(str, command))}\n{done.stderr.decode().strip()}")
-
-    def bench(self, *arguments):
-        self.call(BVHBENCH, *arguments)
 
     def scene_file(self, scene):
         path = self.folder / "scene.h5"
@@ -150,5 +126,5 @@ class Workshop:
                 options += [f"--{name.replace('_', '-')}"] + ([] if value is True else [repr(value) if isinstance(value, float) else value])
         output = self.folder / "run.h5"
         keep = min(steps, max(1, round(every / dt))) if every else steps
-        self.bench("simulate", *kind, "--frames", steps, "--threads", 1, "--trajectory", keep, *options, "-o", output)
+        tools.run(BVHBENCH, "simulate", *kind, "--frames", steps, "--threads", 1, "--trajectory", keep, *options, "-o", output)
         return Run(output, " ".join(map(str, options)))

@@ -20,9 +20,12 @@ def tool(name, preset="release"):
 
 
 def run(*command, **options):
-    """Runs a command and returns what it prints. The options are those of subprocess.run."""
+    """Runs a command and returns what it prints. The options are those of subprocess.run. Raises ToolFailed."""
     words = [str(word) for word in command]
-    done = subprocess.run(words, capture_output=True, text=True, errors="replace", **options)
+    try:
+        done = subprocess.run(words, capture_output=True, text=True, errors="replace", **options)
+    except OSError as defect:
+        raise ToolFailed(f"{words[0]}: {defect.strerror}") from defect
     if done.returncode != 0:
         raise ToolFailed(f"{shlex.join(words)}: exit code {done.returncode}: {(done.stderr or done.stdout).strip()}")
     return done.stdout
@@ -33,12 +36,12 @@ def run_json(*command, **options):
 
 
 def commit():
-    """What TANDEM_COMMIT says, else the commit that is checked out, shortened."""
+    """What TANDEM_COMMIT says, else the commit that is checked out, shortened, else "unknown"."""
     told = os.environ.get("TANDEM_COMMIT")
-    if told:
-        return told
-    done = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True)
-    return done.stdout.strip() or "unknown"
+    try:
+        return told or run("git", "rev-parse", "--short", "HEAD", cwd=ROOT).strip()
+    except ToolFailed:
+        return "unknown"
 
 
 def parser(description):

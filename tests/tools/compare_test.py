@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """bvhbench compare from the outside: its answers, its files, and what it refuses.
 
-Environment: that of tool_test.py, and TANDEM_BVHBENCH.
+Environment: that of tool_test.py, TANDEM_BVHBENCH, and PYTHONPATH with scripts/.
 """
 import json
 import os
@@ -11,6 +11,7 @@ import unittest
 import h5py
 import numpy as np
 
+from common import rotations
 from tool_test import CUBE_OBJ, DONE, SOURCE_DIR, UNREADABLE_INPUT, UNWRITABLE_OUTPUT, USAGE, ToolTest
 
 BVHBENCH = os.environ["TANDEM_BVHBENCH"]
@@ -18,15 +19,6 @@ PLOT = SOURCE_DIR / "scripts/plot_compare"
 TANDEM = ["Tandem exact", "Tandem fast", "Tandem boxes"]
 ARRAYS = {"build_seconds", "update_seconds", "query_seconds_best", "query_seconds_median", "contacts", "missed", "invented",
           "memory_bytes", "work_bytes"}
-
-
-def rotations(count, rng):
-    q = rng.normal(size=(count, 4))
-    w, x, y, z = (q / np.linalg.norm(q, axis=1)[:, None]).T
-    rows = [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
-            2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-            2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]
-    return np.stack(rows, axis=1).reshape(count, 3, 3)
 
 
 class CompareTest(ToolTest):
@@ -49,12 +41,12 @@ class CompareTest(ToolTest):
     def heap(self):
         """Cubes in general position, close enough to meet."""
         rng = np.random.default_rng(1)
-        return self.write_scene("heap", rotations(20, rng), rng.uniform(0, 2.5, (20, 3)))
+        return self.write_scene("heap", rotations.at_random(rng, 20), rng.uniform(0, 2.5, (20, 3)))
 
     def stack(self):
         """Cubes that share corners, edges and faces, all turned by the same rotation: rounding parts some of them."""
         grid = np.stack(np.meshgrid(*[np.arange(3.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
-        rotation = rotations(1, np.random.default_rng(2))[0]
+        rotation = rotations.at_random(np.random.default_rng(2))
         return self.write_scene("stack", np.tile(rotation, (27, 1, 1)), grid @ rotation.T)
 
     def compare(self, *arguments, **options):

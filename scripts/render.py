@@ -22,14 +22,14 @@ def plane_of_weights(corners):
     """Of triangles on the screen: coefficients [n,3,3] such that the barycentric weights at (x, y) are c · (x, y, 1)."""
     (ax, ay), (bx, by), (cx, cy) = (corners[:, k, :2].T for k in range(3))
     area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-    with np.errstate(divide="ignore", invalid="ignore"):  # without area: not finite
+    with np.errstate(divide="ignore", invalid="ignore"):  # triangles without area: coefficients that are not finite
         v = np.stack([cy - ay, ax - cx, (cx - ax) * ay - (cy - ay) * ax], 1) / area[:, None]
         w = np.stack([ay - by, bx - ax, (by - ay) * ax - (bx - ax) * ay], 1) / area[:, None]
         return np.stack([np.array([0, 0, 1]) - v - w, v, w], 1)
 
 
 def pixel_bounds(corners, size):
-    """First and one past the last pixel, [n,2] each, whose centres can lie in a triangle."""
+    """The first and one past the last pixel, [n,2] each, whose centres can lie in a triangle."""
     a, b, c = (corners[:, k, :2] for k in range(3))
     low = np.ceil(np.minimum(np.minimum(a, b), c) - 0.5)
     high = np.floor(np.maximum(np.maximum(a, b), c) - 0.5) + 1
@@ -91,5 +91,5 @@ def to_bytes(image):
 
 
 def save_png(path, image):
-    # 8-bit values by hand, and no "Software" field: the bytes then hang on what is shown alone.
+    # 8-bit values, and no "Software" field: the bytes depend on what is shown alone.
     matplotlib.image.imsave(path, to_bytes(image), metadata={"Software": None})

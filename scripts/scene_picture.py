@@ -13,19 +13,19 @@ COLOURS = ("bf826e", "d4ad7a", "9da985", "789997", "8294ac", "9f8aa3", "c69da1",
            "decaa5", "838da2")
 GROUND = "cbc6b9"
 SKY_ABOVE, SKY_BELOW = "e4eaef", "fbfaf7"
-SUN, SUN_FROM = 0.88, (-0.62, 0.66, 0.52)  # its strength, and where: right, up and towards the eye
+SUN, SUN_FROM = 0.88, (-0.62, 0.66, 0.52)  # its strength, and its direction: right, up and towards the eye
 AMBIENT = 0.56
-OUTLINE = 0.45  # of the light is left where a body ends
+OUTLINE = 0.45  # the share of the light that is left along the outline of a body
 SHADOW_PIXELS = 2048
 
 
 def of_colour(name):
-    """Linear light of an sRGB colour in hexadecimal, nearly enough."""
+    """Linear light of an sRGB colour in hexadecimal, approximately."""
     return (np.array([int(name[i:i + 2], 16) for i in (0, 2, 4)]) / 255) ** 2.2
 
 
 def colours(bodies):
-    """Linear light that each body reflects; hangs on its number alone."""
+    """Linear light that each body reflects; it depends on the number of the body alone."""
     palette = np.array([of_colour(name) for name in COLOURS])
     random = np.random.default_rng(7)
     count = len(bodies.asset)
@@ -58,7 +58,7 @@ def box_corners(bodies):
 class Camera:
     axes: np.ndarray  # rows: right, up, towards the eye
     eye: np.ndarray
-    focal: float  # pixels of something as wide as it is far
+    focal: float  # the width in pixels of something as wide as it is far away
     size: tuple
 
     def seen(self, points):
@@ -76,7 +76,7 @@ class Camera:
 
 
 def camera_on(points, axes, size):
-    """As near to all the points as the margin allows."""
+    """The camera along these axes that is as near to the points as the margin allows."""
     focal = size[0] / 2 / np.tan(FIELD_OF_VIEW / 2)
     half = np.array(size) / 2 - MARGIN * size[0]
     seen = points @ axes.T
@@ -129,7 +129,7 @@ def take_samples(triangles, body, closed, camera):
 
 
 def lit(samples, casters, bounds, light):
-    """Which samples see the light; soft where the samples of a pixel are averaged."""
+    """Which samples see the light; shadows are soft once the samples of a pixel are averaged."""
     right = unit(np.cross([0.0, 0.0, 1.0], light))
     axes = np.array([right, np.cross(light, right), light])
     seen = bounds @ axes.T
@@ -137,11 +137,11 @@ def lit(samples, casters, bounds, light):
     scale = SHADOW_PIXELS / (high - low)[:2].max()
     facing = casters[area_vectors(casters) @ light > 0]
     depth, _ = render.rasterise((facing @ axes.T - low) * [scale, scale, 1], (SHADOW_PIXELS, SHADOW_PIXELS))
-    # Off the surface, which would shade itself: a place r pixels away on a plane at an angle t to the light is nearer to
-    # it by at most r tan t, and a lift of h clears h / cos t; r <= 2.5 + 0.7 of the pixel's own.
+    # Samples are lifted off their surface, which would shade itself otherwise: a place r pixels away on a plane at an angle t
+    # to the light is nearer to it by at most r tan t, and a lift of h clears h / cos t; r <= 2.5, plus 0.7 within a pixel.
     lifted = samples.point + samples.normal * np.float32(3.2 / scale)
     at = lifted @ axes.T.astype(np.float32) - low.astype(np.float32)
-    # Each sample looks at a place of its own on a small disc: a low-discrepancy sequence.
+    # Each sample looks at a place of its own on a small disc; the places are a low-discrepancy sequence.
     index = np.arange(len(at))
     radius, angle = 2.5 * np.sqrt(index * 0.754877 % 1), 2 * np.pi * (index * 0.569840 % 1)
     column = np.floor(at[:, 0] * scale + radius * np.cos(angle)).astype(int)

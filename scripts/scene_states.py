@@ -24,7 +24,7 @@ class Bodies:
 
     @property
     def subject(self):
-        """What a picture shows: all but fixed ground, which is larger than four of the median body is."""
+        """Which bodies a picture has to show: all but fixed ones that are more than four times as large as the median body, the ground."""
         ground = self.fixed & (self.diagonals > 4 * np.median(self.diagonals))
         return ~ground if not ground.all() else ground
 
@@ -45,7 +45,7 @@ class Shape:
 
 
 def is_closed(triangles):
-    """Whether every edge has its opposite: then what faces away is never seen."""
+    """Whether every edge has its opposite, so that a face is never seen from behind."""
     points, corner = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     start = corner.reshape(-1, 3)
     end = np.roll(start, -1, axis=1)
@@ -66,7 +66,7 @@ def read_shapes(path, names):
 
 
 def read_run(path, file, wanted):
-    """The states after the wanted numbers of steps; none wanted: the last."""
+    """The states after the wanted numbers of steps, or the last state where no number is wanted."""
     kept = file["trajectory/frame"][:].tolist() if "trajectory" in file else []
     if not kept:
         raise ValueError("keeps no state: simulate with --trajectory")

@@ -9,9 +9,9 @@ import numpy as np
 from common import tools
 
 BVHBENCH, BVHBUILD = tools.tool("bvhbench"), tools.tool("bvhbuild")
-SLOP = 5e-4  # metres: that of every run of a scene
+SLOP = 5e-4  # metres, in every run of a scene
 GRAVITY = 9.81
-# Boxes by their lengths: the rest are files of assets/.
+# Boxes by their lengths; all other meshes are files of assets/.
 BOXES = {"slab": (300, 40, 2), "flat": (1, 1, 0.2), "uneven": (1, 0.6, 0.2), "thin": (1, 1, 0.01), "target": (2, 2, 0.01)}
 
 
@@ -23,7 +23,7 @@ def box_obj(lengths):
 
 
 class Scene:
-    """Bodies to come: meshes by name, poses of their files' coordinates."""
+    """A scene to be written: names of meshes, and bodies with their poses."""
 
     def __init__(self):
         self.meshes, self.bodies = [], []

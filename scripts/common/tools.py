@@ -1,9 +1,11 @@
 """Runs the project's tools. Needs nothing but Python's standard library."""
 import argparse
+import contextlib
 import json
 import os
 import shlex
 import subprocess
+import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -47,3 +49,13 @@ def commit():
 def parser(description):
     """A parser of options whose help is the description as it is written."""
     return argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+
+
+@contextlib.contextmanager
+def reading(*paths):
+    """Where the block cannot read the files, or does not find in them what it needs, ends the script: a message that names script and files, exit code 2."""
+    try:
+        yield
+    except (OSError, KeyError, ValueError) as defect:
+        print(f"{Path(sys.argv[0]).name}: {', '.join(map(str, paths))}: {defect}", file=sys.stderr)
+        raise SystemExit(2) from defect

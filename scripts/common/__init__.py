@@ -1,1 +1,1 @@
-"""What the scripts share: tools (running them), tables (CSV, Markdown, numbers), charts (one look), rotations."""
+"""What the scripts share: running tools, tables and numbers, the look of charts, rotations."""

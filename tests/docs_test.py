@@ -1,5 +1,7 @@
 #!/usr/bin/python3
-"""Tests of the pages: tables are those of their CSV files, and what a page names is there. Usage: docs_test.py TablesTest|LinksTest."""
+"""Tests of the pages: tables are those of their CSV files, what a page names is there, and sources include what docs/architecture.md lets them.
+
+Usage: docs_test.py TablesTest|LinksTest|IncludesTest."""
 import re
 import shutil
 import subprocess
@@ -14,6 +16,11 @@ CODE = re.compile(r"`([^`\n]+)`")
 FILE_NAME = re.compile(r"[\w.-]+(/[\w.-]+)*/?")
 SOURCE_ENDINGS = {".h", ".cuh", ".cu", ".cpp", ".py", ".cmake", ".csv", ".md", ".yaml"}
 MENTION = re.compile(r"docs/decisions/(?P<number>\d{4})|(?P<page>(?:docs|formats)/[\w/-]+\.md)")
+
+INCLUDE = re.compile(r'^#include ["<]([^">]+/[^">]+)[">]', re.MULTILINE)
+# Starts of include paths, and what docs/architecture.md calls them.
+LIBRARIES = {"CGAL": "CGAL", "CLI": "CLI11", "Eigen": "Eigen", "assimp": "assimp", "fcl": "FCL", "embree3": "Embree", "ode": "ODE", "oneapi": "oneTBB",
+             "tbb": "oneTBB", "nlohmann": "nlohmann-json", "cub": "CUB", "thrust": "CUB", "BulletCollision": "Bullet", "sys": None}
 
 
 def folders():
@@ -110,6 +117,34 @@ class LinksTest(unittest.TestCase):
                         self.assertEqual(len(list((ROOT / "docs/decisions").glob(mention["number"] + "-*.md"))), 1)
                     else:
                         self.assertTrue((ROOT / mention["page"]).exists())
+
+
+class IncludesTest(unittest.TestCase):
+    def setUp(self):
+        page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8").partition("## What belongs where")[2]
+        rows = re.findall(r"^\| `([^`]+)` \| ([^|]+) \|", page, re.MULTILINE)
+        self.allowed = {folder: {name.strip("` ") for name in includes.split(",")} for folder, includes in rows}
+
+    def folder_of(self, path):
+        """The row of a source file: its longest folder that has one."""
+        return max((folder for folder in self.allowed if path.startswith(folder)), key=len, default=None)
+
+    def included(self, name):
+        """The row or the library of an include path; None for the system's."""
+        first, second, *_ = name.split("/")
+        if first == "tandem":
+            return second + "/"
+        return LIBRARIES[first] if first in LIBRARIES else self.folder_of(f"tools/{name}")
+
+    def test_every_folder_includes_what_its_row_says(self):
+        used = {folder: set() for folder in self.allowed}
+        for path in (path for path in FILES if path.suffix in (".h", ".cpp", ".cu", ".cuh")):
+            folder = self.folder_of(path.relative_to(ROOT).as_posix())
+            if folder:
+                used[folder] |= {self.included(name) for name in INCLUDE.findall(path.read_text(encoding="utf-8"))} - {folder, None}
+        for folder, names in used.items():
+            with self.subTest(folder=folder):
+                self.assertEqual(names - self.allowed[folder], set())
 
 
 if __name__ == "__main__":

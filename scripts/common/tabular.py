@@ -34,6 +34,14 @@ def markdown(header, rows, alignment="l"):
     return "\n".join([lines[0], f"|{'|'.join(rule)}|", *lines[1:]]) + "\n"
 
 
+def size(value):
+    """Bytes, by powers of ten."""
+    for unit, power in (("GB", 9), ("MB", 6)):
+        if value >= 10 ** power:
+            return f"{value / 10 ** power:.3g} {unit}"
+    return f"{value / 1e3:.3g} kB"
+
+
 def three_digits(value):
     """Three digits that count, and commas: 0.052, 2.18, 46.6, 7,099; a dash for None."""
     return "–" if value is None else f"{value:,.0f}" if value >= 100 else f"{value:.3g}"

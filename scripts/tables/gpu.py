@@ -1,0 +1,78 @@
+"""Tables of what `scripts/gpu_bench` measured."""
+
+from common import tabular
+from common.tabular import markdown, three_digits, whole
+
+LARGE = {"million": "a million cows of 24,000 triangles, `pile --neighbours 1`",
+         "distinct": "1,042 cows of 96,000 triangles, each bent in another way, lattice of 0.70"}
+SCENES = {"lattice_46_070": "lattice 46³ 0.70", "lattice_46_086": "lattice 46³ 0.86", "lattice_10_070": "lattice 10³ 0.70"}
+
+
+def read(path):
+    """{scene: [row, ...]}, rows of mode exact as dictionaries of text."""
+    scenes = {}
+    for row in tabular.read(path):
+        if row["mode"] == "exact":
+            scenes.setdefault(row["scene"], []).append(row)
+    return scenes
+
+
+def find(rows, backend, engine="tandem", options="", threads=None):
+    """The row of a scene that was measured so, or one without figures."""
+    for row in rows:
+        if (row["backend"], row["engine"], row["options"]) == (backend, engine, options) and threads in (None, row["threads"]):
+            return row
+    return {}
+
+
+def value(row, name):
+    return float(row[name]) if row.get(name) else None
+
+
+def shown(milliseconds):
+    return "" if milliseconds is None else three_digits(milliseconds)
+
+
+def figures(rows):
+    """Cells that both tables have, by the head of their column."""
+    exact, in_order = find(rows, "cuda"), find(rows, "cuda", options="sorted")
+    cells = {head: whole(value(exact, head.replace(" ", "_"))) for head in ("instances", "object pairs", "block pairs", "contacts")}
+    times = {"broad phase": "broad_phase", "query": "contacts", "whole": "whole"}
+    cells |= {head: shown(value(exact, f"{name}_median_ms")) for head, name in times.items()}
+    cells["sorting"] = shown(value(in_order, "contacts_median_ms") - value(exact, "contacts_median_ms"))
+    cells["16 CPU threads"] = shown(value(find(rows, "cpu", threads="16"), "whole_median_ms"))
+    return cells
+
+
+def scene_cells(scene, rows):
+    cells = figures(rows) | {"scene": SCENES.get(scene, scene.replace("_", " "))}
+    cells["the walk alone"] = shown(value(find(rows, "cuda"), "traversal_median_ms"))
+    cells["first contacts alone"] = shown(value(find(rows, "cuda", options="first_contact"), "contacts_median_ms"))
+    cells["the paper's scheme, whole"] = shown(value(find(rows, "cuda", "paper"), "whole_median_ms"))
+    cells["with bit arrays"] = shown(value(find(rows, "cuda", "paper-bits"), "whole_median_ms"))
+    cells["one CPU core"] = shown(value(find(rows, "cpu", threads="1"), "whole_median_ms"))
+    return cells
+
+
+def scenes(results):
+    heads = ["scene", "object pairs", "block pairs", "contacts", "broad phase", "query", "whole", "the walk alone", "sorting",
+             "first contacts alone", "the paper's scheme, whole", "with bit arrays", "one CPU core", "16 CPU threads"]
+    return markdown(heads, [[cells[head] for head in heads] for cells in (scene_cells(*item) for item in results.items())])
+
+
+def large_cells(scene, rows):
+    exact = find(rows, "cuda")
+    cells = figures(rows) | {"scene": LARGE[scene]}
+    # Bodies of one asset share its triangles; else each body has triangles of its own.
+    shared = int(exact["instances"]) if exact["assets"] == "1" else 1
+    cells["distinct triangles"] = whole(int(exact["triangles"]) / shared)
+    cells["upload, s"] = three_digits(value(exact, "upload_ms") / 1e3)
+    cells["memory"] = " / ".join(f"{int(exact[name]) / 1e9:.2f}" for name in ("gpu_bytes", "gpu_bytes_bound", "gpu_bytes_taken"))
+    return cells
+
+
+def large(results):
+    heads = ["scene", "instances", "distinct triangles", "object pairs", "block pairs", "contacts", "broad phase", "query", "whole",
+             "sorting", "upload, s", "16 CPU threads", "memory"]
+    rows = [[cells[head] for head in heads] for cells in (large_cells(*item) for item in results.items())]
+    return markdown(heads, rows, "l" + "r" * (len(heads) - 2) + "l")

@@ -4,9 +4,9 @@ import struct
 
 import h5py
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 import bvh_file
-from common import rotations
 
 
 @dataclasses.dataclass
@@ -79,7 +79,8 @@ def read_run(path, file, wanted):
     centre = file["bodies/center_of_mass"][:]
     states = []
     for row in [kept.index(frame) for frame in wanted or kept[-1:]]:
-        rotation = rotations.of_quaternions(file["trajectory/orientation"][row])
+        w_last = np.roll(file["trajectory/orientation"][row], -1, axis=1)
+        rotation = Rotation.from_quat(w_last).as_matrix()
         moved = np.einsum("nij,nj->ni", rotation, centre)
         states.append(Bodies(shapes, asset, fixed, rotation, file["trajectory/position"][row] - moved))
     return states

@@ -22,6 +22,22 @@ def box_obj(lengths):
     return "".join(f"v {x} {y} {z}\n" for x, y, z in corners) + "".join("f " + " ".join(map(str, face)) + "\n" for face in faces)
 
 
+# Rotations are not scipy's here: it rounds otherwise, and what tumbles or lies in a heap shows the last bit. With scipy's, 23 rows of the cases `tumble` and
+# `order` of docs/results/cpu/stability.csv would come out otherwise; with these the table comes out again in all digits but times.
+
+def rotation_about(axis, angle):
+    x, y, z = np.asarray(axis) / np.linalg.norm(axis)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def random_rotation(random):
+    w, x, y, z = (q := random.normal(size=4)) / np.linalg.norm(q)
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                     [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+
+
 class Scene:
     """A scene to be written: names of meshes, and bodies with their poses."""
 

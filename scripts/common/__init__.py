@@ -1,1 +1,1 @@
-"""What the scripts share: running tools, tables and numbers, the look of charts, rotations."""
+"""What the scripts share: running tools, tables and numbers, the look of charts."""

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """bvhbench compare from the outside: its answers, its files, and what it refuses.
 
-Environment: that of tool_test.py, TANDEM_BVHBENCH, and PYTHONPATH with scripts/.
+Environment: that of tool_test.py, and TANDEM_BVHBENCH.
 """
 import json
 import os
@@ -10,8 +10,8 @@ import unittest
 
 import h5py
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from common import rotations
 from tool_test import CUBE_OBJ, DONE, SOURCE_DIR, UNREADABLE_INPUT, UNWRITABLE_OUTPUT, USAGE, ToolTest
 
 BVHBENCH = os.environ["TANDEM_BVHBENCH"]
@@ -41,12 +41,12 @@ class CompareTest(ToolTest):
     def heap(self):
         """Cubes in general position, close enough to meet."""
         rng = np.random.default_rng(1)
-        return self.write_scene("heap", rotations.at_random(rng, 20), rng.uniform(0, 2.5, (20, 3)))
+        return self.write_scene("heap", Rotation.random(20, rng).as_matrix(), rng.uniform(0, 2.5, (20, 3)))
 
     def stack(self):
         """Cubes that share corners, edges and faces, all turned by the same rotation: rounding parts some of them."""
         grid = np.stack(np.meshgrid(*[np.arange(3.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
-        rotation = rotations.at_random(np.random.default_rng(2))
+        rotation = Rotation.random(random_state=np.random.default_rng(2)).as_matrix()
         return self.write_scene("stack", np.tile(rotation, (27, 1, 1)), grid @ rotation.T)
 
     def compare(self, *arguments, **options):

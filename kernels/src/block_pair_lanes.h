@@ -62,7 +62,7 @@ class BlockPairLanes {
 
   // What depends on one node alone is worked out for four nodes and spread over the lanes after that. No exit
   // after some axes: 70 to 90 % of block pairs in a traversal have a node pair that passes all of them, and
-  // exits cost more than they save (docs/decisions.md).
+  // exits cost more than they save (docs/decisions/0010).
   template <int kPart>
   TANDEM_INLINE unsigned part() const {
     LaneMask<kCount> overlaps = LaneMask<kCount>::all();

@@ -72,7 +72,7 @@ class PairWalk {
  private:
   // A triangle's plane tells more than its box where the other mesh's nodes are much smaller: under bodies of
   // 24,000 triangles on a ground it spares 40 % of the block pairs and 60 % of the candidates
-  // (docs/decisions.md). The candidates of boxes mode are what boxes say.
+  // (docs/decisions/0014). The candidates of boxes mode are what boxes say.
   bool worth_planes(const Block& a, const Block& b) const {
     constexpr float kTimesLarger = 4;
     if (task_.mode == QueryMode::boxes) return false;

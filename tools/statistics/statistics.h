@@ -6,7 +6,7 @@
 
 namespace tandem {
 
-/// What is worth knowing of a tree before it is queried. Meanings in docs/statistics.md.
+/// What is worth knowing of a tree before it is queried. Meanings in docs/json.md.
 struct TreeStatistics {
   std::uint64_t triangles = 0;
   std::uint64_t nodes = 0;  ///< of all kinds

@@ -18,12 +18,12 @@ enum class NodeKind : std::uint32_t {
 inline constexpr int kNodesPerBlock = 4;
 inline constexpr std::uint32_t kNoIndex = 0xFFFFFFFFu;
 
-/// The deepest tree that a file may hold, in blocks from the root block (depth 1) to a leaf block: what
-/// traversals size their stacks by. The builder's trees have depths of 6 to 30.
+/// The deepest tree that a file may hold, in blocks from the root block (depth 1) to a leaf block.
+/// Traversals size their stacks by it. The builder's trees have depths of 6 to 30.
 inline constexpr std::uint32_t kMaxDepth = 64;
 
-/// Four nodes, one cache line, component by component: SIMD loads four lanes as they are, a GPU thread eight
-/// float4.
+/// Four nodes, one cache line, component by component: SIMD loads four lanes as they are, and a GPU thread
+/// loads eight float4.
 ///
 ///     byte 0    16   32   48   64   80   96   112   128
 ///          | cx | cy | cz | hx | hy | hz | index | kind |     each four lanes: node 0, 1, 2, 3

@@ -4,7 +4,7 @@
 
 #include "tandem/formats/block.h"
 
-/// The .bvh file, version 1, as structs that lie in it. formats/FORMAT.md is the byte-level specification.
+/// The structs that a .bvh file, version 1, consists of. formats/FORMAT.md is the byte-level specification.
 namespace tandem {
 
 inline constexpr std::uint8_t kMagic[8] = {0x89, 'B', 'V', 'H', '\r', '\n', 0x1A, '\n'};
@@ -63,7 +63,8 @@ struct Level {
   std::uint32_t block_count;
   std::uint32_t leaf_block_count;
   std::uint32_t depth;  ///< blocks from the root block to the deepest leaf block, both counted
-  double error_bound;   ///< how far the level's surface lies from level 0's at most; 0 for level 0, ascending
+  double error_bound;   ///< upper bound of the distance of the level's surface from level 0's; 0 for level 0,
+                        ///< ascending
   std::uint8_t reserved[8];  ///< zero
 };
 static_assert(sizeof(Level) == 32);

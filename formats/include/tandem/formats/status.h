@@ -3,7 +3,7 @@
 
 namespace tandem {
 
-/// What can be wrong with a .bvh file or with loading it: one name per defect.
+/// What can be wrong with a .bvh file, with loading it, or with a query: one name per defect.
 /// The checker tests for the defects in this order; the first that it finds is returned.
 enum class [[nodiscard]] Status : std::uint32_t{
     kOk = 0,
@@ -19,10 +19,10 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kTrailingBytes,   ///< more bytes than the header says
     kContentChanged,  ///< the hash differs: some byte is not what was written
     // Header and sections. From here on the hash is right, so the writer is wrong or hostile.
-    kBadHeader,          ///< a reserved byte is set, a count is zero or past its limit
-    kBadSectionTable,    ///< the table itself does not fit
-    kUnknownSection,     ///< of a kind that this version does not define, or of a level that the file has not
-    kSectionMisaligned,  ///< offset no multiple of 256
+    kBadHeader,        ///< a reserved byte is set, a count is zero or past its limit
+    kBadSectionTable,  ///< the table itself does not fit
+    kUnknownSection,   ///< of a kind that this version does not define, or of a level that is not in the file
+    kSectionMisaligned,    ///< offset no multiple of 256
     kSectionOutOfBounds,   ///< reaches past the end of the file, or its size overflows
     kSectionsOverlap,      ///< or are not in ascending order
     kSectionSizeMismatch,  ///< bytes differ from count times element size
@@ -52,7 +52,7 @@ enum class [[nodiscard]] Status : std::uint32_t{
     // Querying.
     kOutOfRange,        ///< a coordinate that is NaN or larger than the query can take
     kUnknownAsset,      ///< an instance of an asset that the query was not given
-    kUnknownInstance,   ///< an object pair that names an instance there is none of
+    kUnknownInstance,   ///< an object pair that names an instance that does not exist
     kPoseNotRigid,      ///< not a rotation and a translation, to kRigidTolerance
     kTooManyInstances,  ///< 2^32 - 1 or more
     kTooManyPairs,      ///< 2^32 - 1 object pairs or more

@@ -7,7 +7,7 @@
 
 namespace tandem {
 
-/// Looks at one level of detail of an asset; owns nothing. Pointers are of the CPU or of the GPU alike.
+/// Looks at one level of detail of an asset; owns nothing. Its pointers are of the CPU or of the GPU.
 struct LevelView {
   const Block* blocks = nullptr;        ///< block 0 is the root; the others follow depth first
   const Triangle* triangles = nullptr;  ///< in leaf order: those below a block are consecutive

@@ -22,7 +22,7 @@ inline constexpr std::uint32_t kAllNodePairs = 0xFFFF;
 inline constexpr std::uint32_t kNodePairsAbove = 0x08CE, kNodePairsEqual = 0x8421;
 
 /// Block pairs that are taken off the stack together: their tests do not wait for each other, so a processor
-/// overlaps them. 4 take 11 % less time than 1, and 8 no less than 4 (docs/decisions.md).
+/// overlaps them. 4 take 11 % less time than 1, and 8 no less than 4 (docs/decisions/0012).
 inline constexpr std::uint32_t kTakenAtOnce = 4;
 
 /// The most entries that a traversal's stack ever holds.
@@ -79,7 +79,7 @@ TANDEM_HD inline float size_of(const Block& block) {
 }
 
 /// How many times larger one of two internal blocks must be to descend alone. Bodies on a ground: a third of
-/// the block pairs. Any factor from 1.5 to 4 does about as well (docs/decisions.md).
+/// the block pairs. Any factor from 1.5 to 4 does about as well (docs/decisions/0013).
 inline constexpr float kDescendsAlone = 2;
 
 /// Pairs of the children of a with b. hits: of a and b.

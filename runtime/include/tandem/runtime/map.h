@@ -27,11 +27,11 @@ class MappedAsset {
   ~MappedAsset() { close(); }
 
   /// Brings the file into memory and checks all of it; closes what was open before.
-  /// Result: kOk, or the first defect; then nothing is open and where() tells the section, block, ... that is
-  /// defective. `path` is handed to the operating system as it is.
+  /// Result: kOk, or the first defect; then nothing is open, and where() is the number of the section,
+  /// block or other item that has the defect. `path` is handed to the operating system as it is.
   Status open(const char* path, Access access = Access::map);
 
-  /// Gives the bytes back; every view of them ends.
+  /// Releases the bytes; views of them must not be used any more.
   void close();
 
   /// The checked asset. Condition: the last open() returned kOk.

@@ -5,8 +5,8 @@
 
 namespace tandem {
 
-/// The name of what a CUDA error means to whoever runs the program. `driver_version`: what
-/// cudaDriverGetVersion() tells, 0 where there is no driver; CUDA itself calls that one too old.
+/// The status that names a CUDA error. `driver_version` is that of cudaDriverGetVersion(), 0 where there is
+/// no driver; CUDA itself calls a missing driver too old.
 inline Status status_of(cudaError_t error, int driver_version) {
   switch (error) {
     case cudaSuccess:
@@ -31,7 +31,7 @@ inline Status status_of(cudaError_t error, int driver_version) {
   }
 }
 
-/// The same, asking for the driver's version where it matters.
+/// The same, with the version of the driver that is here.
 inline Status status_of(cudaError_t error) {
   int driver_version = 0;
   if (error == cudaErrorInsufficientDriver) static_cast<void>(cudaDriverGetVersion(&driver_version));

@@ -22,9 +22,8 @@ def box_obj(lengths):
     return "".join(f"v {x} {y} {z}\n" for x, y, z in corners) + "".join("f " + " ".join(map(str, face)) + "\n" for face in faces)
 
 
-# Rotations are not scipy's here: it rounds otherwise, and what tumbles or lies in a heap shows the last bit. With scipy's, 23 rows of the cases `tumble` and
-# `order` of docs/results/cpu/stability.csv would come out otherwise; with these the table comes out again in all digits but times.
-
+# Rotations are not scipy's here: scipy rounds in another way, and bodies that tumble or lie in a heap show the last bit. With scipy's, 23 of the 36 rows of
+# the cases `tumble` and `order` in docs/results/cpu/stability.csv get other values; with these the table comes out again in all digits but those of times.
 def rotation_about(axis, angle):
     x, y, z = np.asarray(axis) / np.linalg.norm(axis)
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])

@@ -125,17 +125,30 @@ class CompareTest(ToolTest):
             self.assertEqual(block_pairs[0], scene["peers"]["Tandem exact"]["counters"]["block_pairs"])
             self.assertTrue(np.isnan(block_pairs[names.index("CGAL")]))
 
-    def test_the_chart_is_drawn_of_the_file(self):
+    def need_matplotlib(self):
         try:
             subprocess.run(["/usr/bin/python3", "-c", "import matplotlib"], check=True, stderr=subprocess.DEVNULL)
         except (OSError, subprocess.CalledProcessError):
             self.skipTest("no matplotlib")
+
+    def test_the_chart_is_drawn_of_the_file(self):
+        self.need_matplotlib()
         self.compared(self.stack(), "--out", self.results)
         result = self.run_tool(PLOT, self.results, "-o", self.outputs / "chart")
         self.assertEqual(result.returncode, DONE, result.stderr)
         self.assertIn(b"| Tandem exact |", result.stdout)
         self.assertGreater((self.outputs / "chart.png").stat().st_size, 1000)
         self.assertIn(b"<svg", (self.outputs / "chart.svg").read_bytes()[:2000])
+
+    def test_a_table_of_the_file_gives_the_same_tables_and_chart(self):
+        self.need_matplotlib()
+        self.compared(self.stack(), "--out", self.results)
+        table = self.outputs / "table.csv"
+        table.write_bytes(self.run_tool(PLOT, self.results, "--csv").stdout)
+        drawn = [self.run_tool(PLOT, source, "-o", self.outputs / source.stem) for source in (self.results, table)]
+        self.assertEqual([result.returncode for result in drawn], [DONE, DONE])
+        self.assertEqual(drawn[0].stdout, drawn[1].stdout)
+        self.assertEqual((self.outputs / "results.svg").read_bytes(), (self.outputs / "table.svg").read_bytes())
 
     def test_refuses_what_it_cannot_compare(self):
         heap = self.heap()

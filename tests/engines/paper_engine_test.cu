@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engines/paper/paper_engine.h"
+#include "gpu/gpu_scene_fixture.h"
 #include "kernels/query_scenes.h"
 #include "tandem/kernels/contact_query.h"
 #include "tandem/runtime/upload.h"
@@ -15,90 +16,18 @@
 namespace tandem::bench {
 namespace {
 
+using test::all_pairs;
+using test::download;
+using test::GpuScene;
 using test::RandomPoses;
 using test::Scene;
+using test::sorted;
 
 constexpr PaperFlags kFlags[] = {PaperFlags::words, PaperFlags::bytes, PaperFlags::bits};
 
-/// An array in GPU memory.
-template <typename Element>
-class OnGpu {
- public:
-  explicit OnGpu(const std::vector<Element>& host) {
-    const std::size_t bytes = host.size() * sizeof(Element);
-    void* memory = nullptr;
-    EXPECT_EQ(cudaMalloc(&memory, std::max<std::size_t>(bytes, 1)), cudaSuccess);
-    data_ = static_cast<Element*>(memory);
-    EXPECT_EQ(cudaMemcpy(data_, host.data(), bytes, cudaMemcpyHostToDevice), cudaSuccess);
-  }
-  OnGpu(const OnGpu&) = delete;
-  OnGpu& operator=(const OnGpu&) = delete;
-  ~OnGpu() { cudaFree(data_); }
-
-  Element* data() const { return data_; }
-
- private:
-  Element* data_ = nullptr;
-};
-
-auto key(const Contact& c) {
-  return std::tie(c.pair, c.triangle_a, c.triangle_b, c.face_a, c.face_b);
-}
-
-bool less(const Contact& x, const Contact& y) {
-  return key(x) < key(y);
-}
-
-std::vector<Contact> sorted(std::vector<Contact> contacts) {
-  std::sort(contacts.begin(), contacts.end(), less);
-  return contacts;
-}
-
 std::vector<Contact> contacts_of(const PaperEngine& engine) {
-  std::vector<Contact> contacts(engine.report().counters.contacts);
-  EXPECT_EQ(cudaMemcpy(contacts.data(), engine.contacts(), contacts.size() * sizeof(Contact),
-                       cudaMemcpyDeviceToHost),
-            cudaSuccess);
-  return sorted(contacts);
+  return sorted(download(engine.contacts(), engine.report().counters.contacts));
 }
-
-/// A scene, all of it in GPU memory, and its object pairs.
-class GpuScene {
- public:
-  GpuScene(const Scene& scene, const std::vector<ObjectPair>& pairs)
-      : asset_(part(scene, &Instance::asset)),
-        pose_(part(scene, &Instance::pose)),
-        pairs_(pairs),
-        count_({static_cast<std::uint32_t>(pairs.size())}),
-        instance_count_(static_cast<std::uint32_t>(scene.instances.size())),
-        pair_count_(static_cast<std::uint32_t>(pairs.size())) {
-    for (const AssetView& view : scene.assets.views()) {
-      uploads_.push_back(std::make_unique<DeviceAsset>());
-      EXPECT_EQ(uploads_.back()->upload(view, nullptr), Status::kOk);
-      views_.push_back(gpu_asset(uploads_.back()->level(), *view.header));
-    }
-  }
-
-  std::span<const GpuAsset> assets() const { return views_; }
-  GpuInstances instances() const { return {asset_.data(), pose_.data(), instance_count_}; }
-  GpuPairs pairs() const { return {pairs_.data(), count_.data(), pair_count_}; }
-
- private:
-  template <typename Value>
-  static std::vector<Value> part(const Scene& scene, Value Instance::*member) {
-    std::vector<Value> out;
-    for (const Instance& instance : scene.instances) out.push_back(instance.*member);
-    return out;
-  }
-
-  std::vector<std::unique_ptr<DeviceAsset>> uploads_;
-  std::vector<GpuAsset> views_;
-  OnGpu<std::uint32_t> asset_;
-  OnGpu<Pose> pose_;
-  OnGpu<ObjectPair> pairs_;
-  OnGpu<std::uint32_t> count_;
-  std::uint32_t instance_count_, pair_count_;
-};
 
 struct CpuAnswer {
   Status status;
@@ -113,18 +42,6 @@ CpuAnswer ask_cpu(const Scene& scene, const std::vector<ObjectPair>& pairs) {
   const Status status = query.find_contacts(scene.instances, pairs, {});
   return {status, query.where(), sorted({query.contacts().begin(), query.contacts().end()}),
           query.counters()};
-}
-
-/// Every two instances, in either order, and with `selves` each with itself.
-std::vector<ObjectPair> all_pairs(const Scene& scene, bool selves, RandomPoses& random) {
-  std::vector<ObjectPair> pairs;
-  const auto count = static_cast<std::uint32_t>(scene.instances.size());
-  for (std::uint32_t a = 0; a < count; ++a) {
-    for (std::uint32_t b = selves ? a : a + 1; b < count; ++b) {
-      pairs.push_back(random.below(2) == 0 ? ObjectPair{a, b} : ObjectPair{b, a});
-    }
-  }
-  return pairs;
 }
 
 Status ask(PaperEngine& engine, const GpuScene& scene, const PaperOptions& options) {
@@ -153,7 +70,7 @@ void expect_contacts(PaperEngine& engine, const GpuScene& scene, const CpuAnswer
 
 void expect_contacts_of(const Scene& scene, const std::vector<ObjectPair>& pairs) {
   const CpuAnswer expected = ask_cpu(scene, pairs);
-  const GpuScene on_gpu(scene, pairs);
+  const GpuScene on_gpu(scene.assets, scene.instances, pairs);
   PaperEngine engine;
   ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk)
       << cudaGetErrorString(engine.cuda_error());
@@ -162,26 +79,9 @@ void expect_contacts_of(const Scene& scene, const std::vector<ObjectPair>& pairs
   EXPECT_EQ(engine.report().where, expected.where);
 }
 
-bool no_gpu() {
-  int count = 0;
-  if (cudaGetDeviceCount(&count) == cudaSuccess && count > 0) return false;
-  static_cast<void>(cudaGetLastError());
-  return true;
-}
+class PaperContacts : public test::GpuTest {};
 
-class PaperContacts : public testing::Test {
- protected:
-  void SetUp() override {
-    if (no_gpu()) GTEST_SKIP() << "no GPU here";
-  }
-};
-
-class PaperContactsOf : public testing::TestWithParam<test::SceneFamily> {
- protected:
-  void SetUp() override {
-    if (no_gpu()) GTEST_SKIP() << "no GPU here";
-  }
-};
+class PaperContactsOf : public test::GpuTestOf<test::SceneFamily> {};
 
 /// Whether the float32 box tests take every pair, which is what the engine can do.
 bool in_reach(const Scene& scene, const std::vector<ObjectPair>& pairs) {
@@ -202,12 +102,12 @@ TEST_P(PaperContactsOf, AreThoseOfTheCpu) {
   RandomPoses random(1);
   for (int trial = 0; trial < test::trials(15, 20); ++trial) {
     const Scene scene = GetParam().make(random);
-    const std::vector<ObjectPair> pairs = all_pairs(scene, trial % 2 == 0, random);
+    const std::vector<ObjectPair> pairs = all_pairs(scene.instances, trial % 2 == 0, random);
     SCOPED_TRACE(testing::Message() << "trial " << trial << '\n' << test::text(scene));
     if (in_reach(scene, pairs)) {
       expect_contacts_of(scene, pairs);
     } else {
-      const GpuScene on_gpu(scene, pairs);
+      const GpuScene on_gpu(scene.assets, scene.instances, pairs);
       PaperEngine engine;
       ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk);
       EXPECT_EQ(ask(engine, on_gpu, {}), Status::kOutOfRange);
@@ -247,7 +147,7 @@ Scene stack(int side, int cells) {
 TEST_F(PaperContacts, OfAPileAreThoseOfTheCpu) {
   RandomPoses random(2);
   const Scene scene = pile(150, 3000, 4, 7);
-  const auto pairs = all_pairs(scene, false, random);
+  const auto pairs = all_pairs(scene.instances, false, random);
   EXPECT_GT(ask_cpu(scene, pairs).contacts.size(), 10000u);
   expect_contacts_of(scene, pairs);
 }
@@ -255,7 +155,7 @@ TEST_F(PaperContacts, OfAPileAreThoseOfTheCpu) {
 TEST_F(PaperContacts, OfAnExactStackAreThoseOfTheCpu) {
   RandomPoses random(3);
   const Scene scene = stack(4, 3);
-  const auto pairs = all_pairs(scene, true, random);
+  const auto pairs = all_pairs(scene.instances, true, random);
   EXPECT_GT(ask_cpu(scene, pairs).contacts.size(), 10000u);
   expect_contacts_of(scene, pairs);
 }
@@ -271,7 +171,7 @@ TEST_F(PaperContacts, OfALargeBodyAndASmallOneAreThoseOfTheCpu) {
   scene.assets.add(one);
   for (const std::uint32_t asset : {0u, 1u, 2u, 0u})
     scene.instances.push_back({asset, random.pose({1, 1, 0.2, 0, 4})});
-  expect_contacts_of(scene, all_pairs(scene, true, random));
+  expect_contacts_of(scene, all_pairs(scene.instances, true, random));
 }
 
 // The same candidates, each once, as every node pair of the leaves says: no flag is lost and none is double.
@@ -285,7 +185,7 @@ TEST_F(PaperContacts, OfRepeatedTrianglesAreAllPairs) {
   scene.assets.add(few);
   scene.instances = {{0, kIdentityPose}, {0, kIdentityPose}, {1, kIdentityPose}};
   const std::vector<ObjectPair> pairs = {{0, 1}, {2, 1}, {0, 2}};
-  const GpuScene on_gpu(scene, pairs);
+  const GpuScene on_gpu(scene.assets, scene.instances, pairs);
   PaperEngine engine;
   ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk);
   for (const PaperFlags flags : kFlags) {
@@ -301,9 +201,9 @@ TEST_F(PaperContacts, OfRepeatedTrianglesAreAllPairs) {
 TEST_F(PaperContacts, OfBoxesIncludeAllContacts) {
   RandomPoses random(5);
   const Scene scene = pile(60, 800, 3, 9);
-  const auto pairs = all_pairs(scene, true, random);
+  const auto pairs = all_pairs(scene.instances, true, random);
   const CpuAnswer expected = ask_cpu(scene, pairs);
-  const GpuScene on_gpu(scene, pairs);
+  const GpuScene on_gpu(scene.assets, scene.instances, pairs);
   PaperEngine engine;
   ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk);
   std::vector<Contact> by_axes[2];
@@ -314,7 +214,7 @@ TEST_F(PaperContacts, OfBoxesIncludeAllContacts) {
                 by_axes[six_axes].end());
   }
   const auto includes = [](const std::vector<Contact>& all, const std::vector<Contact>& some) {
-    return std::includes(all.begin(), all.end(), some.begin(), some.end(), less);
+    return std::includes(all.begin(), all.end(), some.begin(), some.end(), test::comes_before);
   };
   EXPECT_TRUE(includes(by_axes[0], expected.contacts));
   EXPECT_TRUE(includes(by_axes[1], by_axes[0]));
@@ -327,9 +227,9 @@ TEST_F(PaperContacts, OfLargerAndLargerScenesNeedNoNewEngine) {
   std::size_t bytes = 0;
   for (const std::uint32_t bodies : {4u, 30u, 90u}) {
     const Scene scene = pile(bodies, 800, 2, 10);
-    const auto pairs = all_pairs(scene, false, random);
+    const auto pairs = all_pairs(scene.instances, false, random);
     const CpuAnswer expected = ask_cpu(scene, pairs);
-    const GpuScene on_gpu(scene, pairs);
+    const GpuScene on_gpu(scene.assets, scene.instances, pairs);
     ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk);
     expect_contacts(engine, on_gpu, expected);
     EXPECT_GT(engine.bytes(), bytes);
@@ -338,8 +238,8 @@ TEST_F(PaperContacts, OfLargerAndLargerScenesNeedNoNewEngine) {
     EXPECT_EQ(engine.bytes(), bytes);  // settled
   }
   const Scene small = pile(3, 100, 1, 11);
-  const auto pairs = all_pairs(small, false, random);
-  const GpuScene on_gpu(small, pairs);
+  const auto pairs = all_pairs(small.instances, false, random);
+  const GpuScene on_gpu(small.assets, small.instances, pairs);
   ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk);
   expect_contacts(engine, on_gpu, ask_cpu(small, pairs));
 }
@@ -348,7 +248,7 @@ TEST_F(PaperContacts, OfNothingAreNone) {
   for (const bool instances : {false, true}) {
     Scene scene = pile(2, 100, 1, 11);
     if (!instances) scene.instances.clear();
-    const GpuScene on_gpu(scene, {});
+    const GpuScene on_gpu(scene.assets, scene.instances, {});
     PaperEngine engine;
     ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk);
     EXPECT_EQ(ask(engine, on_gpu, {}), Status::kOk);
@@ -378,7 +278,7 @@ TEST_F(PaperContacts, NameWhatIsWrong) {
 TEST_F(PaperContacts, OutOfReachOfFloat32AreRefused) {
   Scene scene = pile(4, 40, 1, 8);
   for (Instance& instance : scene.instances) instance.pose.translation[1] += 1e52;
-  const GpuScene on_gpu(scene, {{0, 1}, {2, 3}});
+  const GpuScene on_gpu(scene.assets, scene.instances, {{0, 1}, {2, 3}});
   PaperEngine engine;
   ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk);
   EXPECT_EQ(ask(engine, on_gpu, {}), Status::kOutOfRange);
@@ -390,7 +290,7 @@ TEST_F(PaperContacts, OutOfReachOfFloat32AreRefused) {
 
 TEST_F(PaperContacts, MoveFromOneOwnerToAnother) {
   const Scene scene = pile(10, 300, 1, 14);
-  const GpuScene on_gpu(scene, {{0, 1}, {2, 3}});
+  const GpuScene on_gpu(scene.assets, scene.instances, {{0, 1}, {2, 3}});
   PaperEngine first;
   ASSERT_EQ(first.set_assets(on_gpu.assets(), nullptr), Status::kOk);
   ASSERT_EQ(ask(first, on_gpu, {}), Status::kOk);

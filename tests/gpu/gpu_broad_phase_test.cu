@@ -13,53 +13,19 @@
 #include <vector>
 
 #include "broad_phase_limits.h"
+#include "gpu_scene_fixture.h"
 
 namespace tandem {
 namespace {
+
+using test::download;
+using test::on_gpu;
 
 // Numbers of boxes: some that are tested each against each, some that a tree is made of.
 constexpr std::uint32_t kFew = 3000, kMany = 20000;
 static_assert(kFewPosed < kFew && kFew <= kFewBoxes && kFewBoxes < kMany);
 
-class GpuBroadPhaseTest : public testing::Test {
- protected:
-  void SetUp() override {
-    int count = 0;
-    if (cudaGetDeviceCount(&count) != cudaSuccess || count == 0) {
-      static_cast<void>(cudaGetLastError());
-      GTEST_SKIP() << "no GPU here";
-    }
-  }
-};
-
-// A copy in GPU memory.
-template <typename Value>
-class OnDevice {
- public:
-  explicit OnDevice(const std::vector<Value>& values) {
-    EXPECT_EQ(cudaMalloc(&data_, std::max<std::size_t>(values.size(), 1) * sizeof(Value)), cudaSuccess);
-    write(values);
-  }
-  OnDevice(const OnDevice&) = delete;
-  OnDevice& operator=(const OnDevice&) = delete;
-  ~OnDevice() { cudaFree(data_); }
-
-  void write(const std::vector<Value>& values) {
-    EXPECT_EQ(cudaMemcpy(data_, values.data(), values.size() * sizeof(Value), cudaMemcpyHostToDevice),
-              cudaSuccess);
-  }
-  Value* data() const { return data_; }
-
- private:
-  Value* data_ = nullptr;
-};
-
-template <typename Value>
-std::vector<Value> download(const Value* device, std::size_t count) {
-  std::vector<Value> host(count);
-  EXPECT_EQ(cudaMemcpy(host.data(), device, count * sizeof(Value), cudaMemcpyDeviceToHost), cudaSuccess);
-  return host;
-}
+class GpuBroadPhaseTest : public test::GpuTest {};
 
 using Boxes = std::vector<WorldBox>;
 using Pairs = std::vector<ObjectPair>;
@@ -85,7 +51,7 @@ Pairs stored(const GpuBroadPhase& broad_phase) {
 }
 
 Pairs of_gpu(GpuBroadPhase& broad_phase, const Boxes& boxes, bool sorted) {
-  const OnDevice<WorldBox> device(boxes);
+  const auto device = on_gpu(boxes);
   EXPECT_EQ(
       broad_phase.find_pairs(device.data(), static_cast<std::uint32_t>(boxes.size()), {sorted}, nullptr),
       Status::kOk)
@@ -319,7 +285,7 @@ TEST_F(GpuBroadPhaseTest, AMillionBoxes) {
 void expect_overflow_is_reported(const Boxes& boxes) {
   const auto count = static_cast<std::uint32_t>(boxes.size());
   const Pairs expected = of_cpu(boxes);
-  const OnDevice<WorldBox> device(boxes);
+  const auto device = on_gpu(boxes);
   for (const bool sorted : {false, true}) {
     GpuBroadPhase broad_phase;
     for (const std::uint32_t room : {0u, 1u, 1000u, static_cast<std::uint32_t>(expected.size()) - 1}) {
@@ -362,7 +328,7 @@ TEST_F(GpuBroadPhaseTest, NamesTheFirstBoxThatItCannotTakeAndGoesOnAfterwards) {
       Boxes boxes = scattered(count, 0.1, 0, 41);
       const Boxes good = boxes;
       boxes[count - 1].hi[1] = boxes[count / 2].lo[2] = bad;
-      const OnDevice<WorldBox> device(boxes);
+      const auto device = on_gpu(boxes);
       EXPECT_EQ(broad_phase.find_pairs(device.data(), count, {}, nullptr), Status::kOutOfRange);
       EXPECT_EQ(broad_phase.report().where, count / 2);
       EXPECT_EQ(stored(broad_phase).size(), 0u);
@@ -370,7 +336,7 @@ TEST_F(GpuBroadPhaseTest, NamesTheFirstBoxThatItCannotTakeAndGoesOnAfterwards) {
       expect_same_as_cpu(broad_phase, good, "after an error");
     }
   }
-  const OnDevice<WorldBox> device(Boxes(10, {{0, 0, 0}, {1, 1, 1}}));
+  const auto device = on_gpu(Boxes(10, {{0, 0, 0}, {1, 1, 1}}));
   GpuBroadPhase unprepared;
   EXPECT_EQ(unprepared.enqueue(device.data(), 10, {}, nullptr), Status::kOutOfRange);
   const auto* shifted = reinterpret_cast<const WorldBox*>(reinterpret_cast<const char*>(device.data()) + 8);
@@ -413,20 +379,17 @@ TEST_F(GpuBroadPhaseTest, ObjectsOnSeveralStreamsAndThreadsDoNotDisturbEachOther
     const std::uint32_t count = seed % 2 == 0 ? kFew : kMany;
     const Boxes boxes = scattered(count, edge_for(count, 10), 1, seed);
     const Pairs expected = of_cpu(boxes);
-    const OnDevice<WorldBox> device(boxes);
-    cudaStream_t stream;
-    ASSERT_EQ(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), cudaSuccess);
-    {
-      GpuBroadPhase first;
-      ASSERT_EQ(first.reserve({count, 10 * count}, {true}), Status::kOk);
-      GpuBroadPhase broad_phase = std::move(first);
-      for (int i = 0; i < 20; ++i)
-        ASSERT_EQ(broad_phase.enqueue(device.data(), count, {true}, stream), Status::kOk);
-      ASSERT_EQ(cudaStreamSynchronize(stream), cudaSuccess);
-      EXPECT_EQ(broad_phase.report().complete, 1u);
-      EXPECT_TRUE(same(stored(broad_phase), expected));
-    }
-    EXPECT_EQ(cudaStreamDestroy(stream), cudaSuccess);
+    const auto device = on_gpu(boxes);
+    GpuStream stream;
+    ASSERT_EQ(stream.create(), cudaSuccess);
+    GpuBroadPhase first;
+    ASSERT_EQ(first.reserve({count, 10 * count}, {true}), Status::kOk);
+    GpuBroadPhase broad_phase = std::move(first);
+    for (int i = 0; i < 20; ++i)
+      ASSERT_EQ(broad_phase.enqueue(device.data(), count, {true}, stream.get()), Status::kOk);
+    ASSERT_EQ(stream.wait(), cudaSuccess);
+    EXPECT_EQ(broad_phase.report().complete, 1u);
+    EXPECT_TRUE(same(stored(broad_phase), expected));
   };
   std::vector<std::thread> threads;
   for (std::uint64_t seed = 61; seed < 65; ++seed) threads.emplace_back(work, seed);
@@ -435,29 +398,25 @@ TEST_F(GpuBroadPhaseTest, ObjectsOnSeveralStreamsAndThreadsDoNotDisturbEachOther
 
 void expect_graph_serves_frames(std::uint32_t count) {
   const Boxes boxes = scattered(count, edge_for(count, 10), 1, 71), later = scattered(count, 0.02, 0, 72);
-  const OnDevice<WorldBox> device(boxes);
+  const auto device = on_gpu(boxes);
   GpuBroadPhase broad_phase;
   ASSERT_EQ(broad_phase.reserve({count, 10 * count}, {true}), Status::kOk);
-  cudaStream_t stream;
-  ASSERT_EQ(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), cudaSuccess);
-  ASSERT_EQ(cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal), cudaSuccess);
-  EXPECT_EQ(broad_phase.enqueue(device.data(), count, {true}, stream), Status::kOk);
-  cudaGraph_t graph;
-  ASSERT_EQ(cudaStreamEndCapture(stream, &graph), cudaSuccess);
-  cudaGraphExec_t run;
-  ASSERT_EQ(cudaGraphInstantiate(&run, graph, 0), cudaSuccess);
+  GpuStream stream;
+  ASSERT_EQ(stream.create(), cudaSuccess);
+  GpuGraph graph;
+  const auto enqueue = [&] {
+    EXPECT_EQ(broad_phase.enqueue(device.data(), count, {true}, stream.get()), Status::kOk);
+  };
+  ASSERT_EQ(graph.capture(stream.get(), enqueue), cudaSuccess);
   for (const Boxes* frame : {&boxes, &later, &boxes}) {
-    OnDevice<WorldBox> upload(*frame);
+    const auto upload = on_gpu(*frame);
     ASSERT_EQ(cudaMemcpy(device.data(), upload.data(), count * sizeof(WorldBox), cudaMemcpyDeviceToDevice),
               cudaSuccess);
     ASSERT_EQ(cudaDeviceSynchronize(), cudaSuccess);
-    ASSERT_EQ(cudaGraphLaunch(run, stream), cudaSuccess);
-    ASSERT_EQ(cudaStreamSynchronize(stream), cudaSuccess);
+    ASSERT_EQ(graph.launch(stream.get()), cudaSuccess);
+    ASSERT_EQ(stream.wait(), cudaSuccess);
     EXPECT_TRUE(same(stored(broad_phase), of_cpu(*frame)));
   }
-  cudaGraphExecDestroy(run);
-  cudaGraphDestroy(graph);
-  cudaStreamDestroy(stream);
 }
 
 TEST_F(GpuBroadPhaseTest, MayBeCapturedIntoAGraph) {
@@ -486,9 +445,9 @@ struct Instances {
 
 Status find_pairs(GpuBroadPhase& broad_phase, const Instances& instances,
                   const std::vector<AssetBounds>& bounds) {
-  const OnDevice<std::uint32_t> asset(instances.asset);
-  const OnDevice<Pose> pose(instances.pose);
-  const OnDevice<AssetBounds> assets(bounds);
+  const auto asset = on_gpu(instances.asset);
+  const auto pose = on_gpu(instances.pose);
+  const auto assets = on_gpu(bounds);
   return broad_phase.find_pairs(
       {asset.data(), pose.data(), static_cast<std::uint32_t>(instances.asset.size())},
       {assets.data(), static_cast<std::uint32_t>(bounds.size())}, {true}, nullptr);

@@ -22,25 +22,16 @@
 namespace tandem {
 namespace {
 
+using test::all_pairs;
 using test::download;
 using test::GpuScene;
-using test::no_gpu;
-using test::OnGpu;
+using test::on_gpu;
 using test::pile;
 using test::RandomPoses;
 using test::Scene;
+using test::sorted;
 
 constexpr QueryMode kModes[] = {QueryMode::exact, QueryMode::fast, QueryMode::boxes};
-
-auto key(const Contact& c) {
-  return std::tie(c.pair, c.triangle_a, c.triangle_b, c.face_a, c.face_b);
-}
-
-std::vector<Contact> sorted(std::vector<Contact> contacts) {
-  std::sort(contacts.begin(), contacts.end(),
-            [](const Contact& x, const Contact& y) { return key(x) < key(y); });
-  return contacts;
-}
 
 std::vector<Contact> contacts_of(const GpuContactQuery& query) {
   return sorted(download(query.contacts(), query.report().contacts));
@@ -92,31 +83,9 @@ void expect_equal(const Answers& answers, QueryMode mode) {
   EXPECT_EQ(answers.gpu_counters.decided_by_float32, answers.cpu_counters.decided_by_float32);
 }
 
-/// Every two instances, in either order, and with `selves` each with itself.
-std::vector<ObjectPair> all_pairs(const std::vector<Instance>& instances, bool selves, RandomPoses& random) {
-  std::vector<ObjectPair> pairs;
-  const auto count = static_cast<std::uint32_t>(instances.size());
-  for (std::uint32_t a = 0; a < count; ++a) {
-    for (std::uint32_t b = selves ? a : a + 1; b < count; ++b) {
-      pairs.push_back(random.below(2) == 0 ? ObjectPair{a, b} : ObjectPair{b, a});
-    }
-  }
-  return pairs;
-}
+class GpuContacts : public test::GpuTest {};
 
-class GpuContacts : public testing::Test {
- protected:
-  void SetUp() override {
-    if (no_gpu()) GTEST_SKIP() << "no GPU here";
-  }
-};
-
-class GpuContactsOf : public testing::TestWithParam<test::SceneFamily> {
- protected:
-  void SetUp() override {
-    if (no_gpu()) GTEST_SKIP() << "no GPU here";
-  }
-};
+class GpuContactsOf : public test::GpuTestOf<test::SceneFamily> {};
 
 TEST_P(GpuContactsOf, AreThoseOfTheCpu) {
   RandomPoses random(1);
@@ -199,8 +168,7 @@ TEST_F(GpuContacts, FirstOnesAreOfThePairsThatHaveAny) {
     for (const Contact& contact : all.cpu) wanted[contact.pair] = 1;
     for (const Contact& contact : first.gpu) {
       ++found[contact.pair];
-      EXPECT_TRUE(std::binary_search(all.cpu.begin(), all.cpu.end(), contact,
-                                     [](const Contact& x, const Contact& y) { return key(x) < key(y); }));
+      EXPECT_TRUE(std::binary_search(all.cpu.begin(), all.cpu.end(), contact, test::comes_before));
     }
     EXPECT_EQ(found, wanted);
     EXPECT_EQ(first.gpu_counters.contacts, wanted.size());
@@ -313,36 +281,33 @@ TEST_F(GpuContacts, AreTheSameOnEveryRunSideBySideAndInAGraph) {
   const GpuScene on_gpu(scene.assets, scene.instances, pairs);
   constexpr int kQueries = 3;
   GpuContactQuery queries[kQueries];
-  cudaStream_t streams[kQueries];
+  GpuStream streams[kQueries];
   for (int i = 0; i < kQueries; ++i) {
-    ASSERT_EQ(cudaStreamCreateWithFlags(&streams[i], cudaStreamNonBlocking), cudaSuccess);
-    ASSERT_EQ(queries[i].set_assets(on_gpu.assets(), streams[i]), Status::kOk);
-    ASSERT_EQ(queries[i].find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, streams[i]), Status::kOk);
+    ASSERT_EQ(streams[i].create(), cudaSuccess);
+    ASSERT_EQ(queries[i].set_assets(on_gpu.assets(), streams[i].get()), Status::kOk);
+    ASSERT_EQ(queries[i].find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, streams[i].get()),
+              Status::kOk);
   }
   for (int run = 0; run < 10; ++run) {
     for (int i = 0; i < kQueries; ++i) {
-      ASSERT_EQ(queries[i].enqueue(on_gpu.instances(), on_gpu.pairs(), {}, streams[i]), Status::kOk);
+      ASSERT_EQ(queries[i].enqueue(on_gpu.instances(), on_gpu.pairs(), {}, streams[i].get()), Status::kOk);
     }
     for (int i = 0; i < kQueries; ++i) {
-      ASSERT_EQ(cudaStreamSynchronize(streams[i]), cudaSuccess);
+      ASSERT_EQ(streams[i].wait(), cudaSuccess);
       EXPECT_EQ(queries[i].report().complete, 1u);
       ASSERT_EQ(contacts_of(queries[i]), expected.cpu);
     }
   }
-  cudaGraph_t graph = nullptr;
-  cudaGraphExec_t ready = nullptr;
-  ASSERT_EQ(cudaStreamBeginCapture(streams[0], cudaStreamCaptureModeGlobal), cudaSuccess);
-  ASSERT_EQ(queries[0].enqueue(on_gpu.instances(), on_gpu.pairs(), {}, streams[0]), Status::kOk);
-  ASSERT_EQ(cudaStreamEndCapture(streams[0], &graph), cudaSuccess);
-  ASSERT_EQ(cudaGraphInstantiate(&ready, graph, 0), cudaSuccess);
+  GpuGraph graph;
+  const auto enqueue = [&] {
+    EXPECT_EQ(queries[0].enqueue(on_gpu.instances(), on_gpu.pairs(), {}, streams[0].get()), Status::kOk);
+  };
+  ASSERT_EQ(graph.capture(streams[0].get(), enqueue), cudaSuccess);
   for (int run = 0; run < 3; ++run) {
-    ASSERT_EQ(cudaGraphLaunch(ready, streams[0]), cudaSuccess);
-    ASSERT_EQ(cudaStreamSynchronize(streams[0]), cudaSuccess);
+    ASSERT_EQ(graph.launch(streams[0].get()), cudaSuccess);
+    ASSERT_EQ(streams[0].wait(), cudaSuccess);
     EXPECT_EQ(contacts_of(queries[0]), expected.cpu);
   }
-  cudaGraphExecDestroy(ready);
-  cudaGraphDestroy(graph);
-  for (cudaStream_t stream : streams) cudaStreamDestroy(stream);
 }
 
 /// Compiled apart from the whole query, with other operations fused, so the counts may differ by a little.
@@ -401,34 +366,30 @@ TEST_F(GpuContacts, DoNotDependOnWhenBlocksBegin) {
   }
   const Answers expected = ask(scene.assets, scene.instances, pairs, QueryMode::exact);
   const GpuScene on_gpu(scene.assets, scene.instances, pairs);
-  cudaStream_t streams[2];
-  for (cudaStream_t& stream : streams) {
-    ASSERT_EQ(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), cudaSuccess);
-  }
+  GpuStream streams[2];
+  for (GpuStream& stream : streams) ASSERT_EQ(stream.create(), cudaSuccess);
   GpuContactQuery query;
-  ASSERT_EQ(query.set_assets(on_gpu.assets(), streams[0]), Status::kOk);
-  ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, streams[0]), Status::kOk);
+  ASSERT_EQ(query.set_assets(on_gpu.assets(), streams[0].get()), Status::kOk);
+  ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, streams[0].get()), Status::kOk);
   int bytes = 0;
   ASSERT_EQ(cudaDeviceGetAttribute(&bytes, cudaDevAttrMaxSharedMemoryPerBlockOptin, 0), cudaSuccess);
   ASSERT_EQ(cudaFuncSetAttribute(hold, cudaFuncAttributeMaxDynamicSharedMemorySize, bytes), cudaSuccess);
-  int* released = nullptr;
-  ASSERT_EQ(cudaMallocHost(&released, sizeof *released), cudaSuccess);
+  PinnedArray<int> released;
+  ASSERT_EQ(released.reserve(1), cudaSuccess);
   *released = 0;
-  hold<<<processors - 1, 32, bytes, streams[1]>>>(released);
+  hold<<<processors - 1, 32, bytes, streams[1].get()>>>(released.data());
   ASSERT_EQ(cudaGetLastError(), cudaSuccess);
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  ASSERT_EQ(query.enqueue(on_gpu.instances(), on_gpu.pairs(), {}, streams[0]), Status::kOk);
-  const bool done = is_done_within_seconds(streams[0], 20);
-  *static_cast<volatile int*>(released) = 1;
-  if (!done && !is_done_within_seconds(streams[0], 2)) {
+  ASSERT_EQ(query.enqueue(on_gpu.instances(), on_gpu.pairs(), {}, streams[0].get()), Status::kOk);
+  const bool done = is_done_within_seconds(streams[0].get(), 20);
+  *static_cast<volatile int*>(released.data()) = 1;
+  if (!done && !is_done_within_seconds(streams[0].get(), 2)) {
     std::fprintf(stderr, "a query hangs where its blocks begin one after another\n");
     std::_Exit(1);  // nothing else can be done with the GPU
   }
   EXPECT_TRUE(done);
   EXPECT_EQ(contacts_of(query), expected.cpu);
-  ASSERT_EQ(cudaStreamSynchronize(streams[1]), cudaSuccess);
-  cudaFreeHost(released);
-  for (cudaStream_t stream : streams) cudaStreamDestroy(stream);
+  ASSERT_EQ(streams[1].wait(), cudaSuccess);
 }
 
 TEST_F(GpuContacts, MoveFromOneOwnerToAnother) {
@@ -453,20 +414,15 @@ __global__ void decide_all(const TrianglePair* pairs, int count, Decided* out) {
   if (i < count) out[i] = {decide_float64(pairs[i]), decide_exact(pairs[i])};
 }
 
-class GpuTriangles : public testing::TestWithParam<TriangleFamily> {
- protected:
-  void SetUp() override {
-    if (no_gpu()) GTEST_SKIP() << "no GPU here";
-  }
-};
+class GpuTriangles : public test::GpuTestOf<TriangleFamily> {};
 
 TEST_P(GpuTriangles, AreDecidedAsOnTheCpu) {
   Random random(1);
   std::vector<TrianglePair> pairs;
   for (int i = 0; i < test::trials(20000, 50); ++i) pairs.push_back(GetParam().make(random));
   const int count = static_cast<int>(pairs.size());
-  const OnGpu<TrianglePair> device(pairs);
-  const OnGpu<Decided> decided(std::vector<Decided>(pairs.size()));
+  const auto device = on_gpu(pairs);
+  const auto decided = on_gpu(std::vector<Decided>(pairs.size()));
   decide_all<<<(count + 63) / 64, 64>>>(device.data(), count, decided.data());
   ASSERT_EQ(cudaGetLastError(), cudaSuccess);
   ASSERT_EQ(cudaDeviceSynchronize(), cudaSuccess);

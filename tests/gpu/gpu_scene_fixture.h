@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <memory>
+#include <tuple>
 #include <vector>
 
 #include "kernels/query_scenes.h"
+#include "tandem/formats/gpu_memory.h"
+#include "tandem/formats/gpu_stream.h"
 #include "tandem/kernels/gpu_contact_query.h"
 #include "tandem/runtime/upload.h"
 
@@ -21,13 +23,17 @@ inline bool no_gpu() {
   return true;
 }
 
-/// Tests that need a GPU.
-class GpuTest : public testing::Test {
+/// Tests that need a GPU. Base: testing::Test or testing::TestWithParam.
+template <typename Base>
+class NeedsGpu : public Base {
  protected:
   void SetUp() override {
     if (no_gpu()) GTEST_SKIP() << "no GPU here";
   }
 };
+using GpuTest = NeedsGpu<testing::Test>;
+template <typename Parameter>
+using GpuTestOf = NeedsGpu<testing::TestWithParam<Parameter>>;
 
 /// With TANDEM_GPU_BLOCKS=N, queries take N blocks at most: for tools that are slow where warps wait.
 inline GpuQueryOptions gpu_options(QueryMode mode, bool first_contact_only = false) {
@@ -37,32 +43,45 @@ inline GpuQueryOptions gpu_options(QueryMode mode, bool first_contact_only = fal
   return options;
 }
 
-/// An array in GPU memory.
+/// A copy in GPU memory.
 template <typename Element>
-class OnGpu {
- public:
-  explicit OnGpu(const std::vector<Element>& host) : size_(host.size()) {
-    void* memory = nullptr;
-    EXPECT_EQ(cudaMalloc(&memory, std::max<std::size_t>(size_, 1) * sizeof(Element)), cudaSuccess);
-    data_ = static_cast<Element*>(memory);
-    EXPECT_EQ(cudaMemcpy(data_, host.data(), size_ * sizeof(Element), cudaMemcpyHostToDevice), cudaSuccess);
-  }
-  OnGpu(const OnGpu&) = delete;
-  OnGpu& operator=(const OnGpu&) = delete;
-  ~OnGpu() { cudaFree(data_); }
+GpuArray<Element> on_gpu(const std::vector<Element>& host) {
+  GpuArray<Element> array;
+  EXPECT_EQ(array.upload(host, nullptr), cudaSuccess);
+  return array;
+}
 
-  Element* data() const { return data_; }
-
- private:
-  Element* data_ = nullptr;
-  std::size_t size_;
-};
-
-template <typename Value>
-std::vector<Value> download(const Value* device, std::size_t count) {
-  std::vector<Value> host(count);
-  EXPECT_EQ(cudaMemcpy(host.data(), device, count * sizeof(Value), cudaMemcpyDeviceToHost), cudaSuccess);
+template <typename Element>
+std::vector<Element> download(const Element* device, std::size_t count) {
+  std::vector<Element> host(count);
+  EXPECT_EQ(tandem::download<Element>(device, host, nullptr), cudaSuccess);
   return host;
+}
+
+/// An order of contacts: by pair, then triangles.
+inline bool comes_before(const Contact& x, const Contact& y) {
+  const auto key = [](const Contact& c) {
+    return std::tie(c.pair, c.triangle_a, c.triangle_b, c.face_a, c.face_b);
+  };
+  return key(x) < key(y);
+}
+
+inline std::vector<Contact> sorted(std::vector<Contact> contacts) {
+  std::sort(contacts.begin(), contacts.end(), comes_before);
+  return contacts;
+}
+
+/// Every two instances, in either order, and with `selves` each with itself.
+inline std::vector<ObjectPair> all_pairs(const std::vector<Instance>& instances, bool selves,
+                                         RandomPoses& random) {
+  std::vector<ObjectPair> pairs;
+  const auto count = static_cast<std::uint32_t>(instances.size());
+  for (std::uint32_t a = 0; a < count; ++a) {
+    for (std::uint32_t b = selves ? a : a + 1; b < count; ++b) {
+      pairs.push_back(random.below(2) == 0 ? ObjectPair{a, b} : ObjectPair{b, a});
+    }
+  }
+  return pairs;
 }
 
 /// A scene, all of it in GPU memory, and its object pairs.
@@ -70,16 +89,16 @@ class GpuScene {
  public:
   GpuScene(const SampleAssets& assets, const std::vector<Instance>& instances,
            const std::vector<ObjectPair>& pairs)
-      : asset_(assets_of(instances)),
-        pose_(poses_of(instances)),
-        pairs_(pairs),
-        count_({static_cast<std::uint32_t>(pairs.size())}),
+      : asset_(on_gpu(part(instances, &Instance::asset))),
+        pose_(on_gpu(part(instances, &Instance::pose))),
+        pairs_(on_gpu(pairs)),
+        count_(on_gpu(std::vector<std::uint32_t>{static_cast<std::uint32_t>(pairs.size())})),
         instance_count_(static_cast<std::uint32_t>(instances.size())),
         pair_count_(static_cast<std::uint32_t>(pairs.size())) {
     for (const AssetView& view : assets.views()) {
-      uploads_.push_back(std::make_unique<DeviceAsset>());
-      EXPECT_EQ(uploads_.back()->upload(view, nullptr), Status::kOk);
-      views_.push_back(gpu_asset(uploads_.back()->level(), *view.header));
+      DeviceAsset& asset = uploads_.emplace_back();
+      EXPECT_EQ(asset.upload(view, nullptr), Status::kOk);
+      views_.push_back(gpu_asset(asset.level(), *view.header));
     }
   }
 
@@ -88,23 +107,19 @@ class GpuScene {
   GpuPairs pairs() const { return {pairs_.data(), count_.data(), pair_count_}; }
 
  private:
-  static std::vector<std::uint32_t> assets_of(const std::vector<Instance>& instances) {
-    std::vector<std::uint32_t> out;
-    for (const Instance& instance : instances) out.push_back(instance.asset);
-    return out;
-  }
-  static std::vector<Pose> poses_of(const std::vector<Instance>& instances) {
-    std::vector<Pose> out;
-    for (const Instance& instance : instances) out.push_back(instance.pose);
+  template <typename Value>
+  static std::vector<Value> part(const std::vector<Instance>& instances, Value Instance::*member) {
+    std::vector<Value> out;
+    for (const Instance& instance : instances) out.push_back(instance.*member);
     return out;
   }
 
-  std::vector<std::unique_ptr<DeviceAsset>> uploads_;
+  std::vector<DeviceAsset> uploads_;
   std::vector<GpuAsset> views_;
-  OnGpu<std::uint32_t> asset_;
-  OnGpu<Pose> pose_;
-  OnGpu<ObjectPair> pairs_;
-  OnGpu<std::uint32_t> count_;
+  GpuArray<std::uint32_t> asset_;
+  GpuArray<Pose> pose_;
+  GpuArray<ObjectPair> pairs_;
+  GpuArray<std::uint32_t> count_;
   std::uint32_t instance_count_, pair_count_;
 };
 

@@ -75,27 +75,24 @@ TEST_F(GpuSorted, AGraphSortsAgainAndAnUnsortedQueryIsStillOne) {
   const std::vector<Contact> expected = expected_of(scene, pairs, QueryMode::exact);
   const GpuScene on_gpu(scene.assets, scene.instances, pairs);
   GpuContactQuery query;
-  cudaStream_t stream = nullptr;
-  ASSERT_EQ(cudaStreamCreate(&stream), cudaSuccess);
+  GpuStream owner;
+  ASSERT_EQ(owner.create(), cudaSuccess);
+  const cudaStream_t stream = owner.get();
   ASSERT_EQ(query.set_assets(on_gpu.assets(), stream), Status::kOk);
   const GpuQueryOptions options = sorted(QueryMode::exact);
   ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), options, stream), Status::kOk);
-  cudaGraph_t graph = nullptr;
-  cudaGraphExec_t ready = nullptr;
-  ASSERT_EQ(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal), cudaSuccess);
-  ASSERT_EQ(query.enqueue(on_gpu.instances(), on_gpu.pairs(), options, stream), Status::kOk);
-  ASSERT_EQ(cudaStreamEndCapture(stream, &graph), cudaSuccess);
-  ASSERT_EQ(cudaGraphInstantiate(&ready, graph, 0), cudaSuccess);
+  GpuGraph graph;
+  const auto enqueue = [&] {
+    EXPECT_EQ(query.enqueue(on_gpu.instances(), on_gpu.pairs(), options, stream), Status::kOk);
+  };
+  ASSERT_EQ(graph.capture(stream, enqueue), cudaSuccess);
   for (int run = 0; run < 3; ++run) {
     ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, stream), Status::kOk);
     EXPECT_EQ(query.report().contacts, expected.size());
-    ASSERT_EQ(cudaGraphLaunch(ready, stream), cudaSuccess);
+    ASSERT_EQ(graph.launch(stream), cudaSuccess);
     ASSERT_EQ(cudaStreamSynchronize(stream), cudaSuccess);
     EXPECT_EQ(download(query.contacts(), query.report().contacts), expected);
   }
-  cudaGraphExecDestroy(ready);
-  cudaGraphDestroy(graph);
-  cudaStreamDestroy(stream);
 }
 
 TEST_F(GpuSorted, WhatDoesNotFitOrFailsIsToldAsEver) {

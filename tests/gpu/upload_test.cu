@@ -6,29 +6,17 @@
 #include <vector>
 
 #include "build/sample_asset.h"
+#include "gpu_scene_fixture.h"
 #include "tandem/kernels/box_test.h"
 #include "tandem/runtime/upload.h"
 
 namespace tandem {
 namespace {
 
-class Gpu : public testing::Test {
- protected:
-  void SetUp() override {
-    int count = 0;
-    if (cudaGetDeviceCount(&count) != cudaSuccess || count == 0) {
-      static_cast<void>(cudaGetLastError());
-      GTEST_SKIP() << "no GPU here";
-    }
-  }
-};
+class Gpu : public test::GpuTest {};
 
-template <typename Value>
-std::vector<Value> download(const Value* device, std::size_t count) {
-  std::vector<Value> host(count);
-  EXPECT_EQ(cudaMemcpy(host.data(), device, count * sizeof(Value), cudaMemcpyDeviceToHost), cudaSuccess);
-  return host;
-}
+using test::download;
+using test::on_gpu;
 
 TEST_F(Gpu, AnUploadedLevelHasTheSameBytes) {
   const build::Image image = test::make_file(test::random_mesh(5000, 1));
@@ -75,14 +63,11 @@ TEST_F(Gpu, KernelsReadTheTreeInPlace) {
   const build::Image image = test::make_file(test::random_mesh(5001, 2));
   DeviceAsset asset;
   ASSERT_EQ(asset.upload(check(image.data(), image.size()).asset, nullptr), Status::kOk);
-  unsigned* leaves = nullptr;
-  ASSERT_EQ(cudaMalloc(&leaves, sizeof(unsigned)), cudaSuccess);
-  ASSERT_EQ(cudaMemset(leaves, 0, sizeof(unsigned)), cudaSuccess);
+  const auto leaves = on_gpu(std::vector<unsigned>{0});
   const LevelView level = asset.level();
-  count_leaves<<<(level.block_count + 127) / 128, 128>>>(level, leaves);
+  count_leaves<<<(level.block_count + 127) / 128, 128>>>(level, leaves.data());
   ASSERT_EQ(cudaGetLastError(), cudaSuccess);
-  EXPECT_EQ(download(leaves, 1)[0], 5001u);
-  cudaFree(leaves);
+  EXPECT_EQ(download(leaves.data(), 1)[0], 5001u);
 }
 
 struct Trial {
@@ -125,19 +110,12 @@ TEST_F(Gpu, ImaginaryNodesAreRejectedAgainstEveryOtherBox) {
       }
     }
   }
-  Trial* device = nullptr;
-  unsigned* accepted = nullptr;
-  ASSERT_EQ(cudaMalloc(&device, trials.size() * sizeof(Trial)), cudaSuccess);
-  ASSERT_EQ(cudaMalloc(&accepted, sizeof(unsigned)), cudaSuccess);
-  ASSERT_EQ(cudaMemset(accepted, 0, sizeof(unsigned)), cudaSuccess);
-  ASSERT_EQ(cudaMemcpy(device, trials.data(), trials.size() * sizeof(Trial), cudaMemcpyHostToDevice),
-            cudaSuccess);
+  const auto device = on_gpu(trials);
+  const auto accepted = on_gpu(std::vector<unsigned>{0});
   const int count = static_cast<int>(trials.size());
-  test_imaginary<<<(count + 255) / 256, 256>>>(device, count, accepted);
+  test_imaginary<<<(count + 255) / 256, 256>>>(device.data(), count, accepted.data());
   ASSERT_EQ(cudaGetLastError(), cudaSuccess);
-  EXPECT_EQ(download(accepted, 1)[0], 0u);
-  cudaFree(device);
-  cudaFree(accepted);
+  EXPECT_EQ(download(accepted.data(), 1)[0], 0u);
 }
 
 }  // namespace

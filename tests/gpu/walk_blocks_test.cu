@@ -16,7 +16,7 @@ namespace {
 
 using test::download;
 using test::Mesh;
-using test::OnGpu;
+using test::on_gpu;
 using test::RandomPoses;
 using test::SampleAssets;
 
@@ -37,14 +37,14 @@ void expect_sound(const SampleAssets& assets) {
   }
   gpu::WalkBlock none;
   std::memset(&none, 0xCD, sizeof none);
-  const OnGpu<gpu::WalkBlock> blocks(std::vector<gpu::WalkBlock>(numbers, none));
-  const OnGpu<std::uint32_t> file_blocks(std::vector<std::uint32_t>(numbers, 0xCDCDCDCDu));
-  const OnGpu<std::uint32_t> scratch(std::vector<std::uint32_t>(block_count, 0xCDCDCDCDu));
-  const OnGpu<gpu::Asset> on_gpu(table);
-  ASSERT_EQ(gpu::make_walk_blocks(on_gpu.data(), assets.size(), block_count, blocks.data(),
+  const auto blocks = on_gpu(std::vector<gpu::WalkBlock>(numbers, none));
+  const auto file_blocks = on_gpu(std::vector<std::uint32_t>(numbers, 0xCDCDCDCDu));
+  const auto scratch = on_gpu(std::vector<std::uint32_t>(block_count, 0xCDCDCDCDu));
+  const auto assets_on_gpu = on_gpu(table);
+  ASSERT_EQ(gpu::make_walk_blocks(assets_on_gpu.data(), assets.size(), block_count, blocks.data(),
                                   file_blocks.data(), scratch.data(), nullptr),
             cudaSuccess);
-  const auto made = download(on_gpu.data(), table.size());
+  const auto made = download(assets_on_gpu.data(), table.size());
   std::vector<test::WalkTree> walks;
   for (std::uint32_t i = 0; i < assets.size(); ++i) {
     const TreeExtent extent = extent_of(assets.views()[i].level().blocks[0]);
@@ -172,7 +172,7 @@ __global__ void invert_all(std::uint32_t numbers, unsigned long long* worst) {
 
 /// All squared lengths of quaternions: the GPU's approximate inverse of each.
 TEST_F(WalkBlocks, HaveInversesWithinTwoUnitsOfRoundoff) {
-  const OnGpu<unsigned long long> worst({0});
+  const auto worst = on_gpu(std::vector<unsigned long long>{0});
   invert_all<<<256, 256>>>(4 * kLargestQuaternionPart * kLargestQuaternionPart, worst.data());
   const unsigned long long bits = download(worst.data(), 1)[0];
   double off;
@@ -191,9 +191,9 @@ TEST_F(WalkBlocks, HaveTheFramesOfTheCpu) {
   RandomPoses random(5);
   std::vector<BlockRotation> rotations(1'000'000);
   for (BlockRotation& r : rotations) r = test::packed(test::random_quaternion(random));
-  const OnGpu<BlockRotation> on_gpu(rotations);
-  const OnGpu<BlockFrame> frames(std::vector<BlockFrame>(rotations.size()));
-  make_frames<<<256, 256>>>(on_gpu.data(), static_cast<std::uint32_t>(rotations.size()), frames.data());
+  const auto device = on_gpu(rotations);
+  const auto frames = on_gpu(std::vector<BlockFrame>(rotations.size()));
+  make_frames<<<256, 256>>>(device.data(), static_cast<std::uint32_t>(rotations.size()), frames.data());
   const std::vector<BlockFrame> made = download(frames.data(), rotations.size());
   for (std::size_t i = 0; i < made.size(); ++i) {
     const BlockFrame expected = frame_of(rotations[i]);

@@ -11,6 +11,7 @@
 #include "broad_phase_limits.h"
 #include "broad_phase_tree.cuh"
 #include "broad_phase_walk.cuh"
+#include "tandem/formats/gpu_memory.h"
 #include "tandem/formats/gpu_status.h"
 
 namespace tandem {
@@ -91,39 +92,7 @@ __global__ void unpack_keys(const unsigned long long* keys, std::uint32_t capaci
 }
 
 // ---------------------------------------------------------------------------------------------------------
-// Memory.
-
-// GPU memory that grows and is kept; what is in it is lost then. On error: empty.
-template <typename Element>
-class DeviceBuffer {
- public:
-  DeviceBuffer() = default;
-  DeviceBuffer(const DeviceBuffer&) = delete;
-  DeviceBuffer& operator=(const DeviceBuffer&) = delete;
-  ~DeviceBuffer() { free(); }
-
-  cudaError_t reserve(std::size_t size) {
-    if (size <= size_) return cudaSuccess;
-    free();
-    const cudaError_t error = cudaMalloc(&data_, size * sizeof(Element));
-    if (error == cudaSuccess) size_ = size;
-    return error;
-  }
-
-  Element* data() const { return data_; }
-  std::size_t size() const { return size_; }
-  std::size_t bytes() const { return size_ * sizeof(Element); }
-
- private:
-  void free() {
-    if (size_ != 0) static_cast<void>(cudaFree(data_));
-    data_ = nullptr;
-    size_ = 0;
-  }
-
-  Element* data_ = nullptr;
-  std::size_t size_ = 0;
-};
+// How work is cut.
 
 std::uint32_t blocks_for(std::uint64_t threads, std::uint32_t size) {
   return static_cast<std::uint32_t>((threads + size - 1) / size);
@@ -155,22 +124,18 @@ std::uint32_t split_of(std::uint32_t groups) {
 }  // namespace
 
 struct GpuBroadPhase::State {
-  DeviceBuffer<WorldBox> boxes;
-  DeviceBuffer<Key> keys[2];
-  DeviceBuffer<Node> nodes;
-  DeviceBuffer<unsigned long long> pairs, sorted_pairs;
-  DeviceBuffer<unsigned char> sorting;  // CUB's
-  DeviceBuffer<Survey> survey;
-  DeviceBuffer<Counters> counters;
+  GpuArray<WorldBox> boxes;
+  GpuArray<Key> keys[2];
+  GpuArray<Node> nodes;
+  GpuArray<unsigned long long> pairs, sorted_pairs;
+  GpuArray<unsigned char> sorting;  // CUB's
+  GpuArray<Survey> survey;
+  GpuArray<Counters> counters;
   bool counters_are_fresh = false;  // a search that ends leaves them so
-  DeviceBuffer<GpuBroadPhaseReport> report;
-  GpuBroadPhaseReport* host_report = nullptr;
+  GpuArray<GpuBroadPhaseReport> report;
+  PinnedArray<GpuBroadPhaseReport> host_report;
   GpuBroadPhaseCapacity capacity;
   cudaError_t error = cudaSuccess;
-
-  ~State() {
-    if (host_report != nullptr) static_cast<void>(cudaFreeHost(host_report));
-  }
 
   // Of a call: true, or what went wrong is kept.
   bool ok(cudaError_t result) {
@@ -219,15 +184,11 @@ void GpuBroadPhase::State::end(bool queued, cudaStream_t stream) {
 }
 
 bool GpuBroadPhase::State::reserve_fixed() {
-  if (host_report != nullptr) return true;
+  if (host_report.data() != nullptr) return true;
   if (!ok(survey.reserve(1)) || !ok(counters.reserve(1)) || !ok(report.reserve(1)) ||
       !ok(cudaMemset(report.data(), 0, report.bytes())) || !refresh(nullptr) ||
-      !ok(cudaStreamSynchronize(nullptr)))
+      !ok(cudaStreamSynchronize(nullptr)) || !ok(host_report.reserve(1)))
     return false;
-  if (!ok(cudaMallocHost(&host_report, sizeof *host_report))) {
-    host_report = nullptr;
-    return false;
-  }
   *host_report = {};
   counters_are_fresh = true;
   return true;
@@ -251,7 +212,7 @@ bool GpuBroadPhase::State::reserve_pairs(std::uint32_t count, bool sorted) {
     if (!ok(pairs.reserve(count))) return false;
     capacity.pairs = count;
   }
-  if (!sorted || sorted_pairs.size() >= capacity.pairs) return true;
+  if (!sorted || sorted_pairs.room() >= capacity.pairs) return true;
   return ok(sorted_pairs.reserve(capacity.pairs)) && reserve_sorting();
 }
 
@@ -261,7 +222,7 @@ bool GpuBroadPhase::State::reserve_sorting() {
   std::size_t bytes = 0, pair_bytes = 0;
   cub::DoubleBuffer<Key> key(keys[0].data(), keys[1].data());
   if (!ok(cub::DeviceRadixSort::SortKeys(nullptr, bytes, key, capacity.boxes))) return false;
-  if (sorted_pairs.size() != 0) {
+  if (sorted_pairs.room() != 0) {
     cub::DoubleBuffer<unsigned long long> pair(pairs.data(), sorted_pairs.data());
     if (!ok(cub::DeviceRadixSort::SortKeys(nullptr, pair_bytes, pair, capacity.pairs))) return false;
   }
@@ -270,13 +231,13 @@ bool GpuBroadPhase::State::reserve_sorting() {
 
 // Why a call cannot be queued.
 Status GpuBroadPhase::State::refusal(std::uint32_t count, const GpuBroadPhaseOptions& options) const {
-  const bool enough = count <= capacity.boxes && (!options.sorted || sorted_pairs.size() >= capacity.pairs);
+  const bool enough = count <= capacity.boxes && (!options.sorted || sorted_pairs.room() >= capacity.pairs);
   return enough ? Status::kOk : Status::kOutOfRange;
 }
 
 Output GpuBroadPhase::State::output(std::uint32_t count, bool sorted) {
-  return {pairs.data(),  capacity.pairs, sorted ? index_bits(count) : 0, sorted ? 0 : 32, counters.data(),
-          report.data(), host_report};
+  return {pairs.data(),  capacity.pairs,    sorted ? index_bits(count) : 0, sorted ? 0 : 32, counters.data(),
+          report.data(), host_report.data()};
 }
 
 template <typename... Parameters, typename... Arguments>
@@ -305,7 +266,7 @@ bool GpuBroadPhase::State::make_tree(const Boxes& from, const WorldBox* given, c
               keys[0].data(), counters.data()))
     return false;
   cub::DoubleBuffer<Key> key(keys[0].data(), keys[1].data());
-  std::size_t bytes = sorting.size();
+  std::size_t bytes = sorting.room();
   if (!ok(cub::DeviceRadixSort::SortKeys(sorting.data(), bytes, key, count, first_bit(count), 64, stream)))
     return false;
   constexpr std::uint32_t kThreads = kFanOut * kFanOut;
@@ -330,7 +291,7 @@ bool GpuBroadPhase::State::sort_pairs(std::uint32_t count, cudaStream_t stream) 
   const std::uint32_t blocks = blocks_for(capacity.pairs, 256);
   if (!launch(blocks, 256, stream, fill_rest, pairs.data(), capacity.pairs, report.data())) return false;
   cub::DoubleBuffer<unsigned long long> key(pairs.data(), sorted_pairs.data());
-  std::size_t bytes = sorting.size();
+  std::size_t bytes = sorting.room();
   if (!ok(cub::DeviceRadixSort::SortKeys(sorting.data(), bytes, key, capacity.pairs, 0, 2 * bits, stream)))
     return false;
   return launch(blocks, 256, stream, unpack_keys, key.Current(), capacity.pairs, bits,
@@ -360,9 +321,10 @@ Status GpuBroadPhase::State::find(GpuBroadPhase& self, GpuBroadPhaseCapacity wan
     if (const Status status = self.reserve(wanted, options); status != Status::kOk) return status;
     if (const Status status = enqueue(); status != Status::kOk) return status;
     if (!ok(cudaStreamSynchronize(stream))) return failure();
-    if (host_report->status != Status::kOk || host_report->complete != 0) return host_report->status;
-    if (host_report->found >= kNoIndex) return Status::kTooManyPairs;
-    room = host_report->found + host_report->found / 4;
+    const GpuBroadPhaseReport& told = *host_report;
+    if (told.status != Status::kOk || told.complete != 0) return told.status;
+    if (told.found >= kNoIndex) return Status::kTooManyPairs;
+    room = told.found + told.found / 4;
   }
 }
 
@@ -398,7 +360,7 @@ Status GpuBroadPhase::enqueue(const WorldBox* boxes, std::uint32_t count, const 
 
 Status GpuBroadPhase::enqueue(const GpuInstances& instances, const GpuAssetBounds& assets,
                               const GpuBroadPhaseOptions& options, cudaStream_t stream) {
-  if (state_ == nullptr || instances.count > state_->boxes.size()) return Status::kOutOfRange;
+  if (state_ == nullptr || instances.count > state_->boxes.room()) return Status::kOutOfRange;
   State& state = *state_;
   const std::uint32_t count = instances.count;
   if (const Status status = state.refusal(count, options); status != Status::kOk) return status;
@@ -430,7 +392,7 @@ Status GpuBroadPhase::find_pairs(const GpuInstances& instances, const GpuAssetBo
 }
 
 GpuPairs GpuBroadPhase::pairs() const {
-  return {reinterpret_cast<const ObjectPair*>(state_->pairs.data()), &state_->report.data()->count,
+  return {reinterpret_cast<const ObjectPair*>(state_->pairs.data()), &state_->report->count,
           state_->capacity.pairs};
 }
 
@@ -447,7 +409,7 @@ const GpuBroadPhaseReport& GpuBroadPhase::report() const {
 GpuBroadPhaseCapacity GpuBroadPhase::capacity() const {
   if (state_ == nullptr) return {};
   GpuBroadPhaseCapacity capacity = state_->capacity;
-  capacity.instances = static_cast<std::uint32_t>(state_->boxes.size());
+  capacity.instances = static_cast<std::uint32_t>(state_->boxes.room());
   return capacity;
 }
 

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <new>
-#include <utility>
 
 #include "paper_engine_data.h"
+#include "tandem/formats/gpu_memory.h"
 #include "tandem/formats/gpu_status.h"
+#include "tandem/formats/gpu_stream.h"
 
 namespace tandem::bench {
 
@@ -14,49 +15,6 @@ using paper::kCollision;
 using paper::kLeaf;
 
 namespace {
-
-/// An array in GPU memory that only grows.
-template <typename Element>
-class GpuArray {
- public:
-  GpuArray() = default;
-  GpuArray(const GpuArray&) = delete;
-  GpuArray& operator=(const GpuArray&) = delete;
-  ~GpuArray() { static_cast<void>(cudaFree(data_)); }
-
-  Element* data() const { return data_; }
-  std::size_t room() const { return room_; }
-  std::size_t bytes() const { return room_ * sizeof(Element); }
-
-  /// Makes room for `wanted`, of which the first `kept` stay. Waits for the device where it grows; then by
-  /// half at least, so that it settles.
-  cudaError_t grow(std::size_t wanted, std::size_t kept = 0) {
-    if (wanted <= room_) return cudaSuccess;
-    const std::size_t room = std::max(wanted, room_ + room_ / 2);
-    if (kept == 0) free();
-    void* memory = nullptr;
-    cudaError_t error = cudaMalloc(&memory, room * sizeof(Element));
-    if (error == cudaSuccess && kept != 0)
-      error = cudaMemcpy(memory, data_, kept * sizeof(Element), cudaMemcpyDeviceToDevice);
-    if (error != cudaSuccess) {
-      static_cast<void>(cudaFree(memory));
-      return error;
-    }
-    free();
-    data_ = static_cast<Element*>(memory);
-    room_ = room;
-    return cudaSuccess;
-  }
-
- private:
-  void free() {
-    static_cast<void>(cudaFree(std::exchange(data_, nullptr)));
-    room_ = 0;
-  }
-
-  Element* data_ = nullptr;
-  std::size_t room_ = 0;
-};
 
 /// What the CPU reads, in memory that the GPU copies to.
 struct Answers {
@@ -80,19 +38,12 @@ struct PaperEngine::State {
   GpuArray<Entry> undecided;  ///< two rows
   GpuArray<Contact> contacts;
   GpuArray<paper::Outcome> outcome;
-  Answers* answers = nullptr;
-  cudaEvent_t moments[kMoments] = {};
+  PinnedArray<Answers> answers;
+  GpuEvent moments[kMoments];
   std::uint32_t asset_count = 0;
   std::uint64_t candidate_count = 0;
   PaperReport report;
   cudaError_t error = cudaSuccess;
-
-  ~State() {
-    static_cast<void>(cudaFreeHost(answers));
-    for (cudaEvent_t moment : moments) {
-      if (moment != nullptr) static_cast<void>(cudaEventDestroy(moment));
-    }
-  }
 
   /// Whether all went well so far; keeps the first error.
   bool ok(cudaError_t result) {
@@ -106,15 +57,12 @@ struct PaperEngine::State {
   Status status() const { return status_of(error); }
 
   bool provide() {
-    if (!ok(outcome.grow(1))) return false;
-    if (answers == nullptr) {
-      void* memory = nullptr;
-      if (!ok(cudaMallocHost(&memory, sizeof(Answers)))) return false;
-      answers = new (memory) Answers{};
+    if (answers.data() != nullptr) return true;
+    for (GpuEvent& moment : moments) {
+      if (!ok(moment.create())) return false;
     }
-    for (cudaEvent_t& moment : moments) {
-      if (moment == nullptr && !ok(cudaEventCreate(&moment))) return false;
-    }
+    if (!ok(outcome.reserve(1)) || !ok(answers.reserve(1))) return false;
+    *answers = {};
     return true;
   }
 
@@ -249,19 +197,19 @@ void PaperEngine::State::count_contacts(QueryMode mode) {
 }
 
 bool PaperEngine::State::measure_times(cudaStream_t stream) {
-  return ok(cudaEventRecord(moments[kEnd], stream)) && ok(cudaEventSynchronize(moments[kEnd])) &&
-         ok(cudaEventElapsedTime(&report.preparation_ms, moments[kBegin], moments[kPrepared])) &&
-         ok(cudaEventElapsedTime(&report.traversal_ms, moments[kPrepared], moments[kTraversed])) &&
-         ok(cudaEventElapsedTime(&report.triangle_ms, moments[kTraversed], moments[kEnd]));
+  return ok(moments[kEnd].record(stream)) && ok(cudaEventSynchronize(moments[kEnd].get())) &&
+         ok(milliseconds_between(moments[kBegin], moments[kPrepared], report.preparation_ms)) &&
+         ok(milliseconds_between(moments[kPrepared], moments[kTraversed], report.traversal_ms)) &&
+         ok(milliseconds_between(moments[kTraversed], moments[kEnd], report.triangle_ms));
 }
 
 Status PaperEngine::State::run(paper::QueryArgs& args, const PaperOptions& options, cudaStream_t stream) {
-  if (!ok(cudaEventRecord(moments[kBegin], stream))) return status();
+  if (!ok(moments[kBegin].record(stream))) return status();
   Status result = prepare(args, stream);
-  if (result != Status::kOk || !ok(cudaEventRecord(moments[kPrepared], stream)))
+  if (result != Status::kOk || !ok(moments[kPrepared].record(stream)))
     return result != Status::kOk ? result : status();
   result = traverse(options, stream);
-  if (result != Status::kOk || !ok(cudaEventRecord(moments[kTraversed], stream)))
+  if (result != Status::kOk || !ok(moments[kTraversed].record(stream)))
     return result != Status::kOk ? result : status();
   if (!test_triangles(args, options.mode, stream)) return status();
   count_contacts(options.mode);

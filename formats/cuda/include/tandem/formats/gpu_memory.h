@@ -37,7 +37,9 @@ class CudaArray {
   }
   ~CudaArray() { free(); }
 
-  Element* data() const { return data_; }     ///< null where there is no room
+  Element* data() const { return data_; }        ///< null where there is no room
+  Element& operator*() const { return *data_; }  ///< the first
+  Element* operator->() const { return data_; }
   std::size_t room() const { return room_; }  ///< elements
   std::size_t bytes() const { return room_ * sizeof(Element); }
 

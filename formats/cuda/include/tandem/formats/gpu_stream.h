@@ -38,16 +38,18 @@ inline cudaError_t destroy_graph(cudaGraphExec_t graph) {
 /// A stream of the current device that does not wait for the default stream.
 class GpuStream : public CudaHandle<cudaStream_t, destroy_stream> {
  public:
-  /// Condition: called once.
-  cudaError_t create() { return cudaStreamCreateWithFlags(&handle_, cudaStreamNonBlocking); }
+  /// Does nothing where it was created before.
+  cudaError_t create() {
+    return handle_ != nullptr ? cudaSuccess : cudaStreamCreateWithFlags(&handle_, cudaStreamNonBlocking);
+  }
   cudaError_t wait() const { return cudaStreamSynchronize(handle_); }
 };
 
 /// A moment of a stream.
 class GpuEvent : public CudaHandle<cudaEvent_t, destroy_event> {
  public:
-  /// Condition: called once.
-  cudaError_t create() { return cudaEventCreate(&handle_); }
+  /// Does nothing where it was created before.
+  cudaError_t create() { return handle_ != nullptr ? cudaSuccess : cudaEventCreate(&handle_); }
 
   /// `flags`: cudaEventRecordExternal where a captured graph is to record it.
   cudaError_t record(cudaStream_t stream, unsigned flags = cudaEventRecordDefault) const {
@@ -56,11 +58,8 @@ class GpuEvent : public CudaHandle<cudaEvent_t, destroy_event> {
 };
 
 /// The time between two events of one stream. Condition: both have passed.
-inline cudaError_t seconds_between(const GpuEvent& begin, const GpuEvent& end, double& seconds) {
-  float milliseconds = 0;
-  const cudaError_t error = cudaEventElapsedTime(&milliseconds, begin.get(), end.get());
-  seconds = 1e-3 * static_cast<double>(milliseconds);
-  return error;
+inline cudaError_t milliseconds_between(const GpuEvent& begin, const GpuEvent& end, float& milliseconds) {
+  return cudaEventElapsedTime(&milliseconds, begin.get(), end.get());
 }
 
 /// Work that was queued once and is launched again and again.

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "tandem/kernels/contact_query.h"
@@ -66,10 +67,10 @@ struct GpuQueryReport {
 /// several objects side by side.
 class GpuContactQuery {
  public:
-  GpuContactQuery() = default;
-  GpuContactQuery(GpuContactQuery&& other) noexcept { *this = static_cast<GpuContactQuery&&>(other); }
-  GpuContactQuery& operator=(GpuContactQuery&& other) noexcept;
-  ~GpuContactQuery() { free(); }
+  GpuContactQuery();
+  GpuContactQuery(GpuContactQuery&&) noexcept;
+  GpuContactQuery& operator=(GpuContactQuery&&) noexcept;
+  ~GpuContactQuery();  ///< waits for the device
 
   /// Names the assets that instances refer to, on the current device, after what `stream` holds; returns when
   /// that is done. What the trees point to must outlive the queries. Result: kOk, kOutOfRange (a tree of 2^29
@@ -96,52 +97,20 @@ class GpuContactQuery {
   Status find_contacts(const GpuInstances& instances, const GpuPairs& pairs, const GpuQueryOptions& options,
                        cudaStream_t stream);
 
-  /// In GPU memory: report().contacts of them.
-  const Contact* contacts() const { return contacts_; }
+  /// In GPU memory: report().contacts of them. Condition: set_assets().
+  const Contact* contacts() const;
   const GpuQueryReport* device_report() const;
 
   /// In CPU memory. Condition: the stream has come to the end of the query.
-  const GpuQueryReport& report() const { return *host_report_; }
+  const GpuQueryReport& report() const;
 
-  const GpuQueryCapacity& capacity() const { return capacity_; }
+  GpuQueryCapacity capacity() const;
   std::size_t bytes() const;  ///< GPU memory held, at most most_query_bytes()
-  cudaError_t cuda_error() const { return error_; }
+  cudaError_t cuda_error() const;
 
  private:
-  void free();
-  void free_room();
-  void free_walk_blocks();
-  void free_sorting();
-  Status fail(cudaError_t error);
-  template <typename Element>
-  Status allocate(Element*& out, std::size_t count);
-  Status provide_fixed_memory(cudaStream_t stream);
-  Status make_walk_blocks(std::span<const GpuAsset> assets, cudaStream_t stream);
-  Status reserve_sorting();
-
-  void* assets_ = nullptr;
-  std::uint32_t asset_count_ = 0, asset_room_ = 0, depth_ = 1;
-  std::uint32_t most_triangles_ = 0;
-  std::uint64_t most_faces_ = 0;
-  void* walk_blocks_ = nullptr;  // of all assets
-  std::uint32_t* file_blocks_ = nullptr;
-  std::size_t block_room_ = 0;
-  void* state_ = nullptr;
-  bool state_is_clear_ = false;  // a query that ends leaves it so
-  void* chunks_ = nullptr;
-  void* pairs_ = nullptr;
-  std::uint32_t* world_pairs_ = nullptr;
-  std::uint32_t* met_ = nullptr;
-  Contact* contacts_ = nullptr;
-  void* undecided_ = nullptr;
-  Contact* unsorted_ = nullptr;
-  std::uint32_t* order_ = nullptr;
-  void* sorting_ = nullptr;
-  std::uint64_t sorted_room_ = 0;
-  std::size_t sorting_bytes_ = 0;
-  GpuQueryReport* host_report_ = nullptr;
-  GpuQueryCapacity capacity_;
-  cudaError_t error_ = cudaSuccess;
+  struct State;
+  std::unique_ptr<State> state_;
 };
 
 }  // namespace tandem

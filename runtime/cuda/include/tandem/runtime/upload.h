@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "tandem/formats/check.h"
+#include "tandem/formats/gpu_memory.h"
 
 namespace tandem {
 
@@ -14,7 +15,7 @@ class DeviceAsset {
   DeviceAsset() = default;
   DeviceAsset(DeviceAsset&& other) noexcept { *this = static_cast<DeviceAsset&&>(other); }
   DeviceAsset& operator=(DeviceAsset&& other) noexcept;
-  ~DeviceAsset() { free(); }
+  ~DeviceAsset() = default;
 
   /// Allocates on the current device and queues the copy on `stream`; what was uploaded before is freed.
   /// Result: kOk, kOutOfGpuMemory, or another that status_of() of gpu_status.h names: kNoGpu, kDriverTooOld,
@@ -28,12 +29,11 @@ class DeviceAsset {
   /// Level `i` with pointers into GPU memory. Condition: upload() returned kOk, i < level_count().
   LevelView level(std::uint32_t i = 0) const { return levels_[i]; }
   std::uint32_t level_count() const { return level_count_; }
-  std::size_t bytes() const { return bytes_; }
+  std::size_t bytes() const { return data_.bytes(); }
   cudaError_t cuda_error() const { return error_; }
 
  private:
-  void* data_ = nullptr;
-  std::size_t bytes_ = 0;
+  GpuArray<unsigned char> data_;
   std::uint32_t level_count_ = 0;
   LevelView levels_[kMaxLevels];
   cudaError_t error_ = cudaSuccess;

@@ -1,4 +1,4 @@
-#include "tandem/kernels/block_pair.h"
+#include "tandem/kernels/detail/block_pair.h"
 
 #include "block_pair_variants.h"
 

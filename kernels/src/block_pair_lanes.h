@@ -2,7 +2,7 @@
 #include "lanes.h"
 
 #ifdef TANDEM_HAVE_LANES
-#include "tandem/kernels/box_test.h"
+#include "tandem/kernels/detail/box_test.h"
 
 // A block pair in vectors of 4, 8 or 16 lanes.
 namespace tandem {

@@ -3,7 +3,7 @@
 
 #include "lanes.h"
 #include "tandem/formats/block.h"
-#include "tandem/kernels/relative_pose.h"
+#include "tandem/kernels/detail/relative_pose.h"
 
 namespace tandem {
 

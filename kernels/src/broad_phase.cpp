@@ -4,7 +4,7 @@
 #include <limits>
 #include <utility>
 
-#include "tandem/kernels/traversal.h"
+#include "tandem/kernels/detail/traversal.h"
 
 namespace tandem {
 namespace {

@@ -5,8 +5,8 @@
 #include <new>
 
 #include "narrow_phase.h"
-#include "tandem/kernels/block_pair.h"
-#include "tandem/kernels/frame_test.h"
+#include "tandem/kernels/detail/block_pair.h"
+#include "tandem/kernels/detail/frame_test.h"
 #include "worker_threads.h"
 
 namespace tandem {

@@ -3,9 +3,9 @@
 #include <algorithm>
 
 #include "narrow_phase_walk.h"
-#include "tandem/kernels/block_pair.h"
-#include "tandem/kernels/frame_test.h"
-#include "tandem/kernels/triangle_test.h"
+#include "tandem/kernels/detail/block_pair.h"
+#include "tandem/kernels/detail/frame_test.h"
+#include "tandem/kernels/detail/triangle_test.h"
 #include "tandem/kernels/world_box.h"
 
 namespace tandem {

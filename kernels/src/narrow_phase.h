@@ -4,9 +4,9 @@
 
 #include "lanes.h"
 #include "tandem/formats/view.h"
-#include "tandem/kernels/block_pair.h"
 #include "tandem/kernels/contact_query.h"
-#include "tandem/kernels/relative_pose.h"
+#include "tandem/kernels/detail/block_pair.h"
+#include "tandem/kernels/detail/relative_pose.h"
 
 // The contacts of one object pair: traversal, then the cascade on its candidates.
 namespace tandem {

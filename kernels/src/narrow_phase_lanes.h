@@ -3,7 +3,7 @@
 
 #ifdef TANDEM_HAVE_LANES
 #include "narrow_phase_walk.h"
-#include "tandem/kernels/frame_test.h"
+#include "tandem/kernels/detail/frame_test.h"
 
 // The narrow phase in vectors of 4, 8 or 16 lanes.
 namespace tandem {

@@ -1,6 +1,6 @@
 #pragma once
 #include "narrow_phase.h"
-#include "tandem/kernels/traversal.h"
+#include "tandem/kernels/detail/traversal.h"
 
 // The walk that all variants of the narrow phase share. Included by files that are compiled for different
 // machines: internal linkage, see lanes.h.

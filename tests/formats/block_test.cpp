@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "tandem/formats/box.h"
-#include "tandem/kernels/box_test.h"
+#include "tandem/kernels/detail/box_test.h"
 
 namespace tandem {
 namespace {

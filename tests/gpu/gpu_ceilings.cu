@@ -6,8 +6,8 @@
 #include <random>
 #include <vector>
 
-#include "tandem/kernels/box_test.h"
-#include "tandem/kernels/relative_pose.h"
+#include "tandem/kernels/detail/box_test.h"
+#include "tandem/kernels/detail/relative_pose.h"
 #include "tandem/runtime/map.h"
 #include "tandem/runtime/upload.h"
 

@@ -15,8 +15,8 @@
 #include "kernels/query_scenes.h"
 #include "kernels/triangle_families.h"
 #include "tandem/kernels/contact_query.h"
+#include "tandem/kernels/detail/triangle_test.h"
 #include "tandem/kernels/gpu_contact_query.h"
-#include "tandem/kernels/triangle_test.h"
 #include "tandem/runtime/upload.h"
 
 namespace tandem {

@@ -7,7 +7,7 @@
 
 #include "build/sample_asset.h"
 #include "gpu_scene_fixture.h"
-#include "tandem/kernels/box_test.h"
+#include "tandem/kernels/detail/box_test.h"
 #include "tandem/runtime/upload.h"
 
 namespace tandem {

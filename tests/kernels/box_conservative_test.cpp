@@ -6,7 +6,7 @@
 #include <cstdio>
 
 #include "sure_verdicts.h"
-#include "tandem/kernels/box_test.h"
+#include "tandem/kernels/detail/box_test.h"
 
 namespace tandem {
 namespace {

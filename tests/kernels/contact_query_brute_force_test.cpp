@@ -9,7 +9,7 @@
 
 #include "narrow_phase.h"
 #include "query_scenes.h"
-#include "tandem/kernels/frame_test.h"
+#include "tandem/kernels/detail/frame_test.h"
 #include "tandem/kernels/world_box.h"
 #include "triangle_oracle.h"
 

@@ -1,5 +1,5 @@
 // The float32 stage in a's frame: right whenever it decides, and its bound above every error.
-#include "tandem/kernels/frame_test.h"
+#include "tandem/kernels/detail/frame_test.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <string>
 
 #include "query_scenes.h"
-#include "tandem/kernels/box_test.h"
+#include "tandem/kernels/detail/box_test.h"
 #include "triangle_families.h"
 
 namespace tandem {

@@ -1,5 +1,5 @@
 // Blocks in frames of their own: what the proof in docs/box_test.md, section 5, says of each step.
-#include "tandem/kernels/oriented_block.h"
+#include "tandem/kernels/detail/oriented_block.h"
 
 #include <gtest/gtest.h>
 

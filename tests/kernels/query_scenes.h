@@ -11,7 +11,7 @@
 #include "build/sample_asset.h"
 #include "random_pose.h"
 #include "tandem/kernels/contact_query.h"
-#include "tandem/kernels/triangle_test.h"
+#include "tandem/kernels/detail/triangle_test.h"
 
 /// Seeded scenes of small meshes, from harmless to hostile, and their contacts by brute force.
 namespace tandem::test {

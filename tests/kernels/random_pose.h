@@ -3,8 +3,8 @@
 #include <random>
 
 #include "tandem/formats/box.h"
+#include "tandem/kernels/detail/relative_pose.h"
 #include "tandem/kernels/pose.h"
-#include "tandem/kernels/relative_pose.h"
 
 /// Poses and boxes that are hard on box tests.
 namespace tandem::test {

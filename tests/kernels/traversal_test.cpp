@@ -1,4 +1,4 @@
-#include "tandem/kernels/traversal.h"
+#include "tandem/kernels/detail/traversal.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "build/sample_asset.h"
-#include "tandem/kernels/box_test.h"
+#include "tandem/kernels/detail/box_test.h"
 
 namespace tandem {
 namespace {

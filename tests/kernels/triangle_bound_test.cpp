@@ -1,6 +1,6 @@
 // Searches for inputs that bring a computed determinant's error near its bound: the bounds of
-// tandem/kernels/orientation.h must hold, and half of them must not, or the search would be too weak to show
-// it.
+// tandem/kernels/detail/orientation.h must hold, and half of them must not, or the search would be too weak
+// to show it.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 #pragma once
-#include "tandem/kernels/triangle_test.h"
+#include "tandem/kernels/detail/triangle_test.h"
 
 namespace tandem {
 

@@ -1,4 +1,4 @@
-#include "tandem/kernels/triangle_test.h"
+#include "tandem/kernels/detail/triangle_test.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 #pragma once
 #include "peer_mesh.h"
-#include "tandem/kernels/triangle_test.h"
+#include "tandem/kernels/detail/triangle_test.h"
 
 namespace tandem::bench {
 namespace detail {

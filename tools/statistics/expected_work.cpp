@@ -3,9 +3,9 @@
 
 #include "near_contact.h"
 #include "statistics.h"
-#include "tandem/kernels/block_pair.h"
-#include "tandem/kernels/traversal.h"
-#include "tandem/kernels/triangle_test.h"
+#include "tandem/kernels/detail/block_pair.h"
+#include "tandem/kernels/detail/traversal.h"
+#include "tandem/kernels/detail/triangle_test.h"
 
 namespace tandem {
 namespace {

@@ -1,6 +1,6 @@
 #include "gpu_query_data.h"
-#include "tandem/kernels/box_test.h"
-#include "tandem/kernels/triangle_test.h"
+#include "tandem/kernels/detail/box_test.h"
+#include "tandem/kernels/detail/triangle_test.h"
 
 // What the walks left undecided: float64, then exactly. The exact stage needs 3 KB of stack a thread, so it
 // has a kernel of its own, which scenes without hard cases leave at once.

@@ -4,9 +4,9 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "tandem/kernels/detail/oriented_block.h"
+#include "tandem/kernels/detail/relative_pose.h"
 #include "tandem/kernels/gpu_contact_query.h"
-#include "tandem/kernels/oriented_block.h"
-#include "tandem/kernels/relative_pose.h"
 
 // What every engine on the GPU keeps of assets and object pairs, and how its lanes share an array.
 namespace tandem::gpu {

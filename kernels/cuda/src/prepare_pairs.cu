@@ -1,5 +1,5 @@
 #include "gpu_query_data.h"
-#include "tandem/kernels/frame_test.h"
+#include "tandem/kernels/detail/frame_test.h"
 #include "tandem/kernels/world_box.h"
 
 // Before the walk: what is wrong with instances and pairs, and how the two of a pair lie. Compiled without

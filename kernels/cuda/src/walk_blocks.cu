@@ -1,5 +1,5 @@
 #include "gpu_query_data.h"
-#include "tandem/kernels/traversal.h"
+#include "tandem/kernels/detail/traversal.h"
 
 // Walk blocks: for each block of a tree a frame that fits the triangles below it, and in that frame the boxes
 // of its nodes.

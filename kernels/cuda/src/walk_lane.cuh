@@ -1,8 +1,8 @@
 #pragma once
 #include "gpu_query_data.h"
-#include "tandem/kernels/frame_test.h"
-#include "tandem/kernels/oriented_block.h"
-#include "tandem/kernels/traversal.h"
+#include "tandem/kernels/detail/frame_test.h"
+#include "tandem/kernels/detail/oriented_block.h"
+#include "tandem/kernels/detail/traversal.h"
 #include "tandem/kernels/world_box.h"
 
 // What one lane of a walk does with a block pair and with a candidate, in the frame of the first of a pair or

@@ -1,6 +1,6 @@
 #include "paper_engine_data.h"
-#include "tandem/kernels/frame_test.h"
-#include "tandem/kernels/triangle_test.h"
+#include "tandem/kernels/detail/frame_test.h"
+#include "tandem/kernels/detail/triangle_test.h"
 #include "tandem/kernels/world_box.h"
 
 // What comes before the traversal, and the last stages of the triangle test. Compiled without fused

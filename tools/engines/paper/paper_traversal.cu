@@ -4,8 +4,8 @@
 #include <type_traits>
 
 #include "paper_engine_data.h"
-#include "tandem/kernels/box_test.h"
-#include "tandem/kernels/frame_test.h"
+#include "tandem/kernels/detail/box_test.h"
+#include "tandem/kernels/detail/frame_test.h"
 
 // The kernels of a level, and the first stage of the triangle test. nvcc may fuse multiplies and adds here:
 // the proofs of the box tests (docs/box_test.md) and of the first stage (frame_test.h) allow it.

@@ -3,7 +3,7 @@
 #include <span>
 
 #include "tandem/formats/status.h"
-#include "tandem/kernels/buffer.h"
+#include "tandem/kernels/detail/buffer.h"
 #include "tandem/kernels/world_box.h"
 
 namespace tandem {

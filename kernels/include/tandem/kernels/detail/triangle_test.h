@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include "tandem/kernels/orientation.h"
+#include "tandem/kernels/detail/orientation.h"
 
 /// Whether two triangles meet, for CPU and GPU. Triangles are closed: touching counts. A flat triangle is the
 /// hull of its corners, a segment or a point. The corners are float64 points, and the answer is that of exact

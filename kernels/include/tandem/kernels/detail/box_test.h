@@ -3,7 +3,7 @@
 
 #include "tandem/formats/box.h"
 #include "tandem/formats/platform.h"
-#include "tandem/kernels/relative_pose.h"
+#include "tandem/kernels/detail/relative_pose.h"
 
 /// Separating-axis tests of two boxes, one posed relative to the other, float32, for CPU and GPU.
 /// Source: Gottschalk, Lin and Manocha 1996. Every comparison has the form |d| <= r and must be true to go

@@ -1,8 +1,8 @@
 #pragma once
 #include <cmath>
 
-#include "tandem/kernels/box_test.h"
-#include "tandem/kernels/relative_pose.h"
+#include "tandem/kernels/detail/box_test.h"
+#include "tandem/kernels/detail/relative_pose.h"
 
 /// The first stage of the triangle test: float32 in the frame of the first instance, with an error bound, for
 /// CPU and GPU. Decides nearly all candidates of ordinary scenes; right whenever it decides.

@@ -6,7 +6,7 @@
 #endif
 
 #include "tandem/formats/box.h"
-#include "tandem/kernels/relative_pose.h"
+#include "tandem/kernels/detail/relative_pose.h"
 
 /// Blocks in frames of their own: the boxes of a block's four nodes lie along the axes of one rotation, which
 /// fits what is below the block. They are thinner than boxes along the axes of the mesh, so fewer pairs of

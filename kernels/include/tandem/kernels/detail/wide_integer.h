@@ -2,11 +2,11 @@
 #include <bit>
 #include <cstdint>
 
-#include "tandem/kernels/expansion.h"
+#include "tandem/kernels/detail/expansion.h"
 
 /// Exact signs of determinants of any finite float64 points, by integers wide enough for all of them, for CPU
-/// and GPU. They decide what lies outside the range of tandem/kernels/expansion.h: coordinates beyond 2^338
-/// or below 2^-306, or both at once, where no scaling helps.
+/// and GPU. They decide what lies outside the range of tandem/kernels/detail/expansion.h: coordinates beyond
+/// 2^338 or below 2^-306, or both at once, where no scaling helps.
 ///
 /// Size. Every finite float64 is an integer below 2^53 times 2^e with -1074 <= e <= 971. Over the smallest e
 /// of the coordinates at hand ("unit"), a coordinate is an integer below 2^(span + 53), where span <= 2045 is

@@ -2,7 +2,7 @@
 #include <cstdint>
 
 #include "tandem/formats/block.h"
-#include "tandem/kernels/box_test.h"
+#include "tandem/kernels/detail/box_test.h"
 
 /// The box tests of a block pair, all 16 at once.
 namespace tandem {

@@ -1,8 +1,8 @@
 #pragma once
 #include <cmath>
 
-#include "tandem/kernels/expansion.h"
-#include "tandem/kernels/wide_integer.h"
+#include "tandem/kernels/detail/expansion.h"
+#include "tandem/kernels/detail/wide_integer.h"
 
 /// On which side of a plane or of a line a point lies: float32 and float64 with a proven error bound, and
 /// exact. All of them are signs of volume(p, q, r, s) = det(q - p, r - p, s - p), the scalar triple product,

@@ -4,8 +4,7 @@
 namespace tandem {
 
 std::uint16_t block_pair_mask_avx2(const Block& a, const Block& b, const RelativePose& b_in_a) {
-  const BlockPairLanes<8> pair(a, b, b_in_a);
-  return static_cast<std::uint16_t>(pair.part<0>() | pair.part<1>());
+  return static_cast<std::uint16_t>(BlockPairLanes<8>(a, b, b_in_a).mask());
 }
 
 }  // namespace tandem

@@ -4,7 +4,7 @@
 namespace tandem {
 
 std::uint16_t block_pair_mask_avx512(const Block& a, const Block& b, const RelativePose& b_in_a) {
-  return static_cast<std::uint16_t>(BlockPairLanes<16>(a, b, b_in_a).part<0>());
+  return static_cast<std::uint16_t>(BlockPairLanes<16>(a, b, b_in_a).mask());
 }
 
 }  // namespace tandem

@@ -60,6 +60,17 @@ class BlockPairLanes {
     for (int i = 0; i < 3; ++i) posed_b_[i] = box_terms::posed_center(pose, i, center_b);
   }
 
+  /// block_pair_mask().
+  TANDEM_INLINE unsigned mask() const {
+    if constexpr (kCount == 16)
+      return part<0>();
+    else if constexpr (kCount == 8)
+      return part<0>() | part<1>();
+    else
+      return part<0>() | part<1>() | part<2>() | part<3>();
+  }
+
+ private:
   // What depends on one node alone is worked out for four nodes and spread over the lanes after that. No exit
   // after some axes: 70 to 90 % of block pairs in a traversal have a node pair that passes all of them, and
   // exits cost more than they save (docs/decisions/0010).
@@ -81,7 +92,6 @@ class BlockPairLanes {
     return overlaps.mask() << (kCount * kPart);
   }
 
- private:
   template <int kPart>
   TANDEM_INLINE static Lanes<kCount> of_a(const Lanes4& four) {
     return nodes_of_a<kCount, kPart>(four);

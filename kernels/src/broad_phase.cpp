@@ -121,7 +121,7 @@ bool BroadPhase::collect() {
     const GroupPair pair = stack[--height];
     const std::size_t begin = level_begin_[pair.level];
     std::uint32_t mask = meeting(groups_[begin + pair.a], groups_[begin + pair.b]);
-    if (pair.a == pair.b) mask &= pair.level == 0 ? kNodePairsAbove : kNodePairsAbove | kNodePairsEqual;
+    if (pair.a == pair.b) mask &= own_node_pairs(pair.level == 0);
     ++group_pairs_;
     for (; mask != 0; mask &= mask - 1) {
       const auto bit = static_cast<std::uint32_t>(lowest_bit(mask));

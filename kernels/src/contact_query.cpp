@@ -7,6 +7,7 @@
 #include "narrow_phase.h"
 #include "tandem/kernels/detail/block_pair.h"
 #include "tandem/kernels/detail/frame_test.h"
+#include "tandem/kernels/detail/instance_check.h"
 #include "worker_threads.h"
 
 namespace tandem {
@@ -30,14 +31,16 @@ struct ChunkResult {
 
 struct alignas(64) Worker {
   Buffer<Contact> contacts;
+  std::uint32_t workers = 1;  // of this call
   QueryCounters counters;
   bool enough_memory = true;
 };
 
 bool grow_contacts(ContactSink& sink) {
-  auto& contacts = *static_cast<Buffer<Contact>*>(sink.owner);
+  Worker& owner = *static_cast<Worker*>(sink.owner);
+  Buffer<Contact>& contacts = owner.contacts;
   const std::size_t used = static_cast<std::size_t>(sink.next - contacts.data());
-  if (!contacts.grow(used)) return false;
+  if (!contacts.grow(used, owner.workers)) return false;
   sink.next = contacts.data() + used;
   sink.end = contacts.data() + contacts.capacity();
   return true;
@@ -108,14 +111,14 @@ struct ContactQuery::State {
 // Poses of stored coordinates, and world boxes.
 Status ContactQuery::State::pose_instances(std::span<const Instance> posed) {
   if (posed.size() >= kNoIndex) return fail(Status::kTooManyInstances, 0);
+  const auto asset_count = static_cast<std::uint32_t>(std::min<std::size_t>(assets.size(), kNoIndex));
   if (!instances.resize(posed.size()) || !boxes.resize(posed.size())) return fail(Status::kOutOfMemory, 0);
   for (std::size_t i = 0; i < posed.size(); ++i) {
-    if (posed[i].asset >= assets.size()) return fail(Status::kUnknownAsset, i);
-    if (!is_rigid(posed[i].pose)) return fail(Status::kPoseNotRigid, i);
-    const Asset& asset = assets[posed[i].asset];
-    instances[i] = {asset.tree, asset.extent, for_stored_coordinates(posed[i].pose, asset.origin)};
-    boxes[i] = world_box(instances[i].pose, asset.lower, asset.upper);
-    if (!in_range(boxes[i])) return fail(Status::kOutOfRange, i);
+    const Status status =
+        pose_instance(assets.data(), asset_count, posed[i].asset, posed[i].pose, instances[i].pose, boxes[i]);
+    if (status != Status::kOk) return fail(status, i);
+    instances[i].tree = assets[posed[i].asset].tree;
+    instances[i].extent = assets[posed[i].asset].extent;
   }
   return Status::kOk;
 }
@@ -139,8 +142,8 @@ Status ContactQuery::State::find_pairs() {
 Status ContactQuery::State::take_pairs(std::span<const ObjectPair> given) {
   if (!pairs.resize(given.size())) return fail(Status::kOutOfMemory, 0);
   for (std::size_t i = 0; i < given.size(); ++i) {
-    if (given[i].a >= instances.size() || given[i].b >= instances.size())
-      return fail(Status::kUnknownInstance, i);
+    const Status status = check_pair(given[i], static_cast<std::uint32_t>(instances.size()));
+    if (status != Status::kOk) return fail(status, i);
     pairs[i] = given[i];
   }
   return Status::kOk;
@@ -176,7 +179,8 @@ PairTask ContactQuery::State::task_of(std::uint32_t pair) const {
 void ContactQuery::State::work(std::uint32_t worker) {
   Worker& self = workers[worker];
   ContactSink sink;
-  sink.owner = &self.contacts;
+  self.workers = active_workers;
+  sink.owner = &self;
   sink.grow = grow_contacts;
   sink.next = self.contacts.data();
   sink.end = self.contacts.data() + self.contacts.capacity();

@@ -68,24 +68,15 @@ TANDEM_INLINE frame::Plane<Lanes4, true> spread(const frame::Plane<Lanes4, true>
   return out;
 }
 
-/// The four boxes of a block in a's frame.
-struct FourBoxes {
-  Lanes4 center[3], half_extent[3];
-
-  explicit FourBoxes(const Block& a) {
-    for (int k = 0; k < 3; ++k) {
-      center[k] = load(a.center[k]);
-      half_extent[k] = load(a.half_extent[k]);
-    }
+/// The four boxes of a block, as stored.
+TANDEM_INLINE frame::BoxInFrame<Lanes4> four_boxes(const Block& block) {
+  frame::BoxInFrame<Lanes4> out;
+  for (int k = 0; k < 3; ++k) {
+    out.center[k] = load(block.center[k]);
+    out.half_extent[k] = load(block.half_extent[k]);
   }
-  FourBoxes(const Block& b, const RelativePose& b_in_a) {
-    const FourBoxes stored(b);
-    for (int k = 0; k < 3; ++k) {
-      center[k] = box_terms::posed_center(b_in_a, k, stored.center);
-      half_extent[k] = box_terms::b_on_face(b_in_a, k, stored.half_extent);
-    }
-  }
-};
+  return out;
+}
 
 /// The corners of the four triangles of a leaf block; where a node is imaginary, of any other.
 TANDEM_INLINE void gather_leaves(const Triangle* triangles, const Block& block,
@@ -103,17 +94,13 @@ TANDEM_INLINE void gather_leaves(const Triangle* triangles, const Block& block,
   frame::Point<Lanes4> corners[3];
   gather_leaves((leaves_a ? task.a : task.b)->tree.triangles, leaves_a ? a : b, corners);
   if (!leaves_a) {
-    for (frame::Point<Lanes4>& corner : corners) {
-      const frame::Point<Lanes4> stored = corner;
-      for (int k = 0; k < 3; ++k) corner.x[k] = box_terms::posed_center(task.b_in_a, k, stored.x);
-    }
+    for (frame::Point<Lanes4>& corner : corners) corner = frame::posed(task.b_in_a, corner);
   }
   const frame::Plane<Lanes4, true> planes(corners[0], corners[1], corners[2], task.frame_error);
-  const FourBoxes boxes = leaves_a ? FourBoxes(b, task.b_in_a) : FourBoxes(a);
+  const frame::BoxInFrame<Lanes4> boxes = leaves_a ? frame::posed(task.b_in_a, four_boxes(b)) : four_boxes(a);
   for (int i = 0; i < kNodesPerBlock; ++i) {
     if ((hits & (leaves_a ? row(0xF, i) : column(0xF, i))) == 0) continue;
-    const std::uint32_t four =
-        frame::beyond(spread(planes, i), boxes.center, boxes.half_extent, task.frame_error).mask();
+    const std::uint32_t four = frame::beyond(spread(planes, i), boxes, task.frame_error).mask();
     hits &= ~(leaves_a ? row(four, i) : column(four, i));
   }
   return hits;
@@ -125,8 +112,7 @@ TANDEM_INLINE BatchVerdicts decide_lanes(const PairTask& task, const std::uint32
   frame::Point<Lanes<kCount>> a[3], b[3];
   for (int corner = 0; corner < 3; ++corner) {
     a[corner] = gather<kCount>(task.a->tree.triangles, index_a, corner);
-    const auto stored = gather<kCount>(task.b->tree.triangles, index_b, corner);
-    for (int i = 0; i < 3; ++i) b[corner].x[i] = box_terms::posed_center(task.b_in_a, i, stored.x);
+    b[corner] = frame::posed(task.b_in_a, gather<kCount>(task.b->tree.triangles, index_b, corner));
   }
   const auto verdicts = frame::decide<kBounded>(a, b, task.frame_error);
   return {verdicts.contact.mask(), verdicts.undecided.mask()};
@@ -200,14 +186,7 @@ class LaneMeans {
   explicit LaneMeans(const PairTask& task) : task_(task) {}
 
   TANDEM_INLINE std::uint32_t test(const Block& a, const Block& b) const {
-    const BlockPairLanes<kCount> pair(a, b, task_.b_in_a);
-    if constexpr (kCount == 16)
-      return pair.template part<0>();
-    else if constexpr (kCount == 8)
-      return pair.template part<0>() | pair.template part<1>();
-    else
-      return pair.template part<0>() | pair.template part<1>() | pair.template part<2>() |
-             pair.template part<3>();
+    return BlockPairLanes<kCount>(a, b, task_.b_in_a).mask();
   }
 
   std::uint32_t drop_beyond_planes(const Block& a, const Block& b, std::uint32_t hits) const {

@@ -1,6 +1,6 @@
 #pragma once
 #include "narrow_phase.h"
-#include "tandem/kernels/detail/traversal.h"
+#include "tandem/kernels/detail/candidate.h"
 
 // The walk that all variants of the narrow phase share. Included by files that are compiled for different
 // machines: internal linkage, see lanes.h.
@@ -42,8 +42,7 @@ constexpr std::uint32_t column(std::uint32_t four, int j) {
 }
 
 /// The means of a variant are made of a task and bring: Stack; test(a, b), see block_pair_mask();
-/// drop_beyond_planes(a, b, hits), of a leaf block and an internal one: less the hits of nodes that lie
-/// beyond the plane of the triangle, see frame::beyond(); append(candidates, a, b, hits); decide(candidates),
+/// drop_beyond_planes(a, b, hits), see leaf_planes.h; append(candidates, a, b, hits); decide(candidates),
 /// the verdicts on the first kBatch candidates, any where there are fewer.
 template <typename Means>
 class PairWalk {
@@ -53,15 +52,17 @@ class PairWalk {
   bool run() {
     const auto test = [this](const Block& a, const Block& b) -> std::uint32_t {
       const std::uint32_t hits = means_.test(a, b);
-      if (!task_.self || &a != &b) return hits;
-      return hits & (a.is_leaf_block() ? kNodePairsAbove : kNodePairsAbove | kNodePairsEqual);
+      return task_.self && &a == &b ? hits & own_node_pairs(a.is_leaf_block()) : hits;
     };
     const auto on_leaves = [this](const Block& a, const Block& b, std::uint32_t hits) {
       means_.append(candidates_, a, b, hits);
       return candidates_.count < kBatch || settle(kBatch);
     };
     const auto narrow = [this](const Block& a, const Block& b, std::uint32_t hits) {
-      return worth_planes(a, b) ? means_.drop_beyond_planes(a, b, hits) : hits;
+      // The candidates of boxes mode are what boxes say.
+      const bool try_planes =
+          task_.mode != QueryMode::boxes && worth_planes(a.is_leaf_block(), size_of(a), size_of(b));
+      return try_planes ? means_.drop_beyond_planes(a, b, hits) : hits;
     };
     sink_.counters.block_pairs +=
         traverse<typename Means::Stack>(task_.a->tree, task_.b->tree, test, on_leaves, narrow);
@@ -70,16 +71,6 @@ class PairWalk {
   }
 
  private:
-  // A triangle's plane tells more than its box where the other mesh's nodes are much smaller: under bodies of
-  // 24,000 triangles on a ground it spares 40 % of the block pairs and 60 % of the candidates
-  // (docs/decisions/0014). The candidates of boxes mode are what boxes say.
-  bool worth_planes(const Block& a, const Block& b) const {
-    constexpr float kTimesLarger = 4;
-    if (task_.mode == QueryMode::boxes) return false;
-    const float size_a = size_of(a), size_b = size_of(b);
-    return a.is_leaf_block() ? size_a > kTimesLarger * size_b : size_b > kTimesLarger * size_a;
-  }
-
   /// Decides the first `count` candidates. False: the pair is done with.
   bool settle(std::uint32_t count) {
     QueryCounters& counters = sink_.counters;
@@ -111,18 +102,19 @@ class PairWalk {
   }
 
   void add(std::uint32_t a, std::uint32_t b) {
-    if (task_.self && a > b) {
-      const std::uint32_t lower = b;
-      b = a;
-      a = lower;
-    }
     if (sink_.next == sink_.end && !sink_.grow(sink_)) {
       enough_memory_ = false;
       done_ = true;
       return;
     }
-    *sink_.next++ = {task_.pair, a, b, task_.a->tree.triangles[a].corner[0].w,
-                     task_.b->tree.triangles[b].corner[0].w};
+    const std::uint32_t face_a = task_.a->tree.triangles[a].source_face(),
+                        face_b = task_.b->tree.triangles[b].source_face();
+    // Two calls: one would have GCC compare and exchange for every contact.
+    if (task_.self) [[unlikely]]
+      *sink_.next = make_contact(task_.pair, true, a, b, face_a, face_b);
+    else
+      *sink_.next = make_contact(task_.pair, false, a, b, face_a, face_b);
+    ++sink_.next;
     ++sink_.counters.contacts;
     done_ = task_.first_contact_only;
   }

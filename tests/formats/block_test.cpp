@@ -6,6 +6,7 @@
 #include <random>
 #include <vector>
 
+#include "kernels/plain_boxes.h"
 #include "tandem/formats/box.h"
 #include "tandem/kernels/detail/box_test.h"
 
@@ -65,8 +66,8 @@ TEST(ImaginaryNode, IsRejectedByEveryBoxTestAgainstEveryOtherBox) {
     ASSERT_FALSE(overlap_6_axes(other, imaginary, pose)) << i;
     ASSERT_FALSE(overlap_15_axes(imaginary, other, pose)) << i;
     ASSERT_FALSE(overlap_15_axes(other, imaginary, pose)) << i;
-    ASSERT_FALSE(overlap_aligned(imaginary, other)) << i;
-    ASSERT_FALSE(overlap_aligned(other, imaginary)) << i;
+    ASSERT_FALSE(test::overlap_aligned(imaginary, other)) << i;
+    ASSERT_FALSE(test::overlap_aligned(other, imaginary)) << i;
   }
 }
 
@@ -94,11 +95,11 @@ TEST(ImaginaryNode, IsTheNeutralElementOfAUnion) {
 // The tests above would pass if nothing ever overlapped.
 TEST(BoxTest, RealBoxesThatTouchOverlap) {
   const Box unit = {{0, 0, 0}, {1, 1, 1}}, beside = {{2, 0, 0}, {1, 1, 1}}, apart = {{2.5f, 0, 0}, {1, 1, 1}};
-  const RelativePose same = without_slack(kIdentityPose.rotation, kIdentityPose.translation);
+  const RelativePose same = test::without_slack(kIdentityPose.rotation, kIdentityPose.translation);
   EXPECT_TRUE(overlap_15_axes(unit, beside, same));
-  EXPECT_TRUE(overlap_aligned(unit, beside));
+  EXPECT_TRUE(test::overlap_aligned(unit, beside));
   EXPECT_FALSE(overlap_15_axes(unit, apart, same));
-  EXPECT_FALSE(overlap_aligned(unit, apart));
+  EXPECT_FALSE(test::overlap_aligned(unit, apart));
 }
 
 // Two long rods crossing at a right angle, rolled by 45 degrees: only the cross product of their edges
@@ -107,7 +108,8 @@ TEST(BoxTest, EdgeAxesSeparateWhatFacesDoNot) {
   const double s = std::sqrt(0.5);
   const Box rod = {{0, 0, 0}, {10, 1, 1}};
   // b's axes in a's frame: turned by 45 degrees about x for both, then across.
-  const RelativePose crossed = without_slack({{0, s, -s}, {s, 0.5, 0.5}, {-s, 0.5, 0.5}}, {0, 2.1, 2.1});
+  const RelativePose crossed =
+      test::without_slack({{0, s, -s}, {s, 0.5, 0.5}, {-s, 0.5, 0.5}}, {0, 2.1, 2.1});
   EXPECT_TRUE(overlap_6_axes(rod, rod, crossed));
   EXPECT_FALSE(overlap_15_axes(rod, rod, crossed));
 }

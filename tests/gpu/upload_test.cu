@@ -7,6 +7,7 @@
 
 #include "build/sample_asset.h"
 #include "gpu_scene_fixture.h"
+#include "kernels/plain_boxes.h"
 #include "tandem/kernels/detail/box_test.h"
 #include "tandem/runtime/upload.h"
 
@@ -84,8 +85,8 @@ __global__ void test_imaginary(const Trial* trials, int count, unsigned* accepte
   const Trial& t = trials[i];
   const bool any = overlap_6_axes(imaginary, t.other, t.pose) || overlap_6_axes(t.other, imaginary, t.pose) ||
                    overlap_15_axes(imaginary, t.other, t.pose) ||
-                   overlap_15_axes(t.other, imaginary, t.pose) || overlap_aligned(imaginary, t.other) ||
-                   overlap_aligned(t.other, imaginary);
+                   overlap_15_axes(t.other, imaginary, t.pose) || test::overlap_aligned(imaginary, t.other) ||
+                   test::overlap_aligned(t.other, imaginary);
   if (any) atomicAdd(accepted, 1u);
 }
 

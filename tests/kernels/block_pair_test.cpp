@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "plain_boxes.h"
+
 #include <limits>
 
 #include "random_pose.h"
@@ -96,7 +98,7 @@ TEST(BlockPair, BitsStandForTheNodesTheyShould) {
     set_node(a, i, {{at, 0, 0}, {1, 1, 1}}, 0, NodeKind::leaf);
     set_node(b, i, {{30 - at, 0, 0}, {1, 1, 1}}, 0, NodeKind::leaf);
   }
-  const RelativePose same = without_slack(kIdentityPose.rotation, kIdentityPose.translation);
+  const RelativePose same = test::without_slack(kIdentityPose.rotation, kIdentityPose.translation);
   for (const BlockPairVariant variant : kBlockPairVariants) {
     const BlockPairTest test = block_pair_test(variant);
     if (test == nullptr) continue;

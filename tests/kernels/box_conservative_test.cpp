@@ -240,6 +240,40 @@ TEST(BoxTest, SlackCostsNextToNothingInOrdinaryScenes) {
   EXPECT_LT(far_away, 1e-4);
 }
 
+/// Numbers beyond float32 are not converted to it, which C++ leaves undefined.
+void expect_finite(const RelativePose& pose) {
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_TRUE(std::isfinite(pose.slack_a[i]) && std::isfinite(pose.slack_b[i]));
+    EXPECT_TRUE(std::isfinite(pose.translation[i]) || std::isnan(pose.translation[i]));
+    for (int j = 0; j < 3; ++j)
+      EXPECT_TRUE(std::isfinite(pose.rotation[i][j]) && std::isfinite(pose.abs_rotation[i][j]));
+  }
+}
+
+TEST(RelativePose, ConvertsNothingThatFloat32CannotHold) {
+  const TreeExtent small = {{1, 1, 1}, {1, 1, 1}}, endless = {{1e300, 1, 1}, {1e300, 1, INFINITY}};
+  for (const double huge : std::initializer_list<double>{1e39, 1e80, 1e200, 1e300, INFINITY, -1e300,
+                                                         -INFINITY, static_cast<double>(NAN)}) {
+    for (int entry = 0; entry < 12; ++entry) {
+      Pose hostile = kIdentityPose;
+      (entry < 9 ? hostile.rotation[entry / 3][entry % 3] : hostile.translation[entry - 9]) = huge;
+      for (const TreeExtent& extent : {small, endless}) {
+        RelativePose out;
+        const bool far_translation_in_range = entry >= 9 && std::fabs(huge) < 1e50;
+        const RelativePoseStatus expected = far_translation_in_range && extent.reach[0] == 1
+                                                ? RelativePoseStatus::kOk
+                                                : RelativePoseStatus::kOutOfRange;
+        EXPECT_EQ(relative_pose(kIdentityPose, small, hostile, extent, out), expected)
+            << huge << ' ' << entry;
+        expect_finite(out);
+        // A hostile a may be in range: its inverse need not be good.
+        static_cast<void>(relative_pose(hostile, extent, kIdentityPose, small, out));
+        expect_finite(out);
+      }
+    }
+  }
+}
+
 TEST(RelativePose, RefusesWhatFloat32CannotHold) {
   const TreeExtent small = {{1, 1, 1}, {1, 1, 1}}, large = {{0x1p121, 1, 1}, {1, 1, 1}};
   Pose far = kIdentityPose, broken = kIdentityPose, scaled = kIdentityPose;

@@ -10,6 +10,7 @@
 
 #include "query_scenes.h"
 #include "tandem/kernels/contact_query.h"
+#include "tandem/kernels/detail/available_memory.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define TANDEM_SANITIZED 1
@@ -69,7 +70,18 @@ int pthread_create(pthread_t* thread, const pthread_attr_t* attributes, void* (*
 }
 }
 
+namespace {
+/// What the machine is said to have.
+std::atomic<std::uint64_t> memory_of_machine{UINT64_MAX};
+}  // namespace
+
 namespace tandem {
+
+/// Instead of the library's.
+std::uint64_t available_memory() {
+  return memory_of_machine;
+}
+
 namespace {
 
 using test::RandomPoses;
@@ -160,6 +172,28 @@ TEST(QueryMemory, WhereItEndsIsSaidAndForgotten) {
                                whole.contacts().end()));
       }
     }
+  }
+}
+
+/// Every triangle of two copies of a mesh is a candidate of every other. Linux would grant the memory for
+/// their contacts, and kill the program when it is written to.
+TEST(QueryMemory, ThatTheMachineDoesNotHaveIsNotTaken) {
+  RandomPoses random(2);
+  Scene scene;
+  scene.assets.add(test::soup(random, 3000, 2));
+  for (int i = 0; i < 4; ++i) scene.instances.push_back({0, kIdentityPose});
+  ContactQuery query;
+  ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+  for (const std::uint32_t threads : {1u, 3u}) {
+    const QueryOptions options = {QueryMode::boxes, false, false, threads};
+    memory_of_machine = std::uint64_t{70} << 20;
+    EXPECT_EQ(query.find_contacts(scene.instances, options), Status::kOutOfMemory) << threads;
+    EXPECT_TRUE(query.contacts().empty());
+    memory_of_machine = UINT64_MAX;
+    ASSERT_EQ(query.find_contacts(scene.instances, options), Status::kOk) << threads;
+    EXPECT_GT(query.contacts().size_bytes(), std::size_t{100} << 20);
+    query = ContactQuery();
+    ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "build/sample_asset.h"
+#include "kernels/plain_boxes.h"
 #include "tandem/kernels/detail/box_test.h"
 
 namespace tandem {
@@ -20,7 +21,7 @@ std::uint32_t aligned_mask(const Block& a, const Block& b) {
   std::uint32_t mask = 0;
   for (int i = 0; i < kNodesPerBlock; ++i) {
     for (int j = 0; j < kNodesPerBlock; ++j) {
-      if (overlap_aligned(box_of(a, i), box_of(b, j))) mask |= 1u << (4 * i + j);
+      if (test::overlap_aligned(box_of(a, i), box_of(b, j))) mask |= 1u << (4 * i + j);
     }
   }
   return mask;

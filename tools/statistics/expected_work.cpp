@@ -4,8 +4,8 @@
 #include "near_contact.h"
 #include "statistics.h"
 #include "tandem/kernels/detail/block_pair.h"
+#include "tandem/kernels/detail/candidate.h"
 #include "tandem/kernels/detail/traversal.h"
-#include "tandem/kernels/detail/triangle_test.h"
 
 namespace tandem {
 namespace {
@@ -73,13 +73,7 @@ class BudgetedQuery {
   }
 
   bool meet(std::uint32_t triangle_a, const Pose& b, std::uint32_t triangle_b) const {
-    TrianglePair pair;
-    for (int corner = 0; corner < 3; ++corner) {
-      const float* p = tree_.triangles[triangle_a].corner[corner].position;
-      const float* q = tree_.triangles[triangle_b].corner[corner].position;
-      apply(a_, p[0], p[1], p[2], pair.a[corner]);
-      apply(b, q[0], q[1], q[2], pair.b[corner]);
-    }
+    const TrianglePair pair = posed_pair(a_, tree_.triangles[triangle_a], b, tree_.triangles[triangle_b]);
     return decide(pair).verdict == Verdict::contact;
   }
 

@@ -1,6 +1,7 @@
 #pragma once
 #include "broad_phase_tree.cuh"
 #include "launch.h"
+#include "tandem/kernels/detail/instance_check.h"
 
 // Where the world boxes of a broad phase come from. Compiled without fused operations, so that is_rigid() is
 // the CPU's too.
@@ -13,7 +14,7 @@ struct GivenBoxes {
 
   __device__ Status get(std::uint32_t i, WorldBox& box) const {
     box = load(boxes, i);
-    return Status::kOk;
+    return in_range(box) ? Status::kOk : Status::kOutOfRange;
   }
   __device__ void keep(std::uint32_t, const WorldBox&) const {}
   // Somewhere near the box.
@@ -28,13 +29,8 @@ struct PosedBoxes {
 
   __device__ Status get(std::uint32_t i, WorldBox& box) const {
     box = {};
-    const std::uint32_t asset = instances.asset[i];
-    const Pose pose = instances.pose[i];
-    if (asset >= assets.count) return Status::kUnknownAsset;
-    if (!is_rigid(pose)) return Status::kPoseNotRigid;
-    const AssetBounds bounds = assets.bounds[asset];
-    box = world_box(for_stored_coordinates(pose, bounds.origin), bounds.lower, bounds.upper);
-    return Status::kOk;
+    Pose stored;
+    return pose_instance(assets.bounds, assets.count, instances.asset[i], instances.pose[i], stored, box);
   }
   __device__ void keep(std::uint32_t i, const WorldBox& box) const { kept[i] = box; }
   __device__ double near(std::uint32_t i, int axis) const { return instances.pose[i].translation[axis]; }
@@ -43,9 +39,8 @@ struct PosedBoxes {
 // Gets box i for good: says what is wrong with it, and keeps it. Result: whether nothing is.
 template <typename Boxes>
 __device__ bool take(const Boxes& boxes, std::uint32_t i, Counters* counters, WorldBox& box) {
-  Status status = boxes.get(i, box);
+  const Status status = boxes.get(i, box);
   boxes.keep(i, box);
-  if (status == Status::kOk && !in_range(box)) status = Status::kOutOfRange;
   if (status == Status::kOk) return true;
   blame(counters, i, status);
   return false;

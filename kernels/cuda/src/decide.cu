@@ -1,6 +1,5 @@
 #include "gpu_query_data.h"
-#include "tandem/kernels/detail/box_test.h"
-#include "tandem/kernels/detail/triangle_test.h"
+#include "tandem/kernels/detail/candidate.h"
 
 // What the walks left undecided: float64, then exactly. The exact stage needs 3 KB of stack a thread, so it
 // has a kernel of its own, which scenes without hard cases leave at once.
@@ -18,29 +17,8 @@ __device__ const Triangle& triangle_b(const PairRecord& record, const Candidate&
 
 __device__ TrianglePair posed_pair(const QueryArgs& args, const PairRecord& record,
                                    const Candidate& candidate) {
-  const Pose pose_a = stored_pose(args, record.instance_a), pose_b = stored_pose(args, record.instance_b);
-  TrianglePair pair;
-  for (int corner = 0; corner < 3; ++corner) {
-    const float* p = triangle_a(record, candidate).corner[corner].position;
-    const float* q = triangle_b(record, candidate).corner[corner].position;
-    apply(pose_a, p[0], p[1], p[2], pair.a[corner]);
-    apply(pose_b, q[0], q[1], q[2], pair.b[corner]);
-  }
-  return pair;
-}
-
-__device__ TrianglePair framed_pair(const PairRecord& record, const Candidate& candidate) {
-  TrianglePair pair;
-  for (int corner = 0; corner < 3; ++corner) {
-    const float* p = triangle_a(record, candidate).corner[corner].position;
-    const float* q = triangle_b(record, candidate).corner[corner].position;
-    for (int i = 0; i < 3; ++i) {
-      const float4 row = record.rotation[i];
-      pair.a[corner][i] = static_cast<double>(p[i]);
-      pair.b[corner][i] = static_cast<double>(((row.x * q[0] + row.y * q[1]) + row.z * q[2]) + row.w);
-    }
-  }
-  return pair;
+  return tandem::posed_pair(stored_pose(args, record.instance_a), triangle_a(record, candidate),
+                            stored_pose(args, record.instance_b), triangle_b(record, candidate));
 }
 
 __device__ std::uint32_t stored(Counter counted, std::uint64_t room) {
@@ -94,10 +72,9 @@ __device__ void write_report(const QueryArgs& args) {
   if (has_float64_stage(args)) counters.decided_by_float32 = state.candidates - by_float64 - exactly;
   counters.contacts = contacts;
   if (state.error != 0) {
-    const Counter error = ~state.error;
     report = {};
-    report.status = static_cast<Status>(error & 0xFFu);
-    report.where = error >> 8 & 0xFFFFFFFFu;
+    report.status = status_in(state.error);
+    report.where = where_in(state.error);
   }
   args.state->report = report;
   *args.host_report = report;
@@ -144,7 +121,8 @@ __global__ void __launch_bounds__(kThreads) decide_by_float64(const __grid_const
     bool by_float64 = false;
     if (i < total) {
       if (kFast && record.in_frame != 0) {
-        verdict = decide_fast(framed_pair(record, candidate));
+        verdict = decide_fast(
+            framed_pair(pose_of(record), triangle_a(record, candidate), triangle_b(record, candidate)));
       } else {
         verdict = decide_float64(posed_pair(args, record, candidate));
         by_float64 = verdict != Verdict::undecided;

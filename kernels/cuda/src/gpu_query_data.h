@@ -5,6 +5,7 @@
 
 #include "launch.h"
 #include "pair_record.h"
+#include "tandem/kernels/detail/candidate.h"
 
 // What the kernels of a query share, all of it in GPU memory.
 namespace tandem::gpu {
@@ -123,8 +124,7 @@ __device__ inline bool failed(const QueryArgs& args) {
 
 /// The pose of stored coordinates.
 __device__ inline Pose stored_pose(const QueryArgs& args, std::uint32_t instance) {
-  return for_stored_coordinates(args.instances.pose[instance],
-                                args.assets[args.instances.asset[instance]].asset.origin);
+  return stored_pose(args.instances, args.assets, instance);
 }
 
 /// Whether the contact counts: where only the first is asked for, the first of its pair.

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "tandem/kernels/detail/frame_test.h"
+#include "tandem/kernels/detail/instance_check.h"
 #include "tandem/kernels/detail/oriented_block.h"
 #include "tandem/kernels/detail/relative_pose.h"
 #include "tandem/kernels/gpu_contact_query.h"
@@ -30,8 +32,7 @@ static_assert(sizeof(WalkBlock) == 112 && offsetof(WalkBlock, first_below) == 96
 inline constexpr std::uint32_t kNumberBits = 29, kNumberMask = (1u << kNumberBits) - 1;
 inline constexpr std::uint32_t kIsLeafBlock = 1u << 31;
 
-struct Asset {
-  GpuAsset asset;
+struct Asset : GpuAsset {
   TreeExtent extent;
   std::uint32_t root;         ///< number of its walk block
   std::uint32_t first_block;  ///< how many blocks the assets before it have in their files
@@ -51,6 +52,20 @@ struct alignas(16) PairRecord {
   std::uint32_t root_a, root_b;  ///< walk blocks
 };
 static_assert(sizeof(PairRecord) == 176);
+
+/// What an error is about, in the order of the CPU's checks.
+enum class Subject : Counter { instance, pair, reach };
+
+/// An error as one number, of which the largest wins: that of the first subject, and of those the first.
+__host__ __device__ constexpr Counter packed_error(Subject subject, Counter where, Status status) {
+  return ~(static_cast<Counter>(subject) << 40 | where << 8 | static_cast<Counter>(status));
+}
+__host__ __device__ constexpr Status status_in(Counter error) {
+  return static_cast<Status>(~error & 0xFFu);
+}
+__host__ __device__ constexpr std::uint64_t where_in(Counter error) {
+  return ~error >> 8 & 0xFFFFFFFFu;
+}
 
 #ifdef __CUDACC__
 
@@ -72,12 +87,6 @@ __device__ inline Counter place_for(bool wanted, Counter* counter) {
   return __shfl_sync(kAllLanes, first, 0) + __popc(lanes & lanes_below());
 }
 
-/// In a pair of an instance with itself the triangle with the lower index comes first.
-__device__ inline Contact make_contact(std::uint32_t pair, bool self, std::uint32_t a, std::uint32_t b,
-                                       std::uint32_t face_a, std::uint32_t face_b) {
-  return self && a > b ? Contact{pair, b, a, face_b, face_a} : Contact{pair, a, b, face_a, face_b};
-}
-
 __device__ inline RelativePose pose_of(const PairRecord& record) {
   RelativePose pose;
 #pragma unroll
@@ -91,6 +100,48 @@ __device__ inline RelativePose pose_of(const PairRecord& record) {
   const float4 last = __ldg(reinterpret_cast<const float4*>(record.slack_b));
   pose.slack_b[0] = last.x, pose.slack_b[1] = last.y, pose.slack_b[2] = last.z;
   return pose;
+}
+
+/// The pose of stored coordinates.
+__device__ inline Pose stored_pose(const GpuInstances& instances, const Asset* assets,
+                                   std::uint32_t instance) {
+  return for_stored_coordinates(instances.pose[instance], assets[instances.asset[instance]].origin);
+}
+
+__device__ inline Status check_instance(const GpuInstances& instances, const Asset* assets,
+                                        std::uint32_t asset_count, std::uint32_t instance) {
+  Pose stored;
+  WorldBox box;
+  return pose_instance(assets, asset_count, instances.asset[instance], instances.pose[instance], stored, box);
+}
+
+/// The record of a pair of instances whose assets there are. oriented: for tests of walk blocks too.
+__device__ inline PairRecord make_record(const GpuInstances& instances, const Asset* assets,
+                                         const ObjectPair& pair, bool oriented) {
+  const Asset &a = assets[instances.asset[pair.a]], &b = assets[instances.asset[pair.b]];
+  RelativePose pose;
+  const bool in_frame =
+      relative_pose(stored_pose(instances, assets, pair.a), a.extent, stored_pose(instances, assets, pair.b),
+                    b.extent, pose) == RelativePoseStatus::kOk;
+  PairRecord record = {};
+  for (int i = 0; i < 3; ++i) {
+    const auto &r = pose.rotation[i], &m = pose.abs_rotation[i];
+    record.rotation[i] = {r[0], r[1], r[2], pose.translation[i]};
+    record.abs_rotation[i] = {m[0], m[1], m[2], pose.slack_a[i]};
+    record.slack_b[i] = pose.slack_b[i];
+  }
+  if (in_frame) record.frame_error = frame_error(pose, a.extent, b.extent);
+  if (in_frame && oriented) record.oriented_slack = oriented_slack(pose, a.extent, b.extent);
+  record.blocks_a = a.tree.blocks;
+  record.blocks_b = b.tree.blocks;
+  record.triangles_a = a.tree.triangles;
+  record.triangles_b = b.tree.triangles;
+  record.root_a = a.root;
+  record.root_b = b.root;
+  record.instance_a = pair.a;
+  record.instance_b = pair.b;
+  record.in_frame = in_frame;
+  return record;
 }
 
 #endif

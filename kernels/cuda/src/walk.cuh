@@ -28,7 +28,6 @@ constexpr std::uint32_t kHome = 0xFEu, kTaken = 0xFFu;                  // in a 
 constexpr std::uint32_t kNothing = 0xFFFFFFFFu;
 constexpr std::uint32_t kOutRoom = 64;
 constexpr std::uint32_t kWarpsPerBlock = 16, kBlocksPerProcessor = 1;
-constexpr float kTimesLarger = 4;  // where planes of leaves are worth it, as narrow_phase_walk.h says
 
 // An entry of the stack: x: object pair; y: what of a lies below, and in its free bits how the pair goes on;
 // z: what of b lies below, and whether both are of one instance; w: a bit for each block pair below that is
@@ -253,22 +252,18 @@ class Walk {
       const bool leaf_a = (side_a.first_below & kIsLeafBlock) != 0,
                  leaf_b = (side_b.first_below & kIsLeafBlock) != 0;
       of_leaves = leaf_a & leaf_b;
-      if ((taken.entry.z & kSelf) != 0 && now.a == now.b)
-        hits &= leaf_a ? kNodePairsAbove : kNodePairsAbove | kNodePairsEqual;
-      // The larger of two alone; of a leaf block and another, the other.
-      const float times = leaf_a != leaf_b ? kTimesLarger : Means::kDescends;
-      const bool larger_a = side_a.size > times * side_b.size, larger_b = side_b.size > times * side_a.size;
-      if (leaf_a != leaf_b && (leaf_a ? larger_a : larger_b) && hits != 0)
-        hits = Means::drop_beyond_planes(args_, record, now.a, now.b, leaf_a, hits);
-      const bool a_alone = leaf_a == leaf_b ? larger_a : leaf_b,
-                 b_alone = leaf_a == leaf_b ? larger_b : leaf_a;
+      if ((taken.entry.z & kSelf) != 0 && now.a == now.b) hits &= own_node_pairs(leaf_a);
+      if (leaf_a != leaf_b && hits != 0 && worth_planes(leaf_a, side_a.size, side_b.size))
+        hits = Means::drop_beyond_planes(args_, record, now.a, now.b, hits);
+      const Descent descent = leaf_a != leaf_b ? descent_beside_leaves(leaf_a)
+                                               : descent_by_size(side_a.size, side_b.size, Means::kDescends);
       below = hits;
-      if (!of_leaves && b_alone) {
+      if (!of_leaves && descent == Descent::b_alone) {
         goes_on = kBAlone;
         below |= hits >> 4;
         below = (below | below >> 8) & 0xFu;
       }
-      if (!of_leaves && a_alone) {
+      if (!of_leaves && descent == Descent::a_alone) {
         goes_on = kAAlone;
         below |= hits >> 1;
         below = (below | below >> 2) & 0x1111u;

@@ -19,7 +19,7 @@ __global__ void __launch_bounds__(kNumbering)
     number_blocks(Asset* assets, std::uint32_t* all_numbers, std::uint32_t* file_blocks) {
   __shared__ std::uint32_t count_of[kNumbering / 32], before[kNumbering / 32], in_all;
   Asset& asset = assets[blockIdx.x];
-  const LevelView& tree = asset.asset.tree;
+  const LevelView& tree = asset.tree;
   const std::uint32_t warp = threadIdx.x / 32, first = asset.root;
   std::uint32_t* const number_of = all_numbers + asset.first_block;
   if (threadIdx.x == 0) {
@@ -318,7 +318,7 @@ __device__ const Asset& asset_of(const Asset* assets, std::uint32_t count, std::
 __global__ void __launch_bounds__(32) fit_blocks(const Asset* assets, std::uint32_t asset_count,
                                                  const std::uint32_t* number_of, WalkBlock* out) {
   const Asset& asset = asset_of(assets, asset_count, blockIdx.x);
-  const LevelView& tree = asset.asset.tree;
+  const LevelView& tree = asset.tree;
   double squared = 0;
   for (const double reach : asset.extent.reach) squared += reach * reach;
   const std::uint32_t at = blockIdx.x - asset.first_block, below = tree.blocks[at].index[0];

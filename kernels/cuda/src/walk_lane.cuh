@@ -1,9 +1,8 @@
 #pragma once
 #include "gpu_query_data.h"
-#include "tandem/kernels/detail/frame_test.h"
+#include "tandem/kernels/detail/block_pair.h"
+#include "tandem/kernels/detail/leaf_planes.h"
 #include "tandem/kernels/detail/oriented_block.h"
-#include "tandem/kernels/detail/traversal.h"
-#include "tandem/kernels/world_box.h"
 
 // What one lane of a walk does with a block pair and with a candidate, in the frame of the first of a pair or
 // in world coordinates.
@@ -156,14 +155,15 @@ __device__ inline std::uint32_t oriented_mask(const PairRecord& record, const Wa
   return mask;
 }
 
-__device__ inline frame::Point<float> corner(const float4& p) {
-  return {{p.x, p.y, p.z}};
-}
-
-__device__ inline frame::Point<float> posed_corner(const float4 (&rows)[3], const float4& p) {
-  frame::Point<float> out;
+/// A stored triangle, in whole float4.
+__device__ inline Triangle load_triangle(const Triangle* triangles, std::uint32_t index) {
+  const auto* from = reinterpret_cast<const float4*>(triangles + index);
+  Triangle out;
 #pragma unroll
-  for (int i = 0; i < 3; ++i) out.x[i] = ((rows[i].x * p.x + rows[i].y * p.y) + rows[i].z * p.z) + rows[i].w;
+  for (int c = 0; c < 3; ++c) {
+    const float4 p = __ldg(from + c);
+    out.corner[c] = {{p.x, p.y, p.z}, __float_as_uint(p.w)};
+  }
   return out;
 }
 
@@ -192,68 +192,25 @@ struct InFrame {
                               pose_of(record), side_a.size, side_b.size);
   }
 
-  /// Of a leaf block and an internal one: less the hits of nodes that lie beyond the plane of the triangle.
   __device__ __noinline__ static std::uint32_t drop_beyond_planes(const QueryArgs& args,
                                                                   const PairRecord& record,
                                                                   std::uint32_t at_a, std::uint32_t at_b,
-                                                                  bool leaf_a, std::uint32_t hits) {
+                                                                  std::uint32_t hits) {
     if constexpr (kMode == QueryMode::boxes) return hits;
-    const Block &a = record.blocks_a[args.file_blocks[at_a]], &b = record.blocks_b[args.file_blocks[at_b]];
-    const RelativePose pose = pose_of(record);
-    std::uint32_t left = hits;
-#pragma unroll 1
-    for (; hits != 0; hits &= hits - 1) {
-      const int bit = __ffs(static_cast<int>(hits)) - 1, i = bit / 4, j = bit % 4;
-      const Triangle& triangle = leaf_a ? record.triangles_a[a.index[i]] : record.triangles_b[b.index[j]];
-      const Box stored = leaf_a ? box_of(b, j) : box_of(a, i);
-      frame::Point<float> t[3];
-      for (int c = 0; c < 3; ++c) {
-        const float* p = triangle.corner[c].position;
-        for (int k = 0; k < 3; ++k) t[c].x[k] = p[k];
-        if (leaf_a) continue;
-        const float x[3] = {p[0], p[1], p[2]};
-        for (int k = 0; k < 3; ++k) t[c].x[k] = box_terms::posed_center(pose, k, x);
-      }
-      Box box = stored;
-      if (leaf_a) {
-        for (int k = 0; k < 3; ++k) {
-          box.center[k] = box_terms::posed_center(pose, k, stored.center);
-          box.half_extent[k] = box_terms::b_on_face(pose, k, stored.half_extent);
-        }
-      }
-      const frame::Plane<float, true> plane(t[0], t[1], t[2], record.frame_error);
-      if (frame::beyond(plane, box.center, box.half_extent, record.frame_error)) left &= ~(1u << bit);
-    }
-    return left;
+    return tandem::drop_beyond_planes(record.blocks_a[args.file_blocks[at_a]],
+                                      record.blocks_b[args.file_blocks[at_b]], hits, record.triangles_a,
+                                      record.triangles_b, pose_of(record), record.frame_error);
   }
 
   __device__ static Judged judge(const PairRecord& record, std::uint32_t a, std::uint32_t b) {
     Judged out = {record.triangles_a[a].corner[0].w, record.triangles_b[b].corner[0].w, true, false};
     if constexpr (kMode == QueryMode::boxes) return out;
-    const Framed framed = in_frame(record, a, b);
+    const TriangleInFrame in_a = stored_triangle(load_triangle(record.triangles_a, a)),
+                          of_b = posed_triangle(pose_of(record), load_triangle(record.triangles_b, b));
     const auto verdicts =
-        frame::decide<kBounded>(framed.a, framed.b, kBounded ? __ldg(&record.frame_error) : 0.0f);
+        frame::decide<kBounded>(in_a.corner, of_b.corner, kBounded ? __ldg(&record.frame_error) : 0.0f);
     out.contact = verdicts.contact;
     out.undecided = verdicts.undecided;
-    return out;
-  }
-
- private:
-  struct Framed {
-    frame::Point<float> a[3], b[3];
-  };
-
-  __device__ static Framed in_frame(const PairRecord& record, std::uint32_t a, std::uint32_t b) {
-    const auto* triangle_a = reinterpret_cast<const float4*>(record.triangles_a + a);
-    const auto* triangle_b = reinterpret_cast<const float4*>(record.triangles_b + b);
-    const float4 rows[3] = {__ldg(&record.rotation[0]), __ldg(&record.rotation[1]),
-                            __ldg(&record.rotation[2])};
-    Framed out;
-#pragma unroll
-    for (int c = 0; c < 3; ++c) {
-      out.a[c] = corner(__ldg(triangle_a + c));
-      out.b[c] = posed_corner(rows, __ldg(triangle_b + c));
-    }
     return out;
   }
 };
@@ -265,34 +222,17 @@ struct InWorld {
   static constexpr float kDescends = kDescendsAlone;
   static constexpr bool kCountsOnly = kWalksOnly;
 
-  __device__ static WorldBox box(const Pose& pose, const Block& block, int node) {
-    double lower[3], upper[3];
-    for (int k = 0; k < 3; ++k) {
-      const double center = block.center[k][node], half_extent = block.half_extent[k][node];
-      lower[k] = center - half_extent;
-      upper[k] = center + half_extent;
-    }
-    return world_box(pose, lower, upper);
-  }
-
   __device__ static std::uint32_t test(const QueryArgs& args, const PairRecord& record, std::uint32_t at_a,
                                        std::uint32_t at_b, Side& side_a, Side& side_b) {
     const Block *a = record.blocks_a + args.file_blocks[at_a], *b = record.blocks_b + args.file_blocks[at_b];
-    const Pose pose_a = stored_pose(args, record.instance_a), pose_b = stored_pose(args, record.instance_b);
-    std::uint32_t mask = 0;
-#pragma unroll 1
-    for (int pair = 0; pair < 16; ++pair) {
-      const int i = pair / 4, j = pair % 4;
-      if (a->kind[i] == NodeKind::imaginary || b->kind[j] == NodeKind::imaginary) continue;
-      if (overlap(box(pose_a, *a, i), box(pose_b, *b, j))) mask |= 1u << pair;
-    }
     side_a = {args.walk_blocks[at_a].first_below, tandem::size_of(*a)};
     side_b = {args.walk_blocks[at_b].first_below, tandem::size_of(*b)};
-    return mask;
+    return world_block_pair_mask(stored_pose(args, record.instance_a), *a,
+                                 stored_pose(args, record.instance_b), *b);
   }
 
   __device__ static std::uint32_t drop_beyond_planes(const QueryArgs&, const PairRecord&, std::uint32_t,
-                                                     std::uint32_t, bool, std::uint32_t hits) {
+                                                     std::uint32_t, std::uint32_t hits) {
     return hits;
   }
 

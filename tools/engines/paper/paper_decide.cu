@@ -1,59 +1,25 @@
 #include "paper_engine_data.h"
-#include "tandem/kernels/detail/frame_test.h"
-#include "tandem/kernels/detail/triangle_test.h"
-#include "tandem/kernels/world_box.h"
+#include "tandem/kernels/detail/candidate.h"
 
 // What comes before the traversal, and the last stages of the triangle test. Compiled without fused
 // operations, which their float64 arithmetic relies on.
 namespace tandem::bench::paper {
 namespace {
 
-enum What : Counter { kInstance, kPair, kReach };  // the order in which errors count
+using gpu::Subject;
 
-__device__ void report_error(const QueryArgs& args, What what, Counter where, Status status) {
-  atomicMax(&args.outcome->error, ~(what << 40 | where << 8 | static_cast<Counter>(status)));
-}
-
-/// The pose of stored coordinates.
-__device__ Pose stored_pose(const QueryArgs& args, std::uint32_t instance) {
-  return for_stored_coordinates(args.instances.pose[instance],
-                                args.assets[args.instances.asset[instance]].asset.origin);
-}
-
-__device__ Status check_instance(const QueryArgs& args, std::uint32_t instance) {
-  if (args.instances.asset[instance] >= args.asset_count) return Status::kUnknownAsset;
-  if (!is_rigid(args.instances.pose[instance])) return Status::kPoseNotRigid;
-  const GpuAsset& asset = args.assets[args.instances.asset[instance]].asset;
-  return in_range(world_box(stored_pose(args, instance), asset.lower, asset.upper)) ? Status::kOk
-                                                                                    : Status::kOutOfRange;
+__device__ void report_error(const QueryArgs& args, Subject subject, Counter where, Status status) {
+  atomicMax(&args.outcome->error, gpu::packed_error(subject, where, status));
 }
 
 __device__ void prepare_pair(const QueryArgs& args, std::uint32_t index) {
   const ObjectPair pair = args.given.pairs[index];
-  if (pair.a >= args.instances.count || pair.b >= args.instances.count)
-    return report_error(args, kPair, index, Status::kUnknownInstance);
+  if (const Status status = check_pair(pair, args.instances.count); status != Status::kOk)
+    return report_error(args, Subject::pair, index, status);
   const std::uint32_t asset_a = args.instances.asset[pair.a], asset_b = args.instances.asset[pair.b];
   if (asset_a >= args.asset_count || asset_b >= args.asset_count) return;  // reported with the instance
-  const Asset &a = args.assets[asset_a], &b = args.assets[asset_b];
-  RelativePose pose;
-  if (relative_pose(stored_pose(args, pair.a), a.extent, stored_pose(args, pair.b), b.extent, pose) !=
-      RelativePoseStatus::kOk)
-    return report_error(args, kReach, index, Status::kOutOfRange);
-  PairRecord record;
-  for (int i = 0; i < 3; ++i) {
-    const auto &r = pose.rotation[i], &m = pose.abs_rotation[i];
-    record.rotation[i] = {r[0], r[1], r[2], pose.translation[i]};
-    record.abs_rotation[i] = {m[0], m[1], m[2], pose.slack_a[i]};
-    record.slack_b[i] = pose.slack_b[i];
-  }
-  record.frame_error = frame_error(pose, a.extent, b.extent);
-  record.blocks_a = a.asset.tree.blocks;
-  record.blocks_b = b.asset.tree.blocks;
-  record.triangles_a = a.asset.tree.triangles;
-  record.triangles_b = b.asset.tree.triangles;
-  record.instance_a = pair.a;
-  record.instance_b = pair.b;
-  args.records[index] = record;
+  args.records[index] = gpu::make_record(args.instances, args.assets, pair, false);
+  if (args.records[index].in_frame == 0) report_error(args, Subject::reach, index, Status::kOutOfRange);
 }
 
 __global__ void __launch_bounds__(kThreads)
@@ -66,43 +32,28 @@ __global__ void __launch_bounds__(kThreads)
     first_level[i] = {i, 0, 0};
   }
   for (std::uint32_t i = first; i < args.instances.count; i += step) {
-    const Status status = check_instance(args, i);
-    if (status != Status::kOk) report_error(args, kInstance, i, status);
+    const Status status = gpu::check_instance(args.instances, args.assets, args.asset_count, i);
+    if (status != Status::kOk) report_error(args, Subject::instance, i, status);
   }
 }
 
 __global__ void measure_extents(Asset* assets, std::uint32_t count) {
   const std::uint32_t i = blockIdx.x * kThreads + threadIdx.x;
-  if (i < count) assets[i].extent = extent_of(assets[i].asset.tree.blocks[0]);
+  if (i < count) assets[i].extent = extent_of(assets[i].tree.blocks[0]);
 }
 
 __device__ TrianglePair posed_pair(const QueryArgs& args, const Entry& candidate) {
   const PairRecord& record = args.records[candidate.pair];
-  const Pose pose_a = stored_pose(args, record.instance_a), pose_b = stored_pose(args, record.instance_b);
-  TrianglePair pair;
-  for (int corner = 0; corner < 3; ++corner) {
-    const float* p = record.triangles_a[candidate.a].corner[corner].position;
-    const float* q = record.triangles_b[candidate.b].corner[corner].position;
-    apply(pose_a, p[0], p[1], p[2], pair.a[corner]);
-    apply(pose_b, q[0], q[1], q[2], pair.b[corner]);
-  }
-  return pair;
+  return tandem::posed_pair(
+      gpu::stored_pose(args.instances, args.assets, record.instance_a), record.triangles_a[candidate.a],
+      gpu::stored_pose(args.instances, args.assets, record.instance_b), record.triangles_b[candidate.b]);
 }
 
 /// float32 corners in the frame of the first instance.
 __device__ TrianglePair framed_pair(const QueryArgs& args, const Entry& candidate) {
   const PairRecord& record = args.records[candidate.pair];
-  TrianglePair pair;
-  for (int corner = 0; corner < 3; ++corner) {
-    const float* p = record.triangles_a[candidate.a].corner[corner].position;
-    const float* q = record.triangles_b[candidate.b].corner[corner].position;
-    for (int i = 0; i < 3; ++i) {
-      const float4 row = record.rotation[i];
-      pair.a[corner][i] = static_cast<double>(p[i]);
-      pair.b[corner][i] = static_cast<double>(((row.x * q[0] + row.y * q[1]) + row.z * q[2]) + row.w);
-    }
-  }
-  return pair;
+  return tandem::framed_pair(gpu::pose_of(record), record.triangles_a[candidate.a],
+                             record.triangles_b[candidate.b]);
 }
 
 template <bool kFast>

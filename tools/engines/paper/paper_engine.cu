@@ -111,9 +111,8 @@ Status PaperEngine::State::prepare(paper::QueryArgs& args, cudaStream_t stream) 
   }
   report.counters.object_pairs = answers->pair_count;
   if (answers->outcome.error == 0) return Status::kOk;
-  const paper::Counter what = ~answers->outcome.error;
-  report.where = what >> 8 & 0xFFFFFFFFu;
-  return static_cast<Status>(what & 0xFFu);
+  report.where = gpu::where_in(answers->outcome.error);
+  return gpu::status_in(answers->outcome.error);
 }
 
 /// One iteration of the paper's loop but for the collection: flags, their prefix sums, and the totals.

@@ -6,6 +6,7 @@
 
 #include "pair_record.h"
 #include "paper_engine.h"
+#include "tandem/kernels/detail/candidate.h"
 
 // What the kernels of the paper's engine share, all of it in GPU memory.
 namespace tandem::bench::paper {
@@ -111,7 +112,7 @@ __device__ inline void add_contact(const QueryArgs& args, const TriangleArgs& tr
   const std::uint32_t face_a = record.triangles_a[a].source_face(),
                       face_b = record.triangles_b[b].source_face();
   triangles.contacts[place] =
-      gpu::make_contact(candidate.pair, record.instance_a == record.instance_b, a, b, face_a, face_b);
+      make_contact(candidate.pair, record.instance_a == record.instance_b, a, b, face_a, face_b);
 }
 
 #endif

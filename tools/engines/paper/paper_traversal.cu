@@ -5,7 +5,7 @@
 
 #include "paper_engine_data.h"
 #include "tandem/kernels/detail/box_test.h"
-#include "tandem/kernels/detail/frame_test.h"
+#include "tandem/kernels/detail/leaf_planes.h"
 
 // The kernels of a level, and the first stage of the triangle test. nvcc may fuse multiplies and adds here:
 // the proofs of the box tests (docs/box_test.md) and of the first stage (frame_test.h) allow it.
@@ -85,11 +85,12 @@ __global__ void __launch_bounds__(kThreads) collide_level(const __grid_constant_
   const bool leaf_a = __float_as_uint(a[kKind0]) == kLeafKind,
              leaf_b = __float_as_uint(b[kKind0]) == kLeafKind;
   const RelativePose pose = pose_of(record);
-  bool hit = active && (kSixAxes ? overlap_6_axes(box_a, box_b, pose) : overlap_15_axes(box_a, box_b, pose));
-  // Node pairs of a block with itself: each once, and no leaf with itself.
-  if (record.instance_a == record.instance_b && pair.a == pair.b) hit = hit && (leaf_a ? i < j : i <= j);
-
-  const std::uint32_t hits = __ballot_sync(kAllLanes, hit) >> (threadIdx.x % 32 - lane) & ((1u << lane) - 1);
+  const bool overlaps =
+      active && (kSixAxes ? overlap_6_axes(box_a, box_b, pose) : overlap_15_axes(box_a, box_b, pose));
+  std::uint32_t mask = __ballot_sync(kAllLanes, overlaps) >> (threadIdx.x % 32 - lane) & kAllNodePairs;
+  if (record.instance_a == record.instance_b && pair.a == pair.b) mask &= own_node_pairs(leaf_a);
+  const bool hit = (mask >> lane & 1u) != 0;
+  const std::uint32_t hits = mask & ((1u << lane) - 1);
   bool collision = hit && !(leaf_a && leaf_b);
   if (leaf_b && !leaf_a) collision = hit && (hits >> 4 * i) == 0;          // none before in i's row
   if (leaf_a && !leaf_b) collision = hit && (hits & (0x1111u << j)) == 0;  // none before in j's column
@@ -140,18 +141,10 @@ __global__ void __launch_bounds__(kThreads)
   const Entry candidate = triangles.candidates[mine ? i : 0];
   const PairRecord& record = args.records[candidate.pair];
   const RelativePose pose = pose_of(record);
-  const auto* a = reinterpret_cast<const float4*>(record.triangles_a + candidate.a);
-  const auto* b = reinterpret_cast<const float4*>(record.triangles_b + candidate.b);
-  frame::Point<float> corners_a[3], corners_b[3];
-#pragma unroll
-  for (int corner = 0; corner < 3; ++corner) {
-    const float4 p = __ldg(a + corner), q = __ldg(b + corner);
-    corners_a[corner] = {{p.x, p.y, p.z}};
-    const float stored_b[3] = {q.x, q.y, q.z};
-#pragma unroll
-    for (int k = 0; k < 3; ++k) corners_b[corner].x[k] = box_terms::posed_center(pose, k, stored_b);
-  }
-  const auto verdicts = frame::decide<kBounded>(corners_a, corners_b, kBounded ? record.frame_error : 0.0f);
+  const TriangleInFrame in_a = stored_triangle(record.triangles_a[candidate.a]),
+                        of_b = posed_triangle(pose, record.triangles_b[candidate.b]);
+  const auto verdicts =
+      frame::decide<kBounded>(in_a.corner, of_b.corner, kBounded ? record.frame_error : 0.0f);
   const bool undecided = mine && verdicts.undecided;
   const Counter place = place_for(undecided, &args.outcome->undecided);
   if (undecided && place < triangles.undecided_room) triangles.undecided[place] = candidate;

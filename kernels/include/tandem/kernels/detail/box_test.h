@@ -130,13 +130,4 @@ TANDEM_HD inline bool overlap_15_axes(const Box& a, const Box& b, const Relative
   return detail::overlap_on_face_axes(s, b_in_a) && detail::overlap_on_edge_axes(s, b_in_a);
 }
 
-/// Whether two boxes of one frame overlap, touching included.
-TANDEM_HD inline bool overlap_aligned(const Box& a, const Box& b) {
-  bool overlap = true;
-  for (int k = 0; k < 3; ++k) {
-    overlap = overlap && std::fabs(a.center[k] - b.center[k]) <= a.half_extent[k] + b.half_extent[k];
-  }
-  return overlap;
-}
-
 }  // namespace tandem

@@ -1,14 +1,18 @@
 #pragma once
 #include <cstddef>
+#include <cstdint>
 #include <cstdlib>
 #include <span>
 #include <type_traits>
 #include <utility>
 
+#include "tandem/kernels/detail/available_memory.h"
+
 namespace tandem {
 
 /// Memory that grows and is kept: a vector for code that must not throw. Elements are plain data and start
-/// uninitialised. Aligned to 128 bytes. Movable, not copyable.
+/// uninitialised. Aligned to 128 bytes. Movable, not copyable. Out of memory is also where Linux would grant
+/// more than there is, see available_memory(); small arrays do not ask.
 template <typename Value>
 class Buffer {
   static_assert(std::is_trivially_copyable_v<Value>);
@@ -25,10 +29,12 @@ class Buffer {
   ~Buffer() { std::free(data_); }
 
   /// Makes room for `size` elements and forgets what was in it, unless there was room; grows by half at
-  /// least. False: out of memory, nothing changed.
+  /// least where there is memory for that. False: out of memory, nothing changed.
   [[nodiscard]] bool resize(std::size_t size) {
-    const std::size_t grown = capacity_ + capacity_ / 2;
-    if (size > capacity_ && !reallocate(size > grown ? size : grown, 0)) return false;
+    if (size > capacity_) {
+      const std::size_t grown = capacity_ + capacity_ / 2;
+      if (!reallocate(size < grown && is_available(grown, 1) ? grown : size, 0, 1)) return false;
+    }
     size_ = size;
     return true;
   }
@@ -40,9 +46,13 @@ class Buffer {
     return true;
   }
 
-  /// Makes room for half as many more elements as there is room for, and keeps the first `kept`. False: out
-  /// of memory, nothing changed.
-  [[nodiscard]] bool grow(std::size_t kept) { return reallocate(capacity_ + capacity_ / 2 + 64, kept); }
+  /// Makes room for half as many more elements as there is room for, or where memory is scarce an eighth as
+  /// many, and keeps the first `kept`. owners: how many threads may be growing such arrays at this time, so
+  /// that there is memory for all. False: out of memory, nothing changed.
+  [[nodiscard]] bool grow(std::size_t kept, std::size_t owners = 1) {
+    const std::size_t half = capacity_ + capacity_ / 2 + 64;
+    return reallocate(is_available(half, owners) ? half : capacity_ + capacity_ / 8 + 64, kept, owners);
+  }
 
   void clear() { size_ = 0; }
   Value* data() { return data_; }
@@ -56,8 +66,15 @@ class Buffer {
  private:
   static constexpr std::size_t kAlignment = 128;
 
-  bool reallocate(std::size_t capacity, std::size_t kept) {
-    if (capacity > static_cast<std::size_t>(-1) / 2 / sizeof(Value)) return false;
+  static constexpr std::size_t kSmall = std::size_t{64} << 20;  ///< bytes
+
+  static bool is_available(std::size_t capacity, std::size_t owners) {
+    const std::size_t bytes = capacity * sizeof(Value);
+    return bytes < kSmall || bytes <= available_memory() / 16 * 15 / owners;
+  }
+
+  bool reallocate(std::size_t capacity, std::size_t kept, std::size_t owners) {
+    if (capacity > SIZE_MAX / 2 / sizeof(Value) || !is_available(capacity, owners)) return false;
     const std::size_t bytes = (capacity * sizeof(Value) + kAlignment - 1) / kAlignment * kAlignment;
     auto* data = static_cast<Value*>(std::aligned_alloc(kAlignment, bytes));
     if (data == nullptr) return false;

@@ -94,6 +94,13 @@ struct Point {
   Value x[3];
 };
 
+/// The image in a's frame of a point of b as stored.
+template <typename Value>
+TANDEM_HD inline Point<Value> posed(const RelativePose& b_in_a, const Point<Value>& stored) {
+  return {{box_terms::posed_center(b_in_a, 0, stored.x), box_terms::posed_center(b_in_a, 1, stored.x),
+           box_terms::posed_center(b_in_a, 2, stored.x)}};
+}
+
 template <typename Value, typename Mask>
 TANDEM_HD inline Point<Value> select_point(Mask mask, const Point<Value>& p, const Point<Value>& q) {
   return {{select(mask, p.x[0], q.x[0]), select(mask, p.x[1], q.x[1]), select(mask, p.x[2], q.x[2])}};
@@ -156,14 +163,36 @@ struct Plane {
   }
 };
 
-/// Whether boxes lie strictly on one side of a plane, with all corners of triangles within them: then none of
-/// these meets the triangle that the plane was made of. The boxes hold stored corners of a or, as
-/// box_terms::posed_center() and b_on_face(), images of b's, where the plane is of the other mesh.
-/// The volume of a corner in a box, whose centre is at w, is off by at most what the proof above says of a
-/// difference bounded by |w| + h; that of the centre is computed, and the box reaches sum |n_k| h_k from it.
+/// A box for each lane, in a's frame.
 template <typename Value>
-TANDEM_HD inline auto beyond(const Plane<Value, true>& plane, const Value (&center)[3],
-                             const Value (&half_extent)[3], float error) {
+struct BoxInFrame {
+  Value center[3], half_extent[3];
+};
+
+/// The box in a's frame around the image of a box of b as stored.
+template <typename Value>
+TANDEM_HD inline BoxInFrame<Value> posed(const RelativePose& b_in_a, const BoxInFrame<Value>& stored) {
+  BoxInFrame<Value> out;
+  for (int k = 0; k < 3; ++k) {
+    out.center[k] = box_terms::posed_center(b_in_a, k, stored.center);
+    out.half_extent[k] = box_terms::b_on_face(b_in_a, k, stored.half_extent);
+  }
+  return out;
+}
+
+/// Whether boxes lie strictly on one side of a plane, with all corners of triangles within them: then none of
+/// these triangles meets the one that the plane was made of. The boxes hold stored corners of a, where the
+/// plane is b's, or are posed() and hold images of b's corners, where it is a's.
+///
+/// **Proof.** The volume of a corner in a box, whose centre is at w, is off by at most what the proof above
+/// says of a difference bounded by |w| + h; that of the centre is computed, and the box reaches sum |n_k| h_k
+/// from it. The box of an image has errors of its own: its centre is off by the epsilon_i that E has, its
+/// half-extents are rounded up by abs_rotation, and underflow in either, at most six operations a coordinate,
+/// moves an end of it by less than 2^-122. That counts as an error of the corner's coordinate, so by |n|_1
+/// times as much, and the 2^-88 that E has to spare, which the bound multiplies with |n|_1 too, is more.
+template <typename Value>
+TANDEM_HD inline auto beyond(const Plane<Value, true>& plane, const BoxInFrame<Value>& box, float error) {
+  const auto &center = box.center, &half_extent = box.half_extent;
   constexpr float kU = 0x1p-24f, kUnderflow = 0x1p-80f;
   Value w[3], term[3], reach[3];
   for (int k = 0; k < 3; ++k) {

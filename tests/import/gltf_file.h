@@ -98,14 +98,12 @@ inline std::string glb(std::string json, std::string binary) {
 /// A folder of its own for each test.
 class GltfFile : public ::testing::Test {
  protected:
-  static constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 30;
-
   fs::path write(const std::string& name, const std::string& bytes) const {
     return temporary_.write(name, bytes);
   }
 
-  ReadResult read(const std::string& bytes, std::uint64_t most_bytes = kMostBytes) const {
-    return read_gltf(bytes, folder_, most_bytes);
+  ReadResult read(const std::string& bytes, const ReadLimits& limits = {}) const {
+    return read_gltf(bytes, folder_, limits);
   }
   PolygonMesh mesh(const Gltf& file) const {
     ReadResult result = read(file.json());

@@ -120,20 +120,67 @@ TEST_F(GltfFile, BoundsWhatInstancesAddUpTo) {
   file.meshes = R"({"primitives": [{"attributes": {"POSITION": 0}}]})";
   file.accessors = R"({"componentType": 5126, "count": 1048576, "type": "VEC3"})";
   for (int i = 0; i < 100; ++i) file.nodes += R"(, {"mesh": 0})";
-  expect_error(file, "more than the memory limit (--memory-limit)");
+  expect_error(file, "more than 4000000 vertices and faces beyond what its");
+  const std::uint64_t endless = std::uint64_t{1} << 60;
+  EXPECT_EQ(read(file.json(), {std::uint64_t{1} << 30, endless}).error,
+            "its triangles, counting each instance of a mesh, take 1026 MiB, more than the memory limit "
+            "(--memory-limit)");
   for (int i = 0; i < 4000; ++i) file.nodes += R"(, {"mesh": 0})";
-  const ReadResult result = read(file.json(), std::uint64_t{1} << 60);
+  const ReadResult result = read(file.json(), {endless, endless});
   EXPECT_NE(result.error.find("more than 4294967294 vertices or corners"), std::string::npos) << result.error;
-  // Primitives that make no triangle take no memory, but time.
+}
+
+TEST_F(GltfFile, CountsPrimitivesThatMakeNoTriangleAmongWhatInstancesAddUpTo) {
+  Gltf file;
+  file.more = R"("extras": 0)";
+  for (int i = 0; i < 4000; ++i) file.nodes += R"(, {"mesh": 0})";
   file.accessors = R"({"componentType": 5126, "count": 0, "type": "VEC3"})";
-  const std::string mesh_of_one = file.meshes;
   std::string primitives = R"({"attributes": {"POSITION": 0}})";
   for (int i = 0; i < 5000; ++i) primitives += R"(, {"attributes": {"POSITION": 0}})";
   file.meshes = R"({"primitives": [)" + primitives + "]}";
-  expect_error(file, "more than the memory limit (--memory-limit)");
-  file.meshes = mesh_of_one;
-  file.accessors = R"({"componentType": 5126, "count": 9007199254740991, "type": "VEC3"})";
+  expect_error(file, "(--expansion-limit)");
+}
+
+TEST_F(GltfFile, BoundsWhatCountsPromiseWithoutAByte) {
+  Gltf file;
+  file.accessors = R"({"componentType": 5126, "count": 100000000, "type": "VEC3"},
+                      {"componentType": 5125, "count": 300000000, "type": "SCALAR"})";
+  expect_error(file,
+               "instances of meshes, or counts without data, make more than 4000000 vertices and faces");
+  file.accessors = R"({"componentType": 5126, "count": 9007199254740991, "type": "VEC3"},
+                      {"componentType": 5125, "count": 3, "type": "SCALAR"})";
   expect_error(file, "more than 4294967294 vertices");
+}
+
+TEST_F(GltfFile, AllowsExactlyWhatItsBytesAndTheLimitAddUpTo) {
+  Gltf file;
+  file.accessors = R"({"componentType": 5126, "count": 5000, "type": "VEC3"},
+                      {"componentType": 5125, "count": 300, "type": "SCALAR"})";
+  const std::string json = file.json();
+  const std::uint64_t elements = 5000 + 100 + 1;  // vertices, triangles, primitives
+  EXPECT_TRUE(read(json, {1 << 20, elements - json.size()}).ok);
+  EXPECT_FALSE(read(json, {1 << 20, elements - json.size() - 1}).ok);
+  EXPECT_TRUE(read(json + std::string(elements - json.size(), ' '), {1 << 20, 0}).ok);
+}
+
+TEST_F(GltfFile, NeverRefusesWhatItsBytesHold) {
+  // The smallest that elements can be: bytes for coordinates and for the indices of a strip.
+  const std::size_t count = 200000;
+  Gltf file;
+  file.meshes = R"({"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "mode": 5}]})";
+  file.accessors = R"({"bufferView": 0, "componentType": 5120, "count": 200, "type": "VEC3"},
+                      {"bufferView": 1, "componentType": 5121, "count": 200000, "type": "SCALAR"})";
+  file.views = R"({"buffer": 0, "byteLength": 600}, {"buffer": 0, "byteOffset": 600, "byteLength": 200000})";
+  file.buffers = R"({"byteLength": 200600})";
+  std::string binary(600 + count, '\0');
+  for (std::size_t i = 0; i < count; ++i) binary[600 + i] = static_cast<char>(i % 200);
+  const ReadResult indexed = read_gltf(glb(file.json(), binary), folder_, {1 << 26, 0});
+  EXPECT_EQ(indexed.mesh.face_count(), count - 2) << indexed.error;
+  file.meshes = R"({"primitives": [{"attributes": {"POSITION": 0}, "mode": 5}]})";
+  file.accessors = R"({"bufferView": 0, "componentType": 5120, "count": 66000, "type": "VEC3"})";
+  file.views = R"({"buffer": 0, "byteLength": 198000})";
+  const ReadResult plain = read_gltf(glb(file.json(), binary), folder_, {1 << 26, 0});
+  EXPECT_EQ(plain.mesh.face_count(), 65998u) << plain.error;
 }
 
 TEST_F(GltfFile, RemarksPosesThatAreNotApplied) {

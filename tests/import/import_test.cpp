@@ -120,7 +120,7 @@ TEST_F(Import, KeepsToItsOwnReadersWhenTold) {
 
 TEST_F(Import, DoesNotReadMoreThanTheMemoryLimit) {
   ImportOptions options;
-  options.memory_limit_bytes = 10;
+  options.limits.memory_bytes = 10;
   const ImportResult result = import_mesh(write("a.obj", kTriangleObj), options);
   EXPECT_FALSE(result.ok);
   EXPECT_NE(result.error.find("--memory-limit"), std::string::npos);
@@ -174,13 +174,54 @@ TEST_F(Import, StopsAssimpWhenItHangs) {
   EXPECT_TRUE(stopped || result.error.find("assimp: ") == 0) << result.error;
 }
 
+/// COLLADA of nodes that each show the next one `copies` times; the last one shows a triangle.
+std::string nested_collada(int depth, int copies) {
+  std::string nodes;
+  for (int i = 0; i < depth; ++i) {
+    nodes += "<node id=\"n" + std::to_string(i) + "\">";
+    for (int k = 0; k < copies; ++k) nodes += "<instance_node url=\"#n" + std::to_string(i + 1) + "\"/>";
+    nodes += "</node>";
+  }
+  nodes += "<node id=\"n" + std::to_string(depth) + "\"><instance_geometry url=\"#g\"/></node>";
+  return R"(<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset/>
+    <library_geometries><geometry id="g"><mesh><source id="p"><float_array id="a" count="9">0 0 0 1 0 0 0 1 0</float_array>
+    <technique_common><accessor source="#a" count="3" stride="3"><param name="X" type="float"/>
+    <param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
+    <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+    <triangles count="1"><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2</p></triangles></mesh></geometry>
+    </library_geometries><library_nodes>)" +
+         nodes + R"(</library_nodes><library_visual_scenes><visual_scene id="s"><node id="r">
+    <instance_node url="#n0"/></node></visual_scene></library_visual_scenes>
+    <scene><instance_visual_scene url="#s"/></scene></COLLADA>)";
+}
+
+TEST_F(Import, BoundsWhatInstancesAddUpToInAssimpsScenes) {
+  const fs::path path = write("nested.dae", nested_collada(6, 4));
+  ImportOptions options;
+  const ImportResult all = import_mesh(path, options);
+  EXPECT_EQ(all.mesh.face_count(), 4096u) << all.error;
+  options.limits.expansion = 4095 * 5;  // each repeats three vertices, a face and a mesh
+  EXPECT_TRUE(import_mesh(path, options).ok);
+  options.limits.expansion -= 1;
+  EXPECT_EQ(
+      import_mesh(path, options).error,
+      "instances of meshes repeat 20475 vertices and faces, of 20474 that are allowed (--expansion-limit)");
+}
+
+TEST_F(Import, StopsAssimpWhenNodesRepeatNodesWithoutEnd) {
+  if (!limits_memory()) GTEST_SKIP() << "sanitizers need the address space that this limits";
+  const ImportResult result = import_mesh(write("nested.dae", nested_collada(30, 2)), {});
+  EXPECT_EQ(result.error.find("assimp needed more than 79"), 0u) << result.error;
+  EXPECT_NE(result.error.find("MiB of memory (--expansion-limit)"), std::string::npos) << result.error;
+}
+
 TEST_F(Import, StopsAssimpAtItsMemoryLimit) {
   if (!limits_memory()) GTEST_SKIP() << "sanitizers need the address space that this limits";
   std::string many = "v 0 0 0\n";
   for (int i = 0; i < 200000; ++i) many += "v 1 2 3\n";
   for (int i = 1; i < 200000; ++i) many += "f " + std::to_string(i) + " 1 2\n";
   ImportOptions options = with_assimp();
-  options.memory_limit_bytes = 8 << 20;
+  options.limits.memory_bytes = 8 << 20;
   const ImportResult result = import_mesh(write("many.obj", many), options);
   EXPECT_FALSE(result.ok);
   EXPECT_EQ(result.error, "assimp needed more than 8 MiB of memory (--memory-limit)");

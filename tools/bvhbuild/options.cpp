@@ -39,7 +39,7 @@ CLI::Validator imaginary_share() {
       "");
 }
 
-void add_options(CLI::App& app, Options& options, double& memory_gib) {
+void add_options(CLI::App& app, Options& options, double& memory_gib, double& expansion) {
   app.add_option("MESH", options.input,
                  "mesh file: OBJ, PLY, STL, OFF, glTF/GLB, DAE and what else assimp reads")
       ->required()
@@ -71,6 +71,12 @@ void add_options(CLI::App& app, Options& options, double& memory_gib) {
   app.add_option("--memory-limit", memory_gib, "GiB of memory that reading may take")
       ->check(between(0.1, 1e6))
       ->option_text("GIB [8]");
+  app.add_option(
+         "--expansion-limit", expansion,
+         "vertices and faces that a scene may have beyond what the bytes of its file can hold: instances "
+         "repeat meshes, and counts may promise what is not there")
+      ->check(between(0, 1e15))
+      ->option_text("N [4000000]");
   app.set_version_flag("--version", "bvhbuild " TANDEM_VERSION);
   app.footer(kFooter);
 }
@@ -81,8 +87,9 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
   CLI::App app("Turns a mesh into an optimised 4-ary blocked AABB tree for exact tandem collision queries.",
                "bvhbuild");
   Options options;
-  double memory_gib = static_cast<double>(options.import.memory_limit_bytes) / 0x1p30;
-  add_options(app, options, memory_gib);
+  double memory_gib = static_cast<double>(options.import.limits.memory_bytes) / 0x1p30;
+  auto expansion = static_cast<double>(options.import.limits.expansion);
+  add_options(app, options, memory_gib, expansion);
   exit_code = kDone;
   try {
     app.parse(argc, argv);
@@ -94,7 +101,8 @@ std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
     exit_code = kUsage;
     return std::nullopt;
   }
-  options.import.memory_limit_bytes = static_cast<std::uint64_t>(memory_gib * 0x1p30);
+  options.import.limits.memory_bytes = static_cast<std::uint64_t>(memory_gib * 0x1p30);
+  options.import.limits.expansion = static_cast<std::uint64_t>(expansion);
   return options;
 }
 

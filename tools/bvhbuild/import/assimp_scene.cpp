@@ -59,10 +59,38 @@ void add_mesh(const aiMesh& mesh, const Visit& visit, MeshAssembly& out) {
   }
 }
 
-void add_meshes_of_node(const aiScene& scene, const Visit& visit, MeshAssembly& out) {
-  if (visit.node->mMeshes == nullptr) return;
-  for (const unsigned mesh : std::span(visit.node->mMeshes, visit.node->mNumMeshes))
-    if (mesh < scene.mNumMeshes && scene.mMeshes[mesh] != nullptr) add_mesh(*scene.mMeshes[mesh], visit, out);
+/// The numbers of the meshes that a node shows.
+std::span<const unsigned> meshes_of(const aiNode& node) {
+  return {node.mMeshes, node.mMeshes == nullptr ? 0 : node.mNumMeshes};
+}
+
+std::span<aiNode* const> children_of(const aiNode& node) {
+  return {node.mChildren, node.mChildren == nullptr ? 0 : node.mNumChildren};
+}
+
+/// The mesh of that number, or nullptr.
+const aiMesh* mesh_of(const aiScene& scene, unsigned number) {
+  return number < scene.mNumMeshes ? scene.mMeshes[number] : nullptr;
+}
+
+/// Vertices, faces and meshes that nodes show once more, after other nodes have shown them.
+std::uint64_t repeated_elements(const aiScene& scene) {
+  std::uint64_t repeated = 0;
+  std::vector<bool> is_shown(scene.mNumMeshes);
+  std::vector<const aiNode*> pending{scene.mRootNode};
+  while (!pending.empty()) {
+    const aiNode& node = *pending.back();
+    pending.pop_back();
+    for (const unsigned number : meshes_of(node)) {
+      const aiMesh* mesh = mesh_of(scene, number);
+      if (mesh == nullptr) continue;
+      if (is_shown[number]) repeated += std::uint64_t{1} + mesh->mNumVertices + mesh->mNumFaces;
+      is_shown[number] = true;
+    }
+    for (const aiNode* child : children_of(node))
+      if (child != nullptr) pending.push_back(child);
+  }
+  return repeated;
 }
 
 ReadResult flatten(const aiScene& scene, const std::string& reader) {
@@ -73,10 +101,11 @@ ReadResult flatten(const aiScene& scene, const std::string& reader) {
   while (!pending.empty()) {
     const Visit visit = std::move(pending.back());
     pending.pop_back();
-    add_meshes_of_node(scene, visit, out);
-    const std::size_t children = visit.node->mChildren ? visit.node->mNumChildren : 0;
-    for (std::size_t i = children; i-- > 0;)
-      if (const aiNode* child = visit.node->mChildren[i])
+    for (const unsigned number : meshes_of(*visit.node))
+      if (const aiMesh* mesh = mesh_of(scene, number)) add_mesh(*mesh, visit, out);
+    const std::span<aiNode* const> children = children_of(*visit.node);
+    for (std::size_t i = children.size(); i-- > 0;)
+      if (const aiNode* child = children[i])
         pending.push_back({child, combined(visit.world, local_transform(*child)),
                            child_path(visit.path, text(child->mName))});
   }
@@ -108,13 +137,18 @@ ReadResult failure(const Assimp::Importer& importer) {
 
 }  // namespace
 
-ReadResult read_assimp_scene(const std::filesystem::path& path) {
+ReadResult read_assimp_scene(const std::filesystem::path& path, const ReadLimits& limits) {
   Assimp::Importer importer;
   importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
   constexpr unsigned kNoPostProcessing = 0;  // faces stay polygons, in order; vertices stay apart
   const aiScene* scene = importer.ReadFile(path.string(), kNoPostProcessing);
   if (scene == nullptr) return failure(importer);
   if (scene->mRootNode == nullptr) return read_failure("assimp: the scene has no root node");
+  const std::uint64_t repeated = repeated_elements(*scene);
+  if (repeated > limits.expansion)
+    return read_failure("instances of meshes repeat " + std::to_string(repeated) +
+                        " vertices and faces, of " + std::to_string(limits.expansion) +
+                        " that are allowed (--expansion-limit)");
   return flatten(*scene, version());
 }
 

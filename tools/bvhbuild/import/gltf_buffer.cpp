@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
-#include "common/printable.h"
 #include "gltf_model.h"
-#include "input_file.h"
+#include "common/printable.h"
 
 namespace tandem::build {
 namespace {
@@ -52,22 +52,33 @@ std::vector<char> bytes_of_data_uri(const GltfBufferSource& source) {
   return bytes;
 }
 
-std::vector<char> bytes_of_file(const GltfBufferSource& source, GltfBufferPlaces& places) {
+/// Effect: `file` becomes the file of this name, read whole. Result: empty, or why it cannot be read.
+std::string read_file(const std::string& name, GltfBufferPlaces& places,
+                      std::shared_ptr<const InputFile>& file) {
+  const auto opened = std::make_shared<InputFile>();
+  if (name.find('\0') != std::string::npos) return "no such file";
+  const std::string wrong = opened->open(places.folder / name);
+  if (!wrong.empty()) return wrong;
+  const auto known = places.files.find(opened->identity());
+  if (known != places.files.end()) return file = known->second, std::string();
+  if (opened->size() > places.most_bytes_in_files)
+    return "its bytes take more than the memory limit (--memory-limit)";
+  places.most_bytes_in_files -= opened->size();
+  places.files.emplace(opened->identity(), file = opened);
+  return opened->read_all();
+}
+
+std::shared_ptr<const InputFile> file_of(const GltfBufferSource& source, GltfBufferPlaces& places) {
   if (has_scheme(source.uri))
     throw GltfError(source.name + ": " + in_quotes(source.uri) + " is not a file beside the glTF");
   const std::string name = percent_decoded(source.uri);
-  InputFile file;
-  std::vector<char> bytes;
-  std::string wrong = name.find('\0') == std::string::npos ? file.open(places.folder / name) : "no such file";
-  if (wrong.empty() && file.size() < source.bytes)
-    wrong =
-        "holds " + std::to_string(file.size()) + " bytes, " + std::to_string(source.bytes) + " are needed";
-  if (wrong.empty() && source.bytes > places.most_bytes_in_files)
-    wrong = "its bytes take more than the memory limit (--memory-limit)";
-  if (wrong.empty()) wrong = file.read_first(source.bytes, bytes);
+  std::shared_ptr<const InputFile> file;
+  std::string wrong = read_file(name, places, file);
+  if (wrong.empty() && file->bytes().size() < source.bytes)
+    wrong = "holds " + std::to_string(file->bytes().size()) + " bytes, " + std::to_string(source.bytes) +
+            " are needed";
   if (!wrong.empty()) throw GltfError(source.name + ": " + in_quotes(name) + ": " + wrong);
-  places.most_bytes_in_files -= source.bytes;
-  return bytes;
+  return file;
 }
 
 }  // namespace
@@ -75,14 +86,17 @@ std::vector<char> bytes_of_file(const GltfBufferSource& source, GltfBufferPlaces
 GltfBuffer read_gltf_buffer(const GltfBufferSource& source, GltfBufferPlaces& places) {
   GltfBuffer buffer;
   if (source.bytes == 0) throw GltfError(source.name + " has no byteLength");
-  if (!source.uri.empty()) {
-    buffer.own = source.uri.starts_with("data:") ? bytes_of_data_uri(source) : bytes_of_file(source, places);
-    buffer.bytes = {buffer.own.data(), buffer.own.size()};
-    return buffer;
+  if (source.uri.starts_with("data:")) {
+    buffer.decoded = bytes_of_data_uri(source);
+    buffer.bytes = {buffer.decoded.data(), buffer.decoded.size()};
+  } else if (!source.uri.empty()) {
+    buffer.file = file_of(source, places);
+    buffer.bytes = buffer.file->bytes().substr(0, source.bytes);
+  } else {
+    if (!places.is_binary) throw GltfError(source.name + " has no uri, so its bytes are nowhere");
+    check_length(source, "the binary chunk", places.chunk.size());
+    buffer.bytes = places.chunk.substr(0, source.bytes);
   }
-  if (!places.is_binary) throw GltfError(source.name + " has no uri, so its bytes are nowhere");
-  check_length(source, "the binary chunk", places.chunk.size());
-  buffer.bytes = places.chunk.substr(0, source.bytes);
   return buffer;
 }
 

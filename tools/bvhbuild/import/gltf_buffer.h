@@ -1,15 +1,20 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <map>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "input_file.h"
+
 namespace tandem::build {
 
-/// A buffer of a glTF file: bytes of its own, or of the container.
+/// A buffer of a glTF file. Its bytes lie in a data URI that was decoded, in a file, or in the container.
 struct GltfBuffer {
-  std::vector<char> own;
+  std::vector<char> decoded;
+  std::shared_ptr<const InputFile> file;
   std::string_view bytes;
 };
 
@@ -26,6 +31,8 @@ struct GltfBufferPlaces {
   bool is_binary = false;               ///< whether this is a GLB file
   std::string_view chunk;               ///< its binary chunk
   std::uint64_t most_bytes_in_files{};  ///< that may still be read; grows less
+  /// Files that buffers were found in. Each is read once, by whatever names buffers call it.
+  std::map<InputFile::Identity, std::shared_ptr<const InputFile>> files;
 };
 
 /// Finds the bytes of a buffer: in a data URI, a file or the chunk, which all may be longer than the buffer.

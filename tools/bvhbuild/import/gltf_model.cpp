@@ -207,6 +207,7 @@ GltfModel read_gltf_model(const GltfObject& root, GltfBufferPlaces places) {
   root.each("buffers", [&](const GltfObject& item) {
     model.buffers.push_back(read_gltf_buffer(buffer_source(item, model.buffers.size()), places));
   });
+  for (const auto& [identity, file] : places.files) model.bytes_held += file->size();
   root.each("bufferViews", [&](const GltfObject& item) { model.views.push_back(view(item)); });
   root.each("accessors", [&](const GltfObject& item) { model.accessors.push_back(accessor(item)); });
   root.each("meshes", [&](const GltfObject& item) { model.meshes.push_back(mesh(item)); });

@@ -77,6 +77,7 @@ struct GltfModel {
   std::vector<GltfMesh> meshes;
   std::vector<GltfNode> nodes;
   std::vector<int> roots;            ///< nodes of the scene
+  std::uint64_t bytes_held = 0;      ///< by the file and the files of its buffers, each counted once
   std::vector<std::string> remarks;  ///< for the report, at most a few
 };
 

@@ -92,8 +92,8 @@ struct Size {
 
 class SceneReader {
  public:
-  SceneReader(const GltfModel& model, std::uint64_t most_bytes)
-      : model_(model), most_bytes_(most_bytes), out_("tandem glTF", kMostNameBytes) {}
+  SceneReader(const GltfModel& model, const ReadLimits& limits)
+      : model_(model), limits_(limits), out_("tandem glTF", kMostNameBytes) {}
 
   ReadResult read();
 
@@ -116,7 +116,7 @@ class SceneReader {
   void add_faces(const GltfPrimitive& primitive, const std::string& name, std::uint64_t first);
 
   const GltfModel& model_;
-  std::uint64_t most_bytes_;
+  const ReadLimits& limits_;
   MeshAssembly out_;
   std::map<std::size_t, Size> sizes_;  ///< of the meshes that nodes show
   Size total_;
@@ -161,14 +161,19 @@ void SceneReader::measure_node(std::size_t node_index) {
   check_total();
 }
 
+/// A file that repeats nothing holds a byte at least for each of these: three for a vertex, one for the index
+/// that ends a triangle, or a vertex of its own where there are no indices, and dozens for a primitive.
 void SceneReader::check_total() const {
+  const std::uint64_t parts = total_.points + total_.triangles + total_.primitives;
+  if (parts > model_.bytes_held && parts - model_.bytes_held > limits_.expansion)
+    throw GltfError("instances of meshes, or counts without data, make more than " +
+                    std::to_string(limits_.expansion) + " vertices and faces beyond what its " +
+                    std::to_string(model_.bytes_held) + " bytes can hold (--expansion-limit)");
   if (total_.points > kMostCorners || total_.triangles > kMostCorners / 3)
     throw GltfError(
         "the scene has more than 4294967294 vertices or corners, counting each instance of a mesh");
-  constexpr std::uint64_t kBytesOfAPrimitive = 64;  // none, but the limit on memory limits the time too
-  const std::uint64_t bytes = total_.points * sizeof(Point) + total_.triangles * 4 * sizeof(std::uint32_t) +
-                              total_.primitives * kBytesOfAPrimitive;
-  if (bytes > most_bytes_)
+  const std::uint64_t bytes = total_.points * sizeof(Point) + total_.triangles * 4 * sizeof(std::uint32_t);
+  if (bytes > limits_.memory_bytes)
     throw GltfError("its triangles, counting each instance of a mesh, take " + std::to_string(bytes >> 20) +
                     " MiB, more than the memory limit (--memory-limit)");
 }
@@ -295,8 +300,8 @@ void SceneReader::add_faces(const GltfPrimitive& primitive, const std::string& n
 
 }  // namespace
 
-ReadResult flatten_gltf(const GltfModel& model, std::uint64_t most_bytes) {
-  return SceneReader(model, most_bytes).read();
+ReadResult flatten_gltf(const GltfModel& model, const ReadLimits& limits) {
+  return SceneReader(model, limits).read();
 }
 
 }  // namespace tandem::build

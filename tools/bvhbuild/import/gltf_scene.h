@@ -1,7 +1,6 @@
 #pragma once
-#include <cstdint>
-
 #include "gltf_model.h"
+#include "read_limits.h"
 #include "read_result.h"
 
 namespace tandem::build {
@@ -13,8 +12,8 @@ namespace tandem::build {
 /// corners as it is. A part is one mesh at one node. Triangles, strips and fans become faces; points and
 /// lines none. A strip's triangle that names a vertex twice only leads the strip elsewhere and is no face. An
 /// index that names no vertex of its primitive becomes kNoVertex. Skins and morph targets are not applied.
-/// Throws a GltfError for accessors that reach outside their buffers; nodes that are no tree; more than 2^32
-/// - 2 vertices or corners, or more than `most_bytes` bytes of them, counting each instance.
-ReadResult flatten_gltf(const GltfModel& model, std::uint64_t most_bytes);
+/// Throws a GltfError for accessors that reach outside their buffers; nodes that are no tree; and, before any
+/// memory is taken, for more vertices and corners, counting each instance, than `limits` or 2^32 - 2 allow.
+ReadResult flatten_gltf(const GltfModel& model, const ReadLimits& limits);
 
 }  // namespace tandem::build

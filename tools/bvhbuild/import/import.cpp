@@ -64,7 +64,7 @@ std::string refusal(const std::string& extension, std::string_view head) {
 
 /// Effect: reads the file. Result: empty, or why not.
 std::string load(InputFile& file, const ImportOptions& options) {
-  if (file.size() <= options.memory_limit_bytes) return file.read_all();
+  if (file.size() <= options.limits.memory_bytes) return file.read_all();
   return "holds " + std::to_string(file.size()) + " bytes, more than the memory limit (--memory-limit)";
 }
 
@@ -80,7 +80,7 @@ bool is_gltf(const std::string& extension, std::string_view head) {
 ReadResult read_gltf_file(const std::filesystem::path& path, InputFile& file, const ImportOptions& options) {
   const std::string problem = load(file, options);
   if (!problem.empty()) return read_failure(problem);
-  ReadResult result = read_gltf(file.bytes(), path.parent_path(), options.memory_limit_bytes);
+  ReadResult result = read_gltf(file.bytes(), path.parent_path(), options.limits);
   const bool may_ask_assimp = !result.ok && options.reader == Reader::automatic;
   return may_ask_assimp && is_for_another_gltf_reader(result.error) ? read_in_assimp_child(path, options)
                                                                     : result;

@@ -1,7 +1,7 @@
 #pragma once
-#include <cstdint>
 #include <filesystem>
 
+#include "read_limits.h"
 #include "read_result.h"
 
 namespace tandem::build {
@@ -11,9 +11,7 @@ enum class Reader { automatic, tandem, assimp };
 struct ImportOptions {
   Reader reader = Reader::automatic;
   double time_limit_seconds = 120;  ///< of the child process that runs assimp
-  /// Address space of that child; the largest file for our own readers, and the most that a glTF scene may
-  /// take, counting each instance of a mesh.
-  std::uint64_t memory_limit_bytes = std::uint64_t{8} << 30;
+  ReadLimits limits;
 };
 
 using ImportResult = ReadResult;

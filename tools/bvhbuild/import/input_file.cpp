@@ -58,6 +58,7 @@ std::string InputFile::open(const std::filesystem::path& path) {
   if (!S_ISREG(status.st_mode)) return "is not a regular file";
   if (status.st_size == 0) return "the file is empty";
   size_ = static_cast<std::uint64_t>(status.st_size);
+  identity_ = {status.st_dev, status.st_ino};
   return {};
 }
 
@@ -74,14 +75,6 @@ std::string InputFile::read_all() {
   const ssize_t got = read_fully(descriptor_, bytes_.get(), size_, 0);
   if (got < 0) return reason(errno);
   bytes_read_ = static_cast<std::size_t>(got);
-  return {};
-}
-
-std::string InputFile::read_first(std::uint64_t count, std::vector<char>& bytes) const {
-  bytes.resize(count);
-  const ssize_t got = read_fully(descriptor_, bytes.data(), bytes.size(), 0);
-  if (got < 0) return reason(errno);
-  bytes.resize(static_cast<std::size_t>(got));
   return {};
 }
 

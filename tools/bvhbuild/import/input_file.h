@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
-#include <vector>
+#include <utility>
 
 namespace tandem::build {
 
@@ -22,6 +22,10 @@ class InputFile {
 
   std::uint64_t size() const { return size_; }
 
+  /// Equal for two open files exactly where they are the same file, whatever their names.
+  using Identity = std::pair<std::uint64_t, std::uint64_t>;
+  Identity identity() const { return identity_; }
+
   /// The first bytes, at most 64. Empty when they cannot be read.
   std::string head() const;
 
@@ -31,16 +35,12 @@ class InputFile {
   /// Result: empty when bytes() holds it, else the reason.
   std::string read_all();
 
-  /// Effect: fills `bytes` with the first `count` bytes, or with all that there are.
-  ///
-  /// Result: empty, or the reason why they cannot be read.
-  std::string read_first(std::uint64_t count, std::vector<char>& bytes) const;
-
   std::string_view bytes() const { return {bytes_.get(), bytes_read_}; }
 
  private:
   int descriptor_ = -1;
   std::uint64_t size_ = 0;
+  Identity identity_{};  ///< device and inode
   std::unique_ptr<char[]> bytes_;
   std::size_t bytes_read_ = 0;
 };

@@ -1,8 +1,8 @@
 #pragma once
-#include <cstdint>
 #include <filesystem>
 #include <string_view>
 
+#include "read_limits.h"
 #include "read_result.h"
 
 namespace tandem::build {
@@ -11,9 +11,9 @@ namespace tandem::build {
 ///
 /// Result: see flatten_gltf(); the default scene, the first one when none is named, or all nodes when there
 /// is no scene. Positions keep their float32, transforms their float64 value. Images are never looked at.
-/// Memory is a small multiple of the bytes and of `most_bytes`, time that of both.
+/// Memory and time are small multiples of what the file and its buffers hold, and of `limits.expansion`.
 /// Errors: what is no glTF; buffers that are missing or too short, by name; what flatten_gltf() refuses;
-/// extensions that hide the triangles from us, by name; what takes more than `most_bytes`.
-ReadResult read_gltf(std::string_view bytes, const std::filesystem::path& folder, std::uint64_t most_bytes);
+/// extensions that hide the triangles from us, by name; what is beyond `limits`.
+ReadResult read_gltf(std::string_view bytes, const std::filesystem::path& folder, const ReadLimits& limits);
 
 }  // namespace tandem::build

@@ -4,8 +4,8 @@
 #include <array>
 #include <utility>
 
-#include "gltf_model.h"
 #include "common/printable.h"
+#include "gltf_model.h"
 
 namespace tandem::build {
 namespace {

@@ -19,6 +19,7 @@ ReadResult small_mesh() {
   result.mesh.face_begin = {0, 4, 7};
   result.mesh.parts = {{"first", "root/a", 0, 1}, {"", "", 1, 1}};
   result.mesh.remarks = {"odd"};
+  result.mesh.left_out = {true, false, true};
   result.mesh.reader = "somebody";
   result.mesh.single_precision = true;
   return result;
@@ -70,6 +71,7 @@ TEST(MeshMessage, BringsAMeshAcross) {
   EXPECT_EQ(result.mesh.parts[0].node_path, "root/a");
   EXPECT_EQ(result.mesh.parts[1].first_face, 1u);
   EXPECT_EQ(result.mesh.remarks, sent.remarks);
+  EXPECT_TRUE(result.mesh.left_out.points && !result.mesh.left_out.lines && result.mesh.left_out.strip_turns);
   EXPECT_EQ(result.mesh.reader, "somebody");
   EXPECT_TRUE(result.mesh.single_precision);
 }

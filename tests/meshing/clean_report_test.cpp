@@ -21,15 +21,16 @@ TEST(Findings, ListEveryCountUnderItsOwnKey) {
   report.triangles_duplicate_reversed = 9;
   report.triangles_flattened = 10;
   report.faces_too_few_corners = 11;
+  report.faces_repeated_corner = 12;
   std::set<std::string> keys;
   std::set<std::uint64_t> counts;
   for (const Finding& finding : findings(report)) {
     keys.insert(finding.key);
     counts.insert(finding.count);
-    EXPECT_EQ(finding.sentence.find(std::to_string(finding.count) + " "), 0u);
+    EXPECT_EQ(finding.sentence().find(std::to_string(finding.count) + " "), 0u);
   }
-  EXPECT_EQ(keys.size(), 11u);
-  EXPECT_EQ(counts.size(), 11u);
+  EXPECT_EQ(keys.size(), 12u);
+  EXPECT_EQ(counts.size(), 12u);
 }
 
 TEST(Findings, SpeakOfOneAndOfMany) {
@@ -37,7 +38,7 @@ TEST(Findings, SpeakOfOneAndOfMany) {
   report.faces_not_finite = 1;
   report.triangles_degenerate = 2;
   std::set<std::string> sentences;
-  for (const Finding& finding : findings(report)) sentences.insert(finding.sentence);
+  for (const Finding& finding : findings(report)) sentences.insert(finding.sentence());
   EXPECT_TRUE(sentences.contains("1 face has a coordinate that is NaN or infinite; dropped"));
   EXPECT_TRUE(sentences.contains("2 triangles have all corners on one line; dropped"));
 }

@@ -167,6 +167,24 @@ TEST(Triangulate, SkipsCornersThatRepeatTheirPredecessor) {
   mesh.face_begin = {0, 7};
   const Outcome outcome = run(mesh);
   EXPECT_EQ(outcome.mesh.triangles, (std::vector<TriangleIndices>{{0, 1, 2}, {0, 2, 3}}));
+  EXPECT_EQ(outcome.report.faces_repeated_corner, 1u);
+}
+
+/// Of four vertices in different places.
+std::uint64_t repeats_found(const std::vector<std::uint32_t>& corners) {
+  PolygonMesh mesh = flat_face({{0, 0}, {4, 0}, {0, 4}, {9, 9}});
+  mesh.corners = corners;
+  mesh.face_begin = {0, static_cast<std::uint32_t>(corners.size())};
+  return run(mesh).report.faces_repeated_corner;
+}
+
+TEST(Triangulate, CountsFacesThatRepeatACornerInARowAndNoOthers) {
+  EXPECT_EQ(repeats_found({0, 1, 1, 2}), 1u);
+  EXPECT_EQ(repeats_found({0, 1, 2, 0}), 1u);
+  EXPECT_EQ(repeats_found({0, 0, 1, 2, 2}), 1u);
+  EXPECT_EQ(repeats_found({0, 1, 3, 1, 2}), 0u);  // a spike
+  EXPECT_EQ(repeats_found({0, 1, 2, 0, 3}), 0u);
+  EXPECT_EQ(repeats_found({0, 1, 1}), 0u);  // a degenerate triangle
 }
 
 TEST(Triangulate, KeepsFaceOnOnePlaceAsOneDegenerateTriangle) {

@@ -3,6 +3,7 @@
 
 Environment: TANDEM_BVHBUILD, TANDEM_BVHINFO (the binaries), TANDEM_SOURCE_DIR.
 """
+import base64
 import json
 import os
 import pty
@@ -11,6 +12,8 @@ import signal
 import subprocess
 import time
 import unittest
+
+import numpy as np
 
 from tool_test import (BVHBUILD, BVHINFO, COLLADA_TRIANGLE, CUBE_OBJ, DONE, NO_TRIANGLE, TRIANGLE_OBJ, UNREADABLE_INPUT, UNWRITABLE_OUTPUT,
                        USAGE, ToolTest, grid_ply, scattered_obj)
@@ -23,7 +26,7 @@ NOBODY = 65534
 class Usage(ToolTest):
     def test_help_names_every_option_and_exit_code(self):
         for tool, words in ((BVHBUILD, ("MESH", "--output", "--imaginary", "minimal|free|SHARE", "--effort", "fast|default|best", "--strict", "--json",
-                                        "--quiet", "--threads", "--reader", "--time-limit", "--memory-limit",
+                                        "--quiet", "--threads", "--reader", "--time-limit", "--memory-limit", "--expansion-limit",
                                         "--version", "Exit codes: 0 done")),
                             (BVHINFO, ("FILE", "--json", "--verify", "--version", "Exit codes: 0 all sound"))):
             result = self.run_tool(tool, "--help")
@@ -56,7 +59,7 @@ class Usage(ToolTest):
         for option, values in {"--imaginary": ["some", "1.5", "-0.1", "nan", ""], "--effort": ["slow", "0", ""],
                                "--reader": ["cgal", "0"],
                                "--threads": ["0", "-1", "two", "1e9"], "--time-limit": ["0", "-5", "nan", "soon"],
-                               "--memory-limit": ["0", "nan", "inf", "8GiB"]}.items():
+                               "--memory-limit": ["0", "nan", "inf", "8GiB"], "--expansion-limit": ["-1", "nan", "many"]}.items():
             for value in values:
                 with self.subTest(option=option, value=value):
                     self.assert_fails(self.build(mesh, "-o", self.out, f"{option}={value}"), USAGE, option)
@@ -115,21 +118,108 @@ class UnreadableInput(ToolTest):
         self.assert_refused(tree, "already a Tandem tree")
         self.assert_refused(tree.rename(self.inputs / "a.obj"), "already a Tandem tree")
 
-    def test_lines_and_points_alone_hold_no_triangle(self):
-        self.assert_refused(self.write("l.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2 3\np 1\n"), "no usable triangle",
-                            code=NO_TRIANGLE)
+    def test_a_mesh_without_a_usable_triangle_says_all_causes(self):
+        vertices = "v 0 0 0\nv 1 1 1\nv 2 2 2\nv 0 1 0\n"
         points = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
-        self.assert_refused(self.write("p.ply", points + "end_header\n0 0 0\n"), "no usable triangle", code=NO_TRIANGLE)
-        self.assert_refused(self.write("p.off", "OFF\n2 0 0\n0 0 0\n1 1 1\n"), "no usable triangle", code=NO_TRIANGLE)
-
-    def test_flat_triangles_alone_are_no_usable_ones_and_say_why(self):
-        self.assert_refused(self.write("f.obj", "v 0 0 0\nv 1 1 1\nv 2 2 2\nf 1 2 3\n"), "on one line", code=NO_TRIANGLE)
+        strip = "element tristrips 1\nproperty list int int vertex_indices\nend_header\n0 0 0\n4 0 0 0 0\n"
+        for name, content, causes in (
+                ("l.obj", vertices + "l 1 2 3\n", "it has lines but no faces"),
+                ("lp.obj", vertices + "l 1 2 3\np 1\n", "it has points and lines but no faces"),
+                ("v.obj", vertices, "it has points but no faces"),
+                ("surf.obj", vertices + "surf 0 1 0 1 1 2\n", "it has points but no faces; free-form surfaces are not read"),
+                ("p.ply", points + "end_header\n0 0 0\n", "it has points but no faces"),
+                ("e.ply", points + "element edge 1\nproperty int a\nend_header\n0 0 0\n0\n", "it has lines but no faces"),
+                ("s.ply", points + strip, "the triangles of its strips all name a vertex twice"),
+                ("p.off", "OFF\n2 0 0\n0 0 0\n1 1 1\n", "it has points but no faces"),
+                ("e.off", "OFF\n0 0 0\n", "it has no faces and no vertices"),
+                ("e.stl", "solid a\nendsolid a\n", "it has no faces and no vertices"),
+                ("e.gltf", '{"asset": {"version": "2.0"}}', "it has no faces and no vertices"),
+                ("flat.obj", vertices + "f 1 2 3\n", "1 triangle has all corners on one line"),
+                ("nan.obj", vertices + "v nan 0 0\nf 1 2 5\n", "1 face has a coordinate that is NaN or infinite"),
+                ("all.obj", vertices + "f 1 2 3\nf 1 2\nf 1 2 9\n",
+                 "1 face names a vertex that the file does not have; 1 face has fewer than three corners; "
+                 "1 triangle has all corners on one line; line 7: face index 9 of 4 vertices")):
+            for option in ([], ["--strict"]):
+                with self.subTest(name=name, option=option):
+                    path = self.write(name, content)
+                    result = self.build(path, "-o", self.out, *option)
+                    self.assertEqual(result.stderr.decode(), f"bvhbuild: {path}: holds no usable triangle: {causes}\n")
+                    self.assertEqual(result.returncode, NO_TRIANGLE)
+        self.assert_nothing_written()
 
     def test_the_time_limit_ends_an_endless_import(self):
         path = self.write("endless.ply", ENDLESS_PLY)
         result = self.build(path, "-o", self.out, "--reader", "assimp", "--time-limit", "0.3")
         self.assert_fails(result, UNREADABLE_INPUT, path, "0.3 s (--time-limit)")
         self.assert_nothing_written()
+
+    def assert_cheaply_refused(self, name, content, *arguments):
+        """Exit code 2 with a reason, below 1 GiB and 10 s."""
+        path = self.write(name, content)
+        with open(self.root / "stderr", "w+b") as stderr:
+            start = time.monotonic()
+            process = subprocess.Popen([BVHBUILD, path, "-o", self.out, *arguments], stderr=stderr)
+            _, status, usage = os.wait4(process.pid, 0)
+            process.returncode = os.waitstatus_to_exitcode(status)
+            stderr.seek(0)
+            message = stderr.read().decode()
+        self.assertEqual(process.returncode, UNREADABLE_INPUT, message)
+        self.assertTrue(message.startswith(f"bvhbuild: {path}: "), message)
+        self.assertLess(time.monotonic() - start, 10)
+        self.assertLess(usage.ru_maxrss << 10, 1 << 30)
+        return message
+
+    def test_instances_and_counts_without_data_are_refused_before_they_take_memory(self):
+        scene = {"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}],
+                 "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+                 "accessors": [{"componentType": 5126, "count": 10 ** 8, "type": "VEC3"},
+                               {"componentType": 5125, "count": 3 * 10 ** 8, "type": "SCALAR"}]}
+        self.assertIn("--expansion-limit", self.assert_cheaply_refused("promises.gltf", json.dumps(scene)))
+        data = bytes(np.arange(3 * 20000, dtype="<u2"))  # positions and indices alike
+        scene["nodes"] *= 20000
+        scene["accessors"] = [{"bufferView": 0, "componentType": 5122, "count": 20000, "type": "VEC3"},
+                              {"bufferView": 0, "componentType": 5123, "count": 60000, "type": "SCALAR"}]
+        scene["bufferViews"] = [{"buffer": 0, "byteLength": len(data)}]
+        scene["buffers"] = [{"byteLength": len(data), "uri": "data:;base64," + base64.b64encode(data).decode()}]
+        self.assertIn("--expansion-limit", self.assert_cheaply_refused("instances.gltf", json.dumps(scene)))
+        nodes = "".join(f'<node id="n{i}"><instance_node url="#n{i + 1}"/><instance_node url="#n{i + 1}"/></node>'
+                        for i in range(30))
+        nested = COLLADA_TRIANGLE.replace("<library_visual_scenes>",
+                                          f'<library_nodes>{nodes}<node id="n30"/></library_nodes><library_visual_scenes>')
+        nested = nested.replace("<translate>", '<instance_node url="#n0"/><translate>')
+        self.assertIn("--expansion-limit", self.assert_cheaply_refused("nested.dae", nested))
+
+    def test_a_higher_expansion_limit_allows_instances(self):
+        scene = {"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}] * 500,
+                 "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": 5}]}],
+                 "accessors": [{"bufferView": 0, "componentType": 5121, "count": 100, "type": "VEC3"}],
+                 "bufferViews": [{"buffer": 0, "byteLength": 300}],
+                 "buffers": [{"byteLength": 300, "uri": "data:;base64," + base64.b64encode(bytes(range(250)) + bytes(50)).decode()}]}
+        path = self.write("a.gltf", json.dumps(scene))
+        self.assert_fails(self.build(path, "-o", self.out, "--expansion-limit", "0"), UNREADABLE_INPUT, "--expansion-limit")
+        self.assertEqual(self.build(path, "-o", self.out, "--expansion-limit", "1e5").returncode, DONE)
+
+    def test_counts_beyond_the_file_are_refused_before_they_take_memory(self):
+        vertex = "property float x\nproperty float y\nproperty float z\n"
+        face = "property list uchar int vertex_indices\n"
+        huge = 4 * 10 ** 9
+        for form in ("ascii", "binary_little_endian", "binary_big_endian"):
+            head = f"ply\nformat {form} 1.0\n"
+            lists = f"{huge} 0 0\n" if form == "ascii" else b"\0" * 12 + b"\x7f" * 4 + b"\0" * 8
+            for name, text in (("vertices", f"element vertex {huge}\n{vertex}end_header\n"),
+                               ("faces", f"element vertex 1\n{vertex}element face {huge}\n{face}end_header\n"),
+                               ("strip", f"element vertex 1\n{vertex}element tristrips 1\n"
+                                "property list int int vertex_indices\nend_header\n"),
+                               ("other", f"element vertex 1\n{vertex}element odd {huge}\nproperty list uint double q\nend_header\n")):
+                data = lists if isinstance(lists, bytes) else f"0 0 0\n{lists}".encode()
+                self.assert_cheaply_refused(f"{name}_{form}.ply", (head + text).encode() + data)
+        for name, content in (("vertices.off", f"OFF\n{huge} 1 0\n0 0 0\n"), ("faces.off", f"OFF\n1 {huge} 0\n0 0 0\n3 0 0 0\n"),
+                              ("corners.off", f"OFF\n1 1 0\n0 0 0\n{huge} 0 0\n"),
+                              ("binary.off", b"OFF BINARY\n" + b"\x7f\xff\xff\xff" * 2 + bytes(4)),
+                              ("facets.stl", bytes(80) + b"\xff" * 4 + bytes(50))):
+            self.assert_cheaply_refused(name, content)
+        for name in ("vertices_ascii.ply", "faces_binary_little_endian.ply", "faces.off"):
+            self.assert_cheaply_refused(name, (self.inputs / name).read_bytes(), "--reader", "assimp")
 
     def test_a_file_beyond_the_memory_limit_is_refused(self):
         path = self.write("sparse.obj", b"")
@@ -373,7 +463,8 @@ class BuildJson(ToolTest):
     ALWAYS = {"tool", "version", "exit_code", "error", "input", "output", "reader", "single_precision_reader", "faces",
               "vertices", "remarks", "findings", "seconds", "peak_memory_bytes"}
     AFTER_SUCCESS = {"interrupted", "parts", "origin", "rounding_error", "tree", "bytes", "hash"}
-    FINDINGS = {"faces_index_out_of_range", "faces_too_few_corners", "faces_not_finite", "faces_too_large", "faces_not_simple",
+    FINDINGS = {"faces_index_out_of_range", "faces_too_few_corners", "faces_not_finite", "faces_too_large",
+                "faces_repeated_corner", "faces_not_simple",
                 "vertices_unreferenced", "vertices_welded", "triangles_degenerate", "triangles_duplicate",
                 "triangles_duplicate_reversed", "triangles_flattened"}
 
@@ -414,6 +505,9 @@ class Strict(ToolTest):
     def test_every_defect_is_an_error_that_says_what_was_found(self):
         for name, content, words in (
                 ("flat.obj", CUBE_OBJ + "f 1 2 2\n", "on one line"),
+                ("repeated.obj", CUBE_OBJ.replace("f 4 3 2 1", "f 4 3 3 2 1"), "two corners in a row in the same place"),
+                ("closed.obj", CUBE_OBJ.replace("f 4 3 2 1", "f 4 3 2 1 4"), "two corners in a row in the same place"),
+                ("both.obj", CUBE_OBJ + "v 9 9 9\nf 1 2 2\n", "1 vertex belongs to no face; 1 triangle has all corners"),
                 ("loose.obj", CUBE_OBJ + "v 9 9 9\n", "to no face"),
                 ("range.obj", CUBE_OBJ + "f 1 2 99\n", "99"),
                 ("twice.obj", CUBE_OBJ + "f 4 3 2 1\n", "earlier one"),

@@ -56,17 +56,37 @@ std::string output_defect(const Options& options, ExitCode& code) {
   return {};
 }
 
-std::uint64_t defects(const CleanReport& report) {
-  std::uint64_t sum = 0;
-  for (const Finding& finding : findings(report)) sum += finding.defect ? finding.count : 0;
-  return sum;
+/// "a; b; c".
+std::string joined(const std::vector<std::string>& texts) {
+  std::string all;
+  for (const std::string& text : texts) all += (all.empty() ? "" : "; ") + text;
+  return all;
 }
 
-std::string first_defect(const CleanReport& report) {
-  for (const Finding& finding : findings(report)) {
-    if (finding.defect && finding.count > 0) return finding.sentence;
-  }
-  return {};
+/// What --strict takes for an error; empty where there is nothing.
+std::string all_defects(const Outcome& outcome) {
+  std::vector<std::string> defects = outcome.remarks;
+  for (const Finding& finding : findings(outcome.clean))
+    if (finding.defect && finding.count > 0) defects.push_back(finding.what);
+  return joined(defects);
+}
+
+std::string instead_of_faces(const Outcome& outcome, const LeftOut& left_out) {
+  if (left_out.strip_turns) return "the triangles of its strips all name a vertex twice";
+  if (left_out.lines)
+    return left_out.points ? "it has points and lines but no faces" : "it has lines but no faces";
+  if (left_out.points || outcome.clean.vertices > 0) return "it has points but no faces";
+  return "it has no faces and no vertices";
+}
+
+/// Why a mesh has no triangle: its faces and what became of them, or what it has instead of faces.
+std::string why_no_triangle(const Outcome& outcome, const LeftOut& left_out) {
+  std::vector<std::string> causes;
+  if (outcome.clean.faces == 0) causes.push_back(instead_of_faces(outcome, left_out));
+  for (const Finding& finding : findings(outcome.clean))
+    if (finding.loses_faces && finding.count > 0) causes.push_back(finding.what);
+  causes.insert(causes.end(), outcome.remarks.begin(), outcome.remarks.end());
+  return "holds no usable triangle: " + joined(causes);
 }
 
 StoredMesh prepare(PolygonMesh& polygons, Outcome& outcome) {
@@ -147,15 +167,10 @@ Outcome run_pipeline(const Options& options) {
 
   progress.step("clean");
   const StoredMesh mesh = prepare(polygons, outcome);
-  if (options.strict && (defects(outcome.clean) > 0 || !outcome.remarks.empty())) {
-    const std::string found = outcome.remarks.empty() ? first_defect(outcome.clean) : outcome.remarks.front();
-    return fail(outcome, kUnreadableInput, options.input, found + " (--strict)");
-  }
-  if (mesh.triangles.empty()) {
-    const std::string found = first_defect(outcome.clean);
-    return fail(outcome, kNoTriangle, options.input,
-                "holds no usable triangle" + (found.empty() ? std::string() : ": " + found));
-  }
+  if (mesh.triangles.empty())
+    return fail(outcome, kNoTriangle, options.input, why_no_triangle(outcome, polygons.left_out));
+  const std::string amiss = options.strict ? all_defects(outcome) : "";
+  if (!amiss.empty()) return fail(outcome, kUnreadableInput, options.input, amiss + " (--strict)");
 
   progress.step("build");
   const Image image = build_image(options, polygons, mesh, progress, outcome);

@@ -70,7 +70,7 @@ std::string text_report(const Options& options, const Outcome& outcome) {
       << outcome.reader << ")\n";
   for (const std::string& remark : outcome.remarks) out << "  note     " << remark << "\n";
   for (const Finding& finding : findings(outcome.clean)) {
-    if (finding.count > 0) out << "  found    " << finding.sentence << "\n";
+    if (finding.count > 0) out << "  found    " << finding.sentence() << "\n";
   }
   out << "  stored   " << rounding_line(outcome) << "\n";
   out << "  tree     " << tree.imaginary_nodes << " of " << with_commas(tree.nodes)

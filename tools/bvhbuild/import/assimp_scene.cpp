@@ -52,7 +52,9 @@ void add_mesh(const aiMesh& mesh, const Visit& visit, MeshAssembly& out) {
   for (const aiVector3D& v : std::span(mesh.mVertices, mesh.mNumVertices))
     out.add_point(transformed(visit.world, {v.x, v.y, v.z}));
   for (const aiFace& face : std::span(mesh.mFaces, mesh.mNumFaces)) {
-    if (face.mIndices == nullptr || face.mNumIndices < 3) continue;  // points and lines
+    if (face.mNumIndices == 1) out.leave_out_points();
+    if (face.mNumIndices == 2) out.leave_out_lines();
+    if (face.mIndices == nullptr || face.mNumIndices < 3) continue;
     for (const unsigned index : std::span(face.mIndices, face.mNumIndices))
       out.add_corner(index < mesh.mNumVertices ? static_cast<std::int64_t>(first + index) : -1);
     out.end_face();

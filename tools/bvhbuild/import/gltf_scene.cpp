@@ -13,7 +13,7 @@
 namespace tandem::build {
 namespace {
 
-enum Mode { kTriangles = 4, kTriangleStrip = 5, kTriangleFan = 6 };
+enum Mode { kPoints = 0, kTriangles = 4, kTriangleStrip = 5, kTriangleFan = 6 };
 
 constexpr std::uint64_t kMostCorners = kNoVertex - 1;
 constexpr int kMostRemarksOfAKind = 4;
@@ -203,6 +203,8 @@ void SceneReader::measure_primitive(const GltfPrimitive& primitive, const std::s
                                     std::map<int, std::uint64_t>& points, Size& size) {
   if (primitive.mode < 0 || primitive.mode > kTriangleFan)
     throw GltfError("mode " + std::to_string(primitive.mode) + " is none of glTF");
+  if (primitive.mode == kPoints) out_.leave_out_points();
+  if (primitive.mode > kPoints && primitive.mode < kTriangles) out_.leave_out_lines();
   if (!has_triangles(primitive)) return;
   if (primitive.positions == -1) {
     if (remarks_++ < kMostRemarksOfAKind) out_.remark(name + " has no POSITION and is passed over");

@@ -34,6 +34,10 @@ class MeshAssembly {
   /// name.
   void begin_part(std::string_view name, std::string_view node_path);
 
+  void leave_out_points() { mesh_.left_out.points = true; }
+  void leave_out_lines() { mesh_.left_out.lines = true; }
+  void leave_out_strip_turn() { mesh_.left_out.strip_turns = true; }
+
   void remark(std::string text) { mesh_.remarks.push_back(std::move(text)); }
   /// Whether one more remark about a vertex index is welcome: the first few show what is wrong, a million
   /// would not.

@@ -99,11 +99,13 @@ bool parts_are_sound(const PolygonMesh& mesh) {
 bool read_mesh(MessageReader& reader, PolygonMesh& mesh) {
   const auto read_text = [&](std::string& text) { return reader.sequence(text); };
   const auto read_one_part = [&](SourcePart& part) { return read_part(reader, part); };
-  std::uint64_t single = 0;
+  std::uint64_t single = 0, points = 0, lines = 0, turns = 0;
   if (!reader.sequence(mesh.points) || !reader.sequence(mesh.corners) || !reader.sequence(mesh.face_begin))
     return false;
   if (!reader.list(mesh.parts, read_one_part) || !reader.list(mesh.remarks, read_text)) return false;
+  if (!reader.number(points) || !reader.number(lines) || !reader.number(turns)) return false;
   if (!reader.sequence(mesh.reader) || !reader.number(single)) return false;
+  mesh.left_out = {points != 0, lines != 0, turns != 0};
   mesh.single_precision = single != 0;
   return mesh.points.size() <= kNoVertex && faces_are_sound(mesh) && parts_are_sound(mesh);
 }
@@ -121,6 +123,9 @@ void write_mesh(Writer& writer, const PolygonMesh& mesh) {
   }
   writer.number(mesh.remarks.size());
   for (const std::string& remark : mesh.remarks) writer.sequence(remark);
+  writer.number(mesh.left_out.points);
+  writer.number(mesh.left_out.lines);
+  writer.number(mesh.left_out.strip_turns);
   writer.sequence(mesh.reader);
   writer.number(mesh.single_precision);
 }

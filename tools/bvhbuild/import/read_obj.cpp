@@ -66,6 +66,8 @@ bool ObjReader::statement() {
   if (keyword == "f") return face();
   if (keyword == "o") name(object_);
   if (keyword == "g") name(group_);
+  if (keyword == "p") mesh_.leave_out_points();
+  if (keyword == "l") mesh_.leave_out_lines();
   if (keyword == "surf") any_surface_ = true;
   text_.skip_to_line_end();
   return true;

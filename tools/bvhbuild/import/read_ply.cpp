@@ -114,6 +114,8 @@ ReadResult PlyReader<Values>::read() {
     if (kind_of(element) == ElementKind::vertex) vertices_promised_ = element.count;
   for (const PlyElement& next : header_.elements)
     if (!element(next)) return read_failure(std::move(error_));
+  for (const PlyElement& left : header_.elements)
+    if (left.name == "edge" && left.count > 0) mesh_.leave_out_lines();
   if (values_.bytes_left() > 0)
     mesh_.remark(std::to_string(values_.bytes_left()) + " bytes after the last element are passed over");
   return mesh_.finish();

@@ -25,7 +25,7 @@ class TriangleStrip {
 
  private:
   void add_triangle(std::int64_t index) {
-    if (index == last_ || index == before_last_ || last_ == before_last_) return;
+    if (index == last_ || index == before_last_ || last_ == before_last_) return mesh_.leave_out_strip_turn();
     const bool turned = length_ % 2 == 1;
     mesh_.add_corner(turned ? last_ : before_last_);
     mesh_.add_corner(turned ? before_last_ : last_);

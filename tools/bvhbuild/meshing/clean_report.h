@@ -15,6 +15,7 @@ struct CleanReport {
   std::uint64_t faces_too_few_corners = 0;     ///< dropped: two corners or fewer
   std::uint64_t faces_not_finite = 0;          ///< dropped: a corner is NaN or infinite
   std::uint64_t faces_too_large = 0;           ///< dropped: a corner lies beyond +-kMaxCoordinate
+  std::uint64_t faces_repeated_corner = 0;     ///< kept: larger faces with two corners in a row in one place
   std::uint64_t faces_not_simple = 0;          ///< kept: the outline crosses itself, so it was split as a fan
   std::uint64_t vertices_unreferenced = 0;     ///< dropped: no face of the file names them
   std::uint64_t vertices_welded = 0;           ///< merged with an earlier vertex at exactly the same place
@@ -27,10 +28,14 @@ struct CleanReport {
 
 /// One line of a report.
 struct Finding {
-  const char* key;       ///< stable; for JSON
-  std::uint64_t count;   ///< may be 0
-  std::string sentence;  ///< for people: "3 faces name a vertex that the file does not have; dropped"
-  bool defect;           ///< something is wrong with the mesh; false for mere bookkeeping (welded vertices)
+  const char* key;      ///< stable; for JSON
+  std::uint64_t count;  ///< may be 0
+  std::string what;     ///< for people: "3 faces name a vertex that the file does not have"
+  const char* fate;     ///< what became of them: "dropped"
+  bool defect;          ///< something is wrong with the mesh; false for mere bookkeeping (welded vertices)
+  bool loses_faces;     ///< faces, or triangles of theirs, were dropped for it
+
+  std::string sentence() const { return what + "; " + fate; }
 };
 
 /// All findings in a fixed order, those with count 0 included: the text report, --json and --strict share

@@ -22,6 +22,12 @@ struct SourcePart {
   std::uint64_t face_count = 0;
 };
 
+/// What a file holds instead of faces. Readers leave it out.
+struct LeftOut {
+  bool points = false, lines = false;
+  bool strip_turns = false;  ///< triangles of a strip that name a vertex twice: they only lead it elsewhere
+};
+
 /// What a reader hands over: the polygons of a file, in the file's order, with the file's float64
 /// coordinates. Nothing in it is checked but its shape: indices may be out of range, coordinates not finite,
 /// polygons degenerate. Points and lines of formats that tell them from faces are left out. Whatever the file
@@ -31,6 +37,7 @@ struct PolygonMesh {
   std::vector<std::uint32_t> corners;        ///< vertex indices of all faces, one face after the other
   std::vector<std::uint32_t> face_begin{0};  ///< face f has corners [face_begin[f], face_begin[f + 1])
   std::vector<SourcePart> parts;             ///< ascending, without gaps, together all faces
+  LeftOut left_out;
   std::string reader;             ///< who read the file, for the report: "tandem PLY", "assimp 5.2.5"
   bool single_precision = false;  ///< the reader keeps only float32 of each coordinate
   std::vector<std::string>

@@ -85,6 +85,7 @@ class Triangulator {
             .subspan(mesh_.face_begin[face], mesh_.face_begin[face + 1] - mesh_.face_begin[face]);
     if (!usable(corners)) return;
     if (corners.size() == 3) return emit(face, {corners[0], corners[1], corners[2]});
+    report_.faces_repeated_corner += repeats_a_corner(corners);
     gather(face, corners);
     if (points_.size() < 3) return emit(face, {corners[0], corners[0], corners[0]});
     split();
@@ -105,6 +106,12 @@ class Triangulator {
       }
     if (!finite) return drop(report_.faces_not_finite);
     return small || drop(report_.faces_too_large);
+  }
+
+  bool repeats_a_corner(Corners corners) const {
+    const auto same = [this](std::uint32_t a, std::uint32_t b) { return mesh_.points[a] == mesh_.points[b]; };
+    return same(corners.front(), corners.back()) ||
+           std::adjacent_find(corners.begin(), corners.end(), same) != corners.end();
   }
 
   static bool drop(std::uint64_t& count) {

@@ -14,10 +14,10 @@ namespace tandem::build {
 /// corners, a coordinate that is not finite or one beyond +-kMaxCoordinate are left out, each counted once,
 /// under the first of these that holds.
 ///
-/// Triangles stay as they are. In larger faces, a corner at the same place as the one before it is skipped,
-/// and a spike (from a place to another and straight back) becomes a degenerate triangle: it has no area, and
-/// the face is split as if it were not there. What remains of a face without any area is degenerate too;
-/// clean() drops and counts all these. They do not make a face "not simple".
+/// Triangles stay as they are. In larger faces, a corner at the same place as the one before it is skipped
+/// and the face counted once, and a spike (from a place to another and straight back) becomes a degenerate
+/// triangle: it has no area, and the face is split as if it were not there. What remains of a face without
+/// any area is degenerate too; clean() drops and counts all these. They do not make a face "not simple".
 ///
 /// A quad is cut along the diagonal that lies inside, the shorter one if both do. A larger face is projected
 /// along the main axis of its Newell normal (Newell in Sutherland, Sproull & Schumacker 1974) and

@@ -13,6 +13,7 @@ import subprocess
 import time
 import unittest
 
+import bvh_file
 import numpy as np
 
 from tool_test import (BVHBUILD, BVHINFO, COLLADA_TRIANGLE, CUBE_OBJ, DONE, NO_TRIANGLE, TRIANGLE_OBJ, UNREADABLE_INPUT, UNWRITABLE_OUTPUT,
@@ -53,6 +54,21 @@ class Usage(ToolTest):
         self.assert_fails(self.build(mesh, "second.obj", "-o", self.out), USAGE, "second.obj")
         self.assert_fails(self.info("--fast", mesh), USAGE, "--fast")
         self.assert_nothing_written()
+
+    def test_a_misspelt_option_is_named_before_what_is_missing(self):
+        mesh = self.write("a.obj", TRIANGLE_OBJ)
+        for arguments, word in (((mesh, "--outptu", self.out), "there is no option --outptu\n"),
+                                ((mesh, "-o", self.out, "--efort", "best", "--jsno"), "there is no option --efort\n"),
+                                ((mesh, "-o", self.out, "one", "two"), "not expected: one two\n")):
+            self.assert_fails(self.build(*arguments), USAGE, word)
+        self.assert_nothing_written()
+
+    def test_standard_input_and_output_are_refused_by_name(self):
+        mesh = self.write("a.obj", TRIANGLE_OBJ)
+        self.assert_fails(self.build(mesh, "-o", "-", cwd=self.outputs), USAGE, "--output", "not standard input or output")
+        self.assert_fails(self.build("-", "-o", self.out), USAGE, "MESH", "not standard input or output")
+        self.assert_nothing_written()
+        self.assertEqual(self.build(mesh, "-o", "./-", cwd=self.outputs).returncode, DONE)
 
     def test_bad_values_are_refused_by_option(self):
         mesh = self.write("a.obj", TRIANGLE_OBJ)
@@ -305,6 +321,23 @@ class Paths(ToolTest):
                 self.assertIn("triangles", json.loads(self.info(out, "--json").stdout))
         self.assertEqual(sorted(os.listdir(self.outputs)), sorted(name + ".bvh" for name in self.NAMES))
 
+    def test_messages_hold_no_control_characters_of_names(self):
+        mesh, out = self.write("red\x1b[31m\n.obj", TRIANGLE_OBJ), self.outputs / os.fsdecode(b"\x1b[2J\xff\xc2.bvh")
+        shown = "\ufffd[2J\ufffd\ufffd.bvh"
+        report = self.build(mesh, "-o", out)
+        self.assertIn("red\ufffd[31m\ufffd.obj", report.stdout.decode())
+        self.assertIn(shown, report.stdout.decode())
+        texts = [report.stdout, self.info(out).stdout, self.info("--verify", out).stdout, self.info(out, out).stdout]
+        for text in texts:
+            self.assertIn(shown, text.decode())
+        failures = [self.build(self.inputs / "no\x1bne\n.obj", "-o", self.out), self.build(mesh, "-o", self.outputs / "a\x1b" / "b"),
+                    self.build(mesh, "-o", self.out, "--od\x1bd"), self.info(self.inputs / "no\x1bne.bvh")]
+        for failure in failures:
+            self.assertIn("\ufffd", failure.stderr.decode())
+            texts.append(failure.stderr)
+        for text in texts:
+            self.assertNotIn(b"\x1b", text)
+
     def test_a_leading_dash_may_follow_a_double_dash(self):
         self.write("-o.obj", TRIANGLE_OBJ)
         result = self.build("--output=-out.bvh", "--", "-o.obj", cwd=self.inputs)
@@ -378,6 +411,7 @@ class Signals(ToolTest):
         os.close(ours)
         self.assertEqual(process.returncode, DONE)
         self.assertTrue(json.loads(report)["interrupted"])
+        self.assertIn(b"effort best, interrupted: the best tree until then\n", self.info(self.out).stdout)
         self.assertEqual(self.info("--verify", self.out).returncode, DONE)
         info = json.loads(self.info("--json", self.out).stdout)
         self.assertEqual(info["imaginary_nodes"], info["imaginary_minimum"])
@@ -441,6 +475,11 @@ class Streams(ToolTest):
             for arguments in ([], ["--json"]):
                 result = self.build(self.inputs / "a.obj", "-o", out, *arguments, stdout=full)
                 self.assertEqual(result.returncode, UNWRITABLE_OUTPUT)
+                self.assertEqual(result.stderr.decode(), f"bvhbuild: {out} is complete, but the report could not be printed: "
+                                                         "No space left on device\n")
+            result = self.build(self.inputs / "none.obj", "-o", out, "--json", stdout=full)
+            self.assertEqual(result.returncode, UNREADABLE_INPUT)
+            self.assertIn(b"no such file\nbvhbuild: the report could not be printed", result.stderr)
             self.assertEqual(self.build(self.inputs / "a.obj", "-o", out, "--quiet", stdout=full).returncode, DONE)
 
     def test_closed_standard_streams_do_no_harm(self):
@@ -538,15 +577,25 @@ class Info(ToolTest):
     def test_the_page_shows_what_people_look_for(self):
         page = self.info(self.built("cube.obj", CUBE_OBJ))
         self.assertEqual((page.returncode, page.stderr), (DONE, b""))
-        for word in ("cube.obj", "triangles    12", "1 imaginary", "minimum 1", "0 partial leaf", "depth", "SAH cost",
+        for word in ("cube.obj", "triangles    12", "1 imaginary", "minimum 1", "0 partial leaf blocks", "depth", "SAH cost",
                      "block pairs", "bounds", "origin", "sections", "provenance"):
             self.assertIn(word, page.stdout.decode())
 
     def test_the_page_sends_no_control_characters_of_a_file_to_a_terminal(self):
         page = self.info(self.built("red\x1b[31m\x07.obj", "o part\x1b[2J\n" + CUBE_OBJ)).stdout
-        self.assertIn(b"red?[31m?.obj", page)
+        self.assertIn("red\ufffd[31m\ufffd.obj", page.decode())
         self.assertNotIn(b"\x1b", page)
         self.assertNotIn(b"\x07", page)
+
+    def test_the_page_says_how_the_tree_was_built_and_nothing_of_interrupts_where_there_was_none(self):
+        page = self.info(self.built("cube.obj", CUBE_OBJ, "--imaginary", "free", "--effort", "fast")).stdout
+        self.assertIn(b", imaginary nodes free, effort fast\n", page)
+
+    def test_the_page_tells_parts_of_one_face_many_and_none(self):
+        mesh = "o one\n" + TRIANGLE_OBJ + "o two\nf 1 2 3\no many\nf 1 2 3\n"
+        page = self.info(with_second_part_emptied(self.built("a.obj", mesh))).stdout
+        for line in (b"one  face 0\n", b"(no name)  no faces\n", b"many  faces 1 to 2\n"):
+            self.assertIn(line, page)
 
     def test_json_of_one_file_is_an_object_with_all_keys(self):
         info = self.json_of(self.built("cube.obj", CUBE_OBJ))
@@ -605,7 +654,12 @@ class Info(ToolTest):
 
     def test_a_bad_file_beside_a_good_one_is_told(self):
         out, missing = self.built("cube.obj", CUBE_OBJ), self.inputs / "none.bvh"
-        self.assert_fails(self.info(out, missing), UNREADABLE_INPUT, missing, "no such file")
+        for files, words in (((out, missing), ["triangles    12"]), ((out, missing, out), ["triangles", "x1.000"])):
+            result = self.info(*files)
+            self.assertEqual(result.returncode, UNREADABLE_INPUT)
+            self.assertEqual(result.stderr.decode(), f"bvhinfo: {missing}: no such file (FileNotFound)\n")
+            for word in words:
+                self.assertIn(word, result.stdout.decode())
         sound = [verdict["sound"] for verdict in self.json_of("--verify", out, missing)]
         self.assertEqual(sound, [True, False])
 
@@ -614,6 +668,25 @@ class Info(ToolTest):
         self.assert_fails(self.info(self.inputs / "pipe.bvh"), UNREADABLE_INPUT, "not a regular file")
         self.assert_fails(self.info(self.inputs), UNREADABLE_INPUT, "not a regular file")
         self.assert_fails(self.info(self.write("empty.bvh", b"")), UNREADABLE_INPUT, "not a Tandem .bvh file")
+
+
+def with_second_part_emptied(path):
+    """The .bvh file, its second part without name and faces: other tools may write such parts."""
+    raw = bytearray(path.read_bytes())
+    *_, section_count, _, _ = bvh_file.HEADER.unpack_from(raw)
+    tables = {}
+    for i in range(section_count):
+        kind, _, offset, _, count = bvh_file.SECTION.unpack_from(raw, bvh_file.HEADER.size + i * bvh_file.SECTION.size)
+        name, row = bvh_file.KINDS[kind]
+        tables[name] = np.frombuffer(raw, row, count, offset)
+    parts, part_of = tables["parts"], tables["triangles"]["corner"]["w"][:, 1]
+    parts["first_face"][2] -= parts["face_count"][1]
+    parts["face_count"][2] += parts["face_count"][1]
+    parts["face_count"][1] = parts["name_bytes"][1] = 0
+    part_of[part_of == 1] = 2
+    raw[8:16] = bvh_file.xxh64(bytes(raw[16:])).to_bytes(8, "little")
+    path.write_bytes(raw)
+    return path
 
 
 def unprivileged(test):

@@ -4,6 +4,8 @@
 #include <new>
 
 #include "command.h"
+#include "common/option_helpers.h"
+#include "common/printable.h"
 #include "compare_command.h"
 #include "engines/gpu_query.h"
 #include "frame_command.h"
@@ -23,7 +25,7 @@ constexpr const char* kFooter =
     "5 internal error, 6 no GPU can be used, or it has too little memory.";
 
 ExitCode fail(ExitCode code, const char* reason) {
-  std::fprintf(stderr, "bvhbench: %s\n", reason);
+  std::fprintf(stderr, "bvhbench: %s\n", printable(reason).c_str());
   return code;
 }
 
@@ -63,13 +65,6 @@ int main(int argc, char** argv) {
   add_simulate(app, run);
   add_frame(app, run);
   add_poses(app, run);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& done) {
-    return app.exit(done);
-  } catch (const CLI::ParseError& error) {
-    std::fprintf(stderr, "bvhbench: %s\nTry 'bvhbench --help'.\n", error.what());
-    return kUsage;
-  }
-  return run_and_report(run);
+  ExitCode exit_code = kDone;
+  return parse_command_line(app, argc, argv, exit_code) ? run_and_report(run) : exit_code;
 }

@@ -1,10 +1,13 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <new>
 
+#include "common/printable.h"
 #include "pipeline.h"
 #include "report.h"
 
@@ -13,7 +16,7 @@ namespace {
 using namespace tandem;
 using namespace tandem::build;
 
-Outcome run(const Options& options) {
+Outcome run_or_explain(const Options& options) {
   Outcome outcome;
   try {
     return run_pipeline(options);
@@ -23,6 +26,12 @@ Outcome run(const Options& options) {
     outcome.error = options.input.string() + ": internal error: " + defect.what();
   }
   outcome.exit_code = kInternal;
+  return outcome;
+}
+
+Outcome run(const Options& options) {
+  Outcome outcome = run_or_explain(options);
+  outcome.error = printable(outcome.error);  // names of files may hold anything
   return outcome;
 }
 
@@ -36,8 +45,13 @@ void occupy_standard_descriptors() {
   if (descriptor > STDERR_FILENO) ::close(descriptor);
 }
 
+ExitCode complain(const std::string& what, ExitCode code) {
+  std::fprintf(stderr, "bvhbuild: %s\n", what.c_str());
+  return code;
+}
+
 void print(const Options& options, const Outcome& outcome) {
-  if (outcome.exit_code != kDone) std::fprintf(stderr, "bvhbuild: %s\n", outcome.error.c_str());
+  if (outcome.exit_code != kDone) complain(outcome.error, outcome.exit_code);
   if (options.json) {
     std::fputs(json_report(options, outcome).c_str(), stdout);
   } else if (!options.quiet && outcome.exit_code == kDone) {
@@ -49,14 +63,15 @@ void print(const Options& options, const Outcome& outcome) {
 
 int main(int argc, char** argv) {
   occupy_standard_descriptors();
-  int exit_code = kDone;
+  ExitCode exit_code = kDone;
   const auto options = parse_options(argc, argv, exit_code);
   if (!options) return exit_code;
   const Outcome outcome = run(*options);
   print(*options, outcome);
-  if (std::fflush(stdout) != 0) {
-    std::perror("bvhbuild: standard output");
-    return outcome.exit_code != kDone ? outcome.exit_code : kUnwritableOutput;
-  }
-  return outcome.exit_code;
+  if (std::fflush(stdout) == 0) return outcome.exit_code;
+  const std::string reason = std::strerror(errno);
+  if (outcome.exit_code != kDone)
+    return complain("the report could not be printed: " + reason, outcome.exit_code);
+  const std::string output = printable(options->output.string());
+  return complain(output + " is complete, but the report could not be printed: " + reason, kUnwritableOutput);
 }

@@ -4,7 +4,6 @@
 #include <map>
 #include <string>
 
-#include "common/exit_code.h"
 #include "common/option_helpers.h"
 
 namespace tandem::build {
@@ -16,7 +15,8 @@ const std::map<std::string, Reader> kReaderNames = {
     {"auto", Reader::automatic}, {"tandem", Reader::tandem}, {"assimp", Reader::assimp}};
 
 constexpr const char* kFooter =
-    R"(Exit codes: 0 done, 1 usage, 2 input could not be read (or --strict found something),
+    R"(MESH and the output are files: there is no reading from standard input, nor writing to standard output.
+Exit codes: 0 done, 1 usage, 2 input could not be read (or --strict found something),
 3 input holds no usable triangle, 4 output could not be written, 5 internal error.
 
 Example: bvhbuild cow.obj -o cow.bvh && bvhinfo cow.bvh)";
@@ -83,24 +83,14 @@ void add_options(CLI::App& app, Options& options, double& memory_gib, double& ex
 
 }  // namespace
 
-std::optional<Options> parse_options(int argc, char** argv, int& exit_code) {
+std::optional<Options> parse_options(int argc, char** argv, ExitCode& exit_code) {
   CLI::App app("Turns a mesh into an optimised 4-ary blocked AABB tree for exact tandem collision queries.",
                "bvhbuild");
   Options options;
   double memory_gib = static_cast<double>(options.import.limits.memory_bytes) / 0x1p30;
   auto expansion = static_cast<double>(options.import.limits.expansion);
   add_options(app, options, memory_gib, expansion);
-  exit_code = kDone;
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& done) {  // --help, --version
-    app.exit(done);
-    return std::nullopt;
-  } catch (const CLI::ParseError& error) {
-    std::cerr << "bvhbuild: " << error.what() << "\nTry 'bvhbuild --help'.\n";
-    exit_code = kUsage;
-    return std::nullopt;
-  }
+  if (!parse_command_line(app, argc, argv, exit_code)) return std::nullopt;
   options.import.limits.memory_bytes = static_cast<std::uint64_t>(memory_gib * 0x1p30);
   options.import.limits.expansion = static_cast<std::uint64_t>(expansion);
   return options;

@@ -5,6 +5,7 @@
 
 #include "bvhbuild/import/import.h"
 #include "bvhbuild/tree/tree.h"
+#include "common/exit_code.h"
 
 namespace tandem::build {
 
@@ -21,7 +22,7 @@ struct Options {
 };
 
 /// Parses the command line. Nothing to run: prints help, the version or what is wrong, and sets `exit_code`.
-std::optional<Options> parse_options(int argc, char** argv, int& exit_code);
+std::optional<Options> parse_options(int argc, char** argv, ExitCode& exit_code);
 
 /// As on the command line: "minimal", "free" or a number; "fast", "default" or "best".
 std::string name(Imaginary imaginary);

@@ -13,6 +13,7 @@
 #include "bvhbuild/tree/assemble.h"
 #include "common/number_words.h"
 #include "common/output_file.h"
+#include "common/printable.h"
 #include "interrupt.h"
 #include "progress.h"
 #include "provenance.h"
@@ -143,7 +144,7 @@ Outcome run_pipeline(const Options& options) {
     return fail(outcome, outcome.exit_code, options.output, defect);
   }
   outcome.exit_code = kDone;
-  Progress progress(!options.quiet, options.input.filename().string());
+  Progress progress(!options.quiet, printable(options.input.filename().string()));
 
   progress.step("import");
   ImportResult imported;

@@ -7,6 +7,7 @@
 
 #include "common/json.h"
 #include "common/number_words.h"
+#include "common/printable.h"
 #include "statistics/statistics_json.h"
 
 namespace tandem::build {
@@ -62,12 +63,12 @@ std::string text_report(const Options& options, const Outcome& outcome) {
   const TreeStatistics& tree = outcome.tree;
   const std::uint64_t blocks = tree.leaf_blocks + tree.internal_blocks;
   std::ostringstream out;
-  out << options.output.string() << ": " << with_commas(tree.triangles)
+  out << printable(options.output.string()) << ": " << with_commas(tree.triangles)
       << (tree.triangles == 1 ? " triangle" : " triangles") << " in " << with_commas(blocks)
       << (blocks == 1 ? " block, " : " blocks, ") << human_bytes(outcome.file_bytes) << "\n";
   out << "  read     " << with_commas(outcome.clean.faces) << " faces, "
-      << with_commas(outcome.clean.vertices) << " vertices from " << options.input.filename().string() << " ("
-      << outcome.reader << ")\n";
+      << with_commas(outcome.clean.vertices) << " vertices from "
+      << printable(options.input.filename().string()) << " (" << outcome.reader << ")\n";
   for (const std::string& remark : outcome.remarks) out << "  note     " << remark << "\n";
   for (const Finding& finding : findings(outcome.clean)) {
     if (finding.count > 0) out << "  found    " << finding.sentence() << "\n";

@@ -2,10 +2,13 @@
 #include <cstdio>
 #include <exception>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/exit_code.h"
 #include "common/number_words.h"
+#include "common/option_helpers.h"
+#include "common/printable.h"
 #include "page.h"
 
 namespace {
@@ -32,12 +35,19 @@ Json verdict(const Inspection& inspection) {
 void print_verdict(const Inspection& inspection) {
   if (inspection.status != Status::kOk) return;
   const double seconds = inspection.check_seconds;
-  std::printf("%s: sound (%s checked in %.1f ms, %.2f GB/s)\n", inspection.path.c_str(),
+  std::printf("%s: sound (%s checked in %.1f ms, %.2f GB/s)\n", printable(inspection.path).c_str(),
               human_bytes(inspection.asset.bytes()).c_str(), 1e3 * seconds,
               static_cast<double>(inspection.asset.bytes()) / seconds / 1e9);
 }
 
-void print(const Options& options, const std::vector<Inspection>& inspections, bool all_sound) {
+/// The page of a sound file; two or more side by side. Files that are not sound are left out.
+void print_sound(std::vector<Inspection> inspections) {
+  std::erase_if(inspections, [](const Inspection& inspection) { return inspection.status != Status::kOk; });
+  if (inspections.empty()) return;
+  std::fputs((inspections.size() > 1 ? comparison(inspections) : page(inspections[0])).c_str(), stdout);
+}
+
+void print(const Options& options, std::vector<Inspection> inspections) {
   if (options.json) {
     Json output = Json::array();
     for (const Inspection& inspection : inspections) {
@@ -47,10 +57,8 @@ void print(const Options& options, const std::vector<Inspection>& inspections, b
     std::puts(pretty(inspections.size() == 1 ? output[0] : output).c_str());
   } else if (options.verify) {
     for (const Inspection& inspection : inspections) print_verdict(inspection);
-  } else if (inspections.size() > 1 && all_sound) {
-    std::fputs(comparison(inspections).c_str(), stdout);
-  } else if (all_sound) {
-    std::fputs(page(inspections[0]).c_str(), stdout);
+  } else {
+    print_sound(std::move(inspections));
   }
 }
 
@@ -61,9 +69,9 @@ ExitCode run(const Options& options) {
     inspections.push_back(inspect(file, options.verify));
     if (inspections.back().status == Status::kOk) continue;
     all_sound = false;
-    std::fprintf(stderr, "bvhinfo: %s\n", defect_of(inspections.back()).c_str());
+    std::fprintf(stderr, "bvhinfo: %s\n", printable(defect_of(inspections.back())).c_str());
   }
-  print(options, inspections, all_sound);
+  print(options, std::move(inspections));
   if (std::fflush(stdout) != 0) {
     std::perror("bvhinfo: standard output");
     return kUnwritableOutput;
@@ -83,14 +91,8 @@ int main(int argc, char** argv) {
   app.footer(
       "Every file is checked in full before anything else is read.\nExit codes: 0 all sound, 1 usage, 2 a "
       "file is not, 4 the output could not be written, 5 internal error.");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& done) {
-    return app.exit(done);
-  } catch (const CLI::ParseError& error) {
-    std::fprintf(stderr, "bvhinfo: %s\nTry 'bvhinfo --help'.\n", error.what());
-    return kUsage;
-  }
+  ExitCode exit_code = kDone;
+  if (!parse_command_line(app, argc, argv, exit_code)) return exit_code;
   try {
     return run(options);
   } catch (const std::exception& defect) {

@@ -4,8 +4,10 @@
 #include <cstdarg>
 #include <cstdio>
 #include <filesystem>
+#include <string_view>
 
 #include "common/number_words.h"
+#include "common/printable.h"
 
 namespace tandem {
 namespace {
@@ -28,12 +30,9 @@ std::string point(const double* p) {
   return format("(%.12g, %.12g, %.12g)", p[0], p[1], p[2]);
 }
 
-// Text that a file brings along, fit for a terminal.
-std::string harmless(std::string text) {
-  for (char& c : text) {
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) c = '?';
-  }
-  return text;
+/// Text that a file brings along, or the name of one, fit for a terminal.
+std::string harmless(std::string_view text) {
+  return printable(text);
 }
 
 // The string under a key, without throwing at what some other tool may have put there.
@@ -51,19 +50,28 @@ std::string source_lines(const Inspection& inspection) {
                      " bytes, XXH64 " + text_of(input, "xxh64") + ", read by " + text_of(input, "reader") +
                      "\n";
   text += "  built by     " + text_of(source, "tool") + " " + text_of(source, "version");
-  if (source.contains("options")) text += ", imaginary nodes " + text_of(source["options"], "imaginary");
-  return text + "\n";
+  if (!source.contains("options")) return text + "\n";
+  const Json& options = source["options"];
+  text += ", imaginary nodes " + text_of(options, "imaginary") + ", effort " + text_of(options, "effort");
+  const bool interrupted = options.is_object() && options.value("interrupted", Json()) == true;
+  return text + (interrupted ? ", interrupted: the best tree until then\n" : "\n");
+}
+
+std::string faces_of(const Part& part) {
+  if (part.face_count == 0) return "no faces";
+  if (part.face_count == 1) return "face " + with_commas(part.first_face);
+  return "faces " + with_commas(part.first_face) + " to " +
+         with_commas(part.first_face + part.face_count - 1);
 }
 
 std::string part_lines(const AssetView& view) {
   std::string text = format("  parts        %zu\n", view.parts.size());
   for (std::size_t i = 0; i < std::min(view.parts.size(), kPartsShown); ++i) {
     const Part& part = view.parts[i];
-    const std::string path = harmless(std::string(view.path_of(part)));
-    const std::string name = harmless(std::string(view.name_of(part)));
+    const std::string path = harmless(view.path_of(part));
+    const std::string name = harmless(view.name_of(part));
     text += "               " + (path.empty() ? "" : path + " : ") + (name.empty() ? "(no name)" : name) +
-            format("  faces %s to %s\n", with_commas(part.first_face).c_str(),
-                   with_commas(part.first_face + std::max<std::uint64_t>(part.face_count, 1) - 1).c_str());
+            "  " + faces_of(part) + "\n";
   }
   if (view.parts.size() > kPartsShown)
     text += format("               and %zu more\n", view.parts.size() - kPartsShown);
@@ -77,7 +85,7 @@ std::string tree_lines(const TreeStatistics& tree, const ExpectedWork& work) {
           format(" imaginary (%.2f %%, minimum %llu)\n", 100 * tree.imaginary_fraction,
                  static_cast<unsigned long long>(tree.imaginary_minimum));
   text += "  blocks       " + with_commas(tree.leaf_blocks) + " leaf, " + with_commas(tree.internal_blocks) +
-          " internal, " + with_commas(tree.partial_leaf_blocks) + " partial leaf\n";
+          " internal, " + with_commas(tree.partial_leaf_blocks) + " partial leaf blocks\n";
   text += format("  depth        %u blocks\n  leaf fill    %.2f %%\n  SAH cost     %.3f\n", tree.depth,
                  100 * tree.leaf_fill, tree.sah_cost);
   if (work.poses == 0)
@@ -146,9 +154,9 @@ std::string figure(const Json& value) {
 std::string page(const Inspection& inspection) {
   const AssetView& view = inspection.asset.view();
   const FileHeader& header = *view.header;
-  std::string text = inspection.path + ": Tandem tree, format " + std::to_string(header.version_major) + "." +
-                     std::to_string(header.version_minor) + ", " + human_bytes(header.file_bytes) +
-                     ", hash " + hexadecimal(header.hash) + "\n";
+  std::string text = harmless(inspection.path) + ": Tandem tree, format " +
+                     std::to_string(header.version_major) + "." + std::to_string(header.version_minor) +
+                     ", " + human_bytes(header.file_bytes) + ", hash " + hexadecimal(header.hash) + "\n";
   text += source_lines(inspection);
   text += part_lines(view);
   text += "  bounds       " + point(header.lower) + " to " + point(header.upper) + "\n";
@@ -165,7 +173,8 @@ std::string comparison(const std::vector<Inspection>& inspections) {
   std::string text = format("%-22s", "");
   for (const Inspection& inspection : inspections) {
     files.push_back(to_json(inspection));
-    text += format(" %24.24s", std::filesystem::path(inspection.path).filename().string().c_str());
+    const std::string name = std::filesystem::path(inspection.path).filename().string();
+    text += format(" %24s", printable(name, name.size() > 24 ? 21 : 24).c_str());
   }
   text += "\n";
   for (const char* key : kCompared) {

@@ -1,6 +1,9 @@
 #include "option_helpers.h"
 
+#include <cstdio>
 #include <filesystem>
+
+#include "printable.h"
 
 namespace tandem {
 
@@ -15,8 +18,51 @@ CLI::Validator between(double lower, double upper) {
 }
 
 CLI::Validator file_name() {
-  return CLI::Validator(
-      [](const std::string& text) { return text.empty() ? "a file needs a name" : std::string(); }, "");
+  const auto defect = [](const std::string& text) -> std::string {
+    if (text.empty()) return "a file needs a name";
+    return text == "-" ? "- is not standard input or output here; ./- names a file" : "";
+  };
+  return CLI::Validator(defect, "");
+}
+
+namespace {
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
+  return text;
+}
+
+/// What is wrong with a command line. CLI11 speaks of what is missing first, which hides an option or a
+/// command that was misspelt, and names surplus arguments backwards.
+std::string usage_defect(const CLI::App& app, const CLI::ParseError& error) {
+  const std::vector<std::string> surplus = app.remaining(true);
+  const bool knows_of_surplus = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::RequiredError) ||
+                                error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError);
+  if (surplus.empty() || !knows_of_surplus) return error.what();
+  for (const std::string& argument : surplus)
+    if (argument.starts_with('-') && argument != "--") return "there is no option " + argument;
+  const bool wants_command = app.get_require_subcommand_min() > 0 && app.get_subcommands().empty();
+  if (wants_command) return "there is no command " + surplus.front();
+  return "not expected: " + joined(surplus);
+}
+
+}  // namespace
+
+bool parse_command_line(CLI::App& app, int argc, char** argv, ExitCode& exit_code) {
+  exit_code = kDone;
+  try {
+    app.parse(argc, argv);
+    return true;
+  } catch (const CLI::Success& done) {  // --help, --version
+    app.exit(done);
+  } catch (const CLI::ParseError& error) {
+    const std::string defect = printable(usage_defect(app, error));
+    std::fprintf(stderr, "%s: %s\nTry '%s --help'.\n", app.get_name().c_str(), defect.c_str(),
+                 app.get_name().c_str());
+    exit_code = kUsage;
+  }
+  return false;
 }
 
 void keep_inputs(const std::string& output, const std::vector<std::string>& inputs) {

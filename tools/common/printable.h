@@ -10,7 +10,7 @@ namespace tandem {
 ///
 /// Effect: what is no valid UTF-8 or a control character becomes U+FFFD; past `most_bytes` bytes of the input
 /// the rest is left out and "..." stands for it.
-std::string printable(std::string_view bytes, std::size_t most_bytes);
+std::string printable(std::string_view bytes, std::size_t most_bytes = std::string::npos);
 
 /// The same in quotes, short enough for a message.
 std::string in_quotes(std::string_view bytes);

@@ -233,6 +233,12 @@ const Attack kLevelAttacks[] = {
      [](Bytes& f) { f.elements<Part>(SectionKind::parts)[1].name_offset = 0xFFFFFFFF; }},
     {"part path", Status::kBadPart,
      [](Bytes& f) { f.elements<Part>(SectionKind::parts)[1].path_offset = 1000; }},
+    {"empty part name behind the strings", Status::kBadPart,
+     [](Bytes& f) {
+       Part& part = f.elements<Part>(SectionKind::parts)[0];
+       part.name_bytes = 0;
+       part.name_offset = static_cast<std::uint32_t>(f.section(SectionKind::strings).bytes) + 1;
+     }},
     {"part gap", Status::kBadPart, [](Bytes& f) { f.elements<Part>(SectionKind::parts)[1].first_face += 1; }},
     {"part too long", Status::kBadPart,
      [](Bytes& f) { f.elements<Part>(SectionKind::parts)[1].face_count += 1; }},
@@ -256,6 +262,8 @@ const Attack kTreeAttacks[] = {
      [](Bytes& f) { f.blocks()[block_with_imaginary_leaf(f)].half_extent[1][3] = 1; }},
     {"imaginary with NaN", Status::kBadImaginaryNode,
      [](Bytes& f) { f.blocks()[block_with_imaginary_leaf(f)].center[0][3] = std::nanf(""); }},
+    {"imaginary with a centre of -0", Status::kBadImaginaryNode,
+     [](Bytes& f) { f.blocks()[block_with_imaginary_leaf(f)].center[2][3] = -0.0F; }},
     {"imaginary with an index", Status::kBadImaginaryNode,
      [](Bytes& f) { f.blocks()[block_with_imaginary_leaf(f)].index[3] = 0; }},
     {"box NaN", Status::kBadBox, [](Bytes& f) { f.blocks()[0].center[0][0] = std::nanf(""); }},
@@ -459,8 +467,25 @@ TEST(Check, AcceptsSeveralLevelsOfDetailAndRejectsErrorsThatFall) {
   EXPECT_EQ(result.asset.level(1).triangle_count, 10u);
   EXPECT_EQ(result.asset.level(1).error_bound, 0.5);
   EXPECT_NE(result.asset.level(0).blocks, result.asset.level(1).blocks);
-  file.elements<Level>(SectionKind::levels)[1].error_bound = -0.5;
-  EXPECT_EQ(file.check_sealed(), Status::kBadLevel);
+  for (const double bound : {-0.5, std::numeric_limits<double>::infinity()}) {
+    file.elements<Level>(SectionKind::levels)[1].error_bound = bound;
+    EXPECT_EQ(file.check_sealed(), Status::kBadLevel) << bound;
+  }
+}
+
+TEST(Check, AcceptsSectionsInAnyOrderAndEmptyTextsAnywhereInTheStrings) {
+  Bytes file = sample();
+  std::swap(file.section(4).kind, file.section(5).kind);
+  const std::uint64_t end = file.section(SectionKind::strings).bytes;
+  ASSERT_GT(end, 0u);
+  for (const std::uint64_t offset : {std::uint64_t{0}, end}) {
+    for (std::uint64_t i = 0; i < file.section(SectionKind::parts).count; ++i) {
+      Part& part = file.elements<Part>(SectionKind::parts)[i];
+      part.name_bytes = part.path_bytes = 0;
+      part.name_offset = part.path_offset = static_cast<std::uint32_t>(offset);
+    }
+    EXPECT_EQ(file.check_sealed(), Status::kOk) << offset;
+  }
 }
 
 }  // namespace

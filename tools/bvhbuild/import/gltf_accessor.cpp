@@ -16,15 +16,11 @@ namespace {
 // a stride or an element's size (both less than 2^10) and their sums stay far below 2^64.
 constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 50;
 
-std::string place(const char* list, std::int64_t index) {
-  return std::string(list) + "[" + std::to_string(index) + "]";
-}
-
 /// The item that `user` names.
 template <class Item>
 const Item& named(const std::vector<Item>& items, const char* list, int index, const std::string& user) {
   if (index >= 0 && static_cast<std::size_t>(index) < items.size()) return items[index];
-  throw GltfError(user + " names " + place(list, index) + " of " + std::to_string(items.size()));
+  throw GltfError(user + " names " + numbered(list, index) + " of " + std::to_string(items.size()));
 }
 
 void check_end(const std::string& what, std::uint64_t end, const std::string& whole, std::uint64_t bytes) {
@@ -84,13 +80,13 @@ std::string_view bytes_of(const GltfModel& model, const GltfView& view, const st
   const GltfBuffer& buffer = named(model.buffers, "buffers", view.buffer, name);
   if (view.offset > kMostBytes || view.bytes > kMostBytes)
     throw GltfError(name + " lies beyond every buffer");
-  check_end(name, view.offset + view.bytes, place("buffers", view.buffer), buffer.bytes.size());
+  check_end(name, view.offset + view.bytes, numbered("buffers", view.buffer), buffer.bytes.size());
   return buffer.bytes.substr(view.offset, view.bytes);
 }
 
 Run locate(const GltfModel& model, const Need& need) {
   const GltfView& view = named(model.views, "bufferViews", need.view, need.user);
-  const std::string name = place("bufferViews", need.view);
+  const std::string name = numbered("bufferViews", need.view);
   const std::string_view bytes = bytes_of(model, view, name);
   const std::uint64_t stride = view.stride == 0 ? need.bytes : view.stride;
   if (stride < need.bytes || stride > 255)
@@ -115,7 +111,7 @@ bool is_index_type(int type) {
 /// Of an accessor that is there and of a type with a meaning.
 Layout lay_out(const GltfModel& model, int index) {
   const GltfAccessor& accessor = model.accessors[index];
-  const std::string name = place("accessors", index);
+  const std::string name = numbered("accessors", index);
   Layout layout;
   if (accessor.view != -1)
     layout.base =
@@ -138,10 +134,10 @@ Layout lay_out(const GltfModel& model, int index) {
 void check(const GltfModel& model, int index, int components, bool (*is_fit)(int), const char* purpose) {
   const GltfAccessor& accessor = named(model.accessors, "accessors", index, purpose);
   if (accessor.components != components)
-    throw GltfError(place("accessors", index) + " has " + std::to_string(accessor.components) +
+    throw GltfError(numbered("accessors", index) + " has " + std::to_string(accessor.components) +
                     " numbers in an element, where " + purpose + " needs " + std::to_string(components));
   if (!is_fit(accessor.component_type))
-    throw GltfError(place("accessors", index) + " has numbers of type " +
+    throw GltfError(numbered("accessors", index) + " has numbers of type " +
                     std::to_string(accessor.component_type) + ", which " + purpose + " cannot have");
   lay_out(model, index);
 }
@@ -155,8 +151,8 @@ void read_sparse(const GltfAccessor& accessor, int index, const Layout& layout, 
         const auto element =
             load_number<decltype(zero), std::endian::little>(layout.indices.data + i * layout.indices.stride);
         if (element >= accessor.count)
-          throw GltfError(place("accessors", index) + ".sparse replaces element " + std::to_string(element) +
-                          " of " + std::to_string(accessor.count));
+          throw GltfError(numbered("accessors", index) + ".sparse replaces element " +
+                          std::to_string(element) + " of " + std::to_string(accessor.count));
         store(element, layout.values.data + i * layout.values.stride);
       }
   });

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <utility>
 
 #include "common/printable.h"
@@ -9,13 +10,6 @@
 
 namespace tandem::build {
 namespace {
-
-int hex_digit(char c) {
-  if (c >= '0' && c <= '9') return c - '0';
-  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-  return -1;
-}
 
 constexpr std::string_view kBase64 = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
@@ -101,12 +95,16 @@ GltfBuffer read_gltf_buffer(const GltfBufferSource& source, GltfBufferPlaces& pl
 }
 
 std::string percent_decoded(std::string_view text) {
+  constexpr std::size_t kEscape = 3;  // "%20"
   std::string decoded;
-  for (std::size_t i = 0; i < text.size(); ++i) {
+  while (!text.empty()) {
+    const std::string_view escape = text.substr(0, kEscape);
+    std::uint8_t byte = 0;
     const bool is_escape =
-        text[i] == '%' && i + 2 < text.size() && hex_digit(text[i + 1]) >= 0 && hex_digit(text[i + 2]) >= 0;
-    decoded += is_escape ? static_cast<char>(hex_digit(text[i + 1]) * 16 + hex_digit(text[i + 2])) : text[i];
-    if (is_escape) i += 2;
+        escape.size() == kEscape && escape[0] == '%' &&
+        std::from_chars(escape.data() + 1, escape.data() + kEscape, byte, 16).ptr == escape.data() + kEscape;
+    decoded += is_escape ? static_cast<char>(byte) : text[0];
+    text.remove_prefix(is_escape ? kEscape : 1);
   }
   return decoded;
 }

@@ -21,18 +21,24 @@ struct Spot {
   throw GltfError(spot.object.path(spot.name, spot.item) + " is not " + wanted);
 }
 
-int to_index(const Json& value, const Spot& spot) {
+template <class Item>
+Item converted(const Json& value, const Spot& spot);
+
+template <>
+int converted(const Json& value, const Spot& spot) {
   if (!value.is_number_unsigned() || value.get<std::uint64_t>() > INT32_MAX)
     refuse(spot, "an unsigned integer below 2147483648");
   return value.get<int>();
 }
 
-double to_number(const Json& value, const Spot& spot) {
+template <>
+double converted(const Json& value, const Spot& spot) {
   if (!value.is_number()) refuse(spot, "a number");
   return value.get<double>();
 }
 
-std::string to_text(const Json& value, const Spot& spot) {
+template <>
+std::string converted(const Json& value, const Spot& spot) {
   if (!value.is_string()) refuse(spot, "a text");
   return value.get<std::string>();
 }
@@ -88,7 +94,7 @@ std::string GltfObject::path(const char* name, std::int64_t item) const {
 
 int GltfObject::index(const char* name, int otherwise) const {
   const Json* value = find(name);
-  return value == nullptr ? otherwise : to_index(*value, {*this, name});
+  return value == nullptr ? otherwise : converted<int>(*value, {*this, name});
 }
 
 std::uint64_t GltfObject::size(const char* name) const {
@@ -113,43 +119,38 @@ bool GltfObject::truth(const char* name) const {
 
 std::string GltfObject::text(const char* name) const {
   const Json* value = find(name);
-  return value == nullptr ? std::string() : to_text(*value, {*this, name});
+  return value == nullptr ? std::string() : converted<std::string>(*value, {*this, name});
 }
 
-template <class Item, class Convert>
-std::vector<Item> GltfObject::list(const char* name, const Convert& convert) const {
-  std::vector<Item> items;
+const Json& GltfObject::array(const char* name) const {
+  static const Json kNone = Json::array();
   const Json* value = find(name);
-  if (value == nullptr) return items;
+  if (value == nullptr) return kNone;
   if (!value->is_array()) refuse({*this, name}, "an array");
-  items.reserve(value->size());
-  for (std::size_t i = 0; i < value->size(); ++i)
-    items.push_back(convert((*value)[i], Spot{*this, name, static_cast<std::int64_t>(i)}));
+  return *value;
+}
+
+template <class Item>
+std::vector<Item> GltfObject::list(const char* name) const {
+  const Json& values = array(name);
+  std::vector<Item> items;
+  items.reserve(values.size());
+  for (const Json& value : values)
+    items.push_back(converted<Item>(value, {*this, name, static_cast<std::int64_t>(items.size())}));
   return items;
 }
 
-std::vector<int> GltfObject::indices(const char* name) const {
-  return list<int>(name, to_index);
-}
-
-std::vector<double> GltfObject::numbers(const char* name) const {
-  return list<double>(name, to_number);
-}
-
-std::vector<std::string> GltfObject::texts(const char* name) const {
-  return list<std::string>(name, to_text);
-}
+template std::vector<int> GltfObject::list(const char*) const;
+template std::vector<double> GltfObject::list(const char*) const;
+template std::vector<std::string> GltfObject::list(const char*) const;
 
 void GltfObject::with(const char* name, const Use& use) const {
   if (const Json* value = find(name)) use(GltfObject(*value, this, name, -1));
 }
 
 void GltfObject::each(const char* name, const Use& use) const {
-  const Json* value = find(name);
-  if (value == nullptr) return;
-  if (!value->is_array()) refuse({*this, name}, "an array");
-  for (std::size_t i = 0; i < value->size(); ++i)
-    use(GltfObject((*value)[i], this, name, static_cast<std::int64_t>(i)));
+  std::int64_t item = 0;
+  for (const Json& value : array(name)) use(GltfObject(value, this, name, item++));
 }
 
 Json parse_gltf_json(std::string_view text, std::uint64_t most_bytes) {

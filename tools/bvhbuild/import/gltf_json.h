@@ -23,9 +23,9 @@ class GltfObject {
   std::uint64_t required_size(const char* name) const;
   bool truth(const char* name) const;
   std::string text(const char* name) const;
-  std::vector<int> indices(const char* name) const;
-  std::vector<double> numbers(const char* name) const;
-  std::vector<std::string> texts(const char* name) const;
+  /// Of int (indices), double or std::string.
+  template <class Item>
+  std::vector<Item> list(const char* name) const;
 
   using Use = std::function<void(const GltfObject&)>;
   /// Calls `use` with the object that a member is.
@@ -39,8 +39,8 @@ class GltfObject {
  private:
   GltfObject(const nlohmann::json& json, const GltfObject* parent, const char* name, std::int64_t item);
   const nlohmann::json* find(const char* name) const;
-  template <class Item, class Convert>
-  std::vector<Item> list(const char* name, const Convert& convert) const;
+  /// The array that a member is; empty where it is left out.
+  const nlohmann::json& array(const char* name) const;
 
   const nlohmann::json& json_;
   const GltfObject* parent_;  ///< of the document: nullptr

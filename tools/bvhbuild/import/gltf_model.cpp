@@ -36,7 +36,7 @@ void check_required_extensions(const std::vector<std::string>& required, std::ve
 
 GltfBufferSource buffer_source(const GltfObject& buffer, std::size_t index) {
   const std::string name = buffer.text("name");
-  return {"buffers[" + std::to_string(index) + "]" + (name.empty() ? "" : " " + in_quotes(name)),
+  return {numbered("buffers", index) + (name.empty() ? "" : " " + in_quotes(name)),
           buffer.text("uri"), buffer.size("byteLength")};
 }
 
@@ -87,7 +87,7 @@ GltfPrimitive primitive(const GltfObject& from) {
 }
 
 bool has_weights(const GltfObject& object) {
-  const std::vector<double> weights = object.numbers("weights");
+  const std::vector<double> weights = object.list<double>("weights");
   return std::any_of(weights.begin(), weights.end(), [](double w) { return w != 0; });
 }
 
@@ -109,7 +109,7 @@ void check_draco(const GltfModel& model) {
 
 /// A list of numbers that is there with the right length, or not at all.
 std::vector<double> numbers(const GltfObject& node, const char* name, std::size_t wanted) {
-  std::vector<double> result = node.numbers(name);
+  std::vector<double> result = node.list<double>(name);
   if (!result.empty() && result.size() != wanted)
     throw GltfError(node.path(name) + " has " + std::to_string(result.size()) + " numbers, not " +
                     std::to_string(wanted));
@@ -155,7 +155,7 @@ Affine local_transform(const GltfObject& node) {
 GltfNode node(const GltfObject& from) {
   return {from.text("name"),
           from.index("mesh"),
-          from.indices("children"),
+          from.list<int>("children"),
           local_transform(from),
           from.has("skin"),
           has_weights(from),
@@ -177,19 +177,23 @@ std::vector<int> all_roots(const std::vector<GltfNode>& nodes) {
 
 void choose_scene(const GltfObject& root, GltfModel& model) {
   std::vector<std::vector<int>> scenes;
-  root.each("scenes", [&](const GltfObject& scene) { scenes.push_back(scene.indices("nodes")); });
+  root.each("scenes", [&](const GltfObject& scene) { scenes.push_back(scene.list<int>("nodes")); });
   const int chosen = root.index("scene", 0);
   if (scenes.empty()) {
     model.roots = all_roots(model.nodes);
     return;
   }
-  const std::string of_all = "scenes[" + std::to_string(chosen) + "] of " + std::to_string(scenes.size());
+  const std::string of_all = numbered("scenes", chosen) + " of " + std::to_string(scenes.size());
   if (static_cast<std::size_t>(chosen) >= scenes.size()) throw GltfError("its default scene is " + of_all);
   model.roots = std::move(scenes[chosen]);
   if (scenes.size() > 1) model.remarks.push_back(of_all + " is read");
 }
 
 }  // namespace
+
+std::string numbered(const char* list, std::int64_t index) {
+  return std::string(list) + "[" + std::to_string(index) + "]";
+}
 
 void check_gltf_version(const std::string& version) {
   if (version.empty()) throw GltfError("is no glTF: its JSON names no asset.version");
@@ -203,7 +207,7 @@ GltfModel read_gltf_model(const GltfObject& root, GltfBufferPlaces places) {
   root.with("asset", [&](const GltfObject& asset) { version = asset.text("version"); });
   check_gltf_version(version);
   GltfModel model;
-  check_required_extensions(root.texts("extensionsRequired"), model.remarks);
+  check_required_extensions(root.list<std::string>("extensionsRequired"), model.remarks);
   root.each("buffers", [&](const GltfObject& item) {
     model.buffers.push_back(read_gltf_buffer(buffer_source(item, model.buffers.size()), places));
   });

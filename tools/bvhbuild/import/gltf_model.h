@@ -81,6 +81,9 @@ struct GltfModel {
   std::vector<std::string> remarks;  ///< for the report, at most a few
 };
 
+/// "accessors[3]".
+std::string numbered(const char* list, std::int64_t index);
+
 /// Reads the model out of a glTF file's JSON, and the buffers from where they are.
 ///
 /// Throws a GltfError for another version than 2; extensions that hide the triangles from us, by name;

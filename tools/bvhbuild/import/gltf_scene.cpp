@@ -19,10 +19,6 @@ constexpr std::uint64_t kMostCorners = kNoVertex - 1;
 constexpr int kMostRemarksOfAKind = 4;
 constexpr std::size_t kLongEnough = 2000;  ///< of names, more than any report shows
 
-std::string numbered(const char* list, std::size_t index) {
-  return std::string(list) + "[" + std::to_string(index) + "]";
-}
-
 std::string described(const char* list, std::size_t index, std::string_view name) {
   return name.empty() ? numbered(list, index) : numbered(list, index) + " " + in_quotes(name);
 }
@@ -178,24 +174,25 @@ void SceneReader::check_total() const {
                     " MiB, more than the memory limit (--memory-limit)");
 }
 
-/// Calls `use`; its errors begin with the name of a primitive.
+/// Calls `use(primitive, name)` for the primitives of a mesh; errors begin with the name.
 template <class Use>
-void in_primitive(const std::string& name, const Use& use) {
-  try {
-    use();
-  } catch (const GltfError& error) {
-    throw GltfError(name + ": " + error.what());
+void each_primitive(const GltfMesh& mesh, std::size_t index, const Use& use) {
+  for (std::size_t i = 0; i < mesh.primitives.size(); ++i) {
+    const std::string name = described("meshes", index, mesh.name) + ", primitive " + std::to_string(i);
+    try {
+      use(mesh.primitives[i], name);
+    } catch (const GltfError& error) {
+      throw GltfError(name + ": " + error.what());
+    }
   }
 }
 
 void SceneReader::measure_mesh(std::size_t index, Size& size) {
-  const GltfMesh& mesh = model_.meshes[index];
   std::map<int, std::uint64_t> points;
-  size.primitives = mesh.primitives.size();
-  for (std::size_t i = 0; i < mesh.primitives.size(); ++i) {
-    const std::string name = described("meshes", index, mesh.name) + ", primitive " + std::to_string(i);
-    in_primitive(name, [&] { measure_primitive(mesh.primitives[i], name, points, size); });
-  }
+  size.primitives = model_.meshes[index].primitives.size();
+  each_primitive(model_.meshes[index], index, [&](const GltfPrimitive& primitive, const std::string& name) {
+    measure_primitive(primitive, name, points, size);
+  });
 }
 
 /// `points` has the accessors that earlier primitives of the mesh took their vertices from.
@@ -247,12 +244,10 @@ void SceneReader::add_node(std::size_t node_index, const Place& place) {
   const GltfMesh& mesh = model_.meshes[index];
   out_.begin_part(name_or_number(mesh.name, "meshes", index), *place.path);
   std::map<int, std::uint64_t> first_points;
-  for (std::size_t i = 0; i < mesh.primitives.size(); ++i) {
-    const GltfPrimitive& primitive = mesh.primitives[i];
-    if (!has_triangles(primitive) || primitive.positions == -1) continue;
-    const std::string name = described("meshes", index, mesh.name) + ", primitive " + std::to_string(i);
-    in_primitive(name, [&] { add_primitive(primitive, name, place.world, first_points); });
-  }
+  each_primitive(mesh, index, [&](const GltfPrimitive& primitive, const std::string& name) {
+    if (has_triangles(primitive) && primitive.positions != -1)
+      add_primitive(primitive, name, place.world, first_points);
+  });
 }
 
 /// Primitives of a mesh often share their vertices, and these are stored once.

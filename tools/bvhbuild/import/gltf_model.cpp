@@ -36,8 +36,8 @@ void check_required_extensions(const std::vector<std::string>& required, std::ve
 
 GltfBufferSource buffer_source(const GltfObject& buffer, std::size_t index) {
   const std::string name = buffer.text("name");
-  return {numbered("buffers", index) + (name.empty() ? "" : " " + in_quotes(name)),
-          buffer.text("uri"), buffer.size("byteLength")};
+  return {numbered("buffers", index) + (name.empty() ? "" : " " + in_quotes(name)), buffer.text("uri"),
+          buffer.size("byteLength")};
 }
 
 GltfView view(const GltfObject& from) {

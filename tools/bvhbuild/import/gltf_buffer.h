@@ -11,11 +11,11 @@
 
 namespace tandem::build {
 
-/// A buffer of a glTF file. Its bytes lie in a data URI that was decoded, in a file, or in the container.
+/// A buffer of a glTF file.
 struct GltfBuffer {
-  std::vector<char> decoded;
-  std::shared_ptr<const InputFile> file;
-  std::string_view bytes;
+  std::vector<char> decoded;              ///< the bytes of a data URI; empty for other buffers
+  std::shared_ptr<const InputFile> file;  ///< the file that the bytes lie in; null for other buffers
+  std::string_view bytes;                 ///< of `decoded`, of `file`, or of the container
 };
 
 /// A buffer as the JSON announces it.
@@ -30,8 +30,8 @@ struct GltfBufferPlaces {
   std::filesystem::path folder;         ///< that file names are relative to
   bool is_binary = false;               ///< whether this is a GLB file
   std::string_view chunk;               ///< its binary chunk
-  std::uint64_t most_bytes_in_files{};  ///< that may still be read; grows less
-  /// Files that buffers were found in. Each is read once, by whatever names buffers call it.
+  std::uint64_t most_bytes_in_files{};  ///< that may still be read; each file that is read lowers it
+  /// The files that buffers were found in. Each is read once, whatever names the buffers call it by.
   std::map<InputFile::Identity, std::shared_ptr<const InputFile>> files;
 };
 
@@ -40,10 +40,10 @@ struct GltfBufferPlaces {
 /// Result: as many bytes as the source says. Throws a GltfError: "buffers[0]: 'wheel.bin': no such file".
 GltfBuffer read_gltf_buffer(const GltfBufferSource& source, GltfBufferPlaces& places);
 
-/// "a%20b.bin" is "a b.bin". What is no escape stays.
+/// Replaces escapes: "a%20b.bin" becomes "a b.bin". Everything else stays as it is.
 std::string percent_decoded(std::string_view text);
 
-/// The bytes that a base64 text stands for, up to the first sign that is none, at most `most_bytes`.
+/// Decodes base64 up to the first character that is no digit of it, and at most `most_bytes` bytes.
 std::vector<char> base64_decoded(std::string_view text, std::uint64_t most_bytes);
 
 }  // namespace tandem::build

@@ -10,8 +10,9 @@ namespace tandem::build {
 
 /// An object in the JSON of a glTF file. It knows its way there, so that errors name it.
 ///
-/// Members that are null count as left out: numbers are `otherwise` or 0, texts and lists empty then. Members
-/// of a wrong type throw a GltfError: "nodes[3].mesh is not an unsigned integer below 2147483648".
+/// A member that is null counts as left out. A number that is left out reads as `otherwise` or 0, a text or a
+/// list as empty. Members of a wrong type throw a GltfError: "nodes[3].mesh is not an unsigned integer below
+/// 2147483648".
 class GltfObject {
  public:
   /// Throws a GltfError when `json` is no object.
@@ -23,7 +24,7 @@ class GltfObject {
   std::uint64_t required_size(const char* name) const;
   bool truth(const char* name) const;
   std::string text(const char* name) const;
-  /// Of int (indices), double or std::string.
+  /// The items of an array. Item: int for indices, double or std::string.
   template <class Item>
   std::vector<Item> list(const char* name) const;
 

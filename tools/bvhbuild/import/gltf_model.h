@@ -27,7 +27,7 @@ struct GltfView {
   std::uint64_t stride = 0;  ///< 0: elements lie side by side
 };
 
-/// Values of their own for a few elements of an accessor.
+/// The sparse part of an accessor: new values for some of its elements.
 struct GltfSparse {
   std::uint64_t count = 0;
   int index_view = -1;
@@ -38,7 +38,7 @@ struct GltfSparse {
 };
 
 struct GltfAccessor {
-  int view = -1;  ///< -1: all zero
+  int view = -1;  ///< -1: all elements are zero
   std::uint64_t offset = 0;
   std::uint64_t count = 0;
   int component_type = 0;  ///< glTF's number, see ComponentType
@@ -81,19 +81,20 @@ struct GltfModel {
   std::vector<std::string> remarks;  ///< for the report, at most a few
 };
 
-/// "accessors[3]".
+/// Names an item of a list for messages: "accessors[3]".
 std::string numbered(const char* list, std::int64_t index);
 
 /// Reads the model out of a glTF file's JSON, and the buffers from where they are.
 ///
-/// Throws a GltfError for another version than 2; extensions that hide the triangles from us, by name;
-/// buffers that are missing or too short; members of a wrong type; transforms that are none.
+/// Throws a GltfError for another version than 2; for extensions that hide the triangles from us, by name;
+/// for buffers that are missing or too short; for members of a wrong type; and for transforms that are not
+/// affine.
 GltfModel read_gltf_model(const GltfObject& root, GltfBufferPlaces places);
 
 /// Throws a GltfError for another version than 2.
 void check_gltf_version(const std::string& version);
 
-/// Whether an error is one that assimp may not have: glTF 1, or Draco.
+/// Whether assimp may be able to read a file that was refused with this error: glTF 1, or Draco compression.
 bool is_for_another_gltf_reader(std::string_view error);
 
 }  // namespace tandem::build

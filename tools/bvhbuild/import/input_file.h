@@ -8,7 +8,7 @@
 
 namespace tandem::build {
 
-/// A regular file opened for reading. Not copyable; closes itself.
+/// A regular file that is open for reading. Its destructor closes it.
 class InputFile {
  public:
   InputFile() = default;
@@ -29,8 +29,8 @@ class InputFile {
   /// The first bytes, at most 64. Empty when they cannot be read.
   std::string head() const;
 
-  /// Effect: reads the whole file, or what is left of it when it shrinks meanwhile. (Read, not mapped: a file
-  /// that shrinks under a mapping kills the process.)
+  /// Effect: reads the whole file, or what is left of it when it shrinks meanwhile. (It is not mapped,
+  /// because a file that shrinks under a mapping kills the process.)
   ///
   /// Result: empty when bytes() holds it, else the reason.
   std::string read_all();

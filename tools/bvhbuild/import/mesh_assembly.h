@@ -30,10 +30,11 @@ class MeshAssembly {
   /// Ends the face at hand, however many corners it has.
   void end_face() { mesh_.face_begin.push_back(static_cast<std::uint32_t>(mesh_.corners.size())); }
 
-  /// Faces from here on belong to a part of this name, or go on with the last part when that has the same
-  /// name.
+  /// The faces that follow belong to a part of this name and path; the last part goes on where it has the
+  /// same name and path.
   void begin_part(std::string_view name, std::string_view node_path);
 
+  /// Notes what the file holds beside faces, for when it has no face at all.
   void leave_out_points() { mesh_.left_out.points = true; }
   void leave_out_lines() { mesh_.left_out.lines = true; }
   void leave_out_strip_turn() { mesh_.left_out.strip_turns = true; }

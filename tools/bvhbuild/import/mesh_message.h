@@ -12,8 +12,8 @@ using MessageSink = std::function<void(const void* bytes, std::size_t count)>;
 /// Gives exactly `count` bytes of a message; false when there are no more.
 using MessageSource = std::function<bool(void* to, std::size_t count)>;
 
-/// What a child process says to its parent: a mesh or the reason why there is none, in the byte order of
-/// both.
+/// Writes what a child process tells its parent: a mesh, or the reason why there is none, in the byte order
+/// of both processes.
 void write_message(const ReadResult& result, const MessageSink& sink);
 
 /// Reads what write_message() wrote, believing nothing: a mesh that comes back has the shape that PolygonMesh

@@ -76,8 +76,10 @@ class ContactQuery {
   /// pairs and no contacts.
   Status find_pairs(std::span<const Instance> instances, const QueryOptions& options = {});
 
-  /// Finds the object pairs whose world boxes overlap, and their contacts. Result: as above, or
-  /// kCannotStartThread.
+  /// Finds the object pairs whose world boxes overlap, and their contacts. find_contacts(instances, {}) is
+  /// this one, with default options. Result: as above, or kCannotStartThread. kOutOfMemory also where the
+  /// machine, or the limit of the process's control group, has not enough memory available for the contacts:
+  /// Linux would grant it and kill the process later. In a steady state nothing is asked.
   Status find_contacts(std::span<const Instance> instances, const QueryOptions& options = {});
 
   /// Finds the contacts of the given object pairs, in either order of a and b. A pair of an instance with

@@ -18,8 +18,8 @@ function(hash_of result)
 endfunction()
 
 file(MAKE_DIRECTORY ${FOLDER})
-set(sources tests/kernels/variant_check.cpp formats/src/box.cpp kernels/src/block_pair.cpp kernels/src/block_pair_lanes4.cpp
-  kernels/src/narrow_phase.cpp kernels/src/narrow_phase_lanes4.cpp)
+set(sources tests/kernels/variant_check.cpp formats/src/box.cpp kernels/src/block_pair.cpp kernels/src/lanes4.cpp
+  kernels/src/narrow_phase.cpp)
 list(TRANSFORM sources PREPEND ${SOURCE}/)
 execute_process(COMMAND ${COMPILER} -std=c++20 -O2 -ffp-contract=off -static -I${SOURCE}/kernels/include -I${SOURCE}/formats/include
   -I${SOURCE}/kernels/src -I${SOURCE}/tests -I${SOURCE}/tests/kernels ${sources} -o ${FOLDER}/variant_check

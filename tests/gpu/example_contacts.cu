@@ -1,4 +1,6 @@
+#include <tandem/formats/gpu_memory.h>
 #include <tandem/formats/gpu_status.h>
+#include <tandem/formats/gpu_stream.h>
 #include <tandem/kernels/gpu_broad_phase.h>
 #include <tandem/kernels/gpu_contact_query.h>
 #include <tandem/runtime/map.h>
@@ -19,13 +21,6 @@ __global__ void move_bodies(tandem::Pose* pose, double size, int step) {
   pose[i] = {{{c, -s, 0}, {s, c, 0}, {0, 0, 1}}, {size * (i % 10), size * (i / 10 % 10), height}};
 }
 
-template <typename Element>
-Element* gpu_array(std::size_t count) {
-  void* memory = nullptr;
-  return cudaMalloc(&memory, count * sizeof(Element)) == cudaSuccess ? static_cast<Element*>(memory)
-                                                                     : nullptr;
-}
-
 int fail(const char* what, tandem::Status status, cudaError_t error) {
   std::printf("%s: %s (%s)\n", what, tandem::explain(status), cudaGetErrorString(error));
   return 1;
@@ -36,9 +31,10 @@ int main(int argc, char** argv) {
   tandem::MappedAsset file;
   if (const tandem::Status status = file.open(path); status != tandem::Status::kOk)
     return fail(path, status, cudaSuccess);
-  cudaStream_t stream;
-  if (const cudaError_t error = cudaStreamCreate(&stream); error != cudaSuccess)
+  tandem::GpuStream owner;
+  if (const cudaError_t error = owner.create(); error != cudaSuccess)
     return fail("a stream", tandem::status_of(error), error);
+  const cudaStream_t stream = owner.get();
   tandem::DeviceAsset cow;  // one allocation, one copy
   tandem::Status status = cow.upload(file.view(), stream);
   if (status != tandem::Status::kOk) return fail("upload", status, cow.cuda_error());
@@ -47,15 +43,16 @@ int main(int argc, char** argv) {
   const tandem::FileHeader& header = *file.view().header;
   const tandem::GpuAsset asset = tandem::gpu_asset(cow.level(), header);
   const tandem::AssetBounds bounds = tandem::asset_bounds(header);
-  auto* gpu_bounds = gpu_array<tandem::AssetBounds>(1);
-  auto* asset_of_body = gpu_array<std::uint32_t>(kBodies);
-  auto* poses = gpu_array<tandem::Pose>(kBodies);
-  auto* history = gpu_array<tandem::GpuQueryReport>(kSteps);
-  if (!gpu_bounds || !asset_of_body || !poses || !history)
-    return fail("scene", tandem::Status::kOutOfGpuMemory, cudaErrorMemoryAllocation);
-  cudaMemcpyAsync(gpu_bounds, &bounds, sizeof bounds, cudaMemcpyHostToDevice, stream);
-  cudaMemsetAsync(asset_of_body, 0, kBodies * sizeof *asset_of_body, stream);
-  const tandem::GpuInstances bodies = {asset_of_body, poses, kBodies};
+  tandem::GpuArray<tandem::AssetBounds> gpu_bounds;
+  tandem::GpuArray<std::uint32_t> asset_of_body;
+  tandem::GpuArray<tandem::Pose> poses;
+  tandem::GpuArray<tandem::GpuQueryReport> history;
+  for (const cudaError_t error : {gpu_bounds.upload({&bounds, 1}, stream), asset_of_body.reserve(kBodies),
+                                  poses.reserve(kBodies), history.reserve(kSteps)}) {
+    if (error != cudaSuccess) return fail("scene", tandem::status_of(error), error);
+  }
+  cudaMemsetAsync(asset_of_body.data(), 0, asset_of_body.bytes(), stream);
+  const tandem::GpuInstances bodies = {asset_of_body.data(), poses.data(), kBodies};
 
   // Room for as much as the scene may need.
   tandem::GpuBroadPhase broad;
@@ -70,18 +67,19 @@ int main(int argc, char** argv) {
   // All steps are queued at once, and nothing waits for the GPU.
   const double size = header.upper[0] - header.lower[0];
   for (int step = 0; step < kSteps; ++step) {
-    move_bodies<<<(kBodies + 255) / 256, 256, 0, stream>>>(poses, size, step);
-    status = broad.enqueue(bodies, {gpu_bounds, 1}, {}, stream);
+    move_bodies<<<(kBodies + 255) / 256, 256, 0, stream>>>(poses.data(), size, step);
+    status = broad.enqueue(bodies, {gpu_bounds.data(), 1}, {}, stream);
     if (status != tandem::Status::kOk) return fail("broad phase", status, broad.cuda_error());
     status = query.enqueue(bodies, broad.pairs(), {}, stream);
     if (status != tandem::Status::kOk) return fail("contacts", status, query.cuda_error());
     // A solver goes on here, on the same stream: query.contacts(), and device_report() for their number.
-    cudaMemcpyAsync(history + step, query.device_report(), sizeof *history, cudaMemcpyDeviceToDevice, stream);
+    cudaMemcpyAsync(history.data() + step, query.device_report(), sizeof *history, cudaMemcpyDeviceToDevice,
+                    stream);
   }
 
   std::vector<tandem::GpuQueryReport> reports(kSteps);
-  cudaMemcpyAsync(reports.data(), history, kSteps * sizeof *history, cudaMemcpyDeviceToHost, stream);
-  if (const cudaError_t error = cudaStreamSynchronize(stream); error != cudaSuccess)
+  if (const cudaError_t error = tandem::download<tandem::GpuQueryReport>(history.data(), reports, stream);
+      error != cudaSuccess)
     return fail("steps", tandem::status_of(error), error);
   for (int step = 0; step < kSteps; ++step) {
     const tandem::GpuQueryReport& report = reports[step];

@@ -6,6 +6,8 @@
 #include <random>
 #include <vector>
 
+#include "tandem/formats/gpu_memory.h"
+#include "tandem/formats/gpu_stream.h"
 #include "tandem/kernels/detail/box_test.h"
 #include "tandem/kernels/detail/relative_pose.h"
 #include "tandem/runtime/map.h"
@@ -63,16 +65,16 @@ struct Times {
 template <typename Work>
 Times time(const Work& work) {
   std::vector<double> times;
-  cudaEvent_t begin, end;
-  require(cudaEventCreate(&begin));
-  require(cudaEventCreate(&end));
+  GpuEvent begin, end;
+  require(begin.create());
+  require(end.create());
   for (int i = 0; i < 24; ++i) {
-    require(cudaEventRecord(begin));
+    require(begin.record(nullptr));
     work();
-    require(cudaEventRecord(end));
+    require(end.record(nullptr));
     require(cudaDeviceSynchronize());
     float ms = 0;
-    require(cudaEventElapsedTime(&ms, begin, end));
+    require(milliseconds_between(begin, end, ms));
     if (i >= 3) times.push_back(static_cast<double>(ms));
   }
   std::sort(times.begin(), times.end());
@@ -80,11 +82,10 @@ Times time(const Work& work) {
 }
 
 template <typename Element>
-Element* to_gpu(const std::vector<Element>& host) {
-  void* memory = nullptr;
-  require(cudaMalloc(&memory, host.size() * sizeof(Element)));
-  require(cudaMemcpy(memory, host.data(), host.size() * sizeof(Element), cudaMemcpyHostToDevice));
-  return static_cast<Element*>(memory);
+GpuArray<Element> to_gpu(const std::vector<Element>& host) {
+  GpuArray<Element> array;
+  require(array.upload(host, nullptr));
+  return array;
 }
 
 Pose random_pose(std::mt19937_64& random, double distance) {
@@ -152,13 +153,12 @@ Queue make_queue(const AssetView& asset, std::size_t enough) {
 
 double copy_gigabytes_per_second(double Times::*which) {
   constexpr std::size_t kBytes = std::size_t{1} << 30;
-  void *from = nullptr, *to = nullptr;
-  require(cudaMalloc(&from, kBytes));
-  require(cudaMalloc(&to, kBytes));
-  require(cudaMemset(from, 0x5A, kBytes));
-  const Times times = time([&] { require(cudaMemcpyAsync(to, from, kBytes, cudaMemcpyDeviceToDevice)); });
-  require(cudaFree(from));
-  require(cudaFree(to));
+  GpuArray<unsigned char> from, to;
+  require(from.reserve(kBytes));
+  require(to.reserve(kBytes));
+  require(cudaMemset(from.data(), 0x5A, kBytes));
+  const Times times =
+      time([&] { require(cudaMemcpyAsync(to.data(), from.data(), kBytes, cudaMemcpyDeviceToDevice)); });
   return 2e-6 * static_cast<double>(kBytes) / (times.*which);
 }
 
@@ -173,20 +173,20 @@ int main(int argc, char** argv) {
   if (asset.upload(file.view(), nullptr) != Status::kOk) return std::puts("upload failed"), 2;
   constexpr std::uint32_t kReady = 1u << 24;
   const Queue queue = make_queue(file.view(), kReady);
-  const Ready* ready = to_gpu(queue.ready);
-  const RelativePose* poses = to_gpu(queue.poses);
-  std::uint16_t* masks = to_gpu(std::vector<std::uint16_t>(kReady, 0));
+  const auto ready = to_gpu(queue.ready);
+  const auto poses = to_gpu(queue.poses);
+  const auto masks = to_gpu(std::vector<std::uint16_t>(kReady, 0));
   const Block* blocks = asset.level().blocks;
   const auto rate = [&](auto kernel) {
     const Times times = time([&] {
-      kernel<<<kReady / 256, 256>>>(ready, kReady, blocks, poses, masks);
+      kernel<<<kReady / 256, 256>>>(ready.data(), kReady, blocks, poses.data(), masks.data());
       require(cudaGetLastError());
     });
     return 1e-6 * kReady / times.median;
   };
   const double rate_15 = rate(test_queue<true>), rate_6 = rate(test_queue<false>);
   std::vector<std::uint16_t> hits(kReady);
-  require(cudaMemcpy(hits.data(), masks, kReady * sizeof hits[0], cudaMemcpyDeviceToHost));
+  require(tandem::download<std::uint16_t>(masks.data(), hits, nullptr));
   std::uint64_t hit = 0;
   for (const std::uint16_t mask : hits) hit += static_cast<std::uint64_t>(__builtin_popcount(mask));
   std::printf(

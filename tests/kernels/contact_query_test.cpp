@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -302,6 +303,43 @@ TEST_F(Query, ManyObjectsWorkSideBySide) {
     }
     for (const ContactQuery& query : queries) EXPECT_EQ(contacts_of(query), expected);
   }
+}
+
+/// Each with worker threads of its own, which start and stop while those of the others work.
+TEST_F(Query, ManyObjectsOfManyThreadsWorkAtOnce) {
+  const Scene scene = crowd(6, 60);
+  ask(scene);
+  const std::vector<Contact> expected = contacts_of(query_);
+  const auto work = [&](std::uint32_t first) {
+    for (std::uint32_t round = 0; round < 4; ++round) {
+      ContactQuery query;
+      EXPECT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+      QueryOptions options;
+      for (const std::uint32_t more : {0u, 4u, 1u, 9u}) {
+        options.threads = first + more;
+        EXPECT_EQ(query.find_contacts(scene.instances, options), Status::kOk);
+        EXPECT_EQ(contacts_of(query), expected);
+      }
+      ContactQuery moved = std::move(query);
+      EXPECT_EQ(moved.find_contacts(scene.instances, options), Status::kOk);
+      EXPECT_EQ(contacts_of(moved), expected);
+    }
+  };
+  std::vector<std::thread> callers;
+  for (std::uint32_t first = 1; first <= 4; ++first) callers.emplace_back(work, first);
+  for (std::thread& caller : callers) caller.join();
+}
+
+/// Braces stand for default options; no pairs at all are an empty list of them.
+TEST_F(Query, BracesAreDefaultOptions) {
+  const Scene scene = row_of_cubes(3);
+  ask(scene);
+  const std::vector<Contact> expected = contacts_of(query_);
+  ASSERT_FALSE(expected.empty());
+  ASSERT_EQ(query_.find_contacts(scene.instances, {}), Status::kOk);
+  EXPECT_EQ(contacts_of(query_), expected);
+  ASSERT_EQ(query_.find_contacts(scene.instances, std::span<const ObjectPair>(), {}), Status::kOk);
+  EXPECT_TRUE(contacts_of(query_).empty());
 }
 
 /// Rounding aside, which generic triangles have room for.

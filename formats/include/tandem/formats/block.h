@@ -68,7 +68,7 @@ inline constexpr float kImaginaryHalfExtent = -std::numeric_limits<float>::infin
 /// The fewest imaginary nodes that a tree of `triangles` leaves can have without partial leaf blocks. With L
 /// = ceil(N / 4) leaf blocks and I = ceil((L - 1) / 3) internal ones, every block but the root being the
 /// child of exactly one node, 4 (L + I) = N + (L + I - 1) + imaginary. Exact for every N >= 1.
-TANDEM_HD constexpr std::uint32_t minimal_imaginary_nodes(std::uint64_t triangles) {
+constexpr std::uint32_t minimal_imaginary_nodes(std::uint64_t triangles) {
   const std::uint64_t leaf_blocks = (triangles + 3) / 4;
   return static_cast<std::uint32_t>((4 - triangles % 4) % 4 + (3 - (leaf_blocks + 2) % 3) % 3);
 }

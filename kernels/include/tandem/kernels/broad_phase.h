@@ -27,10 +27,10 @@ class BroadPhase {
   /// meet, touching included, no more and no fewer, sorted by a, then b.
   Status find_pairs(std::span<const WorldBox> boxes);
 
-  /// Of the last call that returned kOk; valid until the next call.
+  /// The pairs of the last call that returned kOk; valid until the next call.
   std::span<const ObjectPair> pairs() const { return pairs_.view(); }
 
-  /// Pairs of groups that the last call looked at: the work that it did, without time.
+  /// How many pairs of groups the last call looked at: its work, independent of the machine.
   std::uint64_t group_pairs() const { return group_pairs_; }
 
  private:
@@ -42,7 +42,7 @@ class BroadPhase {
     std::uint32_t box;
   };
 
-  /// Four boxes, or the boxes of four groups; where there are fewer, of empty ones, [inf, -inf].
+  /// Four boxes, or the boxes of four groups; where there are fewer, the others are empty, [inf, -inf].
   struct alignas(64) Group {
     double lo[3][kGroup], hi[3][kGroup];
   };

@@ -9,25 +9,25 @@
 
 namespace tandem {
 
-/// An asset, by its place in the list given to set_assets(), and where it stands. The pose speaks of the
-/// file's coordinates.
+/// Where an asset stands. The asset is known by its place in the list given to set_assets(); the pose applies
+/// to the file's coordinates.
 struct Instance {
   std::uint32_t asset;
   Pose pose;
 };
 
-/// How much a query decides.
+/// What a query decides on.
 enum class QueryMode : std::uint8_t {
   exact,  ///< contact pairs, as exact arithmetic on the posed vertices finds them
-  fast,   ///< contact pairs by float32 in the first instance's frame: may err where rounding does
-  boxes,  ///< candidates: triangles whose boxes overlap; none that touch are missing, many do not touch
+  fast,   ///< contact pairs by float32 in the first instance's frame, which may err where rounding does
+  boxes,  ///< candidates: triangles whose boxes overlap; all that touch are among them, and many that do not
 };
 
-/// Two triangles that meet: one of pairs()[pair].a, one of pairs()[pair].b.
+/// Two triangles that meet: triangle_a belongs to instance pairs()[pair].a, triangle_b to pairs()[pair].b.
 struct Contact {
   std::uint32_t pair;
   std::uint32_t triangle_a, triangle_b;  ///< in leaf order: LevelView::triangles[triangle_a]
-  std::uint32_t face_a, face_b;          ///< faces of the source files
+  std::uint32_t face_a, face_b;          ///< the faces of the source files that they come from
 
   friend bool operator==(const Contact&, const Contact&) = default;
 };
@@ -36,16 +36,16 @@ inline constexpr std::uint32_t kMostQueryThreads = 1024;
 
 struct QueryOptions {
   QueryMode mode = QueryMode::exact;
-  bool first_contact_only = false;  ///< at most one contact for each object pair: do they touch?
-  bool self_pairs = false;          ///< also each instance with itself, where the query finds the pairs
-  std::uint32_t threads = 1;  ///< the caller's included, kMostQueryThreads at most; results are the same
+  bool first_contact_only = false;  ///< the query reports one contact for each object pair that touches
+  bool self_pairs = false;          ///< where the query finds the pairs: also each instance with itself
+  std::uint32_t threads = 1;  ///< with the caller's, kMostQueryThreads at most; results don't depend on it
 };
 
-/// What a query did. Independent of threads, and of the machine.
+/// What a query did. The counters depend neither on the number of threads nor on the machine.
 struct QueryCounters {
   std::uint64_t object_pairs = 0;
   std::uint64_t block_pairs = 0;  ///< 16 box tests each
-  std::uint64_t candidates = 0;   ///< in boxes mode; otherwise less those that planes of leaves tell apart
+  std::uint64_t candidates = 0;   ///< except in boxes mode, without those that planes of leaves tell apart
   std::uint64_t decided_by_float32 = 0;  ///< candidates, by the stage of the cascade that decided
   std::uint64_t decided_by_float64 = 0;
   std::uint64_t decided_exactly = 0;
@@ -65,19 +65,21 @@ class ContactQuery {
   ContactQuery& operator=(ContactQuery&&) noexcept;
   ~ContactQuery();
 
-  /// Names the assets that instances refer to; level 0 of each is looked at. What the views look at must
-  /// outlive the queries. Result: kOk, kUnknownAsset (a view of nothing: where() is its place in the list),
-  /// or kOutOfMemory; then there are no assets.
+  /// Names the assets that instances refer to. Queries use level 0 of each; what the views point to must
+  /// outlive the queries. Result: kOk; kUnknownAsset, where a view points to nothing and where() is its place
+  /// in the list; or kOutOfMemory. After an error there are no assets.
   Status set_assets(std::span<const AssetView> assets);
 
-  /// Finds the object pairs whose world boxes overlap, and not their contacts: for those who want to leave
-  /// some out. Result: kOk, or kUnknownAsset, kPoseNotRigid, kOutOfRange (beyond kLargestWorldCoordinate):
-  /// where() is the instance; kTooManyInstances, kTooManyPairs, kOutOfMemory. After an error there are no
-  /// pairs and no contacts.
+  /// Finds the object pairs whose world boxes overlap, without their contacts, so that the caller can leave
+  /// some out. Result: kOk; kUnknownAsset, kPoseNotRigid or kOutOfRange (beyond kLargestWorldCoordinate),
+  /// where where() is the instance; kTooManyInstances, kTooManyPairs or kOutOfMemory. After an error there
+  /// are no pairs and no contacts.
   Status find_pairs(std::span<const Instance> instances, const QueryOptions& options = {});
 
-  /// Finds the object pairs whose world boxes overlap, and their contacts. Result: as above, or
-  /// kCannotStartThread.
+  /// Finds the object pairs whose world boxes overlap, and their contacts. find_contacts(instances, {}) is
+  /// this one, with default options. Result: as above, or kCannotStartThread. kOutOfMemory also where the
+  /// machine, or the limit of the process's control group, has not enough memory available for the contacts:
+  /// Linux would grant it and kill the process later. In a steady state nothing is asked.
   Status find_contacts(std::span<const Instance> instances, const QueryOptions& options = {});
 
   /// Finds the contacts of the given object pairs, in either order of a and b. A pair of an instance with

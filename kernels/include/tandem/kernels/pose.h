@@ -50,8 +50,8 @@ TANDEM_HD inline void apply(const Pose& pose, double x, double y, double z, doub
   }
 }
 
-/// The pose of stored coordinates, given that of the file's coordinates: the translation becomes R * origin +
-/// t, by apply().
+/// The pose for stored coordinates, given the one for the file's coordinates: its translation is R * origin +
+/// t, computed by apply().
 TANDEM_HD inline Pose for_stored_coordinates(const Pose& pose, const double* origin) {
   Pose stored = pose;
   apply(pose, origin[0], origin[1], origin[2], stored.translation);

@@ -12,8 +12,8 @@
 namespace tandem {
 
 struct GpuBroadPhaseOptions {
-  /// Pairs come sorted by a, then b, as BroadPhase has them. Else they come in an order that may differ from
-  /// run to run; of many boxes, neighbours in space close to each other.
+  /// Pairs are sorted by a, then b, as those of BroadPhase. Without it their order may differ from run to
+  /// run; of many boxes, pairs that are neighbours in space come close to each other.
   bool sorted = false;
 };
 
@@ -31,18 +31,20 @@ constexpr std::size_t most_broad_phase_bytes(const GpuBroadPhaseCapacity& capaci
          (sorted ? 17 : 8) * std::size_t{capacity.pairs};
 }
 
-/// What became of a broad phase. Lies in GPU memory, and in CPU memory once the stream has come so far.
+/// The outcome of a broad phase. It lies in GPU memory, and in CPU memory once the stream has come to the
+/// broad phase's end.
 struct GpuBroadPhaseReport {
   Status status;           ///< kOk, or kOutOfRange, kUnknownAsset, kPoseNotRigid; then there are no pairs
   std::uint32_t complete;  ///< 0: there was no room for all pairs; those stored are some of them
-  std::uint32_t where;     ///< the box or instance to blame for an error: of several, the first
-  std::uint32_t count;     ///< pairs that there are, room or not; 2^32 - 1 where they are as many or more
-  std::uint64_t found;     ///< pairs that there are
+  std::uint32_t where;     ///< the box or instance that caused an error; of several, the first
+  std::uint32_t count;     ///< like `found`; 2^32 - 1 where there are as many or more
+  std::uint64_t found;     ///< how many pairs there are, stored or not
 };
 
-/// Finds all pairs of world boxes that meet, on the GPU: the same set as BroadPhase. Nothing of enqueue()
-/// waits for the GPU, allocates, or asks the CPU. Throws nothing. Movable, not copyable. One broad phase at a
-/// time: enqueue the next on the same stream, or after it; several objects side by side.
+/// Finds all pairs of world boxes that meet, on the GPU: the same set as BroadPhase. enqueue() neither waits
+/// for the GPU nor allocates. Throws nothing. Movable, not copyable. An object runs one broad phase at a
+/// time: enqueue the next on the same stream, or when the last has ended. Several objects can run side by
+/// side.
 ///
 /// Few boxes are tested each against each, by one kernel that poses them too. Many are sorted by class of
 /// size, then along a space-filling curve, and grouped by 32 into a tree of fan-out 32. One warp takes a
@@ -68,14 +70,14 @@ class GpuBroadPhase {
   Status enqueue(const WorldBox* boxes, std::uint32_t count, const GpuBroadPhaseOptions& options,
                  cudaStream_t stream);
 
-  /// Computes the instances' world boxes first, with the bits that ContactQuery has. In the report also
-  /// kUnknownAsset, kPoseNotRigid.
+  /// Computes the instances' world boxes first; they have the same bits as those of ContactQuery. The
+  /// report's status may be kUnknownAsset or kPoseNotRigid too.
   Status enqueue(const GpuInstances& instances, const GpuAssetBounds& assets,
                  const GpuBroadPhaseOptions& options, cudaStream_t stream);
 
-  /// enqueue(), waits, makes room where there was too little, and again: at most twice, and in a steady state
-  /// once. Room grows by a quarter more than needed. Result: that of the report or of a call that failed;
-  /// kTooManyPairs where there are 2^32 - 1 or more.
+  /// Enqueues a broad phase and waits for it; where there was too little room, makes room for a quarter more
+  /// than needed and starts again: at most twice, and in a steady state once. Result: that of the report, or
+  /// of a call that failed; kTooManyPairs where there are 2^32 - 1 or more.
   Status find_pairs(const WorldBox* boxes, std::uint32_t count, const GpuBroadPhaseOptions& options,
                     cudaStream_t stream);
   Status find_pairs(const GpuInstances& instances, const GpuAssetBounds& assets,

@@ -13,24 +13,25 @@ namespace tandem {
 
 struct GpuQueryOptions {
   QueryMode mode = QueryMode::exact;
-  bool first_contact_only = false;  ///< one contact for each object pair that has any; which one is open
+  /// The query reports one contact for each object pair that touches; which one is unspecified.
+  bool first_contact_only = false;
 
-  /// Contacts come sorted by pair, face_a, face_b, triangle_a, triangle_b: the same bytes on every run, and
-  /// the order of a contacts file where the pairs are sorted too. Within an instance itself face_a <= face_b
-  /// then. Takes time for as many contacts as there is room for, not for those found. Else they come in no
-  /// order.
+  /// Contacts are sorted by pair, face_a, face_b, triangle_a, triangle_b: they are the same bytes on every
+  /// run, in the order of a contacts file where the pairs are sorted too. In a pair of an instance with
+  /// itself face_a <= face_b then. Sorting takes time for as many contacts as there is room for, not for
+  /// those found. Without it their order is unspecified.
   bool sorted = false;
 
-  /// Walks the trees as mode exact does, counts block pairs and candidates, and decides none: no contacts.
-  /// Tells what the walk takes of a query's time. The other modes do not know it.
+  /// In exact mode, the query only walks the trees and counts block pairs and candidates; it finds no
+  /// contacts. This measures what the walk takes of a query's time. The other modes ignore it.
   bool walk_only = false;
 
-  /// Thread blocks, of 512 threads, that may look for contacts at a time; 0: as many as the GPU holds. Fewer
-  /// leave multiprocessors to what runs beside the query, and let tools run that are slow where warps wait.
+  /// The most thread blocks, of 512 threads, that look for contacts at a time; 0: as many as the GPU holds.
+  /// Fewer leave multiprocessors to other work, and suit tools that are slow where warps wait.
   std::uint32_t most_blocks = 0;
 };
 
-/// How much a query has room for, and how much one needs.
+/// How many of each a query has room for, or needs room for.
 struct GpuQueryCapacity {
   std::uint32_t pairs = 0;
   std::uint64_t contacts = 0;
@@ -50,21 +51,22 @@ inline std::size_t most_query_bytes(const GpuQueryCapacity& capacity, bool sorte
          per_contact * capacity.contacts + 24 * capacity.undecided;
 }
 
-/// What became of a query. Lies in GPU memory, and in CPU memory once the stream has come so far.
+/// The outcome of a query. It lies in GPU memory, and in CPU memory once the stream has come to the query's
+/// end.
 struct GpuQueryReport {
   Status status;              ///< kOk, or what find_contacts() of ContactQuery names; then no contacts
-  std::uint32_t complete;     ///< 0: something did not fit; contacts are missing, and `needed` says more
-  std::uint64_t where;        ///< the instance or pair that is to blame for an error
-  GpuQueryCapacity needed;    ///< at least; exactly, for what follows from things that did fit
-  std::uint64_t contacts;     ///< stored
-  std::uint64_t world_pairs;  ///< object pairs out of reach of float32, which take the slow way
+  std::uint32_t complete;     ///< 0 where something did not fit: contacts are missing then, see `needed`
+  std::uint64_t where;        ///< the instance or pair that caused an error
+  GpuQueryCapacity needed;    ///< a lower bound; exact for what follows from things that did fit
+  std::uint64_t contacts;     ///< how many are stored
+  std::uint64_t world_pairs;  ///< object pairs beyond float32, which are walked by world boxes, slowly
   QueryCounters counters;
 };
 
 /// Finds every pair of triangles that meet, of many posed instances of few assets, on the GPU: the same set
-/// of contacts as ContactQuery. Nothing of enqueue() waits for the GPU, allocates, or asks the CPU. Throws
-/// nothing. Movable, not copyable. One query at a time: enqueue the next on the same stream, or after it;
-/// several objects side by side.
+/// of contacts as ContactQuery. enqueue() neither waits for the GPU nor allocates. Throws nothing. Movable,
+/// not copyable. An object runs one query at a time: enqueue the next on the same stream, or when the last
+/// has ended. Several objects can run side by side.
 class GpuContactQuery {
  public:
   GpuContactQuery();
@@ -83,17 +85,17 @@ class GpuContactQuery {
   /// an error there is the room that there was, or none. Condition: set_assets().
   Status reserve(const GpuQueryCapacity& capacity, const GpuQueryOptions& options = {});
 
-  /// Queues a query behind what `stream` holds; may be captured into a graph. The arrays must stay until it
-  /// is done. A pair of an instance with itself asks for the contacts within it. Result: kOk, kOutOfRange
+  /// Queues a query behind what `stream` holds; it may be captured into a graph. The arrays must stay until
+  /// it is done. A pair of an instance with itself asks for the contacts within it. Result: kOk, kOutOfRange
   /// (sorted, and reserved without), kCudaFailed, or, where CUDA loads a kernel at its first launch and the
   /// GPU is full, kOutOfGpuMemory; what the GPU finds wrong is in the report. Condition: set_assets() and
   /// reserve().
   Status enqueue(const GpuInstances& instances, const GpuPairs& pairs, const GpuQueryOptions& options,
                  cudaStream_t stream);
 
-  /// enqueue(), waits, makes room where it was too small, and again until the query is complete: rarely more
-  /// than twice, and in a steady state once. Result: that of the report or of a call that failed;
-  /// kOutOfRange where pairs.capacity itself was too small.
+  /// Enqueues a query and waits for it; where room was too small, makes room and starts again until the query
+  /// is complete: rarely more than twice, and in a steady state once. Result: that of the report, or of a
+  /// call that failed; kOutOfRange where pairs.capacity itself was too small.
   Status find_contacts(const GpuInstances& instances, const GpuPairs& pairs, const GpuQueryOptions& options,
                        cudaStream_t stream);
 

@@ -9,12 +9,12 @@
 // A scene as queries on a GPU take it: arrays in GPU memory that belong to the caller.
 namespace tandem {
 
-/// An asset as a query on the GPU sees it; owns nothing.
+/// An asset as queries on the GPU take it. Owns nothing.
 struct GpuAsset {
   LevelView tree;  ///< pointers into GPU memory, as DeviceAsset::level() gives them
   double origin[3];
   float lower[3], upper[3];
-  std::uint64_t source_faces;  ///< that sorted contacts can name
+  std::uint64_t source_faces;  ///< how many there are: contacts name faces below this number
 };
 
 /// The asset whose level `tree` lies in GPU memory and whose header lies in CPU memory.
@@ -26,7 +26,8 @@ inline GpuAsset gpu_asset(const LevelView& tree, const FileHeader& header) {
   return asset;
 }
 
-/// What a broad phase needs to know of an asset: stored coordinates, as the file's header has them.
+/// What a broad phase needs to know of an asset: its bounds in stored coordinates, as the file's header has
+/// them.
 struct AssetBounds {
   double origin[3];
   float lower[3], upper[3];
@@ -46,7 +47,7 @@ struct GpuAssetBounds {
   std::uint32_t count;
 };
 
-/// Instances as arrays in GPU memory, which a simulation may write there. Poses speak of the file's
+/// Instances as arrays in GPU memory, which a simulation may write there. Poses apply to the file's
 /// coordinates.
 struct GpuInstances {
   const std::uint32_t* asset;  ///< by place in the list of assets, or of their bounds
@@ -54,7 +55,7 @@ struct GpuInstances {
   std::uint32_t count;
 };
 
-/// Object pairs in GPU memory, their number too: what a broad phase on the GPU leaves there.
+/// Object pairs and their number, both in GPU memory, as a broad phase on the GPU leaves them there.
 struct GpuPairs {
   const ObjectPair* pairs;
   const std::uint32_t* count;  ///< in GPU memory

@@ -191,7 +191,7 @@ TANDEM_HD inline float a_along_b(const OrientedPose& pose, int j, const float (&
 
 /// Whether no face normal of either box separates them: if it says no, no posed triangles in the boxes meet,
 /// in exact arithmetic, as docs/box_test.md says.
-TANDEM_HD inline bool overlap_oriented(const Box& a, const Box& b, const OrientedPose& pose) {
+inline bool overlap_oriented(const Box& a, const Box& b, const OrientedPose& pose) {
   bool overlap = true;
   for (int k = 0; k < 3; ++k) {
     const float in_a = oriented_terms::b_in_a(pose, k, b.center) - a.center[k];

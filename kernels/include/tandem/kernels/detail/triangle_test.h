@@ -323,7 +323,7 @@ TANDEM_HD inline Verdict decide_fast(const TrianglePair& t) {
 }
 
 /// Always right: float64, and what that leaves exactly.
-TANDEM_HD inline Decision decide(const TrianglePair& t) {
+inline Decision decide(const TrianglePair& t) {
   const Verdict verdict = decide_float64(t);
   if (verdict != Verdict::undecided) return {verdict, false};
   return {decide_exact(t), true};

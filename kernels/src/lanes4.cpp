@@ -1,10 +1,16 @@
-#include "block_pair_lanes.h"
+#include "block_pair_variants.h"
+#include "narrow_phase_lanes.h"
 
+// The variants of 4 lanes.
 #ifdef TANDEM_HAVE_LANES
 namespace tandem {
 
 std::uint16_t block_pair_mask_lanes4(const Block& a, const Block& b, const RelativePose& b_in_a) {
   return static_cast<std::uint16_t>(BlockPairLanes<4>(a, b, b_in_a).mask());
+}
+
+bool narrow_phase_lanes4(const PairTask& task, ContactSink& sink) {
+  return PairWalk<LaneMeans<4>>(task, sink).run();
 }
 
 }  // namespace tandem

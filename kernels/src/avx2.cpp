@@ -1,0 +1,17 @@
+#include "block_pair_variants.h"
+#include "narrow_phase_lanes.h"
+
+// The variants of 8 lanes, in a file that is compiled for machines that have the instructions.
+#if defined(TANDEM_HAVE_LANES) && defined(__AVX2__)
+namespace tandem {
+
+std::uint16_t block_pair_mask_avx2(const Block& a, const Block& b, const RelativePose& b_in_a) {
+  return static_cast<std::uint16_t>(BlockPairLanes<8>(a, b, b_in_a).mask());
+}
+
+bool narrow_phase_avx2(const PairTask& task, ContactSink& sink) {
+  return PairWalk<LaneMeans<8>>(task, sink).run();
+}
+
+}  // namespace tandem
+#endif

@@ -2,6 +2,7 @@
 // of more, and with every step of the protocol left out once, which must not go unnoticed.
 #include <gtest/gtest.h>
 
+#include <ostream>
 #include <random>
 
 #include "walk_model.h"
@@ -128,6 +129,10 @@ struct Mutation {
   LeftOut left_out;
   const char* name;
 };
+
+void PrintTo(const Mutation& mutation, std::ostream* out) {
+  *out << mutation.name;
+}
 
 class WorkSharingWithout : public testing::TestWithParam<Mutation> {};
 

@@ -88,7 +88,7 @@ __device__ void clear_mailboxes(QueryState& state) {
 }
 __device__ void clear_counters(QueryState& state) {
   for (Balance* balance : {&state.frame, &state.world}) {
-    balance->active = balance->given = balance->asked = balance->next_pair = 0;
+    balance->counts = balance->next_pair = 0;
   }
   state.error = state.contacts = state.undecided = state.unresolved = 0;
   state.world_pairs = state.finished_blocks = 0;

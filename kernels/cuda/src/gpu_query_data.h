@@ -15,16 +15,17 @@ struct Candidate {
   std::uint32_t pair, a, b;
 };
 
-/// Entries of the stack, see walk.cuh, that one warp gives to another.
-struct Chunk {
-  uint4 entry[32];
+/// Entries of the stack, see walk_stack.cuh, that one warp gives to another: two words of 64 bits each.
+struct alignas(16) Chunk {
+  Counter entry[32][2];
 };
 inline constexpr std::uint32_t kChunks = 8192;
 
-/// How warps share work: how many have work, the chunks given, the numbers given out to those who wait, the
-/// first object pair that nobody took; and mailboxes, see walk.cuh.
+/// How warps share work, see work_sharing.h, and the first object pair that no warp took.
 struct alignas(128) Balance {
-  std::uint32_t active, given, asked, next_pair;
+  Counter counts;
+  Counter beside_counts;  ///< never written: warps look at 16 bytes at once
+  std::uint32_t next_pair;
   alignas(128) std::uint32_t mailbox[kChunks];
 };
 
@@ -60,9 +61,9 @@ struct QueryArgs {
   std::uint32_t* met;  ///< of a pair: not 0 once it has a contact; where only the first is asked for
   Contact* contacts;
   Candidate *undecided, *unresolved;
-  std::uint32_t stack_size, stack_reserve;  ///< see walk.cuh
+  std::uint32_t stack_size, stack_reserve;  ///< entries of a warp's stack; see Walk::step()
   std::uint32_t most_blocks;                ///< of the walk's grid; 0: as many as the GPU holds
-  std::uint32_t mailbox_bits;               ///< they number the mailboxes in use
+  std::uint32_t mailbox_bits;               ///< they number the mailboxes in use, see work_sharing.h
 };
 
 /// What sorting takes besides args.contacts, which it reads: all of as many contacts.

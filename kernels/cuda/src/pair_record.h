@@ -87,17 +87,19 @@ __device__ inline Counter place_for(bool wanted, Counter* counter) {
   return __shfl_sync(kAllLanes, first, 0) + __popc(lanes & lanes_below());
 }
 
+/// By plain loads: a kernel that is launched early may be there while the records are made, and what __ldg()
+/// loads must not change while a kernel runs.
 __device__ inline RelativePose pose_of(const PairRecord& record) {
   RelativePose pose;
 #pragma unroll
   for (int i = 0; i < 3; ++i) {
-    const float4 r = __ldg(&record.rotation[i]), m = __ldg(&record.abs_rotation[i]);
+    const float4 r = record.rotation[i], m = record.abs_rotation[i];
     pose.rotation[i][0] = r.x, pose.rotation[i][1] = r.y, pose.rotation[i][2] = r.z;
     pose.translation[i] = r.w;
     pose.abs_rotation[i][0] = m.x, pose.abs_rotation[i][1] = m.y, pose.abs_rotation[i][2] = m.z;
     pose.slack_a[i] = m.w;
   }
-  const float4 last = __ldg(reinterpret_cast<const float4*>(record.slack_b));
+  const auto& last = *reinterpret_cast<const float4*>(record.slack_b);
   pose.slack_b[0] = last.x, pose.slack_b[1] = last.y, pose.slack_b[2] = last.z;
   return pose;
 }

@@ -92,11 +92,12 @@ __device__ inline Side side_of(const WalkBlock& block) {
   return {words.x, __uint_as_float(words.y)};
 }
 
-/// Translation and rotation of a record.
+/// Translation and rotation of a record. By plain loads, as all of a record: the kernel that makes records
+/// may still be running when this one starts, and what __ldg() loads must not change while a kernel runs.
 __device__ inline void load_pose(const PairRecord& record, float (&rotation)[3][3], float (&translation)[3]) {
 #pragma unroll
   for (int i = 0; i < 3; ++i) {
-    const float4 row = __ldg(&record.rotation[i]);
+    const float4 row = record.rotation[i];
     rotation[i][0] = row.x, rotation[i][1] = row.y, rotation[i][2] = row.z, translation[i] = row.w;
   }
 }
@@ -112,7 +113,7 @@ __device__ inline std::uint32_t oriented_mask(const PairRecord& record, const Wa
   side_b = {last_b.x, __uint_as_float(last_b.y)};
   float rotation[3][3], translation[3];
   load_pose(record, rotation, translation);
-  const OrientedPose pose = oriented_pose(rotation, translation, __ldg(&record.oriented_slack),
+  const OrientedPose pose = oriented_pose(rotation, translation, record.oriented_slack,
                                           frame_of({last_a.z, last_a.w}), frame_of({last_b.z, last_b.w}));
   Four cb[3], hb[3], ca[3], ha[3];
 #pragma unroll
@@ -208,7 +209,7 @@ struct InFrame {
     const TriangleInFrame in_a = stored_triangle(load_triangle(record.triangles_a, a)),
                           of_b = posed_triangle(pose_of(record), load_triangle(record.triangles_b, b));
     const auto verdicts =
-        frame::decide<kBounded>(in_a.corner, of_b.corner, kBounded ? __ldg(&record.frame_error) : 0.0f);
+        frame::decide<kBounded>(in_a.corner, of_b.corner, kBounded ? record.frame_error : 0.0f);
     out.contact = verdicts.contact;
     out.undecided = verdicts.undecided;
     return out;

@@ -472,7 +472,8 @@ FaceContacts found_contacts(const ContactQuery& query) {
 }
 
 std::vector<PosedTriangle> posed_triangles(const Scene& scene, std::uint32_t instance) {
-  const auto& [asset, pose] = scene.instances[instance];
+  const std::uint32_t asset = scene.instances[instance].asset;
+  const Pose& pose = scene.instances[instance].pose;
   const Mesh& mesh = scene.assets.mesh(asset);
   const double* origin = scene.assets.views()[asset].header->origin;
   const auto row = [&](int i, double x, double y, double z) {

@@ -1,0 +1,1 @@
+// Nothing: tests/CMakeLists.txt precompiles GoogleTest's header for this file and for all tests.

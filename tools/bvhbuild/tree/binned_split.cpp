@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "splitter.h"
 
@@ -16,7 +17,11 @@ constexpr std::size_t kGrain = 1 << 15;
 struct Binning {
   float lo = 0, scale = 0;
 
-  int bin(float center) const { return std::clamp(static_cast<int>((center - lo) * scale), 0, kBins - 1); }
+  // Bounds that nearly coincide or lie too far apart for float32 give no finite place; then there is one bin.
+  int bin(float center) const {
+    const float place = (center - lo) * scale;
+    return std::isfinite(place) ? std::clamp(static_cast<int>(place), 0, kBins - 1) : 0;
+  }
 };
 
 struct Bin {

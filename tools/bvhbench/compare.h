@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "engines/peer.h"
+#include "engines/engine.h"
 #include "scenes/scene_file.h"
 
 namespace tandem::bench {
@@ -41,7 +41,7 @@ struct SceneComparison {
 /// Runs a scene through the peers. Queries are repeated in turn, one peer after the other, so that a drifting
 /// machine drifts for all. The reference is CGAL, or Tandem exact without it. Throws FileError of a scene
 /// that cannot be compared, std::runtime_error of a peer.
-SceneComparison compare(const std::string& path, std::span<const std::unique_ptr<Peer>> peers,
+SceneComparison compare(const std::string& path, std::span<const std::unique_ptr<Engine>> peers,
                         unsigned repeats);
 
 }  // namespace tandem::bench

@@ -31,19 +31,15 @@ std::vector<ObjectPair> normalised(std::span<const ObjectPair> pairs) {
   return sorted;
 }
 
-ContactTable make_table(std::span<const ObjectPair> pairs, std::span<const Contact> contacts) {
-  std::vector<std::array<std::uint32_t, 3>> rows;
-  rows.reserve(contacts.size());
-  for (const Contact& contact : contacts) {
+ContactTable make_table(std::span<const ObjectPair> pairs, std::vector<FaceContact> contacts) {
+  for (FaceContact& contact : contacts) {
     const bool itself = pairs[contact.pair].a == pairs[contact.pair].b;
-    const bool swap = itself && contact.face_b < contact.face_a;
-    rows.push_back(
-        {contact.pair, swap ? contact.face_b : contact.face_a, swap ? contact.face_a : contact.face_b});
+    if (itself && contact.face_b < contact.face_a) std::swap(contact.face_a, contact.face_b);
   }
-  std::sort(rows.begin(), rows.end());
+  std::sort(contacts.begin(), contacts.end());
   ContactTable table;
   table.pairs.assign(pairs.begin(), pairs.end());
-  for (const auto& [pair, face_a, face_b] : rows) {
+  for (const auto& [pair, face_a, face_b] : contacts) {
     table.pair.push_back(pair);
     table.face_a.push_back(face_a);
     table.face_b.push_back(face_b);

@@ -1,4 +1,5 @@
 #pragma once
+#include <compare>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -20,8 +21,15 @@ struct ContactTable {
 /// Each pair once, a <= b, sorted.
 std::vector<ObjectPair> normalised(std::span<const ObjectPair> pairs);
 
+/// Source faces that meet, of the instances in row `pair` of the object pairs.
+struct FaceContact {
+  std::uint32_t pair, face_a, face_b;
+
+  friend auto operator<=>(const FaceContact&, const FaceContact&) = default;
+};
+
 /// Condition on pairs: normalised.
-ContactTable make_table(std::span<const ObjectPair> pairs, std::span<const Contact> contacts);
+ContactTable make_table(std::span<const ObjectPair> pairs, std::vector<FaceContact> contacts);
 
 /// XXH64 of pairs, pair, face_a and face_b, one after the other, as little-endian 32-bit numbers.
 std::uint64_t hash_of(const ContactTable& table);

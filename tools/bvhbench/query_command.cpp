@@ -8,7 +8,6 @@
 
 #include "common/json.h"
 #include "common/number_words.h"
-#include "common/stopwatch.h"
 #include "engines/registry.h"
 #include "scenes/contacts_file.h"
 #include "scenes/hdf5_file.h"
@@ -32,7 +31,6 @@ struct Answer {
   QueryRecord record;
   ContactTable table;
   TimedAnswer timed;  // its contacts are in the table
-  double upload = 0;  // seconds for shapes and bodies, allocation included
 };
 
 const std::map<std::string, QueryMode> kModes = {
@@ -107,10 +105,8 @@ Answer run_query(const QueryArguments& arguments, const Scene& scene) {
   const std::vector<ObjectPair> pairs = normalised(description.pairs.value_or(std::vector<ObjectPair>()));
   const auto engine = make_engine(arguments.engine(), arguments.options);
   Answer answer = {record_of(arguments, scene), {}, {}};
-  Stopwatch watch;
   engine->set_shapes(views);
   engine->update(description.instances);
-  answer.upload = watch.lap();
   answer.timed = engine->time_query(
       {description.pairs ? &pairs : nullptr, arguments.repeats, arguments.sorted, arguments.traversal});
   answer.record.seconds = answer.timed.whole;
@@ -176,7 +172,7 @@ Json to_json(const QueryArguments& arguments, const Scene& scene, const Answer& 
     json["gpu_bytes"] = answer.timed.gpu.bytes;
     json["gpu_bytes_bound"] = answer.timed.gpu.bytes_bound == 0 ? Json() : Json(answer.timed.gpu.bytes_bound);
     json["gpu_bytes_taken"] = answer.timed.gpu.bytes_taken;
-    json["upload_seconds"] = answer.upload;
+    json["upload_seconds"] = answer.timed.gpu.upload;
     json["broad_phase_seconds"] = times(answer.timed.broad_phase);
     json["contacts_seconds"] = times(answer.timed.narrow);
     json["traversal_seconds"] = times(answer.timed.traversal);
@@ -220,7 +216,7 @@ void print_summary(const QueryArguments& arguments, const Scene& scene, const An
     print_times("  broad phase", times(answer.timed.broad_phase));
     print_times("  contacts", times(answer.timed.narrow));
     print_times("  traversal", times(answer.timed.traversal), " alone");
-    std::printf("  %-14s %15.3f  once\n", "upload", 1e3 * answer.upload);
+    std::printf("  %-14s %15.3f  once\n", "upload", 1e3 * answer.timed.gpu.upload);
     print_row("GPU bytes", answer.timed.gpu.bytes);
   }
   std::printf("  %-14s %s\n", "hash", hexadecimal(hash_of(answer.table)).c_str());

@@ -4,6 +4,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "common/stopwatch.h"
 #include "tandem/formats/gpu_status.h"
 
 namespace tandem {
@@ -86,9 +87,9 @@ void GpuEngine::check(cudaError_t error, const char* step) const {
 }
 
 void GpuEngine::set_shapes(std::span<const AssetView> shapes) {
+  Stopwatch watch;
   uploads_.clear();
   shapes_.clear();
-  shapes_are_named_ = false;
   check(bounds_.grow(shapes.size()), "instances");
   for (std::size_t i = 0; i < shapes.size(); ++i) {
     DeviceAsset& upload = uploads_.emplace_back();
@@ -99,9 +100,12 @@ void GpuEngine::set_shapes(std::span<const AssetView> shapes) {
   }
   check(bounds_.upload(shapes.size(), stream()), "instances");
   check(stream_.wait(), "upload");
+  upload_of_shapes_ = watch.lap();
+  name_shapes();
 }
 
 void GpuEngine::update(std::span<const BodyPose> bodies) {
+  Stopwatch watch;
   check(shape_of_.grow(bodies.size()), "instances");
   check(poses_.grow(bodies.size()), "instances");
   for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -112,12 +116,16 @@ void GpuEngine::update(std::span<const BodyPose> bodies) {
   check(poses_.upload(bodies.size(), stream()), "instances");
   check(stream_.wait(), "upload");
   instances_ = {shape_of_.on_gpu.data(), poses_.on_gpu.data(), static_cast<std::uint32_t>(bodies.size())};
+  upload_of_bodies_ = watch.lap();
+}
+
+GpuAssetBounds GpuEngine::bounds() const {
+  return {bounds_.on_gpu.data(), static_cast<std::uint32_t>(shapes_.size())};
 }
 
 // Until there is room for all.
 void GpuEngine::find_pairs_on_gpu(bool sorted) {
-  const GpuAssetBounds bounds = {bounds_.on_gpu.data(), static_cast<std::uint32_t>(shapes_.size())};
-  const Status status = broad_phase_.find_pairs(instances_, bounds, {.sorted = sorted}, stream());
+  const Status status = broad_phase_.find_pairs(instances_, bounds(), {.sorted = sorted}, stream());
   if (subject(status) != nullptr) require(status, broad_phase_.report().where);
   check(status, broad_phase_.cuda_error(), "broad phase");
 }
@@ -142,17 +150,11 @@ GpuPairs GpuEngine::upload(std::span<const ObjectPair> pairs) {
   return {given_pairs_.on_gpu.data(), pair_count_.on_gpu.data(), static_cast<std::uint32_t>(pairs.size())};
 }
 
-void GpuEngine::ask_with_shapes(const GpuPairs& pairs, bool sorted) {
-  if (!shapes_are_named_) name_shapes(shapes_);
-  shapes_are_named_ = true;
-  ask(pairs, sorted);
-}
-
 // Pairs that find_pairs() found, all of them, lie on the GPU already.
 void GpuEngine::query(std::span<const ObjectPair> pairs) {
   const bool on_gpu =
       !pairs.empty() && pairs.data() == found_pairs_.data() && pairs.size() == broad_phase_.report().count;
-  ask_with_shapes(on_gpu ? broad_phase_.pairs() : upload(pairs), false);
+  ask(on_gpu ? broad_phase_.pairs() : upload(pairs), false);
 }
 
 bool GpuEngine::contacts(std::vector<TriangleContact>& found_contacts) {
@@ -167,7 +169,7 @@ bool GpuEngine::contacts(std::vector<TriangleContact>& found_contacts) {
 TimedAnswer GpuEngine::time_query(const TimedQuery& asked) {
   if (asked.given == nullptr) find_pairs_on_gpu(asked.sorted);
   const GpuPairs pairs = asked.given == nullptr ? broad_phase_.pairs() : upload(*asked.given);
-  ask_with_shapes(pairs, asked.sorted);
+  ask(pairs, asked.sorted);
   TimedAnswer answer;
   time_repeats(pairs, asked, answer);
   const GpuContacts contacts = found();
@@ -184,8 +186,7 @@ void GpuEngine::time_repeats(const GpuPairs& pairs, const TimedQuery& asked, Tim
   const bool finds_pairs = asked.given == nullptr;
   const Before before = [&](unsigned event_flags) {
     if (finds_pairs) {
-      const GpuAssetBounds bounds = {bounds_.on_gpu.data(), static_cast<std::uint32_t>(shapes_.size())};
-      const Status status = broad_phase_.enqueue(instances_, bounds, {.sorted = asked.sorted}, stream());
+      const Status status = broad_phase_.enqueue(instances_, bounds(), {.sorted = asked.sorted}, stream());
       check(status, broad_phase_.cuda_error(), "broad phase");
     }
     check(between.record(stream(), event_flags), "an event");
@@ -240,8 +241,9 @@ GpuUse GpuEngine::use(const TimedQuery& asked) const {
   check(cudaGetDevice(&device), "start");
   check(cudaGetDeviceProperties(&properties, device), "start");
   use.name = properties.name;
+  use.upload = upload_of_shapes_ + upload_of_bodies_;
   use.bytes = scene_bytes(asked) + broad_phase_.bytes() + query_bytes();
-  use.bytes_bound = most_bytes(asked.sorted, shapes_);
+  use.bytes_bound = most_bytes(asked.sorted);
   if (use.bytes_bound != 0) {
     use.bytes_bound += scene_bytes(asked);
     if (asked.given == nullptr)

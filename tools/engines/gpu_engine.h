@@ -54,14 +54,15 @@ class GpuEngine : public Engine {
   explicit GpuEngine(std::string_view name);
 
   cudaStream_t stream() const { return stream_.get(); }
+  std::span<const GpuAsset> shapes() const { return shapes_; }
   const GpuInstances& instances() const { return instances_; }
 
   /// Throw what a call that failed calls for. `step`: what was done.
   void check(cudaError_t error, const char* step) const;
   void check(Status status, cudaError_t error, const char* step) const;
 
-  /// set_assets() of the query.
-  virtual void name_shapes(std::span<const GpuAsset> shapes) = 0;
+  /// Tells the query of shapes().
+  virtual void name_shapes() = 0;
 
   /// Finds the contacts of these pairs, of instances(), and waits for them. `sorted`: on the GPU.
   virtual void ask(const GpuPairs& pairs, bool sorted) = 0;
@@ -81,27 +82,27 @@ class GpuEngine : public Engine {
 
   /// GPU memory of the query, and what its rule says it is at most; 0: there is no rule.
   virtual std::size_t query_bytes() const = 0;
-  virtual std::size_t most_bytes(bool, std::span<const GpuAsset>) const { return 0; }
+  virtual std::size_t most_bytes(bool) const { return 0; }
 
   /// Runs what `run` queues, and tells the seconds from `begin` to `end`.
   void run_between(const GpuEvent& begin, const std::function<void()>& run, const GpuEvent& end) const;
   double seconds_between(const GpuEvent& begin, const GpuEvent& end) const;
 
  private:
+  GpuAssetBounds bounds() const;
   void find_pairs_on_gpu(bool sorted);
   GpuPairs upload(std::span<const ObjectPair> pairs);
-  void ask_with_shapes(const GpuPairs& pairs, bool sorted);
   void time_repeats(const GpuPairs& pairs, const TimedQuery& asked, TimedAnswer& answer);
   void take(const GpuPairs& pairs, const GpuContacts& contacts, bool sorted, TimedAnswer& answer) const;
   std::size_t scene_bytes(const TimedQuery& asked) const;
   GpuUse use(const TimedQuery& asked) const;
 
   std::string name_;
-  std::size_t free_at_start_;
+  std::size_t free_at_start_ = 0;
+  double upload_of_shapes_ = 0, upload_of_bodies_ = 0;  // seconds
   GpuStream stream_;
   std::vector<DeviceAsset> uploads_;
   std::vector<GpuAsset> shapes_;
-  bool shapes_are_named_ = false;
   StagedArray<AssetBounds> bounds_;
   StagedArray<std::uint32_t> shape_of_, pair_count_;
   StagedArray<Pose> poses_;

@@ -16,10 +16,7 @@ class TandemCudaEngine final : public GpuEngine {
     return {.mode = options_.mode, .first_contact_only = options_.first_contact_only, .sorted = sorted};
   }
 
-  void name_shapes(std::span<const GpuAsset> shapes) override {
-    name_shapes_to(query_, shapes);
-    shapes_ = shapes;
-  }
+  void name_shapes() override { name_shapes_to(query_); }
 
   void ask(const GpuPairs& pairs, bool sorted) override {
     const Status status = query_.find_contacts(instances(), pairs, options(sorted), stream());
@@ -46,7 +43,7 @@ class TandemCudaEngine final : public GpuEngine {
   Seconds time_walk(const GpuPairs& pairs, std::uint32_t repeats) override {
     constexpr GpuQueryOptions kWalk = {.walk_only = true};
     GpuContactQuery walk;
-    name_shapes_to(walk, shapes_);
+    name_shapes_to(walk);
     const Status status = walk.reserve({.pairs = static_cast<std::uint32_t>(counters_.object_pairs)}, kWalk);
     check(status, walk.cuda_error(), "traversal");
     const auto run = captured([&] { enqueue(walk, pairs, kWalk, "traversal"); });
@@ -60,8 +57,8 @@ class TandemCudaEngine final : public GpuEngine {
     return seconds;
   }
 
-  void name_shapes_to(GpuContactQuery& query, std::span<const GpuAsset> shapes) const {
-    const Status status = query.set_assets(shapes, stream());
+  void name_shapes_to(GpuContactQuery& query) const {
+    const Status status = query.set_assets(shapes(), stream());
     check(status, query.cuda_error(), "assets");
   }
 
@@ -78,13 +75,12 @@ class TandemCudaEngine final : public GpuEngine {
   }
 
   std::size_t query_bytes() const override { return query_.bytes(); }
-  std::size_t most_bytes(bool sorted, std::span<const GpuAsset> shapes) const override {
-    return most_query_bytes(query_.capacity(), sorted, shapes);
+  std::size_t most_bytes(bool sorted) const override {
+    return most_query_bytes(query_.capacity(), sorted, shapes());
   }
 
   QueryOptions options_;
   GpuContactQuery query_;
-  std::span<const GpuAsset> shapes_;
 };
 
 }  // namespace

@@ -15,8 +15,8 @@ class PaperSchemeEngine final : public GpuEngine {
   }
 
  private:
-  void name_shapes(std::span<const GpuAsset> shapes) override {
-    const Status status = query_.set_assets(shapes, stream());
+  void name_shapes() override {
+    const Status status = query_.set_assets(shapes(), stream());
     check(status, query_.cuda_error(), "assets");
   }
 

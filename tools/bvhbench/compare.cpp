@@ -158,17 +158,6 @@ void race(std::span<const std::unique_ptr<Engine>> peers, const Frame& frame, un
 
 }  // namespace
 
-double PeerResult::best_seconds() const {
-  return *std::min_element(query_seconds.begin(), query_seconds.end());
-}
-
-double PeerResult::median_seconds() const {
-  std::vector<double> sorted = query_seconds;
-  std::sort(sorted.begin(), sorted.end());
-  const std::size_t middle = sorted.size() / 2;
-  return sorted.size() % 2 == 1 ? sorted[middle] : (sorted[middle - 1] + sorted[middle]) / 2;
-}
-
 SceneComparison compare(const std::string& path, std::span<const std::unique_ptr<Engine>> peers,
                         unsigned repeats) {
   const Scene scene = read_scene(path);

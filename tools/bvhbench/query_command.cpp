@@ -133,11 +133,9 @@ std::uint64_t triangles_of(const Scene& scene) {
   return triangles;
 }
 
-Json times(const std::vector<double>& seconds) {
+Json times(const Seconds& seconds) {
   if (seconds.empty()) return {};
-  QueryRecord record;
-  record.seconds = seconds;
-  return {{"best", record.best_seconds()}, {"median", record.median_seconds()}, {"all", seconds}};
+  return {{"best", best_of(seconds)}, {"median", median_of(seconds)}, {"all", seconds}};
 }
 
 Json to_json(const QueryArguments& arguments, const Scene& scene, const Answer& answer) {

@@ -4,7 +4,6 @@
 #include <bit>
 #include <new>
 
-#include "common/stopwatch.h"
 #include "tandem/formats/status.h"
 
 namespace tandem {

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/stopwatch.h"
 #include "tandem/kernels/contact_query.h"
 
 namespace tandem {
@@ -49,9 +50,6 @@ struct TimedQuery {
   bool sorted = false;     ///< on a GPU: pairs and contacts are sorted there, as a contacts file has them
   bool traversal = false;  ///< on a GPU: the walk of the trees is timed alone too
 };
-
-/// Seconds of a step, one for each repeat.
-using Seconds = std::vector<double>;
 
 /// What an engine takes of a GPU.
 struct GpuUse {

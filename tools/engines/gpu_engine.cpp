@@ -4,7 +4,6 @@
 #include <numeric>
 #include <tuple>
 
-#include "common/stopwatch.h"
 #include "tandem/formats/gpu_status.h"
 
 namespace tandem {

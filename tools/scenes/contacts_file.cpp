@@ -55,16 +55,6 @@ std::uint64_t hash_of(const ContactTable& table) {
   return xxh64(all.data(), all.size() * sizeof(std::uint32_t));
 }
 
-double QueryRecord::best_seconds() const {
-  return *std::min_element(seconds.begin(), seconds.end());
-}
-
-double QueryRecord::median_seconds() const {
-  std::vector<double> sorted = seconds;
-  std::sort(sorted.begin(), sorted.end());
-  return (sorted[(sorted.size() - 1) / 2] + sorted[sorted.size() / 2]) / 2;
-}
-
 void write_contacts(const std::string& path, const ContactTable& table, const QueryRecord& record) {
   const QueryCounters& counters = record.counters;
   Hdf5Output file(path);
@@ -80,8 +70,8 @@ void write_contacts(const std::string& path, const ContactTable& table, const Qu
   file.attribute("given_pairs", std::uint64_t{record.given_pairs});
   file.attribute("threads", record.threads);
   file.attribute("repeats", std::uint64_t{record.seconds.size()});
-  file.attribute("best_seconds", record.best_seconds());
-  file.attribute("median_seconds", record.median_seconds());
+  file.attribute("best_seconds", best_of(record.seconds));
+  file.attribute("median_seconds", median_of(record.seconds));
   file.attribute("object_pairs", counters.object_pairs);
   file.attribute("block_pairs", counters.block_pairs);
   file.attribute("candidates", counters.candidates);

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "common/stopwatch.h"
 #include "tandem/kernels/contact_query.h"
 
 namespace tandem::bench {
@@ -39,11 +40,8 @@ struct QueryRecord {
   std::string mode, backend;
   bool first_contact = false, self_pairs = false, given_pairs = false;
   std::uint64_t threads = 1;
-  std::vector<double> seconds;  ///< of each repeat, at least one
+  Seconds seconds;  ///< of each repeat, at least one
   QueryCounters counters;
-
-  double best_seconds() const;
-  double median_seconds() const;
 };
 
 /// Writes a contacts file (docs/scenes.md), whole or not at all. Throws OutputError.

@@ -11,8 +11,8 @@ class GpuEngine : public testing::TestWithParam<const char*> {
   void SetUp() override {
     int count = 0;
     if (cudaGetDeviceCount(&count) != cudaSuccess || count == 0) GTEST_SKIP() << "no GPU";
-    engine_ = simulation::make_engine(GetParam());
-    reference_ = simulation::make_engine("tandem");
+    engine_ = make_engine(GetParam());
+    reference_ = make_engine("tandem");
     engine_->set_shapes(pile_.assets.views());
     reference_->set_shapes(pile_.assets.views());
   }
@@ -25,7 +25,7 @@ class GpuEngine : public testing::TestWithParam<const char*> {
   }
 
   Pile pile_;
-  std::unique_ptr<CollisionEngine> engine_, reference_;
+  std::unique_ptr<Engine> engine_, reference_;
 };
 
 TEST_P(GpuEngine, FindsWhatTheCpuFindsStepAfterStep) {

@@ -1,13 +1,10 @@
 #pragma once
 #include <algorithm>
 
-#include "engines/collision_engine.h"
+#include "engines/registry.h"
 #include "simulator/contact_scene.h"
 
 namespace tandem::test {
-
-using simulation::CollisionEngine;
-using simulation::ContactList;
 
 /// Dumb-bells in a heap over a sheet, in successive steps.
 struct Pile {
@@ -37,8 +34,7 @@ struct Pile {
   }
 };
 
-inline ContactList found_by(CollisionEngine& engine, const Pile& pile,
-                            std::span<const std::uint8_t> idle = {}) {
+inline ContactList found_by(Engine& engine, const Pile& pile, std::span<const std::uint8_t> idle = {}) {
   ContactList list;
   engine.find(pile.bodies, idle, list);
   return list;

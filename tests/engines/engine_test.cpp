@@ -7,9 +7,6 @@
 namespace tandem::test {
 namespace {
 
-using simulation::is_built_in;
-using simulation::make_engine;
-
 class Engine : public testing::TestWithParam<std::string_view> {
  protected:
   // Not here, or on a GPU that is not here: engine_gpu_test has those.
@@ -74,14 +71,13 @@ TEST_P(Engine, FollowsBodiesThatComeAndGo) {
   EXPECT_TRUE(same(found_by(*engine, pile), found_by(*fresh, pile)));
 }
 
-INSTANTIATE_TEST_SUITE_P(Engines, Engine, testing::ValuesIn(simulation::engine_names()),
-                         [](const auto& tested) {
-                           std::string name(tested.param);
-                           std::replace(name.begin(), name.end(), '-', '_');
-                           return name;
-                         });
+INSTANTIATE_TEST_SUITE_P(Engines, Engine, testing::ValuesIn(engine_names()), [](const auto& tested) {
+  std::string name(tested.param);
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+});
 
-std::string message_of(std::string_view name, const simulation::EngineOptions& options = {}) {
+std::string message_of(std::string_view name, const QueryOptions& options = {}) {
   try {
     make_engine(name, options);
   } catch (const std::runtime_error& error) {
@@ -93,7 +89,7 @@ std::string message_of(std::string_view name, const simulation::EngineOptions& o
 TEST(Engines, ThatAreNotThereSaySoByName) {
   EXPECT_EQ(message_of("rapid"),
             "no engine rapid: there are tandem, tandem-cuda, paper, paper-bits, fcl, embree, embree-refit");
-  for (const std::string_view name : simulation::engine_names()) {
+  for (const std::string_view name : engine_names()) {
     if (is_built_in(name)) continue;
     EXPECT_NE(message_of(name).find("the engine " + std::string(name) + " is not built in: "),
               std::string::npos);
@@ -103,7 +99,8 @@ TEST(Engines, ThatAreNotThereSaySoByName) {
 TEST(Engines, RefuseAModeTheyDoNotHave) {
   for (const std::string_view name : {"fcl", "embree", "embree-refit"}) {
     if (!is_built_in(name)) continue;
-    EXPECT_EQ(message_of(name, {.fast = true}), "the engine " + std::string(name) + " has no fast mode");
+    EXPECT_EQ(message_of(name, {.mode = QueryMode::fast}),
+              "the engine " + std::string(name) + " has no fast mode");
   }
 }
 

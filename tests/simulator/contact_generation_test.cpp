@@ -8,6 +8,7 @@
 #include <cstring>
 
 #include "contact_scene.h"
+#include "engines/registry.h"
 
 namespace tandem::test {
 namespace {
@@ -439,9 +440,9 @@ TEST_P(HostileScene, GivesUnitNormalsAndFiniteDepths) {
   RandomPoses random(12);
   for (int trial = 0; trial < trials(10, 20); ++trial) {
     const Scene scene = GetParam().make(random);
-    const auto engine = simulation::make_engine("tandem");
+    const auto engine = make_engine("tandem");
     engine->set_shapes(scene.assets.views());
-    simulation::ContactList found;
+    ContactList found;
     engine->find(scene.instances, {}, found);
     simulation::ContactGenerator generator;
     generator.set_shapes(scene.assets.views());

@@ -5,6 +5,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "engines/registry.h"
+
 namespace tandem::test {
 
 using Eigen::Isometry3d;
@@ -22,7 +24,7 @@ void ContactScene::add_body(std::uint32_t shape, const Isometry3d& pose) {
 std::vector<simulation::ContactPoint> ContactScene::points(const Isometry3d& motion) {
   std::vector<Instance> instances;
   for (const auto& [shape, pose] : bodies_) instances.push_back({shape, to_pose(motion * pose)});
-  const auto engine = simulation::make_engine("tandem");
+  const auto engine = make_engine("tandem");
   engine->set_shapes(assets_.views());
   engine->find(instances, {}, found_);
   simulation::ContactGenerator generator;

@@ -27,7 +27,7 @@ class ContactScene {
  private:
   SampleAssets assets_;
   std::vector<std::pair<std::uint32_t, Eigen::Isometry3d>> bodies_;
-  simulation::ContactList found_;
+  ContactList found_;
   simulation::ContactStatistics statistics_;
 };
 

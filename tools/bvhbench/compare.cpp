@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cfenv>
-#include <chrono>
 #include <filesystem>
 
+#include "common/stopwatch.h"
 #include "scenes/contacts_file.h"
 #include "tandem/formats/hash.h"
 #include "tandem/kernels/broad_phase.h"
@@ -31,9 +31,9 @@ class SavedFloatingPoint {
 template <class Work>
 double seconds_of(const Work& work) {
   const SavedFloatingPoint saved;
-  const auto begin = std::chrono::steady_clock::now();
+  Stopwatch watch;
   work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return watch.lap();
 }
 
 // Bytes that malloc has handed out, large mappings included.
@@ -87,11 +87,14 @@ std::vector<ObjectPair> found_pairs(const std::string& path, const Scene& scene)
   return {broad_phase.pairs().begin(), broad_phase.pairs().end()};
 }
 
-void prepare(Peer& peer, const Frame& frame, PeerResult& result) {
-  result.name = peer.name();
+void prepare(Engine& peer, const Frame& frame, PeerResult& result) {
+  result.name = peer.label();
   result.settings = peer.settings();
   const std::uint64_t before = heap_bytes();
-  result.build_seconds = seconds_of([&] { peer.build(frame.assets, frame.instances()); });
+  result.build_seconds = seconds_of([&] {
+    peer.set_shapes(frame.assets);
+    peer.update(frame.instances());
+  });
   const auto update = [&] { return seconds_of([&] { peer.update(frame.instances()); }); };
   result.update_seconds = update();
   constexpr double kLong = 1;  // seconds: repeating it would tell little more
@@ -102,17 +105,17 @@ void prepare(Peer& peer, const Frame& frame, PeerResult& result) {
 }
 
 // The first query, which makes room for what it finds, is not timed; nor is anything else but a query.
-Contacts answer_of(Peer& peer, const Frame& frame, PeerResult& result) {
+Contacts answer_of(Engine& peer, const Frame& frame, PeerResult& result) {
   const std::uint64_t before = heap_bytes() + peer.bytes_beside_heap();
   const double seconds = seconds_of([&] { peer.query(frame.pairs); });
   result.work_bytes = growth(before, heap_bytes() + peer.bytes_beside_heap());
   if (peer.is_reference()) result.query_seconds = {seconds};
-  result.counters = peer.counters();
-  Contacts contacts = peer.contacts();
-  if (contacts) {
-    result.contacts = contacts->size();
-    result.hash = xxh64(contacts->data(), contacts->size() * sizeof(TriangleContact));
-  }
+  result.counters = peer.named_counters();
+  std::vector<TriangleContact> contacts;
+  if (!peer.contacts(contacts)) return {};
+  std::sort(contacts.begin(), contacts.end());
+  result.contacts = contacts.size();
+  result.hash = xxh64(contacts.data(), contacts.size() * sizeof(TriangleContact));
   return contacts;
 }
 
@@ -123,13 +126,13 @@ std::uint64_t count_missing(const std::vector<TriangleContact>& a, const std::ve
   return difference.size();
 }
 
-std::size_t find_reference(std::span<const std::unique_ptr<Peer>> peers) {
+std::size_t find_reference(std::span<const std::unique_ptr<Engine>> peers) {
   const auto find = [&](const auto& matches) {
     return static_cast<std::size_t>(std::find_if(peers.begin(), peers.end(), matches) - peers.begin());
   };
   const std::size_t independent = find([](const auto& peer) { return peer->is_reference(); });
   if (independent < peers.size()) return independent;
-  return find([](const auto& peer) { return peer->name() == "Tandem exact"; });
+  return find([](const auto& peer) { return peer->label() == "Tandem exact"; });
 }
 
 void judge(SceneComparison& comparison, const std::vector<Contacts>& answers, std::size_t reference) {
@@ -143,7 +146,7 @@ void judge(SceneComparison& comparison, const std::vector<Contacts>& answers, st
   }
 }
 
-void race(std::span<const std::unique_ptr<Peer>> peers, const Frame& frame, unsigned repeats,
+void race(std::span<const std::unique_ptr<Engine>> peers, const Frame& frame, unsigned repeats,
           std::vector<PeerResult>& results) {
   for (unsigned repeat = 0; repeat < repeats; ++repeat) {
     for (std::size_t i = 0; i < peers.size(); ++i) {
@@ -155,18 +158,7 @@ void race(std::span<const std::unique_ptr<Peer>> peers, const Frame& frame, unsi
 
 }  // namespace
 
-double PeerResult::best_seconds() const {
-  return *std::min_element(query_seconds.begin(), query_seconds.end());
-}
-
-double PeerResult::median_seconds() const {
-  std::vector<double> sorted = query_seconds;
-  std::sort(sorted.begin(), sorted.end());
-  const std::size_t middle = sorted.size() / 2;
-  return sorted.size() % 2 == 1 ? sorted[middle] : (sorted[middle - 1] + sorted[middle]) / 2;
-}
-
-SceneComparison compare(const std::string& path, std::span<const std::unique_ptr<Peer>> peers,
+SceneComparison compare(const std::string& path, std::span<const std::unique_ptr<Engine>> peers,
                         unsigned repeats) {
   const Scene scene = read_scene(path);
   check_instances(path, scene);

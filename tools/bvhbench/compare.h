@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "engines/peer.h"
+#include "engines/engine.h"
 #include "scenes/scene_file.h"
 
 namespace tandem::bench {
@@ -14,18 +14,15 @@ namespace tandem::bench {
 /// What one peer did on one scene.
 struct PeerResult {
   std::string name, settings;
-  double build_seconds = 0;           ///< once
-  double update_seconds = 0;          ///< each frame, best of up to three
-  std::vector<double> query_seconds;  ///< each repeat; a single one for the reference
+  double build_seconds = 0;        ///< once
+  double update_seconds = 0;       ///< each frame, best of up to three
+  Seconds query_seconds;           ///< each repeat; a single one for the reference
   std::uint64_t memory_bytes = 0;  ///< held after build and update: heap growth, and what malloc does not see
   std::uint64_t work_bytes = 0;    ///< by which the first query made it grow: queues, results
   std::optional<std::uint64_t> contacts;          ///< nothing where the library does not tell
   std::optional<std::uint64_t> missed, invented;  ///< against the reference
   std::uint64_t hash = 0;                         ///< XXH64 of the sorted contacts, 0 without them
   std::vector<Counter> counters;
-
-  double best_seconds() const;
-  double median_seconds() const;
 };
 
 /// One scene through all peers, same object pairs, one thread, one process, side by side.
@@ -41,7 +38,7 @@ struct SceneComparison {
 /// Runs a scene through the peers. Queries are repeated in turn, one peer after the other, so that a drifting
 /// machine drifts for all. The reference is CGAL, or Tandem exact without it. Throws FileError of a scene
 /// that cannot be compared, std::runtime_error of a peer.
-SceneComparison compare(const std::string& path, std::span<const std::unique_ptr<Peer>> peers,
+SceneComparison compare(const std::string& path, std::span<const std::unique_ptr<Engine>> peers,
                         unsigned repeats);
 
 }  // namespace tandem::bench

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "compare_results.h"
+#include "engines/registry.h"
 #include "scenes/hdf5_file.h"
 
 namespace tandem::bench {
@@ -35,11 +36,11 @@ std::string processor() {
   return "unknown";
 }
 
-std::vector<std::unique_ptr<Peer>> chosen_peers(const std::vector<std::string>& chosen) {
-  std::vector<std::unique_ptr<Peer>> peers;
-  for (const std::string_view engine : engines()) {
-    if (!chosen.empty() && std::find(chosen.begin(), chosen.end(), engine) == chosen.end()) continue;
-    for (auto& peer : make_peers(engine)) peers.push_back(std::move(peer));
+std::vector<std::unique_ptr<Engine>> chosen_peers(const std::vector<std::string>& chosen) {
+  std::vector<std::unique_ptr<Engine>> peers;
+  for (const std::string_view name : peer_names()) {
+    if (!chosen.empty() && std::find(chosen.begin(), chosen.end(), name) == chosen.end()) continue;
+    for (auto& peer : make_peers(name)) peers.push_back(std::move(peer));
   }
   return peers;
 }
@@ -81,8 +82,8 @@ CLI::App* add_compare(CLI::App& app, Run& run) {
   command->add_option("SCENE", arguments->scenes, "scene files, .h5")->required()->check(file_name());
   command->add_option("--peers", arguments->engines, "engines, all unless given")
       ->delimiter(',')
-      ->check(CLI::IsMember(engines()))
-      ->option_text(join(engines()));
+      ->check(CLI::IsMember(peer_names()))
+      ->option_text(join(peer_names()));
   command->add_option("--repeat", arguments->repeats, "timed queries of each")
       ->check(CLI::Range(1u, 100000u))
       ->option_text("N [5]");

@@ -24,8 +24,8 @@ Json to_json(const PeerResult& peer) {
           {"settings", peer.settings},
           {"build_seconds", peer.build_seconds},
           {"update_seconds", peer.update_seconds},
-          {"query_seconds_best", peer.best_seconds()},
-          {"query_seconds_median", peer.median_seconds()},
+          {"query_seconds_best", best_of(peer.query_seconds)},
+          {"query_seconds_median", median_of(peer.query_seconds)},
           {"query_seconds", peer.query_seconds},
           {"contacts", or_null(peer.contacts)},
           {"missed", or_null(peer.missed)},
@@ -128,8 +128,8 @@ void add_scene(Hdf5Output& file, const SceneComparison& scene, unsigned repeats)
   group.texts("hash", [](const PeerResult& peer) { return peer.contacts ? hexadecimal(peer.hash) : "-"; });
   group.numbers("build_seconds", [](const PeerResult& peer) { return peer.build_seconds; });
   group.numbers("update_seconds", [](const PeerResult& peer) { return peer.update_seconds; });
-  group.numbers("query_seconds_best", [](const PeerResult& peer) { return peer.best_seconds(); });
-  group.numbers("query_seconds_median", [](const PeerResult& peer) { return peer.median_seconds(); });
+  group.numbers("query_seconds_best", [](const PeerResult& peer) { return best_of(peer.query_seconds); });
+  group.numbers("query_seconds_median", [](const PeerResult& peer) { return median_of(peer.query_seconds); });
   group.query_seconds(repeats);
   group.numbers("contacts", [](const PeerResult& peer) { return or_nan(peer.contacts); });
   group.numbers("missed", [](const PeerResult& peer) { return or_nan(peer.missed); });
@@ -163,8 +163,8 @@ std::string to_text(const SceneComparison& scene) {
                  "median ms", "contacts", "missed", "invented", "memory");
   for (const PeerResult& peer : scene.peers) {
     text += format("  %-13s %9.1f %9.2f %9.2f %9.2f %10s %9s %9s %10s\n", peer.name.c_str(),
-                   1e3 * peer.build_seconds, 1e3 * peer.update_seconds, 1e3 * peer.best_seconds(),
-                   1e3 * peer.median_seconds(), count_or_dash(peer.contacts).c_str(),
+                   1e3 * peer.build_seconds, 1e3 * peer.update_seconds, 1e3 * best_of(peer.query_seconds),
+                   1e3 * median_of(peer.query_seconds), count_or_dash(peer.contacts).c_str(),
                    count_or_dash(peer.missed).c_str(), count_or_dash(peer.invented).c_str(),
                    human_bytes(peer.memory_bytes).c_str());
   }

@@ -7,7 +7,7 @@
 #include "common/option_helpers.h"
 #include "common/printable.h"
 #include "compare_command.h"
-#include "engines/gpu_query.h"
+#include "engines/engine.h"
 #include "frame_command.h"
 #include "poses_command.h"
 #include "query_command.h"

@@ -1,6 +1,5 @@
 #include "query_command.h"
 
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -9,7 +8,7 @@
 
 #include "common/json.h"
 #include "common/number_words.h"
-#include "engines/gpu_query.h"
+#include "engines/registry.h"
 #include "scenes/contacts_file.h"
 #include "scenes/hdf5_file.h"
 #include "scenes/scene_file.h"
@@ -17,35 +16,28 @@
 namespace tandem::bench {
 namespace {
 
-#ifdef TANDEM_BENCH_CUDA
-constexpr bool kHaveCuda = true;
-#else
-constexpr bool kHaveCuda = false;
-#endif
-
 struct QueryArguments {
-  std::string scene, out, backend = "cpu";
+  std::string scene, out, backend = "cpu", gpu_engine = "tandem-cuda";
   QueryOptions options;
-  GpuEngine engine = GpuEngine::tandem;
   std::uint32_t repeats = 1;
   bool sorted = false, traversal = false;
   bool json = false, threads_given = false;
 
   bool on_gpu() const { return backend == "cuda"; }
+  std::string engine() const { return on_gpu() ? gpu_engine : "tandem"; }
 };
 
-// What any backend answers.
 struct Answer {
   QueryRecord record;
   ContactTable table;
-  GpuAnswer gpu;  // empty on a CPU
+  TimedAnswer timed;  // its contacts are in the table
 };
 
 const std::map<std::string, QueryMode> kModes = {
     {"exact", QueryMode::exact}, {"fast", QueryMode::fast}, {"boxes", QueryMode::boxes}};
 
-const std::map<std::string, GpuEngine> kEngines = {
-    {"tandem", GpuEngine::tandem}, {"paper", GpuEngine::paper}, {"paper-bits", GpuEngine::paper_bits}};
+const std::map<std::string, std::string> kGpuEngines = {
+    {"tandem", "tandem-cuda"}, {"paper", "paper"}, {"paper-bits", "paper-bits"}};
 
 template <typename Value>
 std::string name_of(Value wanted, const std::map<std::string, Value>& names) {
@@ -55,8 +47,30 @@ std::string name_of(Value wanted, const std::map<std::string, Value>& names) {
   return {};
 }
 
-void check(const std::string& scene, Status status, const ContactQuery& query) {
-  if (status != Status::kOk) refuse(scene, status, query.where());
+// Throws what a status other than kOk calls for. `where`: the instance or pair that is to blame.
+[[noreturn]] void refuse(const std::string& scene, Status status, std::uint64_t where) {
+  const char* unit = subject(status);
+  const std::string blamed = unit == nullptr ? "" : std::string(unit) + " " + std::to_string(where) + ": ";
+  const std::string text = scene + ": " + blamed + explain(status);
+  if (status == Status::kCannotStartThread) throw std::runtime_error(text);
+  throw FileError(text);
+}
+
+[[noreturn]] void refuse(const std::string& scene, const GpuError& error) {
+  const std::string why = explain(error.status);
+  switch (error.status) {
+    case Status::kTooManyPairs:
+      refuse(scene, error.status, 0);
+    case Status::kOutOfGpuMemory:
+      throw GpuError("--backend cuda: " + error.step + ": " + why +
+                     (error.reason.empty() ? "" : ": " + error.reason));
+    case Status::kNoGpu:
+    case Status::kDriverTooOld:
+    case Status::kGpuNotSupported:
+      throw GpuError("--backend cuda: " + why + ": " + error.reason);
+    default:
+      throw std::runtime_error("the GPU: " + error.step + ": " + error.reason);
+  }
 }
 
 QueryRecord record_of(const QueryArguments& arguments, const Scene& scene) {
@@ -70,44 +84,45 @@ QueryRecord record_of(const QueryArguments& arguments, const Scene& scene) {
   return record;
 }
 
+// Takes the contacts.
+ContactTable table_of(const Scene& scene, TimedAnswer& timed) {
+  const auto face = [&](std::uint32_t instance, std::uint32_t triangle) {
+    const std::uint32_t asset = scene.description.instances[instance].asset;
+    return scene.assets[asset].view().level().triangles[triangle].source_face();
+  };
+  std::vector<FaceContact> faces;
+  faces.reserve(timed.contacts.size());
+  for (const auto& [pair, a, b] : timed.contacts)
+    faces.push_back({pair, face(timed.pairs[pair].a, a), face(timed.pairs[pair].b, b)});
+  std::vector<TriangleContact>().swap(timed.contacts);
+  return make_table(timed.pairs, std::move(faces));
+}
+
 // Runs the query as often as asked; the answer is the last run's, which is every run's.
-Answer answer_of_cpu(const QueryArguments& arguments, const Scene& scene) {
+Answer run_query(const QueryArguments& arguments, const Scene& scene) {
   const SceneDescription& description = scene.description;
-  const std::vector<ObjectPair> pairs = normalised(description.pairs.value_or(std::vector<ObjectPair>()));
   const std::vector<AssetView> views = scene.views();
+  const std::vector<ObjectPair> pairs = normalised(description.pairs.value_or(std::vector<ObjectPair>()));
+  const auto engine = make_engine(arguments.engine(), arguments.options);
   Answer answer = {record_of(arguments, scene), {}, {}};
-  ContactQuery query;
-  check(arguments.scene, query.set_assets(views), query);
-  for (std::uint32_t i = 0; i < arguments.repeats; ++i) {
-    const auto start = std::chrono::steady_clock::now();
-    const Status status = description.pairs
-                              ? query.find_contacts(description.instances, pairs, arguments.options)
-                              : query.find_contacts(description.instances, arguments.options);
-    const auto end = std::chrono::steady_clock::now();
-    answer.record.seconds.push_back(std::chrono::duration<double>(end - start).count());
-    check(arguments.scene, status, query);
-  }
-  answer.record.counters = query.counters();
-  answer.table = make_table(query.pairs(), query.contacts());
+  engine->set_shapes(views);
+  engine->update(description.instances);
+  answer.timed = engine->time_query(
+      {description.pairs ? &pairs : nullptr, arguments.repeats, arguments.sorted, arguments.traversal});
+  answer.record.seconds = answer.timed.whole;
+  answer.record.counters = engine->counters();
+  answer.table = table_of(scene, answer.timed);
   return answer;
 }
 
-Answer answer_of_gpu(const QueryArguments& arguments, const Scene& scene) {
-  if constexpr (kHaveCuda) {
-    const bool given = scene.description.pairs.has_value();
-    const std::vector<ObjectPair> pairs =
-        normalised(scene.description.pairs.value_or(std::vector<ObjectPair>()));
-    Answer answer = {record_of(arguments, scene), {}, {}};
-    const QueryOptions& options = arguments.options;
-    answer.gpu = query_on_gpu(arguments.scene, scene, given ? &pairs : nullptr,
-                              {arguments.engine, options.mode, options.first_contact_only, arguments.sorted,
-                               arguments.traversal, arguments.repeats});
-    answer.record.seconds = answer.gpu.whole;
-    answer.record.counters = answer.gpu.counters;
-    answer.table = make_table(answer.gpu.pairs, answer.gpu.contacts);
-    return answer;
+Answer answer_of(const QueryArguments& arguments, const Scene& scene) {
+  try {
+    return run_query(arguments, scene);
+  } catch (const EngineError& error) {
+    refuse(arguments.scene, error.status, error.where);
+  } catch (const GpuError& error) {
+    refuse(arguments.scene, error);
   }
-  throw std::logic_error("a backend that is not there");
 }
 
 std::uint64_t triangles_of(const Scene& scene) {
@@ -118,11 +133,9 @@ std::uint64_t triangles_of(const Scene& scene) {
   return triangles;
 }
 
-Json times(const std::vector<double>& seconds) {
+Json times(const Seconds& seconds) {
   if (seconds.empty()) return {};
-  QueryRecord record;
-  record.seconds = seconds;
-  return {{"best", record.best_seconds()}, {"median", record.median_seconds()}, {"all", seconds}};
+  return {{"best", best_of(seconds)}, {"median", median_of(seconds)}, {"all", seconds}};
 }
 
 Json to_json(const QueryArguments& arguments, const Scene& scene, const Answer& answer) {
@@ -151,16 +164,16 @@ Json to_json(const QueryArguments& arguments, const Scene& scene, const Answer& 
                {"hash", hexadecimal(hash_of(answer.table))},
                {"seconds", times(record.seconds)}};
   if (arguments.on_gpu()) {
-    json["engine"] = name_of(arguments.engine, kEngines);
-    json["gpu"] = answer.gpu.gpu;
+    json["engine"] = name_of(arguments.gpu_engine, kGpuEngines);
+    json["gpu"] = answer.timed.gpu.name;
     json["sorted"] = arguments.sorted;
-    json["gpu_bytes"] = answer.gpu.bytes;
-    json["gpu_bytes_bound"] = answer.gpu.bytes_bound == 0 ? Json() : Json(answer.gpu.bytes_bound);
-    json["gpu_bytes_taken"] = answer.gpu.bytes_taken;
-    json["upload_seconds"] = answer.gpu.upload;
-    json["broad_phase_seconds"] = times(answer.gpu.broad_phase);
-    json["contacts_seconds"] = times(answer.gpu.narrow);
-    json["traversal_seconds"] = times(answer.gpu.traversal);
+    json["gpu_bytes"] = answer.timed.gpu.bytes;
+    json["gpu_bytes_bound"] = answer.timed.gpu.bytes_bound == 0 ? Json() : Json(answer.timed.gpu.bytes_bound);
+    json["gpu_bytes_taken"] = answer.timed.gpu.bytes_taken;
+    json["upload_seconds"] = answer.timed.gpu.upload;
+    json["broad_phase_seconds"] = times(answer.timed.broad_phase);
+    json["contacts_seconds"] = times(answer.timed.narrow);
+    json["traversal_seconds"] = times(answer.timed.traversal);
   }
   return json;
 }
@@ -176,7 +189,7 @@ void print_times(const char* label, const Json& seconds, const char* remark = ""
 }
 
 std::string place_of(const QueryArguments& arguments, const Answer& answer) {
-  if (arguments.on_gpu()) return name_of(arguments.engine, kEngines) + ", " + answer.gpu.gpu;
+  if (arguments.on_gpu()) return name_of(arguments.gpu_engine, kGpuEngines) + ", " + answer.timed.gpu.name;
   return with_commas(answer.record.threads) + (answer.record.threads == 1 ? " thread" : " threads");
 }
 
@@ -198,11 +211,11 @@ void print_summary(const QueryArguments& arguments, const Scene& scene, const An
   print_row("contacts", counters.contacts);
   print_times("milliseconds", times(record.seconds), record.given_pairs ? "; without the broad phase" : "");
   if (arguments.on_gpu()) {
-    print_times("  broad phase", times(answer.gpu.broad_phase));
-    print_times("  contacts", times(answer.gpu.narrow));
-    print_times("  traversal", times(answer.gpu.traversal), " alone");
-    std::printf("  %-14s %15.3f  once\n", "upload", 1e3 * answer.gpu.upload);
-    print_row("GPU bytes", answer.gpu.bytes);
+    print_times("  broad phase", times(answer.timed.broad_phase));
+    print_times("  contacts", times(answer.timed.narrow));
+    print_times("  traversal", times(answer.timed.traversal), " alone");
+    std::printf("  %-14s %15.3f  once\n", "upload", 1e3 * answer.timed.gpu.upload);
+    print_row("GPU bytes", answer.timed.gpu.bytes);
   }
   std::printf("  %-14s %s\n", "hash", hexadecimal(hash_of(answer.table)).c_str());
 }
@@ -212,7 +225,7 @@ void check_arguments(const QueryArguments& arguments, const Scene& scene) {
   if (arguments.options.self_pairs && scene.description.pairs) {
     throw UsageError(arguments.scene + ": gives its object pairs, so --self has nothing to add");
   }
-  const bool tandem = arguments.engine == GpuEngine::tandem;
+  const bool tandem = arguments.gpu_engine == "tandem-cuda";
   if (!arguments.on_gpu()) {
     if (!tandem) throw UsageError("--engine is for the backend cuda");
     if (arguments.sorted) throw UsageError("--sorted is for the backend cuda");
@@ -242,7 +255,7 @@ ExitCode run(const QueryArguments& arguments) {
   if (!arguments.out.empty()) keep_inputs(arguments.out, files_of(arguments.scene, scene));
   check_arguments(arguments, scene);
   if (!arguments.out.empty()) try_output(arguments.out);
-  const Answer answer = (arguments.on_gpu() ? answer_of_gpu : answer_of_cpu)(arguments, scene);
+  const Answer answer = answer_of(arguments, scene);
   if (!arguments.out.empty()) write_contacts(arguments.out, answer.table, answer.record);
   if (arguments.json) {
     std::puts(pretty(to_json(arguments, scene, answer)).c_str());
@@ -252,9 +265,13 @@ ExitCode run(const QueryArguments& arguments) {
   return kDone;
 }
 
+bool has_cuda() {
+  return is_built_in("tandem-cuda");
+}
+
 CLI::Validator backend() {
   const auto defect = [](const std::string& word) -> std::string {
-    if (word == "cpu" || (kHaveCuda && word == "cuda")) return {};
+    if (word == "cpu" || (has_cuda() && word == "cuda")) return {};
     return word == "cuda" ? "this bvhbench was built without CUDA, so it has no GPU"
                           : word + " is neither cpu nor cuda";
   };
@@ -262,15 +279,6 @@ CLI::Validator backend() {
 }
 
 }  // namespace
-
-void refuse(const std::string& scene, Status status, std::uint64_t where) {
-  if (status == Status::kOutOfMemory) throw std::bad_alloc();
-  const char* unit = subject(status);
-  const std::string blamed = unit == nullptr ? "" : std::string(unit) + " " + std::to_string(where) + ": ";
-  const std::string text = scene + ": " + blamed + explain(status);
-  if (status == Status::kCannotStartThread) throw std::runtime_error(text);
-  throw FileError(text);
-}
 
 CLI::App* add_query(CLI::App& app, Run& run_later) {
   const auto arguments = std::make_shared<QueryArguments>();
@@ -280,9 +288,9 @@ CLI::App* add_query(CLI::App& app, Run& run_later) {
   command->add_option("SCENE", arguments->scene, "scene file (HDF5)")->required()->check(file_name());
   command->add_option("--backend", arguments->backend, "what the query runs on")
       ->check(backend())
-      ->option_text(kHaveCuda ? "cpu|cuda [cpu]" : "cpu [cpu]");
-  if constexpr (kHaveCuda) {
-    add_choice(*command, "--engine", kEngines, arguments->engine,
+      ->option_text(has_cuda() ? "cpu|cuda [cpu]" : "cpu [cpu]");
+  if (has_cuda()) {
+    add_choice(*command, "--engine", kGpuEngines, arguments->gpu_engine,
                "on a GPU: Tandem's, or the paper's scheme, the yardstick")
         ->option_text("tandem|paper|paper-bits [tandem]");
     command->add_flag("--sorted", arguments->sorted,

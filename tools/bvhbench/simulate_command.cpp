@@ -10,6 +10,7 @@
 
 #include "common/json.h"
 #include "common/number_words.h"
+#include "engines/registry.h"
 #include "scenes/hdf5_file.h"
 #include "scenes/make_scene_parts.h"
 #include "scenes/scene_file.h"
@@ -224,7 +225,8 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
     return kDone;
   }
   const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, options.threads);
-  auto engine = make_engine(arguments.engine, {arguments.fast, options.threads});
+  auto engine = make_engine(arguments.engine, {.mode = arguments.fast ? QueryMode::fast : QueryMode::exact,
+                                               .threads = options.threads});
   Simulator simulator(start.bodies.bodies, start.bodies.states,
                       make_mesh_contact_finder(std::move(engine), start.shapes(), arguments.contacts),
                       options);

@@ -1,222 +1,255 @@
-#include <cuda_runtime_api.h>
+#include "gpu_engine.h"
 
 #include <algorithm>
-#include <string>
+#include <numeric>
+#include <tuple>
 
-#include "engine_parts.h"
-#include "engines/paper/paper_engine.h"
-#include "gpu_query.h"
 #include "tandem/formats/gpu_status.h"
-#include "tandem/kernels/gpu_broad_phase.h"
-#include "tandem/kernels/gpu_contact_query.h"
-#include "tandem/runtime/upload.h"
 
-namespace tandem::simulation {
+namespace tandem {
 namespace {
 
-void check(std::string_view engine, Status status, cudaError_t error) {
-  if (status == Status::kOk) return;
-  if (status == Status::kOutOfMemory) throw std::bad_alloc();
-  const std::string reason = error == cudaSuccess ? "" : std::string(": ") + cudaGetErrorString(error);
-  throw bench::GpuError(std::string(engine) + ": " + explain(status) + reason);
+std::string free_memory() {
+  std::size_t free = 0, total = 0;
+  if (cudaMemGetInfo(&free, &total) != cudaSuccess) return {};
+  return std::to_string(free >> 20) + " of " + std::to_string(total >> 20) + " MiB are free";
 }
 
-void check(std::string_view engine, cudaError_t error) {
-  check(engine, status_of(error), error);
+std::string version(int number) {
+  return std::to_string(number / 1000) + "." + std::to_string(number % 1000 / 10);
 }
 
-struct Stream {
-  cudaStream_t handle = nullptr;
+// CUDA calls a driver that is missing too old.
+std::string driver_defect() {
+  int driver = 0, runtime = 0;
+  if (cudaDriverGetVersion(&driver) != cudaSuccess || driver == 0) return "no NVIDIA driver is installed";
+  static_cast<void>(cudaRuntimeGetVersion(&runtime));
+  return "it is for CUDA " + version(driver) + ", the program for CUDA " + version(runtime);
+}
 
-  explicit Stream(std::string_view engine) {
-    check(engine, cudaStreamCreateWithFlags(&handle, cudaStreamNonBlocking));
+std::string reason_of(Status status, cudaError_t error) {
+  if (status == Status::kOutOfGpuMemory) return free_memory();
+  return error == cudaErrorInsufficientDriver ? driver_defect() : cudaGetErrorString(error);
+}
+
+void put(std::span<const Contact> contacts, std::vector<TriangleContact>& into) {
+  into.resize(contacts.size());
+  std::transform(contacts.begin(), contacts.end(), into.begin(), [](const Contact& c) {
+    return TriangleContact{c.pair, c.triangle_a, c.triangle_b};
+  });
+}
+
+// Of what the GPU was to sort.
+void check_order(const std::vector<Contact>& contacts) {
+  const auto key = [](const Contact& c) {
+    return std::tie(c.pair, c.face_a, c.face_b, c.triangle_a, c.triangle_b);
+  };
+  const auto after = [&](const Contact& x, const Contact& y) { return key(x) >= key(y); };
+  if (std::adjacent_find(contacts.begin(), contacts.end(), after) == contacts.end()) return;
+  throw std::runtime_error("the GPU: its contacts are not sorted");
+}
+
+// Brings the pairs into ascending order, and the contacts' rows with them.
+void sort_pairs(TimedAnswer& answer) {
+  const std::vector<ObjectPair> pairs = std::move(answer.pairs);
+  const auto key = [&](std::uint32_t i) { return std::tie(pairs[i].a, pairs[i].b); };
+  std::vector<std::uint32_t> order(pairs.size()), row(pairs.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::sort(order.begin(), order.end(), [&](auto x, auto y) { return key(x) < key(y); });
+  answer.pairs.clear();
+  for (std::uint32_t i = 0; i < order.size(); ++i) {
+    row[order[i]] = i;
+    answer.pairs.push_back(pairs[order[i]]);
   }
-  Stream(const Stream&) = delete;
-  Stream& operator=(const Stream&) = delete;
-  ~Stream() { static_cast<void>(cudaStreamDestroy(handle)); }
-};
-
-// An array on the GPU and one in pinned memory of the CPU, which grow together.
-template <typename Element>
-class SharedArray {
- public:
-  SharedArray() = default;
-  SharedArray(const SharedArray&) = delete;
-  SharedArray& operator=(const SharedArray&) = delete;
-  ~SharedArray() { free(); }
-
-  cudaError_t reserve(std::size_t size) {
-    if (size <= room_ && host_ != nullptr) return cudaSuccess;
-    free();
-    const std::size_t room = size + size / 2 + 16;
-    if (const cudaError_t error = cudaMalloc(reinterpret_cast<void**>(&device_), room * sizeof(Element))) {
-      return error;
-    }
-    const cudaError_t error = cudaMallocHost(reinterpret_cast<void**>(&host_), room * sizeof(Element));
-    if (error == cudaSuccess) room_ = room;
-    return error;
-  }
-  cudaError_t upload(std::size_t count, cudaStream_t stream) {
-    return cudaMemcpyAsync(device_, host_, count * sizeof(Element), cudaMemcpyHostToDevice, stream);
-  }
-  cudaError_t download(const Element* from, std::size_t count, cudaStream_t stream) {
-    const cudaError_t error =
-        cudaMemcpyAsync(host_, from, count * sizeof(Element), cudaMemcpyDeviceToHost, stream);
-    return error == cudaSuccess ? cudaStreamSynchronize(stream) : error;
-  }
-  Element* host() { return host_; }
-  const Element* device() const { return device_; }
-
- private:
-  void free() {
-    static_cast<void>(cudaFree(device_));
-    static_cast<void>(cudaFreeHost(host_));
-    device_ = host_ = nullptr;
-    room_ = 0;
-  }
-  Element *device_ = nullptr, *host_ = nullptr;
-  std::size_t room_ = 0;
-};
-
-// Tandem's query or the paper's scheme, behind the same broad phase.
-class GpuEngine final : public CollisionEngine {
- public:
-  GpuEngine(std::string_view name, const EngineOptions& options)
-      : name_(name), mode_(options.fast ? QueryMode::fast : QueryMode::exact), stream_(name) {}
-
-  std::string_view name() const override { return name_; }
-
-  void set_shapes(std::span<const AssetView> shapes) override {
-    uploads_.clear();
-    require_cuda(bounds_.reserve(shapes.size()));
-    std::vector<GpuAsset> views;
-    for (std::size_t i = 0; i < shapes.size(); ++i) {
-      DeviceAsset& upload = uploads_.emplace_back();
-      const Status status = upload.upload(shapes[i], stream_.handle);
-      check(name_, status, upload.cuda_error());
-      views.push_back(gpu_asset(upload.level(), *shapes[i].header));
-      bounds_.host()[i] = asset_bounds(*shapes[i].header);
-    }
-    require_cuda(bounds_.upload(shapes.size(), stream_.handle));
-    require_cuda(cudaStreamSynchronize(stream_.handle));
-    if (is_paper()) {
-      const Status status = paper_.set_assets(views, stream_.handle);
-      check(name_, status, paper_.cuda_error());
-    } else {
-      const Status status = query_.set_assets(views, stream_.handle);
-      check(name_, status, query_.cuda_error());
-    }
-  }
-
-  void find(std::span<const BodyPose> bodies, std::span<const std::uint8_t> idle,
-            ContactList& found) override {
-    times_ = {};
-    counters_ = {};
-    Stopwatch watch;
-    upload(bodies);
-    times_.update = watch.lap();
-    const GpuPairs pairs = find_pairs(static_cast<std::uint32_t>(bodies.size()), idle, found.pairs);
-    times_.broad_phase = watch.lap();
-    const Contact* contacts = is_paper() ? ask_paper(pairs) : ask_tandem(pairs);
-    times_.traversal = watch.lap() - times_.triangle_tests;
-    take(contacts, found);
-    times_.transfer = watch.lap();
-    counters_.object_pairs = found.pairs.size();
-  }
-
- private:
-  bool is_paper() const { return name_ != "tandem-cuda"; }
-  void require_cuda(cudaError_t error) const { check(name_, error); }
-
-  // Of a status that may be about a body.
-  void require_status(Status status, std::uint64_t where, cudaError_t error) const {
-    if (subject(status) != nullptr) require(name_, status, where);
-    check(name_, status, error);
-  }
-
-  void upload(std::span<const BodyPose> bodies) {
-    require_cuda(shape_of_.reserve(bodies.size()));
-    require_cuda(poses_.reserve(bodies.size()));
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      shape_of_.host()[i] = bodies[i].asset;
-      poses_.host()[i] = bodies[i].pose;
-    }
-    require_cuda(shape_of_.upload(bodies.size(), stream_.handle));
-    require_cuda(poses_.upload(bodies.size(), stream_.handle));
-    require_cuda(cudaStreamSynchronize(stream_.handle));
-    instances_ = {shape_of_.device(), poses_.device(), static_cast<std::uint32_t>(bodies.size())};
-  }
-
-  // The pairs on the CPU, sorted, and where they lie on the GPU: without those of idle bodies.
-  GpuPairs find_pairs(std::uint32_t bodies, std::span<const std::uint8_t> idle,
-                      std::vector<ObjectPair>& pairs) {
-    const GpuAssetBounds bounds = {bounds_.device(), static_cast<std::uint32_t>(uploads_.size())};
-    if (bodies == 0) require_cuda(pairs_.reserve(1));
-    const Status status = broad_.find_pairs(instances_, bounds, {.sorted = true}, stream_.handle);
-    require_status(status, status == Status::kOk ? 0 : broad_.report().where, broad_.cuda_error());
-    const std::uint32_t count = broad_.report().count;
-    require_cuda(pairs_.reserve(count));
-    require_cuda(pairs_.download(broad_.pairs().pairs, count, stream_.handle));
-    keep_active(std::span(pairs_.host(), count), idle, pairs);
-    if (pairs.size() == count) return broad_.pairs();
-    require_cuda(pair_count_.reserve(1));
-    std::copy(pairs.begin(), pairs.end(), pairs_.host());
-    *pair_count_.host() = static_cast<std::uint32_t>(pairs.size());
-    require_cuda(pairs_.upload(pairs.size(), stream_.handle));
-    require_cuda(pair_count_.upload(1, stream_.handle));
-    return {pairs_.device(), pair_count_.device(), static_cast<std::uint32_t>(pairs.size())};
-  }
-
-  const Contact* ask_tandem(const GpuPairs& pairs) {
-    const Status status = query_.find_contacts(instances_, pairs, {.mode = mode_}, stream_.handle);
-    require_status(status, status == Status::kOk ? 0 : query_.report().where, query_.cuda_error());
-    counters_ = query_.report().counters;
-    counters_.contacts = query_.report().contacts;
-    return query_.contacts();
-  }
-
-  const Contact* ask_paper(const GpuPairs& pairs) {
-    bench::PaperOptions options;
-    options.mode = mode_;
-    options.flags = name_ == "paper-bits" ? bench::PaperFlags::bits : bench::PaperFlags::words;
-    const Status status = paper_.find_contacts(instances_, pairs, options, stream_.handle);
-    require_status(status, paper_.report().where, paper_.cuda_error());
-    counters_ = paper_.report().counters;
-    times_.triangle_tests = 1e-3 * static_cast<double>(paper_.report().triangle_ms);
-    return paper_.contacts();
-  }
-
-  void take(const Contact* contacts, ContactList& found) {
-    const std::size_t count = counters_.contacts;
-    require_cuda(contacts_.reserve(count));
-    require_cuda(contacts_.download(contacts, count, stream_.handle));
-    found.triangles.resize(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      const Contact& c = contacts_.host()[i];
-      found.triangles[i] = {c.pair, c.triangle_a, c.triangle_b};
-    }
-    sort_contacts(found.triangles);
-  }
-
-  std::string name_;
-  QueryMode mode_;
-  Stream stream_;
-  std::vector<DeviceAsset> uploads_;
-  SharedArray<AssetBounds> bounds_;
-  SharedArray<std::uint32_t> shape_of_, pair_count_;
-  SharedArray<Pose> poses_;
-  SharedArray<ObjectPair> pairs_;
-  SharedArray<Contact> contacts_;
-  GpuInstances instances_ = {};
-  GpuBroadPhase broad_;
-  GpuContactQuery query_;
-  bench::PaperEngine paper_;
-};
+  for (TriangleContact& contact : answer.contacts) contact.pair = row[contact.pair];
+}
 
 }  // namespace
 
-std::unique_ptr<CollisionEngine> make_gpu_engine(std::string_view name, const EngineOptions& options) {
-  return std::make_unique<GpuEngine>(name, options);
+// The context is made first, so that nothing that is timed is charged with it.
+GpuEngine::GpuEngine(std::string_view name) : name_(name) {
+  std::size_t total = 0;
+  check(cudaFree(nullptr), "start");
+  check(cudaMemGetInfo(&free_at_start_, &total), "memory");
+  check(stream_.create(), "a stream");
 }
 
-}  // namespace tandem::simulation
+void GpuEngine::check(Status status, cudaError_t error, const char* step) const {
+  if (status == Status::kOk) return;
+  if (status == Status::kOutOfMemory) throw std::bad_alloc();
+  const std::string told = error == cudaSuccess ? "" : std::string(": ") + cudaGetErrorString(error);
+  throw GpuError(name_ + ": " + explain(status) + told, status, step, reason_of(status, error));
+}
+
+void GpuEngine::check(cudaError_t error, const char* step) const {
+  check(status_of(error), error, step);
+}
+
+void GpuEngine::set_shapes(std::span<const AssetView> shapes) {
+  Stopwatch watch;
+  uploads_.clear();
+  shapes_.clear();
+  check(bounds_.grow(shapes.size()), "instances");
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    DeviceAsset& upload = uploads_.emplace_back();
+    const Status status = upload.upload(shapes[i], stream());
+    check(status, upload.cuda_error(), "an asset");
+    shapes_.push_back(gpu_asset(upload.level(), *shapes[i].header));
+    bounds_.staged.data()[i] = asset_bounds(*shapes[i].header);
+  }
+  check(bounds_.upload(shapes.size(), stream()), "instances");
+  check(stream_.wait(), "upload");
+  upload_of_shapes_ = watch.lap();
+  name_shapes();
+}
+
+void GpuEngine::update(std::span<const BodyPose> bodies) {
+  Stopwatch watch;
+  check(shape_of_.grow(bodies.size()), "instances");
+  check(poses_.grow(bodies.size()), "instances");
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    shape_of_.staged.data()[i] = bodies[i].asset;
+    poses_.staged.data()[i] = bodies[i].pose;
+  }
+  check(shape_of_.upload(bodies.size(), stream()), "instances");
+  check(poses_.upload(bodies.size(), stream()), "instances");
+  check(stream_.wait(), "upload");
+  instances_ = {shape_of_.on_gpu.data(), poses_.on_gpu.data(), static_cast<std::uint32_t>(bodies.size())};
+  upload_of_bodies_ = watch.lap();
+}
+
+GpuAssetBounds GpuEngine::bounds() const {
+  return {bounds_.on_gpu.data(), static_cast<std::uint32_t>(shapes_.size())};
+}
+
+// Until there is room for all.
+void GpuEngine::find_pairs_on_gpu(bool sorted) {
+  const Status status = broad_phase_.find_pairs(instances_, bounds(), {.sorted = sorted}, stream());
+  if (subject(status) != nullptr) require(status, broad_phase_.report().where);
+  check(status, broad_phase_.cuda_error(), "broad phase");
+}
+
+std::span<const ObjectPair> GpuEngine::find_pairs() {
+  find_pairs_on_gpu(true);
+  const std::uint32_t count = broad_phase_.report().count;
+  check(found_pairs_.grow(count), "download");
+  const std::span<ObjectPair> pairs(found_pairs_.data(), count);
+  check(download(broad_phase_.pairs().pairs, pairs, stream()), "download");
+  return pairs;
+}
+
+// Queues the copy; ask() waits for it.
+GpuPairs GpuEngine::upload(std::span<const ObjectPair> pairs) {
+  check(given_pairs_.grow(pairs.size()), "instances");
+  check(pair_count_.grow(1), "instances");
+  std::copy(pairs.begin(), pairs.end(), given_pairs_.staged.data());
+  *pair_count_.staged = static_cast<std::uint32_t>(pairs.size());
+  check(given_pairs_.upload(pairs.size(), stream()), "instances");
+  check(pair_count_.upload(1, stream()), "instances");
+  return {given_pairs_.on_gpu.data(), pair_count_.on_gpu.data(), static_cast<std::uint32_t>(pairs.size())};
+}
+
+// Pairs that find_pairs() found, all of them, lie on the GPU already.
+void GpuEngine::query(std::span<const ObjectPair> pairs) {
+  const bool on_gpu =
+      !pairs.empty() && pairs.data() == found_pairs_.data() && pairs.size() == broad_phase_.report().count;
+  ask(on_gpu ? broad_phase_.pairs() : upload(pairs), false);
+}
+
+bool GpuEngine::contacts(std::vector<TriangleContact>& found_contacts) {
+  const GpuContacts on_gpu = found();
+  check(contacts_.grow(on_gpu.count), "download");
+  const std::span<Contact> contacts(contacts_.data(), on_gpu.count);
+  check(download(on_gpu.data, contacts, stream()), "download");
+  put(contacts, found_contacts);
+  return true;
+}
+
+TimedAnswer GpuEngine::time_query(const TimedQuery& asked) {
+  if (asked.given == nullptr) find_pairs_on_gpu(asked.sorted);
+  const GpuPairs pairs = asked.given == nullptr ? broad_phase_.pairs() : upload(*asked.given);
+  ask(pairs, asked.sorted);
+  TimedAnswer answer;
+  time_repeats(pairs, asked, answer);
+  const GpuContacts contacts = found();
+  answer.gpu = use(asked);
+  answer.pairs.resize(asked.given == nullptr ? broad_phase_.report().count : pairs.capacity);
+  take(pairs, contacts, asked.sorted, answer);
+  if (asked.traversal) answer.traversal = time_walk(pairs, asked.repeats);
+  return answer;
+}
+
+void GpuEngine::time_repeats(const GpuPairs& pairs, const TimedQuery& asked, TimedAnswer& answer) {
+  GpuEvent begin, between, end;
+  for (GpuEvent* event : {&begin, &between, &end}) check(event->create(), "an event");
+  const bool finds_pairs = asked.given == nullptr;
+  const Before before = [&](unsigned event_flags) {
+    if (finds_pairs) {
+      const Status status = broad_phase_.enqueue(instances_, bounds(), {.sorted = asked.sorted}, stream());
+      check(status, broad_phase_.cuda_error(), "broad phase");
+    }
+    check(between.record(stream(), event_flags), "an event");
+  };
+  const std::function<void()> run = repeatable(pairs, asked.sorted, before);
+  for (std::uint32_t i = 0; i < asked.repeats; ++i) {
+    run_between(begin, run, end);
+    answer.whole.push_back(seconds_between(begin, end));
+    answer.narrow.push_back(seconds_between(finds_pairs ? between : begin, end));
+    if (finds_pairs) answer.broad_phase.push_back(seconds_between(begin, between));
+  }
+}
+
+void GpuEngine::run_between(const GpuEvent& begin, const std::function<void()>& run,
+                            const GpuEvent& end) const {
+  check(begin.record(stream()), "an event");
+  run();
+  check(end.record(stream()), "an event");
+  check(stream_.wait(), "the query");
+}
+
+double GpuEngine::seconds_between(const GpuEvent& begin, const GpuEvent& end) const {
+  float milliseconds = 0;
+  check(milliseconds_between(begin, end, milliseconds), "time");
+  return 1e-3 * static_cast<double>(milliseconds);
+}
+
+void GpuEngine::take(const GpuPairs& pairs, const GpuContacts& contacts, bool sorted,
+                     TimedAnswer& answer) const {
+  std::vector<Contact> found(contacts.count);
+  check(download(contacts.data, std::span(found), stream()), "download");
+  if (sorted) check_order(found);
+  put(found, answer.contacts);
+  check(download(pairs.pairs, std::span(answer.pairs), stream()), "download");
+  sort_pairs(answer);
+}
+
+std::size_t GpuEngine::scene_bytes(const TimedQuery& asked) const {
+  std::size_t bytes = shapes_.size() * sizeof(AssetBounds) +
+                      instances_.count * (sizeof(Pose) + sizeof(std::uint32_t)) +
+                      (asked.given != nullptr ? asked.given->size() * sizeof(ObjectPair) : 0);
+  for (const DeviceAsset& upload : uploads_) bytes += upload.bytes();
+  return bytes;
+}
+
+GpuUse GpuEngine::use(const TimedQuery& asked) const {
+  GpuUse use;
+  int device = 0;
+  cudaDeviceProp properties;
+  std::size_t free = 0, total = 0;
+  check(cudaMemGetInfo(&free, &total), "memory");
+  check(cudaGetDevice(&device), "start");
+  check(cudaGetDeviceProperties(&properties, device), "start");
+  use.name = properties.name;
+  use.upload = upload_of_shapes_ + upload_of_bodies_;
+  use.bytes = scene_bytes(asked) + broad_phase_.bytes() + query_bytes();
+  use.bytes_bound = most_bytes(asked.sorted);
+  if (use.bytes_bound != 0) {
+    use.bytes_bound += scene_bytes(asked);
+    if (asked.given == nullptr)
+      use.bytes_bound += most_broad_phase_bytes(broad_phase_.capacity(), asked.sorted);
+  }
+  use.bytes_taken = free_at_start_ - free;
+  return use;
+}
+
+}  // namespace tandem

@@ -31,19 +31,15 @@ std::vector<ObjectPair> normalised(std::span<const ObjectPair> pairs) {
   return sorted;
 }
 
-ContactTable make_table(std::span<const ObjectPair> pairs, std::span<const Contact> contacts) {
-  std::vector<std::array<std::uint32_t, 3>> rows;
-  rows.reserve(contacts.size());
-  for (const Contact& contact : contacts) {
+ContactTable make_table(std::span<const ObjectPair> pairs, std::vector<FaceContact> contacts) {
+  for (FaceContact& contact : contacts) {
     const bool itself = pairs[contact.pair].a == pairs[contact.pair].b;
-    const bool swap = itself && contact.face_b < contact.face_a;
-    rows.push_back(
-        {contact.pair, swap ? contact.face_b : contact.face_a, swap ? contact.face_a : contact.face_b});
+    if (itself && contact.face_b < contact.face_a) std::swap(contact.face_a, contact.face_b);
   }
-  std::sort(rows.begin(), rows.end());
+  std::sort(contacts.begin(), contacts.end());
   ContactTable table;
   table.pairs.assign(pairs.begin(), pairs.end());
-  for (const auto& [pair, face_a, face_b] : rows) {
+  for (const auto& [pair, face_a, face_b] : contacts) {
     table.pair.push_back(pair);
     table.face_a.push_back(face_a);
     table.face_b.push_back(face_b);
@@ -57,16 +53,6 @@ std::uint64_t hash_of(const ContactTable& table) {
     all.insert(all.end(), column->begin(), column->end());
   }
   return xxh64(all.data(), all.size() * sizeof(std::uint32_t));
-}
-
-double QueryRecord::best_seconds() const {
-  return *std::min_element(seconds.begin(), seconds.end());
-}
-
-double QueryRecord::median_seconds() const {
-  std::vector<double> sorted = seconds;
-  std::sort(sorted.begin(), sorted.end());
-  return (sorted[(sorted.size() - 1) / 2] + sorted[sorted.size() / 2]) / 2;
 }
 
 void write_contacts(const std::string& path, const ContactTable& table, const QueryRecord& record) {
@@ -84,8 +70,8 @@ void write_contacts(const std::string& path, const ContactTable& table, const Qu
   file.attribute("given_pairs", std::uint64_t{record.given_pairs});
   file.attribute("threads", record.threads);
   file.attribute("repeats", std::uint64_t{record.seconds.size()});
-  file.attribute("best_seconds", record.best_seconds());
-  file.attribute("median_seconds", record.median_seconds());
+  file.attribute("best_seconds", best_of(record.seconds));
+  file.attribute("median_seconds", median_of(record.seconds));
   file.attribute("object_pairs", counters.object_pairs);
   file.attribute("block_pairs", counters.block_pairs);
   file.attribute("candidates", counters.candidates);

@@ -1,9 +1,11 @@
 #pragma once
+#include <compare>
 #include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "common/stopwatch.h"
 #include "tandem/kernels/contact_query.h"
 
 namespace tandem::bench {
@@ -20,8 +22,15 @@ struct ContactTable {
 /// Each pair once, a <= b, sorted.
 std::vector<ObjectPair> normalised(std::span<const ObjectPair> pairs);
 
+/// Source faces that meet, of the instances in row `pair` of the object pairs.
+struct FaceContact {
+  std::uint32_t pair, face_a, face_b;
+
+  friend auto operator<=>(const FaceContact&, const FaceContact&) = default;
+};
+
 /// Condition on pairs: normalised.
-ContactTable make_table(std::span<const ObjectPair> pairs, std::span<const Contact> contacts);
+ContactTable make_table(std::span<const ObjectPair> pairs, std::vector<FaceContact> contacts);
 
 /// XXH64 of pairs, pair, face_a and face_b, one after the other, as little-endian 32-bit numbers.
 std::uint64_t hash_of(const ContactTable& table);
@@ -31,11 +40,8 @@ struct QueryRecord {
   std::string mode, backend;
   bool first_contact = false, self_pairs = false, given_pairs = false;
   std::uint64_t threads = 1;
-  std::vector<double> seconds;  ///< of each repeat, at least one
+  Seconds seconds;  ///< of each repeat, at least one
   QueryCounters counters;
-
-  double best_seconds() const;
-  double median_seconds() const;
 };
 
 /// Writes a contacts file (docs/scenes.md), whole or not at all. Throws OutputError.

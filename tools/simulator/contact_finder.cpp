@@ -7,7 +7,7 @@ namespace {
 
 class MeshContactFinder : public ContactFinder {
  public:
-  MeshContactFinder(std::unique_ptr<CollisionEngine> engine, std::span<const AssetView> shapes,
+  MeshContactFinder(std::unique_ptr<Engine> engine, std::span<const AssetView> shapes,
                     const ContactOptions& options)
       : engine_(std::move(engine)), options_(options) {
     engine_->set_shapes(shapes);
@@ -25,7 +25,7 @@ class MeshContactFinder : public ContactFinder {
   }
 
  private:
-  std::unique_ptr<CollisionEngine> engine_;
+  std::unique_ptr<Engine> engine_;
   ContactGenerator generator_;
   ContactOptions options_;
   ContactList found_;
@@ -33,7 +33,7 @@ class MeshContactFinder : public ContactFinder {
 
 }  // namespace
 
-std::unique_ptr<ContactFinder> make_mesh_contact_finder(std::unique_ptr<CollisionEngine> engine,
+std::unique_ptr<ContactFinder> make_mesh_contact_finder(std::unique_ptr<Engine> engine,
                                                         std::span<const AssetView> shapes,
                                                         const ContactOptions& options) {
   return std::make_unique<MeshContactFinder>(std::move(engine), shapes, options);

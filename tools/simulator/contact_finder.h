@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "contact_point.h"
-#include "engines/collision_engine.h"
+#include "engines/engine.h"
 #include "simulator/contacts/contact_generation.h"
 
 namespace tandem::simulation {
@@ -36,7 +36,7 @@ class ContactFinder {
 
 /// Contacts of meshes: a collision engine finds the triangles that meet, and points are made of them. What
 /// the shapes look at must outlive it.
-std::unique_ptr<ContactFinder> make_mesh_contact_finder(std::unique_ptr<CollisionEngine> engine,
+std::unique_ptr<ContactFinder> make_mesh_contact_finder(std::unique_ptr<Engine> engine,
                                                         std::span<const AssetView> shapes,
                                                         const ContactOptions& options);
 

@@ -3,7 +3,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 
-#include "engines/collision_engine.h"
+#include "engines/engine.h"
 #include "simulator/contacts/mass_properties.h"
 
 namespace tandem::simulation {

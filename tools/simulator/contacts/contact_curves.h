@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "body_side.h"
-#include "engines/collision_engine.h"
+#include "engines/engine.h"
 #include "key_table.h"
 
 namespace tandem::simulation {

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "engines/collision_engine.h"
+#include "engines/engine.h"
 #include "simulator/contact_point.h"
 
 namespace tandem::simulation {

@@ -2,13 +2,12 @@
 
 #include <stdexcept>
 
-#include "peer.h"
-#include "peer_mesh.h"
+#include "library_engine.h"
 
-namespace tandem::bench {
+namespace tandem {
 namespace {
 
-/// One initialisation of ODE for as long as a peer lives.
+/// One initialisation of ODE for as long as an engine lives.
 struct OdeLibrary {
   OdeLibrary() {
     if (dInitODE2(0) == 0) throw std::runtime_error("ODE: cannot be initialised");
@@ -38,7 +37,7 @@ class OdeMesh {
   dTriMeshDataID data_;
 };
 
-void place(dGeomID geom, const Pose& pose) {
+void set_pose(dGeomID geom, const Pose& pose) {
   dMatrix3 rotation = {};  // rows of four
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) rotation[4 * i + j] = static_cast<dReal>(pose.rotation[i][j]);
@@ -51,52 +50,56 @@ void place(dGeomID geom, const Pose& pose) {
 /// OPCODE inside ODE finds all pairs of triangles and keeps them to itself: dCollide hands out contact
 /// points, of which those of several pairs are merged. With one contact asked for, the search is the whole
 /// search, and next to nothing is spent on points.
-class OdePeer final : public Peer {
+class OdeEngine final : public LibraryEngine {
  public:
-  OdePeer() = default;
-  OdePeer(const OdePeer&) = delete;
-  OdePeer& operator=(const OdePeer&) = delete;
-  ~OdePeer() override {
-    for (dGeomID geom : geoms_) dGeomDestroy(geom);
-  }
+  ~OdeEngine() override { clear_bodies(); }
 
-  std::string name() const override { return "ODE"; }
+  std::string_view name() const override { return "ode"; }
+  std::string label() const override { return "ODE"; }
   std::string settings() const override {
     return "OPCODE through dCollide: finds all pairs of triangles, hands out one contact point; trees "
            "float32, "
            "poses float64";
   }
-
-  void build(std::span<const AssetView> assets, std::span<const Instance> instances) override {
-    assets_ = assets;
-    for (const AssetView& asset : assets) meshes_.push_back(std::make_unique<OdeMesh>(asset.level()));
-    for (const Instance& instance : instances) {
-      geoms_.push_back(dCreateTriMesh(nullptr, meshes_[instance.asset]->data(), nullptr, nullptr, nullptr));
-    }
-    update(instances);
-  }
-
-  void update(std::span<const Instance> instances) override {
-    const std::vector<Pose> poses = stored_poses(assets_, instances);
-    for (std::size_t i = 0; i < poses.size(); ++i) place(geoms_[i], poses[i]);
+  bool contacts(std::vector<TriangleContact>&) override { return false; }
+  std::vector<Counter> named_counters() const override {
+    return {{"touching_object_pairs", touching_pairs_}};
   }
 
   void query(std::span<const ObjectPair> pairs) override {
     touching_pairs_ = 0;
-    dContactGeom contact;
-    for (const auto [a, b] : pairs) {
-      touching_pairs_ +=
-          dCollide(geoms_[a], geoms_[b], CONTACTS_UNIMPORTANT | 1, &contact, sizeof contact) > 0;
-    }
+    LibraryEngine::query(pairs);
   }
 
-  std::optional<std::vector<TriangleContact>> contacts() const override { return std::nullopt; }
-
-  std::vector<Counter> counters() const override { return {{"touching_object_pairs", touching_pairs_}}; }
-
  private:
+  void clear_shapes() override {
+    clear_bodies();
+    meshes_.clear();
+  }
+  void add_shape(const LevelView& level) override { meshes_.push_back(std::make_unique<OdeMesh>(level)); }
+
+  void clear_bodies() {
+    for (dGeomID geom : geoms_) dGeomDestroy(geom);
+    geoms_.clear();
+  }
+  void make_bodies(std::span<const Pose> poses) override {
+    clear_bodies();
+    for (const std::uint32_t shape : shape_of()) {
+      geoms_.push_back(dCreateTriMesh(nullptr, meshes_[shape]->data(), nullptr, nullptr, nullptr));
+    }
+    place(poses);
+  }
+
+  void place(std::span<const Pose> poses) override {
+    for (std::size_t i = 0; i < poses.size(); ++i) set_pose(geoms_[i], poses[i]);
+  }
+
+  void collide(std::uint32_t, std::uint32_t a, std::uint32_t b) override {
+    dContactGeom contact;
+    touching_pairs_ += dCollide(geoms_[a], geoms_[b], CONTACTS_UNIMPORTANT | 1, &contact, sizeof contact) > 0;
+  }
+
   OdeLibrary library_;
-  std::span<const AssetView> assets_;
   std::vector<std::unique_ptr<OdeMesh>> meshes_;
   std::vector<dGeomID> geoms_;
   std::uint64_t touching_pairs_ = 0;
@@ -104,10 +107,8 @@ class OdePeer final : public Peer {
 
 }  // namespace
 
-std::vector<std::unique_ptr<Peer>> make_ode_peers() {
-  std::vector<std::unique_ptr<Peer>> peers;
-  peers.push_back(std::make_unique<OdePeer>());
-  return peers;
+std::unique_ptr<Engine> make_ode(const QueryOptions&) {
+  return std::make_unique<OdeEngine>();
 }
 
-}  // namespace tandem::bench
+}  // namespace tandem

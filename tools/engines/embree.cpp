@@ -6,11 +6,10 @@
 #include <limits>
 #include <stdexcept>
 
-#include "float64_triangles.h"
-#include "peer.h"
-#include "peer_mesh.h"
+#include "library_engine.h"
+#include "tandem/kernels/detail/triangle_test.h"
 
-namespace tandem::bench {
+namespace tandem {
 namespace {
 
 float rounded_down(double x) {
@@ -23,7 +22,32 @@ float rounded_up(double x) {
   return f >= x ? f : std::nextafter(f, std::numeric_limits<float>::infinity());
 }
 
-/// What one instance's scene is made of. Embree holds its address.
+/// Signs as float64 computes them, right or wrong.
+struct Float64Signs {
+  static int sign(double x) { return (x > 0) - (x < 0); }
+
+  /// det(q - p, r - p, s - p)
+  static int volume(const double* p, const double* q, const double* r, const double* s) {
+    double a[3], b[3], c[3];
+    for (int k = 0; k < 3; ++k) a[k] = q[k] - p[k], b[k] = r[k] - p[k], c[k] = s[k] - p[k];
+    return sign(c[0] * (a[1] * b[2] - a[2] * b[1]) + c[1] * (a[2] * b[0] - a[0] * b[2]) +
+                c[2] * (a[0] * b[1] - a[1] * b[0]));
+  }
+
+  /// Component k of (q - p) x (r - p).
+  static int area(const double* p, const double* q, const double* r, int k) {
+    const int i = (k + 1) % 3, j = (k + 2) % 3;
+    return sign((q[i] - p[i]) * (r[j] - p[j]) - (q[j] - p[j]) * (r[i] - p[i]));
+  }
+};
+
+/// Whether two posed triangles meet by plain float64: Guigue and Devillers' test with all its ties, signs
+/// taken as they come out. What a careful user of a library that finds candidates only would write.
+bool meet_in_float64(const PosedTriangle& a, const PosedTriangle& b) {
+  return detail::CompleteTest<Float64Signs>::meet(a.corner, b.corner);
+}
+
+/// What one body's scene is made of. Embree holds its address.
 struct EmbreeBody {
   const IndexedMesh* mesh = nullptr;
   std::vector<std::array<double, 3>> vertices;  ///< posed
@@ -83,42 +107,56 @@ void decide(void* user, RTCCollision* found, unsigned count) {
 /// How the trees follow the bodies: made anew each frame, or their boxes fitted again.
 enum class Following { rebuild, refit };
 
-class EmbreePeer final : public TellingPeer {
+class EmbreeEngine final : public LibraryEngine {
  public:
-  explicit EmbreePeer(Following following)
+  explicit EmbreeEngine(Following following)
       : following_(following), device_(rtcNewDevice("threads=1,set_affinity=0")) {
     if (device_ == nullptr) throw std::runtime_error("Embree: no device");
   }
-  EmbreePeer(const EmbreePeer&) = delete;
-  EmbreePeer& operator=(const EmbreePeer&) = delete;
-  ~EmbreePeer() override {
-    for (const EmbreeBody& body : bodies_) rtcReleaseScene(body.scene), rtcReleaseGeometry(body.geometry);
+  ~EmbreeEngine() override {
+    clear_bodies();
     rtcReleaseDevice(device_);
   }
 
-  std::string name() const override { return following_ == Following::rebuild ? "Embree" : "Embree refit"; }
+  std::string_view name() const override { return rebuilds() ? "embree" : "embree-refit"; }
+  std::string label() const override { return rebuilds() ? "Embree" : "Embree refit"; }
   std::string settings() const override {
     return std::string("rtcCollide, a world-space tree for every body, ") +
-           (following_ == Following::rebuild ? "made anew (medium quality)" : "refitted") +
+           (rebuilds() ? "made anew (medium quality)" : "refitted") +
            " in every frame, triangles decided in float64";
   }
 
-  void build(std::span<const AssetView> assets, std::span<const Instance> instances) override {
-    assets_ = assets;
-    for (const AssetView& asset : assets) meshes_.push_back(index_mesh(asset.level()));
-    bodies_.resize(instances.size());
-    const std::vector<Pose> poses = stored_poses(assets_, instances);
+  void query(std::span<const ObjectPair> pairs) override {
+    LibraryEngine::query(pairs);
+    throw_on_error();
+  }
+
+ private:
+  bool rebuilds() const { return following_ == Following::rebuild; }
+
+  void clear_shapes() override {
+    clear_bodies();
+    meshes_.clear();
+  }
+  void add_shape(const LevelView& level) override { meshes_.push_back(index_mesh(level)); }
+
+  void clear_bodies() {
+    for (const EmbreeBody& body : bodies_) rtcReleaseScene(body.scene), rtcReleaseGeometry(body.geometry);
+    bodies_.clear();
+  }
+  void make_bodies(std::span<const Pose> poses) override {
+    clear_bodies();
+    bodies_.resize(poses.size());
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
-      bodies_[i].mesh = &meshes_[instances[i].asset];
+      bodies_[i].mesh = &meshes_[shape_of()[i]];
       bodies_[i].place(poses[i]);
       make_scene(bodies_[i]);
     }
     throw_on_error();
   }
 
-  void update(std::span<const Instance> instances) override {
-    const std::vector<Pose> poses = stored_poses(assets_, instances);
-    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+  void place(std::span<const Pose> poses) override {
+    for (std::size_t i = 0; i < poses.size(); ++i) {
       bodies_[i].place(poses[i]);
       rtcCommitGeometry(bodies_[i].geometry);
       rtcCommitScene(bodies_[i].scene);
@@ -126,24 +164,15 @@ class EmbreePeer final : public TellingPeer {
     throw_on_error();
   }
 
-  void query(std::span<const ObjectPair> pairs) override {
-    contacts_.clear();
-    candidates_ = 0;
-    for (std::uint32_t pair = 0; pair < pairs.size(); ++pair) {
-      const EmbreeBody &a = bodies_[pairs[pair].a], &b = bodies_[pairs[pair].b];
-      Collision collision = {&a, &b, pair, 0, &contacts_};
-      rtcCollide(a.scene, b.scene, decide, &collision);
-      candidates_ += collision.candidates;
-    }
-    throw_on_error();
+  void collide(std::uint32_t pair, std::uint32_t a, std::uint32_t b) override {
+    Collision collision = {&bodies_[a], &bodies_[b], pair, 0, &contacts_};
+    rtcCollide(bodies_[a].scene, bodies_[b].scene, decide, &collision);
+    candidates_ += collision.candidates;
   }
 
-  std::vector<Counter> counters() const override { return {{"candidates", candidates_}}; }
-
- private:
   // Embree refits what is of quality REFIT in a dynamic scene of quality LOW, and nothing else.
   void make_scene(EmbreeBody& body) {
-    const bool refit = following_ == Following::refit;
+    const bool refit = !rebuilds();
     body.geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_USER);
     rtcSetGeometryUserPrimitiveCount(body.geometry, static_cast<unsigned>(body.mesh->triangle_count()));
     rtcSetGeometryUserData(body.geometry, &body);
@@ -165,19 +194,18 @@ class EmbreePeer final : public TellingPeer {
 
   Following following_;
   RTCDevice device_;
-  std::span<const AssetView> assets_;
   std::vector<IndexedMesh> meshes_;
   std::vector<EmbreeBody> bodies_;
-  std::uint64_t candidates_ = 0;
 };
 
 }  // namespace
 
-std::vector<std::unique_ptr<Peer>> make_embree_peers() {
-  std::vector<std::unique_ptr<Peer>> peers;
-  peers.push_back(std::make_unique<EmbreePeer>(Following::rebuild));
-  peers.push_back(std::make_unique<EmbreePeer>(Following::refit));
-  return peers;
+std::unique_ptr<Engine> make_embree(const QueryOptions&) {
+  return std::make_unique<EmbreeEngine>(Following::rebuild);
 }
 
-}  // namespace tandem::bench
+std::unique_ptr<Engine> make_embree_refit(const QueryOptions&) {
+  return std::make_unique<EmbreeEngine>(Following::refit);
+}
+
+}  // namespace tandem

@@ -1,10 +1,9 @@
 #include <BulletCollision/CollisionShapes/btTriangleIndexVertexArray.h>
 #include <BulletCollision/Gimpact/btGImpactShape.h>
 
-#include "peer.h"
-#include "peer_mesh.h"
+#include "library_engine.h"
 
-namespace tandem::bench {
+namespace tandem {
 namespace {
 
 /// A mesh, and Bullet's shape that looks at it.
@@ -56,65 +55,49 @@ bool triangles_collide(const btGImpactMeshShapePart& part_a, const btTransform& 
   return a.overlap_test_conservative(b) && a.find_triangle_collision_clip_method(b, contact);
 }
 
-class BulletPeer final : public TellingPeer {
+class BulletEngine final : public LibraryEngine {
  public:
-  std::string name() const override { return "Bullet"; }
+  std::string_view name() const override { return "bullet"; }
+  std::string label() const override { return "Bullet"; }
   std::string settings() const override {
     return "btGImpactMeshShape (quantised AABB trees), GImpact's own test of triangles, margin 0, float32";
   }
 
-  void build(std::span<const AssetView> assets, std::span<const Instance> instances) override {
-    assets_ = assets;
-    for (const AssetView& asset : assets) meshes_.push_back(std::make_unique<BulletMesh>(asset.level()));
-    for (const Instance& instance : instances) part_of_.push_back(&meshes_[instance.asset]->part());
-    update(instances);
-  }
-
-  void update(std::span<const Instance> instances) override {
-    transforms_.clear();
-    for (const Pose& pose : stored_poses(assets_, instances)) transforms_.push_back(transform(pose));
-  }
-
-  void query(std::span<const ObjectPair> pairs) override {
-    contacts_.clear();
-    candidates_ = 0;
-    for (std::uint32_t pair = 0; pair < pairs.size(); ++pair) collide(pair, pairs[pair]);
-  }
-
-  std::vector<Counter> counters() const override { return {{"candidates", candidates_}}; }
-
  private:
-  void collide(std::uint32_t pair, ObjectPair instances) {
-    const auto [a, b] = instances;
+  void clear_shapes() override { meshes_.clear(); }
+  void add_shape(const LevelView& level) override { meshes_.push_back(std::make_unique<BulletMesh>(level)); }
+
+  void place(std::span<const Pose> poses) override {
+    transforms_.clear();
+    for (const Pose& pose : poses) transforms_.push_back(transform(pose));
+  }
+
+  void collide(std::uint32_t pair, std::uint32_t a, std::uint32_t b) override {
+    const btGImpactMeshShapePart &part_a = part_of(a), &part_b = part_of(b);
+    const btTransform &at_a = transforms_[static_cast<int>(a)], &at_b = transforms_[static_cast<int>(b)];
     found_.resize(0);
-    btGImpactBoxSet::find_collision(part_of_[a]->getBoxSet(), transforms_[a], part_of_[b]->getBoxSet(),
-                                    transforms_[b], found_);
+    btGImpactBoxSet::find_collision(part_a.getBoxSet(), at_a, part_b.getBoxSet(), at_b, found_);
     candidates_ += static_cast<std::uint64_t>(found_.size());
     for (int i = 0; i < found_.size(); ++i) {
       const int triangle_a = found_[i].m_index1, triangle_b = found_[i].m_index2;
-      if (!triangles_collide(*part_of_[a], transforms_[a], triangle_a, *part_of_[b], transforms_[b],
-                             triangle_b)) {
-        continue;
-      }
-      contacts_.push_back(
-          {pair, static_cast<std::uint32_t>(triangle_a), static_cast<std::uint32_t>(triangle_b)});
+      if (!triangles_collide(part_a, at_a, triangle_a, part_b, at_b, triangle_b)) continue;
+      add_contact(pair, static_cast<std::uint32_t>(triangle_a), static_cast<std::uint32_t>(triangle_b));
     }
   }
 
-  std::span<const AssetView> assets_;
+  const btGImpactMeshShapePart& part_of(std::uint32_t body) const {
+    return meshes_[shape_of()[body]]->part();
+  }
+
   std::vector<std::unique_ptr<BulletMesh>> meshes_;
-  std::vector<const btGImpactMeshShapePart*> part_of_;
   btAlignedObjectArray<btTransform> transforms_;
   btPairSet found_;
-  std::uint64_t candidates_ = 0;
 };
 
 }  // namespace
 
-std::vector<std::unique_ptr<Peer>> make_bullet_peers() {
-  std::vector<std::unique_ptr<Peer>> peers;
-  peers.push_back(std::make_unique<BulletPeer>());
-  return peers;
+std::unique_ptr<Engine> make_bullet(const QueryOptions&) {
+  return std::make_unique<BulletEngine>();
 }
 
-}  // namespace tandem::bench
+}  // namespace tandem

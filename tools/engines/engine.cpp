@@ -1,15 +1,15 @@
-#include "engine_parts.h"
+#include "engine.h"
 
 #include <algorithm>
 #include <bit>
-#include <stdexcept>
-#include <string>
-#include <utility>
+#include <new>
 
 #include "tandem/formats/status.h"
 
-namespace tandem::simulation {
+namespace tandem {
+namespace {
 
+// Leaves out pairs of two idle bodies; order is kept.
 void keep_active(std::span<const ObjectPair> pairs, std::span<const std::uint8_t> idle,
                  std::vector<ObjectPair>& kept) {
   kept.clear();
@@ -53,12 +53,55 @@ void sort_contacts(std::vector<TriangleContact>& contacts) {
   }
 }
 
-void require(std::string_view engine, Status status, std::uint64_t where) {
-  if (status == Status::kOk) return;
-  if (status == Status::kOutOfMemory) throw std::bad_alloc();
-  const bool body = subject(status) != nullptr;
-  throw std::runtime_error(std::string(engine) + ": " + (body ? "body " + std::to_string(where) + ": " : "") +
-                           explain(status));
+}  // namespace
+
+TimedAnswer Engine::time_query(const TimedQuery& asked) {
+  TimedAnswer answer;
+  std::span<const ObjectPair> pairs;
+  for (std::uint32_t i = 0; i < asked.repeats; ++i) {
+    Stopwatch watch;
+    if (asked.given == nullptr) {
+      pairs = find_pairs_and_query();
+    } else {
+      pairs = *asked.given;
+      query(pairs);
+    }
+    answer.whole.push_back(watch.lap());
+  }
+  answer.pairs.assign(pairs.begin(), pairs.end());
+  contacts(answer.contacts);
+  return answer;
 }
 
-}  // namespace tandem::simulation
+void Engine::find(std::span<const BodyPose> bodies, std::span<const std::uint8_t> idle, ContactList& found) {
+  times_ = {};
+  counters_ = {};
+  Stopwatch watch;
+  update(bodies);
+  times_.update = watch.lap();
+  const std::span<const ObjectPair> all = find_pairs();
+  keep_active(all, idle, found.pairs);
+  times_.broad_phase = watch.lap();
+  query(found.pairs.size() == all.size() ? all : found.pairs);
+  times_.traversal = watch.lap() - times_.triangle_tests;
+  if (!contacts(found.triangles)) throw std::logic_error("an engine that does not tell triangles");
+  sort_contacts(found.triangles);
+  times_.transfer = watch.lap();
+  counters_.object_pairs = found.pairs.size();
+  counters_.contacts = found.triangles.size();
+}
+
+std::span<const ObjectPair> Engine::find_pairs_and_query() {
+  const std::span<const ObjectPair> pairs = find_pairs();
+  query(pairs);
+  return pairs;
+}
+
+void Engine::require(Status status, std::uint64_t where) const {
+  if (status == Status::kOk) return;
+  if (status == Status::kOutOfMemory) throw std::bad_alloc();
+  const std::string blamed = subject(status) != nullptr ? "body " + std::to_string(where) + ": " : "";
+  throw EngineError(std::string(name()) + ": " + blamed + explain(status), status, where);
+}
+
+}  // namespace tandem

@@ -6,10 +6,9 @@
 #include <algorithm>
 #include <variant>
 
-#include "peer.h"
-#include "peer_mesh.h"
+#include "library_engine.h"
 
-namespace tandem::bench {
+namespace tandem {
 namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
@@ -72,6 +71,15 @@ bool meet(const ExactTriangle& a, const ExactTriangle& b) {
                     flat::shape(b));
 }
 
+PosedTriangle posed(const Pose& stored_pose, const Triangle& triangle) {
+  PosedTriangle out;
+  for (int i = 0; i < 3; ++i) {
+    const float* v = triangle.corner[i].position;
+    apply(stored_pose, v[0], v[1], v[2], out.corner[i]);
+  }
+  return out;
+}
+
 CGAL::Bbox_3 box_of(const PosedTriangle& t) {
   CGAL::Bbox_3 box;
   for (const double* p : t.corner) box += CGAL::Bbox_3(p[0], p[1], p[2], p[0], p[1], p[2]);
@@ -105,65 +113,48 @@ struct Reaching {
 };
 
 /// The answer that the others are held against: boxes compared in float64, triangles in exact arithmetic.
-class CgalPeer final : public TellingPeer {
+class CgalEngine final : public LibraryEngine {
  public:
-  std::string name() const override { return "CGAL"; }
+  std::string_view name() const override { return "cgal"; }
+  std::string label() const override { return "CGAL"; }
   std::string settings() const override {
     return "box_intersection_d over the posed float64 triangles, do_intersect with exact predicates";
   }
-
-  void build(std::span<const AssetView> assets, std::span<const Instance> instances) override {
-    assets_ = assets;
-    for (const AssetView& asset : assets) levels_.push_back(asset.level());
-    for (const Instance& instance : instances) asset_of_.push_back(instance.asset);
-    update(instances);
-  }
-
-  void update(std::span<const Instance> instances) override {
-    poses_ = stored_poses(assets_, instances);
-    boxes_.clear();
-    for (std::size_t i = 0; i < poses_.size(); ++i) {
-      boxes_.push_back(box_of(levels_[asset_of_[i]], poses_[i]));
-    }
-  }
-
-  void query(std::span<const ObjectPair> pairs) override {
-    contacts_.clear();
-    candidates_ = 0;
-    for (std::uint32_t pair = 0; pair < pairs.size(); ++pair) collide(pair, pairs[pair]);
-  }
-
-  std::vector<Counter> counters() const override { return {{"candidates", candidates_}}; }
   bool is_reference() const override { return true; }
 
  private:
-  void collide(std::uint32_t pair, ObjectPair instances) {
-    const auto [a, b] = instances;
-    Reaching of_a(levels_[asset_of_[a]], poses_[a], boxes_[b]);
-    Reaching of_b(levels_[asset_of_[b]], poses_[b], boxes_[a]);
+  void clear_shapes() override { levels_.clear(); }
+  void add_shape(const LevelView& level) override { levels_.push_back(level); }
+
+  void place(std::span<const Pose> poses) override {
+    poses_.assign(poses.begin(), poses.end());
+    boxes_.clear();
+    for (std::size_t i = 0; i < poses_.size(); ++i) boxes_.push_back(box_of(level_of(i), poses_[i]));
+  }
+
+  void collide(std::uint32_t pair, std::uint32_t a, std::uint32_t b) override {
+    Reaching of_a(level_of(a), poses_[a], boxes_[b]);
+    Reaching of_b(level_of(b), poses_[b], boxes_[a]);
     const auto decide = [&](const TriangleBox& box_a, const TriangleBox& box_b) {
       ++candidates_;
       if (!meet(*box_a.handle(), *box_b.handle())) return;
-      contacts_.push_back({pair, box_a.handle()->index, box_b.handle()->index});
+      add_contact(pair, box_a.handle()->index, box_b.handle()->index);
     };
     CGAL::box_intersection_d(of_a.boxes.begin(), of_a.boxes.end(), of_b.boxes.begin(), of_b.boxes.end(),
                              decide);
   }
 
-  std::span<const AssetView> assets_;
+  const LevelView& level_of(std::size_t body) const { return levels_[shape_of()[body]]; }
+
   std::vector<LevelView> levels_;
-  std::vector<std::uint32_t> asset_of_;
   std::vector<Pose> poses_;
   std::vector<CGAL::Bbox_3> boxes_;
-  std::uint64_t candidates_ = 0;
 };
 
 }  // namespace
 
-std::vector<std::unique_ptr<Peer>> make_cgal_peers() {
-  std::vector<std::unique_ptr<Peer>> peers;
-  peers.push_back(std::make_unique<CgalPeer>());
-  return peers;
+std::unique_ptr<Engine> make_cgal(const QueryOptions&) {
+  return std::make_unique<CgalEngine>();
 }
 
-}  // namespace tandem::bench
+}  // namespace tandem

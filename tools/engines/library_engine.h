@@ -1,0 +1,72 @@
+#pragma once
+#include <memory>
+
+#include "engine.h"
+
+namespace tandem {
+
+/// An asset's level 0 as other libraries take it: corners that coincide share a vertex; triangles in leaf
+/// order.
+struct IndexedMesh {
+  std::vector<float> vertices;  ///< x y z, stored coordinates
+  std::vector<int> corners;     ///< three for each triangle
+
+  std::size_t vertex_count() const { return vertices.size() / 3; }
+  std::size_t triangle_count() const { return corners.size() / 3; }
+};
+
+IndexedMesh index_mesh(const LevelView& level);
+
+/// Float64 corners in the world: the definition that "exact" refers to.
+struct PosedTriangle {
+  double corner[3][3];
+};
+
+/// Someone else's collision library, on one thread, which Tandem's broad phase on the CPU tells the pairs of
+/// bodies.
+class LibraryEngine : public Engine {
+ public:
+  void set_shapes(std::span<const AssetView> shapes) final;
+  void update(std::span<const BodyPose> bodies) final;
+  std::span<const ObjectPair> find_pairs() final;
+  void query(std::span<const ObjectPair> pairs) override;
+  bool contacts(std::vector<TriangleContact>& found) override;
+  std::vector<Counter> named_counters() const override { return {{"candidates", candidates_}}; }
+
+ protected:
+  /// Forgets all shapes.
+  virtual void clear_shapes() = 0;
+
+  /// Makes what the library keeps of the next shape.
+  virtual void add_shape(const LevelView& level) = 0;
+
+  /// Makes what the library keeps of each body, of shape_of(), and places it.
+  virtual void make_bodies(std::span<const Pose> poses) { place(poses); }
+
+  /// Moves the bodies. `poses` speak of stored coordinates.
+  virtual void place(std::span<const Pose> poses) = 0;
+
+  /// Adds the contacts of bodies a and b to contacts_, and what was looked at to candidates_.
+  virtual void collide(std::uint32_t pair, std::uint32_t a, std::uint32_t b) = 0;
+
+  /// The shape of each body.
+  std::span<const std::uint32_t> shape_of() const { return shape_of_; }
+
+  void add_contact(std::uint32_t pair, std::uint64_t triangle_a, std::uint64_t triangle_b) {
+    contacts_.push_back(
+        {pair, static_cast<std::uint32_t>(triangle_a), static_cast<std::uint32_t>(triangle_b)});
+  }
+
+  std::vector<TriangleContact> contacts_;
+  std::uint64_t candidates_ = 0;
+
+ private:
+  std::vector<Pose> stored_poses(std::span<const BodyPose> bodies) const;
+
+  std::span<const BodyPose> bodies_;
+  std::vector<AssetView> shapes_;
+  std::vector<std::uint32_t> shape_of_;
+  std::unique_ptr<ContactQuery> broad_phase_;  ///< made when pairs are asked for
+};
+
+}  // namespace tandem

@@ -1,0 +1,27 @@
+#pragma once
+#include <memory>
+#include <string_view>
+#include <vector>
+
+#include "engine.h"
+
+namespace tandem {
+
+/// The engines that a simulator can use, built in or not: tandem, tandem-cuda, paper, paper-bits, fcl,
+/// embree, embree-refit.
+std::vector<std::string_view> engine_names();
+
+/// Whether this program has the engine.
+bool is_built_in(std::string_view name);
+
+/// `options`: the mode; and, for Tandem, the rest. Throws std::runtime_error: no engine of this name, one
+/// that is not built in, without a usable GPU, or one that has no such mode.
+std::unique_ptr<Engine> make_engine(std::string_view name, const QueryOptions& options = {});
+
+/// The libraries that `bvhbench compare` runs, of those built in, in the order of the charts.
+std::vector<std::string_view> peer_names();
+
+/// The engines of a library, one for each mode worth comparing. Condition: `peer` is one of peer_names().
+std::vector<std::unique_ptr<Engine>> make_peers(std::string_view peer);
+
+}  // namespace tandem

@@ -1,0 +1,79 @@
+#include <memory>
+
+#include "engine.h"
+
+namespace tandem {
+namespace {
+
+constexpr const char* kLabels[] = {"Tandem exact", "Tandem fast", "Tandem boxes"};
+constexpr const char* kSettings[] = {"4-ary AABB trees in one file each, exact on the posed float64 vertices",
+                                     "the same trees, triangles decided in float32",
+                                     "the same trees, triangles whose boxes overlap"};
+
+/// Tandem on the CPU.
+class TandemEngine final : public Engine {
+ public:
+  explicit TandemEngine(const QueryOptions& options) : options_(options) {}
+
+  std::string_view name() const override { return "tandem"; }
+  std::string label() const override { return kLabels[static_cast<int>(options_.mode)]; }
+  std::string settings() const override { return kSettings[static_cast<int>(options_.mode)]; }
+
+  void set_shapes(std::span<const AssetView> shapes) override {
+    check(query_.set_assets(shapes));
+    file_bytes_ = 0;
+    for (const AssetView& shape : shapes) file_bytes_ += shape.header->file_bytes;
+  }
+
+  void update(std::span<const BodyPose> bodies) override { bodies_ = bodies; }
+
+  std::span<const ObjectPair> find_pairs() override {
+    check(query_.find_pairs(bodies_, options_));
+    return query_.pairs();
+  }
+
+  void query(std::span<const ObjectPair> pairs) override {
+    check(query_.find_contacts(bodies_, pairs, options_));
+    counters_ = query_.counters();
+  }
+
+  bool contacts(std::vector<TriangleContact>& found) override {
+    found.clear();
+    found.reserve(query_.contacts().size());
+    for (const Contact& c : query_.contacts()) found.push_back({c.pair, c.triangle_a, c.triangle_b});
+    return true;
+  }
+
+  std::vector<Counter> named_counters() const override {
+    return {{"block_pairs", counters_.block_pairs},
+            {"candidates", counters_.candidates},
+            {"decided_by_float32", counters_.decided_by_float32},
+            {"decided_by_float64", counters_.decided_by_float64},
+            {"decided_exactly", counters_.decided_exactly}};
+  }
+
+  std::uint64_t bytes_beside_heap() const override { return file_bytes_; }
+
+ protected:
+  std::span<const ObjectPair> find_pairs_and_query() override {
+    check(query_.find_contacts(bodies_, options_));
+    counters_ = query_.counters();
+    return query_.pairs();
+  }
+
+ private:
+  void check(Status status) const { require(status, query_.where()); }
+
+  QueryOptions options_;
+  ContactQuery query_;
+  std::span<const BodyPose> bodies_;
+  std::uint64_t file_bytes_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Engine> make_tandem(const QueryOptions& options) {
+  return std::make_unique<TandemEngine>(options);
+}
+
+}  // namespace tandem

@@ -1,0 +1,92 @@
+#include <memory>
+
+#include "gpu_engine.h"
+#include "tandem/kernels/gpu_contact_query.h"
+
+namespace tandem {
+namespace {
+
+/// Tandem on the GPU.
+class TandemCudaEngine final : public GpuEngine {
+ public:
+  explicit TandemCudaEngine(const QueryOptions& options) : GpuEngine("tandem-cuda"), options_(options) {}
+
+ private:
+  GpuQueryOptions options(bool sorted) const {
+    return {.mode = options_.mode, .first_contact_only = options_.first_contact_only, .sorted = sorted};
+  }
+
+  void name_shapes() override { name_shapes_to(query_); }
+
+  void ask(const GpuPairs& pairs, bool sorted) override {
+    const Status status = query_.find_contacts(instances(), pairs, options(sorted), stream());
+    if (subject(status) != nullptr) require(status, query_.report().where);
+    check(status, query_.cuda_error(), "contacts");
+  }
+
+  GpuContacts found() override {
+    if (query_.report().status != Status::kOk || query_.report().complete == 0) {
+      throw std::runtime_error("the GPU: a repeat of the query found something else than the first");
+    }
+    counters_ = query_.report().counters;
+    return {query_.contacts(), query_.report().contacts};
+  }
+
+  // A graph that is replayed.
+  std::function<void()> repeatable(const GpuPairs& pairs, bool sorted, const Before& before) override {
+    return captured([=, this, &before] {
+      before(cudaEventRecordExternal);
+      enqueue(query_, pairs, options(sorted), "contacts");
+    });
+  }
+
+  Seconds time_walk(const GpuPairs& pairs, std::uint32_t repeats) override {
+    constexpr GpuQueryOptions kWalk = {.walk_only = true};
+    GpuContactQuery walk;
+    name_shapes_to(walk);
+    const Status status = walk.reserve({.pairs = static_cast<std::uint32_t>(counters_.object_pairs)}, kWalk);
+    check(status, walk.cuda_error(), "traversal");
+    const auto run = captured([&] { enqueue(walk, pairs, kWalk, "traversal"); });
+    GpuEvent begin, end;
+    for (GpuEvent* event : {&begin, &end}) check(event->create(), "an event");
+    Seconds seconds;
+    for (std::uint32_t i = 0; i < repeats; ++i) {
+      run_between(begin, run, end);
+      seconds.push_back(seconds_between(begin, end));
+    }
+    return seconds;
+  }
+
+  void name_shapes_to(GpuContactQuery& query) const {
+    const Status status = query.set_assets(shapes(), stream());
+    check(status, query.cuda_error(), "assets");
+  }
+
+  void enqueue(GpuContactQuery& query, const GpuPairs& pairs, const GpuQueryOptions& options,
+               const char* step) {
+    const Status status = query.enqueue(instances(), pairs, options, stream());
+    check(status, query.cuda_error(), step);
+  }
+
+  std::function<void()> captured(const std::function<void()>& work) {
+    const auto graph = std::make_shared<GpuGraph>();
+    check(graph->capture(stream(), work), "a graph");
+    return [this, graph] { check(graph->launch(stream()), "a graph"); };
+  }
+
+  std::size_t query_bytes() const override { return query_.bytes(); }
+  std::size_t most_bytes(bool sorted) const override {
+    return most_query_bytes(query_.capacity(), sorted, shapes());
+  }
+
+  QueryOptions options_;
+  GpuContactQuery query_;
+};
+
+}  // namespace
+
+std::unique_ptr<Engine> make_tandem_cuda(const QueryOptions& options) {
+  return std::make_unique<TandemCudaEngine>(options);
+}
+
+}  // namespace tandem

@@ -60,15 +60,17 @@ class Walk {
     if (pairs == 0) return;
     sharing().begin();
     take_first_pairs(pairs);
+    // Each of these is called in one place: the code is to stay small, for the caches of instructions.
+    bool all_done = false;
     for (;;) {
-      // Each of these is called in one place: the code is to stay small, for the caches of instructions.
-      const std::uint32_t least = stack_.waiting() == 0 && !more_input_ ? 1 : kFull;
+      const std::uint32_t least = all_done ? 1 : kFull;
       while (stack_.candidates() >= least) settle(min(stack_.candidates(), kFull));
+      if (all_done) break;
       if (stack_.waiting() < kFull && more_input_) take_pairs();
       if (stack_.waiting() != 0)
         step();
-      else if (least == 1 && !receive())  // not where take_pairs() just found the end: see to the rest first
-        break;
+      else if (!more_input_)
+        all_done = !receive();
     }
     output_.finish(args_);
     add_counters();

@@ -61,7 +61,8 @@ double ConvexContacts::flat_below(const ConvexGoal& goal, const std::vector<Vect
 }
 
 Vector3d ConvexContacts::relative(std::size_t contact, const std::vector<Vector6>& y) const {
-  return {problem_.along(problem_.normal[contact], contact, y), problem_.along(problem_.first[contact], contact, y),
+  return {problem_.along(problem_.normal[contact], contact, y),
+          problem_.along(problem_.first[contact], contact, y),
           problem_.along(problem_.second[contact], contact, y)};
 }
 

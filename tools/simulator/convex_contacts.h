@@ -19,8 +19,9 @@ struct ConvexGoal {
 ///     |y - y*|^2 / 2 + sum over contacts of  R_n/2 max(0, l_n + (target - w_n)/R_n)^2 + R_t H(l_t - w_t/R_t)
 ///
 /// least. w: velocities of a contact; R: `softness` times what an impulse of 1 changes them by; H: half the
-/// square up to the bound, linear from there on (Huber), so that friction does not depend on the impulse along the
-/// normal. The impulses are the derivatives. Newton's method on sparse LDL^T, with exact line search.
+/// square up to the bound, linear from there on (Huber), so that friction does not depend on the impulse
+/// along the normal. The impulses are the derivatives. Newton's method on sparse LDL^T, with exact line
+/// search.
 class ConvexContacts {
  public:
   explicit ConvexContacts(const IslandProblem& problem);
@@ -47,7 +48,8 @@ class ConvexContacts {
   void find_curvature(const ConvexGoal& goal);
   bool find_way();
   double line_search(const ConvexGoal& goal, const std::vector<Vector6>& y) const;
-  Eigen::Vector2d wanted_friction(const ConvexGoal& goal, std::size_t contact, const Eigen::Vector3d& w) const;
+  Eigen::Vector2d wanted_friction(const ConvexGoal& goal, std::size_t contact,
+                                  const Eigen::Vector3d& w) const;
   Eigen::Vector3d impulse_at(const ConvexGoal& goal, std::size_t contact, const Eigen::Vector3d& w) const;
   Eigen::Vector3d impulse_slope(const ConvexGoal& goal, std::size_t contact, const Eigen::Vector3d& w,
                                 const Eigen::Vector3d& change) const;
@@ -57,8 +59,9 @@ class ConvexContacts {
   double softness_ = 1;
   std::vector<double> normal_softness_, friction_softness_;
   Eigen::VectorXd gradient_;
-  std::vector<Vector6> way_;                              // of a Newton step
-  std::vector<Eigen::Vector3d> relative_, relative_way_;  // velocities of contacts, and how the way changes them
+  std::vector<Vector6> way_;  // of a Newton step
+  std::vector<Eigen::Vector3d> relative_,
+      relative_way_;  // velocities of contacts, and how the way changes them
 };
 
 }  // namespace tandem::simulation

@@ -77,7 +77,8 @@ class ProblemMaker {
   void reserve(std::size_t count) {
     for (auto* list : {&problem_.contacts, &problem_.a, &problem_.b}) list->reserve(count);
     for (auto* list : {&problem_.normal, &problem_.first, &problem_.second}) list->reserve(count);
-    for (auto* list : {&problem_.first_direction, &problem_.second_direction, &problem_.drive, &problem_.impulse})
+    for (auto* list :
+         {&problem_.first_direction, &problem_.second_direction, &problem_.drive, &problem_.impulse})
       list->reserve(count);
     for (auto* list : {&problem_.separation, &problem_.rebound}) list->reserve(count);
     problem_.displacement.assign(problem_.bodies.size(), Vector6::Zero());
@@ -94,8 +95,10 @@ class ProblemMaker {
   ContactRow make_row(const ContactPoint& contact, const Vector3d& direction) const {
     const std::uint32_t a = problem_.a.back(), b = problem_.b.back();
     ContactRow row = {Vector6::Zero(), Vector6::Zero()};
-    if (a > 0) row.a = -gradient(problem_.scale[a], direction, contact.position - states_[contact.body_a].position);
-    if (b > 0) row.b = gradient(problem_.scale[b], direction, contact.position - states_[contact.body_b].position);
+    if (a > 0)
+      row.a = -gradient(problem_.scale[a], direction, contact.position - states_[contact.body_a].position);
+    if (b > 0)
+      row.b = gradient(problem_.scale[b], direction, contact.position - states_[contact.body_b].position);
     return row;
   }
 
@@ -120,7 +123,8 @@ class ProblemMaker {
     const double approach = -problem_.along(problem_.normal[i], i, problem_.velocity) - problem_.drive[i].x();
     const bool bounces = contact.depth >= 0 && approach > kBouncesAbove * input_.dt * input_.gravity.norm();
     problem_.rebound.push_back(bounces ? options_.restitution * approach : 0);
-    problem_.impulse.push_back({impulse.normal, first.dot(impulse.tangential), second.dot(impulse.tangential)});
+    problem_.impulse.push_back(
+        {impulse.normal, first.dot(impulse.tangential), second.dot(impulse.tangential)});
   }
 
   const StepInput& input_;
@@ -133,9 +137,10 @@ class ProblemMaker {
 
 }  // namespace
 
-IslandProblem make_island_problem(const StepInput& input, std::size_t island, std::span<const BodyState> states,
-                                  std::span<const ContactImpulse> impulses, const SolverOptions& options,
-                                  std::span<const std::uint32_t> layers, std::span<std::uint32_t> place) {
+IslandProblem make_island_problem(const StepInput& input, std::size_t island,
+                                  std::span<const BodyState> states, std::span<const ContactImpulse> impulses,
+                                  const SolverOptions& options, std::span<const std::uint32_t> layers,
+                                  std::span<std::uint32_t> place) {
   return ProblemMaker(input, states, options, layers, place).make(island, impulses);
 }
 
@@ -151,7 +156,8 @@ IslandResidual residual_of(const IslandProblem& problem, std::span<const double>
       const double w = problem.along(*rows[k], i, problem.velocity) + problem.drive[i][k];
       const double wanted = impulse[k] - (w - (k == 0 ? target[i] : 0)) / mobility;
       // A row of friction has what the other leaves of the cone.
-      const double rest = k == 0 ? 0 : std::sqrt(std::max(0.0, bound * bound - impulse[3 - k] * impulse[3 - k]));
+      const double rest =
+          k == 0 ? 0 : std::sqrt(std::max(0.0, bound * bound - impulse[3 - k] * impulse[3 - k]));
       const double next = k == 0 ? std::max(0.0, wanted) : std::clamp(wanted, -rest, rest);
       const double residual = std::fabs(next - impulse[k]) * mobility;
       all.largest = std::max(all.largest, residual);
@@ -170,12 +176,13 @@ void apply_solution(const IslandProblem& problem, const StepInput& input, std::s
     state.angular_velocity = scale.spread * problem.velocity[i].tail<3>();
     const Vector3d moved = problem.displacement[i].head<3>() / (scale.root_mass * input.dt);
     const Vector3d turned = scale.spread * problem.displacement[i].tail<3>() / input.dt;
-    advance(input.bodies[problem.bodies[i]], state, moved - state.velocity, turned - state.angular_velocity, input.dt);
+    advance(input.bodies[problem.bodies[i]], state, moved - state.velocity, turned - state.angular_velocity,
+            input.dt);
   }
   for (std::size_t i = 0; i < problem.contact_count(); ++i) {
     const Vector3d& impulse = problem.impulse[i];
-    impulses[problem.contacts[i]] = {impulse.x(), impulse.y() * problem.first_direction[i] +
-                                                      impulse.z() * problem.second_direction[i]};
+    impulses[problem.contacts[i]] = {
+        impulse.x(), impulse.y() * problem.first_direction[i] + impulse.z() * problem.second_direction[i]};
   }
 }
 

@@ -36,9 +36,9 @@ struct IslandProblem {
   std::vector<std::uint32_t> contacts, a, b;
   std::vector<ContactRow> normal, first, second;  ///< the latter two across the normal
   std::vector<Eigen::Vector3d> first_direction, second_direction;
-  std::vector<Eigen::Vector3d> drive;  ///< of normal, first, second: by bodies that move and are not moved
-  std::vector<double> separation;      ///< the slop less the depth
-  std::vector<double> rebound;         ///< velocity along the normal that restitution asks for, or 0
+  std::vector<Eigen::Vector3d> drive;    ///< of normal, first, second: by bodies that move and are not moved
+  std::vector<double> separation;        ///< the slop less the depth
+  std::vector<double> rebound;           ///< velocity along the normal that restitution asks for, or 0
   std::vector<Eigen::Vector3d> impulse;  ///< along normal, first, second, as a whole step would need it
 
   std::size_t contact_count() const { return contacts.size(); }
@@ -52,15 +52,17 @@ struct IslandResidual {
   double largest = 0, squares = 0;
 };
 
-/// target: of the velocities along the normals. share: part of the problem's impulses that the law is asked of.
+/// target: of the velocities along the normals. share: part of the problem's impulses that the law is asked
+/// of.
 IslandResidual residual_of(const IslandProblem& problem, std::span<const double> target, double friction,
                            double share);
 
 /// The contacts come by ascending layer of their lower body (find_layers()), so that a sweep goes up from the
 /// ground. place: for each body of the step a number that this may change.
-IslandProblem make_island_problem(const StepInput& input, std::size_t island, std::span<const BodyState> states,
-                                  std::span<const ContactImpulse> impulses, const SolverOptions& options,
-                                  std::span<const std::uint32_t> layers, std::span<std::uint32_t> place);
+IslandProblem make_island_problem(const StepInput& input, std::size_t island,
+                                  std::span<const BodyState> states, std::span<const ContactImpulse> impulses,
+                                  const SolverOptions& options, std::span<const std::uint32_t> layers,
+                                  std::span<std::uint32_t> place);
 
 /// Moves the island's bodies by the displacement, gives them the velocities, and hands out the impulses.
 void apply_solution(const IslandProblem& problem, const StepInput& input, std::span<BodyState> states,

@@ -60,7 +60,8 @@ void IslandSolver::step(const StepInput& input, std::span<BodyState> states,
   sum_up(input, reports);
 }
 
-IslandSolver::IslandReport IslandSolver::solve(IslandProblem& problem, const StepInput& input, bool try_newton) const {
+IslandSolver::IslandReport IslandSolver::solve(IslandProblem& problem, const StepInput& input,
+                                               bool try_newton) const {
   if (try_newton) {
     const NewtonReport newton = solve_newton_step(problem, input, options_);
     if (newton.converged) return {newton.residual, true};
@@ -68,7 +69,8 @@ IslandSolver::IslandReport IslandSolver::solve(IslandProblem& problem, const Ste
   return {solve_soft_step(problem, input, options_), false};
 }
 
-bool IslandSolver::wants_newton(const Islands& islands, std::size_t island, std::span<const std::uint32_t> layers) const {
+bool IslandSolver::wants_newton(const Islands& islands, std::size_t island,
+                                std::span<const std::uint32_t> layers) const {
   if (options_.kind == SolverKind::automatic) return is_slender(islands, island, layers);
   return options_.kind == SolverKind::newton;
 }
@@ -83,7 +85,8 @@ void IslandSolver::sum_up(const StepInput& input, std::span<const IslandReport> 
   }
   statistics_.contacts = input.islands.contacts.size();
   if (statistics_.contacts == 0) return;
-  statistics_.residual_rms = std::sqrt(statistics_.residual_rms / (3 * static_cast<double>(statistics_.contacts)));
+  statistics_.residual_rms =
+      std::sqrt(statistics_.residual_rms / (3 * static_cast<double>(statistics_.contacts)));
 }
 
 }  // namespace tandem::simulation

@@ -91,6 +91,7 @@ void Simulator::solve(StepRecord& record) {
   record.residual_max = solver_->statistics().residual;
   record.residual_rms = solver_->statistics().residual_rms;
   record.islands = solver_->statistics().islands;
+  record.newton_islands = solver_->statistics().newton_islands;
 }
 
 void Simulator::sleep() {

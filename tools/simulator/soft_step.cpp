@@ -22,8 +22,11 @@ Softness softness(double frequency, double damping_ratio, double h) {
 class SoftStep {
  public:
   SoftStep(IslandProblem& problem, const StepInput& input, const SolverOptions& options)
-      : p_(problem), friction_(options.friction), substeps_(options.substeps),
-        h_(input.dt / options.substeps), between_movers_(softness(1 / (8 * h_), 10, h_)),
+      : p_(problem),
+        friction_(options.friction),
+        substeps_(options.substeps),
+        h_(input.dt / options.substeps),
+        between_movers_(softness(1 / (8 * h_), 10, h_)),
         against_unmoved_(softness(2 / (8 * h_), 5, h_)) {}
 
   void solve() {
@@ -41,7 +44,10 @@ class SoftStep {
       for (std::size_t i = 0; i < contacts; ++i) visit_friction(i);
       for (std::size_t j = 1; j < bodies; ++j) pushed_[j] = p_.velocity[j] - start[j];
     }
-    for (std::size_t i = 0; i < contacts; ++i) restitute(i);
+    constexpr int kRestitutionSweeps = 10;
+    for (int k = 0; k < kRestitutionSweeps; ++k) {
+      for (std::size_t i = 0; i < contacts; ++i) restitute(i);
+    }
     for (Vector3d& impulse : p_.impulse) impulse *= substeps_;
   }
 
@@ -68,8 +74,10 @@ class SoftStep {
       friction_mass_[i] = 1 / std::max(mobility(p_.first[i]), mobility(p_.second[i]));
       Vector3d& impulse = p_.impulse[i];
       impulse /= substeps_;
-      pushed_[p_.a[i]] += impulse.x() * p_.normal[i].a + impulse.y() * p_.first[i].a + impulse.z() * p_.second[i].a;
-      pushed_[p_.b[i]] += impulse.x() * p_.normal[i].b + impulse.y() * p_.first[i].b + impulse.z() * p_.second[i].b;
+      pushed_[p_.a[i]] +=
+          impulse.x() * p_.normal[i].a + impulse.y() * p_.first[i].a + impulse.z() * p_.second[i].a;
+      pushed_[p_.b[i]] +=
+          impulse.x() * p_.normal[i].b + impulse.y() * p_.first[i].b + impulse.z() * p_.second[i].b;
     }
   }
 

@@ -9,8 +9,8 @@ namespace tandem::simulation {
 /// has then. Restitution comes after all substeps.
 ///
 /// A soft row is a damped spring of frequency f = 1 / (8 h) and damping ratio 10 (2 f and 5 against what does
-/// not move), taken implicitly: it gives way to what one sweep cannot solve, and its push never becomes speed,
-/// because the relaxing sweep takes it back.
+/// not move), taken implicitly: it gives way to what one sweep cannot solve, and its push never becomes
+/// speed, because the relaxing sweep takes it back.
 ///
 /// Results: velocity, displacement, impulse of the problem, and what its last substep leaves undone.
 IslandResidual solve_soft_step(IslandProblem& problem, const StepInput& input, const SolverOptions& options);

@@ -27,8 +27,8 @@ enum class ContactOrder : std::uint8_t {
 
 struct SolverOptions {
   SolverKind kind = SolverKind::automatic;
-  std::uint32_t substeps = 0;  ///< parts of a step that share its contacts, whose points move with the bodies;
-                               ///< 0: default_substeps()
+  std::uint32_t substeps = 0;  ///< parts of a step that share its contacts, whose points move with the
+                               ///< bodies; 0: default_substeps()
   double friction = 0.5;
   double restitution = 0;
   double slop = 5e-4;  ///< penetration that is left alone, a length
@@ -64,7 +64,7 @@ struct SolverStatistics {
   double residual_rms = 0;  ///< root of the mean square over all rows
   std::uint64_t islands = 0;
   std::uint64_t newton_islands = 0;  ///< of these solved by Newton's method
-  std::uint64_t contacts = 0;  ///< of which at least one body is dynamic
+  std::uint64_t contacts = 0;        ///< of which at least one body is dynamic
 };
 
 /// Moves bodies through a step under gravity and contacts. The same bytes for any number of threads.
@@ -74,7 +74,8 @@ class StepSolver {
 
   /// states: those at the start of the step, and then at its end. impulses: for each contact what to start
   /// with, and then the solution, as a whole step would need it.
-  virtual void step(const StepInput& input, std::span<BodyState> states, std::span<ContactImpulse> impulses) = 0;
+  virtual void step(const StepInput& input, std::span<BodyState> states,
+                    std::span<ContactImpulse> impulses) = 0;
 
   /// Of the last step.
   const SolverStatistics& statistics() const { return statistics_; }

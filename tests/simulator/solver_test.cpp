@@ -15,14 +15,17 @@ using Eigen::Vector3d;
 constexpr double kGravity = 9.81;
 const Vector3d kCube = {1, 1, 1};
 
-// Boxes of these masses on each other on the plane, each as deep in the next as the slop, and askew by `jitter`.
+// Boxes of these masses on each other on the plane, each as deep in the next as the slop, and askew by
+// `jitter`.
 struct Tower {
-  explicit Tower(const std::vector<double>& masses, double slop, double jitter = 0) : bodies{fixed_body()}, states(1) {
+  explicit Tower(const std::vector<double>& masses, double slop, double jitter = 0)
+      : bodies{fixed_body()}, states(1) {
     for (std::size_t i = 1; i <= masses.size(); ++i) {
       const double number = static_cast<double>(i);
       bodies.push_back(box_body(kCube, masses[i - 1]));
       states.emplace_back();
-      states.back().position = {jitter * std::sin(7 * number), jitter * std::cos(5 * number), number - 0.5 - slop * number};
+      states.back().position = {jitter * std::sin(7 * number), jitter * std::cos(5 * number),
+                                number - 0.5 - slop * number};
     }
   }
 
@@ -49,7 +52,8 @@ Outcome stand(const Tower& tower, SolverKind solver, int steps) {
   for (int i = 0; i < steps; ++i) {
     outcome.last = simulator.step();
     for (std::size_t j = 1; j < tower.states.size(); ++j) {
-      outcome.drift = std::max(outcome.drift, (simulator.states()[j].position - tower.states[j].position).norm());
+      outcome.drift =
+          std::max(outcome.drift, (simulator.states()[j].position - tower.states[j].position).norm());
     }
   }
   return outcome;
@@ -102,7 +106,8 @@ TEST(Sliding, APushedBlockStopsWhereTheClosedFormSays) {
 struct OneStep {
   explicit OneStep(const Tower& tower) : bodies(tower.bodies), states(tower.states) {}
 
-  void touch(std::uint32_t a, std::uint32_t b, const Vector3d& position, const Vector3d& normal = Vector3d::UnitZ()) {
+  void touch(std::uint32_t a, std::uint32_t b, const Vector3d& position,
+             const Vector3d& normal = Vector3d::UnitZ()) {
     contacts.push_back({a, b, position, normal, kSlop, 0});
   }
   void touch_by_four(std::uint32_t a, std::uint32_t b, double height) {

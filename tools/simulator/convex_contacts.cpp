@@ -9,14 +9,6 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-namespace {
-
-double mobility(const ContactRow& row) {
-  return row.a.squaredNorm() + row.b.squaredNorm();
-}
-
-}  // namespace
-
 ConvexContacts::ConvexContacts(const IslandProblem& problem)
     : problem_(problem),
       matrix_(problem),
@@ -27,11 +19,9 @@ ConvexContacts::ConvexContacts(const IslandProblem& problem)
       relative_way_(problem.contact_count()) {}
 
 void ConvexContacts::set_softness(double softness) {
-  softness_ = softness;
   for (std::size_t i = 0; i < problem_.contact_count(); ++i) {
-    normal_softness_[i] = softness * mobility(problem_.normal[i]);
-    // One for both directions, or friction would not oppose the slip.
-    friction_softness_[i] = softness * std::max(mobility(problem_.first[i]), mobility(problem_.second[i]));
+    normal_softness_[i] = softness * problem_.normal[i].mobility();
+    friction_softness_[i] = softness * problem_.friction_mobility(i);
   }
 }
 
@@ -79,10 +69,9 @@ void ConvexContacts::find_gradient(const ConvexGoal& goal, const std::vector<Vec
 }
 
 void ConvexContacts::push(std::size_t contact, const Vector3d& impulse) {
-  const ContactRow &n = problem_.normal[contact], &f = problem_.first[contact], &s = problem_.second[contact];
   const std::uint32_t a = problem_.a[contact], b = problem_.b[contact];
-  if (a > 0) gradient_.segment<6>(6 * (a - 1)) -= impulse.x() * n.a + impulse.y() * f.a + impulse.z() * s.a;
-  if (b > 0) gradient_.segment<6>(6 * (b - 1)) -= impulse.x() * n.b + impulse.y() * f.b + impulse.z() * s.b;
+  if (a > 0) gradient_.segment<6>(6 * (a - 1)) -= problem_.change_of_a(contact, impulse);
+  if (b > 0) gradient_.segment<6>(6 * (b - 1)) -= problem_.change_of_b(contact, impulse);
 }
 
 bool ConvexContacts::find_way() {

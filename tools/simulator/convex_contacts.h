@@ -35,7 +35,6 @@ class ConvexContacts {
 
   double normal_softness(std::size_t contact) const { return normal_softness_[contact]; }
   double friction_softness(std::size_t contact) const { return friction_softness_[contact]; }
-  double softness() const { return softness_; }
 
   /// The velocities of a contact but for its drive.
   Eigen::Vector3d relative(std::size_t contact, const std::vector<Vector6>& y) const;
@@ -56,7 +55,6 @@ class ConvexContacts {
 
   const IslandProblem& problem_;
   BlockMatrix matrix_;
-  double softness_ = 1;
   std::vector<double> normal_softness_, friction_softness_;
   Eigen::VectorXd gradient_;
   std::vector<Vector6> way_;  // of a Newton step

@@ -152,7 +152,7 @@ IslandResidual residual_of(const IslandProblem& problem, std::span<const double>
     const Vector3d impulse = share * problem.impulse[i];
     const double bound = friction * impulse.x();
     for (int k = 0; k < 3; ++k) {
-      const double mobility = rows[k]->a.squaredNorm() + rows[k]->b.squaredNorm();
+      const double mobility = rows[k]->mobility();
       const double w = problem.along(*rows[k], i, problem.velocity) + problem.drive[i][k];
       const double wanted = impulse[k] - (w - (k == 0 ? target[i] : 0)) / mobility;
       // A row of friction has what the other leaves of the cone.

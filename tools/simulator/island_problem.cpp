@@ -102,6 +102,11 @@ class ProblemMaker {
     return row;
   }
 
+  // A gap may close; what is in contact comes no deeper, or bodies would rock within the slop.
+  double separation_of(double depth) const {
+    return depth < 0 ? -depth : std::min(0.0, options_.slop - depth);
+  }
+
   void add_contact(std::uint32_t index, const ContactImpulse& impulse) {
     constexpr double kBouncesAbove = 2;  // times what gravity gives in a step
     const ContactPoint& contact = input_.contacts[index];
@@ -118,7 +123,7 @@ class ProblemMaker {
     const Vector3d moving = driven(contact.body_b, contact.position - states_[contact.body_b].position) -
                             driven(contact.body_a, contact.position - states_[contact.body_a].position);
     problem_.drive.push_back({normal.dot(moving), first.dot(moving), second.dot(moving)});
-    problem_.separation.push_back(options_.slop - contact.depth);
+    problem_.separation.push_back(separation_of(contact.depth));
     const std::size_t i = problem_.contacts.size() - 1;
     const double approach = -problem_.along(problem_.normal[i], i, problem_.velocity) - problem_.drive[i].x();
     const bool bounces = contact.depth >= 0 && approach > kBouncesAbove * input_.dt * input_.gravity.norm();

@@ -40,7 +40,7 @@ struct IslandProblem {
   std::vector<ContactRow> normal, first, second;  ///< the latter two across the normal
   std::vector<Eigen::Vector3d> first_direction, second_direction;
   std::vector<Eigen::Vector3d> drive;    ///< of normal, first, second: by bodies that move and are not moved
-  std::vector<double> separation;        ///< the slop less the depth
+  std::vector<double> separation;        ///< of a gap; else the slop less the depth, at most 0
   std::vector<double> rebound;           ///< velocity along the normal that restitution asks for, or 0
   std::vector<Eigen::Vector3d> impulse;  ///< along normal, first, second, as a whole step would need it
 

@@ -1,4 +1,4 @@
-"""Tables of what scripts/stability measured of towers and of heavy boxes."""
+"""Tables of what scripts/stability measured of towers, heavy boxes, stacks and heaps."""
 import re
 
 from common import tabular
@@ -52,6 +52,20 @@ def stacks(cases):
     rows = [[f"`{solver}`", size, name(variant), drift(quantities), f"{float(quantities['largest drift']['ms_per_step']):.3g}"]
             for size, case in (("5³, 10 s", "stack"), ("10³, 60 s", "stack60")) for (solver, variant), quantities in cases[case].items()]
     return markdown(["solver", "stack", "", "largest drift, box lengths", "ms a step"], rows, "lll")
+
+
+def heaps(rows):
+    """Heaps of 1,000 cows, a row for each solver and seed."""
+    found = {}
+    for row in (row for row in rows if row["case"] == "heap"):
+        found.setdefault((row["solver"], row["seed"]), {})[row["quantity"]] = row
+    lines = []
+    for (solver, seed), quantities in found.items():
+        fastest = quantities["fastest body, last 2 s"]
+        shown = f"**fails**, {two_digits(fastest)}" if fastest["verdict"] == "fails" else two_digits(fastest)
+        last = float(quantities["last time that a body is faster than 1 cm/s"]["value"])
+        lines.append([f"`{solver}`", seed, shown, f"{last:.1f}", f"{float(fastest['contacts']):,.0f}", f"{float(fastest['ms_per_step']):.0f}"])
+    return markdown(["solver", "seed", "fastest body of the last 2 s, m/s", "last time above 1 cm/s, s", "contacts", "ms a step"], lines, "l")
 
 
 def peers(rows):

@@ -109,10 +109,10 @@ class Run:
 
 
 class Workshop:
-    """Builds meshes and makes runs in a folder of its own."""
+    """Builds meshes and makes runs in a folder of its own, by one solver."""
 
-    def __init__(self, folder, quick):
-        self.folder, self.quick = Path(folder), quick
+    def __init__(self, folder, quick, solver="auto", seeds=range(1, 11)):
+        self.folder, self.quick, self.solver, self.seeds = Path(folder), quick, solver, seeds
 
     @functools.cache
     def mesh(self, name):
@@ -135,11 +135,11 @@ class Workshop:
         kind = ("scene", self.scene_file(scene), "--slop", SLOP) if isinstance(scene, Scene) else scene
         dt = settings.get("dt") or 1 / 60
         steps = max(1, round(seconds / dt))
-        options = []
+        options = ["--solver", self.solver]
         for name, value in settings.items():
             if value is not None and value is not False:
                 options += [f"--{name.replace('_', '-')}"] + ([] if value is True else [repr(value) if isinstance(value, float) else value])
         output = self.folder / "run.h5"
         keep = min(steps, max(1, round(every / dt))) if every else steps
         tools.run(BVHBENCH, "simulate", *kind, "--frames", steps, "--threads", 1, "--trajectory", keep, *options, "-o", output)
-        return Run(output, " ".join(map(str, options)))
+        return Run(output, " ".join(map(str, options[2:])))

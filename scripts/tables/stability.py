@@ -1,4 +1,4 @@
-"""Tables of what scripts/stability measured of towers and of heavy boxes."""
+"""Tables of what scripts/stability measured of towers, heavy boxes, stacks and heaps."""
 import re
 
 from common import tabular
@@ -6,10 +6,10 @@ from common.tabular import markdown
 
 
 def read(path):
-    """{case: {variant: {quantity: row}}}"""
+    """{case: {(solver, variant): {quantity: row}}}"""
     cases = {}
     for row in tabular.read(path):
-        cases.setdefault(row["case"], {}).setdefault(row["variant"], {})[row["quantity"]] = row
+        cases.setdefault(row["case"], {}).setdefault((row["solver"], row["variant"]), {})[row["quantity"]] = row
     return cases
 
 
@@ -36,13 +36,46 @@ def falls(quantities):
 def towers(cases):
     """Towers of 30. The speed of one that fell says nothing and is left out."""
     rows = []
-    for variant, quantities in cases["tower30"].items():
+    for (solver, variant), quantities in cases["tower30"].items():
         speed = "" if "falls after" in quantities else two_digits(quantities["speed, rms of the last second"])
         step = f"{float(quantities['largest drift']['ms_per_step']):.2g}"
-        rows.append([name(variant), drift(quantities), falls(quantities), speed, step])
-    return markdown(["tower of 30, 20 s", "largest drift, box lengths", "falls after", "rms speed at the end, m/s", "ms a step"], rows)
+        rows.append([f"`{solver}`", name(variant), drift(quantities), falls(quantities), speed, step])
+    return markdown(["solver", "tower of 30, 20 s", "largest drift, box lengths", "falls after", "rms speed at the end, m/s", "ms a step"], rows, "ll")
 
 
 def masses(cases):
-    rows = [[name(variant), drift(quantities), falls(quantities)] for variant, quantities in cases["masses"].items()]
-    return markdown(["heavy on light, 10 s", "largest drift, box lengths", "falls after"], rows)
+    rows = [[f"`{solver}`", name(variant), drift(quantities), falls(quantities)] for (solver, variant), quantities in cases["masses"].items()]
+    return markdown(["solver", "heavy on light, 10 s", "largest drift, box lengths", "falls after"], rows, "ll")
+
+
+def stacks(cases):
+    rows = [[f"`{solver}`", size, name(variant), drift(quantities), f"{float(quantities['largest drift']['ms_per_step']):.3g}"]
+            for size, case in (("5³, 10 s", "stack"), ("10³, 60 s", "stack60")) for (solver, variant), quantities in cases[case].items()]
+    return markdown(["solver", "stack", "", "largest drift, box lengths", "ms a step"], rows, "lll")
+
+
+def heaps(rows):
+    """Heaps of 1,000 cows, a row for each solver and seed."""
+    found = {}
+    for row in (row for row in rows if row["case"] == "heap"):
+        found.setdefault((row["solver"], row["seed"]), {})[row["quantity"]] = row
+    lines = []
+    for (solver, seed), quantities in found.items():
+        fastest = quantities["fastest body, last 2 s"]
+        shown = f"**fails**, {two_digits(fastest)}" if fastest["verdict"] == "fails" else two_digits(fastest)
+        last = float(quantities["last time that a body is faster than 1 cm/s"]["value"])
+        lines.append([f"`{solver}`", seed, shown, f"{last:.1f}", f"{float(fastest['contacts']):,.0f}", f"{float(fastest['ms_per_step']):.0f}"])
+    return markdown(["solver", "seed", "fastest body of the last 2 s, m/s", "last time above 1 cm/s, s", "contacts", "ms a step"], lines, "l")
+
+
+def peers(rows):
+    """Other engines, a row for each case."""
+    engines = list(dict.fromkeys(row["engine"] for row in rows))
+    cells = {(row["case"], row["variant"], row["engine"]): row for row in rows}
+
+    def shown(row):
+        return f"**fails**, {row['value']}" if row["verdict"] == "fails" else row["value"]
+
+    lines = [[label or f"{case}, {variant}", *(shown(cells[case, variant, engine]) if (case, variant, engine) in cells else "–" for engine in engines)]
+             for (case, variant), label in dict.fromkeys(((row["case"], row["variant"]), "plates, m/s" if row["case"] == "tunnelling" else "") for row in rows)]
+    return markdown(["largest drift, box lengths", *(f"{engine} {next(row['version'] for row in rows if row['engine'] == engine)}" for engine in engines)], lines)

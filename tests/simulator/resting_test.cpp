@@ -28,6 +28,33 @@ std::vector<BodyProperties> bodies_with(int boxes, const Vector3d& size) {
   return bodies;
 }
 
+SimulatorOptions options_of(SolverKind solver) {
+  SimulatorOptions options;
+  options.solver.kind = solver;
+  return options;
+}
+
+// Tests of what holds whatever solves the steps.
+class EverySolver : public testing::TestWithParam<SolverKind> {};
+
+std::string name_of(const testing::TestParamInfo<SolverKind>& tested) {
+  switch (tested.param) {
+    case SolverKind::automatic:
+      return "automatic";
+    case SolverKind::soft:
+      return "soft";
+    case SolverKind::newton:
+      return "newton";
+    default:
+      return "sweeps";
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Solvers, EverySolver,
+                         testing::Values(SolverKind::automatic, SolverKind::soft, SolverKind::newton,
+                                         SolverKind::sweeps),
+                         name_of);
+
 // A block on a slope that falls towards +x.
 struct Slope {
   explicit Slope(double degrees) : angle(degrees * M_PI / 180), normal(std::sin(angle), 0, std::cos(angle)) {}
@@ -49,10 +76,10 @@ Simulator block_on(const Slope& slope, const Vector3d& size, const SimulatorOpti
                    boxes_on_plane(slope.normal, size), options);
 }
 
-TEST(Slope, ABlockSlidesAsTheClosedFormSays) {
+TEST_P(EverySolver, ABlockSlidesAsTheClosedFormSays) {
   for (const auto& [degrees, friction] : {std::pair{30.0, 0.3}, {20.0, 0.1}, {40.0, 0.0}}) {
     const Slope slope(degrees);
-    SimulatorOptions options;
+    SimulatorOptions options = options_of(GetParam());
     options.solver.friction = friction;
     const Vector3d flat = {1, 1, 0.2};
     Simulator simulator = block_on(slope, flat, options);
@@ -67,11 +94,11 @@ TEST(Slope, ABlockSlidesAsTheClosedFormSays) {
   }
 }
 
-TEST(Slope, ABlockSticksBelowTheAngleOfFrictionAndSlipsAbove) {
+TEST_P(EverySolver, ABlockSticksBelowTheAngleOfFrictionAndSlipsAbove) {
   const Vector3d flat = {1, 1, 0.2};
   for (const double friction : {0.2, 0.5, 0.8}) {
     const double limit = std::atan(friction) * 180 / M_PI;
-    SimulatorOptions options;
+    SimulatorOptions options = options_of(GetParam());
     options.solver.friction = friction;
     for (const double degrees : {0.99 * limit, 1.01 * limit}) {
       Simulator simulator = block_on(Slope(degrees), flat, options);
@@ -87,20 +114,20 @@ TEST(Slope, ABlockSticksBelowTheAngleOfFrictionAndSlipsAbove) {
   }
 }
 
-TEST(Resting, ABlockGainsNoEnergyInAMinute) {
-  SimulatorOptions options;
+TEST_P(EverySolver, ABlockGainsNoEnergyInAMinute) {
+  SimulatorOptions options = options_of(GetParam());
   Simulator simulator(bodies_with(1, kCube), tower(1, 1, options.solver.slop),
                       boxes_on_plane(Vector3d::UnitZ(), kCube), options);
   const double start = simulator.step().potential_energy;
   for (int i = 1; i < 3600; ++i) {
     const StepRecord record = simulator.step();
-    ASSERT_LE(record.kinetic_energy, 1e-18);
+    ASSERT_LE(record.kinetic_energy, i < 60 && GetParam() == SolverKind::soft ? 1e-12 : 1e-18) << i;
     ASSERT_LE(record.kinetic_energy + record.potential_energy, start + 1e-9);
   }
 }
 
-TEST(Resting, AFallenBlockIsLiftedToTheSlopWithoutSpeed) {
-  SimulatorOptions options;
+TEST_P(EverySolver, AFallenBlockIsLiftedToTheSlopWithoutSpeed) {
+  SimulatorOptions options = options_of(GetParam());
   std::vector<BodyState> states = tower(1, 1, 0);
   states[1].position.z() += 0.5;
   Simulator simulator(bodies_with(1, kCube), states, boxes_on_plane(Vector3d::UnitZ(), kCube), options);
@@ -110,16 +137,16 @@ TEST(Resting, AFallenBlockIsLiftedToTheSlopWithoutSpeed) {
     record = simulator.step();
     // Correction lifts, so potential energy may grow; speed must not.
     if (record.contacts > 0) {
-      ASSERT_LE(record.kinetic_energy, energy + 1e-12);
+      ASSERT_LE(record.kinetic_energy, energy + (GetParam() == SolverKind::soft ? 1e-9 : 1e-12));
       energy = record.kinetic_energy;
     }
   }
   EXPECT_LE(record.kinetic_energy, 1e-18);
-  EXPECT_NEAR(record.penetration_max, options.solver.slop, 1e-6);
+  EXPECT_NEAR(record.penetration_max, options.solver.slop, GetParam() == SolverKind::soft ? 1e-5 : 1e-6);
 }
 
-TEST(Resting, RestitutionGivesTheSpeedBack) {
-  SimulatorOptions options;
+TEST_P(EverySolver, RestitutionGivesTheSpeedBack) {
+  SimulatorOptions options = options_of(GetParam());
   options.solver.restitution = 0.5;
   std::vector<BodyState> states = tower(1, 1, 0);
   states[1].position.z() += 1e-9;
@@ -127,7 +154,7 @@ TEST(Resting, RestitutionGivesTheSpeedBack) {
   options.gravity.setZero();
   Simulator simulator(bodies_with(1, kCube), states, boxes_on_plane(Vector3d::UnitZ(), kCube), options);
   for (int i = 0; i < 2; ++i) simulator.step();
-  EXPECT_NEAR(simulator.states()[1].velocity.z(), 2, 1e-9);
+  EXPECT_NEAR(simulator.states()[1].velocity.z(), 2, GetParam() == SolverKind::soft ? 1e-3 : 1e-9);
 }
 
 TEST(Resting, ATowerStands) {
@@ -135,6 +162,7 @@ TEST(Resting, ATowerStands) {
   for (const bool shock : {false, true}) {
     SCOPED_TRACE(shock ? "with shock propagation" : "without");
     SimulatorOptions options;
+    options.solver.kind = SolverKind::sweeps;
     options.solver.shock_propagation = shock;
     const auto start = tower(kBoxes, 1, options.solver.slop);
     Simulator simulator(bodies_with(kBoxes, kCube), start, boxes_on_plane(Vector3d::UnitZ(), kCube), options);
@@ -151,6 +179,7 @@ TEST(Resting, WarmStartLeavesASmallerResidual) {
   double residual[2];
   for (const bool warm : {false, true}) {
     SimulatorOptions options;
+    options.solver.kind = SolverKind::sweeps;
     options.solver.warm_start = warm;
     Simulator simulator(bodies_with(10, kCube), tower(10, 1, options.solver.slop),
                         boxes_on_plane(Vector3d::UnitZ(), kCube), options);
@@ -163,6 +192,7 @@ TEST(Resting, MoreIterationsLeaveASmallerResidual) {
   double last = 1e9;
   for (const std::uint32_t iterations : {5u, 20u, 80u}) {
     SimulatorOptions options;
+    options.solver.kind = SolverKind::sweeps;
     options.solver.iterations = iterations;
     Simulator simulator(bodies_with(10, kCube), tower(10, 1, options.solver.slop),
                         boxes_on_plane(Vector3d::UnitZ(), kCube), options);
@@ -203,10 +233,11 @@ bool same_bytes(std::span<const BodyState> a, std::span<const BodyState> b) {
   });
 }
 
-TEST(Determinism, ThreadsDoNotChangeABit) {
+TEST_P(EverySolver, ThreadsDoNotChangeABit) {
   const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, 4);
   for (const ContactOrder order : {ContactOrder::found, ContactOrder::shuffled}) {
-    SimulatorOptions options;
+    if (order == ContactOrder::shuffled && GetParam() != SolverKind::sweeps) continue;
+    SimulatorOptions options = options_of(GetParam());
     options.solver.order = order;
     options.solver.shock_propagation = order == ContactOrder::found;
     options.sleep.enabled = true;
@@ -220,6 +251,7 @@ TEST(Determinism, ThreadsDoNotChangeABit) {
 
 TEST(Determinism, TheSeedOfTheOrderMatters) {
   SimulatorOptions options;
+  options.solver.kind = SolverKind::sweeps;
   options.solver.order = ContactOrder::shuffled;
   Simulator first = falling(1, options);
   options.solver.seed = 2;
@@ -228,8 +260,8 @@ TEST(Determinism, TheSeedOfTheOrderMatters) {
   EXPECT_FALSE(same_bytes(first.states(), second.states()));
 }
 
-TEST(Determinism, ARestoredSimulatorGoesOnWithTheSameBytes) {
-  SimulatorOptions options;
+TEST_P(EverySolver, ARestoredSimulatorGoesOnWithTheSameBytes) {
+  SimulatorOptions options = options_of(GetParam());
   options.sleep.enabled = true;
   Simulator whole = falling(1, options), second = falling(1, options);
   for (int i = 0; i < 90; ++i) whole.step();
@@ -238,8 +270,8 @@ TEST(Determinism, ARestoredSimulatorGoesOnWithTheSameBytes) {
   EXPECT_TRUE(same_bytes(whole.states(), second.states()));
 }
 
-TEST(Sleep, ATowerFallsAsleepAndATouchWakesIt) {
-  SimulatorOptions options;
+TEST_P(EverySolver, ATowerFallsAsleepAndATouchWakesIt) {
+  SimulatorOptions options = options_of(GetParam());
   options.sleep.enabled = true;
   auto states = tower(3, 1, options.solver.slop);
   states[3].position.z() += 20;

@@ -34,6 +34,16 @@ struct SimulateArguments {
   RunOptions run;
 };
 
+const std::map<std::string, SolverKind> kSolvers = {{"auto", SolverKind::automatic},
+                                                    {"soft", SolverKind::soft},
+                                                    {"newton", SolverKind::newton},
+                                                    {"sweeps", SolverKind::sweeps}};
+
+std::string solver_name(SolverKind kind) {
+  const auto is_it = [&](const auto& entry) { return entry.second == kind; };
+  return std::find_if(kSolvers.begin(), kSolvers.end(), is_it)->first;
+}
+
 // Meshes and bodies, before anything moves.
 struct Start {
   Scene scene;  // its assets; instances of scene files alone
@@ -116,7 +126,8 @@ Json options_of(const char* kind, const SimulateArguments& arguments, const Star
           {"mode", arguments.fast ? "fast" : "exact"},
           {"points_per_patch", arguments.contacts.points_per_patch},
           {"dt", simulator.dt},
-          {"substeps", simulator.substeps},
+          {"solver", solver_name(solver.kind)},
+          {"substeps", solver.substeps},
           {"gravity", arguments.gravity},
           {"iterations", solver.iterations},
           {"position_iterations", solver.position_iterations},
@@ -219,6 +230,7 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
   options.solver.slop = slop_of(arguments, start);
   options.solver.warm_start = !arguments.cold;
   options.solver.seed = arguments.seed;
+  if (options.solver.substeps == 0) options.solver.substeps = default_substeps(options.solver.kind);
   const RunDescription description = describe(kind, arguments, start);
   if (is_done(arguments, description)) {
     std::printf("%s: is done\n", arguments.run.output.c_str());
@@ -258,12 +270,15 @@ CLI::Validator engine_name() {
 void add_solver_options(CLI::App& command, SimulateArguments& arguments) {
   SimulatorOptions& simulator = arguments.simulator;
   SolverOptions& solver = simulator.solver;
+  add_choice(command, "--solver", kSolvers, solver.kind,
+             "how a step is solved: 'soft' or 'newton', 'auto' of these two, or 'sweeps'")
+      ->option_text("auto|soft|newton|sweeps [auto]");
   command.add_option("--dt", simulator.dt, "seconds of a step")
       ->check(between(1e-9, 1e3))
       ->option_text("SECONDS [1/60]");
-  command.add_option("--substeps", simulator.substeps, "parts of a step that share its contacts")
+  command.add_option("--substeps", solver.substeps, "parts of a step that share its contacts")
       ->check(CLI::Range(1, 10'000))
-      ->option_text("N [1]");
+      ->option_text("N [16, with sweeps 1]");
   command.add_option("--iterations", solver.iterations, "sweeps for velocities in each part of a step")
       ->check(CLI::Range(0, 1'000'000))
       ->option_text("N [30]");

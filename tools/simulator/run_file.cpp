@@ -40,6 +40,7 @@ const Column kColumns[] = {
     {"candidate_points", &StepRecord::candidate_points},
     {"contacts", &StepRecord::contacts},
     {"islands", &StepRecord::islands},
+    {"newton_islands", &StepRecord::newton_islands},
     {"sleeping", &StepRecord::sleeping},
     {"reentered", &StepRecord::reentered},
     {"contact_ratio", &StepRecord::contact_ratio},

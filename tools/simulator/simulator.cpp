@@ -41,7 +41,8 @@ Simulator::Simulator(std::vector<BodyProperties> bodies, std::vector<BodyState> 
       states_(std::move(states)),
       finder_(std::move(contacts)),
       options_(options),
-      arena_(static_cast<int>(options.threads)) {
+      arena_(static_cast<int>(options.threads)),
+      solver_(make_step_solver(options.solver)) {
   sleep_.start(bodies_.size());
 }
 
@@ -80,33 +81,17 @@ void Simulator::solve(StepRecord& record) {
   islands_ = find_islands(acting_, kept_.contacts);
   std::vector<ContactImpulse> impulses(kept_.contacts.size());
   if (options_.solver.warm_start) impulses = cache_.match(kept_.contacts, bodies_, states_);
-  constexpr std::uint32_t kCold = 10;
-  SolverOptions solver = options_.solver;
-  if (solver.warm_start && cache_.entries().empty()) solver.iterations *= kCold;  // or stacks sink at once
-  const double dt = options_.dt / options_.substeps;
   FollowedContacts followed(kept_.contacts, states_);
-  for (std::uint32_t i = 0; i < options_.substeps; ++i) {
-    if (i > 0) followed.follow(states_);
-    for (std::size_t body = 0; body < states_.size(); ++body) {
-      if (acting_[body].motion == Motion::dynamic) states_[body].velocity += dt * options_.gravity;
-    }
-    solver_.solve(acting_, states_, followed.contacts(), islands_, impulses, solver,
-                  {dt, dt * options_.gravity.norm(), step_ * options_.substeps + i});
-    move(dt);
-  }
+  solver_->step(
+      {acting_, kept_.contacts, islands_, options_.dt, options_.gravity, step_, cache_.entries().empty()},
+      states_, impulses);
   followed.follow(states_);
   kept_.contacts = followed.contacts();
   cache_.remember(kept_, impulses, states_, idle());
-  record.residual_max = solver_.statistics().residual;
-  record.residual_rms = solver_.statistics().residual_rms;
-  record.islands = solver_.statistics().islands;
-}
-
-void Simulator::move(double dt) {
-  const auto corrections = solver_.corrections();
-  for (std::size_t i = 0; i < states_.size(); ++i) {
-    advance(acting_[i], states_[i], corrections[i].velocity, corrections[i].angular_velocity, dt);
-  }
+  record.residual_max = solver_->statistics().residual;
+  record.residual_rms = solver_->statistics().residual_rms;
+  record.islands = solver_->statistics().islands;
+  record.newton_islands = solver_->statistics().newton_islands;
 }
 
 void Simulator::sleep() {

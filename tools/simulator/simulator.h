@@ -7,15 +7,14 @@
 #include <vector>
 
 #include "contact_finder.h"
-#include "contact_solver.h"
 #include "sleep.h"
 #include "step_record.h"
+#include "step_solver.h"
 
 namespace tandem::simulation {
 
 struct SimulatorOptions {
   double dt = 1.0 / 60;
-  std::uint32_t substeps = 1;  ///< parts of a step that share its contacts, whose points move with the bodies
   Eigen::Vector3d gravity = {0, 0, -9.81};
   SolverOptions solver;
   SleepOptions sleep;
@@ -59,7 +58,6 @@ class Simulator {
   StepRecord step_in_arena();
   void find_contacts(StepRecord& record);
   void solve(StepRecord& record);
-  void move(double dt);
   void sleep();
   std::vector<std::uint8_t> idle() const;
   void take_measures(StepRecord& record) const;
@@ -71,7 +69,7 @@ class Simulator {
   tbb::task_arena arena_;
   KeptContacts kept_;  // of the step under way
   Islands islands_;
-  ContactSolver solver_;
+  std::unique_ptr<StepSolver> solver_;
   ImpulseCache cache_;
   Sleep sleep_;
   std::uint64_t step_ = 0;

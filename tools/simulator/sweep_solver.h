@@ -3,46 +3,15 @@
 #include <span>
 #include <vector>
 
-#include "contact_point.h"
-#include "impulse_cache.h"
-#include "islands.h"
-#include "rigid_body.h"
+#include "step_solver.h"
 
 namespace tandem::simulation {
-
-/// In which order contacts are solved.
-enum class ContactOrder : std::uint8_t {
-  found,     ///< by ascending pair of bodies, sweeps forwards and backwards in turn
-  shuffled,  ///< anew in each step, from the seed
-};
-
-struct SolverOptions {
-  std::uint32_t iterations = 30;           ///< sweeps over the contacts for velocities, at most
-  std::uint32_t position_iterations = 30;  ///< the same for the correction of penetration
-  double friction = 0.5;
-  double restitution = 0;
-  double slop = 5e-4;       ///< penetration that is left alone, a length
-  double correction = 0.2;  ///< part of the rest that one step takes away, 0 to 1
-  ContactOrder order = ContactOrder::found;
-  std::uint64_t seed = 1;
-  bool warm_start = true;
-  bool shock_propagation = false;
-};
 
 /// The step that is solved for.
 struct SolverStep {
   double dt;
   double gravity_speed;  ///< that gravity gives in the step
   std::uint64_t number;  ///< of the step: another order for each
-};
-
-/// What a solution leaves undone: the natural map of the complementarity problem, row by row the velocity by
-/// which another visit would change a contact. Metres per second.
-struct SolverStatistics {
-  double residual = 0;      ///< the largest
-  double residual_rms = 0;  ///< root of the mean square over all rows
-  std::uint64_t islands = 0;
-  std::uint64_t contacts = 0;  ///< of which at least one body is dynamic
 };
 
 /// Velocities that correct penetration and are forgotten after they have moved the bodies.
@@ -96,6 +65,18 @@ class ContactSolver {
   ContactSolver(const ContactSolver&) = delete;
   ContactSolver& operator=(const ContactSolver&) = delete;
   ~ContactSolver();
+};
+
+/// Steps by sweeps: as many solutions as substeps. With warm start, a step that has no impulse of the step
+/// before makes ten times the sweeps.
+class SweepSolver final : public StepSolver {
+ public:
+  explicit SweepSolver(const SolverOptions& options);
+  void step(const StepInput& input, std::span<BodyState> states, std::span<ContactImpulse> impulses) override;
+
+ private:
+  SolverOptions options_;
+  ContactSolver solver_;
 };
 
 }  // namespace tandem::simulation

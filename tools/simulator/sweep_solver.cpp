@@ -1,4 +1,4 @@
-#include "contact_solver.h"
+#include "sweep_solver.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "common/random_pose.h"
+#include "followed_contacts.h"
 
 namespace tandem::simulation {
 
@@ -190,9 +191,9 @@ struct Residuals {
 };
 
 // The contacts of one island.
-class IslandSolver {
+class IslandSweeps {
  public:
-  IslandSolver(std::span<const std::uint32_t> contacts, std::vector<Joint>& joints,
+  IslandSweeps(std::span<const std::uint32_t> contacts, std::vector<Joint>& joints,
                std::vector<Mover>& movers, std::vector<Correction>& corrections, const SolverOptions& options)
       : order_(contacts.begin(), contacts.end()),
         joints_(joints),
@@ -316,7 +317,7 @@ void ContactSolver::solve(std::span<const BodyProperties> bodies, std::span<Body
     if (options.warm_start) {
       for (const std::uint32_t j : members) warm_start(joints_[j], impulses[j], options.friction, movers_);
     }
-    IslandSolver solver(members, joints_, movers_, corrections_, options);
+    IslandSweeps solver(members, joints_, movers_, corrections_, options);
     if (options.order == ContactOrder::shuffled) {
       solver.shuffle_order(options.seed ^ (step.number * 0x9E3779B97F4A7C15u + members.front()));
     }
@@ -347,6 +348,31 @@ void ContactSolver::solve(std::span<const BodyProperties> bodies, std::span<Body
     impulses[i].tangential = joint.tangent[0].impulse * joint.tangent[0].direction +
                              joint.tangent[1].impulse * joint.tangent[1].direction;
   });
+}
+
+SweepSolver::SweepSolver(const SolverOptions& options) : options_(options) {}
+
+void SweepSolver::step(const StepInput& input, std::span<BodyState> states,
+                       std::span<ContactImpulse> impulses) {
+  constexpr std::uint32_t kCold = 10;
+  SolverOptions options = options_;
+  if (options.warm_start && input.is_cold) options.iterations *= kCold;  // or stacks sink at once
+  const double dt = input.dt / options.substeps;
+  FollowedContacts followed(input.contacts, states);
+  for (std::uint32_t i = 0; i < options.substeps; ++i) {
+    if (i > 0) followed.follow(states);
+    for (std::size_t body = 0; body < states.size(); ++body) {
+      if (input.bodies[body].motion == Motion::dynamic) states[body].velocity += dt * input.gravity;
+    }
+    solver_.solve(input.bodies, states, followed.contacts(), input.islands, impulses, options,
+                  {dt, dt * input.gravity.norm(), input.number * options.substeps + i});
+    const auto corrections = solver_.corrections();
+    for (std::size_t body = 0; body < states.size(); ++body) {
+      advance(input.bodies[body], states[body], corrections[body].velocity,
+              corrections[body].angular_velocity, dt);
+    }
+  }
+  statistics_ = solver_.statistics();
 }
 
 }  // namespace tandem::simulation

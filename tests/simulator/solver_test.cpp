@@ -1,0 +1,220 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "analytic_contacts.h"
+#include "simulator/newton_step.h"
+#include "simulator/soft_step.h"
+
+namespace tandem::simulation {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kGravity = 9.81;
+const Vector3d kCube = {1, 1, 1};
+
+// Boxes of these masses on each other on the plane, each as deep in the next as the slop, and askew by
+// `jitter`.
+struct Tower {
+  explicit Tower(const std::vector<double>& masses, double slop, double jitter = 0)
+      : bodies{fixed_body()}, states(1) {
+    for (std::size_t i = 1; i <= masses.size(); ++i) {
+      const double number = static_cast<double>(i);
+      bodies.push_back(box_body(kCube, masses[i - 1]));
+      states.emplace_back();
+      states.back().position = {jitter * std::sin(7 * number), jitter * std::cos(5 * number),
+                                number - 0.5 - slop * number};
+    }
+  }
+
+  std::vector<BodyProperties> bodies;
+  std::vector<BodyState> states;
+};
+
+std::vector<double> masses(std::size_t count, double highest = 1) {
+  std::vector<double> all(count, 1);
+  all.back() = highest;
+  return all;
+}
+
+struct Outcome {
+  double drift = 0;  // of the box that went farthest at any time, lengths
+  StepRecord last;
+};
+
+Outcome stand(const Tower& tower, SolverKind solver, int steps) {
+  SimulatorOptions options;
+  options.solver.kind = solver;
+  Simulator simulator(tower.bodies, tower.states, boxes_on_plane(Vector3d::UnitZ(), kCube), options);
+  Outcome outcome;
+  for (int i = 0; i < steps; ++i) {
+    outcome.last = simulator.step();
+    for (std::size_t j = 1; j < tower.states.size(); ++j) {
+      outcome.drift =
+          std::max(outcome.drift, (simulator.states()[j].position - tower.states[j].position).norm());
+    }
+  }
+  return outcome;
+}
+
+const double kSlop = SolverOptions().slop;
+
+TEST(Standing, AJitteredTowerOfThirtyStandsByNewton) {
+  for (const SolverKind solver : {SolverKind::automatic, SolverKind::newton}) {
+    const Outcome outcome = stand(Tower(masses(30), kSlop, 5e-4), solver, 600);
+    EXPECT_LT(outcome.drift, 1e-4);
+    EXPECT_LT(outcome.last.speed_max, 1e-6);
+    EXPECT_EQ(outcome.last.newton_islands, 1u);
+  }
+}
+
+TEST(Standing, HeavyBoxesRestOnLightOnesByNewton) {
+  for (const double ratio : {100.0, 1000.0, 10000.0}) {
+    EXPECT_LT(stand(Tower(masses(2, ratio), kSlop), SolverKind::automatic, 300).drift, 1e-4) << ratio;
+  }
+  EXPECT_LT(stand(Tower(masses(10, 1000), kSlop), SolverKind::automatic, 300).drift, 1e-3);
+}
+
+TEST(Standing, SoftStepsHoldAHundredToOneAndATowerOfTen) {
+  EXPECT_LT(stand(Tower(masses(2, 100), kSlop), SolverKind::soft, 300).drift, 0.005);
+  EXPECT_LT(stand(Tower(masses(10), kSlop, 5e-4), SolverKind::soft, 300).drift, 0.005);
+}
+
+TEST(Sliding, APushedBlockStopsWhereTheClosedFormSays) {
+  const Vector3d flat = {1, 1, 0.2};
+  for (const SolverKind solver : {SolverKind::automatic, SolverKind::soft, SolverKind::newton}) {
+    for (const Vector3d& velocity : {Vector3d(4, 0, 0), Vector3d(2.4, 3.2, 0)}) {
+      SimulatorOptions options;
+      options.solver.kind = solver;
+      options.solver.friction = 0.4;
+      BodyState start;
+      start.position.z() = 0.1 - options.solver.slop;
+      start.velocity = velocity;
+      Simulator simulator({fixed_body(), box_body(flat, 1)}, {BodyState(), start},
+                          boxes_on_plane(Vector3d::UnitZ(), flat), options);
+      for (int i = 0; i < 180; ++i) simulator.step();
+      const Vector3d way = simulator.states()[1].position - start.position;
+      EXPECT_NEAR(way.norm() / (16 / (2 * 0.4 * kGravity)), 1, 0.005);
+      EXPECT_NEAR(way.normalized().dot(velocity.normalized()), 1, 1e-6);
+    }
+  }
+}
+
+// One step of bodies and contacts, set up for the solvers of an island.
+struct OneStep {
+  explicit OneStep(const Tower& tower) : bodies(tower.bodies), states(tower.states) {}
+
+  void touch(std::uint32_t a, std::uint32_t b, const Vector3d& position,
+             const Vector3d& normal = Vector3d::UnitZ()) {
+    contacts.push_back({a, b, position, normal, kSlop, 0});
+  }
+  void touch_by_four(std::uint32_t a, std::uint32_t b, double height) {
+    for (const double x : {-0.5, 0.5}) {
+      for (const double y : {-0.5, 0.5}) touch(a, b, {x, y, height});
+    }
+  }
+  IslandProblem problem() {
+    islands = find_islands(bodies, contacts);
+    const std::vector<ContactImpulse> none(contacts.size());
+    std::vector<std::uint32_t> place(bodies.size());
+    return make_island_problem(input(), 0, states, none, options, find_layers(bodies, contacts), place);
+  }
+  StepInput input() const { return {bodies, contacts, islands, kDt, {0, 0, -kGravity}, 0, true}; }
+
+  static constexpr double kDt = 1.0 / 60;
+  std::vector<BodyProperties> bodies;
+  std::vector<BodyState> states;
+  std::vector<ContactPoint> contacts;
+  Islands islands;
+  SolverOptions options;
+};
+
+TEST(Newton, ATowersContactsCarryWhatStandsOnThem) {
+  OneStep step(Tower({1, 10, 1000}, kSlop));
+  for (std::uint32_t i = 0; i < 3; ++i) step.touch_by_four(i, i + 1, i);
+  IslandProblem problem = step.problem();
+  const NewtonReport report = solve_newton_step(problem, step.input(), step.options);
+  ASSERT_TRUE(report.converged);
+  EXPECT_LT(report.residual.largest, 1e-5);
+  const double carried[] = {1011, 1010, 1000};
+  for (std::size_t i = 0; i < 3; ++i) {
+    double sum = 0;
+    for (std::size_t k = 0; k < 4; ++k) sum += problem.impulse[4 * i + k].x();
+    EXPECT_NEAR(sum / (carried[i] * kGravity * OneStep::kDt), 1, 1e-4);
+  }
+}
+
+TEST(Newton, FrictionOfASlidingBlockHasCoulombsSizeAndOpposesTheSlip) {
+  OneStep step(Tower({2}, kSlop));
+  step.options.friction = 0.3;
+  step.states[1].velocity = {3, 4, 0};
+  step.touch_by_four(0, 1, 0);
+  IslandProblem problem = step.problem();
+  ASSERT_TRUE(solve_newton_step(problem, step.input(), step.options).converged);
+  Vector3d sum = Vector3d::Zero();
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Vector3d& impulse = problem.impulse[i];
+    sum += impulse.y() * problem.first_direction[i] + impulse.z() * problem.second_direction[i];
+    EXPECT_NEAR(impulse.tail<2>().norm(), 0.3 * impulse.x(), 1e-4);
+  }
+  const double weight = 2 * kGravity * OneStep::kDt;
+  EXPECT_NEAR(sum.norm() / (0.3 * weight), 1, 1e-3);
+  EXPECT_NEAR(sum.normalized().dot(Vector3d(-0.6, -0.8, 0)), 1, 1e-4);
+}
+
+// A box that one plate presses against another: no velocities satisfy that.
+OneStep pressed_box() {
+  OneStep step(Tower({1}, kSlop));
+  step.bodies.push_back(fixed_body());
+  step.bodies.back().motion = Motion::kinematic;
+  step.states.emplace_back();
+  step.states.back().velocity.z() = -1;
+  step.touch_by_four(0, 1, 0);
+  step.touch_by_four(1, 2, 1);
+  return step;
+}
+
+TEST(Newton, WhatDoesNotConvergeLeavesTheProblemAsItWas) {
+  OneStep step = pressed_box();
+  IslandProblem problem = step.problem();
+  const IslandProblem before = problem;
+  EXPECT_FALSE(solve_newton_step(problem, step.input(), step.options).converged);
+  EXPECT_EQ(problem.velocity, before.velocity);
+  EXPECT_EQ(problem.displacement, before.displacement);
+  EXPECT_EQ(problem.impulse, before.impulse);
+}
+
+TEST(Newton, WhatDoesNotConvergeIsSolvedBySoftSteps) {
+  std::vector<BodyState> results[2];
+  for (const SolverKind kind : {SolverKind::soft, SolverKind::newton}) {
+    OneStep step = pressed_box();
+    step.options.kind = kind;
+    step.problem();
+    std::vector<ContactImpulse> impulses(step.contacts.size());
+    const auto solver = make_step_solver(step.options);
+    solver->step(step.input(), step.states, impulses);
+    EXPECT_EQ(solver->statistics().newton_islands, 0u);
+    results[kind == SolverKind::newton] = step.states;
+  }
+  EXPECT_EQ(results[0][1].position, results[1][1].position);
+  EXPECT_EQ(results[0][1].velocity, results[1][1].velocity);
+  EXPECT_TRUE(results[0][1].velocity.allFinite());
+}
+
+TEST(Soft, TheOrderOfBodiesDoesNotFellATower) {
+  // The boxes from the top down: sweeps go up from the ground all the same.
+  constexpr std::uint32_t kBoxes = 10;
+  OneStep step(Tower(masses(kBoxes), kSlop));
+  std::reverse(step.states.begin() + 1, step.states.end());
+  for (std::uint32_t i = 1; i < kBoxes; ++i) step.touch_by_four(i, i + 1, kBoxes - i);
+  step.touch_by_four(0, kBoxes, 0);
+  const IslandProblem problem = step.problem();
+  std::vector<double> heights;
+  for (const std::uint32_t contact : problem.contacts) heights.push_back(step.contacts[contact].position.z());
+  EXPECT_TRUE(std::is_sorted(heights.begin(), heights.end()));
+}
+
+}  // namespace
+}  // namespace tandem::simulation

@@ -1,0 +1,195 @@
+#include "island_problem.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace tandem::simulation {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+MassScale mass_scale(const BodyProperties& body, const BodyState& state) {
+  const Matrix3d factor = body.inverse_inertia.llt().matrixL();
+  return {std::sqrt(body.mass), state.orientation.toRotationMatrix() * factor};
+}
+
+Vector6 scaled(const MassScale& scale, const Vector3d& velocity, const Vector3d& spin) {
+  Vector6 y;
+  y << scale.root_mass * velocity, scale.spread.inverse() * spin;
+  return y;
+}
+
+Vector6 gradient(const MassScale& scale, const Vector3d& direction, const Vector3d& arm) {
+  Vector6 row;
+  row << direction / scale.root_mass, scale.spread.transpose() * arm.cross(direction);
+  return row;
+}
+
+// Any unit vector across the normal, the same for the same normal.
+Vector3d across(const Vector3d& normal) {
+  int smallest = 0;
+  normal.cwiseAbs().minCoeff(&smallest);
+  return normal.cross(Vector3d::Unit(smallest)).normalized();
+}
+
+class ProblemMaker {
+ public:
+  ProblemMaker(const StepInput& input, std::span<const BodyState> states, const SolverOptions& options,
+               std::span<const std::uint32_t> layers, std::span<std::uint32_t> place)
+      : input_(input), states_(states), options_(options), layers_(layers), place_(place) {}
+
+  IslandProblem make(std::size_t island, std::span<const ContactImpulse> impulses) {
+    add_unmoved();
+    for (const std::uint32_t body : input_.islands.bodies_of(island)) add_body(body);
+    const auto contacts = from_the_ground_up(input_.islands.contacts_of(island));
+    reserve(contacts.size());
+    for (const std::uint32_t contact : contacts) add_contact(contact, impulses[contact]);
+    return std::move(problem_);
+  }
+
+ private:
+  void add_unmoved() {
+    problem_.bodies.push_back(0);
+    problem_.scale.push_back({1, Matrix3d::Identity()});
+    for (auto* list : {&problem_.velocity, &problem_.gravity}) list->push_back(Vector6::Zero());
+  }
+
+  void add_body(std::uint32_t body) {
+    const BodyState& state = states_[body];
+    place_[body] = static_cast<std::uint32_t>(problem_.bodies.size());
+    problem_.bodies.push_back(body);
+    const MassScale scale = mass_scale(input_.bodies[body], state);
+    problem_.scale.push_back(scale);
+    problem_.velocity.push_back(scaled(scale, state.velocity, state.angular_velocity));
+    problem_.gravity.push_back(scaled(scale, input_.gravity, Vector3d::Zero()));
+  }
+
+  std::vector<std::uint32_t> from_the_ground_up(std::span<const std::uint32_t> contacts) const {
+    const auto layer = [&](std::uint32_t i) {
+      return std::min(layers_[input_.contacts[i].body_a], layers_[input_.contacts[i].body_b]);
+    };
+    std::vector<std::uint32_t> order(contacts.begin(), contacts.end());
+    std::stable_sort(order.begin(), order.end(), [&](auto i, auto j) { return layer(i) < layer(j); });
+    return order;
+  }
+
+  void reserve(std::size_t count) {
+    for (auto* list : {&problem_.contacts, &problem_.a, &problem_.b}) list->reserve(count);
+    for (auto* list : {&problem_.normal, &problem_.first, &problem_.second}) list->reserve(count);
+    for (auto* list :
+         {&problem_.first_direction, &problem_.second_direction, &problem_.drive, &problem_.impulse})
+      list->reserve(count);
+    for (auto* list : {&problem_.separation, &problem_.rebound}) list->reserve(count);
+    problem_.displacement.assign(problem_.bodies.size(), Vector6::Zero());
+  }
+
+  bool is_moved(std::uint32_t body) const { return input_.bodies[body].motion == Motion::dynamic; }
+
+  // The velocity of a body's point if contacts do not move the body, else 0.
+  Vector3d driven(std::uint32_t body, const Vector3d& arm) const {
+    if (input_.bodies[body].motion != Motion::kinematic) return Vector3d::Zero();
+    return states_[body].velocity + states_[body].angular_velocity.cross(arm);
+  }
+
+  ContactRow make_row(const ContactPoint& contact, const Vector3d& direction) const {
+    const std::uint32_t a = problem_.a.back(), b = problem_.b.back();
+    ContactRow row = {Vector6::Zero(), Vector6::Zero()};
+    if (a > 0)
+      row.a = -gradient(problem_.scale[a], direction, contact.position - states_[contact.body_a].position);
+    if (b > 0)
+      row.b = gradient(problem_.scale[b], direction, contact.position - states_[contact.body_b].position);
+    return row;
+  }
+
+  // A gap may close; what is in contact comes no deeper, or bodies would rock within the slop.
+  double separation_of(double depth) const {
+    return depth < 0 ? -depth : std::min(0.0, options_.slop - depth);
+  }
+
+  void add_contact(std::uint32_t index, const ContactImpulse& impulse) {
+    constexpr double kBouncesAbove = 2;  // times what gravity gives in a step
+    const ContactPoint& contact = input_.contacts[index];
+    const Vector3d& normal = contact.normal;
+    const Vector3d first = across(normal), second = normal.cross(first);
+    problem_.contacts.push_back(index);
+    problem_.a.push_back(is_moved(contact.body_a) ? place_[contact.body_a] : 0);
+    problem_.b.push_back(is_moved(contact.body_b) ? place_[contact.body_b] : 0);
+    problem_.first_direction.push_back(first);
+    problem_.second_direction.push_back(second);
+    problem_.normal.push_back(make_row(contact, normal));
+    problem_.first.push_back(make_row(contact, first));
+    problem_.second.push_back(make_row(contact, second));
+    const Vector3d moving = driven(contact.body_b, contact.position - states_[contact.body_b].position) -
+                            driven(contact.body_a, contact.position - states_[contact.body_a].position);
+    problem_.drive.push_back({normal.dot(moving), first.dot(moving), second.dot(moving)});
+    problem_.separation.push_back(separation_of(contact.depth));
+    const std::size_t i = problem_.contacts.size() - 1;
+    const double approach = -problem_.along(problem_.normal[i], i, problem_.velocity) - problem_.drive[i].x();
+    const bool bounces = contact.depth >= 0 && approach > kBouncesAbove * input_.dt * input_.gravity.norm();
+    problem_.rebound.push_back(bounces ? options_.restitution * approach : 0);
+    problem_.impulse.push_back(
+        {impulse.normal, first.dot(impulse.tangential), second.dot(impulse.tangential)});
+  }
+
+  const StepInput& input_;
+  std::span<const BodyState> states_;
+  const SolverOptions& options_;
+  std::span<const std::uint32_t> layers_;
+  std::span<std::uint32_t> place_;
+  IslandProblem problem_;
+};
+
+}  // namespace
+
+IslandProblem make_island_problem(const StepInput& input, std::size_t island,
+                                  std::span<const BodyState> states, std::span<const ContactImpulse> impulses,
+                                  const SolverOptions& options, std::span<const std::uint32_t> layers,
+                                  std::span<std::uint32_t> place) {
+  return ProblemMaker(input, states, options, layers, place).make(island, impulses);
+}
+
+IslandResidual residual_of(const IslandProblem& problem, std::span<const double> target, double friction,
+                           double share) {
+  IslandResidual all;
+  for (std::size_t i = 0; i < problem.contact_count(); ++i) {
+    const ContactRow* rows[] = {&problem.normal[i], &problem.first[i], &problem.second[i]};
+    const Vector3d impulse = share * problem.impulse[i];
+    const double bound = friction * impulse.x();
+    for (int k = 0; k < 3; ++k) {
+      const double mobility = rows[k]->mobility();
+      const double w = problem.along(*rows[k], i, problem.velocity) + problem.drive[i][k];
+      const double wanted = impulse[k] - (w - (k == 0 ? target[i] : 0)) / mobility;
+      // A row of friction has what the other leaves of the cone.
+      const double rest =
+          k == 0 ? 0 : std::sqrt(std::max(0.0, bound * bound - impulse[3 - k] * impulse[3 - k]));
+      const double next = k == 0 ? std::max(0.0, wanted) : std::clamp(wanted, -rest, rest);
+      const double residual = std::fabs(next - impulse[k]) * mobility;
+      all.largest = std::max(all.largest, residual);
+      all.squares += residual * residual;
+    }
+  }
+  return all;
+}
+
+void apply_solution(const IslandProblem& problem, const StepInput& input, std::span<BodyState> states,
+                    std::span<ContactImpulse> impulses) {
+  for (std::size_t i = 1; i < problem.bodies.size(); ++i) {
+    const MassScale& scale = problem.scale[i];
+    BodyState& state = states[problem.bodies[i]];
+    state.velocity = problem.velocity[i].head<3>() / scale.root_mass;
+    state.angular_velocity = scale.spread * problem.velocity[i].tail<3>();
+    const Vector3d moved = problem.displacement[i].head<3>() / (scale.root_mass * input.dt);
+    const Vector3d turned = scale.spread * problem.displacement[i].tail<3>() / input.dt;
+    advance(input.bodies[problem.bodies[i]], state, moved - state.velocity, turned - state.angular_velocity,
+            input.dt);
+  }
+  for (std::size_t i = 0; i < problem.contact_count(); ++i) {
+    const Vector3d& impulse = problem.impulse[i];
+    impulses[problem.contacts[i]] = {
+        impulse.x(), impulse.y() * problem.first_direction[i] + impulse.z() * problem.second_direction[i]};
+  }
+}
+
+}  // namespace tandem::simulation

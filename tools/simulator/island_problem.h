@@ -1,0 +1,85 @@
+#pragma once
+#include <Eigen/Core>
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "step_solver.h"
+
+namespace tandem::simulation {
+
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+
+/// One direction of a contact as two gradients: w = a . y_a + b . y_b + drive. An impulse of 1 adds a to y_a
+/// and b to y_b.
+struct ContactRow {
+  Vector6 a, b;
+
+  /// By how much an impulse of 1 changes w.
+  double mobility() const { return a.squaredNorm() + b.squaredNorm(); }
+};
+
+/// Turns velocities of a body into those in which its mass is 1: y = (sqrt(m) v, F^-1 spin), where F F^T is
+/// the inverse of the inertia. Kinetic energy is |y|^2 / 2.
+struct MassScale {
+  double root_mass;
+  Eigen::Matrix3d spread;  ///< F
+};
+
+/// The bodies and contacts of one island in arrays, for one step: inertia, arms and directions stay those of
+/// its start. Bodies are known by their place here; 0 stands for all that contacts do not move, whose y is 0.
+struct IslandProblem {
+  std::vector<std::uint32_t> bodies;  ///< [0] is none
+  std::vector<MassScale> scale;
+  std::vector<Vector6> velocity;      ///< y: at the start of the step, then at its end
+  std::vector<Vector6> displacement;  ///< the integral of y over the step, a result
+  std::vector<Vector6> gravity;       ///< what it adds to y in a second
+
+  std::vector<std::uint32_t> contacts, a, b;
+  std::vector<ContactRow> normal, first, second;  ///< the latter two across the normal
+  std::vector<Eigen::Vector3d> first_direction, second_direction;
+  std::vector<Eigen::Vector3d> drive;    ///< of normal, first, second: by bodies that move and are not moved
+  std::vector<double> separation;        ///< of a gap; else the slop less the depth, at most 0
+  std::vector<double> rebound;           ///< velocity along the normal that restitution asks for, or 0
+  std::vector<Eigen::Vector3d> impulse;  ///< along normal, first, second, as a whole step would need it
+
+  std::size_t contact_count() const { return contacts.size(); }
+  double along(const ContactRow& row, std::size_t contact, const std::vector<Vector6>& y) const {
+    return row.a.dot(y[a[contact]]) + row.b.dot(y[b[contact]]);
+  }
+  /// One for both directions, or friction would not oppose the slip.
+  double friction_mobility(std::size_t contact) const {
+    return std::max(first[contact].mobility(), second[contact].mobility());
+  }
+  /// What a contact's impulse adds to the y of its bodies.
+  Vector6 change_of_a(std::size_t contact, const Eigen::Vector3d& by) const {
+    return by.x() * normal[contact].a + by.y() * first[contact].a + by.z() * second[contact].a;
+  }
+  Vector6 change_of_b(std::size_t contact, const Eigen::Vector3d& by) const {
+    return by.x() * normal[contact].b + by.y() * first[contact].b + by.z() * second[contact].b;
+  }
+};
+
+/// What is left of a step's problem, as SolverStatistics says.
+struct IslandResidual {
+  double largest = 0, squares = 0;
+};
+
+/// target: of the velocities along the normals. share: part of the problem's impulses that the law is asked
+/// of.
+IslandResidual residual_of(const IslandProblem& problem, std::span<const double> target, double friction,
+                           double share);
+
+/// The contacts come by ascending layer of their lower body (find_layers()), so that a sweep goes up from the
+/// ground. place: for each body of the step a number that this may change.
+IslandProblem make_island_problem(const StepInput& input, std::size_t island,
+                                  std::span<const BodyState> states, std::span<const ContactImpulse> impulses,
+                                  const SolverOptions& options, std::span<const std::uint32_t> layers,
+                                  std::span<std::uint32_t> place);
+
+/// Moves the island's bodies by the displacement, gives them the velocities, and hands out the impulses.
+void apply_solution(const IslandProblem& problem, const StepInput& input, std::span<BodyState> states,
+                    std::span<ContactImpulse> impulses);
+
+}  // namespace tandem::simulation

@@ -1,0 +1,92 @@
+#include "island_solver.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "newton_step.h"
+#include "soft_step.h"
+
+namespace tandem::simulation {
+namespace {
+
+using Eigen::Vector3d;
+
+void fly(const StepInput& input, std::uint32_t body, std::span<BodyState> states) {
+  states[body].velocity += input.dt * input.gravity;
+  advance(input.bodies[body], states[body], Vector3d::Zero(), Vector3d::Zero(), input.dt);
+}
+
+// Whether factorising the island's matrix costs no more than what Newton's method has to do for each contact:
+// with bodies by layer the matrix is a band, and eliminating w bodies that hang together with as many of the
+// next layer takes about (6 w)^3 multiplications.
+bool is_slender(const Islands& islands, std::size_t island, std::span<const std::uint32_t> layers) {
+  constexpr double kForAContact = 3000;
+  std::vector<std::uint32_t> layer;
+  for (const std::uint32_t body : islands.bodies_of(island)) layer.push_back(layers[body]);
+  std::sort(layer.begin(), layer.end());
+  double work = 0;
+  for (auto begin = layer.begin(); begin != layer.end();) {
+    const auto end = std::upper_bound(begin, layer.end(), *begin);
+    work += std::pow(6 * static_cast<double>(end - begin), 3);
+    begin = end;
+  }
+  return work <= kForAContact * static_cast<double>(islands.contacts_of(island).size());
+}
+
+}  // namespace
+
+IslandSolver::IslandSolver(const SolverOptions& options) : options_(options) {}
+
+void IslandSolver::step(const StepInput& input, std::span<BodyState> states,
+                        std::span<ContactImpulse> impulses) {
+  place_.resize(input.bodies.size());
+  const std::vector<std::uint32_t> layers = find_layers(input.bodies, input.contacts);
+  std::vector<IslandReport> reports(input.islands.size());
+  tbb::parallel_for(std::size_t{0}, input.islands.size(), [&](std::size_t i) {
+    if (input.islands.contacts_of(i).empty()) {
+      for (const std::uint32_t body : input.islands.bodies_of(i)) fly(input, body, states);
+      return;
+    }
+    IslandProblem problem = make_island_problem(input, i, states, impulses, options_, layers, place_);
+    reports[i] = solve(problem, input, wants_newton(input.islands, i, layers));
+    apply_solution(problem, input, states, impulses);
+  });
+  for (std::uint32_t i = 0; i < states.size(); ++i) {
+    if (input.bodies[i].motion == Motion::kinematic)
+      advance(input.bodies[i], states[i], Vector3d::Zero(), Vector3d::Zero(), input.dt);
+  }
+  sum_up(input, reports);
+}
+
+IslandSolver::IslandReport IslandSolver::solve(IslandProblem& problem, const StepInput& input,
+                                               bool try_newton) const {
+  if (try_newton) {
+    const NewtonReport newton = solve_newton_step(problem, input, options_);
+    if (newton.converged) return {newton.residual, true};
+  }
+  return {solve_soft_step(problem, input, options_), false};
+}
+
+bool IslandSolver::wants_newton(const Islands& islands, std::size_t island,
+                                std::span<const std::uint32_t> layers) const {
+  if (options_.kind == SolverKind::automatic) return is_slender(islands, island, layers);
+  return options_.kind == SolverKind::newton;
+}
+
+void IslandSolver::sum_up(const StepInput& input, std::span<const IslandReport> reports) {
+  statistics_ = {};
+  for (std::size_t i = 0; i < reports.size(); ++i) {
+    statistics_.islands += input.islands.contacts_of(i).empty() ? 0 : 1;
+    statistics_.newton_islands += reports[i].by_newton ? 1 : 0;
+    statistics_.residual = std::max(statistics_.residual, reports[i].residual.largest);
+    statistics_.residual_rms += reports[i].residual.squares;
+  }
+  statistics_.contacts = input.islands.contacts.size();
+  if (statistics_.contacts == 0) return;
+  statistics_.residual_rms =
+      std::sqrt(statistics_.residual_rms / (3 * static_cast<double>(statistics_.contacts)));
+}
+
+}  // namespace tandem::simulation

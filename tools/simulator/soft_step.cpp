@@ -1,0 +1,149 @@
+#include "soft_step.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tandem::simulation {
+namespace {
+
+using Eigen::Vector3d;
+
+// What a soft row asks for where bodies are too deep in each other.
+struct Softness {
+  double bias_rate, mass_scale, impulse_scale;
+};
+
+Softness softness(double frequency, double damping_ratio, double h) {
+  const double omega = 2 * M_PI * frequency;
+  const double a1 = 2 * damping_ratio + h * omega, a2 = h * omega * a1;
+  return {omega / a1, a2 / (1 + a2), 1 / (1 + a2)};
+}
+
+class SoftStep {
+ public:
+  SoftStep(IslandProblem& problem, const StepInput& input, const SolverOptions& options)
+      : p_(problem),
+        friction_(options.friction),
+        substeps_(options.substeps),
+        h_(input.dt / options.substeps),
+        between_movers_(softness(1 / (8 * h_), 10, h_)),
+        against_unmoved_(softness(2 / (8 * h_), 5, h_)) {}
+
+  void solve() {
+    const std::size_t bodies = p_.bodies.size(), contacts = p_.contact_count();
+    prepare();
+    std::vector<Vector6> start(bodies);
+    for (std::uint32_t k = 0; k < substeps_; ++k) {
+      for (std::size_t j = 1; j < bodies; ++j) {
+        start[j] = p_.velocity[j] + h_ * p_.gravity[j];
+        p_.velocity[j] = start[j] + pushed_[j];
+      }
+      for (std::size_t i = 0; i < contacts; ++i) visit_soft(i);
+      for (std::size_t j = 1; j < bodies; ++j) p_.displacement[j] += h_ * p_.velocity[j];
+      for (std::size_t i = 0; i < contacts; ++i) relax(i, (k + 1) * h_);
+      for (std::size_t i = 0; i < contacts; ++i) visit_friction(i);
+      for (std::size_t j = 1; j < bodies; ++j) pushed_[j] = p_.velocity[j] - start[j];
+    }
+    constexpr int kRestitutionSweeps = 10;
+    for (int k = 0; k < kRestitutionSweeps; ++k) {
+      for (std::size_t i = 0; i < contacts; ++i) restitute(i);
+    }
+    for (Vector3d& impulse : p_.impulse) impulse *= substeps_;
+  }
+
+  // Condition: solve() was called.
+  IslandResidual residual() const {
+    std::vector<double> target(p_.contact_count());
+    for (std::size_t i = 0; i < target.size(); ++i) {
+      target[i] = is_rebound(i) ? p_.rebound[i] : -std::max(0.0, followed_[i]) / h_;
+    }
+    return residual_of(p_, target, friction_, 1.0 / substeps_);
+  }
+
+ private:
+  void prepare() {
+    const std::size_t contacts = p_.contact_count();
+    normal_mass_.resize(contacts), friction_mass_.resize(contacts);
+    followed_ = p_.separation;
+    strongest_.assign(contacts, 0);
+    pushed_.assign(p_.bodies.size(), Vector6::Zero());
+    for (std::size_t i = 0; i < contacts; ++i) {
+      normal_mass_[i] = 1 / p_.normal[i].mobility();
+      friction_mass_[i] = 1 / p_.friction_mobility(i);
+      p_.impulse[i] /= substeps_;
+      pushed_[p_.a[i]] += p_.change_of_a(i, p_.impulse[i]);
+      pushed_[p_.b[i]] += p_.change_of_b(i, p_.impulse[i]);
+    }
+  }
+
+  void add(const ContactRow& row, std::size_t i, double impulse) {
+    // What is not moved has a gradient of zero, so that place 0 stays 0.
+    p_.velocity[p_.a[i]] += impulse * row.a;
+    p_.velocity[p_.b[i]] += impulse * row.b;
+  }
+
+  void visit_normal(std::size_t i, double bias, double mass_scale, double impulse_scale) {
+    const ContactRow& row = p_.normal[i];
+    const double w = p_.along(row, i, p_.velocity) + p_.drive[i].x();
+    double& impulse = p_.impulse[i].x();
+    const double wanted = impulse - normal_mass_[i] * mass_scale * (w + bias) - impulse_scale * impulse;
+    const double next = std::max(0.0, wanted);
+    add(row, i, next - impulse);
+    impulse = next;
+    strongest_[i] = std::max(strongest_[i], next);
+  }
+
+  void visit_soft(std::size_t i) {
+    constexpr double kFastestPush = 3;  // m/s
+    const double s = followed_[i];
+    if (s > 0) return visit_normal(i, s / h_, 1, 0);
+    const Softness& soft = p_.a[i] == 0 || p_.b[i] == 0 ? against_unmoved_ : between_movers_;
+    visit_normal(i, std::max(soft.bias_rate * s, -kFastestPush), soft.mass_scale, soft.impulse_scale);
+  }
+
+  void relax(std::size_t i, double time) {
+    const double s = p_.separation[i] + p_.along(p_.normal[i], i, p_.displacement) + time * p_.drive[i].x();
+    followed_[i] = s;
+    visit_normal(i, std::max(0.0, s / h_), 1, 0);
+  }
+
+  void visit_friction(std::size_t i) {
+    Vector3d& impulse = p_.impulse[i];
+    const double bound = friction_ * impulse.x();
+    const double w1 = p_.along(p_.first[i], i, p_.velocity) + p_.drive[i].y();
+    const double w2 = p_.along(p_.second[i], i, p_.velocity) + p_.drive[i].z();
+    double next1 = impulse.y() - friction_mass_[i] * w1, next2 = impulse.z() - friction_mass_[i] * w2;
+    const double size = std::sqrt(next1 * next1 + next2 * next2);
+    if (size > bound) next1 *= bound / size, next2 *= bound / size;
+    const double change1 = next1 - impulse.y(), change2 = next2 - impulse.z();
+    p_.velocity[p_.a[i]] += change1 * p_.first[i].a + change2 * p_.second[i].a;
+    p_.velocity[p_.b[i]] += change1 * p_.first[i].b + change2 * p_.second[i].b;
+    impulse.y() = next1, impulse.z() = next2;
+  }
+
+  bool is_rebound(std::size_t i) const { return p_.rebound[i] > 0 && strongest_[i] > 0; }
+
+  void restitute(std::size_t i) {
+    if (is_rebound(i)) visit_normal(i, -p_.rebound[i], 1, 0);
+  }
+
+  IslandProblem& p_;
+  double friction_;
+  std::uint32_t substeps_;
+  double h_;
+  Softness between_movers_, against_unmoved_;
+  std::vector<double> normal_mass_, friction_mass_;
+  std::vector<double> followed_;   // separations as they change
+  std::vector<double> strongest_;  // largest impulse along the normal
+  std::vector<Vector6> pushed_;    // what the contacts of a substep have added to the velocities
+};
+
+}  // namespace
+
+IslandResidual solve_soft_step(IslandProblem& problem, const StepInput& input, const SolverOptions& options) {
+  SoftStep step(problem, input, options);
+  step.solve();
+  return step.residual();
+}
+
+}  // namespace tandem::simulation

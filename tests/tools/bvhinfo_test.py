@@ -1,0 +1,143 @@
+#!/usr/bin/python3
+"""bvhinfo from the outside: its page and its JSON, several files, files that are not there or are wrong.
+
+Environment: TANDEM_BVHBUILD, TANDEM_BVHINFO (the binaries), TANDEM_SOURCE_DIR.
+"""
+import json
+import os
+import unittest
+
+import bvh_file
+import numpy as np
+
+from tool_test import CUBE_OBJ, DONE, TRIANGLE_OBJ, UNREADABLE_INPUT, ToolTest
+
+
+class Info(ToolTest):
+    KEYS = {"file", "version", "hash", "bytes", "triangles", "nodes", "leaf_nodes", "internal_nodes", "imaginary_nodes",
+            "imaginary_minimum", "imaginary_fraction", "leaf_blocks", "internal_blocks", "partial_leaf_blocks", "depth",
+            "leaf_fill", "sah_cost", "expected_block_pairs", "expected_candidates", "leaf_blocks_at_depth",
+            "blocks_with_fill", "bounds", "origin", "rounding_error", "source_faces", "source", "parts", "levels",
+            "sections"}
+    VERDICT_KEYS = {"file", "sound", "status", "where", "error", "bytes", "check_seconds"}
+
+    def json_of(self, *arguments):
+        return json.loads(self.info("--json", *arguments).stdout)
+
+    def test_the_page_shows_what_people_look_for(self):
+        page = self.info(self.built("cube.obj", CUBE_OBJ))
+        self.assertEqual((page.returncode, page.stderr), (DONE, b""))
+        for word in ("cube.obj", "triangles    12", "1 imaginary", "minimum 1", "0 partial leaf blocks", "depth", "SAH cost",
+                     "block pairs", "bounds", "origin", "sections", "provenance"):
+            self.assertIn(word, page.stdout.decode())
+
+    def test_the_page_sends_no_control_characters_of_a_file_to_a_terminal(self):
+        page = self.info(self.built("red\x1b[31m\x07.obj", "o part\x1b[2J\n" + CUBE_OBJ)).stdout
+        self.assertIn("red\ufffd[31m\ufffd.obj", page.decode())
+        self.assertNotIn(b"\x1b", page)
+        self.assertNotIn(b"\x07", page)
+
+    def test_the_page_says_how_the_tree_was_built_and_nothing_of_interrupts_where_there_was_none(self):
+        page = self.info(self.built("cube.obj", CUBE_OBJ, "--imaginary", "free", "--effort", "fast")).stdout
+        self.assertIn(b", imaginary nodes free, effort fast\n", page)
+
+    def test_the_page_tells_parts_of_one_face_many_and_none(self):
+        mesh = "o one\n" + TRIANGLE_OBJ + "o two\nf 1 2 3\no many\nf 1 2 3\n"
+        page = self.info(with_second_part_emptied(self.built("a.obj", mesh))).stdout
+        for line in (b"one  face 0\n", b"(no name)  no faces\n", b"many  faces 1 to 2\n"):
+            self.assertIn(line, page)
+
+    def test_json_of_one_file_is_an_object_with_all_keys(self):
+        info = self.json_of(self.built("cube.obj", CUBE_OBJ))
+        self.assertEqual(set(info), self.KEYS)
+        self.assertEqual((info["triangles"], info["imaginary_nodes"], info["partial_leaf_blocks"]), (12, 1, 0))
+        self.assertEqual(info["bounds"], {"lower": [0, 0, 0], "upper": [1, 1, 1]})
+        self.assertEqual(info["source"]["input"]["file"], "cube.obj")
+
+    def test_json_of_two_files_is_an_array(self):
+        out = self.built("cube.obj", CUBE_OBJ)
+        pair = self.json_of(out, out)
+        self.assertEqual([info["triangles"] for info in pair], [12, 12])
+
+    def test_two_files_are_set_side_by_side(self):
+        a = self.built("cube.obj", CUBE_OBJ).rename(self.outputs / "a.bvh")
+        b = self.built("cube.obj", CUBE_OBJ, "--imaginary", "free").rename(self.outputs / "b.bvh")
+        table = self.info(a, b)
+        self.assertEqual(table.returncode, DONE)
+        rows = {line.split()[0]: line.split()[1:] for line in table.stdout.decode().splitlines()}
+        self.assertEqual(rows["a.bvh"], ["b.bvh"])
+        self.assertEqual(rows["triangles"], ["12", "12", "x1.000"])
+        counts = [info["imaginary_nodes"] for info in self.json_of(a, b)]
+        self.assertEqual(rows["imaginary_nodes"][:2], [str(count) for count in counts])
+
+    def test_verify_says_that_a_file_is_sound(self):
+        out = self.built("cube.obj", CUBE_OBJ)
+        result = self.info("--verify", out)
+        self.assertEqual(result.returncode, DONE)
+        self.assertIn(f"{out}: sound", result.stdout.decode())
+        verdict = self.json_of("--verify", out)
+        self.assertEqual(set(verdict), self.VERDICT_KEYS)
+        self.assertEqual((verdict["sound"], verdict["status"], verdict["error"]), (True, "Ok", None))
+
+    def damaged(self):
+        whole = self.built("cube.obj", CUBE_OBJ).read_bytes()
+        flipped = bytearray(whole)
+        flipped[-700] ^= 1
+        return {"Truncated": whole[:-1], "TrailingBytes": whole + b"\0", "ContentChanged": bytes(flipped),
+                "NotTandem": b"solid cube\n", "BiovisionMotionCapture": b"HIERARCHY\nROOT Hips\n",
+                "DamagedByTextTransfer": whole[:4] + whole[4:].replace(b"\r\n", b"\n"),
+                "UnsupportedVersion": whole[:20] + b"\2\0" + whole[22:],
+                "WrongByteOrder": whole[:16] + b"\1\2\3\4" + whole[20:]}
+
+    def test_a_file_that_is_not_sound_is_refused_by_the_name_of_its_defect(self):
+        for status, content in self.damaged().items():
+            for option in ([], ["--verify"]):
+                with self.subTest(status=status, option=option):
+                    path = self.write(f"{status}.bvh", content)
+                    self.assert_fails(self.info(path, *option), UNREADABLE_INPUT, path, status)
+                    result = self.info(path, "--json", *option)
+                    verdict = json.loads(result.stdout)
+                    self.assertEqual(result.returncode, UNREADABLE_INPUT)
+                    self.assertEqual(set(verdict), self.VERDICT_KEYS)
+                    self.assertEqual((verdict["sound"], verdict["status"]), (False, status))
+                    self.assertEqual(result.stderr.decode(), f"bvhinfo: {verdict['error']}\n")
+
+    def test_a_bad_file_beside_a_good_one_is_told(self):
+        out, missing = self.built("cube.obj", CUBE_OBJ), self.inputs / "none.bvh"
+        for files, words in (((out, missing), ["triangles    12"]), ((out, missing, out), ["triangles", "x1.000"])):
+            result = self.info(*files)
+            self.assertEqual(result.returncode, UNREADABLE_INPUT)
+            self.assertEqual(result.stderr.decode(), f"bvhinfo: {missing}: no such file (FileNotFound)\n")
+            for word in words:
+                self.assertIn(word, result.stdout.decode())
+        sound = [verdict["sound"] for verdict in self.json_of("--verify", out, missing)]
+        self.assertEqual(sound, [True, False])
+
+    def test_folders_pipes_and_empty_files_are_refused(self):
+        os.mkfifo(self.inputs / "pipe.bvh")
+        self.assert_fails(self.info(self.inputs / "pipe.bvh"), UNREADABLE_INPUT, "not a regular file")
+        self.assert_fails(self.info(self.inputs), UNREADABLE_INPUT, "not a regular file")
+        self.assert_fails(self.info(self.write("empty.bvh", b"")), UNREADABLE_INPUT, "not a Tandem .bvh file")
+
+
+def with_second_part_emptied(path):
+    """The .bvh file, its second part without name and faces: other tools may write such parts."""
+    raw = bytearray(path.read_bytes())
+    *_, section_count, _, _ = bvh_file.HEADER.unpack_from(raw)
+    tables = {}
+    for i in range(section_count):
+        kind, _, offset, _, count = bvh_file.SECTION.unpack_from(raw, bvh_file.HEADER.size + i * bvh_file.SECTION.size)
+        name, row = bvh_file.KINDS[kind]
+        tables[name] = np.frombuffer(raw, row, count, offset)
+    parts, part_of = tables["parts"], tables["triangles"]["corner"]["w"][:, 1]
+    parts["first_face"][2] -= parts["face_count"][1]
+    parts["face_count"][2] += parts["face_count"][1]
+    parts["face_count"][1] = parts["name_bytes"][1] = 0
+    part_of[part_of == 1] = 2
+    raw[8:16] = bvh_file.xxh64(bytes(raw[16:])).to_bytes(8, "little")
+    path.write_bytes(raw)
+    return path
+
+
+if __name__ == "__main__":
+    unittest.main()

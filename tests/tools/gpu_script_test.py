@@ -31,7 +31,7 @@ class GpuScriptTest(unittest.TestCase):
         self.folder, self.out = Path(folder.name) / "programs", Path(folder.name) / "out"
         self.bin = Path(folder.name) / "bin"
         self.bin.mkdir()
-        self.write(self.bin / "nvidia-smi", "#!/bin/sh\necho 'NVIDIA Stub, 80GB'\n")
+        self.write(self.bin / "nvidia-smi", "#!/bin/sh\necho 'NVIDIA Example, 80GB'\n")
         self.write(self.bin / "compute-sanitizer", "#!/bin/sh\necho '========= ERROR SUMMARY: 0 errors'\n")
         for name in ("gpu_test", "paper_engine_test", "engine_gpu_test", "gpu_absent_test"):
             self.program(name, PASSED)
@@ -58,7 +58,7 @@ class GpuScriptTest(unittest.TestCase):
         done = self.run_script()
         self.assertEqual((done.returncode, done.stderr), (0, ""))
         self.assertEqual(self.results()["no_gpu.Suite.Passes"],
-                         {"machine": "NVIDIA Stub, 80GB", "commit": "abc1234", "test": "no_gpu.Suite.Passes", "result": "passed", "milliseconds": "12"})
+                         {"machine": "NVIDIA Example, 80GB", "commit": "abc1234", "test": "no_gpu.Suite.Passes", "result": "passed", "milliseconds": "12"})
         self.assertEqual(set(self.results()), {"Suite.Passes", "no_gpu.Suite.Passes", "old_driver.Suite.Passes"})
         self.assertEqual(done.stdout.count("ERROR SUMMARY: 0 errors"), 5)
 

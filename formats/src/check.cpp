@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "check_oriented.h"
 #include "check_tree.h"
 #include "tandem/formats/hash.h"
 
@@ -58,12 +59,15 @@ std::uint64_t element_bytes(SectionKind kind) {
       return 1;
     case SectionKind::provenance:
       return 1;
+    case SectionKind::oriented_blocks:
+      return sizeof(OrientedBlock);
   }
   return 0;
 }
 
 bool belongs_to_level(SectionKind kind) {
-  return kind == SectionKind::blocks || kind == SectionKind::triangles;
+  return kind == SectionKind::blocks || kind == SectionKind::triangles ||
+         kind == SectionKind::oriented_blocks;
 }
 
 Status check_section(const Section& section, const FileHeader& header) {
@@ -126,11 +130,14 @@ CheckResult check_levels(const unsigned char* data, const FileHeader& header,
     const Level& level = levels[i];
     const auto blocks = elements<Block>(data, sections, SectionKind::blocks, i);
     const auto triangles = elements<Triangle>(data, sections, SectionKind::triangles, i);
+    const auto oriented = elements<OrientedBlock>(data, sections, SectionKind::oriented_blocks, i);
     if (blocks.empty() || triangles.empty()) return {Status::kSectionMissing, i, {}};
     const double least_error = i == 0 ? 0 : levels[i - 1].error_bound;
     bool sound = blocks.size() == level.block_count && triangles.size() == level.triangle_count;
     sound = sound && all_zero(level.reserved, level.reserved + sizeof level.reserved);
     sound = sound && level.leaf_block_count <= level.block_count && level.triangle_count < kNoIndex;
+    sound = sound && (oriented.data() == nullptr ||
+                      (oriented.size() == blocks.size() && triangles.size() < kMostOrientedTriangles));
     sound = sound && std::isfinite(level.error_bound) && level.error_bound >= least_error;
     sound = sound && (i > 0 || level.error_bound == 0);
     if (!sound) return {Status::kBadLevel, i, {}};
@@ -176,7 +183,7 @@ Status check_bounds(const FileHeader& header, const LevelView& level) {
 
 }  // namespace
 
-CheckResult check(const void* data_pointer, std::size_t bytes) {
+CheckResult check(const void* data_pointer, std::size_t bytes, CheckDepth depth) {
   const auto* data = static_cast<const unsigned char*>(data_pointer);
   if (reinterpret_cast<std::uintptr_t>(data) % alignof(Block) != 0) return {Status::kMisaligned, 0, {}};
   if (const Status status = check_identity(data, bytes); status != Status::kOk) return {status, 0, {}};
@@ -200,7 +207,10 @@ CheckResult check(const void* data_pointer, std::size_t bytes) {
   step = check_levels(data, header, asset.sections, asset.levels);
   if (step.status == Status::kOk) step = check_parts(asset);
   for (std::uint32_t i = 0; i < asset.levels.size() && step.status == Status::kOk; ++i) {
-    step = check_tree(asset.level(i), header.source_faces, asset.parts);
+    const LevelView level = asset.level(i);
+    step = check_tree(level, header.source_faces, asset.parts);
+    if (step.status == Status::kOk && level.oriented_blocks != nullptr)
+      step = check_oriented_blocks(level, depth);
   }
   if (step.status == Status::kOk) step.status = check_bounds(header, asset.level(0));
   return step.status == Status::kOk ? result : step;

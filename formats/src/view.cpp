@@ -11,6 +11,8 @@ LevelView AssetView::level(std::uint32_t i) const {
       view.blocks = reinterpret_cast<const Block*>(base + section.offset);
     if (section.kind == SectionKind::triangles)
       view.triangles = reinterpret_cast<const Triangle*>(base + section.offset);
+    if (section.kind == SectionKind::oriented_blocks)
+      view.oriented_blocks = reinterpret_cast<const OrientedBlock*>(base + section.offset);
   }
   const Level& level = levels[i];
   view.block_count = level.block_count;

@@ -65,7 +65,7 @@ class PairWalk {
       return try_planes ? means_.drop_beyond_planes(a, b, hits) : hits;
     };
     sink_.counters.block_pairs +=
-        traverse<typename Means::Stack>(task_.a->tree, task_.b->tree, test, on_leaves, narrow);
+        traverse<typename Means::Stack>(task_.a->tree.blocks, task_.b->tree.blocks, test, on_leaves, narrow);
     if (!done_ && candidates_.count > 0) settle(candidates_.count);
     return enough_memory_;
   }

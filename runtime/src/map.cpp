@@ -129,10 +129,10 @@ Status MappedAsset::acquire(const char* path, Access access) {
   return bytes.status;
 }
 
-Status MappedAsset::open(const char* path, Access access) {
+Status MappedAsset::open(const char* path, Access access, CheckDepth depth) {
   close();
   if (const Status status = acquire(path, access); status != Status::kOk) return status;
-  const CheckResult result = check(data_, bytes_);
+  const CheckResult result = check(data_, bytes_, depth);
   if (result.status != Status::kOk) close();
   asset_ = result.asset;
   where_ = result.where;

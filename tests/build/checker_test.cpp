@@ -419,7 +419,7 @@ TEST(Check, RejectsAFileWithoutParts) {
   const test::Mesh mesh = random_mesh(1, 1);
   const build::Tree tree = build::build_tree(mesh.geometry(), build::Imaginary::minimal);
   const std::vector<std::uint32_t> face = {0};
-  const build::AssetLevel level{mesh.geometry(), face, &tree, 0};
+  const build::AssetLevel level{mesh.geometry(), face, &tree, {}, 0};
   build::AssetSource source;
   source.source_faces = 1;
   const Bytes file(build::assemble(source, {&level, 1}));
@@ -444,7 +444,7 @@ TEST(Check, RejectsATreePastTheDepthLimit) {
     build::AssetSource source;
     source.source_faces = 1;
     source.parts = parts;
-    const build::AssetLevel level{mesh.geometry(), face, &tree, 0};
+    const build::AssetLevel level{mesh.geometry(), face, &tree, {}, 0};
     const Bytes file(build::assemble(source, {&level, 1}));
     EXPECT_EQ(file.check().status, depth <= kMaxDepth ? Status::kOk : Status::kTooDeep) << depth;
   }
@@ -459,8 +459,8 @@ TEST(Check, AcceptsSeveralLevelsOfDetailAndRejectsErrorsThatFall) {
   build::AssetSource source;
   source.source_faces = 1;
   source.parts = parts;
-  const build::AssetLevel levels[] = {{fine.geometry(), face, &fine_tree, 0},
-                                      {coarse.geometry(), face, &coarse_tree, 0.5}};
+  const build::AssetLevel levels[] = {{fine.geometry(), face, &fine_tree, {}, 0},
+                                      {coarse.geometry(), face, &coarse_tree, {}, 0.5}};
   Bytes file(build::assemble(source, levels));
   const CheckResult result = file.check();
   ASSERT_EQ(result.status, Status::kOk) << name(result.status);

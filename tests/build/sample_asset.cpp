@@ -37,7 +37,8 @@ build::Image make_file(const Mesh& mesh, build::Imaginary imaginary, build::Effo
   source.source_faces = n;
   source.parts = parts;
   source.provenance = "{\"tool\":\"test\"}";
-  const build::AssetLevel level{mesh.geometry(), face, &tree, 0};
+  const auto oriented_blocks = build::orient_blocks(mesh.geometry(), tree, effort);
+  const build::AssetLevel level{mesh.geometry(), face, &tree, oriented_blocks, 0};
   return build::assemble(source, {&level, 1});
 }
 

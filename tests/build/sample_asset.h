@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bvhbuild/tree/assemble.h"
+#include "bvhbuild/tree/oriented_blocks.h"
 #include "tandem/formats/box.h"
 #include "tandem/formats/check.h"
 

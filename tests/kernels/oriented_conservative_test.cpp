@@ -27,6 +27,7 @@ constexpr Real dot(const Direction& a, const Direction& b) {
 // A few vertices below a node of a block, and what is made of them.
 struct Body {
   Pose pose;
+  ScaledRotation rotation;
   BlockFrame frame;
   std::array<Direction, 3> axes;  // of the frame, in the mesh
   std::vector<std::array<float, 3>> vertices;
@@ -51,7 +52,9 @@ struct Body {
 
 void begin(RandomPoses& random, const Scale& scale, Body& body) {
   body.pose = random.pose(scale);
-  body.frame = test::any_frame_of(test::packed(test::random_quaternion(random)), random);
+  const BlockRotation rotation = test::packed(test::random_quaternion(random));
+  body.rotation = scaled_rotation(rotation);
+  body.frame = test::any_frame_of(rotation, random);
   body.axes = test::axes_of(body.frame);
   body.vertices.clear();
 }
@@ -82,7 +85,7 @@ void enclose_vertices(RandomPoses& random, Body& body) {
     double lowest = HUGE_VAL, highest = -HUGE_VAL;
     for (const auto& vertex : body.vertices) {
       const float x[3] = {vertex[0], vertex[1], vertex[2]};
-      const double at = along_axis(body.frame, k, x);
+      const double at = along_axis(body.rotation, k, x);
       lowest = std::min(lowest, at), highest = std::max(highest, at);
     }
     box_along(lowest, highest, std::sqrt(squared), body.box.center[k], body.box.half_extent[k]);

@@ -5,7 +5,7 @@
 
 #include "random_pose.h"
 #include "sure_verdicts.h"
-#include "tandem/kernels/detail/oriented_block.h"
+#include "tandem/kernels/detail/oriented_test.h"
 
 /// Rotations of blocks, from harmless to hostile.
 namespace tandem::test {

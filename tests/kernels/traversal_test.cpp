@@ -32,17 +32,18 @@ using Candidates =
 
 Candidates walk(const LevelView& a, const LevelView& b) {
   Candidates candidates;
-  traverse(a, b, aligned_mask, [&](const Block& block_a, const Block& block_b, std::uint32_t mask) {
-    for (int i = 0; i < kNodesPerBlock; ++i) {
-      for (int j = 0; j < kNodesPerBlock; ++j) {
-        if ((mask >> (4 * i + j) & 1) == 0) continue;
-        const Triangle& triangle_a = a.triangles[block_a.index[i]];
-        const Triangle& triangle_b = b.triangles[block_b.index[j]];
-        ++candidates[{triangle_a.source_face(), triangle_b.source_face()}];
-      }
-    }
-    return true;
-  });
+  traverse(a.blocks, b.blocks, aligned_mask,
+           [&](const Block& block_a, const Block& block_b, std::uint32_t mask) {
+             for (int i = 0; i < kNodesPerBlock; ++i) {
+               for (int j = 0; j < kNodesPerBlock; ++j) {
+                 if ((mask >> (4 * i + j) & 1) == 0) continue;
+                 const Triangle& triangle_a = a.triangles[block_a.index[i]];
+                 const Triangle& triangle_b = b.triangles[block_b.index[j]];
+                 ++candidates[{triangle_a.source_face(), triangle_b.source_face()}];
+               }
+             }
+             return true;
+           });
   return candidates;
 }
 
@@ -94,10 +95,10 @@ TEST(Traversal, StopsWhenAsked) {
   const LevelView tree = file.check().asset.level();
   int calls = 0;
   const auto once = [&](const Block&, const Block&, std::uint32_t) { return ++calls < 1; };
-  const std::uint64_t until_first = traverse(tree, tree, aligned_mask, once);
+  const std::uint64_t until_first = traverse(tree.blocks, tree.blocks, aligned_mask, once);
   EXPECT_EQ(calls, 1);
   const auto all = [](const Block&, const Block&, std::uint32_t) { return true; };
-  EXPECT_LT(until_first, traverse(tree, tree, aligned_mask, all));
+  EXPECT_LT(until_first, traverse(tree.blocks, tree.blocks, aligned_mask, all));
 }
 
 // Two trees of the greatest depth in which every internal block has three leaf blocks and one internal one,
@@ -142,10 +143,11 @@ struct DeepTree {
 TEST(Traversal, TheStackHoldsTheDeepestTrees) {
   const DeepTree tree(kMaxDepth);
   std::uint64_t leaf_pairs = 0;
-  traverse(tree.view(), tree.view(), aligned_mask, [&](const Block&, const Block&, std::uint32_t mask) {
-    leaf_pairs += static_cast<std::uint64_t>(__builtin_popcount(mask));
-    return true;
-  });
+  traverse(tree.view().blocks, tree.view().blocks, aligned_mask,
+           [&](const Block&, const Block&, std::uint32_t mask) {
+             leaf_pairs += static_cast<std::uint64_t>(__builtin_popcount(mask));
+             return true;
+           });
   EXPECT_EQ(leaf_pairs, tree.triangles.size() * tree.triangles.size());
 }
 
@@ -188,7 +190,7 @@ TEST(Traversal, TheStackHoldsWhatFullTreesOfTheGreatestDepthPutOn) {
   view.block_count = kMaxDepth;
   RecordingStack::highest = 0;
   const auto stop = [](const Block&, const Block&, std::uint32_t) { return false; };
-  traverse<RecordingStack>(view, view, aligned_mask, stop);
+  traverse<RecordingStack>(view.blocks, view.blocks, aligned_mask, stop);
   EXPECT_GT(RecordingStack::highest, 63u * 15u * 3u);
   EXPECT_LE(RecordingStack::highest, kTraversalStackSize);
 }

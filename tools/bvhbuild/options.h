@@ -14,6 +14,7 @@ struct Options {
   std::filesystem::path input, output;
   Imaginary imaginary = Imaginary::minimal;
   Effort effort = Effort::standard;
+  bool gpu_blocks = true;  ///< the file gets oriented blocks
   ImportOptions import;
   bool strict = false;
   bool json = false;

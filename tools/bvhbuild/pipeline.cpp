@@ -11,6 +11,7 @@
 #include "bvhbuild/meshing/stored_mesh.h"
 #include "bvhbuild/meshing/triangulate.h"
 #include "bvhbuild/tree/assemble.h"
+#include "bvhbuild/tree/oriented_blocks.h"
 #include "common/number_words.h"
 #include "common/output_file.h"
 #include "common/printable.h"
@@ -122,7 +123,10 @@ Image build_image(const Options& options, const PolygonMesh& polygons, const Sto
   source.source_faces = outcome.clean.faces;
   source.parts = polygons.parts;
   source.provenance = provenance_json(options, outcome);
-  const AssetLevel level{geometry, mesh.face, &tree, 0};
+  std::vector<OrientedBlock> oriented_blocks;
+  if (options.gpu_blocks && geometry.triangles.size() < kMostOrientedTriangles)
+    oriented_blocks = orient_blocks(geometry, tree, options.effort);
+  const AssetLevel level{geometry, mesh.face, &tree, oriented_blocks, 0};
   Image image = assemble(source, {&level, 1});
 
   const CheckResult checked = check(image.data(), image.size());

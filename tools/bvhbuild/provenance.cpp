@@ -11,6 +11,7 @@ std::string provenance_json(const Options& options, const Outcome& outcome) {
     if (finding.count > 0) found[finding.key] = finding.count;
   }
   Json shaping = {{"imaginary", name(options.imaginary)}, {"effort", name(options.effort)}};
+  if (!options.gpu_blocks) shaping["gpu_blocks"] = false;
   if (outcome.interrupted) shaping["interrupted"] = true;
   const Json json = {{"tool", "bvhbuild"},
                      {"version", TANDEM_VERSION},

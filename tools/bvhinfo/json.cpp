@@ -19,6 +19,8 @@ const char* name(SectionKind kind) {
       return "strings";
     case SectionKind::provenance:
       return "provenance";
+    case SectionKind::oriented_blocks:
+      return "oriented_blocks";
   }
   return "unknown";
 }

@@ -69,7 +69,7 @@ class BudgetedQuery {
     const auto test = [&](const Block& block_a, const Block& block_b) -> std::uint32_t {
       return take(1) ? of_blocks_(block_a, block_b, b_in_a) : 0;
     };
-    return traverse(tree_, tree_, test, on_leaves);
+    return traverse(tree_.blocks, tree_.blocks, test, on_leaves);
   }
 
   bool meet(std::uint32_t triangle_a, const Pose& b, std::uint32_t triangle_b) const {

@@ -6,7 +6,7 @@
 
 #include "tandem/kernels/detail/frame_test.h"
 #include "tandem/kernels/detail/instance_check.h"
-#include "tandem/kernels/detail/oriented_block.h"
+#include "tandem/kernels/detail/oriented_test.h"
 #include "tandem/kernels/detail/relative_pose.h"
 #include "tandem/kernels/gpu_contact_query.h"
 

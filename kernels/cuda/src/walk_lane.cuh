@@ -2,7 +2,7 @@
 #include "gpu_query_data.h"
 #include "tandem/kernels/detail/block_pair.h"
 #include "tandem/kernels/detail/leaf_planes.h"
-#include "tandem/kernels/detail/oriented_block.h"
+#include "tandem/kernels/detail/oriented_test.h"
 
 // What one lane of a walk does with a block pair and with a candidate, in the frame of the first of a pair or
 // in world coordinates.
@@ -180,7 +180,8 @@ struct InFrame {
   static constexpr bool kWorld = false;
   static constexpr bool kCountsOnly = kWalksOnly;  ///< candidates are counted, none decided
   static constexpr bool kBounded = kMode == QueryMode::exact;
-  static constexpr float kDescends = kBounded ? 1.75f : kDescendsAlone;  ///< by a Side's size
+  static constexpr float kDescends =
+      kBounded ? kOrientedDescendsAlone : kDescendsAlone;  ///< by a Side's size
 
   /// a, b: numbers of walk blocks.
   __device__ static std::uint32_t test(const QueryArgs& args, const PairRecord& record, std::uint32_t a,

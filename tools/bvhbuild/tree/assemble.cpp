@@ -102,11 +102,17 @@ void write_bounds(const AssetLevel& level, FileHeader& header) {
 }
 
 Plan plan_sections(const PartTable& table, const AssetSource& source, std::span<const AssetLevel> levels) {
-  Plan plan(2 * levels.size() + 4);
+  std::size_t oriented = 0;
+  for (const AssetLevel& level : levels) oriented += !level.oriented_blocks.empty();
+  Plan plan(2 * levels.size() + oriented + 4);
   plan.add(SectionKind::levels, 0, levels.size(), sizeof(Level));
-  for (std::uint32_t i = 0; i < levels.size(); ++i) {
+  for (std::uint32_t i = 0; i < levels.size(); ++i)
     plan.add(SectionKind::blocks, i, levels[i].tree->blocks.size(), sizeof(Block));
+  // What exact queries on a GPU need lies together, for one copy.
+  for (std::uint32_t i = 0; i < levels.size(); ++i) {
     plan.add(SectionKind::triangles, i, levels[i].geometry.triangles.size(), sizeof(Triangle));
+    if (!levels[i].oriented_blocks.empty())
+      plan.add(SectionKind::oriented_blocks, i, levels[i].oriented_blocks.size(), sizeof(OrientedBlock));
   }
   plan.add(SectionKind::parts, 0, table.parts.size(), sizeof(Part));
   plan.add(SectionKind::strings, 0, table.strings.size(), 1);
@@ -175,6 +181,11 @@ Image assemble(const AssetSource& source, std::span<const AssetLevel> levels) {
       case SectionKind::blocks: {
         const std::vector<Block>& blocks = levels[section.level].tree->blocks;
         fill(image, section, blocks.data(), blocks.size() * sizeof(Block));
+        break;
+      }
+      case SectionKind::oriented_blocks: {
+        const std::span<const OrientedBlock> blocks = levels[section.level].oriented_blocks;
+        fill(image, section, blocks.data(), blocks.size_bytes());
         break;
       }
       case SectionKind::triangles:

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "bvhbuild/meshing/polygon_mesh.h"
+#include "tandem/formats/oriented_block.h"
 #include "tree.h"
 
 namespace tandem::build {
@@ -16,6 +17,7 @@ struct AssetLevel {
   Geometry geometry;
   std::span<const std::uint32_t> face;
   const Tree* tree = nullptr;
+  std::span<const OrientedBlock> oriented_blocks;  ///< of the tree; may be empty
   double error_bound = 0;
 };
 

@@ -1,4 +1,6 @@
 #pragma once
+#include <cmath>
+
 #include "tandem/formats/block.h"
 
 namespace tandem {
@@ -36,6 +38,28 @@ bool contains(const Box& outer, const Box& inner);
 TANDEM_HD inline Box box_of(const Block& block, int node) {
   return {{block.center[0][node], block.center[1][node], block.center[2][node]},
           {block.half_extent[0][node], block.half_extent[1][node], block.half_extent[2][node]}};
+}
+
+/// How far all boxes of a tree reach. Every box lies in a box of the root block, so the root block tells.
+struct TreeExtent {
+  double reach[3];        ///< >= |center| + half_extent
+  double half_extent[3];  ///< >= half_extent
+};
+
+/// The extent of the tree with this root block.
+TANDEM_HD inline TreeExtent extent_of(const Block& root) {
+  TreeExtent extent{};
+  for (int k = 0; k < 3; ++k) {
+    for (int node = 0; node < kNodesPerBlock; ++node) {
+      if (root.kind[node] == NodeKind::imaginary) continue;
+      const double h = root.half_extent[k][node];
+      // Rounded to nearest, twice: the factor makes up for both.
+      const double reach = (std::fabs(static_cast<double>(root.center[k][node])) + h) * (1 + 0x1p-50);
+      if (reach > extent.reach[k]) extent.reach[k] = reach;
+      if (h > extent.half_extent[k]) extent.half_extent[k] = h;
+    }
+  }
+  return extent;
 }
 
 /// Writes a real node; `index` is a child block or a triangle.

@@ -13,7 +13,7 @@ inline constexpr std::uint16_t kVersionMajor = 1;
 inline constexpr std::uint16_t kVersionMinor = 0;
 inline constexpr std::uint64_t kSectionAlignment = 256;
 inline constexpr std::uint32_t kMaxLevels = 32;
-inline constexpr std::uint32_t kMaxSections = 2 * kMaxLevels + 8;
+inline constexpr std::uint32_t kMaxSections = 3 * kMaxLevels + 8;
 
 /// Bytes 0 to 127 of a file. The section table follows.
 ///
@@ -38,12 +38,13 @@ static_assert(sizeof(FileHeader) == 128 && offsetof(FileHeader, byte_order) == 1
               offsetof(FileHeader, source_faces) == 80 && offsetof(FileHeader, section_count) == 96);
 
 enum class SectionKind : std::uint32_t {
-  levels = 1,      ///< Level[level_count], one for the file
-  blocks = 2,      ///< Block[], one for each level
-  triangles = 3,   ///< Triangle[], one for each level
-  parts = 4,       ///< Part[], one for the file
-  strings = 5,     ///< UTF-8 bytes that parts refer to, one for the file
-  provenance = 6,  ///< JSON, UTF-8, one for the file
+  levels = 1,           ///< Level[level_count], one for the file
+  blocks = 2,           ///< Block[], one for each level
+  triangles = 3,        ///< Triangle[], one for each level
+  parts = 4,            ///< Part[], one for the file
+  strings = 5,          ///< UTF-8 bytes that parts refer to, one for the file
+  provenance = 6,       ///< JSON, UTF-8, one for the file
+  oriented_blocks = 7,  ///< OrientedBlock[], at most one for each level: what exact queries on a GPU walk
 };
 
 /// One row of the section table.

@@ -49,6 +49,11 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kTriangleNotFinite, kTriangleOutsideLeafBox, kChildOutsideParentBox,
     kBadFace,         ///< source face or part out of range, or a reserved lane set
     kBoundsMismatch,  ///< the header's bounds are not those of the triangles
+    // The oriented blocks.
+    kOrientedBlockMismatch,  ///< an oriented block names other children or triangles than its block
+    kBadRotation,            ///< a rotation that is no quaternion of whole numbers in their range
+    kBadOrientedBox,         ///< a box that is none, that reaches too far, or a size that is not the boxes'
+    kTriangleOutsideOrientedBox,  ///< of a node above it
     // Querying.
     kOutOfRange,        ///< a coordinate that is NaN or larger than the query can take
     kUnknownAsset,      ///< an instance of an asset that the query was not given
@@ -57,6 +62,8 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kTooManyInstances,  ///< 2^32 - 1 or more
     kTooManyPairs,      ///< 2^32 - 1 object pairs or more
     kCannotStartThread,
+    kNoOrientedBlocks,     ///< exact queries on a GPU need them, and the asset was given without
+    kNoAxisAlignedBlocks,  ///< the other modes of queries on a GPU need them, and the asset was given without
     // On a GPU; status_of() of gpu_status.h names CUDA's errors.
     kNoGpu,            ///< none here, none that this process may use, or no driver
     kDriverTooOld,     ///< for the CUDA version that the program was built with

@@ -4,13 +4,15 @@
 #include <string_view>
 
 #include "tandem/formats/file.h"
+#include "tandem/formats/oriented_block.h"
 
 namespace tandem {
 
 /// Looks at one level of detail of an asset; owns nothing. Its pointers are of the CPU or of the GPU.
 struct LevelView {
-  const Block* blocks = nullptr;        ///< block 0 is the root; the others follow depth first
-  const Triangle* triangles = nullptr;  ///< in leaf order: those below a block are consecutive
+  const Block* blocks = nullptr;                   ///< block 0 is the root; the others follow depth first
+  const Triangle* triangles = nullptr;             ///< in leaf order: those below a block are consecutive
+  const OrientedBlock* oriented_blocks = nullptr;  ///< block_count of them, or null: the file has none
   std::uint32_t block_count = 0;
   std::uint32_t triangle_count = 0;
   std::uint32_t leaf_block_count = 0;

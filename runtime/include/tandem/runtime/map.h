@@ -26,10 +26,10 @@ class MappedAsset {
   MappedAsset& operator=(MappedAsset&& other) noexcept;
   ~MappedAsset() { close(); }
 
-  /// Brings the file into memory and checks all of it; closes what was open before.
+  /// Brings the file into memory and checks it; closes what was open before.
   /// Result: kOk, or the first defect; then nothing is open, and where() is the number of the section,
   /// block or other item that has the defect. `path` is handed to the operating system as it is.
-  Status open(const char* path, Access access = Access::map);
+  Status open(const char* path, Access access = Access::map, CheckDepth depth = CheckDepth::full);
 
   /// Releases the bytes; views of them must not be used any more.
   void close();

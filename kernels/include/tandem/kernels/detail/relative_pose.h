@@ -1,7 +1,7 @@
 #pragma once
 #include <cmath>
 
-#include "tandem/formats/block.h"
+#include "tandem/formats/box.h"
 #include "tandem/kernels/pose.h"
 
 /// How one posed asset lies in the frame of another, float32, with what rounding can do to it: the input of
@@ -17,12 +17,6 @@ struct RelativePose {
   float slack_b[3];  ///< added to the half-extents of b's boxes, along b's axes
 };
 
-/// How far all boxes of a tree reach. Every box lies in a box of the root block, so the root block tells.
-struct TreeExtent {
-  double reach[3];        ///< >= |center| + half_extent
-  double half_extent[3];  ///< >= half_extent
-};
-
 enum class [[nodiscard]] RelativePoseStatus{
     kOk,
     kOutOfRange,  ///< see kLargestReach; or a pose that is far from rigid
@@ -31,22 +25,6 @@ enum class [[nodiscard]] RelativePoseStatus{
 /// The largest reach of a tree, and the largest slack, that float32 box tests take: about 1.3e36. Posed
 /// points whose float64 rounding exceeds it, those of translations beyond 10^51, are out of range too.
 inline constexpr double kLargestReach = 0x1p120;
-
-/// The extent of the tree with this root block.
-TANDEM_HD inline TreeExtent extent_of(const Block& root) {
-  TreeExtent extent{};
-  for (int k = 0; k < 3; ++k) {
-    for (int node = 0; node < kNodesPerBlock; ++node) {
-      if (root.kind[node] == NodeKind::imaginary) continue;
-      const double h = root.half_extent[k][node];
-      // Rounded to nearest, twice: the factor makes up for both.
-      const double reach = (std::fabs(static_cast<double>(root.center[k][node])) + h) * (1 + 0x1p-50);
-      if (reach > extent.reach[k]) extent.reach[k] = reach;
-      if (h > extent.half_extent[k]) extent.half_extent[k] = h;
-    }
-  }
-  return extent;
-}
 
 namespace relative_pose_detail {
 

@@ -52,6 +52,14 @@ TANDEM_HD inline int lowest_bit(std::uint32_t bits) {
 #endif
 }
 
+/// The number of the block below a node of an internal block. A number means a block of its own kind.
+TANDEM_HD inline std::uint32_t child_of(const Block& block, int node) {
+  return block.index[node];
+}
+TANDEM_HD inline std::uint32_t child_of(const OrientedBlock& block, int node) {
+  return block.first_below + static_cast<std::uint32_t>(node);
+}
+
 /// The block pairs that wait. A CPU has faster ones, with the same order.
 class BlockPairStack {
  public:
@@ -60,10 +68,11 @@ class BlockPairStack {
   void push(const BlockPair& pair) { pairs_[height_++] = pair; }
 
   /// A pair of child blocks for each hit, two internal blocks given.
-  void push_children(const Block& a, const Block& b, std::uint32_t hits) {
+  template <typename AnyBlock>
+  void push_children(const AnyBlock& a, const AnyBlock& b, std::uint32_t hits) {
     for (; hits != 0; hits &= hits - 1) {
       const int bit = lowest_bit(hits);
-      push({a.index[bit / 4], b.index[bit % 4], kAllNodePairs});
+      push({child_of(a, bit / 4), child_of(b, bit % 4), kAllNodePairs});
     }
   }
 
@@ -72,7 +81,7 @@ class BlockPairStack {
   std::uint32_t height_ = 0;
 };
 
-/// The sum of half-extents of the largest node: how large what is in a block may be.
+/// How large what is in a block may be: the sum of half-extents of the largest node.
 TANDEM_HD inline float size_of(const Block& block) {
   float size = 0;  // imaginary nodes have -infinity
   for (int i = 0; i < kNodesPerBlock; ++i) {
@@ -80,6 +89,10 @@ TANDEM_HD inline float size_of(const Block& block) {
     if (sum > size) size = sum;
   }
   return size;
+}
+
+TANDEM_HD inline float size_of(const OrientedBlock& block) {
+  return block.size;
 }
 
 /// Which of the two blocks of a pair that hits are replaced by their children.
@@ -93,6 +106,15 @@ TANDEM_HD constexpr Descent descent_beside_leaves(bool leaf_a) {
 /// How many times larger one of two internal blocks must be to descend alone. Bodies on a ground: a third of
 /// the block pairs. Any factor from 1.5 to 4 does about as well (docs/decisions/0013).
 inline constexpr float kDescendsAlone = 2;
+/// The same by oriented_size() (docs/decisions/0039).
+inline constexpr float kOrientedDescendsAlone = 1.75f;
+
+TANDEM_HD constexpr float descends_alone(const Block&) {
+  return kDescendsAlone;
+}
+TANDEM_HD constexpr float descends_alone(const OrientedBlock&) {
+  return kOrientedDescendsAlone;
+}
 
 /// Of two internal blocks, one that is so many times larger descends alone.
 TANDEM_HD constexpr Descent descent_by_size(float size_a, float size_b, float times) {
@@ -112,32 +134,32 @@ TANDEM_HD constexpr bool worth_planes(bool leaf_a, float size_a, float size_b) {
 }
 
 /// Pairs of the children of a with b. hits: of a and b.
-template <typename Stack>
-void descend_a(Stack& stack, const BlockPair& pair, const Block& a, std::uint32_t hits) {
+template <typename Stack, typename AnyBlock>
+void descend_a(Stack& stack, const BlockPair& pair, const AnyBlock& a, std::uint32_t hits) {
   for (int i = 0; i < kNodesPerBlock; ++i) {
     // Nodes of b that node i hits: the new pair's columns.
     const std::uint32_t row = hits >> 4 * i & 0xFu;
-    if (row != 0) stack.push({a.index[i], pair.b, row * 0x1111u});
+    if (row != 0) stack.push({child_of(a, i), pair.b, row * 0x1111u});
   }
 }
 
 /// Pairs of a with the children of b.
-template <typename Stack>
-void descend_b(Stack& stack, const BlockPair& pair, const Block& b, std::uint32_t hits) {
+template <typename Stack, typename AnyBlock>
+void descend_b(Stack& stack, const BlockPair& pair, const AnyBlock& b, std::uint32_t hits) {
   for (int j = 0; j < kNodesPerBlock; ++j) {
     // Nodes of a that node j hits: the new pair's rows.
     const std::uint32_t column = hits >> j & 0x1111u;
-    if (column != 0) stack.push({pair.a, b.index[j], column * 0xFu});
+    if (column != 0) stack.push({pair.a, child_of(b, j), column * 0xFu});
   }
 }
 
 /// The block pairs below one that hits, not both of whose blocks are leaf blocks.
-template <typename Stack>
-void descend(Stack& stack, const BlockPair& pair, const Block& a, const Block& b, std::uint32_t hits) {
+template <typename Stack, typename AnyBlock>
+void descend(Stack& stack, const BlockPair& pair, const AnyBlock& a, const AnyBlock& b, std::uint32_t hits) {
   const bool leaf_a = a.is_leaf_block();
   const Descent descent = leaf_a != b.is_leaf_block()
                               ? descent_beside_leaves(leaf_a)
-                              : descent_by_size(size_of(a), size_of(b), kDescendsAlone);
+                              : descent_by_size(size_of(a), size_of(b), descends_alone(a));
   if (descent == Descent::a_alone) return descend_a(stack, pair, a, hits);
   if (descent == Descent::b_alone) return descend_b(stack, pair, b, hits);
   stack.push_children(a, b, hits);
@@ -145,10 +167,14 @@ void descend(Stack& stack, const BlockPair& pair, const Block& a, const Block& b
 
 /// Drops no hit.
 struct KeepHits {
-  std::uint32_t operator()(const Block&, const Block&, std::uint32_t hits) const { return hits; }
+  template <typename AnyBlock>
+  std::uint32_t operator()(const AnyBlock&, const AnyBlock&, std::uint32_t hits) const {
+    return hits;
+  }
 };
 
-/// Visits every block pair that the test leads to, each once, and hands leaf pairs on.
+/// Visits every block pair that the test leads to, each once, and hands leaf pairs on. Takes the blocks of
+/// two trees, both Block or both OrientedBlock.
 ///
 /// Two leaf blocks: on_leaves gets the hits. Two internal blocks: one new pair for each hit, both sides
 /// descend; unless one is larger by kDescendsAlone. Then, and where the other is a leaf block, it descends
@@ -160,8 +186,9 @@ struct KeepHits {
 /// on_leaves(block_a, block_b, mask) -> bool: two leaf blocks, mask is not 0; false ends the traversal.
 /// narrow(block_a, block_b, mask) -> mask: of a leaf block and an internal one, less hits that lead nowhere.
 /// Result: the number of block pairs tested. Order: deeper ones first; the same on every run and machine.
-template <typename Stack = BlockPairStack, typename Test, typename OnLeaves, typename Narrow = KeepHits>
-std::uint64_t traverse(const LevelView& tree_a, const LevelView& tree_b, const Test& test,
+template <typename Stack = BlockPairStack, typename AnyBlock, typename Test, typename OnLeaves,
+          typename Narrow = KeepHits>
+std::uint64_t traverse(const AnyBlock* blocks_a, const AnyBlock* blocks_b, const Test& test,
                        const OnLeaves& on_leaves, const Narrow& narrow = {}) {
   Stack stack;
   stack.push({0, 0, kAllNodePairs});
@@ -171,12 +198,12 @@ std::uint64_t traverse(const LevelView& tree_a, const LevelView& tree_b, const T
     std::uint32_t hits[kTakenAtOnce], count = 0;
     while (count < kTakenAtOnce && !stack.empty()) taken[count++] = stack.pop();
     for (std::uint32_t i = 0; i < count; ++i) {
-      hits[i] = test(tree_a.blocks[taken[i].a], tree_b.blocks[taken[i].b]) & taken[i].mask;
+      hits[i] = test(blocks_a[taken[i].a], blocks_b[taken[i].b]) & taken[i].mask;
     }
     tested += count;
     for (std::uint32_t i = 0; i < count; ++i) {
       if (hits[i] == 0) continue;
-      const Block &a = tree_a.blocks[taken[i].a], &b = tree_b.blocks[taken[i].b];
+      const AnyBlock &a = blocks_a[taken[i].a], &b = blocks_b[taken[i].b];
       const bool leaves_a = a.is_leaf_block(), leaves_b = b.is_leaf_block();
       if (leaves_a && leaves_b) {
         if (!on_leaves(a, b, hits[i])) return tested;

@@ -1,27 +1,13 @@
 #pragma once
 #include <cmath>
-#include <cstdint>
-#ifndef __CUDA_ARCH__
-#include <bit>
-#endif
 
 #include "tandem/formats/box.h"
+#include "tandem/formats/oriented_block.h"
 #include "tandem/kernels/detail/relative_pose.h"
 
-/// Blocks in frames of their own: the boxes of a block's four nodes lie along the axes of one rotation, which
-/// fits what is below the block. They are thinner than boxes along the axes of the mesh, so fewer pairs of
-/// them overlap.
+/// Tests of blocks in frames of their own: the boxes of a block against those of another, by intervals
+/// between the two frames.
 namespace tandem {
-
-/// A rotation by its quaternion w + xi + yj + zk, which need not have length 1: whole numbers of at most
-/// kLargestQuaternionPart, not all 0, each stored with kQuaternionOffset added, w and y in the lower halves.
-/// It is the exact rotation of these numbers, so its rows and columns are exactly orthonormal.
-struct BlockRotation {
-  std::uint32_t wx, yz;
-};
-
-inline constexpr int kLargestQuaternionPart = 2047;
-inline constexpr std::uint32_t kQuaternionOffset = 2048;
 
 /// A block's frame, as float32 computes with it: x_mesh = rotation * x_block, rotation = scaled / length.
 /// `scaled` and the squared length of the quaternion are whole numbers of at most 2^24, which are exact.
@@ -31,18 +17,6 @@ struct BlockFrame {
 };
 
 namespace oriented_detail {
-
-/// The whole number in the half of a word.
-TANDEM_HD inline float quaternion_part(std::uint32_t word, bool upper) {
-#ifdef __CUDA_ARCH__
-  // 2^23 + n has n in its last bits.
-  return __uint_as_float(__byte_perm(word, 0x4B000000u, upper ? 0x7632 : 0x7610)) -
-         static_cast<float>(0x1p23 + kQuaternionOffset);
-#else
-  const std::uint32_t half = upper ? word >> 16 : word & 0xFFFFu;
-  return static_cast<float>(static_cast<int>(half) - static_cast<int>(kQuaternionOffset));
-#endif
-}
 
 TANDEM_HD inline float inverse(float x) {
 #ifdef __CUDA_ARCH__
@@ -57,35 +31,13 @@ TANDEM_HD inline float inverse(float x) {
 }  // namespace oriented_detail
 
 TANDEM_HD inline BlockFrame frame_of(const BlockRotation& rotation) {
-  const float w = oriented_detail::quaternion_part(rotation.wx, false),
-              x = oriented_detail::quaternion_part(rotation.wx, true),
-              y = oriented_detail::quaternion_part(rotation.yz, false),
-              z = oriented_detail::quaternion_part(rotation.yz, true);
-  const float with_x = w * w + x * x, without_x = y * y + z * z, wx_less = w * w - x * x,
-              yz_less = y * y - z * z;
-  const float xy = x * y, xz = x * z, yz = y * z, wx = w * x, wy = w * y, wz = w * z;
-  return {{{with_x - without_x, 2 * (xy - wz), 2 * (xz + wy)},
-           {2 * (xy + wz), wx_less + yz_less, 2 * (yz - wx)},
-           {2 * (xz - wy), 2 * (yz + wx), wx_less - yz_less}},
-          oriented_detail::inverse(with_x + without_x)};
-}
-
-/// The quaternion nearest to w + xi + yj + zk. Condition: finite, not all 0.
-TANDEM_HD inline BlockRotation rotation_near(float w, float x, float y, float z) {
-  const float part[4] = {w, x, y, z};
-  float largest = 0;
-  for (const float p : part) largest = std::fmax(largest, std::fabs(p));
-  std::uint32_t word[4];
-  for (int i = 0; i < 4; ++i) {
-    const float n = std::rint(part[i] / largest * static_cast<float>(kLargestQuaternionPart));
-    word[i] = static_cast<std::uint32_t>(static_cast<int>(n) + static_cast<int>(kQuaternionOffset));
+  const ScaledRotation exact = scaled_rotation(rotation);
+  BlockFrame frame;
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) frame.scaled[i][k] = exact.scaled[i][k];
   }
-  return {word[0] | word[1] << 16, word[2] | word[3] << 16};
-}
-
-/// The mesh's own axes.
-TANDEM_HD inline BlockRotation no_rotation() {
-  return rotation_near(1, 0, 0, 0);
+  frame.inverse_length = oriented_detail::inverse(exact.squared_length);
+  return frame;
 }
 
 /// How block b's frame lies in block a's, for tests by intervals: b's boxes in a's frame, a's boxes in b's.
@@ -201,29 +153,6 @@ inline bool overlap_oriented(const Box& a, const Box& b, const OrientedPose& pos
               std::fabs(in_b) <= b.half_extent[k] + oriented_terms::a_along_b(pose, k, a.half_extent);
   }
   return overlap;
-}
-
-/// A coordinate in a block's frame: of a vertex along the frame's axis k, float64, off by at most 2^-49 of
-/// the vertex's distance from the origin.
-TANDEM_HD inline double along_axis(const BlockFrame& frame, int k, const float (&vertex)[3]) {
-  const auto at = [&](int i) {
-    return static_cast<double>(frame.scaled[i][k]) * static_cast<double>(vertex[i]);
-  };
-  double squared = 0;  // each column of `scaled` is as long as the quaternion, squared
-  for (int i = 0; i < 3; ++i) {
-    squared += static_cast<double>(frame.scaled[i][k]) * static_cast<double>(frame.scaled[i][k]);
-  }
-  return ((at(0) + at(1)) + at(2)) / std::sqrt(squared);
-}
-
-/// Centre and half-extent along an axis of a box that holds what lies from `lowest` to `highest`, both of
-/// along_axis(), `farthest` being at least the distance of each vertex from the origin.
-TANDEM_HD inline void box_along(double lowest, double highest, double farthest, float& center,
-                                float& half_extent) {
-  center = static_cast<float>(0.5 * (lowest + highest));
-  const double above = highest - static_cast<double>(center), below = static_cast<double>(center) - lowest;
-  const double half = (above > below ? above : below) + 0x1p-48 * farthest;
-  half_extent = static_cast<float>(half * (1 + 0x1p-22));
 }
 
 }  // namespace tandem

@@ -1,0 +1,178 @@
+#include "check_oriented.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tandem/formats/box.h"
+
+namespace tandem {
+namespace {
+
+Box box_of(const OrientedBlock& block, int node) {
+  return {{block.center[0][node], block.center[1][node], block.center[2][node]},
+          {block.half_extent[0][node], block.half_extent[1][node], block.half_extent[2][node]}};
+}
+
+bool is_legal(const BlockRotation& rotation) {
+  bool all_zero = true;
+  for (const std::uint32_t word : {rotation.wx, rotation.yz}) {
+    for (const std::uint32_t half : {word & 0xFFFFu, word >> 16}) {
+      const int part = static_cast<int>(half) - static_cast<int>(kQuaternionOffset);
+      if (std::abs(part) > kLargestQuaternionPart) return false;
+      all_zero = all_zero && part == 0;
+    }
+  }
+  return !all_zero;
+}
+
+bool is_imaginary_box(const Box& box) {
+  bool sound = true;
+  for (int k = 0; k < 3; ++k)
+    sound = sound && box.center[k] == 0 && !std::signbit(box.center[k]) &&
+            box.half_extent[k] == kImaginaryHalfExtent;
+  return sound;
+}
+
+// Walks the blocks as they lie, which is depth first, with the number of each one's oriented block.
+class OrientedWalk {
+ public:
+  OrientedWalk(const LevelView& level, CheckDepth depth) : level_(level), depth_(depth) {
+    double squared = 0;
+    for (const double reach : extent_of(level.blocks[0]).reach) squared += reach * reach;
+    farthest_ = std::sqrt(squared);
+  }
+
+  CheckResult run() {
+    Status status = visit(0, 0);
+    for (std::uint32_t b = 1; b < level_.block_count && status == Status::kOk; ++b) {
+      const Ancestor& parent = ancestors_[ancestor_count_ - 1];
+      status = visit(b, parent.first_child + static_cast<std::uint32_t>(parent.next));
+    }
+    return {status, where_, {}};
+  }
+
+ private:
+  // An internal block above the current one. Its node `next` is the one whose subtree is being visited.
+  struct Ancestor {
+    std::uint32_t block, oriented, first_child;
+    std::uint32_t first_triangle;  // below the node
+    int next, real;
+  };
+
+  Status visit(std::uint32_t b, std::uint32_t oriented) {
+    const Block& block = level_.blocks[b];
+    int real = kNodesPerBlock;
+    while (block.kind[real - 1] == NodeKind::imaginary) --real;
+    where_ = oriented;
+    if (const Status status = check_block(block, level_.oriented_blocks[oriented], real);
+        status != Status::kOk)
+      return status;
+    if (!block.is_leaf_block()) {
+      ancestors_[ancestor_count_++] = {b, oriented, next_number_, next_triangle_, 0, real};
+      next_number_ += static_cast<std::uint32_t>(real);
+      return Status::kOk;
+    }
+    for (int i = 0; i < real; ++i) {
+      const std::uint32_t triangle = next_triangle_++;
+      if (!holds(block, oriented, i, triangle, triangle + 1)) return Status::kTriangleOutsideOrientedBox;
+    }
+    return leave_nodes();
+  }
+
+  // All but what the boxes hold.
+  Status check_block(const Block& block, const OrientedBlock& oriented, int real) const {
+    const std::uint32_t below =
+        block.is_leaf_block() ? OrientedBlock::kIsLeafBlock | next_triangle_ : next_number_;
+    if (oriented.first_below != below) return Status::kOrientedBlockMismatch;
+    if (!is_legal(oriented.rotation)) return Status::kBadRotation;
+    for (int i = 0; i < kNodesPerBlock; ++i) {
+      const Box box = box_of(oriented, i);
+      if (i < real ? !is_real_box(box) : !is_imaginary_box(box)) return Status::kBadOrientedBox;
+    }
+    return oriented.size == oriented_size(oriented) ? Status::kOk : Status::kBadOrientedBox;
+  }
+
+  // Finite, and no farther from the origin than the slack of the tests allows: docs/box_test.md, section 5.
+  bool is_real_box(const Box& box) const {
+    bool sound = true;
+    for (int k = 0; k < 3; ++k) {
+      sound = sound && box.half_extent[k] >= 0 && std::isfinite(box.half_extent[k]) &&
+              std::abs(double{box.center[k]}) + double{box.half_extent[k]} <= farthest_ * (1 + 0x1p-20);
+    }
+    return sound;
+  }
+
+  // Ends the nodes whose subtrees are complete now.
+  Status leave_nodes() {
+    while (ancestor_count_ > 0) {
+      Ancestor& parent = ancestors_[ancestor_count_ - 1];
+      if (!holds(level_.blocks[parent.block], parent.oriented, parent.next, parent.first_triangle,
+                 next_triangle_)) {
+        where_ = parent.oriented;
+        return Status::kTriangleOutsideOrientedBox;
+      }
+      parent.first_triangle = next_triangle_;
+      if (++parent.next < parent.real) break;
+      --ancestor_count_;
+    }
+    return Status::kOk;
+  }
+
+  // Whether the box of a node holds the triangles from `first` to `end`, in real arithmetic.
+  //
+  // Proof. Let S be the scaled rotation, n the squared length of its quaternion, v a vertex and c, h of the
+  // box. v lies in the box along axis k if |p - n c| <= n h with p = sum over i of S_ik v_i. Products of two
+  // float32 numbers are exact in float64, so p as computed is off by two roundings, at most 2^-52 (1 + 2^-50)
+  // n |v|, since a column of S is n long; and |v| <= farthest_. n c and n h are exact, and |c| + h <=
+  // farthest_ (1 + 2^-20), so n c - n h and n c + n h are off by 2^-53 (1 + 2^-19) n farthest_. Adding the
+  // margin takes one more rounding of that kind. All these are less than the margin together, 2^-50 n
+  // farthest_. Nothing overflows or is subnormal in float64.
+  bool holds(const Block& block, std::uint32_t number, int node, std::uint32_t first,
+             std::uint32_t end) const {
+    if (depth_ == CheckDepth::quick) return true;
+    const OrientedBlock& oriented = level_.oriented_blocks[number];
+    // In the mesh's own axes boxes within boxes do, as check_tree() showed.
+    if (oriented.rotation == kNoRotation && contains(box_of(oriented, node), tandem::box_of(block, node)))
+      return true;
+    const ScaledRotation rotation = scaled_rotation(oriented.rotation);
+    double s[3][3];
+    for (int i = 0; i < 3; ++i) std::copy_n(rotation.scaled[i], 3, s[i]);
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    double lowest[3] = {kInfinity, kInfinity, kInfinity}, highest[3] = {-kInfinity, -kInfinity, -kInfinity};
+    for (std::uint32_t t = first; t < end; ++t) {
+      for (const Triangle::Corner& corner : level_.triangles[t].corner) {
+        const double x = corner.position[0], y = corner.position[1], z = corner.position[2];
+        for (int k = 0; k < 3; ++k) {
+          const double p = (s[0][k] * x + s[1][k] * y) + s[2][k] * z;
+          lowest[k] = p < lowest[k] ? p : lowest[k];
+          highest[k] = p > highest[k] ? p : highest[k];
+        }
+      }
+    }
+    const double n = rotation.squared_length, margin = 0x1p-50 * n * farthest_;
+    bool inside = true;
+    for (int k = 0; k < 3; ++k) {
+      const double c = n * double{oriented.center[k][node]}, h = n * double{oriented.half_extent[k][node]};
+      inside = inside && lowest[k] - margin >= c - h && highest[k] + margin <= c + h;
+    }
+    return inside;
+  }
+
+  LevelView level_;
+  CheckDepth depth_;
+  double farthest_;  // at least the distance of each vertex from the origin, but for roundings of float64
+  Ancestor ancestors_[kMaxDepth - 1];
+  std::uint32_t ancestor_count_ = 0;
+  std::uint32_t next_number_ = 1;  // of an oriented block
+  std::uint32_t next_triangle_ = 0;
+  std::uint32_t where_ = 0;  // the oriented block that a defect speaks of
+};
+
+}  // namespace
+
+CheckResult check_oriented_blocks(const LevelView& level, CheckDepth depth) {
+  return OrientedWalk(level, depth).run();
+}
+
+}  // namespace tandem

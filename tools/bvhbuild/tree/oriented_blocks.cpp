@@ -1,0 +1,359 @@
+#include "oriented_blocks.h"
+
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tandem/formats/box.h"
+
+namespace tandem::build {
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+// Below a block with a frame of its own. Above, none is worth it (docs/decisions/0039), and the checker would
+// have to look at all triangles once more for each level.
+constexpr std::uint32_t kMostTriangles = 4096;
+
+// Corners of a node that frames are judged by.
+constexpr std::uint32_t kMostPoints = 256;
+
+constexpr int kRounds = 8;                               // of a search
+constexpr float kFirstStep = 0.276f, kNextStep = 0.58f;  // 3 steps of the first reach all frames of a cube
+
+using Vector = std::array<float, 3>;
+
+Vector difference(const Vector& a, const Vector& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+Vector cross(const Vector& a, const Vector& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+float dot(const Vector& a, const Vector& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+Vector times(float s, const Vector& a) {
+  return {s * a[0], s * a[1], s * a[2]};
+}
+
+// Of the rotation whose columns are the axes.
+BlockRotation rotation_of(const Vector (&axis)[3]) {
+  const float m00 = axis[0][0], m11 = axis[1][1], m22 = axis[2][2];
+  const float m10 = axis[0][1], m20 = axis[0][2], m01 = axis[1][0], m21 = axis[1][2], m02 = axis[2][0],
+              m12 = axis[2][1];
+  // Four ways, each a multiple of the same quaternion; the longest is the safest.
+  const float q[4][4] = {{1 + m00 + m11 + m22, m21 - m12, m02 - m20, m10 - m01},
+                         {m21 - m12, 1 + m00 - m11 - m22, m10 + m01, m02 + m20},
+                         {m02 - m20, m10 + m01, 1 - m00 + m11 - m22, m21 + m12},
+                         {m10 - m01, m02 + m20, m21 + m12, 1 - m00 - m11 + m22}};
+  int best = 0;
+  for (int i = 1; i < 4; ++i) {
+    if (q[i][i] > q[best][best]) best = i;
+  }
+  bool sound = false;
+  for (const float part : q[best]) {
+    if (!std::isfinite(part)) return kNoRotation;
+    sound = sound || part != 0;
+  }
+  return sound ? rotation_near(q[best][0], q[best][1], q[best][2], q[best][3]) : kNoRotation;
+}
+
+// Times the quaternion 1 + ai + bj + ck.
+BlockRotation turned(const BlockRotation& rotation, float a, float b, float c) {
+  const float w = quaternion_part(rotation, 0), x = quaternion_part(rotation, 1),
+              y = quaternion_part(rotation, 2), z = quaternion_part(rotation, 3);
+  return rotation_near(w - x * a - y * b - z * c, x + w * a + y * c - z * b, y + w * b + z * a - x * c,
+                       z + w * c + x * b - y * a);
+}
+
+typedef float Lanes __attribute__((vector_size(16)));
+constexpr int kLanes = 4;
+
+Lanes lower_of(Lanes a, Lanes b) {
+  return a < b ? a : b;
+}
+Lanes higher_of(Lanes a, Lanes b) {
+  return a > b ? a : b;
+}
+
+// Points of a node, scaled, a few of them at once.
+struct PointCloud {
+  std::vector<Lanes> x, y, z;
+
+  void clear() { x.clear(), y.clear(), z.clear(); }
+  void assign(const std::vector<Vector>& points) {
+    clear();
+    for (std::size_t i = 0; i < points.size(); i += kLanes) {
+      Lanes lanes[3] = {};
+      for (std::size_t l = 0; l < kLanes; ++l) {
+        const Vector& p = points[std::min(i + l, points.size() - 1)];
+        for (int k = 0; k < 3; ++k) lanes[k][l] = p[static_cast<std::size_t>(k)];
+      }
+      x.push_back(lanes[0]), y.push_back(lanes[1]), z.push_back(lanes[2]);
+    }
+  }
+};
+
+// Which triangles of the file lie below each block: from first[b] to end[b].
+struct Ranges {
+  std::vector<std::uint32_t> first, end;
+
+  explicit Ranges(const Tree& tree) : first(tree.blocks.size()), end(tree.blocks.size()) {
+    for (std::size_t b = tree.blocks.size(); b-- > 0;) {  // children before parents
+      const Block& block = tree.blocks[b];
+      int last = kNodesPerBlock - 1;
+      while (block.kind[last] == NodeKind::imaginary) --last;
+      first[b] = block.is_leaf_block() ? block.index[0] : first[block.index[0]];
+      end[b] = block.is_leaf_block() ? block.index[last] + 1 : end[block.index[last]];
+    }
+  }
+};
+
+// Makes the oriented block of one block. Keeps its memory from block to block.
+class Fit {
+ public:
+  Fit(const Geometry& geometry, const Tree& tree, const Ranges& ranges, double farthest)
+      : geometry_(geometry), tree_(tree), ranges_(ranges), farthest_(farthest) {}
+
+  // All but first_below.
+  OrientedBlock make(std::uint32_t at) {
+    const Block& block = tree_.blocks[at];
+    begin(block);
+    OrientedBlock out = along_mesh(block);
+    if (ranges_.end[at] - ranges_.first[at] <= kMostTriangles) {
+      gather();
+      OrientedBlock fitted = out;
+      fitted.rotation = block.is_leaf_block() ? best_of_triangles() : search();
+      if (!(fitted.rotation == kNoRotation)) {
+        fill_boxes(fitted);
+        if (cost_of(fitted) < cost_of(out) && reaches_no_farther(fitted)) out = fitted;
+      }
+    }
+    out.size = oriented_size(out);
+    return out;
+  }
+
+ private:
+  void begin(const Block& block) {
+    nodes_ = 0;
+    for (; nodes_ < kNodesPerBlock && block.kind[nodes_] != NodeKind::imaginary; ++nodes_) {
+      const std::uint32_t below = block.index[nodes_];
+      first_[nodes_] = block.is_leaf_block() ? below : ranges_.first[below];
+      first_[nodes_ + 1] = block.is_leaf_block() ? below + 1 : ranges_.end[below];
+    }
+    float largest = 0, sum = 0;
+    for (int node = 0; node < nodes_; ++node) {
+      for (int k = 0; k < 3; ++k) {
+        largest = std::max(largest, block.half_extent[k][node]);
+        sum += 0.5f / static_cast<float>(nodes_) * block.half_extent[k][node];
+      }
+    }
+    scale_ = largest > 0x1p-120f ? 1 / largest : 1;
+    rim_ = scale_ * sum;
+  }
+
+  OrientedBlock along_mesh(const Block& block) const {
+    OrientedBlock out = {};
+    std::copy_n(&block.center[0][0], 3 * kNodesPerBlock, &out.center[0][0]);
+    std::copy_n(&block.half_extent[0][0], 3 * kNodesPerBlock, &out.half_extent[0][0]);
+    out.rotation = kNoRotation;
+    return out;
+  }
+
+  const Vector& corner(std::uint32_t triangle, std::uint32_t c) const {
+    return geometry_.points[geometry_.triangles[tree_.order[triangle]][c]];
+  }
+
+  // Some of the corners of each node, each point once.
+  void gather() {
+    for (int node = 0; node < nodes_; ++node) {
+      const std::uint32_t corners = 3 * (first_[node + 1] - first_[node]);
+      std::uint32_t stride = (corners + 3 * kMostPoints - 1) / (3 * kMostPoints);
+      if (stride % 3 == 0) ++stride;  // else of each triangle the same corner
+      vertices_.clear();
+      for (std::uint32_t at = 0; at < corners; at += stride)
+        vertices_.push_back(geometry_.triangles[tree_.order[first_[node] + at / 3]][at % 3]);
+      std::sort(vertices_.begin(), vertices_.end());
+      vertices_.erase(std::unique(vertices_.begin(), vertices_.end()), vertices_.end());
+      points_.clear();
+      for (const std::uint32_t vertex : vertices_) points_.push_back(times(scale_, geometry_.points[vertex]));
+      cloud_[node].assign(points_);
+    }
+  }
+
+  // What a frame is judged by: the volumes of its boxes, each with a rim, so that flat and thin ones count
+  // too. half_extent: times scale_.
+  float cost_of_box(const float (&half_extent)[3]) const {
+    return (half_extent[0] + rim_) * (half_extent[1] + rim_) * (half_extent[2] + rim_);
+  }
+  float cost_of(const OrientedBlock& block) const {
+    float cost = 0;
+    for (int node = 0; node < nodes_; ++node) {
+      float half_extent[3];
+      for (int k = 0; k < 3; ++k) half_extent[k] = scale_ * block.half_extent[k][node];
+      cost += cost_of_box(half_extent);
+    }
+    return cost;
+  }
+
+  // By the points gathered.
+  float cost_of(const BlockRotation& rotation) const {
+    const ScaledRotation exact = scaled_rotation(rotation);
+    float m[3][3];
+    for (int i = 0; i < 3; ++i) {
+      for (int k = 0; k < 3; ++k) m[i][k] = exact.scaled[i][k] / exact.squared_length;
+    }
+    float cost = 0;
+    for (int node = 0; node < nodes_; ++node) {
+      const PointCloud& cloud = cloud_[node];
+      const Lanes all = {kInfinity, kInfinity, kInfinity, kInfinity};
+      Lanes lowest[3] = {all, all, all}, highest[3] = {-all, -all, -all};
+      for (std::size_t i = 0; i < cloud.x.size(); ++i) {
+        for (int k = 0; k < 3; ++k) {
+          const Lanes at = m[0][k] * cloud.x[i] + m[1][k] * cloud.y[i] + m[2][k] * cloud.z[i];
+          lowest[k] = lower_of(lowest[k], at);
+          highest[k] = higher_of(highest[k], at);
+        }
+      }
+      float half_extent[3];
+      for (int k = 0; k < 3; ++k) {
+        float low = lowest[k][0], high = highest[k][0];
+        for (int l = 1; l < kLanes; ++l)
+          low = std::min(low, lowest[k][l]), high = std::max(high, highest[k][l]);
+        half_extent[k] = 0.5f * (high - low);
+      }
+      cost += cost_of_box(half_extent);
+    }
+    return cost;
+  }
+
+  struct Judged {
+    BlockRotation rotation = kNoRotation;
+    float cost = kInfinity;
+  };
+  void try_frame(const BlockRotation& rotation, Judged& best) const {
+    const float cost = cost_of(rotation);
+    if (cost < best.cost) best = {rotation, cost};
+  }
+
+  // Of a leaf block: the mesh's axes, or along an edge of a triangle and its normal.
+  BlockRotation best_of_triangles() const {
+    Judged best;
+    try_frame(kNoRotation, best);
+    for (std::uint32_t t = first_[0]; t < first_[nodes_]; ++t) {
+      for (std::uint32_t edge = 0; edge < 3; ++edge) try_frame(axes_of(t, edge), best);
+    }
+    return best.rotation;
+  }
+
+  // Along an edge of a triangle and its normal.
+  BlockRotation axes_of(std::uint32_t triangle, std::uint32_t edge) const {
+    const Vector& from = corner(triangle, edge);
+    const Vector along = times(scale_, difference(corner(triangle, (edge + 1) % 3), from));
+    const Vector normal = cross(along, times(scale_, difference(corner(triangle, (edge + 2) % 3), from)));
+    Vector axis[3] = {along, {}, normal};
+    for (int k = 0; k < 3; k += 2) {
+      const float length = std::sqrt(dot(axis[k], axis[k]));
+      if (!(length > 0)) return kNoRotation;
+      axis[k] = times(1 / length, axis[k]);
+    }
+    axis[1] = cross(axis[2], axis[0]);
+    return rotation_of(axis);
+  }
+
+  // Turns a frame about three axes at once, one way or the other or not at all, ever less.
+  BlockRotation search() const {
+    Judged best;
+    try_frame(kNoRotation, best);
+    float step = kFirstStep;
+    for (int round = 0; round < kRounds; ++round, step *= kNextStep) {
+      const BlockRotation from = best.rotation;
+      for (int turn = 0; turn < 27; ++turn) {
+        if (turn == 13) continue;  // not at all
+        try_frame(
+            turned(from, step * static_cast<float>(turn % 3 - 1), step * static_cast<float>(turn / 3 % 3 - 1),
+                   step * static_cast<float>(turn / 9 - 1)),
+            best);
+      }
+    }
+    return best.rotation;
+  }
+
+  // Boxes of real nodes in the block's frame.
+  void fill_boxes(OrientedBlock& out) const {
+    const ScaledRotation rotation = scaled_rotation(out.rotation);
+    for (int node = 0; node < nodes_; ++node) {
+      double lowest[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, highest[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+      for (std::uint32_t t = first_[node]; t < first_[node + 1]; ++t) {
+        for (std::uint32_t c = 0; c < 3; ++c) {
+          float vertex[3];
+          std::copy_n(corner(t, c).begin(), 3, vertex);
+          for (int k = 0; k < 3; ++k) {
+            const double at = along_axis(rotation, k, vertex);
+            lowest[k] = std::min(lowest[k], at), highest[k] = std::max(highest[k], at);
+          }
+        }
+      }
+      for (int k = 0; k < 3; ++k)
+        box_along(lowest[k], highest[k], farthest_, out.center[k][node], out.half_extent[k][node]);
+    }
+  }
+
+  // What the checker asks for. Boxes of meshes smaller than 1e-40 may reach farther, whose coordinates
+  // float32 rounds to a few bits.
+  bool reaches_no_farther(const OrientedBlock& block) const {
+    bool near = true;
+    for (int node = 0; node < nodes_; ++node) {
+      for (int k = 0; k < 3; ++k) {
+        near = near && std::abs(double{block.center[k][node]}) + double{block.half_extent[k][node]} <=
+                           farthest_ * (1 + 0x1p-20);
+      }
+    }
+    return near;
+  }
+
+  const Geometry& geometry_;
+  const Tree& tree_;
+  const Ranges& ranges_;
+  const double farthest_;  // at least the distance of each vertex from the origin
+  int nodes_ = 0;
+  std::uint32_t first_[kNodesPerBlock + 1] = {};  // triangle of each node, and their end
+  float scale_ = 1;                               // makes the block's size 1
+  float rim_ = 0;
+  std::vector<std::uint32_t> vertices_;
+  std::vector<Vector> points_;
+  PointCloud cloud_[kNodesPerBlock];
+};
+
+}  // namespace
+
+std::vector<OrientedBlock> orient_blocks(const Geometry& geometry, const Tree& tree, Effort) {
+  std::vector<OrientedBlock> out(tree.blocks.size());
+  // Of each block its number, and of its first child, or of its first triangle.
+  std::vector<std::uint32_t> number(tree.blocks.size()), first_below(tree.blocks.size());
+  std::uint32_t next = 1;
+  for (std::size_t b = 0; b < tree.blocks.size(); ++b) {
+    const Block& block = tree.blocks[b];
+    first_below[b] = block.is_leaf_block() ? OrientedBlock::kIsLeafBlock | block.index[0] : next;
+    for (int i = 0; i < kNodesPerBlock && block.kind[i] == NodeKind::internal; ++i)
+      number[block.index[i]] = next++;
+  }
+  double squared = 0;
+  for (const double reach : extent_of(tree.blocks[0]).reach) squared += reach * reach;
+  const double farthest = std::sqrt(squared);
+  const Ranges ranges(tree);
+  using oneapi::tbb::blocked_range;
+  oneapi::tbb::parallel_for(blocked_range<std::size_t>(0, tree.blocks.size(), 64), [&](const auto& part) {
+    Fit fit(geometry, tree, ranges, farthest);
+    for (std::size_t b = part.begin(); b != part.end(); ++b) {
+      OrientedBlock& block = out[number[b]];
+      block = fit.make(static_cast<std::uint32_t>(b));
+      block.first_below = first_below[b];
+    }
+  });
+  return out;
+}
+
+}  // namespace tandem::build

@@ -172,8 +172,10 @@ class Walk {
     std::uint32_t hits = Means::test(args_, record, now.a, now.b, side_a, side_b) & now.nodes;
     const bool leaf_a = side_a.is_leaf_block(), leaf_b = side_b.is_leaf_block();
     if ((taken.entry.z & kSelf) != 0 && now.a == now.b) hits &= own_node_pairs(leaf_a);
-    if (leaf_a != leaf_b && hits != 0 && worth_planes(leaf_a, side_a.size, side_b.size))
-      hits = Means::drop_beyond_planes(record, now.a, now.b, hits);
+    if constexpr (Means::kTriesPlanes) {
+      if (leaf_a != leaf_b && hits != 0 && worth_planes(leaf_a, side_a.size, side_b.size))
+        hits = Means::drop_beyond_planes(record, now.a, now.b, hits);
+    }
     if (leaf_a && leaf_b) return {entry_of(taken, hits, Descent::both, now, side_a, side_b), true};
     const Descent goes_on = leaf_a != leaf_b
                                 ? descent_beside_leaves(leaf_a)

@@ -4,7 +4,6 @@
 #include "gpu_query_data.h"
 #include "tandem/kernels/detail/block_pair.h"
 #include "tandem/kernels/detail/leaf_planes.h"
-#include "tandem/kernels/detail/oriented_planes.h"
 #include "tandem/kernels/detail/oriented_test.h"
 #include "tandem/kernels/detail/oriented_world_box.h"
 #include "walk_stack.cuh"
@@ -230,18 +229,13 @@ struct InFrame {
     }
   }
 
+  /// In mode fast, whose candidates are the CPU's. Oriented boxes of leaves are nearly as thin as their
+  /// planes: exact queries are faster without (docs/decisions/0047).
+  static constexpr bool kTriesPlanes = kMode == QueryMode::fast;
   __device__ __noinline__ static std::uint32_t drop_beyond_planes(const PairRecord& record, std::uint32_t a,
                                                                   std::uint32_t b, std::uint32_t hits) {
-    if constexpr (kMode == QueryMode::exact) {
-      return tandem::drop_beyond_planes(record.oriented_a[a], record.oriented_b[b], hits, record.triangles_a,
-                                        record.triangles_b, pose_of(record), record.frame_error,
-                                        record.oriented_slack);
-    } else if constexpr (kMode == QueryMode::fast) {
-      return tandem::drop_beyond_planes(record.blocks_a[a], record.blocks_b[b], hits, record.triangles_a,
-                                        record.triangles_b, pose_of(record), record.frame_error);
-    } else {
-      return hits;
-    }
+    return tandem::drop_beyond_planes(record.blocks_a[a], record.blocks_b[b], hits, record.triangles_a,
+                                      record.triangles_b, pose_of(record), record.frame_error);
   }
 
   __device__ static Judged judge(const PairRecord& record, std::uint32_t a, std::uint32_t b) {
@@ -285,10 +279,7 @@ struct InWorld {
     return farthest_of(args.assets[args.instances.asset[instance]].extent);
   }
 
-  __device__ static std::uint32_t drop_beyond_planes(const PairRecord&, std::uint32_t, std::uint32_t,
-                                                     std::uint32_t hits) {
-    return hits;
-  }
+  static constexpr bool kTriesPlanes = false;
 
   __device__ static Judged judge(const PairRecord& record, std::uint32_t a, std::uint32_t b) {
     return {record.triangles_a[a].corner[0].w, record.triangles_b[b].corner[0].w, kMode == QueryMode::boxes,

@@ -14,9 +14,6 @@ namespace {
 // Walk blocks that an entry of the walk's stack can name.
 constexpr std::uint64_t kMostNumbers = std::uint64_t{1} << gpu::kNumberBits;
 
-// Entries of a warp's stack beyond its reserve.
-constexpr std::uint32_t kStackSize = 208;
-
 template <typename Number>
 Number grown(Number wanted, Number present) {
   return wanted <= present ? present : std::max(wanted, present + present / 2);
@@ -34,6 +31,7 @@ struct GpuContactQuery::State {
   std::uint32_t asset_count = 0, depth = 1, most_triangles = 0;
   std::uint64_t most_faces = 0;
 
+  gpu::DeviceLimits limits = {};
   GpuArray<gpu::QueryState> query;
   bool query_is_clear = false;  // a query that ends leaves it so
   GpuArray<gpu::Chunk> chunks;
@@ -76,8 +74,9 @@ struct GpuContactQuery::State {
 
 Status GpuContactQuery::State::provide_fixed_memory(cudaStream_t stream) {
   if (report.data() != nullptr) return Status::kOk;
-  Status status = reserve(query, 1);
-  if (status == Status::kOk) status = reserve(chunks, gpu::kChunks);
+  Status status = keep(gpu::limits_of_device(limits));
+  if (status == Status::kOk) status = reserve(query, 1);
+  if (status == Status::kOk) status = reserve(chunks, gpu::most_mailboxes(limits));
   if (status == Status::kOk) status = keep(cudaMemsetAsync(query.data(), 0, query.bytes(), stream));
   if (status == Status::kOk) status = keep(cudaMemsetAsync(chunks.data(), 0, chunks.bytes(), stream));
   if (status == Status::kOk) status = keep(cudaStreamSynchronize(stream));
@@ -199,9 +198,8 @@ gpu::QueryArgs GpuContactQuery::State::args(const GpuInstances& instances, const
   args.contacts = options.sorted ? unsorted.data() : contacts.data();
   args.undecided = undecided.data();
   args.unresolved = undecided.data() + capacity.undecided;
-  args.most_blocks = std::min(options.most_blocks, gpu::kChunks);  // a grid never has as many
-  args.stack_reserve = 2 * depth + 32;                             // see walk.cuh
-  args.stack_size = args.stack_reserve + kStackSize;
+  args.limits = limits;
+  args.shape = gpu::walk_shape(limits, depth, options.most_blocks);
   return args;
 }
 

@@ -42,7 +42,7 @@ struct GpuQueryCapacity {
 /// GpuContactQuery::bytes(), where it was never given more blocks of trees. Instances cost it nothing.
 inline std::size_t most_query_bytes(const GpuQueryCapacity& capacity, bool sorted,
                                     std::span<const GpuAsset> assets) {
-  constexpr std::size_t kFixed = std::size_t{5} << 20;  // work that warps give to each other, and the report
+  constexpr std::size_t kFixed = std::size_t{9} << 20;  // work that warps give to each other, and the report
   std::size_t blocks = assets.size();
   for (const GpuAsset& asset : assets)
     blocks += std::size_t{kNodesPerBlock} * (asset.tree.block_count - asset.tree.leaf_block_count);

@@ -36,12 +36,12 @@ int main(int argc, char** argv) {
     return fail("a stream", tandem::status_of(error), error);
   const cudaStream_t stream = owner.get();
   tandem::DeviceAsset cow;  // one allocation, one copy
-  tandem::Status status = cow.upload(file.view(), stream);
+  tandem::Status status = cow.upload(file.view(), stream, tandem::Contents::exact_queries);
   if (status != tandem::Status::kOk) return fail("upload", status, cow.cuda_error());
 
   // The scene, all of it in GPU memory: the asset's bounds, and for each body the asset and a pose.
   const tandem::FileHeader& header = *file.view().header;
-  const tandem::GpuAsset asset = tandem::gpu_asset(cow.level(), header);
+  const tandem::GpuAsset asset = tandem::gpu_asset(cow.level(), file.view());
   const tandem::AssetBounds bounds = tandem::asset_bounds(header);
   tandem::GpuArray<tandem::AssetBounds> gpu_bounds;
   tandem::GpuArray<std::uint32_t> asset_of_body;

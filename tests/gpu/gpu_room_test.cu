@@ -102,7 +102,7 @@ TEST_F(GpuRoom, AQueryHoldsNoMoreThanItsRuleSays) {
       GpuContactQuery query;
       ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
       ASSERT_EQ(query.reserve(wanted, {.sorted = sorted}), Status::kOk);
-      const std::size_t most = most_query_bytes(query.capacity(), sorted, on_gpu.assets());
+      const std::size_t most = most_query_bytes(query.capacity(), sorted, on_gpu.assets().size());
       EXPECT_LE(query.bytes(), most) << wanted.contacts << " contacts, sorted " << sorted;
       EXPECT_LE(taken.bytes(), query.bytes() + Taken::kSlack);
       EXPECT_LE(most, query.bytes() + query.bytes() / 5 + (5 << 20));  // a rule, not just something large
@@ -116,19 +116,19 @@ TEST_F(GpuRoom, AQueryThatGrewHoldsNoMoreThanItsRuleSays) {
   GpuContactQuery query;
   ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
   ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {.sorted = true}, nullptr), Status::kOk);
-  EXPECT_LE(query.bytes(), most_query_bytes(query.capacity(), true, on_gpu.assets()));
+  EXPECT_LE(query.bytes(), most_query_bytes(query.capacity(), true, on_gpu.assets().size()));
 }
 
-/// Blocks with imaginary nodes have room for children that they lack.
+/// Queries keep nothing of trees.
 TEST_F(GpuRoom, AQueryOfLargeTreesHoldsNoMoreThanItsRuleSays) {
   test::RandomPoses random(34);
   Scene scene;
-  scene.assets.add(test::soup(random, 600'000, 0.01), {}, build::Imaginary::free);
+  scene.assets.add(test::soup(random, 600'000, 0.01));
   scene.instances = {{0, kIdentityPose}};
   const GpuScene on_gpu(scene.assets, scene.instances, {});
   GpuContactQuery query;
   ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
-  const std::size_t most = most_query_bytes(query.capacity(), false, on_gpu.assets());
+  const std::size_t most = most_query_bytes(query.capacity(), false, on_gpu.assets().size());
   EXPECT_LE(query.bytes(), most);
   EXPECT_LE(most, query.bytes() + query.bytes() / 5 + (1 << 20));
 }

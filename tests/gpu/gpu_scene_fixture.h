@@ -88,7 +88,7 @@ inline std::vector<ObjectPair> all_pairs(const std::vector<Instance>& instances,
 class GpuScene {
  public:
   GpuScene(const SampleAssets& assets, const std::vector<Instance>& instances,
-           const std::vector<ObjectPair>& pairs)
+           const std::vector<ObjectPair>& pairs, Contents contents = Contents::all)
       : asset_(on_gpu(part(instances, &Instance::asset))),
         pose_(on_gpu(part(instances, &Instance::pose))),
         pairs_(on_gpu(pairs)),
@@ -97,8 +97,8 @@ class GpuScene {
         pair_count_(static_cast<std::uint32_t>(pairs.size())) {
     for (const AssetView& view : assets.views()) {
       DeviceAsset& asset = uploads_.emplace_back();
-      EXPECT_EQ(asset.upload(view, nullptr), Status::kOk);
-      views_.push_back(gpu_asset(asset.level(), *view.header));
+      EXPECT_EQ(asset.upload(view, nullptr, contents), Status::kOk);
+      views_.push_back(gpu_asset(asset.level(), view));
     }
   }
 

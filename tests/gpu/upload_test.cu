@@ -8,6 +8,7 @@
 #include "build/sample_asset.h"
 #include "gpu_scene_fixture.h"
 #include "kernels/plain_boxes.h"
+#include "made_files.h"
 #include "tandem/kernels/detail/box_test.h"
 #include "tandem/runtime/upload.h"
 
@@ -32,9 +33,37 @@ TEST_F(Gpu, AnUploadedLevelHasTheSameBytes) {
   ASSERT_EQ(device.block_count, host.block_count);
   const auto blocks = download(device.blocks, device.block_count);
   const auto triangles = download(device.triangles, device.triangle_count);
+  const auto oriented = download(device.oriented_blocks, device.block_count);
   EXPECT_EQ(std::memcmp(blocks.data(), host.blocks, blocks.size() * sizeof(Block)), 0);
   EXPECT_EQ(std::memcmp(triangles.data(), host.triangles, triangles.size() * sizeof(Triangle)), 0);
+  EXPECT_EQ(std::memcmp(oriented.data(), host.oriented_blocks, oriented.size() * sizeof(OrientedBlock)), 0);
   EXPECT_EQ(reinterpret_cast<std::uintptr_t>(device.blocks) % alignof(Block), 0u);
+}
+
+TEST_F(Gpu, AnUploadForExactQueriesHasWhatTheyNeed) {
+  test::RandomPoses random(4);
+  std::vector<test::MadeLevel> levels;
+  for (const std::uint32_t triangles : {2001u, 100u, 7u})
+    levels.push_back(test::built_level(test::soup(random, triangles, 0.1), 2001.0 - triangles));
+  const test::Bytes file = test::made_file(levels);
+  const AssetView view = file.check().asset;
+  DeviceAsset asset;
+  ASSERT_EQ(asset.upload(view, nullptr, Contents::exact_queries), Status::kOk);
+  ASSERT_EQ(asset.level_count(), 3u);
+  std::size_t needed = 0;
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    const LevelView host = view.level(i), device = asset.level(i);
+    EXPECT_EQ(device.blocks, nullptr);
+    const auto triangles = download(device.triangles, device.triangle_count);
+    const auto oriented = download(device.oriented_blocks, device.block_count);
+    EXPECT_EQ(std::memcmp(triangles.data(), host.triangles, triangles.size() * sizeof(Triangle)), 0);
+    EXPECT_EQ(std::memcmp(oriented.data(), host.oriented_blocks, oriented.size() * sizeof(OrientedBlock)), 0);
+    EXPECT_EQ(reinterpret_cast<std::uintptr_t>(device.triangles) % kSectionAlignment, 0u);
+    EXPECT_EQ(reinterpret_cast<std::uintptr_t>(device.oriented_blocks) % kSectionAlignment, 0u);
+    needed += triangles.size() * sizeof(Triangle) + oriented.size() * sizeof(OrientedBlock);
+  }
+  EXPECT_GE(asset.bytes(), needed);
+  EXPECT_LT(asset.bytes(), needed + 6 * kSectionAlignment);
 }
 
 TEST_F(Gpu, AssetsMoveAndUploadAgain) {

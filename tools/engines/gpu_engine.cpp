@@ -67,7 +67,7 @@ void sort_pairs(TimedAnswer& answer) {
 }  // namespace
 
 // The context is made first, so that nothing that is timed is charged with it.
-GpuEngine::GpuEngine(std::string_view name) : name_(name) {
+GpuEngine::GpuEngine(std::string_view name, Contents contents) : name_(name), contents_(contents) {
   std::size_t total = 0;
   check(cudaFree(nullptr), "start");
   check(cudaMemGetInfo(&free_at_start_, &total), "memory");
@@ -77,6 +77,7 @@ GpuEngine::GpuEngine(std::string_view name) : name_(name) {
 void GpuEngine::check(Status status, cudaError_t error, const char* step) const {
   if (status == Status::kOk) return;
   if (status == Status::kOutOfMemory) throw std::bad_alloc();
+  if (status == Status::kNoOrientedBlocks) require(status, 0);
   const std::string told = error == cudaSuccess ? "" : std::string(": ") + cudaGetErrorString(error);
   throw GpuError(name_ + ": " + explain(status) + told, status, step, reason_of(status, error));
 }
@@ -92,9 +93,9 @@ void GpuEngine::set_shapes(std::span<const AssetView> shapes) {
   check(bounds_.grow(shapes.size()), "instances");
   for (std::size_t i = 0; i < shapes.size(); ++i) {
     DeviceAsset& upload = uploads_.emplace_back();
-    const Status status = upload.upload(shapes[i], stream());
+    const Status status = upload.upload(shapes[i], stream(), contents_);
     check(status, upload.cuda_error(), "an asset");
-    shapes_.push_back(gpu_asset(upload.level(), *shapes[i].header));
+    shapes_.push_back(gpu_asset(upload.level(), shapes[i]));
     bounds_.staged.data()[i] = asset_bounds(*shapes[i].header);
   }
   check(bounds_.upload(shapes.size(), stream()), "instances");

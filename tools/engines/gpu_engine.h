@@ -50,8 +50,8 @@ class GpuEngine : public Engine {
   TimedAnswer time_query(const TimedQuery& asked) final;
 
  protected:
-  /// Throws GpuError where no GPU can be used.
-  explicit GpuEngine(std::string_view name);
+  /// contents: what it uploads of shapes. Throws GpuError where no GPU can be used.
+  GpuEngine(std::string_view name, Contents contents);
 
   cudaStream_t stream() const { return stream_.get(); }
   std::span<const GpuAsset> shapes() const { return shapes_; }
@@ -98,6 +98,7 @@ class GpuEngine : public Engine {
   GpuUse use(const TimedQuery& asked) const;
 
   std::string name_;
+  Contents contents_;
   std::size_t free_at_start_ = 0;
   double upload_of_shapes_ = 0, upload_of_bodies_ = 0;  // seconds
   GpuStream stream_;

@@ -9,7 +9,9 @@ namespace {
 /// Tandem on the GPU.
 class TandemCudaEngine final : public GpuEngine {
  public:
-  explicit TandemCudaEngine(const QueryOptions& options) : GpuEngine("tandem-cuda"), options_(options) {}
+  explicit TandemCudaEngine(const QueryOptions& options)
+      : GpuEngine("tandem-cuda", options.mode == QueryMode::exact ? Contents::exact_queries : Contents::all),
+        options_(options) {}
 
  private:
   GpuQueryOptions options(bool sorted) const {
@@ -76,7 +78,7 @@ class TandemCudaEngine final : public GpuEngine {
 
   std::size_t query_bytes() const override { return query_.bytes(); }
   std::size_t most_bytes(bool sorted) const override {
-    return most_query_bytes(query_.capacity(), sorted, shapes());
+    return most_query_bytes(query_.capacity(), sorted, shapes().size());
   }
 
   QueryOptions options_;

@@ -11,8 +11,8 @@
 namespace tandem {
 namespace {
 
-// Walk blocks that an entry of the walk's stack can name.
-constexpr std::uint64_t kMostNumbers = std::uint64_t{1} << gpu::kNumberBits;
+// Blocks of a tree that an entry of the walk's stack can name.
+constexpr std::uint32_t kMostBlocks = (1u << gpu::kNumberBits) - 1;
 
 // Entries of a warp's stack beyond its reserve.
 constexpr std::uint32_t kStackSize = 208;
@@ -28,11 +28,10 @@ constexpr std::uint64_t kMostUndecided = 0xFFFFFFFEu;
 }  // namespace
 
 struct GpuContactQuery::State {
-  GpuArray<gpu::Asset> assets;
-  GpuArray<gpu::WalkBlock> walk_blocks;  // of all assets
-  GpuArray<std::uint32_t> file_blocks;   // what each walk block was made of
+  GpuArray<GpuAsset> assets;
   std::uint32_t asset_count = 0, depth = 1, most_triangles = 0;
   std::uint64_t most_faces = 0;
+  bool all_oriented = true, all_axis_aligned = true;  // whether each asset has these blocks
 
   GpuArray<gpu::QueryState> query;
   bool query_is_clear = false;  // a query that ends leaves it so
@@ -63,12 +62,12 @@ struct GpuContactQuery::State {
   }
 
   Status provide_fixed_memory(cudaStream_t stream);
-  Status make_walk_blocks(std::span<const GpuAsset> given, cudaStream_t stream);
   Status set_assets(std::span<const GpuAsset> given, cudaStream_t stream);
   Status reserve_pairs(std::uint32_t wanted);
   Status reserve_contacts(std::uint64_t wanted);
   Status reserve_undecided(std::uint64_t wanted);
   Status reserve_sorting();
+  Status check_mode(QueryMode mode) const;
   bool can_sort() const { return sorting.room() != 0 && unsorted.room() >= capacity.contacts; }
   gpu::QueryArgs args(const GpuInstances& instances, const GpuPairs& given, const GpuQueryOptions& options);
   cudaError_t launch(const gpu::QueryArgs& args, cudaStream_t stream);
@@ -91,44 +90,35 @@ Status GpuContactQuery::State::provide_fixed_memory(cudaStream_t stream) {
 Status GpuContactQuery::State::set_assets(std::span<const GpuAsset> given, cudaStream_t stream) {
   Status status = provide_fixed_memory(stream);
   if (status != Status::kOk) return status;
-  std::uint32_t deepest = 1, triangles = 0;
-  std::uint64_t faces = 0, numbers = 0;
+  std::uint32_t deepest = 1, triangles = 0, blocks = 0;
+  std::uint64_t faces = 0;
+  bool oriented = true, axis_aligned = true;
   for (const GpuAsset& asset : given) {
-    numbers += gpu::numbers_of(asset.tree);
+    oriented = oriented && asset.tree.oriented_blocks != nullptr;
+    axis_aligned = axis_aligned && asset.tree.blocks != nullptr;
+    blocks = std::max(blocks, asset.tree.block_count);
     deepest = std::max(deepest, asset.tree.depth);
     triangles = std::max(triangles, asset.tree.triangle_count);
     faces = std::max(faces, asset.source_faces);
   }
-  if (given.size() >= kNoIndex || numbers > kMostNumbers) return Status::kOutOfRange;
+  if (given.size() >= kNoIndex || blocks >= kMostBlocks) return Status::kOutOfRange;
   asset_count = 0;
-  status = reserve(assets, given.size());
-  if (status == Status::kOk) status = reserve(walk_blocks, numbers);
-  if (status == Status::kOk) status = reserve(file_blocks, numbers);
-  if (status == Status::kOk && !given.empty()) status = make_walk_blocks(given, stream);
+  status = keep(assets.upload(given, stream));
+  if (status == Status::kOk) status = keep(cudaStreamSynchronize(stream));
   if (status != Status::kOk) return status;
   asset_count = static_cast<std::uint32_t>(given.size());
   depth = deepest;
   most_triangles = triangles;
   most_faces = faces;
+  all_oriented = oriented;
+  all_axis_aligned = axis_aligned;
   return Status::kOk;
 }
 
-Status GpuContactQuery::State::make_walk_blocks(std::span<const GpuAsset> given, cudaStream_t stream) {
-  const std::unique_ptr<gpu::Asset[]> table(new (std::nothrow) gpu::Asset[given.size()]);
-  if (table == nullptr) return Status::kOutOfMemory;
-  std::uint32_t root = 0, blocks = 0;
-  for (std::size_t i = 0; i < given.size(); ++i) {
-    table[i] = {given[i], {}, root, blocks};
-    root += static_cast<std::uint32_t>(gpu::numbers_of(given[i].tree));
-    blocks += given[i].tree.block_count;
-  }
-  GpuArray<std::uint32_t> number_of;
-  Status status = reserve(number_of, blocks);
-  if (status == Status::kOk) status = keep(assets.upload({table.get(), given.size()}, stream));
-  if (status == Status::kOk)
-    status = keep(gpu::make_walk_blocks(assets.data(), static_cast<std::uint32_t>(given.size()), blocks,
-                                        walk_blocks.data(), file_blocks.data(), number_of.data(), stream));
-  return status == Status::kOk ? keep(cudaStreamSynchronize(stream)) : status;
+Status GpuContactQuery::State::check_mode(QueryMode mode) const {
+  if (gpu::walked_kind(mode) == gpu::BlockKind::oriented)
+    return all_oriented ? Status::kOk : Status::kNoOrientedBlocks;
+  return all_axis_aligned ? Status::kOk : Status::kNoAxisAlignedBlocks;
 }
 
 Status GpuContactQuery::State::reserve_pairs(std::uint32_t wanted) {
@@ -192,8 +182,6 @@ gpu::QueryArgs GpuContactQuery::State::args(const GpuInstances& instances, const
   args.host_report = report.data();
   args.chunks = chunks.data();
   args.pairs = pairs.data();
-  args.walk_blocks = walk_blocks.data();
-  args.file_blocks = file_blocks.data();
   args.world_pairs = world_pairs.data();
   args.met = met.data();
   args.contacts = options.sorted ? unsorted.data() : contacts.data();
@@ -241,6 +229,7 @@ Status GpuContactQuery::reserve(const GpuQueryCapacity& wanted, const GpuQueryOp
 Status GpuContactQuery::enqueue(const GpuInstances& instances, const GpuPairs& pairs,
                                 const GpuQueryOptions& options, cudaStream_t stream) {
   State& s = *state_;
+  if (const Status status = s.check_mode(options.mode); status != Status::kOk) return status;
   if (options.sorted && !s.can_sort()) return Status::kOutOfRange;
   const gpu::QueryArgs args = s.args(instances, pairs, options);
   cudaError_t error = s.launch(args, stream);
@@ -290,9 +279,9 @@ GpuQueryCapacity GpuContactQuery::capacity() const {
 std::size_t GpuContactQuery::bytes() const {
   if (state_ == nullptr) return 0;
   const State& s = *state_;
-  return s.assets.bytes() + s.walk_blocks.bytes() + s.file_blocks.bytes() + s.query.bytes() +
-         s.chunks.bytes() + s.pairs.bytes() + s.world_pairs.bytes() + s.met.bytes() + s.contacts.bytes() +
-         s.undecided.bytes() + s.unsorted.bytes() + s.order.bytes() + s.sorting.bytes();
+  return s.assets.bytes() + s.query.bytes() + s.chunks.bytes() + s.pairs.bytes() + s.world_pairs.bytes() +
+         s.met.bytes() + s.contacts.bytes() + s.undecided.bytes() + s.unsorted.bytes() + s.order.bytes() +
+         s.sorting.bytes();
 }
 
 cudaError_t GpuContactQuery::cuda_error() const {

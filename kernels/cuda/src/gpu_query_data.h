@@ -10,6 +10,9 @@
 // What the kernels of a query share, all of it in GPU memory.
 namespace tandem::gpu {
 
+/// The bits that the walk's stack has for the number of a block; all of them set is no block's.
+inline constexpr std::uint32_t kNumberBits = 29;
+
 /// Two leaves whose boxes overlap, of an object pair.
 struct Candidate {
   std::uint32_t pair, a, b;
@@ -44,7 +47,7 @@ struct QueryState {
 
 /// The arguments of all kernels of a query.
 struct QueryArgs {
-  const Asset* assets;
+  const GpuAsset* assets;
   std::uint32_t asset_count;
   GpuInstances instances;
   GpuPairs given;
@@ -55,10 +58,8 @@ struct QueryArgs {
   GpuQueryReport* host_report;  ///< in CPU memory
   Chunk* chunks;
   PairRecord* pairs;
-  const WalkBlock* walk_blocks;
-  const std::uint32_t* file_blocks;  ///< see make_walk_blocks()
-  std::uint32_t* world_pairs;        ///< pairs that are not in_frame
-  std::uint32_t* met;  ///< of a pair: not 0 once it has a contact; where only the first is asked for
+  std::uint32_t* world_pairs;  ///< pairs that are not in_frame
+  std::uint32_t* met;          ///< of a pair: not 0 once it has a contact; where only the first is asked for
   Contact* contacts;
   Candidate *undecided, *unresolved;
   std::uint32_t stack_size, stack_reserve;  ///< entries of a warp's stack; see Walk::step()
@@ -79,16 +80,9 @@ struct SortingRoom {
 /// Sorting keeps two rows of 64-bit keys where its result is to come, each row aligned.
 inline constexpr std::size_t kContactsForKeys = 32;
 
-/// Makes the walk blocks of the assets in a table, and fills in their extents; `blocks` have their files in
-/// all. The walk blocks of an asset have numbers from its root on, as many as numbers_of() says, and
-/// `file_blocks` tells of each the block it was made of. number_of: scratch, a word for each block of the
-/// files.
-cudaError_t make_walk_blocks(Asset* assets, std::uint32_t asset_count, std::uint32_t blocks, WalkBlock* out,
-                             std::uint32_t* file_blocks, std::uint32_t* number_of, cudaStream_t stream);
-
-/// Walk blocks are numbered in fours, one four for the children of a block.
-inline std::uint64_t numbers_of(const LevelView& tree) {
-  return 1 + std::uint64_t{kNodesPerBlock} * (tree.block_count - tree.leaf_block_count);
+/// Which blocks a query of this mode walks.
+TANDEM_HD constexpr BlockKind walked_kind(QueryMode mode) {
+  return mode == QueryMode::exact ? BlockKind::oriented : BlockKind::axis_aligned;
 }
 
 /// Checks instances and pairs and makes the records.

@@ -15,29 +15,6 @@ namespace tandem::gpu {
 
 using Counter = unsigned long long;  // what atomicAdd takes
 
-/// What a walk reads of a block: its boxes in a frame of its own, component by component, and what lies below
-/// them. The blocks below its nodes, or the triangles, have numbers that follow each other. 112 bytes, an odd
-/// number of float4: where the lanes of a warp read the same component of several blocks, the L1 cache serves
-/// them from several banks, which it cannot where blocks are 128 bytes apart.
-struct alignas(16) WalkBlock {
-  float center[3][kNodesPerBlock];
-  float half_extent[3][kNodesPerBlock];
-  std::uint32_t first_below;  ///< number of the first node's block, or kIsLeafBlock and that of its triangle
-  float size;                 ///< square root of the surface of the largest box
-  BlockRotation rotation;
-};
-static_assert(sizeof(WalkBlock) == 112 && offsetof(WalkBlock, first_below) == 96);
-
-/// Walk blocks are numbered through all assets of a query.
-inline constexpr std::uint32_t kNumberBits = 29, kNumberMask = (1u << kNumberBits) - 1;
-inline constexpr std::uint32_t kIsLeafBlock = 1u << 31;
-
-struct Asset : GpuAsset {
-  TreeExtent extent;
-  std::uint32_t root;         ///< number of its walk block
-  std::uint32_t first_block;  ///< how many blocks the assets before it have in their files
-};
-
 /// What the walk needs to know of an object pair, in whole float4.
 struct alignas(16) PairRecord {
   float4 rotation[3];      ///< of RelativePose; w: translation
@@ -48,10 +25,19 @@ struct alignas(16) PairRecord {
   std::uint32_t in_frame;  ///< float32 can take the pair
   std::uint32_t instance_a, instance_b;
   const Triangle *triangles_a, *triangles_b;
-  const Block *blocks_a, *blocks_b;
-  std::uint32_t root_a, root_b;  ///< walk blocks
+  union {  ///< which of them, the record's maker says
+    const Block* blocks_a;
+    const OrientedBlock* oriented_a;
+  };
+  union {
+    const Block* blocks_b;
+    const OrientedBlock* oriented_b;
+  };
 };
-static_assert(sizeof(PairRecord) == 176);
+static_assert(sizeof(PairRecord) == 160);
+
+/// Which blocks of a tree are walked.
+enum class BlockKind : std::uint8_t { axis_aligned, oriented };
 
 /// What an error is about, in the order of the CPU's checks.
 enum class Subject : Counter { instance, pair, reach };
@@ -105,22 +91,22 @@ __device__ inline RelativePose pose_of(const PairRecord& record) {
 }
 
 /// The pose of stored coordinates.
-__device__ inline Pose stored_pose(const GpuInstances& instances, const Asset* assets,
+__device__ inline Pose stored_pose(const GpuInstances& instances, const GpuAsset* assets,
                                    std::uint32_t instance) {
   return for_stored_coordinates(instances.pose[instance], assets[instances.asset[instance]].origin);
 }
 
-__device__ inline Status check_instance(const GpuInstances& instances, const Asset* assets,
+__device__ inline Status check_instance(const GpuInstances& instances, const GpuAsset* assets,
                                         std::uint32_t asset_count, std::uint32_t instance) {
   Pose stored;
   WorldBox box;
   return pose_instance(assets, asset_count, instances.asset[instance], instances.pose[instance], stored, box);
 }
 
-/// The record of a pair of instances whose assets there are. oriented: for tests of walk blocks too.
-__device__ inline PairRecord make_record(const GpuInstances& instances, const Asset* assets,
-                                         const ObjectPair& pair, bool oriented) {
-  const Asset &a = assets[instances.asset[pair.a]], &b = assets[instances.asset[pair.b]];
+/// The record of a pair of instances whose assets there are, for walks of such blocks.
+__device__ inline PairRecord make_record(const GpuInstances& instances, const GpuAsset* assets,
+                                         const ObjectPair& pair, BlockKind kind) {
+  const GpuAsset &a = assets[instances.asset[pair.a]], &b = assets[instances.asset[pair.b]];
   RelativePose pose;
   const bool in_frame =
       relative_pose(stored_pose(instances, assets, pair.a), a.extent, stored_pose(instances, assets, pair.b),
@@ -133,13 +119,16 @@ __device__ inline PairRecord make_record(const GpuInstances& instances, const As
     record.slack_b[i] = pose.slack_b[i];
   }
   if (in_frame) record.frame_error = frame_error(pose, a.extent, b.extent);
-  if (in_frame && oriented) record.oriented_slack = oriented_slack(pose, a.extent, b.extent);
-  record.blocks_a = a.tree.blocks;
-  record.blocks_b = b.tree.blocks;
+  if (kind == BlockKind::oriented) {
+    if (in_frame) record.oriented_slack = oriented_slack(pose, a.extent, b.extent);
+    record.oriented_a = a.tree.oriented_blocks;
+    record.oriented_b = b.tree.oriented_blocks;
+  } else {
+    record.blocks_a = a.tree.blocks;
+    record.blocks_b = b.tree.blocks;
+  }
   record.triangles_a = a.tree.triangles;
   record.triangles_b = b.tree.triangles;
-  record.root_a = a.root;
-  record.root_b = b.root;
   record.instance_a = pair.a;
   record.instance_b = pair.b;
   record.in_frame = in_frame;

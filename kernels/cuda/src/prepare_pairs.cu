@@ -17,7 +17,7 @@ __device__ void prepare_pair(const QueryArgs& args, std::uint32_t index) {
     return report_error(args, Subject::pair, index, status);
   if (args.instances.asset[pair.a] >= args.asset_count || args.instances.asset[pair.b] >= args.asset_count)
     return;  // reported with the instance
-  const PairRecord record = make_record(args.instances, args.assets, pair, true);
+  const PairRecord record = make_record(args.instances, args.assets, pair, walked_kind(args.mode));
   args.pairs[index] = record;
   if (args.first_contact_only) args.met[index] = 0;
   if (record.in_frame == 0) args.world_pairs[atomicAdd(&args.state->world_pairs, 1u)] = index;

@@ -117,15 +117,12 @@ class Walk {
 
   __device__ void put_pairs(std::uint32_t first, std::uint32_t count, std::uint32_t pairs) {
     bool mine = lane_ < count && first < pairs && lane_ < pairs - first;
-    std::uint32_t pair = first + lane_, root_a = 0, root_b = 0;
+    std::uint32_t pair = first + lane_;
+    bool self = false;
     if (mine && Means::kWorld) pair = args_.world_pairs[pair];
     if (mine && !Means::kWorld) mine = args_.pairs[pair].in_frame != 0;
-    if (mine) {
-      const PairRecord& record = args_.pairs[pair];
-      root_a = record.root_a;
-      root_b = record.root_b | (record.instance_a == record.instance_b ? kSelf : 0);
-    }
-    stack_.put_roots(mine, pair, root_a, root_b);
+    if (mine) self = args_.pairs[pair].instance_a == args_.pairs[pair].instance_b;
+    stack_.put_roots(mine, pair, Means::Blocks::kRoots, self);
   }
 
   /// Takes up to 32 block pairs off, tests them and puts on those that hit.
@@ -170,17 +167,19 @@ class Walk {
   /// Tests the block pair that a lane took off. By one lane.
   __device__ Tested test(const Taken& taken) const {
     const PairRecord& record = args_.pairs[taken.entry.x];
-    const Below now = below_of(taken.entry, taken.bit);
+    const Below now = below_of<typename Means::Blocks>(record, taken.entry, taken.bit);
     Side side_a, side_b;
     std::uint32_t hits = Means::test(args_, record, now.a, now.b, side_a, side_b) & now.nodes;
-    const bool leaf_a = (side_a.first_below & kIsLeafBlock) != 0,
-               leaf_b = (side_b.first_below & kIsLeafBlock) != 0;
+    const bool leaf_a = side_a.is_leaf_block(), leaf_b = side_b.is_leaf_block();
     if ((taken.entry.z & kSelf) != 0 && now.a == now.b) hits &= own_node_pairs(leaf_a);
-    if (leaf_a != leaf_b && hits != 0 && worth_planes(leaf_a, side_a.size, side_b.size))
-      hits = Means::drop_beyond_planes(args_, record, now.a, now.b, hits);
+    if constexpr (Means::kTriesPlanes) {
+      if (leaf_a != leaf_b && hits != 0 && worth_planes(leaf_a, side_a.size, side_b.size))
+        hits = Means::drop_beyond_planes(record, now.a, now.b, hits);
+    }
     if (leaf_a && leaf_b) return {entry_of(taken, hits, Descent::both, now, side_a, side_b), true};
-    const Descent goes_on = leaf_a != leaf_b ? descent_beside_leaves(leaf_a)
-                                             : descent_by_size(side_a.size, side_b.size, Means::kDescends);
+    const Descent goes_on = leaf_a != leaf_b
+                                ? descent_beside_leaves(leaf_a)
+                                : descent_by_size(side_a.size, side_b.size, Means::Blocks::kDescends);
     uint4 entry = entry_of(taken, hits, goes_on, now, side_a, side_b);
     entry.y |= static_cast<std::uint32_t>(goes_on) << kNumberBits;
     entry.z |= taken.entry.z & kSelf;
@@ -200,8 +199,9 @@ class Walk {
       left |= hits >> 1;
       left = (left | left >> 2) & 0x1111u;
     }
-    return {taken.entry.x, goes_on == Descent::b_alone ? now.a : side_a.first_below & ~kIsLeafBlock,
-            goes_on == Descent::a_alone ? now.b : side_b.first_below & ~kIsLeafBlock, left | hits << 16};
+    return {taken.entry.x, goes_on == Descent::b_alone ? now.a : side_a.below & ~OrientedBlock::kIsLeafBlock,
+            goes_on == Descent::a_alone ? now.b : side_b.below & ~OrientedBlock::kIsLeafBlock,
+            left | hits << 16};
   }
 
   /// Decides the last candidates; count <= 32.

@@ -1,7 +1,7 @@
 #include "walk.cuh"
 
 // Exact mode alone: nvcc may fuse multiplies and adds here. The proofs of box tests (docs/box_test.md,
-// oriented_block.h) and of the first stage (frame_test.h) allow it, and what they leave is decided elsewhere.
+// oriented_test.h) and of the first stage (frame_test.h) allow it, and what they leave is decided elsewhere.
 namespace tandem::gpu {
 
 cudaError_t walk_exact(const QueryArgs& args, cudaStream_t stream) {

@@ -1,8 +1,12 @@
 #pragma once
+#include <type_traits>
+
 #include "gpu_query_data.h"
 #include "tandem/kernels/detail/block_pair.h"
 #include "tandem/kernels/detail/leaf_planes.h"
 #include "tandem/kernels/detail/oriented_test.h"
+#include "tandem/kernels/detail/oriented_world_box.h"
+#include "walk_stack.cuh"
 
 // What one lane of a walk does with a block pair and with a candidate, in the frame of the first of a pair or
 // in world coordinates.
@@ -83,14 +87,42 @@ __device__ inline std::uint32_t mask_of_block_pair(const Block& block_a, const B
 
 /// What a test tells of a block besides.
 struct Side {
-  std::uint32_t first_below;  ///< of its WalkBlock
+  std::uint32_t below;  ///< kIsLeafBlock and the first triangle, or the family of its children
   float size;
+
+  __device__ bool is_leaf_block() const { return (below & OrientedBlock::kIsLeafBlock) != 0; }
 };
 
-__device__ inline Side side_of(const WalkBlock& block) {
-  const uint2 words = __ldg(reinterpret_cast<const uint2*>(&block.first_below));
-  return {words.x, __uint_as_float(words.y)};
-}
+/// Oriented blocks. A family has the number of its first block.
+struct OrientedBlocks {
+  static constexpr std::uint32_t kRoots = 0;  ///< the root's own family
+  static constexpr float kDescends = kOrientedDescendsAlone;
+
+  __device__ static const OrientedBlock* of_a(const PairRecord& record) { return record.oriented_a; }
+  __device__ static const OrientedBlock* of_b(const PairRecord& record) { return record.oriented_b; }
+  __device__ static std::uint32_t child(const OrientedBlock*, std::uint32_t family, std::uint32_t node) {
+    return family + node;
+  }
+};
+
+/// Axis-aligned blocks. A family has the number of the block above it.
+struct AxisAlignedBlocks {
+  static constexpr std::uint32_t kRoots = kNumberMask;  ///< no block has this number
+  static constexpr float kDescends = kDescendsAlone;
+
+  __device__ static const Block* of_a(const PairRecord& record) { return record.blocks_a; }
+  __device__ static const Block* of_b(const PairRecord& record) { return record.blocks_b; }
+  __device__ static std::uint32_t child(const Block* blocks, std::uint32_t family, std::uint32_t node) {
+    return family == kRoots ? 0 : blocks[family].index[node];
+  }
+  __device__ static Side side(const Block& block, std::uint32_t number, float size) {
+    return {block.is_leaf_block() ? OrientedBlock::kIsLeafBlock | block.index[0] : number, size};
+  }
+};
+
+template <QueryMode kMode>
+using WalkedBlocks =
+    std::conditional_t<walked_kind(kMode) == BlockKind::oriented, OrientedBlocks, AxisAlignedBlocks>;
 
 /// Translation and rotation of a record. By plain loads, as all of a record: the kernel that makes records
 /// may still be running when this one starts, and what __ldg() loads must not change while a kernel runs.
@@ -103,8 +135,8 @@ __device__ inline void load_pose(const PairRecord& record, float (&rotation)[3][
 }
 
 /// overlap_oriented() of all node pairs.
-__device__ inline std::uint32_t oriented_mask(const PairRecord& record, const WalkBlock& block_a,
-                                              const WalkBlock& block_b, Side& side_a, Side& side_b) {
+__device__ inline std::uint32_t oriented_mask(const PairRecord& record, const OrientedBlock& block_a,
+                                              const OrientedBlock& block_b, Side& side_a, Side& side_b) {
   const auto* a = reinterpret_cast<const float4*>(&block_a);
   const auto* b = reinterpret_cast<const float4*>(&block_b);
   const uint4 last_a = __ldg(reinterpret_cast<const uint4*>(a + 6)),
@@ -180,27 +212,29 @@ struct InFrame {
   static constexpr bool kWorld = false;
   static constexpr bool kCountsOnly = kWalksOnly;  ///< candidates are counted, none decided
   static constexpr bool kBounded = kMode == QueryMode::exact;
-  static constexpr float kDescends =
-      kBounded ? kOrientedDescendsAlone : kDescendsAlone;  ///< by a Side's size
+  using Blocks = WalkedBlocks<kMode>;
 
-  /// a, b: numbers of walk blocks.
-  __device__ static std::uint32_t test(const QueryArgs& args, const PairRecord& record, std::uint32_t a,
+  /// a, b: numbers of blocks.
+  __device__ static std::uint32_t test(const QueryArgs&, const PairRecord& record, std::uint32_t a,
                                        std::uint32_t b, Side& side_a, Side& side_b) {
-    if constexpr (kBounded)
-      return oriented_mask(record, args.walk_blocks[a], args.walk_blocks[b], side_a, side_b);
-    side_a = side_of(args.walk_blocks[a]);
-    side_b = side_of(args.walk_blocks[b]);
-    return mask_of_block_pair(record.blocks_a[args.file_blocks[a]], record.blocks_b[args.file_blocks[b]],
-                              pose_of(record), side_a.size, side_b.size);
+    if constexpr (kBounded) {
+      return oriented_mask(record, record.oriented_a[a], record.oriented_b[b], side_a, side_b);
+    } else {
+      const Block &block_a = record.blocks_a[a], &block_b = record.blocks_b[b];
+      float size_a, size_b;
+      const std::uint32_t mask = mask_of_block_pair(block_a, block_b, pose_of(record), size_a, size_b);
+      side_a = Blocks::side(block_a, a, size_a);
+      side_b = Blocks::side(block_b, b, size_b);
+      return mask;
+    }
   }
 
-  __device__ __noinline__ static std::uint32_t drop_beyond_planes(const QueryArgs& args,
-                                                                  const PairRecord& record,
-                                                                  std::uint32_t at_a, std::uint32_t at_b,
-                                                                  std::uint32_t hits) {
-    if constexpr (kMode == QueryMode::boxes) return hits;
-    return tandem::drop_beyond_planes(record.blocks_a[args.file_blocks[at_a]],
-                                      record.blocks_b[args.file_blocks[at_b]], hits, record.triangles_a,
+  /// In mode fast, whose candidates are the CPU's. Oriented boxes of leaves are nearly as thin as their
+  /// planes: exact queries are faster without (docs/decisions/0047).
+  static constexpr bool kTriesPlanes = kMode == QueryMode::fast;
+  __device__ __noinline__ static std::uint32_t drop_beyond_planes(const PairRecord& record, std::uint32_t a,
+                                                                  std::uint32_t b, std::uint32_t hits) {
+    return tandem::drop_beyond_planes(record.blocks_a[a], record.blocks_b[b], hits, record.triangles_a,
                                       record.triangles_b, pose_of(record), record.frame_error);
   }
 
@@ -221,22 +255,31 @@ struct InFrame {
 template <QueryMode kMode, bool kWalksOnly = false>
 struct InWorld {
   static constexpr bool kWorld = true;
-  static constexpr float kDescends = kDescendsAlone;
   static constexpr bool kCountsOnly = kWalksOnly;
+  using Blocks = WalkedBlocks<kMode>;
 
-  __device__ static std::uint32_t test(const QueryArgs& args, const PairRecord& record, std::uint32_t at_a,
-                                       std::uint32_t at_b, Side& side_a, Side& side_b) {
-    const Block *a = record.blocks_a + args.file_blocks[at_a], *b = record.blocks_b + args.file_blocks[at_b];
-    side_a = {args.walk_blocks[at_a].first_below, tandem::size_of(*a)};
-    side_b = {args.walk_blocks[at_b].first_below, tandem::size_of(*b)};
-    return world_block_pair_mask(stored_pose(args, record.instance_a), *a,
-                                 stored_pose(args, record.instance_b), *b);
+  __device__ static std::uint32_t test(const QueryArgs& args, const PairRecord& record, std::uint32_t a,
+                                       std::uint32_t b, Side& side_a, Side& side_b) {
+    const Pose pose_a = stored_pose(args, record.instance_a), pose_b = stored_pose(args, record.instance_b);
+    if constexpr (kMode == QueryMode::exact) {
+      const OrientedBlock &block_a = record.oriented_a[a], &block_b = record.oriented_b[b];
+      side_a = {block_a.first_below, block_a.size};
+      side_b = {block_b.first_below, block_b.size};
+      return world_block_pair_mask(pose_a, block_a, farthest(args, record.instance_a), pose_b, block_b,
+                                   farthest(args, record.instance_b));
+    } else {
+      const Block &block_a = record.blocks_a[a], &block_b = record.blocks_b[b];
+      side_a = Blocks::side(block_a, a, tandem::size_of(block_a));
+      side_b = Blocks::side(block_b, b, tandem::size_of(block_b));
+      return world_block_pair_mask(pose_a, block_a, pose_b, block_b);
+    }
   }
 
-  __device__ static std::uint32_t drop_beyond_planes(const QueryArgs&, const PairRecord&, std::uint32_t,
-                                                     std::uint32_t, std::uint32_t hits) {
-    return hits;
+  __device__ static double farthest(const QueryArgs& args, std::uint32_t instance) {
+    return farthest_of(args.assets[args.instances.asset[instance]].extent);
   }
+
+  static constexpr bool kTriesPlanes = false;
 
   __device__ static Judged judge(const PairRecord& record, std::uint32_t a, std::uint32_t b) {
     return {record.triangles_a[a].corner[0].w, record.triangles_b[b].corner[0].w, kMode == QueryMode::boxes,

@@ -9,16 +9,17 @@
 //
 //        31  30 29  28                                  0
 //   x   |                  object pair                   |
-//   y   | g |  how  |         first block of a           |    g: 1 while one warp gives the entry to another
-//   z   |   -   | s |         first block of b           |    s: both are of one instance
+//   y   | g |  how  |         family of a                |    g: 1 while one warp gives the entry to another
+//   z   |   -   | s |         family of b                |    s: both are of one instance
 //   w   |          hits          |   still to be taken   |    16 bits each
 //
-// and of a pair of leaf blocks y and z are the numbers of the first triangles, in 32 bits. `how` the pair
-// goes on (Descent) says what a bit stands for:
+// A family is the children of a block, by a number that the means of the walk understand (walk_lane.cuh). Of
+// a pair of leaf blocks y and z are the numbers of the first triangles, in 32 bits. `how` the pair goes on
+// (Descent) says what a bit stands for:
 //
-//   both      bit 4 i + j: block, or triangle, y + i against z + j
-//   b_alone   bit j: y, a block of its own, against z + j; the hits say with which of y's nodes
-//   a_alone   bit 4 i: y + i against z, a block of its own; the hits say with which of z's nodes
+//   both      bit 4 i + j: child i of y, or triangle y + i, against child, or triangle, j of z
+//   b_alone   bit j: y, a block of its own, against child j of z; the hits say with which of y's nodes
+//   a_alone   bit 4 i: child i of y against z, a block of its own; the hits say with which of z's nodes
 //
 // Object pairs begin as if both roots were the only children.
 //
@@ -28,21 +29,23 @@ namespace {
 
 constexpr std::uint32_t kFull = 32;  // block pairs or candidates of a full warp
 
-constexpr std::uint32_t kSelf = 1u << kNumberBits;  // in z
-constexpr std::uint32_t kGiven = 1u << 31;          // in y: each half of an entry is not 0 while it is given
+constexpr std::uint32_t kNumberMask = (1u << kNumberBits) - 1;  // of y and z
+constexpr std::uint32_t kSelf = 1u << kNumberBits;              // in z
+constexpr std::uint32_t kGiven = 1u << 31;  // in y: each half of an entry is not 0 while it is given
 
-/// A block pair, by numbers of walk blocks, and which of its node pairs count.
+/// A block pair, by numbers, and which of its node pairs count.
 struct Below {
   std::uint32_t a, b, nodes;
 };
 
-/// The block pair that a bit of an entry stands for.
-__device__ inline Below below_of(const uint4& entry, std::uint32_t bit) {
+/// The block pair that a bit of an entry stands for. Blocks: see walk_lane.cuh.
+template <class Blocks>
+__device__ Below below_of(const PairRecord& record, const uint4& entry, std::uint32_t bit) {
   const auto goes_on = static_cast<Descent>(entry.y >> kNumberBits & 3u);
   const std::uint32_t hits = entry.w >> 16;
   Below below = {entry.y & kNumberMask, entry.z & kNumberMask, kAllNodePairs};
-  if (goes_on != Descent::b_alone) below.a += bit / 4;
-  if (goes_on != Descent::a_alone) below.b += bit % 4;
+  if (goes_on != Descent::b_alone) below.a = Blocks::child(Blocks::of_a(record), below.a, bit / 4);
+  if (goes_on != Descent::a_alone) below.b = Blocks::child(Blocks::of_b(record), below.b, bit % 4);
   if (goes_on == Descent::a_alone) below.nodes = (hits >> bit & 0xFu) * 0x1111u;
   if (goes_on == Descent::b_alone) below.nodes = (hits >> bit & 0x1111u) * 0xFu;
   return below;
@@ -88,10 +91,12 @@ class WalkStack {
   __device__ std::uint32_t candidates() const { return candidates_; }  ///< bits of pairs of leaf blocks
   __device__ std::uint32_t room() const { return size_ - height_ - leaf_pairs_; }  ///< entries
 
-  /// Puts on the roots of an object pair for each lane that has one.
-  __device__ void put_roots(bool mine, std::uint32_t pair, std::uint32_t root_a, std::uint32_t root_b) {
+  /// Puts on the roots of an object pair for each lane that has one. roots: the family of a tree's root.
+  __device__ void put_roots(bool mine, std::uint32_t pair, std::uint32_t roots, bool self) {
     const std::uint32_t lanes = __ballot_sync(kAllLanes, mine);
-    if (mine) store_shared4(at(height_ + __popc(lanes & lanes_below())), {pair, root_a, root_b, 1});
+    if (mine)
+      store_shared4(at(height_ + __popc(lanes & lanes_below())),
+                    {pair, roots, roots | (self ? kSelf : 0), 1});
     height_ += __popc(lanes);
     waiting_ += __popc(lanes);
     __syncwarp();

@@ -7,11 +7,33 @@
 namespace tandem {
 namespace {
 
-// The same place of the same file, in the device's copy.
+// Bytes of a file: `size` from `begin` on.
+struct Range {
+  std::uint64_t begin, size;
+};
+
+Range all_of(const AssetView& asset) {
+  return {0, asset.header->file_bytes};
+}
+
+// From the first section that exact queries need to the last. A checked file's sections ascend.
+Range of_exact_queries(const AssetView& asset) {
+  Range range = {};
+  for (const Section& section : asset.sections) {
+    if (section.kind != SectionKind::triangles && section.kind != SectionKind::oriented_blocks) continue;
+    if (range.size == 0) range.begin = section.offset;
+    range.size = section.offset + section.bytes - range.begin;
+  }
+  return range;
+}
+
+// The same place of the copy of a range; null where it is not in the range.
 template <typename Element>
-const Element* relocate(const Element* element, const void* host, const void* device) {
-  const auto offset = reinterpret_cast<const char*>(element) - static_cast<const char*>(host);
-  return reinterpret_cast<const Element*>(static_cast<const char*>(device) + offset);
+const Element* relocate(const Element* element, const void* file, const Range& range, const void* copy) {
+  if (element == nullptr) return nullptr;
+  const auto offset = reinterpret_cast<std::uintptr_t>(element) - reinterpret_cast<std::uintptr_t>(file);
+  if (offset < range.begin || offset - range.begin >= range.size) return nullptr;
+  return reinterpret_cast<const Element*>(static_cast<const char*>(copy) + (offset - range.begin));
 }
 
 }  // namespace
@@ -24,10 +46,11 @@ DeviceAsset& DeviceAsset::operator=(DeviceAsset&& other) noexcept {
   return *this;
 }
 
-Status DeviceAsset::upload(const AssetView& asset, cudaStream_t stream) {
+Status DeviceAsset::upload(const AssetView& asset, cudaStream_t stream, Contents contents) {
   free();
-  const void* const file = asset.header;
-  error_ = data_.upload({static_cast<const unsigned char*>(file), asset.header->file_bytes}, stream);
+  const auto* const file = reinterpret_cast<const unsigned char*>(asset.header);
+  const Range range = contents == Contents::all ? all_of(asset) : of_exact_queries(asset);
+  error_ = data_.upload({file + range.begin, range.size}, stream);
   if (error_ != cudaSuccess) {
     data_.free();
     return status_of(error_);
@@ -35,8 +58,10 @@ Status DeviceAsset::upload(const AssetView& asset, cudaStream_t stream) {
   level_count_ = static_cast<std::uint32_t>(asset.levels.size());
   for (std::uint32_t i = 0; i < level_count_; ++i) {
     levels_[i] = asset.level(i);
-    levels_[i].blocks = relocate(levels_[i].blocks, file, data_.data());
-    levels_[i].triangles = relocate(levels_[i].triangles, file, data_.data());
+    LevelView& level = levels_[i];
+    level.triangles = relocate(level.triangles, file, range, data_.data());
+    level.oriented_blocks = relocate(level.oriented_blocks, file, range, data_.data());
+    level.blocks = contents == Contents::all ? relocate(level.blocks, file, range, data_.data()) : nullptr;
   }
   return Status::kOk;
 }

@@ -18,10 +18,20 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr std::uint32_t kMostTriangles = 4096;
 
 // Corners of a node that frames are judged by.
-constexpr std::uint32_t kMostPoints = 256;
+constexpr std::uint32_t kMostPoints = 128;
 
-constexpr int kRounds = 8;                               // of a search
-constexpr float kFirstStep = 0.276f, kNextStep = 0.58f;  // 3 steps of the first reach all frames of a cube
+// A search for a frame turns the best one so far about some axes at once, one way or the other, by steps that
+// become smaller from round to round.
+struct SearchEffort {
+  int axes_at_once, rounds;
+  float next_step;  // times the one before
+};
+constexpr float kFirstStep = 0.276f;  // 3 such steps reach all frames of a cube
+
+constexpr SearchEffort search_effort(Effort effort) {
+  if (effort == Effort::fast) return {1, 12, 0.7f};
+  return effort == Effort::standard ? SearchEffort{2, 8, 0.58f} : SearchEffort{3, 14, 0.75f};
+}
 
 using Vector = std::array<float, 3>;
 
@@ -68,6 +78,7 @@ BlockRotation turned(const BlockRotation& rotation, float a, float b, float c) {
                        z + w * c + x * b - y * a);
 }
 
+// Lane l is of the l-th of four frames that are judged at once.
 typedef float Lanes __attribute__((vector_size(16)));
 constexpr int kLanes = 4;
 
@@ -78,22 +89,8 @@ Lanes higher_of(Lanes a, Lanes b) {
   return a > b ? a : b;
 }
 
-// Points of a node, scaled, a few of them at once.
-struct PointCloud {
-  std::vector<Lanes> x, y, z;
-
-  void clear() { x.clear(), y.clear(), z.clear(); }
-  void assign(const std::vector<Vector>& points) {
-    clear();
-    for (std::size_t i = 0; i < points.size(); i += kLanes) {
-      Lanes lanes[3] = {};
-      for (std::size_t l = 0; l < kLanes; ++l) {
-        const Vector& p = points[std::min(i + l, points.size() - 1)];
-        for (int k = 0; k < 3; ++k) lanes[k][l] = p[static_cast<std::size_t>(k)];
-      }
-      x.push_back(lanes[0]), y.push_back(lanes[1]), z.push_back(lanes[2]);
-    }
-  }
+struct Point {
+  Lanes x, y, z;  // the same in all lanes
 };
 
 // Which triangles of the file lie below each block: from first[b] to end[b].
@@ -114,8 +111,12 @@ struct Ranges {
 // Makes the oriented block of one block. Keeps its memory from block to block.
 class Fit {
  public:
-  Fit(const Geometry& geometry, const Tree& tree, const Ranges& ranges, double farthest)
-      : geometry_(geometry), tree_(tree), ranges_(ranges), farthest_(farthest) {}
+  Fit(const Geometry& geometry, const Tree& tree, const Ranges& ranges, double farthest, Effort effort)
+      : geometry_(geometry),
+        tree_(tree),
+        ranges_(ranges),
+        farthest_(farthest),
+        effort_(search_effort(effort)) {}
 
   // All but first_below.
   OrientedBlock make(std::uint32_t at) {
@@ -168,6 +169,7 @@ class Fit {
 
   // Some of the corners of each node, each point once.
   void gather() {
+    points_.clear();
     for (int node = 0; node < nodes_; ++node) {
       const std::uint32_t corners = 3 * (first_[node + 1] - first_[node]);
       std::uint32_t stride = (corners + 3 * kMostPoints - 1) / (3 * kMostPoints);
@@ -177,9 +179,11 @@ class Fit {
         vertices_.push_back(geometry_.triangles[tree_.order[first_[node] + at / 3]][at % 3]);
       std::sort(vertices_.begin(), vertices_.end());
       vertices_.erase(std::unique(vertices_.begin(), vertices_.end()), vertices_.end());
-      points_.clear();
-      for (const std::uint32_t vertex : vertices_) points_.push_back(times(scale_, geometry_.points[vertex]));
-      cloud_[node].assign(points_);
+      for (const std::uint32_t vertex : vertices_) {
+        const Vector p = times(scale_, geometry_.points[vertex]);
+        points_.push_back({Lanes{} + p[0], Lanes{} + p[1], Lanes{} + p[2]});
+      }
+      points_end_[node] = points_.size();
     }
   }
 
@@ -199,53 +203,75 @@ class Fit {
   }
 
   // By the points gathered.
-  float cost_of(const BlockRotation& rotation) const {
-    const ScaledRotation exact = scaled_rotation(rotation);
-    float m[3][3];
-    for (int i = 0; i < 3; ++i) {
-      for (int k = 0; k < 3; ++k) m[i][k] = exact.scaled[i][k] / exact.squared_length;
+  Lanes costs_of(const BlockRotation (&rotations)[kLanes]) const {
+    Lanes m[3][3];
+    for (int l = 0; l < kLanes; ++l) {
+      const ScaledRotation exact = scaled_rotation(rotations[l]);
+      const float factor = 1 / exact.squared_length;
+      for (int i = 0; i < 3; ++i) {
+        for (int k = 0; k < 3; ++k) m[i][k][l] = exact.scaled[i][k] * factor;
+      }
     }
-    float cost = 0;
+    Lanes cost = {};
+    const Point* first = points_.data();
     for (int node = 0; node < nodes_; ++node) {
-      const PointCloud& cloud = cloud_[node];
-      const Lanes all = {kInfinity, kInfinity, kInfinity, kInfinity};
-      Lanes lowest[3] = {all, all, all}, highest[3] = {-all, -all, -all};
-      for (std::size_t i = 0; i < cloud.x.size(); ++i) {
-        for (int k = 0; k < 3; ++k) {
-          const Lanes at = m[0][k] * cloud.x[i] + m[1][k] * cloud.y[i] + m[2][k] * cloud.z[i];
-          lowest[k] = lower_of(lowest[k], at);
-          highest[k] = higher_of(highest[k], at);
-        }
-      }
-      float half_extent[3];
+      const Point* const end = points_.data() + points_end_[node];
+      Lanes volume = Lanes{} + 1;
       for (int k = 0; k < 3; ++k) {
-        float low = lowest[k][0], high = highest[k][0];
-        for (int l = 1; l < kLanes; ++l)
-          low = std::min(low, lowest[k][l]), high = std::max(high, highest[k][l]);
-        half_extent[k] = 0.5f * (high - low);
+        Lanes lowest = Lanes{} + kInfinity, highest = Lanes{} - kInfinity;
+        for (const Point* p = first; p != end; ++p) {
+          const Lanes at = m[0][k] * p->x + m[1][k] * p->y + m[2][k] * p->z;
+          lowest = lower_of(lowest, at);
+          highest = higher_of(highest, at);
+        }
+        volume *= 0.5f * (highest - lowest) + rim_;
       }
-      cost += cost_of_box(half_extent);
+      cost += volume;
+      first = end;
     }
     return cost;
   }
 
-  struct Judged {
-    BlockRotation rotation = kNoRotation;
-    float cost = kInfinity;
+  // The best of the frames that were tried, the first of equals.
+  class Best {
+   public:
+    explicit Best(const Fit& fit) : fit_(fit) {}
+
+    void consider(const BlockRotation& rotation) {
+      waiting_[count_++] = rotation;
+      if (count_ == kLanes) judge();
+    }
+    // Of all considered so far.
+    const BlockRotation& rotation() {
+      if (count_ > 0) judge();
+      return rotation_;
+    }
+
+   private:
+    void judge() {
+      std::fill(waiting_ + count_, waiting_ + kLanes, waiting_[0]);
+      const Lanes cost = fit_.costs_of(waiting_);
+      for (int l = 0; l < count_; ++l) {
+        if (cost[l] < cost_) cost_ = cost[l], rotation_ = waiting_[l];
+      }
+      count_ = 0;
+    }
+
+    const Fit& fit_;
+    BlockRotation waiting_[kLanes];
+    int count_ = 0;
+    BlockRotation rotation_ = kNoRotation;
+    float cost_ = kInfinity;
   };
-  void try_frame(const BlockRotation& rotation, Judged& best) const {
-    const float cost = cost_of(rotation);
-    if (cost < best.cost) best = {rotation, cost};
-  }
 
   // Of a leaf block: the mesh's axes, or along an edge of a triangle and its normal.
   BlockRotation best_of_triangles() const {
-    Judged best;
-    try_frame(kNoRotation, best);
+    Best best(*this);
+    best.consider(kNoRotation);
     for (std::uint32_t t = first_[0]; t < first_[nodes_]; ++t) {
-      for (std::uint32_t edge = 0; edge < 3; ++edge) try_frame(axes_of(t, edge), best);
+      for (std::uint32_t edge = 0; edge < 3; ++edge) best.consider(axes_of(t, edge));
     }
-    return best.rotation;
+    return best.rotation();
   }
 
   // Along an edge of a triangle and its normal.
@@ -263,22 +289,21 @@ class Fit {
     return rotation_of(axis);
   }
 
-  // Turns a frame about three axes at once, one way or the other or not at all, ever less.
   BlockRotation search() const {
-    Judged best;
-    try_frame(kNoRotation, best);
+    Best best(*this);
+    best.consider(kNoRotation);
     float step = kFirstStep;
-    for (int round = 0; round < kRounds; ++round, step *= kNextStep) {
-      const BlockRotation from = best.rotation;
+    for (int round = 0; round < effort_.rounds; ++round, step *= effort_.next_step) {
+      const BlockRotation from = best.rotation();
       for (int turn = 0; turn < 27; ++turn) {
-        if (turn == 13) continue;  // not at all
-        try_frame(
-            turned(from, step * static_cast<float>(turn % 3 - 1), step * static_cast<float>(turn / 3 % 3 - 1),
-                   step * static_cast<float>(turn / 9 - 1)),
-            best);
+        const int ways[3] = {turn % 3 - 1, turn / 3 % 3 - 1, turn / 9 - 1};
+        const int axes = (ways[0] != 0) + (ways[1] != 0) + (ways[2] != 0);
+        if (axes == 0 || axes > effort_.axes_at_once) continue;
+        best.consider(turned(from, step * static_cast<float>(ways[0]), step * static_cast<float>(ways[1]),
+                             step * static_cast<float>(ways[2])));
       }
     }
-    return best.rotation;
+    return best.rotation();
   }
 
   // Boxes of real nodes in the block's frame.
@@ -318,18 +343,19 @@ class Fit {
   const Tree& tree_;
   const Ranges& ranges_;
   const double farthest_;  // at least the distance of each vertex from the origin
+  const SearchEffort effort_;
   int nodes_ = 0;
   std::uint32_t first_[kNodesPerBlock + 1] = {};  // triangle of each node, and their end
   float scale_ = 1;                               // makes the block's size 1
   float rim_ = 0;
   std::vector<std::uint32_t> vertices_;
-  std::vector<Vector> points_;
-  PointCloud cloud_[kNodesPerBlock];
+  std::vector<Point> points_;
+  std::size_t points_end_[kNodesPerBlock] = {};
 };
 
 }  // namespace
 
-std::vector<OrientedBlock> orient_blocks(const Geometry& geometry, const Tree& tree, Effort) {
+std::vector<OrientedBlock> orient_blocks(const Geometry& geometry, const Tree& tree, Effort effort) {
   std::vector<OrientedBlock> out(tree.blocks.size());
   // Of each block its number, and of its first child, or of its first triangle.
   std::vector<std::uint32_t> number(tree.blocks.size()), first_below(tree.blocks.size());
@@ -346,7 +372,7 @@ std::vector<OrientedBlock> orient_blocks(const Geometry& geometry, const Tree& t
   const Ranges ranges(tree);
   using oneapi::tbb::blocked_range;
   oneapi::tbb::parallel_for(blocked_range<std::size_t>(0, tree.blocks.size(), 64), [&](const auto& part) {
-    Fit fit(geometry, tree, ranges, farthest);
+    Fit fit(geometry, tree, ranges, farthest, effort);
     for (std::size_t b = part.begin(); b != part.end(); ++b) {
       OrientedBlock& block = out[number[b]];
       block = fit.make(static_cast<std::uint32_t>(b));

@@ -9,7 +9,8 @@ namespace {
 /// The paper's scheme, which asks the CPU after each level of the trees.
 class PaperSchemeEngine final : public GpuEngine {
  public:
-  PaperSchemeEngine(std::string_view name, bench::PaperFlags flags, QueryMode mode) : GpuEngine(name) {
+  PaperSchemeEngine(std::string_view name, bench::PaperFlags flags, QueryMode mode)
+      : GpuEngine(name, Contents::all) {
     options_.mode = mode;
     options_.flags = flags;
   }

@@ -18,7 +18,7 @@ __device__ void prepare_pair(const QueryArgs& args, std::uint32_t index) {
     return report_error(args, Subject::pair, index, status);
   const std::uint32_t asset_a = args.instances.asset[pair.a], asset_b = args.instances.asset[pair.b];
   if (asset_a >= args.asset_count || asset_b >= args.asset_count) return;  // reported with the instance
-  args.records[index] = gpu::make_record(args.instances, args.assets, pair, false);
+  args.records[index] = gpu::make_record(args.instances, args.assets, pair, gpu::BlockKind::axis_aligned);
   if (args.records[index].in_frame == 0) report_error(args, Subject::reach, index, Status::kOutOfRange);
 }
 
@@ -35,11 +35,6 @@ __global__ void __launch_bounds__(kThreads)
     const Status status = gpu::check_instance(args.instances, args.assets, args.asset_count, i);
     if (status != Status::kOk) report_error(args, Subject::instance, i, status);
   }
-}
-
-__global__ void measure_extents(Asset* assets, std::uint32_t count) {
-  const std::uint32_t i = blockIdx.x * kThreads + threadIdx.x;
-  if (i < count) assets[i].extent = extent_of(assets[i].tree.blocks[0]);
 }
 
 __device__ TrianglePair posed_pair(const QueryArgs& args, const Entry& candidate) {
@@ -100,11 +95,6 @@ cudaError_t block_count(unsigned& blocks) {
 }
 
 }  // namespace
-
-cudaError_t measure_assets(Asset* assets, std::uint32_t count, cudaStream_t stream) {
-  measure_extents<<<(count + kThreads - 1) / kThreads, kThreads, 0, stream>>>(assets, count);
-  return cudaGetLastError();
-}
 
 cudaError_t prepare(const QueryArgs& args, Entry* first_level, cudaStream_t stream) {
   unsigned blocks = 0;

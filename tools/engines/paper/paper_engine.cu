@@ -28,7 +28,7 @@ enum Moment { kBegin, kPrepared, kTraversed, kEnd, kMoments };
 }  // namespace
 
 struct PaperEngine::State {
-  GpuArray<paper::Asset> assets;
+  GpuArray<GpuAsset> assets;
   GpuArray<paper::PairRecord> records;
   GpuArray<Entry> levels[2];
   GpuArray<std::uint8_t> flags[2];
@@ -81,14 +81,10 @@ struct PaperEngine::State {
 
 bool PaperEngine::State::set_assets(std::span<const GpuAsset> given, cudaStream_t stream) {
   asset_count = 0;
-  if (!provide() || !ok(assets.grow(given.size()))) return false;
-  const auto count = static_cast<std::uint32_t>(given.size());
-  if (count == 0) return true;
-  if (!ok(cudaMemcpy2DAsync(assets.data(), sizeof(paper::Asset), given.data(), sizeof(GpuAsset),
-                            sizeof(GpuAsset), count, cudaMemcpyHostToDevice, stream)) ||
-      !ok(paper::measure_assets(assets.data(), count, stream)) || !ok(cudaStreamSynchronize(stream)))
+  if (!provide() || !ok(assets.grow(given.size())) || !ok(assets.upload(given, stream)) ||
+      !ok(cudaStreamSynchronize(stream)))
     return false;
-  asset_count = count;
+  asset_count = static_cast<std::uint32_t>(given.size());
   return true;
 }
 
@@ -222,6 +218,9 @@ PaperEngine::~PaperEngine() = default;
 
 Status PaperEngine::set_assets(std::span<const GpuAsset> assets, cudaStream_t stream) {
   if (state_ == nullptr) return Status::kOutOfMemory;
+  for (const GpuAsset& asset : assets) {
+    if (asset.tree.blocks == nullptr) return Status::kNoAxisAlignedBlocks;
+  }
   state_->error = cudaSuccess;
   state_->set_assets(assets, stream);
   return state_->status();

@@ -48,7 +48,8 @@ class PaperEngine {
   ~PaperEngine();
 
   /// Names the assets that instances refer to, on the current device. What the trees point to must outlive
-  /// the queries. Result: kOk, kOutOfMemory, or one that status_of() of gpu_status.h names.
+  /// the queries. Result: kOk, kNoAxisAlignedBlocks, kOutOfMemory, or one that status_of() of gpu_status.h
+  /// names.
   Status set_assets(std::span<const GpuAsset> assets, cudaStream_t stream);
 
   /// Waits for the stream, once for each level of the trees and twice more. Keeps its memory from call to

@@ -11,7 +11,6 @@
 // What the kernels of the paper's engine share, all of it in GPU memory.
 namespace tandem::bench::paper {
 
-using gpu::Asset;
 using gpu::Counter;
 using gpu::PairRecord;
 
@@ -52,7 +51,7 @@ struct Outcome {
 };
 
 struct QueryArgs {
-  const Asset* assets;
+  const GpuAsset* assets;
   std::uint32_t asset_count;
   GpuInstances instances;
   GpuPairs given;
@@ -70,9 +69,6 @@ struct TriangleArgs {
   Entry *undecided, *unresolved;
   std::uint64_t undecided_room;
 };
-
-/// Fills in the extents of assets.
-cudaError_t measure_assets(Asset* assets, std::uint32_t count, cudaStream_t stream);
 
 /// Checks instances and pairs, makes the records and the first level.
 cudaError_t prepare(const QueryArgs& args, Entry* first_level, cudaStream_t stream);

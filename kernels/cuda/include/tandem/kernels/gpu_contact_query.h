@@ -38,16 +38,13 @@ struct GpuQueryCapacity {
   std::uint64_t undecided = 0;  ///< candidates that float32 cannot decide
 };
 
-/// GPU memory that a query of these assets with room for so much holds at most: the bound of
-/// GpuContactQuery::bytes(), where it was never given more blocks of trees. Instances cost it nothing.
-inline std::size_t most_query_bytes(const GpuQueryCapacity& capacity, bool sorted,
-                                    std::span<const GpuAsset> assets) {
+/// GPU memory that a query of so many assets with room for so much holds at most: the bound of
+/// GpuContactQuery::bytes(), where it was never given more of them. Instances cost it nothing, nor does the
+/// size of the assets.
+constexpr std::size_t most_query_bytes(const GpuQueryCapacity& capacity, bool sorted, std::size_t assets) {
   constexpr std::size_t kFixed = std::size_t{5} << 20;  // work that warps give to each other, and the report
-  std::size_t blocks = assets.size();
-  for (const GpuAsset& asset : assets)
-    blocks += std::size_t{kNodesPerBlock} * (asset.tree.block_count - asset.tree.leaf_block_count);
   const std::size_t per_contact = sorted ? 20 + 29 : 20;
-  return kFixed + 256 * assets.size() + 116 * blocks + 200 * std::size_t{capacity.pairs} +
+  return kFixed + sizeof(GpuAsset) * assets + 168 * std::size_t{capacity.pairs} +
          per_contact * capacity.contacts + 24 * capacity.undecided;
 }
 
@@ -74,10 +71,10 @@ class GpuContactQuery {
   GpuContactQuery& operator=(GpuContactQuery&&) noexcept;
   ~GpuContactQuery();  ///< waits for the device
 
-  /// Names the assets that instances refer to, on the current device, after what `stream` holds; returns when
-  /// that is done. What the trees point to must outlive the queries. Result: kOk, kOutOfRange (a tree of 2^29
-  /// blocks or more), kOutOfGpuMemory, kOutOfMemory, or another that status_of() of gpu_status.h names:
-  /// kNoGpu, kDriverTooOld, kGpuNotSupported, kCudaFailed.
+  /// Names the assets that instances refer to, on the current device, after what `stream` holds: copies the
+  /// list, and returns when that is done. What the trees point to must outlive the queries. Result: kOk,
+  /// kOutOfRange (a tree of 2^29 - 1 blocks or more), kOutOfGpuMemory, kOutOfMemory, or another that
+  /// status_of() of gpu_status.h names: kNoGpu, kDriverTooOld, kGpuNotSupported, kCudaFailed.
   Status set_assets(std::span<const GpuAsset> assets, cudaStream_t stream);
 
   /// Makes room for at least so much, waiting for the device where it grows. `options`: those of the calls to
@@ -86,10 +83,11 @@ class GpuContactQuery {
   Status reserve(const GpuQueryCapacity& capacity, const GpuQueryOptions& options = {});
 
   /// Queues a query behind what `stream` holds; it may be captured into a graph. The arrays must stay until
-  /// it is done. A pair of an instance with itself asks for the contacts within it. Result: kOk, kOutOfRange
-  /// (sorted, and reserved without), kCudaFailed, or, where CUDA loads a kernel at its first launch and the
-  /// GPU is full, kOutOfGpuMemory; what the GPU finds wrong is in the report. Condition: set_assets() and
-  /// reserve().
+  /// it is done. A pair of an instance with itself asks for the contacts within it. Mode exact walks oriented
+  /// blocks, the others axis-aligned ones. Result: kOk, kNoOrientedBlocks or kNoAxisAlignedBlocks (an asset
+  /// lacks them), kOutOfRange (sorted, and reserved without), kCudaFailed, or, where CUDA loads a kernel at
+  /// its first launch and the GPU is full, kOutOfGpuMemory; what the GPU finds wrong is in the report.
+  /// Condition: set_assets() and reserve().
   Status enqueue(const GpuInstances& instances, const GpuPairs& pairs, const GpuQueryOptions& options,
                  cudaStream_t stream);
 

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "tandem/formats/box.h"
 #include "tandem/formats/view.h"
 #include "tandem/kernels/broad_phase.h"
 #include "tandem/kernels/pose.h"
@@ -11,18 +12,20 @@ namespace tandem {
 
 /// An asset as queries on the GPU take it. Owns nothing.
 struct GpuAsset {
-  LevelView tree;  ///< pointers into GPU memory, as DeviceAsset::level() gives them
+  LevelView tree;     ///< pointers into GPU memory, as DeviceAsset::level() gives them
+  TreeExtent extent;  ///< of the tree
   double origin[3];
   float lower[3], upper[3];
   std::uint64_t source_faces;  ///< how many there are: contacts name faces below this number
 };
 
-/// The asset whose level `tree` lies in GPU memory and whose header lies in CPU memory.
-inline GpuAsset gpu_asset(const LevelView& tree, const FileHeader& header) {
-  GpuAsset asset = {tree, {}, {}, {}, header.source_faces};
-  std::copy_n(header.origin, 3, asset.origin);
-  std::copy_n(header.lower, 3, asset.lower);
-  std::copy_n(header.upper, 3, asset.upper);
+/// The asset that lies in GPU memory with level `level` of a file, which lies in CPU memory. on_gpu: as
+/// DeviceAsset::level() gives it. Condition: level < file.levels.size().
+inline GpuAsset gpu_asset(const LevelView& on_gpu, const AssetView& file, std::uint32_t level = 0) {
+  GpuAsset asset = {on_gpu, extent_of(file.level(level).blocks[0]), {}, {}, {}, file.header->source_faces};
+  std::copy_n(file.header->origin, 3, asset.origin);
+  std::copy_n(file.header->lower, 3, asset.lower);
+  std::copy_n(file.header->upper, 3, asset.upper);
   return asset;
 }
 

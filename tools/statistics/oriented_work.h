@@ -25,9 +25,9 @@ class OrientedWork {
   OrientedWork(const AssetView& a, const AssetView& b);
 
   /// What a GPU walks with b in this pose: by the same functions and rules, though it fuses operations, so
-  /// that a box pair which touches by a rounding may count here and not there. Planes of leaves are not
-  /// tried. Result: nothing where a body has no oriented blocks, where the pose is beyond the range of
-  /// float32 box tests, or where there are more than `most_block_pairs`.
+  /// that a box pair which touches by a rounding may count here and not there. Result: nothing where a body
+  /// has no oriented blocks, where the pose is beyond the range of float32 box tests, or where there are more
+  /// than `most_block_pairs`.
   std::optional<WalkWork> count(const Pose& b, std::uint64_t most_block_pairs = kAny) const;
 
  private:

@@ -1,8 +1,10 @@
 // What the checker says of oriented blocks.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
+#include <random>
 #include <string>
 
 #include "hostile_file.h"
@@ -355,6 +357,42 @@ TEST(CheckOriented, ABoxMayBeTightButNoUnitTighter) {
   }
   EXPECT_GT(of_leaves, 50);
   EXPECT_GT(of_internal, 10);
+}
+
+// A point, and a box that ends before it by less than float64 tells.
+TEST(CheckOriented, NoRoundingDecides) {
+  std::mt19937_64 random(1);
+  const auto below = [&](std::uint32_t n) { return static_cast<std::uint32_t>(random() >> 32) % n; };
+  const auto any_parts = [&] { return (1 + below(4095)) | (1 + below(4095)) << 16; };
+  int close = 0;
+  for (int i = 0; i < 3000; ++i) {
+    std::array<float, 3> point;
+    for (float& x : point) x = static_cast<float>(below(1u << 24)) * 0x1p-24f;
+    Mesh mesh;
+    mesh.add(point, point, point);
+    Bytes file(make_file(mesh));
+    const LevelView level = file.check().asset.level();
+    OrientedBlock& block = root(file);
+    block.rotation = {any_parts(), any_parts()};
+    const auto k = static_cast<int>(below(3));
+    long double off = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const long double at = range_of(level, {0, 0, 1, 0}, axis).lowest;
+      block.center[axis][0] = static_cast<float>(at);
+      block.half_extent[axis][0] = 0x1p-20f;
+      if (axis == k) off = std::fabs(at - static_cast<long double>(block.center[k][0]));
+    }
+    float& half_extent = block.half_extent[k][0];
+    half_extent = std::nextafter(static_cast<float>(off), 0.0f);
+    if (off - static_cast<long double>(half_extent) < 0x1p-60L) continue;  // more than long double tells
+    close += off - static_cast<long double>(half_extent) < 0x1p-53L;
+    block.size = oriented_size(block);
+    EXPECT_EQ(file.check_sealed(), Status::kTriangleOutsideOrientedBox);
+    half_extent = above(off + 0x1p-48L);
+    block.size = oriented_size(block);
+    EXPECT_EQ(file.check_sealed(), Status::kOk);
+  }
+  EXPECT_GT(close, 100);
 }
 
 // In the mesh's own axes the file's boxes do, and none that is smaller.

@@ -60,10 +60,11 @@ class Bytes {
     return reinterpret_cast<Element*>(data_ + section(kind).offset);
   }
   Block* blocks() { return elements<Block>(SectionKind::blocks); }
+  OrientedBlock* oriented_blocks() { return elements<OrientedBlock>(SectionKind::oriented_blocks); }
   Triangle* triangles() { return elements<Triangle>(SectionKind::triangles); }
   Level& level() { return *elements<Level>(SectionKind::levels); }
 
-  CheckResult check() const { return tandem::check(data_, size_); }
+  CheckResult check(CheckDepth depth = CheckDepth::full) const { return tandem::check(data_, size_, depth); }
   Status check_sealed() {
     seal(data_, size_);
     return check().status;

@@ -57,8 +57,9 @@ void add_options(CLI::App& app, Options& options, double& memory_gib, double& ex
       "time that goes into a tree that is cheap to query; 'best' takes minutes for 100,000 triangles, and "
       "Ctrl-C ends it with the best tree so far")
       ->option_text("fast|default|best [default]");
-  app.add_flag("!--no-gpu-blocks", options.gpu_blocks,
-               "leave out the oriented blocks, which exact queries on a GPU walk; the file is 29 % smaller");
+  app.add_flag_callback(
+      "--no-gpu-blocks", [&options] { options.gpu_blocks = false; },
+      "leave out the oriented blocks, which exact queries on a GPU walk; the file is 29 % smaller");
   app.add_flag("--strict", options.strict, "take anything dropped or found amiss in the mesh for an error");
   app.add_flag("--json", options.json, "print the report as JSON");
   app.add_flag("-q,--quiet", options.quiet, "print nothing but errors");

@@ -15,13 +15,17 @@ BLOCK = np.dtype([("center", "<f4", (3, 4)), ("half_extent", "<f4", (3, 4)), ("i
 TRIANGLE = np.dtype([("corner", [("position", "<f4", 3), ("w", "<u4")], 3)])
 PART = np.dtype([("name_offset", "<u4"), ("name_bytes", "<u4"), ("path_offset", "<u4"), ("path_bytes", "<u4"),
                  ("first_face", "<u8"), ("face_count", "<u8")])
+ORIENTED_BLOCK = np.dtype([("center", "<f4", (3, 4)), ("half_extent", "<f4", (3, 4)), ("first_below", "<u4"),
+                           ("size", "<f4"), ("quaternion", "<u2", 4)])
 KINDS = {1: ("levels", LEVEL), 2: ("blocks", BLOCK), 3: ("triangles", TRIANGLE), 4: ("parts", PART),
-         5: ("strings", np.dtype("u1")), 6: ("provenance", np.dtype("u1"))}
+         5: ("strings", np.dtype("u1")), 6: ("provenance", np.dtype("u1")), 7: ("oriented_blocks", ORIENTED_BLOCK)}
 INTERNAL, LEAF, IMAGINARY = 0, 1, 2
 NO_INDEX = 0xFFFFFFFF
+LEAF_BLOCK = 1 << 31
 
 assert HEADER.size == 128 and SECTION.size == 32 and LEVEL.itemsize == 32
 assert BLOCK.itemsize == 128 and TRIANGLE.itemsize == 48 and PART.itemsize == 32
+assert ORIENTED_BLOCK.itemsize == 112
 
 
 @dataclasses.dataclass
@@ -37,6 +41,7 @@ class BvhFile:
     levels: np.ndarray
     blocks: np.ndarray
     triangles: np.ndarray
+    oriented_blocks: np.ndarray | None
     parts: list
     provenance: dict
 
@@ -89,7 +94,8 @@ def parse(raw):
     parts = [(text(p["name_offset"], p["name_bytes"]), text(p["path_offset"], p["path_bytes"]),
               int(p["first_face"]), int(p["face_count"])) for p in found["parts"]]
     return BvhFile(raw, content_hash, np.array([ox, oy, oz]), np.array(lower, np.float32), np.array(upper, np.float32),
-                   source_faces, rounding_error, found["levels"], found["blocks"], found["triangles"], parts,
+                   source_faces, rounding_error, found["levels"], found["blocks"], found["triangles"],
+                   found.get("oriented_blocks"), parts,
                    json.loads(found["provenance"].tobytes()))
 
 
@@ -200,4 +206,84 @@ def defects_of_boxes(file):
                 lower, upper = interval(block, node, axis)
                 if any(low < lower or high > upper for low, high in inner):
                     defects.append(f"block {index}, node {node}, axis {axis}: the box does not contain what is below")
+    return defects
+
+
+def whole(values):
+    """float32 numbers as whole multiples of 2^-149, exactly."""
+    return [int(Fraction(float(x)) * (1 << 149)) for x in values]
+
+
+def rotation_of(oriented):
+    """The matrix that the quaternion stands for, times its squared length, and that length: whole numbers."""
+    w, x, y, z = (int(part) - 2048 for part in oriented["quaternion"])
+    return [[w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z]], w * w + x * x + y * y + z * z
+
+
+def oriented_size(oriented):
+    """By FORMAT.md: the squares, sums and the root of float64 numbers, and the result rounded to float32."""
+    x, y, z = oriented["half_extent"].astype(np.float64)
+    real = x >= 0
+    surface = ((x * y + y * z) + z * x)[real]
+    return np.float32(np.sqrt(surface.max() / 3))
+
+
+def holds(oriented, node, points, farthest):
+    """Whether an oriented box holds the points, whole multiples of 2^-149, and reaches no farther than it may, which is
+    `farthest`, squared, of the points' distances from the origin, and a 2^20th more along each axis."""
+    rotation, length = rotation_of(oriented)
+    center, half = (whole(oriented[key][:, node]) for key in ("center", "half_extent"))
+    sound = all((abs(c) + h) ** 2 << 40 <= farthest * (((1 << 20) + 1) ** 2 + 1) for c, h in zip(center, half))
+    for axis in range(3):
+        a, b, c = (rotation[i][axis] for i in range(3))
+        along = [a * x + b * y + c * z for x, y, z in points]
+        sound = sound and length * (center[axis] - half[axis]) <= min(along)
+        sound = sound and max(along) <= length * (center[axis] + half[axis])
+    return sound
+
+
+def defects_of_oriented_blocks(file):
+    """Sentences about everything that is wrong with the oriented blocks, in exact arithmetic. Slow: small files."""
+    defects, number, next_number, end = [], {0: 0}, 1, {}
+    points = [whole(point) for point in file.corners.reshape(-1, 3)]
+    reach = [max(abs(x) for node in range(4) if file.blocks[0]["kind"][node] != IMAGINARY
+                 for x in interval(file.blocks[0], node, axis)) * (1 << 149) for axis in range(3)]
+    farthest = int(sum(x * x for x in reach))
+    blocks = list(walk(file))
+    for index, _, block in reversed(blocks):
+        below = [int(at) for at, kind in zip(block["index"], block["kind"]) if kind != IMAGINARY]
+        end[index] = below[-1] + 1 if block["kind"][0] == LEAF else end[below[-1]]
+    first = 0  # triangle of the nodes to come
+    for index, _, block in blocks:
+        oriented = file.oriented_blocks[number[index]]
+        leaf_block = block["kind"][0] == LEAF
+        expected = LEAF_BLOCK | int(block["index"][0]) if leaf_block else next_number
+        if oriented["first_below"] != expected:
+            defects.append(f"oriented block of block {index}: names {oriented['first_below']}, not {expected}")
+        parts = oriented["quaternion"].astype(int) - 2048
+        if not parts.any() or abs(parts).max() > 2047:
+            defects.append(f"oriented block of block {index}: no rotation: {parts}")
+        if oriented["size"] != oriented_size(oriented):
+            defects.append(f"oriented block of block {index}: size {oriented['size']}")
+        begin = int(block["index"][0]) if leaf_block else first
+        for node, kind in enumerate(block["kind"]):
+            below = int(block["index"][node])
+            if kind == IMAGINARY:
+                box = oriented["center"][:, node].tobytes(), oriented["half_extent"][:, node]
+                if box[0] != bytes(12) or not (box[1] == -np.inf).all():
+                    defects.append(f"oriented block of block {index}, node {node}: imaginary and empty go together")
+                continue
+            if kind == INTERNAL:
+                number[below] = next_number
+                next_number += 1
+            past = below + 1 if kind == LEAF else end[below]
+            if not holds(oriented, node, points[3 * begin:3 * past], farthest):
+                defects.append(f"oriented block of block {index}, node {node}: the box does not hold what is below")
+            begin = past
+        if leaf_block:
+            first = begin
+    if next_number != len(file.oriented_blocks):
+        defects.append("there are other oriented blocks than blocks")
     return defects

@@ -96,7 +96,7 @@ constexpr Entry kEntries[] = {
     {Status::kNoGpu, "NoGpu", nullptr, "there is no GPU that can be used"},
     {Status::kDriverTooOld, "DriverTooOld", nullptr, "the GPU's driver is too old for this program"},
     {Status::kGpuNotSupported, "GpuNotSupported", nullptr,
-     "this program was not built for a GPU of this kind"},
+     "this program was not built for a GPU of this kind; the least is compute capability 8.0"},
     {Status::kOutOfGpuMemory, "OutOfGpuMemory", nullptr, "not enough GPU memory"},
     {Status::kCudaFailed, "CudaFailed", nullptr, "a CUDA call failed"},
 };

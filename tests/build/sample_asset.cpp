@@ -3,6 +3,8 @@
 #include <numeric>
 #include <random>
 
+#include "bvhbuild/tree/emit.h"
+
 namespace tandem::test {
 
 void Mesh::add(std::array<float, 3> a, std::array<float, 3> b, std::array<float, 3> c) {
@@ -27,8 +29,11 @@ Mesh random_mesh(std::uint32_t triangles, std::uint64_t seed) {
 }
 
 build::Image make_file(const Mesh& mesh, build::Imaginary imaginary, build::Effort effort) {
+  return make_file(mesh, build::build_tree(mesh.geometry(), imaginary, effort), effort);
+}
+
+build::Image make_file(const Mesh& mesh, const build::Tree& tree, build::Effort effort) {
   const std::size_t n = mesh.triangles.size();
-  const build::Tree tree = build::build_tree(mesh.geometry(), imaginary, effort);
   std::vector<std::uint32_t> face(n);
   std::iota(face.begin(), face.end(), 0u);
   const std::vector<build::SourcePart> parts = {{"left", "scene/left", 0, n / 2},
@@ -40,6 +45,28 @@ build::Image make_file(const Mesh& mesh, build::Imaginary imaginary, build::Effo
   const auto oriented_blocks = build::orient_blocks(mesh.geometry(), tree, effort);
   const build::AssetLevel level{mesh.geometry(), face, &tree, oriented_blocks, 0};
   return build::assemble(source, {&level, 1});
+}
+
+build::Tree deepest_tree(const Mesh& mesh) {
+  build::Topology topology;
+  std::uint32_t triangle = 0;
+  const auto leaf_block = [&] {
+    build::TopologyBlock block = {{}, kNodesPerBlock, true};
+    for (std::uint32_t& child : block.child) child = triangle++;
+    topology.push_back(block);
+    return static_cast<std::uint32_t>(topology.size() - 1);
+  };
+  for (std::uint32_t level = 1; level < kMaxDepth; ++level) {
+    const std::size_t self = topology.size();
+    topology.push_back({{}, kNodesPerBlock, false});
+    for (int i = 1; i < kNodesPerBlock; ++i) {
+      const std::uint32_t child = leaf_block();
+      topology[self].child[i] = child;
+    }
+    topology[self].child[0] = static_cast<std::uint32_t>(topology.size());  // the next level's, or the last
+  }
+  leaf_block();
+  return build::emit(mesh.geometry(), topology);
 }
 
 Section& Bytes::section(SectionKind kind) {

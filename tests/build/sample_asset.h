@@ -28,6 +28,13 @@ Mesh random_mesh(std::uint32_t triangles, std::uint64_t seed);
 /// The bytes of a whole file over this mesh: source face i is triangle i, in two parts.
 build::Image make_file(const Mesh& mesh, build::Imaginary imaginary = build::Imaginary::minimal,
                        build::Effort effort = build::Effort::standard);
+build::Image make_file(const Mesh& mesh, const build::Tree& tree,
+                       build::Effort effort = build::Effort::standard);
+
+/// A tree as deep as the format allows: each block above the lowest has three leaf blocks below it and one
+/// that goes on.
+build::Tree deepest_tree(const Mesh& mesh);
+inline constexpr std::uint32_t kTrianglesOfDeepestTree = 12 * (kMaxDepth - 1) + 4;  ///< that a mesh needs
 
 /// Bytes in an allocation of exactly their size, aligned as the checker wants: an overrun by one is seen by
 /// the sanitizer.
@@ -53,10 +60,11 @@ class Bytes {
     return reinterpret_cast<Element*>(data_ + section(kind).offset);
   }
   Block* blocks() { return elements<Block>(SectionKind::blocks); }
+  OrientedBlock* oriented_blocks() { return elements<OrientedBlock>(SectionKind::oriented_blocks); }
   Triangle* triangles() { return elements<Triangle>(SectionKind::triangles); }
   Level& level() { return *elements<Level>(SectionKind::levels); }
 
-  CheckResult check() const { return tandem::check(data_, size_); }
+  CheckResult check(CheckDepth depth = CheckDepth::full) const { return tandem::check(data_, size_, depth); }
   Status check_sealed() {
     seal(data_, size_);
     return check().status;

@@ -1,5 +1,6 @@
 // What is said where no GPU can be used. ctest hides the GPUs, or puts a driver that is too old in the way
-// (old_driver.cpp): environment variable TANDEM_EXPECTED_STATUS, a name of Status.
+// (old_driver.cpp): environment variable TANDEM_EXPECTED_STATUS, a name of Status. Compiled for other kinds
+// of GPU than the one that is there, this program expects GpuNotSupported.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -22,6 +23,9 @@ class GpuAbsent : public testing::Test {
     expected_ = name;
   }
 
+  /// There is a GPU with memory, but no code for it.
+  bool has_memory() const { return expected_ == name(Status::kGpuNotSupported); }
+
   std::string expected_;
 };
 
@@ -40,6 +44,7 @@ TEST(GpuStatus, CudasErrorsHaveNamesOfTheirOwn) {
 }
 
 TEST_F(GpuAbsent, AnUploadSaysSo) {
+  if (has_memory()) GTEST_SKIP() << "an upload needs no code";
   const build::Image image = test::make_file(test::random_mesh(10, 1));
   const AssetView view = check(image.data(), image.size()).asset;
   DeviceAssets assets;
@@ -59,10 +64,11 @@ TEST_F(GpuAbsent, ABroadPhaseSaysSo) {
 TEST_F(GpuAbsent, AContactQuerySaysSo) {
   GpuContactQuery query;
   EXPECT_EQ(name(query.set_assets({}, nullptr)), expected_);
-  EXPECT_EQ(name(query.reserve({10, 10, 10})), expected_);
-  EXPECT_EQ(name(query.find_contacts({}, {}, {}, nullptr)), expected_);
   EXPECT_NE(query.cuda_error(), cudaSuccess);
   EXPECT_EQ(query.bytes(), 0u);
+  if (has_memory()) return;  // what follows needs set_assets()
+  EXPECT_EQ(name(query.reserve({10, 10, 10})), expected_);
+  EXPECT_EQ(name(query.find_contacts({}, {}, {}, nullptr)), expected_);
 }
 
 }  // namespace

@@ -123,7 +123,7 @@ TEST_F(GpuAssets, OfEveryLevelHaveThatLevelsContacts) {
       for (const QueryMode mode : kModes) {
         if (contents == Contents::exact_queries && mode != QueryMode::exact) continue;
         const auto expected = contacts_on_cpu({&single, 1}, instances, pairs, mode);
-        EXPECT_GT(expected.size(), 2u);
+        EXPECT_FALSE(expected.empty());
         EXPECT_EQ(contacts_on_gpu({&level, 1}, scene, mode), expected) << "level " << i;
       }
     }

@@ -334,7 +334,11 @@ int trials(int usual, int factor) {
 }
 
 void SampleAssets::add(const Mesh& mesh, const std::array<double, 3>& origin, build::Imaginary imaginary) {
-  auto file = std::make_unique<Bytes>(make_file(mesh, imaginary));
+  add(mesh, make_file(mesh, imaginary), origin);
+}
+
+void SampleAssets::add(const Mesh& mesh, const build::Image& image, const std::array<double, 3>& origin) {
+  auto file = std::make_unique<Bytes>(image);
   std::copy(origin.begin(), origin.end(), file->header().origin);
   if (file->check_sealed() != Status::kOk) throw std::logic_error("the sample asset is not sound");
   views_.push_back(file->check().asset);

@@ -24,6 +24,7 @@ class SampleAssets {
  public:
   void add(const Mesh& mesh, const std::array<double, 3>& origin = {},
            build::Imaginary imaginary = build::Imaginary::minimal);
+  void add(const Mesh& mesh, const build::Image& file, const std::array<double, 3>& origin = {});
 
   std::uint32_t size() const { return static_cast<std::uint32_t>(meshes_.size()); }
   std::span<const AssetView> views() const { return views_; }

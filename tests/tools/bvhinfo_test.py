@@ -16,7 +16,8 @@ from tool_test import CUBE_OBJ, DONE, TRIANGLE_OBJ, UNREADABLE_INPUT, ToolTest
 class Info(ToolTest):
     KEYS = {"file", "version", "hash", "bytes", "triangles", "nodes", "leaf_nodes", "internal_nodes", "imaginary_nodes",
             "imaginary_minimum", "imaginary_fraction", "leaf_blocks", "internal_blocks", "partial_leaf_blocks", "depth",
-            "leaf_fill", "sah_cost", "expected_block_pairs", "expected_candidates", "leaf_blocks_at_depth",
+            "leaf_fill", "sah_cost", "expected_block_pairs", "expected_candidates", "expected_oriented_block_pairs",
+            "expected_oriented_candidates", "leaf_blocks_at_depth",
             "blocks_with_fill", "bounds", "origin", "rounding_error", "source_faces", "source", "parts", "levels",
             "sections"}
     VERDICT_KEYS = {"file", "sound", "status", "where", "error", "bytes", "check_seconds"}
@@ -28,7 +29,7 @@ class Info(ToolTest):
         page = self.info(self.built("cube.obj", CUBE_OBJ))
         self.assertEqual((page.returncode, page.stderr), (DONE, b""))
         for word in ("cube.obj", "triangles    12", "1 imaginary", "minimum 1", "0 partial leaf blocks", "depth", "SAH cost",
-                     "block pairs", "bounds", "origin", "sections", "provenance"):
+                     "block pairs", "oriented block pairs", "oriented_blocks", "bounds", "origin", "sections", "provenance"):
             self.assertIn(word, page.stdout.decode())
 
     def test_the_page_sends_no_control_characters_of_a_file_to_a_terminal(self):
@@ -69,6 +70,19 @@ class Info(ToolTest):
         self.assertEqual(rows["triangles"], ["12", "12", "x1.000"])
         counts = [info["imaginary_nodes"] for info in self.json_of(a, b)]
         self.assertEqual(rows["imaginary_nodes"][:2], [str(count) for count in counts])
+
+    def test_a_file_without_oriented_blocks_says_so(self):
+        a = self.built("cube.obj", CUBE_OBJ).rename(self.outputs / "a.bvh")
+        b = self.built("cube.obj", CUBE_OBJ, "--no-gpu-blocks").rename(self.outputs / "b.bvh")
+        with_them, without = self.json_of(a, b)
+        self.assertGreaterEqual(with_them["expected_oriented_block_pairs"], 1)
+        self.assertEqual(without["expected_block_pairs"], with_them["expected_block_pairs"])
+        for key in ("expected_oriented_block_pairs", "expected_oriented_candidates"):
+            self.assertIsNone(without[key])
+        self.assertIn(b"no oriented blocks", self.info(b).stdout)
+        self.assertNotIn(b"no oriented blocks", self.info(a).stdout)
+        rows = {line.split()[0]: line.split()[1:] for line in self.info(a, b).stdout.decode().splitlines()}
+        self.assertEqual(rows["expected_oriented_block_pairs"][1:], ["-"])
 
     def test_verify_says_that_a_file_is_sound(self):
         out = self.built("cube.obj", CUBE_OBJ)

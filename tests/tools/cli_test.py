@@ -500,7 +500,8 @@ class Overlap(ToolTest):
 class BuildJson(ToolTest):
     ALWAYS = {"tool", "version", "exit_code", "error", "input", "output", "reader", "single_precision_reader", "faces",
               "vertices", "remarks", "findings", "seconds", "peak_memory_bytes"}
-    AFTER_SUCCESS = {"interrupted", "parts", "origin", "rounding_error", "tree", "bytes", "hash"}
+    AFTER_SUCCESS = {"interrupted", "parts", "origin", "rounding_error", "tree", "gpu_blocks", "bytes",
+                     "hash"}
     FINDINGS = {"faces_index_out_of_range", "faces_too_few_corners", "faces_not_finite", "faces_too_large",
                 "faces_repeated_corner", "faces_not_simple",
                 "vertices_unreferenced", "vertices_welded", "triangles_degenerate", "triangles_duplicate",
@@ -515,6 +516,13 @@ class BuildJson(ToolTest):
         self.assertEqual((report["faces"], report["vertices"], report["tree"]["triangles"]), (6, 8, 12))
         self.assertEqual(report["bytes"], self.out.stat().st_size)
         self.assertEqual(report["hash"], json.loads(self.info(self.out, "--json").stdout)["hash"])
+
+    def test_a_file_without_oriented_blocks_is_told(self):
+        self.assertTrue(self.built_json("a.obj", CUBE_OBJ)["gpu_blocks"])
+        self.assertFalse(self.built_json("a.obj", CUBE_OBJ, "--no-gpu-blocks")["gpu_blocks"])
+        mesh = self.write("a.obj", CUBE_OBJ)
+        self.assertIn(b"no oriented blocks", self.build(mesh, "-o", self.out, "--no-gpu-blocks").stdout)
+        self.assertNotIn(b"oriented", self.build(mesh, "-o", self.out).stdout)
 
     def test_a_failure_has_its_reason_on_both_streams(self):
         for path, out, code in ((self.inputs / "none.obj", self.out, UNREADABLE_INPUT),

@@ -204,7 +204,9 @@ TEST(PoseWork, ExpectedWorkIsThatOfBoxesInTheFirstValidationPoses) {
   ASSERT_EQ(query.set_assets(assets), Status::kOk);
   constexpr std::uint32_t kPoses = 20;
   double block_pairs = 0, candidates = 0;
+  std::vector<Pose> poses;
   for (const auto& pose : make_poses(body.asset, body.asset, kPoses, 1, PoseSet::validation)) {
+    poses.push_back(pose.b);
     const Instance instances[] = {{0, kIdentityPose}, {0, pose.b}};
     const ObjectPair pair = {0, 1};
     ASSERT_EQ(query.find_contacts(instances, {&pair, 1}, {.mode = QueryMode::boxes}), Status::kOk);
@@ -215,6 +217,10 @@ TEST(PoseWork, ExpectedWorkIsThatOfBoxesInTheFirstValidationPoses) {
   EXPECT_EQ(work.poses, kPoses);
   EXPECT_DOUBLE_EQ(work.block_pairs, block_pairs);
   EXPECT_DOUBLE_EQ(work.candidates, candidates);
+  const PoseWork measured = measure_poses(body.asset, body.asset, poses);
+  ASSERT_TRUE(work.oriented);
+  EXPECT_DOUBLE_EQ(work.oriented->block_pairs, spread_of(measured.oriented_block_pairs).mean);
+  EXPECT_DOUBLE_EQ(work.oriented->candidates, spread_of(measured.oriented_candidates).mean);
 }
 
 TEST(GeometryHash, IsThatOfTheTrianglesInAnyOrder) {

@@ -14,6 +14,7 @@ from bench_test import BenchTest, drop_hint
 from tool_test import DONE, UNREADABLE_INPUT, UNWRITABLE_OUTPUT, USAGE, scattered_obj
 
 COUNTERS = ("block_pairs", "candidates", "contacts")
+ORIENTED = ("oriented_block_pairs", "oriented_candidates")
 
 
 class PosesTest(BenchTest):
@@ -24,10 +25,10 @@ class PosesTest(BenchTest):
         self.minimal, self.free = self.tree("minimal"), self.tree("free")
         self.file, self.other = self.outputs / "poses.h5", self.outputs / "other.h5"
 
-    def tree(self, imaginary, seed=1):
-        path = self.inputs / f"{imaginary}_{seed}.bvh"
+    def tree(self, imaginary, seed=1, *options):
+        path = self.inputs / f"{imaginary}_{seed}{''.join(options)}.bvh"
         mesh = self.write("scattered.obj", scattered_obj(300, seed))
-        result = self.build(mesh, "-o", path, "--imaginary", imaginary)
+        result = self.build(mesh, "-o", path, "--imaginary", imaginary, *options)
         self.assertEqual(result.returncode, DONE, result.stderr)
         return path
 
@@ -80,7 +81,7 @@ class Poses(PosesTest):
         with h5py.File(self.file) as file:
             self.assertEqual(list(file["counts/trees"].asstr()), ["../in/minimal_1.bvh", "../in/free_1.bvh"])
             self.assertTrue(((file["poses/depth"][:] >= 0) & (file["poses/depth"][:] < 0.05)).all())
-            for name in COUNTERS:
+            for name in COUNTERS + ORIENTED:
                 rows = file[f"counts/{name}"][:]
                 self.assertEqual((rows.dtype, rows.shape), ("u4", (2, 101)))
                 for tree, row in zip(trees, rows.astype(float)):
@@ -96,6 +97,27 @@ class Poses(PosesTest):
         self.assertEqual(query["object_pairs"], 40)
         for name in COUNTERS:
             self.assertAlmostEqual(query[name], 40 * tree[name]["mean"], 6)
+
+    def test_oriented_blocks_are_walked_where_there_are_some(self):
+        without = self.tree("minimal", 1, "--no-gpu-blocks")
+        trees = self.poses(self.minimal, without, "--count", "40", "-o", self.file)["trees"]
+        self.assertEqual(trees[0]["block_pairs"], trees[1]["block_pairs"])
+        with h5py.File(self.file) as file:
+            for name in ORIENTED:
+                rows = file[f"counts/{name}"][:]
+                self.assertGreater(rows[0].max(), 1)
+                self.assertFalse(rows[1].any())
+                self.assertIsNone(trees[1][name])
+            # What touches has overlapping boxes of either kind.
+            for name in ("candidates", "oriented_candidates"):
+                self.assertTrue((file[f"counts/{name}"][0] >= file["counts/contacts"][0]).all())
+        swapped = self.poses(without, self.minimal, "--poses", self.file)["trees"][1]
+        for name in ORIENTED:
+            self.assertEqual(swapped[name]["mean"], trees[0][name]["mean"])
+            self.assertIsNone(swapped[name]["ratio"])
+        beside = self.poses(self.minimal, "--with", self.tree("minimal", 2, "--no-gpu-blocks"), "--count", "5")
+        self.assertIsNone(beside["trees"][0]["oriented_block_pairs"])
+        self.assertIn(" -\n", self.passes("poses", without, "--count", "5"))
 
     def test_a_second_mesh(self):
         second = self.tree("minimal", seed=2)

@@ -34,6 +34,7 @@ class Oracle(ToolTest):
             self.assertGreaterEqual(imaginary, least)
         if triangles <= 2000:
             self.assertEqual(bvh_file.defects_of_boxes(file), [])
+            self.assertEqual(bvh_file.defects_of_oriented_blocks(file), [])
             self.assertEqual(bvh_file.xxh64(file.raw[16:]), file.hash)
         corners = file.corners.reshape(-1, 3)
         np.testing.assert_array_equal(corners.min(0), file.lower)
@@ -56,6 +57,18 @@ class Oracle(ToolTest):
             self.assertEqual(self.build(SOURCE_DIR / "assets" / name, "-o", self.out).returncode, DONE)
             self.assert_sound(self.out, triangles)
 
+    def test_oriented_blocks_are_fitted_by_every_effort_and_left_out_where_asked(self):
+        blocks = {}
+        for effort in ("fast", "default", "best"):
+            out = self.built("a.obj", scattered_obj(300), "--effort", effort)
+            blocks[effort] = self.assert_sound(out, 300).oriented_blocks
+            self.assertGreater((blocks[effort]["quaternion"] != (2048 + 2047, 2048, 2048, 2048)).any(1).mean(), 0.5)
+        with_them = self.built("a.obj", scattered_obj(300)).stat().st_size
+        out = self.built("a.obj", scattered_obj(300), "--no-gpu-blocks")
+        self.assertIsNone(bvh_file.read(out).oriented_blocks)
+        self.assertEqual(bvh_file.read(out).provenance["options"]["gpu_blocks"], False)
+        self.assertAlmostEqual((with_them - out.stat().st_size) / 112, len(blocks["fast"]), delta=256 / 112)
+
     def test_coincident_triangles_are_all_kept(self):
         out = self.built("a.obj", TRIANGLE_OBJ + "f 1 2 3\n" * 52)
         file = self.assert_sound(out, 53)
@@ -69,6 +82,19 @@ class Oracle(ToolTest):
         count = len(lines) // 3
         faces = [f"f {3 * i + 1} {3 * i + 2} {3 * i + 3}" for i in range(count)]
         self.assert_sound(self.built("a.obj", "\n".join(lines + faces) + "\n"), count)
+
+    def test_flat_tiny_huge_and_far_meshes_are_sound(self):
+        def obj(points):
+            lines = ["v {:.9g} {:.9g} {:.9g}".format(*point) for point in points]
+            return "\n".join(lines + [f"f {i + 1} {i + 2} {i + 3}" for i in range(0, len(lines), 3)]) + "\n"
+        points = np.random.default_rng(1).uniform(-1, 1, (90, 3))
+        flat = points * (1, 0, 1) + (0, 0.3, 0)
+        for cloud in (flat, points * 1e-44, points * 1e-38, points * 3e38, points + 1e6, points * 1e-3 + (5e5, -7e6, 0),
+                      points[:, :1] * (1, 2, -3)):
+            for effort in ("fast", "default"):
+                self.built("a.obj", obj(cloud), "--effort", effort)
+                file = bvh_file.read(self.out)
+                self.assert_sound(self.out, len(file.triangles))
 
     def test_the_stored_triangles_are_those_of_the_input(self):
         text = scattered_obj(500)

@@ -4,11 +4,13 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <new>
 
+#include "statistics/oriented_work.h"
 #include "tandem/formats/hash.h"
 
 namespace tandem::bench {
@@ -92,13 +94,27 @@ std::vector<NearContactPose> make_poses(const NamedAsset& a, const NamedAsset& b
 
 PoseWork measure_poses(const NamedAsset& a, const NamedAsset& b, std::span<const Pose> poses) {
   PoseWork work;
-  for (auto* column : {&work.block_pairs, &work.candidates, &work.contacts}) column->resize(poses.size());
+  for (auto* column : {&work.block_pairs, &work.candidates, &work.contacts, &work.oriented_block_pairs,
+                       &work.oriented_candidates})
+    column->resize(poses.size());
+  const OrientedWork on_gpu(a.view, b.view);
+  std::atomic<bool> oriented = true;
   for_each_pose(a, b, poses.size(), [&](PairQuery& query, std::size_t i) {
     const QueryCounters& counters = query.ask(poses[i], false);
     work.block_pairs[i] = narrowed(counters.block_pairs);
     work.candidates[i] = narrowed(counters.candidates);
     work.contacts[i] = narrowed(counters.contacts);
+    if (const std::optional<WalkWork> walk = on_gpu.count(poses[i])) {
+      work.oriented_block_pairs[i] = narrowed(walk->block_pairs);
+      work.oriented_candidates[i] = narrowed(walk->candidates);
+    } else {
+      oriented = false;
+    }
   });
+  if (!oriented) {
+    work.oriented_block_pairs.clear();
+    work.oriented_candidates.clear();
+  }
   return work;
 }
 
@@ -128,7 +144,7 @@ Spread spread_of(std::span<const std::uint32_t> values) {
 
 Ratio ratio_of(std::span<const std::uint32_t> values, std::span<const std::uint32_t> base) {
   const double base_mean = mean_of(base), ratio = mean_of(values) / base_mean;
-  if (base_mean == 0) return {NAN, NAN};
+  if (base.empty() || base_mean == 0) return {NAN, NAN};
   double squares = 0;
   for (std::size_t i = 0; i < values.size(); ++i) {
     const double rest = values[i] - ratio * base[i];

@@ -19,6 +19,8 @@ struct NamedAsset {
 /// What queries did in each pose.
 struct PoseWork {
   std::vector<std::uint32_t> block_pairs, candidates, contacts;
+  /// Those of a GPU (statistics/oriented_work.h). Empty where it has nothing to walk in one of the poses.
+  std::vector<std::uint32_t> oriented_block_pairs, oriented_candidates;
 
   friend bool operator==(const PoseWork&, const PoseWork&) = default;
 };
@@ -29,8 +31,8 @@ struct PoseWork {
 std::vector<NearContactPose> make_poses(const NamedAsset& a, const NamedAsset& b, std::uint32_t count,
                                         std::uint64_t seed, PoseSet set);
 
-/// Makes one exact query of a at the identity and b for each pose. Throws FileError. Both use the threads
-/// that oneTBB gives; what they find does not depend on them.
+/// Makes one exact query of a at the identity and b for each pose, and counts what a GPU would walk. Throws
+/// FileError. Both use the threads that oneTBB gives; what they find does not depend on them.
 PoseWork measure_poses(const NamedAsset& a, const NamedAsset& b, std::span<const Pose> poses);
 
 /// XXH64 of level 0's triangles, corner by corner, and the origin, whatever the order of the triangles: equal
@@ -48,12 +50,12 @@ struct Spread {
 Spread spread_of(std::span<const std::uint32_t> values);
 
 /// The ratio of two means over the same poses, and its standard error as poses pair them (by the delta
-/// method); NaN where the denominator is 0.
+/// method); NaN where the denominator is 0 or there is none.
 struct Ratio {
   double value, standard_error;
 };
 
-/// Condition: as many values each.
+/// Condition: at least one value, and as many of `base`, or none.
 Ratio ratio_of(std::span<const std::uint32_t> values, std::span<const std::uint32_t> base);
 
 }  // namespace tandem::bench

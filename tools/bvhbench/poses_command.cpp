@@ -132,11 +132,14 @@ void write(const std::string& path, const Bodies& bodies, const Poses& poses,
     std::vector<std::uint32_t> all;
     for (const PoseWork& of_tree : work) {
       all.insert(all.end(), (of_tree.*column).begin(), (of_tree.*column).end());
+      all.resize(all.size() + poses.of_b.size() - (of_tree.*column).size());
     }
     file.add(name, {work.size(), poses.of_b.size()}, all);
   };
   add("/counts/block_pairs", &PoseWork::block_pairs);
   add("/counts/candidates", &PoseWork::candidates);
+  add("/counts/oriented_block_pairs", &PoseWork::oriented_block_pairs);
+  add("/counts/oriented_candidates", &PoseWork::oriented_candidates);
   add("/counts/contacts", &PoseWork::contacts);
   file.write();
 }
@@ -146,6 +149,7 @@ Json number(double value) {
 }
 
 Json to_json(const std::vector<std::uint32_t>& values, const std::vector<std::uint32_t>& base, double unit) {
+  if (values.empty()) return {};
   const Spread spread = spread_of(values);
   const Ratio ratio = ratio_of(values, base);
   return {{"mean", unit * spread.mean},
@@ -161,12 +165,15 @@ void print_json(const PosesArguments& arguments, const Bodies& bodies, const Pos
   const auto or_null = [](const std::string& text) { return text.empty() ? Json() : Json(text); };
   Json trees = Json::array();
   for (std::size_t i = 0; i < work.size(); ++i) {
-    trees.push_back({{"file", bodies.trees[i].path},
-                     {"triangles", bodies.trees[i].view.level().triangle_count},
-                     {"block_pairs", to_json(work[i].block_pairs, work[0].block_pairs, 1)},
-                     {"box_tests", to_json(work[i].block_pairs, work[0].block_pairs, kBoxTests)},
-                     {"candidates", to_json(work[i].candidates, work[0].candidates, 1)},
-                     {"contacts", to_json(work[i].contacts, work[0].contacts, 1)}});
+    trees.push_back(
+        {{"file", bodies.trees[i].path},
+         {"triangles", bodies.trees[i].view.level().triangle_count},
+         {"block_pairs", to_json(work[i].block_pairs, work[0].block_pairs, 1)},
+         {"box_tests", to_json(work[i].block_pairs, work[0].block_pairs, kBoxTests)},
+         {"candidates", to_json(work[i].candidates, work[0].candidates, 1)},
+         {"oriented_block_pairs", to_json(work[i].oriented_block_pairs, work[0].oriented_block_pairs, 1)},
+         {"oriented_candidates", to_json(work[i].oriented_candidates, work[0].oriented_candidates, 1)},
+         {"contacts", to_json(work[i].contacts, work[0].contacts, 1)}});
   }
   const Json json = {{"tool", "bvhbench poses"},
                      {"version", TANDEM_VERSION},
@@ -182,11 +189,15 @@ void print_json(const PosesArguments& arguments, const Bodies& bodies, const Pos
 
 void print_counter(const char* name, const std::vector<std::uint32_t>& values,
                    const std::vector<std::uint32_t>& base, bool first) {
+  if (values.empty()) {
+    std::printf("  %-20s %11s\n", name, "-");
+    return;
+  }
   const Spread spread = spread_of(values);
-  std::printf("  %-12s %11.1f  %8.1f  %9.0f %9.0f %9.0f", name, spread.mean, spread.standard_error,
+  std::printf("  %-20s %11.1f  %8.1f  %9.0f %9.0f %9.0f", name, spread.mean, spread.standard_error,
               spread.lower_quartile, spread.median, spread.upper_quartile);
   const Ratio ratio = ratio_of(values, base);
-  if (!first) std::printf("   x%.3f  %.3f", ratio.value, ratio.standard_error);
+  if (!first && std::isfinite(ratio.value)) std::printf("   x%.3f  %.3f", ratio.value, ratio.standard_error);
   std::puts("");
 }
 
@@ -194,12 +205,14 @@ void print_text(const Bodies& bodies, const Poses& poses, const std::vector<Pose
   std::printf("%s %s poses near contact, seed %s%s%s\n", with_commas(poses.of_b.size()).c_str(),
               poses.notes.stream[0].c_str(), poses.notes.stream[1].c_str(), bodies.with ? ", with " : "",
               bodies.with ? bodies.with->path.c_str() : "");
-  std::printf("%-14s %11s  %8s  %9s %9s %9s%s\n", "", "mean", "error", "quarter", "median", "3 quarters",
+  std::printf("%-22s %11s  %8s  %9s %9s %9s%s\n", "", "mean", "error", "quarter", "median", "3 quarters",
               work.size() > 1 ? "  to the first  error" : "");
   for (std::size_t i = 0; i < work.size(); ++i) {
     std::printf("%s\n", bodies.trees[i].path.c_str());
     print_counter("block pairs", work[i].block_pairs, work[0].block_pairs, i == 0);
     print_counter("candidates", work[i].candidates, work[0].candidates, i == 0);
+    print_counter("oriented block pairs", work[i].oriented_block_pairs, work[0].oriented_block_pairs, i == 0);
+    print_counter("oriented candidates", work[i].oriented_candidates, work[0].oriented_candidates, i == 0);
     print_counter("contacts", work[i].contacts, work[0].contacts, i == 0);
   }
 }

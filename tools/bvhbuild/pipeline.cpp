@@ -135,6 +135,7 @@ Image build_image(const Options& options, const PolygonMesh& polygons, const Sto
   }
   const FileHeader& header = *checked.asset.header;
   outcome.tree = measure_tree(checked.asset.level(), header.lower, header.upper);
+  outcome.gpu_blocks = checked.asset.level().oriented_blocks != nullptr;
   outcome.hash = hexadecimal(header.hash);
   outcome.file_bytes = header.file_bytes;
   return image;

@@ -26,6 +26,7 @@ struct Outcome {
   double rounding_error = 0;
   bool interrupted = false;  ///< Ctrl-C ended the optimisation; the tree is the best until then
   TreeStatistics tree;
+  bool gpu_blocks = false;  ///< the file has oriented blocks
   std::uint64_t file_bytes = 0;
   std::string hash;  ///< of the output, 16 hexadecimal digits
 

@@ -53,6 +53,7 @@ void add_results(const Outcome& outcome, Json& json) {
   json["rounding_error"] = outcome.rounding_error;
   json["interrupted"] = outcome.interrupted;
   json["tree"] = to_json(outcome.tree);
+  json["gpu_blocks"] = outcome.gpu_blocks;
   json["bytes"] = outcome.file_bytes;
   json["hash"] = outcome.hash;
 }
@@ -77,6 +78,7 @@ std::string text_report(const Options& options, const Outcome& outcome) {
   out << "  tree     " << tree.imaginary_nodes << " of " << with_commas(tree.nodes)
       << " nodes imaginary (minimum " << tree.imaginary_minimum << "), depth " << tree.depth << ", SAH cost "
       << number("%.2f", tree.sah_cost) << "\n";
+  if (!outcome.gpu_blocks) out << "  note     no oriented blocks: exact queries on a GPU refuse the file\n";
   if (outcome.interrupted) out << "  note     interrupted: this is the best tree until then\n";
   const Outcome::Seconds& s = outcome.seconds;
   out << "  took     import " << number("%.2f", s.import) << " s, clean " << number("%.2f", s.clean)

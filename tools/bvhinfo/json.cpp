@@ -72,6 +72,9 @@ Json to_json(const Inspection& inspection) {
   const bool sampled = inspection.work.poses > 0;
   json["expected_block_pairs"] = sampled ? Json(inspection.work.block_pairs) : Json();
   json["expected_candidates"] = sampled ? Json(inspection.work.candidates) : Json();
+  const auto& oriented = inspection.work.oriented;
+  json["expected_oriented_block_pairs"] = oriented ? Json(oriented->block_pairs) : Json();
+  json["expected_oriented_candidates"] = oriented ? Json(oriented->candidates) : Json();
   json["leaf_blocks_at_depth"] = inspection.tree.leaf_blocks_at_depth;
   json["blocks_with_fill"] = inspection.tree.blocks_with_fill;
   json["bounds"] = {{"lower", header.lower}, {"upper", header.upper}};

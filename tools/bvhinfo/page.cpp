@@ -78,7 +78,20 @@ std::string part_lines(const AssetView& view) {
   return text;
 }
 
-std::string tree_lines(const TreeStatistics& tree, const ExpectedWork& work) {
+std::string work_lines(const LevelView& level, const ExpectedWork& work) {
+  std::string text = "  query work   not sampled: the mesh overlaps itself too much, or is too large\n";
+  if (work.poses != 0)
+    text = format("  query work   %.1f block pairs, %.1f candidates expected near contact (%u poses)\n",
+                  work.block_pairs, work.candidates, work.poses);
+  if (work.oriented)
+    text += format("  on a GPU     %.1f oriented block pairs, %.1f candidates\n", work.oriented->block_pairs,
+                   work.oriented->candidates);
+  if (level.oriented_blocks == nullptr)
+    text += "  on a GPU     no exact queries: the file has no oriented blocks\n";
+  return text;
+}
+
+std::string tree_lines(const TreeStatistics& tree) {
   std::string text = "  triangles    " + with_commas(tree.triangles) + "\n";
   text += "  nodes        " + with_commas(tree.nodes) + ": " + with_commas(tree.leaf_nodes) + " leaves, " +
           with_commas(tree.internal_nodes) + " internal, " + with_commas(tree.imaginary_nodes) +
@@ -88,10 +101,6 @@ std::string tree_lines(const TreeStatistics& tree, const ExpectedWork& work) {
           " internal, " + with_commas(tree.partial_leaf_blocks) + " partial leaf blocks\n";
   text += format("  depth        %u blocks\n  leaf fill    %.2f %%\n  SAH cost     %.3f\n", tree.depth,
                  100 * tree.leaf_fill, tree.sah_cost);
-  if (work.poses == 0)
-    return text + "  query work   not sampled: the mesh overlaps itself too much, or is too large\n";
-  text += format("  query work   %.1f block pairs, %.1f candidates expected near contact (%u poses)\n",
-                 work.block_pairs, work.candidates, work.poses);
   return text;
 }
 
@@ -116,7 +125,7 @@ std::string histogram(const char* title, const Counts& counts, std::size_t first
 std::string section_lines(const Json& sections) {
   std::string text = "  sections\n";
   for (const Json& section : sections) {
-    text += format("  %11s  level %u  offset %12s  %12s bytes  %10s elements\n",
+    text += format("  %15s  level %u  offset %12s  %12s bytes  %10s elements\n",
                    section["kind"].get<std::string>().c_str(), section["level"].get<unsigned>(),
                    with_commas(section["offset"].get<std::uint64_t>()).c_str(),
                    with_commas(section["bytes"].get<std::uint64_t>()).c_str(),
@@ -141,6 +150,8 @@ constexpr const char* kCompared[] = {"bytes",
                                      "sah_cost",
                                      "expected_block_pairs",
                                      "expected_candidates",
+                                     "expected_oriented_block_pairs",
+                                     "expected_oriented_candidates",
                                      "rounding_error"};
 
 std::string figure(const Json& value) {
@@ -161,7 +172,8 @@ std::string page(const Inspection& inspection) {
   text += part_lines(view);
   text += "  bounds       " + point(header.lower) + " to " + point(header.upper) + "\n";
   text += "  origin       " + point(header.origin) + format(", rounding error %.3g\n", header.rounding_error);
-  text += tree_lines(inspection.tree, inspection.work);
+  text += tree_lines(inspection.tree);
+  text += work_lines(view.level(), inspection.work);
   text += histogram("leaf blocks at depth", inspection.tree.leaf_blocks_at_depth, 0, 1);
   text +=
       histogram("blocks with so many nodes that are not imaginary", inspection.tree.blocks_with_fill, 1, 0);
@@ -170,7 +182,7 @@ std::string page(const Inspection& inspection) {
 
 std::string comparison(const std::vector<Inspection>& inspections) {
   std::vector<Json> files;
-  std::string text = format("%-22s", "");
+  std::string text = format("%-30s", "");
   for (const Inspection& inspection : inspections) {
     files.push_back(to_json(inspection));
     const std::string name = std::filesystem::path(inspection.path).filename().string();
@@ -178,7 +190,7 @@ std::string comparison(const std::vector<Inspection>& inspections) {
   }
   text += "\n";
   for (const char* key : kCompared) {
-    text += format("%-22s", key);
+    text += format("%-30s", key);
     const double base = files[0][key].is_null() ? 0 : files[0][key].get<double>();
     for (std::size_t i = 0; i < files.size(); ++i) {
       const std::string value = figure(files[i][key]);

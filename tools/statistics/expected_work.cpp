@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "near_contact.h"
+#include "oriented_work.h"
 #include "statistics.h"
 #include "tandem/kernels/detail/block_pair.h"
 #include "tandem/kernels/detail/candidate.h"
@@ -13,10 +14,8 @@ namespace {
 // What a sample may cost, half a second or so, in block pairs: a mesh whose triangles all lie in one place
 // would take their number squared. A triangle test takes as long as a few block pairs.
 constexpr std::uint64_t kMostWork = 20'000'000, kWorkOfTriangleTest = 8;
-
-struct Work {
-  std::uint64_t block_pairs = 0, candidates = 0;
-};
+// Pairs of oriented blocks are tested without SIMD, one box after the other.
+constexpr std::uint64_t kMostOrientedPairs = kMostWork / 8;
 
 // A tree at the identity against itself, posed, as queries walk it, one candidate at a time.
 class BudgetedQuery {
@@ -43,8 +42,8 @@ class BudgetedQuery {
     return found;
   }
 
-  Work work(const Pose& pose) {
-    Work work;
+  WalkWork work(const Pose& pose) {
+    WalkWork work;
     work.block_pairs =
         walk(for_stored_coordinates(pose, origin_), [&](const Block&, const Block&, std::uint32_t mask) {
           work.candidates += static_cast<std::uint64_t>(std::popcount(mask));
@@ -85,22 +84,48 @@ class BudgetedQuery {
   std::uint64_t budget_ = kMostWork;
 };
 
+// What is expected of the oriented blocks.
+class OrientedSample {
+ public:
+  OrientedSample(const AssetView& asset, std::uint32_t poses) : walk_(asset, asset), poses_(poses) {}
+
+  void add(const Pose& pose) {
+    if (!sum_) return;
+    const std::optional<WalkWork> work = walk_.count(pose, left_);
+    if (!work) return sum_.reset();
+    left_ -= work->block_pairs;
+    sum_->block_pairs += static_cast<double>(work->block_pairs) / poses_;
+    sum_->candidates += static_cast<double>(work->candidates) / poses_;
+  }
+
+  std::optional<ExpectedWork::Oriented> sum() const { return sum_; }
+
+ private:
+  const OrientedWork walk_;
+  const std::uint32_t poses_;
+  std::uint64_t left_ = kMostOrientedPairs;
+  std::optional<ExpectedWork::Oriented> sum_ = ExpectedWork::Oriented{};
+};
+
 }  // namespace
 
 ExpectedWork sample_expected_work(const AssetView& asset, std::uint32_t poses) {
   const Bounds bounds = bounds_of(asset);
   const NearContactPoses near_contact(bounds, bounds, 1, PoseSet::validation);
   BudgetedQuery query(asset);
+  OrientedSample oriented(asset, poses);
   ExpectedWork sum;
   sum.poses = poses;
   for (std::uint32_t i = 0; i < poses; ++i) {
     const auto pose = near_contact.find(i, [&](const Pose& b) { return query.touching(b) || query.spent(); });
     if (!pose) return {};
-    const Work work = query.work(pose->b);
+    const WalkWork work = query.work(pose->b);
     if (query.spent()) return {};
+    oriented.add(pose->b);
     sum.block_pairs += static_cast<double>(work.block_pairs) / poses;
     sum.candidates += static_cast<double>(work.candidates) / poses;
   }
+  sum.oriented = oriented.sum();
   return sum;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "tandem/formats/view.h"
@@ -31,6 +32,11 @@ struct ExpectedWork {
   double candidates = 0;    ///< leaf pairs whose boxes overlap
   std::uint32_t poses = 0;  ///< 0: no figures; a mesh overlaps itself so much that sampling was given up, or
                             ///< its coordinates are too large for float32 box tests
+  /// The same of oriented blocks, as a GPU walks them; none where there are none or sampling was given up.
+  struct Oriented {
+    double block_pairs = 0, candidates = 0;
+  };
+  std::optional<Oriented> oriented;
 };
 
 /// Samples the first validation poses of seed 1 (near_contact.h). The same mesh always gets the same poses.

@@ -80,9 +80,9 @@ __device__ void write_report(const QueryArgs& args) {
   *args.host_report = report;
 }
 
-// What makes the state ready for the next query; the report stays.
-__device__ void clear_mailboxes(QueryState& state) {
-  for (std::uint32_t i = blockIdx.x * kThreads + threadIdx.x; i < kChunks; i += gridDim.x * kThreads) {
+// What makes the state ready for the next query; the report stays. Mailboxes: those that this one used.
+__device__ void clear_mailboxes(QueryState& state, std::uint32_t mailboxes) {
+  for (std::uint32_t i = blockIdx.x * kThreads + threadIdx.x; i < mailboxes; i += gridDim.x * kThreads) {
     state.frame.mailbox[i] = state.world.mailbox[i] = 0;
   }
 }
@@ -111,7 +111,7 @@ __device__ bool ends_last(const QueryArgs& args) {
 template <bool kFast>
 __global__ void __launch_bounds__(kThreads) decide_by_float64(const __grid_constant__ QueryArgs args) {
   wait_for_kernel_before();
-  clear_mailboxes(*args.state);
+  clear_mailboxes(*args.state, args.shape.mailboxes());
   const std::uint32_t total = failed(args) ? 0 : stored(args.state->undecided, args.capacity.undecided);
   for (std::uint32_t first = blockIdx.x * kThreads; first < total; first += gridDim.x * kThreads) {
     const std::uint32_t i = first + threadIdx.x;
@@ -147,7 +147,7 @@ __global__ void __launch_bounds__(kThreads) decide_exactly(const __grid_constant
   if (has_float64_stage(args)) {
     if (total == 0) return;
   } else {
-    clear_mailboxes(*args.state);
+    clear_mailboxes(*args.state, args.shape.mailboxes());
   }
   for (std::uint32_t first = blockIdx.x * kThreads; first < total; first += gridDim.x * kThreads) {
     const std::uint32_t i = first + threadIdx.x;
@@ -162,12 +162,7 @@ __global__ void __launch_bounds__(kThreads) decide_exactly(const __grid_constant
 }  // namespace
 
 cudaError_t decide_rest(const QueryArgs& args, cudaStream_t stream) {
-  int device = 0, processors = 0;
-  if (const cudaError_t error = cudaGetDevice(&device); error != cudaSuccess) return error;
-  if (const cudaError_t error = cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device);
-      error != cudaSuccess)
-    return error;
-  const Grid grid = {static_cast<unsigned>(processors) * 4, kThreads, 0, stream};
+  const Grid grid = {args.limits.processors * 4, kThreads, 0, stream, args.limits.early_launch};
   cudaError_t error = cudaSuccess;
   if (has_float64_stage(args))
     error = launch_after(

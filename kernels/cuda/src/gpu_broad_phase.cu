@@ -135,6 +135,7 @@ struct GpuBroadPhase::State {
   GpuArray<GpuBroadPhaseReport> report;
   PinnedArray<GpuBroadPhaseReport> host_report;
   GpuBroadPhaseCapacity capacity;
+  gpu::DeviceLimits limits = {};
   cudaError_t error = cudaSuccess;
 
   // Of a call: true, or what went wrong is kept.
@@ -185,8 +186,8 @@ void GpuBroadPhase::State::end(bool queued, cudaStream_t stream) {
 
 bool GpuBroadPhase::State::reserve_fixed() {
   if (host_report.data() != nullptr) return true;
-  if (!ok(survey.reserve(1)) || !ok(counters.reserve(1)) || !ok(report.reserve(1)) ||
-      !ok(cudaMemset(report.data(), 0, report.bytes())) || !refresh(nullptr) ||
+  if (!ok(gpu::limits_of_device(limits)) || !ok(survey.reserve(1)) || !ok(counters.reserve(1)) ||
+      !ok(report.reserve(1)) || !ok(cudaMemset(report.data(), 0, report.bytes())) || !refresh(nullptr) ||
       !ok(cudaStreamSynchronize(nullptr)) || !ok(host_report.reserve(1)))
     return false;
   *host_report = {};
@@ -243,7 +244,7 @@ Output GpuBroadPhase::State::output(std::uint32_t count, bool sorted) {
 template <typename... Parameters, typename... Arguments>
 bool GpuBroadPhase::State::launch(std::uint32_t blocks, std::uint32_t threads, cudaStream_t stream,
                                   void (*kernel)(Parameters...), const Arguments&... arguments) {
-  return ok(gpu::launch_after({blocks, threads, 0, stream}, kernel, arguments...));
+  return ok(gpu::launch_after({blocks, threads, 0, stream, limits.early_launch}, kernel, arguments...));
 }
 
 template <typename Boxes>

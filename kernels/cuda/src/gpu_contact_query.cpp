@@ -14,9 +14,6 @@ namespace {
 // Blocks of a tree that an entry of the walk's stack can name.
 constexpr std::uint32_t kMostBlocks = (1u << gpu::kNumberBits) - 1;
 
-// Entries of a warp's stack beyond its reserve.
-constexpr std::uint32_t kStackSize = 208;
-
 template <typename Number>
 Number grown(Number wanted, Number present) {
   return wanted <= present ? present : std::max(wanted, present + present / 2);
@@ -33,6 +30,7 @@ struct GpuContactQuery::State {
   std::uint64_t most_faces = 0;
   bool all_oriented = true, all_axis_aligned = true;  // whether each asset has these blocks
 
+  gpu::DeviceLimits limits = {};
   GpuArray<gpu::QueryState> query;
   bool query_is_clear = false;  // a query that ends leaves it so
   GpuArray<gpu::Chunk> chunks;
@@ -75,8 +73,9 @@ struct GpuContactQuery::State {
 
 Status GpuContactQuery::State::provide_fixed_memory(cudaStream_t stream) {
   if (report.data() != nullptr) return Status::kOk;
-  Status status = reserve(query, 1);
-  if (status == Status::kOk) status = reserve(chunks, gpu::kChunks);
+  Status status = keep(gpu::limits_of_device(limits));
+  if (status == Status::kOk) status = reserve(query, 1);
+  if (status == Status::kOk) status = reserve(chunks, gpu::most_mailboxes(limits));
   if (status == Status::kOk) status = keep(cudaMemsetAsync(query.data(), 0, query.bytes(), stream));
   if (status == Status::kOk) status = keep(cudaMemsetAsync(chunks.data(), 0, chunks.bytes(), stream));
   if (status == Status::kOk) status = keep(cudaStreamSynchronize(stream));
@@ -187,9 +186,8 @@ gpu::QueryArgs GpuContactQuery::State::args(const GpuInstances& instances, const
   args.contacts = options.sorted ? unsorted.data() : contacts.data();
   args.undecided = undecided.data();
   args.unresolved = undecided.data() + capacity.undecided;
-  args.most_blocks = std::min(options.most_blocks, gpu::kChunks);  // a grid never has as many
-  args.stack_reserve = 2 * depth + 32;                             // see walk.cuh
-  args.stack_size = args.stack_reserve + kStackSize;
+  args.limits = limits;
+  args.shape = gpu::walk_shape(limits, depth, options.most_blocks);
   return args;
 }
 

@@ -6,6 +6,7 @@
 #include "launch.h"
 #include "pair_record.h"
 #include "tandem/kernels/detail/candidate.h"
+#include "walk_shape.h"
 
 // What the kernels of a query share, all of it in GPU memory.
 namespace tandem::gpu {
@@ -18,18 +19,18 @@ struct Candidate {
   std::uint32_t pair, a, b;
 };
 
-/// Entries of the stack, see walk_stack.cuh, that one warp gives to another: two words of 64 bits each.
+/// Entries of the stack, see walk_stack.cuh, that one warp gives to another: two words of 64 bits each. There
+/// is one for each mailbox.
 struct alignas(16) Chunk {
   Counter entry[32][2];
 };
-inline constexpr std::uint32_t kChunks = 8192;
 
 /// How warps share work, see work_sharing.h, and the first object pair that no warp took.
 struct alignas(128) Balance {
   Counter counts;
   Counter beside_counts;  ///< never written: warps look at 16 bytes at once
   std::uint32_t next_pair;
-  alignas(128) std::uint32_t mailbox[kChunks];
+  alignas(128) std::uint32_t mailbox[kMostMailboxes];
 };
 
 /// Zero when a query begins: cleared by the one before it, the report excepted.
@@ -62,9 +63,8 @@ struct QueryArgs {
   std::uint32_t* met;          ///< of a pair: not 0 once it has a contact; where only the first is asked for
   Contact* contacts;
   Candidate *undecided, *unresolved;
-  std::uint32_t stack_size, stack_reserve;  ///< entries of a warp's stack; see Walk::step()
-  std::uint32_t most_blocks;                ///< of the walk's grid; 0: as many as the GPU holds
-  std::uint32_t mailbox_bits;               ///< they number the mailboxes in use, see work_sharing.h
+  DeviceLimits limits;
+  WalkShape shape;
 };
 
 /// What sorting takes besides args.contacts, which it reads: all of as many contacts.

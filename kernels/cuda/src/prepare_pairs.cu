@@ -38,13 +38,8 @@ __global__ void __launch_bounds__(kThreads) prepare(const __grid_constant__ Quer
 }  // namespace
 
 cudaError_t prepare_pairs(const QueryArgs& args, cudaStream_t stream) {
-  int device = 0, processors = 0;
-  if (const cudaError_t error = cudaGetDevice(&device); error != cudaSuccess) return error;
-  if (const cudaError_t error = cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device);
-      error != cudaSuccess)
-    return error;
   // After whatever kernel of the user's, and so after all of it.
-  prepare<<<static_cast<unsigned>(processors) * 32, kThreads, 0, stream>>>(args);
+  prepare<<<args.limits.processors * 32, kThreads, 0, stream>>>(args);
   return cudaGetLastError();
 }
 

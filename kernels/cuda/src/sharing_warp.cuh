@@ -35,7 +35,7 @@ class SharingWarp {
   }
 
   __device__ static std::uint32_t tickets_end() { return kEndOfTickets; }
-  __device__ std::uint32_t mailbox_bits() const { return args_.mailbox_bits; }
+  __device__ std::uint32_t mailbox_bits() const { return args_.shape.mailbox_bits; }
   __device__ std::uint32_t kept_ticket() const { return load_shared(memory_); }
   __device__ void keep_ticket(std::uint32_t ticket) const { store_shared(memory_, ticket); }
 

@@ -1,10 +1,8 @@
 #pragma once
-#include <algorithm>
-#include <bit>
-
 #include "contact_output.cuh"
 #include "sharing_warp.cuh"
 #include "walk_lane.cuh"
+#include "walk_shape.h"
 #include "walk_stack.cuh"
 #include "work_sharing.h"
 
@@ -20,13 +18,10 @@ namespace {
 
 constexpr std::uint32_t kFewestPairsAtOnce = 4, kMostPairsAtOnce = 16;  // object pairs that a warp takes
 constexpr std::uint32_t kFewestToShare = 32;                            // block pairs, for each gift
-constexpr std::uint32_t kWarpsPerBlock = 16, kBlocksPerProcessor = 1;
 constexpr std::uint32_t kRoundsBetweenCounts = 1u << 26;  // a lane counts at most 16 in each, in 32 bits
 
-/// The shared memory of one warp, in words.
-__host__ __device__ constexpr std::uint32_t warp_words(std::uint32_t stack_size) {
-  return ContactOutput::kSharedWords + SharingWarp::kSharedWords + 4 * stack_size;
-}
+static_assert(kBlockWords == kPositionWords &&
+              kWarpWords == ContactOutput::kSharedWords + SharingWarp::kSharedWords);
 
 /// Where a warp has its shared memory, and the lane. Read back from memory, so that the compiler keeps them
 /// in registers and does not compute them anew.
@@ -53,7 +48,7 @@ class Walk {
         lane_(place.lane),
         output_(place.memory, place.lane),
         warp_(args, balance_, place.memory + 4 * ContactOutput::kSharedWords, place.lane),
-        stack_(positions, place.memory + 4 * warp_words(0), args.stack_size, place.lane) {}
+        stack_(positions, place.memory + 4 * kWarpWords, args.shape.stack_size, place.lane) {}
 
   __device__ void run() {
     const std::uint32_t pairs = input();
@@ -83,10 +78,10 @@ class Walk {
     return Means::kWorld ? args_.state->world_pairs : pair_count(args_);
   }
 
-  __device__ static std::uint32_t warps() { return gridDim.x * kWarpsPerBlock; }
+  __device__ std::uint32_t warps() const { return gridDim.x * args_.shape.warps; }
 
   /// How many object pairs each warp takes where there are so many.
-  __device__ static std::uint32_t share_of(std::uint32_t pairs) {
+  __device__ std::uint32_t share_of(std::uint32_t pairs) const {
     return min(max(pairs / warps(), kFewestPairsAtOnce), kMostPairsAtOnce);
   }
 
@@ -128,7 +123,8 @@ class Walk {
   /// Takes up to 32 block pairs off, tests them and puts on those that hit.
   __device__ void step() {
     warp_.begin_look();  // comes while the boxes are tested
-    const Taken taken = stack_.take_block_pairs(next_count());
+    const Taken taken =
+        stack_.take_block_pairs(block_pairs_to_take(stack_.waiting(), stack_.room(), args_.shape.reserve));
     const bool mine = taken.mine && is_open(taken.entry.x);
     Tested tested = {{taken.entry.x, 0, 0, 0}, false};
     if (mine) tested = test(taken);
@@ -140,17 +136,6 @@ class Walk {
     warp_.end_look();
     if (stack_.waiting() >= kFewestToShare) share();
     if (++rounds_ >= kRoundsBetweenCounts) add_counters(), rounds_ = 0;
-  }
-
-  /// How many block pairs the next step takes off: no more than there is room for, since each puts on one
-  /// entry at most. Where there is little room, fewer are taken, at last one at a time: from there on at most
-  /// one entry for each level of the two trees goes on before what was below is reached again, and at most 32
-  /// pairs of leaf blocks, each with a candidate. So stack_reserve is the two depths and 32.
-  __device__ std::uint32_t next_count() const {
-    const std::uint32_t room = stack_.room(), reserve = args_.stack_reserve;
-    const std::uint32_t count = min(stack_.waiting(), kFull);
-    if (room >= count + reserve) return count;
-    return room > reserve ? room - reserve : 1;
   }
 
   /// By one lane: false where the first contact is enough, and the pair has one.
@@ -271,8 +256,7 @@ class Walk {
 };
 
 template <class Means>
-__global__ void __launch_bounds__(32 * kWarpsPerBlock, kBlocksPerProcessor)
-    walk(const __grid_constant__ QueryArgs args) {
+__global__ void __launch_bounds__(32 * kMostWarpsPerBlock, 1) walk(const __grid_constant__ QueryArgs args) {
   extern __shared__ float4 memory[];
   fill_positions(reinterpret_cast<std::uint32_t*>(memory));
   __syncthreads();
@@ -280,45 +264,22 @@ __global__ void __launch_bounds__(32 * kWarpsPerBlock, kBlocksPerProcessor)
   if (failed(args)) return;
   const auto positions = static_cast<std::uint32_t>(__cvta_generic_to_shared(memory));
   const std::uint32_t warp = threadIdx.x / 32;
-  Walk<Means> walk(args, positions,
-                   warp_place(positions + 4 * (kPositionWords + warp * warp_words(args.stack_size))));
+  Walk<Means> walk(
+      args, positions,
+      warp_place(positions + 4 * (kBlockWords + warp * (kWarpWords + kEntryWords * args.shape.stack_size))));
   walk.run();
-}
-
-/// How many thread blocks the GPU holds of a kernel, at most as many as there are mailboxes for: kMostGifts
-/// for each warp, see work_sharing.h.
-template <class Kernel>
-cudaError_t most_blocks_of(Kernel kernel, std::size_t shared_bytes, std::uint32_t& out) {
-  int device = 0, processors = 0, blocks = 0;
-  cudaError_t error = cudaGetDevice(&device);
-  if (error == cudaSuccess)
-    error = cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device);
-  if (error == cudaSuccess)
-    error = cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                                 static_cast<int>(shared_bytes));
-  if (error == cudaSuccess)
-    error = cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel, 32 * kWarpsPerBlock, shared_bytes);
-  if (error != cudaSuccess) return error;
-  constexpr std::uint32_t kMostBlocks = kChunks / (kMostGifts * kWarpsPerBlock);
-  static_assert(kMostBlocks * kWarpsPerBlock <= kMostWarps && kChunks >= 1u << kFewestMailboxBits);
-  out = std::min(static_cast<std::uint32_t>(blocks * processors), kMostBlocks);
-  return error;
 }
 
 template <class Means>
 cudaError_t launch_walk(const QueryArgs& args, cudaStream_t stream) {
   const auto kernel = walk<Means>;
-  const std::size_t bytes =
-      (kPositionWords + kWarpsPerBlock * warp_words(args.stack_size)) * sizeof(std::uint32_t);
-  std::uint32_t blocks = 0;
-  const cudaError_t error = most_blocks_of(kernel, bytes, blocks);
+  // The same for every walk: CUDA keeps it with the kernel, and another thread's walk may need more.
+  const cudaError_t error = cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                                                 static_cast<int>(most_shared_bytes(args.limits)));
   if (error != cudaSuccess) return error;
-  if (args.most_blocks != 0) blocks = std::min(blocks, args.most_blocks);
-  QueryArgs with_mailboxes = args;
-  with_mailboxes.mailbox_bits =
-      std::max(kFewestMailboxBits,
-               static_cast<std::uint32_t>(std::bit_width(blocks * kWarpsPerBlock * kMostGifts - 1)));
-  return launch_after({blocks, 32 * kWarpsPerBlock, bytes, stream}, kernel, with_mailboxes);
+  const WalkShape& shape = args.shape;
+  return launch_after(
+      {shape.blocks, 32 * shape.warps, shape.shared_bytes(), stream, args.limits.early_launch}, kernel, args);
 }
 
 }  // namespace

@@ -81,7 +81,7 @@
 namespace tandem::gpu {
 
 inline constexpr std::uint32_t kMostGifts = 3;          // at once
-inline constexpr std::uint32_t kMostWarps = 4096;       // of a walk
+inline constexpr std::uint32_t kMostWarps = 8192;       // of a walk
 inline constexpr std::uint32_t kFewestMailboxBits = 8;  // so that a turn has 24
 inline constexpr std::uint32_t kEndOfTickets = 0u - (kMostGifts + 1) * kMostWarps;
 static_assert(kMostGifts * kMostWarps <= 1u << 15 && (kMostGifts + 2) * kMostWarps < 1u << 16);

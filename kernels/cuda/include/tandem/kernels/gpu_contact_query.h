@@ -42,7 +42,7 @@ struct GpuQueryCapacity {
 /// GpuContactQuery::bytes(), where it was never given more of them. Instances cost it nothing, nor does the
 /// size of the assets.
 constexpr std::size_t most_query_bytes(const GpuQueryCapacity& capacity, bool sorted, std::size_t assets) {
-  constexpr std::size_t kFixed = std::size_t{5} << 20;  // work that warps give to each other, and the report
+  constexpr std::size_t kFixed = std::size_t{9} << 20;  // work that warps give to each other, and the report
   const std::size_t per_contact = sorted ? 20 + 29 : 20;
   return kFixed + sizeof(GpuAsset) * assets + 168 * std::size_t{capacity.pairs} +
          per_contact * capacity.contacts + 24 * capacity.undecided;

@@ -35,13 +35,13 @@ int main(int argc, char** argv) {
   if (const cudaError_t error = owner.create(); error != cudaSuccess)
     return fail("a stream", tandem::status_of(error), error);
   const cudaStream_t stream = owner.get();
-  tandem::DeviceAsset cow;  // one allocation, one copy
-  tandem::Status status = cow.upload(file.view(), stream, tandem::Contents::exact_queries);
+  tandem::DeviceAssets cow;  // one allocation for all assets, here one
+  tandem::Status status = cow.upload({&file.view(), 1}, tandem::Contents::exact_queries, stream);
   if (status != tandem::Status::kOk) return fail("upload", status, cow.cuda_error());
 
   // The scene, all of it in GPU memory: the asset's bounds, and for each body the asset and a pose.
   const tandem::FileHeader& header = *file.view().header;
-  const tandem::GpuAsset asset = tandem::gpu_asset(cow.level(), file.view());
+  const tandem::GpuAsset asset = tandem::gpu_asset(cow.level(0), file.view());
   const tandem::AssetBounds bounds = tandem::asset_bounds(header);
   tandem::GpuArray<tandem::AssetBounds> gpu_bounds;
   tandem::GpuArray<std::uint32_t> asset_of_body;

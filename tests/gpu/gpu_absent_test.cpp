@@ -46,10 +46,11 @@ TEST(GpuStatus, CudasErrorsHaveNamesOfTheirOwn) {
 TEST_F(GpuAbsent, AnUploadSaysSo) {
   if (has_memory()) GTEST_SKIP() << "an upload needs no code";
   const build::Image image = test::make_file(test::random_mesh(10, 1));
-  DeviceAsset asset;
-  EXPECT_EQ(name(asset.upload(check(image.data(), image.size()).asset, nullptr)), expected_);
-  EXPECT_NE(asset.cuda_error(), cudaSuccess);
-  EXPECT_EQ(asset.bytes(), 0u);
+  const AssetView view = check(image.data(), image.size()).asset;
+  DeviceAssets assets;
+  EXPECT_EQ(name(assets.upload({&view, 1}, Contents::all, nullptr)), expected_);
+  EXPECT_NE(assets.cuda_error(), cudaSuccess);
+  EXPECT_EQ(assets.bytes(), 0u);
 }
 
 TEST_F(GpuAbsent, ABroadPhaseSaysSo) {

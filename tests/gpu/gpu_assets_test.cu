@@ -71,12 +71,9 @@ TEST_F(GpuAssets, WithoutOrientedBlocksAnswerAllButExactQueries) {
   const std::vector<Instance> instances = {{0, random.pose({1, 1, 0.1, 0, 4})},
                                            {1, random.pose({1, 1, 0.1, 0, 4})}};
   const std::vector<ObjectPair> pairs = {{0, 1}, {0, 0}};
-  DeviceAsset uploads[2];
-  std::vector<GpuAsset> assets;
-  for (int i = 0; i < 2; ++i) {
-    ASSERT_EQ(uploads[i].upload(views[i], nullptr), Status::kOk);
-    assets.push_back(gpu_asset(uploads[i].level(), views[i]));
-  }
+  DeviceAssets uploaded;
+  ASSERT_EQ(uploaded.upload(views, Contents::all, nullptr), Status::kOk);
+  const GpuAsset assets[] = {gpu_asset(uploaded.level(0), views[0]), gpu_asset(uploaded.level(1), views[1])};
   const GpuScene scene({}, instances, pairs);
   for (const QueryMode mode : {QueryMode::fast, QueryMode::boxes}) {
     const auto expected = contacts_on_cpu(views, instances, pairs, mode);
@@ -90,9 +87,9 @@ TEST_F(GpuAssets, WithoutOrientedBlocksAnswerAllButExactQueries) {
   EXPECT_EQ(query.enqueue(scene.instances(), scene.pairs(), {.walk_only = true}, nullptr),
             Status::kNoOrientedBlocks);
   // An upload for exact queries of such a file has triangles alone.
-  ASSERT_EQ(uploads[0].upload(views[0], nullptr, Contents::exact_queries), Status::kOk);
-  EXPECT_EQ(uploads[0].level().oriented_blocks, nullptr);
-  EXPECT_EQ(uploads[0].bytes(), 900 * sizeof(Triangle));
+  ASSERT_EQ(uploaded.upload({views, 1}, Contents::exact_queries, nullptr), Status::kOk);
+  EXPECT_EQ(uploaded.level(0).oriented_blocks, nullptr);
+  EXPECT_EQ(uploaded.bytes(), 900 * sizeof(Triangle));
 }
 
 /// A query knows one level of an asset as it knows an asset.
@@ -118,11 +115,11 @@ TEST_F(GpuAssets, OfEveryLevelHaveThatLevelsContacts) {
   const std::vector<ObjectPair> pairs = {{0, 1}, {1, 1}};
   const GpuScene scene({}, instances, pairs);
   for (const Contents contents : {Contents::all, Contents::exact_queries}) {
-    DeviceAsset asset;
-    ASSERT_EQ(asset.upload(view, nullptr, contents), Status::kOk);
+    DeviceAssets uploaded;
+    ASSERT_EQ(uploaded.upload({&view, 1}, contents, nullptr), Status::kOk);
     for (std::uint32_t i = 0; i < levels.size(); ++i) {
       const AssetView single = alone[i].check().asset;
-      const GpuAsset level = gpu_asset(asset.level(i), view, i);
+      const GpuAsset level = gpu_asset(uploaded.level(0, i), view, i);
       for (const QueryMode mode : kModes) {
         if (contents == Contents::exact_queries && mode != QueryMode::exact) continue;
         const auto expected = contacts_on_cpu({&single, 1}, instances, pairs, mode);
@@ -144,9 +141,9 @@ TEST_F(GpuAssets, OfTheGreatestDepthAreWalked) {
     const std::vector<Instance> instances = {{0, random.pose({1, 1, 0.1, 0, 4})},
                                              {0, random.pose({1, 1, 0.1, 0, 4})}};
     const std::vector<ObjectPair> pairs = {{0, 1}, {0, 0}};
-    DeviceAsset asset;
-    ASSERT_EQ(asset.upload(view, nullptr), Status::kOk);
-    const GpuAsset on_gpu = gpu_asset(asset.level(), view);
+    DeviceAssets uploaded;
+    ASSERT_EQ(uploaded.upload({&view, 1}, Contents::all, nullptr), Status::kOk);
+    const GpuAsset on_gpu = gpu_asset(uploaded.level(0), view);
     const GpuScene scene({}, instances, pairs);
     for (const QueryMode mode : kModes)
       EXPECT_EQ(contacts_on_gpu({&on_gpu, 1}, scene, mode),

@@ -169,14 +169,15 @@ int main(int argc, char** argv) {
   if (argc != 2 || file.open(argv[1]) != Status::kOk) return std::puts("usage: gpu_ceilings MESH.bvh"), 1;
   cudaDeviceProp properties;
   require(cudaGetDeviceProperties(&properties, 0));
-  DeviceAsset asset;
-  if (asset.upload(file.view(), nullptr) != Status::kOk) return std::puts("upload failed"), 2;
+  DeviceAssets uploaded;
+  if (uploaded.upload({&file.view(), 1}, Contents::all, nullptr) != Status::kOk)
+    return std::puts("upload failed"), 2;
   constexpr std::uint32_t kReady = 1u << 24;
   const Queue queue = make_queue(file.view(), kReady);
   const auto ready = to_gpu(queue.ready);
   const auto poses = to_gpu(queue.poses);
   const auto masks = to_gpu(std::vector<std::uint16_t>(kReady, 0));
-  const Block* blocks = asset.level().blocks;
+  const Block* blocks = uploaded.level(0).blocks;
   const auto rate = [&](auto kernel) {
     const Times times = time([&] {
       kernel<<<kReady / 256, 256>>>(ready.data(), kReady, blocks, poses.data(), masks.data());

@@ -50,11 +50,14 @@ TEST_F(GpuRoom, AFullGpuIsToldByItsNameAndIsNoEnd) {
   ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
   ASSERT_EQ(query.reserve({1, 1, 1}), Status::kOk);
   GpuBroadPhase broad;
-  DeviceAsset asset;
+  DeviceAssets assets;
+  const std::vector<AssetView> many(50, large_view);  // by threads
   {
     const FullGpu full;
-    EXPECT_EQ(asset.upload(large_view, nullptr), Status::kOutOfGpuMemory);
-    EXPECT_EQ(asset.bytes(), 0u);
+    EXPECT_EQ(assets.upload(many, Contents::all, nullptr), Status::kOutOfGpuMemory);
+    EXPECT_EQ(assets.cuda_error(), cudaErrorMemoryAllocation);
+    EXPECT_EQ(assets.bytes(), 0u);
+    EXPECT_EQ(assets.count(), 0u);
     EXPECT_EQ(broad.reserve({1'000'000, 1'000'000, 1'000'000}), Status::kOutOfGpuMemory);
     EXPECT_EQ(broad.cuda_error(), cudaErrorMemoryAllocation);
     EXPECT_EQ(another.set_assets(on_gpu.assets(), nullptr), Status::kOutOfGpuMemory);
@@ -64,7 +67,8 @@ TEST_F(GpuRoom, AFullGpuIsToldByItsNameAndIsNoEnd) {
     EXPECT_EQ(query.cuda_error(), cudaErrorMemoryAllocation);
     EXPECT_EQ(cudaGetLastError(), cudaSuccess);  // nothing that failed is left behind
   }
-  EXPECT_EQ(asset.upload(large_view, nullptr), Status::kOk);
+  EXPECT_EQ(assets.upload(many, Contents::all, nullptr), Status::kOk);
+  EXPECT_EQ(assets.bytes(), 50 * large.size());
   EXPECT_EQ(broad.reserve({1'000'000, 1'000'000, 1'000'000}), Status::kOk);
   for (GpuContactQuery* each : {&query, &another}) {
     ASSERT_EQ(each->set_assets(on_gpu.assets(), nullptr), Status::kOk);

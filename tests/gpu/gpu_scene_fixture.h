@@ -95,11 +95,10 @@ class GpuScene {
         count_(on_gpu(std::vector<std::uint32_t>{static_cast<std::uint32_t>(pairs.size())})),
         instance_count_(static_cast<std::uint32_t>(instances.size())),
         pair_count_(static_cast<std::uint32_t>(pairs.size())) {
-    for (const AssetView& view : assets.views()) {
-      DeviceAsset& asset = uploads_.emplace_back();
-      EXPECT_EQ(asset.upload(view, nullptr, contents), Status::kOk);
-      views_.push_back(gpu_asset(asset.level(), view));
-    }
+    const auto files = assets.views();
+    EXPECT_EQ(uploaded_.upload(files, contents, nullptr), Status::kOk);
+    for (std::size_t i = 0; i < uploaded_.count(); ++i)
+      views_.push_back(gpu_asset(uploaded_.level(i), files[i]));
   }
 
   std::span<const GpuAsset> assets() const { return views_; }
@@ -114,7 +113,7 @@ class GpuScene {
     return out;
   }
 
-  std::vector<DeviceAsset> uploads_;
+  DeviceAssets uploaded_;
   std::vector<GpuAsset> views_;
   GpuArray<std::uint32_t> asset_;
   GpuArray<Pose> pose_;

@@ -2,13 +2,16 @@
 
 #include <algorithm>
 #include <cstring>
+#include <memory>
 #include <random>
+#include <thread>
 #include <vector>
 
 #include "build/sample_asset.h"
 #include "gpu_scene_fixture.h"
 #include "kernels/plain_boxes.h"
 #include "made_files.h"
+#include "staged_copy.h"
 #include "tandem/kernels/detail/box_test.h"
 #include "tandem/runtime/upload.h"
 
@@ -20,24 +23,32 @@ class Gpu : public test::GpuTest {};
 using test::download;
 using test::on_gpu;
 
-TEST_F(Gpu, AnUploadedLevelHasTheSameBytes) {
+/// `host` to be the same as `device`, which was uploaded with these contents.
+void expect_same(const LevelView& host, const LevelView& device, Contents contents) {
+  ASSERT_EQ(device.block_count, host.block_count);
+  ASSERT_EQ(device.triangle_count, host.triangle_count);
+  const auto expect_same_array = [](const auto* expected, const auto* on_gpu, std::uint32_t count) {
+    ASSERT_NE(on_gpu, nullptr);
+    EXPECT_EQ(reinterpret_cast<std::uintptr_t>(on_gpu) % kSectionAlignment, 0u);
+    EXPECT_EQ(std::memcmp(download(on_gpu, count).data(), expected, count * sizeof *expected), 0);
+  };
+  expect_same_array(host.triangles, device.triangles, host.triangle_count);
+  expect_same_array(host.oriented_blocks, device.oriented_blocks, host.block_count);
+  if (contents == Contents::all)
+    expect_same_array(host.blocks, device.blocks, host.block_count);
+  else
+    EXPECT_EQ(device.blocks, nullptr);
+}
+
+TEST_F(Gpu, AnUploadedFileHasTheSameBytes) {
   const build::Image image = test::make_file(test::random_mesh(5000, 1));
   const CheckResult checked = check(image.data(), image.size());
   ASSERT_EQ(checked.status, Status::kOk);
-  const LevelView host = checked.asset.level();
-  DeviceAsset asset;
-  ASSERT_EQ(asset.upload(checked.asset, nullptr), Status::kOk) << cudaGetErrorString(asset.cuda_error());
-  ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
-  EXPECT_EQ(asset.bytes(), image.size());
-  const LevelView device = asset.level();
-  ASSERT_EQ(device.block_count, host.block_count);
-  const auto blocks = download(device.blocks, device.block_count);
-  const auto triangles = download(device.triangles, device.triangle_count);
-  const auto oriented = download(device.oriented_blocks, device.block_count);
-  EXPECT_EQ(std::memcmp(blocks.data(), host.blocks, blocks.size() * sizeof(Block)), 0);
-  EXPECT_EQ(std::memcmp(triangles.data(), host.triangles, triangles.size() * sizeof(Triangle)), 0);
-  EXPECT_EQ(std::memcmp(oriented.data(), host.oriented_blocks, oriented.size() * sizeof(OrientedBlock)), 0);
-  EXPECT_EQ(reinterpret_cast<std::uintptr_t>(device.blocks) % alignof(Block), 0u);
+  DeviceAssets assets;
+  ASSERT_EQ(assets.upload({&checked.asset, 1}, Contents::all, nullptr), Status::kOk)
+      << cudaGetErrorString(assets.cuda_error());
+  EXPECT_EQ(assets.bytes(), image.size());
+  expect_same(checked.asset.level(), assets.level(0), Contents::all);
 }
 
 TEST_F(Gpu, AnUploadForExactQueriesHasWhatTheyNeed) {
@@ -47,35 +58,135 @@ TEST_F(Gpu, AnUploadForExactQueriesHasWhatTheyNeed) {
     levels.push_back(test::built_level(test::soup(random, triangles, 0.1), 2001.0 - triangles));
   const test::Bytes file = test::made_file(levels);
   const AssetView view = file.check().asset;
-  DeviceAsset asset;
-  ASSERT_EQ(asset.upload(view, nullptr, Contents::exact_queries), Status::kOk);
-  ASSERT_EQ(asset.level_count(), 3u);
+  DeviceAssets assets;
+  ASSERT_EQ(assets.upload({&view, 1}, Contents::exact_queries, nullptr), Status::kOk);
   std::size_t needed = 0;
   for (std::uint32_t i = 0; i < 3; ++i) {
-    const LevelView host = view.level(i), device = asset.level(i);
-    EXPECT_EQ(device.blocks, nullptr);
-    const auto triangles = download(device.triangles, device.triangle_count);
-    const auto oriented = download(device.oriented_blocks, device.block_count);
-    EXPECT_EQ(std::memcmp(triangles.data(), host.triangles, triangles.size() * sizeof(Triangle)), 0);
-    EXPECT_EQ(std::memcmp(oriented.data(), host.oriented_blocks, oriented.size() * sizeof(OrientedBlock)), 0);
-    EXPECT_EQ(reinterpret_cast<std::uintptr_t>(device.triangles) % kSectionAlignment, 0u);
-    EXPECT_EQ(reinterpret_cast<std::uintptr_t>(device.oriented_blocks) % kSectionAlignment, 0u);
-    needed += triangles.size() * sizeof(Triangle) + oriented.size() * sizeof(OrientedBlock);
+    const LevelView host = view.level(i);
+    expect_same(host, assets.level(0, i), Contents::exact_queries);
+    needed += host.triangle_count * sizeof(Triangle) + host.block_count * sizeof(OrientedBlock);
   }
-  EXPECT_GE(asset.bytes(), needed);
-  EXPECT_LT(asset.bytes(), needed + 6 * kSectionAlignment);
+  EXPECT_GE(assets.bytes(), needed);
+  EXPECT_LT(assets.bytes(), needed + 6 * kSectionAlignment);
+}
+
+/// Files from one triangle on, of one level and of several, and so many views of them, in turn, that threads
+/// copy them.
+class ManyFiles {
+ public:
+  static constexpr std::uint64_t kLeastBytes = std::uint64_t{200} << 20;
+
+  ManyFiles() {
+    test::RandomPoses random(5);
+    std::vector<AssetView> once;
+    for (const std::uint32_t triangles : {1u, 100'000u, 3u, 777u, 20'000u}) {
+      std::vector<test::MadeLevel> levels = {test::built_level(test::soup(random, triangles, 0.1))};
+      if (triangles == 777) levels.push_back(test::built_level(test::soup(random, 50, 0.1), 1));
+      files_.push_back(std::make_unique<test::Bytes>(test::made_file(levels)));
+      once.push_back(files_.back()->check().asset);
+    }
+    for (std::uint64_t bytes = 0; bytes < kLeastBytes;) {
+      views.push_back(once[views.size() % once.size()]);
+      bytes += views.back().level().triangle_count * sizeof(Triangle);
+    }
+  }
+
+  void expect_all(const DeviceAssets& assets, Contents contents) const {
+    ASSERT_EQ(assets.count(), views.size());
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      for (std::uint32_t level = 0; level < views[i].levels.size(); ++level)
+        expect_same(views[i].level(level), assets.level(i, level), contents);
+    }
+  }
+
+  std::vector<AssetView> views;
+
+ private:
+  std::vector<std::unique_ptr<test::Bytes>> files_;
+};
+
+TEST_F(Gpu, ManyAssetsAreAllThereAtOnce) {
+  const ManyFiles files;
+  DeviceAssets assets;
+  for (const Contents contents : {Contents::all, Contents::exact_queries}) {
+    ASSERT_EQ(assets.upload(files.views, contents, nullptr), Status::kOk);
+    EXPECT_GE(assets.bytes(), ManyFiles::kLeastBytes);
+    files.expect_all(assets, contents);
+  }
+}
+
+TEST_F(Gpu, ThreadsUploadSideBySide) {
+  const ManyFiles files;
+  DeviceAssets assets[2];
+  Status status[2];
+  const auto upload = [&](int i) {
+    GpuStream stream;
+    ASSERT_EQ(stream.create(), cudaSuccess);
+    status[i] = assets[i].upload(files.views, Contents::exact_queries, stream.get());
+  };
+  std::thread other(upload, 1);
+  upload(0);
+  other.join();
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_EQ(status[i], Status::kOk);
+    files.expect_all(assets[i], Contents::exact_queries);
+  }
+}
+
+TEST_F(Gpu, AnyThreadsAndChunksCopyTheSame) {
+  constexpr std::uint64_t kGuard = 4096;
+  std::mt19937_64 random(6);
+  std::vector<unsigned char> bytes(3'000'000);
+  for (unsigned char& byte : bytes) byte = static_cast<unsigned char>(random());
+  GpuStream stream;
+  ASSERT_EQ(stream.create(), cudaSuccess);
+  for (const std::vector<std::uint64_t>& sizes : {std::vector<std::uint64_t>{},
+                                                  {1},
+                                                  {4096},
+                                                  {4097},
+                                                  {8 * 2 * 4096},
+                                                  {1'000'000, 1, 256, 255, 1'234'567}}) {
+    std::vector<Piece> pieces;
+    const unsigned char* from = bytes.data();
+    for (const std::uint64_t size : sizes) {
+      pieces.push_back({from, size, 0});
+      from += size;
+    }
+    const std::uint64_t size = place(pieces);
+    for (const std::uint32_t threads : {0u, 1u, 2u, 5u, kMostStagingThreads}) {
+      for (const std::uint64_t chunk : {1000u, 4096u, 1u << 20}) {
+        const auto copy = on_gpu(std::vector<unsigned char>(size + kGuard, 0xEE));
+        ASSERT_EQ(copy_pieces(pieces, size, {threads, chunk}, copy.data(), stream.get()), cudaSuccess);
+        const auto copied = download(copy.data(), size + kGuard);
+        for (const Piece& piece : pieces)
+          EXPECT_EQ(std::memcmp(copied.data() + piece.offset, piece.from, piece.bytes), 0);
+        EXPECT_EQ(std::count(copied.begin() + size, copied.end(), 0xEE), kGuard);
+      }
+    }
+  }
+}
+
+TEST_F(Gpu, ACopyThatFailsSaysSo) {
+  const std::vector<unsigned char> bytes(100'000);
+  Piece piece = {bytes.data(), bytes.size(), 0};
+  for (const std::uint32_t threads : {0u, 1u, kMostStagingThreads}) {
+    EXPECT_NE(copy_pieces({&piece, 1}, piece.bytes, {threads, 4096}, nullptr, nullptr), cudaSuccess);
+    static_cast<void>(cudaGetLastError());
+  }
 }
 
 TEST_F(Gpu, AssetsMoveAndUploadAgain) {
   const build::Image image = test::make_file(test::random_mesh(100, 1));
   const AssetView view = check(image.data(), image.size()).asset;
-  DeviceAsset first;
-  ASSERT_EQ(first.upload(view, nullptr), Status::kOk);
-  DeviceAsset second = std::move(first);
-  EXPECT_EQ(first.level_count(), 0u);
-  ASSERT_EQ(second.upload(view, nullptr), Status::kOk);
-  EXPECT_EQ(second.level().triangle_count, 100u);
-  second.free();
+  DeviceAssets first;
+  ASSERT_EQ(first.upload({&view, 1}, Contents::all, nullptr), Status::kOk);
+  DeviceAssets second = std::move(first);
+  EXPECT_EQ(first.count(), 0u);
+  EXPECT_EQ(second.count(), 1u);
+  ASSERT_EQ(second.upload({&view, 1}, Contents::all, nullptr), Status::kOk);
+  EXPECT_EQ(second.level(0).triangle_count, 100u);
+  ASSERT_EQ(second.upload({}, Contents::all, nullptr), Status::kOk);
+  EXPECT_EQ(second.count(), 0u);
   EXPECT_EQ(second.bytes(), 0u);
 }
 
@@ -91,10 +202,11 @@ __global__ void count_leaves(LevelView level, unsigned* leaves) {
 
 TEST_F(Gpu, KernelsReadTheTreeInPlace) {
   const build::Image image = test::make_file(test::random_mesh(5001, 2));
-  DeviceAsset asset;
-  ASSERT_EQ(asset.upload(check(image.data(), image.size()).asset, nullptr), Status::kOk);
+  const AssetView view = check(image.data(), image.size()).asset;
+  DeviceAssets assets;
+  ASSERT_EQ(assets.upload({&view, 1}, Contents::all, nullptr), Status::kOk);
   const auto leaves = on_gpu(std::vector<unsigned>{0});
-  const LevelView level = asset.level();
+  const LevelView level = assets.level(0);
   count_leaves<<<(level.block_count + 127) / 128, 128>>>(level, leaves.data());
   ASSERT_EQ(cudaGetLastError(), cudaSuccess);
   EXPECT_EQ(download(leaves.data(), 1)[0], 5001u);

@@ -53,8 +53,9 @@ struct TimedQuery {
 
 /// What an engine takes of a GPU.
 struct GpuUse {
-  std::string name;             ///< of the device
-  double upload = 0;            ///< seconds for shapes and bodies, allocation included
+  std::string name;  ///< of the device
+  double upload =
+      0;  ///< seconds from mapped files to what a query takes: shapes and bodies, allocation included
   std::size_t bytes = 0;        ///< shapes, bodies, and the room of both steps
   std::size_t bytes_bound = 0;  ///< what the rule of docs/gpu.md says they are at most; 0: there is no rule
   std::size_t bytes_taken = 0;  ///< by the driver's count; what CUDA keeps for kernels included

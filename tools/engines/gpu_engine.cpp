@@ -88,20 +88,18 @@ void GpuEngine::check(cudaError_t error, const char* step) const {
 
 void GpuEngine::set_shapes(std::span<const AssetView> shapes) {
   Stopwatch watch;
-  uploads_.clear();
   shapes_.clear();
+  const Status status = uploaded_.upload(shapes, contents_, stream());
+  check(status, uploaded_.cuda_error(), "assets");
   check(bounds_.grow(shapes.size()), "instances");
   for (std::size_t i = 0; i < shapes.size(); ++i) {
-    DeviceAsset& upload = uploads_.emplace_back();
-    const Status status = upload.upload(shapes[i], stream(), contents_);
-    check(status, upload.cuda_error(), "an asset");
-    shapes_.push_back(gpu_asset(upload.level(), shapes[i]));
+    shapes_.push_back(gpu_asset(uploaded_.level(i), shapes[i]));
     bounds_.staged.data()[i] = asset_bounds(*shapes[i].header);
   }
   check(bounds_.upload(shapes.size(), stream()), "instances");
+  name_shapes();
   check(stream_.wait(), "upload");
   upload_of_shapes_ = watch.lap();
-  name_shapes();
 }
 
 void GpuEngine::update(std::span<const BodyPose> bodies) {
@@ -225,11 +223,9 @@ void GpuEngine::take(const GpuPairs& pairs, const GpuContacts& contacts, bool so
 }
 
 std::size_t GpuEngine::scene_bytes(const TimedQuery& asked) const {
-  std::size_t bytes = shapes_.size() * sizeof(AssetBounds) +
-                      instances_.count * (sizeof(Pose) + sizeof(std::uint32_t)) +
-                      (asked.given != nullptr ? asked.given->size() * sizeof(ObjectPair) : 0);
-  for (const DeviceAsset& upload : uploads_) bytes += upload.bytes();
-  return bytes;
+  return uploaded_.bytes() + shapes_.size() * sizeof(AssetBounds) +
+         instances_.count * (sizeof(Pose) + sizeof(std::uint32_t)) +
+         (asked.given != nullptr ? asked.given->size() * sizeof(ObjectPair) : 0);
 }
 
 GpuUse GpuEngine::use(const TimedQuery& asked) const {

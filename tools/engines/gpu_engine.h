@@ -102,7 +102,7 @@ class GpuEngine : public Engine {
   std::size_t free_at_start_ = 0;
   double upload_of_shapes_ = 0, upload_of_bodies_ = 0;  // seconds
   GpuStream stream_;
-  std::vector<DeviceAsset> uploads_;
+  DeviceAssets uploaded_;
   std::vector<GpuAsset> shapes_;
   StagedArray<AssetBounds> bounds_;
   StagedArray<std::uint32_t> shape_of_, pair_count_;

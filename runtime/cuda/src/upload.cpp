@@ -1,75 +1,105 @@
 #include "tandem/runtime/upload.h"
 
+#include <new>
+#include <thread>
 #include <utility>
 
+#include "staged_copy.h"
 #include "tandem/formats/gpu_status.h"
 
 namespace tandem {
 namespace {
 
-// Bytes of a file: `size` from `begin` on.
-struct Range {
-  std::uint64_t begin, size;
-};
-
-Range all_of(const AssetView& asset) {
-  return {0, asset.header->file_bytes};
+const unsigned char* bytes_of(const AssetView& asset) {
+  return reinterpret_cast<const unsigned char*>(asset.header);
 }
 
 // From the first section that exact queries need to the last. A checked file's sections ascend.
-Range of_exact_queries(const AssetView& asset) {
-  Range range = {};
+Piece of_exact_queries(const AssetView& asset) {
+  std::uint64_t begin = 0, end = 0;
   for (const Section& section : asset.sections) {
     if (section.kind != SectionKind::triangles && section.kind != SectionKind::oriented_blocks) continue;
-    if (range.size == 0) range.begin = section.offset;
-    range.size = section.offset + section.bytes - range.begin;
+    if (end == 0) begin = section.offset;
+    end = section.offset + section.bytes;
   }
-  return range;
+  return {bytes_of(asset) + begin, end - begin, 0};
 }
 
-// The same place of the copy of a range; null where it is not in the range.
+Piece piece_of(const AssetView& asset, Contents contents) {
+  if (contents == Contents::exact_queries) return of_exact_queries(asset);
+  return {bytes_of(asset), asset.header->file_bytes, 0};
+}
+
+// The same place of the copy of a piece; null where it is not in the piece.
 template <typename Element>
-const Element* relocate(const Element* element, const void* file, const Range& range, const void* copy) {
-  if (element == nullptr) return nullptr;
-  const auto offset = reinterpret_cast<std::uintptr_t>(element) - reinterpret_cast<std::uintptr_t>(file);
-  if (offset < range.begin || offset - range.begin >= range.size) return nullptr;
-  return reinterpret_cast<const Element*>(static_cast<const char*>(copy) + (offset - range.begin));
+const Element* relocate(const Element* element, const Piece& piece, const unsigned char* copy) {
+  const auto at = reinterpret_cast<std::uintptr_t>(element),
+             from = reinterpret_cast<std::uintptr_t>(piece.from);
+  if (element == nullptr || at < from || at - from >= piece.bytes) return nullptr;
+  return reinterpret_cast<const Element*>(copy + piece.offset + (at - from));
+}
+
+LevelView copied_level(LevelView level, const Piece& piece, Contents contents, const unsigned char* copy) {
+  level.triangles = relocate(level.triangles, piece, copy);
+  level.oriented_blocks = relocate(level.oriented_blocks, piece, copy);
+  level.blocks = contents == Contents::all ? relocate(level.blocks, piece, copy) : nullptr;
+  return level;
+}
+
+template <typename Element>
+std::unique_ptr<Element[]> array_of(std::size_t count) {
+  return std::unique_ptr<Element[]>(new (std::nothrow) Element[count]);
+}
+
+// One allocation for all.
+cudaError_t copy_to(GpuArray<unsigned char>& data, std::span<Piece> pieces, cudaStream_t stream) {
+  const std::uint64_t bytes = place(pieces);
+  const cudaError_t error = data.reserve(bytes);
+  if (error != cudaSuccess) return error;
+  const Staging staging = staging_of(bytes, std::thread::hardware_concurrency());
+  return copy_pieces(pieces, bytes, staging, data.data(), stream);
 }
 
 }  // namespace
 
-DeviceAsset& DeviceAsset::operator=(DeviceAsset&& other) noexcept {
+DeviceAssets& DeviceAssets::operator=(DeviceAssets&& other) noexcept {
   data_ = std::move(other.data_);
-  std::swap(level_count_, other.level_count_);
+  std::swap(count_, other.count_);
+  std::swap(first_level_, other.first_level_);
   std::swap(levels_, other.levels_);
   std::swap(error_, other.error_);
   return *this;
 }
 
-Status DeviceAsset::upload(const AssetView& asset, cudaStream_t stream, Contents contents) {
+Status DeviceAssets::upload(std::span<const AssetView> assets, Contents contents, cudaStream_t stream) {
   free();
-  const auto* const file = reinterpret_cast<const unsigned char*>(asset.header);
-  const Range range = contents == Contents::all ? all_of(asset) : of_exact_queries(asset);
-  error_ = data_.upload({file + range.begin, range.size}, stream);
-  if (error_ != cudaSuccess) {
-    data_.free();
-    return status_of(error_);
+  std::size_t levels = 0;
+  for (const AssetView& asset : assets) levels += asset.levels.size();
+  const std::unique_ptr<Piece[]> pieces = array_of<Piece>(assets.size());
+  first_level_ = array_of<std::size_t>(assets.size());
+  levels_ = array_of<LevelView>(levels);
+  if (pieces == nullptr || first_level_ == nullptr || levels_ == nullptr) {
+    free();
+    return Status::kOutOfMemory;
   }
-  level_count_ = static_cast<std::uint32_t>(asset.levels.size());
-  for (std::uint32_t i = 0; i < level_count_; ++i) {
-    levels_[i] = asset.level(i);
-    LevelView& level = levels_[i];
-    level.triangles = relocate(level.triangles, file, range, data_.data());
-    level.oriented_blocks = relocate(level.oriented_blocks, file, range, data_.data());
-    level.blocks = contents == Contents::all ? relocate(level.blocks, file, range, data_.data()) : nullptr;
+  for (std::size_t i = 0; i < assets.size(); ++i) pieces[i] = piece_of(assets[i], contents);
+  const cudaError_t error = copy_to(data_, {pieces.get(), assets.size()}, stream);
+  if (error != cudaSuccess) {
+    free();
+    error_ = error;
+    return status_of(error);
+  }
+  std::size_t level = 0;
+  for (; count_ < assets.size(); ++count_) {
+    first_level_[count_] = level;
+    for (std::uint32_t i = 0; i < assets[count_].levels.size(); ++i)
+      levels_[level++] = copied_level(assets[count_].level(i), pieces[count_], contents, data_.data());
   }
   return Status::kOk;
 }
 
-void DeviceAsset::free() {
-  data_.free();
-  level_count_ = 0;
-  error_ = cudaSuccess;
+void DeviceAssets::free() {
+  *this = DeviceAssets();
 }
 
 }  // namespace tandem

@@ -55,6 +55,9 @@ class GpuEvent : public CudaHandle<cudaEvent_t, destroy_event> {
   cudaError_t record(cudaStream_t stream, unsigned flags = cudaEventRecordDefault) const {
     return cudaEventRecordWithFlags(handle_, stream, flags);
   }
+
+  /// Returns when the moment that was recorded last has passed, at once where there is none.
+  cudaError_t wait() const { return cudaEventSynchronize(handle_); }
 };
 
 /// The time between two events of one stream. Condition: both have passed.

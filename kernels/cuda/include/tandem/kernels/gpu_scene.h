@@ -12,7 +12,7 @@ namespace tandem {
 
 /// An asset as queries on the GPU take it. Owns nothing.
 struct GpuAsset {
-  LevelView tree;     ///< pointers into GPU memory, as DeviceAsset::level() gives them
+  LevelView tree;     ///< pointers into GPU memory, as DeviceAssets::level() gives them
   TreeExtent extent;  ///< of the tree
   double origin[3];
   float lower[3], upper[3];
@@ -20,7 +20,7 @@ struct GpuAsset {
 };
 
 /// The asset that lies in GPU memory with level `level` of a file, which lies in CPU memory. on_gpu: as
-/// DeviceAsset::level() gives it. Condition: level < file.levels.size().
+/// DeviceAssets::level() gives it. Condition: level < file.levels.size().
 inline GpuAsset gpu_asset(const LevelView& on_gpu, const AssetView& file, std::uint32_t level = 0) {
   GpuAsset asset = {on_gpu, extent_of(file.level(level).blocks[0]), {}, {}, {}, file.header->source_faces};
   std::copy_n(file.header->origin, 3, asset.origin);

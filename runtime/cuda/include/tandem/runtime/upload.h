@@ -3,6 +3,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <span>
 
 #include "tandem/formats/check.h"
 #include "tandem/formats/gpu_memory.h"
@@ -15,37 +17,40 @@ enum class Contents : std::uint8_t {
   exact_queries,  ///< triangles and oriented blocks: what queries of mode exact take, a third less
 };
 
-/// Owns a copy of an asset in GPU memory: one allocation, one copy of the file's bytes as they are. Movable,
-/// not copyable. Throws nothing.
-class DeviceAsset {
+/// Owns copies of assets in GPU memory: one allocation for all, the files' bytes as they are, each file from
+/// a multiple of 256 bytes on. Movable, not copyable. Throws nothing. Objects share nothing, so several
+/// threads may upload, each with its own.
+class DeviceAssets {
  public:
-  DeviceAsset() = default;
-  DeviceAsset(DeviceAsset&& other) noexcept { *this = static_cast<DeviceAsset&&>(other); }
-  DeviceAsset& operator=(DeviceAsset&& other) noexcept;
-  ~DeviceAsset() = default;
+  DeviceAssets() = default;
+  DeviceAssets(DeviceAssets&& other) noexcept { *this = static_cast<DeviceAssets&&>(other); }
+  DeviceAssets& operator=(DeviceAssets&& other) noexcept;
+  ~DeviceAssets() = default;
 
-  /// Allocates on the current device and queues the copy on `stream`; what was uploaded before is freed. Of
-  /// Contents::exact_queries the copy reaches from the first section that is wanted to the last; files by
-  /// bvhbuild have nothing else between them.
-  /// Result: kOk, kOutOfGpuMemory, or another that status_of() of gpu_status.h names: kNoGpu, kDriverTooOld,
-  /// kGpuNotSupported, kCudaFailed; then nothing is held, and cuda_error() tells more.
-  /// Condition: the bytes of `asset`, a checked one, stay until the copy is done. They may be pageable (a
-  /// mapped file); CUDA then stages them and returns when it has read them.
-  Status upload(const AssetView& asset, cudaStream_t stream, Contents contents = Contents::all);
+  /// Allocates on the current device, copies on `stream`, and returns when all is there and `stream` is done
+  /// with what it held; what was uploaded before is freed. From 128 MiB on it copies by up to eight threads
+  /// of its own, which pin 4 MiB of CPU memory each meanwhile. Of Contents::exact_queries the copy of a file
+  /// reaches from the first section that is wanted to the last; files by bvhbuild have nothing else between
+  /// them.
+  /// Result: kOk, kOutOfGpuMemory, kOutOfMemory, or another that status_of() of gpu_status.h names: kNoGpu,
+  /// kDriverTooOld, kGpuNotSupported, kCudaFailed; then nothing is held, and cuda_error() tells more.
+  /// Condition: the assets are checked ones. Their bytes may be pageable (mapped files), and need not stay.
+  Status upload(std::span<const AssetView> assets, Contents contents, cudaStream_t stream);
 
   void free();
 
-  /// Level `i` with pointers into GPU memory; null of what the file lacks or `contents` left out. Condition:
-  /// upload() returned kOk, i < level_count().
-  LevelView level(std::uint32_t i = 0) const { return levels_[i]; }
-  std::uint32_t level_count() const { return level_count_; }
+  /// Level `i` of an asset, by its place in the list, with pointers into GPU memory; null of what the file
+  /// lacks or `contents` left out. Condition: asset < count(), i < levels of the asset.
+  LevelView level(std::size_t asset, std::uint32_t i = 0) const { return levels_[first_level_[asset] + i]; }
+  std::size_t count() const { return count_; }  ///< assets; 0 after an error
   std::size_t bytes() const { return data_.bytes(); }
   cudaError_t cuda_error() const { return error_; }
 
  private:
   GpuArray<unsigned char> data_;
-  std::uint32_t level_count_ = 0;
-  LevelView levels_[kMaxLevels];
+  std::size_t count_ = 0;
+  std::unique_ptr<std::size_t[]> first_level_;  // of each asset
+  std::unique_ptr<LevelView[]> levels_;         // of all assets, one asset's after the other's
   cudaError_t error_ = cudaSuccess;
 };
 

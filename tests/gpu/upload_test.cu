@@ -156,6 +156,7 @@ TEST_F(Gpu, AnyThreadsAndChunksCopyTheSame) {
     for (const std::uint32_t threads : {0u, 1u, 2u, 5u, kMostStagingThreads}) {
       for (const std::uint64_t chunk : {1000u, 4096u, 1u << 20}) {
         const auto copy = on_gpu(std::vector<unsigned char>(size + kGuard, 0xEE));
+        ASSERT_EQ(cudaDeviceSynchronize(), cudaSuccess);  // `stream` does not wait for the default stream
         ASSERT_EQ(copy_pieces(pieces, size, {threads, chunk}, copy.data(), stream.get()), cudaSuccess);
         const auto copied = download(copy.data(), size + kGuard);
         for (const Piece& piece : pieces)

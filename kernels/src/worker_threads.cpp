@@ -5,23 +5,46 @@
 
 namespace tandem {
 
-bool WorkerThreads::run(std::uint32_t workers, Work work, void* context) {
-  if (workers > thread_count_ + 1 && !start(workers - 1)) return false;
-  if (workers > 1) {
+namespace {
+
+constexpr int kRoundShift = 16;
+
+// How often a thread looks before it sleeps, some tens of microseconds: longer than what lies between two
+// phases of a query, and about what waking a thread takes.
+constexpr int kLooks = 128;
+
+// Whether it came true while this thread was awake.
+template <typename Condition>
+bool comes_soon(const Condition& condition) {
+  for (int look = 0; look < kLooks; ++look) {
+    if (condition()) return true;
+    std::this_thread::yield();
+  }
+  return false;
+}
+
+}  // namespace
+
+bool WorkerThreads::provide(std::uint32_t workers) {
+  return workers <= thread_count_ + 1 || start(workers - 1);
+}
+
+void WorkerThreads::run(std::uint32_t workers, Work work, void* context) {
+  if (workers == 1) return work(context, 0);
+  {
     const std::lock_guard lock(mutex_);
     work_ = work;
     context_ = context;
-    workers_ = workers;
-    working_ = workers - 1;
-    ++round_;
-    work_came_.notify_all();
+    working_.store(workers - 1, std::memory_order_relaxed);
+    const std::uint64_t number = round_.load(std::memory_order_relaxed) >> kRoundShift;
+    round_.store((number + 1) << kRoundShift | workers, std::memory_order_release);
   }
+  work_came_.notify_all();
   work(context, 0);
-  if (workers > 1) {
-    std::unique_lock lock(mutex_);
-    work_done_.wait(lock, [this] { return working_ == 0; });
-  }
-  return true;
+  const auto done = [this] { return working_.load(std::memory_order_acquire) == 0; };
+  if (comes_soon(done)) return;
+  std::unique_lock lock(mutex_);
+  work_done_.wait(lock, done);
 }
 
 bool WorkerThreads::start(std::uint32_t threads) {
@@ -56,16 +79,19 @@ void WorkerThreads::stop() {
 
 void WorkerThreads::wait_for_work(std::uint32_t worker) {
   std::uint64_t seen = 0;
-  std::unique_lock lock(mutex_);
+  const auto came = [&] { return round_.load(std::memory_order_acquire) != seen; };
   for (;;) {
-    work_came_.wait(lock, [&] { return stopping_ || round_ > seen; });
-    if (stopping_) return;
-    seen = round_;
-    if (worker >= workers_) continue;
-    lock.unlock();
+    if (!comes_soon(came)) {
+      std::unique_lock lock(mutex_);
+      work_came_.wait(lock, [&] { return stopping_ || came(); });
+      if (stopping_) return;
+    }
+    seen = round_.load(std::memory_order_acquire);
+    if (worker >= (seen & ((1u << kRoundShift) - 1))) continue;
     work_(context_, worker);
-    lock.lock();
-    if (--working_ == 0) work_done_.notify_one();
+    if (working_.fetch_sub(1, std::memory_order_acq_rel) > 1) continue;
+    const std::lock_guard lock(mutex_);  // so that the caller sleeps or has seen it
+    work_done_.notify_one();
   }
 }
 

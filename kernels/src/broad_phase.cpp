@@ -75,8 +75,9 @@ bool BroadPhase::halve(Range& range, Range& right) {
     range.units = (range.count + range.unit - 1) / range.unit;
   }
   Item* const items = items_.data() + range.begin;
+  const std::size_t count = range.count;
   double lo[3] = {kInfinity, kInfinity, kInfinity}, hi[3] = {-kInfinity, -kInfinity, -kInfinity};
-  for (std::size_t i = 0; i < range.count; ++i) {
+  for (std::size_t i = 0; i < count; ++i) {
     for (int k = 0; k < 3; ++k) {
       const double c = items[i].center[k];
       lo[k] = c < lo[k] ? c : lo[k];
@@ -88,9 +89,9 @@ bool BroadPhase::halve(Range& range, Range& right) {
     if (hi[k] - lo[k] > hi[axis] - lo[axis]) axis = k;
   }
   const std::size_t left_units = (range.units + 1) / 2, left = left_units * range.unit;
-  std::nth_element(items, items + left, items + range.count,
+  std::nth_element(items, items + left, items + count,
                    [axis](const Item& x, const Item& y) { return x.center[axis] < y.center[axis]; });
-  right = {range.begin + left, range.count - left, range.unit, range.units - left_units};
+  right = {range.begin + left, count - left, range.unit, range.units - left_units};
   range = {range.begin, left, range.unit, left_units};
   return true;
 }
@@ -184,9 +185,10 @@ void BroadPhase::collect(GroupPair from, std::uint32_t owners, Finder& finder) c
   GroupPair stack[15 * std::size(level_begin_) + 1];
   std::size_t height = 0;
   stack[height++] = from;
+  std::uint64_t looked_at = 0;
   while (height > 0) {
     const GroupPair pair = stack[--height];
-    ++finder.group_pairs;
+    ++looked_at;
     for (std::uint32_t mask = meeting(pair); mask != 0; mask &= mask - 1) {
       const auto bit = static_cast<std::uint32_t>(lowest_bit(mask));
       const std::uint32_t a = pair.a * kGroup + bit / 4, b = pair.b * kGroup + bit % 4;
@@ -195,10 +197,12 @@ void BroadPhase::collect(GroupPair from, std::uint32_t owners, Finder& finder) c
         continue;
       }
       const std::uint32_t x = items_[a].box, y = items_[b].box;
-      finder.enough_memory = finder.pairs.push({std::min(x, y), std::max(x, y)}, owners);
-      if (!finder.enough_memory) return;
+      if (finder.pairs.push({std::min(x, y), std::max(x, y)}, owners)) continue;
+      finder.enough_memory = false;
+      return;
     }
   }
+  finder.group_pairs += looked_at;
 }
 
 // One walk until there are enough pairs of groups, or one of leaves, for each worker to walk on from many.
@@ -248,20 +252,23 @@ Status BroadPhase::sort_pairs(std::size_t boxes, bool self_pairs, Team team) {
                              }
                            });
   };
-  std::fill_n(first_.data(), boxes, self_pairs ? 1u : 0u);
-  each_found([&](const ObjectPair& pair) { next_of(first_[pair.a], team.workers); });
+  std::uint32_t* const first = first_.data();
+  ObjectPair* const pairs = pairs_.data();
+  const std::uint32_t workers = team.workers;
+  std::fill_n(first, boxes, self_pairs ? 1u : 0u);
+  each_found([=](const ObjectPair& pair) { next_of(first[pair.a], workers); });
   std::uint32_t sum = 0;
   for (std::uint32_t a = 0; a < boxes; ++a) {
     const std::uint32_t begin = sum;
-    sum += std::exchange(first_[a], begin);
-    if (self_pairs) pairs_[first_[a]++] = {a, a};
+    sum += std::exchange(first[a], begin);
+    if (self_pairs) pairs[first[a]++] = {a, a};
   }
-  each_found([&](const ObjectPair& pair) { pairs_[next_of(first_[pair.a], team.workers)] = pair; });
+  each_found([=](const ObjectPair& pair) { pairs[next_of(first[pair.a], workers)] = pair; });
   team.threads.for_parts(team.workers, boxes, kBoxesAtOnce,
-                         [&](std::size_t begin, std::size_t end, std::uint32_t) {
-                           std::uint32_t from = begin > 0 ? first_[begin - 1] : 0;
-                           for (std::size_t a = begin; a < end; from = first_[a++]) {
-                             std::sort(pairs_.data() + from, pairs_.data() + first_[a],
+                         [=](std::size_t begin, std::size_t end, std::uint32_t) {
+                           std::uint32_t from = begin > 0 ? first[begin - 1] : 0;
+                           for (std::size_t a = begin; a < end; from = first[a++]) {
+                             std::sort(pairs + from, pairs + first[a],
                                        [](const ObjectPair& x, const ObjectPair& y) { return x.b < y.b; });
                            }
                          });

@@ -105,7 +105,7 @@ struct ContactQuery::State {
 
   std::uint32_t most_workers() const { return std::clamp(options.threads, 1u, kMostQueryThreads); }
   std::uint32_t workers_for(std::size_t things, std::size_t at_once) const;
-  Status pose_instance_of(const Instance& posed, std::size_t i);
+  Status pose_from(std::span<const Instance> posed, std::size_t& i, std::size_t end);
   Status pose_instances(std::span<const Instance> posed);
   Status find_pairs();
   Status take_pairs(std::span<const ObjectPair> given);
@@ -122,34 +122,36 @@ std::uint32_t ContactQuery::State::workers_for(std::size_t things, std::size_t a
   return static_cast<std::uint32_t>(std::clamp<std::size_t>(parts, 1, most_workers()));
 }
 
-// Pose of stored coordinates, and world box.
-Status ContactQuery::State::pose_instance_of(const Instance& posed, std::size_t i) {
+// Poses of stored coordinates, and world boxes, from instance i on. i: the end, or the first that is refused.
+Status ContactQuery::State::pose_from(std::span<const Instance> posed, std::size_t& i, std::size_t end) {
   const auto asset_count = static_cast<std::uint32_t>(std::min<std::size_t>(assets.size(), kNoIndex));
-  const Status status =
-      pose_instance(assets.data(), asset_count, posed.asset, posed.pose, instances[i].pose, boxes[i]);
-  if (status != Status::kOk) return status;
-  instances[i].tree = assets[posed.asset].tree;
-  instances[i].extent = assets[posed.asset].extent;
-  return status;
+  for (; i < end; ++i) {
+    const Status status =
+        pose_instance(assets.data(), asset_count, posed[i].asset, posed[i].pose, instances[i].pose, boxes[i]);
+    if (status != Status::kOk) return status;
+    instances[i].tree = assets[posed[i].asset].tree;
+    instances[i].extent = assets[posed[i].asset].extent;
+  }
+  return Status::kOk;
 }
 
-// The first instance that is refused is to blame: every part ends with its own first.
+// Every part ends with its own first instance that is refused; the first of these is to blame.
 Status ContactQuery::State::pose_instances(std::span<const Instance> posed) {
   if (posed.size() >= kNoIndex) return fail(Status::kTooManyInstances, 0);
   if (!instances.resize(posed.size()) || !boxes.resize(posed.size())) return fail(Status::kOutOfMemory, 0);
-  const std::uint32_t workers_of_call = workers_for(posed.size(), kInstancesAtOnce);
-  if (!threads.provide(workers_of_call)) return fail(Status::kCannotStartThread, 0);
+  const std::uint32_t posing = workers_for(posed.size(), kInstancesAtOnce);
+  if (!threads.provide(posing)) return fail(Status::kCannotStartThread, 0);
   std::atomic<std::size_t> first_refused = posed.size();
-  threads.for_parts(workers_of_call, posed.size(), kInstancesAtOnce,
-                    [&](std::size_t i, std::size_t end, std::uint32_t) {
-                      while (i < end && pose_instance_of(posed[i], i) == Status::kOk) ++i;
-                      std::size_t first = first_refused.load(std::memory_order_relaxed);
-                      while (i < end && i < first &&
-                             !first_refused.compare_exchange_weak(first, i, std::memory_order_relaxed)) {
-                      }
-                    });
-  const std::size_t refused = first_refused;
-  return refused == posed.size() ? Status::kOk : fail(pose_instance_of(posed[refused], refused), refused);
+  const auto pose_part = [&](std::size_t i, std::size_t end, std::uint32_t) {
+    if (pose_from(posed, i, end) == Status::kOk) return;
+    std::size_t first = first_refused;
+    while (i < first && !first_refused.compare_exchange_weak(first, i)) {
+    }
+  };
+  threads.for_parts(posing, posed.size(), kInstancesAtOnce, pose_part);
+  std::size_t refused = first_refused;
+  const Status status = pose_from(posed, refused, std::min(refused + 1, posed.size()));
+  return status == Status::kOk ? status : fail(status, refused);
 }
 
 Status ContactQuery::State::find_pairs() {
@@ -177,10 +179,18 @@ bool ContactQuery::State::provide_workers() {
   pairs_in_chunk = std::clamp(pairs.size() / chunks_wanted, std::size_t{1}, kMostPairsInChunk);
   if (!chunks.resize((pairs.size() + pairs_in_chunk - 1) / pairs_in_chunk)) return false;
   active_workers = workers_for(chunks.size(), 1);
-  if (active_workers <= worker_count) return true;
-  workers.reset(new (std::nothrow) Worker[active_workers]);
-  worker_count = workers != nullptr ? active_workers : 0;
-  return workers != nullptr;
+  if (active_workers > worker_count) {
+    workers.reset(new (std::nothrow) Worker[active_workers]);
+    worker_count = workers != nullptr ? active_workers : 0;
+    if (workers == nullptr) return false;
+  }
+  for (std::uint32_t i = 0; i < active_workers; ++i) {
+    workers[i].contacts.clear();
+    workers[i].workers = active_workers;
+    workers[i].counters = {};
+    workers[i].enough_memory = true;
+  }
+  return true;
 }
 
 PairTask ContactQuery::State::task_of(std::uint32_t pair) const {
@@ -201,12 +211,10 @@ PairTask ContactQuery::State::task_of(std::uint32_t pair) const {
 void ContactQuery::State::work(std::uint32_t worker) {
   Worker& self = workers[worker];
   ContactSink sink;
-  self.workers = active_workers;
   sink.owner = &self;
   sink.grow = grow_contacts;
   sink.next = self.contacts.data();
   sink.end = self.contacts.data() + self.contacts.capacity();
-  self.enough_memory = true;
   const auto used = [&] { return static_cast<std::size_t>(sink.next - self.contacts.data()); };
   for (;;) {
     const std::uint32_t chunk = next_chunk.fetch_add(1, std::memory_order_relaxed);

@@ -7,11 +7,22 @@ namespace tandem {
 
 namespace {
 
-constexpr int kRoundShift = 16;
+constexpr int kRoundShift = 32, kWorkersShift = 16;
+constexpr std::uint64_t kLow = (1u << 16) - 1;
 
-// How often a thread looks before it sleeps, some tens of microseconds: longer than what lies between two
-// phases of a query, and about what waking a thread takes.
-constexpr int kLooks = 128;
+std::uint64_t round_of(std::uint64_t state) {
+  return state >> kRoundShift;
+}
+std::uint64_t workers_of(std::uint64_t state) {
+  return state >> kWorkersShift & kLow;
+}
+std::uint64_t at_work(std::uint64_t state) {
+  return state & kLow;
+}
+
+// How often a thread looks before it sleeps, about a tenth of a millisecond: longer than what lies between
+// two phases of a query, and about what waking a thread takes.
+constexpr int kLooks = 512;
 
 // Whether it came true while this thread was awake.
 template <typename Condition>
@@ -35,13 +46,13 @@ void WorkerThreads::run(std::uint32_t workers, Work work, void* context) {
     const std::lock_guard lock(mutex_);
     work_ = work;
     context_ = context;
-    working_.store(workers - 1, std::memory_order_relaxed);
-    const std::uint64_t number = round_.load(std::memory_order_relaxed) >> kRoundShift;
-    round_.store((number + 1) << kRoundShift | workers, std::memory_order_release);
+    const std::uint64_t round = round_of(state_.load(std::memory_order_relaxed)) + 1;
+    state_.store(round << kRoundShift | std::uint64_t{workers} << kWorkersShift, std::memory_order_release);
   }
   work_came_.notify_all();
   work(context, 0);
-  const auto done = [this] { return working_.load(std::memory_order_acquire) == 0; };
+  state_.fetch_and(~(kLow << kWorkersShift), std::memory_order_relaxed);
+  const auto done = [this] { return at_work(state_.load(std::memory_order_acquire)) == 0; };
   if (comes_soon(done)) return;
   std::unique_lock lock(mutex_);
   work_done_.wait(lock, done);
@@ -52,7 +63,7 @@ bool WorkerThreads::start(std::uint32_t threads) {
   threads_.reset(new (std::nothrow) std::thread[threads]);
   if (threads_ == nullptr) return false;
   stopping_ = false;
-  round_ = 0;
+  state_ = 0;
   try {
     while (thread_count_ < threads) {
       const std::uint32_t worker = thread_count_ + 1;
@@ -78,18 +89,24 @@ void WorkerThreads::stop() {
 }
 
 void WorkerThreads::wait_for_work(std::uint32_t worker) {
-  std::uint64_t seen = 0;
-  const auto came = [&] { return round_.load(std::memory_order_acquire) != seen; };
+  std::uint64_t seen = 0;  // the last round
+  const auto came = [&] { return round_of(state_.load(std::memory_order_relaxed)) != seen; };
   for (;;) {
     if (!comes_soon(came)) {
       std::unique_lock lock(mutex_);
       work_came_.wait(lock, [&] { return stopping_ || came(); });
       if (stopping_) return;
     }
-    seen = round_.load(std::memory_order_acquire);
-    if (worker >= (seen & ((1u << kRoundShift) - 1))) continue;
+    std::uint64_t state = state_.load(std::memory_order_relaxed);
+    while (worker < workers_of(state) &&
+           !state_.compare_exchange_weak(state, state + 1, std::memory_order_acquire,
+                                         std::memory_order_relaxed)) {
+    }
+    seen = round_of(state);
+    if (worker >= workers_of(state)) continue;
     work_(context_, worker);
-    if (working_.fetch_sub(1, std::memory_order_acq_rel) > 1) continue;
+    const std::uint64_t before = state_.fetch_sub(1, std::memory_order_release);
+    if (at_work(before) > 1 || workers_of(before) > 0) continue;
     const std::lock_guard lock(mutex_);  // so that the caller sleeps or has seen it
     work_done_.notify_one();
   }

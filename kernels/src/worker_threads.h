@@ -25,8 +25,9 @@ class WorkerThreads {
   /// a thread could not be started, and there are none.
   [[nodiscard]] bool provide(std::uint32_t workers);
 
-  /// Calls work(context, 0) on this thread and work(context, 1 .. workers - 1) on others; returns when all
-  /// are done. There are threads for so many.
+  /// Calls work(context, 0) on this thread and work(context, 1 .. workers - 1) on others, where they wake
+  /// before the first is done; returns when all that were called are. So work(context, 0) must return only
+  /// when nothing is left to begin. There are threads for so many.
   void run(std::uint32_t workers, Work work, void* context);
 
   /// Calls part(begin, end, worker) for parts of [0, count) of `grain` each, the last of which may be
@@ -61,10 +62,10 @@ class WorkerThreads {
   std::condition_variable work_came_, work_done_;
   Work work_ = nullptr;
   void* context_ = nullptr;
-  /// How often there was work, times 2^16, plus the workers of the last, the caller's thread included. In one
-  /// number, because a worker that has no part in it may read it when the next work comes.
-  std::atomic<std::uint64_t> round_ = 0;
-  std::atomic<std::uint32_t> working_ = 0;
+  /// How often there was work, times 2^32; plus the workers that may begin it, the caller's included, times
+  /// 2^16, 0 when none may any longer; plus the other threads at work. In one number, so that no thread
+  /// begins what has ended.
+  std::atomic<std::uint64_t> state_ = 0;
   bool stopping_ = false;
 };
 

@@ -27,11 +27,11 @@ class BroadPhase {
  public:
   /// Result: kOk; kOutOfMemory; kOutOfRange where a coordinate is NaN or beyond kLargestWorldCoordinate;
   /// kTooManyInstances, kTooManyPairs: 2^32 - 1 boxes or pairs, or more. The pairs are those whose boxes
-  /// meet, touching included, no more and no fewer, sorted by a, then b.
+  /// meet, touching included, no more and no fewer, sorted by a, then b. One thread.
   Status find_pairs(std::span<const WorldBox> boxes);
 
-  /// The same by `workers` workers, for whom there are threads; neither the pairs nor group_pairs() depend on
-  /// their number. self_pairs: each box with itself is a pair too.
+  /// The same with the threads of a query, which are there for so many workers; neither the pairs nor
+  /// group_pairs() depend on their number. self_pairs: each box with itself is a pair too.
   Status find_pairs(std::span<const WorldBox> boxes, bool self_pairs, WorkerThreads& threads,
                     std::uint32_t workers);
 

@@ -1,10 +1,13 @@
 #include "tandem/kernels/broad_phase.h"
 
 #include <algorithm>
+#include <atomic>
 #include <limits>
+#include <new>
 #include <utility>
 
 #include "tandem/kernels/detail/traversal.h"
+#include "worker_threads.h"
 
 namespace tandem {
 namespace {
@@ -15,16 +18,64 @@ std::size_t groups_over(std::size_t count) {
   return (count + 3) / 4;
 }
 
+// Boxes or groups that a worker takes at a time: some microseconds of work.
+constexpr std::size_t kBoxesAtOnce = 256, kGroupsAtOnce = 64;
+
+// Ranges that are split by one worker each: enough for all to be busy until the end, none too small.
+constexpr std::size_t kRangesForEach = 4, kMostRanges = 256, kFewestItems = 64;
+
+// Walks of the tree against itself for each worker: so many that the longest is short beside all.
+constexpr std::size_t kWalksForEach = 16;
+
+// The value, and one is added to it; other workers may do the same where there are any.
+std::uint32_t next_of(std::uint32_t& value, std::uint32_t workers) {
+  return workers == 1 ? value++ : std::atomic_ref(value).fetch_add(1, std::memory_order_relaxed);
+}
+
 }  // namespace
 
-// Brings items into the order of the tree: `units` runs of `unit` items, the last of which may be shorter,
-// each again split into four. A unit is a power of four.
-void BroadPhase::split(Item* items, std::size_t count, std::size_t unit, std::size_t units) {
-  if (count <= 1) return;
-  if (units == 1) {
-    if (unit > 1) split(items, count, unit / kGroup, (count + unit / kGroup - 1) / (unit / kGroup));
-    return;
+bool BroadPhase::reserve(std::size_t boxes, std::uint32_t workers) {
+  std::size_t total = 0;
+  levels_ = 0;
+  for (std::size_t below = boxes; levels_ == 0 || below > 1; below = groups_over(below)) {
+    level_begin_[levels_++] = total;
+    total += groups_over(below);
   }
+  if (!items_.resize(boxes) || !groups_.resize(total) || !first_.resize(boxes)) return false;
+  if (finder_count_ >= workers) return true;
+  finders_.reset(new (std::nothrow) Finder[workers]);
+  finder_count_ = finders_ != nullptr ? workers : 0;
+  return finders_ != nullptr;
+}
+
+// The items in the order of boxes. False: a box is out of range.
+bool BroadPhase::take(std::span<const WorldBox> boxes, Team team) {
+  std::atomic<bool> all_in_range = true;
+  team.threads.for_parts(team.workers, boxes.size(), kBoxesAtOnce,
+                         [&](std::size_t begin, std::size_t end, std::uint32_t) {
+                           bool in = true;
+                           for (std::size_t b = begin; b < end; ++b) {
+                             in = in && in_range(boxes[b]);
+                             for (int k = 0; k < 3; ++k)
+                               items_[b].center[k] = 0.5 * boxes[b].lo[k] + 0.5 * boxes[b].hi[k];
+                             items_[b].box = static_cast<std::uint32_t>(b);
+                           }
+                           if (!in) all_in_range.store(false, std::memory_order_relaxed);
+                         });
+  return all_in_range;
+}
+
+// Splits a range at the median along its longest extent: `range` keeps the left half. False: there is nothing
+// to split.
+bool BroadPhase::halve(Range& range, Range& right) {
+  if (range.count <= 1) return false;
+  while (range.units == 1) {
+    if (range.unit == 1) return false;
+    range.unit /= kGroup;
+    range.units = (range.count + range.unit - 1) / range.unit;
+  }
+  Item* const items = items_.data() + range.begin;
+  const std::size_t count = range.count;
   double lo[3] = {kInfinity, kInfinity, kInfinity}, hi[3] = {-kInfinity, -kInfinity, -kInfinity};
   for (std::size_t i = 0; i < count; ++i) {
     for (int k = 0; k < 3; ++k) {
@@ -37,35 +88,51 @@ void BroadPhase::split(Item* items, std::size_t count, std::size_t unit, std::si
   for (int k = 1; k < 3; ++k) {
     if (hi[k] - lo[k] > hi[axis] - lo[axis]) axis = k;
   }
-  const std::size_t left_units = (units + 1) / 2, left = left_units * unit;
+  const std::size_t left_units = (range.units + 1) / 2, left = left_units * range.unit;
   std::nth_element(items, items + left, items + count,
                    [axis](const Item& x, const Item& y) { return x.center[axis] < y.center[axis]; });
-  split(items, left, unit, left_units);
-  split(items + left, count - left, unit, units - left_units);
+  right = {range.begin + left, count - left, range.unit, range.units - left_units};
+  range = {range.begin, left, range.unit, left_units};
+  return true;
+}
+
+// Brings items into the order of the tree.
+void BroadPhase::split(Range range) {
+  for (Range right; halve(range, right);) split(right);
+}
+
+// The same by workers: the ranges do not depend on who splits them, nor when. Each round halves all that
+// there are, until there are enough.
+void BroadPhase::split(Range all, Team team) {
+  Range ranges[kMostRanges] = {all};
+  const std::size_t enough = team.workers == 1 ? 1 : std::min(kMostRanges, kRangesForEach * team.workers);
+  std::size_t count = 1;
+  for (; count < enough && all.count / count >= 2 * kFewestItems; count *= 2) {
+    team.threads.for_parts(team.workers, count, 1, [&](std::size_t begin, std::size_t end, std::uint32_t) {
+      for (std::size_t i = begin; i < end; ++i) {
+        if (!halve(ranges[i], ranges[count + i])) ranges[count + i] = {};
+      }
+    });
+  }
+  team.threads.for_parts(team.workers, count, 1, [&](std::size_t begin, std::size_t end, std::uint32_t) {
+    for (std::size_t i = begin; i < end; ++i) split(ranges[i]);
+  });
 }
 
 // Boxes in the order of the tree, then the groups over them, level by level: group g of a level holds
 // the boxes of 4 g to 4 g + 3 of the level below.
-bool BroadPhase::build(std::span<const WorldBox> boxes) {
-  const std::size_t count = boxes.size();
-  std::size_t total = 0;
-  levels_ = 0;
-  for (std::size_t below = count; levels_ == 0 || below > 1; below = groups_over(below)) {
-    level_begin_[levels_++] = total;
-    total += groups_over(below);
-  }
-  if (!items_.resize(count) || !groups_.resize(total)) return false;
-  for (std::uint32_t b = 0; b < count; ++b) {
-    for (int k = 0; k < 3; ++k) items_[b].center[k] = 0.5 * boxes[b].lo[k] + 0.5 * boxes[b].hi[k];
-    items_[b].box = b;
-  }
+void BroadPhase::build(std::span<const WorldBox> boxes, Team team) {
   std::size_t unit = 1;
-  while (unit * kGroup < count) unit *= kGroup;
-  split(items_.data(), count, unit, (count + unit - 1) / unit);
+  while (unit * kGroup < boxes.size()) unit *= kGroup;
+  split({0, boxes.size(), unit, (boxes.size() + unit - 1) / unit}, team);
+  std::size_t below = boxes.size();
+  for (int level = 0; level < levels_; ++level, below = groups_over(below))
+    build_level(level, below, boxes, team);
+}
 
-  std::size_t below = count;
-  for (int level = 0; level < levels_; ++level, below = groups_over(below)) {
-    for (std::size_t i = 0; i < groups_over(below) * kGroup; ++i) {
+void BroadPhase::build_level(int level, std::size_t below, std::span<const WorldBox> boxes, Team team) {
+  const auto fill = [&](std::size_t first, std::size_t last, std::uint32_t) {
+    for (std::size_t i = first * kGroup; i < last * kGroup; ++i) {
       Group& group = groups_[level_begin_[level] + i / kGroup];
       for (int k = 0; k < 3; ++k) {
         double &lo = group.lo[k][i % kGroup], &hi = group.hi[k][i % kGroup];
@@ -84,8 +151,8 @@ bool BroadPhase::build(std::span<const WorldBox> boxes) {
         }
       }
     }
-  }
-  return true;
+  };
+  team.threads.for_parts(team.workers, groups_over(below), kGroupsAtOnce, fill);
 }
 
 // Bit 4 i + j: box i of a meets box j of b.
@@ -104,65 +171,132 @@ std::uint32_t BroadPhase::meeting(const Group& a, const Group& b) {
   return mask;
 }
 
-// The tree against itself. Both groups of a pair are on one level, and each pair taken off puts at most 16 of
-// the level below on, of which at most 15 wait while the last one's are worked on: 15 for each level above
-// the leaves, and one.
-bool BroadPhase::collect() {
-  struct GroupPair {
-    std::uint32_t a, b;  // within their level; a <= b
-    int level;
-  };
+// As above, each pair of boxes of a group with itself once.
+std::uint32_t BroadPhase::meeting(const GroupPair& pair) const {
+  const Group* const groups = groups_.data() + level_begin_[pair.level];
+  const std::uint32_t mask = meeting(groups[pair.a], groups[pair.b]);
+  return pair.a == pair.b ? mask & own_node_pairs(pair.level == 0) : mask;
+}
+
+// The tree against itself, from one pair of groups on. Each pair taken off puts at most 16 of the level below
+// on, of which at most 15 wait while the last one's are worked on: 15 for each level above the leaves, and
+// one. owners: the workers that may be doing the same.
+void BroadPhase::collect(GroupPair from, std::uint32_t owners, Finder& finder) const {
   GroupPair stack[15 * std::size(level_begin_) + 1];
   std::size_t height = 0;
-  stack[height++] = {0, 0, levels_ - 1};
-  found_.clear();
-  group_pairs_ = 0;
+  stack[height++] = from;
+  std::uint64_t looked_at = 0;
   while (height > 0) {
     const GroupPair pair = stack[--height];
-    const std::size_t begin = level_begin_[pair.level];
-    std::uint32_t mask = meeting(groups_[begin + pair.a], groups_[begin + pair.b]);
-    if (pair.a == pair.b) mask &= own_node_pairs(pair.level == 0);
-    ++group_pairs_;
-    for (; mask != 0; mask &= mask - 1) {
+    ++looked_at;
+    for (std::uint32_t mask = meeting(pair); mask != 0; mask &= mask - 1) {
       const auto bit = static_cast<std::uint32_t>(lowest_bit(mask));
       const std::uint32_t a = pair.a * kGroup + bit / 4, b = pair.b * kGroup + bit % 4;
       if (pair.level > 0) {
         stack[height++] = {a, b, pair.level - 1};
-      } else if (!found_.push(
-                     {std::min(items_[a].box, items_[b].box), std::max(items_[a].box, items_[b].box)})) {
-        return false;
+        continue;
       }
+      const std::uint32_t x = items_[a].box, y = items_[b].box;
+      if (finder.pairs.push({std::min(x, y), std::max(x, y)}, owners)) continue;
+      finder.enough_memory = false;
+      return;
     }
   }
-  return true;
+  finder.group_pairs += looked_at;
 }
 
-// Counting sort by a; the few pairs of each a are then sorted by b.
-bool BroadPhase::sort_pairs(std::size_t boxes) {
-  if (!first_.resize(boxes) || !pairs_.resize(found_.size())) return false;
-  std::fill_n(first_.data(), boxes, 0u);
-  for (const ObjectPair& pair : found_.view()) ++first_[pair.a];
+// One walk until there are enough pairs of groups, or one of leaves, for each worker to walk on from many.
+bool BroadPhase::collect(Team team) {
+  starts_.clear();
+  if (!starts_.push({0, 0, levels_ - 1})) return false;
+  const std::size_t enough = team.workers == 1 ? 1 : kWalksForEach * team.workers;
+  std::size_t taken = 0;
+  for (; taken < starts_.size() && starts_.size() - taken < enough && starts_[taken].level > 0; ++taken) {
+    const GroupPair pair = starts_[taken];
+    for (std::uint32_t mask = meeting(pair); mask != 0; mask &= mask - 1) {
+      const auto bit = static_cast<std::uint32_t>(lowest_bit(mask));
+      if (!starts_.push({pair.a * kGroup + bit / 4, pair.b * kGroup + bit % 4, pair.level - 1})) return false;
+    }
+  }
+  for (std::uint32_t i = 0; i < team.workers; ++i) {
+    finders_[i].pairs.clear();
+    finders_[i].group_pairs = 0;
+    finders_[i].enough_memory = true;
+  }
+  const auto walk = [&](std::size_t begin, std::size_t end, std::uint32_t worker) {
+    Finder& finder = finders_[worker];
+    for (std::size_t i = begin; i < end && finder.enough_memory; ++i)
+      collect(starts_[taken + i], team.workers, finder);
+  };
+  team.threads.for_parts(team.workers, starts_.size() - taken, 1, walk);
+  group_pairs_ = taken;
+  bool enough_memory = true;
+  for (std::uint32_t i = 0; i < team.workers; ++i) {
+    group_pairs_ += finders_[i].group_pairs;
+    enough_memory = enough_memory && finders_[i].enough_memory;
+  }
+  return enough_memory;
+}
+
+// Counting sort by a; the few pairs of each a are then sorted by b, which makes their order unique.
+Status BroadPhase::sort_pairs(std::size_t boxes, bool self_pairs, Team team) {
+  std::size_t total = self_pairs ? boxes : 0;
+  for (std::uint32_t i = 0; i < team.workers; ++i) total += finders_[i].pairs.size();
+  if (total >= kNoIndex) return Status::kTooManyPairs;
+  if (!pairs_.resize(total)) return Status::kOutOfMemory;
+  const auto each_found = [&](const auto& take) {
+    team.threads.for_parts(team.workers, team.workers, 1,
+                           [&](std::size_t begin, std::size_t end, std::uint32_t) {
+                             for (std::size_t i = begin; i < end; ++i) {
+                               for (const ObjectPair& pair : finders_[i].pairs.view()) take(pair);
+                             }
+                           });
+  };
+  std::uint32_t* const first = first_.data();
+  ObjectPair* const pairs = pairs_.data();
+  const std::uint32_t workers = team.workers;
+  std::fill_n(first, boxes, self_pairs ? 1u : 0u);
+  each_found([=](const ObjectPair& pair) { next_of(first[pair.a], workers); });
   std::uint32_t sum = 0;
-  for (std::size_t a = 0; a < boxes; ++a) sum += std::exchange(first_[a], sum);
-  for (const ObjectPair& pair : found_.view()) pairs_[first_[pair.a]++] = pair;
-  const auto by_b = [](const ObjectPair& x, const ObjectPair& y) { return x.b < y.b; };
-  std::uint32_t begin = 0;
-  for (std::size_t a = 0; a < boxes; begin = first_[a++])
-    std::sort(pairs_.data() + begin, pairs_.data() + first_[a], by_b);
-  return true;
+  for (std::uint32_t a = 0; a < boxes; ++a) {
+    const std::uint32_t begin = sum;
+    sum += std::exchange(first[a], begin);
+    if (self_pairs) pairs[first[a]++] = {a, a};
+  }
+  each_found([=](const ObjectPair& pair) { pairs[next_of(first[pair.a], workers)] = pair; });
+  team.threads.for_parts(team.workers, boxes, kBoxesAtOnce,
+                         [=](std::size_t begin, std::size_t end, std::uint32_t) {
+                           std::uint32_t from = begin > 0 ? first[begin - 1] : 0;
+                           for (std::size_t a = begin; a < end; from = first[a++]) {
+                             std::sort(pairs + from, pairs + first[a],
+                                       [](const ObjectPair& x, const ObjectPair& y) { return x.b < y.b; });
+                           }
+                         });
+  // Which worker finds which pairs is chance: so that no call of the same scene allocates, there is room for
+  // all in each.
+  for (std::uint32_t i = 0; i < team.workers && team.workers > 1; ++i) {
+    if (!finders_[i].pairs.resize(total)) break;  // then it will grow when it has to
+  }
+  return Status::kOk;
 }
 
 Status BroadPhase::find_pairs(std::span<const WorldBox> boxes) {
+  WorkerThreads none;
+  return find_pairs(boxes, false, none, 1);
+}
+
+Status BroadPhase::find_pairs(std::span<const WorldBox> boxes, bool self_pairs, WorkerThreads& threads,
+                              std::uint32_t workers) {
+  const Team team = {threads, workers};
   pairs_.clear();
   group_pairs_ = 0;
   if (boxes.size() >= kNoIndex) return Status::kTooManyInstances;
-  for (const WorldBox& box : boxes) {
-    if (!in_range(box)) return Status::kOutOfRange;
-  }
-  if (boxes.size() < 2) return Status::kOk;
-  if (!build(boxes) || !collect()) return Status::kOutOfMemory;
-  if (found_.size() >= kNoIndex) return Status::kTooManyPairs;
-  return sort_pairs(boxes.size()) ? Status::kOk : Status::kOutOfMemory;
+  if (!reserve(boxes.size(), workers)) return Status::kOutOfMemory;
+  if (!take(boxes, team)) return Status::kOutOfRange;
+  if (boxes.empty()) return Status::kOk;
+  build(boxes, team);
+  if (!collect(team)) return Status::kOutOfMemory;
+  return sort_pairs(boxes.size(), self_pairs, team);
 }
 
 }  // namespace tandem

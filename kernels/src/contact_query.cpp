@@ -14,7 +14,10 @@ namespace tandem {
 namespace {
 
 // Object pairs that a thread takes at a time, where there are enough for every thread to come back often.
-constexpr std::size_t kMostPairsInChunk = 16, kChunksForEach = 8;
+constexpr std::size_t kMostPairsInChunk = 16, kChunksForEach = 32;
+
+// Instances that a worker poses, and chunks whose contacts it copies, at a time: some microseconds of work.
+constexpr std::size_t kInstancesAtOnce = 64, kChunksAtOnce = 8;
 
 struct Asset {
   LevelView tree;
@@ -27,6 +30,7 @@ struct Asset {
 struct ChunkResult {
   std::uint32_t worker;
   std::size_t begin, end;
+  std::size_t place;  // among the contacts of all
 };
 
 struct alignas(64) Worker {
@@ -71,7 +75,8 @@ struct ContactQuery::State {
   Buffer<PosedTree> instances;
   Buffer<WorldBox> boxes;
   BroadPhase broad_phase;
-  Buffer<ObjectPair> pairs;
+  Buffer<ObjectPair> given_pairs;
+  std::span<const ObjectPair> pairs;  // found or given
   Buffer<Contact> contacts;
   QueryCounters counters;
   std::uint64_t where = 0;
@@ -93,11 +98,14 @@ struct ContactQuery::State {
   }
 
   void forget_results() {
-    pairs.clear();
+    pairs = {};
     contacts.clear();
     counters = {};
   }
 
+  std::uint32_t most_workers() const { return std::clamp(options.threads, 1u, kMostQueryThreads); }
+  std::uint32_t workers_for(std::size_t things, std::size_t at_once) const;
+  Status pose_from(std::span<const Instance> posed, std::size_t& i, std::size_t end);
   Status pose_instances(std::span<const Instance> posed);
   Status find_pairs();
   Status take_pairs(std::span<const ObjectPair> given);
@@ -108,57 +116,81 @@ struct ContactQuery::State {
   Status collect();
 };
 
-// Poses of stored coordinates, and world boxes.
-Status ContactQuery::State::pose_instances(std::span<const Instance> posed) {
-  if (posed.size() >= kNoIndex) return fail(Status::kTooManyInstances, 0);
+// As many as asked for, but no more than find something to do.
+std::uint32_t ContactQuery::State::workers_for(std::size_t things, std::size_t at_once) const {
+  const std::size_t parts = (things + at_once - 1) / at_once;
+  return static_cast<std::uint32_t>(std::clamp<std::size_t>(parts, 1, most_workers()));
+}
+
+// Poses of stored coordinates, and world boxes, from instance i on. i: the end, or the first that is refused.
+Status ContactQuery::State::pose_from(std::span<const Instance> posed, std::size_t& i, std::size_t end) {
   const auto asset_count = static_cast<std::uint32_t>(std::min<std::size_t>(assets.size(), kNoIndex));
-  if (!instances.resize(posed.size()) || !boxes.resize(posed.size())) return fail(Status::kOutOfMemory, 0);
-  for (std::size_t i = 0; i < posed.size(); ++i) {
+  for (; i < end; ++i) {
     const Status status =
         pose_instance(assets.data(), asset_count, posed[i].asset, posed[i].pose, instances[i].pose, boxes[i]);
-    if (status != Status::kOk) return fail(status, i);
+    if (status != Status::kOk) return status;
     instances[i].tree = assets[posed[i].asset].tree;
     instances[i].extent = assets[posed[i].asset].extent;
   }
   return Status::kOk;
 }
 
+// Every part ends with its own first instance that is refused; the first of these is to blame.
+Status ContactQuery::State::pose_instances(std::span<const Instance> posed) {
+  if (posed.size() >= kNoIndex) return fail(Status::kTooManyInstances, 0);
+  if (!instances.resize(posed.size()) || !boxes.resize(posed.size())) return fail(Status::kOutOfMemory, 0);
+  const std::uint32_t posing = workers_for(posed.size(), kInstancesAtOnce);
+  if (!threads.provide(posing)) return fail(Status::kCannotStartThread, 0);
+  std::atomic<std::size_t> first_refused = posed.size();
+  const auto pose_part = [&](std::size_t i, std::size_t end, std::uint32_t) {
+    if (pose_from(posed, i, end) == Status::kOk) return;
+    std::size_t first = first_refused;
+    while (i < first && !first_refused.compare_exchange_weak(first, i)) {
+    }
+  };
+  threads.for_parts(posing, posed.size(), kInstancesAtOnce, pose_part);
+  std::size_t refused = first_refused;
+  const Status status = pose_from(posed, refused, std::min(refused + 1, posed.size()));
+  return status == Status::kOk ? status : fail(status, refused);
+}
+
 Status ContactQuery::State::find_pairs() {
-  if (const Status status = broad_phase.find_pairs(boxes.view()); status != Status::kOk)
-    return fail(status, 0);
-  const std::span<const ObjectPair> found = broad_phase.pairs();
-  const std::size_t selves = options.self_pairs ? instances.size() : 0;
-  if (!pairs.resize(found.size() + selves)) return fail(Status::kOutOfMemory, 0);
-  std::size_t next = 0;
-  std::uint32_t self = 0;  // the next to come
-  for (const ObjectPair& pair : found) {
-    for (; self < selves && self <= pair.a; ++self) pairs[next++] = {self, self};
-    pairs[next++] = pair;
-  }
-  for (; self < selves; ++self) pairs[next++] = {self, self};
-  return Status::kOk;
+  const Status status = broad_phase.find_pairs(boxes.view(), options.self_pairs, threads,
+                                               workers_for(boxes.size(), kInstancesAtOnce));
+  if (status != Status::kOk) return fail(status, 0);
+  pairs = broad_phase.pairs();
+  return status;
 }
 
 Status ContactQuery::State::take_pairs(std::span<const ObjectPair> given) {
-  if (!pairs.resize(given.size())) return fail(Status::kOutOfMemory, 0);
+  if (!given_pairs.resize(given.size())) return fail(Status::kOutOfMemory, 0);
   for (std::size_t i = 0; i < given.size(); ++i) {
     const Status status = check_pair(given[i], static_cast<std::uint32_t>(instances.size()));
     if (status != Status::kOk) return fail(status, i);
-    pairs[i] = given[i];
+    given_pairs[i] = given[i];
   }
+  pairs = given_pairs.view();
   return Status::kOk;
 }
 
-// As many as asked for, but no more than there are chunks. Those that there are stay.
+// No more than there are chunks. Those that there are stay.
 bool ContactQuery::State::provide_workers() {
-  const std::size_t wanted = std::clamp(options.threads, 1u, kMostQueryThreads);
-  pairs_in_chunk = std::clamp(pairs.size() / (kChunksForEach * wanted), std::size_t{1}, kMostPairsInChunk);
+  const std::size_t chunks_wanted = kChunksForEach * most_workers();
+  pairs_in_chunk = std::clamp(pairs.size() / chunks_wanted, std::size_t{1}, kMostPairsInChunk);
   if (!chunks.resize((pairs.size() + pairs_in_chunk - 1) / pairs_in_chunk)) return false;
-  active_workers = static_cast<std::uint32_t>(std::clamp(chunks.size(), std::size_t{1}, wanted));
-  if (active_workers <= worker_count) return true;
-  workers.reset(new (std::nothrow) Worker[active_workers]);
-  worker_count = workers != nullptr ? active_workers : 0;
-  return workers != nullptr;
+  active_workers = workers_for(chunks.size(), 1);
+  if (active_workers > worker_count) {
+    workers.reset(new (std::nothrow) Worker[active_workers]);
+    worker_count = workers != nullptr ? active_workers : 0;
+    if (workers == nullptr) return false;
+  }
+  for (std::uint32_t i = 0; i < active_workers; ++i) {
+    workers[i].contacts.clear();
+    workers[i].workers = active_workers;
+    workers[i].counters = {};
+    workers[i].enough_memory = true;
+  }
+  return true;
 }
 
 PairTask ContactQuery::State::task_of(std::uint32_t pair) const {
@@ -179,12 +211,10 @@ PairTask ContactQuery::State::task_of(std::uint32_t pair) const {
 void ContactQuery::State::work(std::uint32_t worker) {
   Worker& self = workers[worker];
   ContactSink sink;
-  self.workers = active_workers;
   sink.owner = &self;
   sink.grow = grow_contacts;
   sink.next = self.contacts.data();
   sink.end = self.contacts.data() + self.contacts.capacity();
-  self.enough_memory = true;
   const auto used = [&] { return static_cast<std::size_t>(sink.next - self.contacts.data()); };
   for (;;) {
     const std::uint32_t chunk = next_chunk.fetch_add(1, std::memory_order_relaxed);
@@ -195,7 +225,7 @@ void ContactQuery::State::work(std::uint32_t worker) {
       const PairTask task = task_of(static_cast<std::uint32_t>(pair));
       self.enough_memory = (task.in_frame ? narrow_phase : narrow_phase_by_world_boxes)(task, sink);
     }
-    chunks[chunk] = {worker, begin, used()};
+    chunks[chunk] = {worker, begin, used(), 0};
   }
   self.counters = sink.counters;
   (void)self.contacts.resize(used());
@@ -216,11 +246,19 @@ Status ContactQuery::State::collect() {
     return Status::kOk;
   }
   if (!contacts.resize(total)) return fail(Status::kOutOfMemory, 0);
-  Contact* out = contacts.data();
-  for (const ChunkResult& chunk : chunks.view()) {
-    const Contact* from = workers[chunk.worker].contacts.data();
-    out = std::copy(from + chunk.begin, from + chunk.end, out);
+  std::size_t place = 0;
+  for (std::size_t i = 0; i < chunks.size(); ++i) {
+    chunks[i].place = place;
+    place += chunks[i].end - chunks[i].begin;
   }
+  threads.for_parts(active_workers, chunks.size(), kChunksAtOnce,
+                    [&](std::size_t i, std::size_t end, std::uint32_t) {
+                      for (; i < end; ++i) {
+                        const ChunkResult& chunk = chunks[i];
+                        const Contact* from = workers[chunk.worker].contacts.data();
+                        std::copy(from + chunk.begin, from + chunk.end, contacts.data() + chunk.place);
+                      }
+                    });
   // Which worker takes which chunk is chance: so that no call of the same scene allocates, there is room for
   // all in each.
   for (std::uint32_t i = 0; i < active_workers; ++i) {
@@ -232,9 +270,10 @@ Status ContactQuery::State::collect() {
 Status ContactQuery::State::find_contacts_of_pairs() {
   if (pairs.size() >= kNoIndex) return fail(Status::kOutOfRange, 0);
   if (!provide_workers()) return fail(Status::kOutOfMemory, 0);
+  if (!threads.provide(active_workers)) return fail(Status::kCannotStartThread, 0);
   next_chunk.store(0, std::memory_order_relaxed);
   const auto work = [](void* state, std::uint32_t worker) { static_cast<State*>(state)->work(worker); };
-  if (!threads.run(active_workers, work, this)) return fail(Status::kCannotStartThread, 0);
+  threads.run(active_workers, work, this);
   return collect();
 }
 
@@ -289,7 +328,7 @@ Status ContactQuery::find_contacts(std::span<const Instance> instances, std::spa
 }
 
 std::span<const ObjectPair> ContactQuery::pairs() const {
-  return state_ != nullptr ? state_->pairs.view() : std::span<const ObjectPair>();
+  return state_ != nullptr ? state_->pairs : std::span<const ObjectPair>();
 }
 
 std::span<const Contact> ContactQuery::contacts() const {

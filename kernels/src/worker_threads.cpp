@@ -5,23 +5,57 @@
 
 namespace tandem {
 
-bool WorkerThreads::run(std::uint32_t workers, Work work, void* context) {
-  if (workers > thread_count_ + 1 && !start(workers - 1)) return false;
-  if (workers > 1) {
+namespace {
+
+constexpr int kRoundShift = 32, kWorkersShift = 16;
+constexpr std::uint64_t kLow = (1u << 16) - 1;
+
+std::uint64_t round_of(std::uint64_t state) {
+  return state >> kRoundShift;
+}
+std::uint64_t workers_of(std::uint64_t state) {
+  return state >> kWorkersShift & kLow;
+}
+std::uint64_t at_work(std::uint64_t state) {
+  return state & kLow;
+}
+
+// How often a thread looks before it sleeps, about a tenth of a millisecond: longer than what lies between
+// two phases of a query, and about what waking a thread takes.
+constexpr int kLooks = 512;
+
+// Whether it came true while this thread was awake.
+template <typename Condition>
+bool comes_soon(const Condition& condition) {
+  for (int look = 0; look < kLooks; ++look) {
+    if (condition()) return true;
+    std::this_thread::yield();
+  }
+  return false;
+}
+
+}  // namespace
+
+bool WorkerThreads::provide(std::uint32_t workers) {
+  return workers <= thread_count_ + 1 || start(workers - 1);
+}
+
+void WorkerThreads::run(std::uint32_t workers, Work work, void* context) {
+  if (workers == 1) return work(context, 0);
+  {
     const std::lock_guard lock(mutex_);
     work_ = work;
     context_ = context;
-    workers_ = workers;
-    working_ = workers - 1;
-    ++round_;
-    work_came_.notify_all();
+    const std::uint64_t round = round_of(state_.load(std::memory_order_relaxed)) + 1;
+    state_.store(round << kRoundShift | std::uint64_t{workers} << kWorkersShift, std::memory_order_release);
   }
+  work_came_.notify_all();
   work(context, 0);
-  if (workers > 1) {
-    std::unique_lock lock(mutex_);
-    work_done_.wait(lock, [this] { return working_ == 0; });
-  }
-  return true;
+  state_.fetch_and(~(kLow << kWorkersShift), std::memory_order_relaxed);
+  const auto done = [this] { return at_work(state_.load(std::memory_order_acquire)) == 0; };
+  if (comes_soon(done)) return;
+  std::unique_lock lock(mutex_);
+  work_done_.wait(lock, done);
 }
 
 bool WorkerThreads::start(std::uint32_t threads) {
@@ -29,7 +63,7 @@ bool WorkerThreads::start(std::uint32_t threads) {
   threads_.reset(new (std::nothrow) std::thread[threads]);
   if (threads_ == nullptr) return false;
   stopping_ = false;
-  round_ = 0;
+  state_ = 0;
   try {
     while (thread_count_ < threads) {
       const std::uint32_t worker = thread_count_ + 1;
@@ -55,17 +89,26 @@ void WorkerThreads::stop() {
 }
 
 void WorkerThreads::wait_for_work(std::uint32_t worker) {
-  std::uint64_t seen = 0;
-  std::unique_lock lock(mutex_);
+  std::uint64_t seen = 0;  // the last round
+  const auto came = [&] { return round_of(state_.load(std::memory_order_relaxed)) != seen; };
   for (;;) {
-    work_came_.wait(lock, [&] { return stopping_ || round_ > seen; });
-    if (stopping_) return;
-    seen = round_;
-    if (worker >= workers_) continue;
-    lock.unlock();
+    if (!comes_soon(came)) {
+      std::unique_lock lock(mutex_);
+      work_came_.wait(lock, [&] { return stopping_ || came(); });
+      if (stopping_) return;
+    }
+    std::uint64_t state = state_.load(std::memory_order_relaxed);
+    while (worker < workers_of(state) &&
+           !state_.compare_exchange_weak(state, state + 1, std::memory_order_acquire,
+                                         std::memory_order_relaxed)) {
+    }
+    seen = round_of(state);
+    if (worker >= workers_of(state)) continue;
     work_(context_, worker);
-    lock.lock();
-    if (--working_ == 0) work_done_.notify_one();
+    const std::uint64_t before = state_.fetch_sub(1, std::memory_order_release);
+    if (at_work(before) > 1 || workers_of(before) > 0) continue;
+    const std::lock_guard lock(mutex_);  // so that the caller sleeps or has seen it
+    work_done_.notify_one();
   }
 }
 

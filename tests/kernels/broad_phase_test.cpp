@@ -7,6 +7,8 @@
 #include <random>
 #include <vector>
 
+#include "worker_threads.h"
+
 namespace tandem {
 namespace {
 
@@ -93,6 +95,58 @@ TEST(BroadPhase, NamesCoordinatesThatItCannotTake) {
     const std::vector<WorldBox> boxes = {{{0, 0, 0}, {1, 1, 1}}, {{0, bad, 0}, {1, 1, 1}}};
     EXPECT_EQ(broad_phase.find_pairs(boxes), Status::kOutOfRange);
     EXPECT_EQ(broad_phase.pairs().size(), 0u);
+  }
+  WorkerThreads threads;
+  ASSERT_TRUE(threads.provide(4));
+  for (const std::size_t place : {0, 500, 1999}) {
+    auto boxes = scattered(2000, 1, 1, 0.25, 0, place);
+    ASSERT_EQ(broad_phase.find_pairs(boxes, true, threads, 4), Status::kOk);
+    EXPECT_GE(broad_phase.pairs().size(), boxes.size());
+    boxes[place].hi[2] = std::nan("");
+    EXPECT_EQ(broad_phase.find_pairs(boxes, true, threads, 4), Status::kOutOfRange) << place;
+    EXPECT_EQ(broad_phase.pairs().size(), 0u);
+  }
+}
+
+/// Boxes of a crowd, a far one, a huge one, and many in one place.
+std::vector<std::vector<WorldBox>> hard_boxes() {
+  std::vector<std::vector<WorldBox>> all;
+  for (const std::size_t count : {0, 1, 2, 63, 129, 700, 3000})
+    all.push_back(scattered(count, 1, 1, 0.25, 0, count));
+  all.push_back(all.back());
+  for (int k = 0; k < 3; ++k) all.back()[5].lo[k] = all.back()[5].hi[k] = 1e299;
+  all.push_back(all.back());
+  all.back()[9] = {{-1e12, -1e12, -1e12}, {1e12, 1e12, 1e12}};
+  all.emplace_back(300, WorldBox{{1, 2, 3}, {1, 2, 3}});
+  return all;
+}
+
+TEST(BroadPhase, DoesNotDependOnWorkers) {
+  BroadPhase alone, together;
+  WorkerThreads threads;
+  for (const std::vector<WorldBox>& boxes : hard_boxes()) {
+    const Pairs expected = found(alone, boxes);
+    for (const std::uint32_t workers : {2u, 3u, 4u, 16u, 40u}) {
+      ASSERT_TRUE(threads.provide(workers));
+      for (const bool self_pairs : {false, true}) {
+        ASSERT_EQ(together.find_pairs(boxes, self_pairs, threads, workers), Status::kOk);
+        Pairs pairs;
+        std::uint32_t selves = 0;
+        ObjectPair before = {0, 0};
+        for (const ObjectPair& pair : together.pairs()) {
+          EXPECT_LE(std::pair(before.a, before.b), std::pair(pair.a, pair.b));
+          before = pair;
+          if (pair.a == pair.b) {
+            EXPECT_EQ(pair.a, selves++);
+          } else {
+            pairs.emplace_back(pair.a, pair.b);
+          }
+        }
+        EXPECT_EQ(pairs, expected) << boxes.size() << " boxes, " << workers << " workers";
+        EXPECT_EQ(selves, self_pairs ? boxes.size() : 0);
+        EXPECT_EQ(together.group_pairs(), alone.group_pairs());
+      }
+    }
   }
 }
 

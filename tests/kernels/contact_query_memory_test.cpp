@@ -97,6 +97,11 @@ Scene crowd() {
     for (double& x : pose.translation) x = random.symmetric(2);
     scene.instances.push_back({i % 2, pose});
   }
+  // A row of touching cubes, so that several workers find pairs.
+  for (std::uint32_t i = 0; i < 300; ++i) {
+    scene.instances.push_back({1, kIdentityPose});
+    scene.instances.back().pose.translation[0] = 10 + i;
+  }
   return scene;
 }
 

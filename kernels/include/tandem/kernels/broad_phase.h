@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "tandem/formats/status.h"
@@ -8,13 +9,15 @@
 
 namespace tandem {
 
+class WorkerThreads;
+
 /// Two instances whose world boxes meet; a < b.
 struct ObjectPair {
   std::uint32_t a, b;
 };
 
 /// Finds all pairs of world boxes that meet. Keeps its memory from call to call: in a steady state nothing is
-/// allocated. Throws nothing. One thread.
+/// allocated. Throws nothing.
 ///
 /// Boxes are split into four again and again, at medians along the longest extent, which makes a complete
 /// tree of groups of four; it is traversed in tandem with itself. O(n log n) for boxes of bounded overlap,
@@ -24,8 +27,13 @@ class BroadPhase {
  public:
   /// Result: kOk; kOutOfMemory; kOutOfRange where a coordinate is NaN or beyond kLargestWorldCoordinate;
   /// kTooManyInstances, kTooManyPairs: 2^32 - 1 boxes or pairs, or more. The pairs are those whose boxes
-  /// meet, touching included, no more and no fewer, sorted by a, then b.
+  /// meet, touching included, no more and no fewer, sorted by a, then b. One thread.
   Status find_pairs(std::span<const WorldBox> boxes);
+
+  /// The same with the threads of a query, which are there for so many workers; neither the pairs nor
+  /// group_pairs() depend on their number. self_pairs: each box with itself is a pair too.
+  Status find_pairs(std::span<const WorldBox> boxes, bool self_pairs, WorkerThreads& threads,
+                    std::uint32_t workers);
 
   /// The pairs of the last call that returned kOk; valid until the next call.
   std::span<const ObjectPair> pairs() const { return pairs_.view(); }
@@ -47,18 +55,52 @@ class BroadPhase {
     double lo[3][kGroup], hi[3][kGroup];
   };
 
-  static void split(Item* items, std::size_t count, std::size_t unit, std::size_t units);
+  /// Items that make `units` runs of `unit` items, the last of which may be shorter. A unit is a power of
+  /// four.
+  struct Range {
+    std::size_t begin, count, unit, units;
+  };
+
+  /// Two groups of one level; a <= b.
+  struct GroupPair {
+    std::uint32_t a, b;  // within their level
+    int level;
+  };
+
+  /// What a worker found.
+  struct alignas(64) Finder {
+    Buffer<ObjectPair> pairs;
+    std::uint64_t group_pairs = 0;
+    bool enough_memory = true;
+  };
+
+  struct Team {
+    WorkerThreads& threads;
+    std::uint32_t workers;
+  };
+
   static std::uint32_t meeting(const Group& a, const Group& b);
-  bool build(std::span<const WorldBox> boxes);
-  bool collect();
-  bool sort_pairs(std::size_t boxes);
+  bool reserve(std::size_t boxes, std::uint32_t workers);
+  bool take(std::span<const WorldBox> boxes, Team team);
+  bool halve(Range& range, Range& right);
+  void split(Range range);
+  void split(Range all, Team team);
+  void build(std::span<const WorldBox> boxes, Team team);
+  void build_level(int level, std::size_t below, std::span<const WorldBox> boxes, Team team);
+  std::uint32_t meeting(const GroupPair& pair) const;
+  void collect(GroupPair from, std::uint32_t owners, Finder& finder) const;
+  bool collect(Team team);
+  Status sort_pairs(std::size_t boxes, bool self_pairs, Team team);
 
   Buffer<Item> items_;                // in the order of the tree
   Buffer<Group> groups_;              // level by level from the leaves
   std::size_t level_begin_[17] = {};  // where each level of groups begins
   int levels_ = 0;
   std::uint64_t group_pairs_ = 0;
-  Buffer<ObjectPair> found_, pairs_;
+  Buffer<GroupPair> starts_;  // of the workers' walks
+  std::unique_ptr<Finder[]> finders_;
+  std::uint32_t finder_count_ = 0;
+  Buffer<ObjectPair> pairs_;
   Buffer<std::uint32_t> first_;  // of each box, where its pairs begin
 };
 

@@ -72,14 +72,14 @@ class ContactQuery {
 
   /// Finds the object pairs whose world boxes overlap, without their contacts, so that the caller can leave
   /// some out. Result: kOk; kUnknownAsset, kPoseNotRigid or kOutOfRange (beyond kLargestWorldCoordinate),
-  /// where where() is the instance; kTooManyInstances, kTooManyPairs or kOutOfMemory. After an error there
-  /// are no pairs and no contacts.
+  /// where where() is the instance; kTooManyInstances, kTooManyPairs, kOutOfMemory or
+  /// kCannotStartThread. After an error there are no pairs and no contacts.
   Status find_pairs(std::span<const Instance> instances, const QueryOptions& options = {});
 
   /// Finds the object pairs whose world boxes overlap, and their contacts. find_contacts(instances, {}) is
-  /// this one, with default options. Result: as above, or kCannotStartThread. kOutOfMemory also where the
-  /// machine, or the limit of the process's control group, has not enough memory available for the contacts:
-  /// Linux would grant it and kill the process later. In a steady state nothing is asked.
+  /// this one, with default options. Result: as above; kOutOfMemory also where the machine, or the limit of
+  /// the process's control group, has not enough memory available for the contacts: Linux would grant it and
+  /// kill the process later. In a steady state nothing is asked.
   Status find_contacts(std::span<const Instance> instances, const QueryOptions& options = {});
 
   /// Finds the contacts of the given object pairs, in either order of a and b. A pair of an instance with

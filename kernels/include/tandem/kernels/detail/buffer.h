@@ -39,9 +39,9 @@ class Buffer {
     return true;
   }
 
-  /// Adds an element; grows by half. False: out of memory, nothing changed.
-  [[nodiscard]] bool push(const Value& value) {
-    if (size_ == capacity_ && !grow(size_)) return false;
+  /// Adds an element; where there is no room, grows as grow() does. False: out of memory, nothing changed.
+  [[nodiscard]] bool push(const Value& value, std::size_t owners = 1) {
+    if (size_ == capacity_ && !grow(size_, owners)) return false;
     data_[size_++] = value;
     return true;
   }

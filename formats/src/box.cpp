@@ -120,4 +120,13 @@ bool contains(const Box& outer, const Box& inner) {
   return true;
 }
 
+bool is_imaginary_box(const Box& box) {
+  bool imaginary = true;
+  for (int k = 0; k < 3; ++k) {
+    imaginary = imaginary && box.center[k] == 0 && !std::signbit(box.center[k]) &&
+                box.half_extent[k] == kImaginaryHalfExtent;
+  }
+  return imaginary;
+}
+
 }  // namespace tandem

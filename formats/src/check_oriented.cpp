@@ -7,11 +7,6 @@
 namespace tandem {
 namespace {
 
-Box box_of(const OrientedBlock& block, int node) {
-  return {{block.center[0][node], block.center[1][node], block.center[2][node]},
-          {block.half_extent[0][node], block.half_extent[1][node], block.half_extent[2][node]}};
-}
-
 bool is_legal(const BlockRotation& rotation) {
   bool all_zero = true;
   for (const std::uint32_t word : {rotation.wx, rotation.yz}) {
@@ -22,14 +17,6 @@ bool is_legal(const BlockRotation& rotation) {
     }
   }
   return !all_zero;
-}
-
-bool is_imaginary_box(const Box& box) {
-  bool sound = true;
-  for (int k = 0; k < 3; ++k)
-    sound = sound && box.center[k] == 0 && !std::signbit(box.center[k]) &&
-            box.half_extent[k] == kImaginaryHalfExtent;
-  return sound;
 }
 
 // The same number of two triangles.
@@ -134,7 +121,7 @@ class OrientedWalk {
     if (depth_ == CheckDepth::quick) return true;
     const OrientedBlock& oriented = level_.oriented_blocks[number];
     // In the mesh's own axes boxes within boxes do, as check_tree() showed.
-    if (oriented.rotation == kNoRotation && contains(box_of(oriented, node), tandem::box_of(block, node)))
+    if (oriented.rotation == kNoRotation && contains(box_of(oriented, node), box_of(block, node)))
       return true;
     const ScaledRotation rotation = scaled_rotation(oriented.rotation);
     Two s[3][3], lowest[3], highest[3];

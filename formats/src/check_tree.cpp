@@ -17,14 +17,6 @@ bool is_real_box(const Box& box) {
   return sound;
 }
 
-bool is_imaginary_box(const Box& box) {
-  bool sound = true;
-  for (int k = 0; k < 3; ++k)
-    sound = sound && box.center[k] == 0 && !std::signbit(box.center[k]) &&
-            box.half_extent[k] == kImaginaryHalfExtent;
-  return sound;
-}
-
 // Kinds and boxes of the four nodes; sets `real` to the number of nodes that are not imaginary.
 Status check_nodes(const Block& block, int& real) {
   real = 0;

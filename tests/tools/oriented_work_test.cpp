@@ -30,11 +30,6 @@ FacePairs contacts(const AssetView& a, const AssetView& b, const Pose& pose_of_b
   return faces;
 }
 
-Box box_of(const OrientedBlock& block, int node) {
-  return {{block.center[0][node], block.center[1][node], block.center[2][node]},
-          {block.half_extent[0][node], block.half_extent[1][node], block.half_extent[2][node]}};
-}
-
 // Candidates of oriented boxes, and how often any was met again.
 struct Candidates {
   FacePairs faces;

@@ -8,15 +8,6 @@
 namespace tandem {
 namespace {
 
-Box box_of(const OrientedBlock& block, int node) {
-  Box box;
-  for (int k = 0; k < 3; ++k) {
-    box.center[k] = block.center[k][node];
-    box.half_extent[k] = block.half_extent[k][node];
-  }
-  return box;
-}
-
 std::uint32_t overlaps(const OrientedBlock& a, const OrientedBlock& b, const OrientedPose& pose) {
   Box boxes_b[kNodesPerBlock];
   for (int j = 0; j < kNodesPerBlock; ++j) boxes_b[j] = box_of(b, j);

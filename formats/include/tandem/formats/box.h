@@ -35,6 +35,9 @@ bool contains(const Box& box, const Position& point);
 /// Whether `outer` contains `inner`, in real arithmetic: |c_i - c_o| + h_i <= h_o on every axis.
 bool contains(const Box& outer, const Box& inner);
 
+/// Whether it is the box of an imaginary node, bit by bit.
+bool is_imaginary_box(const Box& box);
+
 TANDEM_HD inline Box box_of(const Block& block, int node) {
   return {{block.center[0][node], block.center[1][node], block.center[2][node]},
           {block.half_extent[0][node], block.half_extent[1][node], block.half_extent[2][node]}};

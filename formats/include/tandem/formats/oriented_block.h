@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "tandem/formats/block.h"
+#include "tandem/formats/box.h"
 
 /// Blocks in frames of their own: the boxes of a block's four nodes lie along the axes of one rotation, which
 /// fits what is below the block. They are thinner than boxes along the axes of the mesh, so fewer pairs of
@@ -47,6 +47,11 @@ struct alignas(16) OrientedBlock {
 };
 static_assert(sizeof(OrientedBlock) == 112 && offsetof(OrientedBlock, half_extent) == 48 &&
               offsetof(OrientedBlock, first_below) == 96 && offsetof(OrientedBlock, rotation) == 104);
+
+TANDEM_HD inline Box box_of(const OrientedBlock& block, int node) {
+  return {{block.center[0][node], block.center[1][node], block.center[2][node]},
+          {block.half_extent[0][node], block.half_extent[1][node], block.half_extent[2][node]}};
+}
 
 /// A level with as many triangles has no oriented blocks: they could not name them all.
 inline constexpr std::uint32_t kMostOrientedTriangles = OrientedBlock::kIsLeafBlock;

@@ -1,0 +1,329 @@
+#pragma once
+#include "tandem/kernels/detail/manifold/patch_normal.h"
+#include "tandem/kernels/detail/manifold/patch_rim.h"
+
+/// The rule by which contacts become manifolds (docs/contacts.md), for CPU and GPU alike.
+namespace tandem::manifold {
+
+/// How far a line that sounds the depth at the rim is moved inwards, as a part of the way to the middle, so
+/// that it does not run along a wall that made the rim.
+inline constexpr double kInwards = 0.02;
+
+/// Points of a manifold closer than this part of the smaller body's diagonal are one.
+inline constexpr double kNear = 0.005;
+
+/// An inner point is kept where it lies deeper than the rim by this factor.
+inline constexpr double kDeeper = 1.25;
+
+/// What became of the contacts of a pair.
+struct PairCounters {
+  std::uint32_t segments = 0, ambiguous_touches = 0;
+};
+
+template <typename Team>
+class ManifoldMaker {
+ public:
+  TANDEM_HD ManifoldMaker(const Team& team, const BodyPair& bodies, const PieceMemory& memory,
+                          PatchMemory& shared)
+      : team_(team), bodies_(bodies), memory_(memory), shared_(shared) {}
+
+  /// Makes the patches of a pair of bodies from its contacts. new_patch(): where the next one is to lie, or
+  /// null; called by one of the team for each.
+  template <typename NewPatch>
+  TANDEM_HD PairCounters make(const Contact* contacts, std::uint32_t count, const NewPatch& new_patch) {
+    CurveFinder<Team> finder(team_, bodies_, memory_);
+    summary_ = finder.find(contacts, count, shared_.next);
+    PairCounters counters;
+    counters.segments = summary_.segments;
+    for (std::uint32_t curve = 0; curve < summary_.curves; ++curve) {
+      team_.sync();
+      if (!make_patch(curve, new_patch)) ++counters.ambiguous_touches;
+    }
+    return counters;
+  }
+
+ private:
+  struct Chosen {
+    Vector2 at;
+    double height, depth, from_middle;
+    std::uint64_t feature;
+    std::uint32_t triangle[2];
+    bool inner;
+  };
+
+  template <typename NewPatch>
+  TANDEM_HD bool make_patch(std::uint32_t curve, const NewPatch& new_patch);
+  TANDEM_HD void place_soundings(const RimFinder<Team>& finder, const Rim& rim, const PatchFrame& frame,
+                                 bool touch);
+  TANDEM_HD void sound(const PatchFrame& frame, int first, int count);
+  TANDEM_HD void sound_deepest(const PatchFrame& frame, const Rim& rim);
+  TANDEM_HD void look_behind(const PatchFrame& frame);
+  TANDEM_HD int choose(const RimFinder<Team>& finder, const PatchFrame& frame, bool touch,
+                       Chosen (&chosen)[kMostSoundings]) const;
+
+  const Team& team_;
+  const BodyPair& bodies_;
+  PieceMemory memory_;
+  PatchMemory& shared_;
+  PieceSummary summary_;
+  Vector2 middle_;       // of the rim
+  double extent_ = 0;    // of the rim, from its middle
+  int rim_points_ = 0, soundings_ = 0;
+};
+
+/// The rim as it is sounded, and the middle.
+template <typename Team>
+TANDEM_HD void ManifoldMaker<Team>::place_soundings(const RimFinder<Team>& finder, const Rim& rim,
+                                                    const PatchFrame& frame, bool touch) {
+  Vector2 at[kMostManifoldPoints];
+  double height[kMostManifoldPoints], mean_height = 0;
+  middle_ = {};
+  for (int i = 0; i < rim.points; ++i) {
+    const Vector3 x = finder.position(rim.reference[i]);
+    at[i] = frame.flat(x), height[i] = frame.height(x);
+    middle_ = middle_ + at[i];
+    mean_height += height[i];
+  }
+  middle_ = (1.0 / rim.points) * middle_;
+  mean_height /= rim.points;
+  extent_ = 0;
+  for (int i = 0; i < rim.points; ++i) extent_ = std::fmax(extent_, norm(at[i] - middle_));
+  rim_points_ = rim.points;
+  soundings_ = touch ? rim.points : rim.points + 1;
+  if (team_.rank() == 0) {
+    for (int i = 0; i < soundings_; ++i) {
+      Sounding& s = shared_.sounding[i];
+      s = {};
+      const bool inner = i == rim.points;
+      s.at = inner ? middle_ : at[i];
+      s.line = inner ? middle_ : at[i] + kInwards * (middle_ - at[i]);
+      s.height = s.target[0] = s.target[1] = inner ? mean_height : height[i];
+      s.reference = inner ? kNoIndex : rim.reference[i];
+      s.feature = feature_hash(0, 4);
+    }
+  }
+  team_.sync();
+}
+
+template <typename Team>
+TANDEM_HD void ManifoldMaker<Team>::sound(const PatchFrame& frame, int first, int count) {
+  for (std::uint32_t i = team_.rank(); i < 2 * static_cast<std::uint32_t>(count); i += team_.size()) {
+    Sounding& s = shared_.sounding[first + static_cast<int>(i / 2)];
+    const int side = static_cast<int>(i % 2);
+    s.surface[side] = nearest_crossing(bodies_[side], frame, s.line, side == 0 ? 1 : -1, s.target[side],
+                                       -INFINITY, INFINITY);
+  }
+  team_.sync();
+}
+
+/// Sounds where a's highest vertex in the patch is, and b's lowest: there, or in the middle, the overlap is
+/// deepest, or nearly. They are looked for within the rim, and no further along the normal than the rim and
+/// the middle are from each other's surfaces, and the rim's extent more.
+template <typename Team>
+TANDEM_HD void ManifoldMaker<Team>::sound_deepest(const PatchFrame& frame, const Rim& rim) {
+  Prism prism;
+  prism.frame = frame;
+  const double more = 1e-6 * extent_ + 0x1p-40 * bodies_.reach();
+  for (int i = 0; i < rim.points; ++i) {
+    const Vector2 p = shared_.sounding[i].at, q = shared_.sounding[i + 1 == rim.points ? 0 : i + 1].at;
+    const double length = norm(q - p);
+    if (!(length > 0)) continue;
+    Vector2& outward = prism.outward[prism.sides];
+    outward = (1 / length) * Vector2{q.y - p.y, p.x - q.x};
+    prism.offset[prism.sides++] = dot(outward, p) + more;
+  }
+  double lowest = INFINITY, highest = -INFINITY;
+  for (int i = 0; i < soundings_; ++i) {
+    const Sounding& s = shared_.sounding[i];
+    lowest = std::fmin(lowest, s.height), highest = std::fmax(highest, s.height);
+    if (!(s.overlap() > 0)) continue;
+    lowest = std::fmin(lowest, s.surface[1].height), highest = std::fmax(highest, s.surface[0].height);
+  }
+  prism.lower = lowest - extent_, prism.upper = highest + extent_;
+  for (std::uint32_t side = team_.rank(); side < 2; side += team_.size()) {
+    shared_.extreme[side] = extreme_vertex(bodies_[static_cast<int>(side)], prism, side == 0 ? 1 : -1);
+  }
+  team_.sync();
+  const int first = soundings_;
+  for (int side = 0; side < 2; ++side) {
+    const Extreme& extreme = shared_.extreme[side];
+    if (!extreme.found()) continue;
+    if (team_.rank() == 0) {
+      Sounding& s = shared_.sounding[soundings_];
+      s = {};
+      s.at = s.line = extreme.at;
+      s.height = extreme.height;
+      s.target[side] = extreme.height;
+      s.target[1 - side] = shared_.sounding[rim_points_].height;
+      s.reference = kNoIndex;
+      s.feature = feature_hash(extreme.vertex, side == 0 ? 5 : 6);
+    }
+    ++soundings_;
+  }
+  team_.sync();
+  sound(frame, first, soundings_ - first);
+}
+
+/// Looks whether lines that seem to overlap run within both bodies: where there are several curves, one may
+/// bound a hole, or one body may go through the other; and where the overlap is large beside the rim, the
+/// surfaces that the line found may not belong to the patch.
+template <typename Team>
+TANDEM_HD void ManifoldMaker<Team>::look_behind(const PatchFrame& frame) {
+  const bool several = summary_.curves > 1;
+  for (std::uint32_t i = team_.rank(); i < 2 * static_cast<std::uint32_t>(soundings_); i += team_.size()) {
+    Sounding& s = shared_.sounding[i / 2];
+    if (!(s.overlap() > (several ? 0 : extent_ / 2))) continue;
+    const int side = static_cast<int>(i % 2);
+    const double height = s.surface[side].height;
+    s.behind[side] = side == 0 ? nearest_crossing(bodies_.a, frame, s.line, -1, height, -INFINITY, height)
+                               : nearest_crossing(bodies_.b, frame, s.line, 1, height, height, INFINITY);
+    if (side == 0) s.looked_behind = true;
+  }
+  team_.sync();
+}
+
+/// The rim as it is sounded, and the deepest inner point where it lies deeper. Deeper points come first, then
+/// those further out; of points near each other the first stays.
+template <typename Team>
+TANDEM_HD int ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, const PatchFrame& frame, bool touch,
+                                          Chosen (&chosen)[kMostSoundings]) const {
+  (void)frame;
+  int count = 0;
+  double of_rim = 0;
+  Chosen inner{};
+  for (int i = 0; i < soundings_; ++i) {
+    const Sounding& s = shared_.sounding[i];
+    Chosen c{};
+    c.at = s.at;
+    c.depth = !touch && s.within() ? s.overlap() : 0;
+    c.height = c.depth > 0 ? (s.surface[0].height + s.surface[1].height) / 2 : s.height;
+    c.from_middle = norm(s.at - middle_);
+    c.inner = s.reference == kNoIndex;
+    if (c.inner) {
+      c.feature = s.feature;
+      c.triangle[0] = s.surface[0].triangle, c.triangle[1] = s.surface[1].triangle;
+      if (c.depth > inner.depth) inner = c;
+      continue;
+    }
+    c.feature = finder.feature(s.reference);
+    const Piece& piece = finder.piece(s.reference);
+    c.triangle[0] = piece.triangle[0], c.triangle[1] = piece.triangle[1];
+    of_rim = std::fmax(of_rim, c.depth);
+    chosen[count++] = c;
+  }
+  if (inner.depth > kDeeper * of_rim) chosen[count++] = inner;
+  for (int i = 1; i < count; ++i) {  // stable
+    const Chosen c = chosen[i];
+    int j = i;
+    for (; j > 0; --j) {
+      const Chosen& before = chosen[j - 1];
+      if (!(c.depth > before.depth || (c.depth == before.depth && c.from_middle > before.from_middle))) break;
+      chosen[j] = before;
+    }
+    chosen[j] = c;
+  }
+  const double near = kNear * bodies_.smaller_diagonal();
+  int kept = 0;
+  for (int i = 0; i < count; ++i) {
+    bool alone = true;
+    for (int k = 0; k < kept; ++k) alone = alone && norm(chosen[k].at - chosen[i].at) >= near;
+    if (alone) chosen[kept++] = chosen[i];
+  }
+  return kept;
+}
+
+template <typename Team>
+template <typename NewPatch>
+TANDEM_HD bool ManifoldMaker<Team>::make_patch(std::uint32_t curve, const NewPatch& new_patch) {
+  NormalFinder<Team> normal_finder(team_, bodies_, memory_, summary_, curve);
+  const CurveMeasure measure = normal_finder.measure();
+  const PatchNormal normal = normal_finder.find(measure);
+  if (!normal.known) return false;
+  const PatchFrame frame(summary_.origin, normal.n);
+  RimFinder<Team> rim_finder(team_, bodies_, memory_, summary_, curve, frame);
+  rim_finder.gather(measure.closed && !summary_.degenerate, shared_.next);
+  const int most = static_cast<int>(kMostManifoldPoints) - (normal.touch ? 0 : 1);
+  const Rim rim = rim_finder.find(most, frame.flat(measure.middle));
+  if (rim.points == 0) return false;
+  place_soundings(rim_finder, rim, frame, normal.touch);
+  bool goes_through = false, hole = false;
+  if (!normal.touch) {
+    sound(frame, 0, soundings_);
+    sound_deepest(frame, rim);
+    look_behind(frame);
+    if (summary_.curves > 1 && measure.closed) {
+      double deepest = 0;
+      bool outside = false;
+      for (int i = 0; i <= rim_points_; ++i) {
+        const Sounding& s = shared_.sounding[i];
+        outside = outside || (s.overlap() > 0 && !s.within());
+        if (!s.within() || s.overlap() <= deepest) continue;
+        deepest = s.overlap();
+        goes_through = s.goes_through();
+      }
+      hole = outside && deepest == 0;
+      // The way back is the shorter one on the side where the middles are.
+      if (goes_through && dot(measure.area, bodies_.apart()) < 0) return true;
+    }
+  }
+  Chosen chosen[kMostSoundings];
+  int count = choose(rim_finder, frame, normal.touch, chosen);
+  count = count < static_cast<int>(kMostManifoldPoints) ? count : static_cast<int>(kMostManifoldPoints);
+  const double near = kNear * bodies_.smaller_diagonal();
+  for (int i = 0; i < count; ++i) {
+    if (!chosen[i].inner) chosen[i].feature = rim_finder.least_feature_near(chosen[i].at, near / 2, chosen[i].feature);
+  }
+  if (team_.rank() != 0) return true;
+  Patch* const patch = new_patch();
+  if (patch == nullptr) return true;
+  Vector2 centre = middle_;
+  double deepest = 0, height = 0;
+  for (int i = 0; i < count; ++i) {
+    deepest = std::fmax(deepest, chosen[i].depth);
+    height += chosen[i].height / count;
+  }
+  if (measure.closed && !normal.touch) {
+    Vector2 of_area;
+    if (rim_finder.middle_of_area(of_area) && norm(of_area - middle_) <= extent_) centre = of_area;
+  }
+  Vector3 area = measure.area;
+  if (!measure.closed) {
+    // The curve bounds no area: that of the rim stands in.
+    double twice = 0;
+    for (int i = 1; i + 1 < rim.points; ++i) {
+      const Vector2 p = shared_.sounding[0].at;
+      twice += cross(shared_.sounding[i].at - p, shared_.sounding[i + 1].at - p);
+    }
+    area = (std::fabs(twice) / 2) * normal.n;
+  }
+  if (normal.touch) area = {};
+  const auto write = [](const Vector3& x, double (&out)[3]) { out[0] = x.x, out[1] = x.y, out[2] = x.z; };
+  Manifold& manifold = patch->manifold;
+  manifold = {};
+  write(normal.n, manifold.normal);
+  write(area, manifold.area_vector);
+  write(frame.at(centre, height), manifold.centre);
+  manifold.depth = deepest;
+  manifold.point_count = static_cast<std::uint32_t>(count);
+  manifold.flags = (normal.touch ? kTouching : 0u) | (measure.closed ? 0u : kOpenCurve) |
+                   (goes_through ? kGoesThrough : 0u);
+  patch->key = measure.key;
+  patch->hole = hole ? 1 : 0;
+  for (int i = 0; i < count; ++i) {
+    const Chosen& c = chosen[i];
+    ManifoldPoint& point = patch->point[i];
+    const Vector3 x = frame.at(c.at, c.height), half = (c.depth / 2) * normal.n;
+    write(x, point.position);
+    write(bodies_.a.in_file_coordinates(x + half), point.in_a);
+    write(bodies_.b.in_file_coordinates(x - half), point.in_b);
+    point.depth = c.depth;
+    point.id = c.feature;
+    point.face_a = bodies_.a.shape->triangles[c.triangle[0]].source_face();
+    point.face_b = bodies_.b.shape->triangles[c.triangle[1]].source_face();
+    point.previous = kNoIndex;
+    point.manifold = kNoIndex;
+  }
+  return true;
+}
+
+}  // namespace tandem::manifold

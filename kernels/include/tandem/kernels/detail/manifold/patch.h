@@ -1,0 +1,93 @@
+#pragma once
+#include <cstdint>
+
+#include "tandem/kernels/detail/manifold/contact_curves.h"
+#include "tandem/kernels/detail/manifold/surface_line.h"
+#include "tandem/kernels/manifold.h"
+
+/// What the steps from a curve of pieces to a manifold pass on to each other.
+namespace tandem::manifold {
+
+/// A manifold before it has its place.
+struct Patch {
+  Manifold manifold;
+  std::uint64_t key;   ///< of its least piece: the order within a pair
+  std::uint64_t hole;  ///< 1: what lies within this curve is no contact, but a hole in another manifold's
+  ManifoldPoint point[kMostManifoldPoints];
+};
+
+/// What all pieces of a curve amount to.
+struct CurveMeasure {
+  Vector3 area;    ///< half the sum of r x dr, and polygons: from a towards b
+  Vector3 middle;  ///< of the pieces
+  double length = 0;
+  bool closed = true;
+  Vector3 sheet_normal;  ///< of the pieces' triangles, from a towards b, times lengths, where it is not closed; of open surfaces where there are any
+  std::uint64_t key = 0;
+};
+
+/// The direction in which the bodies of a patch push each other.
+struct PatchNormal {
+  Vector3 n;           ///< unit, from a towards b
+  bool known = false;  ///< no: corners or edges that touch each other, where no direction is better than another
+  bool touch = false;  ///< the surfaces meet without area
+};
+
+/// A point of a patch where its curve has a corner, as the search for the outermost ones sees it.
+struct Candidate {
+  float x, y;
+  std::uint32_t reference;  ///< piece * 8 + number of its end or corner
+};
+static_assert(sizeof(Candidate) == 12);
+
+struct FloatPoint {
+  float x, y;
+};
+
+/// A patch's outermost candidates, counter-clockwise.
+struct Rim {
+  std::uint32_t reference[kMostManifoldPoints];
+  FloatPoint at[kMostManifoldPoints];
+  int points = 0;
+};
+
+/// A point that a manifold may have, and the line across the patch that measures the depth there.
+struct Sounding {
+  Vector2 at, line;         ///< the line runs a little further inside
+  double height;            ///< of the point
+  double target[2];         ///< the height near which the line is to meet a's surface, b's
+  std::uint32_t reference;  ///< of a rim point: the candidate. Else kNoIndex
+  std::uint64_t feature;    ///< of others
+  Crossing surface[2];      ///< a's, that faces along the normal; b's, that faces against it
+  Crossing behind[2];       ///< where a begins, on the line; where b ends
+  bool looked_behind;
+
+  TANDEM_HD double overlap() const {
+    return surface[0].found() && surface[1].found() ? surface[0].height - surface[1].height : 0;
+  }
+  /// Whether the line runs within both, as far as it was looked at.
+  TANDEM_HD bool within() const {
+    if (!(overlap() > 0)) return false;
+    if (!looked_behind) return true;
+    const double begin = std::fmax(surface[1].height, behind[0].found() ? behind[0].height : -INFINITY);
+    const double end = std::fmin(surface[0].height, behind[1].found() ? behind[1].height : INFINITY);
+    return begin < end;
+  }
+  /// Whether one body ends within the other. Condition: looked_behind, within().
+  TANDEM_HD bool goes_through() const {
+    return (behind[0].found() && behind[0].height > surface[1].height) ||
+           (behind[1].found() && behind[1].height < surface[0].height);
+  }
+};
+
+/// Rim, the middle, a's highest vertex and b's lowest.
+inline constexpr int kMostSoundings = static_cast<int>(kMostManifoldPoints) + 3;
+
+/// What a team shares while it makes a patch.
+struct PatchMemory {
+  Sounding sounding[kMostSoundings];
+  Extreme extreme[2];
+  std::uint32_t next;
+};
+
+}  // namespace tandem::manifold

@@ -1,0 +1,314 @@
+#pragma once
+#include "tandem/kernels/detail/manifold/patch.h"
+
+namespace tandem::manifold {
+
+/// An area vector below this part of length times largest coordinate is rounding: the surfaces only touch.
+inline constexpr double kNoArea = 0x1p-40;
+
+/// A curve whose ends are apart by less than this part of its length closes.
+inline constexpr double kClosed = 1e-6;
+
+/// Faces in so few directions on both sides make a patch one of flat faces; otherwise it is a smooth one.
+inline constexpr int kMostDirections = 5;
+
+/// Measures a curve, and finds the direction in which its patch pushes.
+template <typename Team>
+class NormalFinder {
+ public:
+  TANDEM_HD NormalFinder(const Team& team, const BodyPair& bodies, const PieceMemory& memory,
+                         const PieceSummary& summary, std::uint32_t curve)
+      : team_(team),
+        bodies_(bodies),
+        memory_(memory),
+        summary_(summary),
+        begin_(memory.start[curve]),
+        end_(memory.start[curve + 1]) {}
+
+  TANDEM_HD CurveMeasure measure();
+  TANDEM_HD PatchNormal find(const CurveMeasure& curve);
+
+ private:
+  struct Direction {
+    Vector3 n;            // from a towards b
+    std::uint64_t piece;  // key of the piece whose triangle has it
+    Vector3 x;            // a point of that piece
+  };
+  struct Spread {
+    double highest_a, lowest_b;
+  };
+  static constexpr int kMost = 2 * kMostDirections + 1;
+
+  template <typename Visit>
+  TANDEM_HD void for_each_piece(const Visit& visit) const {
+    for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
+      const std::uint32_t at = memory_.order[i];
+      visit(memory_.pieces[at], memory_.normals + 6 * std::size_t{at});
+    }
+  }
+  TANDEM_HD double total(ExactSum sum, double unit) const {
+    sum.upper = team_.sum(sum.upper), sum.lower = team_.sum(sum.lower);
+    return sum.value(unit);
+  }
+  TANDEM_HD Vector3 total(const ExactVectorSum& sum, double unit) const {
+    return {total(sum.x, unit), total(sum.y, unit), total(sum.z, unit)};
+  }
+  TANDEM_HD Vector3 sheet_normal() const;
+  TANDEM_HD bool gather_directions(int side);
+  TANDEM_HD void spread_along(const Vector3* directions, int count, Spread* spread) const;
+  TANDEM_HD Vector3 face_nearest(const Vector3& smooth);
+  TANDEM_HD bool find_for_touch(Vector3& n);
+  TANDEM_HD bool find_crossing_edges(Vector3& n) const;
+  TANDEM_HD Vector3 crossing_edges(const Piece& piece, int number) const;
+  TANDEM_HD static bool same_direction(const Vector3& p, const Vector3& q) { return dot(p, q) > 1 - 1e-7; }
+
+  const Team& team_;
+  const BodyPair& bodies_;
+  const PieceMemory& memory_;
+  const PieceSummary& summary_;
+  std::uint32_t begin_, end_;
+  Direction direction_[kMost];  // of faces of a, then of b
+  int directions_ = 0;
+};
+
+template <typename Team>
+TANDEM_HD CurveMeasure NormalFinder<Team>::measure() {
+  const double unit = summary_.unit, one_by_unit = 1 / unit;
+  const bool may_be_free = !summary_.degenerate && !(bodies_.a.shape->closed && bodies_.b.shape->closed);
+  ExactVectorSum area, gap, middle, plain_middle;
+  ExactSum length;
+  std::uint64_t key = ~std::uint64_t{0};
+  bool is_free = false;
+  for_each_piece([&](const Piece& piece, const float*) {
+    key = piece.key() < key ? piece.key() : key;
+    const Vector3 from = piece.end[0] - summary_.origin;
+    if (piece.kind() == MeetingKind::polygon) {
+      area.add(piece.end[1], one_by_unit * one_by_unit);
+      plain_middle.add(from, one_by_unit);
+      return;
+    }
+    const Vector3 along = piece.weight() * (piece.end[1] - piece.end[0]);
+    area.add(0.5 * cross(from, along), one_by_unit * one_by_unit);
+    gap.add(along, one_by_unit);
+    const double size = norm(along);
+    length.add(size, one_by_unit);
+    const Vector3 half_way = 0.5 * (from + (piece.end[1] - summary_.origin));
+    middle.add((size * one_by_unit) * half_way, one_by_unit);
+    plain_middle.add(half_way, one_by_unit);
+    for (int end = 0; end < 2 && may_be_free; ++end) {
+      const TriangleFeature f = piece.feature(end);
+      const std::uint32_t flags = bodies_[f.of_b].shape->topology[piece.triangle[f.of_b]].flags;
+      is_free = is_free || is_boundary(flags, f.number);
+    }
+  });
+  CurveMeasure out;
+  out.key = team_.least(key);
+  out.area = total(area, unit * unit);
+  out.length = total(length, unit);
+  const Vector3 residual = total(gap, unit);
+  out.closed = !team_.any(is_free) && norm(residual) <= kClosed * out.length;
+  out.middle = summary_.origin + (out.length > 0 ? (unit / out.length) * total(middle, unit)
+                                                 : (1.0 / (end_ - begin_)) * total(plain_middle, unit));
+  if (!out.closed) out.sheet_normal = sheet_normal();
+  return out;
+}
+
+template <typename Team>
+TANDEM_HD Vector3 NormalFinder<Team>::sheet_normal() const {
+  const bool sheet_a = !bodies_.a.shape->closed, sheet_b = !bodies_.b.shape->closed;
+  const double unit = summary_.unit, one_by_unit = 1 / unit;
+  ExactVectorSum sum;
+  for_each_piece([&](const Piece& piece, const float* normals) {
+    if (piece.kind() == MeetingKind::polygon) return;
+    const double size = norm(piece.weight() * (piece.end[1] - piece.end[0]));
+    if (sheet_a || !sheet_b) sum.add(size * Vector3{normals[0], normals[1], normals[2]}, one_by_unit);
+    if (sheet_b || !sheet_a) sum.add(-(size * Vector3{normals[3], normals[4], normals[5]}), one_by_unit);
+  });
+  return total(sum, unit);
+}
+
+/// Adds the directions of faces of one body, from the least piece on. False where there are more than
+/// kMostDirections. Normals closer than half a milliradian are one.
+template <typename Team>
+TANDEM_HD bool NormalFinder<Team>::gather_directions(int side) {
+  const int first = directions_;
+  FloatVector known[kMostDirections];
+  for (;;) {
+    std::uint64_t key = ~std::uint64_t{0};
+    for_each_piece([&](const Piece& piece, const float* normals) {
+      const float* n = normals + 3 * side;
+      for (int i = 0; i < directions_ - first; ++i) {
+        const float x = n[0] - known[i].x[0], y = n[1] - known[i].x[1], z = n[2] - known[i].x[2];
+        if (x * x + y * y + z * z < 2e-7f) return;
+      }
+      key = piece.key() < key ? piece.key() : key;
+    });
+    key = team_.least(key);
+    if (key == ~std::uint64_t{0}) return true;
+    if (directions_ - first == kMostDirections) return false;
+    const auto triangle = static_cast<std::uint32_t>(side == 0 ? key >> 32 : key);
+    const WorldTriangle t = bodies_[side].triangle(triangle);
+    known[directions_ - first] = {
+        {static_cast<float>(t.normal.x), static_cast<float>(t.normal.y), static_cast<float>(t.normal.z)}};
+    direction_[directions_++] = {side == 0 ? t.normal : -t.normal, key, {}};
+  }
+}
+
+/// The heights of the patch's triangles along directions, from the patch's origin on: a's highest corner and
+/// b's lowest.
+template <typename Team>
+TANDEM_HD void NormalFinder<Team>::spread_along(const Vector3* directions, int count, Spread* spread) const {
+  for (int i = 0; i < count; ++i) spread[i] = {-INFINITY, INFINITY};
+  for_each_piece([&](const Piece& piece, const float*) {
+    for (int k = 0; k < 3; ++k) {
+      const Vector3 p = bodies_.a.corner(piece.triangle[0], k) - summary_.origin,
+                    q = bodies_.b.corner(piece.triangle[1], k) - summary_.origin;
+      for (int i = 0; i < count; ++i) {
+        spread[i].highest_a = std::fmax(spread[i].highest_a, dot(directions[i], p));
+        spread[i].lowest_b = std::fmin(spread[i].lowest_b, dot(directions[i], q));
+      }
+    }
+  });
+  for (int i = 0; i < count; ++i) {
+    spread[i] = {team_.greatest(spread[i].highest_a), team_.least(spread[i].lowest_b)};
+  }
+}
+
+/// Where few flat faces meet, as boxes do, the curve's own normal leans a little, by depth over length: along
+/// the face normal that separates the patch's triangles soonest they stay upright. How far b must move until
+/// a plane lies between all of the triangles counts, not how deep the overlap is: the tip of a pyramid in the
+/// ground is narrower than it is deep, yet the ground goes on.
+template <typename Team>
+TANDEM_HD Vector3 NormalFinder<Team>::face_nearest(const Vector3& smooth) {
+  directions_ = 0;
+  if (!gather_directions(0) || !gather_directions(1)) return smooth;
+  const Vector3 apart = bodies_.apart();
+  Vector3 tried[kMost] = {smooth};
+  int count = 1;
+  for (int i = 0; i < directions_; ++i) {
+    const Vector3& n = direction_[i].n;
+    const double cosine = dot(n, smooth);
+    if (cosine < 0.1 && (cosine < -0.1 || !(dot(n, apart) > 0))) continue;
+    tried[count++] = n;
+  }
+  if (count == 1) return smooth;
+  Spread spread[kMost];
+  spread_along(tried, count, spread);
+  Vector3 best = smooth;
+  double least = (spread[0].highest_a - spread[0].lowest_b) * (1 + 1e-9);
+  for (int i = 1; i < count; ++i) {
+    const double separation = spread[i].highest_a - spread[i].lowest_b;
+    if (separation < least) best = tried[i], least = separation * (1 - 1e-9);
+  }
+  return best;
+}
+
+template <typename Team>
+TANDEM_HD Vector3 NormalFinder<Team>::crossing_edges(const Piece& piece, int number) const {
+  const int i = number / 6, j = number / 2 % 3;
+  const Vector3 e = bodies_.a.corner(piece.triangle[0], (i + 1) % 3) - bodies_.a.corner(piece.triangle[0], i),
+                f = bodies_.b.corner(piece.triangle[1], (j + 1) % 3) - bodies_.b.corner(piece.triangle[1], j);
+  const Vector3 n = cross(e, f);
+  const double length = norm(n);
+  if (!(length > 1e-6 * norm(e) * norm(f))) return {};
+  return ((number % 2 == 0 ? 1 : -1) / length) * n;
+}
+
+/// The one direction across an edge of each body that separates all triangles of the patch.
+template <typename Team>
+TANDEM_HD bool NormalFinder<Team>::find_crossing_edges(Vector3& n) const {
+  constexpr std::uint32_t kMostPieces = 16, kDirections = 18;  // each of 3 x 3 edges, both ways
+  if (end_ - begin_ > kMostPieces) return false;
+  const double tolerance = kNoArea * bodies_.reach();
+  const auto separates = [&](const Vector3& direction, const Vector3& x) {
+    for (std::uint32_t i = begin_; i < end_; ++i) {
+      const Piece& piece = memory_.pieces[memory_.order[i]];
+      for (int k = 0; k < 3; ++k) {
+        if (!(dot(direction, bodies_.a.corner(piece.triangle[0], k) - x) <= tolerance)) return false;
+        if (!(dot(direction, bodies_.b.corner(piece.triangle[1], k) - x) >= -tolerance)) return false;
+      }
+    }
+    return true;
+  };
+  const std::uint32_t tries = kDirections * (end_ - begin_);
+  std::uint64_t key = ~std::uint64_t{0};
+  bool found = false;
+  for (std::uint32_t at = team_.rank(); at < tries; at += team_.size()) {
+    const Piece& piece = memory_.pieces[memory_.order[begin_ + at / kDirections]];
+    const Vector3 direction = crossing_edges(piece, static_cast<int>(at % kDirections));
+    if (dot(direction, direction) == 0 || !separates(direction, piece.end[0])) continue;
+    found = true;
+    key = piece.key() < key ? piece.key() : key;
+  }
+  key = team_.least(key);
+  if (!team_.any(found)) return false;
+  // Of the least piece the first direction counts, if no other piece has another one.
+  std::uint32_t first = kDirections;
+  for (std::uint32_t at = team_.rank(); at < tries; at += team_.size()) {
+    const Piece& piece = memory_.pieces[memory_.order[begin_ + at / kDirections]];
+    if (piece.key() != key) continue;
+    const Vector3 direction = crossing_edges(piece, static_cast<int>(at % kDirections));
+    if (dot(direction, direction) == 0 || !separates(direction, piece.end[0])) continue;
+    first = at % kDirections < first ? at % kDirections : first;
+  }
+  first = team_.least(first);
+  for (std::uint32_t i = begin_; i < end_; ++i) {
+    const Piece& piece = memory_.pieces[memory_.order[i]];
+    if (piece.key() == key) n = crossing_edges(piece, static_cast<int>(first));
+  }
+  bool other = false;
+  for (std::uint32_t at = team_.rank(); at < tries; at += team_.size()) {
+    const Piece& piece = memory_.pieces[memory_.order[begin_ + at / kDirections]];
+    const Vector3 direction = crossing_edges(piece, static_cast<int>(at % kDirections));
+    if (dot(direction, direction) == 0 || same_direction(direction, n)) continue;
+    other = other || separates(direction, piece.end[0]);
+  }
+  return !team_.any(other);
+}
+
+/// The one direction, of faces there and else of crossings of edges, that has all of a's triangles there on
+/// one side and b's on the other. Where several do, corners or edges lie on each other: nothing to lean on.
+template <typename Team>
+TANDEM_HD bool NormalFinder<Team>::find_for_touch(Vector3& n) {
+  directions_ = 0;
+  gather_directions(0);
+  gather_directions(1);
+  Vector3 tried[kMost], at[kMost];
+  for (int i = 0; i < directions_; ++i) tried[i] = direction_[i].n, at[i] = {};
+  // Each direction's plane goes through the piece that has it.
+  for (int i = 0; i < directions_; ++i) {
+    Vector3 x = {-INFINITY, -INFINITY, -INFINITY};
+    for_each_piece([&](const Piece& piece, const float*) {
+      if (piece.key() == direction_[i].piece) x = piece.end[0];
+    });
+    at[i] = {team_.greatest(x.x), team_.greatest(x.y), team_.greatest(x.z)};
+  }
+  Spread spread[kMost];
+  spread_along(tried, directions_, spread);
+  const double tolerance = kNoArea * bodies_.reach();
+  int found = 0;
+  for (int i = 0; i < directions_; ++i) {
+    const double height = dot(tried[i], at[i] - summary_.origin);
+    if (!(spread[i].highest_a - height <= tolerance && spread[i].lowest_b - height >= -tolerance)) continue;
+    if (found > 0 && same_direction(n, tried[i])) continue;
+    if (found == 0) n = tried[i];
+    ++found;
+  }
+  return found == 0 ? find_crossing_edges(n) : found == 1;
+}
+
+template <typename Team>
+TANDEM_HD PatchNormal NormalFinder<Team>::find(const CurveMeasure& curve) {
+  PatchNormal out;
+  out.touch = !(curve.closed ? norm(curve.area) > kNoArea * bodies_.reach() * curve.length
+                             : norm(curve.sheet_normal) > kNoArea * curve.length);
+  if (out.touch) {
+    out.known = find_for_touch(out.n);
+  } else {
+    out.n = face_nearest(normalized(curve.closed ? curve.area : curve.sheet_normal));
+    out.known = true;
+  }
+  return out;
+}
+
+}  // namespace tandem::manifold

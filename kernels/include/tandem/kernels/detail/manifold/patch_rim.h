@@ -1,0 +1,255 @@
+#pragma once
+#include "tandem/kernels/detail/manifold/patch.h"
+
+namespace tandem::manifold {
+
+/// A corner of the rim that adds less than this part to its area is left out; and of a rim of two corners one
+/// that adds less than this part of their distance's square.
+inline constexpr float kLittle = 1e-4f, kThin = 1e-5f;
+
+/// The candidates of a patch: the ends and corners of its pieces, seen along its normal.
+template <typename Team>
+class RimFinder {
+ public:
+  TANDEM_HD RimFinder(const Team& team, const BodyPair& bodies, const PieceMemory& memory,
+                      const PieceSummary& summary, std::uint32_t curve, const PatchFrame& frame)
+      : team_(team),
+        bodies_(bodies),
+        memory_(memory),
+        summary_(summary),
+        begin_(memory.start[curve]),
+        end_(memory.start[curve + 1]),
+        frame_(frame) {}
+
+  /// Writes down the candidates. each_end_twice: pieces share their ends, so one of each will do. next: a
+  /// number that all of the team see.
+  TANDEM_HD void gather(bool each_end_twice, std::uint32_t& next);
+
+  /// The middle of the area within the curve, in the plane; false where it has none. Condition: gather().
+  TANDEM_HD bool middle_of_area(Vector2& middle) const;
+
+  /// Starts with the candidates furthest from each other, or nearly, and takes in again and again the one
+  /// that adds most to the area.
+  TANDEM_HD Rim find(int most, const Vector2& middle) const;
+
+  TANDEM_HD Vector3 position(std::uint32_t reference) const;
+  TANDEM_HD std::uint64_t feature(std::uint32_t reference) const;
+  TANDEM_HD const Piece& piece(std::uint32_t reference) const { return memory_.pieces[reference / 8]; }
+
+  /// The least feature of candidates closer than `distance` to a point, or `feature` if that is less.
+  TANDEM_HD std::uint64_t least_feature_near(const Vector2& at, double distance, std::uint64_t feature) const;
+
+ private:
+  TANDEM_HD Candidate* candidates() const { return reinterpret_cast<Candidate*>(memory_.table); }
+  TANDEM_HD void corners_of(const Piece& piece, Meeting& meeting) const {
+    meet(bodies_.a.triangle(piece.triangle[0]), bodies_.b.triangle(piece.triangle[1]), bodies_.tolerance(),
+         meeting);
+  }
+  TANDEM_HD std::uint64_t key(std::uint32_t reference) const {
+    const Piece& p = piece(reference);
+    return std::uint64_t{p.triangle[0]} << 33 | std::uint64_t{p.triangle[1]} << 3 | (reference & 7u);
+  }
+  TANDEM_HD void add(const Vector3& x, std::uint32_t reference, std::uint32_t& next) {
+    const Vector2 at = frame_.flat(x);
+    candidates()[team_.add(next, 1)] = {static_cast<float>(at.x), static_cast<float>(at.y), reference};
+  }
+  template <typename Value>
+  TANDEM_HD std::uint32_t furthest(const Value& value, float more_than, float& greatest) const;
+
+  const Team& team_;
+  const BodyPair& bodies_;
+  const PieceMemory& memory_;
+  const PieceSummary& summary_;
+  std::uint32_t begin_, end_;
+  const PatchFrame& frame_;
+  std::uint32_t count_ = 0;
+  ExactSum twice_area_, moment_x_, moment_y_;
+};
+
+template <typename Team>
+TANDEM_HD void RimFinder<Team>::gather(bool each_end_twice, std::uint32_t& next) {
+  const double one_by_unit = 1 / summary_.unit;
+  const auto add_moments = [&](double twice_area, const Vector2& three_middles) {
+    twice_area_.add(twice_area, one_by_unit * one_by_unit);
+    const double area_in_units = twice_area * one_by_unit * one_by_unit / 3;
+    moment_x_.add(area_in_units * three_middles.x, one_by_unit);
+    moment_y_.add(area_in_units * three_middles.y, one_by_unit);
+  };
+  if (team_.rank() == 0) team_.store(next, 0);
+  team_.sync();
+  Meeting meeting;
+  for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
+    const std::uint32_t at = memory_.order[i];
+    const Piece& piece = memory_.pieces[at];
+    if (piece.kind() == MeetingKind::polygon) {
+      if (!piece.facing()) continue;
+      corners_of(piece, meeting);
+      for (int k = 0; k < meeting.corners; ++k) {
+        add(meeting.corner[k], at * 8 + 2 + static_cast<std::uint32_t>(k), next);
+      }
+      // Half of the polygon: the segments around it have the rest.
+      Vector2 corner[kMostCorners], sum;
+      double twice_area = 0;
+      for (int k = 0; k < meeting.corners; ++k) corner[k] = frame_.flat(meeting.corner[k]);
+      for (int k = 1; k + 1 < meeting.corners; ++k) {
+        const double part = std::fabs(cross(corner[k] - corner[0], corner[k + 1] - corner[0]));
+        twice_area += part;
+        sum = sum + part * (corner[0] + corner[k] + corner[k + 1]);
+      }
+      if (twice_area > 0) add_moments(twice_area / 2, (1 / twice_area) * sum);
+      continue;
+    }
+    for (std::uint32_t end = 0; end < (each_end_twice ? 1u : 2u); ++end) add(piece.end[end], at * 8 + end, next);
+    const Vector2 x = frame_.flat(piece.end[0]), y = frame_.flat(piece.end[1]);
+    add_moments(piece.weight() * cross(x, y), x + y);
+  }
+  team_.sync();
+  count_ = team_.load(next);
+  twice_area_ = {team_.sum(twice_area_.upper), team_.sum(twice_area_.lower)};
+  moment_x_ = {team_.sum(moment_x_.upper), team_.sum(moment_x_.lower)};
+  moment_y_ = {team_.sum(moment_y_.upper), team_.sum(moment_y_.lower)};
+}
+
+template <typename Team>
+TANDEM_HD bool RimFinder<Team>::middle_of_area(Vector2& middle) const {
+  const double unit = summary_.unit, twice_area = twice_area_.value(unit * unit);
+  if (!(twice_area > 0x1p-30 * (unit * unit))) return false;
+  const double by_area = unit * unit / twice_area;
+  middle = {by_area * moment_x_.value(unit), by_area * moment_y_.value(unit)};
+  return true;
+}
+
+/// The candidate of the greatest value above a limit; of several the one whose triangles come first.
+template <typename Team>
+template <typename Value>
+TANDEM_HD std::uint32_t RimFinder<Team>::furthest(const Value& value, float more_than, float& greatest) const {
+  float best = more_than;
+  std::uint64_t best_key = ~std::uint64_t{0};
+  std::uint32_t best_reference = kNoIndex;
+  for (std::uint32_t i = team_.rank(); i < count_; i += team_.size()) {
+    const Candidate& c = candidates()[i];
+    const float of_c = value(c);
+    if (!(of_c >= best) || (of_c == best && best_reference == kNoIndex)) continue;
+    if (of_c == best) {
+      const std::uint64_t of_same = key(c.reference);
+      if (best_key == ~std::uint64_t{0}) best_key = key(best_reference);
+      if (of_same >= best_key) continue;
+      best_key = of_same;
+    } else {
+      best_key = ~std::uint64_t{0};
+    }
+    best = of_c, best_reference = c.reference;
+  }
+  greatest = team_.greatest(best);
+  const bool mine = best_reference != kNoIndex && best == greatest;
+  if (Team::size() == 1) return best_reference;
+  const std::uint64_t own = mine ? key(best_reference) : ~std::uint64_t{0};
+  const std::uint64_t least = team_.least(own);
+  return team_.least(mine && own == least ? best_reference : kNoIndex);
+}
+
+template <typename Team>
+TANDEM_HD Rim RimFinder<Team>::find(int most, const Vector2& middle) const {
+  Rim rim;
+  float greatest = 0;
+  const auto place = [&](std::uint32_t reference) {
+    const Vector2 at = frame_.flat(position(reference));
+    return FloatPoint{static_cast<float>(at.x), static_cast<float>(at.y)};
+  };
+  const auto insert = [&](int where, std::uint32_t reference) {
+    for (int i = rim.points++; i > where; --i) {
+      rim.reference[i] = rim.reference[i - 1], rim.at[i] = rim.at[i - 1];
+    }
+    rim.reference[where] = reference, rim.at[where] = place(reference);
+  };
+  const auto from = [&](const FloatPoint& p) {
+    return [p](const Candidate& c) { return (c.x - p.x) * (c.x - p.x) + (c.y - p.y) * (c.y - p.y); };
+  };
+  const FloatPoint start = {static_cast<float>(middle.x), static_cast<float>(middle.y)};
+  std::uint32_t reference = furthest(from(start), -1.0f, greatest);
+  if (reference == kNoIndex) return rim;
+  insert(0, reference);
+  if (most < 2 || (reference = furthest(from(rim.at[0]), 0.0f, greatest)) == kNoIndex) return rim;
+  insert(1, reference);
+  if (most < 3) return rim;
+  const auto twice_area = [](const FloatPoint& p, const FloatPoint& q, float x, float y) {
+    return (q.x - p.x) * (y - p.y) - (q.y - p.y) * (x - p.x);
+  };
+  const float length_squared = greatest;
+  const FloatPoint p = rim.at[0], q = rim.at[1];
+  reference = furthest([&](const Candidate& c) { return std::fabs(twice_area(p, q, c.x, c.y)); },
+                       kThin * length_squared, greatest);
+  if (reference == kNoIndex) return rim;
+  const FloatPoint third = place(reference);
+  insert(twice_area(p, q, third.x, third.y) > 0 ? 2 : 1, reference);
+  float area = greatest;
+  while (rim.points < most) {
+    // What a candidate adds beyond the side that it lies furthest beyond.
+    const auto gain = [&](const Candidate& c) {
+      float least = 0;
+      for (int i = 0; i < rim.points; ++i) {
+        const float beyond = twice_area(rim.at[i], rim.at[i + 1 == rim.points ? 0 : i + 1], c.x, c.y);
+        least = beyond < least ? beyond : least;
+      }
+      return -least;
+    };
+    reference = furthest(gain, kLittle * area, greatest);
+    if (reference == kNoIndex) return rim;
+    area += greatest;
+    const FloatPoint x = place(reference);
+    int side = 0;
+    float least = 0;
+    for (int i = 0; i < rim.points; ++i) {
+      const float beyond = twice_area(rim.at[i], rim.at[i + 1 == rim.points ? 0 : i + 1], x.x, x.y);
+      if (beyond < least) least = beyond, side = i;
+    }
+    insert(side + 1, reference);
+  }
+  return rim;
+}
+
+template <typename Team>
+TANDEM_HD Vector3 RimFinder<Team>::position(std::uint32_t reference) const {
+  const Piece& of = piece(reference);
+  const std::uint32_t number = reference & 7u;
+  if (number < 2) return of.end[number];
+  Meeting meeting;
+  corners_of(of, meeting);
+  return meeting.corner[number - 2];
+}
+
+TANDEM_HD inline std::uint64_t feature_hash(std::uint64_t x, std::uint64_t y) {
+  const std::uint64_t hash = mixed(mixed(x + 0x9E3779B97F4A7C15u) ^ y);
+  return hash == 0 ? 1 : hash;
+}
+
+/// What a candidate is called: by the edge or vertex of one body and the triangle of the other that meet there.
+template <typename Team>
+TANDEM_HD std::uint64_t RimFinder<Team>::feature(std::uint32_t reference) const {
+  const Piece& of = piece(reference);
+  const std::uint32_t number = reference & 7u;
+  if (number >= 2) return feature_hash(of.key(), 6 + number);
+  const TriangleFeature f = of.feature(static_cast<int>(number));
+  const int side = f.of_b != 0 ? 1 : 0;
+  const TriangleTopology& own = bodies_[side].shape->topology[of.triangle[side]];
+  const std::uint64_t part = f.is_corner != 0 ? own.vertex[f.number] : edge_key(own, f.number);
+  return feature_hash(mixed(part + 1) ^ of.triangle[1 - side],
+                      (f.of_b != 0 ? 2u : 0u) + (f.is_corner != 0 ? 1u : 0u));
+}
+
+template <typename Team>
+TANDEM_HD std::uint64_t RimFinder<Team>::least_feature_near(const Vector2& at, double distance,
+                                                            std::uint64_t feature_of_point) const {
+  std::uint64_t least = feature_of_point;
+  const auto x = static_cast<float>(at.x), y = static_cast<float>(at.y);
+  const auto square = static_cast<float>(distance * distance);
+  for (std::uint32_t i = team_.rank(); i < count_; i += team_.size()) {
+    const Candidate& c = candidates()[i];
+    if (!((c.x - x) * (c.x - x) + (c.y - y) * (c.y - y) < square)) continue;
+    const std::uint64_t of_c = feature(c.reference);
+    least = of_c < least ? of_c : least;
+  }
+  return team_.least(least);
+}
+
+}  // namespace tandem::manifold

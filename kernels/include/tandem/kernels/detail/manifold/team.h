@@ -1,0 +1,47 @@
+#pragma once
+#include <cstdint>
+
+#include "tandem/formats/platform.h"
+
+namespace tandem::manifold {
+
+/// Those who make the manifolds of an object pair together: one thread of a CPU here, a warp or a thread
+/// block on a GPU (kernels/cuda/src/manifold_team.cuh). Each takes every size()-th thing from rank() on. What
+/// they find together must not depend on how many they are nor on who comes first.
+struct OneThread {
+  static std::uint32_t rank() { return 0; }
+  static std::uint32_t size() { return 1; }
+
+  /// What all have written to memory is seen by all.
+  static void sync() {}
+
+  template <typename T>
+  static T sum(T value) {
+    return value;
+  }
+  template <typename T>
+  static T least(T value) {
+    return value;
+  }
+  template <typename T>
+  static T greatest(T value) {
+    return value;
+  }
+  static bool any(bool value) { return value; }
+
+  /// On memory that all see.
+  static std::uint32_t load(const std::uint32_t& at) { return at; }
+  static void store(std::uint32_t& at, std::uint32_t value) { at = value; }
+  static std::uint32_t add(std::uint32_t& at, std::uint32_t value) {
+    const std::uint32_t before = at;
+    at += value;
+    return before;
+  }
+  static std::uint32_t compare_and_swap(std::uint32_t& at, std::uint32_t expected, std::uint32_t value) {
+    const std::uint32_t before = at;
+    if (before == expected) at = value;
+    return before;
+  }
+};
+
+}  // namespace tandem::manifold

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "check_oriented.h"
+#include "check_topology.h"
 #include "check_tree.h"
 #include "tandem/formats/hash.h"
 
@@ -61,13 +62,18 @@ std::uint64_t element_bytes(SectionKind kind) {
       return 1;
     case SectionKind::oriented_blocks:
       return sizeof(OrientedBlock);
+    case SectionKind::topology:
+      return sizeof(TriangleTopology);
+    case SectionKind::components:
+      return sizeof(SurfaceComponent);
   }
   return 0;
 }
 
 bool belongs_to_level(SectionKind kind) {
   return kind == SectionKind::blocks || kind == SectionKind::triangles ||
-         kind == SectionKind::oriented_blocks;
+         kind == SectionKind::oriented_blocks || kind == SectionKind::topology ||
+         kind == SectionKind::components;
 }
 
 Status check_section(const Section& section, const FileHeader& header) {
@@ -122,6 +128,16 @@ std::span<const Element> elements(const unsigned char* data, std::span<const Sec
   return {};
 }
 
+// Whether the counts of a level's topology agree, or all say that there is none.
+bool has_sound_topology(const Level& level, std::span<const TriangleTopology> topology,
+                        std::span<const SurfaceComponent> components) {
+  if (topology.data() == nullptr)
+    return components.data() == nullptr && level.vertex_count == 0 && level.flags == 0;
+  return topology.size() == level.triangle_count && topology.size() < kMostTopologyTriangles &&
+         !components.empty() && components.size() <= topology.size() && level.vertex_count >= 1 &&
+         level.vertex_count <= 3 * topology.size() && level.flags <= kClosedLevel;
+}
+
 CheckResult check_levels(const unsigned char* data, const FileHeader& header,
                          std::span<const Section> sections, std::span<const Level> levels) {
   if (levels.empty()) return {Status::kSectionMissing, 0, {}};
@@ -131,13 +147,15 @@ CheckResult check_levels(const unsigned char* data, const FileHeader& header,
     const auto blocks = elements<Block>(data, sections, SectionKind::blocks, i);
     const auto triangles = elements<Triangle>(data, sections, SectionKind::triangles, i);
     const auto oriented = elements<OrientedBlock>(data, sections, SectionKind::oriented_blocks, i);
+    const auto topology = elements<TriangleTopology>(data, sections, SectionKind::topology, i);
+    const auto components = elements<SurfaceComponent>(data, sections, SectionKind::components, i);
     if (blocks.empty() || triangles.empty()) return {Status::kSectionMissing, i, {}};
     const double least_error = i == 0 ? 0 : levels[i - 1].error_bound;
     bool sound = blocks.size() == level.block_count && triangles.size() == level.triangle_count;
-    sound = sound && all_zero(level.reserved, level.reserved + sizeof level.reserved);
     sound = sound && level.leaf_block_count <= level.block_count && level.triangle_count < kNoIndex;
     sound = sound && (oriented.data() == nullptr ||
                       (oriented.size() == blocks.size() && triangles.size() < kMostOrientedTriangles));
+    sound = sound && has_sound_topology(level, topology, components);
     sound = sound && std::isfinite(level.error_bound) && level.error_bound >= least_error;
     sound = sound && (i > 0 || level.error_bound == 0);
     if (!sound) return {Status::kBadLevel, i, {}};
@@ -211,6 +229,8 @@ CheckResult check(const void* data_pointer, std::size_t bytes, CheckDepth depth)
     step = check_tree(level, header.source_faces, asset.parts);
     if (step.status == Status::kOk && level.oriented_blocks != nullptr)
       step = check_oriented_blocks(level, depth);
+    if (step.status == Status::kOk && level.topology != nullptr)
+      step = check_topology(level, depth, header.hash);
   }
   if (step.status == Status::kOk) step.status = check_bounds(header, asset.level(0));
   return step.status == Status::kOk ? result : step;

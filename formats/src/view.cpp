@@ -13,12 +13,20 @@ LevelView AssetView::level(std::uint32_t i) const {
       view.triangles = reinterpret_cast<const Triangle*>(base + section.offset);
     if (section.kind == SectionKind::oriented_blocks)
       view.oriented_blocks = reinterpret_cast<const OrientedBlock*>(base + section.offset);
+    if (section.kind == SectionKind::topology)
+      view.topology = reinterpret_cast<const TriangleTopology*>(base + section.offset);
+    if (section.kind == SectionKind::components) {
+      view.components = reinterpret_cast<const SurfaceComponent*>(base + section.offset);
+      view.component_count = static_cast<std::uint32_t>(section.count);
+    }
   }
   const Level& level = levels[i];
   view.block_count = level.block_count;
   view.triangle_count = level.triangle_count;
   view.leaf_block_count = level.leaf_block_count;
   view.depth = level.depth;
+  view.vertex_count = level.vertex_count;
+  view.closed = (level.flags & kClosedLevel) != 0;
   view.error_bound = level.error_bound;
   return view;
 }

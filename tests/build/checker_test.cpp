@@ -219,7 +219,7 @@ const Attack kLevelAttacks[] = {
     {"depth", Status::kDepthMismatch, [](Bytes& f) { ++f.level().depth; }},
     {"error bound of level 0", Status::kBadLevel, [](Bytes& f) { f.level().error_bound = 1; }},
     {"error bound NaN", Status::kBadLevel, [](Bytes& f) { f.level().error_bound = std::nan(""); }},
-    {"reserved", Status::kBadLevel, [](Bytes& f) { f.level().reserved[0] = 1; }},
+    {"an unknown flag", Status::kBadLevel, [](Bytes& f) { f.level().flags |= 2; }},
     {"part name", Status::kBadPart,
      [](Bytes& f) { f.elements<Part>(SectionKind::parts)[0].name_bytes = 1000; }},
     {"part name overflow", Status::kBadPart,

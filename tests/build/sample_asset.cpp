@@ -43,7 +43,8 @@ build::Image make_file(const Mesh& mesh, const build::Tree& tree, build::Effort 
   source.parts = parts;
   source.provenance = "{\"tool\":\"test\"}";
   const auto oriented_blocks = build::orient_blocks(mesh.geometry(), tree, effort);
-  const build::AssetLevel level{mesh.geometry(), face, &tree, oriented_blocks, 0};
+  const build::SurfaceTopology topology = build::make_topology(mesh.geometry(), tree);
+  const build::AssetLevel level{mesh.geometry(), face, &tree, oriented_blocks, 0, &topology};
   return build::assemble(source, {&level, 1});
 }
 

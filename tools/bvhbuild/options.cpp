@@ -60,6 +60,9 @@ void add_options(CLI::App& app, Options& options, double& memory_gib, double& ex
   app.add_flag_callback(
       "--no-gpu-blocks", [&options] { options.gpu_blocks = false; },
       "leave out the oriented blocks, which exact queries on a GPU walk; the file is 29 % smaller");
+  app.add_flag_callback(
+      "--no-topology", [&options] { options.topology = false; },
+      "leave out how triangles hang together, which contact manifolds need: 16 bytes a triangle");
   app.add_flag("--strict", options.strict, "take anything dropped or found amiss in the mesh for an error");
   app.add_flag("--json", options.json, "print the report as JSON");
   app.add_flag("-q,--quiet", options.quiet, "print nothing but errors");

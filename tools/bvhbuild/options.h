@@ -15,6 +15,7 @@ struct Options {
   Imaginary imaginary = Imaginary::minimal;
   Effort effort = Effort::standard;
   bool gpu_blocks = true;  ///< the file gets oriented blocks
+  bool topology = true;    ///< the file gets topology
   ImportOptions import;
   bool strict = false;
   bool json = false;

@@ -3,6 +3,7 @@
 #include <oneapi/tbb/global_control.h>
 
 #include <chrono>
+#include <optional>
 #include <stdexcept>
 #include <thread>
 
@@ -12,6 +13,7 @@
 #include "bvhbuild/meshing/triangulate.h"
 #include "bvhbuild/tree/assemble.h"
 #include "bvhbuild/tree/oriented_blocks.h"
+#include "bvhbuild/tree/surface_topology.h"
 #include "common/number_words.h"
 #include "common/output_file.h"
 #include "common/printable.h"
@@ -126,7 +128,10 @@ Image build_image(const Options& options, const PolygonMesh& polygons, const Sto
   std::vector<OrientedBlock> oriented_blocks;
   if (options.gpu_blocks && geometry.triangles.size() < kMostOrientedTriangles)
     oriented_blocks = orient_blocks(geometry, tree, options.effort);
-  const AssetLevel level{geometry, mesh.face, &tree, oriented_blocks, 0};
+  std::optional<SurfaceTopology> topology;
+  if (options.topology && geometry.triangles.size() < kMostTopologyTriangles)
+    topology = make_topology(geometry, tree);
+  const AssetLevel level{geometry, mesh.face, &tree, oriented_blocks, 0, topology ? &*topology : nullptr};
   Image image = assemble(source, {&level, 1});
 
   const CheckResult checked = check(image.data(), image.size());
@@ -136,6 +141,7 @@ Image build_image(const Options& options, const PolygonMesh& polygons, const Sto
   const FileHeader& header = *checked.asset.header;
   outcome.tree = measure_tree(checked.asset.level(), header.lower, header.upper);
   outcome.gpu_blocks = checked.asset.level().oriented_blocks != nullptr;
+  outcome.topology = checked.asset.level().topology != nullptr;
   outcome.hash = hexadecimal(header.hash);
   outcome.file_bytes = header.file_bytes;
   return image;

@@ -27,6 +27,7 @@ struct Outcome {
   bool interrupted = false;  ///< Ctrl-C ended the optimisation; the tree is the best until then
   TreeStatistics tree;
   bool gpu_blocks = false;  ///< the file has oriented blocks
+  bool topology = false;    ///< the file has topology
   std::uint64_t file_bytes = 0;
   std::string hash;  ///< of the output, 16 hexadecimal digits
 

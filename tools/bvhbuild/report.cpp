@@ -54,6 +54,7 @@ void add_results(const Outcome& outcome, Json& json) {
   json["interrupted"] = outcome.interrupted;
   json["tree"] = to_json(outcome.tree);
   json["gpu_blocks"] = outcome.gpu_blocks;
+  json["topology"] = outcome.topology;
   json["bytes"] = outcome.file_bytes;
   json["hash"] = outcome.hash;
 }
@@ -79,6 +80,7 @@ std::string text_report(const Options& options, const Outcome& outcome) {
       << " nodes imaginary (minimum " << tree.imaginary_minimum << "), depth " << tree.depth << ", SAH cost "
       << number("%.2f", tree.sah_cost) << "\n";
   if (!outcome.gpu_blocks) out << "  note     no oriented blocks: exact queries on a GPU refuse the file\n";
+  if (!outcome.topology) out << "  note     no topology: contact manifolds refuse the file\n";
   if (outcome.interrupted) out << "  note     interrupted: this is the best tree until then\n";
   const Outcome::Seconds& s = outcome.seconds;
   out << "  took     import " << number("%.2f", s.import) << " s, clean " << number("%.2f", s.clean)

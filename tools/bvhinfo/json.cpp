@@ -21,6 +21,10 @@ const char* name(SectionKind kind) {
       return "provenance";
     case SectionKind::oriented_blocks:
       return "oriented_blocks";
+    case SectionKind::topology:
+      return "topology";
+    case SectionKind::components:
+      return "components";
   }
   return "unknown";
 }

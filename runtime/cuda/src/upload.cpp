@@ -14,11 +14,24 @@ const unsigned char* bytes_of(const AssetView& asset) {
   return reinterpret_cast<const unsigned char*>(asset.header);
 }
 
-// From the first section that exact queries need to the last. A checked file's sections ascend.
-Piece of_exact_queries(const AssetView& asset) {
+bool is_wanted(SectionKind kind, Contents contents) {
+  switch (kind) {
+    case SectionKind::triangles:
+    case SectionKind::oriented_blocks:
+      return true;
+    case SectionKind::topology:
+    case SectionKind::components:
+      return contents != Contents::exact_queries;
+    default:
+      return contents == Contents::all;
+  }
+}
+
+// From the first section that is wanted to the last. A checked file's sections ascend.
+Piece of_wanted(const AssetView& asset, Contents contents) {
   std::uint64_t begin = 0, end = 0;
   for (const Section& section : asset.sections) {
-    if (section.kind != SectionKind::triangles && section.kind != SectionKind::oriented_blocks) continue;
+    if (!is_wanted(section.kind, contents)) continue;
     if (end == 0) begin = section.offset;
     end = section.offset + section.bytes;
   }
@@ -26,8 +39,8 @@ Piece of_exact_queries(const AssetView& asset) {
 }
 
 Piece piece_of(const AssetView& asset, Contents contents) {
-  if (contents == Contents::exact_queries) return of_exact_queries(asset);
-  return {bytes_of(asset), asset.header->file_bytes, 0};
+  if (contents == Contents::all) return {bytes_of(asset), asset.header->file_bytes, 0};
+  return of_wanted(asset, contents);
 }
 
 // The same place of the copy of a piece; null where it is not in the piece.
@@ -40,9 +53,14 @@ const Element* relocate(const Element* element, const Piece& piece, const unsign
 }
 
 LevelView copied_level(LevelView level, const Piece& piece, Contents contents, const unsigned char* copy) {
-  level.triangles = relocate(level.triangles, piece, copy);
-  level.oriented_blocks = relocate(level.oriented_blocks, piece, copy);
-  level.blocks = contents == Contents::all ? relocate(level.blocks, piece, copy) : nullptr;
+  const auto copied = [&](auto*& elements, SectionKind kind) {
+    elements = is_wanted(kind, contents) ? relocate(elements, piece, copy) : nullptr;
+  };
+  copied(level.blocks, SectionKind::blocks);
+  copied(level.triangles, SectionKind::triangles);
+  copied(level.oriented_blocks, SectionKind::oriented_blocks);
+  copied(level.topology, SectionKind::topology);
+  copied(level.components, SectionKind::components);
   return level;
 }
 

@@ -102,17 +102,24 @@ void write_bounds(const AssetLevel& level, FileHeader& header) {
 }
 
 Plan plan_sections(const PartTable& table, const AssetSource& source, std::span<const AssetLevel> levels) {
-  std::size_t oriented = 0;
-  for (const AssetLevel& level : levels) oriented += !level.oriented_blocks.empty();
-  Plan plan(2 * levels.size() + oriented + 4);
+  std::size_t optional = 0;
+  for (const AssetLevel& level : levels)
+    optional += (level.oriented_blocks.empty() ? 0 : 1) + (level.topology == nullptr ? 0 : 2);
+  Plan plan(2 * levels.size() + optional + 4);
   plan.add(SectionKind::levels, 0, levels.size(), sizeof(Level));
   for (std::uint32_t i = 0; i < levels.size(); ++i)
     plan.add(SectionKind::blocks, i, levels[i].tree->blocks.size(), sizeof(Block));
-  // What exact queries on a GPU need lies together, for one copy.
+  // What exact queries on a GPU need lies together, for one copy, and behind it what manifolds need too.
   for (std::uint32_t i = 0; i < levels.size(); ++i) {
     plan.add(SectionKind::triangles, i, levels[i].geometry.triangles.size(), sizeof(Triangle));
     if (!levels[i].oriented_blocks.empty())
       plan.add(SectionKind::oriented_blocks, i, levels[i].oriented_blocks.size(), sizeof(OrientedBlock));
+  }
+  for (std::uint32_t i = 0; i < levels.size(); ++i) {
+    if (const SurfaceTopology* topology = levels[i].topology; topology != nullptr) {
+      plan.add(SectionKind::topology, i, topology->triangles.size(), sizeof(TriangleTopology));
+      plan.add(SectionKind::components, i, topology->components.size(), sizeof(SurfaceComponent));
+    }
   }
   plan.add(SectionKind::parts, 0, table.parts.size(), sizeof(Part));
   plan.add(SectionKind::strings, 0, table.strings.size(), 1);
@@ -143,6 +150,10 @@ Level make_level(const AssetLevel& level) {
   row.leaf_block_count = level.tree->leaf_block_count;
   row.depth = level.tree->depth;
   row.error_bound = level.error_bound;
+  if (level.topology != nullptr) {
+    row.vertex_count = level.topology->vertex_count;
+    row.flags = level.topology->closed ? kClosedLevel : 0;
+  }
   return row;
 }
 
@@ -186,6 +197,16 @@ Image assemble(const AssetSource& source, std::span<const AssetLevel> levels) {
       case SectionKind::oriented_blocks: {
         const std::span<const OrientedBlock> blocks = levels[section.level].oriented_blocks;
         fill(image, section, blocks.data(), blocks.size_bytes());
+        break;
+      }
+      case SectionKind::topology: {
+        const std::vector<TriangleTopology>& triangles = levels[section.level].topology->triangles;
+        fill(image, section, triangles.data(), triangles.size() * sizeof(TriangleTopology));
+        break;
+      }
+      case SectionKind::components: {
+        const std::vector<SurfaceComponent>& components = levels[section.level].topology->components;
+        fill(image, section, components.data(), components.size() * sizeof(SurfaceComponent));
         break;
       }
       case SectionKind::triangles:

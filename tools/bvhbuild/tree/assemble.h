@@ -7,6 +7,7 @@
 #include <string>
 
 #include "bvhbuild/meshing/polygon_mesh.h"
+#include "surface_topology.h"
 #include "tandem/formats/oriented_block.h"
 #include "tree.h"
 
@@ -19,6 +20,7 @@ struct AssetLevel {
   const Tree* tree = nullptr;
   std::span<const OrientedBlock> oriented_blocks;  ///< of the tree; may be empty
   double error_bound = 0;
+  const SurfaceTopology* topology = nullptr;  ///< of the tree, or null: the level has none
 };
 
 /// Everything else that a file holds.

@@ -13,7 +13,7 @@ inline constexpr std::uint16_t kVersionMajor = 1;
 inline constexpr std::uint16_t kVersionMinor = 0;
 inline constexpr std::uint64_t kSectionAlignment = 256;
 inline constexpr std::uint32_t kMaxLevels = 32;
-inline constexpr std::uint32_t kMaxSections = 3 * kMaxLevels + 8;
+inline constexpr std::uint32_t kMaxSections = 5 * kMaxLevels + 4;
 
 /// Bytes 0 to 127 of a file. The section table follows.
 ///
@@ -45,6 +45,8 @@ enum class SectionKind : std::uint32_t {
   strings = 5,          ///< UTF-8 bytes that parts refer to, one for the file
   provenance = 6,       ///< JSON, UTF-8, one for the file
   oriented_blocks = 7,  ///< OrientedBlock[], at most one for each level: what exact queries on a GPU walk
+  topology = 8,         ///< TriangleTopology[], at most one for each level: what contact manifolds need
+  components = 9,       ///< SurfaceComponent[], one for each level that has topology
 };
 
 /// One row of the section table.
@@ -66,9 +68,13 @@ struct Level {
   std::uint32_t depth;  ///< blocks from the root block to the deepest leaf block, both counted
   double error_bound;   ///< upper bound of the distance of the level's surface from level 0's; 0 for level 0,
                         ///< ascending
-  std::uint8_t reserved[8];  ///< zero
+  std::uint32_t vertex_count;  ///< different positions of corners; 0: the level has no topology
+  std::uint32_t flags;         ///< kClosedLevel or 0
 };
 static_assert(sizeof(Level) == 32);
+
+/// All components of the level are closed.
+inline constexpr std::uint32_t kClosedLevel = 1;
 
 /// A triangle, three float4, relative to the asset's origin. Triangles lie in leaf order, so those below a
 /// block are consecutive.

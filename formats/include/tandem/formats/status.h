@@ -54,6 +54,13 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kBadRotation,            ///< a rotation that is no quaternion of whole numbers in their range
     kBadOrientedBox,         ///< a box that is none, that reaches too far, or a size that is not the boxes'
     kTriangleOutsideOrientedBox,  ///< of a node above it
+    // The topology.
+    kBadTopology,     ///< a vertex out of range, an unknown flag set, or a component that is none
+    kVertexOrder,     ///< vertices are not numbered by first appearance
+    kVertexMismatch,  ///< corners of one vertex at different positions, or the other way round
+    kEdgeMismatch,    ///< a boundary or an edge of many triangles where there is none, or the other way round
+    kBadWinding,      ///< windings, once turned, disagree or are inside out where that can be known
+    kComponentMismatch,  ///< the components are not those of the triangles, or open where said to be closed
     // Querying.
     kOutOfRange,        ///< a coordinate that is NaN or larger than the query can take
     kUnknownAsset,      ///< an instance of an asset that the query was not given
@@ -64,6 +71,7 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kCannotStartThread,
     kNoOrientedBlocks,     ///< exact queries on a GPU need them, and the asset was given without
     kNoAxisAlignedBlocks,  ///< the other modes of queries on a GPU need them, and the asset was given without
+    kNoTopology,           ///< contact manifolds need it, and the file has none
     // On a GPU; status_of() of gpu_status.h names CUDA's errors.
     kNoGpu,            ///< none here, none that this process may use, or no driver
     kDriverTooOld,     ///< for the CUDA version that the program was built with

@@ -5,6 +5,7 @@
 
 #include "tandem/formats/file.h"
 #include "tandem/formats/oriented_block.h"
+#include "tandem/formats/topology.h"
 
 namespace tandem {
 
@@ -13,10 +14,15 @@ struct LevelView {
   const Block* blocks = nullptr;                   ///< block 0 is the root; the others follow depth first
   const Triangle* triangles = nullptr;             ///< in leaf order: those below a block are consecutive
   const OrientedBlock* oriented_blocks = nullptr;  ///< block_count of them, or null: the file has none
+  const TriangleTopology* topology = nullptr;      ///< triangle_count of them, or null: the file has none
+  const SurfaceComponent* components = nullptr;    ///< component_count of them; null where topology is
   std::uint32_t block_count = 0;
   std::uint32_t triangle_count = 0;
   std::uint32_t leaf_block_count = 0;
   std::uint32_t depth = 0;
+  std::uint32_t component_count = 0;
+  std::uint32_t vertex_count = 0;  ///< different positions of corners; 0 where there is no topology
+  bool closed = false;             ///< all components are; false where there is no topology
   double error_bound = 0;
 };
 

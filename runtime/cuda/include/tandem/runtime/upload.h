@@ -15,6 +15,7 @@ namespace tandem {
 enum class Contents : std::uint8_t {
   all,            ///< the file as it is
   exact_queries,  ///< triangles and oriented blocks: what queries of mode exact take, a third less
+  manifolds,      ///< these and topology: what contact manifolds take besides
 };
 
 /// Owns copies of assets in GPU memory: one allocation for all, the files' bytes as they are, each file from
@@ -29,9 +30,9 @@ class DeviceAssets {
 
   /// Allocates on the current device, copies on `stream`, and returns when all is there and `stream` is done
   /// with what it held; what was uploaded before is freed. From 128 MiB on it copies by up to eight threads
-  /// of its own, which pin 4 MiB of CPU memory each meanwhile. Of Contents::exact_queries the copy of a file
-  /// reaches from the first section that is wanted to the last; files by bvhbuild have nothing else between
-  /// them.
+  /// of its own, which pin 4 MiB of CPU memory each meanwhile. Unless it is Contents::all the copy of a
+  /// file reaches from the first section that is wanted to the last; files by bvhbuild have nothing else
+  /// between them.
   /// Result: kOk, kOutOfGpuMemory, kOutOfMemory, or another that status_of() of gpu_status.h names: kNoGpu,
   /// kDriverTooOld, kGpuNotSupported, kCudaFailed; then nothing is held, and cuda_error() tells more.
   /// Condition: the assets are checked ones. Their bytes may be pageable (mapped files), and need not stay.

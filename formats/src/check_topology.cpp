@@ -1,0 +1,354 @@
+#include "check_topology.h"
+
+#include <algorithm>
+#include <bit>
+#include <memory>
+#include <new>
+
+#include "tandem/formats/enclosed_volume.h"
+
+namespace tandem {
+namespace {
+
+template <typename Element>
+using Array = std::unique_ptr<Element[]>;
+
+// Zeros, or null where there is not enough memory.
+template <typename Element>
+Array<Element> zeros(std::size_t count) {
+  return Array<Element>(new (std::nothrow) Element[count]());
+}
+
+bool same_position(const float* p, const float* q) {
+  return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
+}
+
+// Of positions that are the same, -0 being 0, the same number.
+std::uint64_t hash(const float* position, std::uint64_t seed) {
+  for (int k = 0; k < 3; ++k) {
+    seed = (seed ^ std::bit_cast<std::uint32_t>(position[k] + 0.0f)) * 0x9e3779b97f4a7c15u;
+    seed ^= seed >> 32;
+  }
+  return seed;
+}
+
+// Trees of triangles that belong together, each triangle below a lower one or the lowest.
+class Joined {
+ public:
+  bool make(std::uint32_t count) {
+    below_ = zeros<std::uint32_t>(count);
+    if (below_ == nullptr) return false;
+    for (std::uint32_t t = 0; t < count; ++t) below_[t] = t;
+    return true;
+  }
+  std::uint32_t lowest(std::uint32_t t) {
+    while (below_[t] != t) t = below_[t] = below_[below_[t]];
+    return t;
+  }
+  void join(std::uint32_t s, std::uint32_t t) {
+    s = lowest(s), t = lowest(t);
+    if (s < t) below_[t] = s;
+    if (t < s) below_[s] = t;
+  }
+
+ private:
+  Array<std::uint32_t> below_;
+};
+
+// The same with a relation: whether a triangle and the lowest one must change their windings, or neither.
+class JoinedWindings {
+ public:
+  bool make(std::uint32_t count) {
+    above_ = zeros<std::uint32_t>(count);
+    differs_ = zeros<std::uint8_t>(count);
+    if (above_ == nullptr || differs_ == nullptr) return false;
+    for (std::uint32_t t = 0; t < count; ++t) above_[t] = t;
+    return true;
+  }
+  struct Place {
+    std::uint32_t lowest;
+    std::uint8_t differs;
+  };
+  Place place(std::uint32_t t) {
+    std::uint8_t differs = 0;
+    while (above_[t] != t) {
+      differs_[t] ^= differs_[above_[t]];  // 0 of the lowest
+      above_[t] = above_[above_[t]];
+      differs ^= differs_[t];
+      t = above_[t];
+    }
+    return {t, differs};
+  }
+  /// Whether the relation contradicts those before.
+  bool contradicts(std::uint32_t s, std::uint32_t t, std::uint8_t differ) {
+    const Place a = place(s), b = place(t);
+    const auto between = static_cast<std::uint8_t>(a.differs ^ b.differs ^ differ);
+    if (a.lowest == b.lowest) return between != 0;
+    above_[std::max(a.lowest, b.lowest)] = std::min(a.lowest, b.lowest);
+    differs_[std::max(a.lowest, b.lowest)] = between;
+    return false;
+  }
+
+ private:
+  Array<std::uint32_t> above_;
+  Array<std::uint8_t> differs_;
+};
+
+class TopologyCheck {
+ public:
+  explicit TopologyCheck(const LevelView& level) : level_(level) {}
+
+  CheckResult run(CheckDepth depth, std::uint64_t seed) {
+    Status status = check_ranges();
+    if (depth == CheckDepth::full) {
+      if (status == Status::kOk) status = check_vertices();
+      if (status == Status::kOk) status = check_positions(seed);
+      if (status == Status::kOk) status = check_edges();
+      if (status == Status::kOk) status = check_components();
+      if (status == Status::kOk && one_way_edges_) status = check_patches();
+      if (status == Status::kOk) status = check_volume();
+    }
+    return {status, where_, {}};
+  }
+
+ private:
+  // What a reader needs in order not to leave its arrays.
+  Status check_ranges() {
+    for (where_ = 0; where_ < level_.triangle_count; ++where_) {
+      const TriangleTopology& triangle = level_.topology[where_];
+      for (const std::uint32_t vertex : triangle.vertex) {
+        if (vertex >= level_.vertex_count) return Status::kBadTopology;
+      }
+      if ((triangle.flags & ~kTopologyFlags) != 0) return Status::kBadTopology;
+    }
+    std::uint32_t next = 0;
+    for (where_ = 0; where_ < level_.component_count; ++where_) {
+      const SurfaceComponent& component = level_.components[where_];
+      if (component.first_triangle < next || component.first_triangle >= level_.triangle_count ||
+          component.triangle_count > level_.triangle_count || component.flags > kClosedComponent ||
+          component.reserved != 0)
+        return Status::kBadTopology;
+      next = component.first_triangle + 1;
+    }
+    return Status::kOk;
+  }
+
+  const float* position(std::uint32_t side) const {
+    return level_.triangles[side / 3].corner[side % 3].position;
+  }
+
+  // That vertices appear in order, and that all corners of one are where its first is.
+  Status check_vertices() {
+    first_ = zeros<std::uint32_t>(level_.vertex_count);
+    if (first_ == nullptr) return Status::kOutOfMemory;
+    std::uint32_t next = 0;
+    for (std::uint32_t t = 0; t < level_.triangle_count; ++t) {
+      where_ = t;
+      for (std::uint32_t k = 0; k < 3; ++k) {
+        const std::uint32_t vertex = level_.topology[t].vertex[k];
+        if (vertex > next) return Status::kVertexOrder;
+        if (vertex == next) first_[next++] = 3 * t + k;
+        if (!same_position(position(first_[vertex]), position(3 * t + k))) return Status::kVertexMismatch;
+      }
+    }
+    return next == level_.vertex_count ? Status::kOk : Status::kVertexOrder;
+  }
+
+  // That no two vertices have the same position: each is looked for in a table of those before it.
+  Status check_positions(std::uint64_t seed) {
+    const std::size_t slots = std::bit_ceil(std::size_t{level_.vertex_count} + level_.vertex_count / 2);
+    const Array<std::uint32_t> vertex_at = zeros<std::uint32_t>(slots);  // plus one
+    if (vertex_at == nullptr) return Status::kOutOfMemory;
+    for (std::uint32_t v = 0; v < level_.vertex_count; ++v) {
+      const float* p = position(first_[v]);
+      std::size_t slot = hash(p, seed) & (slots - 1);
+      for (; vertex_at[slot] != 0; slot = (slot + 1) & (slots - 1)) {
+        where_ = first_[v] / 3;
+        if (same_position(position(first_[vertex_at[slot] - 1]), p)) return Status::kVertexMismatch;
+      }
+      vertex_at[slot] = v + 1;
+    }
+    first_.reset();
+    return Status::kOk;
+  }
+
+  // Calls use(first, last) with the sides of each edge: sides_[first] to sides_[last - 1]. Goes on while that
+  // returns kOk.
+  template <typename Use>
+  Status for_each_edge(const Use& use) {
+    for (std::uint64_t first = 0, last = 0; first < side_count_; first = last) {
+      while (last < side_count_ && same_edge(sides_[first], sides_[last])) ++last;
+      if (const Status status = use(first, last); status != Status::kOk) return status;
+    }
+    return Status::kOk;
+  }
+
+  // A side of an edge, and its upper vertex. Those of one lower vertex lie together.
+  struct Side {
+    std::uint32_t upper, side;
+    bool operator<(const Side& other) const {
+      return upper != other.upper ? upper < other.upper : side < other.side;
+    }
+  };
+
+  std::uint32_t from(std::uint32_t side) const { return level_.topology[side / 3].vertex[side % 3]; }
+  std::uint32_t to(std::uint32_t side) const { return level_.topology[side / 3].vertex[(side + 1) % 3]; }
+  std::uint32_t lower(std::uint32_t side) const { return std::min(from(side), to(side)); }
+  bool same_edge(const Side& a, const Side& b) const {
+    return a.upper == b.upper && lower(a.side) == lower(b.side);
+  }
+
+  // Whether a side runs from its lower to its upper vertex, once its triangle is turned where it should be.
+  bool runs_up(std::uint32_t side) const {
+    return (from(side) < to(side)) != is_turned(level_.topology[side / 3].flags);
+  }
+
+  // Puts the sides of edges in the order of their lower and upper vertices: one counting sort, and a small
+  // one for each lower vertex.
+  Status sort_sides() {
+    const Array<std::uint32_t> end = zeros<std::uint32_t>(std::size_t{level_.vertex_count} + 1);
+    if (end == nullptr) return Status::kOutOfMemory;
+    const std::uint32_t all = 3 * level_.triangle_count;
+    for (std::uint32_t side = 0; side < all; ++side) end[lower(side) + 1] += from(side) != to(side);
+    for (std::uint32_t v = 0; v < level_.vertex_count; ++v) end[v + 1] += end[v];
+    side_count_ = end[level_.vertex_count];
+    sides_ = Array<Side>(new (std::nothrow) Side[side_count_]);
+    if (sides_ == nullptr) return Status::kOutOfMemory;
+    for (std::uint32_t side = 0; side < all; ++side) {
+      if (from(side) != to(side)) sides_[end[lower(side)]++] = {std::max(from(side), to(side)), side};
+    }
+    std::uint32_t begin = 0;
+    for (std::uint32_t v = 0; v < level_.vertex_count; begin = end[v++])
+      std::sort(sides_.get() + begin, sides_.get() + end[v]);
+    return Status::kOk;
+  }
+
+  Status check_edges() {
+    open_ = zeros<std::uint8_t>(level_.triangle_count);
+    if (open_ == nullptr || !joined_.make(level_.triangle_count)) return Status::kOutOfMemory;
+    if (const Status status = sort_sides(); status != Status::kOk) return status;
+    return for_each_edge([&](std::uint64_t first, std::uint64_t last) {
+      const std::uint64_t count = last - first;
+      std::int64_t up = 0, down = 0;
+      for (std::uint64_t i = first; i < last; ++i) {
+        const std::uint32_t side = sides_[i].side, flags = level_.topology[side / 3].flags;
+        const auto k = static_cast<int>(side % 3);
+        where_ = side / 3;
+        if (is_boundary(flags, k) != (count == 1) || has_many_triangles(flags, k) != (count > 2))
+          return Status::kEdgeMismatch;
+        ++(runs_up(side) ? up : down);
+        joined_.join(sides_[first].side / 3, side / 3);
+      }
+      if (up != down) open_[sides_[first].side / 3] = 1;
+      one_way_edges_ = one_way_edges_ || (count == 2 && up != down);
+      return Status::kOk;
+    });
+  }
+
+  struct Tally {
+    std::uint32_t triangles, turned, open;
+  };
+
+  // That the components are those that edges make, that they are closed where said to be, and that of an open
+  // one no more than half the triangles are turned; of one half, not the first.
+  Status check_components() {
+    const Array<Tally> tally = zeros<Tally>(level_.component_count);
+    const Array<std::uint32_t> number = zeros<std::uint32_t>(level_.triangle_count);
+    if (tally == nullptr || number == nullptr) return Status::kOutOfMemory;
+    std::uint32_t next = 0;
+    for (std::uint32_t t = 0; t < level_.triangle_count; ++t) {
+      const std::uint32_t lowest = joined_.lowest(t);
+      where_ = next;
+      if (lowest == t) {
+        if (next == level_.component_count || level_.components[next].first_triangle != t)
+          return Status::kComponentMismatch;
+        number[t] = next++;
+      }
+      Tally& of = tally[number[lowest]];
+      ++of.triangles;
+      of.turned += is_turned(level_.topology[t].flags);
+      of.open += open_[t];
+    }
+    where_ = next;
+    if (next != level_.component_count) return Status::kComponentMismatch;
+    std::uint32_t closed = 0;
+    for (std::uint32_t c = 0; c < level_.component_count; ++c) {
+      const SurfaceComponent& component = level_.components[c];
+      where_ = c;
+      if (component.triangle_count != tally[c].triangles || is_closed(component) != (tally[c].open == 0))
+        return Status::kComponentMismatch;
+      closed += is_closed(component);
+      if (is_closed(component)) only_closed_ = component.first_triangle;
+      where_ = component.first_triangle;
+      const std::uint64_t turned = 2 * std::uint64_t{tally[c].turned};
+      const bool most = turned > tally[c].triangles ||
+                        (turned == tally[c].triangles && is_turned(level_.topology[where_].flags));
+      if (most && !is_closed(component)) return Status::kBadWinding;
+    }
+    has_one_closed_ = closed == 1;
+    where_ = level_.component_count;
+    return level_.closed == (closed == level_.component_count) ? Status::kOk : Status::kComponentMismatch;
+  }
+
+  // That windings disagree across an edge of two sides only where no choice of windings makes them agree: in
+  // a patch, which edges of two sides join, that cannot be oriented.
+  Status check_patches() {
+    JoinedWindings windings;
+    const Array<std::uint8_t> unorientable = zeros<std::uint8_t>(level_.triangle_count);
+    if (unorientable == nullptr || !windings.make(level_.triangle_count)) return Status::kOutOfMemory;
+    const auto for_each_pair = [&](const auto& use) {
+      return for_each_edge([&](std::uint64_t first, std::uint64_t last) {
+        if (last - first != 2) return Status::kOk;
+        const std::uint32_t one = sides_[first].side, other = sides_[first + 1].side;
+        return use(one / 3, other / 3, runs_up(one) == runs_up(other));
+      });
+    };
+    // What contradicts is marked at a triangle, since the lowest of its patch is not known before the end.
+    Status status = for_each_pair([&](std::uint32_t s, std::uint32_t t, bool disagree) {
+      unorientable[s] = unorientable[s] | windings.contradicts(s, t, disagree);
+      return Status::kOk;
+    });
+    for (std::uint32_t t = 0; t < level_.triangle_count; ++t) {
+      if (unorientable[t] != 0) unorientable[windings.place(t).lowest] = 1;
+    }
+    if (status == Status::kOk) {
+      status = for_each_pair([&](std::uint32_t s, std::uint32_t, bool disagree) {
+        where_ = s;
+        return disagree && unorientable[windings.place(s).lowest] == 0 ? Status::kBadWinding : Status::kOk;
+      });
+    }
+    return status;
+  }
+
+  // That the only closed component, which can be no cavity, is not inside out.
+  Status check_volume() {
+    if (!has_one_closed_) return Status::kOk;
+    where_ = only_closed_;
+    EnclosedVolume volume(position(3 * only_closed_));
+    for (std::uint32_t t = only_closed_; t < level_.triangle_count; ++t) {
+      if (joined_.lowest(t) != only_closed_) continue;
+      const std::uint32_t turned = is_turned(level_.topology[t].flags);
+      volume.add(position(3 * t), position(3 * t + 1 + turned), position(3 * t + 2 - turned));
+    }
+    return volume.is_inside_out() ? Status::kBadWinding : Status::kOk;
+  }
+
+  LevelView level_;
+  Array<std::uint32_t> first_;  // side that begins at the first corner of each vertex
+  Array<Side> sides_;           // that have an edge
+  std::uint64_t side_count_ = 0;
+  Joined joined_;
+  Array<std::uint8_t> open_;    // of a triangle: not 0 where an edge of it is not closed
+  bool one_way_edges_ = false;  // there are edges of two sides that run the same way
+  bool has_one_closed_ = false;
+  std::uint32_t only_closed_ = 0;  // its first triangle
+  std::uint32_t where_ = 0;        // the triangle or component that a defect speaks of
+};
+
+}  // namespace
+
+CheckResult check_topology(const LevelView& level, CheckDepth depth, std::uint64_t seed) {
+  return TopologyCheck(level).run(depth, seed);
+}
+
+}  // namespace tandem

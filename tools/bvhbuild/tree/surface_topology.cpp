@@ -1,0 +1,191 @@
+#include "surface_topology.h"
+
+#include <algorithm>
+#include <bit>
+
+#include "bvhbuild/meshing/index_table.h"
+#include "enclosure.h"
+#include "surface_edges.h"
+#include "tandem/formats/enclosed_volume.h"
+
+namespace tandem::build {
+namespace {
+
+// The first point at the position of each point.
+std::vector<std::uint32_t> first_at_position(std::span<const std::array<float, 3>> points) {
+  const auto bits = [](float x) { return std::uint64_t{std::bit_cast<std::uint32_t>(x + 0.0f)}; };  // -0 is 0
+  IndexTable table(points.size());
+  std::vector<std::uint32_t> first(points.size());
+  for (std::uint32_t i = 0; i < points.size(); ++i) {
+    const auto& p = points[i];
+    first[i] = table.find_or_insert(hash_words(bits(p[0]), bits(p[1]), bits(p[2])), i,
+                                    [&](std::uint32_t other) { return points[other] == p; });
+  }
+  return first;
+}
+
+void weld(const Geometry& geometry, const Tree& tree, SurfaceTopology& surface) {
+  const std::vector<std::uint32_t> first = first_at_position(geometry.points);
+  std::vector<std::uint32_t> vertex(geometry.points.size(), kNoIndex);
+  surface.triangles.reserve(tree.order.size());
+  for (const std::uint32_t source : tree.order) {
+    TriangleTopology& triangle = surface.triangles.emplace_back();
+    for (std::size_t k = 0; k < 3; ++k) {
+      std::uint32_t& number = vertex[first[geometry.triangles[source][k]]];
+      if (number == kNoIndex) number = surface.vertex_count++;
+      triangle.vertex[k] = number;
+    }
+  }
+}
+
+void flag_edges(const SurfaceEdges& edges, SurfaceTopology& surface) {
+  for (std::uint32_t e = 0; e < edges.count(); ++e) {
+    const auto sides = edges.sides_of(e);
+    if (sides.size() == 2) continue;
+    const std::uint32_t flag = sides.size() == 1 ? kBoundaryEdge0 : kManyTriangles0;
+    for (const std::uint32_t side : sides) surface.triangles[side / 3].flags |= flag << side % 3;
+  }
+}
+
+// The component of each triangle.
+using Components = std::vector<std::uint32_t>;
+
+// Numbers the component of `seed` and makes windings agree with the seed's across edges of two sides.
+void flood(const SurfaceEdges& edges, std::uint32_t seed, std::uint32_t number, SurfaceTopology& surface,
+           Components& component, std::vector<std::uint32_t>& members) {
+  members.assign(1, seed);
+  component[seed] = number;
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    for (std::uint32_t side = 3 * members[i]; side < 3 * members[i] + 3; ++side) {
+      if (edges.edge_of(side) == SurfaceEdges::kNone) continue;
+      const auto sides = edges.sides_of(edges.edge_of(side));
+      for (const std::uint32_t other : sides) {
+        const std::uint32_t t = other / 3;
+        if (component[t] != kNoIndex) continue;
+        component[t] = number;
+        if (sides.size() == 2 && runs_up(surface.triangles, side) == runs_up(surface.triangles, other))
+          surface.triangles[t].flags ^= kTurned;
+        members.push_back(t);
+      }
+    }
+  }
+}
+
+Components orient_components(const SurfaceEdges& edges, SurfaceTopology& surface) {
+  Components component(surface.triangles.size(), kNoIndex);
+  std::vector<std::uint32_t> members;
+  for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
+    if (component[t] != kNoIndex) continue;
+    flood(edges, t, static_cast<std::uint32_t>(surface.components.size()), surface, component, members);
+    surface.components.push_back({t, static_cast<std::uint32_t>(members.size()), kClosedComponent, 0});
+    const auto turned = std::count_if(members.begin(), members.end(),
+                                      [&](auto m) { return is_turned(surface.triangles[m].flags); });
+    if (2 * static_cast<std::size_t>(turned) <= members.size()) continue;
+    for (const std::uint32_t m : members) surface.triangles[m].flags ^= kTurned;
+  }
+  return component;
+}
+
+void find_closed(const SurfaceEdges& edges, const Components& component, SurfaceTopology& surface) {
+  for (std::uint32_t e = 0; e < edges.count(); ++e) {
+    const auto sides = edges.sides_of(e);
+    const auto up =
+        std::count_if(sides.begin(), sides.end(), [&](auto s) { return runs_up(surface.triangles, s); });
+    if (2 * static_cast<std::size_t>(up) != sides.size())
+      surface.components[component[sides[0] / 3]].flags &= ~kClosedComponent;
+  }
+  surface.closed = std::all_of(surface.components.begin(), surface.components.end(), is_closed);
+}
+
+// Triangles of the input, in leaf order.
+class Corners {
+ public:
+  Corners(const Geometry& geometry, const Tree& tree) : geometry_(geometry), tree_(tree) {}
+
+  const std::array<float, 3>& at(std::uint32_t triangle, std::size_t k) const {
+    return geometry_.points[geometry_.triangles[tree_.order[triangle]][k]];
+  }
+
+ private:
+  Geometry geometry_;
+  const Tree& tree_;
+};
+
+// Of each component: closed, and inside out.
+std::vector<std::uint8_t> inside_out(const Corners& corners, const Components& component,
+                                     const SurfaceTopology& surface) {
+  std::vector<EnclosedVolume> volumes;
+  for (const SurfaceComponent& of : surface.components)
+    volumes.emplace_back(corners.at(of.first_triangle, 0).data());
+  for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
+    const std::size_t turned = is_turned(surface.triangles[t].flags);
+    volumes[component[t]].add(corners.at(t, 0).data(), corners.at(t, 1 + turned).data(),
+                              corners.at(t, 2 - turned).data());
+  }
+  std::vector<std::uint8_t> inside_out(volumes.size());
+  for (std::size_t c = 0; c < volumes.size(); ++c)
+    inside_out[c] = is_closed(surface.components[c]) && volumes[c].is_inside_out();
+  return inside_out;
+}
+
+// The triangles of each component.
+class Members {
+ public:
+  Members(const Components& component, const SurfaceTopology& surface) : triangles_(component.size()) {
+    first_.push_back(0);
+    for (const SurfaceComponent& of : surface.components) first_.push_back(first_.back() + of.triangle_count);
+    std::vector<std::uint32_t> next(first_);
+    for (std::uint32_t t = 0; t < component.size(); ++t) triangles_[next[component[t]]++] = t;
+  }
+  std::span<const std::uint32_t> of(std::uint32_t component) const {
+    return std::span(triangles_).subspan(first_[component], first_[component + 1] - first_[component]);
+  }
+
+ private:
+  std::vector<std::uint32_t> first_, triangles_;
+};
+
+// Whether a component lies within others. A corner of each of its triangles is tried until one is far enough
+// from all of them.
+bool is_cavity(const Corners& corners, const Enclosure& others, std::uint32_t own,
+               std::span<const std::uint32_t> members) {
+  constexpr std::size_t kTries = 16;
+  for (const std::uint32_t t : members.first(std::min(members.size(), kTries))) {
+    if (const auto winding = others.around(corners.at(t, 0), own); winding.has_value()) return *winding > 0;
+  }
+  return false;
+}
+
+// Turns closed components that are inside out and no cavities.
+void turn_components(const Geometry& geometry, const Tree& tree, const Components& component,
+                     SurfaceTopology& surface) {
+  const Corners corners(geometry, tree);
+  const std::vector<std::uint8_t> wrong = inside_out(corners, component, surface);
+  if (std::none_of(wrong.begin(), wrong.end(), [](auto w) { return w != 0; })) return;
+  std::vector<std::int8_t> weight(component.size());  // what is inside out counts as turned
+  for (std::uint32_t t = 0; t < weight.size(); ++t) {
+    if (!is_closed(surface.components[component[t]])) continue;
+    weight[t] = is_turned(surface.triangles[t].flags) != (wrong[component[t]] != 0) ? -1 : 1;
+  }
+  const Enclosure enclosure(geometry, tree, component, weight);
+  const Members members(component, surface);
+  for (std::uint32_t c = 0; c < wrong.size(); ++c) {
+    if (wrong[c] == 0 || is_cavity(corners, enclosure, c, members.of(c))) continue;
+    for (const std::uint32_t t : members.of(c)) surface.triangles[t].flags ^= kTurned;
+  }
+}
+
+}  // namespace
+
+SurfaceTopology make_topology(const Geometry& geometry, const Tree& tree) {
+  SurfaceTopology surface;
+  weld(geometry, tree, surface);
+  const SurfaceEdges edges(surface.triangles);
+  flag_edges(edges, surface);
+  const Components component = orient_components(edges, surface);
+  find_closed(edges, component, surface);
+  turn_components(geometry, tree, component, surface);
+  return surface;
+}
+
+}  // namespace tandem::build

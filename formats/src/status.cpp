@@ -96,6 +96,7 @@ constexpr Entry kEntries[] = {
     {Status::kOutOfRange, "OutOfRange", "instance", "a coordinate is not finite or too large for a query"},
     {Status::kUnknownAsset, "UnknownAsset", "instance", "an instance of an asset that does not exist"},
     {Status::kUnknownInstance, "UnknownInstance", "pair", "a pair names an instance that does not exist"},
+    {Status::kUnknownContact, "UnknownContact", "contact", "a contact names a pair or a triangle that does not exist"},
     {Status::kPoseNotRigid, "PoseNotRigid", "instance", "a pose is not a rotation and a translation"},
     {Status::kTooManyInstances, "TooManyInstances", nullptr, "there are 2^32 - 1 instances or more"},
     {Status::kTooManyPairs, "TooManyPairs", nullptr, "there are 2^32 - 1 pairs of instances or more"},

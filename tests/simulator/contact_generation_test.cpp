@@ -1,8 +1,6 @@
 #include "simulator/contacts/contact_generation.h"
 
 #include <gtest/gtest.h>
-#include <oneapi/tbb/global_control.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -77,7 +75,7 @@ TEST_P(BoxOnBox, HasTheOverlapsCornersItsNormalAndItsDepth) {
       EXPECT_NEAR(scene.statistics().area, area, 1e-9);
     }
     EXPECT_NEAR(scene.statistics().depth, pair.depth, 1e-13);
-    EXPECT_EQ(scene.statistics().patches, 1u);
+    EXPECT_EQ(scene.statistics().counters.manifolds, 1u);
   }
 }
 
@@ -136,7 +134,7 @@ TEST(ContactGeneration, BodiesThatTouchInAnEdgeOrACornerOfBothHaveNoPointAndAreC
     scene.add_body(shape, at(1, 1, z));
     EXPECT_TRUE(scene.points().empty());
     EXPECT_GT(scene.triangle_pairs(), 0u);
-    EXPECT_EQ(scene.statistics().ambiguous_touches, 1u);
+    EXPECT_EQ(scene.statistics().counters.ambiguous_touches, 1u);
   }
 }
 
@@ -227,7 +225,7 @@ TEST(ContactGeneration, ABoxOnATiltedSheetStandsOnItsFourCorners) {
       expect_all(points, slope.linear() * kZ, depth, 1e-12);
       EXPECT_EQ(points.size(), 4u) << cells;
       EXPECT_NEAR(scene.statistics().area, 1, 1e-9);
-      EXPECT_EQ(scene.statistics().open_curves, 0u);
+      EXPECT_EQ(scene.statistics().counters.open_curves, 0u);
     }
   }
 }
@@ -237,7 +235,7 @@ TEST(ContactGeneration, ABoxThatHangsOverASheetsBorderStandsOnTheSheet) {
   scene.add_body(scene.add_shape(sheet(4, 5)), at(0, 0, 0));
   scene.add_body(scene.add_shape(cube(0.5f)), at(1.8, 0, 0.49));
   const auto points = scene.points();
-  EXPECT_GT(scene.statistics().open_curves, 0u);
+  EXPECT_GT(scene.statistics().counters.open_curves, 0u);
   ASSERT_FALSE(points.empty());
   for (const ContactPoint& p : points) {
     EXPECT_LT((p.normal - kZ).norm(), 1e-9);
@@ -282,7 +280,7 @@ TEST(ContactGeneration, SpheresPushAlongTheLineOfTheirMiddlesByTheirOverlap) {
     const double height = (1 + (1.5 - overlap) * (1.5 - overlap) - 0.25) / (2 * (1.5 - overlap));
     const double circle = 3.14159265358979323846 * (1 - height * height);
     EXPECT_NEAR(scene.statistics().area, circle, 0.03 * circle + 0.01);
-    EXPECT_EQ(scene.statistics().patches, 1u);
+    EXPECT_EQ(scene.statistics().counters.manifolds, 1u);
   }
 }
 
@@ -292,8 +290,8 @@ TEST(ContactGeneration, LegsHaveAPatchEach) {
   scene.add_body(scene.add_shape(cube(2.0f)), at(0, 0, 0));
   scene.add_body(scene.add_shape(legs), at(0.03, 0.02, 2.499));
   expect_all(scene.points(), kZ, 1e-3, 1e-12);
-  EXPECT_EQ(scene.statistics().patches, 2u);
-  EXPECT_EQ(scene.statistics().points, 8u);
+  EXPECT_EQ(scene.statistics().counters.manifolds, 2u);
+  EXPECT_EQ(scene.statistics().counters.points, 8u);
 }
 
 TEST(ContactGeneration, TheCowStandsOnItsFourHooves) {
@@ -302,7 +300,7 @@ TEST(ContactGeneration, TheCowStandsOnItsFourHooves) {
     scene.add_body(scene.add_shape(sheet(6, 10)), at(0, 0, 0));
     scene.add_body(scene.add_shape(project_mesh(mesh)), at(0.05, 0.02, -0.004));
     const auto points = scene.points();
-    EXPECT_EQ(scene.statistics().patches, 4u);
+    EXPECT_EQ(scene.statistics().counters.manifolds, 4u);
     EXPECT_GE(points.size(), 12u);
     EXPECT_NEAR(scene.statistics().depth, 0.004, 4e-4);
     for (const ContactPoint& p : points) EXPECT_LT((p.normal - kZ).norm(), 1e-9);
@@ -451,7 +449,7 @@ TEST_P(HostileScene, GivesUnitNormalsAndFiniteDepths) {
       ASSERT_NEAR(p.normal.norm(), 1, 1e-9);
       ASSERT_TRUE(p.depth >= 0 && std::isfinite(p.depth)) << p.depth;
     }
-    EXPECT_LE(generator.statistics().segments, found.triangles.size());
+    EXPECT_LE(generator.statistics().counters.segments, found.triangles.size());
   }
 }
 
@@ -463,13 +461,13 @@ TEST(ContactGeneration, ThreadsDoNotChangeAByte) {
   RandomPoses random(7);
   const std::uint32_t cow = scene.add_shape(project_mesh("cow_1500.obj"));
   for (int i = 0; i < 60; ++i) scene.add_body(cow, random_motion(random, 1.5));
-  const auto run = [&](std::size_t threads) {
-    const oneapi::tbb::global_control control(oneapi::tbb::global_control::max_allowed_parallelism, threads);
+  const auto run = [&](std::uint32_t threads) {
+    scene.use_threads(threads);
     return scene.points();
   };
   const auto one = run(1);
   const double area = scene.statistics().area;
-  for (const std::size_t threads : {2, 4}) {
+  for (const std::uint32_t threads : {2u, 4u}) {
     const auto many = run(threads);
     ASSERT_EQ(one.size(), many.size());
     for (std::size_t i = 0; i < one.size(); ++i) {

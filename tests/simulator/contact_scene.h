@@ -21,6 +21,8 @@ class ContactScene {
   void swap_bodies() { std::swap(bodies_[0], bodies_[1]); }
   void move_body(std::size_t body, const Eigen::Isometry3d& pose) { bodies_[body].second = pose; }
 
+  void use_threads(std::uint32_t threads) { threads_ = threads; }
+
   const simulation::ContactStatistics& statistics() const { return statistics_; }
   std::size_t triangle_pairs() const { return found_.triangles.size(); }
 
@@ -29,6 +31,7 @@ class ContactScene {
   std::vector<std::pair<std::uint32_t, Eigen::Isometry3d>> bodies_;
   ContactList found_;
   simulation::ContactStatistics statistics_;
+  std::uint32_t threads_ = 1;
 };
 
 Pose to_pose(const Eigen::Isometry3d& pose);

@@ -237,6 +237,7 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
     return kDone;
   }
   const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, options.threads);
+  arguments.contacts.threads = options.threads;
   auto engine = make_engine(arguments.engine, {.mode = arguments.fast ? QueryMode::fast : QueryMode::exact,
                                                .threads = options.threads});
   Simulator simulator(start.bodies.bodies, start.bodies.states,
@@ -327,7 +328,7 @@ void add_run_options(CLI::App& command, SimulateArguments& arguments) {
       ->option_text("NAME [tandem]");
   command.add_flag("--fast", arguments.fast, "let the engine decide triangles in float32");
   command.add_option("--points-per-patch", arguments.contacts.points_per_patch, "contact points, at most")
-      ->check(CLI::Range(1, 1000))
+      ->check(CLI::Range(1u, kMostManifoldPoints))
       ->option_text("N [" + std::to_string(arguments.contacts.points_per_patch) + "]");
   command.add_option("--density", arguments.density, "of the bodies, in kg/m^3")
       ->check(between(1e-12, 1e12))

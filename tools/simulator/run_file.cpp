@@ -37,7 +37,6 @@ const Column kColumns[] = {
     {"segments", &StepRecord::segments},
     {"patches", &StepRecord::patches},
     {"open_curves", &StepRecord::open_curves},
-    {"candidate_points", &StepRecord::candidate_points},
     {"contacts", &StepRecord::contacts},
     {"islands", &StepRecord::islands},
     {"newton_islands", &StepRecord::newton_islands},

@@ -25,10 +25,9 @@ void take(StepRecord& record, const FinderReport& report) {
   record.block_pairs = report.counters.block_pairs;
   record.candidates = report.counters.candidates;
   record.triangle_pairs = report.counters.contacts;
-  record.segments = report.contacts.segments;
-  record.patches = report.contacts.patches;
-  record.open_curves = report.contacts.open_curves;
-  record.candidate_points = report.contacts.candidate_points;
+  record.segments = report.contacts.counters.segments;
+  record.patches = report.contacts.counters.manifolds;
+  record.open_curves = report.contacts.counters.open_curves;
   record.contact_area = report.contacts.area;
 }
 

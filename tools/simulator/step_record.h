@@ -14,7 +14,7 @@ struct StepRecord {
          transfer_seconds = 0, contact_seconds = 0, solver_seconds = 0, step_seconds = 0;
 
   std::uint64_t object_pairs = 0, block_pairs = 0, candidates = 0, triangle_pairs = 0;
-  std::uint64_t segments = 0, patches = 0, open_curves = 0, candidate_points = 0, contacts = 0;
+  std::uint64_t segments = 0, patches = 0, open_curves = 0, contacts = 0;
   std::uint64_t islands = 0, newton_islands = 0, sleeping = 0, reentered = 0;
 
   double contact_ratio =

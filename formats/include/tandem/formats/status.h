@@ -65,6 +65,7 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kOutOfRange,        ///< a coordinate that is NaN or larger than the query can take
     kUnknownAsset,      ///< an instance of an asset that the query was not given
     kUnknownInstance,   ///< an object pair that names an instance that does not exist
+    kUnknownContact,    ///< a contact that names an object pair or a triangle that does not exist
     kPoseNotRigid,      ///< not a rotation and a translation, to kRigidTolerance
     kTooManyInstances,  ///< 2^32 - 1 or more
     kTooManyPairs,      ///< 2^32 - 1 object pairs or more

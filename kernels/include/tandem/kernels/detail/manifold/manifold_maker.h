@@ -24,8 +24,8 @@ template <typename Team>
 class ManifoldMaker {
  public:
   TANDEM_HD ManifoldMaker(const Team& team, const BodyPair& bodies, const PieceMemory& memory,
-                          PatchMemory& shared)
-      : team_(team), bodies_(bodies), memory_(memory), shared_(shared) {}
+                          PatchMemory& shared, int most_points)
+      : team_(team), bodies_(bodies), memory_(memory), shared_(shared), most_points_(most_points) {}
 
   /// Makes the patches of a pair of bodies from its contacts. new_patch(): where the next one is to lie, or
   /// null; called by one of the team for each.
@@ -65,6 +65,7 @@ class ManifoldMaker {
   const BodyPair& bodies_;
   PieceMemory memory_;
   PatchMemory& shared_;
+  int most_points_;
   PieceSummary summary_;
   Vector2 middle_;       // of the rim
   double extent_ = 0;    // of the rim, from its middle
@@ -242,8 +243,9 @@ TANDEM_HD bool ManifoldMaker<Team>::make_patch(std::uint32_t curve, const NewPat
   const PatchFrame frame(summary_.origin, normal.n);
   RimFinder<Team> rim_finder(team_, bodies_, memory_, summary_, curve, frame);
   rim_finder.gather(measure.closed && !summary_.degenerate, shared_.next);
-  const int most = static_cast<int>(kMostManifoldPoints) - (normal.touch ? 0 : 1);
-  const Rim rim = rim_finder.find(most, frame.flat(measure.middle));
+  // One is left for an inner point.
+  const int most_of_rim = normal.touch || most_points_ == 1 ? most_points_ : most_points_ - 1;
+  const Rim rim = rim_finder.find(most_of_rim, frame.flat(measure.middle));
   if (rim.points == 0) return false;
   place_soundings(rim_finder, rim, frame, normal.touch);
   bool goes_through = false, hole = false;
@@ -268,7 +270,7 @@ TANDEM_HD bool ManifoldMaker<Team>::make_patch(std::uint32_t curve, const NewPat
   }
   Chosen chosen[kMostSoundings];
   int count = choose(rim_finder, frame, normal.touch, chosen);
-  count = count < static_cast<int>(kMostManifoldPoints) ? count : static_cast<int>(kMostManifoldPoints);
+  count = count < most_points_ ? count : most_points_;
   const double near = kNear * bodies_.smaller_diagonal();
   for (int i = 0; i < count; ++i) {
     if (!chosen[i].inner) chosen[i].feature = rim_finder.least_feature_near(chosen[i].at, near / 2, chosen[i].feature);

@@ -10,22 +10,25 @@ MAGIC = b"\x89BVH\r\n\x1a\n"
 HEADER = struct.Struct("<8sQIHHQ3d3f3fQdII24s")
 SECTION = struct.Struct("<IIQQQ")
 LEVEL = np.dtype([("triangles", "<u4"), ("blocks", "<u4"), ("leaf_blocks", "<u4"), ("depth", "<u4"),
-                  ("error_bound", "<f8"), ("reserved", "<u8")])
+                  ("error_bound", "<f8"), ("vertices", "<u4"), ("flags", "<u4")])
 BLOCK = np.dtype([("center", "<f4", (3, 4)), ("half_extent", "<f4", (3, 4)), ("index", "<u4", 4), ("kind", "<u4", 4)])
 TRIANGLE = np.dtype([("corner", [("position", "<f4", 3), ("w", "<u4")], 3)])
 PART = np.dtype([("name_offset", "<u4"), ("name_bytes", "<u4"), ("path_offset", "<u4"), ("path_bytes", "<u4"),
                  ("first_face", "<u8"), ("face_count", "<u8")])
 ORIENTED_BLOCK = np.dtype([("center", "<f4", (3, 4)), ("half_extent", "<f4", (3, 4)), ("first_below", "<u4"),
                            ("size", "<f4"), ("quaternion", "<u2", 4)])
+TOPOLOGY = np.dtype([("vertex", "<u4", 3), ("flags", "<u4")])
+COMPONENT = np.dtype([("first_triangle", "<u4"), ("triangles", "<u4"), ("flags", "<u4"), ("reserved", "<u4")])
 KINDS = {1: ("levels", LEVEL), 2: ("blocks", BLOCK), 3: ("triangles", TRIANGLE), 4: ("parts", PART),
-         5: ("strings", np.dtype("u1")), 6: ("provenance", np.dtype("u1")), 7: ("oriented_blocks", ORIENTED_BLOCK)}
+         5: ("strings", np.dtype("u1")), 6: ("provenance", np.dtype("u1")), 7: ("oriented_blocks", ORIENTED_BLOCK),
+         8: ("topology", TOPOLOGY), 9: ("components", COMPONENT)}
 INTERNAL, LEAF, IMAGINARY = 0, 1, 2
 NO_INDEX = 0xFFFFFFFF
 LEAF_BLOCK = 1 << 31
 
 assert HEADER.size == 128 and SECTION.size == 32 and LEVEL.itemsize == 32
 assert BLOCK.itemsize == 128 and TRIANGLE.itemsize == 48 and PART.itemsize == 32
-assert ORIENTED_BLOCK.itemsize == 112
+assert ORIENTED_BLOCK.itemsize == 112 and TOPOLOGY.itemsize == COMPONENT.itemsize == 16
 
 
 @dataclasses.dataclass
@@ -42,6 +45,8 @@ class BvhFile:
     blocks: np.ndarray
     triangles: np.ndarray
     oriented_blocks: np.ndarray | None
+    topology: np.ndarray | None
+    components: np.ndarray | None
     parts: list
     provenance: dict
 
@@ -95,7 +100,7 @@ def parse(raw):
               int(p["first_face"]), int(p["face_count"])) for p in found["parts"]]
     return BvhFile(raw, content_hash, np.array([ox, oy, oz]), np.array(lower, np.float32), np.array(upper, np.float32),
                    source_faces, rounding_error, found["levels"], found["blocks"], found["triangles"],
-                   found.get("oriented_blocks"), parts,
+                   found.get("oriented_blocks"), found.get("topology"), found.get("components"), parts,
                    json.loads(found["provenance"].tobytes()))
 
 
@@ -287,3 +292,74 @@ def defects_of_oriented_blocks(file):
     if next_number != len(file.oriented_blocks):
         defects.append("there are other oriented blocks than blocks")
     return defects
+
+
+def _numbered(keys):
+    """The number of each row, by first appearance."""
+    _, first, inverse = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return rank[inverse.ravel()]
+
+
+def _groups(count, pairs):
+    """The lowest member of the group of each of `count` things, which pairs join."""
+    lowest = np.arange(count)
+    while True:
+        least = np.minimum(lowest[pairs[:, 0]], lowest[pairs[:, 1]])
+        joined = lowest.copy()
+        np.minimum.at(joined, lowest[pairs].ravel(), np.repeat(least, 2))
+        joined = joined[joined]
+        if (joined == lowest).all():
+            return lowest
+        lowest = joined
+
+
+def defects_of_topology(file):
+    """Sentences about everything that is wrong with the topology, but for which side is outside."""
+    defects, n = [], len(file.triangles)
+    vertex = _numbered(file.corners.reshape(-1, 3) + np.float32(0)).reshape(n, 3)
+    if (file.topology["vertex"] != vertex).any():
+        defects.append("vertices are not the positions, numbered as they appear")
+    if file.levels[0]["vertices"] != vertex.max() + 1:
+        defects.append("the level says another number of vertices")
+    start, end = vertex.ravel(), np.roll(vertex, -1, axis=1).ravel()
+    side = np.flatnonzero(start != end)
+    edge = _numbered(np.sort(np.stack([start, end], 1)[side], axis=1)) if len(side) else side
+    sides = np.bincount(edge)
+    flags = np.zeros(3 * n, np.int64)
+    flags[side] = np.where(sides[edge] == 1, 2, np.where(sides[edge] > 2, 16, 0)) << side % 3
+    if ((file.topology["flags"] & ~np.uint32(1)) != flags.reshape(n, 3).sum(1)).any():
+        defects.append("flags do not count the sides of edges")
+    turned = (file.topology["flags"] & 1).astype(bool)
+    up = (start < end)[side]
+    balance = np.bincount(edge, np.where(up != turned[side // 3], 1, -1), len(sides))
+    first_side = np.zeros(len(sides), np.int64)
+    first_side[edge[::-1]] = side[::-1]
+    pairs = np.stack([first_side[edge] // 3, side // 3], 1)
+    component = _groups(n, pairs)
+    first = np.unique(component)
+    count = np.bincount(component, minlength=n)[first]
+    open_ones = np.unique(component[first_side[balance != 0] // 3])
+    closed = ~np.isin(first, open_ones)
+    wanted = np.stack([first, count, closed, np.zeros_like(first)], 1)
+    if file.components.view("<u4").reshape(-1, 4).tolist() != wanted.tolist():
+        defects.append("components are not what edges join, closed where each is run along both ways")
+    if file.levels[0]["flags"] != closed.all():
+        defects.append("the level is closed where all components are, and says otherwise")
+    if (2 * np.bincount(component, turned, n)[first] > count)[~closed].any():
+        defects.append("more than half of an open component is turned")
+    return defects + _defects_of_windings(n, turned, side, edge, sides, up)
+
+
+def _defects_of_windings(n, turned, side, edge, sides, up):
+    """Each triangle twice, as it is and the other way round: a patch cannot be oriented where both are one group."""
+    order = np.argsort(edge, kind="stable")
+    order = order[sides[edge[order]] == 2].reshape(-1, 2)
+    pair, differ = side[order] // 3, up[order[:, 0]] == up[order[:, 1]]
+    both = np.concatenate([np.stack([pair[:, 0], pair[:, 1] + n * differ], 1),
+                           np.stack([pair[:, 0] + n, pair[:, 1] + n * ~differ], 1)])
+    group = _groups(2 * n, both)
+    orientable = group[:n] != group[n:]
+    wrong = (turned[pair[:, 0]] != turned[pair[:, 1]]) != differ
+    return ["windings disagree where they could agree"] if (wrong & orientable[pair[:, 0]]).any() else []

@@ -29,4 +29,40 @@ inline void expect_all_named(std::span<const Attack> attacks) {
   }
 }
 
+/// A section with its bytes.
+struct Piece {
+  Section row;
+  std::string bytes;
+};
+
+inline std::vector<Piece> pieces_of(Bytes& file) {
+  std::vector<Piece> pieces;
+  for (std::size_t i = 0; i < file.header().section_count; ++i) {
+    const Section& row = file.section(i);
+    pieces.push_back({row, {reinterpret_cast<char*>(file.data()) + row.offset, row.bytes}});
+  }
+  return pieces;
+}
+
+/// A file of these sections, each with as many elements as its row says and bytes as it has.
+inline Bytes lay_out(const FileHeader& header, std::vector<Piece> pieces) {
+  const auto aligned = [](std::size_t at) {
+    return (at + kSectionAlignment - 1) / kSectionAlignment * kSectionAlignment;
+  };
+  std::string bytes(aligned(sizeof header + pieces.size() * sizeof(Section)), '\0');
+  for (Piece& piece : pieces) {
+    piece.row.offset = bytes.size();
+    piece.row.bytes = piece.bytes.size();
+    bytes += piece.bytes;
+    bytes.resize(aligned(bytes.size()), '\0');
+  }
+  Bytes file(bytes.data(), bytes.size());
+  file.header() = header;
+  file.header().file_bytes = file.size();
+  file.header().section_count = static_cast<std::uint32_t>(pieces.size());
+  for (std::size_t i = 0; i < pieces.size(); ++i) file.section(i) = pieces[i].row;
+  seal(file.data(), file.size());
+  return file;
+}
+
 }  // namespace tandem::test

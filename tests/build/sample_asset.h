@@ -61,6 +61,8 @@ class Bytes {
   }
   Block* blocks() { return elements<Block>(SectionKind::blocks); }
   OrientedBlock* oriented_blocks() { return elements<OrientedBlock>(SectionKind::oriented_blocks); }
+  TriangleTopology* topology() { return elements<TriangleTopology>(SectionKind::topology); }
+  SurfaceComponent* components() { return elements<SurfaceComponent>(SectionKind::components); }
   Triangle* triangles() { return elements<Triangle>(SectionKind::triangles); }
   Level& level() { return *elements<Level>(SectionKind::levels); }
 

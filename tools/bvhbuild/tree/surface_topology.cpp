@@ -50,38 +50,75 @@ void flag_edges(const SurfaceEdges& edges, SurfaceTopology& surface) {
 // The component of each triangle.
 using Components = std::vector<std::uint32_t>;
 
-// Numbers the component of `seed` and makes windings agree with the seed's across edges of two sides.
-void flood(const SurfaceEdges& edges, std::uint32_t seed, std::uint32_t number, SurfaceTopology& surface,
-           Components& component, std::vector<std::uint32_t>& members) {
-  members.assign(1, seed);
-  component[seed] = number;
-  for (std::size_t i = 0; i < members.size(); ++i) {
-    for (std::uint32_t side = 3 * members[i]; side < 3 * members[i] + 3; ++side) {
-      if (edges.edge_of(side) == SurfaceEdges::kNone) continue;
-      const auto sides = edges.sides_of(edges.edge_of(side));
+// Walks over a component, patch by patch: a patch is what edges of two sides join. In each, windings are made
+// to agree, the larger part keeping its own; of two halves, the one that is met first.
+class Flood {
+ public:
+  Flood(const SurfaceEdges& edges, SurfaceTopology& surface, Components& component)
+      : edges_(edges), surface_(surface), component_(component) {}
+
+  /// Numbers the component of `seed`. Result: how many triangles it has.
+  std::uint32_t run(std::uint32_t seed, std::uint32_t number) {
+    members_.clear();
+    number_ = number;
+    meet_patch(seed);
+    for (std::size_t i = 0; i < members_.size(); ++i) {
+      for_each_neighbour(members_[i],
+                         [&](std::uint32_t, std::uint32_t other, bool) { meet_patch(other / 3); });
+    }
+    return static_cast<std::uint32_t>(members_.size());
+  }
+
+ private:
+  // Calls use(side, other side, whether they are all that the edge has) for triangles not met yet.
+  template <typename Use>
+  void for_each_neighbour(std::uint32_t triangle, const Use& use) {
+    for (std::uint32_t side = 3 * triangle; side < 3 * triangle + 3; ++side) {
+      if (edges_.edge_of(side) == SurfaceEdges::kNone) continue;
+      const auto sides = edges_.sides_of(edges_.edge_of(side));
       for (const std::uint32_t other : sides) {
-        const std::uint32_t t = other / 3;
-        if (component[t] != kNoIndex) continue;
-        component[t] = number;
-        if (sides.size() == 2 && runs_up(surface.triangles, side) == runs_up(surface.triangles, other))
-          surface.triangles[t].flags ^= kTurned;
-        members.push_back(t);
+        if (component_[other / 3] == kNoIndex) use(side, other, sides.size() == 2);
       }
     }
   }
-}
+
+  void meet(std::uint32_t triangle) {
+    component_[triangle] = number_;
+    members_.push_back(triangle);
+  }
+
+  void meet_patch(std::uint32_t seed) {
+    const std::size_t first = members_.size();
+    std::size_t i = first;
+    for (meet(seed); i < members_.size(); ++i) {
+      for_each_neighbour(members_[i], [&](std::uint32_t side, std::uint32_t other, bool are_all) {
+        if (!are_all) return;
+        if (runs_up(surface_.triangles, side) == runs_up(surface_.triangles, other))
+          surface_.triangles[other / 3].flags ^= kTurned;
+        meet(other / 3);
+      });
+    }
+    const auto patch = std::span(members_).subspan(first);
+    const auto turned = std::count_if(patch.begin(), patch.end(),
+                                      [&](auto t) { return is_turned(surface_.triangles[t].flags); });
+    if (2 * static_cast<std::size_t>(turned) <= patch.size()) return;
+    for (const std::uint32_t t : patch) surface_.triangles[t].flags ^= kTurned;
+  }
+
+  const SurfaceEdges& edges_;
+  SurfaceTopology& surface_;
+  Components& component_;
+  std::vector<std::uint32_t> members_;
+  std::uint32_t number_ = 0;
+};
 
 Components orient_components(const SurfaceEdges& edges, SurfaceTopology& surface) {
   Components component(surface.triangles.size(), kNoIndex);
-  std::vector<std::uint32_t> members;
+  Flood flood(edges, surface, component);
   for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
     if (component[t] != kNoIndex) continue;
-    flood(edges, t, static_cast<std::uint32_t>(surface.components.size()), surface, component, members);
-    surface.components.push_back({t, static_cast<std::uint32_t>(members.size()), kClosedComponent, 0});
-    const auto turned = std::count_if(members.begin(), members.end(),
-                                      [&](auto m) { return is_turned(surface.triangles[m].flags); });
-    if (2 * static_cast<std::size_t>(turned) <= members.size()) continue;
-    for (const std::uint32_t m : members) surface.triangles[m].flags ^= kTurned;
+    const std::uint32_t triangles = flood.run(t, static_cast<std::uint32_t>(surface.components.size()));
+    surface.components.push_back({t, triangles, kClosedComponent, 0});
   }
   return component;
 }

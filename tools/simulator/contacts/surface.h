@@ -23,7 +23,6 @@ struct Surface {
   std::vector<Edge> edge;
   std::vector<std::uint32_t> fan_begin, fan;      ///< triangles around vertex v: fan[fan_begin[v]] to ...
   std::vector<std::uint32_t> spoke_begin, spoke;  ///< edges at vertex v, likewise
-  std::vector<std::uint32_t> component;           ///< of each triangle: parts joined by edges
   std::vector<std::uint8_t> turned;               ///< of each triangle: its winding is against the rest's
   std::uint32_t components = 0;
 
@@ -45,9 +44,8 @@ struct Surface {
   }
 };
 
-/// Welds, and orients: within a component windings are made to agree across edges of two triangles, the
-/// larger part keeping its own; closed components that are inside out are turned, unless they are cavities
-/// (a vertex of theirs lies within another component). Nothing is moved: what is turned is marked.
+/// The surface of a level with topology, from which come vertices and what is turned. Throws
+/// std::runtime_error where the level has none.
 Surface make_surface(const LevelView& level);
 
 }  // namespace tandem::simulation

@@ -15,6 +15,9 @@ inline constexpr double kNear = 0.005;
 /// An inner point is kept where it lies deeper than the rim by this factor.
 inline constexpr double kDeeper = 1.25;
 
+/// In patches of so few pieces the corners of their triangles are looked at for the deepest point.
+inline constexpr std::uint32_t kFewPieces = 64;
+
 /// What became of the contacts of a pair.
 struct PairCounters {
   std::uint32_t segments = 0, ambiguous_touches = 0;
@@ -56,7 +59,8 @@ class ManifoldMaker {
   TANDEM_HD void place_soundings(const RimFinder<Team>& finder, const Rim& rim, const PatchFrame& frame,
                                  bool touch);
   TANDEM_HD void sound(const PatchFrame& frame, int first, int count);
-  TANDEM_HD void sound_deepest(const PatchFrame& frame, const Rim& rim);
+  TANDEM_HD void sound_deepest(const PatchFrame& frame, const Rim& rim, std::uint32_t curve);
+  TANDEM_HD Extreme extreme_corner(const PatchFrame& frame, std::uint32_t begin, std::uint32_t end, int side) const;
   TANDEM_HD void look_behind(const PatchFrame& frame);
   TANDEM_HD int choose(const RimFinder<Team>& finder, const PatchFrame& frame, bool touch,
                        Chosen (&chosen)[kMostSoundings]) const;
@@ -117,11 +121,34 @@ TANDEM_HD void ManifoldMaker<Team>::sound(const PatchFrame& frame, int first, in
   team_.sync();
 }
 
+/// The highest corner of a's triangles of the curve, or the lowest of b's; of several the vertex of the least
+/// number.
+template <typename Team>
+TANDEM_HD Extreme ManifoldMaker<Team>::extreme_corner(const PatchFrame& frame, std::uint32_t begin,
+                                                      std::uint32_t end, int side) const {
+  Extreme best;
+  double furthest = -INFINITY;
+  for (std::uint32_t i = begin; i < end; ++i) {
+    const std::uint32_t t = memory_.pieces[memory_.order[i]].triangle[side];
+    for (int k = 0; k < 3; ++k) {
+      const Vector3 x = bodies_[side].corner(t, k);
+      const double height = frame.height(x), along = side == 0 ? height : -height;
+      const std::uint32_t vertex = bodies_[side].shape->topology[t].vertex[k];
+      if (along < furthest || (along == furthest && vertex >= best.vertex)) continue;
+      furthest = along;
+      best = {frame.flat(x), height, vertex};
+    }
+  }
+  return best;
+}
+
 /// Sounds where a's highest vertex in the patch is, and b's lowest: there, or in the middle, the overlap is
 /// deepest, or nearly. They are looked for within the rim, and no further along the normal than the rim and
-/// the middle are from each other's surfaces, and the rim's extent more.
+/// the middle are from each other's surfaces, and the rim's extent more; and among the corners of triangles
+/// that the curve cuts, where they are few: the tip of a coarse mesh may lean out of its rim.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::sound_deepest(const PatchFrame& frame, const Rim& rim) {
+TANDEM_HD void ManifoldMaker<Team>::sound_deepest(const PatchFrame& frame, const Rim& rim,
+                                                  std::uint32_t curve) {
   Prism prism;
   prism.frame = frame;
   const double more = 1e-6 * extent_ + 0x1p-40 * bodies_.reach();
@@ -144,11 +171,17 @@ TANDEM_HD void ManifoldMaker<Team>::sound_deepest(const PatchFrame& frame, const
   for (std::uint32_t side = team_.rank(); side < 2; side += team_.size()) {
     shared_.extreme[side] = extreme_vertex(bodies_[static_cast<int>(side)], prism, side == 0 ? 1 : -1);
   }
+  const std::uint32_t begin = memory_.start[curve], end = memory_.start[curve + 1];
+  const bool few = end - begin <= kFewPieces;
+  for (std::uint32_t side = team_.rank(); few && side < 2; side += team_.size()) {
+    shared_.extreme[2 + side] = extreme_corner(frame, begin, end, static_cast<int>(side));
+  }
   team_.sync();
   const int first = soundings_;
-  for (int side = 0; side < 2; ++side) {
-    const Extreme& extreme = shared_.extreme[side];
-    if (!extreme.found()) continue;
+  for (int i = 0; i < (few ? 4 : 2); ++i) {
+    const int side = i % 2;
+    const Extreme& extreme = shared_.extreme[i];
+    if (!extreme.found() || (i >= 2 && extreme.vertex == shared_.extreme[side].vertex)) continue;
     if (team_.rank() == 0) {
       Sounding& s = shared_.sounding[soundings_];
       s = {};
@@ -157,6 +190,7 @@ TANDEM_HD void ManifoldMaker<Team>::sound_deepest(const PatchFrame& frame, const
       s.target[side] = extreme.height;
       s.target[1 - side] = shared_.sounding[rim_points_].height;
       s.reference = kNoIndex;
+      s.vertex_of = side;
       s.feature = feature_hash(extreme.vertex, side == 0 ? 5 : 6);
     }
     ++soundings_;
@@ -167,7 +201,8 @@ TANDEM_HD void ManifoldMaker<Team>::sound_deepest(const PatchFrame& frame, const
 
 /// Looks whether lines that seem to overlap run within both bodies: where there are several curves, one may
 /// bound a hole, or one body may go through the other; and where the overlap is large beside the rim, the
-/// surfaces that the line found may not belong to the patch.
+/// surfaces that the line found may not belong to the patch. A vertex is part of its own body: the line may
+/// touch that no further.
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::look_behind(const PatchFrame& frame) {
   const bool several = summary_.curves > 1;
@@ -175,10 +210,11 @@ TANDEM_HD void ManifoldMaker<Team>::look_behind(const PatchFrame& frame) {
     Sounding& s = shared_.sounding[i / 2];
     if (!(s.overlap() > (several ? 0 : extent_ / 2))) continue;
     const int side = static_cast<int>(i % 2);
+    if (side == 0) s.looked_behind = true;
+    if (side == s.vertex_of) continue;
     const double height = s.surface[side].height;
     s.behind[side] = side == 0 ? nearest_crossing(bodies_.a, frame, s.line, -1, height, -INFINITY, height)
                                : nearest_crossing(bodies_.b, frame, s.line, 1, height, height, INFINITY);
-    if (side == 0) s.looked_behind = true;
   }
   team_.sync();
 }
@@ -251,7 +287,7 @@ TANDEM_HD bool ManifoldMaker<Team>::make_patch(std::uint32_t curve, const NewPat
   bool goes_through = false, hole = false;
   if (!normal.touch) {
     sound(frame, 0, soundings_);
-    sound_deepest(frame, rim);
+    sound_deepest(frame, rim, curve);
     look_behind(frame);
     if (summary_.curves > 1 && measure.closed) {
       double deepest = 0;

@@ -58,6 +58,7 @@ struct Sounding {
   double target[2];         ///< the height near which the line is to meet a's surface, b's
   std::uint32_t reference;  ///< of a rim point: the candidate. Else kNoIndex
   std::uint64_t feature;    ///< of others
+  int vertex_of = -1;       ///< the side whose vertex it is; -1: none's
   Crossing surface[2];      ///< a's, that faces along the normal; b's, that faces against it
   Crossing behind[2];       ///< where a begins, on the line; where b ends
   bool looked_behind;
@@ -80,13 +81,13 @@ struct Sounding {
   }
 };
 
-/// Rim, the middle, a's highest vertex and b's lowest.
-inline constexpr int kMostSoundings = static_cast<int>(kMostManifoldPoints) + 3;
+/// Rim, the middle, and twice a's highest vertex and b's lowest.
+inline constexpr int kMostSoundings = static_cast<int>(kMostManifoldPoints) + 5;
 
 /// What a team shares while it makes a patch.
 struct PatchMemory {
   Sounding sounding[kMostSoundings];
-  Extreme extreme[2];
+  Extreme extreme[4];
   std::uint32_t next;
 };
 

@@ -160,19 +160,23 @@ TANDEM_HD inline Crossing nearest_crossing(const Body& body, const PatchFrame& f
   const float slack = slack_near(body, point);
   const LineTest test = {point, in_mesh(body, frame.n), static_cast<float>(lower - target) - slack,
                          static_cast<float>(upper - target) + slack, slack, &reach};
+  const double rounding = 0x1p-48 * body.reach;
   walk_surface(body, test, [&](std::uint32_t t) {
     Vector3 corner[3];
     for (int k = 0; k < 3; ++k) corner[k] = body.corner(t, k) - frame.origin;
     const Vector3 normal = cross(corner[1] - corner[0], corner[2] - corner[0]);
     const double area = dot(frame.n, normal);
     const bool turned = is_turned(body.shape->topology[t].flags);
-    if ((area > 0) != ((facing > 0) != turned) || !(area * area > kWall * kWall * dot(normal, normal))) return;
+    const double size = norm(normal);
+    if ((area > 0) != ((facing > 0) != turned) || !(std::fabs(area) > kWall * size)) return;
     Vector2 side[3];
     for (int k = 0; k < 3; ++k) side[k] = Vector2{dot(frame.u, corner[k]), dot(frame.v, corner[k])} - at;
-    // Shares of the corners. What lies on an edge belongs to both triangles, so that no line slips through.
+    // Shares of the corners. What lies on an edge, or beside it by no more than rounding of posed points and a
+    // little of the triangle, belongs to both triangles: no line slips through.
     const double p = cross(side[1], side[2]) / area, q = cross(side[2], side[0]) / area,
                  r = cross(side[0], side[1]) / area;
-    if (!(p >= -1e-12 && q >= -1e-12 && r >= -1e-12)) return;
+    const double little = 1e-9 + rounding * std::sqrt(size) / std::fabs(area);
+    if (!(p >= -little && q >= -little && r >= -little)) return;
     const double height =
         p * dot(frame.n, corner[0]) + q * dot(frame.n, corner[1]) + r * dot(frame.n, corner[2]);
     if (!(height >= lower && height <= upper)) return;

@@ -38,7 +38,7 @@ __global__ void __launch_bounds__(kThreads) prepare(const __grid_constant__ Quer
   let_next_kernel_begin();
   const std::uint32_t first = blockIdx.x * kThreads + threadIdx.x, step = gridDim.x * kThreads;
   const std::uint32_t pairs = pair_count(args);
-  if (args.grouping.next != nullptr) clear_groups(args, first, step, pairs);
+  if (args.grouping.first_contact != nullptr) clear_groups(args, first, step, pairs);
   for (std::uint32_t i = first; i < pairs; i += step) prepare_pair(args, i);
   for (std::uint32_t i = step - 1 - first; i < args.instances.count;
        i += step) {  // by other threads, at first

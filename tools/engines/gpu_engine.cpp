@@ -39,14 +39,17 @@ void put(std::span<const Contact> contacts, std::vector<TriangleContact>& into) 
   });
 }
 
-// Of what the GPU was to sort.
-void check_order(const std::vector<Contact>& contacts) {
+// Of what the GPU was to group or sort.
+void check_order(const std::vector<Contact>& contacts, OrderOnGpu order) {
+  if (order == OrderOnGpu::any) return;
   const auto key = [](const Contact& c) {
     return std::tie(c.pair, c.face_a, c.face_b, c.triangle_a, c.triangle_b);
   };
-  const auto after = [&](const Contact& x, const Contact& y) { return key(x) >= key(y); };
+  const auto after = [&](const Contact& x, const Contact& y) {
+    return order == OrderOnGpu::sorted ? key(x) >= key(y) : x.pair > y.pair;
+  };
   if (std::adjacent_find(contacts.begin(), contacts.end(), after) == contacts.end()) return;
-  throw std::runtime_error("the GPU: its contacts are not sorted");
+  throw std::runtime_error("the GPU: its contacts are not in order");
 }
 
 // Brings the pairs into ascending order, and the contacts' rows with them.
@@ -152,7 +155,7 @@ GpuPairs GpuEngine::upload(std::span<const ObjectPair> pairs) {
 void GpuEngine::query(std::span<const ObjectPair> pairs) {
   const bool on_gpu =
       !pairs.empty() && pairs.data() == found_pairs_.data() && pairs.size() == broad_phase_.report().count;
-  ask(on_gpu ? broad_phase_.pairs() : upload(pairs), false);
+  ask(on_gpu ? broad_phase_.pairs() : upload(pairs), OrderOnGpu::any);
 }
 
 bool GpuEngine::contacts(std::vector<TriangleContact>& found_contacts) {
@@ -165,15 +168,15 @@ bool GpuEngine::contacts(std::vector<TriangleContact>& found_contacts) {
 }
 
 TimedAnswer GpuEngine::time_query(const TimedQuery& asked) {
-  if (asked.given == nullptr) find_pairs_on_gpu(asked.sorted);
+  if (asked.given == nullptr) find_pairs_on_gpu(asked.order == OrderOnGpu::sorted);
   const GpuPairs pairs = asked.given == nullptr ? broad_phase_.pairs() : upload(*asked.given);
-  ask(pairs, asked.sorted);
+  ask(pairs, asked.order);
   TimedAnswer answer;
   time_repeats(pairs, asked, answer);
   const GpuContacts contacts = found();
   answer.gpu = use(asked);
   answer.pairs.resize(asked.given == nullptr ? broad_phase_.report().count : pairs.capacity);
-  take(pairs, contacts, asked.sorted, answer);
+  take(pairs, contacts, asked.order, answer);
   if (asked.traversal) answer.traversal = time_walk(pairs, asked.repeats);
   return answer;
 }
@@ -184,12 +187,13 @@ void GpuEngine::time_repeats(const GpuPairs& pairs, const TimedQuery& asked, Tim
   const bool finds_pairs = asked.given == nullptr;
   const Before before = [&](unsigned event_flags) {
     if (finds_pairs) {
-      const Status status = broad_phase_.enqueue(instances_, bounds(), {.sorted = asked.sorted}, stream());
+      const Status status =
+          broad_phase_.enqueue(instances_, bounds(), {.sorted = asked.order == OrderOnGpu::sorted}, stream());
       check(status, broad_phase_.cuda_error(), "broad phase");
     }
     check(between.record(stream(), event_flags), "an event");
   };
-  const std::function<void()> run = repeatable(pairs, asked.sorted, before);
+  const std::function<void()> run = repeatable(pairs, asked.order, before);
   for (std::uint32_t i = 0; i < asked.repeats; ++i) {
     run_between(begin, run, end);
     answer.whole.push_back(seconds_between(begin, end));
@@ -212,11 +216,11 @@ double GpuEngine::seconds_between(const GpuEvent& begin, const GpuEvent& end) co
   return 1e-3 * static_cast<double>(milliseconds);
 }
 
-void GpuEngine::take(const GpuPairs& pairs, const GpuContacts& contacts, bool sorted,
+void GpuEngine::take(const GpuPairs& pairs, const GpuContacts& contacts, OrderOnGpu order,
                      TimedAnswer& answer) const {
   std::vector<Contact> found(contacts.count);
   check(download(contacts.data, std::span(found), stream()), "download");
-  if (sorted) check_order(found);
+  check_order(found, order);
   put(found, answer.contacts);
   check(download(pairs.pairs, std::span(answer.pairs), stream()), "download");
   sort_pairs(answer);
@@ -239,11 +243,11 @@ GpuUse GpuEngine::use(const TimedQuery& asked) const {
   use.name = properties.name;
   use.upload = upload_of_shapes_ + upload_of_bodies_;
   use.bytes = scene_bytes(asked) + broad_phase_.bytes() + query_bytes();
-  use.bytes_bound = most_bytes(asked.sorted);
+  use.bytes_bound = most_bytes(asked.order);
   if (use.bytes_bound != 0) {
     use.bytes_bound += scene_bytes(asked);
     if (asked.given == nullptr)
-      use.bytes_bound += most_broad_phase_bytes(broad_phase_.capacity(), asked.sorted);
+      use.bytes_bound += most_broad_phase_bytes(broad_phase_.capacity(), asked.order == OrderOnGpu::sorted);
   }
   use.bytes_taken = free_at_start_ - free;
   return use;

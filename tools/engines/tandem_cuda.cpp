@@ -14,14 +14,17 @@ class TandemCudaEngine final : public GpuEngine {
         options_(options) {}
 
  private:
-  GpuQueryOptions options(bool sorted) const {
-    return {.mode = options_.mode, .first_contact_only = options_.first_contact_only, .sorted = sorted};
+  GpuQueryOptions options(OrderOnGpu order) const {
+    return {.mode = options_.mode,
+            .first_contact_only = options_.first_contact_only,
+            .sorted = order == OrderOnGpu::sorted,
+            .grouped = order == OrderOnGpu::grouped};
   }
 
   void name_shapes() override { name_shapes_to(query_); }
 
-  void ask(const GpuPairs& pairs, bool sorted) override {
-    const Status status = query_.find_contacts(instances(), pairs, options(sorted), stream());
+  void ask(const GpuPairs& pairs, OrderOnGpu order) override {
+    const Status status = query_.find_contacts(instances(), pairs, options(order), stream());
     if (subject(status) != nullptr) require(status, query_.report().where);
     check(status, query_.cuda_error(), "contacts");
   }
@@ -35,10 +38,10 @@ class TandemCudaEngine final : public GpuEngine {
   }
 
   // A graph that is replayed.
-  std::function<void()> repeatable(const GpuPairs& pairs, bool sorted, const Before& before) override {
+  std::function<void()> repeatable(const GpuPairs& pairs, OrderOnGpu order, const Before& before) override {
     return captured([=, this, &before] {
       before(cudaEventRecordExternal);
-      enqueue(query_, pairs, options(sorted), "contacts");
+      enqueue(query_, pairs, options(order), "contacts");
     });
   }
 
@@ -77,8 +80,8 @@ class TandemCudaEngine final : public GpuEngine {
   }
 
   std::size_t query_bytes() const override { return query_.bytes(); }
-  std::size_t most_bytes(bool sorted) const override {
-    return most_query_bytes(query_.capacity(), sorted, shapes().size());
+  std::size_t most_bytes(OrderOnGpu order) const override {
+    return most_query_bytes(query_.capacity(), options(order), shapes().size());
   }
 
   QueryOptions options_;

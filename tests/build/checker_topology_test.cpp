@@ -234,7 +234,8 @@ TEST(CheckTopology, BothSectionsAreThereOrNone) {
   EXPECT_EQ(status_after([&](Pieces& p) { cut(*find(p, kComponents), 2); }), Status::kComponentMismatch);
   EXPECT_EQ(status_after([&](Pieces& p) { ++find(p, kTopology)->row.level; }), Status::kUnknownSection);
   EXPECT_EQ(status_after([&](Pieces& p) { p.push_back(*find(p, kComponents)); }), Status::kSectionDuplicated);
-  EXPECT_EQ(status_after([&](Pieces& p) { find(p, kTopology)->bytes += '\0'; }), Status::kSectionSizeMismatch);
+  EXPECT_EQ(status_after([&](Pieces& p) { find(p, kTopology)->bytes += '\0'; }),
+            Status::kSectionSizeMismatch);
 }
 
 TEST(CheckTopology, AFileWithoutHasNullPointers) {

@@ -20,7 +20,7 @@ struct QueryArguments {
   std::string scene, out, backend = "cpu", gpu_engine = "tandem-cuda";
   QueryOptions options;
   std::uint32_t repeats = 1;
-  bool grouped = false, sorted = false, traversal = false;
+  bool grouped = false, sorted = false, traversal = false, manifolds = false;
   bool json = false, threads_given = false;
 
   bool on_gpu() const { return backend == "cuda"; }
@@ -111,8 +111,8 @@ Answer run_query(const QueryArguments& arguments, const Scene& scene) {
   Answer answer = {record_of(arguments, scene), {}, {}};
   engine->set_shapes(views);
   engine->update(description.instances);
-  answer.timed = engine->time_query(
-      {description.pairs ? &pairs : nullptr, arguments.repeats, arguments.order(), arguments.traversal});
+  answer.timed = engine->time_query({description.pairs ? &pairs : nullptr, arguments.repeats,
+                                     arguments.order(), arguments.traversal, arguments.manifolds});
   answer.record.seconds = answer.timed.whole;
   answer.record.counters = engine->counters();
   answer.table = table_of(scene, answer.timed);
@@ -123,6 +123,10 @@ Answer answer_of(const QueryArguments& arguments, const Scene& scene) {
   try {
     return run_query(arguments, scene);
   } catch (const EngineError& error) {
+    if (error.status == Status::kNoTopology) {
+      throw FileError(arguments.scene + ": " + scene.description.assets[error.where] + ": " +
+                      explain(error.status));
+    }
     refuse(arguments.scene, error.status, error.where);
   } catch (const GpuError& error) {
     refuse(arguments.scene, error);
@@ -167,6 +171,15 @@ Json to_json(const QueryArguments& arguments, const Scene& scene, const Answer& 
                {"contacts", counters.contacts},
                {"hash", hexadecimal(hash_of(answer.table))},
                {"seconds", times(record.seconds)}};
+  if (arguments.manifolds) {
+    const ManifoldCounters& made = answer.timed.manifolds.counters;
+    json["manifolds"] = made.manifolds;
+    json["points"] = made.points;
+    json["segments"] = made.segments;
+    json["open_curves"] = made.open_curves;
+    json["ambiguous_touches"] = made.ambiguous_touches;
+    json["manifold_seconds"] = times(answer.timed.manifolds.seconds);
+  }
   if (arguments.on_gpu()) {
     json["engine"] = name_of(arguments.gpu_engine, kGpuEngines);
     json["gpu"] = answer.timed.gpu.name;
@@ -215,6 +228,11 @@ void print_summary(const QueryArguments& arguments, const Scene& scene, const An
   }
   print_row("contacts", counters.contacts);
   print_times("milliseconds", times(record.seconds), record.given_pairs ? "; without the broad phase" : "");
+  if (arguments.manifolds) {
+    print_row("manifolds", answer.timed.manifolds.counters.manifolds);
+    print_row("points", answer.timed.manifolds.counters.points);
+    print_times("  manifolds", times(answer.timed.manifolds.seconds), " on top");
+  }
   if (arguments.on_gpu()) {
     print_times("  broad phase", times(answer.timed.broad_phase));
     print_times("  contacts", times(answer.timed.narrow));
@@ -229,6 +247,14 @@ void print_summary(const QueryArguments& arguments, const Scene& scene, const An
 void check_arguments(const QueryArguments& arguments, const Scene& scene) {
   if (arguments.options.self_pairs && scene.description.pairs) {
     throw UsageError(arguments.scene + ": gives its object pairs, so --self has nothing to add");
+  }
+  if (arguments.manifolds &&
+      (arguments.options.mode == QueryMode::boxes || arguments.options.first_contact_only)) {
+    throw UsageError(
+        "--manifolds takes all contacts, so neither --mode boxes nor --first-contact goes with it");
+  }
+  if (arguments.manifolds && arguments.on_gpu()) {
+    throw UsageError("--manifolds is for the backend cpu; on a GPU there are none yet");
   }
   const bool tandem = arguments.gpu_engine == "tandem-cuda";
   if (!arguments.on_gpu()) {
@@ -248,6 +274,12 @@ void check_arguments(const QueryArguments& arguments, const Scene& scene) {
   if (arguments.threads_given) throw UsageError("--threads is for the backend cpu");
 }
 
+void write(const QueryArguments& arguments, const Answer& answer) {
+  const TimedManifolds& made = answer.timed.manifolds;
+  const ManifoldTable manifolds = {made.manifolds, made.points, made.counters, made.seconds};
+  write_contacts(arguments.out, answer.table, answer.record, arguments.manifolds ? &manifolds : nullptr);
+}
+
 // The scene file and its assets, as paths from here.
 std::vector<std::string> files_of(const std::string& path, const Scene& scene) {
   std::vector<std::string> files = {path};
@@ -263,7 +295,7 @@ ExitCode run(const QueryArguments& arguments) {
   check_arguments(arguments, scene);
   if (!arguments.out.empty()) try_output(arguments.out);
   const Answer answer = answer_of(arguments, scene);
-  if (!arguments.out.empty()) write_contacts(arguments.out, answer.table, answer.record);
+  if (!arguments.out.empty()) write(arguments, answer);
   if (arguments.json) {
     std::puts(pretty(to_json(arguments, scene, answer)).c_str());
   } else {
@@ -314,6 +346,8 @@ CLI::App* add_query(CLI::App& app, Run& run_later) {
       ->option_text("exact|fast|boxes [exact]");
   command->add_flag("--first-contact", options.first_contact_only,
                     "one contact for each object pair at most");
+  command->add_flag("--manifolds", arguments->manifolds,
+                    "also contact manifolds: normals, depths and points");
   command->add_flag("--self", options.self_pairs, "also each instance with itself");
   CLI::Option* threads =
       command->add_option("--threads", options.threads, "threads; the contacts do not depend on them")

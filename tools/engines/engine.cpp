@@ -67,6 +67,7 @@ TimedAnswer Engine::time_query(const TimedQuery& asked) {
       query(pairs);
     }
     answer.whole.push_back(watch.lap());
+    if (asked.manifolds) make_manifolds(pairs, answer.manifolds);
   }
   answer.pairs.assign(pairs.begin(), pairs.end());
   contacts(answer.contacts);
@@ -95,6 +96,10 @@ std::span<const ObjectPair> Engine::find_pairs_and_query() {
   const std::span<const ObjectPair> pairs = find_pairs();
   query(pairs);
   return pairs;
+}
+
+void Engine::make_manifolds(std::span<const ObjectPair>, TimedManifolds&) {
+  throw std::logic_error("an engine that makes no manifolds");
 }
 
 void Engine::require(Status status, std::uint64_t where) const {

@@ -11,6 +11,7 @@
 
 #include "common/stopwatch.h"
 #include "tandem/kernels/contact_query.h"
+#include "tandem/kernels/manifold.h"
 
 namespace tandem {
 
@@ -52,6 +53,7 @@ struct TimedQuery {
   std::uint32_t repeats = 1;
   OrderOnGpu order = OrderOnGpu::any;  ///< on a GPU
   bool traversal = false;              ///< on a GPU: the walk of the trees is timed alone too
+  bool manifolds = false;              ///< contact manifolds are made of what each repeat finds, and timed
 };
 
 /// What an engine takes of a GPU.
@@ -64,6 +66,15 @@ struct GpuUse {
   std::size_t bytes_taken = 0;  ///< by the driver's count; what CUDA keeps for kernels included
 };
 
+/// Contact manifolds of what a timed query found, in the order of ContactManifolds. Their ids are those of
+/// the features.
+struct TimedManifolds {
+  std::vector<Manifold> manifolds;
+  std::vector<ManifoldPoint> points;
+  ManifoldCounters counters;
+  Seconds seconds;  ///< of each repeat, beside the query's
+};
+
 /// What a timed query found, and how long that took.
 struct TimedAnswer {
   std::vector<ObjectPair> pairs;          ///< sorted
@@ -71,6 +82,7 @@ struct TimedAnswer {
   Seconds whole;                          ///< both steps, and what it takes to start them
   Seconds broad_phase, narrow;            ///< the two steps where they are timed apart, as on a GPU
   Seconds traversal;                      ///< the walk of the same pairs, without triangle tests
+  TimedManifolds manifolds;               ///< where they were asked for
   GpuUse gpu;                             ///< of engines on a GPU
 };
 
@@ -136,7 +148,7 @@ class Engine {
   virtual bool contacts(std::vector<TriangleContact>& found) = 0;
 
   /// Finds pairs, where none are given, and contacts, `repeats` times, and tells what each took. Condition:
-  /// update(); order and traversal are for engines that have them.
+  /// update(); order, traversal and manifolds are for engines that have them.
   virtual TimedAnswer time_query(const TimedQuery& asked);
 
   /// What a simulator asks for: update(), find_pairs(), query() and contacts(), in the order of a
@@ -163,6 +175,10 @@ class Engine {
  protected:
   /// find_pairs() and query() of these. Result: the pairs.
   virtual std::span<const ObjectPair> find_pairs_and_query();
+
+  /// Makes contact manifolds of what the last query found between these pairs, which were its pairs. Adds the
+  /// seconds that it took. Throws std::logic_error of an engine that has none.
+  virtual void make_manifolds(std::span<const ObjectPair> pairs, TimedManifolds& made);
 
   /// Throws what a status other than kOk calls for. `where`: the body to blame, where there is one.
   void require(Status status, std::uint64_t where) const;

@@ -1,6 +1,8 @@
 #include <memory>
+#include <optional>
 
 #include "engine.h"
+#include "tandem/kernels/contact_manifolds.h"
 
 namespace tandem {
 namespace {
@@ -21,6 +23,8 @@ class TandemEngine final : public Engine {
 
   void set_shapes(std::span<const AssetView> shapes) override {
     check(query_.set_assets(shapes));
+    shapes_.assign(shapes.begin(), shapes.end());
+    manifolds_.reset();
     file_bytes_ = 0;
     for (const AssetView& shape : shapes) file_bytes_ += shape.header->file_bytes;
   }
@@ -61,11 +65,28 @@ class TandemEngine final : public Engine {
     return query_.pairs();
   }
 
+  void make_manifolds(std::span<const ObjectPair> pairs, TimedManifolds& made) override {
+    if (!manifolds_) {
+      manifolds_.emplace();
+      require(manifolds_->set_assets(shapes_), manifolds_->where());
+    }
+    Stopwatch watch;
+    const Status status = manifolds_->make(bodies_, pairs, query_.contacts(),
+                                           {.match_previous = false, .threads = options_.threads});
+    made.seconds.push_back(watch.lap());
+    require(status, manifolds_->where());
+    made.manifolds.assign(manifolds_->manifolds().begin(), manifolds_->manifolds().end());
+    made.points.assign(manifolds_->points().begin(), manifolds_->points().end());
+    made.counters = manifolds_->counters();
+  }
+
  private:
   void check(Status status) const { require(status, query_.where()); }
 
   QueryOptions options_;
   ContactQuery query_;
+  std::vector<AssetView> shapes_;
+  std::optional<ContactManifolds> manifolds_;  // of shapes_, once they are asked for
   std::span<const BodyPose> bodies_;
   std::uint64_t file_bytes_ = 0;
 };

@@ -1,7 +1,9 @@
 #include "contacts_file.h"
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
+#include <type_traits>
 
 #include "common/number_words.h"
 #include "hdf5_file.h"
@@ -15,6 +17,55 @@ std::vector<std::uint32_t> flat(std::span<const ObjectPair> pairs) {
   numbers.reserve(2 * pairs.size());
   for (const ObjectPair& pair : pairs) numbers.insert(numbers.end(), {pair.a, pair.b});
   return numbers;
+}
+
+// One number of each element.
+template <typename Element, typename Member>
+auto numbers(std::span<const Element> elements, const Member& member) {
+  std::vector<std::decay_t<decltype(member(elements[0]))>> all;
+  all.reserve(elements.size());
+  for (const Element& element : elements) all.push_back(member(element));
+  return all;
+}
+
+// A vector of each element, one after the other.
+template <typename Element>
+std::vector<double> vectors(std::span<const Element> elements, double (Element::*member)[3]) {
+  std::vector<double> all;
+  all.reserve(3 * elements.size());
+  for (const Element& element : elements) all.insert(all.end(), element.*member, element.*member + 3);
+  return all;
+}
+
+double area_of(const Manifold& manifold) {
+  const double(&v)[3] = manifold.area_vector;
+  return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+void add_manifolds(Hdf5Output& file, const ManifoldTable& table) {
+  const auto manifolds = table.manifolds;
+  const auto points = table.points;
+  const std::size_t m = manifolds.size(), k = points.size();
+  std::vector<std::uint32_t> first = numbers(manifolds, [](const Manifold& x) { return x.first_point; });
+  first.push_back(static_cast<std::uint32_t>(k));
+  file.add("/manifolds/pair", {m}, numbers(manifolds, [](const Manifold& x) { return x.pair; }));
+  file.add("/manifolds/normal", {m, 3}, vectors(manifolds, &Manifold::normal));
+  file.add("/manifolds/area", {m}, numbers(manifolds, area_of));
+  file.add("/manifolds/depth", {m}, numbers(manifolds, [](const Manifold& x) { return x.depth; }));
+  file.add("/manifolds/centre", {m, 3}, vectors(manifolds, &Manifold::centre));
+  file.add("/manifolds/first", {m + 1}, first);
+  file.add("/points/position", {k, 3}, vectors(points, &ManifoldPoint::position));
+  file.add("/points/depth", {k}, numbers(points, [](const ManifoldPoint& x) { return x.depth; }));
+  file.add("/points/id", {k}, numbers(points, [](const ManifoldPoint& x) { return x.id; }));
+  file.add("/points/face_a", {k}, numbers(points, [](const ManifoldPoint& x) { return x.face_a; }));
+  file.add("/points/face_b", {k}, numbers(points, [](const ManifoldPoint& x) { return x.face_b; }));
+  file.attribute("manifolds", table.counters.manifolds);
+  file.attribute("points", table.counters.points);
+  file.attribute("segments", table.counters.segments);
+  file.attribute("open_curves", table.counters.open_curves);
+  file.attribute("ambiguous_touches", table.counters.ambiguous_touches);
+  file.attribute("best_manifold_seconds", best_of(table.seconds));
+  file.attribute("median_manifold_seconds", median_of(table.seconds));
 }
 
 }  // namespace
@@ -55,7 +106,8 @@ std::uint64_t hash_of(const ContactTable& table) {
   return xxh64(all.data(), all.size() * sizeof(std::uint32_t));
 }
 
-void write_contacts(const std::string& path, const ContactTable& table, const QueryRecord& record) {
+void write_contacts(const std::string& path, const ContactTable& table, const QueryRecord& record,
+                    const ManifoldTable* manifolds) {
   const QueryCounters& counters = record.counters;
   Hdf5Output file(path);
   file.add("/pairs", {table.pairs.size(), 2}, flat(table.pairs));
@@ -80,6 +132,7 @@ void write_contacts(const std::string& path, const ContactTable& table, const Qu
   file.attribute("decided_exactly", counters.decided_exactly);
   file.attribute("contacts", counters.contacts);
   file.attribute("hash", hexadecimal(hash_of(table)));
+  if (manifolds != nullptr) add_manifolds(file, *manifolds);
   file.write();
 }
 

@@ -7,6 +7,7 @@
 
 #include "common/stopwatch.h"
 #include "tandem/kernels/contact_query.h"
+#include "tandem/kernels/manifold.h"
 
 namespace tandem::bench {
 
@@ -44,7 +45,16 @@ struct QueryRecord {
   QueryCounters counters;
 };
 
-/// Writes a contacts file (docs/scenes.md), whole or not at all. Throws OutputError.
-void write_contacts(const std::string& path, const ContactTable& table, const QueryRecord& record);
+/// Contact manifolds that go with a ContactTable: Manifold::pair is a row of its pairs.
+struct ManifoldTable {
+  std::span<const Manifold> manifolds;
+  std::span<const ManifoldPoint> points;
+  ManifoldCounters counters;
+  Seconds seconds;  ///< of each repeat, at least one
+};
+
+/// Writes a contacts file (docs/scenes.md), whole or not at all. manifolds: or null. Throws OutputError.
+void write_contacts(const std::string& path, const ContactTable& table, const QueryRecord& record,
+                    const ManifoldTable* manifolds = nullptr);
 
 }  // namespace tandem::bench

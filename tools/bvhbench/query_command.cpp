@@ -253,9 +253,6 @@ void check_arguments(const QueryArguments& arguments, const Scene& scene) {
     throw UsageError(
         "--manifolds takes all contacts, so neither --mode boxes nor --first-contact goes with it");
   }
-  if (arguments.manifolds && arguments.on_gpu()) {
-    throw UsageError("--manifolds is for the backend cpu; on a GPU there are none yet");
-  }
   const bool tandem = arguments.gpu_engine == "tandem-cuda";
   if (!arguments.on_gpu()) {
     if (!tandem) throw UsageError("--engine is for the backend cuda");
@@ -265,8 +262,8 @@ void check_arguments(const QueryArguments& arguments, const Scene& scene) {
     return;
   }
   if (!tandem &&
-      (arguments.options.first_contact_only || arguments.order() != OrderOnGpu::any || arguments.traversal)) {
-    throw UsageError("--first-contact, --grouped, --sorted and --traversal are for the engine tandem");
+      (arguments.options.first_contact_only || arguments.order() != OrderOnGpu::any || arguments.traversal || arguments.manifolds)) {
+    throw UsageError("--first-contact, --grouped, --manifolds, --sorted and --traversal are for the engine tandem");
   }
   if (arguments.options.self_pairs) {
     throw UsageError("--self is for the backend cpu; /pairs of a scene may name an instance twice");

@@ -52,6 +52,22 @@ void check_order(const std::vector<Contact>& contacts, OrderOnGpu order) {
   throw std::runtime_error("the GPU: its contacts are not in order");
 }
 
+// Manifolds by their new rows, and their points with them. Within a pair they stay as they are.
+void sort_manifolds(const std::vector<std::uint32_t>& row, TimedManifolds& made) {
+  for (Manifold& manifold : made.manifolds) manifold.pair = row[manifold.pair];
+  std::stable_sort(made.manifolds.begin(), made.manifolds.end(),
+                   [](const Manifold& x, const Manifold& y) { return x.pair < y.pair; });
+  const std::vector<ManifoldPoint> points = std::move(made.points);
+  made.points.clear();
+  for (std::uint32_t i = 0; i < made.manifolds.size(); ++i) {
+    Manifold& manifold = made.manifolds[i];
+    const auto first = points.begin() + manifold.first_point;
+    manifold.first_point = static_cast<std::uint32_t>(made.points.size());
+    made.points.insert(made.points.end(), first, first + manifold.point_count);
+    for (std::uint32_t k = manifold.first_point; k < made.points.size(); ++k) made.points[k].manifold = i;
+  }
+}
+
 // Brings the pairs into ascending order, and the contacts' rows with them.
 void sort_pairs(TimedAnswer& answer) {
   const std::vector<ObjectPair> pairs = std::move(answer.pairs);
@@ -65,6 +81,7 @@ void sort_pairs(TimedAnswer& answer) {
     answer.pairs.push_back(pairs[order[i]]);
   }
   for (TriangleContact& contact : answer.contacts) contact.pair = row[contact.pair];
+  sort_manifolds(row, answer.manifolds);
 }
 
 }  // namespace
@@ -170,20 +187,21 @@ bool GpuEngine::contacts(std::vector<TriangleContact>& found_contacts) {
 TimedAnswer GpuEngine::time_query(const TimedQuery& asked) {
   if (asked.given == nullptr) find_pairs_on_gpu(asked.order == OrderOnGpu::sorted);
   const GpuPairs pairs = asked.given == nullptr ? broad_phase_.pairs() : upload(*asked.given);
-  ask(pairs, asked.order);
+  ask(pairs, asked.manifolds && asked.order == OrderOnGpu::any ? OrderOnGpu::grouped : asked.order);
   TimedAnswer answer;
   time_repeats(pairs, asked, answer);
   const GpuContacts contacts = found();
   answer.gpu = use(asked);
   answer.pairs.resize(asked.given == nullptr ? broad_phase_.report().count : pairs.capacity);
+  if (asked.manifolds) take_manifolds(answer.manifolds);
   take(pairs, contacts, asked.order, answer);
   if (asked.traversal) answer.traversal = time_walk(pairs, asked.repeats);
   return answer;
 }
 
 void GpuEngine::time_repeats(const GpuPairs& pairs, const TimedQuery& asked, TimedAnswer& answer) {
-  GpuEvent begin, between, end;
-  for (GpuEvent* event : {&begin, &between, &end}) check(event->create(), "an event");
+  GpuEvent begin, between, found, end;
+  for (GpuEvent* event : {&begin, &between, &found, &end}) check(event->create(), "an event");
   const bool finds_pairs = asked.given == nullptr;
   const Before before = [&](unsigned event_flags) {
     if (finds_pairs) {
@@ -193,13 +211,22 @@ void GpuEngine::time_repeats(const GpuPairs& pairs, const TimedQuery& asked, Tim
     }
     check(between.record(stream(), event_flags), "an event");
   };
-  const std::function<void()> run = repeatable(pairs, asked.order, before);
+  const Before then = [&](unsigned event_flags) { check(found.record(stream(), event_flags), "an event"); };
+  const std::function<void()> run = asked.manifolds ? repeatable_with_manifolds(pairs, asked.order, before, then)
+                                                    : repeatable(pairs, asked.order, before);
+  const GpuEvent& end_of_query = asked.manifolds ? found : end;
   for (std::uint32_t i = 0; i < asked.repeats; ++i) {
     run_between(begin, run, end);
-    answer.whole.push_back(seconds_between(begin, end));
-    answer.narrow.push_back(seconds_between(finds_pairs ? between : begin, end));
+    answer.whole.push_back(seconds_between(begin, end_of_query));
+    answer.narrow.push_back(seconds_between(finds_pairs ? between : begin, end_of_query));
+    if (asked.manifolds) answer.manifolds.seconds.push_back(seconds_between(found, end));
     if (finds_pairs) answer.broad_phase.push_back(seconds_between(begin, between));
   }
+}
+
+std::function<void()> GpuEngine::repeatable_with_manifolds(const GpuPairs&, OrderOnGpu, const Before&,
+                                                           const Before&) {
+  throw std::logic_error("an engine that makes no manifolds");
 }
 
 void GpuEngine::run_between(const GpuEvent& begin, const std::function<void()>& run,

@@ -77,6 +77,13 @@ class GpuEngine : public Engine {
   /// what `before` looks at stays.
   virtual std::function<void()> repeatable(const GpuPairs& pairs, OrderOnGpu order, const Before& before) = 0;
 
+  /// The same with contact manifolds of what the query finds, behind `between`. Engines that have none throw.
+  virtual std::function<void()> repeatable_with_manifolds(const GpuPairs& pairs, OrderOnGpu order,
+                                                          const Before& before, const Before& between);
+
+  /// What the last repeat of these made, their rows those of the GPU's pairs.
+  virtual void take_manifolds(TimedManifolds&) {}
+
   /// Times the walk of the trees alone.
   virtual Seconds time_walk(const GpuPairs&, std::uint32_t) { return {}; }
 

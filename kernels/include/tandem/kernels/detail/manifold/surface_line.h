@@ -1,4 +1,5 @@
 #pragma once
+#include <bit>
 #include <cstdint>
 
 #include "tandem/kernels/detail/manifold/body.h"
@@ -75,6 +76,29 @@ struct BlockAxes {
   }
 };
 
+/// The nodes of a block whose boxes pass a test, a bit each. The block is read as a whole: float4 loads on a GPU.
+template <typename AnyBlock, typename Test>
+TANDEM_HD inline unsigned nodes_that_pass(const AnyBlock& block, const Test& test) {
+  unsigned mask = 0;
+#ifdef __CUDA_ARCH__
+#pragma unroll
+#endif
+  for (int i = 0; i < kNodesPerBlock; ++i) {
+    const FloatVector center = {{block.center[0][i], block.center[1][i], block.center[2][i]}};
+    const FloatVector half = {{block.half_extent[0][i], block.half_extent[1][i], block.half_extent[2][i]}};
+    mask |= test.passes(center, half) ? 1u << i : 0u;
+  }
+  return mask;
+}
+
+TANDEM_HD inline int lowest_bit(unsigned mask) {
+#ifdef __CUDA_ARCH__
+  return __ffs(static_cast<int>(mask)) - 1;
+#else
+  return std::countr_zero(mask);
+#endif
+}
+
 /// Visits the triangles of a body whose boxes pass the test. Test: passes(center, half_extent) of a box, and
 /// turned(axes), the same test for boxes along these axes. Imaginary boxes pass no test that compares with <=.
 template <typename Test, typename Visit>
@@ -83,34 +107,25 @@ TANDEM_HD inline void walk_surface(const Body& body, const Test& test, const Vis
   std::uint32_t stack[3 * kMaxDepth + 2];
   int waiting = 0;
   stack[waiting++] = 0;
+  const auto go_on = [&](unsigned mask, bool leaves, const auto& below) {
+    for (; mask != 0; mask &= mask - 1) {
+      const std::uint32_t index = below(lowest_bit(mask));
+      if (leaves)
+        visit(index);
+      else
+        stack[waiting++] = index;
+    }
+  };
   while (waiting > 0) {
     const std::uint32_t index = stack[--waiting];
     if (shape.blocks != nullptr) {
       const Block& block = shape.blocks[index];
-      for (int i = kNodesPerBlock - 1; i >= 0; --i) {
-        const FloatVector center = {{block.center[0][i], block.center[1][i], block.center[2][i]}};
-        const FloatVector half = {{block.half_extent[0][i], block.half_extent[1][i], block.half_extent[2][i]}};
-        if (!test.passes(center, half)) continue;
-        if (block.kind[i] == NodeKind::leaf) {
-          visit(block.index[i]);
-        } else if (block.kind[i] == NodeKind::internal) {
-          stack[waiting++] = block.index[i];
-        }
-      }
+      go_on(nodes_that_pass(block, test), block.is_leaf_block(), [&](int i) { return block.index[i]; });
     } else {
-      const OrientedBlock& block = shape.oriented_blocks[index];
-      const auto turned = test.turned(BlockAxes(block.rotation));
-      for (int i = kNodesPerBlock - 1; i >= 0; --i) {
-        const FloatVector center = {{block.center[0][i], block.center[1][i], block.center[2][i]}};
-        const FloatVector half = {{block.half_extent[0][i], block.half_extent[1][i], block.half_extent[2][i]}};
-        if (!turned.passes(center, half)) continue;
-        const std::uint32_t below = (block.first_below & ~OrientedBlock::kIsLeafBlock) + static_cast<std::uint32_t>(i);
-        if (block.is_leaf_block()) {
-          visit(below);
-        } else {
-          stack[waiting++] = below;
-        }
-      }
+      const OrientedBlock block = shape.oriented_blocks[index];
+      const std::uint32_t first = block.first_below & ~OrientedBlock::kIsLeafBlock;
+      go_on(nodes_that_pass(block, test.turned(BlockAxes(block.rotation))), block.is_leaf_block(),
+            [&](int i) { return first + static_cast<std::uint32_t>(i); });
     }
   }
 }
@@ -164,7 +179,8 @@ TANDEM_HD inline Crossing crossing_within(const Body& body, const PatchFrame& fr
   const double rounding = 0x1p-48 * body.reach;
   walk_surface(body, test, [&](std::uint32_t t) {
     Vector3 corner[3];
-    for (int k = 0; k < 3; ++k) corner[k] = body.corner(t, k) - frame.origin;
+    const Triangle stored = body.shape->triangles[t];
+    for (int k = 0; k < 3; ++k) corner[k] = body.posed(stored.corner[k]) - frame.origin;
     const Vector3 normal = cross(corner[1] - corner[0], corner[2] - corner[0]);
     const double area = dot(frame.n, normal);
     const bool turned = is_turned(body.shape->topology[t].flags);
@@ -277,9 +293,10 @@ TANDEM_HD inline Extreme extreme_vertex(const Body& body, const Prism& prism, in
   test.most_below = static_cast<float>(upwards > 0 ? prism.upper : -prism.lower) + test.slack;
   test.furthest = &reached;
   walk_surface(body, test, [&](std::uint32_t t) {
-    const TriangleTopology& topology = body.shape->topology[t];
+    const TriangleTopology topology = body.shape->topology[t];
+    const Triangle stored = body.shape->triangles[t];
     for (int k = 0; k < 3; ++k) {
-      const Vector3 x = body.corner(t, k);
+      const Vector3 x = body.posed(stored.corner[k]);
       const double height = frame.height(x), along = upwards * height;
       const std::uint32_t vertex = topology.vertex[k];
       if (!(along >= furthest) || (along == furthest && vertex >= best.vertex)) continue;

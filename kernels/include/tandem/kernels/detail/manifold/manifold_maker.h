@@ -291,15 +291,17 @@ TANDEM_HD bool ManifoldMaker<Team>::make_patch(std::uint32_t curve, const NewPat
     look_behind(frame);
     if (summary_.curves > 1 && measure.closed) {
       double deepest = 0;
-      bool outside = false;
+      // No line is within the bodies, nor so short that rounding hides it.
+      hole = true;
+      const double rounding = 0x1p-40 * bodies_.reach();
       for (int i = 0; i <= rim_points_; ++i) {
         const Sounding& s = shared_.sounding[i];
-        outside = outside || (s.overlap() > 0 && !s.within());
+        const bool seen = s.surface[0].found() && s.surface[1].found();
+        hole = hole && !s.within() && !(seen && std::fabs(s.overlap()) <= rounding);
         if (!s.within() || s.overlap() <= deepest) continue;
         deepest = s.overlap();
         goes_through = s.goes_through();
       }
-      hole = outside && deepest == 0;
       // The way back is the shorter one on the side where the middles are.
       if (goes_through && dot(measure.area, bodies_.apart()) < 0) return true;
     }

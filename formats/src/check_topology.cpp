@@ -172,17 +172,6 @@ class TopologyCheck {
     return Status::kOk;
   }
 
-  // Calls use(first, last) with the sides of each edge: sides_[first] to sides_[last - 1]. Goes on while that
-  // returns kOk.
-  template <typename Use>
-  Status for_each_edge(const Use& use) {
-    for (std::uint64_t first = 0, last = 0; first < side_count_; first = last) {
-      while (last < side_count_ && same_edge(sides_[first], sides_[last])) ++last;
-      if (const Status status = use(first, last); status != Status::kOk) return status;
-    }
-    return Status::kOk;
-  }
-
   // A side of an edge, and its upper vertex. Those of one lower vertex lie together.
   struct Side {
     std::uint32_t upper, side;
@@ -191,35 +180,63 @@ class TopologyCheck {
     }
   };
 
-  std::uint32_t from(std::uint32_t side) const { return level_.topology[side / 3].vertex[side % 3]; }
-  std::uint32_t to(std::uint32_t side) const { return level_.topology[side / 3].vertex[(side + 1) % 3]; }
-  std::uint32_t lower(std::uint32_t side) const { return std::min(from(side), to(side)); }
-  bool same_edge(const Side& a, const Side& b) const {
-    return a.upper == b.upper && lower(a.side) == lower(b.side);
+  // Calls use(sides, count) with the sides of each edge. Goes on while that returns kOk.
+  template <typename Use>
+  Status for_each_edge(const Use& use) {
+    const Side* begin = sides_.get();
+    for (std::uint32_t v = 0; v < level_.vertex_count; ++v) {
+      for (const Side *end = sides_.get() + end_[v], *last = begin; begin != end; begin = last) {
+        while (last != end && last->upper == begin->upper) ++last;
+        const Status status = use(begin, static_cast<std::uint32_t>(last - begin));
+        if (status != Status::kOk) return status;
+      }
+    }
+    return Status::kOk;
+  }
+
+  // Calls use(lower vertex, upper vertex, side) with all sides of edges.
+  template <typename Use>
+  void for_each_side(const Use& use) const {
+    for (std::uint32_t t = 0; t < level_.triangle_count; ++t) {
+      const std::uint32_t* v = level_.topology[t].vertex;
+      for (std::uint32_t k = 0, l = 1; k < 3; ++k, l = l < 2 ? l + 1 : 0) {
+        if (v[k] != v[l]) use(std::min(v[k], v[l]), std::max(v[k], v[l]), 3 * t + k);
+      }
+    }
   }
 
   // Whether a side runs from its lower to its upper vertex, once its triangle is turned where it should be.
   bool runs_up(std::uint32_t side) const {
-    return (from(side) < to(side)) != is_turned(level_.topology[side / 3].flags);
+    const TriangleTopology& triangle = level_.topology[side / 3];
+    return (triangle.vertex[side % 3] < triangle.vertex[(side + 1) % 3]) != is_turned(triangle.flags);
+  }
+
+  // Most vertices have few sides.
+  static void sort(Side* begin, Side* end) {
+    if (end - begin > 24) return std::sort(begin, end);
+    for (Side* next = begin; next != end; ++next) {
+      const Side side = *next;
+      Side* place = next;
+      for (; place != begin && side < place[-1]; --place) *place = place[-1];
+      *place = side;
+    }
   }
 
   // Puts the sides of edges in the order of their lower and upper vertices: one counting sort, and a small
   // one for each lower vertex.
   Status sort_sides() {
-    const Array<std::uint32_t> end = zeros<std::uint32_t>(std::size_t{level_.vertex_count} + 1);
-    if (end == nullptr) return Status::kOutOfMemory;
-    const std::uint32_t all = 3 * level_.triangle_count;
-    for (std::uint32_t side = 0; side < all; ++side) end[lower(side) + 1] += from(side) != to(side);
-    for (std::uint32_t v = 0; v < level_.vertex_count; ++v) end[v + 1] += end[v];
-    side_count_ = end[level_.vertex_count];
-    sides_ = Array<Side>(new (std::nothrow) Side[side_count_]);
+    end_ = zeros<std::uint32_t>(std::size_t{level_.vertex_count} + 1);
+    if (end_ == nullptr) return Status::kOutOfMemory;
+    for_each_side([&](std::uint32_t lower, std::uint32_t, std::uint32_t) { ++end_[lower + 1]; });
+    for (std::uint32_t v = 0; v < level_.vertex_count; ++v) end_[v + 1] += end_[v];
+    sides_ = Array<Side>(new (std::nothrow) Side[end_[level_.vertex_count]]);
     if (sides_ == nullptr) return Status::kOutOfMemory;
-    for (std::uint32_t side = 0; side < all; ++side) {
-      if (from(side) != to(side)) sides_[end[lower(side)]++] = {std::max(from(side), to(side)), side};
-    }
+    for_each_side([&](std::uint32_t lower, std::uint32_t upper, std::uint32_t side) {
+      sides_[end_[lower]++] = {upper, side};
+    });
     std::uint32_t begin = 0;
-    for (std::uint32_t v = 0; v < level_.vertex_count; begin = end[v++])
-      std::sort(sides_.get() + begin, sides_.get() + end[v]);
+    for (std::uint32_t v = 0; v < level_.vertex_count; begin = end_[v++])
+      sort(sides_.get() + begin, sides_.get() + end_[v]);
     return Status::kOk;
   }
 
@@ -227,20 +244,21 @@ class TopologyCheck {
     open_ = zeros<std::uint8_t>(level_.triangle_count);
     if (open_ == nullptr || !joined_.make(level_.triangle_count)) return Status::kOutOfMemory;
     if (const Status status = sort_sides(); status != Status::kOk) return status;
-    return for_each_edge([&](std::uint64_t first, std::uint64_t last) {
-      const std::uint64_t count = last - first;
-      std::int64_t up = 0, down = 0;
-      for (std::uint64_t i = first; i < last; ++i) {
-        const std::uint32_t side = sides_[i].side, flags = level_.topology[side / 3].flags;
-        const auto k = static_cast<int>(side % 3);
-        where_ = side / 3;
+    return for_each_edge([&](const Side* sides, std::uint32_t count) {
+      std::uint32_t up = 0;
+      const std::uint32_t first = sides[0].side / 3;
+      for (std::uint32_t i = 0; i < count; ++i) {
+        const std::uint32_t side = sides[i].side, t = side / 3, flags = level_.topology[t].flags;
+        const auto k = static_cast<int>(side - 3 * t);
+        where_ = t;
         if (is_boundary(flags, k) != (count == 1) || has_many_triangles(flags, k) != (count > 2))
           return Status::kEdgeMismatch;
-        ++(runs_up(side) ? up : down);
-        joined_.join(sides_[first].side / 3, side / 3);
+        up += runs_up(side);
+        if (i > 0) joined_.join(first, t);
       }
-      if (up != down) open_[sides_[first].side / 3] = 1;
-      one_way_edges_ = one_way_edges_ || (count == 2 && up != down);
+      const bool balanced = 2 * std::uint64_t{up} == count;
+      if (!balanced) open_[first] = 1;
+      one_way_edges_ = one_way_edges_ || (count == 2 && !balanced);
       return Status::kOk;
     });
   }
@@ -297,9 +315,9 @@ class TopologyCheck {
     const Array<std::uint8_t> unorientable = zeros<std::uint8_t>(level_.triangle_count);
     if (unorientable == nullptr || !windings.make(level_.triangle_count)) return Status::kOutOfMemory;
     const auto for_each_pair = [&](const auto& use) {
-      return for_each_edge([&](std::uint64_t first, std::uint64_t last) {
-        if (last - first != 2) return Status::kOk;
-        const std::uint32_t one = sides_[first].side, other = sides_[first + 1].side;
+      return for_each_edge([&](const Side* sides, std::uint32_t count) {
+        if (count != 2) return Status::kOk;
+        const std::uint32_t one = sides[0].side, other = sides[1].side;
         return use(one / 3, other / 3, runs_up(one) == runs_up(other));
       });
     };
@@ -335,8 +353,8 @@ class TopologyCheck {
 
   LevelView level_;
   Array<std::uint32_t> first_;  // side that begins at the first corner of each vertex
-  Array<Side> sides_;           // that have an edge
-  std::uint64_t side_count_ = 0;
+  Array<Side> sides_;           // that have an edge, by lower vertex
+  Array<std::uint32_t> end_;    // of the sides of each lower vertex
   Joined joined_;
   Array<std::uint8_t> open_;    // of a triangle: not 0 where an edge of it is not closed
   bool one_way_edges_ = false;  // there are edges of two sides that run the same way

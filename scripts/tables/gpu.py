@@ -35,11 +35,13 @@ def shown(milliseconds):
 
 def figures(rows):
     """Cells that both tables have, by the head of their column."""
-    exact, in_order = find(rows, "cuda"), find(rows, "cuda", options="sorted")
+    exact = find(rows, "cuda")
     cells = {head: whole(value(exact, head.replace(" ", "_"))) for head in ("instances", "object pairs", "block pairs", "contacts")}
     times = {"broad phase": "broad_phase", "query": "contacts", "whole": "whole"}
     cells |= {head: shown(value(exact, f"{name}_median_ms")) for head, name in times.items()}
-    cells["sorting"] = shown(value(in_order, "contacts_median_ms") - value(exact, "contacts_median_ms"))
+    for head, options in (("grouping", "grouped"), ("sorting", "sorted")):
+        ordered = value(find(rows, "cuda", options=options), "contacts_median_ms")
+        cells[head] = "" if ordered is None else shown(ordered - value(exact, "contacts_median_ms"))
     cells["16 CPU threads"] = shown(value(find(rows, "cpu", threads="16"), "whole_median_ms"))
     return cells
 
@@ -55,7 +57,7 @@ def scene_cells(scene, rows):
 
 
 def scenes(results):
-    heads = ["scene", "object pairs", "block pairs", "contacts", "broad phase", "query", "whole", "the walk alone", "sorting",
+    heads = ["scene", "object pairs", "block pairs", "contacts", "broad phase", "query", "whole", "the walk alone", "grouping", "sorting",
              "first contacts alone", "the paper's scheme, whole", "with bit arrays", "one CPU core", "16 CPU threads"]
     return markdown(heads, [[cells[head] for head in heads] for cells in (scene_cells(*item) for item in results.items())])
 
@@ -73,6 +75,6 @@ def large_cells(scene, rows):
 
 def large(results):
     heads = ["scene", "instances", "distinct triangles", "object pairs", "block pairs", "contacts", "broad phase", "query", "whole",
-             "sorting", "upload, s", "16 CPU threads", "memory"]
+             "grouping", "sorting", "upload, s", "16 CPU threads", "memory"]
     rows = [[cells[head] for head in heads] for cells in (large_cells(*item) for item in results.items())]
     return markdown(heads, rows, "l" + "r" * (len(heads) - 2) + "l")

@@ -9,6 +9,7 @@
 
 #include "hostile_file.h"
 #include "oriented_oracle.h"
+#include "topology_oracle.h"
 
 namespace tandem {
 namespace {
@@ -119,6 +120,7 @@ TEST(Check, EverySealedSingleByteChangeIsRejectedOrHarmless) {
       if (result.status == Status::kOk) {
         EXPECT_EQ(result.asset.level().triangle_count, 30u);
         EXPECT_EQ(test::defect_of_oriented_blocks(result.asset.level()), nullptr) << i << " ^ " << change;
+        EXPECT_EQ(test::defect_of_topology(result.asset.level()), nullptr) << i << " ^ " << change;
         for (const Part& part : result.asset.parts) EXPECT_LE(result.asset.name_of(part).size(), file.size());
       }
       file.data()[i] ^= static_cast<unsigned char>(change);

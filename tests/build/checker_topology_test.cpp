@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <random>
 
 #include "hostile_file.h"
 #include "topology_oracle.h"
@@ -191,6 +192,67 @@ TEST(CheckTopology, EverySealedChangeIsFoundOrHarmless) {
   EXPECT_EQ(file.check_sealed(), Status::kOk);
 }
 
+TEST(CheckTopology, OfTwoHalvesTheFirstIsNotTurned) {
+  Mesh mesh;
+  mesh.add({0, 0, 0}, {1, 0, 0}, {0, 1, 0});
+  mesh.add({1, 0, 0}, {0, 1, 0}, {1, 1, 0});
+  Bytes file(make_file(mesh));
+  EXPECT_EQ(file.check_sealed(), Status::kOk);
+  ASSERT_EQ(file.topology()[0].flags & kTurned, 0u);
+  ASSERT_EQ(file.topology()[1].flags & kTurned, 1u);
+  for (const int t : {0, 1}) file.topology()[t].flags ^= kTurned;
+  EXPECT_EQ(file.check_sealed(), Status::kBadWinding);
+}
+
+TEST(CheckTopology, MinusZeroIsNoOtherPosition) {
+  Mesh mesh;
+  mesh.add({0, 0, 0}, {1, 0, 0}, {0, 1, 0});
+  mesh.add({-0.0f, 0, -0.0f}, {-1, 0, 0}, {0, -1, 0});
+  Bytes file(make_file(mesh));
+  EXPECT_EQ(file.check_sealed(), Status::kOk);
+  EXPECT_EQ(file.level().vertex_count, 5u);
+  for (int k = 0; k < 3; ++k) file.topology()[1].vertex[k] = 3 + static_cast<std::uint32_t>(k);
+  file.level().vertex_count = 6;
+  EXPECT_EQ(file.check_sealed(), Status::kVertexMismatch);
+}
+
+// Any windings of a sheet but those that agree, beside a strip of five triangles that no windings make agree.
+// The triangles lie in no order that helps.
+TEST(CheckTopology, WindingsMayDisagreeOnlyWhereNoneAgree) {
+  Mesh mesh;
+  const auto at = [](int i, int j) {
+    return std::array<float, 3>{static_cast<float>(i), static_cast<float>(j), 0};
+  };
+  for (int i = 0; i < 18; ++i) {
+    for (int j = 0; j < 21; ++j) {
+      mesh.add(at(i, j), at(i + 1, j), at(i, j + 1));
+      mesh.add(at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
+    }
+  }
+  mesh.triangles.pop_back();
+  const std::array<float, 3> ring[] = {{50, 0, 0}, {51, 0, 1}, {52, 1, 0}, {51, 2, 2}, {50, 1, 1}};
+  for (int i = 0; i < 5; ++i) mesh.add(ring[i], ring[(i + 1) % 5], ring[(i + 2) % 5]);
+  std::mt19937 random(1);
+  std::shuffle(mesh.triangles.begin(), mesh.triangles.end(), random);
+  ASSERT_EQ(mesh.triangles.size(), test::kTrianglesOfDeepestTree);
+  Bytes file(make_file(mesh, test::deepest_tree(mesh)));
+  EXPECT_EQ(file.check_sealed(), Status::kOk);
+  std::vector<std::uint32_t> sheet;
+  for (std::uint32_t t = 0; t < file.level().triangle_count; ++t) {
+    if (file.triangles()[t].corner[0].position[0] < 40) sheet.push_back(t);
+  }
+  ASSERT_EQ(sheet.size(), 755u);
+  for (int round = 0; round < 20; ++round) {
+    for (const std::uint32_t t : sheet) {
+      file.topology()[t].flags &= ~kTurned;
+      file.topology()[t].flags |= random() % 5 < 2 ? kTurned : 0;
+    }
+    EXPECT_EQ(file.check_sealed(), Status::kBadWinding);
+  }
+  for (const std::uint32_t t : sheet) file.topology()[t].flags &= ~kTurned;
+  EXPECT_EQ(file.check_sealed(), Status::kOk);
+}
+
 std::vector<Piece>::iterator find(std::vector<Piece>& pieces, SectionKind kind) {
   return std::find_if(pieces.begin(), pieces.end(), [&](const Piece& p) { return p.row.kind == kind; });
 }
@@ -232,9 +294,18 @@ TEST(CheckTopology, BothSectionsAreThereOrNone) {
   EXPECT_EQ(status_after([&](Pieces& p) { cut(*find(p, kComponents), 0); }), Status::kBadLevel);
   EXPECT_EQ(status_after([&](Pieces& p) { cut(*find(p, kComponents), 10); }), Status::kBadLevel);
   EXPECT_EQ(status_after([&](Pieces& p) { cut(*find(p, kComponents), 2); }), Status::kComponentMismatch);
+  EXPECT_EQ(status_after([&](Pieces& p) {  // a component of no triangles
+              const SurfaceComponent none = {8, 0, kClosedComponent, 0};
+              Piece& piece = *find(p, kComponents);
+              cut(piece, 4);
+              piece.bytes.replace(3 * sizeof none, sizeof none, reinterpret_cast<const char*>(&none),
+                                  sizeof none);
+            }),
+            Status::kComponentMismatch);
   EXPECT_EQ(status_after([&](Pieces& p) { ++find(p, kTopology)->row.level; }), Status::kUnknownSection);
   EXPECT_EQ(status_after([&](Pieces& p) { p.push_back(*find(p, kComponents)); }), Status::kSectionDuplicated);
-  EXPECT_EQ(status_after([&](Pieces& p) { find(p, kTopology)->bytes += '\0'; }), Status::kSectionSizeMismatch);
+  EXPECT_EQ(status_after([&](Pieces& p) { find(p, kTopology)->bytes += '\0'; }),
+            Status::kSectionSizeMismatch);
 }
 
 TEST(CheckTopology, AFileWithoutHasNullPointers) {

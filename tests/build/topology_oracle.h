@@ -102,8 +102,7 @@ inline const char* defect_of_components(const LevelView& level, const Edges& edg
   }
   for (const auto& [ends, sides] : edges) {
     int sum = 0;
-    for (const std::uint32_t side : sides)
-      sum += runs_up(level, side) != is_turned(level, side / 3) ? 1 : -1;
+    for (const std::uint32_t side : sides) sum += runs_up(level, side) != is_turned(level, side / 3) ? 1 : -1;
     if (sum != 0) components[component[sides[0] / 3]].flags = 0;
   }
   if (level.component_count != components.size()) return "there are as many components as said";

@@ -24,7 +24,8 @@ void add_box(Mesh& mesh, const Point& lower, const Point& upper, bool inside_out
     return Point{(i & 1) != 0 ? upper[0] : lower[0], (i & 2) != 0 ? upper[1] : lower[1],
                  (i & 4) != 0 ? upper[2] : lower[2]};
   };
-  constexpr int kFaces[][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
+  constexpr int kFaces[][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
+                               {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
   for (const auto& f : kFaces) {
     for (const int k : {1, 2}) {
       const int a = f[k], b = f[k + 1];
@@ -54,7 +55,8 @@ struct Made {
   }
   std::uint32_t turned() const {
     std::uint32_t count = 0;
-    for (std::uint32_t t = 0; t < level.triangle_count; ++t) count += tandem::is_turned(level.topology[t].flags);
+    for (std::uint32_t t = 0; t < level.triangle_count; ++t)
+      count += tandem::is_turned(level.topology[t].flags);
     return count;
   }
   std::uint32_t sides(bool (*has)(std::uint32_t, int)) const {
@@ -271,7 +273,9 @@ TEST(Topology, ManySmallComponentsAreToldApart) {
 TEST(Topology, IsWhatMapsOfPositionsAndEdgesFind) {
   std::mt19937 random(3);
   for (int round = 0; round < 300; ++round) {
-    const auto coordinate = [&, most = 2 + round % 4] { return static_cast<float>(static_cast<int>(random() % most) - 1); };
+    const auto coordinate = [&, most = 2 + round % 4] {
+      return static_cast<float>(static_cast<int>(random() % most) - 1);
+    };
     const auto point = [&] {
       const float x = coordinate(), y = coordinate();
       return Point{x, y, coordinate()};

@@ -97,7 +97,8 @@ class Taken {
 TEST_F(GpuRoom, AQueryHoldsNoMoreThanItsRuleSays) {
   const Scene scene = test::pile(4, 100, 1, 32);
   const GpuScene on_gpu(scene.assets, scene.instances, pairs_of(4));
-  for (const bool sorted : {false, true}) {
+  for (const GpuQueryOptions& options :
+       {GpuQueryOptions{}, {.sorted = true}, {.grouped = true}, {.sorted = true, .grouped = true}}) {
     for (const GpuQueryCapacity wanted :
          {GpuQueryCapacity{}, GpuQueryCapacity{1, 1, 1}, GpuQueryCapacity{3, 70, 9},
           GpuQueryCapacity{1'000'000, 100, 100}, GpuQueryCapacity{100, 50'000'000, 100},
@@ -105,9 +106,10 @@ TEST_F(GpuRoom, AQueryHoldsNoMoreThanItsRuleSays) {
       const Taken taken;
       GpuContactQuery query;
       ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
-      ASSERT_EQ(query.reserve(wanted, {.sorted = sorted}), Status::kOk);
-      const std::size_t most = most_query_bytes(query.capacity(), sorted, on_gpu.assets().size());
-      EXPECT_LE(query.bytes(), most) << wanted.contacts << " contacts, sorted " << sorted;
+      ASSERT_EQ(query.reserve(wanted, options), Status::kOk);
+      const std::size_t most = most_query_bytes(query.capacity(), options, on_gpu.assets().size());
+      EXPECT_LE(query.bytes(), most) << wanted.contacts << " contacts, sorted " << options.sorted
+                                     << ", grouped " << options.grouped;
       EXPECT_LE(taken.bytes(), query.bytes() + Taken::kSlack);
       EXPECT_LE(most, query.bytes() + query.bytes() / 5 + (9 << 20));  // a rule, not just something large
     }
@@ -120,7 +122,7 @@ TEST_F(GpuRoom, AQueryThatGrewHoldsNoMoreThanItsRuleSays) {
   GpuContactQuery query;
   ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
   ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {.sorted = true}, nullptr), Status::kOk);
-  EXPECT_LE(query.bytes(), most_query_bytes(query.capacity(), true, on_gpu.assets().size()));
+  EXPECT_LE(query.bytes(), most_query_bytes(query.capacity(), {.sorted = true}, on_gpu.assets().size()));
 }
 
 /// Queries keep nothing of trees.
@@ -132,7 +134,7 @@ TEST_F(GpuRoom, AQueryOfLargeTreesHoldsNoMoreThanItsRuleSays) {
   const GpuScene on_gpu(scene.assets, scene.instances, {});
   GpuContactQuery query;
   ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
-  const std::size_t most = most_query_bytes(query.capacity(), false, on_gpu.assets().size());
+  const std::size_t most = most_query_bytes(query.capacity(), {}, on_gpu.assets().size());
   EXPECT_LE(query.bytes(), most);
   EXPECT_LE(most, query.bytes() + query.bytes() / 5 + (9 << 20));
 }

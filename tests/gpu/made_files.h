@@ -20,9 +20,10 @@ inline MadeLevel built_level(const Mesh& mesh, double error_bound = 0) {
 }
 
 /// A file of these levels, all of whose faces are in one part. Source face i is triangle i of its mesh.
-inline Bytes made_file(std::span<const MadeLevel> levels, bool oriented = true) {
+inline Bytes made_file(std::span<const MadeLevel> levels, bool oriented = true, bool with_topology = true) {
   std::vector<std::vector<OrientedBlock>> blocks(levels.size());
   std::vector<std::vector<std::uint32_t>> faces(levels.size());
+  std::vector<build::SurfaceTopology> topology(levels.size());
   std::vector<build::AssetLevel> rows;
   build::AssetSource source;
   for (std::size_t i = 0; i < levels.size(); ++i) {
@@ -32,6 +33,9 @@ inline Bytes made_file(std::span<const MadeLevel> levels, bool oriented = true) 
     source.source_faces = std::max<std::uint64_t>(source.source_faces, faces[i].size());
     if (oriented) blocks[i] = build::orient_blocks(mesh.geometry(), tree, build::Effort::fast);
     rows.push_back({mesh.geometry(), faces[i], &tree, blocks[i], error_bound});
+    if (!with_topology) continue;
+    topology[i] = build::make_topology(mesh.geometry(), tree);
+    rows.back().topology = &topology[i];
   }
   const build::SourcePart part = {"all", "", 0, source.source_faces};
   source.parts = {&part, 1};

@@ -34,6 +34,16 @@ void expect_same(const LevelView& host, const LevelView& device, Contents conten
   };
   expect_same_array(host.triangles, device.triangles, host.triangle_count);
   expect_same_array(host.oriented_blocks, device.oriented_blocks, host.block_count);
+  EXPECT_EQ(device.vertex_count, host.vertex_count);
+  EXPECT_EQ(device.component_count, host.component_count);
+  EXPECT_EQ(device.closed, host.closed);
+  if (contents == Contents::exact_queries) {
+    EXPECT_EQ(device.topology, nullptr);
+    EXPECT_EQ(device.components, nullptr);
+  } else {
+    expect_same_array(host.topology, device.topology, host.triangle_count);
+    expect_same_array(host.components, device.components, host.component_count);
+  }
   if (contents == Contents::all)
     expect_same_array(host.blocks, device.blocks, host.block_count);
   else
@@ -51,7 +61,7 @@ TEST_F(Gpu, AnUploadedFileHasTheSameBytes) {
   expect_same(checked.asset.level(), assets.level(0), Contents::all);
 }
 
-TEST_F(Gpu, AnUploadForExactQueriesHasWhatTheyNeed) {
+TEST_F(Gpu, AnUploadHasWhatItIsFor) {
   test::RandomPoses random(4);
   std::vector<test::MadeLevel> levels;
   for (const std::uint32_t triangles : {2001u, 100u, 7u})
@@ -59,15 +69,32 @@ TEST_F(Gpu, AnUploadForExactQueriesHasWhatTheyNeed) {
   const test::Bytes file = test::made_file(levels);
   const AssetView view = file.check().asset;
   DeviceAssets assets;
-  ASSERT_EQ(assets.upload({&view, 1}, Contents::exact_queries, nullptr), Status::kOk);
-  std::size_t needed = 0;
-  for (std::uint32_t i = 0; i < 3; ++i) {
-    const LevelView host = view.level(i);
-    expect_same(host, assets.level(0, i), Contents::exact_queries);
-    needed += host.triangle_count * sizeof(Triangle) + host.block_count * sizeof(OrientedBlock);
+  for (const Contents contents : {Contents::exact_queries, Contents::manifolds}) {
+    ASSERT_EQ(assets.upload({&view, 1}, contents, nullptr), Status::kOk);
+    std::size_t needed = 0;
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      const LevelView host = view.level(i);
+      expect_same(host, assets.level(0, i), contents);
+      needed += host.triangle_count * sizeof(Triangle) + host.block_count * sizeof(OrientedBlock);
+      if (contents != Contents::manifolds) continue;
+      needed +=
+          host.triangle_count * sizeof(TriangleTopology) + host.component_count * sizeof(SurfaceComponent);
+    }
+    EXPECT_GE(assets.bytes(), needed);
+    EXPECT_LT(assets.bytes(), needed + 12 * kSectionAlignment);
   }
-  EXPECT_GE(assets.bytes(), needed);
-  EXPECT_LT(assets.bytes(), needed + 6 * kSectionAlignment);
+}
+
+TEST_F(Gpu, AFileWithoutTopologyIsUploadedForManifoldsWithoutIt) {
+  test::RandomPoses random(7);
+  const test::MadeLevel level = test::built_level(test::soup(random, 30, 0.1));
+  const test::Bytes file = test::made_file({&level, 1}, true, false);
+  const AssetView view = file.check().asset;
+  DeviceAssets assets;
+  ASSERT_EQ(assets.upload({&view, 1}, Contents::manifolds, nullptr), Status::kOk);
+  EXPECT_NE(assets.level(0).triangles, nullptr);
+  EXPECT_EQ(assets.level(0).topology, nullptr);
+  EXPECT_EQ(assets.level(0).components, nullptr);
 }
 
 /// Files from one triangle on, of one level and of several, and so many views of them, in turn, that threads
@@ -108,7 +135,7 @@ class ManyFiles {
 TEST_F(Gpu, ManyAssetsAreAllThereAtOnce) {
   const ManyFiles files;
   DeviceAssets assets;
-  for (const Contents contents : {Contents::all, Contents::exact_queries}) {
+  for (const Contents contents : {Contents::all, Contents::exact_queries, Contents::manifolds}) {
     ASSERT_EQ(assets.upload(files.views, contents, nullptr), Status::kOk);
     EXPECT_GE(assets.bytes(), ManyFiles::kLeastBytes);
     files.expect_all(assets, contents);

@@ -45,8 +45,9 @@ class BenchGpu(BenchTest):
         if not self.built:
             self.skipTest("built without CUDA")
         self.write_scene()
-        for words in ([*self.ON_GPU, "--self"], [*self.ON_GPU, "--threads", "2"], ["--engine", "paper"], ["--sorted"],
-                      ["--traversal"], *([*self.ON_GPU, "--engine", "paper", word] for word in ("--first-contact", "--sorted", "--traversal"))):
+        for words in ([*self.ON_GPU, "--self"], [*self.ON_GPU, "--threads", "2"], ["--engine", "paper"], ["--sorted"], ["--grouped"],
+                      ["--traversal"], *([*self.ON_GPU, "--engine", "paper", word] for word in ("--first-contact", "--grouped", "--sorted", "--traversal")),
+                      [*self.ON_GPU, "--sorted", "--grouped"]):
             with self.subTest(words=words):
                 self.assert_fails(self.bench("query", self.scene, *words), USAGE, words[-2] if words[-1] == "2" else "--")
 
@@ -68,6 +69,7 @@ class BenchGpu(BenchTest):
                 self.assertEqual(column.tolist(), contacts[name].tolist())
         exact = self.query()["hash"]
         self.assertEqual(self.query("--engine", "paper", *self.ON_GPU)["hash"], exact)
+        self.assertEqual(self.query("--grouped", "--repeat", "2", *self.ON_GPU)["hash"], exact)
         report = self.query("--sorted", "--traversal", "--repeat", "2", *self.ON_GPU)
         self.assertEqual((report["hash"], len(report["traversal_seconds"]["all"])), (exact, 2))
         self.assertLessEqual(report["gpu_bytes"], report["gpu_bytes_bound"])

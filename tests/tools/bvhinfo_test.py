@@ -17,7 +17,7 @@ class Info(ToolTest):
     KEYS = {"file", "version", "hash", "bytes", "triangles", "nodes", "leaf_nodes", "internal_nodes", "imaginary_nodes",
             "imaginary_minimum", "imaginary_fraction", "leaf_blocks", "internal_blocks", "partial_leaf_blocks", "depth",
             "leaf_fill", "sah_cost", "expected_block_pairs", "expected_candidates", "expected_oriented_block_pairs",
-            "expected_oriented_candidates", "leaf_blocks_at_depth",
+            "expected_oriented_candidates", "surface", "leaf_blocks_at_depth",
             "blocks_with_fill", "bounds", "origin", "rounding_error", "source_faces", "source", "parts", "levels",
             "sections"}
     VERDICT_KEYS = {"file", "sound", "status", "where", "error", "bytes", "check_seconds"}
@@ -29,7 +29,8 @@ class Info(ToolTest):
         page = self.info(self.built("cube.obj", CUBE_OBJ))
         self.assertEqual((page.returncode, page.stderr), (DONE, b""))
         for word in ("cube.obj", "triangles    12", "1 imaginary", "minimum 1", "0 partial leaf blocks", "depth", "SAH cost",
-                     "block pairs", "oriented block pairs", "oriented_blocks", "bounds", "origin", "sections", "provenance"):
+                     "block pairs", "oriented block pairs", "oriented_blocks", "8 vertices, 1 component, closed", "topology",
+                     "components", "bounds", "origin", "sections", "provenance"):
             self.assertIn(word, page.stdout.decode())
 
     def test_the_page_sends_no_control_characters_of_a_file_to_a_terminal(self):
@@ -83,6 +84,22 @@ class Info(ToolTest):
         self.assertNotIn(b"no oriented blocks", self.info(a).stdout)
         rows = {line.split()[0]: line.split()[1:] for line in self.info(a, b).stdout.decode().splitlines()}
         self.assertEqual(rows["expected_oriented_block_pairs"][1:], ["-"])
+
+    def test_the_surface_is_described_and_one_without_topology_is_told(self):
+        turned = CUBE_OBJ.splitlines()
+        face = next(i for i, line in enumerate(turned) if line.startswith("f"))
+        words = turned[face].split()
+        turned[face] = " ".join([words[0], *words[:0:-1]])
+        a = self.built("cube.obj", "\n".join(turned) + "\n").rename(self.outputs / "a.bvh")
+        b = self.built("cube.obj", CUBE_OBJ, "--no-topology").rename(self.outputs / "b.bvh")
+        c = self.built("one.obj", TRIANGLE_OBJ).rename(self.outputs / "c.bvh")
+        with_it, without, one = self.json_of(a, b, c)
+        self.assertEqual(with_it["surface"], {"vertices": 8, "components": 1, "closed_components": 1, "turned_triangles": 2,
+                                              "boundary_edges": 0, "sides_at_edges_of_many": 0})
+        self.assertEqual((one["surface"]["boundary_edges"], one["surface"]["closed_components"]), (3, 0))
+        self.assertIsNone(without["surface"])
+        self.assertIn(b"no topology", self.info(b).stdout)
+        self.assertIn(b"2 triangles taken to be wound the other way", self.info(a).stdout)
 
     def test_verify_says_that_a_file_is_sound(self):
         out = self.built("cube.obj", CUBE_OBJ)

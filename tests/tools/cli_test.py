@@ -27,7 +27,7 @@ class Usage(ToolTest):
     def test_help_names_every_option_and_exit_code(self):
         for tool, words in ((BVHBUILD, ("MESH", "--output", "--imaginary", "minimal|free|SHARE", "--effort", "fast|default|best", "--strict", "--json",
                                         "--quiet", "--threads", "--reader", "--time-limit", "--memory-limit", "--expansion-limit",
-                                        "--version", "Exit codes: 0 done")),
+                                        "--no-topology", "--version", "Exit codes: 0 done")),
                             (BVHINFO, ("FILE", "--json", "--verify", "--version", "Exit codes: 0 all sound"))):
             result = self.run_tool(tool, "--help")
             self.assertEqual((result.returncode, result.stderr), (DONE, b""))
@@ -500,7 +500,7 @@ class Overlap(ToolTest):
 class BuildJson(ToolTest):
     ALWAYS = {"tool", "version", "exit_code", "error", "input", "output", "reader", "single_precision_reader", "faces",
               "vertices", "remarks", "findings", "seconds", "peak_memory_bytes"}
-    AFTER_SUCCESS = {"interrupted", "parts", "origin", "rounding_error", "tree", "gpu_blocks", "bytes",
+    AFTER_SUCCESS = {"interrupted", "parts", "origin", "rounding_error", "tree", "gpu_blocks", "topology", "bytes",
                      "hash"}
     FINDINGS = {"faces_index_out_of_range", "faces_too_few_corners", "faces_not_finite", "faces_too_large",
                 "faces_repeated_corner", "faces_not_simple",
@@ -523,6 +523,13 @@ class BuildJson(ToolTest):
         mesh = self.write("a.obj", CUBE_OBJ)
         self.assertIn(b"no oriented blocks", self.build(mesh, "-o", self.out, "--no-gpu-blocks").stdout)
         self.assertNotIn(b"oriented", self.build(mesh, "-o", self.out).stdout)
+
+    def test_a_file_without_topology_is_told(self):
+        self.assertTrue(self.built_json("a.obj", CUBE_OBJ)["topology"])
+        self.assertFalse(self.built_json("a.obj", CUBE_OBJ, "--no-topology")["topology"])
+        mesh = self.write("a.obj", CUBE_OBJ)
+        self.assertIn(b"no topology", self.build(mesh, "-o", self.out, "--no-topology").stdout)
+        self.assertNotIn(b"topology", self.build(mesh, "-o", self.out).stdout)
 
     def test_a_failure_has_its_reason_on_both_streams(self):
         for path, out, code in ((self.inputs / "none.obj", self.out, UNREADABLE_INPUT),

@@ -16,6 +16,7 @@ import sys
 import threading
 import unittest
 
+import bvh_file
 from tool_test import BVHBUILD, DONE, NO_TRIANGLE, SOURCE_DIR, UNREADABLE_INPUT, ToolTest
 
 MESHES = pathlib.Path(os.environ.get("TANDEM_MESHES", SOURCE_DIR.parent / "shared" / "meshes"))
@@ -111,6 +112,7 @@ class Corpus(ToolTest):
         self.assertEqual(info["leaf_nodes"], info["triangles"])
         if minimal:
             self.assertEqual(info["imaginary_nodes"], info["imaginary_minimum"])
+        self.assertEqual(bvh_file.defects_of_topology(bvh_file.read(self.out)), [])
         self.assertGreaterEqual(info["imaginary_nodes"], info["imaginary_minimum"])
         self.out.unlink()
         return info

@@ -32,6 +32,7 @@ class Oracle(ToolTest):
             self.assertEqual(imaginary, least)
         else:
             self.assertGreaterEqual(imaginary, least)
+        self.assertEqual(bvh_file.defects_of_topology(file), [])
         if triangles <= 2000:
             self.assertEqual(bvh_file.defects_of_boxes(file), [])
             self.assertEqual(bvh_file.defects_of_oriented_blocks(file), [])
@@ -68,6 +69,16 @@ class Oracle(ToolTest):
         self.assertIsNone(bvh_file.read(out).oriented_blocks)
         self.assertEqual(bvh_file.read(out).provenance["options"]["gpu_blocks"], False)
         self.assertAlmostEqual((with_them - out.stat().st_size) / 112, len(blocks["fast"]), delta=256 / 112)
+
+    def test_topology_is_left_out_where_asked(self):
+        with_it = self.built("a.obj", scattered_obj(300)).stat().st_size
+        out = self.built("a.obj", scattered_obj(300), "--no-topology")
+        file = bvh_file.read(out)
+        self.assertIsNone(file.topology)
+        self.assertIsNone(file.components)
+        self.assertEqual(file.provenance["options"]["topology"], False)
+        self.assertEqual((file.levels[0]["vertices"], file.levels[0]["flags"]), (0, 0))
+        self.assertAlmostEqual(with_it - out.stat().st_size, 16 * 300 + 16 * 300, delta=512)
 
     def test_coincident_triangles_are_all_kept(self):
         out = self.built("a.obj", TRIANGLE_OBJ + "f 1 2 3\n" * 52)

@@ -20,10 +20,14 @@ struct QueryArguments {
   std::string scene, out, backend = "cpu", gpu_engine = "tandem-cuda";
   QueryOptions options;
   std::uint32_t repeats = 1;
-  bool sorted = false, traversal = false, manifolds = false;
+  bool grouped = false, sorted = false, traversal = false, manifolds = false;
   bool json = false, threads_given = false;
 
   bool on_gpu() const { return backend == "cuda"; }
+  OrderOnGpu order() const {
+    if (sorted) return OrderOnGpu::sorted;
+    return grouped ? OrderOnGpu::grouped : OrderOnGpu::any;
+  }
   std::string engine() const { return on_gpu() ? gpu_engine : "tandem"; }
 };
 
@@ -108,7 +112,7 @@ Answer run_query(const QueryArguments& arguments, const Scene& scene) {
   engine->set_shapes(views);
   engine->update(description.instances);
   answer.timed = engine->time_query({description.pairs ? &pairs : nullptr, arguments.repeats,
-                                     arguments.sorted, arguments.traversal, arguments.manifolds});
+                                     arguments.order(), arguments.traversal, arguments.manifolds});
   answer.record.seconds = answer.timed.whole;
   answer.record.counters = engine->counters();
   answer.table = table_of(scene, answer.timed);
@@ -179,6 +183,7 @@ Json to_json(const QueryArguments& arguments, const Scene& scene, const Answer& 
   if (arguments.on_gpu()) {
     json["engine"] = name_of(arguments.gpu_engine, kGpuEngines);
     json["gpu"] = answer.timed.gpu.name;
+    json["grouped"] = arguments.grouped;
     json["sorted"] = arguments.sorted;
     json["gpu_bytes"] = answer.timed.gpu.bytes;
     json["gpu_bytes_bound"] = answer.timed.gpu.bytes_bound == 0 ? Json() : Json(answer.timed.gpu.bytes_bound);
@@ -248,18 +253,17 @@ void check_arguments(const QueryArguments& arguments, const Scene& scene) {
     throw UsageError(
         "--manifolds takes all contacts, so neither --mode boxes nor --first-contact goes with it");
   }
-  if (arguments.manifolds && arguments.on_gpu()) {
-    throw UsageError("--manifolds is for the backend cpu; on a GPU there are none yet");
-  }
   const bool tandem = arguments.gpu_engine == "tandem-cuda";
   if (!arguments.on_gpu()) {
     if (!tandem) throw UsageError("--engine is for the backend cuda");
+    if (arguments.grouped) throw UsageError("--grouped is for the backend cuda");
     if (arguments.sorted) throw UsageError("--sorted is for the backend cuda");
     if (arguments.traversal) throw UsageError("--traversal is for the backend cuda");
     return;
   }
-  if (!tandem && (arguments.options.first_contact_only || arguments.sorted || arguments.traversal)) {
-    throw UsageError("--first-contact, --sorted and --traversal are for the engine tandem");
+  if (!tandem &&
+      (arguments.options.first_contact_only || arguments.order() != OrderOnGpu::any || arguments.traversal || arguments.manifolds)) {
+    throw UsageError("--first-contact, --grouped, --manifolds, --sorted and --traversal are for the engine tandem");
   }
   if (arguments.options.self_pairs) {
     throw UsageError("--self is for the backend cpu; /pairs of a scene may name an instance twice");
@@ -325,8 +329,12 @@ CLI::App* add_query(CLI::App& app, Run& run_later) {
     add_choice(*command, "--engine", kGpuEngines, arguments->gpu_engine,
                "on a GPU: Tandem's, or the paper's scheme, the yardstick")
         ->option_text("tandem|paper|paper-bits [tandem]");
-    command->add_flag("--sorted", arguments->sorted,
-                      "on a GPU: sort pairs and contacts there, and time that too");
+    CLI::Option* grouped = command->add_flag("--grouped", arguments->grouped,
+                                             "on a GPU: group contacts by pair there, and time that too");
+    command
+        ->add_flag("--sorted", arguments->sorted,
+                   "on a GPU: sort pairs and contacts there, and time that too")
+        ->excludes(grouped);
     command->add_flag("--traversal", arguments->traversal,
                       "on a GPU: also time the trees' walk alone, without triangle tests");
   }

@@ -59,7 +59,7 @@ void add_options(CLI::App& app, Options& options, double& memory_gib, double& ex
       ->option_text("fast|default|best [default]");
   app.add_flag_callback(
       "--no-gpu-blocks", [&options] { options.gpu_blocks = false; },
-      "leave out the oriented blocks, which exact queries on a GPU walk; the file is 29 % smaller");
+      "leave out the oriented blocks, which exact queries on a GPU walk; the file is a quarter smaller");
   app.add_flag_callback(
       "--no-topology", [&options] { options.topology = false; },
       "leave out how triangles hang together, which contact manifolds need: 16 bytes a triangle");

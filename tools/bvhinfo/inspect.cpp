@@ -15,6 +15,24 @@ Json parse_provenance(std::string_view text) {
   return json.is_discarded() ? Json() : json;
 }
 
+std::optional<SurfaceCounts> count_surface(const LevelView& level) {
+  if (level.topology == nullptr) return std::nullopt;
+  SurfaceCounts counts;
+  counts.vertices = level.vertex_count;
+  counts.components = level.component_count;
+  for (std::uint32_t c = 0; c < level.component_count; ++c)
+    counts.closed_components += is_closed(level.components[c]);
+  for (std::uint32_t t = 0; t < level.triangle_count; ++t) {
+    const std::uint32_t flags = level.topology[t].flags;
+    counts.turned_triangles += is_turned(flags);
+    for (int k = 0; k < 3; ++k) {
+      counts.boundary_edges += is_boundary(flags, k);
+      counts.sides_at_edges_of_many += has_many_triangles(flags, k);
+    }
+  }
+  return counts;
+}
+
 }  // namespace
 
 Inspection inspect(const std::string& path, bool only_verify) {
@@ -27,6 +45,7 @@ Inspection inspect(const std::string& path, bool only_verify) {
   const AssetView& view = inspection.asset.view();
   inspection.tree = measure_tree(view.level(), view.header->lower, view.header->upper);
   inspection.work = sample_expected_work(view);
+  inspection.surface = count_surface(view.level());
   inspection.source = parse_provenance(view.provenance);
   return inspection;
 }

@@ -1,10 +1,20 @@
 #pragma once
+#include <cstdint>
+#include <optional>
 #include <string>
 
 #include "statistics/statistics_json.h"
 #include "tandem/runtime/map.h"
 
 namespace tandem {
+
+/// What the topology of a level says.
+struct SurfaceCounts {
+  std::uint64_t vertices = 0, components = 0, closed_components = 0;
+  std::uint64_t turned_triangles = 0;
+  std::uint64_t boundary_edges = 0;
+  std::uint64_t sides_at_edges_of_many = 0;  ///< sides of triangles at edges of more than two
+};
 
 /// One file and everything that bvhinfo knows of it.
 struct Inspection {
@@ -14,7 +24,8 @@ struct Inspection {
   double check_seconds = 0;
   TreeStatistics tree;
   ExpectedWork work;
-  Json source;  ///< the provenance, null if it is no JSON
+  std::optional<SurfaceCounts> surface;  ///< of level 0; nothing where the file has no topology
+  Json source;                           ///< the provenance, null if it is no JSON
 };
 
 /// Opens and checks the file; measures the tree unless `only_verify`. A file that is not sound has a status

@@ -41,6 +41,15 @@ Json sections_json(const AssetView& view) {
   return sections;
 }
 
+Json surface_json(const SurfaceCounts& counts) {
+  return {{"vertices", counts.vertices},
+          {"components", counts.components},
+          {"closed_components", counts.closed_components},
+          {"turned_triangles", counts.turned_triangles},
+          {"boundary_edges", counts.boundary_edges},
+          {"sides_at_edges_of_many", counts.sides_at_edges_of_many}};
+}
+
 Json levels_json(const AssetView& view) {
   Json levels = Json::array();
   for (const Level& level : view.levels) {
@@ -79,6 +88,7 @@ Json to_json(const Inspection& inspection) {
   const auto& oriented = inspection.work.oriented;
   json["expected_oriented_block_pairs"] = oriented ? Json(oriented->block_pairs) : Json();
   json["expected_oriented_candidates"] = oriented ? Json(oriented->candidates) : Json();
+  json["surface"] = inspection.surface ? surface_json(*inspection.surface) : Json();
   json["leaf_blocks_at_depth"] = inspection.tree.leaf_blocks_at_depth;
   json["blocks_with_fill"] = inspection.tree.blocks_with_fill;
   json["bounds"] = {{"lower", header.lower}, {"upper", header.upper}};

@@ -91,6 +91,25 @@ std::string work_lines(const LevelView& level, const ExpectedWork& work) {
   return text;
 }
 
+std::string surface_line(const std::optional<SurfaceCounts>& surface) {
+  if (!surface) return "  surface      no topology: contact manifolds refuse the file\n";
+  std::string text = "  surface      " + with_commas(surface->vertices) + " vertices, " +
+                     with_commas(surface->components) +
+                     (surface->components == 1 ? " component, " : " components, ");
+  if (surface->closed_components == surface->components) {
+    text += "closed";
+  } else {
+    text += with_commas(surface->closed_components) + " closed, " + with_commas(surface->boundary_edges) +
+            " boundary edges";
+  }
+  if (surface->sides_at_edges_of_many != 0)
+    text +=
+        ", " + with_commas(surface->sides_at_edges_of_many) + " sides at edges of more than two triangles";
+  if (surface->turned_triangles != 0)
+    text += ", " + with_commas(surface->turned_triangles) + " triangles taken to be wound the other way";
+  return text + "\n";
+}
+
 std::string tree_lines(const TreeStatistics& tree) {
   std::string text = "  triangles    " + with_commas(tree.triangles) + "\n";
   text += "  nodes        " + with_commas(tree.nodes) + ": " + with_commas(tree.leaf_nodes) + " leaves, " +
@@ -172,6 +191,7 @@ std::string page(const Inspection& inspection) {
   text += part_lines(view);
   text += "  bounds       " + point(header.lower) + " to " + point(header.upper) + "\n";
   text += "  origin       " + point(header.origin) + format(", rounding error %.3g\n", header.rounding_error);
+  text += surface_line(inspection.surface);
   text += tree_lines(inspection.tree);
   text += work_lines(view.level(), inspection.work);
   text += histogram("leaf blocks at depth", inspection.tree.leaf_blocks_at_depth, 0, 1);

@@ -44,13 +44,16 @@ struct EngineTimes {
   double sum() const { return update + broad_phase + traversal + triangle_tests + transfer; }
 };
 
+/// The order of contacts in GPU memory: any, pair by pair, or, of pairs too, as a contacts file has it.
+enum class OrderOnGpu : std::uint8_t { any, grouped, sorted };
+
 /// What `bvhbench query` asks for.
 struct TimedQuery {
   const std::vector<ObjectPair>* given = nullptr;  ///< normalised; null: the engine finds the pairs
   std::uint32_t repeats = 1;
-  bool sorted = false;     ///< on a GPU: pairs and contacts are sorted there, as a contacts file has them
-  bool traversal = false;  ///< on a GPU: the walk of the trees is timed alone too
-  bool manifolds = false;  ///< contact manifolds are made of what each repeat finds, and timed
+  OrderOnGpu order = OrderOnGpu::any;  ///< on a GPU
+  bool traversal = false;              ///< on a GPU: the walk of the trees is timed alone too
+  bool manifolds = false;              ///< contact manifolds are made of what each repeat finds, and timed
 };
 
 /// What an engine takes of a GPU.
@@ -145,7 +148,7 @@ class Engine {
   virtual bool contacts(std::vector<TriangleContact>& found) = 0;
 
   /// Finds pairs, where none are given, and contacts, `repeats` times, and tells what each took. Condition:
-  /// update(); sorted, traversal and manifolds are for engines that have them.
+  /// update(); order, traversal and manifolds are for engines that have them.
   virtual TimedAnswer time_query(const TimedQuery& asked);
 
   /// What a simulator asks for: update(), find_pairs(), query() and contacts(), in the order of a

@@ -39,14 +39,33 @@ void put(std::span<const Contact> contacts, std::vector<TriangleContact>& into) 
   });
 }
 
-// Of what the GPU was to sort.
-void check_order(const std::vector<Contact>& contacts) {
+// Of what the GPU was to group or sort.
+void check_order(const std::vector<Contact>& contacts, OrderOnGpu order) {
+  if (order == OrderOnGpu::any) return;
   const auto key = [](const Contact& c) {
     return std::tie(c.pair, c.face_a, c.face_b, c.triangle_a, c.triangle_b);
   };
-  const auto after = [&](const Contact& x, const Contact& y) { return key(x) >= key(y); };
+  const auto after = [&](const Contact& x, const Contact& y) {
+    return order == OrderOnGpu::sorted ? key(x) >= key(y) : x.pair > y.pair;
+  };
   if (std::adjacent_find(contacts.begin(), contacts.end(), after) == contacts.end()) return;
-  throw std::runtime_error("the GPU: its contacts are not sorted");
+  throw std::runtime_error("the GPU: its contacts are not in order");
+}
+
+// Manifolds by their new rows, and their points with them. Within a pair they stay as they are.
+void sort_manifolds(const std::vector<std::uint32_t>& row, TimedManifolds& made) {
+  for (Manifold& manifold : made.manifolds) manifold.pair = row[manifold.pair];
+  std::stable_sort(made.manifolds.begin(), made.manifolds.end(),
+                   [](const Manifold& x, const Manifold& y) { return x.pair < y.pair; });
+  const std::vector<ManifoldPoint> points = std::move(made.points);
+  made.points.clear();
+  for (std::uint32_t i = 0; i < made.manifolds.size(); ++i) {
+    Manifold& manifold = made.manifolds[i];
+    const auto first = points.begin() + manifold.first_point;
+    manifold.first_point = static_cast<std::uint32_t>(made.points.size());
+    made.points.insert(made.points.end(), first, first + manifold.point_count);
+    for (std::uint32_t k = manifold.first_point; k < made.points.size(); ++k) made.points[k].manifold = i;
+  }
 }
 
 // Brings the pairs into ascending order, and the contacts' rows with them.
@@ -62,6 +81,7 @@ void sort_pairs(TimedAnswer& answer) {
     answer.pairs.push_back(pairs[order[i]]);
   }
   for (TriangleContact& contact : answer.contacts) contact.pair = row[contact.pair];
+  sort_manifolds(row, answer.manifolds);
 }
 
 }  // namespace
@@ -152,7 +172,7 @@ GpuPairs GpuEngine::upload(std::span<const ObjectPair> pairs) {
 void GpuEngine::query(std::span<const ObjectPair> pairs) {
   const bool on_gpu =
       !pairs.empty() && pairs.data() == found_pairs_.data() && pairs.size() == broad_phase_.report().count;
-  ask(on_gpu ? broad_phase_.pairs() : upload(pairs), false);
+  ask(on_gpu ? broad_phase_.pairs() : upload(pairs), OrderOnGpu::any);
 }
 
 bool GpuEngine::contacts(std::vector<TriangleContact>& found_contacts) {
@@ -165,37 +185,48 @@ bool GpuEngine::contacts(std::vector<TriangleContact>& found_contacts) {
 }
 
 TimedAnswer GpuEngine::time_query(const TimedQuery& asked) {
-  if (asked.given == nullptr) find_pairs_on_gpu(asked.sorted);
+  if (asked.given == nullptr) find_pairs_on_gpu(asked.order == OrderOnGpu::sorted);
   const GpuPairs pairs = asked.given == nullptr ? broad_phase_.pairs() : upload(*asked.given);
-  ask(pairs, asked.sorted);
+  ask(pairs, asked.manifolds && asked.order == OrderOnGpu::any ? OrderOnGpu::grouped : asked.order);
   TimedAnswer answer;
   time_repeats(pairs, asked, answer);
   const GpuContacts contacts = found();
   answer.gpu = use(asked);
   answer.pairs.resize(asked.given == nullptr ? broad_phase_.report().count : pairs.capacity);
-  take(pairs, contacts, asked.sorted, answer);
+  if (asked.manifolds) take_manifolds(answer.manifolds);
+  take(pairs, contacts, asked.order, answer);
   if (asked.traversal) answer.traversal = time_walk(pairs, asked.repeats);
   return answer;
 }
 
 void GpuEngine::time_repeats(const GpuPairs& pairs, const TimedQuery& asked, TimedAnswer& answer) {
-  GpuEvent begin, between, end;
-  for (GpuEvent* event : {&begin, &between, &end}) check(event->create(), "an event");
+  GpuEvent begin, between, found, end;
+  for (GpuEvent* event : {&begin, &between, &found, &end}) check(event->create(), "an event");
   const bool finds_pairs = asked.given == nullptr;
   const Before before = [&](unsigned event_flags) {
     if (finds_pairs) {
-      const Status status = broad_phase_.enqueue(instances_, bounds(), {.sorted = asked.sorted}, stream());
+      const Status status =
+          broad_phase_.enqueue(instances_, bounds(), {.sorted = asked.order == OrderOnGpu::sorted}, stream());
       check(status, broad_phase_.cuda_error(), "broad phase");
     }
     check(between.record(stream(), event_flags), "an event");
   };
-  const std::function<void()> run = repeatable(pairs, asked.sorted, before);
+  const Before then = [&](unsigned event_flags) { check(found.record(stream(), event_flags), "an event"); };
+  const std::function<void()> run = asked.manifolds ? repeatable_with_manifolds(pairs, asked.order, before, then)
+                                                    : repeatable(pairs, asked.order, before);
+  const GpuEvent& end_of_query = asked.manifolds ? found : end;
   for (std::uint32_t i = 0; i < asked.repeats; ++i) {
     run_between(begin, run, end);
-    answer.whole.push_back(seconds_between(begin, end));
-    answer.narrow.push_back(seconds_between(finds_pairs ? between : begin, end));
+    answer.whole.push_back(seconds_between(begin, end_of_query));
+    answer.narrow.push_back(seconds_between(finds_pairs ? between : begin, end_of_query));
+    if (asked.manifolds) answer.manifolds.seconds.push_back(seconds_between(found, end));
     if (finds_pairs) answer.broad_phase.push_back(seconds_between(begin, between));
   }
+}
+
+std::function<void()> GpuEngine::repeatable_with_manifolds(const GpuPairs&, OrderOnGpu, const Before&,
+                                                           const Before&) {
+  throw std::logic_error("an engine that makes no manifolds");
 }
 
 void GpuEngine::run_between(const GpuEvent& begin, const std::function<void()>& run,
@@ -212,11 +243,11 @@ double GpuEngine::seconds_between(const GpuEvent& begin, const GpuEvent& end) co
   return 1e-3 * static_cast<double>(milliseconds);
 }
 
-void GpuEngine::take(const GpuPairs& pairs, const GpuContacts& contacts, bool sorted,
+void GpuEngine::take(const GpuPairs& pairs, const GpuContacts& contacts, OrderOnGpu order,
                      TimedAnswer& answer) const {
   std::vector<Contact> found(contacts.count);
   check(download(contacts.data, std::span(found), stream()), "download");
-  if (sorted) check_order(found);
+  check_order(found, order);
   put(found, answer.contacts);
   check(download(pairs.pairs, std::span(answer.pairs), stream()), "download");
   sort_pairs(answer);
@@ -239,11 +270,11 @@ GpuUse GpuEngine::use(const TimedQuery& asked) const {
   use.name = properties.name;
   use.upload = upload_of_shapes_ + upload_of_bodies_;
   use.bytes = scene_bytes(asked) + broad_phase_.bytes() + query_bytes();
-  use.bytes_bound = most_bytes(asked.sorted);
+  use.bytes_bound = most_bytes(asked.order);
   if (use.bytes_bound != 0) {
     use.bytes_bound += scene_bytes(asked);
     if (asked.given == nullptr)
-      use.bytes_bound += most_broad_phase_bytes(broad_phase_.capacity(), asked.sorted);
+      use.bytes_bound += most_broad_phase_bytes(broad_phase_.capacity(), asked.order == OrderOnGpu::sorted);
   }
   use.bytes_taken = free_at_start_ - free;
   return use;

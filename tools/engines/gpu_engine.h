@@ -64,8 +64,8 @@ class GpuEngine : public Engine {
   /// Tells the query of shapes().
   virtual void name_shapes() = 0;
 
-  /// Finds the contacts of these pairs, of instances(), and waits for them. `sorted`: on the GPU.
-  virtual void ask(const GpuPairs& pairs, bool sorted) = 0;
+  /// Finds the contacts of these pairs, of instances(), and waits for them.
+  virtual void ask(const GpuPairs& pairs, OrderOnGpu order) = 0;
 
   /// What the last ask(), or repeat of it, found; sets counters_.
   virtual GpuContacts found() = 0;
@@ -75,14 +75,21 @@ class GpuEngine : public Engine {
 
   /// What queues `before` and the query of these pairs once more. Conditions: ask() of the same went well;
   /// what `before` looks at stays.
-  virtual std::function<void()> repeatable(const GpuPairs& pairs, bool sorted, const Before& before) = 0;
+  virtual std::function<void()> repeatable(const GpuPairs& pairs, OrderOnGpu order, const Before& before) = 0;
+
+  /// The same with contact manifolds of what the query finds, behind `between`. Engines that have none throw.
+  virtual std::function<void()> repeatable_with_manifolds(const GpuPairs& pairs, OrderOnGpu order,
+                                                          const Before& before, const Before& between);
+
+  /// What the last repeat of these made, their rows those of the GPU's pairs.
+  virtual void take_manifolds(TimedManifolds&) {}
 
   /// Times the walk of the trees alone.
   virtual Seconds time_walk(const GpuPairs&, std::uint32_t) { return {}; }
 
   /// GPU memory of the query, and what its rule says it is at most; 0: there is no rule.
   virtual std::size_t query_bytes() const = 0;
-  virtual std::size_t most_bytes(bool) const { return 0; }
+  virtual std::size_t most_bytes(OrderOnGpu) const { return 0; }
 
   /// Runs what `run` queues, and tells the seconds from `begin` to `end`.
   void run_between(const GpuEvent& begin, const std::function<void()>& run, const GpuEvent& end) const;
@@ -93,7 +100,7 @@ class GpuEngine : public Engine {
   void find_pairs_on_gpu(bool sorted);
   GpuPairs upload(std::span<const ObjectPair> pairs);
   void time_repeats(const GpuPairs& pairs, const TimedQuery& asked, TimedAnswer& answer);
-  void take(const GpuPairs& pairs, const GpuContacts& contacts, bool sorted, TimedAnswer& answer) const;
+  void take(const GpuPairs& pairs, const GpuContacts& contacts, OrderOnGpu order, TimedAnswer& answer) const;
   std::size_t scene_bytes(const TimedQuery& asked) const;
   GpuUse use(const TimedQuery& asked) const;
 

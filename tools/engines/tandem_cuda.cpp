@@ -1,6 +1,8 @@
 #include <memory>
 
 #include "gpu_engine.h"
+#include "tandem/formats/gpu_memory.h"
+#include "tandem/kernels/gpu_contact_manifolds.h"
 #include "tandem/kernels/gpu_contact_query.h"
 
 namespace tandem {
@@ -10,18 +12,21 @@ namespace {
 class TandemCudaEngine final : public GpuEngine {
  public:
   explicit TandemCudaEngine(const QueryOptions& options)
-      : GpuEngine("tandem-cuda", options.mode == QueryMode::exact ? Contents::exact_queries : Contents::all),
+      : GpuEngine("tandem-cuda", options.mode == QueryMode::exact ? Contents::manifolds : Contents::all),
         options_(options) {}
 
  private:
-  GpuQueryOptions options(bool sorted) const {
-    return {.mode = options_.mode, .first_contact_only = options_.first_contact_only, .sorted = sorted};
+  GpuQueryOptions options(OrderOnGpu order) const {
+    return {.mode = options_.mode,
+            .first_contact_only = options_.first_contact_only,
+            .sorted = order == OrderOnGpu::sorted,
+            .grouped = order == OrderOnGpu::grouped};
   }
 
   void name_shapes() override { name_shapes_to(query_); }
 
-  void ask(const GpuPairs& pairs, bool sorted) override {
-    const Status status = query_.find_contacts(instances(), pairs, options(sorted), stream());
+  void ask(const GpuPairs& pairs, OrderOnGpu order) override {
+    const Status status = query_.find_contacts(instances(), pairs, options(order), stream());
     if (subject(status) != nullptr) require(status, query_.report().where);
     check(status, query_.cuda_error(), "contacts");
   }
@@ -35,11 +40,40 @@ class TandemCudaEngine final : public GpuEngine {
   }
 
   // A graph that is replayed.
-  std::function<void()> repeatable(const GpuPairs& pairs, bool sorted, const Before& before) override {
+  std::function<void()> repeatable(const GpuPairs& pairs, OrderOnGpu order, const Before& before) override {
     return captured([=, this, &before] {
       before(cudaEventRecordExternal);
-      enqueue(query_, pairs, options(sorted), "contacts");
+      enqueue(query_, pairs, options(order), "contacts");
     });
+  }
+
+  // Both: their contacts are grouped too.
+  std::function<void()> repeatable_with_manifolds(const GpuPairs& pairs, OrderOnGpu order, const Before& before,
+                                                  const Before& between) override {
+    GpuQueryOptions with_groups = options(order);
+    with_groups.grouped = true;
+    constexpr GpuManifoldOptions kOfFeatures = {.match_previous = false};
+    check(query_.reserve(query_.capacity(), with_groups), query_.cuda_error(), "contacts");
+    enqueue(query_, pairs, with_groups, "contacts");
+    check(cudaStreamSynchronize(stream()), "contacts");
+    require(manifolds_.set_assets(shapes(), stream()), 0);
+    const Status status = manifolds_.make(instances(), pairs, query_, kOfFeatures, stream());
+    check(status, manifolds_.cuda_error(), "manifolds");
+    return captured([=, this, &before, &between] {
+      before(cudaEventRecordExternal);
+      enqueue(query_, pairs, with_groups, "contacts");
+      between(cudaEventRecordExternal);
+      check(manifolds_.enqueue(instances(), pairs, query_, kOfFeatures, stream()), manifolds_.cuda_error(), "manifolds");
+    });
+  }
+
+  void take_manifolds(TimedManifolds& made) override {
+    const GpuManifoldReport& report = manifolds_.report();
+    made.manifolds.resize(report.manifolds);
+    made.points.resize(report.points);
+    made.counters = report.counters;
+    check(download(manifolds_.manifolds(), std::span(made.manifolds), stream()), "download");
+    check(download(manifolds_.points(), std::span(made.points), stream()), "download");
   }
 
   Seconds time_walk(const GpuPairs& pairs, std::uint32_t repeats) override {
@@ -77,12 +111,13 @@ class TandemCudaEngine final : public GpuEngine {
   }
 
   std::size_t query_bytes() const override { return query_.bytes(); }
-  std::size_t most_bytes(bool sorted) const override {
-    return most_query_bytes(query_.capacity(), sorted, shapes().size());
+  std::size_t most_bytes(OrderOnGpu order) const override {
+    return most_query_bytes(query_.capacity(), options(order), shapes().size());
   }
 
   QueryOptions options_;
   GpuContactQuery query_;
+  GpuContactManifolds manifolds_;
 };
 
 }  // namespace

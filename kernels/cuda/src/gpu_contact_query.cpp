@@ -22,6 +22,9 @@ Number grown(Number wanted, Number present) {
 // A candidate that lies beyond 32 bits could not be numbered.
 constexpr std::uint64_t kMostUndecided = 0xFFFFFFFEu;
 
+// Pairs whose contacts can be grouped: a sum over them has 31 bits for each kind of pair.
+constexpr std::uint32_t kMostGroupedPairs = 1u << 31;
+
 }  // namespace
 
 struct GpuContactQuery::State {
@@ -42,9 +45,11 @@ struct GpuContactQuery::State {
   GpuArray<gpu::Candidate> undecided;  // two rows: what float32 leaves, and what float64 leaves
   GpuQueryCapacity capacity;
 
-  GpuArray<Contact> unsorted;
+  GpuArray<Contact> ungrouped;  // contacts as they are found, where they are sorted or grouped then
   GpuArray<std::uint32_t> order;
   GpuArray<unsigned char> sorting;  // CUB's
+  GpuArray<std::uint32_t> first_contact, next, few, many;
+  GpuArray<gpu::Counter> tile_sums;
 
   cudaError_t error = cudaSuccess;
 
@@ -64,9 +69,15 @@ struct GpuContactQuery::State {
   Status reserve_pairs(std::uint32_t wanted);
   Status reserve_contacts(std::uint64_t wanted);
   Status reserve_undecided(std::uint64_t wanted);
+  Status reserve_ungrouped();
   Status reserve_sorting();
+  Status reserve_grouping();
+  gpu::Grouping grouping(const GpuQueryOptions& options) const;
   Status check_mode(QueryMode mode) const;
-  bool can_sort() const { return sorting.room() != 0 && unsorted.room() >= capacity.contacts; }
+  bool can_sort() const { return order.room() / 2 >= capacity.contacts && sorting.room() != 0; }
+  bool can_group() const {
+    return ungrouped.room() >= capacity.contacts && first_contact.room() > capacity.pairs;
+  }
   gpu::QueryArgs args(const GpuInstances& instances, const GpuPairs& given, const GpuQueryOptions& options);
   cudaError_t launch(const gpu::QueryArgs& args, cudaStream_t stream);
 };
@@ -152,18 +163,44 @@ Status GpuContactQuery::State::reserve_undecided(std::uint64_t wanted) {
   return status;
 }
 
+Status GpuContactQuery::State::reserve_ungrouped() {
+  return capacity.contacts < kNoIndex ? reserve(ungrouped, capacity.contacts) : Status::kOutOfRange;
+}
+
 Status GpuContactQuery::State::reserve_sorting() {
   if (can_sort()) return Status::kOk;
-  if (capacity.contacts >= kNoIndex) return Status::kOutOfRange;
-  unsorted.free();
   order.free();
   sorting.free();
   std::size_t bytes = 0;
-  Status status = keep(gpu::sorting_bytes(capacity.contacts, bytes));
-  if (status == Status::kOk) status = reserve(unsorted, capacity.contacts);
+  Status status = reserve_ungrouped();
+  if (status == Status::kOk) status = keep(gpu::sorting_bytes(capacity.contacts, bytes));
   if (status == Status::kOk) status = reserve(order, 2 * capacity.contacts);
   if (status == Status::kOk) status = reserve(sorting, std::max<std::size_t>(bytes, 1));
   return status;
+}
+
+Status GpuContactQuery::State::reserve_grouping() {
+  if (can_group()) return Status::kOk;
+  if (capacity.pairs >= kMostGroupedPairs) return Status::kOutOfRange;
+  first_contact.free();  // the last that is there again: can_group() looks at it
+  Status status = reserve_ungrouped();
+  for (GpuArray<std::uint32_t>* array : {&next, &few, &many}) {
+    if (status == Status::kOk) status = reserve(*array, capacity.pairs);
+  }
+  if (status == Status::kOk) status = reserve(tile_sums, 2 * std::size_t{gpu::tiles_of(capacity.pairs)});
+  if (status == Status::kOk) status = reserve(first_contact, std::size_t{capacity.pairs} + 1);
+  return status;
+}
+
+gpu::Grouping GpuContactQuery::State::grouping(const GpuQueryOptions& options) const {
+  if (!options.grouped) return {};
+  return {next.data(),
+          first_contact.data(),
+          few.data(),
+          many.data(),
+          tile_sums.data(),
+          tile_sums.data() + gpu::tiles_of(capacity.pairs),
+          options.sorted ? nullptr : contacts.data()};
 }
 
 gpu::QueryArgs GpuContactQuery::State::args(const GpuInstances& instances, const GpuPairs& given,
@@ -183,7 +220,8 @@ gpu::QueryArgs GpuContactQuery::State::args(const GpuInstances& instances, const
   args.pairs = pairs.data();
   args.world_pairs = world_pairs.data();
   args.met = met.data();
-  args.contacts = options.sorted ? unsorted.data() : contacts.data();
+  args.contacts = options.sorted || options.grouped ? ungrouped.data() : contacts.data();
+  args.grouping = grouping(options);
   args.undecided = undecided.data();
   args.unresolved = undecided.data() + capacity.undecided;
   args.limits = limits;
@@ -191,7 +229,7 @@ gpu::QueryArgs GpuContactQuery::State::args(const GpuInstances& instances, const
   return args;
 }
 
-// All kernels of a query but those that sort.
+// All kernels of a query but those that group and sort.
 cudaError_t GpuContactQuery::State::launch(const gpu::QueryArgs& args, cudaStream_t stream) {
   cudaError_t result = cudaSuccess;
   if (!query_is_clear) result = cudaMemsetAsync(args.state, 0, sizeof(gpu::QueryState), stream);
@@ -221,16 +259,18 @@ Status GpuContactQuery::reserve(const GpuQueryCapacity& wanted, const GpuQueryOp
   Status status = state_->reserve_pairs(wanted.pairs);
   if (status == Status::kOk) status = state_->reserve_contacts(wanted.contacts);
   if (status == Status::kOk) status = state_->reserve_undecided(wanted.undecided);
-  return status == Status::kOk && options.sorted ? state_->reserve_sorting() : status;
+  if (status == Status::kOk && options.sorted) status = state_->reserve_sorting();
+  return status == Status::kOk && options.grouped ? state_->reserve_grouping() : status;
 }
 
 Status GpuContactQuery::enqueue(const GpuInstances& instances, const GpuPairs& pairs,
                                 const GpuQueryOptions& options, cudaStream_t stream) {
   State& s = *state_;
   if (const Status status = s.check_mode(options.mode); status != Status::kOk) return status;
-  if (options.sorted && !s.can_sort()) return Status::kOutOfRange;
+  if ((options.sorted && !s.can_sort()) || (options.grouped && !s.can_group())) return Status::kOutOfRange;
   const gpu::QueryArgs args = s.args(instances, pairs, options);
   cudaError_t error = s.launch(args, stream);
+  if (error == cudaSuccess && options.grouped) error = gpu::group_contacts(args, stream);
   if (error == cudaSuccess && options.sorted) {
     error = gpu::sort_contacts(args,
                                {s.contacts.data(), s.order.data(), s.sorting.data(), s.sorting.bytes(),
@@ -262,6 +302,11 @@ const Contact* GpuContactQuery::contacts() const {
   return state_->contacts.data();
 }
 
+GpuContactGroups GpuContactQuery::groups() const {
+  const State& s = *state_;
+  return {s.contacts.data(), s.first_contact.data(), s.few.data(), s.many.data(), &s.query->groups};
+}
+
 const GpuQueryReport* GpuContactQuery::device_report() const {
   return &state_->query->report;
 }
@@ -278,8 +323,9 @@ std::size_t GpuContactQuery::bytes() const {
   if (state_ == nullptr) return 0;
   const State& s = *state_;
   return s.assets.bytes() + s.query.bytes() + s.chunks.bytes() + s.pairs.bytes() + s.world_pairs.bytes() +
-         s.met.bytes() + s.contacts.bytes() + s.undecided.bytes() + s.unsorted.bytes() + s.order.bytes() +
-         s.sorting.bytes();
+         s.met.bytes() + s.contacts.bytes() + s.undecided.bytes() + s.ungrouped.bytes() + s.order.bytes() +
+         s.sorting.bytes() + s.first_contact.bytes() + s.next.bytes() + s.few.bytes() + s.many.bytes() +
+         s.tile_sums.bytes();
 }
 
 cudaError_t GpuContactQuery::cuda_error() const {

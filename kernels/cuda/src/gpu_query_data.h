@@ -33,7 +33,7 @@ struct alignas(128) Balance {
   alignas(128) std::uint32_t mailbox[kMostMailboxes];
 };
 
-/// Zero when a query begins: cleared by the one before it, the report excepted.
+/// Zero when a query begins: cleared by the one before it, but for what comes from the report on.
 struct QueryState {
   alignas(128) Counter error;  ///< complement of (what, where, status), 0 where there is none: the first wins
   std::uint32_t world_pairs, finished_blocks;
@@ -44,6 +44,25 @@ struct QueryState {
   alignas(128) Counter block_pairs;
   Counter candidates, decided_by_float64;
   GpuQueryReport report;
+  GpuGroupCounts groups;      // written where contacts are grouped
+  std::uint32_t tiles_taken;  // by the sum over pairs; cleared by the query itself
+};
+
+/// Pairs whose contacts are added up at once, by a thread block.
+inline constexpr std::uint32_t kPairsPerTile = 2048;
+
+/// Tiles of pairs, and of the place behind the last.
+TANDEM_HD constexpr std::uint32_t tiles_of(std::uint32_t pairs) {
+  return pairs / kPairsPerTile + 1;
+}
+
+/// What grouping contacts by pair takes; null where it is not asked for.
+struct Grouping {
+  std::uint32_t* next;  ///< of each pair: how many contacts it has, then where the next goes
+  std::uint32_t* first_contact;
+  std::uint32_t *few, *many;  ///< pairs with contacts
+  Counter *tile_contacts, *tile_pairs;
+  Contact* contacts;  ///< where grouped contacts go; null: they stay where they are
 };
 
 /// The arguments of all kernels of a query.
@@ -62,6 +81,7 @@ struct QueryArgs {
   std::uint32_t* world_pairs;  ///< pairs that are not in_frame
   std::uint32_t* met;          ///< of a pair: not 0 once it has a contact; where only the first is asked for
   Contact* contacts;
+  Grouping grouping;
   Candidate *undecided, *unresolved;
   DeviceLimits limits;
   WalkShape shape;
@@ -97,6 +117,9 @@ cudaError_t walk_world(const QueryArgs& args, cudaStream_t stream);
 
 /// Decides what the walks left, and writes the report.
 cudaError_t decide_rest(const QueryArgs& args, cudaStream_t stream);
+
+/// Groups the contacts that the report counts by pair.
+cudaError_t group_contacts(const QueryArgs& args, cudaStream_t stream);
 
 /// Bytes of scratch memory for so many contacts.
 cudaError_t sorting_bytes(std::uint64_t contacts, std::size_t& bytes);

@@ -23,10 +23,22 @@ __device__ void prepare_pair(const QueryArgs& args, std::uint32_t index) {
   if (record.in_frame == 0) args.world_pairs[atomicAdd(&args.state->world_pairs, 1u)] = index;
 }
 
+/// No pair has contacts yet, and no tile of pairs has a sum.
+__device__ void clear_groups(const QueryArgs& args, std::uint32_t first, std::uint32_t step,
+                             std::uint32_t pairs) {
+  const Grouping& grouping = args.grouping;
+  for (std::uint32_t i = first; i < pairs; i += step) grouping.next[i] = 0;
+  for (std::uint32_t i = first; i < tiles_of(pairs); i += step) {
+    grouping.tile_contacts[i] = grouping.tile_pairs[i] = 0;
+  }
+  if (first == 0) args.state->tiles_taken = 0;
+}
+
 __global__ void __launch_bounds__(kThreads) prepare(const __grid_constant__ QueryArgs args) {
   let_next_kernel_begin();
   const std::uint32_t first = blockIdx.x * kThreads + threadIdx.x, step = gridDim.x * kThreads;
   const std::uint32_t pairs = pair_count(args);
+  if (args.grouping.first_contact != nullptr) clear_groups(args, first, step, pairs);
   for (std::uint32_t i = first; i < pairs; i += step) prepare_pair(args, i);
   for (std::uint32_t i = step - 1 - first; i < args.instances.count;
        i += step) {  // by other threads, at first

@@ -53,7 +53,7 @@ class Walk {
   __device__ void run() {
     const std::uint32_t pairs = input();
     if (pairs == 0) return;
-    sharing().begin();
+    if (shares()) sharing().begin();
     take_first_pairs(pairs);
     // Each of these is called in one place: the code is to stay small, for the caches of instructions.
     bool all_done = false;
@@ -65,7 +65,7 @@ class Walk {
       if (stack_.waiting() != 0)
         step();
       else if (!more_input_)
-        all_done = !receive();
+        all_done = !shares() || !receive();
     }
     output_.finish(args_);
     add_counters();
@@ -74,15 +74,21 @@ class Walk {
  private:
   __device__ WorkSharing<SharingWarp> sharing() const { return WorkSharing<SharingWarp>(warp_); }
 
+  /// The same for all warps of a walk.
+  __device__ bool shares() const { return args_.shape.shares; }
+
   __device__ std::uint32_t input() const {
     return Means::kWorld ? args_.state->world_pairs : pair_count(args_);
   }
 
   __device__ std::uint32_t warps() const { return gridDim.x * args_.shape.warps; }
 
-  /// How many object pairs each warp takes where there are so many.
+  /// How many object pairs each warp takes where there are so many. Without sharing, few are spread over all
+  /// warps.
   __device__ std::uint32_t share_of(std::uint32_t pairs) const {
-    return min(max(pairs / warps(), kFewestPairsAtOnce), kMostPairsAtOnce);
+    const std::uint32_t share =
+        shares() ? max(pairs / warps(), kFewestPairsAtOnce) : (pairs + warps() - 1) / warps();
+    return min(share, kMostPairsAtOnce);
   }
 
   /// The first without asking.
@@ -122,7 +128,7 @@ class Walk {
 
   /// Takes up to 32 block pairs off, tests them and puts on those that hit.
   __device__ void step() {
-    warp_.begin_look();  // comes while the boxes are tested
+    if (shares()) warp_.begin_look();  // comes while the boxes are tested
     const Taken taken =
         stack_.take_block_pairs(block_pairs_to_take(stack_.waiting(), stack_.room(), args_.shape.reserve));
     const bool mine = taken.mine && is_open(taken.entry.x);
@@ -133,8 +139,10 @@ class Walk {
       if (tested.of_leaves) candidates_ += __popc(tested.entry.w & 0xFFFFu), tested.entry.w = 0;
     }
     stack_.put(tested.entry, tested.of_leaves);
-    warp_.end_look();
-    if (stack_.waiting() >= kFewestToShare) share();
+    if (shares()) {
+      warp_.end_look();
+      if (stack_.waiting() >= kFewestToShare) share();
+    }
     if (++rounds_ >= kRoundsBetweenCounts) add_counters(), rounds_ = 0;
   }
 
@@ -237,7 +245,7 @@ class Walk {
                         low = __reduce_add_sync(kAllLanes, block_pairs_ & 0xFFFFu);
     const std::uint32_t high_seen = __reduce_add_sync(kAllLanes, candidates_ >> 16),
                         low_seen = __reduce_add_sync(kAllLanes, candidates_ & 0xFFFFu);
-    if (lane_ == 0) {
+    if (lane_ == 0 && (high | low | high_seen | low_seen) != 0) {
       atomicAdd(&args_.state->block_pairs, (static_cast<Counter>(high) << 16) + low);
       atomicAdd(&args_.state->candidates, (static_cast<Counter>(high_seen) << 16) + low_seen);
     }

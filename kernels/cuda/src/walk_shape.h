@@ -55,6 +55,7 @@ struct WalkShape {
   std::uint32_t stack_size;    ///< entries of a warp's stack
   std::uint32_t reserve;       ///< of them, stack_reserve()
   std::uint32_t mailbox_bits;  ///< they number the mailboxes in use, see work_sharing.h
+  bool shares;                 ///< whether warps give work to each other
 
   TANDEM_HD constexpr std::uint32_t mailboxes() const { return 1u << mailbox_bits; }
   constexpr std::uint32_t shared_bytes() const {
@@ -73,12 +74,16 @@ constexpr std::uint32_t mailbox_bits_of(std::uint32_t warps) {
   return std::max(kFewestMailboxBits, static_cast<std::uint32_t>(std::bit_width(kMostGifts * warps - 1)));
 }
 
+/// Trees of so many levels have too little work in an object pair, 17 block pairs at most, for warps to share
+/// it.
+inline constexpr std::uint32_t kDepthWithoutSharing = 2;
+
 /// The shape of a walk of trees that are so deep at most. Where shared memory is short, stacks have fewer
 /// entries, and at the fewest, thread blocks have fewer warps. most_blocks: thread blocks that the caller
 /// allows; 0: as many as the GPU holds. Condition: shared memory of 8 KiB, for one warp with the deepest
 /// trees.
 constexpr WalkShape walk_shape(const DeviceLimits& limits, std::uint32_t depth, std::uint32_t most_blocks) {
-  WalkShape shape = {kMostWarpsPerBlock, 0, 0, stack_reserve(depth), 0};
+  WalkShape shape = {kMostWarpsPerBlock, 0, 0, stack_reserve(depth), 0, depth > kDepthWithoutSharing};
   while (entries_that_fit(limits.shared_bytes, shape.warps) < shape.reserve + kFewestEntries) --shape.warps;
   shape.stack_size = std::min(shape.reserve + kEntries, entries_that_fit(limits.shared_bytes, shape.warps));
   shape.blocks = std::min(limits.processors, kMostMailboxes / (kMostGifts * shape.warps));
@@ -95,7 +100,7 @@ constexpr std::uint32_t most_mailboxes(const DeviceLimits& limits) {
 
 /// At least the shared memory of any walk on this GPU.
 constexpr std::uint32_t most_shared_bytes(const DeviceLimits& limits) {
-  const WalkShape largest = {kMostWarpsPerBlock, 0, stack_reserve(kMaxDepth) + kEntries, 0, 0};
+  const WalkShape largest = {kMostWarpsPerBlock, 0, stack_reserve(kMaxDepth) + kEntries, 0, 0, true};
   return std::min(limits.shared_bytes, largest.shared_bytes());
 }
 

@@ -55,29 +55,26 @@ using Components = std::vector<std::uint32_t>;
 class Flood {
  public:
   Flood(const SurfaceEdges& edges, SurfaceTopology& surface, Components& component)
-      : edges_(edges), surface_(surface), component_(component) {}
+      : edges_(edges), surface_(surface), component_(component), crossed_(edges.count(), 0) {}
 
   /// Numbers the component of `seed`. Result: how many triangles it has.
   std::uint32_t run(std::uint32_t seed, std::uint32_t number) {
     members_.clear();
     number_ = number;
     meet_patch(seed);
-    for (std::size_t i = 0; i < members_.size(); ++i) {
-      for_each_neighbour(members_[i],
-                         [&](std::uint32_t, std::uint32_t other, bool) { meet_patch(other / 3); });
-    }
+    for (std::size_t i = 0; i < members_.size(); ++i) cross_edges_of(members_[i]);
     return static_cast<std::uint32_t>(members_.size());
   }
 
  private:
-  // Calls use(side, other side, whether they are all that the edge has) for triangles not met yet.
-  template <typename Use>
-  void for_each_neighbour(std::uint32_t triangle, const Use& use) {
+  // Each edge once, since any number of triangles may have it.
+  void cross_edges_of(std::uint32_t triangle) {
     for (std::uint32_t side = 3 * triangle; side < 3 * triangle + 3; ++side) {
-      if (edges_.edge_of(side) == SurfaceEdges::kNone) continue;
-      const auto sides = edges_.sides_of(edges_.edge_of(side));
-      for (const std::uint32_t other : sides) {
-        if (component_[other / 3] == kNoIndex) use(side, other, sides.size() == 2);
+      const std::uint32_t edge = edges_.edge_of(side);
+      if (edge == SurfaceEdges::kNone || crossed_[edge] != 0) continue;
+      crossed_[edge] = 1;
+      for (const std::uint32_t other : edges_.sides_of(edge)) {
+        if (component_[other / 3] == kNoIndex) meet_patch(other / 3);
       }
     }
   }
@@ -87,17 +84,24 @@ class Flood {
     members_.push_back(triangle);
   }
 
+  // Makes windings agree with those of `triangle`.
+  void meet_neighbours(std::uint32_t triangle) {
+    for (std::uint32_t side = 3 * triangle; side < 3 * triangle + 3; ++side) {
+      const std::uint32_t edge = edges_.edge_of(side);
+      if (edge == SurfaceEdges::kNone || edges_.sides_of(edge).size() != 2) continue;
+      const auto sides = edges_.sides_of(edge);
+      const std::uint32_t other = sides[0] == side ? sides[1] : sides[0];
+      if (component_[other / 3] != kNoIndex) continue;
+      if (runs_up(surface_.triangles, side) == runs_up(surface_.triangles, other))
+        surface_.triangles[other / 3].flags ^= kTurned;
+      meet(other / 3);
+    }
+  }
+
   void meet_patch(std::uint32_t seed) {
     const std::size_t first = members_.size();
-    std::size_t i = first;
-    for (meet(seed); i < members_.size(); ++i) {
-      for_each_neighbour(members_[i], [&](std::uint32_t side, std::uint32_t other, bool are_all) {
-        if (!are_all) return;
-        if (runs_up(surface_.triangles, side) == runs_up(surface_.triangles, other))
-          surface_.triangles[other / 3].flags ^= kTurned;
-        meet(other / 3);
-      });
-    }
+    meet(seed);
+    for (std::size_t i = first; i < members_.size(); ++i) meet_neighbours(members_[i]);
     const auto patch = std::span(members_).subspan(first);
     const auto turned = std::count_if(patch.begin(), patch.end(),
                                       [&](auto t) { return is_turned(surface_.triangles[t].flags); });
@@ -108,6 +112,7 @@ class Flood {
   const SurfaceEdges& edges_;
   SurfaceTopology& surface_;
   Components& component_;
+  std::vector<std::uint8_t> crossed_;  // of each edge
   std::vector<std::uint32_t> members_;
   std::uint32_t number_ = 0;
 };

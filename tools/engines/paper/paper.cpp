@@ -21,7 +21,7 @@ class PaperSchemeEngine final : public GpuEngine {
     check(status, query_.cuda_error(), "assets");
   }
 
-  void ask(const GpuPairs& pairs, bool) override {
+  void ask(const GpuPairs& pairs, OrderOnGpu) override {
     const Status status = query_.find_contacts(instances(), pairs, options_, stream());
     if (subject(status) != nullptr) require(status, query_.report().where);
     check(status, query_.cuda_error(), "contacts");
@@ -33,10 +33,10 @@ class PaperSchemeEngine final : public GpuEngine {
     return {query_.contacts(), counters_.contacts};
   }
 
-  std::function<void()> repeatable(const GpuPairs& pairs, bool sorted, const Before& before) override {
+  std::function<void()> repeatable(const GpuPairs& pairs, OrderOnGpu order, const Before& before) override {
     return [=, this] {
       before(cudaEventRecordDefault);
-      ask(pairs, sorted);
+      ask(pairs, order);
     };
   }
 

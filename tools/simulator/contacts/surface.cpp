@@ -86,7 +86,7 @@ void count_turned(const LevelView& level, Surface& surface) {
   for (std::uint32_t t = 0; t < surface.triangle_count(); ++t) {
     for (const std::uint32_t e : surface.edge_of[t]) {
       if (first[e] == kNoIndex) first[e] = t;
-      const auto [low, high] = std::minmax(lowest(t), lowest(first[e]));
+      const auto [low, high] = std::minmax({lowest(t), lowest(first[e])});
       lower[high] = low;
     }
   }

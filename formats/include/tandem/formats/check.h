@@ -17,7 +17,8 @@ struct CheckResult {
 /// How much check() proves.
 enum class CheckDepth : std::uint8_t {
   full,
-  quick,  ///< it believes that oriented boxes hold what is below them; what this spares: docs/decisions/0047
+  quick,  ///< it believes what oriented boxes hold and what topology says; what this spares:
+          ///< docs/decisions/0047 and 0052
 };
 
 /// Proves that the bytes are a sound .bvh file: hash, sizes, sections, tree, boxes, triangles. After kOk
@@ -25,11 +26,16 @@ enum class CheckDepth : std::uint8_t {
 /// kMaxDepth and lie depth first, each triangle hangs below exactly one leaf and lies, as every box does,
 /// within all boxes above it in real arithmetic, and imaginary nodes have the box that every test rejects.
 /// Where there are oriented blocks, they are those of these blocks, and each triangle lies within the
-/// oriented boxes of all nodes above it too. A quick check leaves out this last proof alone: with a file that
-/// lies there exact queries on a GPU could miss contacts, but read nothing out of bounds.
+/// oriented boxes of all nodes above it too. Where there is topology, it is that of these triangles: vertices
+/// are their positions, edges and components are counted right, and windings agree where they can; which side
+/// of several components is outside is nothing that a file can show (FORMAT.md). A quick check leaves out
+/// what oriented boxes hold and what topology says beyond the range of its indices: with a file that lies
+/// there exact queries on a GPU could miss contacts, and manifolds be wrong, but nothing reads out of bounds.
 ///
-/// Reads the bytes twice, and the triangles once for each block above them; allocates and throws nothing.
-/// `data` must be aligned to 128 bytes (kMisaligned otherwise); it need not stay after a failure.
+/// Reads the bytes twice, and the triangles once for each block above them. Throws nothing. A full check of a
+/// level with topology takes up to 48 bytes a triangle meanwhile, and kOutOfMemory says that they are not
+/// there; else it allocates nothing. `data` must be aligned to 128 bytes (kMisaligned otherwise); it need not
+/// stay after a failure.
 CheckResult check(const void* data, std::size_t bytes, CheckDepth depth = CheckDepth::full);
 
 /// Writes the content hash into the header, the last step of writing a file.

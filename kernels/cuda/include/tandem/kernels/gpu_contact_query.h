@@ -22,6 +22,11 @@ struct GpuQueryOptions {
   /// those found. Without it their order is unspecified.
   bool sorted = false;
 
+  /// Contacts lie grouped by pair, and groups() tells where those of each pair lie. Their order within a pair
+  /// is unspecified, unless they are sorted too. Grouping takes time for the contacts and pairs that there
+  /// are, not for as many as there is room for.
+  bool grouped = false;
+
   /// In exact mode, the query only walks the trees and counts block pairs and candidates; it finds no
   /// contacts. This measures what the walk takes of a query's time. The other modes ignore it.
   bool walk_only = false;
@@ -39,14 +44,35 @@ struct GpuQueryCapacity {
 };
 
 /// GPU memory that a query of so many assets with room for so much holds at most: the bound of
-/// GpuContactQuery::bytes(), where it was never given more of them. Instances cost it nothing, nor does the
-/// size of the assets.
-constexpr std::size_t most_query_bytes(const GpuQueryCapacity& capacity, bool sorted, std::size_t assets) {
+/// GpuContactQuery::bytes(), where it was never given more of them. options: those of all its calls.
+/// Instances cost it nothing, nor does the size of the assets.
+constexpr std::size_t most_query_bytes(const GpuQueryCapacity& capacity, const GpuQueryOptions& options,
+                                       std::size_t assets) {
   constexpr std::size_t kFixed = std::size_t{9} << 20;  // work that warps give to each other, and the report
-  const std::size_t per_contact = sorted ? 20 + 29 : 20;
-  return kFixed + sizeof(GpuAsset) * assets + 168 * std::size_t{capacity.pairs} +
-         per_contact * capacity.contacts + 24 * capacity.undecided;
+  const std::size_t per_contact = options.sorted ? 20 + 29 : options.grouped ? 20 + 20 : 20;
+  const std::size_t per_pair = options.grouped ? 168 + 17 : 168;
+  return kFixed + sizeof(GpuAsset) * assets + per_pair * capacity.pairs + per_contact * capacity.contacts +
+         24 * capacity.undecided;
 }
+
+/// A pair with no more contacts than these has few of them, see GpuContactGroups.
+inline constexpr std::uint32_t kFewContacts = 64;
+
+struct GpuGroupCounts {
+  std::uint32_t pairs;      ///< all of the query, those without contacts too
+  std::uint32_t contacts;   ///< as many as the report says are stored
+  std::uint32_t few, many;  ///< pairs with few contacts, and with more
+};
+
+/// Where grouped contacts lie; arrays in GPU memory, valid behind the query. Where not all contacts had room,
+/// they tell of those that are stored; after an error no pair has any.
+struct GpuContactGroups {
+  const Contact* contacts;
+  const std::uint32_t*
+      first_contact;                ///< pairs + 1: pair p has contacts first_contact[p], up to that of p + 1
+  const std::uint32_t *few, *many;  ///< the pairs with 1 to kFewContacts contacts and with more, ascending
+  const GpuGroupCounts* counts;     ///< one, in GPU memory
+};
 
 /// The outcome of a query. It lies in GPU memory, and in CPU memory once the stream has come to the query's
 /// end.
@@ -78,16 +104,17 @@ class GpuContactQuery {
   Status set_assets(std::span<const GpuAsset> assets, cudaStream_t stream);
 
   /// Makes room for at least so much, waiting for the device where it grows. `options`: those of the calls to
-  /// come. Result: kOk, kOutOfRange (sorted contacts: 2^32 - 1 or more), kOutOfGpuMemory, kCudaFailed; after
+  /// come. Result: kOk, kOutOfRange (sorted or grouped: 2^32 - 1 contacts or more; grouped: 2^31 pairs or
+  /// more), kOutOfGpuMemory, kCudaFailed; after
   /// an error there is the room that there was, or none. Condition: set_assets().
   Status reserve(const GpuQueryCapacity& capacity, const GpuQueryOptions& options = {});
 
   /// Queues a query behind what `stream` holds; it may be captured into a graph. The arrays must stay until
   /// it is done. A pair of an instance with itself asks for the contacts within it. Mode exact walks oriented
   /// blocks, the others axis-aligned ones. Result: kOk, kNoOrientedBlocks or kNoAxisAlignedBlocks (an asset
-  /// lacks them), kOutOfRange (sorted, and reserved without), kCudaFailed, or, where CUDA loads a kernel at
-  /// its first launch and the GPU is full, kOutOfGpuMemory; what the GPU finds wrong is in the report.
-  /// Condition: set_assets() and reserve().
+  /// lacks them), kOutOfRange (sorted or grouped, and reserved without), kCudaFailed, or, where CUDA loads a
+  /// kernel at its first launch and the GPU is full, kOutOfGpuMemory; what the GPU finds wrong is in the
+  /// report. Condition: set_assets() and reserve().
   Status enqueue(const GpuInstances& instances, const GpuPairs& pairs, const GpuQueryOptions& options,
                  cudaStream_t stream);
 
@@ -100,6 +127,9 @@ class GpuContactQuery {
   /// In GPU memory: report().contacts of them. Condition: set_assets().
   const Contact* contacts() const;
   const GpuQueryReport* device_report() const;
+
+  /// Condition: set_assets(), and reserve() for grouped contacts; valid until the next reserve().
+  GpuContactGroups groups() const;
 
   /// In CPU memory. Condition: the stream has come to the end of the query.
   const GpuQueryReport& report() const;

@@ -9,35 +9,35 @@ namespace tandem::manifold {
 /// block on a GPU (kernels/cuda/src/manifold_team.cuh). Each takes every size()-th thing from rank() on. What
 /// they find together must not depend on how many they are nor on who comes first.
 struct OneThread {
-  static std::uint32_t rank() { return 0; }
-  static std::uint32_t size() { return 1; }
+  TANDEM_HD static std::uint32_t rank() { return 0; }
+  TANDEM_HD static std::uint32_t size() { return 1; }
 
   /// What all have written to memory is seen by all.
-  static void sync() {}
+  TANDEM_HD static void sync() {}
 
   template <typename T>
-  static T sum(T value) {
+  TANDEM_HD static T sum(T value) {
     return value;
   }
   template <typename T>
-  static T least(T value) {
+  TANDEM_HD static T least(T value) {
     return value;
   }
   template <typename T>
-  static T greatest(T value) {
+  TANDEM_HD static T greatest(T value) {
     return value;
   }
-  static bool any(bool value) { return value; }
+  TANDEM_HD static bool any(bool value) { return value; }
 
   /// On memory that all see.
-  static std::uint32_t load(const std::uint32_t& at) { return at; }
-  static void store(std::uint32_t& at, std::uint32_t value) { at = value; }
-  static std::uint32_t add(std::uint32_t& at, std::uint32_t value) {
+  TANDEM_HD static std::uint32_t load(const std::uint32_t& at) { return at; }
+  TANDEM_HD static void store(std::uint32_t& at, std::uint32_t value) { at = value; }
+  TANDEM_HD static std::uint32_t add(std::uint32_t& at, std::uint32_t value) {
     const std::uint32_t before = at;
     at += value;
     return before;
   }
-  static std::uint32_t compare_and_swap(std::uint32_t& at, std::uint32_t expected, std::uint32_t value) {
+  TANDEM_HD static std::uint32_t compare_and_swap(std::uint32_t& at, std::uint32_t expected, std::uint32_t value) {
     const std::uint32_t before = at;
     if (before == expected) at = value;
     return before;

@@ -1,0 +1,197 @@
+#include "manifold_data.h"
+#include "manifold_team.cuh"
+#include "tandem/kernels/detail/manifold/manifold_maker.h"
+
+// From contacts to patches. A thread block makes the patches of a pair with many contacts, a warp those of one
+// with few. Compiled without fused operations: the arithmetic is that of the CPU, bit by bit.
+namespace tandem::gpu {
+namespace {
+
+using manifold::Body;
+using manifold::BodyPair;
+using manifold::ManifoldMaker;
+using manifold::Patch;
+using manifold::PatchMemory;
+using manifold::PieceMemory;
+
+constexpr std::uint32_t kThreads = 128, kWarps = kThreads / 32;
+
+// Pieces are numbered in 28 bits, and table entries in 32.
+constexpr std::uint32_t kMostContactsOfPair = std::uint32_t{1} << 27;
+
+__device__ bool has_query(const ManifoldArgs& args) {
+  return args.query->status == Status::kOk && args.query->complete != 0 &&
+         args.query->contacts <= args.capacity.contacts && *args.pairs.count <= args.capacity.pairs;
+}
+
+template <typename Team>
+__device__ void make_patches_of(const ManifoldArgs& args, const Team& team, PatchMemory& shared,
+                                std::uint32_t pair) {
+  const std::uint32_t first = args.groups.first_contact[pair], count = args.groups.first_contact[pair + 1] - first;
+  const ObjectPair bodies_of_pair = args.pairs.pairs[pair];
+  PairPatches own = {kNoIndex, 0, 0, 0, 0, 0};
+  if (count > kMostContactsOfPair) {
+    if (team.rank() == 0) args.state->too_many_contacts = 1;
+  } else if (bodies_of_pair.a != bodies_of_pair.b) {
+    const BodyPair bodies = {
+        {args.shapes[args.instances.asset[bodies_of_pair.a]], args.instances.pose[bodies_of_pair.a]},
+        {args.shapes[args.instances.asset[bodies_of_pair.b]], args.instances.pose[bodies_of_pair.b]}};
+    const PieceMemory memory = {args.pieces.pieces + first,
+                                args.pieces.normals + 6 * std::size_t{first},
+                                args.pieces.curve + first,
+                                args.pieces.order + first,
+                                args.pieces.start + first + pair,
+                                args.pieces.table + PieceMemory::kTableWords * std::size_t{first}};
+    ManifoldMaker<Team> maker(team, bodies, memory, shared, args.most_points);
+    const auto done = [&](const Patch& patch) {
+      own.points += patch.hole != 0 ? 0 : patch.manifold.point_count;
+      own.manifolds += patch.hole != 0 ? 0 : 1;
+      if ((patch.manifold.flags & kOpenCurve) != 0 && patch.hole == 0) atomicAdd(&args.state->open_curves, 1ull);
+    };
+    Patch* made = nullptr;
+    const auto new_patch = [&]() -> Patch* {
+      if (made != nullptr) done(*made);
+      const std::uint32_t place = atomicAdd(&args.state->next_patch, 1u);
+      if (place >= args.capacity.manifolds) {
+        atomicAdd(&args.state->needed_points, static_cast<Counter>(args.most_points));
+        return made = nullptr;
+      }
+      args.next_of_pair[place] = own.first;
+      own.first = place;
+      ++own.patches;
+      return made = &args.patches[place];
+    };
+    const manifold::PairCounters found =
+        maker.make(args.groups.contacts + first, count, new_patch);
+    if (team.rank() == 0) {
+      if (made != nullptr) done(*made);
+      if (found.segments > 0) atomicAdd(&args.state->segments, Counter{found.segments});
+      if (found.ambiguous_touches > 0)
+        atomicAdd(&args.state->ambiguous_touches, Counter{found.ambiguous_touches});
+    }
+  }
+  if (team.rank() == 0) {
+    args.of_pair[pair] = own;
+    if (own.points > 0) atomicAdd(&args.state->needed_points, Counter{own.points});
+  }
+  team.sync();
+}
+
+__global__ void __launch_bounds__(kThreads) make(const __grid_constant__ ManifoldArgs args) {
+  __shared__ alignas(16) unsigned char memory[kWarps * sizeof(PatchMemory)];  // begins without contents
+  __shared__ Counter scratch[kWarps];
+  PatchMemory* const shared = reinterpret_cast<PatchMemory*>(memory);
+  __shared__ std::uint32_t taken;
+  wait_for_kernel_before();
+  if (!has_query(args)) return;
+  const GpuGroupCounts& counts = *args.groups.counts;
+  const BlockTeam<kThreads> block = {{}, scratch};
+  for (;;) {
+    if (threadIdx.x == 0) taken = atomicAdd(&args.state->next_many, 1u);
+    __syncthreads();
+    const std::uint32_t row = taken;
+    __syncthreads();
+    if (row >= counts.many) break;
+    make_patches_of(args, block, shared[0], args.groups.many[row]);
+  }
+  const WarpTeam warp;
+  for (;;) {
+    std::uint32_t row = 0;
+    if (warp.rank() == 0) row = atomicAdd(&args.state->next_few, 1u);
+    row = __shfl_sync(0xFFFFFFFFu, row, 0);
+    if (row >= counts.few) break;
+    make_patches_of(args, warp, shared[threadIdx.x / 32], args.groups.few[row]);
+  }
+}
+
+/// Step 0 is that of a new table's entries.
+__device__ std::uint32_t step_after(std::uint32_t step) {
+  return step + 1 == 0 ? 1 : step + 1;
+}
+
+__device__ void enter(TableEntry* table, std::uint32_t size, std::uint32_t step, const PairEntry& entry) {
+  auto slot = static_cast<std::uint32_t>((manifold::mixed(entry.bodies) >> 32) * size >> 32);
+  for (;;) {
+    const std::uint32_t there = *static_cast<volatile std::uint32_t*>(&table[slot].step);
+    if (there != step && atomicCAS(&table[slot].step, there, step) == there) break;
+    if (++slot == size) slot = 0;
+  }
+  TableEntry& out = table[slot];
+  out.bodies = entry.bodies, out.first_point = entry.first_point, out.points = entry.points;
+}
+
+__global__ void __launch_bounds__(kThreads) move_table(const TableEntry* from, std::uint32_t from_size, TableEntry* to,
+                                                       std::uint32_t to_size, const ManifoldState* state) {
+  const std::uint32_t step = state->step;
+  for (std::uint32_t i = blockIdx.x * kThreads + threadIdx.x; i < from_size; i += gridDim.x * kThreads) {
+    if (from[i].step == step) enter(to, to_size, step, {from[i].bodies, from[i].first_point, from[i].points});
+  }
+}
+
+__global__ void forget(ManifoldState* state) {
+  state->has_last = 0;
+  state->step = step_after(state->step);
+}
+
+/// Keeps the points of the last call, and where those of each pair are; clears what the call counts.
+__global__ void __launch_bounds__(kThreads) remember(const __grid_constant__ ManifoldArgs args) {
+  wait_for_kernel_before();
+  ManifoldState& state = *args.state;
+  const std::uint32_t first = blockIdx.x * kThreads + threadIdx.x, step = gridDim.x * kThreads;
+  const std::uint32_t pairs = *args.pairs.count < args.capacity.pairs ? *args.pairs.count : args.capacity.pairs;
+  for (std::uint32_t i = first; i < pairs; i += step) args.of_pair[i] = {kNoIndex, 0, 0, 0, 0, 0};
+  for (std::uint32_t i = first; i < args.capacity.pairs / kManifoldTile + 1; i += step) args.tile_sums[i] = 0;
+  if (args.match_previous && state.has_last != 0) {
+    const std::uint32_t table_step = step_after(state.step);
+    // As words, so that the copies are even.
+    constexpr std::uint32_t kManifoldWords = sizeof(Manifold) / 8, kPointWords = sizeof(ManifoldPoint) / 8;
+    const auto copy = [&](const void* from, void* to, std::uint64_t words) {
+      for (std::uint64_t i = first; i < words; i += step)
+        static_cast<Counter*>(to)[i] = static_cast<const Counter*>(from)[i];
+    };
+    copy(args.manifolds, args.manifolds_before, std::uint64_t{state.last_manifolds} * kManifoldWords);
+    copy(args.points, args.points_before, std::uint64_t{state.last_points} * kPointWords);
+    for (std::uint32_t i = first; i < state.last_manifolds; i += step) {
+      const PairEntry entry = args.entries[i];
+      if (entry.points != 0) enter(args.table, args.table_size, table_step, entry);
+    }
+  }
+  // The last block of all sees to the numbers that the others have read.
+  __syncthreads();
+  if (threadIdx.x != 0) return;
+  __threadfence();
+  if (atomicAdd(&state.finished_blocks, 1u) + 1 != gridDim.x) return;
+  state.next_many = state.next_few = state.next_patch = state.tiles_taken = 0;
+  state.needed_points = state.segments = state.ambiguous_touches = state.open_curves = 0;
+  state.too_many_contacts = state.finished_blocks = 0;
+  if (!args.match_previous || state.has_last != 0) state.step = step_after(state.step);  // its table is empty as yet
+  state.has_last = 0;
+}
+
+}  // namespace
+
+cudaError_t remember_points(const ManifoldArgs& args, cudaStream_t stream) {
+  // After whatever kernel of the user's, and so after all of it.
+  remember<<<args.limits.processors * 2, kThreads, 0, stream>>>(args);
+  return cudaGetLastError();
+}
+
+cudaError_t move_entries(const TableEntry* from, std::uint32_t from_size, TableEntry* to, std::uint32_t to_size,
+                         const ManifoldState* state) {
+  constexpr std::uint32_t kBlocks = 256;
+  move_table<<<kBlocks, kThreads>>>(from, from_size, to, to_size, state);
+  return cudaGetLastError();
+}
+
+cudaError_t forget_last(ManifoldState* state, cudaStream_t stream) {
+  forget<<<1, 1, 0, stream>>>(state);
+  return cudaGetLastError();
+}
+
+cudaError_t make_patches(const ManifoldArgs& args, cudaStream_t stream) {
+  constexpr std::uint32_t kBlocksPerProcessor = 4;
+  const Grid grid = {args.limits.processors * kBlocksPerProcessor, kThreads, 0, stream, args.limits.early_launch};
+  return launch_after(grid, make, args);
+}
+
+}  // namespace tandem::gpu

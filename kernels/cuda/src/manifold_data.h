@@ -1,0 +1,98 @@
+#pragma once
+#include <cuda_runtime.h>
+
+#include <cstdint>
+
+#include "launch.h"
+#include "tandem/kernels/detail/manifold/finish.h"
+#include "tandem/kernels/gpu_contact_manifolds.h"
+
+// What the kernels that make manifolds share, all of it in GPU memory.
+namespace tandem::gpu {
+
+using Counter = unsigned long long;
+
+/// The patches of a pair: a list that PatchPlace::next leads along.
+struct PairPatches {
+  std::uint32_t first;  ///< kNoIndex where there is none
+  std::uint32_t patches, manifolds, points;
+  std::uint32_t first_manifold, first_point;
+};
+
+/// A point of the step before, as matching sees it, and the place of a pair's points.
+struct PairEntry {
+  std::uint64_t bodies;
+  std::uint32_t first_point, points;
+};
+
+/// An entry of the table of the step before; of another step than `step` it is empty.
+struct alignas(8) TableEntry {
+  std::uint32_t step;
+  std::uint32_t first_point;
+  std::uint64_t bodies;
+  std::uint32_t points, unused;
+};
+
+struct ManifoldState {
+  // Cleared by each call.
+  std::uint32_t next_many, next_few, next_patch, tiles_taken;
+  Counter needed_points, segments, ambiguous_touches, open_curves;
+  std::uint32_t too_many_contacts, finished_blocks;
+
+  // Kept from call to call.
+  std::uint32_t step;          ///< of the table
+  std::uint32_t has_last;      ///< the last call made manifolds that the next one is to remember
+  std::uint32_t last_manifolds, last_points;
+  GpuManifoldReport report;
+};
+
+/// Pairs whose counts are added up at once, by a thread block.
+inline constexpr std::uint32_t kManifoldTile = 1024;
+
+struct ManifoldArgs {
+  const manifold::Shape* shapes;
+  GpuInstances instances;
+  GpuPairs pairs;
+  GpuContactGroups groups;
+  const GpuQueryReport* query;
+  GpuManifoldCapacity capacity;
+  bool match_previous;
+  int most_points;
+
+  ManifoldState* state;
+  GpuManifoldReport* host_report;  ///< in CPU memory
+  manifold::PieceMemory pieces;
+  manifold::Patch* patches;
+  std::uint32_t* next_of_pair;  ///< of each patch: the next of the same pair
+  PairPatches* of_pair;
+  Counter* tile_sums;
+
+  Manifold* manifolds;
+  ManifoldPoint* points;
+  PairEntry* entries;  ///< of each manifold: the first of a pair has the pair's points, others none
+
+  Manifold* manifolds_before;
+  ManifoldPoint* points_before;
+  TableEntry* table;
+  std::uint32_t table_size;
+
+  DeviceLimits limits;
+};
+
+/// Moves the table of the step before to a larger one, on the default stream.
+cudaError_t move_entries(const TableEntry* from, std::uint32_t from_size, TableEntry* to, std::uint32_t to_size,
+                         const ManifoldState* state);
+
+/// The next call finds nothing before it.
+cudaError_t forget_last(ManifoldState* state, cudaStream_t stream);
+
+/// Keeps the last call's points for matching.
+cudaError_t remember_points(const ManifoldArgs& args, cudaStream_t stream);
+
+/// Makes the patches of all pairs that have contacts.
+cudaError_t make_patches(const ManifoldArgs& args, cudaStream_t stream);
+
+/// Gives them their places, writes manifolds and points, and the report.
+cudaError_t place_manifolds(const ManifoldArgs& args, cudaStream_t stream);
+
+}  // namespace tandem::gpu

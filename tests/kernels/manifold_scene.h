@@ -134,7 +134,8 @@ inline SurfacePart surface_inside(const Triangles& surface, const Triangles& con
         const Vector3 &p = polygon[i], &q = polygon[(i + 1) % polygon.size()];
         const double at_p = dot(n, p - face[0]), at_q = dot(n, q - face[0]);
         if (at_p <= 0) next.push_back(p);
-        if ((at_p < 0 && at_q > 0) || (at_p > 0 && at_q < 0)) next.push_back(p + (at_p / (at_p - at_q)) * (q - p));
+        if ((at_p < 0 && at_q > 0) || (at_p > 0 && at_q < 0))
+          next.push_back(p + (at_p / (at_p - at_q)) * (q - p));
       }
       polygon.swap(next);
     }

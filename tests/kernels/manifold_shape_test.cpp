@@ -8,6 +8,8 @@
 namespace tandem::test {
 namespace {
 
+using manifold::Vector2;
+
 constexpr double kDegree = 3.14159265358979323846 / 180;
 
 double angle_between(const Vector3& p, const Vector3& q) {
@@ -43,44 +45,58 @@ const std::vector<NamedMesh>& grounds() {
   return all;
 }
 
-// By how much the points of a manifold differ from the whole patch, where a uniform pressure pushes on both: what
-// they span has another area and another middle.
+// By how much the points of a manifold differ from the whole patch, where a uniform pressure pushes on both:
+// what they span has another area and another middle.
 struct Reduction {
-  double area = 0;    // 1 - area that the points span over the patch's, the largest
+  double area = 0;  // 1 - area that the points span over the patch's, the largest
+  int patches = 0;
   double torque = 0;  // distance of the middles over the patch's extent, the largest
 
+  // Points that are near each other are merged: patches count that are not small beside the bodies, whose
+  // size is about 1, nor narrow.
   void take(const Manifold& m, std::span<const ManifoldPoint> points) {
-    const Vector3 n = vector_of(m.normal), u = manifold::unit_orthogonal(n), v = cross(n, u);
-    std::vector<manifold::Vector2> at;
-    for (const ManifoldPoint& p : points) {
-      const Vector3 d = vector_of(p.position) - vector_of(m.centre);
-      at.push_back({dot(u, d), dot(v, d)});
-    }
-    const std::vector<manifold::Vector2> hull = hull_of(at);
-    double twice = 0, extent = 0;
-    manifold::Vector2 moment;
+    // The tip of a body that leans may lie beside the patch, seen along the normal, and is no part of it.
+    const double whole = std::fabs(dot(vector_of(m.area_vector), vector_of(m.normal)));
+    if (area_of(m, points) > 1.000001 * whole && points.size() > 1) points = points.subspan(1);
+    const std::vector<Vector2> hull = hull_of(m, points);
+    double extent = 0;
+    Vector2 moment;
     for (std::size_t i = 0; i < hull.size(); ++i) {
       const auto &p = hull[i], &q = hull[(i + 1) % hull.size()];
-      twice += cross(p, q);
       moment = moment + (cross(p, q) / 3) * (p + q);
       extent = std::max(extent, norm(p));
     }
-    const double whole = std::fabs(dot(vector_of(m.area_vector), n));
-    area = std::max(area, std::fabs(1 - twice / 2 / whole));
-    torque = std::max(torque, norm(moment) / (twice * extent));
+    if (whole < 0.01 || whole < 0.25 * extent * extent) return;
+    ++patches;
+    const double of_points = area_of(m, points);
+    area = std::max(area, std::fabs(1 - of_points / whole));
+    torque = std::max(torque, norm(moment) / (2 * of_points * extent));
   }
   void record(const char* what) const {
     testing::Test::RecordProperty("largest_error_of_force", std::to_string(area));
     testing::Test::RecordProperty("largest_error_of_torque", std::to_string(torque));
-    std::printf("%s: the points' area differs by %.3f at most, its middle by %.3f of the extent\n", what, area,
-                torque);
+    std::printf("%s: the points' area differs by %.3f at most, its middle by %.3f of the extent\n", what,
+                area, torque);
   }
 
  private:
-  static std::vector<manifold::Vector2> hull_of(std::vector<manifold::Vector2> at) {
+  static double area_of(const Manifold& m, std::span<const ManifoldPoint> points) {
+    const std::vector<Vector2> hull = hull_of(m, points);
+    double twice = 0;
+    for (std::size_t i = 0; i < hull.size(); ++i) twice += cross(hull[i], hull[(i + 1) % hull.size()]);
+    return twice / 2;
+  }
+  // Seen along the normal, from the centre on.
+  static std::vector<Vector2> hull_of(const Manifold& m, std::span<const ManifoldPoint> points) {
+    const Vector3 n = vector_of(m.normal), u = manifold::unit_orthogonal(n), v = cross(n, u);
+    std::vector<Vector2> at;
+    for (const ManifoldPoint& p : points) {
+      const Vector3 d = vector_of(p.position) - vector_of(m.centre);
+      at.push_back({dot(u, d), dot(v, d)});
+    }
     const auto before = [](const auto& p, const auto& q) { return p.x != q.x ? p.x < q.x : p.y < q.y; };
     std::sort(at.begin(), at.end(), before);
-    std::vector<manifold::Vector2> hull;
+    std::vector<Vector2> hull;
     for (int half = 0; half < 2; ++half) {
       const std::size_t first = hull.size();
       for (const auto& p : at) {
@@ -95,6 +111,14 @@ struct Reduction {
   }
 };
 
+// The deepest line is not always a point's.
+void expect_deepest_point(const Manifold& m, std::span<const ManifoldPoint> points) {
+  double deepest = 0;
+  for (const ManifoldPoint& p : points) deepest = std::max(deepest, p.depth);
+  EXPECT_LE(deepest, m.depth);
+  EXPECT_GE(deepest, 0.8 * m.depth);
+}
+
 class SolidOnPlane : public testing::TestWithParam<NamedMesh> {};
 
 TEST_P(SolidOnPlane, HasThePlanesNormalItsDepthAndTheAreaOfItsSection) {
@@ -108,7 +132,8 @@ TEST_P(SolidOnPlane, HasThePlanesNormalItsDepthAndTheAreaOfItsSection) {
       SCOPED_TRACE(std::string(ground.name) + " " + std::to_string(trial));
       Pose pose = any_motion(random, 0);
       const Triangles turned = triangles_of(GetParam().mesh, pose);
-      const double lowest = -reach_along(turned, {0, 0, -1}), thickness = reach_along(turned, {0, 0, 1}) - lowest;
+      const double lowest = -reach_along(turned, {0, 0, -1}),
+                   thickness = reach_along(turned, {0, 0, 1}) - lowest;
       const double depth = thickness * std::pow(10, random.uniform(-4, -1));
       pose = after(shift(random.symmetric(1), random.symmetric(1), -lowest - depth), pose);
       scene.bodies[1].pose = pose;
@@ -120,7 +145,9 @@ TEST_P(SolidOnPlane, HasThePlanesNormalItsDepthAndTheAreaOfItsSection) {
       EXPECT_LT(angle_between(normal, up), 0.1 * kDegree) << depth / thickness;
       EXPECT_NEAR(m.depth, depth, 0.01 * depth) << depth / thickness;
       EXPECT_EQ(m.flags, 0u);
-      const SurfacePart part = surface_inside(triangles_of(ground.mesh, motion), triangles_of(GetParam().mesh, after(motion, pose)));
+      expect_deepest_point(m, scene.points_of(m));
+      const SurfacePart part = surface_inside(triangles_of(ground.mesh, motion),
+                                              triangles_of(GetParam().mesh, after(motion, pose)));
       EXPECT_LT(norm(vector_of(m.area_vector) - part.area), 1e-6 * norm(part.area) + 1e-12);
       const Vector3 off = vector_of(m.centre) - part.middle(up);
       EXPECT_LT(norm(off - dot(off, normal) * normal), 1e-4 * std::sqrt(norm(part.area)));
@@ -128,6 +155,7 @@ TEST_P(SolidOnPlane, HasThePlanesNormalItsDepthAndTheAreaOfItsSection) {
     }
   }
   reduction.record(GetParam().name);
+  EXPECT_GT(reduction.patches, 10);
   EXPECT_LT(reduction.area, 0.25);
   EXPECT_LT(reduction.torque, 0.2);
 }
@@ -153,7 +181,8 @@ TEST(SolidOnSolid, FacesThatMeetHaveTheAreaThatTheyShare) {
       for (int trial = 0; trial < trials(10, 8); ++trial) {
         SCOPED_TRACE(std::string(lower.name) + ", " + upper.name + " " + std::to_string(trial));
         const double depth = std::pow(10, random.uniform(-5, -1.5));
-        const Pose pose = after(shift(random.symmetric(0.25), random.symmetric(0.25), top + bottom - depth), turn(2, random.symmetric(3)));
+        const Pose pose = after(shift(random.symmetric(0.25), random.symmetric(0.25), top + bottom - depth),
+                                turn(2, random.symmetric(3)));
         scene.bodies[1].pose = pose;
         const Pose motion = any_motion(random, 3);
         scene.find(motion);
@@ -162,7 +191,8 @@ TEST(SolidOnSolid, FacesThatMeetHaveTheAreaThatTheyShare) {
         const Vector3 up = rotate(motion, {0, 0, 1});
         EXPECT_LT(angle_between(vector_of(m.normal), up), 0.1 * kDegree) << depth;
         EXPECT_NEAR(m.depth, depth, 0.01 * depth);
-        const SurfacePart part = surface_inside(triangles_of(lower.mesh, motion), triangles_of(upper.mesh, after(motion, pose)));
+        const SurfacePart part =
+            surface_inside(triangles_of(lower.mesh, motion), triangles_of(upper.mesh, after(motion, pose)));
         EXPECT_LT(norm(vector_of(m.area_vector) - part.area), 1e-6 * norm(part.area));
         for (const ManifoldPoint& p : scene.points()) EXPECT_NEAR(p.depth, depth, 0.01 * depth);
         reduction.take(m, scene.points_of(m));
@@ -170,6 +200,7 @@ TEST(SolidOnSolid, FacesThatMeetHaveTheAreaThatTheyShare) {
     }
   }
   reduction.record("faces on faces");
+  EXPECT_GT(reduction.patches, 10);
   EXPECT_LT(reduction.area, 0.25);
   EXPECT_LT(reduction.torque, 0.2);
 }
@@ -177,12 +208,15 @@ TEST(SolidOnSolid, FacesThatMeetHaveTheAreaThatTheyShare) {
 TEST(SolidOnSolid, SpheresPushAlongTheLineOfTheirMiddles) {
   RandomPoses random(3);
   const double one = 0.5, other = 0.375;
-  // The meshes lie in the spheres, and their faces' middles below them by at most this part of the radius.
-  const double flat = 1 - std::cos(8 * kDegree);
   double most = 0;
   ManifoldScene scene;
   scene.add_body(scene.add_shape(sphere(one, 3)), kIdentityPose);
   scene.add_body(scene.add_shape(sphere(other, 3)), kIdentityPose);
+  // The meshes lie in the spheres, their faces below them by at most this part of the radius.
+  double flat = 0;
+  for (const auto& t : triangles_of(scene.assets.mesh(0), kIdentityPose)) {
+    flat = std::max(flat, 1 - dot(normalized(cross(t[1] - t[0], t[2] - t[0])), t[0]) / one);
+  }
   for (int trial = 0; trial < trials(200, 5); ++trial) {
     const double overlap = random.uniform(0.02, 0.2);
     const Pose motion = any_motion(random, 3);
@@ -191,7 +225,8 @@ TEST(SolidOnSolid, SpheresPushAlongTheLineOfTheirMiddles) {
     scene.find(motion);
     ASSERT_EQ(scene.manifolds().size(), 1u);
     const Manifold& m = scene.manifolds()[0];
-    const Triangles a = triangles_of(scene.assets.mesh(0), scene.posed[0].pose), b = triangles_of(scene.assets.mesh(1), scene.posed[1].pose);
+    const Triangles a = triangles_of(scene.assets.mesh(0), scene.posed[0].pose),
+                    b = triangles_of(scene.assets.mesh(1), scene.posed[1].pose);
     const SurfacePart part = surface_inside(a, b);
     EXPECT_LT(norm(vector_of(m.area_vector) - part.area), 1e-6 * norm(part.area));
     EXPECT_LT(m.depth, overlap + 1e-9);
@@ -223,36 +258,60 @@ TEST(SolidOnSolid, CrossedEdgesPushAcrossBoth) {
     scene.find(motion);
     ASSERT_EQ(scene.manifolds().size(), 1u);
     const Manifold& m = scene.manifolds()[0];
-    EXPECT_LT(angle_between(vector_of(m.normal), rotate(motion, {0, 0, 1})), 0.1 * kDegree) << angle / kDegree;
+    EXPECT_LT(angle_between(vector_of(m.normal), rotate(motion, {0, 0, 1})), 0.1 * kDegree)
+        << angle / kDegree;
     EXPECT_NEAR(m.depth, depth, 0.01 * depth);
   }
 }
 
-// The area within the curve is that of a's surface inside b for convex bodies however they overlap.
+// How far b is to be moved along z so that the bodies just touch, from where their middles lie one over the
+// other.
+double touching_height(ManifoldScene& scene, Pose pose) {
+  double apart = 2, meeting = 0;
+  const double x = pose.translation[0], y = pose.translation[1];
+  for (int i = 0; i < 30; ++i) {
+    const double z = (apart + meeting) / 2;
+    pose.translation[0] = x, pose.translation[1] = y, pose.translation[2] = z;
+    scene.posed = {scene.bodies[0], {scene.bodies[1].asset, pose}};
+    EXPECT_EQ(scene.query.find_contacts(scene.posed, {.first_contact_only = true}), Status::kOk);
+    (scene.query.contacts().empty() ? apart : meeting) = z;
+  }
+  return apart;
+}
+
+// For convex bodies that overlap a little, however they lie, the area within the curve is that of a's surface
+// inside b.
 TEST(SolidOnSolid, TheAreaVectorIsThatOfTheSurfaceInside) {
   RandomPoses random(5);
-  int seen = 0;
   for (const NamedMesh& a : solids()) {
     for (const NamedMesh& b : solids()) {
       ManifoldScene scene;
       scene.add_body(scene.add_shape(a.mesh), kIdentityPose);
       scene.add_body(scene.add_shape(b.mesh), kIdentityPose);
-      for (int trial = 0; trial < trials(8, 10); ++trial) {
-        scene.bodies[1].pose = any_motion(random, 0.6);
+      scene.find();
+      for (int trial = 0; trial < trials(4, 20); ++trial) {
+        SCOPED_TRACE(std::string(a.name) + ", " + b.name + " " + std::to_string(trial));
+        scene.bodies[0].pose = any_motion(random, 0);
+        Pose pose = after(shift(random.symmetric(0.2), random.symmetric(0.2), 0), any_motion(random, 0));
+        pose.translation[2] = touching_height(scene, pose) - std::pow(10, random.uniform(-4, -1.5));
+        scene.bodies[1].pose = pose;
         scene.find(any_motion(random, 3));
-        if (scene.manifolds().size() != 1 || (scene.manifolds()[0].flags & kGoesThrough) != 0) continue;
-        const Manifold& m = scene.manifolds()[0];
-        const Triangles in_a = triangles_of(a.mesh, scene.posed[0].pose), in_b = triangles_of(b.mesh, scene.posed[1].pose);
+        // Where a corner comes out again there are two.
+        ASSERT_FALSE(scene.manifolds().empty());
+        const Triangles in_a = triangles_of(a.mesh, scene.posed[0].pose),
+                        in_b = triangles_of(b.mesh, scene.posed[1].pose);
         const SurfacePart part = surface_inside(in_a, in_b);
-        EXPECT_LT(norm(vector_of(m.area_vector) - part.area), 1e-6) << a.name << ", " << b.name << " " << trial
-            << " flags " << m.flags << " area " << m.area_vector[0] << " " << m.area_vector[1] << " " << m.area_vector[2] << " part " << part.area.x << " " << part.area.y << " " << part.area.z << " segs " << scene.made.counters().segments << " pieces " << scene.made.counters().contacts << " depth " << m.depth << " pts " << m.point_count;
-        const Vector3 n = vector_of(m.normal);
-        EXPECT_LE(m.depth, reach_along(in_a, n) + reach_along(in_b, -n) + 1e-9);
-        ++seen;
+        Vector3 area;
+        for (const Manifold& m : scene.manifolds()) {
+          area = area + vector_of(m.area_vector);
+          const Vector3 n = vector_of(m.normal);
+          EXPECT_GT(m.depth, 0);
+          EXPECT_LE(m.depth, reach_along(in_a, n) + reach_along(in_b, -n) + 1e-9);
+        }
+        EXPECT_LT(norm(area - part.area), 1e-6 * norm(part.area));
       }
     }
   }
-  EXPECT_GT(seen, 100);
 }
 
 class PipeOnPlane : public testing::TestWithParam<NamedMesh> {};
@@ -275,7 +334,7 @@ TEST_P(PipeOnPlane, IsOneManifoldOfTheAreaOfTheRing) {
     EXPECT_LT(angle_between(vector_of(m.normal), rotate(motion, {0, 0, 1})), 0.1 * kDegree);
     EXPECT_NEAR(norm(vector_of(m.area_vector)), ring, 0.01 * ring);
     EXPECT_NEAR(m.depth, depth, 0.01 * depth);
-    EXPECT_LT(norm(vector_of(m.centre) - apply(motion, Vector3{x, y, -depth / 2})), 0.005);
+    EXPECT_LT(norm(vector_of(m.centre) - apply(motion, Vector3{x, y, -depth / 2})), 1e-6);
     for (const ManifoldPoint& p : scene.points()) EXPECT_NEAR(p.depth, depth, 0.01 * depth);
   }
 }

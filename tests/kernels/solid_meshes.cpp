@@ -18,7 +18,8 @@ std::vector<std::array<float, 2>> regular_polygon(int corners, double radius) {
   std::vector<std::array<float, 2>> polygon;
   for (int i = 0; i < corners; ++i) {
     const double angle = 2 * 3.14159265358979323846 * i / corners;
-    polygon.push_back({static_cast<float>(radius * std::cos(angle)), static_cast<float>(radius * std::sin(angle))});
+    polygon.push_back(
+        {static_cast<float>(radius * std::cos(angle)), static_cast<float>(radius * std::sin(angle))});
   }
   return polygon;
 }
@@ -124,10 +125,14 @@ Mesh pipe(int corners, double inner_radius, double outer_radius, float height) {
   const float lower = -height / 2, upper = height / 2;
   for (std::size_t i = 0; i < inner.size(); ++i) {
     const std::size_t j = (i + 1) % inner.size();
-    add_square(mesh, raised(outer[i], lower), raised(outer[j], lower), raised(outer[j], upper), raised(outer[i], upper));
-    add_square(mesh, raised(inner[j], lower), raised(inner[i], lower), raised(inner[i], upper), raised(inner[j], upper));
-    add_square(mesh, raised(inner[i], upper), raised(outer[i], upper), raised(outer[j], upper), raised(inner[j], upper));
-    add_square(mesh, raised(inner[j], lower), raised(outer[j], lower), raised(outer[i], lower), raised(inner[i], lower));
+    add_square(mesh, raised(outer[i], lower), raised(outer[j], lower), raised(outer[j], upper),
+               raised(outer[i], upper));
+    add_square(mesh, raised(inner[j], lower), raised(inner[i], lower), raised(inner[i], upper),
+               raised(inner[j], upper));
+    add_square(mesh, raised(inner[i], upper), raised(outer[i], upper), raised(outer[j], upper),
+               raised(inner[j], upper));
+    add_square(mesh, raised(inner[j], lower), raised(outer[j], lower), raised(outer[i], lower),
+               raised(inner[i], lower));
   }
   return mesh;
 }

@@ -15,7 +15,8 @@ namespace tandem {
 struct PosedTree {
   LevelView tree;
   TreeExtent extent;
-  Pose pose;  ///< of stored coordinates
+  double grid;  ///< grid_of() the tree
+  Pose pose;    ///< of stored coordinates
 };
 
 /// An object pair, and what is asked about it.
@@ -28,7 +29,11 @@ struct PairTask {
   bool in_frame;  ///< float32 in a's frame can take the pair; else what follows has no meaning
   RelativePose b_in_a;
   float frame_error;  ///< see frame_test.h
+  bool on_grid;       ///< lie_on_grid()
 };
+
+/// The pair of these two, or of one instance with itself. pair, mode and first_contact_only are the caller's.
+PairTask pair_task(const PosedTree& a, const PosedTree& b);
 
 /// Where contacts go: room that grows.
 struct ContactSink {

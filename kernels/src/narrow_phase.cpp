@@ -30,14 +30,9 @@ class ScalarMeans {
     append_one_by_one(candidates, a, b, hits);
   }
   BatchVerdicts decide(const Candidates& candidates) const {
-    switch (first_stage(task_)) {
-      case FirstStage::on_grid:
-        return decide_batch<FirstStage::on_grid>(candidates);
-      case FirstStage::as_computed:
-        return decide_batch<FirstStage::as_computed>(candidates);
-      default:
-        return decide_batch<FirstStage::bounded>(candidates);
-    }
+    if (task_.on_grid) return decide_batch<FirstStage::on_grid>(candidates);
+    return task_.mode == QueryMode::fast ? decide_batch<FirstStage::as_computed>(candidates)
+                                         : decide_batch<FirstStage::bounded>(candidates);
   }
 
  private:
@@ -79,7 +74,7 @@ class WorldBoxMeans {
 }  // namespace
 
 PairTask pair_task(const PosedTree& a, const PosedTree& b) {
-  PairTask task{};
+  PairTask task;
   task.a = &a;
   task.b = &b;
   task.self = &a == &b;

@@ -118,9 +118,8 @@ TANDEM_INLINE BatchVerdicts decide_lanes(const PairTask& task, const std::uint32
   return {verdicts.contact.mask(), verdicts.undecided.mask()};
 }
 
-// Not inlined: a pair takes one of three stages, and none should crowd the others out of registers.
 template <int kCount, FirstStage kStage>
-[[gnu::noinline]] BatchVerdicts decide_batch(const PairTask& task, const Candidates& candidates) {
+TANDEM_INLINE BatchVerdicts decide_batch(const PairTask& task, const Candidates& candidates) {
   BatchVerdicts out = {0, 0};
   for (std::uint32_t first = 0; first < kBatch && first < candidates.count; first += kCount) {
     const auto part = decide_lanes<kCount, kStage>(task, candidates.a + first, candidates.b + first);
@@ -128,6 +127,12 @@ template <int kCount, FirstStage kStage>
     out.undecided |= part.undecided << first;
   }
   return out;
+}
+
+// Not inlined, not to crowd the other stages out of registers.
+template <int kCount>
+[[gnu::noinline]] BatchVerdicts decide_on_grid(const PairTask& task, const Candidates& candidates) {
+  return decide_batch<kCount, FirstStage::on_grid>(task, candidates);
 }
 
 #if defined(__AVX512F__)
@@ -212,14 +217,9 @@ class LaneMeans {
   BatchVerdicts decide(Candidates& candidates) const {
     // Lanes beyond the count look at any triangle: the first.
     for (std::uint32_t i = candidates.count; i < kBatch; ++i) candidates.a[i] = candidates.b[i] = 0;
-    switch (first_stage(task_)) {
-      case FirstStage::on_grid:
-        return decide_batch<kCount, FirstStage::on_grid>(task_, candidates);
-      case FirstStage::as_computed:
-        return decide_batch<kCount, FirstStage::as_computed>(task_, candidates);
-      default:
-        return decide_batch<kCount, FirstStage::bounded>(task_, candidates);
-    }
+    if (task_.on_grid) return decide_on_grid<kCount>(task_, candidates);
+    return task_.mode == QueryMode::fast ? decide_batch<kCount, FirstStage::as_computed>(task_, candidates)
+                                         : decide_batch<kCount, FirstStage::bounded>(task_, candidates);
   }
 
  private:

@@ -39,11 +39,6 @@ enum class FirstStage : std::uint8_t {
   on_grid,      ///< float32 that rounds nothing: grid_test.h
 };
 
-inline FirstStage first_stage(const PairTask& task) {
-  if (task.on_grid) return FirstStage::on_grid;
-  return task.mode == QueryMode::fast ? FirstStage::as_computed : FirstStage::bounded;
-}
-
 template <FirstStage kStage, typename Value>
 inline auto decide_first(const frame::Point<Value> (&a)[3], const frame::Point<Value> (&b)[3], float error) {
   if constexpr (kStage == FirstStage::on_grid)

@@ -273,22 +273,59 @@ TEST(GridOf, IsTheLargestPowerOfTwoInAllCoordinatesOrNone) {
   EXPECT_EQ(grid_of_mesh(test::soup(random, 5, 1)), 0);
 }
 
-TEST(GridTest, DecidesAllOfAStackOfCubes) {
+/// Cubes that are turned by quarters and fill space, far from the origin.
+test::Scene stack_of_cubes(RandomPoses& random, double far) {
   test::Scene scene;
   scene.assets.add(test::cube(0.5f, 2));
-  RandomPoses random(4);
   for (int i = 0; i < 27; ++i) {
     Pose pose = test::quarter_turn(random);
     const int place[3] = {i % 3, i / 3 % 3, i / 9};
-    for (int k = 0; k < 3; ++k) pose.translation[k] = 1e7 + place[k];
+    for (int k = 0; k < 3; ++k) pose.translation[k] = far + place[k];
     scene.instances.push_back({0, pose});
   }
+  return scene;
+}
+
+TEST(GridTest, DecidesAllOfAStackOfCubes) {
+  RandomPoses random(4);
+  const test::Scene scene = stack_of_cubes(random, 1e7);
   ContactQuery query;
   ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
   ASSERT_EQ(query.find_contacts(scene.instances), Status::kOk);
   EXPECT_EQ(query.counters().decided_by_float32, query.counters().candidates);
   EXPECT_EQ(test::found_contacts(query), all_contacts(scene, false));
   EXPECT_GT(query.contacts().size(), 10'000u);
+}
+
+/// Faces that part or overlap by a last bit of a coordinate, or by far less, among others that touch.
+TEST(GridTest, LeavesToOthersWhatIsMovedByALastBit) {
+  RandomPoses random(5);
+  for (int trial = 0; trial < test::trials(20, 20); ++trial) {
+    const double far = trial % 3 == 0 ? 0 : trial % 3 == 1 ? 1e7 : 0x1p40;
+    test::Scene scene = stack_of_cubes(random, far);
+    for (Instance& body : scene.instances) {
+      double& x = body.pose.translation[random.below(3)];
+      switch (random.below(5)) {
+        case 0:
+          x = std::nextafter(x, -1e300);
+          break;
+        case 1:
+          x = std::nextafter(x, 1e300);
+          break;
+        case 2:
+          body.pose.rotation[random.below(3)][random.below(3)] += 0x1p-60;
+          break;
+        default:
+          break;
+      }
+    }
+    ContactQuery query;
+    ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+    ASSERT_EQ(query.find_contacts(scene.instances), Status::kOk);
+    EXPECT_EQ(test::found_contacts(query), all_contacts(scene, false));
+    EXPECT_GT(query.counters().decided_by_float32, 0u);
+    EXPECT_LT(query.counters().decided_by_float32, query.counters().candidates);
+  }
 }
 
 }  // namespace

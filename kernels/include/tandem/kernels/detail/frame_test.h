@@ -358,11 +358,14 @@ struct Intervals {
 };
 
 /// Of triangles whose corners lie on both sides of the other's plane. Only b's corners q and r are exchanged,
-/// where one of the two orders asks for it, and a's orientation turns the signs instead.
+/// where one of the two orders asks for it, and a's orientation turns the signs instead. (Inlined by force,
+/// as vectors go through memory to a call.)
 template <bool kBounded, typename Value, typename Mask>
-TANDEM_HD inline Intervals<Value> intervals(const Point<Value> (&a)[3], const Point<Value> (&b)[3],
-                                            const Sides<Mask>& sides_of_a, const Sides<Mask>& sides_of_b,
-                                            float error) {
+[[gnu::always_inline]] TANDEM_HD inline Intervals<Value> intervals(const Point<Value> (&a)[3],
+                                                                   const Point<Value> (&b)[3],
+                                                                   const Sides<Mask>& sides_of_a,
+                                                                   const Sides<Mask>& sides_of_b,
+                                                                   float error) {
   using PlaneOf = Plane<Value, kBounded>;
   Point<Value> oa[3], ob[3];
   lone_first(a, sides_of_a, oa);

@@ -31,6 +31,8 @@ namespace tandem {
 
 namespace grid_detail {
 
+inline constexpr double kFinest = 0x1p-40, kCoarsest = 0x1p30;
+
 /// The largest power of two that x is a multiple of; infinite for 0.
 TANDEM_HD inline double unit_of(double x) {
   if (x == 0) return INFINITY;
@@ -43,11 +45,22 @@ TANDEM_HD inline double unit_of(double x) {
   return std::fabs(x - rest);
 }
 
-/// Whether the conditions on G and M hold.
+/// Of numbers that are not NaN. (std::fmin and std::fmax are calls where NaN matters.)
+TANDEM_HD inline double smaller(double x, double y) {
+  return y < x ? y : x;
+}
+
+TANDEM_HD inline double larger(double x, double y) {
+  return x < y ? y : x;
+}
+
+/// Whether the conditions on G and M hold. What roundings add or take, also those of a reach, is less than
+/// from one integer to the next.
 TANDEM_HD inline bool coarse(double grid, const double (&largest)[3]) {
+  if (!(grid >= kFinest && grid <= kCoarsest)) return false;
   double product = 6;
-  for (int k = 0; k < 3; ++k) product *= std::fmax(2 * largest[k] / grid, 1.0);
-  return grid >= 0x1p-40 && grid <= 0x1p30 && product <= 0x1p24;
+  for (int k = 0; k < 3; ++k) product *= larger(2 * largest[k] / grid, 1);
+  return product <= 0x1p24;
 }
 
 /// Whether all entries are 0, 1 or -1.
@@ -65,7 +78,7 @@ TANDEM_HD inline bool permutes_axes(const double (&rotation)[3][3]) {
 /// The largest power of two, up to 2^30, that all coordinates of a mesh are multiples of; 0 where it is too
 /// fine for this stage, which the first few corners mostly tell.
 inline double grid_of(const LevelView& tree, const TreeExtent& extent) {
-  double grid = 0x1p30;
+  double grid = grid_detail::kCoarsest;
   for (std::uint32_t i = 0; i < tree.triangle_count; ++i) {
     for (const auto& corner : tree.triangles[i].corner) {
       for (const float x : corner.position) {
@@ -83,20 +96,25 @@ inline double grid_of(const LevelView& tree, const TreeExtent& extent) {
 /// grid_a, grid_b: grid_of() their meshes.
 TANDEM_HD inline bool lie_on_grid(const Pose& a, const TreeExtent& tree_a, double grid_a, const Pose& b,
                                   const TreeExtent& tree_b, double grid_b, const RelativePose& b_in_a) {
-  double grid = std::fmin(grid_a, grid_b);
-  if (grid == 0 || !grid_detail::permutes_axes(a.rotation) || !grid_detail::permutes_axes(b.rotation))
-    return false;
-  double farthest = 0, largest[3];
+  namespace g = grid_detail;
+  double grid = g::smaller(grid_a, grid_b), farthest = 0;
+  if (grid < g::kFinest) return false;
   for (int k = 0; k < 3; ++k) {
-    farthest = std::fmax(farthest, std::fmax(std::fabs(a.translation[k]), std::fabs(b.translation[k])));
-    grid = std::fmin(grid, grid_detail::unit_of(a.translation[k]));
-    grid = std::fmin(grid, grid_detail::unit_of(b.translation[k]));
+    const double t_a = a.translation[k], t_b = b.translation[k];
+    grid = g::smaller(grid, g::smaller(g::unit_of(t_a), g::unit_of(t_b)));
+    if (grid < g::kFinest) return false;
+    farthest = g::larger(farthest, g::larger(std::fabs(t_a), std::fabs(t_b)));
+  }
+  if (!(farthest <= 0x1p52 * grid && g::coarse(grid, tree_a.reach))) return false;
+  if (!g::permutes_axes(a.rotation) || !g::permutes_axes(b.rotation)) return false;
+  double largest[3];
+  for (int k = 0; k < 3; ++k) {
     double of_b = std::fabs(static_cast<double>(b_in_a.translation[k]));
     for (int j = 0; j < 3; ++j)
       of_b += std::fabs(static_cast<double>(b_in_a.rotation[k][j])) * tree_b.reach[j];
-    largest[k] = std::fmax(tree_a.reach[k], of_b);
+    largest[k] = g::larger(tree_a.reach[k], of_b);
   }
-  return farthest <= 0x1p52 * grid && grid_detail::coarse(grid, largest);
+  return g::coarse(grid, largest);
 }
 
 namespace frame {
@@ -146,9 +164,10 @@ TANDEM_HD inline auto edge_separates(const PlanarTriangle<Value>& s, const Plana
   return beyond_edge(0) | beyond_edge(1) | beyond_edge(2);
 }
 
-/// decide() where the proof at the top of this file holds; undecided is what has a flat triangle. The method
-/// is that of detail::CompleteTest in triangle_test.h. Of triangles that are not flat, one has all corners in
-/// the other's plane only where both lie in one plane.
+/// decide() where the proof at the top of this file holds; what stays undecided has a flat triangle. The
+/// method is that of detail::CompleteTest in triangle_test.h. A triangle that is not flat has all corners in
+/// the plane of another one, neither flat, only where both lie in one plane; a flat one has no plane, and
+/// everything ties with it.
 template <typename Value>
 TANDEM_HD inline auto decide_on_grid(const Point<Value> (&a)[3], const Point<Value> (&b)[3]) {
   using PlaneOf = Plane<Value, false>;

@@ -165,9 +165,8 @@ TANDEM_HD inline auto edge_separates(const PlanarTriangle<Value>& s, const Plana
 }
 
 /// decide() where the proof at the top of this file holds; what stays undecided has a flat triangle. The
-/// method is that of detail::CompleteTest in triangle_test.h. A triangle that is not flat has all corners in
-/// the plane of another one, neither flat, only where both lie in one plane; a flat one has no plane, and
-/// everything ties with it.
+/// method is that of detail::CompleteTest in triangle_test.h. The normal of a flat triangle is 0, so that all
+/// sides of it are ties; with two triangles that are not flat all are ties only where both lie in one plane.
 template <typename Value>
 TANDEM_HD inline auto decide_on_grid(const Point<Value> (&a)[3], const Point<Value> (&b)[3]) {
   using PlaneOf = Plane<Value, false>;

@@ -6,7 +6,7 @@
 
 #include "narrow_phase.h"
 #include "tandem/kernels/detail/block_pair.h"
-#include "tandem/kernels/detail/frame_test.h"
+#include "tandem/kernels/detail/grid_test.h"
 #include "tandem/kernels/detail/instance_check.h"
 #include "worker_threads.h"
 
@@ -22,6 +22,7 @@ constexpr std::size_t kInstancesAtOnce = 64, kChunksAtOnce = 8;
 struct Asset {
   LevelView tree;
   TreeExtent extent;
+  double grid;
   double origin[3];
   float lower[3], upper[3];
 };
@@ -131,6 +132,7 @@ Status ContactQuery::State::pose_from(std::span<const Instance> posed, std::size
     if (status != Status::kOk) return status;
     instances[i].tree = assets[posed[i].asset].tree;
     instances[i].extent = assets[posed[i].asset].extent;
+    instances[i].grid = assets[posed[i].asset].grid;
   }
   return Status::kOk;
 }
@@ -194,16 +196,10 @@ bool ContactQuery::State::provide_workers() {
 }
 
 PairTask ContactQuery::State::task_of(std::uint32_t pair) const {
-  const PosedTree &a = instances[pairs[pair].a], &b = instances[pairs[pair].b];
-  PairTask task;
-  task.a = &a;
-  task.b = &b;
+  PairTask task = pair_task(instances[pairs[pair].a], instances[pairs[pair].b]);
   task.pair = pair;
   task.mode = options.mode;
   task.first_contact_only = options.first_contact_only;
-  task.self = &a == &b;
-  task.in_frame = relative_pose(a.pose, a.extent, b.pose, b.extent, task.b_in_a) == RelativePoseStatus::kOk;
-  task.frame_error = task.in_frame ? frame_error(task.b_in_a, a.extent, b.extent) : 0;
   return task;
 }
 
@@ -295,6 +291,7 @@ Status ContactQuery::set_assets(std::span<const AssetView> assets) {
     Asset& asset = state_->assets[i];
     asset.tree = assets[i].level();
     asset.extent = extent_of(asset.tree.blocks[0]);
+    asset.grid = grid_of(asset.tree, asset.extent);
     const FileHeader& header = *assets[i].header;
     for (int k = 0; k < 3; ++k) {
       asset.origin[k] = header.origin[k];

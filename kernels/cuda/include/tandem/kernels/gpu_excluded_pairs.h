@@ -2,7 +2,6 @@
 #include <cuda_runtime_api.h>
 
 #include <cstddef>
-#include <span>
 
 #include "tandem/formats/gpu_memory.h"
 #include "tandem/formats/status.h"
@@ -10,16 +9,13 @@
 
 namespace tandem {
 
-struct ObjectPair;
-
-/// Owns a table in GPU memory of pairs of instances that a broad phase is not to look at, such as those that
-/// a joint connects. Throws nothing.
+/// Owns a copy in GPU memory of a table of excluded pairs, for the broad phase there. Throws nothing.
 class GpuExcludedPairs {
  public:
-  /// Takes these pairs, in CPU memory, instead of those before, as ExcludedPairTable::set() does, and waits
-  /// for the stream; what waits there for the table before must be done. Result: also those of CUDA that
-  /// status_of() names. After an error no pair is excluded.
-  Status upload(std::span<const ObjectPair> pairs, cudaStream_t stream);
+  /// Copies a table, ExcludedPairTable::view(), instead of the one before, and waits for the stream; what
+  /// looks at the one before must be done. Result: kOk, or what status_of() names. After an error no pair is
+  /// excluded.
+  Status upload(const ExcludedPairs& table, cudaStream_t stream);
 
   /// Points into GPU memory; valid until the next upload().
   const ExcludedPairs& view() const { return view_; }

@@ -106,23 +106,14 @@ SceneMotion read_motion(const std::string& path, std::size_t bodies) {
 
 // A body that sleeps in the file starts awake: a simulation finds out by itself who sleeps.
 Motion moved_by(const bench::SceneFilter& filter, std::size_t body) {
-  if (filter.motion.empty()) return Motion::dynamic;
-  switch (filter.motion[body]) {
-    case tandem::Motion::fixed:
-      return Motion::fixed;
-    case tandem::Motion::kinematic:
-      return Motion::kinematic;
-    case tandem::Motion::moving:
-    case tandem::Motion::sleeping:
-      break;
-  }
-  return Motion::dynamic;
+  const Motion motion = filter.motion.empty() ? Motion::moving : filter.motion[body];
+  return motion == Motion::sleeping ? Motion::moving : motion;
 }
 
 void add_body(Preparation& all, const BodyProperties& body, const Pose& pose, const AssetView& shape) {
   all.bodies.push_back(body);
   all.states.push_back(state_of(body, pose));
-  if (body.motion == Motion::dynamic) all.triangles += shape.level().triangle_count;
+  if (body.motion == Motion::moving) all.triangles += shape.level().triangle_count;
 }
 
 }  // namespace

@@ -190,10 +190,14 @@ std::uint32_t BroadPhase::meeting(const Group& a, const Group& b) {
 // As above, of a pair of groups; each pair of boxes of a group with itself once. On levels that one tree has
 // not got, its root is child 0 of itself, which meets whatever one of its boxes meets.
 std::uint32_t BroadPhase::meeting(const TreePair& trees, const GroupPair& pair) {
+  if (trees.same()) {
+    const Group* const groups = trees.a.level(pair.level);
+    const std::uint32_t own = meeting(groups[pair.a], groups[pair.b]);
+    return pair.a == pair.b ? own & own_node_pairs(pair.level == 0) : own;
+  }
   const int top_a = trees.a.top(), top_b = trees.b.top();
   const std::uint32_t mask = meeting(trees.a.level(std::min(pair.level, top_a))[pair.a],
                                      trees.b.level(std::min(pair.level, top_b))[pair.b]);
-  if (trees.same()) return pair.a == pair.b ? mask & own_node_pairs(pair.level == 0) : mask;
   if (pair.level > top_a) return (mask | mask >> 4 | mask >> 8 | mask >> 12) & 0x000F;
   if (pair.level > top_b) return (mask | mask >> 1 | mask >> 2 | mask >> 3) & 0x1111;
   return mask;
@@ -291,15 +295,20 @@ Status BroadPhase::sort_pairs(std::size_t boxes, Team team) {
   std::uint32_t sum = 0;
   for (std::size_t run = 0; run < runs; ++run) sum += std::exchange(first[run], sum);
   each_found([=](const ObjectPair& pair) { pairs[next_of(first[pair.a >> shift], workers)] = pair; });
-  team.threads.for_parts(
-      team.workers, runs, kBoxesAtOnce, [=](std::size_t begin, std::size_t end, std::uint32_t) {
-        std::uint32_t from = begin > 0 ? first[begin - 1] : 0;
-        for (std::size_t run = begin; run < end; from = first[run++]) {
-          std::sort(pairs + from, pairs + first[run], [](const ObjectPair& x, const ObjectPair& y) {
-            return x.a != y.a ? x.a < y.a : x.b < y.b;
-          });
-        }
-      });
+  const auto sort_run = [=](std::uint32_t begin, std::uint32_t end) {
+    if (shift == 0) {
+      std::sort(pairs + begin, pairs + end, [](auto& x, auto& y) { return x.b < y.b; });
+    } else {
+      std::sort(pairs + begin, pairs + end,
+                [](auto& x, auto& y) { return x.a != y.a ? x.a < y.a : x.b < y.b; });
+    }
+  };
+  team.threads.for_parts(team.workers, runs, kBoxesAtOnce,
+                         [=](std::size_t begin, std::size_t end, std::uint32_t) {
+                           std::uint32_t from = begin > 0 ? first[begin - 1] : 0;
+                           for (std::size_t run = begin; run < end; from = first[run++])
+                             sort_run(from, first[run]);
+                         });
   // Which worker finds which pairs is chance: so that no call of the same scene allocates, there is room for
   // all in each.
   for (std::uint32_t i = 0; i < team.workers && team.workers > 1; ++i) {

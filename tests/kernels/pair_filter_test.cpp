@@ -341,6 +341,22 @@ TEST_F(FilteredQuery, KeptInstancesStayWhereTheyWereUntilTheyAreKeptAnew) {
   EXPECT_EQ(query_.pairs().size(), 19u);
 }
 
+// The lines are those of docs/queries.md.
+TEST_F(FilteredQuery, IsAskedAsTheDocumentationShows) {
+  const Scene scene = row_of_cubes(3);
+  const std::vector<Instance>& bodies = scene.instances;
+  ContactQuery& query = query_;
+  ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+  const Motion motion[] = {Motion::fixed, Motion::moving, Motion::moving};  // of each instance
+  const ObjectPair joints[] = {{1, 2}};
+  ExcludedPairTable excluded;
+  Status status = excluded.set(joints);
+  const PairFilter filter = {.motion = motion, .excluded = excluded.view()};
+  if (status == Status::kOk) status = query.find_contacts(bodies, {.filter = &filter});
+  EXPECT_EQ(status, Status::kOk);
+  EXPECT_EQ(pairs_of(query), (Pairs{{0, 1}}));
+}
+
 TEST_F(FilteredQuery, NamesTheExcludedPairOfAnInstanceThatThereIsNot) {
   const Scene scene = row_of_cubes(5);
   ExcludedPairTable table;

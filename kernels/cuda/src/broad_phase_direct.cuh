@@ -16,8 +16,9 @@ constexpr std::uint32_t kTileWarps = kTileThreads / kFanOut;
 constexpr std::uint32_t kShare = kTile / kTileWarps;  // a warp's of the other tile: 16 boxes
 
 // Counters::found holds pairs in its low bits and blocks that are done in the others: one addition makes room
-// for a block's pairs and tells whether it is the last.
-constexpr int kFoundBits = 40;
+// for a block's pairs and tells whether it is the last. 2^13 boxes make less than 2^26 pairs with each other
+// and less than 2^45 with others that are kept; blocks are kMostDirectBlocks at most.
+constexpr int kFoundBits = 48;
 
 struct Tiles {
   WorldBox exact[2][kTile];  // of the own tile, of the other

@@ -161,7 +161,8 @@ class Walk {
         const Node &own = memory_.own[hit >> 32], theirs = tree_.level(0)[static_cast<std::uint32_t>(hit)];
         a = min(own.box, theirs.box);
         b = max(own.box, theirs.box);
-        meet = (surely_meet(own, theirs) || overlap(boxes_[a], boxes_[b])) && rule_(a, b);
+        meet = surely_meet(own, theirs) || overlap(boxes_[a], boxes_[b]);
+        if (meet) meet = rule_(a, b);
       }
       const std::uint32_t meeting = __ballot_sync(kAllLanes, meet);
       __syncwarp();  // all have read what may now be overwritten

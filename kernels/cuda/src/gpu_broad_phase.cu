@@ -390,12 +390,18 @@ bool GpuBroadPhase::State::find(const Boxes& from, std::uint32_t count, const Ru
   return !call.sorted || sort_pairs(call);
 }
 
+// A middling number of instances is posed by a kernel of its own.
 template <typename Boxes, typename Rule>
 bool GpuBroadPhase::State::pose_and_find(const Boxes& from, std::uint32_t count, const Rule& rule,
                                          const Call& call) {
-  if (!Boxes::kPosed || count <= kFewPosed || count > kFewBoxes) return find(from, count, rule, call);
-  return launch(blocks_for(count, 256), 256, call.stream, pose_boxes<Boxes>, from, count, counters.data()) &&
-         find(from.taken(), count, rule, call);
+  if constexpr (Boxes::kPosed) {
+    if (count > kFewPosed && count <= kFewBoxes) {
+      return launch(blocks_for(count, 256), 256, call.stream, pose_boxes<Boxes>, from, count,
+                    counters.data()) &&
+             find(from.taken(), count, rule, call);
+    }
+  }
+  return find(from, count, rule, call);
 }
 
 // all: boxes or instances, the kept ones included.

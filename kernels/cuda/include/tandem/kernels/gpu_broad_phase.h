@@ -78,11 +78,11 @@ class GpuBroadPhase {
   /// be of as many, find no pair of two of them and take the time of the others. Given boxes must go on lying
   /// in the array that enqueue() gets; assets and poses of kept instances are not looked at again. Call it
   /// again when one of them has moved or others are fixed; nothing is kept where none is fixed. Makes room
-  /// for all that and waits for the stream: it is no part of a step, and of a graph that was captured before
-  /// it only one that was captured with the same motions may be launched. motion: of each, in CPU memory;
-  /// where a filter of a call to come has motions, it says the same of what is kept. Result: as of reserve();
-  /// kMisaligned; kKeptMismatch where the sizes differ; or kOutOfRange, kUnknownAsset, kPoseNotRigid, where
-  /// report().where is the fixed one to blame. After an error nothing is kept.
+  /// for all that and waits for the stream: it is no part of a step, and graphs that were captured before it
+  /// must be captured anew. motion: of each, in CPU memory; where a filter of a call to come has motions, it
+  /// says the same of what is kept. Result: as of reserve(); kMisaligned; kKeptMismatch where the sizes
+  /// differ; or kOutOfRange, kUnknownAsset, kPoseNotRigid, where report().where is the fixed one to blame.
+  /// After an error nothing is kept.
   Status keep_fixed(const WorldBox* boxes, std::span<const Motion> motion, cudaStream_t stream);
   Status keep_fixed(const GpuInstances& instances, const GpuAssetBounds& assets,
                     std::span<const Motion> motion, cudaStream_t stream);

@@ -134,7 +134,32 @@ void GpuEngine::update(std::span<const BodyPose> bodies) {
   check(poses_.upload(bodies.size(), stream()), "instances");
   check(stream_.wait(), "upload");
   instances_ = {shape_of_.on_gpu.data(), poses_.on_gpu.data(), static_cast<std::uint32_t>(bodies.size())};
+  check(broad_phase_.keep_fixed({}, {}, {}, stream()), broad_phase_.cuda_error(), "broad phase");
   upload_of_bodies_ = watch.lap();
+}
+
+void GpuEngine::keep_fixed() {
+  if (filter_.motion == nullptr) return;
+  const std::span<const Motion> motion(filter_.motion, instances_.count);
+  const Status status = broad_phase_.keep_fixed(instances_, bounds(), motion, stream());
+  if (subject(status) != nullptr) require(status, broad_phase_.report().where);
+  check(status, broad_phase_.cuda_error(), "broad phase");
+}
+
+// Where the copy lies; null where there is nothing of each body to copy.
+template <typename Element>
+const Element* GpuEngine::upload_of_each(const Element* of_each, StagedArray<Element>& array) {
+  if (of_each == nullptr) return nullptr;
+  check(array.grow(instances_.count), "filter");
+  std::copy_n(of_each, instances_.count, array.staged.data());
+  check(array.upload(instances_.count, stream()), "filter");
+  return array.on_gpu.data();
+}
+
+void GpuEngine::upload_filter() {
+  check(excluded_.upload(filter_.excluded, stream()), excluded_.cuda_error(), "filter");
+  filter_on_gpu_ = {upload_of_each(filter_.motion, motion_), upload_of_each(filter_.group, group_),
+                    upload_of_each(filter_.mask, mask_), excluded_.view()};
 }
 
 GpuAssetBounds GpuEngine::bounds() const {
@@ -143,7 +168,9 @@ GpuAssetBounds GpuEngine::bounds() const {
 
 // Until there is room for all.
 void GpuEngine::find_pairs_on_gpu(bool sorted) {
-  const Status status = broad_phase_.find_pairs(instances_, bounds(), {.sorted = sorted}, stream());
+  upload_filter();
+  const Status status =
+      broad_phase_.find_pairs(instances_, bounds(), {.sorted = sorted, .filter = filter_on_gpu_}, stream());
   if (subject(status) != nullptr) require(status, broad_phase_.report().where);
   check(status, broad_phase_.cuda_error(), "broad phase");
 }
@@ -185,7 +212,10 @@ bool GpuEngine::contacts(std::vector<TriangleContact>& found_contacts) {
 }
 
 TimedAnswer GpuEngine::time_query(const TimedQuery& asked) {
-  if (asked.given == nullptr) find_pairs_on_gpu(asked.order == OrderOnGpu::sorted);
+  if (asked.given == nullptr) {
+    keep_fixed();
+    find_pairs_on_gpu(asked.order == OrderOnGpu::sorted);
+  }
   const GpuPairs pairs = asked.given == nullptr ? broad_phase_.pairs() : upload(*asked.given);
   ask(pairs, asked.manifolds && asked.order == OrderOnGpu::any ? OrderOnGpu::grouped : asked.order);
   TimedAnswer answer;
@@ -205,8 +235,8 @@ void GpuEngine::time_repeats(const GpuPairs& pairs, const TimedQuery& asked, Tim
   const bool finds_pairs = asked.given == nullptr;
   const Before before = [&](unsigned event_flags) {
     if (finds_pairs) {
-      const Status status =
-          broad_phase_.enqueue(instances_, bounds(), {.sorted = asked.order == OrderOnGpu::sorted}, stream());
+      const Status status = broad_phase_.enqueue(
+          instances_, bounds(), {.sorted = asked.order == OrderOnGpu::sorted, .filter = filter_on_gpu_}, stream());
       check(status, broad_phase_.cuda_error(), "broad phase");
     }
     check(between.record(stream(), event_flags), "an event");
@@ -255,7 +285,8 @@ void GpuEngine::take(const GpuPairs& pairs, const GpuContacts& contacts, OrderOn
 
 std::size_t GpuEngine::scene_bytes(const TimedQuery& asked) const {
   return uploaded_.bytes() + shapes_.size() * sizeof(AssetBounds) +
-         instances_.count * (sizeof(Pose) + sizeof(std::uint32_t)) +
+         instances_.count * (sizeof(Pose) + sizeof(std::uint32_t)) + motion_.on_gpu.bytes() +
+         group_.on_gpu.bytes() + mask_.on_gpu.bytes() + excluded_.bytes() +
          (asked.given != nullptr ? asked.given->size() * sizeof(ObjectPair) : 0);
 }
 

@@ -40,7 +40,7 @@ struct QueryState {
   Balance frame, world;
   alignas(128) Counter contacts;
   alignas(128) Counter undecided;
-  alignas(128) Counter unresolved;
+  alignas(128) Counter decided_exactly;
   alignas(128) Counter block_pairs;
   Counter candidates, decided_by_float64;
   GpuQueryReport report;
@@ -82,7 +82,7 @@ struct QueryArgs {
   std::uint32_t* met;          ///< of a pair: not 0 once it has a contact; where only the first is asked for
   Contact* contacts;
   Grouping grouping;
-  Candidate *undecided, *unresolved;
+  Candidate* undecided;
   DeviceLimits limits;
   WalkShape shape;
 };
@@ -112,10 +112,7 @@ cudaError_t prepare_pairs(const QueryArgs& args, cudaStream_t stream);
 cudaError_t walk_exact(const QueryArgs& args, cudaStream_t stream);
 cudaError_t walk_unfused(const QueryArgs& args, cudaStream_t stream);
 
-/// Walks the others.
-cudaError_t walk_world(const QueryArgs& args, cudaStream_t stream);
-
-/// Decides what the walks left, and writes the report.
+/// Decides what the walk left, walks the other pairs, and writes the report.
 cudaError_t decide_rest(const QueryArgs& args, cudaStream_t stream);
 
 /// Groups the contacts that the report counts by pair.

@@ -206,7 +206,7 @@ class Walk {
 
   __device__ void judge(bool mine, std::uint32_t pair, std::uint32_t a, std::uint32_t b) {
     Judged judged = {0, 0, false, false};
-    if (mine) judged = Means::judge(args_.pairs[pair], a, b);
+    if (mine) judged = Means::judge(args_, args_.pairs[pair], a, b);
     if (__any_sync(kAllLanes, judged.undecided)) {
       const Counter place = place_for(judged.undecided, &args_.state->undecided);
       if (judged.undecided && place < args_.capacity.undecided) args_.undecided[place] = {pair, a, b};
@@ -263,13 +263,9 @@ class Walk {
   bool more_input_ = true;
 };
 
+/// The walk of a thread block, whose memory fill_positions() has filled.
 template <class Means>
-__global__ void __launch_bounds__(32 * kMostWarpsPerBlock, 1) walk(const __grid_constant__ QueryArgs args) {
-  extern __shared__ float4 memory[];
-  fill_positions(reinterpret_cast<std::uint32_t*>(memory));
-  __syncthreads();
-  wait_for_kernel_before();
-  if (failed(args)) return;
+__device__ void run_walk(const QueryArgs& args, float4* memory) {
   const auto positions = static_cast<std::uint32_t>(__cvta_generic_to_shared(memory));
   const std::uint32_t warp = threadIdx.x / 32;
   Walk<Means> walk(
@@ -279,8 +275,16 @@ __global__ void __launch_bounds__(32 * kMostWarpsPerBlock, 1) walk(const __grid_
 }
 
 template <class Means>
-cudaError_t launch_walk(const QueryArgs& args, cudaStream_t stream) {
-  const auto kernel = walk<Means>;
+__global__ void __launch_bounds__(32 * kMostWarpsPerBlock, 1) walk(const __grid_constant__ QueryArgs args) {
+  extern __shared__ float4 memory[];
+  fill_positions(reinterpret_cast<std::uint32_t*>(memory));
+  __syncthreads();
+  wait_for_kernel_before();
+  if (!failed(args)) run_walk<Means>(args, memory);
+}
+
+/// Launches a kernel of thread blocks in the shape of a walk.
+inline cudaError_t launch_shaped(void (*kernel)(QueryArgs), const QueryArgs& args, cudaStream_t stream) {
   // The same for every walk: CUDA keeps it with the kernel, and another thread's walk may need more.
   const cudaError_t error = cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
                                                  static_cast<int>(most_shared_bytes(args.limits)));

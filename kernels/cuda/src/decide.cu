@@ -58,7 +58,9 @@ class Deciding {
     for (std::uint64_t before = 0; before < total; before += at_once * warps) {
       decide(lane_id() < at_once && before + own < total, static_cast<std::uint32_t>(before + own));
       __syncthreads();
-      if (waiting_ >= blockDim.x) decide_waiting(blockDim.x);
+      const bool full = waiting_ >= blockDim.x;
+      __syncthreads();  // all have looked before more wait
+      if (full) decide_waiting(blockDim.x);
     }
     if (waiting_ != 0) decide_waiting(waiting_);
   }
@@ -171,9 +173,13 @@ __global__ void __launch_bounds__(kMostThreads, 1) decide(const __grid_constant_
   if constexpr (kMode != QueryMode::boxes && !kWalksOnly) {
     if (!failed(args)) Deciding<kMode>(args, memory).run();
   }
-  if (walks_world) run_walk<InWorld<kMode, kWalksOnly>>(args, memory);
+  if (walks_world) {
+    __syncthreads();
+    prepare_memory(memory);
+    run_walk<InWorld<kMode, kWalksOnly>, true>(args, memory);
+  }
   if (!ends_last(args, *reinterpret_cast<std::uint32_t*>(memory))) return;
-  if (walks_world) clear_mailboxes(state.world, threadIdx.x, blockDim.x, mailboxes);
+  if (walks_world) clear_mailboxes(state.world, threadIdx.x, blockDim.x, args.shape.mailboxes());
   if (threadIdx.x != 0) return;
   write_report(args);
   clear_counters(state);

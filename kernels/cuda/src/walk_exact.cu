@@ -5,8 +5,8 @@
 namespace tandem::gpu {
 
 cudaError_t walk_exact(const QueryArgs& args, cudaStream_t stream) {
-  return launch_shaped(
-      args.walk_only ? walk<InFrame<QueryMode::exact, true>> : walk<InFrame<QueryMode::exact>>, args, stream);
+  return args.walk_only ? launch_walk<InFrame<QueryMode::exact, true>>(args, stream)
+                        : launch_walk<InFrame<QueryMode::exact>>(args, stream);
 }
 
 }  // namespace tandem::gpu

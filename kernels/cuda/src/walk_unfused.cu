@@ -4,9 +4,8 @@
 namespace tandem::gpu {
 
 cudaError_t walk_unfused(const QueryArgs& args, cudaStream_t stream) {
-  return launch_shaped(
-      args.mode == QueryMode::boxes ? walk<InFrame<QueryMode::boxes>> : walk<InFrame<QueryMode::fast>>, args,
-      stream);
+  return args.mode == QueryMode::boxes ? launch_walk<InFrame<QueryMode::boxes>>(args, stream)
+                                       : launch_walk<InFrame<QueryMode::fast>>(args, stream);
 }
 
 }  // namespace tandem::gpu

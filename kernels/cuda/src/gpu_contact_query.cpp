@@ -184,9 +184,11 @@ Status GpuContactQuery::State::reserve_grouping() {
   if (capacity.pairs >= kMostGroupedPairs) return Status::kOutOfRange;
   first_contact.free();  // the last that is there again: can_group() looks at it
   Status status = reserve_ungrouped();
-  for (GpuArray<std::uint32_t>* array : {&next, &few, &many}) {
-    if (status == Status::kOk) status = reserve(*array, capacity.pairs);
-  }
+  const std::uint32_t counts =
+      std::max(capacity.pairs, gpu::kSpread * std::min(capacity.pairs, gpu::kMostSpreadPairs));
+  if (status == Status::kOk) status = reserve(next, counts);
+  if (status == Status::kOk) status = reserve(few, capacity.pairs);
+  if (status == Status::kOk) status = reserve(many, capacity.pairs);
   if (status == Status::kOk) status = reserve(tile_sums, 2 * std::size_t{gpu::tiles_of(capacity.pairs)});
   if (status == Status::kOk) status = reserve(first_contact, std::size_t{capacity.pairs} + 1);
   return status;

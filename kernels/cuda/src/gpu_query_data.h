@@ -56,9 +56,16 @@ TANDEM_HD constexpr std::uint32_t tiles_of(std::uint32_t pairs) {
   return pairs / kPairsPerTile + 1;
 }
 
+/// Where there are few pairs, the counts of their contacts lie apart, a cache line each: atomic operations on
+/// one line wait for each other.
+inline constexpr std::uint32_t kMostSpreadPairs = 4096, kSpread = 32;
+TANDEM_HD constexpr std::uint32_t spread_of(std::uint32_t pairs) {
+  return pairs <= kMostSpreadPairs ? kSpread : 1;
+}
+
 /// What grouping contacts by pair takes; null where it is not asked for.
 struct Grouping {
-  std::uint32_t* next;  ///< of each pair: how many contacts it has, then where the next goes
+  std::uint32_t* next;  ///< of each pair: how many contacts it has, then where the next goes; spread_of() apart
   std::uint32_t* first_contact;
   std::uint32_t *few, *many;  ///< pairs with contacts
   Counter *tile_contacts, *tile_pairs;

@@ -27,7 +27,7 @@ __device__ void prepare_pair(const QueryArgs& args, std::uint32_t index) {
 __device__ void clear_groups(const QueryArgs& args, std::uint32_t first, std::uint32_t step,
                              std::uint32_t pairs) {
   const Grouping& grouping = args.grouping;
-  for (std::uint32_t i = first; i < pairs; i += step) grouping.next[i] = 0;
+  for (std::uint32_t i = first; i < pairs; i += step) grouping.next[i * spread_of(pairs)] = 0;
   for (std::uint32_t i = first; i < tiles_of(pairs); i += step) {
     grouping.tile_contacts[i] = grouping.tile_pairs[i] = 0;
   }

@@ -185,18 +185,23 @@ void GpuEngine::time_repeats(const GpuPairs& pairs, const TimedQuery& asked, Tim
   GpuEvent begin, between, end;
   for (GpuEvent* event : {&begin, &between, &end}) check(event->create(), "an event");
   const bool finds_pairs = asked.given == nullptr;
-  const Before before = [&](unsigned event_flags) {
-    if (finds_pairs) {
-      const Status status =
-          broad_phase_.enqueue(instances_, bounds(), {.sorted = asked.order == OrderOnGpu::sorted}, stream());
-      check(status, broad_phase_.cuda_error(), "broad phase");
-    }
+  const Before find_pairs = [&](unsigned) {
+    if (!finds_pairs) return;
+    const Status status =
+        broad_phase_.enqueue(instances_, bounds(), {.sorted = asked.order == OrderOnGpu::sorted}, stream());
+    check(status, broad_phase_.cuda_error(), "broad phase");
+  };
+  const Before find_and_record = [&](unsigned event_flags) {
+    find_pairs(event_flags);
     check(between.record(stream(), event_flags), "an event");
   };
-  const std::function<void()> run = repeatable(pairs, asked.order, before);
+  // An event between the steps keeps the second from getting ready while the first ends.
+  const std::function<void()> run = repeatable(pairs, asked.order, find_pairs),
+                              run_in_steps = repeatable(pairs, asked.order, find_and_record);
   for (std::uint32_t i = 0; i < asked.repeats; ++i) {
     run_between(begin, run, end);
     answer.whole.push_back(seconds_between(begin, end));
+    if (finds_pairs) run_between(begin, run_in_steps, end);
     answer.narrow.push_back(seconds_between(finds_pairs ? between : begin, end));
     if (finds_pairs) answer.broad_phase.push_back(seconds_between(begin, between));
   }

@@ -65,7 +65,7 @@ TANDEM_HD constexpr std::uint32_t spread_of(std::uint32_t pairs) {
 
 /// What grouping contacts by pair takes; null where it is not asked for.
 struct Grouping {
-  std::uint32_t* next;  ///< of each pair: how many contacts it has, then where the next goes; spread_of() apart
+  std::uint32_t* next;  ///< of each pair, spread_of() apart: its number of contacts, then the next place
   std::uint32_t* first_contact;
   std::uint32_t *few, *many;  ///< pairs with contacts
   Counter *tile_contacts, *tile_pairs;

@@ -87,7 +87,7 @@ def table_of(path):
 
 class Scenes(BenchTest):
     KINDS = {"stack": ["--count", "27"], "pile": ["--count", "60"], "coincident": ["--count", "5"], "lattice": ["--count", "30"],
-             "slide": ["--count", "20", "--ground", None]}
+             "slide": ["--count", "20", "--ground", None], "field": ["--fixed", "70", "--count", "27"]}
 
     def arguments(self, kind):
         sheet = self.mesh_of("sheet", SHEET_OBJ)
@@ -303,6 +303,51 @@ class Query(BenchTest):
             for name, column in table_of(self.contacts).items():
                 self.assertEqual(column.tolist(), found[name].tolist())
 
+    def test_filters_of_a_scene_leave_out_pairs(self):
+        """What a query with filters finds is what one without finds of the pairs that they leave."""
+        self.make("pile", "--count", "60", "--neighbours", "12")
+        self.query("--out", self.contacts)
+        found = table_of(self.contacts)
+        random = np.random.default_rng(5)
+        motion, bits = random.integers(0, 4, 60), random.integers(0, 8, (2, 60))
+        excluded = found["pairs"][::3, ::-1]
+        a, b = found["pairs"].T
+        moves = (motion[a] == 0) | (motion[b] == 0) | ((motion[a] >= 2) & (motion[b] >= 2) & (motion[a] != motion[b]))
+        meets = ((bits[0][a] & bits[1][b]) != 0) & ((bits[0][b] & bits[1][a]) != 0)
+        third = np.arange(len(a)) % 3 == 0
+        everything = {"simulation/motion": motion, "instances/group": bits[0], "instances/mask": bits[1], "excluded": excluded}
+        for names, left in ((["simulation/motion"], moves), (["instances/group", "instances/mask"], meets),
+                            (["excluded"], ~third), (list(everything), moves & meets & ~third)):
+            with h5py.File(self.scene, "a") as file:
+                for name in everything:
+                    if name in file:
+                        del file[name]
+                for name in names:
+                    file[name] = everything[name]
+            self.assertTrue(0 < left.sum() < len(left))
+            for threads in ("1", "3"):
+                self.query("--threads", threads, "--repeat", "2", "--out", self.contacts)
+                table = table_of(self.contacts)
+                self.assertEqual(table["pairs"].tolist(), found["pairs"][left].tolist())
+                rows = left[found["contacts/pair"]]
+                for name in ("contacts/face_a", "contacts/face_b"):
+                    self.assertEqual(table[name].tolist(), found[name][rows].tolist())
+        # Given pairs are tested as they are.
+        with h5py.File(self.scene, "a") as file:
+            file["pairs"] = found["pairs"]
+        self.query("--out", self.contacts)
+        self.assertEqual(table_of(self.contacts)["pairs"].tolist(), found["pairs"].tolist())
+
+    def test_fixed_bodies_of_a_field_have_no_pairs_of_their_own(self):
+        self.make("field", "--fixed", "100", "--count", "8")
+        with h5py.File(self.scene) as file:
+            motion = file["simulation/motion"][:]
+        self.assertEqual(motion.tolist(), [1] * 100 + [0] * 8)
+        self.query("--out", self.contacts)
+        pairs = table_of(self.contacts)["pairs"]
+        self.assertTrue((pairs[:, 1] >= 100).all())
+        self.assertTrue((pairs[:, 0] < 100).any())
+
     def test_neither_scene_nor_mesh_is_overwritten_by_contacts(self):
         self.write_scene()
         for path in (self.scene, self.mesh):
@@ -479,7 +524,13 @@ class WrongScenes(BenchTest):
                               ({"instances_translation": np.zeros((2, 3), np.longdouble)}, ("more than 64 bits",)),
                               ({"instances_translation": np.full((2, 3), (1 << 62) + 1)}, ("/instances/translation",)),
                               ({"pairs": np.zeros((1, 3), "u4")}, ("/pairs", "expected n x 2, found 1 x 3")),
-                              ({"pairs_x": np.zeros(1)}, ("/pairs", "not a dataset"))):
+                              ({"pairs_x": np.zeros(1)}, ("/pairs", "not a dataset")),
+                              ({"instances_group": np.zeros(3, "u4")}, ("/instances/group: 3 rows for 2 instances",)),
+                              ({"instances_mask": np.zeros(1, "u4")}, ("/instances/mask: 1 rows for 2 instances",)),
+                              ({"instances_mask": np.array([0, 1 << 32])}, ("/instances/mask",)),
+                              ({"simulation_motion": np.zeros(0, "u1")}, ("/simulation/motion: 0 rows for 2 instances",)),
+                              ({"simulation_motion": np.array([0, 4])}, ("/simulation/motion: instance 1: 4 is none of 0 moving",)),
+                              ({"excluded": np.zeros(2, "u4")}, ("/excluded", "expected 2 dimensions, found 1"))):
             with self.subTest(words=words):
                 self.write_scene(**change)
                 self.assert_refused(UNREADABLE_INPUT, self.scene, *words)
@@ -489,6 +540,8 @@ class WrongScenes(BenchTest):
         self.assert_refused(UNREADABLE_INPUT, self.scene, "instance 1 is of asset 1 of 1")
         self.write_scene(pairs=np.array([[0, 1], [2, 0]], "u4"))
         self.assert_refused(UNREADABLE_INPUT, self.scene, "/pairs: row 1 names instance 2 of 2")
+        self.write_scene(excluded=np.array([[0, 1], [0, 0], [7, 1]], "u4"))
+        self.assert_refused(UNREADABLE_INPUT, self.scene, "/excluded: row 2 names instance 7 of 2")
 
     def test_a_pose_that_is_not_rigid_is_named(self):
         mirror, scaled, broken = np.diag([1.0, 1, -1]), 2 * IDENTITY, IDENTITY * np.nan

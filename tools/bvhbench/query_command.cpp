@@ -109,7 +109,9 @@ Answer run_query(const QueryArguments& arguments, const Scene& scene) {
   const std::vector<ObjectPair> pairs = normalised(description.pairs.value_or(std::vector<ObjectPair>()));
   const auto engine = make_engine(arguments.engine(), arguments.options);
   Answer answer = {record_of(arguments, scene), {}, {}};
+  ExcludedPairTable excluded;
   engine->set_shapes(views);
+  engine->set_filter(description.filter.view(excluded));
   engine->update(description.instances);
   answer.timed = engine->time_query({description.pairs ? &pairs : nullptr, arguments.repeats,
                                      arguments.order(), arguments.traversal, arguments.manifolds});

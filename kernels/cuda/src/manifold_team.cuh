@@ -21,7 +21,6 @@ struct SharedNumbers {
   }
 };
 
-/// A crew is a team's first warp.
 struct WarpCrew : SharedNumbers {
   __device__ static constexpr std::uint32_t crew_size() { return 32; }
   __device__ static void crew_sync() {
@@ -91,7 +90,16 @@ template <std::uint32_t kThreads>
 struct BlockTeam : WarpCrew {
   Counter* scratch;  ///< shared, one for each warp
 
-  __device__ static bool in_crew() { return threadIdx.x < 32; }
+  __device__ static bool in_crew() { return true; }
+  __device__ static constexpr std::uint32_t crew_size() { return kThreads; }
+  __device__ static void crew_sync() { __syncthreads(); }
+  template <typename Found, typename Of>
+  __device__ static void one_by_one(const Found& found, const Of& of) {
+    for (std::uint32_t warp = 0; warp < kThreads / 32; ++warp) {
+      if (threadIdx.x / 32 == warp) WarpCrew::one_by_one(found, of);
+      __syncthreads();
+    }
+  }
   __device__ static std::uint32_t rank() { return threadIdx.x; }
   __device__ static constexpr std::uint32_t size() { return kThreads; }
   __device__ static void sync() { __syncthreads(); }

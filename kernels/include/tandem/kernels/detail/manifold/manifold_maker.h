@@ -162,7 +162,7 @@ TANDEM_HD Extreme ManifoldMaker<Team>::extreme_corner(const PatchFrame& frame, s
 }
 
 /// Sounds where a's highest vertex in the patch is, and b's lowest: there, or in the middle, the overlap is
-/// deepest, or nearly. They are looked for within the rim, and no further along the normal than the rim and
+/// deepest, or nearly. They are looked for beyond what lines have met, within the rim, and no further along the normal than the rim and
 /// the middle are from each other's surfaces, and the rim's extent more; and among the corners of triangles
 /// that the curve cuts, where they are few: the tip of a coarse mesh may lean out of its rim.
 template <typename Team>
@@ -180,11 +180,14 @@ TANDEM_HD void ManifoldMaker<Team>::sound_deepest(const PatchFrame& frame, const
     prism.offset[prism.sides++] = dot(outward, p) + more;
   }
   double lowest = INFINITY, highest = -INFINITY;
+  prism.above_a = -INFINITY, prism.below_b = INFINITY;
   for (int i = 0; i < soundings_; ++i) {
     const Sounding& s = shared_.sounding[i];
     lowest = std::fmin(lowest, s.height), highest = std::fmax(highest, s.height);
     if (!(s.overlap() > 0)) continue;
     lowest = std::fmin(lowest, s.surface[1].height), highest = std::fmax(highest, s.surface[0].height);
+    prism.above_a = std::fmax(prism.above_a, s.surface[0].height);
+    prism.below_b = std::fmin(prism.below_b, s.surface[1].height);
   }
   prism.lower = lowest - extent_, prism.upper = highest + extent_;
   if (team_.in_crew()) {

@@ -307,6 +307,7 @@ struct Prism {
   double offset[kMostSides];    // inside: outward * x <= offset
   int sides = 0;
   double lower, upper;
+  double above_a, below_b;  ///< vertices of a that are not above this do not matter, nor those of b not below this
 
   TANDEM_HD bool contains(const Vector2& x) const {
     bool inside = true;
@@ -375,7 +376,7 @@ class ExtremeQuestions {
     }
     test.least_below = static_cast<float>(question == 0 ? prism_.lower : -prism_.upper) - test.slack;
     test.most_below = static_cast<float>(question == 0 ? prism_.upper : -prism_.lower) + test.slack;
-    test.furthest = -INFINITY;
+    test.furthest = static_cast<float>(question == 0 ? prism_.above_a : -prism_.below_b) - test.slack;
     extreme_[question] = {};
   }
 
@@ -392,6 +393,7 @@ class ExtremeQuestions {
       const Vector3 x = of.posed(stored.corner[k]);
       const double height = frame.height(x);
       if (!(height >= prism_.lower && height <= prism_.upper)) continue;
+      if (!(question == 0 ? height > prism_.above_a : height < prism_.below_b)) continue;
       const Extreme here = {frame.flat(x), height, topology.vertex[k]};
       if (is_further(question, here, found) && prism_.contains(here.at)) found = here;
     }

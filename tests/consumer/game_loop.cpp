@@ -36,9 +36,8 @@ struct Body {
 struct Touch {  // what a solver keeps of a manifold's point
   Body *a, *b;
   Vec normal, arm_a, arm_b;
-  double mass = 0, leaving = 0;  // how hard it is to move along the normal, and how fast it is to leave
-  double push = 0;               // the impulse along the normal
-  Vec drag = {};                 // and that of friction
+  double mass = 0, leaving = 0, push = 0;  // along the normal: resistance, speed wanted, impulse
+  Vec drag = {};                           // the impulse of friction
   void apply(Vec impulse) const { a->push(arm_a, -1 * impulse), b->push(arm_b, impulse); }
 };
 
@@ -93,10 +92,9 @@ int main(int, char** argv) {
       const tandem::Manifold& m = manifolds.manifolds()[p.manifold];
       const auto [i, j] = query.pairs()[m.pair];
       Body &a = bodies[i], &b = bodies[j];
-      for (const std::uint32_t k : {i, j}) {
-        if (motion[k] != Motion::sleeping || norm(bodies[i + j - k].velocity) < 4 * kSlow) continue;
-        motion[k] = Motion::moving, bodies[k].by_mass = 1;  // it was hit
-      }
+      for (const std::uint32_t k : {i, j})  // who is hit wakes
+        if (motion[k] == Motion::sleeping && norm(bodies[i + j - k].velocity) > 4 * kSlow)
+          motion[k] = Motion::moving, bodies[k].by_mass = 1;
       const Vec n = Vec::of(m.normal), x = Vec::of(p.position);
       Touch t = {&a, &b, n, x - Vec::of(poses[i].pose.translation), x - Vec::of(poses[j].pose.translation)};
       t.mass = 1 / (a.yield(t.arm_a, n) + b.yield(t.arm_b, n));

@@ -18,32 +18,22 @@ inline constexpr double kDeeper = 1.25;
 /// In patches of so few pieces the corners of their triangles are looked at for the deepest point.
 inline constexpr std::uint32_t kFewPieces = 64;
 
-/// What became of the contacts of a pair.
-struct PairCounters {
-  std::uint32_t segments = 0, ambiguous_touches = 0;
-};
-
 template <typename Team>
 class ManifoldMaker {
  public:
   TANDEM_HD ManifoldMaker(const Team& team, const BodyPair& bodies, const PieceMemory& memory,
-                          PatchMemory& shared, int most_points)
-      : team_(team), bodies_(bodies), memory_(memory), shared_(shared), most_points_(most_points) {}
+                          PatchMemory& shared, const PieceSummary& summary, int most_points)
+      : team_(team),
+        bodies_(bodies),
+        memory_(memory),
+        shared_(shared),
+        summary_(summary),
+        most_points_(most_points) {}
 
-  /// Makes the patches of a pair of bodies from its contacts. new_patch(): where the next one is to lie, or
-  /// null; called by one of the team for each.
+  /// Makes the patch of a curve that CurveFinder found, whose summary this is. new_patch(): where it is to lie,
+  /// or null; called by one of the team if there is one. False: an ambiguous touch.
   template <typename NewPatch>
-  TANDEM_HD PairCounters make(const Contact* contacts, std::uint32_t count, const NewPatch& new_patch) {
-    CurveFinder<Team> finder(team_, bodies_, memory_);
-    summary_ = finder.find(contacts, count, shared_.next);
-    PairCounters counters;
-    counters.segments = summary_.segments;
-    for (std::uint32_t curve = 0; curve < summary_.curves; ++curve) {
-      team_.sync();
-      if (!make_patch(curve, new_patch)) ++counters.ambiguous_touches;
-    }
-    return counters;
-  }
+  TANDEM_HD bool make(std::uint32_t curve, const NewPatch& new_patch);
 
  private:
   struct Chosen {
@@ -54,8 +44,6 @@ class ManifoldMaker {
     bool inner;
   };
 
-  template <typename NewPatch>
-  TANDEM_HD bool make_patch(std::uint32_t curve, const NewPatch& new_patch);
   TANDEM_HD void place_soundings(const RimFinder<Team>& finder, const Rim& rim, const PatchFrame& frame,
                                  bool touch);
   TANDEM_HD void sound(const PatchFrame& frame, int first, int count);
@@ -69,8 +57,8 @@ class ManifoldMaker {
   const BodyPair& bodies_;
   PieceMemory memory_;
   PatchMemory& shared_;
+  const PieceSummary& summary_;
   int most_points_;
-  PieceSummary summary_;
   Vector2 middle_;       // of the rim
   double extent_ = 0;    // of the rim, from its middle
   int rim_points_ = 0, soundings_ = 0;
@@ -115,8 +103,8 @@ TANDEM_HD void ManifoldMaker<Team>::sound(const PatchFrame& frame, int first, in
   for (std::uint32_t i = team_.rank(); i < 2 * static_cast<std::uint32_t>(count); i += team_.size()) {
     Sounding& s = shared_.sounding[first + static_cast<int>(i / 2)];
     const int side = static_cast<int>(i % 2);
-    s.surface[side] = nearest_crossing(bodies_[side], frame, s.line, side == 0 ? 1 : -1, s.target[side],
-                                       -INFINITY, INFINITY);
+    s.surface[side] =
+        nearest_crossing(bodies_[side], frame, s.line, side == 0 ? 1 : -1, s.target[side], extent_ / 4);
   }
   team_.sync();
 }
@@ -212,9 +200,9 @@ TANDEM_HD void ManifoldMaker<Team>::look_behind(const PatchFrame& frame) {
     const int side = static_cast<int>(i % 2);
     if (side == 0) s.looked_behind = true;
     if (side == s.vertex_of) continue;
-    const double height = s.surface[side].height;
-    s.behind[side] = side == 0 ? nearest_crossing(bodies_.a, frame, s.line, -1, height, -INFINITY, height)
-                               : nearest_crossing(bodies_.b, frame, s.line, 1, height, height, INFINITY);
+    double most = INFINITY;
+    s.behind[side] = crossing_within(bodies_[side], frame, s.line, side == 0 ? -1 : 1, s.surface[side].height,
+                                     s.surface[1].height, s.surface[0].height, most);
   }
   team_.sync();
 }
@@ -271,7 +259,8 @@ TANDEM_HD int ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, const P
 
 template <typename Team>
 template <typename NewPatch>
-TANDEM_HD bool ManifoldMaker<Team>::make_patch(std::uint32_t curve, const NewPatch& new_patch) {
+TANDEM_HD bool ManifoldMaker<Team>::make(std::uint32_t curve, const NewPatch& new_patch) {
+  team_.sync();  // all are done with what the last curve left
   NormalFinder<Team> normal_finder(team_, bodies_, memory_, summary_, curve);
   const CurveMeasure measure = normal_finder.measure();
   const PatchNormal normal = normal_finder.find(measure);

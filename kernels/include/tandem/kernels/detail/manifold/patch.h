@@ -60,7 +60,7 @@ struct Sounding {
   std::uint64_t feature;    ///< of others
   int vertex_of = -1;       ///< the side whose vertex it is; -1: none's
   Crossing surface[2];      ///< a's, that faces along the normal; b's, that faces against it
-  Crossing behind[2];       ///< where a begins, on the line; where b ends
+  Crossing behind[2];       ///< where a begins, on the line, if that is above b's surface; where b ends, if that is below a's
   bool looked_behind;
 
   TANDEM_HD double overlap() const {
@@ -76,8 +76,7 @@ struct Sounding {
   }
   /// Whether one body ends within the other. Condition: looked_behind, within().
   TANDEM_HD bool goes_through() const {
-    return (behind[0].found() && behind[0].height > surface[1].height) ||
-           (behind[1].found() && behind[1].height < surface[0].height);
+    return behind[0].found() || behind[1].found();
   }
 };
 

@@ -32,7 +32,6 @@ class NormalFinder {
   struct Direction {
     Vector3 n;            // from a towards b
     std::uint64_t piece;  // key of the piece whose triangle has it
-    Vector3 x;            // a point of that piece
   };
   struct Spread {
     double highest_a, lowest_b;
@@ -46,6 +45,8 @@ class NormalFinder {
       visit(memory_.pieces[at], memory_.normals + 6 * std::size_t{at});
     }
   }
+  /// Marks that pieces have for the time being. Each is seen by one of the team alone.
+  TANDEM_HD std::uint32_t& mark(std::uint32_t i) const { return memory_.curve[i]; }
   TANDEM_HD double total(ExactSum sum, double unit) const {
     sum.upper = team_.sum(sum.upper), sum.lower = team_.sum(sum.lower);
     return sum.value(unit);
@@ -80,7 +81,7 @@ TANDEM_HD CurveMeasure NormalFinder<Team>::measure() {
   std::uint64_t key = ~std::uint64_t{0};
   bool is_free = false;
   for_each_piece([&](const Piece& piece, const float*) {
-    key = piece.key() < key ? piece.key() : key;
+    key = lesser(key, piece.key());
     const Vector3 from = piece.end[0] - summary_.origin;
     if (piece.kind() == MeetingKind::polygon) {
       area.add(piece.end[1], one_by_unit * one_by_unit);
@@ -131,26 +132,33 @@ TANDEM_HD Vector3 NormalFinder<Team>::sheet_normal() const {
 /// kMostDirections. Normals closer than half a milliradian are one.
 template <typename Team>
 TANDEM_HD bool NormalFinder<Team>::gather_directions(int side) {
-  const int first = directions_;
-  FloatVector known[kMostDirections];
-  for (;;) {
+  float known[3] = {};  // the last direction
+  for (int found = 0;; ++found) {
     std::uint64_t key = ~std::uint64_t{0};
-    for_each_piece([&](const Piece& piece, const float* normals) {
-      const float* n = normals + 3 * side;
-      for (int i = 0; i < directions_ - first; ++i) {
-        const float x = n[0] - known[i].x[0], y = n[1] - known[i].x[1], z = n[2] - known[i].x[2];
-        if (x * x + y * y + z * z < 2e-7f) return;
+    for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
+      const std::uint32_t at = memory_.order[i];
+      if (found == 0) {
+        mark(i) = 0;
+      } else {
+        if (mark(i) != 0) continue;
+        const float* n = memory_.normals + 6 * std::size_t{at} + 3 * side;
+        const float x = n[0] - known[0], y = n[1] - known[1], z = n[2] - known[2];
+        if (x * x + y * y + z * z < 2e-7f) {
+          mark(i) = 1;
+          continue;
+        }
       }
-      key = piece.key() < key ? piece.key() : key;
-    });
+      key = lesser(key, memory_.pieces[at].key());
+    }
     key = team_.least(key);
     if (key == ~std::uint64_t{0}) return true;
-    if (directions_ - first == kMostDirections) return false;
+    if (found == kMostDirections) return false;
     const auto triangle = static_cast<std::uint32_t>(side == 0 ? key >> 32 : key);
     const WorldTriangle t = bodies_[side].triangle(triangle);
-    known[directions_ - first] = {
-        {static_cast<float>(t.normal.x), static_cast<float>(t.normal.y), static_cast<float>(t.normal.z)}};
-    direction_[directions_++] = {side == 0 ? t.normal : -t.normal, key, {}};
+    known[0] = static_cast<float>(t.normal.x);
+    known[1] = static_cast<float>(t.normal.y);
+    known[2] = static_cast<float>(t.normal.z);
+    direction_[directions_++] = {side == 0 ? t.normal : -t.normal, key};
   }
 }
 
@@ -159,15 +167,18 @@ TANDEM_HD bool NormalFinder<Team>::gather_directions(int side) {
 template <typename Team>
 TANDEM_HD void NormalFinder<Team>::spread_along(const Vector3* directions, int count, Spread* spread) const {
   for (int i = 0; i < count; ++i) spread[i] = {-INFINITY, INFINITY};
+  std::uint32_t seen_a = kNoIndex, seen_b = kNoIndex;
   for_each_piece([&](const Piece& piece, const float*) {
-    for (int k = 0; k < 3; ++k) {
-      const Vector3 p = bodies_.a.corner(piece.triangle[0], k) - summary_.origin,
-                    q = bodies_.b.corner(piece.triangle[1], k) - summary_.origin;
-      for (int i = 0; i < count; ++i) {
-        spread[i].highest_a = std::fmax(spread[i].highest_a, dot(directions[i], p));
-        spread[i].lowest_b = std::fmin(spread[i].lowest_b, dot(directions[i], q));
-      }
+    for (int k = 0; k < 3 && piece.triangle[0] != seen_a; ++k) {
+      const Vector3 p = bodies_.a.corner(piece.triangle[0], k) - summary_.origin;
+      for (int i = 0; i < count; ++i)
+        spread[i].highest_a = greater(spread[i].highest_a, dot(directions[i], p));
     }
+    for (int k = 0; k < 3 && piece.triangle[1] != seen_b; ++k) {
+      const Vector3 q = bodies_.b.corner(piece.triangle[1], k) - summary_.origin;
+      for (int i = 0; i < count; ++i) spread[i].lowest_b = lesser(spread[i].lowest_b, dot(directions[i], q));
+    }
+    seen_a = piece.triangle[0], seen_b = piece.triangle[1];
   });
   for (int i = 0; i < count; ++i) {
     spread[i] = {team_.greatest(spread[i].highest_a), team_.least(spread[i].lowest_b)};

@@ -148,16 +148,17 @@ struct LineTest {
   }
 };
 
-/// The crossing of the line through `at` that is nearest in height to `target`, between lower and upper, of
-/// triangles whose outward normals point along the frame's (facing 1) or against it (-1). Of two as near the
-/// triangle that comes first.
-TANDEM_HD inline Crossing nearest_crossing(const Body& body, const PatchFrame& frame, const Vector2& at,
-                                           int facing, double target, double lower, double upper) {
+/// The crossing of the line through `at` that is nearest in height to `target`, between lower and upper and no
+/// further away than `most`, of triangles whose outward normals point along the frame's (facing 1) or against it
+/// (-1). Of two as near the triangle that comes first. Where none is that near, `most` becomes the distance of
+/// another, or infinite.
+TANDEM_HD inline Crossing crossing_within(const Body& body, const PatchFrame& frame, const Vector2& at,
+                                          int facing, double target, double lower, double upper, double& most) {
   Crossing best;
   double nearest = INFINITY;
-  float reach = INFINITY;
   const FloatVector point = point_in_mesh(body, frame.at(at, target));
   const float slack = slack_near(body, point);
+  float reach = static_cast<float>(most) + slack;
   const LineTest test = {point, in_mesh(body, frame.n), static_cast<float>(lower - target) - slack,
                          static_cast<float>(upper - target) + slack, slack, &reach};
   const double rounding = 0x1p-48 * body.reach;
@@ -184,9 +185,21 @@ TANDEM_HD inline Crossing nearest_crossing(const Body& body, const PatchFrame& f
     if (distance > nearest || (distance == nearest && t >= best.triangle)) return;
     nearest = distance;
     best = {height, t};
-    reach = static_cast<float>(distance) + slack;
+    const float as_far = static_cast<float>(distance) + slack;
+    reach = as_far < reach ? as_far : reach;
   });
-  return best;
+  // What is further away than `most` need not be the nearest: not all boxes there were looked at.
+  const bool is_nearest = nearest <= most;
+  most = nearest;
+  return is_nearest ? best : Crossing{};
+}
+
+/// The same however far away it is. expected: how far it is, mostly.
+TANDEM_HD inline Crossing nearest_crossing(const Body& body, const PatchFrame& frame, const Vector2& at,
+                                           int facing, double target, double expected) {
+  double most = expected;
+  const Crossing near = crossing_within(body, frame, at, facing, target, -INFINITY, INFINITY, most);
+  return near.found() ? near : crossing_within(body, frame, at, facing, target, -INFINITY, INFINITY, most);
 }
 
 /// The part of space across a convex polygon in a patch's plane, between two heights.

@@ -117,21 +117,25 @@ TEST_F(Containments, AreThoseOfBruteForce) {
   EXPECT_GT(touching, 100u);
 }
 
+TEST_F(Containments, AreFoundUnderTheDeepestTree) {
+  RandomPoses random(3);
+  const PartedScene scene = test::deep_nest(random);
+  const auto pairs = every_pair(scene.scene);
+  const Rows expected = all_contained(scene, pairs);
+  EXPECT_GE(expected.size(), 3u);
+  EXPECT_EQ(find(scene.scene, pairs), expected);
+}
+
 TEST_F(Containments, DoNotDependOnTheNumberOfThreads) {
-  RandomPoses random(7);
-  PartedScene crowd = test::nest(random, false);
-  for (int i = 0; i < 5; ++i) {
-    auto more = test::nest(random, false).scene.instances;
-    crowd.scene.instances.insert(crowd.scene.instances.end(), more.begin(), more.end());
-  }
+  const PartedScene crowd = test::crowded_nest(7, 48);
   const auto pairs = every_pair(crowd.scene);
   const Rows one = find(crowd.scene, pairs);
   EXPECT_GT(one.size(), 10u);
   for (std::uint32_t threads = 2; threads <= 16; ++threads) EXPECT_EQ(find(crowd.scene, pairs, threads), one);
 }
 
-// A closed surface on the grid of {0, 1, 2}^3, from all points of a finer grid that are not on it: rays along edges,
-// along faces and through vertices.
+// A cube whose vertices are on a grid, from all points of a finer grid that are not on it: rays along edges, along
+// faces and through vertices.
 TEST(RayCrosses, AnOddNumberOfTrianglesFromInside) {
   for (int cells = 1; cells <= 2; ++cells) {
     const Mesh mesh = cube(1, cells);

@@ -181,4 +181,35 @@ inline PartedScene nest(RandomPoses& random, bool on_lattice, double far = 0) {
   return out;
 }
 
+/// Cubes within cubes, and a tetrahedron beside them, under a tree as deep as a file's may be; and small bodies.
+inline PartedScene deep_nest(RandomPoses& random) {
+  PartedMesh deep;
+  const int cells[4] = {7, 3, 2, 1};
+  for (int i = 0; i < 4; ++i) deep.add(cube(static_cast<float>(4 - i), cells[i]));
+  Mesh tetrahedron;
+  const std::array<float, 3> p[4] = {{5, 0, 0}, {6, 0, 0}, {5, 1, 0}, {5, 0, 1}};
+  for (std::size_t i = 0; i < 4; ++i) tetrahedron.add(p[i], p[(i + 1) % 4], p[(i + 2) % 4]);
+  deep.add(tetrahedron);
+  PartedScene out;
+  out.scene.assets.add(deep.mesh, make_file(deep.mesh, deepest_tree(deep.mesh)));
+  out.parts.push_back(deep.parts);
+  PartedMesh small;
+  small.add(cube(0.2f));
+  out.add(small);
+  out.scene.instances.push_back({0, random.pose({1, 1, 0, 0, 4})});
+  for (int i = 0; i < 20; ++i) out.scene.instances.push_back({1, random.pose({1, 1, 3, 0, 4})});
+  return out;
+}
+
+/// Enough bodies about one place for so many pairs.
+inline PartedScene crowded_nest(std::uint64_t seed, std::size_t bodies) {
+  RandomPoses random(seed);
+  PartedScene crowd = nest(random, false);
+  while (crowd.scene.instances.size() < bodies) {
+    const auto more = nest(random, false).scene.instances;
+    crowd.scene.instances.insert(crowd.scene.instances.end(), more.begin(), more.end());
+  }
+  return crowd;
+}
+
 }  // namespace tandem::test

@@ -79,8 +79,10 @@ def drop_hint(result):
 
 
 def table_of(path):
+    """The datasets of a contacts file, those of docs/scenes.md first and in that order."""
     with h5py.File(path) as file:
-        return {name: file[name][:] for name in ("pairs", "contacts/pair", "contacts/face_a", "contacts/face_b")}
+        table = {name: file[name][:] for name in ("pairs", "contacts/pair", "contacts/face_a", "contacts/face_b")}
+        return table | {f"{group}/{name}": column[:] for group in ("manifolds", "points") if group in file for name, column in file[group].items()}
 
 
 class Scenes(BenchTest):
@@ -263,9 +265,10 @@ class Query(BenchTest):
     def test_the_keys_of_json_are_those_of_its_documentation(self):
         self.write_scene()
         page = (SOURCE_DIR / "docs" / "json.md").read_text().split("## `bvhbench query")[1].split("\n## ")[0]
-        documented = [key for line in page.split("\n") if line.startswith("| `")
-                      for key in re.findall(r"`(\w+)`", line.split("|")[1])]
-        self.assertEqual(list(self.query()), documented)
+        keys = [[key for line in part.split("\n") if line.startswith("| `") for key in re.findall(r"`(\w+)`", line.split("|")[1])]
+                for part in page.split("With `--manifolds` also")]
+        self.assertEqual(list(self.query()), keys[0])
+        self.assertEqual(list(self.query("--manifolds")), keys[0] + keys[1])
 
     def test_two_cubes_cross_where_they_should(self):
         self.write_scene()
@@ -384,6 +387,69 @@ class Query(BenchTest):
         itself = table["contacts/pair"] != 1
         self.assertTrue(itself.any())
         self.assertTrue((table["contacts/face_a"][itself] <= table["contacts/face_b"][itself]).all())
+
+    def test_manifolds_are_those_of_a_box_that_lies_on_another(self):
+        self.write_scene(translation=((0, 0, 0), (0.25, 0.125, 0.875)))
+        report = self.query("--manifolds", "--repeat", "3", "--out", self.contacts)
+        table = table_of(self.contacts)
+        self.assertEqual((report["manifolds"], report["points"], report["open_curves"]), (1, 4, 0))
+        self.assertEqual(len(report["manifold_seconds"]["all"]), 3)
+        self.assertEqual(table["manifolds/pair"].tolist(), [0])
+        self.assertEqual(table["manifolds/first"].tolist(), [0, 4])
+        np.testing.assert_allclose(table["manifolds/normal"], [[0, 0, 1]], atol=1e-12)
+        np.testing.assert_allclose(table["manifolds/area"], [0.75 * 0.875], atol=1e-12)
+        np.testing.assert_allclose(table["manifolds/depth"], [0.125], atol=1e-12)
+        np.testing.assert_allclose(table["manifolds/centre"], [[0.625, 0.5625, 0.9375]], atol=1e-12)
+        np.testing.assert_allclose(table["points/depth"], [0.125] * 4, atol=1e-12)
+        corners = sorted((x, y, 0.9375) for x in (0.25, 1) for y in (0.125, 1))
+        np.testing.assert_allclose(sorted(table["points/position"].tolist()), corners, atol=1e-12)
+        # The upper cube's bottom and four sides, against the lower one's top and sides.
+        self.assertLessEqual(set(table["points/face_a"].tolist()), set(range(1, 6)))
+        self.assertLessEqual(set(table["points/face_b"].tolist()), {0, 2, 3, 4, 5})
+
+    def test_manifolds_are_of_the_documented_types_and_belong_together(self):
+        self.make("pile", "--count", "50")
+        self.query("--manifolds", "--out", self.contacts)
+        table = table_of(self.contacts)
+        types = {name: (str(column.dtype), column.shape[1:]) for name, column in table.items() if name[0] in "mp"}
+        page = (SOURCE_DIR / "docs" / "scenes.md").read_text()
+        documented = {}
+        for names, kind, width in re.findall(r"^\| (`/(?:manifolds|points)/.*?) \| ([uf]\d\d) \[\w\+?1?(,3)?\]", page, re.M):
+            for name in re.findall(r"`/([\w/]+)`", names):
+                documented[name] = ({"u32": "uint32", "u64": "uint64", "f64": "float64"}[kind], (3,) if width else ())
+        types.pop("pairs")
+        self.assertEqual(types, documented)
+        first, points = table["manifolds/first"].astype(int), table["points/depth"]
+        self.assertEqual((first[0], first[-1], len(first)), (0, len(points), len(table["manifolds/pair"]) + 1))
+        self.assertGreater(len(points), 50)
+        for row, depth in enumerate(table["manifolds/depth"]):
+            self.assertEqual(depth, points[first[row]:first[row + 1]].max())
+        self.assertTrue((np.diff(table["manifolds/pair"].astype(int)) >= 0).all())
+        self.assertTrue((table["points/id"] != 0).all())
+
+    def test_manifolds_do_not_change_with_threads_and_leave_the_contacts_as_they_are(self):
+        self.make("pile", "--count", "60")
+        self.query("--out", self.contacts)
+        plain, tables = table_of(self.contacts), []
+        for threads in ("1", "2", "7"):
+            self.query("--manifolds", "--threads", threads, "--out", self.contacts)
+            tables.append({name: column.tolist() for name, column in table_of(self.contacts).items()})
+        self.assertEqual(tables[0], tables[1])
+        self.assertEqual(tables[0], tables[2])
+        for name, column in plain.items():
+            self.assertEqual(tables[0][name], column.tolist())
+            self.assertNotIn("manifolds", name)
+
+    def test_manifolds_of_a_mesh_without_topology_are_refused_with_its_name(self):
+        self.write_scene()
+        result = self.build(self.write("cube.obj", CUBE_OBJ), "--no-topology", "-o", self.mesh)
+        self.assertEqual(result.returncode, DONE, result.stderr)
+        self.assert_refused(UNREADABLE_INPUT, "cube.bvh", "--no-topology", arguments=["--manifolds"])
+
+    def test_manifolds_of_less_than_all_contacts_are_refused(self):
+        self.write_scene()
+        for arguments in (["--mode", "boxes"], ["--first-contact"]):
+            self.assert_refused(USAGE, "--manifolds", arguments=["--manifolds", *arguments])
 
     def test_the_summary_is_for_people(self):
         self.write_scene()

@@ -50,7 +50,7 @@ class ManifoldMaker {
   TANDEM_HD void sound_deepest(const PatchFrame& frame, const Rim& rim, std::uint32_t curve);
   TANDEM_HD Extreme extreme_corner(const PatchFrame& frame, std::uint32_t begin, std::uint32_t end, int side) const;
   TANDEM_HD void look_behind(const PatchFrame& frame);
-  TANDEM_HD int choose(const RimFinder<Team>& finder, const PatchFrame& frame, bool touch,
+  TANDEM_HD int choose(const RimFinder<Team>& finder, int most_of_rim, bool touch,
                        Chosen (&chosen)[kMostSoundings]) const;
 
   const Team& team_;
@@ -92,6 +92,7 @@ TANDEM_HD void ManifoldMaker<Team>::place_soundings(const RimFinder<Team>& finde
       s.line = inner ? middle_ : at[i] + kInwards * (middle_ - at[i]);
       s.height = s.target[0] = s.target[1] = inner ? mean_height : height[i];
       s.reference = inner ? kNoIndex : rim.reference[i];
+      s.rank = inner ? 0 : rim.rank[i];
       s.feature = feature_hash(0, 4);
     }
   }
@@ -207,12 +208,11 @@ TANDEM_HD void ManifoldMaker<Team>::look_behind(const PatchFrame& frame) {
   team_.sync();
 }
 
-/// The rim as it is sounded, and the deepest inner point where it lies deeper. Deeper points come first, then
+/// The first points of the rim as it is sounded, and the deepest inner point where it lies deeper. Deeper points come first, then
 /// those further out; of points near each other the first stays.
 template <typename Team>
-TANDEM_HD int ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, const PatchFrame& frame, bool touch,
+TANDEM_HD int ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, int most_of_rim, bool touch,
                                           Chosen (&chosen)[kMostSoundings]) const {
-  (void)frame;
   int count = 0;
   double of_rim = 0;
   Chosen inner{};
@@ -230,6 +230,7 @@ TANDEM_HD int ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, const P
       if (c.depth > inner.depth) inner = c;
       continue;
     }
+    if (s.rank >= most_of_rim) continue;
     c.feature = finder.feature(s.reference);
     const Piece& piece = finder.piece(s.reference);
     c.triangle[0] = piece.triangle[0], c.triangle[1] = piece.triangle[1];
@@ -268,9 +269,9 @@ TANDEM_HD bool ManifoldMaker<Team>::make(std::uint32_t curve, const NewPatch& ne
   const PatchFrame frame(summary_.origin, normal.n);
   RimFinder<Team> rim_finder(team_, bodies_, memory_, summary_, curve, frame);
   rim_finder.gather(measure.closed && !summary_.degenerate, shared_.next);
-  // One is left for an inner point.
+  // One is left for an inner point. What the patch is does not depend on how many points it may have.
   const int most_of_rim = normal.touch || most_points_ == 1 ? most_points_ : most_points_ - 1;
-  const Rim rim = rim_finder.find(most_of_rim, frame.flat(measure.middle));
+  const Rim rim = rim_finder.find(kMostManifoldPoints - (normal.touch ? 0 : 1), frame.flat(measure.middle));
   if (rim.points == 0) return false;
   place_soundings(rim_finder, rim, frame, normal.touch);
   bool goes_through = false, hole = false;
@@ -280,21 +281,23 @@ TANDEM_HD bool ManifoldMaker<Team>::make(std::uint32_t curve, const NewPatch& ne
     look_behind(frame);
     if (summary_.curves > 1 && measure.closed) {
       double deepest = 0;
-      bool outside = false;
+      // No line is within the bodies, nor so short that rounding hides it.
+      hole = true;
+      const double rounding = 0x1p-40 * bodies_.reach();
       for (int i = 0; i <= rim_points_; ++i) {
         const Sounding& s = shared_.sounding[i];
-        outside = outside || (s.overlap() > 0 && !s.within());
+        const bool seen = s.surface[0].found() && s.surface[1].found();
+        hole = hole && !s.within() && !(seen && std::fabs(s.overlap()) <= rounding);
         if (!s.within() || s.overlap() <= deepest) continue;
         deepest = s.overlap();
         goes_through = s.goes_through();
       }
-      hole = outside && deepest == 0;
       // The way back is the shorter one on the side where the middles are.
       if (goes_through && dot(measure.area, bodies_.apart()) < 0) return true;
     }
   }
   Chosen chosen[kMostSoundings];
-  int count = choose(rim_finder, frame, normal.touch, chosen);
+  int count = choose(rim_finder, most_of_rim, normal.touch || hole, chosen);
   count = count < most_points_ ? count : most_points_;
   const double near = kNear * bodies_.smaller_diagonal();
   for (int i = 0; i < count; ++i) {
@@ -305,9 +308,10 @@ TANDEM_HD bool ManifoldMaker<Team>::make(std::uint32_t curve, const NewPatch& ne
   if (patch == nullptr) return true;
   Vector2 centre = middle_;
   double deepest = 0, height = 0;
-  for (int i = 0; i < count; ++i) {
-    deepest = std::fmax(deepest, chosen[i].depth);
-    height += chosen[i].height / count;
+  for (int i = 0; i < count; ++i) height += chosen[i].height / count;
+  for (int i = 0; i < soundings_ && !normal.touch && !hole; ++i) {
+    const Sounding& s = shared_.sounding[i];
+    if (s.within()) deepest = std::fmax(deepest, s.overlap());
   }
   if (measure.closed && !normal.touch) {
     Vector2 of_area;

@@ -48,6 +48,7 @@ struct FloatPoint {
 struct Rim {
   std::uint32_t reference[kMostManifoldPoints];
   FloatPoint at[kMostManifoldPoints];
+  int rank[kMostManifoldPoints];  ///< how many were found before
   int points = 0;
 };
 
@@ -58,6 +59,7 @@ struct Sounding {
   double target[2];         ///< the height near which the line is to meet a's surface, b's
   std::uint32_t reference;  ///< of a rim point: the candidate. Else kNoIndex
   std::uint64_t feature;    ///< of others
+  int rank = 0;             ///< of a rim point
   int vertex_of = -1;       ///< the side whose vertex it is; -1: none's
   Crossing surface[2];      ///< a's, that faces along the normal; b's, that faces against it
   Crossing behind[2];       ///< where a begins, on the line, if that is above b's surface; where b ends, if that is below a's

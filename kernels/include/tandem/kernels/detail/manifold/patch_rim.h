@@ -161,10 +161,12 @@ TANDEM_HD Rim RimFinder<Team>::find(int most, const Vector2& middle) const {
   };
   const auto next = [&](int i) { return i + 1 == rim.points ? 0 : i + 1; };
   const auto insert = [&](int where, std::uint32_t reference) {
-    for (int i = rim.points++; i > where; --i) {
+    const int rank = rim.points++;
+    for (int i = rank; i > where; --i) {
       rim.reference[i] = rim.reference[i - 1], rim.at[i] = rim.at[i - 1], of_side[i] = of_side[i - 1];
+      rim.rank[i] = rim.rank[i - 1];
     }
-    rim.reference[where] = reference, rim.at[where] = place(reference);
+    rim.reference[where] = reference, rim.at[where] = place(reference), rim.rank[where] = rank;
   };
   const auto from = [&](const FloatPoint& p) {
     return [p](const Candidate& c) { return (c.x - p.x) * (c.x - p.x) + (c.y - p.y) * (c.y - p.y); };

@@ -263,9 +263,10 @@ void check_arguments(const QueryArguments& arguments, const Scene& scene) {
     if (arguments.traversal) throw UsageError("--traversal is for the backend cuda");
     return;
   }
-  if (!tandem &&
-      (arguments.options.first_contact_only || arguments.order() != OrderOnGpu::any || arguments.traversal || arguments.manifolds)) {
-    throw UsageError("--first-contact, --grouped, --manifolds, --sorted and --traversal are for the engine tandem");
+  if (!tandem && (arguments.options.first_contact_only || arguments.order() != OrderOnGpu::any ||
+                  arguments.traversal || arguments.manifolds)) {
+    throw UsageError(
+        "--first-contact, --grouped, --manifolds, --sorted and --traversal are for the engine tandem");
   }
   if (arguments.options.self_pairs) {
     throw UsageError("--self is for the backend cpu; /pairs of a scene may name an instance twice");

@@ -26,9 +26,9 @@ class ContactManifolds {
   ~ContactManifolds();
 
   /// Names the assets that instances refer to, the list given to the query. What the views point to must
-  /// outlive the calls. Result: kOk; kUnknownAsset, where a view points to nothing; kNoTopology, where its file
-  /// has none; where() is its place in the list; or kOutOfMemory. After an error there are no assets. Forgets
-  /// the last call.
+  /// outlive the calls. Result: kOk; kUnknownAsset, where a view points to nothing; kNoTopology, where its
+  /// file has none; where() is its place in the list; or kOutOfMemory. After an error there are no assets.
+  /// Forgets the last call.
   Status set_assets(std::span<const AssetView> assets);
 
   /// Makes the manifolds of a query's contacts. A pair of an instance with itself has none. The result does

@@ -76,7 +76,8 @@ struct BlockAxes {
 };
 
 /// Visits the triangles of a body whose boxes pass the test. Test: passes(center, half_extent) of a box, and
-/// turned(axes), the same test for boxes along these axes. Imaginary boxes pass no test that compares with <=.
+/// turned(axes), the same test for boxes along these axes. Imaginary boxes pass no test that compares with
+/// <=.
 template <typename Test, typename Visit>
 TANDEM_HD inline void walk_surface(const Body& body, const Test& test, const Visit& visit) {
   const Shape& shape = *body.shape;
@@ -89,7 +90,8 @@ TANDEM_HD inline void walk_surface(const Body& body, const Test& test, const Vis
       const Block& block = shape.blocks[index];
       for (int i = kNodesPerBlock - 1; i >= 0; --i) {
         const FloatVector center = {{block.center[0][i], block.center[1][i], block.center[2][i]}};
-        const FloatVector half = {{block.half_extent[0][i], block.half_extent[1][i], block.half_extent[2][i]}};
+        const FloatVector half = {
+            {block.half_extent[0][i], block.half_extent[1][i], block.half_extent[2][i]}};
         if (!test.passes(center, half)) continue;
         if (block.kind[i] == NodeKind::leaf) {
           visit(block.index[i]);
@@ -102,9 +104,11 @@ TANDEM_HD inline void walk_surface(const Body& body, const Test& test, const Vis
       const auto turned = test.turned(BlockAxes(block.rotation));
       for (int i = kNodesPerBlock - 1; i >= 0; --i) {
         const FloatVector center = {{block.center[0][i], block.center[1][i], block.center[2][i]}};
-        const FloatVector half = {{block.half_extent[0][i], block.half_extent[1][i], block.half_extent[2][i]}};
+        const FloatVector half = {
+            {block.half_extent[0][i], block.half_extent[1][i], block.half_extent[2][i]}};
         if (!turned.passes(center, half)) continue;
-        const std::uint32_t below = (block.first_below & ~OrientedBlock::kIsLeafBlock) + static_cast<std::uint32_t>(i);
+        const std::uint32_t below =
+            (block.first_below & ~OrientedBlock::kIsLeafBlock) + static_cast<std::uint32_t>(i);
         if (block.is_leaf_block()) {
           visit(below);
         } else {
@@ -148,19 +152,25 @@ struct LineTest {
   }
 };
 
-/// The crossing of the line through `at` that is nearest in height to `target`, between lower and upper and no
-/// further away than `most`, of triangles whose outward normals point along the frame's (facing 1) or against it
-/// (-1). Of two as near the triangle that comes first. Where none is that near, `most` becomes the distance of
-/// another, or infinite.
+/// The crossing of the line through `at` that is nearest in height to `target`, between lower and upper and
+/// no further away than `most`, of triangles whose outward normals point along the frame's (facing 1) or
+/// against it
+/// (-1). Of two as near the triangle that comes first. Where none is that near, `most` becomes the distance
+/// of another, or infinite.
 TANDEM_HD inline Crossing crossing_within(const Body& body, const PatchFrame& frame, const Vector2& at,
-                                          int facing, double target, double lower, double upper, double& most) {
+                                          int facing, double target, double lower, double upper,
+                                          double& most) {
   Crossing best;
   double nearest = INFINITY;
   const FloatVector point = point_in_mesh(body, frame.at(at, target));
   const float slack = slack_near(body, point);
   float reach = static_cast<float>(most) + slack;
-  const LineTest test = {point, in_mesh(body, frame.n), static_cast<float>(lower - target) - slack,
-                         static_cast<float>(upper - target) + slack, slack, &reach};
+  const LineTest test = {point,
+                         in_mesh(body, frame.n),
+                         static_cast<float>(lower - target) - slack,
+                         static_cast<float>(upper - target) + slack,
+                         slack,
+                         &reach};
   const double rounding = 0x1p-48 * body.reach;
   walk_surface(body, test, [&](std::uint32_t t) {
     Vector3 corner[3];
@@ -172,8 +182,8 @@ TANDEM_HD inline Crossing crossing_within(const Body& body, const PatchFrame& fr
     if ((area > 0) != ((facing > 0) != turned) || !(std::fabs(area) > kWall * size)) return;
     Vector2 side[3];
     for (int k = 0; k < 3; ++k) side[k] = Vector2{dot(frame.u, corner[k]), dot(frame.v, corner[k])} - at;
-    // Shares of the corners. What lies on an edge, or beside it by no more than rounding of posed points and a
-    // little of the triangle, belongs to both triangles: no line slips through.
+    // Shares of the corners. What lies on an edge, or beside it by no more than rounding of posed points and
+    // a little of the triangle, belongs to both triangles: no line slips through.
     const double p = cross(side[1], side[2]) / area, q = cross(side[2], side[0]) / area,
                  r = cross(side[0], side[1]) / area;
     const double little = 1e-9 + rounding * std::sqrt(size) / std::fabs(area);
@@ -241,7 +251,8 @@ struct PrismTest {
       return std::fabs(e.x[0]) * h.x[0] + std::fabs(e.x[1]) * h.x[1] + std::fabs(e.x[2]) * h.x[2] + slack;
     };
     const float along = dot(direction, d), reach = extent(direction);
-    if (!(along + reach >= *furthest && along - reach <= most_below && along + reach >= least_below)) return false;
+    if (!(along + reach >= *furthest && along - reach <= most_below && along + reach >= least_below))
+      return false;
     for (int i = 0; i < sides; ++i) {
       if (!(dot(side[i], d) - extent(side[i]) <= offset[i])) return false;
     }
@@ -258,7 +269,8 @@ struct Extreme {
   TANDEM_HD bool found() const { return vertex != kNoIndex; }
 };
 
-/// The highest (upwards 1) or lowest (-1) vertex of a body in a prism. Of several the one of the least number.
+/// The highest (upwards 1) or lowest (-1) vertex of a body in a prism. Of several the one of the least
+/// number.
 TANDEM_HD inline Extreme extreme_vertex(const Body& body, const Prism& prism, int upwards) {
   const PatchFrame& frame = prism.frame;
   Extreme best;

@@ -37,7 +37,8 @@ struct OneThread {
     at += value;
     return before;
   }
-  TANDEM_HD static std::uint32_t compare_and_swap(std::uint32_t& at, std::uint32_t expected, std::uint32_t value) {
+  TANDEM_HD static std::uint32_t compare_and_swap(std::uint32_t& at, std::uint32_t expected,
+                                                  std::uint32_t value) {
     const std::uint32_t before = at;
     if (before == expected) at = value;
     return before;

@@ -62,7 +62,8 @@ bool label_triangles(const LevelView& level, std::uint32_t* labels) {
     }
   }
 
-  for (std::uint32_t t = 0; t < level.triangle_count; ++t) labels[t] = labels[labels[t]];  // lower ones are done
+  for (std::uint32_t t = 0; t < level.triangle_count; ++t)
+    labels[t] = labels[labels[t]];  // lower ones are done
   for (std::uint32_t c = 0; c < level.component_count; ++c) {
     if (!is_closed(level.components[c])) labels[level.components[c].first_triangle] |= kOfOpenComponent;
   }

@@ -39,8 +39,8 @@ Surface surface_of(const FileHeader& header, const LevelView& level) {
   return surface;
 }
 
-// Whether the ray from p crosses the closed components an odd number of times. The stack: each block on the way
-// down leaves three beside it, and the lowest gives four.
+// Whether the ray from p crosses the closed components an odd number of times. The stack: each block on the
+// way down leaves three beside it, and the lowest gives four.
 bool is_inside(const PosedSurface& body, const double* p) {
   const Block* blocks = body.surface->blocks;
   std::uint32_t stack[3 * kMaxDepth + 1];
@@ -165,7 +165,8 @@ Status ContainmentQuery::State::provide_workers(std::uint32_t wanted) {
 }
 
 void ContainmentQuery::State::find(std::uint32_t pair, std::span<const Instance> instances,
-                                   const ObjectPair& bodies, std::span<const Contact> contacts, Found& out) const {
+                                   const ObjectPair& bodies, std::span<const Contact> contacts,
+                                   Found& out) const {
   if (bodies.a == bodies.b) return;
   const PosedSurface body[2] = {{&surfaces[instances[bodies.a].asset], poses[bodies.a]},
                                 {&surfaces[instances[bodies.b].asset], poses[bodies.b]}};
@@ -195,9 +196,10 @@ Status ContainmentQuery::State::gather(std::uint32_t workers) {
       if (!contained.push(row)) return fail(Status::kOutOfMemory, 0);
     }
   }
-  std::sort(contained.data(), contained.data() + contained.size(), [](const Containment& x, const Containment& y) {
-    return std::tie(x.pair, x.inner, x.component) < std::tie(y.pair, y.inner, y.component);
-  });
+  std::sort(contained.data(), contained.data() + contained.size(),
+            [](const Containment& x, const Containment& y) {
+              return std::tie(x.pair, x.inner, x.component) < std::tie(y.pair, y.inner, y.component);
+            });
   return Status::kOk;
 }
 

@@ -69,8 +69,8 @@ class GpuContainments : public test::GpuTest {
     Found found(parted, pairs, contents);
     EXPECT_EQ(found.find(), Status::kOk);
     EXPECT_EQ(rows_of(found.query), expected);
-    EXPECT_LE(found.query.bytes(),
-              most_containment_bytes(found.query.capacity(), parted.scene.assets.size(), triangles_with_labels(parted.scene)));
+    EXPECT_LE(found.query.bytes(), most_containment_bytes(found.query.capacity(), parted.scene.assets.size(),
+                                                          triangles_with_labels(parted.scene)));
     return expected.size();
   }
 };
@@ -140,12 +140,15 @@ TEST_F(GpuContainments, AGraphFindsThemAgain) {
   Found found(scene, pairs, Contents::manifolds);
   ASSERT_EQ(found.find(), Status::kOk);
   const Rows expected = rows_of(found.query);
+  EXPECT_FALSE(expected.empty());
   GpuStream stream;
   ASSERT_EQ(stream.create(), cudaSuccess);
   GpuGraph graph;
-  ASSERT_EQ(graph.capture(stream.get(), [&] { EXPECT_EQ(found.enqueue(stream.get()), Status::kOk); }), cudaSuccess);
+  ASSERT_EQ(graph.capture(stream.get(), [&] { EXPECT_EQ(found.enqueue(stream.get()), Status::kOk); }),
+            cudaSuccess);
   for (int i = 0; i < 3; ++i) {
-    ASSERT_EQ(cudaMemset(const_cast<Containment*>(found.query.contained()), 0xFF, expected.size() * sizeof(Containment)),
+    ASSERT_EQ(cudaMemset(const_cast<Containment*>(found.query.contained()), 0xFF,
+                         expected.size() * sizeof(Containment)),
               cudaSuccess);
     ASSERT_EQ(graph.launch(stream.get()), cudaSuccess);
     ASSERT_EQ(cudaStreamSynchronize(stream.get()), cudaSuccess);
@@ -161,7 +164,8 @@ TEST_F(GpuContainments, OfAQueryThatFailedThereAreNone) {
   GpuContactQuery contacts;
   GpuContainmentQuery query;
   EXPECT_EQ(contacts.set_assets(on_gpu.assets(), nullptr), Status::kOk);
-  EXPECT_EQ(contacts.find_contacts(on_gpu.instances(), on_gpu.pairs(), grouped(), nullptr), Status::kPoseNotRigid);
+  EXPECT_EQ(contacts.find_contacts(on_gpu.instances(), on_gpu.pairs(), grouped(), nullptr),
+            Status::kPoseNotRigid);
   EXPECT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
   EXPECT_EQ(query.find(on_gpu.instances(), on_gpu.pairs(), contacts, nullptr), Status::kPoseNotRigid);
   EXPECT_EQ(query.report().contained, 0u);

@@ -9,8 +9,8 @@
 namespace tandem {
 
 std::ostream& operator<<(std::ostream& out, const Containment& row) {
-  return out << "(pair " << row.pair << ", inner " << row.inner << ", component " << row.component << ", flags "
-             << row.flags << ')';
+  return out << "(pair " << row.pair << ", inner " << row.inner << ", component " << row.component
+             << ", flags " << row.flags << ')';
 }
 
 namespace {
@@ -65,7 +65,8 @@ TEST_F(Containments, AHollowIsOutsideAndAWallIsInside) {
   PartedScene nest;
   nest.add(shell(4, 2));
   nest.add(solid(cube(0.5f)));
-  nest.scene.instances = {{0, at(0, 0, 0)}, {1, at(0, 0, 0)}, {1, at(3, 0, 0)}, {1, at(2, 0, 0)}, {1, at(4, 0, 0)}};
+  nest.scene.instances = {
+      {0, at(0, 0, 0)}, {1, at(0, 0, 0)}, {1, at(3, 0, 0)}, {1, at(2, 0, 0)}, {1, at(4, 0, 0)}};
   EXPECT_EQ(find(nest.scene, {{0, 1}, {0, 2}, {0, 3}, {0, 4}}), (Rows{{1, 1, 0, kInside}}));
 }
 
@@ -91,9 +92,12 @@ TEST_F(Containments, AnOpenBodyIsSaidToBeOpen) {
   nest.add(solid(cube(0.5f)));
   open.add(cube(1));  // a closed part within an open one still encloses
   nest.add(open);
-  nest.scene.instances = {{0, at(0, 0, 0)}, {1, at(0, 0, 0)}, {1, at(2, 2, 2)}, {1, at(9, 0, 0)}, {2, at(0, 0, 0)}};
-  EXPECT_EQ(find(nest.scene, {{0, 1}, {2, 0}, {0, 3}, {4, 1}, {4, 2}}),
-            (Rows{{0, 1, 0, kOuterOpen}, {1, 0, 0, kOuterOpen}, {3, 1, 0, kInside | kOuterOpen}, {4, 1, 0, kOuterOpen}}));
+  nest.scene.instances = {
+      {0, at(0, 0, 0)}, {1, at(0, 0, 0)}, {1, at(2, 2, 2)}, {1, at(9, 0, 0)}, {2, at(0, 0, 0)}};
+  EXPECT_EQ(find(nest.scene, {{0, 1}, {2, 0}, {0, 3}, {4, 1}, {4, 2}}), (Rows{{0, 1, 0, kOuterOpen},
+                                                                              {1, 0, 0, kOuterOpen},
+                                                                              {3, 1, 0, kInside | kOuterOpen},
+                                                                              {4, 1, 0, kOuterOpen}}));
 }
 
 TEST_F(Containments, AreThoseOfBruteForce) {
@@ -134,8 +138,8 @@ TEST_F(Containments, DoNotDependOnTheNumberOfThreads) {
   for (std::uint32_t threads = 2; threads <= 16; ++threads) EXPECT_EQ(find(crowd.scene, pairs, threads), one);
 }
 
-// A cube whose vertices are on a grid, from all points of a finer grid that are not on it: rays along edges, along
-// faces and through vertices.
+// A cube whose vertices are on a grid, from all points of a finer grid that are not on it: rays along edges,
+// along faces and through vertices.
 TEST(RayCrosses, AnOddNumberOfTrianglesFromInside) {
   for (int cells = 1; cells <= 2; ++cells) {
     const Mesh mesh = cube(1, cells);
@@ -160,7 +164,8 @@ TEST(RayCrosses, AnOddNumberOfTrianglesFromInside) {
   }
 }
 
-// Tilted by so little that float64 cannot tell the planes from the points: the ray starts before or behind it.
+// Tilted by so little that float64 cannot tell the planes from the points: the ray starts before or behind
+// it.
 TEST(RayCrosses, WhatIsAheadByOneUnitInTheLastPlace) {
   const double t[3][3] = {{1, -1, -1}, {1, 3, -1}, {1, -1, 3}};
   for (const double factor : {1.0, 1e100, 1e-100, 1e250, 1e-310}) {
@@ -200,7 +205,8 @@ TEST_F(Containments, RefuseWhatQueriesRefuse) {
   EXPECT_EQ(query_.find(nest.scene.instances, pairs, wrong), Status::kUnknownContact);
   EXPECT_EQ(query_.where(), 0u);
 
-  EXPECT_EQ(query_.find(nest.scene.instances, std::vector<ObjectPair>{{0, 1}, {3, 0}}, {}), Status::kUnknownInstance);
+  EXPECT_EQ(query_.find(nest.scene.instances, std::vector<ObjectPair>{{0, 1}, {3, 0}}, {}),
+            Status::kUnknownInstance);
   EXPECT_EQ(query_.where(), 1u);
   auto instances = nest.scene.instances;
   instances[1].asset = 1;

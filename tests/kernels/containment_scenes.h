@@ -23,7 +23,8 @@ struct PartedMesh {
   std::vector<MeshPart> parts;
 
   /// reversed: inside out. open: without its first triangle.
-  void add(const Mesh& part, const std::array<float, 3>& offset = {}, bool reversed = false, bool open = false) {
+  void add(const Mesh& part, const std::array<float, 3>& offset = {}, bool reversed = false,
+           bool open = false) {
     const auto first = static_cast<std::uint32_t>(mesh.triangles.size());
     for (std::size_t t = open ? 1 : 0; t < part.triangles.size(); ++t) {
       std::array<float, 3> p[3];
@@ -73,8 +74,8 @@ inline double solid_angle(const PosedTriangle& t, const std::array<double, 3>& p
   const double volume = d[0][0] * (d[1][1] * d[2][2] - d[1][2] * d[2][1]) -
                         d[0][1] * (d[1][0] * d[2][2] - d[1][2] * d[2][0]) +
                         d[0][2] * (d[1][0] * d[2][1] - d[1][1] * d[2][0]);
-  return 2 * std::atan2(volume, length[0] * length[1] * length[2] + dots[0] * length[2] + dots[1] * length[0] +
-                                    dots[2] * length[1]);
+  return 2 * std::atan2(volume, length[0] * length[1] * length[2] + dots[0] * length[2] +
+                                    dots[1] * length[0] + dots[2] * length[1]);
 }
 
 /// Whether closed parts go round the point an odd number of times, by their solid angle.
@@ -91,7 +92,8 @@ inline bool is_inside(const std::vector<PosedTriangle>& body, const std::vector<
 }
 
 /// What find() has to find: the last vertex of each part says where it is, not the first.
-inline std::vector<Containment> all_contained(const PartedScene& parted, const std::vector<ObjectPair>& pairs) {
+inline std::vector<Containment> all_contained(const PartedScene& parted,
+                                              const std::vector<ObjectPair>& pairs) {
   std::vector<Containment> out;
   const Scene& scene = parted.scene;
   for (std::uint32_t row = 0; row < pairs.size(); ++row) {
@@ -120,9 +122,9 @@ inline std::vector<Containment> all_contained(const PartedScene& parted, const s
         std::uint32_t flags = 0;
         if (is_inside(around, parted.parts_of(other), body[part.first_face + part.face_count - 1][2]))
           flags |= kInside;
-        const Pose own = for_stored_coordinates(
-            scene.instances[instance].pose,
-            scene.assets.views()[scene.instances[instance].asset].header->origin);
+        const Pose own =
+            for_stored_coordinates(scene.instances[instance].pose,
+                                   scene.assets.views()[scene.instances[instance].asset].header->origin);
         const float* v = first.corner[0].position;
         double p[3];
         apply(own, v[0], v[1], v[2], p);
@@ -156,7 +158,8 @@ inline PartedMesh random_parts(RandomPoses& random, bool on_lattice) {
   if (random.below(2) == 0) out.add(solid(half - 1, 1), {}, flip(), open());
   const std::uint64_t more = random.below(3);
   for (std::uint64_t i = 0; i < more; ++i)
-    out.add(solid(0.25f, 1), {half + 1 + static_cast<float>(i), static_cast<float>(i % 2), 0}, flip(), open());
+    out.add(solid(0.25f, 1), {half + 1 + static_cast<float>(i), static_cast<float>(i % 2), 0}, flip(),
+            open());
   return out;
 }
 
@@ -165,7 +168,9 @@ inline PartedScene nest(RandomPoses& random, bool on_lattice, double far = 0) {
   PartedScene out;
   for (int i = 0; i < 3; ++i) {
     PartedMesh mesh = i == 2 ? PartedMesh() : random_parts(random, on_lattice);
-    if (i == 2) mesh.add(on_lattice ? cube(random.below(2) == 0 ? 0.5f : 0.25f, 2) : ball(0.3f), {}, random.below(2) == 0);
+    if (i == 2)
+      mesh.add(on_lattice ? cube(random.below(2) == 0 ? 0.5f : 0.25f, 2) : ball(0.3f), {},
+               random.below(2) == 0);
     out.add(mesh);
   }
   const double away[3] = {far * random.symmetric(1), far * random.symmetric(1), far * random.symmetric(1)};
@@ -181,7 +186,8 @@ inline PartedScene nest(RandomPoses& random, bool on_lattice, double far = 0) {
   return out;
 }
 
-/// Cubes within cubes, and a tetrahedron beside them, under a tree as deep as a file's may be; and small bodies.
+/// Cubes within cubes, and a tetrahedron beside them, under a tree as deep as a file's may be; and small
+/// bodies.
 inline PartedScene deep_nest(RandomPoses& random) {
   PartedMesh deep;
   const int cells[4] = {7, 3, 2, 1};

@@ -23,7 +23,8 @@ TimedContainments find_contained(const Scene& scene, std::span<const ObjectPair>
                    [](const Contact& x, const Contact& y) { return x.pair < y.pair; });
   ContainmentQuery query;
   const Status status = query.set_assets(scene.views());
-  if (status == Status::kNoTopology) throw FileError(scene.description.assets[query.where()] + ": " + explain(status));
+  if (status == Status::kNoTopology)
+    throw FileError(scene.description.assets[query.where()] + ": " + explain(status));
   require(status);
   TimedContainments found;
   for (std::uint32_t i = 0; i < repeats; ++i) {
@@ -36,8 +37,8 @@ TimedContainments find_contained(const Scene& scene, std::span<const ObjectPair>
 }
 
 std::uint64_t count_inside(std::span<const Containment> rows) {
-  return static_cast<std::uint64_t>(
-      std::count_if(rows.begin(), rows.end(), [](const Containment& row) { return (row.flags & kInside) != 0; }));
+  return static_cast<std::uint64_t>(std::count_if(
+      rows.begin(), rows.end(), [](const Containment& row) { return (row.flags & kInside) != 0; }));
 }
 
 }  // namespace tandem::bench

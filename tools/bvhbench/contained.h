@@ -16,8 +16,9 @@ struct TimedContainments {
   Seconds seconds;
 };
 
-/// Finds them on the CPU, `repeats` times. contacts: all of these pairs, in any order. Throws FileError, where an
-/// asset has no topology, std::bad_alloc, or std::runtime_error, where a thread could not be started.
+/// Finds them on the CPU, `repeats` times. contacts: all of these pairs, in any order. Throws FileError,
+/// where an asset has no topology, std::bad_alloc, or std::runtime_error, where a thread could not be
+/// started.
 TimedContainments find_contained(const Scene& scene, std::span<const ObjectPair> pairs,
                                  std::span<const TriangleContact> contacts, std::uint32_t threads,
                                  std::uint32_t repeats);

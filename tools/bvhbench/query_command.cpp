@@ -35,7 +35,7 @@ struct QueryArguments {
 struct Answer {
   QueryRecord record;
   ContactTable table;
-  TimedAnswer timed;  // its contacts are in the table
+  TimedAnswer timed;            // its contacts are in the table
   TimedContainments contained;  // where they were asked for
 };
 
@@ -118,8 +118,8 @@ Answer run_query(const QueryArguments& arguments, const Scene& scene) {
   answer.record.seconds = answer.timed.whole;
   answer.record.counters = engine->counters();
   if (arguments.contained) {
-    answer.contained = find_contained(scene, answer.timed.pairs, answer.timed.contacts, arguments.options.threads,
-                                      arguments.repeats);
+    answer.contained = find_contained(scene, answer.timed.pairs, answer.timed.contacts,
+                                      arguments.options.threads, arguments.repeats);
   }
   answer.table = table_of(scene, answer.timed);
   return answer;
@@ -270,7 +270,8 @@ void check_arguments(const QueryArguments& arguments, const Scene& scene) {
   }
   if (arguments.contained &&
       (arguments.options.mode != QueryMode::exact || arguments.options.first_contact_only)) {
-    throw UsageError("--contained takes all exact contacts, so neither --mode nor --first-contact goes with it");
+    throw UsageError(
+        "--contained takes all exact contacts, so neither --mode nor --first-contact goes with it");
   }
   if (arguments.manifolds && arguments.on_gpu()) {
     throw UsageError("--manifolds is for the backend cpu; on a GPU there are none yet");

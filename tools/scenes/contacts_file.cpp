@@ -71,12 +71,14 @@ void add_manifolds(Hdf5Output& file, const ManifoldTable& table) {
 void add_contained(Hdf5Output& file, const ContainedTable& table) {
   const auto rows = table.rows;
   const auto flag = [&](std::uint32_t wanted) {
-    return numbers(rows, [=](const Containment& x) { return static_cast<std::uint8_t>((x.flags & wanted) != 0); });
+    return numbers(rows,
+                   [=](const Containment& x) { return static_cast<std::uint8_t>((x.flags & wanted) != 0); });
   };
   file.add("/contained/pair", {rows.size()}, numbers(rows, [](const Containment& x) { return x.pair; }));
   file.add("/contained/inner", {rows.size()},
            numbers(rows, [](const Containment& x) { return static_cast<std::uint8_t>(x.inner); }));
-  file.add("/contained/component", {rows.size()}, numbers(rows, [](const Containment& x) { return x.component; }));
+  file.add("/contained/component", {rows.size()},
+           numbers(rows, [](const Containment& x) { return x.component; }));
   file.add("/contained/inside", {rows.size()}, flag(kInside));
   file.add("/contained/open", {rows.size()}, flag(kOuterOpen));
   file.attribute("best_contained_seconds", best_of(table.seconds));

@@ -60,7 +60,8 @@ struct ContainedTable {
   Seconds seconds;  ///< of each repeat, at least one
 };
 
-/// Writes a contacts file (docs/scenes.md), whole or not at all. manifolds, contained: or null. Throws OutputError.
+/// Writes a contacts file (docs/scenes.md), whole or not at all. manifolds, contained: or null. Throws
+/// OutputError.
 void write_contacts(const std::string& path, const ContactTable& table, const QueryRecord& record,
                     const ManifoldTable* manifolds = nullptr, const ContainedTable* contained = nullptr);
 

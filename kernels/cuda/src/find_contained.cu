@@ -1,9 +1,9 @@
 #include "containment_data.h"
-#include "pair_record.h"
 #include "tandem/kernels/detail/containment_rule.h"
 
-// Bodies within bodies. A warp looks at 32 pairs, one a lane; those that may have something to report, which are
-// few, it goes through with all its lanes. Compiled without fused operations: posed points are those of the CPU.
+// Bodies within bodies. A warp looks at 32 pairs, one a lane; those that may have something to report, which
+// are few, it goes through with all its lanes. Compiled without fused operations: posed points are those of
+// the CPU.
 namespace tandem::gpu {
 namespace {
 
@@ -14,16 +14,17 @@ constexpr std::uint32_t kThreads = 128, kWarps = kThreads / 32;
 // A warp looks at so many blocks at a time, four lanes a block.
 constexpr std::uint32_t kBlocksAtOnce = 32 / kNodesPerBlock;
 
-/// The blocks that wait. They lie in ascending order of depth: the last kBlocksAtOnce at most are taken, all at
-/// least as deep as the rest, and their children put there in the same order. So when blocks of a depth are put
-/// there, none of that depth or deeper was left, and there are never more of them than the children of those taken
-/// at once: 32 of each depth from 2 to kMaxDepth.
+/// The blocks that wait. They lie in ascending order of depth: the last kBlocksAtOnce at most are taken, all
+/// at least as deep as the rest, and their children put there in the same order. So when blocks of a depth
+/// are put there, none of that depth or deeper was left, and there are never more of them than the children
+/// of those taken at once: 32 of each depth from 2 to kMaxDepth.
 constexpr std::uint32_t kStackSize = 32 * (kMaxDepth - 1);
 static_assert(kStackSize * 4 * kWarps <= 48 * 1024);
 
 /// Whether the ray from p crosses the closed components an odd number of times. By a warp.
 template <typename AnyBlock>
-__device__ bool is_inside(const PosedSurface& body, const AnyBlock* blocks, const double* p, std::uint32_t* stack) {
+__device__ bool is_inside(const PosedSurface& body, const AnyBlock* blocks, const double* p,
+                          std::uint32_t* stack) {
   const int node = static_cast<int>(lane_id() % kNodesPerBlock);
   const std::uint32_t slot = lane_id() / kNodesPerBlock;
   std::uint32_t waiting = 1, crossings = 0;
@@ -53,8 +54,8 @@ __device__ bool is_inside(const PosedSurface& body, const AnyBlock* blocks, cons
 }
 
 /// Whether a contact among those from `first` to `end` is of a component. By a warp.
-__device__ bool touches(const ContainmentArgs& args, std::uint32_t first, std::uint32_t end, std::uint32_t inner,
-                        const std::uint32_t* labels, std::uint32_t component) {
+__device__ bool touches(const ContainmentArgs& args, std::uint32_t first, std::uint32_t end,
+                        std::uint32_t inner, const std::uint32_t* labels, std::uint32_t component) {
   for (std::uint32_t i = first; i < end; i += 32) {
     bool of_it = false;
     if (i + lane_id() < end) {
@@ -82,7 +83,8 @@ __device__ bool is_worth_a_look(const ContainmentArgs& args, std::uint32_t index
 }
 
 /// Result: how many rows the pair has. By a warp.
-__device__ std::uint32_t find_in_pair(const ContainmentArgs& args, std::uint32_t index, std::uint32_t* stack) {
+__device__ std::uint32_t find_in_pair(const ContainmentArgs& args, std::uint32_t index,
+                                      std::uint32_t* stack) {
   const ObjectPair pair = args.pairs.pairs[index];
   const std::uint32_t first = args.groups.first_contact[index], end = args.groups.first_contact[index + 1];
   std::uint32_t rows = 0;
@@ -101,7 +103,7 @@ __device__ std::uint32_t find_in_pair(const ContainmentArgs& args, std::uint32_t
         },
         [&](std::uint32_t component, std::uint32_t flags) {
           if (lane_id() == 0) {
-            const std::uint32_t place = atomicAdd(&args.state->found, 1u);
+            const Counter place = atomicAdd(&args.state->found, Counter{1});
             if (place < args.capacity.contained) args.found[place] = {{index, inner, component, flags}, rows};
           }
           ++rows;
@@ -147,7 +149,7 @@ __device__ std::uint32_t rows_before(const ContainmentArgs& args, std::uint32_t 
 }
 
 __global__ void __launch_bounds__(kThreads) place(const __grid_constant__ ContainmentArgs args) {
-  const std::uint32_t found = args.state->found;
+  const Counter found = args.state->found;
   const bool complete = has_query(args) && found <= args.capacity.contained;
   const std::uint32_t warp = (blockIdx.x * kThreads + threadIdx.x) / 32;
   for (std::uint32_t i = warp; complete && i < found; i += gridDim.x * kWarps) {
@@ -156,8 +158,11 @@ __global__ void __launch_bounds__(kThreads) place(const __grid_constant__ Contai
     if (lane_id() == 0) args.contained[before + one.rank] = one.row;
   }
   if (blockIdx.x != 0 || threadIdx.x != 0) return;
-  const GpuContainmentReport report = {args.query->status, complete ? 1u : 0u, {*args.pairs.count, found},
-                                       complete ? found : 0};
+  GpuContainmentReport report = {};
+  report.status = args.query->status;
+  report.complete = complete ? 1 : 0;
+  report.needed = {*args.pairs.count, static_cast<std::uint32_t>(found < kNoIndex ? found : kNoIndex)};
+  report.contained = complete ? static_cast<std::uint32_t>(found) : 0;
   args.state->report = report;
   *args.host_report = report;
 }

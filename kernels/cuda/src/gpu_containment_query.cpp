@@ -67,9 +67,11 @@ Status GpuContainmentQuery::State::make_surface(const GpuAsset& asset, std::uint
   Buffer<SurfaceComponent> components;
   if (!topology.resize(level.triangle_count) || !components.resize(level.component_count))
     return Status::kOutOfMemory;
-  Status status = keep(download<TriangleTopology>(level.topology, {topology.data(), topology.size()}, stream));
+  Status status =
+      keep(download<TriangleTopology>(level.topology, {topology.data(), topology.size()}, stream));
   if (status == Status::kOk)
-    status = keep(download<SurfaceComponent>(level.components, {components.data(), components.size()}, stream));
+    status =
+        keep(download<SurfaceComponent>(level.components, {components.data(), components.size()}, stream));
   if (status != Status::kOk) return status;
   level.topology = topology.data(), level.components = components.data();
   for (const SurfaceComponent& component : components.view())
@@ -133,10 +135,10 @@ Status GpuContainmentQuery::reserve(const GpuContainmentCapacity& capacity) {
 Status GpuContainmentQuery::enqueue(const GpuInstances& instances, const GpuPairs& pairs,
                                     const GpuContactQuery& query, cudaStream_t stream) {
   const State& s = *state_;
-  const gpu::ContainmentArgs args = {s.surfaces.data(),      instances,         pairs,           query.groups(),
-                                     query.device_report(),  s.capacity,        s.state.data(),  s.report.data(),
-                                     s.rows_of_pair.data(),  s.sums.data(),     s.found.data(),  s.contained.data(),
-                                     s.limits};
+  const gpu::ContainmentArgs args = {
+      s.surfaces.data(), instances,          pairs,           query.groups(),        query.device_report(),
+      s.capacity,        s.state.data(),     s.report.data(), s.rows_of_pair.data(), s.sums.data(),
+      s.found.data(),    s.contained.data(), s.limits};
   return state_->keep(gpu::find_contained(args, stream));
 }
 

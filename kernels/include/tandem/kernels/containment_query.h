@@ -26,8 +26,8 @@ struct Containment {
 };
 
 /// Finds what lies within another body of an object pair without touching it, which no contact tells, on the
-/// CPU. Decides exactly, on the posed vertices. Keeps its memory from call to call. Throws nothing. Movable, not
-/// copyable; one call at a time, several objects side by side.
+/// CPU. Decides exactly, on the posed vertices. Keeps its memory from call to call. Throws nothing. Movable,
+/// not copyable; one call at a time, several objects side by side.
 class ContainmentQuery {
  public:
   ContainmentQuery();
@@ -36,19 +36,20 @@ class ContainmentQuery {
   ~ContainmentQuery();
 
   /// Names the assets that instances refer to, the list given to the contact query. What the views point to
-  /// must outlive the calls. Result: kOk; kUnknownAsset, where a view points to nothing; kNoTopology, where its
-  /// file has none; where() is its place in the list; or kOutOfMemory. After an error there are no assets.
+  /// must outlive the calls. Result: kOk; kUnknownAsset, where a view points to nothing; kNoTopology, where
+  /// its file has none; where() is its place in the list; or kOutOfMemory. After an error there are no
+  /// assets.
   Status set_assets(std::span<const AssetView> assets);
 
   /// Finds the components of either body of each pair that have no contact with the other body, and have the
   /// flag kInside; or, where the other body has components that are not closed, lie in its world box: their
-  /// first vertex does. A pair of an instance with itself has none. contacts: all of these pairs, in mode exact
-  /// and by ascending pair, as ContactQuery has them; where no body has two components, the first contact of
-  /// each pair will do. threads: with the caller's, kMostQueryThreads at most; results don't depend on it.
-  /// Result: kOk; kUnknownAsset, kPoseNotRigid or kOutOfRange, where where() is the instance; kUnknownInstance,
-  /// where it is the pair; kUnknownContact, where it is the contact: it names a pair or a triangle that does
-  /// not exist, or comes behind one of a later pair; kTooManyInstances, kTooManyPairs, kOutOfMemory or
-  /// kCannotStartThread. After an error nothing is contained.
+  /// first vertex does. A pair of an instance with itself has none. contacts: all of these pairs, in mode
+  /// exact and by ascending pair, as ContactQuery has them; where no body has two components, the first
+  /// contact of each pair will do. threads: with the caller's, kMostQueryThreads at most; results don't
+  /// depend on it. Result: kOk; kUnknownAsset, kPoseNotRigid or kOutOfRange, where where() is the instance;
+  /// kUnknownInstance, where it is the pair; kUnknownContact, where it is the contact: it names a pair or a
+  /// triangle that does not exist, or comes behind one of a later pair; kTooManyInstances, kTooManyPairs,
+  /// kOutOfMemory or kCannotStartThread. After an error nothing is contained.
   Status find(std::span<const Instance> instances, std::span<const ObjectPair> pairs,
               std::span<const Contact> contacts, std::uint32_t threads = 1);
 

@@ -18,8 +18,8 @@ struct GpuContainmentCapacity {
   std::uint32_t contained = 0;  ///< components that lie within the other body
 };
 
-/// GPU memory that an object with room for so much holds at most. triangles: of all assets that have more than one
-/// component, together.
+/// GPU memory that an object with room for so much holds at most. triangles: of all assets that have more
+/// than one component, together.
 constexpr std::size_t most_containment_bytes(const GpuContainmentCapacity& capacity, std::size_t assets,
                                              std::size_t triangles) {
   constexpr std::size_t kFixed = 4096;
@@ -29,15 +29,16 @@ constexpr std::size_t most_containment_bytes(const GpuContainmentCapacity& capac
 
 /// The outcome of a call.
 struct GpuContainmentReport {
-  Status status;                  ///< that of the contact query
-  std::uint32_t complete;         ///< 0 where something did not fit, or the contact query was not complete; then nothing is contained
+  Status status;           ///< that of the contact query
+  std::uint32_t complete;  ///< 0 where something did not fit, or the contact query was not complete; then
+                           ///< nothing is contained
   GpuContainmentCapacity needed;  ///< `contained` is exact where there was room for all pairs
   std::uint32_t contained;
 };
 
-/// Finds what lies within another body of an object pair without touching it, on the GPU: what ContainmentQuery
-/// finds, in its order. enqueue() neither waits for the GPU nor allocates. Throws nothing. Movable, not copyable.
-/// An object runs one call at a time.
+/// Finds what lies within another body of an object pair without touching it, on the GPU: what
+/// ContainmentQuery finds, in its order. enqueue() neither waits for the GPU nor allocates. Throws nothing.
+/// Movable, not copyable. An object runs one call at a time.
 class GpuContainmentQuery {
  public:
   GpuContainmentQuery();
@@ -45,27 +46,27 @@ class GpuContainmentQuery {
   GpuContainmentQuery& operator=(GpuContainmentQuery&&) noexcept;
   ~GpuContainmentQuery();  ///< waits for the device
 
-  /// Names the assets that instances refer to, the list given to the contact query, on the current device, after
-  /// what `stream` holds, and waits for it. Of assets with more than one component it takes the topology back to
-  /// the CPU once. Result: kOk; kNoTopology, where an asset was uploaded without; or kOutOfGpuMemory,
-  /// kOutOfMemory, kNoGpu, kDriverTooOld, kGpuNotSupported, kCudaFailed.
+  /// Names the assets that instances refer to, the list given to the contact query, on the current device,
+  /// after what `stream` holds, and waits for it. Of assets with more than one component it takes the
+  /// topology back to the CPU once. Result: kOk; kNoTopology, where an asset was uploaded without; or
+  /// kOutOfGpuMemory, kOutOfMemory, kNoGpu, kDriverTooOld, kGpuNotSupported, kCudaFailed.
   Status set_assets(std::span<const GpuAsset> assets, cudaStream_t stream);
 
   /// Makes room for at least so much, waiting for the device where it grows. Result: kOk, kOutOfGpuMemory,
   /// kCudaFailed. Condition: set_assets().
   Status reserve(const GpuContainmentCapacity& capacity);
 
-  /// Queues the search behind what `stream` holds, the contact query among it; it may be captured into a graph.
-  /// The arrays must stay until it is done. instances, pairs: those of the contact query, which groups its
-  /// contacts, in mode exact; where no body has two components, the first contact of each pair will do. Result:
-  /// kOk, kCudaFailed, or kOutOfGpuMemory, where CUDA loads a kernel at its first launch; what the GPU finds is
-  /// in the report. Condition: set_assets() and reserve().
+  /// Queues the search behind what `stream` holds, the contact query among it; it may be captured into a
+  /// graph. The arrays must stay until it is done. instances, pairs: those of the contact query, which groups
+  /// its contacts, in mode exact; where no body has two components, the first contact of each pair will do.
+  /// Result: kOk, kCudaFailed, or kOutOfGpuMemory, where CUDA loads a kernel at its first launch; what the
+  /// GPU finds is in the report. Condition: set_assets() and reserve().
   Status enqueue(const GpuInstances& instances, const GpuPairs& pairs, const GpuContactQuery& query,
                  cudaStream_t stream);
 
-  /// Searches behind a contact query that has ended and is complete, and waits for it; where room was too small,
-  /// makes room and starts again. Result: that of the report, or of a call that failed; kOutOfRange where the
-  /// contact query was not complete.
+  /// Searches behind a contact query that has ended and is complete, and waits for it; where room was too
+  /// small, makes room and starts again. Result: that of the report, or of a call that failed; kOutOfRange
+  /// where the contact query was not complete.
   Status find(const GpuInstances& instances, const GpuPairs& pairs, const GpuContactQuery& query,
               cudaStream_t stream);
 

@@ -13,7 +13,8 @@ TANDEM_HD inline bool contains(const WorldBox& box, const double* p) {
 
 /// Whether a body may have a component to report, at a look: find_contained() reports none otherwise.
 /// has_contacts: the bodies have contacts; so the component does, where there is one.
-TANDEM_HD inline bool may_have_contained(const PosedSurface& inner, const PosedSurface& outer, bool has_contacts) {
+TANDEM_HD inline bool may_have_contained(const PosedSurface& inner, const PosedSurface& outer,
+                                         bool has_contacts) {
   if (inner.surface->component_count != 1) return true;
   if (has_contacts) return false;
   double point[3];

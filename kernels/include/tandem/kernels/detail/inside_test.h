@@ -6,14 +6,14 @@
 #include "tandem/kernels/detail/oriented_world_box.h"
 #include "tandem/kernels/world_box.h"
 
-/// Whether a point lies inside a closed posed surface, decided exactly: it does where a ray from it crosses the
-/// surface an odd number of times. The ray from p goes along the x axis of the world.
+/// Whether a point lies inside a closed posed surface, decided exactly: it does where a ray from it crosses
+/// the surface an odd number of times. The ray from p goes along the x axis of the world.
 ///
 /// **What crosses.** Let p' = p + (0, d, e) with infinitesimals d > 0 and e > 0, e infinitely smaller than d,
-/// and look along x. An edge is no more than a point at height z of p', or passes that height at a y that is a
-/// number plus a multiple of e; so p' lies on no edge. The ray from p' therefore crosses a triangle within its
-/// interior or not at all, and a closed surface, each edge of which has an even number of sides, an odd number
-/// of times exactly where p' is inside. p' and p are on the same side if p is not on the surface. What
+/// and look along x. An edge is no more than a point at height z of p', or passes that height at a y that is
+/// a number plus a multiple of e; so p' lies on no edge. The ray from p' therefore crosses a triangle within
+/// its interior or not at all, and a closed surface, each edge of which has an even number of sides, an odd
+/// number of times exactly where p' is inside. p' and p are on the same side if p is not on the surface. What
 /// follows decides for p' and looks at p alone:
 ///
 ///     a corner is above p'               <=>  its z > p.z
@@ -21,13 +21,13 @@
 ///       to the right of p'                    as 0 means that the edge is at p.y, plus a multiple of e
 ///     a triangle has p' in its interior  <=>  one of its two edges with one end above is to the right
 ///
-/// Then it is not seen on edge, its plane passes p' at one x, and that is beyond p.x iff volume(triangle, p) has
-/// the sign opposite to that of the normal's x: positive where the edge to the right runs upwards, as y, z
-/// and x are right-handed. The volume is 0 only where p is on the triangle.
+/// Then it is not seen on edge, its plane passes p' at one x, and that is beyond p.x iff volume(triangle, p)
+/// has the sign opposite to that of the normal's x: positive where the edge to the right runs upwards, as y,
+/// z and x are right-handed. The volume is 0 only where p is on the triangle.
 namespace tandem::containment {
 
-/// Whether the ray may cross a triangle all of whose corners lie in this box: else all are above or none is, all
-/// edges that pass the height are to the right or none is, or all that is crossed lies behind p.
+/// Whether the ray may cross a triangle all of whose corners lie in this box: else all are above or none is,
+/// all edges that pass the height are to the right or none is, or all that is crossed lies behind p.
 TANDEM_HD inline bool ray_may_cross(const WorldBox& box, const double* p) {
   return box.hi[0] > p[0] && box.lo[1] <= p[1] && box.hi[1] > p[1] && box.lo[2] <= p[2] && box.hi[2] > p[2];
 }
@@ -110,7 +110,8 @@ TANDEM_HD inline std::uint32_t below(const OrientedBlock& block, int node) {
 
 /// Whether the ray may cross something below the node.
 template <typename AnyBlock>
-TANDEM_HD inline bool ray_may_cross(const PosedSurface& body, const AnyBlock& block, int node, const double* p) {
+TANDEM_HD inline bool ray_may_cross(const PosedSurface& body, const AnyBlock& block, int node,
+                                    const double* p) {
   return is_real(block, node) && ray_may_cross(node_box(body, block, node), p);
 }
 

@@ -24,7 +24,7 @@ Rows rows_of(const GpuContainmentQuery& query) {
 }
 
 Rows rows_of_cpu(const PartedScene& parted, const std::vector<ObjectPair>& pairs) {
-  const Scene& scene = parted.scene;
+  const test::Scene& scene = parted.scene;
   ContactQuery contacts;
   ContainmentQuery query;
   EXPECT_EQ(contacts.set_assets(scene.assets.views()), Status::kOk);
@@ -140,6 +140,7 @@ TEST_F(GpuContainments, AGraphFindsThemAgain) {
   Found found(scene, pairs, Contents::manifolds);
   ASSERT_EQ(found.find(), Status::kOk);
   const Rows expected = rows_of(found.query);
+  EXPECT_FALSE(expected.empty());
   GpuStream stream;
   ASSERT_EQ(stream.create(), cudaSuccess);
   GpuGraph graph;

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "launch.h"
+#include "pair_record.h"
 #include "tandem/kernels/detail/inside_test.h"
 #include "tandem/kernels/gpu_containment_query.h"
 
@@ -18,7 +19,7 @@ struct FoundContainment {
 
 struct ContainmentState {
   std::uint32_t next_pair;  ///< that no warp has taken
-  std::uint32_t found;      ///< rows, those without room too
+  Counter found;            ///< rows, those without room too
   GpuContainmentReport report;
 };
 

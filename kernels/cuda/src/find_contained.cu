@@ -1,5 +1,4 @@
 #include "containment_data.h"
-#include "pair_record.h"
 #include "tandem/kernels/detail/containment_rule.h"
 
 // Bodies within bodies. A warp looks at 32 pairs, one a lane; those that may have something to report, which
@@ -104,7 +103,7 @@ __device__ std::uint32_t find_in_pair(const ContainmentArgs& args, std::uint32_t
         },
         [&](std::uint32_t component, std::uint32_t flags) {
           if (lane_id() == 0) {
-            const std::uint32_t place = atomicAdd(&args.state->found, 1u);
+            const Counter place = atomicAdd(&args.state->found, Counter{1});
             if (place < args.capacity.contained) args.found[place] = {{index, inner, component, flags}, rows};
           }
           ++rows;
@@ -150,7 +149,7 @@ __device__ std::uint32_t rows_before(const ContainmentArgs& args, std::uint32_t 
 }
 
 __global__ void __launch_bounds__(kThreads) place(const __grid_constant__ ContainmentArgs args) {
-  const std::uint32_t found = args.state->found;
+  const Counter found = args.state->found;
   const bool complete = has_query(args) && found <= args.capacity.contained;
   const std::uint32_t warp = (blockIdx.x * kThreads + threadIdx.x) / 32;
   for (std::uint32_t i = warp; complete && i < found; i += gridDim.x * kWarps) {
@@ -159,8 +158,11 @@ __global__ void __launch_bounds__(kThreads) place(const __grid_constant__ Contai
     if (lane_id() == 0) args.contained[before + one.rank] = one.row;
   }
   if (blockIdx.x != 0 || threadIdx.x != 0) return;
-  const GpuContainmentReport report = {
-      args.query->status, complete ? 1u : 0u, {*args.pairs.count, found}, complete ? found : 0};
+  GpuContainmentReport report = {};
+  report.status = args.query->status;
+  report.complete = complete ? 1 : 0;
+  report.needed = {*args.pairs.count, static_cast<std::uint32_t>(found < kNoIndex ? found : kNoIndex)};
+  report.contained = complete ? static_cast<std::uint32_t>(found) : 0;
   args.state->report = report;
   *args.host_report = report;
 }

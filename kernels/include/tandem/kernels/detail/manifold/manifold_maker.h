@@ -46,6 +46,7 @@ class ManifoldMaker {
 
   TANDEM_HD void place_soundings(const RimFinder<Team>& finder, const Rim& rim, const PatchFrame& frame,
                                  bool touch);
+  TANDEM_HD void walk_lines(LineQuestions& questions, std::uint32_t count);
   TANDEM_HD void sound(const PatchFrame& frame, int first, int count);
   TANDEM_HD void sound_deepest(const PatchFrame& frame, const Rim& rim, std::uint32_t curve);
   TANDEM_HD Extreme extreme_corner(const PatchFrame& frame, std::uint32_t begin, std::uint32_t end,
@@ -100,13 +101,38 @@ TANDEM_HD void ManifoldMaker<Team>::place_soundings(const RimFinder<Team>& finde
   team_.sync();
 }
 
+/// Answers the first `count` line questions; those of no side were not asked. By the crew.
+template <typename Team>
+TANDEM_HD void ManifoldMaker<Team>::walk_lines(LineQuestions& questions, std::uint32_t count) {
+  WalkMemory& walk = shared_.walk;
+  for (bool further = false;; further = true) {
+    if (team_.rank() == 0) team_.store(walk.count, 0);
+    team_.crew_sync();
+    for (std::uint32_t i = team_.rank(); i < count; i += team_.crew_size()) {
+      if (shared_.line[i].side < 0 || (further && !questions.look_further(i))) continue;
+      walk.waiting[team_.add(walk.count, 1)] = std::uint64_t{i} << 32;
+    }
+    team_.crew_sync();
+    if (team_.load(walk.count) == 0) return;
+    walk_surfaces(team_, walk, questions);
+    if (further) return;
+  }
+}
+
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::sound(const PatchFrame& frame, int first, int count) {
-  for (std::uint32_t i = team_.rank(); i < 2 * static_cast<std::uint32_t>(count); i += team_.size()) {
-    Sounding& s = shared_.sounding[first + static_cast<int>(i / 2)];
-    const int side = static_cast<int>(i % 2);
-    s.surface[side] =
-        nearest_crossing(bodies_[side], frame, s.line, side == 0 ? 1 : -1, s.target[side], extent_ / 4);
+  LineQuestions questions(bodies_, frame, shared_.line);
+  const auto asked = 2 * static_cast<std::uint32_t>(count);
+  if (team_.in_crew()) {
+    for (std::uint32_t i = team_.rank(); i < asked; i += team_.crew_size()) {
+      const Sounding& s = shared_.sounding[first + static_cast<int>(i / 2)];
+      const int side = static_cast<int>(i % 2);
+      questions.ask(i, side, side == 0 ? 1 : -1, s.line, s.target[side], -INFINITY, INFINITY, extent_ / 4);
+    }
+    team_.crew_sync();
+    walk_lines(questions, asked);
+    for (std::uint32_t i = team_.rank(); i < asked; i += team_.crew_size())
+      shared_.sounding[first + static_cast<int>(i / 2)].surface[i % 2] = shared_.line[i].best;
   }
   team_.sync();
 }
@@ -117,19 +143,23 @@ template <typename Team>
 TANDEM_HD Extreme ManifoldMaker<Team>::extreme_corner(const PatchFrame& frame, std::uint32_t begin,
                                                       std::uint32_t end, int side) const {
   Extreme best;
-  double furthest = -INFINITY;
-  for (std::uint32_t i = begin; i < end; ++i) {
+  const auto question = static_cast<std::uint32_t>(side);
+  for (std::uint32_t i = begin + team_.rank(); i < end; i += team_.size()) {
     const std::uint32_t t = memory_.pieces[memory_.order[i]].triangle[side];
     for (int k = 0; k < 3; ++k) {
       const Vector3 x = bodies_[side].corner(t, k);
-      const double height = frame.height(x), along = side == 0 ? height : -height;
-      const std::uint32_t vertex = bodies_[side].shape->topology[t].vertex[k];
-      if (along < furthest || (along == furthest && vertex >= best.vertex)) continue;
-      furthest = along;
-      best = {frame.flat(x), height, vertex};
+      const Extreme here = {frame.flat(x), frame.height(x), bodies_[side].shape->topology[t].vertex[k]};
+      if (ExtremeQuestions::is_further(question, here, best)) best = here;
     }
   }
-  return best;
+  const double along = !best.found() ? -INFINITY : side == 0 ? best.height : -best.height;
+  const double furthest = team_.greatest(along);
+  const std::uint32_t vertex = team_.least(along == furthest ? best.vertex : kNoIndex);
+  const bool mine = best.vertex == vertex;
+  // A vertex is posed to the same bits from each of its triangles.
+  return {{team_.greatest(mine ? best.at.x : -INFINITY), team_.greatest(mine ? best.at.y : -INFINITY)},
+          side == 0 ? furthest : -furthest,
+          vertex};
 }
 
 /// Sounds where a's highest vertex in the patch is, and b's lowest: there, or in the middle, the overlap is
@@ -158,13 +188,22 @@ TANDEM_HD void ManifoldMaker<Team>::sound_deepest(const PatchFrame& frame, const
     lowest = std::fmin(lowest, s.surface[1].height), highest = std::fmax(highest, s.surface[0].height);
   }
   prism.lower = lowest - extent_, prism.upper = highest + extent_;
-  for (std::uint32_t side = team_.rank(); side < 2; side += team_.size()) {
-    shared_.extreme[side] = extreme_vertex(bodies_[static_cast<int>(side)], prism, side == 0 ? 1 : -1);
+  if (team_.in_crew()) {
+    ExtremeQuestions questions(bodies_, prism, shared_.prism_test, shared_.extreme);
+    WalkMemory& walk = shared_.walk;
+    for (std::uint32_t side = team_.rank(); side < 2; side += team_.crew_size()) {
+      questions.ask(side);
+      walk.waiting[side] = std::uint64_t{side} << 32;
+    }
+    if (team_.rank() == 0) team_.store(walk.count, 2);
+    team_.crew_sync();
+    walk_surfaces(team_, walk, questions);
   }
   const std::uint32_t begin = memory_.start[curve], end = memory_.start[curve + 1];
   const bool few = end - begin <= kFewPieces;
-  for (std::uint32_t side = team_.rank(); few && side < 2; side += team_.size()) {
-    shared_.extreme[2 + side] = extreme_corner(frame, begin, end, static_cast<int>(side));
+  for (int side = 0; few && side < 2; ++side) {
+    const Extreme corner = extreme_corner(frame, begin, end, side);
+    if (team_.rank() == 0) shared_.extreme[2 + side] = corner;
   }
   team_.sync();
   const int first = soundings_;
@@ -196,15 +235,24 @@ TANDEM_HD void ManifoldMaker<Team>::sound_deepest(const PatchFrame& frame, const
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::look_behind(const PatchFrame& frame) {
   const bool several = summary_.curves > 1;
-  for (std::uint32_t i = team_.rank(); i < 2 * static_cast<std::uint32_t>(soundings_); i += team_.size()) {
-    Sounding& s = shared_.sounding[i / 2];
-    if (!(s.overlap() > (several ? 0 : extent_ / 2))) continue;
-    const int side = static_cast<int>(i % 2);
-    if (side == 0) s.looked_behind = true;
-    if (side == s.vertex_of) continue;
-    double most = INFINITY;
-    s.behind[side] = crossing_within(bodies_[side], frame, s.line, side == 0 ? -1 : 1, s.surface[side].height,
-                                     s.surface[1].height, s.surface[0].height, most);
+  LineQuestions questions(bodies_, frame, shared_.line);
+  const auto asked = 2 * static_cast<std::uint32_t>(soundings_);
+  if (team_.in_crew()) {
+    for (std::uint32_t i = team_.rank(); i < asked; i += team_.crew_size()) {
+      Sounding& s = shared_.sounding[i / 2];
+      const int side = static_cast<int>(i % 2);
+      const bool wanted = s.overlap() > (several ? 0 : extent_ / 2);
+      if (wanted && side == 0) s.looked_behind = true;
+      shared_.line[i].side = -1;
+      if (!wanted || side == s.vertex_of) continue;
+      questions.ask(i, side, side == 0 ? -1 : 1, s.line, s.surface[side].height, s.surface[1].height,
+                    s.surface[0].height, INFINITY);
+    }
+    team_.crew_sync();
+    walk_lines(questions, asked);
+    for (std::uint32_t i = team_.rank(); i < asked; i += team_.crew_size()) {
+      if (shared_.line[i].side >= 0) shared_.sounding[i / 2].behind[i % 2] = shared_.line[i].best;
+    }
   }
   team_.sync();
 }

@@ -90,6 +90,9 @@ inline constexpr int kMostSoundings = static_cast<int>(kMostManifoldPoints) + 5;
 struct PatchMemory {
   Sounding sounding[kMostSoundings];
   Extreme extreme[4];
+  LineQuestion line[2 * kMostSoundings];
+  PrismTest prism_test[2];
+  WalkMemory walk;
   std::uint32_t next;
 };
 

@@ -54,8 +54,8 @@ struct alignas(64) Worker {
         !words.resize((3 + PieceMemory::kTableWords) * contacts + 1))
       return false;
     std::uint32_t* const word = words.data();
-    memory = {pieces.data(),       normals.data(),       word, word + contacts, word + 2 * contacts,
-              word + 3 * contacts + 1};
+    memory = {pieces.data(),   normals.data(),      word,
+              word + contacts, word + 2 * contacts, word + 3 * contacts + 1};
     return true;
   }
 };
@@ -87,8 +87,9 @@ struct ContactManifolds::State {
                std::span<const Contact> contacts);
   Status group(std::size_t pairs, std::span<const Contact>& contacts);
   Status provide_workers(std::uint32_t wanted);
-  void make_patches(std::size_t from, std::size_t to, std::uint32_t worker, std::span<const Instance> instances,
-                    std::span<const ObjectPair> pairs, std::span<const Contact> contacts, int most_points);
+  void make_patches(std::size_t from, std::size_t to, std::uint32_t worker,
+                    std::span<const Instance> instances, std::span<const ObjectPair> pairs,
+                    std::span<const Contact> contacts, int most_points);
   Status place_rows();
   void finish(Row& row, std::span<const Instance> instances, const ObjectPair& pair, bool match);
   Status remember_step(std::span<const ObjectPair> pairs);
@@ -172,7 +173,8 @@ Status ContactManifolds::State::provide_workers(std::uint32_t wanted) {
 }
 
 void ContactManifolds::State::make_patches(std::size_t from, std::size_t to, std::uint32_t worker,
-                                           std::span<const Instance> instances, std::span<const ObjectPair> pairs,
+                                           std::span<const Instance> instances,
+                                           std::span<const ObjectPair> pairs,
                                            std::span<const Contact> contacts, int most_points) {
   Worker& own = workers[worker];
   const OneThread team;
@@ -337,13 +339,12 @@ Status ContactManifolds::make(std::span<const Instance> instances, std::span<con
     state.counters.ambiguous_touches += state.workers[i].ambiguous_touches;
   }
   if ((status = state.place_rows()) != Status::kOk) return failed(status);
-  state.threads.for_parts(workers, state.rows.size(), kPairsAtOnce,
-                          [&](std::size_t from, std::size_t to, std::uint32_t) {
-                            for (std::size_t i = from; i < to; ++i) {
-                              state.finish(state.rows[i], instances, pairs[state.rows[i].pair],
-                                           options.match_previous);
-                            }
-                          });
+  state.threads.for_parts(
+      workers, state.rows.size(), kPairsAtOnce, [&](std::size_t from, std::size_t to, std::uint32_t) {
+        for (std::size_t i = from; i < to; ++i) {
+          state.finish(state.rows[i], instances, pairs[state.rows[i].pair], options.match_previous);
+        }
+      });
   state.counters.contacts = contacts.size();
   state.counters.manifolds = state.manifolds.size();
   state.counters.points = state.points.size();

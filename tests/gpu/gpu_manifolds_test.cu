@@ -41,21 +41,22 @@ void explain_difference(const Result& cpu, const Result& gpu) {
   for (std::size_t i = 0; i < std::min(cpu.manifolds.size(), gpu.manifolds.size()); ++i) {
     const Manifold &x = cpu.manifolds[i], &y = gpu.manifolds[i];
     if (std::memcmp(&x, &y, sizeof x) == 0) continue;
-    ADD_FAILURE() << "manifold " << i << " of pair " << x.pair << " " << y.pair << ", points " << x.point_count << " "
-                  << y.point_count << ", flags " << x.flags << " " << y.flags << ", depth " << x.depth << " "
-                  << y.depth - x.depth << ", normal off " << x.normal[0] - y.normal[0] << " "
-                  << x.normal[1] - y.normal[1] << " " << x.normal[2] - y.normal[2] << ", centre off "
-                  << x.centre[0] - y.centre[0] << ", area off " << x.area_vector[0] - y.area_vector[0];
+    ADD_FAILURE() << "manifold " << i << " of pair " << x.pair << " " << y.pair << ", points "
+                  << x.point_count << " " << y.point_count << ", flags " << x.flags << " " << y.flags
+                  << ", depth " << x.depth << " " << y.depth - x.depth << ", normal off "
+                  << x.normal[0] - y.normal[0] << " " << x.normal[1] - y.normal[1] << " "
+                  << x.normal[2] - y.normal[2] << ", centre off " << x.centre[0] - y.centre[0]
+                  << ", area off " << x.area_vector[0] - y.area_vector[0];
     break;
   }
   for (std::size_t i = 0; i < std::min(cpu.points.size(), gpu.points.size()); ++i) {
     const ManifoldPoint &x = cpu.points[i], &y = gpu.points[i];
     if (std::memcmp(&x, &y, sizeof x) == 0) continue;
-    ADD_FAILURE() << "point " << i << " of manifold " << x.manifold << " " << y.manifold << ", id " << x.id << " "
-                  << y.id << ", depth " << x.depth << " " << y.depth - x.depth << ", position off "
-                  << x.position[0] - y.position[0] << ", in a off " << x.in_a[0] - y.in_a[0] << ", faces " << x.face_a
-                  << " " << y.face_a << " " << x.face_b << " " << y.face_b << ", previous " << x.previous << " "
-                  << y.previous;
+    ADD_FAILURE() << "point " << i << " of manifold " << x.manifold << " " << y.manifold << ", id " << x.id
+                  << " " << y.id << ", depth " << x.depth << " " << y.depth - x.depth << ", position off "
+                  << x.position[0] - y.position[0] << ", in a off " << x.in_a[0] - y.in_a[0] << ", faces "
+                  << x.face_a << " " << y.face_a << " " << x.face_b << " " << y.face_b << ", previous "
+                  << x.previous << " " << y.previous;
     return;
   }
 }
@@ -65,7 +66,8 @@ void expect_same(const Result& cpu, const Result& gpu) {
   EXPECT_EQ(cpu.points.size(), gpu.points.size());
   EXPECT_EQ(cpu.counters.segments, gpu.counters.segments);
   EXPECT_EQ(cpu.counters, gpu.counters);
-  if (!same_bytes(cpu.manifolds, gpu.manifolds) || !same_bytes(cpu.points, gpu.points)) explain_difference(cpu, gpu);
+  if (!same_bytes(cpu.manifolds, gpu.manifolds) || !same_bytes(cpu.points, gpu.points))
+    explain_difference(cpu, gpu);
 }
 
 /// Both sides of a scene, which goes on from step to step.
@@ -76,28 +78,32 @@ class BothSides {
     EXPECT_EQ(query_.set_assets(files), Status::kOk);
     EXPECT_EQ(manifolds_.set_assets(files), Status::kOk);
     EXPECT_EQ(uploaded_.upload(files, contents, nullptr), Status::kOk);
-    for (std::size_t i = 0; i < files.size(); ++i) gpu_assets_.push_back(gpu_asset(uploaded_.level(i), files[i]));
+    for (std::size_t i = 0; i < files.size(); ++i)
+      gpu_assets_.push_back(gpu_asset(uploaded_.level(i), files[i]));
     EXPECT_EQ(gpu_query_.set_assets(gpu_assets_, nullptr), Status::kOk);
     EXPECT_EQ(gpu_.set_assets(gpu_assets_, nullptr), Status::kOk);
   }
 
-  /// Makes the manifolds of the CPU, and of the GPU as often as room was too small, and compares them. Result:
-  /// how many points there are.
+  /// Makes the manifolds of the CPU, and of the GPU as often as room was too small, and compares them.
+  /// Result: how many points there are.
   std::size_t step(const std::vector<Instance>& instances, const std::vector<ObjectPair>& pairs,
                    bool match_previous = true) {
     const Result cpu = on_cpu(instances, pairs, match_previous);
     const OnGpu scene(instances, pairs);
     EXPECT_EQ(gpu_query_.find_contacts(scene.instances(), scene.pairs(), grouped(), nullptr), Status::kOk);
-    EXPECT_EQ(gpu_.make(scene.instances(), scene.pairs(), gpu_query_, {.match_previous = match_previous}, nullptr),
-              Status::kOk);
+    EXPECT_EQ(
+        gpu_.make(scene.instances(), scene.pairs(), gpu_query_, {.match_previous = match_previous}, nullptr),
+        Status::kOk);
     EXPECT_LE(gpu_.bytes(), most_manifold_bytes(gpu_.capacity(), gpu_assets_.size()));
     expect_same(cpu, result_of(gpu_));
     return cpu.points.size();
   }
 
-  Result on_cpu(const std::vector<Instance>& instances, const std::vector<ObjectPair>& pairs, bool match_previous) {
+  Result on_cpu(const std::vector<Instance>& instances, const std::vector<ObjectPair>& pairs,
+                bool match_previous) {
     EXPECT_EQ(query_.find_contacts(instances, pairs, {}), Status::kOk);
-    EXPECT_EQ(manifolds_.make(instances, pairs, query_.contacts(), {.match_previous = match_previous}), Status::kOk);
+    EXPECT_EQ(manifolds_.make(instances, pairs, query_.contacts(), {.match_previous = match_previous}),
+              Status::kOk);
     return {{manifolds_.manifolds().begin(), manifolds_.manifolds().end()},
             {manifolds_.points().begin(), manifolds_.points().end()},
             manifolds_.counters()};
@@ -216,7 +222,8 @@ TEST_F(GpuManifolds, OfAnExactStack) {
   scene.assets.add(test::cube(0.5f, 4));
   for (std::uint32_t i = 0; i < 64; ++i) {
     Instance instance = {i % 2, kIdentityPose};
-    instance.pose.translation[0] = i % 4 + 1e5, instance.pose.translation[1] = i / 4 % 4, instance.pose.translation[2] = i / 16;
+    instance.pose.translation[0] = i % 4 + 1e5, instance.pose.translation[1] = i / 4 % 4,
+    instance.pose.translation[2] = i / 16;
     scene.instances.push_back(instance);
   }
   BothSides both(scene.assets);
@@ -232,16 +239,19 @@ TEST_F(GpuManifolds, WithoutRoomTellWhatTheyNeed) {
   for (int step = 0; step < 3; ++step) {
     const Result cpu = both.on_cpu(scene.instances, pairs, true);
     const BothSides::OnGpu on_gpu(scene.instances, pairs);
-    ASSERT_EQ(both.gpu_query().find_contacts(on_gpu.instances(), on_gpu.pairs(), grouped(), nullptr), Status::kOk);
+    ASSERT_EQ(both.gpu_query().find_contacts(on_gpu.instances(), on_gpu.pairs(), grouped(), nullptr),
+              Status::kOk);
     if (step == 0) {
       ASSERT_EQ(both.gpu().reserve({.pairs = 1, .contacts = 1, .manifolds = 1, .points = 1}), Status::kOk);
-      ASSERT_EQ(both.gpu().enqueue(on_gpu.instances(), on_gpu.pairs(), both.gpu_query(), {}, nullptr), Status::kOk);
+      ASSERT_EQ(both.gpu().enqueue(on_gpu.instances(), on_gpu.pairs(), both.gpu_query(), {}, nullptr),
+                Status::kOk);
       ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
       EXPECT_EQ(both.gpu().report().complete, 0u);
       EXPECT_EQ(both.gpu().report().needed.pairs, pairs.size());
       EXPECT_EQ(both.gpu().report().manifolds, 0u);
     }
-    ASSERT_EQ(both.gpu().make(on_gpu.instances(), on_gpu.pairs(), both.gpu_query(), {}, nullptr), Status::kOk);
+    ASSERT_EQ(both.gpu().make(on_gpu.instances(), on_gpu.pairs(), both.gpu_query(), {}, nullptr),
+              Status::kOk);
     expect_same(cpu, result_of(both.gpu()));
     move(scene.instances, random, 1e-3);
     // Twice the bodies from the second step on: more than there was room for.
@@ -266,10 +276,16 @@ TEST_F(GpuManifolds, OfAGraphThatIsReplayed) {
   GpuStream stream;
   ASSERT_EQ(stream.create(), cudaSuccess);
   GpuGraph graph;
-  ASSERT_EQ(graph.capture(stream.get(), [&] {
-    EXPECT_EQ(both.gpu_query().enqueue(on_gpu.instances(), on_gpu.pairs(), grouped(), stream.get()), Status::kOk);
-    EXPECT_EQ(both.gpu().enqueue(on_gpu.instances(), on_gpu.pairs(), both.gpu_query(), {}, stream.get()), Status::kOk);
-  }), cudaSuccess);
+  ASSERT_EQ(graph.capture(stream.get(),
+                          [&] {
+                            EXPECT_EQ(both.gpu_query().enqueue(on_gpu.instances(), on_gpu.pairs(), grouped(),
+                                                               stream.get()),
+                                      Status::kOk);
+                            EXPECT_EQ(both.gpu().enqueue(on_gpu.instances(), on_gpu.pairs(), both.gpu_query(),
+                                                         {}, stream.get()),
+                                      Status::kOk);
+                          }),
+            cudaSuccess);
   for (int step = 0; step < 3; ++step) {
     ASSERT_EQ(graph.launch(stream.get()), cudaSuccess);
     ASSERT_EQ(stream.wait(), cudaSuccess);

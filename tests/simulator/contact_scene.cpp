@@ -24,7 +24,8 @@ std::vector<simulation::ContactPoint> ContactScene::points(const Isometry3d& mot
   engine->find(instances, {}, found_);
   simulation::ContactGenerator generator;
   generator.set_shapes(assets_.views());
-  const std::vector<simulation::ContactPoint> points = generator.generate(found_, instances, {.threads = threads_});
+  const std::vector<simulation::ContactPoint> points =
+      generator.generate(found_, instances, {.threads = threads_});
   statistics_ = generator.statistics();
   return points;
 }

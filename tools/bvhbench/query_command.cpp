@@ -8,6 +8,7 @@
 
 #include "common/json.h"
 #include "common/number_words.h"
+#include "contained.h"
 #include "engines/registry.h"
 #include "scenes/contacts_file.h"
 #include "scenes/hdf5_file.h"
@@ -20,7 +21,7 @@ struct QueryArguments {
   std::string scene, out, backend = "cpu", gpu_engine = "tandem-cuda";
   QueryOptions options;
   std::uint32_t repeats = 1;
-  bool grouped = false, sorted = false, traversal = false, manifolds = false;
+  bool grouped = false, sorted = false, traversal = false, manifolds = false, contained = false;
   bool json = false, threads_given = false;
 
   bool on_gpu() const { return backend == "cuda"; }
@@ -34,7 +35,8 @@ struct QueryArguments {
 struct Answer {
   QueryRecord record;
   ContactTable table;
-  TimedAnswer timed;  // its contacts are in the table
+  TimedAnswer timed;            // its contacts are in the table
+  TimedContainments contained;  // where they were asked for
 };
 
 const std::map<std::string, QueryMode> kModes = {
@@ -108,7 +110,7 @@ Answer run_query(const QueryArguments& arguments, const Scene& scene) {
   const std::vector<AssetView> views = scene.views();
   const std::vector<ObjectPair> pairs = normalised(description.pairs.value_or(std::vector<ObjectPair>()));
   const auto engine = make_engine(arguments.engine(), arguments.options);
-  Answer answer = {record_of(arguments, scene), {}, {}};
+  Answer answer = {record_of(arguments, scene), {}, {}, {}};
   ExcludedPairTable excluded;
   engine->set_shapes(views);
   engine->set_filter(description.filter.view(excluded));
@@ -117,6 +119,10 @@ Answer run_query(const QueryArguments& arguments, const Scene& scene) {
                                      arguments.order(), arguments.traversal, arguments.manifolds});
   answer.record.seconds = answer.timed.whole;
   answer.record.counters = engine->counters();
+  if (arguments.contained) {
+    answer.contained = find_contained(scene, answer.timed.pairs, answer.timed.contacts,
+                                      arguments.options.threads, arguments.repeats);
+  }
   answer.table = table_of(scene, answer.timed);
   return answer;
 }
@@ -182,6 +188,11 @@ Json to_json(const QueryArguments& arguments, const Scene& scene, const Answer& 
     json["ambiguous_touches"] = made.ambiguous_touches;
     json["manifold_seconds"] = times(answer.timed.manifolds.seconds);
   }
+  if (arguments.contained) {
+    json["contained"] = count_inside(answer.contained.rows);
+    json["contained_rows"] = answer.contained.rows.size();
+    json["contained_seconds"] = times(answer.contained.seconds);
+  }
   if (arguments.on_gpu()) {
     json["engine"] = name_of(arguments.gpu_engine, kGpuEngines);
     json["gpu"] = answer.timed.gpu.name;
@@ -235,6 +246,10 @@ void print_summary(const QueryArguments& arguments, const Scene& scene, const An
     print_row("points", answer.timed.manifolds.counters.points);
     print_times("  manifolds", times(answer.timed.manifolds.seconds), " on top");
   }
+  if (arguments.contained) {
+    print_row("contained", count_inside(answer.contained.rows));
+    print_times("  contained", times(answer.contained.seconds), " on top");
+  }
   if (arguments.on_gpu()) {
     print_times("  broad phase", times(answer.timed.broad_phase));
     print_times("  contacts", times(answer.timed.narrow));
@@ -255,6 +270,11 @@ void check_arguments(const QueryArguments& arguments, const Scene& scene) {
     throw UsageError(
         "--manifolds takes all contacts, so neither --mode boxes nor --first-contact goes with it");
   }
+  if (arguments.contained &&
+      (arguments.options.mode != QueryMode::exact || arguments.options.first_contact_only)) {
+    throw UsageError(
+        "--contained takes all exact contacts, so neither --mode nor --first-contact goes with it");
+  }
   const bool tandem = arguments.gpu_engine == "tandem-cuda";
   if (!arguments.on_gpu()) {
     if (!tandem) throw UsageError("--engine is for the backend cuda");
@@ -263,9 +283,10 @@ void check_arguments(const QueryArguments& arguments, const Scene& scene) {
     if (arguments.traversal) throw UsageError("--traversal is for the backend cuda");
     return;
   }
-  if (!tandem &&
-      (arguments.options.first_contact_only || arguments.order() != OrderOnGpu::any || arguments.traversal || arguments.manifolds)) {
-    throw UsageError("--first-contact, --grouped, --manifolds, --sorted and --traversal are for the engine tandem");
+  if (!tandem && (arguments.options.first_contact_only || arguments.order() != OrderOnGpu::any ||
+                  arguments.traversal || arguments.manifolds)) {
+    throw UsageError(
+        "--first-contact, --grouped, --manifolds, --sorted and --traversal are for the engine tandem");
   }
   if (arguments.options.self_pairs) {
     throw UsageError("--self is for the backend cpu; /pairs of a scene may name an instance twice");
@@ -276,7 +297,9 @@ void check_arguments(const QueryArguments& arguments, const Scene& scene) {
 void write(const QueryArguments& arguments, const Answer& answer) {
   const TimedManifolds& made = answer.timed.manifolds;
   const ManifoldTable manifolds = {made.manifolds, made.points, made.counters, made.seconds};
-  write_contacts(arguments.out, answer.table, answer.record, arguments.manifolds ? &manifolds : nullptr);
+  const ContainedTable contained = {answer.contained.rows, answer.contained.seconds};
+  write_contacts(arguments.out, answer.table, answer.record, arguments.manifolds ? &manifolds : nullptr,
+                 arguments.contained ? &contained : nullptr);
 }
 
 // The scene file and its assets, as paths from here.
@@ -347,6 +370,8 @@ CLI::App* add_query(CLI::App& app, Run& run_later) {
                     "one contact for each object pair at most");
   command->add_flag("--manifolds", arguments->manifolds,
                     "also contact manifolds: normals, depths and points");
+  command->add_flag("--contained", arguments->contained,
+                    "also bodies that lie within others without touching them, found on the CPU");
   command->add_flag("--self", options.self_pairs, "also each instance with itself");
   CLI::Option* threads =
       command->add_option("--threads", options.threads, "threads; the contacts do not depend on them")

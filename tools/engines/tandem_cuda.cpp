@@ -48,8 +48,8 @@ class TandemCudaEngine final : public GpuEngine {
   }
 
   // Both: their contacts are grouped too.
-  std::function<void()> repeatable_with_manifolds(const GpuPairs& pairs, OrderOnGpu order, const Before& before,
-                                                  const Before& between) override {
+  std::function<void()> repeatable_with_manifolds(const GpuPairs& pairs, OrderOnGpu order,
+                                                  const Before& before, const Before& between) override {
     GpuQueryOptions with_groups = options(order);
     with_groups.grouped = true;
     constexpr GpuManifoldOptions kOfFeatures = {.match_previous = false};
@@ -63,7 +63,8 @@ class TandemCudaEngine final : public GpuEngine {
       before(cudaEventRecordExternal);
       enqueue(query_, pairs, with_groups, "contacts");
       between(cudaEventRecordExternal);
-      check(manifolds_.enqueue(instances(), pairs, query_, kOfFeatures, stream()), manifolds_.cuda_error(), "manifolds");
+      check(manifolds_.enqueue(instances(), pairs, query_, kOfFeatures, stream()), manifolds_.cuda_error(),
+            "manifolds");
     });
   }
 

@@ -68,6 +68,23 @@ void add_manifolds(Hdf5Output& file, const ManifoldTable& table) {
   file.attribute("median_manifold_seconds", median_of(table.seconds));
 }
 
+void add_contained(Hdf5Output& file, const ContainedTable& table) {
+  const auto rows = table.rows;
+  const auto flag = [&](std::uint32_t wanted) {
+    return numbers(rows,
+                   [=](const Containment& x) { return static_cast<std::uint8_t>((x.flags & wanted) != 0); });
+  };
+  file.add("/contained/pair", {rows.size()}, numbers(rows, [](const Containment& x) { return x.pair; }));
+  file.add("/contained/inner", {rows.size()},
+           numbers(rows, [](const Containment& x) { return static_cast<std::uint8_t>(x.inner); }));
+  file.add("/contained/component", {rows.size()},
+           numbers(rows, [](const Containment& x) { return x.component; }));
+  file.add("/contained/inside", {rows.size()}, flag(kInside));
+  file.add("/contained/open", {rows.size()}, flag(kOuterOpen));
+  file.attribute("best_contained_seconds", best_of(table.seconds));
+  file.attribute("median_contained_seconds", median_of(table.seconds));
+}
+
 }  // namespace
 
 std::vector<ObjectPair> normalised(std::span<const ObjectPair> pairs) {
@@ -107,7 +124,7 @@ std::uint64_t hash_of(const ContactTable& table) {
 }
 
 void write_contacts(const std::string& path, const ContactTable& table, const QueryRecord& record,
-                    const ManifoldTable* manifolds) {
+                    const ManifoldTable* manifolds, const ContainedTable* contained) {
   const QueryCounters& counters = record.counters;
   Hdf5Output file(path);
   file.add("/pairs", {table.pairs.size(), 2}, flat(table.pairs));
@@ -133,6 +150,7 @@ void write_contacts(const std::string& path, const ContactTable& table, const Qu
   file.attribute("contacts", counters.contacts);
   file.attribute("hash", hexadecimal(hash_of(table)));
   if (manifolds != nullptr) add_manifolds(file, *manifolds);
+  if (contained != nullptr) add_contained(file, *contained);
   file.write();
 }
 

@@ -7,6 +7,7 @@
 
 #include "common/stopwatch.h"
 #include "tandem/kernels/contact_query.h"
+#include "tandem/kernels/containment_query.h"
 #include "tandem/kernels/manifold.h"
 
 namespace tandem::bench {
@@ -53,8 +54,15 @@ struct ManifoldTable {
   Seconds seconds;  ///< of each repeat, at least one
 };
 
-/// Writes a contacts file (docs/scenes.md), whole or not at all. manifolds: or null. Throws OutputError.
+/// Bodies within bodies: Containment::pair is a row of a ContactTable's pairs.
+struct ContainedTable {
+  std::span<const Containment> rows;
+  Seconds seconds;  ///< of each repeat, at least one
+};
+
+/// Writes a contacts file (docs/scenes.md), whole or not at all. manifolds, contained: or null. Throws
+/// OutputError.
 void write_contacts(const std::string& path, const ContactTable& table, const QueryRecord& record,
-                    const ManifoldTable* manifolds = nullptr);
+                    const ManifoldTable* manifolds = nullptr, const ContainedTable* contained = nullptr);
 
 }  // namespace tandem::bench

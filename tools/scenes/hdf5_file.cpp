@@ -344,6 +344,10 @@ void Hdf5Output::add(const std::string& name, const Shape& shape, std::int64_t t
   if (H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0) refuse(last_reason());
 }
 
+void Hdf5Output::add(const std::string& name, const Shape& shape, std::span<const std::uint8_t> values) {
+  add(name, shape, H5T_STD_U8LE, values.data());
+}
+
 void Hdf5Output::add(const std::string& name, const Shape& shape, std::span<const std::uint32_t> values) {
   add(name, shape, H5T_STD_U32LE, values.data());
 }

@@ -75,6 +75,7 @@ class Hdf5Output {
   Hdf5Output& operator=(const Hdf5Output&) = delete;
 
   /// Adds a dataset, and the groups in its name. Condition: as many values as the shape says.
+  void add(const std::string& name, const Shape& shape, std::span<const std::uint8_t> values);
   void add(const std::string& name, const Shape& shape, std::span<const std::uint32_t> values);
   void add(const std::string& name, const Shape& shape, std::span<const std::uint64_t> values);
   void add(const std::string& name, const Shape& shape, std::span<const double> values);

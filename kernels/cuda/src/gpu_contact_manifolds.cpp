@@ -191,7 +191,8 @@ Status GpuContactManifolds::set_assets(std::span<const GpuAsset> assets, cudaStr
 }
 
 Status GpuContactManifolds::reserve(const GpuManifoldCapacity& wanted) {
-  if (wanted.pairs >= kMost / 2 || wanted.contacts >= kMost || wanted.manifolds >= kMost || wanted.points >= kMost)
+  if (wanted.pairs >= kMost / 2 || wanted.contacts >= kMost || wanted.manifolds >= kMost ||
+      wanted.points >= kMost)
     return Status::kOutOfRange;
   Status status = state_->reserve_pairs(wanted.pairs);
   if (status == Status::kOk) status = state_->reserve_contacts(wanted.contacts);
@@ -255,9 +256,10 @@ std::size_t GpuContactManifolds::bytes() const {
   if (state_ == nullptr) return 0;
   const State& s = *state_;
   return s.shapes.bytes() + s.state.bytes() + s.pieces.bytes() + s.normals.bytes() + s.curve.bytes() +
-         s.order.bytes() + s.start.bytes() + s.curves.bytes() + s.summaries.bytes() + s.words.bytes() + s.of_pair.bytes() + s.tile_sums.bytes() +
-         s.table.bytes() + s.patches.bytes() + s.next_of_pair.bytes() + s.manifolds.bytes() +
-         s.manifolds_before.bytes() + s.entries.bytes() + s.points.bytes() + s.points_before.bytes();
+         s.order.bytes() + s.start.bytes() + s.curves.bytes() + s.summaries.bytes() + s.words.bytes() +
+         s.of_pair.bytes() + s.tile_sums.bytes() + s.table.bytes() + s.patches.bytes() +
+         s.next_of_pair.bytes() + s.manifolds.bytes() + s.manifolds_before.bytes() + s.entries.bytes() +
+         s.points.bytes() + s.points_before.bytes();
 }
 
 cudaError_t GpuContactManifolds::cuda_error() const {

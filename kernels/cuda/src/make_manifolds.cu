@@ -2,8 +2,8 @@
 #include "manifold_team.cuh"
 #include "tandem/kernels/detail/manifold/manifold_maker.h"
 
-// From contacts to patches. A thread block makes the patches of a pair with many contacts, a warp those of one
-// with few. Compiled without fused operations: the arithmetic is that of the CPU, bit by bit.
+// From contacts to patches. A thread block makes the patches of a pair with many contacts, a warp those of
+// one with few. Compiled without fused operations: the arithmetic is that of the CPU, bit by bit.
 namespace tandem::gpu {
 namespace {
 
@@ -43,8 +43,10 @@ __device__ PieceMemory memory_of(const ManifoldArgs& args, std::uint32_t pair) {
 }
 
 template <typename Team>
-__device__ void find_curves_of(const ManifoldArgs& args, const Team& team, std::uint32_t& next, std::uint32_t pair) {
-  const std::uint32_t first = args.groups.first_contact[pair], count = args.groups.first_contact[pair + 1] - first;
+__device__ void find_curves_of(const ManifoldArgs& args, const Team& team, std::uint32_t& next,
+                               std::uint32_t pair) {
+  const std::uint32_t first = args.groups.first_contact[pair],
+                      count = args.groups.first_contact[pair + 1] - first;
   const ObjectPair both = args.pairs.pairs[pair];
   if (both.a == both.b) return;
   if (count > kMostContactsOfPair) {
@@ -70,8 +72,8 @@ __device__ void find_curves_of(const ManifoldArgs& args, const Team& team, std::
 /// Calls of(team, row, true) for rows below `many` with a block, and of(team, row, false) for rows below `few` with
 /// a warp.
 template <typename Of>
-__device__ void share_out(std::uint32_t many, std::uint32_t few, std::uint32_t& next_many, std::uint32_t& next_few,
-                          Counter* scratch, const Of& of) {
+__device__ void share_out(std::uint32_t many, std::uint32_t few, std::uint32_t& next_many,
+                          std::uint32_t& next_few, Counter* scratch, const Of& of) {
   __shared__ std::uint32_t taken;
   const BlockTeam<kThreads> block = {{}, scratch};
   for (;;) {
@@ -148,8 +150,8 @@ __global__ void __launch_bounds__(kThreads, 4) make(const __grid_constant__ Mani
   wait_for_kernel_before();
   if (!has_query(args)) return;
   ManifoldState& state = *args.state;
-  share_out(state.curves_of_many, state.curves_of_few, state.next_curve_of_many, state.next_curve_of_few, scratch,
-            [&](const auto& team, std::uint32_t row, bool many) {
+  share_out(state.curves_of_many, state.curves_of_few, state.next_curve_of_many, state.next_curve_of_few,
+            scratch, [&](const auto& team, std::uint32_t row, bool many) {
               make_patch_of(args, team, shared[many ? 0 : threadIdx.x / 32],
                             args.curves[many ? row : args.capacity.contacts - 1 - row]);
             });
@@ -171,8 +173,9 @@ __device__ void enter(TableEntry* table, std::uint32_t size, std::uint32_t step,
   out.bodies = entry.bodies, out.first_point = entry.first_point, out.points = entry.points;
 }
 
-__global__ void __launch_bounds__(kThreads) move_table(const TableEntry* from, std::uint32_t from_size, TableEntry* to,
-                                                       std::uint32_t to_size, const ManifoldState* state) {
+__global__ void __launch_bounds__(kThreads)
+    move_table(const TableEntry* from, std::uint32_t from_size, TableEntry* to, std::uint32_t to_size,
+               const ManifoldState* state) {
   const std::uint32_t step = state->step;
   for (std::uint32_t i = blockIdx.x * kThreads + threadIdx.x; i < from_size; i += gridDim.x * kThreads) {
     if (from[i].step == step) enter(to, to_size, step, {from[i].bodies, from[i].first_point, from[i].points});
@@ -189,7 +192,8 @@ __global__ void __launch_bounds__(kThreads) remember(const __grid_constant__ Man
   wait_for_kernel_before();
   ManifoldState& state = *args.state;
   const std::uint32_t first = blockIdx.x * kThreads + threadIdx.x, step = gridDim.x * kThreads;
-  const std::uint32_t pairs = *args.pairs.count < args.capacity.pairs ? *args.pairs.count : args.capacity.pairs;
+  const std::uint32_t pairs =
+      *args.pairs.count < args.capacity.pairs ? *args.pairs.count : args.capacity.pairs;
   for (std::uint32_t i = first; i < pairs; i += step) args.of_pair[i] = {kNoIndex, 0, 0, 0, 0, 0};
   for (std::uint32_t i = first; i < args.capacity.pairs / kManifoldTile + 1; i += step) args.tile_sums[i] = 0;
   if (args.match_previous && state.has_last != 0) {
@@ -216,7 +220,8 @@ __global__ void __launch_bounds__(kThreads) remember(const __grid_constant__ Man
   state.curves_of_many = state.curves_of_few = state.next_curve_of_many = state.next_curve_of_few = 0;
   state.needed_points = state.segments = state.ambiguous_touches = state.open_curves = 0;
   state.too_many_contacts = state.finished_blocks = 0;
-  if (!args.match_previous || state.has_last != 0) state.step = step_after(state.step);  // its table is empty as yet
+  if (!args.match_previous || state.has_last != 0)
+    state.step = step_after(state.step);  // its table is empty as yet
   state.has_last = 0;
 }
 
@@ -228,8 +233,8 @@ cudaError_t remember_points(const ManifoldArgs& args, cudaStream_t stream) {
   return cudaGetLastError();
 }
 
-cudaError_t move_entries(const TableEntry* from, std::uint32_t from_size, TableEntry* to, std::uint32_t to_size,
-                         const ManifoldState* state) {
+cudaError_t move_entries(const TableEntry* from, std::uint32_t from_size, TableEntry* to,
+                         std::uint32_t to_size, const ManifoldState* state) {
   constexpr std::uint32_t kBlocks = 256;
   move_table<<<kBlocks, kThreads>>>(from, from_size, to, to_size, state);
   return cudaGetLastError();
@@ -242,7 +247,8 @@ cudaError_t forget_last(ManifoldState* state, cudaStream_t stream) {
 
 cudaError_t make_patches(const ManifoldArgs& args, cudaStream_t stream) {
   constexpr std::uint32_t kBlocksPerProcessor = 4;
-  const Grid grid = {args.limits.processors * kBlocksPerProcessor, kThreads, 0, stream, args.limits.early_launch};
+  const Grid grid = {args.limits.processors * kBlocksPerProcessor, kThreads, 0, stream,
+                     args.limits.early_launch};
   const cudaError_t error = launch_after(grid, find_curves, args);
   return error == cudaSuccess ? launch_after(grid, make, args) : error;
 }

@@ -46,8 +46,8 @@ struct ManifoldState {
   std::uint32_t too_many_contacts, finished_blocks;
 
   // Kept from call to call.
-  std::uint32_t step;          ///< of the table
-  std::uint32_t has_last;      ///< the last call made manifolds that the next one is to remember
+  std::uint32_t step;      ///< of the table
+  std::uint32_t has_last;  ///< the last call made manifolds that the next one is to remember
   std::uint32_t last_manifolds, last_points;
   GpuManifoldReport report;
 };
@@ -88,8 +88,8 @@ struct ManifoldArgs {
 };
 
 /// Moves the table of the step before to a larger one, on the default stream.
-cudaError_t move_entries(const TableEntry* from, std::uint32_t from_size, TableEntry* to, std::uint32_t to_size,
-                         const ManifoldState* state);
+cudaError_t move_entries(const TableEntry* from, std::uint32_t from_size, TableEntry* to,
+                         std::uint32_t to_size, const ManifoldState* state);
 
 /// The next call finds nothing before it.
 cudaError_t forget_last(ManifoldState* state, cudaStream_t stream);

@@ -14,7 +14,9 @@ struct SharedNumbers {
   __device__ static void store(std::uint32_t& at, std::uint32_t value) {
     *static_cast<volatile std::uint32_t*>(&at) = value;
   }
-  __device__ static std::uint32_t add(std::uint32_t& at, std::uint32_t value) { return atomicAdd(&at, value); }
+  __device__ static std::uint32_t add(std::uint32_t& at, std::uint32_t value) {
+    return atomicAdd(&at, value);
+  }
   __device__ static std::uint32_t compare_and_swap(std::uint32_t& at, std::uint32_t expected,
                                                    std::uint32_t value) {
     return atomicCAS(&at, expected, value);

@@ -60,8 +60,8 @@ __device__ void write_report(const ManifoldArgs& args, std::uint32_t manifolds, 
   if (complete) {
     report.manifolds = manifolds;
     report.points = points;
-    report.counters = {args.query->contacts, state.segments, manifolds, points, state.open_curves,
-                       state.ambiguous_touches};
+    report.counters = {args.query->contacts, state.segments,         manifolds, points,
+                       state.open_curves,    state.ambiguous_touches};
   }
   state.report = report;
   *args.host_report = report;

@@ -12,7 +12,8 @@ Eigen::Vector3d vector_of(const double (&x)[3]) {
 
 void throw_unless_ok(Status status, std::uint64_t where) {
   if (status == Status::kOk) return;
-  const std::string blamed = subject(status) != nullptr ? std::string(subject(status)) + " " + std::to_string(where) + ": " : "";
+  const std::string blamed =
+      subject(status) != nullptr ? std::string(subject(status)) + " " + std::to_string(where) + ": " : "";
   throw EngineError("contact manifolds: " + blamed + explain(status), status, where);
 }
 
@@ -27,7 +28,8 @@ const std::vector<ContactPoint>& ContactGenerator::generate(const ContactList& f
                                                             const ContactOptions& options) {
   contacts_.clear();
   contacts_.reserve(found.triangles.size());
-  for (const TriangleContact& c : found.triangles) contacts_.push_back({c.pair, c.triangle_a, c.triangle_b, 0, 0});
+  for (const TriangleContact& c : found.triangles)
+    contacts_.push_back({c.pair, c.triangle_a, c.triangle_b, 0, 0});
   // The solvers remember by themselves what a point did in the step before.
   const ManifoldOptions manifold_options = {
       .match_previous = false, .most_points = options.points_per_patch, .threads = options.threads};

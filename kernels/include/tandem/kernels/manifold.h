@@ -11,21 +11,21 @@ inline constexpr std::uint32_t kMostManifoldPoints = 7;
 
 /// A point in which two bodies push against each other.
 struct ManifoldPoint {
-  double position[3];      ///< world, half-way between the surfaces
-  double in_a[3], in_b[3]; ///< the point on the surface of a, of b, in the coordinates of its asset's file
-  double depth;            ///< >= 0, lengths along the manifold's normal
-  std::uint64_t id;        ///< never 0; the same in successive steps for what is the same contact
+  double position[3];       ///< world, half-way between the surfaces
+  double in_a[3], in_b[3];  ///< the point on the surface of a, of b, in the coordinates of its asset's file
+  double depth;             ///< >= 0, lengths along the manifold's normal
+  std::uint64_t id;         ///< never 0; the same in successive steps for what is the same contact
   std::uint32_t face_a, face_b;  ///< of the source files, where the point was found
-  std::uint32_t previous;  ///< the same point among the points of the step before, or kNoIndex
-  std::uint32_t manifold;  ///< that it belongs to
+  std::uint32_t previous;        ///< the same point among the points of the step before, or kNoIndex
+  std::uint32_t manifold;        ///< that it belongs to
 };
 static_assert(sizeof(ManifoldPoint) == 104);
 
 /// How the surfaces of a manifold meet.
 enum ManifoldFlags : std::uint32_t {
-  kTouching = 1,      ///< without overlap: depth 0
-  kOpenCurve = 2,     ///< the curve in which the surfaces cross does not close: an open mesh, or mode fast
-  kGoesThrough = 4,   ///< one body goes through the other here
+  kTouching = 1,     ///< without overlap: depth 0
+  kOpenCurve = 2,    ///< the curve in which the surfaces cross does not close: an open mesh, or mode fast
+  kGoesThrough = 4,  ///< one body goes through the other here
 };
 
 /// A connected region in which the surfaces of two bodies meet.
@@ -36,17 +36,18 @@ struct Manifold {
   double depth;           ///< the largest that was found; the deepest point has at least 0.8 of it
   std::uint32_t pair;     ///< row of the list of object pairs
   std::uint32_t first_point, point_count;
-  std::uint32_t flags;    ///< ManifoldFlags
+  std::uint32_t flags;  ///< ManifoldFlags
 };
 static_assert(sizeof(Manifold) == 96);
 
 /// What became of a list of contacts.
 struct ManifoldCounters {
   std::uint64_t contacts = 0;
-  std::uint64_t segments = 0;           ///< contacts whose triangles share a line
+  std::uint64_t segments = 0;  ///< contacts whose triangles share a line
   std::uint64_t manifolds = 0, points = 0;
   std::uint64_t open_curves = 0;        ///< manifolds with kOpenCurve
-  std::uint64_t ambiguous_touches = 0;  ///< corner on corner or edge along edge: no direction is better than another, and there is no manifold
+  std::uint64_t ambiguous_touches = 0;  ///< corner on corner or edge along edge: no direction is better than
+                                        ///< another, and there is no manifold
 
   friend bool operator==(const ManifoldCounters&, const ManifoldCounters&) = default;
 };

@@ -35,16 +35,18 @@ constexpr std::size_t most_manifold_bytes(const GpuManifoldCapacity& capacity, s
 
 /// The outcome of a call.
 struct GpuManifoldReport {
-  Status status;              ///< that of the query, kOk or an error; or kOutOfRange: a pair of 2^27 contacts
-  std::uint32_t complete;     ///< 0 where something did not fit, or the query was not complete: then there are no manifolds
-  GpuManifoldCapacity needed; ///< where the query is complete; more points than needed, if manifolds did not fit
+  Status status;           ///< that of the query, kOk or an error; or kOutOfRange: a pair of 2^27 contacts
+  std::uint32_t complete;  ///< 0 where something did not fit, or the query was not complete: then there are
+                           ///< no manifolds
+  GpuManifoldCapacity
+      needed;  ///< where the query is complete; more points than needed, if manifolds did not fit
   std::uint32_t manifolds, points;
   ManifoldCounters counters;
 };
 
 /// Makes contact manifolds of the contacts that a GpuContactQuery found, on the GPU: the same bytes as
-/// ContactManifolds makes of them. enqueue() neither waits for the GPU nor allocates. Throws nothing. Movable,
-/// not copyable. An object runs one call at a time.
+/// ContactManifolds makes of them. enqueue() neither waits for the GPU nor allocates. Throws nothing.
+/// Movable, not copyable. An object runs one call at a time.
 class GpuContactManifolds {
  public:
   GpuContactManifolds();
@@ -64,8 +66,8 @@ class GpuContactManifolds {
 
   /// Queues the making of manifolds behind what `stream` holds, the query among it; it may be captured into a
   /// graph. The arrays must stay until it is done. instances, pairs: those of the query. query: one whose
-  /// contacts are grouped. Result: kOk, kCudaFailed, or kOutOfGpuMemory, where CUDA loads a kernel at its first
-  /// launch; what the GPU finds is in the report. Condition: set_assets() and reserve().
+  /// contacts are grouped. Result: kOk, kCudaFailed, or kOutOfGpuMemory, where CUDA loads a kernel at its
+  /// first launch; what the GPU finds is in the report. Condition: set_assets() and reserve().
   Status enqueue(const GpuInstances& instances, const GpuPairs& pairs, const GpuContactQuery& query,
                  const GpuManifoldOptions& options, cudaStream_t stream);
 

@@ -27,9 +27,11 @@ struct Body {
   Vector3 center;  ///< of the bounds, in the world
   double reach;    ///< the largest coordinate of the posed bounds
 
-  TANDEM_HD Body(const Shape& of, const Pose& of_file) : shape(&of), pose(for_stored_coordinates(of_file, of.origin)) {
+  TANDEM_HD Body(const Shape& of, const Pose& of_file)
+      : shape(&of), pose(for_stored_coordinates(of_file, of.origin)) {
     center = posed(of.center);
-    reach = std::fmax(std::fmax(std::fabs(center.x), std::fabs(center.y)), std::fabs(center.z)) + of.diagonal / 2;
+    reach =
+        std::fmax(std::fmax(std::fabs(center.x), std::fabs(center.y)), std::fabs(center.z)) + of.diagonal / 2;
   }
 
   TANDEM_HD Vector3 posed(const Vector3& x) const {
@@ -40,7 +42,9 @@ struct Body {
   TANDEM_HD Vector3 posed(const Triangle::Corner& corner) const {
     return posed(Vector3{corner.position[0], corner.position[1], corner.position[2]});
   }
-  TANDEM_HD Vector3 corner(std::uint32_t triangle, int k) const { return posed(shape->triangles[triangle].corner[k]); }
+  TANDEM_HD Vector3 corner(std::uint32_t triangle, int k) const {
+    return posed(shape->triangles[triangle].corner[k]);
+  }
   TANDEM_HD WorldTriangle triangle(std::uint32_t index) const {
     WorldTriangle out;
     const Triangle stored = shape->triangles[index];  // float4 loads

@@ -69,9 +69,10 @@ TANDEM_HD inline std::uint64_t edge_key(const TriangleTopology& t, int k) {
 /// What is known of all pieces together.
 struct PieceSummary {
   std::uint32_t pieces = 0, segments = 0, curves = 0;
-  bool degenerate = false;  ///< corners of one body lie in triangles of the other, or ends have no one partner
-  Vector3 origin;           ///< the middle of all ends
-  double unit = 1;          ///< a power of two, at least their distance from it along each axis
+  bool degenerate =
+      false;        ///< corners of one body lie in triangles of the other, or ends have no one partner
+  Vector3 origin;   ///< the middle of all ends
+  double unit = 1;  ///< a power of two, at least their distance from it along each axis
 };
 
 /// Finds the curves of one pair of bodies.
@@ -237,9 +238,9 @@ TANDEM_HD void CurveFinder<Team>::make_pieces(const Contact* contacts, std::uint
   summary_.unit = std::ldexp(1.0, exponent);
 }
 
-/// Ends are known by the edge and the triangle that meet there: every edge inside a surface has two triangles,
-/// so two pieces share the end. False where one is alone for another reason than an open surface's boundary:
-/// rounding chose another feature there, or a triangle pair is missing.
+/// Ends are known by the edge and the triangle that meet there: every edge inside a surface has two
+/// triangles, so two pieces share the end. False where one is alone for another reason than an open surface's
+/// boundary: rounding chose another feature there, or a triangle pair is missing.
 template <typename Team>
 TANDEM_HD bool CurveFinder<Team>::connect_by_ends() {
   const std::uint32_t size = 4 * summary_.pieces;
@@ -253,8 +254,7 @@ TANDEM_HD bool CurveFinder<Team>::connect_by_ends() {
       const std::uint32_t flags = topology(f.of_b, piece.triangle[f.of_b]).flags;
       many = many || has_many_triangles(flags, f.number);
       const std::uint32_t reference = i << 4 | end;
-      const std::uint32_t first =
-          insert(reference, size, [&](std::uint32_t of) { return end_key(of); });
+      const std::uint32_t first = insert(reference, size, [&](std::uint32_t of) { return end_key(of); });
       if (!is_boundary(flags, f.number)) alone += first == reference ? 1 : -1;
       if (first != reference) join(first >> 4, i);
     }
@@ -283,7 +283,8 @@ template <typename Team>
 TANDEM_HD void CurveFinder<Team>::sort_by_curve(std::uint32_t& next) {
   const std::uint32_t pieces = summary_.pieces;
   std::uint32_t firsts = 0;
-  for (std::uint32_t i = team_.rank(); i < pieces; i += team_.size()) firsts += team_.load(memory_.curve[i]) == i;
+  for (std::uint32_t i = team_.rank(); i < pieces; i += team_.size())
+    firsts += team_.load(memory_.curve[i]) == i;
   summary_.curves = team_.sum(firsts);
   if (summary_.curves <= 1) {
     for (std::uint32_t i = team_.rank(); i < pieces; i += team_.size()) memory_.order[i] = i;

@@ -26,8 +26,8 @@ struct ExactSum {
 #endif
   }
 
-  /// The nearest whole number. The sum with 1.5 * 2^52 is rounded to a whole number, which is in its last bits.
-  /// Condition: at most 2^51.
+  /// The nearest whole number. The sum with 1.5 * 2^52 is rounded to a whole number, which is in its last
+  /// bits. Condition: at most 2^51.
   TANDEM_HD static std::int64_t whole_number(double x, double& whole) {
     constexpr double kMagic = 0x1.8p52;
     const double sum = x + kMagic;

@@ -2,8 +2,8 @@
 #include "tandem/kernels/detail/manifold/patch_rim.h"
 #include "tandem/kernels/detail/manifold/team.h"
 
-/// What is done once all patches of a pair of bodies are known: holes are taken off, and points get names that
-/// last.
+/// What is done once all patches of a pair of bodies are known: holes are taken off, and points get names
+/// that last.
 namespace tandem::manifold {
 
 /// A point is the one of the step before if it has moved, on either body, by less than this part of the
@@ -14,7 +14,7 @@ inline constexpr double kSamePoint = 0.02;
 /// whose centre is nearest. patch(i): a patch of the pair.
 template <typename PatchOf>
 TANDEM_HD inline void take_off_hole(const Patch& hole, std::uint32_t count, const PatchOf& patch) {
-  const auto vector = [](const double (&x)[3]) { return Vector3{x[0], x[1], x[2]}; };
+  const auto vector = [](const double(&x)[3]) { return Vector3{x[0], x[1], x[2]}; };
   const Vector3 centre = vector(hole.manifold.centre), normal = vector(hole.manifold.normal);
   Patch* nearest = nullptr;
   double least = INFINITY;
@@ -22,14 +22,16 @@ TANDEM_HD inline void take_off_hole(const Patch& hole, std::uint32_t count, cons
     Patch& other = patch(i);
     if (other.hole != 0 || !(dot(vector(other.manifold.normal), normal) < 0)) continue;
     const double distance = norm(vector(other.manifold.centre) - centre);
-    if (distance < least || (distance == least && other.key < nearest->key)) nearest = &other, least = distance;
+    if (distance < least || (distance == least && other.key < nearest->key))
+      nearest = &other, least = distance;
   }
   if (nearest == nullptr) return;
   Manifold& m = nearest->manifold;
   const double own = norm(vector(m.area_vector)), of_hole = norm(vector(hole.manifold.area_vector));
   // The middle stays at its height.
   const Vector3 n = vector(m.normal), apart = vector(m.centre) - centre;
-  const Vector3 across = own > of_hole ? (of_hole / (own - of_hole)) * (apart - dot(n, apart) * n) : Vector3{};
+  const Vector3 across =
+      own > of_hole ? (of_hole / (own - of_hole)) * (apart - dot(n, apart) * n) : Vector3{};
   m.centre[0] += across.x, m.centre[1] += across.y, m.centre[2] += across.z;
   for (int k = 0; k < 3; ++k) m.area_vector[k] += hole.manifold.area_vector[k];
 }
@@ -53,11 +55,11 @@ class PointMatcher {
                        std::uint32_t count, const Step& before) const {
     for (std::uint32_t i = first + team_.rank(); i < first + count; i += team_.size()) {
       points[i].previous = kNoIndex;
-      const std::uint32_t old = nearest(points[i], manifolds[points[i].manifold], before.points, before.manifolds,
-                                        before.first, before.count);
+      const std::uint32_t old = nearest(points[i], manifolds[points[i].manifold], before.points,
+                                        before.manifolds, before.first, before.count);
       if (old == kNoIndex) continue;
-      const std::uint32_t back = nearest(before.points[old], before.manifolds[before.points[old].manifold], points,
-                                         manifolds, first, count);
+      const std::uint32_t back = nearest(before.points[old], before.manifolds[before.points[old].manifold],
+                                         points, manifolds, first, count);
       if (back == i) points[i].previous = old;
     }
     team_.sync();
@@ -84,8 +86,9 @@ class PointMatcher {
     return x * x + y * y + z * z;
   }
   /// Of the points of another step that push in about the same direction. Of two as near the first.
-  TANDEM_HD std::uint32_t nearest(const ManifoldPoint& point, const Manifold& manifold, const ManifoldPoint* others,
-                                  const Manifold* of_others, std::uint32_t first, std::uint32_t count) const {
+  TANDEM_HD std::uint32_t nearest(const ManifoldPoint& point, const Manifold& manifold,
+                                  const ManifoldPoint* others, const Manifold* of_others, std::uint32_t first,
+                                  std::uint32_t count) const {
     std::uint32_t found = kNoIndex;
     double least = reach_ * reach_;
     for (std::uint32_t i = first; i < first + count; ++i) {

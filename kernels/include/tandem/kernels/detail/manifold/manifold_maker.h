@@ -30,8 +30,8 @@ class ManifoldMaker {
         summary_(summary),
         most_points_(most_points) {}
 
-  /// Makes the patch of a curve that CurveFinder found, whose summary this is. new_patch(): where it is to lie,
-  /// or null; called by one of the team if there is one. False: an ambiguous touch.
+  /// Makes the patch of a curve that CurveFinder found, whose summary this is. new_patch(): where it is to
+  /// lie, or null; called by one of the team if there is one. False: an ambiguous touch.
   template <typename NewPatch>
   TANDEM_HD bool make(std::uint32_t curve, const NewPatch& new_patch);
 
@@ -49,7 +49,8 @@ class ManifoldMaker {
   TANDEM_HD void walk_lines(LineQuestions& questions, std::uint32_t count);
   TANDEM_HD void sound(const PatchFrame& frame, int first, int count);
   TANDEM_HD void sound_deepest(const PatchFrame& frame, const Rim& rim, std::uint32_t curve);
-  TANDEM_HD Extreme extreme_corner(const PatchFrame& frame, std::uint32_t begin, std::uint32_t end, int side) const;
+  TANDEM_HD Extreme extreme_corner(const PatchFrame& frame, std::uint32_t begin, std::uint32_t end,
+                                   int side) const;
   TANDEM_HD void look_behind(const PatchFrame& frame);
   TANDEM_HD int choose(const RimFinder<Team>& finder, int most_of_rim, bool touch,
                        Chosen (&chosen)[kMostSoundings]) const;
@@ -60,8 +61,8 @@ class ManifoldMaker {
   PatchMemory& shared_;
   const PieceSummary& summary_;
   int most_points_;
-  Vector2 middle_;       // of the rim
-  double extent_ = 0;    // of the rim, from its middle
+  Vector2 middle_;     // of the rim
+  double extent_ = 0;  // of the rim, from its middle
   int rim_points_ = 0, soundings_ = 0;
 };
 
@@ -259,8 +260,8 @@ TANDEM_HD void ManifoldMaker<Team>::look_behind(const PatchFrame& frame) {
   team_.sync();
 }
 
-/// The first points of the rim as it is sounded, and the deepest inner point where it lies deeper. Deeper points come first, then
-/// those further out; of points near each other the first stays.
+/// The first points of the rim as it is sounded, and the deepest inner point where it lies deeper. Deeper
+/// points come first, then those further out; of points near each other the first stays.
 template <typename Team>
 TANDEM_HD int ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, int most_of_rim, bool touch,
                                           Chosen (&chosen)[kMostSoundings]) const {
@@ -352,7 +353,8 @@ TANDEM_HD bool ManifoldMaker<Team>::make(std::uint32_t curve, const NewPatch& ne
   count = count < most_points_ ? count : most_points_;
   const double near = kNear * bodies_.smaller_diagonal();
   for (int i = 0; i < count; ++i) {
-    if (!chosen[i].inner) chosen[i].feature = rim_finder.least_feature_near(chosen[i].at, near / 2, chosen[i].feature);
+    if (!chosen[i].inner)
+      chosen[i].feature = rim_finder.least_feature_near(chosen[i].at, near / 2, chosen[i].feature);
   }
   if (team_.rank() != 0) return true;
   Patch* const patch = new_patch();
@@ -379,7 +381,7 @@ TANDEM_HD bool ManifoldMaker<Team>::make(std::uint32_t curve, const NewPatch& ne
     area = (std::fabs(twice) / 2) * normal.n;
   }
   if (normal.touch) area = {};
-  const auto write = [](const Vector3& x, double (&out)[3]) { out[0] = x.x, out[1] = x.y, out[2] = x.z; };
+  const auto write = [](const Vector3& x, double(&out)[3]) { out[0] = x.x, out[1] = x.y, out[2] = x.z; };
   Manifold& manifold = patch->manifold;
   manifold = {};
   write(normal.n, manifold.normal);

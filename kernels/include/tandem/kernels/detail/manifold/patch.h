@@ -22,14 +22,16 @@ struct CurveMeasure {
   Vector3 middle;  ///< of the pieces
   double length = 0;
   bool closed = true;
-  Vector3 sheet_normal;  ///< of the pieces' triangles, from a towards b, times lengths, where it is not closed; of open surfaces where there are any
+  Vector3 sheet_normal;  ///< of the pieces' triangles, from a towards b, times lengths, where it is not
+                         ///< closed; of open surfaces where there are any
   std::uint64_t key = 0;
 };
 
 /// The direction in which the bodies of a patch push each other.
 struct PatchNormal {
-  Vector3 n;           ///< unit, from a towards b
-  bool known = false;  ///< no: corners or edges that touch each other, where no direction is better than another
+  Vector3 n;  ///< unit, from a towards b
+  bool known =
+      false;  ///< no: corners or edges that touch each other, where no direction is better than another
   bool touch = false;  ///< the surfaces meet without area
 };
 
@@ -62,7 +64,8 @@ struct Sounding {
   int rank = 0;             ///< of a rim point
   int vertex_of = -1;       ///< the side whose vertex it is; -1: none's
   Crossing surface[2];      ///< a's, that faces along the normal; b's, that faces against it
-  Crossing behind[2];       ///< where a begins, on the line, if that is above b's surface; where b ends, if that is below a's
+  Crossing behind[2];  ///< where a begins, on the line, if that is above b's surface; where b ends, if that
+                       ///< is below a's
   bool looked_behind;
 
   TANDEM_HD double overlap() const {
@@ -77,9 +80,7 @@ struct Sounding {
     return begin < end;
   }
   /// Whether one body ends within the other. Condition: looked_behind, within().
-  TANDEM_HD bool goes_through() const {
-    return behind[0].found() || behind[1].found();
-  }
+  TANDEM_HD bool goes_through() const { return behind[0].found() || behind[1].found(); }
 };
 
 /// Rim, the middle, and twice a's highest vertex and b's lowest.

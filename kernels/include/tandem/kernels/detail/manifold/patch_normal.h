@@ -162,7 +162,8 @@ TANDEM_HD bool NormalFinder<Team>::gather_directions(int side) {
     if (found == kMostDirections) return false;
     const auto triangle = static_cast<std::uint32_t>(side == 0 ? key >> 32 : key);
     const WorldTriangle t = bodies_[side].triangle(triangle);
-    known = {{static_cast<float>(t.normal.x), static_cast<float>(t.normal.y), static_cast<float>(t.normal.z)}};
+    known = {
+        {static_cast<float>(t.normal.x), static_cast<float>(t.normal.y), static_cast<float>(t.normal.z)}};
     direction_[directions_++] = {side == 0 ? t.normal : -t.normal, key};
   }
 }
@@ -172,10 +173,12 @@ TANDEM_HD bool NormalFinder<Team>::gather_directions(int side) {
 template <typename Team>
 TANDEM_HD void NormalFinder<Team>::find_bearing_faces(const Vector3& smooth, double length) {
   directions_ = 0;
-  const FloatVector up = {{static_cast<float>(smooth.x), static_cast<float>(smooth.y), static_cast<float>(smooth.z)}};
+  const FloatVector up = {
+      {static_cast<float>(smooth.x), static_cast<float>(smooth.y), static_cast<float>(smooth.z)}};
   const auto normal_of = [](const float* normals, int side) {
     const float sign = side == 0 ? 1.0f : -1.0f;
-    return FloatVector{{sign * normals[3 * side], sign * normals[3 * side + 1], sign * normals[3 * side + 2]}};
+    return FloatVector{
+        {sign * normals[3 * side], sign * normals[3 * side + 1], sign * normals[3 * side + 2]}};
   };
   for (int side = 0; side < 2; ++side) {
     float most = 0.9f;
@@ -226,8 +229,8 @@ TANDEM_HD void NormalFinder<Team>::spread_along(const Vector3* directions, int c
 /// Where few flat faces meet, as boxes do, the curve's own normal leans a little, by depth over length: along
 /// the face normal that separates the patch's triangles soonest they stay upright. How far b must move until
 /// a plane lies between all of the triangles counts, not how deep the overlap is: the tip of a pyramid in the
-/// ground is narrower than it is deep, yet the ground goes on. A body whose triangles in the patch all face one way
-/// is such a ground, and nothing else is to be compared.
+/// ground is narrower than it is deep, yet the ground goes on. A body whose triangles in the patch all face
+/// one way is such a ground, and nothing else is to be compared.
 template <typename Team>
 TANDEM_HD Vector3 NormalFinder<Team>::face_nearest(const Vector3& smooth, double length) {
   directions_ = 0;

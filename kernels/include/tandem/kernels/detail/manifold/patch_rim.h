@@ -105,7 +105,8 @@ TANDEM_HD void RimFinder<Team>::gather(bool each_end_twice, std::uint32_t& next)
       if (twice_area > 0) add_moments(twice_area / 2, (1 / twice_area) * sum);
       continue;
     }
-    for (std::uint32_t end = 0; end < (each_end_twice ? 1u : 2u); ++end) add(piece.end[end], at * 8 + end, next);
+    for (std::uint32_t end = 0; end < (each_end_twice ? 1u : 2u); ++end)
+      add(piece.end[end], at * 8 + end, next);
     const Vector2 x = frame_.flat(piece.end[0]), y = frame_.flat(piece.end[1]);
     add_moments(piece.weight() * cross(x, y), x + y);
   }
@@ -187,8 +188,8 @@ TANDEM_HD Rim RimFinder<Team>::find(int most, const Vector2& middle) const {
   float limit = kThin * one.value, area = 0;
   for (int first = 0, second = 1; rim.points < most;) {
     of_side[first] = of_side[second] = {0, kNoIndex};
-    furthest(beyond(rim.at[first], rim.at[next(first)]), beyond(rim.at[second], rim.at[next(second)]), of_side[first],
-             of_side[second]);
+    furthest(beyond(rim.at[first], rim.at[next(first)]), beyond(rim.at[second], rim.at[next(second)]),
+             of_side[first], of_side[second]);
     int side = 0;
     for (int i = 1; i < rim.points; ++i) side = of_side[i].value > of_side[side].value ? i : side;
     if (!(of_side[side].value > limit)) return rim;
@@ -215,7 +216,8 @@ TANDEM_HD inline std::uint64_t feature_hash(std::uint64_t x, std::uint64_t y) {
   return hash == 0 ? 1 : hash;
 }
 
-/// What a candidate is called: by the edge or vertex of one body and the triangle of the other that meet there.
+/// What a candidate is called: by the edge or vertex of one body and the triangle of the other that meet
+/// there.
 template <typename Team>
 TANDEM_HD std::uint64_t RimFinder<Team>::feature(std::uint32_t reference) const {
   const Piece& of = piece(reference);

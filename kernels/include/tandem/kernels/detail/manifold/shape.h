@@ -4,7 +4,8 @@
 namespace tandem::manifold {
 
 /// lower, upper, origin: as a file's header has them.
-inline void set_bounds(const float (&lower)[3], const float (&upper)[3], const double (&origin)[3], Shape& shape) {
+inline void set_bounds(const float (&lower)[3], const float (&upper)[3], const double (&origin)[3],
+                       Shape& shape) {
   const Vector3 from = {lower[0], lower[1], lower[2]}, to = {upper[0], upper[1], upper[2]};
   for (int k = 0; k < 3; ++k) shape.origin[k] = origin[k];
   shape.center = 0.5 * (from + to);

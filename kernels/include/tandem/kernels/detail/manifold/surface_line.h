@@ -77,7 +77,8 @@ struct BlockAxes {
   }
 };
 
-/// The nodes of a block whose boxes pass a test, a bit each. The block is read as a whole: float4 loads on a GPU.
+/// The nodes of a block whose boxes pass a test, a bit each. The block is read as a whole: float4 loads on a
+/// GPU.
 template <typename AnyBlock, typename Test>
 TANDEM_HD inline unsigned nodes_that_pass(const AnyBlock& block, const Test& test) {
   unsigned mask = 0;
@@ -110,12 +111,12 @@ struct WalkMemory {
   std::uint32_t count;
 };
 
-/// Answers questions about posed bodies with a crew: those of a team who walk trees together. Each takes a block
-/// for a question; what it finds among the triangles of a leaf block is merged with what is known.
+/// Answers questions about posed bodies with a crew: those of a team who walk trees together. Each takes a
+/// block for a question; what it finds among the triangles of a leaf block is merged with what is known.
 /// Questions: body(question) says which body is walked; test(question) has passes(center, half_extent), and
-/// turned(axes), the same test for boxes along these axes (imaginary boxes pass no test that compares with <=);
-/// visit(question, triangle, found) looks at a triangle, and merge(question, found) keeps what is better; a Found
-/// is true where there is something.
+/// turned(axes), the same test for boxes along these axes (imaginary boxes pass no test that compares with
+/// <=); visit(question, triangle, found) looks at a triangle, and merge(question, found) keeps what is
+/// better; a Found is true where there is something.
 template <typename Team, typename Questions>
 TANDEM_HD inline void walk_surfaces(const Team& team, WalkMemory& memory, Questions& questions) {
   for (;;) {
@@ -191,9 +192,9 @@ struct LineTest {
   }
 };
 
-/// Which crossing of a line with a surface is asked for: the one nearest in height to `target`, between lower and
-/// upper, of triangles whose outward normals point along the frame's (facing 1) or against it (-1). Of two as
-/// near the triangle that comes first.
+/// Which crossing of a line with a surface is asked for: the one nearest in height to `target`, between lower
+/// and upper, of triangles whose outward normals point along the frame's (facing 1) or against it (-1). Of
+/// two as near the triangle that comes first.
 struct LineQuestion {
   Vector2 at;
   double target, lower, upper;
@@ -214,8 +215,8 @@ class LineQuestions {
       : bodies_(bodies), frame_(frame), questions_(questions) {}
 
   /// expected: how far from the target it is, mostly; it is looked for there first.
-  TANDEM_HD void ask(std::uint32_t question, int side, int facing, const Vector2& at, double target, double lower,
-                     double upper, double expected) {
+  TANDEM_HD void ask(std::uint32_t question, int side, int facing, const Vector2& at, double target,
+                     double lower, double upper, double expected) {
     LineQuestion& q = questions_[question];
     q.at = at;
     q.target = target, q.lower = lower, q.upper = upper;
@@ -229,8 +230,8 @@ class LineQuestions {
     look_within(q, expected);
   }
 
-  /// Where nothing lies as near as expected, it has to be looked for further away. Not all boxes there were looked
-  /// at, so what was found there need not be the nearest.
+  /// Where nothing lies as near as expected, it has to be looked for further away. Not all boxes there were
+  /// looked at, so what was found there need not be the nearest.
   TANDEM_HD bool look_further(std::uint32_t question) {
     LineQuestion& q = questions_[question];
     if (q.nearest <= q.most) return false;
@@ -263,14 +264,14 @@ class LineQuestions {
     if ((area > 0) != ((q.facing > 0) != turned) || !(std::fabs(area) > kWall * size)) return;
     Vector2 side[3];
     for (int k = 0; k < 3; ++k) side[k] = Vector2{dot(frame_.u, corner[k]), dot(frame_.v, corner[k])} - q.at;
-    // Shares of the corners. What lies on an edge, or beside it by no more than rounding of posed points and a
-    // little of the triangle, belongs to both triangles: no line slips through.
+    // Shares of the corners. What lies on an edge, or beside it by no more than rounding of posed points and
+    // a little of the triangle, belongs to both triangles: no line slips through.
     const double first = cross(side[1], side[2]) / area, second = cross(side[2], side[0]) / area,
                  third = cross(side[0], side[1]) / area;
     const double little = 1e-9 + 0x1p-48 * body.reach * std::sqrt(size) / std::fabs(area);
     if (!(first >= -little && second >= -little && third >= -little)) return;
-    const double height =
-        first * dot(frame_.n, corner[0]) + second * dot(frame_.n, corner[1]) + third * dot(frame_.n, corner[2]);
+    const double height = first * dot(frame_.n, corner[0]) + second * dot(frame_.n, corner[1]) +
+                          third * dot(frame_.n, corner[2]);
     if (!(height >= q.lower && height <= q.upper)) return;
     const double distance = std::fabs(height - q.target);
     if (distance > found.distance || (distance == found.distance && t >= found.crossing.triangle)) return;
@@ -337,7 +338,8 @@ struct PrismTest {
       return std::fabs(e.x[0]) * h.x[0] + std::fabs(e.x[1]) * h.x[1] + std::fabs(e.x[2]) * h.x[2] + slack;
     };
     const float along = dot(direction, d), reach = extent(direction);
-    if (!(along + reach >= furthest && along - reach <= most_below && along + reach >= least_below)) return false;
+    if (!(along + reach >= furthest && along - reach <= most_below && along + reach >= least_below))
+      return false;
     for (int i = 0; i < sides; ++i) {
       if (!(dot(side[i], d) - extent(side[i]) <= offset[i])) return false;
     }
@@ -355,7 +357,8 @@ struct Extreme {
   TANDEM_HD explicit operator bool() const { return found(); }
 };
 
-/// The highest vertex of a (question 0) and the lowest of b (1) in a prism. Of several the one of the least number.
+/// The highest vertex of a (question 0) and the lowest of b (1) in a prism. Of several the one of the least
+/// number.
 class ExtremeQuestions {
  public:
   /// test, extreme: two each, that all of the crew see.
@@ -407,7 +410,8 @@ class ExtremeQuestions {
 
   TANDEM_HD static bool is_further(std::uint32_t question, const Extreme& x, const Extreme& than) {
     if (!than.found()) return true;
-    const double of_x = question == 0 ? x.height : -x.height, of_than = question == 0 ? than.height : -than.height;
+    const double of_x = question == 0 ? x.height : -x.height,
+                 of_than = question == 0 ? than.height : -than.height;
     return of_x > of_than || (of_x == of_than && x.vertex < than.vertex);
   }
 

@@ -33,7 +33,8 @@ struct OneThread {
   TANDEM_HD static bool in_crew() { return true; }
   TANDEM_HD static std::uint32_t crew_size() { return 1; }
   TANDEM_HD static void crew_sync() {}
-  /// Calls of() for each of the crew that has found something, one after the other. All of the crew come here.
+  /// Calls of() for each of the crew that has found something, one after the other. All of the crew come
+  /// here.
   template <typename Found, typename Of>
   TANDEM_HD static void one_by_one(const Found& found, const Of& of) {
     if (found) of();
@@ -47,7 +48,8 @@ struct OneThread {
     at += value;
     return before;
   }
-  TANDEM_HD static std::uint32_t compare_and_swap(std::uint32_t& at, std::uint32_t expected, std::uint32_t value) {
+  TANDEM_HD static std::uint32_t compare_and_swap(std::uint32_t& at, std::uint32_t expected,
+                                                  std::uint32_t value) {
     const std::uint32_t before = at;
     if (before == expected) at = value;
     return before;

@@ -26,12 +26,12 @@ inline constexpr int kMostCorners = 6;
 /// What two triangles have in common.
 struct Meeting {
   MeetingKind kind = MeetingKind::none;
-  bool degenerate = false;       ///< a corner lies in the other's plane
-  Vector3 end[2];                ///< of a segment, run along as normal_a x normal_b points; of a point, twice
+  bool degenerate = false;  ///< a corner lies in the other's plane
+  Vector3 end[2];           ///< of a segment, run along as normal_a x normal_b points; of a point, twice
   TriangleFeature feature[2] = {};
 
-  /// Whether the segment is an edge of a; of b. Then it counts half, and half again: neighbours that share the
-  /// edge, or a body that only touches there, have the rest.
+  /// Whether the segment is an edge of a; of b. Then it counts half, and half again: neighbours that share
+  /// the edge, or a body that only touches there, have the rest.
   bool along_edge[2] = {};
 
   // Of a polygon: triangles in one plane.

@@ -7,8 +7,8 @@
 /// -ffp-contract=off and device code with --fmad=false, so that both give the same bits.
 namespace tandem::manifold {
 
-/// One instruction each, where fmin() and fmax() of a C library may be calls. Of NaN and a number the result is
-/// the second.
+/// One instruction each, where fmin() and fmax() of a C library may be calls. Of NaN and a number the result
+/// is the second.
 template <typename T>
 TANDEM_HD inline T lesser(T x, T y) {
   return x < y ? x : y;
@@ -31,11 +31,15 @@ struct Vector3 {
   TANDEM_HD Vector3 operator-() const { return {-x, -y, -z}; }
 };
 
-TANDEM_HD inline double dot(const Vector3& p, const Vector3& q) { return p.x * q.x + p.y * q.y + p.z * q.z; }
+TANDEM_HD inline double dot(const Vector3& p, const Vector3& q) {
+  return p.x * q.x + p.y * q.y + p.z * q.z;
+}
 TANDEM_HD inline Vector3 cross(const Vector3& p, const Vector3& q) {
   return {p.y * q.z - p.z * q.y, p.z * q.x - p.x * q.z, p.x * q.y - p.y * q.x};
 }
-TANDEM_HD inline double norm(const Vector3& p) { return std::sqrt(dot(p, p)); }
+TANDEM_HD inline double norm(const Vector3& p) {
+  return std::sqrt(dot(p, p));
+}
 
 /// Of length 1. Condition: p is not 0, and its square neither overflows nor vanishes.
 TANDEM_HD inline Vector3 normalized(const Vector3& p) {
@@ -58,8 +62,14 @@ struct Vector2 {
   TANDEM_HD friend Vector2 operator*(double s, const Vector2& p) { return {s * p.x, s * p.y}; }
 };
 
-TANDEM_HD inline double dot(const Vector2& p, const Vector2& q) { return p.x * q.x + p.y * q.y; }
-TANDEM_HD inline double cross(const Vector2& p, const Vector2& q) { return p.x * q.y - p.y * q.x; }
-TANDEM_HD inline double norm(const Vector2& p) { return std::sqrt(dot(p, p)); }
+TANDEM_HD inline double dot(const Vector2& p, const Vector2& q) {
+  return p.x * q.x + p.y * q.y;
+}
+TANDEM_HD inline double cross(const Vector2& p, const Vector2& q) {
+  return p.x * q.y - p.y * q.x;
+}
+TANDEM_HD inline double norm(const Vector2& p) {
+  return std::sqrt(dot(p, p));
+}
 
 }  // namespace tandem::manifold

@@ -1,0 +1,44 @@
+#include "contained.h"
+
+#include <algorithm>
+#include <new>
+
+namespace tandem::bench {
+namespace {
+
+void require(Status status) {
+  if (status == Status::kOutOfMemory) throw std::bad_alloc();
+  if (status != Status::kOk) throw std::runtime_error(explain(status));
+}
+
+}  // namespace
+
+TimedContainments find_contained(const Scene& scene, std::span<const ObjectPair> pairs,
+                                 std::span<const TriangleContact> contacts, std::uint32_t threads,
+                                 std::uint32_t repeats) {
+  std::vector<Contact> sorted;
+  sorted.reserve(contacts.size());
+  for (const auto& [pair, a, b] : contacts) sorted.push_back({pair, a, b, 0, 0});
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const Contact& x, const Contact& y) { return x.pair < y.pair; });
+  ContainmentQuery query;
+  const Status status = query.set_assets(scene.views());
+  if (status == Status::kNoTopology)
+    throw FileError(scene.description.assets[query.where()] + ": " + explain(status));
+  require(status);
+  TimedContainments found;
+  for (std::uint32_t i = 0; i < repeats; ++i) {
+    Stopwatch watch;
+    require(query.find(scene.description.instances, pairs, sorted, threads));
+    found.seconds.push_back(watch.lap());
+  }
+  found.rows.assign(query.contained().begin(), query.contained().end());
+  return found;
+}
+
+std::uint64_t count_inside(std::span<const Containment> rows) {
+  return static_cast<std::uint64_t>(std::count_if(
+      rows.begin(), rows.end(), [](const Containment& row) { return (row.flags & kInside) != 0; }));
+}
+
+}  // namespace tandem::bench

@@ -15,6 +15,10 @@ using manifold::PieceMemory;
 
 constexpr std::uint32_t kThreads = 128, kWarps = kThreads / 32;
 
+// Contacts of a pair, and pieces of a curve, that a warp takes on; a block those that have more. Most of a
+// patch is work for few threads, so warps of their own do more of them at a time.
+constexpr std::uint32_t kMostOfWarp = 768;
+
 // Pieces are numbered in 28 bits, and table entries in 32.
 constexpr std::uint32_t kMostContactsOfPair = std::uint32_t{1} << 27;
 
@@ -55,7 +59,7 @@ __device__ void find_curves_of(const ManifoldArgs& args, const Team& team, std::
     if (summary.segments > 0) atomicAdd(&args.state->segments, Counter{summary.segments});
   }
   for (std::uint32_t curve = team.rank(); curve < summary.curves; curve += team.size()) {
-    const bool many = memory.start[curve + 1] - memory.start[curve] > kFewContacts;
+    const bool many = memory.start[curve + 1] - memory.start[curve] > kMostOfWarp;
     const std::uint32_t place =
         atomicAdd(many ? &args.state->curves_of_many : &args.state->curves_of_few, 1u);
     args.curves[many ? place : args.capacity.contacts - 1 - place] = {pair, curve};
@@ -63,7 +67,8 @@ __device__ void find_curves_of(const ManifoldArgs& args, const Team& team, std::
   team.sync();
 }
 
-/// Calls of(team, row) for rows below `many` with a block, and for rows below `few` with a warp.
+/// Calls of(team, row, true) for rows below `many` with a block, and of(team, row, false) for rows below
+/// `few` with a warp.
 template <typename Of>
 __device__ void share_out(std::uint32_t many, std::uint32_t few, std::uint32_t& next_many,
                           std::uint32_t& next_few, Counter* scratch, const Of& of) {
@@ -93,10 +98,15 @@ __global__ void __launch_bounds__(kThreads, 4) find_curves(const __grid_constant
   wait_for_kernel_before();
   if (!has_query(args)) return;
   const GpuGroupCounts& counts = *args.groups.counts;
-  share_out(counts.many, counts.few, args.state->next_many, args.state->next_few, scratch,
-            [&](const auto& team, std::uint32_t row, bool many) {
-              find_curves_of(args, team, next[many ? 0 : threadIdx.x / 32],
-                             many ? args.groups.many[row] : args.groups.few[row]);
+  // Pairs that the query calls those with many contacts come up twice: for blocks, and for warps.
+  share_out(counts.many, counts.many + counts.few, args.state->next_many, args.state->next_few, scratch,
+            [&](const auto& team, std::uint32_t row, bool by_block) {
+              const std::uint32_t pair =
+                  row < counts.many ? args.groups.many[row] : args.groups.few[row - counts.many];
+              const std::uint32_t contacts =
+                  args.groups.first_contact[pair + 1] - args.groups.first_contact[pair];
+              if (by_block != (contacts > kMostOfWarp)) return;
+              find_curves_of(args, team, next[by_block ? 0 : threadIdx.x / 32], pair);
             });
 }
 

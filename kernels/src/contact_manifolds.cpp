@@ -191,7 +191,9 @@ void ContactManifolds::State::make_patches(std::size_t from, std::size_t to, std
     }
     const Instance &a = instances[pair.a], &b = instances[pair.b];
     const BodyPair bodies = {{shapes[a.asset], a.pose}, {shapes[b.asset], b.pose}};
-    manifold::ManifoldMaker<OneThread> maker(team, bodies, memory, shared, most_points);
+    manifold::CurveFinder<OneThread> finder(team, bodies, memory);
+    const manifold::PieceSummary summary = finder.find(contacts.data() + begin[row.pair], count, shared.next);
+    manifold::ManifoldMaker<OneThread> maker(team, bodies, memory, shared, summary, most_points);
     const auto new_patch = [&]() -> Patch* {
       if (!own.patches.push({})) {
         own.enough_memory = false;
@@ -199,9 +201,10 @@ void ContactManifolds::State::make_patches(std::size_t from, std::size_t to, std
       }
       return &own.patches[own.patches.size() - 1];
     };
-    const manifold::PairCounters found = maker.make(contacts.data() + begin[row.pair], count, new_patch);
-    own.segments += found.segments;
-    own.ambiguous_touches += found.ambiguous_touches;
+    own.segments += summary.segments;
+    for (std::uint32_t curve = 0; curve < summary.curves; ++curve) {
+      if (!maker.make(curve, new_patch)) ++own.ambiguous_touches;
+    }
     row.patches = static_cast<std::uint32_t>(own.patches.size() - row.first_patch);
     for (std::uint32_t k = 0; k < row.patches; ++k) {
       const Patch& patch = own.patches[row.first_patch + k];

@@ -6,7 +6,7 @@
 
 #include "narrow_phase.h"
 #include "tandem/kernels/detail/block_pair.h"
-#include "tandem/kernels/detail/frame_test.h"
+#include "tandem/kernels/detail/grid_test.h"
 #include "tandem/kernels/detail/instance_check.h"
 #include "worker_threads.h"
 
@@ -22,6 +22,7 @@ constexpr std::size_t kInstancesAtOnce = 64, kChunksAtOnce = 8;
 struct Asset {
   LevelView tree;
   TreeExtent extent;
+  double grid;
   double origin[3];
   float lower[3], upper[3];
 };
@@ -122,42 +123,53 @@ std::uint32_t ContactQuery::State::workers_for(std::size_t things, std::size_t a
   return static_cast<std::uint32_t>(std::clamp<std::size_t>(parts, 1, most_workers()));
 }
 
-// Poses of stored coordinates, and world boxes, from instance i on. i: the end, or the first that is refused.
+// Poses of stored coordinates, and world boxes, from instance i on, of those that are not kept. i: the end,
+// or the first that is refused; by place among them.
 Status ContactQuery::State::pose_from(std::span<const Instance> posed, std::size_t& i, std::size_t end) {
   const auto asset_count = static_cast<std::uint32_t>(std::min<std::size_t>(assets.size(), kNoIndex));
   for (; i < end; ++i) {
-    const Status status =
-        pose_instance(assets.data(), asset_count, posed[i].asset, posed[i].pose, instances[i].pose, boxes[i]);
+    const std::uint32_t at = broad_phase.free_box(i);
+    const Instance& instance = posed[at];
+    const Status status = pose_instance(assets.data(), asset_count, instance.asset, instance.pose,
+                                        instances[at].pose, boxes[at]);
     if (status != Status::kOk) return status;
-    instances[i].tree = assets[posed[i].asset].tree;
-    instances[i].extent = assets[posed[i].asset].extent;
+    instances[at].tree = assets[instance.asset].tree;
+    instances[at].extent = assets[instance.asset].extent;
+    instances[at].grid = assets[instance.asset].grid;
   }
   return Status::kOk;
 }
 
-// Every part ends with its own first instance that is refused; the first of these is to blame.
+// Every part ends with its own first instance that is refused; the first of these is to blame. What is kept
+// of instances stays, because there are as many as before.
 Status ContactQuery::State::pose_instances(std::span<const Instance> posed) {
   if (posed.size() >= kNoIndex) return fail(Status::kTooManyInstances, 0);
+  if (broad_phase.kept_of() != 0 && broad_phase.kept_of() != posed.size())
+    return fail(Status::kKeptMismatch, 0);
   if (!instances.resize(posed.size()) || !boxes.resize(posed.size())) return fail(Status::kOutOfMemory, 0);
-  const std::uint32_t posing = workers_for(posed.size(), kInstancesAtOnce);
+  const std::size_t count = broad_phase.free_count(posed.size());
+  const std::uint32_t posing = workers_for(count, kInstancesAtOnce);
   if (!threads.provide(posing)) return fail(Status::kCannotStartThread, 0);
-  std::atomic<std::size_t> first_refused = posed.size();
+  std::atomic<std::size_t> first_refused = count;
   const auto pose_part = [&](std::size_t i, std::size_t end, std::uint32_t) {
     if (pose_from(posed, i, end) == Status::kOk) return;
     std::size_t first = first_refused;
     while (i < first && !first_refused.compare_exchange_weak(first, i)) {
     }
   };
-  threads.for_parts(posing, posed.size(), kInstancesAtOnce, pose_part);
+  threads.for_parts(posing, count, kInstancesAtOnce, pose_part);
   std::size_t refused = first_refused;
-  const Status status = pose_from(posed, refused, std::min(refused + 1, posed.size()));
-  return status == Status::kOk ? status : fail(status, refused);
+  const Status status = pose_from(posed, refused, std::min(refused + 1, count));
+  return status == Status::kOk ? status : fail(status, broad_phase.free_box(refused));
 }
 
 Status ContactQuery::State::find_pairs() {
-  const Status status = broad_phase.find_pairs(boxes.view(), options.self_pairs, threads,
-                                               workers_for(boxes.size(), kInstancesAtOnce));
-  if (status != Status::kOk) return fail(status, 0);
+  const PairFilter filter = options.filter != nullptr ? *options.filter : PairFilter();
+  const std::size_t count = broad_phase.free_count(boxes.size());
+  const Status status = broad_phase.find_pairs(boxes.view(), filter, options.self_pairs, threads,
+                                               workers_for(count, kInstancesAtOnce));
+  if (status != Status::kOk)
+    return fail(status, status == Status::kUnknownInstance ? filter.excluded.row : 0);
   pairs = broad_phase.pairs();
   return status;
 }
@@ -194,16 +206,10 @@ bool ContactQuery::State::provide_workers() {
 }
 
 PairTask ContactQuery::State::task_of(std::uint32_t pair) const {
-  const PosedTree &a = instances[pairs[pair].a], &b = instances[pairs[pair].b];
-  PairTask task;
-  task.a = &a;
-  task.b = &b;
+  PairTask task = pair_task(instances[pairs[pair].a], instances[pairs[pair].b]);
   task.pair = pair;
   task.mode = options.mode;
   task.first_contact_only = options.first_contact_only;
-  task.self = &a == &b;
-  task.in_frame = relative_pose(a.pose, a.extent, b.pose, b.extent, task.b_in_a) == RelativePoseStatus::kOk;
-  task.frame_error = task.in_frame ? frame_error(task.b_in_a, a.extent, b.extent) : 0;
   return task;
 }
 
@@ -285,6 +291,7 @@ ContactQuery::~ContactQuery() = default;
 Status ContactQuery::set_assets(std::span<const AssetView> assets) {
   if (state_ == nullptr) return Status::kOutOfMemory;
   state_->forget_results();
+  state_->broad_phase.forget_fixed();
   state_->assets.clear();
   for (std::size_t i = 0; i < assets.size(); ++i) {
     if (assets[i].header == nullptr || assets[i].levels.empty())
@@ -295,6 +302,7 @@ Status ContactQuery::set_assets(std::span<const AssetView> assets) {
     Asset& asset = state_->assets[i];
     asset.tree = assets[i].level();
     asset.extent = extent_of(asset.tree.blocks[0]);
+    asset.grid = grid_of(asset.tree, asset.extent);
     const FileHeader& header = *assets[i].header;
     for (int k = 0; k < 3; ++k) {
       asset.origin[k] = header.origin[k];
@@ -303,6 +311,19 @@ Status ContactQuery::set_assets(std::span<const AssetView> assets) {
     }
   }
   return Status::kOk;
+}
+
+Status ContactQuery::keep_fixed(std::span<const Instance> instances, std::span<const Motion> motion,
+                                const QueryOptions& options) {
+  if (state_ == nullptr) return Status::kOutOfMemory;
+  State& state = *state_;
+  state.forget_results();
+  state.broad_phase.forget_fixed();
+  state.options = options;
+  if (const Status status = state.pose_instances(instances); status != Status::kOk) return status;
+  const Status status = state.broad_phase.keep_fixed(state.boxes.view(), motion, state.threads,
+                                                     state.workers_for(instances.size(), kInstancesAtOnce));
+  return status == Status::kOk ? status : state.fail(status, 0);
 }
 
 Status ContactQuery::find_pairs(std::span<const Instance> instances, const QueryOptions& options) {

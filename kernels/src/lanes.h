@@ -43,6 +43,7 @@ struct LaneMask {
   TANDEM_INLINE friend LaneMask operator|(LaneMask a, LaneMask b) { return {a.bits | b.bits}; }
   TANDEM_INLINE friend LaneMask operator^(LaneMask a, LaneMask b) { return {a.bits ^ b.bits}; }
   TANDEM_INLINE friend LaneMask operator!(LaneMask a) { return {~a.bits}; }
+  TANDEM_INLINE friend bool any(LaneMask a) { return a.mask() != 0; }
 
   /// Drops the lanes where x <= y is not true.
   TANDEM_INLINE void require(const Lanes<kCount>& x, const Lanes<kCount>& y) { bits &= x.v <= y.v; }
@@ -75,6 +76,7 @@ struct LaneMask<16> {
   TANDEM_INLINE friend LaneMask operator|(LaneMask a, LaneMask b) { return {_kor_mask16(a.bits, b.bits)}; }
   TANDEM_INLINE friend LaneMask operator^(LaneMask a, LaneMask b) { return {_kxor_mask16(a.bits, b.bits)}; }
   TANDEM_INLINE friend LaneMask operator!(LaneMask a) { return {_knot_mask16(a.bits)}; }
+  TANDEM_INLINE friend bool any(LaneMask a) { return a.bits != 0; }
   TANDEM_INLINE void require(const Lanes<16>& x, const Lanes<16>& y);
   TANDEM_INLINE unsigned mask() const { return bits; }
 };

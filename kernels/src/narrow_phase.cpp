@@ -30,20 +30,25 @@ class ScalarMeans {
     append_one_by_one(candidates, a, b, hits);
   }
   BatchVerdicts decide(const Candidates& candidates) const {
+    if (task_.on_grid) return decide_batch<FirstStage::on_grid>(candidates);
+    return task_.mode == QueryMode::fast ? decide_batch<FirstStage::as_computed>(candidates)
+                                         : decide_batch<FirstStage::bounded>(candidates);
+  }
+
+ private:
+  template <FirstStage kStage>
+  BatchVerdicts decide_batch(const Candidates& candidates) const {
     BatchVerdicts out = {0, 0};
     for (std::uint32_t i = 0; i < kBatch && i < candidates.count; ++i) {
       const TriangleInFrame a = stored_triangle(task_.a->tree.triangles[candidates.a[i]]);
       const TriangleInFrame b = posed_triangle(task_.b_in_a, task_.b->tree.triangles[candidates.b[i]]);
-      const auto verdicts = task_.mode == QueryMode::fast
-                                ? frame::decide<false>(a.corner, b.corner, 0.0f)
-                                : frame::decide<true>(a.corner, b.corner, task_.frame_error);
+      const auto verdicts = decide_first<kStage>(a.corner, b.corner, task_.frame_error);
       out.contact |= static_cast<std::uint32_t>(verdicts.contact.set) << i;
       out.undecided |= static_cast<std::uint32_t>(verdicts.undecided.set) << i;
     }
     return out;
   }
 
- private:
   const PairTask& task_;
 };
 
@@ -67,6 +72,18 @@ class WorldBoxMeans {
 };
 
 }  // namespace
+
+PairTask pair_task(const PosedTree& a, const PosedTree& b) {
+  PairTask task;
+  task.a = &a;
+  task.b = &b;
+  task.self = &a == &b;
+  task.in_frame = relative_pose(a.pose, a.extent, b.pose, b.extent, task.b_in_a) == RelativePoseStatus::kOk;
+  if (!task.in_frame) return task;
+  task.frame_error = frame_error(task.b_in_a, a.extent, b.extent);
+  task.on_grid = lie_on_grid(a.pose, a.extent, a.grid, b.pose, b.extent, b.grid, task.b_in_a);
+  return task;
+}
 
 bool meet(const PairTask& task, std::uint32_t triangle_a, std::uint32_t triangle_b, QueryCounters& counters) {
   const Triangle &a = task.a->tree.triangles[triangle_a], &b = task.b->tree.triangles[triangle_b];

@@ -15,20 +15,25 @@ namespace tandem {
 struct PosedTree {
   LevelView tree;
   TreeExtent extent;
-  Pose pose;  ///< of stored coordinates
+  double grid;  ///< grid_of() the tree
+  Pose pose;    ///< of stored coordinates
 };
 
 /// An object pair, and what is asked about it.
 struct PairTask {
   const PosedTree *a, *b;
-  std::uint32_t pair;
-  QueryMode mode;
-  bool first_contact_only;
+  std::uint32_t pair = 0;
+  QueryMode mode = QueryMode::exact;
+  bool first_contact_only = false;
   bool self;      ///< a and b are one instance: every two triangles once, none with itself
   bool in_frame;  ///< float32 in a's frame can take the pair; else what follows has no meaning
   RelativePose b_in_a;
-  float frame_error;  ///< see frame_test.h
+  float frame_error = 0;  ///< see frame_test.h
+  bool on_grid = false;   ///< lie_on_grid()
 };
+
+/// What is to be known of these two, or of one instance with itself. What is asked is up to the caller.
+PairTask pair_task(const PosedTree& a, const PosedTree& b);
 
 /// Where contacts go: room that grows.
 struct ContactSink {

@@ -3,7 +3,7 @@
 
 #ifdef TANDEM_HAVE_LANES
 #include "narrow_phase_walk.h"
-#include "tandem/kernels/detail/frame_test.h"
+#include "tandem/kernels/detail/grid_test.h"
 
 // The narrow phase in vectors of 4, 8 or 16 lanes.
 namespace tandem {
@@ -106,7 +106,7 @@ TANDEM_INLINE void gather_leaves(const Triangle* triangles, const Block& block,
   return hits;
 }
 
-template <int kCount, bool kBounded>
+template <int kCount, FirstStage kStage>
 TANDEM_INLINE BatchVerdicts decide_lanes(const PairTask& task, const std::uint32_t* index_a,
                                          const std::uint32_t* index_b) {
   frame::Point<Lanes<kCount>> a[3], b[3];
@@ -114,19 +114,25 @@ TANDEM_INLINE BatchVerdicts decide_lanes(const PairTask& task, const std::uint32
     a[corner] = gather<kCount>(task.a->tree.triangles, index_a, corner);
     b[corner] = frame::posed(task.b_in_a, gather<kCount>(task.b->tree.triangles, index_b, corner));
   }
-  const auto verdicts = frame::decide<kBounded>(a, b, task.frame_error);
+  const auto verdicts = decide_first<kStage>(a, b, task.frame_error);
   return {verdicts.contact.mask(), verdicts.undecided.mask()};
 }
 
-template <int kCount, bool kBounded>
+template <int kCount, FirstStage kStage>
 TANDEM_INLINE BatchVerdicts decide_batch(const PairTask& task, const Candidates& candidates) {
   BatchVerdicts out = {0, 0};
   for (std::uint32_t first = 0; first < kBatch && first < candidates.count; first += kCount) {
-    const auto part = decide_lanes<kCount, kBounded>(task, candidates.a + first, candidates.b + first);
+    const auto part = decide_lanes<kCount, kStage>(task, candidates.a + first, candidates.b + first);
     out.contact |= part.contact << first;
     out.undecided |= part.undecided << first;
   }
   return out;
+}
+
+// Not inlined, not to crowd the other stages out of registers.
+template <int kCount>
+[[gnu::noinline]] BatchVerdicts decide_on_grid(const PairTask& task, const Candidates& candidates) {
+  return decide_batch<kCount, FirstStage::on_grid>(task, candidates);
 }
 
 #if defined(__AVX512F__)
@@ -211,8 +217,9 @@ class LaneMeans {
   BatchVerdicts decide(Candidates& candidates) const {
     // Lanes beyond the count look at any triangle: the first.
     for (std::uint32_t i = candidates.count; i < kBatch; ++i) candidates.a[i] = candidates.b[i] = 0;
-    return task_.mode == QueryMode::fast ? decide_batch<kCount, false>(task_, candidates)
-                                         : decide_batch<kCount, true>(task_, candidates);
+    if (task_.on_grid) return decide_on_grid<kCount>(task_, candidates);
+    return task_.mode == QueryMode::fast ? decide_batch<kCount, FirstStage::as_computed>(task_, candidates)
+                                         : decide_batch<kCount, FirstStage::bounded>(task_, candidates);
   }
 
  private:

@@ -1,6 +1,7 @@
 #pragma once
 #include "narrow_phase.h"
 #include "tandem/kernels/detail/candidate.h"
+#include "tandem/kernels/detail/grid_test.h"
 
 // The walk that all variants of the narrow phase share. Included by files that are compiled for different
 // machines: internal linkage, see lanes.h.
@@ -30,6 +31,21 @@ struct Candidates {
 struct BatchVerdicts {
   std::uint32_t contact, undecided;
 };
+
+/// What the first stage of the triangle test makes of the candidates of a pair.
+enum class FirstStage : std::uint8_t {
+  bounded,      ///< float32 with an error bound
+  as_computed,  ///< float32, rounding ignored: mode fast
+  on_grid,      ///< float32 that rounds nothing: grid_test.h
+};
+
+template <FirstStage kStage, typename Value>
+inline auto decide_first(const frame::Point<Value> (&a)[3], const frame::Point<Value> (&b)[3], float error) {
+  if constexpr (kStage == FirstStage::on_grid)
+    return frame::decide_on_grid(a, b);
+  else
+    return frame::decide<kStage == FirstStage::bounded>(a, b, error);
+}
 
 /// The node pairs of node i of a.
 constexpr std::uint32_t row(std::uint32_t four, int i) {

@@ -27,6 +27,7 @@ TEST(WalkShape, FitsEveryTreeIntoEveryGpu) {
           ASSERT_LE(most_shared_bytes(limits), shared_bytes);
           ASSERT_GE(shape.stack_size, 2 * depth + 32 + kFewestEntries);
           ASSERT_GE(shape.warps, 9u);
+          ASSERT_EQ(shape.shares, depth > 2);
           ASSERT_LE(shape.warps, 16u);
           ASSERT_GE(shape.blocks, 1u);
           ASSERT_LE(shape.blocks, most_blocks == 0 ? processors : std::min(most_blocks, processors));

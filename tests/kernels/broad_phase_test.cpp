@@ -100,10 +100,10 @@ TEST(BroadPhase, NamesCoordinatesThatItCannotTake) {
   ASSERT_TRUE(threads.provide(4));
   for (const std::size_t place : {0, 500, 1999}) {
     auto boxes = scattered(2000, 1, 1, 0.25, 0, place);
-    ASSERT_EQ(broad_phase.find_pairs(boxes, true, threads, 4), Status::kOk);
+    ASSERT_EQ(broad_phase.find_pairs(boxes, {}, true, threads, 4), Status::kOk);
     EXPECT_GE(broad_phase.pairs().size(), boxes.size());
     boxes[place].hi[2] = std::nan("");
-    EXPECT_EQ(broad_phase.find_pairs(boxes, true, threads, 4), Status::kOutOfRange) << place;
+    EXPECT_EQ(broad_phase.find_pairs(boxes, {}, true, threads, 4), Status::kOutOfRange) << place;
     EXPECT_EQ(broad_phase.pairs().size(), 0u);
   }
 }
@@ -129,7 +129,7 @@ TEST(BroadPhase, DoesNotDependOnWorkers) {
     for (const std::uint32_t workers : {2u, 3u, 4u, 16u, 40u}) {
       ASSERT_TRUE(threads.provide(workers));
       for (const bool self_pairs : {false, true}) {
-        ASSERT_EQ(together.find_pairs(boxes, self_pairs, threads, workers), Status::kOk);
+        ASSERT_EQ(together.find_pairs(boxes, {}, self_pairs, threads, workers), Status::kOk);
         Pairs pairs;
         std::uint32_t selves = 0;
         ObjectPair before = {0, 0};

@@ -9,7 +9,7 @@
 
 #include "narrow_phase.h"
 #include "query_scenes.h"
-#include "tandem/kernels/detail/frame_test.h"
+#include "tandem/kernels/detail/grid_test.h"
 #include "tandem/kernels/world_box.h"
 #include "triangle_oracle.h"
 
@@ -220,22 +220,11 @@ Answer run(NarrowPhase way, const PairTask& task) {
   return {room, sink.counters};
 }
 
-/// As ContactQuery makes it.
-PairTask make_task(const PosedTree& a, const PosedTree& b) {
-  PairTask task{};
-  task.a = &a;
-  task.b = &b;
-  task.pair = 7;
-  task.self = &a == &b;
-  task.in_frame = relative_pose(a.pose, a.extent, b.pose, b.extent, task.b_in_a) == RelativePoseStatus::kOk;
-  task.frame_error = task.in_frame ? frame_error(task.b_in_a, a.extent, b.extent) : 0;
-  return task;
-}
-
 PosedTree posed_tree(const Scene& scene, std::uint32_t instance) {
   const AssetView& asset = scene.assets.views()[scene.instances[instance].asset];
   const LevelView level = asset.level();
-  return {level, extent_of(level.blocks[0]),
+  const TreeExtent extent = extent_of(level.blocks[0]);
+  return {level, extent, grid_of(level, extent),
           for_stored_coordinates(scene.instances[instance].pose, asset.header->origin)};
 }
 
@@ -253,7 +242,8 @@ TEST_P(Scenes, GiveTheSameBitsInEveryVariant) {
     for (std::uint32_t i = 0; i < scene.instances.size(); ++i) trees.push_back(posed_tree(scene, i));
     for (const PosedTree& a : trees) {
       for (const PosedTree& b : trees) {
-        PairTask task = make_task(a, b);
+        PairTask task = pair_task(a, b);
+        task.pair = 7;
         out_of_frame += !task.in_frame;
         if (!task.in_frame) continue;
         for (const QueryMode mode : {QueryMode::exact, QueryMode::fast, QueryMode::boxes}) {
@@ -286,7 +276,7 @@ TEST_P(Scenes, HaveTheSameContactsByWorldBoxes) {
     for (std::uint32_t i = 0; i < scene.instances.size(); ++i) trees.push_back(posed_tree(scene, i));
     for (std::uint32_t a = 0; a < trees.size(); ++a) {
       for (std::uint32_t b = a; b < trees.size(); ++b) {
-        PairTask task = make_task(trees[a], trees[b]);
+        const PairTask task = pair_task(trees[a], trees[b]);
         FaceContacts found = sorted_faces(run(narrow_phase_by_world_boxes, task));
         for (auto& contact : found) {
           if (a == b && contact.face_a > contact.face_b) std::swap(contact.face_a, contact.face_b);

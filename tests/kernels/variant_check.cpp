@@ -3,13 +3,14 @@
 // which is the same on every machine. Usage: variant_check [TRIALS]   Exit code: 0, or 1 where variants
 // differ.
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <vector>
 
 #include "narrow_phase.h"
 #include "sure_verdicts.h"
-#include "tandem/kernels/detail/frame_test.h"
+#include "tandem/kernels/detail/grid_test.h"
 
 namespace tandem {
 namespace {
@@ -17,10 +18,14 @@ namespace {
 using test::RandomPoses;
 using test::Scale;
 
-/// A tree of up to 16 triangles: the root, and a leaf block below each of its nodes.
+/// Integers, where everything ties.
+constexpr Scale kGrid = {4, 2, 5, 0, 0};
+
+/// A tree of up to 16 triangles: the root, and a leaf block below each of its nodes. on_grid: all its corners
+/// are integers.
 class SmallTree {
  public:
-  SmallTree(RandomPoses& random, const Scale& scale) {
+  SmallTree(RandomPoses& random, const Scale& scale, bool on_grid) : on_grid_(on_grid) {
     const std::uint64_t leaf_blocks = 1 + random.below(kNodesPerBlock);
     blocks_.resize(1 + leaf_blocks);
     double middle[3];
@@ -51,7 +56,8 @@ class SmallTree {
     tree.leaf_block_count = tree.block_count - 1;
     tree.triangle_count = static_cast<std::uint32_t>(triangles_.size());
     tree.depth = 2;
-    return {tree, tandem::extent_of(blocks_[0]), pose};
+    const TreeExtent extent = tandem::extent_of(blocks_[0]);
+    return {tree, extent, grid_of(tree, extent), pose};
   }
 
   /// A corner, for something to meet.
@@ -74,6 +80,7 @@ class SmallTree {
         float& x = triangle.corner[c].position[k];
         x = same ? triangle.corner[0].position[k] : static_cast<float>(at[k] + random.symmetric(reach));
         if (same && c == 0) x = static_cast<float>(at[k]);
+        if (on_grid_) x = std::round(x);
       }
       lo[k] = hi[k] = triangle.corner[0].position[k];
       for (int c = 1; c < 3; ++c) {
@@ -87,6 +94,7 @@ class SmallTree {
     set_node(block, node, enclose(lo, hi), index, NodeKind::leaf);
   }
 
+  bool on_grid_;
   std::vector<Block> blocks_;
   std::vector<Triangle> triangles_;
 };
@@ -130,25 +138,28 @@ Pose meeting_pose(RandomPoses& random, const Scale& scale, const Pose& a, const 
   return b;
 }
 
+void round_translation(Pose& pose) {
+  for (double& x : pose.translation) x = std::round(x);
+}
+
 class Check {
  public:
   void pair(RandomPoses& random) {
-    const Scale scale = test::any_scale(random);
-    const SmallTree tree_a(random, scale), tree_b(random, scale);
-    const PosedTree a = tree_a.posed(random.pose(scale));
+    const bool on_grid = random.below(4) == 0;
+    const Scale scale = on_grid ? kGrid : test::any_scale(random);
+    const SmallTree tree_a(random, scale, on_grid), tree_b(random, scale, on_grid);
+    Pose pose_a = random.pose(scale);
+    if (on_grid) round_translation(pose_a);
+    const PosedTree a = tree_a.posed(pose_a);
     const bool self = random.below(8) == 0;
     const float* const corner_a = tree_a.corner(random);
     const float* const corner_b = tree_b.corner(random);
-    const Pose pose_b = meeting_pose(random, scale, a.pose, corner_a, corner_b);
+    Pose pose_b = meeting_pose(random, scale, a.pose, corner_a, corner_b);
+    if (on_grid) round_translation(pose_b);
     const PosedTree b = tree_b.posed(pose_b);
-    PairTask task{};
-    task.a = &a;
-    task.b = self ? &a : &b;
-    task.self = self;
-    task.in_frame =
-        relative_pose(a.pose, a.extent, task.b->pose, task.b->extent, task.b_in_a) == RelativePoseStatus::kOk;
+    PairTask task = pair_task(a, self ? a : b);
     if (!task.in_frame) return;
-    task.frame_error = frame_error(task.b_in_a, a.extent, task.b->extent);
+    on_grid_ += task.on_grid;
     for (const QueryMode mode : {QueryMode::exact, QueryMode::fast, QueryMode::boxes}) {
       task.mode = mode;
       compare(task);
@@ -159,7 +170,7 @@ class Check {
     std::printf("%llu pairs, %llu contacts, hash %016llx, %llu comparisons\n",
                 static_cast<unsigned long long>(pairs_), static_cast<unsigned long long>(contacts_),
                 static_cast<unsigned long long>(hash_), static_cast<unsigned long long>(comparisons_));
-    return differ_ == 0 && contacts_ > 0;
+    return differ_ == 0 && contacts_ > 0 && on_grid_ > 0;
   }
 
  private:
@@ -191,7 +202,7 @@ class Check {
   }
   void add(std::uint64_t word) { hash_ = (hash_ ^ word) * 0x100000001B3u; }
 
-  std::uint64_t pairs_ = 0, contacts_ = 0, comparisons_ = 0, differ_ = 0;
+  std::uint64_t pairs_ = 0, contacts_ = 0, comparisons_ = 0, differ_ = 0, on_grid_ = 0;
   std::uint64_t hash_ = 0xCBF29CE484222325u;
 };
 

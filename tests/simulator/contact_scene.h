@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "kernels/query_scenes.h"
+#include "kernels/solid_meshes.h"
 #include "simulator/contacts/contact_generation.h"
 
 /// Small scenes for contact generation.
@@ -40,17 +41,5 @@ Eigen::Isometry3d at(double x, double y, double z);
 Eigen::Isometry3d turned(double angle, const Eigen::Vector3d& axis);
 /// A uniformly random rotation, and a translation of up to `reach`.
 Eigen::Isometry3d random_motion(RandomPoses& random, double reach);
-
-/// A flat sheet in z = 0 of side `size`, its normals up, in cells^2 squares of two triangles.
-Mesh sheet(float size, int cells);
-/// The octahedron's sphere, each triangle split into four `splits` times.
-Mesh sphere(double radius, int splits);
-/// A closed box.
-Mesh box(float x, float y, float z);
-/// Both meshes in one.
-Mesh joined(const Mesh& a, const Mesh& b);
-Mesh moved(Mesh mesh, float x, float y, float z);
-/// One of the project's own meshes.
-Mesh project_mesh(const char* name);
 
 }  // namespace tandem::test

@@ -4,6 +4,7 @@ import os
 import re
 import unittest
 
+import h5py
 import numpy as np
 
 from bench_test import BVHBENCH, IDENTITY, BenchTest, drop_hint, table_of
@@ -73,6 +74,22 @@ class BenchGpu(BenchTest):
         report = self.query("--sorted", "--traversal", "--repeat", "2", *self.ON_GPU)
         self.assertEqual((report["hash"], len(report["traversal_seconds"]["all"])), (exact, 2))
         self.assertLessEqual(report["gpu_bytes"], report["gpu_bytes_bound"])
+
+    def test_the_gpu_heeds_filters_as_the_cpu_does(self):
+        self.need_gpu()
+        self.make("field", "--fixed", "400", "--count", "64")
+        random = np.random.default_rng(3)
+        with h5py.File(self.scene, "a") as file:
+            file["simulation/motion"][400:] = random.integers(0, 4, 64)
+            file["instances/group"] = random.integers(0, 8, 464)
+            file["instances/mask"] = random.integers(0, 8, 464)
+            file["excluded"] = random.integers(400, 464, (200, 2))
+        expected = self.query()
+        self.assertGreater(expected["object_pairs"], 0)
+        for words in ([], ["--sorted"]):
+            report = self.query("--repeat", "3", *words, *self.ON_GPU)
+            self.assertEqual((report["hash"], report["object_pairs"]), (expected["hash"], expected["object_pairs"]))
+            self.assertLessEqual(report["gpu_bytes"], report["gpu_bytes_bound"])
 
     def test_gpu_memory_that_runs_out_is_told(self):
         self.need_gpu()

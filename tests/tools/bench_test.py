@@ -79,13 +79,15 @@ def drop_hint(result):
 
 
 def table_of(path):
+    """The datasets of a contacts file, those of docs/scenes.md first and in that order."""
     with h5py.File(path) as file:
-        return {name: file[name][:] for name in ("pairs", "contacts/pair", "contacts/face_a", "contacts/face_b")}
+        table = {name: file[name][:] for name in ("pairs", "contacts/pair", "contacts/face_a", "contacts/face_b")}
+        return table | {f"{group}/{name}": column[:] for group in ("manifolds", "points") if group in file for name, column in file[group].items()}
 
 
 class Scenes(BenchTest):
     KINDS = {"stack": ["--count", "27"], "pile": ["--count", "60"], "coincident": ["--count", "5"], "lattice": ["--count", "30"],
-             "slide": ["--count", "20", "--ground", None]}
+             "slide": ["--count", "20", "--ground", None], "field": ["--fixed", "70", "--count", "27"]}
 
     def arguments(self, kind):
         sheet = self.mesh_of("sheet", SHEET_OBJ)
@@ -263,9 +265,10 @@ class Query(BenchTest):
     def test_the_keys_of_json_are_those_of_its_documentation(self):
         self.write_scene()
         page = (SOURCE_DIR / "docs" / "json.md").read_text().split("## `bvhbench query")[1].split("\n## ")[0]
-        documented = [key for line in page.split("\n") if line.startswith("| `")
-                      for key in re.findall(r"`(\w+)`", line.split("|")[1])]
-        self.assertEqual(list(self.query()), documented)
+        keys = [[key for line in part.split("\n") if line.startswith("| `") for key in re.findall(r"`(\w+)`", line.split("|")[1])]
+                for part in page.split("With `--manifolds` also")]
+        self.assertEqual(list(self.query()), keys[0])
+        self.assertEqual(list(self.query("--manifolds")), keys[0] + keys[1])
 
     def test_two_cubes_cross_where_they_should(self):
         self.write_scene()
@@ -299,6 +302,51 @@ class Query(BenchTest):
             self.assertTrue(report["given_pairs"])
             for name, column in table_of(self.contacts).items():
                 self.assertEqual(column.tolist(), found[name].tolist())
+
+    def test_filters_of_a_scene_leave_out_pairs(self):
+        """What a query with filters finds is what one without finds of the pairs that they leave."""
+        self.make("pile", "--count", "60", "--neighbours", "12")
+        self.query("--out", self.contacts)
+        found = table_of(self.contacts)
+        random = np.random.default_rng(5)
+        motion, bits = random.integers(0, 4, 60), random.integers(0, 8, (2, 60))
+        excluded = found["pairs"][::3, ::-1]
+        a, b = found["pairs"].T
+        moves = (motion[a] == 0) | (motion[b] == 0) | ((motion[a] >= 2) & (motion[b] >= 2) & (motion[a] != motion[b]))
+        meets = ((bits[0][a] & bits[1][b]) != 0) & ((bits[0][b] & bits[1][a]) != 0)
+        third = np.arange(len(a)) % 3 == 0
+        everything = {"simulation/motion": motion, "instances/group": bits[0], "instances/mask": bits[1], "excluded": excluded}
+        for names, left in ((["simulation/motion"], moves), (["instances/group", "instances/mask"], meets),
+                            (["excluded"], ~third), (list(everything), moves & meets & ~third)):
+            with h5py.File(self.scene, "a") as file:
+                for name in everything:
+                    if name in file:
+                        del file[name]
+                for name in names:
+                    file[name] = everything[name]
+            self.assertTrue(0 < left.sum() < len(left))
+            for threads in ("1", "3"):
+                self.query("--threads", threads, "--repeat", "2", "--out", self.contacts)
+                table = table_of(self.contacts)
+                self.assertEqual(table["pairs"].tolist(), found["pairs"][left].tolist())
+                rows = left[found["contacts/pair"]]
+                for name in ("contacts/face_a", "contacts/face_b"):
+                    self.assertEqual(table[name].tolist(), found[name][rows].tolist())
+        # Given pairs are tested as they are.
+        with h5py.File(self.scene, "a") as file:
+            file["pairs"] = found["pairs"]
+        self.query("--out", self.contacts)
+        self.assertEqual(table_of(self.contacts)["pairs"].tolist(), found["pairs"].tolist())
+
+    def test_fixed_bodies_of_a_field_have_no_pairs_of_their_own(self):
+        self.make("field", "--fixed", "100", "--count", "8")
+        with h5py.File(self.scene) as file:
+            motion = file["simulation/motion"][:]
+        self.assertEqual(motion.tolist(), [1] * 100 + [0] * 8)
+        self.query("--out", self.contacts)
+        pairs = table_of(self.contacts)["pairs"]
+        self.assertTrue((pairs[:, 1] >= 100).all())
+        self.assertTrue((pairs[:, 0] < 100).any())
 
     def test_neither_scene_nor_mesh_is_overwritten_by_contacts(self):
         self.write_scene()
@@ -383,6 +431,69 @@ class Query(BenchTest):
         self.assertTrue(itself.any())
         self.assertTrue((table["contacts/face_a"][itself] <= table["contacts/face_b"][itself]).all())
 
+    def test_manifolds_are_those_of_a_box_that_lies_on_another(self):
+        self.write_scene(translation=((0, 0, 0), (0.25, 0.125, 0.875)))
+        report = self.query("--manifolds", "--repeat", "3", "--out", self.contacts)
+        table = table_of(self.contacts)
+        self.assertEqual((report["manifolds"], report["points"], report["open_curves"]), (1, 4, 0))
+        self.assertEqual(len(report["manifold_seconds"]["all"]), 3)
+        self.assertEqual(table["manifolds/pair"].tolist(), [0])
+        self.assertEqual(table["manifolds/first"].tolist(), [0, 4])
+        np.testing.assert_allclose(table["manifolds/normal"], [[0, 0, 1]], atol=1e-12)
+        np.testing.assert_allclose(table["manifolds/area"], [0.75 * 0.875], atol=1e-12)
+        np.testing.assert_allclose(table["manifolds/depth"], [0.125], atol=1e-12)
+        np.testing.assert_allclose(table["manifolds/centre"], [[0.625, 0.5625, 0.9375]], atol=1e-12)
+        np.testing.assert_allclose(table["points/depth"], [0.125] * 4, atol=1e-12)
+        corners = sorted((x, y, 0.9375) for x in (0.25, 1) for y in (0.125, 1))
+        np.testing.assert_allclose(sorted(table["points/position"].tolist()), corners, atol=1e-12)
+        # The upper cube's bottom and four sides, against the lower one's top and sides.
+        self.assertLessEqual(set(table["points/face_a"].tolist()), set(range(1, 6)))
+        self.assertLessEqual(set(table["points/face_b"].tolist()), {0, 2, 3, 4, 5})
+
+    def test_manifolds_are_of_the_documented_types_and_belong_together(self):
+        self.make("pile", "--count", "50")
+        self.query("--manifolds", "--out", self.contacts)
+        table = table_of(self.contacts)
+        types = {name: (str(column.dtype), column.shape[1:]) for name, column in table.items() if name[0] in "mp"}
+        page = (SOURCE_DIR / "docs" / "scenes.md").read_text()
+        documented = {}
+        for names, kind, width in re.findall(r"^\| (`/(?:manifolds|points)/.*?) \| ([uf]\d\d) \[\w\+?1?(,3)?\]", page, re.M):
+            for name in re.findall(r"`/([\w/]+)`", names):
+                documented[name] = ({"u32": "uint32", "u64": "uint64", "f64": "float64"}[kind], (3,) if width else ())
+        types.pop("pairs")
+        self.assertEqual(types, documented)
+        first, points = table["manifolds/first"].astype(int), table["points/depth"]
+        self.assertEqual((first[0], first[-1], len(first)), (0, len(points), len(table["manifolds/pair"]) + 1))
+        self.assertGreater(len(points), 50)
+        for row, depth in enumerate(table["manifolds/depth"]):
+            self.assertEqual(depth, points[first[row]:first[row + 1]].max())
+        self.assertTrue((np.diff(table["manifolds/pair"].astype(int)) >= 0).all())
+        self.assertTrue((table["points/id"] != 0).all())
+
+    def test_manifolds_do_not_change_with_threads_and_leave_the_contacts_as_they_are(self):
+        self.make("pile", "--count", "60")
+        self.query("--out", self.contacts)
+        plain, tables = table_of(self.contacts), []
+        for threads in ("1", "2", "7"):
+            self.query("--manifolds", "--threads", threads, "--out", self.contacts)
+            tables.append({name: column.tolist() for name, column in table_of(self.contacts).items()})
+        self.assertEqual(tables[0], tables[1])
+        self.assertEqual(tables[0], tables[2])
+        for name, column in plain.items():
+            self.assertEqual(tables[0][name], column.tolist())
+            self.assertNotIn("manifolds", name)
+
+    def test_manifolds_of_a_mesh_without_topology_are_refused_with_its_name(self):
+        self.write_scene()
+        result = self.build(self.write("cube.obj", CUBE_OBJ), "--no-topology", "-o", self.mesh)
+        self.assertEqual(result.returncode, DONE, result.stderr)
+        self.assert_refused(UNREADABLE_INPUT, "cube.bvh", "--no-topology", arguments=["--manifolds"])
+
+    def test_manifolds_of_less_than_all_contacts_are_refused(self):
+        self.write_scene()
+        for arguments in (["--mode", "boxes"], ["--first-contact"]):
+            self.assert_refused(USAGE, "--manifolds", arguments=["--manifolds", *arguments])
+
     def test_the_summary_is_for_people(self):
         self.write_scene()
         text = self.passes("query", self.scene)
@@ -456,7 +567,13 @@ class WrongScenes(BenchTest):
                               ({"instances_translation": np.zeros((2, 3), np.longdouble)}, ("more than 64 bits",)),
                               ({"instances_translation": np.full((2, 3), (1 << 62) + 1)}, ("/instances/translation",)),
                               ({"pairs": np.zeros((1, 3), "u4")}, ("/pairs", "expected n x 2, found 1 x 3")),
-                              ({"pairs_x": np.zeros(1)}, ("/pairs", "not a dataset"))):
+                              ({"pairs_x": np.zeros(1)}, ("/pairs", "not a dataset")),
+                              ({"instances_group": np.zeros(3, "u4")}, ("/instances/group: 3 rows for 2 instances",)),
+                              ({"instances_mask": np.zeros(1, "u4")}, ("/instances/mask: 1 rows for 2 instances",)),
+                              ({"instances_mask": np.array([0, 1 << 32])}, ("/instances/mask",)),
+                              ({"simulation_motion": np.zeros(0, "u1")}, ("/simulation/motion: 0 rows for 2 instances",)),
+                              ({"simulation_motion": np.array([0, 4])}, ("/simulation/motion: instance 1: 4 is none of 0 moving",)),
+                              ({"excluded": np.zeros(2, "u4")}, ("/excluded", "expected 2 dimensions, found 1"))):
             with self.subTest(words=words):
                 self.write_scene(**change)
                 self.assert_refused(UNREADABLE_INPUT, self.scene, *words)
@@ -466,6 +583,8 @@ class WrongScenes(BenchTest):
         self.assert_refused(UNREADABLE_INPUT, self.scene, "instance 1 is of asset 1 of 1")
         self.write_scene(pairs=np.array([[0, 1], [2, 0]], "u4"))
         self.assert_refused(UNREADABLE_INPUT, self.scene, "/pairs: row 1 names instance 2 of 2")
+        self.write_scene(excluded=np.array([[0, 1], [0, 0], [7, 1]], "u4"))
+        self.assert_refused(UNREADABLE_INPUT, self.scene, "/excluded: row 2 names instance 7 of 2")
 
     def test_a_pose_that_is_not_rigid_is_named(self):
         mirror, scaled, broken = np.diag([1.0, 1, -1]), 2 * IDENTITY, IDENTITY * np.nan

@@ -80,8 +80,10 @@ std::vector<ObjectPair> found_pairs(const std::string& path, const Scene& scene)
     boxes.push_back(
         world_box(for_stored_coordinates(instance.pose, header.origin), header.lower, header.upper));
   }
+  ExcludedPairTable excluded;
   BroadPhase broad_phase;
-  if (const Status status = broad_phase.find_pairs(boxes); status != Status::kOk) {
+  const PairFilter filter = scene.description.filter.view(excluded);
+  if (const Status status = broad_phase.find_pairs(boxes, filter); status != Status::kOk) {
     throw FileError(path + ": " + explain(status));
   }
   return {broad_phase.pairs().begin(), broad_phase.pairs().end()};

@@ -111,7 +111,9 @@ Answer run_query(const QueryArguments& arguments, const Scene& scene) {
   const std::vector<ObjectPair> pairs = normalised(description.pairs.value_or(std::vector<ObjectPair>()));
   const auto engine = make_engine(arguments.engine(), arguments.options);
   Answer answer = {record_of(arguments, scene), {}, {}, {}};
+  ExcludedPairTable excluded;
   engine->set_shapes(views);
+  engine->set_filter(description.filter.view(excluded));
   engine->update(description.instances);
   answer.timed = engine->time_query({description.pairs ? &pairs : nullptr, arguments.repeats,
                                      arguments.order(), arguments.traversal, arguments.manifolds});
@@ -273,9 +275,6 @@ void check_arguments(const QueryArguments& arguments, const Scene& scene) {
     throw UsageError(
         "--contained takes all exact contacts, so neither --mode nor --first-contact goes with it");
   }
-  if (arguments.manifolds && arguments.on_gpu()) {
-    throw UsageError("--manifolds is for the backend cpu; on a GPU there are none yet");
-  }
   const bool tandem = arguments.gpu_engine == "tandem-cuda";
   if (!arguments.on_gpu()) {
     if (!tandem) throw UsageError("--engine is for the backend cuda");
@@ -285,8 +284,8 @@ void check_arguments(const QueryArguments& arguments, const Scene& scene) {
     return;
   }
   if (!tandem &&
-      (arguments.options.first_contact_only || arguments.order() != OrderOnGpu::any || arguments.traversal)) {
-    throw UsageError("--first-contact, --grouped, --sorted and --traversal are for the engine tandem");
+      (arguments.options.first_contact_only || arguments.order() != OrderOnGpu::any || arguments.traversal || arguments.manifolds)) {
+    throw UsageError("--first-contact, --grouped, --manifolds, --sorted and --traversal are for the engine tandem");
   }
   if (arguments.options.self_pairs) {
     throw UsageError("--self is for the backend cpu; /pairs of a scene may name an instance twice");

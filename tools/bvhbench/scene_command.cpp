@@ -1,5 +1,6 @@
 #include "scene_command.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 
@@ -13,7 +14,7 @@ namespace {
 
 struct SceneArguments {
   std::string mesh, ground, output;
-  std::uint32_t count = 0;
+  std::uint32_t count = 0, fixed = 100'000;
   double jitter = 0.001, neighbours = 6.5, spacing = 0.7, tilt = 20;
   bool exact = false;
   std::uint64_t seed = 1;
@@ -23,7 +24,13 @@ struct SceneArguments {
 };
 
 using Assets = std::vector<AssetView>;
-using Maker = std::function<std::vector<Instance>(const SceneArguments&, const Assets&)>;
+
+// What is made of the arguments.
+struct Bodies {
+  std::vector<Instance> instances;
+  std::vector<Motion> motion = {};
+};
+using Maker = std::function<Bodies(const SceneArguments&, const Assets&)>;
 
 ExitCode run(const SceneArguments& arguments, const Maker& make) {
   keep_inputs(arguments.output, {arguments.mesh, arguments.ground});
@@ -38,8 +45,11 @@ ExitCode run(const SceneArguments& arguments, const Maker& make) {
   }
   std::uint64_t pairs = 0;
   try {
-    scene.instances = make(arguments, assets);
-    pairs = count_box_pairs(assets, scene.instances);
+    Bodies bodies = make(arguments, assets);
+    scene.instances = std::move(bodies.instances);
+    scene.filter.motion = std::move(bodies.motion);
+    ExcludedPairTable excluded;
+    pairs = count_box_pairs(assets, scene.instances, scene.filter.view(excluded));
   } catch (const std::runtime_error& impossible) {
     throw UsageError(arguments.mesh + ": " + impossible.what());
   }
@@ -88,7 +98,7 @@ CLI::App* add_scene(CLI::App& app, Run& run_later) {
 
   CLI::App* stack =
       add("stack", "a cube of boxes, face to face", 1000, [](const auto& a, const Assets& assets) {
-        return make_stack(assets[0], root_above(a.count, 3), a.exact ? 0 : a.jitter, a.scene_seed());
+        return Bodies{make_stack(assets[0], root_above(a.count, 3), a.exact ? 0 : a.jitter, a.scene_seed())};
       });
   stack->get_option("--count")->check(cube_of_a_whole_number());
   stack->add_option("--jitter", arguments->jitter, "how far boxes are moved at most, in box lengths")
@@ -99,7 +109,7 @@ CLI::App* add_scene(CLI::App& app, Run& run_later) {
 
   CLI::App* pile = add("pile", "bodies at random rotations, close together", 1000,
                        [](const auto& a, const Assets& assets) {
-                         return make_pile(assets[0], a.count, a.neighbours, a.scene_seed());
+                         return Bodies{make_pile(assets[0], a.count, a.neighbours, a.scene_seed())};
                        });
   pile->add_option("--neighbours", arguments->neighbours,
                    "bodies whose world box meets that of a body, on average")
@@ -108,16 +118,29 @@ CLI::App* add_scene(CLI::App& app, Run& run_later) {
 
   CLI::App* lattice = add("lattice", "bodies at random rotations on a lattice of a given spacing", 1000,
                           [](const auto& a, const Assets& assets) {
-                            return make_lattice(assets[0], a.count, a.spacing, a.scene_seed());
+                            return Bodies{make_lattice(assets[0], a.count, a.spacing, a.scene_seed())};
                           });
-  lattice
-      ->add_option("--spacing", arguments->spacing, "of the lattice, in lengths of the body's longest side")
-      ->check(between(0.01, 1000))
-      ->option_text("S [0.7]");
+  CLI::App* field =
+      add("field", "a heap of moving bodies on a layer of fixed ones", 1000,
+          [](const auto& a, const Assets& assets) {
+            Bodies bodies = {make_field(assets[0], a.fixed, a.count, a.spacing, a.scene_seed())};
+            bodies.motion.assign(bodies.instances.size(), Motion::moving);
+            std::fill_n(bodies.motion.begin(), a.fixed, Motion::fixed);
+            return bodies;
+          });
+  field->add_option("--fixed", arguments->fixed, "how many fixed ones")
+      ->check(CLI::Range(0, 10'000'000))
+      ->option_text("N [100000]");
+  for (CLI::App* on_lattice : {lattice, field}) {
+    on_lattice
+        ->add_option("--spacing", arguments->spacing, "of the lattice, in lengths of the body's longest side")
+        ->check(between(0.01, 1000))
+        ->option_text("S [0.7]");
+  }
 
   CLI::App* slide = add("slide", "bodies strewn on a tilted sheet of ground", 2500,
                         [](const auto& a, const Assets& assets) {
-                          return make_slide(assets[0], assets[1], a.count, a.tilt, a.scene_seed());
+                          return Bodies{make_slide(assets[0], assets[1], a.count, a.tilt, a.scene_seed())};
                         });
   slide->add_option("--ground", arguments->ground, ".bvh file of the sheet")->required()->check(file_name());
   slide->add_option("--tilt", arguments->tilt, "slope of the ground along x")
@@ -125,7 +148,7 @@ CLI::App* add_scene(CLI::App& app, Run& run_later) {
       ->option_text("DEGREES [20]");
 
   add("coincident", "pairs of bodies in exactly the same pose", 50, [](const auto& a, const Assets& assets) {
-    return make_coincident(assets[0], a.count, a.scene_seed());
+    return Bodies{make_coincident(assets[0], a.count, a.scene_seed())};
   });
   return scene;
 }

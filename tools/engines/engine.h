@@ -136,8 +136,16 @@ class Engine {
   /// something for each body then start anew. `bodies` must stay until the next call.
   virtual void update(std::span<const BodyPose> bodies) = 0;
 
-  /// Finds the pairs of bodies whose world boxes meet: a < b, sorted. Valid until the next call of a function
-  /// that is not const.
+  /// Which pairs find_pairs() finds from now on; at first all. Its arrays lie in CPU memory, have an entry
+  /// for each body, and must stay as long as pairs are asked for.
+  void set_filter(const PairFilter& filter) { filter_ = filter; }
+
+  /// Lets find_pairs() take the bodies that the filter calls fixed as they stand, until the next update(),
+  /// where the engine can. Condition: update().
+  virtual void keep_fixed() {}
+
+  /// Finds the pairs of bodies whose world boxes meet, and that the filter looks at: a < b, sorted. Valid
+  /// until the next call of a function that is not const.
   virtual std::span<const ObjectPair> find_pairs() = 0;
 
   /// Finds and keeps the contacts of these pairs, which may be those of find_pairs().
@@ -147,13 +155,13 @@ class Engine {
   /// does not tell the triangles.
   virtual bool contacts(std::vector<TriangleContact>& found) = 0;
 
-  /// Finds pairs, where none are given, and contacts, `repeats` times, and tells what each took. Condition:
-  /// update(); order, traversal and manifolds are for engines that have them.
+  /// Finds pairs, where none are given, and contacts, `repeats` times, and tells what each took; fixed bodies
+  /// are kept before. Condition: update(); order, traversal and manifolds are for engines that have them.
   virtual TimedAnswer time_query(const TimedQuery& asked);
 
   /// What a simulator asks for: update(), find_pairs(), query() and contacts(), in the order of a
   /// ContactList. `idle`: empty, or for each body whether it does not move (1; else 0): pairs of two idle
-  /// bodies are left out of both lists.
+  /// bodies are left out of both lists. The filter that there was is forgotten.
   void find(std::span<const BodyPose> bodies, std::span<const std::uint8_t> idle, ContactList& found);
 
   /// Of the last find().
@@ -185,6 +193,10 @@ class Engine {
 
   EngineTimes times_;
   QueryCounters counters_;
+  PairFilter filter_;
+
+ private:
+  std::vector<Motion> motion_;  // what find() makes of idle bodies
 };
 
 }  // namespace tandem

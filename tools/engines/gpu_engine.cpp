@@ -39,6 +39,11 @@ void put(std::span<const Contact> contacts, std::vector<TriangleContact>& into) 
   });
 }
 
+// Manifolds are made of contacts that are grouped.
+OrderOnGpu order_of_query(const TimedQuery& asked) {
+  return asked.manifolds && asked.order == OrderOnGpu::any ? OrderOnGpu::grouped : asked.order;
+}
+
 // Of what the GPU was to group or sort.
 void check_order(const std::vector<Contact>& contacts, OrderOnGpu order) {
   if (order == OrderOnGpu::any) return;
@@ -50,6 +55,22 @@ void check_order(const std::vector<Contact>& contacts, OrderOnGpu order) {
   };
   if (std::adjacent_find(contacts.begin(), contacts.end(), after) == contacts.end()) return;
   throw std::runtime_error("the GPU: its contacts are not in order");
+}
+
+// Manifolds by their new rows, and their points with them. Within a pair they stay as they are.
+void sort_manifolds(const std::vector<std::uint32_t>& row, TimedManifolds& made) {
+  for (Manifold& manifold : made.manifolds) manifold.pair = row[manifold.pair];
+  std::stable_sort(made.manifolds.begin(), made.manifolds.end(),
+                   [](const Manifold& x, const Manifold& y) { return x.pair < y.pair; });
+  const std::vector<ManifoldPoint> points = std::move(made.points);
+  made.points.clear();
+  for (std::uint32_t i = 0; i < made.manifolds.size(); ++i) {
+    Manifold& manifold = made.manifolds[i];
+    const auto first = points.begin() + manifold.first_point;
+    manifold.first_point = static_cast<std::uint32_t>(made.points.size());
+    made.points.insert(made.points.end(), first, first + manifold.point_count);
+    for (std::uint32_t k = manifold.first_point; k < made.points.size(); ++k) made.points[k].manifold = i;
+  }
 }
 
 // Brings the pairs into ascending order, and the contacts' rows with them.
@@ -65,6 +86,7 @@ void sort_pairs(TimedAnswer& answer) {
     answer.pairs.push_back(pairs[order[i]]);
   }
   for (TriangleContact& contact : answer.contacts) contact.pair = row[contact.pair];
+  sort_manifolds(row, answer.manifolds);
 }
 
 }  // namespace
@@ -117,7 +139,32 @@ void GpuEngine::update(std::span<const BodyPose> bodies) {
   check(poses_.upload(bodies.size(), stream()), "instances");
   check(stream_.wait(), "upload");
   instances_ = {shape_of_.on_gpu.data(), poses_.on_gpu.data(), static_cast<std::uint32_t>(bodies.size())};
+  check(broad_phase_.keep_fixed({}, {}, {}, stream()), broad_phase_.cuda_error(), "broad phase");
   upload_of_bodies_ = watch.lap();
+}
+
+void GpuEngine::keep_fixed() {
+  if (filter_.motion == nullptr) return;
+  const std::span<const Motion> motion(filter_.motion, instances_.count);
+  const Status status = broad_phase_.keep_fixed(instances_, bounds(), motion, stream());
+  if (subject(status) != nullptr) require(status, broad_phase_.report().where);
+  check(status, broad_phase_.cuda_error(), "broad phase");
+}
+
+// Where the copy lies; null where there is nothing of each body to copy.
+template <typename Element>
+const Element* GpuEngine::upload_of_each(const Element* of_each, StagedArray<Element>& array) {
+  if (of_each == nullptr) return nullptr;
+  check(array.grow(instances_.count), "filter");
+  std::copy_n(of_each, instances_.count, array.staged.data());
+  check(array.upload(instances_.count, stream()), "filter");
+  return array.on_gpu.data();
+}
+
+void GpuEngine::upload_filter() {
+  check(excluded_.upload(filter_.excluded, stream()), excluded_.cuda_error(), "filter");
+  filter_on_gpu_ = {upload_of_each(filter_.motion, motion_), upload_of_each(filter_.group, group_),
+                    upload_of_each(filter_.mask, mask_), excluded_.view()};
 }
 
 GpuAssetBounds GpuEngine::bounds() const {
@@ -126,7 +173,9 @@ GpuAssetBounds GpuEngine::bounds() const {
 
 // Until there is room for all.
 void GpuEngine::find_pairs_on_gpu(bool sorted) {
-  const Status status = broad_phase_.find_pairs(instances_, bounds(), {.sorted = sorted}, stream());
+  upload_filter();
+  const Status status =
+      broad_phase_.find_pairs(instances_, bounds(), {.sorted = sorted, .filter = filter_on_gpu_}, stream());
   if (subject(status) != nullptr) require(status, broad_phase_.report().where);
   check(status, broad_phase_.cuda_error(), "broad phase");
 }
@@ -168,38 +217,58 @@ bool GpuEngine::contacts(std::vector<TriangleContact>& found_contacts) {
 }
 
 TimedAnswer GpuEngine::time_query(const TimedQuery& asked) {
-  if (asked.given == nullptr) find_pairs_on_gpu(asked.order == OrderOnGpu::sorted);
+  if (asked.given == nullptr) {
+    keep_fixed();
+    find_pairs_on_gpu(asked.order == OrderOnGpu::sorted);
+  }
   const GpuPairs pairs = asked.given == nullptr ? broad_phase_.pairs() : upload(*asked.given);
-  ask(pairs, asked.order);
+  ask(pairs, order_of_query(asked));
   TimedAnswer answer;
   time_repeats(pairs, asked, answer);
   const GpuContacts contacts = found();
   answer.gpu = use(asked);
   answer.pairs.resize(asked.given == nullptr ? broad_phase_.report().count : pairs.capacity);
+  if (asked.manifolds) take_manifolds(answer.manifolds);
   take(pairs, contacts, asked.order, answer);
   if (asked.traversal) answer.traversal = time_walk(pairs, asked.repeats);
   return answer;
 }
 
 void GpuEngine::time_repeats(const GpuPairs& pairs, const TimedQuery& asked, TimedAnswer& answer) {
-  GpuEvent begin, between, end;
-  for (GpuEvent* event : {&begin, &between, &end}) check(event->create(), "an event");
+  GpuEvent begin, between, found, end;
+  for (GpuEvent* event : {&begin, &between, &found, &end}) check(event->create(), "an event");
   const bool finds_pairs = asked.given == nullptr;
-  const Before before = [&](unsigned event_flags) {
-    if (finds_pairs) {
-      const Status status =
-          broad_phase_.enqueue(instances_, bounds(), {.sorted = asked.order == OrderOnGpu::sorted}, stream());
-      check(status, broad_phase_.cuda_error(), "broad phase");
-    }
+  const Before find_pairs = [&](unsigned) {
+    if (!finds_pairs) return;
+    const Status status = broad_phase_.enqueue(
+        instances_, bounds(), {.sorted = asked.order == OrderOnGpu::sorted, .filter = filter_on_gpu_},
+        stream());
+    check(status, broad_phase_.cuda_error(), "broad phase");
+  };
+  const Before find_and_record = [&](unsigned event_flags) {
+    find_pairs(event_flags);
     check(between.record(stream(), event_flags), "an event");
   };
-  const std::function<void()> run = repeatable(pairs, asked.order, before);
+  const Before then = [&](unsigned event_flags) { check(found.record(stream(), event_flags), "an event"); };
+  // An event between the steps keeps the second from getting ready while the first ends.
+  const std::function<void()> run = asked.manifolds
+                                        ? repeatable_with_manifolds(pairs, asked.order, find_pairs, then)
+                                        : repeatable(pairs, asked.order, find_pairs),
+                              run_in_steps = repeatable(pairs, order_of_query(asked), find_and_record);
+  const GpuEvent& end_of_query = asked.manifolds ? found : end;
   for (std::uint32_t i = 0; i < asked.repeats; ++i) {
     run_between(begin, run, end);
-    answer.whole.push_back(seconds_between(begin, end));
-    answer.narrow.push_back(seconds_between(finds_pairs ? between : begin, end));
+    answer.whole.push_back(seconds_between(begin, end_of_query));
+    if (asked.manifolds) answer.manifolds.seconds.push_back(seconds_between(found, end));
+    if (finds_pairs) run_between(begin, run_in_steps, end);
+    answer.narrow.push_back(finds_pairs ? seconds_between(between, end) : answer.whole.back());
     if (finds_pairs) answer.broad_phase.push_back(seconds_between(begin, between));
   }
+}
+
+std::function<void()> GpuEngine::repeatable_with_manifolds(const GpuPairs&, OrderOnGpu, const Before&,
+                                                           const Before&) {
+  throw std::logic_error("an engine that makes no manifolds");
 }
 
 void GpuEngine::run_between(const GpuEvent& begin, const std::function<void()>& run,
@@ -228,7 +297,8 @@ void GpuEngine::take(const GpuPairs& pairs, const GpuContacts& contacts, OrderOn
 
 std::size_t GpuEngine::scene_bytes(const TimedQuery& asked) const {
   return uploaded_.bytes() + shapes_.size() * sizeof(AssetBounds) +
-         instances_.count * (sizeof(Pose) + sizeof(std::uint32_t)) +
+         instances_.count * (sizeof(Pose) + sizeof(std::uint32_t)) + motion_.on_gpu.bytes() +
+         group_.on_gpu.bytes() + mask_.on_gpu.bytes() + excluded_.bytes() +
          (asked.given != nullptr ? asked.given->size() * sizeof(ObjectPair) : 0);
 }
 

@@ -7,6 +7,7 @@
 #include "tandem/formats/gpu_memory.h"
 #include "tandem/formats/gpu_stream.h"
 #include "tandem/kernels/gpu_broad_phase.h"
+#include "tandem/kernels/gpu_excluded_pairs.h"
 #include "tandem/kernels/gpu_scene.h"
 #include "tandem/runtime/upload.h"
 
@@ -42,6 +43,7 @@ class GpuEngine : public Engine {
   std::string_view name() const final { return name_; }
   void set_shapes(std::span<const AssetView> shapes) final;
   void update(std::span<const BodyPose> bodies) final;
+  void keep_fixed() final;
   std::span<const ObjectPair> find_pairs() final;
   void query(std::span<const ObjectPair> pairs) final;
   bool contacts(std::vector<TriangleContact>& found) final;
@@ -77,6 +79,13 @@ class GpuEngine : public Engine {
   /// what `before` looks at stays.
   virtual std::function<void()> repeatable(const GpuPairs& pairs, OrderOnGpu order, const Before& before) = 0;
 
+  /// The same with contact manifolds of what the query finds, behind `between`. Engines that have none throw.
+  virtual std::function<void()> repeatable_with_manifolds(const GpuPairs& pairs, OrderOnGpu order,
+                                                          const Before& before, const Before& between);
+
+  /// What the last repeat of these made, their rows those of the GPU's pairs.
+  virtual void take_manifolds(TimedManifolds&) {}
+
   /// Times the walk of the trees alone.
   virtual Seconds time_walk(const GpuPairs&, std::uint32_t) { return {}; }
 
@@ -90,6 +99,9 @@ class GpuEngine : public Engine {
 
  private:
   GpuAssetBounds bounds() const;
+  template <typename Element>
+  const Element* upload_of_each(const Element* of_each, StagedArray<Element>& array);
+  void upload_filter();
   void find_pairs_on_gpu(bool sorted);
   GpuPairs upload(std::span<const ObjectPair> pairs);
   void time_repeats(const GpuPairs& pairs, const TimedQuery& asked, TimedAnswer& answer);
@@ -111,6 +123,10 @@ class GpuEngine : public Engine {
   PinnedArray<ObjectPair> found_pairs_;
   PinnedArray<Contact> contacts_;
   GpuInstances instances_ = {};
+  StagedArray<Motion> motion_;
+  StagedArray<std::uint32_t> group_, mask_;
+  GpuExcludedPairs excluded_;
+  PairFilter filter_on_gpu_;
   GpuBroadPhase broad_phase_;
 };
 

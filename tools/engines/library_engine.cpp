@@ -45,7 +45,9 @@ std::span<const ObjectPair> LibraryEngine::find_pairs() {
     broad_phase_ = std::make_unique<ContactQuery>();
     require(broad_phase_->set_assets(shapes_), broad_phase_->where());
   }
-  require(broad_phase_->find_pairs(bodies_), broad_phase_->where());
+  QueryOptions options;
+  options.filter = &filter_;
+  require(broad_phase_->find_pairs(bodies_, options), broad_phase_->where());
   return broad_phase_->pairs();
 }
 

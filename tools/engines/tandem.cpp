@@ -29,10 +29,18 @@ class TandemEngine final : public Engine {
     for (const AssetView& shape : shapes) file_bytes_ += shape.header->file_bytes;
   }
 
-  void update(std::span<const BodyPose> bodies) override { bodies_ = bodies; }
+  void update(std::span<const BodyPose> bodies) override {
+    bodies_ = bodies;
+    check(query_.keep_fixed({}, {}));
+  }
+
+  void keep_fixed() override {
+    if (filter_.motion != nullptr)
+      check(query_.keep_fixed(bodies_, {filter_.motion, bodies_.size()}, options_));
+  }
 
   std::span<const ObjectPair> find_pairs() override {
-    check(query_.find_pairs(bodies_, options_));
+    check(query_.find_pairs(bodies_, filtered()));
     return query_.pairs();
   }
 
@@ -60,7 +68,7 @@ class TandemEngine final : public Engine {
 
  protected:
   std::span<const ObjectPair> find_pairs_and_query() override {
-    check(query_.find_contacts(bodies_, options_));
+    check(query_.find_contacts(bodies_, filtered()));
     counters_ = query_.counters();
     return query_.pairs();
   }
@@ -81,6 +89,12 @@ class TandemEngine final : public Engine {
   }
 
  private:
+  QueryOptions filtered() const {
+    QueryOptions options = options_;
+    options.filter = &filter_;
+    return options;
+  }
+
   void check(Status status) const { require(status, query_.where()); }
 
   QueryOptions options_;

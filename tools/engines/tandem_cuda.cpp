@@ -1,6 +1,8 @@
 #include <memory>
 
 #include "gpu_engine.h"
+#include "tandem/formats/gpu_memory.h"
+#include "tandem/kernels/gpu_contact_manifolds.h"
 #include "tandem/kernels/gpu_contact_query.h"
 
 namespace tandem {
@@ -10,7 +12,7 @@ namespace {
 class TandemCudaEngine final : public GpuEngine {
  public:
   explicit TandemCudaEngine(const QueryOptions& options)
-      : GpuEngine("tandem-cuda", options.mode == QueryMode::exact ? Contents::exact_queries : Contents::all),
+      : GpuEngine("tandem-cuda", options.mode == QueryMode::exact ? Contents::manifolds : Contents::all),
         options_(options) {}
 
  private:
@@ -43,6 +45,35 @@ class TandemCudaEngine final : public GpuEngine {
       before(cudaEventRecordExternal);
       enqueue(query_, pairs, options(order), "contacts");
     });
+  }
+
+  // Both: their contacts are grouped too.
+  std::function<void()> repeatable_with_manifolds(const GpuPairs& pairs, OrderOnGpu order, const Before& before,
+                                                  const Before& between) override {
+    GpuQueryOptions with_groups = options(order);
+    with_groups.grouped = true;
+    constexpr GpuManifoldOptions kOfFeatures = {.match_previous = false};
+    check(query_.reserve(query_.capacity(), with_groups), query_.cuda_error(), "contacts");
+    enqueue(query_, pairs, with_groups, "contacts");
+    check(cudaStreamSynchronize(stream()), "contacts");
+    require(manifolds_.set_assets(shapes(), stream()), 0);
+    const Status status = manifolds_.make(instances(), pairs, query_, kOfFeatures, stream());
+    check(status, manifolds_.cuda_error(), "manifolds");
+    return captured([=, this, &before, &between] {
+      before(cudaEventRecordExternal);
+      enqueue(query_, pairs, with_groups, "contacts");
+      between(cudaEventRecordExternal);
+      check(manifolds_.enqueue(instances(), pairs, query_, kOfFeatures, stream()), manifolds_.cuda_error(), "manifolds");
+    });
+  }
+
+  void take_manifolds(TimedManifolds& made) override {
+    const GpuManifoldReport& report = manifolds_.report();
+    made.manifolds.resize(report.manifolds);
+    made.points.resize(report.points);
+    made.counters = report.counters;
+    check(download(manifolds_.manifolds(), std::span(made.manifolds), stream()), "download");
+    check(download(manifolds_.points(), std::span(made.points), stream()), "download");
   }
 
   Seconds time_walk(const GpuPairs& pairs, std::uint32_t repeats) override {
@@ -86,6 +117,7 @@ class TandemCudaEngine final : public GpuEngine {
 
   QueryOptions options_;
   GpuContactQuery query_;
+  GpuContactManifolds manifolds_;
 };
 
 }  // namespace

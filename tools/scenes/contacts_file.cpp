@@ -38,8 +38,8 @@ std::vector<double> vectors(std::span<const Element> elements, double (Element::
 }
 
 double area_of(const Manifold& manifold) {
-  const double(&v)[3] = manifold.area_vector;
-  return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+  const double(&v)[3] = manifold.area_vector, (&n)[3] = manifold.normal;
+  return std::fabs(v[0] * n[0] + v[1] * n[1] + v[2] * n[2]);
 }
 
 void add_manifolds(Hdf5Output& file, const ManifoldTable& table) {

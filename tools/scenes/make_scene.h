@@ -39,8 +39,14 @@ std::vector<Instance> make_slide(const AssetView& body, const AssetView& ground,
 /// `count` pairs of instances, 2 i and 2 i + 1, each in one random pose exactly; pairs do not touch.
 std::vector<Instance> make_coincident(const AssetView& body, std::uint32_t count, const SceneSeed&);
 
-/// World boxes of the instances that meet: the object pairs that a query would look at.
+/// A heap of `count` moving bodies on a layer of `fixed` fixed ones, which come first: as make_lattice(),
+/// with the layer square, the heap a cube over the layer's middle, a spacing higher.
+std::vector<Instance> make_field(const AssetView& body, std::uint32_t fixed, std::uint32_t count,
+                                 double spacing, const SceneSeed&);
+
+/// World boxes of the instances that meet, and that the filter looks at: the object pairs that a query finds.
 /// Throws std::bad_alloc, std::runtime_error (coordinates beyond what a query takes).
-std::uint64_t count_box_pairs(const std::vector<AssetView>& assets, const std::vector<Instance>& instances);
+std::uint64_t count_box_pairs(const std::vector<AssetView>& assets, const std::vector<Instance>& instances,
+                              const PairFilter& filter = {});
 
 }  // namespace tandem::bench

@@ -5,7 +5,7 @@
 
 #include "make_scene_parts.h"
 
-// Scenes on a cubic lattice: stack, pile, lattice, coincident.
+// Scenes on a cubic lattice: stack, pile, lattice, field, coincident.
 namespace tandem::bench {
 namespace {
 
@@ -60,17 +60,29 @@ struct Draft {
   std::vector<Vector> positions;
 };
 
-// jitter: in spacings.
+// Adds bodies to a draft, moved by up to `jitter` spacings along each axis. position(i): that of body i.
+template <typename Position>
+void add_bodies(Draft& draft, std::uint32_t count, double jitter, Random& random, const Position& position) {
+  for (std::uint32_t i = 0; i < count; ++i) {
+    Vector at = position(i);
+    for (double& x : at) x += random.between(-jitter, jitter);
+    draft.positions.push_back(at);
+    draft.rotations.push_back(random_rotation(random));
+  }
+}
+
 Draft draft_pile(std::uint32_t count, double jitter, Random& random) {
   const std::uint32_t side = root_above(count, 3);
   Draft draft;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    Vector position = cell(i, side);
-    for (double& x : position) x += random.between(-jitter, jitter);
-    draft.positions.push_back(position);
-    draft.rotations.push_back(random_rotation(random));
-  }
+  add_bodies(draft, count, jitter, random, [&](std::uint32_t i) { return cell(i, side); });
   return draft;
+}
+
+// The longest side of a body's bounds.
+double length_of(const Bounds& bounds) {
+  double length = 0;
+  for (int k = 0; k < 3; ++k) length = std::max(length, bounds.upper[k] - bounds.lower[k]);
+  return length;
 }
 
 std::vector<Instance> spread(const Draft& draft, const Vector& centre, double spacing) {
@@ -139,9 +151,25 @@ std::vector<Instance> make_lattice(const AssetView& body, std::uint32_t count, d
   Random random(seed.seed);
   const Draft draft = draft_pile(count, 0.25, random);
   const Bounds bounds = bounds_of(body);
-  double length = 0;
-  for (int k = 0; k < 3; ++k) length = std::max(length, bounds.upper[k] - bounds.lower[k]);
-  std::vector<Instance> instances = spread(draft, bounds.centre(), spacing * length);
+  std::vector<Instance> instances = spread(draft, bounds.centre(), spacing * length_of(bounds));
+  move(instances, seed.offset);
+  return instances;
+}
+
+std::vector<Instance> make_field(const AssetView& body, std::uint32_t fixed, std::uint32_t count,
+                                 double spacing, const SceneSeed& seed) {
+  constexpr double kJitter = 0.25;
+  Random random(seed.seed);
+  Draft draft;
+  const std::uint32_t wide = root_above(fixed, 2), side = root_above(count, 3);
+  const double middle = 0.5 * (static_cast<double>(wide) - static_cast<double>(side));
+  add_bodies(draft, fixed, kJitter, random, [&](std::uint32_t i) { return cell(i, wide); });
+  add_bodies(draft, count, kJitter, random, [&](std::uint32_t i) {
+    const Vector at = cell(i, side);
+    return Vector{at[0] + middle, at[1] + middle, at[2] + 1};
+  });
+  const Bounds bounds = bounds_of(body);
+  std::vector<Instance> instances = spread(draft, bounds.centre(), spacing * length_of(bounds));
   move(instances, seed.offset);
   return instances;
 }

@@ -28,6 +28,10 @@ void send(const Sink& sink, const std::vector<std::string>& strings) {
 void send(const Sink& sink, const SceneDescription& scene) {
   send(sink, scene.assets);
   send(sink, scene.instances);
+  send(sink, scene.filter.motion);
+  send(sink, scene.filter.group);
+  send(sink, scene.filter.mask);
+  send(sink, scene.filter.excluded);
   const std::uint8_t pairs = scene.pairs.has_value(), poses = scene.poses.has_value();
   sink(&pairs, 1);
   if (pairs != 0) send(sink, *scene.pairs);
@@ -79,8 +83,14 @@ class Receiver {
     return receive(notes.geometry) && receive(notes.stream) && receive(notes.depth);
   }
 
+  bool receive(SceneFilter& filter) {
+    return receive(filter.motion) && receive(filter.group) && receive(filter.mask) &&
+           receive(filter.excluded);
+  }
+
   bool receive(SceneDescription& scene) {
-    return receive(scene.assets) && receive(scene.instances) && receive(scene.pairs) && receive(scene.poses);
+    return receive(scene.assets) && receive(scene.instances) && receive(scene.filter) &&
+           receive(scene.pairs) && receive(scene.poses);
   }
 
   template <typename Part>

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <new>
 
 #include "hdf5_file.h"
 #include "scene_child.h"
@@ -29,11 +30,33 @@ std::vector<Instance> read_instances(const Hdf5Input& file, const std::string& p
   return instances;
 }
 
-std::vector<ObjectPair> read_pairs(const Hdf5Input& file) {
-  const auto flat = file.read_u32("/pairs", {2});
+std::vector<ObjectPair> read_pairs(const Hdf5Input& file, const char* name) {
+  const auto flat = file.read_u32(name, {2});
   std::vector<ObjectPair> pairs(flat.size() / 2);
   for (std::size_t i = 0; i < pairs.size(); ++i) pairs[i] = {flat[2 * i], flat[2 * i + 1]};
   return pairs;
+}
+
+SceneFilter read_filter(const Hdf5Input& file, const std::string& path, std::size_t instances) {
+  const auto of_each = [&](const std::string& name) -> std::vector<std::uint32_t> {
+    if (!file.has(name)) return {};
+    std::vector<std::uint32_t> values = file.read_u32(name);
+    if (values.size() == instances) return values;
+    throw FileError(path + ": " + name + ": " + std::to_string(values.size()) + " rows for " +
+                    std::to_string(instances) + " instances");
+  };
+  SceneFilter filter;
+  filter.group = of_each("/instances/group");
+  filter.mask = of_each("/instances/mask");
+  for (const std::uint32_t motion : of_each("/simulation/motion")) {
+    if (motion > static_cast<std::uint32_t>(Motion::sleeping)) {
+      throw FileError(path + ": /simulation/motion: instance " + std::to_string(filter.motion.size()) + ": " +
+                      std::to_string(motion) + " is none of 0 moving, 1 fixed, 2 kinematic, 3 sleeping");
+    }
+    filter.motion.push_back(static_cast<Motion>(motion));
+  }
+  if (file.has("/excluded")) filter.excluded = read_pairs(file, "/excluded");
+  return filter;
 }
 
 PoseNotes read_notes(const Hdf5Input& file) {
@@ -46,8 +69,9 @@ SceneDescription read_file(const std::string& path) {
   SceneDescription scene;
   scene.assets = file.read_strings("/assets");
   scene.instances = read_instances(file, path);
-  if (file.has("/pairs")) scene.pairs = read_pairs(file);
+  if (file.has("/pairs")) scene.pairs = read_pairs(file, "/pairs");
   if (file.has("/poses")) scene.poses = read_notes(file);
+  scene.filter = read_filter(file, path, scene.instances.size());
   return scene;
 }
 
@@ -58,14 +82,16 @@ void check_indices(const SceneDescription& scene, const std::string& path) {
     throw FileError(path + ": /instances/asset: instance " + std::to_string(i) + " is of asset " +
                     std::to_string(scene.instances[i].asset) + " of " + std::to_string(scene.assets.size()));
   }
-  if (!scene.pairs) return;
-  for (std::size_t i = 0; i < scene.pairs->size(); ++i) {
-    const ObjectPair pair = (*scene.pairs)[i];
-    if (std::max(pair.a, pair.b) < scene.instances.size()) continue;
-    throw FileError(path + ": /pairs: row " + std::to_string(i) + " names instance " +
-                    std::to_string(std::max(pair.a, pair.b)) + " of " +
-                    std::to_string(scene.instances.size()));
-  }
+  const auto check_pairs = [&](const char* name, const std::vector<ObjectPair>& pairs) {
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      const std::uint32_t last = std::max(pairs[i].a, pairs[i].b);
+      if (last < scene.instances.size()) continue;
+      throw FileError(path + ": " + name + ": row " + std::to_string(i) + " names instance " +
+                      std::to_string(last) + " of " + std::to_string(scene.instances.size()));
+    }
+  };
+  if (scene.pairs) check_pairs("/pairs", *scene.pairs);
+  check_pairs("/excluded", scene.filter.excluded);
 }
 
 MappedAsset open_asset(const std::string& scene, const std::vector<std::string>& names, std::size_t i) {
@@ -83,6 +109,12 @@ MappedAsset open_asset(const std::string& scene, const std::vector<std::string>&
 }
 
 }  // namespace
+
+PairFilter SceneFilter::view(ExcludedPairTable& table) const {
+  if (table.set(excluded) != Status::kOk) throw std::bad_alloc();
+  const auto of_each = [](const auto& values) { return values.empty() ? nullptr : values.data(); };
+  return {of_each(motion), of_each(group), of_each(mask), table.view()};
+}
 
 std::vector<AssetView> Scene::views() const {
   std::vector<AssetView> views;
@@ -119,8 +151,30 @@ Scene read_scene(const std::string& path) {
   return scene;
 }
 
+namespace {
+
+void add_pairs(Hdf5Output& file, const char* name, const std::vector<ObjectPair>& pairs) {
+  std::vector<std::uint32_t> numbers;
+  for (const ObjectPair& pair : pairs) numbers.insert(numbers.end(), {pair.a, pair.b});
+  file.add(name, {pairs.size(), 2}, numbers);
+}
+
+void add_filter(Hdf5Output& file, const SceneFilter& filter) {
+  const auto add = [&](const char* name, const std::vector<std::uint32_t>& values) {
+    if (!values.empty()) file.add(name, {values.size()}, values);
+  };
+  std::vector<std::uint32_t> motion;
+  for (const Motion of_each : filter.motion) motion.push_back(static_cast<std::uint32_t>(of_each));
+  add("/instances/group", filter.group);
+  add("/instances/mask", filter.mask);
+  add("/simulation/motion", motion);
+  if (!filter.excluded.empty()) add_pairs(file, "/excluded", filter.excluded);
+}
+
+}  // namespace
+
 void add_scene(Hdf5Output& file, const SceneDescription& scene) {
-  std::vector<std::uint32_t> asset, pairs;
+  std::vector<std::uint32_t> asset;
   std::vector<double> rotation, translation;
   for (const Instance& instance : scene.instances) {
     const double* first = &instance.pose.rotation[0][0];
@@ -132,10 +186,8 @@ void add_scene(Hdf5Output& file, const SceneDescription& scene) {
   file.add("/instances/asset", {asset.size()}, asset);
   file.add("/instances/rotation", {asset.size(), 3, 3}, rotation);
   file.add("/instances/translation", {asset.size(), 3}, translation);
-  if (scene.pairs) {
-    for (const ObjectPair& pair : *scene.pairs) pairs.insert(pairs.end(), {pair.a, pair.b});
-    file.add("/pairs", {scene.pairs->size(), 2}, pairs);
-  }
+  if (scene.pairs) add_pairs(file, "/pairs", *scene.pairs);
+  add_filter(file, scene.filter);
   if (scene.poses) {
     file.add("/poses/geometry", scene.poses->geometry);
     file.add("/poses/stream", scene.poses->stream);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tandem/kernels/contact_query.h"
+#include "tandem/kernels/excluded_pairs.h"
 #include "tandem/runtime/map.h"
 
 namespace tandem::bench {
@@ -21,12 +22,24 @@ struct PoseNotes {
   std::vector<double> depth;          ///< of each pose, see NearContactPose
 };
 
+/// What a scene file tells of the pairs that a query is to find. Arrays have an entry for each instance, or
+/// none where the file has no such dataset.
+struct SceneFilter {
+  std::vector<Motion> motion;
+  std::vector<std::uint32_t> group, mask;
+  std::vector<ObjectPair> excluded;
+
+  /// As queries take it. `table` is made to own the excluded pairs. Throws std::bad_alloc.
+  PairFilter view(ExcludedPairTable& table) const;
+};
+
 /// What a scene file holds (docs/scenes.md).
 struct SceneDescription {
   std::vector<std::string> assets;  ///< .bvh paths, relative to the scene file
   std::vector<Instance> instances;
   std::optional<std::vector<ObjectPair>> pairs;  ///< without them the broad phase makes the pairs
   std::optional<PoseNotes> poses;                ///< of files of poses
+  SceneFilter filter;
 };
 
 /// A scene with its assets mapped and checked.

@@ -88,7 +88,7 @@ Configuration structured_stack(const AssetView& box, std::uint32_t side, double 
       }
       // The floor's upper side is the plane z = 0.
       instance.pose.translation[2] = -bounds.upper[2] + layer * (length[2] - sink);
-      stack.add(instance, layer == 0 ? Motion::fixed : Motion::dynamic);
+      stack.add(instance, layer == 0 ? Motion::fixed : Motion::moving);
     }
   }
   return stack;
@@ -106,7 +106,7 @@ Configuration unstructured_pile(const AssetView& body, const AssetView& ground, 
   while (!spread(Lattice(body, bounds_of(ground), count, spacing), query, random, bodies)) spacing *= kWider;
   Configuration pile;
   pile.add({1, kIdentityPose}, Motion::fixed);
-  for (const Instance& instance : bodies) pile.add(instance, Motion::dynamic);
+  for (const Instance& instance : bodies) pile.add(instance, Motion::moving);
   return pile;
 }
 
@@ -114,7 +114,7 @@ Configuration rock_slide(const AssetView& body, const AssetView& ground, std::ui
                          std::uint64_t seed) {
   Configuration slide;
   for (const Instance& instance : bench::make_slide(body, ground, count, tilt, {seed, {}})) {
-    slide.add(instance, instance.asset == 1 ? Motion::fixed : Motion::dynamic);
+    slide.add(instance, instance.asset == 1 ? Motion::fixed : Motion::moving);
   }
   return slide;
 }

@@ -85,7 +85,7 @@ class ProblemMaker {
     problem_.displacement.assign(problem_.bodies.size(), Vector6::Zero());
   }
 
-  bool is_moved(std::uint32_t body) const { return input_.bodies[body].motion == Motion::dynamic; }
+  bool is_moved(std::uint32_t body) const { return input_.bodies[body].motion == Motion::moving; }
 
   // The velocity of a body's point if contacts do not move the body, else 0.
   Vector3d driven(std::uint32_t body, const Vector3d& arm) const {

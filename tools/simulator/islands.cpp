@@ -27,7 +27,7 @@ class UnionFind {
 };
 
 bool moves(const BodyProperties& body) {
-  return body.motion == Motion::dynamic;
+  return body.motion == Motion::moving;
 }
 
 // Sorts things with an island each by island, keeping their order.

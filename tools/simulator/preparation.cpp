@@ -75,9 +75,8 @@ class Shapes {
   std::vector<std::optional<BodyProperties>> of_dynamic_, of_fixed_;
 };
 
-// What a scene file says of its bodies beyond their poses; empty where it is silent.
+// What a scene file says of its bodies beyond its description; empty where it is silent.
 struct SceneMotion {
-  std::vector<std::uint32_t> motion;
   std::vector<double> density, velocity, angular_velocity;
 };
 
@@ -96,15 +95,6 @@ SceneMotion read_motion(const std::string& path, std::size_t bodies) {
     const bool finite = std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
     if (!finite) throw FileError(path + ": " + name + ": a number is not finite");
   };
-  if (file.has("/simulation/motion")) {
-    read.motion = file.read_u32("/simulation/motion");
-    check("/simulation/motion", read.motion.size());
-    if (std::any_of(read.motion.begin(), read.motion.end(),
-                    [](std::uint32_t motion) { return motion > 2; })) {
-      throw FileError(path +
-                      ": /simulation/motion: a number that is none of 0 dynamic, 1 fixed, 2 kinematic");
-    }
-  }
   read_f64("/simulation/density", {}, read.density);
   if (std::any_of(read.density.begin(), read.density.end(), [](double density) { return density <= 0; })) {
     throw FileError(path + ": /simulation/density: a density that is not above 0");
@@ -114,10 +104,16 @@ SceneMotion read_motion(const std::string& path, std::size_t bodies) {
   return read;
 }
 
+// A body that sleeps in the file starts awake: a simulation finds out by itself who sleeps.
+Motion moved_by(const bench::SceneFilter& filter, std::size_t body) {
+  const Motion motion = filter.motion.empty() ? Motion::moving : filter.motion[body];
+  return motion == Motion::sleeping ? Motion::moving : motion;
+}
+
 void add_body(Preparation& all, const BodyProperties& body, const Pose& pose, const AssetView& shape) {
   all.bodies.push_back(body);
   all.states.push_back(state_of(body, pose));
-  if (body.motion == Motion::dynamic) all.triangles += shape.level().triangle_count;
+  if (body.motion == Motion::moving) all.triangles += shape.level().triangle_count;
 }
 
 }  // namespace
@@ -145,14 +141,14 @@ Preparation prepare_scene(const std::string& path, const bench::Scene& scene, do
       throw FileError(path + ": instance " + std::to_string(i) + ": " + explain(Status::kPoseNotRigid));
     }
     const std::uint32_t shape = instances[i].asset;
-    const auto moved_by = motion.motion.empty() ? Motion::dynamic : static_cast<Motion>(motion.motion[i]);
+    const Motion mover = moved_by(scene.description.filter, i);
     const double body_density = motion.density.empty() ? density : motion.density[i];
-    add_body(all, bodies.body(shape, moved_by, body_density, all.findings), instances[i].pose, shapes[shape]);
+    add_body(all, bodies.body(shape, mover, body_density, all.findings), instances[i].pose, shapes[shape]);
     const auto vector_of = [i](const std::vector<double>& numbers) {
       return numbers.empty() ? Vector3d(Vector3d::Zero())
                              : Vector3d(numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]);
     };
-    if (moved_by == Motion::fixed) continue;
+    if (mover == Motion::fixed) continue;
     all.states.back().velocity = vector_of(motion.velocity);
     all.states.back().angular_velocity = vector_of(motion.angular_velocity);
   }

@@ -14,7 +14,7 @@ bool is_free(const Simulator& simulator, std::uint32_t body, const Vector3d& pos
   const auto bodies = simulator.bodies();
   const auto states = simulator.states();
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
-    if (i == body || bodies[i].motion != Motion::dynamic) continue;
+    if (i == body || bodies[i].motion != Motion::moving) continue;
     const double reach = bodies[i].radius + bodies[body].radius;
     if ((states[i].position - position).squaredNorm() < reach * reach) return false;
   }
@@ -71,7 +71,7 @@ std::uint64_t Reentry::apply(Simulator& simulator, std::uint64_t step) const {
   std::uint64_t count = 0;
   for (std::uint32_t i = 0; i < simulator.bodies().size(); ++i) {
     const BodyProperties& body = simulator.bodies()[i];
-    if (body.motion != Motion::dynamic || !has_left(simulator.states()[i].position, body.radius)) continue;
+    if (body.motion != Motion::moving || !has_left(simulator.states()[i].position, body.radius)) continue;
     simulator.place(i, entry(simulator, i, step));
     ++count;
   }

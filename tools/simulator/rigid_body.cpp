@@ -38,7 +38,7 @@ Vector3d midpoint_angular_velocity(const BodyProperties& body, const BodyState& 
 }
 
 void rotate(const BodyProperties& body, BodyState& state, const Vector3d& correction, double dt) {
-  if (body.motion != Motion::dynamic) {
+  if (body.motion != Motion::moving) {
     state.orientation = (rotation_by(dt * state.angular_velocity) * state.orientation).normalized();
     return;
   }
@@ -84,7 +84,7 @@ BodyState state_of(const BodyProperties& body, const Pose& pose) {
 }
 
 Matrix3d world_inverse_inertia(const BodyProperties& body, const BodyState& state) {
-  if (body.motion != Motion::dynamic) return Matrix3d::Zero();
+  if (body.motion != Motion::moving) return Matrix3d::Zero();
   const Matrix3d rotation = state.orientation.toRotationMatrix();
   return rotation * body.inverse_inertia * rotation.transpose();
 }
@@ -97,13 +97,13 @@ void advance(const BodyProperties& body, BodyState& state, const Vector3d& corre
 }
 
 double kinetic_energy(const BodyProperties& body, const BodyState& state) {
-  if (body.motion != Motion::dynamic) return 0;
+  if (body.motion != Motion::moving) return 0;
   const Vector3d spin = turn_into_world(state.orientation, body.inertia, state.angular_velocity);
   return 0.5 * (body.mass * state.velocity.squaredNorm() + spin.dot(state.angular_velocity));
 }
 
 Vector3d angular_momentum(const BodyProperties& body, const BodyState& state) {
-  if (body.motion != Motion::dynamic) return Vector3d::Zero();
+  if (body.motion != Motion::moving) return Vector3d::Zero();
   const Vector3d spin = turn_into_world(state.orientation, body.inertia, state.angular_velocity);
   return spin + body.mass * state.position.cross(state.velocity);
 }

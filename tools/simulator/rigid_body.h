@@ -8,20 +8,13 @@
 
 namespace tandem::simulation {
 
-/// What moves a body.
-enum class Motion : std::uint8_t {
-  dynamic,    ///< forces and contacts
-  fixed,      ///< nothing
-  kinematic,  ///< its velocities, which nothing changes
-};
-
 /// What a body is, apart from where it is.
 struct BodyProperties {
-  std::uint32_t shape = 0;  ///< by place in the list given to the engine
-  Motion motion = Motion::dynamic;
-  double mass = 1;                                        ///< kg; that of a fixed body is not looked at
-  double radius = 1;                                      ///< of the shape, about the centre of mass
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();       ///< of mass, in the file's coordinates
+  std::uint32_t shape = 0;                           ///< by place in the list given to the engine
+  Motion motion = Motion::moving;                    ///< never sleeping; a kinematic one keeps its velocities
+  double mass = 1;                                   ///< kg; that of a fixed body is not looked at
+  double radius = 1;                                 ///< of the shape, about the centre of mass
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< of mass, in the file's coordinates
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Identity();  ///< about the centre, along the file's axes
   Eigen::Matrix3d inverse_inertia = Eigen::Matrix3d::Identity();
 };

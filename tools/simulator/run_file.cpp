@@ -129,7 +129,7 @@ void write_bodies(Hdf5Output& file, const RunDescription& run) {
   for (const BodyProperties& body : run.bodies) {
     asset.push_back(body.shape);
     motion.push_back(static_cast<std::uint32_t>(body.motion));
-    mass.push_back(body.motion == Motion::dynamic ? body.mass : 0);
+    mass.push_back(body.motion == Motion::moving ? body.mass : 0);
     append(center, body.center);
     inertia.insert(inertia.end(), body.inertia.data(), body.inertia.data() + 9);  // symmetric
   }

@@ -118,7 +118,7 @@ std::vector<BodyPose> Simulator::poses() const {
 void Simulator::take_measures(StepRecord& record) const {
   std::size_t moving = 0;
   for (std::size_t i = 0; i < states_.size(); ++i) {
-    if (bodies_[i].motion != Motion::dynamic) continue;
+    if (bodies_[i].motion != Motion::moving) continue;
     const BodyState& state = states_[i];
     const double speed = state.velocity.norm();
     record.kinetic_energy += kinetic_energy(bodies_[i], state);

@@ -277,7 +277,7 @@ class IslandSweeps {
 };
 
 Mover make_mover(const BodyProperties& body, const BodyState& state) {
-  const bool moves = body.motion == Motion::dynamic;
+  const bool moves = body.motion == Motion::moving;
   const Vector3d still = Vector3d::Zero();
   return {body.motion == Motion::fixed ? still : state.velocity,
           body.motion == Motion::fixed ? still : state.angular_velocity, moves ? 1 / body.mass : 0,
@@ -338,7 +338,7 @@ void ContactSolver::solve(std::span<const BodyProperties> bodies, std::span<Body
         std::sqrt(statistics_.residual_rms / (3 * static_cast<double>(statistics_.contacts)));
   }
   for_each(bodies.size(), [&](std::size_t i) {
-    if (bodies[i].motion != Motion::dynamic) return;
+    if (bodies[i].motion != Motion::moving) return;
     states[i].velocity = movers_[i].velocity;
     states[i].angular_velocity = movers_[i].spin;
   });
@@ -362,7 +362,7 @@ void SweepSolver::step(const StepInput& input, std::span<BodyState> states,
   for (std::uint32_t i = 0; i < options.substeps; ++i) {
     if (i > 0) followed.follow(states);
     for (std::size_t body = 0; body < states.size(); ++body) {
-      if (input.bodies[body].motion == Motion::dynamic) states[body].velocity += dt * input.gravity;
+      if (input.bodies[body].motion == Motion::moving) states[body].velocity += dt * input.gravity;
     }
     solver_.solve(input.bodies, states, followed.contacts(), input.islands, impulses, options,
                   {dt, dt * input.gravity.norm(), input.number * options.substeps + i});

@@ -16,8 +16,9 @@ constexpr std::uint32_t kTileWarps = kTileThreads / kFanOut;
 constexpr std::uint32_t kShare = kTile / kTileWarps;  // a warp's of the other tile: 16 boxes
 
 // Counters::found holds pairs in its low bits and blocks that are done in the others: one addition makes room
-// for a block's pairs and tells whether it is the last.
-constexpr int kFoundBits = 40;
+// for a block's pairs and tells whether it is the last. 2^13 boxes make less than 2^26 pairs with each other
+// and less than 2^45 with others that are kept; blocks are kMostDirectBlocks at most.
+constexpr int kFoundBits = 48;
 
 struct Tiles {
   WorldBox exact[2][kTile];  // of the own tile, of the other
@@ -33,11 +34,12 @@ __device__ std::uint32_t bits_below(int end) {
 }
 
 // The lower tile of a pair is the other, the higher one the block's own.
-template <typename Boxes>
+template <typename Boxes, typename Rule>
 class Direct {
  public:
-  __device__ Direct(const Boxes& boxes, std::uint32_t count, const Output& output, Tiles& tiles)
-      : boxes_(boxes), count_(count), output_(output), tiles_(tiles) {}
+  __device__ Direct(const Boxes& boxes, std::uint32_t count, const Rule& rule, const Output& output,
+                    Tiles& tiles)
+      : boxes_(boxes), count_(count), rule_(rule), output_(output), tiles_(tiles) {}
 
   // Tasks from `task` up to `end`, of which there is one.
   __device__ void run(std::uint32_t task, std::uint32_t end) {
@@ -140,10 +142,20 @@ class Direct {
     return share_ + bit % 16;
   }
 
+  // The boxes' own numbers.
+  __device__ std::uint32_t own_number(std::uint32_t bit) const {
+    return boxes_.number(own_ * kTile + own_of(bit));
+  }
+  __device__ std::uint32_t other_number(std::uint32_t bit) const {
+    return boxes_.number(other_ * kTile + other_of(bit));
+  }
+
   __device__ std::uint32_t decided(std::uint32_t hits) const {
     for (std::uint32_t left = hits; left != 0; left &= left - 1) {
       const std::uint32_t bit = lowest(left);
-      if (!overlap(tiles_.exact[0][own_of(bit)], tiles_.exact[1][other_of(bit)])) hits &= ~(1u << bit);
+      if (!overlap(tiles_.exact[0][own_of(bit)], tiles_.exact[1][other_of(bit)]) ||
+          !rule_(other_number(bit), own_number(bit)))
+        hits &= ~(1u << bit);
     }
     return hits;
   }
@@ -172,7 +184,7 @@ class Direct {
     unsigned long long place = tiles_.begin + first + end - count_of(hits);
     for (; hits != 0; hits &= hits - 1) {
       const std::uint32_t bit = lowest(hits);
-      output_.write(place++, other_ * kTile + other_of(bit), own_ * kTile + own_of(bit));
+      output_.write(place++, other_number(bit), own_number(bit));
     }
   }
 
@@ -189,6 +201,7 @@ class Direct {
 
   const Boxes& boxes_;
   std::uint32_t count_;
+  const Rule& rule_;
   const Output& output_;
   Tiles& tiles_;
   std::uint32_t own_ = 0, other_ = 0;
@@ -197,14 +210,15 @@ class Direct {
 };
 
 // `tasks` for each block, the last one's maybe fewer.
-template <typename Boxes>
+template <typename Boxes, typename Rule>
 __global__ void __launch_bounds__(kTileThreads)
     collect_directly(const __grid_constant__ Boxes boxes, std::uint32_t count,
-                     const __grid_constant__ Output output, std::uint32_t tasks, std::uint32_t all_tasks) {
+                     const __grid_constant__ Rule rule, const __grid_constant__ Output output,
+                     std::uint32_t tasks, std::uint32_t all_tasks) {
   __shared__ Tiles tiles;
   gpu::wait_for_kernel_before();
   const std::uint32_t first = blockIdx.x * tasks;
-  Direct<Boxes>(boxes, count, output, tiles).run(first, min(first + tasks, all_tasks));
+  Direct<Boxes, Rule>(boxes, count, rule, output, tiles).run(first, min(first + tasks, all_tasks));
 }
 
 }  // namespace

@@ -154,7 +154,7 @@ __global__ void __launch_bounds__(256)
   for (int k = 0; k < 3; ++k) cell[k] = cell_of(scale(centre(box, k), k));
   const Key place = static_cast<Key>(class_of(longest_edge(box), known, scale)) << 3 * kAxisBits |
                     along_curve(cell[0], cell[1], cell[2]);
-  keys[i] = place << kUnusedBits >> index_bits << index_bits | i;
+  keys[i] = place << kUnusedBits >> index_bits << index_bits | boxes.number(i);
 }
 
 }  // namespace

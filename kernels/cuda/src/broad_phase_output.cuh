@@ -6,6 +6,16 @@
 namespace tandem {
 namespace {
 
+// Which of the pairs whose boxes meet are written.
+struct EveryPair {
+  __device__ bool operator()(std::uint32_t, std::uint32_t) const { return true; }
+};
+struct FilteredPairs {
+  PairFilter filter;
+
+  __device__ bool operator()(std::uint32_t a, std::uint32_t b) const { return filter.looks_at(a, b); }
+};
+
 // How pairs are written: a << shift_a | b << shift_b. An ObjectPair's bytes, or what sorts as it should.
 struct Output {
   unsigned long long* pairs;

@@ -15,12 +15,19 @@ struct alignas(16) WarpMemory {
 };
 
 // One group of 32 boxes against itself and all that come after, or a part of these.
+template <typename Rule>
 class Walk {
  public:
   // part: of the children of a node, which groups to take, a bit each.
-  __device__ Walk(const Tree& tree, const WorldBox* boxes, const Output& output, WarpMemory& memory,
-                  std::uint32_t group, std::uint32_t part)
-      : tree_(tree), boxes_(boxes), output_(output), memory_(memory), group_(group), part_(part) {
+  __device__ Walk(const Tree& tree, const WorldBox* boxes, const Rule& rule, const Output& output,
+                  WarpMemory& memory, std::uint32_t group, std::uint32_t part)
+      : tree_(tree),
+        boxes_(boxes),
+        rule_(rule),
+        output_(output),
+        memory_(memory),
+        group_(group),
+        part_(part) {
     mine_ = leaf(group * kFanOut + lane_index());
     memory_.own[lane_index()] = mine_;
     around_ = tree_.level(1)[group];
@@ -155,6 +162,7 @@ class Walk {
         a = min(own.box, theirs.box);
         b = max(own.box, theirs.box);
         meet = surely_meet(own, theirs) || overlap(boxes_[a], boxes_[b]);
+        if (meet) meet = rule_(a, b);
       }
       const std::uint32_t meeting = __ballot_sync(kAllLanes, meet);
       __syncwarp();  // all have read what may now be overwritten
@@ -183,6 +191,7 @@ class Walk {
 
   const Tree& tree_;
   const WorldBox* boxes_;
+  const Rule& rule_;
   const Output& output_;
   WarpMemory& memory_;
   std::uint32_t group_, part_, count_ = 0;
@@ -190,16 +199,17 @@ class Walk {
 };
 
 // `split` warps share a group: a power of two, at most 16.
+template <typename Rule>
 __global__ void __launch_bounds__(kWarps* kFanOut)
     collect_pairs(const __grid_constant__ Tree tree, std::uint32_t split, const WorldBox* boxes,
-                  const __grid_constant__ Output output) {
+                  const __grid_constant__ Rule rule, const __grid_constant__ Output output) {
   __shared__ WarpMemory memories[kWarps];
   gpu::wait_for_kernel_before();
   const std::uint32_t warp = threadIdx.x / kFanOut;
   const std::uint64_t task = static_cast<std::uint64_t>(blockIdx.x) * kWarps + warp;
   if (task >= static_cast<std::uint64_t>(tree.count[1]) * split || output.counters->error != kNoError) return;
   const std::uint32_t part = kAllLanes / ((1u << split) - 1) << task % split;  // every split-th bit
-  Walk(tree, boxes, output, memories[warp], static_cast<std::uint32_t>(task / split), part).run();
+  Walk<Rule>(tree, boxes, rule, output, memories[warp], static_cast<std::uint32_t>(task / split), part).run();
 }
 
 }  // namespace

@@ -1,25 +1,18 @@
 #include "gpu_query_data.h"
 #include "tandem/kernels/detail/candidate.h"
+#include "walk.cuh"
 
-// What the walks left undecided: float64, then exactly. The exact stage needs 3 KB of stack a thread, so it
-// has a kernel of its own, which scenes without hard cases leave at once.
+// What the walk of the records leaves, in one kernel, which ends the query: candidates that float32 cannot
+// decide, and object pairs that float32 cannot take.
+//
+// Candidates are decided by float64 as they lie in the list. What float64 leaves waits in shared memory until
+// each thread of the block has one to decide exactly. Object pairs that float32 cannot take are walked by
+// world boxes; they are rare, so each of their candidates is decided on the spot.
 namespace tandem::gpu {
 namespace {
 
-constexpr std::uint32_t kThreads = 128;
-
-__device__ const Triangle& triangle_a(const PairRecord& record, const Candidate& candidate) {
-  return record.triangles_a[candidate.a];
-}
-__device__ const Triangle& triangle_b(const PairRecord& record, const Candidate& candidate) {
-  return record.triangles_b[candidate.b];
-}
-
-__device__ TrianglePair posed_pair(const QueryArgs& args, const PairRecord& record,
-                                   const Candidate& candidate) {
-  return tandem::posed_pair(stored_pose(args, record.instance_a), triangle_a(record, candidate),
-                            stored_pose(args, record.instance_b), triangle_b(record, candidate));
-}
+constexpr std::uint32_t kMostThreads = 32 * kMostWarpsPerBlock;
+constexpr std::uint32_t kFewestAtOnce = 8;  // candidates of a warp: few are spread over all warps
 
 __device__ std::uint32_t stored(Counter counted, std::uint64_t room) {
   return static_cast<std::uint32_t>(counted < room ? counted : room);
@@ -31,9 +24,9 @@ __device__ void add_contact(const QueryArgs& args, const PairRecord& record, con
   if (contact) contact = is_wanted(args, candidate.pair);
   const Counter place = place_for(contact, &args.state->contacts);
   if (!contact || place >= args.capacity.contacts) return;
-  args.contacts[place] =
-      make_contact(candidate.pair, record.instance_a == record.instance_b, candidate.a, candidate.b,
-                   triangle_a(record, candidate).source_face(), triangle_b(record, candidate).source_face());
+  args.contacts[place] = make_contact(candidate.pair, record.instance_a == record.instance_b, candidate.a,
+                                      candidate.b, record.triangles_a[candidate.a].source_face(),
+                                      record.triangles_b[candidate.b].source_face());
 }
 
 /// Adds up over the warp.
@@ -42,10 +35,75 @@ __device__ void count(bool counts, Counter* counter) {
   if (lane_id() == 0 && lanes != 0) atomicAdd(counter, static_cast<Counter>(__popc(lanes)));
 }
 
-/// Where only boxes are asked for, nothing comes to the float64 stage.
-__host__ __device__ bool has_float64_stage(const QueryArgs& args) {
-  return args.mode != QueryMode::boxes && !args.walk_only;
-}
+/// Decides the list of candidates; all threads of a block call each function. Mode: exact or fast.
+template <QueryMode kMode>
+class Deciding {
+ public:
+  /// The candidates that wait lie where the stacks of the walk by world boxes will be.
+  __device__ Deciding(const QueryArgs& args, float4* memory)
+      : args_(args),
+        waiting_(*reinterpret_cast<std::uint32_t*>(memory)),
+        queue_(reinterpret_cast<Candidate*>(memory) + kBlockWords * 4 / sizeof(Candidate) + 1) {
+    static_assert(2 * 32 * sizeof(Candidate) + sizeof(Candidate) <= 4 * kWarpWords);
+  }
+
+  __device__ void run() {
+    const std::uint32_t total = stored(args_.state->undecided, args_.capacity.undecided);
+    if (total == 0) return;
+    if (threadIdx.x == 0) waiting_ = 0;
+    __syncthreads();
+    const std::uint32_t warps = gridDim.x * (blockDim.x / 32),
+                        at_once = min(max((total + warps - 1) / warps, kFewestAtOnce), 32u);
+    const std::uint32_t own = at_once * (threadIdx.x / 32 * gridDim.x + blockIdx.x) + lane_id();
+    for (std::uint64_t before = 0; before < total; before += at_once * warps) {
+      decide(lane_id() < at_once && before + own < total, static_cast<std::uint32_t>(before + own));
+      __syncthreads();
+      const bool full = waiting_ >= blockDim.x;
+      __syncthreads();  // all have looked before more wait
+      if (full) decide_waiting(blockDim.x);
+    }
+    if (waiting_ != 0) decide_waiting(waiting_);
+  }
+
+ private:
+  /// By float64, or as mode fast does.
+  __device__ void decide(bool mine, std::uint32_t i) {
+    const Candidate candidate = args_.undecided[mine ? i : 0];
+    const PairRecord& record = args_.pairs[candidate.pair];
+    Verdict verdict = Verdict::apart;
+    if (mine) {
+      verdict = kMode == QueryMode::fast
+                    ? decide_fast(framed_pair(pose_of(record), record.triangles_a[candidate.a],
+                                              record.triangles_b[candidate.b]))
+                    : decide_float64(posed_pair(args_, record, candidate.a, candidate.b));
+    }
+    if (kMode == QueryMode::exact) {
+      count(mine && verdict != Verdict::undecided, &args_.state->decided_by_float64);
+      if (verdict == Verdict::undecided) queue_[atomicAdd(&waiting_, 1u)] = candidate;
+    }
+    add_contact(args_, record, candidate, verdict == Verdict::contact);
+  }
+
+  /// Exactly, the last of those that wait. Few are spread over all warps. Condition: some wait.
+  __device__ void decide_waiting(std::uint32_t how_many) {
+    const std::uint32_t first = waiting_ - how_many, i = lane_id() * (blockDim.x / 32) + threadIdx.x / 32;
+    const bool mine = i < how_many;
+    const Candidate candidate = queue_[first + (mine ? i : 0)];
+    const PairRecord& record = args_.pairs[candidate.pair];
+    const bool contact = mine && decide_exactly(posed_pair(args_, record, candidate.a, candidate.b));
+    add_contact(args_, record, candidate, contact);
+    __syncthreads();  // all have read what is overwritten from now on
+    if (threadIdx.x == 0) {
+      waiting_ = first;
+      atomicAdd(&args_.state->decided_exactly, static_cast<Counter>(how_many));
+    }
+    __syncthreads();
+  }
+
+  const QueryArgs& args_;
+  std::uint32_t& waiting_;  // in shared memory; less than the block has threads, but for a moment twice these
+  Candidate* queue_;
+};
 
 /// What other blocks made of it.
 __device__ Counter now(const Counter& counter) {
@@ -54,8 +112,8 @@ __device__ Counter now(const Counter& counter) {
 
 __device__ void write_report(const QueryArgs& args) {
   const QueryState& state = *args.state;
-  const Counter contacts = now(state.contacts), exactly = now(state.unresolved),
-                by_float64 = now(state.decided_by_float64);
+  const Counter contacts = now(state.contacts), exactly = now(state.decided_exactly),
+                by_float64 = now(state.decided_by_float64), candidates = now(state.candidates);
   const std::uint32_t pairs = *args.given.count;
   GpuQueryReport report = {};
   report.needed = {pairs, contacts, state.undecided};
@@ -65,11 +123,12 @@ __device__ void write_report(const QueryArgs& args) {
   report.world_pairs = state.world_pairs;
   QueryCounters& counters = report.counters;
   counters.object_pairs = pair_count(args);
-  counters.block_pairs = state.block_pairs;
-  counters.candidates = state.candidates;
+  counters.block_pairs = now(state.block_pairs);
+  counters.candidates = candidates;
   counters.decided_by_float64 = by_float64;
   counters.decided_exactly = exactly;
-  if (has_float64_stage(args)) counters.decided_by_float32 = state.candidates - by_float64 - exactly;
+  if (args.mode != QueryMode::boxes && !args.walk_only)
+    counters.decided_by_float32 = candidates - by_float64 - exactly;
   counters.contacts = contacts;
   if (state.error != 0) {
     report = {};
@@ -81,93 +140,64 @@ __device__ void write_report(const QueryArgs& args) {
 }
 
 // What makes the state ready for the next query; the report stays. Mailboxes: those that this one used.
-__device__ void clear_mailboxes(QueryState& state, std::uint32_t mailboxes) {
-  for (std::uint32_t i = blockIdx.x * kThreads + threadIdx.x; i < mailboxes; i += gridDim.x * kThreads) {
-    state.frame.mailbox[i] = state.world.mailbox[i] = 0;
-  }
+__device__ void clear_mailboxes(Balance& balance, std::uint32_t first, std::uint32_t step,
+                                std::uint32_t mailboxes) {
+  for (std::uint32_t i = first; i < mailboxes; i += step) balance.mailbox[i] = 0;
 }
 __device__ void clear_counters(QueryState& state) {
   for (Balance* balance : {&state.frame, &state.world}) {
     balance->counts = balance->next_pair = 0;
   }
-  state.error = state.contacts = state.undecided = state.unresolved = 0;
+  state.error = state.contacts = state.undecided = state.decided_exactly = 0;
   state.world_pairs = state.finished_blocks = 0;
   state.block_pairs = state.candidates = state.decided_by_float64 = 0;
 }
 
-__device__ void finish(const QueryArgs& args) {
-  write_report(args);
-  clear_counters(*args.state);
-}
-
-/// Whether this is the first thread of the block that comes here last, all others being done.
-__device__ bool ends_last(const QueryArgs& args) {
+/// Whether the block comes here last, all others being done. word: in shared memory.
+__device__ bool ends_last(const QueryArgs& args, std::uint32_t& word) {
   __threadfence();
   __syncthreads();
-  return threadIdx.x == 0 && atomicAdd(&args.state->finished_blocks, 1u) == gridDim.x - 1;
+  if (threadIdx.x == 0) word = atomicAdd(&args.state->finished_blocks, 1u) == gridDim.x - 1;
+  __syncthreads();
+  return word != 0;
 }
 
-/// Finishes the query where nothing is left to the exact stage.
-template <bool kFast>
-__global__ void __launch_bounds__(kThreads) decide_by_float64(const __grid_constant__ QueryArgs args) {
+template <QueryMode kMode, bool kWalksOnly>
+__global__ void __launch_bounds__(kMostThreads, 1) decide(const __grid_constant__ QueryArgs args) {
+  extern __shared__ float4 memory[];
   wait_for_kernel_before();
-  clear_mailboxes(*args.state, args.shape.mailboxes());
-  const std::uint32_t total = failed(args) ? 0 : stored(args.state->undecided, args.capacity.undecided);
-  for (std::uint32_t first = blockIdx.x * kThreads; first < total; first += gridDim.x * kThreads) {
-    const std::uint32_t i = first + threadIdx.x;
-    const Candidate candidate = args.undecided[i < total ? i : first];
-    const PairRecord& record = args.pairs[candidate.pair];
-    Verdict verdict = Verdict::apart;
-    bool by_float64 = false;
-    if (i < total) {
-      if (kFast && record.in_frame != 0) {
-        verdict = decide_fast(
-            framed_pair(pose_of(record), triangle_a(record, candidate), triangle_b(record, candidate)));
-      } else {
-        verdict = decide_float64(posed_pair(args, record, candidate));
-        by_float64 = verdict != Verdict::undecided;
-      }
-    }
-    count(by_float64, &args.state->decided_by_float64);
-    const Counter place = place_for(verdict == Verdict::undecided, &args.state->unresolved);
-    if (verdict == Verdict::undecided) args.unresolved[place] = candidate;
-    add_contact(args, record, candidate, verdict == Verdict::contact);
+  QueryState& state = *args.state;
+  const std::uint32_t mailboxes = args.shape.shares ? args.shape.mailboxes() : 0;
+  clear_mailboxes(state.frame, blockIdx.x * blockDim.x + threadIdx.x, gridDim.x * blockDim.x, mailboxes);
+  const bool walks_world = !failed(args) && state.world_pairs != 0;
+  if constexpr (kMode != QueryMode::boxes && !kWalksOnly) {
+    if (!failed(args)) Deciding<kMode>(args, memory).run();
   }
-  if (!ends_last(args)) return;
-  if (now(args.state->unresolved) == 0)
-    finish(args);
-  else
-    args.state->finished_blocks = 0;
-}
-
-/// Finishes the query where the float64 stage did not.
-__global__ void __launch_bounds__(kThreads) decide_exactly(const __grid_constant__ QueryArgs args) {
-  wait_for_kernel_before();
-  const auto total = static_cast<std::uint32_t>(args.state->unresolved);
-  if (has_float64_stage(args)) {
-    if (total == 0) return;
-  } else {
-    clear_mailboxes(*args.state, args.shape.mailboxes());
+  if (walks_world) {
+    __syncthreads();
+    prepare_memory(memory);
+    run_walk<InWorld<kMode, kWalksOnly>, true>(args, memory);
   }
-  for (std::uint32_t first = blockIdx.x * kThreads; first < total; first += gridDim.x * kThreads) {
-    const std::uint32_t i = first + threadIdx.x;
-    const Candidate candidate = args.unresolved[i < total ? i : first];
-    const PairRecord& record = args.pairs[candidate.pair];
-    const bool contact = i < total && decide_exact(posed_pair(args, record, candidate)) == Verdict::contact;
-    add_contact(args, record, candidate, contact);
-  }
-  if (ends_last(args)) finish(args);
+  if (!ends_last(args, *reinterpret_cast<std::uint32_t*>(memory))) return;
+  if (walks_world) clear_mailboxes(state.world, threadIdx.x, blockDim.x, args.shape.mailboxes());
+  if (threadIdx.x != 0) return;
+  write_report(args);
+  clear_counters(state);
 }
 
 }  // namespace
 
 cudaError_t decide_rest(const QueryArgs& args, cudaStream_t stream) {
-  const Grid grid = {args.limits.processors * 4, kThreads, 0, stream, args.limits.early_launch};
-  cudaError_t error = cudaSuccess;
-  if (has_float64_stage(args))
-    error = launch_after(
-        grid, args.mode == QueryMode::fast ? decide_by_float64<true> : decide_by_float64<false>, args);
-  return error == cudaSuccess ? launch_after(grid, decide_exactly, args) : error;
+  if (args.walk_only) return launch_shaped(decide<QueryMode::exact, true>, args, stream);
+  switch (args.mode) {
+    case QueryMode::exact:
+      return launch_shaped(decide<QueryMode::exact, false>, args, stream);
+    case QueryMode::fast:
+      return launch_shaped(decide<QueryMode::fast, false>, args, stream);
+    case QueryMode::boxes:
+      return launch_shaped(decide<QueryMode::boxes, false>, args, stream);
+  }
+  return cudaErrorInvalidValue;
 }
 
 }  // namespace tandem::gpu

@@ -7,12 +7,14 @@
 
 #include "broad_phase_boxes.cuh"
 #include "broad_phase_direct.cuh"
+#include "broad_phase_kept.cuh"
 #include "broad_phase_keys.cuh"
 #include "broad_phase_limits.h"
 #include "broad_phase_tree.cuh"
 #include "broad_phase_walk.cuh"
 #include "tandem/formats/gpu_memory.h"
 #include "tandem/formats/gpu_status.h"
+#include "tandem/kernels/detail/buffer.h"
 
 namespace tandem {
 namespace {
@@ -106,11 +108,11 @@ int index_bits(std::uint32_t boxes) {
   return static_cast<int>(std::bit_width(std::max(boxes, 2u) - 1));
 }
 
-// The lowest bit that keys are sorted by. Eight bits cost one pass of the sort; the fewer boxes, the less it
-// matters that some lie in one cell of the curve.
-int first_bit(std::uint32_t boxes) {
+// The lowest bit that keys of so many boxes are sorted by, which have so many bits of an index. Eight bits
+// cost one pass of the sort; the fewer boxes, the less it matters that some lie in one cell of the curve.
+int first_bit(std::uint32_t boxes, int bits) {
   const int passes = boxes <= 1u << 14 ? 3 : boxes <= 1u << 18 ? 4 : 6;
-  return std::max(64 - 8 * passes, index_bits(boxes));
+  return std::max(64 - 8 * passes, bits);
 }
 
 // Warps that share a group: so many that small scenes fill a GPU too.
@@ -121,6 +123,41 @@ std::uint32_t split_of(std::uint32_t groups) {
   return split;
 }
 
+template <typename Boxes>
+constexpr bool is_listed = false;
+template <typename Boxes>
+constexpr bool is_listed<Listed<Boxes>> = true;
+
+bool is_none(const PairFilter& filter) {
+  return filter.motion == nullptr && filter.group == nullptr && filter.mask == nullptr &&
+         filter.excluded.slots == nullptr;
+}
+
+// What a call is about: numbers of boxes or instances, where their boxes lie once they have been taken, and
+// how pairs are to be written.
+struct Call {
+  std::uint32_t numbers;
+  const WorldBox* boxes;
+  bool sorted;
+  cudaStream_t stream;
+};
+
+// What is kept of fixed boxes.
+struct Kept {
+  // In place of the number of boxes, where those that were kept are lost: no call is of so many.
+  static constexpr std::uint32_t kLost = kNoIndex;
+
+  std::uint32_t of = 0;  // so many boxes or instances; 0: nothing is kept
+  bool posed = false;    // of instances
+  std::uint32_t free_count = 0;
+  GpuArray<std::uint32_t> list;  // of those that are not kept, then of those that are
+  GpuArray<Node> nodes;
+  GpuArray<Survey> survey;
+  Tree tree = {};
+
+  std::size_t bytes() const { return list.bytes() + nodes.bytes() + survey.bytes(); }
+};
+
 }  // namespace
 
 struct GpuBroadPhase::State {
@@ -130,6 +167,7 @@ struct GpuBroadPhase::State {
   GpuArray<unsigned long long> pairs, sorted_pairs;
   GpuArray<unsigned char> sorting;  // CUB's
   GpuArray<Survey> survey;
+  Kept kept;
   GpuArray<Counters> counters;
   bool counters_are_fresh = false;  // a search that ends leaves them so
   GpuArray<GpuBroadPhaseReport> report;
@@ -151,25 +189,37 @@ struct GpuBroadPhase::State {
   bool reserve_boxes(std::uint32_t count);
   bool reserve_pairs(std::uint32_t count, bool sorted);
   bool reserve_sorting();
-  Status refusal(std::uint32_t count, const GpuBroadPhaseOptions& options) const;
-  Output output(std::uint32_t count, bool sorted);
+  bool reserve_instances(std::uint32_t count);
+  bool reserve_kept(std::uint32_t count, std::uint32_t fixed);
+  Status refusal(std::uint32_t count, bool posed, const GpuBroadPhaseOptions& options) const;
+  Output output(const Call& call);
   template <typename... Parameters, typename... Arguments>
   bool launch(std::uint32_t blocks, std::uint32_t threads, cudaStream_t stream, void (*kernel)(Parameters...),
               const Arguments&... arguments);
   bool refresh(cudaStream_t stream);
   bool begin(cudaStream_t stream) { return counters_are_fresh || refresh(stream); }
   void end(bool queued, cudaStream_t stream);
+  template <typename Boxes, typename Rule>
+  bool test_all(const Boxes& from, std::uint32_t count, const Rule& rule, const Call& call);
   template <typename Boxes>
-  bool test_all(const Boxes& from, std::uint32_t count, bool sorted, cudaStream_t stream);
+  bool make_tree(const Boxes& from, const Tree& tree, Survey* surveyed, const Call& call);
+  template <typename Boxes, typename Rule>
+  bool collect_with_kept(const Boxes& from, const Rule& rule, const Call& call);
+  template <typename Rule>
+  bool collect(const Tree& tree, const Rule& rule, const Call& call);
+  bool sort_pairs(const Call& call);
+  template <typename Boxes, typename Rule>
+  bool find(const Boxes& from, std::uint32_t count, const Rule& rule, const Call& call);
+  template <typename Boxes, typename Rule>
+  bool pose_and_find(const Boxes& from, std::uint32_t count, const Rule& rule, const Call& call);
   template <typename Boxes>
-  bool make_tree(const Boxes& from, const WorldBox* given, const Tree& tree, cudaStream_t stream);
-  bool collect(const WorldBox* given, const Tree& tree, bool sorted, cudaStream_t stream);
-  bool sort_pairs(std::uint32_t count, cudaStream_t stream);
+  Status run(const Boxes& all, const GpuBroadPhaseOptions& options, const Call& call);
+  Status list(std::span<const Motion> motion, cudaStream_t stream);
   template <typename Boxes>
-  bool run(const Boxes& from, const WorldBox* given, std::uint32_t count, bool sorted, cudaStream_t stream);
+  Status keep(const Boxes& all, const WorldBox* boxes, std::span<const Motion> motion, cudaStream_t stream);
   template <typename Enqueue>
-  Status find(GpuBroadPhase& self, GpuBroadPhaseCapacity wanted, const GpuBroadPhaseOptions& options,
-              cudaStream_t stream, const Enqueue& enqueue);
+  Status find_all(GpuBroadPhase& self, GpuBroadPhaseCapacity wanted, const GpuBroadPhaseOptions& options,
+                  cudaStream_t stream, const Enqueue& enqueue);
 };
 
 bool GpuBroadPhase::State::refresh(cudaStream_t stream) {
@@ -217,6 +267,17 @@ bool GpuBroadPhase::State::reserve_pairs(std::uint32_t count, bool sorted) {
   return ok(sorted_pairs.reserve(capacity.pairs)) && reserve_sorting();
 }
 
+// What was kept in room that is too small now is lost.
+bool GpuBroadPhase::State::reserve_instances(std::uint32_t count) {
+  if (count > boxes.room() && kept.of != 0 && kept.posed) kept.of = Kept::kLost;
+  return ok(boxes.reserve(count));
+}
+
+bool GpuBroadPhase::State::reserve_kept(std::uint32_t count, std::uint32_t fixed) {
+  return ok(kept.list.reserve(count)) && ok(kept.survey.reserve(1)) &&
+         ok(kept.nodes.reserve(nodes_of(tree_over(fixed, nullptr))));
+}
+
 // As much as sorting up to the capacity takes: CUB asks for a part that does not depend on the number, and
 // one that grows with it.
 bool GpuBroadPhase::State::reserve_sorting() {
@@ -231,14 +292,18 @@ bool GpuBroadPhase::State::reserve_sorting() {
 }
 
 // Why a call cannot be queued.
-Status GpuBroadPhase::State::refusal(std::uint32_t count, const GpuBroadPhaseOptions& options) const {
-  const bool enough = count <= capacity.boxes && (!options.sorted || sorted_pairs.room() >= capacity.pairs);
-  return enough ? Status::kOk : Status::kOutOfRange;
+Status GpuBroadPhase::State::refusal(std::uint32_t count, bool posed,
+                                     const GpuBroadPhaseOptions& options) const {
+  if (count > capacity.boxes || (options.sorted && sorted_pairs.room() < capacity.pairs))
+    return Status::kOutOfRange;
+  if (kept.of != 0 && (kept.of != count || kept.posed != posed)) return Status::kKeptMismatch;
+  return options.filter.excluded.instances > count ? Status::kUnknownInstance : Status::kOk;
 }
 
-Output GpuBroadPhase::State::output(std::uint32_t count, bool sorted) {
-  return {pairs.data(),  capacity.pairs,    sorted ? index_bits(count) : 0, sorted ? 0 : 32, counters.data(),
-          report.data(), host_report.data()};
+Output GpuBroadPhase::State::output(const Call& call) {
+  return {pairs.data(),         capacity.pairs,  call.sorted ? index_bits(call.numbers) : 0,
+          call.sorted ? 0 : 32, counters.data(), report.data(),
+          host_report.data()};
 }
 
 template <typename... Parameters, typename... Arguments>
@@ -247,75 +312,156 @@ bool GpuBroadPhase::State::launch(std::uint32_t blocks, std::uint32_t threads, c
   return ok(gpu::launch_after({blocks, threads, 0, stream, limits.early_launch}, kernel, arguments...));
 }
 
-template <typename Boxes>
-bool GpuBroadPhase::State::test_all(const Boxes& from, std::uint32_t count, bool sorted,
-                                    cudaStream_t stream) {
+template <typename Boxes, typename Rule>
+bool GpuBroadPhase::State::test_all(const Boxes& from, std::uint32_t count, const Rule& rule,
+                                    const Call& call) {
   const std::uint32_t tiles = std::max(blocks_for(count, kTile), 1u), tasks = tiles * (tiles + 1) / 2,
                       tasks_each = blocks_for(tasks, kMostDirectBlocks);
-  return launch(blocks_for(tasks, tasks_each), kTileThreads, stream, collect_directly<Boxes>, from, count,
-                output(count, sorted), tasks_each, tasks);
+  return launch(blocks_for(tasks, tasks_each), kTileThreads, call.stream, collect_directly<Boxes, Rule>, from,
+                count, rule, output(call), tasks_each, tasks);
 }
 
-// from: where the boxes come from; given: where they lie once they have been taken.
+// from: where the boxes of the tree come from.
 template <typename Boxes>
-bool GpuBroadPhase::State::make_tree(const Boxes& from, const WorldBox* given, const Tree& tree,
-                                     cudaStream_t stream) {
+bool GpuBroadPhase::State::make_tree(const Boxes& from, const Tree& tree, Survey* surveyed,
+                                     const Call& call) {
   const std::uint32_t count = tree.count[0];
-  const int bits = index_bits(count);
-  if (!launch(4, kSamples * kThreadsPerSample, stream, survey_boxes<Boxes>, from, count, survey.data()) ||
-      !launch(blocks_for(count, 256), 256, stream, make_keys<Boxes>, from, count, bits, survey.data(),
+  const int bits = index_bits(call.numbers);
+  if (!launch(4, kSamples * kThreadsPerSample, call.stream, survey_boxes<Boxes>, from, count, surveyed) ||
+      !launch(blocks_for(count, 256), 256, call.stream, make_keys<Boxes>, from, count, bits, surveyed,
               keys[0].data(), counters.data()))
     return false;
   cub::DoubleBuffer<Key> key(keys[0].data(), keys[1].data());
   std::size_t bytes = sorting.room();
-  if (!ok(cub::DeviceRadixSort::SortKeys(sorting.data(), bytes, key, count, first_bit(count), 64, stream)))
+  if (!ok(cub::DeviceRadixSort::SortKeys(sorting.data(), bytes, key, count, first_bit(count, bits), 64,
+                                         call.stream)))
     return false;
   constexpr std::uint32_t kThreads = kFanOut * kFanOut;
-  return launch(blocks_for(count, kThreads), kThreads, stream, build_lower_levels, given, key.Current(), bits,
-                survey.data(), tree) &&
-         (tree.top <= 2 || launch(1, kThreads, stream, build_upper_levels, tree));
+  return launch(blocks_for(count, kThreads), kThreads, call.stream, build_lower_levels, call.boxes,
+                key.Current(), bits, surveyed, tree) &&
+         (tree.top <= 2 || launch(1, kThreads, call.stream, build_upper_levels, tree));
 }
 
-bool GpuBroadPhase::State::collect(const WorldBox* given, const Tree& tree, bool sorted,
-                                   cudaStream_t stream) {
-  const Output out = output(tree.count[0], sorted);
+template <typename Boxes, typename Rule>
+bool GpuBroadPhase::State::collect_with_kept(const Boxes& from, const Rule& rule, const Call& call) {
+  const std::uint32_t blocks = std::min(blocks_for(kept.free_count, kKeptWarps), kMostKeptBlocks);
+  return blocks == 0 ||
+         launch(blocks, kKeptWarps * kFanOut, call.stream, collect_kept<Boxes, Rule>, from, kept.free_count,
+                kept.tree, kept.survey.data(), call.boxes, rule, output(call));
+}
+
+template <typename Rule>
+bool GpuBroadPhase::State::collect(const Tree& tree, const Rule& rule, const Call& call) {
+  const Output out = output(call);
   const std::uint32_t split = split_of(tree.count[1]);
   const std::uint32_t blocks = blocks_for(static_cast<std::uint64_t>(tree.count[1]) * split, kWarps);
-  return launch(blocks, kWarps * kFanOut, stream, collect_pairs, tree, split, given, out) &&
-         launch(1, 1, stream, report_pairs, out);
+  return launch(blocks, kWarps * kFanOut, call.stream, collect_pairs<Rule>, tree, split, call.boxes, rule,
+                out) &&
+         launch(1, 1, call.stream, report_pairs, out);
 }
 
 // Sorts as many keys as there is room for, because the CPU does not know their number.
-bool GpuBroadPhase::State::sort_pairs(std::uint32_t count, cudaStream_t stream) {
+bool GpuBroadPhase::State::sort_pairs(const Call& call) {
   if (capacity.pairs == 0) return true;
-  const int bits = index_bits(count);
+  const int bits = index_bits(call.numbers);
   const std::uint32_t blocks = blocks_for(capacity.pairs, 256);
-  if (!launch(blocks, 256, stream, fill_rest, pairs.data(), capacity.pairs, report.data())) return false;
+  if (!launch(blocks, 256, call.stream, fill_rest, pairs.data(), capacity.pairs, report.data())) return false;
   cub::DoubleBuffer<unsigned long long> key(pairs.data(), sorted_pairs.data());
   std::size_t bytes = sorting.room();
-  if (!ok(cub::DeviceRadixSort::SortKeys(sorting.data(), bytes, key, capacity.pairs, 0, 2 * bits, stream)))
+  if (!ok(cub::DeviceRadixSort::SortKeys(sorting.data(), bytes, key, capacity.pairs, 0, 2 * bits,
+                                         call.stream)))
     return false;
-  return launch(blocks, 256, stream, unpack_keys, key.Current(), capacity.pairs, bits,
+  return launch(blocks, 256, call.stream, unpack_keys, key.Current(), capacity.pairs, bits,
                 reinterpret_cast<ObjectPair*>(pairs.data()), report.data());
 }
 
-template <typename Boxes>
-bool GpuBroadPhase::State::run(const Boxes& from, const WorldBox* given, std::uint32_t count, bool sorted,
-                               cudaStream_t stream) {
+// The pairs with what is kept come first, because the last kernel of the others writes the report.
+template <typename Boxes, typename Rule>
+bool GpuBroadPhase::State::find(const Boxes& from, std::uint32_t count, const Rule& rule, const Call& call) {
+  if constexpr (is_listed<Boxes>) {
+    if (!collect_with_kept(from, rule, call)) return false;
+  }
   if (count <= kFewBoxes) {
-    if (!test_all(from, count, sorted, stream)) return false;
+    if (!test_all(from, count, rule, call)) return false;
   } else {
     const Tree tree = tree_over(count, nodes.data());
-    if (!make_tree(from, given, tree, stream) || !collect(given, tree, sorted, stream)) return false;
+    if (!make_tree(from, tree, survey.data(), call) || !collect(tree, rule, call)) return false;
   }
-  return !sorted || sort_pairs(count, stream);
+  return !call.sorted || sort_pairs(call);
+}
+
+// A middling number of instances is posed by a kernel of its own.
+template <typename Boxes, typename Rule>
+bool GpuBroadPhase::State::pose_and_find(const Boxes& from, std::uint32_t count, const Rule& rule,
+                                         const Call& call) {
+  if constexpr (Boxes::kPosed) {
+    if (count > kFewPosed && count <= kFewBoxes) {
+      return launch(blocks_for(count, 256), 256, call.stream, pose_boxes<Boxes>, from, count,
+                    counters.data()) &&
+             find(from.taken(), count, rule, call);
+    }
+  }
+  return find(from, count, rule, call);
+}
+
+// all: boxes or instances, the kept ones included.
+template <typename Boxes>
+Status GpuBroadPhase::State::run(const Boxes& all, const GpuBroadPhaseOptions& options, const Call& call) {
+  const Status status = refusal(call.numbers, Boxes::kPosed, options);
+  if (status != Status::kOk) return status;
+  bool queued = begin(call.stream);
+  if (queued && kept.of != 0) {
+    queued = pose_and_find(Listed<Boxes>{all, kept.list.data()}, kept.free_count,
+                           FilteredPairs{options.filter}, call);
+  } else if (queued && !is_none(options.filter)) {
+    queued = pose_and_find(all, call.numbers, FilteredPairs{options.filter}, call);
+  } else if (queued) {
+    queued = pose_and_find(all, call.numbers, EveryPair{}, call);
+  }
+  end(queued, call.stream);
+  return queued ? Status::kOk : failure();
+}
+
+// Uploads what motions say of which boxes are kept, and waits.
+Status GpuBroadPhase::State::list(std::span<const Motion> motion, cudaStream_t stream) {
+  Buffer<std::uint32_t> numbers;
+  if (!numbers.resize(motion.size())) return Status::kOutOfMemory;
+  std::uint32_t free_end = 0, end = kept.free_count;
+  for (std::uint32_t i = 0; i < motion.size(); ++i)
+    numbers[motion[i] == Motion::fixed ? end++ : free_end++] = i;
+  const bool uploaded = ok(kept.list.upload(numbers.view(), stream)) && ok(cudaStreamSynchronize(stream));
+  return uploaded ? Status::kOk : failure();
+}
+
+// lie: where the boxes of those that are kept are to be found.
+template <typename Boxes>
+Status GpuBroadPhase::State::keep(const Boxes& all, const WorldBox* lie, std::span<const Motion> motion,
+                                  cudaStream_t stream) {
+  const auto count = static_cast<std::uint32_t>(motion.size());
+  const auto fixed = static_cast<std::uint32_t>(std::count(motion.begin(), motion.end(), Motion::fixed));
+  if (fixed == 0) return Status::kOk;
+  kept.free_count = count - fixed;
+  if (!reserve_fixed() || !reserve_boxes(count) || !reserve_kept(count, fixed)) return failure();
+  if (const Status status = list(motion, stream); status != Status::kOk) return status;
+  kept.tree = tree_over(fixed, kept.nodes.data());
+  const Call call = {count, lie, false, stream};
+  const bool queued = begin(stream) &&
+                      make_tree(Listed<Boxes>{all, kept.list.data() + kept.free_count}, kept.tree,
+                                kept.survey.data(), call) &&
+                      launch(1, 1, stream, report_pairs, output(call));
+  end(queued, stream);
+  if (!queued || !ok(cudaStreamSynchronize(stream))) return failure();
+  if (host_report->status != Status::kOk) return host_report->status;
+  kept.of = count;
+  kept.posed = Boxes::kPosed;
+  return Status::kOk;
 }
 
 // The first guess of room is four pairs for each box.
 template <typename Enqueue>
-Status GpuBroadPhase::State::find(GpuBroadPhase& self, GpuBroadPhaseCapacity wanted,
-                                  const GpuBroadPhaseOptions& options, cudaStream_t stream,
-                                  const Enqueue& enqueue) {
+Status GpuBroadPhase::State::find_all(GpuBroadPhase& self, GpuBroadPhaseCapacity wanted,
+                                      const GpuBroadPhaseOptions& options, cudaStream_t stream,
+                                      const Enqueue& enqueue) {
   std::uint64_t room = capacity.pairs > 0 ? capacity.pairs : 4ull * wanted.boxes + 1024;
   for (;;) {
     wanted.pairs = static_cast<std::uint32_t>(std::min<std::uint64_t>(room, kNoIndex - 1));
@@ -344,52 +490,56 @@ Status GpuBroadPhase::reserve(const GpuBroadPhaseCapacity& capacity, const GpuBr
   if (!provide_state()) return Status::kOutOfMemory;
   const bool enough = state_->reserve_fixed() && state_->reserve_boxes(capacity.boxes) &&
                       state_->reserve_pairs(capacity.pairs, options.sorted) &&
-                      state_->ok(state_->boxes.reserve(capacity.instances));
+                      state_->reserve_instances(capacity.instances);
   return enough ? Status::kOk : state_->failure();
+}
+
+Status GpuBroadPhase::keep_fixed(const WorldBox* boxes, std::span<const Motion> motion, cudaStream_t stream) {
+  if (!provide_state()) return Status::kOutOfMemory;
+  state_->kept.of = 0;
+  if (motion.size() >= kNoIndex) return Status::kOutOfRange;
+  if (reinterpret_cast<std::uintptr_t>(boxes) % 16 != 0) return Status::kMisaligned;
+  return state_->keep(GivenBoxes{boxes}, boxes, motion, stream);
+}
+
+Status GpuBroadPhase::keep_fixed(const GpuInstances& instances, const GpuAssetBounds& assets,
+                                 std::span<const Motion> motion, cudaStream_t stream) {
+  if (!provide_state()) return Status::kOutOfMemory;
+  State& state = *state_;
+  state.kept.of = 0;
+  if (motion.size() != instances.count) return Status::kKeptMismatch;
+  if (!state.reserve_instances(instances.count)) return state.failure();
+  WorldBox* const boxes = state.boxes.data();
+  return state.keep(PosedBoxes{instances, assets, boxes}, boxes, motion, stream);
 }
 
 Status GpuBroadPhase::enqueue(const WorldBox* boxes, std::uint32_t count, const GpuBroadPhaseOptions& options,
                               cudaStream_t stream) {
   if (state_ == nullptr) return Status::kOutOfRange;
-  if (const Status status = state_->refusal(count, options); status != Status::kOk) return status;
   if (reinterpret_cast<std::uintptr_t>(boxes) % 16 != 0) return Status::kMisaligned;
-  const bool queued =
-      state_->begin(stream) && state_->run(GivenBoxes{boxes}, boxes, count, options.sorted, stream);
-  state_->end(queued, stream);
-  return queued ? Status::kOk : state_->failure();
+  return state_->run(GivenBoxes{boxes}, options, {count, boxes, options.sorted, stream});
 }
 
 Status GpuBroadPhase::enqueue(const GpuInstances& instances, const GpuAssetBounds& assets,
                               const GpuBroadPhaseOptions& options, cudaStream_t stream) {
   if (state_ == nullptr || instances.count > state_->boxes.room()) return Status::kOutOfRange;
-  State& state = *state_;
-  const std::uint32_t count = instances.count;
-  if (const Status status = state.refusal(count, options); status != Status::kOk) return status;
-  WorldBox* const boxes = state.boxes.data();
-  const PosedBoxes posed = {instances, assets, boxes};
-  bool queued = state.begin(stream);
-  if (queued && (count <= kFewPosed || count > kFewBoxes)) {
-    queued = state.run(posed, boxes, count, options.sorted, stream);
-  } else if (queued) {
-    queued = state.launch(blocks_for(count, 256), 256, stream, pose_boxes, posed, state.counters.data()) &&
-             state.run(GivenBoxes{boxes}, boxes, count, options.sorted, stream);
-  }
-  state.end(queued, stream);
-  return queued ? Status::kOk : state.failure();
+  WorldBox* const boxes = state_->boxes.data();
+  return state_->run(PosedBoxes{instances, assets, boxes}, options,
+                     {instances.count, boxes, options.sorted, stream});
 }
 
 Status GpuBroadPhase::find_pairs(const WorldBox* boxes, std::uint32_t count,
                                  const GpuBroadPhaseOptions& options, cudaStream_t stream) {
   if (!provide_state()) return Status::kOutOfMemory;
-  return state_->find(*this, {count, 0, 0}, options, stream,
-                      [&] { return enqueue(boxes, count, options, stream); });
+  return state_->find_all(*this, {count, 0, 0}, options, stream,
+                          [&] { return enqueue(boxes, count, options, stream); });
 }
 
 Status GpuBroadPhase::find_pairs(const GpuInstances& instances, const GpuAssetBounds& assets,
                                  const GpuBroadPhaseOptions& options, cudaStream_t stream) {
   if (!provide_state()) return Status::kOutOfMemory;
-  return state_->find(*this, {instances.count, 0, instances.count}, options, stream,
-                      [&] { return enqueue(instances, assets, options, stream); });
+  return state_->find_all(*this, {instances.count, 0, instances.count}, options, stream,
+                          [&] { return enqueue(instances, assets, options, stream); });
 }
 
 GpuPairs GpuBroadPhase::pairs() const {
@@ -411,15 +561,16 @@ GpuBroadPhaseCapacity GpuBroadPhase::capacity() const {
   if (state_ == nullptr) return {};
   GpuBroadPhaseCapacity capacity = state_->capacity;
   capacity.instances = static_cast<std::uint32_t>(state_->boxes.room());
+  capacity.kept = static_cast<std::uint32_t>(state_->kept.list.room());
   return capacity;
 }
 
 std::size_t GpuBroadPhase::bytes() const {
   if (state_ == nullptr) return 0;
   const State& s = *state_;
-  return s.boxes.bytes() + s.keys[0].bytes() + s.keys[1].bytes() + s.nodes.bytes() + s.pairs.bytes() +
-         s.sorted_pairs.bytes() + s.sorting.bytes() + s.survey.bytes() + s.counters.bytes() +
-         s.report.bytes();
+  return s.boxes.bytes() + s.kept.bytes() + s.keys[0].bytes() + s.keys[1].bytes() + s.nodes.bytes() +
+         s.pairs.bytes() + s.sorted_pairs.bytes() + s.sorting.bytes() + s.survey.bytes() +
+         s.counters.bytes() + s.report.bytes();
 }
 
 cudaError_t GpuBroadPhase::cuda_error() const {

@@ -38,6 +38,8 @@ struct GpuContactManifolds::State {
   GpuArray<float> normals;
   GpuArray<std::uint32_t> curve, order, start, words;
   GpuArray<gpu::PairPatches> of_pair;
+  GpuArray<manifold::PieceSummary> summaries;
+  GpuArray<gpu::PairCurve> curves;
   GpuArray<gpu::Counter> tile_sums;
   GpuArray<gpu::TableEntry> table;
   GpuArray<manifold::Patch> patches;
@@ -91,6 +93,7 @@ Status GpuContactManifolds::State::reserve_pairs(std::uint32_t wanted) {
   if (wanted <= capacity.pairs && table.room() != 0) return Status::kOk;
   Status status = keep(of_pair.grow(wanted));
   const std::size_t pairs = of_pair.room();
+  if (status == Status::kOk) status = keep(summaries.reserve(pairs));
   if (status == Status::kOk) status = keep(tile_sums.reserve(pairs / gpu::kManifoldTile + 1));
   GpuArray<gpu::TableEntry> larger;
   if (status == Status::kOk) status = keep(larger.reserve(2 * pairs + 32));
@@ -118,6 +121,7 @@ Status GpuContactManifolds::State::reserve_contacts(std::uint64_t wanted) {
   if (status == Status::kOk) status = keep(curve.reserve(room));
   if (status == Status::kOk) status = keep(order.reserve(room));
   if (status == Status::kOk) status = keep(start.reserve(room + capacity.pairs + 1));
+  if (status == Status::kOk) status = keep(curves.reserve(room));
   if (status == Status::kOk) status = keep(words.reserve(manifold::PieceMemory::kTableWords * room));
   if (status == Status::kOk) capacity.contacts = room;
   return status;
@@ -163,6 +167,8 @@ gpu::ManifoldArgs GpuContactManifolds::State::args(const GpuInstances& instances
   args.patches = patches.data();
   args.next_of_pair = next_of_pair.data();
   args.of_pair = of_pair.data();
+  args.summaries = summaries.data();
+  args.curves = curves.data();
   args.tile_sums = tile_sums.data();
   args.manifolds = manifolds.data();
   args.points = points.data();
@@ -249,7 +255,7 @@ std::size_t GpuContactManifolds::bytes() const {
   if (state_ == nullptr) return 0;
   const State& s = *state_;
   return s.shapes.bytes() + s.state.bytes() + s.pieces.bytes() + s.normals.bytes() + s.curve.bytes() +
-         s.order.bytes() + s.start.bytes() + s.words.bytes() + s.of_pair.bytes() + s.tile_sums.bytes() +
+         s.order.bytes() + s.start.bytes() + s.curves.bytes() + s.summaries.bytes() + s.words.bytes() + s.of_pair.bytes() + s.tile_sums.bytes() +
          s.table.bytes() + s.patches.bytes() + s.next_of_pair.bytes() + s.manifolds.bytes() +
          s.manifolds_before.bytes() + s.entries.bytes() + s.points.bytes() + s.points_before.bytes();
 }

@@ -42,7 +42,7 @@ struct GpuContactQuery::State {
   GpuArray<gpu::PairRecord> pairs;
   GpuArray<std::uint32_t> world_pairs, met;
   GpuArray<Contact> contacts;
-  GpuArray<gpu::Candidate> undecided;  // two rows: what float32 leaves, and what float64 leaves
+  GpuArray<gpu::Candidate> undecided;  // what float32 leaves
   GpuQueryCapacity capacity;
 
   GpuArray<Contact> ungrouped;  // contacts as they are found, where they are sorted or grouped then
@@ -158,7 +158,7 @@ Status GpuContactQuery::State::reserve_undecided(std::uint64_t wanted) {
   if (wanted <= capacity.undecided) return Status::kOk;
   const std::uint64_t count = std::min(grown(wanted, capacity.undecided), kMostUndecided);
   capacity.undecided = 0;
-  const Status status = reserve(undecided, 2 * count);
+  const Status status = reserve(undecided, count);
   if (status == Status::kOk) capacity.undecided = count;
   return status;
 }
@@ -184,9 +184,11 @@ Status GpuContactQuery::State::reserve_grouping() {
   if (capacity.pairs >= kMostGroupedPairs) return Status::kOutOfRange;
   first_contact.free();  // the last that is there again: can_group() looks at it
   Status status = reserve_ungrouped();
-  for (GpuArray<std::uint32_t>* array : {&next, &few, &many}) {
-    if (status == Status::kOk) status = reserve(*array, capacity.pairs);
-  }
+  const std::uint32_t counts =
+      std::max(capacity.pairs, gpu::kSpread * std::min(capacity.pairs, gpu::kMostSpreadPairs));
+  if (status == Status::kOk) status = reserve(next, counts);
+  if (status == Status::kOk) status = reserve(few, capacity.pairs);
+  if (status == Status::kOk) status = reserve(many, capacity.pairs);
   if (status == Status::kOk) status = reserve(tile_sums, 2 * std::size_t{gpu::tiles_of(capacity.pairs)});
   if (status == Status::kOk) status = reserve(first_contact, std::size_t{capacity.pairs} + 1);
   return status;
@@ -223,7 +225,6 @@ gpu::QueryArgs GpuContactQuery::State::args(const GpuInstances& instances, const
   args.contacts = options.sorted || options.grouped ? ungrouped.data() : contacts.data();
   args.grouping = grouping(options);
   args.undecided = undecided.data();
-  args.unresolved = undecided.data() + capacity.undecided;
   args.limits = limits;
   args.shape = gpu::walk_shape(limits, depth, options.most_blocks);
   return args;
@@ -238,7 +239,6 @@ cudaError_t GpuContactQuery::State::launch(const gpu::QueryArgs& args, cudaStrea
   if (result == cudaSuccess) result = gpu::prepare_pairs(args, stream);
   if (result == cudaSuccess)
     result = (args.mode == QueryMode::exact ? gpu::walk_exact : gpu::walk_unfused)(args, stream);
-  if (result == cudaSuccess) result = gpu::walk_world(args, stream);
   if (result == cudaSuccess) result = gpu::decide_rest(args, stream);
   // What is captured has not run: the state is as before.
   if (capture == cudaStreamCaptureStatusNone) query_is_clear = result == cudaSuccess;

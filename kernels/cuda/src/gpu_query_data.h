@@ -40,7 +40,7 @@ struct QueryState {
   Balance frame, world;
   alignas(128) Counter contacts;
   alignas(128) Counter undecided;
-  alignas(128) Counter unresolved;
+  alignas(128) Counter decided_exactly;
   alignas(128) Counter block_pairs;
   Counter candidates, decided_by_float64;
   GpuQueryReport report;
@@ -56,9 +56,16 @@ TANDEM_HD constexpr std::uint32_t tiles_of(std::uint32_t pairs) {
   return pairs / kPairsPerTile + 1;
 }
 
+/// Where there are few pairs, the counts of their contacts lie apart, a cache line each: atomic operations on
+/// one line wait for each other.
+inline constexpr std::uint32_t kMostSpreadPairs = 4096, kSpread = 32;
+TANDEM_HD constexpr std::uint32_t spread_of(std::uint32_t pairs) {
+  return pairs <= kMostSpreadPairs ? kSpread : 1;
+}
+
 /// What grouping contacts by pair takes; null where it is not asked for.
 struct Grouping {
-  std::uint32_t* next;  ///< of each pair: how many contacts it has, then where the next goes
+  std::uint32_t* next;  ///< of each pair, spread_of() apart: its number of contacts, then the next place
   std::uint32_t* first_contact;
   std::uint32_t *few, *many;  ///< pairs with contacts
   Counter *tile_contacts, *tile_pairs;
@@ -82,7 +89,7 @@ struct QueryArgs {
   std::uint32_t* met;          ///< of a pair: not 0 once it has a contact; where only the first is asked for
   Contact* contacts;
   Grouping grouping;
-  Candidate *undecided, *unresolved;
+  Candidate* undecided;
   DeviceLimits limits;
   WalkShape shape;
 };
@@ -112,10 +119,7 @@ cudaError_t prepare_pairs(const QueryArgs& args, cudaStream_t stream);
 cudaError_t walk_exact(const QueryArgs& args, cudaStream_t stream);
 cudaError_t walk_unfused(const QueryArgs& args, cudaStream_t stream);
 
-/// Walks the others.
-cudaError_t walk_world(const QueryArgs& args, cudaStream_t stream);
-
-/// Decides what the walks left, and writes the report.
+/// Decides what the walk left, walks the other pairs, and writes the report.
 cudaError_t decide_rest(const QueryArgs& args, cudaStream_t stream);
 
 /// Groups the contacts that the report counts by pair.

@@ -15,12 +15,12 @@ static_assert(sizeof(Contact) == 4 * kWordsPerContact && offsetof(Contact, pair)
 
 /// Adds one to the count of each lane's pair, with one atomic operation for all lanes of the same pair.
 /// Result: what the count was before this lane's. All lanes of the warp take part.
-__device__ std::uint32_t add_one(std::uint32_t* counts, bool mine, std::uint32_t pair) {
+__device__ std::uint32_t add_one(std::uint32_t* counts, std::uint32_t spread, bool mine, std::uint32_t pair) {
   const std::uint32_t same = __match_any_sync(kAllLanes, mine ? pair : kNoIndex);
   const std::uint32_t leader = __ffs(static_cast<int>(same)) - 1;
   std::uint32_t before = 0;
   if (mine && lane_id() == leader)
-    before = atomicAdd(&counts[pair], static_cast<std::uint32_t>(__popc(same)));
+    before = atomicAdd(&counts[pair * spread], static_cast<std::uint32_t>(__popc(same)));
   return __shfl_sync(kAllLanes, before, static_cast<int>(leader)) + __popc(same & lanes_below());
 }
 
@@ -37,9 +37,10 @@ __device__ void each_32_contacts(const QueryArgs& args, Of of) {
 
 __global__ void __launch_bounds__(kThreads) count_contacts(const __grid_constant__ QueryArgs args) {
   wait_for_kernel_before();
+  const std::uint32_t spread = spread_of(pair_count(args));
   each_32_contacts(args, [&](std::uint64_t first, std::uint32_t count) {
     const bool mine = lane_id() < count;
-    add_one(args.grouping.next, mine, mine ? args.contacts[first + lane_id()].pair : 0);
+    add_one(args.grouping.next, spread, mine, mine ? args.contacts[first + lane_id()].pair : 0);
   });
 }
 
@@ -114,12 +115,13 @@ __device__ void make_ranges_of(const QueryArgs& args, std::uint32_t tile, std::u
   using Scan = cub::BlockScan<Sums, kThreads>;
   __shared__ typename Scan::TempStorage scratch;
   const Grouping& grouping = args.grouping;
+  const std::uint32_t spread = spread_of(pairs);
   const std::uint32_t first = tile * kPairsPerTile + threadIdx.x * kPairsPerThread;
   std::uint32_t counts[kPairsPerThread];
   Sums sums = {0, 0}, own;
 #pragma unroll
   for (std::uint32_t i = 0; i < kPairsPerThread; ++i) {
-    counts[i] = first + i < pairs ? grouping.next[first + i] : 0;
+    counts[i] = first + i < pairs ? grouping.next[(first + i) * spread] : 0;
     sums = sums + sums_of(counts[i]);
   }
   Scan(scratch).ExclusiveScan(
@@ -133,7 +135,7 @@ __device__ void make_ranges_of(const QueryArgs& args, std::uint32_t tile, std::u
     if (pair <= pairs) grouping.first_contact[pair] = begin;
     if (pair == pairs) args.state->groups = {pairs, begin, few, many};
     if (pair < pairs) {
-      grouping.next[pair] = begin;
+      grouping.next[pair * spread] = begin;
       if (counts[i] > kFewContacts)
         grouping.many[many] = pair;
       else if (counts[i] != 0)
@@ -161,6 +163,7 @@ __global__ void __launch_bounds__(kThreads) make_ranges(const __grid_constant__ 
 __global__ void __launch_bounds__(kThreads) move_contacts(const __grid_constant__ QueryArgs args) {
   wait_for_kernel_before();
   const auto* from = reinterpret_cast<const std::uint32_t*>(args.contacts);
+  const std::uint32_t spread = spread_of(pair_count(args));
   auto* to = reinterpret_cast<std::uint32_t*>(args.grouping.contacts);
   each_32_contacts(args, [&](std::uint64_t first, std::uint32_t count) {
     std::uint32_t words[kWordsPerContact];
@@ -171,7 +174,7 @@ __global__ void __launch_bounds__(kThreads) move_contacts(const __grid_constant_
     }
     const bool mine = lane_id() < count;
     const std::uint32_t place =
-        add_one(args.grouping.next, mine, mine ? args.contacts[first + lane_id()].pair : 0);
+        add_one(args.grouping.next, spread, mine, mine ? args.contacts[first + lane_id()].pair : 0);
 #pragma unroll
     for (std::uint32_t i = 0; i < kWordsPerContact; ++i) {
       const std::uint32_t word = 32 * i + lane_id(), contact = word / kWordsPerContact;

@@ -7,7 +7,6 @@
 namespace tandem::gpu {
 namespace {
 
-using manifold::Body;
 using manifold::BodyPair;
 using manifold::ManifoldMaker;
 using manifold::Patch;
@@ -24,84 +23,124 @@ __device__ bool has_query(const ManifoldArgs& args) {
          args.query->contacts <= args.capacity.contacts && *args.pairs.count <= args.capacity.pairs;
 }
 
+__device__ BodyPair bodies_of(const ManifoldArgs& args, const ObjectPair& pair) {
+  return {{args.shapes[args.instances.asset[pair.a]], args.instances.pose[pair.a]},
+          {args.shapes[args.instances.asset[pair.b]], args.instances.pose[pair.b]}};
+}
+
+__device__ PieceMemory memory_of(const ManifoldArgs& args, std::uint32_t pair) {
+  const std::size_t first = args.groups.first_contact[pair];
+  return {args.pieces.pieces + first,       args.pieces.normals + 6 * first,
+          args.pieces.curve + first,        args.pieces.order + first,
+          args.pieces.start + first + pair, args.pieces.table + PieceMemory::kTableWords * first};
+}
+
 template <typename Team>
-__device__ void make_patches_of(const ManifoldArgs& args, const Team& team, PatchMemory& shared,
-                                std::uint32_t pair) {
+__device__ void find_curves_of(const ManifoldArgs& args, const Team& team, std::uint32_t& next, std::uint32_t pair) {
   const std::uint32_t first = args.groups.first_contact[pair], count = args.groups.first_contact[pair + 1] - first;
-  const ObjectPair bodies_of_pair = args.pairs.pairs[pair];
-  PairPatches own = {kNoIndex, 0, 0, 0, 0, 0};
+  const ObjectPair both = args.pairs.pairs[pair];
+  if (both.a == both.b) return;
   if (count > kMostContactsOfPair) {
     if (team.rank() == 0) args.state->too_many_contacts = 1;
-  } else if (bodies_of_pair.a != bodies_of_pair.b) {
-    const BodyPair bodies = {
-        {args.shapes[args.instances.asset[bodies_of_pair.a]], args.instances.pose[bodies_of_pair.a]},
-        {args.shapes[args.instances.asset[bodies_of_pair.b]], args.instances.pose[bodies_of_pair.b]}};
-    const PieceMemory memory = {args.pieces.pieces + first,
-                                args.pieces.normals + 6 * std::size_t{first},
-                                args.pieces.curve + first,
-                                args.pieces.order + first,
-                                args.pieces.start + first + pair,
-                                args.pieces.table + PieceMemory::kTableWords * std::size_t{first}};
-    ManifoldMaker<Team> maker(team, bodies, memory, shared, args.most_points);
-    const auto done = [&](const Patch& patch) {
-      own.points += patch.hole != 0 ? 0 : patch.manifold.point_count;
-      own.manifolds += patch.hole != 0 ? 0 : 1;
-      if ((patch.manifold.flags & kOpenCurve) != 0 && patch.hole == 0) atomicAdd(&args.state->open_curves, 1ull);
-    };
-    Patch* made = nullptr;
-    const auto new_patch = [&]() -> Patch* {
-      if (made != nullptr) done(*made);
-      const std::uint32_t place = atomicAdd(&args.state->next_patch, 1u);
-      if (place >= args.capacity.manifolds) {
-        atomicAdd(&args.state->needed_points, static_cast<Counter>(args.most_points));
-        return made = nullptr;
-      }
-      args.next_of_pair[place] = own.first;
-      own.first = place;
-      ++own.patches;
-      return made = &args.patches[place];
-    };
-    const manifold::PairCounters found =
-        maker.make(args.groups.contacts + first, count, new_patch);
-    if (team.rank() == 0) {
-      if (made != nullptr) done(*made);
-      if (found.segments > 0) atomicAdd(&args.state->segments, Counter{found.segments});
-      if (found.ambiguous_touches > 0)
-        atomicAdd(&args.state->ambiguous_touches, Counter{found.ambiguous_touches});
-    }
+    return;
   }
+  const BodyPair bodies = bodies_of(args, both);
+  const PieceMemory memory = memory_of(args, pair);
+  manifold::CurveFinder<Team> finder(team, bodies, memory);
+  const manifold::PieceSummary summary = finder.find(args.groups.contacts + first, count, next);
   if (team.rank() == 0) {
-    args.of_pair[pair] = own;
-    if (own.points > 0) atomicAdd(&args.state->needed_points, Counter{own.points});
+    args.summaries[pair] = summary;
+    if (summary.segments > 0) atomicAdd(&args.state->segments, Counter{summary.segments});
+  }
+  for (std::uint32_t curve = team.rank(); curve < summary.curves; curve += team.size()) {
+    const bool many = memory.start[curve + 1] - memory.start[curve] > kFewContacts;
+    const std::uint32_t place = atomicAdd(many ? &args.state->curves_of_many : &args.state->curves_of_few, 1u);
+    args.curves[many ? place : args.capacity.contacts - 1 - place] = {pair, curve};
   }
   team.sync();
 }
 
-__global__ void __launch_bounds__(kThreads) make(const __grid_constant__ ManifoldArgs args) {
-  __shared__ alignas(16) unsigned char memory[kWarps * sizeof(PatchMemory)];  // begins without contents
-  __shared__ Counter scratch[kWarps];
-  PatchMemory* const shared = reinterpret_cast<PatchMemory*>(memory);
+/// Calls of(team, row) for rows below `many` with a block, and for rows below `few` with a warp.
+template <typename Of>
+__device__ void share_out(std::uint32_t many, std::uint32_t few, std::uint32_t& next_many, std::uint32_t& next_few,
+                          Counter* scratch, const Of& of) {
   __shared__ std::uint32_t taken;
-  wait_for_kernel_before();
-  if (!has_query(args)) return;
-  const GpuGroupCounts& counts = *args.groups.counts;
   const BlockTeam<kThreads> block = {{}, scratch};
   for (;;) {
-    if (threadIdx.x == 0) taken = atomicAdd(&args.state->next_many, 1u);
+    if (threadIdx.x == 0) taken = atomicAdd(&next_many, 1u);
     __syncthreads();
     const std::uint32_t row = taken;
     __syncthreads();
-    if (row >= counts.many) break;
-    make_patches_of(args, block, shared[0], args.groups.many[row]);
+    if (row >= many) break;
+    of(block, row, true);
   }
   const WarpTeam warp;
   for (;;) {
     std::uint32_t row = 0;
-    if (warp.rank() == 0) row = atomicAdd(&args.state->next_few, 1u);
+    if (warp.rank() == 0) row = atomicAdd(&next_few, 1u);
     row = __shfl_sync(0xFFFFFFFFu, row, 0);
-    if (row >= counts.few) break;
-    make_patches_of(args, warp, shared[threadIdx.x / 32], args.groups.few[row]);
+    if (row >= few) break;
+    of(warp, row, false);
   }
+}
+
+__global__ void __launch_bounds__(kThreads, 4) find_curves(const __grid_constant__ ManifoldArgs args) {
+  __shared__ Counter scratch[kWarps];
+  __shared__ std::uint32_t next[kWarps];
+  wait_for_kernel_before();
+  if (!has_query(args)) return;
+  const GpuGroupCounts& counts = *args.groups.counts;
+  share_out(counts.many, counts.few, args.state->next_many, args.state->next_few, scratch,
+            [&](const auto& team, std::uint32_t row, bool many) {
+              find_curves_of(args, team, next[many ? 0 : threadIdx.x / 32],
+                             many ? args.groups.many[row] : args.groups.few[row]);
+            });
+}
+
+template <typename Team>
+__device__ void make_patch_of(const ManifoldArgs& args, const Team& team, PatchMemory& shared,
+                              const PairCurve& of) {
+  const BodyPair bodies = bodies_of(args, args.pairs.pairs[of.pair]);
+  const PieceMemory memory = memory_of(args, of.pair);
+  ManifoldMaker<Team> maker(team, bodies, memory, shared, args.summaries[of.pair], args.most_points);
+  Patch* made = nullptr;
+  std::uint32_t place = kNoIndex;
+  const auto new_patch = [&]() -> Patch* {
+    place = atomicAdd(&args.state->next_patch, 1u);
+    return made = place < args.capacity.manifolds ? &args.patches[place] : nullptr;
+  };
+  const bool known = maker.make(of.curve, new_patch);
+  if (team.rank() == 0) {
+    PairPatches& own = args.of_pair[of.pair];
+    if (!known) atomicAdd(&args.state->ambiguous_touches, Counter{1});
+    if (made != nullptr) {
+      args.next_of_pair[place] = atomicExch(&own.first, place);
+      atomicAdd(&own.patches, 1u);
+      if (made->hole == 0) {
+        atomicAdd(&own.manifolds, 1u);
+        atomicAdd(&own.points, made->manifold.point_count);
+        atomicAdd(&args.state->needed_points, Counter{made->manifold.point_count});
+        if ((made->manifold.flags & kOpenCurve) != 0) atomicAdd(&args.state->open_curves, Counter{1});
+      }
+    } else if (place != kNoIndex) {
+      atomicAdd(&args.state->needed_points, static_cast<Counter>(args.most_points));
+    }
+  }
+  team.sync();
+}
+
+__global__ void __launch_bounds__(kThreads, 4) make(const __grid_constant__ ManifoldArgs args) {
+  __shared__ alignas(16) unsigned char memory[kWarps * sizeof(PatchMemory)];  // begins without contents
+  __shared__ Counter scratch[kWarps];
+  PatchMemory* const shared = reinterpret_cast<PatchMemory*>(memory);
+  wait_for_kernel_before();
+  if (!has_query(args)) return;
+  ManifoldState& state = *args.state;
+  share_out(state.curves_of_many, state.curves_of_few, state.next_curve_of_many, state.next_curve_of_few, scratch,
+            [&](const auto& team, std::uint32_t row, bool many) {
+              make_patch_of(args, team, shared[many ? 0 : threadIdx.x / 32],
+                            args.curves[many ? row : args.capacity.contacts - 1 - row]);
+            });
 }
 
 /// Step 0 is that of a new table's entries.
@@ -162,6 +201,7 @@ __global__ void __launch_bounds__(kThreads) remember(const __grid_constant__ Man
   __threadfence();
   if (atomicAdd(&state.finished_blocks, 1u) + 1 != gridDim.x) return;
   state.next_many = state.next_few = state.next_patch = state.tiles_taken = 0;
+  state.curves_of_many = state.curves_of_few = state.next_curve_of_many = state.next_curve_of_few = 0;
   state.needed_points = state.segments = state.ambiguous_touches = state.open_curves = 0;
   state.too_many_contacts = state.finished_blocks = 0;
   if (!args.match_previous || state.has_last != 0) state.step = step_after(state.step);  // its table is empty as yet
@@ -191,7 +231,8 @@ cudaError_t forget_last(ManifoldState* state, cudaStream_t stream) {
 cudaError_t make_patches(const ManifoldArgs& args, cudaStream_t stream) {
   constexpr std::uint32_t kBlocksPerProcessor = 4;
   const Grid grid = {args.limits.processors * kBlocksPerProcessor, kThreads, 0, stream, args.limits.early_launch};
-  return launch_after(grid, make, args);
+  const cudaError_t error = launch_after(grid, find_curves, args);
+  return error == cudaSuccess ? launch_after(grid, make, args) : error;
 }
 
 }  // namespace tandem::gpu

@@ -12,7 +12,12 @@ namespace tandem::gpu {
 
 using Counter = unsigned long long;
 
-/// The patches of a pair: a list that PatchPlace::next leads along.
+/// A curve of a pair of bodies.
+struct PairCurve {
+  std::uint32_t pair, curve;
+};
+
+/// The patches of a pair: a list that next_of_pair leads along.
 struct PairPatches {
   std::uint32_t first;  ///< kNoIndex where there is none
   std::uint32_t patches, manifolds, points;
@@ -36,6 +41,7 @@ struct alignas(8) TableEntry {
 struct ManifoldState {
   // Cleared by each call.
   std::uint32_t next_many, next_few, next_patch, tiles_taken;
+  std::uint32_t curves_of_many, curves_of_few, next_curve_of_many, next_curve_of_few;
   Counter needed_points, segments, ambiguous_touches, open_curves;
   std::uint32_t too_many_contacts, finished_blocks;
 
@@ -65,6 +71,8 @@ struct ManifoldArgs {
   manifold::Patch* patches;
   std::uint32_t* next_of_pair;  ///< of each patch: the next of the same pair
   PairPatches* of_pair;
+  manifold::PieceSummary* summaries;  ///< of each pair with contacts
+  PairCurve* curves;                  ///< those of many pieces from the beginning on, others from the end
   Counter* tile_sums;
 
   Manifold* manifolds;
@@ -89,7 +97,7 @@ cudaError_t forget_last(ManifoldState* state, cudaStream_t stream);
 /// Keeps the last call's points for matching.
 cudaError_t remember_points(const ManifoldArgs& args, cudaStream_t stream);
 
-/// Makes the patches of all pairs that have contacts.
+/// Finds the curves of all pairs that have contacts, and makes their patches.
 cudaError_t make_patches(const ManifoldArgs& args, cudaStream_t stream);
 
 /// Gives them their places, writes manifolds and points, and the report.

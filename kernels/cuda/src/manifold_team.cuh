@@ -21,6 +21,23 @@ struct SharedNumbers {
   }
 };
 
+/// A crew is a team's first warp.
+struct WarpCrew : SharedNumbers {
+  __device__ static constexpr std::uint32_t crew_size() { return 32; }
+  __device__ static void crew_sync() {
+    __threadfence_block();
+    __syncwarp();
+  }
+  template <typename Found, typename Of>
+  __device__ static void one_by_one(const Found& found, const Of& of) {
+    const bool has = static_cast<bool>(found);
+    for (std::uint32_t left = __ballot_sync(0xFFFFFFFFu, has); left != 0; left &= left - 1) {
+      if (threadIdx.x % 32 == static_cast<std::uint32_t>(__ffs(static_cast<int>(left)) - 1)) of();
+      crew_sync();
+    }
+  }
+};
+
 struct Sum {
   template <typename T>
   __device__ T operator()(T x, T y) const {
@@ -47,7 +64,8 @@ __device__ T over_warp(T value, Of of) {
   return value;
 }
 
-struct WarpTeam : SharedNumbers {
+struct WarpTeam : WarpCrew {
+  __device__ static bool in_crew() { return true; }
   __device__ static std::uint32_t rank() { return threadIdx.x % 32; }
   __device__ static constexpr std::uint32_t size() { return 32; }
   __device__ static void sync() {
@@ -70,9 +88,10 @@ struct WarpTeam : SharedNumbers {
 };
 
 template <std::uint32_t kThreads>
-struct BlockTeam : SharedNumbers {
+struct BlockTeam : WarpCrew {
   Counter* scratch;  ///< shared, one for each warp
 
+  __device__ static bool in_crew() { return threadIdx.x < 32; }
   __device__ static std::uint32_t rank() { return threadIdx.x; }
   __device__ static constexpr std::uint32_t size() { return kThreads; }
   __device__ static void sync() { __syncthreads(); }

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "gpu_query_data.h"
 
 // Before the walk: what is wrong with instances and pairs, and how the two of a pair lie. Compiled without
@@ -27,7 +29,7 @@ __device__ void prepare_pair(const QueryArgs& args, std::uint32_t index) {
 __device__ void clear_groups(const QueryArgs& args, std::uint32_t first, std::uint32_t step,
                              std::uint32_t pairs) {
   const Grouping& grouping = args.grouping;
-  for (std::uint32_t i = first; i < pairs; i += step) grouping.next[i] = 0;
+  for (std::uint32_t i = first; i < pairs; i += step) grouping.next[i * spread_of(pairs)] = 0;
   for (std::uint32_t i = first; i < tiles_of(pairs); i += step) {
     grouping.tile_contacts[i] = grouping.tile_pairs[i] = 0;
   }
@@ -35,7 +37,7 @@ __device__ void clear_groups(const QueryArgs& args, std::uint32_t first, std::ui
 }
 
 __global__ void __launch_bounds__(kThreads) prepare(const __grid_constant__ QueryArgs args) {
-  let_next_kernel_begin();
+  wait_for_kernel_before();
   const std::uint32_t first = blockIdx.x * kThreads + threadIdx.x, step = gridDim.x * kThreads;
   const std::uint32_t pairs = pair_count(args);
   if (args.grouping.first_contact != nullptr) clear_groups(args, first, step, pairs);
@@ -50,9 +52,12 @@ __global__ void __launch_bounds__(kThreads) prepare(const __grid_constant__ Quer
 }  // namespace
 
 cudaError_t prepare_pairs(const QueryArgs& args, cudaStream_t stream) {
-  // After whatever kernel of the user's, and so after all of it.
-  prepare<<<args.limits.processors * 32, kThreads, 0, stream>>>(args);
-  return cudaGetLastError();
+  // No more blocks than there is work for, where the CPU knows: launching many takes a microsecond or two.
+  const std::uint64_t most =
+      std::uint64_t{args.instances.count} + std::min(args.given.capacity, args.capacity.pairs);
+  const auto blocks =
+      static_cast<std::uint32_t>(std::min<std::uint64_t>(args.limits.processors * 32, most / kThreads + 1));
+  return launch_after({blocks, kThreads, 0, stream, args.limits.early_launch}, prepare, args);
 }
 
 }  // namespace tandem::gpu

@@ -12,6 +12,7 @@ class SharingWarp {
   static constexpr std::uint32_t kLanes = 32, kNoTicket = 0xFFFFFFFFu;
   static constexpr int kEntryWords = 2;
   static constexpr std::uint32_t kSharedWords = 8;  ///< of a warp: the ticket kept, the last look at `counts`
+  static constexpr std::uint32_t kFreeWord = 1, kFreeWords = 3;  ///< of them, those between the two
 
   /// memory: address of kSharedWords in shared memory, a multiple of 16 bytes. Condition: all lanes call it.
   __device__ SharingWarp(const QueryArgs& args, Balance& balance, std::uint32_t memory, std::uint32_t lane)

@@ -39,11 +39,13 @@ __device__ inline WarpPlace warp_place(std::uint32_t memory) {
 
 /// The walk of one warp. Means (walk_lane.cuh) says how a lane tests a block pair and decides a candidate.
 /// All lanes call each function, but for those that say so.
-template <class Means>
+/// kShares: whether warps give work to each other, the same for all warps of a walk.
+template <class Means, bool kShares>
 class Walk {
  public:
-  __device__ Walk(const QueryArgs& args, std::uint32_t positions, WarpPlace place)
+  __device__ Walk(const QueryArgs& args, std::uint32_t positions, std::uint32_t sums, WarpPlace place)
       : args_(args),
+        sums_(sums),
         balance_(Means::kWorld ? args.state->world : args.state->frame),
         lane_(place.lane),
         output_(place.memory, place.lane),
@@ -53,7 +55,7 @@ class Walk {
   __device__ void run() {
     const std::uint32_t pairs = input();
     if (pairs == 0) return;
-    if (shares()) sharing().begin();
+    if (kShares) sharing().begin();
     take_first_pairs(pairs);
     // Each of these is called in one place: the code is to stay small, for the caches of instructions.
     bool all_done = false;
@@ -65,17 +67,14 @@ class Walk {
       if (stack_.waiting() != 0)
         step();
       else if (!more_input_)
-        all_done = !shares() || !receive();
+        all_done = !kShares || !receive();
     }
     output_.finish(args_);
-    add_counters();
+    add_counters_of_block();
   }
 
  private:
   __device__ WorkSharing<SharingWarp> sharing() const { return WorkSharing<SharingWarp>(warp_); }
-
-  /// The same for all warps of a walk.
-  __device__ bool shares() const { return args_.shape.shares; }
 
   __device__ std::uint32_t input() const {
     return Means::kWorld ? args_.state->world_pairs : pair_count(args_);
@@ -87,7 +86,7 @@ class Walk {
   /// warps.
   __device__ std::uint32_t share_of(std::uint32_t pairs) const {
     const std::uint32_t share =
-        shares() ? max(pairs / warps(), kFewestPairsAtOnce) : (pairs + warps() - 1) / warps();
+        kShares ? max(pairs / warps(), kFewestPairsAtOnce) : (pairs + warps() - 1) / warps();
     return min(share, kMostPairsAtOnce);
   }
 
@@ -128,7 +127,7 @@ class Walk {
 
   /// Takes up to 32 block pairs off, tests them and puts on those that hit.
   __device__ void step() {
-    if (shares()) warp_.begin_look();  // comes while the boxes are tested
+    if constexpr (kShares) warp_.begin_look();  // comes while the boxes are tested
     const Taken taken =
         stack_.take_block_pairs(block_pairs_to_take(stack_.waiting(), stack_.room(), args_.shape.reserve));
     const bool mine = taken.mine && is_open(taken.entry.x);
@@ -139,7 +138,7 @@ class Walk {
       if (tested.of_leaves) candidates_ += __popc(tested.entry.w & 0xFFFFu), tested.entry.w = 0;
     }
     stack_.put(tested.entry, tested.of_leaves);
-    if (shares()) {
+    if constexpr (kShares) {
       warp_.end_look();
       if (stack_.waiting() >= kFewestToShare) share();
     }
@@ -206,7 +205,7 @@ class Walk {
 
   __device__ void judge(bool mine, std::uint32_t pair, std::uint32_t a, std::uint32_t b) {
     Judged judged = {0, 0, false, false};
-    if (mine) judged = Means::judge(args_.pairs[pair], a, b);
+    if (mine) judged = Means::judge(args_, args_.pairs[pair], a, b);
     if (__any_sync(kAllLanes, judged.undecided)) {
       const Counter place = place_for(judged.undecided, &args_.state->undecided);
       if (judged.undecided && place < args_.capacity.undecided) args_.undecided[place] = {pair, a, b};
@@ -239,20 +238,45 @@ class Walk {
     return stack_.put_given([&](auto put_on) { return sharing().receive(put_on); }) != 0;
   }
 
+  /// Over the warp.
+  __device__ static Counter sum_of(std::uint32_t count) {
+    const std::uint32_t high = __reduce_add_sync(kAllLanes, count >> 16),
+                        low = __reduce_add_sync(kAllLanes, count & 0xFFFFu);
+    return (static_cast<Counter>(high) << 16) + low;
+  }
+
+  __device__ void add_to_query(Counter block_pairs, Counter candidates) const {
+    if ((block_pairs | candidates) == 0) return;
+    atomicAdd(&args_.state->block_pairs, block_pairs);
+    atomicAdd(&args_.state->candidates, candidates);
+  }
+
   /// Adds what the lanes counted; before 32 bits are full.
   __device__ void add_counters() {
-    const std::uint32_t high = __reduce_add_sync(kAllLanes, block_pairs_ >> 16),
-                        low = __reduce_add_sync(kAllLanes, block_pairs_ & 0xFFFFu);
-    const std::uint32_t high_seen = __reduce_add_sync(kAllLanes, candidates_ >> 16),
-                        low_seen = __reduce_add_sync(kAllLanes, candidates_ & 0xFFFFu);
-    if (lane_ == 0 && (high | low | high_seen | low_seen) != 0) {
-      atomicAdd(&args_.state->block_pairs, (static_cast<Counter>(high) << 16) + low);
-      atomicAdd(&args_.state->candidates, (static_cast<Counter>(high_seen) << 16) + low_seen);
-    }
+    const Counter block_pairs = sum_of(block_pairs_), candidates = sum_of(candidates_);
+    if (lane_ == 0) add_to_query(block_pairs, candidates);
     block_pairs_ = candidates_ = 0;
   }
 
+  /// Adds what the lanes counted, once for all warps of the block: all warps of a walk would wait for each
+  /// other at the query's counters. Called once.
+  __device__ void add_counters_of_block() {
+    const Counter block_pairs = sum_of(block_pairs_), candidates = sum_of(candidates_);
+    if (lane_ != 0) return;
+    const bool small = (block_pairs | candidates) < kSmall;
+    if (!small) add_to_query(block_pairs, candidates);
+    add_shared(sums_, small ? static_cast<std::uint32_t>(block_pairs) : 0);
+    add_shared(sums_ + 4, small ? static_cast<std::uint32_t>(candidates) : 0);
+    __threadfence_block();
+    if (add_shared(sums_ + 8, 1) != args_.shape.warps - 1) return;
+    __threadfence_block();
+    add_to_query(add_shared(sums_, 0), add_shared(sums_ + 4, 0));
+  }
+
+  static constexpr Counter kSmall = (Counter{1} << 32) / kMostWarpsPerBlock;  // so that a block's fit 32 bits
+
   const QueryArgs& args_;
+  const std::uint32_t sums_;  // address: block pairs and candidates of the block, and warps that added theirs
   Balance& balance_;
   const std::uint32_t lane_;
   ContactOutput output_;
@@ -263,24 +287,41 @@ class Walk {
   bool more_input_ = true;
 };
 
-template <class Means>
-__global__ void __launch_bounds__(32 * kMostWarpsPerBlock, 1) walk(const __grid_constant__ QueryArgs args) {
-  extern __shared__ float4 memory[];
+/// Address of the three words in which a block adds up its counters: the first warp has them free.
+__device__ inline std::uint32_t sums_of_block(std::uint32_t memory) {
+  return memory + 4 * (kBlockWords + ContactOutput::kSharedWords + SharingWarp::kFreeWord);
+}
+
+/// Before a walk of the block.
+__device__ inline void prepare_memory(float4* memory) {
   fill_positions(reinterpret_cast<std::uint32_t*>(memory));
+  if (threadIdx.x < SharingWarp::kFreeWords)
+    store_shared(
+        sums_of_block(static_cast<std::uint32_t>(__cvta_generic_to_shared(memory))) + 4 * threadIdx.x, 0);
   __syncthreads();
-  wait_for_kernel_before();
-  if (failed(args)) return;
+}
+
+/// The walk of a thread block. Condition: prepare_memory().
+template <class Means, bool kShares>
+__device__ void run_walk(const QueryArgs& args, float4* memory) {
   const auto positions = static_cast<std::uint32_t>(__cvta_generic_to_shared(memory));
   const std::uint32_t warp = threadIdx.x / 32;
-  Walk<Means> walk(
-      args, positions,
+  Walk<Means, kShares> walk(
+      args, positions, sums_of_block(positions),
       warp_place(positions + 4 * (kBlockWords + warp * (kWarpWords + kEntryWords * args.shape.stack_size))));
   walk.run();
 }
 
-template <class Means>
-cudaError_t launch_walk(const QueryArgs& args, cudaStream_t stream) {
-  const auto kernel = walk<Means>;
+template <class Means, bool kShares>
+__global__ void __launch_bounds__(32 * kMostWarpsPerBlock, 1) walk(const __grid_constant__ QueryArgs args) {
+  extern __shared__ float4 memory[];
+  prepare_memory(memory);
+  wait_for_kernel_before();
+  if (!failed(args)) run_walk<Means, kShares>(args, memory);
+}
+
+/// Launches a kernel of thread blocks in the shape of a walk.
+inline cudaError_t launch_shaped(void (*kernel)(QueryArgs), const QueryArgs& args, cudaStream_t stream) {
   // The same for every walk: CUDA keeps it with the kernel, and another thread's walk may need more.
   const cudaError_t error = cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
                                                  static_cast<int>(most_shared_bytes(args.limits)));
@@ -288,6 +329,11 @@ cudaError_t launch_walk(const QueryArgs& args, cudaStream_t stream) {
   const WalkShape& shape = args.shape;
   return launch_after(
       {shape.blocks, 32 * shape.warps, shape.shared_bytes(), stream, args.limits.early_launch}, kernel, args);
+}
+
+template <class Means>
+cudaError_t launch_walk(const QueryArgs& args, cudaStream_t stream) {
+  return launch_shaped(args.shape.shares ? walk<Means, true> : walk<Means, false>, args, stream);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include "gpu_query_data.h"
 #include "tandem/kernels/detail/block_pair.h"
+#include "tandem/kernels/detail/candidate.h"
 #include "tandem/kernels/detail/leaf_planes.h"
 #include "tandem/kernels/detail/oriented_test.h"
 #include "tandem/kernels/detail/oriented_world_box.h"
@@ -238,7 +239,8 @@ struct InFrame {
                                       record.triangles_b, pose_of(record), record.frame_error);
   }
 
-  __device__ static Judged judge(const PairRecord& record, std::uint32_t a, std::uint32_t b) {
+  __device__ static Judged judge(const QueryArgs&, const PairRecord& record, std::uint32_t a,
+                                 std::uint32_t b) {
     Judged out = {record.triangles_a[a].corner[0].w, record.triangles_b[b].corner[0].w, true, false};
     if constexpr (kMode == QueryMode::boxes) return out;
     const TriangleInFrame in_a = stored_triangle(load_triangle(record.triangles_a, a)),
@@ -251,7 +253,19 @@ struct InFrame {
   }
 };
 
-/// Boxes in world coordinates, float64; leaves every candidate undecided.
+/// Triangles of a candidate, in world coordinates.
+__device__ inline TrianglePair posed_pair(const QueryArgs& args, const PairRecord& record, std::uint32_t a,
+                                          std::uint32_t b) {
+  return tandem::posed_pair(stored_pose(args, record.instance_a), record.triangles_a[a],
+                            stored_pose(args, record.instance_b), record.triangles_b[b]);
+}
+
+/// Takes 3 KB of stack, so its code stands once.
+__device__ __noinline__ inline bool decide_exactly(const TrianglePair& pair) {
+  return decide_exact(pair) == Verdict::contact;
+}
+
+/// Boxes in world coordinates, float64, as the triangles.
 template <QueryMode kMode, bool kWalksOnly = false>
 struct InWorld {
   static constexpr bool kWorld = true;
@@ -281,9 +295,18 @@ struct InWorld {
 
   static constexpr bool kTriesPlanes = false;
 
-  __device__ static Judged judge(const PairRecord& record, std::uint32_t a, std::uint32_t b) {
-    return {record.triangles_a[a].corner[0].w, record.triangles_b[b].corner[0].w, kMode == QueryMode::boxes,
-            kMode != QueryMode::boxes};
+  /// Such pairs are rare: each candidate is decided at once.
+  __device__ static Judged judge(const QueryArgs& args, const PairRecord& record, std::uint32_t a,
+                                 std::uint32_t b) {
+    Judged out = {record.triangles_a[a].corner[0].w, record.triangles_b[b].corner[0].w,
+                  kMode == QueryMode::boxes, false};
+    if constexpr (kMode == QueryMode::boxes) return out;
+    const TrianglePair pair = posed_pair(args, record, a, b);
+    const Verdict verdict = decide_float64(pair);
+    const bool exactly = verdict == Verdict::undecided;
+    atomicAdd(exactly ? &args.state->decided_exactly : &args.state->decided_by_float64, Counter{1});
+    out.contact = exactly ? decide_exactly(pair) : verdict == Verdict::contact;
+    return out;
   }
 };
 

@@ -33,6 +33,12 @@ __device__ inline uint4 load_shared4(std::uint32_t address) {
 __device__ inline void store_shared(std::uint32_t address, std::uint32_t word) {
   asm volatile("st.shared.u32 [%0], %1;" ::"r"(address), "r"(word) : "memory");
 }
+/// Result: the word before.
+__device__ inline std::uint32_t add_shared(std::uint32_t address, std::uint32_t amount) {
+  std::uint32_t before;
+  asm volatile("atom.shared.add.u32 %0, [%1], %2;" : "=r"(before) : "r"(address), "r"(amount) : "memory");
+  return before;
+}
 __device__ inline void store_shared4(std::uint32_t address, const uint4& words) {
   asm volatile("st.shared.v4.u32 [%0], {%1, %2, %3, %4};" ::"r"(address), "r"(words.x), "r"(words.y),
                "r"(words.z), "r"(words.w)

@@ -69,6 +69,7 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kPoseNotRigid,      ///< not a rotation and a translation, to kRigidTolerance
     kTooManyInstances,  ///< 2^32 - 1 or more
     kTooManyPairs,      ///< 2^32 - 1 object pairs or more
+    kKeptMismatch,      ///< fixed instances are kept of a list of another length
     kCannotStartThread,
     kNoOrientedBlocks,     ///< exact queries on a GPU need them, and the asset was given without
     kNoAxisAlignedBlocks,  ///< the other modes of queries on a GPU need them, and the asset was given without

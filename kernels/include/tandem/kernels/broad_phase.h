@@ -5,6 +5,7 @@
 
 #include "tandem/formats/status.h"
 #include "tandem/kernels/detail/buffer.h"
+#include "tandem/kernels/pair_filter.h"
 #include "tandem/kernels/world_box.h"
 
 namespace tandem {
@@ -16,24 +17,48 @@ struct ObjectPair {
   std::uint32_t a, b;
 };
 
-/// Finds all pairs of world boxes that meet. Keeps its memory from call to call: in a steady state nothing is
-/// allocated. Throws nothing.
+/// Finds all pairs of world boxes that meet, or those of them that a filter looks at. Keeps its memory from
+/// call to call: in a steady state nothing is allocated. Throws nothing.
 ///
 /// Boxes are split into four again and again, at medians along the longest extent, which makes a complete
 /// tree of groups of four; it is traversed in tandem with itself. O(n log n) for boxes of bounded overlap,
 /// whatever their distribution: one that is far from all others costs no more than the rest. All in float64,
-/// so that the tree's answer is exact.
+/// so that the tree's answer is exact. Boxes of fixed instances may be kept in a tree of their own: then a
+/// call makes one of the others, and traverses that in tandem with itself and with the kept one.
 class BroadPhase {
  public:
   /// Result: kOk; kOutOfMemory; kOutOfRange where a coordinate is NaN or beyond kLargestWorldCoordinate;
   /// kTooManyInstances, kTooManyPairs: 2^32 - 1 boxes or pairs, or more. The pairs are those whose boxes
-  /// meet, touching included, no more and no fewer, sorted by a, then b. One thread.
-  Status find_pairs(std::span<const WorldBox> boxes);
+  /// meet, touching included, and that the filter looks at, no more and no fewer, sorted by a, then b. One
+  /// thread. kUnknownInstance where the filter excludes a pair of boxes that there are not; kKeptMismatch
+  /// where fixed boxes are kept of another number of boxes.
+  Status find_pairs(std::span<const WorldBox> boxes, const PairFilter& filter = {});
 
   /// The same with the threads of a query, which are there for so many workers; neither the pairs nor
-  /// group_pairs() depend on their number. self_pairs: each box with itself is a pair too.
-  Status find_pairs(std::span<const WorldBox> boxes, bool self_pairs, WorkerThreads& threads,
+  /// group_pairs() depend on their number. self_pairs: each box with itself is a pair too, where the filter
+  /// looks at it.
+  Status find_pairs(std::span<const WorldBox> boxes, const PairFilter& filter, bool self_pairs,
+                    WorkerThreads& threads, std::uint32_t workers);
+
+  /// Keeps the boxes whose motion is fixed for the calls to come, which must be of as many boxes: they find
+  /// no pair of two kept ones, and look at no kept box again; it is where it was, and the filter still says
+  /// that it is fixed. A later call replaces what is kept. motion: of each box. Result: as of find_pairs();
+  /// kKeptMismatch where the sizes differ. After an error nothing is kept.
+  Status keep_fixed(std::span<const WorldBox> boxes, std::span<const Motion> motion);
+  Status keep_fixed(std::span<const WorldBox> boxes, std::span<const Motion> motion, WorkerThreads& threads,
                     std::uint32_t workers);
+
+  void forget_fixed();
+
+  /// Of how many boxes fixed ones are kept; 0: none are.
+  std::size_t kept_of() const { return kept_of_; }
+
+  /// The boxes that a call looks at: all but those that are kept, ascending. count: of all boxes. Condition:
+  /// none are kept, or of so many.
+  std::size_t free_count(std::size_t count) const { return kept_of_ == 0 ? count : free_.size(); }
+  std::uint32_t free_box(std::size_t i) const {
+    return kept_of_ == 0 ? static_cast<std::uint32_t>(i) : free_[i];
+  }
 
   /// The pairs of the last call that returned kOk; valid until the next call.
   std::span<const ObjectPair> pairs() const { return pairs_.view(); }
@@ -61,7 +86,27 @@ class BroadPhase {
     std::size_t begin, count, unit, units;
   };
 
-  /// Two groups of one level; a <= b.
+  /// Items and groups over them; level 0 holds the items' boxes.
+  struct Tree {
+    Buffer<Item> items;                // in the order of the tree
+    Buffer<Group> groups;              // level by level
+    std::size_t level_begin[17] = {};  // where each level of groups begins
+    int levels = 0;
+
+    bool reserve(std::size_t boxes);
+    int top() const { return levels - 1; }
+    const Group* level(int i) const { return groups.data() + level_begin[i]; }
+  };
+
+  /// The trees that are traversed in tandem: the same one twice, or two.
+  struct TreePair {
+    const Tree &a, &b;
+
+    bool same() const { return &a == &b; }
+  };
+
+  /// Two groups, of one level; where one tree has fewer levels, its root stands for itself on those above.
+  /// Within one tree a <= b.
   struct GroupPair {
     std::uint32_t a, b;  // within their level
     int level;
@@ -79,29 +124,31 @@ class BroadPhase {
     std::uint32_t workers;
   };
 
+  bool provide_finders(std::uint32_t workers);
   static std::uint32_t meeting(const Group& a, const Group& b);
-  bool reserve(std::size_t boxes, std::uint32_t workers);
-  bool take(std::span<const WorldBox> boxes, Team team);
-  bool halve(Range& range, Range& right);
-  void split(Range range);
-  void split(Range all, Team team);
-  void build(std::span<const WorldBox> boxes, Team team);
-  void build_level(int level, std::size_t below, std::span<const WorldBox> boxes, Team team);
-  std::uint32_t meeting(const GroupPair& pair) const;
-  void collect(GroupPair from, std::uint32_t owners, Finder& finder) const;
-  bool collect(Team team);
-  Status sort_pairs(std::size_t boxes, bool self_pairs, Team team);
+  static std::uint32_t meeting(const TreePair& trees, const GroupPair& pair);
+  bool take(std::span<const WorldBox> boxes, const std::uint32_t* numbers, Tree& tree, Team team);
+  static bool halve(Item* all, Range& range, Range& right);
+  static void split(Item* all, Range range);
+  static void split(Item* all, Range range, Team team);
+  static void build(std::span<const WorldBox> boxes, Tree& tree, Team team);
+  static void build_level(int level, std::size_t below, std::span<const WorldBox> boxes, Tree& tree,
+                          Team team);
+  static void collect(const TreePair& trees, GroupPair from, const PairFilter& filter, std::uint32_t owners,
+                      Finder& finder);
+  bool collect(const TreePair& trees, const PairFilter& filter, Team team);
+  bool collect_selves(const PairFilter& filter);
+  Status sort_pairs(std::size_t boxes, Team team);
 
-  Buffer<Item> items_;                // in the order of the tree
-  Buffer<Group> groups_;              // level by level from the leaves
-  std::size_t level_begin_[17] = {};  // where each level of groups begins
-  int levels_ = 0;
+  Tree tree_, kept_;
+  std::size_t kept_of_ = 0;
+  Buffer<std::uint32_t> free_, fixed_;  // numbers of boxes that are not kept, and that are
   std::uint64_t group_pairs_ = 0;
   Buffer<GroupPair> starts_;  // of the workers' walks
   std::unique_ptr<Finder[]> finders_;
   std::uint32_t finder_count_ = 0;
   Buffer<ObjectPair> pairs_;
-  Buffer<std::uint32_t> first_;  // of each box, where its pairs begin
+  Buffer<std::uint32_t> first_;  // where the pairs of each run of numbers begin
 };
 
 }  // namespace tandem

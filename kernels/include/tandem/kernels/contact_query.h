@@ -39,6 +39,8 @@ struct QueryOptions {
   bool first_contact_only = false;  ///< the query reports one contact for each object pair that touches
   bool self_pairs = false;          ///< where the query finds the pairs: also each instance with itself
   std::uint32_t threads = 1;  ///< with the caller's, kMostQueryThreads at most; results don't depend on it
+  /// Where the query finds the pairs: those that it looks at; null: all. It must stay as long as the call.
+  const PairFilter* filter = nullptr;
 };
 
 /// What a query did. The counters depend neither on the number of threads nor on the machine.
@@ -70,10 +72,20 @@ class ContactQuery {
   /// in the list; or kOutOfMemory. After an error there are no assets.
   Status set_assets(std::span<const AssetView> assets);
 
+  /// Keeps the instances whose motion is fixed as they stand: calls to come, which must be of as many
+  /// instances, look neither at their assets nor at their poses again, find no pair of two of them, and take
+  /// the time of the others. Call it again when one of them has moved or others are fixed; none are kept
+  /// where none is fixed, as of two empty lists. motion: of each instance; where a filter of a call to come
+  /// has motions, it says the same of what is kept. Result: as of find_pairs(); kKeptMismatch where the sizes
+  /// differ. After an error, and after set_assets(), nothing is kept. Of the options: threads.
+  Status keep_fixed(std::span<const Instance> instances, std::span<const Motion> motion,
+                    const QueryOptions& options = {});
+
   /// Finds the object pairs whose world boxes overlap, without their contacts, so that the caller can leave
   /// some out. Result: kOk; kUnknownAsset, kPoseNotRigid or kOutOfRange (beyond kLargestWorldCoordinate),
-  /// where where() is the instance; kTooManyInstances, kTooManyPairs, kOutOfMemory or
-  /// kCannotStartThread. After an error there are no pairs and no contacts.
+  /// where where() is the instance; kUnknownInstance, where where() is the filter's excluded pair;
+  /// kKeptMismatch, kTooManyInstances, kTooManyPairs, kOutOfMemory or kCannotStartThread. After an error
+  /// there are no pairs and no contacts.
   Status find_pairs(std::span<const Instance> instances, const QueryOptions& options = {});
 
   /// Finds the object pairs whose world boxes overlap, and their contacts. find_contacts(instances, {}) is
@@ -84,8 +96,8 @@ class ContactQuery {
 
   /// Finds the contacts of the given object pairs, in either order of a and b. A pair of an instance with
   /// itself asks for the contacts within it: each pair of two different triangles once, neighbours in the
-  /// mesh included, which touch. `pairs` may be pairs(), or a part of them. Result: as above, or
-  /// kUnknownInstance: where() is the pair.
+  /// mesh included, which touch. `pairs` may be pairs(), or a part of them; the filter is not asked. Result:
+  /// as above, or kUnknownInstance: where() is the pair.
   Status find_contacts(std::span<const Instance> instances, std::span<const ObjectPair> pairs,
                        const QueryOptions& options);
 

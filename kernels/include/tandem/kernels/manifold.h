@@ -33,7 +33,7 @@ struct Manifold {
   double normal[3];       ///< unit, from a towards b: moving b along it separates the bodies
   double area_vector[3];  ///< of a's surface inside b, bounded by the curve in which the surfaces cross
   double centre[3];       ///< of that area, in the world
-  double depth;           ///< the largest of the points
+  double depth;           ///< the largest that was found; the deepest point has at least 0.8 of it
   std::uint32_t pair;     ///< row of the list of object pairs
   std::uint32_t first_point, point_count;
   std::uint32_t flags;    ///< ManifoldFlags

@@ -4,9 +4,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 
 #include "tandem/formats/status.h"
 #include "tandem/kernels/gpu_scene.h"
+#include "tandem/kernels/pair_filter.h"
 #include "tandem/kernels/world_box.h"
 
 namespace tandem {
@@ -15,6 +17,10 @@ struct GpuBroadPhaseOptions {
   /// Pairs are sorted by a, then b, as those of BroadPhase. Without it their order may differ from run to
   /// run; of many boxes, pairs that are neighbours in space come close to each other.
   bool sorted = false;
+
+  /// Which pairs are looked at; its arrays lie in GPU memory and must stay until the call is done. enqueue()
+  /// alone looks at it.
+  PairFilter filter = {};
 };
 
 /// How many boxes and pairs there is room for.
@@ -22,13 +28,14 @@ struct GpuBroadPhaseCapacity {
   std::uint32_t boxes = 0;  ///< or instances
   std::uint32_t pairs = 0;
   std::uint32_t instances = 0;  ///< whose boxes are to be computed
+  std::uint32_t kept = 0;  ///< or boxes, of which fixed ones are kept: keep_fixed() alone makes this room
 };
 
 /// GPU memory that a broad phase with room for so much holds at most: the bound of GpuBroadPhase::bytes().
 constexpr std::size_t most_broad_phase_bytes(const GpuBroadPhaseCapacity& capacity, bool sorted) {
   constexpr std::size_t kFixed = std::size_t{1} << 20;
   return kFixed + 52 * std::size_t{capacity.boxes} + 48 * std::size_t{capacity.instances} +
-         (sorted ? 17 : 8) * std::size_t{capacity.pairs};
+         38 * std::size_t{capacity.kept} + (sorted ? 17 : 8) * std::size_t{capacity.pairs};
 }
 
 /// The outcome of a broad phase. It lies in GPU memory, and in CPU memory once the stream has come to the
@@ -41,7 +48,8 @@ struct GpuBroadPhaseReport {
   std::uint64_t found;     ///< how many pairs there are, stored or not
 };
 
-/// Finds all pairs of world boxes that meet, on the GPU: the same set as BroadPhase. enqueue() neither waits
+/// Finds all pairs of world boxes that meet, or those of them that a filter looks at, on the GPU: the same
+/// set as BroadPhase. enqueue() neither waits
 /// for the GPU nor allocates. Throws nothing. Movable, not copyable. An object runs one broad phase at a
 /// time: enqueue the next on the same stream, or when the last has ended. Several objects can run side by
 /// side.
@@ -49,7 +57,8 @@ struct GpuBroadPhaseReport {
 /// Few boxes are tested each against each, by one kernel that poses them too. Many are sorted by class of
 /// size, then along a space-filling curve, and grouped by 32 into a tree of fan-out 32. One warp takes a
 /// group and walks the part of the tree that lies behind it, so a pair is found once, by the smaller box: one
-/// huge box among many small ones costs each of them a test. O(n log n) for boxes of bounded overlap.
+/// huge box among many small ones costs each of them a test. O(n log n) for boxes of bounded overlap. Boxes
+/// of fixed instances may be kept in a tree of their own, which a warp walks for each of the others.
 class GpuBroadPhase {
  public:
   GpuBroadPhase();
@@ -58,15 +67,32 @@ class GpuBroadPhase {
   ~GpuBroadPhase();  ///< waits for the device
 
   /// Makes room for at least so much on the current device, waiting for it where memory grows. `options`:
-  /// those of the calls to come. Result: kOk, kOutOfRange (2^32 - 1 boxes), kOutOfGpuMemory, kOutOfMemory, or
+  /// those of the calls to come. Where room for more instances is made, what was kept of them is lost, and
+  /// enqueue() returns kKeptMismatch until keep_fixed() is called again.
+  /// Result: kOk, kOutOfRange (2^32 - 1 boxes), kOutOfGpuMemory, kOutOfMemory, or
   /// another that status_of() of gpu_status.h names: kNoGpu, kDriverTooOld, kGpuNotSupported, kCudaFailed;
   /// after an error there is the room that there was, or less.
   Status reserve(const GpuBroadPhaseCapacity& capacity, const GpuBroadPhaseOptions& options = {});
 
+  /// Keeps the boxes, or instances, whose motion is fixed as they are: calls of enqueue() to come, which must
+  /// be of as many, find no pair of two of them and take the time of the others. Given boxes must go on lying
+  /// in the array that enqueue() gets; assets and poses of kept instances are not looked at again. Call it
+  /// again when one of them has moved or others are fixed; nothing is kept where none is fixed. Makes room
+  /// for all that and waits for the stream: it is no part of a step, and graphs that were captured before it
+  /// must be captured anew. motion: of each, in CPU memory; where a filter of a call to come has motions, it
+  /// says the same of what is kept. Result: as of reserve(); kMisaligned; kKeptMismatch where the sizes
+  /// differ; or kOutOfRange, kUnknownAsset, kPoseNotRigid, where report().where is the fixed one to blame.
+  /// After an error nothing is kept.
+  Status keep_fixed(const WorldBox* boxes, std::span<const Motion> motion, cudaStream_t stream);
+  Status keep_fixed(const GpuInstances& instances, const GpuAssetBounds& assets,
+                    std::span<const Motion> motion, cudaStream_t stream);
+
   /// Queues a broad phase of the boxes behind what `stream` holds; may be captured into a graph. `boxes`, in
   /// GPU memory at a multiple of 16 bytes, must stay until it is done. Result: kOk, kMisaligned, kOutOfRange
-  /// (more than reserved for) or kCudaFailed; what the GPU finds wrong is in the report. kOutOfRange there: a
-  /// coordinate that is NaN or beyond kLargestWorldCoordinate. Condition: reserve() with these options.
+  /// (more than reserved for), kUnknownInstance (the filter excludes a pair of boxes that there are not),
+  /// kKeptMismatch (fixed ones are kept of another number of boxes, or of instances) or kCudaFailed; what the
+  /// GPU finds wrong is in the report. kOutOfRange there: a coordinate that is NaN or beyond
+  /// kLargestWorldCoordinate. Condition: reserve() with these options.
   Status enqueue(const WorldBox* boxes, std::uint32_t count, const GpuBroadPhaseOptions& options,
                  cudaStream_t stream);
 
@@ -87,7 +113,7 @@ class GpuBroadPhase {
   /// until reserve(). Condition: reserve() returned kOk.
   GpuPairs pairs() const;
 
-  /// The world boxes that enqueue() computed of instances, in GPU memory.
+  /// The world boxes that enqueue() and keep_fixed() computed of instances, in GPU memory.
   const WorldBox* boxes() const;
 
   const GpuBroadPhaseReport* device_report() const;

@@ -52,7 +52,7 @@ constexpr std::size_t most_query_bytes(const GpuQueryCapacity& capacity, const G
   const std::size_t per_contact = options.sorted ? 20 + 29 : options.grouped ? 20 + 20 : 20;
   const std::size_t per_pair = options.grouped ? 168 + 17 : 168;
   return kFixed + sizeof(GpuAsset) * assets + per_pair * capacity.pairs + per_contact * capacity.contacts +
-         24 * capacity.undecided;
+         12 * capacity.undecided;
 }
 
 /// A pair with no more contacts than these has few of them, see GpuContactGroups.

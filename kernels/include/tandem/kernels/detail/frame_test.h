@@ -9,7 +9,7 @@
 ///
 /// Templates over Value: float, or a vector with a candidate in each lane, which has the same operators; the
 /// results are the same, bit by bit. A vector type brings, in its own namespace, select(mask, x, y),
-/// larger(x, y), magnitude(x) and less(x, y), whose results combine by & | ^ !.
+/// larger(x, y), magnitude(x), less(x, y), whose results combine by & | ^ !, and any() of these.
 ///
 /// **Proof.** Let X be the posed float64 points that a query is about, and T(X) = n (X - t_a), n being the
 /// float64 inverse of a's rotation that relative_pose() works with. T is affine and det n > 0 for rigid
@@ -86,6 +86,9 @@ TANDEM_HD inline float larger(float x, float y) {
 }
 TANDEM_HD inline float select(Flag mask, float x, float y) {
   return mask ? x : y;
+}
+TANDEM_HD inline bool any(Flag mask) {
+  return mask.set;
 }
 
 /// A point for each lane.
@@ -218,6 +221,22 @@ struct Sides {
   TANDEM_HD Mask all_certain() const {
     return (above[0] | below[0]) & (above[1] | below[1]) & (above[2] | below[2]);
   }
+  TANDEM_HD Mask all_ties() const {
+    return !(above[0] | below[0] | above[1] | below[1] | above[2] | below[2]);
+  }
+  /// Of exact sides, neither strictly one nor all ties: the same with ties below where some corner is above,
+  /// and above where none is. Two corners are then on one side, and the third is a detail::lone_corner():
+  /// where some corner is above, it is that one alone, with the others below or in the plane, or it is below
+  /// or in the plane, with the others above; where none is, the same upside down.
+  TANDEM_HD Sides without_ties() const {
+    const Mask some_above = above[0] | above[1] | above[2];
+    Sides out;
+    for (int i = 0; i < 3; ++i) {
+      out.above[i] = above[i] | !(below[i] | some_above);
+      out.below[i] = !out.above[i];
+    }
+    return out;
+  }
   /// Of three certain sides that are not one: whether corner i has one side to itself.
   TANDEM_HD Mask alone(int i) const {
     return (above[i] ^ above[(i + 1) % 3]) & (above[i] ^ above[(i + 2) % 3]);
@@ -331,26 +350,23 @@ TANDEM_HD inline void lone_first(const Point<Value> (&t)[3], const Sides<Mask>& 
   }
 }
 
-/// The answer, lane by lane; apart where neither is set.
-template <typename Mask>
-struct Verdicts {
-  Mask contact, undecided;
+/// The two volumes of order_corners() in triangle_test.h, in its order: the triangles meet where the lower
+/// one is at least 0 and the upper one at most 0.
+template <typename Value>
+struct Intervals {
+  Volume<Value> lower, upper;
 };
 
-/// Decides what the error bound allows. a: corners as stored. b: images of the corners in a's frame by
-/// box_terms::posed_center(). error: frame_error(). The method is that of detail::decide_bounded() in
-/// triangle_test.h; of the corners q and r only b's are exchanged, where one of the two orders asks for it,
-/// and a's orientation turns the signs instead. Without kBounded signs are taken as computed, and what is
-/// undecided are ties.
-template <bool kBounded, typename Value>
-TANDEM_HD inline auto decide(const Point<Value> (&a)[3], const Point<Value> (&b)[3], float error) {
+/// Of triangles whose corners lie on both sides of the other's plane. Only b's corners q and r are exchanged,
+/// where one of the two orders asks for it, and a's orientation turns the signs instead. (Inlined by force,
+/// as vectors go through memory to a call.)
+template <bool kBounded, typename Value, typename Mask>
+[[gnu::always_inline]] TANDEM_HD inline Intervals<Value> intervals(const Point<Value> (&a)[3],
+                                                                   const Point<Value> (&b)[3],
+                                                                   const Sides<Mask>& sides_of_a,
+                                                                   const Sides<Mask>& sides_of_b,
+                                                                   float error) {
   using PlaneOf = Plane<Value, kBounded>;
-  const auto sides = sides_of_both<kBounded>(a, b, error);
-  const auto &sides_of_a = sides.of_a, &sides_of_b = sides.of_b;
-  using Mask = decltype(sides_of_a.strictly_one());
-  const Mask possible = !(sides_of_b.strictly_one() | sides_of_a.strictly_one());
-  const Mask certain = sides_of_a.all_certain() & sides_of_b.all_certain();
-
   Point<Value> oa[3], ob[3];
   lone_first(a, sides_of_a, oa);
   lone_first(b, sides_of_b, ob);
@@ -361,12 +377,33 @@ TANDEM_HD inline auto decide(const Point<Value> (&a)[3], const Point<Value> (&b)
   const Mask turned_a = lone_below(sides_of_b), turned_b = lone_below(sides_of_a);
   const Mask exchange = turned_a ^ turned_b;
   const Point<Value> q = select_point(exchange, ob[2], ob[1]), r = select_point(exchange, ob[1], ob[2]);
-  const Volume<Value> lower = PlaneOf(oa[0], ob[0], oa[1], error).volume(q, error);
-  const Volume<Value> upper = PlaneOf(oa[0], ob[0], oa[2], error).volume(r, error);
-  const Value lower_value = select(turned_a, -lower.value, lower.value);
-  const Value upper_value = select(turned_a, -upper.value, upper.value);
-  const Mask apart = less(lower_value, -lower.bound) | less(upper.bound, upper_value);
-  const Mask meet = less(lower.bound, lower_value) & less(upper_value, -upper.bound);
+  Intervals<Value> out = {PlaneOf(oa[0], ob[0], oa[1], error).volume(q, error),
+                          PlaneOf(oa[0], ob[0], oa[2], error).volume(r, error)};
+  out.lower.value = select(turned_a, -out.lower.value, out.lower.value);
+  out.upper.value = select(turned_a, -out.upper.value, out.upper.value);
+  return out;
+}
+
+/// The answer, lane by lane; apart where neither is set.
+template <typename Mask>
+struct Verdicts {
+  Mask contact, undecided;
+};
+
+/// Decides what the error bound allows. a: corners as stored. b: images of the corners in a's frame by
+/// box_terms::posed_center(). error: frame_error(). The method is that of detail::decide_bounded() in
+/// triangle_test.h. Without kBounded signs are taken as computed, and what is undecided are ties.
+template <bool kBounded, typename Value>
+TANDEM_HD inline auto decide(const Point<Value> (&a)[3], const Point<Value> (&b)[3], float error) {
+  const auto sides = sides_of_both<kBounded>(a, b, error);
+  const auto &sides_of_a = sides.of_a, &sides_of_b = sides.of_b;
+  using Mask = decltype(sides_of_a.strictly_one());
+  const Mask possible = !(sides_of_b.strictly_one() | sides_of_a.strictly_one());
+  const Mask certain = sides_of_a.all_certain() & sides_of_b.all_certain();
+
+  const auto [lower, upper] = intervals<kBounded>(a, b, sides_of_a, sides_of_b, error);
+  const Mask apart = less(lower.value, -lower.bound) | less(upper.bound, upper.value);
+  const Mask meet = less(lower.bound, lower.value) & less(upper.value, -upper.bound);
   Verdicts<Mask> verdicts;
   verdicts.contact = possible & certain & meet;
   verdicts.undecided = possible & !(certain & (apart | meet));

@@ -37,13 +37,14 @@ struct Body {
     apply(pose, x.x, x.y, x.z, out);
     return {out[0], out[1], out[2]};
   }
-  TANDEM_HD Vector3 corner(std::uint32_t triangle, int k) const {
-    const float* p = shape->triangles[triangle].corner[k].position;
-    return posed({p[0], p[1], p[2]});
+  TANDEM_HD Vector3 posed(const Triangle::Corner& corner) const {
+    return posed(Vector3{corner.position[0], corner.position[1], corner.position[2]});
   }
+  TANDEM_HD Vector3 corner(std::uint32_t triangle, int k) const { return posed(shape->triangles[triangle].corner[k]); }
   TANDEM_HD WorldTriangle triangle(std::uint32_t index) const {
     WorldTriangle out;
-    for (int k = 0; k < 3; ++k) out.corner[k] = corner(index, k);
+    const Triangle stored = shape->triangles[index];  // float4 loads
+    for (int k = 0; k < 3; ++k) out.corner[k] = posed(stored.corner[k]);
     const Vector3 n = cross(out.corner[1] - out.corner[0], out.corner[2] - out.corner[0]);
     const double length = norm(n);
     const double turn = is_turned(shape->topology[index].flags) ? -1 : 1;

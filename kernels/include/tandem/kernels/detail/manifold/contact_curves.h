@@ -173,9 +173,12 @@ TANDEM_HD void CurveFinder<Team>::make_pieces(const Contact* contacts, std::uint
   std::uint32_t segments = 0;
   bool degenerate = false;
   Meeting meeting;
+  WorldTriangle a, b;
+  std::uint32_t posed_a = kNoIndex, posed_b = kNoIndex;
   for (std::uint32_t i = team_.rank(); i < count; i += team_.size()) {
     const Contact& contact = contacts[i];
-    const WorldTriangle a = bodies_.a.triangle(contact.triangle_a), b = bodies_.b.triangle(contact.triangle_b);
+    if (contact.triangle_a != posed_a) a = bodies_.a.triangle(posed_a = contact.triangle_a);
+    if (contact.triangle_b != posed_b) b = bodies_.b.triangle(posed_b = contact.triangle_b);
     meet(a, b, tolerance, meeting);
     if (meeting.kind == MeetingKind::none) continue;
     const std::uint32_t at = team_.add(next, 1);
@@ -203,16 +206,16 @@ TANDEM_HD void CurveFinder<Team>::make_pieces(const Contact* contacts, std::uint
     for (int end = 0; end < ends; ++end) {
       const double x[3] = {meeting.end[end].x, meeting.end[end].y, meeting.end[end].z};
       for (int k = 0; k < 3; ++k) {
-        lower[k] = std::fmin(lower[k], x[k]);
-        upper[k] = std::fmax(upper[k], x[k]);
+        lower[k] = lesser(lower[k], x[k]);
+        upper[k] = greater(upper[k], x[k]);
       }
     }
     for (int i_corner = 0; i_corner < meeting.corners; ++i_corner) {
       const Vector3& c = meeting.corner[i_corner];
       const double x[3] = {c.x, c.y, c.z};
       for (int k = 0; k < 3; ++k) {
-        lower[k] = std::fmin(lower[k], x[k]);
-        upper[k] = std::fmax(upper[k], x[k]);
+        lower[k] = lesser(lower[k], x[k]);
+        upper[k] = greater(upper[k], x[k]);
       }
     }
   }
@@ -225,7 +228,7 @@ TANDEM_HD void CurveFinder<Team>::make_pieces(const Contact* contacts, std::uint
     lower[k] = team_.least(lower[k]);
     upper[k] = team_.greatest(upper[k]);
     middle[k] = 0.5 * lower[k] + 0.5 * upper[k];
-    extent = std::fmax(extent, upper[k] - lower[k]);
+    extent = greater(extent, upper[k] - lower[k]);
   }
   summary_.origin = {middle[0], middle[1], middle[2]};
   // Powers of two, so that scaling by them is exact.

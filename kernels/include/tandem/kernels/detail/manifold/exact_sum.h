@@ -1,4 +1,5 @@
 #pragma once
+#include <bit>
 #include <cstdint>
 
 #include "tandem/kernels/detail/manifold/vector3.h"
@@ -13,10 +14,27 @@ struct ExactSum {
   /// Adds value / unit. one_by_unit: a power of two.
   TANDEM_HD void add(double value, double one_by_unit) {
     const double scaled = value * one_by_unit * 0x1p30;
-    const double whole = std::rint(scaled);
-    upper += static_cast<std::int64_t>(whole);
-    lower += static_cast<std::int64_t>(std::rint((scaled - whole) * 0x1p30));
+    double whole = 0, rest = 0;
+    upper += whole_number(scaled, whole);
+    lower += whole_number((scaled - whole) * 0x1p30, rest);
   }
+  TANDEM_HD static std::int64_t bits_of(double x) {
+#ifdef __CUDA_ARCH__
+    return __double_as_longlong(x);
+#else
+    return std::bit_cast<std::int64_t>(x);
+#endif
+  }
+
+  /// The nearest whole number. The sum with 1.5 * 2^52 is rounded to a whole number, which is in its last bits.
+  /// Condition: at most 2^51.
+  TANDEM_HD static std::int64_t whole_number(double x, double& whole) {
+    constexpr double kMagic = 0x1.8p52;
+    const double sum = x + kMagic;
+    whole = sum - kMagic;
+    return bits_of(sum) - bits_of(kMagic);
+  }
+
   TANDEM_HD double value(double unit) const {
     return (static_cast<double>(upper) + static_cast<double>(lower) * 0x1p-30) * (0x1p-30 * unit);
   }

@@ -27,11 +27,11 @@ TANDEM_HD inline void take_off_hole(const Patch& hole, std::uint32_t count, cons
   if (nearest == nullptr) return;
   Manifold& m = nearest->manifold;
   const double own = norm(vector(m.area_vector)), of_hole = norm(vector(hole.manifold.area_vector));
-  for (int k = 0; k < 3; ++k) {
-    if (own > of_hole)
-      m.centre[k] = (own * m.centre[k] - of_hole * hole.manifold.centre[k]) / (own - of_hole);
-    m.area_vector[k] += hole.manifold.area_vector[k];
-  }
+  // The middle stays at its height.
+  const Vector3 n = vector(m.normal), apart = vector(m.centre) - centre;
+  const Vector3 across = own > of_hole ? (of_hole / (own - of_hole)) * (apart - dot(n, apart) * n) : Vector3{};
+  m.centre[0] += across.x, m.centre[1] += across.y, m.centre[2] += across.z;
+  for (int k = 0; k < 3; ++k) m.area_vector[k] += hole.manifold.area_vector[k];
 }
 
 /// Finds each point of a pair among those of the step before: of points that are each other's nearest, and

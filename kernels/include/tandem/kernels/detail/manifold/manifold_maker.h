@@ -18,32 +18,22 @@ inline constexpr double kDeeper = 1.25;
 /// In patches of so few pieces the corners of their triangles are looked at for the deepest point.
 inline constexpr std::uint32_t kFewPieces = 64;
 
-/// What became of the contacts of a pair.
-struct PairCounters {
-  std::uint32_t segments = 0, ambiguous_touches = 0;
-};
-
 template <typename Team>
 class ManifoldMaker {
  public:
   TANDEM_HD ManifoldMaker(const Team& team, const BodyPair& bodies, const PieceMemory& memory,
-                          PatchMemory& shared, int most_points)
-      : team_(team), bodies_(bodies), memory_(memory), shared_(shared), most_points_(most_points) {}
+                          PatchMemory& shared, const PieceSummary& summary, int most_points)
+      : team_(team),
+        bodies_(bodies),
+        memory_(memory),
+        shared_(shared),
+        summary_(summary),
+        most_points_(most_points) {}
 
-  /// Makes the patches of a pair of bodies from its contacts. new_patch(): where the next one is to lie, or
-  /// null; called by one of the team for each.
+  /// Makes the patch of a curve that CurveFinder found, whose summary this is. new_patch(): where it is to lie,
+  /// or null; called by one of the team if there is one. False: an ambiguous touch.
   template <typename NewPatch>
-  TANDEM_HD PairCounters make(const Contact* contacts, std::uint32_t count, const NewPatch& new_patch) {
-    CurveFinder<Team> finder(team_, bodies_, memory_);
-    summary_ = finder.find(contacts, count, shared_.next);
-    PairCounters counters;
-    counters.segments = summary_.segments;
-    for (std::uint32_t curve = 0; curve < summary_.curves; ++curve) {
-      team_.sync();
-      if (!make_patch(curve, new_patch)) ++counters.ambiguous_touches;
-    }
-    return counters;
-  }
+  TANDEM_HD bool make(std::uint32_t curve, const NewPatch& new_patch);
 
  private:
   struct Chosen {
@@ -54,23 +44,22 @@ class ManifoldMaker {
     bool inner;
   };
 
-  template <typename NewPatch>
-  TANDEM_HD bool make_patch(std::uint32_t curve, const NewPatch& new_patch);
   TANDEM_HD void place_soundings(const RimFinder<Team>& finder, const Rim& rim, const PatchFrame& frame,
                                  bool touch);
+  TANDEM_HD void walk_lines(LineQuestions& questions, std::uint32_t count);
   TANDEM_HD void sound(const PatchFrame& frame, int first, int count);
   TANDEM_HD void sound_deepest(const PatchFrame& frame, const Rim& rim, std::uint32_t curve);
   TANDEM_HD Extreme extreme_corner(const PatchFrame& frame, std::uint32_t begin, std::uint32_t end, int side) const;
   TANDEM_HD void look_behind(const PatchFrame& frame);
-  TANDEM_HD int choose(const RimFinder<Team>& finder, const PatchFrame& frame, bool touch,
+  TANDEM_HD int choose(const RimFinder<Team>& finder, int most_of_rim, bool touch,
                        Chosen (&chosen)[kMostSoundings]) const;
 
   const Team& team_;
   const BodyPair& bodies_;
   PieceMemory memory_;
   PatchMemory& shared_;
+  const PieceSummary& summary_;
   int most_points_;
-  PieceSummary summary_;
   Vector2 middle_;       // of the rim
   double extent_ = 0;    // of the rim, from its middle
   int rim_points_ = 0, soundings_ = 0;
@@ -104,19 +93,45 @@ TANDEM_HD void ManifoldMaker<Team>::place_soundings(const RimFinder<Team>& finde
       s.line = inner ? middle_ : at[i] + kInwards * (middle_ - at[i]);
       s.height = s.target[0] = s.target[1] = inner ? mean_height : height[i];
       s.reference = inner ? kNoIndex : rim.reference[i];
+      s.rank = inner ? 0 : rim.rank[i];
       s.feature = feature_hash(0, 4);
     }
   }
   team_.sync();
 }
 
+/// Answers the first `count` line questions; those of no side were not asked. By the crew.
+template <typename Team>
+TANDEM_HD void ManifoldMaker<Team>::walk_lines(LineQuestions& questions, std::uint32_t count) {
+  WalkMemory& walk = shared_.walk;
+  for (bool further = false;; further = true) {
+    if (team_.rank() == 0) team_.store(walk.count, 0);
+    team_.crew_sync();
+    for (std::uint32_t i = team_.rank(); i < count; i += team_.crew_size()) {
+      if (shared_.line[i].side < 0 || (further && !questions.look_further(i))) continue;
+      walk.waiting[team_.add(walk.count, 1)] = std::uint64_t{i} << 32;
+    }
+    team_.crew_sync();
+    if (team_.load(walk.count) == 0) return;
+    walk_surfaces(team_, walk, questions);
+    if (further) return;
+  }
+}
+
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::sound(const PatchFrame& frame, int first, int count) {
-  for (std::uint32_t i = team_.rank(); i < 2 * static_cast<std::uint32_t>(count); i += team_.size()) {
-    Sounding& s = shared_.sounding[first + static_cast<int>(i / 2)];
-    const int side = static_cast<int>(i % 2);
-    s.surface[side] = nearest_crossing(bodies_[side], frame, s.line, side == 0 ? 1 : -1, s.target[side],
-                                       -INFINITY, INFINITY);
+  LineQuestions questions(bodies_, frame, shared_.line);
+  const auto asked = 2 * static_cast<std::uint32_t>(count);
+  if (team_.in_crew()) {
+    for (std::uint32_t i = team_.rank(); i < asked; i += team_.crew_size()) {
+      const Sounding& s = shared_.sounding[first + static_cast<int>(i / 2)];
+      const int side = static_cast<int>(i % 2);
+      questions.ask(i, side, side == 0 ? 1 : -1, s.line, s.target[side], -INFINITY, INFINITY, extent_ / 4);
+    }
+    team_.crew_sync();
+    walk_lines(questions, asked);
+    for (std::uint32_t i = team_.rank(); i < asked; i += team_.crew_size())
+      shared_.sounding[first + static_cast<int>(i / 2)].surface[i % 2] = shared_.line[i].best;
   }
   team_.sync();
 }
@@ -127,19 +142,23 @@ template <typename Team>
 TANDEM_HD Extreme ManifoldMaker<Team>::extreme_corner(const PatchFrame& frame, std::uint32_t begin,
                                                       std::uint32_t end, int side) const {
   Extreme best;
-  double furthest = -INFINITY;
-  for (std::uint32_t i = begin; i < end; ++i) {
+  const auto question = static_cast<std::uint32_t>(side);
+  for (std::uint32_t i = begin + team_.rank(); i < end; i += team_.size()) {
     const std::uint32_t t = memory_.pieces[memory_.order[i]].triangle[side];
     for (int k = 0; k < 3; ++k) {
       const Vector3 x = bodies_[side].corner(t, k);
-      const double height = frame.height(x), along = side == 0 ? height : -height;
-      const std::uint32_t vertex = bodies_[side].shape->topology[t].vertex[k];
-      if (along < furthest || (along == furthest && vertex >= best.vertex)) continue;
-      furthest = along;
-      best = {frame.flat(x), height, vertex};
+      const Extreme here = {frame.flat(x), frame.height(x), bodies_[side].shape->topology[t].vertex[k]};
+      if (ExtremeQuestions::is_further(question, here, best)) best = here;
     }
   }
-  return best;
+  const double along = !best.found() ? -INFINITY : side == 0 ? best.height : -best.height;
+  const double furthest = team_.greatest(along);
+  const std::uint32_t vertex = team_.least(along == furthest ? best.vertex : kNoIndex);
+  const bool mine = best.vertex == vertex;
+  // A vertex is posed to the same bits from each of its triangles.
+  return {{team_.greatest(mine ? best.at.x : -INFINITY), team_.greatest(mine ? best.at.y : -INFINITY)},
+          side == 0 ? furthest : -furthest,
+          vertex};
 }
 
 /// Sounds where a's highest vertex in the patch is, and b's lowest: there, or in the middle, the overlap is
@@ -168,13 +187,22 @@ TANDEM_HD void ManifoldMaker<Team>::sound_deepest(const PatchFrame& frame, const
     lowest = std::fmin(lowest, s.surface[1].height), highest = std::fmax(highest, s.surface[0].height);
   }
   prism.lower = lowest - extent_, prism.upper = highest + extent_;
-  for (std::uint32_t side = team_.rank(); side < 2; side += team_.size()) {
-    shared_.extreme[side] = extreme_vertex(bodies_[static_cast<int>(side)], prism, side == 0 ? 1 : -1);
+  if (team_.in_crew()) {
+    ExtremeQuestions questions(bodies_, prism, shared_.prism_test, shared_.extreme);
+    WalkMemory& walk = shared_.walk;
+    for (std::uint32_t side = team_.rank(); side < 2; side += team_.crew_size()) {
+      questions.ask(side);
+      walk.waiting[side] = std::uint64_t{side} << 32;
+    }
+    if (team_.rank() == 0) team_.store(walk.count, 2);
+    team_.crew_sync();
+    walk_surfaces(team_, walk, questions);
   }
   const std::uint32_t begin = memory_.start[curve], end = memory_.start[curve + 1];
   const bool few = end - begin <= kFewPieces;
-  for (std::uint32_t side = team_.rank(); few && side < 2; side += team_.size()) {
-    shared_.extreme[2 + side] = extreme_corner(frame, begin, end, static_cast<int>(side));
+  for (int side = 0; few && side < 2; ++side) {
+    const Extreme corner = extreme_corner(frame, begin, end, side);
+    if (team_.rank() == 0) shared_.extreme[2 + side] = corner;
   }
   team_.sync();
   const int first = soundings_;
@@ -206,25 +234,33 @@ TANDEM_HD void ManifoldMaker<Team>::sound_deepest(const PatchFrame& frame, const
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::look_behind(const PatchFrame& frame) {
   const bool several = summary_.curves > 1;
-  for (std::uint32_t i = team_.rank(); i < 2 * static_cast<std::uint32_t>(soundings_); i += team_.size()) {
-    Sounding& s = shared_.sounding[i / 2];
-    if (!(s.overlap() > (several ? 0 : extent_ / 2))) continue;
-    const int side = static_cast<int>(i % 2);
-    if (side == 0) s.looked_behind = true;
-    if (side == s.vertex_of) continue;
-    const double height = s.surface[side].height;
-    s.behind[side] = side == 0 ? nearest_crossing(bodies_.a, frame, s.line, -1, height, -INFINITY, height)
-                               : nearest_crossing(bodies_.b, frame, s.line, 1, height, height, INFINITY);
+  LineQuestions questions(bodies_, frame, shared_.line);
+  const auto asked = 2 * static_cast<std::uint32_t>(soundings_);
+  if (team_.in_crew()) {
+    for (std::uint32_t i = team_.rank(); i < asked; i += team_.crew_size()) {
+      Sounding& s = shared_.sounding[i / 2];
+      const int side = static_cast<int>(i % 2);
+      const bool wanted = s.overlap() > (several ? 0 : extent_ / 2);
+      if (wanted && side == 0) s.looked_behind = true;
+      shared_.line[i].side = -1;
+      if (!wanted || side == s.vertex_of) continue;
+      questions.ask(i, side, side == 0 ? -1 : 1, s.line, s.surface[side].height, s.surface[1].height,
+                    s.surface[0].height, INFINITY);
+    }
+    team_.crew_sync();
+    walk_lines(questions, asked);
+    for (std::uint32_t i = team_.rank(); i < asked; i += team_.crew_size()) {
+      if (shared_.line[i].side >= 0) shared_.sounding[i / 2].behind[i % 2] = shared_.line[i].best;
+    }
   }
   team_.sync();
 }
 
-/// The rim as it is sounded, and the deepest inner point where it lies deeper. Deeper points come first, then
+/// The first points of the rim as it is sounded, and the deepest inner point where it lies deeper. Deeper points come first, then
 /// those further out; of points near each other the first stays.
 template <typename Team>
-TANDEM_HD int ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, const PatchFrame& frame, bool touch,
+TANDEM_HD int ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, int most_of_rim, bool touch,
                                           Chosen (&chosen)[kMostSoundings]) const {
-  (void)frame;
   int count = 0;
   double of_rim = 0;
   Chosen inner{};
@@ -242,6 +278,7 @@ TANDEM_HD int ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, const P
       if (c.depth > inner.depth) inner = c;
       continue;
     }
+    if (s.rank >= most_of_rim) continue;
     c.feature = finder.feature(s.reference);
     const Piece& piece = finder.piece(s.reference);
     c.triangle[0] = piece.triangle[0], c.triangle[1] = piece.triangle[1];
@@ -271,7 +308,8 @@ TANDEM_HD int ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, const P
 
 template <typename Team>
 template <typename NewPatch>
-TANDEM_HD bool ManifoldMaker<Team>::make_patch(std::uint32_t curve, const NewPatch& new_patch) {
+TANDEM_HD bool ManifoldMaker<Team>::make(std::uint32_t curve, const NewPatch& new_patch) {
+  team_.sync();  // all are done with what the last curve left
   NormalFinder<Team> normal_finder(team_, bodies_, memory_, summary_, curve);
   const CurveMeasure measure = normal_finder.measure();
   const PatchNormal normal = normal_finder.find(measure);
@@ -279,9 +317,9 @@ TANDEM_HD bool ManifoldMaker<Team>::make_patch(std::uint32_t curve, const NewPat
   const PatchFrame frame(summary_.origin, normal.n);
   RimFinder<Team> rim_finder(team_, bodies_, memory_, summary_, curve, frame);
   rim_finder.gather(measure.closed && !summary_.degenerate, shared_.next);
-  // One is left for an inner point.
+  // One is left for an inner point. What the patch is does not depend on how many points it may have.
   const int most_of_rim = normal.touch || most_points_ == 1 ? most_points_ : most_points_ - 1;
-  const Rim rim = rim_finder.find(most_of_rim, frame.flat(measure.middle));
+  const Rim rim = rim_finder.find(kMostManifoldPoints - (normal.touch ? 0 : 1), frame.flat(measure.middle));
   if (rim.points == 0) return false;
   place_soundings(rim_finder, rim, frame, normal.touch);
   bool goes_through = false, hole = false;
@@ -291,21 +329,23 @@ TANDEM_HD bool ManifoldMaker<Team>::make_patch(std::uint32_t curve, const NewPat
     look_behind(frame);
     if (summary_.curves > 1 && measure.closed) {
       double deepest = 0;
-      bool outside = false;
+      // No line is within the bodies, nor so short that rounding hides it.
+      hole = true;
+      const double rounding = 0x1p-40 * bodies_.reach();
       for (int i = 0; i <= rim_points_; ++i) {
         const Sounding& s = shared_.sounding[i];
-        outside = outside || (s.overlap() > 0 && !s.within());
+        const bool seen = s.surface[0].found() && s.surface[1].found();
+        hole = hole && !s.within() && !(seen && std::fabs(s.overlap()) <= rounding);
         if (!s.within() || s.overlap() <= deepest) continue;
         deepest = s.overlap();
         goes_through = s.goes_through();
       }
-      hole = outside && deepest == 0;
       // The way back is the shorter one on the side where the middles are.
       if (goes_through && dot(measure.area, bodies_.apart()) < 0) return true;
     }
   }
   Chosen chosen[kMostSoundings];
-  int count = choose(rim_finder, frame, normal.touch, chosen);
+  int count = choose(rim_finder, most_of_rim, normal.touch || hole, chosen);
   count = count < most_points_ ? count : most_points_;
   const double near = kNear * bodies_.smaller_diagonal();
   for (int i = 0; i < count; ++i) {
@@ -316,9 +356,10 @@ TANDEM_HD bool ManifoldMaker<Team>::make_patch(std::uint32_t curve, const NewPat
   if (patch == nullptr) return true;
   Vector2 centre = middle_;
   double deepest = 0, height = 0;
-  for (int i = 0; i < count; ++i) {
-    deepest = std::fmax(deepest, chosen[i].depth);
-    height += chosen[i].height / count;
+  for (int i = 0; i < count; ++i) height += chosen[i].height / count;
+  for (int i = 0; i < soundings_ && !normal.touch && !hole; ++i) {
+    const Sounding& s = shared_.sounding[i];
+    if (s.within()) deepest = std::fmax(deepest, s.overlap());
   }
   if (measure.closed && !normal.touch) {
     Vector2 of_area;

@@ -48,6 +48,7 @@ struct FloatPoint {
 struct Rim {
   std::uint32_t reference[kMostManifoldPoints];
   FloatPoint at[kMostManifoldPoints];
+  int rank[kMostManifoldPoints];  ///< how many were found before
   int points = 0;
 };
 
@@ -58,9 +59,10 @@ struct Sounding {
   double target[2];         ///< the height near which the line is to meet a's surface, b's
   std::uint32_t reference;  ///< of a rim point: the candidate. Else kNoIndex
   std::uint64_t feature;    ///< of others
+  int rank = 0;             ///< of a rim point
   int vertex_of = -1;       ///< the side whose vertex it is; -1: none's
   Crossing surface[2];      ///< a's, that faces along the normal; b's, that faces against it
-  Crossing behind[2];       ///< where a begins, on the line; where b ends
+  Crossing behind[2];       ///< where a begins, on the line, if that is above b's surface; where b ends, if that is below a's
   bool looked_behind;
 
   TANDEM_HD double overlap() const {
@@ -76,8 +78,7 @@ struct Sounding {
   }
   /// Whether one body ends within the other. Condition: looked_behind, within().
   TANDEM_HD bool goes_through() const {
-    return (behind[0].found() && behind[0].height > surface[1].height) ||
-           (behind[1].found() && behind[1].height < surface[0].height);
+    return behind[0].found() || behind[1].found();
   }
 };
 
@@ -88,6 +89,9 @@ inline constexpr int kMostSoundings = static_cast<int>(kMostManifoldPoints) + 5;
 struct PatchMemory {
   Sounding sounding[kMostSoundings];
   Extreme extreme[4];
+  LineQuestion line[2 * kMostSoundings];
+  PrismTest prism_test[2];
+  WalkMemory walk;
   std::uint32_t next;
 };
 

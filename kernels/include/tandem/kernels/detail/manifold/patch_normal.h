@@ -12,6 +12,9 @@ inline constexpr double kClosed = 1e-6;
 /// Faces in so few directions on both sides make a patch one of flat faces; otherwise it is a smooth one.
 inline constexpr int kMostDirections = 5;
 
+/// A smooth patch lies on a face if this part of its curve lies in the face's plane.
+inline constexpr double kBearing = 0.9;
+
 /// Measures a curve, and finds the direction in which its patch pushes.
 template <typename Team>
 class NormalFinder {
@@ -32,7 +35,6 @@ class NormalFinder {
   struct Direction {
     Vector3 n;            // from a towards b
     std::uint64_t piece;  // key of the piece whose triangle has it
-    Vector3 x;            // a point of that piece
   };
   struct Spread {
     double highest_a, lowest_b;
@@ -46,6 +48,8 @@ class NormalFinder {
       visit(memory_.pieces[at], memory_.normals + 6 * std::size_t{at});
     }
   }
+  /// Marks that pieces have for the time being. Each is seen by one of the team alone.
+  TANDEM_HD std::uint32_t& mark(std::uint32_t i) const { return memory_.curve[i]; }
   TANDEM_HD double total(ExactSum sum, double unit) const {
     sum.upper = team_.sum(sum.upper), sum.lower = team_.sum(sum.lower);
     return sum.value(unit);
@@ -55,11 +59,16 @@ class NormalFinder {
   }
   TANDEM_HD Vector3 sheet_normal() const;
   TANDEM_HD bool gather_directions(int side);
+  TANDEM_HD void find_bearing_faces(const Vector3& smooth, double length);
   TANDEM_HD void spread_along(const Vector3* directions, int count, Spread* spread) const;
-  TANDEM_HD Vector3 face_nearest(const Vector3& smooth);
+  TANDEM_HD Vector3 face_nearest(const Vector3& smooth, double length);
   TANDEM_HD bool find_for_touch(Vector3& n);
   TANDEM_HD bool find_crossing_edges(Vector3& n) const;
   TANDEM_HD Vector3 crossing_edges(const Piece& piece, int number) const;
+  TANDEM_HD static bool same_face(const FloatVector& p, const FloatVector& q) {
+    const float x = p.x[0] - q.x[0], y = p.x[1] - q.x[1], z = p.x[2] - q.x[2];
+    return x * x + y * y + z * z < 2e-7f;
+  }
   TANDEM_HD static bool same_direction(const Vector3& p, const Vector3& q) { return dot(p, q) > 1 - 1e-7; }
 
   const Team& team_;
@@ -80,7 +89,7 @@ TANDEM_HD CurveMeasure NormalFinder<Team>::measure() {
   std::uint64_t key = ~std::uint64_t{0};
   bool is_free = false;
   for_each_piece([&](const Piece& piece, const float*) {
-    key = piece.key() < key ? piece.key() : key;
+    key = lesser(key, piece.key());
     const Vector3 from = piece.end[0] - summary_.origin;
     if (piece.kind() == MeetingKind::polygon) {
       area.add(piece.end[1], one_by_unit * one_by_unit);
@@ -131,26 +140,63 @@ TANDEM_HD Vector3 NormalFinder<Team>::sheet_normal() const {
 /// kMostDirections. Normals closer than half a milliradian are one.
 template <typename Team>
 TANDEM_HD bool NormalFinder<Team>::gather_directions(int side) {
-  const int first = directions_;
-  FloatVector known[kMostDirections];
-  for (;;) {
+  FloatVector known = {};  // the last direction
+  for (int found = 0;; ++found) {
     std::uint64_t key = ~std::uint64_t{0};
-    for_each_piece([&](const Piece& piece, const float* normals) {
-      const float* n = normals + 3 * side;
-      for (int i = 0; i < directions_ - first; ++i) {
-        const float x = n[0] - known[i].x[0], y = n[1] - known[i].x[1], z = n[2] - known[i].x[2];
-        if (x * x + y * y + z * z < 2e-7f) return;
+    for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
+      const std::uint32_t at = memory_.order[i];
+      if (found == 0) {
+        mark(i) = 0;
+      } else {
+        if (mark(i) != 0) continue;
+        const float* n = memory_.normals + 6 * std::size_t{at} + 3 * side;
+        if (same_face({{n[0], n[1], n[2]}}, known)) {
+          mark(i) = 1;
+          continue;
+        }
       }
-      key = piece.key() < key ? piece.key() : key;
-    });
+      key = lesser(key, memory_.pieces[at].key());
+    }
     key = team_.least(key);
     if (key == ~std::uint64_t{0}) return true;
-    if (directions_ - first == kMostDirections) return false;
+    if (found == kMostDirections) return false;
     const auto triangle = static_cast<std::uint32_t>(side == 0 ? key >> 32 : key);
     const WorldTriangle t = bodies_[side].triangle(triangle);
-    known[directions_ - first] = {
-        {static_cast<float>(t.normal.x), static_cast<float>(t.normal.y), static_cast<float>(t.normal.z)}};
-    direction_[directions_++] = {side == 0 ? t.normal : -t.normal, key, {}};
+    known = {{static_cast<float>(t.normal.x), static_cast<float>(t.normal.y), static_cast<float>(t.normal.z)}};
+    direction_[directions_++] = {side == 0 ? t.normal : -t.normal, key};
+  }
+}
+
+/// Of bodies of many faces those that a patch lies on, as where prisms stand on each other: of each body the
+/// face that lies most across the smooth normal, if nearly all of the curve lies in the plane of such a face.
+template <typename Team>
+TANDEM_HD void NormalFinder<Team>::find_bearing_faces(const Vector3& smooth, double length) {
+  directions_ = 0;
+  const FloatVector up = {{static_cast<float>(smooth.x), static_cast<float>(smooth.y), static_cast<float>(smooth.z)}};
+  const auto normal_of = [](const float* normals, int side) {
+    const float sign = side == 0 ? 1.0f : -1.0f;
+    return FloatVector{{sign * normals[3 * side], sign * normals[3 * side + 1], sign * normals[3 * side + 2]}};
+  };
+  for (int side = 0; side < 2; ++side) {
+    float most = 0.9f;
+    std::uint64_t key = ~std::uint64_t{0};
+    for_each_piece([&](const Piece& piece, const float* normals) {
+      const float along = dot(normal_of(normals, side), up);
+      if (along > most || (along == most && piece.key() < key)) most = along, key = piece.key();
+    });
+    const float greatest = team_.greatest(most);
+    key = team_.least(most == greatest ? key : ~std::uint64_t{0});
+    if (key == ~std::uint64_t{0}) continue;
+    const auto triangle = static_cast<std::uint32_t>(side == 0 ? key >> 32 : key);
+    const Vector3 n = (side == 0 ? 1.0 : -1.0) * bodies_[side].triangle(triangle).normal;
+    const FloatVector face = {{static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)}};
+    ExactSum within;
+    for_each_piece([&](const Piece& piece, const float* normals) {
+      if (piece.kind() == MeetingKind::polygon) return;
+      if (!same_face(normal_of(normals, 0), face) && !same_face(normal_of(normals, 1), face)) return;
+      within.add(norm(piece.weight() * (piece.end[1] - piece.end[0])), 1 / summary_.unit);
+    });
+    if (total(within, summary_.unit) >= kBearing * length) direction_[directions_++] = {n, key};
   }
 }
 
@@ -159,15 +205,18 @@ TANDEM_HD bool NormalFinder<Team>::gather_directions(int side) {
 template <typename Team>
 TANDEM_HD void NormalFinder<Team>::spread_along(const Vector3* directions, int count, Spread* spread) const {
   for (int i = 0; i < count; ++i) spread[i] = {-INFINITY, INFINITY};
+  std::uint32_t seen_a = kNoIndex, seen_b = kNoIndex;
   for_each_piece([&](const Piece& piece, const float*) {
-    for (int k = 0; k < 3; ++k) {
-      const Vector3 p = bodies_.a.corner(piece.triangle[0], k) - summary_.origin,
-                    q = bodies_.b.corner(piece.triangle[1], k) - summary_.origin;
-      for (int i = 0; i < count; ++i) {
-        spread[i].highest_a = std::fmax(spread[i].highest_a, dot(directions[i], p));
-        spread[i].lowest_b = std::fmin(spread[i].lowest_b, dot(directions[i], q));
-      }
+    for (int k = 0; k < 3 && piece.triangle[0] != seen_a; ++k) {
+      const Vector3 p = bodies_.a.corner(piece.triangle[0], k) - summary_.origin;
+      for (int i = 0; i < count; ++i)
+        spread[i].highest_a = greater(spread[i].highest_a, dot(directions[i], p));
     }
+    for (int k = 0; k < 3 && piece.triangle[1] != seen_b; ++k) {
+      const Vector3 q = bodies_.b.corner(piece.triangle[1], k) - summary_.origin;
+      for (int i = 0; i < count; ++i) spread[i].lowest_b = lesser(spread[i].lowest_b, dot(directions[i], q));
+    }
+    seen_a = piece.triangle[0], seen_b = piece.triangle[1];
   });
   for (int i = 0; i < count; ++i) {
     spread[i] = {team_.greatest(spread[i].highest_a), team_.least(spread[i].lowest_b)};
@@ -177,11 +226,18 @@ TANDEM_HD void NormalFinder<Team>::spread_along(const Vector3* directions, int c
 /// Where few flat faces meet, as boxes do, the curve's own normal leans a little, by depth over length: along
 /// the face normal that separates the patch's triangles soonest they stay upright. How far b must move until
 /// a plane lies between all of the triangles counts, not how deep the overlap is: the tip of a pyramid in the
-/// ground is narrower than it is deep, yet the ground goes on.
+/// ground is narrower than it is deep, yet the ground goes on. A body whose triangles in the patch all face one way
+/// is such a ground, and nothing else is to be compared.
 template <typename Team>
-TANDEM_HD Vector3 NormalFinder<Team>::face_nearest(const Vector3& smooth) {
+TANDEM_HD Vector3 NormalFinder<Team>::face_nearest(const Vector3& smooth, double length) {
   directions_ = 0;
-  if (!gather_directions(0) || !gather_directions(1)) return smooth;
+  const int of_a = gather_directions(0) ? directions_ : kMost, first_of_b = directions_;
+  const int of_b = gather_directions(1) ? directions_ - first_of_b : kMost;
+  if ((of_a == 1) != (of_b == 1)) {
+    const Vector3& n = direction_[of_a == 1 ? 0 : first_of_b].n;
+    return dot(n, smooth) > 0 ? n : smooth;
+  }
+  if (of_a == kMost || of_b == kMost) find_bearing_faces(smooth, length);
   const Vector3 apart = bodies_.apart();
   Vector3 tried[kMost] = {smooth};
   int count = 1;
@@ -305,7 +361,7 @@ TANDEM_HD PatchNormal NormalFinder<Team>::find(const CurveMeasure& curve) {
   if (out.touch) {
     out.known = find_for_touch(out.n);
   } else {
-    out.n = face_nearest(normalized(curve.closed ? curve.area : curve.sheet_normal));
+    out.n = face_nearest(normalized(curve.closed ? curve.area : curve.sheet_normal), curve.length);
     out.known = true;
   }
   return out;

@@ -40,7 +40,9 @@ class RimFinder {
   TANDEM_HD std::uint64_t least_feature_near(const Vector2& at, double distance, std::uint64_t feature) const;
 
  private:
-  TANDEM_HD Candidate* candidates() const { return reinterpret_cast<Candidate*>(memory_.table); }
+  TANDEM_HD Candidate* candidates() const {
+    return reinterpret_cast<Candidate*>(memory_.table + PieceMemory::kTableWords * std::size_t{begin_});
+  }
   TANDEM_HD void corners_of(const Piece& piece, Meeting& meeting) const {
     meet(bodies_.a.triangle(piece.triangle[0]), bodies_.b.triangle(piece.triangle[1]), bodies_.tolerance(),
          meeting);
@@ -53,8 +55,12 @@ class RimFinder {
     const Vector2 at = frame_.flat(x);
     candidates()[team_.add(next, 1)] = {static_cast<float>(at.x), static_cast<float>(at.y), reference};
   }
-  template <typename Value>
-  TANDEM_HD std::uint32_t furthest(const Value& value, float more_than, float& greatest) const;
+  struct Furthest {
+    float value;
+    std::uint32_t reference;
+  };
+  template <typename One, typename Other>
+  TANDEM_HD void furthest(const One& value, const Other& other_value, Furthest& one, Furthest& other) const;
 
   const Team& team_;
   const BodyPair& bodies_;
@@ -119,91 +125,77 @@ TANDEM_HD bool RimFinder<Team>::middle_of_area(Vector2& middle) const {
   return true;
 }
 
-/// The candidate of the greatest value above a limit; of several the one whose triangles come first.
+/// For each of two values the candidate that has the greatest one, if it is greater than what is given; of
+/// several the one whose triangles come first.
 template <typename Team>
-template <typename Value>
-TANDEM_HD std::uint32_t RimFinder<Team>::furthest(const Value& value, float more_than, float& greatest) const {
-  float best = more_than;
-  std::uint64_t best_key = ~std::uint64_t{0};
-  std::uint32_t best_reference = kNoIndex;
+template <typename One, typename Other>
+TANDEM_HD void RimFinder<Team>::furthest(const One& value, const Other& other_value, Furthest& one,
+                                         Furthest& other) const {
+  const auto take = [&](float of_c, std::uint32_t reference, Furthest& best) {
+    if (!(of_c >= best.value)) return;
+    if (of_c == best.value && (best.reference == kNoIndex || key(reference) >= key(best.reference))) return;
+    best = {of_c, reference};
+  };
   for (std::uint32_t i = team_.rank(); i < count_; i += team_.size()) {
     const Candidate& c = candidates()[i];
-    const float of_c = value(c);
-    if (!(of_c >= best) || (of_c == best && best_reference == kNoIndex)) continue;
-    if (of_c == best) {
-      const std::uint64_t of_same = key(c.reference);
-      if (best_key == ~std::uint64_t{0}) best_key = key(best_reference);
-      if (of_same >= best_key) continue;
-      best_key = of_same;
-    } else {
-      best_key = ~std::uint64_t{0};
-    }
-    best = of_c, best_reference = c.reference;
+    take(value(c), c.reference, one);
+    take(other_value(c), c.reference, other);
   }
-  greatest = team_.greatest(best);
-  const bool mine = best_reference != kNoIndex && best == greatest;
-  if (Team::size() == 1) return best_reference;
-  const std::uint64_t own = mine ? key(best_reference) : ~std::uint64_t{0};
-  const std::uint64_t least = team_.least(own);
-  return team_.least(mine && own == least ? best_reference : kNoIndex);
+  if (Team::size() == 1) return;
+  for (Furthest* best : {&one, &other}) {
+    const float greatest = team_.greatest(best->value);
+    const bool mine = best->reference != kNoIndex && best->value == greatest;
+    const std::uint64_t own = mine ? key(best->reference) : ~std::uint64_t{0};
+    const std::uint64_t least = team_.least(own);
+    *best = {greatest, team_.least(mine && own == least ? best->reference : kNoIndex)};
+  }
 }
 
 template <typename Team>
 TANDEM_HD Rim RimFinder<Team>::find(int most, const Vector2& middle) const {
   Rim rim;
-  float greatest = 0;
+  Furthest of_side[kMostManifoldPoints];  // beyond the side from point i to the next: what it would add
   const auto place = [&](std::uint32_t reference) {
     const Vector2 at = frame_.flat(position(reference));
     return FloatPoint{static_cast<float>(at.x), static_cast<float>(at.y)};
   };
+  const auto next = [&](int i) { return i + 1 == rim.points ? 0 : i + 1; };
   const auto insert = [&](int where, std::uint32_t reference) {
-    for (int i = rim.points++; i > where; --i) {
-      rim.reference[i] = rim.reference[i - 1], rim.at[i] = rim.at[i - 1];
+    const int rank = rim.points++;
+    for (int i = rank; i > where; --i) {
+      rim.reference[i] = rim.reference[i - 1], rim.at[i] = rim.at[i - 1], of_side[i] = of_side[i - 1];
+      rim.rank[i] = rim.rank[i - 1];
     }
-    rim.reference[where] = reference, rim.at[where] = place(reference);
+    rim.reference[where] = reference, rim.at[where] = place(reference), rim.rank[where] = rank;
   };
   const auto from = [&](const FloatPoint& p) {
     return [p](const Candidate& c) { return (c.x - p.x) * (c.x - p.x) + (c.y - p.y) * (c.y - p.y); };
   };
-  const FloatPoint start = {static_cast<float>(middle.x), static_cast<float>(middle.y)};
-  std::uint32_t reference = furthest(from(start), -1.0f, greatest);
-  if (reference == kNoIndex) return rim;
-  insert(0, reference);
-  if (most < 2 || (reference = furthest(from(rim.at[0]), 0.0f, greatest)) == kNoIndex) return rim;
-  insert(1, reference);
-  if (most < 3) return rim;
-  const auto twice_area = [](const FloatPoint& p, const FloatPoint& q, float x, float y) {
-    return (q.x - p.x) * (y - p.y) - (q.y - p.y) * (x - p.x);
+  const auto beyond = [](const FloatPoint& p, const FloatPoint& q) {
+    return [p, q](const Candidate& c) { return (q.y - p.y) * (c.x - p.x) - (q.x - p.x) * (c.y - p.y); };
   };
-  const float length_squared = greatest;
-  const FloatPoint p = rim.at[0], q = rim.at[1];
-  reference = furthest([&](const Candidate& c) { return std::fabs(twice_area(p, q, c.x, c.y)); },
-                       kThin * length_squared, greatest);
-  if (reference == kNoIndex) return rim;
-  const FloatPoint third = place(reference);
-  insert(twice_area(p, q, third.x, third.y) > 0 ? 2 : 1, reference);
-  float area = greatest;
-  while (rim.points < most) {
-    // What a candidate adds beyond the side that it lies furthest beyond.
-    const auto gain = [&](const Candidate& c) {
-      float least = 0;
-      for (int i = 0; i < rim.points; ++i) {
-        const float beyond = twice_area(rim.at[i], rim.at[i + 1 == rim.points ? 0 : i + 1], c.x, c.y);
-        least = beyond < least ? beyond : least;
-      }
-      return -least;
-    };
-    reference = furthest(gain, kLittle * area, greatest);
-    if (reference == kNoIndex) return rim;
-    area += greatest;
-    const FloatPoint x = place(reference);
+  const auto nothing = [](const Candidate&) { return -1.0f; };
+  const FloatPoint start = {static_cast<float>(middle.x), static_cast<float>(middle.y)};
+  Furthest one = {-1, kNoIndex}, other = {0, kNoIndex};
+  furthest(from(start), nothing, one, other);
+  if (one.reference == kNoIndex) return rim;
+  insert(0, one.reference);
+  one = {0, kNoIndex};
+  if (most > 1) furthest(from(rim.at[0]), nothing, one, other);
+  if (one.reference == kNoIndex) return rim;
+  insert(1, one.reference);
+  float limit = kThin * one.value, area = 0;
+  for (int first = 0, second = 1; rim.points < most;) {
+    of_side[first] = of_side[second] = {0, kNoIndex};
+    furthest(beyond(rim.at[first], rim.at[next(first)]), beyond(rim.at[second], rim.at[next(second)]), of_side[first],
+             of_side[second]);
     int side = 0;
-    float least = 0;
-    for (int i = 0; i < rim.points; ++i) {
-      const float beyond = twice_area(rim.at[i], rim.at[i + 1 == rim.points ? 0 : i + 1], x.x, x.y);
-      if (beyond < least) least = beyond, side = i;
-    }
-    insert(side + 1, reference);
+    for (int i = 1; i < rim.points; ++i) side = of_side[i].value > of_side[side].value ? i : side;
+    if (!(of_side[side].value > limit)) return rim;
+    area += of_side[side].value;
+    limit = kLittle * area;
+    insert(side + 1, of_side[side].reference);
+    first = side, second = side + 1;
   }
   return rim;
 }

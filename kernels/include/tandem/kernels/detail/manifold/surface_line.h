@@ -1,9 +1,11 @@
 #pragma once
+#include <bit>
 #include <cstdint>
 
 #include "tandem/kernels/detail/manifold/body.h"
+#include "tandem/kernels/detail/manifold/team.h"
 
-/// Questions to the tree of a posed body: where a line meets its surface, and which of its vertices reaches
+/// Questions to the trees of posed bodies: where a line meets its surface, and which of its vertices reaches
 /// furthest. Boxes are tested in float32 with slack; triangles and vertices decide in float64. So the answers
 /// do not depend on which blocks are walked, nor in which order.
 namespace tandem::manifold {
@@ -75,43 +77,85 @@ struct BlockAxes {
   }
 };
 
-/// Visits the triangles of a body whose boxes pass the test. Test: passes(center, half_extent) of a box, and
-/// turned(axes), the same test for boxes along these axes. Imaginary boxes pass no test that compares with <=.
-template <typename Test, typename Visit>
-TANDEM_HD inline void walk_surface(const Body& body, const Test& test, const Visit& visit) {
-  const Shape& shape = *body.shape;
-  std::uint32_t stack[3 * kMaxDepth + 2];
-  int waiting = 0;
-  stack[waiting++] = 0;
-  while (waiting > 0) {
-    const std::uint32_t index = stack[--waiting];
-    if (shape.blocks != nullptr) {
-      const Block& block = shape.blocks[index];
-      for (int i = kNodesPerBlock - 1; i >= 0; --i) {
-        const FloatVector center = {{block.center[0][i], block.center[1][i], block.center[2][i]}};
-        const FloatVector half = {{block.half_extent[0][i], block.half_extent[1][i], block.half_extent[2][i]}};
-        if (!test.passes(center, half)) continue;
-        if (block.kind[i] == NodeKind::leaf) {
-          visit(block.index[i]);
-        } else if (block.kind[i] == NodeKind::internal) {
-          stack[waiting++] = block.index[i];
+/// The nodes of a block whose boxes pass a test, a bit each. The block is read as a whole: float4 loads on a GPU.
+template <typename AnyBlock, typename Test>
+TANDEM_HD inline unsigned nodes_that_pass(const AnyBlock& block, const Test& test) {
+  unsigned mask = 0;
+#ifdef __CUDA_ARCH__
+#pragma unroll
+#endif
+  for (int i = 0; i < kNodesPerBlock; ++i) {
+    const FloatVector center = {{block.center[0][i], block.center[1][i], block.center[2][i]}};
+    const FloatVector half = {{block.half_extent[0][i], block.half_extent[1][i], block.half_extent[2][i]}};
+    mask |= test.passes(center, half) ? 1u << i : 0u;
+  }
+  return mask;
+}
+
+TANDEM_HD inline int lowest_bit(unsigned mask) {
+#ifdef __CUDA_ARCH__
+  return __ffs(static_cast<int>(mask)) - 1;
+#else
+  return std::countr_zero(mask);
+#endif
+}
+
+/// Blocks that wait to be looked at, for several questions at a time; all of a crew see it.
+struct WalkMemory {
+  static constexpr std::uint32_t kRoom = 512;
+  /// With so many left, a crew looks at one block at a time: that never takes more.
+  static constexpr std::uint32_t kReserve = 3 * kMaxDepth + 8;
+
+  std::uint64_t waiting[kRoom];  ///< question, block
+  std::uint32_t count;
+};
+
+/// Answers questions about posed bodies with a crew: those of a team who walk trees together. Each takes a block
+/// for a question; what it finds among the triangles of a leaf block is merged with what is known.
+/// Questions: body(question) says which body is walked; test(question) has passes(center, half_extent), and
+/// turned(axes), the same test for boxes along these axes (imaginary boxes pass no test that compares with <=);
+/// visit(question, triangle, found) looks at a triangle, and merge(question, found) keeps what is better; a Found
+/// is true where there is something.
+template <typename Team, typename Questions>
+TANDEM_HD inline void walk_surfaces(const Team& team, WalkMemory& memory, Questions& questions) {
+  for (;;) {
+    const std::uint32_t waiting = team.load(memory.count);
+    const std::uint32_t room = WalkMemory::kRoom - WalkMemory::kReserve;
+    const std::uint32_t fit = waiting < room ? (room - waiting) / 3 : 0;
+    const std::uint32_t most = team.crew_size() < waiting ? team.crew_size() : waiting;
+    const std::uint32_t taken = fit < 1 ? (most < 1 ? most : 1) : fit < most ? fit : most;
+    if (taken == 0) return;
+    const bool mine = team.rank() < taken;
+    const std::uint64_t item = mine ? memory.waiting[waiting - 1 - team.rank()] : 0;
+    team.crew_sync();
+    if (team.rank() == 0) team.store(memory.count, waiting - taken);
+    team.crew_sync();
+    typename Questions::Found found;
+    const auto question = static_cast<std::uint32_t>(item >> 32), index = static_cast<std::uint32_t>(item);
+    if (mine) {
+      const auto go_on = [&](unsigned mask, bool leaves, const auto& below) {
+        for (; mask != 0; mask &= mask - 1) {
+          const std::uint32_t next = below(lowest_bit(mask));
+          if (leaves)
+            questions.visit(question, next, found);
+          else
+            memory.waiting[team.add(memory.count, 1)] = (item >> 32) << 32 | next;
         }
-      }
-    } else {
-      const OrientedBlock& block = shape.oriented_blocks[index];
-      const auto turned = test.turned(BlockAxes(block.rotation));
-      for (int i = kNodesPerBlock - 1; i >= 0; --i) {
-        const FloatVector center = {{block.center[0][i], block.center[1][i], block.center[2][i]}};
-        const FloatVector half = {{block.half_extent[0][i], block.half_extent[1][i], block.half_extent[2][i]}};
-        if (!turned.passes(center, half)) continue;
-        const std::uint32_t below = (block.first_below & ~OrientedBlock::kIsLeafBlock) + static_cast<std::uint32_t>(i);
-        if (block.is_leaf_block()) {
-          visit(below);
-        } else {
-          stack[waiting++] = below;
-        }
+      };
+      const Shape& shape = *questions.body(question).shape;
+      const auto& test = questions.test(question);
+      if (shape.blocks != nullptr) {
+        const Block& block = shape.blocks[index];
+        go_on(nodes_that_pass(block, test), block.is_leaf_block(), [&](int i) { return block.index[i]; });
+      } else {
+        const OrientedBlock block = shape.oriented_blocks[index];
+        const std::uint32_t first = block.first_below & ~OrientedBlock::kIsLeafBlock;
+        go_on(nodes_that_pass(block, test.turned(BlockAxes(block.rotation))), block.is_leaf_block(),
+              [&](int i) { return first + static_cast<std::uint32_t>(i); });
       }
     }
+    team.one_by_one(found, [&] { questions.merge(question, found); });
+    team.crew_sync();
   }
 }
 
@@ -130,8 +174,7 @@ inline constexpr double kWall = 0.01;
 /// between `lower` and `upper`.
 struct LineTest {
   FloatVector point, direction;  // at the target's height
-  float lower, upper, slack;
-  const float* reach;
+  float lower, upper, slack, reach;
 
   TANDEM_HD LineTest turned(const BlockAxes& axes) const {
     return {axes(point), axes(direction), lower, upper, slack, reach};
@@ -144,50 +187,116 @@ struct LineTest {
     if (!(std::fabs(z * p - x * r) <= h.x[2] * ap + h.x[0] * ar + slack)) return false;
     if (!(std::fabs(x * q - y * p) <= h.x[0] * aq + h.x[1] * ap + slack)) return false;
     const float along = x * p + y * q + z * r, extent = h.x[0] * ap + h.x[1] * aq + h.x[2] * ar + slack;
-    return std::fabs(along) - extent <= *reach && along + extent >= lower && along - extent <= upper;
+    return std::fabs(along) - extent <= reach && along + extent >= lower && along - extent <= upper;
   }
 };
 
-/// The crossing of the line through `at` that is nearest in height to `target`, between lower and upper, of
-/// triangles whose outward normals point along the frame's (facing 1) or against it (-1). Of two as near the
-/// triangle that comes first.
-TANDEM_HD inline Crossing nearest_crossing(const Body& body, const PatchFrame& frame, const Vector2& at,
-                                           int facing, double target, double lower, double upper) {
+/// Which crossing of a line with a surface is asked for: the one nearest in height to `target`, between lower and
+/// upper, of triangles whose outward normals point along the frame's (facing 1) or against it (-1). Of two as
+/// near the triangle that comes first.
+struct LineQuestion {
+  Vector2 at;
+  double target, lower, upper;
+  double most;  ///< it is looked for no further from the target
+  int side, facing;
+
+  // The test of boxes.
+  FloatVector point, direction;
+  float lower_along, upper_along, slack, reach;
+
+  double nearest;
   Crossing best;
-  double nearest = INFINITY;
-  float reach = INFINITY;
-  const FloatVector point = point_in_mesh(body, frame.at(at, target));
-  const float slack = slack_near(body, point);
-  const LineTest test = {point, in_mesh(body, frame.n), static_cast<float>(lower - target) - slack,
-                         static_cast<float>(upper - target) + slack, slack, &reach};
-  const double rounding = 0x1p-48 * body.reach;
-  walk_surface(body, test, [&](std::uint32_t t) {
+};
+
+class LineQuestions {
+ public:
+  TANDEM_HD LineQuestions(const BodyPair& bodies, const PatchFrame& frame, LineQuestion* questions)
+      : bodies_(bodies), frame_(frame), questions_(questions) {}
+
+  /// expected: how far from the target it is, mostly; it is looked for there first.
+  TANDEM_HD void ask(std::uint32_t question, int side, int facing, const Vector2& at, double target, double lower,
+                     double upper, double expected) {
+    LineQuestion& q = questions_[question];
+    q.at = at;
+    q.target = target, q.lower = lower, q.upper = upper;
+    q.side = side, q.facing = facing;
+    const Body& body = bodies_[side];
+    q.point = point_in_mesh(body, frame_.at(at, target));
+    q.direction = in_mesh(body, frame_.n);
+    q.slack = slack_near(body, q.point);
+    q.lower_along = static_cast<float>(lower - target) - q.slack;
+    q.upper_along = static_cast<float>(upper - target) + q.slack;
+    look_within(q, expected);
+  }
+
+  /// Where nothing lies as near as expected, it has to be looked for further away. Not all boxes there were looked
+  /// at, so what was found there need not be the nearest.
+  TANDEM_HD bool look_further(std::uint32_t question) {
+    LineQuestion& q = questions_[question];
+    if (q.nearest <= q.most) return false;
+    const bool all = q.most == INFINITY;
+    if (all) return false;
+    look_within(q, q.nearest);
+    return true;
+  }
+
+  struct Found {
+    double distance = INFINITY;
+    Crossing crossing;
+    TANDEM_HD explicit operator bool() const { return crossing.found(); }
+  };
+
+  TANDEM_HD const Body& body(std::uint32_t question) const { return bodies_[questions_[question].side]; }
+  TANDEM_HD LineTest test(std::uint32_t question) const {
+    const LineQuestion& q = questions_[question];
+    return {q.point, q.direction, q.lower_along, q.upper_along, q.slack, q.reach};
+  }
+  TANDEM_HD void visit(std::uint32_t question, std::uint32_t t, Found& found) const {
+    const LineQuestion& q = questions_[question];
+    const Body& body = bodies_[q.side];
+    const Triangle stored = body.shape->triangles[t];
     Vector3 corner[3];
-    for (int k = 0; k < 3; ++k) corner[k] = body.corner(t, k) - frame.origin;
+    for (int k = 0; k < 3; ++k) corner[k] = body.posed(stored.corner[k]) - frame_.origin;
     const Vector3 normal = cross(corner[1] - corner[0], corner[2] - corner[0]);
-    const double area = dot(frame.n, normal);
+    const double area = dot(frame_.n, normal), size = norm(normal);
     const bool turned = is_turned(body.shape->topology[t].flags);
-    const double size = norm(normal);
-    if ((area > 0) != ((facing > 0) != turned) || !(std::fabs(area) > kWall * size)) return;
+    if ((area > 0) != ((q.facing > 0) != turned) || !(std::fabs(area) > kWall * size)) return;
     Vector2 side[3];
-    for (int k = 0; k < 3; ++k) side[k] = Vector2{dot(frame.u, corner[k]), dot(frame.v, corner[k])} - at;
+    for (int k = 0; k < 3; ++k) side[k] = Vector2{dot(frame_.u, corner[k]), dot(frame_.v, corner[k])} - q.at;
     // Shares of the corners. What lies on an edge, or beside it by no more than rounding of posed points and a
     // little of the triangle, belongs to both triangles: no line slips through.
-    const double p = cross(side[1], side[2]) / area, q = cross(side[2], side[0]) / area,
-                 r = cross(side[0], side[1]) / area;
-    const double little = 1e-9 + rounding * std::sqrt(size) / std::fabs(area);
-    if (!(p >= -little && q >= -little && r >= -little)) return;
+    const double first = cross(side[1], side[2]) / area, second = cross(side[2], side[0]) / area,
+                 third = cross(side[0], side[1]) / area;
+    const double little = 1e-9 + 0x1p-48 * body.reach * std::sqrt(size) / std::fabs(area);
+    if (!(first >= -little && second >= -little && third >= -little)) return;
     const double height =
-        p * dot(frame.n, corner[0]) + q * dot(frame.n, corner[1]) + r * dot(frame.n, corner[2]);
-    if (!(height >= lower && height <= upper)) return;
-    const double distance = std::fabs(height - target);
-    if (distance > nearest || (distance == nearest && t >= best.triangle)) return;
-    nearest = distance;
-    best = {height, t};
-    reach = static_cast<float>(distance) + slack;
-  });
-  return best;
-}
+        first * dot(frame_.n, corner[0]) + second * dot(frame_.n, corner[1]) + third * dot(frame_.n, corner[2]);
+    if (!(height >= q.lower && height <= q.upper)) return;
+    const double distance = std::fabs(height - q.target);
+    if (distance > found.distance || (distance == found.distance && t >= found.crossing.triangle)) return;
+    found = {distance, {height, t}};
+  }
+  TANDEM_HD void merge(std::uint32_t question, const Found& found) {
+    LineQuestion& q = questions_[question];
+    if (found.distance > q.nearest ||
+        (found.distance == q.nearest && found.crossing.triangle >= q.best.triangle))
+      return;
+    q.nearest = found.distance, q.best = found.crossing;
+    q.reach = lesser(q.reach, static_cast<float>(found.distance) + q.slack);
+  }
+
+ private:
+  TANDEM_HD static void look_within(LineQuestion& q, double most) {
+    q.most = most;
+    q.reach = static_cast<float>(most) + q.slack;
+    q.nearest = INFINITY;
+    q.best = {};
+  }
+
+  const BodyPair& bodies_;
+  const PatchFrame& frame_;
+  LineQuestion* questions_;
+};
 
 /// The part of space across a convex polygon in a patch's plane, between two heights.
 struct Prism {
@@ -212,8 +321,7 @@ struct PrismTest {
   float offset[Prism::kMostSides];
   int sides;
   float least_below, most_below;  // heights along the direction that may count
-  float slack;
-  const float* furthest;
+  float slack, furthest;
 
   TANDEM_HD PrismTest turned(const BlockAxes& axes) const {
     PrismTest out = *this;
@@ -228,7 +336,7 @@ struct PrismTest {
       return std::fabs(e.x[0]) * h.x[0] + std::fabs(e.x[1]) * h.x[1] + std::fabs(e.x[2]) * h.x[2] + slack;
     };
     const float along = dot(direction, d), reach = extent(direction);
-    if (!(along + reach >= *furthest && along - reach <= most_below && along + reach >= least_below)) return false;
+    if (!(along + reach >= furthest && along - reach <= most_below && along + reach >= least_below)) return false;
     for (int i = 0; i < sides; ++i) {
       if (!(dot(side[i], d) - extent(side[i]) <= offset[i])) return false;
     }
@@ -243,42 +351,69 @@ struct Extreme {
   std::uint32_t vertex = kNoIndex;
 
   TANDEM_HD bool found() const { return vertex != kNoIndex; }
+  TANDEM_HD explicit operator bool() const { return found(); }
 };
 
-/// The highest (upwards 1) or lowest (-1) vertex of a body in a prism. Of several the one of the least number.
-TANDEM_HD inline Extreme extreme_vertex(const Body& body, const Prism& prism, int upwards) {
-  const PatchFrame& frame = prism.frame;
-  Extreme best;
-  double furthest = -INFINITY;
-  float reached = -INFINITY;
-  PrismTest test;
-  test.origin = point_in_mesh(body, frame.origin);
-  test.slack = slack_near(body, test.origin);
-  test.direction = in_mesh(body, static_cast<double>(upwards) * frame.n);
-  test.sides = prism.sides;
-  for (int i = 0; i < prism.sides; ++i) {
-    test.side[i] = in_mesh(body, prism.outward[i].x * frame.u + prism.outward[i].y * frame.v);
-    test.offset[i] = static_cast<float>(prism.offset[i]) + test.slack;
-  }
-  test.least_below = static_cast<float>(upwards > 0 ? prism.lower : -prism.upper) - test.slack;
-  test.most_below = static_cast<float>(upwards > 0 ? prism.upper : -prism.lower) + test.slack;
-  test.furthest = &reached;
-  walk_surface(body, test, [&](std::uint32_t t) {
-    const TriangleTopology& topology = body.shape->topology[t];
-    for (int k = 0; k < 3; ++k) {
-      const Vector3 x = body.corner(t, k);
-      const double height = frame.height(x), along = upwards * height;
-      const std::uint32_t vertex = topology.vertex[k];
-      if (!(along >= furthest) || (along == furthest && vertex >= best.vertex)) continue;
-      if (!(height >= prism.lower && height <= prism.upper)) continue;
-      const Vector2 at = frame.flat(x);
-      if (!prism.contains(at)) continue;
-      furthest = along;
-      best = {at, height, vertex};
-      reached = static_cast<float>(along) - test.slack;
+/// The highest vertex of a (question 0) and the lowest of b (1) in a prism. Of several the one of the least number.
+class ExtremeQuestions {
+ public:
+  /// test, extreme: two each, that all of the crew see.
+  TANDEM_HD ExtremeQuestions(const BodyPair& bodies, const Prism& prism, PrismTest* test, Extreme* extreme)
+      : bodies_(bodies), prism_(prism), test_(test), extreme_(extreme) {}
+
+  TANDEM_HD void ask(std::uint32_t question) {
+    const Body& body = bodies_[static_cast<int>(question)];
+    const PatchFrame& frame = prism_.frame;
+    PrismTest& test = test_[question];
+    test.origin = point_in_mesh(body, frame.origin);
+    test.slack = slack_near(body, test.origin);
+    test.direction = in_mesh(body, question == 0 ? frame.n : -frame.n);
+    test.sides = prism_.sides;
+    for (int i = 0; i < prism_.sides; ++i) {
+      test.side[i] = in_mesh(body, prism_.outward[i].x * frame.u + prism_.outward[i].y * frame.v);
+      test.offset[i] = static_cast<float>(prism_.offset[i]) + test.slack;
     }
-  });
-  return best;
-}
+    test.least_below = static_cast<float>(question == 0 ? prism_.lower : -prism_.upper) - test.slack;
+    test.most_below = static_cast<float>(question == 0 ? prism_.upper : -prism_.lower) + test.slack;
+    test.furthest = -INFINITY;
+    extreme_[question] = {};
+  }
+
+  using Found = Extreme;
+
+  TANDEM_HD const Body& body(std::uint32_t question) const { return bodies_[static_cast<int>(question)]; }
+  TANDEM_HD const PrismTest& test(std::uint32_t question) const { return test_[question]; }
+  TANDEM_HD void visit(std::uint32_t question, std::uint32_t t, Found& found) const {
+    const Body& of = body(question);
+    const PatchFrame& frame = prism_.frame;
+    const TriangleTopology topology = of.shape->topology[t];
+    const Triangle stored = of.shape->triangles[t];
+    for (int k = 0; k < 3; ++k) {
+      const Vector3 x = of.posed(stored.corner[k]);
+      const double height = frame.height(x);
+      if (!(height >= prism_.lower && height <= prism_.upper)) continue;
+      const Extreme here = {frame.flat(x), height, topology.vertex[k]};
+      if (is_further(question, here, found) && prism_.contains(here.at)) found = here;
+    }
+  }
+  TANDEM_HD void merge(std::uint32_t question, const Found& found) {
+    if (!is_further(question, found, extreme_[question])) return;
+    extreme_[question] = found;
+    const double along = question == 0 ? found.height : -found.height;
+    test_[question].furthest = static_cast<float>(along) - test_[question].slack;
+  }
+
+  TANDEM_HD static bool is_further(std::uint32_t question, const Extreme& x, const Extreme& than) {
+    if (!than.found()) return true;
+    const double of_x = question == 0 ? x.height : -x.height, of_than = question == 0 ? than.height : -than.height;
+    return of_x > of_than || (of_x == of_than && x.vertex < than.vertex);
+  }
+
+ private:
+  const BodyPair& bodies_;
+  const Prism& prism_;
+  PrismTest* test_;
+  Extreme* extreme_;
+};
 
 }  // namespace tandem::manifold

@@ -29,6 +29,16 @@ struct OneThread {
   }
   TANDEM_HD static bool any(bool value) { return value; }
 
+  /// Those of the team who walk trees together: the first of it.
+  TANDEM_HD static bool in_crew() { return true; }
+  TANDEM_HD static std::uint32_t crew_size() { return 1; }
+  TANDEM_HD static void crew_sync() {}
+  /// Calls of() for each of the crew that has found something, one after the other. All of the crew come here.
+  template <typename Found, typename Of>
+  TANDEM_HD static void one_by_one(const Found& found, const Of& of) {
+    if (found) of();
+  }
+
   /// On memory that all see.
   TANDEM_HD static std::uint32_t load(const std::uint32_t& at) { return at; }
   TANDEM_HD static void store(std::uint32_t& at, std::uint32_t value) { at = value; }

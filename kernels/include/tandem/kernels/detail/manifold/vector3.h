@@ -7,6 +7,17 @@
 /// -ffp-contract=off and device code with --fmad=false, so that both give the same bits.
 namespace tandem::manifold {
 
+/// One instruction each, where fmin() and fmax() of a C library may be calls. Of NaN and a number the result is
+/// the second.
+template <typename T>
+TANDEM_HD inline T lesser(T x, T y) {
+  return x < y ? x : y;
+}
+template <typename T>
+TANDEM_HD inline T greater(T x, T y) {
+  return x > y ? x : y;
+}
+
 struct Vector3 {
   double x = 0, y = 0, z = 0;
 

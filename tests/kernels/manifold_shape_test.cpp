@@ -1,0 +1,346 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "manifold_scene.h"
+
+/// Manifolds of bodies whose overlap has a closed form, in random poses.
+namespace tandem::test {
+namespace {
+
+using manifold::Vector2;
+
+constexpr double kDegree = 3.14159265358979323846 / 180;
+
+double angle_between(const Vector3& p, const Vector3& q) {
+  return std::atan2(norm(cross(p, q)), dot(p, q));
+}
+
+struct NamedMesh {
+  const char* name;
+  Mesh mesh;
+};
+
+void PrintTo(const NamedMesh& mesh, std::ostream* out) {
+  *out << mesh.name;
+}
+
+const std::vector<NamedMesh>& solids() {
+  static const std::vector<NamedMesh> all = {{"box", box(1, 0.75f, 0.5f)},
+                                             {"fine_box", cube(0.5f, 4)},
+                                             {"prism_of_3", regular_prism(3, 0.5, 0.75f)},
+                                             {"prism_of_6", regular_prism(6, 0.5, 0.5f)},
+                                             {"wedge", wedge()},
+                                             {"tetrahedron", tetrahedron()},
+                                             {"sphere_of_128", sphere(0.5, 2)},
+                                             {"sphere_of_512", sphere(0.5, 3)}};
+  return all;
+}
+
+const std::vector<NamedMesh>& grounds() {
+  static const std::vector<NamedMesh> all = {{"sheet", sheet(4, 1)},
+                                             {"fine_sheet", sheet(4, 12)},
+                                             {"block", moved(box(4, 4, 2), 0, 0, -1)},
+                                             {"fine_block", moved(cube(2, 12), 0, 0, -2)}};
+  return all;
+}
+
+// By how much the points of a manifold differ from the whole patch, where a uniform pressure pushes on both:
+// what they span has another area and another middle.
+struct Reduction {
+  double area = 0;  // 1 - area that the points span over the patch's, the largest
+  int patches = 0;
+  double torque = 0;  // distance of the middles over the patch's extent, the largest
+
+  // Points that are near each other are merged: patches count that are not small beside the bodies, whose
+  // size is about 1, nor narrow.
+  void take(const Manifold& m, std::span<const ManifoldPoint> points) {
+    // The tip of a body that leans may lie beside the patch, seen along the normal, and is no part of it.
+    const double whole = std::fabs(dot(vector_of(m.area_vector), vector_of(m.normal)));
+    if (area_of(m, points) > 1.000001 * whole && points.size() > 1) points = points.subspan(1);
+    const std::vector<Vector2> hull = hull_of(m, points);
+    double extent = 0;
+    Vector2 moment;
+    for (std::size_t i = 0; i < hull.size(); ++i) {
+      const auto &p = hull[i], &q = hull[(i + 1) % hull.size()];
+      moment = moment + (cross(p, q) / 3) * (p + q);
+      extent = std::max(extent, norm(p));
+    }
+    if (whole < 0.01 || whole < 0.25 * extent * extent) return;
+    ++patches;
+    const double of_points = area_of(m, points);
+    area = std::max(area, std::fabs(1 - of_points / whole));
+    torque = std::max(torque, norm(moment) / (2 * of_points * extent));
+  }
+  void record(const char* what) const {
+    testing::Test::RecordProperty("largest_error_of_force", std::to_string(area));
+    testing::Test::RecordProperty("largest_error_of_torque", std::to_string(torque));
+    std::printf("%s: the points' area differs by %.3f at most, its middle by %.3f of the extent\n", what,
+                area, torque);
+  }
+
+ private:
+  static double area_of(const Manifold& m, std::span<const ManifoldPoint> points) {
+    const std::vector<Vector2> hull = hull_of(m, points);
+    double twice = 0;
+    for (std::size_t i = 0; i < hull.size(); ++i) twice += cross(hull[i], hull[(i + 1) % hull.size()]);
+    return twice / 2;
+  }
+  // Seen along the normal, from the centre on.
+  static std::vector<Vector2> hull_of(const Manifold& m, std::span<const ManifoldPoint> points) {
+    const Vector3 n = vector_of(m.normal), u = manifold::unit_orthogonal(n), v = cross(n, u);
+    std::vector<Vector2> at;
+    for (const ManifoldPoint& p : points) {
+      const Vector3 d = vector_of(p.position) - vector_of(m.centre);
+      at.push_back({dot(u, d), dot(v, d)});
+    }
+    const auto before = [](const auto& p, const auto& q) { return p.x != q.x ? p.x < q.x : p.y < q.y; };
+    std::sort(at.begin(), at.end(), before);
+    std::vector<Vector2> hull;
+    for (int half = 0; half < 2; ++half) {
+      const std::size_t first = hull.size();
+      for (const auto& p : at) {
+        while (hull.size() >= first + 2 && cross(hull.back() - hull[hull.size() - 2], p - hull.back()) <= 0)
+          hull.pop_back();
+        hull.push_back(p);
+      }
+      hull.pop_back();
+      std::reverse(at.begin(), at.end());
+    }
+    return hull;
+  }
+};
+
+// The deepest line is not always a point's.
+void expect_deepest_point(const Manifold& m, std::span<const ManifoldPoint> points) {
+  double deepest = 0;
+  for (const ManifoldPoint& p : points) deepest = std::max(deepest, p.depth);
+  EXPECT_LE(deepest, m.depth);
+  EXPECT_GE(deepest, 0.8 * m.depth);
+}
+
+class SolidOnPlane : public testing::TestWithParam<NamedMesh> {};
+
+TEST_P(SolidOnPlane, HasThePlanesNormalItsDepthAndTheAreaOfItsSection) {
+  RandomPoses random(1);
+  Reduction reduction;
+  for (const NamedMesh& ground : grounds()) {
+    ManifoldScene scene;
+    scene.add_body(scene.add_shape(ground.mesh), kIdentityPose);
+    scene.add_body(scene.add_shape(GetParam().mesh), kIdentityPose);
+    for (int trial = 0; trial < trials(40, 10); ++trial) {
+      SCOPED_TRACE(std::string(ground.name) + " " + std::to_string(trial));
+      Pose pose = any_motion(random, 0);
+      const Triangles turned = triangles_of(GetParam().mesh, pose);
+      const double lowest = -reach_along(turned, {0, 0, -1}),
+                   thickness = reach_along(turned, {0, 0, 1}) - lowest;
+      const double depth = thickness * std::pow(10, random.uniform(-4, -1));
+      pose = after(shift(random.symmetric(1), random.symmetric(1), -lowest - depth), pose);
+      scene.bodies[1].pose = pose;
+      const Pose motion = any_motion(random, 3);
+      scene.find(motion);
+      ASSERT_EQ(scene.manifolds().size(), 1u);
+      const Manifold& m = scene.manifolds()[0];
+      const Vector3 up = rotate(motion, {0, 0, 1}), normal = vector_of(m.normal);
+      EXPECT_LT(angle_between(normal, up), 0.1 * kDegree) << depth / thickness;
+      EXPECT_NEAR(m.depth, depth, 0.01 * depth) << depth / thickness;
+      EXPECT_EQ(m.flags, 0u);
+      expect_deepest_point(m, scene.points_of(m));
+      const SurfacePart part = surface_inside(triangles_of(ground.mesh, motion),
+                                              triangles_of(GetParam().mesh, after(motion, pose)));
+      EXPECT_LT(norm(vector_of(m.area_vector) - part.area), 1e-6 * norm(part.area) + 1e-12);
+      const Vector3 off = vector_of(m.centre) - part.middle(up);
+      EXPECT_LT(norm(off - dot(off, normal) * normal), 1e-4 * std::sqrt(norm(part.area)));
+      reduction.take(m, scene.points_of(m));
+    }
+  }
+  reduction.record(GetParam().name);
+  EXPECT_GT(reduction.patches, 10);
+  EXPECT_LT(reduction.area, 0.25);
+  EXPECT_LT(reduction.torque, 0.2);
+}
+
+INSTANTIATE_TEST_SUITE_P(Solids, SolidOnPlane, testing::ValuesIn(solids()),
+                         [](const auto& tested) { return std::string(tested.param.name); });
+
+TEST(SolidOnSolid, FacesThatMeetHaveTheAreaThatTheyShare) {
+  RandomPoses random(2);
+  const std::vector<NamedMesh> prisms = {{"box", box(1, 0.75f, 0.5f)},
+                                         {"fine box", cube(0.5f, 3)},
+                                         {"prism of 3", regular_prism(3, 0.6, 0.5f)},
+                                         {"prism of 5", regular_prism(5, 0.5, 0.5f)},
+                                         {"prism of 8", regular_prism(8, 0.4, 0.5f)}};
+  Reduction reduction;
+  for (const NamedMesh& lower : prisms) {
+    for (const NamedMesh& upper : prisms) {
+      ManifoldScene scene;
+      scene.add_body(scene.add_shape(lower.mesh), kIdentityPose);
+      scene.add_body(scene.add_shape(upper.mesh), kIdentityPose);
+      const double top = reach_along(triangles_of(lower.mesh, kIdentityPose), {0, 0, 1}),
+                   bottom = reach_along(triangles_of(upper.mesh, kIdentityPose), {0, 0, -1});
+      for (int trial = 0; trial < trials(10, 8); ++trial) {
+        SCOPED_TRACE(std::string(lower.name) + ", " + upper.name + " " + std::to_string(trial));
+        const double depth = std::pow(10, random.uniform(-5, -1.5));
+        const Pose pose = after(shift(random.symmetric(0.25), random.symmetric(0.25), top + bottom - depth),
+                                turn(2, random.symmetric(3)));
+        scene.bodies[1].pose = pose;
+        const Pose motion = any_motion(random, 3);
+        scene.find(motion);
+        ASSERT_EQ(scene.manifolds().size(), 1u);
+        const Manifold& m = scene.manifolds()[0];
+        const Vector3 up = rotate(motion, {0, 0, 1});
+        EXPECT_LT(angle_between(vector_of(m.normal), up), 0.1 * kDegree) << depth;
+        EXPECT_NEAR(m.depth, depth, 0.01 * depth);
+        const SurfacePart part =
+            surface_inside(triangles_of(lower.mesh, motion), triangles_of(upper.mesh, after(motion, pose)));
+        EXPECT_LT(norm(vector_of(m.area_vector) - part.area), 1e-6 * norm(part.area));
+        for (const ManifoldPoint& p : scene.points()) EXPECT_NEAR(p.depth, depth, 0.01 * depth);
+        reduction.take(m, scene.points_of(m));
+      }
+    }
+  }
+  reduction.record("faces on faces");
+  EXPECT_GT(reduction.patches, 10);
+  EXPECT_LT(reduction.area, 0.25);
+  EXPECT_LT(reduction.torque, 0.2);
+}
+
+TEST(SolidOnSolid, SpheresPushAlongTheLineOfTheirMiddles) {
+  RandomPoses random(3);
+  const double one = 0.5, other = 0.375;
+  double most = 0;
+  ManifoldScene scene;
+  scene.add_body(scene.add_shape(sphere(one, 3)), kIdentityPose);
+  scene.add_body(scene.add_shape(sphere(other, 3)), kIdentityPose);
+  // The meshes lie in the spheres, their faces below them by at most this part of the radius.
+  double flat = 0;
+  for (const auto& t : triangles_of(scene.assets.mesh(0), kIdentityPose)) {
+    flat = std::max(flat, 1 - dot(normalized(cross(t[1] - t[0], t[2] - t[0])), t[0]) / one);
+  }
+  for (int trial = 0; trial < trials(200, 5); ++trial) {
+    const double overlap = random.uniform(0.02, 0.2);
+    const Pose motion = any_motion(random, 3);
+    scene.bodies[0].pose = any_motion(random, 0);
+    scene.bodies[1].pose = after(shift(0, 0, one + other - overlap), any_motion(random, 0));
+    scene.find(motion);
+    ASSERT_EQ(scene.manifolds().size(), 1u);
+    const Manifold& m = scene.manifolds()[0];
+    const Triangles a = triangles_of(scene.assets.mesh(0), scene.posed[0].pose),
+                    b = triangles_of(scene.assets.mesh(1), scene.posed[1].pose);
+    const SurfacePart part = surface_inside(a, b);
+    EXPECT_LT(norm(vector_of(m.area_vector) - part.area), 1e-6 * norm(part.area));
+    EXPECT_LT(m.depth, overlap + 1e-9);
+    EXPECT_GT(m.depth, 0.99 * overlap - flat * (one + other));
+    const double distance = one + other - overlap;
+    const double height = (distance * distance + one * one - other * other) / (2 * distance);
+    const double circle = 3.14159265358979323846 * (one * one - height * height);
+    EXPECT_NEAR(norm(part.area), circle, 2 * 3.14159265358979323846 * one * flat * (one + other));
+    most = std::max(most, angle_between(vector_of(m.normal), rotate(motion, {0, 0, 1})));
+  }
+  RecordProperty("largest_angle_in_degrees", std::to_string(most / kDegree));
+  std::printf("spheres of 512 triangles: normals lean by %.2f degrees at most\n", most / kDegree);
+  EXPECT_LT(most, 2 * kDegree);
+}
+
+TEST(SolidOnSolid, CrossedEdgesPushAcrossBoth) {
+  RandomPoses random(4);
+  ManifoldScene scene;
+  const std::uint32_t shape = scene.add_shape(cube(0.5f));
+  scene.add_body(shape, turn(0, 45 * kDegree));
+  scene.add_body(shape, kIdentityPose);
+  const double half = std::sqrt(0.5);
+  for (int trial = 0; trial < trials(200, 5); ++trial) {
+    const double depth = std::pow(10, random.uniform(-5, -2));
+    const double angle = random.uniform(30, 150) * kDegree;
+    scene.bodies[1].pose = after(shift(random.symmetric(0.1), random.symmetric(0.1), 2 * half - depth),
+                                 after(turn(2, angle), turn(0, 45 * kDegree)));
+    const Pose motion = any_motion(random, 3);
+    scene.find(motion);
+    ASSERT_EQ(scene.manifolds().size(), 1u);
+    const Manifold& m = scene.manifolds()[0];
+    EXPECT_LT(angle_between(vector_of(m.normal), rotate(motion, {0, 0, 1})), 0.1 * kDegree)
+        << angle / kDegree;
+    EXPECT_NEAR(m.depth, depth, 0.01 * depth);
+  }
+}
+
+// How far b is to be moved along z so that the bodies just touch, from where their middles lie one over the
+// other.
+double touching_height(ManifoldScene& scene, Pose pose) {
+  double apart = 2, meeting = 0;
+  const double x = pose.translation[0], y = pose.translation[1];
+  for (int i = 0; i < 30; ++i) {
+    const double z = (apart + meeting) / 2;
+    pose.translation[0] = x, pose.translation[1] = y, pose.translation[2] = z;
+    scene.posed = {scene.bodies[0], {scene.bodies[1].asset, pose}};
+    EXPECT_EQ(scene.query.find_contacts(scene.posed, {.first_contact_only = true}), Status::kOk);
+    (scene.query.contacts().empty() ? apart : meeting) = z;
+  }
+  return apart;
+}
+
+// For convex bodies that overlap a little, however they lie, the area within the curve is that of a's surface
+// inside b.
+TEST(SolidOnSolid, TheAreaVectorIsThatOfTheSurfaceInside) {
+  RandomPoses random(5);
+  for (const NamedMesh& a : solids()) {
+    for (const NamedMesh& b : solids()) {
+      ManifoldScene scene;
+      scene.add_body(scene.add_shape(a.mesh), kIdentityPose);
+      scene.add_body(scene.add_shape(b.mesh), kIdentityPose);
+      scene.find();
+      for (int trial = 0; trial < trials(4, 20); ++trial) {
+        SCOPED_TRACE(std::string(a.name) + ", " + b.name + " " + std::to_string(trial));
+        scene.bodies[0].pose = any_motion(random, 0);
+        Pose pose = after(shift(random.symmetric(0.2), random.symmetric(0.2), 0), any_motion(random, 0));
+        pose.translation[2] = touching_height(scene, pose) - std::pow(10, random.uniform(-4, -1.5));
+        scene.bodies[1].pose = pose;
+        scene.find(any_motion(random, 3));
+        // Where a corner comes out again there are two.
+        ASSERT_FALSE(scene.manifolds().empty());
+        const Triangles in_a = triangles_of(a.mesh, scene.posed[0].pose),
+                        in_b = triangles_of(b.mesh, scene.posed[1].pose);
+        const SurfacePart part = surface_inside(in_a, in_b);
+        Vector3 area;
+        for (const Manifold& m : scene.manifolds()) {
+          area = area + vector_of(m.area_vector);
+          const Vector3 n = vector_of(m.normal);
+          EXPECT_GT(m.depth, 0);
+          EXPECT_LE(m.depth, reach_along(in_a, n) + reach_along(in_b, -n) + 1e-9);
+        }
+        EXPECT_LT(norm(area - part.area), 1e-6 * norm(part.area));
+      }
+    }
+  }
+}
+
+class PipeOnPlane : public testing::TestWithParam<NamedMesh> {};
+
+TEST_P(PipeOnPlane, IsOneManifoldOfTheAreaOfTheRing) {
+  RandomPoses random(6);
+  const Mesh mesh = pipe(24, 0.25, 0.5, 0.5f);
+  ManifoldScene scene;
+  scene.add_body(scene.add_shape(GetParam().mesh), kIdentityPose);
+  scene.add_body(scene.add_shape(mesh), kIdentityPose);
+  const double ring = 12 * std::sin(15 * kDegree) * (0.5 * 0.5 - 0.25 * 0.25);
+  for (int trial = 0; trial < trials(40, 5); ++trial) {
+    const double depth = std::pow(10, random.uniform(-5, -1.5));
+    const double x = random.symmetric(1), y = random.symmetric(1);
+    scene.bodies[1].pose = after(shift(x, y, 0.25 - depth), turn(2, random.symmetric(3)));
+    const Pose motion = any_motion(random, 3);
+    scene.find(motion);
+    ASSERT_EQ(scene.manifolds().size(), 1u) << trial;
+    const Manifold& m = scene.manifolds()[0];
+    EXPECT_LT(angle_between(vector_of(m.normal), rotate(motion, {0, 0, 1})), 0.1 * kDegree);
+    EXPECT_NEAR(norm(vector_of(m.area_vector)), ring, 0.01 * ring);
+    EXPECT_NEAR(m.depth, depth, 0.01 * depth);
+    EXPECT_LT(norm(vector_of(m.centre) - apply(motion, Vector3{x, y, -depth / 2})), 1e-6);
+    for (const ManifoldPoint& p : scene.points()) EXPECT_NEAR(p.depth, depth, 0.01 * depth);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Grounds, PipeOnPlane, testing::ValuesIn(grounds()),
+                         [](const auto& tested) { return std::string(tested.param.name); });
+
+}  // namespace
+}  // namespace tandem::test

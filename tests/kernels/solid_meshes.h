@@ -1,0 +1,41 @@
+#pragma once
+#include <array>
+#include <vector>
+
+#include "build/sample_asset.h"
+
+/// Meshes of bodies whose overlaps have closed forms.
+namespace tandem::test {
+
+/// A flat sheet in z = 0 of side `size`, its normals up, in cells^2 squares of two triangles.
+Mesh sheet(float size, int cells);
+
+/// The octahedron's sphere, each triangle split into four `splits` times.
+Mesh sphere(double radius, int splits);
+
+/// A closed box about the origin.
+Mesh box(float x, float y, float z);
+
+/// What a convex polygon of the xy plane, counter-clockwise, sweeps from z = -height / 2 to height / 2.
+Mesh prism(const std::vector<std::array<float, 2>>& polygon, float height);
+
+/// A regular prism.
+Mesh regular_prism(int corners, double radius, float height);
+
+/// A prism with a sharp edge along z, at x = 0.5.
+Mesh wedge();
+
+/// A regular tetrahedron, its corners at (+-0.5, +-0.5, +-0.5).
+Mesh tetrahedron();
+
+/// A pipe about the z axis, of regular polygons.
+Mesh pipe(int corners, double inner_radius, double outer_radius, float height);
+
+/// Both meshes in one.
+Mesh joined(const Mesh& a, const Mesh& b);
+Mesh moved(Mesh mesh, float x, float y, float z);
+
+/// One of the project's own meshes.
+Mesh project_mesh(const char* name);
+
+}  // namespace tandem::test

@@ -69,8 +69,8 @@ __device__ void find_curves_of(const ManifoldArgs& args, const Team& team, std::
   team.sync();
 }
 
-/// Calls of(team, row, true) for rows below `many` with a block, and of(team, row, false) for rows below `few` with
-/// a warp.
+/// Calls of(team, row, true) for rows below `many` with a block, and of(team, row, false) for rows below
+/// `few` with a warp.
 template <typename Of>
 __device__ void share_out(std::uint32_t many, std::uint32_t few, std::uint32_t& next_many,
                           std::uint32_t& next_few, Counter* scratch, const Of& of) {

@@ -15,8 +15,8 @@ using manifold::PieceMemory;
 
 constexpr std::uint32_t kThreads = 128, kWarps = kThreads / 32;
 
-// Contacts of a pair, and pieces of a curve, that a warp takes on; a block those that have more. Where there are
-// enough pairs for all warps of a GPU, warps do more of them at a time; else blocks are sooner done.
+// Contacts of a pair, and pieces of a curve, that a warp takes on; a block those that have more. Where there
+// are enough pairs for all warps of a GPU, warps do more of them at a time; else blocks are sooner done.
 __device__ std::uint32_t most_of_warp(const GpuGroupCounts& counts) {
   constexpr std::uint32_t kManyPairs = 8192;
   return counts.few + counts.many > kManyPairs ? 768 : kFewContacts;
@@ -63,7 +63,8 @@ __device__ void find_curves_of(const ManifoldArgs& args, const Team& team, std::
   }
   for (std::uint32_t curve = team.rank(); curve < summary.curves; curve += team.size()) {
     const bool many = memory.start[curve + 1] - memory.start[curve] > most_of_warp(*args.groups.counts);
-    const std::uint32_t place = atomicAdd(many ? &args.state->curves_of_many : &args.state->curves_of_few, 1u);
+    const std::uint32_t place =
+        atomicAdd(many ? &args.state->curves_of_many : &args.state->curves_of_few, 1u);
     args.curves[many ? place : args.capacity.contacts - 1 - place] = {pair, curve};
   }
   team.sync();
@@ -104,8 +105,10 @@ __global__ void __launch_bounds__(kThreads, 4) find_curves(const __grid_constant
   // Pairs that the query calls those with many contacts come up twice: for blocks, and for warps.
   share_out(counts.many, counts.many + counts.few, args.state->next_many, args.state->next_few, scratch,
             [&](const auto& team, std::uint32_t row, bool by_block) {
-              const std::uint32_t pair = row < counts.many ? args.groups.many[row] : args.groups.few[row - counts.many];
-              const std::uint32_t contacts = args.groups.first_contact[pair + 1] - args.groups.first_contact[pair];
+              const std::uint32_t pair =
+                  row < counts.many ? args.groups.many[row] : args.groups.few[row - counts.many];
+              const std::uint32_t contacts =
+                  args.groups.first_contact[pair + 1] - args.groups.first_contact[pair];
               if (by_block != (contacts > most)) return;
               find_curves_of(args, team, next[by_block ? 0 : threadIdx.x / 32], pair);
             });

@@ -163,9 +163,10 @@ TANDEM_HD Extreme ManifoldMaker<Team>::extreme_corner(const PatchFrame& frame, s
 }
 
 /// Sounds where a's highest vertex in the patch is, and b's lowest: there, or in the middle, the overlap is
-/// deepest, or nearly. They are looked for beyond what lines have met, within the rim, and no further along the normal than the rim and
-/// the middle are from each other's surfaces, and the rim's extent more; and among the corners of triangles
-/// that the curve cuts, where they are few: the tip of a coarse mesh may lean out of its rim.
+/// deepest, or nearly. They are looked for beyond what lines have met, within the rim, and no further along
+/// the normal than the rim and the middle are from each other's surfaces, and the rim's extent more; and
+/// among the corners of triangles that the curve cuts, where they are few: the tip of a coarse mesh may lean
+/// out of its rim.
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::sound_deepest(const PatchFrame& frame, const Rim& rim,
                                                   std::uint32_t curve) {

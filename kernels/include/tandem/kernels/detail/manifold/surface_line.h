@@ -308,7 +308,8 @@ struct Prism {
   double offset[kMostSides];    // inside: outward * x <= offset
   int sides = 0;
   double lower, upper;
-  double above_a, below_b;  ///< vertices of a that are not above this do not matter, nor those of b not below this
+  double above_a,
+      below_b;  ///< vertices of a that are not above this do not matter, nor those of b not below this
 
   TANDEM_HD bool contains(const Vector2& x) const {
     bool inside = true;

@@ -135,6 +135,10 @@ class CurveFinder {
     for (;;) {
       const std::uint32_t next = team_.load(memory_.curve[piece]);
       if (next == piece) return piece;
+      // Halves the way for those who come later: a piece that is not the first of its set only ever names
+      // others of the set, nearer to the first.
+      const std::uint32_t after = team_.load(memory_.curve[next]);
+      if (after != next) team_.store(memory_.curve[piece], after);
       piece = next;
     }
   }

@@ -106,6 +106,7 @@ template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::walk_lines(LineQuestions& questions, std::uint32_t count) {
   WalkMemory& walk = shared_.walk;
   for (bool further = false;; further = true) {
+    team_.crew_sync();  // all have read what the last walk left
     if (team_.rank() == 0) team_.store(walk.count, 0);
     team_.crew_sync();
     for (std::uint32_t i = team_.rank(); i < count; i += team_.crew_size()) {

@@ -155,6 +155,7 @@ TANDEM_HD inline void walk_surfaces(const Team& team, WalkMemory& memory, Questi
               [&](int i) { return first + static_cast<std::uint32_t>(i); });
       }
     }
+    team.crew_sync();  // no one asks while answers change
     team.one_by_one(found, [&] { questions.merge(question, found); });
     team.crew_sync();
   }

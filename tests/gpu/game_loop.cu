@@ -63,9 +63,11 @@ int main(int, char** argv) {
     must(broad.enqueue(scene, {gpu_bounds.data(), 1}, filtered, stream));
     must(query.enqueue(scene, broad.pairs(), {.grouped = true}, stream));
     must(manifolds.enqueue(scene, broad.pairs(), query, {}, stream));
-    solve<<<1, 512, 0, stream>>>(poses.data(), motion.data(), bodies.data(), touches[step % 2].data(),
-                                 touches[1 - step % 2].data(), history.data() + step, broad.pairs().pairs,
-                                 manifolds.manifolds(), manifolds.points(), manifolds.device_report());
+    solve<<<1, kThreads, 0, stream>>>(poses.data(), motion.data(), bodies.data(), touches[step % 2].data(),
+                                      touches[1 - step % 2].data(), history.data() + step,
+                                      broad.pairs().pairs, manifolds.manifolds(), manifolds.points(),
+                                      manifolds.device_report());
+    must(status_of(cudaGetLastError()));
   }
   must(status_of(download<Step>(history.data(), steps, stream)));
   for (int step = 1; step <= kSteps; ++step) {

@@ -4,7 +4,7 @@
 using namespace tandem;
 
 // A solver for cubes of side 1 and mass 1 on a floor of fixed ones, by one block.
-constexpr std::uint32_t kFloor = 81, kBodies = kFloor + 36, kSweeps = 120;
+constexpr std::uint32_t kFloor = 81, kBodies = kFloor + 36, kSweeps = 120, kThreads = 512;
 constexpr double kStep = 1.0 / 60, kFriction = 0.6, kSlop = 0.002, kSlow = 0.05;
 
 struct Vec {
@@ -57,9 +57,10 @@ __device__ void each(std::uint32_t count, const Act& act) {
   __syncthreads();
 }
 
-__global__ void solve(Pose* poses, Motion* motion, Body* bodies, Touch* touch, const Touch* before,
-                      Step* told, const ObjectPair* pairs, const Manifold* manifolds,
-                      const ManifoldPoint* points, const GpuManifoldReport* report) {
+__global__ void __launch_bounds__(kThreads)
+    solve(Pose* poses, Motion* motion, Body* bodies, Touch* touch, const Touch* before, Step* told,
+          const ObjectPair* pairs, const Manifold* manifolds, const ManifoldPoint* points,
+          const GpuManifoldReport* report) {
   const std::uint32_t count = report->points;
   each(count, [&](std::uint32_t i) {
     const ManifoldPoint& p = points[i];

@@ -1,0 +1,21 @@
+# docs/contacts.md shows the GPU's game loop and its solver as they are; the pile comes to rest, or there is no GPU. Variables: SOURCE, FOLDER (to work in),
+# BVHBUILD, LOOP.
+file(READ ${SOURCE}/docs/contacts.md page)
+foreach(name game_loop.cu game_solver.cuh)
+  file(READ ${SOURCE}/tests/gpu/${name} program)
+  string(FIND "${page}" "```cpp\n${program}```" place)
+  if(place EQUAL -1)
+    message(FATAL_ERROR "docs/contacts.md does not show tests/gpu/${name} as it is")
+  endif()
+endforeach()
+
+file(MAKE_DIRECTORY ${FOLDER})
+execute_process(COMMAND ${BVHBUILD} ${SOURCE}/assets/box_12.obj -o ${FOLDER}/box.bvh --quiet COMMAND_ERROR_IS_FATAL ANY)
+execute_process(COMMAND ${LOOP} ${FOLDER}/box.bvh RESULT_VARIABLE code OUTPUT_VARIABLE output)
+if(code EQUAL 0 AND output MATCHES "\nall are asleep after [0-9]+ steps\n$")
+  message(STATUS "${output}")
+elseif(code EQUAL 1 AND output MATCHES "^there is no GPU that can be used")
+  message(STATUS "skipped: ${output}")
+else()
+  message(FATAL_ERROR "the game loop says: ${code}, ${output}")
+endif()

@@ -273,6 +273,7 @@ TEST_F(GpuManifolds, OfAGraphThatIsReplayed) {
   const std::vector<ObjectPair> pairs = test::all_pairs(scene.instances, false, random);
   both.step(scene.instances, pairs);
   const BothSides::OnGpu on_gpu(scene.instances, pairs);
+  ASSERT_EQ(cudaDeviceSynchronize(), cudaSuccess);  // the stream does not wait for copies on the default one
   GpuStream stream;
   ASSERT_EQ(stream.create(), cudaSuccess);
   GpuGraph graph;

@@ -24,7 +24,7 @@ struct PairPatches {
   std::uint32_t first_manifold, first_point;
 };
 
-/// A point of the step before, as matching sees it, and the place of a pair's points.
+/// The place of the points of a pair of bodies.
 struct PairEntry {
   std::uint64_t bodies;
   std::uint32_t first_point, points;

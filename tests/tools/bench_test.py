@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""bvhbench scene and bvhbench query from the outside: what is in their files, and what they refuse.
+"""bvhbench query from the outside: what is in its files, and what it refuses.
 
 Environment: that of tool_test.py, and TANDEM_BVHBENCH.
 """
@@ -17,7 +17,6 @@ import bvh_file
 from tool_test import (CUBE_OBJ, DONE, SOURCE_DIR, UNREADABLE_INPUT, UNWRITABLE_OUTPUT, USAGE, ToolTest)
 
 BVHBENCH = os.environ["TANDEM_BVHBENCH"]
-SHEET_OBJ = "v -30 -30 0\nv 30 -30 0.5\nv 30 30 0\nv -30 30 0.5\nf 1 2 3\nf 1 3 4\n"
 IDENTITY = np.eye(3)
 
 
@@ -83,141 +82,6 @@ def table_of(path):
     with h5py.File(path) as file:
         table = {name: file[name][:] for name in ("pairs", "contacts/pair", "contacts/face_a", "contacts/face_b")}
         return table | {f"{group}/{name}": column[:] for group in ("manifolds", "points") if group in file for name, column in file[group].items()}
-
-
-class Scenes(BenchTest):
-    KINDS = {"stack": ["--count", "27"], "pile": ["--count", "60"], "coincident": ["--count", "5"], "lattice": ["--count", "30"],
-             "slide": ["--count", "20", "--ground", None], "field": ["--fixed", "70", "--count", "27"]}
-
-    def arguments(self, kind):
-        sheet = self.mesh_of("sheet", SHEET_OBJ)
-        return [sheet if word is None else word for word in self.KINDS[kind]]
-
-    def test_the_same_arguments_give_the_same_bytes_and_another_seed_other_poses(self):
-        other = self.outputs / "other.h5"
-        for kind in self.KINDS:
-            with self.subTest(kind):
-                arguments = self.arguments(kind)
-                self.make(kind, *arguments)
-                self.make(kind, *arguments, out=other)
-                self.assertEqual(self.scene.read_bytes(), other.read_bytes())
-                self.make(kind, *arguments, "--seed", "2", out=other)
-                with h5py.File(self.scene) as one, h5py.File(other) as two:
-                    self.assertTrue((one["instances/translation"][:] != two["instances/translation"][:]).any())
-
-    def test_poses_are_rigid_and_shapes_are_as_documented(self):
-        for kind in self.KINDS:
-            with self.subTest(kind):
-                text = self.make(kind, *self.arguments(kind))
-                with h5py.File(self.scene) as file:
-                    rotation, count = file["instances/rotation"][:], len(file["instances/asset"])
-                    self.assertEqual(file["instances/asset"].dtype, "u4")
-                    self.assertEqual((rotation.shape, rotation.dtype), ((count, 3, 3), "f8"))
-                    self.assertEqual(file["instances/translation"].shape, (count, 3))
-                    self.assertEqual(file["assets"].asstr()[0], "../in/cube.bvh")
-                product = rotation.transpose(0, 2, 1) @ rotation
-                self.assertLess(np.abs(product - IDENTITY).max(), 1e-14)
-                self.assertTrue((np.linalg.det(rotation) > 0.99).all())
-                self.assertIn(f"{count} instances", text)
-
-    def test_an_offset_is_added_to_every_translation(self):
-        other = self.outputs / "other.h5"
-        for kind in self.KINDS:
-            self.make(kind, *self.arguments(kind))
-            self.make(kind, *self.arguments(kind), "--offset", "-1000.5", "2e6", "3", out=other)
-            with h5py.File(self.scene) as one, h5py.File(other) as two:
-                moved = one["instances/translation"][:] + [-1000.5, 2e6, 3]
-                self.assertTrue(np.allclose(two["instances/translation"][:], moved, rtol=1e-15, atol=1e-9))
-
-    def test_faces_of_an_exact_stack_coincide_wherever_it_stands(self):
-        corners, quads = CUBE_OBJ.split("f", 1)
-        self.mesh = self.mesh_of("odd", corners.replace(" 1", " 1.1") + "f" + quads)
-        page = json.loads(self.info(self.mesh, "--json").stdout)
-        for offset in (("0", "0", "0"), ("1234567.8", "-0.3", "1e-3")):
-            self.make("stack", "--count", "64", "--exact", "--offset", *offset)
-            with h5py.File(self.scene) as file:
-                translation = file["instances/translation"][:]
-            for axis, start in enumerate(map(float, offset)):
-                row = np.unique(translation[:, axis])
-                self.assertEqual((len(row), row[0]), (4, start))
-                placed = page["origin"][axis] + row
-                lower, upper = (page["bounds"][end][axis] for end in ("lower", "upper"))
-                self.assertEqual((upper + placed[:-1]).tolist(), (lower + placed[1:]).tolist())
-            neighbours = 3 * 3 * 16 + 6 * 9 * 4 + 4 * 27  # across faces, edges, corners
-            self.assertEqual(self.query()["object_pairs"], neighbours)
-
-    def test_a_jittered_stack_touches_its_neighbours_alone(self):
-        self.make("stack", "--count", "27", "--jitter", "0.01")
-        with h5py.File(self.scene) as file:
-            moved = file["instances/translation"][:] - np.round(file["instances/translation"][:])
-            self.assertTrue((file["instances/rotation"][:] == IDENTITY).all())
-        self.assertLessEqual(np.abs(moved).max(), 0.01)
-        self.assertGreater(np.abs(moved).max(), 0.005)
-
-    def test_a_pile_has_the_wanted_neighbours(self):
-        for wanted in (2, 6.5):
-            self.make("pile", "--count", "2000", "--neighbours", str(wanted))
-            found = 2 * self.query("--mode", "boxes")["object_pairs"] / 2000
-            self.assertLess(abs(found / wanted - 1), 0.01)
-
-    def test_every_body_of_a_slide_touches_the_ground_and_lies_above_it(self):
-        self.make("slide", *self.arguments("slide"), "--tilt", "15")
-        self.query("--out", self.contacts)
-        table = table_of(self.contacts)
-        touched = table["pairs"][np.unique(table["contacts/pair"])]
-        with h5py.File(self.scene) as file:
-            self.assertEqual(file["instances/asset"][:].tolist(), [1] + [0] * 20)
-            normal = file["instances/rotation"][0][:, 2]
-        self.assertEqual(sorted(touched[touched[:, 0] == 0][:, 1]), list(range(1, 21)))
-        self.assertAlmostEqual(normal[0], np.sin(np.radians(15)))
-
-    def test_a_slide_of_many_bodies_has_several_sheets_that_do_not_touch(self):
-        arguments = self.arguments("slide")
-        arguments[1] = "8000"
-        self.make("slide", *arguments)
-        with h5py.File(self.scene) as file:
-            self.assertEqual((file["instances/asset"][:] == 1).sum(), 4)
-        self.query("--out", self.contacts)
-        self.assertGreaterEqual(table_of(self.contacts)["pairs"][:, 1].min(), 4)
-
-    def test_coincident_pairs_share_a_pose_and_touch_no_others(self):
-        self.make("coincident", "--count", "5")
-        with h5py.File(self.scene) as file:
-            for name in ("instances/rotation", "instances/translation"):
-                self.assertTrue((file[name][0::2] == file[name][1::2]).all())
-        self.query("--out", self.contacts)
-        self.assertEqual(table_of(self.contacts)["pairs"].tolist(), [[2 * i, 2 * i + 1] for i in range(5)])
-
-    def test_wrong_arguments_are_told(self):
-        self.assert_fails(drop_hint(self.bench("scene")), USAGE)
-        self.assert_fails(drop_hint(self.bench("scene", "heap")), USAGE)
-        sheet = self.mesh_of("sheet", SHEET_OBJ)
-        for kind, words, told in (("stack", ["--count", "1001"], "1000"), ("stack", ["--count", "0"], "--count"),
-                                  ("stack", ["--jitter", "nan"], "--jitter"),
-                                  ("stack", ["--exact", "--jitter", "0.1"], "--exact"), ("stack", ["--seed", "-1"], "--seed"),
-                                  ("stack", ["--offset", "1", "2"], "--offset"),
-                                  ("stack", ["--offset", "1", "2", "inf"], "--offset"),
-                                  ("pile", ["--neighbours", "0"], "--neighbours"),
-                                  ("pile", ["--count", "3"], "3 bodies"), ("slide", [], "--ground"),
-                                  ("slide", ["--ground", self.mesh], "too small"),
-                                  ("slide", ["--ground", sheet, "--tilt", "91"], "--tilt")):
-            with self.subTest(words=words):
-                result = self.bench("scene", kind, "--mesh", self.mesh, "-o", self.scene, *words)
-                self.assert_fails(drop_hint(result), USAGE, told)
-        self.assert_nothing_written()
-
-    def test_a_mesh_is_not_overwritten_by_its_scene(self):
-        with open(self.mesh, "rb") as file:
-            before = file.read()
-        result = self.bench("scene", "pile", "--mesh", self.mesh, "-o", self.mesh)
-        self.assert_fails(result, USAGE, "would be overwritten")
-        with open(self.mesh, "rb") as file:
-            self.assertEqual(file.read(), before)
-
-    def test_a_mesh_that_cannot_be_read_is_named(self):
-        for path, told in ((self.inputs / "none.bvh", "no such file"), (self.write("cube.obj", CUBE_OBJ), "not a Tandem")):
-            self.assert_fails(self.bench("scene", "pile", "--mesh", path, "-o", self.scene), UNREADABLE_INPUT, path, told)
-        self.assert_nothing_written()
 
 
 class Query(BenchTest):
@@ -378,49 +242,6 @@ class Query(BenchTest):
             rows.append(set(zip(*(table[f"contacts/{name}"].tolist() for name in ("pair", "face_a", "face_b")))))
         self.assertLessEqual(rows[0], rows[1])
 
-    def contained(self):
-        """Reports of a query with --contained, and the rows of its contacts file by name."""
-        report = self.query("--contained", "--repeat", "2", "--out", self.contacts)
-        with h5py.File(self.contacts) as file:
-            rows = {name: column[:] for name, column in file["contained"].items()}
-        self.assertEqual({name: str(column.dtype) for name, column in rows.items()},
-                         {"pair": "uint32", "inner": "uint8", "component": "uint32", "inside": "uint8", "open": "uint8"})
-        self.assertEqual((report["contained_rows"], report["contained"]), (len(rows["pair"]), rows["inside"].sum()))
-        self.assertEqual(len(report["contained_seconds"]["all"]), 2)
-        return report, {name: column.tolist() for name, column in rows.items()}
-
-    def write_nest(self, inner, outer):
-        """A cube of inner's mesh, within one of outer's that is ten times as large."""
-        asset = [self.mesh_of("small", inner), self.mesh_of("large", re.sub(r"(?m)^(v .*)$", self.enlarged, outer))]
-        self.write_scene(asset=(0, 1), translation=((0, 0, 0), (-4, -4, -4)), assets=[f"../in/{mesh.name}" for mesh in asset])
-
-    @staticmethod
-    def enlarged(line):
-        return "v " + " ".join(str(10 * float(word)) for word in line.group(1).split()[1:])
-
-    def test_a_cube_within_a_cube_is_contained(self):
-        self.write_nest(CUBE_OBJ, CUBE_OBJ)
-        report, rows = self.contained()
-        self.assertEqual(report["contacts"], 0)
-        self.assertEqual(rows, {"pair": [0], "inner": [0], "component": [0], "inside": [1], "open": [0]})
-        self.assertRegex(self.passes("query", self.scene, "--contained"), r"contained +1\n")
-
-    def test_a_cube_within_an_open_one_is_said_to_be(self):
-        self.write_nest(CUBE_OBJ, CUBE_OBJ.rsplit("f ", 1)[0])
-        self.assertEqual(self.contained()[1], {"pair": [0], "inner": [0], "component": [0], "inside": [0], "open": [1]})
-
-    def test_what_touches_is_not_contained(self):
-        self.make("pile", "--count", "50")
-        self.assertEqual(self.contained()[1]["pair"], [])
-
-    def test_contained_of_less_than_all_contacts_or_without_topology_is_refused(self):
-        self.write_scene()
-        for arguments in (["--mode", "boxes"], ["--mode", "fast"], ["--first-contact"]):
-            self.assert_refused(USAGE, "--contained", arguments=["--contained", *arguments])
-        result = self.build(self.write("cube.obj", CUBE_OBJ), "--no-topology", "-o", self.mesh)
-        self.assertEqual(result.returncode, DONE, result.stderr)
-        self.assert_refused(UNREADABLE_INPUT, "cube.bvh", "--no-topology", arguments=["--contained"])
-
     def test_self_adds_each_instance_with_itself(self):
         self.write_scene()
         report = self.query("--self", "--out", self.contacts)
@@ -430,70 +251,6 @@ class Query(BenchTest):
         itself = table["contacts/pair"] != 1
         self.assertTrue(itself.any())
         self.assertTrue((table["contacts/face_a"][itself] <= table["contacts/face_b"][itself]).all())
-
-    def test_manifolds_are_those_of_a_box_that_lies_on_another(self):
-        self.write_scene(translation=((0, 0, 0), (0.25, 0.125, 0.875)))
-        report = self.query("--manifolds", "--repeat", "3", "--out", self.contacts)
-        table = table_of(self.contacts)
-        self.assertEqual((report["manifolds"], report["points"], report["open_curves"]), (1, 4, 0))
-        self.assertEqual(len(report["manifold_seconds"]["all"]), 3)
-        self.assertEqual(table["manifolds/pair"].tolist(), [0])
-        self.assertEqual(table["manifolds/first"].tolist(), [0, 4])
-        np.testing.assert_allclose(table["manifolds/normal"], [[0, 0, 1]], atol=1e-12)
-        np.testing.assert_allclose(table["manifolds/area"], [0.75 * 0.875], atol=1e-12)
-        np.testing.assert_allclose(table["manifolds/depth"], [0.125], atol=1e-12)
-        np.testing.assert_allclose(table["manifolds/centre"], [[0.625, 0.5625, 0.9375]], atol=1e-12)
-        np.testing.assert_allclose(table["points/depth"], [0.125] * 4, atol=1e-12)
-        corners = sorted((x, y, 0.9375) for x in (0.25, 1) for y in (0.125, 1))
-        np.testing.assert_allclose(sorted(table["points/position"].tolist()), corners, atol=1e-12)
-        # The upper cube's bottom and four sides, against the lower one's top and sides.
-        self.assertLessEqual(set(table["points/face_a"].tolist()), set(range(1, 6)))
-        self.assertLessEqual(set(table["points/face_b"].tolist()), {0, 2, 3, 4, 5})
-
-    def test_manifolds_are_of_the_documented_types_and_belong_together(self):
-        self.make("pile", "--count", "50")
-        self.query("--manifolds", "--out", self.contacts)
-        table = table_of(self.contacts)
-        types = {name: (str(column.dtype), column.shape[1:]) for name, column in table.items() if name[0] in "mp"}
-        page = (SOURCE_DIR / "docs" / "scenes.md").read_text()
-        documented = {}
-        for names, kind, width in re.findall(r"^\| (`/(?:manifolds|points)/.*?) \| ([uf]\d\d) \[\w\+?1?(,3)?\]", page, re.M):
-            for name in re.findall(r"`/([\w/]+)`", names):
-                documented[name] = ({"u32": "uint32", "u64": "uint64", "f64": "float64"}[kind], (3,) if width else ())
-        types.pop("pairs")
-        self.assertEqual(types, documented)
-        first, points = table["manifolds/first"].astype(int), table["points/depth"]
-        self.assertEqual((first[0], first[-1], len(first)), (0, len(points), len(table["manifolds/pair"]) + 1))
-        self.assertGreater(len(points), 50)
-        for row, depth in enumerate(table["manifolds/depth"]):
-            deepest = points[first[row]:first[row + 1]].max()
-            self.assertTrue(0.8 * depth <= deepest <= depth, (deepest, depth))
-        self.assertTrue((np.diff(table["manifolds/pair"].astype(int)) >= 0).all())
-        self.assertTrue((table["points/id"] != 0).all())
-
-    def test_manifolds_do_not_change_with_threads_and_leave_the_contacts_as_they_are(self):
-        self.make("pile", "--count", "60")
-        self.query("--out", self.contacts)
-        plain, tables = table_of(self.contacts), []
-        for threads in ("1", "2", "7"):
-            self.query("--manifolds", "--threads", threads, "--out", self.contacts)
-            tables.append({name: column.tolist() for name, column in table_of(self.contacts).items()})
-        self.assertEqual(tables[0], tables[1])
-        self.assertEqual(tables[0], tables[2])
-        for name, column in plain.items():
-            self.assertEqual(tables[0][name], column.tolist())
-            self.assertNotIn("manifolds", name)
-
-    def test_manifolds_of_a_mesh_without_topology_are_refused_with_its_name(self):
-        self.write_scene()
-        result = self.build(self.write("cube.obj", CUBE_OBJ), "--no-topology", "-o", self.mesh)
-        self.assertEqual(result.returncode, DONE, result.stderr)
-        self.assert_refused(UNREADABLE_INPUT, "cube.bvh", "--no-topology", arguments=["--manifolds"])
-
-    def test_manifolds_of_less_than_all_contacts_are_refused(self):
-        self.write_scene()
-        for arguments in (["--mode", "boxes"], ["--first-contact"]):
-            self.assert_refused(USAGE, "--manifolds", arguments=["--manifolds", *arguments])
 
     def test_the_summary_is_for_people(self):
         self.write_scene()

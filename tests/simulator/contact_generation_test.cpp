@@ -294,6 +294,28 @@ TEST(ContactGeneration, LegsHaveAPatchEach) {
   EXPECT_EQ(scene.statistics().counters.points, 8u);
 }
 
+// Where edges cross, the overlap is deepest in the middle, which no edge or vertex names.
+TEST(ContactGeneration, PointsOfSeveralPatchesHaveDifferentFeatures) {
+  Mesh roof;  // lies on its ridge along y
+  roof.add({0, -0.25f, 0}, {1, -0.25f, 1}, {-1, -0.25f, 1});
+  roof.add({0, 0.25f, 0}, {-1, 0.25f, 1}, {1, 0.25f, 1});
+  roof.add({0, -0.25f, 0}, {0, 0.25f, 0}, {1, 0.25f, 1});
+  roof.add({0, -0.25f, 0}, {1, 0.25f, 1}, {1, -0.25f, 1});
+  roof.add({0, 0.25f, 0}, {0, -0.25f, 0}, {-1, -0.25f, 1});
+  roof.add({0, 0.25f, 0}, {-1, -0.25f, 1}, {-1, 0.25f, 1});
+  roof.add({-1, -0.25f, 1}, {1, -0.25f, 1}, {1, 0.25f, 1});
+  roof.add({-1, -0.25f, 1}, {1, 0.25f, 1}, {-1, 0.25f, 1});
+  ContactScene scene;
+  scene.add_body(scene.add_shape(box(6, 1, 1)), turned(std::atan(1.0), kX));
+  scene.add_body(scene.add_shape(joined(moved(roof, -1.5f, 0, 0), moved(roof, 1.5f, 0, 0))),
+                 at(0, 0, std::sqrt(0.5) - 0.01));
+  const auto points = scene.points();
+  EXPECT_EQ(scene.statistics().counters.manifolds, 2u);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (std::size_t j = i + 1; j < points.size(); ++j) EXPECT_NE(points[i].feature, points[j].feature);
+  }
+}
+
 TEST(ContactGeneration, TheCowStandsOnItsFourHooves) {
   for (const char* mesh : {"cow_1500.obj", "cow.obj"}) {
     ContactScene scene;

@@ -355,8 +355,10 @@ TANDEM_HD bool ManifoldMaker<Team>::make(std::uint32_t curve, const NewPatch& ne
   count = count < most_points_ ? count : most_points_;
   const double near = kNear * bodies_.smaller_diagonal();
   for (int i = 0; i < count; ++i) {
-    if (!chosen[i].inner)
-      chosen[i].feature = rim_finder.least_feature_near(chosen[i].at, near / 2, chosen[i].feature);
+    // The middle, and a vertex that is deepest in two patches, are told apart by the patch.
+    std::uint64_t& feature = chosen[i].feature;
+    feature = chosen[i].inner ? feature_hash(feature, measure.key)
+                              : rim_finder.least_feature_near(chosen[i].at, near / 2, feature);
   }
   if (team_.rank() != 0) return true;
   Patch* const patch = new_patch();

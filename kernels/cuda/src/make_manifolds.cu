@@ -1,9 +1,15 @@
+#include <type_traits>
+
 #include "manifold_data.h"
 #include "manifold_team.cuh"
 #include "tandem/kernels/detail/manifold/manifold_maker.h"
 
 // From contacts to patches. A thread block makes the patches of a pair with many contacts, a warp those of
 // one with few. Compiled without fused operations: the arithmetic is that of the CPU, bit by bit.
+#ifndef TANDEM_MAKE_THREADS
+#define TANDEM_MAKE_THREADS 768
+#endif
+
 namespace tandem::gpu {
 namespace {
 
@@ -12,14 +18,43 @@ using manifold::ManifoldMaker;
 using manifold::Patch;
 using manifold::PatchMemory;
 using manifold::PieceMemory;
+using manifold::PieceSummary;
 
-constexpr std::uint32_t kThreads = 128, kWarps = kThreads / 32;
+// A thread block is a team, of one warp or of several: pairs with many contacts, and curves of many pieces,
+// are for large ones.
+constexpr std::uint32_t kLarge = 128, kSmall = 32;
 
-// Contacts of a pair, and pieces of a curve, that a warp takes on; a block those that have more. Where there
-// are enough pairs for all warps of a GPU, warps do more of them at a time; else blocks are sooner done.
-__device__ std::uint32_t most_of_warp(const GpuGroupCounts& counts) {
-  constexpr std::uint32_t kManyPairs = 8192;
-  return counts.few + counts.many > kManyPairs ? 768 : kFewContacts;
+template <std::uint32_t kThreads>
+using Team = std::conditional_t<kThreads == 32, WarpTeam, BlockTeam<kThreads>>;
+
+// What the threads of a team share besides.
+template <std::uint32_t kThreads>
+struct TeamMemory {
+  BlockScratch<kThreads> scratch;
+  WarpWalks walks[kThreads / 32];
+  std::uint32_t row, next;
+};
+
+template <std::uint32_t kThreads>
+__device__ Team<kThreads> team_with(TeamMemory<kThreads>& memory) {
+  if constexpr (kThreads == 32)
+    return Team<kThreads>(memory.walks);
+  else
+    return Team<kThreads>(&memory.scratch, memory.walks);
+}
+
+/// Calls of(row) for rows below `rows` that no other team has taken.
+template <typename AnyTeam, typename Of>
+__device__ void take_rows(const AnyTeam& team, std::uint32_t rows, std::uint32_t& next, std::uint32_t& taken,
+                          const Of& of) {
+  for (;;) {
+    if (team.rank() == 0) team.store(taken, atomicAdd(&next, 1u));
+    team.sync();
+    const std::uint32_t row = team.load(taken);
+    if (row >= rows) return;
+    of(row);
+    team.sync();
+  }
 }
 
 // Pieces are numbered in 28 bits, and table entries in 32.
@@ -42,84 +77,61 @@ __device__ PieceMemory memory_of(const ManifoldArgs& args, std::uint32_t pair) {
           args.pieces.start + first + pair, args.pieces.table + PieceMemory::kTableWords * first};
 }
 
-template <typename Team>
-__device__ void find_curves_of(const ManifoldArgs& args, const Team& team, std::uint32_t& next,
-                               std::uint32_t pair) {
-  const std::uint32_t first = args.groups.first_contact[pair],
-                      count = args.groups.first_contact[pair + 1] - first;
-  const ObjectPair both = args.pairs.pairs[pair];
-  if (both.a == both.b) return;
-  if (count > kMostContactsOfPair) {
-    if (team.rank() == 0) args.state->too_many_contacts = 1;
-    return;
-  }
-  const BodyPair bodies = bodies_of(args, both);
-  const PieceMemory memory = memory_of(args, pair);
-  manifold::CurveFinder<Team> finder(team, bodies, memory);
-  const manifold::PieceSummary summary = finder.find(args.groups.contacts + first, count, next);
-  if (team.rank() == 0) {
-    args.summaries[pair] = summary;
-    if (summary.segments > 0) atomicAdd(&args.state->segments, Counter{summary.segments});
-  }
-  for (std::uint32_t curve = team.rank(); curve < summary.curves; curve += team.size()) {
-    const bool many = memory.start[curve + 1] - memory.start[curve] > most_of_warp(*args.groups.counts);
-    const std::uint32_t place =
-        atomicAdd(many ? &args.state->curves_of_many : &args.state->curves_of_few, 1u);
-    args.curves[many ? place : args.capacity.contacts - 1 - place] = {pair, curve};
-  }
-  team.sync();
-}
+// Shared memory in which a team looks for the curves of a pair, if that has no more contacts than fit.
+template <std::uint32_t kThreads>
+struct NearMemory {
+  static constexpr std::uint32_t kContacts = 8 * kThreads, kWords = 4 * kContacts;
+  std::uint32_t table[kWords], curve[kContacts];
+};
 
-/// Calls of(team, row, true) for rows below `many` with a block, and of(team, row, false) for rows below
-/// `few` with a warp.
-template <typename Of>
-__device__ void share_out(std::uint32_t many, std::uint32_t few, std::uint32_t& next_many,
-                          std::uint32_t& next_few, Counter* scratch, const Of& of) {
-  __shared__ std::uint32_t taken;
-  const BlockTeam<kThreads> block = {{}, scratch};
-  for (;;) {
-    if (threadIdx.x == 0) taken = atomicAdd(&next_many, 1u);
-    __syncthreads();
-    const std::uint32_t row = taken;
-    __syncthreads();
-    if (row >= many) break;
-    of(block, row, true);
-  }
-  const WarpTeam warp;
-  for (;;) {
-    std::uint32_t row = 0;
-    if (warp.rank() == 0) row = atomicAdd(&next_few, 1u);
-    row = __shfl_sync(0xFFFFFFFFu, row, 0);
-    if (row >= few) break;
-    of(warp, row, false);
-  }
-}
-
-__global__ void __launch_bounds__(kThreads, 4) find_curves(const __grid_constant__ ManifoldArgs args) {
-  __shared__ Counter scratch[kWarps];
-  __shared__ std::uint32_t next[kWarps];
+template <std::uint32_t kThreads>
+__global__ void __launch_bounds__(kThreads, 1024 / kThreads)
+    find_curves(const __grid_constant__ ManifoldArgs args) {
+  __shared__ TeamMemory<kThreads> memory;
+  __shared__ NearMemory<kThreads> near;
+  __shared__ alignas(16) unsigned char shared_bodies[sizeof(BodyPair)];
   wait_for_kernel_before();
   if (!has_query(args)) return;
-  const GpuGroupCounts& counts = *args.groups.counts;
-  const std::uint32_t most = most_of_warp(counts);
-  // Pairs that the query calls those with many contacts come up twice: for blocks, and for warps.
-  share_out(counts.many, counts.many + counts.few, args.state->next_many, args.state->next_few, scratch,
-            [&](const auto& team, std::uint32_t row, bool by_block) {
-              const std::uint32_t pair =
-                  row < counts.many ? args.groups.many[row] : args.groups.few[row - counts.many];
-              const std::uint32_t contacts =
-                  args.groups.first_contact[pair + 1] - args.groups.first_contact[pair];
-              if (by_block != (contacts > most)) return;
-              find_curves_of(args, team, next[by_block ? 0 : threadIdx.x / 32], pair);
+  const Team<kThreads> team = team_with(memory);
+  const GpuContactGroups& groups = args.groups;
+  ManifoldState& state = *args.state;
+  constexpr bool kMany = kThreads == kLarge;
+  const std::uint32_t* const rows = kMany ? groups.many : groups.few;
+  take_rows(team, kMany ? groups.counts->many : groups.counts->few, kMany ? state.next_many : state.next_few,
+            memory.row, [&](std::uint32_t row) {
+              const std::uint32_t pair = rows[row], first = groups.first_contact[pair],
+                                  count = groups.first_contact[pair + 1] - first;
+              const ObjectPair both = args.pairs.pairs[pair];
+              if (both.a == both.b) return;
+              if (count > kMostContactsOfPair) {
+                if (team.rank() == 0) state.too_many_contacts = 1;
+                return;
+              }
+              BodyPair& bodies = *reinterpret_cast<BodyPair*>(shared_bodies);
+              if (team.rank() == 0) bodies = bodies_of(args, both);
+              PieceMemory pieces = memory_of(args, pair);
+              pieces.near_table = near.table, pieces.near_words = near.kWords;
+              if (count <= near.kContacts) pieces.curve = near.curve;
+              team.sync();
+              manifold::CurveFinder<Team<kThreads>> finder(team, bodies, pieces);
+              const PieceSummary summary = finder.find(groups.contacts + first, count, memory.next);
+              if (team.rank() == 0) {
+                args.summaries[pair] = summary;
+                if (summary.segments > 0) atomicAdd(&state.segments, Counter{summary.segments});
+              }
+              for (std::uint32_t curve = team.rank(); curve < summary.curves; curve += team.size()) {
+                const bool many = pieces.start[curve + 1] - pieces.start[curve] > kFewContacts;
+                const std::uint32_t place = atomicAdd(many ? &state.curves_of_many : &state.curves_of_few, 1u);
+                args.curves[many ? place : args.capacity.contacts - 1 - place] = {pair, curve};
+              }
             });
 }
 
-template <typename Team>
-__device__ void make_patch_of(const ManifoldArgs& args, const Team& team, PatchMemory& shared,
-                              const PairCurve& of) {
-  const BodyPair bodies = bodies_of(args, args.pairs.pairs[of.pair]);
+template <typename AnyTeam>
+__device__ void make_patch_of(const ManifoldArgs& args, const AnyTeam& team, PatchMemory& shared,
+                              const BodyPair& bodies, const PieceSummary& summary, const PairCurve& of) {
   const PieceMemory memory = memory_of(args, of.pair);
-  ManifoldMaker<Team> maker(team, bodies, memory, shared, args.summaries[of.pair], args.most_points);
+  ManifoldMaker<AnyTeam> maker(team, bodies, memory, shared, summary, args.most_points);
   Patch* made = nullptr;
   std::uint32_t place = kNoIndex;
   const auto new_patch = [&]() -> Patch* {
@@ -127,36 +139,44 @@ __device__ void make_patch_of(const ManifoldArgs& args, const Team& team, PatchM
     return made = place < args.capacity.manifolds ? &args.patches[place] : nullptr;
   };
   const bool known = maker.make(of.curve, new_patch);
-  if (team.rank() == 0) {
-    PairPatches& own = args.of_pair[of.pair];
-    if (!known) atomicAdd(&args.state->ambiguous_touches, Counter{1});
-    if (made != nullptr) {
-      args.next_of_pair[place] = atomicExch(&own.first, place);
-      atomicAdd(&own.patches, 1u);
-      if (made->hole == 0) {
-        atomicAdd(&own.manifolds, 1u);
-        atomicAdd(&own.points, made->manifold.point_count);
-        atomicAdd(&args.state->needed_points, Counter{made->manifold.point_count});
-        if ((made->manifold.flags & kOpenCurve) != 0) atomicAdd(&args.state->open_curves, Counter{1});
-      }
-    } else if (place != kNoIndex) {
-      atomicAdd(&args.state->needed_points, static_cast<Counter>(args.most_points));
+  if (team.rank() != 0) return;
+  PairPatches& own = args.of_pair[of.pair];
+  if (!known) atomicAdd(&args.state->ambiguous_touches, Counter{1});
+  if (made != nullptr) {
+    args.next_of_pair[place] = atomicExch(&own.first, place);
+    atomicAdd(&own.patches, 1u);
+    if (made->hole == 0) {
+      atomicAdd(&own.manifolds, 1u);
+      atomicAdd(&own.points, made->manifold.point_count);
+      atomicAdd(&args.state->needed_points, Counter{made->manifold.point_count});
+      if ((made->manifold.flags & kOpenCurve) != 0) atomicAdd(&args.state->open_curves, Counter{1});
     }
+  } else if (place != kNoIndex) {
+    atomicAdd(&args.state->needed_points, static_cast<Counter>(args.most_points));
   }
-  team.sync();
 }
 
-__global__ void __launch_bounds__(kThreads, 4) make(const __grid_constant__ ManifoldArgs args) {
-  __shared__ alignas(16) unsigned char memory[kWarps * sizeof(PatchMemory)];  // begins without contents
-  __shared__ Counter scratch[kWarps];
-  PatchMemory* const shared = reinterpret_cast<PatchMemory*>(memory);
+template <std::uint32_t kThreads>
+__global__ void __launch_bounds__(kThreads, TANDEM_MAKE_THREADS / kThreads)
+    make(const __grid_constant__ ManifoldArgs args) {
+  __shared__ TeamMemory<kThreads> memory;
+  // Begin without contents.
+  __shared__ alignas(16) unsigned char of_patch[sizeof(PatchMemory)], of_bodies[sizeof(BodyPair)],
+      of_summary[sizeof(PieceSummary)];
   wait_for_kernel_before();
   if (!has_query(args)) return;
+  const Team<kThreads> team = team_with(memory);
   ManifoldState& state = *args.state;
-  share_out(state.curves_of_many, state.curves_of_few, state.next_curve_of_many, state.next_curve_of_few,
-            scratch, [&](const auto& team, std::uint32_t row, bool many) {
-              make_patch_of(args, team, shared[many ? 0 : threadIdx.x / 32],
-                            args.curves[many ? row : args.capacity.contacts - 1 - row]);
+  constexpr bool kMany = kThreads == kLarge;
+  take_rows(team, kMany ? state.curves_of_many : state.curves_of_few,
+            kMany ? state.next_curve_of_many : state.next_curve_of_few, memory.row, [&](std::uint32_t row) {
+              const PairCurve of = args.curves[kMany ? row : args.capacity.contacts - 1 - row];
+              BodyPair& bodies = *reinterpret_cast<BodyPair*>(of_bodies);
+              PieceSummary& summary = *reinterpret_cast<PieceSummary*>(of_summary);
+              if (team.rank() == 0) bodies = bodies_of(args, args.pairs.pairs[of.pair]);
+              if (team.rank() == team.size() - 1) summary = args.summaries[of.pair];
+              team.sync();
+              make_patch_of(args, team, *reinterpret_cast<PatchMemory*>(of_patch), bodies, summary, of);
             });
 }
 
@@ -175,6 +195,8 @@ __device__ void enter(TableEntry* table, std::uint32_t size, std::uint32_t step,
   TableEntry& out = table[slot];
   out.bodies = entry.bodies, out.first_point = entry.first_point, out.points = entry.points;
 }
+
+constexpr std::uint32_t kThreads = 128;
 
 __global__ void __launch_bounds__(kThreads)
     move_table(const TableEntry* from, std::uint32_t from_size, TableEntry* to, std::uint32_t to_size,
@@ -249,11 +271,13 @@ cudaError_t forget_last(ManifoldState* state, cudaStream_t stream) {
 }
 
 cudaError_t make_patches(const ManifoldArgs& args, cudaStream_t stream) {
-  constexpr std::uint32_t kBlocksPerProcessor = 4;
-  const Grid grid = {args.limits.processors * kBlocksPerProcessor, kThreads, 0, stream,
-                     args.limits.early_launch};
-  const cudaError_t error = launch_after(grid, find_curves, args);
-  return error == cudaSuccess ? launch_after(grid, make, args) : error;
+  const auto grid = [&](std::uint32_t threads) {
+    return Grid{args.limits.processors * (1024 / threads), threads, 0, stream, args.limits.early_launch};
+  };
+  cudaError_t error = launch_after(grid(kLarge), find_curves<kLarge>, args);
+  if (error == cudaSuccess) error = launch_after(grid(kSmall), find_curves<kSmall>, args);
+  if (error == cudaSuccess) error = launch_after(grid(kLarge), make<kLarge>, args);
+  return error == cudaSuccess ? launch_after(grid(kSmall), make<kSmall>, args) : error;
 }
 
 }  // namespace tandem::gpu

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <cstring>
 
 #include "tandem/kernels/detail/manifold/team.h"
 
@@ -23,19 +24,54 @@ struct SharedNumbers {
   }
 };
 
-struct WarpCrew : SharedNumbers {
-  __device__ static constexpr std::uint32_t crew_size() { return 32; }
-  __device__ static void crew_sync() {
-    __threadfence_block();
-    __syncwarp();
-  }
-  template <typename Found, typename Of>
-  __device__ static void one_by_one(const Found& found, const Of& of) {
-    const bool has = static_cast<bool>(found);
-    for (std::uint32_t left = __ballot_sync(0xFFFFFFFFu, has); left != 0; left &= left - 1) {
-      if (threadIdx.x % 32 == static_cast<std::uint32_t>(__ffs(static_cast<int>(left)) - 1)) of();
-      crew_sync();
+/// What the groups of a warp need for walks through trees.
+struct WarpWalks {
+  std::uint32_t waiting[1024];                   ///< blocks
+  std::uint32_t triangles[32 * kNodesPerBlock];  ///< of leaves just found
+};
+
+/// Some lanes of a warp, see manifold/team.h. All groups of a warp run in step.
+template <std::uint32_t kWidth>
+struct LaneGroup {
+  static constexpr std::uint32_t kRoom = 1024 * kWidth / 32;
+  std::uint32_t *waiting, *triangles;
+
+  __device__ explicit LaneGroup(WarpWalks& walks)
+      : waiting(walks.waiting + threadIdx.x % 32 / kWidth * kRoom),
+        triangles(walks.triangles + threadIdx.x % 32 / kWidth * kWidth * kNodesPerBlock) {}
+
+  __device__ static std::uint32_t rank() { return threadIdx.x % kWidth; }
+  __device__ static constexpr std::uint32_t size() { return kWidth; }
+  __device__ static void sync() { __syncwarp(); }
+  __device__ static bool any_of_all(bool value) { return __any_sync(0xFFFFFFFFu, value) != 0; }
+  __device__ static std::uint32_t sum_before(std::uint32_t value, std::uint32_t& total) {
+    std::uint32_t sum = value;
+    for (std::uint32_t distance = 1; distance < kWidth; distance *= 2) {
+      const std::uint32_t other = __shfl_up_sync(0xFFFFFFFFu, sum, distance, kWidth);
+      if (rank() >= distance) sum += other;
     }
+    total = __shfl_sync(0xFFFFFFFFu, sum, kWidth - 1, kWidth);
+    return sum - value;
+  }
+  template <typename Found, typename Better>
+  __device__ static Found best(Found found, const Better& better) {
+    for (std::uint32_t distance = kWidth / 2; distance > 0; distance /= 2)
+      found = better(found, exchanged(found, distance));
+    return found;
+  }
+
+ private:
+  /// What the lane has whose number differs in one bit.
+  template <typename T>
+  __device__ static T exchanged(const T& own, std::uint32_t bit) {
+    constexpr int kWords = sizeof(T) / 4;
+    static_assert(sizeof(T) % 4 == 0);
+    std::uint32_t word[kWords];
+    memcpy(word, &own, sizeof(T));
+    for (int i = 0; i < kWords; ++i) word[i] = __shfl_xor_sync(0xFFFFFFFFu, word[i], bit, kWidth);
+    T out;
+    memcpy(&out, word, sizeof(T));
+    return out;
   }
 };
 
@@ -65,8 +101,19 @@ __device__ T over_warp(T value, Of of) {
   return value;
 }
 
-struct WarpTeam : WarpCrew {
-  __device__ static bool in_crew() { return true; }
+/// Of each of several values what `of` makes of those of all lanes.
+template <typename T, int kMost, typename Of>
+__device__ void over_warp(T (&values)[kMost], int count, Of of) {
+#pragma unroll
+  for (int i = 0; i < kMost; ++i) {
+    if (i < count) values[i] = over_warp(values[i], of);
+  }
+}
+
+struct WarpTeam : SharedNumbers {
+  WarpWalks* walks;
+
+  __device__ explicit WarpTeam(WarpWalks* of_warp) : walks(of_warp) {}
   __device__ static std::uint32_t rank() { return threadIdx.x % 32; }
   __device__ static constexpr std::uint32_t size() { return 32; }
   __device__ static void sync() {
@@ -85,23 +132,47 @@ struct WarpTeam : WarpCrew {
   __device__ static T greatest(T value) {
     return over_warp(value, Greatest());
   }
+  template <typename T, int kMost>
+  __device__ static void sums(T (&values)[kMost], int count = kMost) {
+    over_warp(values, count, Sum());
+  }
+  template <typename T, int kMost>
+  __device__ static void least_ones(T (&values)[kMost], int count = kMost) {
+    over_warp(values, count, Least());
+  }
+  template <typename T, int kMost>
+  __device__ static void greatest_ones(T (&values)[kMost], int count = kMost) {
+    over_warp(values, count, Greatest());
+  }
   __device__ static bool any(bool value) { return __any_sync(0xFFFFFFFFu, value) != 0; }
+
+  static constexpr int kHalf = 16;
+  template <int kWidth, typename Of>
+  __device__ void for_each_group(std::uint32_t count, const Of& of) const {
+    constexpr std::uint32_t kGroups = 32 / kWidth;
+    LaneGroup<kWidth> group(*walks);
+    for (std::uint32_t first = 0; first < count; first += kGroups) {
+      const std::uint32_t i = first + rank() / kWidth;
+      of(group, i, i < count);
+    }
+  }
+};
+
+/// A thread block shares this for what its warps tell each other.
+template <std::uint32_t kThreads>
+struct BlockScratch {
+  static constexpr int kMost = 32;  ///< values at a time
+  Counter part[kMost][kThreads / 32];
 };
 
 template <std::uint32_t kThreads>
-struct BlockTeam : WarpCrew {
-  Counter* scratch;  ///< shared, one for each warp
+struct BlockTeam : SharedNumbers {
+  BlockScratch<kThreads>* scratch;
+  WarpWalks* walks;  ///< of each warp
 
-  __device__ static bool in_crew() { return true; }
-  __device__ static constexpr std::uint32_t crew_size() { return kThreads; }
-  __device__ static void crew_sync() { __syncthreads(); }
-  template <typename Found, typename Of>
-  __device__ static void one_by_one(const Found& found, const Of& of) {
-    for (std::uint32_t warp = 0; warp < kThreads / 32; ++warp) {
-      if (threadIdx.x / 32 == warp) WarpCrew::one_by_one(found, of);
-      __syncthreads();
-    }
-  }
+  __device__ BlockTeam(BlockScratch<kThreads>* of_block, WarpWalks* of_warps)
+      : scratch(of_block), walks(of_warps) {}
+
   __device__ static std::uint32_t rank() { return threadIdx.x; }
   __device__ static constexpr std::uint32_t size() { return kThreads; }
   __device__ static void sync() { __syncthreads(); }
@@ -119,19 +190,56 @@ struct BlockTeam : WarpCrew {
   }
   __device__ static bool any(bool value) { return __syncthreads_or(value) != 0; }
 
+  template <typename T, int kMost>
+  __device__ void sums(T (&values)[kMost], int count = kMost) const {
+    over_block(values, count, Sum());
+  }
+  template <typename T, int kMost>
+  __device__ void least_ones(T (&values)[kMost], int count = kMost) const {
+    over_block(values, count, Least());
+  }
+  template <typename T, int kMost>
+  __device__ void greatest_ones(T (&values)[kMost], int count = kMost) const {
+    over_block(values, count, Greatest());
+  }
+
+  static constexpr int kHalf = 32;
+  template <int kWidth, typename Of>
+  __device__ void for_each_group(std::uint32_t count, const Of& of) const {
+    constexpr std::uint32_t kGroups = kThreads / kWidth;
+    LaneGroup<kWidth> group(walks[threadIdx.x / 32]);
+    for (std::uint32_t first = 0; first < count; first += kGroups) {
+      const std::uint32_t i = first + threadIdx.x / kWidth;
+      of(group, i, i < count);
+    }
+  }
+
  private:
   template <typename T, typename Of>
   __device__ T over_block(T value, Of of) const {
-    static_assert(sizeof(T) <= sizeof(Counter));
-    T* const part = reinterpret_cast<T*>(scratch);
-    constexpr std::uint32_t kApart = sizeof(Counter) / sizeof(T);
-    value = over_warp(value, of);
+    T values[1] = {value};
+    over_block(values, 1, of);
+    return values[0];
+  }
+  template <typename T, int kMost, typename Of>
+  __device__ void over_block(T (&values)[kMost], int count, Of of) const {
+    static_assert(sizeof(T) <= sizeof(Counter) && kMost <= BlockScratch<kThreads>::kMost);
+    over_warp(values, count, of);
+    const auto part = [&](int i, std::uint32_t warp) -> T& {
+      return *reinterpret_cast<T*>(&scratch->part[i][warp]);
+    };
     __syncthreads();  // what an earlier call left has been read
-    if (threadIdx.x % 32 == 0) part[kApart * (threadIdx.x / 32)] = value;
+#pragma unroll
+    for (int i = 0; i < kMost; ++i) {
+      if (i < count && threadIdx.x % 32 == 0) part(i, threadIdx.x / 32) = values[i];
+    }
     __syncthreads();
-    value = part[0];
-    for (std::uint32_t i = 1; i < kThreads / 32; ++i) value = of(value, part[kApart * i]);
-    return value;
+#pragma unroll
+    for (int i = 0; i < kMost; ++i) {
+      if (i >= count) continue;
+      values[i] = part(i, 0);
+      for (std::uint32_t warp = 1; warp < kThreads / 32; ++warp) values[i] = of(values[i], part(i, warp));
+    }
   }
 };
 

@@ -50,6 +50,10 @@ struct PieceMemory {
   std::uint32_t* start;  ///< of each curve in `order`; contacts + 1 entries
   std::uint32_t* table;  ///< kTableWords each
 
+  // Of a GPU: nearer memory, used for keys instead of `table` where it suffices.
+  std::uint32_t* near_table = nullptr;
+  std::uint32_t near_words = 0;
+
   /// Bytes for each contact, without the one entry more of `start`.
   static constexpr std::size_t kBytes = sizeof(Piece) + 24 + 12 + 4 * kTableWords;
 };
@@ -123,8 +127,8 @@ class CurveFinder {
     const auto key = key_of(reference);
     auto slot = static_cast<std::uint32_t>((key.hash() >> 32) * size >> 32);
     for (;;) {
-      std::uint32_t there = team_.load(memory_.table[slot]);
-      if (there == kNoIndex) there = team_.compare_and_swap(memory_.table[slot], kNoIndex, reference);
+      std::uint32_t there = team_.load(table_[slot]);
+      if (there == kNoIndex) there = team_.compare_and_swap(table_[slot], kNoIndex, reference);
       if (there == kNoIndex) return reference;
       if (key_of(there) == key) return there;
       if (++slot == size) slot = 0;
@@ -155,7 +159,8 @@ class CurveFinder {
   }
 
   TANDEM_HD void clear(std::uint32_t words) {
-    for (std::uint32_t i = team_.rank(); i < words; i += team_.size()) memory_.table[i] = kNoIndex;
+    table_ = words <= memory_.near_words ? memory_.near_table : memory_.table;
+    for (std::uint32_t i = team_.rank(); i < words; i += team_.size()) table_[i] = kNoIndex;
     for (std::uint32_t i = team_.rank(); i < summary_.pieces; i += team_.size()) memory_.curve[i] = i;
     team_.sync();
   }
@@ -168,6 +173,7 @@ class CurveFinder {
   const BodyPair& bodies_;
   PieceMemory memory_;
   PieceSummary summary_;
+  std::uint32_t* table_ = nullptr;
 };
 
 template <typename Team>
@@ -228,12 +234,13 @@ TANDEM_HD void CurveFinder<Team>::make_pieces(const Contact* contacts, std::uint
   summary_.pieces = team_.load(next);
   summary_.segments = team_.sum(segments);
   summary_.degenerate = team_.any(degenerate);
+  double bounds[6];
+  for (int k = 0; k < 3; ++k) bounds[k] = upper[k], bounds[3 + k] = -lower[k];
+  team_.greatest_ones(bounds);
   double extent = 0, middle[3];
   for (int k = 0; k < 3; ++k) {
-    lower[k] = team_.least(lower[k]);
-    upper[k] = team_.greatest(upper[k]);
-    middle[k] = 0.5 * lower[k] + 0.5 * upper[k];
-    extent = greater(extent, upper[k] - lower[k]);
+    middle[k] = 0.5 * bounds[k] - 0.5 * bounds[3 + k];
+    extent = greater(extent, bounds[k] + bounds[3 + k]);
   }
   summary_.origin = {middle[0], middle[1], middle[2]};
   // Powers of two, so that scaling by them is exact.
@@ -296,8 +303,8 @@ TANDEM_HD void CurveFinder<Team>::sort_by_curve(std::uint32_t& next) {
     team_.sync();
     return;
   }
-  // table: the number of each curve by its first piece, then the pieces counted in it.
-  std::uint32_t *number = memory_.table, *place = memory_.table + pieces;
+  // The table: the number of each curve by its first piece, then the pieces counted in it.
+  std::uint32_t *number = table_, *place = table_ + pieces;
   if (team_.rank() == 0) team_.store(next, 0);
   for (std::uint32_t i = team_.rank(); i <= pieces; i += team_.size()) memory_.start[i] = 0;
   for (std::uint32_t i = team_.rank(); i < pieces; i += team_.size()) place[i] = first_of(i);

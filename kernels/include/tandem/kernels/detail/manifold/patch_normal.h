@@ -50,21 +50,19 @@ class NormalFinder {
   }
   /// Marks that pieces have for the time being. Each is seen by one of the team alone.
   TANDEM_HD std::uint32_t& mark(std::uint32_t i) const { return memory_.curve[i]; }
-  TANDEM_HD double total(ExactSum sum, double unit) const {
-    sum.upper = team_.sum(sum.upper), sum.lower = team_.sum(sum.lower);
-    return sum.value(unit);
-  }
-  TANDEM_HD Vector3 total(const ExactVectorSum& sum, double unit) const {
-    return {total(sum.x, unit), total(sum.y, unit), total(sum.z, unit)};
-  }
   TANDEM_HD Vector3 sheet_normal() const;
-  TANDEM_HD bool gather_directions(int side);
+  TANDEM_HD bool gather_directions(int side, bool keep_if_many);
   TANDEM_HD void find_bearing_faces(const Vector3& smooth, double length);
   TANDEM_HD void spread_along(const Vector3* directions, int count, Spread* spread) const;
   TANDEM_HD Vector3 face_nearest(const Vector3& smooth, double length);
   TANDEM_HD bool find_for_touch(Vector3& n);
   TANDEM_HD bool find_crossing_edges(Vector3& n) const;
   TANDEM_HD Vector3 crossing_edges(const Piece& piece, int number) const;
+  /// The normal, from a towards b, of the triangle of a piece.
+  TANDEM_HD Vector3 direction_of(int side, std::uint64_t piece) const {
+    const Vector3 n = bodies_[side].triangle(static_cast<std::uint32_t>(side == 0 ? piece >> 32 : piece)).normal;
+    return side == 0 ? n : -n;
+  }
   TANDEM_HD static bool same_face(const FloatVector& p, const FloatVector& q) {
     const float x = p.x[0] - q.x[0], y = p.x[1] - q.x[1], z = p.x[2] - q.x[2];
     return x * x + y * y + z * z < 2e-7f;
@@ -110,14 +108,15 @@ TANDEM_HD CurveMeasure NormalFinder<Team>::measure() {
       is_free = is_free || is_boundary(flags, f.number);
     }
   });
+  add_up(team_, {&area.x, &area.y, &area.z, &gap.x, &gap.y, &gap.z, &middle.x, &middle.y, &middle.z,
+                 &plain_middle.x, &plain_middle.y, &plain_middle.z, &length});
   CurveMeasure out;
   out.key = team_.least(key);
-  out.area = total(area, unit * unit);
-  out.length = total(length, unit);
-  const Vector3 residual = total(gap, unit);
-  out.closed = !team_.any(is_free) && norm(residual) <= kClosed * out.length;
-  out.middle = summary_.origin + (out.length > 0 ? (unit / out.length) * total(middle, unit)
-                                                 : (1.0 / (end_ - begin_)) * total(plain_middle, unit));
+  out.area = area.value(unit * unit);
+  out.length = length.value(unit);
+  out.closed = !team_.any(is_free) && norm(gap.value(unit)) <= kClosed * out.length;
+  out.middle = summary_.origin + (out.length > 0 ? (unit / out.length) * middle.value(unit)
+                                                 : (1.0 / (end_ - begin_)) * plain_middle.value(unit));
   if (!out.closed) out.sheet_normal = sheet_normal();
   return out;
 }
@@ -133,16 +132,21 @@ TANDEM_HD Vector3 NormalFinder<Team>::sheet_normal() const {
     if (sheet_a || !sheet_b) sum.add(size * Vector3{normals[0], normals[1], normals[2]}, one_by_unit);
     if (sheet_b || !sheet_a) sum.add(-(size * Vector3{normals[3], normals[4], normals[5]}), one_by_unit);
   });
-  return total(sum, unit);
+  add_up(team_, {&sum.x, &sum.y, &sum.z});
+  return sum.value(unit);
 }
 
-/// Adds the directions of faces of one body, from the least piece on. False where there are more than
-/// kMostDirections. Normals closer than half a milliradian are one.
+/// Adds the directions of faces of one body, from the least piece on; of more than kMostDirections the first
+/// ones, if they are to be kept. False where there are more. Normals closer than half a milliradian are one.
 template <typename Team>
-TANDEM_HD bool NormalFinder<Team>::gather_directions(int side) {
+TANDEM_HD bool NormalFinder<Team>::gather_directions(int side, bool keep_if_many) {
+  std::uint64_t first_piece[kMostDirections];
   FloatVector known = {};  // the last direction
-  for (int found = 0;; ++found) {
-    std::uint64_t key = ~std::uint64_t{0};
+  int found = 0;
+  bool all = false;
+  for (;; ++found) {
+    std::uint64_t own = ~std::uint64_t{0};
+    std::uint32_t holder = kNoIndex;
     for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
       const std::uint32_t at = memory_.order[i];
       if (found == 0) {
@@ -155,17 +159,20 @@ TANDEM_HD bool NormalFinder<Team>::gather_directions(int side) {
           continue;
         }
       }
-      key = lesser(key, memory_.pieces[at].key());
+      const std::uint64_t key = memory_.pieces[at].key();
+      if (key < own) own = key, holder = at;
     }
-    key = team_.least(key);
-    if (key == ~std::uint64_t{0}) return true;
-    if (found == kMostDirections) return false;
-    const auto triangle = static_cast<std::uint32_t>(side == 0 ? key >> 32 : key);
-    const WorldTriangle t = bodies_[side].triangle(triangle);
-    known = {
-        {static_cast<float>(t.normal.x), static_cast<float>(t.normal.y), static_cast<float>(t.normal.z)}};
-    direction_[directions_++] = {side == 0 ? t.normal : -t.normal, key};
+    const std::uint64_t key = team_.least(own);
+    all = key == ~std::uint64_t{0};
+    if (all || found == kMostDirections) break;
+    first_piece[found] = key;
+    holder = team_.least(own == key ? holder : kNoIndex);
+    const float* n = memory_.normals + 6 * std::size_t{holder} + 3 * side;
+    known = {{n[0], n[1], n[2]}};
   }
+  if (!all && !keep_if_many) return false;
+  for (int i = 0; i < found; ++i) direction_[directions_++] = {direction_of(side, first_piece[i]), first_piece[i]};
+  return all;
 }
 
 /// Of bodies of many faces those that a patch lies on, as where prisms stand on each other: of each body the
@@ -180,26 +187,44 @@ TANDEM_HD void NormalFinder<Team>::find_bearing_faces(const Vector3& smooth, dou
     return FloatVector{
         {sign * normals[3 * side], sign * normals[3 * side + 1], sign * normals[3 * side + 2]}};
   };
-  for (int side = 0; side < 2; ++side) {
-    float most = 0.9f;
-    std::uint64_t key = ~std::uint64_t{0};
-    for_each_piece([&](const Piece& piece, const float* normals) {
+  float most[2] = {0.9f, 0.9f};
+  std::uint64_t key[2] = {~std::uint64_t{0}, ~std::uint64_t{0}};
+  for_each_piece([&](const Piece& piece, const float* normals) {
+    for (int side = 0; side < 2; ++side) {
       const float along = dot(normal_of(normals, side), up);
-      if (along > most || (along == most && piece.key() < key)) most = along, key = piece.key();
-    });
-    const float greatest = team_.greatest(most);
-    key = team_.least(most == greatest ? key : ~std::uint64_t{0});
-    if (key == ~std::uint64_t{0}) continue;
-    const auto triangle = static_cast<std::uint32_t>(side == 0 ? key >> 32 : key);
-    const Vector3 n = (side == 0 ? 1.0 : -1.0) * bodies_[side].triangle(triangle).normal;
-    const FloatVector face = {{static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)}};
-    ExactSum within;
-    for_each_piece([&](const Piece& piece, const float* normals) {
-      if (piece.kind() == MeetingKind::polygon) return;
-      if (!same_face(normal_of(normals, 0), face) && !same_face(normal_of(normals, 1), face)) return;
-      within.add(norm(piece.weight() * (piece.end[1] - piece.end[0])), 1 / summary_.unit);
-    });
-    if (total(within, summary_.unit) >= kBearing * length) direction_[directions_++] = {n, key};
+      if (along > most[side] || (along == most[side] && piece.key() < key[side]))
+        most[side] = along, key[side] = piece.key();
+    }
+  });
+  float greatest[2] = {most[0], most[1]};
+  team_.greatest_ones(greatest);
+  for (int side = 0; side < 2; ++side) {
+    if (most[side] != greatest[side]) key[side] = ~std::uint64_t{0};
+  }
+  team_.least_ones(key);
+  Vector3 n[2];
+  FloatVector face[2] = {};
+  bool any = false;
+  for (int side = 0; side < 2; ++side) {
+    if (key[side] == ~std::uint64_t{0}) continue;
+    any = true;
+    n[side] = direction_of(side, key[side]);
+    face[side] = {{static_cast<float>(n[side].x), static_cast<float>(n[side].y), static_cast<float>(n[side].z)}};
+  }
+  if (!any) return;
+  ExactSum within[2];
+  for_each_piece([&](const Piece& piece, const float* normals) {
+    if (piece.kind() == MeetingKind::polygon) return;
+    const double size = norm(piece.weight() * (piece.end[1] - piece.end[0]));
+    for (int side = 0; side < 2; ++side) {
+      if (same_face(normal_of(normals, 0), face[side]) || same_face(normal_of(normals, 1), face[side]))
+        within[side].add(size, 1 / summary_.unit);
+    }
+  });
+  add_up(team_, {&within[0], &within[1]});
+  for (int side = 0; side < 2; ++side) {
+    if (key[side] != ~std::uint64_t{0} && within[side].value(summary_.unit) >= kBearing * length)
+      direction_[directions_++] = {n[side], key[side]};
   }
 }
 
@@ -221,9 +246,10 @@ TANDEM_HD void NormalFinder<Team>::spread_along(const Vector3* directions, int c
     }
     seen_a = piece.triangle[0], seen_b = piece.triangle[1];
   });
-  for (int i = 0; i < count; ++i) {
-    spread[i] = {team_.greatest(spread[i].highest_a), team_.least(spread[i].lowest_b)};
-  }
+  double furthest[2 * kMost];
+  for (int i = 0; i < count; ++i) furthest[2 * i] = spread[i].highest_a, furthest[2 * i + 1] = -spread[i].lowest_b;
+  team_.greatest_ones(furthest, 2 * count);
+  for (int i = 0; i < count; ++i) spread[i] = {furthest[2 * i], -furthest[2 * i + 1]};
 }
 
 /// Where few flat faces meet, as boxes do, the curve's own normal leans a little, by depth over length: along
@@ -234,8 +260,8 @@ TANDEM_HD void NormalFinder<Team>::spread_along(const Vector3* directions, int c
 template <typename Team>
 TANDEM_HD Vector3 NormalFinder<Team>::face_nearest(const Vector3& smooth, double length) {
   directions_ = 0;
-  const int of_a = gather_directions(0) ? directions_ : kMost, first_of_b = directions_;
-  const int of_b = gather_directions(1) ? directions_ - first_of_b : kMost;
+  const int of_a = gather_directions(0, false) ? directions_ : kMost, first_of_b = directions_;
+  const int of_b = gather_directions(1, false) ? directions_ - first_of_b : kMost;
   if ((of_a == 1) != (of_b == 1)) {
     const Vector3& n = direction_[of_a == 1 ? 0 : first_of_b].n;
     return dot(n, smooth) > 0 ? n : smooth;
@@ -330,8 +356,8 @@ TANDEM_HD bool NormalFinder<Team>::find_crossing_edges(Vector3& n) const {
 template <typename Team>
 TANDEM_HD bool NormalFinder<Team>::find_for_touch(Vector3& n) {
   directions_ = 0;
-  gather_directions(0);
-  gather_directions(1);
+  gather_directions(0, true);
+  gather_directions(1, true);
   Vector3 tried[kMost], at[kMost];
   for (int i = 0; i < directions_; ++i) tried[i] = direction_[i].n, at[i] = {};
   // Each direction's plane goes through the piece that has it.

@@ -36,8 +36,10 @@ class RimFinder {
   TANDEM_HD std::uint64_t feature(std::uint32_t reference) const;
   TANDEM_HD const Piece& piece(std::uint32_t reference) const { return memory_.pieces[reference / 8]; }
 
-  /// The least feature of candidates closer than `distance` to a point, or `feature` if that is less.
-  TANDEM_HD std::uint64_t least_feature_near(const Vector2& at, double distance, std::uint64_t feature) const;
+  /// A point of the rim is called by the least feature of its own and of candidates closer than `distance`. An
+  /// inner one, the middle or a vertex that may be deepest in two patches, is told apart by the patch's key.
+  /// points: that all of the team see.
+  TANDEM_HD void name_points(Chosen* points, int count, double distance, std::uint64_t patch_key) const;
 
  private:
   TANDEM_HD Candidate* candidates() const {
@@ -112,9 +114,7 @@ TANDEM_HD void RimFinder<Team>::gather(bool each_end_twice, std::uint32_t& next)
   }
   team_.sync();
   count_ = team_.load(next);
-  twice_area_ = {team_.sum(twice_area_.upper), team_.sum(twice_area_.lower)};
-  moment_x_ = {team_.sum(moment_x_.upper), team_.sum(moment_x_.lower)};
-  moment_y_ = {team_.sum(moment_y_.upper), team_.sum(moment_y_.lower)};
+  add_up(team_, {&twice_area_, &moment_x_, &moment_y_});
 }
 
 template <typename Team>
@@ -143,13 +143,20 @@ TANDEM_HD void RimFinder<Team>::furthest(const One& value, const Other& other_va
     take(other_value(c), c.reference, other);
   }
   if (Team::size() == 1) return;
-  for (Furthest* best : {&one, &other}) {
-    const float greatest = team_.greatest(best->value);
-    const bool mine = best->reference != kNoIndex && best->value == greatest;
-    const std::uint64_t own = mine ? key(best->reference) : ~std::uint64_t{0};
-    const std::uint64_t least = team_.least(own);
-    *best = {greatest, team_.least(mine && own == least ? best->reference : kNoIndex)};
+  float greatest[2] = {one.value, other.value};
+  team_.greatest_ones(greatest);
+  std::uint64_t own[2], least[2];
+  const Furthest* const both[2] = {&one, &other};
+  for (int i = 0; i < 2; ++i) {
+    const bool mine = both[i]->reference != kNoIndex && both[i]->value == greatest[i];
+    least[i] = own[i] = mine ? key(both[i]->reference) : ~std::uint64_t{0};
   }
+  team_.least_ones(least);
+  std::uint32_t reference[2];
+  for (int i = 0; i < 2; ++i)
+    reference[i] = own[i] != ~std::uint64_t{0} && own[i] == least[i] ? both[i]->reference : kNoIndex;
+  team_.least_ones(reference);
+  one = {greatest[0], reference[0]}, other = {greatest[1], reference[1]};
 }
 
 template <typename Team>
@@ -232,18 +239,34 @@ TANDEM_HD std::uint64_t RimFinder<Team>::feature(std::uint32_t reference) const 
 }
 
 template <typename Team>
-TANDEM_HD std::uint64_t RimFinder<Team>::least_feature_near(const Vector2& at, double distance,
-                                                            std::uint64_t feature_of_point) const {
-  std::uint64_t least = feature_of_point;
-  const auto x = static_cast<float>(at.x), y = static_cast<float>(at.y);
+TANDEM_HD void RimFinder<Team>::name_points(Chosen* points, int count, double distance,
+                                            std::uint64_t patch_key) const {
+  constexpr int kMost = kMostManifoldPoints;
+  FloatPoint at[kMost] = {};
+  std::uint64_t least[kMost];
+  for (int k = 0; k < kMost; ++k) {
+    const bool is_rim = k < count && !points[k].inner;
+    least[k] = is_rim ? points[k].feature : 0;
+    // Nothing is near one that is not a number.
+    at[k] = is_rim ? FloatPoint{static_cast<float>(points[k].at.x), static_cast<float>(points[k].at.y)}
+                   : FloatPoint{NAN, NAN};
+  }
   const auto square = static_cast<float>(distance * distance);
   for (std::uint32_t i = team_.rank(); i < count_; i += team_.size()) {
     const Candidate& c = candidates()[i];
-    if (!((c.x - x) * (c.x - x) + (c.y - y) * (c.y - y) < square)) continue;
-    const std::uint64_t of_c = feature(c.reference);
-    least = of_c < least ? of_c : least;
+    for (int k = 0; k < kMost; ++k) {
+      const float x = c.x - at[k].x, y = c.y - at[k].y;
+      if (!(x * x + y * y < square)) continue;
+      least[k] = lesser(least[k], feature(c.reference));
+    }
   }
-  return team_.least(least);
+  team_.least_ones(least);
+  team_.sync();
+  if (team_.rank() == 0) {
+    for (int k = 0; k < count; ++k)
+      points[k].feature = points[k].inner ? feature_hash(points[k].feature, patch_key) : least[k];
+  }
+  team_.sync();
 }
 
 }  // namespace tandem::manifold

@@ -104,6 +104,7 @@ TANDEM_HD void ManifoldMaker<Team>::place_soundings(const RimFinder<Team>& finde
 /// Answers the first `count` line questions; those of no side were not asked. By the crew.
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::walk_lines(LineQuestions& questions, std::uint32_t count) {
+  if constexpr (HasMeans<Team>) return questions.answer(team_.means(), count);
   WalkMemory& walk = shared_.walk;
   for (bool further = false;; further = true) {
     team_.crew_sync();  // all have read what the last walk left
@@ -111,6 +112,7 @@ TANDEM_HD void ManifoldMaker<Team>::walk_lines(LineQuestions& questions, std::ui
     team_.crew_sync();
     for (std::uint32_t i = team_.rank(); i < count; i += team_.crew_size()) {
       if (shared_.line[i].side < 0 || (further && !questions.look_further(i))) continue;
+      if (!further) questions.prepare(i);
       walk.waiting[team_.add(walk.count, 1)] = std::uint64_t{i} << 32;
     }
     team_.crew_sync();
@@ -193,7 +195,10 @@ TANDEM_HD void ManifoldMaker<Team>::sound_deepest(const PatchFrame& frame, const
     prism.below_b = std::fmin(prism.below_b, s.surface[1].height);
   }
   prism.lower = lowest - extent_, prism.upper = highest + extent_;
-  if (team_.in_crew()) {
+  if constexpr (HasMeans<Team>) {
+    for (int side = 0; side < 2; ++side)
+      shared_.extreme[side] = team_.means().find_extreme(bodies_[side], prism, side);
+  } else if (team_.in_crew()) {
     ExtremeQuestions questions(bodies_, prism, shared_.prism_test, shared_.extreme);
     WalkMemory& walk = shared_.walk;
     for (std::uint32_t side = team_.rank(); side < 2; side += team_.crew_size()) {

@@ -222,13 +222,32 @@ class LineQuestions {
     q.at = at;
     q.target = target, q.lower = lower, q.upper = upper;
     q.side = side, q.facing = facing;
-    const Body& body = bodies_[side];
-    q.point = point_in_mesh(body, frame_.at(at, target));
+    q.most = expected;
+  }
+
+  /// Makes the test of boxes.
+  TANDEM_HD void prepare(std::uint32_t question) {
+    LineQuestion& q = questions_[question];
+    const Body& body = bodies_[q.side];
+    q.point = point_in_mesh(body, frame_.at(q.at, q.target));
     q.direction = in_mesh(body, frame_.n);
     q.slack = slack_near(body, q.point);
-    q.lower_along = static_cast<float>(lower - target) - q.slack;
-    q.upper_along = static_cast<float>(upper - target) + q.slack;
-    look_within(q, expected);
+    q.lower_along = static_cast<float>(q.lower - q.target) - q.slack;
+    q.upper_along = static_cast<float>(q.upper - q.target) + q.slack;
+    look_within(q, q.most);
+  }
+
+  /// Answers the first `count` questions; those of no side were not asked.
+  template <typename Means>
+  void answer(const Means& means, std::uint32_t count) {
+    for (int side = 0; side < 2; ++side) {
+      LineQuestion* asked[Means::kMostLines];
+      int lines = 0;
+      for (std::uint32_t i = 0; i < count; ++i) {
+        if (questions_[i].side == side) asked[lines++] = &questions_[i];
+      }
+      if (lines > 0) means.answer_lines(bodies_[side], frame_, asked, lines);
+    }
   }
 
   /// Where nothing lies as near as expected, it has to be looked for further away. Not all boxes there were

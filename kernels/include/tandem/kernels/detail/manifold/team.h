@@ -56,4 +56,11 @@ struct OneThread {
   }
 };
 
+/// A thread of a CPU that has instructions for several things at a time: means() has other ways to the same
+/// answers (kernels/src/manifold_means.h).
+template <typename Team>
+concept HasMeans = requires(const Team& team) {
+  team.means();
+};
+
 }  // namespace tandem::manifold

@@ -1,6 +1,7 @@
 #include "block_pair_variants.h"
 #include "narrow_phase_lanes.h"
 #include "patch_walk_lanes.h"
+#include "piece_lanes.h"
 
 // The variants of 8 lanes, in a file that is compiled for machines that have the instructions.
 #if defined(TANDEM_HAVE_LANES) && defined(__AVX2__)
@@ -14,7 +15,7 @@ bool narrow_phase_avx2(const PairTask& task, ContactSink& sink) {
   return PairWalk<LaneMeans<8>>(task, sink).run();
 }
 
-const ManifoldMeans kManifoldMeansAvx2 = {answer_lines, find_extreme};
+const ManifoldMeans kManifoldMeansAvx2 = {make_pieces, answer_lines, find_extreme};
 
 }  // namespace tandem
 #endif

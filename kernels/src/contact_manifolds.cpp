@@ -42,6 +42,8 @@ struct PairPoints {
   std::uint32_t first, count;
 };
 
+constexpr std::uint32_t kTableWords = std::max(PieceMemory::kTableWords, ManifoldMeans::kTableWords);
+
 struct alignas(64) Worker {
   Buffer<manifold::Piece> pieces;
   Buffer<float> normals;
@@ -52,7 +54,7 @@ struct alignas(64) Worker {
 
   bool make_room(std::size_t contacts, PieceMemory& memory) {
     if (!pieces.resize(contacts) || !normals.resize(6 * contacts) ||
-        !words.resize((3 + PieceMemory::kTableWords) * contacts + 1))
+        !words.resize((3 + kTableWords) * contacts + 5))
       return false;
     std::uint32_t* const word = words.data();
     memory = {pieces.data(),   normals.data(),      word,

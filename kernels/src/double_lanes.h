@@ -5,6 +5,9 @@
 #include "tandem/formats/view.h"
 #include "tandem/kernels/detail/manifold/body.h"
 
+// Vectors wider than the machine's have no way to be passed, and need none: all is inlined.
+#pragma GCC diagnostic ignored "-Wpsabi"
+
 // Vectors of float64, with the operations of vector3.h lane by lane and in its order: the same bits.
 namespace tandem {
 namespace {

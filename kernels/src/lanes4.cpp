@@ -1,6 +1,7 @@
 #include "block_pair_variants.h"
 #include "narrow_phase_lanes.h"
 #include "patch_walk_lanes.h"
+#include "piece_lanes.h"
 
 // The variants of 4 lanes.
 #ifdef TANDEM_HAVE_LANES
@@ -14,7 +15,7 @@ bool narrow_phase_lanes4(const PairTask& task, ContactSink& sink) {
   return PairWalk<LaneMeans<4>>(task, sink).run();
 }
 
-const ManifoldMeans kManifoldMeansLanes4 = {answer_lines, find_extreme};
+const ManifoldMeans kManifoldMeansLanes4 = {make_pieces, answer_lines, find_extreme};
 
 }  // namespace tandem
 #endif

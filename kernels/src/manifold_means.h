@@ -1,6 +1,7 @@
 #pragma once
 #include "lanes.h"
 #include "tandem/kernels/detail/block_pair.h"
+#include "tandem/kernels/detail/manifold/contact_curves.h"
 #include "tandem/kernels/detail/manifold/surface_line.h"
 
 // What makes manifolds faster on a machine that has the instructions. All ways give the same bytes.
@@ -8,6 +9,17 @@ namespace tandem {
 
 struct ManifoldMeans {
   static constexpr int kMostLines = 16;
+
+  /// Words of the table that pieces are joined by, for each contact, and as many once more.
+  static constexpr std::uint32_t kTableWords = 36;
+
+  manifold::PieceBounds (*make_pieces)(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory,
+                                       const Contact* contacts, std::uint32_t count);
+
+  static bool connect_by_ends(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory,
+                              std::uint32_t pieces);
+  static void connect_by_corners(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory,
+                                 std::uint32_t pieces);
 
   /// Answers questions about one body, at most kMostLines.
   void (*answer_lines)(const manifold::Body& body, const manifold::PatchFrame& frame,

@@ -19,6 +19,12 @@ TANDEM_INLINE LaneMask<4> at_most(const Lanes4& x, const Lanes4& y) {
   return {x.v <= y.v};
 }
 
+/// The block is looked at soon.
+TANDEM_INLINE void fetch(const Block& block) {
+  __builtin_prefetch(&block);
+  __builtin_prefetch(&block.half_extent[1]);
+}
+
 struct BoxCoordinates {
   Lanes4 center[3], half_extent[3];
 
@@ -118,7 +124,9 @@ class LineWalk {
         continue;
       }
       for (int i = kNodesPerBlock - 1; i >= 0; --i) {
-        if (below[i] != 0) waiting[count++] = {block.index[i], below[i]};
+        if (below[i] == 0) continue;
+        fetch(body_.shape->blocks[block.index[i]]);
+        waiting[count++] = {block.index[i], below[i]};
       }
     }
   }
@@ -241,7 +249,11 @@ class ExtremeWalk {
         visit(block);
         continue;
       }
-      for (; nodes != 0; nodes &= nodes - 1) waiting[count++] = block.index[std::countr_zero(nodes)];
+      for (; nodes != 0; nodes &= nodes - 1) {
+        const std::uint32_t next = block.index[std::countr_zero(nodes)];
+        fetch(body_.shape->blocks[next]);
+        waiting[count++] = next;
+      }
     }
     return best_;
   }

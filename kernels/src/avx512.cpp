@@ -1,5 +1,6 @@
 #include "block_pair_variants.h"
 #include "narrow_phase_lanes.h"
+#include "patch_passes_lanes.h"
 #include "patch_walk_lanes.h"
 #include "piece_lanes.h"
 
@@ -15,7 +16,8 @@ bool narrow_phase_avx512(const PairTask& task, ContactSink& sink) {
   return PairWalk<LaneMeans<16>>(task, sink).run();
 }
 
-const ManifoldMeans kManifoldMeansAvx512 = {make_pieces, answer_lines, find_extreme};
+const ManifoldMeans kManifoldMeansAvx512 = {make_pieces, sum_pieces, spread_along, extreme_corner, gather_rim,
+                                            furthest,    next_near,  answer_lines, find_extreme};
 
 }  // namespace tandem
 #endif

@@ -2,7 +2,7 @@
 #include "lanes.h"
 #include "tandem/kernels/detail/block_pair.h"
 #include "tandem/kernels/detail/manifold/contact_curves.h"
-#include "tandem/kernels/detail/manifold/surface_line.h"
+#include "tandem/kernels/detail/manifold/patch.h"
 
 // What makes manifolds faster on a machine that has the instructions. All ways give the same bytes.
 namespace tandem {
@@ -20,6 +20,26 @@ struct ManifoldMeans {
                               std::uint32_t pieces);
   static void connect_by_corners(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory,
                                  std::uint32_t pieces);
+
+  // Each as the function of the name in the headers, of pieces order[begin] to order[end - 1].
+  void (*sum_pieces)(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
+                     const manifold::Vector3& origin, double one_by_unit, manifold::CurveSums& out);
+  void (*spread_along)(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory,
+                       std::uint32_t begin, std::uint32_t end, const manifold::Vector3& origin,
+                       const manifold::Vector3* directions, int count, manifold::Spread* spread);
+  manifold::Extreme (*extreme_corner)(const manifold::Body& body, const manifold::PieceMemory& memory,
+                                      std::uint32_t begin, std::uint32_t end,
+                                      const manifold::PatchFrame& frame, int side);
+  /// Where there are no polygons. ends: of each piece, 1 or 2. Result: how many candidates.
+  std::uint32_t (*gather_rim)(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
+                              const manifold::PatchFrame& frame, double one_by_unit, int ends,
+                              manifold::Candidate* candidates, manifold::RimMoments& moments);
+  void (*furthest)(const manifold::PieceMemory& memory, const manifold::Candidate* candidates,
+                   std::uint32_t count, const manifold::RimValue* values, int wanted,
+                   manifold::Furthest* const* best);
+  /// The next candidate from `i` on whose distance's square from a point is less, or `count`.
+  std::uint32_t (*next_near)(const manifold::Candidate* candidates, std::uint32_t i, std::uint32_t count,
+                             const manifold::FloatPoint& at, float square);
 
   /// Answers questions about one body, at most kMostLines.
   void (*answer_lines)(const manifold::Body& body, const manifold::PatchFrame& frame,

@@ -145,6 +145,8 @@ TANDEM_HD void ManifoldMaker<Team>::sound(const PatchFrame& frame, int first, in
 template <typename Team>
 TANDEM_HD Extreme ManifoldMaker<Team>::extreme_corner(const PatchFrame& frame, std::uint32_t begin,
                                                       std::uint32_t end, int side) const {
+  if constexpr (HasMeans<Team>)
+    return team_.means().extreme_corner(bodies_[side], memory_, begin, end, frame, side);
   Extreme best;
   const auto question = static_cast<std::uint32_t>(side);
   for (std::uint32_t i = begin + team_.rank(); i < end; i += team_.size()) {

@@ -36,10 +36,8 @@ class NormalFinder {
     Vector3 n;            // from a towards b
     std::uint64_t piece;  // key of the piece whose triangle has it
   };
-  struct Spread {
-    double highest_a, lowest_b;
-  };
-  static constexpr int kMost = 2 * kMostDirections + 1;
+  static constexpr int kMost = kMostTried;
+  static_assert(kMost == 2 * kMostDirections + 1);
 
   template <typename Visit>
   TANDEM_HD void for_each_piece(const Visit& visit) const {
@@ -57,6 +55,8 @@ class NormalFinder {
   TANDEM_HD Vector3 total(const ExactVectorSum& sum, double unit) const {
     return {total(sum.x, unit), total(sum.y, unit), total(sum.z, unit)};
   }
+  TANDEM_HD bool has_free_end() const;
+  TANDEM_HD Vector3 plain_middle() const;
   TANDEM_HD Vector3 sheet_normal() const;
   TANDEM_HD bool gather_directions(int side);
   TANDEM_HD void find_bearing_faces(const Vector3& smooth, double length);
@@ -84,42 +84,48 @@ template <typename Team>
 TANDEM_HD CurveMeasure NormalFinder<Team>::measure() {
   const double unit = summary_.unit, one_by_unit = 1 / unit;
   const bool may_be_free = !summary_.degenerate && !(bodies_.a.shape->closed && bodies_.b.shape->closed);
-  ExactVectorSum area, gap, middle, plain_middle;
-  ExactSum length;
-  std::uint64_t key = ~std::uint64_t{0};
+  CurveSums sums;
+  if constexpr (HasMeans<Team>) {
+    team_.means().sum_pieces(memory_, begin_, end_, summary_.origin, one_by_unit, sums);
+  } else {
+    for_each_piece([&](const Piece& piece, const float*) { sums.add(piece, summary_.origin, one_by_unit); });
+  }
+  CurveMeasure out;
+  out.key = team_.least(sums.key);
+  out.area = total(sums.area, unit * unit);
+  out.length = total(sums.length, unit);
+  const Vector3 residual = total(sums.gap, unit);
+  out.closed = !(may_be_free && has_free_end()) && norm(residual) <= kClosed * out.length;
+  out.middle =
+      summary_.origin + (out.length > 0 ? (unit / out.length) * total(sums.middle, unit) : plain_middle());
+  if (!out.closed) out.sheet_normal = sheet_normal();
+  return out;
+}
+
+template <typename Team>
+TANDEM_HD bool NormalFinder<Team>::has_free_end() const {
   bool is_free = false;
   for_each_piece([&](const Piece& piece, const float*) {
-    key = lesser(key, piece.key());
-    const Vector3 from = piece.end[0] - summary_.origin;
-    if (piece.kind() == MeetingKind::polygon) {
-      area.add(piece.end[1], one_by_unit * one_by_unit);
-      plain_middle.add(from, one_by_unit);
-      return;
-    }
-    const Vector3 along = piece.weight() * (piece.end[1] - piece.end[0]);
-    area.add(0.5 * cross(from, along), one_by_unit * one_by_unit);
-    gap.add(along, one_by_unit);
-    const double size = norm(along);
-    length.add(size, one_by_unit);
-    const Vector3 half_way = 0.5 * (from + (piece.end[1] - summary_.origin));
-    middle.add((size * one_by_unit) * half_way, one_by_unit);
-    plain_middle.add(half_way, one_by_unit);
-    for (int end = 0; end < 2 && may_be_free; ++end) {
+    if (piece.kind() == MeetingKind::polygon) return;
+    for (int end = 0; end < 2; ++end) {
       const TriangleFeature f = piece.feature(end);
       const std::uint32_t flags = bodies_[f.of_b].shape->topology[piece.triangle[f.of_b]].flags;
       is_free = is_free || is_boundary(flags, f.number);
     }
   });
-  CurveMeasure out;
-  out.key = team_.least(key);
-  out.area = total(area, unit * unit);
-  out.length = total(length, unit);
-  const Vector3 residual = total(gap, unit);
-  out.closed = !team_.any(is_free) && norm(residual) <= kClosed * out.length;
-  out.middle = summary_.origin + (out.length > 0 ? (unit / out.length) * total(middle, unit)
-                                                 : (1.0 / (end_ - begin_)) * total(plain_middle, unit));
-  if (!out.closed) out.sheet_normal = sheet_normal();
-  return out;
+  return team_.any(is_free);
+}
+
+/// Of pieces without length, from the origin on.
+template <typename Team>
+TANDEM_HD Vector3 NormalFinder<Team>::plain_middle() const {
+  ExactVectorSum sum;
+  for_each_piece([&](const Piece& piece, const float*) {
+    const Vector3 from = piece.end[0] - summary_.origin;
+    const bool polygon = piece.kind() == MeetingKind::polygon;
+    sum.add(polygon ? from : 0.5 * (from + (piece.end[1] - summary_.origin)), 1 / summary_.unit);
+  });
+  return (1.0 / (end_ - begin_)) * total(sum, summary_.unit);
 }
 
 template <typename Team>
@@ -207,6 +213,10 @@ TANDEM_HD void NormalFinder<Team>::find_bearing_faces(const Vector3& smooth, dou
 /// b's lowest.
 template <typename Team>
 TANDEM_HD void NormalFinder<Team>::spread_along(const Vector3* directions, int count, Spread* spread) const {
+  if constexpr (HasMeans<Team>) {
+    return team_.means().spread_along(bodies_, memory_, begin_, end_, summary_.origin, directions, count,
+                                      spread);
+  }
   for (int i = 0; i < count; ++i) spread[i] = {-INFINITY, INFINITY};
   std::uint32_t seen_a = kNoIndex, seen_b = kNoIndex;
   for_each_piece([&](const Piece& piece, const float*) {

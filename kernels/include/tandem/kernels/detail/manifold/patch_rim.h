@@ -47,20 +47,11 @@ class RimFinder {
     meet(bodies_.a.triangle(piece.triangle[0]), bodies_.b.triangle(piece.triangle[1]), bodies_.tolerance(),
          meeting);
   }
-  TANDEM_HD std::uint64_t key(std::uint32_t reference) const {
-    const Piece& p = piece(reference);
-    return std::uint64_t{p.triangle[0]} << 33 | std::uint64_t{p.triangle[1]} << 3 | (reference & 7u);
-  }
   TANDEM_HD void add(const Vector3& x, std::uint32_t reference, std::uint32_t& next) {
     const Vector2 at = frame_.flat(x);
     candidates()[team_.add(next, 1)] = {static_cast<float>(at.x), static_cast<float>(at.y), reference};
   }
-  struct Furthest {
-    float value;
-    std::uint32_t reference;
-  };
-  template <typename One, typename Other>
-  TANDEM_HD void furthest(const One& value, const Other& other_value, Furthest& one, Furthest& other) const;
+  TANDEM_HD void furthest(const RimValue* values, int wanted, Furthest* const* best) const;
 
   const Team& team_;
   const BodyPair& bodies_;
@@ -69,18 +60,25 @@ class RimFinder {
   std::uint32_t begin_, end_;
   const PatchFrame& frame_;
   std::uint32_t count_ = 0;
-  ExactSum twice_area_, moment_x_, moment_y_;
+  RimMoments moments_;
 };
 
 template <typename Team>
 TANDEM_HD void RimFinder<Team>::gather(bool each_end_twice, std::uint32_t& next) {
   const double one_by_unit = 1 / summary_.unit;
   const auto add_moments = [&](double twice_area, const Vector2& three_middles) {
-    twice_area_.add(twice_area, one_by_unit * one_by_unit);
+    moments_.twice_area.add(twice_area, one_by_unit * one_by_unit);
     const double area_in_units = twice_area * one_by_unit * one_by_unit / 3;
-    moment_x_.add(area_in_units * three_middles.x, one_by_unit);
-    moment_y_.add(area_in_units * three_middles.y, one_by_unit);
+    moments_.x.add(area_in_units * three_middles.x, one_by_unit);
+    moments_.y.add(area_in_units * three_middles.y, one_by_unit);
   };
+  if constexpr (HasMeans<Team>) {
+    if (!summary_.degenerate) {  // there are no polygons
+      count_ = team_.means().gather_rim(memory_, begin_, end_, frame_, one_by_unit, each_end_twice ? 1 : 2,
+                                        candidates(), moments_);
+      return;
+    }
+  }
   if (team_.rank() == 0) team_.store(next, 0);
   team_.sync();
   Meeting meeting;
@@ -112,43 +110,37 @@ TANDEM_HD void RimFinder<Team>::gather(bool each_end_twice, std::uint32_t& next)
   }
   team_.sync();
   count_ = team_.load(next);
-  twice_area_ = {team_.sum(twice_area_.upper), team_.sum(twice_area_.lower)};
-  moment_x_ = {team_.sum(moment_x_.upper), team_.sum(moment_x_.lower)};
-  moment_y_ = {team_.sum(moment_y_.upper), team_.sum(moment_y_.lower)};
+  for (ExactSum* sum : {&moments_.twice_area, &moments_.x, &moments_.y})
+    *sum = {team_.sum(sum->upper), team_.sum(sum->lower)};
 }
 
 template <typename Team>
 TANDEM_HD bool RimFinder<Team>::middle_of_area(Vector2& middle) const {
-  const double unit = summary_.unit, twice_area = twice_area_.value(unit * unit);
+  const double unit = summary_.unit, twice_area = moments_.twice_area.value(unit * unit);
   if (!(twice_area > 0x1p-30 * (unit * unit))) return false;
   const double by_area = unit * unit / twice_area;
-  middle = {by_area * moment_x_.value(unit), by_area * moment_y_.value(unit)};
+  middle = {by_area * moments_.x.value(unit), by_area * moments_.y.value(unit)};
   return true;
 }
 
-/// For each of two values the candidate that has the greatest one, if it is greater than what is given; of
-/// several the one whose triangles come first.
+/// For each value, one or two, the candidate that has the greatest one, if it is greater than what is given;
+/// of several the one whose triangles come first.
 template <typename Team>
-template <typename One, typename Other>
-TANDEM_HD void RimFinder<Team>::furthest(const One& value, const Other& other_value, Furthest& one,
-                                         Furthest& other) const {
-  const auto take = [&](float of_c, std::uint32_t reference, Furthest& best) {
-    if (!(of_c >= best.value)) return;
-    if (of_c == best.value && (best.reference == kNoIndex || key(reference) >= key(best.reference))) return;
-    best = {of_c, reference};
-  };
+TANDEM_HD void RimFinder<Team>::furthest(const RimValue* values, int wanted, Furthest* const* best) const {
+  if constexpr (HasMeans<Team>) {
+    return team_.means().furthest(memory_, candidates(), count_, values, wanted, best);
+  }
   for (std::uint32_t i = team_.rank(); i < count_; i += team_.size()) {
     const Candidate& c = candidates()[i];
-    take(value(c), c.reference, one);
-    take(other_value(c), c.reference, other);
+    for (int k = 0; k < wanted; ++k) best[k]->take(memory_, values[k](c), c.reference);
   }
   if (Team::size() == 1) return;
-  for (Furthest* best : {&one, &other}) {
-    const float greatest = team_.greatest(best->value);
-    const bool mine = best->reference != kNoIndex && best->value == greatest;
-    const std::uint64_t own = mine ? key(best->reference) : ~std::uint64_t{0};
+  for (int k = 0; k < wanted; ++k) {
+    const float greatest = team_.greatest(best[k]->value);
+    const bool mine = best[k]->reference != kNoIndex && best[k]->value == greatest;
+    const std::uint64_t own = mine ? Furthest::key(memory_, best[k]->reference) : ~std::uint64_t{0};
     const std::uint64_t least = team_.least(own);
-    *best = {greatest, team_.least(mine && own == least ? best->reference : kNoIndex)};
+    *best[k] = {greatest, team_.least(mine && own == least ? best[k]->reference : kNoIndex)};
   }
 }
 
@@ -169,27 +161,27 @@ TANDEM_HD Rim RimFinder<Team>::find(int most, const Vector2& middle) const {
     }
     rim.reference[where] = reference, rim.at[where] = place(reference), rim.rank[where] = rank;
   };
-  const auto from = [&](const FloatPoint& p) {
-    return [p](const Candidate& c) { return (c.x - p.x) * (c.x - p.x) + (c.y - p.y) * (c.y - p.y); };
+  const auto furthest_from = [&](const FloatPoint& p, float than) {
+    const RimValue value = {p, p, true};
+    Furthest best = {than, kNoIndex};
+    Furthest* const bests[] = {&best};
+    furthest(&value, 1, bests);
+    return best;
   };
-  const auto beyond = [](const FloatPoint& p, const FloatPoint& q) {
-    return [p, q](const Candidate& c) { return (q.y - p.y) * (c.x - p.x) - (q.x - p.x) * (c.y - p.y); };
-  };
-  const auto nothing = [](const Candidate&) { return -1.0f; };
-  const FloatPoint start = {static_cast<float>(middle.x), static_cast<float>(middle.y)};
-  Furthest one = {-1, kNoIndex}, other = {0, kNoIndex};
-  furthest(from(start), nothing, one, other);
+  Furthest one = furthest_from({static_cast<float>(middle.x), static_cast<float>(middle.y)}, -1);
   if (one.reference == kNoIndex) return rim;
   insert(0, one.reference);
   one = {0, kNoIndex};
-  if (most > 1) furthest(from(rim.at[0]), nothing, one, other);
+  if (most > 1) one = furthest_from(rim.at[0], 0);
   if (one.reference == kNoIndex) return rim;
   insert(1, one.reference);
   float limit = kThin * one.value, area = 0;
   for (int first = 0, second = 1; rim.points < most;) {
     of_side[first] = of_side[second] = {0, kNoIndex};
-    furthest(beyond(rim.at[first], rim.at[next(first)]), beyond(rim.at[second], rim.at[next(second)]),
-             of_side[first], of_side[second]);
+    const RimValue beyond[] = {{rim.at[first], rim.at[next(first)], false},
+                               {rim.at[second], rim.at[next(second)], false}};
+    Furthest* const bests[] = {&of_side[first], &of_side[second]};
+    furthest(beyond, 2, bests);
     int side = 0;
     for (int i = 1; i < rim.points; ++i) side = of_side[i].value > of_side[side].value ? i : side;
     if (!(of_side[side].value > limit)) return rim;
@@ -237,6 +229,14 @@ TANDEM_HD std::uint64_t RimFinder<Team>::least_feature_near(const Vector2& at, d
   std::uint64_t least = feature_of_point;
   const auto x = static_cast<float>(at.x), y = static_cast<float>(at.y);
   const auto square = static_cast<float>(distance * distance);
+  if constexpr (HasMeans<Team>) {
+    const auto next = [&](std::uint32_t from) {
+      return team_.means().next_near(candidates(), from, count_, {x, y}, square);
+    };
+    for (std::uint32_t i = next(0); i < count_; i = next(i + 1))
+      least = lesser(least, feature(candidates()[i].reference));
+    return least;
+  }
   for (std::uint32_t i = team_.rank(); i < count_; i += team_.size()) {
     const Candidate& c = candidates()[i];
     if (!((c.x - x) * (c.x - x) + (c.y - y) * (c.y - y) < square)) continue;

@@ -1,5 +1,8 @@
 #include "block_pair_variants.h"
 #include "narrow_phase_lanes.h"
+#include "patch_passes_lanes.h"
+#include "patch_walk_lanes.h"
+#include "piece_lanes.h"
 
 // The variants of 8 lanes, in a file that is compiled for machines that have the instructions.
 #if defined(TANDEM_HAVE_LANES) && defined(__AVX2__)
@@ -12,6 +15,9 @@ std::uint16_t block_pair_mask_avx2(const Block& a, const Block& b, const Relativ
 bool narrow_phase_avx2(const PairTask& task, ContactSink& sink) {
   return PairWalk<LaneMeans<8>>(task, sink).run();
 }
+
+const ManifoldMeans kManifoldMeansAvx2 = {make_pieces, sum_pieces, spread_along, extreme_corner, gather_rim,
+                                          furthest,    next_near,  answer_lines, find_extreme};
 
 }  // namespace tandem
 #endif

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <new>
 
+#include "manifold_means.h"
 #include "tandem/kernels/detail/buffer.h"
 #include "tandem/kernels/detail/instance_check.h"
 #include "tandem/kernels/detail/manifold/finish.h"
@@ -41,6 +42,8 @@ struct PairPoints {
   std::uint32_t first, count;
 };
 
+constexpr std::uint32_t kTableWords = std::max(PieceMemory::kTableWords, ManifoldMeans::kTableWords);
+
 struct alignas(64) Worker {
   Buffer<manifold::Piece> pieces;
   Buffer<float> normals;
@@ -51,7 +54,7 @@ struct alignas(64) Worker {
 
   bool make_room(std::size_t contacts, PieceMemory& memory) {
     if (!pieces.resize(contacts) || !normals.resize(6 * contacts) ||
-        !words.resize((3 + PieceMemory::kTableWords) * contacts + 1))
+        !words.resize((3 + kTableWords) * contacts + 5))
       return false;
     std::uint32_t* const word = words.data();
     memory = {pieces.data(),   normals.data(),      word,
@@ -59,6 +62,15 @@ struct alignas(64) Worker {
     return true;
   }
 };
+
+#ifdef TANDEM_HAVE_LANES
+struct LaneThread : OneThread {
+  const ManifoldMeans& best = best_manifold_means();
+  const ManifoldMeans& means() const { return best; }
+};
+#else
+using LaneThread = OneThread;
+#endif
 
 std::uint64_t bodies_of(const ObjectPair& pair) {
   return std::uint64_t{pair.a} << 32 | pair.b;
@@ -177,7 +189,7 @@ void ContactManifolds::State::make_patches(std::size_t from, std::size_t to, std
                                            std::span<const ObjectPair> pairs,
                                            std::span<const Contact> contacts, int most_points) {
   Worker& own = workers[worker];
-  const OneThread team;
+  const LaneThread team;
   manifold::PatchMemory shared;
   for (std::size_t i = from; i < to && own.enough_memory; ++i) {
     Row& row = rows[i];
@@ -193,9 +205,9 @@ void ContactManifolds::State::make_patches(std::size_t from, std::size_t to, std
     }
     const Instance &a = instances[pair.a], &b = instances[pair.b];
     const BodyPair bodies = {{shapes[a.asset], a.pose}, {shapes[b.asset], b.pose}};
-    manifold::CurveFinder<OneThread> finder(team, bodies, memory);
+    manifold::CurveFinder<LaneThread> finder(team, bodies, memory);
     const manifold::PieceSummary summary = finder.find(contacts.data() + begin[row.pair], count, shared.next);
-    manifold::ManifoldMaker<OneThread> maker(team, bodies, memory, shared, summary, most_points);
+    manifold::ManifoldMaker<LaneThread> maker(team, bodies, memory, shared, summary, most_points);
     const auto new_patch = [&]() -> Patch* {
       if (!own.patches.push({})) {
         own.enough_memory = false;

@@ -79,6 +79,51 @@ struct PieceSummary {
   double unit = 1;  ///< a power of two, at least their distance from it along each axis
 };
 
+/// What pieces amount to: how many there are, and where.
+struct PieceBounds {
+  std::uint32_t pieces = 0, segments = 0;
+  bool degenerate = false;
+  double lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY};
+
+  TANDEM_HD void add(const Vector3& p) {
+    const double x[3] = {p.x, p.y, p.z};
+    for (int k = 0; k < 3; ++k) {
+      lower[k] = lesser(lower[k], x[k]);
+      upper[k] = greater(upper[k], x[k]);
+    }
+  }
+};
+
+/// Writes down what the triangles of a contact have in common, and adds it to `bounds`, but for the count.
+/// Condition: they have something in common.
+TANDEM_HD inline void write_piece(const PieceMemory& memory, std::uint32_t at, const Contact& contact,
+                                  const Vector3& normal_a, const Vector3& normal_b, const Meeting& meeting,
+                                  PieceBounds& bounds) {
+  Piece& piece = memory.pieces[at];
+  piece.triangle[0] = contact.triangle_a, piece.triangle[1] = contact.triangle_b;
+  piece.info = static_cast<std::uint32_t>(meeting.kind) | (meeting.facing ? Piece::kFacing : 0u) |
+               (meeting.along_edge[0] ? Piece::kHalfOfA : 0u) |
+               (meeting.along_edge[1] ? Piece::kHalfOfB : 0u) | bits_of(meeting.feature[0]) << 8 |
+               bits_of(meeting.feature[1]) << 12;
+  piece.unused = 0;
+  piece.end[0] = meeting.end[0];
+  piece.end[1] = meeting.end[1];
+  if (meeting.kind == MeetingKind::polygon)
+    piece.end[1] = meeting.facing ? (meeting.area / 2) * normal_a : Vector3{};
+  float* normals = memory.normals + 6 * std::size_t{at};
+  const Vector3 both[2] = {normal_a, normal_b};
+  for (int side = 0; side < 2; ++side) {
+    normals[3 * side] = static_cast<float>(both[side].x);
+    normals[3 * side + 1] = static_cast<float>(both[side].y);
+    normals[3 * side + 2] = static_cast<float>(both[side].z);
+  }
+  bounds.degenerate = bounds.degenerate || meeting.degenerate;
+  bounds.segments += meeting.kind == MeetingKind::segment ? 1u : 0u;
+  bounds.add(meeting.end[0]);
+  if (meeting.kind == MeetingKind::segment) bounds.add(meeting.end[1]);
+  for (int i = 0; i < meeting.corners; ++i) bounds.add(meeting.corner[i]);
+}
+
 /// Finds the curves of one pair of bodies.
 template <typename Team>
 class CurveFinder {
@@ -179,63 +224,30 @@ class CurveFinder {
 template <typename Team>
 TANDEM_HD void CurveFinder<Team>::make_pieces(const Contact* contacts, std::uint32_t count,
                                               std::uint32_t& next) {
-  const double tolerance = bodies_.tolerance();
-  double lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY};
-  std::uint32_t segments = 0;
-  bool degenerate = false;
-  Meeting meeting;
-  WorldTriangle a, b;
-  std::uint32_t posed_a = kNoIndex, posed_b = kNoIndex;
-  for (std::uint32_t i = team_.rank(); i < count; i += team_.size()) {
-    const Contact& contact = contacts[i];
-    if (contact.triangle_a != posed_a) a = bodies_.a.triangle(posed_a = contact.triangle_a);
-    if (contact.triangle_b != posed_b) b = bodies_.b.triangle(posed_b = contact.triangle_b);
-    meet(a, b, tolerance, meeting);
-    if (meeting.kind == MeetingKind::none) continue;
-    const std::uint32_t at = team_.add(next, 1);
-    Piece& piece = memory_.pieces[at];
-    piece.triangle[0] = contact.triangle_a, piece.triangle[1] = contact.triangle_b;
-    piece.info = static_cast<std::uint32_t>(meeting.kind) | (meeting.facing ? Piece::kFacing : 0u) |
-                 (meeting.along_edge[0] ? Piece::kHalfOfA : 0u) |
-                 (meeting.along_edge[1] ? Piece::kHalfOfB : 0u) | bits_of(meeting.feature[0]) << 8 |
-                 bits_of(meeting.feature[1]) << 12;
-    piece.unused = 0;
-    piece.end[0] = meeting.end[0];
-    piece.end[1] = meeting.end[1];
-    if (meeting.kind == MeetingKind::polygon)
-      piece.end[1] = meeting.facing ? (meeting.area / 2) * a.normal : Vector3{};
-    float* normals = memory_.normals + 6 * std::size_t{at};
-    const Vector3 both[2] = {a.normal, b.normal};
-    for (int side = 0; side < 2; ++side) {
-      normals[3 * side] = static_cast<float>(both[side].x);
-      normals[3 * side + 1] = static_cast<float>(both[side].y);
-      normals[3 * side + 2] = static_cast<float>(both[side].z);
+  PieceBounds found;
+  if constexpr (HasMeans<Team>) {
+    found = team_.means().make_pieces(bodies_, memory_, contacts, count);
+    summary_.pieces = found.pieces;
+  } else {
+    const double tolerance = bodies_.tolerance();
+    Meeting meeting;
+    WorldTriangle a, b;
+    std::uint32_t posed_a = kNoIndex, posed_b = kNoIndex;
+    for (std::uint32_t i = team_.rank(); i < count; i += team_.size()) {
+      const Contact& contact = contacts[i];
+      if (contact.triangle_a != posed_a) a = bodies_.a.triangle(posed_a = contact.triangle_a);
+      if (contact.triangle_b != posed_b) b = bodies_.b.triangle(posed_b = contact.triangle_b);
+      meet(a, b, tolerance, meeting);
+      if (meeting.kind == MeetingKind::none) continue;
+      write_piece(memory_, team_.add(next, 1), contact, a.normal, b.normal, meeting, found);
     }
-    degenerate = degenerate || meeting.degenerate;
-    segments += meeting.kind == MeetingKind::segment ? 1u : 0u;
-    const int ends = meeting.kind == MeetingKind::segment ? 2 : 1;
-    for (int end = 0; end < ends; ++end) {
-      const double x[3] = {meeting.end[end].x, meeting.end[end].y, meeting.end[end].z};
-      for (int k = 0; k < 3; ++k) {
-        lower[k] = lesser(lower[k], x[k]);
-        upper[k] = greater(upper[k], x[k]);
-      }
-    }
-    for (int i_corner = 0; i_corner < meeting.corners; ++i_corner) {
-      const Vector3& c = meeting.corner[i_corner];
-      const double x[3] = {c.x, c.y, c.z};
-      for (int k = 0; k < 3; ++k) {
-        lower[k] = lesser(lower[k], x[k]);
-        upper[k] = greater(upper[k], x[k]);
-      }
-    }
+    team_.sync();
+    summary_.pieces = team_.load(next);
   }
-  team_.sync();
-  summary_.pieces = team_.load(next);
-  summary_.segments = team_.sum(segments);
-  summary_.degenerate = team_.any(degenerate);
+  summary_.segments = team_.sum(found.segments);
+  summary_.degenerate = team_.any(found.degenerate);
   double bounds[6];
-  for (int k = 0; k < 3; ++k) bounds[k] = upper[k], bounds[3 + k] = -lower[k];
+  for (int k = 0; k < 3; ++k) bounds[k] = found.upper[k], bounds[3 + k] = -found.lower[k];
   team_.greatest_ones(bounds);
   double extent = 0, middle[3];
   for (int k = 0; k < 3; ++k) {
@@ -254,6 +266,7 @@ TANDEM_HD void CurveFinder<Team>::make_pieces(const Contact* contacts, std::uint
 /// boundary: rounding chose another feature there, or a triangle pair is missing.
 template <typename Team>
 TANDEM_HD bool CurveFinder<Team>::connect_by_ends() {
+  if constexpr (HasMeans<Team>) return team_.means().connect_by_ends(bodies_, memory_, summary_.pieces);
   const std::uint32_t size = 4 * summary_.pieces;
   clear(size);
   int alone = 0;
@@ -278,6 +291,7 @@ TANDEM_HD bool CurveFinder<Team>::connect_by_ends() {
 /// corner on both sides.
 template <typename Team>
 TANDEM_HD void CurveFinder<Team>::connect_by_corners() {
+  if constexpr (HasMeans<Team>) return team_.means().connect_by_corners(bodies_, memory_, summary_.pieces);
   const std::uint32_t size = PieceMemory::kTableWords * summary_.pieces;
   clear(size);
   for (std::uint32_t i = team_.rank(); i < summary_.pieces; i += team_.size()) {

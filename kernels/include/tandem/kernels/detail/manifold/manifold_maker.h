@@ -95,10 +95,12 @@ TANDEM_HD void ManifoldMaker<Team>::place_soundings(const RimFinder<Team>& finde
 /// Answers the first `count` line questions; those of no side were not asked.
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::walk_lines(LineQuestions& questions, std::uint32_t count) {
+  if constexpr (HasMeans<Team>) return questions.answer(team_.means(), count);
   constexpr int kLinesWidth = 8;
   team_.sync();
   team_.template for_each_group<kLinesWidth>(count, [&](auto& group, std::uint32_t i, bool given) {
     const bool asked = given && shared_.line[i].side >= 0;
+    if (asked && group.rank() == 0) questions.prepare(i);
     walk_surface(group, questions, i, asked);
     const bool further = asked && questions.has_to_look_further(i);
     group.sync();
@@ -176,6 +178,12 @@ TANDEM_HD void ManifoldMaker<Team>::place_prism(const PatchFrame& frame) {
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::find_extreme_corners(const PatchFrame& frame, std::uint32_t curve) {
   const std::uint32_t begin = memory_.start[curve], end = memory_.start[curve + 1];
+  if constexpr (HasMeans<Team>) {
+    for (int side = 0; side < 2; ++side)
+      shared_.extreme[2 + side] =
+          team_.means().extreme_corner(bodies_[side], memory_, begin, end, frame, side);
+    return;
+  }
   Extreme best[2];
   for (std::uint32_t i = begin + team_.rank(); i < end; i += team_.size()) {
     for (int side = 0; side < 2; ++side) {
@@ -183,7 +191,8 @@ TANDEM_HD void ManifoldMaker<Team>::find_extreme_corners(const PatchFrame& frame
       for (int k = 0; k < 3; ++k) {
         const Vector3 x = bodies_[side].corner(t, k);
         const Extreme here = {frame.flat(x), frame.height(x), bodies_[side].shape->topology[t].vertex[k]};
-        if (ExtremeQuestions::is_further(static_cast<std::uint32_t>(side), here, best[side])) best[side] = here;
+        if (ExtremeQuestions::is_further(static_cast<std::uint32_t>(side), here, best[side]))
+          best[side] = here;
       }
     }
   }
@@ -216,12 +225,16 @@ TANDEM_HD void ManifoldMaker<Team>::find_extreme_corners(const PatchFrame& frame
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::sound_deepest(const PatchFrame& frame, std::uint32_t curve) {
   place_prism(frame);
-  ExtremeQuestions questions(bodies_, shared_.prism, shared_.prism_test, shared_.extreme);
-  for (std::uint32_t side = team_.rank(); side < 2; side += team_.size()) questions.ask(side);
-  team_.sync();
-  team_.template for_each_group<Team::kHalf>(2, [&](auto& group, std::uint32_t side, bool given) {
-    walk_surface(group, questions, side, given);
-  });
+  if constexpr (HasMeans<Team>) {
+    for (int side = 0; side < 2; ++side)
+      shared_.extreme[side] = team_.means().find_extreme(bodies_[side], shared_.prism, side);
+  } else {
+    ExtremeQuestions questions(bodies_, shared_.prism, shared_.prism_test, shared_.extreme);
+    for (std::uint32_t side = team_.rank(); side < 2; side += team_.size()) questions.ask(side);
+    team_.sync();
+    team_.template for_each_group<Team::kHalf>(
+        2, [&](auto& group, std::uint32_t side, bool given) { walk_surface(group, questions, side, given); });
+  }
   const bool few = memory_.start[curve + 1] - memory_.start[curve] <= kFewPieces;
   if (few) find_extreme_corners(frame, curve);
   team_.sync();

@@ -16,6 +16,24 @@ struct Patch {
   ManifoldPoint point[kMostManifoldPoints];
 };
 
+/// Sums over the pieces of a curve.
+struct CurveSums {
+  ExactVectorSum area, gap, middle;
+  ExactSum length;
+  std::uint64_t key = ~std::uint64_t{0};
+
+  TANDEM_HD void add(const Piece& piece, const Vector3& origin, double one_by_unit) {
+    key = lesser(key, piece.key());
+    if (piece.kind() == MeetingKind::polygon) return area.add(piece.end[1], one_by_unit * one_by_unit);
+    const Vector3 from = piece.end[0] - origin, along = piece.weight() * (piece.end[1] - piece.end[0]);
+    area.add(0.5 * cross(from, along), one_by_unit * one_by_unit);
+    gap.add(along, one_by_unit);
+    const double size = norm(along);
+    length.add(size, one_by_unit);
+    middle.add((size * one_by_unit) * (0.5 * (from + (piece.end[1] - origin))), one_by_unit);
+  }
+};
+
 /// What all pieces of a curve amount to.
 struct CurveMeasure {
   Vector3 area;    ///< half the sum of r x dr, and polygons: from a towards b
@@ -26,6 +44,14 @@ struct CurveMeasure {
                          ///< closed; of open surfaces where there are any
   std::uint64_t key = 0;
 };
+
+/// The heights of a patch's triangles along a direction.
+struct Spread {
+  double highest_a, lowest_b;
+};
+
+/// The most directions that are tried for a normal.
+inline constexpr int kMostTried = 11;
 
 /// The direction in which the bodies of a patch push each other.
 struct PatchNormal {
@@ -46,6 +72,40 @@ struct FloatPoint {
   float x, y;
 };
 
+/// What a candidate is to have most of: distance from p, or distance beyond the line from p to q, times its
+/// length.
+struct RimValue {
+  FloatPoint p, q;
+  bool distance;
+
+  TANDEM_HD float operator()(const Candidate& c) const {
+    const float x = c.x - p.x, y = c.y - p.y;
+    return distance ? x * x + y * y : (q.y - p.y) * x - (q.x - p.x) * y;
+  }
+};
+
+/// The candidate that has most of something.
+struct Furthest {
+  float value;
+  std::uint32_t reference;
+
+  TANDEM_HD static std::uint64_t key(const PieceMemory& memory, std::uint32_t reference) {
+    const Piece& p = memory.pieces[reference / 8];
+    return std::uint64_t{p.triangle[0]} << 33 | std::uint64_t{p.triangle[1]} << 3 | (reference & 7u);
+  }
+  /// Of several the one whose triangles come first.
+  TANDEM_HD void take(const PieceMemory& memory, float of_c, std::uint32_t of) {
+    if (!(of_c >= value)) return;
+    if (of_c == value && (reference == kNoIndex || key(memory, of) >= key(memory, reference))) return;
+    value = of_c, reference = of;
+  }
+};
+
+/// Twice the area within a curve as it is seen along the normal, and that times its middle.
+struct RimMoments {
+  ExactSum twice_area, x, y;
+};
+
 /// A patch's outermost candidates, counter-clockwise.
 struct Rim {
   std::uint32_t reference[kMostManifoldPoints];
@@ -61,11 +121,11 @@ struct Sounding {
   double target[2];         ///< the height near which the line is to meet a's surface, b's
   std::uint32_t reference;  ///< of a rim point: the candidate. Else kNoIndex
   std::uint64_t feature;
-  int rank = 0;             ///< of a rim point
-  int vertex_of = -1;       ///< the side whose vertex it is; -1: none's
-  Crossing surface[2];      ///< a's, that faces along the normal; b's, that faces against it
-  Crossing behind[2];  ///< where a begins, on the line, if that is above b's surface; where b ends, if that
-                       ///< is below a's
+  int rank = 0;         ///< of a rim point
+  int vertex_of = -1;   ///< the side whose vertex it is; -1: none's
+  Crossing surface[2];  ///< a's, that faces along the normal; b's, that faces against it
+  Crossing behind[2];   ///< where a begins, on the line, if that is above b's surface; where b ends, if that
+                        ///< is below a's
   bool looked_behind;
 
   TANDEM_HD double overlap() const {

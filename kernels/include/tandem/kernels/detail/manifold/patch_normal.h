@@ -36,10 +36,8 @@ class NormalFinder {
     Vector3 n;            // from a towards b
     std::uint64_t piece;  // key of the piece whose triangle has it
   };
-  struct Spread {
-    double highest_a, lowest_b;
-  };
-  static constexpr int kMost = 2 * kMostDirections + 1;
+  static constexpr int kMost = kMostTried;
+  static_assert(kMost == 2 * kMostDirections + 1);
 
   template <typename Visit>
   TANDEM_HD void for_each_piece(const Visit& visit) const {
@@ -50,6 +48,8 @@ class NormalFinder {
   }
   /// Marks that pieces have for the time being. Each is seen by one of the team alone.
   TANDEM_HD std::uint32_t& mark(std::uint32_t i) const { return memory_.curve[i]; }
+  TANDEM_HD bool has_free_end() const;
+  TANDEM_HD Vector3 plain_middle() const;
   TANDEM_HD Vector3 sheet_normal() const;
   TANDEM_HD bool gather_directions(int side, bool keep_if_many);
   TANDEM_HD void find_bearing_faces(const Vector3& smooth, double length);
@@ -60,7 +60,8 @@ class NormalFinder {
   TANDEM_HD Vector3 crossing_edges(const Piece& piece, int number) const;
   /// The normal, from a towards b, of the triangle of a piece.
   TANDEM_HD Vector3 direction_of(int side, std::uint64_t piece) const {
-    const Vector3 n = bodies_[side].triangle(static_cast<std::uint32_t>(side == 0 ? piece >> 32 : piece)).normal;
+    const Vector3 n =
+        bodies_[side].triangle(static_cast<std::uint32_t>(side == 0 ? piece >> 32 : piece)).normal;
     return side == 0 ? n : -n;
   }
   TANDEM_HD static bool same_face(const FloatVector& p, const FloatVector& q) {
@@ -82,43 +83,50 @@ template <typename Team>
 TANDEM_HD CurveMeasure NormalFinder<Team>::measure() {
   const double unit = summary_.unit, one_by_unit = 1 / unit;
   const bool may_be_free = !summary_.degenerate && !(bodies_.a.shape->closed && bodies_.b.shape->closed);
-  ExactVectorSum area, gap, middle, plain_middle;
-  ExactSum length;
-  std::uint64_t key = ~std::uint64_t{0};
+  CurveSums sums;
+  if constexpr (HasMeans<Team>) {
+    team_.means().sum_pieces(memory_, begin_, end_, summary_.origin, one_by_unit, sums);
+  } else {
+    for_each_piece([&](const Piece& piece, const float*) { sums.add(piece, summary_.origin, one_by_unit); });
+  }
+  add_up(team_, {&sums.area.x, &sums.area.y, &sums.area.z, &sums.gap.x, &sums.gap.y, &sums.gap.z,
+                 &sums.middle.x, &sums.middle.y, &sums.middle.z, &sums.length});
+  CurveMeasure out;
+  out.key = team_.least(sums.key);
+  out.area = sums.area.value(unit * unit);
+  out.length = sums.length.value(unit);
+  out.closed = !(may_be_free && has_free_end()) && norm(sums.gap.value(unit)) <= kClosed * out.length;
+  out.middle =
+      summary_.origin + (out.length > 0 ? (unit / out.length) * sums.middle.value(unit) : plain_middle());
+  if (!out.closed) out.sheet_normal = sheet_normal();
+  return out;
+}
+
+template <typename Team>
+TANDEM_HD bool NormalFinder<Team>::has_free_end() const {
   bool is_free = false;
   for_each_piece([&](const Piece& piece, const float*) {
-    key = lesser(key, piece.key());
-    const Vector3 from = piece.end[0] - summary_.origin;
-    if (piece.kind() == MeetingKind::polygon) {
-      area.add(piece.end[1], one_by_unit * one_by_unit);
-      plain_middle.add(from, one_by_unit);
-      return;
-    }
-    const Vector3 along = piece.weight() * (piece.end[1] - piece.end[0]);
-    area.add(0.5 * cross(from, along), one_by_unit * one_by_unit);
-    gap.add(along, one_by_unit);
-    const double size = norm(along);
-    length.add(size, one_by_unit);
-    const Vector3 half_way = 0.5 * (from + (piece.end[1] - summary_.origin));
-    middle.add((size * one_by_unit) * half_way, one_by_unit);
-    plain_middle.add(half_way, one_by_unit);
-    for (int end = 0; end < 2 && may_be_free; ++end) {
+    if (piece.kind() == MeetingKind::polygon) return;
+    for (int end = 0; end < 2; ++end) {
       const TriangleFeature f = piece.feature(end);
       const std::uint32_t flags = bodies_[f.of_b].shape->topology[piece.triangle[f.of_b]].flags;
       is_free = is_free || is_boundary(flags, f.number);
     }
   });
-  add_up(team_, {&area.x, &area.y, &area.z, &gap.x, &gap.y, &gap.z, &middle.x, &middle.y, &middle.z,
-                 &plain_middle.x, &plain_middle.y, &plain_middle.z, &length});
-  CurveMeasure out;
-  out.key = team_.least(key);
-  out.area = area.value(unit * unit);
-  out.length = length.value(unit);
-  out.closed = !team_.any(is_free) && norm(gap.value(unit)) <= kClosed * out.length;
-  out.middle = summary_.origin + (out.length > 0 ? (unit / out.length) * middle.value(unit)
-                                                 : (1.0 / (end_ - begin_)) * plain_middle.value(unit));
-  if (!out.closed) out.sheet_normal = sheet_normal();
-  return out;
+  return team_.any(is_free);
+}
+
+/// Of pieces without length, from the origin on.
+template <typename Team>
+TANDEM_HD Vector3 NormalFinder<Team>::plain_middle() const {
+  ExactVectorSum sum;
+  for_each_piece([&](const Piece& piece, const float*) {
+    const Vector3 from = piece.end[0] - summary_.origin;
+    const bool polygon = piece.kind() == MeetingKind::polygon;
+    sum.add(polygon ? from : 0.5 * (from + (piece.end[1] - summary_.origin)), 1 / summary_.unit);
+  });
+  add_up(team_, {&sum.x, &sum.y, &sum.z});
+  return (1.0 / (end_ - begin_)) * sum.value(summary_.unit);
 }
 
 template <typename Team>
@@ -171,7 +179,8 @@ TANDEM_HD bool NormalFinder<Team>::gather_directions(int side, bool keep_if_many
     known = {{n[0], n[1], n[2]}};
   }
   if (!all && !keep_if_many) return false;
-  for (int i = 0; i < found; ++i) direction_[directions_++] = {direction_of(side, first_piece[i]), first_piece[i]};
+  for (int i = 0; i < found; ++i)
+    direction_[directions_++] = {direction_of(side, first_piece[i]), first_piece[i]};
   return all;
 }
 
@@ -209,7 +218,8 @@ TANDEM_HD void NormalFinder<Team>::find_bearing_faces(const Vector3& smooth, dou
     if (key[side] == ~std::uint64_t{0}) continue;
     any = true;
     n[side] = direction_of(side, key[side]);
-    face[side] = {{static_cast<float>(n[side].x), static_cast<float>(n[side].y), static_cast<float>(n[side].z)}};
+    face[side] = {
+        {static_cast<float>(n[side].x), static_cast<float>(n[side].y), static_cast<float>(n[side].z)}};
   }
   if (!any) return;
   ExactSum within[2];
@@ -232,6 +242,10 @@ TANDEM_HD void NormalFinder<Team>::find_bearing_faces(const Vector3& smooth, dou
 /// b's lowest.
 template <typename Team>
 TANDEM_HD void NormalFinder<Team>::spread_along(const Vector3* directions, int count, Spread* spread) const {
+  if constexpr (HasMeans<Team>) {
+    return team_.means().spread_along(bodies_, memory_, begin_, end_, summary_.origin, directions, count,
+                                      spread);
+  }
   for (int i = 0; i < count; ++i) spread[i] = {-INFINITY, INFINITY};
   std::uint32_t seen_a = kNoIndex, seen_b = kNoIndex;
   for_each_piece([&](const Piece& piece, const float*) {
@@ -247,7 +261,8 @@ TANDEM_HD void NormalFinder<Team>::spread_along(const Vector3* directions, int c
     seen_a = piece.triangle[0], seen_b = piece.triangle[1];
   });
   double furthest[2 * kMost];
-  for (int i = 0; i < count; ++i) furthest[2 * i] = spread[i].highest_a, furthest[2 * i + 1] = -spread[i].lowest_b;
+  for (int i = 0; i < count; ++i)
+    furthest[2 * i] = spread[i].highest_a, furthest[2 * i + 1] = -spread[i].lowest_b;
   team_.greatest_ones(furthest, 2 * count);
   for (int i = 0; i < count; ++i) spread[i] = {furthest[2 * i], -furthest[2 * i + 1]};
 }

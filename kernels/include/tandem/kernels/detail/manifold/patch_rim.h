@@ -36,9 +36,9 @@ class RimFinder {
   TANDEM_HD std::uint64_t feature(std::uint32_t reference) const;
   TANDEM_HD const Piece& piece(std::uint32_t reference) const { return memory_.pieces[reference / 8]; }
 
-  /// A point of the rim is called by the least feature of its own and of candidates closer than `distance`. An
-  /// inner one, the middle or a vertex that may be deepest in two patches, is told apart by the patch's key.
-  /// points: that all of the team see.
+  /// A point of the rim is called by the least feature of its own and of candidates closer than `distance`.
+  /// An inner one, the middle or a vertex that may be deepest in two patches, is told apart by the patch's
+  /// key. points: that all of the team see.
   TANDEM_HD void name_points(Chosen* points, int count, double distance, std::uint64_t patch_key) const;
 
  private:
@@ -49,20 +49,11 @@ class RimFinder {
     meet(bodies_.a.triangle(piece.triangle[0]), bodies_.b.triangle(piece.triangle[1]), bodies_.tolerance(),
          meeting);
   }
-  TANDEM_HD std::uint64_t key(std::uint32_t reference) const {
-    const Piece& p = piece(reference);
-    return std::uint64_t{p.triangle[0]} << 33 | std::uint64_t{p.triangle[1]} << 3 | (reference & 7u);
-  }
   TANDEM_HD void add(const Vector3& x, std::uint32_t reference, std::uint32_t& next) {
     const Vector2 at = frame_.flat(x);
     candidates()[team_.add(next, 1)] = {static_cast<float>(at.x), static_cast<float>(at.y), reference};
   }
-  struct Furthest {
-    float value;
-    std::uint32_t reference;
-  };
-  template <typename One, typename Other>
-  TANDEM_HD void furthest(const One& value, const Other& other_value, Furthest& one, Furthest& other) const;
+  TANDEM_HD void furthest(const RimValue* values, int wanted, Furthest* const* best) const;
 
   const Team& team_;
   const BodyPair& bodies_;
@@ -71,18 +62,25 @@ class RimFinder {
   std::uint32_t begin_, end_;
   const PatchFrame& frame_;
   std::uint32_t count_ = 0;
-  ExactSum twice_area_, moment_x_, moment_y_;
+  RimMoments moments_;
 };
 
 template <typename Team>
 TANDEM_HD void RimFinder<Team>::gather(bool each_end_twice, std::uint32_t& next) {
   const double one_by_unit = 1 / summary_.unit;
   const auto add_moments = [&](double twice_area, const Vector2& three_middles) {
-    twice_area_.add(twice_area, one_by_unit * one_by_unit);
+    moments_.twice_area.add(twice_area, one_by_unit * one_by_unit);
     const double area_in_units = twice_area * one_by_unit * one_by_unit / 3;
-    moment_x_.add(area_in_units * three_middles.x, one_by_unit);
-    moment_y_.add(area_in_units * three_middles.y, one_by_unit);
+    moments_.x.add(area_in_units * three_middles.x, one_by_unit);
+    moments_.y.add(area_in_units * three_middles.y, one_by_unit);
   };
+  if constexpr (HasMeans<Team>) {
+    if (!summary_.degenerate) {  // there are no polygons
+      count_ = team_.means().gather_rim(memory_, begin_, end_, frame_, one_by_unit, each_end_twice ? 1 : 2,
+                                        candidates(), moments_);
+      return;
+    }
+  }
   if (team_.rank() == 0) team_.store(next, 0);
   team_.sync();
   Meeting meeting;
@@ -114,49 +112,44 @@ TANDEM_HD void RimFinder<Team>::gather(bool each_end_twice, std::uint32_t& next)
   }
   team_.sync();
   count_ = team_.load(next);
-  add_up(team_, {&twice_area_, &moment_x_, &moment_y_});
+  add_up(team_, {&moments_.twice_area, &moments_.x, &moments_.y});
 }
 
 template <typename Team>
 TANDEM_HD bool RimFinder<Team>::middle_of_area(Vector2& middle) const {
-  const double unit = summary_.unit, twice_area = twice_area_.value(unit * unit);
+  const double unit = summary_.unit, twice_area = moments_.twice_area.value(unit * unit);
   if (!(twice_area > 0x1p-30 * (unit * unit))) return false;
   const double by_area = unit * unit / twice_area;
-  middle = {by_area * moment_x_.value(unit), by_area * moment_y_.value(unit)};
+  middle = {by_area * moments_.x.value(unit), by_area * moments_.y.value(unit)};
   return true;
 }
 
-/// For each of two values the candidate that has the greatest one, if it is greater than what is given; of
-/// several the one whose triangles come first.
+/// For each value, one or two, the candidate that has the greatest one, if it is greater than what is given;
+/// of several the one whose triangles come first.
 template <typename Team>
-template <typename One, typename Other>
-TANDEM_HD void RimFinder<Team>::furthest(const One& value, const Other& other_value, Furthest& one,
-                                         Furthest& other) const {
-  const auto take = [&](float of_c, std::uint32_t reference, Furthest& best) {
-    if (!(of_c >= best.value)) return;
-    if (of_c == best.value && (best.reference == kNoIndex || key(reference) >= key(best.reference))) return;
-    best = {of_c, reference};
-  };
+TANDEM_HD void RimFinder<Team>::furthest(const RimValue* values, int wanted, Furthest* const* best) const {
+  if constexpr (HasMeans<Team>) {
+    return team_.means().furthest(memory_, candidates(), count_, values, wanted, best);
+  }
   for (std::uint32_t i = team_.rank(); i < count_; i += team_.size()) {
     const Candidate& c = candidates()[i];
-    take(value(c), c.reference, one);
-    take(other_value(c), c.reference, other);
+    for (int k = 0; k < wanted; ++k) best[k]->take(memory_, values[k](c), c.reference);
   }
   if (Team::size() == 1) return;
-  float greatest[2] = {one.value, other.value};
-  team_.greatest_ones(greatest);
+  float greatest[2] = {};
+  for (int k = 0; k < 2; ++k) greatest[k] = k < wanted ? best[k]->value : 0;
+  team_.greatest_ones(greatest, wanted);
   std::uint64_t own[2], least[2];
-  const Furthest* const both[2] = {&one, &other};
-  for (int i = 0; i < 2; ++i) {
-    const bool mine = both[i]->reference != kNoIndex && both[i]->value == greatest[i];
-    least[i] = own[i] = mine ? key(both[i]->reference) : ~std::uint64_t{0};
+  for (int k = 0; k < 2; ++k) {
+    const bool mine = k < wanted && best[k]->reference != kNoIndex && best[k]->value == greatest[k];
+    least[k] = own[k] = mine ? Furthest::key(memory_, best[k]->reference) : ~std::uint64_t{0};
   }
-  team_.least_ones(least);
+  team_.least_ones(least, wanted);
   std::uint32_t reference[2];
-  for (int i = 0; i < 2; ++i)
-    reference[i] = own[i] != ~std::uint64_t{0} && own[i] == least[i] ? both[i]->reference : kNoIndex;
-  team_.least_ones(reference);
-  one = {greatest[0], reference[0]}, other = {greatest[1], reference[1]};
+  for (int k = 0; k < 2; ++k)
+    reference[k] = own[k] != ~std::uint64_t{0} && own[k] == least[k] ? best[k]->reference : kNoIndex;
+  team_.least_ones(reference, wanted);
+  for (int k = 0; k < wanted; ++k) *best[k] = {greatest[k], reference[k]};
 }
 
 template <typename Team>
@@ -176,27 +169,27 @@ TANDEM_HD Rim RimFinder<Team>::find(int most, const Vector2& middle) const {
     }
     rim.reference[where] = reference, rim.at[where] = place(reference), rim.rank[where] = rank;
   };
-  const auto from = [&](const FloatPoint& p) {
-    return [p](const Candidate& c) { return (c.x - p.x) * (c.x - p.x) + (c.y - p.y) * (c.y - p.y); };
+  const auto furthest_from = [&](const FloatPoint& p, float than) {
+    const RimValue value = {p, p, true};
+    Furthest best = {than, kNoIndex};
+    Furthest* const bests[] = {&best};
+    furthest(&value, 1, bests);
+    return best;
   };
-  const auto beyond = [](const FloatPoint& p, const FloatPoint& q) {
-    return [p, q](const Candidate& c) { return (q.y - p.y) * (c.x - p.x) - (q.x - p.x) * (c.y - p.y); };
-  };
-  const auto nothing = [](const Candidate&) { return -1.0f; };
-  const FloatPoint start = {static_cast<float>(middle.x), static_cast<float>(middle.y)};
-  Furthest one = {-1, kNoIndex}, other = {0, kNoIndex};
-  furthest(from(start), nothing, one, other);
+  Furthest one = furthest_from({static_cast<float>(middle.x), static_cast<float>(middle.y)}, -1);
   if (one.reference == kNoIndex) return rim;
   insert(0, one.reference);
   one = {0, kNoIndex};
-  if (most > 1) furthest(from(rim.at[0]), nothing, one, other);
+  if (most > 1) one = furthest_from(rim.at[0], 0);
   if (one.reference == kNoIndex) return rim;
   insert(1, one.reference);
   float limit = kThin * one.value, area = 0;
   for (int first = 0, second = 1; rim.points < most;) {
     of_side[first] = of_side[second] = {0, kNoIndex};
-    furthest(beyond(rim.at[first], rim.at[next(first)]), beyond(rim.at[second], rim.at[next(second)]),
-             of_side[first], of_side[second]);
+    const RimValue beyond[] = {{rim.at[first], rim.at[next(first)], false},
+                               {rim.at[second], rim.at[next(second)], false}};
+    Furthest* const bests[] = {&of_side[first], &of_side[second]};
+    furthest(beyond, 2, bests);
     int side = 0;
     for (int i = 1; i < rim.points; ++i) side = of_side[i].value > of_side[side].value ? i : side;
     if (!(of_side[side].value > limit)) return rim;
@@ -252,12 +245,23 @@ TANDEM_HD void RimFinder<Team>::name_points(Chosen* points, int count, double di
                    : FloatPoint{NAN, NAN};
   }
   const auto square = static_cast<float>(distance * distance);
-  for (std::uint32_t i = team_.rank(); i < count_; i += team_.size()) {
-    const Candidate& c = candidates()[i];
-    for (int k = 0; k < kMost; ++k) {
-      const float x = c.x - at[k].x, y = c.y - at[k].y;
-      if (!(x * x + y * y < square)) continue;
-      least[k] = lesser(least[k], feature(c.reference));
+  if constexpr (HasMeans<Team>) {
+    for (int k = 0; k < count; ++k) {
+      const auto next = [&](std::uint32_t from) {
+        return team_.means().next_near(candidates(), from, count_, at[k], square);
+      };
+      if (points[k].inner) continue;
+      for (std::uint32_t i = next(0); i < count_; i = next(i + 1))
+        least[k] = lesser(least[k], feature(candidates()[i].reference));
+    }
+  } else {
+    for (std::uint32_t i = team_.rank(); i < count_; i += team_.size()) {
+      const Candidate& c = candidates()[i];
+      for (int k = 0; k < kMost; ++k) {
+        const float x = c.x - at[k].x, y = c.y - at[k].y;
+        if (!(x * x + y * y < square)) continue;
+        least[k] = lesser(least[k], feature(c.reference));
+      }
     }
   }
   team_.least_ones(least);

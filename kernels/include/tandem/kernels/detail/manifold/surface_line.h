@@ -135,8 +135,7 @@ TANDEM_HD inline std::uint32_t bits_set(unsigned mask) {
 /// triangle; better(found, other) is the better of two, whatever their order; merge(question, found) keeps
 /// what is better than what is known. A Found is true where there is something.
 template <typename Group, typename Questions>
-TANDEM_HD inline void walk_surface(Group& group, Questions& questions, std::uint32_t question,
-                                   bool asked) {
+TANDEM_HD inline void walk_surface(Group& group, Questions& questions, std::uint32_t question, bool asked) {
   // With so many blocks left a group looks at one at a time, which never takes more.
   constexpr std::uint32_t kReserve = 3 * kMaxDepth + 8;
   static_assert(Group::kRoom > kReserve);
@@ -157,8 +156,8 @@ TANDEM_HD inline void walk_surface(Group& group, Questions& questions, std::uint
     const std::uint32_t before = group.sum_before(below.leaves ? nodes << 16 : nodes, total);
     group.sync();  // all have taken theirs
     waiting -= taken;
-    std::uint32_t* next = below.leaves ? group.triangles + (before >> 16)
-                                       : group.waiting + waiting + (before & 0xFFFFu);
+    std::uint32_t* next =
+        below.leaves ? group.triangles + (before >> 16) : group.waiting + waiting + (before & 0xFFFFu);
     for (int i = 0; i < kNodesPerBlock; ++i) {
       if ((below.mask >> i & 1u) != 0) *next++ = below.index[i];
     }
@@ -168,7 +167,8 @@ TANDEM_HD inline void walk_surface(Group& group, Questions& questions, std::uint
     for (std::uint32_t i = group.rank(); i < total >> 16; i += Group::size())
       questions.visit(question, group.triangles[i], found);
     if (group.any_of_all(static_cast<bool>(found))) {
-      found = group.best(found, [&](const auto& x, const auto& y) { return questions.better(question, x, y); });
+      found =
+          group.best(found, [&](const auto& x, const auto& y) { return questions.better(question, x, y); });
       if (found && group.rank() == 0) questions.merge(question, found);
     }
     group.sync();
@@ -236,13 +236,32 @@ class LineQuestions {
     q.at = at;
     q.target = target, q.lower = lower, q.upper = upper;
     q.side = side, q.facing = facing;
-    const Body& body = bodies_[side];
-    q.point = point_in_mesh(body, frame_.at(at, target));
+    q.most = expected;
+  }
+
+  /// Makes the test of boxes.
+  TANDEM_HD void prepare(std::uint32_t question) {
+    LineQuestion& q = questions_[question];
+    const Body& body = bodies_[q.side];
+    q.point = point_in_mesh(body, frame_.at(q.at, q.target));
     q.direction = in_mesh(body, frame_.n);
     q.slack = slack_near(body, q.point);
-    q.lower_along = static_cast<float>(lower - target) - q.slack;
-    q.upper_along = static_cast<float>(upper - target) + q.slack;
-    look_within(q, expected);
+    q.lower_along = static_cast<float>(q.lower - q.target) - q.slack;
+    q.upper_along = static_cast<float>(q.upper - q.target) + q.slack;
+    look_within(q, q.most);
+  }
+
+  /// Answers the first `count` questions; those of no side were not asked.
+  template <typename Means>
+  void answer(const Means& means, std::uint32_t count) {
+    for (int side = 0; side < 2; ++side) {
+      LineQuestion* asked[Means::kMostLines];
+      int lines = 0;
+      for (std::uint32_t i = 0; i < count; ++i) {
+        if (questions_[i].side == side) asked[lines++] = &questions_[i];
+      }
+      if (lines > 0) means.answer_lines(bodies_[side], frame_, asked, lines);
+    }
   }
 
   /// Where nothing lies as near as expected, it has to be looked for further away. Not all boxes there were
@@ -395,8 +414,8 @@ class ExtremeQuestions {
       test.most[k] = static_cast<float>(prism_.most[k]) + slack;
     }
     test.axis[2] = in_mesh(body, question == 0 ? frame.n : -frame.n);
-    const double least = question == 0 ? greater(prism_.lower, prism_.above_a)
-                                       : greater(-prism_.upper, -prism_.below_b);
+    const double least =
+        question == 0 ? greater(prism_.lower, prism_.above_a) : greater(-prism_.upper, -prism_.below_b);
     test.least[2] = static_cast<float>(least) - slack;
     test.most[2] = static_cast<float>(question == 0 ? prism_.upper : -prism_.lower) + slack;
     test.slack = slack;

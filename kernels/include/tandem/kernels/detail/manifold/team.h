@@ -9,8 +9,8 @@ namespace tandem::manifold {
 /// A group of one thread: what a question's walk through a tree needs.
 struct OneThreadGroup {
   static constexpr std::uint32_t kRoom = 4 * kMaxDepth;
-  std::uint32_t waiting[kRoom];                ///< blocks
-  std::uint32_t triangles[kNodesPerBlock];     ///< of the leaves just found
+  std::uint32_t waiting[kRoom];             ///< blocks
+  std::uint32_t triangles[kNodesPerBlock];  ///< of the leaves just found
 
   TANDEM_HD static std::uint32_t rank() { return 0; }
   TANDEM_HD static std::uint32_t size() { return 1; }
@@ -85,6 +85,13 @@ struct OneThread {
     if (before == expected) at = value;
     return before;
   }
+};
+
+/// A thread of a CPU that has instructions for several things at a time: means() has other ways to the same
+/// answers (kernels/src/manifold_means.h).
+template <typename Team>
+concept HasMeans = requires(const Team& team) {
+  team.means();
 };
 
 }  // namespace tandem::manifold

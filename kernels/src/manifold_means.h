@@ -1,0 +1,61 @@
+#pragma once
+#include "lanes.h"
+#include "tandem/kernels/detail/block_pair.h"
+#include "tandem/kernels/detail/manifold/contact_curves.h"
+#include "tandem/kernels/detail/manifold/patch.h"
+
+// What makes manifolds faster on a machine that has the instructions. All ways give the same bytes.
+namespace tandem {
+
+struct ManifoldMeans {
+  static constexpr int kMostLines = 16;
+
+  /// Words of the table that pieces are joined by, for each contact, and as many once more.
+  static constexpr std::uint32_t kTableWords = 36;
+
+  manifold::PieceBounds (*make_pieces)(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory,
+                                       const Contact* contacts, std::uint32_t count);
+
+  static bool connect_by_ends(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory,
+                              std::uint32_t pieces);
+  static void connect_by_corners(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory,
+                                 std::uint32_t pieces);
+
+  // Each as the function of the name in the headers, of pieces order[begin] to order[end - 1].
+  void (*sum_pieces)(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
+                     const manifold::Vector3& origin, double one_by_unit, manifold::CurveSums& out);
+  void (*spread_along)(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory,
+                       std::uint32_t begin, std::uint32_t end, const manifold::Vector3& origin,
+                       const manifold::Vector3* directions, int count, manifold::Spread* spread);
+  manifold::Extreme (*extreme_corner)(const manifold::Body& body, const manifold::PieceMemory& memory,
+                                      std::uint32_t begin, std::uint32_t end,
+                                      const manifold::PatchFrame& frame, int side);
+  /// Where there are no polygons. ends: of each piece, 1 or 2. Result: how many candidates.
+  std::uint32_t (*gather_rim)(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
+                              const manifold::PatchFrame& frame, double one_by_unit, int ends,
+                              manifold::Candidate* candidates, manifold::RimMoments& moments);
+  void (*furthest)(const manifold::PieceMemory& memory, const manifold::Candidate* candidates,
+                   std::uint32_t count, const manifold::RimValue* values, int wanted,
+                   manifold::Furthest* const* best);
+  /// The next candidate from `i` on whose distance's square from a point is less, or `count`.
+  std::uint32_t (*next_near)(const manifold::Candidate* candidates, std::uint32_t i, std::uint32_t count,
+                             const manifold::FloatPoint& at, float square);
+
+  /// Answers questions about one body, at most kMostLines.
+  void (*answer_lines)(const manifold::Body& body, const manifold::PatchFrame& frame,
+                       manifold::LineQuestion* const* lines, int count);
+
+  /// The vertex of a body that reaches furthest in a prism: the highest of a (side 0), the lowest of b (1).
+  manifold::Extreme (*find_extreme)(const manifold::Body& body, const manifold::Prism& prism, int side);
+};
+
+/// The named way, or null where this machine or this build lacks it.
+const ManifoldMeans* manifold_means(BlockPairVariant variant);
+
+/// Of the widest vectors that this machine has. Condition: TANDEM_HAVE_LANES.
+const ManifoldMeans& best_manifold_means();
+
+// Each defined in a file of its own, which is compiled for machines that have the instructions.
+extern const ManifoldMeans kManifoldMeansLanes4, kManifoldMeansAvx2, kManifoldMeansAvx512;
+
+}  // namespace tandem

@@ -1,0 +1,284 @@
+#pragma once
+#include <bit>
+#include <cmath>
+
+#include "double_lanes.h"
+
+#ifdef TANDEM_HAVE_LANES
+#include "manifold_means.h"
+
+// What patch_normal.h, patch_rim.h and manifold_maker.h ask of all pieces of a curve, four pieces at a time.
+namespace tandem {
+namespace {
+
+/// ExactSum, a part of it in each lane. The bits of whole_number()'s constant are taken off in the end, as
+/// often as something was added; whole numbers may go round.
+struct ExactSumLanes {
+  DoubleMask<4> upper = {}, lower = {};
+
+  TANDEM_INLINE void add(const DoubleLanes<4>& value, double one_by_unit) {
+    const DoubleLanes<4> scaled = value * one_by_unit * 0x1p30;
+    const DoubleLanes<4> sum = scaled + kMagic, rest = (scaled - (sum - kMagic)) * 0x1p30 + kMagic;
+    upper += reinterpret_cast<DoubleMask<4>>(sum);
+    lower += reinterpret_cast<DoubleMask<4>>(rest);
+  }
+  TANDEM_INLINE void add_to(manifold::ExactSum& sum, std::uint32_t times) const {
+    const std::uint64_t constants = 4 * std::uint64_t{times} * std::bit_cast<std::uint64_t>(kMagic);
+    sum.upper += whole(upper, constants), sum.lower += whole(lower, constants);
+  }
+
+ private:
+  static constexpr double kMagic = 0x1.8p52;
+
+  TANDEM_INLINE static std::int64_t whole(const DoubleMask<4>& lanes, std::uint64_t constants) {
+    std::uint64_t all = 0;
+    for (int i = 0; i < 4; ++i) all += static_cast<std::uint64_t>(lanes[i]);
+    return static_cast<std::int64_t>(all - constants);
+  }
+};
+
+struct ExactVectorSumLanes {
+  ExactSumLanes x, y, z;
+
+  TANDEM_INLINE void add(const Vector3Lanes<4>& v, double one_by_unit) {
+    x.add(v.x, one_by_unit), y.add(v.y, one_by_unit), z.add(v.z, one_by_unit);
+  }
+  TANDEM_INLINE void add_to(manifold::ExactVectorSum& sum, std::uint32_t times) const {
+    x.add_to(sum.x, times), y.add_to(sum.y, times), z.add_to(sum.z, times);
+  }
+};
+
+TANDEM_INLINE Vector3Lanes<4> scaled(const DoubleLanes<4>& s, const Vector3Lanes<4>& v) {
+  return {s * v.x, s * v.y, s * v.z};
+}
+
+/// Four pieces of a curve; beyond its end the last one again.
+struct FourPieces {
+  std::uint32_t at[4];
+  const manifold::Piece* piece[4];
+  std::uint32_t lanes;
+
+  TANDEM_INLINE FourPieces(const manifold::PieceMemory& memory, std::uint32_t i, std::uint32_t end)
+      : lanes(end - i < 4 ? end - i : 4) {
+    for (std::uint32_t k = 0; k < 4; ++k) {
+      at[k] = memory.order[k < lanes ? i + k : end - 1];
+      piece[k] = memory.pieces + at[k];
+    }
+  }
+  TANDEM_INLINE void ends(Vector3Lanes<4>& from, Vector3Lanes<4>& to) const {
+    using D = DoubleLanes<4>;
+    D low[4], high[4];  // x, y, z of the first end, x of the other; z of the first, x, y, z of the other
+    for (int k = 0; k < 4; ++k) {
+      __builtin_memcpy(&low[k], &piece[k]->end[0].x, sizeof(D));
+      __builtin_memcpy(&high[k], &piece[k]->end[0].z, sizeof(D));
+    }
+    turn(low), turn(high);
+    from = {low[0], low[1], low[2]};
+    to = {low[3], high[2], high[3]};
+  }
+  /// 0 beyond the end and for polygons.
+  TANDEM_INLINE DoubleLanes<4> weights() const {
+    DoubleLanes<4> out;
+    for (std::uint32_t k = 0; k < 4; ++k)
+      out[k] = k < lanes && piece[k]->kind() != manifold::MeetingKind::polygon ? piece[k]->weight() : 0;
+    return out;
+  }
+  TANDEM_INLINE void triangles(int side, std::uint32_t (&index)[4]) const {
+    for (int k = 0; k < 4; ++k) index[k] = piece[k]->triangle[side];
+  }
+
+ private:
+  TANDEM_INLINE static void turn(DoubleLanes<4> (&rows)[4]) {
+    const auto a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 2, 6),
+               b = __builtin_shufflevector(rows[0], rows[1], 1, 5, 3, 7),
+               c = __builtin_shufflevector(rows[2], rows[3], 0, 4, 2, 6),
+               d = __builtin_shufflevector(rows[2], rows[3], 1, 5, 3, 7);
+    rows[0] = __builtin_shufflevector(a, c, 0, 1, 4, 5);
+    rows[1] = __builtin_shufflevector(b, d, 0, 1, 4, 5);
+    rows[2] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
+    rows[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
+  }
+};
+
+/// CurveSums::add() of all pieces.
+void sum_pieces(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
+                const manifold::Vector3& origin, double one_by_unit, manifold::CurveSums& out) {
+  ExactVectorSumLanes area, gap, middle;
+  ExactSumLanes length;
+  std::uint32_t times = 0;
+  for (std::uint32_t i = begin; i < end; i += 4, ++times) {
+    const FourPieces four(memory, i, end);
+    Vector3Lanes<4> first, second;
+    four.ends(first, second);
+    const DoubleLanes<4> weight = four.weights();
+    const Vector3Lanes<4> from = first - origin, along = scaled(weight, second - first);
+    const Vector3Lanes<4> across = cross(from, along);
+    area.add({0.5 * across.x, 0.5 * across.y, 0.5 * across.z}, one_by_unit * one_by_unit);
+    gap.add(along, one_by_unit);
+    const DoubleLanes<4> size = square_root(dot(along, along));
+    length.add(size, one_by_unit);
+    const Vector3Lanes<4> to = second - origin;
+    const Vector3Lanes<4> half_way = {0.5 * (from.x + to.x), 0.5 * (from.y + to.y), 0.5 * (from.z + to.z)};
+    middle.add(scaled(size * one_by_unit, half_way), one_by_unit);
+    for (int k = 0; k < 4; ++k) out.key = manifold::lesser(out.key, four.piece[k]->key());
+    for (std::uint32_t k = 0; k < four.lanes; ++k) {
+      if (four.piece[k]->kind() == manifold::MeetingKind::polygon)
+        out.area.add(four.piece[k]->end[1], one_by_unit * one_by_unit);
+    }
+  }
+  area.add_to(out.area, times), gap.add_to(out.gap, times), middle.add_to(out.middle, times);
+  length.add_to(out.length, times);
+}
+
+/// NormalFinder::spread_along().
+void spread_along(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory, std::uint32_t begin,
+                  std::uint32_t end, const manifold::Vector3& origin, const manifold::Vector3* directions,
+                  int count, manifold::Spread* spread) {
+  using D = DoubleLanes<4>;
+  constexpr D kMost = {INFINITY, INFINITY, INFINITY, INFINITY};
+  D highest[manifold::kMostTried], lowest[manifold::kMostTried];
+  for (int i = 0; i < count; ++i) highest[i] = -kMost, lowest[i] = kMost;
+  for (std::uint32_t i = begin; i < end; i += 4) {
+    const FourPieces four(memory, i, end);
+    for (int side = 0; side < 2; ++side) {
+      std::uint32_t index[4];
+      four.triangles(side, index);
+      for (int k = 0; k < 3; ++k) {
+        const Vector3Lanes<4> p = posed_corner(bodies[side], index, k) - origin;
+        for (int d = 0; d < count; ++d) {
+          const D height = dot(directions[d], p);
+          if (side == 0)
+            highest[d] = highest[d] > height ? highest[d] : height;
+          else
+            lowest[d] = lowest[d] < height ? lowest[d] : height;
+        }
+      }
+    }
+  }
+  for (int d = 0; d < count; ++d) {
+    spread[d] = {-INFINITY, INFINITY};
+    for (int i = 0; i < 4; ++i) {
+      spread[d].highest_a = manifold::greater(spread[d].highest_a, highest[d][i]);
+      spread[d].lowest_b = manifold::lesser(spread[d].lowest_b, lowest[d][i]);
+    }
+  }
+}
+
+/// ManifoldMaker::extreme_corner().
+manifold::Extreme extreme_corner(const manifold::Body& body, const manifold::PieceMemory& memory,
+                                 std::uint32_t begin, std::uint32_t end, const manifold::PatchFrame& frame,
+                                 int side) {
+  manifold::Extreme best;
+  double furthest = -INFINITY;
+  const double up = side == 0 ? 1 : -1;
+  for (std::uint32_t i = begin; i < end; i += 4) {
+    const FourPieces four(memory, i, end);
+    std::uint32_t index[4];
+    four.triangles(side, index);
+    for (int k = 0; k < 3; ++k) {
+      const Vector3Lanes<4> x = posed_corner(body, index, k) - frame.origin;
+      const DoubleLanes<4> height = dot(frame.n, x);
+      unsigned found = bits_of_mask(up * height >= furthest);
+      if (found == 0) continue;
+      const DoubleLanes<4> u = dot(frame.u, x), v = dot(frame.v, x);
+      for (; found != 0; found &= found - 1) {
+        const int lane = std::countr_zero(found);
+        const manifold::Extreme here = {
+            {u[lane], v[lane]}, height[lane], body.shape->topology[index[lane]].vertex[k]};
+        if (!manifold::ExtremeQuestions::is_further(static_cast<std::uint32_t>(side), here, best)) continue;
+        best = here;
+        furthest = up * here.height;
+      }
+    }
+  }
+  return best;
+}
+
+/// RimFinder::gather(), where there are no polygons.
+std::uint32_t gather_rim(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
+                         const manifold::PatchFrame& frame, double one_by_unit, int ends,
+                         manifold::Candidate* candidates, manifold::RimMoments& moments) {
+  using D = DoubleLanes<4>;
+  ExactSumLanes twice_area, moment_x, moment_y;
+  std::uint32_t times = 0, count = 0;
+  for (std::uint32_t i = begin; i < end; i += 4, ++times) {
+    const FourPieces four(memory, i, end);
+    Vector3Lanes<4> first, second;
+    four.ends(first, second);
+    const Vector3Lanes<4> from = first - frame.origin, to = second - frame.origin;
+    const D x[2] = {dot(frame.u, from), dot(frame.u, to)}, y[2] = {dot(frame.v, from), dot(frame.v, to)};
+    const D twice = four.weights() * (x[0] * y[1] - y[0] * x[1]);
+    twice_area.add(twice, one_by_unit * one_by_unit);
+    const D area_in_units = twice * one_by_unit * one_by_unit / 3;
+    moment_x.add(area_in_units * (x[0] + x[1]), one_by_unit);
+    moment_y.add(area_in_units * (y[0] + y[1]), one_by_unit);
+    for (int e = 0; e < ends; ++e) {
+      const auto fx = __builtin_convertvector(x[e], Vector<4>::Floats),
+                 fy = __builtin_convertvector(y[e], Vector<4>::Floats);
+      for (std::uint32_t k = 0; k < four.lanes; ++k)
+        candidates[count++] = {fx[k], fy[k], four.at[k] * 8 + static_cast<std::uint32_t>(e)};
+    }
+  }
+  twice_area.add_to(moments.twice_area, times);
+  moment_x.add_to(moments.x, times), moment_y.add_to(moments.y, times);
+  return count;
+}
+
+/// Four candidates; beyond the end the last one again.
+struct FourCandidates {
+  Lanes4 x, y;
+
+  TANDEM_INLINE FourCandidates(const manifold::Candidate* candidates, std::uint32_t i, std::uint32_t count) {
+    if (count - i >= 4) {
+      const float* const at = &candidates[i].x;
+      const auto a = load(at).v, b = load(at + 4).v, c = load(at + 8).v;  // xy.x y.xy .xy.
+      x.v = __builtin_shufflevector(__builtin_shufflevector(a, b, 0, 3, 6, 6), c, 0, 1, 2, 5);
+      y.v = __builtin_shufflevector(__builtin_shufflevector(a, b, 1, 4, 7, 7), c, 0, 1, 2, 6);
+      return;
+    }
+    for (std::uint32_t k = 0; k < 4; ++k) {
+      const manifold::Candidate& c = candidates[i + k < count ? i + k : count - 1];
+      x.v[k] = c.x, y.v[k] = c.y;
+    }
+  }
+};
+
+TANDEM_INLINE Lanes4 value_of(const manifold::RimValue& value, const FourCandidates& c) {
+  const manifold::FloatPoint &p = value.p, &q = value.q;
+  const Lanes4 x = c.x + -p.x, y = c.y + -p.y;
+  return value.distance ? x * x + y * y : (q.y - p.y) * x - (q.x - p.x) * y;
+}
+
+/// RimFinder::furthest().
+void furthest(const manifold::PieceMemory& memory, const manifold::Candidate* candidates, std::uint32_t count,
+              const manifold::RimValue* values, int wanted, manifold::Furthest* const* best) {
+  for (std::uint32_t i = 0; i < count; i += 4) {
+    const FourCandidates four(candidates, i, count);
+    for (int w = 0; w < wanted; ++w) {
+      const Lanes4 value = value_of(values[w], four);
+      unsigned found = LaneMask<4>{value.v >= best[w]->value}.mask();
+      for (; found != 0; found &= found - 1) {
+        const auto k = static_cast<std::uint32_t>(std::countr_zero(found));
+        if (i + k < count) best[w]->take(memory, value.v[static_cast<int>(k)], candidates[i + k].reference);
+      }
+    }
+  }
+}
+
+/// The next candidate from `i` on that is near, or `count`.
+std::uint32_t next_near(const manifold::Candidate* candidates, std::uint32_t i, std::uint32_t count,
+                        const manifold::FloatPoint& at, float square) {
+  for (; i < count; i += 4) {
+    const FourCandidates four(candidates, i, count);
+    const Lanes4 x = four.x + -at.x, y = four.y + -at.y;
+    const unsigned found = LaneMask<4>{(x * x + y * y).v < square}.mask();
+    if (found == 0) continue;
+    const std::uint32_t next = i + static_cast<std::uint32_t>(std::countr_zero(found));
+    return next < count ? next : count;
+  }
+  return count;
+}
+
+}  // namespace
+}  // namespace tandem
+#endif

@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <cstring>
 
+#include "tandem/kernels/detail/manifold/surface_line.h"
 #include "tandem/kernels/detail/manifold/team.h"
 
 // Teams of a GPU, see manifold/team.h: a warp, and a thread block.
@@ -26,8 +27,8 @@ struct SharedNumbers {
 
 /// What the groups of a warp need for walks through trees.
 struct WarpWalks {
-  std::uint32_t waiting[1024];                   ///< blocks
-  std::uint32_t triangles[32 * kNodesPerBlock];  ///< of leaves just found
+  std::uint32_t waiting[1024];  ///< blocks
+  std::uint32_t triangles[32];  ///< of leaves just found
 };
 
 /// Some lanes of a warp, see manifold/team.h. All groups of a warp run in step.
@@ -38,29 +39,26 @@ struct LaneGroup {
 
   __device__ explicit LaneGroup(WarpWalks& walks)
       : waiting(walks.waiting + threadIdx.x % 32 / kWidth * kRoom),
-        triangles(walks.triangles + threadIdx.x % 32 / kWidth * kWidth * kNodesPerBlock) {}
+        triangles(walks.triangles + threadIdx.x % 32 / kWidth * kWidth) {}
 
   __device__ static std::uint32_t rank() { return threadIdx.x % kWidth; }
-  __device__ static constexpr std::uint32_t size() { return kWidth; }
   __device__ static void sync() { __syncwarp(); }
-  __device__ static bool any_of_all(bool value) { return __any_sync(0xFFFFFFFFu, value) != 0; }
-  __device__ static std::uint32_t sum_before(std::uint32_t value, std::uint32_t& total) {
-    std::uint32_t sum = value;
-    for (std::uint32_t distance = 1; distance < kWidth; distance *= 2) {
-      const std::uint32_t other = __shfl_up_sync(0xFFFFFFFFu, sum, distance, kWidth);
-      if (rank() >= distance) sum += other;
-    }
-    total = __shfl_sync(0xFFFFFFFFu, sum, kWidth - 1, kWidth);
-    return sum - value;
+  __device__ static bool any_of_warp(bool value) { return __any_sync(kWarp, value) != 0; }
+  /// A bit for each of the group.
+  __device__ static std::uint32_t ballot(bool value) {
+    const std::uint32_t all = __ballot_sync(kWarp, value);
+    if constexpr (kWidth == 32) return all;
+    return all >> (threadIdx.x % 32 / kWidth * kWidth) & ((1u << kWidth % 32) - 1);
   }
   template <typename Found, typename Better>
   __device__ static Found best(Found found, const Better& better) {
-    for (std::uint32_t distance = kWidth / 2; distance > 0; distance /= 2)
-      found = better(found, exchanged(found, distance));
+    for (std::uint32_t bit = kWidth / 2; bit > 0; bit /= 2) found = better(found, exchanged(found, bit));
     return found;
   }
 
  private:
+  static constexpr std::uint32_t kWarp = 0xFFFFFFFFu;
+
   /// What the lane has whose number differs in one bit.
   template <typename T>
   __device__ static T exchanged(const T& own, std::uint32_t bit) {
@@ -68,12 +66,69 @@ struct LaneGroup {
     static_assert(sizeof(T) % 4 == 0);
     std::uint32_t word[kWords];
     memcpy(word, &own, sizeof(T));
-    for (int i = 0; i < kWords; ++i) word[i] = __shfl_xor_sync(0xFFFFFFFFu, word[i], bit, kWidth);
+    for (int i = 0; i < kWords; ++i) word[i] = __shfl_xor_sync(kWarp, word[i], bit, kWidth);
     T out;
     memcpy(&out, word, sizeof(T));
     return out;
   }
 };
+
+/// Answers a question about a posed body by a group, as manifold::walk_surface() does by one thread: each of
+/// it takes a node of a block, later a triangle. Groups that run in step come here together.
+template <std::uint32_t kWidth, typename Questions>
+__device__ __noinline__ void walk_surface(const LaneGroup<kWidth>& group, Questions& questions,
+                                          std::uint32_t question, bool asked) {
+  static_assert(kNodesPerBlock == 4);
+  // With so many blocks left a group looks at one at a time, which never takes more.
+  constexpr std::uint32_t kReserve = 3 * kMaxDepth + 4, kAtOnce = kWidth / 4;
+  static_assert(LaneGroup<kWidth>::kRoom > kReserve + 3 * kAtOnce);
+  std::uint32_t waiting = asked ? 1 : 0;
+  if (asked && group.rank() == 0) group.waiting[0] = 0;
+  group.sync();
+  const std::uint32_t node = group.rank() % 4, before = (1u << group.rank()) - 1;
+  while (group.any_of_warp(waiting > 0)) {
+    const std::uint32_t most = waiting + 3 * kAtOnce + kReserve <= LaneGroup<kWidth>::kRoom ? kAtOnce : 1;
+    const std::uint32_t taken = waiting < most ? waiting : most;
+    bool inner = false, leaf = false;
+    std::uint32_t below = 0;
+    if (group.rank() / 4 < taken) {
+      const manifold::Shape& shape = *questions.body(question).shape;
+      const std::uint32_t index = group.waiting[waiting - 1 - group.rank() / 4];
+      const auto passes = [&](const auto& block, const auto& test) {
+        return test.passes(
+            {{block.center[0][node], block.center[1][node], block.center[2][node]}},
+            {{block.half_extent[0][node], block.half_extent[1][node], block.half_extent[2][node]}});
+      };
+      if (shape.blocks != nullptr) {
+        const Block& block = shape.blocks[index];
+        leaf = block.is_leaf_block();
+        below = block.index[node];
+        inner = passes(block, questions.test(question));
+      } else {
+        const OrientedBlock& block = shape.oriented_blocks[index];
+        leaf = block.is_leaf_block();
+        below = (block.first_below & ~OrientedBlock::kIsLeafBlock) + node;
+        inner = passes(block, questions.test(question).turned(manifold::BlockAxes(block.rotation)));
+      }
+      leaf = leaf && inner, inner = inner && !leaf;
+    }
+    const std::uint32_t inners = group.ballot(inner), leaves = group.ballot(leaf);  // all have taken theirs
+    waiting -= taken;
+    if (inner) group.waiting[waiting + __popc(inners & before)] = below;
+    if (leaf) group.triangles[__popc(leaves & before)] = below;
+    waiting += __popc(inners);
+    group.sync();
+    if (!group.any_of_warp(leaves != 0)) continue;
+    typename Questions::Found found;
+    if (group.rank() < __popc(leaves)) questions.visit(question, group.triangles[group.rank()], found);
+    if (group.any_of_warp(static_cast<bool>(found))) {
+      found =
+          group.best(found, [&](const auto& x, const auto& y) { return questions.better(question, x, y); });
+      if (found && group.rank() == 0) questions.merge(question, found);
+    }
+    group.sync();
+  }
+}
 
 struct Sum {
   template <typename T>
@@ -150,7 +205,7 @@ struct WarpTeam : SharedNumbers {
   template <int kWidth, typename Of>
   __device__ void for_each_group(std::uint32_t count, const Of& of) const {
     constexpr std::uint32_t kGroups = 32 / kWidth;
-    LaneGroup<kWidth> group(*walks);
+    const LaneGroup<kWidth> group(*walks);
     for (std::uint32_t first = 0; first < count; first += kGroups) {
       const std::uint32_t i = first + rank() / kWidth;
       of(group, i, i < count);
@@ -207,7 +262,7 @@ struct BlockTeam : SharedNumbers {
   template <int kWidth, typename Of>
   __device__ void for_each_group(std::uint32_t count, const Of& of) const {
     constexpr std::uint32_t kGroups = kThreads / kWidth;
-    LaneGroup<kWidth> group(walks[threadIdx.x / 32]);
+    const LaneGroup<kWidth> group(walks[threadIdx.x / 32]);
     for (std::uint32_t first = 0; first < count; first += kGroups) {
       const std::uint32_t i = first + threadIdx.x / kWidth;
       of(group, i, i < count);

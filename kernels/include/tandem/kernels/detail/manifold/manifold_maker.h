@@ -18,76 +18,85 @@ inline constexpr double kDeeper = 1.25;
 /// In patches of so few pieces the corners of their triangles are looked at for the deepest point.
 inline constexpr std::uint32_t kFewPieces = 64;
 
+/// Makes the patch of a curve that CurveFinder found, whose summary this is, in three steps. A patch's state
+/// is all that they hand on to each other.
 template <typename Team>
 class ManifoldMaker {
  public:
   TANDEM_HD ManifoldMaker(const Team& team, const BodyPair& bodies, const PieceMemory& memory,
-                          PatchMemory& shared, const PieceSummary& summary, int most_points)
+                          PatchMemory& shared, const PieceSummary& summary)
       : team_(team),
         bodies_(bodies),
         memory_(memory),
         shared_(shared),
-        summary_(summary),
-        most_points_(most_points) {}
+        state_(shared.state),
+        summary_(summary) {}
 
-  /// Makes the patch of a curve that CurveFinder found, whose summary this is. new_patch(): where it is to
-  /// lie, or null; called by one of the team if there is one. False: an ambiguous touch.
+  /// Normal and rim. False: an ambiguous touch, which has no patch.
+  TANDEM_HD bool begin(std::uint32_t curve);
+
+  /// Depths.
+  TANDEM_HD void measure_depths(std::uint32_t curve);
+
+  /// Points. new_patch(): where the patch is to lie, or null; called by one of the team if there is one.
   template <typename NewPatch>
-  TANDEM_HD bool make(std::uint32_t curve, const NewPatch& new_patch);
+  TANDEM_HD void finish(std::uint32_t curve, int most_points, const NewPatch& new_patch);
 
  private:
-  TANDEM_HD void place_soundings(const RimFinder<Team>& finder, const Rim& rim, const PatchFrame& frame,
-                                 bool touch);
+  TANDEM_HD void place_soundings(const RimFinder<Team>& finder, const Rim& rim);
   TANDEM_HD void walk_lines(LineQuestions& questions, std::uint32_t count);
-  TANDEM_HD void sound(const PatchFrame& frame, int first, int count);
-  TANDEM_HD void place_prism(const PatchFrame& frame);
-  TANDEM_HD void find_extreme_corners(const PatchFrame& frame, std::uint32_t curve);
-  TANDEM_HD void sound_deepest(const PatchFrame& frame, std::uint32_t curve);
-  TANDEM_HD void look_behind(const PatchFrame& frame);
+  TANDEM_HD void sound(int first);
+  TANDEM_HD void place_prism();
+  TANDEM_HD void find_extreme_corners(std::uint32_t curve);
+  TANDEM_HD void sound_deepest(std::uint32_t curve);
+  TANDEM_HD void look_behind();
   TANDEM_HD void choose(const RimFinder<Team>& finder, int most_of_rim, bool touch);
-  TANDEM_HD void write_points(const PatchFrame& frame, Patch& patch, int count) const;
+  TANDEM_HD void write_points(Patch& patch, int count) const;
+  TANDEM_HD void write_manifold(Patch& patch, int count, bool hole, bool goes_through) const;
 
   const Team& team_;
   const BodyPair& bodies_;
   PieceMemory memory_;
   PatchMemory& shared_;
+  PatchState& state_;
   const PieceSummary& summary_;
-  int most_points_;
-  Vector2 middle_;     // of the rim
-  double extent_ = 0;  // of the rim, from its middle
-  int rim_points_ = 0, soundings_ = 0;
 };
 
 /// The rim as it is sounded, and the middle.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::place_soundings(const RimFinder<Team>& finder, const Rim& rim,
-                                                    const PatchFrame& frame, bool touch) {
-  Vector2 at[kMostManifoldPoints];
-  double mean_height = 0;
-  middle_ = {};
+TANDEM_HD void ManifoldMaker<Team>::place_soundings(const RimFinder<Team>& finder, const Rim& rim) {
+  const PatchFrame& frame = state_.frame;
+  Vector2 at[kMostManifoldPoints], middle;
+  double mean_height = 0, extent = 0;
   for (int i = 0; i < rim.points; ++i) {
     const Vector3 x = finder.position(rim.reference[i]);
     at[i] = frame.flat(x);
-    middle_ = middle_ + at[i];
+    middle = middle + at[i];
     mean_height += frame.height(x);
   }
-  middle_ = (1.0 / rim.points) * middle_;
+  middle = (1.0 / rim.points) * middle;
   mean_height /= rim.points;
-  extent_ = 0;
-  for (int i = 0; i < rim.points; ++i) extent_ = greater(extent_, norm(at[i] - middle_));
-  rim_points_ = rim.points;
-  soundings_ = touch ? rim.points : rim.points + 1;
-  for (int i = static_cast<int>(team_.rank()); i < soundings_; i += static_cast<int>(team_.size())) {
-    Sounding& s = shared_.sounding[i];
+  for (int i = 0; i < rim.points; ++i) extent = greater(extent, norm(at[i] - middle));
+  const int soundings = state_.touch ? rim.points : rim.points + 1;
+  for (int i = static_cast<int>(team_.rank()); i < soundings; i += static_cast<int>(team_.size())) {
+    Sounding& s = state_.sounding[i];
     s = {};
     const bool inner = i == rim.points;
-    s.at = inner ? middle_ : at[i];
-    s.line = inner ? middle_ : at[i] + kInwards * (middle_ - at[i]);
+    s.at = inner ? middle : at[i];
+    s.line = inner ? middle : at[i] + kInwards * (middle - at[i]);
     s.height = inner ? mean_height : frame.height(finder.position(rim.reference[i]));
     s.target[0] = s.target[1] = s.height;
     s.reference = inner ? kNoIndex : rim.reference[i];
     s.rank = inner ? 0 : rim.rank[i];
     s.feature = inner ? feature_hash(0, 4) : finder.feature(rim.reference[i]);
+  }
+  if (team_.rank() == 0) {
+    state_.rim_points = rim.points, state_.soundings = soundings;
+    state_.middle = state_.middle_of_area = middle;
+    state_.extent = extent;
+    Vector2 of_area;
+    if (finder.middle_of_area(of_area) && norm(of_area - middle) <= extent) state_.middle_of_area = of_area;
+    state_.candidates = finder.count();
   }
   team_.sync();
 }
@@ -98,7 +107,7 @@ TANDEM_HD void ManifoldMaker<Team>::walk_lines(LineQuestions& questions, std::ui
   if constexpr (HasMeans<Team>) return questions.answer(team_.means(), count);
   constexpr int kLinesWidth = 8;
   team_.sync();
-  team_.template for_each_group<kLinesWidth>(count, [&](auto& group, std::uint32_t i, bool given) {
+  team_.template for_each_group<kLinesWidth>(count, [&](const auto& group, std::uint32_t i, bool given) {
     const bool asked = given && shared_.line[i].side >= 0;
     if (asked && group.rank() == 0) questions.prepare(i);
     walk_surface(group, questions, i, asked);
@@ -110,18 +119,20 @@ TANDEM_HD void ManifoldMaker<Team>::walk_lines(LineQuestions& questions, std::ui
   team_.sync();
 }
 
+/// Follows the lines of soundings from the first on.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::sound(const PatchFrame& frame, int first, int count) {
-  LineQuestions questions(bodies_, frame, shared_.line);
-  const auto asked = 2 * static_cast<std::uint32_t>(count);
+TANDEM_HD void ManifoldMaker<Team>::sound(int first) {
+  LineQuestions questions(bodies_, state_.frame, shared_.line);
+  const auto asked = 2 * static_cast<std::uint32_t>(state_.soundings - first);
   for (std::uint32_t i = team_.rank(); i < asked; i += team_.size()) {
-    const Sounding& s = shared_.sounding[first + static_cast<int>(i / 2)];
+    const Sounding& s = state_.sounding[first + static_cast<int>(i / 2)];
     const int side = static_cast<int>(i % 2);
-    questions.ask(i, side, side == 0 ? 1 : -1, s.line, s.target[side], -INFINITY, INFINITY, extent_ / 4);
+    questions.ask(i, side, side == 0 ? 1 : -1, s.line, s.target[side], -INFINITY, INFINITY,
+                  state_.extent / 4);
   }
   walk_lines(questions, asked);
   for (std::uint32_t i = team_.rank(); i < asked; i += team_.size())
-    shared_.sounding[first + static_cast<int>(i / 2)].surface[i % 2] = shared_.line[i].best;
+    state_.sounding[first + static_cast<int>(i / 2)].surface[i % 2] = shared_.line[i].best;
   team_.sync();
 }
 
@@ -129,12 +140,12 @@ TANDEM_HD void ManifoldMaker<Team>::sound(const PatchFrame& frame, int first, in
 /// rim, and no further along the normal than the rim and the middle are from each other's surfaces, and the
 /// rim's extent more.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::place_prism(const PatchFrame& frame) {
+TANDEM_HD void ManifoldMaker<Team>::place_prism() {
   Prism& prism = shared_.prism;
-  const double more = 1e-6 * extent_ + 0x1p-40 * bodies_.reach();
-  const auto corner = [&](int i) { return shared_.sounding[i == rim_points_ ? 0 : i].at; };
+  const double more = 1e-6 * state_.extent + 0x1p-40 * bodies_.reach();
+  const auto corner = [&](int i) { return state_.sounding[i == state_.rim_points ? 0 : i].at; };
   const int rank = static_cast<int>(team_.rank()), size = static_cast<int>(team_.size());
-  for (int i = rank; i < rim_points_; i += size) {
+  for (int i = rank; i < state_.rim_points; i += size) {
     const Vector2 p = corner(i), q = corner(i + 1);
     const double length = norm(q - p);
     prism.outward[i] = length > 0 ? (1 / length) * Vector2{q.y - p.y, p.x - q.x} : Vector2{};
@@ -142,32 +153,32 @@ TANDEM_HD void ManifoldMaker<Team>::place_prism(const PatchFrame& frame) {
   }
   for (int k = rank; k < 2; k += size) {
     Vector2 ends[2] = {};  // the rim's first two corners: nearly its longest way across
-    for (int i = 0; i < rim_points_; ++i) {
-      if (shared_.sounding[i].rank < 2) ends[shared_.sounding[i].rank] = shared_.sounding[i].at;
+    for (int i = 0; i < state_.rim_points; ++i) {
+      if (state_.sounding[i].rank < 2) ends[state_.sounding[i].rank] = state_.sounding[i].at;
     }
     const double length = norm(ends[1] - ends[0]);
     const Vector2 along = length > 0 ? (1 / length) * (ends[1] - ends[0]) : Vector2{1, 0};
     prism.axis[k] = k == 0 ? along : Vector2{-along.y, along.x};
     double least = INFINITY, most = -INFINITY;
-    for (int i = 0; i < rim_points_; ++i) {
+    for (int i = 0; i < state_.rim_points; ++i) {
       const double x = dot(prism.axis[k], corner(i));
       least = lesser(least, x), most = greater(most, x);
     }
     prism.least[k] = least - 2 * more, prism.most[k] = most + 2 * more;
   }
   if (rank == 0) {
-    prism.frame = frame;
-    prism.sides = rim_points_;
+    prism.frame = state_.frame;
+    prism.sides = state_.rim_points;
     double lowest = INFINITY, highest = -INFINITY, above_a = -INFINITY, below_b = INFINITY;
-    for (int i = 0; i < soundings_; ++i) {
-      const Sounding& s = shared_.sounding[i];
+    for (int i = 0; i < state_.soundings; ++i) {
+      const Sounding& s = state_.sounding[i];
       lowest = lesser(lowest, s.height), highest = greater(highest, s.height);
       if (!(s.overlap() > 0)) continue;
       const double of_a = s.surface[0].height, of_b = s.surface[1].height;
       lowest = lesser(lowest, of_b), highest = greater(highest, of_a);
       above_a = greater(above_a, of_a), below_b = lesser(below_b, of_b);
     }
-    prism.lower = lowest - extent_, prism.upper = highest + extent_;
+    prism.lower = lowest - state_.extent, prism.upper = highest + state_.extent;
     prism.above_a = above_a, prism.below_b = below_b;
   }
   team_.sync();
@@ -176,7 +187,8 @@ TANDEM_HD void ManifoldMaker<Team>::place_prism(const PatchFrame& frame) {
 /// The highest corner of a's triangles of the curve, and the lowest of b's; of several the vertex of the
 /// least number.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::find_extreme_corners(const PatchFrame& frame, std::uint32_t curve) {
+TANDEM_HD void ManifoldMaker<Team>::find_extreme_corners(std::uint32_t curve) {
+  const PatchFrame& frame = state_.frame;
   const std::uint32_t begin = memory_.start[curve], end = memory_.start[curve + 1];
   if constexpr (HasMeans<Team>) {
     for (int side = 0; side < 2; ++side)
@@ -223,8 +235,8 @@ TANDEM_HD void ManifoldMaker<Team>::find_extreme_corners(const PatchFrame& frame
 /// deepest, or nearly. They are looked for within the rim, and among the corners of triangles that the curve
 /// cuts, where they are few: the tip of a coarse mesh may lean out of its rim.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::sound_deepest(const PatchFrame& frame, std::uint32_t curve) {
-  place_prism(frame);
+TANDEM_HD void ManifoldMaker<Team>::sound_deepest(std::uint32_t curve) {
+  place_prism();
   if constexpr (HasMeans<Team>) {
     for (int side = 0; side < 2; ++side)
       shared_.extreme[side] = team_.means().find_extreme(bodies_[side], shared_.prism, side);
@@ -232,20 +244,23 @@ TANDEM_HD void ManifoldMaker<Team>::sound_deepest(const PatchFrame& frame, std::
     ExtremeQuestions questions(bodies_, shared_.prism, shared_.prism_test, shared_.extreme);
     for (std::uint32_t side = team_.rank(); side < 2; side += team_.size()) questions.ask(side);
     team_.sync();
-    team_.template for_each_group<Team::kHalf>(
-        2, [&](auto& group, std::uint32_t side, bool given) { walk_surface(group, questions, side, given); });
+    team_.template for_each_group<Team::kHalf>(2, [&](const auto& group, std::uint32_t side, bool given) {
+      walk_surface(group, questions, side, given);
+    });
   }
   const bool few = memory_.start[curve + 1] - memory_.start[curve] <= kFewPieces;
-  if (few) find_extreme_corners(frame, curve);
+  if (few) find_extreme_corners(curve);
   team_.sync();
-  const int first = soundings_;
-  const double height_of_middle = shared_.sounding[rim_points_].height;
+  const int first = state_.soundings;
+  const double height_of_middle = state_.sounding[state_.rim_points].height;
+  team_.sync();
+  int soundings = first;
   for (std::uint32_t i = 0; i < (few ? 4u : 2u); ++i) {
     const std::uint32_t side = i % 2;
     const Extreme& extreme = shared_.extreme[i];
     if (!extreme.found() || (i >= 2 && extreme.vertex == shared_.extreme[side].vertex)) continue;
     if (team_.rank() == i % team_.size()) {
-      Sounding& s = shared_.sounding[soundings_];
+      Sounding& s = state_.sounding[soundings];
       s = {};
       s.at = s.line = extreme.at;
       s.height = extreme.height;
@@ -255,10 +270,11 @@ TANDEM_HD void ManifoldMaker<Team>::sound_deepest(const PatchFrame& frame, std::
       s.vertex_of = static_cast<int>(side);
       s.feature = feature_hash(extreme.vertex, side == 0 ? 5 : 6);
     }
-    ++soundings_;
+    ++soundings;
   }
+  if (team_.rank() == 0) state_.soundings = soundings;
   team_.sync();
-  sound(frame, first, soundings_ - first);
+  if (soundings > first) sound(first);
 }
 
 /// Looks whether lines that seem to overlap run within both bodies: where there are several curves, one may
@@ -266,15 +282,15 @@ TANDEM_HD void ManifoldMaker<Team>::sound_deepest(const PatchFrame& frame, std::
 /// surfaces that the line found may not belong to the patch. A vertex is part of its own body: the line may
 /// touch that no further.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::look_behind(const PatchFrame& frame) {
+TANDEM_HD void ManifoldMaker<Team>::look_behind() {
   const bool several = summary_.curves > 1;
-  LineQuestions questions(bodies_, frame, shared_.line);
-  const auto count = 2 * static_cast<std::uint32_t>(soundings_);
+  LineQuestions questions(bodies_, state_.frame, shared_.line);
+  const auto count = 2 * static_cast<std::uint32_t>(state_.soundings);
   bool any = false;
   for (std::uint32_t i = team_.rank(); i < count; i += team_.size()) {
-    Sounding& s = shared_.sounding[i / 2];
+    Sounding& s = state_.sounding[i / 2];
     const int side = static_cast<int>(i % 2);
-    const bool wanted = s.overlap() > (several ? 0 : extent_ / 2);
+    const bool wanted = s.overlap() > (several ? 0 : state_.extent / 2);
     if (wanted && side == 0) s.looked_behind = true;
     shared_.line[i].side = -1;
     if (!wanted || side == s.vertex_of) continue;
@@ -285,7 +301,7 @@ TANDEM_HD void ManifoldMaker<Team>::look_behind(const PatchFrame& frame) {
   if (!team_.any(any)) return;
   walk_lines(questions, count);
   for (std::uint32_t i = team_.rank(); i < count; i += team_.size()) {
-    if (shared_.line[i].side >= 0) shared_.sounding[i / 2].behind[i % 2] = shared_.line[i].best;
+    if (shared_.line[i].side >= 0) state_.sounding[i / 2].behind[i % 2] = shared_.line[i].best;
   }
   team_.sync();
 }
@@ -295,13 +311,13 @@ TANDEM_HD void ManifoldMaker<Team>::look_behind(const PatchFrame& frame) {
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, int most_of_rim, bool touch) {
   const int rank = static_cast<int>(team_.rank()), size = static_cast<int>(team_.size());
-  for (int i = rank; i < soundings_; i += size) {
-    const Sounding& s = shared_.sounding[i];
+  for (int i = rank; i < state_.soundings; i += size) {
+    const Sounding& s = state_.sounding[i];
     Chosen& c = shared_.candidate[i];
     c.at = s.at;
     c.depth = !touch && s.within() ? s.overlap() : 0;
     c.height = c.depth > 0 ? (s.surface[0].height + s.surface[1].height) / 2 : s.height;
-    c.from_middle = norm(s.at - middle_);
+    c.from_middle = norm(s.at - state_.middle);
     c.inner = s.reference == kNoIndex;
     c.feature = s.feature;
     if (c.inner) {
@@ -324,10 +340,10 @@ TANDEM_HD void ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, int mo
       for (; j > 0 && before(i, order[j - 1]); --j) order[j] = order[j - 1];
       order[j] = i;
     };
-    for (int i = 0; i < soundings_; ++i) {
+    for (int i = 0; i < state_.soundings; ++i) {
       const Chosen& c = shared_.candidate[i];
       if (c.inner && c.depth > of_inner) of_inner = c.depth, inner = i;
-      if (c.inner || shared_.sounding[i].rank >= most_of_rim) continue;
+      if (c.inner || state_.sounding[i].rank >= most_of_rim) continue;
       of_rim = greater(of_rim, c.depth);
       insert(i);
     }
@@ -349,7 +365,8 @@ TANDEM_HD void ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, int mo
 }
 
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::write_points(const PatchFrame& frame, Patch& patch, int count) const {
+TANDEM_HD void ManifoldMaker<Team>::write_points(Patch& patch, int count) const {
+  const PatchFrame& frame = state_.frame;
   const auto write = [](const Vector3& x, double(&out)[3]) { out[0] = x.x, out[1] = x.y, out[2] = x.z; };
   for (int i = static_cast<int>(team_.rank()); i < count; i += static_cast<int>(team_.size())) {
     const Chosen& c = shared_.chosen[i];
@@ -368,87 +385,104 @@ TANDEM_HD void ManifoldMaker<Team>::write_points(const PatchFrame& frame, Patch&
 }
 
 template <typename Team>
-template <typename NewPatch>
-TANDEM_HD bool ManifoldMaker<Team>::make(std::uint32_t curve, const NewPatch& new_patch) {
+TANDEM_HD void ManifoldMaker<Team>::write_manifold(Patch& patch, int count, bool hole,
+                                                   bool goes_through) const {
+  const PatchFrame& frame = state_.frame;
+  double deepest = 0, height = 0;
+  for (int i = 0; i < count; ++i) height += shared_.chosen[i].height / count;
+  for (int i = 0; i < state_.soundings && !state_.touch && !hole; ++i) {
+    const Sounding& s = state_.sounding[i];
+    if (s.within()) deepest = greater(deepest, s.overlap());
+  }
+  const Vector2 centre = state_.closed && !state_.touch ? state_.middle_of_area : state_.middle;
+  Vector3 area = state_.area;
+  if (!state_.closed) {
+    // The curve bounds no area: that of the rim stands in.
+    double twice = 0;
+    for (int i = 1; i + 1 < state_.rim_points; ++i) {
+      const Vector2 p = state_.sounding[0].at;
+      twice += cross(state_.sounding[i].at - p, state_.sounding[i + 1].at - p);
+    }
+    area = (std::fabs(twice) / 2) * frame.n;
+  }
+  if (state_.touch) area = {};
+  const auto write = [](const Vector3& x, double(&out)[3]) { out[0] = x.x, out[1] = x.y, out[2] = x.z; };
+  Manifold& manifold = patch.manifold;
+  manifold = {};
+  write(frame.n, manifold.normal);
+  write(area, manifold.area_vector);
+  write(frame.at(centre, height), manifold.centre);
+  manifold.depth = deepest;
+  manifold.point_count = static_cast<std::uint32_t>(count);
+  manifold.flags = (state_.touch ? kTouching : 0u) | (state_.closed ? 0u : kOpenCurve) |
+                   (goes_through ? kGoesThrough : 0u);
+  patch.key = state_.key;
+  patch.hole = hole ? 1 : 0;
+}
+
+template <typename Team>
+TANDEM_HD bool ManifoldMaker<Team>::begin(std::uint32_t curve) {
   team_.sync();  // all are done with what the last curve left
   NormalFinder<Team> normal_finder(team_, bodies_, memory_, summary_, curve);
   const CurveMeasure measure = normal_finder.measure();
   const PatchNormal normal = normal_finder.find(measure);
   if (!normal.known) return false;
-  const PatchFrame frame(summary_.origin, normal.n);
-  RimFinder<Team> rim_finder(team_, bodies_, memory_, summary_, curve, frame);
-  rim_finder.gather(measure.closed && !summary_.degenerate, shared_.next);
-  // One is left for an inner point. What the patch is does not depend on how many points it may have.
-  const int most_of_rim = normal.touch || most_points_ == 1 ? most_points_ : most_points_ - 1;
-  const Rim rim = rim_finder.find(kMostManifoldPoints - (normal.touch ? 0 : 1), frame.flat(measure.middle));
-  if (rim.points == 0) return false;
-  place_soundings(rim_finder, rim, frame, normal.touch);
-  bool goes_through = false, hole = false;
-  if (!normal.touch) {
-    sound(frame, 0, soundings_);
-    sound_deepest(frame, curve);
-    look_behind(frame);
-    if (summary_.curves > 1 && measure.closed) {
-      double deepest = 0;
-      // No line is within the bodies, nor so short that rounding hides it.
-      hole = true;
-      const double rounding = 0x1p-40 * bodies_.reach();
-      for (int i = 0; i <= rim_points_; ++i) {
-        const Sounding& s = shared_.sounding[i];
-        const bool seen = s.surface[0].found() && s.surface[1].found();
-        hole = hole && !s.within() && !(seen && std::fabs(s.overlap()) <= rounding);
-        if (!s.within() || s.overlap() <= deepest) continue;
-        deepest = s.overlap();
-        goes_through = s.goes_through();
-      }
-      // The way back is the shorter one on the side where the middles are.
-      if (goes_through && dot(measure.area, bodies_.apart()) < 0) return true;
-    }
+  if (team_.rank() == 0) {
+    state_.touch = normal.touch, state_.closed = measure.closed;
+    state_.frame = PatchFrame(summary_.origin, normal.n);
+    state_.area = measure.area;
+    state_.key = measure.key;
   }
-  choose(rim_finder, most_of_rim, normal.touch || hole);
-  const int found = static_cast<int>(shared_.count), count = found < most_points_ ? found : most_points_;
-  rim_finder.name_points(shared_.chosen, count, kNear / 2 * bodies_.smaller_diagonal(), measure.key);
+  team_.sync();
+  RimFinder<Team> rim_finder(team_, bodies_, memory_, summary_, curve, state_.frame);
+  rim_finder.gather(measure.closed && !summary_.degenerate, shared_.next);
+  // One is left for an inner point.
+  const int most_of_rim = kMostManifoldPoints - (normal.touch ? 0 : 1);
+  const Rim rim = rim_finder.find(most_of_rim, state_.frame.flat(measure.middle));
+  if (rim.points == 0) return false;
+  place_soundings(rim_finder, rim);
+  return true;
+}
+
+template <typename Team>
+TANDEM_HD void ManifoldMaker<Team>::measure_depths(std::uint32_t curve) {
+  if (state_.touch) return;
+  sound(0);
+  sound_deepest(curve);
+  look_behind();
+}
+
+template <typename Team>
+template <typename NewPatch>
+TANDEM_HD void ManifoldMaker<Team>::finish(std::uint32_t curve, int most_points, const NewPatch& new_patch) {
+  bool goes_through = false, hole = false;
+  if (!state_.touch && summary_.curves > 1 && state_.closed) {
+    double deepest = 0;
+    // No line is within the bodies, nor so short that rounding hides it.
+    hole = true;
+    const double rounding = 0x1p-40 * bodies_.reach();
+    for (int i = 0; i <= state_.rim_points; ++i) {
+      const Sounding& s = state_.sounding[i];
+      const bool seen = s.surface[0].found() && s.surface[1].found();
+      hole = hole && !s.within() && !(seen && std::fabs(s.overlap()) <= rounding);
+      if (!s.within() || s.overlap() <= deepest) continue;
+      deepest = s.overlap();
+      goes_through = s.goes_through();
+    }
+    // The way back is the shorter one on the side where the middles are.
+    if (goes_through && dot(state_.area, bodies_.apart()) < 0) return;
+  }
+  const RimFinder<Team> rim_finder(team_, bodies_, memory_, summary_, curve, state_.frame, state_.candidates);
+  // What the patch is does not depend on how many points it may have.
+  choose(rim_finder, state_.touch || most_points == 1 ? most_points : most_points - 1, state_.touch || hole);
+  const int found = static_cast<int>(shared_.count), count = found < most_points ? found : most_points;
+  rim_finder.name_points(shared_.chosen, count, kNear / 2 * bodies_.smaller_diagonal(), state_.key);
   if (team_.rank() == 0) shared_.patch = new_patch();
   team_.sync();
   Patch* const patch = shared_.patch;
-  if (patch == nullptr) return true;
-  write_points(frame, *patch, count);
-  if (team_.rank() != 0) return true;
-  Vector2 centre = middle_;
-  double deepest = 0, height = 0;
-  for (int i = 0; i < count; ++i) height += shared_.chosen[i].height / count;
-  for (int i = 0; i < soundings_ && !normal.touch && !hole; ++i) {
-    const Sounding& s = shared_.sounding[i];
-    if (s.within()) deepest = greater(deepest, s.overlap());
-  }
-  if (measure.closed && !normal.touch) {
-    Vector2 of_area;
-    if (rim_finder.middle_of_area(of_area) && norm(of_area - middle_) <= extent_) centre = of_area;
-  }
-  Vector3 area = measure.area;
-  if (!measure.closed) {
-    // The curve bounds no area: that of the rim stands in.
-    double twice = 0;
-    for (int i = 1; i + 1 < rim.points; ++i) {
-      const Vector2 p = shared_.sounding[0].at;
-      twice += cross(shared_.sounding[i].at - p, shared_.sounding[i + 1].at - p);
-    }
-    area = (std::fabs(twice) / 2) * normal.n;
-  }
-  if (normal.touch) area = {};
-  const auto write = [](const Vector3& x, double(&out)[3]) { out[0] = x.x, out[1] = x.y, out[2] = x.z; };
-  Manifold& manifold = patch->manifold;
-  manifold = {};
-  write(normal.n, manifold.normal);
-  write(area, manifold.area_vector);
-  write(frame.at(centre, height), manifold.centre);
-  manifold.depth = deepest;
-  manifold.point_count = static_cast<std::uint32_t>(count);
-  manifold.flags = (normal.touch ? kTouching : 0u) | (measure.closed ? 0u : kOpenCurve) |
-                   (goes_through ? kGoesThrough : 0u);
-  patch->key = measure.key;
-  patch->hole = hole ? 1 : 0;
-  return true;
+  if (patch == nullptr) return;
+  write_points(*patch, count);
+  if (team_.rank() == 0) write_manifold(*patch, count, hole, goes_through);
 }
 
 }  // namespace tandem::manifold

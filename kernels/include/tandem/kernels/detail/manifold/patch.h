@@ -155,9 +155,23 @@ struct Chosen {
   bool inner;
 };
 
+/// What is known of a patch from one step to the next.
+struct PatchState {
+  Sounding sounding[kMostSoundings];  ///< of the rim, of the middle, of vertices
+  int rim_points, soundings;
+  bool touch, closed;
+  PatchFrame frame;
+  Vector3 area;            ///< CurveMeasure's
+  Vector2 middle;          ///< of the rim
+  Vector2 middle_of_area;  ///< that of the rim where there is none
+  double extent;           ///< of the rim, from its middle
+  std::uint64_t key;
+  std::uint32_t candidates;
+};
+
 /// What a team shares while it makes a patch.
 struct PatchMemory {
-  Sounding sounding[kMostSoundings];
+  PatchState state;
   LineQuestion line[2 * kMostSoundings];
   Prism prism;
   PrismTest prism_test[2];

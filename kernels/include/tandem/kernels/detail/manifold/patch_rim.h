@@ -12,21 +12,24 @@ template <typename Team>
 class RimFinder {
  public:
   TANDEM_HD RimFinder(const Team& team, const BodyPair& bodies, const PieceMemory& memory,
-                      const PieceSummary& summary, std::uint32_t curve, const PatchFrame& frame)
+                      const PieceSummary& summary, std::uint32_t curve, const PatchFrame& frame,
+                      std::uint32_t candidates = 0)
       : team_(team),
         bodies_(bodies),
         memory_(memory),
         summary_(summary),
         begin_(memory.start[curve]),
         end_(memory.start[curve + 1]),
-        frame_(frame) {}
+        frame_(frame),
+        count_(candidates) {}
 
   /// Writes down the candidates. each_end_twice: pieces share their ends, so one of each will do. next: a
-  /// number that all of the team see.
+  /// number that all of the team see. Where that was done before, their number is given instead.
   TANDEM_HD void gather(bool each_end_twice, std::uint32_t& next);
 
   /// The middle of the area within the curve, in the plane; false where it has none. Condition: gather().
   TANDEM_HD bool middle_of_area(Vector2& middle) const;
+  TANDEM_HD std::uint32_t count() const { return count_; }
 
   /// Starts with the candidates furthest from each other, or nearly, and takes in again and again the one
   /// that adds most to the area.
@@ -61,7 +64,7 @@ class RimFinder {
   const PieceSummary& summary_;
   std::uint32_t begin_, end_;
   const PatchFrame& frame_;
-  std::uint32_t count_ = 0;
+  std::uint32_t count_;
   RimMoments moments_;
 };
 

@@ -120,58 +120,29 @@ TANDEM_HD inline Below look_below(const Shape& shape, std::uint32_t index, const
   return out;
 }
 
-TANDEM_HD inline std::uint32_t bits_set(unsigned mask) {
-#ifdef __CUDA_ARCH__
-  return static_cast<std::uint32_t>(__popc(mask));
-#else
-  return static_cast<std::uint32_t>(std::popcount(mask));
-#endif
-}
-
-/// Answers a question about a posed body by a group (team.h): each of it takes a block, later a triangle.
-/// asked: of a group that has no question false; groups that run in step come here together.
+/// Answers a question about a posed body, by one thread. A GPU has a way of its own (manifold_team.cuh).
+/// asked: of a group that has no question false.
 /// Questions: body(question) says which body is walked; test(question) has passes(center, half_extent), and
 /// turned(axes), the same test for boxes along these axes; visit(question, triangle, found) looks at a
-/// triangle; better(found, other) is the better of two, whatever their order; merge(question, found) keeps
-/// what is better than what is known. A Found is true where there is something.
-template <typename Group, typename Questions>
-TANDEM_HD inline void walk_surface(Group& group, Questions& questions, std::uint32_t question, bool asked) {
-  // With so many blocks left a group looks at one at a time, which never takes more.
-  constexpr std::uint32_t kReserve = 3 * kMaxDepth + 8;
-  static_assert(Group::kRoom > kReserve);
-  std::uint32_t waiting = asked ? 1 : 0;
-  if (asked && group.rank() == 0) group.waiting[0] = 0;
-  group.sync();
-  while (group.any_of_all(waiting > 0)) {
-    const std::uint32_t room = Group::kRoom - kReserve, fit = waiting < room ? (room - waiting) / 3 : 0;
-    const std::uint32_t most = waiting < Group::size() ? waiting : Group::size();
-    const std::uint32_t taken = most < fit ? most : most == 0 ? 0 : fit > 0 ? fit : 1;
-    Below below;
-    if (group.rank() < taken) {
-      below = look_below(*questions.body(question).shape, group.waiting[waiting - 1 - group.rank()],
-                         questions.test(question));
-    }
-    const std::uint32_t nodes = bits_set(below.mask);
-    std::uint32_t total = 0;
-    const std::uint32_t before = group.sum_before(below.leaves ? nodes << 16 : nodes, total);
-    group.sync();  // all have taken theirs
-    waiting -= taken;
-    std::uint32_t* next =
-        below.leaves ? group.triangles + (before >> 16) : group.waiting + waiting + (before & 0xFFFFu);
-    for (int i = 0; i < kNodesPerBlock; ++i) {
-      if ((below.mask >> i & 1u) != 0) *next++ = below.index[i];
-    }
-    waiting += total & 0xFFFFu;
-    group.sync();
+/// triangle; better(question, found, other) is the better of two, whatever their order; merge(question,
+/// found) keeps what is better than what is known. A Found is true where there is something.
+template <typename Questions>
+TANDEM_HD inline void walk_surface(const OneThreadGroup&, Questions& questions, std::uint32_t question,
+                                   bool asked) {
+  if (!asked) return;
+  std::uint32_t waiting[3 * kMaxDepth + 1] = {0};
+  for (int count = 1; count > 0;) {
+    const Below below =
+        look_below(*questions.body(question).shape, waiting[--count], questions.test(question));
     typename Questions::Found found;
-    for (std::uint32_t i = group.rank(); i < total >> 16; i += Group::size())
-      questions.visit(question, group.triangles[i], found);
-    if (group.any_of_all(static_cast<bool>(found))) {
-      found =
-          group.best(found, [&](const auto& x, const auto& y) { return questions.better(question, x, y); });
-      if (found && group.rank() == 0) questions.merge(question, found);
+    for (int i = 0; i < kNodesPerBlock; ++i) {
+      if ((below.mask >> i & 1u) == 0) continue;
+      if (below.leaves)
+        questions.visit(question, below.index[i], found);
+      else
+        waiting[count++] = below.index[i];
     }
-    group.sync();
+    if (found) questions.merge(question, found);
   }
 }
 

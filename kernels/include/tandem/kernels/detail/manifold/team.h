@@ -1,32 +1,14 @@
 #pragma once
 #include <cstdint>
 
-#include "tandem/formats/block.h"
 #include "tandem/formats/platform.h"
 
 namespace tandem::manifold {
 
-/// A group of one thread: what a question's walk through a tree needs.
+/// A group of one thread: those who walk through a tree together.
 struct OneThreadGroup {
-  static constexpr std::uint32_t kRoom = 4 * kMaxDepth;
-  std::uint32_t waiting[kRoom];             ///< blocks
-  std::uint32_t triangles[kNodesPerBlock];  ///< of the leaves just found
-
   TANDEM_HD static std::uint32_t rank() { return 0; }
-  TANDEM_HD static std::uint32_t size() { return 1; }
   TANDEM_HD static void sync() {}
-  /// Whether it is so for one of this group, or of those that run in step with it.
-  TANDEM_HD static bool any_of_all(bool value) { return value; }
-  /// The sum of the values of those before this one; total: of all.
-  TANDEM_HD static std::uint32_t sum_before(std::uint32_t value, std::uint32_t& total) {
-    total = value;
-    return 0;
-  }
-  /// The best of all.
-  template <typename Found, typename Better>
-  TANDEM_HD static Found best(const Found& found, const Better&) {
-    return found;
-  }
 };
 
 /// Those who make the manifolds of an object pair together: one thread of a CPU here, a warp or a thread
@@ -65,8 +47,7 @@ struct OneThread {
   /// a group of a GPU has.
   template <int kWidth, typename Of>
   TANDEM_HD static void for_each_group(std::uint32_t count, const Of& of) {
-    OneThreadGroup group;
-    for (std::uint32_t i = 0; i < count; ++i) of(group, i, true);
+    for (std::uint32_t i = 0; i < count; ++i) of(OneThreadGroup(), i, true);
   }
   /// As many as are worth while for each of two questions.
   static constexpr int kHalf = 1;

@@ -190,7 +190,10 @@ void ContactManifolds::State::make_patches(std::size_t from, std::size_t to, std
                                            std::span<const Contact> contacts, int most_points) {
   Worker& own = workers[worker];
   const LaneThread team;
-  manifold::PatchMemory shared;
+  manifold::PatchState state;
+  manifold::OutlineMemory of_outline;
+  manifold::DepthMemory of_depths;
+  manifold::ChoiceMemory of_choice;
   for (std::size_t i = from; i < to && own.enough_memory; ++i) {
     Row& row = rows[i];
     const ObjectPair& pair = pairs[row.pair];
@@ -206,8 +209,9 @@ void ContactManifolds::State::make_patches(std::size_t from, std::size_t to, std
     const Instance &a = instances[pair.a], &b = instances[pair.b];
     const BodyPair bodies = {{shapes[a.asset], a.pose}, {shapes[b.asset], b.pose}};
     manifold::CurveFinder<LaneThread> finder(team, bodies, memory);
-    const manifold::PieceSummary summary = finder.find(contacts.data() + begin[row.pair], count, shared.next);
-    manifold::ManifoldMaker<LaneThread> maker(team, bodies, memory, shared, summary);
+    const manifold::PieceSummary summary =
+        finder.find(contacts.data() + begin[row.pair], count, of_outline.next);
+    manifold::ManifoldMaker<LaneThread> maker(team, bodies, memory, summary, state);
     const auto new_patch = [&]() -> Patch* {
       if (!own.patches.push({})) {
         own.enough_memory = false;
@@ -217,12 +221,12 @@ void ContactManifolds::State::make_patches(std::size_t from, std::size_t to, std
     };
     own.segments += summary.segments;
     for (std::uint32_t curve = 0; curve < summary.curves; ++curve) {
-      if (!maker.begin(curve)) {
+      if (!maker.begin(curve, of_outline)) {
         ++own.ambiguous_touches;
         continue;
       }
-      maker.measure_depths(curve);
-      maker.finish(curve, most_points, new_patch);
+      maker.measure_depths(curve, of_depths);
+      maker.finish(curve, most_points, of_choice, new_patch);
     }
     row.patches = static_cast<std::uint32_t>(own.patches.size() - row.first_patch);
     for (std::uint32_t k = 0; k < row.patches; ++k) {

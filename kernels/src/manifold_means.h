@@ -36,7 +36,7 @@ struct ManifoldMeans {
                               manifold::Candidate* candidates, manifold::RimMoments& moments);
   void (*furthest)(const manifold::PieceMemory& memory, const manifold::Candidate* candidates,
                    std::uint32_t count, const manifold::RimValue* values, int wanted,
-                   manifold::Furthest* const* best);
+                   manifold::Furthest* best);
   /// The next candidate from `i` on whose distance's square from a point is less, or `count`.
   std::uint32_t (*next_near)(const manifold::Candidate* candidates, std::uint32_t i, std::uint32_t count,
                              const manifold::FloatPoint& at, float square);

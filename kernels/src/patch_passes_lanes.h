@@ -251,15 +251,15 @@ TANDEM_INLINE Lanes4 value_of(const manifold::RimValue& value, const FourCandida
 
 /// RimFinder::furthest().
 void furthest(const manifold::PieceMemory& memory, const manifold::Candidate* candidates, std::uint32_t count,
-              const manifold::RimValue* values, int wanted, manifold::Furthest* const* best) {
+              const manifold::RimValue* values, int wanted, manifold::Furthest* best) {
   for (std::uint32_t i = 0; i < count; i += 4) {
     const FourCandidates four(candidates, i, count);
     for (int w = 0; w < wanted; ++w) {
       const Lanes4 value = value_of(values[w], four);
-      unsigned found = LaneMask<4>{value.v >= best[w]->value}.mask();
+      unsigned found = LaneMask<4>{value.v >= best[w].value}.mask();
       for (; found != 0; found &= found - 1) {
         const auto k = static_cast<std::uint32_t>(std::countr_zero(found));
-        if (i + k < count) best[w]->take(memory, value.v[static_cast<int>(k)], candidates[i + k].reference);
+        if (i + k < count) best[w].take(memory, value.v[static_cast<int>(k)], candidates[i + k].reference);
       }
     }
   }

@@ -53,6 +53,19 @@ struct Spread {
 /// The most directions that are tried for a normal.
 inline constexpr int kMostTried = 11;
 
+/// The direction of a face, from a towards b.
+struct Direction {
+  Vector3 n;
+  std::uint32_t piece;  ///< one whose triangle has it
+};
+
+/// What a team shares while it looks for a normal.
+struct NormalMemory {
+  Direction direction[kMostTried];  ///< of faces of a, then of b
+  Vector3 tried[kMostTried];
+  Spread spread[kMostTried];
+};
+
 /// The direction in which the bodies of a patch push each other.
 struct PatchNormal {
   Vector3 n;  ///< unit, from a towards b
@@ -111,7 +124,15 @@ struct Rim {
   std::uint32_t reference[kMostManifoldPoints];
   FloatPoint at[kMostManifoldPoints];
   int rank[kMostManifoldPoints];  ///< how many were found before
-  int points = 0;
+  int points;
+};
+
+/// What a team shares while it looks for a rim.
+struct RimMemory {
+  Rim rim;
+  Furthest of_side[kMostManifoldPoints];  ///< beyond the side from point i to the next: what it would add
+  int first, second;                      ///< sides that are to be looked beyond
+  bool complete;
 };
 
 /// A point that a manifold may have, and the line across the patch that measures the depth there.
@@ -169,17 +190,26 @@ struct PatchState {
   std::uint32_t candidates;
 };
 
-/// What a team shares while it makes a patch.
-struct PatchMemory {
-  PatchState state;
+/// What a team shares while it finds a patch's normal and rim.
+struct OutlineMemory {
+  NormalMemory normal;
+  RimMemory rim;
+  std::uint32_t next;
+};
+
+/// What a team shares while it measures a patch's depths.
+struct DepthMemory {
   LineQuestion line[2 * kMostSoundings];
   Prism prism;
   PrismTest prism_test[2];
   Extreme extreme[4];
+};
+
+/// What a team shares while it chooses a patch's points.
+struct ChoiceMemory {
   Chosen candidate[kMostSoundings], chosen[kMostSoundings];
   Patch* patch;
   std::uint32_t count;
-  std::uint32_t next;
 };
 
 }  // namespace tandem::manifold

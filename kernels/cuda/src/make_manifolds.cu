@@ -120,10 +120,13 @@ __global__ void __launch_bounds__(kThreads, 4) make_pieces(const __grid_constant
   }
 }
 
+// Shared memory for keys and sets of the pieces of a pair, if they fit; a warp has its part of it. With what
+// else a block shares it stays below the 48 KiB that need no leave.
+constexpr std::uint32_t kNearPieces = 1920, kNearWords = 4 * kNearPieces;
+constexpr std::size_t kNearBytes = (kNearWords + kNearPieces) * sizeof(std::uint32_t);
+
 /// Finds the curves of each pair.
 __global__ void __launch_bounds__(kFinders, 2) find_curves(const __grid_constant__ ManifoldArgs args) {
-  // For keys and sets of pieces, if they fit. A warp has its part.
-  constexpr std::uint32_t kPieces = 2048, kWords = 4 * kPieces;
   extern __shared__ std::uint32_t near[];
   __shared__ Raw<BodyPair> shared_bodies[kFindingWarps];
   __shared__ std::uint32_t next[kFindingWarps];
@@ -144,8 +147,8 @@ __global__ void __launch_bounds__(kFinders, 2) find_curves(const __grid_constant
     BodyPair& bodies = shared_bodies[own].get();
     if (team.rank() == 0) bodies = bodies_of(args, args.pairs.pairs[pair]);
     PieceMemory pieces = memory_of(args, pair);
-    pieces.near_table = near + own * kWords / kParts, pieces.near_words = kWords / kParts;
-    if (count <= kPieces / kParts) pieces.curve = near + kWords + own * kPieces / kParts;
+    pieces.near_table = near + own * kNearWords / kParts, pieces.near_words = kNearWords / kParts;
+    if (count <= kNearPieces / kParts) pieces.curve = near + kNearWords + own * kNearPieces / kParts;
     team.sync();
     manifold::CurveFinder<AnyTeam> finder(team, bodies, pieces);
     const PieceSummary summary = finder.find_among(count, next[own]);
@@ -161,7 +164,6 @@ __global__ void __launch_bounds__(kFinders, 2) find_curves(const __grid_constant
   };
   share_out<kFinders>(groups.counts->many, state.next_many, groups.counts->few, state.next_few, of);
 }
-constexpr std::size_t kNearBytes = 5 * 2048 * sizeof(std::uint32_t);
 
 // What a team that makes a patch shares.
 struct MakerMemory {

@@ -64,7 +64,7 @@ constexpr bool kIsLarge = AnyTeam::size() != 32;
 // of them at a time; else blocks are sooner done.
 __device__ std::uint32_t most_of_warp(const GpuGroupCounts& counts) {
   constexpr std::uint32_t kManyPairs = 8192;
-  return counts.few + counts.many > kManyPairs ? 512 : kFewContacts;
+  return counts.few + counts.many > kManyPairs ? 512 : 128;
 }
 
 // Pieces are numbered in 28 bits, and table entries in 32.
@@ -88,7 +88,7 @@ __device__ PieceMemory memory_of(const ManifoldArgs& args, std::uint32_t pair) {
 }
 
 /// Writes down what each contact's triangles have in common, among the pieces of the contact's pair.
-__global__ void __launch_bounds__(kThreads, 4) make_pieces(const __grid_constant__ ManifoldArgs args) {
+__global__ void __launch_bounds__(kThreads, 3) make_pieces(const __grid_constant__ ManifoldArgs args) {
   wait_for_kernel_before();
   if (!has_query(args)) return;
   const std::uint64_t count = args.query->contacts, step = std::uint64_t{gridDim.x} * kThreads;
@@ -228,7 +228,7 @@ __device__ std::uint32_t patches_begun(const ManifoldArgs& args) {
 }
 
 /// Measures the depths of each patch: by a block, or, where there are enough for all warps, by a warp.
-__global__ void __launch_bounds__(kThreads, 6) measure_depths(const __grid_constant__ ManifoldArgs args) {
+__global__ void __launch_bounds__(kThreads, 4) measure_depths(const __grid_constant__ ManifoldArgs args) {
   __shared__ BlockScratch<kThreads> scratch;
   __shared__ WarpWalks walks[kWarps];
   __shared__ MakerMemory memory[kWarps];
@@ -377,10 +377,10 @@ cudaError_t make_patches(const ManifoldArgs& args, cudaStream_t stream) {
   const auto grid = [&](unsigned blocks, unsigned threads, std::size_t shared_bytes) {
     return Grid{args.limits.processors * blocks, threads, shared_bytes, stream, args.limits.early_launch};
   };
-  cudaError_t error = launch_after(grid(4, kThreads, 0), make_pieces, args);
+  cudaError_t error = launch_after(grid(3, kThreads, 0), make_pieces, args);
   if (error == cudaSuccess) error = launch_after(grid(2, kFinders, kNearBytes), find_curves, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), begin_patches, args);
-  if (error == cudaSuccess) error = launch_after(grid(6, kThreads, 0), measure_depths, args);
+  if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), measure_depths, args);
   return error == cudaSuccess ? launch_after(grid(6, kThreads, 0), finish_patches, args) : error;
 }
 

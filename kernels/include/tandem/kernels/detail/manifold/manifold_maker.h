@@ -125,8 +125,7 @@ TANDEM_HD void ManifoldMaker<Team>::sound(int first, DepthMemory& shared) {
   for (std::uint32_t i = team_.rank(); i < asked; i += team_.size()) {
     const Sounding& s = state_.sounding[first + static_cast<int>(i / 2)];
     const int side = static_cast<int>(i % 2);
-    questions.ask(i, side, side == 0 ? 1 : -1, s.line, s.target[side], -INFINITY, INFINITY,
-                  state_.extent / 4);
+    questions.ask(i, side, side == 0 ? 1 : -1, s.line, s.target[side], -INFINITY, INFINITY, state_.extent);
   }
   walk_lines(questions, asked, shared);
   for (std::uint32_t i = team_.rank(); i < asked; i += team_.size())

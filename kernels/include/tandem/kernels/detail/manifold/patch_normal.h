@@ -12,6 +12,9 @@ inline constexpr double kClosed = 1e-6;
 /// Faces in so few directions on both sides make a patch one of flat faces; otherwise it is a smooth one.
 inline constexpr int kMostDirections = 5;
 
+/// Unit normals of float32 whose difference's square is less are of one face: half a milliradian.
+inline constexpr float kSameFace = 2e-7f;
+
 /// A smooth patch lies on a face if this part of its curve lies in the face's plane.
 inline constexpr double kBearing = 0.9;
 
@@ -58,6 +61,7 @@ class NormalFinder {
   TANDEM_HD bool has_free_end() const;
   TANDEM_HD Vector3 plain_middle() const;
   TANDEM_HD Vector3 sheet_normal() const;
+  TANDEM_HD bool has_many_directions(int side) const;
   TANDEM_HD bool gather_directions(int side);
   TANDEM_HD void find_bearing_faces(const Vector3& smooth, double length);
   TANDEM_HD void spread_along(const Vector3* directions, int count, Spread* spread) const;
@@ -66,8 +70,11 @@ class NormalFinder {
   TANDEM_HD bool find_crossing_edges(Vector3& n) const;
   TANDEM_HD Vector3 crossing_edges(const Piece& piece, int number) const;
   TANDEM_HD static bool same_face(const FloatVector& p, const FloatVector& q) {
+    return distance_square(p, q) < kSameFace;
+  }
+  TANDEM_HD static float distance_square(const FloatVector& p, const FloatVector& q) {
     const float x = p.x[0] - q.x[0], y = p.x[1] - q.x[1], z = p.x[2] - q.x[2];
-    return x * x + y * y + z * z < 2e-7f;
+    return x * x + y * y + z * z;
   }
   TANDEM_HD static bool same_direction(const Vector3& p, const Vector3& q) { return dot(p, q) > 1 - 1e-7; }
 
@@ -140,6 +147,26 @@ TANDEM_HD Vector3 NormalFinder<Team>::sheet_normal() const {
     if (sheet_b || !sheet_a) sum.add(-(size * Vector3{normals[3], normals[4], normals[5]}), one_by_unit);
   });
   return total(sum, unit);
+}
+
+/// Whether a sample of pieces proves that gather_directions() is false: of more than kMostDirections normals
+/// each is more than twice as far from the others as normals of one direction are from it, so no direction
+/// has two of them. All of the team come to the same answer.
+template <typename Team>
+TANDEM_HD bool NormalFinder<Team>::has_many_directions(int side) const {
+  constexpr std::uint32_t kSample = 24;
+  FloatVector known[kMostDirections];
+  int count = 0;
+  for (std::uint32_t i = begin_; i < end_ && i < begin_ + kSample; ++i) {
+    const float* n = memory_.normals + 6 * std::size_t{memory_.order[i]} + 3 * side;
+    const FloatVector normal = {{n[0], n[1], n[2]}};
+    bool apart = true;
+    for (int k = 0; k < count; ++k) apart = apart && distance_square(normal, known[k]) > 4.1f * kSameFace;
+    if (!apart) continue;
+    if (count == kMostDirections) return true;
+    known[count++] = normal;
+  }
+  return false;
 }
 
 /// Adds the directions of faces of one body, from the least piece on. False where there are more than
@@ -244,8 +271,9 @@ TANDEM_HD void NormalFinder<Team>::spread_along(const Vector3* directions, int c
 template <typename Team>
 TANDEM_HD Vector3 NormalFinder<Team>::face_nearest(const Vector3& smooth, double length) {
   directions_ = 0;
-  const int of_a = gather_directions(0) ? directions_ : kMost, first_of_b = directions_;
-  const int of_b = gather_directions(1) ? directions_ - first_of_b : kMost;
+  const auto gather = [&](int side) { return !has_many_directions(side) && gather_directions(side); };
+  const int of_a = gather(0) ? directions_ : kMost, first_of_b = directions_;
+  const int of_b = gather(1) ? directions_ - first_of_b : kMost;
   if ((of_a == 1) != (of_b == 1)) {
     const Vector3& n = direction_[of_a == 1 ? 0 : first_of_b].n;
     return dot(n, smooth) > 0 ? n : smooth;

@@ -53,7 +53,7 @@ struct alignas(64) Worker {
   bool enough_memory = true;
 
   bool make_room(std::size_t contacts, PieceMemory& memory) {
-    if (!pieces.resize(contacts) || !normals.resize(6 * contacts) ||
+    if (!pieces.resize(contacts) || !normals.resize(6 * contacts + 1) ||
         !words.resize((3 + kTableWords) * contacts + 5))
       return false;
     std::uint32_t* const word = words.data();

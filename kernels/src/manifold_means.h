@@ -24,6 +24,12 @@ struct ManifoldMeans {
   // Each as the function of the name in the headers, of pieces order[begin] to order[end - 1].
   void (*sum_pieces)(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
                      const manifold::Vector3& origin, double one_by_unit, manifold::CurveSums& out);
+  std::uint64_t (*least_unmarked)(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
+                                  int side, const manifold::FloatVector* known);
+  void (*find_face_along)(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
+                          int side, const manifold::FloatVector& up, manifold::FaceAlong& best);
+  void (*sum_length_on_face)(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
+                             const manifold::FloatVector& face, double one_by_unit, manifold::ExactSum& sum);
   void (*spread_along)(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory,
                        std::uint32_t begin, std::uint32_t end, const manifold::Vector3& origin,
                        const manifold::Vector3* directions, int count, manifold::Spread* spread);

@@ -130,6 +130,73 @@ void sum_pieces(const manifold::PieceMemory& memory, std::uint32_t begin, std::u
   length.add_to(out.length, times);
 }
 
+/// The normals of four pieces, of a's triangle or b's. One float beyond them is read.
+struct FourNormals {
+  Lanes4 x, y, z;
+
+  TANDEM_INLINE FourNormals(const manifold::PieceMemory& memory, const FourPieces& four, int side) {
+    Lanes4 rows[4];
+    for (int k = 0; k < 4; ++k) rows[k] = load(memory.normals + 6 * std::size_t{four.at[k]} + 3 * side);
+    transpose_rows(rows);
+    x = rows[0], y = rows[1], z = rows[2];
+  }
+  TANDEM_INLINE LaneMask<4> of_face(const manifold::FloatVector& n) const {
+    const Lanes4 p = x + -n.x[0], q = y + -n.x[1], r = z + -n.x[2];
+    return {(p * p + q * q + r * r).v < manifold::kSameFace};
+  }
+};
+
+/// NormalFinder::least_unmarked(). A piece's mark is where its curve was.
+std::uint64_t least_unmarked(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
+                             int side, const manifold::FloatVector* known) {
+  std::uint64_t key = ~std::uint64_t{0};
+  for (std::uint32_t i = begin; i < end; i += 4) {
+    const FourPieces four(memory, i, end);
+    unsigned left = (1u << four.lanes) - 1;
+    const unsigned marked = known == nullptr ? 0 : FourNormals(memory, four, side).of_face(*known).mask();
+    for (unsigned k = 0; k < four.lanes; ++k) {
+      std::uint32_t& mark = memory.curve[i + k];
+      mark = known == nullptr ? 0 : mark | (marked >> k & 1u);
+      left &= ~(mark << k);
+    }
+    for (; left != 0; left &= left - 1)
+      key = manifold::lesser(key, four.piece[std::countr_zero(left)]->key());
+  }
+  return key;
+}
+
+/// Of NormalFinder::find_bearing_faces().
+void find_face_along(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end, int side,
+                     const manifold::FloatVector& up, manifold::FaceAlong& best) {
+  const float sign = side == 0 ? 1 : -1;
+  const float x = sign * up.x[0], y = sign * up.x[1], z = sign * up.x[2];
+  for (std::uint32_t i = begin; i < end; i += 4) {
+    const FourPieces four(memory, i, end);
+    const FourNormals n(memory, four, side);
+    const Lanes4 along = x * n.x + y * n.y + z * n.z;
+    for (unsigned found = LaneMask<4>{along.v >= best.along}.mask(); found != 0; found &= found - 1) {
+      const int k = std::countr_zero(found);
+      best.take(along.v[k], four.piece[k]->key());
+    }
+  }
+}
+
+/// Of NormalFinder::find_bearing_faces().
+void sum_length_on_face(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
+                        const manifold::FloatVector& face, double one_by_unit, manifold::ExactSum& sum) {
+  const manifold::FloatVector turned = {{-face.x[0], -face.x[1], -face.x[2]}};
+  for (std::uint32_t i = begin; i < end; i += 4) {
+    const FourPieces four(memory, i, end);
+    unsigned found =
+        (FourNormals(memory, four, 0).of_face(face) | FourNormals(memory, four, 1).of_face(turned)).mask();
+    for (found &= (1u << four.lanes) - 1; found != 0; found &= found - 1) {
+      const manifold::Piece& piece = *four.piece[std::countr_zero(found)];
+      if (piece.kind() == manifold::MeetingKind::polygon) continue;
+      sum.add(norm(piece.weight() * (piece.end[1] - piece.end[0])), one_by_unit);
+    }
+  }
+}
+
 /// NormalFinder::spread_along().
 void spread_along(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory, std::uint32_t begin,
                   std::uint32_t end, const manifold::Vector3& origin, const manifold::Vector3* directions,

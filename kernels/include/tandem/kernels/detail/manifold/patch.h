@@ -45,6 +45,19 @@ struct CurveMeasure {
   std::uint64_t key = 0;
 };
 
+/// Unit normals of float32 whose difference's square is less are of one face: half a milliradian.
+inline constexpr float kSameFace = 2e-7f;
+
+/// The face that lies most across a direction; of several that of the least piece.
+struct FaceAlong {
+  float along;
+  std::uint64_t key;
+
+  TANDEM_HD void take(float of_piece, std::uint64_t piece) {
+    if (of_piece > along || (of_piece == along && piece < key)) along = of_piece, key = piece;
+  }
+};
+
 /// The heights of a patch's triangles along a direction.
 struct Spread {
   double highest_a, lowest_b;

@@ -12,9 +12,6 @@ inline constexpr double kClosed = 1e-6;
 /// Faces in so few directions on both sides make a patch one of flat faces; otherwise it is a smooth one.
 inline constexpr int kMostDirections = 5;
 
-/// Unit normals of float32 whose difference's square is less are of one face: half a milliradian.
-inline constexpr float kSameFace = 2e-7f;
-
 /// A smooth patch lies on a face if this part of its curve lies in the face's plane.
 inline constexpr double kBearing = 0.9;
 
@@ -62,6 +59,7 @@ class NormalFinder {
   TANDEM_HD Vector3 plain_middle() const;
   TANDEM_HD Vector3 sheet_normal() const;
   TANDEM_HD bool has_many_directions(int side) const;
+  TANDEM_HD std::uint64_t least_unmarked(int side, const FloatVector* known) const;
   TANDEM_HD bool gather_directions(int side);
   TANDEM_HD void find_bearing_faces(const Vector3& smooth, double length);
   TANDEM_HD void spread_along(const Vector3* directions, int count, Spread* spread) const;
@@ -69,6 +67,11 @@ class NormalFinder {
   TANDEM_HD bool find_for_touch(Vector3& n);
   TANDEM_HD bool find_crossing_edges(Vector3& n) const;
   TANDEM_HD Vector3 crossing_edges(const Piece& piece, int number) const;
+  /// From a towards b.
+  TANDEM_HD static FloatVector turned_normal(const float* normals, int side) {
+    const float sign = side == 0 ? 1.0f : -1.0f;
+    return {{sign * normals[3 * side], sign * normals[3 * side + 1], sign * normals[3 * side + 2]}};
+  }
   TANDEM_HD static bool same_face(const FloatVector& p, const FloatVector& q) {
     return distance_square(p, q) < kSameFace;
   }
@@ -169,28 +172,36 @@ TANDEM_HD bool NormalFinder<Team>::has_many_directions(int side) const {
   return false;
 }
 
+/// Marks pieces whose normals are of the face of a known one, none at first. Result: the least key of those
+/// without a mark.
+template <typename Team>
+TANDEM_HD std::uint64_t NormalFinder<Team>::least_unmarked(int side, const FloatVector* known) const {
+  if constexpr (HasMeans<Team>) return team_.means().least_unmarked(memory_, begin_, end_, side, known);
+  std::uint64_t key = ~std::uint64_t{0};
+  for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
+    const std::uint32_t at = memory_.order[i];
+    if (known == nullptr) {
+      mark(i) = 0;
+    } else {
+      if (mark(i) != 0) continue;
+      const float* n = memory_.normals + 6 * std::size_t{at} + 3 * side;
+      if (same_face({{n[0], n[1], n[2]}}, *known)) {
+        mark(i) = 1;
+        continue;
+      }
+    }
+    key = lesser(key, memory_.pieces[at].key());
+  }
+  return key;
+}
+
 /// Adds the directions of faces of one body, from the least piece on. False where there are more than
 /// kMostDirections. Normals closer than half a milliradian are one.
 template <typename Team>
 TANDEM_HD bool NormalFinder<Team>::gather_directions(int side) {
   FloatVector known = {};  // the last direction
   for (int found = 0;; ++found) {
-    std::uint64_t key = ~std::uint64_t{0};
-    for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
-      const std::uint32_t at = memory_.order[i];
-      if (found == 0) {
-        mark(i) = 0;
-      } else {
-        if (mark(i) != 0) continue;
-        const float* n = memory_.normals + 6 * std::size_t{at} + 3 * side;
-        if (same_face({{n[0], n[1], n[2]}}, known)) {
-          mark(i) = 1;
-          continue;
-        }
-      }
-      key = lesser(key, memory_.pieces[at].key());
-    }
-    key = team_.least(key);
+    const std::uint64_t key = team_.least(least_unmarked(side, found == 0 ? nullptr : &known));
     if (key == ~std::uint64_t{0}) return true;
     if (found == kMostDirections) return false;
     const auto triangle = static_cast<std::uint32_t>(side == 0 ? key >> 32 : key);
@@ -208,30 +219,32 @@ TANDEM_HD void NormalFinder<Team>::find_bearing_faces(const Vector3& smooth, dou
   directions_ = 0;
   const FloatVector up = {
       {static_cast<float>(smooth.x), static_cast<float>(smooth.y), static_cast<float>(smooth.z)}};
-  const auto normal_of = [](const float* normals, int side) {
-    const float sign = side == 0 ? 1.0f : -1.0f;
-    return FloatVector{
-        {sign * normals[3 * side], sign * normals[3 * side + 1], sign * normals[3 * side + 2]}};
-  };
   for (int side = 0; side < 2; ++side) {
-    float most = 0.9f;
-    std::uint64_t key = ~std::uint64_t{0};
-    for_each_piece([&](const Piece& piece, const float* normals) {
-      const float along = dot(normal_of(normals, side), up);
-      if (along > most || (along == most && piece.key() < key)) most = along, key = piece.key();
-    });
-    const float greatest = team_.greatest(most);
-    key = team_.least(most == greatest ? key : ~std::uint64_t{0});
+    FaceAlong face_up = {0.9f, ~std::uint64_t{0}};
+    if constexpr (HasMeans<Team>) {
+      team_.means().find_face_along(memory_, begin_, end_, side, up, face_up);
+    } else {
+      for_each_piece([&](const Piece& piece, const float* normals) {
+        face_up.take(dot(turned_normal(normals, side), up), piece.key());
+      });
+    }
+    const float greatest = team_.greatest(face_up.along);
+    const std::uint64_t key = team_.least(face_up.along == greatest ? face_up.key : ~std::uint64_t{0});
     if (key == ~std::uint64_t{0}) continue;
     const auto triangle = static_cast<std::uint32_t>(side == 0 ? key >> 32 : key);
     const Vector3 n = (side == 0 ? 1.0 : -1.0) * bodies_[side].triangle(triangle).normal;
     const FloatVector face = {{static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)}};
     ExactSum within;
-    for_each_piece([&](const Piece& piece, const float* normals) {
-      if (piece.kind() == MeetingKind::polygon) return;
-      if (!same_face(normal_of(normals, 0), face) && !same_face(normal_of(normals, 1), face)) return;
-      within.add(norm(piece.weight() * (piece.end[1] - piece.end[0])), 1 / summary_.unit);
-    });
+    if constexpr (HasMeans<Team>) {
+      team_.means().sum_length_on_face(memory_, begin_, end_, face, 1 / summary_.unit, within);
+    } else {
+      for_each_piece([&](const Piece& piece, const float* normals) {
+        if (piece.kind() == MeetingKind::polygon) return;
+        if (!same_face(turned_normal(normals, 0), face) && !same_face(turned_normal(normals, 1), face))
+          return;
+        within.add(norm(piece.weight() * (piece.end[1] - piece.end[0])), 1 / summary_.unit);
+      });
+    }
     if (total(within, summary_.unit) >= kBearing * length) direction_[directions_++] = {n, key};
   }
 }

@@ -157,10 +157,11 @@ TANDEM_HD Vector3 NormalFinder<Team>::sheet_normal() const {
 /// has two of them. All of the team come to the same answer.
 template <typename Team>
 TANDEM_HD bool NormalFinder<Team>::has_many_directions(int side) const {
-  constexpr std::uint32_t kSample = 24;
+  constexpr std::uint32_t kSample = 32;
+  const std::uint32_t step = (end_ - begin_ + kSample - 1) / kSample;
   FloatVector known[kMostDirections];
   int count = 0;
-  for (std::uint32_t i = begin_; i < end_ && i < begin_ + kSample; ++i) {
+  for (std::uint32_t i = begin_; i < end_; i += step) {
     const float* n = memory_.normals + 6 * std::size_t{memory_.order[i]} + 3 * side;
     const FloatVector normal = {{n[0], n[1], n[2]}};
     bool apart = true;

@@ -25,7 +25,7 @@ struct ManifoldMeans {
   void (*sum_pieces)(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
                      const manifold::Vector3& origin, double one_by_unit, manifold::CurveSums& out);
   std::uint64_t (*least_unmarked)(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
-                                  int side, const manifold::FloatVector* known);
+                                  int side, const manifold::FloatVector& known);
   void (*find_face_along)(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
                           int side, const manifold::FloatVector& up, manifold::FaceAlong& best);
   void (*sum_length_on_face)(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,

@@ -148,18 +148,27 @@ struct FourNormals {
 
 /// NormalFinder::least_unmarked(). A piece's mark is where its curve was.
 std::uint64_t least_unmarked(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
-                             int side, const manifold::FloatVector* known) {
+                             int side, const manifold::FloatVector& known) {
+  using Marks = Vector<4>::Bits;
   std::uint64_t key = ~std::uint64_t{0};
   for (std::uint32_t i = begin; i < end; i += 4) {
     const FourPieces four(memory, i, end);
-    unsigned left = (1u << four.lanes) - 1;
-    const unsigned marked = known == nullptr ? 0 : FourNormals(memory, four, side).of_face(*known).mask();
-    for (unsigned k = 0; k < four.lanes; ++k) {
-      std::uint32_t& mark = memory.curve[i + k];
-      mark = known == nullptr ? 0 : mark | (marked >> k & 1u);
-      left &= ~(mark << k);
+    Marks marks = {1, 1, 1, 1};
+    if (four.lanes == 4) {
+      __builtin_memcpy(&marks, memory.curve + i, sizeof marks);
+    } else {
+      for (std::uint32_t k = 0; k < four.lanes; ++k)
+        marks[k] = static_cast<std::int32_t>(memory.curve[i + k]);
     }
-    for (; left != 0; left &= left - 1)
+    if (LaneMask<4>{marks == 0}.mask() == 0) continue;
+    marks |= FourNormals(memory, four, side).of_face(known).bits & 1;
+    if (four.lanes == 4) {
+      __builtin_memcpy(memory.curve + i, &marks, sizeof marks);
+    } else {
+      for (std::uint32_t k = 0; k < four.lanes; ++k)
+        memory.curve[i + k] = static_cast<std::uint32_t>(marks[k]);
+    }
+    for (unsigned left = LaneMask<4>{marks == 0}.mask(); left != 0; left &= left - 1)
       key = manifold::lesser(key, four.piece[std::countr_zero(left)]->key());
   }
   return key;

@@ -29,6 +29,8 @@ class NormalFinder {
         end_(memory.start[curve + 1]) {}
 
   TANDEM_HD CurveMeasure measure();
+
+  /// Condition: measure(), whose result this is.
   TANDEM_HD PatchNormal find(const CurveMeasure& curve);
 
  private:
@@ -59,7 +61,7 @@ class NormalFinder {
   TANDEM_HD Vector3 plain_middle() const;
   TANDEM_HD Vector3 sheet_normal() const;
   TANDEM_HD bool has_many_directions(int side) const;
-  TANDEM_HD std::uint64_t least_unmarked(int side, const FloatVector* known) const;
+  TANDEM_HD std::uint64_t least_unmarked(int side, const FloatVector& known) const;
   TANDEM_HD bool gather_directions(int side);
   TANDEM_HD void find_bearing_faces(const Vector3& smooth, double length);
   TANDEM_HD void spread_along(const Vector3* directions, int count, Spread* spread) const;
@@ -86,6 +88,7 @@ class NormalFinder {
   const PieceMemory& memory_;
   const PieceSummary& summary_;
   std::uint32_t begin_, end_;
+  std::uint64_t key_ = 0;       // of the least piece
   Direction direction_[kMost];  // of faces of a, then of b
   int directions_ = 0;
 };
@@ -101,7 +104,7 @@ TANDEM_HD CurveMeasure NormalFinder<Team>::measure() {
     for_each_piece([&](const Piece& piece, const float*) { sums.add(piece, summary_.origin, one_by_unit); });
   }
   CurveMeasure out;
-  out.key = team_.least(sums.key);
+  out.key = key_ = team_.least(sums.key);
   out.area = total(sums.area, unit * unit);
   out.length = total(sums.length, unit);
   const Vector3 residual = total(sums.gap, unit);
@@ -173,25 +176,19 @@ TANDEM_HD bool NormalFinder<Team>::has_many_directions(int side) const {
   return false;
 }
 
-/// Marks pieces whose normals are of the face of a known one, none at first. Result: the least key of those
-/// without a mark.
+/// Marks pieces whose normals are of the face of a known one. Result: the least key of those without a mark.
 template <typename Team>
-TANDEM_HD std::uint64_t NormalFinder<Team>::least_unmarked(int side, const FloatVector* known) const {
+TANDEM_HD std::uint64_t NormalFinder<Team>::least_unmarked(int side, const FloatVector& known) const {
   if constexpr (HasMeans<Team>) return team_.means().least_unmarked(memory_, begin_, end_, side, known);
   std::uint64_t key = ~std::uint64_t{0};
   for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
+    if (mark(i) != 0) continue;
     const std::uint32_t at = memory_.order[i];
-    if (known == nullptr) {
-      mark(i) = 0;
-    } else {
-      if (mark(i) != 0) continue;
-      const float* n = memory_.normals + 6 * std::size_t{at} + 3 * side;
-      if (same_face({{n[0], n[1], n[2]}}, *known)) {
-        mark(i) = 1;
-        continue;
-      }
-    }
-    key = lesser(key, memory_.pieces[at].key());
+    const float* n = memory_.normals + 6 * std::size_t{at} + 3 * side;
+    if (same_face({{n[0], n[1], n[2]}}, known))
+      mark(i) = 1;
+    else
+      key = lesser(key, memory_.pieces[at].key());
   }
   return key;
 }
@@ -200,16 +197,17 @@ TANDEM_HD std::uint64_t NormalFinder<Team>::least_unmarked(int side, const Float
 /// kMostDirections. Normals closer than half a milliradian are one.
 template <typename Team>
 TANDEM_HD bool NormalFinder<Team>::gather_directions(int side) {
-  FloatVector known = {};  // the last direction
+  for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) mark(i) = 0;
+  std::uint64_t key = key_;
   for (int found = 0;; ++found) {
-    const std::uint64_t key = team_.least(least_unmarked(side, found == 0 ? nullptr : &known));
     if (key == ~std::uint64_t{0}) return true;
     if (found == kMostDirections) return false;
     const auto triangle = static_cast<std::uint32_t>(side == 0 ? key >> 32 : key);
     const WorldTriangle t = bodies_[side].triangle(triangle);
-    known = {
-        {static_cast<float>(t.normal.x), static_cast<float>(t.normal.y), static_cast<float>(t.normal.z)}};
     direction_[directions_++] = {side == 0 ? t.normal : -t.normal, key};
+    const FloatVector known = {
+        {static_cast<float>(t.normal.x), static_cast<float>(t.normal.y), static_cast<float>(t.normal.z)}};
+    key = team_.least(least_unmarked(side, known));
   }
 }
 

@@ -122,6 +122,14 @@ TANDEM_INLINE Vector3Lanes<4> posed_corner(const manifold::Body& body, const std
                               __builtin_convertvector(rows[2].v, DoubleLanes<4>)});
 }
 
+/// 1 for each of four triangles that is turned, else 0.
+TANDEM_INLINE Vector<4>::Bits turned_lanes(const manifold::Body& body, const std::uint32_t* index) {
+  const TriangleTopology* const t = body.shape->topology;
+  const auto flags = [&](int i) { return static_cast<std::int32_t>(t[index[i]].flags); };
+  static_assert(kTurned == 1);
+  return Vector<4>::Bits{flags(0), flags(1), flags(2), flags(3)} & 1;
+}
+
 }  // namespace
 }  // namespace tandem
 #endif

@@ -145,19 +145,16 @@ class LineWalk {
     const Lanes4 along = d[0] * x + d[1] * y + d[2] * z;
     const Lanes4 reach = s[0] * h[0] + s[1] * h[1] + s[2] * h[2] + slack_;
     const Lanes4 low = along - reach, high = along + reach;
-    below[0] = below[1] = below[2] = below[3] = 0;
-    unsigned met = 0;
+    typename Vector<4>::Bits all = {};
     for (; lines != 0; lines &= lines - 1) {
       const int i = std::countr_zero(lines);
       const Line& line = line_[i];
       typename Vector<4>::Bits passes = (low.v <= line.to) & (high.v >= line.from);
       for (int k = 0; k < 3; ++k) passes &= magnitude(across[k] + -line.across[k]).v <= extent[k].v;
-      unsigned nodes = LaneMask<4>{passes}.mask();
-      if (nodes == 0) continue;
-      met |= 1u << i;
-      for (; nodes != 0; nodes &= nodes - 1) below[std::countr_zero(nodes)] |= 1u << i;
+      all |= passes & (1 << i);
     }
-    return met;
+    __builtin_memcpy(below, &all, sizeof below);
+    return below[0] | below[1] | below[2] | below[3];
   }
 
   /// LineQuestions::visit() and merge(), of four triangles.
@@ -169,9 +166,7 @@ class LineWalk {
     for (int k = 0; k < 3; ++k) corner[k] = posed_corner(body_, index, k) - frame_.origin;
     const Vector3Lanes<4> normal = cross(corner[1] - corner[0], corner[2] - corner[0]);
     const D area = dot(frame_.n, normal), size = square_root(dot(normal, normal));
-    const TriangleTopology* const topology = body_.shape->topology;
-    DoubleMask<4> turned;
-    for (int i = 0; i < kNodesPerBlock; ++i) turned[i] = is_turned(topology[index[i]].flags) ? -1 : 0;
+    const DoubleMask<4> turned = -__builtin_convertvector(turned_lanes(body_, index), DoubleMask<4>);
     const DoubleMask<4> upwards = turned ^ (area > 0);  // not turned: a positive area faces along the normal
     const DoubleMask<4> steep = magnitude_of<4>(area) > manifold::kWall * size;
     const D little = 1e-9 + 0x1p-48 * body_.reach * square_root(size) / magnitude_of<4>(area);

@@ -16,8 +16,7 @@ struct WorldTriangleLanes {
     for (int k = 0; k < 3; ++k) corner[k] = posed_corner(body, index, k);
     const Vector3Lanes<4> n = cross(corner[1] - corner[0], corner[2] - corner[0]);
     const DoubleLanes<4> length = square_root(dot(n, n));
-    DoubleLanes<4> turn;
-    for (int i = 0; i < 4; ++i) turn[i] = is_turned(body.shape->topology[index[i]].flags) ? -1 : 1;
+    const DoubleLanes<4> turn = __builtin_convertvector(1 - 2 * turned_lanes(body, index), DoubleLanes<4>);
     const DoubleLanes<4> scale = length > 1e-290 ? turn / length : DoubleLanes<4>{};
     normal = {scale * n.x, scale * n.y, scale * n.z};
   }

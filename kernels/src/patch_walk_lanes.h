@@ -25,6 +25,14 @@ TANDEM_INLINE void fetch(const Block& block) {
   __builtin_prefetch(&block.half_extent[1]);
 }
 
+/// The triangles of the leaf block are looked at soon.
+TANDEM_INLINE void fetch_leaves(const manifold::Body& body, const Block& block) {
+  const char* const triangles = reinterpret_cast<const char*>(body.shape->triangles + block.index[0]);
+  for (int line = 0; line < 3; ++line) __builtin_prefetch(triangles + 64 * line);
+  __builtin_prefetch(triangles + 4 * sizeof(Triangle) - 1);
+  __builtin_prefetch(body.shape->topology + block.index[0]);
+}
+
 struct BoxCoordinates {
   Lanes4 center[3], half_extent[3];
 
@@ -113,6 +121,8 @@ class LineWalk {
     Waiting waiting[kMostWaiting];
     int count = 0;
     waiting[count++] = {0, asked};
+    const Block* fetched = nullptr;  // a leaf block that waits for its triangles
+    unsigned lines_of_fetched = 0;
     while (count > 0) {
       const Waiting next = waiting[--count];
       const Block& block = body_.shape->blocks[next.block];
@@ -120,7 +130,9 @@ class LineWalk {
       const unsigned met = lines_that_meet(block, next.lines, below);
       if (met == 0) continue;
       if (block.is_leaf_block()) {
-        visit(block, met);
+        fetch_leaves(body_, block);
+        if (fetched != nullptr) visit(*fetched, lines_of_fetched);
+        fetched = &block, lines_of_fetched = met;
         continue;
       }
       for (int i = kNodesPerBlock - 1; i >= 0; --i) {
@@ -129,6 +141,7 @@ class LineWalk {
         waiting[count++] = {block.index[i], below[i]};
       }
     }
+    if (fetched != nullptr) visit(*fetched, lines_of_fetched);
   }
 
   /// As LineTest::passes(), for four boxes and several lines. What depends on the line alone or the box alone
@@ -236,12 +249,15 @@ class ExtremeWalk {
     std::uint32_t waiting[kMostWaiting];
     int count = 0;
     waiting[count++] = 0;
+    const Block* fetched = nullptr;
     while (count > 0) {
       const Block& block = body_.shape->blocks[waiting[--count]];
       unsigned nodes = nodes_that_reach(block);
       if (nodes == 0) continue;
       if (block.is_leaf_block()) {
-        visit(block);
+        fetch_leaves(body_, block);
+        if (fetched != nullptr) visit(*fetched);
+        fetched = &block;
         continue;
       }
       for (; nodes != 0; nodes &= nodes - 1) {
@@ -250,6 +266,7 @@ class ExtremeWalk {
         waiting[count++] = next;
       }
     }
+    if (fetched != nullptr) visit(*fetched);
     return best_;
   }
 

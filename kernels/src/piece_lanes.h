@@ -103,6 +103,10 @@ class PieceMaker {
   manifold::PieceBounds make(const Contact* contacts, std::uint32_t count) {
     for (std::uint32_t i = 0; i < count; i += 4) {
       const std::uint32_t lanes = count - i < 4 ? count - i : 4;
+      for (std::uint32_t next = i + kAhead; next < i + kAhead + 4 && next < count; ++next) {
+        fetch_triangle(bodies_.a, contacts[next].triangle_a);
+        fetch_triangle(bodies_.b, contacts[next].triangle_b);
+      }
       make_four(contacts + i, lanes);
     }
     for (int k = 0; k < 3; ++k) {
@@ -115,6 +119,14 @@ class PieceMaker {
   }
 
  private:
+  static constexpr std::uint32_t kAhead = 12;  // contacts whose triangles are on their way
+
+  TANDEM_INLINE static void fetch_triangle(const manifold::Body& body, std::uint32_t triangle) {
+    __builtin_prefetch(body.shape->triangles[triangle].corner);
+    __builtin_prefetch(body.shape->triangles[triangle].corner + 2);
+    __builtin_prefetch(body.shape->topology + triangle);
+  }
+
   TANDEM_INLINE void make_four(const Contact* contacts, std::uint32_t lanes) {
     using D = DoubleLanes<4>;
     using Mask = DoubleMask<4>;

@@ -206,36 +206,84 @@ void sum_length_on_face(const manifold::PieceMemory& memory, std::uint32_t begin
   }
 }
 
-/// NormalFinder::spread_along().
-void spread_along(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory, std::uint32_t begin,
-                  std::uint32_t end, const manifold::Vector3& origin, const manifold::Vector3* directions,
-                  int count, manifold::Spread* spread) {
-  using D = DoubleLanes<4>;
-  constexpr D kMost = {INFINITY, INFINITY, INFINITY, INFINITY};
-  D highest[manifold::kMostTried], lowest[manifold::kMostTried];
-  for (int i = 0; i < count; ++i) highest[i] = -kMost, lowest[i] = kMost;
-  for (std::uint32_t i = begin; i < end; i += 4) {
-    const FourPieces four(memory, i, end);
-    for (int side = 0; side < 2; ++side) {
-      std::uint32_t index[4];
-      four.triangles(side, index);
+/// Triangles of one body that pieces of a curve have, most of them once.
+class CurveTriangles {
+ public:
+  static constexpr std::uint32_t kMost = 64;
+
+  CurveTriangles(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end, int side)
+      : memory_(memory), next_(begin), end_(end), side_(side) {
+    for (std::uint32_t& s : seen_) s = kNoIndex;
+  }
+
+  /// Up to kMost further ones, a multiple of four: the last one may be there several times. 0: no more.
+  std::uint32_t gather(std::uint32_t (&index)[kMost]) {
+    std::uint32_t count = 0;
+    for (; next_ < end_ && count < kMost; ++next_) {
+      const std::uint32_t t = memory_.pieces[memory_.order[next_]].triangle[side_];
+      index[count] = t;
+      count += seen_[t % kSeen] != t ? 1 : 0;
+      seen_[t % kSeen] = t;
+    }
+    for (; count % 4 != 0; ++count) index[count] = index[count - 1];
+    return count;
+  }
+
+ private:
+  static constexpr std::uint32_t kSeen = 64;
+
+  const manifold::PieceMemory& memory_;
+  std::uint32_t next_, end_;
+  int side_;
+  std::uint32_t seen_[kSeen];
+};
+
+TANDEM_INLINE DoubleLanes<4> larger(const DoubleLanes<4>& x, const DoubleLanes<4>& y) {
+  return x > y ? x : y;
+}
+TANDEM_INLINE double largest(const DoubleLanes<4>& x) {
+  return manifold::greater(manifold::greater(x[0], x[1]), manifold::greater(x[2], x[3]));
+}
+
+/// The greatest heights of a body's triangles along directions.
+template <int kDirections>
+void highest_along(const manifold::Body& body, CurveTriangles triangles, const manifold::Vector3& origin,
+                   const manifold::Vector3* directions, double* highest) {
+  DoubleLanes<4> most[kDirections];
+  for (DoubleLanes<4>& m : most) m = DoubleLanes<4>{} - INFINITY;
+  std::uint32_t index[CurveTriangles::kMost];
+  while (const std::uint32_t count = triangles.gather(index)) {
+    for (std::uint32_t i = 0; i < count; i += 4) {
       for (int k = 0; k < 3; ++k) {
-        const Vector3Lanes<4> p = posed_corner(bodies[side], index, k) - origin;
-        for (int d = 0; d < count; ++d) {
-          const D height = dot(directions[d], p);
-          if (side == 0)
-            highest[d] = highest[d] > height ? highest[d] : height;
-          else
-            lowest[d] = lowest[d] < height ? lowest[d] : height;
-        }
+        const Vector3Lanes<4> p = posed_corner(body, index + i, k) - origin;
+        for (int d = 0; d < kDirections; ++d) most[d] = larger(most[d], dot(directions[d], p));
       }
     }
   }
-  for (int d = 0; d < count; ++d) {
-    spread[d] = {-INFINITY, INFINITY};
-    for (int i = 0; i < 4; ++i) {
-      spread[d].highest_a = manifold::greater(spread[d].highest_a, highest[d][i]);
-      spread[d].lowest_b = manifold::lesser(spread[d].lowest_b, lowest[d][i]);
+  for (int d = 0; d < kDirections; ++d) highest[d] = largest(most[d]);
+}
+
+/// NormalFinder::spread_along(). Heights against a direction are those along it, negated to the last bit.
+void spread_along(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory, std::uint32_t begin,
+                  std::uint32_t end, const manifold::Vector3& origin, const manifold::Vector3* directions,
+                  int count, manifold::Spread* spread) {
+  constexpr int kAtOnce = 4;
+  for (int side = 0; side < 2; ++side) {
+    const CurveTriangles triangles(memory, begin, end, side);
+    for (int first = 0; first < count; first += kAtOnce) {
+      manifold::Vector3 along[kAtOnce];
+      double highest[kAtOnce];
+      for (int d = 0; d < kAtOnce; ++d) {
+        const manifold::Vector3& n = directions[first + d < count ? first + d : first];
+        along[d] = side == 0 ? n : -n;
+      }
+      highest_along<kAtOnce>(bodies[side], triangles, origin, along, highest);
+      for (int d = 0; d < kAtOnce && first + d < count; ++d) {
+        if (side == 0)
+          spread[first + d].highest_a = highest[d];
+        else
+          spread[first + d].lowest_b = -highest[d];
+      }
     }
   }
 }
@@ -244,28 +292,33 @@ void spread_along(const manifold::BodyPair& bodies, const manifold::PieceMemory&
 manifold::Extreme extreme_corner(const manifold::Body& body, const manifold::PieceMemory& memory,
                                  std::uint32_t begin, std::uint32_t end, const manifold::PatchFrame& frame,
                                  int side) {
+  using D = DoubleLanes<4>;
   manifold::Extreme best;
-  double furthest = -INFINITY;
-  const double up = side == 0 ? 1 : -1;
-  for (std::uint32_t i = begin; i < end; i += 4) {
-    const FourPieces four(memory, i, end);
-    std::uint32_t index[4];
-    four.triangles(side, index);
-    for (int k = 0; k < 3; ++k) {
-      const Vector3Lanes<4> x = posed_corner(body, index, k) - frame.origin;
-      const DoubleLanes<4> height = dot(frame.n, x);
-      unsigned found = bits_of_mask(up * height >= furthest);
-      if (found == 0) continue;
-      const DoubleLanes<4> u = dot(frame.u, x), v = dot(frame.v, x);
-      for (; found != 0; found &= found - 1) {
-        const int lane = std::countr_zero(found);
-        const manifold::Extreme here = {
-            {u[lane], v[lane]}, height[lane], body.shape->topology[index[lane]].vertex[k]};
-        if (!manifold::ExtremeQuestions::is_further(static_cast<std::uint32_t>(side), here, best)) continue;
-        best = here;
-        furthest = up * here.height;
+  const manifold::Vector3 up = side == 0 ? frame.n : -frame.n;
+  CurveTriangles triangles(memory, begin, end, side);
+  std::uint32_t index[CurveTriangles::kMost];
+  while (const std::uint32_t count = triangles.gather(index)) {
+    D height[3 * CurveTriangles::kMost / 4], most = D{} - INFINITY;
+    std::uint32_t heights = 0;
+    for (std::uint32_t i = 0; i < count; i += 4) {
+      for (int k = 0; k < 3; ++k) {
+        const D h = dot(up, posed_corner(body, index + i, k) - frame.origin);
+        height[heights++] = h, most = larger(most, h);
       }
     }
+    const double highest = largest(most);
+    manifold::Extreme here;
+    std::uint32_t triangle = 0, corner = 0;
+    for (std::uint32_t i = 0; i < heights; ++i) {  // a flat face has many that are as high
+      for (unsigned found = bits_of_mask(height[i] == highest); found != 0; found &= found - 1) {
+        const std::uint32_t t = index[i / 3 * 4 + static_cast<std::uint32_t>(std::countr_zero(found))];
+        const std::uint32_t vertex = body.shape->topology[t].vertex[i % 3];
+        if (vertex < here.vertex) here.vertex = vertex, triangle = t, corner = i % 3;
+      }
+    }
+    const manifold::Vector3 x = body.corner(triangle, static_cast<int>(corner));
+    here.at = frame.flat(x), here.height = frame.height(x);
+    if (manifold::ExtremeQuestions::is_further(static_cast<std::uint32_t>(side), here, best)) best = here;
   }
   return best;
 }
@@ -325,17 +378,31 @@ TANDEM_INLINE Lanes4 value_of(const manifold::RimValue& value, const FourCandida
   return value.distance ? x * x + y * y : (q.y - p.y) * x - (q.x - p.x) * y;
 }
 
-/// RimFinder::furthest().
+/// RimFinder::furthest(). First the values, then who has the greatest.
 void furthest(const manifold::PieceMemory& memory, const manifold::Candidate* candidates, std::uint32_t count,
               const manifold::RimValue* values, int wanted, manifold::Furthest* const* best) {
-  for (std::uint32_t i = 0; i < count; i += 4) {
-    const FourCandidates four(candidates, i, count);
+  constexpr std::uint32_t kAtOnce = 256;
+  for (std::uint32_t from = 0; from < count; from += kAtOnce) {
+    const std::uint32_t end = count - from < kAtOnce ? count : from + kAtOnce;
+    Lanes4 value[2][kAtOnce / 4], most[2];
+    for (int w = 0; w < wanted; ++w) most[w].v = Lanes4::Floats{} + best[w]->value;
+    std::uint32_t groups = 0;
+    for (std::uint32_t i = from; i < end; i += 4, ++groups) {
+      const FourCandidates four(candidates, i, count);
+      for (int w = 0; w < wanted; ++w) {
+        value[w][groups] = value_of(values[w], four);
+        most[w] = larger(most[w], value[w][groups]);
+      }
+    }
     for (int w = 0; w < wanted; ++w) {
-      const Lanes4 value = value_of(values[w], four);
-      unsigned found = LaneMask<4>{value.v >= best[w]->value}.mask();
-      for (; found != 0; found &= found - 1) {
-        const auto k = static_cast<std::uint32_t>(std::countr_zero(found));
-        if (i + k < count) best[w]->take(memory, value.v[static_cast<int>(k)], candidates[i + k].reference);
+      float greatest = most[w].v[0];
+      for (int k = 1; k < 4; ++k) greatest = manifold::greater(greatest, most[w].v[k]);
+      for (std::uint32_t group = 0; group < groups; ++group) {
+        unsigned found = LaneMask<4>{value[w][group].v == greatest}.mask();
+        for (; found != 0; found &= found - 1) {
+          const std::uint32_t i = from + 4 * group + static_cast<std::uint32_t>(std::countr_zero(found));
+          if (i < count) best[w]->take(memory, greatest, candidates[i].reference);
+        }
       }
     }
   }

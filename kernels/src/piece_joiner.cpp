@@ -61,7 +61,7 @@ class PieceJoiner {
 }  // namespace
 
 bool ManifoldMeans::connect_by_ends(const BodyPair& bodies, const PieceMemory& memory, std::uint32_t pieces) {
-  PieceJoiner joiner(memory, pieces, 4 * pieces);
+  PieceJoiner joiner(memory, pieces, 3 * pieces);
   const TriangleTopology* const topology[2] = {bodies.a.shape->topology, bodies.b.shape->topology};
   std::int64_t alone = 0;
   bool many = false;

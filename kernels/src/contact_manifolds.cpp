@@ -207,7 +207,7 @@ void ContactManifolds::State::make_patches(std::size_t from, std::size_t to, std
     const BodyPair bodies = {{shapes[a.asset], a.pose}, {shapes[b.asset], b.pose}};
     manifold::CurveFinder<LaneThread> finder(team, bodies, memory);
     const manifold::PieceSummary summary = finder.find(contacts.data() + begin[row.pair], count, shared.next);
-    manifold::ManifoldMaker<LaneThread> maker(team, bodies, memory, shared, summary, most_points);
+    manifold::ManifoldMaker<LaneThread> maker(team, bodies, memory, shared, summary);
     const auto new_patch = [&]() -> Patch* {
       if (!own.patches.push({})) {
         own.enough_memory = false;
@@ -217,7 +217,12 @@ void ContactManifolds::State::make_patches(std::size_t from, std::size_t to, std
     };
     own.segments += summary.segments;
     for (std::uint32_t curve = 0; curve < summary.curves; ++curve) {
-      if (!maker.make(curve, new_patch)) ++own.ambiguous_touches;
+      if (!maker.begin(curve)) {
+        ++own.ambiguous_touches;
+        continue;
+      }
+      maker.measure_depths(curve);
+      maker.finish(curve, most_points, new_patch);
     }
     row.patches = static_cast<std::uint32_t>(own.patches.size() - row.first_patch);
     for (std::uint32_t k = 0; k < row.patches; ++k) {

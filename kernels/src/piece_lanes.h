@@ -170,7 +170,8 @@ class PieceMaker {
       manifold::meet(of_lane_a, of_lane_b, tolerance_, meeting_);
       if (meeting_.kind == manifold::MeetingKind::none) continue;
       manifold::write_piece(memory_, found_.pieces++, contacts[i], of_lane_a.normal, of_lane_b.normal,
-                            meeting_, found_);
+                            meeting_);
+      found_.add(meeting_);
     }
   }
 

@@ -42,6 +42,7 @@ struct GpuContactManifolds::State {
   GpuArray<gpu::PairCurve> curves;
   GpuArray<gpu::Counter> tile_sums;
   GpuArray<gpu::TableEntry> table;
+  GpuArray<gpu::BegunPatch> begun;
   GpuArray<manifold::Patch> patches;
   GpuArray<std::uint32_t> next_of_pair;
   GpuArray<Manifold> manifolds, manifolds_before;
@@ -134,6 +135,7 @@ Status GpuContactManifolds::State::reserve_manifolds(std::uint32_t wanted) {
   const std::size_t room = manifolds.room();
   if (status == Status::kOk) status = keep(manifolds_before.grow(room, manifolds_before.room()));
   if (status == Status::kOk) status = keep(entries.grow(room, entries.room()));
+  if (status == Status::kOk) status = keep(begun.reserve(room));
   if (status == Status::kOk) status = keep(patches.reserve(room));
   if (status == Status::kOk) status = keep(next_of_pair.reserve(room));
   if (status == Status::kOk) capacity.manifolds = static_cast<std::uint32_t>(room);
@@ -164,6 +166,7 @@ gpu::ManifoldArgs GpuContactManifolds::State::args(const GpuInstances& instances
   args.state = state.data();
   args.host_report = report.data();
   args.pieces = {pieces.data(), normals.data(), curve.data(), order.data(), start.data(), words.data()};
+  args.begun = begun.data();
   args.patches = patches.data();
   args.next_of_pair = next_of_pair.data();
   args.of_pair = of_pair.data();
@@ -257,7 +260,7 @@ std::size_t GpuContactManifolds::bytes() const {
   const State& s = *state_;
   return s.shapes.bytes() + s.state.bytes() + s.pieces.bytes() + s.normals.bytes() + s.curve.bytes() +
          s.order.bytes() + s.start.bytes() + s.curves.bytes() + s.summaries.bytes() + s.words.bytes() +
-         s.of_pair.bytes() + s.tile_sums.bytes() + s.table.bytes() + s.patches.bytes() +
+         s.of_pair.bytes() + s.tile_sums.bytes() + s.table.bytes() + s.begun.bytes() + s.patches.bytes() +
          s.next_of_pair.bytes() + s.manifolds.bytes() + s.manifolds_before.bytes() + s.entries.bytes() +
          s.points.bytes() + s.points_before.bytes();
 }

@@ -5,6 +5,7 @@
 
 #include "launch.h"
 #include "tandem/kernels/detail/manifold/finish.h"
+#include "tandem/kernels/detail/manifold/patch.h"
 #include "tandem/kernels/gpu_contact_manifolds.h"
 
 // What the kernels that make manifolds share, all of it in GPU memory.
@@ -22,6 +23,13 @@ struct PairPatches {
   std::uint32_t first;  ///< kNoIndex where there is none
   std::uint32_t patches, manifolds, points;
   std::uint32_t first_manifold, first_point;
+  std::uint32_t pieces;
+};
+
+/// A patch between the kernels that make it.
+struct BegunPatch {
+  PairCurve of;
+  manifold::PatchState state;
 };
 
 /// The place of the points of a pair of bodies.
@@ -42,6 +50,7 @@ struct ManifoldState {
   // Cleared by each call.
   std::uint32_t next_many, next_few, next_patch, tiles_taken;
   std::uint32_t curves_of_many, curves_of_few, next_curve_of_many, next_curve_of_few;
+  std::uint32_t next_measured, next_finished;
   Counter needed_points, segments, ambiguous_touches, open_curves;
   std::uint32_t too_many_contacts, finished_blocks;
 
@@ -68,6 +77,7 @@ struct ManifoldArgs {
   ManifoldState* state;
   GpuManifoldReport* host_report;  ///< in CPU memory
   manifold::PieceMemory pieces;
+  BegunPatch* begun;
   manifold::Patch* patches;
   std::uint32_t* next_of_pair;  ///< of each patch: the next of the same pair
   PairPatches* of_pair;

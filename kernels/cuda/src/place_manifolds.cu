@@ -119,7 +119,7 @@ __global__ void __launch_bounds__(kThreads) place(const __grid_constant__ Manifo
 /// Sorts the numbers of a pair's patches by their keys into `sorted`, by counting those before each.
 __device__ void sort_patches(const ManifoldArgs& args, const PairPatches& pair, std::uint32_t* list,
                              std::uint32_t* sorted) {
-  const WarpTeam team;
+  const WarpTeam team(nullptr);
   if (team.rank() == 0) {
     std::uint32_t at = 0;
     for (std::uint32_t p = pair.first; p != kNoIndex; p = args.next_of_pair[p]) list[at++] = p;
@@ -135,7 +135,7 @@ __device__ void sort_patches(const ManifoldArgs& args, const PairPatches& pair, 
 }
 
 __device__ void write_pair(const ManifoldArgs& args, std::uint32_t row) {
-  const WarpTeam team;
+  const WarpTeam team(nullptr);
   const PairPatches pair = args.of_pair[row];
   if (pair.patches == 0) return;
   const std::uint32_t first_contact = args.groups.first_contact[row];

@@ -30,7 +30,7 @@ struct alignas(16) Piece {
   }
   TANDEM_HD std::uint64_t key() const { return std::uint64_t{triangle[0]} << 32 | triangle[1]; }
 
-  static constexpr std::uint32_t kFacing = 4, kHalfOfA = 8, kHalfOfB = 16;
+  static constexpr std::uint32_t kFacing = 4, kHalfOfA = 8, kHalfOfB = 16, kDegenerate = 32;
 };
 static_assert(sizeof(Piece) == 64);
 
@@ -49,6 +49,10 @@ struct PieceMemory {
   std::uint32_t* order;  ///< pieces, curve by curve
   std::uint32_t* start;  ///< of each curve in `order`; contacts + 1 entries
   std::uint32_t* table;  ///< kTableWords each
+
+  // Of a GPU: nearer memory, used for keys instead of `table` where it suffices.
+  std::uint32_t* near_table = nullptr;
+  std::uint32_t near_words = 0;
 
   /// Bytes for each contact, without the one entry more of `start`.
   static constexpr std::size_t kBytes = sizeof(Piece) + 24 + 12 + 4 * kTableWords;
@@ -88,18 +92,25 @@ struct PieceBounds {
       upper[k] = greater(upper[k], x[k]);
     }
   }
+  /// But for the count.
+  TANDEM_HD void add(const Meeting& meeting) {
+    degenerate = degenerate || meeting.degenerate;
+    segments += meeting.kind == MeetingKind::segment ? 1u : 0u;
+    add(meeting.end[0]);
+    if (meeting.kind == MeetingKind::segment) add(meeting.end[1]);
+    for (int i = 0; i < meeting.corners; ++i) add(meeting.corner[i]);
+  }
 };
 
-/// Writes down what the triangles of a contact have in common, and adds it to `bounds`, but for the count.
-/// Condition: they have something in common.
+/// Writes down what the triangles of a contact have in common. Condition: they have something in common.
 TANDEM_HD inline void write_piece(const PieceMemory& memory, std::uint32_t at, const Contact& contact,
-                                  const Vector3& normal_a, const Vector3& normal_b, const Meeting& meeting,
-                                  PieceBounds& bounds) {
+                                  const Vector3& normal_a, const Vector3& normal_b, const Meeting& meeting) {
   Piece& piece = memory.pieces[at];
   piece.triangle[0] = contact.triangle_a, piece.triangle[1] = contact.triangle_b;
   piece.info = static_cast<std::uint32_t>(meeting.kind) | (meeting.facing ? Piece::kFacing : 0u) |
                (meeting.along_edge[0] ? Piece::kHalfOfA : 0u) |
-               (meeting.along_edge[1] ? Piece::kHalfOfB : 0u) | bits_of(meeting.feature[0]) << 8 |
+               (meeting.along_edge[1] ? Piece::kHalfOfB : 0u) |
+               (meeting.degenerate ? Piece::kDegenerate : 0u) | bits_of(meeting.feature[0]) << 8 |
                bits_of(meeting.feature[1]) << 12;
   piece.unused = 0;
   piece.end[0] = meeting.end[0];
@@ -113,11 +124,6 @@ TANDEM_HD inline void write_piece(const PieceMemory& memory, std::uint32_t at, c
     normals[3 * side + 1] = static_cast<float>(both[side].y);
     normals[3 * side + 2] = static_cast<float>(both[side].z);
   }
-  bounds.degenerate = bounds.degenerate || meeting.degenerate;
-  bounds.segments += meeting.kind == MeetingKind::segment ? 1u : 0u;
-  bounds.add(meeting.end[0]);
-  if (meeting.kind == MeetingKind::segment) bounds.add(meeting.end[1]);
-  for (int i = 0; i < meeting.corners; ++i) bounds.add(meeting.corner[i]);
 }
 
 /// Finds the curves of one pair of bodies.
@@ -125,11 +131,14 @@ template <typename Team>
 class CurveFinder {
  public:
   TANDEM_HD CurveFinder(const Team& team, const BodyPair& bodies, const PieceMemory& memory)
-      : team_(team), bodies_(bodies), memory_(memory) {}
+      : team_(team), bodies_(bodies), memory_(memory), table_(memory.table) {}
 
   /// Afterwards the pieces of curve c are order[start[c]] to order[start[c + 1] - 1]. next: a number that all
   /// of the team see, for its use.
   TANDEM_HD PieceSummary find(const Contact* contacts, std::uint32_t count, std::uint32_t& next);
+
+  /// The same of so many pieces that are written down already.
+  TANDEM_HD PieceSummary find_among(std::uint32_t pieces, std::uint32_t& next);
 
  private:
   struct EndKey {
@@ -168,8 +177,8 @@ class CurveFinder {
     const auto key = key_of(reference);
     auto slot = static_cast<std::uint32_t>((key.hash() >> 32) * size >> 32);
     for (;;) {
-      std::uint32_t there = team_.load(memory_.table[slot]);
-      if (there == kNoIndex) there = team_.compare_and_swap(memory_.table[slot], kNoIndex, reference);
+      std::uint32_t there = team_.load(table_[slot]);
+      if (there == kNoIndex) there = team_.compare_and_swap(table_[slot], kNoIndex, reference);
       if (there == kNoIndex) return reference;
       if (key_of(there) == key) return there;
       if (++slot == size) slot = 0;
@@ -200,11 +209,15 @@ class CurveFinder {
   }
 
   TANDEM_HD void clear(std::uint32_t words) {
-    for (std::uint32_t i = team_.rank(); i < words; i += team_.size()) memory_.table[i] = kNoIndex;
+    table_ = words <= memory_.near_words ? memory_.near_table : memory_.table;
+    for (std::uint32_t i = team_.rank(); i < words; i += team_.size()) table_[i] = kNoIndex;
     for (std::uint32_t i = team_.rank(); i < summary_.pieces; i += team_.size()) memory_.curve[i] = i;
     team_.sync();
   }
-  TANDEM_HD void make_pieces(const Contact* contacts, std::uint32_t count, std::uint32_t& next);
+  TANDEM_HD PieceBounds make_pieces(const Contact* contacts, std::uint32_t count, std::uint32_t& next);
+  TANDEM_HD PieceBounds bounds_of_pieces(std::uint32_t pieces) const;
+  TANDEM_HD void summarize(const PieceBounds& own, std::uint32_t pieces);
+  TANDEM_HD PieceSummary connect(std::uint32_t& next);
   TANDEM_HD bool connect_by_ends();
   TANDEM_HD void connect_by_corners();
   TANDEM_HD void sort_by_curve(std::uint32_t& next);
@@ -213,38 +226,64 @@ class CurveFinder {
   const BodyPair& bodies_;
   PieceMemory memory_;
   PieceSummary summary_;
+  std::uint32_t* table_;
 };
 
+/// Writes down what the team's contacts have in common. Result: of all, or of what this one of the team made,
+/// without the count.
 template <typename Team>
-TANDEM_HD void CurveFinder<Team>::make_pieces(const Contact* contacts, std::uint32_t count,
-                                              std::uint32_t& next) {
+TANDEM_HD PieceBounds CurveFinder<Team>::make_pieces(const Contact* contacts, std::uint32_t count,
+                                                     std::uint32_t& next) {
   PieceBounds found;
-  if constexpr (HasMeans<Team>) {
-    found = team_.means().make_pieces(bodies_, memory_, contacts, count);
-    summary_.pieces = found.pieces;
-  } else {
-    const double tolerance = bodies_.tolerance();
-    Meeting meeting;
-    WorldTriangle a, b;
-    std::uint32_t posed_a = kNoIndex, posed_b = kNoIndex;
-    for (std::uint32_t i = team_.rank(); i < count; i += team_.size()) {
-      const Contact& contact = contacts[i];
-      if (contact.triangle_a != posed_a) a = bodies_.a.triangle(posed_a = contact.triangle_a);
-      if (contact.triangle_b != posed_b) b = bodies_.b.triangle(posed_b = contact.triangle_b);
-      meet(a, b, tolerance, meeting);
-      if (meeting.kind == MeetingKind::none) continue;
-      write_piece(memory_, team_.add(next, 1), contact, a.normal, b.normal, meeting, found);
-    }
-    team_.sync();
-    summary_.pieces = team_.load(next);
+  const double tolerance = bodies_.tolerance();
+  Meeting meeting;
+  WorldTriangle a, b;
+  std::uint32_t posed_a = kNoIndex, posed_b = kNoIndex;
+  for (std::uint32_t i = team_.rank(); i < count; i += team_.size()) {
+    const Contact& contact = contacts[i];
+    if (contact.triangle_a != posed_a) a = bodies_.a.triangle(posed_a = contact.triangle_a);
+    if (contact.triangle_b != posed_b) b = bodies_.b.triangle(posed_b = contact.triangle_b);
+    meet(a, b, tolerance, meeting);
+    if (meeting.kind == MeetingKind::none) continue;
+    write_piece(memory_, team_.add(next, 1), contact, a.normal, b.normal, meeting);
+    found.add(meeting);
   }
-  summary_.segments = team_.sum(found.segments);
-  summary_.degenerate = team_.any(found.degenerate);
+  team_.sync();
+  return found;
+}
+
+template <typename Team>
+TANDEM_HD PieceBounds CurveFinder<Team>::bounds_of_pieces(std::uint32_t pieces) const {
+  PieceBounds found;
+  for (std::uint32_t i = team_.rank(); i < pieces; i += team_.size()) {
+    const Piece& piece = memory_.pieces[i];
+    Meeting meeting;
+    if (piece.kind() == MeetingKind::polygon) {
+      meet(bodies_.a.triangle(piece.triangle[0]), bodies_.b.triangle(piece.triangle[1]), bodies_.tolerance(),
+           meeting);
+    } else {
+      meeting.kind = piece.kind();
+      meeting.end[0] = piece.end[0], meeting.end[1] = piece.end[1];
+    }
+    meeting.degenerate = (piece.info & Piece::kDegenerate) != 0;
+    found.add(meeting);
+  }
+  return found;
+}
+
+template <typename Team>
+TANDEM_HD void CurveFinder<Team>::summarize(const PieceBounds& own, std::uint32_t pieces) {
+  summary_ = {};
+  summary_.pieces = pieces;
+  summary_.segments = team_.sum(own.segments);
+  summary_.degenerate = team_.any(own.degenerate);
+  double bounds[6];
+  for (int k = 0; k < 3; ++k) bounds[k] = own.upper[k], bounds[3 + k] = -own.lower[k];
+  team_.greatest_ones(bounds);
   double extent = 0, middle[3];
   for (int k = 0; k < 3; ++k) {
-    const double lower = team_.least(found.lower[k]), upper = team_.greatest(found.upper[k]);
-    middle[k] = 0.5 * lower + 0.5 * upper;
-    extent = greater(extent, upper - lower);
+    middle[k] = 0.5 * bounds[k] - 0.5 * bounds[3 + k];
+    extent = greater(extent, bounds[k] + bounds[3 + k]);
   }
   summary_.origin = {middle[0], middle[1], middle[2]};
   // Powers of two, so that scaling by them is exact.
@@ -309,8 +348,8 @@ TANDEM_HD void CurveFinder<Team>::sort_by_curve(std::uint32_t& next) {
     team_.sync();
     return;
   }
-  // table: the number of each curve by its first piece, then the pieces counted in it.
-  std::uint32_t *number = memory_.table, *place = memory_.table + pieces;
+  // The table: the number of each curve by its first piece, then the pieces counted in it.
+  std::uint32_t *number = table_, *place = table_ + pieces;
   if (team_.rank() == 0) team_.store(next, 0);
   for (std::uint32_t i = team_.rank(); i <= pieces; i += team_.size()) memory_.start[i] = 0;
   for (std::uint32_t i = team_.rank(); i < pieces; i += team_.size()) place[i] = first_of(i);
@@ -336,12 +375,7 @@ TANDEM_HD void CurveFinder<Team>::sort_by_curve(std::uint32_t& next) {
 }
 
 template <typename Team>
-TANDEM_HD PieceSummary CurveFinder<Team>::find(const Contact* contacts, std::uint32_t count,
-                                               std::uint32_t& next) {
-  summary_ = {};
-  if (team_.rank() == 0) team_.store(next, 0);
-  team_.sync();
-  make_pieces(contacts, count, next);
+TANDEM_HD PieceSummary CurveFinder<Team>::connect(std::uint32_t& next) {
   if (summary_.pieces == 0) return summary_;
   if (summary_.degenerate || !connect_by_ends()) {
     summary_.degenerate = true;
@@ -349,6 +383,27 @@ TANDEM_HD PieceSummary CurveFinder<Team>::find(const Contact* contacts, std::uin
   }
   sort_by_curve(next);
   return summary_;
+}
+
+template <typename Team>
+TANDEM_HD PieceSummary CurveFinder<Team>::find(const Contact* contacts, std::uint32_t count,
+                                               std::uint32_t& next) {
+  if constexpr (HasMeans<Team>) {
+    const PieceBounds found = team_.means().make_pieces(bodies_, memory_, contacts, count);
+    summarize(found, found.pieces);
+  } else {
+    if (team_.rank() == 0) team_.store(next, 0);
+    team_.sync();
+    const PieceBounds found = make_pieces(contacts, count, next);
+    summarize(found, team_.load(next));
+  }
+  return connect(next);
+}
+
+template <typename Team>
+TANDEM_HD PieceSummary CurveFinder<Team>::find_among(std::uint32_t pieces, std::uint32_t& next) {
+  summarize(bounds_of_pieces(pieces), pieces);
+  return connect(next);
 }
 
 }  // namespace tandem::manifold

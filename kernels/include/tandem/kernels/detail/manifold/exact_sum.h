@@ -51,4 +51,13 @@ struct ExactVectorSum {
   TANDEM_HD Vector3 value(double unit) const { return {x.value(unit), y.value(unit), z.value(unit)}; }
 };
 
+/// Makes each of these the sum of all that a team has.
+template <typename Team, int kCount>
+TANDEM_HD void add_up(const Team& team, ExactSum* const (&sums)[kCount]) {
+  std::int64_t words[2 * kCount];
+  for (int i = 0; i < kCount; ++i) words[2 * i] = sums[i]->upper, words[2 * i + 1] = sums[i]->lower;
+  team.sums(words);
+  for (int i = 0; i < kCount; ++i) *sums[i] = {words[2 * i], words[2 * i + 1]};
+}
+
 }  // namespace tandem::manifold

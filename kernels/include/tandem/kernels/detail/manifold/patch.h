@@ -133,12 +133,12 @@ struct Sounding {
   double height;            ///< of the point
   double target[2];         ///< the height near which the line is to meet a's surface, b's
   std::uint32_t reference;  ///< of a rim point: the candidate. Else kNoIndex
-  std::uint64_t feature;    ///< of others
-  int rank = 0;             ///< of a rim point
-  int vertex_of = -1;       ///< the side whose vertex it is; -1: none's
-  Crossing surface[2];      ///< a's, that faces along the normal; b's, that faces against it
-  Crossing behind[2];  ///< where a begins, on the line, if that is above b's surface; where b ends, if that
-                       ///< is below a's
+  std::uint64_t feature;
+  int rank = 0;         ///< of a rim point
+  int vertex_of = -1;   ///< the side whose vertex it is; -1: none's
+  Crossing surface[2];  ///< a's, that faces along the normal; b's, that faces against it
+  Crossing behind[2];   ///< where a begins, on the line, if that is above b's surface; where b ends, if that
+                        ///< is below a's
   bool looked_behind;
 
   TANDEM_HD double overlap() const {
@@ -159,13 +159,39 @@ struct Sounding {
 /// Rim, the middle, and twice a's highest vertex and b's lowest.
 inline constexpr int kMostSoundings = static_cast<int>(kMostManifoldPoints) + 5;
 
+/// A point that a manifold may have, as those that it has are chosen.
+struct Chosen {
+  Vector2 at;
+  double height, depth, from_middle;
+  std::uint64_t feature;
+  std::uint32_t triangle[2];
+  bool inner;
+};
+
+/// What is known of a patch from one step to the next.
+struct PatchState {
+  Sounding sounding[kMostSoundings];  ///< of the rim, of the middle, of vertices
+  int rim_points, soundings;
+  bool touch, closed;
+  PatchFrame frame;
+  Vector3 area;            ///< CurveMeasure's
+  Vector2 middle;          ///< of the rim
+  Vector2 middle_of_area;  ///< that of the rim where there is none
+  double extent;           ///< of the rim, from its middle
+  std::uint64_t key;
+  std::uint32_t candidates;
+};
+
 /// What a team shares while it makes a patch.
 struct PatchMemory {
-  Sounding sounding[kMostSoundings];
-  Extreme extreme[4];
+  PatchState state;
   LineQuestion line[2 * kMostSoundings];
+  Prism prism;
   PrismTest prism_test[2];
-  WalkMemory walk;
+  Extreme extreme[4];
+  Chosen candidate[kMostSoundings], chosen[kMostSoundings];
+  Patch* patch;
+  std::uint32_t count;
   std::uint32_t next;
 };
 

@@ -50,19 +50,11 @@ class NormalFinder {
   }
   /// Marks that pieces have for the time being. Each is seen by one of the team alone.
   TANDEM_HD std::uint32_t& mark(std::uint32_t i) const { return memory_.curve[i]; }
-  TANDEM_HD double total(ExactSum sum, double unit) const {
-    sum.upper = team_.sum(sum.upper), sum.lower = team_.sum(sum.lower);
-    return sum.value(unit);
-  }
-  TANDEM_HD Vector3 total(const ExactVectorSum& sum, double unit) const {
-    return {total(sum.x, unit), total(sum.y, unit), total(sum.z, unit)};
-  }
   TANDEM_HD bool has_free_end() const;
   TANDEM_HD Vector3 plain_middle() const;
   TANDEM_HD Vector3 sheet_normal() const;
   TANDEM_HD bool has_many_directions(int side) const;
-  TANDEM_HD std::uint64_t least_unmarked(int side, const FloatVector& known) const;
-  TANDEM_HD bool gather_directions(int side);
+  TANDEM_HD bool gather_directions(int side, bool keep_if_many);
   TANDEM_HD void find_bearing_faces(const Vector3& smooth, double length);
   TANDEM_HD void spread_along(const Vector3* directions, int count, Spread* spread) const;
   TANDEM_HD Vector3 face_nearest(const Vector3& smooth, double length);
@@ -73,6 +65,12 @@ class NormalFinder {
   TANDEM_HD static FloatVector turned_normal(const float* normals, int side) {
     const float sign = side == 0 ? 1.0f : -1.0f;
     return {{sign * normals[3 * side], sign * normals[3 * side + 1], sign * normals[3 * side + 2]}};
+  }
+  /// The normal, from a towards b, of the triangle of a piece.
+  TANDEM_HD Vector3 direction_of(int side, std::uint64_t piece) const {
+    const Vector3 n =
+        bodies_[side].triangle(static_cast<std::uint32_t>(side == 0 ? piece >> 32 : piece)).normal;
+    return side == 0 ? n : -n;
   }
   TANDEM_HD static bool same_face(const FloatVector& p, const FloatVector& q) {
     return distance_square(p, q) < kSameFace;
@@ -103,14 +101,15 @@ TANDEM_HD CurveMeasure NormalFinder<Team>::measure() {
   } else {
     for_each_piece([&](const Piece& piece, const float*) { sums.add(piece, summary_.origin, one_by_unit); });
   }
+  add_up(team_, {&sums.area.x, &sums.area.y, &sums.area.z, &sums.gap.x, &sums.gap.y, &sums.gap.z,
+                 &sums.middle.x, &sums.middle.y, &sums.middle.z, &sums.length});
   CurveMeasure out;
   out.key = key_ = team_.least(sums.key);
-  out.area = total(sums.area, unit * unit);
-  out.length = total(sums.length, unit);
-  const Vector3 residual = total(sums.gap, unit);
-  out.closed = !(may_be_free && has_free_end()) && norm(residual) <= kClosed * out.length;
+  out.area = sums.area.value(unit * unit);
+  out.length = sums.length.value(unit);
+  out.closed = !(may_be_free && has_free_end()) && norm(sums.gap.value(unit)) <= kClosed * out.length;
   out.middle =
-      summary_.origin + (out.length > 0 ? (unit / out.length) * total(sums.middle, unit) : plain_middle());
+      summary_.origin + (out.length > 0 ? (unit / out.length) * sums.middle.value(unit) : plain_middle());
   if (!out.closed) out.sheet_normal = sheet_normal();
   return out;
 }
@@ -138,7 +137,8 @@ TANDEM_HD Vector3 NormalFinder<Team>::plain_middle() const {
     const bool polygon = piece.kind() == MeetingKind::polygon;
     sum.add(polygon ? from : 0.5 * (from + (piece.end[1] - summary_.origin)), 1 / summary_.unit);
   });
-  return (1.0 / (end_ - begin_)) * total(sum, summary_.unit);
+  add_up(team_, {&sum.x, &sum.y, &sum.z});
+  return (1.0 / (end_ - begin_)) * sum.value(summary_.unit);
 }
 
 template <typename Team>
@@ -152,7 +152,8 @@ TANDEM_HD Vector3 NormalFinder<Team>::sheet_normal() const {
     if (sheet_a || !sheet_b) sum.add(size * Vector3{normals[0], normals[1], normals[2]}, one_by_unit);
     if (sheet_b || !sheet_a) sum.add(-(size * Vector3{normals[3], normals[4], normals[5]}), one_by_unit);
   });
-  return total(sum, unit);
+  add_up(team_, {&sum.x, &sum.y, &sum.z});
+  return sum.value(unit);
 }
 
 /// Whether a sample of pieces proves that gather_directions() is false: of more than kMostDirections normals
@@ -176,39 +177,58 @@ TANDEM_HD bool NormalFinder<Team>::has_many_directions(int side) const {
   return false;
 }
 
-/// Marks pieces whose normals are of the face of a known one. Result: the least key of those without a mark.
+/// Adds the directions of faces of one body, from the least piece on; of more than kMostDirections the first
+/// ones, if they are to be kept. False where there are more. Normals closer than half a milliradian are one.
 template <typename Team>
-TANDEM_HD std::uint64_t NormalFinder<Team>::least_unmarked(int side, const FloatVector& known) const {
-  if constexpr (HasMeans<Team>) return team_.means().least_unmarked(memory_, begin_, end_, side, known);
-  std::uint64_t key = ~std::uint64_t{0};
-  for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
-    if (mark(i) != 0) continue;
-    const std::uint32_t at = memory_.order[i];
-    const float* n = memory_.normals + 6 * std::size_t{at} + 3 * side;
-    if (same_face({{n[0], n[1], n[2]}}, known))
-      mark(i) = 1;
-    else
-      key = lesser(key, memory_.pieces[at].key());
+TANDEM_HD bool NormalFinder<Team>::gather_directions(int side, bool keep_if_many) {
+  if (!keep_if_many && has_many_directions(side)) return false;
+  std::uint64_t first_piece[kMostDirections];
+  FloatVector known = {};  // the last direction
+  int found = 0;
+  bool all = false;
+  if constexpr (HasMeans<Team>) {
+    for (std::uint32_t i = begin_; i < end_; ++i) mark(i) = 0;
+    for (std::uint64_t key = key_;; ++found) {
+      all = key == ~std::uint64_t{0};
+      if (all || found == kMostDirections) break;
+      first_piece[found] = key;
+      const Vector3 n = direction_of(side, key);
+      const float turn = side == 0 ? 1.0f : -1.0f;
+      known = {
+          {turn * static_cast<float>(n.x), turn * static_cast<float>(n.y), turn * static_cast<float>(n.z)}};
+      key = team_.means().least_unmarked(memory_, begin_, end_, side, known);
+    }
   }
-  return key;
-}
-
-/// Adds the directions of faces of one body, from the least piece on. False where there are more than
-/// kMostDirections. Normals closer than half a milliradian are one.
-template <typename Team>
-TANDEM_HD bool NormalFinder<Team>::gather_directions(int side) {
-  for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) mark(i) = 0;
-  std::uint64_t key = key_;
-  for (int found = 0;; ++found) {
-    if (key == ~std::uint64_t{0}) return true;
-    if (found == kMostDirections) return false;
-    const auto triangle = static_cast<std::uint32_t>(side == 0 ? key >> 32 : key);
-    const WorldTriangle t = bodies_[side].triangle(triangle);
-    direction_[directions_++] = {side == 0 ? t.normal : -t.normal, key};
-    const FloatVector known = {
-        {static_cast<float>(t.normal.x), static_cast<float>(t.normal.y), static_cast<float>(t.normal.z)}};
-    key = team_.least(least_unmarked(side, known));
+  for (; !HasMeans<Team>; ++found) {
+    std::uint64_t own = ~std::uint64_t{0};
+    std::uint32_t holder = kNoIndex;
+    for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
+      const std::uint32_t at = memory_.order[i];
+      if (found == 0) {
+        mark(i) = 0;
+      } else {
+        if (mark(i) != 0) continue;
+        const float* n = memory_.normals + 6 * std::size_t{at} + 3 * side;
+        if (same_face({{n[0], n[1], n[2]}}, known)) {
+          mark(i) = 1;
+          continue;
+        }
+      }
+      const std::uint64_t key = memory_.pieces[at].key();
+      if (key < own) own = key, holder = at;
+    }
+    const std::uint64_t key = team_.least(own);
+    all = key == ~std::uint64_t{0};
+    if (all || found == kMostDirections) break;
+    first_piece[found] = key;
+    holder = team_.least(own == key ? holder : kNoIndex);
+    const float* n = memory_.normals + 6 * std::size_t{holder} + 3 * side;
+    known = {{n[0], n[1], n[2]}};
   }
+  if (!all && !keep_if_many) return false;
+  for (int i = 0; i < found; ++i)
+    direction_[directions_++] = {direction_of(side, first_piece[i]), first_piece[i]};
+  return all;
 }
 
 /// Of bodies of many faces those that a patch lies on, as where prisms stand on each other: of each body the
@@ -218,33 +238,54 @@ TANDEM_HD void NormalFinder<Team>::find_bearing_faces(const Vector3& smooth, dou
   directions_ = 0;
   const FloatVector up = {
       {static_cast<float>(smooth.x), static_cast<float>(smooth.y), static_cast<float>(smooth.z)}};
+  FaceAlong most[2] = {{0.9f, ~std::uint64_t{0}}, {0.9f, ~std::uint64_t{0}}};
+  if constexpr (HasMeans<Team>) {
+    for (int side = 0; side < 2; ++side)
+      team_.means().find_face_along(memory_, begin_, end_, side, up, most[side]);
+  } else {
+    for_each_piece([&](const Piece& piece, const float* normals) {
+      for (int side = 0; side < 2; ++side)
+        most[side].take(dot(turned_normal(normals, side), up), piece.key());
+    });
+  }
+  float greatest[2] = {most[0].along, most[1].along};
+  team_.greatest_ones(greatest);
+  std::uint64_t key[2];
+  for (int side = 0; side < 2; ++side)
+    key[side] = most[side].along == greatest[side] ? most[side].key : ~std::uint64_t{0};
+  team_.least_ones(key);
+  Vector3 n[2];
+  FloatVector face[2] = {};
+  bool any = false;
   for (int side = 0; side < 2; ++side) {
-    FaceAlong face_up = {0.9f, ~std::uint64_t{0}};
-    if constexpr (HasMeans<Team>) {
-      team_.means().find_face_along(memory_, begin_, end_, side, up, face_up);
-    } else {
-      for_each_piece([&](const Piece& piece, const float* normals) {
-        face_up.take(dot(turned_normal(normals, side), up), piece.key());
-      });
+    if (key[side] == ~std::uint64_t{0}) continue;
+    any = true;
+    n[side] = direction_of(side, key[side]);
+    face[side] = {
+        {static_cast<float>(n[side].x), static_cast<float>(n[side].y), static_cast<float>(n[side].z)}};
+  }
+  if (!any) return;
+  ExactSum within[2];
+  if constexpr (HasMeans<Team>) {
+    for (int side = 0; side < 2; ++side) {
+      if (key[side] == ~std::uint64_t{0}) continue;
+      team_.means().sum_length_on_face(memory_, begin_, end_, face[side], 1 / summary_.unit, within[side]);
     }
-    const float greatest = team_.greatest(face_up.along);
-    const std::uint64_t key = team_.least(face_up.along == greatest ? face_up.key : ~std::uint64_t{0});
-    if (key == ~std::uint64_t{0}) continue;
-    const auto triangle = static_cast<std::uint32_t>(side == 0 ? key >> 32 : key);
-    const Vector3 n = (side == 0 ? 1.0 : -1.0) * bodies_[side].triangle(triangle).normal;
-    const FloatVector face = {{static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)}};
-    ExactSum within;
-    if constexpr (HasMeans<Team>) {
-      team_.means().sum_length_on_face(memory_, begin_, end_, face, 1 / summary_.unit, within);
-    } else {
-      for_each_piece([&](const Piece& piece, const float* normals) {
-        if (piece.kind() == MeetingKind::polygon) return;
-        if (!same_face(turned_normal(normals, 0), face) && !same_face(turned_normal(normals, 1), face))
-          return;
-        within.add(norm(piece.weight() * (piece.end[1] - piece.end[0])), 1 / summary_.unit);
-      });
-    }
-    if (total(within, summary_.unit) >= kBearing * length) direction_[directions_++] = {n, key};
+  } else {
+    for_each_piece([&](const Piece& piece, const float* normals) {
+      if (piece.kind() == MeetingKind::polygon) return;
+      const double size = norm(piece.weight() * (piece.end[1] - piece.end[0]));
+      for (int side = 0; side < 2; ++side) {
+        if (same_face(turned_normal(normals, 0), face[side]) ||
+            same_face(turned_normal(normals, 1), face[side]))
+          within[side].add(size, 1 / summary_.unit);
+      }
+    });
+  }
+  add_up(team_, {&within[0], &within[1]});
+  for (int side = 0; side < 2; ++side) {
+    if (key[side] != ~std::uint64_t{0} && within[side].value(summary_.unit) >= kBearing * length)
+      direction_[directions_++] = {n[side], key[side]};
   }
 }
 
@@ -270,9 +311,11 @@ TANDEM_HD void NormalFinder<Team>::spread_along(const Vector3* directions, int c
     }
     seen_a = piece.triangle[0], seen_b = piece.triangle[1];
   });
-  for (int i = 0; i < count; ++i) {
-    spread[i] = {team_.greatest(spread[i].highest_a), team_.least(spread[i].lowest_b)};
-  }
+  double furthest[2 * kMost];
+  for (int i = 0; i < count; ++i)
+    furthest[2 * i] = spread[i].highest_a, furthest[2 * i + 1] = -spread[i].lowest_b;
+  team_.greatest_ones(furthest, 2 * count);
+  for (int i = 0; i < count; ++i) spread[i] = {furthest[2 * i], -furthest[2 * i + 1]};
 }
 
 /// Where few flat faces meet, as boxes do, the curve's own normal leans a little, by depth over length: along
@@ -283,9 +326,8 @@ TANDEM_HD void NormalFinder<Team>::spread_along(const Vector3* directions, int c
 template <typename Team>
 TANDEM_HD Vector3 NormalFinder<Team>::face_nearest(const Vector3& smooth, double length) {
   directions_ = 0;
-  const auto gather = [&](int side) { return !has_many_directions(side) && gather_directions(side); };
-  const int of_a = gather(0) ? directions_ : kMost, first_of_b = directions_;
-  const int of_b = gather(1) ? directions_ - first_of_b : kMost;
+  const int of_a = gather_directions(0, false) ? directions_ : kMost, first_of_b = directions_;
+  const int of_b = gather_directions(1, false) ? directions_ - first_of_b : kMost;
   if ((of_a == 1) != (of_b == 1)) {
     const Vector3& n = direction_[of_a == 1 ? 0 : first_of_b].n;
     return dot(n, smooth) > 0 ? n : smooth;
@@ -380,8 +422,8 @@ TANDEM_HD bool NormalFinder<Team>::find_crossing_edges(Vector3& n) const {
 template <typename Team>
 TANDEM_HD bool NormalFinder<Team>::find_for_touch(Vector3& n) {
   directions_ = 0;
-  gather_directions(0);
-  gather_directions(1);
+  gather_directions(0, true);
+  gather_directions(1, true);
   Vector3 tried[kMost], at[kMost];
   for (int i = 0; i < directions_; ++i) tried[i] = direction_[i].n, at[i] = {};
   // Each direction's plane goes through the piece that has it.

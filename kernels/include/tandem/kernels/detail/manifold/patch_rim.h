@@ -12,21 +12,24 @@ template <typename Team>
 class RimFinder {
  public:
   TANDEM_HD RimFinder(const Team& team, const BodyPair& bodies, const PieceMemory& memory,
-                      const PieceSummary& summary, std::uint32_t curve, const PatchFrame& frame)
+                      const PieceSummary& summary, std::uint32_t curve, const PatchFrame& frame,
+                      std::uint32_t candidates = 0)
       : team_(team),
         bodies_(bodies),
         memory_(memory),
         summary_(summary),
         begin_(memory.start[curve]),
         end_(memory.start[curve + 1]),
-        frame_(frame) {}
+        frame_(frame),
+        count_(candidates) {}
 
   /// Writes down the candidates. each_end_twice: pieces share their ends, so one of each will do. next: a
-  /// number that all of the team see.
+  /// number that all of the team see. Where that was done before, their number is given instead.
   TANDEM_HD void gather(bool each_end_twice, std::uint32_t& next);
 
   /// The middle of the area within the curve, in the plane; false where it has none. Condition: gather().
   TANDEM_HD bool middle_of_area(Vector2& middle) const;
+  TANDEM_HD std::uint32_t count() const { return count_; }
 
   /// Starts with the candidates furthest from each other, or nearly, and takes in again and again the one
   /// that adds most to the area.
@@ -36,8 +39,10 @@ class RimFinder {
   TANDEM_HD std::uint64_t feature(std::uint32_t reference) const;
   TANDEM_HD const Piece& piece(std::uint32_t reference) const { return memory_.pieces[reference / 8]; }
 
-  /// The least feature of candidates closer than `distance` to a point, or `feature` if that is less.
-  TANDEM_HD std::uint64_t least_feature_near(const Vector2& at, double distance, std::uint64_t feature) const;
+  /// A point of the rim is called by the least feature of its own and of candidates closer than `distance`.
+  /// An inner one, the middle or a vertex that may be deepest in two patches, is told apart by the patch's
+  /// key. points: that all of the team see.
+  TANDEM_HD void name_points(Chosen* points, int count, double distance, std::uint64_t patch_key) const;
 
  private:
   TANDEM_HD Candidate* candidates() const {
@@ -59,7 +64,7 @@ class RimFinder {
   const PieceSummary& summary_;
   std::uint32_t begin_, end_;
   const PatchFrame& frame_;
-  std::uint32_t count_ = 0;
+  std::uint32_t count_;
   RimMoments moments_;
 };
 
@@ -110,8 +115,7 @@ TANDEM_HD void RimFinder<Team>::gather(bool each_end_twice, std::uint32_t& next)
   }
   team_.sync();
   count_ = team_.load(next);
-  for (ExactSum* sum : {&moments_.twice_area, &moments_.x, &moments_.y})
-    *sum = {team_.sum(sum->upper), team_.sum(sum->lower)};
+  add_up(team_, {&moments_.twice_area, &moments_.x, &moments_.y});
 }
 
 template <typename Team>
@@ -135,13 +139,20 @@ TANDEM_HD void RimFinder<Team>::furthest(const RimValue* values, int wanted, Fur
     for (int k = 0; k < wanted; ++k) best[k]->take(memory_, values[k](c), c.reference);
   }
   if (Team::size() == 1) return;
-  for (int k = 0; k < wanted; ++k) {
-    const float greatest = team_.greatest(best[k]->value);
-    const bool mine = best[k]->reference != kNoIndex && best[k]->value == greatest;
-    const std::uint64_t own = mine ? Furthest::key(memory_, best[k]->reference) : ~std::uint64_t{0};
-    const std::uint64_t least = team_.least(own);
-    *best[k] = {greatest, team_.least(mine && own == least ? best[k]->reference : kNoIndex)};
+  float greatest[2] = {};
+  for (int k = 0; k < 2; ++k) greatest[k] = k < wanted ? best[k]->value : 0;
+  team_.greatest_ones(greatest, wanted);
+  std::uint64_t own[2], least[2];
+  for (int k = 0; k < 2; ++k) {
+    const bool mine = k < wanted && best[k]->reference != kNoIndex && best[k]->value == greatest[k];
+    least[k] = own[k] = mine ? Furthest::key(memory_, best[k]->reference) : ~std::uint64_t{0};
   }
+  team_.least_ones(least, wanted);
+  std::uint32_t reference[2];
+  for (int k = 0; k < 2; ++k)
+    reference[k] = own[k] != ~std::uint64_t{0} && own[k] == least[k] ? best[k]->reference : kNoIndex;
+  team_.least_ones(reference, wanted);
+  for (int k = 0; k < wanted; ++k) *best[k] = {greatest[k], reference[k]};
 }
 
 template <typename Team>
@@ -224,26 +235,45 @@ TANDEM_HD std::uint64_t RimFinder<Team>::feature(std::uint32_t reference) const 
 }
 
 template <typename Team>
-TANDEM_HD std::uint64_t RimFinder<Team>::least_feature_near(const Vector2& at, double distance,
-                                                            std::uint64_t feature_of_point) const {
-  std::uint64_t least = feature_of_point;
-  const auto x = static_cast<float>(at.x), y = static_cast<float>(at.y);
+TANDEM_HD void RimFinder<Team>::name_points(Chosen* points, int count, double distance,
+                                            std::uint64_t patch_key) const {
+  constexpr int kMost = kMostManifoldPoints;
+  FloatPoint at[kMost] = {};
+  std::uint64_t least[kMost];
+  for (int k = 0; k < kMost; ++k) {
+    const bool is_rim = k < count && !points[k].inner;
+    least[k] = is_rim ? points[k].feature : 0;
+    // Nothing is near one that is not a number.
+    at[k] = is_rim ? FloatPoint{static_cast<float>(points[k].at.x), static_cast<float>(points[k].at.y)}
+                   : FloatPoint{NAN, NAN};
+  }
   const auto square = static_cast<float>(distance * distance);
   if constexpr (HasMeans<Team>) {
-    const auto next = [&](std::uint32_t from) {
-      return team_.means().next_near(candidates(), from, count_, {x, y}, square);
-    };
-    for (std::uint32_t i = next(0); i < count_; i = next(i + 1))
-      least = lesser(least, feature(candidates()[i].reference));
-    return least;
+    for (int k = 0; k < count; ++k) {
+      const auto next = [&](std::uint32_t from) {
+        return team_.means().next_near(candidates(), from, count_, at[k], square);
+      };
+      if (points[k].inner) continue;
+      for (std::uint32_t i = next(0); i < count_; i = next(i + 1))
+        least[k] = lesser(least[k], feature(candidates()[i].reference));
+    }
+  } else {
+    for (std::uint32_t i = team_.rank(); i < count_; i += team_.size()) {
+      const Candidate& c = candidates()[i];
+      for (int k = 0; k < kMost; ++k) {
+        const float x = c.x - at[k].x, y = c.y - at[k].y;
+        if (!(x * x + y * y < square)) continue;
+        least[k] = lesser(least[k], feature(c.reference));
+      }
+    }
   }
-  for (std::uint32_t i = team_.rank(); i < count_; i += team_.size()) {
-    const Candidate& c = candidates()[i];
-    if (!((c.x - x) * (c.x - x) + (c.y - y) * (c.y - y) < square)) continue;
-    const std::uint64_t of_c = feature(c.reference);
-    least = of_c < least ? of_c : least;
+  team_.least_ones(least);
+  team_.sync();
+  if (team_.rank() == 0) {
+    for (int k = 0; k < count; ++k)
+      points[k].feature = points[k].inner ? feature_hash(points[k].feature, patch_key) : least[k];
   }
-  return team_.least(least);
+  team_.sync();
 }
 
 }  // namespace tandem::manifold

@@ -68,8 +68,9 @@ struct BlockAxes {
 
   TANDEM_HD explicit BlockAxes(const BlockRotation& rotation) {
     const ScaledRotation r = scaled_rotation(rotation);
+    const float by_length = 1 / r.squared_length;
     for (int k = 0; k < 3; ++k) {
-      for (int i = 0; i < 3; ++i) axis[k].x[i] = r.scaled[i][k] / r.squared_length;
+      for (int i = 0; i < 3; ++i) axis[k].x[i] = r.scaled[i][k] * by_length;
     }
   }
   TANDEM_HD FloatVector operator()(const FloatVector& p) const {
@@ -93,71 +94,55 @@ TANDEM_HD inline unsigned nodes_that_pass(const AnyBlock& block, const Test& tes
   return mask;
 }
 
-TANDEM_HD inline int lowest_bit(unsigned mask) {
-#ifdef __CUDA_ARCH__
-  return __ffs(static_cast<int>(mask)) - 1;
-#else
-  return std::countr_zero(mask);
-#endif
-}
-
-/// Blocks that wait to be looked at, for several questions at a time; all of a crew see it.
-struct WalkMemory {
-  static constexpr std::uint32_t kRoom = 512;
-  /// With so many left, a crew looks at one block at a time: that never takes more.
-  static constexpr std::uint32_t kReserve = 3 * kMaxDepth + 8;
-
-  std::uint64_t waiting[kRoom];  ///< question, block
-  std::uint32_t count;
+/// What lies below those nodes of a block that pass a test.
+struct Below {
+  unsigned mask = 0;  ///< these nodes
+  bool leaves = false;
+  std::uint32_t index[kNodesPerBlock];  ///< of blocks, or of triangles where they are leaves
 };
 
-/// Answers questions about posed bodies with a crew: those of a team who walk trees together. Each takes a
-/// block for a question; what it finds among the triangles of a leaf block is merged with what is known.
+/// Imaginary boxes pass no test that compares with <=.
+template <typename Test>
+TANDEM_HD inline Below look_below(const Shape& shape, std::uint32_t index, const Test& test) {
+  Below out;
+  if (shape.blocks != nullptr) {
+    const Block& block = shape.blocks[index];
+    out.mask = nodes_that_pass(block, test);
+    out.leaves = block.is_leaf_block();
+    for (int i = 0; i < kNodesPerBlock; ++i) out.index[i] = block.index[i];
+  } else {
+    const OrientedBlock block = shape.oriented_blocks[index];
+    out.mask = nodes_that_pass(block, test.turned(BlockAxes(block.rotation)));
+    out.leaves = (block.first_below & OrientedBlock::kIsLeafBlock) != 0;
+    const std::uint32_t first = block.first_below & ~OrientedBlock::kIsLeafBlock;
+    for (int i = 0; i < kNodesPerBlock; ++i) out.index[i] = first + static_cast<std::uint32_t>(i);
+  }
+  return out;
+}
+
+/// Answers a question about a posed body, by one thread. A GPU has a way of its own (manifold_team.cuh).
+/// asked: of a group that has no question false.
 /// Questions: body(question) says which body is walked; test(question) has passes(center, half_extent), and
-/// turned(axes), the same test for boxes along these axes (imaginary boxes pass no test that compares with
-/// <=); visit(question, triangle, found) looks at a triangle, and merge(question, found) keeps what is
-/// better; a Found is true where there is something.
-template <typename Team, typename Questions>
-TANDEM_HD inline void walk_surfaces(const Team& team, WalkMemory& memory, Questions& questions) {
-  for (;;) {
-    const std::uint32_t waiting = team.load(memory.count);
-    const std::uint32_t room = WalkMemory::kRoom - WalkMemory::kReserve;
-    const std::uint32_t fit = waiting < room ? (room - waiting) / 3 : 0;
-    const std::uint32_t most = team.crew_size() < waiting ? team.crew_size() : waiting;
-    const std::uint32_t taken = fit < 1 ? (most < 1 ? most : 1) : fit < most ? fit : most;
-    if (taken == 0) return;
-    const bool mine = team.rank() < taken;
-    const std::uint64_t item = mine ? memory.waiting[waiting - 1 - team.rank()] : 0;
-    team.crew_sync();
-    if (team.rank() == 0) team.store(memory.count, waiting - taken);
-    team.crew_sync();
+/// turned(axes), the same test for boxes along these axes; visit(question, triangle, found) looks at a
+/// triangle; better(question, found, other) is the better of two, whatever their order; merge(question,
+/// found) keeps what is better than what is known. A Found is true where there is something.
+template <typename Questions>
+TANDEM_HD inline void walk_surface(const OneThreadGroup&, Questions& questions, std::uint32_t question,
+                                   bool asked) {
+  if (!asked) return;
+  std::uint32_t waiting[3 * kMaxDepth + 1] = {0};
+  for (int count = 1; count > 0;) {
+    const Below below =
+        look_below(*questions.body(question).shape, waiting[--count], questions.test(question));
     typename Questions::Found found;
-    const auto question = static_cast<std::uint32_t>(item >> 32), index = static_cast<std::uint32_t>(item);
-    if (mine) {
-      const auto go_on = [&](unsigned mask, bool leaves, const auto& below) {
-        for (; mask != 0; mask &= mask - 1) {
-          const std::uint32_t next = below(lowest_bit(mask));
-          if (leaves)
-            questions.visit(question, next, found);
-          else
-            memory.waiting[team.add(memory.count, 1)] = (item >> 32) << 32 | next;
-        }
-      };
-      const Shape& shape = *questions.body(question).shape;
-      const auto& test = questions.test(question);
-      if (shape.blocks != nullptr) {
-        const Block& block = shape.blocks[index];
-        go_on(nodes_that_pass(block, test), block.is_leaf_block(), [&](int i) { return block.index[i]; });
-      } else {
-        const OrientedBlock block = shape.oriented_blocks[index];
-        const std::uint32_t first = block.first_below & ~OrientedBlock::kIsLeafBlock;
-        go_on(nodes_that_pass(block, test.turned(BlockAxes(block.rotation))), block.is_leaf_block(),
-              [&](int i) { return first + static_cast<std::uint32_t>(i); });
-      }
+    for (int i = 0; i < kNodesPerBlock; ++i) {
+      if ((below.mask >> i & 1u) == 0) continue;
+      if (below.leaves)
+        questions.visit(question, below.index[i], found);
+      else
+        waiting[count++] = below.index[i];
     }
-    team.crew_sync();  // no one asks while answers change
-    team.one_by_one(found, [&] { questions.merge(question, found); });
-    team.crew_sync();
+    if (found) questions.merge(question, found);
   }
 }
 
@@ -252,13 +237,12 @@ class LineQuestions {
 
   /// Where nothing lies as near as expected, it has to be looked for further away. Not all boxes there were
   /// looked at, so what was found there need not be the nearest.
-  TANDEM_HD bool look_further(std::uint32_t question) {
-    LineQuestion& q = questions_[question];
-    if (q.nearest <= q.most) return false;
-    const bool all = q.most == INFINITY;
-    if (all) return false;
-    look_within(q, q.nearest);
-    return true;
+  TANDEM_HD void look_further(std::uint32_t question) {
+    look_within(questions_[question], questions_[question].nearest);
+  }
+  TANDEM_HD bool has_to_look_further(std::uint32_t question) const {
+    const LineQuestion& q = questions_[question];
+    return q.nearest > q.most && q.most != INFINITY;
   }
 
   struct Found {
@@ -293,15 +277,19 @@ class LineQuestions {
     const double height = first * dot(frame_.n, corner[0]) + second * dot(frame_.n, corner[1]) +
                           third * dot(frame_.n, corner[2]);
     if (!(height >= q.lower && height <= q.upper)) return;
-    const double distance = std::fabs(height - q.target);
-    if (distance > found.distance || (distance == found.distance && t >= found.crossing.triangle)) return;
-    found = {distance, {height, t}};
+    const Found here = {std::fabs(height - q.target), {height, t}};
+    if (is_nearer(here, found)) found = here;
+  }
+  TANDEM_HD static bool is_nearer(const Found& x, const Found& than) {
+    return x.distance < than.distance ||
+           (x.distance == than.distance && x.crossing.triangle < than.crossing.triangle);
+  }
+  TANDEM_HD static Found better(std::uint32_t, const Found& x, const Found& y) {
+    return is_nearer(y, x) ? y : x;
   }
   TANDEM_HD void merge(std::uint32_t question, const Found& found) {
     LineQuestion& q = questions_[question];
-    if (found.distance > q.nearest ||
-        (found.distance == q.nearest && found.crossing.triangle >= q.best.triangle))
-      return;
+    if (!is_nearer(found, {q.nearest, q.best})) return;
     q.nearest = found.distance, q.best = found.crossing;
     q.reach = lesser(q.reach, static_cast<float>(found.distance) + q.slack);
   }
@@ -327,6 +315,8 @@ struct Prism {
   Vector2 outward[kMostSides];  // unit normals of the sides
   double offset[kMostSides];    // inside: outward * x <= offset
   int sides = 0;
+  Vector2 axis[2];           // unit vectors; a rectangle around the polygon lies along them
+  double least[2], most[2];  // it reaches from least to most along each
   double lower, upper;
   double above_a,
       below_b;  ///< vertices of a that are not above this do not matter, nor those of b not below this
@@ -338,33 +328,30 @@ struct Prism {
   }
 };
 
-/// Boxes that reach into a prism and further along a direction than what is known.
+/// Boxes that reach into the box around a prism, and further along its last axis than what is known.
 struct PrismTest {
-  FloatVector side[Prism::kMostSides], direction, origin;
-  float offset[Prism::kMostSides];
-  int sides;
-  float least_below, most_below;  // heights along the direction that may count
-  float slack, furthest;
+  FloatVector axis[3], origin;
+  float least[3], most[3], slack;
 
   TANDEM_HD PrismTest turned(const BlockAxes& axes) const {
     PrismTest out = *this;
-    for (int i = 0; i < sides; ++i) out.side[i] = axes(side[i]);
-    out.direction = axes(direction);
+    for (int k = 0; k < 3; ++k) out.axis[k] = axes(axis[k]);
     out.origin = axes(origin);
     return out;
   }
   TANDEM_HD bool passes(const FloatVector& c, const FloatVector& h) const {
     const FloatVector d = {{c.x[0] - origin.x[0], c.x[1] - origin.x[1], c.x[2] - origin.x[2]}};
-    const auto extent = [&](const FloatVector& e) {
-      return std::fabs(e.x[0]) * h.x[0] + std::fabs(e.x[1]) * h.x[1] + std::fabs(e.x[2]) * h.x[2] + slack;
-    };
-    const float along = dot(direction, d), reach = extent(direction);
-    if (!(along + reach >= furthest && along - reach <= most_below && along + reach >= least_below))
-      return false;
-    for (int i = 0; i < sides; ++i) {
-      if (!(dot(side[i], d) - extent(side[i]) <= offset[i])) return false;
+    bool all = true;
+#ifdef __CUDA_ARCH__
+#pragma unroll
+#endif
+    for (int k = 0; k < 3; ++k) {
+      const FloatVector& e = axis[k];
+      const float at = dot(e, d), extent = std::fabs(e.x[0]) * h.x[0] + std::fabs(e.x[1]) * h.x[1] +
+                                           std::fabs(e.x[2]) * h.x[2];
+      all = all && at + extent >= least[k] && at - extent <= most[k];
     }
-    return true;
+    return all;
   }
 };
 
@@ -391,16 +378,18 @@ class ExtremeQuestions {
     const PatchFrame& frame = prism_.frame;
     PrismTest& test = test_[question];
     test.origin = point_in_mesh(body, frame.origin);
-    test.slack = slack_near(body, test.origin);
-    test.direction = in_mesh(body, question == 0 ? frame.n : -frame.n);
-    test.sides = prism_.sides;
-    for (int i = 0; i < prism_.sides; ++i) {
-      test.side[i] = in_mesh(body, prism_.outward[i].x * frame.u + prism_.outward[i].y * frame.v);
-      test.offset[i] = static_cast<float>(prism_.offset[i]) + test.slack;
+    const float slack = slack_near(body, test.origin);
+    for (int k = 0; k < 2; ++k) {
+      test.axis[k] = in_mesh(body, prism_.axis[k].x * frame.u + prism_.axis[k].y * frame.v);
+      test.least[k] = static_cast<float>(prism_.least[k]) - slack;
+      test.most[k] = static_cast<float>(prism_.most[k]) + slack;
     }
-    test.least_below = static_cast<float>(question == 0 ? prism_.lower : -prism_.upper) - test.slack;
-    test.most_below = static_cast<float>(question == 0 ? prism_.upper : -prism_.lower) + test.slack;
-    test.furthest = static_cast<float>(question == 0 ? prism_.above_a : -prism_.below_b) - test.slack;
+    test.axis[2] = in_mesh(body, question == 0 ? frame.n : -frame.n);
+    const double least =
+        question == 0 ? greater(prism_.lower, prism_.above_a) : greater(-prism_.upper, -prism_.below_b);
+    test.least[2] = static_cast<float>(least) - slack;
+    test.most[2] = static_cast<float>(question == 0 ? prism_.upper : -prism_.lower) + slack;
+    test.slack = slack;
     extreme_[question] = {};
   }
 
@@ -426,7 +415,10 @@ class ExtremeQuestions {
     if (!is_further(question, found, extreme_[question])) return;
     extreme_[question] = found;
     const double along = question == 0 ? found.height : -found.height;
-    test_[question].furthest = static_cast<float>(along) - test_[question].slack;
+    test_[question].least[2] = static_cast<float>(along) - test_[question].slack;
+  }
+  TANDEM_HD static Found better(std::uint32_t question, const Found& x, const Found& y) {
+    return y.found() && is_further(question, y, x) ? y : x;
   }
 
   TANDEM_HD static bool is_further(std::uint32_t question, const Extreme& x, const Extreme& than) {

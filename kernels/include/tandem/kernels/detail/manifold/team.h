@@ -5,6 +5,12 @@
 
 namespace tandem::manifold {
 
+/// A group of one thread: those who walk through a tree together.
+struct OneThreadGroup {
+  TANDEM_HD static std::uint32_t rank() { return 0; }
+  TANDEM_HD static void sync() {}
+};
+
 /// Those who make the manifolds of an object pair together: one thread of a CPU here, a warp or a thread
 /// block on a GPU (kernels/cuda/src/manifold_team.cuh). Each takes every size()-th thing from rank() on. What
 /// they find together must not depend on how many they are nor on who comes first.
@@ -27,18 +33,24 @@ struct OneThread {
   TANDEM_HD static T greatest(T value) {
     return value;
   }
+  /// The same of each of several values, of the first `count`: sooner than one after the other.
+  template <typename T, int kMost>
+  TANDEM_HD static void sums(T (&)[kMost], int = kMost) {}
+  template <typename T, int kMost>
+  TANDEM_HD static void least_ones(T (&)[kMost], int = kMost) {}
+  template <typename T, int kMost>
+  TANDEM_HD static void greatest_ones(T (&)[kMost], int = kMost) {}
   TANDEM_HD static bool any(bool value) { return value; }
 
-  /// Those of the team who walk trees together: the first of it.
-  TANDEM_HD static bool in_crew() { return true; }
-  TANDEM_HD static std::uint32_t crew_size() { return 1; }
-  TANDEM_HD static void crew_sync() {}
-  /// Calls of() for each of the crew that has found something, one after the other. All of the crew come
-  /// here.
-  template <typename Found, typename Of>
-  TANDEM_HD static void one_by_one(const Found& found, const Of& of) {
-    if (found) of();
+  /// Calls of(group, i, true) for all i below `count`, each by one group of the team: those who walk a tree
+  /// together. Groups that run in step with others and have none call of(group, i, false). kWidth: how many
+  /// a group of a GPU has.
+  template <int kWidth, typename Of>
+  TANDEM_HD static void for_each_group(std::uint32_t count, const Of& of) {
+    for (std::uint32_t i = 0; i < count; ++i) of(OneThreadGroup(), i, true);
   }
+  /// As many as are worth while for each of two questions.
+  static constexpr int kHalf = 1;
 
   /// On memory that all see.
   TANDEM_HD static std::uint32_t load(const std::uint32_t& at) { return at; }

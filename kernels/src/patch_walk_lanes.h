@@ -72,9 +72,9 @@ class LineWalk {
       for (int k = 0; k < 3; ++k)
         p.x[k] = static_cast<float>(at.x) * u_.x[k] + static_cast<float>(at.y) * v_.x[k];
       const float(&d)[3] = direction_.x;
-      line_[i].across[0] = p.x[1] * d[2] - p.x[2] * d[1];
-      line_[i].across[1] = p.x[2] * d[0] - p.x[0] * d[2];
-      line_[i].across[2] = p.x[0] * d[1] - p.x[1] * d[0];
+      line_[i].across[0] = p.x[2] * d[1] - p.x[1] * d[2];
+      line_[i].across[1] = p.x[0] * d[2] - p.x[2] * d[0];
+      line_[i].across[2] = p.x[1] * d[0] - p.x[0] * d[1];
     }
   }
 
@@ -163,7 +163,7 @@ class LineWalk {
       const int i = std::countr_zero(lines);
       const Line& line = line_[i];
       typename Vector<4>::Bits passes = (low.v <= line.to) & (high.v >= line.from);
-      for (int k = 0; k < 3; ++k) passes &= magnitude(across[k] + -line.across[k]).v <= extent[k].v;
+      for (int k = 0; k < 3; ++k) passes &= magnitude(across[k] + line.across[k]).v <= extent[k].v;
       all |= passes & (1 << i);
     }
     __builtin_memcpy(below, &all, sizeof below);
@@ -233,16 +233,16 @@ class ExtremeWalk {
     const PatchFrame& frame = prism.frame;
     origin_ = point_in_mesh(body, frame.origin);
     slack_ = slack_near(body, origin_);
-    direction_ = in_mesh(body, side == 0 ? frame.n : -frame.n);
-    const FloatVector u = in_mesh(body, frame.u), v = in_mesh(body, frame.v);
-    for (int i = 0; i < prism.sides; ++i) {
-      const auto x = static_cast<float>(prism.outward[i].x), y = static_cast<float>(prism.outward[i].y);
-      for (int k = 0; k < 3; ++k) outward_[i].x[k] = x * u.x[k] + y * v.x[k];
-      offset_[i] = static_cast<float>(prism.offset[i]) + slack_;
+    for (int k = 0; k < 2; ++k) {
+      axis_[k] = in_mesh(body, prism.axis[k].x * frame.u + prism.axis[k].y * frame.v);
+      least_[k] = static_cast<float>(prism.least[k]) - slack_;
+      most_[k] = static_cast<float>(prism.most[k]) + slack_;
     }
-    const float lower = static_cast<float>(side == 0 ? prism.lower : -prism.upper) - slack_;
-    upper_ = static_cast<float>(side == 0 ? prism.upper : -prism.lower) + slack_;
-    lower_ = greater(lower, static_cast<float>(side == 0 ? prism.above_a : -prism.below_b) - slack_);
+    axis_[2] = in_mesh(body, side == 0 ? frame.n : -frame.n);
+    least_[2] = greater(static_cast<float>(side == 0 ? prism.lower : -prism.upper),
+                        static_cast<float>(side == 0 ? prism.above_a : -prism.below_b)) -
+                slack_;
+    most_[2] = static_cast<float>(side == 0 ? prism.upper : -prism.lower) + slack_;
   }
 
   manifold::Extreme find() {
@@ -274,18 +274,13 @@ class ExtremeWalk {
   /// As PrismTest::passes(), for four boxes.
   TANDEM_INLINE unsigned nodes_that_reach(const Block& block) const {
     const BoxCoordinates box(block, origin_);
-    const auto dot_with = [](const manifold::FloatVector& e, const Lanes4(&x)[3]) {
-      return e.x[0] * x[0] + e.x[1] * x[1] + e.x[2] * x[2];
-    };
-    const auto extent = [&](const manifold::FloatVector& e) {
-      const Lanes4(&h)[3] = box.half_extent;
-      return std::fabs(e.x[0]) * h[0] + std::fabs(e.x[1]) * h[1] + std::fabs(e.x[2]) * h[2] + slack_;
-    };
-    const Lanes4 along = dot_with(direction_, box.center), reach = extent(direction_);
-    typename Vector<4>::Bits passes = ((along + reach).v >= lower_) & ((along - reach).v <= upper_);
-    for (int i = 0; i < prism_.sides; ++i) {
-      if (LaneMask<4>{passes}.mask() == 0) return 0;
-      passes &= (dot_with(outward_[i], box.center) - extent(outward_[i])).v <= offset_[i];
+    const Lanes4(&x)[3] = box.center, (&h)[3] = box.half_extent;
+    typename Vector<4>::Bits passes = ~typename Vector<4>::Bits{};
+    for (int k = 0; k < 3; ++k) {
+      const float(&e)[3] = axis_[k].x;
+      const Lanes4 at = e[0] * x[0] + e[1] * x[1] + e[2] * x[2];
+      const Lanes4 extent = std::fabs(e[0]) * h[0] + std::fabs(e[1]) * h[1] + std::fabs(e[2]) * h[2];
+      passes &= ((at + extent).v >= least_[k]) & ((at - extent).v <= most_[k]);
     }
     return LaneMask<4>{passes}.mask();
   }
@@ -308,7 +303,7 @@ class ExtremeWalk {
         const auto side = static_cast<std::uint32_t>(side_);
         if (!manifold::ExtremeQuestions::is_further(side, here, best_) || !prism_.contains(here.at)) continue;
         best_ = here;
-        lower_ = manifold::greater(lower_, static_cast<float>(up_ * here.height) - slack_);
+        least_[2] = manifold::greater(least_[2], static_cast<float>(up_ * here.height) - slack_);
       }
     }
   }
@@ -316,8 +311,8 @@ class ExtremeWalk {
   const manifold::Body& body_;
   const manifold::Prism& prism_;
   int side_, up_;
-  manifold::FloatVector origin_, direction_, outward_[manifold::Prism::kMostSides];
-  float offset_[manifold::Prism::kMostSides], lower_, upper_, slack_;
+  manifold::FloatVector origin_, axis_[3];
+  float least_[3], most_[3], slack_;
   manifold::Extreme best_;
 };
 

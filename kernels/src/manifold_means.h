@@ -10,9 +10,10 @@ namespace tandem {
 struct ManifoldMeans {
   static constexpr int kMostLines = 16;
 
-  /// Words of the table that pieces are joined by, for each contact, and as many once more.
-  static constexpr std::uint32_t kTableWords = 36;
+  /// Words of the table that pieces are joined by: so many for each contact, and some more.
+  static constexpr std::uint32_t kTableWords = 36, kMoreTableWords = 4;
 
+  /// Of what comes later, one float beyond the pieces' normals is read.
   manifold::PieceBounds (*make_pieces)(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory,
                                        const Contact* contacts, std::uint32_t count);
 

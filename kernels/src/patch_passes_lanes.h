@@ -72,7 +72,7 @@ struct FourPieces {
       __builtin_memcpy(&low[k], &piece[k]->end[0].x, sizeof(D));
       __builtin_memcpy(&high[k], &piece[k]->end[0].z, sizeof(D));
     }
-    turn(low), turn(high);
+    transpose_rows(low), transpose_rows(high);
     from = {low[0], low[1], low[2]};
     to = {low[3], high[2], high[3]};
   }
@@ -85,18 +85,6 @@ struct FourPieces {
   }
   TANDEM_INLINE void triangles(int side, std::uint32_t (&index)[4]) const {
     for (int k = 0; k < 4; ++k) index[k] = piece[k]->triangle[side];
-  }
-
- private:
-  TANDEM_INLINE static void turn(DoubleLanes<4> (&rows)[4]) {
-    const auto a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 2, 6),
-               b = __builtin_shufflevector(rows[0], rows[1], 1, 5, 3, 7),
-               c = __builtin_shufflevector(rows[2], rows[3], 0, 4, 2, 6),
-               d = __builtin_shufflevector(rows[2], rows[3], 1, 5, 3, 7);
-    rows[0] = __builtin_shufflevector(a, c, 0, 1, 4, 5);
-    rows[1] = __builtin_shufflevector(b, d, 0, 1, 4, 5);
-    rows[2] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
-    rows[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
   }
 };
 
@@ -263,27 +251,48 @@ void highest_along(const manifold::Body& body, CurveTriangles triangles, const m
   for (int d = 0; d < kDirections; ++d) highest[d] = largest(most[d]);
 }
 
-/// NormalFinder::spread_along(). Heights against a direction are those along it, negated to the last bit.
+/// NormalFinder::spread_along(), of some of the directions. Heights against a direction are those along it,
+/// negated to the last bit.
+template <int kDirections>
+void spread_along_some(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory,
+                       std::uint32_t begin, std::uint32_t end, const manifold::Vector3& origin,
+                       const manifold::Vector3* directions, int count, manifold::Spread* spread) {
+  for (int side = 0; side < 2; ++side) {
+    manifold::Vector3 along[kDirections];
+    double highest[kDirections];
+    for (int d = 0; d < kDirections; ++d) {
+      const manifold::Vector3& n = directions[d < count ? d : 0];
+      along[d] = side == 0 ? n : -n;
+    }
+    highest_along<kDirections>(bodies[side], CurveTriangles(memory, begin, end, side), origin, along,
+                               highest);
+    for (int d = 0; d < kDirections && d < count; ++d)
+      (side == 0 ? spread[d].highest_a : spread[d].lowest_b) = side == 0 ? highest[d] : -highest[d];
+  }
+}
+
 void spread_along(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory, std::uint32_t begin,
                   std::uint32_t end, const manifold::Vector3& origin, const manifold::Vector3* directions,
                   int count, manifold::Spread* spread) {
-  constexpr int kAtOnce = 4;
-  for (int side = 0; side < 2; ++side) {
-    const CurveTriangles triangles(memory, begin, end, side);
-    for (int first = 0; first < count; first += kAtOnce) {
-      manifold::Vector3 along[kAtOnce];
-      double highest[kAtOnce];
-      for (int d = 0; d < kAtOnce; ++d) {
-        const manifold::Vector3& n = directions[first + d < count ? first + d : first];
-        along[d] = side == 0 ? n : -n;
-      }
-      highest_along<kAtOnce>(bodies[side], triangles, origin, along, highest);
-      for (int d = 0; d < kAtOnce && first + d < count; ++d) {
-        if (side == 0)
-          spread[first + d].highest_a = highest[d];
-        else
-          spread[first + d].lowest_b = -highest[d];
-      }
+  for (int first = 0; first < count;) {
+    const auto some = [&]<int kDirections>() {
+      spread_along_some<kDirections>(bodies, memory, begin, end, origin, directions + first, count - first,
+                                     spread + first);
+      first += kDirections;
+    };
+    switch (count - first) {
+      case 1:
+      case 2:
+        some.template operator()<2>();
+        break;
+      case 3:
+        some.template operator()<3>();
+        break;
+      case 4:
+        some.template operator()<4>();
+        break;
+      default:
+        some.template operator()<6>();
     }
   }
 }

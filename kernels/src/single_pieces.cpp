@@ -2,8 +2,8 @@
 
 #include "manifold_means.h"
 
-// CurveFinder's ways to join pieces to curves, by one thread: keys lie beside the references, so that nothing
-// is computed again where two are compared.
+// What CurveFinder does with single pieces, by one thread. Keys lie beside the references, so that nothing is
+// computed again where two are compared.
 namespace tandem {
 namespace {
 
@@ -59,6 +59,16 @@ class PieceJoiner {
 };
 
 }  // namespace
+
+void ManifoldMeans::add_piece(const PieceMemory& memory, const Contact& contact,
+                              const manifold::WorldTriangle& a, const manifold::WorldTriangle& b,
+                              double tolerance, manifold::PieceBounds& bounds) {
+  manifold::Meeting meeting;
+  manifold::meet(a, b, tolerance, meeting);
+  if (meeting.kind == manifold::MeetingKind::none) return;
+  manifold::write_piece(memory, bounds.pieces++, contact, a.normal, b.normal, meeting);
+  bounds.add(meeting);
+}
 
 bool ManifoldMeans::connect_by_ends(const BodyPair& bodies, const PieceMemory& memory, std::uint32_t pieces) {
   PieceJoiner joiner(memory, pieces, 3 * pieces);

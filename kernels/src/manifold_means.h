@@ -30,8 +30,8 @@ struct ManifoldMeans {
   // Each as the function of the name in the headers, of pieces order[begin] to order[end - 1].
   void (*sum_pieces)(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
                      const manifold::Vector3& origin, double one_by_unit, manifold::CurveSums& out);
-  std::uint64_t (*least_unmarked)(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
-                                  int side, const manifold::FloatVector& known);
+  manifold::LeastPiece (*least_unmarked)(const manifold::PieceMemory& memory, std::uint32_t begin,
+                                         std::uint32_t end, int side, const manifold::FloatVector& known);
   void (*find_face_along)(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
                           int side, const manifold::FloatVector& up, manifold::FaceAlong& best);
   void (*sum_length_on_face)(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
@@ -48,7 +48,7 @@ struct ManifoldMeans {
                               manifold::Candidate* candidates, manifold::RimMoments& moments);
   void (*furthest)(const manifold::PieceMemory& memory, const manifold::Candidate* candidates,
                    std::uint32_t count, const manifold::RimValue* values, int wanted,
-                   manifold::Furthest* const* best);
+                   manifold::Furthest* best);
   /// The next candidate from `i` on whose distance's square from a point is less, or `count`.
   std::uint32_t (*next_near)(const manifold::Candidate* candidates, std::uint32_t i, std::uint32_t count,
                              const manifold::FloatPoint& at, float square);

@@ -30,21 +30,21 @@ struct alignas(64) PairPatches {
     manifold::PieceMemory memory;
     if (!make_room(count, memory)) return false;
     manifold::CurveFinder<Team> finder(team, bodies, memory);
-    const manifold::PieceSummary summary = finder.find(contacts, count, shared_.next);
+    const manifold::PieceSummary summary = finder.find(contacts, count, outline_.next);
     segments += summary.segments;
-    manifold::ManifoldMaker<Team> maker(team, bodies, memory, shared_, summary);
+    manifold::ManifoldMaker<Team> maker(team, bodies, memory, summary, state_);
     bool enough_memory = true;
     const auto new_patch = [&]() -> manifold::Patch* {
       enough_memory = enough_memory && patches.push({});
       return enough_memory ? &patches[patches.size() - 1] : nullptr;
     };
     for (std::uint32_t curve = 0; curve < summary.curves; ++curve) {
-      if (!maker.begin(curve)) {
+      if (!maker.begin(curve, outline_)) {
         ++ambiguous_touches;
         continue;
       }
-      maker.measure_depths(curve);
-      maker.finish(curve, most_points, new_patch);
+      maker.measure_depths(curve, depths_);
+      maker.finish(curve, most_points, choice_, new_patch);
     }
     return enough_memory;
   }
@@ -66,7 +66,10 @@ struct alignas(64) PairPatches {
   Buffer<manifold::Piece> pieces_;
   Buffer<float> normals_;
   Buffer<std::uint32_t> words_;
-  manifold::PatchMemory shared_;
+  manifold::PatchState state_;
+  manifold::OutlineMemory outline_;
+  manifold::DepthMemory depths_;
+  manifold::ChoiceMemory choice_;
 };
 
 }  // namespace tandem

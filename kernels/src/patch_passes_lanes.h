@@ -108,7 +108,7 @@ void sum_pieces(const manifold::PieceMemory& memory, std::uint32_t begin, std::u
     const Vector3Lanes<4> to = second - origin;
     const Vector3Lanes<4> half_way = {0.5 * (from.x + to.x), 0.5 * (from.y + to.y), 0.5 * (from.z + to.z)};
     middle.add(scaled(size * one_by_unit, half_way), one_by_unit);
-    for (int k = 0; k < 4; ++k) out.key = manifold::lesser(out.key, four.piece[k]->key());
+    for (int k = 0; k < 4; ++k) out.least.take(four.piece[k]->key(), four.at[k]);
     for (std::uint32_t k = 0; k < four.lanes; ++k) {
       if (four.piece[k]->kind() == manifold::MeetingKind::polygon)
         out.area.add(four.piece[k]->end[1], one_by_unit * one_by_unit);
@@ -135,10 +135,10 @@ struct FourNormals {
 };
 
 /// NormalFinder::least_unmarked(). A piece's mark is where its curve was.
-std::uint64_t least_unmarked(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
-                             int side, const manifold::FloatVector& known) {
+manifold::LeastPiece least_unmarked(const manifold::PieceMemory& memory, std::uint32_t begin,
+                                    std::uint32_t end, int side, const manifold::FloatVector& known) {
   using Marks = Vector<4>::Bits;
-  std::uint64_t key = ~std::uint64_t{0};
+  manifold::LeastPiece least;
   for (std::uint32_t i = begin; i < end; i += 4) {
     const FourPieces four(memory, i, end);
     Marks marks = {1, 1, 1, 1};
@@ -157,9 +157,9 @@ std::uint64_t least_unmarked(const manifold::PieceMemory& memory, std::uint32_t 
         memory.curve[i + k] = static_cast<std::uint32_t>(marks[k]);
     }
     for (unsigned left = LaneMask<4>{marks == 0}.mask(); left != 0; left &= left - 1)
-      key = manifold::lesser(key, four.piece[std::countr_zero(left)]->key());
+      least.take(four.piece[std::countr_zero(left)]->key(), four.at[std::countr_zero(left)]);
   }
-  return key;
+  return least;
 }
 
 /// Of NormalFinder::find_bearing_faces().
@@ -173,7 +173,7 @@ void find_face_along(const manifold::PieceMemory& memory, std::uint32_t begin, s
     const Lanes4 along = x * n.x + y * n.y + z * n.z;
     for (unsigned found = LaneMask<4>{along.v >= best.along}.mask(); found != 0; found &= found - 1) {
       const int k = std::countr_zero(found);
-      best.take(along.v[k], four.piece[k]->key());
+      best.take(along.v[k], four.piece[k]->key(), four.at[k]);
     }
   }
 }
@@ -389,12 +389,12 @@ TANDEM_INLINE Lanes4 value_of(const manifold::RimValue& value, const FourCandida
 
 /// RimFinder::furthest(). First the values, then who has the greatest.
 void furthest(const manifold::PieceMemory& memory, const manifold::Candidate* candidates, std::uint32_t count,
-              const manifold::RimValue* values, int wanted, manifold::Furthest* const* best) {
+              const manifold::RimValue* values, int wanted, manifold::Furthest* best) {
   constexpr std::uint32_t kAtOnce = 256;
   for (std::uint32_t from = 0; from < count; from += kAtOnce) {
     const std::uint32_t end = count - from < kAtOnce ? count : from + kAtOnce;
     Lanes4 value[2][kAtOnce / 4], most[2];
-    for (int w = 0; w < wanted; ++w) most[w].v = Lanes4::Floats{} + best[w]->value;
+    for (int w = 0; w < wanted; ++w) most[w].v = Lanes4::Floats{} + best[w].value;
     std::uint32_t groups = 0;
     for (std::uint32_t i = from; i < end; i += 4, ++groups) {
       const FourCandidates four(candidates, i, count);
@@ -410,7 +410,7 @@ void furthest(const manifold::PieceMemory& memory, const manifold::Candidate* ca
         unsigned found = LaneMask<4>{value[w][group].v == greatest}.mask();
         for (; found != 0; found &= found - 1) {
           const std::uint32_t i = from + 4 * group + static_cast<std::uint32_t>(std::countr_zero(found));
-          if (i < count) best[w]->take(memory, greatest, candidates[i].reference);
+          if (i < count) best[w].take(memory, greatest, candidates[i].reference);
         }
       }
     }

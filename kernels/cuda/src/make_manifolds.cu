@@ -12,32 +12,21 @@ namespace {
 using manifold::BodyPair;
 using manifold::ManifoldMaker;
 using manifold::Patch;
-using manifold::PatchMemory;
 using manifold::PatchState;
 using manifold::PieceMemory;
 using manifold::PieceSummary;
 
-// A thread block is a team, of one warp or of several: pairs with many contacts, and curves of many pieces,
-// are for large ones.
-constexpr std::uint32_t kLarge = 128, kSmall = 32;
+// The threads of a block. They are a team for a pair with many contacts or a curve of many pieces, and later
+// on each of its warps is one for those of few.
+constexpr std::uint32_t kThreads = 128, kWarps = kThreads / 32;
+using LargeTeam = BlockTeam<kThreads>;
 
-template <std::uint32_t kThreads>
-using Team = std::conditional_t<kThreads == 32, WarpTeam, BlockTeam<kThreads>>;
-
-// What the threads of a team share besides.
-template <std::uint32_t kThreads>
-struct TeamMemory {
-  BlockScratch<kThreads> scratch;
-  std::uint32_t row, next;
+/// What teams share, without contents at first.
+template <typename T>
+struct Raw {
+  alignas(16) unsigned char bytes[sizeof(T)];
+  __device__ T& get() { return *reinterpret_cast<T*>(bytes); }
 };
-
-template <std::uint32_t kThreads>
-__device__ Team<kThreads> team_with(TeamMemory<kThreads>& memory, WarpWalks* walks = nullptr) {
-  if constexpr (kThreads == 32)
-    return Team<kThreads>(walks);
-  else
-    return Team<kThreads>(&memory.scratch, walks);
-}
 
 /// Calls of(row) for rows below `rows` that no other team has taken.
 template <typename AnyTeam, typename Of>
@@ -52,6 +41,24 @@ __device__ void take_rows(const AnyTeam& team, std::uint32_t rows, std::uint32_t
     team.sync();
   }
 }
+
+/// Calls of(team, row, 0) for rows below `many`, by blocks, then of(team, row, warp) for rows below `few`, by
+/// warps.
+template <typename Of>
+__device__ void share_out(std::uint32_t many, std::uint32_t& next_many, std::uint32_t few,
+                          std::uint32_t& next_few, const Of& of) {
+  __shared__ BlockScratch<kThreads> scratch;
+  __shared__ std::uint32_t taken[kWarps];
+  const LargeTeam block(&scratch, nullptr);
+  take_rows(block, many, next_many, taken[0], [&](std::uint32_t row) { of(block, row, 0u); });
+  __syncthreads();
+  const std::uint32_t own = threadIdx.x / 32;
+  const WarpTeam warp(nullptr);
+  take_rows(warp, few, next_few, taken[own], [&](std::uint32_t row) { of(warp, row, own); });
+}
+
+template <typename AnyTeam>
+constexpr bool kIsLarge = AnyTeam::size() == kThreads;
 
 // Pieces are numbered in 28 bits, and table entries in 32.
 constexpr std::uint32_t kMostContactsOfPair = std::uint32_t{1} << 27;
@@ -74,11 +81,11 @@ __device__ PieceMemory memory_of(const ManifoldArgs& args, std::uint32_t pair) {
 }
 
 /// Writes down what each contact's triangles have in common, among the pieces of the contact's pair.
-__global__ void __launch_bounds__(kLarge) make_pieces(const __grid_constant__ ManifoldArgs args) {
+__global__ void __launch_bounds__(kThreads, 5) make_pieces(const __grid_constant__ ManifoldArgs args) {
   wait_for_kernel_before();
   if (!has_query(args)) return;
-  const std::uint64_t count = args.query->contacts, step = std::uint64_t{gridDim.x} * kLarge;
-  for (std::uint64_t first = std::uint64_t{blockIdx.x} * kLarge; first < count; first += step) {
+  const std::uint64_t count = args.query->contacts, step = std::uint64_t{gridDim.x} * kThreads;
+  for (std::uint64_t first = std::uint64_t{blockIdx.x} * kThreads; first < count; first += step) {
     const std::uint64_t i = first + threadIdx.x;
     manifold::Meeting meeting;
     manifold::WorldTriangle a, b;
@@ -106,73 +113,66 @@ __global__ void __launch_bounds__(kLarge) make_pieces(const __grid_constant__ Ma
   }
 }
 
-// Shared memory in which a team looks for the curves of a pair, if that has no more pieces than fit.
-template <std::uint32_t kThreads>
-struct NearMemory {
-  static constexpr std::uint32_t kPieces = 8 * kThreads, kWords = 4 * kPieces;
-  std::uint32_t table[kWords], curve[kPieces];
-};
-
-template <std::uint32_t kThreads>
-__global__ void __launch_bounds__(kThreads, 768 / kThreads)
-    find_curves(const __grid_constant__ ManifoldArgs args) {
-  __shared__ TeamMemory<kThreads> memory;
-  __shared__ NearMemory<kThreads> near;
-  __shared__ alignas(16) unsigned char shared_bodies[sizeof(BodyPair)];
+/// Finds the curves of each pair.
+__global__ void __launch_bounds__(kThreads, 5) find_curves(const __grid_constant__ ManifoldArgs args) {
+  // For keys and sets of pieces, if they fit. A warp has its part.
+  constexpr std::uint32_t kPieces = 2048, kWords = 4 * kPieces;
+  extern __shared__ std::uint32_t near[];
+  __shared__ Raw<BodyPair> shared_bodies[kWarps];
+  __shared__ std::uint32_t next[kWarps];
   wait_for_kernel_before();
   if (!has_query(args)) return;
-  const Team<kThreads> team = team_with(memory);
   const GpuContactGroups& groups = args.groups;
   ManifoldState& state = *args.state;
-  constexpr bool kMany = kThreads == kLarge;
-  const std::uint32_t* const rows = kMany ? groups.many : groups.few;
-  take_rows(team, kMany ? groups.counts->many : groups.counts->few, kMany ? state.next_many : state.next_few,
-            memory.row, [&](std::uint32_t row) {
-              const std::uint32_t pair = rows[row], count = args.of_pair[pair].pieces;
-              if (count == 0) return;
-              if (count > kMostContactsOfPair) {
-                if (team.rank() == 0) state.too_many_contacts = 1;
-                return;
-              }
-              BodyPair& bodies = *reinterpret_cast<BodyPair*>(shared_bodies);
-              if (team.rank() == 0) bodies = bodies_of(args, args.pairs.pairs[pair]);
-              PieceMemory pieces = memory_of(args, pair);
-              pieces.near_table = near.table, pieces.near_words = near.kWords;
-              if (count <= near.kPieces) pieces.curve = near.curve;
-              team.sync();
-              manifold::CurveFinder<Team<kThreads>> finder(team, bodies, pieces);
-              const PieceSummary summary = finder.find_among(count, memory.next);
-              if (team.rank() == 0) {
-                args.summaries[pair] = summary;
-                if (summary.segments > 0) atomicAdd(&state.segments, Counter{summary.segments});
-              }
-              for (std::uint32_t curve = team.rank(); curve < summary.curves; curve += team.size()) {
-                const bool many = pieces.start[curve + 1] - pieces.start[curve] > kFewContacts;
-                const std::uint32_t place =
-                    atomicAdd(many ? &state.curves_of_many : &state.curves_of_few, 1u);
-                args.curves[many ? place : args.capacity.contacts - 1 - place] = {pair, curve};
-              }
-            });
+  const auto of = [&](const auto& team, std::uint32_t row, std::uint32_t own) {
+    using AnyTeam = std::remove_cvref_t<decltype(team)>;
+    constexpr std::uint32_t kParts = kIsLarge<AnyTeam> ? 1 : kWarps;
+    const std::uint32_t pair = kIsLarge<AnyTeam> ? groups.many[row] : groups.few[row],
+                        count = args.of_pair[pair].pieces;
+    if (count == 0) return;
+    if (count > kMostContactsOfPair) {
+      if (team.rank() == 0) state.too_many_contacts = 1;
+      return;
+    }
+    BodyPair& bodies = shared_bodies[own].get();
+    if (team.rank() == 0) bodies = bodies_of(args, args.pairs.pairs[pair]);
+    PieceMemory pieces = memory_of(args, pair);
+    pieces.near_table = near + own * kWords / kParts, pieces.near_words = kWords / kParts;
+    if (count <= kPieces / kParts) pieces.curve = near + kWords + own * kPieces / kParts;
+    team.sync();
+    manifold::CurveFinder<AnyTeam> finder(team, bodies, pieces);
+    const PieceSummary summary = finder.find_among(count, next[own]);
+    if (team.rank() == 0) {
+      args.summaries[pair] = summary;
+      if (summary.segments > 0) atomicAdd(&state.segments, Counter{summary.segments});
+    }
+    for (std::uint32_t curve = team.rank(); curve < summary.curves; curve += team.size()) {
+      const bool many = pieces.start[curve + 1] - pieces.start[curve] > kFewContacts;
+      const std::uint32_t place = atomicAdd(many ? &state.curves_of_many : &state.curves_of_few, 1u);
+      args.curves[many ? place : args.capacity.contacts - 1 - place] = {pair, curve};
+    }
+  };
+  share_out(groups.counts->many, state.next_many, groups.counts->few, state.next_few, of);
 }
+constexpr std::size_t kNearBytes = 5 * 2048 * sizeof(std::uint32_t);
 
-// What a team that makes a patch shares, without contents at first.
+// What a team that makes a patch shares.
 struct MakerMemory {
-  alignas(16) unsigned char patch[sizeof(PatchMemory)], bodies[sizeof(BodyPair)],
-      summary[sizeof(PieceSummary)];
+  Raw<BodyPair> bodies;
+  Raw<PieceSummary> summary;
+  Raw<PatchState> state;
 };
 
-/// Calls of(maker, memory) with a maker for a curve.
+/// Calls of(maker, state) with a maker for a curve.
 template <typename AnyTeam, typename Of>
 __device__ void with_maker(const ManifoldArgs& args, const AnyTeam& team, MakerMemory& shared,
                            const PairCurve& of_curve, const Of& of) {
-  BodyPair& bodies = *reinterpret_cast<BodyPair*>(shared.bodies);
-  PieceSummary& summary = *reinterpret_cast<PieceSummary*>(shared.summary);
-  PatchMemory& memory = *reinterpret_cast<PatchMemory*>(shared.patch);
-  if (team.rank() == 0) bodies = bodies_of(args, args.pairs.pairs[of_curve.pair]);
-  if (team.rank() == team.size() - 1) summary = args.summaries[of_curve.pair];
+  if (team.rank() == 0) shared.bodies.get() = bodies_of(args, args.pairs.pairs[of_curve.pair]);
+  if (team.rank() == team.size() - 1) shared.summary.get() = args.summaries[of_curve.pair];
   team.sync();
-  ManifoldMaker<AnyTeam> maker(team, bodies, memory_of(args, of_curve.pair), memory, summary);
-  of(maker, memory);
+  ManifoldMaker<AnyTeam> maker(team, shared.bodies.get(), memory_of(args, of_curve.pair),
+                               shared.summary.get(), shared.state.get());
+  of(maker, shared.state.get());
 }
 
 template <typename AnyTeam>
@@ -183,34 +183,33 @@ __device__ void copy_state(const AnyTeam& team, const PatchState& from, PatchSta
   team.sync();
 }
 
-template <std::uint32_t kThreads>
-__global__ void __launch_bounds__(kThreads, 512 / kThreads)
-    begin_patches(const __grid_constant__ ManifoldArgs args) {
-  __shared__ TeamMemory<kThreads> memory;
-  __shared__ MakerMemory shared;
-  __shared__ std::uint32_t place;
+/// Begins the patch of each curve.
+__global__ void __launch_bounds__(kThreads, 4) begin_patches(const __grid_constant__ ManifoldArgs args) {
+  __shared__ MakerMemory memory[kWarps];
+  __shared__ Raw<manifold::OutlineMemory> outline[kWarps];
+  __shared__ std::uint32_t places[kWarps];
   wait_for_kernel_before();
   if (!has_query(args)) return;
-  const Team<kThreads> team = team_with(memory);
   ManifoldState& state = *args.state;
-  constexpr bool kMany = kThreads == kLarge;
-  take_rows(team, kMany ? state.curves_of_many : state.curves_of_few,
-            kMany ? state.next_curve_of_many : state.next_curve_of_few, memory.row, [&](std::uint32_t row) {
-              const PairCurve of = args.curves[kMany ? row : args.capacity.contacts - 1 - row];
-              with_maker(args, team, shared, of, [&](auto& maker, const PatchMemory& made) {
-                const bool known = maker.begin(of.curve);
-                if (team.rank() == 0) {
-                  place = known ? atomicAdd(&state.next_patch, 1u) : kNoIndex;
-                  if (!known) atomicAdd(&state.ambiguous_touches, Counter{1});
-                  if (known && place >= args.capacity.manifolds)
-                    atomicAdd(&state.needed_points, static_cast<Counter>(args.most_points));
-                }
-                team.sync();
-                if (place >= args.capacity.manifolds) return;
-                if (team.rank() == 0) args.begun[place].of = of;
-                copy_state(team, made.state, args.begun[place].state);
-              });
-            });
+  const auto of = [&](const auto& team, std::uint32_t row, std::uint32_t own) {
+    constexpr bool kMany = kIsLarge<std::remove_cvref_t<decltype(team)>>;
+    const PairCurve curve = args.curves[kMany ? row : args.capacity.contacts - 1 - row];
+    with_maker(args, team, memory[own], curve, [&](auto& maker, const PatchState& made) {
+      const bool known = maker.begin(curve.curve, outline[own].get());
+      std::uint32_t& place = places[own];
+      if (team.rank() == 0) {
+        place = known ? atomicAdd(&state.next_patch, 1u) : kNoIndex;
+        if (!known) atomicAdd(&state.ambiguous_touches, Counter{1});
+        if (known && place >= args.capacity.manifolds)
+          atomicAdd(&state.needed_points, static_cast<Counter>(args.most_points));
+      }
+      team.sync();
+      if (place >= args.capacity.manifolds) return;
+      if (team.rank() == 0) args.begun[place].of = curve;
+      copy_state(team, made, args.begun[place].state);
+    });
+  };
+  share_out(state.curves_of_many, state.next_curve_of_many, state.curves_of_few, state.next_curve_of_few, of);
 }
 
 __device__ std::uint32_t patches_begun(const ManifoldArgs& args) {
@@ -218,45 +217,50 @@ __device__ std::uint32_t patches_begun(const ManifoldArgs& args) {
   return wanted < args.capacity.manifolds ? wanted : args.capacity.manifolds;
 }
 
-__global__ void __launch_bounds__(kLarge, 768 / kLarge)
-    measure_depths(const __grid_constant__ ManifoldArgs args) {
-  __shared__ TeamMemory<kLarge> memory;
-  __shared__ WarpWalks walks[kLarge / 32];
-  __shared__ MakerMemory shared;
+/// Measures the depths of each patch, by a block.
+__global__ void __launch_bounds__(kThreads, 6) measure_depths(const __grid_constant__ ManifoldArgs args) {
+  __shared__ BlockScratch<kThreads> scratch;
+  __shared__ WarpWalks walks[kWarps];
+  __shared__ MakerMemory memory;
+  __shared__ Raw<manifold::DepthMemory> depths;
+  __shared__ std::uint32_t taken;
   wait_for_kernel_before();
   if (!has_query(args)) return;
-  const Team<kLarge> team = team_with(memory, walks);
-  take_rows(team, patches_begun(args), args.state->next_measured, memory.row, [&](std::uint32_t row) {
+  const LargeTeam team(&scratch, walks);
+  take_rows(team, patches_begun(args), args.state->next_measured, taken, [&](std::uint32_t row) {
     BegunPatch& begun = args.begun[row];
-    with_maker(args, team, shared, begun.of, [&](auto& maker, PatchMemory& made) {
-      copy_state(team, begun.state, made.state);
-      if (made.state.touch) return;
-      maker.measure_depths(begun.of.curve);
-      copy_state(team, made.state, begun.state);
+    if (begun.state.touch) return;
+    with_maker(args, team, memory, begun.of, [&](auto& maker, PatchState& state) {
+      copy_state(team, begun.state, state);
+      maker.measure_depths(begun.of.curve, depths.get());
+      copy_state(team, state, begun.state);
     });
   });
 }
 
-__global__ void __launch_bounds__(kSmall, 768 / kSmall)
-    finish_patches(const __grid_constant__ ManifoldArgs args) {
-  __shared__ TeamMemory<kSmall> memory;
-  __shared__ MakerMemory shared;
+/// Finishes each patch, by a warp.
+__global__ void __launch_bounds__(kThreads, 6) finish_patches(const __grid_constant__ ManifoldArgs args) {
+  __shared__ MakerMemory memory[kWarps];
+  __shared__ Raw<manifold::ChoiceMemory> choice[kWarps];
+  __shared__ std::uint32_t taken[kWarps];
   wait_for_kernel_before();
   if (!has_query(args)) return;
-  const Team<kSmall> team = team_with(memory);
-  take_rows(team, patches_begun(args), args.state->next_finished, memory.row, [&](std::uint32_t row) {
+  const WarpTeam team(nullptr);
+  const std::uint32_t own = threadIdx.x / 32;
+  take_rows(team, patches_begun(args), args.state->next_finished, taken[own], [&](std::uint32_t row) {
     const BegunPatch& begun = args.begun[row];
-    with_maker(args, team, shared, begun.of, [&](auto& maker, PatchMemory& made) {
-      copy_state(team, begun.state, made.state);
+    with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState& state) {
+      copy_state(team, begun.state, state);
       Patch* patch = nullptr;
-      maker.finish(begun.of.curve, args.most_points, [&] { return patch = &args.patches[row]; });
+      maker.finish(begun.of.curve, args.most_points, choice[own].get(),
+                   [&] { return patch = &args.patches[row]; });
       if (patch == nullptr) return;
-      PairPatches& own = args.of_pair[begun.of.pair];
-      args.next_of_pair[row] = atomicExch(&own.first, row);
-      atomicAdd(&own.patches, 1u);
+      PairPatches& pair = args.of_pair[begun.of.pair];
+      args.next_of_pair[row] = atomicExch(&pair.first, row);
+      atomicAdd(&pair.patches, 1u);
       if (patch->hole != 0) return;
-      atomicAdd(&own.manifolds, 1u);
-      atomicAdd(&own.points, patch->manifold.point_count);
+      atomicAdd(&pair.manifolds, 1u);
+      atomicAdd(&pair.points, patch->manifold.point_count);
       atomicAdd(&args.state->needed_points, Counter{patch->manifold.point_count});
       if ((patch->manifold.flags & kOpenCurve) != 0) atomicAdd(&args.state->open_curves, Counter{1});
     });
@@ -278,8 +282,6 @@ __device__ void enter(TableEntry* table, std::uint32_t size, std::uint32_t step,
   TableEntry& out = table[slot];
   out.bodies = entry.bodies, out.first_point = entry.first_point, out.points = entry.points;
 }
-
-constexpr std::uint32_t kThreads = 128;
 
 __global__ void __launch_bounds__(kThreads)
     move_table(const TableEntry* from, std::uint32_t from_size, TableEntry* to, std::uint32_t to_size,
@@ -355,16 +357,15 @@ cudaError_t forget_last(ManifoldState* state, cudaStream_t stream) {
 }
 
 cudaError_t make_patches(const ManifoldArgs& args, cudaStream_t stream) {
-  const auto grid = [&](std::uint32_t threads) {
-    return Grid{args.limits.processors * (768 / threads), threads, 0, stream, args.limits.early_launch};
+  const auto grid = [&](unsigned blocks_of_processor, std::size_t shared_bytes) {
+    return Grid{args.limits.processors * blocks_of_processor, kThreads, shared_bytes, stream,
+                args.limits.early_launch};
   };
-  cudaError_t error = launch_after(grid(kLarge), make_pieces, args);
-  if (error == cudaSuccess) error = launch_after(grid(kLarge), find_curves<kLarge>, args);
-  if (error == cudaSuccess) error = launch_after(grid(kSmall), find_curves<kSmall>, args);
-  if (error == cudaSuccess) error = launch_after(grid(kLarge), begin_patches<kLarge>, args);
-  if (error == cudaSuccess) error = launch_after(grid(kSmall), begin_patches<kSmall>, args);
-  if (error == cudaSuccess) error = launch_after(grid(kLarge), measure_depths, args);
-  return error == cudaSuccess ? launch_after(grid(kSmall), finish_patches, args) : error;
+  cudaError_t error = launch_after(grid(5, 0), make_pieces, args);
+  if (error == cudaSuccess) error = launch_after(grid(5, kNearBytes), find_curves, args);
+  if (error == cudaSuccess) error = launch_after(grid(4, 0), begin_patches, args);
+  if (error == cudaSuccess) error = launch_after(grid(6, 0), measure_depths, args);
+  return error == cudaSuccess ? launch_after(grid(6, 0), finish_patches, args) : error;
 }
 
 }  // namespace tandem::gpu

@@ -24,67 +24,64 @@ template <typename Team>
 class ManifoldMaker {
  public:
   TANDEM_HD ManifoldMaker(const Team& team, const BodyPair& bodies, const PieceMemory& memory,
-                          PatchMemory& shared, const PieceSummary& summary)
-      : team_(team),
-        bodies_(bodies),
-        memory_(memory),
-        shared_(shared),
-        state_(shared.state),
-        summary_(summary) {}
+                          const PieceSummary& summary, PatchState& state)
+      : team_(team), bodies_(bodies), memory_(memory), summary_(summary), state_(state) {}
 
   /// Normal and rim. False: an ambiguous touch, which has no patch.
-  TANDEM_HD bool begin(std::uint32_t curve);
+  TANDEM_HD bool begin(std::uint32_t curve, OutlineMemory& shared);
 
   /// Depths.
-  TANDEM_HD void measure_depths(std::uint32_t curve);
+  TANDEM_HD void measure_depths(std::uint32_t curve, DepthMemory& shared);
 
   /// Points. new_patch(): where the patch is to lie, or null; called by one of the team if there is one.
   template <typename NewPatch>
-  TANDEM_HD void finish(std::uint32_t curve, int most_points, const NewPatch& new_patch);
+  TANDEM_HD void finish(std::uint32_t curve, int most_points, ChoiceMemory& shared,
+                        const NewPatch& new_patch);
 
  private:
   TANDEM_HD void place_soundings(const RimFinder<Team>& finder, const Rim& rim);
-  TANDEM_HD void walk_lines(LineQuestions& questions, std::uint32_t count);
-  TANDEM_HD void sound(int first);
-  TANDEM_HD void place_prism();
-  TANDEM_HD void find_extreme_corners(std::uint32_t curve);
-  TANDEM_HD void sound_deepest(std::uint32_t curve);
-  TANDEM_HD void look_behind();
-  TANDEM_HD void choose(const RimFinder<Team>& finder, int most_of_rim, bool touch);
-  TANDEM_HD void write_points(Patch& patch, int count) const;
-  TANDEM_HD void write_manifold(Patch& patch, int count, bool hole, bool goes_through) const;
+  TANDEM_HD void walk_lines(LineQuestions& questions, std::uint32_t count, DepthMemory& shared);
+  TANDEM_HD void sound(int first, DepthMemory& shared);
+  TANDEM_HD void place_prism(DepthMemory& shared);
+  TANDEM_HD void find_extreme_corners(std::uint32_t curve, DepthMemory& shared);
+  TANDEM_HD void sound_deepest(std::uint32_t curve, DepthMemory& shared);
+  TANDEM_HD void look_behind(DepthMemory& shared);
+  TANDEM_HD void choose(const RimFinder<Team>& finder, int most_of_rim, bool touch, ChoiceMemory& shared);
+  TANDEM_HD void write_points(const ChoiceMemory& shared, Patch& patch, int count) const;
+  TANDEM_HD void write_manifold(const ChoiceMemory& shared, Patch& patch, int count, bool hole,
+                                bool goes_through) const;
 
   const Team& team_;
   const BodyPair& bodies_;
   PieceMemory memory_;
-  PatchMemory& shared_;
-  PatchState& state_;
   const PieceSummary& summary_;
+  PatchState& state_;
 };
 
 /// The rim as it is sounded, and the middle.
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::place_soundings(const RimFinder<Team>& finder, const Rim& rim) {
   const PatchFrame& frame = state_.frame;
-  Vector2 at[kMostManifoldPoints], middle;
+  Vector2 middle;
   double mean_height = 0, extent = 0;
   for (int i = 0; i < rim.points; ++i) {
     const Vector3 x = finder.position(rim.reference[i]);
-    at[i] = frame.flat(x);
-    middle = middle + at[i];
+    middle = middle + frame.flat(x);
     mean_height += frame.height(x);
   }
   middle = (1.0 / rim.points) * middle;
   mean_height /= rim.points;
-  for (int i = 0; i < rim.points; ++i) extent = greater(extent, norm(at[i] - middle));
+  for (int i = 0; i < rim.points; ++i)
+    extent = greater(extent, norm(frame.flat(finder.position(rim.reference[i])) - middle));
   const int soundings = state_.touch ? rim.points : rim.points + 1;
   for (int i = static_cast<int>(team_.rank()); i < soundings; i += static_cast<int>(team_.size())) {
     Sounding& s = state_.sounding[i];
     s = {};
     const bool inner = i == rim.points;
-    s.at = inner ? middle : at[i];
-    s.line = inner ? middle : at[i] + kInwards * (middle - at[i]);
-    s.height = inner ? mean_height : frame.height(finder.position(rim.reference[i]));
+    const Vector3 x = finder.position(rim.reference[inner ? 0 : i]);
+    s.at = inner ? middle : frame.flat(x);
+    s.line = inner ? middle : s.at + kInwards * (middle - s.at);
+    s.height = inner ? mean_height : frame.height(x);
     s.target[0] = s.target[1] = s.height;
     s.reference = inner ? kNoIndex : rim.reference[i];
     s.rank = inner ? 0 : rim.rank[i];
@@ -103,12 +100,13 @@ TANDEM_HD void ManifoldMaker<Team>::place_soundings(const RimFinder<Team>& finde
 
 /// Answers the first `count` line questions; those of no side were not asked.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::walk_lines(LineQuestions& questions, std::uint32_t count) {
+TANDEM_HD void ManifoldMaker<Team>::walk_lines(LineQuestions& questions, std::uint32_t count,
+                                               DepthMemory& shared) {
   if constexpr (HasMeans<Team>) return questions.answer(team_.means(), count);
   constexpr int kLinesWidth = 8;
   team_.sync();
   team_.template for_each_group<kLinesWidth>(count, [&](const auto& group, std::uint32_t i, bool given) {
-    const bool asked = given && shared_.line[i].side >= 0;
+    const bool asked = given && shared.line[i].side >= 0;
     if (asked && group.rank() == 0) questions.prepare(i);
     walk_surface(group, questions, i, asked);
     const bool further = asked && questions.has_to_look_further(i);
@@ -121,8 +119,8 @@ TANDEM_HD void ManifoldMaker<Team>::walk_lines(LineQuestions& questions, std::ui
 
 /// Follows the lines of soundings from the first on.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::sound(int first) {
-  LineQuestions questions(bodies_, state_.frame, shared_.line);
+TANDEM_HD void ManifoldMaker<Team>::sound(int first, DepthMemory& shared) {
+  LineQuestions questions(bodies_, state_.frame, shared.line);
   const auto asked = 2 * static_cast<std::uint32_t>(state_.soundings - first);
   for (std::uint32_t i = team_.rank(); i < asked; i += team_.size()) {
     const Sounding& s = state_.sounding[first + static_cast<int>(i / 2)];
@@ -130,9 +128,9 @@ TANDEM_HD void ManifoldMaker<Team>::sound(int first) {
     questions.ask(i, side, side == 0 ? 1 : -1, s.line, s.target[side], -INFINITY, INFINITY,
                   state_.extent / 4);
   }
-  walk_lines(questions, asked);
+  walk_lines(questions, asked, shared);
   for (std::uint32_t i = team_.rank(); i < asked; i += team_.size())
-    state_.sounding[first + static_cast<int>(i / 2)].surface[i % 2] = shared_.line[i].best;
+    state_.sounding[first + static_cast<int>(i / 2)].surface[i % 2] = shared.line[i].best;
   team_.sync();
 }
 
@@ -140,8 +138,8 @@ TANDEM_HD void ManifoldMaker<Team>::sound(int first) {
 /// rim, and no further along the normal than the rim and the middle are from each other's surfaces, and the
 /// rim's extent more.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::place_prism() {
-  Prism& prism = shared_.prism;
+TANDEM_HD void ManifoldMaker<Team>::place_prism(DepthMemory& shared) {
+  Prism& prism = shared.prism;
   const double more = 1e-6 * state_.extent + 0x1p-40 * bodies_.reach();
   const auto corner = [&](int i) { return state_.sounding[i == state_.rim_points ? 0 : i].at; };
   const int rank = static_cast<int>(team_.rank()), size = static_cast<int>(team_.size());
@@ -187,12 +185,12 @@ TANDEM_HD void ManifoldMaker<Team>::place_prism() {
 /// The highest corner of a's triangles of the curve, and the lowest of b's; of several the vertex of the
 /// least number.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::find_extreme_corners(std::uint32_t curve) {
+TANDEM_HD void ManifoldMaker<Team>::find_extreme_corners(std::uint32_t curve, DepthMemory& shared) {
   const PatchFrame& frame = state_.frame;
   const std::uint32_t begin = memory_.start[curve], end = memory_.start[curve + 1];
   if constexpr (HasMeans<Team>) {
     for (int side = 0; side < 2; ++side)
-      shared_.extreme[2 + side] =
+      shared.extreme[2 + side] =
           team_.means().extreme_corner(bodies_[side], memory_, begin, end, frame, side);
     return;
   }
@@ -226,8 +224,8 @@ TANDEM_HD void ManifoldMaker<Team>::find_extreme_corners(std::uint32_t curve) {
   }
   team_.greatest_ones(at);
   if (team_.rank() == 0) {
-    shared_.extreme[2] = {{at[0], at[1]}, furthest[0], vertex[0]};
-    shared_.extreme[3] = {{at[2], at[3]}, -furthest[1], vertex[1]};
+    shared.extreme[2] = {{at[0], at[1]}, furthest[0], vertex[0]};
+    shared.extreme[3] = {{at[2], at[3]}, -furthest[1], vertex[1]};
   }
 }
 
@@ -235,13 +233,13 @@ TANDEM_HD void ManifoldMaker<Team>::find_extreme_corners(std::uint32_t curve) {
 /// deepest, or nearly. They are looked for within the rim, and among the corners of triangles that the curve
 /// cuts, where they are few: the tip of a coarse mesh may lean out of its rim.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::sound_deepest(std::uint32_t curve) {
-  place_prism();
+TANDEM_HD void ManifoldMaker<Team>::sound_deepest(std::uint32_t curve, DepthMemory& shared) {
+  place_prism(shared);
   if constexpr (HasMeans<Team>) {
     for (int side = 0; side < 2; ++side)
-      shared_.extreme[side] = team_.means().find_extreme(bodies_[side], shared_.prism, side);
+      shared.extreme[side] = team_.means().find_extreme(bodies_[side], shared.prism, side);
   } else {
-    ExtremeQuestions questions(bodies_, shared_.prism, shared_.prism_test, shared_.extreme);
+    ExtremeQuestions questions(bodies_, shared.prism, shared.prism_test, shared.extreme);
     for (std::uint32_t side = team_.rank(); side < 2; side += team_.size()) questions.ask(side);
     team_.sync();
     team_.template for_each_group<Team::kHalf>(2, [&](const auto& group, std::uint32_t side, bool given) {
@@ -249,7 +247,7 @@ TANDEM_HD void ManifoldMaker<Team>::sound_deepest(std::uint32_t curve) {
     });
   }
   const bool few = memory_.start[curve + 1] - memory_.start[curve] <= kFewPieces;
-  if (few) find_extreme_corners(curve);
+  if (few) find_extreme_corners(curve, shared);
   team_.sync();
   const int first = state_.soundings;
   const double height_of_middle = state_.sounding[state_.rim_points].height;
@@ -257,8 +255,8 @@ TANDEM_HD void ManifoldMaker<Team>::sound_deepest(std::uint32_t curve) {
   int soundings = first;
   for (std::uint32_t i = 0; i < (few ? 4u : 2u); ++i) {
     const std::uint32_t side = i % 2;
-    const Extreme& extreme = shared_.extreme[i];
-    if (!extreme.found() || (i >= 2 && extreme.vertex == shared_.extreme[side].vertex)) continue;
+    const Extreme& extreme = shared.extreme[i];
+    if (!extreme.found() || (i >= 2 && extreme.vertex == shared.extreme[side].vertex)) continue;
     if (team_.rank() == i % team_.size()) {
       Sounding& s = state_.sounding[soundings];
       s = {};
@@ -274,7 +272,7 @@ TANDEM_HD void ManifoldMaker<Team>::sound_deepest(std::uint32_t curve) {
   }
   if (team_.rank() == 0) state_.soundings = soundings;
   team_.sync();
-  if (soundings > first) sound(first);
+  if (soundings > first) sound(first, shared);
 }
 
 /// Looks whether lines that seem to overlap run within both bodies: where there are several curves, one may
@@ -282,9 +280,9 @@ TANDEM_HD void ManifoldMaker<Team>::sound_deepest(std::uint32_t curve) {
 /// surfaces that the line found may not belong to the patch. A vertex is part of its own body: the line may
 /// touch that no further.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::look_behind() {
+TANDEM_HD void ManifoldMaker<Team>::look_behind(DepthMemory& shared) {
   const bool several = summary_.curves > 1;
-  LineQuestions questions(bodies_, state_.frame, shared_.line);
+  LineQuestions questions(bodies_, state_.frame, shared.line);
   const auto count = 2 * static_cast<std::uint32_t>(state_.soundings);
   bool any = false;
   for (std::uint32_t i = team_.rank(); i < count; i += team_.size()) {
@@ -292,16 +290,16 @@ TANDEM_HD void ManifoldMaker<Team>::look_behind() {
     const int side = static_cast<int>(i % 2);
     const bool wanted = s.overlap() > (several ? 0 : state_.extent / 2);
     if (wanted && side == 0) s.looked_behind = true;
-    shared_.line[i].side = -1;
+    shared.line[i].side = -1;
     if (!wanted || side == s.vertex_of) continue;
     questions.ask(i, side, side == 0 ? -1 : 1, s.line, s.surface[side].height, s.surface[1].height,
                   s.surface[0].height, INFINITY);
     any = true;
   }
   if (!team_.any(any)) return;
-  walk_lines(questions, count);
+  walk_lines(questions, count, shared);
   for (std::uint32_t i = team_.rank(); i < count; i += team_.size()) {
-    if (shared_.line[i].side >= 0) state_.sounding[i / 2].behind[i % 2] = shared_.line[i].best;
+    if (shared.line[i].side >= 0) state_.sounding[i / 2].behind[i % 2] = shared.line[i].best;
   }
   team_.sync();
 }
@@ -309,11 +307,12 @@ TANDEM_HD void ManifoldMaker<Team>::look_behind() {
 /// The first points of the rim as it is sounded, and the deepest inner point where it lies deeper. Deeper
 /// points come first, then those further out; of points near each other the first stays.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, int most_of_rim, bool touch) {
+TANDEM_HD void ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, int most_of_rim, bool touch,
+                                           ChoiceMemory& shared) {
   const int rank = static_cast<int>(team_.rank()), size = static_cast<int>(team_.size());
   for (int i = rank; i < state_.soundings; i += size) {
     const Sounding& s = state_.sounding[i];
-    Chosen& c = shared_.candidate[i];
+    Chosen& c = shared.candidate[i];
     c.at = s.at;
     c.depth = !touch && s.within() ? s.overlap() : 0;
     c.height = c.depth > 0 ? (s.surface[0].height + s.surface[1].height) / 2 : s.height;
@@ -332,7 +331,7 @@ TANDEM_HD void ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, int mo
     int order[kMostSoundings], count = 0, inner = -1;
     double of_rim = 0, of_inner = 0;
     const auto before = [&](int i, int j) {  // in what is chosen
-      const Chosen &x = shared_.candidate[i], &y = shared_.candidate[j];
+      const Chosen &x = shared.candidate[i], &y = shared.candidate[j];
       return x.depth > y.depth || (x.depth == y.depth && x.from_middle > y.from_middle);
     };
     const auto insert = [&](int i) {  // stable
@@ -341,7 +340,7 @@ TANDEM_HD void ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, int mo
       order[j] = i;
     };
     for (int i = 0; i < state_.soundings; ++i) {
-      const Chosen& c = shared_.candidate[i];
+      const Chosen& c = shared.candidate[i];
       if (c.inner && c.depth > of_inner) of_inner = c.depth, inner = i;
       if (c.inner || state_.sounding[i].rank >= most_of_rim) continue;
       of_rim = greater(of_rim, c.depth);
@@ -351,25 +350,25 @@ TANDEM_HD void ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, int mo
     const double near = kNear * bodies_.smaller_diagonal();
     int kept = 0;
     for (int i = 0; i < count; ++i) {
-      const Chosen& c = shared_.candidate[order[i]];
+      const Chosen& c = shared.candidate[order[i]];
       bool alone = true;
       for (int k = 0; k < kept && alone; ++k) {
-        const Vector2 apart = shared_.chosen[k].at - c.at;
+        const Vector2 apart = shared.chosen[k].at - c.at;
         alone = dot(apart, apart) >= near * near;
       }
-      if (alone) shared_.chosen[kept++] = c;
+      if (alone) shared.chosen[kept++] = c;
     }
-    shared_.count = static_cast<std::uint32_t>(kept);
+    shared.count = static_cast<std::uint32_t>(kept);
   }
   team_.sync();
 }
 
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::write_points(Patch& patch, int count) const {
+TANDEM_HD void ManifoldMaker<Team>::write_points(const ChoiceMemory& shared, Patch& patch, int count) const {
   const PatchFrame& frame = state_.frame;
   const auto write = [](const Vector3& x, double(&out)[3]) { out[0] = x.x, out[1] = x.y, out[2] = x.z; };
   for (int i = static_cast<int>(team_.rank()); i < count; i += static_cast<int>(team_.size())) {
-    const Chosen& c = shared_.chosen[i];
+    const Chosen& c = shared.chosen[i];
     ManifoldPoint& point = patch.point[i];
     const Vector3 x = frame.at(c.at, c.height), half = (c.depth / 2) * frame.n;
     write(x, point.position);
@@ -385,11 +384,11 @@ TANDEM_HD void ManifoldMaker<Team>::write_points(Patch& patch, int count) const 
 }
 
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::write_manifold(Patch& patch, int count, bool hole,
-                                                   bool goes_through) const {
+TANDEM_HD void ManifoldMaker<Team>::write_manifold(const ChoiceMemory& shared, Patch& patch, int count,
+                                                   bool hole, bool goes_through) const {
   const PatchFrame& frame = state_.frame;
   double deepest = 0, height = 0;
-  for (int i = 0; i < count; ++i) height += shared_.chosen[i].height / count;
+  for (int i = 0; i < count; ++i) height += shared.chosen[i].height / count;
   for (int i = 0; i < state_.soundings && !state_.touch && !hole; ++i) {
     const Sounding& s = state_.sounding[i];
     if (s.within()) deepest = greater(deepest, s.overlap());
@@ -421,9 +420,9 @@ TANDEM_HD void ManifoldMaker<Team>::write_manifold(Patch& patch, int count, bool
 }
 
 template <typename Team>
-TANDEM_HD bool ManifoldMaker<Team>::begin(std::uint32_t curve) {
+TANDEM_HD bool ManifoldMaker<Team>::begin(std::uint32_t curve, OutlineMemory& shared) {
   team_.sync();  // all are done with what the last curve left
-  NormalFinder<Team> normal_finder(team_, bodies_, memory_, summary_, curve);
+  NormalFinder<Team> normal_finder(team_, bodies_, memory_, summary_, curve, shared.normal);
   const CurveMeasure measure = normal_finder.measure();
   const PatchNormal normal = normal_finder.find(measure);
   if (!normal.known) return false;
@@ -435,26 +434,27 @@ TANDEM_HD bool ManifoldMaker<Team>::begin(std::uint32_t curve) {
   }
   team_.sync();
   RimFinder<Team> rim_finder(team_, bodies_, memory_, summary_, curve, state_.frame);
-  rim_finder.gather(measure.closed && !summary_.degenerate, shared_.next);
+  rim_finder.gather(measure.closed && !summary_.degenerate, shared.next);
   // One is left for an inner point.
   const int most_of_rim = kMostManifoldPoints - (normal.touch ? 0 : 1);
-  const Rim rim = rim_finder.find(most_of_rim, state_.frame.flat(measure.middle));
-  if (rim.points == 0) return false;
-  place_soundings(rim_finder, rim);
+  rim_finder.find(most_of_rim, state_.frame.flat(measure.middle), shared.rim);
+  if (shared.rim.rim.points == 0) return false;
+  place_soundings(rim_finder, shared.rim.rim);
   return true;
 }
 
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::measure_depths(std::uint32_t curve) {
+TANDEM_HD void ManifoldMaker<Team>::measure_depths(std::uint32_t curve, DepthMemory& shared) {
   if (state_.touch) return;
-  sound(0);
-  sound_deepest(curve);
-  look_behind();
+  sound(0, shared);
+  sound_deepest(curve, shared);
+  look_behind(shared);
 }
 
 template <typename Team>
 template <typename NewPatch>
-TANDEM_HD void ManifoldMaker<Team>::finish(std::uint32_t curve, int most_points, const NewPatch& new_patch) {
+TANDEM_HD void ManifoldMaker<Team>::finish(std::uint32_t curve, int most_points, ChoiceMemory& shared,
+                                           const NewPatch& new_patch) {
   bool goes_through = false, hole = false;
   if (!state_.touch && summary_.curves > 1 && state_.closed) {
     double deepest = 0;
@@ -474,15 +474,16 @@ TANDEM_HD void ManifoldMaker<Team>::finish(std::uint32_t curve, int most_points,
   }
   const RimFinder<Team> rim_finder(team_, bodies_, memory_, summary_, curve, state_.frame, state_.candidates);
   // What the patch is does not depend on how many points it may have.
-  choose(rim_finder, state_.touch || most_points == 1 ? most_points : most_points - 1, state_.touch || hole);
-  const int found = static_cast<int>(shared_.count), count = found < most_points ? found : most_points;
-  rim_finder.name_points(shared_.chosen, count, kNear / 2 * bodies_.smaller_diagonal(), state_.key);
-  if (team_.rank() == 0) shared_.patch = new_patch();
+  choose(rim_finder, state_.touch || most_points == 1 ? most_points : most_points - 1, state_.touch || hole,
+         shared);
+  const int found = static_cast<int>(shared.count), count = found < most_points ? found : most_points;
+  rim_finder.name_points(shared.chosen, count, kNear / 2 * bodies_.smaller_diagonal(), state_.key);
+  if (team_.rank() == 0) shared.patch = new_patch();
   team_.sync();
-  Patch* const patch = shared_.patch;
+  Patch* const patch = shared.patch;
   if (patch == nullptr) return;
-  write_points(*patch, count);
-  if (team_.rank() == 0) write_manifold(*patch, count, hole, goes_through);
+  write_points(shared, *patch, count);
+  if (team_.rank() == 0) write_manifold(shared, *patch, count, hole, goes_through);
 }
 
 }  // namespace tandem::manifold

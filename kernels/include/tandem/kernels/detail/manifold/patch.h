@@ -16,14 +16,25 @@ struct Patch {
   ManifoldPoint point[kMostManifoldPoints];
 };
 
+/// The piece of the least key.
+struct LeastPiece {
+  std::uint64_t key = ~std::uint64_t{0};
+  std::uint32_t piece = kNoIndex;
+
+  TANDEM_HD void take(std::uint64_t of, std::uint32_t at) {
+    if (of < key) key = of, piece = at;
+  }
+};
+
 /// Sums over the pieces of a curve.
 struct CurveSums {
   ExactVectorSum area, gap, middle;
   ExactSum length;
-  std::uint64_t key = ~std::uint64_t{0};
+  LeastPiece least;
 
-  TANDEM_HD void add(const Piece& piece, const Vector3& origin, double one_by_unit) {
-    key = lesser(key, piece.key());
+  TANDEM_HD void add(const PieceMemory& memory, std::uint32_t at, const Vector3& origin, double one_by_unit) {
+    const Piece& piece = memory.pieces[at];
+    least.take(piece.key(), at);
     if (piece.kind() == MeetingKind::polygon) return area.add(piece.end[1], one_by_unit * one_by_unit);
     const Vector3 from = piece.end[0] - origin, along = piece.weight() * (piece.end[1] - piece.end[0]);
     area.add(0.5 * cross(from, along), one_by_unit * one_by_unit);
@@ -50,11 +61,12 @@ inline constexpr float kSameFace = 2e-7f;
 
 /// The face that lies most across a direction; of several that of the least piece.
 struct FaceAlong {
-  float along;
-  std::uint64_t key;
+  float along = 0.9f;  ///< faces that lie less across it do not count
+  LeastPiece least;
 
-  TANDEM_HD void take(float of_piece, std::uint64_t piece) {
-    if (of_piece > along || (of_piece == along && piece < key)) along = of_piece, key = piece;
+  TANDEM_HD void take(float of_piece, std::uint64_t key, std::uint32_t piece) {
+    if (of_piece > along) along = of_piece, least = {};
+    if (of_piece == along) least.take(key, piece);
   }
 };
 
@@ -65,6 +77,19 @@ struct Spread {
 
 /// The most directions that are tried for a normal.
 inline constexpr int kMostTried = 11;
+
+/// The direction of a face, from a towards b.
+struct Direction {
+  Vector3 n;
+  std::uint32_t piece;  ///< one whose triangle has it
+};
+
+/// What a team shares while it looks for a normal.
+struct NormalMemory {
+  Direction direction[kMostTried];  ///< of faces of a, then of b
+  Vector3 tried[kMostTried];
+  Spread spread[kMostTried];
+};
 
 /// The direction in which the bodies of a patch push each other.
 struct PatchNormal {
@@ -124,7 +149,15 @@ struct Rim {
   std::uint32_t reference[kMostManifoldPoints];
   FloatPoint at[kMostManifoldPoints];
   int rank[kMostManifoldPoints];  ///< how many were found before
-  int points = 0;
+  int points;
+};
+
+/// What a team shares while it looks for a rim.
+struct RimMemory {
+  Rim rim;
+  Furthest of_side[kMostManifoldPoints];  ///< beyond the side from point i to the next: what it would add
+  int first, second;                      ///< sides that are to be looked beyond
+  bool complete;
 };
 
 /// A point that a manifold may have, and the line across the patch that measures the depth there.
@@ -182,17 +215,26 @@ struct PatchState {
   std::uint32_t candidates;
 };
 
-/// What a team shares while it makes a patch.
-struct PatchMemory {
-  PatchState state;
+/// What a team shares while it finds a patch's normal and rim.
+struct OutlineMemory {
+  NormalMemory normal;
+  RimMemory rim;
+  std::uint32_t next;
+};
+
+/// What a team shares while it measures a patch's depths.
+struct DepthMemory {
   LineQuestion line[2 * kMostSoundings];
   Prism prism;
   PrismTest prism_test[2];
   Extreme extreme[4];
+};
+
+/// What a team shares while it chooses a patch's points.
+struct ChoiceMemory {
   Chosen candidate[kMostSoundings], chosen[kMostSoundings];
   Patch* patch;
   std::uint32_t count;
-  std::uint32_t next;
 };
 
 }  // namespace tandem::manifold

@@ -20,10 +20,11 @@ template <typename Team>
 class NormalFinder {
  public:
   TANDEM_HD NormalFinder(const Team& team, const BodyPair& bodies, const PieceMemory& memory,
-                         const PieceSummary& summary, std::uint32_t curve)
+                         const PieceSummary& summary, std::uint32_t curve, NormalMemory& shared)
       : team_(team),
         bodies_(bodies),
         memory_(memory),
+        shared_(shared),
         summary_(summary),
         begin_(memory.start[curve]),
         end_(memory.start[curve + 1]) {}
@@ -34,10 +35,6 @@ class NormalFinder {
   TANDEM_HD PatchNormal find(const CurveMeasure& curve);
 
  private:
-  struct Direction {
-    Vector3 n;            // from a towards b
-    std::uint64_t piece;  // key of the piece whose triangle has it
-  };
   static constexpr int kMost = kMostTried;
   static_assert(kMost == 2 * kMostDirections + 1);
 
@@ -54,9 +51,10 @@ class NormalFinder {
   TANDEM_HD Vector3 plain_middle() const;
   TANDEM_HD Vector3 sheet_normal() const;
   TANDEM_HD bool has_many_directions(int side) const;
+  TANDEM_HD LeastPiece least_unmarked(int side, const FloatVector& known) const;
   TANDEM_HD bool gather_directions(int side, bool keep_if_many);
   TANDEM_HD void find_bearing_faces(const Vector3& smooth, double length);
-  TANDEM_HD void spread_along(const Vector3* directions, int count, Spread* spread) const;
+  TANDEM_HD void spread_along(int count) const;
   TANDEM_HD Vector3 face_nearest(const Vector3& smooth, double length);
   TANDEM_HD bool find_for_touch(Vector3& n);
   TANDEM_HD bool find_crossing_edges(Vector3& n) const;
@@ -66,10 +64,9 @@ class NormalFinder {
     const float sign = side == 0 ? 1.0f : -1.0f;
     return {{sign * normals[3 * side], sign * normals[3 * side + 1], sign * normals[3 * side + 2]}};
   }
-  /// The normal, from a towards b, of the triangle of a piece.
-  TANDEM_HD Vector3 direction_of(int side, std::uint64_t piece) const {
-    const Vector3 n =
-        bodies_[side].triangle(static_cast<std::uint32_t>(side == 0 ? piece >> 32 : piece)).normal;
+  /// The normal, from a towards b, of a piece's triangle.
+  TANDEM_HD Vector3 direction_of(int side, std::uint32_t piece) const {
+    const Vector3 n = bodies_[side].triangle(memory_.pieces[piece].triangle[side]).normal;
     return side == 0 ? n : -n;
   }
   TANDEM_HD static bool same_face(const FloatVector& p, const FloatVector& q) {
@@ -84,10 +81,10 @@ class NormalFinder {
   const Team& team_;
   const BodyPair& bodies_;
   const PieceMemory& memory_;
+  NormalMemory& shared_;
   const PieceSummary& summary_;
   std::uint32_t begin_, end_;
-  std::uint64_t key_ = 0;       // of the least piece
-  Direction direction_[kMost];  // of faces of a, then of b
+  LeastPiece least_;  // of those that this one of the team sees
   int directions_ = 0;
 };
 
@@ -99,12 +96,14 @@ TANDEM_HD CurveMeasure NormalFinder<Team>::measure() {
   if constexpr (HasMeans<Team>) {
     team_.means().sum_pieces(memory_, begin_, end_, summary_.origin, one_by_unit, sums);
   } else {
-    for_each_piece([&](const Piece& piece, const float*) { sums.add(piece, summary_.origin, one_by_unit); });
+    for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size())
+      sums.add(memory_, memory_.order[i], summary_.origin, one_by_unit);
   }
   add_up(team_, {&sums.area.x, &sums.area.y, &sums.area.z, &sums.gap.x, &sums.gap.y, &sums.gap.z,
                  &sums.middle.x, &sums.middle.y, &sums.middle.z, &sums.length});
   CurveMeasure out;
-  out.key = key_ = team_.least(sums.key);
+  least_ = sums.least;
+  out.key = team_.least(least_.key);
   out.area = sums.area.value(unit * unit);
   out.length = sums.length.value(unit);
   out.closed = !(may_be_free && has_free_end()) && norm(sums.gap.value(unit)) <= kClosed * out.length;
@@ -177,57 +176,49 @@ TANDEM_HD bool NormalFinder<Team>::has_many_directions(int side) const {
   return false;
 }
 
+/// Marks pieces whose normals are of the face of a known one. Result: the least of those without a mark.
+template <typename Team>
+TANDEM_HD LeastPiece NormalFinder<Team>::least_unmarked(int side, const FloatVector& known) const {
+  if constexpr (HasMeans<Team>) return team_.means().least_unmarked(memory_, begin_, end_, side, known);
+  LeastPiece least;
+  for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
+    if (mark(i) != 0) continue;
+    const std::uint32_t at = memory_.order[i];
+    const float* n = memory_.normals + 6 * std::size_t{at} + 3 * side;
+    if (same_face({{n[0], n[1], n[2]}}, known))
+      mark(i) = 1;
+    else
+      least.take(memory_.pieces[at].key(), at);
+  }
+  return least;
+}
+
 /// Adds the directions of faces of one body, from the least piece on; of more than kMostDirections the first
 /// ones, if they are to be kept. False where there are more. Normals closer than half a milliradian are one.
 template <typename Team>
 TANDEM_HD bool NormalFinder<Team>::gather_directions(int side, bool keep_if_many) {
   if (!keep_if_many && has_many_directions(side)) return false;
-  std::uint64_t first_piece[kMostDirections];
-  FloatVector known = {};  // the last direction
+  for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) mark(i) = 0;
+  LeastPiece own = least_;
   int found = 0;
   bool all = false;
-  if constexpr (HasMeans<Team>) {
-    for (std::uint32_t i = begin_; i < end_; ++i) mark(i) = 0;
-    for (std::uint64_t key = key_;; ++found) {
-      all = key == ~std::uint64_t{0};
-      if (all || found == kMostDirections) break;
-      first_piece[found] = key;
-      const Vector3 n = direction_of(side, key);
-      const float turn = side == 0 ? 1.0f : -1.0f;
-      known = {
-          {turn * static_cast<float>(n.x), turn * static_cast<float>(n.y), turn * static_cast<float>(n.z)}};
-      key = team_.means().least_unmarked(memory_, begin_, end_, side, known);
-    }
-  }
-  for (; !HasMeans<Team>; ++found) {
-    std::uint64_t own = ~std::uint64_t{0};
-    std::uint32_t holder = kNoIndex;
-    for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
-      const std::uint32_t at = memory_.order[i];
-      if (found == 0) {
-        mark(i) = 0;
-      } else {
-        if (mark(i) != 0) continue;
-        const float* n = memory_.normals + 6 * std::size_t{at} + 3 * side;
-        if (same_face({{n[0], n[1], n[2]}}, known)) {
-          mark(i) = 1;
-          continue;
-        }
-      }
-      const std::uint64_t key = memory_.pieces[at].key();
-      if (key < own) own = key, holder = at;
-    }
-    const std::uint64_t key = team_.least(own);
+  for (;; ++found) {
+    const std::uint64_t key = team_.least(own.key);
     all = key == ~std::uint64_t{0};
     if (all || found == kMostDirections) break;
-    first_piece[found] = key;
-    holder = team_.least(own == key ? holder : kNoIndex);
+    const std::uint32_t holder = team_.least(own.key == key ? own.piece : kNoIndex);
+    if (team_.rank() == 0) shared_.direction[directions_ + found].piece = holder;
     const float* n = memory_.normals + 6 * std::size_t{holder} + 3 * side;
-    known = {{n[0], n[1], n[2]}};
+    own = least_unmarked(side, {{n[0], n[1], n[2]}});
   }
   if (!all && !keep_if_many) return false;
-  for (int i = 0; i < found; ++i)
-    direction_[directions_++] = {direction_of(side, first_piece[i]), first_piece[i]};
+  team_.sync();
+  for (int i = static_cast<int>(team_.rank()); i < found; i += static_cast<int>(team_.size())) {
+    Direction& direction = shared_.direction[directions_ + i];
+    direction.n = direction_of(side, direction.piece);
+  }
+  directions_ += found;
+  team_.sync();
   return all;
 }
 
@@ -238,29 +229,38 @@ TANDEM_HD void NormalFinder<Team>::find_bearing_faces(const Vector3& smooth, dou
   directions_ = 0;
   const FloatVector up = {
       {static_cast<float>(smooth.x), static_cast<float>(smooth.y), static_cast<float>(smooth.z)}};
-  FaceAlong most[2] = {{0.9f, ~std::uint64_t{0}}, {0.9f, ~std::uint64_t{0}}};
+  FaceAlong most[2];
   if constexpr (HasMeans<Team>) {
     for (int side = 0; side < 2; ++side)
       team_.means().find_face_along(memory_, begin_, end_, side, up, most[side]);
   } else {
-    for_each_piece([&](const Piece& piece, const float* normals) {
-      for (int side = 0; side < 2; ++side)
-        most[side].take(dot(turned_normal(normals, side), up), piece.key());
-    });
+    for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
+      const std::uint32_t at = memory_.order[i];
+      for (int side = 0; side < 2; ++side) {
+        const float along = dot(turned_normal(memory_.normals + 6 * std::size_t{at}, side), up);
+        most[side].take(along, memory_.pieces[at].key(), at);
+      }
+    }
   }
   float greatest[2] = {most[0].along, most[1].along};
   team_.greatest_ones(greatest);
   std::uint64_t key[2];
-  for (int side = 0; side < 2; ++side)
-    key[side] = most[side].along == greatest[side] ? most[side].key : ~std::uint64_t{0};
+  std::uint32_t holder[2];
+  for (int side = 0; side < 2; ++side) {
+    if (most[side].along != greatest[side]) most[side].least = {};
+    key[side] = most[side].least.key;
+  }
   team_.least_ones(key);
+  for (int side = 0; side < 2; ++side)
+    holder[side] = most[side].least.key == key[side] ? most[side].least.piece : kNoIndex;
+  team_.least_ones(holder);
   Vector3 n[2];
   FloatVector face[2] = {};
   bool any = false;
   for (int side = 0; side < 2; ++side) {
-    if (key[side] == ~std::uint64_t{0}) continue;
+    if (holder[side] == kNoIndex) continue;
     any = true;
-    n[side] = direction_of(side, key[side]);
+    n[side] = direction_of(side, holder[side]);
     face[side] = {
         {static_cast<float>(n[side].x), static_cast<float>(n[side].y), static_cast<float>(n[side].z)}};
   }
@@ -268,7 +268,7 @@ TANDEM_HD void NormalFinder<Team>::find_bearing_faces(const Vector3& smooth, dou
   ExactSum within[2];
   if constexpr (HasMeans<Team>) {
     for (int side = 0; side < 2; ++side) {
-      if (key[side] == ~std::uint64_t{0}) continue;
+      if (holder[side] == kNoIndex) continue;
       team_.means().sum_length_on_face(memory_, begin_, end_, face[side], 1 / summary_.unit, within[side]);
     }
   } else {
@@ -284,38 +284,49 @@ TANDEM_HD void NormalFinder<Team>::find_bearing_faces(const Vector3& smooth, dou
   }
   add_up(team_, {&within[0], &within[1]});
   for (int side = 0; side < 2; ++side) {
-    if (key[side] != ~std::uint64_t{0} && within[side].value(summary_.unit) >= kBearing * length)
-      direction_[directions_++] = {n[side], key[side]};
+    if (holder[side] == kNoIndex || !(within[side].value(summary_.unit) >= kBearing * length)) continue;
+    if (team_.rank() == 0) shared_.direction[directions_] = {n[side], holder[side]};
+    ++directions_;
   }
+  team_.sync();
 }
 
-/// The heights of the patch's triangles along directions, from the patch's origin on: a's highest corner and
-/// b's lowest.
+/// The heights of the patch's triangles along the directions that are tried, from the patch's origin on: a's
+/// highest corner and b's lowest.
 template <typename Team>
-TANDEM_HD void NormalFinder<Team>::spread_along(const Vector3* directions, int count, Spread* spread) const {
+TANDEM_HD void NormalFinder<Team>::spread_along(int count) const {
   if constexpr (HasMeans<Team>) {
-    return team_.means().spread_along(bodies_, memory_, begin_, end_, summary_.origin, directions, count,
-                                      spread);
+    return team_.means().spread_along(bodies_, memory_, begin_, end_, summary_.origin, shared_.tried, count,
+                                      shared_.spread);
   }
-  for (int i = 0; i < count; ++i) spread[i] = {-INFINITY, INFINITY};
-  std::uint32_t seen_a = kNoIndex, seen_b = kNoIndex;
-  for_each_piece([&](const Piece& piece, const float*) {
-    for (int k = 0; k < 3 && piece.triangle[0] != seen_a; ++k) {
-      const Vector3 p = bodies_.a.corner(piece.triangle[0], k) - summary_.origin;
-      for (int i = 0; i < count; ++i)
-        spread[i].highest_a = greater(spread[i].highest_a, dot(directions[i], p));
+  constexpr int kAtOnce = 4;  // so that they stay in registers
+  for (int first = 0; first < count; first += kAtOnce) {
+    Vector3 along[kAtOnce];
+    double furthest[2 * kAtOnce];  // of a, of b the other way
+    for (int i = 0; i < kAtOnce; ++i) {
+      along[i] = shared_.tried[first + i < count ? first + i : first];
+      furthest[2 * i] = furthest[2 * i + 1] = -INFINITY;
     }
-    for (int k = 0; k < 3 && piece.triangle[1] != seen_b; ++k) {
-      const Vector3 q = bodies_.b.corner(piece.triangle[1], k) - summary_.origin;
-      for (int i = 0; i < count; ++i) spread[i].lowest_b = lesser(spread[i].lowest_b, dot(directions[i], q));
+    std::uint32_t seen_a = kNoIndex, seen_b = kNoIndex;
+    for_each_piece([&](const Piece& piece, const float*) {
+      for (int k = 0; k < 3 && piece.triangle[0] != seen_a; ++k) {
+        const Vector3 p = bodies_.a.corner(piece.triangle[0], k) - summary_.origin;
+        for (int i = 0; i < kAtOnce; ++i) furthest[2 * i] = greater(furthest[2 * i], dot(along[i], p));
+      }
+      for (int k = 0; k < 3 && piece.triangle[1] != seen_b; ++k) {
+        const Vector3 q = bodies_.b.corner(piece.triangle[1], k) - summary_.origin;
+        for (int i = 0; i < kAtOnce; ++i)
+          furthest[2 * i + 1] = greater(furthest[2 * i + 1], -dot(along[i], q));
+      }
+      seen_a = piece.triangle[0], seen_b = piece.triangle[1];
+    });
+    team_.greatest_ones(furthest);
+    for (int i = 0; i < kAtOnce; ++i) {
+      if (team_.rank() == 0 && first + i < count)
+        shared_.spread[first + i] = {furthest[2 * i], -furthest[2 * i + 1]};
     }
-    seen_a = piece.triangle[0], seen_b = piece.triangle[1];
-  });
-  double furthest[2 * kMost];
-  for (int i = 0; i < count; ++i)
-    furthest[2 * i] = spread[i].highest_a, furthest[2 * i + 1] = -spread[i].lowest_b;
-  team_.greatest_ones(furthest, 2 * count);
-  for (int i = 0; i < count; ++i) spread[i] = {furthest[2 * i], -furthest[2 * i + 1]};
+  }
+  team_.sync();
 }
 
 /// Where few flat faces meet, as boxes do, the curve's own normal leans a little, by depth over length: along
@@ -329,29 +340,33 @@ TANDEM_HD Vector3 NormalFinder<Team>::face_nearest(const Vector3& smooth, double
   const int of_a = gather_directions(0, false) ? directions_ : kMost, first_of_b = directions_;
   const int of_b = gather_directions(1, false) ? directions_ - first_of_b : kMost;
   if ((of_a == 1) != (of_b == 1)) {
-    const Vector3& n = direction_[of_a == 1 ? 0 : first_of_b].n;
+    const Vector3 n = shared_.direction[of_a == 1 ? 0 : first_of_b].n;
     return dot(n, smooth) > 0 ? n : smooth;
   }
   if (of_a == kMost || of_b == kMost) find_bearing_faces(smooth, length);
   const Vector3 apart = bodies_.apart();
-  Vector3 tried[kMost] = {smooth};
-  int count = 1;
+  int count = 0;
+  const auto add = [&](const Vector3& n) {
+    if (team_.rank() == 0) shared_.tried[count] = n;
+    ++count;
+  };
+  add(smooth);
   for (int i = 0; i < directions_; ++i) {
-    const Vector3& n = direction_[i].n;
+    const Vector3 n = shared_.direction[i].n;
     const double cosine = dot(n, smooth);
     if (cosine < 0.1 && (cosine < -0.1 || !(dot(n, apart) > 0))) continue;
-    tried[count++] = n;
+    add(n);
   }
   if (count == 1) return smooth;
-  Spread spread[kMost];
-  spread_along(tried, count, spread);
-  Vector3 best = smooth;
-  double least = (spread[0].highest_a - spread[0].lowest_b) * (1 + 1e-9);
+  team_.sync();
+  spread_along(count);
+  const auto separation = [&](int i) { return shared_.spread[i].highest_a - shared_.spread[i].lowest_b; };
+  int best = 0;
+  double least = separation(0) * (1 + 1e-9);
   for (int i = 1; i < count; ++i) {
-    const double separation = spread[i].highest_a - spread[i].lowest_b;
-    if (separation < least) best = tried[i], least = separation * (1 - 1e-9);
+    if (separation(i) < least) best = i, least = separation(i) * (1 - 1e-9);
   }
-  return best;
+  return shared_.tried[best];
 }
 
 template <typename Team>
@@ -424,25 +439,20 @@ TANDEM_HD bool NormalFinder<Team>::find_for_touch(Vector3& n) {
   directions_ = 0;
   gather_directions(0, true);
   gather_directions(1, true);
-  Vector3 tried[kMost], at[kMost];
-  for (int i = 0; i < directions_; ++i) tried[i] = direction_[i].n, at[i] = {};
-  // Each direction's plane goes through the piece that has it.
-  for (int i = 0; i < directions_; ++i) {
-    Vector3 x = {-INFINITY, -INFINITY, -INFINITY};
-    for_each_piece([&](const Piece& piece, const float*) {
-      if (piece.key() == direction_[i].piece) x = piece.end[0];
-    });
-    at[i] = {team_.greatest(x.x), team_.greatest(x.y), team_.greatest(x.z)};
-  }
-  Spread spread[kMost];
-  spread_along(tried, directions_, spread);
+  for (int i = static_cast<int>(team_.rank()); i < directions_; i += static_cast<int>(team_.size()))
+    shared_.tried[i] = shared_.direction[i].n;
+  team_.sync();
+  spread_along(directions_);
   const double tolerance = kNoArea * bodies_.reach();
   int found = 0;
   for (int i = 0; i < directions_; ++i) {
-    const double height = dot(tried[i], at[i] - summary_.origin);
-    if (!(spread[i].highest_a - height <= tolerance && spread[i].lowest_b - height >= -tolerance)) continue;
-    if (found > 0 && same_direction(n, tried[i])) continue;
-    if (found == 0) n = tried[i];
+    const Vector3 tried = shared_.tried[i];
+    const Spread spread = shared_.spread[i];
+    // Its plane goes through the piece that has it.
+    const double height = dot(tried, memory_.pieces[shared_.direction[i].piece].end[0] - summary_.origin);
+    if (!(spread.highest_a - height <= tolerance && spread.lowest_b - height >= -tolerance)) continue;
+    if (found > 0 && same_direction(n, tried)) continue;
+    if (found == 0) n = tried;
     ++found;
   }
   return found == 0 ? find_crossing_edges(n) : found == 1;

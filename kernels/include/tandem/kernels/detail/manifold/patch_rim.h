@@ -33,7 +33,7 @@ class RimFinder {
 
   /// Starts with the candidates furthest from each other, or nearly, and takes in again and again the one
   /// that adds most to the area.
-  TANDEM_HD Rim find(int most, const Vector2& middle) const;
+  TANDEM_HD void find(int most, const Vector2& middle, RimMemory& shared) const;
 
   TANDEM_HD Vector3 position(std::uint32_t reference) const;
   TANDEM_HD std::uint64_t feature(std::uint32_t reference) const;
@@ -56,7 +56,8 @@ class RimFinder {
     const Vector2 at = frame_.flat(x);
     candidates()[team_.add(next, 1)] = {static_cast<float>(at.x), static_cast<float>(at.y), reference};
   }
-  TANDEM_HD void furthest(const RimValue* values, int wanted, Furthest* const* best) const;
+  template <int kWanted>
+  TANDEM_HD void furthest(const RimValue (&values)[kWanted], Furthest (&best)[kWanted]) const;
 
   const Team& team_;
   const BodyPair& bodies_;
@@ -127,81 +128,87 @@ TANDEM_HD bool RimFinder<Team>::middle_of_area(Vector2& middle) const {
   return true;
 }
 
-/// For each value, one or two, the candidate that has the greatest one, if it is greater than what is given;
-/// of several the one whose triangles come first.
+/// For each value the candidate that has the greatest one, if it is greater than what is given; of several
+/// the one whose triangles come first.
 template <typename Team>
-TANDEM_HD void RimFinder<Team>::furthest(const RimValue* values, int wanted, Furthest* const* best) const {
-  if constexpr (HasMeans<Team>) {
-    return team_.means().furthest(memory_, candidates(), count_, values, wanted, best);
-  }
+template <int kWanted>
+TANDEM_HD void RimFinder<Team>::furthest(const RimValue (&values)[kWanted], Furthest (&best)[kWanted]) const {
+  if constexpr (HasMeans<Team>)
+    return team_.means().furthest(memory_, candidates(), count_, values, kWanted, best);
   for (std::uint32_t i = team_.rank(); i < count_; i += team_.size()) {
     const Candidate& c = candidates()[i];
-    for (int k = 0; k < wanted; ++k) best[k]->take(memory_, values[k](c), c.reference);
+    for (int k = 0; k < kWanted; ++k) best[k].take(memory_, values[k](c), c.reference);
   }
   if (Team::size() == 1) return;
-  float greatest[2] = {};
-  for (int k = 0; k < 2; ++k) greatest[k] = k < wanted ? best[k]->value : 0;
-  team_.greatest_ones(greatest, wanted);
-  std::uint64_t own[2], least[2];
-  for (int k = 0; k < 2; ++k) {
-    const bool mine = k < wanted && best[k]->reference != kNoIndex && best[k]->value == greatest[k];
-    least[k] = own[k] = mine ? Furthest::key(memory_, best[k]->reference) : ~std::uint64_t{0};
+  float greatest[kWanted];
+  for (int k = 0; k < kWanted; ++k) greatest[k] = best[k].value;
+  team_.greatest_ones(greatest);
+  std::uint64_t own[kWanted], least[kWanted];
+  for (int k = 0; k < kWanted; ++k) {
+    const bool mine = best[k].reference != kNoIndex && best[k].value == greatest[k];
+    least[k] = own[k] = mine ? Furthest::key(memory_, best[k].reference) : ~std::uint64_t{0};
   }
-  team_.least_ones(least, wanted);
-  std::uint32_t reference[2];
-  for (int k = 0; k < 2; ++k)
-    reference[k] = own[k] != ~std::uint64_t{0} && own[k] == least[k] ? best[k]->reference : kNoIndex;
-  team_.least_ones(reference, wanted);
-  for (int k = 0; k < wanted; ++k) *best[k] = {greatest[k], reference[k]};
+  team_.least_ones(least);
+  std::uint32_t reference[kWanted];
+  for (int k = 0; k < kWanted; ++k)
+    reference[k] = own[k] != ~std::uint64_t{0} && own[k] == least[k] ? best[k].reference : kNoIndex;
+  team_.least_ones(reference);
+  for (int k = 0; k < kWanted; ++k) best[k] = {greatest[k], reference[k]};
 }
 
 template <typename Team>
-TANDEM_HD Rim RimFinder<Team>::find(int most, const Vector2& middle) const {
-  Rim rim;
-  Furthest of_side[kMostManifoldPoints];  // beyond the side from point i to the next: what it would add
-  const auto place = [&](std::uint32_t reference) {
-    const Vector2 at = frame_.flat(position(reference));
-    return FloatPoint{static_cast<float>(at.x), static_cast<float>(at.y)};
-  };
-  const auto next = [&](int i) { return i + 1 == rim.points ? 0 : i + 1; };
+TANDEM_HD void RimFinder<Team>::find(int most, const Vector2& middle, RimMemory& shared) const {
+  Rim& rim = shared.rim;
+  float limit = 0, area = 0;
+  // What is shared is written by the first of the team, after all have found the furthest together.
+  const bool is_first = team_.rank() == 0;
+  if (is_first) rim.points = 0, shared.first = 0, shared.second = 1, shared.complete = false;
+  team_.sync();
   const auto insert = [&](int where, std::uint32_t reference) {
     const int rank = rim.points++;
     for (int i = rank; i > where; --i) {
-      rim.reference[i] = rim.reference[i - 1], rim.at[i] = rim.at[i - 1], of_side[i] = of_side[i - 1];
-      rim.rank[i] = rim.rank[i - 1];
+      rim.reference[i] = rim.reference[i - 1], rim.at[i] = rim.at[i - 1], rim.rank[i] = rim.rank[i - 1];
+      shared.of_side[i] = shared.of_side[i - 1];
     }
-    rim.reference[where] = reference, rim.at[where] = place(reference), rim.rank[where] = rank;
+    const Vector2 at = frame_.flat(position(reference));
+    rim.reference[where] = reference, rim.rank[where] = rank;
+    rim.at[where] = {static_cast<float>(at.x), static_cast<float>(at.y)};
   };
-  const auto furthest_from = [&](const FloatPoint& p, float than) {
-    const RimValue value = {p, p, true};
-    Furthest best = {than, kNoIndex};
-    Furthest* const bests[] = {&best};
-    furthest(&value, 1, bests);
-    return best;
+  const auto insert_furthest = [&](const FloatPoint& from, float than) {
+    const RimValue value[] = {{from, from, true}};
+    Furthest best[] = {{than, kNoIndex}};
+    furthest(value, best);
+    const bool found = best[0].reference != kNoIndex;
+    if (is_first && found) insert(rim.points, best[0].reference), limit = kThin * best[0].value;
+    team_.sync();
+    return found;
   };
-  Furthest one = furthest_from({static_cast<float>(middle.x), static_cast<float>(middle.y)}, -1);
-  if (one.reference == kNoIndex) return rim;
-  insert(0, one.reference);
-  one = {0, kNoIndex};
-  if (most > 1) one = furthest_from(rim.at[0], 0);
-  if (one.reference == kNoIndex) return rim;
-  insert(1, one.reference);
-  float limit = kThin * one.value, area = 0;
-  for (int first = 0, second = 1; rim.points < most;) {
-    of_side[first] = of_side[second] = {0, kNoIndex};
-    const RimValue beyond[] = {{rim.at[first], rim.at[next(first)], false},
-                               {rim.at[second], rim.at[next(second)], false}};
-    Furthest* const bests[] = {&of_side[first], &of_side[second]};
-    furthest(beyond, 2, bests);
-    int side = 0;
-    for (int i = 1; i < rim.points; ++i) side = of_side[i].value > of_side[side].value ? i : side;
-    if (!(of_side[side].value > limit)) return rim;
-    area += of_side[side].value;
-    limit = kLittle * area;
-    insert(side + 1, of_side[side].reference);
-    first = side, second = side + 1;
+  if (!insert_furthest({static_cast<float>(middle.x), static_cast<float>(middle.y)}, -1)) return;
+  if (most == 1 || !insert_furthest(rim.at[0], 0)) return;
+  while (rim.points < most && !shared.complete) {
+    const int first = shared.first, second = shared.second;
+    const auto beyond = [&](int i) {
+      return RimValue{rim.at[i], rim.at[i + 1 == rim.points ? 0 : i + 1], false};
+    };
+    const RimValue values[] = {beyond(first), beyond(second)};
+    Furthest found[2] = {{0, kNoIndex}, {0, kNoIndex}};
+    furthest(values, found);
+    if (is_first) {
+      shared.of_side[first] = found[0], shared.of_side[second] = found[1];
+      int side = 0;
+      for (int i = 1; i < rim.points; ++i)
+        side = shared.of_side[i].value > shared.of_side[side].value ? i : side;
+      const Furthest best = shared.of_side[side];
+      shared.complete = !(best.value > limit);
+      if (!shared.complete) {
+        area += best.value;
+        limit = kLittle * area;
+        insert(side + 1, best.reference);
+        shared.first = side, shared.second = side + 1;
+      }
+    }
+    team_.sync();
   }
-  return rim;
 }
 
 template <typename Team>

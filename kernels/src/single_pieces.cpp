@@ -37,12 +37,13 @@ class PieceJoiner {
     }
   }
 
-  void join(std::uint32_t i, std::uint32_t j) {
-    i = first_of(i), j = first_of(j);
-    if (i < j)
-      curve_[j] = i;
-    else
-      curve_[i] = j;
+  /// Joins the set whose first piece is `first` with that of another piece. Result: the first of both.
+  std::uint32_t join(std::uint32_t first, std::uint32_t piece) {
+    const std::uint32_t other = first_of(piece);
+    if (other == first) return first;
+    const std::uint32_t of_both = other < first ? other : first;
+    curve_[other < first ? first : other] = of_both;
+    return of_both;
   }
 
  private:
@@ -77,6 +78,7 @@ bool ManifoldMeans::connect_by_ends(const BodyPair& bodies, const PieceMemory& m
   bool many = false;
   for (std::uint32_t i = 0; i < pieces; ++i) {
     const Piece& piece = memory.pieces[i];
+    std::uint32_t first_piece = i;
     for (int end = 0; end < 2; ++end) {
       const manifold::TriangleFeature f = piece.feature(end);
       const std::uint32_t side = f.of_b;
@@ -88,7 +90,7 @@ bool ManifoldMeans::connect_by_ends(const BodyPair& bodies, const PieceMemory& m
           joiner.insert(static_cast<std::uint32_t>(edge >> 32), static_cast<std::uint32_t>(edge),
                         piece.triangle[1 - side] << 1 | side, i, first);
       if (!is_boundary(t.flags, f.number)) alone += first ? 1 : -1;
-      if (!first) joiner.join(there, i);
+      if (!first) first_piece = joiner.join(first_piece, there);
     }
   }
   return alone == 0 && !many;
@@ -101,10 +103,11 @@ void ManifoldMeans::connect_by_corners(const BodyPair& bodies, const PieceMemory
     const Piece& piece = memory.pieces[i];
     const std::uint32_t(&u)[3] = bodies.a.shape->topology[piece.triangle[0]].vertex;
     const std::uint32_t(&v)[3] = bodies.b.shape->topology[piece.triangle[1]].vertex;
+    std::uint32_t first_piece = i;
     for (int k = 0; k < 9; ++k) {
       bool first;
       const std::uint32_t there = joiner.insert(u[k / 3], v[k % 3], 0, i, first);
-      if (!first) joiner.join(there, i);
+      if (!first) first_piece = joiner.join(first_piece, there);
     }
   }
 }

@@ -16,9 +16,9 @@ using manifold::PatchState;
 using manifold::PieceMemory;
 using manifold::PieceSummary;
 
-// The threads of a block. They are a team for a pair with many contacts or a curve of many pieces, and later
-// on each of its warps is one for those of few.
-constexpr std::uint32_t kThreads = 128, kWarps = kThreads / 32;
+// The threads of a block; of one that finds curves. They are a team for a pair with many contacts or a curve
+// of many pieces, and later on each of its warps is one for those of few.
+constexpr std::uint32_t kThreads = 128, kWarps = kThreads / 32, kFinders = 512, kFindingWarps = kFinders / 32;
 using LargeTeam = BlockTeam<kThreads>;
 
 /// What teams share, without contents at first.
@@ -44,12 +44,12 @@ __device__ void take_rows(const AnyTeam& team, std::uint32_t rows, std::uint32_t
 
 /// Calls of(team, row, 0) for rows below `many`, by blocks, then of(team, row, warp) for rows below `few`, by
 /// warps.
-template <typename Of>
+template <std::uint32_t kSize, typename Of>
 __device__ void share_out(std::uint32_t many, std::uint32_t& next_many, std::uint32_t few,
                           std::uint32_t& next_few, const Of& of) {
-  __shared__ BlockScratch<kThreads> scratch;
-  __shared__ std::uint32_t taken[kWarps];
-  const LargeTeam block(&scratch, nullptr);
+  __shared__ BlockScratch<kSize> scratch;
+  __shared__ std::uint32_t taken[kSize / 32];
+  const BlockTeam<kSize> block(&scratch, nullptr);
   take_rows(block, many, next_many, taken[0], [&](std::uint32_t row) { of(block, row, 0u); });
   __syncthreads();
   const std::uint32_t own = threadIdx.x / 32;
@@ -58,7 +58,14 @@ __device__ void share_out(std::uint32_t many, std::uint32_t& next_many, std::uin
 }
 
 template <typename AnyTeam>
-constexpr bool kIsLarge = AnyTeam::size() == kThreads;
+constexpr bool kIsLarge = AnyTeam::size() != 32;
+
+// Pieces of a curve that a warp takes on. Where there are enough curves for all warps of a GPU, warps do more
+// of them at a time; else blocks are sooner done.
+__device__ std::uint32_t most_of_warp(const GpuGroupCounts& counts) {
+  constexpr std::uint32_t kManyPairs = 8192;
+  return counts.few + counts.many > kManyPairs ? 512 : kFewContacts;
+}
 
 // Pieces are numbered in 28 bits, and table entries in 32.
 constexpr std::uint32_t kMostContactsOfPair = std::uint32_t{1} << 27;
@@ -81,7 +88,7 @@ __device__ PieceMemory memory_of(const ManifoldArgs& args, std::uint32_t pair) {
 }
 
 /// Writes down what each contact's triangles have in common, among the pieces of the contact's pair.
-__global__ void __launch_bounds__(kThreads, 5) make_pieces(const __grid_constant__ ManifoldArgs args) {
+__global__ void __launch_bounds__(kThreads, 4) make_pieces(const __grid_constant__ ManifoldArgs args) {
   wait_for_kernel_before();
   if (!has_query(args)) return;
   const std::uint64_t count = args.query->contacts, step = std::uint64_t{gridDim.x} * kThreads;
@@ -113,20 +120,23 @@ __global__ void __launch_bounds__(kThreads, 5) make_pieces(const __grid_constant
   }
 }
 
+// Shared memory for keys and sets of the pieces of a pair, if they fit; a warp has its part of it. With what
+// else a block shares it stays below the 48 KiB that need no leave.
+constexpr std::uint32_t kNearPieces = 1920, kNearWords = 4 * kNearPieces;
+constexpr std::size_t kNearBytes = (kNearWords + kNearPieces) * sizeof(std::uint32_t);
+
 /// Finds the curves of each pair.
-__global__ void __launch_bounds__(kThreads, 5) find_curves(const __grid_constant__ ManifoldArgs args) {
-  // For keys and sets of pieces, if they fit. A warp has its part.
-  constexpr std::uint32_t kPieces = 2048, kWords = 4 * kPieces;
+__global__ void __launch_bounds__(kFinders, 2) find_curves(const __grid_constant__ ManifoldArgs args) {
   extern __shared__ std::uint32_t near[];
-  __shared__ Raw<BodyPair> shared_bodies[kWarps];
-  __shared__ std::uint32_t next[kWarps];
+  __shared__ Raw<BodyPair> shared_bodies[kFindingWarps];
+  __shared__ std::uint32_t next[kFindingWarps];
   wait_for_kernel_before();
   if (!has_query(args)) return;
   const GpuContactGroups& groups = args.groups;
   ManifoldState& state = *args.state;
   const auto of = [&](const auto& team, std::uint32_t row, std::uint32_t own) {
     using AnyTeam = std::remove_cvref_t<decltype(team)>;
-    constexpr std::uint32_t kParts = kIsLarge<AnyTeam> ? 1 : kWarps;
+    constexpr std::uint32_t kParts = kIsLarge<AnyTeam> ? 1 : kFindingWarps;
     const std::uint32_t pair = kIsLarge<AnyTeam> ? groups.many[row] : groups.few[row],
                         count = args.of_pair[pair].pieces;
     if (count == 0) return;
@@ -137,8 +147,8 @@ __global__ void __launch_bounds__(kThreads, 5) find_curves(const __grid_constant
     BodyPair& bodies = shared_bodies[own].get();
     if (team.rank() == 0) bodies = bodies_of(args, args.pairs.pairs[pair]);
     PieceMemory pieces = memory_of(args, pair);
-    pieces.near_table = near + own * kWords / kParts, pieces.near_words = kWords / kParts;
-    if (count <= kPieces / kParts) pieces.curve = near + kWords + own * kPieces / kParts;
+    pieces.near_table = near + own * kNearWords / kParts, pieces.near_words = kNearWords / kParts;
+    if (count <= kNearPieces / kParts) pieces.curve = near + kNearWords + own * kNearPieces / kParts;
     team.sync();
     manifold::CurveFinder<AnyTeam> finder(team, bodies, pieces);
     const PieceSummary summary = finder.find_among(count, next[own]);
@@ -147,14 +157,13 @@ __global__ void __launch_bounds__(kThreads, 5) find_curves(const __grid_constant
       if (summary.segments > 0) atomicAdd(&state.segments, Counter{summary.segments});
     }
     for (std::uint32_t curve = team.rank(); curve < summary.curves; curve += team.size()) {
-      const bool many = pieces.start[curve + 1] - pieces.start[curve] > kFewContacts;
+      const bool many = pieces.start[curve + 1] - pieces.start[curve] > most_of_warp(*groups.counts);
       const std::uint32_t place = atomicAdd(many ? &state.curves_of_many : &state.curves_of_few, 1u);
       args.curves[many ? place : args.capacity.contacts - 1 - place] = {pair, curve};
     }
   };
-  share_out(groups.counts->many, state.next_many, groups.counts->few, state.next_few, of);
+  share_out<kFinders>(groups.counts->many, state.next_many, groups.counts->few, state.next_few, of);
 }
-constexpr std::size_t kNearBytes = 5 * 2048 * sizeof(std::uint32_t);
 
 // What a team that makes a patch shares.
 struct MakerMemory {
@@ -209,7 +218,8 @@ __global__ void __launch_bounds__(kThreads, 4) begin_patches(const __grid_consta
       copy_state(team, made, args.begun[place].state);
     });
   };
-  share_out(state.curves_of_many, state.next_curve_of_many, state.curves_of_few, state.next_curve_of_few, of);
+  share_out<kThreads>(state.curves_of_many, state.next_curve_of_many, state.curves_of_few,
+                      state.next_curve_of_few, of);
 }
 
 __device__ std::uint32_t patches_begun(const ManifoldArgs& args) {
@@ -217,25 +227,32 @@ __device__ std::uint32_t patches_begun(const ManifoldArgs& args) {
   return wanted < args.capacity.manifolds ? wanted : args.capacity.manifolds;
 }
 
-/// Measures the depths of each patch, by a block.
+/// Measures the depths of each patch: by a block, or, where there are enough for all warps, by a warp.
 __global__ void __launch_bounds__(kThreads, 6) measure_depths(const __grid_constant__ ManifoldArgs args) {
   __shared__ BlockScratch<kThreads> scratch;
   __shared__ WarpWalks walks[kWarps];
-  __shared__ MakerMemory memory;
-  __shared__ Raw<manifold::DepthMemory> depths;
-  __shared__ std::uint32_t taken;
+  __shared__ MakerMemory memory[kWarps];
+  __shared__ Raw<manifold::DepthMemory> depths[kWarps];
+  __shared__ std::uint32_t taken[kWarps];
   wait_for_kernel_before();
   if (!has_query(args)) return;
-  const LargeTeam team(&scratch, walks);
-  take_rows(team, patches_begun(args), args.state->next_measured, taken, [&](std::uint32_t row) {
-    BegunPatch& begun = args.begun[row];
-    if (begun.state.touch) return;
-    with_maker(args, team, memory, begun.of, [&](auto& maker, PatchState& state) {
-      copy_state(team, begun.state, state);
-      maker.measure_depths(begun.of.curve, depths.get());
-      copy_state(team, state, begun.state);
+  const auto measure = [&](const auto& team, std::uint32_t own) {
+    take_rows(team, patches_begun(args), args.state->next_measured, taken[own], [&](std::uint32_t row) {
+      BegunPatch& begun = args.begun[row];
+      if (begun.state.touch) return;
+      with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState& state) {
+        copy_state(team, begun.state, state);
+        maker.measure_depths(begun.of.curve, depths[own].get());
+        copy_state(team, state, begun.state);
+      });
     });
-  });
+  };
+  constexpr std::uint32_t kEnough = 12;  // for each processor
+  const std::uint32_t warp = threadIdx.x / 32;
+  if (patches_begun(args) < kEnough * args.limits.processors)
+    measure(LargeTeam(&scratch, walks), 0);
+  else
+    measure(WarpTeam(&walks[warp]), warp);
 }
 
 /// Finishes each patch, by a warp.
@@ -357,15 +374,14 @@ cudaError_t forget_last(ManifoldState* state, cudaStream_t stream) {
 }
 
 cudaError_t make_patches(const ManifoldArgs& args, cudaStream_t stream) {
-  const auto grid = [&](unsigned blocks_of_processor, std::size_t shared_bytes) {
-    return Grid{args.limits.processors * blocks_of_processor, kThreads, shared_bytes, stream,
-                args.limits.early_launch};
+  const auto grid = [&](unsigned blocks, unsigned threads, std::size_t shared_bytes) {
+    return Grid{args.limits.processors * blocks, threads, shared_bytes, stream, args.limits.early_launch};
   };
-  cudaError_t error = launch_after(grid(5, 0), make_pieces, args);
-  if (error == cudaSuccess) error = launch_after(grid(5, kNearBytes), find_curves, args);
-  if (error == cudaSuccess) error = launch_after(grid(4, 0), begin_patches, args);
-  if (error == cudaSuccess) error = launch_after(grid(6, 0), measure_depths, args);
-  return error == cudaSuccess ? launch_after(grid(6, 0), finish_patches, args) : error;
+  cudaError_t error = launch_after(grid(4, kThreads, 0), make_pieces, args);
+  if (error == cudaSuccess) error = launch_after(grid(2, kFinders, kNearBytes), find_curves, args);
+  if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), begin_patches, args);
+  if (error == cudaSuccess) error = launch_after(grid(6, kThreads, 0), measure_depths, args);
+  return error == cudaSuccess ? launch_after(grid(6, kThreads, 0), finish_patches, args) : error;
 }
 
 }  // namespace tandem::gpu

@@ -157,12 +157,10 @@ __device__ T over_warp(T value, Of of) {
 }
 
 /// Of each of several values what `of` makes of those of all lanes.
-template <typename T, int kMost, typename Of>
-__device__ void over_warp(T (&values)[kMost], int count, Of of) {
+template <typename T, int kCount, typename Of>
+__device__ __forceinline__ void over_warp(T (&values)[kCount], Of of) {
 #pragma unroll
-  for (int i = 0; i < kMost; ++i) {
-    if (i < count) values[i] = over_warp(values[i], of);
-  }
+  for (int i = 0; i < kCount; ++i) values[i] = over_warp(values[i], of);
 }
 
 struct WarpTeam : SharedNumbers {
@@ -187,17 +185,17 @@ struct WarpTeam : SharedNumbers {
   __device__ static T greatest(T value) {
     return over_warp(value, Greatest());
   }
-  template <typename T, int kMost>
-  __device__ static void sums(T (&values)[kMost], int count = kMost) {
-    over_warp(values, count, Sum());
+  template <typename T, int kCount>
+  __device__ __forceinline__ static void sums(T (&values)[kCount]) {
+    over_warp(values, Sum());
   }
-  template <typename T, int kMost>
-  __device__ static void least_ones(T (&values)[kMost], int count = kMost) {
-    over_warp(values, count, Least());
+  template <typename T, int kCount>
+  __device__ __forceinline__ static void least_ones(T (&values)[kCount]) {
+    over_warp(values, Least());
   }
-  template <typename T, int kMost>
-  __device__ static void greatest_ones(T (&values)[kMost], int count = kMost) {
-    over_warp(values, count, Greatest());
+  template <typename T, int kCount>
+  __device__ __forceinline__ static void greatest_ones(T (&values)[kCount]) {
+    over_warp(values, Greatest());
   }
   __device__ static bool any(bool value) { return __any_sync(0xFFFFFFFFu, value) != 0; }
 
@@ -245,17 +243,17 @@ struct BlockTeam : SharedNumbers {
   }
   __device__ static bool any(bool value) { return __syncthreads_or(value) != 0; }
 
-  template <typename T, int kMost>
-  __device__ void sums(T (&values)[kMost], int count = kMost) const {
-    over_block(values, count, Sum());
+  template <typename T, int kCount>
+  __device__ __forceinline__ void sums(T (&values)[kCount]) const {
+    over_block(values, Sum());
   }
-  template <typename T, int kMost>
-  __device__ void least_ones(T (&values)[kMost], int count = kMost) const {
-    over_block(values, count, Least());
+  template <typename T, int kCount>
+  __device__ __forceinline__ void least_ones(T (&values)[kCount]) const {
+    over_block(values, Least());
   }
-  template <typename T, int kMost>
-  __device__ void greatest_ones(T (&values)[kMost], int count = kMost) const {
-    over_block(values, count, Greatest());
+  template <typename T, int kCount>
+  __device__ __forceinline__ void greatest_ones(T (&values)[kCount]) const {
+    over_block(values, Greatest());
   }
 
   static constexpr int kHalf = 32;
@@ -273,26 +271,26 @@ struct BlockTeam : SharedNumbers {
   template <typename T, typename Of>
   __device__ T over_block(T value, Of of) const {
     T values[1] = {value};
-    over_block(values, 1, of);
+    over_block(values, of);
     return values[0];
   }
-  template <typename T, int kMost, typename Of>
-  __device__ void over_block(T (&values)[kMost], int count, Of of) const {
-    static_assert(sizeof(T) <= sizeof(Counter) && kMost <= BlockScratch<kThreads>::kMost);
-    over_warp(values, count, of);
+  template <typename T, int kCount, typename Of>
+  __device__ __forceinline__ void over_block(T (&values)[kCount], Of of) const {
+    static_assert(sizeof(T) <= sizeof(Counter) && kCount <= BlockScratch<kThreads>::kMost);
+    over_warp(values, of);
     const auto part = [&](int i, std::uint32_t warp) -> T& {
       return *reinterpret_cast<T*>(&scratch->part[i][warp]);
     };
     __syncthreads();  // what an earlier call left has been read
+    if (threadIdx.x % 32 == 0) {
 #pragma unroll
-    for (int i = 0; i < kMost; ++i) {
-      if (i < count && threadIdx.x % 32 == 0) part(i, threadIdx.x / 32) = values[i];
+      for (int i = 0; i < kCount; ++i) part(i, threadIdx.x / 32) = values[i];
     }
     __syncthreads();
 #pragma unroll
-    for (int i = 0; i < kMost; ++i) {
-      if (i >= count) continue;
+    for (int i = 0; i < kCount; ++i) {
       values[i] = part(i, 0);
+#pragma unroll 4
       for (std::uint32_t warp = 1; warp < kThreads / 32; ++warp) values[i] = of(values[i], part(i, warp));
     }
   }

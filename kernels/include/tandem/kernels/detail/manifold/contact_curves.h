@@ -70,6 +70,11 @@ TANDEM_HD inline std::uint64_t edge_key(const TriangleTopology& t, int k) {
   return u < v ? std::uint64_t{u} << 32 | v : std::uint64_t{v} << 32 | u;
 }
 
+/// What the triangles of a piece have in common, once more.
+TANDEM_HD_SELDOM inline void meet_again(const BodyPair& bodies, const Piece& piece, Meeting& out) {
+  meet(bodies.a.triangle(piece.triangle[0]), bodies.b.triangle(piece.triangle[1]), bodies.tolerance(), out);
+}
+
 /// What is known of all pieces together.
 struct PieceSummary {
   std::uint32_t pieces = 0, segments = 0, curves = 0;
@@ -219,7 +224,7 @@ class CurveFinder {
   TANDEM_HD void summarize(const PieceBounds& own, std::uint32_t pieces);
   TANDEM_HD PieceSummary connect(std::uint32_t& next);
   TANDEM_HD bool connect_by_ends();
-  TANDEM_HD void connect_by_corners();
+  TANDEM_HD_SELDOM void connect_by_corners();
   TANDEM_HD void sort_by_curve(std::uint32_t& next);
 
   const Team& team_;
@@ -259,8 +264,7 @@ TANDEM_HD PieceBounds CurveFinder<Team>::bounds_of_pieces(std::uint32_t pieces) 
     const Piece& piece = memory_.pieces[i];
     Meeting meeting;
     if (piece.kind() == MeetingKind::polygon) {
-      meet(bodies_.a.triangle(piece.triangle[0]), bodies_.b.triangle(piece.triangle[1]), bodies_.tolerance(),
-           meeting);
+      meet_again(bodies_, piece, meeting);
     } else {
       meeting.kind = piece.kind();
       meeting.end[0] = piece.end[0], meeting.end[1] = piece.end[1];
@@ -321,7 +325,7 @@ TANDEM_HD bool CurveFinder<Team>::connect_by_ends() {
 /// Where corners lie in planes the ends are ambiguous: then pieces hang together whose triangles share a
 /// corner on both sides.
 template <typename Team>
-TANDEM_HD void CurveFinder<Team>::connect_by_corners() {
+TANDEM_HD_SELDOM void CurveFinder<Team>::connect_by_corners() {
   if constexpr (HasMeans<Team>) return team_.means().connect_by_corners(bodies_, memory_, summary_.pieces);
   const std::uint32_t size = PieceMemory::kTableWords * summary_.pieces;
   clear(size);
@@ -348,29 +352,29 @@ TANDEM_HD void CurveFinder<Team>::sort_by_curve(std::uint32_t& next) {
     team_.sync();
     return;
   }
-  // The table: the number of each curve by its first piece, then the pieces counted in it.
-  std::uint32_t *number = table_, *place = table_ + pieces;
+  // In the table: the number of each curve by its first piece; of each piece the first of its curve; where
+  // the curves begin.
+  static_assert(PieceMemory::kTableWords >= 4);
+  std::uint32_t *number = table_, *first = table_ + pieces, *begin = table_ + 2 * std::size_t{pieces};
   if (team_.rank() == 0) team_.store(next, 0);
-  for (std::uint32_t i = team_.rank(); i <= pieces; i += team_.size()) memory_.start[i] = 0;
-  for (std::uint32_t i = team_.rank(); i < pieces; i += team_.size()) place[i] = first_of(i);
+  for (std::uint32_t i = team_.rank(); i <= summary_.curves; i += team_.size()) begin[i] = 0;
+  for (std::uint32_t i = team_.rank(); i < pieces; i += team_.size()) first[i] = first_of(i);
   team_.sync();
   for (std::uint32_t i = team_.rank(); i < pieces; i += team_.size()) {
-    if (place[i] == i) number[i] = team_.add(next, 1);
+    if (first[i] == i) number[i] = team_.add(next, 1);
   }
   team_.sync();
-  for (std::uint32_t i = team_.rank(); i < pieces; i += team_.size()) {
-    memory_.curve[i] = number[place[i]];
-    team_.add(memory_.start[memory_.curve[i] + 1], 1);
-  }
+  for (std::uint32_t i = team_.rank(); i < pieces; i += team_.size())
+    team_.add(begin[number[first[i]] + 1], 1);
   team_.sync();
   if (team_.rank() == 0) {
-    for (std::uint32_t c = 0; c < summary_.curves; ++c) memory_.start[c + 1] += memory_.start[c];
-    for (std::uint32_t c = 0; c < summary_.curves; ++c) place[c] = memory_.start[c];
+    for (std::uint32_t c = 0; c < summary_.curves; ++c) begin[c + 1] += begin[c];
   }
   team_.sync();
-  for (std::uint32_t i = team_.rank(); i < pieces; i += team_.size()) {
-    memory_.order[team_.add(place[memory_.curve[i]], 1)] = i;
-  }
+  for (std::uint32_t c = team_.rank(); c <= summary_.curves; c += team_.size()) memory_.start[c] = begin[c];
+  team_.sync();
+  for (std::uint32_t i = team_.rank(); i < pieces; i += team_.size())
+    memory_.order[team_.add(begin[number[first[i]]], 1)] = i;
   team_.sync();
 }
 

@@ -52,12 +52,13 @@ struct ExactVectorSum {
 };
 
 /// Makes each of these the sum of all that a team has.
-template <typename Team, int kCount>
-TANDEM_HD void add_up(const Team& team, ExactSum* const (&sums)[kCount]) {
-  std::int64_t words[2 * kCount];
-  for (int i = 0; i < kCount; ++i) words[2 * i] = sums[i]->upper, words[2 * i + 1] = sums[i]->lower;
+template <typename Team, typename... Sums>
+TANDEM_HD void add_up(const Team& team, Sums&... sums) {
+  std::int64_t words[] = {sums.upper..., sums.lower...};
   team.sums(words);
-  for (int i = 0; i < kCount; ++i) *sums[i] = {words[2 * i], words[2 * i + 1]};
+  int i = 0;
+  ((sums.upper = words[i++]), ...);
+  ((sums.lower = words[i++]), ...);
 }
 
 }  // namespace tandem::manifold

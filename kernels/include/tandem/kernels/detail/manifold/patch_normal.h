@@ -47,17 +47,17 @@ class NormalFinder {
   }
   /// Marks that pieces have for the time being. Each is seen by one of the team alone.
   TANDEM_HD std::uint32_t& mark(std::uint32_t i) const { return memory_.curve[i]; }
-  TANDEM_HD bool has_free_end() const;
-  TANDEM_HD Vector3 plain_middle() const;
-  TANDEM_HD Vector3 sheet_normal() const;
+  TANDEM_HD_SELDOM bool has_free_end() const;
+  TANDEM_HD_SELDOM Vector3 plain_middle() const;
+  TANDEM_HD_SELDOM Vector3 sheet_normal() const;
   TANDEM_HD bool has_many_directions(int side) const;
   TANDEM_HD LeastPiece least_unmarked(int side, const FloatVector& known) const;
   TANDEM_HD bool gather_directions(int side, bool keep_if_many);
   TANDEM_HD void find_bearing_faces(const Vector3& smooth, double length);
   TANDEM_HD void spread_along(int count) const;
   TANDEM_HD Vector3 face_nearest(const Vector3& smooth, double length);
-  TANDEM_HD bool find_for_touch(Vector3& n);
-  TANDEM_HD bool find_crossing_edges(Vector3& n) const;
+  TANDEM_HD_SELDOM bool find_for_touch(Vector3& n);
+  TANDEM_HD_SELDOM bool find_crossing_edges(Vector3& n) const;
   TANDEM_HD Vector3 crossing_edges(const Piece& piece, int number) const;
   /// From a towards b.
   TANDEM_HD static FloatVector turned_normal(const float* normals, int side) {
@@ -99,8 +99,8 @@ TANDEM_HD CurveMeasure NormalFinder<Team>::measure() {
     for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size())
       sums.add(memory_, memory_.order[i], summary_.origin, one_by_unit);
   }
-  add_up(team_, {&sums.area.x, &sums.area.y, &sums.area.z, &sums.gap.x, &sums.gap.y, &sums.gap.z,
-                 &sums.middle.x, &sums.middle.y, &sums.middle.z, &sums.length});
+  add_up(team_, sums.area.x, sums.area.y, sums.area.z, sums.gap.x, sums.gap.y, sums.gap.z, sums.middle.x,
+         sums.middle.y, sums.middle.z, sums.length);
   CurveMeasure out;
   least_ = sums.least;
   out.key = team_.least(least_.key);
@@ -114,7 +114,7 @@ TANDEM_HD CurveMeasure NormalFinder<Team>::measure() {
 }
 
 template <typename Team>
-TANDEM_HD bool NormalFinder<Team>::has_free_end() const {
+TANDEM_HD_SELDOM bool NormalFinder<Team>::has_free_end() const {
   bool is_free = false;
   for_each_piece([&](const Piece& piece, const float*) {
     if (piece.kind() == MeetingKind::polygon) return;
@@ -129,19 +129,19 @@ TANDEM_HD bool NormalFinder<Team>::has_free_end() const {
 
 /// Of pieces without length, from the origin on.
 template <typename Team>
-TANDEM_HD Vector3 NormalFinder<Team>::plain_middle() const {
+TANDEM_HD_SELDOM Vector3 NormalFinder<Team>::plain_middle() const {
   ExactVectorSum sum;
   for_each_piece([&](const Piece& piece, const float*) {
     const Vector3 from = piece.end[0] - summary_.origin;
     const bool polygon = piece.kind() == MeetingKind::polygon;
     sum.add(polygon ? from : 0.5 * (from + (piece.end[1] - summary_.origin)), 1 / summary_.unit);
   });
-  add_up(team_, {&sum.x, &sum.y, &sum.z});
+  add_up(team_, sum.x, sum.y, sum.z);
   return (1.0 / (end_ - begin_)) * sum.value(summary_.unit);
 }
 
 template <typename Team>
-TANDEM_HD Vector3 NormalFinder<Team>::sheet_normal() const {
+TANDEM_HD_SELDOM Vector3 NormalFinder<Team>::sheet_normal() const {
   const bool sheet_a = !bodies_.a.shape->closed, sheet_b = !bodies_.b.shape->closed;
   const double unit = summary_.unit, one_by_unit = 1 / unit;
   ExactVectorSum sum;
@@ -151,13 +151,13 @@ TANDEM_HD Vector3 NormalFinder<Team>::sheet_normal() const {
     if (sheet_a || !sheet_b) sum.add(size * Vector3{normals[0], normals[1], normals[2]}, one_by_unit);
     if (sheet_b || !sheet_a) sum.add(-(size * Vector3{normals[3], normals[4], normals[5]}), one_by_unit);
   });
-  add_up(team_, {&sum.x, &sum.y, &sum.z});
+  add_up(team_, sum.x, sum.y, sum.z);
   return sum.value(unit);
 }
 
 /// Whether a sample of pieces proves that gather_directions() is false: of more than kMostDirections normals
 /// each is more than twice as far from the others as normals of one direction are from it, so no direction
-/// has two of them. All of the team come to the same answer.
+/// has two of them.
 template <typename Team>
 TANDEM_HD bool NormalFinder<Team>::has_many_directions(int side) const {
   constexpr std::uint32_t kSample = 32;
@@ -197,7 +197,9 @@ TANDEM_HD LeastPiece NormalFinder<Team>::least_unmarked(int side, const FloatVec
 /// ones, if they are to be kept. False where there are more. Normals closer than half a milliradian are one.
 template <typename Team>
 TANDEM_HD bool NormalFinder<Team>::gather_directions(int side, bool keep_if_many) {
-  if (!keep_if_many && has_many_directions(side)) return false;
+  if constexpr (HasMeans<Team>) {  // a team has passed over the pieces as soon
+    if (!keep_if_many && has_many_directions(side)) return false;
+  }
   for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) mark(i) = 0;
   LeastPiece own = least_;
   int found = 0;
@@ -282,7 +284,7 @@ TANDEM_HD void NormalFinder<Team>::find_bearing_faces(const Vector3& smooth, dou
       }
     });
   }
-  add_up(team_, {&within[0], &within[1]});
+  add_up(team_, within[0], within[1]);
   for (int side = 0; side < 2; ++side) {
     if (holder[side] == kNoIndex || !(within[side].value(summary_.unit) >= kBearing * length)) continue;
     if (team_.rank() == 0) shared_.direction[directions_] = {n[side], holder[side]};
@@ -382,7 +384,7 @@ TANDEM_HD Vector3 NormalFinder<Team>::crossing_edges(const Piece& piece, int num
 
 /// The one direction across an edge of each body that separates all triangles of the patch.
 template <typename Team>
-TANDEM_HD bool NormalFinder<Team>::find_crossing_edges(Vector3& n) const {
+TANDEM_HD_SELDOM bool NormalFinder<Team>::find_crossing_edges(Vector3& n) const {
   constexpr std::uint32_t kMostPieces = 16, kDirections = 18;  // each of 3 x 3 edges, both ways
   if (end_ - begin_ > kMostPieces) return false;
   const double tolerance = kNoArea * bodies_.reach();
@@ -435,7 +437,7 @@ TANDEM_HD bool NormalFinder<Team>::find_crossing_edges(Vector3& n) const {
 /// The one direction, of faces there and else of crossings of edges, that has all of a's triangles there on
 /// one side and b's on the other. Where several do, corners or edges lie on each other: nothing to lean on.
 template <typename Team>
-TANDEM_HD bool NormalFinder<Team>::find_for_touch(Vector3& n) {
+TANDEM_HD_SELDOM bool NormalFinder<Team>::find_for_touch(Vector3& n) {
   directions_ = 0;
   gather_directions(0, true);
   gather_directions(1, true);

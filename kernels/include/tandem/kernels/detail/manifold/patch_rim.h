@@ -48,10 +48,6 @@ class RimFinder {
   TANDEM_HD Candidate* candidates() const {
     return reinterpret_cast<Candidate*>(memory_.table + PieceMemory::kTableWords * std::size_t{begin_});
   }
-  TANDEM_HD void corners_of(const Piece& piece, Meeting& meeting) const {
-    meet(bodies_.a.triangle(piece.triangle[0]), bodies_.b.triangle(piece.triangle[1]), bodies_.tolerance(),
-         meeting);
-  }
   TANDEM_HD void add(const Vector3& x, std::uint32_t reference, std::uint32_t& next) {
     const Vector2 at = frame_.flat(x);
     candidates()[team_.add(next, 1)] = {static_cast<float>(at.x), static_cast<float>(at.y), reference};
@@ -93,7 +89,7 @@ TANDEM_HD void RimFinder<Team>::gather(bool each_end_twice, std::uint32_t& next)
     const Piece& piece = memory_.pieces[at];
     if (piece.kind() == MeetingKind::polygon) {
       if (!piece.facing()) continue;
-      corners_of(piece, meeting);
+      meet_again(bodies_, piece, meeting);
       for (int k = 0; k < meeting.corners; ++k) {
         add(meeting.corner[k], at * 8 + 2 + static_cast<std::uint32_t>(k), next);
       }
@@ -116,7 +112,7 @@ TANDEM_HD void RimFinder<Team>::gather(bool each_end_twice, std::uint32_t& next)
   }
   team_.sync();
   count_ = team_.load(next);
-  add_up(team_, {&moments_.twice_area, &moments_.x, &moments_.y});
+  add_up(team_, moments_.twice_area, moments_.x, moments_.y);
 }
 
 template <typename Team>
@@ -217,7 +213,7 @@ TANDEM_HD Vector3 RimFinder<Team>::position(std::uint32_t reference) const {
   const std::uint32_t number = reference & 7u;
   if (number < 2) return of.end[number];
   Meeting meeting;
-  corners_of(of, meeting);
+  meet_again(bodies_, of, meeting);
   return meeting.corner[number - 2];
 }
 

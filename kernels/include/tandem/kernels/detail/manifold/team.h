@@ -33,13 +33,13 @@ struct OneThread {
   TANDEM_HD static T greatest(T value) {
     return value;
   }
-  /// The same of each of several values, of the first `count`: sooner than one after the other.
-  template <typename T, int kMost>
-  TANDEM_HD static void sums(T (&)[kMost], int = kMost) {}
-  template <typename T, int kMost>
-  TANDEM_HD static void least_ones(T (&)[kMost], int = kMost) {}
-  template <typename T, int kMost>
-  TANDEM_HD static void greatest_ones(T (&)[kMost], int = kMost) {}
+  /// The same of each of several values: sooner than one after the other.
+  template <typename T, int kCount>
+  TANDEM_HD static void sums(T (&)[kCount]) {}
+  template <typename T, int kCount>
+  TANDEM_HD static void least_ones(T (&)[kCount]) {}
+  template <typename T, int kCount>
+  TANDEM_HD static void greatest_ones(T (&)[kCount]) {}
   TANDEM_HD static bool any(bool value) { return value; }
 
   /// Calls of(group, i, true) for all i below `count`, each by one group of the team: those who walk a tree

@@ -3,6 +3,14 @@
 
 #include "tandem/formats/platform.h"
 
+/// A function that is seldom called. It is not copied to where it is called from, whose registers on a GPU
+/// then suffice for what is done often.
+#if defined(__CUDACC__)
+#define TANDEM_HD_SELDOM __host__ __device__ __noinline__
+#else
+#define TANDEM_HD_SELDOM
+#endif
+
 /// Vectors of float64 for contact manifolds. Every operation is rounded by itself: host code is compiled with
 /// -ffp-contract=off and device code with --fmad=false, so that both give the same bits.
 namespace tandem::manifold {

@@ -16,8 +16,9 @@ bool narrow_phase_avx512(const PairTask& task, ContactSink& sink) {
   return PairWalk<LaneMeans<16>>(task, sink).run();
 }
 
-const ManifoldMeans kManifoldMeansAvx512 = {make_pieces, sum_pieces, spread_along, extreme_corner, gather_rim,
-                                            furthest,    next_near,  answer_lines, find_extreme};
+const ManifoldMeans kManifoldMeansAvx512 = {make_pieces,        sum_pieces,   least_unmarked, find_face_along,
+                                            sum_length_on_face, spread_along, extreme_corner, gather_rim,
+                                            furthest,           next_near,    answer_lines,   find_extreme};
 
 }  // namespace tandem
 #endif

@@ -4,11 +4,10 @@
 #include <atomic>
 #include <new>
 
-#include "manifold_means.h"
+#include "pair_patches.h"
 #include "tandem/kernels/detail/buffer.h"
 #include "tandem/kernels/detail/instance_check.h"
 #include "tandem/kernels/detail/manifold/finish.h"
-#include "tandem/kernels/detail/manifold/manifold_maker.h"
 #include "tandem/kernels/detail/manifold/shape.h"
 #include "worker_threads.h"
 
@@ -18,7 +17,6 @@ namespace {
 using manifold::BodyPair;
 using manifold::OneThread;
 using manifold::Patch;
-using manifold::PieceMemory;
 using manifold::Shape;
 
 // Pairs with contacts that a thread takes at a time.
@@ -42,35 +40,10 @@ struct PairPoints {
   std::uint32_t first, count;
 };
 
-constexpr std::uint32_t kTableWords = std::max(PieceMemory::kTableWords, ManifoldMeans::kTableWords);
-
 struct alignas(64) Worker {
-  Buffer<manifold::Piece> pieces;
-  Buffer<float> normals;
-  Buffer<std::uint32_t> words;
-  Buffer<Patch> patches;
-  std::uint64_t segments = 0, ambiguous_touches = 0;
+  PairPatches made;
   bool enough_memory = true;
-
-  bool make_room(std::size_t contacts, PieceMemory& memory) {
-    if (!pieces.resize(contacts) || !normals.resize(6 * contacts) ||
-        !words.resize((3 + kTableWords) * contacts + 5))
-      return false;
-    std::uint32_t* const word = words.data();
-    memory = {pieces.data(),   normals.data(),      word,
-              word + contacts, word + 2 * contacts, word + 3 * contacts + 1};
-    return true;
-  }
 };
-
-#ifdef TANDEM_HAVE_LANES
-struct LaneThread : OneThread {
-  const ManifoldMeans& best = best_manifold_means();
-  const ManifoldMeans& means() const { return best; }
-};
-#else
-using LaneThread = OneThread;
-#endif
 
 std::uint64_t bodies_of(const ObjectPair& pair) {
   return std::uint64_t{pair.a} << 32 | pair.b;
@@ -177,8 +150,7 @@ Status ContactManifolds::State::provide_workers(std::uint32_t wanted) {
     worker_count = wanted;
   }
   for (std::uint32_t i = 0; i < worker_count; ++i) {
-    workers[i].patches.clear();
-    workers[i].segments = workers[i].ambiguous_touches = 0;
+    workers[i].made.clear();
     workers[i].enough_memory = true;
   }
   return Status::kOk;
@@ -189,48 +161,25 @@ void ContactManifolds::State::make_patches(std::size_t from, std::size_t to, std
                                            std::span<const ObjectPair> pairs,
                                            std::span<const Contact> contacts, int most_points) {
   Worker& own = workers[worker];
-  const LaneThread team;
-  manifold::PatchState state;
-  manifold::OutlineMemory of_outline;
-  manifold::DepthMemory of_depths;
-  manifold::ChoiceMemory of_choice;
+  Buffer<Patch>& patches = own.made.patches;
+#ifdef TANDEM_HAVE_LANES
+  const MeansThread team = {{}, best_manifold_means()};
+#else
+  const OneThread team;
+#endif
   for (std::size_t i = from; i < to && own.enough_memory; ++i) {
     Row& row = rows[i];
     const ObjectPair& pair = pairs[row.pair];
     row.worker = worker;
-    row.first_patch = own.patches.size();
+    row.first_patch = patches.size();
     if (pair.a == pair.b) continue;
-    const std::uint32_t count = begin[row.pair + 1] - begin[row.pair];
-    PieceMemory memory;
-    if (!own.make_room(count, memory)) {
-      own.enough_memory = false;
-      break;
-    }
     const Instance &a = instances[pair.a], &b = instances[pair.b];
     const BodyPair bodies = {{shapes[a.asset], a.pose}, {shapes[b.asset], b.pose}};
-    manifold::CurveFinder<LaneThread> finder(team, bodies, memory);
-    const manifold::PieceSummary summary =
-        finder.find(contacts.data() + begin[row.pair], count, of_outline.next);
-    manifold::ManifoldMaker<LaneThread> maker(team, bodies, memory, summary, state);
-    const auto new_patch = [&]() -> Patch* {
-      if (!own.patches.push({})) {
-        own.enough_memory = false;
-        return nullptr;
-      }
-      return &own.patches[own.patches.size() - 1];
-    };
-    own.segments += summary.segments;
-    for (std::uint32_t curve = 0; curve < summary.curves; ++curve) {
-      if (!maker.begin(curve, of_outline)) {
-        ++own.ambiguous_touches;
-        continue;
-      }
-      maker.measure_depths(curve, of_depths);
-      maker.finish(curve, most_points, of_choice, new_patch);
-    }
-    row.patches = static_cast<std::uint32_t>(own.patches.size() - row.first_patch);
+    const std::uint32_t first = begin[row.pair], count = begin[row.pair + 1] - first;
+    own.enough_memory = own.made.add(team, bodies, contacts.data() + first, count, most_points);
+    row.patches = static_cast<std::uint32_t>(patches.size() - row.first_patch);
     for (std::uint32_t k = 0; k < row.patches; ++k) {
-      const Patch& patch = own.patches[row.first_patch + k];
+      const Patch& patch = patches[row.first_patch + k];
       if (patch.hole != 0) continue;
       ++row.manifolds;
       row.points += patch.manifold.point_count;
@@ -253,7 +202,7 @@ Status ContactManifolds::State::place_rows() {
 
 void ContactManifolds::State::finish(Row& row, std::span<const Instance> instances, const ObjectPair& pair,
                                      bool match) {
-  Patch* const patches = workers[row.worker].patches.data() + row.first_patch;
+  Patch* const patches = workers[row.worker].made.patches.data() + row.first_patch;
   const auto patch = [&](std::uint32_t i) -> Patch& { return patches[i]; };
   std::sort(patches, patches + row.patches, [](const Patch& x, const Patch& y) { return x.key < y.key; });
   for (std::uint32_t i = 0; i < row.patches; ++i) {
@@ -356,8 +305,8 @@ Status ContactManifolds::make(std::span<const Instance> instances, std::span<con
   state.counters = {};
   for (std::uint32_t i = 0; i < workers; ++i) {
     if (!state.workers[i].enough_memory) return failed(state.fail(Status::kOutOfMemory, 0));
-    state.counters.segments += state.workers[i].segments;
-    state.counters.ambiguous_touches += state.workers[i].ambiguous_touches;
+    state.counters.segments += state.workers[i].made.segments;
+    state.counters.ambiguous_touches += state.workers[i].made.ambiguous_touches;
   }
   if ((status = state.place_rows()) != Status::kOk) return failed(status);
   state.threads.for_parts(

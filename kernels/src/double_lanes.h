@@ -111,6 +111,17 @@ TANDEM_INLINE void transpose_rows(Lanes4 (&rows)[4]) {
   rows[3].v = __builtin_shufflevector(high01, high23, 2, 3, 6, 7);
 }
 
+TANDEM_INLINE void transpose_rows(DoubleLanes<4> (&rows)[4]) {
+  const auto a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 2, 6),
+             b = __builtin_shufflevector(rows[0], rows[1], 1, 5, 3, 7),
+             c = __builtin_shufflevector(rows[2], rows[3], 0, 4, 2, 6),
+             d = __builtin_shufflevector(rows[2], rows[3], 1, 5, 3, 7);
+  rows[0] = __builtin_shufflevector(a, c, 0, 1, 4, 5);
+  rows[1] = __builtin_shufflevector(b, d, 0, 1, 4, 5);
+  rows[2] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
+  rows[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
+}
+
 /// A corner of four triangles, by their indices, posed.
 TANDEM_INLINE Vector3Lanes<4> posed_corner(const manifold::Body& body, const std::uint32_t* index,
                                            int corner) {
@@ -120,6 +131,14 @@ TANDEM_INLINE Vector3Lanes<4> posed_corner(const manifold::Body& body, const std
   return posed<4>(body.pose, {__builtin_convertvector(rows[0].v, DoubleLanes<4>),
                               __builtin_convertvector(rows[1].v, DoubleLanes<4>),
                               __builtin_convertvector(rows[2].v, DoubleLanes<4>)});
+}
+
+/// 1 for each of four triangles that is turned, else 0.
+TANDEM_INLINE Vector<4>::Bits turned_lanes(const manifold::Body& body, const std::uint32_t* index) {
+  const TriangleTopology* const t = body.shape->topology;
+  const auto flags = [&](int i) { return static_cast<std::int32_t>(t[index[i]].flags); };
+  static_assert(kTurned == 1);
+  return Vector<4>::Bits{flags(0), flags(1), flags(2), flags(3)} & 1;
 }
 
 }  // namespace

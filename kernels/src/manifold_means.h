@@ -10,12 +10,18 @@ namespace tandem {
 struct ManifoldMeans {
   static constexpr int kMostLines = 16;
 
-  /// Words of the table that pieces are joined by, for each contact, and as many once more.
-  static constexpr std::uint32_t kTableWords = 36;
+  /// Words of the table that pieces are joined by: so many for each contact, and some more.
+  static constexpr std::uint32_t kTableWords = 36, kMoreTableWords = 4;
 
+  /// Of what comes later, one float beyond the pieces' normals is read.
   manifold::PieceBounds (*make_pieces)(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory,
                                        const Contact* contacts, std::uint32_t count);
 
+  /// Adds what two triangles have in common, if that is something. Not inlined, so that no inline function
+  /// that is compiled for one machine is linked into code for another.
+  static void add_piece(const manifold::PieceMemory& memory, const Contact& contact,
+                        const manifold::WorldTriangle& a, const manifold::WorldTriangle& b, double tolerance,
+                        manifold::PieceBounds& bounds);
   static bool connect_by_ends(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory,
                               std::uint32_t pieces);
   static void connect_by_corners(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory,
@@ -24,6 +30,12 @@ struct ManifoldMeans {
   // Each as the function of the name in the headers, of pieces order[begin] to order[end - 1].
   void (*sum_pieces)(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
                      const manifold::Vector3& origin, double one_by_unit, manifold::CurveSums& out);
+  manifold::LeastPiece (*least_unmarked)(const manifold::PieceMemory& memory, std::uint32_t begin,
+                                         std::uint32_t end, int side, const manifold::FloatVector& known);
+  void (*find_face_along)(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
+                          int side, const manifold::FloatVector& up, manifold::FaceAlong& best);
+  void (*sum_length_on_face)(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
+                             const manifold::FloatVector& face, double one_by_unit, manifold::ExactSum& sum);
   void (*spread_along)(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory,
                        std::uint32_t begin, std::uint32_t end, const manifold::Vector3& origin,
                        const manifold::Vector3* directions, int count, manifold::Spread* spread);

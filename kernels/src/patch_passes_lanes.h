@@ -72,7 +72,7 @@ struct FourPieces {
       __builtin_memcpy(&low[k], &piece[k]->end[0].x, sizeof(D));
       __builtin_memcpy(&high[k], &piece[k]->end[0].z, sizeof(D));
     }
-    turn(low), turn(high);
+    transpose_rows(low), transpose_rows(high);
     from = {low[0], low[1], low[2]};
     to = {low[3], high[2], high[3]};
   }
@@ -85,18 +85,6 @@ struct FourPieces {
   }
   TANDEM_INLINE void triangles(int side, std::uint32_t (&index)[4]) const {
     for (int k = 0; k < 4; ++k) index[k] = piece[k]->triangle[side];
-  }
-
- private:
-  TANDEM_INLINE static void turn(DoubleLanes<4> (&rows)[4]) {
-    const auto a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 2, 6),
-               b = __builtin_shufflevector(rows[0], rows[1], 1, 5, 3, 7),
-               c = __builtin_shufflevector(rows[2], rows[3], 0, 4, 2, 6),
-               d = __builtin_shufflevector(rows[2], rows[3], 1, 5, 3, 7);
-    rows[0] = __builtin_shufflevector(a, c, 0, 1, 4, 5);
-    rows[1] = __builtin_shufflevector(b, d, 0, 1, 4, 5);
-    rows[2] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
-    rows[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
   }
 };
 
@@ -120,7 +108,7 @@ void sum_pieces(const manifold::PieceMemory& memory, std::uint32_t begin, std::u
     const Vector3Lanes<4> to = second - origin;
     const Vector3Lanes<4> half_way = {0.5 * (from.x + to.x), 0.5 * (from.y + to.y), 0.5 * (from.z + to.z)};
     middle.add(scaled(size * one_by_unit, half_way), one_by_unit);
-    for (int k = 0; k < 4; ++k) out.key = manifold::lesser(out.key, four.piece[k]->key());
+    for (int k = 0; k < 4; ++k) out.least.take(four.piece[k]->key(), four.at[k]);
     for (std::uint32_t k = 0; k < four.lanes; ++k) {
       if (four.piece[k]->kind() == manifold::MeetingKind::polygon)
         out.area.add(four.piece[k]->end[1], one_by_unit * one_by_unit);
@@ -130,36 +118,181 @@ void sum_pieces(const manifold::PieceMemory& memory, std::uint32_t begin, std::u
   length.add_to(out.length, times);
 }
 
-/// NormalFinder::spread_along().
-void spread_along(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory, std::uint32_t begin,
-                  std::uint32_t end, const manifold::Vector3& origin, const manifold::Vector3* directions,
-                  int count, manifold::Spread* spread) {
-  using D = DoubleLanes<4>;
-  constexpr D kMost = {INFINITY, INFINITY, INFINITY, INFINITY};
-  D highest[manifold::kMostTried], lowest[manifold::kMostTried];
-  for (int i = 0; i < count; ++i) highest[i] = -kMost, lowest[i] = kMost;
+/// The normals of four pieces, of a's triangle or b's. One float beyond them is read.
+struct FourNormals {
+  Lanes4 x, y, z;
+
+  TANDEM_INLINE FourNormals(const manifold::PieceMemory& memory, const FourPieces& four, int side) {
+    Lanes4 rows[4];
+    for (int k = 0; k < 4; ++k) rows[k] = load(memory.normals + 6 * std::size_t{four.at[k]} + 3 * side);
+    transpose_rows(rows);
+    x = rows[0], y = rows[1], z = rows[2];
+  }
+  TANDEM_INLINE LaneMask<4> of_face(const manifold::FloatVector& n) const {
+    const Lanes4 p = x + -n.x[0], q = y + -n.x[1], r = z + -n.x[2];
+    return {(p * p + q * q + r * r).v < manifold::kSameFace};
+  }
+};
+
+/// NormalFinder::least_unmarked(). A piece's mark is where its curve was.
+manifold::LeastPiece least_unmarked(const manifold::PieceMemory& memory, std::uint32_t begin,
+                                    std::uint32_t end, int side, const manifold::FloatVector& known) {
+  using Marks = Vector<4>::Bits;
+  manifold::LeastPiece least;
   for (std::uint32_t i = begin; i < end; i += 4) {
     const FourPieces four(memory, i, end);
-    for (int side = 0; side < 2; ++side) {
-      std::uint32_t index[4];
-      four.triangles(side, index);
+    Marks marks = {1, 1, 1, 1};
+    if (four.lanes == 4) {
+      __builtin_memcpy(&marks, memory.curve + i, sizeof marks);
+    } else {
+      for (std::uint32_t k = 0; k < four.lanes; ++k)
+        marks[k] = static_cast<std::int32_t>(memory.curve[i + k]);
+    }
+    if (LaneMask<4>{marks == 0}.mask() == 0) continue;
+    marks |= FourNormals(memory, four, side).of_face(known).bits & 1;
+    if (four.lanes == 4) {
+      __builtin_memcpy(memory.curve + i, &marks, sizeof marks);
+    } else {
+      for (std::uint32_t k = 0; k < four.lanes; ++k)
+        memory.curve[i + k] = static_cast<std::uint32_t>(marks[k]);
+    }
+    for (unsigned left = LaneMask<4>{marks == 0}.mask(); left != 0; left &= left - 1)
+      least.take(four.piece[std::countr_zero(left)]->key(), four.at[std::countr_zero(left)]);
+  }
+  return least;
+}
+
+/// Of NormalFinder::find_bearing_faces().
+void find_face_along(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end, int side,
+                     const manifold::FloatVector& up, manifold::FaceAlong& best) {
+  const float sign = side == 0 ? 1 : -1;
+  const float x = sign * up.x[0], y = sign * up.x[1], z = sign * up.x[2];
+  for (std::uint32_t i = begin; i < end; i += 4) {
+    const FourPieces four(memory, i, end);
+    const FourNormals n(memory, four, side);
+    const Lanes4 along = x * n.x + y * n.y + z * n.z;
+    for (unsigned found = LaneMask<4>{along.v >= best.along}.mask(); found != 0; found &= found - 1) {
+      const int k = std::countr_zero(found);
+      best.take(along.v[k], four.piece[k]->key(), four.at[k]);
+    }
+  }
+}
+
+/// Of NormalFinder::find_bearing_faces().
+void sum_length_on_face(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
+                        const manifold::FloatVector& face, double one_by_unit, manifold::ExactSum& sum) {
+  const manifold::FloatVector turned = {{-face.x[0], -face.x[1], -face.x[2]}};
+  for (std::uint32_t i = begin; i < end; i += 4) {
+    const FourPieces four(memory, i, end);
+    unsigned found =
+        (FourNormals(memory, four, 0).of_face(face) | FourNormals(memory, four, 1).of_face(turned)).mask();
+    for (found &= (1u << four.lanes) - 1; found != 0; found &= found - 1) {
+      const manifold::Piece& piece = *four.piece[std::countr_zero(found)];
+      if (piece.kind() == manifold::MeetingKind::polygon) continue;
+      sum.add(norm(piece.weight() * (piece.end[1] - piece.end[0])), one_by_unit);
+    }
+  }
+}
+
+/// Triangles of one body that pieces of a curve have, most of them once.
+class CurveTriangles {
+ public:
+  static constexpr std::uint32_t kMost = 64;
+
+  CurveTriangles(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end, int side)
+      : memory_(memory), next_(begin), end_(end), side_(side) {
+    for (std::uint32_t& s : seen_) s = kNoIndex;
+  }
+
+  /// Up to kMost further ones, a multiple of four: the last one may be there several times. 0: no more.
+  std::uint32_t gather(std::uint32_t (&index)[kMost]) {
+    std::uint32_t count = 0;
+    for (; next_ < end_ && count < kMost; ++next_) {
+      const std::uint32_t t = memory_.pieces[memory_.order[next_]].triangle[side_];
+      index[count] = t;
+      count += seen_[t % kSeen] != t ? 1 : 0;
+      seen_[t % kSeen] = t;
+    }
+    for (; count % 4 != 0; ++count) index[count] = index[count - 1];
+    return count;
+  }
+
+ private:
+  static constexpr std::uint32_t kSeen = 64;
+
+  const manifold::PieceMemory& memory_;
+  std::uint32_t next_, end_;
+  int side_;
+  std::uint32_t seen_[kSeen];
+};
+
+TANDEM_INLINE DoubleLanes<4> larger(const DoubleLanes<4>& x, const DoubleLanes<4>& y) {
+  return x > y ? x : y;
+}
+TANDEM_INLINE double largest(const DoubleLanes<4>& x) {
+  return manifold::greater(manifold::greater(x[0], x[1]), manifold::greater(x[2], x[3]));
+}
+
+/// The greatest heights of a body's triangles along directions.
+template <int kDirections>
+void highest_along(const manifold::Body& body, CurveTriangles triangles, const manifold::Vector3& origin,
+                   const manifold::Vector3* directions, double* highest) {
+  DoubleLanes<4> most[kDirections];
+  for (DoubleLanes<4>& m : most) m = DoubleLanes<4>{} - INFINITY;
+  std::uint32_t index[CurveTriangles::kMost];
+  while (const std::uint32_t count = triangles.gather(index)) {
+    for (std::uint32_t i = 0; i < count; i += 4) {
       for (int k = 0; k < 3; ++k) {
-        const Vector3Lanes<4> p = posed_corner(bodies[side], index, k) - origin;
-        for (int d = 0; d < count; ++d) {
-          const D height = dot(directions[d], p);
-          if (side == 0)
-            highest[d] = highest[d] > height ? highest[d] : height;
-          else
-            lowest[d] = lowest[d] < height ? lowest[d] : height;
-        }
+        const Vector3Lanes<4> p = posed_corner(body, index + i, k) - origin;
+        for (int d = 0; d < kDirections; ++d) most[d] = larger(most[d], dot(directions[d], p));
       }
     }
   }
-  for (int d = 0; d < count; ++d) {
-    spread[d] = {-INFINITY, INFINITY};
-    for (int i = 0; i < 4; ++i) {
-      spread[d].highest_a = manifold::greater(spread[d].highest_a, highest[d][i]);
-      spread[d].lowest_b = manifold::lesser(spread[d].lowest_b, lowest[d][i]);
+  for (int d = 0; d < kDirections; ++d) highest[d] = largest(most[d]);
+}
+
+/// NormalFinder::spread_along(), of some of the directions. Heights against a direction are those along it,
+/// negated to the last bit.
+template <int kDirections>
+void spread_along_some(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory,
+                       std::uint32_t begin, std::uint32_t end, const manifold::Vector3& origin,
+                       const manifold::Vector3* directions, int count, manifold::Spread* spread) {
+  for (int side = 0; side < 2; ++side) {
+    manifold::Vector3 along[kDirections];
+    double highest[kDirections];
+    for (int d = 0; d < kDirections; ++d) {
+      const manifold::Vector3& n = directions[d < count ? d : 0];
+      along[d] = side == 0 ? n : -n;
+    }
+    highest_along<kDirections>(bodies[side], CurveTriangles(memory, begin, end, side), origin, along,
+                               highest);
+    for (int d = 0; d < kDirections && d < count; ++d)
+      (side == 0 ? spread[d].highest_a : spread[d].lowest_b) = side == 0 ? highest[d] : -highest[d];
+  }
+}
+
+void spread_along(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory, std::uint32_t begin,
+                  std::uint32_t end, const manifold::Vector3& origin, const manifold::Vector3* directions,
+                  int count, manifold::Spread* spread) {
+  for (int first = 0; first < count;) {
+    const auto some = [&]<int kDirections>() {
+      spread_along_some<kDirections>(bodies, memory, begin, end, origin, directions + first, count - first,
+                                     spread + first);
+      first += kDirections;
+    };
+    switch (count - first) {
+      case 1:
+      case 2:
+        some.template operator()<2>();
+        break;
+      case 3:
+        some.template operator()<3>();
+        break;
+      case 4:
+        some.template operator()<4>();
+        break;
+      default:
+        some.template operator()<6>();
     }
   }
 }
@@ -168,28 +301,33 @@ void spread_along(const manifold::BodyPair& bodies, const manifold::PieceMemory&
 manifold::Extreme extreme_corner(const manifold::Body& body, const manifold::PieceMemory& memory,
                                  std::uint32_t begin, std::uint32_t end, const manifold::PatchFrame& frame,
                                  int side) {
+  using D = DoubleLanes<4>;
   manifold::Extreme best;
-  double furthest = -INFINITY;
-  const double up = side == 0 ? 1 : -1;
-  for (std::uint32_t i = begin; i < end; i += 4) {
-    const FourPieces four(memory, i, end);
-    std::uint32_t index[4];
-    four.triangles(side, index);
-    for (int k = 0; k < 3; ++k) {
-      const Vector3Lanes<4> x = posed_corner(body, index, k) - frame.origin;
-      const DoubleLanes<4> height = dot(frame.n, x);
-      unsigned found = bits_of_mask(up * height >= furthest);
-      if (found == 0) continue;
-      const DoubleLanes<4> u = dot(frame.u, x), v = dot(frame.v, x);
-      for (; found != 0; found &= found - 1) {
-        const int lane = std::countr_zero(found);
-        const manifold::Extreme here = {
-            {u[lane], v[lane]}, height[lane], body.shape->topology[index[lane]].vertex[k]};
-        if (!manifold::ExtremeQuestions::is_further(static_cast<std::uint32_t>(side), here, best)) continue;
-        best = here;
-        furthest = up * here.height;
+  const manifold::Vector3 up = side == 0 ? frame.n : -frame.n;
+  CurveTriangles triangles(memory, begin, end, side);
+  std::uint32_t index[CurveTriangles::kMost];
+  while (const std::uint32_t count = triangles.gather(index)) {
+    D height[3 * CurveTriangles::kMost / 4], most = D{} - INFINITY;
+    std::uint32_t heights = 0;
+    for (std::uint32_t i = 0; i < count; i += 4) {
+      for (int k = 0; k < 3; ++k) {
+        const D h = dot(up, posed_corner(body, index + i, k) - frame.origin);
+        height[heights++] = h, most = larger(most, h);
       }
     }
+    const double highest = largest(most);
+    manifold::Extreme here;
+    std::uint32_t triangle = 0, corner = 0;
+    for (std::uint32_t i = 0; i < heights; ++i) {  // a flat face has many that are as high
+      for (unsigned found = bits_of_mask(height[i] == highest); found != 0; found &= found - 1) {
+        const std::uint32_t t = index[i / 3 * 4 + static_cast<std::uint32_t>(std::countr_zero(found))];
+        const std::uint32_t vertex = body.shape->topology[t].vertex[i % 3];
+        if (vertex < here.vertex) here.vertex = vertex, triangle = t, corner = i % 3;
+      }
+    }
+    const manifold::Vector3 x = body.corner(triangle, static_cast<int>(corner));
+    here.at = frame.flat(x), here.height = frame.height(x);
+    if (manifold::ExtremeQuestions::is_further(static_cast<std::uint32_t>(side), here, best)) best = here;
   }
   return best;
 }
@@ -249,17 +387,31 @@ TANDEM_INLINE Lanes4 value_of(const manifold::RimValue& value, const FourCandida
   return value.distance ? x * x + y * y : (q.y - p.y) * x - (q.x - p.x) * y;
 }
 
-/// RimFinder::furthest().
+/// RimFinder::furthest(). First the values, then who has the greatest.
 void furthest(const manifold::PieceMemory& memory, const manifold::Candidate* candidates, std::uint32_t count,
               const manifold::RimValue* values, int wanted, manifold::Furthest* best) {
-  for (std::uint32_t i = 0; i < count; i += 4) {
-    const FourCandidates four(candidates, i, count);
+  constexpr std::uint32_t kAtOnce = 256;
+  for (std::uint32_t from = 0; from < count; from += kAtOnce) {
+    const std::uint32_t end = count - from < kAtOnce ? count : from + kAtOnce;
+    Lanes4 value[2][kAtOnce / 4], most[2];
+    for (int w = 0; w < wanted; ++w) most[w].v = Lanes4::Floats{} + best[w].value;
+    std::uint32_t groups = 0;
+    for (std::uint32_t i = from; i < end; i += 4, ++groups) {
+      const FourCandidates four(candidates, i, count);
+      for (int w = 0; w < wanted; ++w) {
+        value[w][groups] = value_of(values[w], four);
+        most[w] = larger(most[w], value[w][groups]);
+      }
+    }
     for (int w = 0; w < wanted; ++w) {
-      const Lanes4 value = value_of(values[w], four);
-      unsigned found = LaneMask<4>{value.v >= best[w].value}.mask();
-      for (; found != 0; found &= found - 1) {
-        const auto k = static_cast<std::uint32_t>(std::countr_zero(found));
-        if (i + k < count) best[w].take(memory, value.v[static_cast<int>(k)], candidates[i + k].reference);
+      float greatest = most[w].v[0];
+      for (int k = 1; k < 4; ++k) greatest = manifold::greater(greatest, most[w].v[k]);
+      for (std::uint32_t group = 0; group < groups; ++group) {
+        unsigned found = LaneMask<4>{value[w][group].v == greatest}.mask();
+        for (; found != 0; found &= found - 1) {
+          const std::uint32_t i = from + 4 * group + static_cast<std::uint32_t>(std::countr_zero(found));
+          if (i < count) best[w].take(memory, greatest, candidates[i].reference);
+        }
       }
     }
   }

@@ -25,6 +25,14 @@ TANDEM_INLINE void fetch(const Block& block) {
   __builtin_prefetch(&block.half_extent[1]);
 }
 
+/// The triangles of the leaf block are looked at soon.
+TANDEM_INLINE void fetch_leaves(const manifold::Body& body, const Block& block) {
+  const char* const triangles = reinterpret_cast<const char*>(body.shape->triangles + block.index[0]);
+  for (int line = 0; line < 3; ++line) __builtin_prefetch(triangles + 64 * line);
+  __builtin_prefetch(triangles + 4 * sizeof(Triangle) - 1);
+  __builtin_prefetch(body.shape->topology + block.index[0]);
+}
+
 struct BoxCoordinates {
   Lanes4 center[3], half_extent[3];
 
@@ -64,9 +72,9 @@ class LineWalk {
       for (int k = 0; k < 3; ++k)
         p.x[k] = static_cast<float>(at.x) * u_.x[k] + static_cast<float>(at.y) * v_.x[k];
       const float(&d)[3] = direction_.x;
-      line_[i].across[0] = p.x[1] * d[2] - p.x[2] * d[1];
-      line_[i].across[1] = p.x[2] * d[0] - p.x[0] * d[2];
-      line_[i].across[2] = p.x[0] * d[1] - p.x[1] * d[0];
+      line_[i].across[0] = p.x[2] * d[1] - p.x[1] * d[2];
+      line_[i].across[1] = p.x[0] * d[2] - p.x[2] * d[0];
+      line_[i].across[2] = p.x[1] * d[0] - p.x[0] * d[1];
     }
   }
 
@@ -113,6 +121,8 @@ class LineWalk {
     Waiting waiting[kMostWaiting];
     int count = 0;
     waiting[count++] = {0, asked};
+    const Block* fetched = nullptr;  // a leaf block that waits for its triangles
+    unsigned lines_of_fetched = 0;
     while (count > 0) {
       const Waiting next = waiting[--count];
       const Block& block = body_.shape->blocks[next.block];
@@ -120,7 +130,9 @@ class LineWalk {
       const unsigned met = lines_that_meet(block, next.lines, below);
       if (met == 0) continue;
       if (block.is_leaf_block()) {
-        visit(block, met);
+        fetch_leaves(body_, block);
+        if (fetched != nullptr) visit(*fetched, lines_of_fetched);
+        fetched = &block, lines_of_fetched = met;
         continue;
       }
       for (int i = kNodesPerBlock - 1; i >= 0; --i) {
@@ -129,6 +141,7 @@ class LineWalk {
         waiting[count++] = {block.index[i], below[i]};
       }
     }
+    if (fetched != nullptr) visit(*fetched, lines_of_fetched);
   }
 
   /// As LineTest::passes(), for four boxes and several lines. What depends on the line alone or the box alone
@@ -145,19 +158,16 @@ class LineWalk {
     const Lanes4 along = d[0] * x + d[1] * y + d[2] * z;
     const Lanes4 reach = s[0] * h[0] + s[1] * h[1] + s[2] * h[2] + slack_;
     const Lanes4 low = along - reach, high = along + reach;
-    below[0] = below[1] = below[2] = below[3] = 0;
-    unsigned met = 0;
+    typename Vector<4>::Bits all = {};
     for (; lines != 0; lines &= lines - 1) {
       const int i = std::countr_zero(lines);
       const Line& line = line_[i];
       typename Vector<4>::Bits passes = (low.v <= line.to) & (high.v >= line.from);
-      for (int k = 0; k < 3; ++k) passes &= magnitude(across[k] + -line.across[k]).v <= extent[k].v;
-      unsigned nodes = LaneMask<4>{passes}.mask();
-      if (nodes == 0) continue;
-      met |= 1u << i;
-      for (; nodes != 0; nodes &= nodes - 1) below[std::countr_zero(nodes)] |= 1u << i;
+      for (int k = 0; k < 3; ++k) passes &= magnitude(across[k] + line.across[k]).v <= extent[k].v;
+      all |= passes & (1 << i);
     }
-    return met;
+    __builtin_memcpy(below, &all, sizeof below);
+    return below[0] | below[1] | below[2] | below[3];
   }
 
   /// LineQuestions::visit() and merge(), of four triangles.
@@ -169,9 +179,7 @@ class LineWalk {
     for (int k = 0; k < 3; ++k) corner[k] = posed_corner(body_, index, k) - frame_.origin;
     const Vector3Lanes<4> normal = cross(corner[1] - corner[0], corner[2] - corner[0]);
     const D area = dot(frame_.n, normal), size = square_root(dot(normal, normal));
-    const TriangleTopology* const topology = body_.shape->topology;
-    DoubleMask<4> turned;
-    for (int i = 0; i < kNodesPerBlock; ++i) turned[i] = is_turned(topology[index[i]].flags) ? -1 : 0;
+    const DoubleMask<4> turned = -__builtin_convertvector(turned_lanes(body_, index), DoubleMask<4>);
     const DoubleMask<4> upwards = turned ^ (area > 0);  // not turned: a positive area faces along the normal
     const DoubleMask<4> steep = magnitude_of<4>(area) > manifold::kWall * size;
     const D little = 1e-9 + 0x1p-48 * body_.reach * square_root(size) / magnitude_of<4>(area);
@@ -225,28 +233,31 @@ class ExtremeWalk {
     const PatchFrame& frame = prism.frame;
     origin_ = point_in_mesh(body, frame.origin);
     slack_ = slack_near(body, origin_);
-    direction_ = in_mesh(body, side == 0 ? frame.n : -frame.n);
-    const FloatVector u = in_mesh(body, frame.u), v = in_mesh(body, frame.v);
-    for (int i = 0; i < prism.sides; ++i) {
-      const auto x = static_cast<float>(prism.outward[i].x), y = static_cast<float>(prism.outward[i].y);
-      for (int k = 0; k < 3; ++k) outward_[i].x[k] = x * u.x[k] + y * v.x[k];
-      offset_[i] = static_cast<float>(prism.offset[i]) + slack_;
+    for (int k = 0; k < 2; ++k) {
+      axis_[k] = in_mesh(body, prism.axis[k].x * frame.u + prism.axis[k].y * frame.v);
+      least_[k] = static_cast<float>(prism.least[k]) - slack_;
+      most_[k] = static_cast<float>(prism.most[k]) + slack_;
     }
-    const float lower = static_cast<float>(side == 0 ? prism.lower : -prism.upper) - slack_;
-    upper_ = static_cast<float>(side == 0 ? prism.upper : -prism.lower) + slack_;
-    lower_ = greater(lower, static_cast<float>(side == 0 ? prism.above_a : -prism.below_b) - slack_);
+    axis_[2] = in_mesh(body, side == 0 ? frame.n : -frame.n);
+    least_[2] = greater(static_cast<float>(side == 0 ? prism.lower : -prism.upper),
+                        static_cast<float>(side == 0 ? prism.above_a : -prism.below_b)) -
+                slack_;
+    most_[2] = static_cast<float>(side == 0 ? prism.upper : -prism.lower) + slack_;
   }
 
   manifold::Extreme find() {
     std::uint32_t waiting[kMostWaiting];
     int count = 0;
     waiting[count++] = 0;
+    const Block* fetched = nullptr;
     while (count > 0) {
       const Block& block = body_.shape->blocks[waiting[--count]];
       unsigned nodes = nodes_that_reach(block);
       if (nodes == 0) continue;
       if (block.is_leaf_block()) {
-        visit(block);
+        fetch_leaves(body_, block);
+        if (fetched != nullptr) visit(*fetched);
+        fetched = &block;
         continue;
       }
       for (; nodes != 0; nodes &= nodes - 1) {
@@ -255,6 +266,7 @@ class ExtremeWalk {
         waiting[count++] = next;
       }
     }
+    if (fetched != nullptr) visit(*fetched);
     return best_;
   }
 
@@ -262,18 +274,13 @@ class ExtremeWalk {
   /// As PrismTest::passes(), for four boxes.
   TANDEM_INLINE unsigned nodes_that_reach(const Block& block) const {
     const BoxCoordinates box(block, origin_);
-    const auto dot_with = [](const manifold::FloatVector& e, const Lanes4(&x)[3]) {
-      return e.x[0] * x[0] + e.x[1] * x[1] + e.x[2] * x[2];
-    };
-    const auto extent = [&](const manifold::FloatVector& e) {
-      const Lanes4(&h)[3] = box.half_extent;
-      return std::fabs(e.x[0]) * h[0] + std::fabs(e.x[1]) * h[1] + std::fabs(e.x[2]) * h[2] + slack_;
-    };
-    const Lanes4 along = dot_with(direction_, box.center), reach = extent(direction_);
-    typename Vector<4>::Bits passes = ((along + reach).v >= lower_) & ((along - reach).v <= upper_);
-    for (int i = 0; i < prism_.sides; ++i) {
-      if (LaneMask<4>{passes}.mask() == 0) return 0;
-      passes &= (dot_with(outward_[i], box.center) - extent(outward_[i])).v <= offset_[i];
+    const Lanes4(&x)[3] = box.center, (&h)[3] = box.half_extent;
+    typename Vector<4>::Bits passes = ~typename Vector<4>::Bits{};
+    for (int k = 0; k < 3; ++k) {
+      const float(&e)[3] = axis_[k].x;
+      const Lanes4 at = e[0] * x[0] + e[1] * x[1] + e[2] * x[2];
+      const Lanes4 extent = std::fabs(e[0]) * h[0] + std::fabs(e[1]) * h[1] + std::fabs(e[2]) * h[2];
+      passes &= ((at + extent).v >= least_[k]) & ((at - extent).v <= most_[k]);
     }
     return LaneMask<4>{passes}.mask();
   }
@@ -296,7 +303,7 @@ class ExtremeWalk {
         const auto side = static_cast<std::uint32_t>(side_);
         if (!manifold::ExtremeQuestions::is_further(side, here, best_) || !prism_.contains(here.at)) continue;
         best_ = here;
-        lower_ = manifold::greater(lower_, static_cast<float>(up_ * here.height) - slack_);
+        least_[2] = manifold::greater(least_[2], static_cast<float>(up_ * here.height) - slack_);
       }
     }
   }
@@ -304,8 +311,8 @@ class ExtremeWalk {
   const manifold::Body& body_;
   const manifold::Prism& prism_;
   int side_, up_;
-  manifold::FloatVector origin_, direction_, outward_[manifold::Prism::kMostSides];
-  float offset_[manifold::Prism::kMostSides], lower_, upper_, slack_;
+  manifold::FloatVector origin_, axis_[3];
+  float least_[3], most_[3], slack_;
   manifold::Extreme best_;
 };
 

@@ -16,8 +16,7 @@ struct WorldTriangleLanes {
     for (int k = 0; k < 3; ++k) corner[k] = posed_corner(body, index, k);
     const Vector3Lanes<4> n = cross(corner[1] - corner[0], corner[2] - corner[0]);
     const DoubleLanes<4> length = square_root(dot(n, n));
-    DoubleLanes<4> turn;
-    for (int i = 0; i < 4; ++i) turn[i] = is_turned(body.shape->topology[index[i]].flags) ? -1 : 1;
+    const DoubleLanes<4> turn = __builtin_convertvector(1 - 2 * turned_lanes(body, index), DoubleLanes<4>);
     const DoubleLanes<4> scale = length > 1e-290 ? turn / length : DoubleLanes<4>{};
     normal = {scale * n.x, scale * n.y, scale * n.z};
   }
@@ -104,6 +103,10 @@ class PieceMaker {
   manifold::PieceBounds make(const Contact* contacts, std::uint32_t count) {
     for (std::uint32_t i = 0; i < count; i += 4) {
       const std::uint32_t lanes = count - i < 4 ? count - i : 4;
+      for (std::uint32_t next = i + kAhead; next < i + kAhead + 4 && next < count; ++next) {
+        fetch_triangle(bodies_.a, contacts[next].triangle_a);
+        fetch_triangle(bodies_.b, contacts[next].triangle_b);
+      }
       make_four(contacts + i, lanes);
     }
     for (int k = 0; k < 3; ++k) {
@@ -116,6 +119,14 @@ class PieceMaker {
   }
 
  private:
+  static constexpr std::uint32_t kAhead = 12;  // contacts whose triangles are on their way
+
+  TANDEM_INLINE static void fetch_triangle(const manifold::Body& body, std::uint32_t triangle) {
+    __builtin_prefetch(body.shape->triangles[triangle].corner);
+    __builtin_prefetch(body.shape->triangles[triangle].corner + 2);
+    __builtin_prefetch(body.shape->topology + triangle);
+  }
+
   TANDEM_INLINE void make_four(const Contact* contacts, std::uint32_t lanes) {
     using D = DoubleLanes<4>;
     using Mask = DoubleMask<4>;
@@ -150,17 +161,12 @@ class PieceMaker {
       const Mask info = kind | feature_from << 8 | feature_to << 12;
       const unsigned whole = bits_of_mask(meets) & all & ~special;
       stretch_bounds(from, to, is_point, meets, whole, special, lanes);
-      write(contacts, whole, info, from, to, a.normal, b.normal);
+      write(index_a, index_b, whole, info, from, to, a.normal, b.normal);
       found_.segments += static_cast<std::uint32_t>(std::popcount(whole & ~bits_of_mask(is_point)));
     }
     for (unsigned rest = special; rest != 0; rest &= rest - 1) {
       const int i = std::countr_zero(rest);
-      const manifold::WorldTriangle of_lane_a = a.lane(i), of_lane_b = b.lane(i);
-      manifold::meet(of_lane_a, of_lane_b, tolerance_, meeting_);
-      if (meeting_.kind == manifold::MeetingKind::none) continue;
-      manifold::write_piece(memory_, found_.pieces++, contacts[i], of_lane_a.normal, of_lane_b.normal,
-                            meeting_);
-      found_.add(meeting_);
+      ManifoldMeans::add_piece(memory_, contacts[i], a.lane(i), b.lane(i), tolerance_, found_);
     }
   }
 
@@ -181,25 +187,39 @@ class PieceMaker {
     }
   }
 
-  TANDEM_INLINE void write(const Contact* contacts, unsigned whole, const DoubleMask<4>& info,
-                           const Vector3Lanes<4>& from, const Vector3Lanes<4>& to,
-                           const Vector3Lanes<4>& normal_a, const Vector3Lanes<4>& normal_b) {
-    using Floats [[gnu::vector_size(16)]] = float;
-    const auto floats = [](const DoubleLanes<4>& x) { return __builtin_convertvector(x, Floats); };
-    const Floats n[6] = {floats(normal_a.x), floats(normal_a.y), floats(normal_a.z),
-                         floats(normal_b.x), floats(normal_b.y), floats(normal_b.z)};
-    for (; whole != 0; whole &= whole - 1) {
-      const int i = std::countr_zero(whole);
+  TANDEM_INLINE void write(const std::uint32_t (&index_of_a)[4], const std::uint32_t (&index_of_b)[4],
+                           unsigned whole, const DoubleMask<4>& info, const Vector3Lanes<4>& from,
+                           const Vector3Lanes<4>& to, const Vector3Lanes<4>& normal_a,
+                           const Vector3Lanes<4>& normal_b) {
+    using Floats = Vector<4>::Floats;
+    using Bits = Vector<4>::Bits;
+    const auto floats = [](const DoubleLanes<4>& x) { return Lanes4{__builtin_convertvector(x, Floats)}; };
+    const auto bits_as_floats = [](const Bits& x) { return Lanes4{reinterpret_cast<Floats>(x)}; };
+    Bits index_a, index_b;
+    __builtin_memcpy(&index_a, index_of_a, sizeof index_a);
+    __builtin_memcpy(&index_b, index_of_b, sizeof index_b);
+    Lanes4 head[4] = {bits_as_floats(index_a), bits_as_floats(index_b),
+                      bits_as_floats(__builtin_convertvector(info, Bits)), Lanes4{}};
+    DoubleLanes<4> ends[4] = {from.x, from.y, from.z, to.x}, rest[4] = {to.y, to.z, to.y, to.z};
+    Lanes4 normals[4] = {floats(normal_a.x), floats(normal_a.y), floats(normal_a.z), floats(normal_b.x)},
+           more[4] = {floats(normal_b.y), floats(normal_b.z), floats(normal_b.y), floats(normal_b.z)};
+    transpose_rows(head), transpose_rows(ends), transpose_rows(rest);
+    transpose_rows(normals), transpose_rows(more);
+#pragma GCC unroll 4
+    for (unsigned i = 0; i < 4; ++i) {
+      if ((whole >> i & 1u) == 0) continue;
       const std::uint32_t at = found_.pieces++;
-      manifold::Piece& piece = memory_.pieces[at];
-      piece.triangle[0] = contacts[i].triangle_a, piece.triangle[1] = contacts[i].triangle_b;
-      piece.info = static_cast<std::uint32_t>(info[i]);
-      piece.unused = 0;
-      piece.end[0] = WorldTriangleLanes::lane_of(from, i), piece.end[1] = WorldTriangleLanes::lane_of(to, i);
-      float* const normals = memory_.normals + 6 * std::size_t{at};
-      for (int k = 0; k < 6; ++k) normals[k] = n[k][i];
+      char* const piece = reinterpret_cast<char*>(memory_.pieces + at);
+      __builtin_memcpy(piece, &head[i], 16);
+      __builtin_memcpy(piece + 16, &ends[i], 32);
+      __builtin_memcpy(piece + 48, &rest[i], 16);
+      float* const normals_of_piece = memory_.normals + 6 * std::size_t{at};
+      __builtin_memcpy(normals_of_piece, &normals[i], 16);
+      __builtin_memcpy(normals_of_piece + 4, &more[i], 8);
     }
   }
+
+  static_assert(offsetof(manifold::Piece, info) == 8 && offsetof(manifold::Piece, end) == 16);
 
   static constexpr DoubleLanes<4> kNothing = {INFINITY, INFINITY, INFINITY, INFINITY};
 
@@ -208,7 +228,6 @@ class PieceMaker {
   double tolerance_;
   manifold::PieceBounds found_;
   DoubleLanes<4> lower_[3] = {kNothing, kNothing, kNothing}, upper_[3] = {-kNothing, -kNothing, -kNothing};
-  manifold::Meeting meeting_;
 };
 
 manifold::PieceBounds make_pieces(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory,

@@ -41,10 +41,12 @@ class ManifoldMaker {
  private:
   TANDEM_HD void place_soundings(const RimFinder<Team>& finder, const Rim& rim);
   TANDEM_HD void walk_lines(LineQuestions& questions, std::uint32_t count, DepthMemory& shared);
-  TANDEM_HD void sound(int first, DepthMemory& shared);
+  TANDEM_HD void sound(int first, int end, std::uint32_t which, DepthMemory& shared);
   TANDEM_HD void place_prism(DepthMemory& shared);
   TANDEM_HD void find_extreme_corners(std::uint32_t curve, DepthMemory& shared);
-  TANDEM_HD void sound_deepest(std::uint32_t curve, DepthMemory& shared);
+  TANDEM_HD void place_vertex(int at, int side, const Extreme& vertex, double height_of_middle);
+  TANDEM_HD void sound_rim(bool few, std::uint32_t curve, DepthMemory& shared);
+  TANDEM_HD void sound_deepest(bool few, DepthMemory& shared);
   TANDEM_HD void look_behind(DepthMemory& shared);
   TANDEM_HD void choose(const RimFinder<Team>& finder, int most_of_rim, bool touch, ChoiceMemory& shared);
   TANDEM_HD void write_points(const ChoiceMemory& shared, Patch& patch, int count) const;
@@ -117,19 +119,24 @@ TANDEM_HD void ManifoldMaker<Team>::walk_lines(LineQuestions& questions, std::ui
   team_.sync();
 }
 
-/// Follows the lines of soundings from the first on.
+/// Follows the lines of soundings from `first` on, of those below `end` whose bits are set.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::sound(int first, DepthMemory& shared) {
+TANDEM_HD void ManifoldMaker<Team>::sound(int first, int end, std::uint32_t which, DepthMemory& shared) {
   LineQuestions questions(bodies_, state_.frame, shared.line);
-  const auto asked = 2 * static_cast<std::uint32_t>(state_.soundings - first);
-  for (std::uint32_t i = team_.rank(); i < asked; i += team_.size()) {
-    const Sounding& s = state_.sounding[first + static_cast<int>(i / 2)];
-    const int side = static_cast<int>(i % 2);
-    questions.ask(i, side, side == 0 ? 1 : -1, s.line, s.target[side], -INFINITY, INFINITY, state_.extent);
+  const auto count = 2 * static_cast<std::uint32_t>(end - first);
+  for (std::uint32_t i = team_.rank(); i < count; i += team_.size()) {
+    const int at = first + static_cast<int>(i / 2), side = static_cast<int>(i % 2);
+    const Sounding& s = state_.sounding[at];
+    shared.line[i].side = -1;
+    if ((which >> at & 1u) == 0) continue;
+    questions.ask(i, side, side == 0 ? 1 : -1, s.line, s.target[side], -INFINITY, INFINITY,
+                  state_.extent / 4);
   }
-  walk_lines(questions, asked, shared);
-  for (std::uint32_t i = team_.rank(); i < asked; i += team_.size())
-    state_.sounding[first + static_cast<int>(i / 2)].surface[i % 2] = shared.line[i].best;
+  walk_lines(questions, count, shared);
+  for (std::uint32_t i = team_.rank(); i < count; i += team_.size()) {
+    if (shared.line[i].side >= 0)
+      state_.sounding[first + static_cast<int>(i / 2)].surface[i % 2] = shared.line[i].best;
+  }
   team_.sync();
 }
 
@@ -167,7 +174,7 @@ TANDEM_HD void ManifoldMaker<Team>::place_prism(DepthMemory& shared) {
     prism.frame = state_.frame;
     prism.sides = state_.rim_points;
     double lowest = INFINITY, highest = -INFINITY, above_a = -INFINITY, below_b = INFINITY;
-    for (int i = 0; i < state_.soundings; ++i) {
+    for (int i = 0; i <= state_.rim_points; ++i) {
       const Sounding& s = state_.sounding[i];
       lowest = lesser(lowest, s.height), highest = greater(highest, s.height);
       if (!(s.overlap() > 0)) continue;
@@ -228,11 +235,43 @@ TANDEM_HD void ManifoldMaker<Team>::find_extreme_corners(std::uint32_t curve, De
   }
 }
 
-/// Sounds where a's highest vertex in the patch is, and b's lowest: there, or in the middle, the overlap is
-/// deepest, or nearly. They are looked for within the rim, and among the corners of triangles that the curve
-/// cuts, where they are few: the tip of a coarse mesh may lean out of its rim.
+/// A sounding where a body's vertex is; one that meets nothing, if there is no vertex.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::sound_deepest(std::uint32_t curve, DepthMemory& shared) {
+TANDEM_HD void ManifoldMaker<Team>::place_vertex(int at, int side, const Extreme& vertex,
+                                                 double height_of_middle) {
+  Sounding& s = state_.sounding[at];
+  s = {};
+  s.reference = kNoIndex;
+  if (!vertex.found()) return;
+  s.at = s.line = vertex.at;
+  s.height = vertex.height;
+  s.target[side] = vertex.height;
+  s.target[1 - side] = height_of_middle;
+  s.vertex_of = side;
+  s.feature = feature_hash(vertex.vertex, side == 0 ? 5 : 6);
+}
+
+/// Sounds the rim and the middle, and where triangles that the curve cuts are few, their highest corner of a
+/// and their lowest of b: the tip of a coarse mesh may lean out of its rim. Before those come two soundings
+/// for vertices within the rim.
+template <typename Team>
+TANDEM_HD void ManifoldMaker<Team>::sound_rim(bool few, std::uint32_t curve, DepthMemory& shared) {
+  if (few) find_extreme_corners(curve, shared);
+  team_.sync();
+  const int inner = state_.rim_points + 1, end = inner + 4;
+  const double height_of_middle = state_.sounding[state_.rim_points].height;
+  for (int i = static_cast<int>(team_.rank()); i < 4; i += static_cast<int>(team_.size()))
+    place_vertex(inner + i, i % 2, few && i >= 2 ? shared.extreme[i] : Extreme{}, height_of_middle);
+  if (team_.rank() == 0) state_.soundings = end;
+  team_.sync();
+  const std::uint32_t corners = few ? 3u << (inner + 2) : 0u;
+  sound(0, few ? end : inner, ((1u << inner) - 1) | corners, shared);
+}
+
+/// Sounds where a's highest vertex within the rim is, and b's lowest: there, or in the middle, the overlap is
+/// deepest, or nearly. Where that is a corner that was sounded with the rim, it takes its place.
+template <typename Team>
+TANDEM_HD void ManifoldMaker<Team>::sound_deepest(bool few, DepthMemory& shared) {
   place_prism(shared);
   if constexpr (HasMeans<Team>) {
     for (int side = 0; side < 2; ++side)
@@ -245,33 +284,25 @@ TANDEM_HD void ManifoldMaker<Team>::sound_deepest(std::uint32_t curve, DepthMemo
       walk_surface(group, questions, side, given);
     });
   }
-  const bool few = memory_.start[curve + 1] - memory_.start[curve] <= kFewPieces;
-  if (few) find_extreme_corners(curve, shared);
   team_.sync();
-  const int first = state_.soundings;
+  const int inner = state_.rim_points + 1;
   const double height_of_middle = state_.sounding[state_.rim_points].height;
-  team_.sync();
-  int soundings = first;
-  for (std::uint32_t i = 0; i < (few ? 4u : 2u); ++i) {
-    const std::uint32_t side = i % 2;
-    const Extreme& extreme = shared.extreme[i];
-    if (!extreme.found() || (i >= 2 && extreme.vertex == shared.extreme[side].vertex)) continue;
-    if (team_.rank() == i % team_.size()) {
-      Sounding& s = state_.sounding[soundings];
-      s = {};
-      s.at = s.line = extreme.at;
-      s.height = extreme.height;
-      s.target[side] = extreme.height;
-      s.target[1 - side] = height_of_middle;
-      s.reference = kNoIndex;
-      s.vertex_of = static_cast<int>(side);
-      s.feature = feature_hash(extreme.vertex, side == 0 ? 5 : 6);
+  std::uint32_t further = 0;
+  for (int side = 0; side < 2; ++side) {
+    const Extreme& vertex = shared.extreme[side];
+    if (!vertex.found()) continue;
+    const bool sounded = few && vertex.vertex == shared.extreme[2 + side].vertex;
+    if (!sounded) further |= 1u << (inner + side);
+    if (team_.rank() != static_cast<std::uint32_t>(side) % team_.size()) continue;
+    if (sounded) {
+      state_.sounding[inner + side] = state_.sounding[inner + 2 + side];
+      place_vertex(inner + 2 + side, side, {}, 0);
+    } else {
+      place_vertex(inner + side, side, vertex, height_of_middle);
     }
-    ++soundings;
   }
-  if (team_.rank() == 0) state_.soundings = soundings;
   team_.sync();
-  if (soundings > first) sound(first, shared);
+  if (further != 0) sound(inner, inner + 2, further, shared);
 }
 
 /// Looks whether lines that seem to overlap run within both bodies: where there are several curves, one may
@@ -445,8 +476,9 @@ TANDEM_HD bool ManifoldMaker<Team>::begin(std::uint32_t curve, OutlineMemory& sh
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::measure_depths(std::uint32_t curve, DepthMemory& shared) {
   if (state_.touch) return;
-  sound(0, shared);
-  sound_deepest(curve, shared);
+  const bool few = memory_.start[curve + 1] - memory_.start[curve] <= kFewPieces;
+  sound_rim(few, curve, shared);
+  sound_deepest(few, shared);
   look_behind(shared);
 }
 

@@ -16,14 +16,25 @@ struct Patch {
   ManifoldPoint point[kMostManifoldPoints];
 };
 
+/// The piece of the least key.
+struct LeastPiece {
+  std::uint64_t key = ~std::uint64_t{0};
+  std::uint32_t piece = kNoIndex;
+
+  TANDEM_HD void take(std::uint64_t of, std::uint32_t at) {
+    if (of < key) key = of, piece = at;
+  }
+};
+
 /// Sums over the pieces of a curve.
 struct CurveSums {
   ExactVectorSum area, gap, middle;
   ExactSum length;
-  std::uint64_t key = ~std::uint64_t{0};
+  LeastPiece least;
 
-  TANDEM_HD void add(const Piece& piece, const Vector3& origin, double one_by_unit) {
-    key = lesser(key, piece.key());
+  TANDEM_HD void add(const PieceMemory& memory, std::uint32_t at, const Vector3& origin, double one_by_unit) {
+    const Piece& piece = memory.pieces[at];
+    least.take(piece.key(), at);
     if (piece.kind() == MeetingKind::polygon) return area.add(piece.end[1], one_by_unit * one_by_unit);
     const Vector3 from = piece.end[0] - origin, along = piece.weight() * (piece.end[1] - piece.end[0]);
     area.add(0.5 * cross(from, along), one_by_unit * one_by_unit);
@@ -43,6 +54,20 @@ struct CurveMeasure {
   Vector3 sheet_normal;  ///< of the pieces' triangles, from a towards b, times lengths, where it is not
                          ///< closed; of open surfaces where there are any
   std::uint64_t key = 0;
+};
+
+/// Unit normals of float32 whose difference's square is less are of one face: half a milliradian.
+inline constexpr float kSameFace = 2e-7f;
+
+/// The face that lies most across a direction; of several that of the least piece.
+struct FaceAlong {
+  float along = 0.9f;  ///< faces that lie less across it do not count
+  LeastPiece least;
+
+  TANDEM_HD void take(float of_piece, std::uint64_t key, std::uint32_t piece) {
+    if (of_piece > along) along = of_piece, least = {};
+    if (of_piece == along) least.take(key, piece);
+  }
 };
 
 /// The heights of a patch's triangles along a direction.

@@ -30,6 +30,8 @@ class NormalFinder {
         end_(memory.start[curve + 1]) {}
 
   TANDEM_HD CurveMeasure measure();
+
+  /// Condition: measure(), whose result this is.
   TANDEM_HD PatchNormal find(const CurveMeasure& curve);
 
  private:
@@ -48,6 +50,8 @@ class NormalFinder {
   TANDEM_HD_SELDOM bool has_free_end() const;
   TANDEM_HD_SELDOM Vector3 plain_middle() const;
   TANDEM_HD_SELDOM Vector3 sheet_normal() const;
+  TANDEM_HD bool has_many_directions(int side) const;
+  TANDEM_HD LeastPiece least_unmarked(int side, const FloatVector& known) const;
   TANDEM_HD bool gather_directions(int side, bool keep_if_many);
   TANDEM_HD void find_bearing_faces(const Vector3& smooth, double length);
   TANDEM_HD void spread_along(int count) const;
@@ -55,14 +59,22 @@ class NormalFinder {
   TANDEM_HD_SELDOM bool find_for_touch(Vector3& n);
   TANDEM_HD_SELDOM bool find_crossing_edges(Vector3& n) const;
   TANDEM_HD Vector3 crossing_edges(const Piece& piece, int number) const;
+  /// From a towards b.
+  TANDEM_HD static FloatVector turned_normal(const float* normals, int side) {
+    const float sign = side == 0 ? 1.0f : -1.0f;
+    return {{sign * normals[3 * side], sign * normals[3 * side + 1], sign * normals[3 * side + 2]}};
+  }
   /// The normal, from a towards b, of a piece's triangle.
   TANDEM_HD Vector3 direction_of(int side, std::uint32_t piece) const {
     const Vector3 n = bodies_[side].triangle(memory_.pieces[piece].triangle[side]).normal;
     return side == 0 ? n : -n;
   }
   TANDEM_HD static bool same_face(const FloatVector& p, const FloatVector& q) {
+    return distance_square(p, q) < kSameFace;
+  }
+  TANDEM_HD static float distance_square(const FloatVector& p, const FloatVector& q) {
     const float x = p.x[0] - q.x[0], y = p.x[1] - q.x[1], z = p.x[2] - q.x[2];
-    return x * x + y * y + z * z < 2e-7f;
+    return x * x + y * y + z * z;
   }
   TANDEM_HD static bool same_direction(const Vector3& p, const Vector3& q) { return dot(p, q) > 1 - 1e-7; }
 
@@ -72,6 +84,7 @@ class NormalFinder {
   NormalMemory& shared_;
   const PieceSummary& summary_;
   std::uint32_t begin_, end_;
+  LeastPiece least_;  // of those that this one of the team sees
   int directions_ = 0;
 };
 
@@ -83,12 +96,14 @@ TANDEM_HD CurveMeasure NormalFinder<Team>::measure() {
   if constexpr (HasMeans<Team>) {
     team_.means().sum_pieces(memory_, begin_, end_, summary_.origin, one_by_unit, sums);
   } else {
-    for_each_piece([&](const Piece& piece, const float*) { sums.add(piece, summary_.origin, one_by_unit); });
+    for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size())
+      sums.add(memory_, memory_.order[i], summary_.origin, one_by_unit);
   }
   add_up(team_, sums.area.x, sums.area.y, sums.area.z, sums.gap.x, sums.gap.y, sums.gap.z, sums.middle.x,
          sums.middle.y, sums.middle.z, sums.length);
   CurveMeasure out;
-  out.key = team_.least(sums.key);
+  least_ = sums.least;
+  out.key = team_.least(least_.key);
   out.area = sums.area.value(unit * unit);
   out.length = sums.length.value(unit);
   out.closed = !(may_be_free && has_free_end()) && norm(sums.gap.value(unit)) <= kClosed * out.length;
@@ -140,38 +155,63 @@ TANDEM_HD_SELDOM Vector3 NormalFinder<Team>::sheet_normal() const {
   return sum.value(unit);
 }
 
+/// Whether a sample of pieces proves that gather_directions() is false: of more than kMostDirections normals
+/// each is more than twice as far from the others as normals of one direction are from it, so no direction
+/// has two of them.
+template <typename Team>
+TANDEM_HD bool NormalFinder<Team>::has_many_directions(int side) const {
+  constexpr std::uint32_t kSample = 32;
+  const std::uint32_t step = (end_ - begin_ + kSample - 1) / kSample;
+  FloatVector known[kMostDirections];
+  int count = 0;
+  for (std::uint32_t i = begin_; i < end_; i += step) {
+    const float* n = memory_.normals + 6 * std::size_t{memory_.order[i]} + 3 * side;
+    const FloatVector normal = {{n[0], n[1], n[2]}};
+    bool apart = true;
+    for (int k = 0; k < count; ++k) apart = apart && distance_square(normal, known[k]) > 4.1f * kSameFace;
+    if (!apart) continue;
+    if (count == kMostDirections) return true;
+    known[count++] = normal;
+  }
+  return false;
+}
+
+/// Marks pieces whose normals are of the face of a known one. Result: the least of those without a mark.
+template <typename Team>
+TANDEM_HD LeastPiece NormalFinder<Team>::least_unmarked(int side, const FloatVector& known) const {
+  if constexpr (HasMeans<Team>) return team_.means().least_unmarked(memory_, begin_, end_, side, known);
+  LeastPiece least;
+  for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
+    if (mark(i) != 0) continue;
+    const std::uint32_t at = memory_.order[i];
+    const float* n = memory_.normals + 6 * std::size_t{at} + 3 * side;
+    if (same_face({{n[0], n[1], n[2]}}, known))
+      mark(i) = 1;
+    else
+      least.take(memory_.pieces[at].key(), at);
+  }
+  return least;
+}
+
 /// Adds the directions of faces of one body, from the least piece on; of more than kMostDirections the first
 /// ones, if they are to be kept. False where there are more. Normals closer than half a milliradian are one.
 template <typename Team>
 TANDEM_HD bool NormalFinder<Team>::gather_directions(int side, bool keep_if_many) {
-  FloatVector known = {};  // the last direction
+  if constexpr (HasMeans<Team>) {  // a team has passed over the pieces as soon
+    if (!keep_if_many && has_many_directions(side)) return false;
+  }
+  for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) mark(i) = 0;
+  LeastPiece own = least_;
   int found = 0;
   bool all = false;
   for (;; ++found) {
-    std::uint64_t own = ~std::uint64_t{0};
-    std::uint32_t holder = kNoIndex;
-    for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
-      const std::uint32_t at = memory_.order[i];
-      if (found == 0) {
-        mark(i) = 0;
-      } else {
-        if (mark(i) != 0) continue;
-        const float* n = memory_.normals + 6 * std::size_t{at} + 3 * side;
-        if (same_face({{n[0], n[1], n[2]}}, known)) {
-          mark(i) = 1;
-          continue;
-        }
-      }
-      const std::uint64_t key = memory_.pieces[at].key();
-      if (key < own) own = key, holder = at;
-    }
-    const std::uint64_t key = team_.least(own);
+    const std::uint64_t key = team_.least(own.key);
     all = key == ~std::uint64_t{0};
     if (all || found == kMostDirections) break;
-    holder = team_.least(own == key ? holder : kNoIndex);
+    const std::uint32_t holder = team_.least(own.key == key ? own.piece : kNoIndex);
     if (team_.rank() == 0) shared_.direction[directions_ + found].piece = holder;
     const float* n = memory_.normals + 6 * std::size_t{holder} + 3 * side;
-    known = {{n[0], n[1], n[2]}};
+    own = least_unmarked(side, {{n[0], n[1], n[2]}});
   }
   if (!all && !keep_if_many) return false;
   team_.sync();
@@ -191,34 +231,30 @@ TANDEM_HD void NormalFinder<Team>::find_bearing_faces(const Vector3& smooth, dou
   directions_ = 0;
   const FloatVector up = {
       {static_cast<float>(smooth.x), static_cast<float>(smooth.y), static_cast<float>(smooth.z)}};
-  const auto normal_of = [](const float* normals, int side) {
-    const float sign = side == 0 ? 1.0f : -1.0f;
-    return FloatVector{
-        {sign * normals[3 * side], sign * normals[3 * side + 1], sign * normals[3 * side + 2]}};
-  };
-  float most[2] = {0.9f, 0.9f};
-  std::uint64_t own[2] = {~std::uint64_t{0}, ~std::uint64_t{0}};
-  std::uint32_t holder[2] = {kNoIndex, kNoIndex};
-  for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
-    const std::uint32_t at = memory_.order[i];
-    for (int side = 0; side < 2; ++side) {
-      const float along = dot(normal_of(memory_.normals + 6 * std::size_t{at}, side), up);
-      const std::uint64_t key = memory_.pieces[at].key();
-      if (along > most[side] || (along == most[side] && key < own[side]))
-        most[side] = along, own[side] = key, holder[side] = at;
+  FaceAlong most[2];
+  if constexpr (HasMeans<Team>) {
+    for (int side = 0; side < 2; ++side)
+      team_.means().find_face_along(memory_, begin_, end_, side, up, most[side]);
+  } else {
+    for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
+      const std::uint32_t at = memory_.order[i];
+      for (int side = 0; side < 2; ++side) {
+        const float along = dot(turned_normal(memory_.normals + 6 * std::size_t{at}, side), up);
+        most[side].take(along, memory_.pieces[at].key(), at);
+      }
     }
   }
-  float greatest[2] = {most[0], most[1]};
+  float greatest[2] = {most[0].along, most[1].along};
   team_.greatest_ones(greatest);
   std::uint64_t key[2];
+  std::uint32_t holder[2];
   for (int side = 0; side < 2; ++side) {
-    if (most[side] != greatest[side]) own[side] = ~std::uint64_t{0};
-    key[side] = own[side];
+    if (most[side].along != greatest[side]) most[side].least = {};
+    key[side] = most[side].least.key;
   }
   team_.least_ones(key);
-  for (int side = 0; side < 2; ++side) {
-    if (own[side] != key[side]) holder[side] = kNoIndex;
-  }
+  for (int side = 0; side < 2; ++side)
+    holder[side] = most[side].least.key == key[side] ? most[side].least.piece : kNoIndex;
   team_.least_ones(holder);
   Vector3 n[2];
   FloatVector face[2] = {};
@@ -232,14 +268,22 @@ TANDEM_HD void NormalFinder<Team>::find_bearing_faces(const Vector3& smooth, dou
   }
   if (!any) return;
   ExactSum within[2];
-  for_each_piece([&](const Piece& piece, const float* normals) {
-    if (piece.kind() == MeetingKind::polygon) return;
-    const double size = norm(piece.weight() * (piece.end[1] - piece.end[0]));
+  if constexpr (HasMeans<Team>) {
     for (int side = 0; side < 2; ++side) {
-      if (same_face(normal_of(normals, 0), face[side]) || same_face(normal_of(normals, 1), face[side]))
-        within[side].add(size, 1 / summary_.unit);
+      if (holder[side] == kNoIndex) continue;
+      team_.means().sum_length_on_face(memory_, begin_, end_, face[side], 1 / summary_.unit, within[side]);
     }
-  });
+  } else {
+    for_each_piece([&](const Piece& piece, const float* normals) {
+      if (piece.kind() == MeetingKind::polygon) return;
+      const double size = norm(piece.weight() * (piece.end[1] - piece.end[0]));
+      for (int side = 0; side < 2; ++side) {
+        if (same_face(turned_normal(normals, 0), face[side]) ||
+            same_face(turned_normal(normals, 1), face[side]))
+          within[side].add(size, 1 / summary_.unit);
+      }
+    });
+  }
   add_up(team_, within[0], within[1]);
   for (int side = 0; side < 2; ++side) {
     if (holder[side] == kNoIndex || !(within[side].value(summary_.unit) >= kBearing * length)) continue;

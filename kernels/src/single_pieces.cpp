@@ -2,8 +2,8 @@
 
 #include "manifold_means.h"
 
-// CurveFinder's ways to join pieces to curves, by one thread: keys lie beside the references, so that nothing
-// is computed again where two are compared.
+// What CurveFinder does with single pieces, by one thread. Keys lie beside the references, so that nothing is
+// computed again where two are compared.
 namespace tandem {
 namespace {
 
@@ -37,12 +37,13 @@ class PieceJoiner {
     }
   }
 
-  void join(std::uint32_t i, std::uint32_t j) {
-    i = first_of(i), j = first_of(j);
-    if (i < j)
-      curve_[j] = i;
-    else
-      curve_[i] = j;
+  /// Joins the set whose first piece is `first` with that of another piece. Result: the first of both.
+  std::uint32_t join(std::uint32_t first, std::uint32_t piece) {
+    const std::uint32_t other = first_of(piece);
+    if (other == first) return first;
+    const std::uint32_t of_both = other < first ? other : first;
+    curve_[other < first ? first : other] = of_both;
+    return of_both;
   }
 
  private:
@@ -60,13 +61,24 @@ class PieceJoiner {
 
 }  // namespace
 
+void ManifoldMeans::add_piece(const PieceMemory& memory, const Contact& contact,
+                              const manifold::WorldTriangle& a, const manifold::WorldTriangle& b,
+                              double tolerance, manifold::PieceBounds& bounds) {
+  manifold::Meeting meeting;
+  manifold::meet(a, b, tolerance, meeting);
+  if (meeting.kind == manifold::MeetingKind::none) return;
+  manifold::write_piece(memory, bounds.pieces++, contact, a.normal, b.normal, meeting);
+  bounds.add(meeting);
+}
+
 bool ManifoldMeans::connect_by_ends(const BodyPair& bodies, const PieceMemory& memory, std::uint32_t pieces) {
-  PieceJoiner joiner(memory, pieces, 4 * pieces);
+  PieceJoiner joiner(memory, pieces, 3 * pieces);
   const TriangleTopology* const topology[2] = {bodies.a.shape->topology, bodies.b.shape->topology};
   std::int64_t alone = 0;
   bool many = false;
   for (std::uint32_t i = 0; i < pieces; ++i) {
     const Piece& piece = memory.pieces[i];
+    std::uint32_t first_piece = i;
     for (int end = 0; end < 2; ++end) {
       const manifold::TriangleFeature f = piece.feature(end);
       const std::uint32_t side = f.of_b;
@@ -78,7 +90,7 @@ bool ManifoldMeans::connect_by_ends(const BodyPair& bodies, const PieceMemory& m
           joiner.insert(static_cast<std::uint32_t>(edge >> 32), static_cast<std::uint32_t>(edge),
                         piece.triangle[1 - side] << 1 | side, i, first);
       if (!is_boundary(t.flags, f.number)) alone += first ? 1 : -1;
-      if (!first) joiner.join(there, i);
+      if (!first) first_piece = joiner.join(first_piece, there);
     }
   }
   return alone == 0 && !many;
@@ -91,10 +103,11 @@ void ManifoldMeans::connect_by_corners(const BodyPair& bodies, const PieceMemory
     const Piece& piece = memory.pieces[i];
     const std::uint32_t(&u)[3] = bodies.a.shape->topology[piece.triangle[0]].vertex;
     const std::uint32_t(&v)[3] = bodies.b.shape->topology[piece.triangle[1]].vertex;
+    std::uint32_t first_piece = i;
     for (int k = 0; k < 9; ++k) {
       bool first;
       const std::uint32_t there = joiner.insert(u[k / 3], v[k % 3], 0, i, first);
-      if (!first) joiner.join(there, i);
+      if (!first) first_piece = joiner.join(first_piece, there);
     }
   }
 }

@@ -1,0 +1,18 @@
+# Whether what is compiled for some machines only has functions that the linker may take for all: inline
+# functions that were not inlined. Usage: cmake -D NM=nm -D "OBJECTS=a.o;b.o" -P variant_symbols.cmake
+set(found 0)
+foreach(object IN LISTS OBJECTS)
+  if(NOT object MATCHES "/src/avx[0-9]+\\.cpp")
+    continue()
+  endif()
+  math(EXPR found "${found} + 1")
+  execute_process(COMMAND ${NM} -C --defined-only ${object} OUTPUT_VARIABLE symbols COMMAND_ERROR_IS_FATAL ANY)
+  string(REGEX MATCHALL "[^\n]* [WVu] [^\n]*" shared "${symbols}")
+  if(shared)
+    list(JOIN shared "\n" shared)
+    message(FATAL_ERROR "${object}:\n${shared}")
+  endif()
+endforeach()
+if(NOT found EQUAL 2)
+  message(FATAL_ERROR "${found} objects of AVX2 and AVX-512, not 2")
+endif()

@@ -359,7 +359,7 @@ TANDEM_HD bool ManifoldMaker<Team>::make(std::uint32_t curve, const NewPatch& ne
     std::uint64_t& feature = chosen[i].feature;
     feature = chosen[i].inner ? feature_hash(feature, measure.key)
                               : rim_finder.least_feature_near(chosen[i].at, near / 2, feature);
-    // Where rounding has moved corners, an edge may go through a triangle twice.
+    // Far from the origin, where tolerance() is as large as triangles, one feature may be at two places.
     for (int k = 0; k < i; ++k) {
       if (chosen[k].feature == feature) feature = feature_hash(feature, 10 + static_cast<std::uint64_t>(i));
     }

@@ -115,6 +115,28 @@ TEST(ContactManifolds, PointsOnTheSurfacesStayThereWhereMeshesHaveAnOrigin) {
   }
 }
 
+/// So far away that corners as far from a plane as triangles are long count as in it: then both triangles at
+/// an edge may end a piece there, at two places.
+TEST(ContactManifolds, PointsHaveDifferentIdsWhereRoundingIsAsLargeAsTriangles) {
+  RandomPoses random(3);
+  ManifoldScene scene;
+  scene.add_shape(project_mesh("cow_1500.obj"));
+  scene.add_shape(soup(random, 40, 0.3));
+  std::size_t points = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    scene.bodies.clear();
+    for (const std::uint32_t shape : {0u, 1u})
+      scene.add_body(shape, after(shift(0, 5e11, -5e11), any_motion(random, 0.3)));
+    scene.find();
+    std::vector<std::uint64_t> ids;
+    for (const ManifoldPoint& p : scene.points()) ids.push_back(p.id);
+    std::sort(ids.begin(), ids.end());
+    EXPECT_EQ(std::adjacent_find(ids.begin(), ids.end()), ids.end()) << trial;
+    points += ids.size();
+  }
+  EXPECT_GT(points, 1000u);
+}
+
 TEST(ContactManifolds, FewerPointsMayBeAskedFor) {
   ManifoldScene scene;
   fill(scene, 6, 40);

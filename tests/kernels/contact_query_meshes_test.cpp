@@ -23,10 +23,12 @@ namespace tandem {
 namespace {
 
 namespace fs = std::filesystem;
+using test::centred_at;
 using test::FaceContacts;
 using test::found_contacts;
 using test::Mesh;
 using test::PosedTriangle;
+using test::radius_of;
 using test::RandomPoses;
 using test::Scene;
 
@@ -107,30 +109,6 @@ Imported import(const char* name) {
     out.mesh.triangles.push_back({triangle[0], triangle[1], triangle[2]});
   std::copy_n(&stored.origin[0], 3, out.origin.begin());
   return out;
-}
-
-double radius_of(const AssetView& asset) {
-  double square = 0;
-  for (int k = 0; k < 3; ++k) {
-    const double half =
-        0.5 * (static_cast<double>(asset.header->upper[k]) - static_cast<double>(asset.header->lower[k]));
-    square += half * half;
-  }
-  return std::sqrt(square);
-}
-
-/// With this rotation, and the centre of the asset at a place.
-Pose centred_at(const AssetView& asset, Pose pose, const double (&place)[3]) {
-  const FileHeader& header = *asset.header;
-  double center[3], moved[3];
-  for (int k = 0; k < 3; ++k) {
-    center[k] = header.origin[k] +
-                0.5 * (static_cast<double>(header.lower[k]) + static_cast<double>(header.upper[k]));
-    pose.translation[k] = 0;
-  }
-  apply(pose, center[0], center[1], center[2], moved);
-  for (int k = 0; k < 3; ++k) pose.translation[k] = place[k] - moved[k];
-  return pose;
 }
 
 /// The box of a posed triangle.

@@ -457,6 +457,29 @@ Pose any_rotation(RandomPoses& random) {
   }
 }
 
+double radius_of(const AssetView& asset) {
+  double square = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double half =
+        0.5 * (static_cast<double>(asset.header->upper[k]) - static_cast<double>(asset.header->lower[k]));
+    square += half * half;
+  }
+  return std::sqrt(square);
+}
+
+Pose centred_at(const AssetView& asset, Pose pose, const double (&place)[3]) {
+  const FileHeader& header = *asset.header;
+  double center[3], moved[3];
+  for (int k = 0; k < 3; ++k) {
+    center[k] = header.origin[k] +
+                0.5 * (static_cast<double>(header.lower[k]) + static_cast<double>(header.upper[k]));
+    pose.translation[k] = 0;
+  }
+  apply(pose, center[0], center[1], center[2], moved);
+  for (int k = 0; k < 3; ++k) pose.translation[k] = place[k] - moved[k];
+  return pose;
+}
+
 std::ostream& operator<<(std::ostream& out, const FaceContact& contact) {
   return out << '(' << contact.a << ',' << contact.b << ": " << contact.face_a << ',' << contact.face_b
              << ')';

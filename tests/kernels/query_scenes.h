@@ -68,6 +68,11 @@ Pose quarter_turn(RandomPoses& random);
 /// quite orthonormal.
 Pose any_rotation(RandomPoses& random);
 
+/// Half the diagonal of the box about an asset.
+double radius_of(const AssetView& asset);
+/// With this rotation, and the centre of the asset at a place.
+Pose centred_at(const AssetView& asset, Pose pose, const double (&place)[3]);
+
 // Contacts.
 
 /// A contact by instances and faces; instance a < b, or face a < b within one instance.

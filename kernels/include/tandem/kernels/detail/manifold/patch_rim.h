@@ -273,8 +273,14 @@ TANDEM_HD void RimFinder<Team>::name_points(Chosen* points, int count, double di
   team_.least_ones(least);
   team_.sync();
   if (team_.rank() == 0) {
-    for (int k = 0; k < count; ++k)
-      points[k].feature = points[k].inner ? feature_hash(points[k].feature, patch_key) : least[k];
+    for (int k = 0; k < count; ++k) {
+      std::uint64_t& name = points[k].feature;
+      name = points[k].inner ? feature_hash(name, patch_key) : least[k];
+      // Far from the origin, where tolerance() is as large as triangles, one feature may be at two places.
+      for (int i = 0; i < k; ++i) {
+        if (points[i].feature == name) name = feature_hash(name, 10 + static_cast<std::uint64_t>(k));
+      }
+    }
   }
   team_.sync();
 }

@@ -113,10 +113,10 @@ class Walk {
   void advance_pair(const WaitingPair& leaf) {
     ++counters_.triangle_pairs;
     const MovingTriangles start = moving_triangles(pair_, a_.triangles[leaf.a], b_.triangles[leaf.b]);
-    const double apart =
-        time_apart_by_faces(pair_, triangles_at(pair_, start, place_), tolerance_).time;
-    if (apart >= left_) return;
-    const double from = begin_ + std::max(apart, leaf.apart);
+    const TimeApart apart =
+        time_apart_by_faces(pair_, triangles_at(pair_, start, place_), kAim * tolerance_);
+    if (apart.time >= left_) return;
+    const double from = begin_ + std::max(apart.nearly, leaf.apart);
     const TriangleStop stop = advance(pair_, start, from, stop_.time, tolerance_);
     ++counters_.advanced;
     counters_.steps += stop.steps;

@@ -289,7 +289,7 @@ void add_meeting(MovingScene& moves, RandomPoses& random, double far, double spi
   moves.add(0, a, random_motion(random, a, 0.5, spin));
   RigidMotion motion = random_motion(random, b, 0.5, spin);
   for (int k = 0; k < 3; ++k) {
-    motion.velocity[k] += random.uniform(0.2, 3) * (a.translation[k] - b.translation[k]);
+    motion.velocity[k] += random.uniform(-0.5, 3) * (a.translation[k] - b.translation[k]);
   }
   moves.add(moves.scene.assets.size() - 1, b, motion);
 }
@@ -336,9 +336,8 @@ const MotionFamily kFamilies[] = {
      [](RandomPoses& random) {
        MovingScene moves;
        moves.scene.assets.add(test::box(2, 1e-3f, 1e-3f));
-       moves.scene.assets.add(soup(random, 3, 1e-3));
        moves.scene.assets.add(test::box(3, 1e-4f, 1e-2f));
-       add_meeting(moves, random, 0.5, 20);
+       add_meeting(moves, random, random.uniform(0.5, 4), 10);
        return moves;
      }},
     {"far from the origin",
@@ -408,7 +407,8 @@ TEST_P(ImpactFamilies, NothingTouchesUntilTSafeAndThenTheGapIsWhatIsTold) {
     const Impact impact = check(moves, random, test::trials(60, 17));
     found += impact.status == ImpactStatus::found;
     none += impact.status == ImpactStatus::none;
-    near += impact.status == ImpactStatus::found && impact.gap <= 1.1e-6 * moves.diagonal();
+    const double far = std::fabs(impact.point_a[0]) + std::fabs(moves.motion[0].center[0]);
+    near += impact.status == ImpactStatus::found && impact.gap <= 1.1e-6 * moves.diagonal() + 1e-14 * far;
     if (HasFailure()) ADD_FAILURE() << "motion " << i << "\n" << text(moves.scene);
   }
   RecordProperty("found", found);

@@ -1,7 +1,6 @@
 #include "query_command.h"
 
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <new>
 #include <thread>
@@ -300,15 +299,6 @@ void write(const QueryArguments& arguments, const Answer& answer) {
   const ContainedTable contained = {answer.contained.rows, answer.contained.seconds};
   write_contacts(arguments.out, answer.table, answer.record, arguments.manifolds ? &manifolds : nullptr,
                  arguments.contained ? &contained : nullptr);
-}
-
-// The scene file and its assets, as paths from here.
-std::vector<std::string> files_of(const std::string& path, const Scene& scene) {
-  std::vector<std::string> files = {path};
-  for (const std::string& asset : scene.description.assets) {
-    files.push_back((std::filesystem::path(path).parent_path() / asset).string());
-  }
-  return files;
 }
 
 ExitCode run(const QueryArguments& arguments) {

@@ -47,6 +47,8 @@ TANDEM_HD inline void rotation_by(const manifold::Vector3& turn, double (&out)[3
   const double s = std::sin(angle), c = std::cos(angle);
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) out[i][j] = (1 - c) * k[i] * k[j];
+  }
+  for (int i = 0; i < 3; ++i) {
     out[i][i] += c;
     const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
     out[i2][i1] += s * k[i];

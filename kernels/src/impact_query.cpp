@@ -49,6 +49,7 @@ Asset asset_of(const AssetView& view) {
 // What a worker did; each pair's impact has its own place.
 struct alignas(64) Worker {
   ImpactCounters counters;
+  impact::ImpactWalk walk;
 };
 
 void add_to(ImpactCounters& sum, const ImpactCounters& part) {
@@ -132,7 +133,7 @@ struct ImpactQuery::State {
   Status find_pairs();
   Status find_contacts_at_start();
   Status provide_workers(std::uint32_t wanted);
-  Impact impact_of(std::size_t pair, ImpactCounters& counts) const;
+  Impact impact_of(std::size_t pair, Worker& worker) const;
   Status find_impacts();
 };
 
@@ -216,7 +217,7 @@ Status ImpactQuery::State::provide_workers(std::uint32_t wanted) {
   return Status::kOk;
 }
 
-Impact ImpactQuery::State::impact_of(std::size_t row, ImpactCounters& counts) const {
+Impact ImpactQuery::State::impact_of(std::size_t row, Worker& worker) const {
   const ObjectPair& pair = pairs[row];
   const Asset &a = assets[instances[pair.a].asset], &b = assets[instances[pair.b].asset];
   const PairMotion motion = impact::pair_motion(bodies[pair.a], bodies[pair.b]);
@@ -229,19 +230,19 @@ Impact ImpactQuery::State::impact_of(std::size_t row, ImpactCounters& counts) co
     impact.status = ImpactStatus::at_start;
     tell(motion, a.tree, b.tree, 0, impact);
     impact.gap = 0;
-    ++counts.at_start;
+    ++worker.counters.at_start;
     return impact;
   }
   if (pair.a == pair.b) return impact;
   const double tolerance = options.tolerance * std::min(a.diagonal, b.diagonal);
-  const PairStop stop = impact::find_stop(motion, a.tree, b.tree, tolerance, counts);
+  const PairStop stop = worker.walk.find_stop(motion, a.tree, b.tree, tolerance, worker.counters);
   if (stop.triangle_a == kNoIndex) return impact;
   impact.t_safe = stop.time * duration * (1 - 0x1p-51);
   impact.triangle_a = stop.triangle_a;
   impact.triangle_b = stop.triangle_b;
   impact.status = ImpactStatus::found;
   tell(motion, a.tree, b.tree, stop.time, impact);
-  ++counts.found;
+  ++worker.counters.found;
   return impact;
 }
 
@@ -252,7 +253,7 @@ Status ImpactQuery::State::find_impacts() {
   if (!impacts.resize(pairs.size())) return fail(Status::kOutOfMemory, 0);
   threads.for_parts(wanted, pairs.size(), kPairsAtOnce,
                     [&](std::size_t i, std::size_t end, std::uint32_t worker) {
-                      for (; i < end; ++i) impacts[i] = impact_of(i, workers[worker].counters);
+                      for (; i < end; ++i) impacts[i] = impact_of(i, workers[worker]);
                     });
   for (std::uint32_t i = 0; i < wanted; ++i) add_to(counters, workers[i].counters);
   counters.object_pairs = pairs.size();

@@ -37,10 +37,10 @@ struct ImpactOptions {
 struct ImpactCounters {
   std::uint64_t object_pairs = 0;
   std::uint64_t at_start = 0, found = 0;  ///< of them
-  std::uint64_t walks = 0;                ///< of two trees: one for each kMostTurnOfWalk of a pair's turn
+  std::uint64_t walks = 0;                ///< of two trees: one for each 1/4 radian of a pair's turn
   std::uint64_t block_pairs = 0;
   std::uint64_t triangle_pairs = 0;  ///< whose boxes may meet
-  std::uint64_t advanced = 0;        ///< of these, not told apart where a walk begins
+  std::uint64_t advanced = 0;        ///< of these, not told apart by their planes
   std::uint64_t steps = 0;           ///< of conservative advancement, of all of them
   std::uint64_t most_steps = 0;      ///< of one
   std::uint64_t unconverged = 0;     ///< those that stopped a pair for want of steps, above the tolerance
@@ -49,7 +49,7 @@ struct ImpactCounters {
 };
 
 /// Finds until when moving instances surely do not meet, on the CPU. Keeps its memory from call to call.
-/// Throws nothing. Movable, not copyable; one query at a time, several objects side by side. Takes about 200
+/// Throws nothing. Movable, not copyable; one query at a time, several objects side by side. Takes about 100
 /// KB of the calling thread's stack. Rounds to nearest and keeps subnormals.
 ///
 /// **Guarantee.** Unless a pair is in contact at the start, no triangles of its two instances meet at any

@@ -24,8 +24,8 @@ class ImpactWalk {
                      ImpactCounters& counters);
 
  private:
-  static constexpr double kMostTurnOfPiece = 0.25;
-  static constexpr std::uint32_t kHalvings = 5;
+  static constexpr double kMostTurnOfPiece = 0.5;
+  static constexpr std::uint32_t kHalvings = 6;
 
   /// Each pair that is taken off puts at most 16 on, whose depths and halvings add up to 1 more at least:
   /// from 2 to 2 kMaxDepth + kHalvings.

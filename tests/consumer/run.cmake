@@ -26,6 +26,9 @@ require_shown(docs/queries.md cpp "${program}")
 file(READ ${SOURCE}/tests/consumer/game_loop.cpp program)
 require_shown(docs/contacts.md cpp "${program}")
 
+file(READ ${SOURCE}/tests/consumer/impact.cpp program)
+require_shown(docs/impact.md cpp "${program}")
+
 file(REMOVE_RECURSE ${FOLDER})
 foreach(package assimp CGAL CLI11 CUDAToolkit GTest HDF5 nlohmann_json TBB)
   list(APPEND no_packages -DCMAKE_DISABLE_FIND_PACKAGE_${package}=ON)
@@ -50,6 +53,8 @@ if(NOT code EQUAL 1 OR NOT output STREQUAL "${SOURCE}/README.md: not a Tandem .b
 endif()
 run(${FOLDER}/consumer/contacts ${FOLDER}/box.bvh)
 require_shown(docs/queries.md "" "${output}")
+run(${FOLDER}/consumer/impact ${FOLDER}/box.bvh)
+require_shown(docs/impact.md "" "${output}")
 run(${FOLDER}/consumer/game_loop ${FOLDER}/box.bvh)
 if(NOT output MATCHES "\nall are asleep after [0-9]+ steps\n$")
   message(FATAL_ERROR "the game loop says: ${output}")

@@ -1,5 +1,6 @@
 #include "impact_command.h"
 
+#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -244,7 +245,14 @@ void print_summary(const ImpactArguments& arguments, const Scene& scene, const I
   std::printf("  %-14s %s\n", "hash", hexadecimal(hash_of(table)).c_str());
 }
 
+// CLI11 takes NaN and infinity for numbers in a range.
+void check_arguments(const ImpactArguments& arguments) {
+  if (!std::isfinite(arguments.duration)) throw UsageError("--dt is not finite");
+  if (!std::isfinite(arguments.options.tolerance)) throw UsageError("--tolerance is not finite");
+}
+
 ExitCode run(const ImpactArguments& arguments) {
+  check_arguments(arguments);
   const Scene scene = read_scene(arguments.scene);
   if (!arguments.out.empty()) keep_inputs(arguments.out, files_of(arguments.scene, scene));
   if (!arguments.out.empty()) try_output(arguments.out);

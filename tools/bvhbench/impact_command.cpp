@@ -1,6 +1,5 @@
 #include "impact_command.h"
 
-#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -245,14 +244,7 @@ void print_summary(const ImpactArguments& arguments, const Scene& scene, const I
   std::printf("  %-14s %s\n", "hash", hexadecimal(hash_of(table)).c_str());
 }
 
-// CLI11 takes NaN and infinity for numbers in a range.
-void check_arguments(const ImpactArguments& arguments) {
-  if (!std::isfinite(arguments.duration)) throw UsageError("--dt is not finite");
-  if (!std::isfinite(arguments.options.tolerance)) throw UsageError("--tolerance is not finite");
-}
-
 ExitCode run(const ImpactArguments& arguments) {
-  check_arguments(arguments);
   const Scene scene = read_scene(arguments.scene);
   if (!arguments.out.empty()) keep_inputs(arguments.out, files_of(arguments.scene, scene));
   if (!arguments.out.empty()) try_output(arguments.out);
@@ -278,12 +270,12 @@ CLI::App* add_impact(CLI::App& app, Run& run_later) {
       ->check(file_name());
   command->add_option("--dt", arguments->duration, "the step in which they move, in seconds")
       ->required()
-      ->check(CLI::NonNegativeNumber)
+      ->check(between(0, 1e9))
       ->option_text("T");
   command
       ->add_option("--tolerance", options.tolerance,
                    "how near triangles stop, as a part of the smaller body's diagonal")
-      ->check(CLI::NonNegativeNumber)
+      ->check(between(0, 1))
       ->option_text("R [1e-6]");
   command->add_option("--threads", options.threads, "threads; the impacts do not depend on them")
       ->check(CLI::Range(1u, kMostQueryThreads))

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "followed_contacts.h"
-
 namespace tandem::simulation {
 namespace {
 
@@ -13,8 +11,13 @@ using Eigen::AngleAxisd;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-// A pair goes on beyond its impact by at most this part of the thinner body's inner radius.
+// A pair goes on beyond its impact, or deeper than it is, by at most this part of the thinner body's inner
+// radius.
 constexpr double kBeyond = 0.25;
+
+// How often the depth of a pair that touches is measured on its way, at most: each time that its points may
+// have moved by kBeyond inner radii. It goes no farther.
+constexpr double kMostSamples = 256;
 
 // Each round stops bodies earlier, until none that has stopped is in another one's way.
 constexpr int kMostRounds = 8;
@@ -44,12 +47,17 @@ Quaterniond turned(const Quaterniond& orientation, const Vector3d& turn) {
   return (Quaterniond(AngleAxisd(angle, turn / angle)) * orientation).normalized();
 }
 
+void require(Status status) {
+  if (status != Status::kOk) throw std::runtime_error(std::string("continuous motion: ") + explain(status));
+}
+
 }  // namespace
 
 ContinuousMotion::ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads)
     : threads_(threads) {
-  const Status status = query_.set_assets(shapes);
-  if (status != Status::kOk) throw std::runtime_error(explain(status));
+  require(query_.set_assets(shapes));
+  require(contacts_.set_assets(shapes));
+  require(manifolds_.set_assets(shapes));
   for (const AssetView& shape : shapes) inner_radius_.push_back(inner_radius_of(shape));
 }
 
@@ -74,31 +82,9 @@ bool ContinuousMotion::find_fast(std::span<const BodyProperties> bodies, std::sp
   return any;
 }
 
-// What touched already is no impact. A fast body goes on until a contact is deeper by a part of the thinner
-// body's inner radius.
-void ContinuousMotion::stop_in_contacts(std::span<const BodyProperties> bodies,
-                                        std::span<const ContactPoint> contacts,
-                                        std::span<const BodyState> before, std::span<const BodyState> after,
-                                        double slop) {
-  FollowedContacts followed(contacts, before);
-  followed.follow(after);
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    const std::uint32_t a = contacts[i].body_a, b = contacts[i].body_b;
-    const double thinner = std::min(inner_radius(bodies[a]), inner_radius(bodies[b]));
-    const double start = contacts[i].depth, end = followed.contacts()[i].depth;
-    const double most = std::max(start, slop) + kBeyond * thinner;
-    if (end <= most) continue;
-    const double part = (most - start) / (end - start);
-    for (const std::uint32_t body : {a, b}) {
-      if (fast_[body] == Motion::moving && bodies[body].motion == Motion::moving)
-        part_[body] = std::min(part_[body], part);
-    }
-  }
-}
-
 // Which part of their ways two bodies go until they are a slop deep in each other, or a little beyond where
 // they barely touch. reach: how much farther they may go, a length.
-double ContinuousMotion::stop_of(const Impact& impact, std::uint32_t a, std::uint32_t b, double reach,
+double ContinuousMotion::stop_of(const Impact& impact, const ObjectPair& pair, double reach,
                                  double slop) const {
   const Vector3d at_a(impact.point_a), at_b(impact.point_b);
   const auto velocity = [&](std::uint32_t body, const Vector3d& at) {
@@ -106,16 +92,53 @@ double ContinuousMotion::stop_of(const Impact& impact, std::uint32_t a, std::uin
     const Vector3d v(motion.velocity), w(motion.angular_velocity), c(motion.center);
     return Vector3d(v + w.cross(at - (c + impact.t_safe * v)));
   };
-  const Vector3d approach = velocity(a, at_a) - velocity(b, at_b), apart = at_b - at_a;
+  const Vector3d approach = velocity(pair.a, at_a) - velocity(pair.b, at_b), apart = at_b - at_a;
   const double closing = apart.norm() > 0 ? approach.dot(apart.normalized()) : approach.norm();
   double beyond = reach / approach.norm();
   if (closing > 0) beyond = std::min(beyond, (impact.gap + slop) / closing);
   return std::min(1.0, impact.t_safe + beyond);
 }
 
+// How deep two bodies are in each other when they have gone this part of what they go; infinite where one
+// goes through the other.
+double ContinuousMotion::depth_at(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
+                                  const ObjectPair& pair, double part) {
+  const ObjectPair pairs[] = {{0, 1}};
+  Instance instances[2];
+  for (int i = 0; i < 2; ++i) {
+    const std::uint32_t body = i == 0 ? pair.a : pair.b;
+    BodyState state = before[body];
+    state.position += part * part_[body] * way_[body];
+    state.orientation = turned(state.orientation, part * part_[body] * turn_[body]);
+    instances[i] = pose_of(bodies[body], state);
+  }
+  require(contacts_.find_contacts(instances, pairs, {}));
+  require(manifolds_.make(instances, pairs, contacts_.contacts(), {.match_previous = false}));
+  double depth = 0;
+  for (const Manifold& manifold : manifolds_.manifolds())
+    depth = std::max(depth, (manifold.flags & kGoesThrough) != 0 ? INFINITY : manifold.depth);
+  return depth;
+}
+
+// Which part of their ways two bodies go that touch already.
+double ContinuousMotion::stop_of_touching(std::span<const BodyProperties> bodies,
+                                          std::span<const BodyState> before, const ObjectPair& pair,
+                                          double reach, double slop) {
+  const auto turned_by = [&](std::uint32_t body) {
+    return bodies[body].motion == Motion::fixed ? 0 : part_[body] * bodies[body].radius * turn_[body].norm();
+  };
+  const Vector3d way = part_[pair.a] * way_[pair.a] - part_[pair.b] * way_[pair.b];
+  const double samples = std::ceil((way.norm() + turned_by(pair.a) + turned_by(pair.b)) / reach);
+  const double most = std::max(depth_at(bodies, before, pair, 0), slop) + reach;
+  for (double i = 1; i <= std::min(samples, kMostSamples); ++i) {
+    if (depth_at(bodies, before, pair, i / samples) > most) return (i - 1) / samples;
+  }
+  return std::min(1.0, kMostSamples / samples);
+}
+
 // Result: whether a body stops earlier than it did.
-bool ContinuousMotion::stop_at_impacts(std::span<const BodyProperties> bodies,
-                                       std::span<const BodyState> before, double slop) {
+bool ContinuousMotion::stop(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
+                            double slop) {
   instances_.resize(bodies.size());
   motion_.resize(bodies.size());
   for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -128,20 +151,20 @@ bool ContinuousMotion::stop_at_impacts(std::span<const BodyProperties> bodies,
     }
   }
   const PairFilter filter = {.motion = fast_.data()};
-  const Status status =
-      query_.find(instances_, motion_, 1, {.tolerance = 1e-8, .threads = threads_, .filter = &filter});
-  if (status != Status::kOk) throw std::runtime_error(std::string("times of impact: ") + explain(status));
+  require(query_.find(instances_, motion_, 1, {.tolerance = 1e-8, .threads = threads_, .filter = &filter}));
   stop_.assign(bodies.size(), 1);
   bool earlier = false;
   for (std::size_t i = 0; i < query_.pairs().size(); ++i) {
     const Impact& impact = query_.impacts()[i];
-    if (impact.status != ImpactStatus::found) continue;
-    const auto [a, b] = query_.pairs()[i];
-    const double thinner = std::min(inner_radius(bodies[a]), inner_radius(bodies[b]));
+    if (impact.status == ImpactStatus::none) continue;
+    const ObjectPair& pair = query_.pairs()[i];
+    const double thinner = std::min(inner_radius(bodies[pair.a]), inner_radius(bodies[pair.b]));
     const double reach = std::isfinite(thinner) ? kBeyond * thinner : slop;
-    const double part = stop_of(impact, a, b, reach, slop);
+    const double part = impact.status == ImpactStatus::found
+                            ? stop_of(impact, pair, reach, slop)
+                            : stop_of_touching(bodies, before, pair, reach, slop);
     if (part > 1 - 1e-9) continue;
-    for (const std::uint32_t body : {a, b}) {
+    for (const std::uint32_t body : {pair.a, pair.b}) {
       if (bodies[body].motion == Motion::moving) stop_[body] = std::min(stop_[body], part);
     }
     earlier = true;
@@ -150,12 +173,10 @@ bool ContinuousMotion::stop_at_impacts(std::span<const BodyProperties> bodies,
   return earlier;
 }
 
-void ContinuousMotion::limit(std::span<const BodyProperties> bodies, std::span<const ContactPoint> contacts,
-                             std::span<const BodyState> before, std::span<BodyState> after,
-                             double slop) {
+void ContinuousMotion::limit(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
+                             std::span<BodyState> after, double slop) {
   if (!find_fast(bodies, before, after)) return;
-  stop_in_contacts(bodies, contacts, before, after, slop);
-  for (int round = 0; round < kMostRounds && stop_at_impacts(bodies, before, slop); ++round) {
+  for (int round = 0; round < kMostRounds && stop(bodies, before, slop); ++round) {
   }
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     if (part_[i] == 1) continue;

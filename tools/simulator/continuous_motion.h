@@ -2,15 +2,16 @@
 #include <span>
 #include <vector>
 
-#include "contact_point.h"
 #include "rigid_body.h"
+#include "tandem/kernels/contact_manifolds.h"
 #include "tandem/kernels/impact_query.h"
 
 namespace tandem::simulation {
 
 /// Keeps fast bodies from passing through others in a step: they are carried to where they first meet
-/// another body, a slop deep, so that the next step has a contact there and stops them. What is left of the
-/// step's way is lost, velocities are not.
+/// another body, a slop deep, so that the next step has a contact there and stops them. Where two touch
+/// already they go on until they are deeper in each other by a part of the thinner one's inner radius. What
+/// is left of the step's way is lost, velocities are not.
 ///
 /// A body is fast where one of its points moves by more than half the inner radius of the thinnest closed
 /// shape: half the least side of its bounds. Steps without a fast body cost next to nothing.
@@ -19,22 +20,25 @@ class ContinuousMotion {
   /// What the shapes look at must outlive it. Throws std::runtime_error where a shape cannot be taken.
   ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads);
 
-  /// Takes back what of the way from `before` to `after` leads through other bodies, or deeper into those
-  /// that a body was in contact with. contacts: at the start. Throws std::runtime_error where the impact
-  /// query fails.
-  void limit(std::span<const BodyProperties> bodies, std::span<const ContactPoint> contacts,
-             std::span<const BodyState> before, std::span<BodyState> after, double slop);
+  /// Takes back what of the way from `before` to `after` leads through other bodies. Throws
+  /// std::runtime_error where a query fails.
+  void limit(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
+             std::span<BodyState> after, double slop);
 
  private:
   double inner_radius(const BodyProperties& body) const { return inner_radius_[body.shape]; }
   bool find_fast(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
                  std::span<const BodyState> after);
-  void stop_in_contacts(std::span<const BodyProperties> bodies, std::span<const ContactPoint> contacts,
-                        std::span<const BodyState> before, std::span<const BodyState> after, double slop);
-  bool stop_at_impacts(std::span<const BodyProperties> bodies, std::span<const BodyState> before, double slop);
-  double stop_of(const Impact& impact, std::uint32_t a, std::uint32_t b, double reach, double slop) const;
+  bool stop(std::span<const BodyProperties> bodies, std::span<const BodyState> before, double slop);
+  double stop_of(const Impact& impact, const ObjectPair& pair, double reach, double slop) const;
+  double stop_of_touching(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
+                          const ObjectPair& pair, double reach, double slop);
+  double depth_at(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
+                  const ObjectPair& pair, double part);
 
   ImpactQuery query_;
+  ContactQuery contacts_;
+  ContactManifolds manifolds_;
   std::vector<double> inner_radius_;  // of each shape; infinite where it is not closed
   std::uint32_t threads_;
 

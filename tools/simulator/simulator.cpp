@@ -87,7 +87,7 @@ void Simulator::solve(StepRecord& record) {
   solver_->step(
       {acting_, kept_.contacts, islands_, options_.dt, options_.gravity, step_, cache_.entries().empty()},
       states_, impulses);
-  if (continuous_) continuous_->limit(acting_, kept_.contacts, before, states_, options_.solver.slop);
+  if (continuous_) continuous_->limit(acting_, before, states_, options_.solver.slop);
   followed.follow(states_);
   kept_.contacts = followed.contacts();
   cache_.remember(kept_, impulses, states_, idle());

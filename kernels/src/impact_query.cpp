@@ -73,8 +73,8 @@ void write(const Vector3& x, double (&out)[3]) {
 // What two triangles of a pair tell at a time, a part of the step.
 void tell(const PairMotion& pair, const LevelView& a, const LevelView& b, double time, Impact& out) {
   const Triangle &of_a = a.triangles[out.triangle_a], &of_b = b.triangles[out.triangle_b];
-  const impact::TrianglesAt triangles = triangles_at(
-      pair, impact::moving_triangles(pair, of_a, of_b), impact::place_at(pair, time));
+  const impact::TrianglesAt triangles =
+      triangles_at(pair, impact::moving_triangles(pair, of_a, of_b), impact::place_at(pair, time));
   const TriangleDistance distance = triangle_distance(impact::triangle_pair(triangles));
   const Vector3 center = pair.a->center + time * pair.a->displacement;
   out.gap = distance.interval.upper;
@@ -85,8 +85,8 @@ void tell(const PairMotion& pair, const LevelView& a, const LevelView& b, double
 }
 
 constexpr Impact none_in(double duration) {
-  return {duration,          INFINITY, {0, 0, 0}, {0, 0, 0}, kNoIndex, kNoIndex, kNoIndex, kNoIndex,
-          ImpactStatus::none};
+  return {duration, INFINITY, {0, 0, 0}, {0, 0, 0},         kNoIndex,
+          kNoIndex, kNoIndex, kNoIndex,  ImpactStatus::none};
 }
 
 }  // namespace
@@ -145,8 +145,7 @@ Status ImpactQuery::State::pose(std::uint32_t i, const RigidMotion& motion) {
   if (status != Status::kOk) return status;
   const Asset& asset = assets[instances[i].asset];
   MovingBody& body = bodies[i];
-  const Status moving =
-      moving_body(stored, motion, duration, asset.lower, asset.upper, asset.extent, body);
+  const Status moving = moving_body(stored, motion, duration, asset.lower, asset.upper, asset.extent, body);
   boxes[i] = swept_box(box, body.displacement, body.turn, body.fastest, body.error);
   return moving;
 }
@@ -159,8 +158,8 @@ Status ImpactQuery::State::start(std::span<const Instance> posed, std::span<cons
   options = chosen;
   if (posed.size() >= kNoIndex) return fail(Status::kTooManyInstances, 0);
   if (motion.size() != posed.size()) return fail(Status::kMotionMismatch, 0);
-  const bool fits = seconds >= 0 && std::isfinite(seconds) && options.tolerance >= 0 &&
-                    std::isfinite(options.tolerance);
+  const bool fits =
+      seconds >= 0 && std::isfinite(seconds) && options.tolerance >= 0 && std::isfinite(options.tolerance);
   if (!fits) return fail(Status::kOutOfRange, 0);
   if (!bodies.resize(posed.size()) || !boxes.resize(posed.size())) return fail(Status::kOutOfMemory, 0);
   for (std::uint32_t i = 0; i < posed.size(); ++i) {

@@ -78,8 +78,7 @@ void ImpactWalk::descend(const WaitingPair& pair, const NodeTimes& times, double
   if (descent == Descent::both) {
     for (std::uint32_t hits = times.hits; hits != 0; hits &= hits - 1) {
       const int bit = lowest_bit(hits);
-      below.insert(
-          {a.index[bit / 4], b.index[bit % 4], kAllNodePairs, pair.part, begin + times.apart[bit]});
+      below.insert({a.index[bit / 4], b.index[bit % 4], kAllNodePairs, pair.part, begin + times.apart[bit]});
     }
   }
   for (int i = 0; i < kNodesPerBlock; ++i) {

@@ -518,7 +518,8 @@ MovingTriangle triangle_above(RandomPoses& random, const double (&n)[3], double 
   }
   const double size = std::pow(10, random.uniform(-4, 0));
   for (int c = 0; c < 3; ++c) {
-    for (int k = 0; k < 3; ++k) out.triangle.corner[c].position[k] = static_cast<float>(random.symmetric(size));
+    for (int k = 0; k < 3; ++k)
+      out.triangle.corner[c].position[k] = static_cast<float>(random.symmetric(size));
   }
   return out;
 }
@@ -719,12 +720,11 @@ TEST_P(ImpactFamilies, NothingTouchesUntilTSafeAndThenTheGapIsWhatIsTold) {
   EXPECT_GE(near, found * 0.99);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, ImpactFamilies, testing::ValuesIn(kFamilies),
-                         [](const auto& family) {
-                           std::string name = family.param.name;
-                           std::replace(name.begin(), name.end(), ' ', '_');
-                           return name;
-                         });
+INSTANTIATE_TEST_SUITE_P(All, ImpactFamilies, testing::ValuesIn(kFamilies), [](const auto& family) {
+  std::string name = family.param.name;
+  std::replace(name.begin(), name.end(), ' ', '_');
+  return name;
+});
 
 }  // namespace
 }  // namespace tandem

@@ -19,7 +19,7 @@ enum class ImpactStatus : std::uint8_t {
 struct Impact {
   double t_safe;  ///< seconds; the whole step where there is none, 0 where they are in contact at the start
   double gap;     ///< of the two triangles at t_safe; other triangles of the pair may be nearer, but recede
-  double point_a[3], point_b[3];  ///< where these are nearest then, in the world
+  double point_a[3], point_b[3];         ///< where these are nearest then, in the world
   std::uint32_t triangle_a, triangle_b;  ///< in leaf order
   std::uint32_t face_a, face_b;          ///< of the source files
   ImpactStatus status;

@@ -39,9 +39,9 @@ inline constexpr double kLargestMovingCoordinate = 1e100;
 TANDEM_HD inline void rotation_by(const manifold::Vector3& turn, double (&out)[3][3]) {
   using manifold::greater;
   const double largest = greater(greater(std::fabs(turn.x), std::fabs(turn.y)), std::fabs(turn.z));
-  const manifold::Vector3 scaled = largest > 0 ? manifold::Vector3{turn.x / largest, turn.y / largest,
-                                                                   turn.z / largest}
-                                               : manifold::Vector3{1, 0, 0};
+  const manifold::Vector3 scaled =
+      largest > 0 ? manifold::Vector3{turn.x / largest, turn.y / largest, turn.z / largest}
+                  : manifold::Vector3{1, 0, 0};
   const double length = norm(scaled), angle = largest * length;
   const double k[3] = {scaled.x / length, scaled.y / length, scaled.z / length};
   const double s = std::sin(angle), c = std::cos(angle);
@@ -67,8 +67,8 @@ TANDEM_HD inline Pose pose_at(const Pose& start, const RigidMotion& motion, doub
   for (int i = 0; i < 3; ++i) {
     double turned = 0;
     for (int j = 0; j < 3; ++j) {
-      pose.rotation[i][j] = q[i][0] * start.rotation[0][j] + q[i][1] * start.rotation[1][j] +
-                            q[i][2] * start.rotation[2][j];
+      pose.rotation[i][j] =
+          q[i][0] * start.rotation[0][j] + q[i][1] * start.rotation[1][j] + q[i][2] * start.rotation[2][j];
       turned += q[i][j] * (start.translation[j] - motion.center[j]);
     }
     pose.translation[i] = turned + (motion.center[i] + t * motion.velocity[i]);
@@ -133,8 +133,8 @@ TANDEM_HD inline WorldBox swept_box(const WorldBox& start, const manifold::Vecto
   for (int k = 0; k < 3; ++k) {
     const double seen = angle > 0x1p-500 ? across[k] / angle : 1;
     const double turned = chord * seen * (1 + 0x1p-40);
-    const double margin = error + 0x1p-49 * (std::fabs(start.lo[k]) + std::fabs(start.hi[k]) +
-                                     std::fabs(along[k]) + turned);
+    const double margin =
+        error + 0x1p-49 * (std::fabs(start.lo[k]) + std::fabs(start.hi[k]) + std::fabs(along[k]) + turned);
     box.lo[k] = start.lo[k] + (along[k] < 0 ? along[k] : 0) - turned - margin;
     box.hi[k] = start.hi[k] + (along[k] > 0 ? along[k] : 0) + turned + margin;
   }

@@ -138,42 +138,37 @@ TANDEM_HD inline void other_nodes(const FrameMotion& frame, const Block& block, 
   }
 }
 
-/// The nodes of a block pair in both frames.
-struct MovingBlocks {
-  MovingNodes a_in_a, b_in_a, a_in_b, b_in_b;
+/// The nodes of a block pair along the axes of one frame: those of the frame's own tree, and of the other.
+struct FrameNodes {
+  MovingNodes own, other;
 };
 
-TANDEM_HD inline void moving_blocks(const PairFrames& frames, const Block& a, const Block& b,
-                                    MovingBlocks& out) {
-  own_nodes(frames.of_a, a, out.a_in_a);
-  other_nodes(frames.of_a, b, out.b_in_a);
-  other_nodes(frames.of_b, a, out.a_in_b);
-  own_nodes(frames.of_b, b, out.b_in_b);
+TANDEM_HD inline void frame_nodes(const FrameMotion& frame, const Block& own, const Block& other,
+                                  FrameNodes& out) {
+  own_nodes(frame, own, out.own);
+  other_nodes(frame, other, out.other);
 }
 
-/// One axis of (1): distance, velocity, radius with slack, and how fast the radius grows.
+/// One axis of (1): distance, velocity, radius with slack, and how fast the radius grows within `most`.
 struct AxisMotion {
   double distance, velocity, radius, growth;
 };
 
-TANDEM_HD inline AxisMotion axis_motion(const PairFrames& frames, const MovingBlocks& nodes, int axis, int i,
-                                        int j, double most) {
-  const MovingNodes &a = axis < 3 ? nodes.a_in_a : nodes.a_in_b, &b = axis < 3 ? nodes.b_in_a : nodes.b_in_b;
-  const int k = axis % 3;
-  const double acceleration = (axis < 3 ? frames.of_a : frames.of_b).acceleration[k];
-  return {b.center[k][j] - a.center[k][i], b.velocity[k][j] - a.velocity[k][i],
-          b.radius[k][j] + a.radius[k][i] + frames.slack,
-          b.spread[k][j] + a.spread[k][i] + 0.5 * acceleration * most};
+TANDEM_HD inline AxisMotion axis_motion(const MovingNodes& x, int i, const MovingNodes& y, int j, int k,
+                                        double slack, double acceleration, double most) {
+  return {y.center[k][j] - x.center[k][i], y.velocity[k][j] - x.velocity[k][i],
+          y.radius[k][j] + x.radius[k][i] + slack,
+          y.spread[k][j] + x.spread[k][i] + 0.5 * acceleration * most};
 }
 
-/// For node i of a and each node of b, more than 0 where one axis tells them apart from now on for `most`.
-/// Imaginary nodes have any value.
-TANDEM_HD inline void margins(const PairFrames& frames, const MovingBlocks& nodes, int i, double most,
-                              double (&margin)[kNodesPerBlock]) {
-  for (int j = 0; j < kNodesPerBlock; ++j) margin[j] = -std::numeric_limits<double>::infinity();
-  for (int axis = 0; axis < 6; ++axis) {
+/// Raises margins to more than 0 for pairs of node i of x and each node of y that an axis of the frame tells
+/// apart from now on for `most`. Imaginary nodes have any value.
+TANDEM_HD inline void raise_margins(const FrameMotion& frame, const MovingNodes& x, int i,
+                                    const MovingNodes& y, double slack, double most,
+                                    double (&margin)[kNodesPerBlock]) {
+  for (int k = 0; k < 3; ++k) {
     for (int j = 0; j < kNodesPerBlock; ++j) {
-      const AxisMotion m = axis_motion(frames, nodes, axis, i, j, most);
+      const AxisMotion m = axis_motion(x, i, y, j, k, slack, frame.acceleration[k], most);
       const double d = m.distance + most * m.velocity, r = m.radius + most * m.growth;
       const double above = manifold::lesser(m.distance - m.radius, d - r),
                    below = manifold::lesser(-m.distance - m.radius, -d - r);
@@ -184,11 +179,15 @@ TANDEM_HD inline void margins(const PairFrames& frames, const MovingBlocks& node
 
 /// How long real nodes i and j surely stay apart by the margin from now on, at most `most`; 0 where they are
 /// nearer now.
-TANDEM_HD inline double time_apart(const PairFrames& frames, const MovingBlocks& nodes, int i, int j,
-                                   double most) {
+TANDEM_HD inline double time_apart(const PairFrames& frames, const FrameNodes& in_a, const FrameNodes& in_b,
+                                   int i, int j, double most) {
   double start[12], slope[12];  // of the difference in (1), on each side of each axis
   for (int axis = 0; axis < 6; ++axis) {
-    const AxisMotion m = axis_motion(frames, nodes, axis, i, j, most);
+    const int k = axis % 3;
+    const AxisMotion m =
+        axis < 3
+            ? axis_motion(in_a.own, i, in_a.other, j, k, frames.slack, frames.of_a.acceleration[k], most)
+            : axis_motion(in_b.other, i, in_b.own, j, k, frames.slack, frames.of_b.acceleration[k], most);
     start[2 * axis] = m.distance - (m.radius + frames.margin);
     slope[2 * axis] = m.velocity - m.growth;
     start[2 * axis + 1] = -m.distance - (m.radius + frames.margin);
@@ -228,18 +227,31 @@ struct NodeTimes {
 /// Of those in `mask`, which are apart until `known` from now on, the node pairs that may meet before `most`.
 TANDEM_HD inline void node_times(const PairFrames& frames, const Block& a, const Block& b, std::uint32_t mask,
                                  double known, double most, NodeTimes& out) {
-  MovingBlocks nodes;
-  moving_blocks(frames, a, b, nodes);
-  const std::uint32_t real_b = real_nodes(b);
   out.hits = 0;
+  FrameNodes in_a, in_b;
+  double margin[kNodesPerBlock][kNodesPerBlock];
+  // Most block pairs are told apart in the first frame.
+  frame_nodes(frames.of_a, a, b, in_a);
+  const std::uint32_t real_b = real_nodes(b);
+  std::uint32_t open = 0;
   for (int i = 0; i < kNodesPerBlock; ++i) {
     const std::uint32_t row = a.half_extent[0][i] >= 0 ? mask >> 4 * i & real_b : 0;
     if (row == 0) continue;
-    double margin[kNodesPerBlock];
-    margins(frames, nodes, i, most, margin);
+    for (int j = 0; j < kNodesPerBlock; ++j) margin[i][j] = -std::numeric_limits<double>::infinity();
+    raise_margins(frames.of_a, in_a.own, i, in_a.other, frames.slack, most, margin[i]);
     for (int j = 0; j < kNodesPerBlock; ++j) {
-      if ((row >> j & 1) == 0 || margin[j] > 0) continue;
-      const double apart = time_apart(frames, nodes, i, j, most);
+      if ((row >> j & 1) != 0 && !(margin[i][j] > 0)) open |= 1u << (4 * i + j);
+    }
+  }
+  if (open == 0) return;
+  frame_nodes(frames.of_b, b, a, in_b);
+  for (int i = 0; i < kNodesPerBlock; ++i) {
+    const std::uint32_t row = open >> 4 * i & 0xFu;
+    if (row == 0) continue;
+    raise_margins(frames.of_b, in_b.other, i, in_b.own, frames.slack, most, margin[i]);
+    for (int j = 0; j < kNodesPerBlock; ++j) {
+      if ((row >> j & 1) == 0 || margin[i][j] > 0) continue;
+      const double apart = time_apart(frames, in_a, in_b, i, j, most);
       if (apart >= most) continue;
       out.hits |= 1u << (4 * i + j);
       out.apart[4 * i + j] = manifold::greater(apart, known);

@@ -23,8 +23,7 @@ struct Matrix3 {
     Matrix3 out;
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) {
-        out.row[i][j] =
-            m.row[i][0] * n.row[0][j] + m.row[i][1] * n.row[1][j] + m.row[i][2] * n.row[2][j];
+        out.row[i][j] = m.row[i][0] * n.row[0][j] + m.row[i][1] * n.row[1][j] + m.row[i][2] * n.row[2][j];
       }
     }
     return out;

@@ -43,8 +43,8 @@ TANDEM_HD inline double corners_of(const MovingBody& body, const Triangle& trian
     double x[3];
     apply(body.start, p[0], p[1], p[2], x);
     out[c] = vector_of(x) - body.center;
-    fastest = manifold::greater(fastest, norm(manifold::cross(body.turn, out[c])) +
-                                             0x1p-49 * body.angle * norm(out[c]));
+    fastest = manifold::greater(
+        fastest, norm(manifold::cross(body.turn, out[c])) + 0x1p-49 * body.angle * norm(out[c]));
   }
   return fastest;
 }

@@ -1,0 +1,70 @@
+#pragma once
+#include <cmath>
+
+#include "tandem/kernels/detail/distance/box_distance.h"
+#include "tandem/kernels/detail/distance/nearest_features.h"
+
+/// The distance of two triangles as float32 knows it in the frame of the first instance, for CPU and GPU.
+///
+/// **Proof.** E of frame_test.h bounds, coordinate by coordinate, how far the image of a corner of a is from
+/// the corner as stored, and that of one of b from posed() of it, both together. So for points p and q of the
+/// posed triangles, N (p - q) differs from the difference of the same points of the float32 triangles by at
+/// most E a coordinate, and their distance in the frame by sqrt(3) E < 1.7321 E. Of the float32 triangles the
+/// proof in triangle_distance.h holds with u = 2^-24: both bounds are relative to a[0] and to M there. The
+/// difference of the two points, `apart`, is made of offsets with parameters from 0 to 1 there too: an offset
+/// of two corners (4 u M), two edges times a parameter (6 u M each) and two sums (8 u M) are 24 u M a
+/// coordinate, below the 40 u M that it has. Directions too short to be sure of, where |n|_1 < 2^-40, give 0;
+/// from there on underflow, a few times 2^-126, is below 2^-104 < 0.09 u |n|_1 M, as M >= |n|_1 / 6.
+namespace tandem::distance {
+
+/// Lengths in a's frame that the distance is not below, and not above.
+template <typename Value>
+struct FrameInterval {
+  Value lower, upper;
+};
+
+TANDEM_HD inline float square_root(float x) {
+  return std::sqrt(x);
+}
+
+template <typename Value>
+TANDEM_HD inline Value least_of(const Value& x, const Value& y, const Value& z) {
+  const Value first = select(less(y, x), y, x);
+  return select(less(z, first), z, first);
+}
+
+template <typename Value>
+TANDEM_HD inline Value greatest_of(const Value& x, const Value& y, const Value& z) {
+  return larger(larger(x, y), z);
+}
+
+/// a: corners as stored, b: posed() ones. error: frame_error().
+template <typename Value>
+TANDEM_HD inline FrameInterval<Value> frame_interval(const Point<Value> (&corner_a)[3],
+                                                     const Point<Value> (&corner_b)[3], float error) {
+  Point<Value> a[3], b[3];
+  Value largest{};
+  for (int i = 0; i < 3; ++i) {
+    a[i] = minus(corner_a[i], corner_a[0]);
+    b[i] = minus(corner_b[i], corner_a[0]);
+    for (int k = 0; k < 3; ++k) largest = larger(largest, larger(magnitude(a[i].x[k]), magnitude(b[i].x[k])));
+  }
+  const Nearest<Value> nearest = nearest_features<Value>(a, b, value_of<Value>(0x1p-60));
+  constexpr float kU = 0x1p-24f;
+  const float off = 1.7321f * error * (1 + 8 * kU);
+  const Point<Value>& n = nearest.along;
+  const Value length = square_root(dot(n, n)), n_1 = frame::sum_of_magnitudes(n.x);
+  const Value gap = least_of(dot(n, a[0]), dot(n, a[1]), dot(n, a[2])) -
+                    greatest_of(dot(n, b[0]), dot(n, b[1]), dot(n, b[2]));
+  const Value sure = gap - (9.1f * kU) * (n_1 * largest);
+  const auto counts = less(value_of<Value>(0x1p-40), n_1) & less(Value{}, sure);
+  const Value quotient = sure / select(counts, length, value_of<Value>(1));
+  const Value lower = select(counts, (1 - 12 * kU) * quotient + (-off), Value{});
+  FrameInterval<Value> out;
+  out.lower = select(less(Value{}, lower), lower, Value{});
+  const Point<Value>& apart = nearest.apart;
+  out.upper = (1 + 12 * kU) * square_root(dot(apart, apart)) + ((84 * kU) * largest + (off + 0x1p-60f));
+  return out;
+}
+
+}  // namespace tandem::distance

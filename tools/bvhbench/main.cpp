@@ -7,6 +7,7 @@
 #include "common/option_helpers.h"
 #include "common/printable.h"
 #include "compare_command.h"
+#include "distance_command.h"
 #include "engines/engine.h"
 #include "frame_command.h"
 #include "poses_command.h"
@@ -61,6 +62,7 @@ int main(int argc, char** argv) {
   // Each subcommand is a header and a line here.
   add_scene(app, run);
   add_query(app, run);
+  add_distance(app, run);
   add_compare(app, run);
   add_simulate(app, run);
   add_frame(app, run);

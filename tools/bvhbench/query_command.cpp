@@ -1,7 +1,6 @@
 #include "query_command.h"
 
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <new>
 #include <thread>
@@ -53,16 +52,7 @@ std::string name_of(Value wanted, const std::map<std::string, Value>& names) {
   return {};
 }
 
-// Throws what a status other than kOk calls for. `where`: the instance or pair that is to blame.
-[[noreturn]] void refuse(const std::string& scene, Status status, std::uint64_t where) {
-  const char* unit = subject(status);
-  const std::string blamed = unit == nullptr ? "" : std::string(unit) + " " + std::to_string(where) + ": ";
-  const std::string text = scene + ": " + blamed + explain(status);
-  if (status == Status::kCannotStartThread) throw std::runtime_error(text);
-  throw FileError(text);
-}
-
-[[noreturn]] void refuse(const std::string& scene, const GpuError& error) {
+[[noreturn]] void refuse_gpu(const std::string& scene, const GpuError& error) {
   const std::string why = explain(error.status);
   switch (error.status) {
     case Status::kTooManyPairs:
@@ -137,16 +127,8 @@ Answer answer_of(const QueryArguments& arguments, const Scene& scene) {
     }
     refuse(arguments.scene, error.status, error.where);
   } catch (const GpuError& error) {
-    refuse(arguments.scene, error);
+    refuse_gpu(arguments.scene, error);
   }
-}
-
-std::uint64_t triangles_of(const Scene& scene) {
-  std::uint64_t triangles = 0;
-  for (const Instance& instance : scene.description.instances) {
-    triangles += scene.assets[instance.asset].view().level().triangle_count;
-  }
-  return triangles;
 }
 
 Json times(const Seconds& seconds) {
@@ -300,15 +282,6 @@ void write(const QueryArguments& arguments, const Answer& answer) {
   const ContainedTable contained = {answer.contained.rows, answer.contained.seconds};
   write_contacts(arguments.out, answer.table, answer.record, arguments.manifolds ? &manifolds : nullptr,
                  arguments.contained ? &contained : nullptr);
-}
-
-// The scene file and its assets, as paths from here.
-std::vector<std::string> files_of(const std::string& path, const Scene& scene) {
-  std::vector<std::string> files = {path};
-  for (const std::string& asset : scene.description.assets) {
-    files.push_back((std::filesystem::path(path).parent_path() / asset).string());
-  }
-  return files;
 }
 
 ExitCode run(const QueryArguments& arguments) {

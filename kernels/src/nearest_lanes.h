@@ -81,24 +81,45 @@ class NearestLaneMeans {
   }
 
   // Not inlined, not to crowd the bounds of boxes out of registers.
-  [[gnu::noinline]] void intervals(const NearBatch& batch, double* lower, double* upper) const {
+  [[gnu::noinline]] std::uint32_t far_along(const NearBatch& batch, const float (&direction)[3],
+                                            double at_least) const {
+    const distance::FrameDirection along = direction_of(task_, direction, at_least);
+    std::uint32_t mask = 0;
+    for (std::uint32_t first = 0; first < kNearBatch && first < batch.count; first += kCount) {
+      Corner a[3], b[3];
+      gather_corners(batch, first, a, b);
+      mask |= distance::is_far_along(a, b, along).mask() << first;
+    }
+    return mask;
+  }
+
+  [[gnu::noinline]] void bound(const NearBatch& batch, BoundedBatch& out) const {
     const DistanceFrame& frame = task_.frame;
     for (std::uint32_t first = 0; first < kNearBatch && first < batch.count; first += kCount) {
-      tandem::frame::Point<Lanes<kCount>> a[3], b[3];
-      for (int corner = 0; corner < 3; ++corner) {
-        a[corner] = gather<kCount>(task_.a->tree.triangles, batch.a + first, corner);
-        b[corner] = tandem::frame::posed(frame.b_in_a,
-                                         gather<kCount>(task_.b->tree.triangles, batch.b + first, corner));
-      }
+      Corner a[3], b[3];
+      gather_corners(batch, first, a, b);
       const auto interval = distance::frame_interval(a, b, frame.error);
       for (int i = 0; i < kCount; ++i) {
-        lower[first + i] = static_cast<double>(interval.lower.v[i]) * frame.least_in_world;
-        upper[first + i] = static_cast<double>(interval.upper.v[i]) * frame.most_in_world;
+        out.lower[first + i] = static_cast<double>(interval.lower.v[i]) * frame.least_in_world;
+        out.upper[first + i] = static_cast<double>(interval.upper.v[i]) * frame.most_in_world;
       }
+      for (int k = 0; k < 3; ++k)
+        __builtin_memcpy(out.along[k] + first, &interval.along.x[k], sizeof interval.along.x[k]);
     }
   }
 
  private:
+  using Corner = tandem::frame::Point<Lanes<kCount>>;
+
+  TANDEM_INLINE void gather_corners(const NearBatch& batch, std::uint32_t first, Corner (&a)[3],
+                                    Corner (&b)[3]) const {
+    for (int corner = 0; corner < 3; ++corner) {
+      a[corner] = gather<kCount>(task_.a->tree.triangles, batch.a + first, corner);
+      b[corner] = tandem::frame::posed(task_.frame.b_in_a,
+                                       gather<kCount>(task_.b->tree.triangles, batch.b + first, corner));
+    }
+  }
+
   const NearestTask& task_;
 };
 

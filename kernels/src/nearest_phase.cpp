@@ -30,18 +30,36 @@ class NearestScalarMeans {
     return mask;
   }
 
-  void intervals(const NearBatch& batch, double* lower, double* upper) const {
+  std::uint32_t far_along(const NearBatch& batch, const float (&direction)[3], double at_least) const {
+    const distance::FrameDirection along = direction_of(task_, direction, at_least);
+    std::uint32_t mask = 0;
+    for (std::uint32_t i = 0; i < kNearBatch && i < batch.count; ++i) {
+      const auto [a, b] = corners(batch, i);
+      if (distance::is_far_along(a.corner, b.corner, along)) mask |= 1u << i;
+    }
+    return mask;
+  }
+
+  void bound(const NearBatch& batch, BoundedBatch& out) const {
     const DistanceFrame& frame = task_.frame;
     for (std::uint32_t i = 0; i < kNearBatch && i < batch.count; ++i) {
-      const TriangleInFrame a = stored_triangle(task_.a->tree.triangles[batch.a[i]]);
-      const TriangleInFrame b = posed_triangle(frame.b_in_a, task_.b->tree.triangles[batch.b[i]]);
+      const auto [a, b] = corners(batch, i);
       const auto interval = distance::frame_interval(a.corner, b.corner, frame.error);
-      lower[i] = static_cast<double>(interval.lower) * frame.least_in_world;
-      upper[i] = static_cast<double>(interval.upper) * frame.most_in_world;
+      out.lower[i] = static_cast<double>(interval.lower) * frame.least_in_world;
+      out.upper[i] = static_cast<double>(interval.upper) * frame.most_in_world;
+      for (int k = 0; k < 3; ++k) out.along[k][i] = interval.along.x[k];
     }
   }
 
  private:
+  struct Corners {
+    TriangleInFrame a, b;
+  };
+  Corners corners(const NearBatch& batch, std::uint32_t i) const {
+    return {stored_triangle(task_.a->tree.triangles[batch.a[i]]),
+            posed_triangle(task_.frame.b_in_a, task_.b->tree.triangles[batch.b[i]])};
+  }
+
   const NearestTask& task_;
 };
 
@@ -75,10 +93,12 @@ class NearestWorldBoxMeans {
     return mask;
   }
 
+  std::uint32_t far_along(const NearBatch&, const float (&)[3], double) const { return 0; }
+
   /// Nothing is known, so that all are settled.
-  void intervals(const NearBatch&, double* lower, double* upper) const {
-    std::fill_n(lower, kNearBatch, 0.0);
-    std::fill_n(upper, kNearBatch, INFINITY);
+  void bound(const NearBatch&, BoundedBatch& out) const {
+    std::fill_n(out.lower, kNearBatch, 0.0);
+    std::fill_n(out.upper, kNearBatch, INFINITY);
   }
 
  private:
@@ -108,6 +128,10 @@ float bound_limit(const NearestTask& task, double distance) {
 
 double bound_distance(const NearestTask& task, float bound) {
   return distance::distance_of(task.frame, bound);
+}
+
+distance::FrameDirection direction_of(const NearestTask& task, const float (&direction)[3], double at_least) {
+  return distance::frame_direction(task.frame, direction, at_least);
 }
 
 bool add_candidate(const NearCandidate& candidate, NearestSoFar& state) {
@@ -203,6 +227,21 @@ bool take_over(NearestSoFar& from, NearestSoFar& state) {
   return true;
 }
 
+namespace {
+
+// A lower bound: how far apart a candidate's triangles are along the direction of the best. Most of those
+// that are left have their nearest corner or edge in common with it, and so all but the same distance.
+double distance_along_best(const NearestTask& task, const NearCandidate& candidate,
+                           const NearestSoFar& state) {
+  const distance::LocalPair local = distance::local_pair(posed_pair(
+      task.a->pose, task.a->tree.triangles[candidate.a], task.b->pose, task.b->tree.triangles[candidate.b]));
+  if (!local.in_range()) return 0;
+  const double(&p)[3] = state.best.point_a, (&q)[3] = state.best.point_b;
+  return distance::distance_along(local, {{p[0] - q[0], p[1] - q[1], p[2] - q[2]}});
+}
+
+}  // namespace
+
 void settle_candidates(const NearestTask& task, NearestSoFar& state) {
   NearCandidate* const begin = state.candidates.data();
   NearCandidate* const end = begin + state.candidates.size();
@@ -218,10 +257,11 @@ void settle_candidates(const NearestTask& task, NearestSoFar& state) {
   });
   for (const NearCandidate* at = begin; at < far && !state.touches(); ++at) {
     if (at->a == state.triangle_a && at->b == state.triangle_b) continue;
-    if (near(*at))
+    const double lower = near(*at) ? distance_along_best(task, *at, state) : at->lower;
+    if (lower < nearness(task, state))
       settle(task, at->a, at->b, state);
     else
-      state.floor = std::min(state.floor, at->lower);
+      state.floor = std::min(state.floor, lower);
   }
   state.candidates.clear();
 }

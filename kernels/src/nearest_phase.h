@@ -5,6 +5,7 @@
 #include "narrow_phase.h"
 #include "tandem/kernels/detail/buffer.h"
 #include "tandem/kernels/detail/distance/box_distance.h"
+#include "tandem/kernels/detail/distance/frame_distance.h"
 #include "tandem/kernels/detail/distance/triangle_distance.h"
 #include "tandem/kernels/distance_query.h"
 
@@ -79,6 +80,9 @@ double nearness(const NearestTask& task, const NearestSoFar& state);
 /// limit_of() and distance_of() of box_distance.h.
 float bound_limit(const NearestTask& task, double distance);
 double bound_distance(const NearestTask& task, float bound);
+
+/// frame_direction() of frame_distance.h.
+distance::FrameDirection direction_of(const NearestTask& task, const float (&direction)[3], double at_least);
 
 /// False: out of memory, which the state keeps.
 bool add_candidate(const NearCandidate& candidate, NearestSoFar& state);

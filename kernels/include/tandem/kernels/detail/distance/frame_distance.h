@@ -21,7 +21,34 @@ namespace tandem::distance {
 template <typename Value>
 struct FrameInterval {
   Value lower, upper;
+  Point<Value> along;  ///< from b to a, of any length: the direction that `lower` is told by
 };
+
+/// A direction in a's frame, and how far apart along it triangles must be to be at least a given distance
+/// apart in the world.
+struct FrameDirection {
+  float n[3];      ///< |n| <= 1
+  float length;    ///< in a's frame, with all errors but those that grow with the triangles
+  float relative;  ///< these, for each unit of M in the proof
+};
+
+/// Where `along` is too short to tell its direction, nothing counts as far.
+TANDEM_HD inline FrameDirection frame_direction(const DistanceFrame& frame, const float (&along)[3],
+                                                double at_least) {
+  double square = 0, sum = 0;
+  for (const float x : along) square += static_cast<double>(x) * static_cast<double>(x);
+  // Rounding to float32 makes |n| larger by u at most.
+  const double factor = square > 0 ? (1 - 0x1p-22) / std::sqrt(square) : 0;
+  FrameDirection out;
+  for (int k = 0; k < 3; ++k) {
+    out.n[k] = static_cast<float>(static_cast<double>(along[k]) * factor);
+    sum += std::fabs(static_cast<double>(out.n[k]));
+  }
+  const double length = at_least / frame.least_in_world + 1.7321 * static_cast<double>(frame.error);
+  out.length = length < 0x1p100 ? static_cast<float>(length * (1 + 0x1p-20) + 0x1p-100) : INFINITY;
+  out.relative = static_cast<float>(9.2 * 0x1p-24 * sum);
+  return out;
+}
 
 TANDEM_HD inline float square_root(float x) {
   return std::sqrt(x);
@@ -36,6 +63,22 @@ TANDEM_HD inline Value least_of(const Value& x, const Value& y, const Value& z) 
 template <typename Value>
 TANDEM_HD inline Value greatest_of(const Value& x, const Value& y, const Value& z) {
   return larger(larger(x, y), z);
+}
+
+/// Whether the posed triangles are at least as far apart as frame_direction() was asked for, along that
+/// direction: what the proof says of `lower`, with |n| <= 1. a: corners as stored, b: posed() ones.
+template <typename Value>
+TANDEM_HD inline auto is_far_along(const Point<Value> (&corner_a)[3], const Point<Value> (&corner_b)[3],
+                                   const FrameDirection& along) {
+  Value of_a[3], of_b[3], largest{};
+  for (int i = 0; i < 3; ++i) {
+    const Point<Value> a = minus(corner_a[i], corner_a[0]), b = minus(corner_b[i], corner_a[0]);
+    of_a[i] = (along.n[0] * a.x[0] + along.n[1] * a.x[1]) + along.n[2] * a.x[2];
+    of_b[i] = (along.n[0] * b.x[0] + along.n[1] * b.x[1]) + along.n[2] * b.x[2];
+    largest = larger(largest, larger(frame::largest_magnitude(a.x), frame::largest_magnitude(b.x)));
+  }
+  const Value gap = least_of(of_a[0], of_a[1], of_a[2]) - greatest_of(of_b[0], of_b[1], of_b[2]);
+  return less(along.relative * largest + along.length, gap);
 }
 
 /// a: corners as stored, b: posed() ones. error: frame_error().
@@ -61,6 +104,7 @@ TANDEM_HD inline FrameInterval<Value> frame_interval(const Point<Value> (&corner
   const Value quotient = sure / select(counts, length, value_of<Value>(1));
   const Value lower = select(counts, (1 - 12 * kU) * quotient + (-off), Value{});
   FrameInterval<Value> out;
+  out.along = n;
   out.lower = select(less(Value{}, lower), lower, Value{});
   const Point<Value>& apart = nearest.apart;
   out.upper = (1 + 12 * kU) * square_root(dot(apart, apart)) + ((84 * kU) * largest + (off + 0x1p-60f));

@@ -53,16 +53,6 @@ bool is_near_first(const BoundedBlockPair& x, const BoundedBlockPair& y) {
   return x.a != y.a ? x.a < y.a : x.b < y.b;
 }
 
-// A box whose distance from another is at most `reach` meets that one, grown as well.
-WorldBox grown(const WorldBox& box, double reach) {
-  WorldBox out;
-  for (int k = 0; k < 3; ++k) {
-    out.lo[k] = std::max(std::nextafter(box.lo[k] - 0.5 * reach, -HUGE_VAL), -kLargestWorldCoordinate);
-    out.hi[k] = std::min(std::nextafter(box.hi[k] + 0.5 * reach, HUGE_VAL), kLargestWorldCoordinate);
-  }
-  return out;
-}
-
 }  // namespace
 
 struct DistanceQuery::State {
@@ -154,7 +144,8 @@ Status DistanceQuery::State::pose_instances(std::span<const Instance> posed) {
 }
 
 Status DistanceQuery::State::find_pairs() {
-  for (WorldBox& box : std::span(boxes.data(), boxes.size())) box = grown(box, options.reach);
+  // Two boxes that are within reach of each other meet when each is larger by half of it.
+  for (WorldBox& box : std::span(boxes.data(), boxes.size())) box = grown(box, 0.5 * options.reach);
   const PairFilter filter = options.filter != nullptr ? *options.filter : PairFilter();
   const Status status = broad_phase.find_pairs(boxes.view(), filter, false, threads,
                                                workers_for(boxes.size(), kInstancesAtOnce));

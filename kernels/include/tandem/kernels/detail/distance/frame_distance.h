@@ -111,4 +111,72 @@ TANDEM_HD inline FrameInterval<Value> frame_interval(const Point<Value> (&corner
   return out;
 }
 
+/// What clearance asks of a pair of instances: a distance in the world, as lengths in a's frame.
+struct FrameClearance {
+  float apart_from;  ///< what is farther apart than this is farther apart than asked, in the world
+  float within_to;   ///< what is no farther apart than this is within what is asked
+  float error;       ///< frame_error()
+};
+
+TANDEM_HD inline FrameClearance frame_clearance(const DistanceFrame& frame, double distance) {
+  const double apart = distance / frame.least_in_world * (1 + 0x1p-22) + 0x1p-100,
+               within = distance / frame.most_in_world * (1 - 0x1p-22) - 0x1p-100;
+  return {apart < 0x1p100 ? static_cast<float>(apart) : INFINITY,
+          within > 0 ? within < 0x1p100 ? static_cast<float>(within) : 0x1p100f : -1.0f, frame.error};
+}
+
+/// Whether two triangles lie more than a length apart along n or against it: the proof above, with 9.2 u for
+/// its 9.1, and 8 u for |n| as computed. M: `largest`. A direction that underflow could touch tells nothing.
+template <typename Value>
+TANDEM_HD inline auto is_beyond_along(const Point<Value>& n, const Point<Value> (&a)[3],
+                                      const Point<Value> (&b)[3], const Value& largest, float length) {
+  constexpr float kU = 0x1p-24f;
+  const Value of_a[3] = {dot(n, a[0]), dot(n, a[1]), dot(n, a[2])},
+              of_b[3] = {dot(n, b[0]), dot(n, b[1]), dot(n, b[2])};
+  const Value above = least_of(of_b[0], of_b[1], of_b[2]) - greatest_of(of_a[0], of_a[1], of_a[2]);
+  const Value below = least_of(of_a[0], of_a[1], of_a[2]) - greatest_of(of_b[0], of_b[1], of_b[2]);
+  const Value n_1 = frame::sum_of_magnitudes(n.x), size = n_1 * largest;
+  const Value needed = length * square_root(dot(n, n)) + (9.2f * kU) * size;
+  return less(value_of<Value>(0x1p-55), n_1) & less(value_of<Value>(0x1p-80), size) &
+         less(needed, larger(above, below));
+}
+
+/// Whether the posed triangles are surely farther apart than asked: by their boxes in a's frame, or by the
+/// planes of either. a: corners as stored, b: posed() ones.
+template <typename Value>
+TANDEM_HD inline auto are_beyond(const Point<Value> (&corner_a)[3], const Point<Value> (&corner_b)[3],
+                                 const FrameClearance& clearance) {
+  Point<Value> a[3], b[3];
+  Value largest{}, widest = value_of<Value>(-1);
+  for (int i = 0; i < 3; ++i) {
+    a[i] = minus(corner_a[i], corner_a[0]);
+    b[i] = minus(corner_b[i], corner_a[0]);
+    largest = larger(largest, larger(frame::largest_magnitude(a[i].x), frame::largest_magnitude(b[i].x)));
+  }
+  for (int k = 0; k < 3; ++k) {
+    const Value above =
+        least_of(b[0].x[k], b[1].x[k], b[2].x[k]) - greatest_of(a[0].x[k], a[1].x[k], a[2].x[k]);
+    const Value below =
+        least_of(a[0].x[k], a[1].x[k], a[2].x[k]) - greatest_of(b[0].x[k], b[1].x[k], b[2].x[k]);
+    widest = larger(widest, larger(above, below));
+  }
+  constexpr float kU = 0x1p-24f;
+  const float length = (clearance.apart_from + 1.7321f * clearance.error) * (1 + 16 * kU);
+  // Along an axis, differences are the only roundings: of u M each, and one of their own.
+  const auto by_boxes = less((5 * kU) * largest + length, widest);
+  return by_boxes | is_beyond_along(cross(minus(a[1], a[0]), minus(a[2], a[0])), a, b, largest, length) |
+         is_beyond_along(cross(minus(b[1], b[0]), minus(b[2], b[0])), a, b, largest, length);
+}
+
+/// What frame_interval() knows of clearance: `contact` where the posed triangles are surely within it.
+template <typename Value>
+TANDEM_HD inline auto decide_within(const Point<Value> (&a)[3], const Point<Value> (&b)[3],
+                                    const FrameClearance& clearance) {
+  const FrameInterval<Value> interval = frame_interval(a, b, clearance.error);
+  frame::Verdicts<decltype(less(interval.lower, interval.upper))> verdicts;
+  verdicts.contact = less(interval.upper, value_of<Value>(clearance.within_to));
+  verdicts.undecided = !(verdicts.contact | less(value_of<Value>(clearance.apart_from), interval.lower));
+  return verdicts;
+}
+
 }  // namespace tandem::distance

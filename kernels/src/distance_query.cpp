@@ -18,9 +18,10 @@ constexpr std::size_t kInstancesAtOnce = 64, kMostPairsAtOnce = 16;
 // Pairs of bodies with more triangles than this, together, are spread over all threads, one after the other.
 constexpr std::uint64_t kSpreadFrom = std::uint64_t{1} << 18;
 
-// Of such a pair: so many walks are begun before one of them tells where to look, so many after that, and so
-// many at a time, which know what those before them found. Threads take them as they come.
-constexpr std::size_t kFirstWalks = 64, kMostWalks = 4096, kWalksInRound = 256;
+// Of such a pair: how many pairs of blocks one walk visits before it leaves the rest to others; and how many
+// walks make a round, in which none knows what the others find. Threads take them as they come.
+constexpr std::uint64_t kVisitsAlone = 8192, kVisitsInRound = 1024;
+constexpr std::size_t kWalksInRound = 64;
 
 struct Asset {
   LevelView tree;
@@ -71,7 +72,7 @@ struct DistanceQuery::State {
   WorkerThreads threads;
   std::unique_ptr<Slot[]> slots;  // one for each worker, or for each walk of a round
   std::size_t slot_count = 0;
-  Buffer<BoundedBlockPair> walks, next_walks;
+  Buffer<BoundedBlockPair> walks;
 
   Status fail(Status status, std::uint64_t at) {
     where = at;
@@ -101,7 +102,6 @@ struct DistanceQuery::State {
     return task.in_frame ? nearest_phase : nearest_phase_by_world_boxes;
   }
   void find_one(std::size_t pair, NearestSoFar& state);
-  bool expand(const NearestTask& task, NearestSoFar& state, std::size_t wanted);
   bool walk_round(const NearestTask& task, std::size_t first, NearestSoFar& state);
   bool find_spread(std::size_t pair);
   void finish(std::size_t pair, const NearestTask& task, NearestSoFar& state);
@@ -228,24 +228,8 @@ void DistanceQuery::State::find_one(std::size_t pair, NearestSoFar& state) {
   finish(pair, task, state);
 }
 
-// Replaces pairs of blocks that are near by those below them, until there are as many as wanted, or pairs of
-// leaf blocks only. The nearest come first. False: out of memory.
-bool DistanceQuery::State::expand(const NearestTask& task, NearestSoFar& state, std::size_t wanted) {
-  for (bool deeper = true; deeper && walks.size() < wanted;) {
-    deeper = false;
-    next_walks.clear();
-    for (const BoundedBlockPair& pair : walks.view()) {
-      deeper = deeper || !task.a->tree.blocks[pair.a].is_leaf_block() ||
-               !task.b->tree.blocks[pair.b].is_leaf_block();
-      if (!tandem::expand(task, pair, state, next_walks)) return false;
-    }
-    std::swap(walks, next_walks);
-  }
-  std::sort(walks.data(), walks.data() + walks.size(), is_near_first);
-  return true;
-}
-
-// Walks of which none knows what the others find, whoever takes them; what they found, in their order.
+// Walks of which none knows what the others find, whoever takes them; what they found and left, in their
+// order.
 bool DistanceQuery::State::walk_round(const NearestTask& task, std::size_t first, NearestSoFar& state) {
   const std::size_t count = std::min(walks.size() - first, kWalksInRound);
   const auto walk = [&](std::size_t i, std::size_t end, std::uint32_t) {
@@ -255,6 +239,7 @@ bool DistanceQuery::State::walk_round(const NearestTask& task, std::size_t first
       own.counters = {};
       own.upper = state.upper;
       own.found = state.found;
+      own.most_visits = kVisitsInRound;
       phase_of(task)(task, &walks[first + i], 1, own);
     }
   };
@@ -269,16 +254,16 @@ bool DistanceQuery::State::find_spread(std::size_t pair) {
   NearestSoFar whole;
   const NearestTask task = task_of(pairs[pair]);
   begin(task, pairs[pair], whole);
-  walks.clear();
-  if (!walks.push({0, 0, 0, kAllNodePairs}) || !expand(task, whole, kFirstWalks)) return false;
-  if (walks.size() > 0) {
-    phase_of(task)(task, walks.data(), 1, whole);
-    walks[0] = walks[walks.size() - 1];
-    (void)walks.resize(walks.size() - 1);
-  }
-  if (!whole.touches() && !expand(task, whole, kMostWalks)) return false;
-  for (std::size_t first = 0; first < walks.size() && !whole.touches(); first += kWalksInRound) {
-    if (!walk_round(task, first, whole)) return false;
+  whole.most_visits = kVisitsAlone;
+  const BoundedBlockPair roots = {0, 0, 0, kAllNodePairs};
+  phase_of(task)(task, &roots, 1, whole);
+  while (whole.left.size() > 0 && !whole.touches() && whole.enough_memory) {
+    std::swap(walks, whole.left);
+    whole.left.clear();
+    std::sort(walks.data(), walks.data() + walks.size(), is_near_first);
+    for (std::size_t first = 0; first < walks.size() && !whole.touches(); first += kWalksInRound) {
+      if (!walk_round(task, first, whole)) return false;
+    }
   }
   finish(pair, task, whole);
   add_to(counters, whole.counters);
@@ -295,6 +280,7 @@ Status DistanceQuery::State::find_distances_of_pairs() {
   for (std::size_t i = 0; i < slot_count; ++i) {
     slots[i].state.counters = {};
     slots[i].state.enough_memory = true;
+    slots[i].state.most_visits = ~std::uint64_t{0};
   }
   threads.for_parts(workers, pairs.size(), at_once,
                     [&](std::size_t i, std::size_t end, std::uint32_t worker) {

@@ -30,13 +30,15 @@ class ScalarMeans {
   void append(Candidates& candidates, const Block& a, const Block& b, std::uint32_t hits) const {
     append_one_by_one(candidates, a, b, hits);
   }
-  std::uint32_t beyond(const Candidates& candidates) const {
-    std::uint32_t mask = 0;
+  BatchSifted sift(const Candidates& candidates) const {
+    BatchSifted out = {0, 0};
     for (std::uint32_t i = 0; i < kBatch && i < candidates.count; ++i) {
       const auto [a, b] = corners(candidates, i);
-      if (distance::are_beyond(a.corner, b.corner, task_.clearance)) mask |= 1u << i;
+      const auto sifted = distance::sift(a.corner, b.corner, task_.clearance);
+      out.beyond |= static_cast<std::uint32_t>(sifted.beyond.set) << i;
+      out.within |= static_cast<std::uint32_t>(sifted.within.set) << i;
     }
-    return mask;
+    return out;
   }
   BatchVerdicts decide_within(const Candidates& candidates) const {
     BatchVerdicts out = {0, 0};
@@ -92,7 +94,7 @@ class WorldBoxMeans {
   }
   std::uint32_t drop_beyond_planes(const Block&, const Block&, std::uint32_t hits) const { return hits; }
   BatchVerdicts decide(const Candidates&) const { return {0, 0xFFFF}; }
-  std::uint32_t beyond(const Candidates&) const { return 0; }
+  BatchSifted sift(const Candidates&) const { return {0, 0}; }
   BatchVerdicts decide_within(const Candidates&) const { return {0, 0xFFFF}; }
 
  private:
@@ -128,6 +130,11 @@ PairTask clearance_task(const PosedTree& a, const PosedTree& b, double within, P
 }
 
 bool are_within(const PairTask& task, const TrianglePair& pair, QueryCounters& counters) {
+  const Verdict verdict = decide_float64(pair);
+  if (verdict == Verdict::contact) {
+    ++counters.decided_by_float64;
+    return true;
+  }
   const distance::LocalPair local = distance::local_pair(pair);
   if (local.in_range()) {
     // What is asked for decides, however wide the interval is.
@@ -139,7 +146,8 @@ bool are_within(const PairTask& task, const TrianglePair& pair, QueryCounters& c
     }
   }
   ++counters.decided_exactly;
-  return decide(pair).verdict == Verdict::contact || exact::are_within(pair, task.within);
+  if (verdict == Verdict::undecided && decide_exact(pair) == Verdict::contact) return true;
+  return exact::are_within(pair, task.within);
 }
 
 }  // namespace

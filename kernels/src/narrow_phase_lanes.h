@@ -189,14 +189,16 @@ TANDEM_INLINE void gather_candidates(const PairTask& task, const Candidates& can
 }
 
 template <int kCount>
-[[gnu::noinline]] std::uint32_t find_beyond(const PairTask& task, const Candidates& candidates) {
-  std::uint32_t mask = 0;
+[[gnu::noinline]] BatchSifted sift_batch(const PairTask& task, const Candidates& candidates) {
+  BatchSifted out = {0, 0};
   for (std::uint32_t first = 0; first < kBatch && first < candidates.count; first += kCount) {
     frame::Point<Lanes<kCount>> a[3], b[3];
     gather_candidates<kCount>(task, candidates, first, a, b);
-    mask |= distance::are_beyond(a, b, task.clearance).mask() << first;
+    const auto sifted = distance::sift(a, b, task.clearance);
+    out.beyond |= sifted.beyond.mask() << first;
+    out.within |= sifted.within.mask() << first;
   }
-  return mask;
+  return out;
 }
 
 template <int kCount>
@@ -249,9 +251,9 @@ class LaneMeans {
 #endif
   }
 
-  std::uint32_t beyond(Candidates& candidates) const {
+  BatchSifted sift(Candidates& candidates) const {
     fill_up(candidates);
-    return find_beyond<kCount>(task_, candidates);
+    return sift_batch<kCount>(task_, candidates);
   }
 
   BatchVerdicts decide_within(Candidates& candidates) const {

@@ -32,6 +32,11 @@ struct BatchVerdicts {
   std::uint32_t contact, undecided;
 };
 
+/// The same of the first step of clearance, see distance::sift().
+struct BatchSifted {
+  std::uint32_t beyond, within;
+};
+
 /// What the first stage of the triangle test makes of the candidates of a pair.
 enum class FirstStage : std::uint8_t {
   bounded,      ///< float32 with an error bound
@@ -60,8 +65,7 @@ constexpr std::uint32_t column(std::uint32_t four, int j) {
 /// The means of a variant are made of a task and bring: Stack; test(a, b), see block_pair_mask();
 /// drop_beyond_planes(a, b, hits), see leaf_planes.h; append(candidates, a, b, hits); decide(candidates),
 /// the verdicts on the first kBatch candidates, any where there are fewer; and of clearance, as it is dearer,
-/// in two steps: beyond(candidates), a mask of those that are surely too far apart, and
-/// decide_within(candidates) on the others.
+/// in two steps: sift(candidates), and decide_within(candidates) on those that it leaves.
 template <typename Means>
 class PairWalk {
  public:
@@ -90,18 +94,25 @@ class PairWalk {
   }
 
  private:
-  /// Of the first `count` candidates, keeps those that may be within. False: the pair is done with.
-  bool keep_near(std::uint32_t count) {
-    const std::uint32_t given = (2u << (count - 1)) - 1, beyond = means_.beyond(candidates_) & given;
+  /// Of the first `count` candidates, adds those that are surely within, and keeps those that may be. False:
+  /// the pair is done with.
+  bool sift(std::uint32_t count) {
+    const std::uint32_t given = (2u << (count - 1)) - 1;
+    const BatchSifted sifted = means_.sift(candidates_);
+    const std::uint32_t told = (sifted.beyond | sifted.within) & given;
     sink_.counters.candidates += count;
-    sink_.counters.decided_by_float32 += static_cast<std::uint32_t>(std::popcount(beyond));
-    for (std::uint32_t left = given & ~beyond; left != 0; left &= left - 1) {
+    sink_.counters.decided_by_float32 += static_cast<std::uint32_t>(std::popcount(told));
+    for (std::uint32_t left = given & ~sifted.beyond; left != 0 && !done_; left &= left - 1) {
       const int i = lowest_bit(left);
+      if ((sifted.within >> i & 1u) != 0) {
+        add(candidates_.a[i], candidates_.b[i]);
+        continue;
+      }
       near_.a[near_.count] = candidates_.a[i];
       near_.b[near_.count++] = candidates_.b[i];
     }
     drop_batch(candidates_);
-    return near_.count < kBatch || settle_near(kBatch);
+    return !done_ && (near_.count < kBatch || settle_near(kBatch));
   }
 
   /// Decides the first `count` that may be within. False: the pair is done with.
@@ -130,7 +141,7 @@ class PairWalk {
 
   /// Decides the first `count` candidates. False: the pair is done with.
   bool settle(std::uint32_t count) {
-    if (task_.within > 0 && task_.mode != QueryMode::boxes) return keep_near(count);
+    if (task_.within > 0 && task_.mode != QueryMode::boxes) return sift(count);
     QueryCounters& counters = sink_.counters;
     const std::uint32_t given = (2u << (count - 1)) - 1;
     BatchVerdicts verdicts = {given, 0};

@@ -139,6 +139,11 @@ bool add_candidate(const NearCandidate& candidate, NearestSoFar& state) {
   return state.enough_memory;
 }
 
+bool leave(const BoundedBlockPair& pair, NearestSoFar& state) {
+  state.enough_memory = state.left.push(pair);
+  return state.enough_memory;
+}
+
 namespace {
 
 // The nearer of two, and of those at one distance the one with the lower triangles.
@@ -169,47 +174,6 @@ void settle(const NearestTask& task, std::uint32_t triangle_a, std::uint32_t tri
   keep_nearer(found, triangle_a, triangle_b, state);
 }
 
-namespace {
-
-template <typename Means>
-bool expand_by(const NearestTask& task, const BoundedBlockPair& pair, NearestSoFar& state,
-               Buffer<BoundedBlockPair>& out) {
-  const Means means(task);
-  const auto limit = means.limit(nearness(task, state)), limit_without_tolerance = means.limit(state.upper);
-  const Block &a = task.a->tree.blocks[pair.a], &b = task.b->tree.blocks[pair.b];
-  const auto pass_over = [&](typename Means::Bound bound) {
-    if (bound < limit_without_tolerance) state.floor = std::min(state.floor, means.distance(bound));
-  };
-  const auto bound_of_pair = static_cast<typename Means::Bound>(pair.bound);
-  if (!(bound_of_pair < limit)) return pass_over(bound_of_pair), true;
-  if (a.is_leaf_block() && b.is_leaf_block()) return out.push(pair);
-  typename Means::Bound bound[16];
-  const std::uint32_t hits = means.bounds(a, b, limit, bound) & pair.mask;
-  ++state.counters.block_pairs;
-  for (std::uint32_t rest = pair.mask & ~hits; rest != 0; rest &= rest - 1) {
-    const int bit = lowest_bit(rest);
-    if (a.kind[bit / 4] != NodeKind::imaginary && b.kind[bit % 4] != NodeKind::imaginary)
-      pass_over(bound[bit]);
-  }
-  bool enough_memory = true;
-  each_pair_below(a, b, hits, bound,
-                  [&](typename Means::Bound least, const std::uint32_t* child_a, const std::uint32_t* child_b,
-                      std::uint32_t mask) {
-                    const BoundedBlockPair below = {least, child_a != nullptr ? *child_a : pair.a,
-                                                    child_b != nullptr ? *child_b : pair.b, mask};
-                    enough_memory = enough_memory && out.push(below);
-                  });
-  return enough_memory;
-}
-
-}  // namespace
-
-bool expand(const NearestTask& task, const BoundedBlockPair& pair, NearestSoFar& state,
-            Buffer<BoundedBlockPair>& out) {
-  return task.in_frame ? expand_by<NearestScalarMeans>(task, pair, state, out)
-                       : expand_by<NearestWorldBoxMeans>(task, pair, state, out);
-}
-
 bool take_over(NearestSoFar& from, NearestSoFar& state) {
   if (!from.enough_memory) return false;
   state.counters.block_pairs += from.counters.block_pairs;
@@ -223,6 +187,9 @@ bool take_over(NearestSoFar& from, NearestSoFar& state) {
   keep_nearer(from.best, from.triangle_a, from.triangle_b, state);
   for (const NearCandidate& candidate : from.candidates.view()) {
     if (!add_candidate(candidate, state)) return false;
+  }
+  for (const BoundedBlockPair& pair : from.left.view()) {
+    if (!leave(pair, state)) return false;
   }
   return true;
 }

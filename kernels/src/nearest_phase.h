@@ -44,6 +44,8 @@ struct NearestSoFar {
   TriangleDistance best = {{INFINITY, INFINITY}, {}, {}};
   std::uint32_t triangle_a = kNoIndex, triangle_b = kNoIndex;  ///< of `best`
   Buffer<NearCandidate> candidates;
+  std::uint64_t most_visits = ~std::uint64_t{0};  ///< of pairs of blocks, by one walk
+  Buffer<BoundedBlockPair> left;                  ///< what it had not visited by then
   DistanceCounters counters;
   bool enough_memory = true;
 
@@ -56,10 +58,12 @@ struct NearestSoFar {
     best.interval = {INFINITY, INFINITY};
     triangle_a = triangle_b = kNoIndex;
     candidates.clear();
+    left.clear();
   }
 };
 
-/// Walks from these pairs of blocks and adds what is near to `state`. Passes over what cannot make the
+/// Walks from these pairs of blocks, of which one at most where most_visits is limited, and adds what is near
+/// to `state`. Passes over what cannot make the
 /// interval wider than it may be.
 using NearestPhase = void (*)(const NearestTask&, const BoundedBlockPair* from, std::uint32_t count,
                               NearestSoFar& state);
@@ -87,18 +91,17 @@ distance::FrameDirection direction_of(const NearestTask& task, const float (&dir
 /// False: out of memory, which the state keeps.
 bool add_candidate(const NearCandidate& candidate, NearestSoFar& state);
 
+/// Leaves a pair of blocks for another walk. False: as above.
+bool leave(const BoundedBlockPair& pair, NearestSoFar& state);
+
 /// Bounds a pair of triangles by float64, and keeps it where it is nearest.
 void settle(const NearestTask& task, std::uint32_t triangle_a, std::uint32_t triangle_b, NearestSoFar& state);
 
 /// Settles the candidates that count, and one that told the upper bound, if any is there.
 void settle_candidates(const NearestTask& task, NearestSoFar& state);
 
-/// Adds the pairs of blocks below one to `out`, where they are near enough to count; two leaf blocks as they
-/// are. False: out of memory.
-bool expand(const NearestTask& task, const BoundedBlockPair& pair, NearestSoFar& state,
-            Buffer<BoundedBlockPair>& out);
-
-/// What another walk of the same task found, whose state began as this one stood. False: out of memory.
+/// Takes what another walk of the same task found and left, whose state began as this one stood. False: out
+/// of memory.
 bool take_over(NearestSoFar& from, NearestSoFar& state);
 
 // Each defined in a file of its own, which is compiled for machines that have the instructions.

@@ -135,9 +135,11 @@ class NearestWalk {
     if (state_.found) wait_in_order();
     for (std::uint32_t i = 0; i < count && goes_on(); ++i) {
       stack_[height_++] = from[i];
-      while (goes_on() && (height_ > 0 || take_nearest())) visit(stack_[--height_]);
+      while (goes_on() && visits_ < state_.most_visits && (height_ > 0 || take_nearest()))
+        visit(stack_[--height_]);
     }
     if (goes_on()) bound_triangles(true);
+    while (goes_on() && (height_ > 0 || take_nearest())) leave(stack_[--height_], state_);
   }
 
  private:
@@ -162,6 +164,7 @@ class NearestWalk {
     alignas(64) Bound bound[16];
     const std::uint32_t open = means_.bounds(a, b, limit_without_tolerance_, bound) & pair.mask;
     ++state_.counters.block_pairs;
+    ++visits_;
     std::uint32_t hits = 0;
     for (std::uint32_t bits = open; bits != 0; bits &= bits - 1) {
       const int bit = lowest_bit(bits);
@@ -283,6 +286,7 @@ class NearestWalk {
   /// levels as both trees have together; the last gives 16.
   BoundedBlockPair stack_[15 * 2 * kMaxDepth + 16];
   std::uint32_t height_ = 0;
+  std::uint64_t visits_ = 0;
 };
 
 }  // namespace

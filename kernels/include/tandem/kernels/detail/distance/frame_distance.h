@@ -141,11 +141,17 @@ TANDEM_HD inline auto is_beyond_along(const Point<Value>& n, const Point<Value> 
          less(needed, larger(above, below));
 }
 
-/// Whether the posed triangles are surely farther apart than asked: by their boxes in a's frame, or by the
-/// planes of either. a: corners as stored, b: posed() ones.
+/// What is quickly told of clearance: surely farther apart than asked, by the triangles' boxes in a's frame
+/// or by the plane of either, or surely within it, by two of their corners.
+template <typename Mask>
+struct Sifted {
+  Mask beyond, within;
+};
+
+/// a: corners as stored, b: posed() ones.
 template <typename Value>
-TANDEM_HD inline auto are_beyond(const Point<Value> (&corner_a)[3], const Point<Value> (&corner_b)[3],
-                                 const FrameClearance& clearance) {
+TANDEM_HD inline auto sift(const Point<Value> (&corner_a)[3], const Point<Value> (&corner_b)[3],
+                           const FrameClearance& clearance) {
   Point<Value> a[3], b[3];
   Value largest{}, widest = value_of<Value>(-1);
   for (int i = 0; i < 3; ++i) {
@@ -160,12 +166,27 @@ TANDEM_HD inline auto are_beyond(const Point<Value> (&corner_a)[3], const Point<
         least_of(a[0].x[k], a[1].x[k], a[2].x[k]) - greatest_of(b[0].x[k], b[1].x[k], b[2].x[k]);
     widest = larger(widest, larger(above, below));
   }
+  Value square = value_of<Value>(0x1p100);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      const Point<Value> apart = minus(a[i], b[j]);
+      const Value next = dot(apart, apart);
+      square = select(less(next, square), next, square);
+    }
+  }
   constexpr float kU = 0x1p-24f;
-  const float length = (clearance.apart_from + 1.7321f * clearance.error) * (1 + 16 * kU);
+  const float off = 1.7321f * clearance.error;
+  const float length = (clearance.apart_from + off) * (1 + 16 * kU);
+  Sifted<decltype(less(square, widest))> out;
   // Along an axis, differences are the only roundings: of u M each, and one of their own.
-  const auto by_boxes = less((5 * kU) * largest + length, widest);
-  return by_boxes | is_beyond_along(cross(minus(a[1], a[0]), minus(a[2], a[0])), a, b, largest, length) |
-         is_beyond_along(cross(minus(b[1], b[0]), minus(b[2], b[0])), a, b, largest, length);
+  out.beyond = less((5 * kU) * largest + length, widest) |
+               is_beyond_along(cross(minus(a[1], a[0]), minus(a[2], a[0])), a, b, largest, length) |
+               is_beyond_along(cross(minus(b[1], b[0]), minus(b[2], b[0])), a, b, largest, length);
+  // Corners are off by 2 u M a coordinate, and their difference by 2 u M more.
+  const Value distance = (1 + 12 * kU) * square_root(square) + ((8 * kU) * largest + (off + 0x1p-60f));
+  out.within = less(distance, value_of<Value>(clearance.within_to)) |
+               frame::decide<true>(corner_a, corner_b, clearance.error).contact;
+  return out;
 }
 
 /// What frame_interval() knows of clearance: `contact` where the posed triangles are surely within it.

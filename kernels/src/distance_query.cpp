@@ -239,6 +239,8 @@ bool DistanceQuery::State::walk_round(const NearestTask& task, std::size_t first
       own.counters = {};
       own.upper = state.upper;
       own.found = state.found;
+      own.has_direction = state.has_direction;
+      std::copy_n(state.direction, 3, own.direction);
       own.most_visits = kVisitsInRound;
       phase_of(task)(task, &walks[first + i], 1, own);
     }

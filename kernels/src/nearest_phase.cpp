@@ -183,6 +183,8 @@ bool take_over(NearestSoFar& from, NearestSoFar& state) {
   if (from.found && from.upper < state.upper) {
     state.upper = from.upper;
     state.found = true;
+    state.has_direction = from.has_direction;
+    std::copy_n(from.direction, 3, state.direction);
   }
   keep_nearer(from.best, from.triangle_a, from.triangle_b, state);
   for (const NearCandidate& candidate : from.candidates.view()) {

@@ -40,6 +40,8 @@ struct NearCandidate {
 struct NearestSoFar {
   double upper = INFINITY;  ///< of the distance; before one is found, what is at least so far is beyond reach
   bool found = false;       ///< an upper bound
+  bool has_direction = false;
+  float direction[3];       ///< in a's frame, from b to a, between the nearest triangles so far
   double floor = INFINITY;  ///< what was passed over is not nearer
   TriangleDistance best = {{INFINITY, INFINITY}, {}, {}};
   std::uint32_t triangle_a = kNoIndex, triangle_b = kNoIndex;  ///< of `best`
@@ -53,7 +55,7 @@ struct NearestSoFar {
 
   void reset(double reach) {
     upper = reach < INFINITY ? std::nextafter(reach, INFINITY) : reach;
-    found = false;
+    found = has_direction = false;
     floor = INFINITY;
     best.interval = {INFINITY, INFINITY};
     triangle_a = triangle_b = kNoIndex;

@@ -219,7 +219,7 @@ class NearestWalk {
       const std::uint32_t count = std::min(leaves_.count, kNearBatch);
       leaves_.fill_up();
       std::uint32_t left = (2u << (count - 1)) - 1;
-      if (has_direction_) left &= ~means_.far_along(leaves_, direction_, state_.upper);
+      if (state_.has_direction) left &= ~means_.far_along(leaves_, state_.direction, state_.upper);
       for (; left != 0; left &= left - 1) {
         const int i = lowest_bit(left);
         near_.a[near_.count] = leaves_.a[i];
@@ -258,8 +258,8 @@ class NearestWalk {
       nearest = i;
     }
     if (nearest < kNearBatch) {
-      has_direction_ = true;
-      for (int k = 0; k < 3; ++k) direction_[k] = found.along[k][nearest];
+      state_.has_direction = true;
+      for (int k = 0; k < 3; ++k) state_.direction[k] = found.along[k][nearest];
     }
     const double near = nearness(task_, state_);
     for (std::uint32_t i = 0; i < count && goes_on(); ++i) {
@@ -279,8 +279,6 @@ class NearestWalk {
   const Means means_;
   Bound limit_, limit_without_tolerance_;
   NearBatch leaves_, near_;
-  float direction_[3];  ///< in a's frame, from b to a, between the nearest triangles so far
-  bool has_direction_ = false;
   WaitingPairs waiting_;
   /// Depth first, one pair at a time, each leaving 15 beside the one that is taken next, on at most as many
   /// levels as both trees have together; the last gives 16.

@@ -20,7 +20,7 @@ constexpr std::uint64_t kSpreadFrom = std::uint64_t{1} << 18;
 
 // Of such a pair: how many pairs of blocks one walk visits before it leaves the rest to others; and how many
 // walks make a round, in which none knows what the others find. Threads take them as they come.
-constexpr std::uint64_t kVisitsAlone = 8192, kVisitsInRound = 1024;
+constexpr std::uint64_t kVisitsAlone = 2048, kVisitsInRound = 512;
 constexpr std::size_t kWalksInRound = 64;
 
 struct Asset {

@@ -1,5 +1,6 @@
 #include "block_pair_variants.h"
 #include "narrow_phase_lanes.h"
+#include "nearest_lanes.h"
 
 // The variants of 16 lanes, in a file that is compiled for machines that have the instructions.
 #if defined(TANDEM_HAVE_LANES) && defined(__AVX512F__)
@@ -11,6 +12,11 @@ std::uint16_t block_pair_mask_avx512(const Block& a, const Block& b, const Relat
 
 bool narrow_phase_avx512(const PairTask& task, ContactSink& sink) {
   return PairWalk<LaneMeans<16>>(task, sink).run();
+}
+
+void nearest_phase_avx512(const NearestTask& task, const BoundedBlockPair* from, std::uint32_t count,
+                          NearestSoFar& state) {
+  NearestWalk<NearestLaneMeans<16>>(task, state).run(from, count);
 }
 
 }  // namespace tandem

@@ -1,5 +1,6 @@
 #include "block_pair_variants.h"
 #include "narrow_phase_lanes.h"
+#include "nearest_lanes.h"
 
 // The variants of 4 lanes.
 #ifdef TANDEM_HAVE_LANES
@@ -11,6 +12,11 @@ std::uint16_t block_pair_mask_lanes4(const Block& a, const Block& b, const Relat
 
 bool narrow_phase_lanes4(const PairTask& task, ContactSink& sink) {
   return PairWalk<LaneMeans<4>>(task, sink).run();
+}
+
+void nearest_phase_lanes4(const NearestTask& task, const BoundedBlockPair* from, std::uint32_t count,
+                          NearestSoFar& state) {
+  NearestWalk<NearestLaneMeans<4>>(task, state).run(from, count);
 }
 
 }  // namespace tandem

@@ -124,6 +124,18 @@ std::string family_name(const testing::TestParamInfo<TriangleFamily>& family) {
   return name;
 }
 
+/// are_within() at the distance rounded either way, and next to it.
+void expect_decisions_right(const TrianglePair& pair) {
+  const DistanceOracle oracle(pair);
+  if (oracle.meet()) return;
+  double d = oracle.rounded();
+  for (int i = 0; i < 2; ++i) d = std::nextafter(d, 0);
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_EQ(exact::are_within(pair, d), oracle.is_in(0, d)) << d << "\n" << text(pair);
+    d = std::nextafter(d, HUGE_VAL);
+  }
+}
+
 class TriangleDistances : public testing::TestWithParam<TriangleFamily> {};
 
 TEST_P(TriangleDistances, EveryIntervalHoldsTheExactDistance) {
@@ -137,6 +149,15 @@ TEST_P(TriangleDistances, EveryIntervalHoldsTheExactDistance) {
     expect_every_stage_right(i % 2 == 0 ? pair : swapped(pair));
   }
   EXPECT_GT(apart, 0);
+}
+
+TEST_P(TriangleDistances, ClearanceIsDecidedExactly) {
+  Random random(1111);
+  const int count = pairs_per_family() / 25;
+  for (int i = 0; i < count && !HasFailure(); ++i) {
+    const TrianglePair pair = GetParam().make(random);
+    if (in_range(pair)) expect_decisions_right(pair);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Families, TriangleDistances, testing::ValuesIn(triangle_families()), family_name);

@@ -2,6 +2,7 @@
 
 #include <cstdio>
 #include <memory>
+#include <new>
 #include <optional>
 #include <thread>
 
@@ -36,15 +37,6 @@ struct ImpactTable {
   ImpactCounters counters;
   Seconds seconds;
 };
-
-[[noreturn]] void refuse(const std::string& scene, Status status, std::uint64_t where) {
-  const char* unit = subject(status);
-  const std::string blamed = unit == nullptr ? "" : std::string(unit) + " " + std::to_string(where) + ": ";
-  if (status == Status::kOutOfMemory) throw std::bad_alloc();
-  const std::string text = scene + ": " + blamed + explain(status);
-  if (status == Status::kCannotStartThread) throw std::runtime_error(text);
-  throw FileError(text);
-}
 
 // Centres of mass of the assets, computed where they are asked for.
 class MassCenters {
@@ -128,6 +120,7 @@ ImpactTable run_query(const ImpactArguments& arguments, const Scene& scene) {
                                : query.find(description.instances, motion, arguments.duration, options);
     seconds.push_back(watch.lap());
   }
+  if (status == Status::kOutOfMemory) throw std::bad_alloc();
   if (status != Status::kOk) refuse(arguments.scene, status, query.where());
   ImpactTable table = table_of(query);
   table.motion = motion;

@@ -7,6 +7,7 @@
 #include "common/option_helpers.h"
 #include "common/printable.h"
 #include "compare_command.h"
+#include "distance_command.h"
 #include "engines/engine.h"
 #include "frame_command.h"
 #include "impact_command.h"
@@ -63,6 +64,7 @@ int main(int argc, char** argv) {
   add_scene(app, run);
   add_query(app, run);
   add_impact(app, run);
+  add_distance(app, run);
   add_compare(app, run);
   add_simulate(app, run);
   add_frame(app, run);

@@ -151,13 +151,6 @@ Scene read_scene(const std::string& path) {
   return scene;
 }
 
-std::vector<std::string> files_of(const std::string& path, const Scene& scene) {
-  std::vector<std::string> files = {path};
-  for (const std::string& asset : scene.description.assets)
-    files.push_back((fs::path(path).parent_path() / asset).string());
-  return files;
-}
-
 namespace {
 
 void add_pairs(Hdf5Output& file, const char* name, const std::vector<ObjectPair>& pairs) {

@@ -62,9 +62,6 @@ SceneDescription read_description(const std::string& path);
 /// Throws FileError: of the scene file, or of the asset that is to blame.
 Scene read_scene(const std::string& path);
 
-/// The scene file and its assets, as paths from here.
-std::vector<std::string> files_of(const std::string& path, const Scene& scene);
-
 class Hdf5Output;
 
 /// Adds what a scene file holds to a file in the making. Throws FileError.

@@ -10,7 +10,11 @@
 namespace tandem::distance {
 
 using frame::Flag;
+using frame::larger;
+using frame::less;
+using frame::magnitude;
 using frame::Point;
+using frame::select;
 
 // frame_test.h has these for float.
 TANDEM_HD inline Flag less(double x, double y) {
@@ -76,16 +80,20 @@ template <typename Value>
 struct Nearest {
   Value square;        ///< of the distance
   Point<Value> apart;  ///< the point of a less the point of b
+  Point<Value>
+      along;  ///< the same, or where a face is nearest its normal on this side: better where both are near
   Value feature, s, t;
 
   template <typename Mask>
-  TANDEM_HD void take(Mask where, const Value& square_there, const Point<Value>& apart_there, int number,
-                      const Value& s_there, const Value& t_there) {
+  TANDEM_HD void take(Mask where, const Value& square_there, const Point<Value>& apart_there,
+                      const Point<Value>& along_there, int number, const Value& s_there,
+                      const Value& t_there) {
     const auto better = less(square_there, square) & where;
     square = select(better, square_there, square);
-    apart = frame::Point<Value>{{select(better, apart_there.x[0], apart.x[0]),
-                                 select(better, apart_there.x[1], apart.x[1]),
-                                 select(better, apart_there.x[2], apart.x[2])}};
+    for (int k = 0; k < 3; ++k) {
+      apart.x[k] = select(better, apart_there.x[k], apart.x[k]);
+      along.x[k] = select(better, along_there.x[k], along.x[k]);
+    }
     feature = select(better, value_of<Value>(number), feature);
     s = select(better, s_there, s);
     t = select(better, t_there, t);
@@ -110,7 +118,7 @@ TANDEM_HD inline void take_edges(const Edge<Value>& e, const Edge<Value>& f, con
   const Value s = clamped_to_1((ef * t - er) * e.inverse_square);
   const Point<Value> apart = minus(plus(offset, scaled(s, e.along)), scaled(t, f.along));
   const Value square = dot(apart, apart);
-  nearest.take(!less(square, Value{}), square, apart, number, s, t);
+  nearest.take(!less(square, Value{}), square, apart, apart, number, s, t);
 }
 
 /// A face's three corners and a corner each of three others; `sign` is 1 where the face is a's.
@@ -128,7 +136,10 @@ TANDEM_HD inline void take_face(const Point<Value> (&face)[3], const Point<Value
     const Value s = dot(r, to_s), t = dot(r, to_t), height = dot(r, normal);
     const Value part = height * inverse_square;
     const auto above = has_normal & !(less(s, zero) | less(t, zero) | less(one, s + t));
-    nearest.take(above, height * part, scaled(value_of<Value>(-sign) * part, normal), number + i, s, t);
+    const Point<Value> to_face = minus(plus(scaled(s, u), scaled(t, v)), r);
+    const Point<Value> apart = scaled(value_of<Value>(sign), to_face);
+    nearest.take(above, height * part, apart, scaled(value_of<Value>(-sign) * part, normal), number + i, s,
+                 t);
   }
 }
 
@@ -147,7 +158,7 @@ TANDEM_HD inline Nearest<Value> nearest_features(const Point<Value> (&a)[3], con
   }
   const Value zero{};
   Nearest<Value> nearest;
-  nearest.apart = minus(a[0], b[0]);
+  nearest.apart = nearest.along = minus(a[0], b[0]);
   nearest.square = dot(nearest.apart, nearest.apart);
   nearest.feature = nearest.s = nearest.t = zero;
   for (int i = 0; i < 3; ++i) {

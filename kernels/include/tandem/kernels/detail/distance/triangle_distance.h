@@ -131,7 +131,7 @@ TANDEM_HD inline Point<double> without_part(Point<double> n, const Point<double>
 /// where that is small beside them: normal to the edges that the points are within.
 TANDEM_HD inline Point<double> refined(const LocalPair& pair, const Nearest<double>& nearest) {
   const int feature = static_cast<int>(nearest.feature);
-  if (feature >= 9) return nearest.apart;  // a normal of the face already
+  if (feature >= 9) return nearest.along;
   const int i = feature / 3, j = feature % 3;
   const Point<double> e = minus(pair.a[(i + 1) % 3], pair.a[i]), f = minus(pair.b[(j + 1) % 3], pair.b[j]);
   const bool within_e = nearest.s > 0 && nearest.s<1, within_f = nearest.t> 0 && nearest.t < 1;
@@ -151,7 +151,7 @@ TANDEM_HD inline DistanceInterval bounded_distance(const LocalPair& pair, const 
                                                    TriangleWeights& weights) {
   const Nearest<double> nearest = nearest_features<double>(pair.a, pair.b, 0x1p-480);
   weights = weights_of(nearest);
-  DistanceInterval interval = {distance_along(pair, nearest.apart), distance_at(pair, weights)};
+  DistanceInterval interval = {distance_along(pair, nearest.along), distance_at(pair, weights)};
   if (is_narrow(interval, tolerance)) return interval;
   const double lower = distance_along(pair, refined(pair, nearest));
   if (lower > interval.lower) interval.lower = lower;

@@ -146,8 +146,9 @@ Status ImpactQuery::State::pose(std::uint32_t i, const RigidMotion& motion) {
   const Asset& asset = assets[instances[i].asset];
   MovingBody& body = bodies[i];
   const Status moving = moving_body(stored, motion, duration, asset.lower, asset.upper, asset.extent, body);
+  if (moving != Status::kOk) return moving;
   boxes[i] = swept_box(box, body.displacement, body.turn, body.fastest, body.error);
-  return moving;
+  return Status::kOk;
 }
 
 Status ImpactQuery::State::start(std::span<const Instance> posed, std::span<const RigidMotion> motion,

@@ -1,6 +1,4 @@
 #pragma once
-#include <limits>
-
 #include "tandem/formats/block.h"
 #include "tandem/formats/view.h"
 #include "tandem/kernels/detail/impact/pair_motion.h"
@@ -237,7 +235,7 @@ TANDEM_HD inline void node_times(const PairFrames& frames, const Block& a, const
   for (int i = 0; i < kNodesPerBlock; ++i) {
     const std::uint32_t row = a.half_extent[0][i] >= 0 ? mask >> 4 * i & real_b : 0;
     if (row == 0) continue;
-    for (int j = 0; j < kNodesPerBlock; ++j) margin[i][j] = -std::numeric_limits<double>::infinity();
+    for (int j = 0; j < kNodesPerBlock; ++j) margin[i][j] = -INFINITY;
     raise_margins(frames.of_a, in_a.own, i, in_a.other, frames.slack, most, margin[i]);
     for (int j = 0; j < kNodesPerBlock; ++j) {
       if ((row >> j & 1) != 0 && !(margin[i][j] > 0)) open |= 1u << (4 * i + j);

@@ -87,16 +87,17 @@ TANDEM_HD inline Status moving_body(const Pose& stored, const RigidMotion& motio
 
 /// Two of them. Where what this folder computes says *apart*, for some time or from one time to another, with
 /// `slack` added to every distance, then during that time neither the moving triangles meet nor those that
-/// pose_at() and apply() make.
+/// pose_at() and apply() make. Condition: it is used for no longer than either body turns by a radian.
 ///
 /// **Slack.** Let w = 2^-53, Theta = 1 + the larger angle, and size the sum of both bodies' sizes, of the
-/// centres' distance and of their relative displacement: no place or displacement relative to a's centre, and
-/// no velocity along a direction of length 1, is larger than 2 Theta size in the step. What is computed here,
-/// by at most 100 roundings on the way from numbers of this size, rotations included, whose matrices err by
-/// 2^-45 Theta, errs by less than 2^-43 Theta size. So it does where operations are fused. Posed vertices
-/// have been rounded, by w |translation| + 8 w reach at most, and those of pose_at() err by both bodies'
-/// errors, which contain that. Half of the first term is spare: times within the step are rounded to w, and
-/// nothing moves by more than 2^-51 Theta size in that time. Hence slack = 2^-42 Theta size + errors.
+/// centres' distance and of both displacements: no place or displacement relative to a's centre, and no
+/// velocity along a direction of length 1, is larger than 2 Theta size in the step. Matrices of rotations err
+/// by 2^-45 Theta, places by that times size, and velocities, times a time in which a body turns by a radian,
+/// by that too. The rest of what is computed here, by at most 100 roundings on the way from numbers of this
+/// size, errs by 200 w Theta size, so all together by less than 2^-43 Theta size, fused or not. Posed
+/// vertices have been rounded, by w |translation| + 8 w reach at most, and those of pose_at() err by both
+/// bodies' errors, which contain that. Half of the first term is spare: times within the step are rounded to
+/// w, and nothing moves by more than 2^-51 Theta size in that time. Hence slack = 2^-42 Theta size + errors.
 struct PairMotion {
   const MovingBody *a, *b;
   Vector3 offset;        ///< from a's centre to b's, at the start

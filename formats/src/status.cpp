@@ -103,6 +103,7 @@ constexpr Entry kEntries[] = {
     {Status::kTooManyPairs, "TooManyPairs", nullptr, "there are 2^32 - 1 pairs of instances or more"},
     {Status::kKeptMismatch, "KeptMismatch", nullptr,
      "fixed instances are kept of another number of instances"},
+    {Status::kMotionMismatch, "MotionMismatch", nullptr, "there are not as many motions as instances"},
     {Status::kCannotStartThread, "CannotStartThread", nullptr, "a thread could not be started"},
     {Status::kNoOrientedBlocks, "NoOrientedBlocks", nullptr,
      "an asset has no oriented blocks, which exact queries on a GPU walk: build it without --no-gpu-blocks"},

@@ -1,5 +1,6 @@
 #include "block_pair_variants.h"
 #include "narrow_phase_lanes.h"
+#include "nearest_lanes.h"
 #include "patch_passes_lanes.h"
 #include "patch_walk_lanes.h"
 #include "piece_lanes.h"
@@ -19,6 +20,11 @@ bool narrow_phase_avx2(const PairTask& task, ContactSink& sink) {
 const ManifoldMeans kManifoldMeansAvx2 = {make_pieces,        sum_pieces,   least_unmarked, find_face_along,
                                           sum_length_on_face, spread_along, extreme_corner, gather_rim,
                                           furthest,           next_near,    answer_lines,   find_extreme};
+
+void nearest_phase_avx2(const NearestTask& task, const BoundedBlockPair* from, std::uint32_t count,
+                        NearestSoFar& state) {
+  NearestWalk<NearestLaneMeans<8>>(task, state).run(from, count);
+}
 
 }  // namespace tandem
 #endif

@@ -108,6 +108,7 @@ struct ContactQuery::State {
   std::uint32_t workers_for(std::size_t things, std::size_t at_once) const;
   Status pose_from(std::span<const Instance> posed, std::size_t& i, std::size_t end);
   Status pose_instances(std::span<const Instance> posed);
+  void grow_boxes(std::size_t count);
   Status find_pairs();
   Status take_pairs(std::span<const ObjectPair> given);
   Status find_contacts_of_pairs();
@@ -143,6 +144,8 @@ Status ContactQuery::State::pose_from(std::span<const Instance> posed, std::size
 // Every part ends with its own first instance that is refused; the first of these is to blame. What is kept
 // of instances stays, because there are as many as before.
 Status ContactQuery::State::pose_instances(std::span<const Instance> posed) {
+  if (!(options.within >= 0 && options.within <= kLargestWorldCoordinate))
+    return fail(Status::kOutOfRange, 0);
   if (posed.size() >= kNoIndex) return fail(Status::kTooManyInstances, 0);
   if (broad_phase.kept_of() != 0 && broad_phase.kept_of() != posed.size())
     return fail(Status::kKeptMismatch, 0);
@@ -163,9 +166,21 @@ Status ContactQuery::State::pose_instances(std::span<const Instance> posed) {
   return status == Status::kOk ? status : fail(status, broad_phase.free_box(refused));
 }
 
+// Boxes within reach of each other meet when each is larger by half of it; or one by all of it where the
+// other is kept, which is kept for any reach.
+void ContactQuery::State::grow_boxes(std::size_t count) {
+  if (!(options.within > 0)) return;
+  const double margin = broad_phase.kept_of() != 0 ? options.within : 0.5 * options.within;
+  for (std::size_t i = 0; i < count; ++i) {
+    WorldBox& box = boxes[broad_phase.free_box(i)];
+    box = grown(box, margin);
+  }
+}
+
 Status ContactQuery::State::find_pairs() {
   const PairFilter filter = options.filter != nullptr ? *options.filter : PairFilter();
   const std::size_t count = broad_phase.free_count(boxes.size());
+  grow_boxes(count);
   const Status status = broad_phase.find_pairs(boxes.view(), filter, options.self_pairs, threads,
                                                workers_for(count, kInstancesAtOnce));
   if (status != Status::kOk)
@@ -206,7 +221,7 @@ bool ContactQuery::State::provide_workers() {
 }
 
 PairTask ContactQuery::State::task_of(std::uint32_t pair) const {
-  PairTask task = pair_task(instances[pairs[pair].a], instances[pairs[pair].b]);
+  PairTask task = pair_task(instances[pairs[pair].a], instances[pairs[pair].b], options.within);
   task.pair = pair;
   task.mode = options.mode;
   task.first_contact_only = options.first_contact_only;

@@ -94,6 +94,7 @@ struct Lanes {
   TANDEM_INLINE friend Lanes operator-(const Lanes& a) { return {-a.v}; }
   TANDEM_INLINE friend Lanes operator*(const Lanes& a, const Lanes& b) { return {a.v * b.v}; }
   TANDEM_INLINE friend Lanes operator*(float a, const Lanes& b) { return {a * b.v}; }
+  TANDEM_INLINE friend Lanes operator/(const Lanes& a, const Lanes& b) { return {a.v / b.v}; }
   TANDEM_INLINE friend LaneMask<kCount> less(const Lanes& a, const Lanes& b) {
 #if defined(__AVX512F__)
     if constexpr (kCount == 16) {
@@ -106,6 +107,25 @@ struct Lanes {
   }
   TANDEM_INLINE friend Lanes magnitude(const Lanes& a) {
     return {reinterpret_cast<Floats>(reinterpret_cast<Bits>(a.v) & 0x7FFFFFFF)};
+  }
+  TANDEM_INLINE friend Lanes square_root(const Lanes& a) {
+#if defined(__AVX512F__)
+    if constexpr (kCount == 16)
+      return {reinterpret_cast<Floats>(_mm512_maskz_sqrt_ps(0xFFFF, reinterpret_cast<__m512>(a.v)))};
+#endif
+#if defined(__AVX__)
+    if constexpr (kCount == 8)
+      return {reinterpret_cast<Floats>(_mm256_sqrt_ps(reinterpret_cast<__m256>(a.v)))};
+#endif
+#if defined(__SSE2__)
+    if constexpr (kCount == 4) return {reinterpret_cast<Floats>(_mm_sqrt_ps(reinterpret_cast<__m128>(a.v)))};
+#elif defined(__aarch64__)
+    if constexpr (kCount == 4)
+      return {reinterpret_cast<Floats>(vsqrtq_f32(reinterpret_cast<float32x4_t>(a.v)))};
+#endif
+    Lanes out;
+    for (int i = 0; i < kCount; ++i) out.v[i] = __builtin_sqrtf(a.v[i]);
+    return out;
   }
   TANDEM_INLINE friend Lanes select(LaneMask<kCount> mask, const Lanes& a, const Lanes& b) {
 #if defined(__AVX512F__)

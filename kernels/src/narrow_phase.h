@@ -6,6 +6,7 @@
 #include "tandem/formats/view.h"
 #include "tandem/kernels/contact_query.h"
 #include "tandem/kernels/detail/block_pair.h"
+#include "tandem/kernels/detail/distance/frame_distance.h"
 #include "tandem/kernels/detail/relative_pose.h"
 
 // The contacts of one object pair: traversal, then the cascade on its candidates.
@@ -25,15 +26,17 @@ struct PairTask {
   std::uint32_t pair = 0;
   QueryMode mode = QueryMode::exact;
   bool first_contact_only = false;
-  bool self;      ///< a and b are one instance: every two triangles once, none with itself
-  bool in_frame;  ///< float32 in a's frame can take the pair; else what follows has no meaning
-  RelativePose b_in_a;
-  float frame_error = 0;  ///< see frame_test.h
+  bool self;              ///< a and b are one instance: every two triangles once, none with itself
+  bool in_frame;          ///< float32 in a's frame can take the pair; else what follows has no meaning
+  RelativePose b_in_a;    ///< with slack for what is within reach too
+  float frame_error = 0;  ///< see frame_test.h; with what is within reach too
   bool on_grid = false;   ///< lie_on_grid()
+  double within = 0;      ///< triangles at most so far apart count; 0: those that meet
+  distance::FrameClearance clearance = {};  ///< where that is not 0
 };
 
-/// What is to be known of these two, or of one instance with itself. What is asked is up to the caller.
-PairTask pair_task(const PosedTree& a, const PosedTree& b);
+/// What is to be known of these two, or of one instance with itself. What else is asked is up to the caller.
+PairTask pair_task(const PosedTree& a, const PosedTree& b, double within = 0);
 
 /// Where contacts go: room that grows.
 struct ContactSink {
@@ -57,6 +60,7 @@ bool narrow_phase_by_world_boxes(const PairTask& task, ContactSink& sink);
 
 /// What the first stage left: decides on the posed vertices, by float64, then exactly. In fast mode, by
 /// float32 in a's frame.
+/// Where task.within is not 0, whether they are within it, in any mode.
 bool meet(const PairTask& task, std::uint32_t triangle_a, std::uint32_t triangle_b, QueryCounters& counters);
 
 // Each defined in a file of its own, which is compiled for machines that have the instructions.

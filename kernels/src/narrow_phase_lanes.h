@@ -177,6 +177,43 @@ class CompressingStack {
 };
 #endif
 
+template <int kCount>
+TANDEM_INLINE void gather_candidates(const PairTask& task, const Candidates& candidates, std::uint32_t first,
+                                     frame::Point<Lanes<kCount>> (&a)[3],
+                                     frame::Point<Lanes<kCount>> (&b)[3]) {
+  for (int corner = 0; corner < 3; ++corner) {
+    a[corner] = gather<kCount>(task.a->tree.triangles, candidates.a + first, corner);
+    b[corner] =
+        frame::posed(task.b_in_a, gather<kCount>(task.b->tree.triangles, candidates.b + first, corner));
+  }
+}
+
+template <int kCount>
+[[gnu::noinline]] BatchSifted sift_batch(const PairTask& task, const Candidates& candidates) {
+  BatchSifted out = {0, 0};
+  for (std::uint32_t first = 0; first < kBatch && first < candidates.count; first += kCount) {
+    frame::Point<Lanes<kCount>> a[3], b[3];
+    gather_candidates<kCount>(task, candidates, first, a, b);
+    const auto sifted = distance::sift(a, b, task.clearance);
+    out.beyond |= sifted.beyond.mask() << first;
+    out.within |= sifted.within.mask() << first;
+  }
+  return out;
+}
+
+template <int kCount>
+[[gnu::noinline]] BatchVerdicts decide_batch_within(const PairTask& task, const Candidates& candidates) {
+  BatchVerdicts out = {0, 0};
+  for (std::uint32_t first = 0; first < kBatch && first < candidates.count; first += kCount) {
+    frame::Point<Lanes<kCount>> a[3], b[3];
+    gather_candidates<kCount>(task, candidates, first, a, b);
+    const auto verdicts = distance::decide_within(a, b, task.clearance);
+    out.contact |= verdicts.contact.mask() << first;
+    out.undecided |= verdicts.undecided.mask() << first;
+  }
+  return out;
+}
+
 /// A stack of this machine's own, so that what is made of it is too.
 class LocalStack : public BlockPairStack {};
 
@@ -214,15 +251,29 @@ class LaneMeans {
 #endif
   }
 
+  BatchSifted sift(Candidates& candidates) const {
+    fill_up(candidates);
+    return sift_batch<kCount>(task_, candidates);
+  }
+
+  BatchVerdicts decide_within(Candidates& candidates) const {
+    fill_up(candidates);
+    return decide_batch_within<kCount>(task_, candidates);
+  }
+
   BatchVerdicts decide(Candidates& candidates) const {
-    // Lanes beyond the count look at any triangle: the first.
-    for (std::uint32_t i = candidates.count; i < kBatch; ++i) candidates.a[i] = candidates.b[i] = 0;
+    fill_up(candidates);
     if (task_.on_grid) return decide_on_grid<kCount>(task_, candidates);
     return task_.mode == QueryMode::fast ? decide_batch<kCount, FirstStage::as_computed>(task_, candidates)
                                          : decide_batch<kCount, FirstStage::bounded>(task_, candidates);
   }
 
  private:
+  // Lanes beyond the count look at any triangle: the first.
+  static void fill_up(Candidates& candidates) {
+    for (std::uint32_t i = candidates.count; i < kBatch; ++i) candidates.a[i] = candidates.b[i] = 0;
+  }
+
   const PairTask& task_;
 };
 

@@ -32,6 +32,11 @@ struct BatchVerdicts {
   std::uint32_t contact, undecided;
 };
 
+/// The same of the first step of clearance, see distance::sift().
+struct BatchSifted {
+  std::uint32_t beyond, within;
+};
+
 /// What the first stage of the triangle test makes of the candidates of a pair.
 enum class FirstStage : std::uint8_t {
   bounded,      ///< float32 with an error bound
@@ -59,7 +64,8 @@ constexpr std::uint32_t column(std::uint32_t four, int j) {
 
 /// The means of a variant are made of a task and bring: Stack; test(a, b), see block_pair_mask();
 /// drop_beyond_planes(a, b, hits), see leaf_planes.h; append(candidates, a, b, hits); decide(candidates),
-/// the verdicts on the first kBatch candidates, any where there are fewer.
+/// the verdicts on the first kBatch candidates, any where there are fewer; and of clearance, as it is dearer,
+/// in two steps: sift(candidates), and decide_within(candidates) on those that it leaves.
 template <typename Means>
 class PairWalk {
  public:
@@ -83,12 +89,59 @@ class PairWalk {
     sink_.counters.block_pairs +=
         traverse<typename Means::Stack>(task_.a->tree.blocks, task_.b->tree.blocks, test, on_leaves, narrow);
     if (!done_ && candidates_.count > 0) settle(candidates_.count);
+    if (!done_ && near_.count > 0) settle_near(near_.count);
     return enough_memory_;
   }
 
  private:
+  /// Of the first `count` candidates, adds those that are surely within, and keeps those that may be. False:
+  /// the pair is done with.
+  bool sift(std::uint32_t count) {
+    const std::uint32_t given = (2u << (count - 1)) - 1;
+    const BatchSifted sifted = means_.sift(candidates_);
+    const std::uint32_t told = (sifted.beyond | sifted.within) & given;
+    sink_.counters.candidates += count;
+    sink_.counters.decided_by_float32 += static_cast<std::uint32_t>(std::popcount(told));
+    for (std::uint32_t left = given & ~sifted.beyond; left != 0 && !done_; left &= left - 1) {
+      const int i = lowest_bit(left);
+      if ((sifted.within >> i & 1u) != 0) {
+        add(candidates_.a[i], candidates_.b[i]);
+        continue;
+      }
+      near_.a[near_.count] = candidates_.a[i];
+      near_.b[near_.count++] = candidates_.b[i];
+    }
+    drop_batch(candidates_);
+    return !done_ && (near_.count < kBatch || settle_near(kBatch));
+  }
+
+  /// Decides the first `count` that may be within. False: the pair is done with.
+  bool settle_near(std::uint32_t count) {
+    const std::uint32_t given = (2u << (count - 1)) - 1;
+    BatchVerdicts verdicts = means_.decide_within(near_);
+    verdicts.contact &= given;
+    verdicts.undecided &= given;
+    for (std::uint32_t open = verdicts.contact | verdicts.undecided; open != 0 && !done_; open &= open - 1) {
+      const int i = lowest_bit(open);
+      const std::uint32_t a = near_.a[i], b = near_.b[i];
+      if ((verdicts.undecided >> i & 1u) == 0 || meet(task_, a, b, sink_.counters)) add(a, b);
+    }
+    sink_.counters.decided_by_float32 +=
+        static_cast<std::uint32_t>(std::popcount(given & ~verdicts.undecided));
+    drop_batch(near_);
+    return !done_;
+  }
+
+  static void drop_batch(Candidates& candidates) {
+    if (candidates.count > kBatch)
+      candidates.drop_batch();
+    else
+      candidates.count = 0;
+  }
+
   /// Decides the first `count` candidates. False: the pair is done with.
   bool settle(std::uint32_t count) {
+    if (task_.within > 0 && task_.mode != QueryMode::boxes) return sift(count);
     QueryCounters& counters = sink_.counters;
     const std::uint32_t given = (2u << (count - 1)) - 1;
     BatchVerdicts verdicts = {given, 0};
@@ -110,10 +163,7 @@ class PairWalk {
       counters.decided_by_float32 +=
           static_cast<std::uint32_t>(std::popcount(considered & ~verdicts.undecided));
     }
-    if (candidates_.count > kBatch)
-      candidates_.drop_batch();
-    else
-      candidates_.count = 0;
+    drop_batch(candidates_);
     return !done_;
   }
 
@@ -139,6 +189,7 @@ class PairWalk {
   ContactSink& sink_;
   const Means means_;
   Candidates candidates_;
+  Candidates near_;  ///< of clearance, what may be within
   bool done_ = false, enough_memory_ = true;
 };
 

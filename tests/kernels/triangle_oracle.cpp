@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <variant>
 
 namespace tandem {
@@ -49,7 +50,101 @@ CGAL::Gmpq rational_volume(const double* p, const double* q, const double* r, co
          d[0][2] * (d[1][0] * d[2][1] - d[1][1] * d[2][0]);
 }
 
+using Rational = CGAL::Gmpq;
+using RationalPoint = std::array<Rational, 3>;
+
+RationalPoint rational(const double* p) {
+  return {Rational(p[0]), Rational(p[1]), Rational(p[2])};
+}
+RationalPoint operator-(const RationalPoint& p, const RationalPoint& q) {
+  return {p[0] - q[0], p[1] - q[1], p[2] - q[2]};
+}
+RationalPoint operator+(const RationalPoint& p, const RationalPoint& q) {
+  return {p[0] + q[0], p[1] + q[1], p[2] + q[2]};
+}
+RationalPoint operator*(const Rational& f, const RationalPoint& p) {
+  return {f * p[0], f * p[1], f * p[2]};
+}
+Rational dot(const RationalPoint& p, const RationalPoint& q) {
+  return p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
+}
+Rational clamped(const Rational& x) {
+  return x < 0 ? Rational(0) : x > 1 ? Rational(1) : x;
+}
+
+/// The square of the distance of a point and a segment that starts at the origin.
+Rational point_segment(const RationalPoint& p, const RationalPoint& e) {
+  const Rational square = dot(e, e);
+  const RationalPoint apart = square == 0 ? p : p - clamped(dot(p, e) / square) * e;
+  return dot(apart, apart);
+}
+
+/// The square of the distance of two segments by the sides of the square of parameters and its inside.
+Rational segments(const RationalPoint& p, const RationalPoint& e, const RationalPoint& q,
+                  const RationalPoint& f) {
+  Rational least = std::min(std::min(point_segment(p - q, f), point_segment(p + e - q, f)),
+                            std::min(point_segment(q - p, e), point_segment(q + f - p, e)));
+  const Rational ee = dot(e, e), ff = dot(f, f), ef = dot(e, f);
+  const Rational determinant = ee * ff - ef * ef;
+  if (determinant == 0) return least;
+  const RationalPoint r = p - q;
+  const Rational s = (ef * dot(f, r) - ff * dot(e, r)) / determinant,
+                 t = (ee * dot(f, r) - ef * dot(e, r)) / determinant;
+  if (s < 0 || s > 1 || t < 0 || t > 1) return least;
+  const RationalPoint apart = r + s * e - t * f;
+  return std::min(least, dot(apart, apart));
+}
+
+/// The square of the distance of a point and the plane of a triangle, where the foot is on the triangle, by
+/// the normal equations; else `least`.
+Rational point_face(const RationalPoint& p, const std::array<RationalPoint, 3>& t, const Rational& least) {
+  const RationalPoint u = t[1] - t[0], v = t[2] - t[0], r = p - t[0];
+  const Rational uu = dot(u, u), uv = dot(u, v), vv = dot(v, v), determinant = uu * vv - uv * uv;
+  if (determinant == 0) return least;
+  const Rational x = (vv * dot(u, r) - uv * dot(v, r)) / determinant,
+                 y = (uu * dot(v, r) - uv * dot(u, r)) / determinant;
+  if (x < 0 || y < 0 || x + y > 1) return least;
+  const RationalPoint apart = r - x * u - y * v;
+  return std::min(least, dot(apart, apart));
+}
+
+Rational squared_distance(const TrianglePair& pair) {
+  std::array<RationalPoint, 3> a, b;
+  for (int i = 0; i < 3; ++i) {
+    a[i] = rational(pair.a[i]);
+    b[i] = rational(pair.b[i]);
+  }
+  Rational least = dot(a[0] - b[0], a[0] - b[0]);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j)
+      least = std::min(least, segments(a[i], a[(i + 1) % 3] - a[i], b[j], b[(j + 1) % 3] - b[j]));
+  }
+  for (int i = 0; i < 3; ++i) least = point_face(a[i], b, point_face(b[i], a, least));
+  return least;
+}
+
 }  // namespace
+
+struct DistanceOracle::Square {
+  Rational value;
+};
+
+DistanceOracle::DistanceOracle(const TrianglePair& pair)
+    : square_(new Square{oracle_contact(pair) ? Rational(0) : squared_distance(pair)}) {}
+DistanceOracle::~DistanceOracle() = default;
+
+bool DistanceOracle::meet() const {
+  return square_->value == 0;
+}
+
+bool DistanceOracle::is_in(double lower, double upper) const {
+  const auto square = [](double x) { return Rational(x) * Rational(x); };
+  return square(lower) <= square_->value && (std::isinf(upper) || square_->value <= square(upper));
+}
+
+double DistanceOracle::rounded() const {
+  return std::sqrt(CGAL::to_double(square_->value));
+}
 
 bool oracle_contact(const TrianglePair& pair) {
   return std::visit([](const auto& a, const auto& b) { return meet(a, b); }, shape(pair.a), shape(pair.b));

@@ -1,4 +1,6 @@
 #pragma once
+#include <memory>
+
 #include "tandem/kernels/detail/triangle_test.h"
 
 namespace tandem {
@@ -6,6 +8,21 @@ namespace tandem {
 /// Whether the triangles meet, by CGAL's exact constructions: a flat triangle is dispatched as the segment or
 /// point that it is.
 bool oracle_contact(const TrianglePair& pair);
+
+/// The distance of two triangles by rational numbers.
+class DistanceOracle {
+ public:
+  explicit DistanceOracle(const TrianglePair& pair);
+  ~DistanceOracle();
+
+  bool meet() const;
+  bool is_in(double lower, double upper) const;
+  double rounded() const;
+
+ private:
+  struct Square;
+  std::unique_ptr<Square> square_;
+};
 
 /// |computed - det(q - p, r - p, s - p)|, by rational numbers, rounded at the end.
 double oracle_volume_error(const double* p, const double* q, const double* r, const double* s,

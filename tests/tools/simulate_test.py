@@ -5,6 +5,7 @@ Environment: that of tool_test.py, and TANDEM_BVHBENCH.
 """
 import json
 import os
+import re
 import signal
 import subprocess
 import time
@@ -29,7 +30,8 @@ class SimulateTest(ToolTest):
     def setUp(self):
         super().setUp()
         self.run_file = self.outputs / "run.h5"
-        self.cube = self.mesh_of("cube", (SOURCE_DIR / "assets/box_12.obj").read_bytes())
+        self.cube_obj = (SOURCE_DIR / "assets/box_12.obj").read_bytes()
+        self.cube = self.mesh_of("cube", self.cube_obj)
 
     def mesh_of(self, name, content):
         path = self.inputs / f"{name}.bvh"
@@ -133,6 +135,34 @@ class Runs(SimulateTest):
             # 2 m/s braked by 0.25 g come to rest after 0.82 s, 0.815 m further on.
             self.assertAlmostEqual(moved[1, 0], 2**2 / (2 * 0.25 * 9.81), delta=0.03)
             np.testing.assert_allclose(moved[2], [0, 1.5, 0], atol=1e-12)
+
+    def test_continuous_keeps_fast_plates_from_passing_through(self):
+        plate = self.mesh_of("plate", re.sub(rb"^v (\S+) (\S+) (\S+)", lambda v: b"v %s %s %f" % (v[1], v[2], 0.01 * float(v[3])),
+                                             self.cube_obj, flags=re.M))
+        scene, speeds = self.outputs / "scene.h5", np.array([1.0, 3, 10, 30, 100])
+        at = np.array([(3 * i, 0, z) for i, speed in enumerate(speeds) for z in (0, 0.02 + speed / 30)])
+        with h5py.File(scene, "w") as file:
+            file["assets"] = [os.fspath(plate)]
+            file["instances/asset"] = np.zeros(10, "u4")
+            file["instances/rotation"] = np.stack([np.eye(3)] * 10)
+            file["instances/translation"] = at
+            file["simulation/motion"] = np.array([1, 0] * 5, "u4")
+            file["simulation/velocity"] = np.array([(0, 0, v) for speed in speeds for v in (0, -speed)])
+        arguments = [scene, "--frames", "12", "--trajectory", "12", "--gravity", "0"]
+        behind = []
+        for options in ((), ("--continuous",)):
+            self.simulate("scene", *arguments, *options)
+            with h5py.File(self.run_file) as file:
+                behind.append((file["/trajectory/position"][-1, 1::2, 2] < 0).tolist())
+        self.assertEqual(behind[0], [False, True, True, True, True])
+        self.assertEqual(behind[1], [False] * 5)
+
+    def test_continuous_changes_nothing_where_nothing_is_fast(self):
+        runs = []
+        for options in ((), ("--continuous",)):
+            self.stack("--frames", "60", "--trajectory", "20", *options)
+            runs.append({name: data for name, data in self.contents(self.run_file).items() if name.startswith(("/trajectory", "/frames", "/state"))})
+        self.assertEqual(runs[0], runs[1])
 
     def test_usage_errors_say_what_is_wrong(self):
         self.assert_fails(self.bench("simulate", "stack", "--mesh", self.cube, "--count", "26", "--frames", "1", "-o",

@@ -5,9 +5,12 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <set>
 
+#include "compare_distance.h"
 #include "compare_results.h"
 #include "engines/registry.h"
 #include "scenes/hdf5_file.h"
@@ -20,6 +23,7 @@ struct CompareArguments {
   unsigned repeats = 5;
   std::string out;
   bool json = false;
+  std::optional<double> distances_within;  ///< distances are compared, not contacts
 };
 
 std::string join(const std::vector<std::string_view>& words) {
@@ -54,8 +58,34 @@ void check_names(const std::vector<std::string>& scenes) {
   }
 }
 
+ExitCode run_distances(const CompareArguments& arguments) {
+  if (!arguments.out.empty() || !arguments.engines.empty())
+    throw UsageError("--out and --peers are for contacts, so --distance does not go with them");
+  Json results = Json::array();
+  for (const std::string& scene : arguments.scenes) {
+    const DistanceComparison compared =
+        compare_distances(scene, *arguments.distances_within, arguments.repeats);
+    if (arguments.json) {
+      results.push_back(to_json(compared));
+      continue;
+    }
+    std::fputs(to_text(compared).c_str(), stdout);
+    std::fflush(stdout);
+  }
+  if (arguments.json) {
+    const Json json = {{"tool", "bvhbench compare --distance"},
+                       {"version", TANDEM_VERSION},
+                       {"processor", processor()},
+                       {"repeats", arguments.repeats},
+                       {"scenes", results}};
+    std::puts(pretty(json).c_str());
+  }
+  return kDone;
+}
+
 ExitCode run_compare(const CompareArguments& arguments) {
   check_names(arguments.scenes);
+  if (arguments.distances_within) return run_distances(arguments);
   if (!arguments.out.empty()) {
     keep_inputs(arguments.out, arguments.scenes);
     try_output(arguments.out);
@@ -88,6 +118,11 @@ CLI::App* add_compare(CLI::App& app, Run& run) {
       ->check(CLI::Range(1u, 100000u))
       ->option_text("N [5]");
   command->add_option("--out", arguments->out, "write the results here, as HDF5")->check(file_name());
+  command
+      ->add_option("--distance", arguments->distances_within,
+                   "compare distances instead, of pairs that are apart and within D")
+      ->check(between(0, std::numeric_limits<double>::infinity()))
+      ->option_text("D");
   command->add_flag("--json", arguments->json, "print JSON");
   command->footer("Times are of one thread. docs/comparison.md says what is compared, and how.");
   command->final_callback([arguments, &run] { run = [arguments] { return run_compare(*arguments); }; });

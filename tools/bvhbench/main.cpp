@@ -7,8 +7,10 @@
 #include "common/option_helpers.h"
 #include "common/printable.h"
 #include "compare_command.h"
+#include "distance_command.h"
 #include "engines/engine.h"
 #include "frame_command.h"
+#include "impact_command.h"
 #include "poses_command.h"
 #include "query_command.h"
 #include "scene_command.h"
@@ -61,6 +63,8 @@ int main(int argc, char** argv) {
   // Each subcommand is a header and a line here.
   add_scene(app, run);
   add_query(app, run);
+  add_impact(app, run);
+  add_distance(app, run);
   add_compare(app, run);
   add_simulate(app, run);
   add_frame(app, run);

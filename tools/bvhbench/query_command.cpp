@@ -1,7 +1,6 @@
 #include "query_command.h"
 
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <new>
 #include <thread>
@@ -53,16 +52,7 @@ std::string name_of(Value wanted, const std::map<std::string, Value>& names) {
   return {};
 }
 
-// Throws what a status other than kOk calls for. `where`: the instance or pair that is to blame.
-[[noreturn]] void refuse(const std::string& scene, Status status, std::uint64_t where) {
-  const char* unit = subject(status);
-  const std::string blamed = unit == nullptr ? "" : std::string(unit) + " " + std::to_string(where) + ": ";
-  const std::string text = scene + ": " + blamed + explain(status);
-  if (status == Status::kCannotStartThread) throw std::runtime_error(text);
-  throw FileError(text);
-}
-
-[[noreturn]] void refuse(const std::string& scene, const GpuError& error) {
+[[noreturn]] void refuse_gpu(const std::string& scene, const GpuError& error) {
   const std::string why = explain(error.status);
   switch (error.status) {
     case Status::kTooManyPairs:
@@ -84,6 +74,7 @@ QueryRecord record_of(const QueryArguments& arguments, const Scene& scene) {
   record.mode = name_of(arguments.options.mode, kModes);
   record.backend = arguments.backend;
   record.first_contact = arguments.options.first_contact_only;
+  record.within = arguments.options.within;
   record.self_pairs = arguments.options.self_pairs;
   record.given_pairs = scene.description.pairs.has_value();
   record.threads = arguments.on_gpu() ? 0 : arguments.options.threads;
@@ -137,16 +128,8 @@ Answer answer_of(const QueryArguments& arguments, const Scene& scene) {
     }
     refuse(arguments.scene, error.status, error.where);
   } catch (const GpuError& error) {
-    refuse(arguments.scene, error);
+    refuse_gpu(arguments.scene, error);
   }
-}
-
-std::uint64_t triangles_of(const Scene& scene) {
-  std::uint64_t triangles = 0;
-  for (const Instance& instance : scene.description.instances) {
-    triangles += scene.assets[instance.asset].view().level().triangle_count;
-  }
-  return triangles;
 }
 
 Json times(const Seconds& seconds) {
@@ -165,6 +148,7 @@ Json to_json(const QueryArguments& arguments, const Scene& scene, const Answer& 
                {"mode", record.mode},
                {"first_contact", record.first_contact},
                {"self_pairs", record.self_pairs},
+               {"within", record.within},
                {"given_pairs", record.given_pairs},
                {"threads", record.threads},
                {"assets", scene.assets.size()},
@@ -275,6 +259,9 @@ void check_arguments(const QueryArguments& arguments, const Scene& scene) {
     throw UsageError(
         "--contained takes all exact contacts, so neither --mode nor --first-contact goes with it");
   }
+  if (arguments.options.within > 0 && (arguments.manifolds || arguments.contained)) {
+    throw UsageError("--manifolds and --contained take contacts, so --within does not go with them");
+  }
   const bool tandem = arguments.gpu_engine == "tandem-cuda";
   if (!arguments.on_gpu()) {
     if (!tandem) throw UsageError("--engine is for the backend cuda");
@@ -291,6 +278,7 @@ void check_arguments(const QueryArguments& arguments, const Scene& scene) {
   if (arguments.options.self_pairs) {
     throw UsageError("--self is for the backend cpu; /pairs of a scene may name an instance twice");
   }
+  if (arguments.options.within > 0) throw UsageError("--within is for the backend cpu");
   if (arguments.threads_given) throw UsageError("--threads is for the backend cpu");
 }
 
@@ -300,15 +288,6 @@ void write(const QueryArguments& arguments, const Answer& answer) {
   const ContainedTable contained = {answer.contained.rows, answer.contained.seconds};
   write_contacts(arguments.out, answer.table, answer.record, arguments.manifolds ? &manifolds : nullptr,
                  arguments.contained ? &contained : nullptr);
-}
-
-// The scene file and its assets, as paths from here.
-std::vector<std::string> files_of(const std::string& path, const Scene& scene) {
-  std::vector<std::string> files = {path};
-  for (const std::string& asset : scene.description.assets) {
-    files.push_back((std::filesystem::path(path).parent_path() / asset).string());
-  }
-  return files;
 }
 
 ExitCode run(const QueryArguments& arguments) {
@@ -368,6 +347,11 @@ CLI::App* add_query(CLI::App& app, Run& run_later) {
       ->option_text("exact|fast|boxes [exact]");
   command->add_flag("--first-contact", options.first_contact_only,
                     "one contact for each object pair at most");
+  command
+      ->add_option("--within", options.within,
+                   "clearance: also triangles at most so far apart, decided exactly")
+      ->check(between(0, kLargestWorldCoordinate))
+      ->option_text("D [0]");
   command->add_flag("--manifolds", arguments->manifolds,
                     "also contact manifolds: normals, depths and points");
   command->add_flag("--contained", arguments->contained,

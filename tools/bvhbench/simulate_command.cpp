@@ -28,7 +28,7 @@ struct SimulateArguments {
   std::uint32_t count = 0;
   double jitter = 0.0005, tilt = 30, density = 1000, gravity = 9.81, slop = -1;
   std::uint64_t seed = 1;
-  bool fast = false, json = false, cold = false;
+  bool fast = false, json = false, cold = false, continuous = false;
   SimulatorOptions simulator;
   ContactOptions contacts;
   RunOptions run;
@@ -140,6 +140,7 @@ Json options_of(const char* kind, const SimulateArguments& arguments, const Star
           {"shock_propagation", solver.shock_propagation},
           {"sleeping", simulator.sleep.enabled},
           {"sleep_speed", simulator.sleep.speed},
+          {"continuous", arguments.continuous},
           {"trajectory", arguments.run.trajectory_every}};
 }
 
@@ -240,9 +241,11 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
   arguments.contacts.threads = options.threads;
   auto engine = make_engine(arguments.engine, {.mode = arguments.fast ? QueryMode::fast : QueryMode::exact,
                                                .threads = options.threads});
+  std::unique_ptr<ContinuousMotion> continuous;
+  if (arguments.continuous) continuous = std::make_unique<ContinuousMotion>(start.shapes(), options.threads);
   Simulator simulator(start.bodies.bodies, start.bodies.states,
                       make_mesh_contact_finder(std::move(engine), start.shapes(), arguments.contacts),
-                      options);
+                      options, std::move(continuous));
   const RunResults results = run_simulation(simulator, description, start.reentry, arguments.run);
   if (arguments.json) {
     std::puts(pretty(to_json(kind, arguments, description, results)).c_str());
@@ -312,6 +315,8 @@ void add_solver_options(CLI::App& command, SimulateArguments& arguments) {
   command.add_flag("--shock", solver.shock_propagation,
                    "propagate shocks from the ground up after the sweeps");
   command.add_flag("--sleep", simulator.sleep.enabled, "let islands at rest fall asleep");
+  command.add_flag("--continuous", arguments.continuous,
+                   "carry fast bodies to where they first meet others, so that none passes through");
   command.add_option("--sleep-speed", simulator.sleep.speed, "below which a body is at rest, in m/s")
       ->check(between(0, 1e6))
       ->option_text("V [0.01]");

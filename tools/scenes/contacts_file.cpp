@@ -137,6 +137,7 @@ void write_contacts(const std::string& path, const ContactTable& table, const Qu
   file.attribute("first_contact", std::uint64_t{record.first_contact});
   file.attribute("self_pairs", std::uint64_t{record.self_pairs});
   file.attribute("given_pairs", std::uint64_t{record.given_pairs});
+  file.attribute("within", record.within);
   file.attribute("threads", record.threads);
   file.attribute("repeats", std::uint64_t{record.seconds.size()});
   file.attribute("best_seconds", best_of(record.seconds));

@@ -41,6 +41,7 @@ std::uint64_t hash_of(const ContactTable& table);
 struct QueryRecord {
   std::string mode, backend;
   bool first_contact = false, self_pairs = false, given_pairs = false;
+  double within = 0;  ///< clearance
   std::uint64_t threads = 1;
   Seconds seconds;  ///< of each repeat, at least one
   QueryCounters counters;

@@ -5,7 +5,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "scenes/hdf5_file.h"
+#include "scenes/scene_motion.h"
 #include "tandem/formats/hash.h"
 
 namespace tandem::simulation {
@@ -75,35 +75,6 @@ class Shapes {
   std::vector<std::optional<BodyProperties>> of_dynamic_, of_fixed_;
 };
 
-// What a scene file says of its bodies beyond its description; empty where it is silent.
-struct SceneMotion {
-  std::vector<double> density, velocity, angular_velocity;
-};
-
-SceneMotion read_motion(const std::string& path, std::size_t bodies) {
-  const bench::Hdf5Input file(path);
-  SceneMotion read;
-  const auto check = [&](const char* name, std::size_t rows) {
-    if (rows == bodies) return;
-    throw FileError(path + ": " + name + ": " + std::to_string(rows) + " rows for " + std::to_string(bodies) +
-                    " instances");
-  };
-  const auto read_f64 = [&](const char* name, const bench::Shape& row, std::vector<double>& values) {
-    if (!file.has(name)) return;
-    values = file.read_f64(name, row);
-    check(name, values.size() / (row.empty() ? 1 : row[0]));
-    const bool finite = std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
-    if (!finite) throw FileError(path + ": " + name + ": a number is not finite");
-  };
-  read_f64("/simulation/density", {}, read.density);
-  if (std::any_of(read.density.begin(), read.density.end(), [](double density) { return density <= 0; })) {
-    throw FileError(path + ": /simulation/density: a density that is not above 0");
-  }
-  read_f64("/simulation/velocity", {3}, read.velocity);
-  read_f64("/simulation/angular_velocity", {3}, read.angular_velocity);
-  return read;
-}
-
 // A body that sleeps in the file starts awake: a simulation finds out by itself who sleeps.
 Motion moved_by(const bench::SceneFilter& filter, std::size_t body) {
   const Motion motion = filter.motion.empty() ? Motion::moving : filter.motion[body];
@@ -132,7 +103,7 @@ Preparation prepare(const Configuration& configuration, std::span<const AssetVie
 
 Preparation prepare_scene(const std::string& path, const bench::Scene& scene, double density) {
   const auto& instances = scene.description.instances;
-  const SceneMotion motion = read_motion(path, instances.size());
+  const bench::SceneMotion motion = bench::read_motion(path, instances.size());
   const std::vector<AssetView> shapes = scene.views();
   Preparation all;
   Shapes bodies(shapes, scene.description.assets);

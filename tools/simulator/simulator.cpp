@@ -34,11 +34,13 @@ void take(StepRecord& record, const FinderReport& report) {
 }  // namespace
 
 Simulator::Simulator(std::vector<BodyProperties> bodies, std::vector<BodyState> states,
-                     std::unique_ptr<ContactFinder> contacts, const SimulatorOptions& options)
+                     std::unique_ptr<ContactFinder> contacts, const SimulatorOptions& options,
+                     std::unique_ptr<ContinuousMotion> continuous)
     : bodies_(std::move(bodies)),
       acting_(bodies_),
       states_(std::move(states)),
       finder_(std::move(contacts)),
+      continuous_(std::move(continuous)),
       options_(options),
       arena_(static_cast<int>(options.threads)),
       solver_(make_step_solver(options.solver)) {
@@ -81,9 +83,11 @@ void Simulator::solve(StepRecord& record) {
   std::vector<ContactImpulse> impulses(kept_.contacts.size());
   if (options_.solver.warm_start) impulses = cache_.match(kept_.contacts, bodies_, states_);
   FollowedContacts followed(kept_.contacts, states_);
+  const std::vector<BodyState> before = continuous_ ? states_ : std::vector<BodyState>();
   solver_->step(
       {acting_, kept_.contacts, islands_, options_.dt, options_.gravity, step_, cache_.entries().empty()},
       states_, impulses);
+  if (continuous_) continuous_->limit(acting_, before, states_, options_.solver.slop);
   followed.follow(states_);
   kept_.contacts = followed.contacts();
   cache_.remember(kept_, impulses, states_, idle());

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "contact_finder.h"
+#include "continuous_motion.h"
 #include "sleep.h"
 #include "step_record.h"
 #include "step_solver.h"
@@ -35,9 +36,11 @@ struct SimulatorState {
 /// impulse of the step before makes ten times the sweeps. The same bytes for any number of threads.
 class Simulator {
  public:
-  /// Condition: as many states as bodies.
+  /// continuous: what keeps fast bodies from passing through others; null: nothing does. Condition: as many
+  /// states as bodies.
   Simulator(std::vector<BodyProperties> bodies, std::vector<BodyState> states,
-            std::unique_ptr<ContactFinder> contacts, const SimulatorOptions& options);
+            std::unique_ptr<ContactFinder> contacts, const SimulatorOptions& options,
+            std::unique_ptr<ContinuousMotion> continuous = nullptr);
 
   /// Throws what the contact finder throws.
   StepRecord step();
@@ -65,6 +68,7 @@ class Simulator {
   std::vector<BodyProperties> bodies_, acting_;  // acting_: what sleeps is fixed
   std::vector<BodyState> states_;
   std::unique_ptr<ContactFinder> finder_;
+  std::unique_ptr<ContinuousMotion> continuous_;
   SimulatorOptions options_;
   tbb::task_arena arena_;
   KeptContacts kept_;  // of the step under way

@@ -70,6 +70,7 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kTooManyInstances,  ///< 2^32 - 1 or more
     kTooManyPairs,      ///< 2^32 - 1 object pairs or more
     kKeptMismatch,      ///< fixed instances are kept of a list of another length
+    kMotionMismatch,    ///< not as many motions as instances
     kCannotStartThread,
     kNoOrientedBlocks,     ///< exact queries on a GPU need them, and the asset was given without
     kNoAxisAlignedBlocks,  ///< the other modes of queries on a GPU need them, and the asset was given without

@@ -41,6 +41,10 @@ struct QueryOptions {
   std::uint32_t threads = 1;  ///< with the caller's, kMostQueryThreads at most; results don't depend on it
   /// Where the query finds the pairs: those that it looks at; null: all. It must stay as long as the call.
   const PairFilter* filter = nullptr;
+  /// Clearance: triangles whose distance is at most this count as contacts, decided exactly, in mode fast
+  /// too; candidates are triangles whose boxes are within it. 0: those that meet. From 0 to
+  /// kLargestWorldCoordinate, else kOutOfRange.
+  double within = 0;
 };
 
 /// What a query did. The counters depend neither on the number of threads nor on the machine.
@@ -88,10 +92,10 @@ class ContactQuery {
   /// there are no pairs and no contacts.
   Status find_pairs(std::span<const Instance> instances, const QueryOptions& options = {});
 
-  /// Finds the object pairs whose world boxes overlap, and their contacts. find_contacts(instances, {}) is
-  /// this one, with default options. Result: as above; kOutOfMemory also where the machine, or the limit of
-  /// the process's control group, has not enough memory available for the contacts: Linux would grant it and
-  /// kill the process later. In a steady state nothing is asked.
+  /// Finds the object pairs whose world boxes overlap, or are within `within`, and their contacts.
+  /// find_contacts(instances, {}) is this one, with default options. Result: as above; kOutOfMemory also
+  /// where the machine, or the limit of the process's control group, has not enough memory available for the
+  /// contacts: Linux would grant it and kill the process later. In a steady state nothing is asked.
   Status find_contacts(std::span<const Instance> instances, const QueryOptions& options = {});
 
   /// Finds the contacts of the given object pairs, in either order of a and b. A pair of an instance with

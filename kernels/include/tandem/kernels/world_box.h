@@ -53,4 +53,21 @@ TANDEM_HD inline bool overlap(const WorldBox& a, const WorldBox& b) {
   return overlap;
 }
 
+/// Whether along each axis no gap as computed is larger than `reach`; with 0, whether they meet.
+TANDEM_HD inline bool are_near(const WorldBox& a, const WorldBox& b, double reach) {
+  bool near = true;
+  for (int k = 0; k < 3; ++k) near = near && a.lo[k] - b.hi[k] <= reach && b.lo[k] - a.hi[k] <= reach;
+  return near;
+}
+
+/// The box, larger by `margin` on each side, rounded outward, as far as queries take boxes.
+inline WorldBox grown(const WorldBox& box, double margin) {
+  WorldBox out;
+  for (int k = 0; k < 3; ++k) {
+    out.lo[k] = std::fmax(std::nextafter(box.lo[k] - margin, -HUGE_VAL), -kLargestWorldCoordinate);
+    out.hi[k] = std::fmin(std::nextafter(box.hi[k] + margin, HUGE_VAL), kLargestWorldCoordinate);
+  }
+  return out;
+}
+
 }  // namespace tandem

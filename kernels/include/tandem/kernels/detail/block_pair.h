@@ -36,9 +36,11 @@ TANDEM_HD inline WorldBox node_world_box(const Pose& pose, const Block& block, i
   return world_box(pose, lower, upper);
 }
 
-/// block_pair_mask() by world boxes in float64, for pairs that float32 cannot take.
+/// block_pair_mask() by world boxes in float64, for pairs that float32 cannot take. within: boxes at most so
+/// far apart along each axis count too; the gap as computed is too large by 2^-53 of itself at most.
 TANDEM_HD inline std::uint32_t world_block_pair_mask(const Pose& pose_a, const Block& a, const Pose& pose_b,
-                                                     const Block& b) {
+                                                     const Block& b, double within = 0) {
+  const double reach = within * (1 + 0x1p-50);
   std::uint32_t mask = 0;
 #ifdef __CUDA_ARCH__
 #pragma unroll 1
@@ -51,7 +53,7 @@ TANDEM_HD inline std::uint32_t world_block_pair_mask(const Pose& pose_a, const B
 #endif
     for (int j = 0; j < kNodesPerBlock; ++j) {
       if (b.kind[j] == NodeKind::imaginary) continue;
-      if (overlap(box_a, node_world_box(pose_b, b, j))) mask |= 1u << (4 * i + j);
+      if (are_near(box_a, node_world_box(pose_b, b, j), reach)) mask |= 1u << (4 * i + j);
     }
   }
   return mask;

@@ -1,0 +1,99 @@
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "tandem/kernels/contact_query.h"
+#include "tandem/kernels/motion.h"
+
+namespace tandem {
+
+enum class ImpactStatus : std::uint8_t {
+  none = 0,      ///< surely no contact in the whole step
+  found = 1,     ///< surely none until t_safe, when two triangles are near and may go on to meet
+  at_start = 2,  ///< the instances are in contact at the start, as the exact contact query says
+};
+
+/// When the two instances of a pair meet. Where there is none in this step the triangles and faces are
+/// kNoIndex, the gap is infinite, and the points are 0.
+struct Impact {
+  double t_safe;  ///< seconds; the whole step where there is none, 0 where they are in contact at the start
+  double gap;     ///< of the two triangles at t_safe; other triangles of the pair may be nearer, but recede
+  double point_a[3], point_b[3];         ///< where these are nearest then, in the world
+  std::uint32_t triangle_a, triangle_b;  ///< in leaf order
+  std::uint32_t face_a, face_b;          ///< of the source files
+  ImpactStatus status;
+};
+
+struct ImpactOptions {
+  /// How near triangles come before they stop a pair: a part of the diagonal of the smaller body's bounds.
+  double tolerance = 1e-6;
+  std::uint32_t threads = 1;  ///< with the caller's, kMostQueryThreads at most; results don't depend on it
+  /// Where the query finds the pairs: those that it looks at; null: all. It must stay as long as the call.
+  const PairFilter* filter = nullptr;
+};
+
+/// What a query did. The counters depend neither on the number of threads nor on the machine.
+struct ImpactCounters {
+  std::uint64_t object_pairs = 0;
+  std::uint64_t at_start = 0, found = 0;  ///< of them
+  std::uint64_t walks = 0;                ///< of two trees: one for each half radian of a pair's turn
+  std::uint64_t block_pairs = 0;
+  std::uint64_t triangle_pairs = 0;  ///< whose boxes may meet
+  std::uint64_t advanced = 0;        ///< of these, not told apart by their planes
+  std::uint64_t steps = 0;           ///< of conservative advancement, of all of them
+  std::uint64_t most_steps = 0;      ///< of one
+  std::uint64_t unconverged = 0;     ///< those that stopped a pair for want of steps, above the tolerance
+
+  friend bool operator==(const ImpactCounters&, const ImpactCounters&) = default;
+};
+
+/// Finds until when moving instances surely do not meet, on the CPU. Keeps its memory from call to call.
+/// Throws nothing. Movable, not copyable; one query at a time, several objects side by side. Takes about 100
+/// KB of the calling thread's stack. Rounds to nearest and keeps subnormals.
+///
+/// **Guarantee.** Unless a pair is in contact at the start, no triangles of its two instances meet at any
+/// time in [0, t_safe]: neither those that move as RigidMotion defines, nor those that apply() makes of
+/// pose_at(). Meshes need not be closed: a surface in another's inside is no contact. Proofs: pair_motion.h,
+/// box_times.h and triangle_impact.h.
+class ImpactQuery {
+ public:
+  ImpactQuery();
+  ImpactQuery(ImpactQuery&&) noexcept;
+  ImpactQuery& operator=(ImpactQuery&&) noexcept;
+  ~ImpactQuery();
+
+  /// Names the assets that instances refer to, as ContactQuery::set_assets() does.
+  Status set_assets(std::span<const AssetView> assets);
+
+  /// Finds the object pairs whose boxes, swept by their motions of a step of `duration` seconds, meet, and
+  /// when each of them does. motion: of each instance. Result: as of ContactQuery::find_contacts();
+  /// kMotionMismatch where there are not as many motions as instances; kOutOfRange, where where() is the
+  /// instance, also where it turns by more than kLargestTurn, or its centre, place or displacement are beyond
+  /// kLargestMovingCoordinate; and where the duration or the tolerance is negative or not finite. After an
+  /// error there are no pairs and no impacts.
+  Status find(std::span<const Instance> instances, std::span<const RigidMotion> motion, double duration,
+              const ImpactOptions& options = {});
+
+  /// The same of given object pairs, in either order of a and b; the filter is not asked. An instance and
+  /// itself do not move relative to each other. Result: as above, or kUnknownInstance: where() is the pair.
+  Status find(std::span<const Instance> instances, std::span<const RigidMotion> motion, double duration,
+              std::span<const ObjectPair> pairs, const ImpactOptions& options);
+
+  /// The object pairs of the last call: a < b, sorted, where the query found them; as given else.
+  std::span<const ObjectPair> pairs() const;
+
+  /// When each of them meets. Valid until the next call.
+  std::span<const Impact> impacts() const;
+
+  const ImpactCounters& counters() const;
+
+  /// The asset, instance or pair that is to blame for an error.
+  std::uint64_t where() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace tandem

@@ -1,0 +1,120 @@
+#include "compare_distance.h"
+
+#include <algorithm>
+#include <cfenv>
+#include <cstdio>
+#include <filesystem>
+
+#include "command.h"
+#include "common/number_words.h"
+#include "engines/distance_engine.h"
+
+namespace tandem::bench {
+namespace {
+
+struct CertifiedPairs {
+  std::vector<ObjectPair> pairs;
+  std::vector<double> lower, upper;
+};
+
+CertifiedPairs certified_pairs(const std::string& path, const Scene& scene, double reach) {
+  DistanceQuery query;
+  Status status = query.set_assets(scene.views());
+  if (status == Status::kOk) status = query.find_distances(scene.description.instances, {.reach = reach});
+  if (status != Status::kOk) refuse(path, status, query.where());
+  CertifiedPairs out;
+  for (std::size_t i = 0; i < query.pairs().size(); ++i) {
+    const ObjectDistance& found = query.distances()[i];
+    if (found.upper == 0 || found.upper > reach) continue;
+    out.pairs.push_back(query.pairs()[i]);
+    out.lower.push_back(found.lower);
+    out.upper.push_back(found.upper);
+  }
+  return out;
+}
+
+double worst_error(const CertifiedPairs& pairs, const std::vector<double>& distances) {
+  double worst = 0;
+  for (std::size_t i = 0; i < distances.size(); ++i) {
+    const double beyond = std::max(pairs.lower[i] - distances[i], distances[i] - pairs.upper[i]);
+    worst = std::max(worst, beyond / pairs.upper[i]);
+  }
+  return worst;
+}
+
+// Libraries change rounding and denormal modes; what follows them must not notice.
+template <typename Work>
+double seconds_of(const Work& work) {
+  std::fenv_t saved;
+  std::fegetenv(&saved);
+  Stopwatch watch;
+  work();
+  const double seconds = watch.lap();
+  std::fesetenv(&saved);
+  return seconds;
+}
+
+}  // namespace
+
+DistanceComparison compare_distances(const std::string& path, double reach, unsigned repeats) {
+  const Scene scene = read_scene(path);
+  const std::vector<AssetView> views = scene.views();
+  const CertifiedPairs pairs = certified_pairs(path, scene, reach);
+  DistanceComparison out;
+  out.name = std::filesystem::path(path).stem().string();
+  out.reach = reach;
+  out.instances = scene.description.instances.size();
+  out.object_pairs = pairs.pairs.size();
+  const auto engines = distance_engines();
+  for (const auto& engine : engines) {
+    DistancePeer peer;
+    peer.name = engine->label();
+    peer.settings = engine->settings();
+    peer.build_seconds = seconds_of([&] { engine->set_shapes(views); });
+    engine->update(scene.description.instances);
+    out.peers.push_back(peer);
+  }
+  std::vector<double> distances;
+  for (unsigned i = 0; i < repeats; ++i) {
+    for (std::size_t e = 0; e < engines.size(); ++e) {
+      out.peers[e].query_seconds.push_back(seconds_of([&] { engines[e]->find(pairs.pairs, distances); }));
+      out.peers[e].worst_error = worst_error(pairs, distances);
+    }
+  }
+  return out;
+}
+
+std::string to_text(const DistanceComparison& comparison) {
+  char line[200];
+  std::snprintf(line, sizeof line, "%s: %s instances, %s pairs apart and within %g\n",
+                comparison.name.c_str(), with_commas(comparison.instances).c_str(),
+                with_commas(comparison.object_pairs).c_str(), comparison.reach);
+  std::string out = line;
+  for (const DistancePeer& peer : comparison.peers) {
+    const double best = best_of(peer.query_seconds);
+    std::snprintf(line, sizeof line, "  %-12s %10.3f ms  %8.2f times  error %.1e  built in %.3f s\n",
+                  peer.name.c_str(), 1e3 * best, best / best_of(comparison.peers[0].query_seconds),
+                  peer.worst_error, peer.build_seconds);
+    out += line;
+  }
+  return out;
+}
+
+Json to_json(const DistanceComparison& comparison) {
+  Json peers = Json::array();
+  for (const DistancePeer& peer : comparison.peers) {
+    peers.push_back({{"name", peer.name},
+                     {"settings", peer.settings},
+                     {"build_seconds", peer.build_seconds},
+                     {"best_seconds", best_of(peer.query_seconds)},
+                     {"median_seconds", median_of(peer.query_seconds)},
+                     {"worst_error", peer.worst_error}});
+  }
+  return {{"scene", comparison.name},
+          {"reach", comparison.reach},
+          {"instances", comparison.instances},
+          {"object_pairs", comparison.object_pairs},
+          {"peers", peers}};
+}
+
+}  // namespace tandem::bench

@@ -1,0 +1,286 @@
+#include "impact_command.h"
+
+#include <cstdio>
+#include <memory>
+#include <new>
+#include <optional>
+#include <thread>
+
+#include "common/json.h"
+#include "common/number_words.h"
+#include "common/stopwatch.h"
+#include "scenes/contacts_file.h"
+#include "scenes/hdf5_file.h"
+#include "scenes/scene_motion.h"
+#include "simulator/contacts/mass_properties.h"
+#include "tandem/formats/hash.h"
+#include "tandem/kernels/impact_query.h"
+
+namespace tandem::bench {
+namespace {
+
+struct ImpactArguments {
+  std::string scene, out;
+  double duration = 0;
+  ImpactOptions options;
+  std::uint32_t repeats = 1;
+  bool json = false;
+};
+
+// The answer, column by column as the file has it.
+struct ImpactTable {
+  std::vector<std::uint32_t> pairs;  // two for each row
+  std::vector<double> t_safe, gap, point_a, point_b;
+  std::vector<std::uint8_t> status;
+  std::vector<std::uint32_t> face_a, face_b;
+  std::vector<RigidMotion> motion;  // of the instances
+  ImpactCounters counters;
+  Seconds seconds;
+};
+
+// Centres of mass of the assets, computed where they are asked for.
+class MassCenters {
+ public:
+  explicit MassCenters(const Scene& scene) : scene_(scene), centers_(scene.assets.size()) {}
+
+  // In the file's coordinates.
+  const Eigen::Vector3d& of(std::uint32_t asset) {
+    if (!centers_[asset]) centers_[asset] = compute(asset);
+    return *centers_[asset];
+  }
+
+ private:
+  Eigen::Vector3d compute(std::uint32_t asset) const {
+    try {
+      return simulation::mass_properties(scene_.assets[asset].view()).properties.center;
+    } catch (const std::runtime_error& impossible) {
+      throw FileError(scene_.description.assets[asset] + ": " + impossible.what());
+    }
+  }
+
+  const Scene& scene_;
+  std::vector<std::optional<Eigen::Vector3d>> centers_;
+};
+
+// What the scene file says: fixed instances stay where they are, and the others turn about their centre of
+// mass, where the file gives none.
+std::vector<RigidMotion> motions_of(const std::string& path, const Scene& scene) {
+  const auto& instances = scene.description.instances;
+  const auto& movers = scene.description.filter.motion;
+  const SceneMotion told = read_motion(path, instances.size());
+  MassCenters centers(scene);
+  std::vector<RigidMotion> all(instances.size(), kAtRest);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (!movers.empty() && movers[i] == Motion::fixed) continue;
+    RigidMotion& motion = all[i];
+    if (!told.velocity.empty()) std::copy_n(&told.velocity[3 * i], 3, motion.velocity);
+    if (!told.angular_velocity.empty())
+      std::copy_n(&told.angular_velocity[3 * i], 3, motion.angular_velocity);
+    if (!told.centre.empty()) {
+      std::copy_n(&told.centre[3 * i], 3, motion.center);
+    } else if (!told.angular_velocity.empty()) {
+      const Eigen::Vector3d& center = centers.of(instances[i].asset);
+      apply(instances[i].pose, center[0], center[1], center[2], motion.center);
+    }
+  }
+  return all;
+}
+
+ImpactTable table_of(const ImpactQuery& query) {
+  ImpactTable table;
+  for (const ObjectPair& pair : query.pairs()) table.pairs.insert(table.pairs.end(), {pair.a, pair.b});
+  for (const Impact& impact : query.impacts()) {
+    table.t_safe.push_back(impact.t_safe);
+    table.status.push_back(static_cast<std::uint8_t>(impact.status));
+    table.gap.push_back(impact.gap);
+    table.point_a.insert(table.point_a.end(), impact.point_a, impact.point_a + 3);
+    table.point_b.insert(table.point_b.end(), impact.point_b, impact.point_b + 3);
+    table.face_a.push_back(impact.face_a);
+    table.face_b.push_back(impact.face_b);
+  }
+  table.counters = query.counters();
+  return table;
+}
+
+// Runs the query as often as asked; the answer is every run's.
+ImpactTable run_query(const ImpactArguments& arguments, const Scene& scene) {
+  const SceneDescription& description = scene.description;
+  const std::vector<RigidMotion> motion = motions_of(arguments.scene, scene);
+  const std::vector<ObjectPair> pairs = normalised(description.pairs.value_or(std::vector<ObjectPair>()));
+  ExcludedPairTable excluded;
+  const PairFilter filter = description.filter.view(excluded);
+  ImpactOptions options = arguments.options;
+  options.filter = &filter;
+  ImpactQuery query;
+  Seconds seconds;
+  Status status = query.set_assets(scene.views());
+  for (std::uint32_t i = 0; i < arguments.repeats && status == Status::kOk; ++i) {
+    Stopwatch watch;
+    status = description.pairs ? query.find(description.instances, motion, arguments.duration, pairs, options)
+                               : query.find(description.instances, motion, arguments.duration, options);
+    seconds.push_back(watch.lap());
+  }
+  if (status == Status::kOutOfMemory) throw std::bad_alloc();
+  if (status != Status::kOk) refuse(arguments.scene, status, query.where());
+  ImpactTable table = table_of(query);
+  table.motion = motion;
+  table.seconds = seconds;
+  return table;
+}
+
+// XXH64 of the file's datasets of pairs and impacts, each hash the seed of the next one.
+std::uint64_t hash_of(const ImpactTable& table) {
+  std::uint64_t hash = 0;
+  const auto add = [&](const auto& column) {
+    hash = xxh64(column.data(), column.size() * sizeof column[0], hash);
+  };
+  add(table.pairs);
+  add(table.t_safe);
+  add(table.status);
+  add(table.gap);
+  add(table.point_a);
+  add(table.point_b);
+  add(table.face_a);
+  add(table.face_b);
+  return hash;
+}
+
+std::vector<double> vectors(const std::vector<RigidMotion>& motion, double (RigidMotion::*member)[3]) {
+  std::vector<double> all;
+  for (const RigidMotion& of_each : motion) {
+    all.insert(all.end(), of_each.*member, of_each.*member + 3);
+  }
+  return all;
+}
+
+void write(const ImpactArguments& arguments, const ImpactTable& table) {
+  const std::size_t m = table.t_safe.size(), n = table.motion.size();
+  Hdf5Output file(arguments.out);
+  file.add("/pairs", {m, 2}, table.pairs);
+  file.add("/impact/t_safe", {m}, table.t_safe);
+  file.add("/impact/status", {m}, table.status);
+  file.add("/impact/gap", {m}, table.gap);
+  file.add("/impact/point_a", {m, 3}, table.point_a);
+  file.add("/impact/point_b", {m, 3}, table.point_b);
+  file.add("/impact/face_a", {m}, table.face_a);
+  file.add("/impact/face_b", {m}, table.face_b);
+  file.add("/motion/velocity", {n, 3}, vectors(table.motion, &RigidMotion::velocity));
+  file.add("/motion/angular_velocity", {n, 3}, vectors(table.motion, &RigidMotion::angular_velocity));
+  file.add("/motion/centre", {n, 3}, vectors(table.motion, &RigidMotion::center));
+  file.attribute("tandem_version", std::string(TANDEM_VERSION));
+  file.attribute("dt", arguments.duration);
+  file.attribute("tolerance", arguments.options.tolerance);
+  file.attribute("threads", std::uint64_t{arguments.options.threads});
+  file.attribute("repeats", std::uint64_t{table.seconds.size()});
+  file.attribute("best_seconds", best_of(table.seconds));
+  file.attribute("median_seconds", median_of(table.seconds));
+  const ImpactCounters& counters = table.counters;
+  file.attribute("object_pairs", counters.object_pairs);
+  file.attribute("at_start", counters.at_start);
+  file.attribute("found", counters.found);
+  file.attribute("walks", counters.walks);
+  file.attribute("block_pairs", counters.block_pairs);
+  file.attribute("triangle_pairs", counters.triangle_pairs);
+  file.attribute("advanced", counters.advanced);
+  file.attribute("steps", counters.steps);
+  file.attribute("most_steps", counters.most_steps);
+  file.attribute("unconverged", counters.unconverged);
+  file.attribute("hash", hexadecimal(hash_of(table)));
+  file.write();
+}
+
+Json to_json(const ImpactArguments& arguments, const Scene& scene, const ImpactTable& table) {
+  const ImpactCounters& counters = table.counters;
+  return {{"tool", "bvhbench impact"},
+          {"version", TANDEM_VERSION},
+          {"scene", arguments.scene},
+          {"output", arguments.out.empty() ? Json() : Json(arguments.out)},
+          {"dt", arguments.duration},
+          {"tolerance", arguments.options.tolerance},
+          {"given_pairs", scene.description.pairs.has_value()},
+          {"threads", arguments.options.threads},
+          {"instances", scene.description.instances.size()},
+          {"object_pairs", counters.object_pairs},
+          {"at_start", counters.at_start},
+          {"found", counters.found},
+          {"walks", counters.walks},
+          {"block_pairs", counters.block_pairs},
+          {"triangle_pairs", counters.triangle_pairs},
+          {"advanced", counters.advanced},
+          {"steps", counters.steps},
+          {"most_steps", counters.most_steps},
+          {"unconverged", counters.unconverged},
+          {"hash", hexadecimal(hash_of(table))},
+          {"seconds",
+           {{"best", best_of(table.seconds)}, {"median", median_of(table.seconds)}, {"all", table.seconds}}}};
+}
+
+void print_row(const char* label, std::uint64_t value) {
+  std::printf("  %-14s %15s\n", label, with_commas(value).c_str());
+}
+
+void print_summary(const ImpactArguments& arguments, const Scene& scene, const ImpactTable& table) {
+  const ImpactCounters& counters = table.counters;
+  const std::uint32_t threads = arguments.options.threads;
+  std::printf("%s: impacts within %g s on cpu, %s %s\n", arguments.scene.c_str(), arguments.duration,
+              with_commas(threads).c_str(), threads == 1 ? "thread" : "threads");
+  print_row("instances", scene.description.instances.size());
+  print_row("object pairs", counters.object_pairs);
+  print_row("  touch already", counters.at_start);
+  print_row("  meet", counters.found);
+  print_row("block pairs", counters.block_pairs);
+  print_row("triangle pairs", counters.triangle_pairs);
+  print_row("  advanced", counters.advanced);
+  print_row("  steps", counters.steps);
+  std::printf("  %-14s %15.3f  best of %zu, median %.3f\n", "milliseconds", 1e3 * best_of(table.seconds),
+              table.seconds.size(), 1e3 * median_of(table.seconds));
+  std::printf("  %-14s %s\n", "hash", hexadecimal(hash_of(table)).c_str());
+}
+
+ExitCode run(const ImpactArguments& arguments) {
+  const Scene scene = read_scene(arguments.scene);
+  if (!arguments.out.empty()) keep_inputs(arguments.out, files_of(arguments.scene, scene));
+  if (!arguments.out.empty()) try_output(arguments.out);
+  const ImpactTable table = run_query(arguments, scene);
+  if (!arguments.out.empty()) write(arguments, table);
+  if (arguments.json) {
+    std::puts(pretty(to_json(arguments, scene, table)).c_str());
+  } else {
+    print_summary(arguments, scene, table);
+  }
+  return kDone;
+}
+
+}  // namespace
+
+CLI::App* add_impact(CLI::App& app, Run& run_later) {
+  const auto arguments = std::make_shared<ImpactArguments>();
+  ImpactOptions& options = arguments->options;
+  options.threads = std::max(1u, std::thread::hardware_concurrency());
+  CLI::App* command = app.add_subcommand("impact", "find when the moving instances of a scene meet");
+  command->add_option("SCENE", arguments->scene, "scene file (HDF5) with /simulation/velocity")
+      ->required()
+      ->check(file_name());
+  command->add_option("--dt", arguments->duration, "the step in which they move, in seconds")
+      ->required()
+      ->check(between(0, 1e9))
+      ->option_text("T");
+  command
+      ->add_option("--tolerance", options.tolerance,
+                   "how near triangles stop, as a part of the smaller body's diagonal")
+      ->check(between(0, 1))
+      ->option_text("R [1e-6]");
+  command->add_option("--threads", options.threads, "threads; the impacts do not depend on them")
+      ->check(CLI::Range(1u, kMostQueryThreads))
+      ->option_text("N [all]");
+  command->add_option("--repeat", arguments->repeats, "times to run the query, for its timing")
+      ->check(CLI::Range(1, 1000000))
+      ->option_text("N [1]");
+  command->add_option("--out", arguments->out, "the file to write; appears whole or not at all")
+      ->check(file_name());
+  command->add_flag("--json", arguments->json, "print the summary as JSON");
+  command->final_callback([arguments, &run_later] { run_later = [arguments] { return run(*arguments); }; });
+  return command;
+}
+
+}  // namespace tandem::bench

@@ -1,0 +1,40 @@
+#pragma once
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tandem/kernels/distance_query.h"
+
+namespace tandem {
+
+/// Finds how near bodies are, on one thread. Functions throw std::bad_alloc, or std::runtime_error where a
+/// call fails.
+class DistanceEngine {
+ public:
+  DistanceEngine() = default;
+  DistanceEngine(const DistanceEngine&) = delete;
+  DistanceEngine& operator=(const DistanceEngine&) = delete;
+  virtual ~DistanceEngine() = default;
+
+  /// For tables.
+  virtual std::string label() const = 0;
+
+  /// The data structure, the precision and whatever else the figures depend on, in a line.
+  virtual std::string settings() const = 0;
+
+  /// Names the shapes that bodies refer to, and makes what lasts as long as they, which must outlive the
+  /// engine's use.
+  virtual void set_shapes(std::span<const AssetView> shapes) = 0;
+
+  /// Takes the places of the bodies, which must stay until the next call.
+  virtual void update(std::span<const Instance> bodies) = 0;
+
+  /// The distance of each pair; 0 or less where bodies meet.
+  virtual void find(std::span<const ObjectPair> pairs, std::vector<double>& distances) = 0;
+};
+
+/// Tandem's, and those of the libraries that were found when this program was built.
+std::vector<std::unique_ptr<DistanceEngine>> distance_engines();
+
+}  // namespace tandem

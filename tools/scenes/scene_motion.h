@@ -1,0 +1,16 @@
+#pragma once
+#include <string>
+#include <vector>
+
+namespace tandem::bench {
+
+/// What /simulation of a scene file says of its instances (docs/scenes.md): numbers of each, three for a
+/// vector; empty where the file is silent.
+struct SceneMotion {
+  std::vector<double> density, velocity, angular_velocity, centre;
+};
+
+/// Reads it from a file that read_scene() accepts. Throws FileError.
+SceneMotion read_motion(const std::string& path, std::size_t instances);
+
+}  // namespace tandem::bench

@@ -1,0 +1,188 @@
+#include "continuous_motion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace tandem::simulation {
+namespace {
+
+using Eigen::AngleAxisd;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+// A pair goes on beyond its impact, or deeper than it is, by at most this part of the thinner body's inner
+// radius.
+constexpr double kBeyond = 0.25;
+
+// How often the depth of a pair that touches is measured on its way, at most: each time that its points may
+// have moved by kBeyond inner radii. It goes no farther.
+constexpr double kMostSamples = 256;
+
+// Each round stops bodies earlier, until none that has stopped is in another one's way.
+constexpr int kMostRounds = 8;
+
+// Half the least side of the bounds; of a shape that is not closed, which has no inside to be passed through
+// within, infinite.
+double inner_radius_of(const AssetView& shape) {
+  if (!shape.level().closed) return INFINITY;
+  double least = INFINITY;
+  for (int k = 0; k < 3; ++k) {
+    const double side =
+        static_cast<double>(shape.header->upper[k]) - static_cast<double>(shape.header->lower[k]);
+    least = std::min(least, 0.5 * side);
+  }
+  return least;
+}
+
+// The shortest rotation from one orientation to another, as an axis times an angle.
+Vector3d turn_between(const Quaterniond& from, const Quaterniond& to) {
+  const AngleAxisd turn(to * from.conjugate());
+  return turn.angle() * turn.axis();
+}
+
+Quaterniond turned(const Quaterniond& orientation, const Vector3d& turn) {
+  const double angle = turn.norm();
+  if (angle == 0) return orientation;
+  return (Quaterniond(AngleAxisd(angle, turn / angle)) * orientation).normalized();
+}
+
+void require(Status status) {
+  if (status != Status::kOk) throw std::runtime_error(std::string("continuous motion: ") + explain(status));
+}
+
+}  // namespace
+
+ContinuousMotion::ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads)
+    : threads_(threads) {
+  require(query_.set_assets(shapes));
+  require(contacts_.set_assets(shapes));
+  require(manifolds_.set_assets(shapes));
+  for (const AssetView& shape : shapes) inner_radius_.push_back(inner_radius_of(shape));
+}
+
+bool ContinuousMotion::find_fast(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
+                                 std::span<const BodyState> after) {
+  constexpr double kFast = 0.5;
+  double thinnest = INFINITY;
+  for (const BodyProperties& body : bodies) thinnest = std::min(thinnest, inner_radius(body));
+  fast_.assign(bodies.size(), Motion::fixed);
+  turn_.resize(bodies.size());
+  way_.resize(bodies.size());
+  bool any = false;
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    way_[i] = after[i].position - before[i].position;
+    turn_[i] = turn_between(before[i].orientation, after[i].orientation);
+    if (bodies[i].motion == Motion::fixed) continue;
+    if (way_[i].norm() + bodies[i].radius * turn_[i].norm() <= kFast * thinnest) continue;
+    fast_[i] = Motion::moving;
+    any = true;
+  }
+  part_.assign(bodies.size(), 1);
+  return any;
+}
+
+// Which part of their ways two bodies go until they are a slop deep in each other, or a little beyond where
+// they barely touch. reach: how much farther they may go, a length.
+double ContinuousMotion::stop_of(const Impact& impact, const ObjectPair& pair, double reach,
+                                 double slop) const {
+  const Vector3d at_a(impact.point_a), at_b(impact.point_b);
+  const auto velocity = [&](std::uint32_t body, const Vector3d& at) {
+    const RigidMotion& motion = motion_[body];
+    const Vector3d v(motion.velocity), w(motion.angular_velocity), c(motion.center);
+    return Vector3d(v + w.cross(at - (c + impact.t_safe * v)));
+  };
+  const Vector3d approach = velocity(pair.a, at_a) - velocity(pair.b, at_b), apart = at_b - at_a;
+  const double closing = apart.norm() > 0 ? approach.dot(apart.normalized()) : approach.norm();
+  double beyond = reach / approach.norm();
+  if (closing > 0) beyond = std::min(beyond, (impact.gap + slop) / closing);
+  return std::min(1.0, impact.t_safe + beyond);
+}
+
+// How deep two bodies are in each other when they have gone this part of what they go; infinite where one
+// goes through the other.
+double ContinuousMotion::depth_at(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
+                                  const ObjectPair& pair, double part) {
+  const ObjectPair pairs[] = {{0, 1}};
+  Instance instances[2];
+  for (int i = 0; i < 2; ++i) {
+    const std::uint32_t body = i == 0 ? pair.a : pair.b;
+    BodyState state = before[body];
+    state.position += part * part_[body] * way_[body];
+    state.orientation = turned(state.orientation, part * part_[body] * turn_[body]);
+    instances[i] = pose_of(bodies[body], state);
+  }
+  require(contacts_.find_contacts(instances, pairs, {}));
+  require(manifolds_.make(instances, pairs, contacts_.contacts(), {.match_previous = false}));
+  double depth = 0;
+  for (const Manifold& manifold : manifolds_.manifolds())
+    depth = std::max(depth, (manifold.flags & kGoesThrough) != 0 ? INFINITY : manifold.depth);
+  return depth;
+}
+
+// Which part of their ways two bodies go that touch already.
+double ContinuousMotion::stop_of_touching(std::span<const BodyProperties> bodies,
+                                          std::span<const BodyState> before, const ObjectPair& pair,
+                                          double reach, double slop) {
+  const auto turned_by = [&](std::uint32_t body) {
+    return bodies[body].motion == Motion::fixed ? 0 : part_[body] * bodies[body].radius * turn_[body].norm();
+  };
+  const Vector3d way = part_[pair.a] * way_[pair.a] - part_[pair.b] * way_[pair.b];
+  const double samples = std::ceil((way.norm() + turned_by(pair.a) + turned_by(pair.b)) / reach);
+  const double most = std::max(depth_at(bodies, before, pair, 0), slop) + reach;
+  for (double i = 1; i <= std::min(samples, kMostSamples); ++i) {
+    if (depth_at(bodies, before, pair, i / samples) > most) return (i - 1) / samples;
+  }
+  return std::min(1.0, kMostSamples / samples);
+}
+
+// Result: whether a body stops earlier than it did.
+bool ContinuousMotion::stop(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
+                            double slop) {
+  instances_.resize(bodies.size());
+  motion_.resize(bodies.size());
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    instances_[i] = pose_of(bodies[i], before[i]);
+    const Vector3d way = part_[i] * way_[i], turn = part_[i] * turn_[i];
+    for (int k = 0; k < 3; ++k) {
+      motion_[i].velocity[k] = way[k];
+      motion_[i].angular_velocity[k] = turn[k];
+      motion_[i].center[k] = before[i].position[k];
+    }
+  }
+  const PairFilter filter = {.motion = fast_.data()};
+  require(query_.find(instances_, motion_, 1, {.tolerance = 1e-8, .threads = threads_, .filter = &filter}));
+  stop_.assign(bodies.size(), 1);
+  bool earlier = false;
+  for (std::size_t i = 0; i < query_.pairs().size(); ++i) {
+    const Impact& impact = query_.impacts()[i];
+    if (impact.status == ImpactStatus::none) continue;
+    const ObjectPair& pair = query_.pairs()[i];
+    const double thinner = std::min(inner_radius(bodies[pair.a]), inner_radius(bodies[pair.b]));
+    const double reach = std::isfinite(thinner) ? kBeyond * thinner : slop;
+    const double part = impact.status == ImpactStatus::found
+                            ? stop_of(impact, pair, reach, slop)
+                            : stop_of_touching(bodies, before, pair, reach, slop);
+    if (part > 1 - 1e-9) continue;
+    for (const std::uint32_t body : {pair.a, pair.b}) {
+      if (bodies[body].motion == Motion::moving) stop_[body] = std::min(stop_[body], part);
+    }
+    earlier = true;
+  }
+  for (std::size_t i = 0; i < bodies.size(); ++i) part_[i] *= stop_[i];
+  return earlier;
+}
+
+void ContinuousMotion::limit(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
+                             std::span<BodyState> after, double slop) {
+  if (!find_fast(bodies, before, after)) return;
+  for (int round = 0; round < kMostRounds && stop(bodies, before, slop); ++round) {
+  }
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    if (part_[i] == 1) continue;
+    after[i].position = before[i].position + part_[i] * way_[i];
+    after[i].orientation = turned(before[i].orientation, part_[i] * turn_[i]);
+  }
+}
+
+}  // namespace tandem::simulation

@@ -296,6 +296,14 @@ TEST(TriangleDistance, OfTrianglesThatCrossIsZeroAtACommonPoint) {
   EXPECT_NEAR(found.point_a[2], 0, 1e-15);
 }
 
+TEST(TriangleDistance, OfANeedleThroughASegmentIsZeroWhereTheyMeet) {
+  const TrianglePair pair = {{{3, 3, 2}, {3, 4, 1}, {3, 4, 1}},
+                             {{5, 1, 0}, {1, 0x1.3ffffffffffffp+2, 4}, {0, 6, 5}}};
+  const TriangleDistance found = triangle_distance(pair);
+  EXPECT_EQ(found.interval.upper, 0);
+  EXPECT_NEAR(separation(found), 0, 1e-12);
+}
+
 TEST(TriangleDistance, WideNumbersDecideATieEitherWay) {
   const TrianglePair pair = {{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}}, {{1, 1, 3}, {2, 1, 4}, {1, 2, 4}}};
   EXPECT_TRUE(exact::are_within(pair, 3));

@@ -60,13 +60,14 @@ double extent_of(const TrianglePair& pair) {
   return extent;
 }
 
-/// Whether no axis has coordinates that are nearly lost beside those of another.
+/// Whether no axis has coordinates that are small beside those of another: normals as computed tell little
+/// of it then, and points are worse, which no interval is.
 bool is_even(const TrianglePair& pair) {
   const double extent = extent_of(pair);
   for (int k = 0; k < 3; ++k) {
     for (int i = 0; i < 3; ++i) {
       const double x = std::fabs(pair.a[i][k] - pair.b[i][k]);
-      if (x != 0 && x < 0x1p-60 * extent) return false;
+      if (x != 0 && x < 0x1p-20 * extent) return false;
     }
   }
   return true;

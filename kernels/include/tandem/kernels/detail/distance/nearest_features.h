@@ -121,7 +121,8 @@ TANDEM_HD inline void take_edges(const Edge<Value>& e, const Edge<Value>& f, con
   nearest.take(!less(square, Value{}), square, apart, apart, number, s, t);
 }
 
-/// A face's three corners and a corner each of three others; `sign` is 1 where the face is a's.
+/// A face's three corners and a corner each of three others; `sign` is 1 where the face is a's. The square is
+/// that of the two points, and not of the height, which means nothing where the face is a needle.
 template <typename Value>
 TANDEM_HD inline void take_face(const Point<Value> (&face)[3], const Point<Value> (&corner)[3], float sign,
                                 int number, const Value& least, Nearest<Value>& nearest) {
@@ -138,8 +139,8 @@ TANDEM_HD inline void take_face(const Point<Value> (&face)[3], const Point<Value
     const auto above = has_normal & !(less(s, zero) | less(t, zero) | less(one, s + t));
     const Point<Value> to_face = minus(plus(scaled(s, u), scaled(t, v)), r);
     const Point<Value> apart = scaled(value_of<Value>(sign), to_face);
-    nearest.take(above, height * part, apart, scaled(value_of<Value>(-sign) * part, normal), number + i, s,
-                 t);
+    nearest.take(above, dot(apart, apart), apart, scaled(value_of<Value>(-sign) * part, normal), number + i,
+                 s, t);
   }
 }
 

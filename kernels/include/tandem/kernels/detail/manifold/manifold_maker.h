@@ -15,6 +15,10 @@ inline constexpr double kNear = 0.005;
 /// An inner point is kept where it lies deeper than the rim by this factor.
 inline constexpr double kDeeper = 1.25;
 
+/// A rim point near the deepest inner point has its depth where that is larger by a factor between these:
+/// less is rounding and the lean of the surface beside the point, more is another place.
+inline constexpr double kLittleDeeper = 1.01, kSomewhatDeeper = 1.1;
+
 /// In patches of so few pieces the corners of their triangles are looked at for the deepest point.
 inline constexpr std::uint32_t kFewPieces = 64;
 
@@ -334,8 +338,10 @@ TANDEM_HD void ManifoldMaker<Team>::look_behind(DepthMemory& shared) {
   team_.sync();
 }
 
-/// The first points of the rim as it is sounded, and the deepest inner point where it lies deeper. Deeper
-/// points come first, then those further out; of points near each other the first stays.
+/// The first points of the rim as it is sounded, and the deepest inner point where it lies deeper. Where it
+/// lies little deeper, the rim's point nearest to it has its depth: else depths would jump where a pose
+/// hardly changes, but its rim gets other points. Deeper points come first, then those further out; of points
+/// near each other the first stays.
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, int most_of_rim, bool touch,
                                            ChoiceMemory& shared) {
@@ -359,7 +365,6 @@ TANDEM_HD void ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, int mo
   team_.sync();
   if (rank == 0) {
     int order[kMostSoundings], count = 0, inner = -1;
-    double of_rim = 0, of_inner = 0;
     const auto before = [&](int i, int j) {  // in what is chosen
       const Chosen &x = shared.candidate[i], &y = shared.candidate[j];
       return x.depth > y.depth || (x.depth == y.depth && x.from_middle > y.from_middle);
@@ -369,15 +374,32 @@ TANDEM_HD void ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, int mo
       for (; j > 0 && before(i, order[j - 1]); --j) order[j] = order[j - 1];
       order[j] = i;
     };
+    const auto of_rim = [&](int i) {
+      return !shared.candidate[i].inner && state_.sounding[i].rank < most_of_rim;
+    };
+    double deepest_of_rim = 0, of_inner = 0;
     for (int i = 0; i < state_.soundings; ++i) {
       const Chosen& c = shared.candidate[i];
       if (c.inner && c.depth > of_inner) of_inner = c.depth, inner = i;
-      if (c.inner || state_.sounding[i].rank >= most_of_rim) continue;
-      of_rim = greater(of_rim, c.depth);
-      insert(i);
+      if (of_rim(i)) deepest_of_rim = greater(deepest_of_rim, c.depth);
     }
-    if (of_inner > kDeeper * of_rim) insert(inner);
     const double near = kNear * bodies_.smaller_diagonal();
+    const bool much_deeper = of_inner > kDeeper * deepest_of_rim;
+    if (inner >= 0 && !much_deeper) {
+      int nearest = -1;
+      double least = near * near;
+      for (int i = 0; i < state_.soundings; ++i) {
+        const Vector2 apart = shared.candidate[i].at - shared.candidate[inner].at;
+        if (of_rim(i) && dot(apart, apart) < least) least = dot(apart, apart), nearest = i;
+      }
+      if (nearest >= 0) {
+        double& depth = shared.candidate[nearest].depth;
+        if (of_inner > kLittleDeeper * depth && of_inner <= kSomewhatDeeper * depth) depth = of_inner;
+      }
+    }
+    for (int i = 0; i < state_.soundings; ++i) {
+      if (of_rim(i) || (i == inner && much_deeper)) insert(i);
+    }
     int kept = 0;
     for (int i = 0; i < count; ++i) {
       const Chosen& c = shared.candidate[order[i]];

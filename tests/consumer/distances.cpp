@@ -16,7 +16,8 @@ int main(int, char** argv) {
   std::vector<tandem::Instance> bodies(3, {.asset = 0, .pose = tandem::kIdentityPose});
   for (std::size_t i = 0; i < bodies.size(); ++i)
     bodies[i].pose.translation[0] = 1.5 * static_cast<double>(i);
-  if (const tandem::Status status = query.find_distances(bodies, {.reach = 2}); status != tandem::Status::kOk) {
+  if (const tandem::Status status = query.find_distances(bodies, {.reach = 2});
+      status != tandem::Status::kOk) {
     return std::printf("body %d: %s\n", static_cast<int>(query.where()), tandem::explain(status)), 1;
   }
   for (std::size_t i = 0; i < query.pairs().size(); ++i) {

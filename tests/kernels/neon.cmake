@@ -18,8 +18,9 @@ function(hash_of result)
 endfunction()
 
 file(MAKE_DIRECTORY ${FOLDER})
-set(sources tests/kernels/variant_check.cpp formats/src/box.cpp kernels/src/block_pair.cpp kernels/src/lanes4.cpp
-  kernels/src/narrow_phase.cpp)
+set(sources tests/kernels/variant_check.cpp formats/src/box.cpp kernels/src/available_memory.cpp
+  kernels/src/available_memory_of_machine.cpp kernels/src/block_pair.cpp kernels/src/lanes4.cpp
+  kernels/src/manifold_means.cpp kernels/src/narrow_phase.cpp kernels/src/nearest_phase.cpp kernels/src/single_pieces.cpp)
 list(TRANSFORM sources PREPEND ${SOURCE}/)
 execute_process(COMMAND ${COMPILER} -std=c++20 -O1 -ffp-contract=off -static -I${SOURCE}/kernels/include -I${SOURCE}/formats/include
   -I${SOURCE}/kernels/src -I${SOURCE}/tests -I${SOURCE}/tests/kernels ${sources} -o ${FOLDER}/variant_check

@@ -275,7 +275,7 @@ class ExtremeWalk {
   TANDEM_INLINE unsigned nodes_that_reach(const Block& block) const {
     const BoxCoordinates box(block, origin_);
     const Lanes4(&x)[3] = box.center, (&h)[3] = box.half_extent;
-    typename Vector<4>::Bits passes = ~typename Vector<4>::Bits{};
+    typename Vector<4>::Bits passes = h[0].v >= 0.0f;  // no imaginary box, should the bounds be infinite
     for (int k = 0; k < 3; ++k) {
       const float(&e)[3] = axis_[k].x;
       const Lanes4 at = e[0] * x[0] + e[1] * x[1] + e[2] * x[2];

@@ -16,6 +16,8 @@ struct SharedNumbers {
   __device__ static void store(std::uint32_t& at, std::uint32_t value) {
     *static_cast<volatile std::uint32_t*>(&at) = value;
   }
+  __device__ static std::uint32_t concurrent_load(std::uint32_t& at) { return atomicOr(&at, 0u); }
+  __device__ static void concurrent_store(std::uint32_t& at, std::uint32_t value) { atomicExch(&at, value); }
   __device__ static std::uint32_t add(std::uint32_t& at, std::uint32_t value) {
     return atomicAdd(&at, value);
   }
@@ -112,7 +114,8 @@ __device__ __noinline__ void walk_surface(const LaneGroup<kWidth>& group, Questi
       }
       leaf = leaf && inner, inner = inner && !leaf;
     }
-    const std::uint32_t inners = group.ballot(inner), leaves = group.ballot(leaf);  // all have taken theirs
+    const std::uint32_t inners = group.ballot(inner), leaves = group.ballot(leaf);
+    group.sync();  // all have taken theirs
     waiting -= taken;
     if (inner) group.waiting[waiting + __popc(inners & before)] = below;
     if (leaf) group.triangles[__popc(leaves & before)] = below;
@@ -124,6 +127,7 @@ __device__ __noinline__ void walk_surface(const LaneGroup<kWidth>& group, Questi
     if (group.any_of_warp(static_cast<bool>(found))) {
       found =
           group.best(found, [&](const auto& x, const auto& y) { return questions.better(question, x, y); });
+      group.sync();  // all are done with the question as it was
       if (found && group.rank() == 0) questions.merge(question, found);
     }
     group.sync();

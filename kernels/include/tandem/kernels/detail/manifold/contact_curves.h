@@ -182,7 +182,7 @@ class CurveFinder {
     const auto key = key_of(reference);
     auto slot = static_cast<std::uint32_t>((key.hash() >> 32) * size >> 32);
     for (;;) {
-      std::uint32_t there = team_.load(table_[slot]);
+      std::uint32_t there = team_.concurrent_load(table_[slot]);
       if (there == kNoIndex) there = team_.compare_and_swap(table_[slot], kNoIndex, reference);
       if (there == kNoIndex) return reference;
       if (key_of(there) == key) return there;
@@ -192,12 +192,12 @@ class CurveFinder {
 
   TANDEM_HD std::uint32_t first_of(std::uint32_t piece) {
     for (;;) {
-      const std::uint32_t next = team_.load(memory_.curve[piece]);
+      const std::uint32_t next = team_.concurrent_load(memory_.curve[piece]);
       if (next == piece) return piece;
       // Halves the way for those who come later: a piece that is not the first of its set only ever names
       // others of the set, nearer to the first.
-      const std::uint32_t after = team_.load(memory_.curve[next]);
-      if (after != next) team_.store(memory_.curve[piece], after);
+      const std::uint32_t after = team_.concurrent_load(memory_.curve[next]);
+      if (after != next) team_.concurrent_store(memory_.curve[piece], after);
       piece = next;
     }
   }

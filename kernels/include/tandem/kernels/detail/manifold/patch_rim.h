@@ -175,6 +175,7 @@ TANDEM_HD void RimFinder<Team>::find(int most, const Vector2& middle, RimMemory&
     Furthest best[] = {{than, kNoIndex}};
     furthest(value, best);
     const bool found = best[0].reference != kNoIndex;
+    team_.sync();  // all have read what is shared
     if (is_first && found) insert(rim.points, best[0].reference), limit = kThin * best[0].value;
     team_.sync();
     return found;
@@ -189,6 +190,7 @@ TANDEM_HD void RimFinder<Team>::find(int most, const Vector2& middle, RimMemory&
     const RimValue values[] = {beyond(first), beyond(second)};
     Furthest found[2] = {{0, kNoIndex}, {0, kNoIndex}};
     furthest(values, found);
+    team_.sync();  // all have read what is shared
     if (is_first) {
       shared.of_side[first] = found[0], shared.of_side[second] = found[1];
       int side = 0;

@@ -341,7 +341,7 @@ struct PrismTest {
   }
   TANDEM_HD bool passes(const FloatVector& c, const FloatVector& h) const {
     const FloatVector d = {{c.x[0] - origin.x[0], c.x[1] - origin.x[1], c.x[2] - origin.x[2]}};
-    bool all = true;
+    bool all = h.x[0] >= 0;  // no imaginary box, should the bounds be infinite
 #ifdef __CUDA_ARCH__
 #pragma unroll
 #endif

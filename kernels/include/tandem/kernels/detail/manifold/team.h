@@ -55,6 +55,9 @@ struct OneThread {
   /// On memory that all see.
   TANDEM_HD static std::uint32_t load(const std::uint32_t& at) { return at; }
   TANDEM_HD static void store(std::uint32_t& at, std::uint32_t value) { at = value; }
+  /// The same while others may write there.
+  TANDEM_HD static std::uint32_t concurrent_load(std::uint32_t& at) { return at; }
+  TANDEM_HD static void concurrent_store(std::uint32_t& at, std::uint32_t value) { at = value; }
   TANDEM_HD static std::uint32_t add(std::uint32_t& at, std::uint32_t value) {
     const std::uint32_t before = at;
     at += value;

@@ -116,25 +116,19 @@ bool widen(PairTask& task, float length) {
   return task.frame_error <= static_cast<float>(kLargestInFrame / 4);
 }
 
-PairTask clearance_task(const PosedTree& a, const PosedTree& b, double within, PairTask task) {
+// Makes a task of contacts one of clearance.
+void ask_for_clearance(PairTask& task) {
   DistanceFrame frame;
-  task.within = within;
-  task.on_grid = false;
-  task.in_frame = distance_frame(a.pose, a.extent, b.pose, b.extent, frame);
-  if (!task.in_frame) return task;
-  task.b_in_a = frame.b_in_a;
-  task.frame_error = frame.error;
-  task.clearance = distance::frame_clearance(frame, within);
+  frame.b_in_a = task.b_in_a;
+  frame.error = task.frame_error;
+  task.in_frame = bound_lengths(task.a->pose, frame);
+  if (!task.in_frame) return;
+  task.clearance = distance::frame_clearance(frame, task.within);
   task.in_frame = widen(task, task.clearance.apart_from);
-  return task;
 }
 
-bool are_within(const PairTask& task, const TrianglePair& pair, QueryCounters& counters) {
-  const Verdict verdict = decide_float64(pair);
-  if (verdict == Verdict::contact) {
-    ++counters.decided_by_float64;
-    return true;
-  }
+// verdict: of decide_float64(), that they are apart or undecided.
+bool are_within(const PairTask& task, const TrianglePair& pair, Verdict verdict, QueryCounters& counters) {
   const distance::LocalPair local = distance::local_pair(pair);
   if (local.in_range()) {
     // What is asked for decides, however wide the interval is.
@@ -157,24 +151,29 @@ PairTask pair_task(const PosedTree& a, const PosedTree& b, double within) {
   task.a = &a;
   task.b = &b;
   task.self = &a == &b;
-  if (within > 0) return clearance_task(a, b, within, task);
+  task.within = within;
   task.in_frame = relative_pose(a.pose, a.extent, b.pose, b.extent, task.b_in_a) == RelativePoseStatus::kOk;
   if (!task.in_frame) return task;
   task.frame_error = frame_error(task.b_in_a, a.extent, b.extent);
-  task.on_grid = lie_on_grid(a.pose, a.extent, a.grid, b.pose, b.extent, b.grid, task.b_in_a);
+  if (within > 0)
+    ask_for_clearance(task);
+  else
+    task.on_grid = lie_on_grid(a.pose, a.extent, a.grid, b.pose, b.extent, b.grid, task.b_in_a);
   return task;
 }
 
 bool meet(const PairTask& task, std::uint32_t triangle_a, std::uint32_t triangle_b, QueryCounters& counters) {
   const Triangle &a = task.a->tree.triangles[triangle_a], &b = task.b->tree.triangles[triangle_b];
-  if (task.within > 0) return are_within(task, posed_pair(task.a->pose, a, task.b->pose, b), counters);
-  if (task.mode == QueryMode::fast && task.in_frame) {
+  if (task.mode == QueryMode::fast && task.in_frame && !(task.within > 0)) {
     ++counters.decided_by_float32;
     return decide_fast(framed_pair(task.b_in_a, a, b)) == Verdict::contact;
   }
-  const Decision decision = decide(posed_pair(task.a->pose, a, task.b->pose, b));
-  ++(decision.exactly ? counters.decided_exactly : counters.decided_by_float64);
-  return decision.verdict == Verdict::contact;
+  const TrianglePair pair = posed_pair(task.a->pose, a, task.b->pose, b);
+  const Verdict verdict = decide_float64(pair);
+  if (task.within > 0 && verdict != Verdict::contact) return are_within(task, pair, verdict, counters);
+  const bool exactly = verdict == Verdict::undecided;
+  ++(exactly ? counters.decided_exactly : counters.decided_by_float64);
+  return (exactly ? decide_exact(pair) : verdict) == Verdict::contact;
 }
 
 bool narrow_phase_scalar(const PairTask& task, ContactSink& sink) {

@@ -261,7 +261,8 @@ class LaneMeans {
     return decide_batch_within<kCount>(task_, candidates);
   }
 
-  BatchVerdicts decide(Candidates& candidates) const {
+  // All stages inlined, though sift_batch() calls one of them too.
+  [[gnu::flatten]] BatchVerdicts decide(Candidates& candidates) const {
     fill_up(candidates);
     if (task_.on_grid) return decide_on_grid<kCount>(task_, candidates);
     return task_.mode == QueryMode::fast ? decide_batch<kCount, FirstStage::as_computed>(task_, candidates)

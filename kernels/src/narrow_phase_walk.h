@@ -95,8 +95,8 @@ class PairWalk {
 
  private:
   /// Of the first `count` candidates, adds those that are surely within, and keeps those that may be. False:
-  /// the pair is done with.
-  bool sift(std::uint32_t count) {
+  /// the pair is done with. Not inlined, as settle_near(), not to crowd the walk that is for contacts.
+  [[gnu::noinline]] bool sift(std::uint32_t count) {
     const std::uint32_t given = (2u << (count - 1)) - 1;
     const BatchSifted sifted = means_.sift(candidates_);
     const std::uint32_t told = (sifted.beyond | sifted.within) & given;
@@ -116,7 +116,7 @@ class PairWalk {
   }
 
   /// Decides the first `count` that may be within. False: the pair is done with.
-  bool settle_near(std::uint32_t count) {
+  [[gnu::noinline]] bool settle_near(std::uint32_t count) {
     const std::uint32_t given = (2u << (count - 1)) - 1;
     BatchVerdicts verdicts = means_.decide_within(near_);
     verdicts.contact &= given;
@@ -141,7 +141,8 @@ class PairWalk {
 
   /// Decides the first `count` candidates. False: the pair is done with.
   bool settle(std::uint32_t count) {
-    if (task_.within > 0 && task_.mode != QueryMode::boxes) return sift(count);
+    if (task_.within > 0 && task_.mode != QueryMode::boxes) [[unlikely]]
+      return sift(count);
     QueryCounters& counters = sink_.counters;
     const std::uint32_t given = (2u << (count - 1)) - 1;
     BatchVerdicts verdicts = {given, 0};

@@ -67,21 +67,27 @@ TANDEM_HD inline double lack_of_orthonormality(const Real (&m)[3][3]) {
 
 }  // namespace distance
 
-/// False: float32 cannot take the pair, and the frame is of no use. pose_a, pose_b: of stored coordinates.
+/// Of a frame with b_in_a and error, what lengths in it tell. False: float32 cannot take the pair, and the
+/// frame is of no use.
+TANDEM_HD inline bool bound_lengths(const Pose& pose_a, DistanceFrame& frame) {
+  double inverse[3][3];
+  relative_pose_detail::invert(pose_a.rotation, inverse);
+  const double of_a = distance::lack_of_orthonormality(inverse),
+               of_m = distance::lack_of_orthonormality(frame.b_in_a.rotation);
+  if (!(frame.error <= static_cast<float>(kLargestInFrame) && of_a < 0.125 && of_m < 0.125)) return false;
+  frame.square_to_world = (1 - 0x1p-20) / ((1 + of_a) * (1 + of_m));
+  // Eigenvalues of N N^T are from 1 - of_a to 1 + of_a; four roundings are spared.
+  frame.least_in_world = (1 - 0x1p-50) / std::sqrt(1 + of_a);
+  frame.most_in_world = (1 + 0x1p-50) / std::sqrt(1 - of_a);
+  return true;
+}
+
+/// False: as of bound_lengths(). pose_a, pose_b: of stored coordinates.
 TANDEM_HD inline bool distance_frame(const Pose& pose_a, const TreeExtent& tree_a, const Pose& pose_b,
                                      const TreeExtent& tree_b, DistanceFrame& out) {
   if (relative_pose(pose_a, tree_a, pose_b, tree_b, out.b_in_a) != RelativePoseStatus::kOk) return false;
   out.error = frame_error(out.b_in_a, tree_a, tree_b);
-  double inverse[3][3];
-  relative_pose_detail::invert(pose_a.rotation, inverse);
-  const double of_a = distance::lack_of_orthonormality(inverse),
-               of_m = distance::lack_of_orthonormality(out.b_in_a.rotation);
-  if (!(out.error <= static_cast<float>(kLargestInFrame) && of_a < 0.125 && of_m < 0.125)) return false;
-  out.square_to_world = (1 - 0x1p-20) / ((1 + of_a) * (1 + of_m));
-  // Eigenvalues of N N^T are from 1 - of_a to 1 + of_a; four roundings are spared.
-  out.least_in_world = (1 - 0x1p-50) / std::sqrt(1 + of_a);
-  out.most_in_world = (1 + 0x1p-50) / std::sqrt(1 - of_a);
-  return true;
+  return bound_lengths(pose_a, out);
 }
 
 namespace distance {

@@ -158,12 +158,13 @@ class LineWalk {
     const Lanes4 along = d[0] * x + d[1] * y + d[2] * z;
     const Lanes4 reach = s[0] * h[0] + s[1] * h[1] + s[2] * h[2] + slack_;
     const Lanes4 low = along - reach, high = along + reach;
+    const typename Vector<4>::Bits is_real = h[0].v >= 0.0f;
     typename Vector<4>::Bits all = {};
     for (; lines != 0; lines &= lines - 1) {
       const int i = std::countr_zero(lines);
       const Line& line = line_[i];
-      typename Vector<4>::Bits passes = (low.v <= line.to) & (high.v >= line.from);
-      for (int k = 0; k < 3; ++k) passes &= magnitude(across[k] + line.across[k]).v <= extent[k].v;
+      typename Vector<4>::Bits passes = is_real & ~(low.v > line.to) & ~(high.v < line.from);
+      for (int k = 0; k < 3; ++k) passes &= ~(magnitude(across[k] + line.across[k]).v > extent[k].v);
       all |= passes & (1 << i);
     }
     __builtin_memcpy(below, &all, sizeof below);
@@ -275,12 +276,12 @@ class ExtremeWalk {
   TANDEM_INLINE unsigned nodes_that_reach(const Block& block) const {
     const BoxCoordinates box(block, origin_);
     const Lanes4(&x)[3] = box.center, (&h)[3] = box.half_extent;
-    typename Vector<4>::Bits passes = h[0].v >= 0.0f;  // no imaginary box, should the bounds be infinite
+    typename Vector<4>::Bits passes = h[0].v >= 0.0f;
     for (int k = 0; k < 3; ++k) {
       const float(&e)[3] = axis_[k].x;
       const Lanes4 at = e[0] * x[0] + e[1] * x[1] + e[2] * x[2];
       const Lanes4 extent = std::fabs(e[0]) * h[0] + std::fabs(e[1]) * h[1] + std::fabs(e[2]) * h[2];
-      passes &= ((at + extent).v >= least_[k]) & ((at - extent).v <= most_[k]);
+      passes &= ~((at + extent).v < least_[k]) & ~((at - extent).v > most_[k]);
     }
     return LaneMask<4>{passes}.mask();
   }

@@ -277,6 +277,7 @@ TANDEM_HD PieceBounds CurveFinder<Team>::bounds_of_pieces(std::uint32_t pieces) 
 
 template <typename Team>
 TANDEM_HD void CurveFinder<Team>::summarize(const PieceBounds& own, std::uint32_t pieces) {
+  team_.sync();
   summary_ = {};
   summary_.pieces = pieces;
   summary_.segments = team_.sum(own.segments);

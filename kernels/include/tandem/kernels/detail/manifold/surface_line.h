@@ -7,7 +7,8 @@
 
 /// Questions to the trees of posed bodies: where a line meets its surface, and which of its vertices reaches
 /// furthest. Boxes are tested in float32 with slack; triangles and vertices decide in float64. So the answers
-/// do not depend on which blocks are walked, nor in which order.
+/// do not depend on which blocks are walked, nor in which order. Imaginary boxes are told by their extent,
+/// and where a product is too large for float32, so that comparisons fail, a box passes.
 namespace tandem::manifold {
 
 /// Float32 rounds coordinates, products and sums to 2^-24 of |box| + |point|; a dozen of them amount to less
@@ -170,11 +171,12 @@ struct LineTest {
     const float x = c.x[0] - point.x[0], y = c.x[1] - point.x[1], z = c.x[2] - point.x[2];
     const float p = direction.x[0], q = direction.x[1], r = direction.x[2];
     const float ap = std::fabs(p), aq = std::fabs(q), ar = std::fabs(r);
-    if (!(std::fabs(y * r - z * q) <= h.x[1] * ar + h.x[2] * aq + slack)) return false;
-    if (!(std::fabs(z * p - x * r) <= h.x[2] * ap + h.x[0] * ar + slack)) return false;
-    if (!(std::fabs(x * q - y * p) <= h.x[0] * aq + h.x[1] * ap + slack)) return false;
+    if (!(h.x[0] >= 0)) return false;
+    if (std::fabs(y * r - z * q) > h.x[1] * ar + h.x[2] * aq + slack) return false;
+    if (std::fabs(z * p - x * r) > h.x[2] * ap + h.x[0] * ar + slack) return false;
+    if (std::fabs(x * q - y * p) > h.x[0] * aq + h.x[1] * ap + slack) return false;
     const float along = x * p + y * q + z * r, extent = h.x[0] * ap + h.x[1] * aq + h.x[2] * ar + slack;
-    return std::fabs(along) - extent <= reach && along + extent >= lower && along - extent <= upper;
+    return !(std::fabs(along) - extent > reach || along + extent < lower || along - extent > upper);
   }
 };
 
@@ -341,7 +343,7 @@ struct PrismTest {
   }
   TANDEM_HD bool passes(const FloatVector& c, const FloatVector& h) const {
     const FloatVector d = {{c.x[0] - origin.x[0], c.x[1] - origin.x[1], c.x[2] - origin.x[2]}};
-    bool all = h.x[0] >= 0;  // no imaginary box, should the bounds be infinite
+    bool all = h.x[0] >= 0;
 #ifdef __CUDA_ARCH__
 #pragma unroll
 #endif
@@ -349,7 +351,7 @@ struct PrismTest {
       const FloatVector& e = axis[k];
       const float at = dot(e, d), extent = std::fabs(e.x[0]) * h.x[0] + std::fabs(e.x[1]) * h.x[1] +
                                            std::fabs(e.x[2]) * h.x[2];
-      all = all && at + extent >= least[k] && at - extent <= most[k];
+      all = all && !(at + extent < least[k]) && !(at - extent > most[k]);
     }
     return all;
   }

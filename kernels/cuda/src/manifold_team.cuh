@@ -232,7 +232,10 @@ struct BlockTeam : SharedNumbers {
 
   __device__ static std::uint32_t rank() { return threadIdx.x; }
   __device__ static constexpr std::uint32_t size() { return kThreads; }
-  __device__ static void sync() { __syncthreads(); }
+  __device__ static void sync() {
+    __syncwarp();  // a warp comes to a barrier as one
+    __syncthreads();
+  }
   template <typename T>
   __device__ T sum(T value) const {
     return over_block(value, Sum());
@@ -245,7 +248,10 @@ struct BlockTeam : SharedNumbers {
   __device__ T greatest(T value) const {
     return over_block(value, Greatest());
   }
-  __device__ static bool any(bool value) { return __syncthreads_or(value) != 0; }
+  __device__ static bool any(bool value) {
+    __syncwarp();
+    return __syncthreads_or(value) != 0;
+  }
 
   template <typename T, int kCount>
   __device__ __forceinline__ void sums(T (&values)[kCount]) const {
@@ -285,12 +291,12 @@ struct BlockTeam : SharedNumbers {
     const auto part = [&](int i, std::uint32_t warp) -> T& {
       return *reinterpret_cast<T*>(&scratch->part[i][warp]);
     };
-    __syncthreads();  // what an earlier call left has been read
+    sync();  // what an earlier call left has been read
     if (threadIdx.x % 32 == 0) {
 #pragma unroll
       for (int i = 0; i < kCount; ++i) part(i, threadIdx.x / 32) = values[i];
     }
-    __syncthreads();
+    sync();
 #pragma unroll
     for (int i = 0; i < kCount; ++i) {
       values[i] = part(i, 0);

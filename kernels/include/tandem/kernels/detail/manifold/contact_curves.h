@@ -260,7 +260,9 @@ TANDEM_HD PieceBounds CurveFinder<Team>::make_pieces(const Contact* contacts, st
 template <typename Team>
 TANDEM_HD PieceBounds CurveFinder<Team>::bounds_of_pieces(std::uint32_t pieces) const {
   PieceBounds found;
-  for (std::uint32_t i = team_.rank(); i < pieces; i += team_.size()) {
+  for (std::uint32_t first = 0; first < pieces; first += team_.size()) {  // as often for all of the team
+    const std::uint32_t i = first + team_.rank();
+    if (i >= pieces) continue;
     const Piece& piece = memory_.pieces[i];
     Meeting meeting;
     if (piece.kind() == MeetingKind::polygon) {
@@ -277,7 +279,6 @@ TANDEM_HD PieceBounds CurveFinder<Team>::bounds_of_pieces(std::uint32_t pieces) 
 
 template <typename Team>
 TANDEM_HD void CurveFinder<Team>::summarize(const PieceBounds& own, std::uint32_t pieces) {
-  team_.sync();
   summary_ = {};
   summary_.pieces = pieces;
   summary_.segments = team_.sum(own.segments);

@@ -7,7 +7,7 @@
 #include <vector>
 
 // Cubes of side 1 and mass 1 fall on a floor of fixed ones, tumble and come to rest.
-constexpr int kFloor = 49, kBodies = kFloor + 36;
+constexpr int kFloor = 81, kBodies = kFloor + 36;
 constexpr double kStep = 1.0 / 60, kFriction = 0.6, kSlop = 0.002, kSlow = 0.05;
 
 struct Vec {
@@ -75,8 +75,8 @@ int main(int, char** argv) {
   for (int i = 0; i < kBodies; ++i) {
     const int k = i - kFloor;
     double(&x)[3] = poses[i].pose.translation;
-    x[0] = k < 0 ? i % 7 - 3 : 1.1 * (k % 3) - 1.1 + 0.02 * (k % 7);
-    x[1] = k < 0 ? i / 7 - 3 : 1.1 * (k / 3 % 3) - 1.1 + 0.03 * (k % 5);
+    x[0] = k < 0 ? i % 9 - 4 : 1.1 * (k % 3) - 1.1 + 0.02 * (k % 7);
+    x[1] = k < 0 ? i / 9 - 4 : 1.1 * (k / 3 % 3) - 1.1 + 0.03 * (k % 5);
     x[2] = k < 0 ? -0.5 : 0.6 + 1.2 * (k / 9);
     if (k >= 0) motion[i] = Motion::moving, bodies[i] = {1, {}, {k % 5 - 2.0, k % 3 - 1.0, 0}};
   }

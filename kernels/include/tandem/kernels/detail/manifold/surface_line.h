@@ -371,7 +371,7 @@ struct Extreme {
 /// number.
 class ExtremeQuestions {
  public:
-  /// test, extreme: two each, that all of the crew see.
+  /// test, extreme: two each, that all of the team see.
   TANDEM_HD ExtremeQuestions(const BodyPair& bodies, const Prism& prism, PrismTest* test, Extreme* extreme)
       : bodies_(bodies), prism_(prism), test_(test), extreme_(extreme) {}
 

@@ -1,7 +1,6 @@
 #pragma once
 #include <cfenv>
-
-#include "common/stopwatch.h"
+#include <ctime>
 
 namespace tandem::bench {
 
@@ -17,13 +16,21 @@ class SavedFloatingPoint {
   std::fenv_t saved_;
 };
 
-/// Of a call of a library.
+/// That the calling thread has computed.
+inline double thread_seconds() {
+  timespec time;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+/// Of a call of a library: seconds that this thread computed, so that other work on the machine counts
+/// little.
 template <class Work>
 double seconds_of(const Work& work) {
   const SavedFloatingPoint saved;
-  Stopwatch watch;
+  const double start = thread_seconds();
   work();
-  return watch.lap();
+  return thread_seconds() - start;
 }
 
 }  // namespace tandem::bench

@@ -34,6 +34,9 @@ class ImpactEngine {
 
   /// When the bodies of each pair meet, in seconds; infinite where they do not in this step.
   virtual void find(std::span<const ObjectPair> pairs, std::vector<double>& times) = 0;
+
+  /// Whether it is so slow that it is asked once and not raced.
+  virtual bool runs_once() const { return false; }
 };
 
 /// Tandem's, and those of the libraries that were found when this program was built.

@@ -22,7 +22,7 @@ struct KnownImpact {
   double safe, contact;
 };
 
-// A part of a turn beyond which the shortest rotation to the end of a step is another one.
+// In radians: from half a turn on the shortest rotation to the end of the step is another one.
 constexpr double kMostTurn = 3.14;
 
 void check_turns(const std::string& path, const std::vector<RigidMotion>& motions, double duration) {
@@ -43,11 +43,11 @@ class ContactSearch {
     if (const Status status = query_.set_assets(views); status != Status::kOk) refuse(path, status, 0);
   }
 
-  /// The first time after `safe` at which one is found: soon after it, then at even times.
+  /// The first of 151 times after `safe` at which one is found: soon after it, then at even times.
   double first_after(const ObjectPair& pair, double safe) {
-    constexpr int kHalvings = 30, kEven = 128;
+    constexpr int kSoonest = 30, kEven = 128;  // the rest of the step over 2^30, and its 128ths
     const double rest = duration_ - safe;
-    for (int k = kHalvings; k > 7; --k) {
+    for (int k = kSoonest; k > 7; --k) {
       const double time = safe + std::ldexp(rest, -k);
       if (in_contact(pair, time)) return time;
     }

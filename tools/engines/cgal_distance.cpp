@@ -1,3 +1,6 @@
+// CGAL 5.5 relies on another header for it, which has it no more in Boost 1.90.
+#include <boost/next_prior.hpp>
+
 #include <CGAL/AABB_traits.h>
 #include <CGAL/AABB_tree.h>
 #include <CGAL/AABB_triangle_primitive.h>

@@ -191,6 +191,26 @@ TEST(SolidOnSolid, FlushSidesHaveNoDepthButTheFaces) {
   }
 }
 
+/// Flush boxes that turn about a corner, by 1e-7: their planes cross in the corner, so nearly that rounding
+/// leaves one piece of the curve, a point. (Found in a stack of flush boxes.)
+TEST(SolidOnSolid, APointIsATouch) {
+  ManifoldScene scene;
+  const std::uint32_t shape = scene.add_shape(project_mesh("box_12.obj"));
+  scene.add_body(shape, {{{0x1.fffffffffffd5p-1, 0x1.62f6277a9d713p-24, 0x1.c734b8ec3576cp-25},
+                          {-0x1.62f626367547bp-24, 0x1.fffffffffffc1p-1, -0x1.6c99ba962fe84p-24},
+                          {-0x1.c734bcdf4bc32p-25, 0x1.6c99b95a999a2p-24, 0x1.fffffffffffd3p-1}},
+                         {0x1.ffffff76e7a8cp+0, 0x1.7ffffedcced55p+1, 0x1.7fffffe1f0c8ap+1}});
+  scene.add_body(shape, {{{0x1.fffffffffffe2p-1, 0x1.5fb68351131c9p-24, 0x1.885c9007d4e11p-31},
+                          {-0x1.5fb6834e56547p-24, 0x1.fffffffffffd5p-1, -0x1.c93ae7dfe05c2p-25},
+                          {-0x1.885d2d134474bp-31, 0x1.c93ae7d7741fep-25, 0x1.ffffffffffff3p-1}},
+                         {0x1.7ffffff46625cp+1, 0x1.7ffffef602109p+1, 0x1.7fffffaf7e654p+1}});
+  scene.find();
+  ASSERT_EQ(scene.manifolds().size(), 1u);
+  EXPECT_EQ(scene.manifolds()[0].flags, kTouching);
+  EXPECT_EQ(scene.manifolds()[0].depth, 0);
+  EXPECT_LT(angle_between(vector_of(scene.manifolds()[0].normal), {1, 0, 0}), 1e-6);
+}
+
 TEST(SolidOnSolid, FacesThatMeetHaveTheAreaThatTheyShare) {
   RandomPoses random(2);
   const std::vector<NamedMesh> prisms = {{"box", box(1, 0.75f, 0.5f)},

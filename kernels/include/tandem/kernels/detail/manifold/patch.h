@@ -50,6 +50,7 @@ struct CurveMeasure {
   Vector3 area;    ///< half the sum of r x dr, and polygons: from a towards b
   Vector3 middle;  ///< of the pieces
   double length = 0;
+  bool point = false;  ///< all pieces are points, as nearly as it can be told: the ends of one may differ
   bool closed = true;
   Vector3 sheet_normal;  ///< of the pieces' triangles, from a towards b, times lengths, where it is not
                          ///< closed; of open surfaces where there are any

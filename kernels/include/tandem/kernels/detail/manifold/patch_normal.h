@@ -109,7 +109,10 @@ TANDEM_HD CurveMeasure NormalFinder<Team>::measure() {
   out.key = team_.least(least_.key);
   out.area = sums.area.value(unit * unit);
   out.length = sums.length.value(unit);
-  out.closed = !(may_be_free && has_free_end()) && norm(sums.gap.value(unit)) <= kClosed * out.length;
+  const double of_points = bodies_.tolerance() * (end_ - begin_);
+  out.point = out.length <= of_points && norm(out.area) <= of_points * bodies_.reach();
+  out.closed =
+      out.point || (!(may_be_free && has_free_end()) && norm(sums.gap.value(unit)) <= kClosed * out.length);
   out.middle =
       summary_.origin + (out.length > 0 ? (unit / out.length) * sums.middle.value(unit) : plain_middle());
   if (!out.closed) out.sheet_normal = sheet_normal();
@@ -469,8 +472,8 @@ TANDEM_HD_SELDOM bool NormalFinder<Team>::find_for_touch(Vector3& n) {
 template <typename Team>
 TANDEM_HD PatchNormal NormalFinder<Team>::find(const CurveMeasure& curve) {
   PatchNormal out;
-  out.touch = !(curve.closed ? norm(curve.area) > kNoArea * bodies_.reach() * curve.length
-                             : norm(curve.sheet_normal) > kNoArea * curve.length);
+  out.touch = curve.point || !(curve.closed ? norm(curve.area) > kNoArea * bodies_.reach() * curve.length
+                                            : norm(curve.sheet_normal) > kNoArea * curve.length);
   if (out.touch) {
     out.known = find_for_touch(out.n);
   } else {

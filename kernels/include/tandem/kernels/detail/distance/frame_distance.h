@@ -184,18 +184,19 @@ TANDEM_HD inline auto sift(const Point<Value> (&corner_a)[3], const Point<Value>
                is_beyond_along(cross(minus(b[1], b[0]), minus(b[2], b[0])), a, b, largest, length);
   // Corners are off by 2 u M a coordinate, and their difference by 2 u M more.
   const Value distance = (1 + 12 * kU) * square_root(square) + ((8 * kU) * largest + (off + 0x1p-60f));
-  out.within = less(distance, value_of<Value>(clearance.within_to)) |
-               frame::decide<true>(corner_a, corner_b, clearance.error).contact;
+  out.within = less(distance, value_of<Value>(clearance.within_to));
   return out;
 }
 
-/// What frame_interval() knows of clearance: `contact` where the posed triangles are surely within it.
+/// What frame_interval() knows of clearance, and of triangles that meet, whose features may be apart, the
+/// contact test: `contact` where the posed triangles are surely within it.
 template <typename Value>
 TANDEM_HD inline auto decide_within(const Point<Value> (&a)[3], const Point<Value> (&b)[3],
                                     const FrameClearance& clearance) {
   const FrameInterval<Value> interval = frame_interval(a, b, clearance.error);
   frame::Verdicts<decltype(less(interval.lower, interval.upper))> verdicts;
-  verdicts.contact = less(interval.upper, value_of<Value>(clearance.within_to));
+  verdicts.contact = less(interval.upper, value_of<Value>(clearance.within_to)) |
+                     frame::decide<true>(a, b, clearance.error).contact;
   verdicts.undecided = !(verdicts.contact | less(value_of<Value>(clearance.apart_from), interval.lower));
   return verdicts;
 }

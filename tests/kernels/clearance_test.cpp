@@ -16,6 +16,7 @@
 namespace tandem {
 namespace {
 
+using test::any_distance;
 using test::FaceContacts;
 using test::PosedTriangle;
 
@@ -40,18 +41,6 @@ FaceContacts all_within(const Scene& scene, double d, bool selves) {
     }
   }
   return out;
-}
-
-/// Any size beside the scene's; whole numbers, so that grids have ties, among them.
-double any_distance(RandomPoses& random, const Scene& scene) {
-  double size = 0;
-  for (const AssetView& asset : scene.assets.views()) {
-    for (int k = 0; k < 3; ++k)
-      size = std::max(size, double{asset.header->upper[k]} - asset.header->lower[k]);
-  }
-  const double small[] = {1,          0.5, 0.25, 2, size * 0.01, size * 0.1, size * random.uniform(0, 0.5),
-                          size * 1e-7};
-  return small[random.below(std::size(small))];
 }
 
 class ClearanceScenes : public testing::TestWithParam<test::SceneFamily> {

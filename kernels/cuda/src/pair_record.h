@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "tandem/kernels/detail/distance/clearance.h"
 #include "tandem/kernels/detail/frame_test.h"
 #include "tandem/kernels/detail/instance_check.h"
 #include "tandem/kernels/detail/oriented_test.h"
@@ -103,14 +104,27 @@ __device__ inline Status check_instance(const GpuInstances& instances, const Gpu
   return pose_instance(assets, asset_count, instances.asset[instance], instances.pose[instance], stored, box);
 }
 
-/// The record of a pair of instances whose assets there are, for walks of such blocks.
+/// The record of a pair of instances whose assets there are, for walks of such blocks. within: with slack for
+/// what is so far apart, of which `clearance` tells.
 __device__ inline PairRecord make_record(const GpuInstances& instances, const GpuAsset* assets,
-                                         const ObjectPair& pair, BlockKind kind) {
+                                         const ObjectPair& pair, BlockKind kind, double within,
+                                         distance::FrameClearance& clearance) {
   const GpuAsset &a = assets[instances.asset[pair.a]], &b = assets[instances.asset[pair.b]];
+  const Pose pose_a = stored_pose(instances, assets, pair.a);
   RelativePose pose;
-  const bool in_frame =
-      relative_pose(stored_pose(instances, assets, pair.a), a.extent, stored_pose(instances, assets, pair.b),
-                    b.extent, pose) == RelativePoseStatus::kOk;
+  bool in_frame = relative_pose(pose_a, a.extent, stored_pose(instances, assets, pair.b), b.extent, pose) ==
+                  RelativePoseStatus::kOk;
+  float error = 0, slack = 0;
+  clearance = {};
+  if (in_frame) error = frame_error(pose, a.extent, b.extent);
+  if (within > 0 && in_frame) {
+    const RelativePose of_contacts = pose;
+    in_frame = distance::ask_for_clearance(pose_a, within, pose, error, clearance);
+    if (in_frame && kind == BlockKind::oriented)
+      slack = oriented_slack(of_contacts, a.extent, b.extent, clearance.apart_from);
+  } else if (in_frame && kind == BlockKind::oriented) {
+    slack = oriented_slack(pose, a.extent, b.extent);
+  }
   PairRecord record = {};
   for (int i = 0; i < 3; ++i) {
     const auto &r = pose.rotation[i], &m = pose.abs_rotation[i];
@@ -118,9 +132,9 @@ __device__ inline PairRecord make_record(const GpuInstances& instances, const Gp
     record.abs_rotation[i] = {m[0], m[1], m[2], pose.slack_a[i]};
     record.slack_b[i] = pose.slack_b[i];
   }
-  if (in_frame) record.frame_error = frame_error(pose, a.extent, b.extent);
+  record.frame_error = error;
   if (kind == BlockKind::oriented) {
-    if (in_frame) record.oriented_slack = oriented_slack(pose, a.extent, b.extent);
+    record.oriented_slack = slack;
     record.oriented_a = a.tree.oriented_blocks;
     record.oriented_b = b.tree.oriented_blocks;
   } else {
@@ -133,6 +147,13 @@ __device__ inline PairRecord make_record(const GpuInstances& instances, const Gp
   record.instance_b = pair.b;
   record.in_frame = in_frame;
   return record;
+}
+
+/// The same of contacts.
+__device__ inline PairRecord make_record(const GpuInstances& instances, const GpuAsset* assets,
+                                         const ObjectPair& pair, BlockKind kind) {
+  distance::FrameClearance none;
+  return make_record(instances, assets, pair, kind, 0, none);
 }
 
 #endif

@@ -34,7 +34,7 @@ class ScalarMeans {
     BatchSifted out = {0, 0};
     for (std::uint32_t i = 0; i < kBatch && i < candidates.count; ++i) {
       const auto [a, b] = corners(candidates, i);
-      const auto sifted = distance::sift(a.corner, b.corner, task_.clearance);
+      const auto sifted = distance::sift(a.corner, b.corner, task_.clearance, task_.first_contact_only);
       out.beyond |= static_cast<std::uint32_t>(sifted.beyond.set) << i;
       out.within |= static_cast<std::uint32_t>(sifted.within.set) << i;
     }

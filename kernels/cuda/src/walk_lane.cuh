@@ -263,7 +263,8 @@ struct NearInFrame : InFrame<kMode> {
     const PairRecord& record = args.pairs[pair];
     const TriangleInFrame in_a = stored_triangle(load_triangle(record.triangles_a, a)),
                           of_b = posed_triangle(pose_of(record), load_triangle(record.triangles_b, b));
-    const auto sifted = distance::sift(in_a.corner, of_b.corner, args.clearances[pair]);
+    const auto sifted =
+        distance::sift(in_a.corner, of_b.corner, args.clearances[pair], args.first_contact_only);
     return {record.triangles_a[a].corner[0].w, record.triangles_b[b].corner[0].w, sifted.within,
             !(sifted.within | sifted.beyond)};
   }
@@ -281,9 +282,9 @@ __device__ __noinline__ inline bool decide_exactly(const TrianglePair& pair) {
   return decide_exact(pair) == Verdict::contact;
 }
 
-/// Coordinates whose last bits are at most 136 binary digits apart: room that is no larger than that of
+/// Coordinates whose last bits are at most 104 binary digits apart: room that is no larger than that of
 /// decide_exactly().
-inline constexpr int kFewWords = 6;
+inline constexpr int kFewWords = 5;
 
 __device__ __noinline__ inline bool are_within_in_few_words(const TrianglePair& pair, double within,
                                                             const detail::ExponentRange& range) {

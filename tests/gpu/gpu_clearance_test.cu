@@ -190,11 +190,14 @@ TEST_F(GpuClearance, FirstOnesAreOfThePairsThatHaveAny) {
 // For tools that are too slow for more.
 TEST_F(GpuClearance, OfASmallSceneInEveryMode) {
   RandomPoses random(15);
-  Scene scene = pile(8, 100, 0.7, 15);
-  scene.instances.push_back({1, kIdentityPose});
-  scene.instances.push_back({1, kIdentityPose});
-  scene.instances.back().pose.translation[0] = 1.25;
-  scene.instances.back().pose.translation[1] = 1e-60;
+  Scene scene;
+  test::Mesh triangle;
+  triangle.add({0, 0, 0}, {1, 0, 0}, {0, 1, 0});
+  scene.assets.add(triangle);
+  scene.assets.add(test::soup(random, 60, 0.1));
+  scene.instances = {at(0, 0, 0), at(1e-60, 0, 0.25)};  // a tie that takes wide numbers
+  for (int i = 0; i < 4; ++i) scene.instances.push_back({1, random.pose({1, 1, 0.3, 0, 4})});
+  EXPECT_GT(of_gpu(scene, {{0, 1}}, within(0.25)).counters.decided_exactly, 0u);
   const auto pairs = all_pairs(scene.instances, true, random);
   for (const QueryMode mode : kModes) expect_as_cpu(scene, pairs, 0.25, mode);
 }

@@ -91,6 +91,16 @@ __device__ inline RelativePose pose_of(const PairRecord& record) {
   return pose;
 }
 
+/// What pose_of() gives back.
+__device__ inline void set_pose(const RelativePose& pose, PairRecord& record) {
+  for (int i = 0; i < 3; ++i) {
+    const auto &r = pose.rotation[i], &m = pose.abs_rotation[i];
+    record.rotation[i] = {r[0], r[1], r[2], pose.translation[i]};
+    record.abs_rotation[i] = {m[0], m[1], m[2], pose.slack_a[i]};
+    record.slack_b[i] = pose.slack_b[i];
+  }
+}
+
 /// The pose of stored coordinates.
 __device__ inline Pose stored_pose(const GpuInstances& instances, const GpuAsset* assets,
                                    std::uint32_t instance) {
@@ -104,16 +114,13 @@ __device__ inline Status check_instance(const GpuInstances& instances, const Gpu
   return pose_instance(assets, asset_count, instances.asset[instance], instances.pose[instance], stored, box);
 }
 
-/// The record of a pair of instances whose assets there are, for walks of such blocks. within: with slack for
-/// what is so far apart, of which `clearance` tells.
-__device__ inline PairRecord make_record(const GpuInstances& instances, const GpuAsset* assets,
-                                         const ObjectPair& pair, BlockKind kind, double within,
+/// The record of a pair whose two instances have these poses, of stored coordinates, for walks of such
+/// blocks. within: with slack for what is so far apart, of which `clearance` tells.
+__device__ inline PairRecord make_record(const ObjectPair& pair, const GpuAsset& a, const Pose& pose_a,
+                                         const GpuAsset& b, const Pose& pose_b, BlockKind kind, double within,
                                          distance::FrameClearance& clearance) {
-  const GpuAsset &a = assets[instances.asset[pair.a]], &b = assets[instances.asset[pair.b]];
-  const Pose pose_a = stored_pose(instances, assets, pair.a);
   RelativePose pose;
-  bool in_frame = relative_pose(pose_a, a.extent, stored_pose(instances, assets, pair.b), b.extent, pose) ==
-                  RelativePoseStatus::kOk;
+  bool in_frame = relative_pose(pose_a, a.extent, pose_b, b.extent, pose) == RelativePoseStatus::kOk;
   float error = 0, slack = 0;
   clearance = {};
   if (in_frame) error = frame_error(pose, a.extent, b.extent);
@@ -126,12 +133,7 @@ __device__ inline PairRecord make_record(const GpuInstances& instances, const Gp
     slack = oriented_slack(pose, a.extent, b.extent);
   }
   PairRecord record = {};
-  for (int i = 0; i < 3; ++i) {
-    const auto &r = pose.rotation[i], &m = pose.abs_rotation[i];
-    record.rotation[i] = {r[0], r[1], r[2], pose.translation[i]};
-    record.abs_rotation[i] = {m[0], m[1], m[2], pose.slack_a[i]};
-    record.slack_b[i] = pose.slack_b[i];
-  }
+  set_pose(pose, record);
   record.frame_error = error;
   if (kind == BlockKind::oriented) {
     record.oriented_slack = slack;
@@ -150,6 +152,20 @@ __device__ inline PairRecord make_record(const GpuInstances& instances, const Gp
 }
 
 /// The same of contacts.
+__device__ inline PairRecord make_record(const ObjectPair& pair, const GpuAsset& a, const Pose& pose_a,
+                                         const GpuAsset& b, const Pose& pose_b, BlockKind kind) {
+  distance::FrameClearance none;
+  return make_record(pair, a, pose_a, b, pose_b, kind, 0, none);
+}
+
+/// The same of instances whose assets there are, where they stand.
+__device__ inline PairRecord make_record(const GpuInstances& instances, const GpuAsset* assets,
+                                         const ObjectPair& pair, BlockKind kind, double within,
+                                         distance::FrameClearance& clearance) {
+  return make_record(pair, assets[instances.asset[pair.a]], stored_pose(instances, assets, pair.a),
+                     assets[instances.asset[pair.b]], stored_pose(instances, assets, pair.b), kind, within,
+                     clearance);
+}
 __device__ inline PairRecord make_record(const GpuInstances& instances, const GpuAsset* assets,
                                          const ObjectPair& pair, BlockKind kind) {
   distance::FrameClearance none;

@@ -194,7 +194,7 @@ template <int kCount>
   for (std::uint32_t first = 0; first < kBatch && first < candidates.count; first += kCount) {
     frame::Point<Lanes<kCount>> a[3], b[3];
     gather_candidates<kCount>(task, candidates, first, a, b);
-    const auto sifted = distance::sift(a, b, task.clearance);
+    const auto sifted = distance::sift(a, b, task.clearance, task.first_contact_only);
     out.beyond |= sifted.beyond.mask() << first;
     out.within |= sifted.within.mask() << first;
   }
@@ -261,7 +261,7 @@ class LaneMeans {
     return decide_batch_within<kCount>(task_, candidates);
   }
 
-  // All stages inlined, though sift_batch() calls one of them too.
+  // All stages inlined, though clearance calls one of them too.
   [[gnu::flatten]] BatchVerdicts decide(Candidates& candidates) const {
     fill_up(candidates);
     if (task_.on_grid) return decide_on_grid<kCount>(task_, candidates);

@@ -457,6 +457,16 @@ Pose any_rotation(RandomPoses& random) {
   }
 }
 
+double any_distance(RandomPoses& random, const Scene& scene) {
+  double size = 0;
+  for (const AssetView& asset : scene.assets.views()) {
+    for (int k = 0; k < 3; ++k)
+      size = std::max(size, double{asset.header->upper[k]} - asset.header->lower[k]);
+  }
+  return pick(random,
+              {1.0, 0.5, 0.25, 2.0, size * 0.01, size * 0.1, size * random.uniform(0, 0.5), size * 1e-7});
+}
+
 double radius_of(const AssetView& asset) {
   double square = 0;
   for (int k = 0; k < 3; ++k) {

@@ -73,6 +73,9 @@ double radius_of(const AssetView& asset);
 /// With this rotation, and the centre of the asset at a place.
 Pose centred_at(const AssetView& asset, Pose pose, const double (&place)[3]);
 
+/// A distance to ask about: any size beside the scene's; whole numbers, so that grids have ties, among them.
+double any_distance(RandomPoses& random, const Scene& scene);
+
 // Contacts.
 
 /// A contact by instances and faces; instance a < b, or face a < b within one instance.

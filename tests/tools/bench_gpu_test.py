@@ -48,6 +48,7 @@ class BenchGpu(BenchTest):
         self.write_scene()
         for words in ([*self.ON_GPU, "--self"], [*self.ON_GPU, "--threads", "2"], ["--engine", "paper"], ["--sorted"], ["--grouped"],
                       ["--traversal"], *([*self.ON_GPU, "--engine", "paper", word] for word in ("--first-contact", "--grouped", "--sorted", "--traversal")),
+                      [*self.ON_GPU, "--engine", "paper", "--within", "2"],
                       [*self.ON_GPU, "--sorted", "--grouped"]):
             with self.subTest(words=words):
                 self.assert_fails(drop_hint(self.bench("query", self.scene, *words)), USAGE, words[-2] if words[-1] == "2" else "--")
@@ -68,6 +69,11 @@ class BenchGpu(BenchTest):
             self.assertEqual(len(report["contacts_seconds"]["all"]), 3)
             for name, column in table_of(self.contacts).items():
                 self.assertEqual(column.tolist(), contacts[name].tolist())
+            clearance = self.query("--mode", mode, "--within", "0.1")
+            self.assertGreater(clearance["contacts"], expected["contacts"])
+            report = self.query("--mode", mode, "--within", "0.1", "--repeat", "3", *self.ON_GPU)
+            self.assertEqual((report["hash"], report["within"]), (clearance["hash"], 0.1))
+            self.assertLessEqual(report["gpu_bytes"], report["gpu_bytes_bound"])
         exact = self.query()["hash"]
         self.assertEqual(self.query("--engine", "paper", *self.ON_GPU)["hash"], exact)
         self.assertEqual(self.query("--grouped", "--repeat", "2", *self.ON_GPU)["hash"], exact)
@@ -84,12 +90,13 @@ class BenchGpu(BenchTest):
             file["instances/group"] = random.integers(0, 8, 464)
             file["instances/mask"] = random.integers(0, 8, 464)
             file["excluded"] = random.integers(400, 464, (200, 2))
-        expected = self.query()
-        self.assertGreater(expected["object_pairs"], 0)
-        for words in ([], ["--sorted"]):
-            report = self.query("--repeat", "3", *words, *self.ON_GPU)
-            self.assertEqual((report["hash"], report["object_pairs"]), (expected["hash"], expected["object_pairs"]))
-            self.assertLessEqual(report["gpu_bytes"], report["gpu_bytes_bound"])
+        for clearance in ("0", "0.1"):
+            expected = self.query("--within", clearance)
+            self.assertGreater(expected["object_pairs"], 0)
+            for words in ([], ["--sorted"]):
+                report = self.query("--repeat", "3", "--within", clearance, *words, *self.ON_GPU)
+                self.assertEqual((report["hash"], report["object_pairs"]), (expected["hash"], expected["object_pairs"]))
+                self.assertLessEqual(report["gpu_bytes"], report["gpu_bytes_bound"])
 
     def test_gpu_memory_that_runs_out_is_told(self):
         self.need_gpu()

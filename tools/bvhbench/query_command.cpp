@@ -271,14 +271,14 @@ void check_arguments(const QueryArguments& arguments, const Scene& scene) {
     return;
   }
   if (!tandem && (arguments.options.first_contact_only || arguments.order() != OrderOnGpu::any ||
-                  arguments.traversal || arguments.manifolds)) {
+                  arguments.traversal || arguments.manifolds || arguments.options.within > 0)) {
     throw UsageError(
-        "--first-contact, --grouped, --manifolds, --sorted and --traversal are for the engine tandem");
+        "--first-contact, --grouped, --manifolds, --sorted, --traversal and --within are for the engine "
+        "tandem");
   }
   if (arguments.options.self_pairs) {
     throw UsageError("--self is for the backend cpu; /pairs of a scene may name an instance twice");
   }
-  if (arguments.options.within > 0) throw UsageError("--within is for the backend cpu");
   if (arguments.threads_given) throw UsageError("--threads is for the backend cpu");
 }
 

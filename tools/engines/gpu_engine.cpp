@@ -92,7 +92,8 @@ void sort_pairs(TimedAnswer& answer) {
 }  // namespace
 
 // The context is made first, so that nothing that is timed is charged with it.
-GpuEngine::GpuEngine(std::string_view name, Contents contents) : name_(name), contents_(contents) {
+GpuEngine::GpuEngine(std::string_view name, Contents contents, double within)
+    : name_(name), contents_(contents), within_(within) {
   std::size_t total = 0;
   check(cudaFree(nullptr), "start");
   check(cudaMemGetInfo(&free_at_start_, &total), "memory");
@@ -171,11 +172,14 @@ GpuAssetBounds GpuEngine::bounds() const {
   return {bounds_.on_gpu.data(), static_cast<std::uint32_t>(shapes_.size())};
 }
 
+GpuBroadPhaseOptions GpuEngine::broad_phase_options(bool sorted) const {
+  return {.sorted = sorted, .filter = filter_on_gpu_, .within = within_};
+}
+
 // Until there is room for all.
 void GpuEngine::find_pairs_on_gpu(bool sorted) {
   upload_filter();
-  const Status status =
-      broad_phase_.find_pairs(instances_, bounds(), {.sorted = sorted, .filter = filter_on_gpu_}, stream());
+  const Status status = broad_phase_.find_pairs(instances_, bounds(), broad_phase_options(sorted), stream());
   if (subject(status) != nullptr) require(status, broad_phase_.report().where);
   check(status, broad_phase_.cuda_error(), "broad phase");
 }
@@ -241,8 +245,7 @@ void GpuEngine::time_repeats(const GpuPairs& pairs, const TimedQuery& asked, Tim
   const Before find_pairs = [&](unsigned) {
     if (!finds_pairs) return;
     const Status status = broad_phase_.enqueue(
-        instances_, bounds(), {.sorted = asked.order == OrderOnGpu::sorted, .filter = filter_on_gpu_},
-        stream());
+        instances_, bounds(), broad_phase_options(asked.order == OrderOnGpu::sorted), stream());
     check(status, broad_phase_.cuda_error(), "broad phase");
   };
   const Before find_and_record = [&](unsigned event_flags) {

@@ -52,8 +52,9 @@ class GpuEngine : public Engine {
   TimedAnswer time_query(const TimedQuery& asked) final;
 
  protected:
-  /// contents: what it uploads of shapes. Throws GpuError where no GPU can be used.
-  GpuEngine(std::string_view name, Contents contents);
+  /// contents: what it uploads of shapes; within: of clearance, how far apart the boxes of pairs may be.
+  /// Throws GpuError where no GPU can be used.
+  GpuEngine(std::string_view name, Contents contents, double within = 0);
 
   cudaStream_t stream() const { return stream_.get(); }
   std::span<const GpuAsset> shapes() const { return shapes_; }
@@ -99,6 +100,7 @@ class GpuEngine : public Engine {
 
  private:
   GpuAssetBounds bounds() const;
+  GpuBroadPhaseOptions broad_phase_options(bool sorted) const;
   template <typename Element>
   const Element* upload_of_each(const Element* of_each, StagedArray<Element>& array);
   void upload_filter();
@@ -111,6 +113,7 @@ class GpuEngine : public Engine {
 
   std::string name_;
   Contents contents_;
+  double within_;
   std::size_t free_at_start_ = 0;
   double upload_of_shapes_ = 0, upload_of_bodies_ = 0;  // seconds
   GpuStream stream_;

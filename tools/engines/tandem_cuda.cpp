@@ -12,7 +12,8 @@ namespace {
 class TandemCudaEngine final : public GpuEngine {
  public:
   explicit TandemCudaEngine(const QueryOptions& options)
-      : GpuEngine("tandem-cuda", options.mode == QueryMode::exact ? Contents::manifolds : Contents::all),
+      : GpuEngine("tandem-cuda", options.mode == QueryMode::exact ? Contents::manifolds : Contents::all,
+                  options.within),
         options_(options) {}
 
  private:
@@ -20,7 +21,8 @@ class TandemCudaEngine final : public GpuEngine {
     return {.mode = options_.mode,
             .first_contact_only = options_.first_contact_only,
             .sorted = order == OrderOnGpu::sorted,
-            .grouped = order == OrderOnGpu::grouped};
+            .grouped = order == OrderOnGpu::grouped,
+            .within = options_.within};
   }
 
   void name_shapes() override { name_shapes_to(query_); }
@@ -78,12 +80,13 @@ class TandemCudaEngine final : public GpuEngine {
   }
 
   Seconds time_walk(const GpuPairs& pairs, std::uint32_t repeats) override {
-    constexpr GpuQueryOptions kWalk = {.walk_only = true};
+    const GpuQueryOptions walk_alone = {.walk_only = true, .within = options_.within};
     GpuContactQuery walk;
     name_shapes_to(walk);
-    const Status status = walk.reserve({.pairs = static_cast<std::uint32_t>(counters_.object_pairs)}, kWalk);
+    const Status status =
+        walk.reserve({.pairs = static_cast<std::uint32_t>(counters_.object_pairs)}, walk_alone);
     check(status, walk.cuda_error(), "traversal");
-    const auto run = captured([&] { enqueue(walk, pairs, kWalk, "traversal"); });
+    const auto run = captured([&] { enqueue(walk, pairs, walk_alone, "traversal"); });
     GpuEvent begin, end;
     for (GpuEvent* event : {&begin, &end}) check(event->create(), "an event");
     Seconds seconds;

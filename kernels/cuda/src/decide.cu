@@ -105,6 +105,110 @@ class Deciding {
   Candidate* queue_;
 };
 
+/// The same of clearance: by float32, then float64, then exactly, each stage as soon as the block's threads
+/// all have a candidate. The result is exact in mode fast too.
+class NearDeciding {
+ public:
+  __device__ NearDeciding(const QueryArgs& args, float4* memory)
+      : args_(args), waiting_(reinterpret_cast<std::uint32_t*>(memory)) {
+    static_assert(kStages * 2 * 32 * sizeof(Candidate) <= 4 * kWarpWords + 4 * kEntryWords * kFewestEntries);
+    for (int i = 0; i < kStages; ++i)
+      queue_[i] = reinterpret_cast<Candidate*>(memory + kBlockWords / 4) + i * 2 * blockDim.x;
+  }
+
+  __device__ void run() {
+    const std::uint32_t total = stored(args_.state->undecided, args_.capacity.undecided);
+    if (total == 0) return;
+    if (threadIdx.x < kStages) waiting_[threadIdx.x] = 0;
+    __syncthreads();
+    const std::uint32_t warps = gridDim.x * (blockDim.x / 32),
+                        at_once = min(max((total + warps - 1) / warps, kFewestAtOnce), 32u);
+    const std::uint32_t own = at_once * (threadIdx.x / 32 * gridDim.x + blockIdx.x) + lane_id();
+    for (std::uint64_t before = 0; before < total; before += at_once * warps) {
+      const bool mine = lane_id() < at_once && before + own < total;
+      by_float32(mine, args_.undecided[mine ? before + own : 0]);
+      settle(blockDim.x);
+    }
+    settle(1);
+  }
+
+ private:
+  static constexpr int kStages = 2;  // that candidates wait for
+
+  /// Takes stages that so many candidates wait for, at least, in the end with those that are left.
+  __device__ void settle(std::uint32_t least) {
+    while (wait_for(0, least)) {
+      by_float64();
+      while (wait_for(1, blockDim.x)) exactly();
+    }
+    while (wait_for(1, least)) exactly();
+  }
+
+  __device__ bool wait_for(int stage, std::uint32_t least) const {
+    __syncthreads();  // all are there
+    const bool enough = waiting_[stage] >= least;
+    __syncthreads();  // all have looked before that changes
+    return enough;
+  }
+
+  __device__ void by_float32(bool mine, const Candidate& candidate) {
+    const PairRecord& record = args_.pairs[candidate.pair];
+    bool contact = false;
+    if (mine) {
+      const TriangleInFrame a = stored_triangle(record.triangles_a[candidate.a]),
+                            b = posed_triangle(pose_of(record), record.triangles_b[candidate.b]);
+      const auto verdicts = distance::decide_within(a.corner, b.corner, args_.clearances[candidate.pair]);
+      contact = verdicts.contact;
+      if (verdicts.undecided) put(0, candidate);
+    }
+    add_contact(args_, record, candidate, contact);
+  }
+
+  __device__ void by_float64() {
+    Candidate candidate;
+    const bool mine = take(0, candidate);
+    const PairRecord& record = args_.pairs[candidate.pair];
+    Verdict verdict = Verdict::apart;
+    if (mine) {
+      verdict =
+          distance::decide_within_float64(posed_pair(args_, record, candidate.a, candidate.b), args_.within);
+      if (verdict == Verdict::undecided) put(1, candidate);
+    }
+    count(mine && verdict != Verdict::undecided, &args_.state->decided_by_float64);
+    add_contact(args_, record, candidate, verdict == Verdict::contact);
+  }
+
+  __device__ void exactly() {
+    Candidate candidate;
+    const bool mine = take(1, candidate);
+    const PairRecord& record = args_.pairs[candidate.pair];
+    const bool contact =
+        mine && are_within_exactly(args_, posed_pair(args_, record, candidate.a, candidate.b));
+    count(mine, &args_.state->decided_exactly);
+    add_contact(args_, record, candidate, contact);
+  }
+
+  /// By one thread.
+  __device__ void put(int stage, const Candidate& candidate) {
+    queue_[stage][atomicAdd(&waiting_[stage], 1u)] = candidate;
+  }
+
+  /// Takes the last of those that wait, one a thread; few are spread over all warps. False: there is none for
+  /// this thread, and the candidate is any. Condition: some wait.
+  __device__ bool take(int stage, Candidate& candidate) {
+    const std::uint32_t all = waiting_[stage], how_many = min(all, blockDim.x);
+    const std::uint32_t i = lane_id() * (blockDim.x / 32) + threadIdx.x / 32;
+    candidate = queue_[stage][all - how_many + (i < how_many ? i : 0)];
+    __syncthreads();  // all have read what is overwritten from now on
+    if (threadIdx.x == 0) waiting_[stage] = all - how_many;
+    return i < how_many;
+  }
+
+  const QueryArgs& args_;
+  std::uint32_t* waiting_;  // of each stage; less than the block has threads, but for a moment twice these
+  Candidate* queue_[kStages];
+};
+
 /// What other blocks made of it.
 __device__ Counter now(const Counter& counter) {
   return *static_cast<const volatile Counter*>(&counter);
@@ -162,7 +266,8 @@ __device__ bool ends_last(const QueryArgs& args, std::uint32_t& word) {
   return word != 0;
 }
 
-template <QueryMode kMode, bool kWalksOnly>
+/// kNear: of a query of clearance.
+template <QueryMode kMode, bool kWalksOnly, bool kNear>
 __global__ void __launch_bounds__(kMostThreads, 1) decide(const __grid_constant__ QueryArgs args) {
   extern __shared__ float4 memory[];
   wait_for_kernel_before();
@@ -171,12 +276,13 @@ __global__ void __launch_bounds__(kMostThreads, 1) decide(const __grid_constant_
   clear_mailboxes(state.frame, blockIdx.x * blockDim.x + threadIdx.x, gridDim.x * blockDim.x, mailboxes);
   const bool walks_world = !failed(args) && state.world_pairs != 0;
   if constexpr (kMode != QueryMode::boxes && !kWalksOnly) {
-    if (!failed(args)) Deciding<kMode>(args, memory).run();
+    using Way = std::conditional_t<kNear, NearDeciding, Deciding<kMode>>;
+    if (!failed(args)) Way(args, memory).run();
   }
   if (walks_world) {
     __syncthreads();
     prepare_memory(memory);
-    run_walk<InWorld<kMode, kWalksOnly>, true>(args, memory);
+    run_walk<InWorld<kMode, kWalksOnly, kNear>, true>(args, memory);
   }
   if (!ends_last(args, *reinterpret_cast<std::uint32_t*>(memory))) return;
   if (walks_world) clear_mailboxes(state.world, threadIdx.x, blockDim.x, args.shape.mailboxes());
@@ -185,19 +291,24 @@ __global__ void __launch_bounds__(kMostThreads, 1) decide(const __grid_constant_
   clear_counters(state);
 }
 
+template <bool kNear>
+cudaError_t launch_decide(const QueryArgs& args, cudaStream_t stream) {
+  if (args.walk_only) return launch_shaped(decide<QueryMode::exact, true, kNear>, args, stream);
+  switch (args.mode) {
+    case QueryMode::exact:
+      return launch_shaped(decide<QueryMode::exact, false, kNear>, args, stream);
+    case QueryMode::fast:
+      return launch_shaped(decide<QueryMode::fast, false, kNear>, args, stream);
+    case QueryMode::boxes:
+      return launch_shaped(decide<QueryMode::boxes, false, kNear>, args, stream);
+  }
+  return cudaErrorInvalidValue;
+}
+
 }  // namespace
 
 cudaError_t decide_rest(const QueryArgs& args, cudaStream_t stream) {
-  if (args.walk_only) return launch_shaped(decide<QueryMode::exact, true>, args, stream);
-  switch (args.mode) {
-    case QueryMode::exact:
-      return launch_shaped(decide<QueryMode::exact, false>, args, stream);
-    case QueryMode::fast:
-      return launch_shaped(decide<QueryMode::fast, false>, args, stream);
-    case QueryMode::boxes:
-      return launch_shaped(decide<QueryMode::boxes, false>, args, stream);
-  }
-  return cudaErrorInvalidValue;
+  return args.within > 0 ? launch_decide<true>(args, stream) : launch_decide<false>(args, stream);
 }
 
 }  // namespace tandem::gpu

@@ -44,6 +44,8 @@ struct GpuContactQuery::State {
   GpuArray<Contact> contacts;
   GpuArray<gpu::Candidate> undecided;  // what float32 leaves
   GpuQueryCapacity capacity;
+  GpuArray<distance::FrameClearance> clearances;  // of clearance
+  GpuArray<gpu::WideRoom> wide_rooms;
 
   GpuArray<Contact> ungrouped;  // contacts as they are found, where they are sorted or grouped then
   GpuArray<std::uint32_t> order;
@@ -69,11 +71,13 @@ struct GpuContactQuery::State {
   Status reserve_pairs(std::uint32_t wanted);
   Status reserve_contacts(std::uint64_t wanted);
   Status reserve_undecided(std::uint64_t wanted);
+  Status reserve_clearance();
   Status reserve_ungrouped();
   Status reserve_sorting();
   Status reserve_grouping();
   gpu::Grouping grouping(const GpuQueryOptions& options) const;
   Status check_mode(QueryMode mode) const;
+  bool can_clear() const { return clearances.room() >= capacity.pairs && wide_rooms.room() != 0; }
   bool can_sort() const { return order.room() / 2 >= capacity.contacts && sorting.room() != 0; }
   bool can_group() const {
     return ungrouped.room() >= capacity.contacts && first_contact.room() > capacity.pairs;
@@ -163,6 +167,16 @@ Status GpuContactQuery::State::reserve_undecided(std::uint64_t wanted) {
   return status;
 }
 
+Status GpuContactQuery::State::reserve_clearance() {
+  Status status = reserve(clearances, capacity.pairs);
+  if (status != Status::kOk || wide_rooms.room() != 0) return status;
+  status = reserve(wide_rooms, gpu::kWideRooms);
+  if (status == Status::kOk) status = keep(cudaMemset(wide_rooms.data(), 0, wide_rooms.bytes()));
+  if (status == Status::kOk) status = keep(cudaDeviceSynchronize());
+  if (status != Status::kOk) wide_rooms.free();
+  return status;
+}
+
 Status GpuContactQuery::State::reserve_ungrouped() {
   return capacity.contacts < kNoIndex ? reserve(ungrouped, capacity.contacts) : Status::kOutOfRange;
 }
@@ -227,6 +241,9 @@ gpu::QueryArgs GpuContactQuery::State::args(const GpuInstances& instances, const
   args.undecided = undecided.data();
   args.limits = limits;
   args.shape = gpu::walk_shape(limits, depth, options.most_blocks);
+  args.within = options.within;
+  args.clearances = clearances.data();
+  args.wide_rooms = wide_rooms.data();
   return args;
 }
 
@@ -259,6 +276,7 @@ Status GpuContactQuery::reserve(const GpuQueryCapacity& wanted, const GpuQueryOp
   Status status = state_->reserve_pairs(wanted.pairs);
   if (status == Status::kOk) status = state_->reserve_contacts(wanted.contacts);
   if (status == Status::kOk) status = state_->reserve_undecided(wanted.undecided);
+  if (status == Status::kOk && options.within > 0) status = state_->reserve_clearance();
   if (status == Status::kOk && options.sorted) status = state_->reserve_sorting();
   return status == Status::kOk && options.grouped ? state_->reserve_grouping() : status;
 }
@@ -267,7 +285,10 @@ Status GpuContactQuery::enqueue(const GpuInstances& instances, const GpuPairs& p
                                 const GpuQueryOptions& options, cudaStream_t stream) {
   State& s = *state_;
   if (const Status status = s.check_mode(options.mode); status != Status::kOk) return status;
-  if ((options.sorted && !s.can_sort()) || (options.grouped && !s.can_group())) return Status::kOutOfRange;
+  if (!(options.within >= 0 && options.within <= kLargestWorldCoordinate)) return Status::kOutOfRange;
+  if ((options.sorted && !s.can_sort()) || (options.grouped && !s.can_group()) ||
+      (options.within > 0 && !s.can_clear()))
+    return Status::kOutOfRange;
   const gpu::QueryArgs args = s.args(instances, pairs, options);
   cudaError_t error = s.launch(args, stream);
   if (error == cudaSuccess && options.grouped) error = gpu::group_contacts(args, stream);
@@ -323,9 +344,9 @@ std::size_t GpuContactQuery::bytes() const {
   if (state_ == nullptr) return 0;
   const State& s = *state_;
   return s.assets.bytes() + s.query.bytes() + s.chunks.bytes() + s.pairs.bytes() + s.world_pairs.bytes() +
-         s.met.bytes() + s.contacts.bytes() + s.undecided.bytes() + s.ungrouped.bytes() + s.order.bytes() +
-         s.sorting.bytes() + s.first_contact.bytes() + s.next.bytes() + s.few.bytes() + s.many.bytes() +
-         s.tile_sums.bytes();
+         s.met.bytes() + s.contacts.bytes() + s.undecided.bytes() + s.clearances.bytes() +
+         s.wide_rooms.bytes() + s.ungrouped.bytes() + s.order.bytes() + s.sorting.bytes() +
+         s.first_contact.bytes() + s.next.bytes() + s.few.bytes() + s.many.bytes() + s.tile_sums.bytes();
 }
 
 cudaError_t GpuContactQuery::cuda_error() const {

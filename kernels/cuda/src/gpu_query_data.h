@@ -6,6 +6,7 @@
 #include "launch.h"
 #include "pair_record.h"
 #include "tandem/kernels/detail/candidate.h"
+#include "tandem/kernels/detail/distance/clearance.h"
 #include "walk_shape.h"
 
 // What the kernels of a query share, all of it in GPU memory.
@@ -72,6 +73,15 @@ struct Grouping {
   Contact* contacts;  ///< where grouped contacts go; null: they stay where they are
 };
 
+/// Room for one exact decision of clearance at a time, of coordinates of any size: more than CUDA should
+/// reserve for each thread that a GPU can hold. lock: 0 where it is free.
+struct WideRoom {
+  std::uint32_t lock;
+  exact::ClearanceDecision<detail::kMaxWords> decision;
+};
+inline constexpr std::uint32_t kWideRooms = 64;
+static_assert(kWideRooms * sizeof(WideRoom) <= kMostWideBytes);
+
 /// The arguments of all kernels of a query.
 struct QueryArgs {
   const GpuAsset* assets;
@@ -92,6 +102,9 @@ struct QueryArgs {
   Candidate* undecided;
   DeviceLimits limits;
   WalkShape shape;
+  double within;                         ///< 0: contacts
+  distance::FrameClearance* clearances;  ///< of each pair that is in_frame; of clearance, as the next
+  WideRoom* wide_rooms;
 };
 
 /// What sorting takes besides args.contacts, which it reads: all of as many contacts.

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "tandem/kernels/detail/distance/clearance.h"
 #include "tandem/kernels/detail/frame_test.h"
 #include "tandem/kernels/detail/instance_check.h"
 #include "tandem/kernels/detail/oriented_test.h"
@@ -90,6 +91,16 @@ __device__ inline RelativePose pose_of(const PairRecord& record) {
   return pose;
 }
 
+/// What pose_of() gives back.
+__device__ inline void set_pose(const RelativePose& pose, PairRecord& record) {
+  for (int i = 0; i < 3; ++i) {
+    const auto &r = pose.rotation[i], &m = pose.abs_rotation[i];
+    record.rotation[i] = {r[0], r[1], r[2], pose.translation[i]};
+    record.abs_rotation[i] = {m[0], m[1], m[2], pose.slack_a[i]};
+    record.slack_b[i] = pose.slack_b[i];
+  }
+}
+
 /// The pose of stored coordinates.
 __device__ inline Pose stored_pose(const GpuInstances& instances, const GpuAsset* assets,
                                    std::uint32_t instance) {
@@ -103,24 +114,29 @@ __device__ inline Status check_instance(const GpuInstances& instances, const Gpu
   return pose_instance(assets, asset_count, instances.asset[instance], instances.pose[instance], stored, box);
 }
 
-/// The record of a pair of instances whose assets there are, for walks of such blocks.
-__device__ inline PairRecord make_record(const GpuInstances& instances, const GpuAsset* assets,
-                                         const ObjectPair& pair, BlockKind kind) {
-  const GpuAsset &a = assets[instances.asset[pair.a]], &b = assets[instances.asset[pair.b]];
+/// The record of a pair whose two instances have these poses, of stored coordinates, for walks of such
+/// blocks. within: with slack for what is so far apart, of which `clearance` tells.
+__device__ inline PairRecord make_record(const ObjectPair& pair, const GpuAsset& a, const Pose& pose_a,
+                                         const GpuAsset& b, const Pose& pose_b, BlockKind kind, double within,
+                                         distance::FrameClearance& clearance) {
   RelativePose pose;
-  const bool in_frame =
-      relative_pose(stored_pose(instances, assets, pair.a), a.extent, stored_pose(instances, assets, pair.b),
-                    b.extent, pose) == RelativePoseStatus::kOk;
-  PairRecord record = {};
-  for (int i = 0; i < 3; ++i) {
-    const auto &r = pose.rotation[i], &m = pose.abs_rotation[i];
-    record.rotation[i] = {r[0], r[1], r[2], pose.translation[i]};
-    record.abs_rotation[i] = {m[0], m[1], m[2], pose.slack_a[i]};
-    record.slack_b[i] = pose.slack_b[i];
+  bool in_frame = relative_pose(pose_a, a.extent, pose_b, b.extent, pose) == RelativePoseStatus::kOk;
+  float error = 0, slack = 0;
+  clearance = {};
+  if (in_frame) error = frame_error(pose, a.extent, b.extent);
+  if (within > 0 && in_frame) {
+    const RelativePose of_contacts = pose;
+    in_frame = distance::ask_for_clearance(pose_a, within, pose, error, clearance);
+    if (in_frame && kind == BlockKind::oriented)
+      slack = oriented_slack(of_contacts, a.extent, b.extent, clearance.apart_from);
+  } else if (in_frame && kind == BlockKind::oriented) {
+    slack = oriented_slack(pose, a.extent, b.extent);
   }
-  if (in_frame) record.frame_error = frame_error(pose, a.extent, b.extent);
+  PairRecord record = {};
+  set_pose(pose, record);
+  record.frame_error = error;
   if (kind == BlockKind::oriented) {
-    if (in_frame) record.oriented_slack = oriented_slack(pose, a.extent, b.extent);
+    record.oriented_slack = slack;
     record.oriented_a = a.tree.oriented_blocks;
     record.oriented_b = b.tree.oriented_blocks;
   } else {
@@ -133,6 +149,27 @@ __device__ inline PairRecord make_record(const GpuInstances& instances, const Gp
   record.instance_b = pair.b;
   record.in_frame = in_frame;
   return record;
+}
+
+/// The same of contacts.
+__device__ inline PairRecord make_record(const ObjectPair& pair, const GpuAsset& a, const Pose& pose_a,
+                                         const GpuAsset& b, const Pose& pose_b, BlockKind kind) {
+  distance::FrameClearance none;
+  return make_record(pair, a, pose_a, b, pose_b, kind, 0, none);
+}
+
+/// The same of instances whose assets there are, where they stand.
+__device__ inline PairRecord make_record(const GpuInstances& instances, const GpuAsset* assets,
+                                         const ObjectPair& pair, BlockKind kind, double within,
+                                         distance::FrameClearance& clearance) {
+  return make_record(pair, assets[instances.asset[pair.a]], stored_pose(instances, assets, pair.a),
+                     assets[instances.asset[pair.b]], stored_pose(instances, assets, pair.b), kind, within,
+                     clearance);
+}
+__device__ inline PairRecord make_record(const GpuInstances& instances, const GpuAsset* assets,
+                                         const ObjectPair& pair, BlockKind kind) {
+  distance::FrameClearance none;
+  return make_record(instances, assets, pair, kind, 0, none);
 }
 
 #endif

@@ -13,14 +13,18 @@ __device__ void report_error(const QueryArgs& args, Subject subject, Counter whe
   atomicMax(&args.state->error, packed_error(subject, where, status));
 }
 
+template <bool kNear>
 __device__ void prepare_pair(const QueryArgs& args, std::uint32_t index) {
   const ObjectPair pair = args.given.pairs[index];
   if (const Status status = check_pair(pair, args.instances.count); status != Status::kOk)
     return report_error(args, Subject::pair, index, status);
   if (args.instances.asset[pair.a] >= args.asset_count || args.instances.asset[pair.b] >= args.asset_count)
     return;  // reported with the instance
-  const PairRecord record = make_record(args.instances, args.assets, pair, walked_kind(args.mode));
+  distance::FrameClearance clearance;
+  const PairRecord record = make_record(args.instances, args.assets, pair, walked_kind(args.mode),
+                                        kNear ? args.within : 0, clearance);
   args.pairs[index] = record;
+  if (kNear) args.clearances[index] = clearance;
   if (args.first_contact_only) args.met[index] = 0;
   if (record.in_frame == 0) args.world_pairs[atomicAdd(&args.state->world_pairs, 1u)] = index;
 }
@@ -36,12 +40,14 @@ __device__ void clear_groups(const QueryArgs& args, std::uint32_t first, std::ui
   if (first == 0) args.state->tiles_taken = 0;
 }
 
+/// kNear: of a query of clearance.
+template <bool kNear>
 __global__ void __launch_bounds__(kThreads) prepare(const __grid_constant__ QueryArgs args) {
   wait_for_kernel_before();
   const std::uint32_t first = blockIdx.x * kThreads + threadIdx.x, step = gridDim.x * kThreads;
   const std::uint32_t pairs = pair_count(args);
   if (args.grouping.first_contact != nullptr) clear_groups(args, first, step, pairs);
-  for (std::uint32_t i = first; i < pairs; i += step) prepare_pair(args, i);
+  for (std::uint32_t i = first; i < pairs; i += step) prepare_pair<kNear>(args, i);
   for (std::uint32_t i = step - 1 - first; i < args.instances.count;
        i += step) {  // by other threads, at first
     const Status status = check_instance(args.instances, args.assets, args.asset_count, i);
@@ -57,7 +63,8 @@ cudaError_t prepare_pairs(const QueryArgs& args, cudaStream_t stream) {
       std::uint64_t{args.instances.count} + std::min(args.given.capacity, args.capacity.pairs);
   const auto blocks =
       static_cast<std::uint32_t>(std::min<std::uint64_t>(args.limits.processors * 32, most / kThreads + 1));
-  return launch_after({blocks, kThreads, 0, stream, args.limits.early_launch}, prepare, args);
+  return launch_after({blocks, kThreads, 0, stream, args.limits.early_launch},
+                      args.within > 0 ? prepare<true> : prepare<false>, args);
 }
 
 }  // namespace tandem::gpu

@@ -205,7 +205,7 @@ class Walk {
 
   __device__ void judge(bool mine, std::uint32_t pair, std::uint32_t a, std::uint32_t b) {
     Judged judged = {0, 0, false, false};
-    if (mine) judged = Means::judge(args_, args_.pairs[pair], a, b);
+    if (mine) judged = Means::judge(args_, pair, a, b);
     if (__any_sync(kAllLanes, judged.undecided)) {
       const Counter place = place_for(judged.undecided, &args_.state->undecided);
       if (judged.undecided && place < args_.capacity.undecided) args_.undecided[place] = {pair, a, b};

@@ -239,8 +239,9 @@ struct InFrame {
                                       record.triangles_b, pose_of(record), record.frame_error);
   }
 
-  __device__ static Judged judge(const QueryArgs&, const PairRecord& record, std::uint32_t a,
+  __device__ static Judged judge(const QueryArgs& args, std::uint32_t pair, std::uint32_t a,
                                  std::uint32_t b) {
+    const PairRecord& record = args.pairs[pair];
     Judged out = {record.triangles_a[a].corner[0].w, record.triangles_b[b].corner[0].w, true, false};
     if constexpr (kMode == QueryMode::boxes) return out;
     const TriangleInFrame in_a = stored_triangle(load_triangle(record.triangles_a, a)),
@@ -250,6 +251,22 @@ struct InFrame {
     out.contact = verdicts.contact;
     out.undecided = verdicts.undecided;
     return out;
+  }
+};
+
+/// The same of clearance: candidates pass a sieve, and what it leaves is for another kernel, whose threads
+/// all have one then.
+template <QueryMode kMode>
+struct NearInFrame : InFrame<kMode> {
+  __device__ static Judged judge(const QueryArgs& args, std::uint32_t pair, std::uint32_t a,
+                                 std::uint32_t b) {
+    const PairRecord& record = args.pairs[pair];
+    const TriangleInFrame in_a = stored_triangle(load_triangle(record.triangles_a, a)),
+                          of_b = posed_triangle(pose_of(record), load_triangle(record.triangles_b, b));
+    const auto sifted =
+        distance::sift(in_a.corner, of_b.corner, args.clearances[pair], args.first_contact_only);
+    return {record.triangles_a[a].corner[0].w, record.triangles_b[b].corner[0].w, sifted.within,
+            !(sifted.within | sifted.beyond)};
   }
 };
 
@@ -265,8 +282,43 @@ __device__ __noinline__ inline bool decide_exactly(const TrianglePair& pair) {
   return decide_exact(pair) == Verdict::contact;
 }
 
-/// Boxes in world coordinates, float64, as the triangles.
-template <QueryMode kMode, bool kWalksOnly = false>
+/// Coordinates whose last bits are at most 104 binary digits apart: room that is no larger than that of
+/// decide_exactly().
+inline constexpr int kFewWords = 5;
+
+__device__ __noinline__ inline bool are_within_in_few_words(const TrianglePair& pair, double within,
+                                                            const detail::ExponentRange& range) {
+  exact::ClearanceDecision<kFewWords> decision;
+  return decision.are_within(pair, within, range);
+}
+
+/// One thread after the other, of those that share a room.
+__device__ __noinline__ inline bool are_within_in_wide_room(const TrianglePair& pair, double within,
+                                                            const detail::ExponentRange& range,
+                                                            WideRoom& room) {
+  bool done = false, result = false;
+  while (!done) {
+    if (atomicCAS(&room.lock, 0u, 1u) != 0) continue;
+    __threadfence();
+    result = room.decision.are_within(pair, within, range);
+    __threadfence();
+    atomicExch(&room.lock, 0u);
+    done = true;
+  }
+  return result;
+}
+
+/// Of clearance.
+__device__ __noinline__ inline bool are_within_exactly(const QueryArgs& args, const TrianglePair& pair) {
+  if (decide_exactly(pair)) return true;
+  const detail::ExponentRange range = exact::exponents_of(pair, args.within);
+  return range.words() <= kFewWords
+             ? are_within_in_few_words(pair, args.within, range)
+             : are_within_in_wide_room(pair, args.within, range, args.wide_rooms[blockIdx.x % kWideRooms]);
+}
+
+/// Boxes in world coordinates, float64, as the triangles. kNear: of clearance.
+template <QueryMode kMode, bool kWalksOnly, bool kNear>
 struct InWorld {
   static constexpr bool kWorld = true;
   static constexpr bool kCountsOnly = kWalksOnly;
@@ -280,12 +332,12 @@ struct InWorld {
       side_a = {block_a.first_below, block_a.size};
       side_b = {block_b.first_below, block_b.size};
       return world_block_pair_mask(pose_a, block_a, farthest(args, record.instance_a), pose_b, block_b,
-                                   farthest(args, record.instance_b));
+                                   farthest(args, record.instance_b), kNear ? args.within : 0);
     } else {
       const Block &block_a = record.blocks_a[a], &block_b = record.blocks_b[b];
       side_a = Blocks::side(block_a, a, tandem::size_of(block_a));
       side_b = Blocks::side(block_b, b, tandem::size_of(block_b));
-      return world_block_pair_mask(pose_a, block_a, pose_b, block_b);
+      return world_block_pair_mask(pose_a, block_a, pose_b, block_b, kNear ? args.within : 0);
     }
   }
 
@@ -296,16 +348,20 @@ struct InWorld {
   static constexpr bool kTriesPlanes = false;
 
   /// Such pairs are rare: each candidate is decided at once.
-  __device__ static Judged judge(const QueryArgs& args, const PairRecord& record, std::uint32_t a,
+  __device__ static Judged judge(const QueryArgs& args, std::uint32_t index, std::uint32_t a,
                                  std::uint32_t b) {
+    const PairRecord& record = args.pairs[index];
     Judged out = {record.triangles_a[a].corner[0].w, record.triangles_b[b].corner[0].w,
                   kMode == QueryMode::boxes, false};
     if constexpr (kMode == QueryMode::boxes) return out;
     const TrianglePair pair = posed_pair(args, record, a, b);
-    const Verdict verdict = decide_float64(pair);
+    const Verdict verdict = kNear ? distance::decide_within_float64(pair, args.within) : decide_float64(pair);
     const bool exactly = verdict == Verdict::undecided;
     atomicAdd(exactly ? &args.state->decided_exactly : &args.state->decided_by_float64, Counter{1});
-    out.contact = exactly ? decide_exactly(pair) : verdict == Verdict::contact;
+    if (!exactly)
+      out.contact = verdict == Verdict::contact;
+    else
+      out.contact = kNear ? are_within_exactly(args, pair) : decide_exactly(pair);
     return out;
   }
 };

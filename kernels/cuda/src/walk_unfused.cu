@@ -4,8 +4,9 @@
 namespace tandem::gpu {
 
 cudaError_t walk_unfused(const QueryArgs& args, cudaStream_t stream) {
-  return args.mode == QueryMode::boxes ? launch_walk<InFrame<QueryMode::boxes>>(args, stream)
-                                       : launch_walk<InFrame<QueryMode::fast>>(args, stream);
+  if (args.mode == QueryMode::boxes) return launch_walk<InFrame<QueryMode::boxes>>(args, stream);
+  return args.within > 0 ? launch_walk<NearInFrame<QueryMode::fast>>(args, stream)
+                         : launch_walk<InFrame<QueryMode::fast>>(args, stream);
 }
 
 }  // namespace tandem::gpu

@@ -34,14 +34,21 @@ struct GpuQueryOptions {
   /// The most thread blocks, of 512 threads, that look for contacts at a time; 0: as many as the GPU holds.
   /// Fewer leave multiprocessors to other work, and suit tools that are slow where warps wait.
   std::uint32_t most_blocks = 0;
+
+  /// Clearance: triangles whose distance is at most this count as contacts, as QueryOptions::within says;
+  /// pairs that may have some are found by GpuBroadPhaseOptions::within. From 0 to kLargestWorldCoordinate.
+  double within = 0;
 };
 
 /// How many of each a query has room for, or needs room for.
 struct GpuQueryCapacity {
   std::uint32_t pairs = 0;
   std::uint64_t contacts = 0;
-  std::uint64_t undecided = 0;  ///< candidates that float32 cannot decide
+  std::uint64_t undecided = 0;  ///< candidates that float32 cannot decide; of clearance, not quickly
 };
+
+/// What exact decisions of clearance take of it at most.
+inline constexpr std::size_t kMostWideBytes = std::size_t{2} << 20;
 
 /// GPU memory that a query of so many assets with room for so much holds at most: the bound of
 /// GpuContactQuery::bytes(), where it was never given more of them. options: those of all its calls.
@@ -50,9 +57,10 @@ constexpr std::size_t most_query_bytes(const GpuQueryCapacity& capacity, const G
                                        std::size_t assets) {
   constexpr std::size_t kFixed = std::size_t{9} << 20;  // work that warps give to each other, and the report
   const std::size_t per_contact = options.sorted ? 20 + 29 : options.grouped ? 20 + 20 : 20;
-  const std::size_t per_pair = options.grouped ? 168 + 17 : 168;
-  return kFixed + sizeof(GpuAsset) * assets + per_pair * capacity.pairs + per_contact * capacity.contacts +
-         12 * capacity.undecided;
+  const std::size_t per_pair = (options.grouped ? 168 + 17 : 168) + (options.within > 0 ? 12 : 0);
+  const std::size_t wide = options.within > 0 ? kMostWideBytes : 0;
+  return kFixed + wide + sizeof(GpuAsset) * assets + per_pair * capacity.pairs +
+         per_contact * capacity.contacts + 12 * capacity.undecided;
 }
 
 /// A pair with no more contacts than these has few of them, see GpuContactGroups.
@@ -104,15 +112,16 @@ class GpuContactQuery {
   Status set_assets(std::span<const GpuAsset> assets, cudaStream_t stream);
 
   /// Makes room for at least so much, waiting for the device where it grows. `options`: those of the calls to
-  /// come. Result: kOk, kOutOfRange (sorted or grouped: 2^32 - 1 contacts or more; grouped: 2^31 pairs or
-  /// more), kOutOfGpuMemory, kCudaFailed; after
-  /// an error there is the room that there was, or none. Condition: set_assets().
+  /// come; `within` of them counts as 0 or not. Result: kOk, kOutOfRange (sorted or grouped: 2^32 - 1
+  /// contacts or more; grouped: 2^31 pairs or more), kOutOfGpuMemory, kCudaFailed; after an error there is
+  /// the room that there was, or none. Condition: set_assets().
   Status reserve(const GpuQueryCapacity& capacity, const GpuQueryOptions& options = {});
 
   /// Queues a query behind what `stream` holds; it may be captured into a graph. The arrays must stay until
   /// it is done. A pair of an instance with itself asks for the contacts within it. Mode exact walks oriented
   /// blocks, the others axis-aligned ones. Result: kOk, kNoOrientedBlocks or kNoAxisAlignedBlocks (an asset
-  /// lacks them), kOutOfRange (sorted or grouped, and reserved without), kCudaFailed, or, where CUDA loads a
+  /// lacks them), kOutOfRange (sorted, grouped or within, and reserved without; a distance that is none),
+  /// kCudaFailed, or, where CUDA loads a
   /// kernel at its first launch and the GPU is full, kOutOfGpuMemory; what the GPU finds wrong is in the
   /// report. Condition: set_assets() and reserve().
   Status enqueue(const GpuInstances& instances, const GpuPairs& pairs, const GpuQueryOptions& options,

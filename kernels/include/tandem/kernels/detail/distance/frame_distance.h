@@ -142,16 +142,17 @@ TANDEM_HD inline auto is_beyond_along(const Point<Value>& n, const Point<Value> 
 }
 
 /// What is quickly told of clearance: surely farther apart than asked, by the triangles' boxes in a's frame
-/// or by the plane of either, or surely within it, by two of their corners.
+/// or by the plane of either, or surely within it, by two of their corners or because they meet.
 template <typename Mask>
 struct Sifted {
   Mask beyond, within;
 };
 
-/// a: corners as stored, b: posed() ones.
+/// a: corners as stored, b: posed() ones. tries_contact: whether it looks if they meet, which decide_within()
+/// does too: it pays where the first pair ends the search.
 template <typename Value>
 TANDEM_HD inline auto sift(const Point<Value> (&corner_a)[3], const Point<Value> (&corner_b)[3],
-                           const FrameClearance& clearance) {
+                           const FrameClearance& clearance, bool tries_contact) {
   Point<Value> a[3], b[3];
   Value largest{}, widest = value_of<Value>(-1);
   for (int i = 0; i < 3; ++i) {
@@ -184,18 +185,21 @@ TANDEM_HD inline auto sift(const Point<Value> (&corner_a)[3], const Point<Value>
                is_beyond_along(cross(minus(b[1], b[0]), minus(b[2], b[0])), a, b, largest, length);
   // Corners are off by 2 u M a coordinate, and their difference by 2 u M more.
   const Value distance = (1 + 12 * kU) * square_root(square) + ((8 * kU) * largest + (off + 0x1p-60f));
-  out.within = less(distance, value_of<Value>(clearance.within_to)) |
-               frame::decide<true>(corner_a, corner_b, clearance.error).contact;
+  out.within = less(distance, value_of<Value>(clearance.within_to));
+  if (tries_contact)
+    out.within = out.within | frame::decide<true>(corner_a, corner_b, clearance.error).contact;
   return out;
 }
 
-/// What frame_interval() knows of clearance: `contact` where the posed triangles are surely within it.
+/// What frame_interval() knows of clearance, and of triangles that meet, whose features may be apart, the
+/// contact test: `contact` where the posed triangles are surely within it.
 template <typename Value>
 TANDEM_HD inline auto decide_within(const Point<Value> (&a)[3], const Point<Value> (&b)[3],
                                     const FrameClearance& clearance) {
   const FrameInterval<Value> interval = frame_interval(a, b, clearance.error);
   frame::Verdicts<decltype(less(interval.lower, interval.upper))> verdicts;
-  verdicts.contact = less(interval.upper, value_of<Value>(clearance.within_to));
+  verdicts.contact = less(interval.upper, value_of<Value>(clearance.within_to)) |
+                     frame::decide<true>(a, b, clearance.error).contact;
   verdicts.undecided = !(verdicts.contact | less(value_of<Value>(clearance.apart_from), interval.lower));
   return verdicts;
 }

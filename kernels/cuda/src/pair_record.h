@@ -90,6 +90,16 @@ __device__ inline RelativePose pose_of(const PairRecord& record) {
   return pose;
 }
 
+/// What pose_of() gives back.
+__device__ inline void set_pose(const RelativePose& pose, PairRecord& record) {
+  for (int i = 0; i < 3; ++i) {
+    const auto &r = pose.rotation[i], &m = pose.abs_rotation[i];
+    record.rotation[i] = {r[0], r[1], r[2], pose.translation[i]};
+    record.abs_rotation[i] = {m[0], m[1], m[2], pose.slack_a[i]};
+    record.slack_b[i] = pose.slack_b[i];
+  }
+}
+
 /// The pose of stored coordinates.
 __device__ inline Pose stored_pose(const GpuInstances& instances, const GpuAsset* assets,
                                    std::uint32_t instance) {
@@ -112,12 +122,7 @@ __device__ inline PairRecord make_record(const GpuInstances& instances, const Gp
       relative_pose(stored_pose(instances, assets, pair.a), a.extent, stored_pose(instances, assets, pair.b),
                     b.extent, pose) == RelativePoseStatus::kOk;
   PairRecord record = {};
-  for (int i = 0; i < 3; ++i) {
-    const auto &r = pose.rotation[i], &m = pose.abs_rotation[i];
-    record.rotation[i] = {r[0], r[1], r[2], pose.translation[i]};
-    record.abs_rotation[i] = {m[0], m[1], m[2], pose.slack_a[i]};
-    record.slack_b[i] = pose.slack_b[i];
-  }
+  set_pose(pose, record);
   if (in_frame) record.frame_error = frame_error(pose, a.extent, b.extent);
   if (kind == BlockKind::oriented) {
     if (in_frame) record.oriented_slack = oriented_slack(pose, a.extent, b.extent);

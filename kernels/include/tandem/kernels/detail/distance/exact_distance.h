@@ -268,12 +268,15 @@ class IsWithin {
   WideNumber<kWords, 2> square_;
 };
 
-/// The distance of triangles that do not meet, as NearestFeatures has it, and where it is.
+/// The distance of triangles that do not meet, as NearestFeatures has it, and where it is. Condition:
+/// exponents_of(t).words() <= kWords, which holds for all triangles with the most words; fewer take less of
+/// the stack.
+template <int kWords = detail::kMaxWords>
 TANDEM_OUT_OF_LINE TANDEM_HD inline DistanceInterval distance_apart(const TrianglePair& t,
                                                                     TriangleWeights& weights) {
   const detail::ExponentRange range = exponents_of(t);
   NearestFeatures nearest(range.unit);
-  Features<detail::kMaxWords>(t, range).visit(nearest);
+  Features<kWords>(t, range).visit(nearest);
   weights = nearest.weights();
   return nearest.interval();
 }

@@ -3,7 +3,7 @@
 #include "narrow_phase_walk.h"
 #include "tandem/kernels/detail/block_pair.h"
 #include "tandem/kernels/detail/candidate.h"
-#include "tandem/kernels/detail/distance/triangle_distance.h"
+#include "tandem/kernels/detail/distance/clearance.h"
 
 namespace tandem {
 namespace {
@@ -101,47 +101,12 @@ class WorldBoxMeans {
   const PairTask& task_;
 };
 
-}  // namespace
-
-namespace {
-
-// Widens the tests of a pair by a length in a's frame. What is within it could be moved by no more than that,
-// along each axis, to meet; so to the box tests and the planes of leaves it is one more error of positions,
-// the s of docs/box_test.md and the E of frame_test.h, whose factor of 1.001 it gets too. False: float32
-// cannot take it.
-bool widen(PairTask& task, float length) {
-  const float slack = 1.002f * length;
-  for (float& of_a : task.b_in_a.slack_a) of_a += slack;
-  task.frame_error += slack;
-  return task.frame_error <= static_cast<float>(kLargestInFrame / 4);
-}
-
-// Makes a task of contacts one of clearance.
-void ask_for_clearance(PairTask& task) {
-  DistanceFrame frame;
-  frame.b_in_a = task.b_in_a;
-  frame.error = task.frame_error;
-  task.in_frame = bound_lengths(task.a->pose, frame);
-  if (!task.in_frame) return;
-  task.clearance = distance::frame_clearance(frame, task.within);
-  task.in_frame = widen(task, task.clearance.apart_from);
-}
-
-// verdict: of decide_float64(), that they are apart or undecided.
-bool are_within(const PairTask& task, const TrianglePair& pair, Verdict verdict, QueryCounters& counters) {
-  const distance::LocalPair local = distance::local_pair(pair);
-  if (local.in_range()) {
-    // What is asked for decides, however wide the interval is.
-    TriangleWeights weights;
-    const DistanceInterval interval = distance::bounded_distance(local, {}, weights);
-    if (interval.lower > task.within || interval.upper <= task.within) {
-      ++counters.decided_by_float64;
-      return interval.upper <= task.within;
-    }
-  }
-  ++counters.decided_exactly;
-  if (verdict == Verdict::undecided && decide_exact(pair) == Verdict::contact) return true;
-  return exact::are_within(pair, task.within);
+bool are_within(const PairTask& task, const TrianglePair& pair, QueryCounters& counters) {
+  const Verdict verdict = distance::decide_within_float64(pair, task.within);
+  const bool exactly = verdict == Verdict::undecided;
+  ++(exactly ? counters.decided_exactly : counters.decided_by_float64);
+  if (!exactly) return verdict == Verdict::contact;
+  return decide_exact(pair) == Verdict::contact || exact::are_within(pair, task.within);
 }
 
 }  // namespace
@@ -156,7 +121,8 @@ PairTask pair_task(const PosedTree& a, const PosedTree& b, double within) {
   if (!task.in_frame) return task;
   task.frame_error = frame_error(task.b_in_a, a.extent, b.extent);
   if (within > 0)
-    ask_for_clearance(task);
+    task.in_frame =
+        distance::ask_for_clearance(a.pose, within, task.b_in_a, task.frame_error, task.clearance);
   else
     task.on_grid = lie_on_grid(a.pose, a.extent, a.grid, b.pose, b.extent, b.grid, task.b_in_a);
   return task;
@@ -169,8 +135,8 @@ bool meet(const PairTask& task, std::uint32_t triangle_a, std::uint32_t triangle
     return decide_fast(framed_pair(task.b_in_a, a, b)) == Verdict::contact;
   }
   const TrianglePair pair = posed_pair(task.a->pose, a, task.b->pose, b);
+  if (task.within > 0) return are_within(task, pair, counters);
   const Verdict verdict = decide_float64(pair);
-  if (task.within > 0 && verdict != Verdict::contact) return are_within(task, pair, verdict, counters);
   const bool exactly = verdict == Verdict::undecided;
   ++(exactly ? counters.decided_exactly : counters.decided_by_float64);
   return (exactly ? decide_exact(pair) : verdict) == Verdict::contact;

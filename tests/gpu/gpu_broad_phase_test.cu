@@ -343,6 +343,72 @@ TEST_F(GpuBroadPhaseTest, NamesTheFirstBoxThatItCannotTakeAndGoesOnAfterwards) {
   EXPECT_EQ(broad_phase.enqueue(shifted, 9, {}, nullptr), Status::kMisaligned);
 }
 
+Boxes grown_by(Boxes boxes, double margin) {
+  for (WorldBox& box : boxes) box = grown(box, margin);
+  return boxes;
+}
+
+void expect_grown_as_cpu(GpuBroadPhase& broad_phase, const Boxes& boxes, double within) {
+  const Boxes larger = grown_by(boxes, 0.5 * within);
+  const Pairs expected = of_cpu(larger);
+  const auto device = on_gpu(boxes);
+  for (const bool sorted : {false, true}) {
+    const GpuBroadPhaseOptions options = {.sorted = sorted, .within = within};
+    ASSERT_EQ(
+        broad_phase.find_pairs(device.data(), static_cast<std::uint32_t>(boxes.size()), options, nullptr),
+        Status::kOk);
+    Pairs pairs = stored(broad_phase);
+    if (!sorted) std::sort(pairs.begin(), pairs.end(), before);
+    EXPECT_TRUE(same(pairs, expected)) << boxes.size() << " boxes within " << within << ": " << pairs.size()
+                                       << " instead of " << expected.size();
+  }
+  const Boxes taken = download(broad_phase.boxes(), boxes.size());
+  EXPECT_TRUE(boxes.empty() ||
+              std::memcmp(taken.data(), larger.data(), boxes.size() * sizeof(WorldBox)) == 0);
+  EXPECT_LE(broad_phase.bytes(), most_broad_phase_bytes(broad_phase.capacity(), true));
+  expect_same_as_cpu(broad_phase, boxes, "not grown any more");
+}
+
+TEST_F(GpuBroadPhaseTest, BoxesWithinADistanceAreThePairsOfTheCpusGrownBoxes) {
+  GpuBroadPhase broad_phase;
+  for (const std::uint32_t count : {0u, 1u, 2u, 1000u, kFew, kFewBoxes + 1, kMany}) {
+    const double edge = edge_for(count + 1, 4);
+    for (const double within : {std::numeric_limits<double>::denorm_min(), 0.25 * edge, 2 * edge}) {
+      expect_grown_as_cpu(broad_phase, scattered(count, edge, 1, count), within);
+      expect_grown_as_cpu(broad_phase, transformed(scattered(count, edge, 1, count), 100, 1e15),
+                          100 * within);
+    }
+  }
+  // Gaps of exactly the distance, and one last bit more or less, are as the CPU has them.
+  for (const int side : {12, 22}) {
+    Boxes cubes = lattice(side, 0.1);
+    for (WorldBox& box : cubes) box.hi[0] -= 0.25, box.hi[1] -= 0.3;
+    for (const double within : {0.25, std::nextafter(0.25, 0.0), std::nextafter(0.25, 1.0), 0.3})
+      expect_grown_as_cpu(broad_phase, cubes, within);
+  }
+  const Boxes few = scattered(200, 1e-3, 1, 5);
+  expect_grown_as_cpu(broad_phase, few, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(of_cpu(grown_by(few, std::numeric_limits<double>::infinity())).size(), 200u * 199 / 2);
+}
+
+TEST_F(GpuBroadPhaseTest, ADistanceThatIsNoneAndBoxesThatAreNoneAreRefused) {
+  Boxes boxes = scattered(kMany, 0.1, 0, 43);
+  const auto good = on_gpu(boxes);
+  GpuBroadPhase broad_phase;
+  ASSERT_EQ(broad_phase.reserve({kMany, 8 * kMany}), Status::kOk);
+  for (const double within : {-1.0, -std::numeric_limits<double>::denorm_min(), std::nan("")})
+    EXPECT_EQ(broad_phase.enqueue(good.data(), kMany, {.within = within}, nullptr), Status::kOutOfRange);
+  EXPECT_EQ(broad_phase.enqueue(good.data(), kMany, {.within = 1e-3}, nullptr), Status::kOutOfRange)
+      << "without room for larger boxes";
+  boxes[77].hi[2] = std::nan(""), boxes[78].lo[0] = -1.0000001e300;
+  for (const std::uint32_t count : {100u, kFew, kMany}) {
+    const auto bad = on_gpu(Boxes(boxes.begin(), boxes.begin() + count));
+    EXPECT_EQ(broad_phase.find_pairs(bad.data(), count, {.within = 1e-3}, nullptr), Status::kOutOfRange);
+    EXPECT_EQ(broad_phase.report().where, 77u);
+    EXPECT_EQ(broad_phase.report().found, 0u);
+  }
+}
+
 Boxes moved(const Boxes& boxes, const std::vector<std::array<double, 3>>& speeds, double time) {
   Boxes result = boxes;
   for (std::size_t i = 0; i < boxes.size(); ++i) {
@@ -444,13 +510,14 @@ struct Instances {
 };
 
 Status find_pairs(GpuBroadPhase& broad_phase, const Instances& instances,
-                  const std::vector<AssetBounds>& bounds) {
+                  const std::vector<AssetBounds>& bounds, double within = 0) {
   const auto asset = on_gpu(instances.asset);
   const auto pose = on_gpu(instances.pose);
   const auto assets = on_gpu(bounds);
   return broad_phase.find_pairs(
       {asset.data(), pose.data(), static_cast<std::uint32_t>(instances.asset.size())},
-      {assets.data(), static_cast<std::uint32_t>(bounds.size())}, {true}, nullptr);
+      {assets.data(), static_cast<std::uint32_t>(bounds.size())}, {.sorted = true, .within = within},
+      nullptr);
 }
 
 void expect_poses_as_the_cpu(GpuBroadPhase& broad_phase, std::uint32_t count) {
@@ -475,6 +542,9 @@ void expect_poses_as_the_cpu(GpuBroadPhase& broad_phase, std::uint32_t count) {
   const Pairs expected = of_cpu(boxes);
   EXPECT_GT(expected.size(), count / 20);
   EXPECT_TRUE(same(stored(broad_phase), expected));
+  ASSERT_EQ(find_pairs(broad_phase, instances, bounds, 0.3), Status::kOk);
+  EXPECT_TRUE(same(stored(broad_phase), of_cpu(grown_by(boxes, 0.15))));
+  EXPECT_GT(broad_phase.report().found, expected.size());
 
   instances.pose[count - 100].translation[0] = 1e301;
   instances.pose[count - 200].rotation[1][1] += 1e-3;
@@ -485,8 +555,10 @@ void expect_poses_as_the_cpu(GpuBroadPhase& broad_phase, std::uint32_t count) {
   EXPECT_EQ(find_pairs(broad_phase, instances, bounds), Status::kPoseNotRigid);
   EXPECT_EQ(broad_phase.report().where, count - 200);
   instances.pose[count - 200] = kIdentityPose;
-  EXPECT_EQ(find_pairs(broad_phase, instances, bounds), Status::kOutOfRange);
-  EXPECT_EQ(broad_phase.report().where, count - 100);
+  for (const double within : {0.0, 0.3}) {
+    EXPECT_EQ(find_pairs(broad_phase, instances, bounds, within), Status::kOutOfRange);
+    EXPECT_EQ(broad_phase.report().where, count - 100);
+  }
 }
 
 TEST_F(GpuBroadPhaseTest, PosesInstancesBitByBitAsTheCpu) {

@@ -89,16 +89,27 @@ Boxes scattered(std::uint32_t count, std::uint64_t seed) {
   return boxes;
 }
 
+// Where fixed boxes are kept, the others are larger by all of the distance.
+Boxes grown_for(Boxes boxes, const FilterArrays& filter, bool keep, double within) {
+  for (std::size_t i = 0; i < boxes.size() && within > 0; ++i) {
+    if (!keep) boxes[i] = grown(boxes[i], 0.5 * within);
+    if (keep && filter.motion[i] != Motion::fixed) boxes[i] = grown(boxes[i], within);
+  }
+  return boxes;
+}
+
 void expect_as_cpu(GpuBroadPhase& broad_phase, const Boxes& boxes, const FilterArrays& filter, bool keep,
-                   const std::string& what) {
-  const Pairs expected = of_cpu(boxes, filter);
+                   const std::string& what, double within = 0) {
+  const bool kept =
+      keep && std::find(filter.motion.begin(), filter.motion.end(), Motion::fixed) != filter.motion.end();
+  const Pairs expected = of_cpu(grown_for(boxes, filter, kept, within), filter);
   const auto device = on_gpu(boxes);
   const GpuFilter on_device(filter);
   ASSERT_EQ(broad_phase.keep_fixed(device.data(), keep ? filter.motion : std::vector<Motion>(), nullptr),
             Status::kOk)
       << what;
   for (const bool sorted : {false, true}) {
-    const GpuBroadPhaseOptions options = {sorted, on_device.view()};
+    const GpuBroadPhaseOptions options = {sorted, on_device.view(), within};
     ASSERT_EQ(
         broad_phase.find_pairs(device.data(), static_cast<std::uint32_t>(boxes.size()), options, nullptr),
         Status::kOk)
@@ -121,6 +132,8 @@ TEST_F(GpuFilterTest, FindsThePairsOfTheCpuWhateverTheFilterAndWhatIsKept) {
       for (const bool keep : {false, true}) {
         expect_as_cpu(broad_phase, boxes, filter, keep && !filter.motion.empty(),
                       std::to_string(count) + " boxes, filter " + std::to_string(parts));
+        expect_as_cpu(broad_phase, boxes, filter, keep && !filter.motion.empty(),
+                      std::to_string(count) + " near boxes, filter " + std::to_string(parts), 0.125);
       }
     }
   }
@@ -238,6 +251,9 @@ TEST_F(GpuFilterTest, KeptInstancesAreNotLookedAtAgain) {
     EXPECT_TRUE(same(stored(broad_phase), expected));
     const Boxes posed = download(broad_phase.boxes(), count);
     EXPECT_EQ(std::memcmp(posed.data(), boxes.data(), count * sizeof(WorldBox)), 0);
+    const GpuBroadPhaseOptions near = {true, on_device.view(), 0.25};
+    ASSERT_EQ(broad_phase.find_pairs(later.view(), bounds, near, nullptr), Status::kOk);
+    EXPECT_TRUE(same(stored(broad_phase), of_cpu(grown_for(boxes, filter, true, 0.25), filter)));
     EXPECT_EQ(broad_phase.keep_fixed(later.view(), bounds, filter.motion, nullptr), Status::kUnknownAsset);
     const auto first = std::find(filter.motion.begin(), filter.motion.end(), Motion::fixed);
     EXPECT_EQ(broad_phase.report().where, static_cast<std::uint32_t>(first - filter.motion.begin()));

@@ -13,8 +13,8 @@ struct GivenBoxes {
   static constexpr bool kPosed = false;
   const WorldBox* boxes;
 
-  // The same, where they lie once they have been taken.
-  GivenBoxes taken() const { return *this; }
+  // The same, or grown ones, where they lie once they have been taken.
+  GivenBoxes lying_at(const WorldBox* taken) const { return {taken}; }
 
   __device__ std::uint32_t number(std::uint32_t i) const { return i; }
   __device__ Status get(std::uint32_t i, WorldBox& box) const {
@@ -33,7 +33,7 @@ struct PosedBoxes {
   GpuAssetBounds assets;
   WorldBox* kept;
 
-  GivenBoxes taken() const { return {kept}; }
+  GivenBoxes lying_at(const WorldBox* taken) const { return {taken}; }
   __device__ std::uint32_t number(std::uint32_t i) const { return i; }
   __device__ Status get(std::uint32_t i, WorldBox& box) const {
     box = {};
@@ -51,7 +51,7 @@ struct Listed {
   Boxes all;
   const std::uint32_t* list;  // their numbers, ascending
 
-  Listed<GivenBoxes> taken() const { return {all.taken(), list}; }
+  Listed<GivenBoxes> lying_at(const WorldBox* taken) const { return {all.lying_at(taken), list}; }
 
   __device__ std::uint32_t number(std::uint32_t i) const { return list[i]; }
   __device__ Status get(std::uint32_t i, WorldBox& box) const { return all.get(list[i], box); }
@@ -75,6 +75,19 @@ __global__ void pose_boxes(const __grid_constant__ Boxes boxes, std::uint32_t co
   const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
   WorldBox box;
   if (i < count) take(boxes, i, counters, box);
+}
+
+// Boxes that are larger by `margin`, by their numbers; nothing is wrong with any of them.
+template <typename Boxes>
+__global__ void grow_boxes(const __grid_constant__ Boxes boxes, std::uint32_t count, double margin,
+                           WorldBox* larger, Counters* counters) {
+  gpu::wait_for_kernel_before();
+  const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
+  if (i >= count) return;
+  WorldBox box;
+  const Status status = boxes.get(i, box);
+  if (status != Status::kOk) blame(counters, boxes.number(i), status);
+  larger[boxes.number(i)] = status == Status::kOk ? grown(box, margin) : WorldBox{};
 }
 
 }  // namespace

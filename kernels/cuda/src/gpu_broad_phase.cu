@@ -133,11 +133,12 @@ bool is_none(const PairFilter& filter) {
          filter.excluded.slots == nullptr;
 }
 
-// What a call is about: numbers of boxes or instances, where their boxes lie once they have been taken, and
-// how pairs are to be written.
+// What a call is about: numbers of boxes or instances, where their boxes lie once they have been taken, where
+// those of them lie that are kept, and how pairs are to be written.
 struct Call {
   std::uint32_t numbers;
   const WorldBox* boxes;
+  const WorldBox* kept;
   bool sorted;
   cudaStream_t stream;
 };
@@ -189,7 +190,7 @@ struct GpuBroadPhase::State {
   bool reserve_boxes(std::uint32_t count);
   bool reserve_pairs(std::uint32_t count, bool sorted);
   bool reserve_sorting();
-  bool reserve_instances(std::uint32_t count);
+  bool reserve_taken(std::uint32_t count);
   bool reserve_kept(std::uint32_t count, std::uint32_t fixed);
   Status refusal(std::uint32_t count, bool posed, const GpuBroadPhaseOptions& options) const;
   Output output(const Call& call);
@@ -212,6 +213,8 @@ struct GpuBroadPhase::State {
   bool find(const Boxes& from, std::uint32_t count, const Rule& rule, const Call& call);
   template <typename Boxes, typename Rule>
   bool pose_and_find(const Boxes& from, std::uint32_t count, const Rule& rule, const Call& call);
+  template <typename Boxes, typename Rule>
+  bool grow_and_find(const Boxes& from, std::uint32_t count, const Rule& rule, double within, Call call);
   template <typename Boxes>
   Status run(const Boxes& all, const GpuBroadPhaseOptions& options, const Call& call);
   Status list(std::span<const Motion> motion, cudaStream_t stream);
@@ -267,8 +270,8 @@ bool GpuBroadPhase::State::reserve_pairs(std::uint32_t count, bool sorted) {
   return ok(sorted_pairs.reserve(capacity.pairs)) && reserve_sorting();
 }
 
-// What was kept in room that is too small now is lost.
-bool GpuBroadPhase::State::reserve_instances(std::uint32_t count) {
+// Room for boxes of instances, or grown ones. What was kept in room that is too small now is lost.
+bool GpuBroadPhase::State::reserve_taken(std::uint32_t count) {
   if (count > boxes.room() && kept.of != 0 && kept.posed) kept.of = Kept::kLost;
   return ok(boxes.reserve(count));
 }
@@ -294,7 +297,8 @@ bool GpuBroadPhase::State::reserve_sorting() {
 // Why a call cannot be queued.
 Status GpuBroadPhase::State::refusal(std::uint32_t count, bool posed,
                                      const GpuBroadPhaseOptions& options) const {
-  if (count > capacity.boxes || (options.sorted && sorted_pairs.room() < capacity.pairs))
+  if (count > capacity.boxes || (options.sorted && sorted_pairs.room() < capacity.pairs) ||
+      !(options.within >= 0) || (options.within > 0 && count > boxes.room()))
     return Status::kOutOfRange;
   if (kept.of != 0 && (kept.of != count || kept.posed != posed)) return Status::kKeptMismatch;
   return options.filter.excluded.instances > count ? Status::kUnknownInstance : Status::kOk;
@@ -345,9 +349,8 @@ bool GpuBroadPhase::State::make_tree(const Boxes& from, const Tree& tree, Survey
 template <typename Boxes, typename Rule>
 bool GpuBroadPhase::State::collect_with_kept(const Boxes& from, const Rule& rule, const Call& call) {
   const std::uint32_t blocks = std::min(blocks_for(kept.free_count, kKeptWarps), kMostKeptBlocks);
-  return blocks == 0 ||
-         launch(blocks, kKeptWarps * kFanOut, call.stream, collect_kept<Boxes, Rule>, from, kept.free_count,
-                kept.tree, kept.survey.data(), call.boxes, rule, output(call));
+  return blocks == 0 || launch(blocks, kKeptWarps * kFanOut, call.stream, collect_kept<Boxes, Rule>, from,
+                               kept.free_count, kept.tree, kept.survey.data(), call.kept, rule, output(call));
 }
 
 template <typename Rule>
@@ -398,10 +401,23 @@ bool GpuBroadPhase::State::pose_and_find(const Boxes& from, std::uint32_t count,
     if (count > kFewPosed && count <= kFewBoxes) {
       return launch(blocks_for(count, 256), 256, call.stream, pose_boxes<Boxes>, from, count,
                     counters.data()) &&
-             find(from.taken(), count, rule, call);
+             find(from.lying_at(boxes.data()), count, rule, call);
     }
   }
   return find(from, count, rule, call);
+}
+
+// Boxes within reach of each other meet when each is larger by half of it; or one by all of it where the
+// other is kept, which is kept for any reach.
+template <typename Boxes, typename Rule>
+bool GpuBroadPhase::State::grow_and_find(const Boxes& from, std::uint32_t count, const Rule& rule,
+                                         double within, Call call) {
+  if (!(within > 0)) return pose_and_find(from, count, rule, call);
+  const double margin = is_listed<Boxes> ? within : 0.5 * within;
+  call.boxes = boxes.data();
+  return (count == 0 || launch(blocks_for(count, 256), 256, call.stream, grow_boxes<Boxes>, from, count,
+                               margin, boxes.data(), counters.data())) &&
+         find(from.lying_at(boxes.data()), count, rule, call);
 }
 
 // all: boxes or instances, the kept ones included.
@@ -411,12 +427,12 @@ Status GpuBroadPhase::State::run(const Boxes& all, const GpuBroadPhaseOptions& o
   if (status != Status::kOk) return status;
   bool queued = begin(call.stream);
   if (queued && kept.of != 0) {
-    queued = pose_and_find(Listed<Boxes>{all, kept.list.data()}, kept.free_count,
-                           FilteredPairs{options.filter}, call);
+    queued = grow_and_find(Listed<Boxes>{all, kept.list.data()}, kept.free_count,
+                           FilteredPairs{options.filter}, options.within, call);
   } else if (queued && !is_none(options.filter)) {
-    queued = pose_and_find(all, call.numbers, FilteredPairs{options.filter}, call);
+    queued = grow_and_find(all, call.numbers, FilteredPairs{options.filter}, options.within, call);
   } else if (queued) {
-    queued = pose_and_find(all, call.numbers, EveryPair{}, call);
+    queued = grow_and_find(all, call.numbers, EveryPair{}, options.within, call);
   }
   end(queued, call.stream);
   return queued ? Status::kOk : failure();
@@ -444,7 +460,7 @@ Status GpuBroadPhase::State::keep(const Boxes& all, const WorldBox* lie, std::sp
   if (!reserve_fixed() || !reserve_boxes(count) || !reserve_kept(count, fixed)) return failure();
   if (const Status status = list(motion, stream); status != Status::kOk) return status;
   kept.tree = tree_over(fixed, kept.nodes.data());
-  const Call call = {count, lie, false, stream};
+  const Call call = {count, lie, lie, false, stream};
   const bool queued = begin(stream) &&
                       make_tree(Listed<Boxes>{all, kept.list.data() + kept.free_count}, kept.tree,
                                 kept.survey.data(), call) &&
@@ -488,9 +504,10 @@ bool GpuBroadPhase::provide_state() {
 Status GpuBroadPhase::reserve(const GpuBroadPhaseCapacity& capacity, const GpuBroadPhaseOptions& options) {
   if (capacity.boxes == kNoIndex) return Status::kOutOfRange;
   if (!provide_state()) return Status::kOutOfMemory;
-  const bool enough = state_->reserve_fixed() && state_->reserve_boxes(capacity.boxes) &&
-                      state_->reserve_pairs(capacity.pairs, options.sorted) &&
-                      state_->reserve_instances(capacity.instances);
+  const bool enough =
+      state_->reserve_fixed() && state_->reserve_boxes(capacity.boxes) &&
+      state_->reserve_pairs(capacity.pairs, options.sorted) &&
+      state_->reserve_taken(std::max(capacity.instances, options.within > 0 ? capacity.boxes : 0));
   return enough ? Status::kOk : state_->failure();
 }
 
@@ -508,7 +525,7 @@ Status GpuBroadPhase::keep_fixed(const GpuInstances& instances, const GpuAssetBo
   State& state = *state_;
   state.kept.of = 0;
   if (motion.size() != instances.count) return Status::kKeptMismatch;
-  if (!state.reserve_instances(instances.count)) return state.failure();
+  if (!state.reserve_taken(instances.count)) return state.failure();
   WorldBox* const boxes = state.boxes.data();
   return state.keep(PosedBoxes{instances, assets, boxes}, boxes, motion, stream);
 }
@@ -517,7 +534,7 @@ Status GpuBroadPhase::enqueue(const WorldBox* boxes, std::uint32_t count, const 
                               cudaStream_t stream) {
   if (state_ == nullptr) return Status::kOutOfRange;
   if (reinterpret_cast<std::uintptr_t>(boxes) % 16 != 0) return Status::kMisaligned;
-  return state_->run(GivenBoxes{boxes}, options, {count, boxes, options.sorted, stream});
+  return state_->run(GivenBoxes{boxes}, options, {count, boxes, boxes, options.sorted, stream});
 }
 
 Status GpuBroadPhase::enqueue(const GpuInstances& instances, const GpuAssetBounds& assets,
@@ -525,7 +542,7 @@ Status GpuBroadPhase::enqueue(const GpuInstances& instances, const GpuAssetBound
   if (state_ == nullptr || instances.count > state_->boxes.room()) return Status::kOutOfRange;
   WorldBox* const boxes = state_->boxes.data();
   return state_->run(PosedBoxes{instances, assets, boxes}, options,
-                     {instances.count, boxes, options.sorted, stream});
+                     {instances.count, boxes, boxes, options.sorted, stream});
 }
 
 Status GpuBroadPhase::find_pairs(const WorldBox* boxes, std::uint32_t count,

@@ -73,7 +73,7 @@ TANDEM_HD inline bool are_near(const WorldBox& a, const WorldBox& b, double reac
 }
 
 /// The box, larger by `margin` on each side, rounded outward, as far as queries take boxes.
-inline WorldBox grown(const WorldBox& box, double margin) {
+TANDEM_HD inline WorldBox grown(const WorldBox& box, double margin) {
   WorldBox out;
   for (int k = 0; k < 3; ++k) {
     out.lo[k] = std::fmax(std::nextafter(box.lo[k] - margin, -HUGE_VAL), -kLargestWorldCoordinate);

@@ -21,13 +21,17 @@ struct GpuBroadPhaseOptions {
   /// Which pairs are looked at; its arrays lie in GPU memory and must stay until the call is done. enqueue()
   /// alone looks at it.
   PairFilter filter = {};
+
+  /// Pairs of boxes that are so far apart are found too, as BroadPhase finds those of grown() boxes: each is
+  /// larger by half of it, or by all of it where the other one is kept. Infinity: all pairs.
+  double within = 0;
 };
 
 /// How many boxes and pairs there is room for.
 struct GpuBroadPhaseCapacity {
   std::uint32_t boxes = 0;  ///< or instances
   std::uint32_t pairs = 0;
-  std::uint32_t instances = 0;  ///< whose boxes are to be computed
+  std::uint32_t instances = 0;  ///< whose boxes are to be computed; with `within` at least as many as `boxes`
   std::uint32_t kept = 0;  ///< or boxes, of which fixed ones are kept: keep_fixed() alone makes this room
 };
 
@@ -89,10 +93,10 @@ class GpuBroadPhase {
 
   /// Queues a broad phase of the boxes behind what `stream` holds; may be captured into a graph. `boxes`, in
   /// GPU memory at a multiple of 16 bytes, must stay until it is done. Result: kOk, kMisaligned, kOutOfRange
-  /// (more than reserved for), kUnknownInstance (the filter excludes a pair of boxes that there are not),
-  /// kKeptMismatch (fixed ones are kept of another number of boxes, or of instances) or kCudaFailed; what the
-  /// GPU finds wrong is in the report. kOutOfRange there: a coordinate that is NaN or beyond
-  /// kLargestWorldCoordinate. Condition: reserve() with these options.
+  /// (more than reserved for; `within` negative or NaN), kUnknownInstance (the filter excludes a pair of
+  /// boxes that there are not), kKeptMismatch (fixed ones are kept of another number of boxes, or of
+  /// instances) or kCudaFailed; what the GPU finds wrong is in the report. kOutOfRange there: a coordinate
+  /// that is NaN or beyond kLargestWorldCoordinate. Condition: reserve() with these options.
   Status enqueue(const WorldBox* boxes, std::uint32_t count, const GpuBroadPhaseOptions& options,
                  cudaStream_t stream);
 
@@ -113,7 +117,8 @@ class GpuBroadPhase {
   /// until reserve(). Condition: reserve() returned kOk.
   GpuPairs pairs() const;
 
-  /// The world boxes that enqueue() and keep_fixed() computed of instances, in GPU memory.
+  /// The world boxes that enqueue() and keep_fixed() computed of instances, in GPU memory; with `within`,
+  /// those of enqueue() are the larger ones.
   const WorldBox* boxes() const;
 
   const GpuBroadPhaseReport* device_report() const;

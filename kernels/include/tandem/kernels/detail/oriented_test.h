@@ -50,9 +50,9 @@ struct OrientedPose {
 
 /// The slack of the tests of all blocks of two trees, from the pose that relative_pose() made of them, such
 /// that what overlap_oriented() calls apart is apart. Proof: docs/box_test.md, section 5. Condition: the pose
-/// is in range.
+/// is in range. length: in a's frame; what is apart is then farther apart than that.
 TANDEM_HD inline float oriented_slack(const RelativePose& b_in_a, const TreeExtent& tree_a,
-                                      const TreeExtent& tree_b) {
+                                      const TreeExtent& tree_b, float length = 0) {
   namespace d = relative_pose_detail;
   double norm = 0, lack_size = 0, s = 0, t = 0, rho_a = 0, rho_b = 0;
   for (int j = 0; j < 3; ++j) {
@@ -75,8 +75,9 @@ TANDEM_HD inline float oriented_slack(const RelativePose& b_in_a, const TreeExte
   const double mu = norm > 1 ? std::sqrt(norm) : 1;
   const double rho = std::sqrt(rho_a > rho_b ? rho_a : rho_b) * (1 + 0x1p-20);
   const double rounding = d::kU * mu * (31 * std::sqrt(t) + 47.9 * rho);
-  return static_cast<float>(d::kSafety * (mu * std::sqrt(s) + std::sqrt(lack_size) + rounding) +
-                            d::kLeastSlack);
+  double error = std::sqrt(s);
+  if (length > 0) error += static_cast<double>(length);
+  return static_cast<float>(d::kSafety * (mu * error + std::sqrt(lack_size) + rounding) + d::kLeastSlack);
 }
 
 /// How two blocks lie. rotation, translation: of the RelativePose of their trees; slack: oriented_slack().

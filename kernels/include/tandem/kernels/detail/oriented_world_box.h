@@ -64,9 +64,13 @@ TANDEM_HD inline WorldBox node_world_box(const Pose& pose, const OrientedBlock& 
 }
 
 /// The node pairs whose world boxes meet; imaginary nodes never do. farthest_a, farthest_b: of the trees.
+/// within: boxes at most so far apart along each axis count too; the gap as computed is too large by 2^-53 of
+/// itself at most.
 TANDEM_HD inline std::uint32_t world_block_pair_mask(const Pose& pose_a, const OrientedBlock& a,
                                                      double farthest_a, const Pose& pose_b,
-                                                     const OrientedBlock& b, double farthest_b) {
+                                                     const OrientedBlock& b, double farthest_b,
+                                                     double within = 0) {
+  const double reach = within * (1 + 0x1p-50);
   std::uint32_t mask = 0;
 #ifdef __CUDA_ARCH__
 #pragma unroll 1
@@ -79,7 +83,8 @@ TANDEM_HD inline std::uint32_t world_block_pair_mask(const Pose& pose_a, const O
 #endif
     for (int j = 0; j < kNodesPerBlock; ++j) {
       if (!(b.half_extent[0][j] >= 0)) continue;
-      if (overlap(box_a, node_world_box(pose_b, b, j, farthest_b))) mask |= 1u << (4 * i + j);
+      const WorldBox box_b = node_world_box(pose_b, b, j, farthest_b);
+      if (within > 0 ? are_near(box_a, box_b, reach) : overlap(box_a, box_b)) mask |= 1u << (4 * i + j);
     }
   }
   return mask;

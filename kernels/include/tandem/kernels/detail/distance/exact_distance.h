@@ -29,26 +29,27 @@ struct WideVector {
   WideNumber<kWords, kDegree> x[3];
 };
 
+/// out = u . v. term: room.
 template <int kW, int kX, int kY>
-TANDEM_HD inline WideNumber<kW, kX + kY> dot(const WideVector<kW, kX>& u, const WideVector<kW, kY>& v) {
-  return u.x[0] * v.x[0] + u.x[1] * v.x[1] + u.x[2] * v.x[2];
+TANDEM_HD inline void assign_dot(const WideVector<kW, kX>& u, const WideVector<kW, kY>& v,
+                                 WideNumber<kW, kX + kY>& out, WideNumber<kW, kX + kY>& term) {
+  out.assign_product(u.x[0], v.x[0]);
+  for (int k = 1; k < 3; ++k) {
+    term.assign_product(u.x[k], v.x[k]);
+    out.add(term);
+  }
 }
 
+/// out = u x v. term: room.
 template <int kW, int kX, int kY>
-TANDEM_HD inline WideVector<kW, kX + kY> cross(const WideVector<kW, kX>& u, const WideVector<kW, kY>& v) {
-  WideVector<kW, kX + kY> out;
+TANDEM_HD inline void assign_cross(const WideVector<kW, kX>& u, const WideVector<kW, kY>& v,
+                                   WideVector<kW, kX + kY>& out, WideNumber<kW, kX + kY>& term) {
   for (int k = 0; k < 3; ++k) {
     const int i = (k + 1) % 3, j = (k + 2) % 3;
-    out.x[k] = u.x[i] * v.x[j] - u.x[j] * v.x[i];
+    out.x[k].assign_product(u.x[i], v.x[j]);
+    term.assign_product(u.x[j], v.x[i]);
+    out.x[k].subtract(term);
   }
-  return out;
-}
-
-template <int kW, int kD>
-TANDEM_HD inline WideVector<kW, kD> operator-(const WideVector<kW, kD>& u) {
-  WideVector<kW, kD> out;
-  for (int k = 0; k < 3; ++k) out.x[k] = -u.x[k];
-  return out;
 }
 
 /// 0 <= x <= y.
@@ -78,7 +79,8 @@ TANDEM_HD inline detail::ExponentRange exponents_of(const TrianglePair& t) {
   return range;
 }
 
-/// The features of two triangles, as many words a coordinate as `range` asks for, at most kWords.
+/// The features of two triangles, as many words a coordinate as `range` asks for, at most kWords, with the
+/// room that visiting them takes.
 template <int kWords>
 class Features {
  public:
@@ -87,14 +89,14 @@ class Features {
   template <int kDegree>
   using Vector = WideVector<kWords, kDegree>;
 
-  TANDEM_HD Features(const TrianglePair& t, const detail::ExponentRange& range) {
+  TANDEM_HD void assign(const TrianglePair& t, const detail::ExponentRange& range) {
     const int n = range.words(), unit = range.unit;
     for (int i = 0; i < 3; ++i) {
       for (int k = 0; k < 3; ++k) {
         const int next = (i + 1) % 3;
-        edge_a_[i].x[k] = Number<1>::difference(t.a[next][k], t.a[i][k], unit, n);
-        edge_b_[i].x[k] = Number<1>::difference(t.b[next][k], t.b[i][k], unit, n);
-        for (int j = 0; j < 3; ++j) offset_[i][j].x[k] = Number<1>::difference(t.a[i][k], t.b[j][k], unit, n);
+        edge_a_[i].x[k].assign_difference(t.a[next][k], t.a[i][k], unit, n);
+        edge_b_[i].x[k].assign_difference(t.b[next][k], t.b[i][k], unit, n);
+        for (int j = 0; j < 3; ++j) offset_[i][j].x[k].assign_difference(t.a[i][k], t.b[j][k], unit, n);
       }
     }
   }
@@ -103,7 +105,7 @@ class Features {
   /// weights), where the square of the distance is P / 1 given (P, One), P / Q given (P, Q) and V^2 / N given
   /// (V, N).
   template <class Visitor>
-  TANDEM_HD bool visit(Visitor& visitor) const {
+  TANDEM_HD bool visit(Visitor& visitor) {
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) {
         if (visit_corners(i, j, visitor) || visit_corner_and_edge(i, j, visitor) ||
@@ -111,9 +113,9 @@ class Features {
           return true;
       }
     }
-    const Vector<1> a[2] = {edge_a_[0], -edge_a_[2]}, b[2] = {edge_b_[0], -edge_b_[2]};
     for (int i = 0; i < 3; ++i) {
-      if (visit_face(a, -offset_[0][i], i, true, visitor) || visit_face(b, offset_[i][0], i, false, visitor))
+      if (visit_face(edge_a_, offset_[0][i], i, true, visitor) ||
+          visit_face(edge_b_, offset_[i][0], i, false, visitor))
         return true;
     }
     return false;
@@ -121,77 +123,111 @@ class Features {
 
  private:
   template <class Visitor>
-  TANDEM_HD bool visit_corners(int i, int j, Visitor& visitor) const {
+  TANDEM_HD bool visit_corners(int i, int j, Visitor& visitor) {
     TriangleWeights weights = {};
     weights.a[i] = weights.b[j] = 1;
-    return visitor.corners(dot(offset_[i][j], offset_[i][j]), weights);
+    assign_dot(offset_[i][j], offset_[i][j], length_, term2_);
+    return visitor.corners(length_, weights);
   }
 
   /// Corner i of a over edge j of b.
   template <class Visitor>
-  TANDEM_HD bool visit_corner_and_edge(int i, int j, Visitor& visitor) const {
-    const auto length = dot(edge_b_[j], edge_b_[j]), along = dot(edge_b_[j], offset_[i][j]);
-    if (length.sign() == 0 || !is_within(along, length)) return false;
+  TANDEM_HD bool visit_corner_and_edge(int i, int j, Visitor& visitor) {
+    assign_dot(edge_b_[j], edge_b_[j], length_, term2_);
+    assign_dot(edge_b_[j], offset_[i][j], along_, term2_);
+    if (length_.sign() == 0 || !is_within(along_, length_)) return false;
     TriangleWeights weights = {};
     weights.a[i] = 1;
-    weights.b[(j + 1) % 3] = share(along, length);
+    weights.b[(j + 1) % 3] = share(along_, length_);
     weights.b[j] = 1 - weights.b[(j + 1) % 3];
-    const auto normal = cross(edge_b_[j], offset_[i][j]);
-    return visitor.corner_and_edge(dot(normal, normal), length, weights);
+    return visit_height(edge_b_[j], offset_[i][j], weights, visitor);
   }
 
   /// Edge i of a below corner j of b.
   template <class Visitor>
-  TANDEM_HD bool visit_edge_and_corner(int i, int j, Visitor& visitor) const {
-    const auto length = dot(edge_a_[i], edge_a_[i]), along = -dot(edge_a_[i], offset_[i][j]);
-    if (length.sign() == 0 || !is_within(along, length)) return false;
+  TANDEM_HD bool visit_edge_and_corner(int i, int j, Visitor& visitor) {
+    assign_dot(edge_a_[i], edge_a_[i], length_, term2_);
+    assign_dot(edge_a_[i], offset_[i][j], along_, term2_);
+    along_.negate();
+    if (length_.sign() == 0 || !is_within(along_, length_)) return false;
     TriangleWeights weights = {};
     weights.b[j] = 1;
-    weights.a[(i + 1) % 3] = share(along, length);
+    weights.a[(i + 1) % 3] = share(along_, length_);
     weights.a[i] = 1 - weights.a[(i + 1) % 3];
-    const auto normal = cross(edge_a_[i], offset_[i][j]);
-    return visitor.corner_and_edge(dot(normal, normal), length, weights);
+    return visit_height(edge_a_[i], offset_[i][j], weights, visitor);
+  }
+
+  /// Over an edge whose square is length_.
+  template <class Visitor>
+  TANDEM_HD bool visit_height(const Vector<1>& edge, const Vector<1>& offset, const TriangleWeights& weights,
+                              Visitor& visitor) {
+    assign_cross(edge, offset, normal_, term2_);
+    assign_dot(normal_, normal_, square_, term4_);
+    return visitor.corner_and_edge(square_, length_, weights);
   }
 
   /// With r the offset, the feet are at s and t along the edges e and f where r + s e - t f is along n = e x
   /// f. Multiplied with n x f and n x e that is s N = -(r x f) . n and t N = (e x r) . n.
   template <class Visitor>
-  TANDEM_HD bool visit_edges(int i, int j, Visitor& visitor) const {
-    const auto normal = cross(edge_a_[i], edge_b_[j]);
-    const auto square = dot(normal, normal);
-    if (square.sign() == 0) return false;
-    const auto s = -dot(cross(offset_[i][j], edge_b_[j]), normal);
-    if (!is_within(s, square)) return false;
-    const auto t = dot(cross(edge_a_[i], offset_[i][j]), normal);
-    if (!is_within(t, square)) return false;
+  TANDEM_HD bool visit_edges(int i, int j, Visitor& visitor) {
+    if (!make_normal(edge_a_[i], edge_b_[j])) return false;
+    assign_along_normal(offset_[i][j], edge_b_[j], s_);
+    s_.negate();
+    if (!is_within(s_, square_)) return false;
+    assign_along_normal(edge_a_[i], offset_[i][j], t_);
+    if (!is_within(t_, square_)) return false;
     TriangleWeights weights = {};
-    weights.a[(i + 1) % 3] = share(s, square);
+    weights.a[(i + 1) % 3] = share(s_, square_);
     weights.a[i] = 1 - weights.a[(i + 1) % 3];
-    weights.b[(j + 1) % 3] = share(t, square);
+    weights.b[(j + 1) % 3] = share(t_, square_);
     weights.b[j] = 1 - weights.b[(j + 1) % 3];
-    return visitor.on_planes(dot(offset_[i][j], normal), square, weights);
+    assign_dot(offset_[i][j], normal_, volume_, term3_);
+    return visitor.on_planes(volume_, square_, weights);
   }
 
-  /// The face with these two edges from its corner 0, and a corner of the other triangle, whose number is
-  /// given, at r from there: r = x u + y v + z n has x N = (r x v) . n and y N = (u x r) . n.
+  /// The face with these edges, of which u = edge[0] and -v = edge[2] have its corner 0, and a corner of the
+  /// other triangle, whose number is given, at r from there: r = x u + y v + z n, n = u x v, has x N = (r x
+  /// v) . n and y N = (u x r) . n. With -v for v, and so -n for n, y N changes its sign; with an offset of -r
+  /// for r, which it is where the face is a's, both do.
   template <class Visitor>
-  TANDEM_HD bool visit_face(const Vector<1> (&edge)[2], const Vector<1>& r, int corner, bool face_of_a,
-                            Visitor& visitor) const {
-    const auto normal = cross(edge[0], edge[1]);
-    const auto square = dot(normal, normal);
-    if (square.sign() == 0) return false;
-    const auto x = dot(cross(r, edge[1]), normal), y = dot(cross(edge[0], r), normal);
-    if (x.sign() < 0 || y.sign() < 0 || !is_within(x + y, square)) return false;
+  TANDEM_HD bool visit_face(const Vector<1> (&edge)[3], const Vector<1>& offset, int corner, bool face_of_a,
+                            Visitor& visitor) {
+    if (!make_normal(edge[0], edge[2])) return false;
+    assign_along_normal(offset, edge[2], s_);
+    assign_along_normal(edge[0], offset, t_);
+    (face_of_a ? s_ : t_).negate();
+    term4_ = s_;
+    term4_.add(t_);
+    if (s_.sign() < 0 || t_.sign() < 0 || !is_within(term4_, square_)) return false;
     TriangleWeights weights = {};
     double *face = face_of_a ? weights.a : weights.b, *other = face_of_a ? weights.b : weights.a;
     other[corner] = 1;
-    face[1] = share(x, square);
-    face[2] = share(y, square);
+    face[1] = share(s_, square_);
+    face[2] = share(t_, square_);
     face[0] = 1 - face[1] - face[2] > 0 ? 1 - face[1] - face[2] : 0;
-    return visitor.on_planes(dot(r, normal), square, weights);
+    assign_dot(offset, normal_, volume_, term3_);
+    return visitor.on_planes(volume_, square_, weights);
+  }
+
+  /// normal_ = u x v and its square. False: they are parallel.
+  TANDEM_HD bool make_normal(const Vector<1>& u, const Vector<1>& v) {
+    assign_cross(u, v, normal_, term2_);
+    assign_dot(normal_, normal_, square_, term4_);
+    return square_.sign() != 0;
+  }
+
+  /// out = (u x v) . normal_.
+  TANDEM_HD void assign_along_normal(const Vector<1>& u, const Vector<1>& v, Number<4>& out) {
+    assign_cross(u, v, across_, term2_);
+    assign_dot(across_, normal_, out, term4_);
   }
 
   Vector<1> edge_a_[3], edge_b_[3], offset_[3][3];
+  // Of the feature that is visited.
+  Vector<2> normal_, across_;
+  Number<2> length_, along_, term2_;
+  Number<3> volume_, term3_;
+  Number<4> square_, s_, t_, term4_;
 };
 
 /// Keeps the least distance, as an interval whose ends differ by less than 2^-49 of it, or by less than two
@@ -247,25 +283,31 @@ template <int kWords>
 class IsWithin {
  public:
   /// The exponents of d are in the range.
-  TANDEM_HD IsWithin(double d, const detail::ExponentRange& range)
-      : distance_(WideNumber<kWords, 1>::difference(d, 0, range.unit, range.words())),
-        square_(distance_ * distance_) {}
+  TANDEM_HD void assign(double d, const detail::ExponentRange& range) {
+    distance_.assign_difference(d, 0, range.unit, range.words());
+    square_.assign_product(distance_, distance_);
+  }
 
   TANDEM_HD bool corners(const WideNumber<kWords, 2>& p, const TriangleWeights&) const {
     return is_within(p, square_);
   }
   TANDEM_HD bool corner_and_edge(const WideNumber<kWords, 4>& p, const WideNumber<kWords, 2>& q,
-                                 const TriangleWeights&) const {
-    return is_within(p, square_ * q);
+                                 const TriangleWeights&) {
+    bound4_.assign_product(square_, q);
+    return is_within(p, bound4_);
   }
   TANDEM_HD bool on_planes(const WideNumber<kWords, 3>& v, const WideNumber<kWords, 4>& n,
-                           const TriangleWeights&) const {
-    return is_within(v * v, square_ * n);
+                           const TriangleWeights&) {
+    square6_.assign_product(v, v);
+    bound6_.assign_product(square_, n);
+    return is_within(square6_, bound6_);
   }
 
  private:
   WideNumber<kWords, 1> distance_;
   WideNumber<kWords, 2> square_;
+  WideNumber<kWords, 4> bound4_;
+  WideNumber<kWords, 6> square6_, bound6_;
 };
 
 /// The distance of triangles that do not meet, as NearestFeatures has it, and where it is. Condition:
@@ -276,17 +318,41 @@ TANDEM_OUT_OF_LINE TANDEM_HD inline DistanceInterval distance_apart(const Triang
                                                                     TriangleWeights& weights) {
   const detail::ExponentRange range = exponents_of(t);
   NearestFeatures nearest(range.unit);
-  Features<kWords>(t, range).visit(nearest);
+  Features<kWords> features;
+  features.assign(t, range);
+  features.visit(nearest);
   weights = nearest.weights();
   return nearest.interval();
 }
 
-/// Whether the distance of triangles that do not meet is at most d. Condition: d >= 0, finite.
-TANDEM_OUT_OF_LINE TANDEM_HD inline bool are_within(const TrianglePair& t, double d) {
+/// The exponents of all corners and of d: what ClearanceDecision goes by.
+TANDEM_HD inline detail::ExponentRange exponents_of(const TrianglePair& t, double d) {
   detail::ExponentRange range = exponents_of(t);
   range.include(d);
-  IsWithin<detail::kMaxWords> within(d, range);
-  return Features<detail::kMaxWords>(t, range).visit(within);
+  return range;
+}
+
+/// Decides clearance in room of its own, which need not be initialised.
+template <int kWords>
+class ClearanceDecision {
+ public:
+  /// Whether the distance of triangles that do not meet is at most d. Condition: d >= 0, finite; range:
+  /// exponents_of() these, of at most kWords words.
+  TANDEM_HD bool are_within(const TrianglePair& t, double d, const detail::ExponentRange& range) {
+    within_.assign(d, range);
+    features_.assign(t, range);
+    return features_.visit(within_);
+  }
+
+ private:
+  IsWithin<kWords> within_;
+  Features<kWords> features_;
+};
+
+/// Whether the distance of triangles that do not meet is at most d. Condition: d >= 0, finite.
+TANDEM_OUT_OF_LINE TANDEM_HD inline bool are_within(const TrianglePair& t, double d) {
+  ClearanceDecision<detail::kMaxWords> decision;
+  return decision.are_within(t, d, exponents_of(t, d));
 }
 
 }  // namespace tandem::exact

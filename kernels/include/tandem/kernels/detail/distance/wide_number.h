@@ -8,7 +8,8 @@
 /// and GPU: what exact distances are made of.
 namespace tandem::exact {
 
-/// A whole number below 2^(32 kWords kDegree) in magnitude, of which only the words in use cost time.
+/// A whole number below 2^(32 kWords kDegree) in magnitude, of which only the words in use cost time. Results
+/// are written in place: wide ones are too large for the stack of a GPU's threads.
 ///
 /// Size. Over the smallest exponent of the coordinates at hand ("unit"), a difference of two coordinates is
 /// below 2^(span + 54), and ExponentRange::words() gives the n for which 32 n >= span + 56 (proof in
@@ -29,33 +30,42 @@ class WideNumber {
   }
 
   /// (a - b) / 2^unit, which is a whole number; n words are enough.
-  TANDEM_HD static WideNumber difference(double a, double b, int unit, int n) {
-    WideNumber out;
-    for (int i = 0; i < n; ++i) out.word_[i] = 0;
-    detail::accumulate(out.word_, n, a, unit, a < 0);
-    detail::accumulate(out.word_, n, b, unit, !(b < 0));
-    detail::normalise(out.word_, n, out.negative_);
-    out.size_ = n;
-    out.trim();
-    return out;
+  TANDEM_HD void assign_difference(double a, double b, int unit, int n) {
+    for (int i = 0; i < n; ++i) word_[i] = 0;
+    detail::accumulate(word_, n, a, unit, a < 0);
+    detail::accumulate(word_, n, b, unit, !(b < 0));
+    detail::normalise(word_, n, negative_);
+    size_ = n;
+    trim();
   }
+
+  /// Neither factor is this number.
+  template <int kX, int kY>
+  TANDEM_HD void assign_product(const WideNumber<kWords, kX>& x, const WideNumber<kWords, kY>& y) {
+    static_assert(kX + kY == kDegree);
+    size_ = x.size_ == 0 || y.size_ == 0 ? 0 : x.size_ + y.size_;
+    negative_ = x.negative_ != y.negative_;
+    if (size_ == 0) return;
+    for (int i = 0; i < size_; ++i) word_[i] = 0;
+    for (int i = 0; i < x.size_; ++i) {
+      std::uint64_t carry = 0;
+      for (int j = 0; j < y.size_; ++j) {
+        carry += std::uint64_t{x.word_[i]} * y.word_[j] + word_[i + j];
+        word_[i + j] = static_cast<std::uint32_t>(carry);
+        carry >>= 32;
+      }
+      word_[i + y.size_] = static_cast<std::uint32_t>(carry);
+    }
+    trim();
+  }
+
+  TANDEM_HD void add(const WideNumber& y) { add(y, y.negative_); }
+  TANDEM_HD void subtract(const WideNumber& y) { add(y, !y.negative_); }
+  TANDEM_HD void negate() { negative_ = !negative_; }
 
   TANDEM_HD int sign() const { return size_ == 0 ? 0 : negative_ ? -1 : 1; }
   TANDEM_HD int size() const { return size_; }
   TANDEM_HD std::uint32_t word(int i) const { return i < size_ ? word_[i] : 0; }
-
-  TANDEM_HD WideNumber operator-() const {
-    WideNumber out = *this;
-    out.negative_ = !negative_;
-    return out;
-  }
-
-  TANDEM_HD friend WideNumber operator+(const WideNumber& x, const WideNumber& y) {
-    return sum(x, y, y.negative_);
-  }
-  TANDEM_HD friend WideNumber operator-(const WideNumber& x, const WideNumber& y) {
-    return sum(x, y, !y.negative_);
-  }
 
   /// The sign of |x| - |y|.
   TANDEM_HD static int compare_magnitudes(const WideNumber& x, const WideNumber& y) {
@@ -69,58 +79,32 @@ class WideNumber {
  private:
   template <int, int>
   friend class WideNumber;
-  template <int kW, int kX, int kY>
-  TANDEM_HD friend WideNumber<kW, kX + kY> operator*(const WideNumber<kW, kX>& x,
-                                                     const WideNumber<kW, kY>& y);
 
   TANDEM_HD void trim() {
     while (size_ > 0 && word_[size_ - 1] == 0) --size_;
   }
 
-  /// x, and y's magnitude with a sign of choice.
-  TANDEM_HD static WideNumber sum(const WideNumber& x, const WideNumber& y, bool negative_y) {
-    const bool add = x.negative_ == negative_y;
-    const bool x_larger = compare_magnitudes(x, y) >= 0;
-    const WideNumber &more = x_larger ? x : y, &less = x_larger ? y : x;
-    WideNumber out;
-    out.negative_ = x_larger ? x.negative_ : negative_y;
+  /// y's magnitude, with a sign of choice.
+  TANDEM_HD void add(const WideNumber& y, bool negative_y) {
+    const bool alike = negative_ == negative_y, larger = compare_magnitudes(*this, y) >= 0;
+    const int size = size_ < y.size_ ? y.size_ : size_;
     std::int64_t carry = 0;
-    for (int i = 0; i < more.size_; ++i) {
-      const std::int64_t other = less.word(i);
-      carry += static_cast<std::int64_t>(more.word_[i]) + (add ? other : -other);
-      out.word_[i] = static_cast<std::uint32_t>(carry);
+    for (int i = 0; i < size; ++i) {
+      const std::int64_t mine = word(i), other = y.word(i);
+      carry += alike ? mine + other : larger ? mine - other : other - mine;
+      word_[i] = static_cast<std::uint32_t>(carry);
       carry >>= 32;
     }
-    out.size_ = more.size_;
-    if (carry != 0) out.word_[out.size_++] = static_cast<std::uint32_t>(carry);
-    out.trim();
-    return out;
+    if (!larger) negative_ = negative_y;
+    size_ = size;
+    if (carry != 0) word_[size_++] = static_cast<std::uint32_t>(carry);
+    trim();
   }
 
   std::uint32_t word_[kCapacity];  ///< size_ of them, the least significant first, the last one not 0
   int size_;
   bool negative_;
 };
-
-template <int kW, int kX, int kY>
-TANDEM_HD WideNumber<kW, kX + kY> operator*(const WideNumber<kW, kX>& x, const WideNumber<kW, kY>& y) {
-  WideNumber<kW, kX + kY> out;
-  if (x.size_ == 0 || y.size_ == 0) return out;
-  out.size_ = x.size_ + y.size_;
-  out.negative_ = x.negative_ != y.negative_;
-  for (int i = 0; i < out.size_; ++i) out.word_[i] = 0;
-  for (int i = 0; i < x.size_; ++i) {
-    std::uint64_t carry = 0;
-    for (int j = 0; j < y.size_; ++j) {
-      carry += std::uint64_t{x.word_[i]} * y.word_[j] + out.word_[i + j];
-      out.word_[i + j] = static_cast<std::uint32_t>(carry);
-      carry >>= 32;
-    }
-    out.word_[i + y.size_] = static_cast<std::uint32_t>(carry);
-  }
-  out.trim();
-  return out;
-}
 
 /// lower * 2^exponent <= a number's magnitude <= upper * 2^exponent; the exponent is even, lower is in
 /// [1, 4), and upper is larger by at most a factor of 1 + 2^-52; or all are 0.

@@ -8,6 +8,7 @@
 #include "gpu_scene_fixture.h"
 #include "kernels/contact_query_fixture.h"
 #include "tandem/formats/gpu_stream.h"
+#include "tandem/kernels/detail/distance/triangle_distance.h"
 #include "tandem/kernels/gpu_distance_query.h"
 
 namespace tandem {

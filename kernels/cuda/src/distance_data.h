@@ -52,7 +52,7 @@ struct alignas(16) NearState {
   Counter best_of_rest;            ///< triangles that have it, besides the first
 };
 
-/// Bounds less the least one of their pair are counted in so many steps, four for each factor of 2, of which
+/// Bounds less the least one of their pair are counted in so many steps, one for each factor of 2, of which
 /// the last ends at NearState::top.
 inline constexpr int kSteps = 32;
 

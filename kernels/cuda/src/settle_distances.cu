@@ -144,15 +144,27 @@ __device__ std::uint32_t as_capacity(Counter counted) {
   return static_cast<std::uint32_t>(counted < kNoIndex ? counted : kNoIndex);
 }
 
+__device__ Counter shuffled(Counter x, int bit) {
+  return __shfl_xor_sync(kAllLanes, x, bit);
+}
+
+/// By a warp.
 __device__ void write_report(const DistanceArgs& args) {
   const DistanceState& state = *args.state;
   GpuDistanceReport report = {};
-  Counter widest = 0, block_pairs = state.narrow_block_pairs;
-  for (std::uint32_t i = 0; i < args.rounds; ++i) {
+  Counter widest = 0, block_pairs = 0, rounds = 0;
+  for (std::uint32_t i = lane_id(); i < args.rounds; i += 32) {
     widest = max(widest, max(state.narrow_rounds[i], state.rounds[i]));
     block_pairs += state.rounds[i];
-    report.rounds += (state.narrow_rounds[i] != 0) + (state.rounds[i] != 0);
+    rounds += (state.narrow_rounds[i] != 0) + (state.rounds[i] != 0);
   }
+  for (int bit = 1; bit < 32; bit <<= 1) {
+    widest = max(widest, shuffled(widest, bit));
+    block_pairs += shuffled(block_pairs, bit);
+    rounds += shuffled(rounds, bit);
+  }
+  if (lane_id() != 0) return;
+  report.rounds = static_cast<std::uint32_t>(rounds);
   const std::uint32_t pairs = *args.given.count;
   report.needed = {pairs, as_capacity(widest), as_capacity(max(state.seeds, state.near)),
                    as_capacity(state.rest), max(state.words, kFewWords)};
@@ -163,7 +175,7 @@ __device__ void write_report(const DistanceArgs& args) {
   report.world_pairs = state.world_pairs;
   DistanceCounters& counters = report.counters;
   counters.object_pairs = pair_count(args);
-  counters.block_pairs = block_pairs;
+  counters.block_pairs = state.narrow_block_pairs + block_pairs;
   counters.by_float32 = state.seeds + state.near;
   counters.by_float64 = state.settled + state.rest;
   counters.touching = now(state.touching);
@@ -200,7 +212,7 @@ __global__ void __launch_bounds__(kThreads) finish(const __grid_constant__ Dista
     write(args.rest_distances[i], entry.a, entry.b, args.distances[entry.pair]);
     finish_row(args, entry.pair, true);
   }
-  if (ends_last(args) && threadIdx.x == 0) write_report(args);
+  if (ends_last(args) && threadIdx.x < 32) write_report(args);
 }
 
 template <int kWords>

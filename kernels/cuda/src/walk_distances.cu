@@ -8,20 +8,21 @@
 namespace tandem::gpu {
 namespace {
 
-constexpr std::uint32_t kThreads = 128, kBlocksPerProcessor = 6;
+constexpr std::uint32_t kThreads = 128, kBlocksPerProcessor = 5;
 constexpr std::uint32_t kLanes = kNodesPerBlock * kNodesPerBlock;
 constexpr int kTurns = 4;  // block pairs of half a warp whose children are appended at once
 
 // How many block pairs a round of the narrow walk has for each pair: as many as the GPU takes at once, spread
-// over the pairs that are walked. From 64 on the bound is the distance, but for one pair in a hundred
+// over the pairs that are walked. From 32 on the bound is the distance, but for few pairs in a hundred
 // (docs/decisions/0062).
-constexpr std::uint32_t kNarrowRound = 1u << 15, kFewestNarrow = 64, kMostNarrow = 1u << 12;
+constexpr std::uint32_t kNarrowRound = 1u << 14, kFewestNarrow = 32, kMostNarrow = 1u << 10;
 
 /// What a lane makes of its node pair of a block pair.
 struct Visit {
   bool has_below, has_triangles;
   BlockPairEntry below;
-  float bound;  ///< of `below`
+  float bound;    ///< of `below`
+  bool is_least;  ///< of the node pairs that have the same node of a
   std::uint32_t triangle_a, triangle_b;
 };
 
@@ -40,6 +41,7 @@ __device__ Visit follow(const BlockPairEntry& entry, const Block& a, const Block
   const bool leaves_a = a.is_leaf_block(), leaves_b = b.is_leaf_block();
   Visit out = {};
   out.has_triangles = hit && leaves_a && leaves_b;
+  out.is_least = bound <= of_row;
   out.triangle_a = a.index[i];
   out.triangle_b = b.index[j];
   if (hits == 0 || (leaves_a && leaves_b)) return out;
@@ -167,7 +169,7 @@ class Round {
       if (kNarrow) next.mask |= count_in(args_.narrowings[entry.pair], state.top, found.bound) << 16;
       below.put(turn, next);
     }
-    if (found.has_triangles && !is_far(record, state, found))
+    if (found.has_triangles && (kNarrow ? found.is_least : !is_far(record, state, found)))
       triangles.put(turn, {entry.pair, found.triangle_a, found.triangle_b});
   }
 
@@ -194,7 +196,7 @@ class Round {
     const std::uint32_t next = (number_ + 1) % 3;
     const float least = __uint_as_float(~narrowing.least[number_ % 3]), above = bound - least;
     int step = 0;
-    if (above > 0) step = max(((__float_as_int(above) - __float_as_int(top)) >> 21) + kSteps - 1, 0);
+    if (above > 0) step = max(((__float_as_int(above) - __float_as_int(top)) >> 23) + kSteps - 1, 0);
     step = min(step, kSteps - 1);
     atomicAdd(&narrowing.steps[next][step], 1u);
     const std::uint32_t complement = ~__float_as_uint(bound);
@@ -205,7 +207,7 @@ class Round {
 
   /// Whether the direction of the nearest triangles so far tells that these are no nearer.
   __device__ static bool is_far(const DistanceRecord& record, const NearState& state, const Visit& found) {
-    if (kNarrow || record.pair.in_frame == 0) return false;
+    if (record.pair.in_frame == 0) return false;
     return distance::is_far_along(
         stored_triangle(record.pair.triangles_a[found.triangle_a]).corner,
         posed_triangle(pose_of(record.pair), record.pair.triangles_b[found.triangle_b]).corner, state.along);

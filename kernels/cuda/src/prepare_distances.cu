@@ -86,7 +86,7 @@ __device__ bool prepare_pair(const DistanceArgs& args, std::uint32_t index) {
     state.limit = state.open_limit = in_frame ? distance::limit_of(frame, args.beyond_reach) : INFINITY;
     state.top = fminf(state.limit, static_cast<float>(in_frame ? farthest * farthest : farthest));
     if (!in_frame) atomicAdd(&args.state->world_pairs, Counter{1});
-    if (pair.a == pair.b) state.seed = triangles_as_number(0, 0);
+    if (pair.a == pair.b) state.first = triangles_as_number(0, 0);
     walked = pair.a != pair.b && (!in_frame || has_near_roots(record, frame, state.limit));
   }
   args.near_states[index] = state;

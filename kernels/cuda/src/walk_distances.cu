@@ -22,7 +22,7 @@ struct Visit {
   bool has_below, has_triangles;
   BlockPairEntry below;
   float bound;    ///< of `below`
-  bool is_least;  ///< of the node pairs that have the same node of a
+  bool is_least;  ///< of the node pairs that have the same node of a, or of b
   std::uint32_t triangle_a, triangle_b;
 };
 
@@ -41,7 +41,7 @@ __device__ Visit follow(const BlockPairEntry& entry, const Block& a, const Block
   const bool leaves_a = a.is_leaf_block(), leaves_b = b.is_leaf_block();
   Visit out = {};
   out.has_triangles = hit && leaves_a && leaves_b;
-  out.is_least = bound <= of_row;
+  out.is_least = bound <= of_row || bound <= of_column;
   out.triangle_a = a.index[i];
   out.triangle_b = b.index[j];
   if (hits == 0 || (leaves_a && leaves_b)) return out;
@@ -53,12 +53,12 @@ __device__ Visit follow(const BlockPairEntry& entry, const Block& a, const Block
     out.bound = bound;
   } else if (descent == Descent::a_alone) {
     const std::uint32_t row = hits >> kNodesPerBlock * i & 0xFu;
-    out.has_below = j == 0 && row != 0;
+    out.has_below = out.is_least = j == 0 && row != 0;
     out.below = {entry.pair, a.index[i], entry.b, row * 0x1111u};
     out.bound = of_row;
   } else {
     const std::uint32_t column = hits >> j & 0x1111u;
-    out.has_below = i == 0 && column != 0;
+    out.has_below = out.is_least = i == 0 && column != 0;
     out.below = {entry.pair, entry.a, b.index[j], column * 0xFu};
     out.bound = of_column;
   }
@@ -164,7 +164,8 @@ class Round {
         hit = is_near_in_world(record, state, a, i, b, j, bound);
     }
     const Visit found = follow(entry, a, b, hit, hit ? bound : INFINITY);
-    if (found.has_below) {
+    // The narrow walk takes the nearest of each node: nearly half fewer, and to the same triangles mostly.
+    if (found.has_below && (!kNarrow || found.is_least)) {
       BlockPairEntry next = found.below;
       if (kNarrow) next.mask |= count_in(args_.narrowings[entry.pair], state.top, found.bound) << 16;
       below.put(turn, next);
@@ -220,7 +221,7 @@ class Round {
 };
 
 template <bool kNarrow>
-__global__ void __launch_bounds__(kThreads)
+__global__ void __launch_bounds__(kThreads, kBlocksPerProcessor)
     walk_round(const __grid_constant__ DistanceArgs args, std::uint32_t number) {
   wait_for_kernel_before();
   Round<kNarrow>(args, number).run();

@@ -47,7 +47,7 @@ constexpr std::size_t most_distance_bytes(const GpuDistanceCapacity& capacity, s
 /// The outcome of a query. It lies in GPU memory, and in CPU memory once the stream has come to the query's
 /// end.
 struct GpuDistanceReport {
-  Status status;               ///< kOk, or what find_distances() of DistanceQuery names
+  Status status;               ///< kOk, or what find_distances() of DistanceQuery names; then no distances
   std::uint32_t complete;      ///< 0 where something did not fit, see `needed`; then distances mean nothing
   std::uint64_t where;         ///< the instance or pair that caused an error
   GpuDistanceCapacity needed;  ///< a lower bound; exact for what follows from things that did fit

@@ -29,7 +29,8 @@ struct GpuDistanceCapacity {
   std::uint32_t triangle_pairs = 0;  ///< that boxes and the direction of the nearest leave
   std::uint32_t settled = 0;         ///< of these, besides the first of each object pair: bounded by float64
   /// 32-bit words of a coordinate in exact arithmetic. What float64 leaves too wide needs 2 or 3, as a rule,
-  /// and at most kMaxWords. Beyond kFewWords, CUDA keeps 12 KB of stack for each thread that the GPU holds.
+  /// and at most kMaxWords. Up to kFewWords, CUDA keeps 4.5 KB of stack for each thread that the GPU holds,
+  /// and 24 KB beyond.
   std::uint32_t words = 0;
 };
 

@@ -19,6 +19,8 @@ static_assert(most_distance_bytes({0, 1, 1, 1, 0}, 0) - most_distance_bytes({}, 
               2 * sizeof(gpu::BlockPairEntry) + sizeof(gpu::TrianglePairEntry) + sizeof(gpu::FrameBounds) +
                   sizeof(gpu::TrianglePairEntry) + sizeof(TriangleDistance));
 
+static_assert(sizeof(gpu::DistanceState) <= most_distance_bytes({}, 0));
+
 /// What is there before a query tells what it needs.
 constexpr std::uint32_t kFirstRoom = 1u << 16;
 

@@ -63,8 +63,6 @@ class NearestScalarMeans {
   const NearestTask& task_;
 };
 
-/// Bounds are the largest gap of the world boxes along an axis, which rounding makes larger by at most a
-/// factor of 1 + 2^-53.
 class NearestWorldBoxMeans {
  public:
   using Bound = double;
@@ -82,11 +80,8 @@ class NearestWorldBoxMeans {
       for (int j = 0; j < kNodesPerBlock; ++j) {
         if (b.kind[j] == NodeKind::imaginary) continue;
         const WorldBox box_b = node_world_box(task_.b->pose, b, j);
-        double gap = 0;
-        for (int k = 0; k < 3; ++k)
-          gap = std::max({gap, box_b.lo[k] - box_a.hi[k], box_a.lo[k] - box_b.hi[k]});
         const int bit = 4 * i + j;
-        out[bit] = gap * (1 - 0x1p-52);
+        out[bit] = distance_between(box_a, box_b);
         if (out[bit] < limit) mask |= 1u << bit;
       }
     }
@@ -117,9 +112,7 @@ NearestTask nearest_task(const PosedTree& a, const PosedTree& b, const DistanceT
 }
 
 double nearness(const NearestTask& task, const NearestSoFar& state) {
-  if (!state.found) return state.upper;
-  constexpr double kLeast = 0x1p-1074;
-  return std::max(state.upper - allowed_width(task.tolerance, state.upper), kLeast);
+  return state.found ? nearness_below(task.tolerance, state.upper) : state.upper;
 }
 
 float bound_limit(const NearestTask& task, double distance) {
@@ -202,11 +195,9 @@ namespace {
 // that are left have their nearest corner or edge in common with it, and so all but the same distance.
 double distance_along_best(const NearestTask& task, const NearCandidate& candidate,
                            const NearestSoFar& state) {
-  const distance::LocalPair local = distance::local_pair(posed_pair(
-      task.a->pose, task.a->tree.triangles[candidate.a], task.b->pose, task.b->tree.triangles[candidate.b]));
-  if (!local.in_range()) return 0;
-  const double(&p)[3] = state.best.point_a, (&q)[3] = state.best.point_b;
-  return distance::distance_along(local, {{p[0] - q[0], p[1] - q[1], p[2] - q[2]}});
+  return distance::distance_along_points(posed_pair(task.a->pose, task.a->tree.triangles[candidate.a],
+                                                    task.b->pose, task.b->tree.triangles[candidate.b]),
+                                         state.best.point_a, state.best.point_b);
 }
 
 }  // namespace

@@ -8,8 +8,10 @@
 #include <new>
 #include <thread>
 
+#include "backend.h"
 #include "common/json.h"
 #include "common/number_words.h"
+#include "engines/registry.h"
 #include "scenes/contacts_file.h"
 #include "scenes/distance_file.h"
 #include "scenes/hdf5_file.h"
@@ -20,10 +22,21 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 struct DistanceArguments {
-  std::string scene, out;
+  std::string scene, out, backend = "cpu";
   DistanceOptions options;
   std::uint32_t repeats = 1;
-  bool json = false;
+  bool json = false, threads_given = false;
+
+  bool on_gpu() const { return backend == "cuda"; }
+};
+
+struct Answer {
+  std::vector<ObjectPair> pairs;
+  std::vector<ObjectDistance> distances;
+  DistanceRecord record;
+  std::uint32_t rounds = 0;  // of the GPU's
+  Seconds nearest;
+  GpuUse gpu;
 };
 
 void require(const std::string& scene, const DistanceQuery& query, Status status) {
@@ -31,78 +44,130 @@ void require(const std::string& scene, const DistanceQuery& query, Status status
   if (status != Status::kOk) refuse(scene, status, query.where());
 }
 
+void run_on_cpu(const DistanceArguments& arguments, const BodiesApart& bodies, Answer& answer) {
+  DistanceOptions options = arguments.options;
+  options.filter = &bodies.filter;
+  DistanceQuery query;
+  require(arguments.scene, query, query.set_assets(bodies.shapes));
+  for (std::uint32_t i = 0; i < arguments.repeats; ++i) {
+    Stopwatch watch;
+    const Status status = bodies.given != nullptr
+                              ? query.find_distances(bodies.bodies, *bodies.given, options)
+                              : query.find_distances(bodies.bodies, options);
+    answer.record.seconds.push_back(watch.lap());
+    require(arguments.scene, query, status);
+  }
+  answer.record.counters = query.counters();
+  answer.pairs.assign(query.pairs().begin(), query.pairs().end());
+  answer.distances.assign(query.distances().begin(), query.distances().end());
+}
+
+void run_on_gpu(const DistanceArguments& arguments, const BodiesApart& bodies, Answer& answer) {
+  try {
+    TimedDistances timed = distances_on_gpu()(bodies, arguments.repeats);
+    answer.record.seconds = timed.seconds;
+    answer.record.counters = timed.counters;
+    answer.pairs = std::move(timed.pairs);
+    answer.distances = std::move(timed.distances);
+    answer.rounds = timed.rounds;
+    answer.nearest = timed.nearest;
+    answer.gpu = timed.gpu;
+  } catch (const EngineError& error) {
+    refuse(arguments.scene, error.status, error.where);
+  } catch (const GpuError& error) {
+    refuse_gpu(arguments.scene, error);
+  }
+}
+
 // Runs the query as often as asked; the answer is the last run's, which is every run's.
-DistanceRecord run_query(const DistanceArguments& arguments, const Scene& scene, DistanceQuery& query) {
+Answer run_query(const DistanceArguments& arguments, const Scene& scene) {
   const SceneDescription& description = scene.description;
+  const std::vector<AssetView> shapes = scene.views();
   const std::vector<ObjectPair> pairs = normalised(description.pairs.value_or(std::vector<ObjectPair>()));
   ExcludedPairTable excluded;
-  const PairFilter filter = description.filter.view(excluded);
-  DistanceOptions options = arguments.options;
-  options.filter = &filter;
-  DistanceRecord record;
-  record.backend = "cpu";
+  const DistanceOptions& options = arguments.options;
+  const BodiesApart bodies = {shapes,
+                              description.instances,
+                              options.tolerance,
+                              options.reach,
+                              description.pairs ? &pairs : nullptr,
+                              description.filter.view(excluded)};
+  Answer answer;
+  DistanceRecord& record = answer.record;
+  record.backend = arguments.backend;
   record.tolerance = options.tolerance;
   record.reach = options.reach;
   record.given_pairs = description.pairs.has_value();
-  record.threads = options.threads;
-  require(arguments.scene, query, query.set_assets(scene.views()));
-  for (std::uint32_t i = 0; i < arguments.repeats; ++i) {
-    Stopwatch watch;
-    const Status status = description.pairs ? query.find_distances(description.instances, pairs, options)
-                                            : query.find_distances(description.instances, options);
-    record.seconds.push_back(watch.lap());
-    require(arguments.scene, query, status);
-  }
-  record.counters = query.counters();
-  return record;
+  record.threads = arguments.on_gpu() ? 0 : options.threads;
+  (arguments.on_gpu() ? run_on_gpu : run_on_cpu)(arguments, bodies, answer);
+  return answer;
 }
 
 // Infinite where there are no pairs.
-double least_upper(const DistanceQuery& query) {
+double least_upper(const std::vector<ObjectDistance>& distances) {
   double least = kInfinity;
-  for (const ObjectDistance& distance : query.distances()) least = std::min(least, distance.upper);
+  for (const ObjectDistance& distance : distances) least = std::min(least, distance.upper);
   return least;
+}
+
+Json times(const Seconds& seconds) {
+  return {{"best", best_of(seconds)}, {"median", median_of(seconds)}, {"all", seconds}};
 }
 
 Json finite_or_null(double x) {
   return std::isfinite(x) ? Json(x) : Json();
 }
 
-Json to_json(const DistanceArguments& arguments, const Scene& scene, const DistanceRecord& record,
-             const DistanceQuery& query) {
-  return {
-      {"tool", "bvhbench distance"},
-      {"version", TANDEM_VERSION},
-      {"scene", arguments.scene},
-      {"output", arguments.out.empty() ? Json() : Json(arguments.out)},
-      {"backend", record.backend},
-      {"reach", finite_or_null(record.reach)},
-      {"absolute_tolerance", record.tolerance.absolute},
-      {"relative_tolerance", record.tolerance.relative},
-      {"given_pairs", record.given_pairs},
-      {"threads", record.threads},
-      {"assets", scene.assets.size()},
-      {"instances", scene.description.instances.size()},
-      {"triangles", triangles_of(scene)},
-      {"object_pairs", record.counters.object_pairs},
-      {"touching", record.counters.touching},
-      {"block_pairs", record.counters.block_pairs},
-      {"by_float32", record.counters.by_float32},
-      {"by_float64", record.counters.by_float64},
-      {"least", finite_or_null(least_upper(query))},
-      {"hash", hexadecimal(hash_of(query.pairs(), query.distances()))},
-      {"seconds",
-       {{"best", best_of(record.seconds)}, {"median", median_of(record.seconds)}, {"all", record.seconds}}}};
+Json to_json(const DistanceArguments& arguments, const Scene& scene, const Answer& answer) {
+  const DistanceRecord& record = answer.record;
+  Json json = {{"tool", "bvhbench distance"},
+               {"version", TANDEM_VERSION},
+               {"scene", arguments.scene},
+               {"output", arguments.out.empty() ? Json() : Json(arguments.out)},
+               {"backend", record.backend},
+               {"reach", finite_or_null(record.reach)},
+               {"absolute_tolerance", record.tolerance.absolute},
+               {"relative_tolerance", record.tolerance.relative},
+               {"given_pairs", record.given_pairs},
+               {"threads", record.threads},
+               {"assets", scene.assets.size()},
+               {"instances", scene.description.instances.size()},
+               {"triangles", triangles_of(scene)},
+               {"object_pairs", record.counters.object_pairs},
+               {"touching", record.counters.touching},
+               {"block_pairs", record.counters.block_pairs},
+               {"by_float32", record.counters.by_float32},
+               {"by_float64", record.counters.by_float64},
+               {"least", finite_or_null(least_upper(answer.distances))},
+               {"hash", hexadecimal(hash_of(answer.pairs, answer.distances))},
+               {"seconds", times(record.seconds)}};
+  if (arguments.on_gpu()) {
+    json["rounds"] = answer.rounds;
+    json["gpu"] = answer.gpu.name;
+    json["gpu_bytes"] = answer.gpu.bytes;
+    json["gpu_bytes_bound"] = answer.gpu.bytes_bound;
+    json["gpu_bytes_taken"] = answer.gpu.bytes_taken;
+    json["upload_seconds"] = answer.gpu.upload;
+    json["distances_seconds"] = times(answer.nearest);
+  }
+  return json;
 }
 
 void print_row(const char* label, std::uint64_t value, const char* remark = "") {
   std::printf("  %-14s %15s%s\n", label, with_commas(value).c_str(), remark);
 }
 
-void print_summary(const DistanceArguments& arguments, const Scene& scene, const DistanceRecord& record,
-                   const DistanceQuery& query) {
-  std::printf("%s: distances on %s, %s %s\n", arguments.scene.c_str(), record.backend.c_str(),
-              with_commas(record.threads).c_str(), record.threads == 1 ? "thread" : "threads");
+void print_times(const char* label, const Seconds& seconds) {
+  std::printf("  %-14s %15.3f  best of %zu, median %.3f\n", label, 1e3 * best_of(seconds), seconds.size(),
+              1e3 * median_of(seconds));
+}
+
+void print_summary(const DistanceArguments& arguments, const Scene& scene, const Answer& answer) {
+  const DistanceRecord& record = answer.record;
+  const std::string place =
+      arguments.on_gpu() ? answer.gpu.name
+                         : with_commas(record.threads) + (record.threads == 1 ? " thread" : " threads");
+  std::printf("%s: distances on %s, %s\n", arguments.scene.c_str(), record.backend.c_str(), place.c_str());
   print_row("instances", scene.description.instances.size());
   print_row("triangles", triangles_of(scene));
   print_row("object pairs", record.counters.object_pairs, record.given_pairs ? "  given" : "  found");
@@ -110,25 +175,26 @@ void print_summary(const DistanceArguments& arguments, const Scene& scene, const
   print_row("block pairs", record.counters.block_pairs);
   print_row("triangle pairs", record.counters.by_float32);
   print_row("  by float64", record.counters.by_float64);
-  std::printf("  %-14s %15.6g\n", "least", least_upper(query));
-  std::printf("  %-14s %15.3f  best of %zu, median %.3f\n", "milliseconds", 1e3 * best_of(record.seconds),
-              record.seconds.size(), 1e3 * median_of(record.seconds));
-  std::printf("  %-14s %s\n", "hash", hexadecimal(hash_of(query.pairs(), query.distances())).c_str());
+  if (arguments.on_gpu()) print_row("rounds", answer.rounds);
+  std::printf("  %-14s %15.6g\n", "least", least_upper(answer.distances));
+  print_times("milliseconds", record.seconds);
+  if (arguments.on_gpu()) print_times("  distances", answer.nearest);
+  std::printf("  %-14s %s\n", "hash", hexadecimal(hash_of(answer.pairs, answer.distances)).c_str());
 }
 
 ExitCode run(const DistanceArguments& arguments) {
+  if (arguments.on_gpu() && arguments.threads_given) throw UsageError("--threads is for the backend cpu");
   const Scene scene = read_scene(arguments.scene);
   if (!arguments.out.empty()) {
     keep_inputs(arguments.out, files_of(arguments.scene, scene));
     try_output(arguments.out);
   }
-  DistanceQuery query;
-  const DistanceRecord record = run_query(arguments, scene, query);
-  if (!arguments.out.empty()) write_distances(arguments.out, query.pairs(), query.distances(), record);
+  const Answer answer = run_query(arguments, scene);
+  if (!arguments.out.empty()) write_distances(arguments.out, answer.pairs, answer.distances, answer.record);
   if (arguments.json) {
-    std::puts(pretty(to_json(arguments, scene, record, query)).c_str());
+    std::puts(pretty(to_json(arguments, scene, answer)).c_str());
   } else {
-    print_summary(arguments, scene, record, query);
+    print_summary(arguments, scene, answer);
   }
   return kDone;
 }
@@ -141,6 +207,7 @@ CLI::App* add_distance(CLI::App& app, Run& run_later) {
   options.threads = std::max(1u, std::thread::hardware_concurrency());
   CLI::App* command = app.add_subcommand("distance", "find how near the bodies of a scene are");
   command->add_option("SCENE", arguments->scene, "scene file (HDF5)")->required()->check(file_name());
+  add_backend(*command, arguments->backend);
   command->add_option("--reach", options.reach, "pairs farther apart than this are only told to be so")
       ->check(between(0, kInfinity))
       ->option_text("D [no limit]");
@@ -154,16 +221,20 @@ CLI::App* add_distance(CLI::App& app, Run& run_later) {
                    "or how wide in units of length, if that is more")
       ->check(between(0, kInfinity))
       ->option_text("A [0]");
-  command->add_option("--threads", options.threads, "threads; the distances do not depend on them")
-      ->check(CLI::Range(1u, kMostQueryThreads))
-      ->option_text("N [all]");
+  CLI::Option* threads =
+      command->add_option("--threads", options.threads, "threads; the distances do not depend on them")
+          ->check(CLI::Range(1u, kMostQueryThreads))
+          ->option_text("N [all]");
   command->add_option("--repeat", arguments->repeats, "times to run the query, for its timing")
       ->check(CLI::Range(1, 1000000))
       ->option_text("N [1]");
   command->add_option("--out", arguments->out, "the distances file to write; appears whole or not at all")
       ->check(file_name());
   command->add_flag("--json", arguments->json, "print the summary as JSON");
-  command->final_callback([arguments, &run_later] { run_later = [arguments] { return run(*arguments); }; });
+  command->final_callback([arguments, threads, &run_later] {
+    arguments->threads_given = threads->count() > 0;
+    run_later = [arguments] { return run(*arguments); };
+  });
   return command;
 }
 

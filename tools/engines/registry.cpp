@@ -78,6 +78,11 @@ std::unique_ptr<Engine> make_engine(std::string_view name, const QueryOptions& o
   return entry->make(options);
 }
 
+DistancesOnGpu* distances_on_gpu() {
+  constexpr DistancesOnGpu* kFound = TANDEM_HAVE_CUDA ? time_distances_on_gpu : nullptr;
+  return kFound;
+}
+
 std::vector<std::string_view> peer_names() {
   std::vector<std::string_view> names;
   for (const Entry& entry : kEntries) {

@@ -53,6 +53,18 @@ TANDEM_HD inline bool overlap(const WorldBox& a, const WorldBox& b) {
   return overlap;
 }
 
+/// A lower bound of the distance of what is in two boxes: the largest gap along an axis, which rounding makes
+/// larger by at most a factor of 1 + 2^-53.
+TANDEM_HD inline double distance_between(const WorldBox& a, const WorldBox& b) {
+  double gap = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double above = b.lo[k] - a.hi[k], below = a.lo[k] - b.hi[k];
+    gap = above > gap ? above : gap;
+    gap = below > gap ? below : gap;
+  }
+  return gap * (1 - 0x1p-52);
+}
+
 /// Whether along each axis no gap as computed is larger than `reach`; with 0, whether they meet.
 TANDEM_HD inline bool are_near(const WorldBox& a, const WorldBox& b, double reach) {
   bool near = true;

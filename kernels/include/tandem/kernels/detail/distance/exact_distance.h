@@ -310,12 +310,15 @@ class IsWithin {
   WideNumber<kWords, 6> square6_, bound6_;
 };
 
-/// The distance of triangles that do not meet, as NearestFeatures has it, and where it is.
+/// The distance of triangles that do not meet, as NearestFeatures has it, and where it is. Condition:
+/// exponents_of(t).words() <= kWords, which holds for all triangles with the most words; fewer take less of
+/// the stack.
+template <int kWords = detail::kMaxWords>
 TANDEM_OUT_OF_LINE TANDEM_HD inline DistanceInterval distance_apart(const TrianglePair& t,
                                                                     TriangleWeights& weights) {
   const detail::ExponentRange range = exponents_of(t);
   NearestFeatures nearest(range.unit);
-  Features<detail::kMaxWords> features;
+  Features<kWords> features;
   features.assign(t, range);
   features.visit(nearest);
   weights = nearest.weights();

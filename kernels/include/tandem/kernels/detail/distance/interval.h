@@ -28,6 +28,14 @@ TANDEM_HD inline bool is_narrow(const DistanceInterval& interval, const Distance
   return interval.upper - interval.lower <= allowed_width(tolerance, interval.upper);
 }
 
+/// How near a pair must be to count beside an upper bound: nearer than this. What may touch counts, whatever
+/// the tolerance.
+TANDEM_HD inline double nearness_below(const DistanceTolerance& tolerance, double upper) {
+  constexpr double kLeast = 0x1p-1074;
+  const double near = upper - allowed_width(tolerance, upper);
+  return near > kLeast ? near : kLeast;
+}
+
 /// Points of two triangles as sums of corners: weights are in [0, 1] and sum to 1, up to rounding.
 struct TriangleWeights {
   double a[3], b[3];

@@ -193,6 +193,14 @@ TANDEM_HD inline void find_common_point(const LocalPair& pair, TriangleWeights& 
   }
 }
 
+/// A lower bound of the distance: how far apart the triangles are along the direction of two points.
+TANDEM_HD inline double distance_along_points(const TrianglePair& t, const double (&point_a)[3],
+                                              const double (&point_b)[3]) {
+  const LocalPair local = local_pair(t);
+  if (!local.in_range()) return 0;
+  return distance_along(local, {{point_a[0] - point_b[0], point_a[1] - point_b[1], point_a[2] - point_b[2]}});
+}
+
 /// Sums of the corners with these weights.
 TANDEM_HD inline void write_points(const TrianglePair& t, const TriangleWeights& weights,
                                    TriangleDistance& out) {
@@ -206,13 +214,12 @@ TANDEM_HD inline void write_points(const TrianglePair& t, const TriangleWeights&
 
 }  // namespace distance
 
-/// The distance of two triangles: an interval as narrow as `tolerance` asks for, and where it is. The
-/// interval is 0, 0 exactly where the triangles meet; the points are then one point that both have, up to
-/// rounding, where coordinates differ by 2^-200 to 2^200 (else any points of them). Condition: corners are at
-/// most kLargestWorldCoordinate in magnitude.
-TANDEM_HD inline TriangleDistance triangle_distance(const TrianglePair& t,
-                                                    const DistanceTolerance& tolerance = {}) {
-  TriangleDistance out;
+/// The distance of two triangles by whole numbers of at most so many words a coordinate: an interval, 0, 0
+/// exactly where the triangles meet, and where it is. False: the interval is wider than `tolerance` asks for,
+/// and more words would make it narrow. With the most words that is never so.
+template <int kWords>
+TANDEM_HD inline bool find_distance(const TrianglePair& t, const DistanceTolerance& tolerance,
+                                    TriangleDistance& out) {
   TriangleWeights weights = {};
   const distance::LocalPair local = distance::local_pair(t);
   if (local.in_range()) {
@@ -227,12 +234,26 @@ TANDEM_HD inline TriangleDistance triangle_distance(const TrianglePair& t,
       out.interval = {0, 0};
       if (local.in_range()) distance::find_common_point(local, weights);
       distance::write_points(t, weights, out);
-      return out;
+      return true;
     }
   }
-  if (out.interval.lower == 0 || !is_narrow(out.interval, tolerance))
-    out.interval = exact::distance_apart(t, weights);
+  bool narrow = out.interval.lower != 0 && is_narrow(out.interval, tolerance);
+  if (!narrow && exact::exponents_of(t).words() <= kWords) {
+    out.interval = exact::distance_apart<kWords>(t, weights);
+    narrow = true;
+  }
   distance::write_points(t, weights, out);
+  return narrow;
+}
+
+/// The distance of two triangles: an interval as narrow as `tolerance` asks for, and where it is. The
+/// interval is 0, 0 exactly where the triangles meet; the points are then one point that both have, up to
+/// rounding, where coordinates differ by 2^-200 to 2^200 (else any points of them). Condition: corners are at
+/// most kLargestWorldCoordinate in magnitude.
+TANDEM_HD inline TriangleDistance triangle_distance(const TrianglePair& t,
+                                                    const DistanceTolerance& tolerance = {}) {
+  TriangleDistance out;
+  find_distance<detail::kMaxWords>(t, tolerance, out);
   return out;
 }
 

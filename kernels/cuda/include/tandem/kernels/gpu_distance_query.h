@@ -1,0 +1,113 @@
+#pragma once
+#include <cuda_runtime_api.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+
+#include "tandem/kernels/distance_query.h"
+#include "tandem/kernels/gpu_scene.h"
+
+namespace tandem {
+
+struct GpuDistanceOptions {
+  DistanceTolerance tolerance = {};
+  /// Pairs that are surely farther apart than this have no nearest points: lower >= reach, upper is infinite.
+  double reach = std::numeric_limits<double>::infinity();
+  /// Of each pair what it was a step ago, in GPU memory; distances() of this query will do. The walk begins
+  /// with the triangles that were nearest; kNoIndex: with none. Results are as certified as without. Those of
+  /// triangles that there are not are passed over. Null: nothing is known.
+  const ObjectDistance* former = nullptr;
+};
+
+/// How many of each a query has room for, or needs room for.
+struct GpuDistanceCapacity {
+  std::uint32_t pairs = 0;           ///< object pairs
+  std::uint32_t block_pairs = 0;     ///< that one round of the walk has
+  std::uint32_t triangle_pairs = 0;  ///< that boxes and the direction of the nearest leave
+  std::uint32_t settled = 0;         ///< of these, besides the first of each object pair: bounded by float64
+  /// 32-bit words of a coordinate in exact arithmetic. What float64 leaves too wide needs 2 or 3, as a rule,
+  /// and at most kMaxWords. Up to kFewWords, CUDA keeps 4.5 KB of stack for each thread that the GPU holds,
+  /// and 24 KB beyond.
+  std::uint32_t words = 0;
+};
+
+inline constexpr std::uint32_t kFewWords = 8;
+
+/// GPU memory that a query of so many assets with room for so much holds at most: the bound of
+/// GpuDistanceQuery::bytes(), where it was never given more of them.
+constexpr std::size_t most_distance_bytes(const GpuDistanceCapacity& capacity, std::size_t assets) {
+  constexpr std::size_t kFixed = 4096;
+  return kFixed + sizeof(GpuAsset) * assets + 788 * std::size_t{capacity.pairs} +
+         32 * std::size_t{capacity.block_pairs} + 20 * std::size_t{capacity.triangle_pairs} +
+         76 * std::size_t{capacity.settled};
+}
+
+/// The outcome of a query. It lies in GPU memory, and in CPU memory once the stream has come to the query's
+/// end.
+struct GpuDistanceReport {
+  Status status;               ///< kOk, or what find_distances() of DistanceQuery names; then no distances
+  std::uint32_t complete;      ///< 0 where something did not fit, see `needed`; then distances mean nothing
+  std::uint64_t where;         ///< the instance or pair that caused an error
+  GpuDistanceCapacity needed;  ///< a lower bound; exact for what follows from things that did fit
+  std::uint64_t world_pairs;   ///< object pairs beyond float32, which are walked by world boxes, slowly
+  std::uint32_t rounds;        ///< of the walk, that had anything to do
+  DistanceCounters counters;
+};
+
+/// Finds how near the surfaces of posed instances are, of many pairs or of few huge ones, on the GPU: the
+/// distances of DistanceQuery, as certified, 0, 0 for the same pairs; not the same bytes, but the same bytes
+/// on every run of one kind of GPU. enqueue() neither waits for the GPU nor allocates. Throws nothing.
+/// Movable, not copyable. An object runs one query at a time: enqueue the next on the same stream, or when
+/// the last has ended. Several objects can run side by side.
+class GpuDistanceQuery {
+ public:
+  GpuDistanceQuery();
+  GpuDistanceQuery(GpuDistanceQuery&&) noexcept;
+  GpuDistanceQuery& operator=(GpuDistanceQuery&&) noexcept;
+  ~GpuDistanceQuery();  ///< waits for the device
+
+  /// Names the assets that instances refer to, on the current device, after what `stream` holds: copies the
+  /// list, and returns when that is done. What the trees point to must outlive the queries. Result: kOk,
+  /// kNoAxisAlignedBlocks (an asset lacks them), kOutOfRange (2^32 - 1 assets), kOutOfGpuMemory,
+  /// kOutOfMemory, or another that status_of() of gpu_status.h names: kNoGpu, kDriverTooOld,
+  /// kGpuNotSupported, kCudaFailed.
+  Status set_assets(std::span<const GpuAsset> assets, cudaStream_t stream);
+
+  /// Makes room for at least so much, waiting for the device where it grows. Result: kOk, kOutOfGpuMemory,
+  /// kCudaFailed; after an error there is the room that there was, or none. Condition: set_assets().
+  Status reserve(const GpuDistanceCapacity& capacity);
+
+  /// Queues a query behind what `stream` holds; it may be captured into a graph. The arrays must stay until
+  /// it is done. Pairs may be in either order of a and b; an instance is at distance 0 from itself. Result:
+  /// kOk, kOutOfRange (a tolerance or reach that is negative or NaN), kCudaFailed, or, where CUDA loads a
+  /// kernel at its first launch and the GPU is full, kOutOfGpuMemory; what the GPU finds wrong is in the
+  /// report. Condition: set_assets() and reserve().
+  Status enqueue(const GpuInstances& instances, const GpuPairs& pairs, const GpuDistanceOptions& options,
+                 cudaStream_t stream);
+
+  /// Enqueues a query and waits for it; where room was too small, makes room and starts again until the query
+  /// is complete: in a steady state once. Result: that of the report, or of a call that failed; kOutOfRange
+  /// where pairs.capacity itself was too small.
+  Status find_distances(const GpuInstances& instances, const GpuPairs& pairs,
+                        const GpuDistanceOptions& options, cudaStream_t stream);
+
+  /// In GPU memory: one for each pair. Valid until the next reserve().
+  const ObjectDistance* distances() const;
+  const GpuDistanceReport* device_report() const;
+
+  /// In CPU memory. Condition: the stream has come to the end of the query.
+  const GpuDistanceReport& report() const;
+
+  GpuDistanceCapacity capacity() const;
+  std::size_t bytes() const;  ///< GPU memory held, at most most_distance_bytes()
+  cudaError_t cuda_error() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace tandem

@@ -166,6 +166,17 @@ TANDEM_HD inline TimeApart time_apart_by_faces(const PairMotion& pair, const Tri
                 time_apart(pair, t, -normal_towards(t.b, t.a), margin));
 }
 
+/// The time up to which two triangles whose boxes may meet need not be advanced: `end` where the planes that
+/// they have at `begin`, where `place` is, tell them apart until then. apart: until when their boxes are.
+TANDEM_HD inline double time_to_advance_from(const PairMotion& pair, const MovingTriangles& start,
+                                             const PairPlace& place, double begin, double end, double apart,
+                                             double tolerance) {
+  const TimeApart by_faces =
+      time_apart_by_faces(pair, triangles_at(pair, start, place), kAim * tolerance);
+  if (by_faces.time >= end - begin) return end;
+  return manifold::greater(begin + by_faces.nearly, apart);
+}
+
 /// Where triangles stop: until `time`, in parts of the step, they are surely apart.
 struct TriangleStop {
   double time;

@@ -103,14 +103,11 @@ __device__ inline Status check_instance(const GpuInstances& instances, const Gpu
   return pose_instance(assets, asset_count, instances.asset[instance], instances.pose[instance], stored, box);
 }
 
-/// The record of a pair of instances whose assets there are, for walks of such blocks.
-__device__ inline PairRecord make_record(const GpuInstances& instances, const GpuAsset* assets,
-                                         const ObjectPair& pair, BlockKind kind) {
-  const GpuAsset &a = assets[instances.asset[pair.a]], &b = assets[instances.asset[pair.b]];
+/// The record of a pair whose two instances have these poses, of stored coordinates, for walks of such blocks.
+__device__ inline PairRecord make_record(const ObjectPair& pair, const GpuAsset& a, const Pose& pose_a,
+                                         const GpuAsset& b, const Pose& pose_b, BlockKind kind) {
   RelativePose pose;
-  const bool in_frame =
-      relative_pose(stored_pose(instances, assets, pair.a), a.extent, stored_pose(instances, assets, pair.b),
-                    b.extent, pose) == RelativePoseStatus::kOk;
+  const bool in_frame = relative_pose(pose_a, a.extent, pose_b, b.extent, pose) == RelativePoseStatus::kOk;
   PairRecord record = {};
   for (int i = 0; i < 3; ++i) {
     const auto &r = pose.rotation[i], &m = pose.abs_rotation[i];
@@ -133,6 +130,13 @@ __device__ inline PairRecord make_record(const GpuInstances& instances, const Gp
   record.instance_b = pair.b;
   record.in_frame = in_frame;
   return record;
+}
+
+/// The same of instances whose assets there are, where they stand.
+__device__ inline PairRecord make_record(const GpuInstances& instances, const GpuAsset* assets,
+                                         const ObjectPair& pair, BlockKind kind) {
+  return make_record(pair, assets[instances.asset[pair.a]], stored_pose(instances, assets, pair.a),
+                     assets[instances.asset[pair.b]], stored_pose(instances, assets, pair.b), kind);
 }
 
 #endif

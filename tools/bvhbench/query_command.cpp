@@ -5,6 +5,7 @@
 #include <new>
 #include <thread>
 
+#include "backend.h"
 #include "common/json.h"
 #include "common/number_words.h"
 #include "contained.h"
@@ -50,23 +51,6 @@ std::string name_of(Value wanted, const std::map<std::string, Value>& names) {
     if (value == wanted) return name;
   }
   return {};
-}
-
-[[noreturn]] void refuse_gpu(const std::string& scene, const GpuError& error) {
-  const std::string why = explain(error.status);
-  switch (error.status) {
-    case Status::kTooManyPairs:
-      refuse(scene, error.status, 0);
-    case Status::kOutOfGpuMemory:
-      throw GpuError("--backend cuda: " + error.step + ": " + why +
-                     (error.reason.empty() ? "" : ": " + error.reason));
-    case Status::kNoGpu:
-    case Status::kDriverTooOld:
-    case Status::kGpuNotSupported:
-      throw GpuError("--backend cuda: " + why + ": " + error.reason);
-    default:
-      throw std::runtime_error("the GPU: " + error.step + ": " + error.reason);
-  }
 }
 
 QueryRecord record_of(const QueryArguments& arguments, const Scene& scene) {
@@ -305,19 +289,6 @@ ExitCode run(const QueryArguments& arguments) {
   return kDone;
 }
 
-bool has_cuda() {
-  return is_built_in("tandem-cuda");
-}
-
-CLI::Validator backend() {
-  const auto defect = [](const std::string& word) -> std::string {
-    if (word == "cpu" || (has_cuda() && word == "cuda")) return {};
-    return word == "cuda" ? "this bvhbench was built without CUDA, so it has no GPU"
-                          : word + " is neither cpu nor cuda";
-  };
-  return CLI::Validator(defect, "");
-}
-
 }  // namespace
 
 CLI::App* add_query(CLI::App& app, Run& run_later) {
@@ -326,9 +297,7 @@ CLI::App* add_query(CLI::App& app, Run& run_later) {
   options.threads = std::max(1u, std::thread::hardware_concurrency());
   CLI::App* command = app.add_subcommand("query", "find every pair of triangles that meet in a scene");
   command->add_option("SCENE", arguments->scene, "scene file (HDF5)")->required()->check(file_name());
-  command->add_option("--backend", arguments->backend, "what the query runs on")
-      ->check(backend())
-      ->option_text(has_cuda() ? "cpu|cuda [cpu]" : "cpu [cpu]");
+  add_backend(*command, arguments->backend);
   if (has_cuda()) {
     add_choice(*command, "--engine", kGpuEngines, arguments->gpu_engine,
                "on a GPU: Tandem's, or the paper's scheme, the yardstick")

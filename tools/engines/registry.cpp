@@ -78,6 +78,11 @@ std::unique_ptr<Engine> make_engine(std::string_view name, const QueryOptions& o
   return entry->make(options);
 }
 
+ImpactsOnGpu* impacts_on_gpu() {
+  constexpr ImpactsOnGpu* kFound = TANDEM_HAVE_CUDA ? time_impacts_on_gpu : nullptr;
+  return kFound;
+}
+
 std::vector<std::string_view> peer_names() {
   std::vector<std::string_view> names;
   for (const Entry& entry : kEntries) {

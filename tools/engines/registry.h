@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "engine.h"
+#include "gpu_impacts.h"
 
 namespace tandem {
 
@@ -17,6 +18,9 @@ bool is_built_in(std::string_view name);
 /// `options`: the mode; and, for Tandem, the rest. Throws std::runtime_error: no engine of this name, one
 /// that is not built in, without a usable GPU, or one that has no such mode.
 std::unique_ptr<Engine> make_engine(std::string_view name, const QueryOptions& options = {});
+
+/// What finds impacts on the GPU, see gpu_impacts.h; null where this program was built without CUDA.
+ImpactsOnGpu* impacts_on_gpu();
 
 /// The libraries that `bvhbench compare` runs, of those built in, in the order of the charts.
 std::vector<std::string_view> peer_names();

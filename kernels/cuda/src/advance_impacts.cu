@@ -126,11 +126,13 @@ __device__ void tell(const ImpactPair& pair, double time, bool in_contact, Impac
 }
 
 __device__ Impact impact_of(const ImpactArgs& args, std::uint32_t index) {
-  Impact out = {args.duration, INFINITY, {0, 0, 0}, {0, 0, 0},        kNoIndex,
-                kNoIndex,      kNoIndex, kNoIndex,  ImpactStatus::none};
+  // What was not sought is not promised: where there is no impact, all of the step was.
+  const double sought = args.sought[index];
+  Impact out = {sought * args.duration, INFINITY, {0, 0, 0}, {0, 0, 0},         kNoIndex,
+                kNoIndex,               kNoIndex, kNoIndex,  ImpactStatus::none};
   const Counter triangles = args.triangles[index];
   if (triangles == kNoTriangles) return out;
-  const bool in_contact = args.sought[index] == 0;
+  const bool in_contact = sought == 0;
   const double time = in_contact ? 0 : __longlong_as_double(static_cast<long long>(args.stops[index]));
   out.status = in_contact ? ImpactStatus::at_start : ImpactStatus::found;
   out.t_safe = time * args.duration * (1 - 0x1p-51);

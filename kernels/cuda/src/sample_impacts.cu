@@ -81,8 +81,10 @@ __global__ void __launch_bounds__(kThreads)
     pose_sample(args, which, i, count);
 }
 
-/// No impact of a pair is later than where its triangles are posed in contact: pose_at() makes those of which
-/// a walk says that they are apart.
+/// No impact of a pair is later than a time at which a walk that is never wrong about contacts finds one
+/// between its triangles as pose_at() makes them: the rounds say *apart* of these triangles too, with
+/// pose_error() of displacement and turn, which are what is posed here. So where a pair has such a time,
+/// something stops it before, or then, and what the rounds leave out is later.
 __global__ void __launch_bounds__(kThreads) end(const __grid_constant__ ImpactArgs args) {
   wait_for_kernel_before();
   const std::uint32_t count = samples_of_pair(args), pairs = args.state->sampled_pairs;

@@ -10,7 +10,8 @@ constexpr std::uint32_t kBodies = 200;
 constexpr double kStep = 1.0 / 60;
 
 // Two sheets of a hundred bodies, shot at each other so fast that they would change places in a step.
-__global__ void place_bodies(std::uint32_t* asset, tandem::Pose* pose, tandem::RigidMotion* motion, double size) {
+__global__ void place_bodies(std::uint32_t* asset, tandem::Pose* pose, tandem::RigidMotion* motion,
+                             double size) {
   const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
   if (i >= kBodies) return;
   const double side = i < kBodies / 2 ? -1 : 1;
@@ -24,12 +25,14 @@ __global__ void place_bodies(std::uint32_t* asset, tandem::Pose* pose, tandem::R
 }
 
 // Carries bodies to where they meet the first other one, or to the end of the step: one thread for all.
-__global__ void move_bodies(tandem::Pose* pose, const tandem::RigidMotion* motion, const tandem::ObjectPair* pairs,
-                            const tandem::Impact* impacts, const tandem::GpuImpactReport* report) {
+__global__ void move_bodies(tandem::Pose* pose, const tandem::RigidMotion* motion,
+                            const tandem::ObjectPair* pairs, const tandem::Impact* impacts,
+                            const tandem::GpuImpactReport* report) {
   double until[kBodies];
   for (std::uint32_t i = 0; i < kBodies; ++i) until[i] = kStep;
   for (std::uint32_t i = 0; i < report->impacts; ++i) {
-    for (const std::uint32_t body : {pairs[i].a, pairs[i].b}) until[body] = fmin(until[body], impacts[i].t_safe);
+    for (const std::uint32_t body : {pairs[i].a, pairs[i].b})
+      until[body] = fmin(until[body], impacts[i].t_safe);
   }
   for (std::uint32_t i = 0; i < kBodies; ++i) pose[i] = tandem::pose_at(pose[i], motion[i], until[i]);
 }
@@ -56,7 +59,8 @@ int main(int argc, char** argv) {
   tandem::GpuArray<std::uint32_t> asset_of_body;
   tandem::GpuArray<tandem::Pose> poses;
   tandem::GpuArray<tandem::RigidMotion> motion;
-  for (const cudaError_t error : {asset_of_body.reserve(kBodies), poses.reserve(kBodies), motion.reserve(kBodies)}) {
+  for (const cudaError_t error :
+       {asset_of_body.reserve(kBodies), poses.reserve(kBodies), motion.reserve(kBodies)}) {
     if (error != cudaSuccess) return fail("bodies", tandem::status_of(error), error);
   }
   const double size = file.view().header->upper[0] - file.view().header->lower[0];
@@ -74,6 +78,7 @@ int main(int argc, char** argv) {
   if (const cudaError_t error = cudaStreamSynchronize(stream); error != cudaSuccess)
     return fail("a step", tandem::status_of(error), error);
   const tandem::ImpactCounters& counters = query.report().counters;
-  std::printf("%llu pairs of bodies, %llu meet in the step\n", static_cast<unsigned long long>(counters.object_pairs),
+  std::printf("%llu pairs of bodies, %llu meet in the step\n",
+              static_cast<unsigned long long>(counters.object_pairs),
               static_cast<unsigned long long>(counters.found));
 }

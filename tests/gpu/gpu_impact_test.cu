@@ -143,7 +143,8 @@ MovingScene shower(std::uint64_t seed, int count, std::uint32_t triangles, doubl
 }
 
 TEST_F(GpuImpacts, OfManyBodiesAreCertifiedAndNearlyThoseOfTheCpu) {
-  for (const MovingScene& moves : {test::moving_crowd(4, 120), shower(5, 60, 1500, 1), shower(6, 40, 1500, 12)}) {
+  for (const MovingScene& moves :
+       {test::moving_crowd(4, 120), shower(5, 60, 1500, 1), shower(6, 40, 1500, 12)}) {
     Moved moved(moves);
     ASSERT_EQ(moved.find(kSorted), Status::kOk);
     const Pairs pairs = moved.pairs(), expected = pairs_of_cpu(moves);

@@ -287,11 +287,12 @@ TEST_P(ImpactFamilies, NothingTouchesUntilTSafeAndThenTheGapIsWhatIsTold) {
   EXPECT_GE(near, found * 0.99);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, ImpactFamilies, testing::ValuesIn(test::kMotionFamilies), [](const auto& family) {
-  std::string name = family.param.name;
-  std::replace(name.begin(), name.end(), ' ', '_');
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(All, ImpactFamilies, testing::ValuesIn(test::kMotionFamilies),
+                         [](const auto& family) {
+                           std::string name = family.param.name;
+                           std::replace(name.begin(), name.end(), ' ', '_');
+                           return name;
+                         });
 
 }  // namespace
 }  // namespace tandem

@@ -115,7 +115,8 @@ class ImpactChecker {
     for (int body = 0; body < 2; ++body) {
       const Instance& instance = moves_.scene.instances[pair_[body]];
       const AssetView& asset = moves_.scene.assets.views()[instance.asset];
-      const Pose stored = for_stored_coordinates(moves_.pose(pair_[body], found.t_safe), asset.header->origin);
+      const Pose stored =
+          for_stored_coordinates(moves_.pose(pair_[body], found.t_safe), asset.header->origin);
       const Triangle& corners = asset.level().triangles[triangle[body]];
       for (int c = 0; c < 3; ++c) {
         const float* p = corners.corner[c].position;
@@ -170,7 +171,7 @@ inline Pose placed(RandomPoses& random, double far) {
 }
 
 inline RigidMotion random_motion(RandomPoses& random, const Pose& pose, double speed, double spin,
-                          double arm = 0.2) {
+                                 double arm = 0.2) {
   RigidMotion motion;
   for (int k = 0; k < 3; ++k) {
     motion.velocity[k] = random.symmetric(speed);

@@ -231,29 +231,30 @@ void write(const ImpactArguments& arguments, const ImpactTable& table) {
 
 Json to_json(const ImpactArguments& arguments, const Scene& scene, const ImpactTable& table) {
   const ImpactCounters& counters = table.counters;
-  Json json = {{"tool", "bvhbench impact"},
-          {"version", TANDEM_VERSION},
-          {"scene", arguments.scene},
-          {"output", arguments.out.empty() ? Json() : Json(arguments.out)},
-          {"backend", arguments.backend},
-          {"dt", arguments.duration},
-          {"tolerance", arguments.options.tolerance},
-          {"given_pairs", scene.description.pairs.has_value()},
-          {"threads", threads_of(arguments)},
-          {"instances", scene.description.instances.size()},
-          {"object_pairs", counters.object_pairs},
-          {"at_start", counters.at_start},
-          {"found", counters.found},
-          {"walks", counters.walks},
-          {"block_pairs", counters.block_pairs},
-          {"triangle_pairs", counters.triangle_pairs},
-          {"advanced", counters.advanced},
-          {"steps", counters.steps},
-          {"most_steps", counters.most_steps},
-          {"unconverged", counters.unconverged},
-          {"hash", hexadecimal(hash_of(table))},
-          {"seconds",
-           {{"best", best_of(table.seconds)}, {"median", median_of(table.seconds)}, {"all", table.seconds}}}};
+  Json json = {
+      {"tool", "bvhbench impact"},
+      {"version", TANDEM_VERSION},
+      {"scene", arguments.scene},
+      {"output", arguments.out.empty() ? Json() : Json(arguments.out)},
+      {"backend", arguments.backend},
+      {"dt", arguments.duration},
+      {"tolerance", arguments.options.tolerance},
+      {"given_pairs", scene.description.pairs.has_value()},
+      {"threads", threads_of(arguments)},
+      {"instances", scene.description.instances.size()},
+      {"object_pairs", counters.object_pairs},
+      {"at_start", counters.at_start},
+      {"found", counters.found},
+      {"walks", counters.walks},
+      {"block_pairs", counters.block_pairs},
+      {"triangle_pairs", counters.triangle_pairs},
+      {"advanced", counters.advanced},
+      {"steps", counters.steps},
+      {"most_steps", counters.most_steps},
+      {"unconverged", counters.unconverged},
+      {"hash", hexadecimal(hash_of(table))},
+      {"seconds",
+       {{"best", best_of(table.seconds)}, {"median", median_of(table.seconds)}, {"all", table.seconds}}}};
   if (arguments.on_gpu()) {
     json["rounds"] = table.rounds;
     json["gpu"] = table.gpu.name;
@@ -272,9 +273,8 @@ void print_row(const char* label, std::uint64_t value) {
 void print_summary(const ImpactArguments& arguments, const Scene& scene, const ImpactTable& table) {
   const ImpactCounters& counters = table.counters;
   const std::uint32_t threads = threads_of(arguments);
-  const std::string place = arguments.on_gpu()
-                                ? table.gpu.name
-                                : with_commas(threads) + (threads == 1 ? " thread" : " threads");
+  const std::string place =
+      arguments.on_gpu() ? table.gpu.name : with_commas(threads) + (threads == 1 ? " thread" : " threads");
   std::printf("%s: impacts within %g s on %s, %s\n", arguments.scene.c_str(), arguments.duration,
               arguments.backend.c_str(), place.c_str());
   print_row("instances", scene.description.instances.size());

@@ -101,8 +101,8 @@ __device__ double scale_of(const impact::TrianglesAt& t) {
 /// lengths are scaled by a power of two where the bound's proof asks for it.
 __device__ void tell(const ImpactPair& pair, double time, bool in_contact, Impact& out) {
   const Triangle &of_a = pair.triangles_a[out.triangle_a], &of_b = pair.triangles_b[out.triangle_b];
-  const impact::TrianglesAt t = triangles_at(
-      pair.motion, moving_triangles(pair.motion, of_a, of_b), place_at(pair.motion, time));
+  const impact::TrianglesAt t =
+      triangles_at(pair.motion, moving_triangles(pair.motion, of_a, of_b), place_at(pair.motion, time));
   TrianglePair local = triangle_pair(t), scaled = local;
   const double scale = scale_of(t);
   for (int c = 0; c < 3; ++c) {
@@ -128,8 +128,9 @@ __device__ void tell(const ImpactPair& pair, double time, bool in_contact, Impac
 __device__ Impact impact_of(const ImpactArgs& args, std::uint32_t index) {
   // What was not sought is not promised: where there is no impact, all of the step was.
   const double sought = args.sought[index];
-  Impact out = {sought * args.duration, INFINITY, {0, 0, 0}, {0, 0, 0},         kNoIndex,
-                kNoIndex,               kNoIndex, kNoIndex,  ImpactStatus::none};
+  Impact out = {
+      sought * args.duration, INFINITY, {0, 0, 0}, {0, 0, 0}, kNoIndex, kNoIndex, kNoIndex, kNoIndex,
+      ImpactStatus::none};
   const Counter triangles = args.triangles[index];
   if (triangles == kNoTriangles) return out;
   const bool in_contact = sought == 0;
@@ -149,9 +150,8 @@ __device__ std::uint32_t limited(Counter count) {
 /// By a warp. rounds: that had block pairs.
 __device__ GpuImpactCapacity needed_by(const ImpactArgs& args, std::uint32_t& rounds) {
   const ImpactState& state = *args.state;
-  GpuImpactCapacity needed = {args.instances.count,       *args.given.count,
-                              args.query->needed.contacts, args.query->needed.undecided,
-                              limited(state.parts),       0,
+  GpuImpactCapacity needed = {args.instances.count,         *args.given.count,    args.query->needed.contacts,
+                              args.query->needed.undecided, limited(state.parts), 0,
                               limited(state.triangle_pairs)};
   std::uint32_t mine = 0, most = 0;
   for (std::uint32_t i = lane_id(); i <= kMostImpactRounds; i += 32) {
@@ -193,9 +193,8 @@ __device__ GpuImpactReport make_report(const ImpactArgs& args) {
   report.complete = is_complete(args, report.needed) ? 1 : 0;
   if (report.complete == 0) return report;
   report.impacts = *args.given.count;
-  report.counters = {report.impacts,        state.at_start, state.found,      state.walks,
-                     state.visited,         state.triangle_pairs, state.advanced, state.steps,
-                     state.most_steps,      state.unconverged};
+  report.counters = {report.impacts,       state.at_start, state.found, state.walks,      state.visited,
+                     state.triangle_pairs, state.advanced, state.steps, state.most_steps, state.unconverged};
   return report;
 }
 
@@ -212,7 +211,8 @@ __global__ void __launch_bounds__(kThreads) write(const __grid_constant__ Impact
     }
     const std::uint32_t found = __ballot_sync(kAllLanes, status == ImpactStatus::found),
                         at_start = __ballot_sync(kAllLanes, status == ImpactStatus::at_start);
-    if (lane_id() == 0 && found != 0) atomicAdd(&args.state->found, static_cast<std::uint32_t>(__popc(found)));
+    if (lane_id() == 0 && found != 0)
+      atomicAdd(&args.state->found, static_cast<std::uint32_t>(__popc(found)));
     if (lane_id() == 0 && at_start != 0)
       atomicAdd(&args.state->at_start, static_cast<std::uint32_t>(__popc(at_start)));
   }

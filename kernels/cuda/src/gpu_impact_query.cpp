@@ -24,9 +24,12 @@ Number grown(Number wanted, Number present) {
 }
 
 GpuImpactCapacity larger(const GpuImpactCapacity& x, const GpuImpactCapacity& y) {
-  return {std::max(x.instances, y.instances),     std::max(x.pairs, y.pairs),
-          std::max(x.contacts, y.contacts),       std::max(x.undecided, y.undecided),
-          std::max(x.parts, y.parts),             std::max(x.block_pairs, y.block_pairs),
+  return {std::max(x.instances, y.instances),
+          std::max(x.pairs, y.pairs),
+          std::max(x.contacts, y.contacts),
+          std::max(x.undecided, y.undecided),
+          std::max(x.parts, y.parts),
+          std::max(x.block_pairs, y.block_pairs),
           std::max(x.triangle_pairs, y.triangle_pairs)};
 }
 
@@ -141,8 +144,7 @@ Status GpuImpactQuery::State::reserve_pairs(std::uint32_t wanted) {
   const std::size_t poses = kImpactSamplesPerPair * std::size_t{count} + kFewestImpactSamples;
   if (poses >= kNoIndex) return Status::kOutOfGpuMemory;
   capacity.pairs = 0;
-  Status status =
-      reserve_all(count, pairs, sought, stops, triangles, impacts, is_sampled, sampled_pairs);
+  Status status = reserve_all(count, pairs, sought, stops, triangles, impacts, is_sampled, sampled_pairs);
   if (status == Status::kOk) status = keep(met.reserve(2 * poses));
   if (status == Status::kOk) status = keep(samples.reserve(poses));
   if (status == Status::kOk) capacity.pairs = count;
@@ -187,8 +189,7 @@ Status GpuImpactQuery::State::reserve(const GpuImpactCapacity& wanted, const Gpu
   if (status == Status::kOk) status = reserve_triangle_pairs(wanted.triangle_pairs);
   if (status == Status::kOk)
     status = broad_phase.reserve({capacity.instances, capacity.pairs}, {.sorted = options.sorted});
-  if (status == Status::kOk)
-    status = contacts.reserve({capacity.pairs, wanted.contacts, wanted.undecided});
+  if (status == Status::kOk) status = contacts.reserve({capacity.pairs, wanted.contacts, wanted.undecided});
   capacity.contacts = contacts.capacity().contacts;
   capacity.undecided = contacts.capacity().undecided;
   return status;

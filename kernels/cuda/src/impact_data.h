@@ -96,7 +96,7 @@ struct ImpactArgs {
   GpuPairs given;
   GpuImpactCapacity capacity;
   ImpactState* state;
-  GpuImpactReport* host_report;  ///< in CPU memory
+  GpuImpactReport* host_report;            ///< in CPU memory
   const GpuBroadPhaseReport* broad_phase;  ///< null where pairs are given
   const GpuQueryReport* query;
   const Contact* contacts;  ///< at the start
@@ -131,8 +131,7 @@ cudaError_t move_bodies(const ImpactArgs& args, cudaStream_t stream);
 /// 2: what the contact query found, and the pieces of the other pairs.
 cudaError_t begin_impacts(const ImpactArgs& args, cudaStream_t stream);
 /// 3: rounds from one to another.
-cudaError_t walk_impacts(const ImpactArgs& args, std::uint32_t first, std::uint32_t end,
-                         cudaStream_t stream);
+cudaError_t walk_impacts(const ImpactArgs& args, std::uint32_t first, std::uint32_t end, cudaStream_t stream);
 /// 4: poses the pairs that are left, the first time throughout the step, the second around the first contact.
 cudaError_t list_sampled_pairs(const ImpactArgs& args, cudaStream_t stream);
 cudaError_t pose_samples(const ImpactArgs& args, std::uint32_t which, cudaStream_t stream);

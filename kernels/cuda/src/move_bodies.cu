@@ -11,7 +11,8 @@ __device__ Status move_body(const ImpactArgs& args, std::uint32_t i) {
   Pose stored;
   WorldBox box;
   args.boxes[i] = {};
-  Status status = pose_instance(args.assets, args.asset_count, instances.asset[i], instances.pose[i], stored, box);
+  Status status =
+      pose_instance(args.assets, args.asset_count, instances.asset[i], instances.pose[i], stored, box);
   if (status != Status::kOk) return status;
   const GpuAsset& asset = args.assets[instances.asset[i]];
   impact::MovingBody body;
@@ -34,7 +35,8 @@ __global__ void __launch_bounds__(kThreads) move(const __grid_constant__ ImpactA
 
 cudaError_t move_bodies(const ImpactArgs& args, cudaStream_t stream) {
   const std::uint32_t wanted = args.instances.count / kThreads + 1, most = args.limits.processors * 32;
-  return launch_after({wanted < most ? wanted : most, kThreads, 0, stream, args.limits.early_launch}, move, args);
+  return launch_after({wanted < most ? wanted : most, kThreads, 0, stream, args.limits.early_launch}, move,
+                      args);
 }
 
 }  // namespace tandem::gpu

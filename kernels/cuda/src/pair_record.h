@@ -103,7 +103,8 @@ __device__ inline Status check_instance(const GpuInstances& instances, const Gpu
   return pose_instance(assets, asset_count, instances.asset[instance], instances.pose[instance], stored, box);
 }
 
-/// The record of a pair whose two instances have these poses, of stored coordinates, for walks of such blocks.
+/// The record of a pair whose two instances have these poses, of stored coordinates, for walks of such
+/// blocks.
 __device__ inline PairRecord make_record(const ObjectPair& pair, const GpuAsset& a, const Pose& pose_a,
                                          const GpuAsset& b, const Pose& pose_b, BlockKind kind) {
   RelativePose pose;

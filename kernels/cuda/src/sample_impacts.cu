@@ -67,9 +67,9 @@ __device__ void pose_sample(const ImpactArgs& args, std::uint32_t which, std::ui
   const std::uint32_t index = args.sampled_pairs[place];
   const ObjectPair& pair = args.given.pairs[index];
   const impact::PairMotion& motion = args.pairs[index].motion;
-  args.samples[sample] = make_record(pair, args.assets[args.instances.asset[pair.a]],
-                                     pose_of_sample(*motion.a, time), args.assets[args.instances.asset[pair.b]],
-                                     pose_of_sample(*motion.b, time), BlockKind::oriented);
+  args.samples[sample] = make_record(
+      pair, args.assets[args.instances.asset[pair.a]], pose_of_sample(*motion.a, time),
+      args.assets[args.instances.asset[pair.b]], pose_of_sample(*motion.b, time), BlockKind::oriented);
 }
 
 __global__ void __launch_bounds__(kThreads)

@@ -2,8 +2,8 @@
 #include "tandem/kernels/detail/impact/triangle_impact.h"
 
 // The walks of all moving pairs, round by round. Multiplies and adds may be fused: the proofs of box_times.h
-// and pair_motion.h allow it. CUDA's sine and cosine in float64 err by 2 units in the last place at most (CUDA
-// C++ Programming Guide, "Mathematical Functions", "Double-Precision Floating-Point Functions"), as
+// and pair_motion.h allow it. CUDA's sine and cosine in float64 err by 2 units in the last place at most
+// (CUDA C++ Programming Guide, "Mathematical Functions", "Double-Precision Floating-Point Functions"), as
 // rotation_by() asks for.
 namespace tandem::gpu {
 namespace {
@@ -167,9 +167,11 @@ __device__ void follow(const ImpactArgs& args, const ImpactBlockPair& entry, con
                        Following& following) {
   const ImpactPart& part = args.parts[entry.part];
   const Block &a = pair.blocks_a[entry.a], &b = pair.blocks_b[entry.b];
-  const std::uint32_t node_pair = lane_id() % kLanes, i = node_pair / kNodesPerBlock, j = node_pair % kNodesPerBlock;
+  const std::uint32_t node_pair = lane_id() % kLanes, i = node_pair / kNodesPerBlock,
+                      j = node_pair % kNodesPerBlock;
   const float size_a = size_of(a), size_b = size_of(b);
-  if (impact::worth_halving(pair.acceleration, part.number, part.time.end - part.time.begin, size_a, size_b)) {
+  if (impact::worth_halving(pair.acceleration, part.number, part.time.end - part.time.begin, size_a,
+                            size_b)) {
     if (node_pair < 2)
       following.block_pairs.put(0, {half_of(args, part, node_pair), entry.a, entry.b, hits, entry.apart});
     return;
@@ -199,7 +201,8 @@ __device__ bool visit(const ImpactArgs& args, bool mine, ImpactBlockPair entry, 
   mine = mine && entry.apart < sought;
   const ImpactPair& pair = args.pairs[part.pair];
   const std::uint32_t node_pair = lane_id() % kLanes;
-  const int i = static_cast<int>(node_pair / kNodesPerBlock), j = static_cast<int>(node_pair % kNodesPerBlock);
+  const int i = static_cast<int>(node_pair / kNodesPerBlock),
+            j = static_cast<int>(node_pair % kNodesPerBlock);
   double apart = INFINITY;
   if (mine && (entry.mask >> node_pair & 1) != 0) {
     const Block &a = pair.blocks_a[entry.a], &b = pair.blocks_b[entry.b];

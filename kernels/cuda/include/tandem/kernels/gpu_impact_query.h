@@ -39,8 +39,7 @@ inline constexpr std::uint32_t kImpactSamplesPerPair = 2, kFewestImpactSamples =
 /// GPU memory that a query of so many assets with room for so much holds at most: the bound of
 /// GpuImpactQuery::bytes(). sorted: whether any of its calls sorts pairs.
 constexpr std::size_t most_impact_bytes(const GpuImpactCapacity& capacity, std::size_t assets, bool sorted) {
-  const std::size_t samples =
-      kImpactSamplesPerPair * std::size_t{capacity.pairs} + kFewestImpactSamples;
+  const std::size_t samples = kImpactSamplesPerPair * std::size_t{capacity.pairs} + kFewestImpactSamples;
   return (std::size_t{10} << 20) + 152 * assets + 256 * std::size_t{capacity.instances} +
          264 * std::size_t{capacity.pairs} + 168 * samples + 656 * std::size_t{capacity.parts} +
          48 * std::size_t{capacity.block_pairs} + 72 * std::size_t{capacity.triangle_pairs} +
@@ -87,10 +86,10 @@ class GpuImpactQuery {
 
   /// Queues a query behind what `stream` holds; it may be captured into a graph. Finds the object pairs whose
   /// boxes, swept by their motions of a step of `duration` seconds, meet, and when each of them does.
-  /// motion: of each instance, in GPU memory. The arrays must stay until it is done. Result: kOk; kOutOfRange,
-  /// where the duration or the tolerance is negative or not finite, or there are more instances than reserved
-  /// for; kUnknownInstance, kCudaFailed, kOutOfGpuMemory, as of GpuBroadPhase::enqueue(); what the GPU finds
-  /// wrong is in the report. Condition: set_assets() and reserve() with these options.
+  /// motion: of each instance, in GPU memory. The arrays must stay until it is done. Result: kOk;
+  /// kOutOfRange, where the duration or the tolerance is negative or not finite, or there are more instances
+  /// than reserved for; kUnknownInstance, kCudaFailed, kOutOfGpuMemory, as of GpuBroadPhase::enqueue(); what
+  /// the GPU finds wrong is in the report. Condition: set_assets() and reserve() with these options.
   Status enqueue(const GpuInstances& instances, const RigidMotion* motion, double duration,
                  const GpuImpactOptions& options, cudaStream_t stream);
 

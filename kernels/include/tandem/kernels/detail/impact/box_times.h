@@ -189,20 +189,22 @@ TANDEM_HD inline double time_apart(const PairFrames& frames, const FrameNodes<kN
     start[2 * axis + 1] = -m.distance - (m.radius + frames.margin);
     slope[2 * axis + 1] = -m.velocity - m.growth;
   }
-  // An axis that is used up is of no further use: 12 rounds at most.
-  double time = 0;
-  for (bool longer = true; longer && time < most;) {
-    longer = false;
-    for (int k = 0; k < 12; ++k) {
-      if (!(start[k] + time * slope[k] > 0)) continue;
-      const double end = slope[k] < 0 ? start[k] / -slope[k] * (1 - 0x1p-50) : most;
-      if (end > time) {
-        time = end;
-        longer = true;
-      }
+  // Those that hold now do until they fall to 0, the last of them for the time ahead / fall; compared by
+  // products, of which one may be taken that is shorter by rounding.
+  double ahead = 0, fall = 1;
+  bool lasts = false;
+  for (int k = 0; k < 12; ++k) {
+    const bool holds = start[k] > 0, falls = slope[k] < 0;
+    lasts = lasts || (holds && !falls);
+    if (holds && falls && start[k] * fall > ahead * -slope[k]) {
+      ahead = start[k];
+      fall = -slope[k];
     }
   }
-  return time < most ? time : most;
+  const double time = ahead / fall * (1 - 0x1p-50);
+  // One that holds then and does not fall holds for the rest.
+  for (int k = 0; k < 12; ++k) lasts = lasts || (!(slope[k] < 0) && start[k] + time * slope[k] > 0);
+  return lasts || !(time < most) ? most : time;
 }
 
 /// How long node i of a and node j of b, both real, surely stay apart from now on: `most` where that is so

@@ -124,13 +124,25 @@ TANDEM_HD inline Apart apart_along(const PairMotion& pair, const TrianglesAt& t,
   }
   out.throughout = now && then;
   if (!now || then) return out;
-  out.nearly = INFINITY;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      const double to_margin = at_b[j] - at_a[i] - slack - length * margin;
-      const double rate = rate_b[j] - rate_a[i];
-      out.nearly = manifold::lesser(to_margin > 0 ? first_root(to_margin, rate, bend) : 0, out.nearly);
+  out.nearly = least > length * margin ? left : 0;
+  // The least root, by few of them: that of whichever is lowest at the least root so far. Each pair of corners
+  // is lowest once at most, but for rounding.
+  bool lowered = out.nearly > 0;
+  for (int rounds = 0; rounds < 9 && lowered; ++rounds) {
+    double lowest = 0, lowest_g = 0, lowest_rate = 0;
+    lowered = false;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        const double g = at_b[j] - at_a[i] - slack - length * margin, rate = rate_b[j] - rate_a[i];
+        const double value = g + out.nearly * (rate - 0.5 * out.nearly * bend);
+        if (value > lowest) continue;
+        lowered = true;
+        lowest = value;
+        lowest_g = g;
+        lowest_rate = rate;
+      }
     }
+    if (lowered) out.nearly = manifold::lesser(first_root(lowest_g, lowest_rate, bend), out.nearly);
   }
   out.gap = least / length * (1 - 0x1p-48);
   return out;

@@ -59,7 +59,8 @@ __device__ std::uint32_t begin_pair(const ImpactArgs& args, std::uint32_t index)
   args.sought[index] = in_contact ? 0 : 1;
   args.stops[index] = static_cast<Counter>(__double_as_longlong(1.0));
   args.is_sampled[index] = 0;
-  return in_contact || given.a == given.b ? 0 : static_cast<std::uint32_t>(impact::pieces_of(pair.motion));
+  if (in_contact || given.a == given.b || balls_stay_apart(pair.motion)) return 0;
+  return static_cast<std::uint32_t>(impact::pieces_of(pair.motion));
 }
 
 /// The sum of what this lane and those before it have.
@@ -109,17 +110,47 @@ __global__ void __launch_bounds__(kThreads) begin(const __grid_constant__ Impact
   }
 }
 
+/// What the other lane of two has.
+__device__ impact::TreePlace of_other_lane(const impact::TreePlace& mine) {
+  constexpr int kNumbers = sizeof(impact::TreePlace) / sizeof(double);
+  static_assert(sizeof(impact::TreePlace) == kNumbers * sizeof(double));
+  impact::TreePlace other;
+  const auto* from = reinterpret_cast<const double*>(&mine);
+  auto* to = reinterpret_cast<double*>(&other);
+#pragma unroll
+  for (int i = 0; i < kNumbers; ++i) to[i] = __shfl_xor_sync(kAllLanes, from[i], 1);
+  return other;
+}
+
+/// pair_frames(), by two lanes, each the frame of one of the bodies.
+__device__ void make_frame(const ImpactPair& pair, ImpactPart& part, bool mine, bool of_b) {
+  const impact::PairMotion& motion = pair.motion;
+  const impact::MovingBody& body = of_b ? *motion.b : *motion.a;
+  const double time = part.time.begin, sign = of_b ? -1 : 1;
+  impact::Matrix3 turned;
+  rotation_by(time * body.turn, turned.row);
+  const impact::TreePlace own = tree_place(body, turned), other = of_other_lane(own);
+  const manifold::Vector3 offset = motion.offset + time * motion.displacement;
+  if (!mine) return;
+  (of_b ? part.frames.of_b : part.frames.of_a) =
+      frame_motion(motion, own, other, sign * offset, sign * motion.displacement);
+  if (of_b) return;
+  part.frames.slack = motion.slack;
+  part.frames.margin = impact::kAim * pair.tolerance;
+}
+
 /// Makes the frames of parts that came in the round before.
 __global__ void __launch_bounds__(kThreads)
     make_frames(const __grid_constant__ ImpactArgs args, std::uint32_t round) {
   wait_for_kernel_before();
   const Counter all = args.state->parts, stored = all < args.capacity.parts ? all : args.capacity.parts;
   if (first_of_thread() == 0) args.state->made[round + 1] = stored;
-  for (Counter i = args.state->made[round] + first_of_thread(); i < stored; i += threads_of_grid()) {
-    ImpactPart& part = args.parts[i];
-    const ImpactPair& pair = args.pairs[part.pair];
-    part.frames =
-        pair_frames(pair.motion, place_at(pair.motion, part.time.begin), impact::kAim * pair.tolerance);
+  const Counter made = args.state->made[round], left = 2 * (stored - made);
+  for (Counter first = first_of_thread() - lane_id(); first < left; first += threads_of_grid()) {
+    const Counter task = first + lane_id();
+    const bool mine = task < left;
+    ImpactPart& part = args.parts[made + (mine ? task / 2 : 0)];
+    make_frame(args.pairs[part.pair], part, mine, lane_id() % 2 != 0);
   }
 }
 

@@ -36,7 +36,7 @@ def measure(bench, scene, threads):
     rows, first = [], None
     for place in (("--threads", 1), ("--threads", threads), ("--backend", "cuda")):
         on_gpu = "cuda" in place
-        result = bench.json("impact", f"{scene}.h5", "--dt", STEP, *place, "--out", "impacts.h5", "--repeat", bench.repeat if on_gpu else 5)
+        result = bench.json("impact", f"{scene}.h5", "--dt", STEP, *place, "--out", "impacts.h5", "--repeat", bench.repeat if on_gpu else 3)
         status, t_safe = impacts_of(bench.folder / "impacts.h5")
         first = (status, t_safe) if first is None else first
         rows.append({"scene": scene, "backend": result["backend"], "threads": result["threads"], **{name: result[name] for name in COUNTERS},

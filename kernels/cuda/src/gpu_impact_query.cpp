@@ -18,6 +18,15 @@ constexpr std::uint32_t kMostParts = (1u << 25) - 1;
 // Trees with fewer levels have few block pairs whatever is looked for.
 constexpr std::uint32_t kFewestLevelsToSample = 4;
 
+// What most_impact_bytes() counts with; a hash table has fewer than four places for each part.
+static_assert(sizeof(impact::MovingBody) + sizeof(WorldBox) == 264);
+static_assert(sizeof(gpu::ImpactPair) + sizeof(Impact) + 3 * sizeof(double) + 2 * sizeof(std::uint32_t) ==
+              240);
+static_assert(sizeof(gpu::PairRecord) + 2 * sizeof(std::uint32_t) == 168);
+static_assert(sizeof(gpu::ImpactPart) + 4 * 2 * sizeof(std::uint32_t) == 656);
+static_assert(2 * sizeof(gpu::ImpactBlockPair) == 48);
+static_assert(sizeof(gpu::ImpactTrianglePair) + sizeof(gpu::AdvancedPair) == 56);
+
 template <typename Number>
 Number grown(Number wanted, Number present) {
   return wanted <= present ? present : std::max(wanted, present + present / 2);

@@ -40,9 +40,9 @@ inline constexpr std::uint32_t kImpactSamplesPerPair = 2, kFewestImpactSamples =
 /// GpuImpactQuery::bytes(). sorted: whether any of its calls sorts pairs.
 constexpr std::size_t most_impact_bytes(const GpuImpactCapacity& capacity, std::size_t assets, bool sorted) {
   const std::size_t samples = kImpactSamplesPerPair * std::size_t{capacity.pairs} + kFewestImpactSamples;
-  return (std::size_t{10} << 20) + 152 * assets + 264 * std::size_t{capacity.instances} +
-         264 * std::size_t{capacity.pairs} + 168 * samples + 656 * std::size_t{capacity.parts} +
-         48 * std::size_t{capacity.block_pairs} + 72 * std::size_t{capacity.triangle_pairs} +
+  return (std::size_t{9} << 20) + sizeof(GpuAsset) * assets + 264 * std::size_t{capacity.instances} +
+         240 * std::size_t{capacity.pairs} + 168 * samples + 656 * std::size_t{capacity.parts} +
+         48 * std::size_t{capacity.block_pairs} + 56 * std::size_t{capacity.triangle_pairs} +
          most_query_bytes({capacity.pairs, capacity.contacts, capacity.undecided}, {}, assets) +
          most_broad_phase_bytes({capacity.instances, capacity.pairs}, sorted);
 }

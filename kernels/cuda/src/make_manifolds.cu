@@ -87,6 +87,55 @@ __device__ PieceMemory memory_of(const ManifoldArgs& args, std::uint32_t pair) {
           args.pieces.start + first + pair, args.pieces.table + PieceMemory::kTableWords * first};
 }
 
+/// Whole numbers above 0 in the order of what they are made of.
+__device__ Counter in_order(double x) {
+  const auto bits = static_cast<Counter>(__double_as_longlong(x));
+  constexpr Counter kSign = Counter{1} << 63;
+  return (bits & kSign) != 0 ? ~bits : bits | kSign;
+}
+__device__ double from_order(Counter number) {
+  constexpr Counter kSign = Counter{1} << 63;
+  return __longlong_as_double(static_cast<long long>((number & kSign) != 0 ? number ^ kSign : ~number));
+}
+
+/// Adds what a warp's lanes know of pieces, if anything, to what is known of their pairs. Lanes of the same
+/// pair are neighbours, and the first of them adds.
+__device__ void add_bounds(const ManifoldArgs& args, std::uint32_t pair, bool known,
+                           const manifold::PieceBounds& own) {
+  double outermost[6];
+  for (int k = 0; k < 3; ++k) outermost[k] = own.upper[k], outermost[3 + k] = -own.lower[k];
+  std::uint32_t segments = own.segments, flags = (known ? 1u : 0u) | (own.degenerate ? 2u : 0u);
+  for (std::uint32_t distance = 1; distance < 32; distance *= 2) {
+    const std::uint32_t pair_there = __shfl_down_sync(0xFFFFFFFFu, pair, distance);
+    const bool same = threadIdx.x % 32 + distance < 32 && pair_there == pair;
+    for (double& own_one : outermost) {
+      const double there = __shfl_down_sync(0xFFFFFFFFu, own_one, distance);
+      if (same && there > own_one) own_one = there;
+    }
+    const std::uint32_t segments_there = __shfl_down_sync(0xFFFFFFFFu, segments, distance),
+                        flags_there = __shfl_down_sync(0xFFFFFFFFu, flags, distance);
+    if (same) segments += segments_there, flags |= flags_there;
+  }
+  const std::uint32_t pair_before = __shfl_up_sync(0xFFFFFFFFu, pair, 1);
+  if (flags == 0 || (threadIdx.x % 32 != 0 && pair_before == pair)) return;
+  PairPieces& all = args.of_pair[pair].pieces;
+  for (int k = 0; k < 6; ++k) atomicMax(&all.outermost[k], in_order(outermost[k]));
+  if (segments != 0) atomicAdd(&all.segments, segments);
+  if ((flags & 2u) != 0) atomicOr(&all.degenerate, 1u);
+}
+
+__device__ manifold::PieceBounds bounds_of(const PairPieces& pieces) {
+  manifold::PieceBounds out;
+  out.pieces = pieces.pieces;
+  out.segments = pieces.segments;
+  out.degenerate = pieces.degenerate != 0;
+  for (int k = 0; k < 3; ++k) {
+    out.upper[k] = from_order(pieces.outermost[k]);
+    out.lower[k] = -from_order(pieces.outermost[3 + k]);
+  }
+  return out;
+}
+
 /// Writes down what each contact's triangles have in common, among the pieces of the contact's pair.
 __global__ void __launch_bounds__(kThreads, 3) make_pieces(const __grid_constant__ ManifoldArgs args) {
   wait_for_kernel_before();
@@ -108,13 +157,16 @@ __global__ void __launch_bounds__(kThreads, 3) make_pieces(const __grid_constant
       }
     }
     const bool wanted = meeting.kind != manifold::MeetingKind::none;
+    manifold::PieceBounds own;
+    if (wanted) own.add(meeting);
+    add_bounds(args, contact.pair, wanted, own);
     const std::uint32_t same = __match_any_sync(0xFFFFFFFFu, wanted ? contact.pair : kNoIndex);
     if (!wanted) continue;
     // The first lane of those with the same pair takes room for all of them.
     const int leader = __ffs(static_cast<int>(same)) - 1;
     std::uint32_t place = 0;
     if (threadIdx.x % 32 == static_cast<std::uint32_t>(leader))
-      place = atomicAdd(&args.of_pair[contact.pair].pieces, static_cast<std::uint32_t>(__popc(same)));
+      place = atomicAdd(&args.of_pair[contact.pair].pieces.pieces, static_cast<std::uint32_t>(__popc(same)));
     place = __shfl_sync(same, place, leader) + __popc(same & ((1u << threadIdx.x % 32) - 1));
     write_piece(memory_of(args, contact.pair), place, contact, a.normal, b.normal, meeting);
   }
@@ -138,7 +190,7 @@ __global__ void __launch_bounds__(kFinders, 2) find_curves(const __grid_constant
     using AnyTeam = std::remove_cvref_t<decltype(team)>;
     constexpr std::uint32_t kParts = kIsLarge<AnyTeam> ? 1 : kFindingWarps;
     const std::uint32_t pair = kIsLarge<AnyTeam> ? groups.many[row] : groups.few[row],
-                        count = args.of_pair[pair].pieces;
+                        count = args.of_pair[pair].pieces.pieces;
     if (count == 0) return;
     if (count > kMostContactsOfPair) {
       if (team.rank() == 0) state.too_many_contacts = 1;
@@ -151,7 +203,7 @@ __global__ void __launch_bounds__(kFinders, 2) find_curves(const __grid_constant
     if (count <= kNearPieces / kParts) pieces.curve = near + kNearWords + own * kNearPieces / kParts;
     team.sync();
     manifold::CurveFinder<AnyTeam> finder(team, bodies, pieces);
-    const PieceSummary summary = finder.find_among(count, next[own]);
+    const PieceSummary summary = finder.find_among(bounds_of(args.of_pair[pair].pieces), next[own]);
     if (team.rank() == 0) {
       args.summaries[pair] = summary;
       if (summary.segments > 0) atomicAdd(&state.segments, Counter{summary.segments});
@@ -321,7 +373,7 @@ __global__ void __launch_bounds__(kThreads) remember(const __grid_constant__ Man
   const std::uint32_t first = blockIdx.x * kThreads + threadIdx.x, step = gridDim.x * kThreads;
   const std::uint32_t pairs =
       *args.pairs.count < args.capacity.pairs ? *args.pairs.count : args.capacity.pairs;
-  for (std::uint32_t i = first; i < pairs; i += step) args.of_pair[i] = {kNoIndex, 0, 0, 0, 0, 0, 0};
+  for (std::uint32_t i = first; i < pairs; i += step) args.of_pair[i] = {kNoIndex, 0, 0, 0, 0, 0, {}};
   for (std::uint32_t i = first; i < args.capacity.pairs / kManifoldTile + 1; i += step) args.tile_sums[i] = 0;
   if (args.match_previous && state.has_last != 0) {
     const std::uint32_t table_step = step_after(state.step);

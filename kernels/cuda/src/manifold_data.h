@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "launch.h"
+#include "tandem/kernels/detail/manifold/contact_curves.h"
 #include "tandem/kernels/detail/manifold/finish.h"
 #include "tandem/kernels/detail/manifold/patch.h"
 #include "tandem/kernels/gpu_contact_manifolds.h"
@@ -18,12 +19,18 @@ struct PairCurve {
   std::uint32_t pair, curve;
 };
 
+/// manifold::PieceBounds of a pair, to which lanes add by atomic operations: all zeros before.
+struct PairPieces {
+  std::uint32_t pieces, segments, degenerate;
+  Counter outermost[6];  ///< in_order() of the upper bounds and of the negated lower ones
+};
+
 /// The patches of a pair: a list that next_of_pair leads along.
 struct PairPatches {
   std::uint32_t first;  ///< kNoIndex where there is none
   std::uint32_t patches, manifolds, points;
   std::uint32_t first_manifold, first_point;
-  std::uint32_t pieces;
+  PairPieces pieces;
 };
 
 /// A patch between the kernels that make it.

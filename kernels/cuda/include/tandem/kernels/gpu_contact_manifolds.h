@@ -29,7 +29,7 @@ struct GpuManifoldCapacity {
 /// GPU memory that an object with room for so much, of so many assets, holds at most.
 constexpr std::size_t most_manifold_bytes(const GpuManifoldCapacity& capacity, std::size_t assets) {
   constexpr std::size_t kFixed = std::size_t{1} << 20;
-  return kFixed + 128 * assets + 140 * std::size_t{capacity.pairs} + 180 * capacity.contacts +
+  return kFixed + 128 * assets + 200 * std::size_t{capacity.pairs} + 180 * capacity.contacts +
          3076 * std::size_t{capacity.manifolds} + 208 * std::size_t{capacity.points};
 }
 

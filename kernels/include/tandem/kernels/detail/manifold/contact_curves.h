@@ -139,11 +139,11 @@ class CurveFinder {
       : team_(team), bodies_(bodies), memory_(memory), table_(memory.table) {}
 
   /// Afterwards the pieces of curve c are order[start[c]] to order[start[c + 1] - 1]. next: a number that all
-  /// of the team see, for its use.
+  /// of the team see, for its use. Condition: a team of one.
   TANDEM_HD PieceSummary find(const Contact* contacts, std::uint32_t count, std::uint32_t& next);
 
-  /// The same of so many pieces that are written down already.
-  TANDEM_HD PieceSummary find_among(std::uint32_t pieces, std::uint32_t& next);
+  /// The same of pieces that are written down already, from what all of them amount to.
+  TANDEM_HD PieceSummary find_among(const PieceBounds& all, std::uint32_t& next);
 
  private:
   struct EndKey {
@@ -219,10 +219,8 @@ class CurveFinder {
     for (std::uint32_t i = team_.rank(); i < summary_.pieces; i += team_.size()) memory_.curve[i] = i;
     team_.sync();
   }
-  TANDEM_HD PieceBounds make_pieces(const Contact* contacts, std::uint32_t count, std::uint32_t& next);
-  TANDEM_HD PieceBounds bounds_of_pieces(std::uint32_t pieces) const;
-  TANDEM_HD void summarize(const PieceBounds& own, std::uint32_t pieces);
-  TANDEM_HD PieceSummary connect(std::uint32_t& next);
+  TANDEM_HD PieceBounds make_pieces(const Contact* contacts, std::uint32_t count);
+  TANDEM_HD void summarize(const PieceBounds& all);
   TANDEM_HD bool connect_by_ends();
   TANDEM_HD_SELDOM void connect_by_corners();
   TANDEM_HD void sort_by_curve(std::uint32_t& next);
@@ -234,62 +232,37 @@ class CurveFinder {
   std::uint32_t* table_;
 };
 
-/// Writes down what the team's contacts have in common. Result: of all, or of what this one of the team made,
-/// without the count.
+/// Writes down what the contacts have in common.
 template <typename Team>
-TANDEM_HD PieceBounds CurveFinder<Team>::make_pieces(const Contact* contacts, std::uint32_t count,
-                                                     std::uint32_t& next) {
+TANDEM_HD PieceBounds CurveFinder<Team>::make_pieces(const Contact* contacts, std::uint32_t count) {
   PieceBounds found;
   const double tolerance = bodies_.tolerance();
   Meeting meeting;
   WorldTriangle a, b;
   std::uint32_t posed_a = kNoIndex, posed_b = kNoIndex;
-  for (std::uint32_t i = team_.rank(); i < count; i += team_.size()) {
+  for (std::uint32_t i = 0; i < count; ++i) {
     const Contact& contact = contacts[i];
     if (contact.triangle_a != posed_a) a = bodies_.a.triangle(posed_a = contact.triangle_a);
     if (contact.triangle_b != posed_b) b = bodies_.b.triangle(posed_b = contact.triangle_b);
     meet(a, b, tolerance, meeting);
     if (meeting.kind == MeetingKind::none) continue;
-    write_piece(memory_, team_.add(next, 1), contact, a.normal, b.normal, meeting);
-    found.add(meeting);
-  }
-  team_.sync();
-  return found;
-}
-
-template <typename Team>
-TANDEM_HD PieceBounds CurveFinder<Team>::bounds_of_pieces(std::uint32_t pieces) const {
-  PieceBounds found;
-  for (std::uint32_t first = 0; first < pieces; first += team_.size()) {  // as often for all of the team
-    const std::uint32_t i = first + team_.rank();
-    if (i >= pieces) continue;
-    const Piece& piece = memory_.pieces[i];
-    Meeting meeting;
-    if (piece.kind() == MeetingKind::polygon) {
-      meet_again(bodies_, piece, meeting);
-    } else {
-      meeting.kind = piece.kind();
-      meeting.end[0] = piece.end[0], meeting.end[1] = piece.end[1];
-    }
-    meeting.degenerate = (piece.info & Piece::kDegenerate) != 0;
+    write_piece(memory_, found.pieces++, contact, a.normal, b.normal, meeting);
     found.add(meeting);
   }
   return found;
 }
 
 template <typename Team>
-TANDEM_HD void CurveFinder<Team>::summarize(const PieceBounds& own, std::uint32_t pieces) {
+TANDEM_HD void CurveFinder<Team>::summarize(const PieceBounds& all) {
   summary_ = {};
-  summary_.pieces = pieces;
-  summary_.segments = team_.sum(own.segments);
-  summary_.degenerate = team_.any(own.degenerate);
-  double bounds[6];
-  for (int k = 0; k < 3; ++k) bounds[k] = own.upper[k], bounds[3 + k] = -own.lower[k];
-  team_.greatest_ones(bounds);
+  summary_.pieces = all.pieces;
+  summary_.segments = all.segments;
+  summary_.degenerate = all.degenerate;
   double extent = 0, middle[3];
   for (int k = 0; k < 3; ++k) {
-    middle[k] = 0.5 * bounds[k] - 0.5 * bounds[3 + k];
-    extent = greater(extent, bounds[k] + bounds[3 + k]);
+    // Zeros of either sign may be the outermost; their middle is to be 0 for all teams.
+    middle[k] = (0.5 * all.upper[k] + 0.5 * all.lower[k]) + 0.0;
+    extent = greater(extent, all.upper[k] - all.lower[k]);
   }
   summary_.origin = {middle[0], middle[1], middle[2]};
   // Powers of two, so that scaling by them is exact.
@@ -381,7 +354,16 @@ TANDEM_HD void CurveFinder<Team>::sort_by_curve(std::uint32_t& next) {
 }
 
 template <typename Team>
-TANDEM_HD PieceSummary CurveFinder<Team>::connect(std::uint32_t& next) {
+TANDEM_HD PieceSummary CurveFinder<Team>::find(const Contact* contacts, std::uint32_t count,
+                                               std::uint32_t& next) {
+  if constexpr (HasMeans<Team>)
+    return find_among(team_.means().make_pieces(bodies_, memory_, contacts, count), next);
+  return find_among(make_pieces(contacts, count), next);
+}
+
+template <typename Team>
+TANDEM_HD PieceSummary CurveFinder<Team>::find_among(const PieceBounds& all, std::uint32_t& next) {
+  summarize(all);
   if (summary_.pieces == 0) return summary_;
   if (summary_.degenerate || !connect_by_ends()) {
     summary_.degenerate = true;
@@ -389,27 +371,6 @@ TANDEM_HD PieceSummary CurveFinder<Team>::connect(std::uint32_t& next) {
   }
   sort_by_curve(next);
   return summary_;
-}
-
-template <typename Team>
-TANDEM_HD PieceSummary CurveFinder<Team>::find(const Contact* contacts, std::uint32_t count,
-                                               std::uint32_t& next) {
-  if constexpr (HasMeans<Team>) {
-    const PieceBounds found = team_.means().make_pieces(bodies_, memory_, contacts, count);
-    summarize(found, found.pieces);
-  } else {
-    if (team_.rank() == 0) team_.store(next, 0);
-    team_.sync();
-    const PieceBounds found = make_pieces(contacts, count, next);
-    summarize(found, team_.load(next));
-  }
-  return connect(next);
-}
-
-template <typename Team>
-TANDEM_HD PieceSummary CurveFinder<Team>::find_among(std::uint32_t pieces, std::uint32_t& next) {
-  summarize(bounds_of_pieces(pieces), pieces);
-  return connect(next);
 }
 
 }  // namespace tandem::manifold

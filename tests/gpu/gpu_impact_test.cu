@@ -21,6 +21,16 @@ using test::on_gpu;
 using Impacts = std::vector<Impact>;
 using Pairs = std::vector<ObjectPair>;
 
+/// As test::gpu_options() has it.
+GpuImpactOptions gpu_options(bool sorted = false) {
+  GpuImpactOptions options;
+  options.sorted = sorted;
+  options.most_blocks = test::gpu_options(QueryMode::exact).most_blocks;
+  return options;
+}
+
+const GpuImpactOptions kSorted = gpu_options(true);
+
 /// A scene with motions on the GPU, and a query of it.
 struct Moved {
   explicit Moved(const MovingScene& moves, const Pairs& given = {})
@@ -29,10 +39,10 @@ struct Moved {
         duration(moves.duration) {
     EXPECT_EQ(query.set_assets(scene.assets(), nullptr), Status::kOk);
   }
-  Status find(const GpuImpactOptions& options = {}) {
+  Status find(const GpuImpactOptions& options = gpu_options()) {
     return query.find(scene.instances(), motion.data(), duration, options, nullptr);
   }
-  Status find_given(const GpuImpactOptions& options = {}) {
+  Status find_given(const GpuImpactOptions& options = gpu_options()) {
     return query.find(scene.instances(), motion.data(), duration, scene.pairs(), options, nullptr);
   }
   Status enqueue(const GpuImpactOptions& options, cudaStream_t stream) {
@@ -46,8 +56,6 @@ struct Moved {
   double duration;
   GpuImpactQuery query;
 };
-
-constexpr GpuImpactOptions kSorted = {.sorted = true};
 
 /// Byte by byte but for what lies behind the status.
 bool same(const Impacts& x, const Impacts& y) {
@@ -77,7 +85,7 @@ class GpuImpacts : public test::GpuTest {
 };
 
 Impact impact_of(Moved& moved, double tolerance = 1e-6) {
-  GpuImpactOptions options;
+  GpuImpactOptions options = gpu_options();
   options.tolerance = tolerance;
   EXPECT_EQ(moved.find_given(options), Status::kOk);
   const Impacts found = moved.impacts();
@@ -298,7 +306,7 @@ TEST_F(GpuImpacts, FiltersLeavePairsOut) {
   ASSERT_EQ(table.set(joint), Status::kOk);
   GpuExcludedPairs excluded;
   ASSERT_EQ(excluded.upload(table.view(), nullptr), Status::kOk);
-  GpuImpactOptions options;
+  GpuImpactOptions options = gpu_options();
   Moved moved(moves);
   ASSERT_EQ(moved.find(options), Status::kOk);
   EXPECT_EQ(moved.query.report().impacts, pairs_of_cpu(moves).size());
@@ -348,7 +356,7 @@ TEST_F(GpuImpacts, ErrorsAreNamedAndLeaveNothing) {
     EXPECT_EQ(moved.find_given(), Status::kOutOfRange);
   }
   moved.duration = 1;
-  GpuImpactOptions options;
+  GpuImpactOptions options = gpu_options();
   options.tolerance = NAN;
   EXPECT_EQ(moved.find_given(options), Status::kOutOfRange);
 }

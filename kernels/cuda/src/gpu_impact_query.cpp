@@ -101,10 +101,11 @@ struct GpuImpactQuery::State {
 
   gpu::ImpactArgs args(const GpuInstances& instances, const RigidMotion* motion, double duration,
                        const GpuPairs& given, const GpuImpactOptions& options);
-  gpu::QueryArgs sample_args(const gpu::ImpactArgs& args, std::uint32_t which) const;
+  gpu::QueryArgs sample_args(const gpu::ImpactArgs& args, std::uint32_t which,
+                             std::uint32_t most_blocks) const;
   cudaError_t clear(const gpu::ImpactArgs& args, cudaStream_t stream);
-  cudaError_t end_at_samples(const gpu::ImpactArgs& args, cudaStream_t stream);
-  cudaError_t walk(const gpu::ImpactArgs& args, cudaStream_t stream);
+  cudaError_t end_at_samples(const gpu::ImpactArgs& args, std::uint32_t most_blocks, cudaStream_t stream);
+  cudaError_t walk(const gpu::ImpactArgs& args, std::uint32_t most_blocks, cudaStream_t stream);
   Status enqueue(const gpu::ImpactArgs& args, const GpuImpactOptions& options, cudaStream_t stream);
 };
 
@@ -245,7 +246,8 @@ gpu::ImpactArgs GpuImpactQuery::State::args(const GpuInstances& instances, const
 }
 
 // A walk that only marks which samples have a contact that float32 is sure of.
-gpu::QueryArgs GpuImpactQuery::State::sample_args(const gpu::ImpactArgs& args, std::uint32_t which) const {
+gpu::QueryArgs GpuImpactQuery::State::sample_args(const gpu::ImpactArgs& args, std::uint32_t which,
+                                                  std::uint32_t most_blocks) const {
   gpu::QueryArgs walk = {};
   walk.assets = args.assets;
   walk.asset_count = args.asset_count;
@@ -259,7 +261,7 @@ gpu::QueryArgs GpuImpactQuery::State::sample_args(const gpu::ImpactArgs& args, s
   walk.pairs = args.samples;
   walk.met = args.met[which];
   walk.limits = limits;
-  walk.shape = gpu::walk_shape(limits, depth, 0);
+  walk.shape = gpu::walk_shape(limits, depth, most_blocks);
   return walk;
 }
 
@@ -271,24 +273,26 @@ cudaError_t GpuImpactQuery::State::clear(const gpu::ImpactArgs& args, cudaStream
   return result;
 }
 
-cudaError_t GpuImpactQuery::State::end_at_samples(const gpu::ImpactArgs& args, cudaStream_t stream) {
+cudaError_t GpuImpactQuery::State::end_at_samples(const gpu::ImpactArgs& args, std::uint32_t most_blocks,
+                                                  cudaStream_t stream) {
   cudaError_t result = gpu::list_sampled_pairs(args, stream);
   for (std::uint32_t which = 0; which < 2 && result == cudaSuccess; ++which) {
     result = cudaMemsetAsync(walk_state.data(), 0, sizeof(gpu::QueryState), stream);
     if (result == cudaSuccess) result = gpu::pose_samples(args, which, stream);
-    if (result == cudaSuccess) result = gpu::walk_exact(sample_args(args, which), stream);
+    if (result == cudaSuccess) result = gpu::walk_exact(sample_args(args, which, most_blocks), stream);
   }
   return result == cudaSuccess ? gpu::end_at_samples(args, stream) : result;
 }
 
-cudaError_t GpuImpactQuery::State::walk(const gpu::ImpactArgs& args, cudaStream_t stream) {
+cudaError_t GpuImpactQuery::State::walk(const gpu::ImpactArgs& args, std::uint32_t most_blocks,
+                                        cudaStream_t stream) {
   const std::uint32_t rounds = gpu::impact_rounds_of(depth);
   cudaError_t result = gpu::begin_impacts(args, stream);
   std::uint32_t first = 0;
   if (result == cudaSuccess && depth >= kFewestLevelsToSample) {
     first = gpu::kSampledRound;
     result = gpu::walk_impacts(args, 0, first, stream);
-    if (result == cudaSuccess) result = end_at_samples(args, stream);
+    if (result == cudaSuccess) result = end_at_samples(args, most_blocks, stream);
   }
   if (result == cudaSuccess) result = gpu::walk_impacts(args, first, rounds, stream);
   if (result == cudaSuccess) result = gpu::advance_impacts(args, stream);
@@ -310,8 +314,9 @@ Status GpuImpactQuery::State::enqueue(const gpu::ImpactArgs& given, const GpuImp
     args.given = broad_phase.pairs();
     args.broad_phase = broad_phase.device_report();
   }
-  if (status == Status::kOk) status = contacts.enqueue(args.instances, args.given, {}, stream);
-  return status == Status::kOk ? keep(walk(args, stream)) : status;
+  if (status == Status::kOk)
+    status = contacts.enqueue(args.instances, args.given, {.most_blocks = options.most_blocks}, stream);
+  return status == Status::kOk ? keep(walk(args, options.most_blocks, stream)) : status;
 }
 
 GpuImpactQuery::GpuImpactQuery() : state_(new (std::nothrow) State) {}

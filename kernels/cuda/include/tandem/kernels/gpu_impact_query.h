@@ -19,6 +19,8 @@ struct GpuImpactOptions {
   bool sorted = false;
   /// Where the query finds the pairs: those that it looks at. Its arrays lie in GPU memory.
   PairFilter filter = {};
+  /// As of GpuQueryOptions, for the walks that look for contacts.
+  std::uint32_t most_blocks = 0;
 };
 
 /// How many of each a query has room for, or needs room for.

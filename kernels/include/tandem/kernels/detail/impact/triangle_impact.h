@@ -125,8 +125,8 @@ TANDEM_HD inline Apart apart_along(const PairMotion& pair, const TrianglesAt& t,
   out.throughout = now && then;
   if (!now || then) return out;
   out.nearly = least > length * margin ? left : 0;
-  // The least root, by few of them: that of whichever is lowest at the least root so far. Each pair of corners
-  // is lowest once at most, but for rounding.
+  // The least root, by few of them: that of whichever is lowest at the least root so far. Each pair of
+  // corners is lowest once at most, but for rounding.
   bool lowered = out.nearly > 0;
   for (int rounds = 0; rounds < 9 && lowered; ++rounds) {
     double lowest = 0, lowest_g = 0, lowest_rate = 0;

@@ -1,7 +1,7 @@
 # docs/contacts.md shows the GPU's game loop and its solver as they are; the pile comes to rest, or there is no GPU. Variables: SOURCE, FOLDER (to work in),
 # BVHBUILD, LOOP.
 file(READ ${SOURCE}/docs/contacts.md page)
-foreach(name game_loop.cu game_solver.cuh)
+foreach(name game_loop.cu)
   file(READ ${SOURCE}/tests/gpu/${name} program)
   string(FIND "${page}" "```cpp\n${program}```" place)
   if(place EQUAL -1)

@@ -17,12 +17,15 @@
 #include <limits>
 #include <memory>
 #include <stdexcept>
+#include <string_view>
+#include <utility>
 
 #include "manifold_scene.h"
 
 /// Contact manifolds of Tandem and of other libraries beside closed forms: same bodies, same poses, one
 /// thread. Prints CSV. Usage: manifold_peers [POSES], of overlaps and as many of gaps for each kind of
 /// bodies. Exit code 1 where Tandem invents or misses a touch, or is off by 0.1 degree or 1 % of the depth.
+/// manifold_peers POSES --json prints the bodies and their poses instead, for scripts/manifold_peers_newton.
 namespace tandem::test {
 namespace {
 
@@ -312,6 +315,29 @@ std::vector<Kind> kinds() {
           {"pipe upright in block", block, pipe(24, 0.25, 0.5, 0.5f), about_z}};
 }
 
+/// Two bodies in the world.
+struct PosedPair {
+  Pose a, b;
+  double depth;  ///< along a's z; negative: a gap
+};
+
+/// Overlaps and gaps by turns, of 0.001 to 0.05.
+std::vector<PosedPair> posed_pairs(const Kind& kind, int poses) {
+  RandomPoses random(1);
+  const double top = reach_along(triangles_of(kind.a, kIdentityPose), {0, 0, 1});
+  std::vector<PosedPair> out;
+  for (int i = 0; i < 2 * poses; ++i) {
+    const double size = 1e-3 * std::pow(50, random.uniform(0, 1));
+    const double depth = i % 2 == 0 ? size : -size;
+    const Pose turned = kind.turned(random);
+    const double z = top + reach_along(triangles_of(kind.b, turned), {0, 0, -1}) - depth;
+    const Pose motion = any_motion(random, 3);
+    const double y = random.symmetric(0.25), x = random.symmetric(0.25);
+    out.push_back({motion, after(motion, after(shift(x, y, z), turned)), depth});
+  }
+  return out;
+}
+
 double median(std::vector<double> values) {
   if (values.empty()) return NAN;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -365,26 +391,18 @@ bool compare(const Kind& kind, int poses) {
   peers.emplace_back("FCL", std::make_unique<FclPeer>(kind.a, kind.b));
   peers.emplace_back("ODE", std::make_unique<OdePeer>(kind.a, kind.b));
   std::vector<Record> records(peers.size());
-  RandomPoses random(1);
-  const double top = reach_along(triangles_of(kind.a, kIdentityPose), {0, 0, 1});
-  for (int i = 0; i < 2 * poses; ++i) {
-    const bool apart = i % 2 != 0;
-    const double depth = 1e-3 * std::pow(50, random.uniform(0, 1));
-    const Pose turned = kind.turned(random);
-    const double z = top + reach_along(triangles_of(kind.b, turned), {0, 0, -1}) + (apart ? depth : -depth);
-    const Pose motion = any_motion(random, 3);
-    const Pose b = after(motion, after(shift(random.symmetric(0.25), random.symmetric(0.25), z), turned));
+  for (const PosedPair& pair : posed_pairs(kind, poses)) {
     std::vector<std::vector<double>> times(peers.size());
     for (int round = 0; round < kRounds; ++round) {
       for (std::size_t k = 0; k < peers.size(); ++k)
-        times[k].push_back(microseconds_of(*peers[k].second, motion, b));
+        times[k].push_back(microseconds_of(*peers[k].second, pair.a, pair.b));
     }
     for (std::size_t k = 0; k < peers.size(); ++k) {
       const Answer answer = peers[k].second->answer();
-      if (apart) {
+      if (pair.depth < 0) {
         records[k].invented += !answer.points.empty();
       } else {
-        records[k].take_overlap(answer, rotate(motion, {0, 0, 1}), depth);
+        records[k].take_overlap(answer, rotate(pair.a, {0, 0, 1}), pair.depth);
         records[k].microseconds.push_back(median(times[k]));
       }
     }
@@ -401,11 +419,65 @@ bool compare(const Kind& kind, int poses) {
          largest(records[0].depth_errors) < 0.01;
 }
 
+void print_array(const char* name, const auto& values) {
+  std::printf("\"%s\": [", name);
+  const char* comma = "";
+  for (const auto value : values)
+    std::printf("%s%.17g", std::exchange(comma, ", "), static_cast<double>(value));
+  std::printf("]");
+}
+
+void print_body(const char* name, const Mesh& mesh) {
+  const FlatMesh flat(mesh);
+  std::printf("\"%s\": {", name);
+  print_array("vertices", flat.vertices);
+  std::printf(", ");
+  print_array("corners", flat.corners);
+  std::printf("},\n ");
+}
+
+/// The nine numbers of the rotation by rows, then the translation.
+std::array<double, 12> numbers_of(const Pose& pose) {
+  std::array<double, 12> out{};
+  for (std::size_t i = 0; i < 9; ++i) out[i] = pose.rotation[i / 3][i % 3];
+  std::copy_n(pose.translation, 3, out.begin() + 9);
+  return out;
+}
+
+/// A JSON object: the bodies "a" and "b" as flat arrays, and "pairs" with the depth and the pose of each.
+void print_json(const Kind& kind, int poses) {
+  std::printf("{\"name\": \"%s\",\n ", kind.name);
+  print_body("a", kind.a), print_body("b", kind.b);
+  std::printf("\"pairs\": [");
+  const char* comma = "";
+  for (const PosedPair& pair : posed_pairs(kind, poses)) {
+    std::printf("%s\n  {\"depth\": %.17g, ", std::exchange(comma, ","), pair.depth);
+    print_array("a", numbers_of(pair.a));
+    std::printf(", ");
+    print_array("b", numbers_of(pair.b));
+    std::printf("}");
+  }
+  std::printf("]}");
+}
+
+void print_json(int poses) {
+  const char* before = "[";
+  for (const Kind& kind : kinds()) {
+    std::fputs(std::exchange(before, ",\n"), stdout);
+    print_json(kind, poses);
+  }
+  std::puts("]");
+}
+
 }  // namespace
 }  // namespace tandem::test
 
 int main(int argc, char** argv) {
   const int poses = argc > 1 ? std::atoi(argv[1]) : 300;
+  if (argc > 2 && std::string_view(argv[2]) == "--json") {
+    tandem::test::print_json(poses);
+    return 0;
+  }
   dInitODE2(0);
   dAllocateODEDataForThread(dAllocateMaskAll);
   std::puts(

@@ -127,6 +127,7 @@ class CompareDistances(BenchTest):
         self.assertLess(scene["peers"][0]["worst_error"], 1e-6)
         for peer in scene["peers"]:
             self.assertLess(peer["worst_error"], 1e-5, peer["name"])
+        self.assertEqual((scene["peers"][-1]["name"], scene["peers"][-1]["outside"]), ("CGAL", 0))
 
     def test_what_is_of_contacts_is_refused(self):
         self.write_scene()

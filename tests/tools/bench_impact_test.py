@@ -144,5 +144,39 @@ class Impact(BenchTest):
         self.refuses(USAGE, "--tolerance", arguments=("--dt", "1", "--tolerance", "-1"))
 
 
+class CompareImpacts(BenchTest):
+    def moving(self, places, velocity, angular_velocity):
+        self.write_scene(asset=(0,) * len(places), rotation=(IDENTITY,) * len(places), translation=places)
+        with h5py.File(self.scene, "a") as file:
+            file["simulation/velocity"] = np.asarray(velocity, "f8")
+            file["simulation/angular_velocity"] = np.asarray(angular_velocity, "f8")
+
+    def test_times_are_judged_by_contacts_that_are_found(self):
+        # A cube falls on another one, which a third one, that spins, touches from the start.
+        still = (0, 0, 0)
+        self.moving([still, (0.25, 0.125, 3), (4, 0, 0), (-0.9, -0.9, 0.5)], [still, (0, 0, -4), still, still], [still, still, still, (0, 0, 1)])
+        scene, = json.loads(self.passes("compare", self.scene, "--impact", "1", "--repeat", "2", "--json"))["scenes"]
+        self.assertEqual([scene[key] for key in ("at_start", "stopped", "in_contact")], [1, 1, 1])
+        peers = {peer["name"]: peer for peer in scene["peers"]}
+        self.assertEqual([peers["Tandem"][key] for key in ("found", "missed", "late", "invented")], [2, 0, 0, 0])
+        for name, peer in peers.items():
+            with self.subTest(name):
+                self.assertEqual(peer["found"] + peer["missed"] - peer["invented"], 2)
+        if "FCL oriented" in peers:
+            oriented, sampled = peers["FCL oriented"], peers["FCL 10 poses"]
+            self.assertEqual([oriented[key] for key in ("missed", "late", "invented")], [0, 0, 0])
+            self.assertEqual((sampled["missed"], sampled["late"]), (0, 1))  # they meet at 1/2 and are seen to at 5/9
+            self.assertAlmostEqual(sampled["most_late"], 5 / 9 - 1 / 2, delta=1e-3)
+
+    def test_what_is_of_contacts_or_of_distances_is_refused(self):
+        self.moving([(0, 0, 0)], [(0, 0, 0)], [(0, 0, 0)])
+        for other in (("--peers", "fcl"), ("--distance", "1")):
+            self.assertEqual(self.bench("compare", self.scene, "--impact", "1", *other).returncode, USAGE, other)
+
+    def test_half_a_turn_is_refused(self):
+        self.moving([(0, 0, 0), (3, 0, 0)], np.zeros((2, 3)), [(0, 0, 0), (0, 0, 3.2)])
+        self.assert_fails(drop_hint(self.bench("compare", self.scene, "--impact", "1")), UNREADABLE_INPUT, "instance 1", "half a turn")
+
+
 if __name__ == "__main__":
     unittest.main()

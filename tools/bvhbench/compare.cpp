@@ -3,38 +3,17 @@
 #include <malloc.h>
 
 #include <algorithm>
-#include <cfenv>
 #include <filesystem>
 
-#include "common/stopwatch.h"
 #include "scenes/contacts_file.h"
 #include "tandem/formats/hash.h"
 #include "tandem/kernels/broad_phase.h"
+#include "timed_work.h"
 
 namespace tandem::bench {
 namespace {
 
 using Contacts = std::optional<std::vector<TriangleContact>>;
-
-// Libraries change rounding and denormal modes; what follows them must not notice.
-class SavedFloatingPoint {
- public:
-  SavedFloatingPoint() { std::fegetenv(&saved_); }
-  SavedFloatingPoint(const SavedFloatingPoint&) = delete;
-  SavedFloatingPoint& operator=(const SavedFloatingPoint&) = delete;
-  ~SavedFloatingPoint() { std::fesetenv(&saved_); }
-
- private:
-  std::fenv_t saved_;
-};
-
-template <class Work>
-double seconds_of(const Work& work) {
-  const SavedFloatingPoint saved;
-  Stopwatch watch;
-  work();
-  return watch.lap();
-}
 
 // Bytes that malloc has handed out, large mappings included.
 std::uint64_t heap_bytes() {

@@ -11,6 +11,7 @@
 #include <set>
 
 #include "compare_distance.h"
+#include "compare_impact.h"
 #include "compare_results.h"
 #include "engines/registry.h"
 #include "scenes/hdf5_file.h"
@@ -24,6 +25,7 @@ struct CompareArguments {
   std::string out;
   bool json = false;
   std::optional<double> distances_within;  ///< distances are compared, not contacts
+  std::optional<double> impacts_within;    ///< times of impact are compared, not contacts
 };
 
 std::string join(const std::vector<std::string_view>& words) {
@@ -58,13 +60,14 @@ void check_names(const std::vector<std::string>& scenes) {
   }
 }
 
-ExitCode run_distances(const CompareArguments& arguments) {
+// Compares scene by scene, without a file of results. option: what asked for it.
+template <typename Compare>
+ExitCode run_scenes(const CompareArguments& arguments, const std::string& option, const Compare& compare) {
   if (!arguments.out.empty() || !arguments.engines.empty())
-    throw UsageError("--out and --peers are for contacts, so --distance does not go with them");
+    throw UsageError("--out and --peers are for contacts, so " + option + " does not go with them");
   Json results = Json::array();
   for (const std::string& scene : arguments.scenes) {
-    const DistanceComparison compared =
-        compare_distances(scene, *arguments.distances_within, arguments.repeats);
+    const auto compared = compare(scene);
     if (arguments.json) {
       results.push_back(to_json(compared));
       continue;
@@ -73,7 +76,7 @@ ExitCode run_distances(const CompareArguments& arguments) {
     std::fflush(stdout);
   }
   if (arguments.json) {
-    const Json json = {{"tool", "bvhbench compare --distance"},
+    const Json json = {{"tool", "bvhbench compare " + option},
                        {"version", TANDEM_VERSION},
                        {"processor", processor()},
                        {"repeats", arguments.repeats},
@@ -85,7 +88,16 @@ ExitCode run_distances(const CompareArguments& arguments) {
 
 ExitCode run_compare(const CompareArguments& arguments) {
   check_names(arguments.scenes);
-  if (arguments.distances_within) return run_distances(arguments);
+  if (arguments.distances_within) {
+    return run_scenes(arguments, "--distance", [&](const std::string& scene) {
+      return compare_distances(scene, *arguments.distances_within, arguments.repeats);
+    });
+  }
+  if (arguments.impacts_within) {
+    return run_scenes(arguments, "--impact", [&](const std::string& scene) {
+      return compare_impacts(scene, *arguments.impacts_within, arguments.repeats);
+    });
+  }
   if (!arguments.out.empty()) {
     keep_inputs(arguments.out, arguments.scenes);
     try_output(arguments.out);
@@ -118,11 +130,17 @@ CLI::App* add_compare(CLI::App& app, Run& run) {
       ->check(CLI::Range(1u, 100000u))
       ->option_text("N [5]");
   command->add_option("--out", arguments->out, "write the results here, as HDF5")->check(file_name());
+  CLI::Option* distances = command
+                               ->add_option("--distance", arguments->distances_within,
+                                            "compare distances instead, of pairs that are apart and within D")
+                               ->check(between(0, std::numeric_limits<double>::infinity()))
+                               ->option_text("D");
   command
-      ->add_option("--distance", arguments->distances_within,
-                   "compare distances instead, of pairs that are apart and within D")
-      ->check(between(0, std::numeric_limits<double>::infinity()))
-      ->option_text("D");
+      ->add_option("--impact", arguments->impacts_within,
+                   "compare times of impact instead, of the scene's motions for T seconds")
+      ->check(between(1e-9, 1e9))
+      ->option_text("T")
+      ->excludes(distances);
   command->add_flag("--json", arguments->json, "print JSON");
   command->footer("Times are of one thread. docs/comparison.md says what is compared, and how.");
   command->final_callback([arguments, &run] { run = [arguments] { return run_compare(*arguments); }; });

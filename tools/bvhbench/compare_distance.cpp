@@ -1,13 +1,13 @@
 #include "compare_distance.h"
 
 #include <algorithm>
-#include <cfenv>
 #include <cstdio>
 #include <filesystem>
 
 #include "command.h"
 #include "common/number_words.h"
 #include "engines/distance_engine.h"
+#include "timed_work.h"
 
 namespace tandem::bench {
 namespace {
@@ -42,16 +42,14 @@ double worst_error(const CertifiedPairs& pairs, const std::vector<double>& dista
   return worst;
 }
 
-// Libraries change rounding and denormal modes; what follows them must not notice.
-template <typename Work>
-double seconds_of(const Work& work) {
-  std::fenv_t saved;
-  std::fegetenv(&saved);
-  Stopwatch watch;
-  work();
-  const double seconds = watch.lap();
-  std::fesetenv(&saved);
-  return seconds;
+// Of both bodies of every pair.
+std::uint64_t triangles_of_pairs(const Scene& scene, const std::vector<ObjectPair>& pairs) {
+  std::uint64_t sum = 0;
+  for (const auto& [a, b] : pairs) {
+    for (const std::uint32_t body : {a, b})
+      sum += scene.assets[scene.description.instances[body].asset].view().level().triangle_count;
+  }
+  return sum;
 }
 
 }  // namespace
@@ -65,7 +63,9 @@ DistanceComparison compare_distances(const std::string& path, double reach, unsi
   out.reach = reach;
   out.instances = scene.description.instances.size();
   out.object_pairs = pairs.pairs.size();
-  const auto engines = distance_engines();
+  auto engines = distance_engines();
+  if (triangles_of_pairs(scene, pairs.pairs) > kMostReferenceTriangles)
+    std::erase_if(engines, [](const auto& engine) { return engine->is_reference(); });
   for (const auto& engine : engines) {
     DistancePeer peer;
     peer.name = engine->label();
@@ -77,8 +77,11 @@ DistanceComparison compare_distances(const std::string& path, double reach, unsi
   std::vector<double> distances;
   for (unsigned i = 0; i < repeats; ++i) {
     for (std::size_t e = 0; e < engines.size(); ++e) {
-      out.peers[e].query_seconds.push_back(seconds_of([&] { engines[e]->find(pairs.pairs, distances); }));
-      out.peers[e].worst_error = worst_error(pairs, distances);
+      if (i > 0 && engines[e]->is_reference()) continue;
+      DistancePeer& peer = out.peers[e];
+      peer.query_seconds.push_back(seconds_of([&] { engines[e]->find(pairs.pairs, distances); }));
+      peer.worst_error = worst_error(pairs, distances);
+      if (engines[e]->is_reference()) peer.outside = engines[e]->outside(pairs.lower, pairs.upper);
     }
   }
   return out;
@@ -96,6 +99,10 @@ std::string to_text(const DistanceComparison& comparison) {
                   peer.name.c_str(), 1e3 * best, best / best_of(comparison.peers[0].query_seconds),
                   peer.worst_error, peer.build_seconds);
     out += line;
+    if (!peer.outside) continue;
+    std::snprintf(line, sizeof line, "  %-12s %s of Tandem's intervals do not hold its exact distance\n", "",
+                  with_commas(*peer.outside).c_str());
+    out += line;
   }
   return out;
 }
@@ -108,7 +115,8 @@ Json to_json(const DistanceComparison& comparison) {
                      {"build_seconds", peer.build_seconds},
                      {"best_seconds", best_of(peer.query_seconds)},
                      {"median_seconds", median_of(peer.query_seconds)},
-                     {"worst_error", peer.worst_error}});
+                     {"worst_error", peer.worst_error},
+                     {"outside", peer.outside ? Json(*peer.outside) : Json()}});
   }
   return {{"scene", comparison.name},
           {"reach", comparison.reach},

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,15 +9,21 @@
 
 namespace tandem::bench {
 
+/// Pairs of bodies with more triangles than that, in all, are not given to the reference, which would take
+/// hours.
+inline constexpr std::uint64_t kMostReferenceTriangles = 10'000'000;
+
 /// What one library did for the distances of a scene.
 struct DistancePeer {
   std::string name, settings;
   double build_seconds = 0;  ///< once
   Seconds query_seconds;     ///< each repeat
   double worst_error = 0;    ///< how far beyond the certified interval, relative to it, in the worst pair
+  std::optional<std::uint64_t> outside;  ///< of the reference: intervals that do not hold its exact distance
 };
 
-/// The distances of a scene's bodies through all libraries, same object pairs, one thread, side by side.
+/// The distances of a scene's bodies through all libraries, same object pairs, one thread, side by side. The
+/// reference runs once, and only where the pairs have kMostReferenceTriangles in all at most.
 struct DistanceComparison {
   std::string name;  ///< of the scene file, without folder and ending
   double reach = 0;

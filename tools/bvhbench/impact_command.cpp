@@ -3,7 +3,6 @@
 #include <cstdio>
 #include <memory>
 #include <new>
-#include <optional>
 #include <thread>
 
 #include "backend.h"
@@ -11,10 +10,9 @@
 #include "common/number_words.h"
 #include "common/stopwatch.h"
 #include "engines/registry.h"
+#include "scene_motions.h"
 #include "scenes/contacts_file.h"
 #include "scenes/hdf5_file.h"
-#include "scenes/scene_motion.h"
-#include "simulator/contacts/mass_properties.h"
 #include "tandem/formats/hash.h"
 #include "tandem/kernels/impact_query.h"
 
@@ -43,54 +41,6 @@ struct ImpactTable {
   std::uint32_t rounds = 0;  // of the GPU's
   GpuUse gpu;
 };
-
-// Centres of mass of the assets, computed where they are asked for.
-class MassCenters {
- public:
-  explicit MassCenters(const Scene& scene) : scene_(scene), centers_(scene.assets.size()) {}
-
-  // In the file's coordinates.
-  const Eigen::Vector3d& of(std::uint32_t asset) {
-    if (!centers_[asset]) centers_[asset] = compute(asset);
-    return *centers_[asset];
-  }
-
- private:
-  Eigen::Vector3d compute(std::uint32_t asset) const {
-    try {
-      return simulation::mass_properties(scene_.assets[asset].view()).properties.center;
-    } catch (const std::runtime_error& impossible) {
-      throw FileError(scene_.description.assets[asset] + ": " + impossible.what());
-    }
-  }
-
-  const Scene& scene_;
-  std::vector<std::optional<Eigen::Vector3d>> centers_;
-};
-
-// What the scene file says: fixed instances stay where they are, and the others turn about their centre of
-// mass, where the file gives none.
-std::vector<RigidMotion> motions_of(const std::string& path, const Scene& scene) {
-  const auto& instances = scene.description.instances;
-  const auto& movers = scene.description.filter.motion;
-  const SceneMotion told = read_motion(path, instances.size());
-  MassCenters centers(scene);
-  std::vector<RigidMotion> all(instances.size(), kAtRest);
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (!movers.empty() && movers[i] == Motion::fixed) continue;
-    RigidMotion& motion = all[i];
-    if (!told.velocity.empty()) std::copy_n(&told.velocity[3 * i], 3, motion.velocity);
-    if (!told.angular_velocity.empty())
-      std::copy_n(&told.angular_velocity[3 * i], 3, motion.angular_velocity);
-    if (!told.centre.empty()) {
-      std::copy_n(&told.centre[3 * i], 3, motion.center);
-    } else if (!told.angular_velocity.empty()) {
-      const Eigen::Vector3d& center = centers.of(instances[i].asset);
-      apply(instances[i].pose, center[0], center[1], center[2], motion.center);
-    }
-  }
-  return all;
-}
 
 ImpactTable table_of(std::span<const ObjectPair> pairs, std::span<const Impact> impacts) {
   ImpactTable table;

@@ -1,3 +1,6 @@
+// CGAL 5.5 relies on another header for it, which has it no more in Boost 1.90.
+#include <boost/next_prior.hpp>
+
 #include <CGAL/Bbox_3.h>
 #include <CGAL/Exact_predicates_exact_constructions_kernel.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>

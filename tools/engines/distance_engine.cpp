@@ -7,7 +7,7 @@ namespace tandem {
 
 using DistanceEngines = void(std::vector<std::unique_ptr<DistanceEngine>>& engines);
 // Each in a file of its own.
-DistanceEngines add_fcl_distance, add_coal_distance;
+DistanceEngines add_cgal_distance, add_fcl_distance, add_coal_distance;
 
 namespace {
 
@@ -41,6 +41,7 @@ std::vector<std::unique_ptr<DistanceEngine>> distance_engines() {
   engines.push_back(std::make_unique<TandemDistance>());
   if constexpr (TANDEM_HAVE_FCL) add_fcl_distance(engines);
   if constexpr (TANDEM_HAVE_COAL) add_coal_distance(engines);
+  add_cgal_distance(engines);
   return engines;
 }
 

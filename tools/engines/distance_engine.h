@@ -32,9 +32,18 @@ class DistanceEngine {
 
   /// The distance of each pair; 0 or less where bodies meet.
   virtual void find(std::span<const ObjectPair> pairs, std::vector<double>& distances) = 0;
+
+  /// Whether find() is exact, without Tandem's own code; asked once, not raced.
+  virtual bool is_reference() const { return false; }
+
+  /// How many pairs of the last find() have an exact distance that is not in [lower, upper], as exact
+  /// arithmetic decides. Condition: is_reference().
+  virtual std::uint64_t outside(std::span<const double> /*lower*/, std::span<const double> /*upper*/) const {
+    return 0;
+  }
 };
 
-/// Tandem's, and those of the libraries that were found when this program was built.
+/// Tandem's, those of the libraries that were found when this program was built, and the reference.
 std::vector<std::unique_ptr<DistanceEngine>> distance_engines();
 
 }  // namespace tandem

@@ -1,40 +1,13 @@
-#include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/narrowphase/collision.h>
 
 #include <limits>
 
-#include "library_engine.h"
+#include "fcl_model.h"
 
 namespace tandem {
 namespace {
 
 using Model = fcl::BVHModel<fcl::OBBd>;
-
-std::shared_ptr<Model> make_model(const LevelView& level) {
-  const IndexedMesh mesh = index_mesh(level);
-  std::vector<fcl::Vector3d> vertices;
-  std::vector<fcl::Triangle> triangles;
-  for (std::size_t i = 0; i < mesh.vertices.size(); i += 3) {
-    vertices.emplace_back(mesh.vertices[i], mesh.vertices[i + 1], mesh.vertices[i + 2]);
-  }
-  for (std::size_t i = 0; i < mesh.corners.size(); i += 3) {
-    triangles.emplace_back(mesh.corners[i], mesh.corners[i + 1], mesh.corners[i + 2]);
-  }
-  auto model = std::make_shared<Model>();
-  model->beginModel(static_cast<int>(triangles.size()), static_cast<int>(vertices.size()));
-  model->addSubModel(vertices, triangles);
-  model->endModel();
-  return model;
-}
-
-fcl::Transform3d transform(const Pose& pose) {
-  fcl::Transform3d out = fcl::Transform3d::Identity();
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) out.linear()(i, j) = pose.rotation[i][j];
-    out.translation()[i] = pose.translation[i];
-  }
-  return out;
-}
 
 class FclEngine final : public LibraryEngine {
  public:
@@ -52,11 +25,11 @@ class FclEngine final : public LibraryEngine {
 
  private:
   void clear_shapes() override { models_.clear(); }
-  void add_shape(const LevelView& level) override { models_.push_back(make_model(level)); }
+  void add_shape(const LevelView& level) override { models_.push_back(fcl_model<fcl::OBBd>(level)); }
 
   void place(std::span<const Pose> poses) override {
     transforms_.clear();
-    for (const Pose& pose : poses) transforms_.push_back(transform(pose));
+    for (const Pose& pose : poses) transforms_.push_back(fcl_transform(pose));
   }
 
   void collide(std::uint32_t pair, std::uint32_t a, std::uint32_t b) override {

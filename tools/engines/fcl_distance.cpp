@@ -1,8 +1,7 @@
-#include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/narrowphase/distance.h>
 
 #include "distance_engine.h"
-#include "library_engine.h"
+#include "fcl_model.h"
 
 namespace tandem {
 namespace {
@@ -18,20 +17,15 @@ class FclDistance final : public DistanceEngine {
   void set_shapes(std::span<const AssetView> shapes) override {
     models_.clear();
     shapes_ = shapes;
-    for (const AssetView& shape : shapes) models_.push_back(make_model(shape.level()));
+    for (const AssetView& shape : shapes) models_.push_back(fcl_model<Volume>(shape.level()));
   }
 
   void update(std::span<const Instance> bodies) override {
     bodies_ = bodies;
     transforms_.clear();
     for (const Instance& body : bodies) {
-      const Pose pose = for_stored_coordinates(body.pose, shapes_[body.asset].header->origin);
-      fcl::Transform3d out = fcl::Transform3d::Identity();
-      for (int i = 0; i < 3; ++i) {
-        for (int j = 0; j < 3; ++j) out.linear()(i, j) = pose.rotation[i][j];
-        out.translation()[i] = pose.translation[i];
-      }
-      transforms_.push_back(out);
+      transforms_.push_back(
+          fcl_transform(for_stored_coordinates(body.pose, shapes_[body.asset].header->origin)));
     }
   }
 
@@ -48,27 +42,10 @@ class FclDistance final : public DistanceEngine {
   }
 
  private:
-  using Model = fcl::BVHModel<Volume>;
-
-  static std::shared_ptr<Model> make_model(const LevelView& level) {
-    const IndexedMesh mesh = index_mesh(level);
-    std::vector<fcl::Vector3d> vertices;
-    std::vector<fcl::Triangle> triangles;
-    for (std::size_t i = 0; i < mesh.vertices.size(); i += 3)
-      vertices.emplace_back(mesh.vertices[i], mesh.vertices[i + 1], mesh.vertices[i + 2]);
-    for (std::size_t i = 0; i < mesh.corners.size(); i += 3)
-      triangles.emplace_back(mesh.corners[i], mesh.corners[i + 1], mesh.corners[i + 2]);
-    auto model = std::make_shared<Model>();
-    model->beginModel(static_cast<int>(triangles.size()), static_cast<int>(vertices.size()));
-    model->addSubModel(vertices, triangles);
-    model->endModel();
-    return model;
-  }
-
   const std::string volume_;
   std::span<const AssetView> shapes_;
   std::span<const Instance> bodies_;
-  std::vector<std::shared_ptr<Model>> models_;
+  std::vector<std::shared_ptr<fcl::BVHModel<Volume>>> models_;
   std::vector<fcl::Transform3d, Eigen::aligned_allocator<fcl::Transform3d>> transforms_;
 };
 

@@ -15,6 +15,9 @@ inline constexpr int kMostDirections = 5;
 /// A smooth patch lies on a face if this part of its curve lies in the face's plane.
 inline constexpr double kBearing = 0.9;
 
+/// Faces of two bodies are flush, as seen from a to b, where the cosine of their normals is below this.
+inline constexpr double kFlush = -0.99;
+
 /// Measures a curve, and finds the direction in which its patch pushes.
 template <typename Team>
 class NormalFinder {
@@ -335,7 +338,8 @@ TANDEM_HD void NormalFinder<Team>::spread_along(int count) const {
 /// the face normal that separates the patch's triangles soonest they stay upright. How far b must move until
 /// a plane lies between all of the triangles counts, not how deep the overlap is: the tip of a pyramid in the
 /// ground is narrower than it is deep, yet the ground goes on. A body whose triangles in the patch all face
-/// one way is such a ground, and nothing else is to be compared.
+/// one way is such a ground, and nothing else is to be compared; unless the other body has a face there that
+/// lies flush with it, facing the same way: of what sticks out of the ground there the tip is outside.
 template <typename Team>
 TANDEM_HD Vector3 NormalFinder<Team>::face_nearest(const Vector3& smooth, double length) {
   directions_ = 0;
@@ -343,7 +347,9 @@ TANDEM_HD Vector3 NormalFinder<Team>::face_nearest(const Vector3& smooth, double
   const int of_b = gather_directions(1, false) ? directions_ - first_of_b : kMost;
   if ((of_a == 1) != (of_b == 1)) {
     const Vector3 n = shared_.direction[of_a == 1 ? 0 : first_of_b].n;
-    return dot(n, smooth) > 0 ? n : smooth;
+    bool flush = false;
+    for (int i = 0; i < directions_; ++i) flush = flush || dot(shared_.direction[i].n, n) < kFlush;
+    if (!flush) return dot(n, smooth) > 0 ? n : smooth;
   }
   if (of_a == kMost || of_b == kMost) find_bearing_faces(smooth, length);
   const Vector3 apart = bodies_.apart();

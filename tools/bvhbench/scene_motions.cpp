@@ -1,0 +1,61 @@
+#include "scene_motions.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "scenes/hdf5_file.h"
+#include "scenes/scene_motion.h"
+#include "simulator/contacts/mass_properties.h"
+
+namespace tandem::bench {
+namespace {
+
+// Centres of mass of the assets, computed where they are asked for.
+class MassCenters {
+ public:
+  explicit MassCenters(const Scene& scene) : scene_(scene), centers_(scene.assets.size()) {}
+
+  // In the file's coordinates.
+  const Eigen::Vector3d& of(std::uint32_t asset) {
+    if (!centers_[asset]) centers_[asset] = compute(asset);
+    return *centers_[asset];
+  }
+
+ private:
+  Eigen::Vector3d compute(std::uint32_t asset) const {
+    try {
+      return simulation::mass_properties(scene_.assets[asset].view()).properties.center;
+    } catch (const std::runtime_error& impossible) {
+      throw FileError(scene_.description.assets[asset] + ": " + impossible.what());
+    }
+  }
+
+  const Scene& scene_;
+  std::vector<std::optional<Eigen::Vector3d>> centers_;
+};
+
+}  // namespace
+
+std::vector<RigidMotion> motions_of(const std::string& path, const Scene& scene) {
+  const auto& instances = scene.description.instances;
+  const auto& movers = scene.description.filter.motion;
+  const SceneMotion told = read_motion(path, instances.size());
+  MassCenters centers(scene);
+  std::vector<RigidMotion> all(instances.size(), kAtRest);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (!movers.empty() && movers[i] == Motion::fixed) continue;
+    RigidMotion& motion = all[i];
+    if (!told.velocity.empty()) std::copy_n(&told.velocity[3 * i], 3, motion.velocity);
+    if (!told.angular_velocity.empty())
+      std::copy_n(&told.angular_velocity[3 * i], 3, motion.angular_velocity);
+    if (!told.centre.empty()) {
+      std::copy_n(&told.centre[3 * i], 3, motion.center);
+    } else if (!told.angular_velocity.empty()) {
+      const Eigen::Vector3d& center = centers.of(instances[i].asset);
+      apply(instances[i].pose, center[0], center[1], center[2], motion.center);
+    }
+  }
+  return all;
+}
+
+}  // namespace tandem::bench

@@ -1,7 +1,6 @@
 #include "impact_walk.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "tandem/kernels/detail/impact/triangle_impact.h"
@@ -28,39 +27,30 @@ class ImpactWalk::SortedPairs {
 const ImpactWalk::Part& ImpactWalk::part(std::uint32_t number) {
   Part& part = parts_[number];
   if (part.piece == piece_) return part;
-  const int halvings = std::bit_width(number) - 1;
-  const double length = std::ldexp(end_ - begin_, -halvings);
-  const std::uint32_t place = number - (1u << halvings);
   part.piece = piece_;
-  part.begin = begin_ + place * length;
-  part.end = place + 1 == 1u << halvings ? end_ : begin_ + (place + 1) * length;
-  part.place = place_at(*pair_, part.begin);
+  part.time = part_of_piece(span_, number);
+  part.place = place_at(*pair_, part.time.begin);
   part.frames = pair_frames(*pair_, part.place, kAim * tolerance_);
   return part;
-}
-
-bool ImpactWalk::worth_halving(const Part& part, const Block& a, const Block& b) const {
-  constexpr double kOfSize = 0.125;
-  const double length = part.end - part.begin;
-  return acceleration_ * length * length > kOfSize * (static_cast<double>(size_of(a)) + size_of(b));
 }
 
 void ImpactWalk::visit(const WaitingPair& pair) {
   const Part& now = part(pair.part);
   const Block &a = a_->blocks[pair.a], &b = b_->blocks[pair.b];
-  const double most = std::min(now.end, stop_.time) - now.begin;
+  const double most = std::min(now.time.end, stop_.time) - now.time.begin;
   NodeTimes times;
   // What is below a node is apart for as long as the node is.
-  node_times(now.frames, a, b, pair.mask, std::max(0.0, pair.apart - now.begin), most, times);
+  node_times(now.frames, a, b, pair.mask, std::max(0.0, pair.apart - now.time.begin), most, times);
   ++counters_->block_pairs;
   if (times.hits == 0) return;
-  if (pair.part < 1u << kHalvings && worth_halving(now, a, b)) {
+  const double length = now.time.end - now.time.begin;
+  if (worth_halving(acceleration_, pair.part, length, size_of(a), size_of(b))) {
     push({pair.a, pair.b, times.hits, 2 * pair.part + 1, pair.apart});
     push({pair.a, pair.b, times.hits, 2 * pair.part, pair.apart});
   } else if (a.is_leaf_block() && b.is_leaf_block()) {
     advance_leaves(pair, times, now);
   } else {
-    descend(pair, times, now.begin);
+    descend(pair, times, now.time.begin);
   }
 }
 
@@ -96,7 +86,7 @@ void ImpactWalk::advance_leaves(const WaitingPair& pair, const NodeTimes& times,
   for (std::uint32_t hits = times.hits; hits != 0; hits &= hits - 1) {
     const int bit = lowest_bit(hits);
     leaves.insert({a_->blocks[pair.a].index[bit / 4], b_->blocks[pair.b].index[bit % 4], 0, pair.part,
-                   part.begin + times.apart[bit]});
+                   part.time.begin + times.apart[bit]});
   }
   for (std::uint32_t i = leaves.count(); i-- > 0;) {
     if (leaves[i].apart < stop_.time) advance_pair(leaves[i], part);
@@ -106,11 +96,10 @@ void ImpactWalk::advance_leaves(const WaitingPair& pair, const NodeTimes& times,
 void ImpactWalk::advance_pair(const WaitingPair& leaf, const Part& part) {
   ++counters_->triangle_pairs;
   const MovingTriangles start = moving_triangles(*pair_, a_->triangles[leaf.a], b_->triangles[leaf.b]);
-  const double end = std::min(part.end, stop_.time);
-  const TimeApart apart =
-      time_apart_by_faces(*pair_, triangles_at(*pair_, start, part.place), kAim * tolerance_);
-  if (apart.time >= end - part.begin) return;
-  const double from = std::max(part.begin + apart.nearly, leaf.apart);
+  const double end = std::min(part.time.end, stop_.time);
+  const double from =
+      time_to_advance_from(*pair_, start, part.place, part.time.begin, end, leaf.apart, tolerance_);
+  if (from >= end) return;
   const TriangleStop stop = advance(*pair_, start, from, end, tolerance_);
   ++counters_->advanced;
   counters_->steps += stop.steps;
@@ -124,7 +113,7 @@ void ImpactWalk::advance_pair(const WaitingPair& leaf, const Part& part) {
 void ImpactWalk::walk() {
   ++piece_;
   ++counters_->walks;
-  push({0, 0, kAllNodePairs, 1, begin_});
+  push({0, 0, kAllNodePairs, 1, span_.begin});
   while (height_ > 0) {
     const WaitingPair pair = stack_[--height_];
     if (pair.apart < stop_.time) visit(pair);
@@ -138,12 +127,12 @@ PairStop ImpactWalk::find_stop(const PairMotion& pair, const LevelView& a, const
   b_ = &b;
   counters_ = &counters;
   tolerance_ = tolerance;
-  acceleration_ = pair.a->angle * pair.a->fastest + pair.b->angle * pair.b->fastest;
+  acceleration_ = largest_acceleration(pair);
   stop_ = {1};
-  const double pieces = std::max(1.0, std::ceil(std::max(pair.a->angle, pair.b->angle) / kMostTurnOfPiece));
+  if (balls_stay_apart(pair)) return stop_;
+  const double pieces = pieces_of(pair);
   for (double i = 0; i < pieces && stop_.triangle_a == kNoIndex; ++i) {
-    begin_ = i / pieces;
-    end_ = (i + 1) / pieces;
+    span_ = piece_of_step(i, pieces);
     walk();
   }
   if (stop_.triangle_a != kNoIndex && !converged_) ++counters.unconverged;

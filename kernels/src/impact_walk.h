@@ -1,5 +1,6 @@
 #pragma once
 #include "tandem/kernels/detail/impact/box_times.h"
+#include "tandem/kernels/detail/impact/step_parts.h"
 #include "tandem/kernels/impact_query.h"
 
 namespace tandem::impact {
@@ -12,11 +13,6 @@ struct PairStop {
 
 /// A depth-first walk of two trees through a piece of the step at a time, the nodes that may meet soonest
 /// first. Large; to be kept.
-///
-/// A piece is a run of time in which no body turns by more than kMostTurnOfPiece. The larger the turn, the
-/// less boxes know of where their nodes are after it, so pieces are halved where nodes are small: a block
-/// pair that may meet in a piece is tested again in each half, instead of the nodes below it, as long as its
-/// nodes are smaller than what they may leave their straight ways by.
 class ImpactWalk {
  public:
   /// Until when two trees stay apart. tolerance: in units of length. Adds to the counters.
@@ -24,15 +20,11 @@ class ImpactWalk {
                      ImpactCounters& counters);
 
  private:
-  static constexpr double kMostTurnOfPiece = 0.5;
-  static constexpr std::uint32_t kHalvings = 6;
-
   /// Each pair that is taken off puts at most 16 on, whose depths and halvings add up to 1 more at least:
   /// from 2 to 2 kMaxDepth + kHalvings.
   static constexpr std::uint32_t kStackSize = 16 * (2 * kMaxDepth + kHalvings - 2) + 1;
 
   /// A block pair whose nodes in the mask may meet, in a part of the piece, but not before `apart`.
-  /// part: 1: the whole piece; 2 p and 2 p + 1: the halves of part p.
   struct WaitingPair {
     std::uint32_t a, b, mask, part;
     double apart;
@@ -42,7 +34,7 @@ class ImpactWalk {
   /// Where the bodies are when a part of the piece begins.
   struct Part {
     std::uint64_t piece = 0;  ///< that it is of, in the order of all
-    double begin, end;
+    Span time;
     PairPlace place;
     PairFrames frames;
   };
@@ -50,7 +42,6 @@ class ImpactWalk {
   const Part& part(std::uint32_t number);
   void walk();
   void visit(const WaitingPair& pair);
-  bool worth_halving(const Part& part, const Block& a, const Block& b) const;
   void descend(const WaitingPair& pair, const NodeTimes& times, double begin);
   void advance_leaves(const WaitingPair& pair, const NodeTimes& times, const Part& part);
   void advance_pair(const WaitingPair& leaf, const Part& part);
@@ -62,13 +53,13 @@ class ImpactWalk {
   double tolerance_ = 0, acceleration_ = 0;
 
   std::uint64_t piece_ = 0;
-  double begin_ = 0, end_ = 0;  // of the piece
+  Span span_ = {0, 0};  // of the piece
   PairStop stop_ = {1};
   bool converged_ = true;
 
   std::uint32_t height_ = 0;
   WaitingPair stack_[kStackSize];
-  Part parts_[2u << kHalvings];
+  Part parts_[kPartNumbers];
 };
 
 }  // namespace tandem::impact

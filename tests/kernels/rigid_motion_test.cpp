@@ -152,7 +152,7 @@ MovingTriangle triangle_above(RandomPoses& random, const double (&n)[3], double 
 
 TEST(TriangleTimes, ADirectionTellsTrianglesApartForAsLongAsItSays) {
   RandomPoses random(13);
-  int finite = 0;
+  int throughout = 0, ends = 0;
   for (int i = 0; i < test::trials(3000, 100); ++i) {
     const Pose frame = random.pose({});
     const double n[3] = {frame.rotation[0][0], frame.rotation[0][1], frame.rotation[0][2]};
@@ -163,11 +163,15 @@ TEST(TriangleTimes, ADirectionTellsTrianglesApartForAsLongAsItSays) {
     const impact::MovingTriangles start = impact::moving_triangles(pair, a.triangle, b.triangle);
     const double now = random.uniform(0, 1);
     const impact::TrianglesAt at_now = triangles_at(pair, start, impact::place_at(pair, now));
-    const impact::TimeApart apart = time_apart(pair, at_now, impact::vector_of(n), 0);
-    if (!(apart.time > 0)) continue;
-    finite += std::isfinite(apart.time);
+    const double left = random.uniform(0, 1 - now);
+    const impact::Apart apart = apart_along(pair, at_now, impact::vector_of(n), left, 0);
+    const double time = apart.throughout ? left : apart.nearly;
+    if (!(time > 0)) continue;
+    throughout += apart.throughout;
+    ends += !apart.throughout;
+    EXPECT_LE(time, left * (1 + 1e-12));
     for (int step = 0; step <= 20; ++step) {
-      const long double t = now + step / 20.0L * std::min(apart.time, 1 - now);
+      const long double t = now + step / 20.0L * time;
       long double most_a = -INFINITY, least_b = INFINITY;
       for (int c = 0; c < 3; ++c) {
         const auto p = a.place(c, t), q = b.place(c, t);
@@ -177,7 +181,8 @@ TEST(TriangleTimes, ADirectionTellsTrianglesApartForAsLongAsItSays) {
       EXPECT_LT(most_a, least_b) << "motion " << i << ", step " << step;
     }
   }
-  EXPECT_GT(finite, 500);
+  EXPECT_GT(throughout, 500);
+  EXPECT_GT(ends, 300);
 }
 
 }  // namespace

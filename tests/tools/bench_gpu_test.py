@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""bvhbench query --backend cuda from the outside. Environment: that of bench_test.py."""
+"""bvhbench query and impact --backend cuda from the outside. Environment: that of bench_test.py."""
 import os
 import re
 import unittest
@@ -41,6 +41,9 @@ class BenchGpu(BenchTest):
             result = self.bench("query", self.scene, *self.ON_GPU, "--engine", engine, "--out", self.contacts, **options)
             self.assert_fails(result, UNUSABLE_GPU, "--backend cuda: ", *words)
             self.assertFalse(self.contacts.exists())
+        result = self.bench("impact", self.scene, "--dt", "1", *self.ON_GPU, "--out", self.contacts, **options)
+        self.assert_fails(result, UNUSABLE_GPU, "--backend cuda: ", *words)
+        self.assertFalse(self.contacts.exists())
 
     def test_options_of_another_backend_or_engine_are_refused(self):
         if not self.built:
@@ -53,10 +56,29 @@ class BenchGpu(BenchTest):
             with self.subTest(words=words):
                 self.assert_fails(drop_hint(self.bench("query", self.scene, *words)), USAGE, words[-2] if words[-1] == "2" else "--")
 
+        self.assert_fails(drop_hint(self.bench("impact", self.scene, "--dt", "1", *self.ON_GPU, "--threads", "2")), USAGE, "--threads")
+
     def need_gpu(self):
         self.write_scene()
         if self.bench("query", self.scene, *self.ON_GPU).returncode != DONE:
             self.skipTest("no GPU can be used")
+
+    def test_impacts_on_the_gpu_are_those_of_the_cpu_but_for_the_tolerance(self):
+        self.need_gpu()
+        self.make("pile", "--count", "60")
+        random = np.random.default_rng(1)
+        with h5py.File(self.scene, "r+") as file:
+            file["/simulation/velocity"] = random.normal(size=(60, 3))
+            file["/simulation/angular_velocity"] = random.normal(size=(60, 3))
+        tables = []
+        for words in ([], [*self.ON_GPU, "--repeat", "2"]):
+            self.passes("impact", self.scene, "--dt", "0.5", "--out", self.contacts, *words)
+            with h5py.File(self.contacts) as file:
+                tables.append({name: file[name][:] for name in ("pairs", "impact/status", "impact/t_safe")})
+        cpu, gpu = tables
+        self.assertEqual(gpu["pairs"].tolist(), cpu["pairs"].tolist())
+        self.assertEqual(gpu["impact/status"].tolist(), cpu["impact/status"].tolist())
+        np.testing.assert_allclose(gpu["impact/t_safe"], cpu["impact/t_safe"], atol=1e-4)
 
     def test_the_gpu_finds_what_the_cpu_finds(self):
         self.need_gpu()

@@ -5,9 +5,11 @@
 #include <new>
 #include <thread>
 
+#include "backend.h"
 #include "common/json.h"
 #include "common/number_words.h"
 #include "common/stopwatch.h"
+#include "engines/registry.h"
 #include "scene_motions.h"
 #include "scenes/contacts_file.h"
 #include "scenes/hdf5_file.h"
@@ -18,11 +20,13 @@ namespace tandem::bench {
 namespace {
 
 struct ImpactArguments {
-  std::string scene, out;
+  std::string scene, out, backend = "cpu";
   double duration = 0;
   ImpactOptions options;
   std::uint32_t repeats = 1;
-  bool json = false;
+  bool json = false, threads_given = false;
+
+  bool on_gpu() const { return backend == "cuda"; }
 };
 
 // The answer, column by column as the file has it.
@@ -34,12 +38,14 @@ struct ImpactTable {
   std::vector<RigidMotion> motion;  // of the instances
   ImpactCounters counters;
   Seconds seconds;
+  std::uint32_t rounds = 0;  // of the GPU's
+  GpuUse gpu;
 };
 
-ImpactTable table_of(const ImpactQuery& query) {
+ImpactTable table_of(std::span<const ObjectPair> pairs, std::span<const Impact> impacts) {
   ImpactTable table;
-  for (const ObjectPair& pair : query.pairs()) table.pairs.insert(table.pairs.end(), {pair.a, pair.b});
-  for (const Impact& impact : query.impacts()) {
+  for (const ObjectPair& pair : pairs) table.pairs.insert(table.pairs.end(), {pair.a, pair.b});
+  for (const Impact& impact : impacts) {
     table.t_safe.push_back(impact.t_safe);
     table.status.push_back(static_cast<std::uint8_t>(impact.status));
     table.gap.push_back(impact.gap);
@@ -48,33 +54,62 @@ ImpactTable table_of(const ImpactQuery& query) {
     table.face_a.push_back(impact.face_a);
     table.face_b.push_back(impact.face_b);
   }
-  table.counters = query.counters();
   return table;
 }
 
 // Runs the query as often as asked; the answer is every run's.
-ImpactTable run_query(const ImpactArguments& arguments, const Scene& scene) {
-  const SceneDescription& description = scene.description;
-  const std::vector<RigidMotion> motion = motions_of(arguments.scene, scene);
-  const std::vector<ObjectPair> pairs = normalised(description.pairs.value_or(std::vector<ObjectPair>()));
-  ExcludedPairTable excluded;
-  const PairFilter filter = description.filter.view(excluded);
+ImpactTable run_on_cpu(const ImpactArguments& arguments, const MovingBodies& moving) {
   ImpactOptions options = arguments.options;
-  options.filter = &filter;
+  options.filter = &moving.filter;
   ImpactQuery query;
   Seconds seconds;
-  Status status = query.set_assets(scene.views());
+  Status status = query.set_assets(moving.shapes);
   for (std::uint32_t i = 0; i < arguments.repeats && status == Status::kOk; ++i) {
     Stopwatch watch;
-    status = description.pairs ? query.find(description.instances, motion, arguments.duration, pairs, options)
-                               : query.find(description.instances, motion, arguments.duration, options);
+    status = moving.given != nullptr
+                 ? query.find(moving.bodies, moving.motion, moving.duration, *moving.given, options)
+                 : query.find(moving.bodies, moving.motion, moving.duration, options);
     seconds.push_back(watch.lap());
   }
   if (status == Status::kOutOfMemory) throw std::bad_alloc();
   if (status != Status::kOk) refuse(arguments.scene, status, query.where());
-  ImpactTable table = table_of(query);
-  table.motion = motion;
+  ImpactTable table = table_of(query.pairs(), query.impacts());
+  table.counters = query.counters();
   table.seconds = seconds;
+  return table;
+}
+
+ImpactTable run_on_gpu(const ImpactArguments& arguments, const MovingBodies& moving) {
+  try {
+    const TimedImpacts timed = impacts_on_gpu()(moving, arguments.repeats);
+    ImpactTable table = table_of(timed.pairs, timed.impacts);
+    table.counters = timed.counters;
+    table.seconds = timed.seconds;
+    table.rounds = timed.rounds;
+    table.gpu = timed.gpu;
+    return table;
+  } catch (const EngineError& error) {
+    refuse(arguments.scene, error.status, error.where);
+  } catch (const GpuError& error) {
+    refuse_gpu(arguments.scene, error);
+  }
+}
+
+ImpactTable run_query(const ImpactArguments& arguments, const Scene& scene) {
+  const SceneDescription& description = scene.description;
+  const std::vector<AssetView> shapes = scene.views();
+  const std::vector<RigidMotion> motion = motions_of(arguments.scene, scene);
+  const std::vector<ObjectPair> pairs = normalised(description.pairs.value_or(std::vector<ObjectPair>()));
+  ExcludedPairTable excluded;
+  const MovingBodies moving = {shapes,
+                               description.instances,
+                               motion,
+                               arguments.duration,
+                               arguments.options.tolerance,
+                               description.pairs ? &pairs : nullptr,
+                               description.filter.view(excluded)};
+  ImpactTable table = arguments.on_gpu() ? run_on_gpu(arguments, moving) : run_on_cpu(arguments, moving);
+  table.motion = motion;
   return table;
 }
 
@@ -103,6 +138,10 @@ std::vector<double> vectors(const std::vector<RigidMotion>& motion, double (Rigi
   return all;
 }
 
+std::uint32_t threads_of(const ImpactArguments& arguments) {
+  return arguments.on_gpu() ? 0 : arguments.options.threads;
+}
+
 void write(const ImpactArguments& arguments, const ImpactTable& table) {
   const std::size_t m = table.t_safe.size(), n = table.motion.size();
   Hdf5Output file(arguments.out);
@@ -118,9 +157,10 @@ void write(const ImpactArguments& arguments, const ImpactTable& table) {
   file.add("/motion/angular_velocity", {n, 3}, vectors(table.motion, &RigidMotion::angular_velocity));
   file.add("/motion/centre", {n, 3}, vectors(table.motion, &RigidMotion::center));
   file.attribute("tandem_version", std::string(TANDEM_VERSION));
+  file.attribute("backend", arguments.backend);
   file.attribute("dt", arguments.duration);
   file.attribute("tolerance", arguments.options.tolerance);
-  file.attribute("threads", std::uint64_t{arguments.options.threads});
+  file.attribute("threads", std::uint64_t{threads_of(arguments)});
   file.attribute("repeats", std::uint64_t{table.seconds.size()});
   file.attribute("best_seconds", best_of(table.seconds));
   file.attribute("median_seconds", median_of(table.seconds));
@@ -141,28 +181,39 @@ void write(const ImpactArguments& arguments, const ImpactTable& table) {
 
 Json to_json(const ImpactArguments& arguments, const Scene& scene, const ImpactTable& table) {
   const ImpactCounters& counters = table.counters;
-  return {{"tool", "bvhbench impact"},
-          {"version", TANDEM_VERSION},
-          {"scene", arguments.scene},
-          {"output", arguments.out.empty() ? Json() : Json(arguments.out)},
-          {"dt", arguments.duration},
-          {"tolerance", arguments.options.tolerance},
-          {"given_pairs", scene.description.pairs.has_value()},
-          {"threads", arguments.options.threads},
-          {"instances", scene.description.instances.size()},
-          {"object_pairs", counters.object_pairs},
-          {"at_start", counters.at_start},
-          {"found", counters.found},
-          {"walks", counters.walks},
-          {"block_pairs", counters.block_pairs},
-          {"triangle_pairs", counters.triangle_pairs},
-          {"advanced", counters.advanced},
-          {"steps", counters.steps},
-          {"most_steps", counters.most_steps},
-          {"unconverged", counters.unconverged},
-          {"hash", hexadecimal(hash_of(table))},
-          {"seconds",
-           {{"best", best_of(table.seconds)}, {"median", median_of(table.seconds)}, {"all", table.seconds}}}};
+  Json json = {
+      {"tool", "bvhbench impact"},
+      {"version", TANDEM_VERSION},
+      {"scene", arguments.scene},
+      {"output", arguments.out.empty() ? Json() : Json(arguments.out)},
+      {"backend", arguments.backend},
+      {"dt", arguments.duration},
+      {"tolerance", arguments.options.tolerance},
+      {"given_pairs", scene.description.pairs.has_value()},
+      {"threads", threads_of(arguments)},
+      {"instances", scene.description.instances.size()},
+      {"object_pairs", counters.object_pairs},
+      {"at_start", counters.at_start},
+      {"found", counters.found},
+      {"walks", counters.walks},
+      {"block_pairs", counters.block_pairs},
+      {"triangle_pairs", counters.triangle_pairs},
+      {"advanced", counters.advanced},
+      {"steps", counters.steps},
+      {"most_steps", counters.most_steps},
+      {"unconverged", counters.unconverged},
+      {"hash", hexadecimal(hash_of(table))},
+      {"seconds",
+       {{"best", best_of(table.seconds)}, {"median", median_of(table.seconds)}, {"all", table.seconds}}}};
+  if (arguments.on_gpu()) {
+    json["rounds"] = table.rounds;
+    json["gpu"] = table.gpu.name;
+    json["gpu_bytes"] = table.gpu.bytes;
+    json["gpu_bytes_bound"] = table.gpu.bytes_bound;
+    json["gpu_bytes_taken"] = table.gpu.bytes_taken;
+    json["upload_seconds"] = table.gpu.upload;
+  }
+  return json;
 }
 
 void print_row(const char* label, std::uint64_t value) {
@@ -171,9 +222,11 @@ void print_row(const char* label, std::uint64_t value) {
 
 void print_summary(const ImpactArguments& arguments, const Scene& scene, const ImpactTable& table) {
   const ImpactCounters& counters = table.counters;
-  const std::uint32_t threads = arguments.options.threads;
-  std::printf("%s: impacts within %g s on cpu, %s %s\n", arguments.scene.c_str(), arguments.duration,
-              with_commas(threads).c_str(), threads == 1 ? "thread" : "threads");
+  const std::uint32_t threads = threads_of(arguments);
+  const std::string place =
+      arguments.on_gpu() ? table.gpu.name : with_commas(threads) + (threads == 1 ? " thread" : " threads");
+  std::printf("%s: impacts within %g s on %s, %s\n", arguments.scene.c_str(), arguments.duration,
+              arguments.backend.c_str(), place.c_str());
   print_row("instances", scene.description.instances.size());
   print_row("object pairs", counters.object_pairs);
   print_row("  touch already", counters.at_start);
@@ -182,12 +235,14 @@ void print_summary(const ImpactArguments& arguments, const Scene& scene, const I
   print_row("triangle pairs", counters.triangle_pairs);
   print_row("  advanced", counters.advanced);
   print_row("  steps", counters.steps);
+  if (arguments.on_gpu()) print_row("rounds", table.rounds);
   std::printf("  %-14s %15.3f  best of %zu, median %.3f\n", "milliseconds", 1e3 * best_of(table.seconds),
               table.seconds.size(), 1e3 * median_of(table.seconds));
   std::printf("  %-14s %s\n", "hash", hexadecimal(hash_of(table)).c_str());
 }
 
 ExitCode run(const ImpactArguments& arguments) {
+  if (arguments.on_gpu() && arguments.threads_given) throw UsageError("--threads is for the backend cpu");
   const Scene scene = read_scene(arguments.scene);
   if (!arguments.out.empty()) keep_inputs(arguments.out, files_of(arguments.scene, scene));
   if (!arguments.out.empty()) try_output(arguments.out);
@@ -215,21 +270,26 @@ CLI::App* add_impact(CLI::App& app, Run& run_later) {
       ->required()
       ->check(between(0, 1e9))
       ->option_text("T");
+  add_backend(*command, arguments->backend);
   command
       ->add_option("--tolerance", options.tolerance,
                    "how near triangles stop, as a part of the smaller body's diagonal")
       ->check(between(0, 1))
       ->option_text("R [1e-6]");
-  command->add_option("--threads", options.threads, "threads; the impacts do not depend on them")
-      ->check(CLI::Range(1u, kMostQueryThreads))
-      ->option_text("N [all]");
+  CLI::Option* threads =
+      command->add_option("--threads", options.threads, "threads; the impacts do not depend on them")
+          ->check(CLI::Range(1u, kMostQueryThreads))
+          ->option_text("N [all]");
   command->add_option("--repeat", arguments->repeats, "times to run the query, for its timing")
       ->check(CLI::Range(1, 1000000))
       ->option_text("N [1]");
   command->add_option("--out", arguments->out, "the file to write; appears whole or not at all")
       ->check(file_name());
   command->add_flag("--json", arguments->json, "print the summary as JSON");
-  command->final_callback([arguments, &run_later] { run_later = [arguments] { return run(*arguments); }; });
+  command->final_callback([arguments, threads, &run_later] {
+    arguments->threads_given = threads->count() > 0;
+    run_later = [arguments] { return run(*arguments); };
+  });
   return command;
 }
 

@@ -100,12 +100,16 @@ GpuEngine::GpuEngine(std::string_view name, Contents contents, double within)
   check(stream_.create(), "a stream");
 }
 
-void GpuEngine::check(Status status, cudaError_t error, const char* step) const {
+void check_on_gpu(const std::string& name, Status status, cudaError_t error, const char* step) {
   if (status == Status::kOk) return;
   if (status == Status::kOutOfMemory) throw std::bad_alloc();
-  if (status == Status::kNoOrientedBlocks) require(status, 0);
   const std::string told = error == cudaSuccess ? "" : std::string(": ") + cudaGetErrorString(error);
-  throw GpuError(name_ + ": " + explain(status) + told, status, step, reason_of(status, error));
+  throw GpuError(name + ": " + explain(status) + told, status, step, reason_of(status, error));
+}
+
+void GpuEngine::check(Status status, cudaError_t error, const char* step) const {
+  if (status == Status::kNoOrientedBlocks) require(status, 0);
+  check_on_gpu(name_, status, error, step);
 }
 
 void GpuEngine::check(cudaError_t error, const char* step) const {

@@ -31,6 +31,9 @@ struct StagedArray {
   }
 };
 
+/// Throws what a call that failed calls for. name: of the engine; step: what was done.
+void check_on_gpu(const std::string& name, Status status, cudaError_t error, const char* step);
+
 /// Contacts in GPU memory.
 struct GpuContacts {
   const Contact* data;

@@ -83,6 +83,11 @@ DistancesOnGpu* distances_on_gpu() {
   return kFound;
 }
 
+ImpactsOnGpu* impacts_on_gpu() {
+  constexpr ImpactsOnGpu* kFound = TANDEM_HAVE_CUDA ? time_impacts_on_gpu : nullptr;
+  return kFound;
+}
+
 std::vector<std::string_view> peer_names() {
   std::vector<std::string_view> names;
   for (const Entry& entry : kEntries) {

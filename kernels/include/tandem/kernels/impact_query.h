@@ -37,7 +37,8 @@ struct ImpactOptions {
 struct ImpactCounters {
   std::uint64_t object_pairs = 0;
   std::uint64_t at_start = 0, found = 0;  ///< of them
-  std::uint64_t walks = 0;                ///< of two trees: one for each half radian of a pair's turn
+  std::uint64_t walks =
+      0;  ///< of two trees: one for each half radian of a pair's turn, where balls come near
   std::uint64_t block_pairs = 0;
   std::uint64_t triangle_pairs = 0;  ///< whose boxes may meet
   std::uint64_t advanced = 0;        ///< of these, not told apart by their planes

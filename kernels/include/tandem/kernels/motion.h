@@ -115,6 +115,22 @@ TANDEM_HD inline double fastest_turn(const Pose& pose, const float* lower, const
          0x1p-45 * norm(turn) * (size + std::fabs(t[0]) + std::fabs(t[1]) + std::fabs(t[2]));
 }
 
+/// The largest distance from the centre of the posed points of an asset with these bounds, or more, also of
+/// posed vertices as they are rounded. A corner of the bounds has it, as above.
+TANDEM_HD inline double farthest_from_center(const Pose& pose, const float* lower, const float* upper,
+                                             const double (&center)[3]) {
+  double most = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    double x[3];
+    apply(pose, corner & 1 ? upper[0] : lower[0], corner & 2 ? upper[1] : lower[1],
+          corner & 4 ? upper[2] : lower[2], x);
+    most = manifold::greater(most,
+                             norm(manifold::Vector3{x[0] - center[0], x[1] - center[1], x[2] - center[2]}));
+  }
+  const auto& t = pose.translation;
+  return most * (1 + 0x1p-40) + 0x1p-45 * (std::fabs(t[0]) + std::fabs(t[1]) + std::fabs(t[2]));
+}
+
 /// A box that the instance does not leave during a step, nor do the points of pose_at(). start: its world
 /// box; fastest: fastest_turn(); error: pose_error().
 ///

@@ -32,19 +32,10 @@ namespace tandem::impact {
 ///
 /// relative to the frame's origin; a point of the frame's own tree at x has the velocity own_spin * x.
 struct FrameMotion {
-  Matrix3 rotation, abs_rotation, spin, abs_spin;
+  Matrix3 rotation, spin, own_spin;
   Vector3 translation, drift;
-  Matrix3 own_spin, abs_own_spin;
   double acceleration[3];  ///< acceleration_along() each axis
 };
-
-TANDEM_HD inline Matrix3 absolute(const Matrix3& m) {
-  Matrix3 out;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) out.row[i][j] = std::fabs(m.row[i][j]);
-  }
-  return out;
-}
 
 /// A body's tree at some time: stored point v is at matrix * v + arm from the body's centre.
 struct TreePlace {
@@ -72,13 +63,10 @@ TANDEM_HD inline FrameMotion frame_motion(const PairMotion& pair, const TreePlac
                                           const Vector3& displacement) {
   FrameMotion frame;
   frame.rotation = own.inverse * other.matrix;
-  frame.abs_rotation = absolute(frame.rotation);
   frame.spin = own.inverse * other.spin;
-  frame.abs_spin = absolute(frame.spin);
   frame.translation = own.inverse * (offset + other.arm - own.arm);
   frame.drift = own.inverse * (displacement + other.drift - own.drift);
   frame.own_spin = own.inverse * own.spin;
-  frame.abs_own_spin = absolute(frame.own_spin);
   for (int k = 0; k < 3; ++k) {
     frame.acceleration[k] =
         acceleration_along(pair, vector_of(own.inverse.row[k]), pair.a->fastest, pair.b->fastest);
@@ -99,10 +87,11 @@ TANDEM_HD inline PairFrames pair_frames(const PairMotion& pair, const PairPlace&
           frame_motion(pair, b, a, -place.offset, -pair.displacement), pair.slack, margin};
 }
 
-/// A block's four nodes along the axes of a frame: centres, their velocities, and the radii of both.
+/// Nodes of a block along the axes of a frame: centres, their velocities, and the radii of both.
+template <int kNodes>
 struct MovingNodes {
-  double center[3][kNodesPerBlock], velocity[3][kNodesPerBlock];
-  double radius[3][kNodesPerBlock], spread[3][kNodesPerBlock];
+  double center[3][kNodes], velocity[3][kNodes];
+  double radius[3][kNodes], spread[3][kNodes];
 };
 
 TANDEM_HD inline double row_times(const double* row, const float (&v)[3][kNodesPerBlock], int node) {
@@ -110,50 +99,57 @@ TANDEM_HD inline double row_times(const double* row, const float (&v)[3][kNodesP
          row[2] * static_cast<double>(v[2][node]);
 }
 
-/// Of the frame's own tree.
-TANDEM_HD inline void own_nodes(const FrameMotion& frame, const Block& block, MovingNodes& out) {
+/// The same with the magnitudes of the row.
+TANDEM_HD inline double sizes_times(const double* row, const float (&v)[3][kNodesPerBlock], int node) {
+  return std::fabs(row[0]) * static_cast<double>(v[0][node]) +
+         std::fabs(row[1]) * static_cast<double>(v[1][node]) +
+         std::fabs(row[2]) * static_cast<double>(v[2][node]);
+}
+
+/// Of the frame's own tree: nodes of the block from `first` on.
+template <int kNodes>
+TANDEM_HD inline void own_nodes(const FrameMotion& frame, const Block& block, int first,
+                                MovingNodes<kNodes>& out) {
   for (int k = 0; k < 3; ++k) {
-    for (int i = 0; i < kNodesPerBlock; ++i) {
-      out.center[k][i] = static_cast<double>(block.center[k][i]);
-      out.radius[k][i] = static_cast<double>(block.half_extent[k][i]);
-      out.velocity[k][i] = row_times(frame.own_spin.row[k], block.center, i);
-      out.spread[k][i] = row_times(frame.abs_own_spin.row[k], block.half_extent, i);
+    for (int i = 0; i < kNodes; ++i) {
+      out.center[k][i] = static_cast<double>(block.center[k][first + i]);
+      out.radius[k][i] = static_cast<double>(block.half_extent[k][first + i]);
+      out.velocity[k][i] = row_times(frame.own_spin.row[k], block.center, first + i);
+      out.spread[k][i] = sizes_times(frame.own_spin.row[k], block.half_extent, first + i);
     }
   }
 }
 
 /// Of the other tree.
-TANDEM_HD inline void other_nodes(const FrameMotion& frame, const Block& block, MovingNodes& out) {
+template <int kNodes>
+TANDEM_HD inline void other_nodes(const FrameMotion& frame, const Block& block, int first,
+                                  MovingNodes<kNodes>& out) {
   const double t[3] = {frame.translation.x, frame.translation.y, frame.translation.z};
   const double drift[3] = {frame.drift.x, frame.drift.y, frame.drift.z};
   for (int k = 0; k < 3; ++k) {
-    for (int i = 0; i < kNodesPerBlock; ++i) {
-      out.center[k][i] = row_times(frame.rotation.row[k], block.center, i) + t[k];
-      out.radius[k][i] = row_times(frame.abs_rotation.row[k], block.half_extent, i);
-      out.velocity[k][i] = row_times(frame.spin.row[k], block.center, i) + drift[k];
-      out.spread[k][i] = row_times(frame.abs_spin.row[k], block.half_extent, i);
+    for (int i = 0; i < kNodes; ++i) {
+      out.center[k][i] = row_times(frame.rotation.row[k], block.center, first + i) + t[k];
+      out.radius[k][i] = sizes_times(frame.rotation.row[k], block.half_extent, first + i);
+      out.velocity[k][i] = row_times(frame.spin.row[k], block.center, first + i) + drift[k];
+      out.spread[k][i] = sizes_times(frame.spin.row[k], block.half_extent, first + i);
     }
   }
 }
 
-/// The nodes of a block pair along the axes of one frame: those of the frame's own tree, and of the other.
+/// Nodes of a block pair along the axes of one frame: those of the frame's own tree, and of the other.
+template <int kNodes>
 struct FrameNodes {
-  MovingNodes own, other;
+  MovingNodes<kNodes> own, other;
 };
-
-TANDEM_HD inline void frame_nodes(const FrameMotion& frame, const Block& own, const Block& other,
-                                  FrameNodes& out) {
-  own_nodes(frame, own, out.own);
-  other_nodes(frame, other, out.other);
-}
 
 /// One axis of (1): distance, velocity, radius with slack, and how fast the radius grows within `most`.
 struct AxisMotion {
   double distance, velocity, radius, growth;
 };
 
-TANDEM_HD inline AxisMotion axis_motion(const MovingNodes& x, int i, const MovingNodes& y, int j, int k,
-                                        double slack, double acceleration, double most) {
+template <int kNodes>
+TANDEM_HD inline AxisMotion axis_motion(const MovingNodes<kNodes>& x, int i, const MovingNodes<kNodes>& y,
+                                        int j, int k, double slack, double acceleration, double most) {
   return {y.center[k][j] - x.center[k][i], y.velocity[k][j] - x.velocity[k][i],
           y.radius[k][j] + x.radius[k][i] + slack,
           y.spread[k][j] + x.spread[k][i] + 0.5 * acceleration * most};
@@ -161,11 +157,12 @@ TANDEM_HD inline AxisMotion axis_motion(const MovingNodes& x, int i, const Movin
 
 /// Raises margins to more than 0 for pairs of node i of x and each node of y that an axis of the frame tells
 /// apart from now on for `most`. Imaginary nodes have any value.
-TANDEM_HD inline void raise_margins(const FrameMotion& frame, const MovingNodes& x, int i,
-                                    const MovingNodes& y, double slack, double most,
-                                    double (&margin)[kNodesPerBlock]) {
+template <int kNodes>
+TANDEM_HD inline void raise_margins(const FrameMotion& frame, const MovingNodes<kNodes>& x, int i,
+                                    const MovingNodes<kNodes>& y, double slack, double most,
+                                    double (&margin)[kNodes]) {
   for (int k = 0; k < 3; ++k) {
-    for (int j = 0; j < kNodesPerBlock; ++j) {
+    for (int j = 0; j < kNodes; ++j) {
       const AxisMotion m = axis_motion(x, i, y, j, k, slack, frame.acceleration[k], most);
       const double d = m.distance + most * m.velocity, r = m.radius + most * m.growth;
       const double above = manifold::lesser(m.distance - m.radius, d - r),
@@ -177,8 +174,9 @@ TANDEM_HD inline void raise_margins(const FrameMotion& frame, const MovingNodes&
 
 /// How long real nodes i and j surely stay apart by the margin from now on, at most `most`; 0 where they are
 /// nearer now.
-TANDEM_HD inline double time_apart(const PairFrames& frames, const FrameNodes& in_a, const FrameNodes& in_b,
-                                   int i, int j, double most) {
+template <int kNodes>
+TANDEM_HD inline double time_apart(const PairFrames& frames, const FrameNodes<kNodes>& in_a,
+                                   const FrameNodes<kNodes>& in_b, int i, int j, double most) {
   double start[12], slope[12];  // of the difference in (1), on each side of each axis
   for (int axis = 0; axis < 6; ++axis) {
     const int k = axis % 3;
@@ -191,20 +189,38 @@ TANDEM_HD inline double time_apart(const PairFrames& frames, const FrameNodes& i
     start[2 * axis + 1] = -m.distance - (m.radius + frames.margin);
     slope[2 * axis + 1] = -m.velocity - m.growth;
   }
-  // An axis that is used up is of no further use: 12 rounds at most.
-  double time = 0;
-  for (bool longer = true; longer && time < most;) {
-    longer = false;
-    for (int k = 0; k < 12; ++k) {
-      if (!(start[k] + time * slope[k] > 0)) continue;
-      const double end = slope[k] < 0 ? start[k] / -slope[k] * (1 - 0x1p-50) : most;
-      if (end > time) {
-        time = end;
-        longer = true;
-      }
+  // Those that hold now do until they fall to 0, the last of them for the time ahead / fall; compared by
+  // products, of which one may be taken that is shorter by rounding.
+  double ahead = 0, fall = 1;
+  bool lasts = false;
+  for (int k = 0; k < 12; ++k) {
+    const bool holds = start[k] > 0, falls = slope[k] < 0;
+    lasts = lasts || (holds && !falls);
+    if (holds && falls && start[k] * fall > ahead * -slope[k]) {
+      ahead = start[k];
+      fall = -slope[k];
     }
   }
-  return time < most ? time : most;
+  const double time = ahead / fall * (1 - 0x1p-50);
+  // One that holds then and does not fall holds for the rest.
+  for (int k = 0; k < 12; ++k) lasts = lasts || (!(slope[k] < 0) && start[k] + time * slope[k] > 0);
+  return lasts || !(time < most) ? most : time;
+}
+
+/// How long node i of a and node j of b, both real, surely stay apart from now on: `most` where that is so
+/// for all of it.
+TANDEM_HD inline double node_pair_time(const PairFrames& frames, const Block& a, int i, const Block& b, int j,
+                                       double most) {
+  FrameNodes<1> in_a, in_b;
+  double margin[1] = {-INFINITY};
+  own_nodes(frames.of_a, a, i, in_a.own);
+  other_nodes(frames.of_a, b, j, in_a.other);
+  raise_margins(frames.of_a, in_a.own, 0, in_a.other, frames.slack, most, margin);
+  if (margin[0] > 0) return most;
+  own_nodes(frames.of_b, b, j, in_b.own);
+  other_nodes(frames.of_b, a, i, in_b.other);
+  raise_margins(frames.of_b, in_b.other, 0, in_b.own, frames.slack, most, margin);
+  return margin[0] > 0 ? most : time_apart(frames, in_a, in_b, 0, 0, most);
 }
 
 /// The real nodes of a block, a bit each; imaginary ones come last.
@@ -226,10 +242,11 @@ struct NodeTimes {
 TANDEM_HD inline void node_times(const PairFrames& frames, const Block& a, const Block& b, std::uint32_t mask,
                                  double known, double most, NodeTimes& out) {
   out.hits = 0;
-  FrameNodes in_a, in_b;
+  FrameNodes<kNodesPerBlock> in_a, in_b;
   double margin[kNodesPerBlock][kNodesPerBlock];
   // Most block pairs are told apart in the first frame.
-  frame_nodes(frames.of_a, a, b, in_a);
+  own_nodes(frames.of_a, a, 0, in_a.own);
+  other_nodes(frames.of_a, b, 0, in_a.other);
   const std::uint32_t real_b = real_nodes(b);
   std::uint32_t open = 0;
   for (int i = 0; i < kNodesPerBlock; ++i) {
@@ -242,7 +259,8 @@ TANDEM_HD inline void node_times(const PairFrames& frames, const Block& a, const
     }
   }
   if (open == 0) return;
-  frame_nodes(frames.of_b, b, a, in_b);
+  own_nodes(frames.of_b, b, 0, in_b.own);
+  other_nodes(frames.of_b, a, 0, in_b.other);
   for (int i = 0; i < kNodesPerBlock; ++i) {
     const std::uint32_t row = open >> 4 * i & 0xFu;
     if (row == 0) continue;

@@ -56,6 +56,7 @@ struct MovingBody {
   double fastest;        ///< fastest_turn()
   double reach;          ///< of the tree: no stored point is farther from the stored origin
   double size;           ///< >= |translation - center| + reach
+  double radius;         ///< no posed vertex is farther from the centre, as it is rounded, at any time
   double error;          ///< pose_error()
 };
 
@@ -81,6 +82,7 @@ TANDEM_HD inline Status moving_body(const Pose& stored, const RigidMotion& motio
   body.fastest = fastest_turn(stored, lower, upper, motion.center, body.turn);
   body.reach = norm(vector_of(tree.reach));
   body.size = norm(vector_of(stored.translation) - body.center) + body.reach;
+  body.radius = farthest_from_center(stored, lower, upper, motion.center);
   body.error = pose_error(stored, body.reach, motion.center, body.displacement, body.turn);
   return Status::kOk;
 }
@@ -114,6 +116,17 @@ TANDEM_HD inline PairMotion pair_motion(const MovingBody& a, const MovingBody& b
   const double size = a.size + b.size + norm(pair.offset) + norm(a.displacement) + norm(b.displacement);
   pair.slack = 0x1p-42 * (1 + manifold::greater(a.angle, b.angle)) * size + 1.01 * (a.error + b.error);
   return pair;
+}
+
+/// Whether the balls about the bodies' centres that hold them stay apart for the whole step. A turn changes
+/// no distance from the centre, and the centres' offset goes straight ahead: it is least at one time, which
+/// is computed with an error of 4 w |offset| / |displacement|, and so errs by that many |displacement|, which
+/// slack is for.
+TANDEM_HD inline bool balls_stay_apart(const PairMotion& pair) {
+  const double squared = dot(pair.displacement, pair.displacement);
+  const double nearest = squared > 0 ? -dot(pair.offset, pair.displacement) / squared : 0;
+  const double time = manifold::lesser(manifold::greater(nearest, 0.0), 1.0);
+  return norm(pair.offset + time * pair.displacement) > pair.a->radius + pair.b->radius + pair.slack;
 }
 
 /// No point of two bodies accelerates more along n, relative to the other. fastest_a, fastest_b: the largest

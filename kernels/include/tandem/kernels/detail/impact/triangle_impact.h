@@ -89,20 +89,21 @@ TANDEM_HD inline double first_root(double g, double rate, double bend) {
   return bend > 0 ? (rate + root) / bend * (1 - 0x1p-48) : INFINITY;
 }
 
-/// How long a direction keeps triangles apart.
-struct TimeApart {
-  double time = 0;    ///< from now on
+/// How a direction keeps triangles apart for some time from now on.
+struct Apart {
+  bool throughout = false;  ///< for all of it; the rest is not told then
   double nearly = 0;  ///< until they may be `margin` apart along the direction; 0 where they are nearer now
   double gap = 0;     ///< a lower bound of their distance now
 };
 
-/// n: from a to b.
-TANDEM_HD inline TimeApart time_apart(const PairMotion& pair, const TrianglesAt& t, const Vector3& n,
-                                      double margin) {
-  TimeApart out;
+/// n: from a to b. left: the time; (2) is concave, so what is above 0 now and then is so in between. Its
+/// value then has few more roundings than slack is for.
+TANDEM_HD inline Apart apart_along(const PairMotion& pair, const TrianglesAt& t, const Vector3& n,
+                                   double left, double margin) {
+  Apart out;
   const double length = norm(n);
   if (!(length >= 0x1p-400)) return out;
-  double at_a[3], at_b[3], rate_a[3], rate_b[3], gap = INFINITY;
+  double at_a[3], at_b[3], rate_a[3], rate_b[3], least = INFINITY;
   for (int c = 0; c < 3; ++c) {
     // Relative to one corner, so that a product with n is no larger than it needs to be.
     at_a[c] = dot(n, t.a[c] - t.a[0]);
@@ -112,18 +113,38 @@ TANDEM_HD inline TimeApart time_apart(const PairMotion& pair, const TrianglesAt&
   }
   const double slack = length * pair.slack;
   const double bend = acceleration_along(pair, n, t.fastest_a, t.fastest_b);
-  out.time = out.nearly = INFINITY;
+  bool now = true, then = true;  // NaN is not above 0
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
       const double g = at_b[j] - at_a[i] - slack, rate = rate_b[j] - rate_a[i];
-      gap = manifold::lesser(g, gap);
-      if (!(g > 0)) return {};
-      out.time = manifold::lesser(first_root(g, rate, bend), out.time);
-      const double to_margin = g - length * margin;
-      out.nearly = manifold::lesser(to_margin > 0 ? first_root(to_margin, rate, bend) : 0, out.nearly);
+      least = manifold::lesser(g, least);
+      now = now && g > 0;
+      then = then && g + left * (rate - 0.5 * left * bend) > 0;
     }
   }
-  out.gap = gap / length * (1 - 0x1p-48);
+  out.throughout = now && then;
+  if (!now || then) return out;
+  out.nearly = least > length * margin ? left : 0;
+  // The least root, by few of them: that of whichever is lowest at the least root so far. Each pair of
+  // corners is lowest once at most, but for rounding.
+  bool lowered = out.nearly > 0;
+  for (int rounds = 0; rounds < 9 && lowered; ++rounds) {
+    double lowest = 0, lowest_g = 0, lowest_rate = 0;
+    lowered = false;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        const double g = at_b[j] - at_a[i] - slack - length * margin, rate = rate_b[j] - rate_a[i];
+        const double value = g + out.nearly * (rate - 0.5 * out.nearly * bend);
+        if (value > lowest) continue;
+        lowered = true;
+        lowest = value;
+        lowest_g = g;
+        lowest_rate = rate;
+      }
+    }
+    if (lowered) out.nearly = manifold::lesser(first_root(lowest_g, lowest_rate, bend), out.nearly);
+  }
+  out.gap = least / length * (1 - 0x1p-48);
   return out;
 }
 
@@ -155,15 +176,28 @@ TANDEM_HD inline Vector3 nearest_direction(const TrianglesAt& t) {
   return {-n.x[0], -n.x[1], -n.x[2]};
 }
 
-TANDEM_HD inline TimeApart longer(const TimeApart& x, const TimeApart& y) {
-  return {manifold::greater(x.time, y.time), manifold::greater(x.nearly, y.nearly),
+TANDEM_HD inline Apart longer(const Apart& x, const Apart& y) {
+  return {x.throughout || y.throughout, manifold::greater(x.nearly, y.nearly),
           manifold::greater(x.gap, y.gap)};
 }
 
-/// The longest time that either face's normal keeps the triangles apart.
-TANDEM_HD inline TimeApart time_apart_by_faces(const PairMotion& pair, const TrianglesAt& t, double margin) {
-  return longer(time_apart(pair, t, normal_towards(t.a, t.b), margin),
-                time_apart(pair, t, -normal_towards(t.b, t.a), margin));
+/// As long as either face's normal keeps the triangles apart.
+TANDEM_HD inline Apart apart_by_faces(const PairMotion& pair, const TrianglesAt& t, double left,
+                                      double margin) {
+  const Apart by_a = apart_along(pair, t, normal_towards(t.a, t.b), left, margin);
+  if (by_a.throughout) return by_a;
+  return longer(by_a, apart_along(pair, t, -normal_towards(t.b, t.a), left, margin));
+}
+
+/// The time up to which two triangles whose boxes may meet need not be advanced: `end` where the planes that
+/// they have at `begin`, where `place` is, tell them apart until then. apart: until when their boxes are.
+TANDEM_HD inline double time_to_advance_from(const PairMotion& pair, const MovingTriangles& start,
+                                             const PairPlace& place, double begin, double end, double apart,
+                                             double tolerance) {
+  const Apart by_faces =
+      apart_by_faces(pair, triangles_at(pair, start, place), end - begin, kAim * tolerance);
+  if (by_faces.throughout) return end;
+  return manifold::greater(begin + by_faces.nearly, apart);
 }
 
 /// Where triangles stop: until `time`, in parts of the step, they are surely apart.
@@ -181,9 +215,9 @@ TANDEM_HD inline TriangleStop advance(const PairMotion& pair, const MovingTriang
   for (std::uint32_t steps = 1; steps <= kMostTriangleSteps; ++steps) {
     const TrianglesAt t = triangles_at(pair, start, place_at(pair, time));
     const double left = end - time, margin = kAim * tolerance;
-    TimeApart apart = time_apart_by_faces(pair, t, margin);
-    if (apart.time < left) apart = longer(apart, time_apart(pair, t, nearest_direction(t), margin));
-    if (apart.time >= left) return {end, steps, true};
+    Apart apart = apart_by_faces(pair, t, left, margin);
+    if (!apart.throughout) apart = longer(apart, apart_along(pair, t, nearest_direction(t), left, margin));
+    if (apart.throughout) return {end, steps, true};
     const double next = time + apart.nearly;
     if (apart.gap <= tolerance || !(next > time)) return {time, steps, true};
     time = next;

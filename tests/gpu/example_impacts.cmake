@@ -1,0 +1,16 @@
+# docs/impact.md shows the example as it is; it runs, or says that there is no GPU. Variables: SOURCE, FOLDER (to work in), BVHBUILD, EXAMPLE.
+file(READ ${SOURCE}/tests/gpu/example_impacts.cu program)
+file(READ ${SOURCE}/docs/impact.md page)
+string(FIND "${page}" "```cpp\n${program}```" place)
+if(place EQUAL -1)
+  message(FATAL_ERROR "docs/impact.md does not show tests/gpu/example_impacts.cu as it is")
+endif()
+
+file(MAKE_DIRECTORY ${FOLDER})
+execute_process(COMMAND ${BVHBUILD} ${SOURCE}/assets/cow_1500.obj -o ${FOLDER}/cow.bvh --quiet COMMAND_ERROR_IS_FATAL ANY)
+execute_process(COMMAND ${EXAMPLE} ${FOLDER}/cow.bvh RESULT_VARIABLE code OUTPUT_VARIABLE output)
+if(code EQUAL 0 AND output MATCHES "^[0-9]+ pairs of bodies, 100 meet in the step\n")
+  message(STATUS "${output}")
+elseif(NOT code EQUAL 1 OR NOT output MATCHES "^a stream: there is no GPU that can be used ")
+  message(FATAL_ERROR "the example says: ${code}, ${output}")
+endif()

@@ -113,7 +113,8 @@ __global__ void __launch_bounds__(kThreads) choose_best(const __grid_constant__ 
 /// Whether the first triangles of a pair are its nearest.
 __device__ bool is_first_best(const DistanceArgs& args, std::uint32_t pair) {
   const NearState& state = args.near_states[pair];
-  if (state.first == kNoTriangles || state.best_of_rest == kNoTriangles) return true;
+  if (state.first == kNoTriangles || state.best_of_rest == kNoTriangles)
+    return state.best_of_rest == kNoTriangles;
   return state.first_upper == state.best && state.first < state.best_of_rest;
 }
 

@@ -53,10 +53,7 @@ class GpuDistanceRun {
 
  private:
   void check(Status status, cudaError_t error, const char* step) const {
-    if (status == Status::kOk) return;
-    if (status == Status::kOutOfMemory) throw std::bad_alloc();
-    const char* why = error == cudaSuccess ? "" : cudaGetErrorString(error);
-    throw GpuError(std::string("tandem-cuda: ") + explain(status), status, step, why);
+    check_on_gpu("tandem-cuda", status, error, step);
   }
   void check(cudaError_t error, const char* step) const { check(status_of(error), error, step); }
   void require(Status status, cudaError_t error, std::uint64_t where, const char* step) const {

@@ -44,9 +44,9 @@ Distances of_cpu(const Scene& scene, const std::vector<ObjectPair>& pairs, const
 
 /// A scene on the GPU, and a query of it.
 struct Found {
-  Found(const Scene& scene, const std::vector<ObjectPair>& given)
-      : scene(scene.assets, scene.instances, given), pairs(given.size()) {
-    EXPECT_EQ(query.set_assets(this->scene.assets(), nullptr), Status::kOk);
+  Found(const Scene& of, const std::vector<ObjectPair>& given)
+      : scene(of.assets, of.instances, given), pairs(given.size()) {
+    EXPECT_EQ(query.set_assets(scene.assets(), nullptr), Status::kOk);
   }
   Status find(const GpuDistanceOptions& options = {}) {
     return query.find_distances(scene.instances(), scene.pairs(), options, nullptr);

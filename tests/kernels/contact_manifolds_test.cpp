@@ -126,7 +126,7 @@ TEST(ContactManifolds, PointsHaveDifferentIdsWhereRoundingIsAsLargeAsTriangles) 
   for (int trial = 0; trial < 100; ++trial) {
     scene.bodies.clear();
     for (const std::uint32_t shape : {0u, 1u})
-      scene.add_body(shape, after(shift(0, 2e11, -2e11), any_motion(random, 0.3)));
+      scene.add_body(shape, after(shift(0, 5e11, -5e11), any_motion(random, 0.3)));
     scene.find();
     std::vector<std::uint64_t> ids;
     for (const ManifoldPoint& p : scene.points()) ids.push_back(p.id);

@@ -24,10 +24,14 @@ static_assert(sizeof(gpu::DistanceState) <= most_distance_bytes({}, 0));
 /// What is there before a query tells what it needs.
 constexpr std::uint32_t kFirstRoom = 1u << 16;
 
+/// The most of anything: threads that share out so many, each a step beyond its last one, still count in 32
+/// bits, and a number that is too large for the report, kNoIndex, is no room.
+constexpr std::uint32_t kMostRoom = kNoIndex - (1u << 24);
+
 // Room that is too small hides what would have followed from what it has no room for.
 std::uint32_t with_spare(std::uint32_t needed, std::uint32_t present) {
-  if (needed <= present) return present;
-  return static_cast<std::uint32_t>(std::min<std::uint64_t>(std::uint64_t{needed} + needed / 2, kNoIndex));
+  if (needed <= present || needed > kMostRoom) return std::max(needed, present);
+  return static_cast<std::uint32_t>(std::min<std::uint64_t>(std::uint64_t{needed} + needed / 2, kMostRoom));
 }
 
 }  // namespace
@@ -70,7 +74,7 @@ template <typename... Arrays>
 Status GpuDistanceQuery::State::grow(std::uint32_t wanted, std::uint32_t& room, Arrays&... arrays) {
   if (wanted <= room) return Status::kOk;
   const std::uint64_t count =
-      std::min<std::uint64_t>(std::max<std::uint64_t>(wanted, room + room / 2), kNoIndex);
+      std::min<std::uint64_t>(std::max<std::uint64_t>(wanted, std::uint64_t{room} + room / 2), kMostRoom);
   room = 0;
   Status status = Status::kOk;
   const auto grow_one = [&](auto& array) {
@@ -111,6 +115,8 @@ Status GpuDistanceQuery::State::set_assets(std::span<const GpuAsset> given, cuda
 }
 
 Status GpuDistanceQuery::State::reserve(const GpuDistanceCapacity& wanted) {
+  if (std::max({wanted.pairs, wanted.block_pairs, wanted.triangle_pairs, wanted.settled}) > kMostRoom)
+    return Status::kOutOfGpuMemory;
   Status status = grow(wanted.pairs, capacity.pairs, records, near_states, narrowings, distances, walked);
   if (status == Status::kOk && wanted.block_pairs > capacity.block_pairs) {
     // Two rounds lie there.
@@ -187,15 +193,18 @@ Status GpuDistanceQuery::find_distances(const GpuInstances& instances, const Gpu
   wanted.block_pairs = std::max(wanted.block_pairs, kFirstRoom);
   wanted.triangle_pairs = std::max(wanted.triangle_pairs, kFirstRoom);
   wanted.settled = std::max(wanted.settled, kFirstRoom / 16);
+  GpuDistanceOptions own = options;
   for (;;) {
     Status status = reserve(wanted);
-    if (status == Status::kOk) status = enqueue(instances, pairs, options, stream);
+    if (status == Status::kOk) status = enqueue(instances, pairs, own, stream);
     if (status == Status::kOk) status = state_->keep(cudaStreamSynchronize(stream));
     if (status != Status::kOk) return status;
     if (report().status != Status::kOk) return report().status;
     if (report().complete != 0) return Status::kOk;
     const GpuDistanceCapacity &needed = report().needed, present = capacity();
     if (needed.pairs > pairs.capacity) return Status::kOutOfRange;
+    // The rows of the step before are lost, and these are of a query that was not complete.
+    if (own.former == distances()) own.former = nullptr;
     wanted = {needed.pairs, with_spare(needed.block_pairs, present.block_pairs),
               with_spare(needed.triangle_pairs, present.triangle_pairs),
               with_spare(needed.settled, present.settled), needed.words};

@@ -163,7 +163,7 @@ Status GpuImpactQuery::State::reserve_pairs(std::uint32_t wanted) {
 
 // There is always one, which lanes without a block pair may look at.
 Status GpuImpactQuery::State::reserve_parts(std::uint32_t wanted) {
-  if (wanted <= capacity.parts && parts.room() != 0) return Status::kOk;
+  if (wanted <= capacity.parts && capacity.parts != 0) return Status::kOk;
   if (wanted > kMostParts) return Status::kOutOfRange;
   const std::uint32_t count = std::clamp(grown(wanted, capacity.parts), 1u, kMostParts);
   capacity.parts = 0;

@@ -25,10 +25,11 @@ __global__ void __launch_bounds__(kThreads) list_pairs(const __grid_constant__ I
     list_pair(args, left.entries[i]);
 }
 
-/// How many samples each pair has.
+/// How many samples each pair has: what there is room for in any query that has room for all pairs.
 __device__ std::uint32_t samples_of_pair(const ImpactArgs& args) {
-  const std::uint32_t room = args.most_samples / max(args.state->sampled_pairs, 1u);
-  return min(room, kMostSamples);
+  const Counter pairs = *args.given.count, all = kImpactSamplesPerPair * pairs + kFewestImpactSamples,
+                room = all < args.most_samples ? all : args.most_samples;
+  return static_cast<std::uint32_t>(min(room / max(args.state->sampled_pairs, 1u), Counter{kMostSamples}));
 }
 
 /// The first that met, of a pair's; `count` where none did.

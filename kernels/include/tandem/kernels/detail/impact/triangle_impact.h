@@ -79,9 +79,10 @@ TANDEM_HD inline TrianglesAt triangles_at(const PairMotion& pair, const MovingTr
 }
 
 /// The first s > 0 at which g + s rate - s^2 / 2 bend is not above 0, rounded down; infinite where there is
-/// none. Condition: g > 0, bend >= 0.
+/// none; 0 where numbers are too large. Condition: g > 0, bend >= 0.
 TANDEM_HD inline double first_root(double g, double rate, double bend) {
   const double root = std::sqrt(rate * rate + 2 * bend * g);
+  if (!(root < INFINITY)) return 0;
   if (rate <= 0) {
     const double fall = root - rate;
     return fall > 0 ? 2 * g / fall * (1 - 0x1p-48) : INFINITY;

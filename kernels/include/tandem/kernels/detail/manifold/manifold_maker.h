@@ -479,7 +479,8 @@ TANDEM_HD bool ManifoldMaker<Team>::begin(std::uint32_t curve, OutlineMemory& sh
   const PatchNormal normal = normal_finder.find(measure);
   if (!normal.known) return false;
   if (team_.rank() == 0) {
-    state_.touch = normal.touch, state_.closed = measure.closed;
+    state_.touch = normal.touch;
+    state_.closed = measure.closed || (normal.touch && measure.point);
     state_.frame = PatchFrame(summary_.origin, normal.n);
     state_.area = measure.area;
     state_.key = measure.key;

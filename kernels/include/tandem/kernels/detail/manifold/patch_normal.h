@@ -16,7 +16,7 @@ inline constexpr int kMostDirections = 5;
 inline constexpr double kBearing = 0.9;
 
 /// Faces of two bodies are flush, as seen from a to b, where the cosine of their normals is below this.
-inline constexpr double kFlush = -0.99;
+inline constexpr double kFlush = -0.9995;
 
 /// Measures a curve, and finds the direction in which its patch pushes.
 template <typename Team>
@@ -110,9 +110,8 @@ TANDEM_HD CurveMeasure NormalFinder<Team>::measure() {
   out.area = sums.area.value(unit * unit);
   out.length = sums.length.value(unit);
   const double of_points = bodies_.tolerance() * (end_ - begin_);
-  out.point = out.length <= of_points && norm(out.area) <= of_points * bodies_.reach();
-  out.closed =
-      out.point || (!(may_be_free && has_free_end()) && norm(sums.gap.value(unit)) <= kClosed * out.length);
+  out.point = out.length <= of_points && norm(out.area) <= of_points * unit;  // polygons have area alone
+  out.closed = !(may_be_free && has_free_end()) && norm(sums.gap.value(unit)) <= kClosed * out.length;
   out.middle =
       summary_.origin + (out.length > 0 ? (unit / out.length) * sums.middle.value(unit) : plain_middle());
   if (!out.closed) out.sheet_normal = sheet_normal();
@@ -472,14 +471,15 @@ TANDEM_HD_SELDOM bool NormalFinder<Team>::find_for_touch(Vector3& n) {
 template <typename Team>
 TANDEM_HD PatchNormal NormalFinder<Team>::find(const CurveMeasure& curve) {
   PatchNormal out;
-  out.touch = curve.point || !(curve.closed ? norm(curve.area) > kNoArea * bodies_.reach() * curve.length
-                                            : norm(curve.sheet_normal) > kNoArea * curve.length);
-  if (out.touch) {
-    out.known = find_for_touch(out.n);
-  } else {
-    out.n = face_nearest(normalized(curve.closed ? curve.area : curve.sheet_normal), curve.length);
-    out.known = true;
-  }
+  const bool no_area = !(curve.closed ? norm(curve.area) > kNoArea * bodies_.reach() * curve.length
+                                      : norm(curve.sheet_normal) > kNoArea * curve.length);
+  out.touch = no_area || curve.point;
+  if (out.touch) out.known = find_for_touch(out.n);
+  if (no_area || out.known) return out;
+  // Points may hide a patch that is smaller than rounding.
+  out.touch = false;
+  out.known = true;
+  out.n = face_nearest(normalized(curve.closed ? curve.area : curve.sheet_normal), curve.length);
   return out;
 }
 

@@ -35,7 +35,7 @@ void add_to(QueryCounters& sum, const QueryCounters& part) {
 
 }  // namespace
 
-struct ToleranceQuery::State {
+struct ToleranceQuery::State : Allocated {
   ContactQuery contacts;  // of which each level is an asset
   Buffer<LevelRange> ranges;
   Buffer<AssetLevel> levels;

@@ -14,24 +14,6 @@ CheckDepth depth_of(uint32_t check_depth) {
   return check_depth == TANDEM_CHECK_QUICK ? CheckDepth::quick : CheckDepth::full;
 }
 
-// Makes an asset of what `fill` does to an empty one, with the caller's allocator.
-template <typename Fill>
-tandem_status make_asset(const tandem_allocator* given, tandem_asset** asset, const Fill& fill) {
-  Allocator allocator;
-  if (const tandem_status status = read_allocator(given, allocator); status != TANDEM_OK) return status;
-  const AllocatorScope scope(allocator);
-  auto* const made = new (std::nothrow) tandem_asset;
-  if (made == nullptr) return TANDEM_OUT_OF_MEMORY;
-  made->allocator = allocator;
-  const tandem_status status = fill(*made);
-  if (status == TANDEM_OK) {
-    *asset = made;
-  } else {
-    delete made;
-  }
-  return status;
-}
-
 // Clears what a function that makes an asset returns by pointers; false: there is no place for the asset.
 bool begin(tandem_asset** asset, uint64_t* where) {
   if (where != nullptr) *where = 0;

@@ -39,20 +39,23 @@ tandem_status read_options(const tandem_query_options* given, size_t instances, 
                            uint64_t& where) {
   tandem_query_options read;
   if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return status;
-  if (read.mode > TANDEM_BOXES || read.first_contact_only > 1 || read.self_pairs > 1 || read.reserved != 0)
+  if (read.mode > TANDEM_BOXES || read.first_contact_only > 1 || read.self_pairs > 1 ||
+      read.add_error_bounds > 1)
     return TANDEM_BAD_OPTION;
   options.query.mode = static_cast<QueryMode>(read.mode);
   options.query.first_contact_only = read.first_contact_only != 0;
   options.query.self_pairs = read.self_pairs != 0;
   options.query.threads = read.threads;
   options.query.within = read.within;
+  options.query.add_error_bounds = read.add_error_bounds != 0;
   if (read.filter == nullptr) return TANDEM_OK;
   options.query.filter = &options.filter;
   return read_filter(*read.filter, instances, options.filter, where);
 }
 
 Found found_with(const QueryOptions& options) {
-  const bool all = options.mode == QueryMode::exact && !options.first_contact_only && options.within == 0;
+  const bool all = options.mode == QueryMode::exact && !options.first_contact_only && options.within == 0 &&
+                   !options.add_error_bounds;
   return all ? Found::all_contacts : Found::contacts;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 #include <atomic>
+#include <memory>
 #include <span>
 
 #include "status.h"
@@ -99,6 +100,20 @@ tandem_status create(const tandem_allocator* given, Of** handle) noexcept {
   }
   *handle = made;
   return TANDEM_OK;
+}
+
+/// Makes an asset of what `fill` does to an empty one, with the caller's allocator.
+template <typename Fill>
+tandem_status make_asset(const tandem_allocator* given, tandem_asset** asset, const Fill& fill) {
+  Allocator allocator;
+  if (const tandem_status status = read_allocator(given, allocator); status != TANDEM_OK) return status;
+  const AllocatorScope scope(allocator);
+  std::unique_ptr<tandem_asset> made(new (std::nothrow) tandem_asset);
+  if (made == nullptr) return TANDEM_OUT_OF_MEMORY;
+  made->allocator = allocator;
+  const tandem_status status = fill(*made);
+  if (status == TANDEM_OK) *asset = made.release();
+  return status;
 }
 
 /// Whether a list is where it must be.

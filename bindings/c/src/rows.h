@@ -5,6 +5,7 @@
 #include "tandem/kernels/containment_query.h"
 #include "tandem/kernels/distance_query.h"
 #include "tandem/kernels/impact_query.h"
+#include "tandem/kernels/tolerance_query.h"
 #include "tandem/tandem.h"
 
 /// Rows of the interface have the layout of the libraries' rows, so that they are handed over where they are.
@@ -60,6 +61,9 @@ TANDEM_SAME_PLACE(ObjectDistance, tandem_distance, triangle_a);
 TANDEM_SAME_PLACE(ObjectDistance, tandem_distance, triangle_b);
 TANDEM_SAME_PLACE(ObjectDistance, tandem_distance, face_a);
 TANDEM_SAME_PLACE(ObjectDistance, tandem_distance, face_b);
+TANDEM_SAME_SIZE(PairVerdict, tandem_verdict);
+TANDEM_SAME_PLACE(PairVerdict, tandem_verdict, level_a);
+TANDEM_SAME_PLACE(PairVerdict, tandem_verdict, level_b);
 TANDEM_SAME_SIZE(RigidMotion, tandem_motion);
 TANDEM_SAME_PLACE(RigidMotion, tandem_motion, angular_velocity);
 TANDEM_SAME_PLACE(RigidMotion, tandem_motion, center);
@@ -85,6 +89,9 @@ static_assert(TANDEM_EXACT == int(QueryMode::exact) && TANDEM_FAST == int(QueryM
 static_assert(TANDEM_TOUCHING == int(kTouching) && TANDEM_OPEN_CURVE == int(kOpenCurve) &&
               TANDEM_GOES_THROUGH == int(kGoesThrough));
 static_assert(TANDEM_INSIDE == int(kInside) && TANDEM_OUTER_OPEN == int(kOuterOpen));
+static_assert(TANDEM_APART == int(ToleranceVerdict::apart) &&
+              TANDEM_TOUCH == int(ToleranceVerdict::touching) &&
+              TANDEM_WITHIN_TOLERANCE == int(ToleranceVerdict::within_tolerance));
 static_assert(TANDEM_NO_IMPACT == int(ImpactStatus::none) && TANDEM_IMPACT == int(ImpactStatus::found) &&
               TANDEM_IMPACT_AT_START == int(ImpactStatus::at_start));
 

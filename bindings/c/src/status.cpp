@@ -78,6 +78,7 @@ tandem_status number_of(Status status) {
   PAIR(kNoOrientedBlocks, NO_ORIENTED_BLOCKS)                      \
   PAIR(kNoAxisAlignedBlocks, NO_AXIS_ALIGNED_BLOCKS)               \
   PAIR(kNoTopology, NO_TOPOLOGY)                                   \
+  PAIR(kNoFinestLevel, NO_FINEST_LEVEL)                            \
   PAIR(kNoGpu, NO_GPU)                                             \
   PAIR(kDriverTooOld, DRIVER_TOO_OLD)                              \
   PAIR(kGpuNotSupported, GPU_NOT_SUPPORTED)                        \
@@ -124,6 +125,10 @@ constexpr Entry kEntries[] = {
     {TANDEM_FILTER_MISMATCH, "FilterMismatch", nullptr, "a filter is of another number of instances"},
     {TANDEM_CONTACTS_MISSING, "ContactsMissing", nullptr,
      "the query's last call did not find the contacts that this one needs"},
+    {TANDEM_NO_BUILDER, "NoBuilder", nullptr,
+     "this library was made without oneTBB, and so without the builder"},
+    {TANDEM_NO_TRIANGLE, "NoTriangle", nullptr, "none of the triangles can be used"},
+    {TANDEM_TOO_MANY_TRIANGLES, "TooManyTriangles", nullptr, "there are 2^32 - 1 triangles or more"},
 };
 
 const Entry* entry_of(tandem_status status) {

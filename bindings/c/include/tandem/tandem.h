@@ -52,10 +52,13 @@ enum {
   TANDEM_BAD_OPTION = 3,       ///< a number that names no choice, or a reserved field that is not zero
   TANDEM_OUT_OF_MEMORY = 4,
   TANDEM_CANNOT_START_THREAD = 5,
-  TANDEM_INTERNAL_ERROR = 6,    ///< a defect of the library
-  TANDEM_UNKNOWN_LEVEL = 7,     ///< a level or part that the asset does not have
-  TANDEM_FILTER_MISMATCH = 8,   ///< a filter of another number of instances
-  TANDEM_CONTACTS_MISSING = 9,  ///< the query's last call did not find the contacts that this call needs
+  TANDEM_INTERNAL_ERROR = 6,       ///< a defect of the library
+  TANDEM_UNKNOWN_LEVEL = 7,        ///< a level or part that the asset does not have
+  TANDEM_FILTER_MISMATCH = 8,      ///< a filter of another number of instances
+  TANDEM_CONTACTS_MISSING = 9,     ///< the query's last call did not find the contacts that this call needs
+  TANDEM_NO_BUILDER = 10,          ///< this library was made without oneTBB, and so without the builder
+  TANDEM_NO_TRIANGLE = 11,         ///< none of the triangles can be used
+  TANDEM_TOO_MANY_TRIANGLES = 12,  ///< 2^32 - 1 or more
   // A file, or bytes of one. Of the defects that are there, the first in this order.
   // clang-format off
   TANDEM_FILE_NOT_FOUND = 100, TANDEM_NOT_A_REGULAR_FILE = 101, TANDEM_CANNOT_OPEN = 102,
@@ -83,7 +86,7 @@ enum {
   TANDEM_OUT_OF_RANGE = 200, TANDEM_UNKNOWN_ASSET = 201, TANDEM_UNKNOWN_INSTANCE = 202,
   TANDEM_UNKNOWN_CONTACT = 203, TANDEM_POSE_NOT_RIGID = 204, TANDEM_TOO_MANY_INSTANCES = 205,
   TANDEM_TOO_MANY_PAIRS = 206, TANDEM_KEPT_MISMATCH = 207, TANDEM_MOTION_MISMATCH = 208,
-  TANDEM_NO_ORIENTED_BLOCKS = 209, TANDEM_NO_AXIS_ALIGNED_BLOCKS = 210, TANDEM_NO_TOPOLOGY = 211,
+  TANDEM_NO_ORIENTED_BLOCKS = 209, TANDEM_NO_AXIS_ALIGNED_BLOCKS = 210, TANDEM_NO_TOPOLOGY = 211, TANDEM_NO_FINEST_LEVEL = 212,
   // A GPU; this library, which is that of the CPU, returns none of these.
   TANDEM_NO_GPU = 300, TANDEM_DRIVER_TOO_OLD = 301, TANDEM_GPU_NOT_SUPPORTED = 302,
   TANDEM_OUT_OF_GPU_MEMORY = 303, TANDEM_CUDA_FAILED = 304
@@ -160,6 +163,64 @@ TANDEM_API tandem_status tandem_asset_from_memory(const void* data, size_t bytes
                                                   const tandem_memory_options* options,
                                                   const tandem_allocator* allocator, tandem_asset** asset,
                                                   uint64_t* where);
+
+/// A run of faces with a name: an object, a group, a mesh at a node.
+typedef struct tandem_mesh_part {
+  const char *name, *path;  ///< or null
+  uint64_t face_count;
+} tandem_mesh_part;
+
+/// Triangles in memory, to build an asset of. What cannot be used of them is left out, and counted.
+typedef struct tandem_mesh {
+  uint32_t struct_size;
+  uint32_t reserved;
+  const double* positions;  ///< three for each vertex
+  size_t vertex_count;
+  const uint32_t* triangles;  ///< three vertices for each
+  size_t triangle_count;
+  const uint32_t* faces;          ///< of each triangle: the face that it is a piece of; null: its own number
+  const tandem_mesh_part* parts;  ///< that the faces are in, one after the other; null: one without a name
+  size_t part_count;              ///< the parts' faces together are more than each of `faces`
+} tandem_mesh;
+
+enum { TANDEM_EFFORT_DEFAULT = 0, TANDEM_EFFORT_FAST = 1, TANDEM_EFFORT_BEST = 2 };
+
+/// As bvhbuild's options.
+typedef struct tandem_build_options {
+  uint32_t struct_size;
+  uint32_t effort;         ///< TANDEM_EFFORT_DEFAULT, ...; the best takes minutes for 100,000 triangles
+  uint32_t no_gpu_blocks;  ///< 1: without the blocks that exact queries on a GPU walk
+  uint32_t no_topology;    ///< 1: without what manifolds and contained bodies need
+  uint32_t threads;        ///< at most; 0: as many as the machine has. The bytes do not depend on it
+  uint32_t reserved;
+  double imaginary_share;  ///< padding nodes: 0: the proven fewest; to 1: as many as a free tree has
+  const char* provenance;  ///< JSON that the file says of its making, or null: options and findings
+  /// Or null: called now and then, by one thread at a time, with the share of the optimisation that is done;
+  /// where it returns 1, optimisation ends soon, with the best tree so far.
+  uint32_t (*progress)(void* user, double share);
+  void* user;
+} tandem_build_options;
+
+/// What became of the triangles; faces are triangles here.
+typedef struct tandem_build_report {
+  uint32_t struct_size;
+  uint32_t reserved;
+  uint64_t index_out_of_range, not_finite,
+      too_large;                           ///< triangles that were left out, under the first cause
+  uint64_t degenerate;                     ///< left out: their corners lie on one line
+  uint64_t duplicate, duplicate_reversed;  ///< kept: the three places of an earlier one, the other way round
+  uint64_t flattened;                      ///< kept: on one line only once rounded to float32
+  uint64_t vertices_unreferenced, vertices_welded;  ///< named by no triangle; at the place of an earlier one
+} tandem_build_report;
+
+/// Builds an asset, whose bytes (tandem_asset_data()) are those that bvhbuild writes for the same triangles,
+/// but for the provenance, and the same whatever the threads. report: or null; filled also where no triangle
+/// can be used. The bytes come from the allocator; what building takes meanwhile, from the C++ runtime.
+/// Result: TANDEM_NO_TRIANGLE, TANDEM_TOO_MANY_TRIANGLES; TANDEM_BAD_PART where faces lie in no part;
+/// TANDEM_NO_BUILDER.
+TANDEM_API tandem_status tandem_asset_build(const tandem_mesh* mesh, const tandem_build_options* options,
+                                            const tandem_allocator* allocator, tandem_asset** asset,
+                                            tandem_build_report* report);
 
 /// Takes or gives up a reference. The last one that goes takes the asset's memory with it. Null does nothing.
 TANDEM_API void tandem_asset_retain(tandem_asset* asset);
@@ -305,11 +366,11 @@ enum {
 
 typedef struct tandem_query_options {
   uint32_t struct_size;
-  uint32_t mode;                ///< TANDEM_EXACT, TANDEM_FAST or TANDEM_BOXES
-  uint32_t first_contact_only;  ///< 1: one contact for each object pair that touches
-  uint32_t self_pairs;          ///< 1: where the query finds the pairs, also each instance with itself
-  uint32_t threads;             ///< with the caller's; 0: 1, at most 1,024. Results do not depend on it
-  uint32_t reserved;
+  uint32_t mode;                     ///< TANDEM_EXACT, TANDEM_FAST or TANDEM_BOXES
+  uint32_t first_contact_only;       ///< 1: one contact for each object pair that touches
+  uint32_t self_pairs;               ///< 1: where the query finds the pairs, also each instance with itself
+  uint32_t threads;                  ///< with the caller's; 0: 1, at most 1,024. Results do not depend on it
+  uint32_t add_error_bounds;         ///< 1: a pair without a contact is surely apart at the finest levels too
   double within;                     ///< clearance: triangles at most so far apart count, decided exactly
   const tandem_pair_filter* filter;  ///< or null; where the query finds the pairs
 } tandem_query_options;
@@ -435,6 +496,50 @@ TANDEM_API tandem_status tandem_contact_query_find_contained(tandem_contact_quer
                                                              uint32_t threads);
 TANDEM_API const tandem_containment* tandem_contact_query_contained(const tandem_contact_query* query,
                                                                     size_t* count);
+
+/// ---- Levels of detail
+
+/// Tells of pairs of bodies with levels of detail whether they surely do not meet, surely meet, or are within
+/// a tolerance (docs/levels.md): coarse levels first, finer ones for what these leave open.
+typedef struct tandem_tolerance_query tandem_tolerance_query;
+
+TANDEM_API tandem_status tandem_tolerance_query_create(const tandem_allocator* allocator,
+                                                       tandem_tolerance_query** query);
+TANDEM_API void tandem_tolerance_query_destroy(tandem_tolerance_query* query);
+/// Result: TANDEM_NO_FINEST_LEVEL, where is the asset, where an asset does not show the file's level 0.
+TANDEM_API tandem_status tandem_tolerance_query_set_assets(tandem_tolerance_query* query,
+                                                           tandem_asset* const* assets, size_t count);
+
+typedef struct tandem_tolerance_options {
+  uint32_t struct_size;
+  uint32_t threads;
+  double tolerance;                  ///< what need not be told apart from touching; 0: all is decided
+  const tandem_pair_filter* filter;  ///< or null; where the query finds the pairs
+} tandem_tolerance_options;
+
+enum { TANDEM_APART = 0, TANDEM_TOUCH = 1, TANDEM_WITHIN_TOLERANCE = 2 };
+
+typedef struct tandem_verdict {
+  uint8_t verdict;           ///< TANDEM_APART: the finest surfaces do not meet, TANDEM_TOUCH: they do, ...
+  uint8_t level_a, level_b;  ///< that told
+} tandem_verdict;
+
+/// Finds the object pairs whose world boxes overlap, and the verdicts on them; or those on given pairs.
+/// Result: as of tandem_contact_query_find_contacts().
+TANDEM_API tandem_status tandem_tolerance_query_decide(tandem_tolerance_query* query,
+                                                       const tandem_instance* instances, size_t count,
+                                                       const tandem_tolerance_options* options);
+TANDEM_API tandem_status tandem_tolerance_query_decide_pairs(tandem_tolerance_query* query,
+                                                             const tandem_instance* instances, size_t count,
+                                                             const tandem_object_pair* pairs,
+                                                             size_t pair_count,
+                                                             const tandem_tolerance_options* options);
+TANDEM_API const tandem_object_pair* tandem_tolerance_query_pairs(const tandem_tolerance_query* query,
+                                                                  size_t* count);
+/// One for each pair.
+TANDEM_API const tandem_verdict* tandem_tolerance_query_verdicts(const tandem_tolerance_query* query,
+                                                                 size_t* count);
+TANDEM_API uint64_t tandem_tolerance_query_where(const tandem_tolerance_query* query);
 
 /// ---- Distances
 

@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <span>
 #include <vector>
 
 #include "levels/nearest_triangle.h"
@@ -38,8 +39,8 @@ struct CornerDistances {
 };
 
 /// The number under which a corner's position is known.
-std::uint32_t corner_number(const LevelView& level, std::uint32_t triangle, int k) {
-  return level.topology == nullptr ? 3 * triangle + k : level.topology[triangle].vertex[k];
+std::uint64_t corner_number(const LevelView& level, std::uint32_t triangle, int k) {
+  return level.topology == nullptr ? 3 * std::uint64_t{triangle} + k : level.topology[triangle].vertex[k];
 }
 
 /// Corners in the order of their numbers, each as 3 triangle + k.
@@ -52,6 +53,16 @@ std::vector<std::uint64_t> first_corners(const LevelView& level) {
     }
   }
   return corners;
+}
+
+/// The nearest of these triangles.
+NearestTriangle nearest_of(const LevelView& level, const Point& p, std::span<const std::uint32_t> triangles) {
+  NearestTriangle nearest = {INFINITY, triangles.front()};
+  for (const std::uint32_t triangle : triangles) {
+    const double square = square_distance(p, level.triangles[triangle]);
+    if (square < nearest.square) nearest = {square, triangle};
+  }
+  return nearest;
 }
 
 /// Works on parts of [0, count) that depend on nothing else: work(part, begin, end).
@@ -136,7 +147,7 @@ class Search {
                 for (std::size_t t = begin; t < end; ++t) {
                   Piece piece = {{}, INFINITY, 0, static_cast<std::uint16_t>(side)};
                   for (int k = 0; k < 3; ++k) {
-                    const std::uint32_t i = corner_number(from, static_cast<std::uint32_t>(t), k);
+                    const std::uint64_t i = corner_number(from, static_cast<std::uint32_t>(t), k);
                     piece.corner[k] = {corner_of(from.triangles[t], k), corners_[side].distance[i],
                                        corners_[side].nearest[i]};
                   }
@@ -201,13 +212,15 @@ class Search {
 
   void look_into(Piece& piece, double limit, Outcome& outcome) const {
     const LevelView& to = to_[piece.side];
-    const auto measured = [&](const Point& point) {
-      const Corner corner = measure(piece.side, point, piece.corner[0].nearest);
+    const auto measured = [&](const Point& point, std::uint32_t hint) {
+      const Corner corner = measure(piece.side, point, hint);
       outcome.farthest.offer(corner, piece.side);
       return corner;
     };
-    const Point sum = plus(plus(piece.corner[0].point, piece.corner[1].point), piece.corner[2].point);
-    const std::uint32_t nearest = measured(scaled(1.0 / 3, sum)).nearest;
+    const Point middle =
+        scaled(1.0 / 3, plus(plus(piece.corner[0].point, piece.corner[1].point), piece.corner[2].point));
+    const std::uint32_t known[] = {piece.corner[0].nearest, piece.corner[1].nearest, piece.corner[2].nearest};
+    const std::uint32_t nearest = measured(middle, nearest_of(to, middle, known).triangle).nearest;
     tighten(to, {&nearest, 1}, limit, piece);
     if (piece.bound <= limit || piece.depth == kDeepest) {
       outcome.settled = std::max(outcome.settled, piece.bound);
@@ -216,7 +229,14 @@ class Search {
     }
     const Cut cut = choose_cut(piece, to.triangles[nearest], limit / 8);
     Corner points[2];
-    for (int i = 0; i < cut.edges; ++i) points[i] = measured(point_of(piece, cut, i));
+    for (int i = 0; i < cut.edges; ++i) {
+      const Point point = point_of(piece, cut, i);
+      const std::uint32_t near[] = {nearest, known[cut.edge[i]], known[(cut.edge[i] + 1) % 3]};
+      const NearestTriangle guess = nearest_of(to, point, near);
+      // Any triangle serves a bound; the nearest one is asked for only where the point may be the farthest.
+      points[i] = {point, std::sqrt(guess.square), guess.triangle};
+      if (points[i].distance > outcome.farthest.distance) points[i] = measured(point, guess.triangle);
+    }
     Piece parts[kMostParts];
     const int count = cut_piece(piece, cut, points, parts);
     for (int i = 0; i < count; ++i) {

@@ -10,7 +10,7 @@ namespace tandem {
 struct HausdorffOptions {
   /// The bounds are narrowed until upper <= lower (1 + relative) or upper <= lower + a unit that the stored
   /// coordinates are rounded to (2^-24 of the largest).
-  double relative = 0.02;
+  double relative = 0.002;
   /// Ends as soon as upper <= wanted is proved, or a distance above `wanted` is found: then upper may be
   /// infinite.
   std::optional<double> wanted = {};

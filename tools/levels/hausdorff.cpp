@@ -88,9 +88,8 @@ class Search {
     for (const int side : {0, 1}) {
       if (!is_refuted()) collect_pieces(side);
     }
-    const std::uint64_t most =
-        (1 << 20) + std::uint64_t{options_.pieces_per_triangle} *
-                        (std::uint64_t{from_[0].triangle_count} + from_[1].triangle_count);
+    const std::uint64_t triangles = std::uint64_t{from_[0].triangle_count} + from_[1].triangle_count;
+    const std::uint64_t most = options_.most_pieces.value_or((1 << 20) + 64 * triangles);
     for (int round = 0; !pool_.empty() && !is_refuted() && pieces_ < most; ++round) refine_some(round);
     return result();
   }

@@ -14,9 +14,9 @@ struct HausdorffOptions {
   /// Ends as soon as upper <= wanted is proved, or a distance above `wanted` is found: then upper may be
   /// infinite.
   std::optional<double> wanted = {};
-  /// Pieces that may be looked into for each triangle of both surfaces, and 2^20 beside. What is left then
-  /// has wide bounds, which hold all the same.
-  std::uint32_t pieces_per_triangle = 64;
+  /// Pieces of triangles that are looked into at most, or about so many; where they run out the bounds stay
+  /// wide, but hold. Without it: 2^20 and 64 for each triangle of both surfaces.
+  std::optional<std::uint64_t> most_pieces = {};
 };
 
 /// lower <= the Hausdorff distance of two surfaces <= upper: the largest distance of a point of either from

@@ -107,7 +107,7 @@ class Search {
   /// Bounds of pieces up to here are not looked into if a point is so far away.
   double enough(double distance) const {
     const double near = std::max(distance * (1 + options_.relative), distance + 0x1p-24 * largest_);
-    return std::max(near, options_.wanted.value_or(0)) - slack_;
+    return std::max(near, options_.wanted.value_or(0) * (1 - 0x1p-45)) - slack_;
   }
 
   bool is_refuted() const { return options_.wanted && farthest_.distance - slack_ > *options_.wanted; }
@@ -250,10 +250,17 @@ class Search {
     const LevelView& other = to_[farthest_.side];
     const double proved = proved_distance(other, farthest_.point, farthest_.nearest) - slack_;
     bound.lower = std::max(proved, 0.0);
-    bound.upper = settled_;
-    for (const Piece& piece : pool_) bound.upper = std::max(bound.upper, piece.bound);
-    bound.upper = is_refuted() ? INFINITY : (bound.upper + slack_) * (1 + 0x1p-50);
-    bound.narrow = is_refuted() || (pool_.empty() && !too_deep_);
+    if (!is_refuted()) {
+      double most = settled_;
+      for (const Piece& piece : pool_) most = std::max(most, piece.bound);
+      const double sure = (most + slack_) * (1 + 0x1p-50);
+      bound.upper = sure * (1 + 0x1p-40);  // a little more, so that this very number can be wanted next
+      bound.narrow = pool_.empty() && !too_deep_;
+      if (options_.wanted) {
+        bound.narrow = sure <= *options_.wanted;
+        if (bound.narrow) bound.upper = std::min(bound.upper, *options_.wanted);
+      }
+    }
     for (int k = 0; k < 3; ++k) bound.point[k] = farthest_.point.x[k];
     bound.point_on_a = farthest_.side == 0;
     bound.pieces = pieces_;

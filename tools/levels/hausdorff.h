@@ -11,8 +11,8 @@ struct HausdorffOptions {
   /// The bounds are narrowed until upper <= lower (1 + relative) or upper <= lower + a unit that the stored
   /// coordinates are rounded to (2^-24 of the largest).
   double relative = 0.002;
-  /// Ends as soon as upper <= wanted is proved, or a distance above `wanted` is found: then upper may be
-  /// infinite.
+  /// Ends as soon as upper <= wanted is proved, or a distance above `wanted` is found; upper is infinite
+  /// then. Where `wanted` itself is between bounds that are that narrow, neither may come of it.
   std::optional<double> wanted = {};
   /// Pieces of triangles that are looked into at most, or about so many; where they run out the bounds stay
   /// wide, but hold. Without it: 2^20 and 64 for each triangle of both surfaces.
@@ -24,7 +24,7 @@ struct HausdorffOptions {
 struct HausdorffBound {
   double upper = std::numeric_limits<double>::infinity();
   double lower = 0;      ///< a distance that occurs, rounded down
-  bool narrow = true;    ///< as narrow as asked for, or decided; false: pieces ran out
+  bool narrow = true;    ///< as narrow as asked for or, given `wanted`, decided
   double point[3] = {};  ///< on one surface, up to rounding, and as far as `lower` from the other
   bool point_on_a = true;
   std::uint64_t pieces = 0;  ///< that were looked into

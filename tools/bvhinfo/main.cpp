@@ -53,10 +53,9 @@ Json verdict(const Inspection& inspection) {
 }
 
 void print_verdict(const Inspection& inspection) {
-  if (inspection.status != Status::kOk) return;
+  if (!inspection.is_sound()) return;
   const double seconds = inspection.check_seconds;
-  std::printf("%s: %s (%s checked in %.1f ms, %.2f GB/s)\n", printable(inspection.path).c_str(),
-              inspection.is_sound() ? "sound" : "sound but for its error bounds",
+  std::printf("%s: sound (%s checked in %.1f ms, %.2f GB/s)\n", printable(inspection.path).c_str(),
               human_bytes(inspection.asset.bytes()).c_str(), 1e3 * seconds,
               static_cast<double>(inspection.asset.bytes()) / seconds / 1e9);
   if (!inspection.level_checks) return;

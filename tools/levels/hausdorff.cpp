@@ -15,7 +15,7 @@ namespace {
 
 using namespace levels;
 
-constexpr std::size_t kCornersAtOnce = 512, kTrianglesAtOnce = 1024, kPiecesAtOnce = 8192;
+constexpr std::size_t kCornersAtOnce = 512, kTrianglesAtOnce = 1024, kPiecesAtOnce = 1024;
 
 /// The farthest point that was found.
 struct Farthest {

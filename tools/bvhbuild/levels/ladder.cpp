@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "collapses.h"
 #include "laid_level.h"
@@ -87,7 +88,7 @@ class Search {
       const auto count =
           std::clamp(static_cast<std::size_t>(middle - collapses.begin()) + 1, near + 1, far - 1);
       Candidate candidate = {after(opened_, std::span(collapses).first(count)), 0};
-      candidate.error_bound = bound(candidate.mesh).upper;
+      candidate.error_bound = bound(candidate.mesh, wanted).upper;
       if (candidate.error_bound <= wanted) {
         near = count;
         best = std::move(candidate);
@@ -95,13 +96,17 @@ class Search {
         far = count;
       }
     }
+    if (near > 0) best.error_bound = std::min(best.error_bound, bound(best.mesh).upper);
     return best;
   }
 
-  HausdorffBound bound(const LevelMesh& mesh) const {
+  // `wanted`: as far as it takes to know whether the mesh is near enough.
+  HausdorffBound bound(const LevelMesh& mesh, std::optional<double> wanted = {}) const {
     const Geometry geometry = {mesh.points, mesh.triangles};
     const Tree tree = build_tree(geometry, Imaginary::minimal, Effort::fast);
-    return hausdorff_bound(finest_.view(), LaidLevel(geometry, tree).view());
+    HausdorffOptions options;
+    options.wanted = wanted;
+    return hausdorff_bound(finest_.view(), LaidLevel(geometry, tree).view(), options);
   }
 
   LaidLevel finest_;

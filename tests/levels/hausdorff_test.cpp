@@ -121,7 +121,7 @@ TEST(Hausdorff, OfOneSurfaceDividedTwiceIsNearlyNothing) {
 TEST(Hausdorff, OfASurfaceFromItselfIsNearlyNothing) {
   const Mesh mesh = joined(test::random_mesh(500, 3), test::sphere(2, 3));
   const HausdorffBound found = bound(mesh, mesh);
-  EXPECT_LE(found.upper, 2 * 0x1p-24);
+  EXPECT_LE(found.upper, 2 * 0x1p-36);
   EXPECT_EQ(found.lower, 0);
 }
 

@@ -8,8 +8,8 @@
 namespace tandem {
 
 struct HausdorffOptions {
-  /// The bounds are narrowed until upper <= lower (1 + relative) or upper <= lower + a unit that the stored
-  /// coordinates are rounded to (2^-24 of the largest).
+  /// The bounds are narrowed until upper <= lower (1 + relative), or until they differ by 2^-36 of the
+  /// largest coordinate, far less than the rounding of coordinates.
   double relative = 0.002;
   /// Ends as soon as upper <= wanted is proved, or a distance above `wanted` is found; upper is infinite
   /// then. Where `wanted` itself is between bounds that are that narrow, neither may come of it.

@@ -90,7 +90,11 @@ class Search {
     }
     const std::uint64_t triangles = std::uint64_t{from_[0].triangle_count} + from_[1].triangle_count;
     const std::uint64_t most = options_.most_pieces.value_or((1 << 20) + 64 * triangles);
-    for (int round = 0; !pool_.empty() && !is_refuted() && pieces_ < most; ++round) refine_some(round);
+    const std::uint64_t most_waiting = (1 << 20) + 2 * triangles;
+    for (int round = 0; !pool_.empty() && !is_refuted(); ++round) {
+      if (pieces_ >= most || pool_.size() > most_waiting) break;
+      refine_some(round);
+    }
     return result();
   }
 

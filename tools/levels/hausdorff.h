@@ -15,7 +15,8 @@ struct HausdorffOptions {
   /// then. Where `wanted` itself is between bounds that are that narrow, neither may come of it.
   std::optional<double> wanted = {};
   /// Pieces of triangles that are looked into at most, or about so many; where they run out the bounds stay
-  /// wide, but hold. Without it: 2^20 and 64 for each triangle of both surfaces.
+  /// wide, but hold, as they do where 2^20 pieces and two for each triangle wait, for their memory. Without
+  /// it: 2^20 and 64 for each triangle of both surfaces.
   std::optional<std::uint64_t> most_pieces = {};
 };
 

@@ -339,8 +339,9 @@ CLI::App* add_query(CLI::App& app, Run& run_later) {
       ->check(between(0, kLargestWorldCoordinate))
       ->option_text("D [0]");
   command
-      ->add_option("--tolerance", arguments->tolerance,
-                   "only which bodies surely meet, which surely do not, and which are within T, by their levels")
+      ->add_option(
+          "--tolerance", arguments->tolerance,
+          "only which bodies surely meet, which surely do not, and which are within T, by their levels")
       ->check(between(0, kLargestWorldCoordinate))
       ->option_text("T");
   command->add_flag("--manifolds", arguments->manifolds,

@@ -73,8 +73,12 @@ Answer answer_of(const ToleranceArguments& arguments, const Scene& scene) {
   const bool on_gpu = arguments.backend == "cuda";
   Answer answer;
   answer.timed = (on_gpu ? time_on_gpu : time_on_cpu)(arguments, bodies);
-  answer.record = {arguments.backend,    arguments.tolerance,   description.pairs.has_value(),
-                   on_gpu ? 0 : arguments.threads, answer.timed.seconds, answer.timed.counters};
+  answer.record = {arguments.backend,
+                   arguments.tolerance,
+                   description.pairs.has_value(),
+                   on_gpu ? 0 : arguments.threads,
+                   answer.timed.seconds,
+                   answer.timed.counters};
   return answer;
 }
 
@@ -157,7 +161,8 @@ void print_summary(const ToleranceArguments& arguments, const Scene& scene, cons
   print_row("candidates", counters.work.candidates);
   print_times("milliseconds", record.seconds);
   if (record.backend == "cuda") print_times("  rounds", answer.timed.rounds);
-  std::printf("  %-16s %s\n", "hash", hexadecimal(hash_of(answer.timed.pairs, answer.timed.verdicts)).c_str());
+  std::printf("  %-16s %s\n", "hash",
+              hexadecimal(hash_of(answer.timed.pairs, answer.timed.verdicts)).c_str());
 }
 
 }  // namespace

@@ -11,7 +11,8 @@
 namespace tandem {
 namespace {
 
-static_assert(sizeof(gpu::ToleranceState) <= most_tolerance_bytes({}, 0) - most_query_bytes({}, kToleranceRound, 0));
+static_assert(sizeof(gpu::ToleranceState) <=
+              most_tolerance_bytes({}, 0) - most_query_bytes({}, kToleranceRound, 0));
 static_assert(2 * (sizeof(ObjectPair) + sizeof(std::uint32_t)) + sizeof(PairVerdict) == 27);
 static_assert(sizeof(levels::LevelRange) == 8);
 
@@ -88,7 +89,8 @@ Status GpuToleranceQuery::State::reserve_instances(std::uint32_t wanted) {
   capacity.instances = 0;
   Status status = keep(last.grow(wanted));
   if (status == Status::kOk) status = keep(level.grow(wanted));
-  if (status == Status::kOk) capacity.instances = static_cast<std::uint32_t>(std::min(last.room(), level.room()));
+  if (status == Status::kOk)
+    capacity.instances = static_cast<std::uint32_t>(std::min(last.room(), level.room()));
   return status;
 }
 
@@ -110,7 +112,8 @@ Status GpuToleranceQuery::State::reserve(const GpuToleranceCapacity& wanted) {
   const std::uint32_t pairs = std::max(wanted.pairs, capacity.pairs);
   Status status = reserve_instances(wanted.instances);
   if (status == Status::kOk)
-    status = keep(contacts.reserve({pairs, pairs, std::max(wanted.undecided, capacity.undecided)}, kToleranceRound));
+    status = keep(
+        contacts.reserve({pairs, pairs, std::max(wanted.undecided, capacity.undecided)}, kToleranceRound));
   const GpuQueryCapacity room = contacts.capacity();
   capacity.undecided = room.undecided;
   if (status == Status::kOk)

@@ -117,12 +117,14 @@ __device__ void write_report(const ToleranceArgs& args) {
   *args.host_report = report;
 }
 
-__global__ void __launch_bounds__(kThreads) judge(const __grid_constant__ ToleranceArgs args, std::uint32_t round) {
+__global__ void __launch_bounds__(kThreads)
+    judge(const __grid_constant__ ToleranceArgs args, std::uint32_t round) {
   wait_for_kernel_before();
   const std::uint32_t first = blockIdx.x * kThreads + threadIdx.x, step = gridDim.x * kThreads;
   if (args.query->status == Status::kOk) {
     const std::uint64_t pairs = args.query->counters.object_pairs;
-    for (std::uint64_t i = first; i < pairs; i += step) judge_pair(args, round, static_cast<std::uint32_t>(i));
+    for (std::uint64_t i = first; i < pairs; i += step)
+      judge_pair(args, round, static_cast<std::uint32_t>(i));
   }
   if (first == 0) take_report(args, round);
   if (round + 1 != args.rounds) {
@@ -146,7 +148,8 @@ cudaError_t begin_rounds(const ToleranceArgs& args, cudaStream_t stream) {
 }
 
 cudaError_t judge_round(const ToleranceArgs& args, std::uint32_t round, cudaStream_t stream) {
-  const std::uint32_t most = std::max(args.instances.count, std::min(args.given.capacity, args.pair_capacity));
+  const std::uint32_t most =
+      std::max(args.instances.count, std::min(args.given.capacity, args.pair_capacity));
   return launch_after(grid_for(args, most, stream), judge, args, round);
 }
 

@@ -358,9 +358,9 @@ struct InWorld {
                   kMode == QueryMode::boxes, false};
     if constexpr (kMode == QueryMode::boxes) return out;
     const TrianglePair pair = posed_pair(args, record, a, b);
-    const Verdict verdict =
-        kNear ? distance::decide_within_float64(pair, clearance_of(args, record.instance_a, record.instance_b))
-              : decide_float64(pair);
+    const Verdict verdict = kNear ? distance::decide_within_float64(
+                                        pair, clearance_of(args, record.instance_a, record.instance_b))
+                                  : decide_float64(pair);
     const bool exactly = verdict == Verdict::undecided;
     atomicAdd(exactly ? &args.state->decided_exactly : &args.state->decided_by_float64, Counter{1});
     if (!exactly)

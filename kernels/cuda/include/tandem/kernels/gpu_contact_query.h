@@ -118,18 +118,17 @@ class GpuContactQuery {
   Status set_assets(std::span<const GpuAsset> assets, cudaStream_t stream);
 
   /// Makes room for at least so much, waiting for the device where it grows. `options`: those of the calls to
-  /// come; of `within` and add_error_bounds counts whether they are of clearance. Result: kOk, kOutOfRange (sorted or grouped: 2^32 - 1
-  /// contacts or more; grouped: 2^31 pairs or more), kOutOfGpuMemory, kCudaFailed; after an error there is
-  /// the room that there was, or none. Condition: set_assets().
+  /// come; of `within` and add_error_bounds counts whether they are of clearance. Result: kOk, kOutOfRange
+  /// (sorted or grouped: 2^32 - 1 contacts or more; grouped: 2^31 pairs or more), kOutOfGpuMemory,
+  /// kCudaFailed; after an error there is the room that there was, or none. Condition: set_assets().
   Status reserve(const GpuQueryCapacity& capacity, const GpuQueryOptions& options = {});
 
   /// Queues a query behind what `stream` holds; it may be captured into a graph. The arrays must stay until
   /// it is done. A pair of an instance with itself asks for the contacts within it. Mode exact walks oriented
   /// blocks, the others axis-aligned ones. Result: kOk, kNoOrientedBlocks or kNoAxisAlignedBlocks (an asset
-  /// lacks them), kOutOfRange (sorted, grouped or of clearance, and reserved without; a distance that is none),
-  /// kCudaFailed, or, where CUDA loads a
-  /// kernel at its first launch and the GPU is full, kOutOfGpuMemory; what the GPU finds wrong is in the
-  /// report. Condition: set_assets() and reserve().
+  /// lacks them), kOutOfRange (sorted, grouped or of clearance, and reserved without; a distance that is
+  /// none), kCudaFailed, or, where CUDA loads a kernel at its first launch and the GPU is full,
+  /// kOutOfGpuMemory; what the GPU finds wrong is in the report. Condition: set_assets() and reserve().
   Status enqueue(const GpuInstances& instances, const GpuPairs& pairs, const GpuQueryOptions& options,
                  cudaStream_t stream);
 

@@ -25,8 +25,10 @@ inline constexpr GpuQueryOptions kToleranceRound = {.first_contact_only = true, 
 /// the bound of GpuToleranceQuery::bytes(), where it was never given more of them.
 constexpr std::size_t most_tolerance_bytes(const GpuToleranceCapacity& capacity, std::size_t levels) {
   constexpr std::size_t kFixed = 4096;
-  return kFixed + most_query_bytes({capacity.pairs, capacity.pairs, capacity.undecided}, kToleranceRound, levels) +
-         (sizeof(GpuAsset) + 8) * levels + 8 * std::size_t{capacity.instances} + 27 * std::size_t{capacity.pairs};
+  return kFixed +
+         most_query_bytes({capacity.pairs, capacity.pairs, capacity.undecided}, kToleranceRound, levels) +
+         (sizeof(GpuAsset) + 8) * levels + 8 * std::size_t{capacity.instances} +
+         27 * std::size_t{capacity.pairs};
 }
 
 /// The outcome of a query. It lies in GPU memory, and in CPU memory once the stream has come to the query's

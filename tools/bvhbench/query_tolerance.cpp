@@ -99,8 +99,6 @@ Json levels_of(const Answer& answer) {
 Json to_json(const ToleranceArguments& arguments, const Scene& scene, const Answer& answer) {
   const VerdictRecord& record = answer.record;
   const ToleranceCounters& counters = record.counters;
-  Json rounds = Json::array();
-  for (std::uint32_t i = 0; i < counters.rounds; ++i) rounds.push_back(counters.pairs_of_round[i]);
   Json json = {{"tool", "bvhbench query"},
                {"version", TANDEM_VERSION},
                {"scene", arguments.scene},
@@ -116,7 +114,6 @@ Json to_json(const ToleranceArguments& arguments, const Scene& scene, const Answ
                {"apart", counters.apart},
                {"touching", counters.touching},
                {"within_tolerance", counters.within_tolerance},
-               {"pairs_of_round", rounds},
                {"decided_at", levels_of(answer)},
                {"block_pairs", counters.work.block_pairs},
                {"candidates", counters.work.candidates},
@@ -128,7 +125,7 @@ Json to_json(const ToleranceArguments& arguments, const Scene& scene, const Answ
     json["gpu_bytes_bound"] = answer.timed.gpu.bytes_bound;
     json["gpu_bytes_taken"] = answer.timed.gpu.bytes_taken;
     json["upload_seconds"] = answer.timed.gpu.upload;
-    json["rounds_seconds"] = times(answer.timed.rounds);
+    json["deciding_seconds"] = times(answer.timed.deciding);
   }
   return json;
 }
@@ -155,12 +152,10 @@ void print_summary(const ToleranceArguments& arguments, const Scene& scene, cons
   print_row("apart", counters.apart, "  surely");
   print_row("touching", counters.touching, "  surely");
   print_row("within tolerance", counters.within_tolerance);
-  for (std::uint32_t i = 0; i < counters.rounds; ++i)
-    print_row(("  round " + std::to_string(i + 1)).c_str(), counters.pairs_of_round[i], "  pairs");
   print_row("block pairs", counters.work.block_pairs);
   print_row("candidates", counters.work.candidates);
   print_times("milliseconds", record.seconds);
-  if (record.backend == "cuda") print_times("  rounds", answer.timed.rounds);
+  if (record.backend == "cuda") print_times("  deciding", answer.timed.deciding);
   std::printf("  %-16s %s\n", "hash",
               hexadecimal(hash_of(answer.timed.pairs, answer.timed.verdicts)).c_str());
 }

@@ -42,8 +42,6 @@ void write_verdicts(const std::string& path, std::span<const ObjectPair> pairs,
   file.add("/verdict/verdict", {m}, column(verdicts, &PairVerdict::verdict));
   file.add("/verdict/level_a", {m}, column(verdicts, &PairVerdict::level_a));
   file.add("/verdict/level_b", {m}, column(verdicts, &PairVerdict::level_b));
-  file.add("/rounds/pairs", {counters.rounds},
-           std::span<const std::uint64_t>(counters.pairs_of_round, counters.rounds));
   file.attribute("tandem_version", std::string(TANDEM_VERSION));
   file.attribute("backend", record.backend);
   file.attribute("tolerance", record.tolerance);
@@ -56,7 +54,6 @@ void write_verdicts(const std::string& path, std::span<const ObjectPair> pairs,
   file.attribute("apart", counters.apart);
   file.attribute("touching", counters.touching);
   file.attribute("within_tolerance", counters.within_tolerance);
-  file.attribute("rounds", std::uint64_t{counters.rounds});
   file.attribute("block_pairs", counters.work.block_pairs);
   file.attribute("candidates", counters.work.candidates);
   file.attribute("hash", hexadecimal(hash_of(pairs, verdicts)));

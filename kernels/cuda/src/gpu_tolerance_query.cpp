@@ -12,8 +12,8 @@ namespace tandem {
 namespace {
 
 static_assert(sizeof(gpu::ToleranceState) <=
-              most_tolerance_bytes({}, 0) - most_query_bytes({}, kToleranceRound, 0));
-static_assert(2 * (sizeof(ObjectPair) + sizeof(std::uint32_t)) + sizeof(PairVerdict) == 27);
+              most_tolerance_bytes({}, 0) - most_query_bytes({}, kToleranceOptions, 0));
+static_assert(sizeof(PairVerdict) == 3);
 static_assert(sizeof(levels::LevelRange) == 8);
 
 }  // namespace
@@ -22,13 +22,11 @@ struct GpuToleranceQuery::State {
   GpuContactQuery contacts;  // of which each level is an asset
   GpuArray<GpuAsset> levels;
   GpuArray<levels::LevelRange> assets;
-  std::uint32_t asset_count = 0, most_levels = 1;
+  std::uint32_t asset_count = 0;
   gpu::DeviceLimits limits = {};
   GpuArray<gpu::ToleranceState> state;
   PinnedArray<GpuToleranceReport> report;
-  GpuArray<std::uint32_t> last, level;
-  GpuArray<ObjectPair> open[2];
-  GpuArray<std::uint32_t> rows[2];
+  GpuArray<std::uint32_t> level, asset;  // of each instance
   GpuArray<PairVerdict> verdicts;
   GpuToleranceCapacity capacity;
   cudaError_t error = cudaSuccess;
@@ -80,17 +78,16 @@ Status GpuToleranceQuery::State::set_levels(std::span<const GpuAsset> given, cud
   if (status == Status::kOk) status = keep(cudaStreamSynchronize(stream));
   if (status != Status::kOk) return status;
   asset_count = static_cast<std::uint32_t>(ranges.size());
-  most_levels = most;
   return Status::kOk;
 }
 
 Status GpuToleranceQuery::State::reserve_instances(std::uint32_t wanted) {
   if (wanted <= capacity.instances) return Status::kOk;
   capacity.instances = 0;
-  Status status = keep(last.grow(wanted));
-  if (status == Status::kOk) status = keep(level.grow(wanted));
+  Status status = keep(level.grow(wanted));
+  if (status == Status::kOk) status = keep(asset.grow(wanted));
   if (status == Status::kOk)
-    capacity.instances = static_cast<std::uint32_t>(std::min(last.room(), level.room()));
+    capacity.instances = static_cast<std::uint32_t>(std::min(level.room(), asset.room()));
   return status;
 }
 
@@ -98,12 +95,7 @@ Status GpuToleranceQuery::State::reserve_instances(std::uint32_t wanted) {
 Status GpuToleranceQuery::State::reserve_pairs(std::uint32_t wanted) {
   if (wanted <= capacity.pairs) return Status::kOk;
   capacity.pairs = 0;
-  Status status = Status::kOk;
-  for (int i = 0; i < 2 && status == Status::kOk; ++i) {
-    status = keep(open[i].reserve(wanted));
-    if (status == Status::kOk) status = keep(rows[i].reserve(wanted));
-  }
-  if (status == Status::kOk) status = keep(verdicts.reserve(wanted));
+  const Status status = keep(verdicts.reserve(wanted));
   if (status == Status::kOk) capacity.pairs = wanted;
   return status;
 }
@@ -113,7 +105,7 @@ Status GpuToleranceQuery::State::reserve(const GpuToleranceCapacity& wanted) {
   Status status = reserve_instances(wanted.instances);
   if (status == Status::kOk)
     status = keep(
-        contacts.reserve({pairs, pairs, std::max(wanted.undecided, capacity.undecided)}, kToleranceRound));
+        contacts.reserve({pairs, pairs, std::max(wanted.undecided, capacity.undecided)}, kToleranceOptions));
   const GpuQueryCapacity room = contacts.capacity();
   capacity.undecided = room.undecided;
   if (status == Status::kOk)
@@ -130,16 +122,11 @@ gpu::ToleranceArgs GpuToleranceQuery::State::args(const GpuInstances& instances,
   args.instances = instances;
   args.given = pairs;
   args.tolerance = tolerance;
-  args.rounds = most_levels;
   args.pair_capacity = capacity.pairs;
   args.state = state.data();
   args.host_report = report.data();
-  args.last = last.data();
   args.level = level.data();
-  for (int i = 0; i < 2; ++i) {
-    args.open[i] = open[i].data();
-    args.rows[i] = rows[i].data();
-  }
+  args.asset = asset.data();
   args.verdicts = verdicts.data();
   args.met = contacts.met();
   args.query = contacts.device_report();
@@ -148,14 +135,12 @@ gpu::ToleranceArgs GpuToleranceQuery::State::args(const GpuInstances& instances,
 }
 
 Status GpuToleranceQuery::State::enqueue(const gpu::ToleranceArgs& args, cudaStream_t stream) {
-  Status status = keep(gpu::begin_rounds(args, stream));
-  const GpuInstances posed = {args.level, args.instances.pose, args.instances.count};
-  for (std::uint32_t round = 0; round < args.rounds && status == Status::kOk; ++round) {
-    const GpuPairs open = {args.open[round % 2], args.state->open + round, args.pair_capacity};
-    status = keep(contacts.enqueue(posed, round == 0 ? args.given : open, kToleranceRound, stream));
-    if (status == Status::kOk) status = keep(gpu::judge_round(args, round, stream));
-  }
-  return status;
+  const GpuInstances posed = {args.asset, args.instances.pose, args.instances.count};
+  GpuQueryOptions options = kToleranceOptions;
+  options.add_error_bounds = args.tolerance > 0;  // else all stand for their finest levels
+  Status status = keep(gpu::choose_levels(args, stream));
+  if (status == Status::kOk) status = keep(contacts.enqueue(posed, args.given, options, stream));
+  return status == Status::kOk ? keep(gpu::judge_pairs(args, stream)) : status;
 }
 
 GpuToleranceQuery::GpuToleranceQuery() : state_(new (std::nothrow) State) {}
@@ -191,8 +176,7 @@ Status GpuToleranceQuery::decide(const GpuInstances& instances, const GpuPairs& 
     if (report().complete != 0) return Status::kOk;
     if (report().needed.pairs > pairs.capacity) return Status::kOutOfRange;
     wanted = report().needed;
-    // What is looked at before a pair's first contact is found differs from run to run, and rounds without
-    // the pairs that had no room had less to look at.
+    // What is looked at before a pair's first contact is found differs from run to run.
     wanted.undecided += wanted.undecided / 2 + 1024;
   }
 }
@@ -216,9 +200,8 @@ GpuToleranceCapacity GpuToleranceQuery::capacity() const {
 std::size_t GpuToleranceQuery::bytes() const {
   if (state_ == nullptr) return 0;
   const State& s = *state_;
-  return s.contacts.bytes() + s.levels.bytes() + s.assets.bytes() + s.state.bytes() + s.last.bytes() +
-         s.level.bytes() + s.open[0].bytes() + s.open[1].bytes() + s.rows[0].bytes() + s.rows[1].bytes() +
-         s.verdicts.bytes();
+  return s.contacts.bytes() + s.levels.bytes() + s.assets.bytes() + s.state.bytes() + s.level.bytes() +
+         s.asset.bytes() + s.verdicts.bytes();
 }
 
 cudaError_t GpuToleranceQuery::cuda_error() const {

@@ -15,20 +15,20 @@ namespace tandem {
 struct GpuToleranceCapacity {
   std::uint32_t instances = 0;
   std::uint32_t pairs = 0;
-  std::uint64_t undecided = 0;  ///< candidates of a round that are not decided quickly
+  std::uint64_t undecided = 0;  ///< candidates that are not decided quickly
 };
 
-/// What its rounds ask of the contact query.
-inline constexpr GpuQueryOptions kToleranceRound = {.first_contact_only = true, .add_error_bounds = true};
+/// What it asks of a contact query.
+inline constexpr GpuQueryOptions kToleranceOptions = {.first_contact_only = true, .add_error_bounds = true};
 
 /// GPU memory that a query of so many levels of assets, all together, with room for so much holds at most:
 /// the bound of GpuToleranceQuery::bytes(), where it was never given more of them.
 constexpr std::size_t most_tolerance_bytes(const GpuToleranceCapacity& capacity, std::size_t levels) {
   constexpr std::size_t kFixed = 4096;
   return kFixed +
-         most_query_bytes({capacity.pairs, capacity.pairs, capacity.undecided}, kToleranceRound, levels) +
+         most_query_bytes({capacity.pairs, capacity.pairs, capacity.undecided}, kToleranceOptions, levels) +
          (sizeof(GpuAsset) + 8) * levels + 8 * std::size_t{capacity.instances} +
-         27 * std::size_t{capacity.pairs};
+         3 * std::size_t{capacity.pairs};
 }
 
 /// The outcome of a query. It lies in GPU memory, and in CPU memory once the stream has come to the query's
@@ -43,11 +43,10 @@ struct GpuToleranceReport {
 };
 
 /// Tells of pairs of bodies with levels of detail whether they surely do not meet, surely meet, or are within
-/// a tolerance, on the GPU: the verdicts of ToleranceQuery, and the levels that told. enqueue() neither waits
-/// for the GPU nor allocates: all rounds are queued, a contact query and a small kernel each, as many as the
-/// assets have levels at most, and the GPU keeps the list of pairs that are open. Throws nothing. Movable,
-/// not copyable. An object runs one query at a time: enqueue the next on the same stream, or when the last
-/// has ended. Several objects can run side by side.
+/// a tolerance, on the GPU: the verdicts of ToleranceQuery, at the same levels. enqueue() neither waits for
+/// the GPU nor allocates: the GPU chooses the levels. Throws nothing. Movable, not copyable. An object runs
+/// one query at a time: enqueue the next on the same stream, or when the last has ended. Several objects can
+/// run side by side.
 class GpuToleranceQuery {
  public:
   GpuToleranceQuery();

@@ -95,6 +95,18 @@ class CScenesTest(unittest.TestCase):
             file.create_dataset("pairs", data=[[4, 5], [0, 1], [2, 2]], dtype="u4")
         self.check("coincident.h5")
 
+    def test_levels_of_detail_by_tolerance(self):
+        run(BVHBUILD, ROOT / "assets/cow.obj", "-o", self.folder / "levels.bvh", "--levels", "0.5%,2%", "--effort", "fast", "--quiet")
+        self.make("levels.h5", "lattice", "--mesh", self.folder / "levels.bvh", "--count", 64, "--spacing", 0.9)
+        (self.folder / "levels.txt").write_text(as_text(self.folder / "levels.h5", self.folder), encoding="utf-8")
+        counts = set()
+        for tolerance in (0, 0.05, 0.2):
+            expected = json.loads(run(BVHBENCH, "query", self.folder / "levels.h5", "--tolerance", tolerance, "--repeat", 1, "--json"))
+            found = run(SCENE_HASH, self.folder / "levels.txt", 0, 0, 0, 0, 2, tolerance).splitlines()[0].split()
+            self.assertEqual(found, [str(expected[key]) for key in ("apart", "touching", "within_tolerance")])
+            counts.add(tuple(found))
+        self.assertGreater(len(counts), 1)
+
     def test_filtered_fields(self):
         self.make("field.h5", "field", "--mesh", self.folder / "box_12.bvh", "--fixed", 500, "--count", 64)
         self.check("field.h5", threads=2)

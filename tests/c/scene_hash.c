@@ -1,5 +1,6 @@
 // Finds the contacts of a scene through the C interface and prints how many and their hash, by the rule of
-// docs/scenes.md. C99. Usage: scene_hash SCENE MODE FIRST_ONLY SELF_PAIRS WITHIN THREADS
+// docs/scenes.md. With a tolerance: how many object pairs are apart, touch, and are within it. C99.
+// Usage: scene_hash SCENE MODE FIRST_ONLY SELF_PAIRS WITHIN THREADS [TOLERANCE]
 //
 // SCENE is what c_scenes_test.py writes of a scene file: lines "asset PATH", then "instances N" and N lines of an
 // asset's number and twelve numbers of a pose, then "motion" with N numbers or "pairs M" with M lines of two.
@@ -90,8 +91,22 @@ static void* list(size_t count, size_t size) {
   return made;
 }
 
+static void print_verdicts(tandem_asset* const* assets, size_t asset_count, const tandem_instance* instances,
+                           size_t count, double tolerance, const tandem_query_options* from) {
+  tandem_tolerance_options options = {sizeof options, from->threads, tolerance, from->filter};
+  tandem_tolerance_query* query = NULL;
+  CHECK_STATUS(tandem_tolerance_query_create(NULL, &query), TANDEM_OK);
+  CHECK_STATUS(tandem_tolerance_query_set_assets(query, assets, asset_count), TANDEM_OK);
+  CHECK_STATUS(tandem_tolerance_query_decide(query, instances, count, &options), TANDEM_OK);
+  size_t found = 0, of[3] = {0, 0, 0};
+  const tandem_verdict* verdicts = tandem_tolerance_query_verdicts(query, &found);
+  for (size_t i = 0; i < found; ++i) ++of[verdicts[i].verdict];
+  printf("%zu %zu %zu\n", of[TANDEM_APART], of[TANDEM_TOUCH], of[TANDEM_WITHIN_TOLERANCE]);
+  tandem_tolerance_query_destroy(query);
+}
+
 int main(int argc, char** argv) {
-  if (argc != 7) return printf("usage: scene_hash SCENE MODE FIRST_ONLY SELF_PAIRS WITHIN THREADS\n"), 1;
+  if (argc != 7 && argc != 8) return printf("usage: scene_hash SCENE MODE FIRST_ONLY SELF_PAIRS WITHIN THREADS [TOLERANCE]\n"), 1;
   FILE* scene = fopen(argv[1], "r");
   if (scene == NULL) return printf("%s cannot be opened\n", argv[1]), 1;
   tandem_asset* assets[16];
@@ -141,6 +156,7 @@ int main(int argc, char** argv) {
   options.within = atof(argv[5]);
   options.threads = (uint32_t)atoi(argv[6]);
   options.filter = &filter;
+  if (argc == 8) print_verdicts(assets, asset_count, instances, count, atof(argv[7]), &options);
   tandem_contact_query* query = NULL;
   CHECK_STATUS(tandem_contact_query_create(NULL, &query), TANDEM_OK);
   CHECK_STATUS(tandem_contact_query_set_assets(query, assets, asset_count), TANDEM_OK);

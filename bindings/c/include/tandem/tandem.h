@@ -105,10 +105,10 @@ TANDEM_API const char* tandem_status_subject(tandem_status status);
 
 /// ---- Memory
 
-/// Where memory comes from. A handle keeps a copy of it and takes all of its memory there, results included.
-/// Both functions may be called by several threads at a time, also by those that queries start. The library's
-/// own are only what the C++ runtime and the system take to start a thread. Null pointers to allocators stand
-/// for the C library's memory.
+/// Where memory comes from. A handle keeps a copy of it and takes all of its memory there, results included;
+/// what `user` points to outlives the handle. Both functions may be called by several threads at a time, also
+/// by those that queries start. The library's own are only what the C++ runtime and the system take to start
+/// a thread. Null pointers to allocators stand for the C library's memory.
 typedef struct tandem_allocator {
   uint32_t struct_size;
   uint32_t reserved;
@@ -500,7 +500,7 @@ TANDEM_API const tandem_containment* tandem_contact_query_contained(const tandem
 /// ---- Levels of detail
 
 /// Tells of pairs of bodies with levels of detail whether they surely do not meet, surely meet, or are within
-/// a tolerance (docs/levels.md): coarse levels first, finer ones for what these leave open.
+/// a tolerance (docs/levels.md). Each body is looked at at the coarsest of its levels that can tell.
 typedef struct tandem_tolerance_query tandem_tolerance_query;
 
 TANDEM_API tandem_status tandem_tolerance_query_create(const tandem_allocator* allocator,
@@ -521,7 +521,7 @@ enum { TANDEM_APART = 0, TANDEM_TOUCH = 1, TANDEM_WITHIN_TOLERANCE = 2 };
 
 typedef struct tandem_verdict {
   uint8_t verdict;           ///< TANDEM_APART: the finest surfaces do not meet, TANDEM_TOUCH: they do, ...
-  uint8_t level_a, level_b;  ///< that told
+  uint8_t level_a, level_b;  ///< of the bodies, that it was asked of
 } tandem_verdict;
 
 /// Finds the object pairs whose world boxes overlap, and the verdicts on them; or those on given pairs.

@@ -272,6 +272,17 @@ static void test_contacts(const tandem_allocator* allocator) {
   (void)tandem_contact_query_pairs(query, &count);
   CHECK(count == 0);
 
+  // The pairs that the query found, without the first, are given to it.
+  for (int i = 0; i < 10; ++i) row[i] = at(0.5 * i, 0, 0);
+  CHECK_STATUS(tandem_contact_query_find_pairs(query, row, 10, NULL), TANDEM_OK);
+  pairs = tandem_contact_query_pairs(query, &count);
+  CHECK(count == 17 && tandem_contact_query_contacts(query, NULL) == NULL);
+  CHECK_STATUS(tandem_contact_query_find_contacts_of_pairs(query, row, 10, pairs + 1, count - 1, NULL), TANDEM_OK);
+  pairs = tandem_contact_query_pairs(query, &count);
+  CHECK(count == 16 && pairs[0].a == 0 && pairs[0].b == 2);
+  (void)tandem_contact_query_contacts(query, &count);
+  CHECK(count == 964 - 52);
+
   // Filters: one fixed, two that a joint connects, two groups; and fixed ones that are kept.
   for (int i = 0; i < 10; ++i) row[i] = at(0.9 * i, 0, 0);
   uint8_t motion[10] = {TANDEM_FIXED, TANDEM_FIXED, 0, 0, 0, 0, 0, 0, 0, TANDEM_SLEEPING};

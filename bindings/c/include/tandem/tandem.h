@@ -12,10 +12,9 @@
 /// - Rows of arguments and results (instances, pairs, contacts, ...) never change their layout.
 /// - Strings are UTF-8. Lengths are in the files' unit, angles in radians, times in seconds.
 /// - A handle of a query takes one call at a time; several handles work side by side. Assets never change,
-/// and
-///   any number of threads may use them. Queries start threads where options ask for them, and keep them.
-/// - Rounding is to nearest, subnormals included, as every thread begins. A query takes about 100 KB of
-/// stack.
+///   and any number of threads may use them. Queries start threads where options ask for them, and keep them.
+/// - Rounding is to nearest, subnormals included, as every thread begins. A query takes about 100 KB of the
+///   stack.
 #ifndef TANDEM_TANDEM_H
 #define TANDEM_TANDEM_H
 
@@ -205,11 +204,12 @@ typedef struct tandem_build_options {
 typedef struct tandem_build_report {
   uint32_t struct_size;
   uint32_t reserved;
-  uint64_t index_out_of_range, not_finite,
-      too_large;                           ///< triangles that were left out, under the first cause
-  uint64_t degenerate;                     ///< left out: their corners lie on one line
-  uint64_t duplicate, duplicate_reversed;  ///< kept: the three places of an earlier one, the other way round
-  uint64_t flattened;                      ///< kept: on one line only once rounded to float32
+  // Left out, each under the first cause that holds.
+  uint64_t index_out_of_range, not_finite, too_large;
+  uint64_t degenerate;  ///< left out: the corners lie on one line
+  // Kept.
+  uint64_t duplicate, duplicate_reversed;  ///< the three places of an earlier one; of these, wound otherwise
+  uint64_t flattened;                      ///< on one line only once rounded to float32
   uint64_t vertices_unreferenced, vertices_welded;  ///< named by no triangle; at the place of an earlier one
 } tandem_build_report;
 
@@ -260,7 +260,7 @@ typedef struct tandem_level {
   uint32_t depth;                ///< of the tree, in blocks
   uint32_t has_oriented_blocks;  ///< which exact queries on a GPU walk
   uint32_t has_topology;         ///< which manifolds and contained bodies need
-  uint32_t vertex_count;     ///< different positions of corners; this and what follows: 0 without topology
+  uint32_t vertex_count;     ///< different positions of corners; this and the next two: 0 without topology
   uint32_t component_count;  ///< triangles that edges join
   uint32_t closed;           ///< all components are
   double error_bound;        ///< no point of this surface or of the file's finest is farther from the other
@@ -406,8 +406,8 @@ TANDEM_API tandem_status tandem_contact_query_find_contacts(tandem_contact_query
                                                             const tandem_query_options* options);
 
 /// The same of given object pairs, in either order of a and b; the filter is not asked. A pair of an instance
-/// with itself asks for the contacts within it. Result: as above, or TANDEM_UNKNOWN_INSTANCE: where is the
-/// pair.
+/// with itself asks for the contacts within it. They may be tandem_contact_query_pairs(), or a part of them.
+/// Result: as above, or TANDEM_UNKNOWN_INSTANCE: where is the pair.
 TANDEM_API tandem_status tandem_contact_query_find_contacts_of_pairs(
     tandem_contact_query* query, const tandem_instance* instances, size_t count,
     const tandem_object_pair* pairs, size_t pair_count, const tandem_query_options* options);

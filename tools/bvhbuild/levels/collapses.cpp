@@ -85,7 +85,9 @@ struct Placement {
 // finest level. Between these points nothing is promised.
 class Guard {
  public:
-  Guard(const OpenedMesh& opened, const LevelView& finest, double distance)
+  // face: of each triangle, kNoVertex where it takes no part.
+  Guard(const OpenedMesh& opened, std::span<const std::uint32_t> face, const LevelView& finest,
+        double distance)
       : finest_(finest),
         square_(distance * distance),
         positions_(opened.points),
@@ -96,13 +98,13 @@ class Guard {
     for (std::size_t t = 0; t < opened.triangles.size(); ++t) area += doubled_area(opened, t);
     const double share = area / static_cast<double>(opened.triangles.size());
     for (std::uint32_t t = 0; t < opened.triangles.size(); ++t) {
-      const auto& corners = opened.triangles[t];
-      for (const std::uint32_t corner : corners) {
+      if (face[t] == kNoVertex) continue;
+      for (const std::uint32_t corner : opened.triangles[t]) {
         near_[corner] = opened.was[t];
-        if (!sampled[corner]) add(point_of(corner), t);
+        if (!sampled[corner]) add(point_of(corner), face[t]);
         sampled[corner] = true;
       }
-      spread(opened, t, share);
+      if (share > 0) spread(opened, t, face[t], share);
     }
   }
 
@@ -169,7 +171,7 @@ class Guard {
   }
 
   // Points in large triangles: one for each mean area, on a grid of barycentric coordinates.
-  void spread(const OpenedMesh& opened, std::uint32_t t, double share) {
+  void spread(const OpenedMesh& opened, std::uint32_t t, std::uint32_t face, double share) {
     const double wanted = std::min(doubled_area(opened, t) / share, kMostSamples);
     const int rows = static_cast<int>(std::sqrt(2 * wanted));
     const auto& [a, b, c] = opened.triangles[t];
@@ -178,7 +180,7 @@ class Guard {
         const double u = (i + 1.0 / 3) / rows, v = (j + 1.0 / 3) / rows;
         const levels::Point along = levels::plus(levels::scaled(u, levels::minus(point_of(b), point_of(a))),
                                                  levels::scaled(v, levels::minus(point_of(c), point_of(a))));
-        add(levels::plus(point_of(a), along), t);
+        add(levels::plus(point_of(a), along), face);
       }
     }
   }
@@ -305,20 +307,26 @@ struct Recorder : simplification::Edge_collapse_visitor_base<Mesh> {
   }
 };
 
-Mesh surface_mesh(const OpenedMesh& opened, const Frame& frame, std::vector<bool>& fixed) {
-  Mesh mesh;
+// The mesh in the frame, and of each triangle its face there.
+std::pair<Mesh, std::vector<std::uint32_t>> surface_mesh(const OpenedMesh& opened, const Frame& frame,
+                                                         std::vector<bool>& fixed) {
+  std::pair<Mesh, std::vector<std::uint32_t>> result;
+  auto& [mesh, faces] = result;
   mesh.reserve(static_cast<Mesh::size_type>(opened.points.size()),
                static_cast<Mesh::size_type>(opened.triangles.size() * 3 / 2),
                static_cast<Mesh::size_type>(opened.triangles.size()));
+  faces.reserve(opened.triangles.size());
   for (const auto& point : opened.points) mesh.add_vertex(frame.into(point));
   using Vertex = Mesh::Vertex_index;
   for (const auto& [a, b, c] : opened.triangles) {
     // Two cut edges between the same vertices are one to Surface_mesh, which may refuse the triangle: then it
     // stays as it is.
-    if (mesh.add_face(Vertex(a), Vertex(b), Vertex(c)) == Mesh::null_face())
-      fixed[a] = fixed[b] = fixed[c] = true;
+    const Mesh::Face_index face = mesh.add_face(Vertex(a), Vertex(b), Vertex(c));
+    const bool refused = face == Mesh::null_face();
+    if (refused) fixed[a] = fixed[b] = fixed[c] = true;
+    faces.push_back(refused ? kNoVertex : std::uint32_t{face});
   }
-  return mesh;
+  return result;
 }
 
 }  // namespace
@@ -327,9 +335,9 @@ std::vector<Collapse> collapse_edges(const OpenedMesh& opened, const LevelView& 
   std::vector<Collapse> collapses;
   std::vector<bool> fixed = opened.fixed;
   const Frame frame(opened.points);
-  Mesh mesh = surface_mesh(opened, frame, fixed);
+  auto [mesh, face] = surface_mesh(opened, frame, fixed);
   const Quadrics quadrics(mesh);
-  Guard guard(opened, finest, distance);
+  Guard guard(opened, face, finest, distance);
   Recorder recorder;
   recorder.guard = &guard;
   recorder.mesh = &opened;

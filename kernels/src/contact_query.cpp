@@ -8,6 +8,7 @@
 #include "tandem/kernels/detail/block_pair.h"
 #include "tandem/kernels/detail/grid_test.h"
 #include "tandem/kernels/detail/instance_check.h"
+#include "tandem/kernels/detail/level_error.h"
 #include "worker_threads.h"
 
 namespace tandem {
@@ -104,6 +105,12 @@ struct ContactQuery::State {
     counters = {};
   }
 
+  // What adds error bounds proves something, so it is decided exactly in mode fast too.
+  void take(const QueryOptions& asked) {
+    options = asked;
+    if (options.add_error_bounds && options.mode == QueryMode::fast) options.mode = QueryMode::exact;
+  }
+
   std::uint32_t most_workers() const { return std::clamp(options.threads, 1u, kMostQueryThreads); }
   std::uint32_t workers_for(std::size_t things, std::size_t at_once) const;
   Status pose_from(std::span<const Instance> posed, std::size_t& i, std::size_t end);
@@ -134,9 +141,11 @@ Status ContactQuery::State::pose_from(std::span<const Instance> posed, std::size
     const Status status = pose_instance(assets.data(), asset_count, instance.asset, instance.pose,
                                         instances[at].pose, boxes[at]);
     if (status != Status::kOk) return status;
-    instances[at].tree = assets[instance.asset].tree;
-    instances[at].extent = assets[instance.asset].extent;
-    instances[at].grid = assets[instance.asset].grid;
+    const Asset& asset = assets[instance.asset];
+    instances[at].tree = asset.tree;
+    instances[at].extent = asset.extent;
+    instances[at].grid = asset.grid;
+    instances[at].error = posed_level_error(asset.tree, asset.lower, asset.upper, instances[at].pose);
   }
   return Status::kOk;
 }
@@ -167,7 +176,8 @@ Status ContactQuery::State::pose_instances(std::span<const Instance> posed) {
 }
 
 // Boxes within reach of each other meet when each is larger by half of it; or one by all of it where the
-// other is kept, which is kept for any reach.
+// other is kept, which is kept for any reach. Errors of levels need no more: a world box is made of bounds
+// that hold all levels, the finest one too, which is what the query is about.
 void ContactQuery::State::grow_boxes(std::size_t count) {
   if (!(options.within > 0)) return;
   const double margin = broad_phase.kept_of() != 0 ? options.within : 0.5 * options.within;
@@ -221,7 +231,10 @@ bool ContactQuery::State::provide_workers() {
 }
 
 PairTask ContactQuery::State::task_of(std::uint32_t pair) const {
-  PairTask task = pair_task(instances[pairs[pair].a], instances[pairs[pair].b], options.within);
+  const PosedTree &a = instances[pairs[pair].a], &b = instances[pairs[pair].b];
+  double within = options.within;
+  if (options.add_error_bounds && &a != &b) within = clearance_of_levels(within, a.error, b.error);
+  PairTask task = pair_task(a, b, within);
   task.pair = pair;
   task.mode = options.mode;
   task.first_contact_only = options.first_contact_only;
@@ -334,7 +347,7 @@ Status ContactQuery::keep_fixed(std::span<const Instance> instances, std::span<c
   State& state = *state_;
   state.forget_results();
   state.broad_phase.forget_fixed();
-  state.options = options;
+  state.take(options);
   if (const Status status = state.pose_instances(instances); status != Status::kOk) return status;
   const Status status = state.broad_phase.keep_fixed(state.boxes.view(), motion, state.threads,
                                                      state.workers_for(instances.size(), kInstancesAtOnce));
@@ -344,7 +357,7 @@ Status ContactQuery::keep_fixed(std::span<const Instance> instances, std::span<c
 Status ContactQuery::find_pairs(std::span<const Instance> instances, const QueryOptions& options) {
   if (state_ == nullptr) return Status::kOutOfMemory;
   state_->forget_results();
-  state_->options = options;
+  state_->take(options);
   const Status status = state_->pose_instances(instances);
   return status == Status::kOk ? state_->find_pairs() : status;
 }
@@ -357,7 +370,7 @@ Status ContactQuery::find_contacts(std::span<const Instance> instances, const Qu
 Status ContactQuery::find_contacts(std::span<const Instance> instances, std::span<const ObjectPair> pairs,
                                    const QueryOptions& options) {
   if (state_ == nullptr) return Status::kOutOfMemory;
-  state_->options = options;
+  state_->take(options);
   Status status = state_->pose_instances(instances);
   if (status == Status::kOk) status = state_->take_pairs(pairs);
   return status == Status::kOk ? state_->find_contacts_of_pairs() : status;

@@ -47,8 +47,9 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kLeafCountMismatch,  ///< leaves, or leaf blocks, differ in number from what the level says
     kTriangleOrder,      ///< leaves, in the order of blocks, must name the triangles 0, 1, 2, ...
     kTriangleNotFinite, kTriangleOutsideLeafBox, kChildOutsideParentBox,
-    kBadFace,         ///< source face or part out of range, or a reserved lane set
-    kBoundsMismatch,  ///< the header's bounds are not those of the triangles
+    kBadFace,             ///< source face or part out of range, or a reserved lane set
+    kBoundsMismatch,      ///< the header's bounds are not those of level 0's triangles
+    kLevelOutsideBounds,  ///< a coarser level reaches beyond the header's bounds
     // The oriented blocks.
     kOrientedBlockMismatch,  ///< an oriented block names other children or triangles than its block
     kBadRotation,            ///< a rotation that is no quaternion of whole numbers in their range
@@ -75,6 +76,7 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kNoOrientedBlocks,     ///< exact queries on a GPU need them, and the asset was given without
     kNoAxisAlignedBlocks,  ///< the other modes of queries on a GPU need them, and the asset was given without
     kNoTopology,           ///< contact manifolds need it, and the file has none
+    kNoFinestLevel,        ///< queries by tolerance need it, and the view leaves it out
     // On a GPU; status_of() of gpu_status.h names CUDA's errors.
     kNoGpu,            ///< none here, none that this process may use, or no driver
     kDriverTooOld,     ///< for the CUDA version that the program was built with

@@ -1,0 +1,150 @@
+#include "ladder.h"
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "collapses.h"
+#include "laid_level.h"
+#include "levels/hausdorff.h"
+#include "levels/nearest_triangle.h"
+#include "opened_mesh.h"
+
+namespace tandem::build {
+namespace {
+
+// What part of the wanted error the simplifier may use, at first and where it turns out to be too much: the
+// surface is farther off between the points that it looks at than in them.
+constexpr double kFirstShare = 0.85, kNextShare = 0.97, kUsedUp = 0.88;
+constexpr int kTries = 3;
+// Counts of triangles this close are the same to a search.
+constexpr double kNarrow = 1.02;
+
+// A mesh and a bound of its distance from the finest level; no triangles: there is none.
+struct Candidate {
+  LevelMesh mesh;
+  double error_bound = 0;
+};
+
+// Makes meshes near the finest level and measures how near they are.
+class Search {
+ public:
+  Search(const FinestLevel& finest, const OpenedMesh& opened)
+      : finest_(finest.geometry, finest.tree), opened_(opened) {}
+
+  // A mesh of few triangles whose bound is at most `wanted`. The simplifier keeps what it looks at within a
+  // distance, and the bound says what became of the rest: where it is too far off, once more with less.
+  Candidate level(double wanted) const {
+    double distance = kFirstShare * wanted, refused = 0;
+    std::vector<Collapse> collapses;
+    Candidate best;
+    for (int i = 0; i < kTries; ++i) {
+      collapses = collapse_edges(opened_, finest_.view(), distance);
+      Candidate candidate = {after(opened_, collapses), 0};
+      candidate.error_bound = bound(candidate.mesh).upper;
+      if (candidate.error_bound > wanted) {
+        refused = distance;
+        distance *= kNextShare * wanted / candidate.error_bound;
+        continue;
+      }
+      const bool used_up = refused == 0 || candidate.error_bound > kUsedUp * wanted;
+      if (best.mesh.triangles.empty() || candidate.mesh.triangles.size() < best.mesh.triangles.size())
+        best = std::move(candidate);
+      if (used_up) break;
+      distance = std::sqrt(distance * refused);
+    }
+    return best.mesh.triangles.empty() ? longest_near(collapses, wanted) : best;
+  }
+
+  // The triangles of the finest level, in leaf order, that are nearest to the middles of a mesh's.
+  std::vector<std::uint32_t> nearest(const LevelMesh& mesh) const {
+    std::vector<std::uint32_t> nearest(mesh.triangles.size());
+    tbb::parallel_for(std::size_t{0}, nearest.size(), [&](std::size_t t) {
+      levels::Point sum = {};
+      for (const std::uint32_t corner : mesh.triangles[t]) {
+        const auto& point = mesh.points[corner];
+        sum = levels::plus(sum, levels::Point{{point[0], point[1], point[2]}});
+      }
+      const levels::Point middle = levels::scaled(1.0 / 3, sum);
+      nearest[t] = levels::nearest_triangle(finest_.view(), middle, mesh.was[t]).triangle;
+    });
+    return nearest;
+  }
+
+ private:
+  // The mesh after as many of the collapses as leave it near enough, or nearly as many.
+  Candidate longest_near(const std::vector<Collapse>& collapses, double wanted) const {
+    const auto triangles = [&](std::size_t count) {
+      return static_cast<double>(count == 0 ? opened_.triangles.size() : collapses[count - 1].triangles);
+    };
+    std::size_t near = 0, far = collapses.size();
+    Candidate best;
+    while (near + 1 < far && triangles(near) > std::max(kNarrow * triangles(far), triangles(far) + 4)) {
+      const double most = std::sqrt(triangles(near) * triangles(far));
+      const auto middle = std::partition_point(collapses.begin(), collapses.end(),
+                                               [&](const Collapse& c) { return c.triangles > most; });
+      const auto count =
+          std::clamp(static_cast<std::size_t>(middle - collapses.begin()) + 1, near + 1, far - 1);
+      Candidate candidate = {after(opened_, std::span(collapses).first(count)), 0};
+      candidate.error_bound = bound(candidate.mesh, wanted).upper;
+      if (candidate.error_bound <= wanted) {
+        near = count;
+        best = std::move(candidate);
+      } else {
+        far = count;
+      }
+    }
+    if (near > 0) best.error_bound = std::min(best.error_bound, bound(best.mesh).upper);
+    return best;
+  }
+
+  // `wanted`: as far as it takes to know whether the mesh is near enough.
+  HausdorffBound bound(const LevelMesh& mesh, std::optional<double> wanted = {}) const {
+    const Geometry geometry = {mesh.points, mesh.triangles};
+    const Tree tree = build_tree(geometry, Imaginary::minimal, Effort::fast);
+    HausdorffOptions options;
+    options.wanted = wanted;
+    return hausdorff_bound(finest_.view(), LaidLevel(geometry, tree).view(), options);
+  }
+
+  LaidLevel finest_;
+  const OpenedMesh& opened_;
+};
+
+}  // namespace
+
+Ladder make_ladder(const FinestLevel& finest, std::span<const double> wanted,
+                   const std::function<void(double)>& progress) {
+  Ladder ladder;
+  const OpenedMesh opened = cut_open(finest.geometry, finest.tree, finest.topology);
+  ladder.fixed_vertices = opened.fixed_vertices;
+  if (opened.triangles.empty()) {  // segments and points only
+    for (std::size_t i = 0; i < wanted.size(); ++i) ladder.left_out.push_back(i);
+    return ladder;
+  }
+  const Search search(finest, opened);
+  std::size_t triangles = finest.geometry.triangles.size();
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    progress(static_cast<double>(i) / static_cast<double>(wanted.size()));
+    Candidate candidate = search.level(wanted[i]);
+    if (candidate.mesh.triangles.empty() || candidate.mesh.triangles.size() >= triangles) {
+      ladder.left_out.push_back(i);
+      continue;
+    }
+    // A level that is coarser and nearer spares the ones before it.
+    while (!ladder.levels.empty() && ladder.levels.back().error_bound > candidate.error_bound) {
+      ladder.left_out.push_back(ladder.levels.back().wanted);
+      ladder.levels.pop_back();
+    }
+    triangles = candidate.mesh.triangles.size();
+    std::vector<std::uint32_t> nearest = search.nearest(candidate.mesh);
+    for (std::uint32_t& triangle : nearest) triangle = finest.tree.order[triangle];
+    ladder.levels.push_back({std::move(candidate.mesh), std::move(nearest), i, candidate.error_bound});
+  }
+  std::sort(ladder.left_out.begin(), ladder.left_out.end());
+  return ladder;
+}
+
+}  // namespace tandem::build

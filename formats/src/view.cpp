@@ -1,12 +1,14 @@
 #include "tandem/formats/view.h"
 
+#include <algorithm>
+
 namespace tandem {
 
 LevelView AssetView::level(std::uint32_t i) const {
   LevelView view;
   const auto* base = reinterpret_cast<const unsigned char*>(header);
   for (const Section& section : sections) {
-    if (section.level != i) continue;
+    if (section.level != first_level + i) continue;
     if (section.kind == SectionKind::blocks)
       view.blocks = reinterpret_cast<const Block*>(base + section.offset);
     if (section.kind == SectionKind::triangles)
@@ -27,8 +29,23 @@ LevelView AssetView::level(std::uint32_t i) const {
   view.depth = level.depth;
   view.vertex_count = level.vertex_count;
   view.closed = (level.flags & kClosedLevel) != 0;
+  view.number = first_level + i;
   view.error_bound = level.error_bound;
   return view;
+}
+
+AssetView AssetView::levels_from(std::uint32_t first, std::uint32_t count) const {
+  AssetView view = *this;
+  view.levels = levels.subspan(first, std::min<std::size_t>(count, levels.size() - first));
+  view.first_level = first_level + first;
+  return view;
+}
+
+// Error bounds ascend.
+std::uint32_t AssetView::coarsest_level(double tolerance) const {
+  std::uint32_t coarsest = 0;
+  while (coarsest + 1 < levels.size() && levels[coarsest + 1].error_bound <= tolerance) ++coarsest;
+  return coarsest;
 }
 
 }  // namespace tandem

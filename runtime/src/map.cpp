@@ -96,11 +96,17 @@ Bytes map_file(const char* path) {
 void unmap(void* data, std::size_t size) {
   ::munmap(data, size);
 }
+
+// Where the system takes this advice, pages come back, from the file's cache, as they are touched.
+void give_back_pages(void* data, std::size_t size) {
+  (void)::madvise(data, size, MADV_DONTNEED);
+}
 #else
 Bytes map_file(const char*) {
   return {Status::kCannotRead};
 }
 void unmap(void*, std::size_t) {}
+void give_back_pages(void*, std::size_t) {}
 #endif
 
 }  // namespace
@@ -134,6 +140,7 @@ Status MappedAsset::open(const char* path, Access access, CheckDepth depth) {
   if (const Status status = acquire(path, access); status != Status::kOk) return status;
   const CheckResult result = check(data_, bytes_, depth);
   if (result.status != Status::kOk) close();
+  if (mapped_ && result.asset.levels.size() > 1) give_back_pages(data_, bytes_);
   asset_ = result.asset;
   where_ = result.where;
   return result.status;

@@ -3,9 +3,11 @@
 #include <cstdint>
 #include <span>
 
-#include "tandem/formats/file.h"
+#include "tandem/formats/view.h"
+#include "tandem/runtime/contents.h"
 
-// Where bytes of many files lie in one copy of them, and who copies them. Measured: docs/decisions/0049.
+// What is copied of files, where it lies in one copy of them all, and who copies it. Measured:
+// docs/decisions/0049.
 namespace tandem {
 
 /// Bytes in CPU memory and their place in the copy.
@@ -14,6 +16,43 @@ struct Piece {
   std::uint64_t bytes;
   std::uint64_t offset;  ///< in the copy, a multiple of kSectionAlignment
 };
+
+constexpr bool is_wanted(SectionKind kind, Contents contents) {
+  switch (kind) {
+    case SectionKind::triangles:
+    case SectionKind::oriented_blocks:
+      return true;
+    case SectionKind::topology:
+    case SectionKind::components:
+      return contents != Contents::exact_queries;
+    case SectionKind::blocks:
+      return contents == Contents::all;
+    default:
+      return false;
+  }
+}
+
+/// Calls add(piece) for what of the file is to be copied, in the order of the file: sections that follow one
+/// another make one piece.
+template <typename Add>
+void for_each_piece(const AssetView& asset, Contents contents, const Add& add) {
+  const auto* bytes = reinterpret_cast<const unsigned char*>(asset.header);
+  if (contents == Contents::all && asset.levels.size() == asset.header->level_count)
+    return add(Piece{bytes, asset.header->file_bytes, 0});
+  std::uint64_t begin = 0, end = 0;  // of the piece in the making
+  for (const Section& section : asset.sections) {
+    const bool shown =
+        section.level >= asset.first_level && section.level - asset.first_level < asset.levels.size();
+    if (shown && is_wanted(section.kind, contents)) {
+      if (end == 0) begin = section.offset;
+      end = section.offset + section.bytes;
+    } else if (end != 0) {
+      add(Piece{bytes + begin, end - begin, 0});
+      end = 0;
+    }
+  }
+  if (end != 0) add(Piece{bytes + begin, end - begin, 0});
+}
 
 /// Places the pieces one behind the other; returns the bytes of the copy.
 inline std::uint64_t place(std::span<Piece> pieces) {

@@ -10,51 +10,22 @@
 namespace tandem {
 namespace {
 
-const unsigned char* bytes_of(const AssetView& asset) {
-  return reinterpret_cast<const unsigned char*>(asset.header);
-}
-
-bool is_wanted(SectionKind kind, Contents contents) {
-  switch (kind) {
-    case SectionKind::triangles:
-    case SectionKind::oriented_blocks:
-      return true;
-    case SectionKind::topology:
-    case SectionKind::components:
-      return contents != Contents::exact_queries;
-    default:
-      return contents == Contents::all;
-  }
-}
-
-// From the first section that is wanted to the last. A checked file's sections ascend.
-Piece of_wanted(const AssetView& asset, Contents contents) {
-  std::uint64_t begin = 0, end = 0;
-  for (const Section& section : asset.sections) {
-    if (!is_wanted(section.kind, contents)) continue;
-    if (end == 0) begin = section.offset;
-    end = section.offset + section.bytes;
-  }
-  return {bytes_of(asset) + begin, end - begin, 0};
-}
-
-Piece piece_of(const AssetView& asset, Contents contents) {
-  if (contents == Contents::all) return {bytes_of(asset), asset.header->file_bytes, 0};
-  return of_wanted(asset, contents);
-}
-
-// The same place of the copy of a piece; null where it is not in the piece.
+// The same place of the copy; null where no piece has it.
 template <typename Element>
-const Element* relocate(const Element* element, const Piece& piece, const unsigned char* copy) {
-  const auto at = reinterpret_cast<std::uintptr_t>(element),
-             from = reinterpret_cast<std::uintptr_t>(piece.from);
-  if (element == nullptr || at < from || at - from >= piece.bytes) return nullptr;
-  return reinterpret_cast<const Element*>(copy + piece.offset + (at - from));
+const Element* relocate(const Element* element, std::span<const Piece> pieces, const unsigned char* copy) {
+  const auto at = reinterpret_cast<std::uintptr_t>(element);
+  for (const Piece& piece : pieces) {
+    const auto from = reinterpret_cast<std::uintptr_t>(piece.from);
+    if (at >= from && at - from < piece.bytes)
+      return reinterpret_cast<const Element*>(copy + piece.offset + (at - from));
+  }
+  return nullptr;
 }
 
-LevelView copied_level(LevelView level, const Piece& piece, Contents contents, const unsigned char* copy) {
+LevelView copied_level(LevelView level, std::span<const Piece> pieces, Contents contents,
+                       const unsigned char* copy) {
   const auto copied = [&](auto*& elements, SectionKind kind) {
-    elements = is_wanted(kind, contents) ? relocate(elements, piece, copy) : nullptr;
+    elements = is_wanted(kind, contents) ? relocate(elements, pieces, copy) : nullptr;
   };
   copied(level.blocks, SectionKind::blocks);
   copied(level.triangles, SectionKind::triangles);
@@ -91,27 +62,37 @@ DeviceAssets& DeviceAssets::operator=(DeviceAssets&& other) noexcept {
 
 Status DeviceAssets::upload(std::span<const AssetView> assets, Contents contents, cudaStream_t stream) {
   free();
-  std::size_t levels = 0;
-  for (const AssetView& asset : assets) levels += asset.levels.size();
-  const std::unique_ptr<Piece[]> pieces = array_of<Piece>(assets.size());
+  std::size_t levels = 0, piece_count = 0;
+  for (const AssetView& asset : assets) {
+    levels += asset.levels.size();
+    for_each_piece(asset, contents, [&](const Piece&) { ++piece_count; });
+  }
+  const std::unique_ptr<Piece[]> pieces = array_of<Piece>(piece_count);
   first_level_ = array_of<std::size_t>(assets.size());
   levels_ = array_of<LevelView>(levels);
   if (pieces == nullptr || first_level_ == nullptr || levels_ == nullptr) {
     free();
     return Status::kOutOfMemory;
   }
-  for (std::size_t i = 0; i < assets.size(); ++i) pieces[i] = piece_of(assets[i], contents);
-  const cudaError_t error = copy_to(data_, {pieces.get(), assets.size()}, stream);
+  Piece* next = pieces.get();
+  for (const AssetView& asset : assets)
+    for_each_piece(asset, contents, [&](const Piece& piece) { *next++ = piece; });
+  const cudaError_t error = copy_to(data_, {pieces.get(), piece_count}, stream);
   if (error != cudaSuccess) {
     free();
     error_ = error;
     return status_of(error);
   }
   std::size_t level = 0;
+  const Piece* own = pieces.get();
   for (; count_ < assets.size(); ++count_) {
+    const AssetView& asset = assets[count_];
+    std::size_t own_count = 0;
+    for_each_piece(asset, contents, [&](const Piece&) { ++own_count; });
     first_level_[count_] = level;
-    for (std::uint32_t i = 0; i < assets[count_].levels.size(); ++i)
-      levels_[level++] = copied_level(assets[count_].level(i), pieces[count_], contents, data_.data());
+    for (std::uint32_t i = 0; i < asset.levels.size(); ++i)
+      levels_[level++] = copied_level(asset.level(i), {own, own_count}, contents, data_.data());
+    own += own_count;
   }
   return Status::kOk;
 }

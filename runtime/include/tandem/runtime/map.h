@@ -15,6 +15,11 @@ enum class Access : std::uint8_t {
 /// Owns the bytes of a .bvh file in CPU memory and hands out views of them. Movable, not copyable. Throws
 /// nothing.
 ///
+/// open() looks at every byte, of all levels of detail, since nothing of a file is believed unseen. Mapping
+/// copies nothing: pages are the system's, which takes them back when memory is scarce. Of a file of several
+/// levels open() gives them back itself (on Linux), so that of the process's memory the asset takes the pages
+/// of those levels alone that are used.
+///
 /// While an asset is mapped, nobody may write into its file or cut it short: what was checked would no longer
 /// hold, and reading a page that is gone ends a process. Tools that replace a file by a rename, as bvhbuild
 /// does, are safe. For a file already in memory there is nothing to own: call check() of

@@ -8,18 +8,12 @@
 
 #include "tandem/formats/check.h"
 #include "tandem/formats/gpu_memory.h"
+#include "tandem/runtime/contents.h"
 
 namespace tandem {
 
-/// What of an asset goes into GPU memory.
-enum class Contents : std::uint8_t {
-  all,            ///< the file as it is
-  exact_queries,  ///< triangles and oriented blocks: what queries of mode exact take, a third less
-  manifolds,      ///< these and topology: what contact manifolds take besides
-};
-
-/// Owns copies of assets in GPU memory: one allocation for all, the files' bytes as they are, each file from
-/// a multiple of 256 bytes on. Movable, not copyable. Throws nothing. Objects share nothing, so several
+/// Owns copies of assets in GPU memory: one allocation for all, bytes of files as they are, from multiples of
+/// 256 bytes on. Movable, not copyable. Throws nothing. Objects share nothing, so several
 /// threads may upload, each with its own.
 class DeviceAssets {
  public:
@@ -30,9 +24,9 @@ class DeviceAssets {
 
   /// Allocates on the current device, copies on `stream`, and returns when all is there and `stream` is done
   /// with what it held; what was uploaded before is freed. From 128 MiB on it copies by up to eight threads
-  /// of its own, which pin 4 MiB of CPU memory each meanwhile. Unless it is Contents::all the copy of a
-  /// file reaches from the first section that is wanted to the last; files by bvhbuild have nothing else
-  /// between them.
+  /// of its own, which pin 4 MiB of CPU memory each meanwhile. Of a file it copies the sections that are
+  /// wanted of the levels that its view shows (AssetView::levels_from()); Contents::all of all levels is the
+  /// whole file.
   /// Result: kOk, kOutOfGpuMemory, kOutOfMemory, or another that status_of() of gpu_status.h names: kNoGpu,
   /// kDriverTooOld, kGpuNotSupported, kCudaFailed; then nothing is held, and cuda_error() tells more.
   /// Condition: the assets are checked ones. Their bytes may be pageable (mapped files), and need not stay.
@@ -40,8 +34,8 @@ class DeviceAssets {
 
   void free();
 
-  /// Level `i` of an asset, by its place in the list, with pointers into GPU memory; null of what the file
-  /// lacks or `contents` left out. Condition: asset < count(), i < levels of the asset.
+  /// Level `i` of an asset's view, by its place in the list, with pointers into GPU memory; null of what the
+  /// file lacks or `contents` left out. Condition: asset < count(), i < levels of the view.
   LevelView level(std::size_t asset, std::uint32_t i = 0) const { return levels_[first_level_[asset] + i]; }
   std::size_t count() const { return count_; }  ///< assets; 0 after an error
   std::size_t bytes() const { return data_.bytes(); }

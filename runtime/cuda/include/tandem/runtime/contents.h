@@ -1,0 +1,13 @@
+#pragma once
+#include <cstdint>
+
+namespace tandem {
+
+/// What of the levels of an asset goes into GPU memory.
+enum class Contents : std::uint8_t {
+  all,            ///< all of them; of a whole file also what lies beside them
+  exact_queries,  ///< triangles and oriented blocks: what queries of mode exact take, a third less
+  manifolds,      ///< these and topology: what contact manifolds take besides
+};
+
+}  // namespace tandem

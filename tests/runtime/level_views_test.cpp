@@ -1,0 +1,191 @@
+// Views of runs of levels, and what of a file is copied to a GPU for them.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+#include <vector>
+
+#include "copy_plan.h"
+#include "gpu/made_files.h"
+#include "tandem/runtime/map.h"
+#include "temp_folder.h"
+
+namespace tandem {
+namespace {
+
+constexpr std::uint32_t kTriangles[] = {2001, 300, 20, 7};
+constexpr double kErrors[] = {0, 0.001, 0.01, 0.1};
+constexpr std::uint32_t kLevels = 4;
+
+/// Four levels; the coarser ones are the first triangles of the finest.
+test::Bytes four_levels() {
+  const test::Mesh finest = test::random_mesh(kTriangles[0], 5);
+  std::vector<test::MadeLevel> levels;
+  for (std::uint32_t i = 0; i < kLevels; ++i) {
+    test::Mesh mesh = finest;
+    mesh.triangles.resize(kTriangles[i]);
+    mesh.points.resize(3 * kTriangles[i]);
+    levels.push_back(test::built_level(mesh, kErrors[i]));
+  }
+  return test::made_file(levels);
+}
+
+void expect_same(const LevelView& view, const LevelView& expected) {
+  EXPECT_EQ(view.blocks, expected.blocks);
+  EXPECT_EQ(view.triangles, expected.triangles);
+  EXPECT_EQ(view.oriented_blocks, expected.oriented_blocks);
+  EXPECT_EQ(view.topology, expected.topology);
+  EXPECT_EQ(view.components, expected.components);
+  EXPECT_EQ(view.triangle_count, expected.triangle_count);
+  EXPECT_EQ(view.number, expected.number);
+  EXPECT_EQ(view.error_bound, expected.error_bound);
+}
+
+TEST(LevelViews, ShowARunOfLevelsFromAnyOnThatOthersTakeAsLevel0) {
+  const test::Bytes file = four_levels();
+  const AssetView all = file.check().asset;
+  for (std::uint32_t first = 0; first < kLevels; ++first) {
+    for (std::uint32_t count = 1; count <= kLevels + 1; ++count) {
+      const AssetView view = all.levels_from(first, count);
+      ASSERT_EQ(view.levels.size(), std::min(count, kLevels - first));
+      for (std::uint32_t i = 0; i < view.levels.size(); ++i) {
+        expect_same(view.level(i), all.level(first + i));
+        expect_same(view.levels_from(i).level(), all.level(first + i));
+        EXPECT_EQ(view.level(i).number, first + i);
+        EXPECT_EQ(view.level(i).triangle_count, kTriangles[first + i]);
+      }
+    }
+    EXPECT_EQ(all.levels_from(first).levels.size(), kLevels - first);
+  }
+}
+
+TEST(LevelViews, NameTheCoarsestLevelWithinATolerance) {
+  const test::Bytes file = four_levels();
+  const AssetView all = file.check().asset;
+  EXPECT_EQ(all.coarsest_level(0), 0u);
+  EXPECT_EQ(all.coarsest_level(std::nextafter(0.001, 0)), 0u);
+  EXPECT_EQ(all.coarsest_level(0.001), 1u);
+  EXPECT_EQ(all.coarsest_level(0.05), 2u);
+  EXPECT_EQ(all.coarsest_level(0.1), 3u);
+  EXPECT_EQ(all.coarsest_level(1e300), 3u);
+  EXPECT_EQ(all.coarsest_level(-1), 0u);
+  EXPECT_EQ(all.coarsest_level(std::nan("")), 0u);
+  EXPECT_EQ(all.levels_from(1).coarsest_level(0.05), 1u);
+  EXPECT_EQ(all.levels_from(1).coarsest_level(0), 0u);
+  EXPECT_EQ(all.levels_from(0, 2).coarsest_level(1), 1u);
+}
+
+std::vector<Piece> pieces_of(const AssetView& view, Contents contents) {
+  std::vector<Piece> pieces;
+  for_each_piece(view, contents, [&](const Piece& piece) { pieces.push_back(piece); });
+  return pieces;
+}
+
+std::uint64_t wanted_bytes(const AssetView& view, Contents contents) {
+  std::uint64_t bytes = 0;
+  for (std::uint32_t i = 0; i < view.levels.size(); ++i) {
+    const LevelView level = view.level(i);
+    bytes += level.triangle_count * sizeof(Triangle) + level.block_count * sizeof(OrientedBlock);
+    if (contents == Contents::all) bytes += level.block_count * sizeof(Block);
+    if (contents == Contents::exact_queries) continue;
+    bytes +=
+        level.triangle_count * sizeof(TriangleTopology) + level.component_count * sizeof(SurfaceComponent);
+  }
+  return bytes;
+}
+
+bool is_in(const std::vector<Piece>& pieces, const void* element) {
+  const auto* at = static_cast<const unsigned char*>(element);
+  return std::any_of(pieces.begin(), pieces.end(),
+                     [&](const Piece& piece) { return at >= piece.from && at < piece.from + piece.bytes; });
+}
+
+TEST(LevelViews, AreCopiedWithoutTheOtherLevels) {
+  const test::Bytes file = four_levels();
+  const AssetView all = file.check().asset;
+  for (const Contents contents : {Contents::all, Contents::exact_queries, Contents::manifolds}) {
+    for (std::uint32_t first = 0; first < kLevels; ++first) {
+      for (std::uint32_t count = 1; count <= kLevels - first; ++count) {
+        const AssetView view = all.levels_from(first, count);
+        if (contents == Contents::all && count == kLevels) continue;
+        const std::vector<Piece> pieces = pieces_of(view, contents);
+        std::uint64_t bytes = 0;
+        for (const Piece& piece : pieces) {
+          bytes += piece.bytes;
+          EXPECT_EQ((piece.from - reinterpret_cast<const unsigned char*>(all.header)) % kSectionAlignment, 0);
+        }
+        EXPECT_GE(bytes, wanted_bytes(view, contents));
+        EXPECT_LT(bytes, wanted_bytes(view, contents) + 5 * count * kSectionAlignment);
+        for (std::uint32_t i = 0; i < kLevels; ++i) {
+          const bool shown = i >= first && i < first + count;
+          const LevelView level = all.level(i);
+          EXPECT_EQ(is_in(pieces, level.triangles), shown);
+          EXPECT_EQ(is_in(pieces, level.triangles + level.triangle_count - 1), shown);
+          EXPECT_EQ(is_in(pieces, level.oriented_blocks), shown);
+          EXPECT_EQ(is_in(pieces, level.blocks), shown && contents == Contents::all);
+          EXPECT_EQ(is_in(pieces, level.topology), shown && contents != Contents::exact_queries);
+        }
+      }
+    }
+  }
+}
+
+TEST(LevelViews, OfAWholeFileAreCopiedAsItIs) {
+  const test::Bytes file = four_levels();
+  const AssetView all = file.check().asset;
+  const std::vector<Piece> pieces = pieces_of(all, Contents::all);
+  ASSERT_EQ(pieces.size(), 1u);
+  EXPECT_EQ(pieces[0].bytes, all.header->file_bytes);
+  EXPECT_TRUE(is_in(pieces, all.header));
+}
+
+/// Bytes of the mapping at an address that lie in the process's memory.
+std::uint64_t resident_bytes(const void* mapping) {
+  std::ifstream maps("/proc/self/smaps");
+  std::ostringstream begin;
+  begin << std::hex << reinterpret_cast<std::uintptr_t>(mapping) << '-';
+  for (std::string line; std::getline(maps, line);) {
+    if (!line.starts_with(begin.str())) continue;
+    while (std::getline(maps, line) && !line.starts_with("Rss:")) {
+    }
+    return 1024 * std::stoull(line.substr(4));
+  }
+  return ~std::uint64_t{0};
+}
+
+TEST(LevelViews, TakeMemoryOfTheProcessForTheLevelsThatAreUsed) {
+#ifndef __linux__
+  GTEST_SKIP() << "no /proc/self/smaps here";
+#else
+  std::vector<test::MadeLevel> levels;
+  for (const std::uint32_t triangles : {120'000u, 100u}) {
+    test::Mesh mesh = test::random_mesh(120'000, 5);
+    mesh.triangles.resize(triangles);
+    levels.push_back({mesh,
+                      build::build_tree(mesh.geometry(), build::Imaginary::minimal, build::Effort::fast),
+                      levels.empty() ? 0.0 : 0.5});
+  }
+  const test::Bytes bytes = test::made_file(levels);
+  const test::TempFolder folder;
+  const std::string path =
+      folder.write("a.bvh", {reinterpret_cast<const char*>(bytes.check().asset.header), bytes.size()})
+          .string();
+  MappedAsset asset;
+  ASSERT_EQ(asset.open(path.c_str()), Status::kOk);
+  ASSERT_TRUE(asset.is_mapped());
+  const auto touch = [](const LevelView& level) {
+    float sum = 0;
+    for (std::uint32_t t = 0; t < level.triangle_count; ++t) sum += level.triangles[t].corner[0].position[0];
+    return sum;
+  };
+  EXPECT_GT(touch(asset.view().level(1)), 0);
+  // A page brings its neighbours along, up to 2 MiB of them where the file system keeps them together.
+  EXPECT_LT(resident_bytes(asset.data()), bytes.size() / 2);
+  const std::uint64_t before = resident_bytes(asset.data());
+  EXPECT_GT(touch(asset.view().level(0)), 0);
+  EXPECT_GT(resident_bytes(asset.data()), before);
+#endif
+}
+
+}  // namespace
+}  // namespace tandem

@@ -105,8 +105,8 @@ std::uint32_t rock_side_for(std::uint64_t triangles) {
 }
 
 Mesh rock(std::uint32_t side, std::uint32_t seed) {
-  constexpr Point kRadii = {0.5, 0.4, 0.32};   // metres
-  constexpr double kScannerNoise = 3e-4;       // of the radius
+  constexpr Point kRadii = {0.5, 0.4, 0.32};  // metres
+  constexpr double kScannerNoise = 3e-4;      // of the radius
   Octahedron octahedron(side);
   Mesh mesh;
   mesh.triangles = std::move(octahedron.triangles);
@@ -115,8 +115,7 @@ Mesh rock(std::uint32_t side, std::uint32_t seed) {
     const Point from_centre = {static_cast<double>(at[0]), static_cast<double>(at[1]),
                                static_cast<double>(at[2])};
     const Point direction = 1 / length(from_centre) * from_centre;
-    const double radius =
-        radius_along(direction, seed) + kScannerNoise * lattice_value(at, seed + kScanner);
+    const double radius = radius_along(direction, seed) + kScannerNoise * lattice_value(at, seed + kScanner);
     mesh.points.push_back({radius * kRadii[0] * direction[0], radius * kRadii[1] * direction[1],
                            radius * kRadii[2] * direction[2]});
   }

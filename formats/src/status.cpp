@@ -111,6 +111,8 @@ constexpr Entry kEntries[] = {
      "an asset was uploaded for exact queries alone, and this mode walks its axis-aligned blocks"},
     {Status::kNoTopology, "NoTopology", nullptr,
      "an asset has no topology, which contact manifolds need: build it without --no-topology"},
+    {Status::kNoFinestLevel, "NoFinestLevel", nullptr,
+     "a query by tolerance needs the finest level, and the asset was given without"},
     {Status::kNoGpu, "NoGpu", nullptr, "there is no GPU that can be used"},
     {Status::kDriverTooOld, "DriverTooOld", nullptr, "the GPU's driver is too old for this program"},
     {Status::kGpuNotSupported, "GpuNotSupported", nullptr,

@@ -8,6 +8,7 @@
 #include "tandem/kernels/detail/block_pair.h"
 #include "tandem/kernels/detail/grid_test.h"
 #include "tandem/kernels/detail/instance_check.h"
+#include "tandem/kernels/detail/level_error.h"
 #include "worker_threads.h"
 
 namespace tandem {
@@ -134,9 +135,11 @@ Status ContactQuery::State::pose_from(std::span<const Instance> posed, std::size
     const Status status = pose_instance(assets.data(), asset_count, instance.asset, instance.pose,
                                         instances[at].pose, boxes[at]);
     if (status != Status::kOk) return status;
-    instances[at].tree = assets[instance.asset].tree;
-    instances[at].extent = assets[instance.asset].extent;
-    instances[at].grid = assets[instance.asset].grid;
+    const Asset& asset = assets[instance.asset];
+    instances[at].tree = asset.tree;
+    instances[at].extent = asset.extent;
+    instances[at].grid = asset.grid;
+    instances[at].error = posed_level_error(asset.tree, asset.lower, asset.upper, instances[at].pose);
   }
   return Status::kOk;
 }
@@ -167,7 +170,8 @@ Status ContactQuery::State::pose_instances(std::span<const Instance> posed) {
 }
 
 // Boxes within reach of each other meet when each is larger by half of it; or one by all of it where the
-// other is kept, which is kept for any reach.
+// other is kept, which is kept for any reach. Errors of levels need no more: a world box is made of bounds
+// that hold all levels, the finest one too, which is what the query is about.
 void ContactQuery::State::grow_boxes(std::size_t count) {
   if (!(options.within > 0)) return;
   const double margin = broad_phase.kept_of() != 0 ? options.within : 0.5 * options.within;
@@ -221,7 +225,10 @@ bool ContactQuery::State::provide_workers() {
 }
 
 PairTask ContactQuery::State::task_of(std::uint32_t pair) const {
-  PairTask task = pair_task(instances[pairs[pair].a], instances[pairs[pair].b], options.within);
+  const PosedTree &a = instances[pairs[pair].a], &b = instances[pairs[pair].b];
+  const bool adds_errors = options.add_error_bounds && &a != &b;
+  const double within = adds_errors ? clearance_of_levels(options.within, a.error, b.error) : options.within;
+  PairTask task = pair_task(a, b, within);
   task.pair = pair;
   task.mode = options.mode;
   task.first_contact_only = options.first_contact_only;

@@ -16,8 +16,9 @@ namespace tandem {
 struct PosedTree {
   LevelView tree;
   TreeExtent extent;
-  double grid;  ///< grid_of() the tree
-  Pose pose;    ///< of stored coordinates
+  double grid;       ///< grid_of() the tree
+  Pose pose;         ///< of stored coordinates
+  double error = 0;  ///< posed_level_error()
 };
 
 /// An object pair, and what is asked about it.

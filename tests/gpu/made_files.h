@@ -20,7 +20,8 @@ inline MadeLevel built_level(const Mesh& mesh, double error_bound = 0) {
 }
 
 /// A file of these levels, all of whose faces are in one part. Source face i is triangle i of its mesh.
-inline Bytes made_file(std::span<const MadeLevel> levels, bool oriented = true, bool with_topology = true) {
+inline build::Image made_image(std::span<const MadeLevel> levels, bool oriented = true,
+                               bool with_topology = true) {
   std::vector<std::vector<OrientedBlock>> blocks(levels.size());
   std::vector<std::vector<std::uint32_t>> faces(levels.size());
   std::vector<build::SurfaceTopology> topology(levels.size());
@@ -40,7 +41,11 @@ inline Bytes made_file(std::span<const MadeLevel> levels, bool oriented = true, 
   const build::SourcePart part = {"all", "", 0, source.source_faces};
   source.parts = {&part, 1};
   source.provenance = "{}";
-  return Bytes(build::assemble(source, rows));
+  return build::assemble(source, rows);
+}
+
+inline Bytes made_file(std::span<const MadeLevel> levels, bool oriented = true, bool with_topology = true) {
+  return Bytes(made_image(levels, oriented, with_topology));
 }
 
 /// A tree as deep as asked for: of the four children of an internal block three are leaf blocks.

@@ -75,6 +75,7 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kNoOrientedBlocks,     ///< exact queries on a GPU need them, and the asset was given without
     kNoAxisAlignedBlocks,  ///< the other modes of queries on a GPU need them, and the asset was given without
     kNoTopology,           ///< contact manifolds need it, and the file has none
+    kNoFinestLevel,        ///< queries by tolerance need it, and the view leaves it out
     // On a GPU; status_of() of gpu_status.h names CUDA's errors.
     kNoGpu,            ///< none here, none that this process may use, or no driver
     kDriverTooOld,     ///< for the CUDA version that the program was built with

@@ -45,6 +45,11 @@ struct QueryOptions {
   /// too; candidates are triangles whose boxes are within it. 0: those that meet. From 0 to
   /// kLargestWorldCoordinate, else kOutOfRange.
   double within = 0;
+  /// Levels of detail: each object pair is asked for a clearance that is larger by what its two levels may
+  /// differ from the finest ones (docs/levels.md). The finest surfaces of a pair without a contact, and of
+  /// two instances that are not found as a pair, are then surely farther apart than `within`, or with 0 do
+  /// not meet. Pairs of finest levels, and pairs of an instance with itself, are decided as without.
+  bool add_error_bounds = false;
 };
 
 /// What a query did. The counters depend neither on the number of threads nor on the machine.
@@ -71,9 +76,10 @@ class ContactQuery {
   ContactQuery& operator=(ContactQuery&&) noexcept;
   ~ContactQuery();
 
-  /// Names the assets that instances refer to. Queries use level 0 of each; what the views point to must
-  /// outlive the queries. Result: kOk; kUnknownAsset, where a view points to nothing and where() is its place
-  /// in the list; or kOutOfMemory. After an error there are no assets.
+  /// Names the assets that instances refer to. Queries use level 0 of each view, which may be any of the file
+  /// (AssetView::levels_from()); what the views point to must outlive the queries. Result: kOk;
+  /// kUnknownAsset, where a view points to nothing and where() is its place in the list; or kOutOfMemory.
+  /// After an error there are no assets.
   Status set_assets(std::span<const AssetView> assets);
 
   /// Keeps the instances whose motion is fixed as they stand: calls to come, which must be of as many

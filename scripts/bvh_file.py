@@ -22,6 +22,7 @@ COMPONENT = np.dtype([("first_triangle", "<u4"), ("triangles", "<u4"), ("flags",
 KINDS = {1: ("levels", LEVEL), 2: ("blocks", BLOCK), 3: ("triangles", TRIANGLE), 4: ("parts", PART),
          5: ("strings", np.dtype("u1")), 6: ("provenance", np.dtype("u1")), 7: ("oriented_blocks", ORIENTED_BLOCK),
          8: ("topology", TOPOLOGY), 9: ("components", COMPONENT)}
+OF_A_LEVEL = ("blocks", "triangles", "oriented_blocks", "topology", "components")
 INTERNAL, LEAF, IMAGINARY = 0, 1, 2
 NO_INDEX = 0xFFFFFFFF
 LEAF_BLOCK = 1 << 31
@@ -33,8 +34,9 @@ assert ORIENTED_BLOCK.itemsize == 112 and TOPOLOGY.itemsize == COMPONENT.itemsiz
 
 @dataclasses.dataclass
 class BvhFile:
-    """One file; level 0 only. Corner positions are relative to `origin`."""
+    """One file, as seen at one of its levels. Corner positions are relative to `origin`."""
     raw: bytes
+    level: int
     hash: int
     origin: np.ndarray
     lower: np.ndarray
@@ -69,27 +71,29 @@ class BvhFile:
         return self.triangles["corner"]["w"][:, 1]
 
 
-def read(path):
+def read(path, level=0):
     with open(path, "rb") as file:
-        return parse(file.read())
+        return parse(file.read(), level)
 
 
-def parse(raw):
+def parse(raw, wanted=0):
     (magic, content_hash, order, major, minor, size, ox, oy, oz, *rest) = HEADER.unpack_from(raw)
     lower, upper = rest[0:3], rest[3:6]
     source_faces, rounding_error, section_count, level_count, reserved = rest[6:]
     assert magic == MAGIC and order == 0x01020304 and (major, minor) == (1, 0)
-    assert size == len(raw) and reserved == bytes(24) and level_count == 1
+    assert size == len(raw) and reserved == bytes(24) and wanted < level_count <= 32
     found = {}
     end = HEADER.size + section_count * SECTION.size
     for i in range(section_count):
         kind, level, offset, length, count = SECTION.unpack_from(raw, HEADER.size + i * SECTION.size)
         name, dtype = KINDS[kind]
-        assert level == 0 and offset % 256 == 0 and offset >= end and length == count * dtype.itemsize
+        assert level < level_count and offset % 256 == 0 and offset >= end and length == count * dtype.itemsize
         assert not any(raw[end:offset]), "gaps are zero"
+        end = offset + length
+        if level != wanted and name in OF_A_LEVEL:
+            continue
         assert name not in found
         found[name] = np.frombuffer(raw, dtype, count, offset)
-        end = offset + length
     assert not any(raw[end:])
     strings = found["strings"].tobytes() if "strings" in found else b""
 
@@ -98,7 +102,8 @@ def parse(raw):
 
     parts = [(text(p["name_offset"], p["name_bytes"]), text(p["path_offset"], p["path_bytes"]),
               int(p["first_face"]), int(p["face_count"])) for p in found["parts"]]
-    return BvhFile(raw, content_hash, np.array([ox, oy, oz]), np.array(lower, np.float32), np.array(upper, np.float32),
+    assert len(found["levels"]) == level_count
+    return BvhFile(raw, wanted, content_hash, np.array([ox, oy, oz]), np.array(lower, np.float32), np.array(upper, np.float32),
                    source_faces, rounding_error, found["levels"], found["blocks"], found["triangles"],
                    found.get("oriented_blocks"), found.get("topology"), found.get("components"), parts,
                    json.loads(found["provenance"].tobytes()))
@@ -189,7 +194,7 @@ def defects_of_tree(file):
         defects.append("the leaves do not name the triangles one after the other")
     if visited != len(file.blocks):
         defects.append("not every block is reached")
-    if max(depths) != file.levels[0]["depth"]:
+    if max(depths) != file.levels[file.level]["depth"]:
         defects.append("the depth is not what the level says")
     return defects
 
@@ -321,7 +326,7 @@ def defects_of_topology(file):
     vertex = _numbered(file.corners.reshape(-1, 3) + np.float32(0)).reshape(n, 3)
     if (file.topology["vertex"] != vertex).any():
         defects.append("vertices are not the positions, numbered as they appear")
-    if file.levels[0]["vertices"] != vertex.max() + 1:
+    if file.levels[file.level]["vertices"] != vertex.max() + 1:
         defects.append("the level says another number of vertices")
     start, end = vertex.ravel(), np.roll(vertex, -1, axis=1).ravel()
     side = np.flatnonzero(start != end)
@@ -345,7 +350,7 @@ def defects_of_topology(file):
     wanted = np.stack([first, count, closed, np.zeros_like(first)], 1)
     if file.components.view("<u4").reshape(-1, 4).tolist() != wanted.tolist():
         defects.append("components are not what edges join, closed where each is run along both ways")
-    if file.levels[0]["flags"] != closed.all():
+    if file.levels[file.level]["flags"] != closed.all():
         defects.append("the level is closed where all components are, and says otherwise")
     if (2 * np.bincount(component, turned, n)[first] > count)[~closed].any():
         defects.append("more than half of an open component is turned")

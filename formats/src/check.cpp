@@ -181,8 +181,13 @@ CheckResult check_parts(const AssetView& asset) {
   return {};
 }
 
-Status check_bounds(const FileHeader& header, const LevelView& level) {
+struct Bounds {
   float lower[3], upper[3];
+};
+
+Bounds bounds_of(const LevelView& level) {
+  Bounds bounds;
+  auto& [lower, upper] = bounds;
   std::memcpy(lower, level.triangles[0].corner[0].position, sizeof lower);
   std::memcpy(upper, lower, sizeof upper);
   for (std::uint32_t t = 0; t < level.triangle_count; ++t) {
@@ -193,10 +198,22 @@ Status check_bounds(const FileHeader& header, const LevelView& level) {
       }
     }
   }
-  for (int k = 0; k < 3; ++k) {
-    if (lower[k] != header.lower[k] || upper[k] != header.upper[k]) return Status::kBoundsMismatch;
+  return bounds;
+}
+
+// The header has the bounds of level 0, and the other levels lie within them.
+CheckResult check_bounds(const AssetView& asset) {
+  const FileHeader& header = *asset.header;
+  for (std::uint32_t i = 0; i < asset.levels.size(); ++i) {
+    const auto [lower, upper] = bounds_of(asset.level(i));
+    for (int k = 0; k < 3; ++k) {
+      if (i == 0 && !(lower[k] == header.lower[k] && upper[k] == header.upper[k]))
+        return {Status::kBoundsMismatch, 0, {}};
+      if (!(lower[k] >= header.lower[k] && upper[k] <= header.upper[k]))
+        return {Status::kLevelOutsideBounds, i, {}};
+    }
   }
-  return Status::kOk;
+  return {};
 }
 
 }  // namespace
@@ -232,7 +249,7 @@ CheckResult check(const void* data_pointer, std::size_t bytes, CheckDepth depth)
     if (step.status == Status::kOk && level.topology != nullptr)
       step = check_topology(level, depth, header.hash);
   }
-  if (step.status == Status::kOk) step.status = check_bounds(header, asset.level(0));
+  if (step.status == Status::kOk) step = check_bounds(asset);
   return step.status == Status::kOk ? result : step;
 }
 

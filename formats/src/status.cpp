@@ -74,6 +74,8 @@ constexpr Entry kEntries[] = {
     {Status::kBadFace, "BadFace", "block", "a triangle names a source face or part that does not exist"},
     {Status::kBoundsMismatch, "BoundsMismatch", nullptr,
      "the header's bounds are not those of the triangles"},
+    {Status::kLevelOutsideBounds, "LevelOutsideBounds", "level",
+     "a coarser level reaches beyond the bounds of the finest"},
     {Status::kOrientedBlockMismatch, "OrientedBlockMismatch", "oriented block",
      "an oriented block names other children or triangles than the block that it belongs to"},
     {Status::kBadRotation, "BadRotation", "oriented block",

@@ -201,7 +201,8 @@ TEST(CheckOriented, NamesSectionsThatAreNone) {
 }
 
 TEST(CheckOriented, EachLevelHasItsOwnBlocksOrNone) {
-  const Mesh fine = random_mesh(40, 1), coarse = random_mesh(10, 2);
+  const std::vector<Mesh> meshes = test::random_levels(40, 2, 1);
+  const Mesh &fine = meshes[0], &coarse = meshes[1];
   const build::Tree fine_tree = build::build_tree(fine.geometry(), build::Imaginary::minimal);
   const build::Tree coarse_tree = build::build_tree(coarse.geometry(), build::Imaginary::minimal);
   const auto fine_blocks = build::orient_blocks(fine.geometry(), fine_tree, build::Effort::standard);

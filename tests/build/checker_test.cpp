@@ -437,29 +437,6 @@ TEST(Check, RejectsATreePastTheDepthLimit) {
   }
 }
 
-TEST(Check, AcceptsSeveralLevelsOfDetailAndRejectsErrorsThatFall) {
-  const test::Mesh fine = random_mesh(40, 1), coarse = random_mesh(10, 2);
-  const build::Tree fine_tree = build::build_tree(fine.geometry(), build::Imaginary::minimal);
-  const build::Tree coarse_tree = build::build_tree(coarse.geometry(), build::Imaginary::minimal);
-  const std::vector<std::uint32_t> face(40, 0);
-  const std::vector<build::SourcePart> parts = {{"all", "", 0, 1}};
-  build::AssetSource source;
-  source.source_faces = 1;
-  source.parts = parts;
-  const build::AssetLevel levels[] = {{fine.geometry(), face, &fine_tree, {}, 0},
-                                      {coarse.geometry(), face, &coarse_tree, {}, 0.5}};
-  Bytes file(build::assemble(source, levels));
-  const CheckResult result = file.check();
-  ASSERT_EQ(result.status, Status::kOk) << name(result.status);
-  EXPECT_EQ(result.asset.level(1).triangle_count, 10u);
-  EXPECT_EQ(result.asset.level(1).error_bound, 0.5);
-  EXPECT_NE(result.asset.level(0).blocks, result.asset.level(1).blocks);
-  for (const double bound : {-0.5, std::numeric_limits<double>::infinity()}) {
-    file.elements<Level>(SectionKind::levels)[1].error_bound = bound;
-    EXPECT_EQ(file.check_sealed(), Status::kBadLevel) << bound;
-  }
-}
-
 TEST(Check, AcceptsSectionsInAnyOrderAndEmptyTextsAnywhereInTheStrings) {
   Bytes file = sample();
   std::swap(file.section(SectionKind::strings).kind, file.section(SectionKind::provenance).kind);

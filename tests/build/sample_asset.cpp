@@ -48,6 +48,43 @@ build::Image make_file(const Mesh& mesh, const build::Tree& tree, build::Effort 
   return build::assemble(source, {&level, 1});
 }
 
+build::Image make_file_of_levels(std::span<const Mesh> meshes) {
+  const std::size_t faces = meshes[0].triangles.size();
+  std::vector<std::uint32_t> face(faces);
+  std::iota(face.begin(), face.end(), 0u);
+  const std::vector<build::SourcePart> parts = {{"all", "", 0, faces}};
+  build::AssetSource source;
+  source.source_faces = faces;
+  source.parts = parts;
+  source.provenance = "{\"tool\":\"test\"}";
+  struct Built {
+    build::Tree tree;
+    std::vector<OrientedBlock> oriented_blocks;
+    build::SurfaceTopology topology;
+  };
+  std::vector<Built> built;
+  for (const Mesh& mesh : meshes) {
+    build::Tree tree = build::build_tree(mesh.geometry());
+    auto oriented_blocks = build::orient_blocks(mesh.geometry(), tree, build::Effort::standard);
+    auto topology = build::make_topology(mesh.geometry(), tree);
+    built.push_back({std::move(tree), std::move(oriented_blocks), std::move(topology)});
+  }
+  std::vector<build::AssetLevel> levels;
+  for (std::size_t i = 0; i < meshes.size(); ++i)
+    levels.push_back({meshes[i].geometry(), face, &built[i].tree, built[i].oriented_blocks,
+                      static_cast<double>(i), &built[i].topology});
+  return build::assemble(source, levels);
+}
+
+std::vector<Mesh> random_levels(std::uint32_t triangles, std::uint32_t levels, std::uint64_t seed) {
+  std::vector<Mesh> meshes = {random_mesh(triangles, seed)};
+  while (meshes.size() < levels) {
+    meshes.push_back(meshes.back());
+    meshes.back().triangles.resize((meshes.back().triangles.size() + 1) / 2);
+  }
+  return meshes;
+}
+
 build::Tree deepest_tree(const Mesh& mesh) {
   build::Topology topology;
   std::uint32_t triangle = 0;

@@ -2,6 +2,7 @@
 #include <array>
 #include <cstring>
 #include <new>
+#include <span>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -30,6 +31,13 @@ build::Image make_file(const Mesh& mesh, build::Imaginary imaginary = build::Ima
                        build::Effort effort = build::Effort::standard);
 build::Image make_file(const Mesh& mesh, const build::Tree& tree,
                        build::Effort effort = build::Effort::standard);
+
+/// A file of several levels, each with all sections that a level can have; level i has the error bound i.
+/// Conditions: the first mesh has at least as many triangles as each of the others, and its bounds hold them.
+build::Image make_file_of_levels(std::span<const Mesh> meshes);
+
+/// Triangles of random_mesh() and, as coarser levels, fewer and fewer of them.
+std::vector<Mesh> random_levels(std::uint32_t triangles, std::uint32_t levels, std::uint64_t seed);
 
 /// A tree as deep as the format allows: each block above the lowest has three leaf blocks below it and one
 /// that goes on.

@@ -39,6 +39,15 @@ CLI::Validator imaginary_share() {
       "");
 }
 
+CLI::Validator level_errors() {
+  return CLI::Validator(
+      [](const std::string& text) {
+        std::vector<LevelError> errors;
+        return parse_level_errors(text, errors);
+      },
+      "");
+}
+
 void add_options(CLI::App& app, Options& options, double& memory_gib, double& expansion) {
   app.add_option("MESH", options.input,
                  "mesh file: OBJ, PLY, STL, OFF, glTF/GLB, DAE and what else assimp reads")
@@ -63,6 +72,13 @@ void add_options(CLI::App& app, Options& options, double& memory_gib, double& ex
   app.add_flag_callback(
       "--no-topology", [&options] { options.topology = false; },
       "leave out how triangles hang together, which contact manifolds need: 16 bytes a triangle");
+  app.add_option_function<std::string>(
+         "--levels", [&options](const std::string& text) { parse_level_errors(text, options.levels); },
+         "coarser levels of the mesh, each proved to be at most so far from the finest: lengths, or with % "
+         "of "
+         "the diagonal of its bounds, ascending; 'auto' is 0.1%,0.3%,1%,3%")
+      ->check(level_errors())
+      ->option_text("E1,E2,...|auto");
   app.add_flag("--strict", options.strict, "take anything dropped or found amiss in the mesh for an error");
   app.add_flag("--json", options.json, "print the report as JSON");
   app.add_flag("-q,--quiet", options.quiet, "print nothing but errors");

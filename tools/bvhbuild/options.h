@@ -2,8 +2,10 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "bvhbuild/import/import.h"
+#include "bvhbuild/levels/level_errors.h"
 #include "bvhbuild/tree/tree.h"
 #include "common/exit_code.h"
 
@@ -14,8 +16,9 @@ struct Options {
   std::filesystem::path input, output;
   Imaginary imaginary = Imaginary::minimal;
   Effort effort = Effort::standard;
-  bool gpu_blocks = true;  ///< the file gets oriented blocks
-  bool topology = true;    ///< the file gets topology
+  bool gpu_blocks = true;          ///< the file gets oriented blocks
+  bool topology = true;            ///< the file gets topology
+  std::vector<LevelError> levels;  ///< the errors of levels beyond the finest
   ImportOptions import;
   bool strict = false;
   bool json = false;

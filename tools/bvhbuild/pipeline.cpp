@@ -3,7 +3,6 @@
 #include <oneapi/tbb/global_control.h>
 
 #include <chrono>
-#include <optional>
 #include <stdexcept>
 #include <thread>
 
@@ -12,12 +11,11 @@
 #include "bvhbuild/meshing/stored_mesh.h"
 #include "bvhbuild/meshing/triangulate.h"
 #include "bvhbuild/tree/assemble.h"
-#include "bvhbuild/tree/oriented_blocks.h"
-#include "bvhbuild/tree/surface_topology.h"
 #include "common/number_words.h"
 #include "common/output_file.h"
 #include "common/printable.h"
 #include "interrupt.h"
+#include "level_pipeline.h"
 #include "progress.h"
 #include "provenance.h"
 #include "tandem/formats/check.h"
@@ -103,36 +101,29 @@ StoredMesh prepare(PolygonMesh& polygons, Outcome& outcome) {
   return mesh;
 }
 
-Tree build_watched(const Geometry& geometry, const Options& options, Progress& progress, Outcome& outcome) {
-  OptimisationWatch watch;
-  watch.progress = [&](double share) { progress.share(share); };
-  const StopOnInterrupt interrupt(options.effort == Effort::best ? &watch.stop : nullptr);
-  Tree tree = build_tree(geometry, options.imaginary, options.effort, watch);
-  outcome.interrupted = watch.stop;
-  return tree;
-}
-
-// Builds the tree and the file's bytes, and has the checker prove both: what this program writes, every other
-// one can load.
+// Builds the levels and the file's bytes, and has the checker prove both: what this program writes, every
+// other one can load.
 Image build_image(const Options& options, const PolygonMesh& polygons, const StoredMesh& mesh,
                   Progress& progress, Outcome& outcome) {
   const Stopwatch stopwatch(outcome.seconds.build);
-  const Geometry geometry{mesh.points, mesh.triangles};
-  const Tree tree = build_watched(geometry, options, progress, outcome);
+  OptimisationWatch watch;
+  watch.progress = [&](double share) { progress.share(share); };
+  const StopOnInterrupt interrupt(options.effort == Effort::best ? &watch.stop : nullptr);
+  std::vector<BuiltLevel> levels;
+  levels.push_back(build_level({mesh.points, mesh.triangles}, options, watch));
+  levels[0].face = mesh.face;
+  if (!options.levels.empty()) add_levels(options, mesh, watch, levels, outcome);
+  outcome.interrupted = watch.stop;
+
   AssetSource source;
   source.origin = mesh.origin;
   source.rounding_error = mesh.largest_rounding_error;
   source.source_faces = outcome.clean.faces;
   source.parts = polygons.parts;
   source.provenance = provenance_json(options, outcome);
-  std::vector<OrientedBlock> oriented_blocks;
-  if (options.gpu_blocks && geometry.triangles.size() < kMostOrientedTriangles)
-    oriented_blocks = orient_blocks(geometry, tree, options.effort);
-  std::optional<SurfaceTopology> topology;
-  if (options.topology && geometry.triangles.size() < kMostTopologyTriangles)
-    topology = make_topology(geometry, tree);
-  const AssetLevel level{geometry, mesh.face, &tree, oriented_blocks, 0, topology ? &*topology : nullptr};
-  Image image = assemble(source, {&level, 1});
+  std::vector<AssetLevel> rows;
+  for (const BuiltLevel& level : levels) rows.push_back(level.row(options));
+  Image image = assemble(source, rows);
 
   const CheckResult checked = check(image.data(), image.size());
   if (checked.status != Status::kOk) {
@@ -144,6 +135,7 @@ Image build_image(const Options& options, const PolygonMesh& polygons, const Sto
   outcome.topology = checked.asset.level().topology != nullptr;
   outcome.hash = hexadecimal(header.hash);
   outcome.file_bytes = header.file_bytes;
+  if (!options.levels.empty()) describe_levels(options, checked.asset, outcome);
   return image;
 }
 
@@ -183,6 +175,9 @@ Outcome run_pipeline(const Options& options) {
     return fail(outcome, kNoTriangle, options.input, why_no_triangle(outcome, polygons.left_out));
   const std::string amiss = options.strict ? all_defects(outcome) : "";
   if (!amiss.empty()) return fail(outcome, kUnreadableInput, options.input, amiss + " (--strict)");
+
+  if (const std::string defect = level_errors_defect(options, mesh); !defect.empty())
+    return fail(outcome, kUsage, options.input, defect);
 
   progress.step("build");
   const Image image = build_image(options, polygons, mesh, progress, outcome);

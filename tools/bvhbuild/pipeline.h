@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,17 @@
 #include "statistics/statistics.h"
 
 namespace tandem::build {
+
+/// One level of the file that was written.
+struct LevelOutcome {
+  std::optional<LevelError> wanted;  ///< what was asked for; none for the finest
+  TreeStatistics tree;
+  double error_bound = 0;
+  double error_bound_relative = 0;  ///< to the diagonal of the finest's bounds; 0 where that is 0
+  std::optional<bool> closed;       ///< whether all components are; none without topology
+  /// Pairs of triangles that meet without having a corner in common; none where coordinates are too large.
+  std::optional<std::uint64_t> self_contacts;
+};
 
 /// Everything that a report tells of one run.
 struct Outcome {
@@ -31,8 +43,13 @@ struct Outcome {
   std::uint64_t file_bytes = 0;
   std::string hash;  ///< of the output, 16 hexadecimal digits
 
+  std::vector<LevelOutcome> levels;         ///< of the file where some were asked for, the finest first
+  std::vector<LevelError> levels_left_out;  ///< they would have had as many triangles as the level before
+  std::uint64_t fixed_vertices = 0;         ///< that stay in place at every level: surfaces meet there
+
   struct Seconds {
     double import = 0, clean = 0, build = 0, write = 0;
+    double levels = 0;  ///< of `build`: what the levels beyond the finest took
   } seconds;
 };
 

@@ -13,6 +13,10 @@ std::string provenance_json(const Options& options, const Outcome& outcome) {
   Json shaping = {{"imaginary", name(options.imaginary)}, {"effort", name(options.effort)}};
   if (!options.gpu_blocks) shaping["gpu_blocks"] = false;
   if (!options.topology) shaping["topology"] = false;
+  if (!options.levels.empty()) {
+    shaping["levels"] = Json::array();
+    for (const LevelError& error : options.levels) shaping["levels"].push_back(name(error));
+  }
   if (outcome.interrupted) shaping["interrupted"] = true;
   const Json json = {{"tool", "bvhbuild"},
                      {"version", TANDEM_VERSION},

@@ -47,6 +47,20 @@ Json findings_json(const CleanReport& report) {
   return json;
 }
 
+Json levels_json(const Outcome& outcome) {
+  Json levels = Json::array();
+  for (const LevelOutcome& level : outcome.levels) {
+    levels.push_back({{"wanted", level.wanted ? Json(name(*level.wanted)) : Json()},
+                      {"triangles", level.tree.triangles},
+                      {"error_bound", level.error_bound},
+                      {"error_bound_relative", level.error_bound_relative},
+                      {"closed", level.closed ? Json(*level.closed) : Json()},
+                      {"self_contacts", level.self_contacts ? Json(*level.self_contacts) : Json()},
+                      {"tree", to_json(level.tree)}});
+  }
+  return levels;
+}
+
 void add_results(const Outcome& outcome, Json& json) {
   json["parts"] = outcome.parts;
   json["origin"] = outcome.origin;
@@ -55,8 +69,49 @@ void add_results(const Outcome& outcome, Json& json) {
   json["tree"] = to_json(outcome.tree);
   json["gpu_blocks"] = outcome.gpu_blocks;
   json["topology"] = outcome.topology;
+  if (!outcome.levels.empty()) {
+    json["levels"] = levels_json(outcome);
+    json["levels_left_out"] = Json::array();
+    for (const LevelError& error : outcome.levels_left_out) json["levels_left_out"].push_back(name(error));
+    json["fixed_vertices"] = outcome.fixed_vertices;
+  }
   json["bytes"] = outcome.file_bytes;
   json["hash"] = outcome.hash;
+}
+
+// "  level 1  4,208 triangles (14.4 %), off by 0.0021 at most (0.1 %), closed", and what else is to be told.
+std::string level_line(const Outcome& outcome, std::size_t i) {
+  const LevelOutcome& level = outcome.levels[i];
+  const auto of_finest = [&](std::uint64_t count) {
+    return 100 * static_cast<double>(count) / static_cast<double>(outcome.levels[0].tree.triangles);
+  };
+  std::ostringstream out;
+  out << "  level " << i << "  " << with_commas(level.tree.triangles) << " triangles";
+  if (i > 0) {
+    out << " (" << number("%.3g", of_finest(level.tree.triangles)) << " %), off by at most "
+        << number("%.3g", level.error_bound) << " (" << number("%.3g", 100 * level.error_bound_relative)
+        << " % of the diagonal)";
+  }
+  if (level.closed) out << (*level.closed ? ", closed" : ", not closed");
+  if (!level.self_contacts)
+    out << ", self-contacts unknown: coordinates are too large";
+  else if (*level.self_contacts > 0)
+    out << ", meets itself at " << with_commas(*level.self_contacts)
+        << (*level.self_contacts == 1 ? " pair of triangles" : " pairs of triangles");
+  return out.str() + "\n";
+}
+
+void print_levels(const Outcome& outcome, std::ostringstream& out) {
+  for (std::size_t i = 0; i < outcome.levels.size(); ++i) out << level_line(outcome, i);
+  for (const LevelError& error : outcome.levels_left_out)
+    out << "  note     no level for " << name(error)
+        << ": it would have as many triangles as the one before\n";
+  if (outcome.fixed_vertices > 0) {
+    out << "  note     " << with_commas(outcome.fixed_vertices)
+        << (outcome.fixed_vertices == 1 ? " vertex where surfaces meet stays"
+                                        : " vertices where surfaces meet stay")
+        << " in place at every level\n";
+  }
 }
 
 }  // namespace
@@ -79,13 +134,15 @@ std::string text_report(const Options& options, const Outcome& outcome) {
   out << "  tree     " << tree.imaginary_nodes << " of " << with_commas(tree.nodes)
       << " nodes imaginary (minimum " << tree.imaginary_minimum << "), depth " << tree.depth << ", SAH cost "
       << number("%.2f", tree.sah_cost) << "\n";
+  print_levels(outcome, out);
   if (!outcome.gpu_blocks) out << "  note     no oriented blocks: exact queries on a GPU refuse the file\n";
   if (!outcome.topology) out << "  note     no topology: contact manifolds refuse the file\n";
   if (outcome.interrupted) out << "  note     interrupted: this is the best tree until then\n";
   const Outcome::Seconds& s = outcome.seconds;
   out << "  took     import " << number("%.2f", s.import) << " s, clean " << number("%.2f", s.clean)
-      << " s, build " << number("%.2f", s.build) << " s, write " << number("%.2f", s.write)
-      << " s; peak memory " << human_bytes(peak_memory_bytes()) << "\n";
+      << " s, build " << number("%.2f", s.build) << " s"
+      << (options.levels.empty() ? "" : " (levels " + number("%.2f", s.levels) + " s)") << ", write "
+      << number("%.2f", s.write) << " s; peak memory " << human_bytes(peak_memory_bytes()) << "\n";
   return out.str();
 }
 
@@ -105,6 +162,7 @@ std::string json_report(const Options& options, const Outcome& outcome) {
   if (outcome.exit_code == kDone) add_results(outcome, json);
   const Outcome::Seconds& s = outcome.seconds;
   json["seconds"] = {{"import", s.import}, {"clean", s.clean}, {"build", s.build}, {"write", s.write}};
+  if (!options.levels.empty()) json["seconds"]["levels"] = s.levels;
   json["peak_memory_bytes"] = peak_memory_bytes();
   return pretty(json) + "\n";
 }

@@ -107,15 +107,12 @@ Plan plan_sections(const PartTable& table, const AssetSource& source, std::span<
     optional += (level.oriented_blocks.empty() ? 0 : 1) + (level.topology == nullptr ? 0 : 2);
   Plan plan(2 * levels.size() + optional + 4);
   plan.add(SectionKind::levels, 0, levels.size(), sizeof(Level));
-  for (std::uint32_t i = 0; i < levels.size(); ++i)
-    plan.add(SectionKind::blocks, i, levels[i].tree->blocks.size(), sizeof(Block));
-  // What exact queries on a GPU need lies together, for one copy, and behind it what manifolds need too.
   for (std::uint32_t i = 0; i < levels.size(); ++i) {
+    // What exact queries on a GPU need lies together, for one copy, and behind it what manifolds need too.
+    plan.add(SectionKind::blocks, i, levels[i].tree->blocks.size(), sizeof(Block));
     plan.add(SectionKind::triangles, i, levels[i].geometry.triangles.size(), sizeof(Triangle));
     if (!levels[i].oriented_blocks.empty())
       plan.add(SectionKind::oriented_blocks, i, levels[i].oriented_blocks.size(), sizeof(OrientedBlock));
-  }
-  for (std::uint32_t i = 0; i < levels.size(); ++i) {
     if (const SurfaceTopology* topology = levels[i].topology; topology != nullptr) {
       plan.add(SectionKind::topology, i, topology->triangles.size(), sizeof(TriangleTopology));
       plan.add(SectionKind::components, i, topology->components.size(), sizeof(SurfaceComponent));

@@ -60,7 +60,7 @@ struct Section {
 static_assert(sizeof(Section) == 32);
 
 /// One level of detail: its own blocks and triangles. Level 0 is the full mesh, each further level a coarser
-/// one.
+/// one within its bounds.
 struct Level {
   std::uint32_t triangle_count;
   std::uint32_t block_count;

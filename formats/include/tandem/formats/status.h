@@ -47,8 +47,9 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kLeafCountMismatch,  ///< leaves, or leaf blocks, differ in number from what the level says
     kTriangleOrder,      ///< leaves, in the order of blocks, must name the triangles 0, 1, 2, ...
     kTriangleNotFinite, kTriangleOutsideLeafBox, kChildOutsideParentBox,
-    kBadFace,         ///< source face or part out of range, or a reserved lane set
-    kBoundsMismatch,  ///< the header's bounds are not those of the triangles
+    kBadFace,             ///< source face or part out of range, or a reserved lane set
+    kBoundsMismatch,      ///< the header's bounds are not those of level 0's triangles
+    kLevelOutsideBounds,  ///< a coarser level reaches beyond the header's bounds
     // The oriented blocks.
     kOrientedBlockMismatch,  ///< an oriented block names other children or triangles than its block
     kBadRotation,            ///< a rotation that is no quaternion of whole numbers in their range

@@ -1,0 +1,100 @@
+#include "level_pipeline.h"
+
+#include <algorithm>
+#include <cmath>
+#include <thread>
+
+#include "bvhbuild/levels/ladder.h"
+#include "bvhbuild/levels/self_contacts.h"
+#include "bvhbuild/tree/oriented_blocks.h"
+#include "common/stopwatch.h"
+
+namespace tandem::build {
+namespace {
+
+double diagonal(const float* lower, const float* upper) {
+  return std::hypot(double{upper[0]} - lower[0], double{upper[1]} - lower[1], double{upper[2]} - lower[2]);
+}
+
+std::vector<double> wanted_lengths(const Options& options, const StoredMesh& mesh) {
+  std::array<float, 3> lower = mesh.points[0], upper = lower;
+  for (const auto& point : mesh.points) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      lower[k] = std::min(lower[k], point[k]);
+      upper[k] = std::max(upper[k], point[k]);
+    }
+  }
+  std::vector<double> lengths;
+  for (const LevelError& error : options.levels)
+    lengths.push_back(error.length(diagonal(lower.data(), upper.data())));
+  return lengths;
+}
+
+}  // namespace
+
+AssetLevel BuiltLevel::row(const Options& options) const {
+  return {geometry,        face,        &tree,
+          oriented_blocks, error_bound, options.topology && topology ? &*topology : nullptr};
+}
+
+BuiltLevel build_level(const Geometry& geometry, const Options& options, OptimisationWatch& watch) {
+  BuiltLevel level;
+  level.geometry = geometry;
+  level.tree = build_tree(geometry, options.imaginary, options.effort, watch);
+  if (options.gpu_blocks && geometry.triangles.size() < kMostOrientedTriangles)
+    level.oriented_blocks = orient_blocks(geometry, level.tree, options.effort);
+  const bool needed = options.topology || !options.levels.empty();
+  if (needed && geometry.triangles.size() < kMostTopologyTriangles)
+    level.topology = make_topology(geometry, level.tree);
+  return level;
+}
+
+std::string level_errors_defect(const Options& options, const StoredMesh& mesh) {
+  if (options.levels.empty()) return {};
+  if (mesh.triangles.size() >= kMostTopologyTriangles) return "too many triangles for --levels";
+  const std::vector<double> lengths = wanted_lengths(options, mesh);
+  for (std::size_t i = 1; i < lengths.size(); ++i) {
+    if (!(lengths[i] > lengths[i - 1]))
+      return "--levels: " + name(options.levels[i]) + " is not larger than " + name(options.levels[i - 1]) +
+             " for a diagonal of " + name({lengths.back() / options.levels.back().length(1), false});
+  }
+  return {};
+}
+
+void add_levels(const Options& options, const StoredMesh& mesh, OptimisationWatch& watch,
+                std::vector<BuiltLevel>& levels, Outcome& outcome) {
+  Stopwatch stopwatch;
+  const FinestLevel finest = {levels[0].geometry, levels[0].tree, *levels[0].topology};
+  Ladder ladder = make_ladder(finest, wanted_lengths(options, mesh), watch.progress);
+  outcome.fixed_vertices = ladder.fixed_vertices;
+  outcome.levels.emplace_back();
+  for (const std::size_t i : ladder.left_out) outcome.levels_left_out.push_back(options.levels[i]);
+  levels.reserve(1 + ladder.levels.size());
+  for (LadderLevel& coarse : ladder.levels) {
+    outcome.levels.emplace_back().wanted = options.levels[coarse.wanted];
+    BuiltLevel& level =
+        levels.emplace_back(build_level({coarse.mesh.points, coarse.mesh.triangles}, options, watch));
+    level.mesh = std::move(coarse.mesh);  // which leaves its arrays where they are
+    level.error_bound = coarse.error_bound;
+    for (const std::uint32_t triangle : coarse.nearest) level.face.push_back(mesh.face[triangle]);
+  }
+  outcome.seconds.levels = stopwatch.lap();
+}
+
+void describe_levels(const Options& options, const AssetView& asset, Outcome& outcome) {
+  const unsigned threads =
+      options.threads > 0 ? static_cast<unsigned>(options.threads) : std::thread::hardware_concurrency();
+  const FileHeader& header = *asset.header;
+  const double whole = diagonal(header.lower, header.upper);
+  for (std::uint32_t i = 0; i < asset.levels.size(); ++i) {
+    const LevelView view = asset.level(i);
+    LevelOutcome& level = outcome.levels[i];
+    level.tree = measure_tree(view, header.lower, header.upper);
+    level.error_bound = view.error_bound;
+    level.error_bound_relative = whole > 0 ? view.error_bound / whole : 0;
+    if (view.topology != nullptr) level.closed = view.closed;
+    level.self_contacts = count_self_contacts(asset.levels_from(i, 1), std::max(threads, 1u));
+  }
+}
+
+}  // namespace tandem::build

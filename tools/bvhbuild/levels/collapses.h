@@ -1,0 +1,29 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "level_mesh.h"
+#include "opened_mesh.h"
+
+namespace tandem::build {
+
+/// An edge shrinks to a point, and the triangles beside it vanish.
+struct Collapse {
+  std::uint32_t gone, kept;    ///< points at its ends; both go on as `kept`
+  std::array<float, 3> point;  ///< where that now is
+  std::uint32_t triangles;     ///< that are left
+  float error;                 ///< a guess of how far the surface has moved, never less than before
+};
+
+/// Collapses the edges of a mesh one after the other, the least harmful first, until none is left that can
+/// be: a closed surface stays one, with four triangles at least, an open one keeps its boundary, fixed points
+/// stay where they are, and no triangle is turned over. Points stay within the bounds of the mesh. The result
+/// depends on the mesh alone.
+std::vector<Collapse> collapse_edges(const OpenedMesh& mesh);
+
+/// The mesh as it is after some collapses: the first ones of collapse_edges(mesh).
+LevelMesh after(const OpenedMesh& mesh, std::span<const Collapse> collapses);
+
+}  // namespace tandem::build

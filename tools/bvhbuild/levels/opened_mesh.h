@@ -1,0 +1,28 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "bvhbuild/tree/surface_topology.h"
+#include "bvhbuild/tree/tree.h"
+
+namespace tandem::build {
+
+/// A mesh whose edges have one side or two that run in opposite directions, and whose triangles around each
+/// vertex follow each other over such edges: what simplifiers ask for. It is the surface of a level, cut open
+/// where more than two triangles meet at an edge, where windings disagree, and where surfaces touch in a
+/// vertex. Vertices along the cuts are fixed, so that what was joined stays joined.
+struct OpenedMesh {
+  std::vector<std::array<float, 3>> points;
+  std::vector<bool> fixed;                              ///< of each point
+  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< wound as level 0's topology says
+  std::vector<std::uint32_t> was;                       ///< of each triangle, in leaf order of level 0
+  std::uint64_t fixed_vertices = 0;                     ///< positions that points along the cuts have
+  std::uint64_t left_out = 0;  ///< triangles that repeat another one, or are segments
+};
+
+/// Cuts a level open. Triangles with two corners at one position and, of triangles with the same corners, all
+/// but one are left out: the rest is the same surface. Condition: fewer than kMostTopologyTriangles.
+OpenedMesh cut_open(const Geometry& geometry, const Tree& tree, const SurfaceTopology& topology);
+
+}  // namespace tandem::build

@@ -1,5 +1,8 @@
 #include "page.h"
 
+#include <cmath>
+#include <utility>
+
 #include "common/number_words.h"
 
 namespace tandem {
@@ -50,13 +53,41 @@ Json surface_json(const SurfaceCounts& counts) {
           {"sides_at_edges_of_many", counts.sides_at_edges_of_many}};
 }
 
-Json levels_json(const AssetView& view) {
+/// The keys of docs/json.md, null where nothing was sampled.
+Json work_json(const ExpectedWork& work) {
+  const bool sampled = work.poses > 0;
+  const auto& oriented = work.oriented;
+  return {{"expected_block_pairs", sampled ? Json(work.block_pairs) : Json()},
+          {"expected_candidates", sampled ? Json(work.candidates) : Json()},
+          {"expected_oriented_block_pairs", oriented ? Json(oriented->block_pairs) : Json()},
+          {"expected_oriented_candidates", oriented ? Json(oriented->candidates) : Json()}};
+}
+
+/// Of the bounds of level 0.
+double diagonal(const FileHeader& header) {
+  double square = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double side = double{header.upper[k]} - double{header.lower[k]};
+    square += side * side;
+  }
+  return std::sqrt(square);
+}
+
+Json levels_json(const Inspection& inspection) {
+  const AssetView& view = inspection.asset.view();
   Json levels = Json::array();
-  for (const Level& level : view.levels) {
-    levels.push_back({{"triangles", level.triangle_count},
-                      {"blocks", level.block_count},
-                      {"depth", level.depth},
-                      {"error_bound", level.error_bound}});
+  for (std::uint32_t i = 0; i < view.levels.size(); ++i) {
+    const LevelView level = view.level(i);
+    const double relative = level.error_bound / diagonal(*view.header);
+    Json json = {{"triangles", level.triangle_count},
+                 {"blocks", level.block_count},
+                 {"depth", level.depth},
+                 {"bytes", bytes_of_level(view, i)},
+                 {"error_bound", level.error_bound},
+                 {"error_bound_relative", std::isfinite(relative) ? Json(relative) : Json()},
+                 {"closed", level.topology != nullptr ? Json(level.closed) : Json()}};
+    json.update(work_json(inspection.work[i]));
+    levels.push_back(std::move(json));
   }
   return levels;
 }
@@ -82,12 +113,7 @@ Json to_json(const Inspection& inspection) {
                {"hash", hexadecimal(header.hash)},
                {"bytes", header.file_bytes}};
   json.update(to_json(inspection.tree));
-  const bool sampled = inspection.work.poses > 0;
-  json["expected_block_pairs"] = sampled ? Json(inspection.work.block_pairs) : Json();
-  json["expected_candidates"] = sampled ? Json(inspection.work.candidates) : Json();
-  const auto& oriented = inspection.work.oriented;
-  json["expected_oriented_block_pairs"] = oriented ? Json(oriented->block_pairs) : Json();
-  json["expected_oriented_candidates"] = oriented ? Json(oriented->candidates) : Json();
+  json.update(work_json(inspection.work[0]));
   json["surface"] = inspection.surface ? surface_json(*inspection.surface) : Json();
   json["leaf_blocks_at_depth"] = inspection.tree.leaf_blocks_at_depth;
   json["blocks_with_fill"] = inspection.tree.blocks_with_fill;
@@ -97,7 +123,7 @@ Json to_json(const Inspection& inspection) {
   json["source_faces"] = header.source_faces;
   json["source"] = inspection.source;
   json["parts"] = parts_json(view);
-  json["levels"] = levels_json(view);
+  json["levels"] = levels_json(inspection);
   json["sections"] = sections_json(view);
   return json;
 }

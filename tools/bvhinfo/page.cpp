@@ -153,6 +153,26 @@ std::string section_lines(const Json& sections) {
   return text;
 }
 
+/// Levels side by side.
+std::string level_lines(const Json& levels) {
+  std::string text =
+      "  levels       triangles     blocks  depth         bytes  error bound  of diagonal  block pairs\n";
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    const Json& level = levels[i];
+    const Json &relative = level["error_bound_relative"], &pairs = level["expected_block_pairs"],
+               &closed = level["closed"];
+    text +=
+        format("  %6zu %15s %10s %6u %13s  %11.5g  %11s  %11s%s\n", i,
+               with_commas(level["triangles"].get<std::uint64_t>()).c_str(),
+               with_commas(level["blocks"].get<std::uint64_t>()).c_str(), level["depth"].get<unsigned>(),
+               with_commas(level["bytes"].get<std::uint64_t>()).c_str(), level["error_bound"].get<double>(),
+               relative.is_null() ? "-" : format("%.3g %%", 100 * relative.get<double>()).c_str(),
+               pairs.is_null() ? "-" : format("%.1f", pairs.get<double>()).c_str(),
+               closed == true ? "  closed" : "");
+  }
+  return text;
+}
+
 // The figures that people compare when they tune, in the order of the page.
 constexpr const char* kCompared[] = {"bytes",
                                      "triangles",
@@ -193,7 +213,8 @@ std::string page(const Inspection& inspection) {
   text += "  origin       " + point(header.origin) + format(", rounding error %.3g\n", header.rounding_error);
   text += surface_line(inspection.surface);
   text += tree_lines(inspection.tree);
-  text += work_lines(view.level(), inspection.work);
+  text += work_lines(view.level(), inspection.work[0]);
+  if (view.levels.size() > 1) text += level_lines(to_json(inspection)["levels"]);
   text += histogram("leaf blocks at depth", inspection.tree.leaf_blocks_at_depth, 0, 1);
   text +=
       histogram("blocks with so many nodes that are not imaginary", inspection.tree.blocks_with_fill, 1, 0);

@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <span>
 #include <vector>
 
 #include "levels/nearest_triangle.h"
@@ -14,7 +15,7 @@ namespace {
 
 using namespace levels;
 
-constexpr std::size_t kCornersAtOnce = 512, kTrianglesAtOnce = 1024, kPiecesAtOnce = 8192;
+constexpr std::size_t kCornersAtOnce = 512, kTrianglesAtOnce = 1024, kPiecesAtOnce = 1024;
 
 /// The farthest point that was found.
 struct Farthest {
@@ -38,8 +39,8 @@ struct CornerDistances {
 };
 
 /// The number under which a corner's position is known.
-std::uint32_t corner_number(const LevelView& level, std::uint32_t triangle, int k) {
-  return level.topology == nullptr ? 3 * triangle + k : level.topology[triangle].vertex[k];
+std::uint64_t corner_number(const LevelView& level, std::uint32_t triangle, int k) {
+  return level.topology == nullptr ? 3 * std::uint64_t{triangle} + k : level.topology[triangle].vertex[k];
 }
 
 /// Corners in the order of their numbers, each as 3 triangle + k.
@@ -52,6 +53,16 @@ std::vector<std::uint64_t> first_corners(const LevelView& level) {
     }
   }
   return corners;
+}
+
+/// The nearest of these triangles.
+NearestTriangle nearest_of(const LevelView& level, const Point& p, std::span<const std::uint32_t> triangles) {
+  NearestTriangle nearest = {INFINITY, triangles.front()};
+  for (const std::uint32_t triangle : triangles) {
+    const double square = square_distance(p, level.triangles[triangle]);
+    if (square < nearest.square) nearest = {square, triangle};
+  }
+  return nearest;
 }
 
 /// Works on parts of [0, count) that depend on nothing else: work(part, begin, end).
@@ -77,9 +88,8 @@ class Search {
     for (const int side : {0, 1}) {
       if (!is_refuted()) collect_pieces(side);
     }
-    const std::uint64_t most =
-        (1 << 20) + std::uint64_t{options_.pieces_per_triangle} *
-                        (std::uint64_t{from_[0].triangle_count} + from_[1].triangle_count);
+    const std::uint64_t triangles = std::uint64_t{from_[0].triangle_count} + from_[1].triangle_count;
+    const std::uint64_t most = options_.most_pieces.value_or((1 << 20) + 64 * triangles);
     for (int round = 0; !pool_.empty() && !is_refuted() && pieces_ < most; ++round) refine_some(round);
     return result();
   }
@@ -97,7 +107,7 @@ class Search {
   /// Bounds of pieces up to here are not looked into if a point is so far away.
   double enough(double distance) const {
     const double near = std::max(distance * (1 + options_.relative), distance + 0x1p-24 * largest_);
-    return std::max(near, options_.wanted.value_or(0)) - slack_;
+    return std::max(near, options_.wanted.value_or(0) * (1 - 0x1p-45)) - slack_;
   }
 
   bool is_refuted() const { return options_.wanted && farthest_.distance - slack_ > *options_.wanted; }
@@ -136,7 +146,7 @@ class Search {
                 for (std::size_t t = begin; t < end; ++t) {
                   Piece piece = {{}, INFINITY, 0, static_cast<std::uint16_t>(side)};
                   for (int k = 0; k < 3; ++k) {
-                    const std::uint32_t i = corner_number(from, static_cast<std::uint32_t>(t), k);
+                    const std::uint64_t i = corner_number(from, static_cast<std::uint32_t>(t), k);
                     piece.corner[k] = {corner_of(from.triangles[t], k), corners_[side].distance[i],
                                        corners_[side].nearest[i]};
                   }
@@ -201,13 +211,15 @@ class Search {
 
   void look_into(Piece& piece, double limit, Outcome& outcome) const {
     const LevelView& to = to_[piece.side];
-    const auto measured = [&](const Point& point) {
-      const Corner corner = measure(piece.side, point, piece.corner[0].nearest);
+    const auto measured = [&](const Point& point, std::uint32_t hint) {
+      const Corner corner = measure(piece.side, point, hint);
       outcome.farthest.offer(corner, piece.side);
       return corner;
     };
-    const Point sum = plus(plus(piece.corner[0].point, piece.corner[1].point), piece.corner[2].point);
-    const std::uint32_t nearest = measured(scaled(1.0 / 3, sum)).nearest;
+    const Point middle =
+        scaled(1.0 / 3, plus(plus(piece.corner[0].point, piece.corner[1].point), piece.corner[2].point));
+    const std::uint32_t known[] = {piece.corner[0].nearest, piece.corner[1].nearest, piece.corner[2].nearest};
+    const std::uint32_t nearest = measured(middle, nearest_of(to, middle, known).triangle).nearest;
     tighten(to, {&nearest, 1}, limit, piece);
     if (piece.bound <= limit || piece.depth == kDeepest) {
       outcome.settled = std::max(outcome.settled, piece.bound);
@@ -216,7 +228,14 @@ class Search {
     }
     const Cut cut = choose_cut(piece, to.triangles[nearest], limit / 8);
     Corner points[2];
-    for (int i = 0; i < cut.edges; ++i) points[i] = measured(point_of(piece, cut, i));
+    for (int i = 0; i < cut.edges; ++i) {
+      const Point point = point_of(piece, cut, i);
+      const std::uint32_t near[] = {nearest, known[cut.edge[i]], known[(cut.edge[i] + 1) % 3]};
+      const NearestTriangle guess = nearest_of(to, point, near);
+      // Any triangle serves a bound; the nearest one is asked for only where the point may be the farthest.
+      points[i] = {point, std::sqrt(guess.square), guess.triangle};
+      if (points[i].distance > outcome.farthest.distance) points[i] = measured(point, guess.triangle);
+    }
     Piece parts[kMostParts];
     const int count = cut_piece(piece, cut, points, parts);
     for (int i = 0; i < count; ++i) {
@@ -231,10 +250,17 @@ class Search {
     const LevelView& other = to_[farthest_.side];
     const double proved = proved_distance(other, farthest_.point, farthest_.nearest) - slack_;
     bound.lower = std::max(proved, 0.0);
-    bound.upper = settled_;
-    for (const Piece& piece : pool_) bound.upper = std::max(bound.upper, piece.bound);
-    bound.upper = is_refuted() ? INFINITY : (bound.upper + slack_) * (1 + 0x1p-50);
-    bound.narrow = is_refuted() || (pool_.empty() && !too_deep_);
+    if (!is_refuted()) {
+      double most = settled_;
+      for (const Piece& piece : pool_) most = std::max(most, piece.bound);
+      const double sure = (most + slack_) * (1 + 0x1p-50);
+      bound.upper = sure * (1 + 0x1p-40);  // a little more, so that this very number can be wanted next
+      bound.narrow = pool_.empty() && !too_deep_;
+      if (options_.wanted) {
+        bound.narrow = sure <= *options_.wanted;
+        if (bound.narrow) bound.upper = std::min(bound.upper, *options_.wanted);
+      }
+    }
     for (int k = 0; k < 3; ++k) bound.point[k] = farthest_.point.x[k];
     bound.point_on_a = farthest_.side == 0;
     bound.pieces = pieces_;

@@ -10,13 +10,13 @@ namespace tandem {
 struct HausdorffOptions {
   /// The bounds are narrowed until upper <= lower (1 + relative) or upper <= lower + a unit that the stored
   /// coordinates are rounded to (2^-24 of the largest).
-  double relative = 0.02;
-  /// Ends as soon as upper <= wanted is proved, or a distance above `wanted` is found: then upper may be
-  /// infinite.
+  double relative = 0.002;
+  /// Ends as soon as upper <= wanted is proved, or a distance above `wanted` is found; upper is infinite
+  /// then. Where `wanted` itself is between bounds that are that narrow, neither may come of it.
   std::optional<double> wanted = {};
-  /// Pieces that may be looked into for each triangle of both surfaces, and 2^20 beside. What is left then
-  /// has wide bounds, which hold all the same.
-  std::uint32_t pieces_per_triangle = 64;
+  /// Pieces of triangles that are looked into at most, or about so many; where they run out the bounds stay
+  /// wide, but hold. Without it: 2^20 and 64 for each triangle of both surfaces.
+  std::optional<std::uint64_t> most_pieces = {};
 };
 
 /// lower <= the Hausdorff distance of two surfaces <= upper: the largest distance of a point of either from
@@ -24,7 +24,7 @@ struct HausdorffOptions {
 struct HausdorffBound {
   double upper = std::numeric_limits<double>::infinity();
   double lower = 0;      ///< a distance that occurs, rounded down
-  bool narrow = true;    ///< as narrow as asked for, or decided; false: pieces ran out
+  bool narrow = true;    ///< as narrow as asked for or, given `wanted`, decided
   double point[3] = {};  ///< on one surface, up to rounding, and as far as `lower` from the other
   bool point_on_a = true;
   std::uint64_t pieces = 0;  ///< that were looked into
@@ -33,7 +33,7 @@ struct HausdorffBound {
 /// Bounds the distance of two levels in the stored coordinates of one file. The surfaces are the unions of
 /// their closed triangles, of which any may be flat. The result does not depend on the number of threads.
 /// Conditions: levels of checked files with at least one triangle each. Throws std::bad_alloc. The proof is
-/// in docs/levels.md.
+/// in docs/level_error.md.
 HausdorffBound hausdorff_bound(const LevelView& a, const LevelView& b, const HausdorffOptions& options = {});
 
 }  // namespace tandem

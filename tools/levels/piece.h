@@ -30,7 +30,7 @@ inline constexpr int kMostParts = 3;
 inline constexpr int kDeepest = 100;
 
 /// What rounding adds at most to a bound of a piece's points, where no coordinate of either surface is
-/// larger: 2^-42 of that. The proof is in docs/levels.md.
+/// larger: 2^-42 of that. The proof is in docs/level_error.md.
 inline double rounding_slack(double largest_coordinate) {
   return 0x1p-42 * largest_coordinate;
 }

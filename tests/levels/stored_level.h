@@ -1,0 +1,34 @@
+#pragma once
+#include <stdexcept>
+
+#include "build/sample_asset.h"
+
+namespace tandem::test {
+
+/// A mesh as the level 0 of a checked file.
+class StoredLevel {
+ public:
+  explicit StoredLevel(const Mesh& mesh)
+      : file_(make_file(mesh, build::Imaginary::minimal, build::Effort::fast)) {
+    const CheckResult checked = file_.check();
+    if (checked.status != Status::kOk) throw std::runtime_error(name(checked.status));
+    view_ = checked.asset.level();
+  }
+
+  const LevelView& view() const { return view_; }
+
+  /// The same without topology.
+  LevelView triangles_only() const {
+    LevelView view = view_;
+    view.topology = nullptr;
+    view.components = nullptr;
+    view.vertex_count = view.component_count = 0;
+    return view;
+  }
+
+ private:
+  Bytes file_;
+  LevelView view_;
+};
+
+}  // namespace tandem::test

@@ -30,7 +30,7 @@ class MadeUp {
       measures.query_seconds += 8 >> level;
       depth += part_ * kBounds[level];
     }
-    measures.change.depth.most = depth;
+    measures.change.depth.median = depth;
     return measures;
   }
 

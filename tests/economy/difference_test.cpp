@@ -13,11 +13,12 @@ Patch patch(std::uint32_t a, std::uint32_t b, double x, double depth, double deg
   return {{a, b}, {std::sin(angle), 0, std::cos(angle)}, {x, 0, 0}, depth};
 }
 
-TEST(Spread, TellsMeanLargestAndWhatNinetyFiveOfAHundredAreAtMost) {
+TEST(Spread, TellsWhatPartsOfTheNumbersAreAtMost) {
   std::vector<double> numbers;
   for (int i = 100; i >= 1; --i) numbers.push_back(i);
   const Spread spread = spread_of(numbers);
   EXPECT_DOUBLE_EQ(spread.mean, 50.5);
+  EXPECT_EQ(spread.median, 50);
   EXPECT_EQ(spread.most, 95);
   EXPECT_EQ(spread.largest, 100);
 }
@@ -26,6 +27,7 @@ TEST(Spread, OfFewNumbersTakesTheLargest) {
   EXPECT_EQ(spread_of({}).largest, 0);
   EXPECT_EQ(spread_of({3}).most, 3);
   EXPECT_EQ(spread_of({3, 1, 2}).most, 3);
+  EXPECT_EQ(spread_of({3, 1, 2}).median, 2);
 }
 
 TEST(Difference, CountsPairsThatTouchAtOneLevelAlone) {

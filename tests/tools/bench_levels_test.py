@@ -182,7 +182,7 @@ class Economy(LevelsBenchTest):
             told = self.economy("--tolerance", f"{100 * tolerance}%")
             asset = told["assets"][0]
             limit = tolerance * asset["diagonal"]
-            keeps = [row["error_bound"] <= limit and row["depth_error"]["most"] <= limit for row in asset["levels"]]
+            keeps = [row["error_bound"] <= limit and row["depth_error"]["median"] <= limit for row in asset["levels"]]
             self.assertTrue(keeps[0])
             self.assertEqual(asset["recommended_level"], max(level for level in range(3) if keeps[level]))
             self.assertEqual(told["tolerance_relative"], tolerance)

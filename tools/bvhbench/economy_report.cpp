@@ -11,7 +11,8 @@ using economy::Measures;
 using economy::Spread;
 
 Json to_json(const Spread& spread) {
-  return {{"mean", spread.mean}, {"most", spread.most}, {"largest", spread.largest}};
+  return {
+      {"mean", spread.mean}, {"median", spread.median}, {"most", spread.most}, {"largest", spread.largest}};
 }
 
 Json to_json(const Measures& measures) {
@@ -86,30 +87,45 @@ double largest_diagonal(const EconomyResult& result) {
   return largest;
 }
 
-void print_levels(const AssetEconomy& asset, std::uint32_t recommended) {
-  std::printf("%s: diagonal %.4g, %s instances\n", asset.name.c_str(), asset.diagonal,
-              with_commas(asset.instances).c_str());
-  const bool simulated = asset.measures[0].rest.has_value();
-  std::printf(
-      "    level  triangles      memory  error bound  query ms  manifolds ms  contacts  manifolds"
-      "  pairs lost   new  depth error  normals%s\n",
-      simulated ? "   step ms  apart at the end" : "");
-  for (std::size_t i = 0; i < asset.levels.size(); ++i) {
-    const LevelView& level = asset.levels[i];
-    const Measures& of_level = asset.measures[i];
-    const economy::Difference& change = of_level.change;
-    const std::uint64_t bytes = of_level.gpu_bytes == 0 ? of_level.bytes : of_level.gpu_bytes;
-    std::printf("  %s %5zu %10s %11s %12s %9.3f %13.3f %9s %10s %11s %5s %12.3g %7.2g°",
-                i == recommended ? ">" : " ", i, with_commas(level.triangle_count).c_str(),
-                human_bytes(bytes).c_str(), percent(level.error_bound / asset.diagonal).c_str(),
-                1e3 * of_level.query_seconds, 1e3 * of_level.manifold_seconds,
-                with_commas(of_level.contacts).c_str(), with_commas(of_level.manifolds).c_str(),
-                with_commas(change.lost_pairs).c_str(), with_commas(change.new_pairs).c_str(),
-                change.depth.most, change.angle.most);
-    if (simulated)
-      std::printf(" %9.3f %17.3g", 1e3 * of_level.rest->step_seconds, of_level.rest->end_distance.mean);
-    std::printf("\n");
+// "0.12 (1.5)": half of the numbers are at most so large, and 95 of 100.
+std::string half_and_most(const Spread& spread) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.2g (%.2g)", spread.median, spread.most);
+  return text;
+}
+
+// The same in per cent of a length.
+std::string half_and_most(const Spread& spread, double length) {
+  return half_and_most({0, 100 * spread.median / length, 100 * spread.most / length, 0});
+}
+
+void print_level(const AssetEconomy& asset, std::size_t i, bool recommended) {
+  const LevelView& level = asset.levels[i];
+  const Measures& measures = asset.measures[i];
+  const economy::Difference& change = measures.change;
+  const std::uint64_t bytes = measures.gpu_bytes == 0 ? measures.bytes : measures.gpu_bytes;
+  std::printf(" %s %5zu %9s %10s %8s %10.3f %10.3f %9s %9s %10s %5s %16s %13s", recommended ? ">" : " ", i,
+              with_commas(level.triangle_count).c_str(), human_bytes(bytes).c_str(),
+              percent(level.error_bound / asset.diagonal).c_str(), 1e3 * measures.query_seconds,
+              1e3 * measures.manifold_seconds, with_commas(measures.contacts).c_str(),
+              with_commas(measures.manifolds).c_str(), with_commas(change.lost_pairs).c_str(),
+              with_commas(change.new_pairs).c_str(), half_and_most(change.depth, asset.diagonal).c_str(),
+              half_and_most(change.angle).c_str());
+  if (measures.rest) {
+    std::printf(" %9.3f %15s", 1e3 * measures.rest->step_seconds,
+                half_and_most(measures.rest->end_distance, asset.diagonal).c_str());
   }
+  std::printf("\n");
+}
+
+void print_levels(const AssetEconomy& asset, std::uint32_t recommended) {
+  std::printf("%s: diagonal %.4g, %s instance%s\n", asset.name.c_str(), asset.diagonal,
+              with_commas(asset.instances).c_str(), asset.instances == 1 ? "" : "s");
+  std::printf(
+      "   level triangles     memory   proved   query, manifolds, ms  contacts manifolds  pairs lost, new"
+      "   depths off, %%   normals off%s\n",
+      asset.measures[0].rest ? "  step, ms   ends apart, %" : "");
+  for (std::size_t i = 0; i < asset.levels.size(); ++i) print_level(asset, i, i == recommended);
 }
 
 std::string limit_words(const EconomyArguments& arguments) {
@@ -124,28 +140,37 @@ std::string limit_words(const EconomyArguments& arguments) {
   return text;
 }
 
+std::string place_of(const EconomyArguments& arguments, const EconomyResult& result) {
+  if (!result.gpu.empty()) return result.gpu;
+  const std::uint32_t threads = arguments.settings.threads;
+  return with_commas(threads) + (threads == 1 ? " CPU thread" : " CPU threads");
+}
+
 void print_losses(const EconomyResult& result) {
   const Measures &finest = result.finest, &chosen = result.recommended;
   const economy::Difference& change = chosen.change;
-  const double diagonal = largest_diagonal(result);
   std::printf("What is lost by it, of all assets together:\n");
   std::printf("  %s of %s pairs that touch at the finest levels are found apart, and %s others touch\n",
               with_commas(change.lost_pairs).c_str(), with_commas(finest.touching_pairs).c_str(),
               with_commas(change.new_pairs).c_str());
-  std::printf(
-      "  depths of 95 manifolds in 100 differ by %.3g at most (%s of the largest diagonal), of all by %.3g\n",
-      change.depth.most, percent(change.depth.most / diagonal).c_str(), change.depth.largest);
-  std::printf(
-      "  normals of 95 in 100 by %.2g degrees, of all by %.2g; %s manifolds have no match, and %s new ones\n",
-      change.angle.most, change.angle.largest, with_commas(change.lost_patches).c_str(),
-      with_commas(change.new_patches).c_str());
+  std::printf("  half of the depths differ by %.3g at most, %s of the largest diagonal; 95 in 100 by %.3g\n",
+              change.depth.median, percent(change.depth.median / largest_diagonal(result)).c_str(),
+              change.depth.most);
+  std::printf("  half of the normals turn by %.2g degrees at most, 95 in 100 by %.2g\n", change.angle.median,
+              change.angle.most);
+  std::printf("  %s of %s manifolds have no match, and %s are new\n",
+              with_commas(change.lost_patches).c_str(), with_commas(finest.manifolds).c_str(),
+              with_commas(change.new_patches).c_str());
   if (!chosen.rest) return;
-  std::printf("  bodies end %.3g apart on average, 95 in 100 within %.3g", chosen.rest->end_distance.mean,
-              chosen.rest->end_distance.most);
-  if (result.nudged)
-    std::printf("; those of the finest levels, nudged by a millionth, %.3g and %.3g", result.nudged->mean,
-                result.nudged->most);
-  std::printf("\n  the fastest moves at %.2g at the end; at the finest levels at %.2g\n", chosen.rest->speed,
+  const Spread& apart = chosen.rest->end_distance;
+  std::printf(
+      "  half of the bodies end within %.3g of where they do at the finest levels, 95 in 100 within %.3g\n",
+      apart.median, apart.most);
+  if (result.nudged) {
+    std::printf("    (within %.3g and %.3g at the finest levels again, nudged by a millionth at the start)\n",
+                result.nudged->median, result.nudged->most);
+  }
+  std::printf("  the fastest moves at %.2g at the end; at the finest levels at %.2g\n", chosen.rest->speed,
               finest.rest->speed);
 }
 
@@ -183,16 +208,16 @@ Json to_json(const EconomyArguments& arguments, const EconomyResult& result) {
 
 void print(const EconomyArguments& arguments, const EconomyResult& result) {
   const Measures &finest = result.finest, &chosen = result.recommended;
-  std::printf("%s: %s, %s object pairs\n", arguments.scene.c_str(),
-              result.gpu.empty() ? (with_commas(arguments.settings.threads) + " CPU threads").c_str()
-                                 : result.gpu.c_str(),
+  std::printf("%s: %s, %s object pairs\n", arguments.scene.c_str(), place_of(arguments, result).c_str(),
               with_commas(finest.object_pairs).c_str());
   for (std::size_t i = 0; i < result.assets.size(); ++i) {
     if (result.assets[i].instances > 0) print_levels(result.assets[i], chosen.levels[i]);
   }
   std::printf(
-      "Memory is that of the level%s; depth error and normals: of 95 manifolds in 100, against level 0.\n",
-      chosen.gpu_bytes == 0 ? "s of all assets" : "s and the query on the GPU");
+      "Memory: of the levels%s. Depths%s in %% of the diagonal, normals in degrees: half of them are off by "
+      "no\n"
+      "more, and in brackets 95 in 100, against level 0.\n",
+      chosen.gpu_bytes == 0 ? " of all assets" : " and the query on the GPU", finest.rest ? " and ends" : "");
   std::printf("Recommended for %s%s:\n", limit_words(arguments).c_str(),
               result.within ? "" : ", WHICH EVEN THE CHEAPEST LEVELS EXCEED");
   for (std::size_t i = 0; i < result.assets.size(); ++i) {

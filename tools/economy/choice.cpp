@@ -57,14 +57,15 @@ Levels within_tolerance(const Candidates& candidates, const std::vector<double>&
   for (std::size_t i = 0; i < levels.size(); ++i) {
     const std::vector<double>& bounds = candidates.error_bounds[i];
     for (std::uint32_t level = 1; level < bounds.size() && bounds[level] <= tolerance[i]; ++level) {
-      if (candidates.measure(candidates.alone(i, level)).change.depth.most <= tolerance[i]) levels[i] = level;
+      if (candidates.measure(candidates.alone(i, level)).change.depth.median <= tolerance[i])
+        levels[i] = level;
     }
   }
   const double largest = tolerance.empty() ? 0 : *std::max_element(tolerance.begin(), tolerance.end());
   const auto is_finest = [&] {
     return std::all_of(levels.begin(), levels.end(), [](std::uint32_t level) { return level == 0; });
   };
-  while (!is_finest() && candidates.measure(levels).change.depth.most > largest)
+  while (!is_finest() && candidates.measure(levels).change.depth.median > largest)
     --levels[loosest(candidates, levels, tolerance)];
   return levels;
 }

@@ -22,9 +22,9 @@ struct Candidates {
 };
 
 /// For each asset the coarsest level whose error bound is at most the asset's tolerance, a length, and that
-/// alone changes depths, 95 of 100, by no more. Then as many finer levels, at the asset whose error bound is
-/// the largest part of its tolerance, as it takes until all together change depths by no more than the
-/// largest tolerance.
+/// alone changes half of the depths by no more. Then as many finer levels, at the asset whose error bound is
+/// the largest part of its tolerance, as it takes until all together change half of the depths by no more
+/// than the largest tolerance.
 Levels within_tolerance(const Candidates& candidates, const std::vector<double>& tolerance);
 
 /// Levels whose cost is at most the budget, or the cheapest if none is so cheap: from the finest on always

@@ -110,8 +110,9 @@ Spread spread_of(std::vector<double> numbers) {
   std::sort(numbers.begin(), numbers.end());
   double sum = 0;
   for (const double number : numbers) sum += number;
-  const std::size_t at_most = (95 * numbers.size() + 99) / 100;  // as many as are to be at most `most`
-  return {sum / static_cast<double>(numbers.size()), numbers[at_most - 1], numbers.back()};
+  const std::size_t count = numbers.size();
+  const auto of_smallest = [&](std::size_t percent) { return numbers[(percent * count + 99) / 100 - 1]; };
+  return {sum / static_cast<double>(count), of_smallest(50), of_smallest(95), numbers.back()};
 }
 
 Difference difference(const Findings& finest, const Findings& coarser) {

@@ -12,6 +12,8 @@
 #include <numeric>
 #include <tuple>
 
+#include "levels/nearest_triangle.h"
+
 namespace tandem::build {
 namespace {
 
@@ -55,8 +57,6 @@ class Frame {
     return result;
   }
 
-  double length_back(double length) const { return std::ldexp(length, exponent_); }
-
  private:
   static constexpr float kInfinity = std::numeric_limits<float>::infinity();
   std::array<float, 3> lower_ = {kInfinity, kInfinity, kInfinity};
@@ -80,8 +80,171 @@ struct Placement {
   }
 };
 
-// Refuses a collapse that turns a triangle by a right angle or more.
-struct NoTurnedTriangle {
+// Keeps the surface near: points of the finest level each know a triangle that is at most so far away, and a
+// collapse that would leave one of them without is refused, as is one that moves a vertex farther from the
+// finest level. Between these points nothing is promised.
+class Guard {
+ public:
+  Guard(const OpenedMesh& opened, const LevelView& finest, double distance)
+      : finest_(finest),
+        square_(distance * distance),
+        positions_(opened.points),
+        near_(opened.points.size()),
+        first_(opened.triangles.size(), kNone) {
+    std::vector<bool> sampled(opened.points.size(), false);
+    double area = 0;
+    for (std::size_t t = 0; t < opened.triangles.size(); ++t) area += doubled_area(opened, t);
+    const double share = area / static_cast<double>(opened.triangles.size());
+    for (std::uint32_t t = 0; t < opened.triangles.size(); ++t) {
+      const auto& corners = opened.triangles[t];
+      for (const std::uint32_t corner : corners) {
+        near_[corner] = opened.was[t];
+        if (!sampled[corner]) add(point_of(corner), t);
+        sampled[corner] = true;
+      }
+      spread(opened, t, share);
+    }
+  }
+
+  // Whether the collapse leaves everything near. If so, keep() may follow.
+  bool allows(const Mesh& mesh, std::uint32_t v0, std::uint32_t v1, const std::array<float, 3>& point) {
+    point_ = point;
+    collect_star(mesh, v0, v1);
+    places_.clear();
+    for (const std::uint32_t face : star_) {
+      for (std::uint32_t sample = first_[face]; sample != kNone; sample = next_[sample]) {
+        double least = std::numeric_limits<double>::infinity();
+        std::uint32_t place = 0;
+        for (const auto& [left, triangle] : left_) {
+          const double square = levels::square_distance(samples_[sample], triangle);
+          if (square < least) {
+            least = square;
+            place = left;
+          }
+        }
+        if (!(least <= square_)) return false;
+        places_.push_back({sample, place});
+      }
+    }
+    const levels::Point moved = {{point[0], point[1], point[2]}};
+    near_of_moved_ = near_[v0];
+    if (!is_near(moved, near_of_moved_)) return false;
+    return std::all_of(left_.begin(), left_.end(), [&](const auto& left) { return lies_near(left.second); });
+  }
+
+  // The collapse that was allowed last happens, and `kept` stands for both ends.
+  void keep(std::uint32_t kept) {
+    positions_[kept] = point_;
+    near_[kept] = near_of_moved_;
+    for (const std::uint32_t face : star_) first_[face] = kNone;
+    for (const auto& [sample, face] : places_) {
+      next_[sample] = first_[face];
+      first_[face] = sample;
+    }
+  }
+
+ private:
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+  // Weights of the second and third corner.
+  static constexpr double kPlaces[][2] = {{0.5, 0},     {0.25, 0},   {0.75, 0},
+                                          {0.25, 0.25}, {0.5, 0.25}, {0.25, 0.5}};
+  static constexpr double kMostSamples = 64;  // of a triangle, beside its corners
+
+  levels::Point point_of(std::uint32_t vertex) const {
+    const auto& p = positions_[vertex];
+    return {{p[0], p[1], p[2]}};
+  }
+
+  double doubled_area(const OpenedMesh& opened, std::size_t t) const {
+    const auto& [a, b, c] = opened.triangles[t];
+    const levels::Point p = point_of(a);
+    const levels::Point normal = levels::cross(levels::minus(point_of(b), p), levels::minus(point_of(c), p));
+    return std::sqrt(levels::dot(normal, normal));
+  }
+
+  void add(const levels::Point& point, std::uint32_t face) {
+    next_.push_back(first_[face]);
+    first_[face] = static_cast<std::uint32_t>(samples_.size());
+    samples_.push_back(point);
+  }
+
+  // Points in large triangles: one for each mean area, on a grid of barycentric coordinates.
+  void spread(const OpenedMesh& opened, std::uint32_t t, double share) {
+    const double wanted = std::min(doubled_area(opened, t) / share, kMostSamples);
+    const int rows = static_cast<int>(std::sqrt(2 * wanted));
+    const auto& [a, b, c] = opened.triangles[t];
+    for (int i = 0; i < rows; ++i) {
+      for (int j = 0; i + j < rows; ++j) {
+        const double u = (i + 1.0 / 3) / rows, v = (j + 1.0 / 3) / rows;
+        const levels::Point along = levels::plus(levels::scaled(u, levels::minus(point_of(b), point_of(a))),
+                                                 levels::scaled(v, levels::minus(point_of(c), point_of(a))));
+        add(levels::plus(point_of(a), along), t);
+      }
+    }
+  }
+
+  // Whether points of a triangle around the moved vertex are near the finest level.
+  bool lies_near(const Triangle& triangle) const {
+    const levels::Point a = levels::corner_of(triangle, 0), b = levels::corner_of(triangle, 1),
+                        c = levels::corner_of(triangle, 2);
+    const auto mix = [&](double u, double v) {
+      return levels::plus(
+          a, levels::plus(levels::scaled(u, levels::minus(b, a)), levels::scaled(v, levels::minus(c, a))));
+    };
+    std::uint32_t hint = near_of_moved_;
+    return std::all_of(std::begin(kPlaces), std::end(kPlaces),
+                       [&](const auto& place) { return is_near(mix(place[0], place[1]), hint); });
+  }
+
+  // Whether a point is near the finest level. `hint`: a triangle that may be, and after that one that is.
+  bool is_near(const levels::Point& point, std::uint32_t& hint) const {
+    if (levels::square_distance(point, finest_.triangles[hint]) <= square_) return true;
+    const levels::NearestTriangle nearest = levels::nearest_triangle(finest_, point, hint);
+    hint = nearest.triangle;
+    return nearest.square <= square_;
+  }
+
+  // The triangles around both ends, and how those that are left will be.
+  void collect_star(const Mesh& mesh, std::uint32_t v0, std::uint32_t v1) {
+    star_.clear();
+    left_.clear();
+    for (const std::uint32_t end : {v0, v1}) {
+      const std::uint32_t other = end == v0 ? v1 : v0;
+      for (const auto h : CGAL::halfedges_around_target(Mesh::Vertex_index(end), mesh)) {
+        if (mesh.is_border(h)) continue;
+        const std::uint32_t face = mesh.face(h), p = mesh.source(h), q = mesh.target(mesh.next(h));
+        const bool vanishes = p == other || q == other;
+        if (!vanishes || end == v0) star_.push_back(face);
+        if (vanishes) continue;
+        Triangle triangle = {};
+        const std::array<float, 3>* corners[] = {&point_, &positions_[q], &positions_[p]};
+        for (int k = 0; k < 3; ++k) std::copy_n(corners[k]->data(), 3, triangle.corner[k].position);
+        left_.push_back({face, triangle});
+      }
+    }
+  }
+
+  LevelView finest_;
+  double square_;
+  std::vector<std::array<float, 3>> positions_;
+  std::vector<std::uint32_t> near_;  // of each vertex: a triangle of the finest level
+  std::vector<levels::Point> samples_;
+  std::vector<std::uint32_t> next_, first_;  // samples of a triangle: a list
+  // Of the collapse that is being looked at:
+  std::array<float, 3> point_ = {};
+  std::uint32_t near_of_moved_ = 0;
+  std::vector<std::uint32_t> star_;
+  std::vector<std::pair<std::uint32_t, Triangle>> left_;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> places_;
+};
+
+// Refuses a collapse that turns a triangle by a right angle or more, or that the guard refuses.
+struct Filter {
+  const OpenedMesh* opened;
+  const Frame* frame;
+  const std::vector<bool>* fixed;
+  Guard* guard;
+
   template <class Profile>
   boost::optional<Point> operator()(const Profile& profile, boost::optional<Point> placement) const {
     if (!placement) return placement;
@@ -94,7 +257,12 @@ struct NoTurnedTriangle {
       const Vector now = CGAL::cross_product(p - *placement, r - *placement);
       if (!(before * now > 0) && before != CGAL::NULL_VECTOR) return boost::none;
     }
-    return placement;
+    std::array<float, 3> point = frame->back(*placement);
+    const std::uint32_t v0 = profile.v0(), v1 = profile.v1();
+    for (const std::uint32_t end : {v0, v1}) {
+      if ((*fixed)[end]) point = opened->points[end];
+    }
+    return guard->allows(profile.surface_mesh(), v0, v1, point) ? placement : boost::none;
   }
 };
 
@@ -111,15 +279,10 @@ struct Recorder : simplification::Edge_collapse_visitor_base<Mesh> {
   const Frame* frame;
   std::vector<bool>* fixed;
   std::vector<Collapse>* collapses;
+  Guard* guard;
   std::uint32_t triangles;
-  double cost = 0;
   std::uint32_t ends[2] = {};
   std::array<float, 3> point = {};
-
-  template <class Profile>
-  void OnSelected(const Profile&, boost::optional<double> least, std::size_t, std::size_t) {
-    if (least) cost = std::max(cost, *least);
-  }
 
   template <class Profile>
   void OnCollapsing(const Profile& profile, const boost::optional<Point>& placement) {
@@ -136,9 +299,9 @@ struct Recorder : simplification::Edge_collapse_visitor_base<Mesh> {
   template <class Profile>
   void OnCollapsed(const Profile&, Mesh::Vertex_index vertex) {
     const std::uint32_t kept = vertex, gone = ends[kept == ends[0] ? 1 : 0];
+    guard->keep(kept);
     (*fixed)[kept] = (*fixed)[kept] || (*fixed)[gone];
-    collapses->push_back(
-        {gone, kept, point, triangles, static_cast<float>(frame->length_back(std::sqrt(cost)))});
+    collapses->push_back({gone, kept, point, triangles});
   }
 };
 
@@ -160,13 +323,15 @@ Mesh surface_mesh(const OpenedMesh& opened, const Frame& frame, std::vector<bool
 
 }  // namespace
 
-std::vector<Collapse> collapse_edges(const OpenedMesh& opened) {
+std::vector<Collapse> collapse_edges(const OpenedMesh& opened, const LevelView& finest, double distance) {
   std::vector<Collapse> collapses;
   std::vector<bool> fixed = opened.fixed;
   const Frame frame(opened.points);
   Mesh mesh = surface_mesh(opened, frame, fixed);
   const Quadrics quadrics(mesh);
+  Guard guard(opened, finest, distance);
   Recorder recorder;
+  recorder.guard = &guard;
   recorder.mesh = &opened;
   recorder.frame = &frame;
   recorder.fixed = &fixed;
@@ -175,7 +340,7 @@ std::vector<Collapse> collapse_edges(const OpenedMesh& opened) {
   simplification::edge_collapse(mesh, Never{},
                                 CGAL::parameters::get_cost(quadrics.get_cost())
                                     .get_placement(Placement{&quadrics, &fixed})
-                                    .filter(NoTurnedTriangle{})
+                                    .filter(Filter{&opened, &frame, &fixed, &guard})
                                     .visitor(recorder));
   return collapses;
 }

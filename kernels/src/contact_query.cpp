@@ -230,7 +230,8 @@ PairTask ContactQuery::State::task_of(std::uint32_t pair) const {
   const double within = adds_errors ? clearance_of_levels(options.within, a.error, b.error) : options.within;
   PairTask task = pair_task(a, b, within);
   task.pair = pair;
-  task.mode = options.mode;
+  const bool proves = options.add_error_bounds && options.mode == QueryMode::fast;
+  task.mode = proves ? QueryMode::exact : options.mode;
   task.first_contact_only = options.first_contact_only;
   return task;
 }

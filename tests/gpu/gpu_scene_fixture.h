@@ -89,19 +89,26 @@ class GpuScene {
  public:
   GpuScene(const SampleAssets& assets, const std::vector<Instance>& instances,
            const std::vector<ObjectPair>& pairs, Contents contents = Contents::all)
+      : GpuScene(assets.views(), instances, pairs, contents) {}
+  GpuScene(std::span<const AssetView> files, const std::vector<Instance>& instances,
+           const std::vector<ObjectPair>& pairs, Contents contents = Contents::all)
       : asset_(on_gpu(part(instances, &Instance::asset))),
         pose_(on_gpu(part(instances, &Instance::pose))),
         pairs_(on_gpu(pairs)),
         count_(on_gpu(std::vector<std::uint32_t>{static_cast<std::uint32_t>(pairs.size())})),
         instance_count_(static_cast<std::uint32_t>(instances.size())),
         pair_count_(static_cast<std::uint32_t>(pairs.size())) {
-    const auto files = assets.views();
     EXPECT_EQ(uploaded_.upload(files, contents, nullptr), Status::kOk);
-    for (std::size_t i = 0; i < uploaded_.count(); ++i)
+    for (std::size_t i = 0; i < uploaded_.count(); ++i) {
       views_.push_back(gpu_asset(uploaded_.level(i), files[i]));
+      for (std::uint32_t level = 0; level < files[i].levels.size(); ++level)
+        levels_.push_back(gpu_asset(uploaded_.level(i, level), files[i], level));
+    }
   }
 
   std::span<const GpuAsset> assets() const { return views_; }
+  std::span<const GpuAsset> levels() const { return levels_; }  ///< asset by asset
+  std::size_t asset_bytes() const { return uploaded_.bytes(); }
   GpuInstances instances() const { return {asset_.data(), pose_.data(), instance_count_}; }
   GpuPairs pairs() const { return {pairs_.data(), count_.data(), pair_count_}; }
 
@@ -114,7 +121,7 @@ class GpuScene {
   }
 
   DeviceAssets uploaded_;
-  std::vector<GpuAsset> views_;
+  std::vector<GpuAsset> views_, levels_;
   GpuArray<std::uint32_t> asset_;
   GpuArray<Pose> pose_;
   GpuArray<ObjectPair> pairs_;

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <memory>
 #include <new>
+#include <optional>
 #include <thread>
 
 #include "backend.h"
@@ -10,6 +11,7 @@
 #include "common/number_words.h"
 #include "contained.h"
 #include "engines/registry.h"
+#include "query_tolerance.h"
 #include "scenes/contacts_file.h"
 #include "scenes/hdf5_file.h"
 #include "scenes/scene_file.h"
@@ -20,6 +22,7 @@ namespace {
 struct QueryArguments {
   std::string scene, out, backend = "cpu", gpu_engine = "tandem-cuda";
   QueryOptions options;
+  std::optional<double> tolerance;
   std::uint32_t repeats = 1;
   bool grouped = false, sorted = false, traversal = false, manifolds = false, contained = false;
   bool json = false, threads_given = false;
@@ -274,7 +277,21 @@ void write(const QueryArguments& arguments, const Answer& answer) {
                  arguments.contained ? &contained : nullptr);
 }
 
+// What it prints and writes is all about pairs of bodies, so options of contacts do not go with it.
+ExitCode run_by_tolerance(const QueryArguments& arguments) {
+  const QueryOptions& options = arguments.options;
+  if (options.mode != QueryMode::exact || options.first_contact_only || options.within > 0 ||
+      options.self_pairs || arguments.manifolds || arguments.contained || arguments.traversal ||
+      arguments.order() != OrderOnGpu::any || arguments.gpu_engine != "tandem-cuda") {
+    throw UsageError("--tolerance finds no contacts, so options that are about them do not go with it");
+  }
+  if (arguments.on_gpu() && arguments.threads_given) throw UsageError("--threads is for the backend cpu");
+  return run_tolerance({arguments.scene, arguments.out, arguments.backend, *arguments.tolerance,
+                        options.threads, arguments.repeats, arguments.json});
+}
+
 ExitCode run(const QueryArguments& arguments) {
+  if (arguments.tolerance) return run_by_tolerance(arguments);
   const Scene scene = read_scene(arguments.scene);
   if (!arguments.out.empty()) keep_inputs(arguments.out, files_of(arguments.scene, scene));
   check_arguments(arguments, scene);
@@ -321,6 +338,12 @@ CLI::App* add_query(CLI::App& app, Run& run_later) {
                    "clearance: also triangles at most so far apart, decided exactly")
       ->check(between(0, kLargestWorldCoordinate))
       ->option_text("D [0]");
+  command
+      ->add_option(
+          "--tolerance", arguments->tolerance,
+          "only which bodies surely meet, which surely do not, and which are within T, by their levels")
+      ->check(between(0, kLargestWorldCoordinate))
+      ->option_text("T");
   command->add_flag("--manifolds", arguments->manifolds,
                     "also contact manifolds: normals, depths and points");
   command->add_flag("--contained", arguments->contained,

@@ -88,6 +88,11 @@ ImpactsOnGpu* impacts_on_gpu() {
   return kFound;
 }
 
+VerdictsOnGpu* verdicts_on_gpu() {
+  constexpr VerdictsOnGpu* kFound = TANDEM_HAVE_CUDA ? time_verdicts_on_gpu : nullptr;
+  return kFound;
+}
+
 std::vector<std::string_view> peer_names() {
   std::vector<std::string_view> names;
   for (const Entry& entry : kEntries) {

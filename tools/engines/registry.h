@@ -6,6 +6,7 @@
 #include "engine.h"
 #include "gpu_distances.h"
 #include "gpu_impacts.h"
+#include "gpu_tolerance.h"
 
 namespace tandem {
 
@@ -24,6 +25,8 @@ std::unique_ptr<Engine> make_engine(std::string_view name, const QueryOptions& o
 DistancesOnGpu* distances_on_gpu();
 /// What finds impacts on the GPU, see gpu_impacts.h; null where this program was built without CUDA.
 ImpactsOnGpu* impacts_on_gpu();
+/// What comes to verdicts on the GPU, see gpu_tolerance.h; null where this program was built without CUDA.
+VerdictsOnGpu* verdicts_on_gpu();
 
 /// The libraries that `bvhbench compare` runs, of those built in, in the order of the charts.
 std::vector<std::string_view> peer_names();

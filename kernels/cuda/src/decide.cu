@@ -170,8 +170,8 @@ class NearDeciding {
     const PairRecord& record = args_.pairs[candidate.pair];
     Verdict verdict = Verdict::apart;
     if (mine) {
-      verdict =
-          distance::decide_within_float64(posed_pair(args_, record, candidate.a, candidate.b), args_.within);
+      verdict = distance::decide_within_float64(posed_pair(args_, record, candidate.a, candidate.b),
+                                                clearance_of(args_, record.instance_a, record.instance_b));
       if (verdict == Verdict::undecided) put(1, candidate);
     }
     count(mine && verdict != Verdict::undecided, &args_.state->decided_by_float64);
@@ -183,7 +183,7 @@ class NearDeciding {
     const bool mine = take(1, candidate);
     const PairRecord& record = args_.pairs[candidate.pair];
     const bool contact =
-        mine && are_within_exactly(args_, posed_pair(args_, record, candidate.a, candidate.b));
+        mine && are_within_exactly(args_, record, posed_pair(args_, record, candidate.a, candidate.b));
     count(mine, &args_.state->decided_exactly);
     add_contact(args_, record, candidate, contact);
   }
@@ -308,7 +308,7 @@ cudaError_t launch_decide(const QueryArgs& args, cudaStream_t stream) {
 }  // namespace
 
 cudaError_t decide_rest(const QueryArgs& args, cudaStream_t stream) {
-  return args.within > 0 ? launch_decide<true>(args, stream) : launch_decide<false>(args, stream);
+  return args.near ? launch_decide<true>(args, stream) : launch_decide<false>(args, stream);
 }
 
 }  // namespace tandem::gpu

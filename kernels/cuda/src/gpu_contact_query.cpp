@@ -242,6 +242,8 @@ gpu::QueryArgs GpuContactQuery::State::args(const GpuInstances& instances, const
   args.limits = limits;
   args.shape = gpu::walk_shape(limits, depth, options.most_blocks);
   args.within = options.within;
+  args.adds_errors = options.add_error_bounds;
+  args.near = options.of_clearance();
   args.clearances = clearances.data();
   args.wide_rooms = wide_rooms.data();
   return args;
@@ -276,7 +278,7 @@ Status GpuContactQuery::reserve(const GpuQueryCapacity& wanted, const GpuQueryOp
   Status status = state_->reserve_pairs(wanted.pairs);
   if (status == Status::kOk) status = state_->reserve_contacts(wanted.contacts);
   if (status == Status::kOk) status = state_->reserve_undecided(wanted.undecided);
-  if (status == Status::kOk && options.within > 0) status = state_->reserve_clearance();
+  if (status == Status::kOk && options.of_clearance()) status = state_->reserve_clearance();
   if (status == Status::kOk && options.sorted) status = state_->reserve_sorting();
   return status == Status::kOk && options.grouped ? state_->reserve_grouping() : status;
 }
@@ -287,7 +289,7 @@ Status GpuContactQuery::enqueue(const GpuInstances& instances, const GpuPairs& p
   if (const Status status = s.check_mode(options.mode); status != Status::kOk) return status;
   if (!(options.within >= 0 && options.within <= kLargestWorldCoordinate)) return Status::kOutOfRange;
   if ((options.sorted && !s.can_sort()) || (options.grouped && !s.can_group()) ||
-      (options.within > 0 && !s.can_clear()))
+      (options.of_clearance() && !s.can_clear()))
     return Status::kOutOfRange;
   const gpu::QueryArgs args = s.args(instances, pairs, options);
   cudaError_t error = s.launch(args, stream);
@@ -326,6 +328,10 @@ const Contact* GpuContactQuery::contacts() const {
 GpuContactGroups GpuContactQuery::groups() const {
   const State& s = *state_;
   return {s.contacts.data(), s.first_contact.data(), s.few.data(), s.many.data(), &s.query->groups};
+}
+
+const std::uint32_t* GpuContactQuery::met() const {
+  return state_->met.data();
 }
 
 const GpuQueryReport* GpuContactQuery::device_report() const {

@@ -7,6 +7,7 @@
 #include "pair_record.h"
 #include "tandem/kernels/detail/candidate.h"
 #include "tandem/kernels/detail/distance/clearance.h"
+#include "tandem/kernels/detail/level_error.h"
 #include "walk_shape.h"
 
 // What the kernels of a query share, all of it in GPU memory.
@@ -103,6 +104,8 @@ struct QueryArgs {
   DeviceLimits limits;
   WalkShape shape;
   double within;                         ///< 0: contacts
+  bool adds_errors;                      ///< of levels, see clearance_of()
+  bool near;                             ///< a query of clearance: one of these is not 0
   distance::FrameClearance* clearances;  ///< of each pair that is in_frame; of clearance, as the next
   WideRoom* wide_rooms;
 };
@@ -160,6 +163,17 @@ __device__ inline bool failed(const QueryArgs& args) {
 /// The pose of stored coordinates.
 __device__ inline Pose stored_pose(const QueryArgs& args, std::uint32_t instance) {
   return stored_pose(args.instances, args.assets, instance);
+}
+
+/// How near triangles of two instances have to be in a query of clearance. In files that are compiled without
+/// fused operations, so that it has the CPU's bits.
+__device__ inline double clearance_of(const QueryArgs& args, std::uint32_t a, std::uint32_t b) {
+  if (!args.adds_errors || a == b) return args.within;
+  const auto error = [&](std::uint32_t instance) {
+    const GpuAsset& asset = args.assets[args.instances.asset[instance]];
+    return posed_level_error(asset.tree, asset.lower, asset.upper, stored_pose(args, instance));
+  };
+  return clearance_of_levels(args.within, error(a), error(b));
 }
 
 /// Whether the contact counts: where only the first is asked for, the first of its pair.

@@ -115,15 +115,16 @@ __device__ inline Status check_instance(const GpuInstances& instances, const Gpu
 }
 
 /// The record of a pair whose two instances have these poses, of stored coordinates, for walks of such
-/// blocks. within: with slack for what is so far apart, of which `clearance` tells.
+/// blocks. within: with slack for what is so far apart, of which `clearance` tells. With 0 that tells what
+/// meets.
 __device__ inline PairRecord make_record(const ObjectPair& pair, const GpuAsset& a, const Pose& pose_a,
                                          const GpuAsset& b, const Pose& pose_b, BlockKind kind, double within,
                                          distance::FrameClearance& clearance) {
   RelativePose pose;
   bool in_frame = relative_pose(pose_a, a.extent, pose_b, b.extent, pose) == RelativePoseStatus::kOk;
   float error = 0, slack = 0;
-  clearance = {};
   if (in_frame) error = frame_error(pose, a.extent, b.extent);
+  clearance = {0, -1, error};
   if (within > 0 && in_frame) {
     const RelativePose of_contacts = pose;
     in_frame = distance::ask_for_clearance(pose_a, within, pose, error, clearance);

@@ -22,7 +22,7 @@ __device__ void prepare_pair(const QueryArgs& args, std::uint32_t index) {
     return;  // reported with the instance
   distance::FrameClearance clearance;
   const PairRecord record = make_record(args.instances, args.assets, pair, walked_kind(args.mode),
-                                        kNear ? args.within : 0, clearance);
+                                        kNear ? clearance_of(args, pair.a, pair.b) : 0, clearance);
   args.pairs[index] = record;
   if (kNear) args.clearances[index] = clearance;
   if (args.first_contact_only) args.met[index] = 0;
@@ -64,7 +64,7 @@ cudaError_t prepare_pairs(const QueryArgs& args, cudaStream_t stream) {
   const auto blocks =
       static_cast<std::uint32_t>(std::min<std::uint64_t>(args.limits.processors * 32, most / kThreads + 1));
   return launch_after({blocks, kThreads, 0, stream, args.limits.early_launch},
-                      args.within > 0 ? prepare<true> : prepare<false>, args);
+                      args.near ? prepare<true> : prepare<false>, args);
 }
 
 }  // namespace tandem::gpu

@@ -7,8 +7,8 @@ namespace tandem::gpu {
 
 cudaError_t walk_exact(const QueryArgs& args, cudaStream_t stream) {
   if (args.walk_only) return launch_walk<InFrame<QueryMode::exact, true>>(args, stream);
-  return args.within > 0 ? launch_walk<NearInFrame<QueryMode::exact>>(args, stream)
-                         : launch_walk<InFrame<QueryMode::exact>>(args, stream);
+  return args.near ? launch_walk<NearInFrame<QueryMode::exact>>(args, stream)
+                   : launch_walk<InFrame<QueryMode::exact>>(args, stream);
 }
 
 }  // namespace tandem::gpu

@@ -309,12 +309,14 @@ __device__ __noinline__ inline bool are_within_in_wide_room(const TrianglePair& 
 }
 
 /// Of clearance.
-__device__ __noinline__ inline bool are_within_exactly(const QueryArgs& args, const TrianglePair& pair) {
+__device__ __noinline__ inline bool are_within_exactly(const QueryArgs& args, const PairRecord& record,
+                                                       const TrianglePair& pair) {
   if (decide_exactly(pair)) return true;
-  const detail::ExponentRange range = exact::exponents_of(pair, args.within);
+  const double within = clearance_of(args, record.instance_a, record.instance_b);
+  const detail::ExponentRange range = exact::exponents_of(pair, within);
   return range.words() <= kFewWords
-             ? are_within_in_few_words(pair, args.within, range)
-             : are_within_in_wide_room(pair, args.within, range, args.wide_rooms[blockIdx.x % kWideRooms]);
+             ? are_within_in_few_words(pair, within, range)
+             : are_within_in_wide_room(pair, within, range, args.wide_rooms[blockIdx.x % kWideRooms]);
 }
 
 /// Boxes in world coordinates, float64, as the triangles. kNear: of clearance.
@@ -327,17 +329,18 @@ struct InWorld {
   __device__ static std::uint32_t test(const QueryArgs& args, const PairRecord& record, std::uint32_t a,
                                        std::uint32_t b, Side& side_a, Side& side_b) {
     const Pose pose_a = stored_pose(args, record.instance_a), pose_b = stored_pose(args, record.instance_b);
+    const double within = kNear ? clearance_of(args, record.instance_a, record.instance_b) : 0;
     if constexpr (kMode == QueryMode::exact) {
       const OrientedBlock &block_a = record.oriented_a[a], &block_b = record.oriented_b[b];
       side_a = {block_a.first_below, block_a.size};
       side_b = {block_b.first_below, block_b.size};
       return world_block_pair_mask(pose_a, block_a, farthest(args, record.instance_a), pose_b, block_b,
-                                   farthest(args, record.instance_b), kNear ? args.within : 0);
+                                   farthest(args, record.instance_b), within);
     } else {
       const Block &block_a = record.blocks_a[a], &block_b = record.blocks_b[b];
       side_a = Blocks::side(block_a, a, tandem::size_of(block_a));
       side_b = Blocks::side(block_b, b, tandem::size_of(block_b));
-      return world_block_pair_mask(pose_a, block_a, pose_b, block_b, kNear ? args.within : 0);
+      return world_block_pair_mask(pose_a, block_a, pose_b, block_b, within);
     }
   }
 
@@ -355,13 +358,15 @@ struct InWorld {
                   kMode == QueryMode::boxes, false};
     if constexpr (kMode == QueryMode::boxes) return out;
     const TrianglePair pair = posed_pair(args, record, a, b);
-    const Verdict verdict = kNear ? distance::decide_within_float64(pair, args.within) : decide_float64(pair);
+    const Verdict verdict = kNear ? distance::decide_within_float64(
+                                        pair, clearance_of(args, record.instance_a, record.instance_b))
+                                  : decide_float64(pair);
     const bool exactly = verdict == Verdict::undecided;
     atomicAdd(exactly ? &args.state->decided_exactly : &args.state->decided_by_float64, Counter{1});
     if (!exactly)
       out.contact = verdict == Verdict::contact;
     else
-      out.contact = kNear ? are_within_exactly(args, pair) : decide_exactly(pair);
+      out.contact = kNear ? are_within_exactly(args, record, pair) : decide_exactly(pair);
     return out;
   }
 };

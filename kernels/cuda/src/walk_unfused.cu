@@ -5,8 +5,8 @@ namespace tandem::gpu {
 
 cudaError_t walk_unfused(const QueryArgs& args, cudaStream_t stream) {
   if (args.mode == QueryMode::boxes) return launch_walk<InFrame<QueryMode::boxes>>(args, stream);
-  return args.within > 0 ? launch_walk<NearInFrame<QueryMode::fast>>(args, stream)
-                         : launch_walk<InFrame<QueryMode::fast>>(args, stream);
+  return args.near ? launch_walk<NearInFrame<QueryMode::fast>>(args, stream)
+                   : launch_walk<InFrame<QueryMode::fast>>(args, stream);
 }
 
 }  // namespace tandem::gpu

@@ -48,7 +48,8 @@ struct QueryOptions {
   /// Levels of detail: each object pair is asked for a clearance that is larger by what its two levels may
   /// differ from the finest ones (docs/levels.md). The finest surfaces of a pair without a contact, and of
   /// two instances that are not found as a pair, are then surely farther apart than `within`, or with 0 do
-  /// not meet. Pairs of finest levels, and pairs of an instance with itself, are decided as without.
+  /// not meet. Mode fast decides exactly then, too. Pairs of finest levels, and pairs of an instance with
+  /// itself, are decided as without.
   bool add_error_bounds = false;
 };
 

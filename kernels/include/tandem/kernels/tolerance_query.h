@@ -14,7 +14,7 @@ enum class ToleranceVerdict : std::uint8_t {
   within_tolerance,  ///< they are at most the tolerance apart; whether they meet was not asked
 };
 
-/// The verdict on an object pair, and the levels of its bodies that told.
+/// The verdict on an object pair, and the levels of its bodies that it was asked of.
 struct PairVerdict {
   ToleranceVerdict verdict;
   std::uint8_t level_a, level_b;
@@ -34,18 +34,15 @@ struct ToleranceOptions {
 /// What a query did. The counters depend neither on the number of threads nor on the machine.
 struct ToleranceCounters {
   std::uint64_t apart = 0, touching = 0, within_tolerance = 0;  ///< object pairs
-  std::uint32_t rounds = 0;                                     ///< that had pairs to look at
-  std::uint64_t pairs_of_round[kMaxLevels] = {};
-  QueryCounters work;  ///< of all rounds together
+  QueryCounters work;                                           ///< of the contact query at these levels
 
   friend bool operator==(const ToleranceCounters&, const ToleranceCounters&) = default;
 };
 
 /// Tells of pairs of bodies with levels of detail whether they surely do not meet, surely meet, or are within
-/// a tolerance, on the CPU. Begins with the coarsest levels and goes on to finer ones for those pairs alone
-/// that these leave open, down to the coarsest levels that tell what is within the tolerance; a pair whose
-/// bodies have none such but the finest is decided exactly. Keeps its memory from call to call. Throws
-/// nothing. Movable, not copyable; one call at a time, several objects side by side.
+/// a tolerance, on the CPU. Each body is looked at at the coarsest level that tells what is within the
+/// tolerance; a pair whose bodies have none such but the finest is decided exactly. Keeps its memory from
+/// call to call. Throws nothing. Movable, not copyable; one call at a time, several objects side by side.
 class ToleranceQuery {
  public:
   ToleranceQuery();

@@ -38,6 +38,12 @@ struct GpuQueryOptions {
   /// Clearance: triangles whose distance is at most this count as contacts, as QueryOptions::within says;
   /// pairs that may have some are found by GpuBroadPhaseOptions::within. From 0 to kLargestWorldCoordinate.
   double within = 0;
+
+  /// Levels of detail: as QueryOptions::add_error_bounds says. Object pairs are found as without.
+  bool add_error_bounds = false;
+
+  /// Whether distances are asked for at all, which takes other kernels, and more memory.
+  constexpr bool of_clearance() const { return within > 0 || add_error_bounds; }
 };
 
 /// How many of each a query has room for, or needs room for.
@@ -57,8 +63,8 @@ constexpr std::size_t most_query_bytes(const GpuQueryCapacity& capacity, const G
                                        std::size_t assets) {
   constexpr std::size_t kFixed = std::size_t{9} << 20;  // work that warps give to each other, and the report
   const std::size_t per_contact = options.sorted ? 20 + 29 : options.grouped ? 20 + 20 : 20;
-  const std::size_t per_pair = (options.grouped ? 168 + 17 : 168) + (options.within > 0 ? 12 : 0);
-  const std::size_t wide = options.within > 0 ? kMostWideBytes : 0;
+  const std::size_t per_pair = (options.grouped ? 168 + 17 : 168) + (options.of_clearance() ? 12 : 0);
+  const std::size_t wide = options.of_clearance() ? kMostWideBytes : 0;
   return kFixed + wide + sizeof(GpuAsset) * assets + per_pair * capacity.pairs +
          per_contact * capacity.contacts + 12 * capacity.undecided;
 }
@@ -112,18 +118,17 @@ class GpuContactQuery {
   Status set_assets(std::span<const GpuAsset> assets, cudaStream_t stream);
 
   /// Makes room for at least so much, waiting for the device where it grows. `options`: those of the calls to
-  /// come; `within` of them counts as 0 or not. Result: kOk, kOutOfRange (sorted or grouped: 2^32 - 1
-  /// contacts or more; grouped: 2^31 pairs or more), kOutOfGpuMemory, kCudaFailed; after an error there is
-  /// the room that there was, or none. Condition: set_assets().
+  /// come; of `within` and add_error_bounds counts whether they are of clearance. Result: kOk, kOutOfRange
+  /// (sorted or grouped: 2^32 - 1 contacts or more; grouped: 2^31 pairs or more), kOutOfGpuMemory,
+  /// kCudaFailed; after an error there is the room that there was, or none. Condition: set_assets().
   Status reserve(const GpuQueryCapacity& capacity, const GpuQueryOptions& options = {});
 
   /// Queues a query behind what `stream` holds; it may be captured into a graph. The arrays must stay until
   /// it is done. A pair of an instance with itself asks for the contacts within it. Mode exact walks oriented
   /// blocks, the others axis-aligned ones. Result: kOk, kNoOrientedBlocks or kNoAxisAlignedBlocks (an asset
-  /// lacks them), kOutOfRange (sorted, grouped or within, and reserved without; a distance that is none),
-  /// kCudaFailed, or, where CUDA loads a
-  /// kernel at its first launch and the GPU is full, kOutOfGpuMemory; what the GPU finds wrong is in the
-  /// report. Condition: set_assets() and reserve().
+  /// lacks them), kOutOfRange (sorted, grouped or of clearance, and reserved without; a distance that is
+  /// none), kCudaFailed, or, where CUDA loads a kernel at its first launch and the GPU is full,
+  /// kOutOfGpuMemory; what the GPU finds wrong is in the report. Condition: set_assets() and reserve().
   Status enqueue(const GpuInstances& instances, const GpuPairs& pairs, const GpuQueryOptions& options,
                  cudaStream_t stream);
 
@@ -139,6 +144,10 @@ class GpuContactQuery {
 
   /// Condition: set_assets(), and reserve() for grouped contacts; valid until the next reserve().
   GpuContactGroups groups() const;
+
+  /// Of each pair whether it has a contact, not 0 where it has, in GPU memory; valid behind a query with
+  /// first_contact_only whose report is kOk and complete. Condition: reserve().
+  const std::uint32_t* met() const;
 
   /// In CPU memory. Condition: the stream has come to the end of the query.
   const GpuQueryReport& report() const;

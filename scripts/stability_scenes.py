@@ -129,14 +129,14 @@ class Run:
 class Workshop:
     """Builds meshes and makes runs in a folder of its own, by one solver."""
 
-    with_levels = ("rock", "cow_24000")  # meshes that are built with LEVELS
-
     def __init__(self, folder, quick, solver="auto", seeds=range(1, 11)):
         self.folder, self.quick, self.solver, self.seeds = Path(folder), quick, solver, seeds
 
     @functools.cache
     def mesh(self, name):
-        source = tools.ROOT / f"assets/{name}.obj"
+        """The .bvh file of a mesh; of the rock, and of names that end in _levels, with LEVELS."""
+        asset = name.removesuffix("_levels")
+        source = tools.ROOT / f"assets/{asset}.obj"
         if name in BOXES:
             source = self.folder / f"{name}.obj"
             source.write_text(box_obj(BOXES[name]))
@@ -144,7 +144,7 @@ class Workshop:
             source = self.folder / "rock.ply"
             tools.run(MAKEASSETS, "rock", "--triangles", ROCK, "-o", source)
         built = self.folder / f"{name}.bvh"
-        tools.run(BVHBUILD, source, "-o", built, "-q", *(["--levels", LEVELS] if name in self.with_levels else []))
+        tools.run(BVHBUILD, source, "-o", built, "-q", *(["--levels", LEVELS] if name == "rock" or name != asset else []))
         return built
 
     def levels(self, mesh):

@@ -11,7 +11,7 @@ import bvh_file
 
 @dataclasses.dataclass
 class Bodies:
-    """What stands where: rows of `asset`, `rotation` and `translation` are bodies."""
+    """What stands where: rows of `asset`, which are of `shapes`, `rotation` and `translation` are bodies."""
     shapes: list  # Shape
     asset: np.ndarray
     fixed: np.ndarray
@@ -53,16 +53,21 @@ def is_closed(triangles):
     return np.array_equal(np.sort(there, axis=None), np.sort(back, axis=None))
 
 
-def read_shape(path):
+def read_shape(path, level):
     try:
-        triangles = bvh_file.read(path).world
+        triangles = bvh_file.read(path, level).world
     except (AssertionError, KeyError, struct.error) as error:
         raise ValueError(f"{path}: not a .bvh file that can be read") from error
     return Shape(triangles, is_closed(triangles))
 
 
-def read_shapes(path, names):
-    return [read_shape(path.parent / (name.decode() if isinstance(name, bytes) else name)) for name in names]
+def read_shapes(path, file, group):
+    """The shapes of the bodies in a group, /instances or /bodies, and which of them each body has: one for each asset and level of detail in use."""
+    names = [name.decode() if isinstance(name, bytes) else name for name in file["assets"][:]]
+    asset = file[f"{group}/asset"][:].astype(int)
+    level = file[f"{group}/level"][:].astype(int) if f"{group}/level" in file else np.zeros(len(asset), int)
+    used, of_each = np.unique(np.stack([asset, level], 1), axis=0, return_inverse=True)
+    return [read_shape(path.parent / names[row], at) for row, at in used.tolist()], of_each.reshape(-1)
 
 
 def read_run(path, file, wanted):
@@ -74,8 +79,7 @@ def read_run(path, file, wanted):
         if frame not in kept:
             raise ValueError(f"does not keep the state after step {frame}, but every {kept[1] - kept[0]}th "
                              f"up to {kept[-1]}" if len(kept) > 1 else "keeps the start alone")
-    shapes = read_shapes(path, file["assets"][:])
-    asset, fixed = file["bodies/asset"][:], file["bodies/motion"][:] == 1
+    (shapes, asset), fixed = read_shapes(path, file, "bodies"), file["bodies/motion"][:] == 1
     centre = file["bodies/center_of_mass"][:]
     states = []
     for row in [kept.index(frame) for frame in wanted or kept[-1:]]:
@@ -87,8 +91,7 @@ def read_run(path, file, wanted):
 
 
 def read_scene(path, file):
-    shapes = read_shapes(path, file["assets"][:])
-    asset = file["instances/asset"][:]
+    shapes, asset = read_shapes(path, file, "instances")
     if "simulation/motion" in file:
         fixed = file["simulation/motion"][:] == 1
     else:

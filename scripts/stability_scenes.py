@@ -8,11 +8,13 @@ import numpy as np
 
 from common import tools
 
-BVHBENCH, BVHBUILD = tools.tool("bvhbench"), tools.tool("bvhbuild")
+BVHBENCH, BVHBUILD, BVHINFO, MAKEASSETS = (tools.tool(name) for name in ("bvhbench", "bvhbuild", "bvhinfo", "makeassets"))
 SLOP = 5e-4  # metres, in every run of a scene
 GRAVITY = 9.81
 # Boxes by their lengths; all other meshes are files of assets/.
 BOXES = {"slab": (300, 40, 2), "flat": (1, 1, 0.2), "uneven": (1, 0.6, 0.2), "thin": (1, 1, 0.01), "target": (2, 2, 0.01)}
+ROCK = 80_000  # triangles of the rough rock, which makeassets makes
+LEVELS = "0.1%,0.3%,1%,3%"  # errors of its coarser levels, of its diagonal
 
 
 def box_obj(lengths):
@@ -43,21 +45,37 @@ class Scene:
     def __init__(self):
         self.meshes, self.bodies = [], []
 
-    def add(self, mesh, at, turned=np.eye(3), fixed=False, density=1000, velocity=(0, 0, 0), spin=(0, 0, 0)):
+    def add(self, mesh, at, turned=np.eye(3), fixed=False, density=1000, velocity=(0, 0, 0), spin=(0, 0, 0), level=0):
         if mesh not in self.meshes:
             self.meshes.append(mesh)
-        self.bodies.append((self.meshes.index(mesh), at, turned, fixed, density, velocity, spin))
+        self.bodies.append((self.meshes.index(mesh), at, turned, fixed, density, velocity, spin, level))
         return self
+
+    def at_level(self, level):
+        """The same scene with its moving bodies at a level of detail."""
+        scene = Scene()
+        scene.meshes = self.meshes
+        scene.bodies = [(*body[:7], 0 if body[3] else level) for body in self.bodies]
+        return scene
+
+    def moved_to(self, rotations, places):
+        """The same scene with its bodies elsewhere, at rest."""
+        scene = Scene()
+        scene.meshes = self.meshes
+        scene.bodies = [(body[0], place, turned, *body[3:5], (0, 0, 0), (0, 0, 0), body[7]) for body, turned, place in zip(self.bodies, rotations, places)]
+        return scene
 
     def slab(self, turned=np.eye(3)):
         """Fixed; its upper side goes through the origin."""
         return self.add("slab", turned @ [0, 0, -BOXES["slab"][2] / 2], turned, fixed=True)
 
     def write(self, path, mesh_file):
-        assets, at, turned, fixed, density, velocity, spin = zip(*self.bodies)
+        assets, at, turned, fixed, density, velocity, spin, level = zip(*self.bodies)
         with h5py.File(path, "w") as file:
             file["assets"] = [str(mesh_file(mesh)) for mesh in self.meshes]
             file["instances/asset"] = np.array(assets, "u4")
+            if any(level):
+                file["instances/level"] = np.array(level, "u4")
             file["instances/rotation"] = np.array(turned, float)
             file["instances/translation"] = np.array(at, float)
             file["simulation/motion"] = np.array(fixed, "u4")
@@ -116,13 +134,30 @@ class Workshop:
 
     @functools.cache
     def mesh(self, name):
-        source = tools.ROOT / f"assets/{name}.obj"
+        """The .bvh file of a mesh; of the rock, and of names that end in _levels, with LEVELS."""
+        asset = name.removesuffix("_levels")
+        source = tools.ROOT / f"assets/{asset}.obj"
         if name in BOXES:
             source = self.folder / f"{name}.obj"
             source.write_text(box_obj(BOXES[name]))
+        if name == "rock":
+            source = self.folder / "rock.ply"
+            tools.run(MAKEASSETS, "rock", "--triangles", ROCK, "-o", source)
         built = self.folder / f"{name}.bvh"
-        tools.run(BVHBUILD, source, "-o", built, "-q")
+        tools.run(BVHBUILD, source, "-o", built, "-q", *(["--levels", LEVELS] if name == "rock" or name != asset else []))
         return built
+
+    def levels(self, mesh):
+        """What bvhinfo says of the levels of a mesh."""
+        return tools.run_json(BVHINFO, self.mesh(mesh), "--json")["levels"]
+
+    def settled(self, scene, seconds):
+        """The scene as it is after a while, at rest."""
+        run = self.simulate(scene, seconds)
+        frame = self.folder / "settled.h5"
+        tools.run(BVHBENCH, "frame", self.folder / "run.h5", "--frame", len(run.frames["time"]), "-o", frame)
+        with h5py.File(frame) as file:
+            return scene.moved_to(file["instances/rotation"][:], file["instances/translation"][:])
 
     def scene_file(self, scene):
         path = self.folder / "scene.h5"

@@ -105,6 +105,12 @@ struct ContactQuery::State : Allocated {
     counters = {};
   }
 
+  // What adds error bounds proves something, so it is decided exactly in mode fast too.
+  void take(const QueryOptions& asked) {
+    options = asked;
+    if (options.add_error_bounds && options.mode == QueryMode::fast) options.mode = QueryMode::exact;
+  }
+
   std::uint32_t most_workers() const { return std::clamp(options.threads, 1u, kMostQueryThreads); }
   std::uint32_t workers_for(std::size_t things, std::size_t at_once) const;
   Status pose_from(std::span<const Instance> posed, std::size_t& i, std::size_t end);
@@ -226,12 +232,11 @@ bool ContactQuery::State::provide_workers() {
 
 PairTask ContactQuery::State::task_of(std::uint32_t pair) const {
   const PosedTree &a = instances[pairs[pair].a], &b = instances[pairs[pair].b];
-  const bool adds_errors = options.add_error_bounds && &a != &b;
-  const double within = adds_errors ? clearance_of_levels(options.within, a.error, b.error) : options.within;
+  double within = options.within;
+  if (options.add_error_bounds && &a != &b) within = clearance_of_levels(within, a.error, b.error);
   PairTask task = pair_task(a, b, within);
   task.pair = pair;
-  const bool proves = options.add_error_bounds && options.mode == QueryMode::fast;
-  task.mode = proves ? QueryMode::exact : options.mode;
+  task.mode = options.mode;
   task.first_contact_only = options.first_contact_only;
   return task;
 }
@@ -342,7 +347,7 @@ Status ContactQuery::keep_fixed(std::span<const Instance> instances, std::span<c
   State& state = *state_;
   state.forget_results();
   state.broad_phase.forget_fixed();
-  state.options = options;
+  state.take(options);
   if (const Status status = state.pose_instances(instances); status != Status::kOk) return status;
   const Status status = state.broad_phase.keep_fixed(state.boxes.view(), motion, state.threads,
                                                      state.workers_for(instances.size(), kInstancesAtOnce));
@@ -352,7 +357,7 @@ Status ContactQuery::keep_fixed(std::span<const Instance> instances, std::span<c
 Status ContactQuery::find_pairs(std::span<const Instance> instances, const QueryOptions& options) {
   if (state_ == nullptr) return Status::kOutOfMemory;
   state_->forget_results();
-  state_->options = options;
+  state_->take(options);
   const Status status = state_->pose_instances(instances);
   return status == Status::kOk ? state_->find_pairs() : status;
 }
@@ -365,7 +370,7 @@ Status ContactQuery::find_contacts(std::span<const Instance> instances, const Qu
 Status ContactQuery::find_contacts(std::span<const Instance> instances, std::span<const ObjectPair> pairs,
                                    const QueryOptions& options) {
   if (state_ == nullptr) return Status::kOutOfMemory;
-  state_->options = options;
+  state_->take(options);
   Status status = state_->pose_instances(instances);
   if (status == Status::kOk) status = state_->take_pairs(pairs);
   return status == Status::kOk ? state_->find_contacts_of_pairs() : status;

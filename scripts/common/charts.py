@@ -30,6 +30,15 @@ def thousands(axis):
     axis.set_minor_formatter(matplotlib.ticker.NullFormatter())
 
 
+def best(points):
+    """Of (time, error, ...) those that no other undercuts in both."""
+    front = []
+    for point in sorted(points, key=lambda point: point[:2]):
+        if not front or point[1] < front[-1][1]:
+            front.append(point)
+    return front
+
+
 def sign(**style):
     """What stands for a series in a legend."""
     return plt.Line2D([], [], **style)

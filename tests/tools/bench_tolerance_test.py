@@ -13,7 +13,7 @@ import unittest
 import h5py
 import numpy as np
 
-from bench_test import BenchTest, IDENTITY
+from bench_test import BenchTest, drop_hint
 from tool_test import DONE, SOURCE_DIR, USAGE
 
 MESHES = pathlib.Path(os.environ.get("TANDEM_MESHES", SOURCE_DIR.parent / "shared" / "meshes"))
@@ -116,7 +116,7 @@ class Tolerance(ToleranceTest):
         for option in (("--mode", "fast"), ("--first-contact",), ("--manifolds",), ("--contained",), ("--within", "1"), ("--self",)):
             self.assert_fails(self.bench("query", self.scene, "--tolerance", "1", *option), USAGE, "--tolerance")
         for bad in ("-1", "nan", "x", "1e301"):
-            self.assert_fails(self.bench("query", self.scene, "--tolerance", bad), USAGE, "--tolerance")
+            self.assert_fails(drop_hint(self.bench("query", self.scene, "--tolerance", bad)), USAGE, "--tolerance")
 
 
 @unittest.skipUnless(MESHES.is_dir(), f"no folder of meshes: {MESHES}")
@@ -126,7 +126,7 @@ class SharedMeshes(ToleranceTest):
         for name in TEN if LONG else FEW:
             with self.subTest(mesh=name):
                 path, errors = self.with_levels(MESHES / name)
-                self.write_near_poses(path, 100 if LONG else 15, 0.01)
+                self.write_near_poses(path, 100 if LONG else 15, 0.02)
                 counted = self.assert_right([0] + [4.001 * error for error in errors[1:]])
                 touching, apart = touching + counted[0][TOUCHING], apart + counted[0][APART]
         self.assertGreater(touching, 250 if LONG else 15)

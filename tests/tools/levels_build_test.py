@@ -230,8 +230,32 @@ class Levels(ToolTest):
                     self.assertEqual(report["fixed_vertices"], fixed)
                 for file in files:
                     self.assertEqual(len(file.components), 1)
+                    if fixed:
+                        on_axis = [c for c in map(tuple, file.corners.reshape(-1, 3)) if c[:2] == (0, 0)]
+                        self.assertEqual(sorted({c[2] for c in on_axis}), [np.float32(i / 12) for i in range(13)])
+                        self.assertEqual((file.topology["flags"] & 112 > 0).sum(), 36)
                 self.assertIn(b"in place at every level",
                               self.build(self.inputs / (name + ".obj"), "-o", self.out, "--levels", "3%").stdout)
+
+    def test_closed_surfaces_along_an_edge_stay_closed(self):
+        """Four blocks around an axis, with two coincident walls between neighbours."""
+        points, faces = [], []
+        for block in range(4):
+            x, y = ((1, 0), (0, 1), (-1, 0), (0, -1))[block]
+            for axis in range(3):
+                for end in (0, 1):
+                    flat, sides = sheet(6, lambda a, b: np.full(len(a), float(end)))
+                    cube = np.roll(flat, axis - 2, axis=1)
+                    turned = np.stack([cube[:, 0] * x - cube[:, 1] * y, cube[:, 0] * y + cube[:, 1] * x, cube[:, 2]], 1)
+                    wobble = 1 + 0.03 * np.sin(3 * turned[:, 2:]) * np.array([1, 1, 0])
+                    faces += [tuple(np.asarray(side)[::1 if end else -1] + len(points)) for side in sides]
+                    points += list(np.round(turned * wobble, 6))
+        report = self.built_json("blocks.obj", obj(points, faces), "--levels", "0.5%,2%")
+        self.assertGreater(report["fixed_vertices"], 20)
+        files = self.assert_levels(report, self.out)
+        self.assertGreater(len(files), 1)
+        for row in report["levels"]:
+            self.assertTrue(row["closed"])
 
     def test_balls_that_touch_in_a_vertex_still_do(self):
         points, faces = ball(12, bumps=0)

@@ -25,7 +25,7 @@ std::vector<std::string> files_of(const std::string& path, const Scene& scene) {
 std::uint64_t triangles_of(const Scene& scene) {
   std::uint64_t triangles = 0;
   for (const Instance& instance : scene.description.instances) {
-    triangles += scene.assets[instance.asset].view().level().triangle_count;
+    triangles += scene.view(instance.asset).level().triangle_count;
   }
   return triangles;
 }

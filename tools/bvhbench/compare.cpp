@@ -37,7 +37,7 @@ void check_instances(const std::string& path, const Scene& scene) {
   const auto& instances = scene.description.instances;
   for (std::size_t i = 0; i < instances.size(); ++i) {
     const std::string which = path + ": instance " + std::to_string(i) + ": ";
-    if (instances[i].asset >= scene.assets.size()) throw FileError(which + "no such asset");
+    if (instances[i].asset >= scene.shapes.size()) throw FileError(which + "no such asset");
     if (!is_rigid(instances[i].pose)) throw FileError(which + "the pose is not rigid");
   }
 }
@@ -55,7 +55,7 @@ std::vector<ObjectPair> given_pairs(const std::string& path, const Scene& scene)
 std::vector<ObjectPair> found_pairs(const std::string& path, const Scene& scene) {
   std::vector<WorldBox> boxes;
   for (const Instance& instance : scene.description.instances) {
-    const FileHeader& header = *scene.assets[instance.asset].view().header;
+    const FileHeader& header = *scene.view(instance.asset).header;
     boxes.push_back(
         world_box(for_stored_coordinates(instance.pose, header.origin), header.lower, header.upper));
   }

@@ -47,7 +47,7 @@ std::uint64_t triangles_of_pairs(const Scene& scene, const std::vector<ObjectPai
   std::uint64_t sum = 0;
   for (const auto& [a, b] : pairs) {
     for (const std::uint32_t body : {a, b})
-      sum += scene.assets[scene.description.instances[body].asset].view().level().triangle_count;
+      sum += scene.view(scene.description.instances[body].asset).level().triangle_count;
   }
   return sum;
 }

@@ -23,8 +23,7 @@ TimedContainments find_contained(const Scene& scene, std::span<const ObjectPair>
                    [](const Contact& x, const Contact& y) { return x.pair < y.pair; });
   ContainmentQuery query;
   const Status status = query.set_assets(scene.views());
-  if (status == Status::kNoTopology)
-    throw FileError(scene.description.assets[query.where()] + ": " + explain(status));
+  if (status == Status::kNoTopology) throw FileError(scene.name_of(query.where()) + ": " + explain(status));
   require(status);
   TimedContainments found;
   for (std::uint32_t i = 0; i < repeats; ++i) {

@@ -25,6 +25,7 @@ ExitCode run(const FrameArguments& arguments) {
     scene.assets.push_back(seen_from(arguments.output, path.string()));
   }
   scene.instances = frame.poses;
+  scene.level = frame.level;
   write_scene(arguments.output, scene);
   std::printf("%s: %s instances after step %u of %s\n", arguments.output.c_str(),
               with_commas(scene.instances.size()).c_str(), arguments.frame, arguments.run.c_str());

@@ -8,6 +8,7 @@
 #include "common/printable.h"
 #include "compare_command.h"
 #include "distance_command.h"
+#include "economy_command.h"
 #include "engines/engine.h"
 #include "frame_command.h"
 #include "impact_command.h"
@@ -67,6 +68,7 @@ int main(int argc, char** argv) {
   add_distance(app, run);
   add_compare(app, run);
   add_simulate(app, run);
+  add_economy(app, run);
   add_frame(app, run);
   add_poses(app, run);
   ExitCode exit_code = kDone;

@@ -73,7 +73,8 @@ Poses make(const PosesArguments& arguments, const Bodies& bodies) {
 // Whether the scene is one that write() below makes.
 bool is_of_poses(const SceneDescription& scene) {
   const std::size_t count = scene.instances.size(), assets = scene.assets.size();
-  if (!scene.poses || !scene.pairs || count < 2 || assets < 1 || assets > 2) return false;
+  if (!scene.poses || !scene.pairs || !scene.level.empty() || count < 2 || assets < 1 || assets > 2)
+    return false;
   const PoseNotes& notes = *scene.poses;
   if (notes.geometry.size() != assets || notes.stream.size() != 2 || notes.depth.size() != count - 1)
     return false;

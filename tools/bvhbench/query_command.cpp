@@ -70,9 +70,10 @@ QueryRecord record_of(const QueryArguments& arguments, const Scene& scene) {
 
 // Takes the contacts.
 ContactTable table_of(const Scene& scene, TimedAnswer& timed) {
+  const std::vector<AssetView> views = scene.views();
   const auto face = [&](std::uint32_t instance, std::uint32_t triangle) {
-    const std::uint32_t asset = scene.description.instances[instance].asset;
-    return scene.assets[asset].view().level().triangles[triangle].source_face();
+    const std::uint32_t shape = scene.description.instances[instance].asset;
+    return views[shape].level().triangles[triangle].source_face();
   };
   std::vector<FaceContact> faces;
   faces.reserve(timed.contacts.size());
@@ -110,8 +111,7 @@ Answer answer_of(const QueryArguments& arguments, const Scene& scene) {
     return run_query(arguments, scene);
   } catch (const EngineError& error) {
     if (error.status == Status::kNoTopology) {
-      throw FileError(arguments.scene + ": " + scene.description.assets[error.where] + ": " +
-                      explain(error.status));
+      throw FileError(arguments.scene + ": " + scene.name_of(error.where) + ": " + explain(error.status));
     }
     refuse(arguments.scene, error.status, error.where);
   } catch (const GpuError& error) {

@@ -1,6 +1,5 @@
 #include "query_tolerance.h"
 
-#include <algorithm>
 #include <cstdio>
 #include <new>
 
@@ -19,16 +18,6 @@ struct Answer {
   TimedVerdicts timed;
   VerdictRecord record;
 };
-
-// A view of all levels for each of the scene's views.
-std::vector<AssetView> all_levels(const Scene& scene) {
-  std::vector<AssetView> views = scene.views();
-  for (AssetView& view : views) {
-    const auto of_it = [&](const MappedAsset& asset) { return asset.view().header == view.header; };
-    view = std::find_if(scene.assets.begin(), scene.assets.end(), of_it)->view();
-  }
-  return views;
-}
 
 void require(const std::string& scene, const ToleranceQuery& query, Status status) {
   if (status == Status::kOutOfMemory) throw std::bad_alloc();
@@ -65,7 +54,7 @@ TimedVerdicts time_on_gpu(const ToleranceArguments& arguments, const BodiesWithL
 
 Answer answer_of(const ToleranceArguments& arguments, const Scene& scene) {
   const SceneDescription& description = scene.description;
-  const std::vector<AssetView> shapes = all_levels(scene);
+  const std::vector<AssetView> shapes = scene.finest_views();
   const std::vector<ObjectPair> pairs = normalised(description.pairs.value_or(std::vector<ObjectPair>()));
   ExcludedPairTable excluded;
   const BodiesWithLevels bodies = {shapes, description.instances, arguments.tolerance,

@@ -14,7 +14,7 @@ namespace {
 
 struct SceneArguments {
   std::string mesh, ground, output;
-  std::uint32_t count = 0, fixed = 100'000;
+  std::uint32_t count = 0, fixed = 100'000, level = 0;
   double jitter = 0.001, neighbours = 6.5, spacing = 0.7, tilt = 20;
   bool exact = false;
   std::uint64_t seed = 1;
@@ -32,6 +32,23 @@ struct Bodies {
 };
 using Maker = std::function<Bodies(const SceneArguments&, const Assets&)>;
 
+// The bodies' mesh at the level that is asked for.
+AssetView body_of(const SceneArguments& arguments, const AssetView& mesh) {
+  const std::size_t levels = mesh.levels.size();
+  if (arguments.level < levels) return mesh.levels_from(arguments.level, 1);
+  throw UsageError(arguments.mesh + ": has " + std::to_string(levels) + (levels == 1 ? " level" : " levels") +
+                   ", so there is no level " + std::to_string(arguments.level));
+}
+
+// Of each instance; none where all are at level 0.
+std::vector<std::uint32_t> levels_of(const SceneArguments& arguments,
+                                     const std::vector<Instance>& instances) {
+  std::vector<std::uint32_t> levels;
+  if (arguments.level == 0) return levels;
+  for (const Instance& instance : instances) levels.push_back(instance.asset == 0 ? arguments.level : 0);
+  return levels;
+}
+
 ExitCode run(const SceneArguments& arguments, const Maker& make) {
   keep_inputs(arguments.output, {arguments.mesh, arguments.ground});
   std::vector<MappedAsset> meshes;
@@ -40,13 +57,14 @@ ExitCode run(const SceneArguments& arguments, const Maker& make) {
   for (const std::string& path : {arguments.mesh, arguments.ground}) {
     if (path.empty()) continue;
     meshes.push_back(open_mesh(path));
-    assets.push_back(meshes.back().view());
+    assets.push_back(assets.empty() ? body_of(arguments, meshes.back().view()) : meshes.back().view());
     scene.assets.push_back(seen_from(arguments.output, path));
   }
   std::uint64_t pairs = 0;
   try {
     Bodies bodies = make(arguments, assets);
     scene.instances = std::move(bodies.instances);
+    scene.level = levels_of(arguments, scene.instances);
     scene.filter.motion = std::move(bodies.motion);
     ExcludedPairTable excluded;
     pairs = count_box_pairs(assets, scene.instances, scene.filter.view(excluded));
@@ -68,6 +86,9 @@ CLI::App* add_kind(CLI::App& scene, Run& run_later, const std::shared_ptr<SceneA
   command->add_option("--count", arguments->count, "how many")
       ->check(CLI::Range(1, 10'000'000))
       ->option_text("N [" + std::to_string(count) + "]");
+  command->add_option("--level", arguments->level, "of detail of the bodies; 0: the finest")
+      ->check(CLI::NonNegativeNumber)
+      ->option_text("N [0]");
   command->add_option("--seed", arguments->seed, "another scene of the kind")
       ->check(CLI::NonNegativeNumber)
       ->option_text("N [1]");

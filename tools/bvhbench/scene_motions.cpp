@@ -10,23 +10,23 @@
 namespace tandem::bench {
 namespace {
 
-// Centres of mass of the assets, computed where they are asked for.
+// Centres of mass of the shapes, those of their assets' finest level, computed where they are asked for.
 class MassCenters {
  public:
-  explicit MassCenters(const Scene& scene) : scene_(scene), centers_(scene.assets.size()) {}
+  explicit MassCenters(const Scene& scene) : scene_(scene), centers_(scene.shapes.size()) {}
 
   // In the file's coordinates.
-  const Eigen::Vector3d& of(std::uint32_t asset) {
-    if (!centers_[asset]) centers_[asset] = compute(asset);
-    return *centers_[asset];
+  const Eigen::Vector3d& of(std::uint32_t shape) {
+    if (!centers_[shape]) centers_[shape] = compute(shape);
+    return *centers_[shape];
   }
 
  private:
-  Eigen::Vector3d compute(std::uint32_t asset) const {
+  Eigen::Vector3d compute(std::uint32_t shape) const {
     try {
-      return simulation::mass_properties(scene_.assets[asset].view()).properties.center;
+      return simulation::mass_properties(scene_.assets[scene_.shapes[shape].asset].view()).properties.center;
     } catch (const std::runtime_error& impossible) {
-      throw FileError(scene_.description.assets[asset] + ": " + impossible.what());
+      throw FileError(scene_.name_of(shape) + ": " + impossible.what());
     }
   }
 

@@ -60,19 +60,13 @@ using SetUp = std::function<void(const SimulateArguments&, Start&)>;
 void open(Start& start, const std::vector<std::string>& paths) {
   for (const std::string& path : paths) {
     if (path.empty()) continue;
-    start.scene.assets.push_back(open_mesh(path));
+    start.scene.add(open_mesh(path));
     start.paths.push_back(path);
   }
 }
 
-// The length that lengths of a contact are measured by: the diagonal of the first shape.
-double diagonal(const Start& start) {
-  return bounds_of(start.scene.assets[0].view()).diagonal();
-}
-
 double slop_of(const SimulateArguments& arguments, const Start& start) {
-  constexpr double kSlop = 2.5e-4;  // of the diagonal
-  return arguments.slop >= 0 ? arguments.slop : kSlop * diagonal(start);
+  return arguments.slop >= 0 ? arguments.slop : default_slop(start.scene.assets[0].view());
 }
 
 void set_up_stack(const SimulateArguments& arguments, Start& start) {
@@ -118,9 +112,8 @@ void set_up_scene(const SimulateArguments& arguments, Start& start) {
 Json options_of(const char* kind, const SimulateArguments& arguments, const Start& start) {
   const SimulatorOptions& simulator = arguments.simulator;
   const SolverOptions& solver = simulator.solver;
-  const auto shapes = start.shapes();
   return {{"configuration", kind},
-          {"start", hexadecimal(hash_of(start.bodies.bodies, start.bodies.states, shapes))},
+          {"start", hexadecimal(hash_of(start.bodies.bodies, start.bodies.states, start.scene))},
           {"seed", arguments.seed},
           {"engine", arguments.engine},
           {"mode", arguments.fast ? "fast" : "exact"},
@@ -148,6 +141,7 @@ RunDescription describe(const char* kind, const SimulateArguments& arguments, co
   RunDescription run;
   run.options = options_of(kind, arguments, start);
   for (const std::string& path : start.paths) run.assets.push_back(seen_from(arguments.run.output, path));
+  run.shapes = start.scene.shapes;
   run.bodies = start.bodies.bodies;
   run.triangles = start.bodies.triangles;
   return run;

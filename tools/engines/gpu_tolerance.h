@@ -21,9 +21,9 @@ struct TimedVerdicts {
   std::vector<ObjectPair> pairs;
   std::vector<PairVerdict> verdicts;
   ToleranceCounters counters;
-  Seconds
-      seconds;  ///< of each repeat; on a GPU a replayed graph, the broad phase included where pairs are found
-  Seconds rounds;  ///< on a GPU: the same without the broad phase
+  /// Of each repeat; on a GPU a replayed graph, the broad phase included where pairs are found.
+  Seconds seconds;
+  Seconds deciding;  ///< on a GPU: the same without the broad phase
   GpuUse gpu;
 };
 

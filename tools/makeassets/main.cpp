@@ -6,6 +6,7 @@
 
 #include "closed_mesh_check.h"
 #include "cow_mesh.h"
+#include "rock.h"
 #include "terrain.h"
 #include "write_mesh.h"
 
@@ -18,6 +19,7 @@ enum ExitCode { kDone = 0, kUsage = 1, kNotWritten = 4, kInternal = 5 };
 constexpr const char* kCowComment =
     "Tandem's cow, MIT licence. Units: metres. Axes: x forward, y left, z up.";
 constexpr const char* kBoxComment = "Unit cube centred at the origin, MIT licence. Units: metres.";
+constexpr const char* kRockComment = "A rough rock, MIT licence. Units: metres.";
 constexpr const char* kTerrainComment = "Uneven ground, MIT licence. Units: metres. Axes: z up.";
 
 // A multiple of 4e-6: the midpoints of two subdivisions are then multiples of 1e-6, which six decimals hold
@@ -82,6 +84,22 @@ int write_terrain(const TerrainOptions& options) {
                options.path);
 }
 
+struct RockOptions {
+  std::uint64_t triangles = 80'000;
+  std::uint32_t seed = 1;
+  std::filesystem::path path;
+};
+
+int write_rock(const RockOptions& options) {
+  const std::uint32_t side = rock_side_for(options.triangles);
+  if (std::uint64_t{8} * side * side != options.triangles)
+    throw CLI::ValidationError("--triangles", "must be 8 times a square, as 80000 is");
+  const Mesh mesh = rock(side, options.seed);
+  if (const std::string defect = closed_mesh_defect(mesh, options.triangles); !defect.empty())
+    return report(options.path, "not written: " + defect, kInternal);
+  return write(mesh, kRockComment, options.path);
+}
+
 std::string ending_defect(const std::string& path) {
   const std::filesystem::path ending = std::filesystem::path(path).extension();
   return ending == ".obj" || ending == ".ply" ? "" : "must end in .obj or .ply";
@@ -110,9 +128,20 @@ int main(int argc, char** argv) {
       ->check(ending_defect)
       ->required();
 
+  RockOptions rough;
+  CLI::App* stone = app.add_subcommand("rock", "Write one rough rock, as a scanner would see it");
+  stone->add_option("--triangles", rough.triangles, "8 times a square")
+      ->check(CLI::Range(std::uint64_t{8}, kMaxTriangles))
+      ->capture_default_str();
+  stone->add_option("--seed", rough.seed, "Number of the rock")->capture_default_str();
+  stone->add_option("-o,--output", rough.path, "File: .obj, or .ply for binary PLY")
+      ->check(ending_defect)
+      ->required();
+
   try {
     app.parse(argc, argv);
-    return *all ? write_all(folder) : write_terrain(options);
+    if (*all) return write_all(folder);
+    return *stone ? write_rock(rough) : write_terrain(options);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kDone : kUsage;
   } catch (const std::exception& error) {

@@ -2,22 +2,15 @@
 
 #include <cmath>
 
+#include "noise.h"
+
 namespace tandem::makeassets {
 namespace {
 
-// A height in [-1, 1] at a lattice point: an integer hash, the same on every machine.
+// A height in [-1, 1] at a lattice point.
 double lattice_height(std::int64_t x, std::int64_t y, std::uint64_t seed) {
-  std::uint64_t h = seed * 0x9E3779B97F4A7C15u + static_cast<std::uint64_t>(x) * 0xC2B2AE3D27D4EB4Fu +
-                    static_cast<std::uint64_t>(y) * 0x165667B19E3779F9u;
-  h = (h ^ h >> 30) * 0xBF58476D1CE4E5B9u;  // finaliser of SplitMix64
-  h = (h ^ h >> 27) * 0x94D049BB133111EBu;
-  h ^= h >> 31;
-  return static_cast<double>(h >> 11) / static_cast<double>(1ull << 52) - 1;
-}
-
-// Perlin's quintic: first and second derivatives vanish at 0 and 1, so that cells join without a crease.
-double fade(double t) {
-  return t * t * t * (t * (t * 6 - 15) + 10);
+  return hashed(seed * 0x9E3779B97F4A7C15u + static_cast<std::uint64_t>(x) * 0xC2B2AE3D27D4EB4Fu +
+                static_cast<std::uint64_t>(y) * 0x165667B19E3779F9u);
 }
 
 double value_noise(double x, double y, std::uint64_t seed) {

@@ -28,6 +28,7 @@ void send(const Sink& sink, const std::vector<std::string>& strings) {
 void send(const Sink& sink, const SceneDescription& scene) {
   send(sink, scene.assets);
   send(sink, scene.instances);
+  send(sink, scene.level);
   send(sink, scene.filter.motion);
   send(sink, scene.filter.group);
   send(sink, scene.filter.mask);
@@ -89,8 +90,8 @@ class Receiver {
   }
 
   bool receive(SceneDescription& scene) {
-    return receive(scene.assets) && receive(scene.instances) && receive(scene.filter) &&
-           receive(scene.pairs) && receive(scene.poses);
+    return receive(scene.assets) && receive(scene.instances) && receive(scene.level) &&
+           receive(scene.filter) && receive(scene.pairs) && receive(scene.poses);
   }
 
   template <typename Part>

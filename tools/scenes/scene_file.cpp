@@ -37,14 +37,18 @@ std::vector<ObjectPair> read_pairs(const Hdf5Input& file, const char* name) {
   return pairs;
 }
 
+// An optional number of each instance.
+std::vector<std::uint32_t> read_of_each(const Hdf5Input& file, const std::string& path,
+                                        const std::string& name, std::size_t instances) {
+  if (!file.has(name)) return {};
+  std::vector<std::uint32_t> values = file.read_u32(name);
+  if (values.size() == instances) return values;
+  throw FileError(path + ": " + name + ": " + std::to_string(values.size()) + " rows for " +
+                  std::to_string(instances) + " instances");
+}
+
 SceneFilter read_filter(const Hdf5Input& file, const std::string& path, std::size_t instances) {
-  const auto of_each = [&](const std::string& name) -> std::vector<std::uint32_t> {
-    if (!file.has(name)) return {};
-    std::vector<std::uint32_t> values = file.read_u32(name);
-    if (values.size() == instances) return values;
-    throw FileError(path + ": " + name + ": " + std::to_string(values.size()) + " rows for " +
-                    std::to_string(instances) + " instances");
-  };
+  const auto of_each = [&](const std::string& name) { return read_of_each(file, path, name, instances); };
   SceneFilter filter;
   filter.group = of_each("/instances/group");
   filter.mask = of_each("/instances/mask");
@@ -69,6 +73,7 @@ SceneDescription read_file(const std::string& path) {
   SceneDescription scene;
   scene.assets = file.read_strings("/assets");
   scene.instances = read_instances(file, path);
+  scene.level = read_of_each(file, path, "/instances/level", scene.instances.size());
   if (file.has("/pairs")) scene.pairs = read_pairs(file, "/pairs");
   if (file.has("/poses")) scene.poses = read_notes(file);
   scene.filter = read_filter(file, path, scene.instances.size());
@@ -94,6 +99,19 @@ void check_indices(const SceneDescription& scene, const std::string& path) {
   check_pairs("/excluded", scene.filter.excluded);
 }
 
+// Levels that an asset has not got.
+void check_levels(const Scene& scene, const std::string& path) {
+  const SceneDescription& told = scene.description;
+  for (std::size_t i = 0; i < told.level.size(); ++i) {
+    const std::uint32_t asset = told.instances[i].asset;
+    const std::size_t levels = scene.assets[asset].view().levels.size();
+    if (told.level[i] < levels) continue;
+    throw FileError(path + ": /instances/level: instance " + std::to_string(i) + " is at level " +
+                    std::to_string(told.level[i]) + " of " + told.assets[asset] + ", which has " +
+                    std::to_string(levels));
+  }
+}
+
 MappedAsset open_asset(const std::string& scene, const std::vector<std::string>& names, std::size_t i) {
   const std::string where = " (asset " + std::to_string(i) + " of " + scene + ")";
   if (names[i].empty()) throw FileError(scene + ": /assets: row " + std::to_string(i) + " is empty");
@@ -116,10 +134,46 @@ PairFilter SceneFilter::view(ExcludedPairTable& table) const {
   return {of_each(motion), of_each(group), of_each(mask), table.view()};
 }
 
+void Scene::add(MappedAsset asset) {
+  shapes.push_back({static_cast<std::uint32_t>(assets.size())});
+  assets.push_back(std::move(asset));
+}
+
+AssetView Scene::view(std::uint32_t shape) const {
+  return assets[shapes[shape].asset].view().levels_from(shapes[shape].level, 1);
+}
+
 std::vector<AssetView> Scene::views() const {
   std::vector<AssetView> views;
-  for (const MappedAsset& asset : assets) views.push_back(asset.view());
+  for (std::uint32_t i = 0; i < shapes.size(); ++i) views.push_back(view(i));
   return views;
+}
+
+std::vector<AssetView> Scene::finest_views() const {
+  std::vector<AssetView> views;
+  for (const SceneShape& shape : shapes) views.push_back(assets[shape.asset].view());
+  return views;
+}
+
+const std::string& Scene::name_of(std::uint64_t shape) const {
+  return description.assets[shapes[shape].asset];
+}
+
+void use_levels(Scene& scene, std::span<const std::uint32_t> level) {
+  std::vector<Instance>& instances = scene.description.instances;
+  std::vector<SceneShape>& shapes = scene.shapes;
+  shapes.clear();
+  for (std::size_t i = 0; i < instances.size(); ++i) {
+    const SceneShape shape = {instances[i].asset, level[i]};
+    if (shapes.empty() || shapes.back() != shape) shapes.push_back(shape);
+  }
+  std::sort(shapes.begin(), shapes.end());
+  shapes.erase(std::unique(shapes.begin(), shapes.end()), shapes.end());
+  for (std::size_t i = 0; i < instances.size(); ++i) {
+    const auto found =
+        std::lower_bound(shapes.begin(), shapes.end(), SceneShape{instances[i].asset, level[i]});
+    instances[i].asset = static_cast<std::uint32_t>(found - shapes.begin());
+  }
 }
 
 MappedAsset open_mesh(const std::string& path) {
@@ -146,8 +200,11 @@ Scene read_scene(const std::string& path) {
   Scene scene;
   scene.description = read_description(path);
   for (std::size_t i = 0; i < scene.description.assets.size(); ++i) {
-    scene.assets.push_back(open_asset(path, scene.description.assets, i));
+    scene.add(open_asset(path, scene.description.assets, i));
   }
+  check_levels(scene, path);
+  const std::vector<std::uint32_t>& level = scene.description.level;
+  if (!level.empty()) use_levels(scene, level);
   return scene;
 }
 
@@ -186,6 +243,7 @@ void add_scene(Hdf5Output& file, const SceneDescription& scene) {
   file.add("/instances/asset", {asset.size()}, asset);
   file.add("/instances/rotation", {asset.size(), 3, 3}, rotation);
   file.add("/instances/translation", {asset.size(), 3}, translation);
+  if (!scene.level.empty()) file.add("/instances/level", {scene.level.size()}, scene.level);
   if (scene.pairs) add_pairs(file, "/pairs", *scene.pairs);
   add_filter(file, scene.filter);
   if (scene.poses) {

@@ -1,5 +1,7 @@
 #pragma once
+#include <compare>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -37,18 +39,43 @@ struct SceneFilter {
 struct SceneDescription {
   std::vector<std::string> assets;  ///< .bvh paths, relative to the scene file
   std::vector<Instance> instances;
+  std::vector<std::uint32_t> level;              ///< of detail, of each instance; none: level 0 of all
   std::optional<std::vector<ObjectPair>> pairs;  ///< without them the broad phase makes the pairs
   std::optional<PoseNotes> poses;                ///< of files of poses
   SceneFilter filter;
 };
 
-/// A scene with its assets mapped and checked.
+/// What instances of a scene are posed copies of.
+struct SceneShape {
+  std::uint32_t asset;
+  std::uint32_t level = 0;  ///< of detail
+
+  friend auto operator<=>(const SceneShape&, const SceneShape&) = default;
+};
+
+/// A scene with its assets mapped and checked. Its instances are of rows of `shapes`, not of assets.
 struct Scene {
   SceneDescription description;
   std::vector<MappedAsset> assets;
+  std::vector<SceneShape> shapes;  ///< all assets where no instance has a level; else those in use, sorted
 
+  /// Adds an asset, and its finest level to the shapes.
+  void add(MappedAsset asset);
+
+  /// Of a shape: its level, which is level 0 of the view, and no other.
+  AssetView view(std::uint32_t shape) const;
   std::vector<AssetView> views() const;
+
+  /// The assets of the shapes, with all levels.
+  std::vector<AssetView> finest_views() const;
+
+  /// What the file calls the asset of a shape.
+  const std::string& name_of(std::uint64_t shape) const;
 };
+
+/// Lets the instances of a scene be of the (asset, level) pairs that `level`, of each instance, tells.
+/// Condition: its instances are of assets, and these have the levels.
+void use_levels(Scene& scene, std::span<const std::uint32_t> level);
 
 /// The .bvh file at a path. Throws FileError.
 MappedAsset open_mesh(const std::string& path);

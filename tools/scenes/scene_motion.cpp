@@ -33,4 +33,14 @@ SceneMotion read_motion(const std::string& path, std::size_t instances) {
   return motion;
 }
 
+void add_motion(Hdf5Output& file, const SceneMotion& motion) {
+  const auto add = [&](const char* name, const std::vector<double>& vectors) {
+    if (!vectors.empty()) file.add(name, {vectors.size() / 3, 3}, vectors);
+  };
+  if (!motion.density.empty()) file.add("/simulation/density", {motion.density.size()}, motion.density);
+  add("/simulation/velocity", motion.velocity);
+  add("/simulation/angular_velocity", motion.angular_velocity);
+  add("/simulation/centre", motion.centre);
+}
+
 }  // namespace tandem::bench

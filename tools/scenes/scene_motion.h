@@ -13,4 +13,9 @@ struct SceneMotion {
 /// Reads it from a file that read_scene() accepts. Throws FileError.
 SceneMotion read_motion(const std::string& path, std::size_t instances);
 
+class Hdf5Output;
+
+/// Adds it to a scene file in the making. Throws FileError.
+void add_motion(Hdf5Output& file, const SceneMotion& motion);
+
 }  // namespace tandem::bench

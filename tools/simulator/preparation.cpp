@@ -5,6 +5,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "common/random_pose.h"
 #include "scenes/scene_motion.h"
 #include "tandem/formats/hash.h"
 
@@ -28,11 +29,17 @@ double radius_about(const Vector3d& center, const AssetView& shape) {
   return std::sqrt(squared);
 }
 
-// Bodies of each shape, of density 1.
+// Bodies of each shape, of density 1. Their mass is that of `finest`, the shapes' assets from level 0 on: a
+// coarser level changes what a body touches, not what it weighs.
 class Shapes {
  public:
-  Shapes(std::span<const AssetView> shapes, std::span<const std::string> names)
-      : shapes_(shapes), names_(names), of_dynamic_(shapes.size()), of_fixed_(shapes.size()) {}
+  Shapes(std::span<const AssetView> shapes, std::span<const AssetView> finest,
+         std::span<const std::string> names)
+      : shapes_(shapes),
+        finest_(finest),
+        names_(names),
+        of_dynamic_(shapes.size()),
+        of_fixed_(shapes.size()) {}
 
   BodyProperties body(std::uint32_t shape, Motion motion, double density,
                       std::vector<std::string>& findings) {
@@ -60,7 +67,7 @@ class Shapes {
 
   BodyProperties dynamic(std::uint32_t shape, std::vector<std::string>& findings) const {
     try {
-      const MassReport report = mass_properties(shapes_[shape]);
+      const MassReport report = mass_properties(finest_[shape]);
       for (const std::string& finding : report.findings) findings.push_back(names_[shape] + ": " + finding);
       BodyProperties body = body_properties(shape, report.properties, 1);
       body.radius = radius_about(body.center, shapes_[shape]);
@@ -70,7 +77,7 @@ class Shapes {
     }
   }
 
-  std::span<const AssetView> shapes_;
+  std::span<const AssetView> shapes_, finest_;
   std::span<const std::string> names_;
   std::vector<std::optional<BodyProperties>> of_dynamic_, of_fixed_;
 };
@@ -92,7 +99,7 @@ void add_body(Preparation& all, const BodyProperties& body, const Pose& pose, co
 Preparation prepare(const Configuration& configuration, std::span<const AssetView> shapes,
                     std::span<const std::string> names, double density) {
   Preparation all;
-  Shapes bodies(shapes, names);
+  Shapes bodies(shapes, shapes, names);
   for (std::size_t i = 0; i < configuration.instances.size(); ++i) {
     const Instance& instance = configuration.instances[i];
     add_body(all, bodies.body(instance.asset, configuration.motion[i], density, all.findings), instance.pose,
@@ -104,9 +111,11 @@ Preparation prepare(const Configuration& configuration, std::span<const AssetVie
 Preparation prepare_scene(const std::string& path, const bench::Scene& scene, double density) {
   const auto& instances = scene.description.instances;
   const bench::SceneMotion motion = bench::read_motion(path, instances.size());
-  const std::vector<AssetView> shapes = scene.views();
+  const std::vector<AssetView> shapes = scene.views(), finest = scene.finest_views();
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < shapes.size(); ++i) names.push_back(scene.name_of(i));
   Preparation all;
-  Shapes bodies(shapes, scene.description.assets);
+  Shapes bodies(shapes, finest, names);
   for (std::size_t i = 0; i < instances.size(); ++i) {
     if (!is_rigid(instances[i].pose)) {
       throw FileError(path + ": instance " + std::to_string(i) + ": " + explain(Status::kPoseNotRigid));
@@ -126,8 +135,12 @@ Preparation prepare_scene(const std::string& path, const bench::Scene& scene, do
   return all;
 }
 
+double default_slop(const AssetView& first) {
+  return 2.5e-4 * bounds_of(first).diagonal();
+}
+
 std::uint64_t hash_of(std::span<const BodyProperties> bodies, std::span<const BodyState> states,
-                      std::span<const AssetView> shapes) {
+                      const bench::Scene& scene) {
   std::vector<double> numbers;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const BodyState& state = states[i];
@@ -140,7 +153,11 @@ std::uint64_t hash_of(std::span<const BodyProperties> bodies, std::span<const Bo
     numbers.insert(numbers.end(), state.orientation.coeffs().data(), state.orientation.coeffs().data() + 4);
   }
   std::uint64_t hash = xxh64(numbers.data(), numbers.size() * sizeof(double));
-  for (const AssetView& shape : shapes) hash = xxh64(&shape.header->hash, sizeof shape.header->hash, hash);
+  for (const auto& [asset, level] : scene.shapes) {
+    const std::uint64_t mesh = scene.assets[asset].view().header->hash;
+    hash = xxh64(&mesh, sizeof mesh, hash);
+    if (level > 0) hash = xxh64(&level, sizeof level, hash);
+  }
   return hash;
 }
 

@@ -22,11 +22,15 @@ Preparation prepare(const Configuration& configuration, std::span<const AssetVie
                     std::span<const std::string> names, double density);
 
 /// A scene with what /simulation of its file says of the bodies (docs/simulation.md); `density` where it is
-/// silent. Throws bench::FileError.
+/// silent. Masses are those of the finest levels. Throws bench::FileError.
 Preparation prepare_scene(const std::string& path, const bench::Scene& scene, double density);
 
-/// What decides a configuration's start: the hash of all instances and of the meshes.
+/// Penetration that a solver leaves alone unless it is told otherwise: 1/4000 of the first mesh's diagonal.
+double default_slop(const AssetView& first);
+
+/// What decides a configuration's start: the hash of all instances, of the meshes, and of the scene's coarser
+/// levels.
 std::uint64_t hash_of(std::span<const BodyProperties> bodies, std::span<const BodyState> states,
-                      std::span<const AssetView> shapes);
+                      const bench::Scene& scene);
 
 }  // namespace tandem::simulation

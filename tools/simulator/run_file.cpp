@@ -124,10 +124,11 @@ std::vector<StepRecord> read_records(const Hdf5Input& file) {
 }
 
 void write_bodies(Hdf5Output& file, const RunDescription& run) {
-  std::vector<std::uint32_t> asset, motion;
+  std::vector<std::uint32_t> asset, level, motion;
   std::vector<double> mass, center, inertia;
   for (const BodyProperties& body : run.bodies) {
-    asset.push_back(body.shape);
+    asset.push_back(run.shapes[body.shape].asset);
+    level.push_back(run.shapes[body.shape].level);
     motion.push_back(static_cast<std::uint32_t>(body.motion));
     mass.push_back(body.motion == Motion::moving ? body.mass : 0);
     append(center, body.center);
@@ -136,6 +137,8 @@ void write_bodies(Hdf5Output& file, const RunDescription& run) {
   const std::size_t count = run.bodies.size();
   file.add("/assets", run.assets);
   file.add("/bodies/asset", {count}, asset);
+  if (std::count(level.begin(), level.end(), 0) != static_cast<std::ptrdiff_t>(count))
+    file.add("/bodies/level", {count}, level);
   file.add("/bodies/motion", {count}, motion);
   file.add("/bodies/mass", {count}, mass);
   file.add("/bodies/center_of_mass", {count, 3}, center);
@@ -331,6 +334,10 @@ StoredFrame read_frame(const std::string& path, std::uint32_t frame) {
   }
   StoredFrame stored;
   stored.assets = file.read_strings("/assets");
+  if (file.has("/bodies/level")) {
+    stored.level = file.read_u32("/bodies/level");
+    if (stored.level.size() != shape.size()) throw FileError(path + ": /bodies/level: not of all bodies");
+  }
   for (std::size_t i = 0; i < shape.size(); ++i) {
     const std::size_t at = static_cast<std::size_t>(found - kept.begin()) * shape.size() + i;
     BodyProperties body;

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "common/json.h"
+#include "scenes/scene_file.h"
 #include "simulator.h"
 
 namespace tandem::simulation {
@@ -27,8 +28,9 @@ struct RunResults {
 
 /// What a run is, apart from its results.
 struct RunDescription {
-  Json options;                     ///< name: value; what they say decides the results
-  std::vector<std::string> assets;  ///< .bvh paths, relative to the run file
+  Json options;                           ///< name: value; what they say decides the results
+  std::vector<std::string> assets;        ///< .bvh paths, relative to the run file
+  std::vector<bench::SceneShape> shapes;  ///< of these assets, as the bodies name them
   std::vector<BodyProperties> bodies;
   std::uint64_t triangles = 0;  ///< of the dynamic bodies: what contact_ratio is a ratio to
 };
@@ -44,8 +46,9 @@ RunResults read_run(const std::string& path, const RunDescription& expected);
 /// A body's asset and pose in a kept state, as the engine saw them.
 /// Throws bench::FileError: of the file, or where it keeps no such state; it names those that it keeps.
 struct StoredFrame {
-  std::vector<std::string> assets;  ///< relative to the run file
-  std::vector<BodyPose> poses;
+  std::vector<std::string> assets;   ///< relative to the run file
+  std::vector<BodyPose> poses;       ///< of these assets
+  std::vector<std::uint32_t> level;  ///< of detail, of each body; none: level 0 of all
 };
 StoredFrame read_frame(const std::string& path, std::uint32_t frame);
 

@@ -108,6 +108,9 @@ class Guard {
     }
   }
 
+  // Where a vertex is now.
+  const std::array<float, 3>& position(std::uint32_t vertex) const { return positions_[vertex]; }
+
   // Whether the collapse leaves everything near. If so, keep() may follow.
   bool allows(const Mesh& mesh, std::uint32_t v0, std::uint32_t v1, const std::array<float, 3>& point) {
     point_ = point;
@@ -242,7 +245,6 @@ class Guard {
 
 // Refuses a collapse that turns a triangle by a right angle or more, or that the guard refuses.
 struct Filter {
-  const OpenedMesh* opened;
   const Frame* frame;
   const std::vector<bool>* fixed;
   Guard* guard;
@@ -262,7 +264,7 @@ struct Filter {
     std::array<float, 3> point = frame->back(*placement);
     const std::uint32_t v0 = profile.v0(), v1 = profile.v1();
     for (const std::uint32_t end : {v0, v1}) {
-      if ((*fixed)[end]) point = opened->points[end];
+      if ((*fixed)[end]) point = guard->position(end);
     }
     return guard->allows(profile.surface_mesh(), v0, v1, point) ? placement : boost::none;
   }
@@ -277,7 +279,6 @@ struct Never {
 
 // Writes down what happens.
 struct Recorder : simplification::Edge_collapse_visitor_base<Mesh> {
-  const OpenedMesh* mesh;
   const Frame* frame;
   std::vector<bool>* fixed;
   std::vector<Collapse>* collapses;
@@ -292,7 +293,7 @@ struct Recorder : simplification::Edge_collapse_visitor_base<Mesh> {
     ends[1] = profile.v1();
     point = frame->back(*placement);
     for (const std::uint32_t end : ends) {
-      if ((*fixed)[end]) point = mesh->points[end];
+      if ((*fixed)[end]) point = guard->position(end);
     }
     triangles -= static_cast<std::uint32_t>(profile.left_face_exists()) +
                  static_cast<std::uint32_t>(profile.right_face_exists());
@@ -340,7 +341,6 @@ std::vector<Collapse> collapse_edges(const OpenedMesh& opened, const LevelView& 
   Guard guard(opened, face, finest, distance);
   Recorder recorder;
   recorder.guard = &guard;
-  recorder.mesh = &opened;
   recorder.frame = &frame;
   recorder.fixed = &fixed;
   recorder.collapses = &collapses;
@@ -348,7 +348,7 @@ std::vector<Collapse> collapse_edges(const OpenedMesh& opened, const LevelView& 
   simplification::edge_collapse(mesh, Never{},
                                 CGAL::parameters::get_cost(quadrics.get_cost())
                                     .get_placement(Placement{&quadrics, &fixed})
-                                    .filter(Filter{&opened, &frame, &fixed, &guard})
+                                    .filter(Filter{&frame, &fixed, &guard})
                                     .visitor(recorder));
   return collapses;
 }
@@ -366,6 +366,10 @@ LevelMesh after(const OpenedMesh& mesh, std::span<const Collapse> collapses) {
     return point;
   };
   LevelMesh level;
+  const auto add = [&](const TriangleIndices& corners, std::uint32_t was) {
+    level.triangles.push_back(corners);
+    level.was.push_back(was);
+  };
   std::vector<std::uint32_t> number(mesh.points.size(), kNoVertex);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto& [a, b, c] = mesh.triangles[t];
@@ -379,8 +383,11 @@ LevelMesh after(const OpenedMesh& mesh, std::span<const Collapse> collapses) {
       }
       corner = number[corner];
     }
-    level.triangles.push_back(corners);
-    level.was.push_back(mesh.was[t]);
+    const std::int32_t copies = mesh.copies.empty() ? 1 : mesh.copies[t];
+    const TriangleIndices turned = {corners[0], corners[2], corners[1]};
+    if (copies == 0) add(turned, mesh.was[t]);
+    for (std::int32_t i = 0; i < std::max(std::abs(copies), 1); ++i)
+      add(copies < 0 ? turned : corners, mesh.was[t]);
   }
   return level;
 }

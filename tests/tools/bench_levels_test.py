@@ -1,0 +1,289 @@
+#!/usr/bin/python3
+"""Scenes at levels of detail, and bvhbench economy, from the outside.
+
+Environment: that of tool_test.py, and TANDEM_BVHBENCH.
+"""
+import json
+import re
+import unittest
+
+import h5py
+import numpy as np
+
+import bvh_file
+from bench_test import IDENTITY, BenchTest, drop_hint, table_of
+from tool_test import DONE, SOURCE_DIR, UNREADABLE_INPUT, USAGE
+
+ERRORS = "1%,5%"  # of two coarser levels
+
+
+def obj_of(triangles):
+    """An OBJ of float64[triangles, 3 corners, 3], whose corners are the same float32 numbers."""
+    corners, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    lines = ["v %.17g %.17g %.17g" % tuple(corner) for corner in corners]
+    return "\n".join(lines + ["f %d %d %d" % tuple(face + 1) for face in index.reshape(-1, 3)]) + "\n"
+
+
+class LevelsBenchTest(BenchTest):
+    """Each test has the cow of 1,500 triangles with two coarser levels, in/cow.bvh."""
+
+    cow_with_levels = None
+
+    def setUp(self):
+        super().setUp()
+        self.cow = self.inputs / "cow.bvh"
+        if self.cow_with_levels is None:
+            result = self.build(SOURCE_DIR / "assets/cow_1500.obj", "-o", self.cow, "--levels", ERRORS, "-q")
+            self.assertEqual((result.returncode, result.stderr), (DONE, b""))
+            type(self).cow_with_levels = self.cow.read_bytes()
+        self.cow.write_bytes(self.cow_with_levels)
+        self.triangles = [len(bvh_file.read(self.cow, level).triangles) for level in range(3)]
+
+    def bench(self, *arguments, **options):
+        return super().bench(*map(str, arguments), **options)
+
+    def write_cows(self, count=20, apart=0.5, **datasets):
+        """Cows in a row; unless told otherwise so close that each meets the next."""
+        rng = np.random.default_rng(1)
+        turns = [np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(count)]
+        turns = [turn * np.linalg.det(turn) for turn in turns]
+        self.write_scene(asset=(0,) * count, rotation=turns, translation=[(apart * i, 0, 0) for i in range(count)],
+                         assets=("../in/cow.bvh",), **datasets)
+
+    def levels(self, *values):
+        return {"instances_level": np.array(values, "u4")}
+
+    def economy(self, *arguments):
+        return json.loads(self.passes("economy", self.scene, "--json", "--repeat", 1, *arguments))
+
+
+class SceneLevels(LevelsBenchTest):
+    LEVELS = [0, 1, 2, 1, 0, 2] * 5
+
+    def write_at_levels(self, apart=0.5):
+        """Cows at levels, and pairs of neighbours."""
+        self.write_cows(30, apart, pairs=np.array([(i, i + 1) for i in range(29)], "u4"), simulation_velocity=np.eye(3)[np.arange(30) % 3],
+                        **self.levels(*self.LEVELS))
+
+    def take_files_of_one_level(self):
+        """The oracle: the same scene with files of one level each, made of the levels' triangles, as assets of their own."""
+        names = []
+        for i in range(3):
+            path = self.mesh_of(f"level_{i}", obj_of(bvh_file.read(self.cow, i).world))
+            self.assertEqual(len(bvh_file.read(path).triangles), self.triangles[i])
+            names.append(f"../in/{path.name}")
+        with h5py.File(self.scene, "r+") as file:
+            del file["assets"], file["instances/level"]
+            file["instances/asset"][:] = self.LEVELS
+            file["assets"] = np.array(names, dtype=h5py.string_dtype())
+
+    def test_a_query_takes_the_meshes_of_the_levels(self):
+        self.write_at_levels()
+        found = self.query("--out", self.contacts, "--manifolds")
+        self.assertEqual(found["triangles"], sum(self.triangles[i] for i in self.LEVELS))
+        self.take_files_of_one_level()
+        alone = self.query("--manifolds")
+        for key in ("triangles", "object_pairs", "contacts", "manifolds", "points", "segments"):
+            self.assertEqual(found[key], alone[key], key)
+        self.assertGreater(found["contacts"], 100)
+        with h5py.File(self.contacts) as file:  # faces are of the source file, at any level
+            self.assertLess(file["contacts/face_a"][:].max(), 1500)
+
+    def results(self, command, *words):
+        out = self.outputs / f"{command}.h5"
+        self.passes(command, self.scene, *words, "--out", out)
+        with h5py.File(out) as file:
+            return {name: column[:] for name, column in file["distance" if command == "distance" else "impact"].items()}
+
+    def test_distances_are_those_of_the_levels(self):
+        self.write_at_levels(apart=2.5)
+        found = self.results("distance")
+        self.take_files_of_one_level()
+        alone = self.results("distance")
+        self.assertGreater(found["lower"].min(), 0)
+        self.assertTrue((np.maximum(found["lower"], alone["lower"]) <= np.minimum(found["upper"], alone["upper"])).all())
+
+    def test_impacts_are_those_of_the_levels(self):
+        self.write_at_levels(apart=1.5)
+        found = self.results("impact", "--dt", "2")
+        self.take_files_of_one_level()
+        alone = self.results("impact", "--dt", "2")
+        self.assertGreater((found["status"] == 1).sum(), 3)
+        self.assertEqual(found["status"].tolist(), alone["status"].tolist())
+        self.assertLess(np.abs(found["t_safe"] - alone["t_safe"]).max(), 1e-3)
+
+    def test_level_0_of_all_is_the_scene_without_levels(self):
+        self.write_cows()
+        without = self.query()["hash"]
+        self.write_cows(**self.levels(*[0] * 20))
+        self.assertEqual(self.query()["hash"], without)
+        self.write_cows(**self.levels(*[1] * 20))
+        self.assertNotEqual(self.query()["hash"], without)
+
+    def test_levels_that_are_not_there_are_refused(self):
+        self.write_cows(2, **self.levels(0, 3))
+        self.assert_refused(UNREADABLE_INPUT, "/instances/level", "instance 1 is at level 3", "cow.bvh, which has 3")
+        self.write_cows(2, **self.levels(0, 1, 2))
+        self.assert_refused(UNREADABLE_INPUT, "/instances/level", "3 rows for 2 instances")
+        self.write_cows(2, instances_level=np.array([0, -1]))
+        self.assert_refused(UNREADABLE_INPUT, "/instances/level")
+
+    def test_scenes_are_made_at_a_level(self):
+        self.passes("scene", "pile", "--mesh", self.cow, "--count", 20, "--level", 2, "-o", self.scene)
+        with h5py.File(self.scene) as file:
+            self.assertEqual(file["instances/level"][:].tolist(), [2] * 20)
+            at_2 = file["instances/translation"][:]
+        plain = self.outputs / "plain.h5"
+        self.passes("scene", "pile", "--mesh", self.cow, "--count", 20, "--level", 0, "-o", plain)
+        with h5py.File(plain) as file:
+            self.assertNotIn("level", file["instances"])
+            self.assertTrue((file["instances/translation"][:] == at_2).all())  # boxes are those of level 0
+        result = self.bench("scene", "pile", "--mesh", self.cow, "--level", 3, "-o", self.outputs / "none.h5")
+        self.assert_fails(drop_hint(result), USAGE, "cow.bvh", "has 3 levels, so there is no level 3")
+
+    def test_only_bodies_are_at_the_level_not_the_ground(self):
+        self.passes("scene", "slide", "--mesh", self.cow, "--ground", self.mesh_of("ground", (SOURCE_DIR / "assets/ground.obj").read_bytes()),
+                    "--count", 5, "--level", 1, "-o", self.scene)
+        with h5py.File(self.scene) as file:
+            self.assertEqual(file["instances/level"][:].tolist(), [0] + [1] * 5)
+
+
+class SimulatedLevels(LevelsBenchTest):
+    def run_of(self, name, *arguments):
+        path = self.outputs / name
+        self.passes("simulate", "scene", self.scene, "--frames", 4, "--trajectory", 4, "--threads", 1, *arguments, "-o", path)
+        return path
+
+    def test_a_body_weighs_what_its_finest_level_weighs(self):
+        self.write_cows(3)
+        with h5py.File(self.run_of("finest.h5")) as file:
+            self.assertNotIn("level", file["bodies"])
+            expected = {name: file[f"bodies/{name}"][:] for name in ("mass", "inertia", "center_of_mass")}
+        self.write_cows(3, **self.levels(0, 2, 1))
+        with h5py.File(self.run_of("coarser.h5")) as file:
+            self.assertEqual(file["bodies/level"][:].tolist(), [0, 2, 1])
+            self.assertEqual(file["bodies/asset"][:].tolist(), [0, 0, 0])
+            self.assertEqual(len(file["assets"]), 1)
+            for name, values in expected.items():
+                self.assertTrue((file[f"bodies/{name}"][:] == values).all(), name)
+
+    def test_a_frame_keeps_the_levels(self):
+        self.write_cows(3, **self.levels(0, 2, 1))
+        frame = self.outputs / "frame.h5"
+        self.passes("frame", self.run_of("run.h5"), "--frame", 4, "-o", frame)
+        with h5py.File(frame) as file:
+            self.assertEqual(file["instances/level"][:].tolist(), [0, 2, 1])
+            self.assertEqual(file["instances/asset"][:].tolist(), [0, 0, 0])
+        self.passes("query", frame)
+
+    def test_a_run_does_not_go_on_at_other_levels(self):
+        self.write_cows(3, **self.levels(1, 1, 1))
+        part = self.outputs / "run.h5.part"
+        self.run_of("run.h5").rename(part)
+        self.write_cows(3, **self.levels(2, 2, 2))
+        result = self.bench("simulate", "scene", self.scene, "--frames", 4, "--trajectory", 4, "--resume", "-o", self.outputs / "run.h5")
+        self.assert_fails(result, UNREADABLE_INPUT, "of another run, whose start is")
+
+
+class Economy(LevelsBenchTest):
+    def test_a_row_of_each_level_is_what_a_query_finds(self):
+        self.write_cows()
+        told = self.economy("--tolerance", "10%")
+        self.assertEqual([row["triangles"] for row in told["assets"][0]["levels"]], self.triangles)
+        for level, row in enumerate(told["assets"][0]["levels"]):
+            self.write_cows(**self.levels(*[level] * 20))
+            found = self.query("--manifolds")
+            for key in ("object_pairs", "contacts", "manifolds"):
+                self.assertEqual(row[key], found[key], (level, key))
+        finest = told["assets"][0]["levels"][0]
+        self.assertEqual((finest["lost_pairs"], finest["new_pairs"], finest["depth_error"]["largest"]), (0, 0, 0))
+        self.assertEqual(finest["matched_manifolds"], finest["manifolds"])
+
+    def test_the_recommended_level_keeps_the_tolerance_and_the_next_does_not(self):
+        self.write_cows()
+        for tolerance in (0.001, 0.01, 0.03, 0.05, 0.2):
+            told = self.economy("--tolerance", f"{100 * tolerance}%")
+            asset = told["assets"][0]
+            limit = tolerance * asset["diagonal"]
+            keeps = [row["error_bound"] <= limit and row["depth_error"]["median"] <= limit for row in asset["levels"]]
+            self.assertTrue(keeps[0])
+            self.assertEqual(asset["recommended_level"], max(level for level in range(3) if keeps[level]))
+            self.assertEqual(told["tolerance_relative"], tolerance)
+
+    def test_subdivided_cows_need_no_more_than_the_first(self):
+        """cow.obj is cow_1500.obj, each triangle split into four: the same surface."""
+        self.cow.unlink()
+        result = self.build(SOURCE_DIR / "assets/cow.obj", "-o", self.cow, "--levels", "0.001%", "-q")
+        self.assertEqual(result.returncode, DONE, result.stderr)
+        self.write_cows()
+        told = self.economy("--tolerance", "0.001%")
+        levels, chosen = told["assets"][0]["levels"], told["assets"][0]["recommended_level"]
+        self.assertEqual(levels[0]["triangles"], 6000)
+        self.assertLessEqual(levels[chosen]["triangles"], 1500)
+        self.assertEqual((told["recommended"]["lost_pairs"], told["recommended"]["new_pairs"]), (0, 0))
+
+    def test_budgets(self):
+        self.write_cows()
+        finest = self.economy("--tolerance", "0")["assets"][0]
+        bytes_of = [row["bytes"] for row in finest["levels"]]
+        self.assertEqual(finest["recommended_level"], 0)
+        for level, budget in ((0, bytes_of[0]), (1, bytes_of[0] - 1), (1, bytes_of[1]), (2, bytes_of[1] - 1)):
+            told = self.economy("--memory", budget)
+            self.assertEqual(told["recommended"]["levels"], [level])
+            self.assertTrue(told["recommended"]["within_limit"])
+        told = self.economy("--memory", 1)
+        self.assertEqual((told["recommended"]["levels"], told["recommended"]["within_limit"]), ([2], False))
+        self.assertEqual(self.economy("--time", 1e6)["recommended"]["levels"], [0])
+
+    def test_apply_writes_the_scene_with_the_levels(self):
+        velocity = np.arange(60.0).reshape(20, 3)
+        self.write_cows(simulation_velocity=velocity, simulation_density=np.full(20, 500.0), excluded=np.array([[0, 1]], "u4"),
+                        instances_level=np.full(20, 1, "u4"))
+        folder = self.outputs / "elsewhere"
+        folder.mkdir()
+        told = self.economy("--tolerance", "20%", "--apply", folder / "applied.h5")
+        level = told["assets"][0]["recommended_level"]
+        self.assertEqual(level, 2)
+        with h5py.File(folder / "applied.h5") as file:
+            self.assertEqual(file["instances/level"][:].tolist(), [level] * 20)
+            self.assertEqual(file["assets"][0].decode(), "../../in/cow.bvh")
+            self.assertTrue((file["simulation/velocity"][:] == velocity).all())
+            self.assertTrue((file["simulation/density"][:] == 500).all())
+            self.assertEqual(file["excluded"][:].tolist(), [[0, 1]])
+        found = json.loads(self.passes("query", folder / "applied.h5", "--json"))
+        self.assertEqual(found["contacts"], told["recommended"]["contacts"])
+
+    def test_simulated_bodies_are_compared_where_they_end(self):
+        self.write_cows(4)
+        told = self.economy("--tolerance", "5%", "--simulate", "0.2")
+        levels = told["assets"][0]["levels"]
+        self.assertEqual(levels[0]["end_distance"]["largest"], 0)
+        self.assertGreater(levels[2]["end_distance"]["largest"], 0)
+        self.assertGreater(told["end_distance_of_a_nudge"]["mean"], 0)
+        self.assertTrue(all(row["step_seconds"] > 0 for row in levels))
+        text = self.passes("economy", self.scene, "--tolerance", "5%", "--simulate", "0.2")
+        self.assertIn("nudged by a millionth", text)
+
+    def test_the_keys_of_json_are_those_of_its_documentation(self):
+        self.write_cows(4)
+        page = (SOURCE_DIR / "docs" / "json.md").read_text().split("## `bvhbench economy")[1].split("\n## ")[0]
+        keys = [[key for line in part.split("\n") if line.startswith("| `") for key in re.findall(r"`(\w+)`", line.split("|")[1])]
+                for part in page.split("\n\n**")]
+        told = self.economy("--tolerance", "5%", "--simulate", "0.1")
+        level = told["assets"][0]["levels"][0]
+        self.assertEqual([list(told), list(told["assets"][0]), list(level)], keys[:3])
+        self.assertEqual(list(told["recommended"]), ["levels", "within_limit", *list(level)[4:]])
+
+    def test_what_it_refuses(self):
+        self.write_cows(2)
+        for words in ((), ("--tolerance", "1%", "--time", "1")):
+            self.assert_fails(drop_hint(self.bench("economy", self.scene, *words)), USAGE, "[--tolerance,--time,--memory]")
+        for tolerance in ("-1", "one", "%", "nan", "inf%"):
+            self.assert_fails(drop_hint(self.bench("economy", self.scene, f"--tolerance={tolerance}")), USAGE, tolerance)
+        self.assert_fails(drop_hint(self.bench("economy", self.scene, "--tolerance", "1", "--apply", self.cow)), USAGE, "cow.bvh")
+        self.write_scene(asset=(), rotation=np.zeros((0, 3, 3)), translation=np.zeros((0, 3)), assets=("../in/cow.bvh",))
+        self.assert_fails(self.bench("economy", self.scene, "--tolerance", "1"), UNREADABLE_INPUT, "/instances", "there is none")
+
+
+if __name__ == "__main__":
+    unittest.main()

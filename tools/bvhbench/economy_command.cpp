@@ -1,0 +1,193 @@
+#include "economy_command.h"
+
+#include <tbb/global_control.h>
+
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <thread>
+
+#include "backend.h"
+#include "common/random_pose.h"
+#include "economy/choice.h"
+#include "economy_report.h"
+#include "scenes/hdf5_file.h"
+#include "scenes/scene_motion.h"
+
+namespace tandem::bench {
+namespace {
+
+using economy::Candidates;
+using economy::LevelMeasurer;
+using economy::Levels;
+using economy::Measures;
+
+// "0.01" or "1%".
+void parse_tolerance(const std::string& text, EconomyArguments& arguments) {
+  arguments.relative = !text.empty() && text.back() == '%';
+  double number = 0;
+  const std::string digits = arguments.relative ? text.substr(0, text.size() - 1) : text;
+  if (!CLI::detail::lexical_cast(digits, number) || !std::isfinite(number) || number < 0)
+    throw CLI::ValidationError("--tolerance", text + " is neither a length nor per cent of the diagonal");
+  arguments.tolerance = arguments.relative ? number / 100 : number;
+}
+
+Candidates candidates_of(LevelMeasurer& measurer) {
+  Candidates candidates;
+  candidates.measure = [&](const Levels& levels) -> const Measures& { return measurer.measure(levels); };
+  const std::vector<std::uint32_t> counts = measurer.level_counts();
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    const AssetView asset = measurer.scene().assets[i].view();
+    std::vector<double>& bounds = candidates.error_bounds.emplace_back();
+    for (std::uint32_t level = 0; level < counts[i]; ++level)
+      bounds.push_back(asset.level(level).error_bound);
+  }
+  return candidates;
+}
+
+std::vector<AssetEconomy> measure_each(LevelMeasurer& measurer, const Candidates& candidates) {
+  const Scene& scene = measurer.scene();
+  std::vector<AssetEconomy> assets;
+  for (std::size_t i = 0; i < candidates.assets(); ++i) {
+    const AssetView view = scene.assets[i].view();
+    AssetEconomy& asset = assets.emplace_back();
+    asset.name = scene.description.assets[i];
+    asset.diagonal = bounds_of(view).diagonal();
+    for (const Instance& instance : scene.description.instances) asset.instances += instance.asset == i;
+    for (std::uint32_t level = 0; level < candidates.error_bounds[i].size(); ++level) {
+      asset.levels.push_back(view.level(level));
+      asset.measures.push_back(measurer.measure(candidates.alone(i, level)));
+    }
+  }
+  return assets;
+}
+
+std::uint64_t bytes_of(const Measures& measures) {
+  return measures.gpu_bytes == 0 ? measures.bytes : measures.gpu_bytes;
+}
+
+double cost_of(const EconomyArguments& arguments, const Measures& measures) {
+  return arguments.bytes ? static_cast<double>(bytes_of(measures)) : 1e3 * seconds_of(measures);
+}
+
+double budget_of(const EconomyArguments& arguments) {
+  return arguments.bytes ? static_cast<double>(*arguments.bytes) : *arguments.milliseconds;
+}
+
+Levels choose(const EconomyArguments& arguments, const Candidates& candidates,
+              const std::vector<AssetEconomy>& assets) {
+  if (!arguments.tolerance) {
+    return within_budget(candidates, budget_of(arguments),
+                         [&](const Measures& measures) { return cost_of(arguments, measures); });
+  }
+  std::vector<double> tolerance;
+  for (const AssetEconomy& asset : assets)
+    tolerance.push_back(*arguments.tolerance * (arguments.relative ? asset.diagonal : 1));
+  return within_tolerance(candidates, tolerance);
+}
+
+EconomyResult measure(const EconomyArguments& arguments, LevelMeasurer& measurer) {
+  const Candidates candidates = candidates_of(measurer);
+  EconomyResult result;
+  result.finest = measurer.measure(Levels(candidates.assets()));
+  result.assets = measure_each(measurer, candidates);
+  result.recommended = measurer.measure(choose(arguments, candidates, result.assets));
+  result.within = arguments.tolerance || cost_of(arguments, result.recommended) <= budget_of(arguments);
+  result.gpu = measurer.gpu();
+  if (result.finest.rest) result.nudged = measurer.end_distance_of_a_nudge();
+  return result;
+}
+
+EconomyResult result_of(const EconomyArguments& arguments, LevelMeasurer& measurer) {
+  try {
+    return measure(arguments, measurer);
+  } catch (const EngineError& error) {
+    if (error.status == Status::kNoTopology)
+      throw FileError(arguments.scene + ": " + measurer.scene().name_of(error.where) + ": " +
+                      explain(error.status));
+    refuse(arguments.scene, error.status, error.where);
+  } catch (const GpuError& error) {
+    refuse_gpu(arguments.scene, error);
+  }
+}
+
+// The scene with all that a scene file tells, at these levels.
+void write_at_levels(const EconomyArguments& arguments, const Levels& levels) {
+  SceneDescription scene = read_description(arguments.scene);
+  const SceneMotion motion = read_motion(arguments.scene, scene.instances.size());
+  const auto folder = std::filesystem::path(arguments.scene).parent_path();
+  for (std::string& asset : scene.assets) asset = seen_from(arguments.apply, (folder / asset).string());
+  scene.level.clear();
+  for (const Instance& instance : scene.instances) scene.level.push_back(levels[instance.asset]);
+  Hdf5Output file(arguments.apply);
+  add_scene(file, scene);
+  add_motion(file, motion);
+  file.write();
+}
+
+ExitCode run(const EconomyArguments& arguments) {
+  LevelMeasurer measurer(arguments.scene, arguments.settings);
+  if (measurer.scene().description.instances.empty())
+    throw FileError(arguments.scene + ": /instances: there is none");
+  if (!arguments.apply.empty()) {
+    keep_inputs(arguments.apply, files_of(arguments.scene, measurer.scene()));
+    try_output(arguments.apply);
+  }
+  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, arguments.settings.threads);
+  const EconomyResult result = result_of(arguments, measurer);
+  if (!arguments.apply.empty()) write_at_levels(arguments, result.recommended.levels);
+  if (arguments.json) {
+    std::puts(pretty(to_json(arguments, result)).c_str());
+  } else {
+    print(arguments, result);
+  }
+  return kDone;
+}
+
+}  // namespace
+
+CLI::App* add_economy(CLI::App& app, Run& run_later) {
+  const auto arguments = std::make_shared<EconomyArguments>();
+  economy::MeasureSettings& settings = arguments->settings;
+  settings.threads = std::max(1u, std::thread::hardware_concurrency());
+  settings.repeats = 3;
+  CLI::App* command = app.add_subcommand("economy", "find out which levels of detail are enough for a scene");
+  command->add_option("SCENE", arguments->scene, "scene file (HDF5)")->required()->check(file_name());
+  CLI::Option_group* limit = command->add_option_group("limit");
+  limit->require_option(1);
+  limit
+      ->add_option_function<std::string>(
+          "--tolerance", [=](const std::string& text) { parse_tolerance(text, *arguments); },
+          "by how much surfaces may be off, proved, and depths, measured")
+      ->option_text("LENGTH|PERCENT%");
+  limit->add_option("--time", arguments->milliseconds, "for query and manifolds, or with --simulate a step")
+      ->check(between(0, 1e9))
+      ->option_text("MS");
+  limit
+      ->add_option("--memory", arguments->bytes,
+                   "for the levels of all assets, or all that a GPU query takes")
+      ->transform(CLI::AsSizeValue(false))
+      ->option_text("BYTES");
+  command
+      ->add_option("--simulate", settings.simulated_seconds,
+                   "also let bodies move, so long, and compare where they end")
+      ->check(between(0, 1e6))
+      ->option_text("SECONDS [0]");
+  add_backend(*command, arguments->backend);
+  command->add_option("--threads", settings.threads, "threads; what is found does not depend on them")
+      ->check(CLI::Range(1u, kMostQueryThreads))
+      ->option_text("N [all]");
+  command->add_option("--repeat", settings.repeats, "times to run each query, for its timing")
+      ->check(CLI::Range(1, 1000000))
+      ->option_text("N [3]");
+  command->add_option("--apply", arguments->apply, "the scene file to write, with the recommended levels")
+      ->check(file_name());
+  command->add_flag("--json", arguments->json, "print the results as JSON");
+  command->final_callback([arguments, &run_later] {
+    if (arguments->backend == "cuda") arguments->settings.engine = "tandem-cuda";
+    run_later = [arguments] { return run(*arguments); };
+  });
+  return command;
+}
+
+}  // namespace tandem::bench

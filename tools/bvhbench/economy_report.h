@@ -1,0 +1,47 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/json.h"
+#include "economy/measure.h"
+
+namespace tandem::bench {
+
+/// What `bvhbench economy` was asked: one of the three limits.
+struct EconomyArguments {
+  std::string scene, backend = "cpu", apply;
+  std::optional<double> tolerance;     ///< a length, or a part of each asset's diagonal
+  bool relative = false;               ///< which of these
+  std::optional<double> milliseconds;  ///< of query and manifolds, or of a simulated step
+  std::optional<std::uint64_t> bytes;  ///< of all levels, or of GPU memory
+  economy::MeasureSettings settings;
+  bool json = false;
+};
+
+/// What was found of one asset.
+struct AssetEconomy {
+  std::string name;
+  double diagonal = 0;
+  std::uint64_t instances = 0;
+  std::vector<LevelView> levels;
+  std::vector<economy::Measures> measures;  ///< of each level, the other assets at their finest
+};
+
+struct EconomyResult {
+  std::string gpu;  ///< its name, or empty
+  std::vector<AssetEconomy> assets;
+  economy::Measures finest, recommended;
+  bool within = true;  ///< the limit; a budget can be too small for the coarsest levels
+  std::optional<economy::Spread> nudged;
+};
+
+/// Of query and manifolds; of a simulated step where there is one.
+double seconds_of(const economy::Measures& measures);
+
+Json to_json(const EconomyArguments& arguments, const EconomyResult& result);
+
+/// For people: a table of each asset, and what is recommended and lost by it.
+void print(const EconomyArguments& arguments, const EconomyResult& result);
+
+}  // namespace tandem::bench

@@ -1,0 +1,45 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "tandem/kernels/contact_query.h"
+
+namespace tandem::economy {
+
+/// A contact manifold as two levels are compared by it.
+struct Patch {
+  ObjectPair pair;
+  std::array<double, 3> normal;  ///< unit, from pair.a towards pair.b
+  std::array<double, 3> centre;  ///< in the world
+  double depth;
+};
+
+/// What a query finds in a scene.
+struct Findings {
+  std::uint64_t object_pairs = 0, contacts = 0;
+  std::vector<ObjectPair> touching;  ///< pairs with a contact; a < b, sorted, each once
+  std::vector<Patch> patches;        ///< in any order
+};
+
+/// Some numbers that are not negative: half of them are at most `median`, 95 of 100 at most `most`.
+struct Spread {
+  double mean = 0, median = 0, most = 0, largest = 0;
+};
+
+/// 0 of no numbers.
+Spread spread_of(std::vector<double> numbers);
+
+/// What a coarser level changes.
+struct Difference {
+  std::uint64_t lost_pairs = 0, new_pairs = 0;      ///< touching at the finest alone; at the coarser alone
+  std::uint64_t matched = 0;                        ///< manifolds with one to compare them with
+  std::uint64_t lost_patches = 0, new_patches = 0;  ///< manifolds without
+  Spread angle;                                     ///< between the normals of matched manifolds, in degrees
+  Spread depth;  ///< by which matched manifolds differ; the whole depth of those without a match
+};
+
+/// Manifolds are matched within each object pair, those nearest to each other first, by their centres.
+Difference difference(const Findings& finest, const Findings& coarser);
+
+}  // namespace tandem::economy

@@ -1,0 +1,123 @@
+#include "measure.h"
+
+#include <algorithm>
+
+#include "engines/registry.h"
+#include "scenes/contacts_file.h"
+
+namespace tandem::economy {
+namespace {
+
+Findings findings_of(const TimedAnswer& answer) {
+  Findings found;
+  found.object_pairs = answer.pairs.size();
+  found.contacts = answer.contacts.size();
+  std::vector<bool> touches(answer.pairs.size());
+  for (const TriangleContact& contact : answer.contacts) touches[contact.pair] = true;
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    if (touches[i]) found.touching.push_back(answer.pairs[i]);
+  }
+  for (const Manifold& manifold : answer.manifolds.manifolds) {
+    Patch patch = {answer.pairs[manifold.pair], {}, {}, manifold.depth};
+    std::copy_n(manifold.normal, 3, patch.normal.begin());
+    std::copy_n(manifold.centre, 3, patch.centre.begin());
+    found.patches.push_back(patch);
+  }
+  return found;
+}
+
+}  // namespace
+
+std::uint64_t bytes_of(const AssetView& asset, std::uint32_t level) {
+  std::uint64_t bytes = 0;
+  for (const Section& section : asset.sections) {
+    const bool of_file = section.kind == SectionKind::levels || section.kind == SectionKind::parts ||
+                         section.kind == SectionKind::strings || section.kind == SectionKind::provenance;
+    if (!of_file && section.level == level) bytes += section.bytes;
+  }
+  return bytes;
+}
+
+LevelMeasurer::LevelMeasurer(std::string path, const MeasureSettings& settings)
+    : path_(std::move(path)), settings_(settings), scene_(bench::read_scene(path_)) {
+  for (Instance& instance : scene_.description.instances)
+    instance.asset = scene_.shapes[instance.asset].asset;
+  use(Levels(scene_.assets.size()));
+}
+
+void LevelMeasurer::use(const Levels& levels) {
+  scene_.shapes.clear();
+  for (std::uint32_t i = 0; i < levels.size(); ++i) scene_.shapes.push_back({i, levels[i]});
+}
+
+std::vector<std::uint32_t> LevelMeasurer::level_counts() const {
+  std::vector<std::uint32_t> counts(scene_.assets.size(), 1);
+  for (const Instance& instance : scene_.description.instances) {
+    const AssetView asset = scene_.assets[instance.asset].view();
+    counts[instance.asset] = static_cast<std::uint32_t>(asset.levels.size());
+  }
+  return counts;
+}
+
+SimulationSettings LevelMeasurer::simulation() const {
+  return {settings_.engine, settings_.simulated_seconds, 0, settings_.threads};
+}
+
+Measures LevelMeasurer::query(const Levels& levels) {
+  const bench::SceneDescription& told = scene_.description;
+  const auto pairs = bench::normalised(told.pairs.value_or(std::vector<ObjectPair>()));
+  const auto engine = make_engine(settings_.engine, {.threads = settings_.threads});
+  ExcludedPairTable excluded;
+  engine->set_shapes(scene_.views());
+  engine->set_filter(told.filter.view(excluded));
+  engine->update(told.instances);
+  TimedQuery asked;
+  asked.given = told.pairs ? &pairs : nullptr;
+  asked.repeats = settings_.repeats;
+  asked.manifolds = true;
+  const TimedAnswer answer = engine->time_query(asked);
+  found_ = findings_of(answer);
+  gpu_ = answer.gpu.name;
+  Measures measures;
+  measures.levels = levels;
+  for (std::uint32_t i = 0; i < levels.size(); ++i)
+    measures.bytes += bytes_of(scene_.assets[i].view(), levels[i]);
+  measures.gpu_bytes = answer.gpu.bytes;
+  measures.query_seconds = best_of(answer.whole);
+  measures.manifold_seconds = best_of(answer.manifolds.seconds);
+  measures.object_pairs = found_.object_pairs;
+  measures.touching_pairs = found_.touching.size();
+  measures.contacts = found_.contacts;
+  measures.manifolds = found_.patches.size();
+  return measures;
+}
+
+const Measures& LevelMeasurer::measure(const Levels& levels) {
+  const Levels finest(levels.size());
+  if (levels != finest) measure(finest);
+  if (const auto known = known_.find(levels); known != known_.end()) return known->second;
+  use(levels);
+  Measures measures = query(levels);
+  if (levels == finest) finest_ = found_;
+  measures.change = difference(finest_, found_);
+  if (settings_.simulated_seconds > 0) {
+    const Rest rest = simulate(path_, scene_, simulation());
+    if (levels == finest) finest_rest_ = rest;
+    measures.rest = {rest.step_seconds, rest.speed, end_distance(finest_rest_, rest)};
+  }
+  return known_.emplace(levels, std::move(measures)).first->second;
+}
+
+const Spread& LevelMeasurer::end_distance_of_a_nudge() {
+  if (!nudged_) {
+    const Levels finest(scene_.assets.size());
+    measure(finest);
+    use(finest);
+    SimulationSettings settings = simulation();
+    settings.nudge = kNudge;
+    nudged_ = end_distance(finest_rest_, simulate(path_, scene_, settings));
+  }
+  return *nudged_;
+}
+
+}  // namespace tandem::economy

@@ -238,9 +238,12 @@ TEST_F(GpuTolerance, AViewsLevelsAloneAreUploaded) {
     const AssetView view = all.levels_from(first);
     const GpuScene device({&view, 1}, {}, {}, Contents::all);
     std::size_t needed = 0;
-    for (const Level& level : view.levels)
+    for (std::uint32_t i = 0; i < view.levels.size(); ++i) {
+      const LevelView level = view.level(i);
       needed += level.triangle_count * (sizeof(Triangle) + sizeof(TriangleTopology)) +
-                level.block_count * (sizeof(Block) + sizeof(OrientedBlock));
+                level.block_count * (sizeof(Block) + sizeof(OrientedBlock)) +
+                level.component_count * sizeof(SurfaceComponent);
+    }
     EXPECT_GE(device.asset_bytes(), needed);
     EXPECT_LT(device.asset_bytes(), needed + 6 * view.levels.size() * kSectionAlignment);
     EXPECT_LT(device.asset_bytes(), last);

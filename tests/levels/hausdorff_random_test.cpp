@@ -166,7 +166,7 @@ TEST_P(RandomSurfaces, AreAsNearAsTheBoundSays) {
     EXPECT_LE(farthest, found.upper + rounding) << "trial " << trial;
     EXPECT_TRUE(found.narrow) << "trial " << trial;
     narrow += found.upper <= found.lower * 1.0021 ||
-              found.upper <= found.lower + 0x1p-23 * largest_coordinate(a, b);
+              found.upper <= found.lower + 0x1p-35 * largest_coordinate(a, b);
   }
   EXPECT_EQ(narrow, trials);
 }

@@ -121,8 +121,27 @@ TEST(Hausdorff, OfOneSurfaceDividedTwiceIsNearlyNothing) {
 TEST(Hausdorff, OfASurfaceFromItselfIsNearlyNothing) {
   const Mesh mesh = joined(test::random_mesh(500, 3), test::sphere(2, 3));
   const HausdorffBound found = bound(mesh, mesh);
-  EXPECT_LE(found.upper, 2 * 0x1p-24);
+  EXPECT_LE(found.upper, 2 * 0x1p-36);
   EXPECT_EQ(found.lower, 0);
+}
+
+/// Flat triangles that cover the same places again and again.
+TEST(Hausdorff, OfOverlappingSegmentsTakesFewPieces) {
+  Mesh mesh;
+  mesh.add({40, 0, 0}, {35, 0, 0}, {49, 0, 0});
+  mesh.add({45, 0, 0}, {54, 0, 0}, {53.9999619f, 0, 0});
+  mesh.add({39, 0, 0}, {5, 0, 0}, {19, 0, 0});
+  mesh.add({35, 0, 0}, {1, 0, 0}, {1, 0, 0});
+  mesh.add({52, 0, 0}, {49.5f, 0, 0}, {51.5999985f, 0, 0});
+  mesh.add({16, 0, 0}, {45, 0, 0}, {45, 0, 0});
+  mesh.add({8, 0, 0}, {63, 0, 0}, {36, 0, 0});
+  mesh.add({61, 0, 0}, {19, 0, 0}, {14, 0, 0});
+  mesh.add({38, 0, 0}, {36.4000015f, 0, 0}, {36.9000015f, 0, 0});
+  const HausdorffBound found = bound(mesh, mesh);
+  EXPECT_LE(found.upper, 64 * 0x1p-36);
+  EXPECT_TRUE(found.narrow);
+  EXPECT_LT(found.pieces, 2'000u);
+  EXPECT_GT(found.pieces, 0u);
 }
 
 TEST(Hausdorff, OfTrianglesAtTheOriginIsNothing) {

@@ -39,7 +39,7 @@ TEST(CutPiece, CoversThePieceWithItsParts) {
   Random random(1);
   constexpr int kEdges[][2] = {{0, 0}, {1, 0}, {2, 0}, {0, 1}, {1, 2}, {0, 2}};
   for (int trial = 0; trial < 600; ++trial) {
-    Piece piece = {{}, INFINITY, 0, 0};
+    Piece piece = {{}, INFINITY, 0, 0, 0, false};
     for (Corner& corner : piece.corner) corner = {random_point(random), 0, 0};
     Cut cut = {trial % 6 < 3 ? 1 : 2, {kEdges[trial % 6][0], kEdges[trial % 6][1]}, {}};
     Corner points[2] = {};
@@ -68,12 +68,54 @@ TEST(CutPiece, CoversThePieceWithItsParts) {
   }
 }
 
+/// A needle becomes its longest edge, whichever that is, and the distance of its third corner counts.
+TEST(Flatten, MakesASegmentOfANeedle) {
+  const Point ends[] = {{{0, 0, 0}}, {{0, 8, 0}}, {{0.25, 4, 0}}};
+  for (int first = 0; first < 3; ++first) {
+    Piece piece = {{}, INFINITY, 0, 0, 0, false};
+    for (int k = 0; k < 3; ++k) piece.corner[k].point = ends[(first + k) % 3];
+    flatten(piece, 0.2);
+    EXPECT_FALSE(piece.is_segment);
+    EXPECT_EQ(piece.excess, 0);
+    flatten(piece, 0.25);
+    ASSERT_TRUE(piece.is_segment);
+    EXPECT_EQ(piece.excess, 0.25);
+    EXPECT_EQ(piece.corner[0].point.x[1] + piece.corner[1].point.x[1], 8);
+    EXPECT_EQ(piece.corner[1].point.x[1], piece.corner[2].point.x[1]);
+  }
+}
+
+/// The parts of a segment are two segments that meet, and what was added to its bound is added to theirs.
+TEST(CutPiece, HalvesASegment) {
+  test::Mesh mesh;
+  mesh.add({0, 0, 0}, {0, 2, 0}, {1, 0, 0});
+  const test::StoredLevel level(mesh);
+  Piece piece = {{}, INFINITY, 0.5, 0, 0, true};
+  piece.corner[0] = {{{0, 0, 3}}, 3, 0};
+  piece.corner[1] = piece.corner[2] = {{{0, 8, 3}}, std::sqrt(45.0), 0};
+  const Cut cut = choose_cut(piece, level.view().triangles[0], 1e-9);
+  ASSERT_EQ(cut.edges, 1);
+  ASSERT_EQ(cut.edge[0], 0);
+  Corner points[2] = {{point_of(piece, cut, 0), 0, 0}, {}};
+  Piece parts[kMostParts];
+  ASSERT_EQ(cut_piece(piece, cut, points, parts), 2);
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_TRUE(parts[i].is_segment);
+    EXPECT_EQ(parts[i].corner[1 - i].point.x[1], points[0].point.x[1]);
+    EXPECT_EQ(parts[i].corner[1].point.x[1], parts[i].corner[2].point.x[1]);
+  }
+  EXPECT_EQ(parts[0].corner[0].point.x[1], 0);
+  EXPECT_EQ(parts[1].corner[1].point.x[1], 8);
+  tighten(level.view(), {}, 0, piece);
+  EXPECT_EQ(piece.bound, std::sqrt(45.0) + 0.5);
+}
+
 /// Cut at the ends of the triangle that its middle is nearest to, a piece has a part within these ends.
 TEST(ChooseCut, IsWhereTheNearestTriangleEnds) {
   test::Mesh mesh;
   mesh.add({0, 0, 0}, {1, 0, 0}, {0, 1, 0});
   const test::StoredLevel level(mesh);
-  Piece piece = {{}, INFINITY, 0, 0};
+  Piece piece = {{}, INFINITY, 0, 0, 0, false};
   piece.corner[0].point = {{0.2, 0.2, 0.1}};
   piece.corner[1].point = {{0.3, 0.2, 0.1}};
   piece.corner[2].point = {{0.2, -0.6, 0.1}};
@@ -93,7 +135,7 @@ TEST(Tighten, MixesTriangles) {
   mesh.add({-9, -9, 0}, {9, -9, 0}, {0, 9, 0});
   mesh.add({-9, -9, 1}, {9, -9, 1}, {0, 9, 1});
   const test::StoredLevel level(mesh);
-  Piece piece = {{}, INFINITY, 0, 0};
+  Piece piece = {{}, INFINITY, 0, 0, 0, false};
   piece.corner[0] = {{{0, 0, 0}}, 0, 0};
   piece.corner[1] = {{{0.1, 0, 1}}, 0, 0};
   piece.corner[2] = {{{0, 0.1, 1}}, 0, 0};

@@ -90,7 +90,11 @@ class Search {
     }
     const std::uint64_t triangles = std::uint64_t{from_[0].triangle_count} + from_[1].triangle_count;
     const std::uint64_t most = options_.most_pieces.value_or((1 << 20) + 64 * triangles);
-    for (int round = 0; !pool_.empty() && !is_refuted() && pieces_ < most; ++round) refine_some(round);
+    const std::uint64_t most_waiting = (1 << 20) + 2 * triangles;
+    for (int round = 0; !pool_.empty() && !is_refuted(); ++round) {
+      if (pieces_ >= most || pool_.size() > most_waiting) break;
+      refine_some(round);
+    }
     return result();
   }
 
@@ -106,7 +110,7 @@ class Search {
 
   /// Bounds of pieces up to here are not looked into if a point is so far away.
   double enough(double distance) const {
-    const double near = std::max(distance * (1 + options_.relative), distance + 0x1p-24 * largest_);
+    const double near = std::max(distance * (1 + options_.relative), distance + 0x1p-36 * largest_);
     return std::max(near, options_.wanted.value_or(0) * (1 - 0x1p-45)) - slack_;
   }
 
@@ -144,7 +148,7 @@ class Search {
     for_parts(from.triangle_count, kTrianglesAtOnce,
               [&](std::size_t part, std::size_t begin, std::size_t end) {
                 for (std::size_t t = begin; t < end; ++t) {
-                  Piece piece = {{}, INFINITY, 0, static_cast<std::uint16_t>(side)};
+                  Piece piece = {{}, INFINITY, 0, 0, static_cast<std::uint8_t>(side), false};
                   for (int k = 0; k < 3; ++k) {
                     const std::uint64_t i = corner_number(from, static_cast<std::uint32_t>(t), k);
                     piece.corner[k] = {corner_of(from.triangles[t], k), corners_[side].distance[i],
@@ -211,6 +215,7 @@ class Search {
 
   void look_into(Piece& piece, double limit, Outcome& outcome) const {
     const LevelView& to = to_[piece.side];
+    if (!piece.is_segment) flatten(piece, (limit + slack_ - outcome.farthest.distance) / 4);
     const auto measured = [&](const Point& point, std::uint32_t hint) {
       const Corner corner = measure(piece.side, point, hint);
       outcome.farthest.offer(corner, piece.side);

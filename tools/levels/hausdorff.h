@@ -8,14 +8,15 @@
 namespace tandem {
 
 struct HausdorffOptions {
-  /// The bounds are narrowed until upper <= lower (1 + relative) or upper <= lower + a unit that the stored
-  /// coordinates are rounded to (2^-24 of the largest).
+  /// The bounds are narrowed until upper <= lower (1 + relative), or until they differ by 2^-36 of the
+  /// largest coordinate, far less than the rounding of coordinates.
   double relative = 0.002;
   /// Ends as soon as upper <= wanted is proved, or a distance above `wanted` is found; upper is infinite
   /// then. Where `wanted` itself is between bounds that are that narrow, neither may come of it.
   std::optional<double> wanted = {};
   /// Pieces of triangles that are looked into at most, or about so many; where they run out the bounds stay
-  /// wide, but hold. Without it: 2^20 and 64 for each triangle of both surfaces.
+  /// wide, but hold, as they do where 2^20 pieces and two for each triangle wait, for their memory. Without
+  /// it: 2^20 and 64 for each triangle of both surfaces.
   std::optional<std::uint64_t> most_pieces = {};
 };
 

@@ -58,9 +58,9 @@ bool excursions(const Piece& piece, const Triangle& triangle, int e, Row& beyond
 
 /// The cut between the corners that are beyond a plane and those that are on its near side. False: all are on
 /// one side.
-bool cut_at_plane(const Row& beyond, double negligible, Cut& cut) {
+bool cut_at_plane(const Row& beyond, int edges, double negligible, Cut& cut) {
   cut.edges = 0;
-  for (int e = 0; e < 3; ++e) {
+  for (int e = 0; e < edges; ++e) {
     const double from = beyond[e], to = beyond[(e + 1) % 3];
     if (std::fabs(from) <= negligible || std::fabs(to) <= negligible || (from > 0) == (to > 0)) continue;
     cut.edge[cut.edges] = e;
@@ -75,6 +75,7 @@ void tighten(const LevelView& other, std::span<const std::uint32_t> triangles, d
   std::uint32_t candidate[kMostCandidates];
   Row row[kMostCandidates];
   int count = 0;
+  const auto offer = [&](double bound) { piece.bound = std::min(piece.bound, bound + piece.excess); };
   const auto add = [&](std::uint32_t triangle) {
     for (int i = 0; i < count; ++i) {
       if (candidate[i] == triangle) return;
@@ -85,7 +86,7 @@ void tighten(const LevelView& other, std::span<const std::uint32_t> triangles, d
                           ? corner.distance
                           : std::sqrt(square_distance(corner.point, other.triangles[triangle]));
     }
-    piece.bound = std::min(piece.bound, greatest(row[count]));
+    offer(greatest(row[count]));
     candidate[count++] = triangle;
   };
   for (const std::uint32_t triangle : triangles) {
@@ -95,9 +96,21 @@ void tighten(const LevelView& other, std::span<const std::uint32_t> triangles, d
     if (piece.bound > enough) add(corner.nearest);
   }
   for (int i = 0; i < count; ++i) {
-    for (int j = 0; j < i && piece.bound > enough; ++j)
-      piece.bound = std::min(piece.bound, least_mixed(row[i], row[j]));
+    for (int j = 0; j < i && piece.bound > enough; ++j) offer(least_mixed(row[i], row[j]));
   }
+}
+
+void flatten(Piece& piece, double tolerance) {
+  const int e = longest_edge(piece);
+  const Corner from = piece.corner[e], to = piece.corner[(e + 1) % 3];
+  Point foot;
+  const double height = std::sqrt(
+      nearest_on_edge(piece.corner[(e + 2) % 3].point, from.point, minus(to.point, from.point), foot));
+  if (!(height <= tolerance)) return;
+  piece.corner[0] = from;
+  piece.corner[1] = piece.corner[2] = to;
+  piece.excess += height;
+  piece.is_segment = true;
 }
 
 Cut choose_cut(const Piece& piece, const Triangle& nearest, double negligible) {
@@ -112,7 +125,7 @@ Cut choose_cut(const Piece& piece, const Triangle& nearest, double negligible) {
     Row beyond;
     Cut cut;
     if (!excursions(piece, nearest, e, beyond) || !(greatest(beyond) > farthest) ||
-        !cut_at_plane(beyond, negligible, cut))
+        !cut_at_plane(beyond, piece.is_segment ? 1 : 3, negligible, cut))
       continue;
     farthest = greatest(beyond);
     best = cut;
@@ -126,8 +139,18 @@ Point point_of(const Piece& piece, const Cut& cut, int i) {
 
 int cut_piece(const Piece& piece, const Cut& cut, const Corner (&point)[2], Piece (&parts)[kMostParts]) {
   const auto part = [&](int i, const Corner& x, const Corner& y, const Corner& z) {
-    parts[i] = {{x, y, z}, INFINITY, static_cast<std::uint16_t>(piece.depth + 1), piece.side};
+    parts[i] = piece;
+    parts[i].corner[0] = x;
+    parts[i].corner[1] = y;
+    parts[i].corner[2] = z;
+    parts[i].bound = INFINITY;
+    ++parts[i].depth;
   };
+  if (piece.is_segment) {
+    part(0, piece.corner[0], point[0], point[0]);
+    part(1, point[0], piece.corner[1], piece.corner[1]);
+    return 2;
+  }
   if (cut.edges == 1) {
     const int e = cut.edge[0], f = (e + 1) % 3, apex = (e + 2) % 3;
     part(0, piece.corner[e], point[0], piece.corner[apex]);

@@ -14,13 +14,15 @@ struct Corner {
   std::uint32_t nearest;
 };
 
-/// A triangle that is a part of a triangle of one surface, and a bound of how far its points are from the
-/// other surface: of its computed corners, without the slack that rounding asks for.
+/// A triangle that is a part of a triangle of one surface, or a segment that such a part is near to, and a
+/// bound of how far the part's points are from the other surface, without the slack that rounding asks for.
 struct Piece {
-  Corner corner[3];
+  Corner corner[3];  ///< of a segment: its ends, the second one twice
   double bound;
+  double excess;        ///< how far points of the part are from the segment; 0 of triangles
   std::uint16_t depth;  ///< cuts that led to it from the whole triangle
-  std::uint16_t side;   ///< whose triangle it is a part of: 0 or 1
+  std::uint8_t side;    ///< whose triangle it is a part of: 0 or 1
+  bool is_segment;
 };
 
 /// A cut of a piece makes at most so many.
@@ -39,8 +41,12 @@ inline double rounding_slack(double largest_coordinate) {
 /// `enough` or they tell no more.
 void tighten(const LevelView& other, std::span<const std::uint32_t> triangles, double enough, Piece& piece);
 
+/// Makes a segment of a triangle of which no point is farther than `tolerance` from its longest edge. Else
+/// thin triangles would be cut into fans of thinner ones.
+void flatten(Piece& piece, double tolerance);
+
 /// How a piece is cut: at points of its edges. An edge runs from corner `edge` to corner `edge + 1`, and the
-/// point is at `along` of it.
+/// point is at `along` of it. A segment has edge 0 alone. A segment has edge 0.
 struct Cut {
   int edges;  ///< 1 or 2
   int edge[2];

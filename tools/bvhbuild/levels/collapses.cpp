@@ -85,7 +85,9 @@ struct Placement {
 // finest level. Between these points nothing is promised.
 class Guard {
  public:
-  Guard(const OpenedMesh& opened, const LevelView& finest, double distance)
+  // face: of each triangle, kNoVertex where it takes no part.
+  Guard(const OpenedMesh& opened, std::span<const std::uint32_t> face, const LevelView& finest,
+        double distance)
       : finest_(finest),
         square_(distance * distance),
         positions_(opened.points),
@@ -96,15 +98,18 @@ class Guard {
     for (std::size_t t = 0; t < opened.triangles.size(); ++t) area += doubled_area(opened, t);
     const double share = area / static_cast<double>(opened.triangles.size());
     for (std::uint32_t t = 0; t < opened.triangles.size(); ++t) {
-      const auto& corners = opened.triangles[t];
-      for (const std::uint32_t corner : corners) {
+      if (face[t] == kNoVertex) continue;
+      for (const std::uint32_t corner : opened.triangles[t]) {
         near_[corner] = opened.was[t];
-        if (!sampled[corner]) add(point_of(corner), t);
+        if (!sampled[corner]) add(point_of(corner), face[t]);
         sampled[corner] = true;
       }
-      spread(opened, t, share);
+      if (share > 0) spread(opened, t, face[t], share);
     }
   }
+
+  // Where a vertex is now.
+  const std::array<float, 3>& position(std::uint32_t vertex) const { return positions_[vertex]; }
 
   // Whether the collapse leaves everything near. If so, keep() may follow.
   bool allows(const Mesh& mesh, std::uint32_t v0, std::uint32_t v1, const std::array<float, 3>& point) {
@@ -169,7 +174,7 @@ class Guard {
   }
 
   // Points in large triangles: one for each mean area, on a grid of barycentric coordinates.
-  void spread(const OpenedMesh& opened, std::uint32_t t, double share) {
+  void spread(const OpenedMesh& opened, std::uint32_t t, std::uint32_t face, double share) {
     const double wanted = std::min(doubled_area(opened, t) / share, kMostSamples);
     const int rows = static_cast<int>(std::sqrt(2 * wanted));
     const auto& [a, b, c] = opened.triangles[t];
@@ -178,7 +183,7 @@ class Guard {
         const double u = (i + 1.0 / 3) / rows, v = (j + 1.0 / 3) / rows;
         const levels::Point along = levels::plus(levels::scaled(u, levels::minus(point_of(b), point_of(a))),
                                                  levels::scaled(v, levels::minus(point_of(c), point_of(a))));
-        add(levels::plus(point_of(a), along), t);
+        add(levels::plus(point_of(a), along), face);
       }
     }
   }
@@ -240,7 +245,6 @@ class Guard {
 
 // Refuses a collapse that turns a triangle by a right angle or more, or that the guard refuses.
 struct Filter {
-  const OpenedMesh* opened;
   const Frame* frame;
   const std::vector<bool>* fixed;
   Guard* guard;
@@ -260,7 +264,7 @@ struct Filter {
     std::array<float, 3> point = frame->back(*placement);
     const std::uint32_t v0 = profile.v0(), v1 = profile.v1();
     for (const std::uint32_t end : {v0, v1}) {
-      if ((*fixed)[end]) point = opened->points[end];
+      if ((*fixed)[end]) point = guard->position(end);
     }
     return guard->allows(profile.surface_mesh(), v0, v1, point) ? placement : boost::none;
   }
@@ -275,7 +279,6 @@ struct Never {
 
 // Writes down what happens.
 struct Recorder : simplification::Edge_collapse_visitor_base<Mesh> {
-  const OpenedMesh* mesh;
   const Frame* frame;
   std::vector<bool>* fixed;
   std::vector<Collapse>* collapses;
@@ -290,7 +293,7 @@ struct Recorder : simplification::Edge_collapse_visitor_base<Mesh> {
     ends[1] = profile.v1();
     point = frame->back(*placement);
     for (const std::uint32_t end : ends) {
-      if ((*fixed)[end]) point = mesh->points[end];
+      if ((*fixed)[end]) point = guard->position(end);
     }
     triangles -= static_cast<std::uint32_t>(profile.left_face_exists()) +
                  static_cast<std::uint32_t>(profile.right_face_exists());
@@ -305,20 +308,26 @@ struct Recorder : simplification::Edge_collapse_visitor_base<Mesh> {
   }
 };
 
-Mesh surface_mesh(const OpenedMesh& opened, const Frame& frame, std::vector<bool>& fixed) {
-  Mesh mesh;
+// The mesh in the frame, and of each triangle its face there.
+std::pair<Mesh, std::vector<std::uint32_t>> surface_mesh(const OpenedMesh& opened, const Frame& frame,
+                                                         std::vector<bool>& fixed) {
+  std::pair<Mesh, std::vector<std::uint32_t>> result;
+  auto& [mesh, faces] = result;
   mesh.reserve(static_cast<Mesh::size_type>(opened.points.size()),
                static_cast<Mesh::size_type>(opened.triangles.size() * 3 / 2),
                static_cast<Mesh::size_type>(opened.triangles.size()));
+  faces.reserve(opened.triangles.size());
   for (const auto& point : opened.points) mesh.add_vertex(frame.into(point));
   using Vertex = Mesh::Vertex_index;
   for (const auto& [a, b, c] : opened.triangles) {
     // Two cut edges between the same vertices are one to Surface_mesh, which may refuse the triangle: then it
     // stays as it is.
-    if (mesh.add_face(Vertex(a), Vertex(b), Vertex(c)) == Mesh::null_face())
-      fixed[a] = fixed[b] = fixed[c] = true;
+    const Mesh::Face_index face = mesh.add_face(Vertex(a), Vertex(b), Vertex(c));
+    const bool refused = face == Mesh::null_face();
+    if (refused) fixed[a] = fixed[b] = fixed[c] = true;
+    faces.push_back(refused ? kNoVertex : std::uint32_t{face});
   }
-  return mesh;
+  return result;
 }
 
 }  // namespace
@@ -327,12 +336,11 @@ std::vector<Collapse> collapse_edges(const OpenedMesh& opened, const LevelView& 
   std::vector<Collapse> collapses;
   std::vector<bool> fixed = opened.fixed;
   const Frame frame(opened.points);
-  Mesh mesh = surface_mesh(opened, frame, fixed);
+  auto [mesh, face] = surface_mesh(opened, frame, fixed);
   const Quadrics quadrics(mesh);
-  Guard guard(opened, finest, distance);
+  Guard guard(opened, face, finest, distance);
   Recorder recorder;
   recorder.guard = &guard;
-  recorder.mesh = &opened;
   recorder.frame = &frame;
   recorder.fixed = &fixed;
   recorder.collapses = &collapses;
@@ -340,7 +348,7 @@ std::vector<Collapse> collapse_edges(const OpenedMesh& opened, const LevelView& 
   simplification::edge_collapse(mesh, Never{},
                                 CGAL::parameters::get_cost(quadrics.get_cost())
                                     .get_placement(Placement{&quadrics, &fixed})
-                                    .filter(Filter{&opened, &frame, &fixed, &guard})
+                                    .filter(Filter{&frame, &fixed, &guard})
                                     .visitor(recorder));
   return collapses;
 }
@@ -358,6 +366,10 @@ LevelMesh after(const OpenedMesh& mesh, std::span<const Collapse> collapses) {
     return point;
   };
   LevelMesh level;
+  const auto add = [&](const TriangleIndices& corners, std::uint32_t was) {
+    level.triangles.push_back(corners);
+    level.was.push_back(was);
+  };
   std::vector<std::uint32_t> number(mesh.points.size(), kNoVertex);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto& [a, b, c] = mesh.triangles[t];
@@ -371,8 +383,11 @@ LevelMesh after(const OpenedMesh& mesh, std::span<const Collapse> collapses) {
       }
       corner = number[corner];
     }
-    level.triangles.push_back(corners);
-    level.was.push_back(mesh.was[t]);
+    const std::int32_t copies = mesh.copies.empty() ? 1 : mesh.copies[t];
+    const TriangleIndices turned = {corners[0], corners[2], corners[1]};
+    if (copies == 0) add(turned, mesh.was[t]);
+    for (std::int32_t i = 0; i < std::max(std::abs(copies), 1); ++i)
+      add(copies < 0 ? turned : corners, mesh.was[t]);
   }
   return level;
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "collapses.h"
 #include "laid_level.h"
@@ -16,8 +17,8 @@ namespace {
 
 // What part of the wanted error the simplifier may use, at first and where it turns out to be too much: the
 // surface is farther off between the points that it looks at than in them.
-constexpr double kFirstShare = 0.85, kNextShare = 0.97;
-constexpr int kTries = 4;
+constexpr double kFirstShare = 0.85, kNextShare = 0.97, kUsedUp = 0.88;
+constexpr int kTries = 3;
 // Counts of triangles this close are the same to a search.
 constexpr double kNarrow = 1.02;
 
@@ -36,16 +37,25 @@ class Search {
   // A mesh of few triangles whose bound is at most `wanted`. The simplifier keeps what it looks at within a
   // distance, and the bound says what became of the rest: where it is too far off, once more with less.
   Candidate level(double wanted) const {
-    double distance = kFirstShare * wanted;
+    double distance = kFirstShare * wanted, refused = 0;
     std::vector<Collapse> collapses;
+    Candidate best;
     for (int i = 0; i < kTries; ++i) {
       collapses = collapse_edges(opened_, finest_.view(), distance);
       Candidate candidate = {after(opened_, collapses), 0};
-      candidate.error_bound = bound(candidate.mesh, {}).upper;
-      if (candidate.error_bound <= wanted) return candidate;
-      distance *= kNextShare * wanted / candidate.error_bound;
+      candidate.error_bound = bound(candidate.mesh).upper;
+      if (candidate.error_bound > wanted) {
+        refused = distance;
+        distance *= kNextShare * wanted / candidate.error_bound;
+        continue;
+      }
+      const bool used_up = refused == 0 || candidate.error_bound > kUsedUp * wanted;
+      if (best.mesh.triangles.empty() || candidate.mesh.triangles.size() < best.mesh.triangles.size())
+        best = std::move(candidate);
+      if (used_up) break;
+      distance = std::sqrt(distance * refused);
     }
-    return longest_near(collapses, wanted);
+    return best.mesh.triangles.empty() ? longest_near(collapses, wanted) : best;
   }
 
   // The triangles of the finest level, in leaf order, that are nearest to the middles of a mesh's.
@@ -78,7 +88,7 @@ class Search {
       const auto count =
           std::clamp(static_cast<std::size_t>(middle - collapses.begin()) + 1, near + 1, far - 1);
       Candidate candidate = {after(opened_, std::span(collapses).first(count)), 0};
-      candidate.error_bound = bound(candidate.mesh, {}).upper;
+      candidate.error_bound = bound(candidate.mesh, wanted).upper;
       if (candidate.error_bound <= wanted) {
         near = count;
         best = std::move(candidate);
@@ -86,12 +96,16 @@ class Search {
         far = count;
       }
     }
+    if (near > 0) best.error_bound = std::min(best.error_bound, bound(best.mesh).upper);
     return best;
   }
 
-  HausdorffBound bound(const LevelMesh& mesh, const HausdorffOptions& options) const {
+  // `wanted`: as far as it takes to know whether the mesh is near enough.
+  HausdorffBound bound(const LevelMesh& mesh, std::optional<double> wanted = {}) const {
     const Geometry geometry = {mesh.points, mesh.triangles};
     const Tree tree = build_tree(geometry, Imaginary::minimal, Effort::fast);
+    HausdorffOptions options;
+    options.wanted = wanted;
     return hausdorff_bound(finest_.view(), LaidLevel(geometry, tree).view(), options);
   }
 
@@ -106,6 +120,10 @@ Ladder make_ladder(const FinestLevel& finest, std::span<const double> wanted,
   Ladder ladder;
   const OpenedMesh opened = cut_open(finest.geometry, finest.tree, finest.topology);
   ladder.fixed_vertices = opened.fixed_vertices;
+  if (opened.triangles.empty()) {  // segments and points only
+    for (std::size_t i = 0; i < wanted.size(); ++i) ladder.left_out.push_back(i);
+    return ladder;
+  }
   const Search search(finest, opened);
   std::size_t triangles = finest.geometry.triangles.size();
   for (std::size_t i = 0; i < wanted.size(); ++i) {

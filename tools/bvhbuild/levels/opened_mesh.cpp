@@ -33,8 +33,18 @@ bool is_segment(const TriangleTopology& triangle) {
   return v[0] == v[1] || v[1] == v[2] || v[2] == v[0];
 }
 
-// The numbers of the triangles that are kept, ascending: of those with the same corners the first.
-std::vector<std::uint32_t> different_triangles(std::span<const TriangleTopology> triangles) {
+// Whether the corners go round as 0, 1, 2 do, once a turned triangle is turned, 1 or -1: the same number for
+// triangles with the same corners means the same winding.
+std::int32_t winding(const TriangleTopology& triangle) {
+  const std::uint32_t(&v)[3] = triangle.vertex;
+  const bool ascends = (v[0] < v[1]) + (v[1] < v[2]) + (v[2] < v[0]) == 2;
+  return ascends != is_turned(triangle.flags) ? 1 : -1;
+}
+
+// The numbers of the triangles that are kept, ascending: of those with the same corners the first; and how
+// often each is there, less those that are wound the other way, as seen from the first.
+std::vector<std::uint32_t> different_triangles(std::span<const TriangleTopology> triangles,
+                                               std::vector<std::int32_t>& copies) {
   const auto corners = [&](std::uint32_t t) {
     std::array<std::uint32_t, 3> sorted = {triangles[t].vertex[0], triangles[t].vertex[1],
                                            triangles[t].vertex[2]};
@@ -48,7 +58,14 @@ std::vector<std::uint32_t> different_triangles(std::span<const TriangleTopology>
     if (is_segment(triangles[t])) continue;
     const auto mine = corners(t);
     const auto same = [&](std::uint32_t other) { return corners(other) == mine; };
-    if (table.find_or_insert(hash_words(mine[0], mine[1], mine[2]), t, same) == t) kept.push_back(t);
+    const std::uint32_t first = table.find_or_insert(hash_words(mine[0], mine[1], mine[2]), t, same);
+    if (first == t) {
+      kept.push_back(t);
+      copies.push_back(1);
+    } else {
+      const auto place = std::lower_bound(kept.begin(), kept.end(), first) - kept.begin();
+      copies[static_cast<std::size_t>(place)] += winding(triangles[first]) * winding(triangles[t]);
+    }
   }
   return kept;
 }
@@ -90,8 +107,10 @@ void join_corners(std::span<const TriangleTopology> triangles, UnionFind& corner
 
 OpenedMesh cut_open(const Geometry& geometry, const Tree& tree, const SurfaceTopology& topology) {
   OpenedMesh mesh;
-  mesh.was = different_triangles(topology.triangles);
-  mesh.left_out = topology.triangles.size() - mesh.was.size();
+  mesh.was = different_triangles(topology.triangles, mesh.copies);
+  const bool once =
+      std::all_of(mesh.copies.begin(), mesh.copies.end(), [](std::int32_t n) { return n == 1; });
+  if (once || !topology.closed) mesh.copies = {};
   const std::vector<TriangleTopology> triangles = wound(topology.triangles, mesh.was);
   UnionFind corners(3 * triangles.size());
   std::vector<bool> on_cut(topology.vertex_count, false);

@@ -17,12 +17,14 @@ struct OpenedMesh {
   std::vector<bool> fixed;                              ///< of each point
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< wound as level 0's topology says
   std::vector<std::uint32_t> was;                       ///< of each triangle, in leaf order of level 0
-  std::uint64_t fixed_vertices = 0;                     ///< positions that points along the cuts have
-  std::uint64_t left_out = 0;  ///< triangles that repeat another one, or are segments
+  /// How often each triangle is there, those the other way round counted as less than none; empty: each once.
+  std::vector<std::int32_t> copies;
+  std::uint64_t fixed_vertices = 0;  ///< positions that points along the cuts have
 };
 
-/// Cuts a level open. Triangles with two corners at one position and, of triangles with the same corners, all
-/// but one are left out: the rest is the same surface. Condition: fewer than kMostTopologyTriangles.
+/// Cuts a level open. Triangles with two corners at one position are left out, and of triangles with the same
+/// corners there is one, with a number of copies where the level is closed, which it is by these. Condition:
+/// fewer than kMostTopologyTriangles.
 OpenedMesh cut_open(const Geometry& geometry, const Tree& tree, const SurfaceTopology& topology);
 
 }  // namespace tandem::build

@@ -138,6 +138,8 @@ class IncludesTest(unittest.TestCase):
     def included(self, name):
         """The row or the library of an include path; None for the system's."""
         first, second, *_ = name.split("/")
+        if name == "tandem/tandem.h":
+            return "bindings/c/"
         if first == "tandem":
             return second + "/"
         return LIBRARIES[first] if first in LIBRARIES else self.folder_of(f"tools/{name}")

@@ -2,21 +2,37 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstdint>
 #include <memory>
-#include <new>
+#include <type_traits>
 
+#include "tandem/formats/allocator.h"
 #include "tandem/formats/enclosed_volume.h"
 
 namespace tandem {
 namespace {
 
-template <typename Element>
-using Array = std::unique_ptr<Element[]>;
+struct Deallocate {
+  void operator()(void* memory) const { deallocate(memory); }
+};
 
-// Zeros, or null where there is not enough memory.
+template <typename Element>
+using Array = std::unique_ptr<Element[], Deallocate>;
+
+// Not initialised, or null where there is not enough memory.
+template <typename Element>
+Array<Element> uninitialised(std::size_t count) {
+  static_assert(std::is_trivial_v<Element>);
+  if (count > SIZE_MAX / sizeof(Element)) return nullptr;
+  return Array<Element>(static_cast<Element*>(allocate(count * sizeof(Element))));
+}
+
+// Zeros, or null.
 template <typename Element>
 Array<Element> zeros(std::size_t count) {
-  return Array<Element>(new (std::nothrow) Element[count]());
+  Array<Element> array = uninitialised<Element>(count);
+  if (array != nullptr) std::fill_n(array.get(), count, Element{});
+  return array;
 }
 
 bool same_position(const float* p, const float* q) {
@@ -229,7 +245,7 @@ class TopologyCheck {
     if (end_ == nullptr) return Status::kOutOfMemory;
     for_each_side([&](std::uint32_t lower, std::uint32_t, std::uint32_t) { ++end_[lower + 1]; });
     for (std::uint32_t v = 0; v < level_.vertex_count; ++v) end_[v + 1] += end_[v];
-    sides_ = Array<Side>(new (std::nothrow) Side[end_[level_.vertex_count]]);
+    sides_ = uninitialised<Side>(end_[level_.vertex_count]);
     if (sides_ == nullptr) return Status::kOutOfMemory;
     for_each_side([&](std::uint32_t lower, std::uint32_t upper, std::uint32_t side) {
       sides_[end_[lower]++] = {upper, side};

@@ -40,7 +40,7 @@ struct PairPoints {
   std::uint32_t first, count;
 };
 
-struct alignas(64) Worker {
+struct alignas(64) Worker : Allocated {
   PairPatches made;
   bool enough_memory = true;
 };
@@ -51,7 +51,7 @@ std::uint64_t bodies_of(const ObjectPair& pair) {
 
 }  // namespace
 
-struct ContactManifolds::State {
+struct ContactManifolds::State : Allocated {
   Buffer<Shape> shapes;
   Buffer<std::uint32_t> triangle_counts;
   Buffer<std::uint32_t> begin;  // of each pair's contacts
@@ -251,12 +251,13 @@ Status ContactManifolds::State::remember_step(std::span<const ObjectPair> pairs)
   return Status::kOk;
 }
 
-ContactManifolds::ContactManifolds() : state_(std::make_unique<State>()) {}
+ContactManifolds::ContactManifolds() : state_(new (std::nothrow) State) {}
 ContactManifolds::ContactManifolds(ContactManifolds&&) noexcept = default;
 ContactManifolds& ContactManifolds::operator=(ContactManifolds&&) noexcept = default;
 ContactManifolds::~ContactManifolds() = default;
 
 Status ContactManifolds::set_assets(std::span<const AssetView> assets) {
+  if (state_ == nullptr) return Status::kOutOfMemory;
   State& state = *state_;
   state.shapes.clear();
   state.triangle_counts.clear();
@@ -282,6 +283,7 @@ Status ContactManifolds::set_assets(std::span<const AssetView> assets) {
 
 Status ContactManifolds::make(std::span<const Instance> instances, std::span<const ObjectPair> pairs,
                               std::span<const Contact> contacts, const ManifoldOptions& options) {
+  if (state_ == nullptr) return Status::kOutOfMemory;
   State& state = *state_;
   if (!options.match_previous) forget_points();
   std::swap(state.manifolds, state.manifolds_before);
@@ -326,23 +328,24 @@ Status ContactManifolds::make(std::span<const Instance> instances, std::span<con
 }
 
 std::span<const Manifold> ContactManifolds::manifolds() const {
-  return state_->manifolds.view();
+  return state_ != nullptr ? state_->manifolds.view() : std::span<const Manifold>();
 }
 
 std::span<const ManifoldPoint> ContactManifolds::points() const {
-  return state_->points.view();
+  return state_ != nullptr ? state_->points.view() : std::span<const ManifoldPoint>();
 }
 
 const ManifoldCounters& ContactManifolds::counters() const {
-  return state_->counters;
+  static constexpr ManifoldCounters kNone;
+  return state_ != nullptr ? state_->counters : kNone;
 }
 
 void ContactManifolds::forget_points() {
-  state_->pair_points_before.clear();
+  if (state_ != nullptr) state_->pair_points_before.clear();
 }
 
 std::uint64_t ContactManifolds::where() const {
-  return state_->where;
+  return state_ != nullptr ? state_->where : 0;
 }
 
 }  // namespace tandem

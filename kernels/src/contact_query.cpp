@@ -35,7 +35,7 @@ struct ChunkResult {
   std::size_t place;  // among the contacts of all
 };
 
-struct alignas(64) Worker {
+struct alignas(64) Worker : Allocated {
   Buffer<Contact> contacts;
   std::uint32_t workers = 1;  // of this call
   QueryCounters counters;
@@ -72,7 +72,7 @@ void add_to(QueryCounters& sum, const QueryCounters& part) {
 
 }  // namespace
 
-struct ContactQuery::State {
+struct ContactQuery::State : Allocated {
   Buffer<Asset> assets;
   Buffer<PosedTree> instances;
   Buffer<WorldBox> boxes;

@@ -61,14 +61,14 @@ bool is_inside(const PosedSurface& body, const double* p) {
   return odd;
 }
 
-struct alignas(64) Found {
+struct alignas(64) Found : Allocated {
   Buffer<Containment> rows;
   bool enough_memory = true;
 };
 
 }  // namespace
 
-struct ContainmentQuery::State {
+struct ContainmentQuery::State : Allocated {
   Buffer<Surface> surfaces;
   Buffer<std::uint32_t> labels;
   Buffer<Pose> poses;           // of stored coordinates
@@ -203,12 +203,13 @@ Status ContainmentQuery::State::gather(std::uint32_t workers) {
   return Status::kOk;
 }
 
-ContainmentQuery::ContainmentQuery() : state_(std::make_unique<State>()) {}
+ContainmentQuery::ContainmentQuery() : state_(new (std::nothrow) State) {}
 ContainmentQuery::ContainmentQuery(ContainmentQuery&&) noexcept = default;
 ContainmentQuery& ContainmentQuery::operator=(ContainmentQuery&&) noexcept = default;
 ContainmentQuery::~ContainmentQuery() = default;
 
 Status ContainmentQuery::set_assets(std::span<const AssetView> assets) {
+  if (state_ == nullptr) return Status::kOutOfMemory;
   const Status status = state_->set_assets(assets);
   if (status != Status::kOk) state_->surfaces.clear();
   return status;
@@ -216,6 +217,7 @@ Status ContainmentQuery::set_assets(std::span<const AssetView> assets) {
 
 Status ContainmentQuery::find(std::span<const Instance> instances, std::span<const ObjectPair> pairs,
                               std::span<const Contact> contacts, std::uint32_t threads) {
+  if (state_ == nullptr) return Status::kOutOfMemory;
   State& state = *state_;
   Status status = state.pose(instances);
   if (status == Status::kOk) status = state.check(instances, pairs, contacts);
@@ -235,11 +237,11 @@ Status ContainmentQuery::find(std::span<const Instance> instances, std::span<con
 }
 
 std::span<const Containment> ContainmentQuery::contained() const {
-  return state_->contained.view();
+  return state_ != nullptr ? state_->contained.view() : std::span<const Containment>();
 }
 
 std::uint64_t ContainmentQuery::where() const {
-  return state_->where;
+  return state_ != nullptr ? state_->where : 0;
 }
 
 }  // namespace tandem

@@ -45,7 +45,7 @@ void add_to(DistanceCounters& sum, const DistanceCounters& part) {
 }
 
 // What the walks of one round may find is kept in slots of their own.
-struct alignas(64) Slot {
+struct alignas(64) Slot : Allocated {
   NearestSoFar state;
 };
 
@@ -56,7 +56,7 @@ bool is_near_first(const BoundedBlockPair& x, const BoundedBlockPair& y) {
 
 }  // namespace
 
-struct DistanceQuery::State {
+struct DistanceQuery::State : Allocated {
   Buffer<Asset> assets;
   Buffer<PosedTree> instances;
   Buffer<WorldBox> boxes;

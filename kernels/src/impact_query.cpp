@@ -47,7 +47,7 @@ Asset asset_of(const AssetView& view) {
 }
 
 // What a worker did; each pair's impact has its own place.
-struct alignas(64) Worker {
+struct alignas(64) Worker : Allocated {
   ImpactCounters counters;
   impact::ImpactWalk walk;
 };
@@ -91,7 +91,7 @@ constexpr Impact none_in(double duration) {
 
 }  // namespace
 
-struct ImpactQuery::State {
+struct ImpactQuery::State : Allocated {
   Buffer<Asset> assets;
   Buffer<MovingBody> bodies;
   Buffer<WorldBox> boxes;  // swept

@@ -19,7 +19,7 @@ struct AssetLevel {
 
 }  // namespace
 
-struct ToleranceQuery::State {
+struct ToleranceQuery::State : Allocated {
   ContactQuery contacts;  // of which each level is an asset
   Buffer<LevelRange> ranges;
   Buffer<AssetLevel> levels;
@@ -58,12 +58,13 @@ Status ToleranceQuery::State::set_assets(std::span<const AssetView> assets) {
     const auto count = static_cast<std::uint32_t>(asset.levels.size());
     if (!ranges.push({static_cast<std::uint32_t>(levels.size()), count}))
       return fail(Status::kOutOfMemory, i);
-    for (std::uint32_t level = 0; level < count; ++level) {
-      AssetLevel row = {asset.level(level), {}, {}, {}};
+    for (std::uint32_t of_file = 0; of_file < count; ++of_file) {
+      AssetLevel row = {asset.level(of_file), {}, {}, {}};
       std::copy_n(asset.header->origin, 3, row.origin);
       std::copy_n(asset.header->lower, 3, row.lower);
       std::copy_n(asset.header->upper, 3, row.upper);
-      if (!levels.push(row) || !views.push(asset.levels_from(level, 1))) return fail(Status::kOutOfMemory, i);
+      if (!levels.push(row) || !views.push(asset.levels_from(of_file, 1)))
+        return fail(Status::kOutOfMemory, i);
     }
   }
   return contacts.set_assets(views.view());

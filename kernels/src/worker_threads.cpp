@@ -46,6 +46,7 @@ void WorkerThreads::run(std::uint32_t workers, Work work, void* context) {
     const std::lock_guard lock(mutex_);
     work_ = work;
     context_ = context;
+    allocator_ = current_allocator();
     const std::uint64_t round = round_of(state_.load(std::memory_order_relaxed)) + 1;
     state_.store(round << kRoundShift | std::uint64_t{workers} << kWorkersShift, std::memory_order_release);
   }
@@ -60,14 +61,14 @@ void WorkerThreads::run(std::uint32_t workers, Work work, void* context) {
 
 bool WorkerThreads::start(std::uint32_t threads) {
   stop();
-  threads_.reset(new (std::nothrow) std::thread[threads]);
+  threads_.reset(new (std::nothrow) Thread[threads]);
   if (threads_ == nullptr) return false;
   stopping_ = false;
   state_ = 0;
   try {
     while (thread_count_ < threads) {
       const std::uint32_t worker = thread_count_ + 1;
-      threads_[thread_count_] = std::thread([this, worker] { wait_for_work(worker); });
+      threads_[thread_count_].thread = std::thread([this, worker] { wait_for_work(worker); });
       ++thread_count_;
     }
   } catch (const std::exception&) {  // the system's refusal, or no memory
@@ -83,7 +84,7 @@ void WorkerThreads::stop() {
     stopping_ = true;
     work_came_.notify_all();
   }
-  for (std::uint32_t i = 0; i < thread_count_; ++i) threads_[i].join();
+  for (std::uint32_t i = 0; i < thread_count_; ++i) threads_[i].thread.join();
   threads_.reset();
   thread_count_ = 0;
 }
@@ -104,7 +105,10 @@ void WorkerThreads::wait_for_work(std::uint32_t worker) {
     }
     seen = round_of(state);
     if (worker >= workers_of(state)) continue;
-    work_(context_, worker);
+    {
+      const AllocatorScope scope(allocator_);
+      work_(context_, worker);
+    }
     const std::uint64_t before = state_.fetch_sub(1, std::memory_order_release);
     if (at_work(before) > 1 || workers_of(before) > 0) continue;
     const std::lock_guard lock(mutex_);  // so that the caller sleeps or has seen it

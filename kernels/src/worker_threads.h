@@ -8,6 +8,8 @@
 #include <mutex>
 #include <thread>
 
+#include "tandem/formats/allocator.h"
+
 namespace tandem {
 
 /// Threads that wait for work, kept from call to call: as many as were ever asked for. Between two pieces of
@@ -55,13 +57,18 @@ class WorkerThreads {
   void stop();
   void wait_for_work(std::uint32_t worker);
 
-  std::unique_ptr<std::thread[]> threads_;
+  struct Thread : Allocated {
+    std::thread thread;
+  };
+
+  std::unique_ptr<Thread[]> threads_;
   std::uint32_t thread_count_ = 0;
 
   std::mutex mutex_;
   std::condition_variable work_came_, work_done_;
   Work work_ = nullptr;
   void* context_ = nullptr;
+  Allocator allocator_;  ///< of the caller
   /// How often there was work, times 2^32; plus the workers that may begin it, the caller's included, times
   /// 2^16, 0 when none may any longer; plus the other threads at work. In one number, so that no thread
   /// begins what has ended.

@@ -3,8 +3,9 @@
 #include <cerrno>
 #include <cstdio>
 #include <limits>
-#include <new>
 #include <utility>
+
+#include "tandem/formats/allocator.h"
 
 #if __has_include(<sys/mman.h>)
 #define TANDEM_HAS_MMAP 1
@@ -25,7 +26,7 @@ struct Bytes {
   std::size_t size = 0;
 };
 
-constexpr std::align_val_t kAlignment{alignof(Block)};
+static_assert(kMemoryAlignment % alignof(Block) == 0);
 
 Status status_of_open_error() {
   if (errno == ENOENT || errno == ENOTDIR) return Status::kFileNotFound;
@@ -43,10 +44,10 @@ Bytes read_all(std::FILE* file) {
   const long size = size_of(file);
   if (size < 0) return {Status::kNotARegularFile};
   const auto bytes = static_cast<std::size_t>(size);
-  void* data = ::operator new(bytes + 1, kAlignment, std::nothrow);  // + 1: an empty file has an address too
+  void* data = allocate(bytes + 1);  // + 1: an empty file has an address too
   if (data == nullptr) return {Status::kOutOfMemory};
   if (std::fread(data, 1, bytes, file) == bytes) return {Status::kOk, data, bytes};
-  ::operator delete(data, kAlignment);
+  deallocate(data);
   return {Status::kCannotRead};
 }
 
@@ -150,7 +151,7 @@ void MappedAsset::close() {
   if (mapped_) {
     unmap(data_, bytes_);
   } else {
-    ::operator delete(data_, kAlignment);
+    deallocate(data_);
   }
   data_ = nullptr;
   bytes_ = 0;

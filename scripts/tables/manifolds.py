@@ -7,12 +7,10 @@ def shown(text, least):
     return f"< {least:g}" if float(text) < least else three_digits(float(text))
 
 
-def peers(timed, untimed):
-    """The rows of both, kind by kind."""
-    kinds = list(dict.fromkeys(row["bodies"] for row in timed))
-    rows = sorted([*timed, *untimed], key=lambda row: kinds.index(row["bodies"]))
+def peers(rows):
+    """One row for each kind of bodies and peer."""
     heads = ["bodies", "peer", "missed", "invented", "points", "points upright, %", "normal off by, degrees", "at most", "depth off by, %", "at most", "time over Tandem's"]
     lines = [[row["bodies"], row["peer"], row["missed"], row["invented"], row["points"], row["points_upright_percent"],
               shown(row["normal_degrees"], 1e-3), shown(row["normal_degrees_largest"], 1e-3),
-              shown(row["depth_percent"], 1e-2), shown(row["depth_percent_largest"], 1e-2), row.get("time_ratio", "–")] for row in rows]
+              shown(row["depth_percent"], 1e-2), shown(row["depth_percent_largest"], 1e-2), row["time_ratio"]] for row in rows]
     return markdown(heads, lines, "ll")

@@ -6,7 +6,6 @@
 
 #include "bvhbuild/levels/ladder.h"
 #include "bvhbuild/levels/self_contacts.h"
-#include "bvhbuild/tree/oriented_blocks.h"
 #include "common/stopwatch.h"
 
 namespace tandem::build {
@@ -38,15 +37,9 @@ AssetLevel BuiltLevel::row(const Options& options) const {
 }
 
 BuiltLevel build_level(const Geometry& geometry, const Options& options, OptimisationWatch& watch) {
-  BuiltLevel level;
-  level.geometry = geometry;
-  level.tree = build_tree(geometry, options.imaginary, options.effort, watch);
-  if (options.gpu_blocks && geometry.triangles.size() < kMostOrientedTriangles)
-    level.oriented_blocks = orient_blocks(geometry, level.tree, options.effort);
-  const bool needed = options.topology || !options.levels.empty();
-  if (needed && geometry.triangles.size() < kMostTopologyTriangles)
-    level.topology = make_topology(geometry, level.tree);
-  return level;
+  BuildOptions parts = options;
+  parts.topology = options.topology || !options.levels.empty();
+  return {build_parts(geometry, parts, watch), {}, geometry, {}, 0};
 }
 
 std::string level_errors_defect(const Options& options, const StoredMesh& mesh) {

@@ -1,30 +1,27 @@
 #pragma once
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "bvhbuild/levels/level_mesh.h"
 #include "bvhbuild/meshing/stored_mesh.h"
-#include "bvhbuild/tree/assemble.h"
+#include "bvhbuild/tree/level_parts.h"
 #include "pipeline.h"
 
 namespace tandem::build {
 
 /// A level with everything that a file may say of it.
-struct BuiltLevel {
+struct BuiltLevel : LevelParts {
   LevelMesh mesh;     ///< of the finest nothing: its geometry is that of the stored mesh
   Geometry geometry;  ///< looks at `mesh` or at the stored mesh
   std::vector<std::uint32_t> face;
-  Tree tree;
-  std::vector<OrientedBlock> oriented_blocks;
-  std::optional<SurfaceTopology> topology;
   double error_bound = 0;
 
   /// What the file gets of it.
   AssetLevel row(const Options& options) const;
 };
 
-/// Builds the tree of a level and what belongs to it. The geometry must outlive the result.
+/// Builds the tree of a level and what belongs to it; topology also where other levels need it. The geometry
+/// must outlive the result.
 BuiltLevel build_level(const Geometry& geometry, const Options& options, OptimisationWatch& watch);
 
 /// What is wrong with the errors that were asked for, now that the mesh is known; empty where nothing is.

@@ -6,18 +6,14 @@
 
 #include "bvhbuild/import/import.h"
 #include "bvhbuild/levels/level_errors.h"
-#include "bvhbuild/tree/tree.h"
+#include "bvhbuild/tree/build_options.h"
 #include "common/exit_code.h"
 
 namespace tandem::build {
 
 /// The command line of bvhbuild.
-struct Options {
+struct Options : BuildOptions {
   std::filesystem::path input, output;
-  Imaginary imaginary = Imaginary::minimal;
-  Effort effort = Effort::standard;
-  bool gpu_blocks = true;          ///< the file gets oriented blocks
-  bool topology = true;            ///< the file gets topology
   std::vector<LevelError> levels;  ///< the errors of levels beyond the finest
   ImportOptions import;
   bool strict = false;

@@ -3,14 +3,12 @@
 #include <oneapi/tbb/global_control.h>
 
 #include <chrono>
-#include <stdexcept>
 #include <thread>
 
 #include "bvhbuild/import/import.h"
 #include "bvhbuild/meshing/clean.h"
 #include "bvhbuild/meshing/stored_mesh.h"
 #include "bvhbuild/meshing/triangulate.h"
-#include "bvhbuild/tree/assemble.h"
 #include "common/number_words.h"
 #include "common/output_file.h"
 #include "common/printable.h"
@@ -18,7 +16,6 @@
 #include "level_pipeline.h"
 #include "progress.h"
 #include "provenance.h"
-#include "tandem/formats/check.h"
 
 namespace tandem::build {
 namespace {
@@ -123,20 +120,15 @@ Image build_image(const Options& options, const PolygonMesh& polygons, const Sto
   source.provenance = provenance_json(options, outcome);
   std::vector<AssetLevel> rows;
   for (const BuiltLevel& level : levels) rows.push_back(level.row(options));
-  Image image = assemble(source, rows);
-
-  const CheckResult checked = check(image.data(), image.size());
-  if (checked.status != Status::kOk) {
-    throw std::logic_error(std::string("the tree that was built is not sound: ") + explain(checked.status));
-  }
-  const FileHeader& header = *checked.asset.header;
-  outcome.tree = measure_tree(checked.asset.level(), header.lower, header.upper);
-  outcome.gpu_blocks = checked.asset.level().oriented_blocks != nullptr;
-  outcome.topology = checked.asset.level().topology != nullptr;
+  auto [image, asset] = assemble_checked(source, rows);
+  const FileHeader& header = *asset.header;
+  outcome.tree = measure_tree(asset.level(), header.lower, header.upper);
+  outcome.gpu_blocks = asset.level().oriented_blocks != nullptr;
+  outcome.topology = asset.level().topology != nullptr;
   outcome.hash = hexadecimal(header.hash);
   outcome.file_bytes = header.file_bytes;
-  if (!options.levels.empty()) describe_levels(options, checked.asset, outcome);
-  return image;
+  if (!options.levels.empty()) describe_levels(options, asset, outcome);
+  return std::move(image);
 }
 
 }  // namespace

@@ -1,13 +1,11 @@
 #include "exact_predicates.h"
 
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-
 #include <cmath>
+
+#include "tandem/kernels/detail/orientation.h"
 
 namespace tandem::build {
 namespace {
-
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 
 /// Sign of (a - c) x (b - c) in float64 when that sign is certain, else 0.
 ///
@@ -27,23 +25,21 @@ int certain_sign(double ax, double ay, double bx, double by, double cx, double c
   return determinant > 0 ? 1 : -1;
 }
 
-Kernel::Point_3 exact_point(const Point& p) {
-  return {p[0], p[1], p[2]};
-}
-
 }  // namespace
 
 int orientation(const Point2& a, const Point2& b, const Point2& c) {
   if (const int sign = certain_sign(a[0], a[1], b[0], b[1], c[0], c[1])) return sign;
-  return CGAL::orientation(Kernel::Point_2(a[0], a[1]), Kernel::Point_2(b[0], b[1]),
-                           Kernel::Point_2(c[0], c[1]));
+  const Point p = {a[0], a[1], 0}, q = {b[0], b[1], 0}, r = {c[0], c[1], 0};
+  return detail::ExactSigns::area(p.data(), q.data(), r.data(), 2);
 }
 
 bool collinear(const Point& a, const Point& b, const Point& c) {
   // One projection with an area settles it; nearly every triangle leaves here.
   for (int u = 0, v = 1; u < 3; ++u, v = (v + 1) % 3)
     if (certain_sign(a[u], a[v], b[u], b[v], c[u], c[v]) != 0) return false;
-  return CGAL::collinear(exact_point(a), exact_point(b), exact_point(c));
+  for (int k = 0; k < 3; ++k)
+    if (detail::ExactSigns::area(a.data(), b.data(), c.data(), k) != 0) return false;
+  return true;
 }
 
 }  // namespace tandem::build

@@ -7,7 +7,7 @@
 
 #include "exact_predicates.h"
 #include "polygon_cdt.h"
-#include "tandem/formats/box.h"
+#include "usable_face.h"
 
 namespace tandem::build {
 namespace {
@@ -83,7 +83,7 @@ class Triangulator {
     const Corners corners =
         Corners(mesh_.corners)
             .subspan(mesh_.face_begin[face], mesh_.face_begin[face + 1] - mesh_.face_begin[face]);
-    if (!usable(corners)) return;
+    if (!is_usable(mesh_.points, corners, report_)) return;
     if (corners.size() == 3) return emit(face, {corners[0], corners[1], corners[2]});
     report_.faces_repeated_corner += repeats_a_corner(corners);
     gather(face, corners);
@@ -93,30 +93,10 @@ class Triangulator {
   }
 
  private:
-  bool usable(Corners corners) {
-    for (const std::uint32_t corner : corners)
-      if (corner >= mesh_.points.size()) return drop(report_.faces_index_out_of_range);
-    if (corners.size() < 3) return drop(report_.faces_too_few_corners);
-    bool finite = true;
-    bool small = true;
-    for (const std::uint32_t corner : corners)
-      for (const double x : mesh_.points[corner]) {
-        finite &= std::isfinite(x);
-        small &= std::abs(x) <= double{kMaxCoordinate};
-      }
-    if (!finite) return drop(report_.faces_not_finite);
-    return small || drop(report_.faces_too_large);
-  }
-
   bool repeats_a_corner(Corners corners) const {
     const auto same = [this](std::uint32_t a, std::uint32_t b) { return mesh_.points[a] == mesh_.points[b]; };
     return same(corners.front(), corners.back()) ||
            std::adjacent_find(corners.begin(), corners.end(), same) != corners.end();
-  }
-
-  static bool drop(std::uint64_t& count) {
-    ++count;
-    return false;
   }
 
   void emit(std::uint32_t face, const TriangleIndices& triangle) {
@@ -208,13 +188,6 @@ class Triangulator {
   std::vector<TriangleIndices> pieces_;  ///< of the face at hand, by corner
 };
 
-std::uint64_t count_unreferenced(const PolygonMesh& mesh) {
-  std::vector<bool> referenced(mesh.points.size(), false);
-  for (const std::uint32_t corner : mesh.corners)
-    if (corner < referenced.size()) referenced[corner] = true;
-  return static_cast<std::uint64_t>(std::count(referenced.begin(), referenced.end(), false));
-}
-
 /// Each face of n corners makes at most n - 2 triangles, but for outlines that touch themselves.
 std::size_t expected_triangles(const PolygonMesh& mesh) {
   return mesh.corners.size() - std::min(mesh.corners.size(), 2 * mesh.face_count());
@@ -225,7 +198,7 @@ std::size_t expected_triangles(const PolygonMesh& mesh) {
 TriangleMesh triangulate(PolygonMesh& mesh, CleanReport& report) {
   report.faces = mesh.face_count();
   report.vertices = mesh.points.size();
-  report.vertices_unreferenced = count_unreferenced(mesh);
+  report.vertices_unreferenced = count_unreferenced(mesh.points.size(), mesh.corners);
   TriangleMesh out;
   out.triangles.reserve(expected_triangles(mesh));
   out.face.reserve(expected_triangles(mesh));

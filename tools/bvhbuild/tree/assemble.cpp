@@ -6,12 +6,11 @@
 #include <stdexcept>
 #include <vector>
 
+#include "tandem/formats/allocator.h"
 #include "tandem/formats/check.h"
 
 namespace tandem::build {
 namespace {
-
-constexpr std::align_val_t kAlignment{kSectionAlignment};
 
 std::uint64_t align_up(std::uint64_t offset) {
   return (offset + kSectionAlignment - 1) / kSectionAlignment * kSectionAlignment;
@@ -162,13 +161,13 @@ void fill(Image& image, const Section& section, const void* data, std::size_t by
 
 }  // namespace
 
-Image::Image(std::size_t bytes)
-    : data_(static_cast<std::byte*>(::operator new(bytes, kAlignment))), size_(bytes) {
+Image::Image(std::size_t bytes) : data_(static_cast<std::byte*>(allocate(bytes))), size_(bytes) {
+  if (data_ == nullptr) throw std::bad_alloc();
   std::memset(data_.get(), 0, bytes);
 }
 
 void Image::Delete::operator()(std::byte* data) const {
-  ::operator delete(data, kAlignment);
+  deallocate(data);
 }
 
 Image assemble(const AssetSource& source, std::span<const AssetLevel> levels) {

@@ -32,13 +32,16 @@ struct AssetSource {
   std::string provenance;             ///< JSON
 };
 
-/// The bytes of a whole .bvh file in memory, aligned as the checker wants them.
+/// The bytes of a whole .bvh file in memory, aligned as the checker wants them. The memory is from allocate()
+/// of tandem/formats/allocator.h.
 class Image {
  public:
   explicit Image(std::size_t bytes);  ///< all zero
   std::byte* data() { return data_.get(); }
   const std::byte* data() const { return data_.get(); }
   std::size_t size() const { return size_; }
+  /// The caller deallocates them.
+  std::byte* release() { return data_.release(); }
 
  private:
   struct Delete {

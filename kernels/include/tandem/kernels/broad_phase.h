@@ -113,7 +113,7 @@ class BroadPhase {
   };
 
   /// What a worker found.
-  struct alignas(64) Finder {
+  struct alignas(64) Finder : Allocated {
     Buffer<ObjectPair> pairs;
     std::uint64_t group_pairs = 0;
     bool enough_memory = true;

@@ -1,18 +1,19 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <span>
 #include <type_traits>
 #include <utility>
 
+#include "tandem/formats/allocator.h"
 #include "tandem/kernels/detail/available_memory.h"
 
 namespace tandem {
 
 /// Memory that grows and is kept: a vector for code that must not throw. Elements are plain data and start
-/// uninitialised. Aligned to 128 bytes. Movable, not copyable. Out of memory is also where Linux would grant
-/// more than there is, see available_memory(); small arrays do not ask.
+/// uninitialised. Aligned to kMemoryAlignment, from the current allocator. Movable, not copyable. Out of
+/// memory is also where Linux would grant more than there is, see available_memory(); small arrays do not
+/// ask.
 template <typename Value>
 class Buffer {
   static_assert(std::is_trivially_copyable_v<Value>);
@@ -26,7 +27,7 @@ class Buffer {
     std::swap(capacity_, other.capacity_);
     return *this;
   }
-  ~Buffer() { std::free(data_); }
+  ~Buffer() { deallocate(data_); }
 
   /// Makes room for `size` elements and forgets what was in it, unless there was room; grows by half at
   /// least where there is memory for that. False: out of memory, nothing changed.
@@ -64,8 +65,6 @@ class Buffer {
   std::span<const Value> view() const { return {data_, size_}; }
 
  private:
-  static constexpr std::size_t kAlignment = 128;
-
   static constexpr std::size_t kSmall = std::size_t{64} << 20;  ///< bytes
 
   static bool is_available(std::size_t capacity, std::size_t owners) {
@@ -75,11 +74,10 @@ class Buffer {
 
   bool reallocate(std::size_t capacity, std::size_t kept, std::size_t owners) {
     if (capacity > SIZE_MAX / 2 / sizeof(Value) || !is_available(capacity, owners)) return false;
-    const std::size_t bytes = (capacity * sizeof(Value) + kAlignment - 1) / kAlignment * kAlignment;
-    auto* data = static_cast<Value*>(std::aligned_alloc(kAlignment, bytes));
+    auto* data = static_cast<Value*>(allocate(capacity * sizeof(Value)));
     if (data == nullptr) return false;
     for (std::size_t i = 0; i < kept; ++i) data[i] = data_[i];
-    std::free(data_);
+    deallocate(data_);
     data_ = data;
     capacity_ = capacity;
     return true;

@@ -1,0 +1,136 @@
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include <algorithm>
+#include <new>
+#include <vector>
+
+#include "bvhbuild/tree/build_asset.h"
+#include "handles.h"
+
+using namespace tandem;
+using namespace tandem::c;
+
+namespace {
+
+// A mesh as the builder takes it.
+struct Source {
+  std::vector<build::SourcePart> parts;
+  build::TriangleSource triangles;
+};
+
+static_assert(sizeof(build::Point) == 3 * sizeof(double) &&
+              sizeof(build::TriangleIndices) == 3 * sizeof(uint32_t));
+
+tandem_status read_mesh(const tandem_mesh& given, Source& source) {
+  tandem_mesh mesh;
+  if (const tandem_status status = read_struct(&given, mesh); status != TANDEM_OK) return status;
+  if (mesh.reserved != 0) return TANDEM_BAD_OPTION;
+  if (!is_there(mesh.positions, mesh.vertex_count) || !is_there(mesh.triangles, mesh.triangle_count) ||
+      !is_there(mesh.parts, mesh.part_count))
+    return TANDEM_NULL_ARGUMENT;
+  if (mesh.triangle_count >= kNoIndex) return TANDEM_TOO_MANY_TRIANGLES;
+  build::TriangleSource& to = source.triangles;
+  to.points = {reinterpret_cast<const build::Point*>(mesh.positions), mesh.vertex_count};
+  to.triangles = {reinterpret_cast<const build::TriangleIndices*>(mesh.triangles), mesh.triangle_count};
+  if (mesh.faces != nullptr) to.face = {mesh.faces, mesh.triangle_count};
+  uint64_t faces = mesh.triangle_count;
+  if (!to.face.empty()) faces = uint64_t{*std::max_element(to.face.begin(), to.face.end())} + 1;
+  to.face_count = faces;
+  uint64_t named = 0;
+  for (const tandem_mesh_part& part : std::span(mesh.parts, mesh.part_count)) {
+    if (part.face_count > kNoIndex) return TANDEM_BAD_PART;
+    source.parts.push_back({part.name != nullptr ? part.name : "", part.path != nullptr ? part.path : "",
+                            named, part.face_count});
+    named += part.face_count;
+  }
+  if (source.parts.empty()) return TANDEM_OK;
+  // Without `faces`, a face is a triangle.
+  if (named < faces || (to.face.empty() && named != faces)) return TANDEM_BAD_PART;
+  to.face_count = named;
+  to.parts = source.parts;
+  return TANDEM_OK;
+}
+
+tandem_status read_options(const tandem_build_options* given, tandem_build_options& read,
+                           build::BuildOptions& options) {
+  if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return status;
+  const bool known = read.effort <= TANDEM_EFFORT_BEST && read.no_gpu_blocks <= 1 && read.no_topology <= 1 &&
+                     read.reserved == 0 && read.imaginary_share >= 0 && read.imaginary_share <= 1;
+  if (!known) return TANDEM_BAD_OPTION;
+  constexpr build::Effort kEfforts[] = {build::Effort::standard, build::Effort::fast, build::Effort::best};
+  options.effort = kEfforts[read.effort];
+  options.imaginary.share = read.imaginary_share;
+  options.gpu_blocks = read.no_gpu_blocks == 0;
+  options.topology = read.no_topology == 0;
+  return TANDEM_OK;
+}
+
+tandem_build_report report_of(const build::CleanReport& clean) {
+  tandem_build_report report = {};
+  report.index_out_of_range = clean.faces_index_out_of_range;
+  report.not_finite = clean.faces_not_finite;
+  report.too_large = clean.faces_too_large;
+  report.degenerate = clean.triangles_degenerate;
+  report.duplicate = clean.triangles_duplicate;
+  report.duplicate_reversed = clean.triangles_duplicate_reversed;
+  report.flattened = clean.triangles_flattened;
+  report.vertices_unreferenced = clean.vertices_unreferenced;
+  report.vertices_welded = clean.vertices_welded;
+  return report;
+}
+
+// In an arena of its own, so that the program's other work with oneTBB keeps its threads.
+build::BuiltAsset build_with(const Source& source, const build::BuildOptions& options,
+                             const tandem_build_options& read) {
+  build::OptimisationWatch watch;
+  if (read.progress != nullptr)
+    watch.progress = [&](double share) { watch.stop = watch.stop || read.progress(read.user, share) != 0; };
+  using oneapi::tbb::global_control;
+  const size_t most = global_control::active_value(global_control::max_allowed_parallelism);
+  oneapi::tbb::task_arena arena(
+      static_cast<int>(read.threads != 0 ? std::min<size_t>(read.threads, most) : most));
+  const Allocator allocator = current_allocator();
+  build::BuiltAsset built;
+  arena.execute([&] {
+    const AllocatorScope scope(allocator);
+    built = build::build_asset(source.triangles, options, read.provenance != nullptr ? read.provenance : "",
+                               watch);
+  });
+  return built;
+}
+
+tandem_status take(build::BuiltAsset built, tandem_asset& made) {
+  if (!built.file) return TANDEM_NO_TRIANGLE;
+  made.view = built.file->asset;
+  made.copy = built.file->image.release();
+  return TANDEM_OK;
+}
+
+}  // namespace
+
+tandem_status tandem_asset_build(const tandem_mesh* mesh, const tandem_build_options* options,
+                                 const tandem_allocator* allocator, tandem_asset** asset,
+                                 tandem_build_report* report) {
+  if (asset == nullptr) return TANDEM_NULL_ARGUMENT;
+  *asset = nullptr;
+  if (mesh == nullptr) return TANDEM_NULL_ARGUMENT;
+  try {
+    tandem_build_options read;
+    build::BuildOptions understood;
+    Source source;
+    tandem_status status = read_options(options, read, understood);
+    if (status == TANDEM_OK) status = read_mesh(*mesh, source);
+    if (status == TANDEM_OK && report != nullptr) status = write_struct(tandem_build_report{}, report);
+    if (status != TANDEM_OK) return status;
+    return make_asset(allocator, asset, [&](tandem_asset& made) {
+      build::BuiltAsset built = build_with(source, understood, read);
+      if (report != nullptr) (void)write_struct(report_of(built.clean), report);
+      return take(std::move(built), made);
+    });
+  } catch (const std::bad_alloc&) {
+    return TANDEM_OUT_OF_MEMORY;
+  } catch (...) {
+    return TANDEM_INTERNAL_ERROR;
+  }
+}

@@ -1,0 +1,65 @@
+#include "build_asset.h"
+
+#include <charconv>
+
+#include "bvhbuild/meshing/clean.h"
+#include "bvhbuild/meshing/stored_mesh.h"
+#include "bvhbuild/meshing/take_triangles.h"
+
+namespace tandem::build {
+namespace {
+
+std::string number(double value) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, value).ptr};
+}
+
+const char* name(Effort effort) {
+  return effort == Effort::fast ? "fast" : effort == Effort::best ? "best" : "default";
+}
+
+}  // namespace
+
+std::string usual_provenance(const BuildOptions& options, const CleanReport& report) {
+  std::string json = R"({"tool":"tandem","version":")" TANDEM_VERSION R"(","input":{"faces":)" +
+                     std::to_string(report.faces) + R"(,"vertices":)" + std::to_string(report.vertices) +
+                     R"(},"options":{"imaginary":)" + number(options.imaginary.share) + R"(,"effort":")" +
+                     name(options.effort) + "\"";
+  if (!options.gpu_blocks) json += R"(,"gpu_blocks":false)";
+  if (!options.topology) json += R"(,"topology":false)";
+  json += R"(},"findings":{)";
+  bool first = true;
+  for (const Finding& finding : findings(report)) {
+    if (finding.count == 0) continue;
+    json += (first ? "\"" : ",\"") + std::string(finding.key) + "\":" + std::to_string(finding.count);
+    first = false;
+  }
+  return json + "}}";
+}
+
+BuiltAsset build_asset(const TriangleSource& given, const BuildOptions& options, std::string provenance,
+                       OptimisationWatch& watch) {
+  BuiltAsset built;
+  TriangleMesh triangles = take_triangles(given.points, given.triangles, given.face, built.clean);
+  clean(triangles, built.clean);
+  const StoredMesh mesh = to_single_precision(triangles, built.clean);
+  if (mesh.triangles.empty()) return built;
+
+  AssetSource source;
+  source.origin = mesh.origin;
+  source.rounding_error = mesh.largest_rounding_error;
+  source.source_faces = given.face.empty() ? given.triangles.size() : given.face_count;
+  const SourcePart whole = {{}, {}, 0, source.source_faces};
+  source.parts = given.parts.empty() ? std::span(&whole, 1) : given.parts;
+  source.provenance = provenance.empty() ? usual_provenance(options, built.clean) : std::move(provenance);
+
+  const Geometry geometry{mesh.points, mesh.triangles};
+  const LevelParts parts = build_parts(geometry, options, watch);
+  const AssetLevel level = {geometry,    mesh.face,
+                            &parts.tree, parts.oriented_blocks,
+                            0,           parts.topology ? &*parts.topology : nullptr};
+  built.file = assemble_checked(source, {&level, 1});
+  return built;
+}
+
+}  // namespace tandem::build

@@ -8,8 +8,8 @@ namespace tandem::test {
 /// A mesh as the level 0 of a checked file.
 class StoredLevel {
  public:
-  explicit StoredLevel(const Mesh& mesh)
-      : file_(make_file(mesh, build::Imaginary::minimal, build::Effort::fast)) {
+  explicit StoredLevel(const Mesh& mesh, build::Effort effort = build::Effort::fast)
+      : file_(make_file(mesh, build::Imaginary::minimal, effort)) {
     const CheckResult checked = file_.check();
     if (checked.status != Status::kOk) throw std::runtime_error(name(checked.status));
     view_ = checked.asset.level();

@@ -72,7 +72,8 @@ void add_results(const Outcome& outcome, Json& json) {
   if (!outcome.levels.empty()) {
     json["levels"] = levels_json(outcome);
     json["levels_left_out"] = Json::array();
-    for (const LevelError& error : outcome.levels_left_out) json["levels_left_out"].push_back(name(error));
+    for (const LevelLeftOut& error : outcome.levels_left_out)
+      json["levels_left_out"].push_back(name(error.wanted));
     json["fixed_vertices"] = outcome.fixed_vertices;
   }
   json["bytes"] = outcome.file_bytes;
@@ -101,11 +102,22 @@ std::string level_line(const Outcome& outcome, std::size_t i) {
   return out.str() + "\n";
 }
 
+const char* why(NoLevel reason) {
+  switch (reason) {
+    case NoLevel::no_coarser:
+      return "it would have as many triangles as the one before";
+    case NoLevel::spared:
+      return "a later one is coarser and nearer";
+    case NoLevel::interrupted:
+      return "its making was interrupted";
+  }
+  return "unknown";
+}
+
 void print_levels(const Outcome& outcome, std::ostringstream& out) {
   for (std::size_t i = 0; i < outcome.levels.size(); ++i) out << level_line(outcome, i);
-  for (const LevelError& error : outcome.levels_left_out)
-    out << "  note     no level for " << name(error)
-        << ": it would have as many triangles as the one before\n";
+  for (const LevelLeftOut& error : outcome.levels_left_out)
+    out << "  note     no level for " << name(error.wanted) << ": " << why(error.why) << "\n";
   if (outcome.fixed_vertices > 0) {
     out << "  note     " << with_commas(outcome.fixed_vertices)
         << (outcome.fixed_vertices == 1 ? " vertex where surfaces meet stays"

@@ -14,6 +14,7 @@ GRAVITY = 9.81
 # Boxes by their lengths; all other meshes are files of assets/.
 BOXES = {"slab": (300, 40, 2), "flat": (1, 1, 0.2), "uneven": (1, 0.6, 0.2), "thin": (1, 1, 0.01), "target": (2, 2, 0.01)}
 ROCK = 80_000  # triangles of the rough rock, which makeassets makes
+NUDGE = 1e-6  # metres
 LEVELS = "0.1%,0.3%,1%,3%"  # errors of its coarser levels, of its diagonal
 
 
@@ -64,6 +65,17 @@ class Scene:
         scene.meshes = self.meshes
         scene.bodies = [(body[0], place, turned, *body[3:5], (0, 0, 0), (0, 0, 0), body[7]) for body, turned, place in zip(self.bodies, rotations, places)]
         return scene
+
+    def nudged(self):
+        """The same scene with its moving bodies moved by NUDGE, each in some direction, at rest."""
+        random = np.random.default_rng(1)
+        steps = [step / np.linalg.norm(step) for step in random.normal(size=(len(self.bodies), 3))]
+        return self.moved_to([body[2] for body in self.bodies], [np.asarray(body[1]) + (0 if body[3] else NUDGE) * step for body, step in zip(self.bodies, steps)])
+
+    def tilted(self, angle):
+        """The same scene, all turned about the y axis, at rest."""
+        about = rotation_about((0, 1, 0), angle)
+        return self.moved_to([about @ body[2] for body in self.bodies], [about @ body[1] for body in self.bodies])
 
     def slab(self, turned=np.eye(3)):
         """Fixed; its upper side goes through the origin."""

@@ -136,6 +136,11 @@ static void test_assets(void) {
   free(aligned);
 }
 
+static uint32_t end_soon(void* user, double share) {
+  *(double*)user = share;
+  return 1;
+}
+
 static void test_building(void) {
   // Two triangles of a square, one without area, one that names no vertex; quads as faces, in two parts.
   const double positions[] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 2, 0, 0};
@@ -203,6 +208,20 @@ static void test_building(void) {
   CHECK(text == 12 && memcmp(json, options.provenance, text) == 0);
   tandem_asset_release(asset);
   tandem_asset_release(other);
+
+  // The best tree until the caller has seen enough.
+  double done = -1;
+  options.effort = TANDEM_EFFORT_BEST;
+  options.provenance = NULL;
+  options.progress = end_soon;
+  options.user = &done;
+  CHECK_STATUS(tandem_asset_build(&mesh, &options, NULL, &asset, NULL), TANDEM_OK);
+  json = tandem_asset_provenance(asset, &text);
+  char said[512] = {0};
+  memcpy(said, json, text < sizeof said ? text : sizeof said - 1);
+  CHECK(done >= 0 && done < 1 && strstr(said, "\"interrupted\":true") != NULL);
+  CHECK(strstr(said, "\"imaginary\":\"minimal\",\"effort\":\"best\"") != NULL);
+  tandem_asset_release(asset);
   free_mesh(&cow);
 }
 

@@ -74,7 +74,7 @@ TEST_F(GpuAssets, WithoutOrientedBlocksAnswerAllButExactQueries) {
   DeviceAssets uploaded;
   ASSERT_EQ(uploaded.upload(views, Contents::all, nullptr), Status::kOk);
   const GpuAsset assets[] = {gpu_asset(uploaded.level(0), views[0]), gpu_asset(uploaded.level(1), views[1])};
-  const GpuScene scene({}, instances, pairs);
+  const GpuScene scene(std::span<const AssetView>(), instances, pairs);
   for (const QueryMode mode : {QueryMode::fast, QueryMode::boxes}) {
     const auto expected = contacts_on_cpu(views, instances, pairs, mode);
     EXPECT_GT(expected.size(), 100u);
@@ -113,7 +113,7 @@ TEST_F(GpuAssets, OfEveryLevelHaveThatLevelsContacts) {
   const std::vector<Instance> instances = {{0, random.pose({1, 1, 0.2, 0, 4})},
                                            {0, random.pose({1, 1, 0.2, 0, 4})}};
   const std::vector<ObjectPair> pairs = {{0, 1}, {1, 1}};
-  const GpuScene scene({}, instances, pairs);
+  const GpuScene scene(std::span<const AssetView>(), instances, pairs);
   for (const Contents contents : {Contents::all, Contents::exact_queries}) {
     DeviceAssets uploaded;
     ASSERT_EQ(uploaded.upload({&view, 1}, contents, nullptr), Status::kOk);
@@ -144,7 +144,7 @@ TEST_F(GpuAssets, OfTheGreatestDepthAreWalked) {
     DeviceAssets uploaded;
     ASSERT_EQ(uploaded.upload({&view, 1}, Contents::all, nullptr), Status::kOk);
     const GpuAsset on_gpu = gpu_asset(uploaded.level(0), view);
-    const GpuScene scene({}, instances, pairs);
+    const GpuScene scene(std::span<const AssetView>(), instances, pairs);
     for (const QueryMode mode : kModes)
       EXPECT_EQ(contacts_on_gpu({&on_gpu, 1}, scene, mode),
                 contacts_on_cpu({&view, 1}, instances, pairs, mode))

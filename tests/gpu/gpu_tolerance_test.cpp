@@ -207,6 +207,12 @@ TEST_F(GpuTolerance, WhatIsWrongIsSaid) {
   {
     const GpuScene device(scene.assets, scene.instances, pairs, Contents::exact_queries);
     EXPECT_EQ(query.set_levels(device.levels().subspan(1), nullptr), Status::kNoFinestLevel);
+    std::vector<GpuAsset> gap(device.levels().begin(), device.levels().begin() + 3);
+    gap.erase(gap.begin() + 1);
+    EXPECT_EQ(query.set_levels(gap, nullptr), Status::kNoFinestLevel);
+    std::vector<GpuAsset> of_two(device.levels().begin(), device.levels().begin() + 2);
+    of_two[1].lower[0] -= 1;
+    EXPECT_EQ(query.set_levels(of_two, nullptr), Status::kNoFinestLevel);
     ASSERT_EQ(query.set_levels(device.levels(), nullptr), Status::kOk);
     for (const double bad : {-1.0, std::nan(""), HUGE_VAL, 1e301})
       EXPECT_EQ(query.decide(device.instances(), device.pairs(), bad, nullptr), Status::kOutOfRange);

@@ -108,7 +108,7 @@ class SceneLevels(LevelsBenchTest):
         found = self.results("impact", "--dt", "2")
         self.take_files_of_one_level()
         alone = self.results("impact", "--dt", "2")
-        self.assertGreater((found["status"] == 1).sum(), 3)
+        self.assertGreater((found["status"] == 1).sum(), 0)
         self.assertEqual(found["status"].tolist(), alone["status"].tolist())
         self.assertLess(np.abs(found["t_safe"] - alone["t_safe"]).max(), 1e-3)
 

@@ -130,7 +130,7 @@ class Query(BenchTest):
         self.write_scene()
         page = (SOURCE_DIR / "docs" / "json.md").read_text().split("## `bvhbench query")[1].split("\n## ")[0]
         keys = [[key for line in part.split("\n") if line.startswith("| `") for key in re.findall(r"`(\w+)`", line.split("|")[1])]
-                for part in page.split("With `--manifolds` also")]
+                for part in re.split("\nWith `--(?:manifolds|tolerance)", page)]
         self.assertEqual(list(self.query()), keys[0])
         self.assertEqual(list(self.query("--manifolds")), keys[0] + keys[1])
 

@@ -24,6 +24,7 @@ class GpuToleranceRun : GpuRun {
     find_pairs();
     const Status status = query_.decide(instances_, pairs_, tolerance_, stream_.get());
     require(status, query_.cuda_error(), query_.report().where, "verdicts");
+    make_room_for_repeats();
     TimedVerdicts out;
     out.deciding = time_repeats(repeats, [&] { enqueue(); });
     out.seconds = given_ != nullptr ? out.deciding : time_repeats(repeats, [&] {
@@ -35,6 +36,13 @@ class GpuToleranceRun : GpuRun {
   }
 
  private:
+  // What is looked at before a pair's first contact is found differs from run to run.
+  void make_room_for_repeats() {
+    GpuToleranceCapacity room = query_.report().needed;
+    room.undecided += room.undecided / 2 + 1024;
+    check(query_.reserve(room), query_.cuda_error(), "room");
+  }
+
   void enqueue() {
     check(query_.enqueue(instances_, pairs_, tolerance_, stream_.get()), query_.cuda_error(), "verdicts");
   }

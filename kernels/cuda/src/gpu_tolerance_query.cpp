@@ -16,6 +16,14 @@ static_assert(sizeof(gpu::ToleranceState) <=
 static_assert(sizeof(PairVerdict) == 3);
 static_assert(sizeof(levels::LevelRange) == 8);
 
+// Whether two levels in a row of a list are of one asset, the one behind the other.
+bool follows(const GpuAsset& finer, const GpuAsset& coarser) {
+  return coarser.tree.number == finer.tree.number + 1 && coarser.source_faces == finer.source_faces &&
+         std::equal(coarser.origin, coarser.origin + 3, finer.origin) &&
+         std::equal(coarser.lower, coarser.lower + 3, finer.lower) &&
+         std::equal(coarser.upper, coarser.upper + 3, finer.upper);
+}
+
 }  // namespace
 
 struct GpuToleranceQuery::State {
@@ -65,7 +73,7 @@ Status GpuToleranceQuery::State::set_levels(std::span<const GpuAsset> given, cud
   for (std::size_t i = 0; i < given.size(); ++i) {
     if (given[i].tree.oriented_blocks == nullptr) return Status::kNoOrientedBlocks;
     const bool begins = given[i].tree.number == 0;
-    if (!begins && i == 0) return Status::kNoFinestLevel;
+    if (!begins && (i == 0 || !follows(given[i - 1], given[i]))) return Status::kNoFinestLevel;
     if (begins && !ranges.push({static_cast<std::uint32_t>(i), 0})) return Status::kOutOfMemory;
     most = std::max(most, ++ranges[ranges.size() - 1].count);
   }

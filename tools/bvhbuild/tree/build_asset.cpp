@@ -9,9 +9,11 @@
 namespace tandem::build {
 namespace {
 
-std::string number(double value) {
+std::string name(Imaginary imaginary) {
+  if (imaginary == Imaginary::minimal) return "minimal";
+  if (imaginary == Imaginary::free) return "free";
   char text[32];
-  return {text, std::to_chars(text, text + sizeof text, value).ptr};
+  return {text, std::to_chars(text, text + sizeof text, imaginary.share).ptr};
 }
 
 const char* name(Effort effort) {
@@ -20,13 +22,14 @@ const char* name(Effort effort) {
 
 }  // namespace
 
-std::string usual_provenance(const BuildOptions& options, const CleanReport& report) {
+std::string usual_provenance(const BuildOptions& options, const CleanReport& report, bool interrupted) {
   std::string json = R"({"tool":"tandem","version":")" TANDEM_VERSION R"(","input":{"faces":)" +
                      std::to_string(report.faces) + R"(,"vertices":)" + std::to_string(report.vertices) +
-                     R"(},"options":{"imaginary":)" + number(options.imaginary.share) + R"(,"effort":")" +
+                     R"(},"options":{"imaginary":")" + name(options.imaginary) + R"(","effort":")" +
                      name(options.effort) + "\"";
   if (!options.gpu_blocks) json += R"(,"gpu_blocks":false)";
   if (!options.topology) json += R"(,"topology":false)";
+  if (interrupted) json += R"(,"interrupted":true)";
   json += R"(},"findings":{)";
   bool first = true;
   for (const Finding& finding : findings(report)) {
@@ -51,10 +54,10 @@ BuiltAsset build_asset(const TriangleSource& given, const BuildOptions& options,
   source.source_faces = given.face.empty() ? given.triangles.size() : given.face_count;
   const SourcePart whole = {{}, {}, 0, source.source_faces};
   source.parts = given.parts.empty() ? std::span(&whole, 1) : given.parts;
-  source.provenance = provenance.empty() ? usual_provenance(options, built.clean) : std::move(provenance);
-
   const Geometry geometry{mesh.points, mesh.triangles};
   const LevelParts parts = build_parts(geometry, options, watch);
+  source.provenance =
+      provenance.empty() ? usual_provenance(options, built.clean, watch.stop) : std::move(provenance);
   const AssetLevel level = {geometry,    mesh.face,
                             &parts.tree, parts.oriented_blocks,
                             0,           parts.topology ? &*parts.topology : nullptr};

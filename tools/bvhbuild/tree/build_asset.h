@@ -27,7 +27,8 @@ struct BuiltAsset {
 };
 
 /// What a file says of its making where the caller says nothing: JSON, without what depends on the machine.
-std::string usual_provenance(const BuildOptions& options, const CleanReport& report);
+/// interrupted: the watch ended the optimisation.
+std::string usual_provenance(const BuildOptions& options, const CleanReport& report, bool interrupted);
 
 /// Cleans, builds, assembles and checks, on the threads that oneTBB gives where it is called. The same
 /// source, options and provenance give the same bytes whatever their number, and those that bvhbuild writes

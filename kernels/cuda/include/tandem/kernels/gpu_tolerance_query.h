@@ -57,8 +57,9 @@ class GpuToleranceQuery {
   /// Names the levels of the assets that instances refer to, on the current device, after what `stream`
   /// holds, and waits for it: asset by asset, from the finest level on. A level whose tree.number is 0 begins
   /// an asset; instances name assets by their order. What the trees point to must outlive the queries.
-  /// Result: kOk; kNoFinestLevel (the first is none); kNoOrientedBlocks (a level lacks them); kOutOfRange (an
-  /// asset of more than kMaxLevels); or as of set_assets() of GpuContactQuery.
+  /// Result: kOk; kNoFinestLevel (a level is not the one behind the level before it, or the first is no
+  /// finest one); kNoOrientedBlocks (a level lacks them); kOutOfRange (an asset of more than kMaxLevels); or
+  /// as of set_assets() of GpuContactQuery.
   Status set_levels(std::span<const GpuAsset> levels, cudaStream_t stream);
 
   /// Makes room for at least so much, waiting for the device where it grows. Result: kOk, kOutOfGpuMemory,

@@ -310,6 +310,15 @@ class Levels(ToolTest):
             self.assertGreater(row["self_contacts"], 10)
         self.assertIn(b"meets itself at", self.build(self.inputs / "two.obj", "-o", self.out, "--levels", "1%").stdout)
 
+    def test_self_contacts_are_counted_up_to_a_million(self):
+        rng = np.random.default_rng(4)
+        soup = obj(rng.uniform(-1, 1, (9000, 3)), np.arange(9000).reshape(-1, 3))
+        report = self.built_json("soup.obj", soup, "--levels", "0.1%", "--effort", "fast")
+        self.assertIsNone(report["levels"][0]["self_contacts"])
+        self.assertLess(report["peak_memory_bytes"], 100 << 20)
+        self.assertIn(b", meets itself at more than 1,000,000 pairs of triangles\n",
+                      self.build(self.inputs / "soup.obj", "-o", self.out, "--levels", "0.1%", "--effort", "fast").stdout)
+
     def test_wrong_errors_are_usage_errors(self):
         mesh = self.write("cube.obj", CUBE_OBJ)
         for text, word in (("", "--levels"), ("0", "'0'"), ("-1%", "'-1%'"), ("nan", "'nan'"), ("inf", "'inf'"), ("1%%", "'1%%'"),

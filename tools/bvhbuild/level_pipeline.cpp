@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <thread>
 
 #include "bvhbuild/levels/ladder.h"
 #include "bvhbuild/levels/self_contacts.h"
@@ -79,9 +78,7 @@ void add_levels(const Options& options, const StoredMesh& mesh, OptimisationWatc
   outcome.seconds.levels = stopwatch.lap();
 }
 
-void describe_levels(const Options& options, const AssetView& asset, Outcome& outcome) {
-  const unsigned threads =
-      options.threads > 0 ? static_cast<unsigned>(options.threads) : std::thread::hardware_concurrency();
+void describe_levels(const AssetView& asset, Outcome& outcome) {
   const FileHeader& header = *asset.header;
   const double whole = diagonal(header.lower, header.upper);
   for (std::uint32_t i = 0; i < asset.levels.size(); ++i) {
@@ -91,7 +88,7 @@ void describe_levels(const Options& options, const AssetView& asset, Outcome& ou
     level.error_bound = view.error_bound;
     level.error_bound_relative = whole > 0 ? view.error_bound / whole : 0;
     if (view.topology != nullptr) level.closed = view.closed;
-    level.self_contacts = count_self_contacts(asset.levels_from(i, 1), std::max(threads, 1u));
+    level.self_contacts = count_self_contacts(view);
   }
 }
 

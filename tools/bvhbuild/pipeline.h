@@ -20,7 +20,7 @@ struct LevelOutcome {
   double error_bound = 0;
   double error_bound_relative = 0;  ///< to the diagonal of the finest's bounds; 0 where that is 0
   std::optional<bool> closed;       ///< whether all components are; none without topology
-  /// Pairs of triangles that meet without having a corner in common; none where coordinates are too large.
+  /// Pairs of triangles that meet without having a corner in common; none: more than kMostSelfContacts.
   std::optional<std::uint64_t> self_contacts;
 };
 

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <sstream>
 
+#include "bvhbuild/levels/self_contacts.h"
 #include "common/json.h"
 #include "common/number_words.h"
 #include "common/printable.h"
@@ -95,7 +96,7 @@ std::string level_line(const Outcome& outcome, std::size_t i) {
   }
   if (level.closed) out << (*level.closed ? ", closed" : ", not closed");
   if (!level.self_contacts)
-    out << ", self-contacts unknown: coordinates are too large";
+    out << ", meets itself at more than " << with_commas(kMostSelfContacts) << " pairs of triangles";
   else if (*level.self_contacts > 0)
     out << ", meets itself at " << with_commas(*level.self_contacts)
         << (*level.self_contacts == 1 ? " pair of triangles" : " pairs of triangles");

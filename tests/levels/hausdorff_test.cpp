@@ -5,6 +5,7 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
+#include <random>
 
 #include "kernels/solid_meshes.h"
 #include "levels/stored_level.h"
@@ -224,6 +225,52 @@ TEST(Hausdorff, HoldsWhenPiecesRunOutAndSaysSo) {
   EXPECT_LE(wide.lower, narrow.upper);
   EXPECT_GT(wide.upper, narrow.upper);
   EXPECT_LT(wide.upper, 2);
+}
+
+/// Cubes of a grid whose coordinates are rounded, so that boxes of different trees end differently.
+Mesh cubes_of_a_grid(float step, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  Mesh mesh;
+  for (int i = 0; i < 12; ++i) {
+    float place[3];
+    for (float& x : place) x = static_cast<float>(random() % 9) * step;
+    mesh = joined(mesh, moved(test::box(step, step, step), place[0], place[1], place[2]));
+  }
+  return mesh;
+}
+
+/// The same surface where all triangles lie in planes of two axes and have edges along both.
+Mesh divided(const Mesh& mesh) {
+  Mesh parts;
+  for (const auto& triangle : mesh.triangles) {
+    std::array<float, 3> corner[3], middle[3];
+    for (std::size_t k = 0; k < 3; ++k) corner[k] = mesh.points[triangle[k]];
+    for (std::size_t k = 0; k < 3; ++k)
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        middle[k][axis] = std::midpoint(corner[k][axis], corner[(k + 1) % 3][axis]);
+    for (std::size_t k = 0; k < 3; ++k) parts.add(middle[(k + 2) % 3], corner[k], middle[k]);
+    parts.add(middle[0], middle[1], middle[2]);
+  }
+  return parts;
+}
+
+/// Such as bvhbuild's trees and those of the file: where the distance is nothing, the bound is rounding
+/// alone.
+TEST(Hausdorff, ABoundFoundWithSomeTreesIsProvedWithOthers) {
+  for (std::uint64_t seed = 0; seed < 12; ++seed) {
+    const Mesh coarse = cubes_of_a_grid(1.0f / 3, seed), fine = divided(divided(coarse));
+    const StoredLevel some[] = {StoredLevel(fine), StoredLevel(coarse)};
+    const StoredLevel others[] = {StoredLevel(fine, build::Effort::standard),
+                                  StoredLevel(coarse, build::Effort::standard)};
+    HausdorffOptions options;
+    options.wanted = hausdorff_bound(some[0].view(), some[1].view()).upper;
+    EXPECT_LT(*options.wanted, 0x1p-36);
+    const HausdorffBound decided = hausdorff_bound(others[0].view(), others[1].view(), options);
+    EXPECT_TRUE(decided.narrow) << seed;
+    EXPECT_LE(decided.upper, *options.wanted) << seed;
+    options.wanted = hausdorff_bound(others[0].view(), others[1].view()).upper;
+    EXPECT_TRUE(hausdorff_bound(some[0].view(), some[1].view(), options).narrow) << seed;
+  }
 }
 
 TEST(Hausdorff, DecidesWhetherItIsWithinAWantedLength) {

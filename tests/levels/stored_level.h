@@ -8,13 +8,15 @@ namespace tandem::test {
 /// A mesh as the level 0 of a checked file.
 class StoredLevel {
  public:
-  explicit StoredLevel(const Mesh& mesh)
-      : file_(make_file(mesh, build::Imaginary::minimal, build::Effort::fast)) {
+  explicit StoredLevel(const Mesh& mesh, build::Effort effort = build::Effort::fast)
+      : file_(make_file(mesh, build::Imaginary::minimal, effort)) {
     const CheckResult checked = file_.check();
     if (checked.status != Status::kOk) throw std::runtime_error(name(checked.status));
-    view_ = checked.asset.level();
+    asset_ = checked.asset;
+    view_ = asset_.level();
   }
 
+  const AssetView& asset() const { return asset_; }
   const LevelView& view() const { return view_; }
 
   /// The same without topology.
@@ -28,6 +30,7 @@ class StoredLevel {
 
  private:
   Bytes file_;
+  AssetView asset_;
   LevelView view_;
 };
 

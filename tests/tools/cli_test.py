@@ -394,13 +394,14 @@ class Signals(ToolTest):
         self.assertGreater(killed, 0, "no signal came in time: the test shows nothing")
 
 
-    def test_ctrl_c_during_best_effort_keeps_the_best_tree_so_far(self):
+    def interrupted_build(self, *arguments):
+        """What a build of best effort reports that Ctrl-C ended while it optimised."""
         mesh = self.write("large.ply", grid_ply(100))
         try:
             ours, theirs = pty.openpty()
         except OSError as error:
             self.skipTest(f"no terminal to be had: {error}")
-        process = subprocess.Popen([BVHBUILD, mesh, "-o", self.out, "--effort", "best", "--json"], stdout=subprocess.PIPE, stderr=theirs)
+        process = subprocess.Popen([BVHBUILD, mesh, "-o", self.out, "--effort", "best", *arguments], stdout=subprocess.PIPE, stderr=theirs)
         os.close(theirs)
         text = b""
         while b" %" not in text:  # optimisation is under way, and says how far it is
@@ -409,11 +410,21 @@ class Signals(ToolTest):
         report, _ = process.communicate(timeout=60)
         os.close(ours)
         self.assertEqual(process.returncode, DONE)
-        self.assertTrue(json.loads(report)["interrupted"])
+        return report
+
+    def test_ctrl_c_during_best_effort_keeps_the_best_tree_so_far(self):
+        self.assertTrue(json.loads(self.interrupted_build("--json"))["interrupted"])
         self.assertIn(b"effort best, interrupted: the best tree until then\n", self.info(self.out).stdout)
         self.assertEqual(self.info("--verify", self.out).returncode, DONE)
         info = json.loads(self.info("--json", self.out).stdout)
         self.assertEqual(info["imaginary_nodes"], info["imaginary_minimum"])
+
+    def test_ctrl_c_leaves_out_the_levels_that_are_not_made_yet(self):
+        report = self.interrupted_build("--levels", "0.1%,1%")
+        for error in (b"0.1%", b"1%"):
+            self.assertIn(b"no level for " + error + b": its making was interrupted\n", report)
+        self.assertEqual(len(json.loads(self.info("--json", self.out).stdout)["levels"]), 1)
+        self.assertEqual(self.info("--verify", "--levels", self.out).returncode, DONE)
 
 
 class Streams(ToolTest):

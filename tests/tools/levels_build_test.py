@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """bvhbuild --levels: counts, bounds, what is kept and what is told. Environment: that of cli_test.py."""
 import json
+import re
 import unittest
 
 import bvh_file
@@ -287,6 +288,20 @@ class Levels(ToolTest):
         self.assertIn(b"no level for 2%", self.build(self.inputs / "cube.obj", "-o", self.out, "--levels", "2%").stdout)
         self.assertEqual(len(bvh_file.read(self.out).levels), 1)
 
+    def test_levels_that_a_coarser_and_nearer_one_spares_are_told(self):
+        errors = ",".join(f"{error:.4g}%" for error in np.linspace(0.2, 1, 25))
+        mesh = self.write("ball.obj", obj(*ball(11)))
+        page = self.build(mesh, "-o", self.out, "--levels", errors, "--effort", "fast").stdout.decode()
+        spared = re.findall("no level for (.*)%: a later one is coarser and nearer\n", page)
+        self.assertGreater(len(spared), 0)
+        report = self.built_json("ball.obj", obj(*ball(11)), "--levels", errors, "--effort", "fast")
+        self.assert_levels(report, self.out)
+        for error in spared:
+            self.assertIn(error + "%", report["levels_left_out"])
+            # Of levels with more triangles and larger errors there would be no use.
+            later = next(row for row in report["levels"][1:] if float(row["wanted"][:-1]) > float(error))
+            self.assertLess(100 * later["error_bound_relative"], float(error))
+
     def test_a_surface_that_meets_itself_is_told(self):
         points, faces = ball(12)
         text = obj(points, faces) + obj(points + np.array([1, 0, 0]), faces, 1 + len(points))
@@ -294,6 +309,15 @@ class Levels(ToolTest):
         for row in report["levels"]:
             self.assertGreater(row["self_contacts"], 10)
         self.assertIn(b"meets itself at", self.build(self.inputs / "two.obj", "-o", self.out, "--levels", "1%").stdout)
+
+    def test_self_contacts_are_counted_up_to_a_million(self):
+        rng = np.random.default_rng(4)
+        soup = obj(rng.uniform(-1, 1, (9000, 3)), np.arange(9000).reshape(-1, 3))
+        report = self.built_json("soup.obj", soup, "--levels", "0.1%", "--effort", "fast")
+        self.assertIsNone(report["levels"][0]["self_contacts"])
+        self.assertLess(report["peak_memory_bytes"], 100 << 20)
+        self.assertIn(b", meets itself at more than 1,000,000 pairs of triangles\n",
+                      self.build(self.inputs / "soup.obj", "-o", self.out, "--levels", "0.1%", "--effort", "fast").stdout)
 
     def test_wrong_errors_are_usage_errors(self):
         mesh = self.write("cube.obj", CUBE_OBJ)
@@ -304,7 +328,8 @@ class Levels(ToolTest):
                 self.assert_fails(self.build(mesh, "-o", self.out, "--levels", text), USAGE, word)
                 self.assertFalse(self.out.exists())
         # Only the mesh says which is larger.
-        self.assert_fails(self.build(mesh, "-o", self.out, "--levels", "1%,0.001"), USAGE, "cube.obj", "not larger than 1%")
+        self.assert_fails(self.build(mesh, "-o", self.out, "--levels", "1%,0.001"), USAGE, "cube.obj", "not larger than 1%",
+                          f"for a diagonal of {3 ** 0.5:.6g}")
         self.assertFalse(self.out.exists())
 
 

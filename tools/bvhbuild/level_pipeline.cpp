@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <thread>
 
 #include "bvhbuild/levels/ladder.h"
 #include "bvhbuild/levels/self_contacts.h"
@@ -15,7 +14,7 @@ double diagonal(const float* lower, const float* upper) {
   return std::hypot(double{upper[0]} - lower[0], double{upper[1]} - lower[1], double{upper[2]} - lower[2]);
 }
 
-std::vector<double> wanted_lengths(const Options& options, const StoredMesh& mesh) {
+double diagonal(const StoredMesh& mesh) {
   std::array<float, 3> lower = mesh.points[0], upper = lower;
   for (const auto& point : mesh.points) {
     for (std::size_t k = 0; k < 3; ++k) {
@@ -23,9 +22,13 @@ std::vector<double> wanted_lengths(const Options& options, const StoredMesh& mes
       upper[k] = std::max(upper[k], point[k]);
     }
   }
+  return diagonal(lower.data(), upper.data());
+}
+
+std::vector<double> wanted_lengths(const Options& options, const StoredMesh& mesh) {
+  const double whole = diagonal(mesh);
   std::vector<double> lengths;
-  for (const LevelError& error : options.levels)
-    lengths.push_back(error.length(diagonal(lower.data(), upper.data())));
+  for (const LevelError& error : options.levels) lengths.push_back(error.length(whole));
   return lengths;
 }
 
@@ -49,7 +52,7 @@ std::string level_errors_defect(const Options& options, const StoredMesh& mesh) 
   for (std::size_t i = 1; i < lengths.size(); ++i) {
     if (!(lengths[i] > lengths[i - 1]))
       return "--levels: " + name(options.levels[i]) + " is not larger than " + name(options.levels[i - 1]) +
-             " for a diagonal of " + name({lengths.back() / options.levels.back().length(1), false});
+             " for a diagonal of " + name({diagonal(mesh), false});
   }
   return {};
 }
@@ -58,10 +61,11 @@ void add_levels(const Options& options, const StoredMesh& mesh, OptimisationWatc
                 std::vector<BuiltLevel>& levels, Outcome& outcome) {
   Stopwatch stopwatch;
   const FinestLevel finest = {levels[0].geometry, levels[0].tree, *levels[0].topology};
-  Ladder ladder = make_ladder(finest, wanted_lengths(options, mesh), watch.progress);
+  Ladder ladder = make_ladder(finest, wanted_lengths(options, mesh), watch);
   outcome.fixed_vertices = ladder.fixed_vertices;
   outcome.levels.emplace_back();
-  for (const std::size_t i : ladder.left_out) outcome.levels_left_out.push_back(options.levels[i]);
+  for (const LeftOutError& error : ladder.left_out)
+    outcome.levels_left_out.push_back({options.levels[error.wanted], error.why});
   levels.reserve(1 + ladder.levels.size());
   for (LadderLevel& coarse : ladder.levels) {
     outcome.levels.emplace_back().wanted = options.levels[coarse.wanted];
@@ -74,9 +78,7 @@ void add_levels(const Options& options, const StoredMesh& mesh, OptimisationWatc
   outcome.seconds.levels = stopwatch.lap();
 }
 
-void describe_levels(const Options& options, const AssetView& asset, Outcome& outcome) {
-  const unsigned threads =
-      options.threads > 0 ? static_cast<unsigned>(options.threads) : std::thread::hardware_concurrency();
+void describe_levels(const AssetView& asset, Outcome& outcome) {
   const FileHeader& header = *asset.header;
   const double whole = diagonal(header.lower, header.upper);
   for (std::uint32_t i = 0; i < asset.levels.size(); ++i) {
@@ -86,7 +88,7 @@ void describe_levels(const Options& options, const AssetView& asset, Outcome& ou
     level.error_bound = view.error_bound;
     level.error_bound_relative = whole > 0 ? view.error_bound / whole : 0;
     if (view.topology != nullptr) level.closed = view.closed;
-    level.self_contacts = count_self_contacts(asset.levels_from(i, 1), std::max(threads, 1u));
+    level.self_contacts = count_self_contacts(view);
   }
 }
 

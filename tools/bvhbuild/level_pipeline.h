@@ -32,6 +32,6 @@ void add_levels(const Options& options, const StoredMesh& mesh, OptimisationWatc
                 std::vector<BuiltLevel>& levels, Outcome& outcome);
 
 /// Says what the levels of the file are like.
-void describe_levels(const Options& options, const AssetView& asset, Outcome& outcome);
+void describe_levels(const AssetView& asset, Outcome& outcome);
 
 }  // namespace tandem::build

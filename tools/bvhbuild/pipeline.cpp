@@ -127,7 +127,7 @@ Image build_image(const Options& options, const PolygonMesh& polygons, const Sto
   outcome.topology = asset.level().topology != nullptr;
   outcome.hash = hexadecimal(header.hash);
   outcome.file_bytes = header.file_bytes;
-  if (!options.levels.empty()) describe_levels(options, asset, outcome);
+  if (!options.levels.empty()) describe_levels(asset, outcome);
   return std::move(image);
 }
 

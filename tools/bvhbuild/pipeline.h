@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "bvhbuild/levels/ladder.h"
 #include "bvhbuild/meshing/clean_report.h"
 #include "common/exit_code.h"
 #include "input_digest.h"
@@ -19,8 +20,14 @@ struct LevelOutcome {
   double error_bound = 0;
   double error_bound_relative = 0;  ///< to the diagonal of the finest's bounds; 0 where that is 0
   std::optional<bool> closed;       ///< whether all components are; none without topology
-  /// Pairs of triangles that meet without having a corner in common; none where coordinates are too large.
+  /// Pairs of triangles that meet without having a corner in common; none: more than kMostSelfContacts.
   std::optional<std::uint64_t> self_contacts;
+};
+
+/// An error that was asked for and got no level.
+struct LevelLeftOut {
+  LevelError wanted;
+  NoLevel why;
 };
 
 /// Everything that a report tells of one run.
@@ -43,9 +50,9 @@ struct Outcome {
   std::uint64_t file_bytes = 0;
   std::string hash;  ///< of the output, 16 hexadecimal digits
 
-  std::vector<LevelOutcome> levels;         ///< of the file where some were asked for, the finest first
-  std::vector<LevelError> levels_left_out;  ///< they would have had as many triangles as the level before
-  std::uint64_t fixed_vertices = 0;         ///< that stay in place at every level: surfaces meet there
+  std::vector<LevelOutcome> levels;  ///< of the file where some were asked for, the finest first
+  std::vector<LevelLeftOut> levels_left_out;
+  std::uint64_t fixed_vertices = 0;  ///< that stay in place at every level: surfaces meet there
 
   struct Seconds {
     double import = 0, clean = 0, build = 0, write = 0;

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <sstream>
 
+#include "bvhbuild/levels/self_contacts.h"
 #include "common/json.h"
 #include "common/number_words.h"
 #include "common/printable.h"
@@ -72,7 +73,8 @@ void add_results(const Outcome& outcome, Json& json) {
   if (!outcome.levels.empty()) {
     json["levels"] = levels_json(outcome);
     json["levels_left_out"] = Json::array();
-    for (const LevelError& error : outcome.levels_left_out) json["levels_left_out"].push_back(name(error));
+    for (const LevelLeftOut& error : outcome.levels_left_out)
+      json["levels_left_out"].push_back(name(error.wanted));
     json["fixed_vertices"] = outcome.fixed_vertices;
   }
   json["bytes"] = outcome.file_bytes;
@@ -94,18 +96,29 @@ std::string level_line(const Outcome& outcome, std::size_t i) {
   }
   if (level.closed) out << (*level.closed ? ", closed" : ", not closed");
   if (!level.self_contacts)
-    out << ", self-contacts unknown: coordinates are too large";
+    out << ", meets itself at more than " << with_commas(kMostSelfContacts) << " pairs of triangles";
   else if (*level.self_contacts > 0)
     out << ", meets itself at " << with_commas(*level.self_contacts)
         << (*level.self_contacts == 1 ? " pair of triangles" : " pairs of triangles");
   return out.str() + "\n";
 }
 
+const char* why(NoLevel reason) {
+  switch (reason) {
+    case NoLevel::no_coarser:
+      return "it would have as many triangles as the one before";
+    case NoLevel::spared:
+      return "a later one is coarser and nearer";
+    case NoLevel::interrupted:
+      return "its making was interrupted";
+  }
+  return "unknown";
+}
+
 void print_levels(const Outcome& outcome, std::ostringstream& out) {
   for (std::size_t i = 0; i < outcome.levels.size(); ++i) out << level_line(outcome, i);
-  for (const LevelError& error : outcome.levels_left_out)
-    out << "  note     no level for " << name(error)
-        << ": it would have as many triangles as the one before\n";
+  for (const LevelLeftOut& error : outcome.levels_left_out)
+    out << "  note     no level for " << name(error.wanted) << ": " << why(error.why) << "\n";
   if (outcome.fixed_vertices > 0) {
     out << "  note     " << with_commas(outcome.fixed_vertices)
         << (outcome.fixed_vertices == 1 ? " vertex where surfaces meet stays"

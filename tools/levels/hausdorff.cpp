@@ -3,12 +3,12 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 #include <vector>
 
 #include "levels/nearest_triangle.h"
 #include "levels/piece.h"
-#include "tandem/formats/box.h"
 
 namespace tandem {
 namespace {
@@ -37,6 +37,17 @@ struct CornerDistances {
   std::vector<double> distance;
   std::vector<std::uint32_t> nearest;
 };
+
+/// The largest magnitude of a coordinate of a level's corners.
+double largest_coordinate(const LevelView& level) {
+  float largest = 0;
+  for (const Triangle& triangle : std::span(level.triangles, level.triangle_count)) {
+    for (const auto& corner : triangle.corner) {
+      for (const float x : corner.position) largest = std::max(largest, std::fabs(x));
+    }
+  }
+  return largest;
+}
 
 /// The number under which a corner's position is known.
 std::uint64_t corner_number(const LevelView& level, std::uint32_t triangle, int k) {
@@ -77,9 +88,9 @@ class Search {
  public:
   Search(const LevelView& a, const LevelView& b, const HausdorffOptions& options)
       : from_{a, b}, to_{b, a}, options_(options) {
-    for (const LevelView& level : from_) {
-      for (const double reach : extent_of(level.blocks[0]).reach) largest_ = std::max(largest_, reach);
-    }
+    // Of the corners, not of boxes: the same for any tree, so that a bound that one tree led to is proved
+    // with another as well.
+    for (const LevelView& level : from_) largest_ = std::max(largest_, largest_coordinate(level));
     slack_ = rounding_slack(largest_);
   }
 

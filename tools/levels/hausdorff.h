@@ -33,7 +33,8 @@ struct HausdorffBound {
 
 /// Bounds the distance of two levels in the stored coordinates of one file. The surfaces are the unions of
 /// their closed triangles, of which any may be flat. The result does not depend on the number of threads.
-/// Conditions: levels of checked files with at least one triangle each. Throws std::bad_alloc. The proof is
+/// Conditions: levels of fully checked files (CheckDepth::full: trees and numbers of vertices are relied on)
+/// with at least one triangle each. Throws std::bad_alloc. The proof is
 /// in docs/level_error.md.
 HausdorffBound hausdorff_bound(const LevelView& a, const LevelView& b, const HausdorffOptions& options = {});
 

@@ -46,7 +46,7 @@ void tighten(const LevelView& other, std::span<const std::uint32_t> triangles, d
 void flatten(Piece& piece, double tolerance);
 
 /// How a piece is cut: at points of its edges. An edge runs from corner `edge` to corner `edge + 1`, and the
-/// point is at `along` of it. A segment has edge 0 alone. A segment has edge 0.
+/// point is at `along` of it. A segment has edge 0 alone.
 struct Cut {
   int edges;  ///< 1 or 2
   int edge[2];

@@ -52,7 +52,8 @@ class Frame {
     std::array<float, 3> result;
     for (std::size_t k = 0; k < 3; ++k) {
       const double along = std::ldexp(point[static_cast<int>(k)], exponent_) + centre_[k];
-      result[k] = std::clamp(static_cast<float>(along), lower_[k], upper_[k]) + 0.0f;
+      // Clamped first: what is beyond float32 may not be cast.
+      result[k] = static_cast<float>(std::clamp(along, double{lower_[k]}, double{upper_[k]})) + 0.0f;
     }
     return result;
   }

@@ -3,6 +3,7 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <optional>
 
@@ -31,8 +32,9 @@ struct Candidate {
 // Makes meshes near the finest level and measures how near they are.
 class Search {
  public:
-  Search(const FinestLevel& finest, const OpenedMesh& opened)
-      : finest_(finest.geometry, finest.tree), opened_(opened) {}
+  // Makes no further meshes once `stop` is set.
+  Search(const FinestLevel& finest, const OpenedMesh& opened, const std::atomic<bool>& stop)
+      : finest_(finest.geometry, finest.tree), opened_(opened), stop_(stop) {}
 
   // A mesh of few triangles whose bound is at most `wanted`. The simplifier keeps what it looks at within a
   // distance, and the bound says what became of the rest: where it is too far off, once more with less.
@@ -40,7 +42,7 @@ class Search {
     double distance = kFirstShare * wanted, refused = 0;
     std::vector<Collapse> collapses;
     Candidate best;
-    for (int i = 0; i < kTries; ++i) {
+    for (int i = 0; i < kTries && !stop_; ++i) {
       collapses = collapse_edges(opened_, finest_.view(), distance);
       Candidate candidate = {after(opened_, collapses), 0};
       candidate.error_bound = bound(candidate.mesh).upper;
@@ -81,7 +83,8 @@ class Search {
     };
     std::size_t near = 0, far = collapses.size();
     Candidate best;
-    while (near + 1 < far && triangles(near) > std::max(kNarrow * triangles(far), triangles(far) + 4)) {
+    while (!stop_ && near + 1 < far &&
+           triangles(near) > std::max(kNarrow * triangles(far), triangles(far) + 4)) {
       const double most = std::sqrt(triangles(near) * triangles(far));
       const auto middle = std::partition_point(collapses.begin(), collapses.end(),
                                                [&](const Collapse& c) { return c.triangles > most; });
@@ -100,8 +103,10 @@ class Search {
     return best;
   }
 
-  // `wanted`: as far as it takes to know whether the mesh is near enough.
+  // `wanted`: as far as it takes to know whether the mesh is near enough. A mesh of nothing, where all
+  // corners round together, never is.
   HausdorffBound bound(const LevelMesh& mesh, std::optional<double> wanted = {}) const {
+    if (mesh.triangles.empty()) return {};
     const Geometry geometry = {mesh.points, mesh.triangles};
     const Tree tree = build_tree(geometry, Imaginary::minimal, Effort::fast);
     HausdorffOptions options;
@@ -111,31 +116,32 @@ class Search {
 
   LaidLevel finest_;
   const OpenedMesh& opened_;
+  const std::atomic<bool>& stop_;
 };
 
 }  // namespace
 
 Ladder make_ladder(const FinestLevel& finest, std::span<const double> wanted,
-                   const std::function<void(double)>& progress) {
+                   const OptimisationWatch& watch) {
   Ladder ladder;
   const OpenedMesh opened = cut_open(finest.geometry, finest.tree, finest.topology);
   ladder.fixed_vertices = opened.fixed_vertices;
   if (opened.triangles.empty()) {  // segments and points only
-    for (std::size_t i = 0; i < wanted.size(); ++i) ladder.left_out.push_back(i);
+    for (std::size_t i = 0; i < wanted.size(); ++i) ladder.left_out.push_back({i, NoLevel::no_coarser});
     return ladder;
   }
-  const Search search(finest, opened);
+  const Search search(finest, opened, watch.stop);
   std::size_t triangles = finest.geometry.triangles.size();
   for (std::size_t i = 0; i < wanted.size(); ++i) {
-    progress(static_cast<double>(i) / static_cast<double>(wanted.size()));
+    watch.progress(static_cast<double>(i) / static_cast<double>(wanted.size()));
     Candidate candidate = search.level(wanted[i]);
     if (candidate.mesh.triangles.empty() || candidate.mesh.triangles.size() >= triangles) {
-      ladder.left_out.push_back(i);
+      ladder.left_out.push_back({i, watch.stop ? NoLevel::interrupted : NoLevel::no_coarser});
       continue;
     }
     // A level that is coarser and nearer spares the ones before it.
     while (!ladder.levels.empty() && ladder.levels.back().error_bound > candidate.error_bound) {
-      ladder.left_out.push_back(ladder.levels.back().wanted);
+      ladder.left_out.push_back({ladder.levels.back().wanted, NoLevel::spared});
       ladder.levels.pop_back();
     }
     triangles = candidate.mesh.triangles.size();
@@ -143,7 +149,8 @@ Ladder make_ladder(const FinestLevel& finest, std::span<const double> wanted,
     for (std::uint32_t& triangle : nearest) triangle = finest.tree.order[triangle];
     ladder.levels.push_back({std::move(candidate.mesh), std::move(nearest), i, candidate.error_bound});
   }
-  std::sort(ladder.left_out.begin(), ladder.left_out.end());
+  std::sort(ladder.left_out.begin(), ladder.left_out.end(),
+            [](const LeftOutError& a, const LeftOutError& b) { return a.wanted < b.wanted; });
   return ladder;
 }
 

@@ -1,9 +1,9 @@
 #pragma once
 #include <cstdint>
-#include <functional>
 #include <span>
 #include <vector>
 
+#include "bvhbuild/tree/effort.h"
 #include "bvhbuild/tree/surface_topology.h"
 #include "bvhbuild/tree/tree.h"
 #include "level_mesh.h"
@@ -25,18 +25,30 @@ struct FinestLevel {
   const SurfaceTopology& topology;
 };
 
+/// Why there is no level for an error.
+enum class NoLevel : std::uint8_t {
+  no_coarser,   ///< it would have as many triangles as the one before, or more
+  spared,       ///< a later level is coarser and nearer to the finest
+  interrupted,  ///< its making was stopped
+};
+
+struct LeftOutError {
+  std::size_t wanted;  ///< which of the errors that were asked for
+  NoLevel why;
+};
+
 struct Ladder {
-  std::vector<LadderLevel> levels;    ///< errors ascend, triangles descend
-  std::vector<std::size_t> left_out;  ///< which errors got no level of their own
-  std::uint64_t fixed_vertices = 0;   ///< where surfaces meet: they stay in place at every level
+  std::vector<LadderLevel> levels;     ///< errors ascend, triangles descend
+  std::vector<LeftOutError> left_out;  ///< in the order in which they were asked for
+  std::uint64_t fixed_vertices = 0;    ///< where surfaces meet: they stay in place at every level
 };
 
 /// Makes a level for each wanted error: the one with the fewest triangles, or nearly, that is proved to be
-/// at most so far from the finest, of those that collapses of edges lead to. There is none where it would
-/// have as many triangles as the one before. The result does not depend on the number of threads.
-/// wanted: lengths in the unit of the coordinates, ascending. progress: is told the share that is done.
-/// Condition: fewer than kMostTopologyTriangles.
-Ladder make_ladder(const FinestLevel& finest, std::span<const double> wanted,
-                   const std::function<void(double)>& progress);
+/// at most so far from the finest, of those that collapses of edges lead to. Errors without a level are in
+/// `left_out`. The result does not depend on the number of threads. wanted: lengths in the unit of the
+/// coordinates, ascending. watch: its progress is told the share that is done; once its stop is set, no
+/// further mesh is made, and what was found and proved until then stays. Condition: fewer than
+/// kMostTopologyTriangles.
+Ladder make_ladder(const FinestLevel& finest, std::span<const double> wanted, const OptimisationWatch& watch);
 
 }  // namespace tandem::build

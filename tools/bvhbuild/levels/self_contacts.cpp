@@ -1,40 +1,84 @@
 #include "self_contacts.h"
 
-#include <algorithm>
-#include <new>
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
 
-#include "tandem/kernels/contact_query.h"
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include "tandem/formats/box.h"
+#include "tandem/kernels/detail/triangle_test.h"
 
 namespace tandem::build {
 namespace {
 
-bool share_a_corner(const Triangle& a, const Triangle& b) {
-  for (const Triangle::Corner& p : a.corner) {
-    for (const Triangle::Corner& q : b.corner) {
-      if (std::equal(p.position, p.position + 3, q.position)) return true;
+// The bounds of a triangle.
+struct Range {
+  double lower[3], upper[3];
+
+  explicit Range(const Triangle& triangle) {
+    for (int k = 0; k < 3; ++k) {
+      const auto& [a, b, c] = triangle.corner;
+      lower[k] = std::min({a.position[k], b.position[k], c.position[k]});
+      upper[k] = std::max({a.position[k], b.position[k], c.position[k]});
     }
   }
-  return false;
+
+  // Whether a node's box may have a point of it. What is computed of the gap is off by less than 2^-51 of the
+  // magnitudes.
+  bool may_meet(const Block& block, int node) const {
+    for (int k = 0; k < 3; ++k) {
+      const double center = block.center[k][node], half_extent = block.half_extent[k][node];
+      const double gap = std::max(lower[k] - center, center - upper[k]) - half_extent;
+      const double magnitude =
+          std::max(std::fabs(lower[k]), std::fabs(upper[k])) + std::fabs(center) + half_extent;
+      if (gap > 0x1p-50 * magnitude) return false;
+    }
+    return true;
+  }
+};
+
+bool meet_apart_from_corners(const Triangle& a, const Triangle& b) {
+  TrianglePair pair;
+  for (int i = 0; i < 3; ++i) {
+    std::copy_n(a.corner[i].position, 3, pair.a[i]);
+    std::copy_n(b.corner[i].position, 3, pair.b[i]);
+  }
+  return !detail::share_corner(pair) && decide(pair).verdict == Verdict::contact;
+}
+
+// How many triangles after this one, in leaf order, it meets; may stop where that is more than `most`.
+std::uint64_t count_later(const LevelView& level, std::uint32_t triangle, std::uint64_t most) {
+  const Triangle& own = level.triangles[triangle];
+  const Range range(own);
+  // A block leaves at most three of its four children behind, on each of at most kMaxDepth levels.
+  std::uint32_t stack[3 * kMaxDepth + 1] = {0};
+  std::uint64_t count = 0;
+  for (int size = 1; size > 0 && count <= most;) {
+    const Block& block = level.blocks[stack[--size]];
+    for (int node = 0; node < kNodesPerBlock; ++node) {
+      const std::uint32_t index = block.index[node];
+      if (block.kind[node] == NodeKind::imaginary || !range.may_meet(block, node)) continue;
+      if (block.kind[node] == NodeKind::internal)
+        stack[size++] = index;
+      else if (index > triangle)
+        count += meet_apart_from_corners(own, level.triangles[index]) ? 1 : 0;
+    }
+  }
+  return count;
 }
 
 }  // namespace
 
-std::optional<std::uint64_t> count_self_contacts(const AssetView& asset, std::uint32_t threads) {
-  ContactQuery query;
-  QueryOptions options;
-  options.threads = std::min(threads, kMostQueryThreads);
-  Instance instance = {0, kIdentityPose};
-  for (int k = 0; k < 3; ++k) instance.pose.translation[k] = -asset.header->origin[k];
-  const ObjectPair itself = {0, 0};
-  Status status = query.set_assets({&asset, 1});
-  if (status == Status::kOk) status = query.find_contacts({&instance, 1}, {&itself, 1}, options);
-  if (status == Status::kOutOfMemory) throw std::bad_alloc();
-  if (status != Status::kOk) return std::nullopt;
-  const Triangle* triangles = asset.level().triangles;
-  return static_cast<std::uint64_t>(
-      std::count_if(query.contacts().begin(), query.contacts().end(), [&](const Contact& contact) {
-        return !share_a_corner(triangles[contact.triangle_a], triangles[contact.triangle_b]);
-      }));
+std::optional<std::uint64_t> count_self_contacts(const LevelView& level, std::uint64_t most) {
+  std::atomic<std::uint64_t> count = 0;
+  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, level.triangle_count, 64), [&](const auto& part) {
+    for (std::uint32_t triangle = part.begin(); triangle < part.end() && count <= most; ++triangle)
+      count += count_later(level, triangle, most);
+  });
+  if (count > most) return std::nullopt;
+  return count;
 }
 
 }  // namespace tandem::build

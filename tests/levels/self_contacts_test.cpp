@@ -1,0 +1,71 @@
+// Self-contacts of a level against those that the contact query finds.
+#include "bvhbuild/levels/self_contacts.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "kernels/solid_meshes.h"
+#include "levels/stored_level.h"
+#include "tandem/kernels/contact_query.h"
+
+namespace tandem {
+namespace {
+
+using build::count_self_contacts;
+using test::joined;
+using test::Mesh;
+using test::moved;
+using test::StoredLevel;
+
+/// Large triangles on a coarse grid: many meet, many have corners in common, some are flat.
+Mesh crossing(std::uint32_t triangles, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  Mesh mesh;
+  for (std::uint32_t t = 0; t < triangles; ++t) {
+    std::array<float, 3> corner[3];
+    for (auto& point : corner)
+      for (float& x : point) x = static_cast<float>(random() % 8) / 3;
+    mesh.add(corner[0], corner[1], corner[2]);
+  }
+  return mesh;
+}
+
+bool share_a_corner(const Triangle& a, const Triangle& b) {
+  for (const auto& p : a.corner)
+    for (const auto& q : b.corner)
+      if (std::equal(p.position, p.position + 3, q.position)) return true;
+  return false;
+}
+
+std::uint64_t found_by_query(const AssetView& asset) {
+  ContactQuery query;
+  const Instance instance = {0, kIdentityPose};
+  const ObjectPair itself = {0, 0};
+  EXPECT_EQ(query.set_assets({&asset, 1}), Status::kOk);
+  EXPECT_EQ(query.find_contacts({&instance, 1}, {&itself, 1}, {}), Status::kOk);
+  const Triangle* triangles = asset.level().triangles;
+  return std::count_if(query.contacts().begin(), query.contacts().end(), [&](const Contact& contact) {
+    return !share_a_corner(triangles[contact.triangle_a], triangles[contact.triangle_b]);
+  });
+}
+
+TEST(SelfContacts, AreThoseOfTheContactQuery) {
+  const Mesh balls = joined(test::sphere(1, 3), moved(test::sphere(1, 3), 1, 0, 0));
+  for (const Mesh& mesh : {crossing(300, 1), crossing(3, 2), balls, test::random_mesh(3000, 3)}) {
+    const StoredLevel level(mesh);
+    const std::uint64_t expected = found_by_query(level.asset());
+    EXPECT_GT(expected, 0u);
+    EXPECT_EQ(count_self_contacts(level.view()), expected);
+    EXPECT_EQ(count_self_contacts(level.view(), expected), expected);
+    EXPECT_EQ(count_self_contacts(level.view(), expected - 1), std::nullopt);
+  }
+}
+
+TEST(SelfContacts, OfASolidThereAreNone) {
+  EXPECT_EQ(count_self_contacts(StoredLevel(test::sphere(1, 4)).view(), 0), 0u);
+}
+
+}  // namespace
+}  // namespace tandem

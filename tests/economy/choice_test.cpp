@@ -7,8 +7,8 @@
 namespace tandem::economy {
 namespace {
 
-// Two assets of four levels. A level's error bound is 0, 1, 4, 16; measured depths are off by a part of the
-// sum of both, and the time is 8, 4, 2, 1 for each.
+// Two assets of four levels, an instance each. A level's error bound is 0, 1, 4, 16; the depth between both
+// is off by a part of their sum, and the time is 8, 4, 2, 1 for each.
 class MadeUp {
  public:
   explicit MadeUp(double part) : part_(part) {}
@@ -16,6 +16,7 @@ class MadeUp {
   Candidates candidates() {
     Candidates made;
     made.error_bounds = {kBounds, kBounds};
+    made.asset_of = {0, 1};
     made.measure = [this](const Levels& levels) -> const Measures& { return measure(levels); };
     return made;
   }
@@ -30,7 +31,7 @@ class MadeUp {
       measures.query_seconds += 8 >> level;
       depth += part_ * kBounds[level];
     }
-    measures.change.depth.median = depth;
+    measures.change.depths = {{{0, 1}, depth}};
     return measures;
   }
 
@@ -59,7 +60,48 @@ TEST(WithinTolerance, OfNothingTakesLevelsWithoutError) {
 
 TEST(WithinTolerance, LooksAtWhatALevelChangesInTheScene) {
   MadeUp scene(2);
-  EXPECT_EQ(within_tolerance(scene.candidates(), {7, 0}), (Levels{1, 0}));  // level 2: bound 4, measured 8
+  EXPECT_EQ(within_tolerance(scene.candidates(), {7, 7}), (Levels{1, 1}));  // level 2: bound 4, measured 8
+}
+
+TEST(WithinTolerance, TakesTheSmallerToleranceOfAPair) {
+  MadeUp scene(0.1);
+  EXPECT_EQ(within_tolerance(scene.candidates(), {20, 0.5}), (Levels{2, 0}));  // level 3: measured 1.6
+}
+
+// Depths of pairs of instances 0 to 4, of assets 0, 1, 1, 2, 2, each of two levels: what the pair's assets
+// add to it at level 1.
+Candidates of_pairs(std::vector<DepthChange> at_level_1, std::map<Levels, Measures>& known) {
+  Candidates made;
+  made.error_bounds = {{0, 1}, {0, 1}, {0, 1}};
+  made.asset_of = {0, 1, 1, 2, 2};
+  made.measure = [=, &known](const Levels& levels) -> const Measures& {
+    Measures& measures = known[levels];
+    measures.change.depths.clear();
+    for (const auto& [pair, by] : at_level_1) {
+      const std::uint32_t a = made.asset_of[pair.a], b = made.asset_of[pair.b];
+      measures.change.depths.push_back({pair, by * (levels[a] + levels[b])});
+    }
+    return measures;
+  };
+  return made;
+}
+
+TEST(WithinTolerance, JudgesAnAssetByThePairsThatItIsIn) {
+  std::map<Levels, Measures> known;
+  const Candidates made = of_pairs({{{0, 1}, 5}, {{1, 2}, 0}, {{3, 4}, 0}}, known);
+  EXPECT_EQ(within_tolerance(made, {2, 2, 2}), (Levels{0, 1, 1}));  // asset 1: half of its depths
+}
+
+TEST(WithinTolerance, RefinesOnlyWhatCanBeToBlame) {
+  std::map<Levels, Measures> known;
+  const Candidates made = of_pairs({{{0, 1}, 1.5}, {{3, 4}, 0}}, known);
+  EXPECT_EQ(within_tolerance(made, {2, 2, 1}), (Levels{0, 1, 1}));
+}
+
+TEST(Tolerances, AreAtMostThatOfTheSmallestThatMoves) {
+  EXPECT_EQ(tolerances_of(0.5, {100, 4, 2, 1}, {false, true, true, false}),
+            (std::vector<double>{1, 1, 1, 0.5}));
+  EXPECT_EQ(tolerances_of(0.5, {100, 4}, {false, false}), (std::vector<double>{50, 2}));
 }
 
 TEST(WithinTolerance, RefinesWhereAllTogetherChangeTooMuch) {
@@ -83,6 +125,16 @@ TEST(WithinBudget, CoarsensWhatAddsLeastErrorForWhatItSaves) {
 TEST(WithinBudget, TakesTheCheapestWhereNothingIsCheapEnough) {
   MadeUp scene(1);
   EXPECT_EQ(within_budget(scene.candidates(), 1, time_of), (Levels{3, 3}));
+}
+
+TEST(WithinBudget, MeasuresAllAtTheirCoarsestBeforeItGivesUp) {
+  Candidates made;  // only both together save anything
+  made.error_bounds = {{0, 1}, {0, 1}};
+  std::map<Levels, Measures> known;
+  for (const Levels& levels : {Levels{0, 0}, Levels{1, 0}, Levels{0, 1}}) known[levels].query_seconds = 10;
+  known[{1, 1}].query_seconds = 5;
+  made.measure = [&](const Levels& levels) -> const Measures& { return known.at(levels); };
+  EXPECT_EQ(within_budget(made, 6, time_of), (Levels{1, 1}));
 }
 
 TEST(WithinBudget, LeavesLevelsOutThatSaveNothing) {

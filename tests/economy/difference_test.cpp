@@ -37,6 +37,7 @@ TEST(Difference, CountsPairsThatTouchAtOneLevelAlone) {
   const Difference found = difference(finest, coarser);
   EXPECT_EQ(found.lost_pairs, 3u);
   EXPECT_EQ(found.new_pairs, 1u);
+  EXPECT_EQ(found.touching_pairs, 4u);
 }
 
 TEST(Difference, MatchesTheNearestManifoldsOfAPairWhateverTheirOrder) {

@@ -4,7 +4,11 @@
 Environment: that of tool_test.py, and TANDEM_BVHBENCH.
 """
 import json
+import os
+import pathlib
 import re
+import subprocess
+import time
 import unittest
 
 import h5py
@@ -197,7 +201,10 @@ class Economy(LevelsBenchTest):
                 self.assertEqual(row[key], found[key], (level, key))
         finest = told["assets"][0]["levels"][0]
         self.assertEqual((finest["lost_pairs"], finest["new_pairs"], finest["depth_error"]["largest"]), (0, 0, 0))
-        self.assertEqual(finest["matched_manifolds"], finest["manifolds"])
+        self.assertEqual((finest["changeable_pairs"], finest["matched_manifolds"]), (0, 0))
+        coarser = told["assets"][0]["levels"][1]
+        self.assertEqual(coarser["changeable_pairs"], finest["touching_pairs"])
+        self.assertEqual(coarser["matched_manifolds"] + coarser["lost_manifolds"], finest["manifolds"])
 
     def test_the_recommended_level_keeps_the_tolerance_and_the_next_does_not(self):
         self.write_cows()
@@ -231,9 +238,74 @@ class Economy(LevelsBenchTest):
             told = self.economy("--memory", budget)
             self.assertEqual(told["recommended"]["levels"], [level])
             self.assertTrue(told["recommended"]["within_limit"])
-        told = self.economy("--memory", 1)
-        self.assertEqual((told["recommended"]["levels"], told["recommended"]["within_limit"]), ([2], False))
         self.assertEqual(self.economy("--time", 1e6)["recommended"]["levels"], [0])
+
+    def test_a_budget_that_cannot_be_met_fails_and_applies_nothing(self):
+        self.write_cows()
+        applied = self.outputs / "applied.h5"
+        for words, reason in ((("--memory", 1), "--memory 1: the cheapest levels take"), (("--time", 0), "--time 0: the cheapest levels take")):
+            result = self.bench("economy", self.scene, "--json", "--repeat", 1, *words, "--apply", applied)
+            self.assertEqual(result.returncode, USAGE)
+            self.assertIn(reason, result.stderr.decode())
+            self.assertIn("applied.h5 is not written", result.stderr.decode())
+            self.assertFalse(applied.exists())
+            told = json.loads(result.stdout)
+            self.assertFalse(told["recommended"]["within_limit"])
+        self.assertEqual(self.bench("economy", self.scene, "--memory", 1).returncode, USAGE)
+
+    def write_cows_and_cubes(self, cubes, cube_side=1, **datasets):
+        """Two cows that meet, and far from them a row of cubes each of which meets the next."""
+        corners = cube_side * np.array([(i & 1, i >> 1 & 1, i >> 2) for i in range(8)], "f8")
+        faces = [(0, 2, 1), (1, 2, 3), (4, 5, 6), (5, 7, 6), (0, 1, 4), (1, 5, 4), (2, 6, 3), (3, 6, 7), (0, 4, 2), (2, 4, 6), (1, 3, 5), (3, 7, 5)]
+        self.mesh_of("block", obj_of(corners[np.array(faces)]))
+        places = [(0, 0, 0), (0.3, 0.1, 0.2)] + [(20 + 0.9 * cube_side * i, 0.05 * i, 0.03 * i) for i in range(cubes)]
+        self.write_scene(asset=(0, 0) + (1,) * cubes, rotation=(IDENTITY,) * (2 + cubes), translation=places,
+                         assets=("../in/cow.bvh", "../in/block.bvh", "../in/cow.bvh"), **datasets)
+
+    def test_an_asset_is_judged_by_the_pairs_that_it_is_in(self):
+        self.write_cows_and_cubes(0)
+        alone = self.economy("--tolerance", "1%")["assets"][0]["levels"]
+        self.write_cows_and_cubes(40)
+        told = self.economy("--tolerance", "1%")
+        among = told["assets"][0]["levels"]
+        self.assertGreater(alone[2]["depth_error"]["median"], 0)
+        for level in (1, 2):
+            self.assertEqual(among[level]["changeable_pairs"], 1)
+            self.assertGreater(among[level]["touching_pairs"], 30)
+            for key in ("depth_error", "normal_error_degrees", "matched_manifolds", "lost_manifolds", "new_manifolds"):
+                self.assertEqual(among[level][key], alone[level][key], key)
+        self.assertIn(f"of {among[0]['touching_pairs']} pairs that touch", self.passes("economy", self.scene, "--tolerance", "20%"))
+
+    def test_a_tolerance_in_per_cent_is_of_the_smallest_that_moves(self):
+        self.write_cows_and_cubes(3, cube_side=0.01, simulation_motion=np.array([1, 1, 0, 0, 0], "u4"))
+        told = self.economy("--tolerance", "5%")
+        cow, block, _ = told["assets"]
+        self.assertEqual(block["tolerance"], 0.05 * block["diagonal"])
+        self.assertEqual(cow["tolerance"], block["tolerance"])
+        self.assertEqual(cow["recommended_level"], 0)
+        self.write_cows_and_cubes(3, cube_side=0.01, simulation_motion=np.array([0, 0, 1, 1, 1], "u4"))
+        told = self.economy("--tolerance", "5%")
+        self.assertEqual(told["assets"][0]["tolerance"], 0.05 * cow["diagonal"])
+
+    def test_an_asset_without_instances_is_left_out(self):
+        self.write_cows_and_cubes(1)
+        with_it = self.economy("--tolerance", "1%")
+        self.assertEqual((with_it["assets"][2]["instances"], len(with_it["assets"][2]["levels"])), (0, 1))
+        with h5py.File(self.scene, "r+") as file:
+            names = file["assets"][:2]
+            del file["assets"]
+            file["assets"] = names
+        self.assertEqual(self.economy("--tolerance", "1%")["finest"]["bytes"], with_it["finest"]["bytes"])
+        with h5py.File(self.scene, "r+") as file:
+            del file["assets"], file["instances/asset"]
+            file["assets"] = [b"../in/cow.bvh"] + list(names)
+            file["instances/asset"] = np.array([1, 1, 2], "u4")
+        applied = self.outputs / "applied.h5"
+        told = self.economy("--tolerance", "20%", "--apply", applied)
+        self.assertEqual(told["finest"]["bytes"], with_it["finest"]["bytes"])
+        with h5py.File(applied) as file:
+            self.assertEqual(file["instances/asset"][:].tolist(), [1, 1, 2])
+            self.assertEqual(file["instances/level"][:].tolist(), [told["assets"][1]["recommended_level"]] * 2 + [0])
 
     def test_apply_writes_the_scene_with_the_levels(self):
         velocity = np.arange(60.0).reshape(20, 3)
@@ -252,6 +324,21 @@ class Economy(LevelsBenchTest):
             self.assertEqual(file["excluded"][:].tolist(), [[0, 1]])
         found = json.loads(self.passes("query", folder / "applied.h5", "--json"))
         self.assertEqual(found["contacts"], told["recommended"]["contacts"])
+
+    def test_apply_writes_the_scene_that_was_measured(self):
+        self.write_cows(simulation_velocity=np.ones((20, 3)))
+        applied = self.outputs / "applied.h5"
+        command = [os.environ["TANDEM_BVHBENCH"], "economy", self.scene, "--tolerance", "20%", "--threads", "2", "--repeat", "1000", "--apply", applied]
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as running:
+            tasks = pathlib.Path(f"/proc/{running.pid}/task")
+            while running.poll() is None and len(list(tasks.glob("*"))) == 1:
+                time.sleep(0.001)
+            self.scene.unlink()  # now that it measures
+            errors = running.communicate()[1]
+        self.assertEqual((running.returncode, errors), (DONE, b""))
+        with h5py.File(applied) as file:
+            self.assertEqual(file["instances/level"][:].tolist(), [2] * 20)
+            self.assertTrue((file["simulation/velocity"][:] == 1).all())
 
     def test_simulated_bodies_are_compared_where_they_end(self):
         self.write_cows(4)

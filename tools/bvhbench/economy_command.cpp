@@ -2,12 +2,14 @@
 
 #include <tbb/global_control.h>
 
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <memory>
 #include <thread>
 
 #include "backend.h"
+#include "common/number_words.h"
 #include "common/random_pose.h"
 #include "economy/choice.h"
 #include "economy_report.h"
@@ -24,16 +26,18 @@ using economy::Measures;
 
 // "0.01" or "1%".
 void parse_tolerance(const std::string& text, EconomyArguments& arguments) {
-  arguments.relative = !text.empty() && text.back() == '%';
+  arguments.relative = text.ends_with('%');
   double number = 0;
-  const std::string digits = arguments.relative ? text.substr(0, text.size() - 1) : text;
-  if (!CLI::detail::lexical_cast(digits, number) || !std::isfinite(number) || number < 0)
+  const char* end = text.data() + text.size() - (arguments.relative ? 1 : 0);
+  const auto [read, error] = std::from_chars(text.data(), end, number);
+  if (error != std::errc() || read != end || !std::isfinite(number) || number < 0)
     throw CLI::ValidationError("--tolerance", text + " is neither a length nor per cent of the diagonal");
   arguments.tolerance = arguments.relative ? number / 100 : number;
 }
 
 Candidates candidates_of(LevelMeasurer& measurer) {
   Candidates candidates;
+  candidates.asset_of = measurer.asset_of();
   candidates.measure = [&](const Levels& levels) -> const Measures& { return measurer.measure(levels); };
   const std::vector<std::uint32_t> counts = measurer.level_counts();
   for (std::size_t i = 0; i < counts.size(); ++i) {
@@ -53,36 +57,48 @@ std::vector<AssetEconomy> measure_each(LevelMeasurer& measurer, const Candidates
     AssetEconomy& asset = assets.emplace_back();
     asset.name = scene.description.assets[i];
     asset.diagonal = bounds_of(view).diagonal();
-    for (const Instance& instance : scene.description.instances) asset.instances += instance.asset == i;
     for (std::uint32_t level = 0; level < candidates.error_bounds[i].size(); ++level) {
       asset.levels.push_back(view.level(level));
       asset.measures.push_back(measurer.measure(candidates.alone(i, level)));
     }
   }
+  const std::vector<Motion>& motion = scene.description.filter.motion;
+  for (std::size_t i = 0; i < candidates.asset_of.size(); ++i) {
+    AssetEconomy& asset = assets[candidates.asset_of[i]];
+    ++asset.instances;
+    asset.moves = asset.moves || motion.empty() || motion[i] != Motion::fixed;
+  }
   return assets;
 }
 
-std::uint64_t bytes_of(const Measures& measures) {
-  return measures.gpu_bytes == 0 ? measures.bytes : measures.gpu_bytes;
-}
-
 double cost_of(const EconomyArguments& arguments, const Measures& measures) {
-  return arguments.bytes ? static_cast<double>(bytes_of(measures)) : 1e3 * seconds_of(measures);
+  return arguments.bytes ? static_cast<double>(memory_of(measures)) : 1e3 * seconds_of(measures);
 }
 
 double budget_of(const EconomyArguments& arguments) {
   return arguments.bytes ? static_cast<double>(*arguments.bytes) : *arguments.milliseconds;
 }
 
+std::vector<double> tolerances_of(const EconomyArguments& arguments,
+                                  const std::vector<AssetEconomy>& assets) {
+  if (!arguments.relative) return std::vector<double>(assets.size(), *arguments.tolerance);
+  std::vector<double> diagonals;
+  std::vector<bool> moves;
+  for (const AssetEconomy& asset : assets) {
+    diagonals.push_back(asset.diagonal);
+    moves.push_back(asset.moves);
+  }
+  return economy::tolerances_of(*arguments.tolerance, diagonals, moves);
+}
+
 Levels choose(const EconomyArguments& arguments, const Candidates& candidates,
-              const std::vector<AssetEconomy>& assets) {
+              std::vector<AssetEconomy>& assets) {
   if (!arguments.tolerance) {
     return within_budget(candidates, budget_of(arguments),
                          [&](const Measures& measures) { return cost_of(arguments, measures); });
   }
-  std::vector<double> tolerance;
-  for (const AssetEconomy& asset : assets)
-    tolerance.push_back(*arguments.tolerance * (arguments.relative ? asset.diagonal : 1));
+  const std::vector<double> tolerance = tolerances_of(arguments, assets);
+  for (std::size_t i = 0; i < assets.size(); ++i) assets[i].tolerance = tolerance[i];
   return within_tolerance(candidates, tolerance);
 }
 
@@ -111,36 +127,56 @@ EconomyResult result_of(const EconomyArguments& arguments, LevelMeasurer& measur
   }
 }
 
-// The scene with all that a scene file tells, at these levels.
-void write_at_levels(const EconomyArguments& arguments, const Levels& levels) {
-  SceneDescription scene = read_description(arguments.scene);
-  const SceneMotion motion = read_motion(arguments.scene, scene.instances.size());
+// Writes the measured scene, with all that docs/scenes.md knows, at these levels.
+void write_at_levels(const EconomyArguments& arguments, const LevelMeasurer& measurer,
+                     const SceneMotion& motion, const Levels& levels) {
+  SceneDescription scene = measurer.scene().description;
   const auto folder = std::filesystem::path(arguments.scene).parent_path();
   for (std::string& asset : scene.assets) asset = seen_from(arguments.apply, (folder / asset).string());
   scene.level.clear();
-  for (const Instance& instance : scene.instances) scene.level.push_back(levels[instance.asset]);
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    scene.instances[i].asset = measurer.asset_of()[i];
+    scene.level.push_back(levels[scene.instances[i].asset]);
+  }
   Hdf5Output file(arguments.apply);
   add_scene(file, scene);
   add_motion(file, motion);
   file.write();
 }
 
+// What is wrong with a budget that even the cheapest levels exceed.
+std::string excess_of(const EconomyArguments& arguments, const Measures& cheapest) {
+  char text[128];
+  if (arguments.bytes) {
+    std::snprintf(text, sizeof text, "--memory %s: the cheapest levels take %s bytes",
+                  with_commas(*arguments.bytes).c_str(), with_commas(memory_of(cheapest)).c_str());
+  } else {
+    std::snprintf(text, sizeof text, "--time %g: the cheapest levels take %g ms", *arguments.milliseconds,
+                  1e3 * seconds_of(cheapest));
+  }
+  return text + std::string(arguments.apply.empty() ? "" : "; " + arguments.apply + " is not written");
+}
+
 ExitCode run(const EconomyArguments& arguments) {
   LevelMeasurer measurer(arguments.scene, arguments.settings);
   if (measurer.scene().description.instances.empty())
     throw FileError(arguments.scene + ": /instances: there is none");
+  SceneMotion motion;  // read now: the file may be another when all is measured
   if (!arguments.apply.empty()) {
+    motion = read_motion(arguments.scene, measurer.asset_of().size());
     keep_inputs(arguments.apply, files_of(arguments.scene, measurer.scene()));
     try_output(arguments.apply);
   }
   const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, arguments.settings.threads);
   const EconomyResult result = result_of(arguments, measurer);
-  if (!arguments.apply.empty()) write_at_levels(arguments, result.recommended.levels);
+  if (!arguments.apply.empty() && result.within)
+    write_at_levels(arguments, measurer, motion, result.recommended.levels);
   if (arguments.json) {
     std::puts(pretty(to_json(arguments, result)).c_str());
   } else {
     print(arguments, result);
   }
+  if (!result.within) throw UsageError(arguments.scene + ": " + excess_of(arguments, result.recommended));
   return kDone;
 }
 

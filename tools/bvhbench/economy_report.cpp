@@ -25,6 +25,7 @@ Json to_json(const Measures& measures) {
                {"touching_pairs", measures.touching_pairs},
                {"contacts", measures.contacts},
                {"manifolds", measures.manifolds},
+               {"changeable_pairs", change.touching_pairs},
                {"lost_pairs", change.lost_pairs},
                {"new_pairs", change.new_pairs},
                {"matched_manifolds", change.matched},
@@ -54,6 +55,7 @@ Json to_json(const AssetEconomy& asset, std::uint32_t recommended) {
   return {{"asset", asset.name},
           {"diagonal", asset.diagonal},
           {"instances", asset.instances},
+          {"tolerance", asset.tolerance ? Json(*asset.tolerance) : Json()},
           {"recommended_level", recommended},
           {"levels", levels}};
 }
@@ -103,9 +105,8 @@ void print_level(const AssetEconomy& asset, std::size_t i, bool recommended) {
   const LevelView& level = asset.levels[i];
   const Measures& measures = asset.measures[i];
   const economy::Difference& change = measures.change;
-  const std::uint64_t bytes = measures.gpu_bytes == 0 ? measures.bytes : measures.gpu_bytes;
   std::printf(" %s %5zu %9s %10s %8s %10.3f %10.3f %9s %9s %10s %5s %16s %13s", recommended ? ">" : " ", i,
-              with_commas(level.triangle_count).c_str(), human_bytes(bytes).c_str(),
+              with_commas(level.triangle_count).c_str(), human_bytes(memory_of(measures)).c_str(),
               percent(level.error_bound / asset.diagonal).c_str(), 1e3 * measures.query_seconds,
               1e3 * measures.manifold_seconds, with_commas(measures.contacts).c_str(),
               with_commas(measures.manifolds).c_str(), with_commas(change.lost_pairs).c_str(),
@@ -119,8 +120,11 @@ void print_level(const AssetEconomy& asset, std::size_t i, bool recommended) {
 }
 
 void print_levels(const AssetEconomy& asset, std::uint32_t recommended) {
-  std::printf("%s: diagonal %.4g, %s instance%s\n", asset.name.c_str(), asset.diagonal,
+  std::printf("%s: diagonal %.4g, %s instance%s", asset.name.c_str(), asset.diagonal,
               with_commas(asset.instances).c_str(), asset.instances == 1 ? "" : "s");
+  if (asset.levels.size() > 1)
+    std::printf(", in %s touching pairs", with_commas(asset.measures[1].change.touching_pairs).c_str());
+  std::printf("\n");
   std::printf(
       "   level triangles     memory   proved   query, manifolds, ms  contacts manifolds  pairs lost, new"
       "   depths off, %%   normals off%s\n",
@@ -130,7 +134,7 @@ void print_levels(const AssetEconomy& asset, std::uint32_t recommended) {
 
 std::string limit_words(const EconomyArguments& arguments) {
   char text[64];
-  if (arguments.tolerance && arguments.relative) return percent(*arguments.tolerance) + " of each diagonal";
+  if (arguments.tolerance && arguments.relative) return percent(*arguments.tolerance) + " of the diagonals";
   if (arguments.tolerance) {
     std::snprintf(text, sizeof text, "%g units of length", *arguments.tolerance);
     return text;
@@ -149,18 +153,20 @@ std::string place_of(const EconomyArguments& arguments, const EconomyResult& res
 void print_losses(const EconomyResult& result) {
   const Measures &finest = result.finest, &chosen = result.recommended;
   const economy::Difference& change = chosen.change;
-  std::printf("What is lost by it, of all assets together:\n");
-  std::printf("  %s of %s pairs that touch at the finest levels are found apart, and %s others touch\n",
-              with_commas(change.lost_pairs).c_str(), with_commas(finest.touching_pairs).c_str(),
-              with_commas(change.new_pairs).c_str());
+  std::printf("What is lost by it, in pairs with an asset at a coarser level:\n");
+  std::printf(
+      "  %s of %s pairs that touch at the finest levels are such: %s of them are found apart, and %s others "
+      "touch\n",
+      with_commas(change.touching_pairs).c_str(), with_commas(finest.touching_pairs).c_str(),
+      with_commas(change.lost_pairs).c_str(), with_commas(change.new_pairs).c_str());
   std::printf("  half of the depths differ by %.3g at most, %s of the largest diagonal; 95 in 100 by %.3g\n",
               change.depth.median, percent(change.depth.median / largest_diagonal(result)).c_str(),
               change.depth.most);
   std::printf("  half of the normals turn by %.2g degrees at most, 95 in 100 by %.2g\n", change.angle.median,
               change.angle.most);
-  std::printf("  %s of %s manifolds have no match, and %s are new\n",
-              with_commas(change.lost_patches).c_str(), with_commas(finest.manifolds).c_str(),
-              with_commas(change.new_patches).c_str());
+  std::printf(
+      "  %s of %s manifolds have no match, and %s are new\n", with_commas(change.lost_patches).c_str(),
+      with_commas(change.matched + change.lost_patches).c_str(), with_commas(change.new_patches).c_str());
   if (!chosen.rest) return;
   const Spread& apart = chosen.rest->end_distance;
   std::printf(
@@ -178,6 +184,10 @@ void print_losses(const EconomyResult& result) {
 
 double seconds_of(const Measures& measures) {
   return measures.rest ? measures.rest->step_seconds : measures.query_seconds + measures.manifold_seconds;
+}
+
+std::uint64_t memory_of(const Measures& measures) {
+  return measures.gpu_bytes == 0 ? measures.bytes : measures.gpu_bytes;
 }
 
 Json to_json(const EconomyArguments& arguments, const EconomyResult& result) {
@@ -214,12 +224,12 @@ void print(const EconomyArguments& arguments, const EconomyResult& result) {
     if (result.assets[i].instances > 0) print_levels(result.assets[i], chosen.levels[i]);
   }
   std::printf(
-      "Memory: of the levels%s. Depths%s in %% of the diagonal, normals in degrees: half of them are off by "
-      "no\n"
-      "more, and in brackets 95 in 100, against level 0.\n",
+      "Memory: of the levels%s. Depths%s in %% of the diagonal, normals in degrees: half of them, in "
+      "pairs\n"
+      "with the asset, are off by no more, and in brackets 95 in 100, against level 0.\n",
       chosen.gpu_bytes == 0 ? " of all assets" : " and the query on the GPU", finest.rest ? " and ends" : "");
   std::printf("Recommended for %s%s:\n", limit_words(arguments).c_str(),
-              result.within ? "" : ", WHICH EVEN THE CHEAPEST LEVELS EXCEED");
+              result.within ? "" : ", which even the cheapest levels exceed");
   for (std::size_t i = 0; i < result.assets.size(); ++i) {
     const AssetEconomy& asset = result.assets[i];
     if (asset.instances == 0) continue;
@@ -232,7 +242,7 @@ void print(const EconomyArguments& arguments, const EconomyResult& result) {
   std::printf("  %s; contacts: %s of %s; memory: %s of %s\n",
               speed_words(seconds_of(finest), seconds_of(chosen)).c_str(),
               with_commas(chosen.contacts).c_str(), with_commas(finest.contacts).c_str(),
-              human_bytes(chosen.bytes).c_str(), human_bytes(finest.bytes).c_str());
+              human_bytes(memory_of(chosen)).c_str(), human_bytes(memory_of(finest)).c_str());
   print_losses(result);
 }
 

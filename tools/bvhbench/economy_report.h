@@ -11,7 +11,7 @@ namespace tandem::bench {
 /// What `bvhbench economy` was asked: one of the three limits.
 struct EconomyArguments {
   std::string scene, backend = "cpu", apply;
-  std::optional<double> tolerance;     ///< a length, or a part of each asset's diagonal
+  std::optional<double> tolerance;     ///< a length, or a part of diagonals
   bool relative = false;               ///< which of these
   std::optional<double> milliseconds;  ///< of query and manifolds, or of a simulated step
   std::optional<std::uint64_t> bytes;  ///< of all levels, or of GPU memory
@@ -24,6 +24,8 @@ struct AssetEconomy {
   std::string name;
   double diagonal = 0;
   std::uint64_t instances = 0;
+  bool moves = false;               ///< some instance does
+  std::optional<double> tolerance;  ///< a length, where a tolerance is the limit
   std::vector<LevelView> levels;
   std::vector<economy::Measures> measures;  ///< of each level, the other assets at their finest
 };
@@ -38,6 +40,9 @@ struct EconomyResult {
 
 /// Of query and manifolds; of a simulated step where there is one.
 double seconds_of(const economy::Measures& measures);
+
+/// Of the query on the GPU, or else of the levels.
+std::uint64_t memory_of(const economy::Measures& measures);
 
 Json to_json(const EconomyArguments& arguments, const EconomyResult& result);
 

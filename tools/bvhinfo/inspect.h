@@ -46,7 +46,4 @@ Inspection inspect(const std::string& path, InspectionDepth depth);
 /// "cow.bvh: a block has two parents (ChildShared, block 17)". Condition: the file is not sound.
 std::string defect_of(const Inspection& inspection);
 
-/// The bytes of one level's sections.
-std::uint64_t bytes_of_level(const AssetView& view, std::uint32_t level);
-
 }  // namespace tandem

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "common/number_words.h"
+#include "levels/level_bytes.h"
 
 namespace tandem {
 namespace {

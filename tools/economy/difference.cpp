@@ -41,7 +41,7 @@ using Patches = std::span<const Patch>;
 // Collects what the manifolds of one object pair after the other differ by.
 class Matches {
  public:
-  void add(Patches finest, Patches coarser) {
+  void add(const ObjectPair& pair, Patches finest, Patches coarser) {
     struct Candidate {
       double squared;
       std::size_t i, j;
@@ -60,32 +60,34 @@ class Matches {
       of_finest[i] = of_coarser[j] = true;
       ++found_.matched;
       angles_.push_back(angle_between(finest[i].normal, coarser[j].normal));
-      depths_.push_back(std::fabs(finest[i].depth - coarser[j].depth));
+      found_.depths.push_back({pair, std::fabs(finest[i].depth - coarser[j].depth)});
     }
-    found_.lost_patches += add_unmatched(finest, of_finest);
-    found_.new_patches += add_unmatched(coarser, of_coarser);
+    found_.lost_patches += add_unmatched(pair, finest, of_finest);
+    found_.new_patches += add_unmatched(pair, coarser, of_coarser);
   }
 
   Difference result() const {
     Difference all = found_;
     all.angle = spread_of(angles_);
-    all.depth = spread_of(depths_);
+    std::vector<double> depths;
+    for (const DepthChange& change : all.depths) depths.push_back(change.by);
+    all.depth = spread_of(std::move(depths));
     return all;
   }
 
  private:
-  std::uint64_t add_unmatched(Patches patches, const std::vector<bool>& matched) {
+  std::uint64_t add_unmatched(const ObjectPair& pair, Patches patches, const std::vector<bool>& matched) {
     std::uint64_t count = 0;
     for (std::size_t i = 0; i < patches.size(); ++i) {
       if (matched[i]) continue;
-      depths_.push_back(patches[i].depth);
+      found_.depths.push_back({pair, patches[i].depth});
       ++count;
     }
     return count;
   }
 
   Difference found_;
-  std::vector<double> angles_, depths_;
+  std::vector<double> angles_;
 };
 
 std::vector<Patch> by_pair(std::vector<Patch> patches) {
@@ -123,9 +125,10 @@ Difference difference(const Findings& finest, const Findings& coarser) {
     const bool from_left = right.empty() || (!left.empty() && !comes_before(right[0].pair, left[0].pair));
     const ObjectPair pair = from_left ? left[0].pair : right[0].pair;
     const Patches of_finest = take(left, pair), of_coarser = take(right, pair);
-    matches.add(of_finest, of_coarser);
+    matches.add(pair, of_finest, of_coarser);
   }
   Difference all = matches.result();
+  all.touching_pairs = finest.touching.size();
   all.lost_pairs = count_missing(finest.touching, coarser.touching);
   all.new_pairs = count_missing(coarser.touching, finest.touching);
   return all;

@@ -30,13 +30,21 @@ struct Spread {
 /// 0 of no numbers.
 Spread spread_of(std::vector<double> numbers);
 
+/// By how much the depth of a manifold differs; of one without a match its whole depth.
+struct DepthChange {
+  ObjectPair pair;
+  double by;
+};
+
 /// What a coarser level changes.
 struct Difference {
+  std::uint64_t touching_pairs = 0;                 ///< at the finest
   std::uint64_t lost_pairs = 0, new_pairs = 0;      ///< touching at the finest alone; at the coarser alone
   std::uint64_t matched = 0;                        ///< manifolds with one to compare them with
   std::uint64_t lost_patches = 0, new_patches = 0;  ///< manifolds without
   Spread angle;                                     ///< between the normals of matched manifolds, in degrees
-  Spread depth;  ///< by which matched manifolds differ; the whole depth of those without a match
+  Spread depth;                                     ///< of `depths`
+  std::vector<DepthChange> depths;
 };
 
 /// Manifolds are matched within each object pair, those nearest to each other first, by their centres.

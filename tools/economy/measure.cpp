@@ -1,8 +1,10 @@
 #include "measure.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "engines/registry.h"
+#include "levels/level_bytes.h"
 #include "scenes/contacts_file.h"
 
 namespace tandem::economy {
@@ -28,34 +30,30 @@ Findings findings_of(const TimedAnswer& answer) {
 
 }  // namespace
 
-std::uint64_t bytes_of(const AssetView& asset, std::uint32_t level) {
-  std::uint64_t bytes = 0;
-  for (const Section& section : asset.sections) {
-    const bool of_file = section.kind == SectionKind::levels || section.kind == SectionKind::parts ||
-                         section.kind == SectionKind::strings || section.kind == SectionKind::provenance;
-    if (!of_file && section.level == level) bytes += section.bytes;
-  }
-  return bytes;
-}
-
 LevelMeasurer::LevelMeasurer(std::string path, const MeasureSettings& settings)
     : path_(std::move(path)), settings_(settings), scene_(bench::read_scene(path_)) {
-  for (Instance& instance : scene_.description.instances)
-    instance.asset = scene_.shapes[instance.asset].asset;
+  std::vector<Instance>& instances = scene_.description.instances;
+  for (const Instance& instance : instances) asset_of_.push_back(scene_.shapes[instance.asset].asset);
+  std::vector<std::uint32_t> row(scene_.assets.size(), 0);  // of each asset in shapes
+  for (const std::uint32_t asset : asset_of_) row[asset] = 1;
+  for (std::uint32_t i = 0; i < row.size(); ++i) {
+    if (row[i] == 0) continue;
+    row[i] = static_cast<std::uint32_t>(used_.size());
+    used_.push_back(i);
+  }
+  for (std::size_t i = 0; i < instances.size(); ++i) instances[i].asset = row[asset_of_[i]];
   use(Levels(scene_.assets.size()));
 }
 
 void LevelMeasurer::use(const Levels& levels) {
   scene_.shapes.clear();
-  for (std::uint32_t i = 0; i < levels.size(); ++i) scene_.shapes.push_back({i, levels[i]});
+  for (const std::uint32_t asset : used_) scene_.shapes.push_back({asset, levels[asset]});
 }
 
 std::vector<std::uint32_t> LevelMeasurer::level_counts() const {
   std::vector<std::uint32_t> counts(scene_.assets.size(), 1);
-  for (const Instance& instance : scene_.description.instances) {
-    const AssetView asset = scene_.assets[instance.asset].view();
-    counts[instance.asset] = static_cast<std::uint32_t>(asset.levels.size());
-  }
+  for (const std::uint32_t asset : used_)
+    counts[asset] = static_cast<std::uint32_t>(scene_.assets[asset].view().levels.size());
   return counts;
 }
 
@@ -80,8 +78,8 @@ Measures LevelMeasurer::query(const Levels& levels) {
   gpu_ = answer.gpu.name;
   Measures measures;
   measures.levels = levels;
-  for (std::uint32_t i = 0; i < levels.size(); ++i)
-    measures.bytes += bytes_of(scene_.assets[i].view(), levels[i]);
+  for (const std::uint32_t asset : used_)
+    measures.bytes += bytes_of_level(scene_.assets[asset].view(), levels[asset]);
   measures.gpu_bytes = answer.gpu.bytes;
   measures.query_seconds = best_of(answer.whole);
   measures.manifold_seconds = best_of(answer.manifolds.seconds);
@@ -92,6 +90,18 @@ Measures LevelMeasurer::query(const Levels& levels) {
   return measures;
 }
 
+Findings LevelMeasurer::changeable(const Findings& found, const Levels& levels) const {
+  const auto is_changeable = [&](const ObjectPair& pair) {
+    return levels[asset_of_[pair.a]] > 0 || levels[asset_of_[pair.b]] > 0;
+  };
+  Findings taken;
+  std::copy_if(found.touching.begin(), found.touching.end(), std::back_inserter(taken.touching),
+               is_changeable);
+  std::copy_if(found.patches.begin(), found.patches.end(), std::back_inserter(taken.patches),
+               [&](const Patch& patch) { return is_changeable(patch.pair); });
+  return taken;
+}
+
 const Measures& LevelMeasurer::measure(const Levels& levels) {
   const Levels finest(levels.size());
   if (levels != finest) measure(finest);
@@ -99,7 +109,7 @@ const Measures& LevelMeasurer::measure(const Levels& levels) {
   use(levels);
   Measures measures = query(levels);
   if (levels == finest) finest_ = found_;
-  measures.change = difference(finest_, found_);
+  measures.change = difference(changeable(finest_, levels), changeable(found_, levels));
   if (settings_.simulated_seconds > 0) {
     const Rest rest = simulate(path_, scene_, simulation());
     if (levels == finest) finest_rest_ = rest;

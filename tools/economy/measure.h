@@ -25,14 +25,15 @@ struct RestMeasures {
   Spread end_distance;      ///< from where the finest levels leave the bodies
 };
 
-/// What a scene costs with its assets at some levels, and what these change against the finest.
+/// What a scene costs with its assets at some levels, and what these change against the finest. Assets
+/// without instances are left out.
 struct Measures {
   Levels levels;
   std::uint64_t bytes = 0;                         ///< of these levels in their files
   std::uint64_t gpu_bytes = 0;                     ///< that the query takes of a GPU; 0 on a CPU
   double query_seconds = 0, manifold_seconds = 0;  ///< the best of the repeats; broad phase included
   std::uint64_t object_pairs = 0, touching_pairs = 0, contacts = 0, manifolds = 0;
-  Difference change;
+  Difference change;  ///< of the object pairs that have an asset at a coarser level: no others can change
   std::optional<RestMeasures> rest;
 };
 
@@ -42,7 +43,11 @@ class LevelMeasurer {
   /// Throws bench::FileError.
   LevelMeasurer(std::string path, const MeasureSettings& settings);
 
+  /// Its instances are of rows of `shapes`, the assets that have instances.
   const bench::Scene& scene() const { return scene_; }
+
+  /// Of each instance.
+  const std::vector<std::uint32_t>& asset_of() const { return asset_of_; }
 
   /// How many levels each asset has; 1 of an asset that the scene has no instance of.
   std::vector<std::uint32_t> level_counts() const;
@@ -60,19 +65,19 @@ class LevelMeasurer {
 
  private:
   Measures query(const Levels& levels);
+  Findings changeable(const Findings& found, const Levels& levels) const;
   void use(const Levels& levels);
   SimulationSettings simulation() const;
 
   std::string path_, gpu_;
   MeasureSettings settings_;
   bench::Scene scene_;
-  Findings finest_, found_;  // of the finest levels; of the last query
+  std::vector<std::uint32_t> asset_of_;  // of each instance
+  std::vector<std::uint32_t> used_;      // the assets that have instances, ascending
+  Findings finest_, found_;              // of the finest levels; of the last query
   Rest finest_rest_;
   std::optional<Spread> nudged_;
   std::map<Levels, Measures> known_;
 };
-
-/// Bytes of one level in its file: of the sections that are its own.
-std::uint64_t bytes_of(const AssetView& asset, std::uint32_t level);
 
 }  // namespace tandem::economy

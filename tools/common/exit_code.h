@@ -5,7 +5,7 @@ namespace tandem {
 /// What the tools return to the shell. Stable.
 enum ExitCode : int {
   kDone = 0,
-  kUsage = 1,             ///< the command line is wrong
+  kUsage = 1,             ///< the command line is wrong, or asks for what cannot be had
   kUnreadableInput = 2,   ///< the input is missing, malformed or, under --strict, not flawless
   kNoTriangle = 3,        ///< the input holds no usable triangle
   kUnwritableOutput = 4,  ///< the output could not be written

@@ -18,7 +18,7 @@ function(hash_of result)
 endfunction()
 
 file(MAKE_DIRECTORY ${FOLDER})
-set(sources tests/kernels/variant_check.cpp formats/src/box.cpp kernels/src/available_memory.cpp
+set(sources tests/kernels/variant_check.cpp formats/src/allocator.cpp formats/src/box.cpp kernels/src/available_memory.cpp
   kernels/src/available_memory_of_machine.cpp kernels/src/block_pair.cpp kernels/src/lanes4.cpp
   kernels/src/manifold_means.cpp kernels/src/narrow_phase.cpp kernels/src/nearest_phase.cpp kernels/src/single_pieces.cpp)
 list(TRANSFORM sources PREPEND ${SOURCE}/)

@@ -46,3 +46,13 @@ function(tandem_library name)
     install(DIRECTORY include/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
   endif()
 endfunction()
+
+# Includes are spelled from tools/ on, such as "scenes/scene_file.h".
+# tandem_tool_library(scenes SOURCES a.cpp DEPENDS PUBLIC x PRIVATE y): target tandem_scenes.
+function(tandem_tool_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
+  add_library(tandem_${name} STATIC ${ARG_SOURCES})
+  tandem_flags(tandem_${name})
+  target_include_directories(tandem_${name} PUBLIC ${PROJECT_SOURCE_DIR}/tools)
+  target_link_libraries(tandem_${name} ${ARG_DEPENDS})
+endfunction()

@@ -20,7 +20,7 @@ MENTION = re.compile(r"docs/decisions/(?P<number>\d{4})|(?P<page>(?:docs|formats
 INCLUDE = re.compile(r'^#include ["<]([^">]+/[^">]+)[">]', re.MULTILINE)
 # Starts of include paths, and what docs/architecture.md calls them.
 LIBRARIES = {"CGAL": "CGAL", "CLI": "CLI11", "Eigen": "Eigen", "assimp": "assimp", "fcl": "FCL", "coal": "Coal", "embree3": "Embree", "ode": "ODE", "oneapi": "oneTBB",
-             "tbb": "oneTBB", "nlohmann": "nlohmann-json", "cub": "CUB", "thrust": "CUB", "BulletCollision": "Bullet", "sys": None}
+             "tbb": "oneTBB", "nanobind": "nanobind", "nlohmann": "nlohmann-json", "cub": "CUB", "thrust": "CUB", "BulletCollision": "Bullet", "sys": None}
 
 
 def folders():

@@ -1,10 +1,8 @@
-#include <oneapi/tbb/global_control.h>
-#include <oneapi/tbb/task_arena.h>
-
 #include <algorithm>
 #include <new>
 #include <vector>
 
+#include "bvhbuild/meshing/parallel.h"
 #include "bvhbuild/tree/build_asset.h"
 #include "handles.h"
 
@@ -80,19 +78,14 @@ tandem_build_report report_of(const build::CleanReport& clean) {
   return report;
 }
 
-// In an arena of its own, so that the program's other work with oneTBB keeps its threads.
 build::BuiltAsset build_with(const Source& source, const build::BuildOptions& options,
                              const tandem_build_options& read) {
   build::OptimisationWatch watch;
   if (read.progress != nullptr)
     watch.progress = [&](double share) { watch.stop = watch.stop || read.progress(read.user, share) != 0; };
-  using oneapi::tbb::global_control;
-  const size_t most = global_control::active_value(global_control::max_allowed_parallelism);
-  oneapi::tbb::task_arena arena(
-      static_cast<int>(read.threads != 0 ? std::min<size_t>(read.threads, most) : most));
   const Allocator allocator = current_allocator();
   build::BuiltAsset built;
-  arena.execute([&] {
+  build::run_with_threads(read.threads, [&] {
     const AllocatorScope scope(allocator);
     built = build::build_asset(source.triangles, options, read.provenance != nullptr ? read.provenance : "",
                                watch);

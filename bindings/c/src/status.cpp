@@ -125,8 +125,6 @@ constexpr Entry kEntries[] = {
     {TANDEM_FILTER_MISMATCH, "FilterMismatch", nullptr, "a filter is of another number of instances"},
     {TANDEM_CONTACTS_MISSING, "ContactsMissing", nullptr,
      "the query's last call did not find the contacts that this one needs"},
-    {TANDEM_NO_BUILDER, "NoBuilder", nullptr,
-     "this library was made without oneTBB, and so without the builder"},
     {TANDEM_NO_TRIANGLE, "NoTriangle", nullptr, "none of the triangles can be used"},
     {TANDEM_TOO_MANY_TRIANGLES, "TooManyTriangles", nullptr, "there are 2^32 - 1 triangles or more"},
 };

@@ -1,13 +1,11 @@
 #include "clean.h"
 
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <bit>
 
 #include "exact_predicates.h"
 #include "index_table.h"
+#include "parallel.h"
 
 namespace tandem::build {
 namespace {
@@ -76,8 +74,8 @@ bool degenerate(const TriangleMesh& mesh, const TriangleIndices& t) {
 }
 
 void drop_degenerate(TriangleMesh& mesh, CleanReport& report) {
-  const tbb::blocked_range<std::size_t> all(0, mesh.triangles.size(), 4096);
-  tbb::parallel_for(all, [&](const tbb::blocked_range<std::size_t>& range) {
+  const blocked_range<std::size_t> all(0, mesh.triangles.size(), 4096);
+  parallel_for(all, [&](const blocked_range<std::size_t>& range) {
     for (std::size_t i = range.begin(); i < range.end(); ++i)
       if (degenerate(mesh, mesh.triangles[i])) mesh.triangles[i][0] = kNoVertex;
   });

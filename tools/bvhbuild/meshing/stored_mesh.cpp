@@ -1,14 +1,12 @@
 #include "stored_mesh.h"
 
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
 
 #include "exact_predicates.h"
+#include "parallel.h"
 
 namespace tandem::build {
 namespace {
@@ -103,7 +101,7 @@ Point widened(const std::array<float, 3>& p) {
 }
 
 std::uint64_t count_flat(const StoredMesh& mesh) {
-  using Range = tbb::blocked_range<std::size_t>;
+  using Range = blocked_range<std::size_t>;
   const auto count = [&](const Range& range, std::uint64_t flat) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       const TriangleIndices& t = mesh.triangles[i];
@@ -111,7 +109,7 @@ std::uint64_t count_flat(const StoredMesh& mesh) {
     }
     return flat;
   };
-  return tbb::parallel_reduce(Range(0, mesh.triangles.size(), 4096), std::uint64_t{0}, count, std::plus<>());
+  return parallel_reduce(Range(0, mesh.triangles.size(), 4096), std::uint64_t{0}, count, std::plus<>());
 }
 
 }  // namespace

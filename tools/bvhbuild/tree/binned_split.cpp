@@ -1,10 +1,9 @@
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "bvhbuild/meshing/parallel.h"
 #include "splitter.h"
 
 namespace tandem::build {
@@ -86,10 +85,9 @@ Split best_of(int axis, const std::array<Bin, kBins>& bins, std::uint32_t n,
 
 // Unions and sums in any order give the same bits, so threads may share the work without changing the result.
 Split TriangleSplitter::best_binned_split(Range range, const IsLegal& is_legal) const {
-  using oneapi::tbb::blocked_range;
   const auto triangles = order(range);
   const blocked_range<std::size_t> all(0, triangles.size(), kGrain);
-  const Bounds centers = oneapi::tbb::parallel_reduce(
+  const Bounds centers = parallel_reduce(
       all, Bounds(),
       [&](const auto& part, Bounds bounds) {
         for (std::size_t i = part.begin(); i != part.end(); ++i) {
@@ -110,7 +108,7 @@ Split TriangleSplitter::best_binned_split(Range range, const IsLegal& is_legal) 
     const float length = centers.hi[k] - centers.lo[k];
     binning[k] = {centers.lo[k], length > 0 ? static_cast<float>(kBins) / length : 0};
   }
-  const Bins bins = oneapi::tbb::parallel_reduce(
+  const Bins bins = parallel_reduce(
       all, Bins(),
       [&](const auto& part, Bins partial) {
         for (std::size_t i = part.begin(); i != part.end(); ++i) {

@@ -1,10 +1,8 @@
 #include "emit.h"
 
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 
+#include "bvhbuild/meshing/parallel.h"
 #include "tandem/formats/box.h"
 
 namespace tandem::build {
@@ -80,8 +78,7 @@ Tree emit(const Geometry& geometry, const Topology& topology) {
   tree.depth = numbering.depth();
   tree.blocks.resize(places.size());
   tree.order.resize(geometry.triangles.size());
-  using oneapi::tbb::blocked_range;
-  oneapi::tbb::parallel_for(blocked_range<std::size_t>(0, places.size()), [&](const auto& part) {
+  parallel_for(blocked_range<std::size_t>(0, places.size()), [&](const auto& part) {
     for (std::size_t b = part.begin(); b != part.end(); ++b) {
       const TopologyBlock& from = topology[places[b].block];
       for (int i = from.count; i < kNodesPerBlock; ++i) set_imaginary(tree.blocks[b], i);

@@ -1,9 +1,8 @@
 #include "free_tree.h"
 
-#include <oneapi/tbb/parallel_invoke.h>
-
 #include <algorithm>
 
+#include "bvhbuild/meshing/parallel.h"
 #include "depth.h"
 #include "splitter.h"
 
@@ -54,7 +53,7 @@ class BinaryTree {
     const auto build_left = [&] { bounds = build(left(node), {range.begin, middle}, depth + 1); };
     const auto build_right = [&] { other = build(right(node), {middle, range.end}, depth + 1); };
     if (range.size() > kSerialSize) {
-      oneapi::tbb::parallel_invoke(build_left, build_right);
+      parallel_invoke(build_left, build_right);
     } else {
       build_left();
       build_right();

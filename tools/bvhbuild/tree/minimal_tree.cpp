@@ -1,9 +1,8 @@
 #include "minimal_tree.h"
 
-#include <oneapi/tbb/parallel_invoke.h>
-
 #include <algorithm>
 
+#include "bvhbuild/meshing/parallel.h"
 #include "depth.h"
 #include "legal_splits.h"
 #include "splitter.h"
@@ -24,7 +23,7 @@ struct Groups {
 template <typename Left, typename Right>
 void maybe_parallel(bool parallel, const Left& left, const Right& right) {
   if (parallel) {
-    oneapi::tbb::parallel_invoke(left, right);
+    parallel_invoke(left, right);
   } else {
     left();
     right();

@@ -1,11 +1,10 @@
 #include "mixed_tree.h"
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cstdlib>
 #include <optional>
 
+#include "bvhbuild/meshing/parallel.h"
 #include "free_tree.h"
 #include "minimal_tree.h"
 #include "region.h"
@@ -132,9 +131,8 @@ void add_replacements(const WorkingTree& tree, std::span<const Bounds> bounds, s
   const std::size_t count = regions.size() - (regions.size() > 1);  // without the blocks above them
   const std::size_t first = all.size();
   all.resize(first + count);
-  oneapi::tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-    all[first + i] = replacement_of(tree, regions[i], bounds, build);
-  });
+  parallel_for(std::size_t{0}, count,
+               [&](std::size_t i) { all[first + i] = replacement_of(tree, regions[i], bounds, build); });
 }
 
 // Those that fit, the most worth first.

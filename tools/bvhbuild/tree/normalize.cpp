@@ -1,10 +1,9 @@
 #include "normalize.h"
 
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
+
+#include "bvhbuild/meshing/parallel.h"
 
 namespace tandem::build {
 namespace {
@@ -49,7 +48,7 @@ std::vector<Bounds> normalized_bounds(const Geometry& geometry) {
   const auto n = static_cast<std::uint32_t>(geometry.triangles.size());
   std::vector<Bounds> bounds(n);
   const Normalization normalization(geometry);
-  oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::uint32_t>(0, n), [&](const auto& part) {
+  parallel_for(blocked_range<std::uint32_t>(0, n), [&](const auto& part) {
     for (std::uint32_t t = part.begin(); t != part.end(); ++t)
       bounds[t] = normalization.bounds_of(geometry, t);
   });

@@ -1,11 +1,9 @@
 #include "optimise.h"
 
-#include <oneapi/tbb/enumerable_thread_specific.h>
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 
 #include "anneal.h"
+#include "bvhbuild/meshing/parallel.h"
 #include "exchange_search.h"
 #include "region.h"
 
@@ -63,12 +61,12 @@ class Optimiser {
   template <typename Body>
   void for_each_below(const std::vector<Region>& regions, const Body& body) {
     const std::size_t count = regions.size() - has_top(regions);
-    oneapi::tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) { body(regions[i]); });
+    parallel_for(std::size_t{0}, count, [&](std::size_t i) { body(regions[i]); });
     for (std::size_t i = 0; i < count; ++i) tree_.refresh_heights(regions[i].root);
   }
 
   WorkingTree tree_;
-  oneapi::tbb::enumerable_thread_specific<ExchangeSearch> searches_;
+  PerThread<ExchangeSearch> searches_;
   OptimisationWatch& watch_;
 };
 

@@ -1,11 +1,9 @@
 #include "oriented_blocks.h"
 
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 
+#include "bvhbuild/meshing/parallel.h"
 #include "tandem/formats/box.h"
 
 namespace tandem::build {
@@ -370,8 +368,7 @@ std::vector<OrientedBlock> orient_blocks(const Geometry& geometry, const Tree& t
   for (const double reach : extent_of(tree.blocks[0]).reach) squared += reach * reach;
   const double farthest = std::sqrt(squared);
   const Ranges ranges(tree);
-  using oneapi::tbb::blocked_range;
-  oneapi::tbb::parallel_for(blocked_range<std::size_t>(0, tree.blocks.size(), 64), [&](const auto& part) {
+  parallel_for(blocked_range<std::size_t>(0, tree.blocks.size(), 64), [&](const auto& part) {
     Fit fit(geometry, tree, ranges, farthest, effort);
     for (std::size_t b = part.begin(); b != part.end(); ++b) {
       OrientedBlock& block = out[number[b]];

@@ -1,19 +1,15 @@
 #include "splitter.h"
 
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <numeric>
 #include <utility>
 
+#include "bvhbuild/meshing/parallel.h"
+
 namespace tandem::build {
 namespace {
-
-using oneapi::tbb::blocked_range;
-using oneapi::tbb::parallel_for;
 
 // Calls body(0), body(1), body(2), at once if the group is large.
 template <typename Body>

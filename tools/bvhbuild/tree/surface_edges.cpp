@@ -1,8 +1,8 @@
 #include "surface_edges.h"
 
-#include <oneapi/tbb/parallel_sort.h>
-
 #include <algorithm>
+
+#include "bvhbuild/meshing/parallel.h"
 
 namespace tandem::build {
 namespace {
@@ -26,7 +26,7 @@ SurfaceEdges::SurfaceEdges(std::span<const TriangleTopology> triangles) : edge_(
     const std::uint32_t u = vertex[side % 3], v = vertex[(side + 1) % 3];
     if (u != v) sides.push_back({std::min(u, v), std::max(u, v), side});
   }
-  oneapi::tbb::parallel_sort(sides.begin(), sides.end());
+  parallel_sort(sides.begin(), sides.end());
   sides_.reserve(sides.size());
   for (std::size_t i = 0; i < sides.size(); ++i) {
     if (i == 0 || sides[i].lower != sides[i - 1].lower || sides[i].upper != sides[i - 1].upper)

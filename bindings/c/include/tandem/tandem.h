@@ -55,7 +55,6 @@ enum {
   TANDEM_UNKNOWN_LEVEL = 7,        ///< a level or part that the asset does not have
   TANDEM_FILTER_MISMATCH = 8,      ///< a filter of another number of instances
   TANDEM_CONTACTS_MISSING = 9,     ///< the query's last call did not find the contacts that this call needs
-  TANDEM_NO_BUILDER = 10,          ///< this library was made without oneTBB, and so without the builder
   TANDEM_NO_TRIANGLE = 11,         ///< none of the triangles can be used
   TANDEM_TOO_MANY_TRIANGLES = 12,  ///< 2^32 - 1 or more
   // A file, or bytes of one. Of the defects that are there, the first in this order.
@@ -190,7 +189,8 @@ typedef struct tandem_build_options {
   uint32_t effort;         ///< TANDEM_EFFORT_DEFAULT, ...; the best takes minutes for 100,000 triangles
   uint32_t no_gpu_blocks;  ///< 1: without the blocks that exact queries on a GPU walk
   uint32_t no_topology;    ///< 1: without what manifolds and contained bodies need
-  uint32_t threads;        ///< at most; 0: as many as the machine has. The bytes do not depend on it
+  uint32_t threads;  ///< at most; 0: as many as the machine has. The bytes do not depend on it. A library
+                     ///< that was made without oneTBB has one
   uint32_t reserved;
   double imaginary_share;  ///< padding nodes: 0: the proven fewest; to 1: as many as a free tree has
   const char* provenance;  ///< JSON that the file says of its making, or null: options and findings
@@ -216,8 +216,7 @@ typedef struct tandem_build_report {
 /// Builds an asset, whose bytes (tandem_asset_data()) are those that bvhbuild writes for the same triangles,
 /// but for the provenance, and the same whatever the threads. report: or null; filled also where no triangle
 /// can be used. The bytes come from the allocator; what building takes meanwhile, from the C++ runtime.
-/// Result: TANDEM_NO_TRIANGLE, TANDEM_TOO_MANY_TRIANGLES; TANDEM_BAD_PART where faces lie in no part;
-/// TANDEM_NO_BUILDER.
+/// Result: TANDEM_NO_TRIANGLE, TANDEM_TOO_MANY_TRIANGLES; TANDEM_BAD_PART where faces lie in no part.
 TANDEM_API tandem_status tandem_asset_build(const tandem_mesh* mesh, const tandem_build_options* options,
                                             const tandem_allocator* allocator, tandem_asset** asset,
                                             tandem_build_report* report);

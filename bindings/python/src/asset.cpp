@@ -1,0 +1,167 @@
+#include <nanobind/stl/string.h>
+
+#include "core.h"
+
+namespace tandem::python {
+namespace {
+
+// A null pointer to the bytes of an empty buffer would be a null argument.
+const void* there(const void* data) {
+  return data != nullptr ? data : "";
+}
+
+Asset* open(const nb::bytes& path, bool read, bool quick) {
+  tandem_open_options options = {};
+  options.struct_size = sizeof options;
+  options.access = read ? TANDEM_ACCESS_READ : TANDEM_ACCESS_MAP;
+  options.check_depth = quick ? TANDEM_CHECK_QUICK : TANDEM_CHECK_FULL;
+  tandem_asset* asset = nullptr;
+  std::uint64_t where = 0;
+  const tandem_status status = [&] {
+    const nb::gil_scoped_release release;
+    return tandem_asset_open(path.c_str(), &options, nullptr, &asset, &where);
+  }();
+  check(status, where);
+  return new Asset(asset);
+}
+
+Asset* from_bytes(nb::handle data, bool quick) {
+  const Bytes bytes(data);
+  tandem_memory_options options = {};
+  options.struct_size = sizeof options;
+  options.check_depth = quick ? TANDEM_CHECK_QUICK : TANDEM_CHECK_FULL;
+  tandem_asset* asset = nullptr;
+  std::uint64_t where = 0;
+  const tandem_status status = [&] {
+    const nb::gil_scoped_release release;
+    return tandem_asset_from_memory(there(bytes.data()), bytes.size(), &options, nullptr, &asset, &where);
+  }();
+  check(status, where);
+  return new Asset(asset);
+}
+
+Asset* levels_from(const Asset& asset, std::uint32_t first, std::uint32_t count) {
+  tandem_asset* levels = nullptr;
+  check(tandem_asset_levels_from(asset.get(), first, count, &levels));
+  return new Asset(levels);
+}
+
+tandem_asset_info info_of(const Asset& asset) {
+  tandem_asset_info info = {};
+  info.struct_size = sizeof info;
+  check(tandem_asset_get_info(asset.get(), &info));
+  return info;
+}
+
+tandem_level level_of(const Asset& asset, std::uint32_t level) {
+  tandem_level result = {};
+  result.struct_size = sizeof result;
+  check(tandem_asset_get_level(asset.get(), level, &result));
+  return result;
+}
+
+template <typename Value>
+nb::tuple three(const Value* v) {
+  return nb::make_tuple(double{v[0]}, double{v[1]}, double{v[2]});
+}
+
+nb::dict info(const Asset& asset) {
+  const tandem_asset_info of = info_of(asset);
+  nb::dict result;
+  result["level_count"] = of.level_count;
+  result["first_level"] = of.first_level;
+  result["part_count"] = of.part_count;
+  result["file_bytes"] = of.file_bytes;
+  result["hash"] = of.hash;
+  result["source_faces"] = of.source_faces;
+  result["origin"] = three(of.origin);
+  result["rounding_error"] = of.rounding_error;
+  result["lower"] = three(of.lower);
+  result["upper"] = three(of.upper);
+  return result;
+}
+
+nb::dict level(const Asset& asset, std::uint32_t number) {
+  const tandem_level of = level_of(asset, number);
+  nb::dict result;
+  result["triangle_count"] = of.triangle_count;
+  result["block_count"] = of.block_count;
+  result["leaf_block_count"] = of.leaf_block_count;
+  result["depth"] = of.depth;
+  result["error_bound"] = of.error_bound;
+  result["has_oriented_blocks"] = of.has_oriented_blocks != 0;
+  result["has_topology"] = of.has_topology != 0;
+  result["vertex_count"] = of.vertex_count;
+  result["component_count"] = of.component_count;
+  result["closed"] = of.closed != 0;
+  return result;
+}
+
+// float64 corners in the mesh file's coordinates, three triples for each triangle.
+nb::object triangles(const Asset& asset, std::uint32_t number) {
+  const tandem_level of = level_of(asset, number);
+  const tandem_asset_info about = info_of(asset);
+  const std::size_t count = of.triangle_count;
+  nb::object bytes = make_bytes(count * 9 * sizeof(double));
+  double* to = static_cast<double*>(bytes_begin(bytes));
+  for (const tandem_triangle& triangle : std::span(of.triangles, count)) {
+    for (const tandem_corner& corner : triangle.corner) {
+      for (int k = 0; k < 3; ++k) *to++ = double{corner.position[k]} + about.origin[k];
+    }
+  }
+  return bytes;
+}
+
+// uint32: word 0 of each triangle is the face of the mesh file, word 1 the part.
+nb::object words(const Asset& asset, std::uint32_t number, std::uint32_t corner) {
+  const tandem_level of = level_of(asset, number);
+  nb::object bytes = make_bytes(of.triangle_count * sizeof(std::uint32_t));
+  auto* to = static_cast<std::uint32_t*>(bytes_begin(bytes));
+  for (const tandem_triangle& triangle : std::span(of.triangles, of.triangle_count))
+    *to++ = triangle.corner[corner].word;
+  return bytes;
+}
+
+nb::tuple part(const Asset& asset, std::uint32_t number) {
+  tandem_part of = {};
+  of.struct_size = sizeof of;
+  check(tandem_asset_get_part(asset.get(), number, &of));
+  return nb::make_tuple(nb::bytes(of.name, of.name_bytes), nb::bytes(of.path, of.path_bytes), of.first_face,
+                        of.face_count);
+}
+
+nb::bytes provenance(const Asset& asset) {
+  std::size_t size;
+  const char* json = tandem_asset_provenance(asset.get(), &size);
+  return nb::bytes(json, size);
+}
+
+// The bytes of the file, which live as long as the asset, to be read alone.
+int get_buffer(PyObject* self, Py_buffer* view, int flags) {
+  std::size_t size;
+  const void* data = tandem_asset_data(nb::inst_ptr<Asset>(self)->get(), &size);
+  return PyBuffer_FillInfo(view, self, const_cast<void*>(data), static_cast<Py_ssize_t>(size), 1, flags);
+}
+
+PyType_Slot asset_slots[] = {{Py_bf_getbuffer, reinterpret_cast<void*>(get_buffer)}, {0, nullptr}};
+
+}  // namespace
+
+void add_assets(nb::module_& module) {
+  nb::class_<Asset>(module, "Asset", nb::type_slots(asset_slots))
+      .def("levels_from", levels_from)
+      .def("coarsest_level",
+           [](const Asset& asset, double tolerance) {
+             return tandem_asset_coarsest_level(asset.get(), tolerance);
+           })
+      .def("info", info)
+      .def("level", level)
+      .def("triangles", triangles)
+      .def("words", words)
+      .def("part", part)
+      .def("provenance", provenance);
+  module.def("open", open, nb::rv_policy::take_ownership);
+  module.def("from_bytes", from_bytes, nb::rv_policy::take_ownership);
+}
+
+}  // namespace tandem::python

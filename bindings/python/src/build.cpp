@@ -1,0 +1,132 @@
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include <atomic>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <tuple>
+
+#include "core.h"
+
+namespace tandem::python {
+namespace {
+
+using Part = std::tuple<std::string, std::string, std::uint64_t>;
+
+// What the builder's threads and the caller's tell each other.
+struct Watch {
+  std::mutex mutex;
+  std::condition_variable changed;
+  bool done = false;
+  std::atomic<double> share = 0;
+  std::atomic<bool> stop = false;
+};
+
+std::uint32_t note(void* user, double share) {
+  auto& watch = *static_cast<Watch*>(user);
+  watch.share = share;
+  return watch.stop ? 1 : 0;
+}
+
+// Looks for signals (Ctrl-C) and calls progress(share) in the caller's thread until the builder is done.
+// After an exception of either, stops the builder and waits for it.
+void wait(Watch& watch, std::thread& builder, nb::handle progress) {
+  const auto done_within = [&](std::chrono::milliseconds time) {
+    const nb::gil_scoped_release release;
+    std::unique_lock lock(watch.mutex);
+    return watch.changed.wait_for(lock, time, [&] { return watch.done; });
+  };
+  const auto join = [&] {
+    const nb::gil_scoped_release release;
+    builder.join();
+  };
+  try {
+    double told = 0;
+    while (!done_within(std::chrono::milliseconds(50))) {
+      if (PyErr_CheckSignals() != 0) throw nb::python_error();
+      if (const double share = watch.share; !progress.is_none() && share != told) progress(told = share);
+    }
+  } catch (...) {
+    watch.stop = true;
+    join();
+    throw;
+  }
+  join();
+}
+
+nb::dict to_dict(const tandem_build_report& of) {
+  nb::dict report;
+  report["index_out_of_range"] = of.index_out_of_range;
+  report["not_finite"] = of.not_finite;
+  report["too_large"] = of.too_large;
+  report["degenerate"] = of.degenerate;
+  report["duplicate"] = of.duplicate;
+  report["duplicate_reversed"] = of.duplicate_reversed;
+  report["flattened"] = of.flattened;
+  report["vertices_unreferenced"] = of.vertices_unreferenced;
+  report["vertices_welded"] = of.vertices_welded;
+  return report;
+}
+
+// Positions and triangles by rows; faces of triangles or None; names, paths and counts of faces of parts.
+nb::tuple build(nb::handle positions, nb::handle triangles, nb::handle faces, const std::vector<Part>& parts,
+                std::uint32_t effort, bool gpu_blocks, bool topology, std::uint32_t threads,
+                double imaginary_share, const nb::object& provenance, nb::handle progress) {
+  const auto points = copy_rows<double>(positions);
+  const auto corners = copy_rows<std::uint32_t>(triangles);
+  std::vector<std::uint32_t> face_of;
+  if (!faces.is_none()) face_of = copy_rows<std::uint32_t>(faces);
+  std::vector<tandem_mesh_part> mesh_parts;
+  for (const auto& [name, path, count] : parts) mesh_parts.push_back({name.c_str(), path.c_str(), count});
+
+  tandem_mesh mesh = {};
+  mesh.struct_size = sizeof mesh;
+  mesh.positions = points.data();
+  mesh.vertex_count = points.size() / 3;
+  mesh.triangles = corners.data();
+  mesh.triangle_count = corners.size() / 3;
+  mesh.faces = faces.is_none() ? nullptr : face_of.data();
+  mesh.parts = mesh_parts.data();
+  mesh.part_count = mesh_parts.size();
+
+  Watch watch;
+  tandem_build_options options = {};
+  options.struct_size = sizeof options;
+  options.effort = effort;
+  options.no_gpu_blocks = !gpu_blocks;
+  options.no_topology = !topology;
+  options.threads = threads;
+  options.imaginary_share = imaginary_share;
+  options.provenance = provenance.is_none() ? nullptr : nb::borrow<nb::str>(provenance).c_str();
+  options.progress = note;
+  options.user = &watch;
+
+  std::unique_ptr<tandem_asset, decltype(&tandem_asset_release)> asset(nullptr, tandem_asset_release);
+  tandem_build_report report = {};
+  report.struct_size = sizeof report;
+  tandem_status status = TANDEM_OK;
+  std::thread builder([&] {
+    tandem_asset* made = nullptr;
+    status = tandem_asset_build(&mesh, &options, nullptr, &made, &report);
+    asset.reset(made);
+    const std::lock_guard lock(watch.mutex);
+    watch.done = true;
+    watch.changed.notify_one();
+  });
+  wait(watch, builder, progress);
+  check(status);
+  return nb::make_tuple(nb::cast(Asset(asset.release())), to_dict(report));
+}
+
+}  // namespace
+
+void add_builder(nb::module_& module) {
+  module.def("build", build, nb::arg(), nb::arg(), nb::arg().none(), nb::arg(), nb::arg(), nb::arg(),
+             nb::arg(), nb::arg(), nb::arg(), nb::arg().none(), nb::arg().none());
+}
+
+}  // namespace tandem::python

@@ -1,0 +1,31 @@
+#include "core.h"
+
+namespace tandem::python {
+
+void check(tandem_status status, std::uint64_t where) {
+  if (status == TANDEM_OK) return;
+  const nb::object error =
+      nb::module_::import_("tandem._errors")
+          .attr("from_status")(status, tandem_status_name(status), tandem_status_explain(status),
+                               tandem_status_subject(status), where);
+  PyErr_SetObject(error.type().ptr(), error.ptr());
+  throw nb::python_error();
+}
+
+Bytes::Bytes(nb::handle object) {
+  if (PyObject_GetBuffer(object.ptr(), &view_, PyBUF_SIMPLE) != 0) throw nb::python_error();
+}
+
+void throw_broken_rows() {
+  throw nb::value_error("a buffer does not hold whole rows");
+}
+
+nb::object make_bytes(std::size_t size) {
+  return nb::steal(PyByteArray_FromStringAndSize(nullptr, static_cast<Py_ssize_t>(size)));
+}
+
+void* bytes_begin(nb::handle bytearray) {
+  return PyByteArray_AsString(bytearray.ptr());
+}
+
+}  // namespace tandem::python

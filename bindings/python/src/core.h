@@ -1,0 +1,93 @@
+#pragma once
+/// What the parts of the extension share. The extension takes and gives raw rows; the package's Python files
+/// check what the caller gave, and name the arguments.
+#include <nanobind/nanobind.h>
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "tandem/tandem.h"
+
+namespace tandem::python {
+
+namespace nb = nanobind;
+
+/// Throws the Python exception of a status that is not TANDEM_OK (tandem._errors.from_status).
+void check(tandem_status status, std::uint64_t where = 0);
+
+/// The contiguous bytes of a Python object, for as long as this lives.
+class Bytes {
+ public:
+  explicit Bytes(nb::handle object);
+  ~Bytes() { PyBuffer_Release(&view_); }
+  Bytes(const Bytes&) = delete;
+  Bytes& operator=(const Bytes&) = delete;
+  const void* data() const { return view_.buf; }
+  std::size_t size() const { return static_cast<std::size_t>(view_.len); }
+
+ private:
+  Py_buffer view_;
+};
+
+/// Throws ValueError: a buffer is not of whole rows. The package's Python files never let that happen.
+[[noreturn]] void throw_broken_rows();
+
+/// A copy of an array's rows, which other threads cannot change while the interpreter runs them.
+template <typename Row>
+std::vector<Row> copy_rows(nb::handle object) {
+  const Bytes bytes(object);
+  if (bytes.size() % sizeof(Row) != 0) throw_broken_rows();
+  const Row* first = static_cast<const Row*>(bytes.data());
+  return {first, first + bytes.size() / sizeof(Row)};
+}
+
+/// A new bytearray, not yet filled.
+nb::object make_bytes(std::size_t size);
+void* bytes_begin(nb::handle bytearray);
+
+/// A copy of rows that a query has, as a bytearray: NumPy makes an array of it that owns it.
+template <typename Row>
+nb::object to_python(const Row* rows, std::size_t count) {
+  return nb::steal(
+      PyByteArray_FromStringAndSize(reinterpret_cast<const char*>(rows), Py_ssize_t(count * sizeof(Row))));
+}
+
+/// A checked file in memory, by one reference to it.
+class Asset {
+ public:
+  explicit Asset(tandem_asset* asset) : asset_(asset) {}
+  ~Asset() { tandem_asset_release(asset_); }
+  Asset(Asset&& other) noexcept : asset_(other.asset_) { other.asset_ = nullptr; }
+  Asset& operator=(Asset&&) = delete;
+  tandem_asset* get() const { return asset_; }
+
+ private:
+  tandem_asset* asset_;
+};
+
+/// Which pairs a query looks at; has copies of what it was made of, and never changes.
+class Filter {
+ public:
+  Filter(nb::object motion, nb::object group, nb::object mask, nb::object excluded);
+  ~Filter() { tandem_excluded_pairs_destroy(excluded_); }
+  Filter(const Filter&) = delete;
+  Filter& operator=(const Filter&) = delete;
+  /// Null for none.
+  static const tandem_pair_filter* of(const Filter* filter) {
+    return filter != nullptr ? &filter->filter_ : nullptr;
+  }
+
+ private:
+  std::vector<std::uint8_t> motion_;
+  std::vector<std::uint32_t> group_, mask_;
+  tandem_excluded_pairs* excluded_ = nullptr;
+  tandem_pair_filter filter_ = {};
+};
+
+void add_assets(nb::module_& module);
+void add_builder(nb::module_& module);
+void add_filters(nb::module_& module);
+void add_queries(nb::module_& module);
+
+}  // namespace tandem::python

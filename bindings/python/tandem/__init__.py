@@ -1,0 +1,36 @@
+"""Exact collision detection of posed triangle meshes: contacts, manifolds, distances, times of impact.
+
+>>> import tandem
+>>> box = tandem.build([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+>>> query = tandem.Query([box])
+>>> found = query.contacts(translation=[[0, 0, 0], [0.25, 0.25, 0.25]])
+>>> len(found.contacts) > 0
+True
+"""
+from . import _tandem
+from ._arrays import instances
+from ._asset import Asset, Level, Part
+from ._build import BuildReport, build
+from ._errors import Error, FileError
+from ._query import Contacts, Contained, Counters, Distances, Filter, Impacts, Manifolds, Query, Verdicts
+from ._rows import CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, INSTANCE, MANIFOLD, MOTION, NO_INDEX, PAIR, POINT, VERDICT
+
+#: What moves an instance (Filter): forces; nothing; the caller; nothing until the caller wakes it.
+MOVING, FIXED, KINEMATIC, SLEEPING = range(4)
+#: Flags of manifolds: without overlap; the curve in which the surfaces cross does not close; one body goes through the other.
+TOUCHING, OPEN_CURVE, GOES_THROUGH = 1, 2, 4
+#: Flags of contained components: inside; of an open body there is no inside.
+INSIDE, OUTER_OPEN = 1, 2
+#: Verdicts.
+APART, TOUCH, WITHIN_TOLERANCE = range(3)
+#: Statuses of impacts.
+NO_IMPACT, IMPACT_IN_STEP, IMPACT_AT_START = range(3)
+
+__version__ = f"{_tandem.version // 10000}.{_tandem.version // 100 % 100}.{_tandem.version % 100}"
+
+__all__ = [
+    "APART", "CONTACT", "CONTAINMENT", "DISTANCE", "FIXED", "FORMER", "GOES_THROUGH", "IMPACT", "IMPACT_AT_START", "IMPACT_IN_STEP", "INSIDE", "INSTANCE",
+    "KINEMATIC", "MANIFOLD", "MOTION", "MOVING", "NO_IMPACT", "NO_INDEX", "OPEN_CURVE", "OUTER_OPEN", "PAIR", "POINT", "SLEEPING", "TOUCH", "TOUCHING", "VERDICT",
+    "WITHIN_TOLERANCE", "Asset", "BuildReport", "Contacts", "Contained", "Counters", "Distances", "Error", "FileError", "Filter", "Impacts", "Level", "Manifolds",
+    "Part", "Query", "Verdicts", "build", "instances",
+]

@@ -1,0 +1,136 @@
+"""Arguments to arrays: each function names the argument, and the row, that is wrong."""
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ._rows import INSTANCE, PAIR
+
+__all__ = ["Rows", "instances"]
+
+#: An array of rows, such as INSTANCE.
+Rows = npt.NDArray[np.void]
+
+_MOST = 0xFFFFFFFF
+_LAST_ROW = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+def floats(value: npt.ArrayLike, name: str, *tail: int) -> npt.NDArray[np.float64]:
+    """A contiguous float64 array of shape `tail` or (n, *tail)."""
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind not in "fiu" and array.size:
+            raise TypeError(f"{name} has {array.dtype} where numbers are wanted")
+        array = np.ascontiguousarray(array, dtype=np.float64) if array.ndim else array.astype(np.float64)
+    except ValueError as error:
+        raise ValueError(f"{name} is no array: {error}") from None
+    if array.ndim == 1 and not array.size and tail:
+        return array.reshape(0, *tail)
+    if array.shape != tail and array.shape[1:] != tail:
+        raise ValueError(f"{name} has shape {array.shape} where {tail} or (n, {str(tail)[1:].replace(',)', ')')} is wanted")
+    return array
+
+
+def whole_numbers(value: npt.ArrayLike, name: str, most: int = _MOST, dtype: npt.DTypeLike = np.uint32) -> npt.NDArray[Any]:
+    """A contiguous array of whole numbers from 0 to `most`."""
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise ValueError(f"{name} is no array: {error}") from None
+    if array.dtype.kind not in "iu":
+        if array.size:
+            raise TypeError(f"{name} has {array.dtype} where whole numbers are wanted")
+    elif array.size and array.dtype != dtype:
+        bad = array > most if array.dtype.kind == "u" else (array < 0) | (array > most)
+        if bad.any():
+            row = int(np.flatnonzero(bad.reshape(len(bad), -1).any(axis=1) if bad.ndim else bad)[0])
+            raise ValueError(f"{name}: row {row} is not from 0 to {most}: {array[row] if array.ndim else array}")
+    return np.asarray(array, dtype=dtype, order="C")
+
+
+def rows(value: Rows, name: str, dtype: np.dtype[Any]) -> Rows:
+    """A contiguous one-dimensional array of rows of this very dtype."""
+    if not isinstance(value, np.ndarray) or value.dtype != dtype:
+        kind = f"an array of {value.dtype}" if isinstance(value, np.ndarray) else type(value).__name__
+        raise TypeError(f"{name} is {kind} where an array of rows {dtype.names} (dtype tandem.{_name_of(dtype)}) is wanted")
+    if value.ndim != 1:
+        raise ValueError(f"{name} has shape {value.shape} where (n,) is wanted")
+    return value if value.flags.c_contiguous else np.ascontiguousarray(value)
+
+
+def _name_of(dtype: np.dtype[Any]) -> str:
+    from . import _rows
+    return next(name for name in _rows.__all__ if getattr(_rows, name) is dtype)
+
+
+def pairs_of(value: npt.ArrayLike | Rows | None) -> Rows | None:
+    """Object pairs: None, an array of PAIR, or whole numbers of shape (m, 2)."""
+    if value is None:
+        return None
+    if isinstance(value, np.ndarray) and value.dtype == PAIR:
+        return rows(value, "pairs", PAIR)
+    array = whole_numbers(value, "pairs")
+    if array.size == 0:
+        return np.empty(0, PAIR)
+    if array.ndim != 2 or array.shape[1] != 2:
+        raise ValueError(f"pairs has shape {array.shape} where (m, 2) is wanted")
+    return array.view(PAIR).reshape(-1)
+
+
+def instances(asset: npt.ArrayLike = 0, rotation: npt.ArrayLike | None = None, translation: npt.ArrayLike | None = None,
+              transform: npt.ArrayLike | None = None) -> Rows:
+    """Bodies, posed: one for each row of the longest argument; an argument without rows, or with one, is that of all.
+
+    Args:
+        asset: place in the query's list of assets, () or (n,).
+        rotation: (3, 3) or (n, 3, 3); the identity where it is not given.
+        translation: (3,) or (n, 3), in the assets' unit; 0 where it is not given.
+        transform: (4, 4) or (n, 4, 4) instead of both; the last row is 0, 0, 0, 1.
+
+    Returns:
+        An array of INSTANCE, (n,).
+
+    Raises:
+        ValueError, TypeError: which name the argument and the row. Whether rotations are rigid is looked at by queries.
+
+    >>> tandem.instances(translation=[[0, 0, 0], [2, 0, 0]])["translation"][1]
+    array([2., 0., 0.])
+    """
+    if transform is not None:
+        if rotation is not None or translation is not None:
+            raise TypeError("transform stands instead of rotation and translation, not beside them")
+        matrices = floats(transform, "transform", 4, 4)
+        wrong = np.abs(matrices[..., 3, :] - _LAST_ROW).max(axis=-1) if matrices.size else np.zeros(0)
+        if not np.all(wrong <= 1e-6):
+            raise ValueError(f"transform: the last row of matrix {int(np.flatnonzero(~(wrong <= 1e-6))[0])} is not 0, 0, 0, 1")
+        rotation, translation = matrices[..., :3, :3], matrices[..., :3, 3]
+    rotations = np.eye(3) if rotation is None else floats(rotation, "rotation", 3, 3)
+    translations = np.zeros(3) if translation is None else floats(translation, "translation", 3)
+    numbers = whole_numbers(asset, "asset")
+    if numbers.ndim > 1:
+        raise ValueError(f"asset has shape {numbers.shape} where () or (n,) is wanted")
+    counts = {name: len(array) for name, array, one in
+              (("asset", numbers, 0), ("transform" if transform is not None else "rotation", rotations, 2), ("translation", translations, 1))
+              if array.ndim > one and len(array) != 1}
+    if len(set(counts.values())) > 1:
+        raise ValueError("different numbers of rows: " + ", ".join(f"{name} {count}" for name, count in counts.items()))
+    made = np.zeros(next(iter(counts.values()), 1), INSTANCE)
+    made["asset"] = numbers
+    made["rotation"] = rotations
+    made["translation"] = translations
+    return made
+
+
+def instances_of(given: Rows | None, asset: Any, rotation: Any, translation: Any, transform: Any) -> Rows:
+    """The instances of a call: rows, or what to make them of."""
+    if given is None:
+        if asset is None and rotation is None and translation is None and transform is None:
+            raise TypeError("instances is missing, or asset, rotation, translation or transform")
+        return instances(0 if asset is None else asset, rotation, translation, transform)
+    if asset is not None or rotation is not None or translation is not None or transform is not None:
+        raise TypeError("instances stand instead of asset, rotation, translation and transform, not beside them")
+    if type(given) is np.ndarray and given.dtype is INSTANCE and given.ndim == 1 and given.flags.c_contiguous:
+        return given
+    return rows(given, "instances", INSTANCE)

@@ -1,0 +1,208 @@
+"""Meshes, ready to be asked about."""
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import tempfile
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _tandem
+from ._errors import Error
+
+__all__ = ["Asset", "Level", "Part"]
+
+
+class Level(NamedTuple):
+    """A level of detail of an asset; level 0 is the finest."""
+
+    triangle_count: int
+    block_count: int
+    leaf_block_count: int
+    #: Of the tree, in blocks.
+    depth: int
+    #: No point of this surface or of the file's finest is farther from the other.
+    error_bound: float
+    #: Exact queries on a GPU walk them.
+    has_oriented_blocks: bool
+    #: Manifolds and contained bodies need it.
+    has_topology: bool
+    #: Different positions of corners; this and the next two are 0 and False without topology.
+    vertex_count: int
+    #: Triangles that edges join.
+    component_count: int
+    #: All components are.
+    closed: bool
+
+
+class Part(NamedTuple):
+    """A run of faces that the mesh file gives a name."""
+
+    name: str
+    #: Of scene nodes, joined by "/".
+    path: str
+    first_face: int
+    face_count: int
+
+
+class Asset:
+    """What one .bvh file holds, checked: a mesh and its trees, at one or more levels of detail.
+
+    It never changes, and threads may share it. Made by `Asset.load`, `Asset.from_bytes` and `tandem.build`. It pickles, as its bytes.
+    """
+
+    __slots__ = ("_core", "_info", "__weakref__")
+    _core: _tandem.Asset
+    _info: dict[str, Any]
+
+    def __init__(self) -> None:
+        raise TypeError("Asset.load, Asset.from_bytes and tandem.build make assets")
+
+    @classmethod
+    def _of(cls, core: _tandem.Asset) -> Asset:
+        made = cls.__new__(cls)
+        made._core = core
+        made._info = core.info()
+        return made
+
+    @staticmethod
+    def load(path: str | os.PathLike[str], *, access: Literal["map", "read"] = "map", check: Literal["full", "quick"] = "full") -> Asset:
+        """Opens and checks a .bvh file.
+
+        Args:
+            path: of the file.
+            access: "map" maps its pages, and nobody may write to it or cut it short meanwhile (replacing it by a rename is safe); "read" copies it.
+            check: "quick" believes what oriented boxes hold and what topology says; nothing is read out of bounds.
+
+        Raises:
+            FileError: it cannot be found or read.
+            Error: it is no .bvh file, or a defect of it.
+        """
+        read, quick = _choice("access", access, ("map", "read")), _choice("check", check, ("full", "quick"))
+        name = os.fsencode(path)
+        if b"\0" in name:
+            raise ValueError("path has a zero byte")
+        try:
+            return Asset._of(_tandem.open(name, bool(read), bool(quick)))
+        except Error as error:
+            raise type(error)(f"{os.fsdecode(path)}: {error}", error.status, error.name, error.subject, error.where) from None
+
+    @staticmethod
+    def from_bytes(data: Any, *, check: Literal["full", "quick"] = "full") -> Asset:
+        """Checks the bytes of a .bvh file, any contiguous buffer, and copies them. Errors and `check`: as of `load`."""
+        return Asset._of(_tandem.from_bytes(data, bool(_choice("check", check, ("full", "quick")))))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the file: whole, or not at all (into a temporary file beside it, which then gets its name)."""
+        path = os.fspath(path)
+        descriptor, aside = tempfile.mkstemp(prefix=".", suffix=".tmp", dir=os.path.dirname(path) or ".")
+        try:
+            with open(descriptor, "wb") as file:
+                file.write(self.data)
+                mask = os.umask(0)
+                os.umask(mask)
+                os.fchmod(file.fileno(), 0o666 & ~mask)
+            os.replace(aside, path)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                os.unlink(aside)
+            raise
+
+    @property
+    def data(self) -> memoryview:
+        """The bytes of the file, without a copy; they live as long as the view."""
+        return memoryview(self._core)  # type: ignore[arg-type]
+
+    def __bytes__(self) -> bytes:
+        return bytes(self.data)
+
+    def __buffer__(self, flags: int) -> memoryview:
+        return self.data
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restore, (bytes(self), self._info["first_level"], self._info["level_count"])
+
+    def __repr__(self) -> str:
+        return f"<tandem.Asset of {self.levels[0].triangle_count} triangles, {self._info['level_count']} levels>"
+
+    def levels_from(self, first: int, count: int = 0) -> Asset:
+        """An asset that shows `count` levels of this one from level `first` on; 0: all. Queries use the first that an asset shows. The bytes are shared.
+
+        Raises:
+            Error: there is no level `first`.
+        """
+        return Asset._of(self._core.levels_from(first, count))
+
+    def coarsest_level(self, tolerance: float) -> int:
+        """The coarsest level whose error_bound is at most `tolerance`, in the mesh's unit; 0 where none is."""
+        return self._core.coarsest_level(tolerance)
+
+    @property
+    def levels(self) -> list[Level]:
+        """The levels of detail that the asset shows, the finest first."""
+        return [Level(**self._core.level(level)) for level in range(self._info["level_count"])]
+
+    def triangles(self, level: int = 0) -> npt.NDArray[np.float64]:
+        """Corners of a level's triangles, (n, 3, 3), in the mesh file's coordinates; triangles as contacts number them."""
+        return np.frombuffer(self._core.triangles(level), np.float64).reshape(-1, 3, 3)
+
+    def faces(self, level: int = 0) -> npt.NDArray[np.uint32]:
+        """Of each triangle of a level, the face of the mesh file that it comes from, (n,)."""
+        return np.frombuffer(self._core.words(level, 0), np.uint32)
+
+    @property
+    def bounds(self) -> npt.NDArray[np.float64]:
+        """The lower and the upper corner of all levels, (2, 3), in the mesh file's coordinates."""
+        return np.array([self._info["lower"], self._info["upper"]]) + self.origin
+
+    @property
+    def origin(self) -> npt.NDArray[np.float64]:
+        """What is added to stored coordinates, (3,)."""
+        return np.array(self._info["origin"])
+
+    @property
+    def rounding_error(self) -> float:
+        """How far a stored coordinate is from that of the mesh file, at most."""
+        return self._info["rounding_error"]
+
+    @property
+    def hash(self) -> str:
+        """Of the content, as bvhinfo prints it."""
+        return f"{self._info['hash']:016x}"
+
+    @property
+    def file_bytes(self) -> int:
+        return self._info["file_bytes"]
+
+    @property
+    def source_faces(self) -> int:
+        """Faces of the mesh file."""
+        return self._info["source_faces"]
+
+    @property
+    def parts(self) -> list[Part]:
+        """The objects, groups or scene nodes that the mesh file names."""
+        found = (self._core.part(part) for part in range(self._info["part_count"]))
+        return [Part(name.decode(errors="replace"), path.decode(errors="replace"), first, count) for name, path, first, count in found]
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """How the file was made."""
+        return json.loads(self._core.provenance() or b"{}")
+
+
+def _restore(data: bytes, first_level: int, level_count: int) -> Asset:
+    whole = Asset.from_bytes(data)
+    if (first_level, level_count) == (0, whole._info["level_count"]):
+        return whole
+    return whole.levels_from(first_level, level_count)
+
+
+def _choice(name: str, given: str, choices: tuple[str, ...]) -> int:
+    try:
+        return choices.index(given)
+    except ValueError:
+        raise ValueError(f"{name} is {given!r} where one of {', '.join(map(repr, choices))} is wanted") from None

@@ -1,0 +1,248 @@
+"""Queries: what meets, how near, and when."""
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _tandem
+from ._arrays import Rows, instances_of, pairs_of, rows, whole_numbers
+from ._asset import Asset, _choice
+from ._rows import CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, MANIFOLD, MOTION, PAIR, POINT, VERDICT
+
+__all__ = ["Contacts", "Contained", "Counters", "Distances", "Filter", "Impacts", "Manifolds", "Query", "Verdicts"]
+
+_frombuffer = np.frombuffer
+_MODES = {"exact": 0, "fast": 1, "boxes": 2}
+
+
+class Counters(NamedTuple):
+    """Work that a call did."""
+
+    object_pairs: int
+    block_pairs: int
+    candidates: int
+    decided_by_float32: int
+    decided_by_float64: int
+    decided_exactly: int
+    contacts: int
+
+
+class Contacts(NamedTuple):
+    """Object pairs, array of PAIR, and triangles that meet, array of CONTACT, by ascending pair."""
+
+    pairs: Rows
+    contacts: Rows
+    counters: Counters
+
+
+class Manifolds(NamedTuple):
+    """Object pairs; their contact regions, array of MANIFOLD by ascending pair; the points of these, array of POINT, manifold by manifold."""
+
+    pairs: Rows
+    manifolds: Rows
+    points: Rows
+
+
+class Contained(NamedTuple):
+    """Object pairs, and components of bodies that lie within another, array of CONTAINMENT."""
+
+    pairs: Rows
+    contained: Rows
+
+
+class Distances(NamedTuple):
+    """Object pairs, and the distance of each, array of DISTANCE."""
+
+    pairs: Rows
+    distances: Rows
+
+
+class Impacts(NamedTuple):
+    """Object pairs, and when each of them meets, array of IMPACT."""
+
+    pairs: Rows
+    impacts: Rows
+
+
+class Verdicts(NamedTuple):
+    """Object pairs, and what is known of each, array of VERDICT."""
+
+    pairs: Rows
+    verdicts: Rows
+
+
+class Filter:
+    """Which pairs of instances a query looks at, of all whose world boxes meet. Keeps copies of what it is made of.
+
+    Args:
+        motion: (n,), of each instance MOVING, FIXED, KINEMATIC or SLEEPING; pairs without anything that moves are not looked at.
+        group: (n,), the groups that an instance is in, a bit each; all where not given.
+        mask: (n,), the groups that it meets; all where not given. Two are looked at where each is in a group of the other's mask.
+        excluded: (m, 2) or array of PAIR: pairs that are not looked at, in any order.
+    """
+
+    __slots__ = ("_core",)
+
+    def __init__(self, motion: npt.ArrayLike | None = None, group: npt.ArrayLike | None = None, mask: npt.ArrayLike | None = None,
+                 excluded: npt.ArrayLike | None = None):
+        given = {"motion": None if motion is None else whole_numbers(motion, "motion", 255, np.uint8),
+                 "group": None if group is None else whole_numbers(group, "group"), "mask": None if mask is None else whole_numbers(mask, "mask")}
+        shapes = {name: array.shape for name, array in given.items() if array is not None}
+        for name, shape in shapes.items():
+            if len(shape) != 1 or shape != next(iter(shapes.values())):
+                raise ValueError(f"{name} has shape {shape} where (n,) is wanted, the same as of the others")
+        try:
+            self._core = _tandem.Filter(*given.values(), pairs_of(excluded))
+        except ValueError as error:
+            raise ValueError(str(error).replace("pairs", "excluded", 1)) from None
+
+
+class Query:
+    """Finds what happens between posed meshes.
+
+    Args:
+        assets: that instances refer to by their place in this list. The query keeps them.
+        threads: of its calls where they name no other number, 1 to 1,024, the caller's thread included. Results do not depend on it.
+
+    Calls let other Python threads run. A query takes one call at a time: a second thread gets RuntimeError; several queries may share assets.
+
+    Every call takes the instances as an array of INSTANCE, or as `asset`, `rotation`, `translation` or `transform` (see `tandem.instances`); pairs, where they
+    are given, as an array of PAIR or whole numbers (m, 2), else the query finds the pairs whose world boxes meet, a < b, sorted. Error: a pose that is not rigid
+    to 1e-6, a number that is not finite or beyond 1e300, an asset or instance that there is not; `where` is the instance or pair.
+    """
+
+    __slots__ = ("_core", "_threads", "__weakref__")
+
+    def __init__(self, assets: Iterable[Asset], *, threads: int = 1):
+        if isinstance(assets, Asset):
+            raise TypeError("assets is one asset where a list of them is wanted")
+        cores = []
+        for place, asset in enumerate(assets):
+            if not isinstance(asset, Asset):
+                raise TypeError(f"assets: entry {place} is {type(asset).__name__} where an Asset is wanted")
+            cores.append(asset._core)
+        self._threads = 1
+        self._threads = self._number_of_threads(threads)
+        self._core = _tandem.Query(cores)
+
+    def _number_of_threads(self, threads: int | None) -> int:
+        if threads is None:
+            return self._threads
+        if not isinstance(threads, (int, np.integer)):
+            raise TypeError(f"threads is {type(threads).__name__} where a whole number is wanted")
+        if not 1 <= threads <= 1024:
+            raise ValueError(f"threads is {threads} where 1 to 1024 is wanted")
+        return int(threads)
+
+    def contacts(self, instances: Rows | None = None, *, pairs: npt.ArrayLike | None = None, mode: Literal["exact", "fast", "boxes"] = "exact",
+                 first_contact_only: bool = False, self_pairs: bool = False, within: float = 0.0, add_error_bounds: bool = False, filter: Filter | None = None,
+                 threads: int | None = None, asset: npt.ArrayLike | None = None, rotation: npt.ArrayLike | None = None,
+                 translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None) -> Contacts:
+        """Finds every pair of triangles that meet.
+
+        Args:
+            mode: "exact": as exact arithmetic on the posed vertices finds them; "fast": by float32, which may err where rounding does; "boxes": triangles whose
+                boxes overlap.
+            first_contact_only: one contact for each object pair that touches.
+            self_pairs: where the query finds the pairs, also each instance with itself.
+            within: clearance: triangles at most so far apart count, decided exactly.
+            add_error_bounds: a pair without a contact is surely apart at the finest levels too.
+            filter: where the query finds the pairs.
+        """
+        found = self._core.contacts(
+            instances_of(instances, asset, rotation, translation, transform), None if pairs is None else pairs_of(pairs),
+            _MODES[mode] if mode in _MODES else _choice("mode", mode, tuple(_MODES)), first_contact_only, self_pairs, within, add_error_bounds,
+            None if filter is None else filter._core, self._threads if threads is None else self._number_of_threads(threads))
+        return Contacts(_frombuffer(found[0], PAIR), _frombuffer(found[1], CONTACT), Counters._make(found[2]))
+
+    def pairs(self, instances: Rows | None = None, *, self_pairs: bool = False, within: float = 0.0, add_error_bounds: bool = False,
+              filter: Filter | None = None, threads: int | None = None, asset: npt.ArrayLike | None = None, rotation: npt.ArrayLike | None = None,
+              translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None) -> Rows:
+        """The object pairs whose world boxes meet, array of PAIR: a < b, sorted. Arguments: as of `contacts`."""
+        found = self._core.pairs(instances_of(instances, asset, rotation, translation, transform), self_pairs, within, add_error_bounds,
+                                 None if filter is None else filter._core, self._number_of_threads(threads))
+        return _frombuffer(found, PAIR)
+
+    def keep_fixed(self, instances: Rows, motion: npt.ArrayLike, *, threads: int | None = None) -> None:
+        """Keeps the instances whose motion is FIXED as they stand: calls of `contacts` and `pairs` to come, which must be of as many instances, take the time of
+        the others. To be called again when one of them has moved or others are fixed. motion: (n,)."""
+        posed = instances_of(instances, None, None, None, None)
+        motions = whole_numbers(motion, "motion", 255, np.uint8)
+        if motions.shape != posed.shape:
+            raise ValueError(f"motion has shape {motions.shape} where {posed.shape} is wanted")
+        self._core.keep_fixed(posed, motions, self._number_of_threads(threads))
+
+    def manifolds(self, *, most_points: int = 7, match_previous: bool = True, threads: int | None = None) -> Manifolds:
+        """Makes contact manifolds of the last `contacts` of this query, whose instances it remembers.
+
+        Args:
+            most_points: of a manifold, 1 to 7.
+            match_previous: points are looked for among those of the last call, and keep their `id`.
+
+        Raises:
+            Error: the last call did not find contacts; an asset has no topology.
+        """
+        if not 1 <= most_points <= 7:
+            raise ValueError(f"most_points is {most_points} where 1 to 7 is wanted")
+        pairs, manifolds, points = self._core.manifolds(most_points, match_previous, self._number_of_threads(threads))
+        return Manifolds(_frombuffer(pairs, PAIR), _frombuffer(manifolds, MANIFOLD), _frombuffer(points, POINT))
+
+    def contained(self, *, threads: int | None = None) -> Contained:
+        """Finds bodies within others, which no contact tells, of the object pairs of the last `contacts`, which was in mode "exact", for all contacts and with
+        `within` 0; else Error."""
+        pairs, contained = self._core.contained(self._number_of_threads(threads))
+        return Contained(_frombuffer(pairs, PAIR), _frombuffer(contained, CONTAINMENT))
+
+    def distances(self, instances: Rows | None = None, *, pairs: npt.ArrayLike | None = None, reach: float | None = None, absolute_tolerance: float = 0.0,
+                  relative_tolerance: float = 0.0, filter: Filter | None = None, former: Rows | None = None, threads: int | None = None,
+                  asset: npt.ArrayLike | None = None, rotation: npt.ArrayLike | None = None, translation: npt.ArrayLike | None = None,
+                  transform: npt.ArrayLike | None = None) -> Distances:
+        """Finds how near the surfaces are: `lower` <= distance <= `upper`, both 0 exactly where triangles meet.
+
+        Args:
+            pairs: where not given, those whose world boxes are within reach.
+            reach: pairs that are surely farther apart have NO_INDEX for triangles; None: all are looked at.
+            absolute_tolerance, relative_tolerance: upper - lower <= max(absolute, relative * upper); relative 0: 1e-6.
+            former: array of FORMER by ascending a, then b: where to begin to look.
+        """
+        found, distances = self._core.distances(
+            instances_of(instances, asset, rotation, translation, transform), pairs_of(pairs), reach, absolute_tolerance, relative_tolerance,
+            None if filter is None else filter._core, None if former is None else rows(former, "former", FORMER), self._number_of_threads(threads))
+        return Distances(_frombuffer(found, PAIR), _frombuffer(distances, DISTANCE))
+
+    def impacts(self, instances: Rows | None, motion: Rows, duration: float, *, pairs: npt.ArrayLike | None = None, tolerance: float = 0.0,
+                filter: Filter | None = None, threads: int | None = None, asset: npt.ArrayLike | None = None, rotation: npt.ArrayLike | None = None,
+                translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None) -> Impacts:
+        """Finds until when moving bodies surely do not meet, in a step of `duration` seconds.
+
+        Args:
+            instances: at the start, or None where asset, rotation, ... are given.
+            motion: array of MOTION, one for each instance: m/s of the centre, rad/s about it.
+            tolerance: how near triangles come before they stop a pair, as a part of the diagonal of the smaller body's bounds; 0: 1e-6.
+        """
+        posed = instances_of(instances, asset, rotation, translation, transform)
+        motions = rows(motion, "motion", MOTION)
+        if motions.shape != posed.shape:
+            raise ValueError(f"motion has shape {motions.shape} where {posed.shape} is wanted")
+        found, impacts = self._core.impacts(posed, motions, duration, pairs_of(pairs), tolerance, None if filter is None else filter._core,
+                                            self._number_of_threads(threads))
+        return Impacts(_frombuffer(found, PAIR), _frombuffer(impacts, IMPACT))
+
+    def verdicts(self, instances: Rows | None = None, *, tolerance: float, pairs: npt.ArrayLike | None = None, filter: Filter | None = None,
+                 threads: int | None = None, asset: npt.ArrayLike | None = None, rotation: npt.ArrayLike | None = None,
+                 translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None) -> Verdicts:
+        """Tells of pairs whether they surely do not meet (APART), surely meet (TOUCH), or are within a tolerance (WITHIN_TOLERANCE), each body at the coarsest of
+        its levels that can tell.
+
+        Args:
+            tolerance: what need not be told apart from touching; 0: all is decided.
+
+        Raises:
+            Error: an asset does not show its file's level 0; `where` is the asset.
+        """
+        found, verdicts = self._core.verdicts(instances_of(instances, asset, rotation, translation, transform), tolerance, pairs_of(pairs),
+                                              None if filter is None else filter._core, self._number_of_threads(threads))
+        return Verdicts(_frombuffer(found, PAIR), _frombuffer(verdicts, VERDICT))

@@ -365,6 +365,27 @@ TEST(SolidOnSolid, TheAreaVectorIsThatOfTheSurfaceInside) {
   EXPECT_GE(exact, seen - seen / 500 - 1);
 }
 
+// The vertex of one link that lies furthest along the normal may be on the far side of the other link's hole:
+// what is between belongs to neither.
+TEST(LinksOfAChain, OverlapByNoMoreThanTheyWerePulled) {
+  RandomPoses random(7);
+  constexpr double kRadius = 0.1, kTube = 0.02;
+  ManifoldScene scene;
+  const std::uint32_t link = scene.add_shape(ring(24, kRadius, 8, kTube));
+  const Pose upright = turn(0, 90 * kDegree), across = after(turn(2, 90 * kDegree), upright);
+  scene.add_body(link, upright);
+  scene.add_body(link, across);
+  for (int trial = 0; trial < trials(200, 5); ++trial) {
+    const Pose lean = after(turn(0, random.symmetric(0.01)), turn(1, random.symmetric(0.01)));
+    Pose lower = after(lean, across);
+    lower.translation[2] = -2 * (kRadius - kTube) - 0.001;
+    scene.bodies[1].pose = lower;
+    scene.find(any_motion(random, 3));
+    ASSERT_FALSE(scene.manifolds().empty());
+    for (const Manifold& m : scene.manifolds()) EXPECT_LT(m.depth, 0.003) << trial;
+  }
+}
+
 class PipeOnPlane : public testing::TestWithParam<NamedMesh> {};
 
 TEST_P(PipeOnPlane, IsOneManifoldOfTheAreaOfTheRing) {

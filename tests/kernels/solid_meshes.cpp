@@ -137,6 +137,21 @@ Mesh pipe(int corners, double inner_radius, double outer_radius, float height) {
   return mesh;
 }
 
+Mesh ring(int corners, double radius, int tube_corners, double tube_radius) {
+  const auto section = regular_polygon(tube_corners, tube_radius);
+  const auto place = [&](int i, int j) -> std::array<float, 3> {
+    const auto& p = section[static_cast<std::size_t>(j % tube_corners)];
+    const double angle = 2 * 3.14159265358979323846 * (i % corners) / corners, out = radius + p[0];
+    return {static_cast<float>(out * std::cos(angle)), static_cast<float>(out * std::sin(angle)), p[1]};
+  };
+  Mesh mesh;
+  for (int i = 0; i < corners; ++i) {
+    for (int j = 0; j < tube_corners; ++j)
+      add_square(mesh, place(i, j), place(i + 1, j), place(i + 1, j + 1), place(i, j + 1));
+  }
+  return mesh;
+}
+
 Mesh joined(const Mesh& a, const Mesh& b) {
   Mesh mesh = a;
   const auto base = static_cast<std::uint32_t>(a.points.size());

@@ -31,6 +31,9 @@ Mesh tetrahedron();
 /// A pipe about the z axis, of regular polygons.
 Mesh pipe(int corners, double inner_radius, double outer_radius, float height);
 
+/// A ring about the z axis: a tube of regular polygons around a regular polygon of this radius.
+Mesh ring(int corners, double radius, int tube_corners, double tube_radius);
+
 /// Both meshes in one.
 Mesh joined(const Mesh& a, const Mesh& b);
 Mesh moved(Mesh mesh, float x, float y, float z);

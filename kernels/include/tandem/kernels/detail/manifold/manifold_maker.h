@@ -311,8 +311,9 @@ TANDEM_HD void ManifoldMaker<Team>::sound_deepest(bool few, DepthMemory& shared)
 
 /// Looks whether lines that seem to overlap run within both bodies: where there are several curves, one may
 /// bound a hole, or one body may go through the other; and where the overlap is large beside the rim, the
-/// surfaces that the line found may not belong to the patch. A vertex is part of its own body: the line may
-/// touch that no further.
+/// surfaces that the line found may not belong to the patch. A vertex is part of its own body, which the line
+/// may touch there alone: that counts only where the vertex is not within the other body, and so its own may
+/// end before the other begins, as where links of a chain hang in each other.
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::look_behind(DepthMemory& shared) {
   const bool several = summary_.curves > 1;
@@ -325,7 +326,7 @@ TANDEM_HD void ManifoldMaker<Team>::look_behind(DepthMemory& shared) {
     const bool wanted = s.overlap() > (several ? 0 : state_.extent / 2);
     if (wanted && side == 0) s.looked_behind = true;
     shared.line[i].side = -1;
-    if (!wanted || side == s.vertex_of) continue;
+    if (!wanted) continue;
     questions.ask(i, side, side == 0 ? -1 : 1, s.line, s.surface[side].height, s.surface[1].height,
                   s.surface[0].height, INFINITY);
     any = true;
@@ -333,7 +334,11 @@ TANDEM_HD void ManifoldMaker<Team>::look_behind(DepthMemory& shared) {
   if (!team_.any(any)) return;
   walk_lines(questions, count, shared);
   for (std::uint32_t i = team_.rank(); i < count; i += team_.size()) {
-    if (shared.line[i].side >= 0) state_.sounding[i / 2].behind[i % 2] = shared.line[i].best;
+    if (shared.line[i].side < 0) continue;
+    Sounding& s = state_.sounding[i / 2];
+    const std::uint32_t of_other = i ^ 1u;
+    const bool own_vertex = static_cast<int>(i % 2) == s.vertex_of;
+    if (!own_vertex || shared.line[of_other].best.found()) s.behind[i % 2] = shared.line[i].best;
   }
   team_.sync();
 }

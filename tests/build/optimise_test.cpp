@@ -1,7 +1,6 @@
 #include "bvhbuild/tree/optimise.h"
 
 #include <gtest/gtest.h>
-#include <oneapi/tbb/global_control.h>
 
 #include <cmath>
 #include <cstring>
@@ -12,6 +11,7 @@
 #include "bvhbuild/tree/minimal_tree.h"
 #include "bvhbuild/tree/normalize.h"
 #include "bvhbuild/tree/region.h"
+#include "parallel/parallel.h"
 #include "sample_asset.h"
 #include "statistics/statistics.h"
 
@@ -142,8 +142,8 @@ TEST(Optimise, NeverDeepensATreeBeyondWhatAFileMayHold) {
 TEST(Optimise, BytesAreTheSameForOneThreadAndForMany) {
   const Mesh mesh = test::random_mesh(20'000, 3);  // several regions
   std::vector<Image> files;
-  for (const std::size_t threads : {1, 2, 8}) {
-    const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism, threads);
+  for (const unsigned threads : {1, 2, 8}) {
+    const parallel::ThreadLimit limit(threads);
     files.push_back(test::make_file(mesh, Imaginary::minimal, Effort::standard));
   }
   for (const Image& file : files) {

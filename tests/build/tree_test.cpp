@@ -1,12 +1,12 @@
 #include "bvhbuild/tree/tree.h"
 
 #include <gtest/gtest.h>
-#include <oneapi/tbb/global_control.h>
 
 #include <cmath>
 
 #include "bvhbuild/tree/legal_splits.h"
 #include "bvhbuild/tree/splitter.h"
+#include "parallel/parallel.h"
 #include "sample_asset.h"
 #include "statistics/statistics.h"
 
@@ -151,8 +151,8 @@ TEST(Tree, BytesAreTheSameForOneThreadAndForMany) {
   const Mesh mesh = test::random_mesh(50 * kSweepSize, 3);  // binned and swept
   for (const Imaginary imaginary : {Imaginary::minimal, Imaginary::free}) {
     std::vector<Image> files;
-    for (const std::size_t threads : {1, 2, 8}) {
-      const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism, threads);
+    for (const unsigned threads : {1, 2, 8}) {
+      const parallel::ThreadLimit limit(threads);
       files.push_back(test::make_file(mesh, imaginary));
     }
     for (const Image& file : files) {

@@ -2,13 +2,13 @@
 #include "levels/hausdorff.h"
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <cmath>
 #include <random>
 
 #include "kernels/solid_meshes.h"
 #include "levels/stored_level.h"
+#include "parallel/parallel.h"
 
 namespace tandem {
 namespace {
@@ -203,7 +203,7 @@ TEST(Hausdorff, DoesNotDependOnThreads) {
   const StoredLevel a(joined(test::sphere(1, 5), test::sphere(0.97, 4))), b(test::sphere(1, 3));
   HausdorffBound found[2];
   for (const int i : {0, 1}) {
-    const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, i == 0 ? 1 : 4);
+    const parallel::ThreadLimit threads(i == 0 ? 1 : 4);
     found[i] = hausdorff_bound(a.view(), b.view());
   }
   EXPECT_EQ(found[0].upper, found[1].upper);

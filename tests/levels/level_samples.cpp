@@ -1,8 +1,6 @@
 // level_samples SAMPLES FILE.bvh...: attacks the error bounds of levels by samples. Of each level as many
 // points as said, spread evenly over its area, and as many of level 0, each as far from the other surface as
 // the nearest triangle that a search finds: none may be farther than the error bound. Exit code 1: one is.
-#include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -11,6 +9,7 @@
 #include <vector>
 
 #include "levels/nearest_triangle.h"
+#include "parallel/parallel.h"
 #include "tandem/runtime/map.h"
 
 namespace {
@@ -47,7 +46,7 @@ std::vector<double> cumulative_areas(const LevelView& level) {
 
 Farthest attack(const LevelView& from, const LevelView& to, std::uint64_t samples, double error_bound) {
   const std::vector<double> areas = cumulative_areas(from);
-  tbb::enumerable_thread_specific<Farthest> of_threads;
+  Farthest all;
   const auto look = [&](const Point& p, std::uint32_t& hint, Farthest& farthest, bool is_corner) {
     const levels::NearestTriangle nearest = levels::nearest_triangle(to, p, hint);
     hint = nearest.triangle;
@@ -56,13 +55,11 @@ Farthest attack(const LevelView& from, const LevelView& to, std::uint64_t sample
     most = std::max(most, distance);
     farthest.violations += distance > error_bound;
   };
-  tbb::parallel_for(std::size_t{0}, samples / kSamplesAtOnce + 1, [&](std::size_t part) {
-    Farthest& farthest = of_threads.local();
-    std::mt19937_64 random(part);
+  const auto sample = [&](Farthest& farthest, std::uint64_t begin, std::uint64_t end) {
+    std::mt19937_64 random(begin);
     const auto uniform = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
     std::uint32_t hint = 0;
-    const std::uint64_t end = std::min<std::uint64_t>(samples, (part + 1) * kSamplesAtOnce);
-    for (std::uint64_t i = part * kSamplesAtOnce; i < end; ++i) {
+    for (std::uint64_t i = begin; i < end; ++i) {
       const double place = (static_cast<double>(i) + uniform()) / static_cast<double>(samples) * areas.back();
       const auto found = std::lower_bound(areas.begin(), areas.end() - 1, place);
       const Triangle& triangle = from.triangles[found - areas.begin()];
@@ -75,12 +72,13 @@ Farthest attack(const LevelView& from, const LevelView& to, std::uint64_t sample
                   v = levels::minus(levels::corner_of(triangle, 2), a);
       look(levels::plus(a, levels::plus(levels::scaled(x, u), levels::scaled(y, v))), hint, farthest, false);
     }
-  });
-  Farthest all;
+  };
+  parallel::for_parts(
+      samples, kSamplesAtOnce, [] { return Farthest(); }, sample,
+      [&](const Farthest& farthest) { all.add(farthest); });
   std::uint32_t hint = 0;
   for (std::uint32_t t = 0; t < from.triangle_count; ++t)
     for (int k = 0; k < 3; ++k) look(levels::corner_of(from.triangles[t], k), hint, all, true);
-  for (const Farthest& farthest : of_threads) all.add(farthest);
   return all;
 }
 

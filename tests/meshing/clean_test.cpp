@@ -1,13 +1,14 @@
 #include "bvhbuild/meshing/clean.h"
 
 #include <gtest/gtest.h>
-#include <oneapi/tbb/global_control.h>
 
 #include <bit>
 #include <cmath>
 #include <map>
 #include <random>
 #include <set>
+
+#include "parallel/parallel.h"
 
 namespace tandem::build {
 namespace {
@@ -148,10 +149,10 @@ TEST(Clean, DoesNotDependOnTheNumberOfThreads) {
   TriangleMesh one = random_soup(99, 50000);
   TriangleMesh many = one;
   {
-    const tbb::global_control single(tbb::global_control::max_allowed_parallelism, 1);
+    const parallel::ThreadLimit single(1);
     cleaned(one);
   }
-  const tbb::global_control several(tbb::global_control::max_allowed_parallelism, 8);
+  const parallel::ThreadLimit several(8);
   cleaned(many);
   EXPECT_EQ(one.points, many.points);
   EXPECT_EQ(one.triangles, many.triangles);

@@ -1,7 +1,6 @@
 #include "statistics/near_contact.h"
 
 #include <gtest/gtest.h>
-#include <oneapi/tbb/global_control.h>
 
 #include <cmath>
 #include <cstring>
@@ -9,6 +8,7 @@
 
 #include "build/sample_asset.h"
 #include "bvhbench/pose_work.h"
+#include "parallel/parallel.h"
 #include "statistics/statistics.h"
 
 namespace tandem::bench {
@@ -191,7 +191,7 @@ TEST(PoseWork, DoesNotDependOnThreads) {
   for (const auto& pose : make_poses(body.asset, body.asset, 100, 1, PoseSet::training))
     poses.push_back(pose.b);
   const PoseWork all = measure_poses(body.asset, body.asset, poses);
-  const oneapi::tbb::global_control alone(oneapi::tbb::global_control::max_allowed_parallelism, 1);
+  const parallel::ThreadLimit alone(1);
   const auto again = make_poses(body.asset, body.asset, 100, 1, PoseSet::training);
   for (std::size_t i = 0; i < poses.size(); ++i) EXPECT_TRUE(same(poses[i], again[i].b)) << i;
   EXPECT_EQ(measure_poses(body.asset, body.asset, poses), all);

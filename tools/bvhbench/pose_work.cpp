@@ -1,8 +1,5 @@
 #include "pose_work.h"
 
-#include <oneapi/tbb/enumerable_thread_specific.h>
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -10,6 +7,7 @@
 #include <limits>
 #include <new>
 
+#include "parallel/parallel.h"
 #include "statistics/oriented_work.h"
 #include "tandem/formats/hash.h"
 
@@ -46,8 +44,8 @@ class PairQuery {
 // Calls work(query, i) for each i below count, on all threads.
 template <typename Work>
 void for_each_pose(const NamedAsset& a, const NamedAsset& b, std::size_t count, const Work& work) {
-  oneapi::tbb::enumerable_thread_specific<PairQuery> queries([&] { return PairQuery(a, b); });
-  oneapi::tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) { work(queries.local(), i); });
+  parallel::for_each(
+      count, [&] { return PairQuery(a, b); }, work);
 }
 
 std::uint32_t narrowed(std::uint64_t counter) {

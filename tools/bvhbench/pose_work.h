@@ -32,7 +32,8 @@ std::vector<NearContactPose> make_poses(const NamedAsset& a, const NamedAsset& b
                                         std::uint64_t seed, PoseSet set);
 
 /// Makes one exact query of a at the identity and b for each pose, and counts what a GPU would walk. Throws
-/// FileError. Both use the threads that oneTBB gives; what they find does not depend on them.
+/// FileError. Both use the threads that the caller may (parallel::ThreadLimit); what they find does not
+/// depend on them.
 PoseWork measure_poses(const NamedAsset& a, const NamedAsset& b, std::span<const Pose> poses);
 
 /// XXH64 of level 0's triangles, corner by corner, and the origin, whatever the order of the triangles: equal

@@ -1,7 +1,5 @@
 #include "poses_command.h"
 
-#include <oneapi/tbb/global_control.h>
-
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -10,6 +8,7 @@
 
 #include "common/json.h"
 #include "common/number_words.h"
+#include "parallel/parallel.h"
 #include "pose_work.h"
 #include "scenes/hdf5_file.h"
 
@@ -233,8 +232,7 @@ ExitCode run(const PosesArguments& arguments) {
   for (const std::string& path : arguments.trees) bodies.trees.push_back(bodies.open(path));
   if (!with.empty()) bodies.with = bodies.open(with);
 
-  using oneapi::tbb::global_control;
-  const global_control limit(global_control::max_allowed_parallelism, arguments.threads);
+  const parallel::ThreadLimit limit(arguments.threads);
   const Poses poses = arguments.poses.empty() ? make(arguments, bodies) : take(std::move(stored));
   const std::string from = arguments.poses.empty() ? bodies.trees[0].path : arguments.poses;
   for (const NamedAsset& tree : bodies.trees) check_geometry(tree, poses.notes.geometry[0], from);

@@ -1,9 +1,6 @@
 #include "pipeline.h"
 
-#include <oneapi/tbb/global_control.h>
-
 #include <chrono>
-#include <thread>
 
 #include "bvhbuild/import/import.h"
 #include "bvhbuild/meshing/clean.h"
@@ -14,6 +11,7 @@
 #include "common/printable.h"
 #include "interrupt.h"
 #include "level_pipeline.h"
+#include "parallel/parallel.h"
 #include "progress.h"
 #include "provenance.h"
 
@@ -156,10 +154,7 @@ Outcome run_pipeline(const Options& options) {
   outcome.parts = polygons.parts.size();
 
   // Threads begin here: import may fork, and must be alone.
-  using oneapi::tbb::global_control;
-  const auto threads =
-      static_cast<std::size_t>(options.threads > 0 ? options.threads : std::thread::hardware_concurrency());
-  const global_control limit(global_control::max_allowed_parallelism, std::max<std::size_t>(threads, 1));
+  const parallel::ThreadLimit limit(static_cast<unsigned>(options.threads));
 
   progress.step("clean");
   const StoredMesh mesh = prepare(polygons, outcome);

@@ -1,7 +1,5 @@
 #include "levels/hausdorff.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <span>
@@ -9,6 +7,7 @@
 
 #include "levels/nearest_triangle.h"
 #include "levels/piece.h"
+#include "parallel/parallel.h"
 
 namespace tandem {
 namespace {
@@ -79,8 +78,8 @@ NearestTriangle nearest_of(const LevelView& level, const Point& p, std::span<con
 /// Works on parts of [0, count) that depend on nothing else: work(part, begin, end).
 template <class Work>
 void for_parts(std::size_t count, std::size_t size, const Work& work) {
-  tbb::parallel_for(std::size_t{0}, (count + size - 1) / size,
-                    [&](std::size_t part) { work(part, part * size, std::min(count, (part + 1) * size)); });
+  parallel::for_parts(count, size,
+                      [&](std::size_t begin, std::size_t end) { work(begin / size, begin, end); });
 }
 
 /// Looks for the distance of two surfaces. Side 0 are the points of a and the triangles of b.

@@ -2,9 +2,9 @@
 #include <new>
 #include <vector>
 
-#include "bvhbuild/meshing/parallel.h"
 #include "bvhbuild/tree/build_asset.h"
 #include "handles.h"
+#include "parallel/parallel.h"
 
 using namespace tandem;
 using namespace tandem::c;
@@ -83,14 +83,9 @@ build::BuiltAsset build_with(const Source& source, const build::BuildOptions& op
   build::OptimisationWatch watch;
   if (read.progress != nullptr)
     watch.progress = [&](double share) { watch.stop = watch.stop || read.progress(read.user, share) != 0; };
-  const Allocator allocator = current_allocator();
-  build::BuiltAsset built;
-  build::run_with_threads(read.threads, [&] {
-    const AllocatorScope scope(allocator);
-    built = build::build_asset(source.triangles, options, read.provenance != nullptr ? read.provenance : "",
-                               watch);
-  });
-  return built;
+  const parallel::ThreadLimit limit(read.threads);
+  return build::build_asset(source.triangles, options, read.provenance != nullptr ? read.provenance : "",
+                            watch);
 }
 
 tandem_status take(build::BuiltAsset built, tandem_asset& made) {

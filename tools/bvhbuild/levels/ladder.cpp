@@ -1,7 +1,5 @@
 #include "ladder.h"
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -12,6 +10,7 @@
 #include "levels/hausdorff.h"
 #include "levels/nearest_triangle.h"
 #include "opened_mesh.h"
+#include "parallel/parallel.h"
 
 namespace tandem::build {
 namespace {
@@ -63,19 +62,23 @@ class Search {
   // The triangles of the finest level, in leaf order, that are nearest to the middles of a mesh's.
   std::vector<std::uint32_t> nearest(const LevelMesh& mesh) const {
     std::vector<std::uint32_t> nearest(mesh.triangles.size());
-    tbb::parallel_for(std::size_t{0}, nearest.size(), [&](std::size_t t) {
-      levels::Point sum = {};
-      for (const std::uint32_t corner : mesh.triangles[t]) {
-        const auto& point = mesh.points[corner];
-        sum = levels::plus(sum, levels::Point{{point[0], point[1], point[2]}});
-      }
-      const levels::Point middle = levels::scaled(1.0 / 3, sum);
-      nearest[t] = levels::nearest_triangle(finest_.view(), middle, mesh.was[t]).triangle;
+    parallel::for_parts(nearest.size(), 64, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t t = begin; t != end; ++t) nearest[t] = nearest_to(mesh, t);
     });
     return nearest;
   }
 
  private:
+  std::uint32_t nearest_to(const LevelMesh& mesh, std::size_t triangle) const {
+    levels::Point sum = {};
+    for (const std::uint32_t corner : mesh.triangles[triangle]) {
+      const auto& point = mesh.points[corner];
+      sum = levels::plus(sum, levels::Point{{point[0], point[1], point[2]}});
+    }
+    const levels::Point middle = levels::scaled(1.0 / 3, sum);
+    return levels::nearest_triangle(finest_.view(), middle, mesh.was[triangle]).triangle;
+  }
+
   // The mesh after as many of the collapses as leave it near enough, or nearly as many.
   Candidate longest_near(const std::vector<Collapse>& collapses, double wanted) const {
     const auto triangles = [&](std::size_t count) {

@@ -1,12 +1,10 @@
 #include "self_contacts.h"
 
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 
+#include "parallel/parallel.h"
 #include "tandem/formats/box.h"
 #include "tandem/kernels/detail/triangle_test.h"
 
@@ -73,9 +71,9 @@ std::uint64_t count_later(const LevelView& level, std::uint32_t triangle, std::u
 
 std::optional<std::uint64_t> count_self_contacts(const LevelView& level, std::uint64_t most) {
   std::atomic<std::uint64_t> count = 0;
-  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, level.triangle_count, 64), [&](const auto& part) {
-    for (std::uint32_t triangle = part.begin(); triangle < part.end() && count <= most; ++triangle)
-      count += count_later(level, triangle, most);
+  parallel::for_parts(level.triangle_count, 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t triangle = begin; triangle < end && count <= most; ++triangle)
+      count += count_later(level, static_cast<std::uint32_t>(triangle), most);
   });
   if (count > most) return std::nullopt;
   return count;

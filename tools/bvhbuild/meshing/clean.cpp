@@ -5,10 +5,12 @@
 
 #include "exact_predicates.h"
 #include "index_table.h"
-#include "parallel.h"
+#include "parallel/parallel.h"
 
 namespace tandem::build {
 namespace {
+
+constexpr std::size_t kTrianglesAtOnce = 1 << 14;
 
 /// Calls visit(i, hash(i)) in order for all i below `count`, with the table's slots on their way from memory:
 /// welding is bound by cache misses, and a batch waits for them together.
@@ -74,9 +76,8 @@ bool degenerate(const TriangleMesh& mesh, const TriangleIndices& t) {
 }
 
 void drop_degenerate(TriangleMesh& mesh, CleanReport& report) {
-  const blocked_range<std::size_t> all(0, mesh.triangles.size(), 4096);
-  parallel_for(all, [&](const blocked_range<std::size_t>& range) {
-    for (std::size_t i = range.begin(); i < range.end(); ++i)
+  parallel::for_parts(mesh.triangles.size(), kTrianglesAtOnce, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
       if (degenerate(mesh, mesh.triangles[i])) mesh.triangles[i][0] = kNoVertex;
   });
   std::size_t kept = 0;

@@ -2,14 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 
 #include "exact_predicates.h"
-#include "parallel.h"
+#include "parallel/parallel.h"
 
 namespace tandem::build {
 namespace {
+
+constexpr std::size_t kTrianglesAtOnce = 1 << 14;
 
 bool all_single(const TriangleMesh& mesh) {
   return std::all_of(mesh.points.begin(), mesh.points.end(), [](const Point& p) {
@@ -101,15 +102,14 @@ Point widened(const std::array<float, 3>& p) {
 }
 
 std::uint64_t count_flat(const StoredMesh& mesh) {
-  using Range = blocked_range<std::size_t>;
-  const auto count = [&](const Range& range, std::uint64_t flat) {
-    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+  const auto count = [&](std::uint64_t& flat, std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
       const TriangleIndices& t = mesh.triangles[i];
       flat += collinear(widened(mesh.points[t[0]]), widened(mesh.points[t[1]]), widened(mesh.points[t[2]]));
     }
-    return flat;
   };
-  return parallel_reduce(Range(0, mesh.triangles.size(), 4096), std::uint64_t{0}, count, std::plus<>());
+  const auto add = [](std::uint64_t& sum, std::uint64_t other) { sum += other; };
+  return parallel::reduce(mesh.triangles.size(), kTrianglesAtOnce, std::uint64_t{0}, count, add);
 }
 
 }  // namespace

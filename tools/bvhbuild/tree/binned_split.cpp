@@ -1,9 +1,8 @@
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "bvhbuild/meshing/parallel.h"
+#include "parallel/parallel.h"
 #include "splitter.h"
 
 namespace tandem::build {
@@ -86,44 +85,35 @@ Split best_of(int axis, const std::array<Bin, kBins>& bins, std::uint32_t n,
 // Unions and sums in any order give the same bits, so threads may share the work without changing the result.
 Split TriangleSplitter::best_binned_split(Range range, const IsLegal& is_legal) const {
   const auto triangles = order(range);
-  const blocked_range<std::size_t> all(0, triangles.size(), kGrain);
-  const Bounds centers = parallel_reduce(
-      all, Bounds(),
-      [&](const auto& part, Bounds bounds) {
-        for (std::size_t i = part.begin(); i != part.end(); ++i) {
+  const Bounds centers = parallel::reduce(
+      triangles.size(), kGrain, Bounds(),
+      [&](Bounds& bounds, std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i != end; ++i) {
           for (int k = 0; k < 3; ++k) {
             const float c = center(triangles[i], k);
             bounds.lo[k] = std::min(bounds.lo[k], c);
             bounds.hi[k] = std::max(bounds.hi[k], c);
           }
         }
-        return bounds;
       },
-      [](Bounds a, const Bounds& b) {
-        a.grow(b);
-        return a;
-      });
+      [](Bounds& sum, const Bounds& other) { sum.grow(other); });
   Binning binning[3];
   for (int k = 0; k < 3; ++k) {
     const float length = centers.hi[k] - centers.lo[k];
     binning[k] = {centers.lo[k], length > 0 ? static_cast<float>(kBins) / length : 0};
   }
-  const Bins bins = parallel_reduce(
-      all, Bins(),
-      [&](const auto& part, Bins partial) {
-        for (std::size_t i = part.begin(); i != part.end(); ++i) {
+  const Bins bins = parallel::reduce(
+      triangles.size(), kGrain, Bins(),
+      [&](Bins& partial, std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i != end; ++i) {
           for (int k = 0; k < 3; ++k) {
             Bin& bin = partial[k][binning[k].bin(center(triangles[i], k))];
             bin.bounds.grow(bounds_[triangles[i]]);
             ++bin.count;
           }
         }
-        return partial;
       },
-      [](Bins a, const Bins& b) {
-        merge(a, b);
-        return a;
-      });
+      merge);
   Split best;
   for (int axis = 0; axis < 3; ++axis) {
     const Split split = best_of(axis, bins[axis], range.size(), is_legal);

@@ -30,10 +30,10 @@ struct BuiltAsset {
 /// interrupted: the watch ended the optimisation.
 std::string usual_provenance(const BuildOptions& options, const CleanReport& report, bool interrupted);
 
-/// Cleans, builds, assembles and checks, on the threads that oneTBB gives where it is called. The same
-/// source, options and provenance give the same bytes whatever their number, and those that bvhbuild writes
-/// for a file of these triangles. provenance: JSON; empty: usual_provenance(). The image's memory is that of
-/// the allocator in force. Throws std::bad_alloc, and std::logic_error on a defect of the program.
+/// Cleans, builds, assembles and checks, on the threads that the caller may use (parallel::ThreadLimit). The
+/// same source, options and provenance give the same bytes whatever their number, and those that bvhbuild
+/// writes for a file of these triangles. provenance: JSON; empty: usual_provenance(). The image's memory is
+/// that of the allocator in force. Throws std::bad_alloc, and std::logic_error on a defect of the program.
 /// Conditions: fewer than 2^32 - 1 triangles; those of TriangleSource.
 BuiltAsset build_asset(const TriangleSource& source, const BuildOptions& options, std::string provenance,
                        OptimisationWatch& watch);

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 
-#include "bvhbuild/meshing/parallel.h"
+#include "parallel/parallel.h"
 #include "tandem/formats/box.h"
 
 namespace tandem::build {
 namespace {
+
+constexpr std::size_t kBlocksAtOnce = 1 << 12;
 
 // Where a block of the topology comes to lie, and its children.
 struct Place {
@@ -78,8 +80,8 @@ Tree emit(const Geometry& geometry, const Topology& topology) {
   tree.depth = numbering.depth();
   tree.blocks.resize(places.size());
   tree.order.resize(geometry.triangles.size());
-  parallel_for(blocked_range<std::size_t>(0, places.size()), [&](const auto& part) {
-    for (std::size_t b = part.begin(); b != part.end(); ++b) {
+  parallel::for_parts(places.size(), kBlocksAtOnce, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t b = begin; b != end; ++b) {
       const TopologyBlock& from = topology[places[b].block];
       for (int i = from.count; i < kNodesPerBlock; ++i) set_imaginary(tree.blocks[b], i);
       if (from.is_leaf_block) emit_leaf_block(geometry, from, places[b], tree, tree.blocks[b]);

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "bvhbuild/meshing/parallel.h"
 #include "depth.h"
+#include "parallel/parallel.h"
 #include "splitter.h"
 
 namespace tandem::build {
@@ -53,7 +53,7 @@ class BinaryTree {
     const auto build_left = [&] { bounds = build(left(node), {range.begin, middle}, depth + 1); };
     const auto build_right = [&] { other = build(right(node), {middle, range.end}, depth + 1); };
     if (range.size() > kSerialSize) {
-      parallel_invoke(build_left, build_right);
+      parallel::invoke(build_left, build_right);
     } else {
       build_left();
       build_right();

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "bvhbuild/meshing/parallel.h"
 #include "depth.h"
 #include "legal_splits.h"
+#include "parallel/parallel.h"
 #include "splitter.h"
 
 namespace tandem::build {
@@ -23,7 +23,7 @@ struct Groups {
 template <typename Left, typename Right>
 void maybe_parallel(bool parallel, const Left& left, const Right& right) {
   if (parallel) {
-    parallel_invoke(left, right);
+    parallel::invoke(left, right);
   } else {
     left();
     right();

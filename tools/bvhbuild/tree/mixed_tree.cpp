@@ -4,9 +4,9 @@
 #include <cstdlib>
 #include <optional>
 
-#include "bvhbuild/meshing/parallel.h"
 #include "free_tree.h"
 #include "minimal_tree.h"
+#include "parallel/parallel.h"
 #include "region.h"
 #include "working_tree.h"
 
@@ -131,8 +131,8 @@ void add_replacements(const WorkingTree& tree, std::span<const Bounds> bounds, s
   const std::size_t count = regions.size() - (regions.size() > 1);  // without the blocks above them
   const std::size_t first = all.size();
   all.resize(first + count);
-  parallel_for(std::size_t{0}, count,
-               [&](std::size_t i) { all[first + i] = replacement_of(tree, regions[i], bounds, build); });
+  parallel::for_each(
+      count, [&](std::size_t i) { all[first + i] = replacement_of(tree, regions[i], bounds, build); });
 }
 
 // Those that fit, the most worth first.

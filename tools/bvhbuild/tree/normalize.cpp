@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "bvhbuild/meshing/parallel.h"
+#include "parallel/parallel.h"
 
 namespace tandem::build {
 namespace {
+
+constexpr std::size_t kTrianglesAtOnce = 1 << 14;
 
 class Normalization {
  public:
@@ -45,12 +47,11 @@ class Normalization {
 }  // namespace
 
 std::vector<Bounds> normalized_bounds(const Geometry& geometry) {
-  const auto n = static_cast<std::uint32_t>(geometry.triangles.size());
-  std::vector<Bounds> bounds(n);
+  std::vector<Bounds> bounds(geometry.triangles.size());
   const Normalization normalization(geometry);
-  parallel_for(blocked_range<std::uint32_t>(0, n), [&](const auto& part) {
-    for (std::uint32_t t = part.begin(); t != part.end(); ++t)
-      bounds[t] = normalization.bounds_of(geometry, t);
+  parallel::for_parts(bounds.size(), kTrianglesAtOnce, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t != end; ++t)
+      bounds[t] = normalization.bounds_of(geometry, static_cast<std::uint32_t>(t));
   });
   return bounds;
 }

@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "anneal.h"
-#include "bvhbuild/meshing/parallel.h"
 #include "exchange_search.h"
+#include "parallel/parallel.h"
 #include "region.h"
 
 namespace tandem::build {
@@ -24,13 +24,13 @@ constexpr int kMostPasses = 8;
 class Optimiser {
  public:
   Optimiser(const Topology& topology, std::span<const Bounds> bounds, OptimisationWatch& watch)
-      : tree_(topology, bounds), searches_([this] { return ExchangeSearch(tree_); }), watch_(watch) {}
+      : tree_(topology, bounds), search_(tree_), watch_(watch) {}
 
   // One pass over each region, then over the blocks above them.
   void exchange_in_regions() {
     const std::vector<Region> regions = cut_into_regions(tree_, kRegionTriangles);
-    for_each_below(regions, [&](const Region& region) { searches_.local().pass(region); });
-    if (has_top(regions)) searches_.local().pass(regions.back());
+    for_each_below(regions, [](ExchangeSearch& search, const Region& region) { search.pass(region); });
+    if (has_top(regions)) search_.pass(regions.back());
   }
 
   void anneal_regions() {
@@ -40,8 +40,8 @@ class Optimiser {
     const std::uint64_t trials =
         std::min(kTrialsPerChild, kMostTrials / std::max<std::uint64_t>(children, 1));
     watch_.expect(trials * children);
-    for_each_below(regions, [&](const Region& region) {
-      anneal(tree_, searches_.local(), region, static_cast<std::uint32_t>(trials), watch_);
+    for_each_below(regions, [&](ExchangeSearch& search, const Region& region) {
+      anneal(tree_, search, region, static_cast<std::uint32_t>(trials), watch_);
     });
   }
 
@@ -49,7 +49,7 @@ class Optimiser {
   void exchange_everywhere() {
     const Region whole = cut_into_regions(tree_, ~0u).front();
     for (int pass = 0; pass < kMostPasses && !watch_.stop; ++pass) {
-      if (searches_.local().pass(whole) == 0) break;
+      if (search_.pass(whole) == 0) break;
     }
   }
 
@@ -61,12 +61,14 @@ class Optimiser {
   template <typename Body>
   void for_each_below(const std::vector<Region>& regions, const Body& body) {
     const std::size_t count = regions.size() - has_top(regions);
-    parallel_for(std::size_t{0}, count, [&](std::size_t i) { body(regions[i]); });
+    parallel::for_each(
+        count, [&] { return ExchangeSearch(tree_); },
+        [&](ExchangeSearch& search, std::size_t i) { body(search, regions[i]); });
     for (std::size_t i = 0; i < count; ++i) tree_.refresh_heights(regions[i].root);
   }
 
   WorkingTree tree_;
-  PerThread<ExchangeSearch> searches_;
+  ExchangeSearch search_;
   OptimisationWatch& watch_;
 };
 

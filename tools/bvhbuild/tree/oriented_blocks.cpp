@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "bvhbuild/meshing/parallel.h"
+#include "parallel/parallel.h"
 #include "tandem/formats/box.h"
 
 namespace tandem::build {
@@ -14,6 +14,8 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 // Below a block with a frame of its own. Above, none is worth it (docs/decisions/0039), and the checker would
 // have to look at all triangles once more for each level.
 constexpr std::uint32_t kMostTriangles = 4096;
+
+constexpr std::size_t kBlocksAtOnce = 64;
 
 // Corners of a node that frames are judged by.
 constexpr std::uint32_t kMostPoints = 128;
@@ -368,9 +370,9 @@ std::vector<OrientedBlock> orient_blocks(const Geometry& geometry, const Tree& t
   for (const double reach : extent_of(tree.blocks[0]).reach) squared += reach * reach;
   const double farthest = std::sqrt(squared);
   const Ranges ranges(tree);
-  parallel_for(blocked_range<std::size_t>(0, tree.blocks.size(), 64), [&](const auto& part) {
+  parallel::for_parts(tree.blocks.size(), kBlocksAtOnce, [&](std::size_t begin, std::size_t end) {
     Fit fit(geometry, tree, ranges, farthest, effort);
-    for (std::size_t b = part.begin(); b != part.end(); ++b) {
+    for (std::size_t b = begin; b != end; ++b) {
       OrientedBlock& block = out[number[b]];
       block = fit.make(static_cast<std::uint32_t>(b));
       block.first_below = first_below[b];

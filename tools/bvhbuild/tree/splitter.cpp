@@ -6,7 +6,7 @@
 #include <numeric>
 #include <utility>
 
-#include "bvhbuild/meshing/parallel.h"
+#include "parallel/parallel.h"
 
 namespace tandem::build {
 namespace {
@@ -17,7 +17,7 @@ void for_each_axis(Range range, const Body& body) {
   if (range.size() < kSerialSize) {
     for (int axis = 0; axis < 3; ++axis) body(axis);
   } else {
-    parallel_for(0, 3, body);
+    parallel::for_each(3, [&](std::size_t axis) { body(static_cast<int>(axis)); });
   }
 }
 

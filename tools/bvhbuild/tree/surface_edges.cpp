@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "bvhbuild/meshing/parallel.h"
+#include "parallel/parallel.h"
 
 namespace tandem::build {
 namespace {
@@ -26,7 +26,7 @@ SurfaceEdges::SurfaceEdges(std::span<const TriangleTopology> triangles) : edge_(
     const std::uint32_t u = vertex[side % 3], v = vertex[(side + 1) % 3];
     if (u != v) sides.push_back({std::min(u, v), std::max(u, v), side});
   }
-  parallel_sort(sides.begin(), sides.end());
+  parallel::sort(sides.begin(), sides.end(), 1 << 15);
   sides_.reserve(sides.size());
   for (std::size_t i = 0; i < sides.size(); ++i) {
     if (i == 0 || sides[i].lower != sides[i - 1].lower || sides[i].upper != sides[i - 1].upper)

@@ -39,8 +39,8 @@ struct Geometry {
 };
 
 /// Builds the pure 4-ary tree of all triangles, blocks in depth-first order, and optimises it.
-/// The result depends on the triangles, `imaginary` and `effort` alone, not on the number of threads, of
-/// which oneTBB gives what it may (and on watch.stop, if somebody sets it). Condition: at least one and fewer
+/// The result depends on the triangles, `imaginary` and `effort` alone, not on the number of threads
+/// (and on watch.stop, if somebody sets it). Condition: at least one and fewer
 /// than 2^32 - 1 triangles; indices in range; coordinates at most kMaxCoordinate in magnitude.
 Tree build_tree(const Geometry& geometry, Imaginary imaginary = Imaginary::minimal,
                 Effort effort = Effort::standard);

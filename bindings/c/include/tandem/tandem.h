@@ -189,8 +189,7 @@ typedef struct tandem_build_options {
   uint32_t effort;         ///< TANDEM_EFFORT_DEFAULT, ...; the best takes minutes for 100,000 triangles
   uint32_t no_gpu_blocks;  ///< 1: without the blocks that exact queries on a GPU walk
   uint32_t no_topology;    ///< 1: without what manifolds and contained bodies need
-  uint32_t threads;  ///< at most; 0: as many as the machine has. The bytes do not depend on it. A library
-                     ///< that was made without oneTBB has one
+  uint32_t threads;        ///< at most; 0: as many as the machine has. The bytes do not depend on it
   uint32_t reserved;
   double imaginary_share;  ///< padding nodes: 0: the proven fewest; to 1: as many as a free tree has
   const char* provenance;  ///< JSON that the file says of its making, or null: options and findings

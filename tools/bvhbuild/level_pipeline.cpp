@@ -78,6 +78,22 @@ void add_levels(const Options& options, const StoredMesh& mesh, OptimisationWatc
   outcome.seconds.levels = stopwatch.lap();
 }
 
+CheckedImage build_file(const Options& options, const StoredMesh& mesh, AssetSource source,
+                        const std::function<std::string()>& provenance, OptimisationWatch& watch,
+                        Outcome& outcome) {
+  std::vector<BuiltLevel> levels;
+  levels.push_back(build_level({mesh.points, mesh.triangles}, options, watch));
+  levels[0].face = mesh.face;
+  if (!options.levels.empty()) add_levels(options, mesh, watch, levels, outcome);
+  outcome.interrupted = watch.stop;
+  source.origin = mesh.origin;
+  source.rounding_error = mesh.largest_rounding_error;
+  source.provenance = provenance();
+  std::vector<AssetLevel> rows;
+  for (const BuiltLevel& level : levels) rows.push_back(level.row(options));
+  return assemble_checked(source, rows);
+}
+
 void describe_levels(const AssetView& asset, Outcome& outcome) {
   const FileHeader& header = *asset.header;
   const double whole = diagonal(header.lower, header.upper);

@@ -1,9 +1,11 @@
 #pragma once
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "bvhbuild/levels/level_mesh.h"
 #include "bvhbuild/meshing/stored_mesh.h"
+#include "bvhbuild/tree/assemble.h"
 #include "bvhbuild/tree/level_parts.h"
 #include "pipeline.h"
 
@@ -30,6 +32,13 @@ std::string level_errors_defect(const Options& options, const StoredMesh& mesh);
 /// Adds the levels that were asked for to the finest one, and says in `outcome` which there are not.
 void add_levels(const Options& options, const StoredMesh& mesh, OptimisationWatch& watch,
                 std::vector<BuiltLevel>& levels, Outcome& outcome);
+
+/// Builds all levels of a mesh and the file's bytes, and has the checker prove both: what is written, every
+/// program can load. source: parts and number of faces; provenance(): what the file says of its making, asked
+/// once `outcome` tells of the levels.
+CheckedImage build_file(const Options& options, const StoredMesh& mesh, AssetSource source,
+                        const std::function<std::string()>& provenance, OptimisationWatch& watch,
+                        Outcome& outcome);
 
 /// Says what the levels of the file are like.
 void describe_levels(const AssetView& asset, Outcome& outcome);

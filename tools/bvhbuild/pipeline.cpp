@@ -96,29 +96,17 @@ StoredMesh prepare(PolygonMesh& polygons, Outcome& outcome) {
   return mesh;
 }
 
-// Builds the levels and the file's bytes, and has the checker prove both: what this program writes, every
-// other one can load.
 Image build_image(const Options& options, const PolygonMesh& polygons, const StoredMesh& mesh,
                   Progress& progress, Outcome& outcome) {
   const Stopwatch stopwatch(outcome.seconds.build);
   OptimisationWatch watch;
   watch.progress = [&](double share) { progress.share(share); };
   const StopOnInterrupt interrupt(options.effort == Effort::best ? &watch.stop : nullptr);
-  std::vector<BuiltLevel> levels;
-  levels.push_back(build_level({mesh.points, mesh.triangles}, options, watch));
-  levels[0].face = mesh.face;
-  if (!options.levels.empty()) add_levels(options, mesh, watch, levels, outcome);
-  outcome.interrupted = watch.stop;
-
   AssetSource source;
-  source.origin = mesh.origin;
-  source.rounding_error = mesh.largest_rounding_error;
   source.source_faces = outcome.clean.faces;
   source.parts = polygons.parts;
-  source.provenance = provenance_json(options, outcome);
-  std::vector<AssetLevel> rows;
-  for (const BuiltLevel& level : levels) rows.push_back(level.row(options));
-  auto [image, asset] = assemble_checked(source, rows);
+  const auto provenance = [&] { return provenance_json(options, outcome); };
+  auto [image, asset] = build_file(options, mesh, source, provenance, watch, outcome);
   const FileHeader& header = *asset.header;
   outcome.tree = measure_tree(asset.level(), header.lower, header.upper);
   outcome.gpu_blocks = asset.level().oriented_blocks != nullptr;

@@ -2,60 +2,22 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
-#include <atomic>
-#include <condition_variable>
 #include <memory>
-#include <mutex>
 #include <string>
-#include <thread>
 #include <tuple>
 
 #include "core.h"
+#include "patience.h"
 
 namespace tandem::python {
 namespace {
 
 using Part = std::tuple<std::string, std::string, std::uint64_t>;
 
-// What the builder's threads and the caller's tell each other.
-struct Watch {
-  std::mutex mutex;
-  std::condition_variable changed;
-  bool done = false;
-  std::atomic<double> share = 0;
-  std::atomic<bool> stop = false;
-};
-
 std::uint32_t note(void* user, double share) {
   auto& watch = *static_cast<Watch*>(user);
   watch.share = share;
   return watch.stop ? 1 : 0;
-}
-
-// Looks for signals (Ctrl-C) and calls progress(share) in the caller's thread until the builder is done.
-// After an exception of either, stops the builder and waits for it.
-void wait(Watch& watch, std::thread& builder, nb::handle progress) {
-  const auto done_within = [&](std::chrono::milliseconds time) {
-    const nb::gil_scoped_release release;
-    std::unique_lock lock(watch.mutex);
-    return watch.changed.wait_for(lock, time, [&] { return watch.done; });
-  };
-  const auto join = [&] {
-    const nb::gil_scoped_release release;
-    builder.join();
-  };
-  try {
-    double told = 0;
-    while (!done_within(std::chrono::milliseconds(50))) {
-      if (PyErr_CheckSignals() != 0) throw nb::python_error();
-      if (const double share = watch.share; !progress.is_none() && share != told) progress(told = share);
-    }
-  } catch (...) {
-    watch.stop = true;
-    join();
-    throw;
-  }
-  join();
 }
 
 nb::dict to_dict(const tandem_build_report& of) {
@@ -109,15 +71,11 @@ nb::tuple build(nb::handle positions, nb::handle triangles, nb::handle faces, co
   tandem_build_report report = {};
   report.struct_size = sizeof report;
   tandem_status status = TANDEM_OK;
-  std::thread builder([&] {
+  run_with_patience(watch, progress, [&] {
     tandem_asset* made = nullptr;
     status = tandem_asset_build(&mesh, &options, nullptr, &made, &report);
     asset.reset(made);
-    const std::lock_guard lock(watch.mutex);
-    watch.done = true;
-    watch.changed.notify_one();
   });
-  wait(watch, builder, progress);
   check(status);
   return nb::make_tuple(nb::cast(Asset(asset.release())), to_dict(report));
 }

@@ -3,6 +3,11 @@
 NB_MODULE(_tandem, module) {
   module.doc() = "The C interface for the package's Python files, which check what the caller gives.";
   module.attr("version") = tandem_version();
+  module.attr("NO_TRIANGLE") = tandem_status{TANDEM_NO_TRIANGLE};
+  module.def("status_words", [](std::uint32_t status) {
+    return nanobind::make_tuple(tandem_status_name(status), tandem_status_explain(status),
+                                tandem_status_subject(status));
+  });
   tandem::python::add_assets(module);
   tandem::python::add_builder(module);
   tandem::python::add_filters(module);

@@ -10,7 +10,7 @@ True
 from . import _tandem
 from ._arrays import instances
 from ._asset import Asset, Level, Part
-from ._build import BuildReport, build
+from ._build import BuildReport, Mesh, build, read_mesh
 from ._errors import Error, FileError
 from ._query import Contacts, Contained, Counters, Distances, Filter, Impacts, Manifolds, Query, Verdicts
 from ._rows import CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, INSTANCE, MANIFOLD, MOTION, NO_INDEX, PAIR, POINT, VERDICT
@@ -31,6 +31,6 @@ __version__ = f"{_tandem.version // 10000}.{_tandem.version // 100 % 100}.{_tand
 __all__ = [
     "APART", "CONTACT", "CONTAINMENT", "DISTANCE", "FIXED", "FORMER", "GOES_THROUGH", "IMPACT", "IMPACT_AT_START", "IMPACT_IN_STEP", "INSIDE", "INSTANCE",
     "KINEMATIC", "MANIFOLD", "MOTION", "MOVING", "NO_IMPACT", "NO_INDEX", "OPEN_CURVE", "OUTER_OPEN", "PAIR", "POINT", "SLEEPING", "TOUCH", "TOUCHING", "VERDICT",
-    "WITHIN_TOLERANCE", "Asset", "BuildReport", "Contacts", "Contained", "Counters", "Distances", "Error", "FileError", "Filter", "Impacts", "Level", "Manifolds",
-    "Part", "Query", "Verdicts", "build", "instances",
+    "WITHIN_TOLERANCE", "Asset", "BuildReport", "Contacts", "Contained", "Counters", "Distances", "Error", "FileError", "Filter", "Impacts", "Level", "Manifolds", "Mesh",
+    "Part", "Query", "Verdicts", "build", "instances", "read_mesh",
 ]

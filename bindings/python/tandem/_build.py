@@ -1,16 +1,23 @@
-"""The builder, in memory."""
+"""The builder, in memory, and the readers of mesh files."""
 from __future__ import annotations
 
+import marshal
+import os
+import subprocess
+import sys
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, NamedTuple
+from types import ModuleType
+from typing import Any, Literal, NamedTuple, overload
 
+import numpy as np
 import numpy.typing as npt
 
 from . import _tandem
 from ._arrays import floats, whole_numbers
-from ._asset import Asset, _choice
+from ._asset import Asset, Part, _choice
+from ._errors import Error, FileError
 
-__all__ = ["BuildReport", "build"]
+__all__ = ["BuildReport", "Mesh", "build", "read_mesh"]
 
 
 class BuildReport(NamedTuple):
@@ -20,7 +27,7 @@ class BuildReport(NamedTuple):
     index_out_of_range: int
     not_finite: int
     too_large: int
-    #: The corners lie on one line.
+    #: Left out: the corners lie on one line.
     degenerate: int
     #: Kept: the three places of an earlier one.
     duplicate: int
@@ -34,51 +41,158 @@ class BuildReport(NamedTuple):
     vertices_welded: int
 
 
-def build(vertices: npt.ArrayLike, faces: npt.ArrayLike, *, effort: Literal["default", "fast", "best"] = "default", threads: int = 0,
-          gpu_blocks: bool = True, topology: bool = True, imaginary_share: float = 0.0, face_ids: npt.ArrayLike | None = None,
-          parts: Sequence[tuple[str, str, int]] | None = None, provenance: str | None = None, progress: Callable[[float], object] | None = None,
-          return_report: bool = False) -> Any:
-    """Builds an asset of triangles: the bytes that bvhbuild writes for them.
+class Mesh(NamedTuple):
+    """What a mesh file holds: `tandem.build(mesh.vertices, mesh.triangles, face_ids=mesh.face_ids, parts=mesh.parts)` is what bvhbuild makes of it."""
+
+    #: (n, 3), as the file has them.
+    vertices: npt.NDArray[np.float64]
+    #: (m, 3): the file's faces, split into triangles.
+    triangles: npt.NDArray[np.uint32]
+    #: (m,): the face of the file that each triangle is a piece of.
+    face_ids: npt.NDArray[np.uint32]
+    #: Objects, groups or scene nodes.
+    parts: list[Part]
+    #: Oddities, for people.
+    remarks: list[str]
+
+
+Effort = Literal["default", "fast", "best"]
+Levels = Literal["auto"] | Sequence[float | str]
+#: Name, path and, last, number of faces of each.
+Parts = Sequence[Part] | Sequence[tuple[str, str, int]]
+Progress = Callable[[float], object]
+
+
+@overload
+def build(vertices: npt.ArrayLike, faces: npt.ArrayLike | Sequence[Sequence[int]], *, effort: Effort = ..., levels: Levels | None = ..., threads: int = ...,
+          gpu_blocks: bool = ..., topology: bool = ..., imaginary_share: float = ..., face_ids: npt.ArrayLike | None = ..., parts: Parts | None = ...,
+          provenance: str | None = ..., progress: Progress | None = ..., return_report: Literal[False] = ...) -> Asset: ...
+
+
+@overload
+def build(vertices: npt.ArrayLike, faces: npt.ArrayLike | Sequence[Sequence[int]], *, effort: Effort = ..., levels: Levels | None = ..., threads: int = ...,
+          gpu_blocks: bool = ..., topology: bool = ..., imaginary_share: float = ..., face_ids: npt.ArrayLike | None = ..., parts: Parts | None = ...,
+          provenance: str | None = ..., progress: Progress | None = ..., return_report: Literal[True]) -> tuple[Asset, BuildReport]: ...
+
+
+def build(vertices: npt.ArrayLike, faces: npt.ArrayLike | Sequence[Sequence[int]], *, effort: Effort = "default", levels: Levels | None = None, threads: int = 0,
+          gpu_blocks: bool = True, topology: bool = True, imaginary_share: float = 0.0, face_ids: npt.ArrayLike | None = None, parts: Parts | None = None,
+          provenance: str | None = None, progress: Progress | None = None, return_report: bool = False) -> Asset | tuple[Asset, BuildReport]:
+    """Builds an asset: the bytes that bvhbuild writes for these faces, but for what they say of their making.
 
     Args:
         vertices: (n, 3), float64.
-        faces: (m, 3), three vertices for each triangle.
+        faces: (m, 3), the vertices of each triangle; or polygons, (m, k) or a list of lists, which need the mesh tools.
         effort: "fast", "default", or "best", which takes minutes for 100,000 triangles.
+        levels: coarser levels of the mesh, each proved to be at most so far from the finest: lengths, or shares of the diagonal such as "1%", ascending; "auto"
+            is 0.1 %, 0.3 %, 1 % and 3 %. Needs the mesh tools.
         threads: at most; 0: as many as the machine has. The bytes do not depend on it.
         gpu_blocks: with the blocks that exact queries on a GPU walk.
         topology: with what manifolds and contained bodies need.
         imaginary_share: padding nodes: 0, the proven fewest, to 1, as many as a free tree has.
-        face_ids: (m,), the face that each triangle is a piece of; its own number where not given.
-        parts: name, path and number of faces of each run of faces with a name.
+        face_ids: (m,), the face of the caller's mesh that each one is a piece of; its own number where not given.
+        parts: of each run of faces with a name: name, path and number of faces, or what `read_mesh` says.
         provenance: JSON that the file says of its making.
-        progress: called now and then with the share of the optimisation that is done. What it raises ends the build, as Ctrl-C does, and is raised here.
+        progress: called now and then, in this thread, with the share of the optimisation that is done. What it raises ends the build, as Ctrl-C does.
         return_report: return (asset, BuildReport) instead of the asset.
 
     Raises:
-        Error: no triangle can be used; a face is in no part.
-        ValueError, TypeError: which name the argument.
+        Error: no triangle can be used; faces are in no part.
+        ValueError, TypeError: which name the argument and the row.
+        ImportError: the mesh tools are needed and not installed.
+
+    >>> tetrahedron = tandem.build([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    >>> tetrahedron.levels[0].triangle_count, tetrahedron.levels[0].closed
+    (4, True)
     """
     points = floats(vertices, "vertices", 3)
     if points.ndim != 2:
         raise ValueError(f"vertices has shape {points.shape} where (n, 3) is wanted")
-    corners = _triangles(faces)
-    ids = None
-    if face_ids is not None:
-        ids = whole_numbers(face_ids, "face_ids")
-        if ids.shape != (len(corners),):
-            raise ValueError(f"face_ids has shape {ids.shape} where ({len(corners)},) is wanted")
+    corners, face_begin = _polygons(faces)
+    count = len(corners) // 3 if face_begin is None else len(face_begin) - 1
+    ids = None if face_ids is None else whole_numbers(face_ids, "face_ids", 0xFFFFFFFE)
+    if ids is not None and ids.shape != (count,):
+        raise ValueError(f"face_ids has shape {ids.shape} where ({count},) is wanted")
     if not 0 <= imaginary_share <= 1:
         raise ValueError(f"imaginary_share is {imaginary_share} where 0 to 1 is wanted")
-    core, report = _tandem.build(points, corners, ids, [tuple(part) for part in parts or ()], _choice("effort", effort, ("default", "fast", "best")), gpu_blocks,
-                                 topology, threads, imaginary_share, provenance, progress)
-    asset = Asset._of(core)
+    if not 0 <= threads <= 4096:
+        raise ValueError(f"threads is {threads} where 0 to 4096 is wanted")
+    named = [(part[0], part[1], part[-1]) for part in parts or ()]
+    strength = _choice("effort", effort, ("default", "fast", "best"))
+    if levels is None and face_begin is None:
+        core, report = _tandem.build(points, corners, ids, named, strength, gpu_blocks, topology, threads, imaginary_share, provenance, progress)
+        asset = Asset._of(core)
+    else:
+        if face_begin is None:
+            face_begin = np.arange(0, 3 * count + 1, 3, dtype=np.uint32)
+        words = "" if levels is None else levels if isinstance(levels, str) else ",".join(level if isinstance(level, str) else repr(float(level)) for level in levels)
+        data, report = _mesh_tools().build(points, corners, face_begin, ids, named, strength, gpu_blocks, topology, threads, imaginary_share, words, provenance,
+                                           progress)
+        if data is None:
+            raise _no_triangle()
+        asset = Asset.from_bytes(data)
     return (asset, BuildReport(**report)) if return_report else asset
 
 
-def _triangles(faces: npt.ArrayLike) -> npt.NDArray[Any]:
+def read_mesh(path: str | os.PathLike[str]) -> Mesh:
+    """Reads a mesh file as bvhbuild does: OBJ, PLY, STL, OFF, glTF and GLB by its own readers, whatever else assimp reads in a child process.
+
+    Raises:
+        FileError: it cannot be read; the text says why, with the line where there is one.
+        ImportError: the mesh tools are not installed.
+    """
+    tools = _mesh_tools()
+    name = os.fsencode(path)
+    if b"\0" in name:
+        raise ValueError("path has a zero byte")
+    read = tools.read(name, True)
+    if read[0] is None:
+        # assimp is run by a fork, which a process with threads must not do: a fresh interpreter can.
+        script = ("import importlib.util, marshal, sys; spec = importlib.util.spec_from_file_location('_bvhbuild', sys.argv[1]); "
+                  "tools = importlib.util.module_from_spec(spec); spec.loader.exec_module(tools); "
+                  "marshal.dump(tools.read(sys.argv[2].encode('utf-8', 'surrogateescape'), False), sys.stdout.buffer)")
+        done = subprocess.run([sys.executable, "-I", "-S", "-X", "utf8", "-c", script, str(tools.__file__), name], capture_output=True)
+        if done.returncode != 0:
+            raise FileError(f"{os.fsdecode(path)}: the reader's process failed: {done.stderr.decode(errors='replace')}")
+        read = marshal.loads(done.stdout)
+    if read[0] is None:
+        raise FileError(f"{os.fsdecode(path)}: {read[1].decode(errors='replace')}")
+    points, triangles, faces, parts, remarks = read
+    return Mesh(np.frombuffer(bytearray(points), np.float64).reshape(-1, 3), np.frombuffer(bytearray(triangles), np.uint32).reshape(-1, 3),
+                np.frombuffer(bytearray(faces), np.uint32), [Part(name.decode(errors="replace"), path.decode(errors="replace"), first, count)
+                                                             for name, path, first, count in parts],
+                [remark.decode(errors="replace") for remark in remarks])
+
+
+def _polygons(faces: Any) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint32] | None]:
+    """Vertices of all faces, one after the other, and where each begins; None for triangles."""
+    if not isinstance(faces, np.ndarray) and hasattr(faces, "__len__"):
+        lengths = {len(face) for face in faces if hasattr(face, "__len__")}
+        if len(lengths) > 1:
+            rows = [whole_numbers(face, f"faces: row {row}") for row, face in enumerate(faces)]
+            begin = np.concatenate([[0], np.cumsum([len(row) for row in rows])])
+            return np.concatenate(rows), begin.astype(np.uint32)
     corners = whole_numbers(faces, "faces")
     if corners.size == 0:
-        return corners.reshape(0, 3)
-    if corners.ndim != 2 or corners.shape[1] != 3:
+        return corners.reshape(-1), None
+    if corners.ndim != 2:
         raise ValueError(f"faces has shape {corners.shape} where (m, 3) is wanted")
-    return corners
+    if corners.shape[1] == 3:
+        return corners.reshape(-1), None
+    return corners.reshape(-1), np.arange(0, corners.size + 1, corners.shape[1], dtype=np.uint32)
+
+
+def _mesh_tools() -> ModuleType:
+    try:
+        from . import _bvhbuild
+    except ImportError as error:
+        raise ImportError("this tandem was built without its mesh tools (readers, polygons, levels of detail), which need CGAL and assimp: docs/python.md") from error
+    return _bvhbuild
+
+
+def _no_triangle() -> Error:
+    from ._errors import from_status
+    status = _tandem.NO_TRIANGLE
+    error = from_status(status, *_tandem.status_words(status), 0)
+    assert isinstance(error, Error)
+    return error

@@ -1,5 +1,6 @@
 """Assets: made, kept, shown, and refused."""
 import copy
+import json
 import os
 import pickle
 import subprocess
@@ -128,3 +129,12 @@ def test_shows_levels_from_one_on(tmp_path):
         with pytest.raises(tandem.Error) as caught:
             call()
         assert caught.value.name == "UnknownLevel"
+
+
+@pytest.mark.parametrize("name, words", [("cow_1500", ["--levels", "1%", "--effort", "fast"]), ("box_12", []), ("ground", ["--no-topology", "--no-gpu-blocks"])])
+def test_statistics_are_those_of_bvhinfo(tmp_path, name, words):
+    path = tmp_path / "a.bvh"
+    subprocess.run([os.environ["TANDEM_BVHBUILD"], ASSETS / f"{name}.obj", "-o", path, "--quiet", *words], check=True)
+    told = json.loads(subprocess.run([os.environ["TANDEM_BVHINFO"], path, "--json"], check=True, capture_output=True).stdout)
+    del told["file"]
+    assert tandem.Asset.load(path).statistics() == told

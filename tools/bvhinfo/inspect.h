@@ -6,17 +6,10 @@
 
 #include "level_check.h"
 #include "statistics/statistics_json.h"
+#include "statistics/surface_counts.h"
 #include "tandem/runtime/map.h"
 
 namespace tandem {
-
-/// What the topology of a level says.
-struct SurfaceCounts {
-  std::uint64_t vertices = 0, components = 0, closed_components = 0;
-  std::uint64_t turned_triangles = 0;
-  std::uint64_t boundary_edges = 0;
-  std::uint64_t sides_at_edges_of_many = 0;  ///< sides of triangles at edges of more than two
-};
 
 /// One file and everything that bvhinfo knows of it.
 struct Inspection {

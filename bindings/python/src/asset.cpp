@@ -159,7 +159,8 @@ void add_assets(nb::module_& module) {
       .def("triangles", triangles)
       .def("words", words)
       .def("part", part)
-      .def("provenance", provenance);
+      .def("provenance", provenance)
+      .def("statistics", statistics);
   module.def("open", open, nb::rv_policy::take_ownership);
   module.def("from_bytes", from_bytes, nb::rv_policy::take_ownership);
 }

@@ -85,6 +85,9 @@ class Filter {
   tandem_pair_filter filter_ = {};
 };
 
+/// What bvhinfo tells of a file, but for its name, its hash, its parts and its making.
+nb::dict statistics(const Asset& asset);
+
 void add_assets(nb::module_& module);
 void add_builder(nb::module_& module);
 void add_filters(nb::module_& module);

@@ -189,9 +189,18 @@ class Asset:
         return [Part(name.decode(errors="replace"), path.decode(errors="replace"), first, count) for name, path, first, count in found]
 
     @property
-    def provenance(self) -> dict[str, Any]:
-        """How the file was made."""
-        return json.loads(self._core.provenance() or b"{}")
+    def provenance(self) -> Any:
+        """How the file was made: what its JSON says, None where it is no JSON."""
+        try:
+            return json.loads(self._core.provenance())
+        except (ValueError, RecursionError):
+            return None
+
+    def statistics(self) -> dict[str, Any]:
+        """What `bvhinfo --json` tells, under its keys (docs/json.md), but for "file": figures of the trees, and the work that queries are expected to do, which
+        is sampled and takes a while."""
+        parts = [part._asdict() for part in self.parts]
+        return {**self._core.statistics(), "hash": self.hash, "parts": parts, "source": self.provenance}
 
 
 def _restore(data: bytes, first_level: int, level_count: int) -> Asset:

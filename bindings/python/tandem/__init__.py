@@ -1,5 +1,7 @@
 """Exact collision detection of posed triangle meshes: contacts, manifolds, distances, times of impact.
 
+In the examples of the docstrings, `box` is a cube of unit length with a corner at 0, `query` is tandem.Query([box]), and `np` is NumPy.
+
 >>> import tandem
 >>> box = tandem.build([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 >>> query = tandem.Query([box])

@@ -65,17 +65,17 @@ def _name_of(dtype: np.dtype[Any]) -> str:
     return next(name for name in _rows.__all__ if getattr(_rows, name) is dtype)
 
 
-def pairs_of(value: npt.ArrayLike | Rows | None) -> Rows | None:
+def pairs_of(value: npt.ArrayLike | Rows | None, name: str = "pairs") -> Rows | None:
     """Object pairs: None, an array of PAIR, or whole numbers of shape (m, 2)."""
     if value is None:
         return None
     if isinstance(value, np.ndarray) and value.dtype == PAIR:
-        return rows(value, "pairs", PAIR)
-    array = whole_numbers(value, "pairs")
+        return rows(value, name, PAIR)
+    array = whole_numbers(value, name)
     if array.size == 0:
         return np.empty(0, PAIR)
     if array.ndim != 2 or array.shape[1] != 2:
-        raise ValueError(f"pairs has shape {array.shape} where (m, 2) is wanted")
+        raise ValueError(f"{name} has shape {array.shape} where (m, 2) is wanted")
     return array.view(PAIR).reshape(-1)
 
 

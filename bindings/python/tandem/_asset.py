@@ -114,7 +114,7 @@ class Asset:
     @property
     def data(self) -> memoryview:
         """The bytes of the file, without a copy; they live as long as the view."""
-        return memoryview(self._core)  # type: ignore[arg-type]
+        return memoryview(self._core)
 
     def __bytes__(self) -> bytes:
         return bytes(self.data)
@@ -133,6 +133,10 @@ class Asset:
 
         Raises:
             Error: there is no level `first`.
+
+        >>> box.levels_from(1)
+        Traceback (most recent call last):
+        tandem._errors.Error: the asset has no such level or part
         """
         return Asset._of(self._core.levels_from(first, count))
 
@@ -150,7 +154,11 @@ class Asset:
         return np.frombuffer(self._core.triangles(level), np.float64).reshape(-1, 3, 3)
 
     def faces(self, level: int = 0) -> npt.NDArray[np.uint32]:
-        """Of each triangle of a level, the face of the mesh file that it comes from, (n,)."""
+        """Of each triangle of a level, the face of the mesh file that it comes from, (n,).
+
+        >>> box.triangles().shape, sorted(box.faces().tolist()) == list(range(12))
+        ((12, 3, 3), True)
+        """
         return np.frombuffer(self._core.words(level, 0), np.uint32)
 
     @property
@@ -166,7 +174,7 @@ class Asset:
     @property
     def rounding_error(self) -> float:
         """How far a stored coordinate is from that of the mesh file, at most."""
-        return self._info["rounding_error"]
+        return float(self._info["rounding_error"])
 
     @property
     def hash(self) -> str:
@@ -175,12 +183,13 @@ class Asset:
 
     @property
     def file_bytes(self) -> int:
-        return self._info["file_bytes"]
+        """Of the file, with all levels."""
+        return int(self._info["file_bytes"])
 
     @property
     def source_faces(self) -> int:
         """Faces of the mesh file."""
-        return self._info["source_faces"]
+        return int(self._info["source_faces"])
 
     @property
     def parts(self) -> list[Part]:

@@ -82,22 +82,24 @@ class Filter:
         group: (n,), the groups that an instance is in, a bit each; all where not given.
         mask: (n,), the groups that it meets; all where not given. Two are looked at where each is in a group of the other's mask.
         excluded: (m, 2) or array of PAIR: pairs that are not looked at, in any order.
+
+    >>> fixed = tandem.Filter(motion=[tandem.FIXED, tandem.FIXED, tandem.MOVING])
+    >>> query.pairs(translation=np.zeros((3, 3)), filter=fixed).tolist()
+    [(0, 2), (1, 2)]
     """
 
     __slots__ = ("_core",)
 
     def __init__(self, motion: npt.ArrayLike | None = None, group: npt.ArrayLike | None = None, mask: npt.ArrayLike | None = None,
                  excluded: npt.ArrayLike | None = None):
-        given = {"motion": None if motion is None else whole_numbers(motion, "motion", 255, np.uint8),
-                 "group": None if group is None else whole_numbers(group, "group"), "mask": None if mask is None else whole_numbers(mask, "mask")}
-        shapes = {name: array.shape for name, array in given.items() if array is not None}
+        motions = None if motion is None else whole_numbers(motion, "motion", 255, np.uint8)
+        groups = None if group is None else whole_numbers(group, "group")
+        masks = None if mask is None else whole_numbers(mask, "mask")
+        shapes = {name: array.shape for name, array in (("motion", motions), ("group", groups), ("mask", masks)) if array is not None}
         for name, shape in shapes.items():
             if len(shape) != 1 or shape != next(iter(shapes.values())):
                 raise ValueError(f"{name} has shape {shape} where (n,) is wanted, the same as of the others")
-        try:
-            self._core = _tandem.Filter(*given.values(), pairs_of(excluded))
-        except ValueError as error:
-            raise ValueError(str(error).replace("pairs", "excluded", 1)) from None
+        self._core = _tandem.Filter(motions, groups, masks, pairs_of(excluded, "excluded"))
 
 
 class Query:
@@ -151,6 +153,13 @@ class Query:
             within: clearance: triangles at most so far apart count, decided exactly.
             add_error_bounds: a pair without a contact is surely apart at the finest levels too.
             filter: where the query finds the pairs.
+
+        >>> pairs, contacts, counters = query.contacts(translation=[[0, 0, 0], [0.5, 0.5, 0.5]])
+        >>> pairs.tolist(), len(contacts), counters.contacts
+        ([(0, 1)], 18, 18)
+        >>> query.contacts(rotation=np.ones((3, 3)))
+        Traceback (most recent call last):
+        tandem._errors.Error: instance 0: a pose is not a rotation and a translation
         """
         found = self._core.contacts(
             instances_of(instances, asset, rotation, translation, transform), None if pairs is None else pairs_of(pairs),
@@ -161,14 +170,22 @@ class Query:
     def pairs(self, instances: Rows | None = None, *, self_pairs: bool = False, within: float = 0.0, add_error_bounds: bool = False,
               filter: Filter | None = None, threads: int | None = None, asset: npt.ArrayLike | None = None, rotation: npt.ArrayLike | None = None,
               translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None) -> Rows:
-        """The object pairs whose world boxes meet, array of PAIR: a < b, sorted. Arguments: as of `contacts`."""
+        """The object pairs whose world boxes meet, array of PAIR: a < b, sorted. Arguments: as of `contacts`.
+
+        >>> query.pairs(translation=[[0, 0, 0], [0.5, 0, 0], [3, 0, 0]]).tolist()
+        [(0, 1)]
+        """
         found = self._core.pairs(instances_of(instances, asset, rotation, translation, transform), self_pairs, within, add_error_bounds,
                                  None if filter is None else filter._core, self._number_of_threads(threads))
         return _frombuffer(found, PAIR)
 
     def keep_fixed(self, instances: Rows, motion: npt.ArrayLike, *, threads: int | None = None) -> None:
         """Keeps the instances whose motion is FIXED as they stand: calls of `contacts` and `pairs` to come, which must be of as many instances, take the time of
-        the others. To be called again when one of them has moved or others are fixed. motion: (n,)."""
+        the others. To be called again when one of them has moved or others are fixed. motion: (n,).
+
+        >>> bodies = tandem.instances(translation=[[0, 0, 0], [0.5, 0, 0]])
+        >>> tandem.Query([box]).keep_fixed(bodies, [tandem.FIXED, tandem.MOVING])
+        """
         posed = instances_of(instances, None, None, None, None)
         motions = whole_numbers(motion, "motion", 255, np.uint8)
         if motions.shape != posed.shape:
@@ -184,6 +201,11 @@ class Query:
 
         Raises:
             Error: the last call did not find contacts; an asset has no topology.
+
+        >>> found = query.contacts(translation=[[0, 0, 0], [0.1, 0.2, 0.75]])
+        >>> _, manifolds, points = query.manifolds()
+        >>> manifolds["normal"].tolist(), manifolds["depth"].tolist(), len(points)
+        ([[0.0, 0.0, 1.0]], [0.25], 4)
         """
         if not 1 <= most_points <= 7:
             raise ValueError(f"most_points is {most_points} where 1 to 7 is wanted")
@@ -192,7 +214,13 @@ class Query:
 
     def contained(self, *, threads: int | None = None) -> Contained:
         """Finds bodies within others, which no contact tells, of the object pairs of the last `contacts`, which was in mode "exact", for all contacts and with
-        `within` 0; else Error."""
+        `within` 0; else Error.
+
+        >>> small = tandem.build(box.triangles().reshape(-1, 3) / 4 + 0.25, np.arange(36).reshape(12, 3))
+        >>> both = tandem.Query([box, small])
+        >>> len(both.contacts(asset=[0, 1]).contacts), both.contained().contained["inner"].tolist()
+        (0, [1])
+        """
         pairs, contained = self._core.contained(self._number_of_threads(threads))
         return Contained(_frombuffer(pairs, PAIR), _frombuffer(contained, CONTAINMENT))
 
@@ -207,6 +235,9 @@ class Query:
             reach: pairs that are surely farther apart have NO_INDEX for triangles; None: all are looked at.
             absolute_tolerance, relative_tolerance: upper - lower <= max(absolute, relative * upper); relative 0: 1e-6.
             former: array of FORMER by ascending a, then b: where to begin to look.
+
+        >>> query.distances(translation=[[0, 0, 0], [1.5, 0, 0]]).distances["upper"].round(9).tolist()
+        [0.5]
         """
         found, distances = self._core.distances(
             instances_of(instances, asset, rotation, translation, transform), pairs_of(pairs), reach, absolute_tolerance, relative_tolerance,
@@ -216,12 +247,17 @@ class Query:
     def impacts(self, instances: Rows | None, motion: Rows, duration: float, *, pairs: npt.ArrayLike | None = None, tolerance: float = 0.0,
                 filter: Filter | None = None, threads: int | None = None, asset: npt.ArrayLike | None = None, rotation: npt.ArrayLike | None = None,
                 translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None) -> Impacts:
-        """Finds until when moving bodies surely do not meet, in a step of `duration` seconds.
+        """Finds until when moving bodies surely do not meet, in a step of `duration` seconds, of the object pairs whose boxes meet when swept.
 
         Args:
             instances: at the start, or None where asset, rotation, ... are given.
             motion: array of MOTION, one for each instance: m/s of the centre, rad/s about it.
             tolerance: how near triangles come before they stop a pair, as a part of the diagonal of the smaller body's bounds; 0: 1e-6.
+
+        >>> motion = np.zeros(2, tandem.MOTION)
+        >>> motion["velocity"][1] = [-1, 0, 0]
+        >>> query.impacts(None, motion, 2.0, translation=[[0, 0, 0], [1.5, 0, 0]]).impacts["t_safe"].round(3).tolist()
+        [0.5]
         """
         posed = instances_of(instances, asset, rotation, translation, transform)
         motions = rows(motion, "motion", MOTION)
@@ -242,6 +278,9 @@ class Query:
 
         Raises:
             Error: an asset does not show its file's level 0; `where` is the asset.
+
+        >>> query.verdicts(translation=[[0, 0, 0], [0.5, 0, 0]], tolerance=0.1).verdicts["verdict"].tolist() == [tandem.TOUCH]
+        True
         """
         found, verdicts = self._core.verdicts(instances_of(instances, asset, rotation, translation, transform), tolerance, pairs_of(pairs),
                                               None if filter is None else filter._core, self._number_of_threads(threads))

@@ -121,7 +121,8 @@ nb::dict statistics(const Asset& asset) {
       work.push_back(sample_expected_work(view.levels_from(i, 1)));
   }
   nb::dict result;
-  result["version"] = (std::to_string(header.version_major) + "." + std::to_string(header.version_minor)).c_str();
+  result["version"] =
+      (std::to_string(header.version_major) + "." + std::to_string(header.version_minor)).c_str();
   result["bytes"] = header.file_bytes;
   add_tree(result, tree);
   add_work(result, work[0]);

@@ -160,6 +160,8 @@ const char* tandem_status_explain(tandem_status status) {
 }
 
 const char* tandem_status_subject(tandem_status status) {
+  // In this interface these two come with the asset that lacks something.
+  if (status == TANDEM_NO_TOPOLOGY || status == TANDEM_NO_FINEST_LEVEL) return "asset";
   if (Status known = Status::kOk; find(status, known)) return tandem::subject(known);
   const Entry* entry = entry_of(status);
   return entry != nullptr ? entry->subject : nullptr;

@@ -1,6 +1,7 @@
 """Arguments to arrays: each function names the argument, and the row, that is wrong."""
 from __future__ import annotations
 
+import operator
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,31 @@ Rows = npt.NDArray[np.void]
 
 _MOST = 0xFFFFFFFF
 _LAST_ROW = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+def number(value: Any, name: str) -> float:
+    """A float64."""
+    if type(value) is float:
+        return value
+    try:
+        if isinstance(value, (str, bytes)):
+            raise TypeError
+        return float(value)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} is {type(value).__name__} where a number is wanted") from None
+    except OverflowError:
+        raise ValueError(f"{name} is {value} where a float64 is wanted") from None
+
+
+def whole_number(value: Any, name: str, least: int, most: int) -> int:
+    """A whole number from `least` to `most`."""
+    try:
+        found = operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name} is {type(value).__name__} where a whole number is wanted") from None
+    if not least <= found <= most:
+        raise ValueError(f"{name} is {found} where {least} to {most} is wanted")
+    return found
 
 
 def floats(value: npt.ArrayLike, name: str, *tail: int) -> npt.NDArray[np.float64]:

@@ -11,9 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _tandem
+from ._arrays import number, whole_number
 from ._errors import Error
 
 __all__ = ["Asset", "Level", "Part"]
+
+_MOST = 0xFFFFFFFF
 
 
 class Level(NamedTuple):
@@ -138,11 +141,11 @@ class Asset:
         Traceback (most recent call last):
         tandem._errors.Error: the asset has no such level or part
         """
-        return Asset._of(self._core.levels_from(first, count))
+        return Asset._of(self._core.levels_from(whole_number(first, "first", 0, _MOST), whole_number(count, "count", 0, _MOST)))
 
     def coarsest_level(self, tolerance: float) -> int:
         """The coarsest level whose error_bound is at most `tolerance`, in the mesh's unit; 0 where none is."""
-        return self._core.coarsest_level(tolerance)
+        return self._core.coarsest_level(number(tolerance, "tolerance"))
 
     @property
     def levels(self) -> list[Level]:
@@ -151,7 +154,7 @@ class Asset:
 
     def triangles(self, level: int = 0) -> npt.NDArray[np.float64]:
         """Corners of a level's triangles, (n, 3, 3), in the mesh file's coordinates; triangles as contacts number them."""
-        return np.frombuffer(self._core.triangles(level), np.float64).reshape(-1, 3, 3)
+        return np.frombuffer(self._core.triangles(whole_number(level, "level", 0, _MOST)), np.float64).reshape(-1, 3, 3)
 
     def faces(self, level: int = 0) -> npt.NDArray[np.uint32]:
         """Of each triangle of a level, the face of the mesh file that it comes from, (n,).
@@ -159,7 +162,7 @@ class Asset:
         >>> box.triangles().shape, sorted(box.faces().tolist()) == list(range(12))
         ((12, 3, 3), True)
         """
-        return np.frombuffer(self._core.words(level, 0), np.uint32)
+        return np.frombuffer(self._core.words(whole_number(level, "level", 0, _MOST), 0), np.uint32)
 
     @property
     def bounds(self) -> npt.NDArray[np.float64]:

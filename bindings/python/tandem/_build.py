@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _tandem
-from ._arrays import floats, whole_numbers
+from ._arrays import floats, number, whole_number, whole_numbers
 from ._asset import Asset, Part, _choice
 from ._errors import Error, FileError
 
@@ -113,21 +113,24 @@ def build(vertices: npt.ArrayLike, faces: npt.ArrayLike | Sequence[Sequence[int]
     ids = None if face_ids is None else whole_numbers(face_ids, "face_ids", 0xFFFFFFFE)
     if ids is not None and ids.shape != (count,):
         raise ValueError(f"face_ids has shape {ids.shape} where ({count},) is wanted")
-    if not 0 <= imaginary_share <= 1:
-        raise ValueError(f"imaginary_share is {imaginary_share} where 0 to 1 is wanted")
-    if not 0 <= threads <= 4096:
-        raise ValueError(f"threads is {threads} where 0 to 4096 is wanted")
-    named = [(part[0], part[1], part[-1]) for part in parts or ()]
+    share = number(imaginary_share, "imaginary_share")
+    if not 0 <= share <= 1:
+        raise ValueError(f"imaginary_share is {share} where 0 to 1 is wanted")
+    workers = whole_number(threads, "threads", 0, 4096)
+    named = _named_parts(parts)
+    if provenance is not None:
+        _text(provenance, "provenance")
+    if progress is not None and not callable(progress):
+        raise TypeError(f"progress is {type(progress).__name__} where a function is wanted")
     strength = _choice("effort", effort, ("default", "fast", "best"))
     if levels is None and face_begin is None:
-        core, report = _tandem.build(points, corners, ids, named, strength, gpu_blocks, topology, threads, imaginary_share, provenance, progress)
+        core, report = _tandem.build(points, corners, ids, named, strength, bool(gpu_blocks), bool(topology), workers, share, provenance, progress)
         asset = Asset._of(core)
     else:
         if face_begin is None:
             face_begin = np.arange(0, 3 * count + 1, 3, dtype=np.uint32)
-        words = "" if levels is None else levels if isinstance(levels, str) else ",".join(level if isinstance(level, str) else repr(float(level)) for level in levels)
-        data, report = _mesh_tools().build(points, corners, face_begin, ids, named, strength, gpu_blocks, topology, threads, imaginary_share, words, provenance,
-                                           progress)
+        data, report = _mesh_tools().build(points, corners, face_begin, ids, named, strength, bool(gpu_blocks), bool(topology), workers, share,
+                                           _words(levels), provenance, progress)
         if data is None:
             raise _no_triangle()
         asset = Asset.from_bytes(data)
@@ -180,6 +183,40 @@ def _polygons(faces: Any) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint32
     if corners.shape[1] == 3:
         return corners.reshape(-1), None
     return corners.reshape(-1), np.arange(0, corners.size + 1, corners.shape[1], dtype=np.uint32)
+
+
+def _words(levels: Levels | None) -> str:
+    """Errors of levels as bvhbuild takes them."""
+    if levels is None or isinstance(levels, str):
+        return levels or ""
+    try:
+        entries = list(levels)
+    except TypeError:
+        raise TypeError(f"levels is {type(levels).__name__} where \"auto\" or a list is wanted") from None
+    words = ",".join(entry if isinstance(entry, str) else repr(number(entry, "levels")) for entry in entries)
+    return _text(words, "levels")
+
+
+def _named_parts(parts: Parts | None) -> list[tuple[str, str, int]]:
+    named = []
+    for row, part in enumerate(parts or ()):
+        if not isinstance(part, tuple) or len(part) not in (3, 4):
+            raise TypeError(f"parts: row {row} is not (name, path, number of faces)")
+        named.append((_text(part[0], f"parts: row {row}: name"), _text(part[1], f"parts: row {row}: path"),
+                      whole_number(part[-1], f"parts: row {row}: number of faces", 0, 0xFFFFFFFF)))
+    return named
+
+
+def _text(text: Any, name: str) -> str:
+    if not isinstance(text, str):
+        raise TypeError(f"{name} is {type(text).__name__} where a string is wanted")
+    if "\0" in text:
+        raise ValueError(f"{name} has a zero character")
+    try:
+        text.encode()
+    except UnicodeEncodeError as error:
+        raise ValueError(f"{name} is no UTF-8: {error}") from None
+    return text
 
 
 def _mesh_tools() -> ModuleType:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _tandem
-from ._arrays import Rows, instances_of, pairs_of, rows, whole_numbers
+from ._arrays import Rows, instances_of, number, pairs_of, rows, whole_number, whole_numbers
 from ._asset import Asset, _choice
 from ._rows import CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, MANIFOLD, MOTION, PAIR, POINT, VERDICT
 
@@ -102,6 +102,14 @@ class Filter:
         self._core = _tandem.Filter(motions, groups, masks, pairs_of(excluded, "excluded"))
 
 
+def _core_of(filter: Filter | None) -> _tandem.Filter | None:
+    if filter is None:
+        return None
+    if not isinstance(filter, Filter):
+        raise TypeError(f"filter is {type(filter).__name__} where a tandem.Filter is wanted")
+    return filter._core
+
+
 class Query:
     """Finds what happens between posed meshes.
 
@@ -133,11 +141,7 @@ class Query:
     def _number_of_threads(self, threads: int | None) -> int:
         if threads is None:
             return self._threads
-        if not isinstance(threads, (int, np.integer)):
-            raise TypeError(f"threads is {type(threads).__name__} where a whole number is wanted")
-        if not 1 <= threads <= 1024:
-            raise ValueError(f"threads is {threads} where 1 to 1024 is wanted")
-        return int(threads)
+        return whole_number(threads, "threads", 1, 1024)
 
     def contacts(self, instances: Rows | None = None, *, pairs: npt.ArrayLike | None = None, mode: Literal["exact", "fast", "boxes"] = "exact",
                  first_contact_only: bool = False, self_pairs: bool = False, within: float = 0.0, add_error_bounds: bool = False, filter: Filter | None = None,
@@ -163,8 +167,8 @@ class Query:
         """
         found = self._core.contacts(
             instances_of(instances, asset, rotation, translation, transform), None if pairs is None else pairs_of(pairs),
-            _MODES[mode] if mode in _MODES else _choice("mode", mode, tuple(_MODES)), first_contact_only, self_pairs, within, add_error_bounds,
-            None if filter is None else filter._core, self._threads if threads is None else self._number_of_threads(threads))
+            _MODES[mode] if mode in _MODES else _choice("mode", mode, tuple(_MODES)), bool(first_contact_only), bool(self_pairs),
+            number(within, "within"), bool(add_error_bounds), _core_of(filter), self._threads if threads is None else self._number_of_threads(threads))
         return Contacts(_frombuffer(found[0], PAIR), _frombuffer(found[1], CONTACT), Counters._make(found[2]))
 
     def pairs(self, instances: Rows | None = None, *, self_pairs: bool = False, within: float = 0.0, add_error_bounds: bool = False,
@@ -175,8 +179,8 @@ class Query:
         >>> query.pairs(translation=[[0, 0, 0], [0.5, 0, 0], [3, 0, 0]]).tolist()
         [(0, 1)]
         """
-        found = self._core.pairs(instances_of(instances, asset, rotation, translation, transform), self_pairs, within, add_error_bounds,
-                                 None if filter is None else filter._core, self._number_of_threads(threads))
+        found = self._core.pairs(instances_of(instances, asset, rotation, translation, transform), bool(self_pairs), number(within, "within"),
+                                 bool(add_error_bounds), _core_of(filter), self._number_of_threads(threads))
         return _frombuffer(found, PAIR)
 
     def keep_fixed(self, instances: Rows, motion: npt.ArrayLike, *, threads: int | None = None) -> None:
@@ -207,9 +211,7 @@ class Query:
         >>> manifolds["normal"].tolist(), manifolds["depth"].tolist(), len(points)
         ([[0.0, 0.0, 1.0]], [0.25], 4)
         """
-        if not 1 <= most_points <= 7:
-            raise ValueError(f"most_points is {most_points} where 1 to 7 is wanted")
-        pairs, manifolds, points = self._core.manifolds(most_points, match_previous, self._number_of_threads(threads))
+        pairs, manifolds, points = self._core.manifolds(whole_number(most_points, "most_points", 1, 7), bool(match_previous), self._number_of_threads(threads))
         return Manifolds(_frombuffer(pairs, PAIR), _frombuffer(manifolds, MANIFOLD), _frombuffer(points, POINT))
 
     def contained(self, *, threads: int | None = None) -> Contained:
@@ -240,8 +242,8 @@ class Query:
         [0.5]
         """
         found, distances = self._core.distances(
-            instances_of(instances, asset, rotation, translation, transform), pairs_of(pairs), reach, absolute_tolerance, relative_tolerance,
-            None if filter is None else filter._core, None if former is None else rows(former, "former", FORMER), self._number_of_threads(threads))
+            instances_of(instances, asset, rotation, translation, transform), pairs_of(pairs), None if reach is None else number(reach, "reach"),
+            number(absolute_tolerance, "absolute_tolerance"), number(relative_tolerance, "relative_tolerance"), _core_of(filter), None if former is None else rows(former, "former", FORMER), self._number_of_threads(threads))
         return Distances(_frombuffer(found, PAIR), _frombuffer(distances, DISTANCE))
 
     def impacts(self, instances: Rows | None, motion: Rows, duration: float, *, pairs: npt.ArrayLike | None = None, tolerance: float = 0.0,
@@ -263,7 +265,7 @@ class Query:
         motions = rows(motion, "motion", MOTION)
         if motions.shape != posed.shape:
             raise ValueError(f"motion has shape {motions.shape} where {posed.shape} is wanted")
-        found, impacts = self._core.impacts(posed, motions, duration, pairs_of(pairs), tolerance, None if filter is None else filter._core,
+        found, impacts = self._core.impacts(posed, motions, number(duration, "duration"), pairs_of(pairs), number(tolerance, "tolerance"), _core_of(filter),
                                             self._number_of_threads(threads))
         return Impacts(_frombuffer(found, PAIR), _frombuffer(impacts, IMPACT))
 
@@ -282,6 +284,6 @@ class Query:
         >>> query.verdicts(translation=[[0, 0, 0], [0.5, 0, 0]], tolerance=0.1).verdicts["verdict"].tolist() == [tandem.TOUCH]
         True
         """
-        found, verdicts = self._core.verdicts(instances_of(instances, asset, rotation, translation, transform), tolerance, pairs_of(pairs),
-                                              None if filter is None else filter._core, self._number_of_threads(threads))
+        found, verdicts = self._core.verdicts(instances_of(instances, asset, rotation, translation, transform), number(tolerance, "tolerance"),
+                                              pairs_of(pairs), _core_of(filter), self._number_of_threads(threads))
         return Verdicts(_frombuffer(found, PAIR), _frombuffer(verdicts, VERDICT))

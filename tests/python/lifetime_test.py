@@ -1,0 +1,167 @@
+"""Who may die before whom, threads, exceptions in callbacks, and Ctrl-C."""
+import gc
+import signal
+import threading
+
+import numpy as np
+import pytest
+
+import tandem
+from meshes import BOX_FACES, BOX_VERTICES
+
+SCENE = tandem.instances(translation=np.random.default_rng(1).uniform(0, 6, (400, 3)))
+
+
+def sphere(count):
+    """A closed mesh of some 4 count^2 triangles."""
+    theta, phi = np.meshgrid(np.linspace(0, np.pi, count + 1), np.linspace(0, 2 * np.pi, 2 * count, endpoint=False), indexing="ij")
+    vertices = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1).reshape(-1, 3)
+    vertices[-2 * count:, :2] = 0  # sin(pi) is not quite 0
+    row, column = np.meshgrid(np.arange(count), np.arange(2 * count), indexing="ij")
+    at = lambda r, c: (r * 2 * count + c % (2 * count)).ravel()  # noqa: E731
+    faces = np.concatenate([np.stack([at(row, column), at(row + 1, column), at(row + 1, column + 1)], -1),
+                            np.stack([at(row, column), at(row + 1, column + 1), at(row, column + 1)], -1)])
+    return vertices, faces
+
+
+def test_assets_die_before_queries_and_queries_before_arrays():
+    arrays = []
+    for number in range(5):
+        query = tandem.Query([tandem.build(BOX_VERTICES, BOX_FACES), tandem.build(BOX_VERTICES / 2, BOX_FACES).levels_from(0)])
+        gc.collect()
+        found = query.contacts(SCENE)
+        manifolds, distances = query.manifolds(), query.distances(SCENE[:20])
+        verdicts, impacts = query.verdicts(SCENE[:20], tolerance=0.1), query.impacts(SCENE[:20], np.zeros(20, tandem.MOTION), 1.0)
+        arrays.append([array for result in (found[:2], manifolds, distances, verdicts, impacts) for array in result])
+        del query, found, manifolds, distances, verdicts, impacts
+        gc.collect()
+    for array in zip(*arrays):
+        for other in array[1:]:
+            assert other.tobytes() == array[0].tobytes()
+            other[:] = 0
+
+
+def test_views_of_bytes_outlive_assets():
+    asset = tandem.build(BOX_VERTICES, BOX_FACES)
+    view, triangles, expected = asset.data, asset.triangles(), asset.triangles().copy()
+    again = tandem.Asset.from_bytes(view)
+    del asset
+    gc.collect()
+    assert bytes(view) == bytes(again) and (triangles == expected).all()
+
+
+def test_threads_share_assets_and_have_queries_of_their_own():
+    box = tandem.build(BOX_VERTICES, BOX_FACES)
+    expected = tandem.Query([box]).contacts(SCENE).contacts.tobytes()
+    same = []
+
+    def ask(threads):
+        query = tandem.Query([box], threads=threads)
+        same.extend(query.contacts(SCENE).contacts.tobytes() == expected for _ in range(5))
+
+    workers = [threading.Thread(target=ask, args=(1 + number % 3,)) for number in range(6)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    assert same == [True] * 30
+
+
+def test_a_query_takes_one_call_at_a_time_while_other_threads_run():
+    query = tandem.Query([tandem.build(BOX_VERTICES, BOX_FACES)])
+    scene = tandem.instances(translation=np.random.default_rng(2).uniform(0, 3, (700, 3)))
+    expected = len(query.contacts(scene).contacts)
+    refused, found, done = [], [], threading.Event()
+
+    def work():
+        for _ in range(5):
+            try:
+                found.append(len(query.contacts(scene).contacts))
+            except RuntimeError as error:
+                refused.append(str(error))
+        done.set()
+
+    worker = threading.Thread(target=work)
+    worker.start()
+    while not done.is_set():  # runs only where calls let it
+        try:
+            found.append(len(query.contacts(SCENE[:2]).contacts) * 0 + expected)
+        except RuntimeError as error:
+            refused.append(str(error))
+    worker.join()
+    assert set(refused) == {"another thread is in a call of this query"}
+    assert set(found) == {expected}
+
+
+def test_arguments_may_change_during_a_call():
+    box = tandem.build(BOX_VERTICES, BOX_FACES)
+    scene = tandem.instances(translation=np.random.default_rng(3).uniform(0, 4, (500, 3)))
+    expected = tandem.Query([box]).contacts(scene).contacts.tobytes()
+    results, start = [], threading.Barrier(2)
+
+    def work():
+        query = tandem.Query([box])
+        start.wait()
+        rows = scene.copy()
+        changing.append(rows)
+        results.append(query.contacts(rows).contacts.tobytes())
+
+    changing = []
+    worker = threading.Thread(target=work)
+    worker.start()
+    start.wait()
+    while worker.is_alive():
+        if changing and results:
+            changing[0]["translation"] = np.nan
+    worker.join()
+    assert results == [expected]
+
+
+def test_progress_ascends_and_comes_in_the_callers_thread():
+    shares, threads = [], set()
+    vertices, faces = sphere(16)
+
+    def progress(share):
+        shares.append(share)
+        threads.add(threading.get_ident())
+
+    asset = tandem.build(vertices, faces, effort="best", progress=progress)
+    assert asset.levels[0].closed
+    assert shares == sorted(shares) and len(shares) > 0 and 0 <= shares[0] and shares[-1] <= 1
+    assert threads == {threading.get_ident()}
+
+
+def test_what_progress_raises_ends_the_build():
+    class Enough(Exception):
+        pass
+
+    def progress(share):
+        raise Enough(share)
+
+    vertices, faces = sphere(50)
+    with pytest.raises(Enough):
+        tandem.build(vertices, faces, effort="best", progress=progress)
+
+
+@pytest.mark.parametrize("levels", [None, "auto"])
+def test_ctrl_c_ends_a_long_build(levels):
+    if levels:
+        pytest.importorskip("tandem._bvhbuild")
+    vertices, faces = sphere(120)  # which takes many seconds
+    signal.signal(signal.SIGALRM, signal.default_int_handler)
+    signal.setitimer(signal.ITIMER_REAL, 0.3)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            tandem.build(vertices, faces, effort="best", levels=levels)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+
+
+def test_files_may_be_replaced_while_they_are_mapped(tmp_path):
+    path = tmp_path / "box.bvh"
+    tandem.build(BOX_VERTICES, BOX_FACES).save(path)
+    mapped = tandem.Asset.load(path)
+    expected = bytes(mapped)
+    tandem.build(BOX_VERTICES * 2, BOX_FACES).save(path)
+    assert bytes(mapped) == expected != bytes(tandem.Asset.load(path))

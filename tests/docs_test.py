@@ -140,6 +140,8 @@ class IncludesTest(unittest.TestCase):
         first, second, *_ = name.split("/")
         if name == "tandem/tandem.h":
             return "bindings/c/"
+        if name.startswith("tandem/build/"):
+            return "tools/bvhbuild/include/"
         if first == "tandem":
             return second + "/"
         return LIBRARIES[first] if first in LIBRARIES else self.folder_of(f"tools/{name}")

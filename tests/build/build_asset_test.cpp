@@ -1,4 +1,4 @@
-#include "bvhbuild/tree/build_asset.h"
+#include "tandem/build/build_asset.h"
 
 #include <gtest/gtest.h>
 
@@ -6,8 +6,6 @@
 #include <cmath>
 #include <cstring>
 #include <random>
-
-#include "parallel/parallel.h"
 
 namespace tandem::build {
 namespace {
@@ -38,8 +36,8 @@ struct Sheet {
     }
   }
 
-  std::vector<std::byte> built(const BuildOptions& options, unsigned threads) const {
-    const parallel::ThreadLimit limit(threads);
+  std::vector<std::byte> built(BuildOptions options, unsigned threads) const {
+    options.threads = threads;
     OptimisationWatch watch;
     const BuiltAsset asset = build_asset({points, triangles, {}, 0, {}}, options, {}, watch);
     EXPECT_TRUE(asset.file);

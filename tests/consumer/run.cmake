@@ -67,6 +67,11 @@ if(NOT output MATCHES "\nall are asleep after [0-9]+ steps\n$")
   message(FATAL_ERROR "the game loop says: ${output}")
 endif()
 
+run(${FOLDER}/consumer/build)
+if(NOT output STREQUAL "4 triangles in 1 block, 1 left out\n")
+  message(FATAL_ERROR "the builder says: ${output}")
+endif()
+
 run(${FOLDER}/consumer/contacts_in_c ${FOLDER}/box.bvh)
 require_shown(docs/c.md "" "${output}")
 set(told_in_c "${output}")

@@ -1,4 +1,4 @@
-#include "bvhbuild/meshing/clean_report.h"
+#include "tandem/build/clean_report.h"
 
 #include <gtest/gtest.h>
 

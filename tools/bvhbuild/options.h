@@ -6,8 +6,8 @@
 
 #include "bvhbuild/import/import.h"
 #include "bvhbuild/levels/level_errors.h"
-#include "bvhbuild/tree/build_options.h"
 #include "common/exit_code.h"
+#include "tandem/build/build_options.h"
 
 namespace tandem::build {
 
@@ -19,7 +19,6 @@ struct Options : BuildOptions {
   bool strict = false;
   bool json = false;
   bool quiet = false;
-  int threads = 0;  ///< 0: as many as the machine has
 };
 
 /// Parses the command line. Nothing to run: prints help, the version or what is wrong, and sets `exit_code`.

@@ -142,7 +142,7 @@ Outcome run_pipeline(const Options& options) {
   outcome.parts = polygons.parts.size();
 
   // Threads begin here: import may fork, and must be alone.
-  const parallel::ThreadLimit limit(static_cast<unsigned>(options.threads));
+  const parallel::ThreadLimit limit(options.threads);
 
   progress.step("clean");
   const StoredMesh mesh = prepare(polygons, outcome);

@@ -5,11 +5,11 @@
 #include <vector>
 
 #include "bvhbuild/levels/ladder.h"
-#include "bvhbuild/meshing/clean_report.h"
 #include "common/exit_code.h"
 #include "input_digest.h"
 #include "options.h"
 #include "statistics/statistics.h"
+#include "tandem/build/clean_report.h"
 
 namespace tandem::build {
 

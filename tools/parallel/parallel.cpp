@@ -83,9 +83,8 @@ unsigned usable_threads() {
   return std::max(std::thread::hardware_concurrency(), 1u);
 }
 
-ThreadLimit::ThreadLimit(unsigned threads)
-    : spare_((threads > 0 ? threads : usable_threads()) - 1), before_(limit_here) {
-  limit_here = &spare_;
+ThreadLimit::ThreadLimit(unsigned threads) : spare_(threads - 1), before_(limit_here) {
+  if (threads > 0) limit_here = &spare_;
 }
 
 ThreadLimit::~ThreadLimit() {

@@ -14,7 +14,7 @@ namespace tandem::parallel {
 unsigned usable_threads();
 
 /// While it lives, at most so many threads, this one included, are at work at a time on what this thread
-/// asks for; 0: usable_threads(), which is the limit of the whole process where no other is in force.
+/// asks for; 0: no limit beside the one that is in force, of the whole process usable_threads().
 /// Condition: ends on the thread that made it, the last one made first.
 class ThreadLimit {
  public:

@@ -2,9 +2,8 @@
 #include <new>
 #include <vector>
 
-#include "bvhbuild/tree/build_asset.h"
 #include "handles.h"
-#include "parallel/parallel.h"
+#include "tandem/build/build_asset.h"
 
 using namespace tandem;
 using namespace tandem::c;
@@ -61,6 +60,7 @@ tandem_status read_options(const tandem_build_options* given, tandem_build_optio
   options.imaginary.share = read.imaginary_share;
   options.gpu_blocks = read.no_gpu_blocks == 0;
   options.topology = read.no_topology == 0;
+  options.threads = read.threads;
   return TANDEM_OK;
 }
 
@@ -83,7 +83,6 @@ build::BuiltAsset build_with(const Source& source, const build::BuildOptions& op
   build::OptimisationWatch watch;
   if (read.progress != nullptr)
     watch.progress = [&](double share) { watch.stop = watch.stop || read.progress(read.user, share) != 0; };
-  const parallel::ThreadLimit limit(read.threads);
   return build::build_asset(source.triangles, options, read.provenance != nullptr ? read.provenance : "",
                             watch);
 }

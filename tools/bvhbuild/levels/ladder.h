@@ -3,10 +3,10 @@
 #include <span>
 #include <vector>
 
-#include "bvhbuild/tree/effort.h"
 #include "bvhbuild/tree/surface_topology.h"
 #include "bvhbuild/tree/tree.h"
 #include "level_mesh.h"
+#include "tandem/build/effort.h"
 
 namespace tandem::build {
 

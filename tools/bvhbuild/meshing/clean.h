@@ -1,5 +1,5 @@
 #pragma once
-#include "clean_report.h"
+#include "tandem/build/clean_report.h"
 #include "triangle_mesh.h"
 
 namespace tandem::build {

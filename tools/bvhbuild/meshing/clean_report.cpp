@@ -1,4 +1,4 @@
-#include "clean_report.h"
+#include "tandem/build/clean_report.h"
 
 namespace tandem::build {
 namespace {

@@ -1,26 +1,15 @@
 #pragma once
-#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
 
-namespace tandem::build {
+#include "tandem/build/mesh.h"
 
-using Point = std::array<double, 3>;
+namespace tandem::build {
 
 /// A vertex index that names no vertex, whatever their number: what a reader stores for an index that cannot
 /// be represented (negative, 0 in an OBJ file, beyond 2^32 - 2).
 inline constexpr std::uint32_t kNoVertex = 0xFFFFFFFFu;
-
-/// A run of consecutive faces that the file gives a name: an OBJ object or group, a glTF mesh at a node, an
-/// STL solid.
-struct SourcePart {
-  std::string name;  ///< of the mesh, object, group or solid; may be empty
-  std::string
-      node_path;  ///< names of the scene nodes from the root, joined by '/'; empty where files have none
-  std::uint64_t first_face = 0;
-  std::uint64_t face_count = 0;
-};
 
 /// What a file holds instead of faces. Readers leave it out.
 struct LeftOut {

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "clean_report.h"
+#include "tandem/build/clean_report.h"
 #include "triangle_mesh.h"
 
 namespace tandem::build {

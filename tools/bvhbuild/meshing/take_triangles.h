@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <span>
 
-#include "clean_report.h"
+#include "tandem/build/clean_report.h"
 #include "triangle_mesh.h"
 
 namespace tandem::build {

@@ -1,14 +1,10 @@
 #pragma once
-#include <array>
 #include <cstdint>
 #include <vector>
 
 #include "polygon_mesh.h"
 
 namespace tandem::build {
-
-using TriangleIndices =
-    std::array<std::uint32_t, 3>;  ///< vertex indices, in the order that the face goes round
 
 /// The triangles of a file with its float64 coordinates. Every index is below points.size(), every coordinate
 /// that a triangle uses is finite and at most kMaxCoordinate in magnitude.

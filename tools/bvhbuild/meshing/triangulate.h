@@ -1,6 +1,6 @@
 #pragma once
-#include "clean_report.h"
 #include "polygon_mesh.h"
+#include "tandem/build/clean_report.h"
 #include "triangle_mesh.h"
 
 namespace tandem::build {

@@ -2,8 +2,8 @@
 #include <cstdint>
 #include <span>
 
-#include "clean_report.h"
 #include "polygon_mesh.h"
+#include "tandem/build/clean_report.h"
 
 namespace tandem::build {
 

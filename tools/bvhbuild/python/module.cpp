@@ -13,7 +13,7 @@
 #include "bvhbuild/level_pipeline.h"
 #include "bvhbuild/meshing/clean.h"
 #include "bvhbuild/meshing/triangulate.h"
-#include "bvhbuild/tree/build_asset.h"
+#include "tandem/build/build_asset.h"
 #include "common/json.h"
 #include "parallel/parallel.h"
 

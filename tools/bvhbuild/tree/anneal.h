@@ -1,9 +1,9 @@
 #pragma once
 #include <cstdint>
 
-#include "effort.h"
 #include "exchange_search.h"
 #include "region.h"
+#include "tandem/build/effort.h"
 
 namespace tandem::build {
 

@@ -1,13 +1,12 @@
 #pragma once
 #include <array>
-#include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <string>
 
-#include "bvhbuild/meshing/polygon_mesh.h"
 #include "surface_topology.h"
+#include "tandem/build/image.h"
+#include "tandem/build/mesh.h"
 #include "tandem/formats/oriented_block.h"
 #include "tree.h"
 
@@ -30,25 +29,6 @@ struct AssetSource {
   std::uint64_t source_faces = 0;
   std::span<const SourcePart> parts;  ///< ascending, without gaps, together source_faces faces
   std::string provenance;             ///< JSON
-};
-
-/// The bytes of a whole .bvh file in memory, aligned as the checker wants them. The memory is from allocate()
-/// of tandem/formats/allocator.h.
-class Image {
- public:
-  explicit Image(std::size_t bytes);  ///< all zero
-  std::byte* data() { return data_.get(); }
-  const std::byte* data() const { return data_.get(); }
-  std::size_t size() const { return size_; }
-  /// The caller deallocates them.
-  std::byte* release() { return data_.release(); }
-
- private:
-  struct Delete {
-    void operator()(std::byte* data) const;
-  };
-  std::unique_ptr<std::byte[], Delete> data_;
-  std::size_t size_;
 };
 
 /// Lays a file out, fills it in and seals it with its hash. Throws std::bad_alloc, and std::logic_error

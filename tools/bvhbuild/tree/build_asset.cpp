@@ -1,10 +1,12 @@
-#include "build_asset.h"
+#include "tandem/build/build_asset.h"
 
 #include <charconv>
 
 #include "bvhbuild/meshing/clean.h"
 #include "bvhbuild/meshing/stored_mesh.h"
 #include "bvhbuild/meshing/take_triangles.h"
+#include "level_parts.h"
+#include "parallel/parallel.h"
 
 namespace tandem::build {
 namespace {
@@ -42,6 +44,7 @@ std::string usual_provenance(const BuildOptions& options, const CleanReport& rep
 
 BuiltAsset build_asset(const TriangleSource& given, const BuildOptions& options, std::string provenance,
                        OptimisationWatch& watch) {
+  const parallel::ThreadLimit limit(options.threads);
   BuiltAsset built;
   TriangleMesh triangles = take_triangles(given.points, given.triangles, given.face, built.clean);
   clean(triangles, built.clean);

@@ -3,8 +3,7 @@
 #include <vector>
 
 #include "assemble.h"
-#include "build_options.h"
-#include "tandem/formats/view.h"
+#include "tandem/build/build_options.h"
 
 namespace tandem::build {
 
@@ -18,12 +17,6 @@ struct LevelParts {
 /// Builds what the options ask for, as far as there are not too many triangles for it. The result does not
 /// depend on the number of threads.
 LevelParts build_parts(const Geometry& geometry, const BuildOptions& options, OptimisationWatch& watch);
-
-/// The bytes of a file, and the view of them.
-struct CheckedImage {
-  Image image;
-  AssetView asset;
-};
 
 /// Assembles a file and has the checker prove it: what is written, every program can load. Throws
 /// std::bad_alloc, and std::logic_error on a defect of the program.

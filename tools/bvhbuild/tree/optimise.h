@@ -2,7 +2,7 @@
 #include <span>
 
 #include "bounds.h"
-#include "effort.h"
+#include "tandem/build/effort.h"
 #include "topology.h"
 
 namespace tandem::build {

@@ -4,23 +4,10 @@
 #include <span>
 #include <vector>
 
-#include "effort.h"
+#include "tandem/build/build_options.h"
 #include "tandem/formats/block.h"
 
 namespace tandem::build {
-
-/// How many imaginary nodes a tree may have.
-struct Imaginary {
-  /// Of all nodes, beyond the minimum. 0: the proven minimum, minimal_imaginary_nodes(). 1: wherever the
-  /// cheapest collapse of a free binary tree puts them, about a fifth. Between: where a given number of them
-  /// saves most.
-  double share = 0;
-
-  static const Imaginary minimal, free;
-  bool operator==(const Imaginary&) const = default;
-};
-
-inline constexpr Imaginary Imaginary::minimal{0}, Imaginary::free{1};
 
 /// The blocks of one level of detail, as they will lie in the file, and the order in which its triangles must
 /// lie: triangle t of the file is triangle order[t] of the input.

@@ -3,9 +3,10 @@
 #include <span>
 #include <string>
 
-#include "bvhbuild/meshing/clean_report.h"
-#include "bvhbuild/meshing/triangle_mesh.h"
-#include "level_parts.h"
+#include "tandem/build/build_options.h"
+#include "tandem/build/clean_report.h"
+#include "tandem/build/image.h"
+#include "tandem/build/mesh.h"
 
 /// The builder as a library: triangles in memory become the bytes of a .bvh file, by the same steps as in
 /// bvhbuild, without assimp, CGAL or child processes.
@@ -30,8 +31,8 @@ struct BuiltAsset {
 /// interrupted: the watch ended the optimisation.
 std::string usual_provenance(const BuildOptions& options, const CleanReport& report, bool interrupted);
 
-/// Cleans, builds, assembles and checks, on the threads that the caller may use (parallel::ThreadLimit). The
-/// same source, options and provenance give the same bytes whatever their number, and those that bvhbuild
+/// Cleans, builds, assembles and checks. The same
+/// source, options and provenance give the same bytes whatever their number, and those that bvhbuild
 /// writes for a file of these triangles. provenance: JSON; empty: usual_provenance(). The image's memory is
 /// that of the allocator in force. Throws std::bad_alloc, and std::logic_error on a defect of the program.
 /// Conditions: fewer than 2^32 - 1 triangles; those of TriangleSource.

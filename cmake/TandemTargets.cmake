@@ -1,4 +1,6 @@
 include(GNUInstallDirs)
+# Components of the installation: dev, but for shared libraries (libs, cuda), commands (tools) and the Python package (python).
+set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME dev)
 
 # Flags that every target of the project is compiled with. -ffp-contract=off: promised results must not depend
 # on whether a compiler fuses a multiply and an add.

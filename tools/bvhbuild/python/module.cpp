@@ -13,9 +13,9 @@
 #include "bvhbuild/level_pipeline.h"
 #include "bvhbuild/meshing/clean.h"
 #include "bvhbuild/meshing/triangulate.h"
-#include "tandem/build/build_asset.h"
 #include "common/json.h"
 #include "parallel/parallel.h"
+#include "tandem/build/build_asset.h"
 
 namespace tandem::build {
 namespace {

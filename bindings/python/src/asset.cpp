@@ -102,7 +102,7 @@ nb::object triangles(const Asset& asset, std::uint32_t number) {
   const tandem_level of = level_of(asset, number);
   const tandem_asset_info about = info_of(asset);
   const std::size_t count = of.triangle_count;
-  nb::object bytes = make_bytes(count * 9 * sizeof(double));
+  nb::object bytes = make_bytes(nullptr, count * 9 * sizeof(double));
   double* to = static_cast<double*>(bytes_begin(bytes));
   for (const tandem_triangle& triangle : std::span(of.triangles, count)) {
     for (const tandem_corner& corner : triangle.corner) {
@@ -115,7 +115,7 @@ nb::object triangles(const Asset& asset, std::uint32_t number) {
 // uint32: word 0 of each triangle is the face of the mesh file, word 1 the part.
 nb::object words(const Asset& asset, std::uint32_t number, std::uint32_t corner) {
   const tandem_level of = level_of(asset, number);
-  nb::object bytes = make_bytes(of.triangle_count * sizeof(std::uint32_t));
+  nb::object bytes = make_bytes(nullptr, of.triangle_count * sizeof(std::uint32_t));
   auto* to = static_cast<std::uint32_t*>(bytes_begin(bytes));
   for (const tandem_triangle& triangle : std::span(of.triangles, of.triangle_count))
     *to++ = triangle.corner[corner].word;

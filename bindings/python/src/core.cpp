@@ -20,8 +20,11 @@ void throw_broken_rows() {
   throw nb::value_error("a buffer does not hold whole rows");
 }
 
-nb::object make_bytes(std::size_t size) {
-  return nb::steal(PyByteArray_FromStringAndSize(nullptr, static_cast<Py_ssize_t>(size)));
+nb::object make_bytes(const void* bytes, std::size_t size) {
+  PyObject* made =
+      PyByteArray_FromStringAndSize(static_cast<const char*>(bytes), static_cast<Py_ssize_t>(size));
+  if (made == nullptr) throw nb::python_error();
+  return nb::steal(made);
 }
 
 void* bytes_begin(nb::handle bytearray) {

@@ -42,15 +42,14 @@ std::vector<Row> copy_rows(nb::handle object) {
   return {first, first + bytes.size() / sizeof(Row)};
 }
 
-/// A new bytearray, not yet filled.
-nb::object make_bytes(std::size_t size);
+/// A new bytearray with a copy of bytes; null: not yet filled.
+nb::object make_bytes(const void* bytes, std::size_t size);
 void* bytes_begin(nb::handle bytearray);
 
 /// A copy of rows that a query has, as a bytearray: NumPy makes an array of it that owns it.
 template <typename Row>
 nb::object to_python(const Row* rows, std::size_t count) {
-  return nb::steal(
-      PyByteArray_FromStringAndSize(reinterpret_cast<const char*>(rows), Py_ssize_t(count * sizeof(Row))));
+  return make_bytes(rows, count * sizeof(Row));
 }
 
 /// A checked file in memory, by one reference to it.

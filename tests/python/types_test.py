@@ -15,7 +15,9 @@ PROGRAM = Path(os.environ["TANDEM_SOURCE_DIR"]) / "tests/python/typed_program.py
 
 def mypy(*words, folder):
     pytest.importorskip("mypy")
-    environment = {**os.environ, "MYPYPATH": str(PACKAGE.parent)}
+    environment = dict(os.environ)
+    if PACKAGE.parent.name != "site-packages":  # where mypy looks anyway, and wants no path
+        environment["MYPYPATH"] = str(PACKAGE.parent)
     return subprocess.run([sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(folder / "cache"), *words], capture_output=True, text=True, env=environment,
                           cwd=folder)
 
@@ -59,4 +61,5 @@ def test_stubs_are_those_of_the_extensions(name):
     generated = stubgen.StubGen(module)
     generated.put(module)
     expected = signatures(generated.get())
+    expected.pop("Asset.__buffer__", None)  # from Python 3.12 on; the stub says it by the base Buffer
     assert expected and signatures((PACKAGE / f"{name}.pyi").read_text()) == expected

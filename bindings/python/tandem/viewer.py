@@ -54,7 +54,8 @@ def view(what: Any, instances: NDArray[np.void] | None = None, *, picture: str |
 
 
 class View:
-    """A scene in a window, or off screen. `plotter` is pyvista's, for whatever else is to be drawn or saved.
+    """A scene in a window, or off screen. `plotter` is pyvista's, for whatever else is to be drawn or saved: about `origin`, a
+    point of the world. `state` is the row of the run's states that is shown, `tree_depth` that of the boxes.
 
     what, instances: as for view().
     contacts: tandem.Contacts of these instances, whose triangles are drawn in red; or True: a query finds them, anew
@@ -94,7 +95,7 @@ class View:
                 raise ValueError(f"{name}: belong to one state, at its levels; let them be found by {name}=True")
         self._contacts, self._manifolds, self._distances = contacts, manifolds, distances
         self._query = tandem.Query(self._assets) if contacts is True or manifolds is True else None
-        self._tree_depth, self._color = tree_depth, color
+        self.tree_depth, self._color = tree_depth, color
         inside = contacts is not False or manifolds is not False or distances is not None
         self._opacity = opacity if opacity is not None else TRANSLUCENT if inside else 1.0
         self._place()
@@ -121,7 +122,7 @@ class View:
 
     def show_tree(self, depth: int | None) -> None:
         """Shows the boxes of the nodes at another depth; None: no boxes."""
-        self._tree_depth = depth
+        self.tree_depth = depth
         self._draw_tree()
 
     def picture(self, path: str | os.PathLike[str] | None = None) -> NDArray[np.uint8]:
@@ -145,9 +146,9 @@ class View:
             self._slider(lambda value: self.show_step(int(steps[np.abs(steps - value).argmin()])),
                          "step", (steps[0], steps[-1]), steps[self.state], left, right)
             left, right = 0.36, 0.63
-        if self._tree_depth is not None:
+        if self.tree_depth is not None:
             deepest = max(asset.levels[0].depth for asset in self._assets)
-            self._slider(lambda value: self.show_tree(round(value)), "tree depth", (0, deepest), self._tree_depth, left, right)
+            self._slider(lambda value: self.show_tree(round(value)), "tree depth", (0, deepest), self.tree_depth, left, right)
 
     def close(self) -> None:
         """Frees the window, and all that it refers to."""
@@ -177,7 +178,7 @@ class View:
         fixed = self._motion == tandem.FIXED
         self._subject = ~fixed if not fixed.all() else fixed
         self._length = float(np.median(diagonal[self._asset[self._subject]]))
-        self._centre = self._centres(len(self.scene.steps) - 1)[self._subject].mean(axis=0)
+        self.origin = self._centres(len(self.scene.steps) - 1)[self._subject].mean(axis=0)
 
     def _centres(self, state: int) -> NDArray[np.float64]:
         """Where the middles of the bodies' meshes are, (n, 3), in the world."""
@@ -189,7 +190,7 @@ class View:
         state = self.state if state is None else state
         about = points - self._middle[self._asset[body]][:, None]
         turned = np.einsum("nij,nkj->nki", self.scene.rotation[state][body], about)
-        return turned + (self._centres(state)[body] - self._centre)[:, None]
+        return turned + (self._centres(state)[body] - self.origin)[:, None]
 
     def _open(self, off_screen: bool, size: tuple[int, int]) -> None:
         self.plotter = _plotter(off_screen, size)
@@ -211,7 +212,7 @@ class View:
             actor.SetMapper(mapper)
             actor.SetForceTranslucent(self._opacity < 1)  # the glyphs' colours have the opacity
             actor.GetProperty().SetBackfaceCulling(self._opacity < 1 and bool(self._assets[row].levels[0].closed))
-            actor.GetProperty().SetAmbient(0.2)
+            actor.GetProperty().SetAmbient(0.1)
             self.plotter.add_actor(actor, name=f"bodies {row}", reset_camera=False)
             self._bodies.append(mapper)
 
@@ -245,8 +246,8 @@ class View:
 
     def _draw_bodies(self) -> None:
         opacity = np.full((len(self._asset), 1), round(255 * self._opacity), np.uint8)
-        colour = np.concatenate([self._colours(), opacity], axis=1)
-        centres = self._centres(self.state) - self._centre
+        colour = np.concatenate([self.body_colours(), opacity], axis=1)
+        centres = self._centres(self.state) - self.origin
         for row, mapper in enumerate(self._bodies):
             of_it = self._asset == row
             points = pyvista.PolyData(centres[of_it])
@@ -254,8 +255,8 @@ class View:
             points["colour"] = colour[of_it]
             mapper.SetInputData(points)
 
-    def _colours(self) -> NDArray[np.uint8]:
-        """Of each body, (n, 3)."""
+    def body_colours(self) -> NDArray[np.uint8]:
+        """The colour of each body, sRGB, (n, 3)."""
         if self._color == "level":
             return _level_colours(int(self._level.max()) + 1)[self._level]
         number = self.scene.asset if self._color == "asset" else np.arange(len(self._asset))
@@ -293,9 +294,9 @@ class View:
     def _draw_manifolds(self, found: tandem.Manifolds) -> None:
         points, normals = None, None
         if len(found.points):
-            points = pyvista.PolyData(found.points["position"] - self._centre)
+            points = pyvista.PolyData(found.points["position"] - self.origin)
             points["depth"] = found.points["depth"]
-            arrows = pyvista.PolyData(found.manifolds["centre"] - self._centre)
+            arrows = pyvista.PolyData(found.manifolds["centre"] - self.origin)
             arrows["normal"] = found.manifolds["normal"]
             normals = arrows.glyph(orient="normal", scale=False, factor=NORMAL_LENGTH * self._length,
                                    geom=pyvista.Arrow(tip_radius=0.07, tip_length=0.3, shaft_radius=0.022))
@@ -307,7 +308,7 @@ class View:
         near = found.distances[np.isfinite(found.distances["upper"])]
         lines = None
         if len(near):
-            ends = np.stack([near["point_a"], near["point_b"]], 1) - self._centre
+            ends = np.stack([near["point_a"], near["point_b"]], 1) - self.origin
             lines = pyvista.line_segments_from_points(ends.reshape(-1, 3))
             lines.cell_data["distance"] = near["upper"]
         self._put("distances", lines, scalars="distance", cmap="viridis", clim=_from_zero(near["upper"]), line_width=4,
@@ -315,14 +316,14 @@ class View:
 
     def _draw_tree(self) -> None:
         edges = None
-        if self._tree_depth is not None:
+        if self.tree_depth is not None:
             corners = [self._boxes_of(row) for row in range(len(self._assets))]
             edges = _wireframe(np.concatenate(corners))
         self._put("tree", edges, color=TREE_COLOUR, line_width=1, opacity=0.6)
 
     def _boxes_of(self, row: int) -> NDArray[np.float64]:
         """The corners of the boxes of all bodies that show an asset, (n, 8, 3)."""
-        corners = _corners(tree.boxes(self._assets[row], self._tree_depth or 0))
+        corners = _corners(tree.boxes(self._assets[row], self.tree_depth or 0))
         body = np.flatnonzero((self._asset == row) & self._subject)
         return self._posed(np.repeat(body, len(corners)), np.tile(corners, (len(body), 1, 1)))
 
@@ -363,7 +364,7 @@ def _plotter(off_screen: bool, size: tuple[int, int]) -> pyvista.Plotter:
     if off_screen:
         vtk.vtkLogger.SetStderrVerbosity(vtk.vtkLogger.VERBOSITY_ERROR)
     try:
-        plotter = pyvista.Plotter(off_screen=off_screen, window_size=list(size))
+        plotter = pyvista.Plotter(off_screen=off_screen, window_size=list(size), lighting='three lights')
         if off_screen:
             plotter.render_window.Initialize()
     finally:

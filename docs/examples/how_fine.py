@@ -32,5 +32,5 @@ for verdict, meaning in ((tandem.APART, "surely apart"), (tandem.TOUCH, "surely 
     print(f"{len(rows):4} pairs {meaning}, of which {np.count_nonzero(rows['level_a'])} were decided at a coarser level")
 
 if "--picture" in sys.argv:
-    side_by_side = tandem.instances(np.zeros(len(cow.levels), int), translation=[[0, 1.1 * k, 0] for k in range(len(cow.levels))])
-    tandem.view([cow], side_by_side, levels=np.arange(len(cow.levels)), color="level", picture="how_fine.png", size=(640, 400), azimuth=-10)
+    side_by_side = tandem.instances(np.zeros(len(cow.levels), int), translation=[[1.7 * k, 0, 0] for k in range(len(cow.levels))])
+    tandem.view([cow], side_by_side, levels=np.arange(len(cow.levels)), color="level", picture="how_fine.png", size=(640, 240), azimuth=-80, elevation=12)

@@ -26,7 +26,7 @@ from meshes import BOX_FACES, BOX_VERTICES, read_obj  # noqa: E402
 from tandem import scene_files, tree, viewer  # noqa: E402
 
 SIZE = (320, 200)
-RED, BLUE = 0.0, 0.61  # hues, of 1
+RED = 0.99  # its hue, of 1
 TURNED = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
 
 
@@ -133,7 +133,7 @@ def test_bodies_are_where_a_z_buffer_puts_them(shown, herd):
     picture, expected = view.picture(), body_of_pixels(view, assets, instances)
     drawn, covered = ~is_backdrop(picture), expected >= 0
     # A pixel at an outline shows what covers a part of it, be it not its middle.
-    assert covered.mean() > 0.1 and (covered & ~drawn).sum() <= 3 and (drawn & ~grown(covered)).sum() <= 3
+    assert covered.mean() > 0.1 and not (covered & ~drawn).any() and not (drawn & ~grown(grown(covered))).any()
     colours = view.body_colours()
     found = hues(picture)[..., 0]
     for body in range(len(instances)):
@@ -195,15 +195,16 @@ def test_triangles_that_meet_are_red_and_no_others(shown, box):
                                             for s in "ab"]), axis=0)
         posed = np.array([box.triangles()[t] + instances["translation"][b] for b, t in touched])
         expected = render.rasterise(projected(view, posed), SIZE)[1] >= 0
-        assert expected.sum() > 200 and (expected & ~red).sum() <= 3 and (red & ~grown(expected)).sum() <= 3
+        assert expected.sum() > 200 and not (expected & inner(expected) & ~red).any() and not (red & ~grown(expected)).any()
 
 
-def test_contact_points_are_where_they_are_in_the_colour_of_their_depths(shown, herd):
-    assets, instances = herd
-    query = tandem.Query(assets)
+def test_contact_points_are_where_they_are_in_the_colour_of_their_depths(shown, box):
+    c, s = np.cos(0.1), np.sin(0.1)
+    instances = tandem.instances([0, 0], rotation=[np.eye(3), [[c, 0, s], [0, 1, 0], [-s, 0, c]]], translation=[[0, 0, 0], [0.2, 0.3, 0.95]])
+    query = tandem.Query([box])
     query.contacts(instances)
     manifolds = query.manifolds()
-    view = shown(assets, instances, manifolds=manifolds, opacity=0)
+    view = shown([box], instances, manifolds=manifolds, opacity=0)
     picture = view.picture()
     at = projected(view, manifolds.points["position"])
     apart = np.linalg.norm(at[:, None, :2] - at[None, :, :2], axis=2) + 1e9 * np.eye(len(at))
@@ -214,7 +215,7 @@ def test_contact_points_are_where_they_are_in_the_colour_of_their_depths(shown, 
         wanted = hues(np.array(matplotlib.colormaps["plasma"](share, bytes=True)[:3]))[0]
         near = hues(picture[int(y) - 1:int(y) + 2, int(x) - 1:int(x) + 2])
         seen += (hue_distance(near[..., 0], wanted) < 0.06)[near[..., 1] > 0.3].any()
-    assert alone.sum() >= 5 and seen >= 0.8 * alone.sum()  # arrows of normals cover some
+    assert alone.sum() >= 3 and seen == alone.sum() and np.ptp(depth[alone]) > 0.2 * depth.max()
 
 
 def test_normals_point_from_a_to_b(shown, box):
@@ -224,10 +225,10 @@ def test_normals_point_from_a_to_b(shown, box):
     manifolds = query.manifolds()
     assert np.allclose(manifolds.manifolds["normal"], [[0, 1, 0]])
     view = shown([box], instances, manifolds=manifolds, opacity=0, azimuth=0, elevation=0)
-    black = view.picture().max(axis=2) < 60
+    dark = view.picture()[:, :270].max(axis=2) < 150  # the bar of depths is on the right
     centre = manifolds.manifolds["centre"][0]
     reach = viewer.NORMAL_LENGTH * np.sqrt(3)  # the diagonal of the box is sqrt(3)
-    columns = np.flatnonzero(black[int(projected(view, centre)[1])])
+    columns = np.flatnonzero(dark[int(projected(view, centre)[1])])
     start, end = (projected(view, centre + [0, y, 0])[0] for y in (0, reach))
     assert abs(columns[0] - start) <= viewer.POINT_PIXELS and abs(columns[-1] - end) <= 2
 
@@ -255,7 +256,7 @@ def test_nothing_found_draws_nothing(shown, box):
 def test_boxes_of_every_depth_hold_the_mesh(cow):
     triangles = cow.triangles()
     depth = cow.levels[0].depth
-    np.testing.assert_array_equal(tree.boxes(cow, 0), cow.bounds[None])
+    np.testing.assert_allclose(tree.boxes(cow, 0), cow.bounds[None], atol=1e-6)
     count = 0
     for at in range(depth + 1):
         boxes = tree.boxes(cow, at)
@@ -264,7 +265,6 @@ def test_boxes_of_every_depth_hold_the_mesh(cow):
         count = len(boxes)
     assert count == len(triangles)
     assert len(tree.boxes(cow, depth + 3)) == count
-    np.testing.assert_allclose(tree.boxes(cow, depth)[:, 0], triangles.min(axis=1), atol=1e-6) if depth == 1 else None
     with pytest.raises(IndexError):
         tree.boxes(cow, 1, level=1)
     with pytest.raises(ValueError):
@@ -274,14 +274,14 @@ def test_boxes_of_every_depth_hold_the_mesh(cow):
 def test_edges_of_boxes_are_drawn_at_the_poses_of_bodies(shown, box):
     instances = tandem.instances([0, 0], rotation=[np.eye(3), TURNED], translation=[[0, 0, 0], [0, 3, 0]])
     view = shown([box], instances, tree_depth=0, opacity=0)
-    picture = hues(view.picture())
-    blue = (hue_distance(picture[..., 0], BLUE) < 0.08) & (picture[..., 1] > 0.2)
+    lines = ~is_backdrop(view.picture())
     low, high = box.bounds
     for row in instances:
         for axis in range(3):
             middle = np.where(np.arange(3) == axis, (low + high) / 2, high)
             x, y, _ = projected(view, row["rotation"] @ middle + row["translation"])
-            assert blue[int(y) - 1:int(y) + 2, int(x) - 1:int(x) + 2].any()
+            assert lines[int(y) - 1:int(y) + 2, int(x) - 1:int(x) + 2].any()
+    assert lines.mean() < 0.1
     view.show_tree(None)
     assert is_backdrop(view.picture()).all()
 

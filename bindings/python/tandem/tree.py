@@ -43,7 +43,7 @@ def boxes(asset: tandem.Asset, depth: int, level: int = 0) -> NDArray[np.float64
 
 
 def _blocks(asset: tandem.Asset, level: int) -> NDArray[np.void]:
-    raw = bytes(asset)
+    raw = asset.data
     count = int(np.frombuffer(raw, "<u4", 1, _SECTION_COUNT)[0])
     table = np.frombuffer(raw, _SECTION, count, _SECTION_TABLE)
     wanted = asset.first_level + level

@@ -1,7 +1,10 @@
 """tandem.view(): what its pictures show, and where. The project's own z-buffer (scripts/render.py) says what ought to be there."""
 import colorsys
+import json
 import os
 import pathlib
+import re
+import shlex
 import subprocess
 import sys
 
@@ -423,4 +426,27 @@ def test_the_command_says_what_is_wrong(tmp_path):
 def test_info_prints_statistics(box, tmp_path):
     box.save(tmp_path / "box.bvh")
     result = command("info", tmp_path / "box.bvh")
-    assert result.returncode == 0 and __import__("json").loads(result.stdout) == box.statistics()
+    assert result.returncode == 0 and json.loads(result.stdout) == box.statistics()
+
+
+def test_what_the_page_shows_works(shown, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    build, bench = (os.environ[name] for name in ("TANDEM_BVHBUILD", "TANDEM_BVHBENCH"))
+    (tmp_path / "slab.obj").write_text("v -20 -20 0\nv 20 -20 0\nv 20 20 0\nv -20 20 0\nf 1 2 3 4\n")
+    for command_line in ([build, SOURCE_DIR / "assets/cow_1500.obj", "-o", "cow.bvh"], [build, "slab.obj", "-o", "slab.bvh"],
+                         [bench, "scene", "lattice", "--mesh", "cow.bvh", "--count", "8", "-o", "scene.h5"],
+                         [bench, "simulate", "pile", "--mesh", "cow.bvh", "--ground", "slab.bvh", "--count", "2", "--frames", "120",
+                          "--trajectory", "60", "-o", "run.h5"]):
+        subprocess.run(command_line, check=True, capture_output=True)
+    page = (SOURCE_DIR / "docs/python_view.md").read_text()
+    (code,), (shell,) = (re.findall(rf"^```{language}\n(.*?)^```", page, re.MULTILINE | re.DOTALL) for language in ("python", "sh"))
+    on_screen = tandem.view
+    monkeypatch.setattr(tandem, "view", lambda *what, **options: on_screen(*what, **{"off_screen": True, **options}))
+    names = {}
+    exec(code, names)
+    assert names["image"].shape == (562, 900, 3) and (tmp_path / "step.png").exists()
+    for line in shell.splitlines():
+        words = shlex.split(line, comments=True)
+        assert words[:3] == ["python3", "-m", "tandem"]
+        result = command(*words[3:], *(["-o", "picture.png"] if words[3] == "view" and "-o" not in words else []))
+        assert (result.returncode, result.stderr) == (0, ""), line

@@ -152,7 +152,7 @@ class Asset:
     @property
     def first_level(self) -> int:
         """The file's number of the finest level that the asset shows."""
-        return self._info["first_level"]
+        return int(self._info["first_level"])
 
     def triangles(self, level: int = 0) -> npt.NDArray[np.float64]:
         """Corners of a level's triangles, (n, 3, 3), in the mesh file's coordinates; triangles as contacts number them."""

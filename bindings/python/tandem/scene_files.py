@@ -6,7 +6,7 @@ import os
 import pathlib
 from typing import Any
 
-import h5py
+import h5py  # type: ignore[import-untyped,import-not-found,unused-ignore]
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,6 +1,8 @@
 """The tree of an asset: boxes of its nodes, for pictures and statistics."""
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -54,7 +56,7 @@ def _blocks(asset: tandem.Asset, level: int) -> NDArray[np.void]:
 _NODE = np.dtype([("centre", "<f4", 3), ("half_extent", "<f4", 3), ("index", "<u4"), ("kind", "<u4")])
 
 
-def _nodes(blocks: NDArray[np.void], row: NDArray[np.integer]) -> NDArray[np.void]:
+def _nodes(blocks: NDArray[np.void], row: NDArray[Any]) -> NDArray[np.void]:
     """The nodes of some blocks that are not imaginary."""
     nodes = np.empty((len(row), 4), _NODE)
     for name in ("centre", "half_extent"):

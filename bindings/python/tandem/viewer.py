@@ -1,14 +1,12 @@
 """tandem.view(): bodies, what queries found, levels of detail and trees, in a window or as a picture. Needs pyvista."""
 from __future__ import annotations
 
+import importlib
 import os
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
-import matplotlib
 import numpy as np
-import pyvista
-import vtk
 from numpy.typing import ArrayLike, NDArray
 
 import tandem
@@ -16,6 +14,14 @@ from tandem import tree
 
 if TYPE_CHECKING:
     from tandem.scene_files import Scene
+
+# matplotlib and vtk have no types, and what pyvista's decorators make of its own says nothing to mypy.
+matplotlib: Any = importlib.import_module("matplotlib")
+pyvista: Any = importlib.import_module("pyvista")
+vtk: Any = importlib.import_module("vtk")
+
+Points = NDArray[np.float64]
+Mesh = Any  # pyvista.PolyData
 
 BODY_COLOURS = ("bf826e", "d4ad7a", "9da985", "789997", "8294ac", "9f8aa3", "c69da1", "bcb693", "90a7b8", "a88673",
                 "decaa5", "838da2")
@@ -180,17 +186,18 @@ class View:
         self._length = float(np.median(diagonal[self._asset[self._subject]]))
         self.origin = self._centres(len(self.scene.steps) - 1)[self._subject].mean(axis=0)
 
-    def _centres(self, state: int) -> NDArray[np.float64]:
+    def _centres(self, state: int) -> Points:
         """Where the middles of the bodies' meshes are, (n, 3), in the world."""
-        turned = np.einsum("nij,nj->ni", self.scene.rotation[state], self._middle[self._asset])
-        return turned + self.scene.translation[state]
+        found: Points = np.einsum("nij,nj->ni", self.scene.rotation[state], self._middle[self._asset]) + self.scene.translation[state]
+        return found
 
-    def _posed(self, body: NDArray[Any], points: NDArray[np.float64], state: int | None = None) -> NDArray[np.float64]:
+    def _posed(self, body: NDArray[Any], points: Points, state: int | None = None) -> Points:
         """Points (n, k, 3) of bodies (n,), in the coordinates of their meshes, as they are drawn."""
         state = self.state if state is None else state
         about = points - self._middle[self._asset[body]][:, None]
-        turned = np.einsum("nij,nkj->nki", self.scene.rotation[state][body], about)
-        return turned + (self._centres(state)[body] - self.origin)[:, None]
+        turned: Points = np.einsum("nij,nkj->nki", self.scene.rotation[state][body], about)
+        turned += (self._centres(state)[body] - self.origin)[:, None]
+        return turned
 
     def _open(self, off_screen: bool, size: tuple[int, int]) -> None:
         self.plotter = _plotter(off_screen, size)
@@ -261,7 +268,7 @@ class View:
             return _level_colours(int(self._level.max()) + 1)[self._level]
         number = self.scene.asset if self._color == "asset" else np.arange(len(self._asset))
         palette = np.array([_rgb(name) for name in BODY_COLOURS], np.uint8)
-        colour = palette[number * 5 % len(palette)]
+        colour: NDArray[np.uint8] = palette[number * 5 % len(palette)]
         colour[self._motion == tandem.FIXED] = _rgb(FIXED_COLOUR)
         return colour
 
@@ -273,9 +280,9 @@ class View:
             found = self._query.contacts(instances)
             contacts = found if contacts is True else contacts
             manifolds = self._query.manifolds() if manifolds is True else manifolds
-        if contacts is not False:
+        if not isinstance(contacts, bool):
             self._draw_contacts(contacts)
-        if manifolds is not False:
+        if not isinstance(manifolds, bool):
             self._draw_manifolds(manifolds)
         if self._distances is not None:
             self._draw_distances(self._distances)
@@ -321,13 +328,13 @@ class View:
             edges = _wireframe(np.concatenate(corners))
         self._put("tree", edges, color=TREE_COLOUR, line_width=1, opacity=0.6)
 
-    def _boxes_of(self, row: int) -> NDArray[np.float64]:
+    def _boxes_of(self, row: int) -> Points:
         """The corners of the boxes of all bodies that show an asset, (n, 8, 3)."""
         corners = _corners(tree.boxes(self._assets[row], self.tree_depth or 0))
         body = np.flatnonzero((self._asset == row) & self._subject)
         return self._posed(np.repeat(body, len(corners)), np.tile(corners, (len(body), 1, 1)))
 
-    def _put(self, name: str, mesh: pyvista.PolyData | None, **options: Any) -> None:
+    def _put(self, name: str, mesh: Mesh | None, **options: Any) -> None:
         """Draws a mesh in the place of what had its name."""
         if mesh is None:
             self.plotter.remove_actor(name, reset_camera=False, render=False)
@@ -358,7 +365,7 @@ def _scene(what: Any, instances: NDArray[np.void] | None) -> Scene:
     return scene
 
 
-def _plotter(off_screen: bool, size: tuple[int, int]) -> pyvista.Plotter:
+def _plotter(off_screen: bool, size: tuple[int, int]) -> Any:
     """With its window made. Off screen VTK looks for a display first and would say on stderr that there is none."""
     told = vtk.vtkLogger.GetCurrentVerbosityCutoff()
     if off_screen:
@@ -372,18 +379,18 @@ def _plotter(off_screen: bool, size: tuple[int, int]) -> pyvista.Plotter:
     return plotter
 
 
-def _surface(triangles: NDArray[np.float64]) -> pyvista.PolyData:
+def _surface(triangles: Points) -> Mesh:
     """Of corners (n, 3, 3); without joined vertices, so that faces look flat."""
     return pyvista.PolyData.from_regular_faces(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3))
 
 
-def _corners(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+def _corners(boxes: Points) -> Points:
     """Of boxes (n, 2, 3), (n, 8, 3): corner i is upper along axis k where bit k of i is set."""
     high = np.array([[i >> k & 1 for k in range(3)] for i in range(8)], bool)
     return np.where(high, boxes[:, 1, None], boxes[:, 0, None])
 
 
-def _wireframe(corners: NDArray[np.float64]) -> pyvista.PolyData:
+def _wireframe(corners: Points) -> Mesh:
     """The edges of boxes whose _corners() these are."""
     ends = np.array([[i, i | 1 << k] for k in range(3) for i in range(8) if not i >> k & 1])
     lines = (np.arange(len(corners))[:, None, None] * 8 + ends).reshape(-1, 2)
@@ -391,7 +398,7 @@ def _wireframe(corners: NDArray[np.float64]) -> pyvista.PolyData:
     return pyvista.PolyData(corners.reshape(-1, 3), lines=cells.ravel())
 
 
-def _quaternions(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
+def _quaternions(rotation: Points) -> Points:
     """w, x, y, z of rotations (n, 3, 3): of the four columns of 4 q q^T the longest, normalised."""
     r = np.moveaxis(rotation, 0, -1)
     s = np.array([[1 + r[0, 0] + r[1, 1] + r[2, 2], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]],
@@ -399,20 +406,22 @@ def _quaternions(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
                   [r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], 1 - r[0, 0] + r[1, 1] - r[2, 2], r[1, 2] + r[2, 1]],
                   [r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], 1 - r[0, 0] - r[1, 1] + r[2, 2]]])
     longest = np.argmax(np.einsum("iin->in", s), axis=0)
-    found = s[longest, :, np.arange(len(rotation))]
-    return found / np.linalg.norm(found, axis=1, keepdims=True)
+    found: Points = s[longest, :, np.arange(len(rotation))].copy()
+    found /= np.linalg.norm(found, axis=1, keepdims=True)
+    return found
 
 
 def _level_colours(count: int) -> NDArray[np.uint8]:
     """Of the finest first, (count, 3)."""
-    return matplotlib.colormaps["viridis"](np.linspace(0, 1, count), bytes=True)[:, :3]
+    colours: NDArray[np.uint8] = matplotlib.colormaps["viridis"](np.linspace(0, 1, count), bytes=True)[:, :3]
+    return colours
 
 
 def _rgb(name: str) -> tuple[int, ...]:
     return tuple(bytes.fromhex(name))
 
 
-def _from_zero(values: NDArray[np.float64]) -> tuple[float, float]:
+def _from_zero(values: Points) -> tuple[float, float]:
     return 0.0, float(values.max(initial=0)) or 1.0
 
 

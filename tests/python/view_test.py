@@ -416,7 +416,12 @@ def test_the_command_writes_the_picture_that_view_makes(box, tmp_path):
     assert np.array_equal(written, tandem.view(tmp_path / "run.h5", off_screen=True, step=5, manifolds=True, size=SIZE))
 
 
-def test_the_command_says_what_is_wrong(tmp_path):
+def test_the_command_says_what_is_wrong(box, tmp_path, monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    box.save(tmp_path / "box.bvh")
+    result = command("view", tmp_path / "box.bvh")
+    text = "tandem: there is no display for a window; picture= and off_screen=True draw without one\n"
+    assert (result.returncode, result.stderr) == (2, text)
     (tmp_path / "broken.bvh").write_bytes(b"no asset")
     result = command("view", tmp_path / "broken.bvh", "-o", tmp_path / "a.png")
     assert result.returncode == 2 and result.stderr.startswith("tandem: ") and "broken.bvh" in result.stderr

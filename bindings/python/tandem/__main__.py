@@ -16,14 +16,14 @@ import tandem
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Runs a command. Returns the exit code: 0 done, 1 usage, 2 input could not be read."""
+    """Runs a command. Returns the exit code: 0 done, 1 usage, 2 input could not be read, or there is nothing to draw on."""
     options = _parser().parse_args(arguments)
     try:
         options.run(options)
     except ImportError as error:
         print(f"tandem: {error}; python -m pip install tandem[view] has it", file=sys.stderr)
         return 1
-    except (OSError, ValueError, tandem.Error) as error:
+    except (OSError, RuntimeError, ValueError, tandem.Error) as error:
         print(f"tandem: {error}", file=sys.stderr)
         return 2
     return 0

@@ -82,7 +82,8 @@ class View:
     size: width and height in pixels.
     azimuth, elevation: degrees. From where one looks: 0 from +x, 90 from +y; above the horizon, z is up.
 
-    Raises ValueError for arguments that do not fit together, and what reading files and queries raise.
+    Raises ValueError for arguments that do not fit together, RuntimeError where there is nothing to draw with, and what
+    reading files and queries raise.
     """
 
     def __init__(self, what: Any, instances: NDArray[np.void] | None = None, *,
@@ -366,14 +367,18 @@ def _scene(what: Any, instances: NDArray[np.void] | None) -> Scene:
 
 
 def _plotter(off_screen: bool, size: tuple[int, int]) -> Any:
-    """With its window made. Off screen VTK looks for a display first and would say on stderr that there is none."""
+    """With its window made. VTK looks for a display first, then for what draws without, and says on stderr what it misses."""
     told = vtk.vtkLogger.GetCurrentVerbosityCutoff()
-    if off_screen:
-        vtk.vtkLogger.SetStderrVerbosity(vtk.vtkLogger.VERBOSITY_ERROR)
+    vtk.vtkLogger.SetStderrVerbosity(vtk.vtkLogger.VERBOSITY_ERROR)
     try:
-        plotter = pyvista.Plotter(off_screen=off_screen, window_size=list(size), lighting='three lights')
+        plotter = pyvista.Plotter(off_screen=off_screen, window_size=list(size), lighting="three lights")
+        window = plotter.render_window
         if off_screen:
-            plotter.render_window.Initialize()
+            window.Initialize()
+            if not window.GetInitialized():
+                raise RuntimeError("VTK finds nothing to draw with: neither EGL (Debian: libegl1 libgl1-mesa-dri) nor OSMesa")
+        elif not plotter.notebook and window.GetClassName() in ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow"):
+            raise RuntimeError("there is no display for a window; picture= and off_screen=True draw without one")
     finally:
         vtk.vtkLogger.SetStderrVerbosity(told)
     return plotter

@@ -345,13 +345,16 @@ def test_a_run_shows_its_steps_and_sliders_choose(shown, box, tmp_path):
     assert scene.steps.tolist() == [0, 5, 10]
     corners = scene.rotation[1, 1] @ BOX_VERTICES.T + scene.translation[1, 1][:, None]
     np.testing.assert_allclose([corners.min(axis=1), corners.max(axis=1)], [[-0.5, 1.4, -0.5], [0.5, 2.4, 0.5]], atol=1e-12)
-    view = shown(tmp_path / "run.h5", contacts=True, opacity=0.5)
+    view = shown(tmp_path / "run.h5", contacts=True, manifolds=True, opacity=0.5)
     assert view.state == 2
+    far = view.picture()
     for step, meets in ((0, True), (5, False), (0, True)):
         view.show_step(step)
         saturated = hues(view.picture())
         red = (hue_distance(saturated[..., 0], RED) < 0.05) & (saturated[..., 1] > 0.6)
         assert red.any() == meets
+    view.show_step(10)
+    assert np.array_equal(view.picture(), far)  # without contacts, points, or the bar of their depths
     with pytest.raises(ValueError, match=r"step 3: the run keeps the states after \[0, 5, 10\]"):
         view.show_step(3)
     view.show_tree(1)

@@ -337,6 +337,9 @@ class View:
 
     def _put(self, name: str, mesh: Mesh | None, **options: Any) -> None:
         """Draws a mesh in the place of what had its name."""
+        title = options.get("scalars")
+        if title in self.plotter.scalar_bars:
+            self.plotter.remove_scalar_bar(title)
         if mesh is None:
             self.plotter.remove_actor(name, reset_camera=False, render=False)
             return

@@ -11,7 +11,7 @@ names = ["table", "post", "shelf", "base", "upper arm", "forearm", "gripper"]
 assets = [tandem.build(*mesh) for mesh in (
     box((1.7, 1.7, 0.1), (0, 0, -0.05)), rod(0.04, 0.62), box((0.5, 0.3, 0.03)), rod(0.12, 0.3),
     box((UPPER_ARM, 0.1, 0.1), (UPPER_ARM / 2, 0, 0)), box((FOREARM, 0.07, 0.07), (FOREARM / 2, 0, 0)), rod(0.05, 0.12, 32))]
-cell_at = [[0, 0, 0], [0.55, 0.55, 0], [-0.1, 0.8, 0.75]]
+cell_at = [[0, 0, 0], [0.55, 0.55, 0], [-0.15, 0.8, 0.75]]
 
 
 def poses(turn, shoulder, elbow):
@@ -47,7 +47,7 @@ def tightest(lift):
 for lift in range(30, 71, 5):
     distance, (a, b), turn, instances, found = tightest(lift)
     safe = distance > 0.02
-    print(f"lifted by {lift} degrees: {distance:.4f} m between {names[a]} and {names[b]} at {turn} degrees", "- safe" if safe else "")
+    print(f"lifted by {lift} degrees: {distance:.4f} m between {names[a]} and {names[b]}, turned by {turn}:", "safe" if safe else "too near")
     if safe:
         break
 

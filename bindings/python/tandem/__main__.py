@@ -16,7 +16,7 @@ import tandem
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Runs a command. Returns the exit code: 0 done, 1 usage, 2 input could not be read, or there is nothing to draw on."""
+    """Runs a command. Returns the exit code: 0 done, 1 usage, 2 input cannot be read, or nothing to draw on."""
     options = _parser().parse_args(arguments)
     try:
         options.run(options)
@@ -39,12 +39,14 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="view|info")
     view = commands.add_parser("view", help="shows a scene, a run, or an asset")
     view.add_argument("file", type=pathlib.Path, help="scene file, run file, or .bvh file")
-    view.add_argument("-o", "--output", type=pathlib.Path, metavar="PICTURE.png", help="write a picture; no window opens")
+    view.add_argument("-o", "--output", type=pathlib.Path, metavar="PICTURE.png",
+                      help="write a picture; no window opens")
     view.add_argument("--contacts", action="store_true", help="find the triangles that meet, and draw them in red")
     view.add_argument("--manifolds", action="store_true", help="draw contact points with depths, and normals")
     view.add_argument("--level", type=int, help="of detail, of all bodies (default: those of the scene)")
     view.add_argument("--tree-depth", type=int, metavar="D", help="draw the boxes of the tree's nodes at this depth")
-    view.add_argument("--color", choices=("body", "asset", "level"), default="body", help="what has a colour of its own")
+    view.add_argument("--color", choices=("body", "asset", "level"), default="body",
+                      help="what has a colour of its own (default: body)")
     view.add_argument("--opacity", type=float, help="of the bodies, 0 to 1")
     view.add_argument("--step", type=int, help="of a run: steps made before the state (default: the last)")
     view.add_argument("--azimuth", type=float, default=-60, help="degrees; 0 from +x, 90 from +y (default: -60)")
@@ -60,9 +62,9 @@ def _parser() -> argparse.ArgumentParser:
 
 def _view(options: argparse.Namespace) -> None:
     what = tandem.Asset.load(options.file) if options.file.suffix == ".bvh" else options.file
-    tandem.view(what, picture=options.output, contacts=options.contacts, manifolds=options.manifolds, levels=options.level,
-                tree_depth=options.tree_depth, color=options.color, opacity=options.opacity, step=options.step,
-                azimuth=options.azimuth, elevation=options.elevation, size=(options.width, options.height))
+    tandem.view(what, picture=options.output, contacts=options.contacts, manifolds=options.manifolds,
+                levels=options.level, tree_depth=options.tree_depth, color=options.color, opacity=options.opacity,
+                step=options.step, azimuth=options.azimuth, elevation=options.elevation, size=(options.width, options.height))
 
 
 def _info(options: argparse.Namespace) -> None:

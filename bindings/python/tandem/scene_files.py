@@ -1,4 +1,7 @@
-"""Reads scene files, and the states that runs of bvhbench simulate keep (docs/scenes.md, docs/simulation.md). Needs h5py."""
+"""Scenes, and the states that runs of bvhbench simulate keep (docs/scenes.md, docs/simulation.md).
+
+Reading needs h5py.
+"""
 from __future__ import annotations
 
 import dataclasses
@@ -6,7 +9,6 @@ import os
 import pathlib
 from typing import Any
 
-import h5py  # type: ignore[import-untyped,import-not-found,unused-ignore]
 import numpy as np
 from numpy.typing import NDArray
 
@@ -49,6 +51,8 @@ def read(path: str | os.PathLike[str]) -> Scene:
     Raises OSError where a file is not there or is no HDF5 file, tandem.Error where an asset is broken, and ValueError,
     with the path, where something is missing.
     """
+    import h5py  # type: ignore[import-untyped,import-not-found,unused-ignore]
+
     path = pathlib.Path(path)
     with h5py.File(path) as file:
         try:
@@ -57,7 +61,7 @@ def read(path: str | os.PathLike[str]) -> Scene:
             raise ValueError(f"{path}: neither a scene nor a run: {error.args[0]}") from error
 
 
-def _read(path: pathlib.Path, file: h5py.File) -> Scene:
+def _read(path: pathlib.Path, file: Any) -> Scene:
     is_run = "bodies" in file
     group = file["bodies" if is_run else "instances"]
     asset = group["asset"][:].astype(np.uint32)
@@ -78,7 +82,7 @@ def _read(path: pathlib.Path, file: h5py.File) -> Scene:
     return Scene(assets, asset, level, motion, steps, rotation.astype(float), translation.astype(float))
 
 
-def _states(path: pathlib.Path, file: h5py.File) -> tuple[NDArray[np.int64], NDArray[Any], NDArray[Any]]:
+def _states(path: pathlib.Path, file: Any) -> tuple[NDArray[np.int64], NDArray[Any], NDArray[Any]]:
     if "trajectory" not in file:
         raise ValueError(f"{path}: keeps no state: simulate with --trajectory")
     rotation = _of_quaternions(file["trajectory/orientation"][:])

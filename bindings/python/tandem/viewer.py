@@ -4,16 +4,14 @@ from __future__ import annotations
 import importlib
 import os
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import tandem
 from tandem import tree
-
-if TYPE_CHECKING:
-    from tandem.scene_files import Scene
+from tandem.scene_files import Scene, at_levels, read
 
 # matplotlib and vtk have no types, and what pyvista's decorators make of its own says nothing to mypy.
 matplotlib: Any = importlib.import_module("matplotlib")
@@ -60,8 +58,9 @@ def view(what: Any, instances: NDArray[np.void] | None = None, *, picture: str |
 
 
 class View:
-    """A scene in a window, or off screen. `plotter` is pyvista's, for whatever else is to be drawn or saved: about `origin`, a
-    point of the world. `state` is the row of the run's states that is shown, `tree_depth` that of the boxes.
+    """A scene in a window, or off screen. `plotter` is pyvista's, for whatever else is to be drawn or saved: about
+    `origin`, a point of the world. `state` is the row of the run's states that is shown, `tree_depth` the depth of
+    the boxes.
 
     what, instances: as for view().
     contacts: tandem.Contacts of these instances, whose triangles are drawn in red; or True: a query finds them, anew
@@ -72,8 +71,8 @@ class View:
         the distance.
     levels: level of detail at which bodies are shown, one or (n,); those of the scene file, or 0. What True finds is
         found at these levels.
-    motion: what moves each body, as of tandem.Filter; that of the scene file, or tandem.MOVING. The fixed ones are grey,
-        and the others fill the picture.
+    motion: what moves each body, as of tandem.Filter; that of the scene file, or tandem.MOVING. The fixed ones are
+        grey, and the others fill the picture.
     step: of a run, show the state after so many steps; else the last, from where all of them are in the picture. In a
         window a slider chooses.
     tree_depth: the boxes of the tree's nodes at this depth, from 0 (tandem.tree.boxes()). In a window a slider chooses.
@@ -89,13 +88,15 @@ class View:
     def __init__(self, what: Any, instances: NDArray[np.void] | None = None, *,
                  contacts: tandem.Contacts | bool = False, manifolds: tandem.Manifolds | bool = False,
                  distances: tandem.Distances | None = None, levels: ArrayLike | None = None,
-                 motion: ArrayLike | None = None, step: int | None = None, tree_depth: int | None = None, color: str = "body", opacity: float | None = None,
+                 motion: ArrayLike | None = None, step: int | None = None, tree_depth: int | None = None,
+                 color: str = "body", opacity: float | None = None,
                  off_screen: bool = False, size: tuple[int, int] = (900, 562),
                  azimuth: float = -60, elevation: float = 24) -> None:
         if color not in COLORS:
             raise ValueError(f"color {color!r}: is none of {', '.join(COLORS)}")
         self.scene = _scene(what, instances)
-        self._motion = np.broadcast_to(self.scene.motion if motion is None else np.asarray(motion), self.scene.asset.shape)
+        moved = self.scene.motion if motion is None else np.asarray(motion)
+        self._motion = np.broadcast_to(moved, self.scene.asset.shape)
         self._use_levels(levels)
         for name, found in (("contacts", contacts), ("manifolds", manifolds), ("distances", distances)):
             if found not in (False, True, None) and (len(self.scene.steps) > 1 or levels is not None):
@@ -155,7 +156,8 @@ class View:
             left, right = 0.36, 0.63
         if self.tree_depth is not None:
             deepest = max(asset.levels[0].depth for asset in self._assets)
-            self._slider(lambda value: self.show_tree(round(value)), "tree depth", (0, deepest), self.tree_depth, left, right)
+            self._slider(lambda value: self.show_tree(round(value)), "tree depth", (0, deepest), self.tree_depth, left,
+                         right)
 
     def close(self) -> None:
         """Frees the window, and all that it refers to."""
@@ -164,13 +166,12 @@ class View:
 
     def _slider(self, changed: Callable[[float], None], title: str, bounds: tuple[int, int], value: int, left: float,
                 right: float) -> None:
-        self.plotter.add_slider_widget(changed, bounds, value=value, title=title, pointa=(left, 0.08), pointb=(right, 0.08),
-                                       color="black", fmt="%.0f", interaction_event="always", style="modern")
+        self.plotter.add_slider_widget(changed, bounds, value=value, title=title, pointa=(left, 0.08),
+                                       pointb=(right, 0.08), color="black", fmt="%.0f", interaction_event="always",
+                                       style="modern")
 
     def _use_levels(self, levels: ArrayLike | None) -> None:
         """Sets the assets that queries see and bodies show, of one level each, and which each body has."""
-        from tandem.scene_files import at_levels
-
         wanted = self.scene.level if levels is None else np.asarray(levels)
         self._level = np.broadcast_to(wanted, self.scene.asset.shape).astype(np.uint32)
         self._assets, self._asset = at_levels(self.scene.assets, self.scene.asset, self._level)
@@ -189,8 +190,9 @@ class View:
 
     def _centres(self, state: int) -> Points:
         """Where the middles of the bodies' meshes are, (n, 3), in the world."""
-        found: Points = np.einsum("nij,nj->ni", self.scene.rotation[state], self._middle[self._asset]) + self.scene.translation[state]
-        return found
+        centres: Points = np.einsum("nij,nj->ni", self.scene.rotation[state], self._middle[self._asset])
+        centres += self.scene.translation[state]
+        return centres
 
     def _posed(self, body: NDArray[Any], points: Points, state: int | None = None) -> Points:
         """Points (n, k, 3) of bodies (n,), in the coordinates of their meshes, as they are drawn."""
@@ -235,8 +237,8 @@ class View:
         seen = np.concatenate([self._posed(body, corners, state).reshape(-1, 3) for state in states]) @ axes.T
         width, height = self.plotter.window_size
         half = np.tan(np.radians(VIEW_ANGLE / 2)) * np.array([width / height, 1]) * (1 - 2 * MARGIN)
-        # The eye is the nearest place behind everything from which all points lie in the cone of the view. Across, it is
-        # where the cones that touch the points on either side meet.
+        # The eye is the nearest place behind everything from which all points lie in the cone of the view. Across, it
+        # is where the cones that touch the points on either side meet.
         reach = np.stack([seen[:, :2] + seen[:, 2:] * half, seen[:, :2] - seen[:, 2:] * half])
         middle = (reach[0].max(axis=0) + reach[1].min(axis=0)) / 2
         away = ((reach[0].max(axis=0) - reach[1].min(axis=0)) / (2 * half)).max()
@@ -308,8 +310,8 @@ class View:
             arrows["normal"] = found.manifolds["normal"]
             normals = arrows.glyph(orient="normal", scale=False, factor=NORMAL_LENGTH * self._length,
                                    geom=pyvista.Arrow(tip_radius=0.07, tip_length=0.3, shaft_radius=0.022))
-        self._put("points", points, scalars="depth", cmap="plasma", clim=_from_zero(found.points["depth"]), style="points",
-                  point_size=POINT_PIXELS, render_points_as_spheres=True, scalar_bar_args=_bar("depth"))
+        self._put("points", points, scalars="depth", cmap="plasma", clim=_from_zero(found.points["depth"]),
+                  style="points", point_size=POINT_PIXELS, render_points_as_spheres=True, scalar_bar_args=_bar("depth"))
         self._put("normals", normals, color=NORMAL_COLOUR, lighting=False)
 
     def _draw_distances(self, found: tandem.Distances) -> None:
@@ -350,17 +352,15 @@ class View:
 
 
 def _scene(what: Any, instances: NDArray[np.void] | None) -> Scene:
-    from tandem import scene_files
-
-    if isinstance(what, scene_files.Scene):
+    if isinstance(what, Scene):
         return what
     if isinstance(what, (str, os.PathLike)):
-        scene = scene_files.read(what)
+        scene = read(what)
     else:
         assets = [what] if isinstance(what, tandem.Asset) else list(what)
         given = tandem.instances(np.arange(len(assets))) if instances is None else instances
         count = len(given)
-        scene = scene_files.Scene(assets, given["asset"], np.zeros(count, np.uint32), np.zeros(count, np.uint8),
+        scene = Scene(assets, given["asset"], np.zeros(count, np.uint32), np.zeros(count, np.uint8),
                                   np.zeros(1, np.int64), given["rotation"][None], given["translation"][None])
     if not len(scene.asset):
         raise ValueError("there is no body to show")
@@ -370,7 +370,8 @@ def _scene(what: Any, instances: NDArray[np.void] | None) -> Scene:
 
 
 def _plotter(off_screen: bool, size: tuple[int, int]) -> Any:
-    """With its window made. VTK looks for a display first, then for what draws without, and says on stderr what it misses."""
+    """With its window made. VTK looks for a display first, then for what draws without, and says on stderr what it
+    misses."""
     told = vtk.vtkLogger.GetCurrentVerbosityCutoff()
     vtk.vtkLogger.SetStderrVerbosity(vtk.vtkLogger.VERBOSITY_ERROR)
     try:
@@ -379,7 +380,8 @@ def _plotter(off_screen: bool, size: tuple[int, int]) -> Any:
         if off_screen:
             window.Initialize()
             if not window.GetInitialized():
-                raise RuntimeError("VTK finds nothing to draw with: neither EGL (Debian: libegl1 libgl1-mesa-dri) nor OSMesa")
+                raise RuntimeError("VTK finds nothing to draw with: neither EGL (Debian: libegl1 libgl1-mesa-dri) nor "
+                                   "OSMesa")
         elif not plotter.notebook and window.GetClassName() in ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow"):
             raise RuntimeError("there is no display for a window; picture= and off_screen=True draw without one")
     finally:

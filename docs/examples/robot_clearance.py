@@ -39,7 +39,7 @@ def tightest(lift):
         instances = tandem.instances(np.arange(len(assets)), rotation=rotation, translation=translation)
         found = query.distances(instances, reach=0.5, filter=asked)
         row = found.distances["lower"].argmin()  # no two points are nearer than that: it is proved, not estimated
-        if nearest is None or found.distances["lower"][row] < nearest[0]:
+        if nearest is None or found.distances["lower"][row] < nearest[0] - 1e-6:
             nearest = found.distances["lower"][row], found.pairs[row], turn, instances, found
     return nearest
 

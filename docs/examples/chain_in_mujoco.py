@@ -27,3 +27,6 @@ while data.time < 2:
 for i in range(1, LINKS):
     below, below_alone = (2 - state.body(f"link {i}").xpos[2] for state in (data, alone))
     print(f"link {i} hangs {below:.2f} m below the first" + (", alone MuJoCo has lost it" if below_alone > 5 else ""))
+
+if "--picture" in sys.argv:
+    tandem.view(contacts.assets, contacts.instances, contacts=True, picture="chain_in_mujoco.png", size=(640, 400), azimuth=30, elevation=10)

@@ -4,17 +4,20 @@ import sys
 try:
     import warp as wp
 
-    wp.config.log_level = wp.LOG_WARNING
+    wp.config.log_level = wp.LOG_ERROR
     import newton
 except ImportError:
     print("needs the package newton")
     sys.exit(77)
 
+import numpy as np
+
 import tandem.newton
 from shapes import turned
 
 cup = turned([(0, 0), (0.18, 0), (0.18, 0.25), (0.15, 0.25), (0.15, 0.04), (0, 0.04)], 32, closed=False)
-ball = turned([(0, -0.1), (0.06, -0.08), (0.08, -0.06), (0.1, 0), (0.08, 0.06), (0.06, 0.08), (0, 0.1)], 32, closed=False)
+arc = np.linspace(-np.pi / 2, np.pi / 2, 17)
+ball = turned(np.stack([0.1 * np.cos(arc), 0.1 * np.sin(arc)], 1), 32, closed=False)
 
 wp.set_device("cpu")
 builder = newton.ModelBuilder()
@@ -33,3 +36,6 @@ for step in range(500):
     solver.step(state, following, control, contacts, 1 / 500)
     state, following = following, state
 print(f"the ball has come to rest {state.body_q.numpy()[1, 2]:.2f} m above the ground, in the cup")
+
+if "--picture" in sys.argv:
+    tandem.view(pipeline.assets, pipeline.instances, picture="cup_in_newton.png", size=(640, 400), azimuth=30, elevation=35, opacity=0.6)

@@ -36,5 +36,6 @@ def test_prints_what_the_readme_says(name, can_draw, tmp_path):
     result = run(name, *(["--picture"] if can_draw else []), folder=tmp_path)
     if result.returncode == 77:
         pytest.skip(result.stdout.strip())
-    assert (result.returncode, result.stderr, result.stdout) == (0, "", OUTPUTS[name])
+    complaints = re.sub(r"^Warp CUDA warning: .*\n", "", result.stderr, flags=re.MULTILINE)  # where Warp finds no GPU
+    assert (result.returncode, complaints, result.stdout) == (0, "", OUTPUTS[name])
     assert [path.suffix for path in tmp_path.iterdir()] == [".png"] * can_draw

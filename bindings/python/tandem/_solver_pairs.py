@@ -54,7 +54,8 @@ class Touches:
         a, b = pairs["a"].astype(np.intp), pairs["b"].astype(np.intp)
 
         def local(point: NDArray[np.float64], instance: NDArray[np.intp]) -> NDArray[np.float64]:
-            return np.einsum("nji,nj->ni", instances["rotation"][instance], point - instances["translation"][instance])
+            placed: NDArray[np.float64] = np.einsum("nji,nj->ni", instances["rotation"][instance], point - instances["translation"][instance])
+            return placed
 
         self.a, self.b = np.concatenate([self.a, a]), np.concatenate([self.b, b])
         self.normal = np.concatenate([self.normal, apart / length[:, None]])

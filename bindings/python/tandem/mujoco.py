@@ -11,9 +11,9 @@ Needs the package `mujoco`; tried with 3.17 and 4.0.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
-import mujoco
+import mujoco  # type: ignore[import-untyped,import-not-found,unused-ignore]
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,7 +46,7 @@ class MeshContacts:
     mesh geoms of the model may collide. One call at a time; for threads that each have an MjData, make one for each.
     """
 
-    def __init__(self, model: mujoco.MjModel, *, most_points: int = 7, threads: int = 1, effort: str = "default") -> None:
+    def __init__(self, model: mujoco.MjModel, *, most_points: int = 7, threads: int = 1, effort: Literal["default", "fast", "best"] = "default") -> None:
         self.model, self.most_points, self.threads = model, most_points, threads
         geom_pairs, explicit = _pairs_that_may_collide(model)
         if len(geom_pairs) == 0:
@@ -55,9 +55,10 @@ class MeshContacts:
         self._is_ours = np.zeros(model.ngeom, bool)
         self._is_ours[self.geoms] = True
         meshes, asset = np.unique(model.geom_dataid[self.geoms], return_inverse=True)
-        self._query = tandem.Query([_asset_of(model, mesh, effort) for mesh in meshes], threads=threads)
-        self._instances = np.zeros(len(self.geoms), tandem.INSTANCE)
-        self._instances["asset"] = asset
+        self.assets = [_asset_of(model, mesh, effort) for mesh in meshes]  #: of the meshes that these geoms have
+        self.instances = np.zeros(len(self.geoms), tandem.INSTANCE)  #: the geoms, posed as in the last call
+        self.instances["asset"] = asset
+        self._query = tandem.Query(self.assets, threads=threads)
         rows = np.searchsorted(self.geoms, geom_pairs)
         self._arguments = pair_arguments(len(self.geoms), rows)
         self._explicit = {(int(a), int(b)): int(pair) for (a, b), pair in zip(geom_pairs, explicit) if pair >= 0}
@@ -114,9 +115,9 @@ class MeshContacts:
         if self.model.opt.disableflags & (mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT):
             return 0
         self._drop_hull_contacts(data)
-        self._instances["rotation"] = data.geom_xmat[self.geoms].reshape(-1, 3, 3)
-        self._instances["translation"] = data.geom_xpos[self.geoms]
-        touches = Touches(self._query, self._instances, self.most_points, self._reach(), self._arguments)
+        self.instances["rotation"] = data.geom_xmat[self.geoms].reshape(-1, 3, 3)
+        self.instances["translation"] = data.geom_xpos[self.geoms]
+        touches = Touches(self._query, self.instances, self.most_points, self._reach(), self._arguments)
         geom = np.stack([self.geoms[touches.a], self.geoms[touches.b]], axis=1)
         contact = self._parameters(geom)
         contact |= {"dist": touches.gap, "pos": touches.position, "frame": _frames(touches.normal)}
@@ -163,7 +164,8 @@ class MeshContacts:
         share = np.where(first, 1.0, np.where(second, 0.0, share))[:, None]
 
         def mixed(values: NDArray[Any]) -> NDArray[Any]:
-            return share * values[geom[:, 0]] + (1 - share) * values[geom[:, 1]]
+            both = values[geom]
+            return np.asarray(share * both[:, 0] + (1 - share) * both[:, 1])
 
         def combined(values: NDArray[Any], rule: Any) -> NDArray[Any]:
             both, shape = values[geom], (-1,) + (1,) * (values.ndim - 1)
@@ -196,7 +198,7 @@ class MeshContacts:
             result[name][rows] = getattr(self.model, f"pair_{field}")[pair]
 
 
-def _asset_of(model: mujoco.MjModel, mesh: int, effort: str) -> tandem.Asset:
+def _asset_of(model: mujoco.MjModel, mesh: int, effort: Literal["default", "fast", "best"]) -> tandem.Asset:
     vertex, face = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
     vertices = model.mesh_vert[vertex:vertex + model.mesh_vertnum[mesh]].astype(np.float64)
     return tandem.build(vertices, model.mesh_face[face:face + model.mesh_facenum[mesh]], effort=effort)

@@ -9,12 +9,12 @@ Needs the package `newton`; tried with 1.8 and Warp 1.19.
 """
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
-import newton
+import newton  # type: ignore[import-untyped,import-not-found,unused-ignore]
 import numpy as np
 import numpy.typing as npt
-import warp as wp
+import warp as wp  # type: ignore[import-untyped,import-not-found,unused-ignore]
 
 import tandem
 from tandem._solver_pairs import Touches, pair_arguments
@@ -22,6 +22,7 @@ from tandem._solver_pairs import Touches, pair_arguments
 __all__ = ["CollisionPipeline"]
 
 _Array = npt.NDArray[np.float64]
+_Effort = Literal["default", "fast", "best"]
 _NOT_TAKEN = {"broad_phase": "which pairs there are is decided here", "shape_pairs_filtered": "which pairs there are is decided here",
               "contact_matching": "points of meshes have no match", "contact_report": "points of meshes have no match",
               "body_pair_reduction": "points of meshes are few", "speculative_contact_gap_max": "points of meshes are where surfaces are now"}
@@ -45,26 +46,30 @@ class CollisionPipeline:
         options: of newton.CollisionPipeline, such as rigid_contact_max, the room for contacts, of which Newton has an estimate.
     """
 
-    def __init__(self, model: newton.Model, *, most_points: int = 7, threads: int = 1, effort: Any = "default", **options: Any):
+    def __init__(self, model: newton.Model, *, most_points: int = 7, threads: int = 1, effort: _Effort = "default", **options: Any):
         for name in options.keys() & _NOT_TAKEN.keys():
             raise ValueError(f"{name} is not taken: {_NOT_TAKEN[name]}")
         self.model, self.most_points = model, most_points
-        pairs = np.sort(model.shape_contact_pairs.numpy().reshape(-1, 2).astype(np.intp), axis=1)
-        is_ours = (model.shape_type.numpy()[pairs] == newton.GeoType.MESH).all(axis=1)
-        others = wp.array(pairs[~is_ours].astype(np.int32), dtype=wp.vec2i, device=model.device)
+
+        def values(name: str) -> npt.NDArray[Any]:
+            return np.asarray(getattr(model, name).numpy())
+
+        pairs = np.sort(values("shape_contact_pairs").reshape(-1, 2).astype(np.intp), axis=1)
+        is_ours = (values("shape_type")[pairs] == newton.GeoType.MESH).all(axis=1)
+        others: Any = wp.array(pairs[~is_ours].astype(np.int32), dtype=wp.vec2i, device=model.device)
         self.others = newton.CollisionPipeline(model, broad_phase="explicit", shape_pairs_filtered=others, **options)
         self.shapes = np.unique(pairs[is_ours])  #: the mesh shapes that Tandem looks at, ascending
-        body = model.shape_body.numpy()[self.shapes]
+        body = values("shape_body")[self.shapes]
         self._body, self._is_static = np.maximum(body, 0), body < 0
-        transform = model.shape_transform.numpy().astype(np.float64)[self.shapes]
+        transform = values("shape_transform").astype(np.float64)[self.shapes]
         self._in_body = _rotations(transform), transform[:, :3]
-        self._margin = model.shape_margin.numpy().astype(np.float64)[self.shapes]
+        self._margin = values("shape_margin").astype(np.float64)[self.shapes]
+        self.assets, asset = _assets_of(model, self.shapes, effort)  #: of the meshes that these shapes have, at their scales
+        self.instances = np.zeros(len(self.shapes), tandem.INSTANCE)  #: the shapes, posed as in the last call
+        self.instances["asset"] = asset
         if len(self.shapes):
             self._arguments = pair_arguments(len(self.shapes), np.searchsorted(self.shapes, pairs[is_ours]))
-            assets, asset = _assets_of(model, self.shapes, effort)
-            self._query = tandem.Query(assets, threads=threads)
-            self._instances = np.zeros(len(self.shapes), tandem.INSTANCE)
-            self._instances["asset"] = asset
+            self._query = tandem.Query(self.assets, threads=threads)
 
     def contacts(self) -> newton.Contacts:
         """Room for the contacts of collide()."""
@@ -83,12 +88,13 @@ class CollisionPipeline:
         self.others.collide(state, contacts, **options)
         if len(self.shapes) == 0:
             return 0
-        body = state.body_q.numpy().astype(np.float64)[self._body] if len(state.body_q) else np.zeros((len(self.shapes), 7))
+        poses: Any = state.body_q
+        body = poses.numpy().astype(np.float64)[self._body] if len(poses) else np.zeros((len(self.shapes), 7))
         body[self._is_static] = 0, 0, 0, 0, 0, 0, 1
         rotation, inner = _rotations(body), self._in_body
-        self._instances["rotation"] = rotation @ inner[0]
-        self._instances["translation"] = np.einsum("nij,nj->ni", rotation, inner[1]) + body[:, :3]
-        touches = Touches(self._query, self._instances, self.most_points, 2 * float(self._margin.max()), self._arguments)
+        self.instances["rotation"] = rotation @ inner[0]
+        self.instances["translation"] = np.einsum("nij,nj->ni", rotation, inner[1]) + body[:, :3]
+        touches = Touches(self._query, self.instances, self.most_points, 2 * float(self._margin.max()), self._arguments)
         margins = self._margin[touches.a], self._margin[touches.b]
         near = touches.gap <= margins[0] + margins[1]
         sides = []
@@ -107,13 +113,15 @@ def _rotations(transforms: _Array) -> _Array:
                      2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], axis=1).reshape(-1, 3, 3)
 
 
-def _assets_of(model: newton.Model, shapes: npt.NDArray[np.intp], effort: Any) -> tuple[list[tandem.Asset], list[int]]:
+def _assets_of(model: newton.Model, shapes: npt.NDArray[np.intp], effort: _Effort) -> tuple[list[tandem.Asset], list[int]]:
     """Of each mesh and scale that the shapes have, an asset; and of each shape, which it has."""
-    scales = model.shape_scale.numpy().astype(np.float64)[shapes]
+    scale_of: Any = model.shape_scale
+    scales = scale_of.numpy().astype(np.float64)[shapes]
     places: dict[tuple[int, ...], int] = {}
-    assets, asset = [], []
+    assets: list[tandem.Asset] = []
+    asset: list[int] = []
     for shape, scale in zip(shapes, scales):
-        mesh = model.shape_source[shape]
+        mesh: Any = model.shape_source[shape]
         key = (id(mesh), *scale.view(np.int64))
         if key not in places:
             places[key] = len(assets)

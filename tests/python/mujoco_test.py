@@ -198,21 +198,41 @@ def test_contacts_with_other_geoms_stay():
 # ---- Margins
 
 
-def test_points_within_the_margin_are_nearest_points():
+def test_points_within_margin_and_gap():
     model = model_of("<geom mesh='floor' margin='0.01' gap='0.02'/>" + free("ball", "0.2 0.1 0.215"), floor=solids.box(1, 1, 0.1), ball=solids.ball(0.1))
     data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
     contacts = tandem.mujoco.MeshContacts(model)
-    assert contacts.collide(data) == 1
-    assert data.contact.dist[0] == pytest.approx(0.015, abs=1e-6) and data.contact.exclude[0] == 1  # in the gap
-    np.testing.assert_allclose(data.contact.pos[0], [0.2, 0.1, 0.1075], atol=1e-6)
-    np.testing.assert_allclose(data.contact.frame[0, :3], [0, 0, 1], atol=1e-6)
-    data.qpos[2] = 0.205
+    for height, is_in_gap in ((0.215, True), (0.205, False), (0.235, None)):
+        data.qpos[2] = height
+        mujoco.mj_kinematics(model, data)
+        count = contacts.collide(data)
+        if is_in_gap is None:
+            assert count == 0
+            continue
+        deepest = data.contact.dist.argmin()
+        assert count > 3 and data.contact.dist[deepest] == pytest.approx(height - 0.2, abs=1e-6) and data.contact.dist.max() <= 0.03
+        np.testing.assert_array_equal(data.contact.exclude, data.contact.dist >= 0.01)
+        assert data.contact.exclude[deepest] == is_in_gap
+        np.testing.assert_allclose(data.contact.pos[deepest], [0.2, 0.1, 0.1 + 0.5 * (height - 0.2)], atol=1e-6)
+        np.testing.assert_allclose(data.contact.frame[:, :3], np.tile([0, 0, 1], (count, 1)), atol=1e-6)
+
+
+def test_bodies_rest_on_their_margins():
+    """Level and still, though they never meet: all corners are contacts."""
+    model = model_of("<geom mesh='floor' margin='0.004'/>" + free("box", "0 0 0.21"), floor=solids.box(1, 1, 0.1), box=solids.box(0.1, 0.05, 0.1))
+    data = run(model, 1, tandem.mujoco.MeshContacts(model).step)
+    assert data.ncon == 4 and 0 < data.contact.dist.min() and data.contact.dist.max() < 0.004
+    assert abs(data.qpos[3]) > 1 - 1e-6 and np.abs(data.qvel).max() < 1e-3
+
+
+def test_what_is_met_only_on_the_way_is_no_contact():
+    """A box over the edge of another: moved down by the margin it is deep beside it, and shallow sideways."""
+    model = model_of(f"<geom mesh='box' margin='0.01'/>{free('box', '0.199 0 0.203')}", box=solids.box(0.1, 0.1, 0.1))
+    data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    assert contacts.collide(data) == 1 and data.contact.exclude[0] == 0
-    data.qpos[2] = 0.235
-    mujoco.mj_kinematics(model, data)
-    assert contacts.collide(data) == 0
+    assert tandem.mujoco.MeshContacts(model).collide(data) > 0
+    np.testing.assert_allclose(data.contact.dist, 0.003, atol=1e-6)
+    np.testing.assert_allclose(data.contact.frame[:, :3], np.tile([0, 0, 1], (data.ncon, 1)), atol=1e-6)
 
 
 # ---- The page

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import tandem
+
+_Array = NDArray[np.float64]
 
 
 def pair_arguments(count: int, allowed: NDArray[np.integer[Any]]) -> dict[str, Any]:
@@ -27,40 +31,57 @@ class Touches:
     """Contact points of pairs of instances, a row for each.
 
     a, b: the instances, (n,). normal: unit, from a towards b, (n, 3). position: in the world, half-way between the surfaces, (n, 3). in_a, in_b: on
-    the surfaces, in the coordinates of the assets, (n, 3). gap: how far the surfaces are apart, less than 0 where they overlap, (n,). id: of a
-    point that is the same as in the step before; 0 where surfaces are apart.
+    the surfaces, in the coordinates of the assets, (n, 3). gap: how far the surfaces are apart, less than 0 where they overlap, (n,).
     """
 
-    def __init__(self, query: tandem.Query, instances: NDArray[np.void], most_points: int, reach: float, arguments: dict[str, Any]) -> None:
-        """The points of all manifolds; and of pairs that are apart, by `reach` at most, their nearest points."""
-        query.contacts(instances, **arguments)
-        made = query.manifolds(most_points=most_points)
+    def __init__(self, query: tandem.Query, instances: NDArray[np.void], most_points: int, arguments: dict[str, Any]) -> None:
+        """The points of all manifolds. arguments: those of query.contacts() that say which pairs are asked for."""
+        self._query, self._instances, self._most_points, self._arguments = query, instances, most_points, arguments
+        self._take(query.contacts(instances, **arguments).pairs)
+
+    def _take(self, pairs: NDArray[np.void]) -> None:
+        made = self._query.manifolds(most_points=self._most_points, match_previous=False)
         manifold = made.manifolds[made.points["manifold"]]
-        pairs = made.pairs[manifold["pair"]]
-        self.a, self.b = pairs["a"].astype(np.intp), pairs["b"].astype(np.intp)
+        self.pair = manifold["pair"].astype(np.intp)  # the row among pairs
+        self.a, self.b = pairs["a"][self.pair].astype(np.intp), pairs["b"][self.pair].astype(np.intp)
         self.normal, self.position, self.gap = manifold["normal"], made.points["position"], -made.points["depth"]
-        self.in_a, self.in_b, self.id = made.points["in_a"], made.points["in_b"], made.points["id"]
-        if reach > 0:
-            self._add_near(query, instances, reach, arguments)
+        self.in_a, self.in_b = made.points["in_a"], made.points["in_b"]
 
-    def _add_near(self, query: tandem.Query, instances: NDArray[np.void], reach: float, arguments: dict[str, Any]) -> None:
-        found = query.distances(instances, reach=reach, **arguments)
-        rows = (found.distances["lower"] > 0) & (found.distances["upper"] < np.inf)
-        near, pairs = found.distances[rows], found.pairs[rows]
-        apart = near["point_b"] - near["point_a"]
-        length = np.linalg.norm(apart, axis=1)
-        certain = length > 0  # else the points are one, though the surfaces do not meet
-        near, pairs, apart, length = near[certain], pairs[certain], apart[certain], length[certain]
-        a, b = pairs["a"].astype(np.intp), pairs["b"].astype(np.intp)
+    def add_near(self, reach: Callable[[NDArray[np.intp], NDArray[np.intp]], _Array], largest: float) -> None:
+        """Adds points of pairs that are apart, by at most reach(a, b), which is at most `largest`.
 
-        def local(point: NDArray[np.float64], instance: NDArray[np.intp]) -> NDArray[np.float64]:
-            placed: NDArray[np.float64] = np.einsum("nji,nj->ni", instances["rotation"][instance], point - instances["translation"][instance])
+        One body is moved towards the other by the reach, in the direction of their nearest points. The points of the manifolds that it then has are
+        those that are within reach along that direction; it is moved back with them. A pair that has no manifold even so has its nearest points.
+        """
+        found = self._query.distances(self._instances, reach=largest, **self._arguments)
+        a, b = found.pairs["a"].astype(np.intp), found.pairs["b"].astype(np.intp)
+        way = found.distances["point_b"] - found.distances["point_a"]
+        gap, within = np.linalg.norm(way, axis=1), reach(a, b)
+        rows = (found.distances["lower"] > 0) & (gap > 0) & (gap <= within)
+        if not rows.any():
+            return
+        a, b, gap, within, near = a[rows], b[rows], gap[rows], within[rows], found.distances[rows]
+        way = way[rows] / gap[:, None]
+        moved = self._instances[np.stack([a, b], axis=1).ravel()]  # each pair has two instances of its own
+        moved["translation"][1::2] -= within[:, None] * way
+        touches = copy.copy(self)
+        touches._take(self._query.contacts(moved, pairs=np.arange(2 * len(a)).reshape(-1, 2)).pairs)
+        back = (within[:, None] * way)[touches.pair]
+        gap_back = touches.gap + np.einsum("ni,ni->n", back, touches.normal)
+        # No surfaces are nearer than `lower`: what seems so met on the way, and not along it. Depths are right to a hundredth.
+        least = near["lower"][touches.pair]
+        true = gap_back >= least - 0.02 * within[touches.pair]
+        row = touches.pair[true]
+        alone = np.setdiff1d(np.arange(len(a)), row)
+
+        def local(point: _Array, instance: NDArray[np.intp]) -> _Array:
+            placed: _Array = np.einsum("nji,nj->ni", self._instances["rotation"][instance], point - self._instances["translation"][instance])
             return placed
 
-        self.a, self.b = np.concatenate([self.a, a]), np.concatenate([self.b, b])
-        self.normal = np.concatenate([self.normal, apart / length[:, None]])
-        self.position = np.concatenate([self.position, 0.5 * (near["point_a"] + near["point_b"])])
-        self.gap = np.concatenate([self.gap, length])
-        self.in_a = np.concatenate([self.in_a, local(near["point_a"], a)])
-        self.in_b = np.concatenate([self.in_b, local(near["point_b"], b)])
-        self.id = np.concatenate([self.id, np.zeros(len(a), np.uint64)])
+        for name, of_manifolds, of_nearest in (
+            ("a", a[row], a[alone]), ("b", b[row], b[alone]), ("normal", touches.normal[true], way[alone]),
+            ("position", (touches.position + 0.5 * back)[true], 0.5 * (near["point_a"] + near["point_b"])[alone]),
+            ("in_a", touches.in_a[true], local(near["point_a"][alone], a[alone])), ("in_b", touches.in_b[true], local(near["point_b"][alone], b[alone])),
+            ("gap", np.maximum(gap_back, least)[true], gap[alone]),
+        ):
+            setattr(self, name, np.concatenate([getattr(self, name), of_manifolds, of_nearest]))

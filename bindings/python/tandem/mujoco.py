@@ -35,7 +35,7 @@ class MeshContacts:
     """Finds the contacts between mesh geoms of a model by Tandem, and leaves all others to MuJoCo.
 
     The meshes are those of the model, with all their faces; their hulls play no part. A pair of geoms has the points of its manifolds, each
-    with the manifold's normal and its depth; where it is apart by less than its margin and gap, its nearest points. Which pairs may collide is
+    with the manifold's normal and its depth; where it is apart by less than its margin and gap, the points that are, found along the way from one to the other. Which pairs may collide is
     MuJoCo's rule (contype and conaffinity, weld and parent bodies, <exclude>, <pair>), taken from the model when this is made; the callback
     mjcb_contactfilter is not asked. Margin, gap, condim, friction, solref, solimp and what else a contact has are combined as MuJoCo does, from the
     model as it is in each call.
@@ -117,7 +117,9 @@ class MeshContacts:
         self._drop_hull_contacts(data)
         self.instances["rotation"] = data.geom_xmat[self.geoms].reshape(-1, 3, 3)
         self.instances["translation"] = data.geom_xpos[self.geoms]
-        touches = Touches(self._query, self.instances, self.most_points, self._reach(), self._arguments)
+        touches = Touches(self._query, self.instances, self.most_points, self._arguments)
+        if (reach := self._reach()) > 0:
+            touches.add_near(self._reach_of, reach)
         geom = np.stack([self.geoms[touches.a], self.geoms[touches.b]], axis=1)
         contact = self._parameters(geom)
         contact |= {"dist": touches.gap, "pos": touches.position, "frame": _frames(touches.normal)}
@@ -152,6 +154,10 @@ class MeshContacts:
             return float(margin + gap.max(initial=0))
         one = (model.geom_margin + model.geom_gap)[self.geoms]
         return float(np.concatenate([2 * one, (model.pair_margin + model.pair_gap)[pairs]]).max(initial=0))
+
+    def _reach_of(self, a: NDArray[np.intp], b: NDArray[np.intp]) -> _Array:
+        contact = self._parameters(np.stack([self.geoms[a], self.geoms[b]], axis=1))
+        return np.asarray(contact["includemargin"] + contact["gap"])
 
     def _parameters(self, geom: NDArray[np.intp]) -> dict[str, Any]:
         """What MuJoCo combines of the properties of two geoms (n, 2), or takes from the <pair> that they are, by the names of MjContact; and `gap`."""

@@ -32,7 +32,7 @@ class CollisionPipeline:
     """Newton's collision pipeline, but that Tandem finds the contacts between meshes.
 
     Pairs of mesh shapes have the points of their manifolds, each with the manifold's normal and the points of both surfaces; where shapes have margins
-    and the surfaces are apart by less than both, the nearest points. Gaps, by which Newton looks for contacts before there are any, play no part between
+    and the surfaces are apart by less than both, the points that are, found along the way from one to the other. Gaps, by which Newton looks for contacts before there are any, play no part between
     meshes: collide in every substep. All other pairs, particles and soft contacts are Newton's. Which pairs may collide is told by
     model.shape_contact_pairs, as it is when this is made. Meshes of a model on a GPU are looked at by the CPU, and collide() waits for the GPU.
 
@@ -94,7 +94,9 @@ class CollisionPipeline:
         rotation, inner = _rotations(body), self._in_body
         self.instances["rotation"] = rotation @ inner[0]
         self.instances["translation"] = np.einsum("nij,nj->ni", rotation, inner[1]) + body[:, :3]
-        touches = Touches(self._query, self.instances, self.most_points, 2 * float(self._margin.max()), self._arguments)
+        touches = Touches(self._query, self.instances, self.most_points, self._arguments)
+        if self._margin.max() > 0:
+            touches.add_near(lambda a, b: self._margin[a] + self._margin[b], 2 * float(self._margin.max()))
         margins = self._margin[touches.a], self._margin[touches.b]
         near = touches.gap <= margins[0] + margins[1]
         sides = []

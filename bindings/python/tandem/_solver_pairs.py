@@ -41,10 +41,10 @@ class Touches:
 
     def _take(self, pairs: NDArray[np.void]) -> None:
         made = self._query.manifolds(most_points=self._most_points, match_previous=False)
-        manifold = made.manifolds[made.points["manifold"]]
-        self.pair = manifold["pair"].astype(np.intp)  # the row among pairs
+        manifold = made.points["manifold"]
+        self.pair = made.manifolds["pair"][manifold].astype(np.intp)  # the row among pairs
         self.a, self.b = pairs["a"][self.pair].astype(np.intp), pairs["b"][self.pair].astype(np.intp)
-        self.normal, self.position, self.gap = manifold["normal"], made.points["position"], -made.points["depth"]
+        self.normal, self.position, self.gap = made.manifolds["normal"][manifold], made.points["position"], -made.points["depth"]
         self.in_a, self.in_b = made.points["in_a"], made.points["in_b"]
 
     def add_near(self, reach: Callable[[NDArray[np.intp], NDArray[np.intp]], _Array], largest: float) -> None:

@@ -1,0 +1,412 @@
+"""Bodies at their places and what a query finds between them: what `tandem.trimesh` is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import trimesh.triangles
+
+from . import INSIDE, INSTANCE, NO_INDEX, Asset, Filter, Query, build
+from ._convex import Overlap, Solid, face_overlaps, overlap
+
+RIGID = 4e-7  # what a pose may be off: queries take 1e-6, by another measure of the same matrix
+ROUNDING = 1e-5  # a matrix that is so near to a rotation is meant to be one
+PRECISION = 1e-12  # of distances, relative
+FEW_PAIRS = 64  # whose distances are asked for at once
+MEETING_STEPS = 32
+
+
+@dataclass(slots=True)
+class Contact:
+    """What trimesh's ContactData takes: bodies a and b, their faces, and where, along what and how deep they meet. The normal points from a to b."""
+
+    a: int
+    b: int
+    b1: int
+    b2: int
+    normal: np.ndarray
+    pos: np.ndarray
+    penetration_depth: float
+
+
+@dataclass(slots=True)
+class Nearest:
+    """What trimesh's DistanceData takes: bodies a and b, how far apart they are, their nearest points, and the faces these are on."""
+
+    a: int
+    b: int
+    min_distance: float
+    nearest_points: Sequence[np.ndarray | None]
+    b1: int
+    b2: int
+
+
+class Shape:
+    """What a mesh is to queries: an asset, and whether it is solid."""
+
+    def __init__(self, vertices: np.ndarray, faces: np.ndarray, is_convex: bool) -> None:
+        self.vertices = vertices
+        self.faces = faces
+        self.is_convex = is_convex
+        self.asset: Asset = build(vertices, faces, effort="fast", gpu_blocks=False)
+        low, high = self.asset.bounds
+        self.middle, self.radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
+        self._solid: Solid | None = None
+        self._stretched: tuple[bytes, Shape] | None = None
+
+    @staticmethod
+    def of(mesh: Any) -> Shape:
+        """The shape of a trimesh.Trimesh, which the mesh keeps as long as it does not change."""
+        is_convex = bool(mesh.is_convex)
+        shape = mesh._cache["tandem"]
+        if shape is None:
+            shape = Shape(np.array(mesh.vertices, np.float64), np.array(mesh.faces), is_convex)
+            mesh._cache["tandem"] = shape
+        return shape
+
+    def stretched(self, stretch: np.ndarray) -> Shape:
+        """The shape with every vertex v at stretch v. The last one is kept."""
+        key = stretch.tobytes()
+        if self._stretched is None or self._stretched[0] != key:
+            # Mirrored triangles would face inwards.
+            faces = self.faces if np.linalg.det(stretch) > 0 else self.faces[:, ::-1]
+            self._stretched = key, Shape(self.vertices @ stretch.T, faces, self.is_convex)
+        return self._stretched[1]
+
+    def solid(self) -> Solid:
+        """The convex hull."""
+        if self._solid is None:
+            self._solid = Solid(self.vertices[np.unique(self.faces)])
+        return self._solid
+
+
+def _rotation_and_stretch(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+    """The rotation and the symmetric stretch, None where there is none, whose product a matrix (3, 3) is. Digits beyond the twelfth of the stretch are
+    dropped, so that a stretched body that turns keeps its shape."""
+    left, sizes, right = np.linalg.svd(matrix)
+    rotation = left @ right
+    stretch = right.T * sizes @ right
+    if np.linalg.det(rotation) < 0:
+        rotation, stretch = -rotation, -stretch
+    if np.abs(stretch - np.eye(3)).max() <= ROUNDING:
+        return rotation, None
+    unit = 2.0 ** np.ceil(np.log2(sizes[0])) if sizes[0] > 0 else 1.0
+    return rotation, np.round(stretch / unit, 12) * unit + 0.0  # not -0
+
+
+class Bodies:
+    """Shapes at places, with names. The places are (4, 4) matrices.
+
+    Attributes: `rows`, array of tandem.INSTANCE; `shapes`, those that the rows' assets are of; `convex` (n,), which are.
+    """
+
+    def __init__(self, names: list[Hashable], shapes: list[Shape], places: list[np.ndarray]) -> None:
+        self.names = names
+        self._given = shapes
+        self.rows = np.zeros(len(names), INSTANCE)
+        self.convex = np.array([shape.is_convex for shape in shapes], bool)
+        self.shapes: list[Shape] = []
+        self.assets: list[Asset] = []
+        self._query: Query | None = None
+        self.move(places)
+
+    @staticmethod
+    def joined(ours: Bodies, theirs: Bodies, former: Bodies | None) -> Bodies:
+        """Both, ours first. Takes the query of the former result where that is of the same assets."""
+        both = object.__new__(Bodies)
+        both.names = ours.names + theirs.names
+        both._given = []
+        both.shapes = ours.shapes + theirs.shapes
+        both.convex = np.concatenate([ours.convex, theirs.convex])
+        both.assets = ours.assets + theirs.assets
+        both.rows = np.empty(len(both.names), INSTANCE)
+        both.rows[: len(ours.rows)], both.rows[len(ours.rows) :] = ours.rows, theirs.rows
+        both.rows["asset"][len(ours.rows) :] += len(ours.assets)
+        both._query = former._query if former is not None and _same(former.assets, both.assets) else None
+        return both
+
+    def move(self, places: list[np.ndarray]) -> None:
+        """Puts the bodies at other places. Raises ValueError where one is not finite."""
+        if not places:
+            return
+        matrices = np.array(places)
+        linear = matrices[:, :3, :3]
+        self.rows["rotation"] = linear
+        self.rows["translation"] = matrices[:, :3, 3]
+        finite = np.isfinite(matrices[:, :3]).all(axis=(1, 2))
+        if not finite.all():
+            raise ValueError(f"the transform of {self.names[int(finite.argmin())]} is not finite")
+        off = np.abs(linear.transpose(0, 2, 1) @ linear - np.eye(3)).max(axis=(1, 2))
+        rigid = (off <= RIGID) & (np.linalg.det(linear) > 0)
+        shapes = self._given
+        if not rigid.all():
+            shapes = list(shapes)
+            for i in np.flatnonzero(~rigid):
+                self.rows["rotation"][i], stretch = _rotation_and_stretch(linear[i])
+                if stretch is not None:
+                    shapes[i] = shapes[i].stretched(stretch)
+        if not _same(shapes, self.shapes):
+            self.shapes = shapes
+            numbers: dict[int, int] = {}
+            self.rows["asset"] = [numbers.setdefault(id(shape), len(numbers)) for shape in shapes]
+            self.assets = [shape.asset for shape in {id(shape): shape for shape in shapes}.values()]
+            self._query = None
+
+    def query(self) -> Query:
+        if self._query is None:
+            self._query = Query(self.assets)
+        return self._query
+
+    def solid(self, body: int) -> Solid:
+        """The convex hull of a body where it stands."""
+        row = self.rows[body]
+        return self.shapes[body].solid().moved(row["rotation"], row["translation"])
+
+    def corners(self, body: int, faces: np.ndarray) -> np.ndarray:
+        """(n, 3, 3) of faces of a body where it stands."""
+        row, shape = self.rows[body], self.shapes[body]
+        return shape.vertices[shape.faces[faces]] @ row["rotation"].T + row["translation"]
+
+    def extent(self) -> float:
+        """No two points of bodies are farther apart."""
+        middles = np.array([shape.middle for shape in self.shapes])
+        middles = np.einsum("nij,nj->ni", self.rows["rotation"], middles) + self.rows["translation"]
+        return float(np.linalg.norm(np.ptp(middles, axis=0))) + 2 * max(shape.radius for shape in self.shapes)
+
+
+def _same(some: Sequence[object], others: Sequence[object]) -> bool:
+    return len(some) == len(others) and all(one is other for one, other in zip(some, others))
+
+
+class Search:
+    """A question about pairs of bodies: of all; of the first `first_side` with the others; or of the body `alone` with the others."""
+
+    def __init__(self, bodies: Bodies, threads: int, first_side: int | None = None, alone: int | None = None) -> None:
+        self.bodies = bodies
+        self._threads = threads
+        count = len(bodies.names)
+        self._filter: Filter | None = None
+        self._pair_count = count * (count - 1) // 2
+        if first_side is not None or alone is not None:
+            sides = np.ones(count, np.uint32)
+            sides[slice(first_side, None) if alone is None else alone] = 2
+            second = int((sides == 2).sum())
+            self._pair_count = second * (count - second)
+            self._filter = Filter(group=sides, mask=3 - sides)
+
+    def any_collision(self) -> bool:
+        """Whether there is one."""
+        if self._pair_count == 0:
+            return False
+        pairs, meet = self._first_contacts()
+        return bool(meet.any()) or bool(self._enclosed_pairs(pairs[~meet]))
+
+    def colliding_pairs(self) -> set[tuple[int, int]]:
+        """The pairs of bodies (a, b), a < b, that collide: whose surfaces meet, or one of whom is convex and has a component of the other inside."""
+        if self._pair_count == 0:
+            return set()
+        pairs, meet = self._first_contacts()
+        return {(int(a), int(b)) for a, b in pairs[meet]} | self._enclosed_pairs(pairs[~meet])
+
+    def contacts(self) -> list[Contact]:
+        """All contacts: one for each pair of convex bodies; of a convex body and another one for each face of the other that meets the solid; one for each
+        pair of faces of others that meet."""
+        if self._pair_count == 0:
+            return []
+        query, rows = self.bodies.query(), self.bodies.rows
+        found = query.contacts(rows, filter=self._filter, threads=self._threads)
+        contained = query.contained(threads=self._threads).contained
+        pairs = _columns(found.pairs)
+        bounds = np.searchsorted(found.contacts["pair"], np.arange(len(pairs) + 1))
+        meet = np.diff(bounds) > 0
+        convex = self.bodies.convex[pairs]
+        regions = _Regions(query.manifolds(match_previous=False, threads=self._threads)) if (meet & ~convex.any(axis=1)).any() else None
+        contacts: list[Contact] = []
+        meet[self._enclosed(pairs, contained)] = True
+        for pair in np.flatnonzero(meet):
+            a, b = map(int, pairs[pair])
+            meeting = found.contacts[bounds[pair] : bounds[pair + 1]]
+            if convex[pair].all():
+                contacts.append(self._convex_contact(a, b))
+            elif convex[pair].any():
+                contacts.extend(self._face_contacts(a, b, meeting))
+            else:
+                assert regions is not None
+                contacts.extend(self._surface_contacts(a, b, meeting, *regions.of(int(pair))))
+        return contacts
+
+    def nearest(self) -> Nearest | None:
+        """The pair that is nearest, or the deepest of those that collide; None where there is no pair. Of equals the first."""
+        if self._pair_count == 0:
+            return None
+        colliding = sorted(self.colliding_pairs())
+        if colliding:
+            return min((self._collision(a, b) for a, b in colliding), key=lambda found: found.min_distance)
+        query, rows = self.bodies.query(), self.bodies.rows
+        reach: float | None = None
+        if self._pair_count > FEW_PAIRS:
+            reach = self.bodies.extent() / 256
+        while True:
+            found = query.distances(rows, reach=reach, relative_tolerance=PRECISION, filter=self._filter, threads=self._threads)
+            distances = found.distances["upper"].copy()
+            distances[found.distances["triangle_a"] == NO_INDEX] = np.inf
+            # What is not in the list, or has no points, is farther away than the reach.
+            if len(distances) and distances.min() <= (np.inf if reach is None else reach):
+                first = int(distances.argmin())
+                return _nearest(found.pairs[first], found.distances[first])
+            assert reach is not None
+            reach = 4 * reach if reach < self.bodies.extent() else None
+
+    def _first_contacts(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n, 2) the pairs whose boxes meet, and (n,) whether their surfaces do."""
+        found = self.bodies.query().contacts(self.bodies.rows, first_contact_only=True, filter=self._filter, threads=self._threads)
+        pairs = _columns(found.pairs)
+        meet = np.zeros(len(pairs), bool)
+        meet[found.contacts["pair"]] = True
+        return pairs, meet
+
+    def _enclosed_pairs(self, apart: np.ndarray) -> set[tuple[int, int]]:
+        """Of pairs (n, 2) whose surfaces do not meet, those with a component of one body inside the other, which is convex."""
+        apart = apart[self.bodies.convex[apart].any(axis=1)]
+        if len(apart) == 0:
+            return set()
+        query = self.bodies.query()
+        query.contacts(self.bodies.rows, pairs=apart, threads=self._threads)
+        rows = self._enclosed(apart, query.contained(threads=self._threads).contained)
+        return {(int(a), int(b)) for a, b in apart[rows]}
+
+    def _enclosed(self, pairs: np.ndarray, contained: np.ndarray) -> np.ndarray:
+        """(n,) the rows of the pairs with a component of one body inside the other, which is convex."""
+        outer = pairs[contained["pair"], np.where(contained["inner"] == 1, 0, 1)]
+        return contained["pair"][self.bodies.convex[outer] & (contained["flags"] & INSIDE > 0)]
+
+    def _collision(self, a: int, b: int) -> Nearest:
+        convex = self.bodies.convex[[a, b]]
+        if convex.all():
+            solids = self.bodies.solid(a), self.bodies.solid(b)
+            found = overlap(*solids)
+            return Nearest(a, b, -found.depth, [found.point_a, found.point_b], *self._faces(a, b, found))
+        query, pair = self.bodies.query(), [(a, b)]
+        if convex.any():
+            meeting = query.contacts(self.bodies.rows, pairs=pair, threads=self._threads).contacts
+            deepest = max(self._face_contacts(a, b, meeting), key=lambda contact: contact.penetration_depth)
+            half = deepest.normal * deepest.penetration_depth / 2
+            return Nearest(a, b, -deepest.penetration_depth, [deepest.pos + half, deepest.pos - half], deepest.b1, deepest.b2)
+        return _nearest((a, b), query.distances(self.bodies.rows, pairs=pair, threads=self._threads).distances[0])
+
+    def _faces(self, a: int, b: int, found: Overlap) -> tuple[int, int]:
+        """The faces of two convex bodies whose corners are the farthest along the way that parts them; of equals the first."""
+        ends = []
+        for body, side in ((a, 1.0), (b, -1.0)):
+            faces = np.arange(len(self.bodies.shapes[body].faces))
+            along = (self.bodies.corners(body, faces) @ (side * found.normal)).min(axis=1)
+            ends.append(int(np.flatnonzero(along >= along.max() - 1e-9 * self.bodies.shapes[body].radius)[0]))
+        return ends[0], ends[1]
+
+    def _convex_contact(self, a: int, b: int) -> Contact:
+        found = overlap(self.bodies.solid(a), self.bodies.solid(b))
+        return Contact(a, b, *self._faces(a, b, found), found.normal, found.middle, found.depth)
+
+    def _face_contacts(self, a: int, b: int, meeting: np.ndarray) -> list[Contact]:
+        """Of a convex body and another: the other's faces that meet its surface, then those inside."""
+        a_is_solid = bool(self.bodies.convex[a])
+        body, other = (a, b) if a_is_solid else (b, a)
+        solid_column, face_column = ("face_a", "face_b") if a_is_solid else ("face_b", "face_a")
+        crossing, first = np.unique(meeting[face_column], return_index=True)
+        solid = self.bodies.solid(body)
+        inner = np.setdiff1d(np.arange(len(self.bodies.shapes[other].faces)), crossing)
+        # A face that does not meet the surface is inside where its middle is.
+        inner = inner[solid.contains(self.bodies.corners(other, inner).mean(axis=1))]
+        faces = np.concatenate([crossing, inner])
+        corners = self.bodies.corners(other, faces)
+        depths, normals, planes = face_overlaps(solid, corners)
+        points = corners.mean(axis=1)
+        solid_faces = meeting[solid_column][first]
+        points[: len(crossing)] = meeting_points(self.bodies.corners(body, solid_faces), corners[: len(crossing)])
+        solid_faces = np.concatenate([solid_faces, self._faces_of_planes(body, solid, planes[len(crossing) :])])
+        if not a_is_solid:
+            normals = -normals
+        ends = (solid_faces, faces) if a_is_solid else (faces, solid_faces)
+        return _contacts(a, b, *ends, normals, points, depths)
+
+    def _faces_of_planes(self, body: int, solid: Solid, planes: np.ndarray) -> np.ndarray:
+        """(n,) of each of the planes of a solid, by number, a face of the mesh that is the nearest to it."""
+        corners = self.bodies.corners(body, np.arange(len(self.bodies.shapes[body].faces)))
+        found = {int(plane): int((corners @ solid.normals[plane]).min(axis=1).argmax()) for plane in np.unique(planes)}
+        return np.array([found[int(plane)] for plane in planes], np.intp)
+
+    def _surface_contacts(self, a: int, b: int, meeting: np.ndarray, normals: np.ndarray, depths: np.ndarray, places: np.ndarray) -> list[Contact]:
+        """Of two bodies that are not convex. The normal and the depth are those of the contact region that is the nearest; where there is none, of which
+        the surfaces touch in a point, the normal is that of a's face."""
+        corners_a, corners_b = self.bodies.corners(a, meeting["face_a"]), self.bodies.corners(b, meeting["face_b"])
+        points = meeting_points(corners_a, corners_b)
+        if len(places):
+            region = np.array([((places - point) ** 2).sum(axis=1).argmin() for point in points])
+            normals, depths = normals[region], depths[region]
+        else:
+            crosses = np.cross(corners_a[:, 1] - corners_a[:, 0], corners_a[:, 2] - corners_a[:, 0])
+            normals, depths = crosses / np.linalg.norm(crosses, axis=1)[:, None], np.zeros(len(meeting))
+        return _contacts(a, b, meeting["face_a"], meeting["face_b"], normals, points, depths)
+
+
+class _Regions:
+    """Contact regions by pair."""
+
+    def __init__(self, found: Any) -> None:
+        self._manifolds, self._points = found.manifolds, found.points
+
+    def of(self, pair: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Normals (n, 3), depths (n,) and places (n, 3) of the points of a pair's regions: normal and depth of the region each."""
+        first, last = np.searchsorted(self._manifolds["pair"], [pair, pair + 1])
+        own = self._manifolds[first:last]
+        if len(own) == 0:
+            return np.empty((0, 3)), np.empty(0), np.empty((0, 3))
+        which = np.repeat(np.arange(len(own)), own["point_count"])
+        start = int(own["first_point"][0])
+        return own["normal"][which], own["depth"][which], self._points["position"][start : start + len(which)]
+
+
+def _columns(pairs: np.ndarray) -> np.ndarray:
+    """(n, 2) intp of an array of tandem.PAIR."""
+    return np.stack([pairs["a"], pairs["b"]], axis=1).astype(np.intp)
+
+
+def _nearest(pair: Any, row: Any) -> Nearest:
+    return Nearest(int(pair[0]), int(pair[1]), float(row["upper"]), [row["point_a"].copy(), row["point_b"].copy()], int(row["face_a"]), int(row["face_b"]))
+
+
+def _contacts(a: int, b: int, faces_a: np.ndarray, faces_b: np.ndarray, normals: np.ndarray, points: np.ndarray, depths: np.ndarray) -> list[Contact]:
+    return [Contact(a, b, *row) for row in zip(faces_a.tolist(), faces_b.tolist(), normals, points, depths.tolist())]
+
+
+def meeting_points(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(n, 3) a point of both triangles of each of n pairs that meet, a and b (n, 3, 3): the middle of where the edges of one go through the other. Of
+    triangles in one plane, and where rounding hides the crossing, what going to and fro between the nearest points of both comes to."""
+    total, count = np.zeros((len(a), 3)), np.zeros(len(a))
+    for edges, other in ((a, b), (b, a)):
+        origin, u, v = other[:, 0], other[:, 1] - other[:, 0], other[:, 2] - other[:, 0]
+        normal = np.cross(u, v)
+        heights = ((edges - origin[:, None]) * normal[:, None]).sum(axis=2)
+        for i, j in ((0, 1), (1, 2), (2, 0)):
+            crosses = heights[:, i] * heights[:, j] < 0
+            part = heights[:, i] / np.where(crosses, heights[:, i] - heights[:, j], 1)
+            point = edges[:, i] + part[:, None] * (edges[:, j] - edges[:, i])
+            square = np.maximum((normal * normal).sum(axis=1), np.finfo(float).tiny)
+            s = (np.cross(point - origin, v) * normal).sum(axis=1) / square
+            t = (np.cross(u, point - origin) * normal).sum(axis=1) / square
+            hit = crosses & (s >= 0) & (t >= 0) & (s + t <= 1)
+            total[hit] += point[hit]
+            count += hit
+    rest = count == 0
+    points = total / np.maximum(count, 1)[:, None]
+    if rest.any():
+        near = a[rest].mean(axis=1)
+        for _ in range(MEETING_STEPS):
+            near = trimesh.triangles.closest_point(b[rest], near)
+            near = trimesh.triangles.closest_point(a[rest], near)
+        points[rest] = near
+    return points

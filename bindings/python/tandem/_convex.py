@@ -1,0 +1,158 @@
+"""How deep convex bodies overlap, for `tandem.trimesh`. Needs SciPy, as trimesh does to tell that a mesh is convex."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import nnls
+from scipy.spatial import ConvexHull
+
+FIRST_DIRECTIONS = 16  # of a body's faces, about so many
+CHUNK = 1 << 22  # numbers of a matrix that are there at a time
+
+
+@dataclass(frozen=True, slots=True)
+class Overlap:
+    """How two bodies are parted by the shortest way. Lengths are in the bodies' unit."""
+
+    depth: float  #: length of that way
+    normal: np.ndarray  #: (3,) its unit vector, along which b goes
+    point_a: np.ndarray  #: (3,) of a's surface, deepest in b
+    point_b: np.ndarray  #: (3,) of b's surface: point_a - depth * normal
+
+    @property
+    def middle(self) -> np.ndarray:
+        """(3,) half-way between the two points."""
+        return (self.point_a + self.point_b) / 2
+
+
+class Solid:
+    """The convex hull of points: `vertices` (n, 3), and `normals` (k, 3) and `offsets` (k,) of its faces, outside of which normal . x > offset."""
+
+    def __init__(self, vertices: np.ndarray) -> None:
+        hull = ConvexHull(vertices)
+        self.vertices = np.ascontiguousarray(vertices[hull.vertices])
+        # Triangles of one face have the same plane to the bit.
+        planes = np.unique(hull.equations, axis=0)
+        self.normals, self.offsets = planes[:, :3], -planes[:, 3]
+
+    def moved(self, rotation: np.ndarray, translation: np.ndarray) -> Solid:
+        """The body at a pose: rotation (3, 3), translation (3,)."""
+        body = object.__new__(Solid)
+        body.vertices = self.vertices @ rotation.T + translation
+        body.normals = self.normals @ rotation.T
+        body.offsets = self.offsets + body.normals @ translation
+        return body
+
+    def size(self) -> float:
+        """The diagonal of its bounds."""
+        return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
+
+    def contains(self, points: np.ndarray, margin: float = 0.0) -> np.ndarray:
+        """(n,) whether each of the points (n, 3) is inside or no farther than `margin` outside of all faces' planes."""
+        inside = np.empty(len(points), bool)
+        for rows in _chunks(len(points), len(self.offsets)):
+            inside[rows] = (points[rows] @ self.normals.T <= self.offsets + margin).all(axis=1)
+        return inside
+
+
+def _chunks(rows: int, columns: int) -> list[slice]:
+    step = max(1, CHUNK // max(columns, 1))
+    return [slice(first, first + step) for first in range(0, rows, step)]
+
+
+def _farthest(vertices: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """(m,) which of the vertices is the farthest along each of the directions (m, 3)."""
+    found = np.empty(len(directions), np.intp)
+    for rows in _chunks(len(directions), len(vertices)):
+        found[rows] = (directions[rows] @ vertices.T).argmax(axis=1)
+    return found
+
+
+def overlap(a: Solid, b: Solid) -> Overlap:
+    """The shortest way that parts two solids that meet.
+
+    The differences of the points of a and those of b are a convex body D; moving b along n parts them as soon as it goes
+    beyond D's farthest point along n. The least such distance is that of a face of D. D is approached from within by the
+    hull of those of its points that are the farthest along some direction: where no face of the hull that is nearer than
+    the best direction so far has a point of D beyond it, that direction is the best of all. Of equally short ways it is the
+    one whose normal comes first in the order of coordinates, so that the answer does not depend on rounding.
+    """
+    tolerance = 1e-10 * (a.size() + b.size())
+
+    def supports(directions: np.ndarray) -> np.ndarray:
+        return a.vertices[_farthest(a.vertices, directions)] - b.vertices[_farthest(b.vertices, -directions)]
+
+    if len(a.vertices) * len(b.vertices) <= 256:
+        points = (a.vertices[:, None] - b.vertices[None]).reshape(-1, 3)
+    else:
+        normals = [body[:: 1 + len(body) // FIRST_DIRECTIONS] for body in (a.normals, -b.normals)]
+        points = supports(np.concatenate(normals))
+        if np.linalg.matrix_rank(points - points[0], tolerance) < 3:
+            points = np.concatenate([points, a.vertices - b.vertices[0]])  # which spans space as a does
+        # These span space as a does, whatever the directions.
+    shortest = np.inf  # of the ways that were tried
+    while True:
+        hull = ConvexHull(points)
+        normals, offsets = hull.equations[:, :3], -hull.equations[:, 3]
+        near = offsets <= shortest + tolerance
+        normals, offsets = normals[near], offsets[near]
+        found = supports(normals)
+        ways = (found * normals).sum(axis=1)
+        shortest = min(shortest, float(ways.min()))
+        beyond = (ways > offsets + tolerance) & (offsets <= shortest + tolerance)
+        if not beyond.any():
+            break
+        points = np.concatenate([points[hull.vertices], found[beyond]])
+    normals = np.unique(np.round(normals[ways <= shortest + tolerance], 12), axis=0)
+    normal = normals[0]
+    depth = float((a.vertices @ normal).max() - (b.vertices @ normal).min())
+    point_a = _deepest_point(a, b, depth, normal, 10 * tolerance)
+    return Overlap(depth, normal, point_a, point_a - depth * normal)
+
+
+def _deepest_point(a: Solid, b: Solid, depth: float, normal: np.ndarray, tolerance: float) -> np.ndarray:
+    """(3,) a point of a that touches b once b has gone `depth` along the normal: the first vertex that does, where one does."""
+    along_a, along_b = a.vertices @ normal, b.vertices @ normal
+    deepest_a = a.vertices[along_a >= along_a.max() - tolerance]
+    deepest_b = b.vertices[along_b <= along_b.min() + tolerance]
+    shift = depth * normal
+    touching = deepest_a[b.contains(deepest_a - shift, tolerance)]
+    if len(touching):
+        return touching[0]
+    touching = deepest_b[a.contains(deepest_b + shift, tolerance)]
+    if len(touching):
+        return touching[0] + shift
+    # Edges cross: weights of the vertices of either side, each of sum 1, with one middle.
+    weight = a.size() + b.size()
+    sums = [np.r_[np.full(len(deepest_a), weight), np.zeros(len(deepest_b))], np.r_[np.zeros(len(deepest_a)), np.full(len(deepest_b), weight)]]
+    columns = np.concatenate([np.concatenate([deepest_a, -deepest_b]).T, sums])
+    weights = nnls(columns, np.r_[shift, weight, weight])[0][: len(deepest_a)]
+    return weights @ deepest_a / weights.sum()
+
+
+def face_overlaps(solid: Solid, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """How triangles (n, 3, 3) that meet a solid are parted from it along the normal of one of its faces, or their own: of these ways the shortest. That is
+    the shortest way of all unless one across two edges is shorter.
+
+    Returns depths (n,), normals (n, 3), along which the triangle goes, and (n,) which plane of the solid is the nearest along it.
+    """
+    count = len(corners)
+    depths, planes = np.empty(count), np.empty(count, np.intp)
+    for rows in _chunks(count, 3 * len(solid.offsets)):
+        ways = solid.offsets - (corners[rows] @ solid.normals.T).min(axis=1)
+        planes[rows] = ways.argmin(axis=1)
+        depths[rows] = ways.min(axis=1)
+    normals = solid.normals[planes]
+    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    own = crosses / np.maximum(np.linalg.norm(crosses, axis=1), np.finfo(float).tiny)[:, None]
+    heights = (own * corners[:, 0]).sum(axis=1)
+    for side in (own, -own):
+        ways = np.empty(count)
+        for rows in _chunks(count, len(solid.vertices)):
+            ways[rows] = (side[rows] @ solid.vertices.T).max(axis=1)
+        ways -= heights if side is own else -heights
+        better = ways < depths - 1e-12 * solid.size()
+        depths[better], normals[better] = ways[better], side[better]
+    return np.maximum(depths, 0.0), normals, planes

@@ -16,8 +16,10 @@ from ._convex import Overlap, Solid, face_overlaps, overlap
 RIGID = 4e-7  # what a pose may be off: queries take 1e-6, by another measure of the same matrix
 ROUNDING = 1e-5  # a matrix that is so near to a rotation is meant to be one
 PRECISION = 1e-12  # of distances, relative
+SMALL = 10_000  # faces of a mesh
 FEW_PAIRS = 64  # whose distances are asked for at once
 MEETING_STEPS = 32
+CONTACTS_AT_A_TIME = 1 << 16
 
 
 @dataclass(slots=True)
@@ -52,7 +54,8 @@ class Shape:
         self.vertices = vertices
         self.faces = faces
         self.is_convex = is_convex
-        self.asset: Asset = build(vertices, faces, effort="fast", gpu_blocks=False)
+        # Starting threads takes longer than to build a small tree.
+        self.asset: Asset = build(vertices, faces, effort="fast", gpu_blocks=False, threads=1 if len(faces) < SMALL else 0)
         low, high = self.asset.bounds
         self.middle, self.radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
         self._solid: Solid | None = None
@@ -171,6 +174,16 @@ class Bodies:
         row, shape = self.rows[body], self.shapes[body]
         return shape.vertices[shape.faces[faces]] @ row["rotation"].T + row["translation"]
 
+    def corners_of(self, bodies: np.ndarray, faces: np.ndarray) -> np.ndarray:
+        """(n, 3, 3) of a face each of n bodies."""
+        corners = np.empty((len(faces), 3, 3))
+        order = np.argsort(bodies, kind="stable")
+        bounds = np.flatnonzero(np.diff(bodies[order], prepend=-1, append=-1))
+        for first, last in zip(bounds[:-1], bounds[1:]):
+            rows = order[first:last]
+            corners[rows] = self.corners(int(bodies[rows[0]]), faces[rows])
+        return corners
+
     def extent(self) -> float:
         """No two points of bodies are farther apart."""
         middles = np.array([shape.middle for shape in self.shapes])
@@ -222,21 +235,16 @@ class Search:
         contained = query.contained(threads=self._threads).contained
         pairs = _columns(found.pairs)
         bounds = np.searchsorted(found.contacts["pair"], np.arange(len(pairs) + 1))
-        meet = np.diff(bounds) > 0
         convex = self.bodies.convex[pairs]
-        regions = _Regions(query.manifolds(match_previous=False, threads=self._threads)) if (meet & ~convex.any(axis=1)).any() else None
-        contacts: list[Contact] = []
+        meet = np.diff(bounds) > 0
+        contacts = self._surface_contacts(pairs, found.contacts[~convex.any(axis=1)[found.contacts["pair"]]])
         meet[self._enclosed(pairs, contained)] = True
-        for pair in np.flatnonzero(meet):
+        for pair in np.flatnonzero(meet & convex.any(axis=1)):
             a, b = map(int, pairs[pair])
-            meeting = found.contacts[bounds[pair] : bounds[pair + 1]]
             if convex[pair].all():
                 contacts.append(self._convex_contact(a, b))
-            elif convex[pair].any():
-                contacts.extend(self._face_contacts(a, b, meeting))
             else:
-                assert regions is not None
-                contacts.extend(self._surface_contacts(a, b, meeting, *regions.of(int(pair))))
+                contacts.extend(self._face_contacts(a, b, found.contacts[bounds[pair] : bounds[pair + 1]]))
         return contacts
 
     def nearest(self) -> Nearest | None:
@@ -339,35 +347,36 @@ class Search:
         found = {int(plane): int((corners @ solid.normals[plane]).min(axis=1).argmax()) for plane in np.unique(planes)}
         return np.array([found[int(plane)] for plane in planes], np.intp)
 
-    def _surface_contacts(self, a: int, b: int, meeting: np.ndarray, normals: np.ndarray, depths: np.ndarray, places: np.ndarray) -> list[Contact]:
-        """Of two bodies that are not convex. The normal and the depth are those of the contact region that is the nearest; where there is none, of which
-        the surfaces touch in a point, the normal is that of a's face."""
-        corners_a, corners_b = self.bodies.corners(a, meeting["face_a"]), self.bodies.corners(b, meeting["face_b"])
-        points = meeting_points(corners_a, corners_b)
-        if len(places):
-            region = np.array([((places - point) ** 2).sum(axis=1).argmin() for point in points])
-            normals, depths = normals[region], depths[region]
-        else:
-            crosses = np.cross(corners_a[:, 1] - corners_a[:, 0], corners_a[:, 2] - corners_a[:, 0])
-            normals, depths = crosses / np.linalg.norm(crosses, axis=1)[:, None], np.zeros(len(meeting))
-        return _contacts(a, b, meeting["face_a"], meeting["face_b"], normals, points, depths)
-
-
-class _Regions:
-    """Contact regions by pair."""
-
-    def __init__(self, found: Any) -> None:
-        self._manifolds, self._points = found.manifolds, found.points
-
-    def of(self, pair: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Normals (n, 3), depths (n,) and places (n, 3) of the points of a pair's regions: normal and depth of the region each."""
-        first, last = np.searchsorted(self._manifolds["pair"], [pair, pair + 1])
-        own = self._manifolds[first:last]
-        if len(own) == 0:
-            return np.empty((0, 3)), np.empty(0), np.empty((0, 3))
-        which = np.repeat(np.arange(len(own)), own["point_count"])
-        start = int(own["first_point"][0])
-        return own["normal"][which], own["depth"][which], self._points["position"][start : start + len(which)]
+    def _surface_contacts(self, pairs: np.ndarray, meeting: np.ndarray) -> list[Contact]:
+        """Of bodies that are not convex. Normal and depth are those of the contact region that is the nearest; where there is none, of which the surfaces
+        touch in a point, the normal is that of a's face."""
+        if len(meeting) == 0:
+            return []
+        a, b = pairs[meeting["pair"]].T
+        points, normals, depths = np.empty((len(meeting), 3)), np.empty((len(meeting), 3)), np.zeros(len(meeting))
+        for first in range(0, len(meeting), CONTACTS_AT_A_TIME):
+            rows = slice(first, first + CONTACTS_AT_A_TIME)
+            corners_a = self.bodies.corners_of(a[rows], meeting["face_a"][rows])
+            corners_b = self.bodies.corners_of(b[rows], meeting["face_b"][rows])
+            points[rows] = meeting_points(corners_a, corners_b)
+            normals[rows] = unit_normals(corners_a)
+        found = self.bodies.query().manifolds(match_previous=False, threads=self._threads)
+        regions, places = found.manifolds, found.points["position"]
+        which, starts = np.unique(meeting["pair"], return_index=True)
+        for pair, start, end in zip(which, starts, np.append(starts[1:], len(meeting))):
+            first, last = np.searchsorted(regions["pair"], [pair, pair + 1])
+            own = regions[first:last]
+            if len(own) == 0:
+                continue
+            begin = int(own["first_point"][0])
+            region_of_point = np.repeat(np.arange(len(own)), own["point_count"])
+            region = np.zeros(end - start, np.intp)
+            if len(own) > 1:
+                gaps = points[start:end, None] - places[begin : begin + len(region_of_point)]
+                region = region_of_point[np.einsum("ijk,ijk->ij", gaps, gaps).argmin(axis=1)]
+            normals[start:end], depths[start:end] = own["normal"][region], own["depth"][region]
+        bodies = zip(a.tolist(), b.tolist(), meeting["face_a"].tolist(), meeting["face_b"].tolist())
+        return [Contact(*faces, *rest) for faces, *rest in zip(bodies, normals, points, depths.tolist())]
 
 
 def _columns(pairs: np.ndarray) -> np.ndarray:
@@ -381,6 +390,12 @@ def _nearest(pair: Any, row: Any) -> Nearest:
 
 def _contacts(a: int, b: int, faces_a: np.ndarray, faces_b: np.ndarray, normals: np.ndarray, points: np.ndarray, depths: np.ndarray) -> list[Contact]:
     return [Contact(a, b, *row) for row in zip(faces_a.tolist(), faces_b.tolist(), normals, points, depths.tolist())]
+
+
+def unit_normals(corners: np.ndarray) -> np.ndarray:
+    """(n, 3) of triangles (n, 3, 3)."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return normals / np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
 
 
 def meeting_points(a: np.ndarray, b: np.ndarray) -> np.ndarray:

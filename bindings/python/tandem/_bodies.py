@@ -11,7 +11,7 @@ import numpy as np
 import trimesh.triangles
 
 from . import INSIDE, INSTANCE, NO_INDEX, Asset, Filter, Query, build
-from ._convex import Overlap, Solid, face_overlaps, overlap
+from ._convex import Array, Overlap, Solid, face_overlaps, overlap
 
 RIGID = 4e-7  # what a pose may be off: queries take 1e-6, by another measure of the same matrix
 ROUNDING = 1e-5  # a matrix that is so near to a rotation is meant to be one
@@ -30,8 +30,8 @@ class Contact:
     b: int
     b1: int
     b2: int
-    normal: np.ndarray
-    pos: np.ndarray
+    normal: Array
+    pos: Array
     penetration_depth: float
 
 
@@ -42,7 +42,7 @@ class Nearest:
     a: int
     b: int
     min_distance: float
-    nearest_points: Sequence[np.ndarray | None]
+    nearest_points: Sequence[Array | None]
     b1: int
     b2: int
 
@@ -50,7 +50,7 @@ class Nearest:
 class Shape:
     """What a mesh is to queries: an asset, and whether it is solid."""
 
-    def __init__(self, vertices: np.ndarray, faces: np.ndarray, is_convex: bool) -> None:
+    def __init__(self, vertices: Array, faces: Array, is_convex: bool) -> None:
         self.vertices = vertices
         self.faces = faces
         self.is_convex = is_convex
@@ -71,7 +71,7 @@ class Shape:
             mesh._cache["tandem"] = shape
         return shape
 
-    def stretched(self, stretch: np.ndarray) -> Shape:
+    def stretched(self, stretch: Array) -> Shape:
         """The shape with every vertex v at stretch v. The last one is kept."""
         key = stretch.tobytes()
         if self._stretched is None or self._stretched[0] != key:
@@ -87,7 +87,7 @@ class Shape:
         return self._solid
 
 
-def _rotation_and_stretch(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+def _rotation_and_stretch(matrix: Array) -> tuple[Array, Array | None]:
     """The rotation and the symmetric stretch, None where there is none, whose product a matrix (3, 3) is. Digits beyond the twelfth of the stretch are
     dropped, so that a stretched body that turns keeps its shape."""
     left, sizes, right = np.linalg.svd(matrix)
@@ -107,7 +107,7 @@ class Bodies:
     Attributes: `rows`, array of tandem.INSTANCE; `shapes`, those that the rows' assets are of; `convex` (n,), which are.
     """
 
-    def __init__(self, names: list[Hashable], shapes: list[Shape], places: list[np.ndarray]) -> None:
+    def __init__(self, names: list[Hashable], shapes: list[Shape], places: list[Array]) -> None:
         self.names = names
         self._given = shapes
         self.rows = np.zeros(len(names), INSTANCE)
@@ -132,7 +132,7 @@ class Bodies:
         both._query = former._query if former is not None and _same(former.assets, both.assets) else None
         return both
 
-    def move(self, places: list[np.ndarray]) -> None:
+    def move(self, places: list[Array]) -> None:
         """Puts the bodies at other places. Raises ValueError where one is not finite."""
         if not places:
             return
@@ -169,12 +169,12 @@ class Bodies:
         row = self.rows[body]
         return self.shapes[body].solid().moved(row["rotation"], row["translation"])
 
-    def corners(self, body: int, faces: np.ndarray) -> np.ndarray:
+    def corners(self, body: int, faces: Array) -> Array:
         """(n, 3, 3) of faces of a body where it stands."""
         row, shape = self.rows[body], self.shapes[body]
         return shape.vertices[shape.faces[faces]] @ row["rotation"].T + row["translation"]
 
-    def corners_of(self, bodies: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    def corners_of(self, bodies: Array, faces: Array) -> Array:
         """(n, 3, 3) of a face each of n bodies."""
         corners = np.empty((len(faces), 3, 3))
         order = np.argsort(bodies, kind="stable")
@@ -269,7 +269,7 @@ class Search:
             assert reach is not None
             reach = 4 * reach if reach < self.bodies.extent() else None
 
-    def _first_contacts(self) -> tuple[np.ndarray, np.ndarray]:
+    def _first_contacts(self) -> tuple[Array, Array]:
         """(n, 2) the pairs whose boxes meet, and (n,) whether their surfaces do."""
         found = self.bodies.query().contacts(self.bodies.rows, first_contact_only=True, filter=self._filter, threads=self._threads)
         pairs = _columns(found.pairs)
@@ -277,7 +277,7 @@ class Search:
         meet[found.contacts["pair"]] = True
         return pairs, meet
 
-    def _enclosed_pairs(self, apart: np.ndarray) -> set[tuple[int, int]]:
+    def _enclosed_pairs(self, apart: Array) -> set[tuple[int, int]]:
         """Of pairs (n, 2) whose surfaces do not meet, those with a component of one body inside the other, which is convex."""
         apart = apart[self.bodies.convex[apart].any(axis=1)]
         if len(apart) == 0:
@@ -287,7 +287,7 @@ class Search:
         rows = self._enclosed(apart, query.contained(threads=self._threads).contained)
         return {(int(a), int(b)) for a, b in apart[rows]}
 
-    def _enclosed(self, pairs: np.ndarray, contained: np.ndarray) -> np.ndarray:
+    def _enclosed(self, pairs: Array, contained: Array) -> Array:
         """(n,) the rows of the pairs with a component of one body inside the other, which is convex."""
         outer = pairs[contained["pair"], np.where(contained["inner"] == 1, 0, 1)]
         return contained["pair"][self.bodies.convex[outer] & (contained["flags"] & INSIDE > 0)]
@@ -319,7 +319,7 @@ class Search:
         found = overlap(self.bodies.solid(a), self.bodies.solid(b))
         return Contact(a, b, *self._faces(a, b, found), found.normal, found.middle, found.depth)
 
-    def _face_contacts(self, a: int, b: int, meeting: np.ndarray) -> list[Contact]:
+    def _face_contacts(self, a: int, b: int, meeting: Array) -> list[Contact]:
         """Of a convex body and another: the other's faces that meet its surface, then those inside."""
         a_is_solid = bool(self.bodies.convex[a])
         body, other = (a, b) if a_is_solid else (b, a)
@@ -341,13 +341,13 @@ class Search:
         ends = (solid_faces, faces) if a_is_solid else (faces, solid_faces)
         return _contacts(a, b, *ends, normals, points, depths)
 
-    def _faces_of_planes(self, body: int, solid: Solid, planes: np.ndarray) -> np.ndarray:
+    def _faces_of_planes(self, body: int, solid: Solid, planes: Array) -> Array:
         """(n,) of each of the planes of a solid, by number, a face of the mesh that is the nearest to it."""
         corners = self.bodies.corners(body, np.arange(len(self.bodies.shapes[body].faces)))
         found = {int(plane): int((corners @ solid.normals[plane]).min(axis=1).argmax()) for plane in np.unique(planes)}
         return np.array([found[int(plane)] for plane in planes], np.intp)
 
-    def _surface_contacts(self, pairs: np.ndarray, meeting: np.ndarray) -> list[Contact]:
+    def _surface_contacts(self, pairs: Array, meeting: Array) -> list[Contact]:
         """Of bodies that are not convex. Normal and depth are those of the contact region that is the nearest; where there is none, of which the surfaces
         touch in a point, the normal is that of a's face."""
         if len(meeting) == 0:
@@ -379,7 +379,7 @@ class Search:
         return [Contact(*faces, *rest) for faces, *rest in zip(bodies, normals, points, depths.tolist())]
 
 
-def _columns(pairs: np.ndarray) -> np.ndarray:
+def _columns(pairs: Array) -> Array:
     """(n, 2) intp of an array of tandem.PAIR."""
     return np.stack([pairs["a"], pairs["b"]], axis=1).astype(np.intp)
 
@@ -388,17 +388,17 @@ def _nearest(pair: Any, row: Any) -> Nearest:
     return Nearest(int(pair[0]), int(pair[1]), float(row["upper"]), [row["point_a"].copy(), row["point_b"].copy()], int(row["face_a"]), int(row["face_b"]))
 
 
-def _contacts(a: int, b: int, faces_a: np.ndarray, faces_b: np.ndarray, normals: np.ndarray, points: np.ndarray, depths: np.ndarray) -> list[Contact]:
+def _contacts(a: int, b: int, faces_a: Array, faces_b: Array, normals: Array, points: Array, depths: Array) -> list[Contact]:
     return [Contact(a, b, *row) for row in zip(faces_a.tolist(), faces_b.tolist(), normals, points, depths.tolist())]
 
 
-def unit_normals(corners: np.ndarray) -> np.ndarray:
+def unit_normals(corners: Array) -> Array:
     """(n, 3) of triangles (n, 3, 3)."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     return normals / np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
 
 
-def meeting_points(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def meeting_points(a: Array, b: Array) -> Array:
     """(n, 3) a point of both triangles of each of n pairs that meet, a and b (n, 3, 3): the middle of where the edges of one go through the other. Of
     triangles in one plane, and where rounding hides the crossing, what going to and fro between the nearest points of both comes to."""
     total, count = np.zeros((len(a), 3)), np.zeros(len(a))

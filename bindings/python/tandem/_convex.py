@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy.optimize import nnls
 from scipy.spatial import ConvexHull
+
+Array = npt.NDArray[Any]
 
 FIRST_DIRECTIONS = 16  # of a body's faces, about so many
 CHUNK = 1 << 22  # numbers of a matrix that are there at a time
@@ -17,12 +21,12 @@ class Overlap:
     """How two bodies are parted by the shortest way. Lengths are in the bodies' unit."""
 
     depth: float  #: length of that way
-    normal: np.ndarray  #: (3,) its unit vector, along which b goes
-    point_a: np.ndarray  #: (3,) of a's surface, deepest in b
-    point_b: np.ndarray  #: (3,) of b's surface: point_a - depth * normal
+    normal: Array  #: (3,) its unit vector, along which b goes
+    point_a: Array  #: (3,) of a's surface, deepest in b
+    point_b: Array  #: (3,) of b's surface: point_a - depth * normal
 
     @property
-    def middle(self) -> np.ndarray:
+    def middle(self) -> Array:
         """(3,) half-way between the two points."""
         return (self.point_a + self.point_b) / 2
 
@@ -30,14 +34,14 @@ class Overlap:
 class Solid:
     """The convex hull of points: `vertices` (n, 3), and `normals` (k, 3) and `offsets` (k,) of its faces, outside of which normal . x > offset."""
 
-    def __init__(self, vertices: np.ndarray) -> None:
+    def __init__(self, vertices: Array) -> None:
         hull = ConvexHull(vertices)
         self.vertices = np.ascontiguousarray(vertices[hull.vertices])
         # Triangles of one face have the same plane to the bit.
         planes = np.unique(hull.equations, axis=0)
         self.normals, self.offsets = planes[:, :3], -planes[:, 3]
 
-    def moved(self, rotation: np.ndarray, translation: np.ndarray) -> Solid:
+    def moved(self, rotation: Array, translation: Array) -> Solid:
         """The body at a pose: rotation (3, 3), translation (3,)."""
         body = object.__new__(Solid)
         body.vertices = self.vertices @ rotation.T + translation
@@ -49,7 +53,7 @@ class Solid:
         """The diagonal of its bounds."""
         return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
 
-    def contains(self, points: np.ndarray, margin: float = 0.0) -> np.ndarray:
+    def contains(self, points: Array, margin: float = 0.0) -> Array:
         """(n,) whether each of the points (n, 3) is inside or no farther than `margin` outside of all faces' planes."""
         inside = np.empty(len(points), bool)
         for rows in _chunks(len(points), len(self.offsets)):
@@ -62,7 +66,7 @@ def _chunks(rows: int, columns: int) -> list[slice]:
     return [slice(first, first + step) for first in range(0, rows, step)]
 
 
-def _farthest(vertices: np.ndarray, directions: np.ndarray) -> np.ndarray:
+def _farthest(vertices: Array, directions: Array) -> Array:
     """(m,) which of the vertices is the farthest along each of the directions (m, 3)."""
     found = np.empty(len(directions), np.intp)
     for rows in _chunks(len(directions), len(vertices)):
@@ -81,7 +85,7 @@ def overlap(a: Solid, b: Solid) -> Overlap:
     """
     tolerance = 1e-10 * (a.size() + b.size())
 
-    def supports(directions: np.ndarray) -> np.ndarray:
+    def supports(directions: Array) -> Array:
         return a.vertices[_farthest(a.vertices, directions)] - b.vertices[_farthest(b.vertices, -directions)]
 
     if len(a.vertices) * len(b.vertices) <= 256:
@@ -112,7 +116,7 @@ def overlap(a: Solid, b: Solid) -> Overlap:
     return Overlap(depth, normal, point_a, point_a - depth * normal)
 
 
-def _deepest_point(a: Solid, b: Solid, depth: float, normal: np.ndarray, tolerance: float) -> np.ndarray:
+def _deepest_point(a: Solid, b: Solid, depth: float, normal: Array, tolerance: float) -> Array:
     """(3,) a point of a that touches b once b has gone `depth` along the normal: the first vertex that does, where one does."""
     along_a, along_b = a.vertices @ normal, b.vertices @ normal
     deepest_a = a.vertices[along_a >= along_a.max() - tolerance]
@@ -132,7 +136,7 @@ def _deepest_point(a: Solid, b: Solid, depth: float, normal: np.ndarray, toleran
     return weights @ deepest_a / weights.sum()
 
 
-def face_overlaps(solid: Solid, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def face_overlaps(solid: Solid, corners: Array) -> tuple[Array, Array, Array]:
     """How triangles (n, 3, 3) that meet a solid are parted from it along the normal of one of its faces, or their own: of these ways the shortest. That is
     the shortest way of all unless one across two edges is shorter.
 

@@ -24,6 +24,7 @@ import numpy as np
 from trimesh.collision import ContactData, DistanceData
 
 from ._bodies import Bodies, Contact, Nearest, Search, Shape
+from ._convex import Array
 
 __all__ = ["CollisionManager", "CollisionObject", "ContactData", "DistanceData", "scene_to_collision"]
 
@@ -35,12 +36,12 @@ class CollisionObject:
 
     __slots__ = ("_place", "_shape")
 
-    def __init__(self, shape: Shape, place: np.ndarray) -> None:
+    def __init__(self, shape: Shape, place: Array) -> None:
         self._shape = shape
         self._place = place
 
     @property
-    def transform(self) -> np.ndarray:
+    def transform(self) -> Array:
         """(4, 4) float64, a copy."""
         return self._place.copy()
 
@@ -98,7 +99,7 @@ class CollisionManager:
         del self._objs[name]
         self._bodies = None
 
-    def set_transform(self, name: Hashable, transform: np.ndarray) -> None:
+    def set_transform(self, name: Hashable, transform: Array) -> None:
         """Moves an object to the transform, (4, 4) float. Raises ValueError where there is none of that name."""
         self._check(name)
         place = self._objs[name]._place

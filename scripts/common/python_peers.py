@@ -93,21 +93,23 @@ class TrimeshManagerData(Manager):
 
 
 class Coal:
-    """coal.collide() of every pair that its broad phase gives, all contacts, without points and normals."""
+    """Its manager's broad phase with the default callback: all contacts, without points and normals."""
 
     name, needs = "Coal", ["coal"]
 
     def __init__(self, vertices, faces, rotation, translation):
         import coal
         self.coal = coal
-        self.mesh = coal.BVHModelOBB()
-        self.mesh.beginModel(len(faces), len(vertices))
+        mesh = coal.BVHModelOBB()
+        mesh.beginModel(len(faces), len(vertices))
         corners, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
         corners.extend(list(vertices))
         triangles.extend([coal.Triangle(*face) for face in faces.tolist()])
-        self.mesh.addSubModel(corners, triangles)
-        self.mesh.endModel()
-        self.objects = [coal.CollisionObject(self.mesh, *pose) for pose in zip(rotation, translation)]
+        mesh.addSubModel(corners, triangles)
+        mesh.endModel()
+        # A contact names the mesh, not the body.
+        self.meshes = [mesh.clone() for _ in rotation]
+        self.objects = [coal.CollisionObject(own, *pose) for own, *pose in zip(self.meshes, rotation, translation)]
         self.manager = coal.DynamicAABBTreeCollisionManager()
         for one in self.objects:
             self.manager.registerObject(one)
@@ -119,23 +121,14 @@ class Coal:
             one.setTransform(self.coal.Transform3s(turn, place))
             one.computeAABB()
         self.manager.update()
-        pairs = self.coal.CollisionCallBackCollect(1 << 24)
-        self.manager.collide(pairs)
-        self.found = []
-        for a, b in pairs.getCollisionPairs():
-            result = self.coal.CollisionResult()
-            self.coal.collide(a, b, self.request, result)
-            self.found.append((a, b, result))
+        self.found = self.coal.CollisionCallBackDefault()
+        self.found.data.request = self.request
+        self.manager.collide(self.found)
 
     def contacts(self):
-        # A body is known by its place, which no other has.
-        bodies = {tuple(one.getTranslation()): body for body, one in enumerate(self.objects)}
-        rows = []
-        for a, b, result in self.found:
-            first, second = bodies[tuple(a.getTranslation())], bodies[tuple(b.getTranslation())]
-            for contact in result.getContacts():
-                rows.append((first, second, contact.b1, contact.b2) if first < second else (second, first, contact.b2, contact.b1))
-        return np.array(rows).reshape(-1, 4)
+        bodies = {mesh.id(): body for body, mesh in enumerate(self.meshes)}
+        rows = [(bodies[contact.o1.id()], bodies[contact.o2.id()], contact.b1, contact.b2) for contact in self.found.data.result.getContacts()]
+        return np.array([row if row[0] < row[1] else (row[1], row[0], row[3], row[2]) for row in rows]).reshape(-1, 4)
 
 
 def box_pairs(lower, upper, rotation, translation):

@@ -1,6 +1,8 @@
 """The kernel of the peer Warp of scripts/python_peers."""
 import warp as wp
 
+SCALE = wp.constant(wp.float64(1.0e4))  # intersect_tri_tri() takes distances below 1e-6 for 0, whatever the size of the triangles
+
 
 @wp.kernel
 def find(mesh: wp.uint64, corners: wp.array(dtype=wp.vec3d), pairs: wp.array(dtype=wp.vec2i), rotation: wp.array(dtype=wp.mat33d),
@@ -18,7 +20,8 @@ def find(mesh: wp.uint64, corners: wp.array(dtype=wp.vec3d), pairs: wp.array(dty
     query = wp.mesh_query_aabb(mesh, wp.vec3(lower - wider), wp.vec3(upper + wider))
     other = int(0)
     while wp.mesh_query_aabb_next(query, other):
-        if wp.intersect_tri_tri(p, q, r, corners[3 * other], corners[3 * other + 1], corners[3 * other + 2]) != 0:
+        u, v, w = SCALE * corners[3 * other], SCALE * corners[3 * other + 1], SCALE * corners[3 * other + 2]
+        if wp.intersect_tri_tri(SCALE * p, SCALE * q, SCALE * r, u, v, w) != 0:
             place = wp.atomic_add(count, 0, 1)
             if place < found.shape[0]:
                 found[place] = wp.vec4i(a, b, face, other)

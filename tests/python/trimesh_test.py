@@ -1,5 +1,6 @@
 """tandem.trimesh.CollisionManager beside trimesh.collision.CollisionManager over python-fcl."""
 
+import doctest
 import sys
 import threading
 
@@ -243,10 +244,11 @@ def test_the_normal_points_to_the_mesh_or_the_other_manager():
             assert len(contacts) > 0
             assert all(contact.normal[0] > 0.6 for contact in contacts)
             assert all(0 < contact.depth < 0.16 for contact in contacts)
-    mixed = filled(MANAGERS["tandem"](), a=BOX).in_collision_single(RING, at(1.75, 0, 0), return_data=True)[1]
-    assert max(mixed, key=lambda contact: contact.depth).normal == pytest.approx([1, 0, 0])
-    mixed = filled(MANAGERS["tandem"](), a=RING).in_collision_single(BOX, at(1.75, 0, 0), return_data=True)[1]
-    assert max(mixed, key=lambda contact: contact.depth).normal == pytest.approx([1, 0, 0])
+    # Of a convex body and another the normal points to the convex one, in trimesh too.
+    for made in MANAGERS.values():
+        for first, second, sign in ((BOX, RING, -1), (RING, BOX, 1)):
+            contacts = filled(made(), a=first).in_collision_single(second, at(1.75, 0, 0), return_data=True)[1]
+            assert max(contacts, key=lambda contact: contact.depth).normal == pytest.approx([sign, 0, 0], abs=1e-6)
 
 
 def test_coinciding_boxes_part_along_the_first_axis_from_the_first_corner():
@@ -424,6 +426,28 @@ def test_many_small_bodies_on_a_large_one():
     manager = filled(MANAGERS["tandem"](), **names)
     ground = trimesh.creation.box((1000, 10, 10)).apply_translation([0, 0, 0])
     assert manager.in_collision_single(ground, return_names=True) == (True, set(names))
+
+
+def test_primitives_are_built_again_when_they_change():
+    box = trimesh.primitives.Box((1, 1, 1))
+    manager = filled(MANAGERS["tandem"](), a=BOX)
+    assert not manager.in_collision_single(box, at(1.5, 0, 0))
+    box.primitive.extents = (3, 1, 1)
+    assert manager.in_collision_single(box, at(1.5, 0, 0))
+
+
+def test_flat_and_far_bodies_have_depths():
+    rng = np.random.default_rng(2)
+    for _ in range(60):
+        flat = trimesh.Trimesh((BOX.vertices * [1, 1, 10.0 ** rng.uniform(-9, -1)]) @ random_rotation_matrix(rng.random(3))[:3, :3].T, BOX.faces, process=False)
+        far = 10.0 ** rng.uniform(0, 6)
+        manager = filled(MANAGERS["tandem"](), a=(flat, at(far, 0, 0)), b=(BALL, at(far, 0.1, 0.2)))
+        assert manager.in_collision_internal(return_names=True, return_data=True)[:2] == (True, {("a", "b")})
+        assert -2.1 < manager.min_distance_internal() < 0
+
+
+def test_docstring_examples():
+    assert doctest.testmod(tandem.trimesh) == (0, 8)
 
 
 def test_scenes():

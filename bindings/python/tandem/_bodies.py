@@ -24,7 +24,8 @@ CONTACTS_AT_A_TIME = 1 << 16
 
 @dataclass(slots=True)
 class Contact:
-    """What trimesh's ContactData takes: bodies a and b, their faces, and where, along what and how deep they meet. The normal points from a to b."""
+    """What trimesh's ContactData takes: bodies a and b, in either order, their faces b1 and b2, and where, along what and how deep they meet. The normal
+    points from a to b."""
 
     a: int
     b: int
@@ -51,11 +52,12 @@ class Shape:
     """What a mesh is to queries: an asset, and whether it is solid."""
 
     def __init__(self, vertices: Array, faces: Array, is_convex: bool) -> None:
-        self.vertices = vertices
         self.faces = faces
         self.is_convex = is_convex
         # Starting threads takes longer than to build a small tree.
         self.asset: Asset = build(vertices, faces, effort="fast", gpu_blocks=False, threads=1 if len(faces) < SMALL else 0)
+        # As the asset has them.
+        self.vertices: Array = (vertices - self.asset.origin).astype(np.float32) + self.asset.origin
         low, high = self.asset.bounds
         self.middle, self.radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
         self._solid: Solid | None = None
@@ -303,7 +305,9 @@ class Search:
             meeting = query.contacts(self.bodies.rows, pairs=pair, threads=self._threads).contacts
             deepest = max(self._face_contacts(a, b, meeting), key=lambda contact: contact.penetration_depth)
             half = deepest.normal * deepest.penetration_depth / 2
-            return Nearest(a, b, -deepest.penetration_depth, [deepest.pos + half, deepest.pos - half], deepest.b1, deepest.b2)
+            ends = [(deepest.a, deepest.pos + half, deepest.b1), (deepest.b, deepest.pos - half, deepest.b2)]
+            (_, point_a, face_a), (_, point_b, face_b) = sorted(ends, key=lambda end: end[0])
+            return Nearest(a, b, -deepest.penetration_depth, [point_a, point_b], face_a, face_b)
         return _nearest((a, b), query.distances(self.bodies.rows, pairs=pair, threads=self._threads).distances[0])
 
     def _faces(self, a: int, b: int, found: Overlap) -> tuple[int, int]:
@@ -320,7 +324,8 @@ class Search:
         return Contact(a, b, *self._faces(a, b, found), found.normal, found.middle, found.depth)
 
     def _face_contacts(self, a: int, b: int, meeting: Array) -> list[Contact]:
-        """Of a convex body and another: the other's faces that meet its surface, then those inside."""
+        """Of a convex body and another: the other's faces that meet its surface, then those inside. As in python-fcl, normals point from the other to the
+        convex one, whichever is a."""
         a_is_solid = bool(self.bodies.convex[a])
         body, other = (a, b) if a_is_solid else (b, a)
         solid_column, face_column = ("face_a", "face_b") if a_is_solid else ("face_b", "face_a")
@@ -328,18 +333,19 @@ class Search:
         solid = self.bodies.solid(body)
         inner = np.setdiff1d(np.arange(len(self.bodies.shapes[other].faces)), crossing)
         # A face that does not meet the surface is inside where its middle is.
-        inner = inner[solid.contains(self.bodies.corners(other, inner).mean(axis=1))]
-        faces = np.concatenate([crossing, inner])
+        middles = self.bodies.corners(other, inner).mean(axis=1)
+        inside = solid.contains(middles)
+        if len(crossing) == 0 and not inside.any():
+            inside[solid.nearest(middles)] = True  # rounding moved it out of the hull
+        faces = np.concatenate([crossing, inner[inside]])
         corners = self.bodies.corners(other, faces)
         depths, normals, planes = face_overlaps(solid, corners)
         points = corners.mean(axis=1)
         solid_faces = meeting[solid_column][first]
         points[: len(crossing)] = meeting_points(self.bodies.corners(body, solid_faces), corners[: len(crossing)])
         solid_faces = np.concatenate([solid_faces, self._faces_of_planes(body, solid, planes[len(crossing) :])])
-        if not a_is_solid:
-            normals = -normals
-        ends = (solid_faces, faces) if a_is_solid else (faces, solid_faces)
-        return _contacts(a, b, *ends, normals, points, depths)
+        rows = zip(faces.tolist(), solid_faces.tolist(), -normals, points, depths.tolist())
+        return [Contact(other, body, *row) for row in rows]
 
     def _faces_of_planes(self, body: int, solid: Solid, planes: Array) -> Array:
         """(n,) of each of the planes of a solid, by number, a face of the mesh that is the nearest to it."""
@@ -386,10 +392,6 @@ def _columns(pairs: Array) -> Array:
 
 def _nearest(pair: Any, row: Any) -> Nearest:
     return Nearest(int(pair[0]), int(pair[1]), float(row["upper"]), [row["point_a"].copy(), row["point_b"].copy()], int(row["face_a"]), int(row["face_b"]))
-
-
-def _contacts(a: int, b: int, faces_a: Array, faces_b: Array, normals: Array, points: Array, depths: Array) -> list[Contact]:
-    return [Contact(a, b, *row) for row in zip(faces_a.tolist(), faces_b.tolist(), normals, points, depths.tolist())]
 
 
 def unit_normals(corners: Array) -> Array:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import nnls
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 
 Array = npt.NDArray[Any]
 
@@ -35,7 +35,7 @@ class Solid:
     """The convex hull of points: `vertices` (n, 3), and `normals` (k, 3) and `offsets` (k,) of its faces, outside of which normal . x > offset."""
 
     def __init__(self, vertices: Array) -> None:
-        hull = ConvexHull(vertices)
+        hull = _hull(vertices)
         self.vertices = np.ascontiguousarray(vertices[hull.vertices])
         # Triangles of one face have the same plane to the bit.
         planes = np.unique(hull.equations, axis=0)
@@ -53,12 +53,28 @@ class Solid:
         """The diagonal of its bounds."""
         return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
 
+    def _heights(self, points: Array) -> Array:
+        """(n,) how far points (n, 3) are outside of the plane of a face, at most; negative: inside."""
+        heights = np.empty(len(points))
+        for rows in _chunks(len(points), len(self.offsets)):
+            heights[rows] = (points[rows] @ self.normals.T - self.offsets).max(axis=1)
+        return heights
+
     def contains(self, points: Array, margin: float = 0.0) -> Array:
         """(n,) whether each of the points (n, 3) is inside or no farther than `margin` outside of all faces' planes."""
-        inside = np.empty(len(points), bool)
-        for rows in _chunks(len(points), len(self.offsets)):
-            inside[rows] = (points[rows] @ self.normals.T <= self.offsets + margin).all(axis=1)
+        inside: Array = self._heights(points) <= margin
         return inside
+
+    def nearest(self, points: Array) -> int:
+        """Which of the points (n, 3) is the deepest inside, or the least far outside of a face's plane."""
+        return int(self._heights(points).argmin())
+
+
+def _hull(points: Array) -> Any:
+    try:
+        return ConvexHull(points)
+    except QhullError:
+        return ConvexHull(points, qhull_options="QJ")  # flat to rounding: points are moved by as much
 
 
 def _chunks(rows: int, columns: int) -> list[slice]:
@@ -95,10 +111,9 @@ def overlap(a: Solid, b: Solid) -> Overlap:
         points = supports(np.concatenate(normals))
         if np.linalg.matrix_rank(points - points[0], tolerance) < 3:
             points = np.concatenate([points, a.vertices - b.vertices[0]])  # which spans space as a does
-        # These span space as a does, whatever the directions.
     shortest = np.inf  # of the ways that were tried
     while True:
-        hull = ConvexHull(points)
+        hull = _hull(points)
         normals, offsets = hull.equations[:, :3], -hull.equations[:, 3]
         near = offsets <= shortest + tolerance
         normals, offsets = normals[near], offsets[near]
@@ -111,7 +126,7 @@ def overlap(a: Solid, b: Solid) -> Overlap:
         points = np.concatenate([points[hull.vertices], found[beyond]])
     normals = np.unique(np.round(normals[ways <= shortest + tolerance], 12), axis=0)
     normal = normals[0]
-    depth = float((a.vertices @ normal).max() - (b.vertices @ normal).min())
+    depth = max(0.0, float((a.vertices @ normal).max() - (b.vertices @ normal).min()))
     point_a = _deepest_point(a, b, depth, normal, 10 * tolerance)
     return Overlap(depth, normal, point_a, point_a - depth * normal)
 

@@ -102,9 +102,9 @@ class CollisionManager:
     def set_transform(self, name: Hashable, transform: Array) -> None:
         """Moves an object to the transform, (4, 4) float. Raises ValueError where there is none of that name."""
         self._check(name)
+        rotation, translation = transform[:3, :3], transform[:3, 3]
         place = self._objs[name]._place
-        place[:3, :3] = transform[:3, :3]
-        place[:3, 3] = transform[:3, 3]
+        place[:3, :3], place[:3, 3] = rotation, translation
         self._moved = True
 
     def in_collision_single(self, mesh: Any, transform: Any = None, return_names: bool = False, return_data: bool = False) -> Any:
@@ -116,7 +116,7 @@ class CollisionManager:
         names : set of str
           Of the objects that it collides with; if return_names.
         contacts : list of ContactData
-          All of them; if return_data. The mesh is called "__external". Normals point from the object to the mesh.
+          All of them; if return_data. The mesh is called "__external". Normals point from the object to the mesh; where one of them is convex, to that.
         """
         return self._collisions(self._with_single(mesh, transform), lambda a, b: a, return_names, return_data)
 
@@ -129,7 +129,7 @@ class CollisionManager:
         names : set of (str, str)
           The pairs that collide, either in alphabetical order; if return_names.
         contacts : list of ContactData
-          All of them; if return_data. Normals point from the object that was added first to the other.
+          All of them; if return_data. Normals point from the object that was added first to the other; where one of them is convex, to that.
         """
         return self._collisions(self._search(), lambda a, b: tuple(sorted((a, b))), return_names, return_data)
 
@@ -142,7 +142,7 @@ class CollisionManager:
         names : set of (str, str)
           The pairs that collide: this manager's object, the other's; if return_names.
         contacts : list of ContactData
-          All of them; if return_data. Normals point from this manager's object to the other's.
+          All of them; if return_data. Normals point from this manager's object to the other's; where one of them is convex, to that.
         """
         return self._collisions(self._with_other(other_manager), lambda a, b: (a, b), return_names, return_data)
 
@@ -232,7 +232,7 @@ class CollisionManager:
         contacts: list[Contact] = []
         if return_data:
             contacts = search.contacts()
-            pairs = {(contact.a, contact.b) for contact in contacts}
+            pairs = {(min(contact.a, contact.b), max(contact.a, contact.b)) for contact in contacts}
         elif return_names:
             pairs = search.colliding_pairs()
         else:

@@ -190,15 +190,18 @@ class Warp:
         self.faces, self.room = len(faces), 1 << 16
         self.frame(rotation, translation)  # compiles the kernel
 
-    def frame(self, rotation, translation):
+    def placed(self, rotation, translation):
+        """Pairs, rotations and translations, where the kernel takes them."""
         warp = self.warp
-        self.pairs = box_pairs(*self.bounds, rotation, translation)
-        posed = [warp.array(values, dtype=kind, device=self.device) for values, kind in
-                 ((self.pairs.astype(np.int32), warp.vec2i), (rotation, warp.mat33d), (translation, warp.vec3d))]
+        pairs = box_pairs(*self.bounds, rotation, translation).astype(np.int32)
+        return [warp.array(values, dtype=kind, device=self.device) for values, kind in ((pairs, warp.vec2i), (rotation, warp.mat33d), (translation, warp.vec3d))]
+
+    def frame(self, rotation, translation):
+        warp, posed = self.warp, self.placed(rotation, translation)
         while True:
             self.count = warp.zeros(1, dtype=int, device=self.device)
             self.found = warp.empty(self.room, dtype=warp.vec4i, device=self.device)
-            warp.launch(self.kernel, (len(self.pairs), self.faces), [self.mesh.id, self.corners, *posed, self.count, self.found], device=self.device)
+            warp.launch(self.kernel, (len(posed[0]), self.faces), [self.mesh.id, self.corners, *posed, self.count, self.found], device=self.device)
             count = int(self.count.numpy()[0])
             if count <= self.room:
                 return
@@ -209,21 +212,32 @@ class Warp:
 
 
 class WarpCuda(Warp):
+    """As Warp; pairs and poses lie on the GPU before the frame's time begins."""
+
     device = "cuda"
 
+    def placed(self, rotation, translation):
+        if not hasattr(self, "kept"):
+            self.kept = {}
+        if id(rotation) not in self.kept:
+            self.kept[id(rotation)] = rotation, super().placed(rotation, translation)
+        return self.kept[id(rotation)][1]
 
-class TandemCuda(Tandem):
-    """tandem.cuda.Query; poses come from the host and contacts stay on the device, as with Warp."""
 
-    needs = ["tandem.cuda"]
+class TandemCuda:
+    """tandem.cuda.Query; poses lie on the GPU before the frame's time begins."""
+
+    name, needs = "Tandem", ["tandem.cuda", "cupy"]
 
     def __init__(self, vertices, faces, rotation, translation):
         import tandem.cuda
-        self.query = tandem.cuda.Query([tandem.build(vertices, faces)])
+        self.query, self.kept = tandem.cuda.Query([tandem.build(vertices, faces)]), {}
 
     def frame(self, rotation, translation):
-        poses = np.concatenate([rotation, translation[:, None]], axis=1)
-        self.found = self.query.contacts(np.zeros(len(poses), np.uint32), poses)
+        import cupy
+        if id(rotation) not in self.kept:
+            self.kept[id(rotation)] = rotation, self.query.instances(pose=cupy.asarray(np.concatenate([rotation, translation[:, None]], axis=1)))
+        self.found = self.query.contacts(self.kept[id(rotation)][1])
 
     def contacts(self):
         pairs, contacts = self.found.pairs.numpy(), self.found.contacts.numpy()

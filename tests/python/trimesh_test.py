@@ -1,8 +1,14 @@
 """tandem.trimesh.CollisionManager beside trimesh.collision.CollisionManager over python-fcl."""
 
+import contextlib
 import doctest
+import io
+import os
+import re
+import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -448,6 +454,26 @@ def test_flat_and_far_bodies_have_depths():
 
 def test_docstring_examples():
     assert doctest.testmod(tandem.trimesh) == (0, 8)
+
+
+def test_the_page_shows_what_happens():
+    page = (Path(os.environ["TANDEM_SOURCE_DIR"]) / "docs/python_trimesh.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```python\n(.*?)^```\n(?:```\n(.*?)^```\n)?", page, re.MULTILINE | re.DOTALL)
+    assert len(blocks) > 1
+    names = {}
+    for code, shown in blocks:
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed):
+            exec(compile(code, "python_trimesh.md", "exec"), names)
+        assert printed.getvalue() == shown
+
+
+def test_mypy_finds_nothing(tmp_path):
+    pytest.importorskip("mypy")
+    package = Path(tandem.__file__).parent
+    done = subprocess.run([sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(tmp_path), "-m", "tandem.trimesh"], capture_output=True, text=True,
+                          env={**os.environ, "MYPYPATH": str(package.parent)}, cwd=tmp_path)
+    assert done.returncode == 0, done.stdout
 
 
 def test_scenes():

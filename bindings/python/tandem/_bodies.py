@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -67,7 +67,7 @@ class Shape:
     def of(mesh: Any) -> Shape:
         """The shape of a trimesh.Trimesh, which the mesh keeps as long as it does not change."""
         is_convex = bool(mesh.is_convex)
-        shape = mesh._cache["tandem"]
+        shape: Shape | None = mesh._cache["tandem"]
         if shape is None:
             shape = Shape(np.array(mesh.vertices, np.float64), np.array(mesh.faces), is_convex)
             mesh._cache["tandem"] = shape
@@ -174,7 +174,8 @@ class Bodies:
     def corners(self, body: int, faces: Array) -> Array:
         """(n, 3, 3) of faces of a body where it stands."""
         row, shape = self.rows[body], self.shapes[body]
-        return shape.vertices[shape.faces[faces]] @ row["rotation"].T + row["translation"]
+        corners: Array = shape.vertices[shape.faces[faces]] @ row["rotation"].T + row["translation"]
+        return corners
 
     def corners_of(self, bodies: Array, faces: Array) -> Array:
         """(n, 3, 3) of a face each of n bodies."""
@@ -227,11 +228,11 @@ class Search:
         pairs, meet = self._first_contacts()
         return {(int(a), int(b)) for a, b in pairs[meet]} | self._enclosed_pairs(pairs[~meet])
 
-    def contacts(self) -> list[Contact]:
+    def contacts(self) -> Iterator[Contact]:
         """All contacts: one for each pair of convex bodies; of a convex body and another one for each face of the other that meets the solid; one for each
         pair of faces of others that meet."""
         if self._pair_count == 0:
-            return []
+            return
         query, rows = self.bodies.query(), self.bodies.rows
         found = query.contacts(rows, filter=self._filter, threads=self._threads)
         contained = query.contained(threads=self._threads).contained
@@ -239,15 +240,14 @@ class Search:
         bounds = np.searchsorted(found.contacts["pair"], np.arange(len(pairs) + 1))
         convex = self.bodies.convex[pairs]
         meet = np.diff(bounds) > 0
-        contacts = self._surface_contacts(pairs, found.contacts[~convex.any(axis=1)[found.contacts["pair"]]])
+        yield from self._surface_contacts(pairs, found.contacts[~convex.any(axis=1)[found.contacts["pair"]]])
         meet[self._enclosed(pairs, contained)] = True
         for pair in np.flatnonzero(meet & convex.any(axis=1)):
             a, b = map(int, pairs[pair])
             if convex[pair].all():
-                contacts.append(self._convex_contact(a, b))
+                yield self._convex_contact(a, b)
             else:
-                contacts.extend(self._face_contacts(a, b, found.contacts[bounds[pair] : bounds[pair + 1]]))
-        return contacts
+                yield from self._face_contacts(a, b, found.contacts[bounds[pair] : bounds[pair + 1]])
 
     def nearest(self) -> Nearest | None:
         """The pair that is nearest, or the deepest of those that collide; None where there is no pair. Of equals the first."""
@@ -281,6 +281,8 @@ class Search:
 
     def _enclosed_pairs(self, apart: Array) -> set[tuple[int, int]]:
         """Of pairs (n, 2) whose surfaces do not meet, those with a component of one body inside the other, which is convex."""
+        if not self.bodies.convex.any():
+            return set()
         apart = apart[self.bodies.convex[apart].any(axis=1)]
         if len(apart) == 0:
             return set()
@@ -292,7 +294,8 @@ class Search:
     def _enclosed(self, pairs: Array, contained: Array) -> Array:
         """(n,) the rows of the pairs with a component of one body inside the other, which is convex."""
         outer = pairs[contained["pair"], np.where(contained["inner"] == 1, 0, 1)]
-        return contained["pair"][self.bodies.convex[outer] & (contained["flags"] & INSIDE > 0)]
+        rows: Array = contained["pair"][self.bodies.convex[outer] & (contained["flags"] & INSIDE > 0)]
+        return rows
 
     def _collision(self, a: int, b: int) -> Nearest:
         convex = self.bodies.convex[[a, b]]
@@ -323,7 +326,7 @@ class Search:
         found = overlap(self.bodies.solid(a), self.bodies.solid(b))
         return Contact(a, b, *self._faces(a, b, found), found.normal, found.middle, found.depth)
 
-    def _face_contacts(self, a: int, b: int, meeting: Array) -> list[Contact]:
+    def _face_contacts(self, a: int, b: int, meeting: Array) -> Iterator[Contact]:
         """Of a convex body and another: the other's faces that meet its surface, then those inside. As in python-fcl, normals point from the other to the
         convex one, whichever is a."""
         a_is_solid = bool(self.bodies.convex[a])
@@ -345,7 +348,8 @@ class Search:
         points[: len(crossing)] = meeting_points(self.bodies.corners(body, solid_faces), corners[: len(crossing)])
         solid_faces = np.concatenate([solid_faces, self._faces_of_planes(body, solid, planes[len(crossing) :])])
         rows = zip(faces.tolist(), solid_faces.tolist(), -normals, points, depths.tolist())
-        return [Contact(other, body, *row) for row in rows]
+        for row in rows:
+            yield Contact(other, body, *row)
 
     def _faces_of_planes(self, body: int, solid: Solid, planes: Array) -> Array:
         """(n,) of each of the planes of a solid, by number, a face of the mesh that is the nearest to it."""
@@ -353,11 +357,11 @@ class Search:
         found = {int(plane): int((corners @ solid.normals[plane]).min(axis=1).argmax()) for plane in np.unique(planes)}
         return np.array([found[int(plane)] for plane in planes], np.intp)
 
-    def _surface_contacts(self, pairs: Array, meeting: Array) -> list[Contact]:
+    def _surface_contacts(self, pairs: Array, meeting: Array) -> Iterator[Contact]:
         """Of bodies that are not convex. Normal and depth are those of the contact region that is the nearest; where there is none, of which the surfaces
         touch in a point, the normal is that of a's face."""
         if len(meeting) == 0:
-            return []
+            return
         a, b = pairs[meeting["pair"]].T
         points, normals, depths = np.empty((len(meeting), 3)), np.empty((len(meeting), 3)), np.zeros(len(meeting))
         for first in range(0, len(meeting), CONTACTS_AT_A_TIME):
@@ -382,12 +386,14 @@ class Search:
                 region = region_of_point[np.einsum("ijk,ijk->ij", gaps, gaps).argmin(axis=1)]
             normals[start:end], depths[start:end] = own["normal"][region], own["depth"][region]
         bodies = zip(a.tolist(), b.tolist(), meeting["face_a"].tolist(), meeting["face_b"].tolist())
-        return [Contact(*faces, *rest) for faces, *rest in zip(bodies, normals, points, depths.tolist())]
+        for faces, normal, point, depth in zip(bodies, normals, points, depths.tolist()):
+            yield Contact(*faces, normal, point, depth)
 
 
 def _columns(pairs: Array) -> Array:
     """(n, 2) intp of an array of tandem.PAIR."""
-    return np.stack([pairs["a"], pairs["b"]], axis=1).astype(np.intp)
+    columns: Array = np.stack([pairs["a"], pairs["b"]], axis=1).astype(np.intp)
+    return columns
 
 
 def _nearest(pair: Any, row: Any) -> Nearest:
@@ -396,8 +402,9 @@ def _nearest(pair: Any, row: Any) -> Nearest:
 
 def unit_normals(corners: Array) -> Array:
     """(n, 3) of triangles (n, 3, 3)."""
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return normals / np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
+    normals: Array = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
+    return normals
 
 
 def meeting_points(a: Array, b: Array) -> Array:
@@ -407,23 +414,23 @@ def meeting_points(a: Array, b: Array) -> Array:
     for edges, other in ((a, b), (b, a)):
         origin, u, v = other[:, 0], other[:, 1] - other[:, 0], other[:, 2] - other[:, 0]
         normal = np.cross(u, v)
-        heights = ((edges - origin[:, None]) * normal[:, None]).sum(axis=2)
-        for i, j in ((0, 1), (1, 2), (2, 0)):
-            crosses = heights[:, i] * heights[:, j] < 0
-            part = heights[:, i] / np.where(crosses, heights[:, i] - heights[:, j], 1)
-            point = edges[:, i] + part[:, None] * (edges[:, j] - edges[:, i])
-            square = np.maximum((normal * normal).sum(axis=1), np.finfo(float).tiny)
-            s = (np.cross(point - origin, v) * normal).sum(axis=1) / square
-            t = (np.cross(u, point - origin) * normal).sum(axis=1) / square
-            hit = crosses & (s >= 0) & (t >= 0) & (s + t <= 1)
-            total[hit] += point[hit]
-            count += hit
+        square = np.maximum((normal * normal).sum(axis=1), np.finfo(float).tiny)[:, None]
+        # Of a point origin + s u + t v of the plane: s and t.
+        to_s, to_t = np.cross(v, normal) / square, np.cross(normal, u) / square
+        heights = np.einsum("nij,nj->ni", edges - origin[:, None], normal)
+        ends, heights_of_ends = np.roll(edges, -1, axis=1), np.roll(heights, -1, axis=1)
+        crosses = heights * heights_of_ends < 0
+        part = heights / np.where(crosses, heights - heights_of_ends, 1)
+        points = edges + part[:, :, None] * (ends - edges)
+        s, t = (np.einsum("nij,nj->ni", points - origin[:, None], to) for to in (to_s, to_t))
+        hit = crosses & (s >= 0) & (t >= 0) & (s + t <= 1)
+        total += (points * hit[:, :, None]).sum(axis=1)
+        count += hit.sum(axis=1)
+    middles: Array = total / np.maximum(count, 1)[:, None]
     rest = count == 0
-    points = total / np.maximum(count, 1)[:, None]
     if rest.any():
         near = a[rest].mean(axis=1)
-        for _ in range(MEETING_STEPS):
-            near = trimesh.triangles.closest_point(b[rest], near)
-            near = trimesh.triangles.closest_point(a[rest], near)
-        points[rest] = near
-    return points
+        for triangles in MEETING_STEPS * (b[rest], a[rest]):
+            near = trimesh.triangles.closest_point(triangles, near)  # type: ignore[no-untyped-call]
+        middles[rest] = near
+    return middles

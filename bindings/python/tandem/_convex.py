@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import nnls
-from scipy.spatial import ConvexHull, QhullError
+from scipy.optimize import nnls  # type: ignore[import-untyped]
+from scipy.spatial import ConvexHull, QhullError  # type: ignore[import-untyped]
 
 Array = npt.NDArray[Any]
 
@@ -102,7 +102,8 @@ def overlap(a: Solid, b: Solid) -> Overlap:
     tolerance = 1e-10 * (a.size() + b.size())
 
     def supports(directions: Array) -> Array:
-        return a.vertices[_farthest(a.vertices, directions)] - b.vertices[_farthest(b.vertices, -directions)]
+        points: Array = a.vertices[_farthest(a.vertices, directions)] - b.vertices[_farthest(b.vertices, -directions)]
+        return points
 
     if len(a.vertices) * len(b.vertices) <= 256:
         points = (a.vertices[:, None] - b.vertices[None]).reshape(-1, 3)
@@ -137,18 +138,17 @@ def _deepest_point(a: Solid, b: Solid, depth: float, normal: Array, tolerance: f
     deepest_a = a.vertices[along_a >= along_a.max() - tolerance]
     deepest_b = b.vertices[along_b <= along_b.min() + tolerance]
     shift = depth * normal
-    touching = deepest_a[b.contains(deepest_a - shift, tolerance)]
-    if len(touching):
-        return touching[0]
-    touching = deepest_b[a.contains(deepest_b + shift, tolerance)]
-    if len(touching):
-        return touching[0] + shift
-    # Edges cross: weights of the vertices of either side, each of sum 1, with one middle.
-    weight = a.size() + b.size()
-    sums = [np.r_[np.full(len(deepest_a), weight), np.zeros(len(deepest_b))], np.r_[np.zeros(len(deepest_a)), np.full(len(deepest_b), weight)]]
-    columns = np.concatenate([np.concatenate([deepest_a, -deepest_b]).T, sums])
-    weights = nnls(columns, np.r_[shift, weight, weight])[0][: len(deepest_a)]
-    return weights @ deepest_a / weights.sum()
+    touching: Array = np.concatenate([deepest_a[b.contains(deepest_a - shift, tolerance)], deepest_b[a.contains(deepest_b + shift, tolerance)] + shift])
+    if len(touching) == 0:
+        # Edges cross: weights of the vertices of either side, each of sum 1, with one middle.
+        one = a.size() + b.size()
+        sums = np.zeros((2, len(deepest_a) + len(deepest_b)))
+        sums[0, : len(deepest_a)] = sums[1, len(deepest_a) :] = one
+        columns = np.concatenate([np.concatenate([deepest_a, -deepest_b]).T, sums])
+        weights = nnls(columns, np.r_[shift, one, one])[0][: len(deepest_a)]
+        touching = (weights @ deepest_a / weights.sum())[None]
+    first: Array = touching[0]
+    return first
 
 
 def face_overlaps(solid: Solid, corners: Array) -> tuple[Array, Array, Array]:

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from trimesh.collision import ContactData, DistanceData
 
-from ._bodies import Bodies, Contact, Nearest, Search, Shape
+from ._bodies import Bodies, Nearest, Search, Shape
 from ._convex import Array
 
 __all__ = ["CollisionManager", "CollisionObject", "ContactData", "DistanceData", "scene_to_collision"]
@@ -229,10 +229,13 @@ class CollisionManager:
 
     def _collisions(self, search: Search, pair_name: Any, return_names: bool, return_data: bool) -> Any:
         names = search.bodies.names
-        contacts: list[Contact] = []
+        contacts: list[ContactData] = []
         if return_data:
-            contacts = search.contacts()
-            pairs = {(min(contact.a, contact.b), max(contact.a, contact.b)) for contact in contacts}
+            make: Any = ContactData
+            pairs = set()
+            for contact in search.contacts():
+                pairs.add((min(contact.a, contact.b), max(contact.a, contact.b)))
+                contacts.append(make((names[contact.a], names[contact.b]), contact))
         elif return_names:
             pairs = search.colliding_pairs()
         else:
@@ -241,7 +244,7 @@ class CollisionManager:
         if return_names:
             answer.append({pair_name(names[a], names[b]) for a, b in pairs})
         if return_data:
-            answer.append([ContactData((names[contact.a], names[contact.b]), contact) for contact in contacts])
+            answer.append(contacts)
         return tuple(answer)
 
     def _distance(self, search: Search, nobody: tuple[Any, Any], pair_name: Any, return_names: bool, return_data: bool) -> Any:
@@ -258,7 +261,8 @@ class CollisionManager:
         if return_names:
             answer.append(pair)
         if return_data:
-            answer.append(DistanceData(names, nearest))
+            make: Any = DistanceData
+            answer.append(make(names, nearest))
         return tuple(answer)
 
 

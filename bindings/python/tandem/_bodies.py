@@ -59,7 +59,7 @@ class Shape:
         # As the asset has them.
         self.vertices: Array = (vertices - self.asset.origin).astype(np.float32) + self.asset.origin
         low, high = self.asset.bounds
-        self.middle, self.radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
+        self.middle, self.half = (low + high) / 2, (high - low) / 2
         self._solid: Solid | None = None
         self._stretched: tuple[bytes, Shape] | None = None
 
@@ -117,6 +117,7 @@ class Bodies:
         self.shapes: list[Shape] = []
         self.assets: list[Asset] = []
         self._query: Query | None = None
+        self._solids: dict[int, Solid] = {}
         self.move(places)
 
     @staticmethod
@@ -131,6 +132,7 @@ class Bodies:
         both.rows = np.empty(len(both.names), INSTANCE)
         both.rows[: len(ours.rows)], both.rows[len(ours.rows) :] = ours.rows, theirs.rows
         both.rows["asset"][len(ours.rows) :] += len(ours.assets)
+        both._solids = {}
         both._query = former._query if former is not None and _same(former.assets, both.assets) else None
         return both
 
@@ -138,6 +140,7 @@ class Bodies:
         """Puts the bodies at other places. Raises ValueError where one is not finite."""
         if not places:
             return
+        self._solids = {}
         matrices = np.array(places)
         linear = matrices[:, :3, :3]
         self.rows["rotation"] = linear
@@ -168,8 +171,10 @@ class Bodies:
 
     def solid(self, body: int) -> Solid:
         """The convex hull of a body where it stands."""
-        row = self.rows[body]
-        return self.shapes[body].solid().moved(row["rotation"], row["translation"])
+        if body not in self._solids:
+            row = self.rows[body]
+            self._solids[body] = self.shapes[body].solid().moved(row["rotation"], row["translation"])
+        return self._solids[body]
 
     def corners(self, body: int, faces: Array) -> Array:
         """(n, 3, 3) of faces of a body where it stands."""
@@ -187,11 +192,11 @@ class Bodies:
             corners[rows] = self.corners(int(bodies[rows[0]]), faces[rows])
         return corners
 
-    def extent(self) -> float:
-        """No two points of bodies are farther apart."""
-        middles = np.array([shape.middle for shape in self.shapes])
-        middles = np.einsum("nij,nj->ni", self.rows["rotation"], middles) + self.rows["translation"]
-        return float(np.linalg.norm(np.ptp(middles, axis=0))) + 2 * max(shape.radius for shape in self.shapes)
+    def boxes(self) -> tuple[Array, Array]:
+        """(n, 3) the least and the greatest coordinates of boxes that the bodies lie in."""
+        middles = np.einsum("nij,nj->ni", self.rows["rotation"], np.array([shape.middle for shape in self.shapes])) + self.rows["translation"]
+        halves = np.einsum("nij,nj->ni", np.abs(self.rows["rotation"]), np.array([shape.half for shape in self.shapes]))
+        return middles - halves, middles + halves
 
 
 def _same(some: Sequence[object], others: Sequence[object]) -> bool:
@@ -253,13 +258,13 @@ class Search:
         """The pair that is nearest, or the deepest of those that collide; None where there is no pair. Of equals the first."""
         if self._pair_count == 0:
             return None
-        colliding = sorted(self.colliding_pairs())
+        colliding = self.colliding_pairs()
         if colliding:
-            return min((self._collision(a, b) for a, b in colliding), key=lambda found: found.min_distance)
+            return self._deepest(np.array(sorted(colliding)))
         query, rows = self.bodies.query(), self.bodies.rows
-        reach: float | None = None
-        if self._pair_count > FEW_PAIRS:
-            reach = self.bodies.extent() / 256
+        lows, highs = self.bodies.boxes()
+        extent = float(np.linalg.norm(highs.max(axis=0) - lows.min(axis=0)))
+        reach = extent / 256 if self._pair_count > FEW_PAIRS else None
         while True:
             found = query.distances(rows, reach=reach, relative_tolerance=PRECISION, filter=self._filter, threads=self._threads)
             distances = found.distances["upper"].copy()
@@ -269,7 +274,26 @@ class Search:
                 first = int(distances.argmin())
                 return _nearest(found.pairs[first], found.distances[first])
             assert reach is not None
-            reach = 4 * reach if reach < self.bodies.extent() else None
+            reach = 4 * reach if reach < extent else None
+
+    def _deepest(self, pairs: Array) -> Nearest:
+        """Of pairs (n, 2) that collide the one that is the deepest, the first of equals."""
+        lows, highs = self.bodies.boxes()
+        a, b = pairs.T
+        # No two convex bodies are deeper than their boxes, others have no depth; of a convex body and another each has to be looked at.
+        bounds = np.minimum(highs[a] - lows[b], highs[b] - lows[a]).min(axis=1)
+        convex = self.bodies.convex[pairs]
+        bounds[~convex.all(axis=1)] = np.inf
+        bounds[~convex.any(axis=1)] = 0
+        deepest: Nearest | None = None
+        for row in np.argsort(-bounds, kind="stable"):
+            if deepest is not None and bounds[row] <= -deepest.min_distance:
+                break
+            found = self._collision(*map(int, pairs[row]))
+            if deepest is None or (found.min_distance, found.a, found.b) < (deepest.min_distance, deepest.a, deepest.b):
+                deepest = found
+        assert deepest is not None
+        return deepest
 
     def _first_contacts(self) -> tuple[Array, Array]:
         """(n, 2) the pairs whose boxes meet, and (n,) whether their surfaces do."""
@@ -319,7 +343,7 @@ class Search:
         for body, side in ((a, 1.0), (b, -1.0)):
             faces = np.arange(len(self.bodies.shapes[body].faces))
             along = (self.bodies.corners(body, faces) @ (side * found.normal)).min(axis=1)
-            ends.append(int(np.flatnonzero(along >= along.max() - 1e-9 * self.bodies.shapes[body].radius)[0]))
+            ends.append(int(np.flatnonzero(along >= along.max() - 1e-9 * self.bodies.solid(body).size)[0]))
         return ends[0], ends[1]
 
     def _convex_contact(self, a: int, b: int) -> Contact:

@@ -23,3 +23,10 @@ def speed(rows):
         lines.append([peer] + [text for row in cells for text in (three_digits(float(row["set_up_ms"])), three_digits(float(row["frame_ms"])),
                                                                   whole(int(row["missed"]) + int(row["invented"])))])
     return markdown(heads, lines)
+
+
+def on_a_gpu(rows):
+    """One row for each scene."""
+    return markdown(["scene", "peer", "set up", "frame", "contacts", "wrong"],
+                    [[row["scene"], row["peer"], three_digits(float(row["set_up_ms"])), three_digits(float(row["frame_ms"])), whole(int(row["contacts"])),
+                      whole(int(row["missed"]) + int(row["invented"]))] for row in rows], "ll")

@@ -9,6 +9,8 @@ In the examples of the docstrings, `box` is a cube of unit length with a corner 
 >>> len(found.contacts) > 0
 True
 """
+from typing import Any as _Any
+
 from . import _tandem
 from ._arrays import instances
 from ._asset import Asset, Level, Part
@@ -28,11 +30,19 @@ APART, TOUCH, WITHIN_TOLERANCE = range(3)
 #: Statuses of impacts.
 NO_IMPACT, IMPACT_IN_STEP, IMPACT_AT_START = range(3)
 
+
+def view(what: _Any, instances: _Any = None, **options: _Any) -> _Any:
+    """Shows bodies and what was found of them, in a window or as a picture: tandem.viewer.view(), which needs pyvista."""
+    from .viewer import view as show
+
+    return show(what, instances, **options)
+
+
 __version__ = f"{_tandem.version // 10000}.{_tandem.version // 100 % 100}.{_tandem.version % 100}"
 
 __all__ = [
     "APART", "CONTACT", "CONTAINMENT", "DISTANCE", "FIXED", "FORMER", "GOES_THROUGH", "IMPACT", "IMPACT_AT_START", "IMPACT_IN_STEP", "INSIDE", "INSTANCE",
     "KINEMATIC", "MANIFOLD", "MOTION", "MOVING", "NO_IMPACT", "NO_INDEX", "OPEN_CURVE", "OUTER_OPEN", "PAIR", "POINT", "SLEEPING", "TOUCH", "TOUCHING", "VERDICT",
     "WITHIN_TOLERANCE", "Asset", "BuildReport", "Contacts", "Contained", "Counters", "Distances", "Error", "FileError", "Filter", "Impacts", "Level", "Manifolds", "Mesh",
-    "Part", "Query", "Verdicts", "build", "instances", "read_mesh",
+    "Part", "Query", "Verdicts", "build", "instances", "read_mesh", "view",
 ]

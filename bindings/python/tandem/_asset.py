@@ -152,6 +152,11 @@ class Asset:
         """The levels of detail that the asset shows, the finest first."""
         return [Level(**self._core.level(level)) for level in range(self._info["level_count"])]
 
+    @property
+    def first_level(self) -> int:
+        """The file's number of the finest level that the asset shows."""
+        return int(self._info["first_level"])
+
     def triangles(self, level: int = 0) -> npt.NDArray[np.float64]:
         """Corners of a level's triangles, (n, 3, 3), in the mesh file's coordinates; triangles as contacts number them."""
         return np.frombuffer(self._core.triangles(whole_number(level, "level", 0, _MOST)), np.float64).reshape(-1, 3, 3)

@@ -1,0 +1,460 @@
+"""Bodies at their places and what a query finds between them: what `tandem.trimesh` is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import trimesh.triangles
+
+from . import INSIDE, INSTANCE, NO_INDEX, Asset, Filter, Query, build
+from ._convex import Array, Overlap, Solid, face_overlaps, overlap
+
+RIGID = 4e-7  # what a pose may be off: queries take 1e-6, by another measure of the same matrix
+ROUNDING = 1e-5  # a matrix that is so near to a rotation is meant to be one
+PRECISION = 1e-12  # of distances, relative
+SMALL = 10_000  # faces of a mesh
+FEW_PAIRS = 64  # whose distances are asked for at once
+MEETING_STEPS = 32
+CONTACTS_AT_A_TIME = 1 << 16
+
+
+@dataclass(slots=True)
+class Contact:
+    """What trimesh's ContactData takes: bodies a and b, in either order, their faces b1 and b2, and where, along what and how deep they meet. The normal
+    points from a to b."""
+
+    a: int
+    b: int
+    b1: int
+    b2: int
+    normal: Array
+    pos: Array
+    penetration_depth: float
+
+
+@dataclass(slots=True)
+class Nearest:
+    """What trimesh's DistanceData takes: bodies a and b, how far apart they are, their nearest points, and the faces these are on."""
+
+    a: int
+    b: int
+    min_distance: float
+    nearest_points: Sequence[Array | None]
+    b1: int
+    b2: int
+
+
+class Shape:
+    """What a mesh is to queries: an asset, and whether it is solid."""
+
+    def __init__(self, vertices: Array, faces: Array, is_convex: bool) -> None:
+        self.faces = faces
+        self.is_convex = is_convex
+        # Starting threads takes longer than to build a small tree.
+        self.asset: Asset = build(vertices, faces, effort="fast", gpu_blocks=False, threads=1 if len(faces) < SMALL else 0)
+        # As the asset has them.
+        self.vertices: Array = (vertices - self.asset.origin).astype(np.float32) + self.asset.origin
+        low, high = self.asset.bounds
+        self.middle, self.half = (low + high) / 2, (high - low) / 2
+        self._solid: Solid | None = None
+        self._stretched: tuple[bytes, Shape] | None = None
+
+    @staticmethod
+    def of(mesh: Any) -> Shape:
+        """The shape of a trimesh.Trimesh, which the mesh keeps as long as it does not change."""
+        is_convex = bool(mesh.is_convex)
+        shape: Shape | None = mesh._cache["tandem"]
+        if shape is None:
+            shape = Shape(np.array(mesh.vertices, np.float64), np.array(mesh.faces), is_convex)
+            mesh._cache["tandem"] = shape
+        return shape
+
+    def stretched(self, stretch: Array) -> Shape:
+        """The shape with every vertex v at stretch v. The last one is kept."""
+        key = stretch.tobytes()
+        if self._stretched is None or self._stretched[0] != key:
+            # Mirrored triangles would face inwards.
+            faces = self.faces if np.linalg.det(stretch) > 0 else self.faces[:, ::-1]
+            self._stretched = key, Shape(self.vertices @ stretch.T, faces, self.is_convex)
+        return self._stretched[1]
+
+    def solid(self) -> Solid:
+        """The convex hull."""
+        if self._solid is None:
+            self._solid = Solid(self.vertices[np.unique(self.faces)])
+        return self._solid
+
+
+def _rotation_and_stretch(matrix: Array) -> tuple[Array, Array | None]:
+    """The rotation and the symmetric stretch, None where there is none, whose product a matrix (3, 3) is. Digits beyond the twelfth of the stretch are
+    dropped, so that a stretched body that turns keeps its shape."""
+    left, sizes, right = np.linalg.svd(matrix)
+    rotation = left @ right
+    stretch = right.T * sizes @ right
+    if np.linalg.det(rotation) < 0:
+        rotation, stretch = -rotation, -stretch
+    if np.abs(stretch - np.eye(3)).max() <= ROUNDING:
+        return rotation, None
+    unit = 2.0 ** np.ceil(np.log2(sizes[0])) if sizes[0] > 0 else 1.0
+    return rotation, np.round(stretch / unit, 12) * unit + 0.0  # not -0
+
+
+class Bodies:
+    """Shapes at places, with names. The places are (4, 4) matrices.
+
+    Attributes: `rows`, array of tandem.INSTANCE; `shapes`, those that the rows' assets are of; `convex` (n,), which are.
+    """
+
+    def __init__(self, names: list[Hashable], shapes: list[Shape], places: list[Array]) -> None:
+        self.names = names
+        self._given = shapes
+        self.rows = np.zeros(len(names), INSTANCE)
+        self.convex = np.array([shape.is_convex for shape in shapes], bool)
+        self.shapes: list[Shape] = []
+        self.assets: list[Asset] = []
+        self._query: Query | None = None
+        self._solids: dict[int, Solid] = {}
+        self.move(places)
+
+    @staticmethod
+    def joined(ours: Bodies, theirs: Bodies, former: Bodies | None) -> Bodies:
+        """Both, ours first. Takes the query of the former result where that is of the same assets."""
+        both = object.__new__(Bodies)
+        both.names = ours.names + theirs.names
+        both._given = []
+        both.shapes = ours.shapes + theirs.shapes
+        both.convex = np.concatenate([ours.convex, theirs.convex])
+        both.assets = ours.assets + theirs.assets
+        both.rows = np.empty(len(both.names), INSTANCE)
+        both.rows[: len(ours.rows)], both.rows[len(ours.rows) :] = ours.rows, theirs.rows
+        both.rows["asset"][len(ours.rows) :] += len(ours.assets)
+        both._solids = {}
+        both._query = former._query if former is not None and _same(former.assets, both.assets) else None
+        return both
+
+    def move(self, places: list[Array]) -> None:
+        """Puts the bodies at other places. Raises ValueError where one is not finite."""
+        if not places:
+            return
+        self._solids = {}
+        matrices = np.array(places)
+        linear = matrices[:, :3, :3]
+        self.rows["rotation"] = linear
+        self.rows["translation"] = matrices[:, :3, 3]
+        finite = np.isfinite(matrices[:, :3]).all(axis=(1, 2))
+        if not finite.all():
+            raise ValueError(f"the transform of {self.names[int(finite.argmin())]} is not finite")
+        off = np.abs(linear.transpose(0, 2, 1) @ linear - np.eye(3)).max(axis=(1, 2))
+        rigid = (off <= RIGID) & (np.linalg.det(linear) > 0)
+        shapes = self._given
+        if not rigid.all():
+            shapes = list(shapes)
+            for i in np.flatnonzero(~rigid):
+                self.rows["rotation"][i], stretch = _rotation_and_stretch(linear[i])
+                if stretch is not None:
+                    shapes[i] = shapes[i].stretched(stretch)
+        if not _same(shapes, self.shapes):
+            self.shapes = shapes
+            numbers: dict[int, int] = {}
+            self.rows["asset"] = [numbers.setdefault(id(shape), len(numbers)) for shape in shapes]
+            self.assets = [shape.asset for shape in {id(shape): shape for shape in shapes}.values()]
+            self._query = None
+
+    def query(self) -> Query:
+        if self._query is None:
+            self._query = Query(self.assets)
+        return self._query
+
+    def solid(self, body: int) -> Solid:
+        """The convex hull of a body where it stands."""
+        if body not in self._solids:
+            row = self.rows[body]
+            self._solids[body] = self.shapes[body].solid().moved(row["rotation"], row["translation"])
+        return self._solids[body]
+
+    def corners(self, body: int, faces: Array) -> Array:
+        """(n, 3, 3) of faces of a body where it stands."""
+        row, shape = self.rows[body], self.shapes[body]
+        corners: Array = shape.vertices[shape.faces[faces]] @ row["rotation"].T + row["translation"]
+        return corners
+
+    def corners_of(self, bodies: Array, faces: Array) -> Array:
+        """(n, 3, 3) of a face each of n bodies."""
+        corners = np.empty((len(faces), 3, 3))
+        order = np.argsort(bodies, kind="stable")
+        bounds = np.flatnonzero(np.diff(bodies[order], prepend=-1, append=-1))
+        for first, last in zip(bounds[:-1], bounds[1:]):
+            rows = order[first:last]
+            corners[rows] = self.corners(int(bodies[rows[0]]), faces[rows])
+        return corners
+
+    def boxes(self) -> tuple[Array, Array]:
+        """(n, 3) the least and the greatest coordinates of boxes that the bodies lie in."""
+        middles = np.einsum("nij,nj->ni", self.rows["rotation"], np.array([shape.middle for shape in self.shapes])) + self.rows["translation"]
+        halves = np.einsum("nij,nj->ni", np.abs(self.rows["rotation"]), np.array([shape.half for shape in self.shapes]))
+        return middles - halves, middles + halves
+
+
+def _same(some: Sequence[object], others: Sequence[object]) -> bool:
+    return len(some) == len(others) and all(one is other for one, other in zip(some, others))
+
+
+class Search:
+    """A question about pairs of bodies: of all; of the first `first_side` with the others; or of the body `alone` with the others."""
+
+    def __init__(self, bodies: Bodies, threads: int, first_side: int | None = None, alone: int | None = None) -> None:
+        self.bodies = bodies
+        self._threads = threads
+        count = len(bodies.names)
+        self._filter: Filter | None = None
+        self._pair_count = count * (count - 1) // 2
+        if first_side is not None or alone is not None:
+            sides = np.ones(count, np.uint32)
+            sides[slice(first_side, None) if alone is None else alone] = 2
+            second = int((sides == 2).sum())
+            self._pair_count = second * (count - second)
+            self._filter = Filter(group=sides, mask=3 - sides)
+
+    def any_collision(self) -> bool:
+        """Whether there is one."""
+        if self._pair_count == 0:
+            return False
+        pairs, meet = self._first_contacts()
+        return bool(meet.any()) or bool(self._enclosed_pairs(pairs[~meet]))
+
+    def colliding_pairs(self) -> set[tuple[int, int]]:
+        """The pairs of bodies (a, b), a < b, that collide: whose surfaces meet, or one of whom is convex and has a component of the other inside."""
+        if self._pair_count == 0:
+            return set()
+        pairs, meet = self._first_contacts()
+        return {(int(a), int(b)) for a, b in pairs[meet]} | self._enclosed_pairs(pairs[~meet])
+
+    def contacts(self) -> Iterator[Contact]:
+        """All contacts: one for each pair of convex bodies; of a convex body and another one for each face of the other that meets the solid; one for each
+        pair of faces of others that meet."""
+        if self._pair_count == 0:
+            return
+        query, rows = self.bodies.query(), self.bodies.rows
+        found = query.contacts(rows, filter=self._filter, threads=self._threads)
+        contained = query.contained(threads=self._threads).contained
+        pairs = _columns(found.pairs)
+        bounds = np.searchsorted(found.contacts["pair"], np.arange(len(pairs) + 1))
+        convex = self.bodies.convex[pairs]
+        meet = np.diff(bounds) > 0
+        yield from self._surface_contacts(pairs, found.contacts[~convex.any(axis=1)[found.contacts["pair"]]])
+        meet[self._enclosed(pairs, contained)] = True
+        for pair in np.flatnonzero(meet & convex.any(axis=1)):
+            a, b = map(int, pairs[pair])
+            if convex[pair].all():
+                yield self._convex_contact(a, b)
+            else:
+                yield from self._face_contacts(a, b, found.contacts[bounds[pair] : bounds[pair + 1]])
+
+    def nearest(self) -> Nearest | None:
+        """The pair that is nearest, or the deepest of those that collide; None where there is no pair. Of equals the first."""
+        if self._pair_count == 0:
+            return None
+        colliding = self.colliding_pairs()
+        if colliding:
+            return self._deepest(np.array(sorted(colliding)))
+        query, rows = self.bodies.query(), self.bodies.rows
+        lows, highs = self.bodies.boxes()
+        extent = float(np.linalg.norm(highs.max(axis=0) - lows.min(axis=0)))
+        reach = extent / 256 if self._pair_count > FEW_PAIRS else None
+        while True:
+            found = query.distances(rows, reach=reach, relative_tolerance=PRECISION, filter=self._filter, threads=self._threads)
+            distances = found.distances["upper"].copy()
+            distances[found.distances["triangle_a"] == NO_INDEX] = np.inf
+            # What is not in the list, or has no points, is farther away than the reach.
+            if len(distances) and distances.min() <= (np.inf if reach is None else reach):
+                first = int(distances.argmin())
+                return _nearest(found.pairs[first], found.distances[first])
+            assert reach is not None
+            reach = 4 * reach if reach < extent else None
+
+    def _deepest(self, pairs: Array) -> Nearest:
+        """Of pairs (n, 2) that collide the one that is the deepest, the first of equals."""
+        lows, highs = self.bodies.boxes()
+        a, b = pairs.T
+        # No two convex bodies are deeper than their boxes, others have no depth; of a convex body and another each has to be looked at.
+        bounds = np.minimum(highs[a] - lows[b], highs[b] - lows[a]).min(axis=1)
+        convex = self.bodies.convex[pairs]
+        bounds[~convex.all(axis=1)] = np.inf
+        bounds[~convex.any(axis=1)] = 0
+        deepest: Nearest | None = None
+        for row in np.argsort(-bounds, kind="stable"):
+            if deepest is not None and bounds[row] <= -deepest.min_distance:
+                break
+            found = self._collision(*map(int, pairs[row]))
+            if deepest is None or (found.min_distance, found.a, found.b) < (deepest.min_distance, deepest.a, deepest.b):
+                deepest = found
+        assert deepest is not None
+        return deepest
+
+    def _first_contacts(self) -> tuple[Array, Array]:
+        """(n, 2) the pairs whose boxes meet, and (n,) whether their surfaces do."""
+        found = self.bodies.query().contacts(self.bodies.rows, first_contact_only=True, filter=self._filter, threads=self._threads)
+        pairs = _columns(found.pairs)
+        meet = np.zeros(len(pairs), bool)
+        meet[found.contacts["pair"]] = True
+        return pairs, meet
+
+    def _enclosed_pairs(self, apart: Array) -> set[tuple[int, int]]:
+        """Of pairs (n, 2) whose surfaces do not meet, those with a component of one body inside the other, which is convex."""
+        if not self.bodies.convex.any():
+            return set()
+        apart = apart[self.bodies.convex[apart].any(axis=1)]
+        if len(apart) == 0:
+            return set()
+        query = self.bodies.query()
+        query.contacts(self.bodies.rows, pairs=apart, threads=self._threads)
+        rows = self._enclosed(apart, query.contained(threads=self._threads).contained)
+        return {(int(a), int(b)) for a, b in apart[rows]}
+
+    def _enclosed(self, pairs: Array, contained: Array) -> Array:
+        """(n,) the rows of the pairs with a component of one body inside the other, which is convex."""
+        outer = pairs[contained["pair"], np.where(contained["inner"] == 1, 0, 1)]
+        rows: Array = contained["pair"][self.bodies.convex[outer] & (contained["flags"] & INSIDE > 0)]
+        return rows
+
+    def _collision(self, a: int, b: int) -> Nearest:
+        convex = self.bodies.convex[[a, b]]
+        if convex.all():
+            solids = self.bodies.solid(a), self.bodies.solid(b)
+            found = overlap(*solids)
+            return Nearest(a, b, -found.depth, [found.point_a, found.point_b], *self._faces(a, b, found))
+        query, pair = self.bodies.query(), [(a, b)]
+        if convex.any():
+            meeting = query.contacts(self.bodies.rows, pairs=pair, threads=self._threads).contacts
+            deepest = max(self._face_contacts(a, b, meeting), key=lambda contact: contact.penetration_depth)
+            half = deepest.normal * deepest.penetration_depth / 2
+            ends = [(deepest.a, deepest.pos + half, deepest.b1), (deepest.b, deepest.pos - half, deepest.b2)]
+            (_, point_a, face_a), (_, point_b, face_b) = sorted(ends, key=lambda end: end[0])
+            return Nearest(a, b, -deepest.penetration_depth, [point_a, point_b], face_a, face_b)
+        return _nearest((a, b), query.distances(self.bodies.rows, pairs=pair, threads=self._threads).distances[0])
+
+    def _faces(self, a: int, b: int, found: Overlap) -> tuple[int, int]:
+        """The faces of two convex bodies whose corners are the farthest along the way that parts them; of equals the first."""
+        ends = []
+        for body, side in ((a, 1.0), (b, -1.0)):
+            faces = np.arange(len(self.bodies.shapes[body].faces))
+            along = (self.bodies.corners(body, faces) @ (side * found.normal)).min(axis=1)
+            ends.append(int(np.flatnonzero(along >= along.max() - 1e-9 * self.bodies.solid(body).size)[0]))
+        return ends[0], ends[1]
+
+    def _convex_contact(self, a: int, b: int) -> Contact:
+        found = overlap(self.bodies.solid(a), self.bodies.solid(b))
+        return Contact(a, b, *self._faces(a, b, found), found.normal, found.middle, found.depth)
+
+    def _face_contacts(self, a: int, b: int, meeting: Array) -> Iterator[Contact]:
+        """Of a convex body and another: the other's faces that meet its surface, then those inside. As in python-fcl, normals point from the other to the
+        convex one, whichever is a."""
+        a_is_solid = bool(self.bodies.convex[a])
+        body, other = (a, b) if a_is_solid else (b, a)
+        solid_column, face_column = ("face_a", "face_b") if a_is_solid else ("face_b", "face_a")
+        crossing, first = np.unique(meeting[face_column], return_index=True)
+        solid = self.bodies.solid(body)
+        inner = np.setdiff1d(np.arange(len(self.bodies.shapes[other].faces)), crossing)
+        # A face that does not meet the surface is inside where its middle is.
+        middles = self.bodies.corners(other, inner).mean(axis=1)
+        inside = solid.contains(middles)
+        if len(crossing) == 0 and not inside.any():
+            inside[solid.nearest(middles)] = True  # rounding moved it out of the hull
+        faces = np.concatenate([crossing, inner[inside]])
+        corners = self.bodies.corners(other, faces)
+        depths, normals, planes = face_overlaps(solid, corners)
+        points = corners.mean(axis=1)
+        solid_faces = meeting[solid_column][first]
+        points[: len(crossing)] = meeting_points(self.bodies.corners(body, solid_faces), corners[: len(crossing)])
+        solid_faces = np.concatenate([solid_faces, self._faces_of_planes(body, solid, planes[len(crossing) :])])
+        rows = zip(faces.tolist(), solid_faces.tolist(), -normals, points, depths.tolist())
+        for row in rows:
+            yield Contact(other, body, *row)
+
+    def _faces_of_planes(self, body: int, solid: Solid, planes: Array) -> Array:
+        """(n,) of each of the planes of a solid, by number, a face of the mesh that is the nearest to it."""
+        corners = self.bodies.corners(body, np.arange(len(self.bodies.shapes[body].faces)))
+        found = {int(plane): int((corners @ solid.normals[plane]).min(axis=1).argmax()) for plane in np.unique(planes)}
+        return np.array([found[int(plane)] for plane in planes], np.intp)
+
+    def _surface_contacts(self, pairs: Array, meeting: Array) -> Iterator[Contact]:
+        """Of bodies that are not convex. Normal and depth are those of the contact region that is the nearest; where there is none, of which the surfaces
+        touch in a point, the normal is that of a's face."""
+        if len(meeting) == 0:
+            return
+        a, b = pairs[meeting["pair"]].T
+        points, normals, depths = np.empty((len(meeting), 3)), np.empty((len(meeting), 3)), np.zeros(len(meeting))
+        for first in range(0, len(meeting), CONTACTS_AT_A_TIME):
+            rows = slice(first, first + CONTACTS_AT_A_TIME)
+            corners_a = self.bodies.corners_of(a[rows], meeting["face_a"][rows])
+            corners_b = self.bodies.corners_of(b[rows], meeting["face_b"][rows])
+            points[rows] = meeting_points(corners_a, corners_b)
+            normals[rows] = unit_normals(corners_a)
+        found = self.bodies.query().manifolds(match_previous=False, threads=self._threads)
+        regions, places = found.manifolds, found.points["position"]
+        which, starts = np.unique(meeting["pair"], return_index=True)
+        for pair, start, end in zip(which, starts, np.append(starts[1:], len(meeting))):
+            first, last = np.searchsorted(regions["pair"], [pair, pair + 1])
+            own = regions[first:last]
+            if len(own) == 0:
+                continue
+            begin = int(own["first_point"][0])
+            region_of_point = np.repeat(np.arange(len(own)), own["point_count"])
+            region = np.zeros(end - start, np.intp)
+            if len(own) > 1:
+                gaps = points[start:end, None] - places[begin : begin + len(region_of_point)]
+                region = region_of_point[np.einsum("ijk,ijk->ij", gaps, gaps).argmin(axis=1)]
+            normals[start:end], depths[start:end] = own["normal"][region], own["depth"][region]
+        bodies = zip(a.tolist(), b.tolist(), meeting["face_a"].tolist(), meeting["face_b"].tolist())
+        for faces, normal, point, depth in zip(bodies, normals, points, depths.tolist()):
+            yield Contact(*faces, normal, point, depth)
+
+
+def _columns(pairs: Array) -> Array:
+    """(n, 2) intp of an array of tandem.PAIR."""
+    columns: Array = np.stack([pairs["a"], pairs["b"]], axis=1).astype(np.intp)
+    return columns
+
+
+def _nearest(pair: Any, row: Any) -> Nearest:
+    return Nearest(int(pair[0]), int(pair[1]), float(row["upper"]), [row["point_a"].copy(), row["point_b"].copy()], int(row["face_a"]), int(row["face_b"]))
+
+
+def unit_normals(corners: Array) -> Array:
+    """(n, 3) of triangles (n, 3, 3)."""
+    normals: Array = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
+    return normals
+
+
+def meeting_points(a: Array, b: Array) -> Array:
+    """(n, 3) a point of both triangles of each of n pairs that meet, a and b (n, 3, 3): the middle of where the edges of one go through the other. Of
+    triangles in one plane, and where rounding hides the crossing, what going to and fro between the nearest points of both comes to."""
+    total, count = np.zeros((len(a), 3)), np.zeros(len(a))
+    for edges, other in ((a, b), (b, a)):
+        origin, u, v = other[:, 0], other[:, 1] - other[:, 0], other[:, 2] - other[:, 0]
+        normal = np.cross(u, v)
+        square = np.maximum((normal * normal).sum(axis=1), np.finfo(float).tiny)[:, None]
+        # Of a point origin + s u + t v of the plane: s and t.
+        to_s, to_t = np.cross(v, normal) / square, np.cross(normal, u) / square
+        heights = np.einsum("nij,nj->ni", edges - origin[:, None], normal)
+        ends, heights_of_ends = np.roll(edges, -1, axis=1), np.roll(heights, -1, axis=1)
+        crosses = heights * heights_of_ends < 0
+        part = heights / np.where(crosses, heights - heights_of_ends, 1)
+        points = edges + part[:, :, None] * (ends - edges)
+        s, t = (np.einsum("nij,nj->ni", points - origin[:, None], to) for to in (to_s, to_t))
+        hit = crosses & (s >= 0) & (t >= 0) & (s + t <= 1)
+        total += (points * hit[:, :, None]).sum(axis=1)
+        count += hit.sum(axis=1)
+    middles: Array = total / np.maximum(count, 1)[:, None]
+    rest = count == 0
+    if rest.any():
+        near = a[rest].mean(axis=1)
+        for triangles in MEETING_STEPS * (b[rest], a[rest]):
+            near = trimesh.triangles.closest_point(triangles, near)  # type: ignore[no-untyped-call]
+        middles[rest] = near
+    return middles

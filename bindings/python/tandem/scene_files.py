@@ -1,0 +1,98 @@
+"""Scenes, and the states that runs of bvhbench simulate keep (docs/scenes.md, docs/simulation.md).
+
+Reading needs h5py.
+"""
+from __future__ import annotations
+
+import dataclasses
+import os
+import pathlib
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import tandem
+
+MOVING, FIXED, KINEMATIC, SLEEPING = 0, 1, 2, 3
+
+
+@dataclasses.dataclass(frozen=True)
+class Scene:
+    """n bodies at one time, or at the k times of which a run keeps states."""
+
+    assets: list[tandem.Asset]
+    asset: NDArray[np.uint32]  # (n,): row of `assets`
+    level: NDArray[np.uint32]  # (n,): level of detail of that asset at which the body is
+    motion: NDArray[np.uint8]  # (n,): MOVING, FIXED, KINEMATIC or SLEEPING
+    steps: NDArray[np.int64]  # (k,): steps made before each state, ascending
+    rotation: NDArray[np.float64]  # (k, n, 3, 3): world = rotation x + translation
+    translation: NDArray[np.float64]  # (k, n, 3)
+
+    def instances(self, state: int = -1) -> NDArray[np.void]:
+        """The bodies of a state, (n,) of tandem.INSTANCE. Their assets are rows of `assets`, whatever `level` says."""
+        return tandem.instances(self.asset, rotation=self.rotation[state], translation=self.translation[state])
+
+
+def at_levels(assets: list[tandem.Asset], asset: NDArray[Any], level: NDArray[Any]
+              ) -> tuple[list[tandem.Asset], NDArray[np.uint32]]:
+    """Assets that show one level each, one for each pair of an asset and a level that occurs, and the row of each body.
+
+    Raises tandem.Error where an asset has no such level.
+    """
+    used, row = np.unique(np.stack([asset, level], axis=1), axis=0, return_inverse=True)
+    shown = [assets[a].levels_from(first, 1) for a, first in used.tolist()]
+    return shown, row.reshape(-1).astype(np.uint32)
+
+
+def read(path: str | os.PathLike[str]) -> Scene:
+    """Reads a scene file, or a run file with its states, and the assets that it names.
+
+    Raises OSError where a file is not there or is no HDF5 file, tandem.Error where an asset is broken, and ValueError,
+    with the path, where something is missing.
+    """
+    import h5py  # type: ignore[import-untyped,import-not-found,unused-ignore]
+
+    path = pathlib.Path(path)
+    with h5py.File(path) as file:
+        try:
+            return _read(path, file)
+        except KeyError as error:
+            raise ValueError(f"{path}: neither a scene nor a run: {error.args[0]}") from error
+
+
+def _read(path: pathlib.Path, file: Any) -> Scene:
+    is_run = "bodies" in file
+    group = file["bodies" if is_run else "instances"]
+    asset = group["asset"][:].astype(np.uint32)
+    level = group["level"][:].astype(np.uint32) if "level" in group else np.zeros_like(asset)
+    names = [os.fsdecode(name) for name in file["assets"][:]]
+    if len(asset) and asset.max() >= len(names):
+        raise ValueError(f"{path}: a body has asset {asset.max()} of {len(names)}")
+    assets = [tandem.Asset.load(path.parent / name) for name in names]
+    if is_run:
+        motion = group["motion"][:].astype(np.uint8)
+        steps, rotation, translation = _states(path, file)
+    else:
+        motion = np.zeros(len(asset), np.uint8)
+        if "simulation/motion" in file:
+            motion[:] = file["simulation/motion"][:]
+        steps = np.zeros(1, np.int64)
+        rotation, translation = group["rotation"][:][None], group["translation"][:][None]
+    return Scene(assets, asset, level, motion, steps, rotation.astype(float), translation.astype(float))
+
+
+def _states(path: pathlib.Path, file: Any) -> tuple[NDArray[np.int64], NDArray[Any], NDArray[Any]]:
+    if "trajectory" not in file:
+        raise ValueError(f"{path}: keeps no state: simulate with --trajectory")
+    rotation = _of_quaternions(file["trajectory/orientation"][:])
+    moved = np.einsum("knij,nj->kni", rotation, file["bodies/center_of_mass"][:])
+    return file["trajectory/frame"][:].astype(np.int64), rotation, file["trajectory/position"][:] - moved
+
+
+def _of_quaternions(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+    w, x, y, z = np.moveaxis(quaternions, -1, 0)
+    rows = [[w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z]]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))

@@ -1,0 +1,440 @@
+"""tandem.view(): bodies, what queries found, levels of detail and trees, in a window or as a picture. Needs pyvista."""
+from __future__ import annotations
+
+import importlib
+import os
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import tandem
+from tandem import tree
+from tandem.scene_files import Scene, at_levels, read
+
+# matplotlib and vtk have no types, and what pyvista's decorators make of its own says nothing to mypy.
+matplotlib: Any = importlib.import_module("matplotlib")
+pyvista: Any = importlib.import_module("pyvista")
+vtk: Any = importlib.import_module("vtk")
+
+Points = NDArray[np.float64]
+Mesh = Any  # pyvista.PolyData
+
+BODY_COLOURS = ("bf826e", "d4ad7a", "9da985", "789997", "8294ac", "9f8aa3", "c69da1", "bcb693", "90a7b8", "a88673",
+                "decaa5", "838da2")
+FIXED_COLOUR = "cbc6b9"
+CONTACT_COLOUR = "d1202f"
+NORMAL_COLOUR = "1b1b1b"
+TREE_COLOUR = "2a4d8f"
+BACKGROUND = ("fbfaf7", "e4eaef")  # below, above
+TRANSLUCENT = 0.35
+POINT_PIXELS = 12
+VIEW_ANGLE = 24  # degrees, from the lower edge to the upper
+MARGIN = 0.03  # of the picture, on either side
+NORMAL_LENGTH = 0.15  # of the median diagonal of the bodies
+COLORS = ("body", "asset", "level")
+
+
+def view(what: Any, instances: NDArray[np.void] | None = None, *, picture: str | os.PathLike[str] | None = None,
+         off_screen: bool = False, **options: Any) -> NDArray[np.uint8] | None:
+    """Shows bodies and what was found of them.
+
+    what: the path of a scene file or of a run with states, an asset, or assets, to which `instances` belong
+        (tandem.instances()). With pictures of an asset alone it stands at the origin.
+    picture: path of a .png file to write; no window opens.
+    off_screen: no window opens; needs neither a display nor a GPU.
+    options: those of tandem.viewer.View: contacts, manifolds, distances, levels, motion, step, tree_depth, color,
+        opacity, size, azimuth, elevation.
+
+    Returns the picture where no window opens, uint8 (height, width, 3); else None once the window is closed.
+    """
+    hidden = off_screen or picture is not None
+    shown = View(what, instances, off_screen=hidden, **options)
+    try:
+        return shown.picture(picture) if hidden else shown.show()
+    finally:
+        shown.close()
+
+
+class View:
+    """A scene in a window, or off screen. `plotter` is pyvista's, for whatever else is to be drawn or saved: about
+    `origin`, a point of the world. `state` is the row of the run's states that is shown, `tree_depth` the depth of
+    the boxes.
+
+    what, instances: as for view().
+    contacts: tandem.Contacts of these instances, whose triangles are drawn in red; or True: a query finds them, anew
+        for each state of a run.
+    manifolds: tandem.Manifolds of these instances, drawn as points in the colour of their depths, with an arrow for the
+        normal of each manifold, from a to b; or True as above.
+    distances: tandem.Distances of these instances: a line between the nearest points of each pair, in the colour of
+        the distance.
+    levels: level of detail at which bodies are shown, one or (n,); those of the scene file, or 0. What True finds is
+        found at these levels.
+    motion: what moves each body, as of tandem.Filter; that of the scene file, or tandem.MOVING. The fixed ones are
+        grey, and the others fill the picture.
+    step: of a run, show the state after so many steps; else the last, from where all of them are in the picture. In a
+        window a slider chooses.
+    tree_depth: the boxes of the tree's nodes at this depth, from 0 (tandem.tree.boxes()). In a window a slider chooses.
+    color: "body", "asset" or "level", with a legend: what has one of its own. Fixed bodies are grey but for "level".
+    opacity: of the bodies, 0 to 1; 1, or 0.35 where there is something to see inside.
+    size: width and height in pixels.
+    azimuth, elevation: degrees. From where one looks: 0 from +x, 90 from +y; above the horizon, z is up.
+
+    Raises ValueError for arguments that do not fit together, RuntimeError where there is nothing to draw with, and what
+    reading files and queries raise.
+    """
+
+    def __init__(self, what: Any, instances: NDArray[np.void] | None = None, *,
+                 contacts: tandem.Contacts | bool = False, manifolds: tandem.Manifolds | bool = False,
+                 distances: tandem.Distances | None = None, levels: ArrayLike | None = None,
+                 motion: ArrayLike | None = None, step: int | None = None, tree_depth: int | None = None,
+                 color: str = "body", opacity: float | None = None,
+                 off_screen: bool = False, size: tuple[int, int] = (900, 562),
+                 azimuth: float = -60, elevation: float = 24) -> None:
+        if color not in COLORS:
+            raise ValueError(f"color {color!r}: is none of {', '.join(COLORS)}")
+        self.scene = _scene(what, instances)
+        moved = self.scene.motion if motion is None else np.asarray(motion)
+        self._motion = np.broadcast_to(moved, self.scene.asset.shape)
+        self._use_levels(levels)
+        for name, found in (("contacts", contacts), ("manifolds", manifolds), ("distances", distances)):
+            if found not in (False, True, None) and (len(self.scene.steps) > 1 or levels is not None):
+                raise ValueError(f"{name}: belong to one state, at its levels; let them be found by {name}=True")
+        self._contacts, self._manifolds, self._distances = contacts, manifolds, distances
+        self._query = tandem.Query(self._assets) if contacts is True or manifolds is True else None
+        self.tree_depth, self._color = tree_depth, color
+        inside = contacts is not False or manifolds is not False or distances is not None
+        self._opacity = opacity if opacity is not None else TRANSLUCENT if inside else 1.0
+        self._place()
+        self._open(off_screen, size)
+        self.state = self._state_after(step)
+        if color == "level":
+            used = np.unique(self._level)
+            labels = [[f"level {level}", _level_colours(int(used[-1]) + 1)[level] / 255] for level in used]
+            self.plotter.add_legend(labels, bcolor=None, border=False, size=(0.14, 0.05 * len(used)), face="rectangle")
+        self._draw()
+        self._look(azimuth, elevation, range(len(self.scene.steps)) if step is None else [self.state])
+
+    def show_step(self, step: int) -> None:
+        """Shows the state of a run after so many steps. Raises ValueError where it keeps none."""
+        self.state = self._state_after(step)
+        self._draw()
+
+    def _state_after(self, step: int | None) -> int:
+        kept = self.scene.steps
+        found = np.flatnonzero(kept == step) if step is not None else [len(kept) - 1]
+        if not len(found):
+            raise ValueError(f"step {step}: the run keeps the states after {kept.tolist()}")
+        return int(found[0])
+
+    def show_tree(self, depth: int | None) -> None:
+        """Shows the boxes of the nodes at another depth; None: no boxes."""
+        self.tree_depth = depth
+        self._draw_tree()
+
+    def picture(self, path: str | os.PathLike[str] | None = None) -> NDArray[np.uint8]:
+        """Draws the scene: uint8 (height, width, 3); a .png file too where a path is given."""
+        if path is not None and not os.fspath(path).endswith(".png"):
+            raise ValueError(f"{path}: is not a .png file")
+        self.plotter.render()
+        image = self.plotter.screenshot(path, return_img=True)
+        return np.asarray(image)[..., :3]
+
+    def show(self) -> Any:
+        """Opens the window, with sliders, and waits until it is closed. In a notebook it returns pyvista's widget."""
+        self.add_sliders()
+        return self.plotter.show()
+
+    def add_sliders(self) -> None:
+        """Adds a slider for the steps of a run, and one for the depth of the tree where its boxes are shown."""
+        left, right = 0.03, 0.3
+        if len(self.scene.steps) > 1:
+            steps = self.scene.steps
+            self._slider(lambda value: self.show_step(int(steps[np.abs(steps - value).argmin()])),
+                         "step", (steps[0], steps[-1]), steps[self.state], left, right)
+            left, right = 0.36, 0.63
+        if self.tree_depth is not None:
+            deepest = max(asset.levels[0].depth for asset in self._assets)
+            self._slider(lambda value: self.show_tree(round(value)), "tree depth", (0, deepest), self.tree_depth, left,
+                         right)
+
+    def close(self) -> None:
+        """Frees the window, and all that it refers to."""
+        self.plotter.clear_slider_widgets()
+        self.plotter.close()
+
+    def _slider(self, changed: Callable[[float], None], title: str, bounds: tuple[int, int], value: int, left: float,
+                right: float) -> None:
+        self.plotter.add_slider_widget(changed, bounds, value=value, title=title, pointa=(left, 0.08),
+                                       pointb=(right, 0.08), color="black", fmt="%.0f", interaction_event="always",
+                                       style="modern")
+
+    def _use_levels(self, levels: ArrayLike | None) -> None:
+        """Sets the assets that queries see and bodies show, of one level each, and which each body has."""
+        wanted = self.scene.level if levels is None else np.asarray(levels)
+        self._level = np.broadcast_to(wanted, self.scene.asset.shape).astype(np.uint32)
+        self._assets, self._asset = at_levels(self.scene.assets, self.scene.asset, self._level)
+
+    def _place(self) -> None:
+        """Meshes are drawn about their middles and the scene about its own: graphics hardware computes in float32."""
+        self._triangles = [asset.triangles() for asset in self._assets]
+        bounds = np.array([[t.min(axis=(0, 1)), t.max(axis=(0, 1))] for t in self._triangles])
+        self._bounds = _corners(bounds)
+        self._middle = bounds.mean(axis=1)
+        diagonal = np.linalg.norm(bounds[:, 1] - bounds[:, 0], axis=1)
+        fixed = self._motion == tandem.FIXED
+        self._subject = ~fixed if not fixed.all() else fixed
+        self._length = float(np.median(diagonal[self._asset[self._subject]]))
+        self.origin = self._centres(len(self.scene.steps) - 1)[self._subject].mean(axis=0)
+
+    def _centres(self, state: int) -> Points:
+        """Where the middles of the bodies' meshes are, (n, 3), in the world."""
+        centres: Points = np.einsum("nij,nj->ni", self.scene.rotation[state], self._middle[self._asset])
+        centres += self.scene.translation[state]
+        return centres
+
+    def _posed(self, body: NDArray[Any], points: Points, state: int | None = None) -> Points:
+        """Points (n, k, 3) of bodies (n,), in the coordinates of their meshes, as they are drawn."""
+        state = self.state if state is None else state
+        about = points - self._middle[self._asset[body]][:, None]
+        turned: Points = np.einsum("nij,nkj->nki", self.scene.rotation[state][body], about)
+        turned += (self._centres(state)[body] - self.origin)[:, None]
+        return turned
+
+    def _open(self, off_screen: bool, size: tuple[int, int]) -> None:
+        self.plotter = _plotter(off_screen, size)
+        self.plotter.set_background(BACKGROUND[0], top=BACKGROUND[1])
+        self.plotter.enable_anti_aliasing("ssaa" if off_screen else "fxaa")
+        if self._opacity < 1:
+            self.plotter.enable_depth_peeling(6)
+        self._bodies = []
+        for row, triangles in enumerate(self._triangles):
+            mapper = vtk.vtkGlyph3DMapper()
+            mapper.SetSourceData(_surface(triangles - self._middle[row]))
+            mapper.SetOrientationArray("orientation")
+            mapper.SetOrientationModeToQuaternion()
+            mapper.ScalingOff()
+            mapper.SetScalarModeToUsePointFieldData()
+            mapper.SelectColorArray("colour")
+            mapper.SetColorModeToDirectScalars()
+            actor = vtk.vtkActor()
+            actor.SetMapper(mapper)
+            actor.SetForceTranslucent(self._opacity < 1)  # the glyphs' colours have the opacity
+            actor.GetProperty().SetBackfaceCulling(self._opacity < 1 and bool(self._assets[row].levels[0].closed))
+            actor.GetProperty().SetAmbient(0.1)
+            self.plotter.add_actor(actor, name=f"bodies {row}", reset_camera=False)
+            self._bodies.append(mapper)
+
+    def _look(self, azimuth: float, elevation: float, states: Iterable[int]) -> None:
+        """Puts the camera as near as all bodies, in all of these states, are in the picture."""
+        a, e = np.radians([azimuth, elevation])
+        back = np.array([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)])
+        right = np.array([-np.sin(a), np.cos(a), 0])
+        axes = np.array([right, np.cross(back, right), back])
+        body = np.flatnonzero(self._subject)
+        corners = self._bounds[self._asset[body]]
+        seen = np.concatenate([self._posed(body, corners, state).reshape(-1, 3) for state in states]) @ axes.T
+        width, height = self.plotter.window_size
+        half = np.tan(np.radians(VIEW_ANGLE / 2)) * np.array([width / height, 1]) * (1 - 2 * MARGIN)
+        # The eye is the nearest place behind everything from which all points lie in the cone of the view. Across, it
+        # is where the cones that touch the points on either side meet.
+        reach = np.stack([seen[:, :2] + seen[:, 2:] * half, seen[:, :2] - seen[:, 2:] * half])
+        middle = (reach[0].max(axis=0) + reach[1].min(axis=0)) / 2
+        away = ((reach[0].max(axis=0) - reach[1].min(axis=0)) / (2 * half)).max()
+        camera = self.plotter.camera
+        camera.view_angle = VIEW_ANGLE
+        camera.position = np.append(middle, away) @ axes
+        camera.focal_point = np.append(middle, seen[:, 2].mean()) @ axes
+        camera.up = axes[1]
+
+    def _draw(self) -> None:
+        self._draw_bodies()
+        self._draw_found()
+        self._draw_tree()
+        self.plotter.renderer.ResetCameraClippingRange()
+
+    def _draw_bodies(self) -> None:
+        opacity = np.full((len(self._asset), 1), round(255 * self._opacity), np.uint8)
+        colour = np.concatenate([self.body_colours(), opacity], axis=1)
+        centres = self._centres(self.state) - self.origin
+        for row, mapper in enumerate(self._bodies):
+            of_it = self._asset == row
+            points = pyvista.PolyData(centres[of_it])
+            points["orientation"] = _quaternions(self.scene.rotation[self.state][of_it]).astype(np.float32)
+            points["colour"] = colour[of_it]
+            mapper.SetInputData(points)
+
+    def body_colours(self) -> NDArray[np.uint8]:
+        """The colour of each body, sRGB, (n, 3)."""
+        if self._color == "level":
+            return _level_colours(int(self._level.max()) + 1)[self._level]
+        number = self.scene.asset if self._color == "asset" else np.arange(len(self._asset))
+        palette = np.array([_rgb(name) for name in BODY_COLOURS], np.uint8)
+        colour: NDArray[np.uint8] = palette[number * 5 % len(palette)]
+        colour[self._motion == tandem.FIXED] = _rgb(FIXED_COLOUR)
+        return colour
+
+    def _draw_found(self) -> None:
+        contacts, manifolds = self._contacts, self._manifolds
+        if self._query is not None:
+            instances = tandem.instances(self._asset, rotation=self.scene.rotation[self.state],
+                                         translation=self.scene.translation[self.state])
+            found = self._query.contacts(instances)
+            contacts = found if contacts is True else contacts
+            manifolds = self._query.manifolds() if manifolds is True else manifolds
+        if not isinstance(contacts, bool):
+            self._draw_contacts(contacts)
+        if not isinstance(manifolds, bool):
+            self._draw_manifolds(manifolds)
+        if self._distances is not None:
+            self._draw_distances(self._distances)
+
+    def _draw_contacts(self, found: tandem.Contacts) -> None:
+        """The triangles that meet others, once each."""
+        pair = found.pairs[found.contacts["pair"]]
+        sides = [np.stack([pair[side], found.contacts[f"triangle_{side}"]], 1) for side in "ab"]
+        body, triangle = np.unique(np.concatenate(sides), axis=0).T
+        corners = np.empty((len(body), 3, 3))
+        for row, triangles in enumerate(self._triangles):
+            of_it = self._asset[body] == row
+            corners[of_it] = triangles[triangle[of_it]]
+        self._put("contacts", _surface(self._posed(body, corners)) if len(body) else None, color=CONTACT_COLOUR)
+
+    def _draw_manifolds(self, found: tandem.Manifolds) -> None:
+        points, normals = None, None
+        if len(found.points):
+            points = pyvista.PolyData(found.points["position"] - self.origin)
+            points["depth"] = found.points["depth"]
+            arrows = pyvista.PolyData(found.manifolds["centre"] - self.origin)
+            arrows["normal"] = found.manifolds["normal"]
+            normals = arrows.glyph(orient="normal", scale=False, factor=NORMAL_LENGTH * self._length,
+                                   geom=pyvista.Arrow(tip_radius=0.07, tip_length=0.3, shaft_radius=0.022))
+        self._put("points", points, scalars="depth", cmap="plasma", clim=_from_zero(found.points["depth"]),
+                  style="points", point_size=POINT_PIXELS, render_points_as_spheres=True, scalar_bar_args=_bar("depth"))
+        self._put("normals", normals, color=NORMAL_COLOUR, lighting=False)
+
+    def _draw_distances(self, found: tandem.Distances) -> None:
+        near = found.distances[np.isfinite(found.distances["upper"])]
+        lines = None
+        if len(near):
+            ends = np.stack([near["point_a"], near["point_b"]], 1) - self.origin
+            lines = pyvista.line_segments_from_points(ends.reshape(-1, 3))
+            lines.cell_data["distance"] = near["upper"]
+        self._put("distances", lines, scalars="distance", cmap="viridis", clim=_from_zero(near["upper"]), line_width=4,
+                  scalar_bar_args=_bar("distance"))
+
+    def _draw_tree(self) -> None:
+        edges = None
+        if self.tree_depth is not None:
+            corners = [self._boxes_of(row) for row in range(len(self._assets))]
+            edges = _wireframe(np.concatenate(corners))
+        self._put("tree", edges, color=TREE_COLOUR, line_width=1, opacity=0.6)
+
+    def _boxes_of(self, row: int) -> Points:
+        """The corners of the boxes of all bodies that show an asset, (n, 8, 3)."""
+        corners = _corners(tree.boxes(self._assets[row], self.tree_depth or 0))
+        body = np.flatnonzero((self._asset == row) & self._subject)
+        return self._posed(np.repeat(body, len(corners)), np.tile(corners, (len(body), 1, 1)))
+
+    def _put(self, name: str, mesh: Mesh | None, **options: Any) -> None:
+        """Draws a mesh in the place of what had its name."""
+        title = options.get("scalars")
+        if title in self.plotter.scalar_bars:
+            self.plotter.remove_scalar_bar(title)
+        if mesh is None:
+            self.plotter.remove_actor(name, reset_camera=False, render=False)
+            return
+        actor = self.plotter.add_mesh(mesh, name=name, reset_camera=False, render=False, **options)
+        actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()  # what is on a body is seen on it
+        actor.mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(-2, -2)
+        actor.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-2, -2)
+
+
+def _scene(what: Any, instances: NDArray[np.void] | None) -> Scene:
+    if isinstance(what, Scene):
+        return what
+    if isinstance(what, (str, os.PathLike)):
+        scene = read(what)
+    else:
+        assets = [what] if isinstance(what, tandem.Asset) else list(what)
+        given = tandem.instances(np.arange(len(assets))) if instances is None else instances
+        count = len(given)
+        scene = Scene(assets, given["asset"], np.zeros(count, np.uint32), np.zeros(count, np.uint8),
+                                  np.zeros(1, np.int64), given["rotation"][None], given["translation"][None])
+    if not len(scene.asset):
+        raise ValueError("there is no body to show")
+    if not (np.isfinite(scene.rotation).all() and np.isfinite(scene.translation).all()):
+        raise ValueError("a body is not in a finite place")
+    return scene
+
+
+def _plotter(off_screen: bool, size: tuple[int, int]) -> Any:
+    """With its window made. VTK looks for a display first, then for what draws without, and says on stderr what it
+    misses."""
+    told = vtk.vtkLogger.GetCurrentVerbosityCutoff()
+    vtk.vtkLogger.SetStderrVerbosity(vtk.vtkLogger.VERBOSITY_ERROR)
+    try:
+        plotter = pyvista.Plotter(off_screen=off_screen, window_size=list(size), lighting="three lights")
+        window = plotter.render_window
+        if off_screen:
+            window.Initialize()
+            if not window.GetInitialized():
+                raise RuntimeError("VTK finds nothing to draw with: neither EGL (Debian: libegl1 libgl1-mesa-dri) nor "
+                                   "OSMesa")
+        elif not plotter.notebook and window.GetClassName() in ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow"):
+            raise RuntimeError("there is no display for a window; picture= and off_screen=True draw without one")
+    finally:
+        vtk.vtkLogger.SetStderrVerbosity(told)
+    return plotter
+
+
+def _surface(triangles: Points) -> Mesh:
+    """Of corners (n, 3, 3); without joined vertices, so that faces look flat."""
+    return pyvista.PolyData.from_regular_faces(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3))
+
+
+def _corners(boxes: Points) -> Points:
+    """Of boxes (n, 2, 3), (n, 8, 3): corner i is upper along axis k where bit k of i is set."""
+    high = np.array([[i >> k & 1 for k in range(3)] for i in range(8)], bool)
+    return np.where(high, boxes[:, 1, None], boxes[:, 0, None])
+
+
+def _wireframe(corners: Points) -> Mesh:
+    """The edges of boxes whose _corners() these are."""
+    ends = np.array([[i, i | 1 << k] for k in range(3) for i in range(8) if not i >> k & 1])
+    lines = (np.arange(len(corners))[:, None, None] * 8 + ends).reshape(-1, 2)
+    cells = np.insert(lines, 0, 2, axis=1)
+    return pyvista.PolyData(corners.reshape(-1, 3), lines=cells.ravel())
+
+
+def _quaternions(rotation: Points) -> Points:
+    """w, x, y, z of rotations (n, 3, 3): of the four columns of 4 q q^T the longest, normalised."""
+    r = np.moveaxis(rotation, 0, -1)
+    s = np.array([[1 + r[0, 0] + r[1, 1] + r[2, 2], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]],
+                  [r[2, 1] - r[1, 2], 1 + r[0, 0] - r[1, 1] - r[2, 2], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]],
+                  [r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], 1 - r[0, 0] + r[1, 1] - r[2, 2], r[1, 2] + r[2, 1]],
+                  [r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], 1 - r[0, 0] - r[1, 1] + r[2, 2]]])
+    longest = np.argmax(np.einsum("iin->in", s), axis=0)
+    found: Points = s[longest, :, np.arange(len(rotation))].copy()
+    found /= np.linalg.norm(found, axis=1, keepdims=True)
+    return found
+
+
+def _level_colours(count: int) -> NDArray[np.uint8]:
+    """Of the finest first, (count, 3)."""
+    colours: NDArray[np.uint8] = matplotlib.colormaps["viridis"](np.linspace(0, 1, count), bytes=True)[:, :3]
+    return colours
+
+
+def _rgb(name: str) -> tuple[int, ...]:
+    return tuple(bytes.fromhex(name))
+
+
+def _from_zero(values: Points) -> tuple[float, float]:
+    return 0.0, float(values.max(initial=0)) or 1.0
+
+
+def _bar(title: str) -> dict[str, Any]:
+    return {"title": title, "vertical": True, "position_x": 0.89, "position_y": 0.15, "height": 0.7, "width": 0.05,
+            "color": "black", "fmt": "%.2g"}

@@ -1,12 +1,10 @@
-// Finds the contacts of a scene on the GPU through the C interface and prints what scene_hash prints of it. C99.
-// Usage: gpu_scene_hash SCENE MODE WITHIN   Exit code 77: there is no GPU.
+// Finds the contacts of scenes on the GPU through the C interface and prints what scene_hash prints of each. C99.
+// Usage: gpu_scene_hash MODE WITHIN SCENE...   Exit code 77: there is no GPU.
 #include "gpu_c_test.h"
 #include "scene_text.h"
 
-int main(int argc, char** argv) {
-  if (argc != 4) return printf("usage: gpu_scene_hash SCENE MODE WITHIN\n"), 1;
-  if (!has_gpu()) return printf("there is no GPU\n"), NO_GPU;
-  Scene scene = read_scene(argv[1]);
+static void print_scene(const char* file, uint32_t mode, double within) {
+  Scene scene = read_scene(file);
   const cudaStream_t stream = NULL;
   tandem_gpu_assets* assets = NULL;
   tandem_gpu_broad_phase* broad_phase = NULL;
@@ -29,12 +27,12 @@ int main(int argc, char** argv) {
   memset(&near, 0, sizeof near);
   near.struct_size = sizeof near;
   near.sorted = 1;
-  near.within = atof(argv[3]);
+  near.within = within;
   near.filter = &filter;
   tandem_gpu_query_options options;
   memset(&options, 0, sizeof options);
   options.struct_size = sizeof options;
-  options.mode = (uint32_t)atoi(argv[2]);
+  options.mode = mode;
   options.within = near.within;
   tandem_gpu_pairs pairs;
   memset(&pairs, 0, sizeof pairs);
@@ -66,5 +64,11 @@ int main(int argc, char** argv) {
   cuda_must(cudaFree(motion));
   cuda_must(cudaFree(given));
   free_scene(&scene);
+}
+
+int main(int argc, char** argv) {
+  if (argc < 4) return printf("usage: gpu_scene_hash MODE WITHIN SCENE...\n"), 1;
+  if (!has_gpu()) return printf("there is no GPU\n"), NO_GPU;
+  for (int i = 3; i < argc; ++i) print_scene(argv[i], (uint32_t)atoi(argv[1]), atof(argv[2]));
   return failures != 0;
 }

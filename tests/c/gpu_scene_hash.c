@@ -1,7 +1,22 @@
 // Finds the contacts of scenes on the GPU through the C interface and prints what scene_hash prints of each. C99.
 // Usage: gpu_scene_hash MODE WITHIN SCENE...   Exit code 77: there is no GPU.
+// TANDEM_REPEAT=N: then makes N calls of both kinds again and says how many microseconds the median of them took.
+#define _POSIX_C_SOURCE 200112L
+#include <time.h>
+
 #include "gpu_c_test.h"
 #include "scene_text.h"
+
+static int compare_numbers(const void* x, const void* y) {
+  const double a = *(const double*)x, b = *(const double*)y;
+  return a < b ? -1 : a > b;
+}
+
+static double microseconds(void) {
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return 1e6 * (double)now.tv_sec + 1e-3 * (double)now.tv_nsec;
+}
 
 static void print_scene(const char* file, uint32_t mode, double within) {
   Scene scene = read_scene(file);
@@ -58,6 +73,20 @@ static void print_scene(const char* file, uint32_t mode, double within) {
   print_found(of, pair_count, contacts, report.contacts);
   free(of);
   free(contacts);
+  const size_t repeat = getenv("TANDEM_REPEAT") != NULL ? (size_t)atoi(getenv("TANDEM_REPEAT")) : 0;
+  double* taken = (double*)list(repeat, sizeof *taken);
+  for (size_t i = 0; i < repeat; ++i) {
+    taken[i] = -microseconds();
+    if (scene.pairs == NULL) {
+      CHECK_STATUS(tandem_gpu_broad_phase_find(broad_phase, &on_gpu.instances, &near, stream), TANDEM_OK);
+      pairs = tandem_gpu_broad_phase_pairs(broad_phase);
+    }
+    CHECK_STATUS(tandem_gpu_contact_query_find(query, &on_gpu.instances, &pairs, &options, stream), TANDEM_OK);
+    taken[i] += microseconds();
+  }
+  qsort(taken, repeat, sizeof *taken, compare_numbers);
+  if (repeat > 0) printf("%.2f us\n", taken[repeat / 2]);
+  free(taken);
   tandem_gpu_contact_query_destroy(query);
   tandem_gpu_broad_phase_destroy(broad_phase);
   free_gpu_scene(&on_gpu);

@@ -1,6 +1,8 @@
 """tandem.cuda: what it finds is what the CPU finds, from and to the arrays of PyTorch, CuPy and JAX, without a copy. Skipped where there is no GPU."""
+import doctest
 import gc
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -397,3 +399,15 @@ def test_what_is_wrong_is_told(assets):
     with pytest.raises(tandem.Error) as caught:
         cuda.Query(assets, contents="exact").distances(pose=at)
     assert caught.value.name == "NoAxisAlignedBlocks"
+
+
+@needs_gpu
+def test_the_page_shows_what_runs(assets, tmp_path, monkeypatch):
+    pytest.importorskip("torch")
+    assets[1].save(tmp_path / "cow.bvh")
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"^```pycon\n(.*?)^```$", (ROOT / "docs/python.md").read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    test = doctest.DocTestParser().get_doctest("\n".join(blocks), {}, "docs/python.md", None, 0)
+    failed, tried = doctest.DocTestRunner().run(test, clear_globs=False)
+    assert failed == 0 and tried > 10
+    assert len(test.globs["faces"]) > 0 and test.globs["contacts"] > 0

@@ -59,8 +59,8 @@ class Rows:
 
     __slots__ = ("_core", "dtype")
 
-    def __init__(self, core: Any, dtype: np.dtype[Any]):
-        self._core = core
+    def __init__(self, core: _cuda.Rows, dtype: np.dtype[Any]):
+        self._core: _cuda.Rows = core
         #: NumPy's, byte for byte.
         self.dtype = dtype
 
@@ -165,6 +165,11 @@ def _stream(stream: Any) -> int:
     raise TypeError(f"stream is {type(stream).__name__} where a number, a stream of PyTorch or CuPy, or None is wanted")
 
 
+def _found(found: _cuda.Rows | None, given: Any) -> Any:
+    """The pairs of a result: those that were found, or what was given."""
+    return given if found is None else Rows(found, PAIR)
+
+
 def _choice(name: str, given: Any, choices: dict[str, int]) -> int:
     if given not in choices:
         raise ValueError(f"{name} is {given!r} where one of {', '.join(choices)} is wanted")
@@ -177,8 +182,8 @@ class Instances:
 
     __slots__ = ("_core", "asset", "pose")
 
-    def __init__(self, core: Any, asset: Any, pose: Any):
-        self._core = core
+    def __init__(self, core: _cuda.Instances, asset: Any, pose: Any):
+        self._core: _cuda.Instances = core
         #: As they were given.
         self.asset = asset
         self.pose = pose
@@ -208,8 +213,8 @@ class Queued:
 
     __slots__ = ("_core", "_kept")
 
-    def __init__(self, core: Any, kept: tuple[Any, ...]):
-        self._core = core
+    def __init__(self, core: _cuda.Step, kept: tuple[Any, ...]):
+        self._core: _cuda.Step = core
         self._kept = kept  # what the stream, or a graph, reads
 
     @property
@@ -276,7 +281,7 @@ class Query:
     A query takes one call at a time: a second thread gets RuntimeError.
     """
 
-    __slots__ = ("_assets", "_core", "_step", "__weakref__")
+    __slots__ = ("_assets", "_core", "_given", "_step", "__weakref__")
 
     def __init__(self, assets: Iterable[Asset], *, device: int = 0, contents: Literal["all", "exact", "manifolds"] = "all", stream: Any = None):
         if isinstance(assets, Asset):
@@ -288,7 +293,8 @@ class Query:
             cores.append(asset._core)
         self._assets = _cuda.Assets(cores, device, _choice("contents", contents, _CONTENTS), _stream(stream))
         self._core = _cuda.Query(self._assets)
-        self._step: Any = None
+        self._given: Any = None  # the pairs of the last contacts()
+        self._step: _cuda.Step | None = None
 
     @property
     def device(self) -> int:
@@ -300,7 +306,7 @@ class Query:
             raise TypeError("pose is missing")
         return Instances(_cuda.Instances(self._assets, asset, pose, _stream(stream)), asset, pose)
 
-    def _bodies(self, instances: Instances | None, asset: Any, pose: Any, stream: int) -> Any:
+    def _bodies(self, instances: Instances | None, asset: Any, pose: Any, stream: int) -> _cuda.Instances:
         if instances is None:
             if pose is None:
                 raise TypeError("instances is missing, or pose")
@@ -309,7 +315,7 @@ class Query:
             raise TypeError("instances stand instead of asset and pose, not beside them")
         return instances._core
 
-    def _pairs(self, pairs: Any, stream: int) -> Any:
+    def _pairs(self, pairs: Any, stream: int) -> _cuda.Pairs | None:
         return None if pairs is None else _cuda.Pairs(pairs, stream, self._assets.device)
 
     def contacts(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, pairs: Any = None,
@@ -325,9 +331,10 @@ class Query:
         The others: as of `tandem.Query.contacts`.
         """
         number = _stream(stream)
+        self._given = pairs
         found = self._core.contacts(self._bodies(instances, asset, pose, number), self._pairs(pairs, number), _choice("mode", mode, _MODES), first_contact_only,
                                     within, add_error_bounds, sorted, grouped, None if filter is None else filter._core, number)
-        return Contacts(Rows(found[0], PAIR) if pairs is None else pairs, Rows(found[1], CONTACT), Counters._make(found[2]))
+        return Contacts(_found(found[0], pairs), Rows(found[1], CONTACT), Counters._make(found[2]))
 
     def pairs(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, sorted: bool = True, within: float = 0.0,
               filter: Filter | None = None, stream: Any = None) -> Rows:
@@ -342,12 +349,12 @@ class Query:
         if not 1 <= most_points <= 7:
             raise ValueError(f"most_points is {most_points} where 1 to 7 is wanted")
         pairs, manifolds, points = self._core.manifolds(most_points, match_previous)
-        return Manifolds(None if pairs is None else Rows(pairs, PAIR), Rows(manifolds, MANIFOLD), Rows(points, POINT))
+        return Manifolds(_found(pairs, self._given), Rows(manifolds, MANIFOLD), Rows(points, POINT))
 
     def contained(self) -> Contained:
         """Finds bodies within others of the last `contacts(..., grouped=True)`, which was in mode "exact" and for all contacts."""
         pairs, contained = self._core.contained()
-        return Contained(None if pairs is None else Rows(pairs, PAIR), Rows(contained, CONTAINMENT))
+        return Contained(_found(pairs, self._given), Rows(contained, CONTAINMENT))
 
     def distances(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, pairs: Any = None, reach: float | None = None,
                   absolute_tolerance: float = 0.0, relative_tolerance: float = 0.0, filter: Filter | None = None, stream: Any = None) -> Distances:
@@ -355,7 +362,7 @@ class Query:
         number = _stream(stream)
         found = self._core.distances(self._bodies(instances, asset, pose, number), self._pairs(pairs, number), reach, absolute_tolerance, relative_tolerance,
                                      None if filter is None else filter._core, number)
-        return Distances(Rows(found[0], PAIR) if pairs is None else pairs, Rows(found[1], DISTANCE))
+        return Distances(_found(found[0], pairs), Rows(found[1], DISTANCE))
 
     def impacts(self, instances: Instances | None = None, *, motion: Any, duration: float, asset: Any = None, pose: Any = None, pairs: Any = None,
                 tolerance: float = 0.0, sorted: bool = True, filter: Filter | None = None, stream: Any = None) -> Impacts:
@@ -367,7 +374,7 @@ class Query:
         number = _stream(stream)
         found = self._core.impacts(self._bodies(instances, asset, pose, number), motion, duration, self._pairs(pairs, number), tolerance, sorted,
                                    None if filter is None else filter._core, number)
-        return Impacts(Rows(found[0], PAIR) if pairs is None else pairs, Rows(found[1], IMPACT))
+        return Impacts(_found(found[0], pairs), Rows(found[1], IMPACT))
 
     def verdicts(self, instances: Instances | None = None, *, tolerance: float, asset: Any = None, pose: Any = None, pairs: Any = None,
                  filter: Filter | None = None, stream: Any = None) -> Verdicts:
@@ -375,7 +382,7 @@ class Query:
         number = _stream(stream)
         found = self._core.verdicts(self._bodies(instances, asset, pose, number), tolerance, self._pairs(pairs, number),
                                     None if filter is None else filter._core, number)
-        return Verdicts(Rows(found[0], PAIR) if pairs is None else pairs, Rows(found[1], VERDICT))
+        return Verdicts(_found(found[0], pairs), Rows(found[1], VERDICT))
 
     def reserve(self, *, instances: int, pairs: int, contacts: int, undecided: int | None = None, mode: Literal["exact", "fast", "boxes"] = "exact",
                 first_contact_only: bool = False, within: float = 0.0, add_error_bounds: bool = False, sorted: bool = False, grouped: bool = False) -> None:

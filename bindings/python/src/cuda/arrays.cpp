@@ -68,6 +68,15 @@ void check_cuda(cudaError_t error) {
   throw nb::python_error();
 }
 
+void check_whole(tandem_status status) {
+  if (status == TANDEM_OK) return;
+  const nb::object error = nb::module_::import_("tandem._errors")
+                               .attr("from_status")(status, tandem_status_name(status),
+                                                    tandem_status_explain(status), nb::none(), 0);
+  PyErr_SetObject(error.type().ptr(), error.ptr());
+  throw nb::python_error();
+}
+
 OnDevice::OnDevice(int device) {
   int current = -1;
   // Where there is no GPU, the call that follows says so.

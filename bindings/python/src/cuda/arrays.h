@@ -18,6 +18,9 @@ inline constexpr dlpack::DataType kU8 = {dlpack::kUInt, 8, 1}, kU32 = {dlpack::k
 /// Throws the exception of an error of CUDA's.
 void check_cuda(cudaError_t error);
 
+/// As check(), of a status that comes without the number of what is to blame.
+void check_whole(tandem_status status);
+
 /// While it lives, the device is the current one.
 class OnDevice {
  public:

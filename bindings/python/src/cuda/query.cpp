@@ -8,12 +8,15 @@ namespace tandem::python {
 namespace {
 
 // Runs a call that waits for the GPU while other Python threads run. where: what the GPU's report says of it.
+template <typename Call>
+tandem_status call_freely(const Call& call) {
+  const nb::gil_scoped_release release;
+  return call();
+}
+
 template <typename Call, typename Where>
 void run(const Call& call, const Where& where) {
-  const tandem_status status = [&] {
-    const nb::gil_scoped_release release;
-    return call();
-  }();
+  const tandem_status status = call_freely(call);
   if (status != TANDEM_OK) check(status, where());
 }
 
@@ -109,7 +112,7 @@ nb::object Query::pairs(nb::object instances, bool sorted, double within, const 
 }
 
 const Query::Last& Query::last() const {
-  if (!last_.has_value()) check(TANDEM_CONTACTS_MISSING);
+  if (!last_.has_value()) check_whole(TANDEM_CONTACTS_MISSING);
   return *last_;
 }
 
@@ -143,12 +146,10 @@ nb::tuple Query::manifolds(std::uint32_t most_points, bool match_previous) {
   options.ignore_previous = !match_previous;
   const Instances& bodies = bodies_of(of.instances);
   tandem_gpu_manifolds* const made = manifolds_.get();
-  run(
-      [&] {
-        return tandem_gpu_manifolds_find(made, &bodies.get(), &of.pairs.pairs, of.contacts.get(), &options,
-                                         of.stream);
-      },
-      [] { return std::uint64_t{0}; });
+  check_whole(call_freely([&] {
+    return tandem_gpu_manifolds_find(made, &bodies.get(), &of.pairs.pairs, of.contacts.get(), &options,
+                                     of.stream);
+  }));
   const auto report = report_of(tandem_gpu_manifolds_get_report, made);
   // The query keeps its own, to find points again in the next step.
   return nb::make_tuple(
@@ -167,12 +168,10 @@ nb::tuple Query::contained() {
     });
   const Instances& bodies = bodies_of(of.instances);
   tandem_gpu_containment_query* const query = contained_.get();
-  run(
-      [&] {
-        return tandem_gpu_containment_query_find(query, &bodies.get(), &of.pairs.pairs, of.contacts.get(),
-                                                 of.stream);
-      },
-      [] { return std::uint64_t{0}; });
+  check_whole(call_freely([&] {
+    return tandem_gpu_containment_query_find(query, &bodies.get(), &of.pairs.pairs, of.contacts.get(),
+                                             of.stream);
+  }));
   const auto report = report_of(tandem_gpu_containment_query_get_report, query);
   return nb::make_tuple(of.given.is_none() ? nb::cast(rows_of(of.pairs, of.stream)) : nb::none(),
                         copy(tandem_gpu_containment_query_contained(query), report.contained,

@@ -38,9 +38,9 @@ class Pool {
   template <typename SetAssets>
   static Pointer make(int device, const SetAssets& set_assets) {
     Of* handle = nullptr;
-    check(create(nullptr, &handle));
+    check_whole(create(nullptr, &handle));
     Pointer made(handle, Destroy<Of, destroy>{device});
-    check(set_assets(handle));
+    check_whole(set_assets(handle));
     return made;
   }
 

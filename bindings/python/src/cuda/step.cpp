@@ -25,8 +25,8 @@ Step::Step(nb::object assets, std::uint32_t instances, std::uint32_t pairs, std:
   });
   const tandem_gpu_broad_phase_capacity near_room = {instances, pairs};
   const tandem_gpu_query_capacity room = {pairs, 0, contacts, undecided};
-  check(tandem_gpu_broad_phase_reserve(broad_phase_.get(), &near_room, &near_));
-  check(tandem_gpu_contact_query_reserve(contacts_.get(), &room, &options_));
+  check_whole(tandem_gpu_broad_phase_reserve(broad_phase_.get(), &near_room, &near_));
+  check_whole(tandem_gpu_contact_query_reserve(contacts_.get(), &room, &options_));
 }
 
 void Step::enqueue(nb::object instances, nb::object pairs, nb::object filter, std::uintptr_t stream) {
@@ -37,12 +37,12 @@ void Step::enqueue(nb::object instances, nb::object pairs, nb::object filter, st
   if (pairs.is_none()) {
     near_.filter =
         filter.is_none() ? nullptr : GpuFilter::of(&nb::cast<const GpuFilter&>(filter), bodies.count());
-    check(tandem_gpu_broad_phase_enqueue(broad_phase_.get(), &bodies.get(), &near_, stream_));
+    check_whole(tandem_gpu_broad_phase_enqueue(broad_phase_.get(), &bodies.get(), &near_, stream_));
     of = tandem_gpu_broad_phase_pairs(broad_phase_.get());
   } else {
     of = nb::cast<const Pairs&>(pairs).get();
   }
-  check(tandem_gpu_contact_query_enqueue(contacts_.get(), &bodies.get(), &of, &options_, stream_));
+  check_whole(tandem_gpu_contact_query_enqueue(contacts_.get(), &bodies.get(), &of, &options_, stream_));
   instances_ = instances;
   given_ = pairs;
   filter_ = filter;

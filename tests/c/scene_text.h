@@ -1,10 +1,9 @@
-/// Scenes as c_scenes_test.py writes them: lines "asset PATH", then "instances N" and N lines of an asset's number
-/// and twelve numbers of a pose, then "motion" with N numbers or "pairs M" with M lines of two. And the hash of
-/// contacts, by the rule of docs/scenes.md. C99.
+/// Scenes as c_scenes_test.py writes them: lines "asset PATH", then "instances N" and N lines of an asset's
+/// number and twelve numbers of a pose, then "motion" with N numbers or "pairs M" with M lines of two. And
+/// the hash of contacts, by the rule of docs/scenes.md. C99.
 #ifndef TANDEM_TESTS_C_SCENE_TEXT_H
 #define TANDEM_TESTS_C_SCENE_TEXT_H
 #include "c_test.h"
-
 
 typedef struct Row {
   uint32_t pair, face_a, face_b;
@@ -59,8 +58,8 @@ static inline uint64_t xxh64(const uint32_t* words, size_t count) {
   return hash ^ hash >> 32;
 }
 
-static inline uint64_t hash_of(const tandem_object_pair* pairs, size_t pair_count, const tandem_contact* contacts,
-                        size_t count) {
+static inline uint64_t hash_of(const tandem_object_pair* pairs, size_t pair_count,
+                               const tandem_contact* contacts, size_t count) {
   Row* rows = (Row*)malloc((count + 1) * sizeof(Row));
   uint32_t* words = (uint32_t*)malloc((2 * pair_count + 3 * count + 1) * sizeof(uint32_t));
   for (size_t i = 0; i < count; ++i) {
@@ -151,8 +150,8 @@ static inline void free_scene(Scene* scene) {
   free(scene->motion);
 }
 
-static inline void print_found(const tandem_object_pair* pairs, size_t pair_count, const tandem_contact* contacts,
-                               size_t count) {
+static inline void print_found(const tandem_object_pair* pairs, size_t pair_count,
+                               const tandem_contact* contacts, size_t count) {
   const uint64_t hash = hash_of(pairs, pair_count, contacts, count);
   printf("%zu %zu %08x%08x\n", pair_count, count, (unsigned)(hash >> 32), (unsigned)hash);
 }

@@ -128,6 +128,12 @@ std::span<const Element> elements(const unsigned char* data, std::span<const Sec
   return {};
 }
 
+// Condition: the table lies within the file.
+std::span<const Section> sections_of(const unsigned char* data) {
+  const auto& header = *reinterpret_cast<const FileHeader*>(data);
+  return {reinterpret_cast<const Section*>(data + sizeof(FileHeader)), header.section_count};
+}
+
 // Whether the counts of a level's topology agree, or all say that there is none.
 bool has_sound_topology(const Level& level, std::span<const TriangleTopology> topology,
                         std::span<const SurfaceComponent> components) {
@@ -225,20 +231,11 @@ CheckResult check(const void* data_pointer, std::size_t bytes, CheckDepth depth)
   const auto& header = *reinterpret_cast<const FileHeader*>(data);
   if (const Status status = check_header(header); status != Status::kOk) return {status, 0, {}};
 
-  CheckResult result;
-  AssetView& asset = result.asset;
-  asset.header = &header;
-  asset.sections = {reinterpret_cast<const Section*>(data + sizeof(FileHeader)), header.section_count};
-  CheckResult step = check_section_table(data, header, asset.sections);
+  CheckResult step = check_section_table(data, header, sections_of(data));
   if (step.status != Status::kOk) return step;
 
-  asset.levels = elements<Level>(data, asset.sections, SectionKind::levels);
-  asset.parts = elements<Part>(data, asset.sections, SectionKind::parts);
-  const auto strings = elements<char>(data, asset.sections, SectionKind::strings);
-  const auto provenance = elements<char>(data, asset.sections, SectionKind::provenance);
-  asset.strings = {strings.data(), strings.size()};
-  asset.provenance = {provenance.data(), provenance.size()};
-
+  CheckResult result;
+  const AssetView& asset = result.asset = view_of_checked(data);
   step = check_levels(data, header, asset.sections, asset.levels);
   if (step.status == Status::kOk) step = check_parts(asset);
   for (std::uint32_t i = 0; i < asset.levels.size() && step.status == Status::kOk; ++i) {
@@ -251,6 +248,21 @@ CheckResult check(const void* data_pointer, std::size_t bytes, CheckDepth depth)
   }
   if (step.status == Status::kOk) step = check_bounds(asset);
   return step.status == Status::kOk ? result : step;
+}
+
+// The header and the section table alone are looked at.
+AssetView view_of_checked(const void* data_pointer) {
+  const auto* data = static_cast<const unsigned char*>(data_pointer);
+  AssetView asset;
+  asset.header = reinterpret_cast<const FileHeader*>(data);
+  asset.sections = sections_of(data);
+  asset.levels = elements<Level>(data, asset.sections, SectionKind::levels);
+  asset.parts = elements<Part>(data, asset.sections, SectionKind::parts);
+  const auto strings = elements<char>(data, asset.sections, SectionKind::strings);
+  const auto provenance = elements<char>(data, asset.sections, SectionKind::provenance);
+  asset.strings = {strings.data(), strings.size()};
+  asset.provenance = {provenance.data(), provenance.size()};
+  return asset;
 }
 
 void seal(void* data, std::size_t bytes) {

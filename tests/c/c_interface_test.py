@@ -10,6 +10,7 @@ from pathlib import Path
 
 ROOT, LIBRARY = Path(os.environ["TANDEM_SOURCE_DIR"]), Path(os.environ["TANDEM_LIBRARY"])
 HEADER = ROOT / "bindings/c/include/tandem/tandem.h"
+CUDA_LIBRARY, CUDA_HEADER = os.environ.get("TANDEM_CUDA_LIBRARY"), ROOT / "bindings/c/cuda/include/tandem/tandem_cuda.h"
 PAGE = (ROOT / "docs/c.md").read_text(encoding="utf-8")
 SIZES = {"u8": 1, "u32": 4, "u64": 8, "f32": 4, "f64": 8, "usize": 8, "byte": 1, "uint": 4, "ulong": 8, "float": 4, "double": 8, "IntPtr": 8, "UIntPtr": 8}
 
@@ -55,18 +56,39 @@ class CInterfaceTest(unittest.TestCase):
         self.addCleanup(holder.cleanup)
         self.folder = Path(holder.name)
 
-    def declared(self):
-        return set(re.findall(r"^TANDEM_API [^(]*?(tandem_\w+)\(", HEADER.read_text(encoding="utf-8"), re.MULTILINE))
+    def declared(self, header=HEADER):
+        return set(re.findall(r"^TANDEM_API [^(]*?(tandem_\w+)\(", header.read_text(encoding="utf-8"), re.MULTILINE))
 
-    def test_exports_are_the_declared_functions(self):
-        listed = subprocess.run(["nm", "-D", "--defined-only", LIBRARY], capture_output=True, text=True, check=True).stdout
+    def check_exports(self, library, header):
+        listed = subprocess.run(["nm", "-D", "--defined-only", library], capture_output=True, text=True, check=True).stdout
         names = {line.split()[-1] for line in listed.splitlines()}
-        self.assertEqual(names, {"TANDEM_0.1"} | {f"{name}@@TANDEM_0.1" for name in self.declared()})
+        self.assertEqual(names, {"TANDEM_0.1"} | {f"{name}@@TANDEM_0.1" for name in self.declared(header)})
         self.assertGreater(len(names), 50)
 
+    def test_exports_are_the_declared_functions(self):
+        self.check_exports(LIBRARY, HEADER)
+
+    def dynamic(self, library):
+        return subprocess.run(["readelf", "-d", library], capture_output=True, text=True, check=True).stdout
+
     def test_the_library_is_known_by_its_soname(self):
-        told = subprocess.run(["readelf", "-d", LIBRARY], capture_output=True, text=True, check=True).stdout
-        self.assertIn("[libtandem.so.0]", told)
+        self.assertIn("[libtandem.so.0]", self.dynamic(LIBRARY))
+
+    def test_the_library_for_gpus(self):
+        if CUDA_LIBRARY is None:
+            self.skipTest("built without CUDA")
+        self.check_exports(CUDA_LIBRARY, CUDA_HEADER)
+        # It has no assets of its own: it uses those of the other library by functions that everybody may call.
+        told = self.dynamic(CUDA_LIBRARY)
+        self.assertIn("soname: [libtandem_cuda.so.0]", told)
+        self.assertIn("(NEEDED)             Shared library: [libtandem.so.0]", told)
+
+    def test_headers_compile_as_c99_alone(self):
+        for header in (HEADER, CUDA_HEADER):
+            source = self.folder / "alone.c"
+            source.write_text(f"#include <tandem/{header.name}>\nint main(void) {{ return 0; }}\n")
+            subprocess.run(["cc", "-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", f"-I{HEADER.parent.parent}", f"-I{CUDA_HEADER.parent.parent}", "-c", source,
+                            "-o", self.folder / "alone.o"], check=True)
 
     def test_layouts_in_other_languages_are_those_of_c(self):
         for language, structs in (("rust", list(rust_structs())), ("csharp", list(csharp_structs()))):

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import h5py
 
+from scene_text import as_text
+
 ROOT = Path(os.environ["TANDEM_SOURCE_DIR"])
 BVHBUILD, BVHBENCH = os.environ["TANDEM_BVHBUILD"], os.environ["TANDEM_BVHBENCH"]
 SCENE_HASH, BUILD_FILE = os.environ["TANDEM_SCENE_HASH"], os.environ["TANDEM_BUILD_FILE"]
@@ -21,24 +23,6 @@ def run(*words):
     if done.returncode != 0:
         raise AssertionError(f"{words}: {done.returncode}\n{done.stdout}{done.stderr}")
     return done.stdout
-
-
-def as_text(scene, folder):
-    """What scene_hash reads. repr() of a float64 is read back as it was."""
-    lines = []
-    with h5py.File(scene) as file:
-        for path in file["assets"].asstr()[:]:
-            lines.append(f"asset {folder / path}")
-        instances = file["instances"]
-        lines.append(f"instances {len(instances['asset'])}")
-        for asset, rotation, translation in zip(instances["asset"][:], instances["rotation"][:], instances["translation"][:]):
-            lines.append(" ".join([str(asset)] + [repr(float(x)) for x in rotation.ravel()] + [repr(float(x)) for x in translation]))
-        if "simulation/motion" in file:
-            lines += ["motion", " ".join(str(m) for m in file["simulation/motion"][:])]
-        if "pairs" in file:
-            lines.append(f"pairs {len(file['pairs'])}")
-            lines += [f"{a} {b}" for a, b in file["pairs"][:]]
-    return "\n".join(lines) + "\n"
 
 
 class CScenesTest(unittest.TestCase):

@@ -24,7 +24,7 @@ def mypy(*words, folder):
 
 def test_mypy_finds_nothing(tmp_path):
     modules = [f"tandem.{path.stem}" for path in PACKAGE.glob("_[a-z]*.py")]
-    done = mypy("-m", "tandem", *(word for module in modules for word in ("-m", module)), folder=tmp_path)
+    done = mypy("-m", "tandem", "-m", "tandem.cuda", *(word for module in modules for word in ("-m", module)), folder=tmp_path)
     assert done.returncode == 0, done.stdout
     done = mypy(str(PROGRAM), folder=tmp_path)
     assert done.returncode == 0, done.stdout
@@ -54,7 +54,7 @@ def signatures(text):
     return found
 
 
-@pytest.mark.parametrize("name", ["_tandem", "_bvhbuild"])
+@pytest.mark.parametrize("name", ["_tandem", "_bvhbuild", "_cuda"])
 def test_stubs_are_those_of_the_extensions(name):
     stubgen = pytest.importorskip("nanobind.stubgen")
     module = pytest.importorskip(f"tandem.{name}")

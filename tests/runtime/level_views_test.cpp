@@ -59,6 +59,22 @@ TEST(LevelViews, ShowARunOfLevelsFromAnyOnThatOthersTakeAsLevel0) {
   }
 }
 
+TEST(LevelViews, AreThoseOfTheCheckWhereTheFileWasCheckedBefore) {
+  const test::Bytes file = four_levels();
+  const AssetView checked = file.check().asset;
+  const AssetView view = view_of_checked(checked.header);
+  EXPECT_EQ(view.header, checked.header);
+  EXPECT_EQ(view.sections.data(), checked.sections.data());
+  EXPECT_EQ(view.sections.size(), checked.sections.size());
+  EXPECT_EQ(view.first_level, 0u);
+  EXPECT_EQ(view.parts.data(), checked.parts.data());
+  EXPECT_EQ(view.parts.size(), checked.parts.size());
+  EXPECT_EQ(view.strings, checked.strings);
+  EXPECT_EQ(view.provenance, checked.provenance);
+  ASSERT_EQ(view.levels.size(), kLevels);
+  for (std::uint32_t i = 0; i < kLevels; ++i) expect_same(view.level(i), checked.level(i));
+}
+
 TEST(LevelViews, NameTheCoarsestLevelWithinATolerance) {
   const test::Bytes file = four_levels();
   const AssetView all = file.check().asset;

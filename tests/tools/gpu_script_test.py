@@ -33,7 +33,7 @@ class GpuScriptTest(unittest.TestCase):
         self.bin.mkdir()
         self.write(self.bin / "nvidia-smi", "#!/bin/sh\necho 'NVIDIA Example, 80GB'\n")
         self.write(self.bin / "compute-sanitizer", "#!/bin/sh\necho '========= ERROR SUMMARY: 0 errors'\n")
-        for name in ("gpu_test", "paper_engine_test", "engine_gpu_test", "gpu_absent_test"):
+        for name in ("gpu_test", "paper_engine_test", "engine_gpu_test", "gpu_absent_test", "gpu_use_test", "libtandem.so.0", "libtandem_cuda.so.0"):
             self.program(name, PASSED)
 
     def write(self, path, text):
@@ -60,7 +60,7 @@ class GpuScriptTest(unittest.TestCase):
         self.assertEqual(self.results()["no_gpu.Suite.Passes"],
                          {"machine": "NVIDIA Example, 80GB", "commit": "abc1234", "test": "no_gpu.Suite.Passes", "result": "passed", "milliseconds": "12"})
         self.assertEqual(set(self.results()), {"Suite.Passes", "no_gpu.Suite.Passes", "old_driver.Suite.Passes"})
-        self.assertEqual(done.stdout.count("ERROR SUMMARY: 0 errors"), 5)
+        self.assertEqual(done.stdout.count("ERROR SUMMARY: 0 errors"), 6)  # and one of the C interface
 
     def test_a_test_that_wants_a_mesh_is_named_and_the_sanitizers_run(self):
         self.program("gpu_test", PASSED, SKIPPED % "cow.obj is not here (set TANDEM_MESHES)")
@@ -95,6 +95,19 @@ class GpuScriptTest(unittest.TestCase):
         self.assertEqual(done.returncode, 1)
         self.assertIn("compute-sanitizer: synccheck gpu_test", done.stderr)
         self.assertEqual([path.name for path in self.out.glob("*.txt")], ["synccheck_gpu_test.txt"])
+
+    def test_a_failure_of_the_c_interface_fails(self):
+        self.program("gpu_use_test", code=1)
+        done = self.run_script()
+        self.assertEqual((done.returncode, done.stderr), (1, "gpu_use_test: exit code 1\n"))
+        self.assertIn("gpu_use_test under memcheck: exit code 0", done.stdout)
+        self.assertIn("the Python package is not in", done.stdout)
+
+    def test_the_package_is_tested_where_it_is(self):
+        self.write(self.folder / "python/tandem/_cuda.so", "")  # which Python cannot load: the tests say so and are skipped
+        done = self.run_script()
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertIn("cuda_test.py: skipped", done.stdout)
 
     def test_a_program_that_is_missing_is_named(self):
         (self.folder / "tests/paper_engine_test").unlink()

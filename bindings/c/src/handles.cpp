@@ -1,19 +1,8 @@
 #include "handles.h"
 
-#include <algorithm>
-
 #include "rows.h"
 
 namespace tandem::c {
-
-tandem_status read_allocator(const tandem_allocator* given, Allocator& allocator) {
-  tandem_allocator read;
-  if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return status;
-  if (read.reserved != 0) return TANDEM_BAD_OPTION;
-  allocator = {read.user, read.allocate, read.deallocate};
-  const bool complete = read.allocate != nullptr && read.deallocate != nullptr;
-  return given == nullptr || complete ? TANDEM_OK : TANDEM_NULL_ARGUMENT;
-}
 
 tandem_status AssetList::set(tandem_asset* const* assets, size_t count, uint64_t& where) {
   where = 0;
@@ -42,11 +31,6 @@ void AssetList::clear() {
   for (tandem_asset* asset : assets_.view()) tandem_asset_release(asset);
   assets_.clear();
   views_.clear();
-}
-
-size_t first_unknown_motion(const uint8_t* motion, size_t count) {
-  const auto is_unknown = [](uint8_t value) { return value > TANDEM_SLEEPING; };
-  return static_cast<size_t>(std::find_if(motion, motion + count, is_unknown) - motion);
 }
 
 tandem_status read_filter(const tandem_pair_filter& given, size_t instances, PairFilter& filter,

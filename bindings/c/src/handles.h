@@ -3,9 +3,8 @@
 #include <memory>
 #include <span>
 
+#include "entry.h"
 #include "status.h"
-#include "structs.h"
-#include "tandem/formats/allocator.h"
 #include "tandem/kernels/detail/buffer.h"
 #include "tandem/kernels/excluded_pairs.h"
 #include "tandem/runtime/map.h"
@@ -28,10 +27,6 @@ struct tandem_excluded_pairs : tandem::Allocated {
 };
 
 namespace tandem::c {
-
-/// The caller's allocator; null: that of the C library. Result: TANDEM_OK, TANDEM_BAD_STRUCT_SIZE,
-/// TANDEM_BAD_OPTION, or TANDEM_NULL_ARGUMENT where a function is missing.
-tandem_status read_allocator(const tandem_allocator* given, Allocator& allocator);
 
 /// The assets that a query was given, a reference to each.
 class AssetList {
@@ -70,17 +65,13 @@ struct Handle : Allocated {
   }
 };
 
-/// Runs the body of a function: its memory comes from the handle's allocator, and nothing is thrown.
+/// Runs the body of a function, see guarded(); `where` begins as 0.
 template <typename Of, typename Body>
 tandem_status enter(Of* handle, const Body& body) noexcept {
-  if (handle == nullptr) return TANDEM_NULL_ARGUMENT;
-  const AllocatorScope scope(handle->allocator);
-  handle->where = 0;
-  try {
-    return body(*handle);
-  } catch (...) {
-    return TANDEM_INTERNAL_ERROR;
-  }
+  return guarded(handle, [&](Of& self) {
+    self.where = 0;
+    return body(self);
+  });
 }
 
 /// Makes the handle of a query.
@@ -116,17 +107,9 @@ tandem_status make_asset(const tandem_allocator* given, tandem_asset** asset, co
   return status;
 }
 
-/// Whether a list is where it must be.
-inline bool is_there(const void* list, size_t count) {
-  return list != nullptr || count == 0;
-}
-
 /// The filter of a call with so many instances. Result: TANDEM_OK, TANDEM_BAD_STRUCT_SIZE, TANDEM_BAD_OPTION,
 /// where `where` is the instance with a motion that there is not, or TANDEM_FILTER_MISMATCH.
 tandem_status read_filter(const tandem_pair_filter& given, size_t instances, PairFilter& filter,
                           uint64_t& where);
-
-/// The first entry that is no motion; `count` where all are.
-size_t first_unknown_motion(const uint8_t* motion, size_t count);
 
 }  // namespace tandem::c

@@ -57,6 +57,7 @@ enum {
   TANDEM_CONTACTS_MISSING = 9,     ///< the query's last call did not find the contacts that this call needs
   TANDEM_NO_TRIANGLE = 11,         ///< none of the triangles can be used
   TANDEM_TOO_MANY_TRIANGLES = 12,  ///< 2^32 - 1 or more
+  TANDEM_ASSETS_MISSING = 13,      ///< of a handle of tandem_cuda.h
   // A file, or bytes of one. Of the defects that are there, the first in this order.
   // clang-format off
   TANDEM_FILE_NOT_FOUND = 100, TANDEM_NOT_A_REGULAR_FILE = 101, TANDEM_CANNOT_OPEN = 102,
@@ -85,7 +86,7 @@ enum {
   TANDEM_UNKNOWN_CONTACT = 203, TANDEM_POSE_NOT_RIGID = 204, TANDEM_TOO_MANY_INSTANCES = 205,
   TANDEM_TOO_MANY_PAIRS = 206, TANDEM_KEPT_MISMATCH = 207, TANDEM_MOTION_MISMATCH = 208,
   TANDEM_NO_ORIENTED_BLOCKS = 209, TANDEM_NO_AXIS_ALIGNED_BLOCKS = 210, TANDEM_NO_TOPOLOGY = 211, TANDEM_NO_FINEST_LEVEL = 212,
-  // A GPU; this library, which is that of the CPU, returns none of these.
+  // A GPU (tandem_cuda.h).
   TANDEM_NO_GPU = 300, TANDEM_DRIVER_TOO_OLD = 301, TANDEM_GPU_NOT_SUPPORTED = 302,
   TANDEM_OUT_OF_GPU_MEMORY = 303, TANDEM_CUDA_FAILED = 304
   // clang-format on

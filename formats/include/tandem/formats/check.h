@@ -38,6 +38,10 @@ enum class CheckDepth : std::uint8_t {
 /// stay after a failure.
 CheckResult check(const void* data, std::size_t bytes, CheckDepth depth = CheckDepth::full);
 
+/// What check() returns of the same bytes, at once. Condition: it found them sound, and they are as they
+/// were.
+AssetView view_of_checked(const void* data);
+
 /// Writes the content hash into the header, the last step of writing a file.
 /// Condition: `data` holds `bytes` bytes, at least a header.
 void seal(void* data, std::size_t bytes);

@@ -1,0 +1,558 @@
+/// Tandem's C interface to queries on a GPU: libtandem_cuda.so, beside libtandem.so, whose assets it takes.
+/// C99 and C++; needs no header of CUDA's. docs/c.md is its page; what calls mean is in docs/gpu.md.
+///
+/// The conventions are those of tandem.h, and these:
+/// - Poses, pairs and results lie in GPU memory. Arrays of results belong to their query: they stay where
+/// they
+///   are until its next reserve(), and their contents until its next call. Arrays of arguments stay as they
+///   are until the stream has passed the call.
+/// - Work is queued on the caller's stream. ..._enqueue() neither waits for the GPU nor allocates, and may be
+///   captured into a CUDA graph. ..._find() enqueues, waits for the stream, and where there was too little
+///   room makes some and starts again. Uploads, ..._set_assets(), ..._reserve() and ..._destroy() wait too.
+/// - Functions work on the calling thread's current device (cudaSetDevice()); a handle belongs to the device
+///   that was current when it was given its assets.
+/// - What the GPU finds wrong is in a query's report: ..._device_report() in GPU memory, for kernels that
+/// follow;
+///   ..._get_report(), once the stream has passed the call, in CPU memory, with the status as its result.
+/// - Structs that lie in GPU memory, and capacities, are rows: they have no struct_size and never change.
+/// - A handle that was not given assets yet, or others than the query whose contacts it takes, returns
+///   TANDEM_ASSETS_MISSING. Any call may return TANDEM_OUT_OF_MEMORY, and of the GPU TANDEM_NO_GPU,
+///   TANDEM_DRIVER_TOO_OLD, TANDEM_GPU_NOT_SUPPORTED, TANDEM_OUT_OF_GPU_MEMORY or TANDEM_CUDA_FAILED.
+/// - GPU memory comes from cudaMalloc(). An allocator gives the memory of the handle itself; what its query
+/// keeps
+///   in CPU memory, some kilobytes, comes from the C++ runtime.
+#ifndef TANDEM_TANDEM_CUDA_H
+#define TANDEM_TANDEM_CUDA_H
+
+#include <tandem/tandem.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/// A cudaStream_t or CUstream; null: the default stream.
+typedef struct CUstream_st* tandem_stream;
+
+/// The cudaError_t behind the last status from TANDEM_NO_GPU to TANDEM_CUDA_FAILED that a function of this
+/// header returned on the calling thread; 0 before.
+TANDEM_API int tandem_cuda_error(void);
+
+/// ---- Assets in GPU memory
+
+/// Copies of assets in the memory of one GPU: the levels that they show. They never change, and references
+/// are counted, as those of tandem_asset; each handle that is given them has one.
+typedef struct tandem_gpu_assets tandem_gpu_assets;
+
+enum {
+  TANDEM_CONTENTS_ALL = 0,            ///< whatever the files hold
+  TANDEM_CONTENTS_EXACT_QUERIES = 1,  ///< what queries of mode TANDEM_EXACT take, and those by tolerance
+  TANDEM_CONTENTS_MANIFOLDS = 2       ///< these and topology, which manifolds and contained bodies take
+};
+
+typedef struct tandem_upload_options {
+  uint32_t struct_size;
+  uint32_t contents;  ///< TANDEM_CONTENTS_ALL, ...
+} tandem_upload_options;
+
+/// Copies assets into one allocation of the current device's memory; it returns when all is there. The assets
+/// need not stay. where (or null): the place of an asset that is null. After an error *uploaded is null.
+TANDEM_API tandem_status tandem_gpu_assets_upload(tandem_asset* const* assets, size_t count,
+                                                  const tandem_upload_options* options, tandem_stream stream,
+                                                  const tandem_allocator* allocator,
+                                                  tandem_gpu_assets** uploaded, uint64_t* where);
+TANDEM_API void tandem_gpu_assets_retain(tandem_gpu_assets* assets);
+/// The last reference frees the memory, which waits for the device. Null does nothing.
+TANDEM_API void tandem_gpu_assets_release(tandem_gpu_assets* assets);
+TANDEM_API size_t tandem_gpu_assets_count(const tandem_gpu_assets* assets);
+/// GPU memory that they hold.
+TANDEM_API size_t tandem_gpu_assets_bytes(const tandem_gpu_assets* assets);
+
+/// ---- Scenes in GPU memory
+
+/// Instances as two arrays in GPU memory, which a simulation may write there.
+typedef struct tandem_gpu_instances {
+  const uint32_t* asset;    ///< place in the list of assets, of each
+  const tandem_pose* pose;  ///< of each
+  uint32_t count;
+  uint32_t reserved;
+} tandem_gpu_instances;
+
+/// Object pairs in GPU memory.
+typedef struct tandem_gpu_pairs {
+  const tandem_object_pair* pairs;
+  const uint32_t* count;  ///< how many, in GPU memory; null: `capacity`
+  uint32_t capacity;      ///< room in `pairs`; where *count is more, queries of them are not complete
+  uint32_t reserved;
+} tandem_gpu_pairs;
+
+/// A table of pairs that a filter excludes, in GPU memory.
+typedef struct tandem_gpu_excluded_pairs tandem_gpu_excluded_pairs;
+
+/// As tandem_excluded_pairs_create(): `pairs` in CPU memory. Waits for the stream.
+TANDEM_API tandem_status tandem_gpu_excluded_pairs_create(const tandem_object_pair* pairs, size_t count,
+                                                          tandem_stream stream,
+                                                          const tandem_allocator* allocator,
+                                                          tandem_gpu_excluded_pairs** excluded);
+TANDEM_API void tandem_gpu_excluded_pairs_destroy(tandem_gpu_excluded_pairs* excluded);
+
+/// As tandem_pair_filter, with arrays in GPU memory that have an entry for each instance, or are null. All
+/// stay, with the table, until the stream has passed the call.
+typedef struct tandem_gpu_pair_filter {
+  uint32_t struct_size;
+  uint32_t reserved;
+  const uint8_t* motion;
+  const uint32_t* group;
+  const uint32_t* mask;
+  const tandem_gpu_excluded_pairs* excluded;
+} tandem_gpu_pair_filter;
+
+/// ---- Broad phase
+
+/// Finds the pairs of instances whose world boxes overlap.
+typedef struct tandem_gpu_broad_phase tandem_gpu_broad_phase;
+
+typedef struct tandem_gpu_broad_phase_options {
+  uint32_t struct_size;
+  uint32_t sorted;                       ///< 1: pairs ascend; reserve() has to know too
+  double within;                         ///< pairs for a query of clearance with the same; reserve() too
+  const tandem_gpu_pair_filter* filter;  ///< or null
+} tandem_gpu_broad_phase_options;
+
+typedef struct tandem_gpu_broad_phase_capacity {
+  uint32_t instances, pairs;
+} tandem_gpu_broad_phase_capacity;
+
+typedef struct tandem_gpu_broad_phase_report {
+  uint32_t failed;    ///< not 0: an error, which get_report() names; then there are no pairs
+  uint32_t complete;  ///< 0: there was no room for all pairs
+  uint32_t where;     ///< the instance to blame
+  uint32_t count;     ///< pairs; 2^32 - 1 where there are as many or more
+  uint64_t found;     ///< pairs, stored or not
+} tandem_gpu_broad_phase_report;
+
+TANDEM_API tandem_status tandem_gpu_broad_phase_create(const tandem_allocator* allocator,
+                                                       tandem_gpu_broad_phase** broad_phase);
+TANDEM_API void tandem_gpu_broad_phase_destroy(tandem_gpu_broad_phase* broad_phase);
+/// Names the assets that instances refer to. What was kept of fixed instances is forgotten.
+TANDEM_API tandem_status tandem_gpu_broad_phase_set_assets(tandem_gpu_broad_phase* broad_phase,
+                                                           tandem_gpu_assets* assets);
+/// Room for at least so much. Result: TANDEM_OUT_OF_RANGE for 2^32 - 1 instances.
+TANDEM_API tandem_status tandem_gpu_broad_phase_reserve(tandem_gpu_broad_phase* broad_phase,
+                                                        const tandem_gpu_broad_phase_capacity* capacity,
+                                                        const tandem_gpu_broad_phase_options* options);
+/// Keeps the instances whose motion is TANDEM_FIXED as they stand, and waits: calls to come take the time of
+/// the others. motion: instances->count entries, in CPU memory. Room for more instances forgets what was
+/// kept, and calls return TANDEM_KEPT_MISMATCH then. Result: as of find().
+TANDEM_API tandem_status tandem_gpu_broad_phase_keep_fixed(tandem_gpu_broad_phase* broad_phase,
+                                                           const tandem_gpu_instances* instances,
+                                                           const uint8_t* motion, tandem_stream stream);
+/// Result: TANDEM_OUT_OF_RANGE where less was reserved, or without these options, or `within` is negative or
+/// NaN; TANDEM_UNKNOWN_INSTANCE: an excluded pair names one that there is not; TANDEM_KEPT_MISMATCH.
+TANDEM_API tandem_status tandem_gpu_broad_phase_enqueue(tandem_gpu_broad_phase* broad_phase,
+                                                        const tandem_gpu_instances* instances,
+                                                        const tandem_gpu_broad_phase_options* options,
+                                                        tandem_stream stream);
+/// Result: as of enqueue(), or what the GPU found: TANDEM_UNKNOWN_ASSET, TANDEM_POSE_NOT_RIGID,
+/// TANDEM_OUT_OF_RANGE, where the report says which instance; TANDEM_TOO_MANY_PAIRS.
+TANDEM_API tandem_status tandem_gpu_broad_phase_find(tandem_gpu_broad_phase* broad_phase,
+                                                     const tandem_gpu_instances* instances,
+                                                     const tandem_gpu_broad_phase_options* options,
+                                                     tandem_stream stream);
+/// Where the pairs lie, for the queries below: a < b. The result's arrays are null before assets are set.
+TANDEM_API tandem_gpu_pairs tandem_gpu_broad_phase_pairs(const tandem_gpu_broad_phase* broad_phase);
+TANDEM_API const tandem_gpu_broad_phase_report* tandem_gpu_broad_phase_device_report(
+    const tandem_gpu_broad_phase* broad_phase);
+TANDEM_API tandem_status tandem_gpu_broad_phase_get_report(const tandem_gpu_broad_phase* broad_phase,
+                                                           tandem_gpu_broad_phase_report* report);
+TANDEM_API size_t tandem_gpu_broad_phase_bytes(const tandem_gpu_broad_phase* broad_phase);
+
+/// ---- Contacts
+
+/// Finds every pair of triangles that meet, of given object pairs: the same set as tandem_contact_query.
+typedef struct tandem_gpu_contact_query tandem_gpu_contact_query;
+
+/// reserve() has to know of sorted, grouped, within and add_error_bounds too.
+typedef struct tandem_gpu_query_options {
+  uint32_t struct_size;
+  uint32_t mode;  ///< TANDEM_EXACT, ...; the other two walk blocks that TANDEM_CONTENTS_ALL alone has
+  uint32_t first_contact_only;
+  uint32_t sorted;  ///< 1: by pair, face_a, face_b, triangles: the same bytes on every run; costs the time of
+                    ///< as many contacts as there is room for
+  uint32_t grouped;  ///< 1: contacts lie pair by pair, and groups() tells where
+  uint32_t add_error_bounds;
+  double within;
+  uint32_t most_blocks;  ///< thread blocks that look for contacts at a time; 0: as many as the GPU holds
+  uint32_t reserved;
+} tandem_gpu_query_options;
+
+typedef struct tandem_gpu_query_capacity {
+  uint32_t pairs;
+  uint32_t reserved;
+  uint64_t contacts;
+  uint64_t undecided;  ///< candidates that are not decided quickly
+} tandem_gpu_query_capacity;
+
+typedef struct tandem_gpu_query_counters {
+  uint64_t object_pairs, block_pairs, candidates;
+  uint64_t decided_by_float32, decided_by_float64, decided_exactly;
+  uint64_t contacts;
+} tandem_gpu_query_counters;
+
+typedef struct tandem_gpu_query_report {
+  uint32_t failed;    ///< not 0: an error, which get_report() names; then there are no contacts
+  uint32_t complete;  ///< 0: something did not fit, and contacts are missing
+  uint64_t where;     ///< the instance or pair to blame
+  tandem_gpu_query_capacity needed;  ///< exact for what follows from things that did fit
+  uint64_t contacts;                 ///< how many are stored
+  uint64_t world_pairs;              ///< object pairs beyond float32, which take long
+  tandem_gpu_query_counters counters;
+} tandem_gpu_query_report;
+
+typedef struct tandem_gpu_group_counts {
+  uint32_t pairs, contacts;
+  uint32_t few, many;
+} tandem_gpu_group_counts;
+
+/// Where grouped contacts lie, in GPU memory.
+typedef struct tandem_gpu_contact_groups {
+  const tandem_contact* contacts;
+  const uint32_t*
+      first_contact;           ///< pairs + 1: those of pair p are first_contact[p] up to first_contact[p + 1]
+  const uint32_t *few, *many;  ///< pairs with 1 to 64 contacts, and with more, ascending
+  const tandem_gpu_group_counts* counts;
+} tandem_gpu_contact_groups;
+
+TANDEM_API tandem_status tandem_gpu_contact_query_create(const tandem_allocator* allocator,
+                                                         tandem_gpu_contact_query** query);
+TANDEM_API void tandem_gpu_contact_query_destroy(tandem_gpu_contact_query* query);
+TANDEM_API tandem_status tandem_gpu_contact_query_set_assets(tandem_gpu_contact_query* query,
+                                                             tandem_gpu_assets* assets, tandem_stream stream);
+/// Result: TANDEM_OUT_OF_RANGE for 2^32 - 1 sorted or grouped contacts or more.
+TANDEM_API tandem_status tandem_gpu_contact_query_reserve(tandem_gpu_contact_query* query,
+                                                          const tandem_gpu_query_capacity* capacity,
+                                                          const tandem_gpu_query_options* options);
+/// A pair of an instance with itself asks for the contacts within it. Result: TANDEM_NO_ORIENTED_BLOCKS or
+/// TANDEM_NO_AXIS_ALIGNED_BLOCKS, where an asset lacks what the mode walks; TANDEM_OUT_OF_RANGE: reserved
+/// without these options, or `within` is no distance.
+TANDEM_API tandem_status tandem_gpu_contact_query_enqueue(tandem_gpu_contact_query* query,
+                                                          const tandem_gpu_instances* instances,
+                                                          const tandem_gpu_pairs* pairs,
+                                                          const tandem_gpu_query_options* options,
+                                                          tandem_stream stream);
+/// Result: as of enqueue(), or what the GPU found: as of the broad phase, or TANDEM_UNKNOWN_INSTANCE, where
+/// the report says which pair; TANDEM_OUT_OF_RANGE where there are more pairs than capacity.
+TANDEM_API tandem_status tandem_gpu_contact_query_find(tandem_gpu_contact_query* query,
+                                                       const tandem_gpu_instances* instances,
+                                                       const tandem_gpu_pairs* pairs,
+                                                       const tandem_gpu_query_options* options,
+                                                       tandem_stream stream);
+/// In GPU memory: as many as the report says. Null before assets are set, as all results.
+TANDEM_API const tandem_contact* tandem_gpu_contact_query_contacts(const tandem_gpu_contact_query* query);
+TANDEM_API tandem_gpu_contact_groups tandem_gpu_contact_query_groups(const tandem_gpu_contact_query* query);
+/// Of each pair whether it has a contact, not 0 where it has; of a complete query with first_contact_only.
+TANDEM_API const uint32_t* tandem_gpu_contact_query_met(const tandem_gpu_contact_query* query);
+TANDEM_API const tandem_gpu_query_report* tandem_gpu_contact_query_device_report(
+    const tandem_gpu_contact_query* query);
+TANDEM_API tandem_status tandem_gpu_contact_query_get_report(const tandem_gpu_contact_query* query,
+                                                             tandem_gpu_query_report* report);
+TANDEM_API size_t tandem_gpu_contact_query_bytes(const tandem_gpu_contact_query* query);
+
+/// ---- Contact manifolds
+
+/// Makes the manifolds of grouped contacts: the bytes that tandem_contact_query_make_manifolds() makes.
+typedef struct tandem_gpu_manifolds tandem_gpu_manifolds;
+
+typedef struct tandem_gpu_manifold_options {
+  uint32_t struct_size;
+  uint32_t most_points;      ///< of a manifold, 1 to 7; 0: 7
+  uint32_t ignore_previous;  ///< 1: points are not looked for among those of the last call
+  uint32_t reserved;
+} tandem_gpu_manifold_options;
+
+typedef struct tandem_gpu_manifold_capacity {
+  uint32_t pairs;
+  uint32_t reserved;
+  uint64_t contacts;
+  uint32_t manifolds, points;
+} tandem_gpu_manifold_capacity;
+
+typedef struct tandem_gpu_manifold_counters {
+  uint64_t contacts;
+  uint64_t segments;  ///< contacts whose triangles share a line
+  uint64_t manifolds, points;
+  uint64_t open_curves;        ///< manifolds with TANDEM_OPEN_CURVE
+  uint64_t ambiguous_touches;  ///< corner on corner or edge along edge, of which there is no manifold
+} tandem_gpu_manifold_counters;
+
+typedef struct tandem_gpu_manifold_report {
+  uint32_t failed;
+  uint32_t
+      complete;  ///< 0: something did not fit, or the query was not complete; then there are no manifolds
+  tandem_gpu_manifold_capacity needed;  ///< where the query is complete
+  uint32_t manifolds, points;
+  tandem_gpu_manifold_counters counters;
+} tandem_gpu_manifold_report;
+
+TANDEM_API tandem_status tandem_gpu_manifolds_create(const tandem_allocator* allocator,
+                                                     tandem_gpu_manifolds** manifolds);
+TANDEM_API void tandem_gpu_manifolds_destroy(tandem_gpu_manifolds* manifolds);
+/// Result: TANDEM_NO_TOPOLOGY, where an asset was uploaded without. Forgets the points of the last call.
+TANDEM_API tandem_status tandem_gpu_manifolds_set_assets(tandem_gpu_manifolds* manifolds,
+                                                         tandem_gpu_assets* assets, tandem_stream stream);
+TANDEM_API tandem_status tandem_gpu_manifolds_reserve(tandem_gpu_manifolds* manifolds,
+                                                      const tandem_gpu_manifold_capacity* capacity);
+/// Behind a call of `query`, with its instances and pairs. Result: TANDEM_CONTACTS_MISSING where its last
+/// call did not group contacts.
+TANDEM_API tandem_status tandem_gpu_manifolds_enqueue(
+    tandem_gpu_manifolds* manifolds, const tandem_gpu_instances* instances, const tandem_gpu_pairs* pairs,
+    const tandem_gpu_contact_query* query, const tandem_gpu_manifold_options* options, tandem_stream stream);
+/// Behind a query that has ended and is complete.
+TANDEM_API tandem_status tandem_gpu_manifolds_find(
+    tandem_gpu_manifolds* manifolds, const tandem_gpu_instances* instances, const tandem_gpu_pairs* pairs,
+    const tandem_gpu_contact_query* query, const tandem_gpu_manifold_options* options, tandem_stream stream);
+TANDEM_API const tandem_manifold* tandem_gpu_manifolds_manifolds(const tandem_gpu_manifolds* manifolds);
+TANDEM_API const tandem_manifold_point* tandem_gpu_manifolds_points(const tandem_gpu_manifolds* manifolds);
+TANDEM_API const tandem_gpu_manifold_report* tandem_gpu_manifolds_device_report(
+    const tandem_gpu_manifolds* manifolds);
+TANDEM_API tandem_status tandem_gpu_manifolds_get_report(const tandem_gpu_manifolds* manifolds,
+                                                         tandem_gpu_manifold_report* report);
+TANDEM_API size_t tandem_gpu_manifolds_bytes(const tandem_gpu_manifolds* manifolds);
+
+/// ---- Contained bodies
+
+/// Finds bodies within others, which no contact tells: the rows of tandem_contact_query_find_contained().
+typedef struct tandem_gpu_containment_query tandem_gpu_containment_query;
+
+typedef struct tandem_gpu_containment_capacity {
+  uint32_t pairs, contained;
+} tandem_gpu_containment_capacity;
+
+typedef struct tandem_gpu_containment_report {
+  uint32_t failed;
+  uint32_t complete;  ///< 0: something did not fit, or the query was not complete; then nothing is contained
+  tandem_gpu_containment_capacity needed;
+  uint32_t contained;
+} tandem_gpu_containment_report;
+
+TANDEM_API tandem_status tandem_gpu_containment_query_create(const tandem_allocator* allocator,
+                                                             tandem_gpu_containment_query** query);
+TANDEM_API void tandem_gpu_containment_query_destroy(tandem_gpu_containment_query* query);
+/// Result: TANDEM_NO_TOPOLOGY, where an asset was uploaded without.
+TANDEM_API tandem_status tandem_gpu_containment_query_set_assets(tandem_gpu_containment_query* query,
+                                                                 tandem_gpu_assets* assets,
+                                                                 tandem_stream stream);
+TANDEM_API tandem_status tandem_gpu_containment_query_reserve(
+    tandem_gpu_containment_query* query, const tandem_gpu_containment_capacity* capacity);
+/// As of manifolds; TANDEM_CONTACTS_MISSING also where the query's call was not in mode TANDEM_EXACT, of
+/// clearance, or found the first contacts only.
+TANDEM_API tandem_status tandem_gpu_containment_query_enqueue(tandem_gpu_containment_query* query,
+                                                              const tandem_gpu_instances* instances,
+                                                              const tandem_gpu_pairs* pairs,
+                                                              const tandem_gpu_contact_query* contacts,
+                                                              tandem_stream stream);
+TANDEM_API tandem_status tandem_gpu_containment_query_find(tandem_gpu_containment_query* query,
+                                                           const tandem_gpu_instances* instances,
+                                                           const tandem_gpu_pairs* pairs,
+                                                           const tandem_gpu_contact_query* contacts,
+                                                           tandem_stream stream);
+TANDEM_API const tandem_containment* tandem_gpu_containment_query_contained(
+    const tandem_gpu_containment_query* query);
+TANDEM_API const tandem_gpu_containment_report* tandem_gpu_containment_query_device_report(
+    const tandem_gpu_containment_query* query);
+TANDEM_API tandem_status tandem_gpu_containment_query_get_report(const tandem_gpu_containment_query* query,
+                                                                 tandem_gpu_containment_report* report);
+TANDEM_API size_t tandem_gpu_containment_query_bytes(const tandem_gpu_containment_query* query);
+
+/// ---- Distances
+
+/// Finds how near the bodies of given pairs are: as certified as tandem_distance_query, but not its bytes.
+typedef struct tandem_gpu_distance_query tandem_gpu_distance_query;
+
+typedef struct tandem_gpu_distance_options {
+  uint32_t struct_size;
+  uint32_t limit_reach;  ///< 1: pairs surely farther apart than `reach` have no nearest points
+  double reach;
+  double absolute_tolerance;  ///< upper - lower <= max(absolute, relative * upper)
+  double relative_tolerance;  ///< 0: 1e-6; at the finest 2^-48
+  /// Or null: of each pair what it was a step ago, in GPU memory; the query's own distances will do.
+  const tandem_distance* former;
+} tandem_gpu_distance_options;
+
+typedef struct tandem_gpu_distance_capacity {
+  uint32_t pairs;
+  uint32_t block_pairs;     ///< of one round of the walk
+  uint32_t triangle_pairs;  ///< that boxes and the direction of the nearest leave
+  uint32_t settled;         ///< of these: bounded by float64
+  uint32_t words;           ///< of a coordinate in exact arithmetic; 0: 8
+} tandem_gpu_distance_capacity;
+
+typedef struct tandem_gpu_distance_counters {
+  uint64_t object_pairs, block_pairs;
+  uint64_t by_float32, by_float64;  ///< triangle pairs
+  uint64_t touching;                ///< object pairs at distance 0
+} tandem_gpu_distance_counters;
+
+typedef struct tandem_gpu_distance_report {
+  uint32_t failed;
+  uint32_t complete;  ///< 0: something did not fit; then distances mean nothing
+  uint64_t where;     ///< the instance or pair to blame
+  tandem_gpu_distance_capacity needed;
+  uint64_t world_pairs;
+  uint32_t rounds;  ///< of the walk
+  tandem_gpu_distance_counters counters;
+} tandem_gpu_distance_report;
+
+TANDEM_API tandem_status tandem_gpu_distance_query_create(const tandem_allocator* allocator,
+                                                          tandem_gpu_distance_query** query);
+TANDEM_API void tandem_gpu_distance_query_destroy(tandem_gpu_distance_query* query);
+/// Result: TANDEM_NO_AXIS_ALIGNED_BLOCKS, where an asset was not uploaded with TANDEM_CONTENTS_ALL.
+TANDEM_API tandem_status tandem_gpu_distance_query_set_assets(tandem_gpu_distance_query* query,
+                                                              tandem_gpu_assets* assets,
+                                                              tandem_stream stream);
+TANDEM_API tandem_status tandem_gpu_distance_query_reserve(tandem_gpu_distance_query* query,
+                                                           const tandem_gpu_distance_capacity* capacity);
+/// Result: TANDEM_OUT_OF_RANGE for a tolerance or reach that is negative or NaN.
+TANDEM_API tandem_status tandem_gpu_distance_query_enqueue(tandem_gpu_distance_query* query,
+                                                           const tandem_gpu_instances* instances,
+                                                           const tandem_gpu_pairs* pairs,
+                                                           const tandem_gpu_distance_options* options,
+                                                           tandem_stream stream);
+TANDEM_API tandem_status tandem_gpu_distance_query_find(tandem_gpu_distance_query* query,
+                                                        const tandem_gpu_instances* instances,
+                                                        const tandem_gpu_pairs* pairs,
+                                                        const tandem_gpu_distance_options* options,
+                                                        tandem_stream stream);
+/// One for each pair.
+TANDEM_API const tandem_distance* tandem_gpu_distance_query_distances(const tandem_gpu_distance_query* query);
+TANDEM_API const tandem_gpu_distance_report* tandem_gpu_distance_query_device_report(
+    const tandem_gpu_distance_query* query);
+TANDEM_API tandem_status tandem_gpu_distance_query_get_report(const tandem_gpu_distance_query* query,
+                                                              tandem_gpu_distance_report* report);
+TANDEM_API size_t tandem_gpu_distance_query_bytes(const tandem_gpu_distance_query* query);
+
+/// ---- Times of impact
+
+/// Finds until when moving bodies surely do not meet: the guarantee of tandem_impact_query, but not its
+/// bytes.
+typedef struct tandem_gpu_impact_query tandem_gpu_impact_query;
+
+typedef struct tandem_gpu_impact_options {
+  uint32_t struct_size;
+  uint32_t sorted;                       ///< 1: the pairs that it finds ascend; reserve() has to know too
+  double tolerance;                      ///< as of tandem_impact_options
+  const tandem_gpu_pair_filter* filter;  ///< or null; where the query finds the pairs
+  uint32_t most_blocks;                  ///< as of tandem_gpu_query_options
+  uint32_t reserved;
+} tandem_gpu_impact_options;
+
+typedef struct tandem_gpu_impact_capacity {
+  uint32_t instances, pairs;
+  uint64_t contacts;   ///< at the start
+  uint64_t undecided;  ///< as of tandem_gpu_query_capacity
+  uint32_t parts;      ///< of the step, of all pairs: half radians of turn
+  uint32_t block_pairs, triangle_pairs;
+  uint32_t reserved;
+} tandem_gpu_impact_capacity;
+
+typedef struct tandem_gpu_impact_counters {
+  uint64_t object_pairs, at_start, found;
+  uint64_t walks, block_pairs, triangle_pairs;
+  uint64_t advanced, steps, most_steps, unconverged;
+} tandem_gpu_impact_counters;
+
+typedef struct tandem_gpu_impact_report {
+  uint32_t failed;
+  uint32_t complete;  ///< 0: something did not fit; then there are no impacts
+  uint64_t where;     ///< the instance or pair to blame
+  tandem_gpu_impact_capacity needed;
+  uint32_t impacts;  ///< one for each object pair
+  uint32_t rounds;
+  tandem_gpu_impact_counters counters;
+} tandem_gpu_impact_report;
+
+TANDEM_API tandem_status tandem_gpu_impact_query_create(const tandem_allocator* allocator,
+                                                        tandem_gpu_impact_query** query);
+TANDEM_API void tandem_gpu_impact_query_destroy(tandem_gpu_impact_query* query);
+/// Assets are uploaded with TANDEM_CONTENTS_ALL.
+TANDEM_API tandem_status tandem_gpu_impact_query_set_assets(tandem_gpu_impact_query* query,
+                                                            tandem_gpu_assets* assets, tandem_stream stream);
+TANDEM_API tandem_status tandem_gpu_impact_query_reserve(tandem_gpu_impact_query* query,
+                                                         const tandem_gpu_impact_capacity* capacity,
+                                                         const tandem_gpu_impact_options* options);
+/// Of the pairs whose boxes, swept by the motions of a step of `duration`, meet; or of given pairs. motion:
+/// of each instance, in GPU memory. pairs: or null. Result: TANDEM_OUT_OF_RANGE of the duration and the
+/// tolerance, or for more instances than reserved; as of tandem_gpu_broad_phase_enqueue().
+TANDEM_API tandem_status tandem_gpu_impact_query_enqueue(tandem_gpu_impact_query* query,
+                                                         const tandem_gpu_instances* instances,
+                                                         const tandem_motion* motion, double duration,
+                                                         const tandem_gpu_pairs* pairs,
+                                                         const tandem_gpu_impact_options* options,
+                                                         tandem_stream stream);
+TANDEM_API tandem_status tandem_gpu_impact_query_find(tandem_gpu_impact_query* query,
+                                                      const tandem_gpu_instances* instances,
+                                                      const tandem_motion* motion, double duration,
+                                                      const tandem_gpu_pairs* pairs,
+                                                      const tandem_gpu_impact_options* options,
+                                                      tandem_stream stream);
+/// Those that it found.
+TANDEM_API tandem_gpu_pairs tandem_gpu_impact_query_pairs(const tandem_gpu_impact_query* query);
+/// One for each pair, as many as the report says.
+TANDEM_API const tandem_impact* tandem_gpu_impact_query_impacts(const tandem_gpu_impact_query* query);
+TANDEM_API const tandem_gpu_impact_report* tandem_gpu_impact_query_device_report(
+    const tandem_gpu_impact_query* query);
+TANDEM_API tandem_status tandem_gpu_impact_query_get_report(const tandem_gpu_impact_query* query,
+                                                            tandem_gpu_impact_report* report);
+TANDEM_API size_t tandem_gpu_impact_query_bytes(const tandem_gpu_impact_query* query);
+
+/// ---- Levels of detail
+
+/// Comes to the verdicts of tandem_tolerance_query, at the same levels, on given pairs.
+typedef struct tandem_gpu_tolerance_query tandem_gpu_tolerance_query;
+
+typedef struct tandem_gpu_tolerance_capacity {
+  uint32_t instances, pairs;
+  uint64_t undecided;
+} tandem_gpu_tolerance_capacity;
+
+typedef struct tandem_gpu_tolerance_report {
+  uint32_t failed;
+  uint32_t complete;  ///< 0: something did not fit; then verdicts mean nothing
+  uint64_t where;     ///< the instance or pair to blame
+  tandem_gpu_tolerance_capacity needed;
+  uint64_t world_pairs;
+  uint64_t apart, touching, within_tolerance;  ///< object pairs
+  tandem_gpu_query_counters work;
+} tandem_gpu_tolerance_report;
+
+TANDEM_API tandem_status tandem_gpu_tolerance_query_create(const tandem_allocator* allocator,
+                                                           tandem_gpu_tolerance_query** query);
+TANDEM_API void tandem_gpu_tolerance_query_destroy(tandem_gpu_tolerance_query* query);
+/// Result: TANDEM_NO_FINEST_LEVEL where an asset does not show the file's level 0; TANDEM_NO_ORIENTED_BLOCKS.
+TANDEM_API tandem_status tandem_gpu_tolerance_query_set_assets(tandem_gpu_tolerance_query* query,
+                                                               tandem_gpu_assets* assets,
+                                                               tandem_stream stream);
+TANDEM_API tandem_status tandem_gpu_tolerance_query_reserve(tandem_gpu_tolerance_query* query,
+                                                            const tandem_gpu_tolerance_capacity* capacity);
+/// tolerance: what need not be told apart from touching. Result: TANDEM_OUT_OF_RANGE where it is none, or for
+/// more instances than reserved.
+TANDEM_API tandem_status tandem_gpu_tolerance_query_enqueue(tandem_gpu_tolerance_query* query,
+                                                            const tandem_gpu_instances* instances,
+                                                            const tandem_gpu_pairs* pairs, double tolerance,
+                                                            tandem_stream stream);
+TANDEM_API tandem_status tandem_gpu_tolerance_query_find(tandem_gpu_tolerance_query* query,
+                                                         const tandem_gpu_instances* instances,
+                                                         const tandem_gpu_pairs* pairs, double tolerance,
+                                                         tandem_stream stream);
+/// One for each pair.
+TANDEM_API const tandem_verdict* tandem_gpu_tolerance_query_verdicts(const tandem_gpu_tolerance_query* query);
+TANDEM_API const tandem_gpu_tolerance_report* tandem_gpu_tolerance_query_device_report(
+    const tandem_gpu_tolerance_query* query);
+TANDEM_API tandem_status tandem_gpu_tolerance_query_get_report(const tandem_gpu_tolerance_query* query,
+                                                               tandem_gpu_tolerance_report* report);
+TANDEM_API size_t tandem_gpu_tolerance_query_bytes(const tandem_gpu_tolerance_query* query);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

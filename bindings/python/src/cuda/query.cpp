@@ -1,0 +1,287 @@
+#include "query.h"
+
+#include <nanobind/stl/optional.h>
+
+#include <limits>
+
+namespace tandem::python {
+namespace {
+
+// Runs a call that waits for the GPU while other Python threads run. where: what the GPU's report says of it.
+template <typename Call>
+tandem_status call_freely(const Call& call) {
+  const nb::gil_scoped_release release;
+  return call();
+}
+
+template <typename Call, typename Where>
+void run(const Call& call, const Where& where) {
+  const tandem_status status = call_freely(call);
+  if (status != TANDEM_OK) check(status, where());
+}
+
+template <typename Report, typename Of>
+Report report_of(tandem_status (*get)(const Of*, Report*), const Of* query) {
+  Report report = {};
+  static_cast<void>(get(query, &report));
+  return report;
+}
+
+nb::tuple counters_of(const tandem_gpu_query_counters& counters) {
+  return nb::make_tuple(counters.object_pairs, counters.block_pairs, counters.candidates,
+                        counters.decided_by_float32, counters.decided_by_float64, counters.decided_exactly,
+                        counters.contacts);
+}
+
+const Instances& bodies_of(const nb::object& instances) {
+  return nb::cast<const Instances&>(instances);
+}
+
+}  // namespace
+
+Query::Turn::Turn(Query& query) : query_(query) {
+  if (!query.busy_.exchange(true)) return;
+  PyErr_SetString(PyExc_RuntimeError, "the query is at work for another thread");
+  throw nb::python_error();
+}
+
+FoundPairs Query::find_pairs(const Instances& bodies, bool sorted, double within, const GpuFilter* filter,
+                             cudaStream_t stream) {
+  const auto broad_phase = broad_phases_.take(device(), [&](tandem_gpu_broad_phase* made) {
+    return tandem_gpu_broad_phase_set_assets(made, assets_.get());
+  });
+  auto options = sized<tandem_gpu_broad_phase_options>();
+  options.sorted = sorted;
+  options.within = within;
+  options.filter = GpuFilter::of(filter, bodies.count());
+  tandem_gpu_broad_phase* const query = broad_phase.get();
+  run([&] { return tandem_gpu_broad_phase_find(query, &bodies.get(), &options, stream); },
+      [&] { return report_of(tandem_gpu_broad_phase_get_report, query).where; });
+  return {tandem_gpu_broad_phase_pairs(query), broad_phase,
+          report_of(tandem_gpu_broad_phase_get_report, query).count};
+}
+
+FoundPairs Query::pairs_of(nb::handle given, const Instances& bodies, bool sorted, double within,
+                           const GpuFilter* filter, cudaStream_t stream) {
+  if (given.is_none()) return find_pairs(bodies, sorted, within, filter, stream);
+  const Pairs& pairs = nb::cast<const Pairs&>(given);
+  return {pairs.get(), nullptr, pairs.count()};
+}
+
+Rows Query::rows_of(const FoundPairs& pairs, cudaStream_t stream) const {
+  return {memory_of(pairs.owner, stream), pairs.pairs.pairs, pairs.count, sizeof(tandem_object_pair)};
+}
+
+nb::tuple Query::contacts(nb::object instances, nb::object given, std::uint32_t mode, bool first_contact_only,
+                          double within, bool add_error_bounds, bool sorted, bool grouped,
+                          const GpuFilter* filter, std::uintptr_t stream_number) {
+  const Turn turn(*this);
+  const OnDevice current(device());
+  const cudaStream_t stream = stream_of(stream_number);
+  const Instances& bodies = bodies_of(instances);
+  last_.reset();
+  const FoundPairs pairs = pairs_of(given, bodies, sorted, within, filter, stream);
+  const auto contacts = contact_queries_.take(device(), [&](tandem_gpu_contact_query* made) {
+    return tandem_gpu_contact_query_set_assets(made, assets_.get(), stream);
+  });
+  auto options = sized<tandem_gpu_query_options>();
+  options.mode = mode;
+  options.first_contact_only = first_contact_only;
+  options.sorted = sorted;
+  options.grouped = grouped;
+  options.add_error_bounds = add_error_bounds;
+  options.within = within;
+  tandem_gpu_contact_query* const query = contacts.get();
+  run([&] { return tandem_gpu_contact_query_find(query, &bodies.get(), &pairs.pairs, &options, stream); },
+      [&] { return report_of(tandem_gpu_contact_query_get_report, query).where; });
+  const auto report = report_of(tandem_gpu_contact_query_get_report, query);
+  if (grouped) last_ = Last{instances, given, pairs, contacts, stream};
+  return nb::make_tuple(given.is_none() ? nb::cast(rows_of(pairs, stream)) : nb::none(),
+                        Rows(memory_of(contacts, stream), tandem_gpu_contact_query_contacts(query),
+                             report.contacts, sizeof(tandem_contact)),
+                        counters_of(report.counters));
+}
+
+nb::object Query::pairs(nb::object instances, bool sorted, double within, const GpuFilter* filter,
+                        std::uintptr_t stream_number) {
+  const Turn turn(*this);
+  const OnDevice current(device());
+  last_.reset();
+  const cudaStream_t stream = stream_of(stream_number);
+  return nb::cast(rows_of(find_pairs(bodies_of(instances), sorted, within, filter, stream), stream));
+}
+
+const Query::Last& Query::last() const {
+  if (!last_.has_value()) check_whole(TANDEM_CONTACTS_MISSING);
+  return *last_;
+}
+
+// A copy of rows that stay with the query, in memory that nobody has any more, or in new one.
+Rows Query::copy(const void* rows, std::size_t count, std::size_t row_bytes, cudaStream_t stream) {
+  const std::size_t bytes = count * row_bytes;
+  std::shared_ptr<Buffer> to;
+  for (auto& made : copies_) {
+    if (made.use_count() != 1) continue;
+    if (made->bytes() < bytes) made = std::make_shared<Buffer>(bytes + bytes / 2);
+    to = made;
+    break;
+  }
+  if (to == nullptr) copies_.push_back(to = std::make_shared<Buffer>(bytes + bytes / 2));
+  check_cuda(cudaMemcpyAsync(to->data(), rows, bytes, cudaMemcpyDeviceToDevice, stream));
+  Memory memory = memory_of(to, stream);
+  memory.ready = false;
+  return {std::move(memory), to->data(), count, row_bytes};
+}
+
+nb::tuple Query::manifolds(std::uint32_t most_points, bool match_previous) {
+  const Turn turn(*this);
+  const OnDevice current(device());
+  const Last& of = last();
+  if (manifolds_ == nullptr)
+    manifolds_ = ManifoldMakers::make(device(), [&](tandem_gpu_manifolds* made) {
+      return tandem_gpu_manifolds_set_assets(made, assets_.get(), of.stream);
+    });
+  auto options = sized<tandem_gpu_manifold_options>();
+  options.most_points = most_points;
+  options.ignore_previous = !match_previous;
+  const Instances& bodies = bodies_of(of.instances);
+  tandem_gpu_manifolds* const made = manifolds_.get();
+  check_whole(call_freely([&] {
+    return tandem_gpu_manifolds_find(made, &bodies.get(), &of.pairs.pairs, of.contacts.get(), &options,
+                                     of.stream);
+  }));
+  const auto report = report_of(tandem_gpu_manifolds_get_report, made);
+  // The query keeps its own, to find points again in the next step.
+  return nb::make_tuple(
+      of.given.is_none() ? nb::cast(rows_of(of.pairs, of.stream)) : nb::none(),
+      copy(tandem_gpu_manifolds_manifolds(made), report.manifolds, sizeof(tandem_manifold), of.stream),
+      copy(tandem_gpu_manifolds_points(made), report.points, sizeof(tandem_manifold_point), of.stream));
+}
+
+nb::tuple Query::contained() {
+  const Turn turn(*this);
+  const OnDevice current(device());
+  const Last& of = last();
+  if (contained_ == nullptr)
+    contained_ = ContainmentQueries::make(device(), [&](tandem_gpu_containment_query* made) {
+      return tandem_gpu_containment_query_set_assets(made, assets_.get(), of.stream);
+    });
+  const Instances& bodies = bodies_of(of.instances);
+  tandem_gpu_containment_query* const query = contained_.get();
+  check_whole(call_freely([&] {
+    return tandem_gpu_containment_query_find(query, &bodies.get(), &of.pairs.pairs, of.contacts.get(),
+                                             of.stream);
+  }));
+  const auto report = report_of(tandem_gpu_containment_query_get_report, query);
+  return nb::make_tuple(of.given.is_none() ? nb::cast(rows_of(of.pairs, of.stream)) : nb::none(),
+                        copy(tandem_gpu_containment_query_contained(query), report.contained,
+                             sizeof(tandem_containment), of.stream));
+}
+
+nb::tuple Query::distances(nb::object instances, nb::object given, std::optional<double> reach,
+                           double absolute, double relative, const GpuFilter* filter,
+                           std::uintptr_t stream_number) {
+  const Turn turn(*this);
+  const OnDevice current(device());
+  const cudaStream_t stream = stream_of(stream_number);
+  const Instances& bodies = bodies_of(instances);
+  const double within = reach.value_or(std::numeric_limits<double>::infinity());
+  const FoundPairs pairs = pairs_of(given, bodies, true, within, filter, stream);
+  const auto distances = distance_queries_.take(device(), [&](tandem_gpu_distance_query* made) {
+    return tandem_gpu_distance_query_set_assets(made, assets_.get(), stream);
+  });
+  auto options = sized<tandem_gpu_distance_options>();
+  options.limit_reach = reach.has_value();
+  options.reach = reach.value_or(0);
+  options.absolute_tolerance = absolute;
+  options.relative_tolerance = relative;
+  tandem_gpu_distance_query* const query = distances.get();
+  run([&] { return tandem_gpu_distance_query_find(query, &bodies.get(), &pairs.pairs, &options, stream); },
+      [&] { return report_of(tandem_gpu_distance_query_get_report, query).where; });
+  return nb::make_tuple(given.is_none() ? nb::cast(rows_of(pairs, stream)) : nb::none(),
+                        Rows(memory_of(distances, stream), tandem_gpu_distance_query_distances(query),
+                             pairs.count, sizeof(tandem_distance)));
+}
+
+nb::tuple Query::impacts(nb::object instances, nb::object motion, double duration, nb::object given,
+                         double tolerance, bool sorted, const GpuFilter* filter,
+                         std::uintptr_t stream_number) {
+  const Turn turn(*this);
+  const OnDevice current(device());
+  const cudaStream_t stream = stream_of(stream_number);
+  const Instances& bodies = bodies_of(instances);
+  const GivenArray moves(motion, "motion", stream, device());
+  moves.require_type({kF64}, "float64");
+  const auto count = static_cast<std::int64_t>(bodies.count());
+  const std::vector<std::int64_t>& shape = moves.shape();
+  const bool flat = shape == std::vector<std::int64_t>{count, 9};
+  if (!flat && shape != std::vector<std::int64_t>{count, 3, 3})
+    moves.wrong_shape(
+        ("(" + std::to_string(count) + ", 9) or (" + std::to_string(count) + ", 3, 3)").c_str());
+  const auto impacts = impact_queries_.take(device(), [&](tandem_gpu_impact_query* made) {
+    return tandem_gpu_impact_query_set_assets(made, assets_.get(), stream);
+  });
+  auto options = sized<tandem_gpu_impact_options>();
+  options.sorted = sorted;
+  options.tolerance = tolerance;
+  options.filter = GpuFilter::of(filter, bodies.count());
+  const tandem_gpu_pairs* const of = given.is_none() ? nullptr : &nb::cast<const Pairs&>(given).get();
+  tandem_gpu_impact_query* const query = impacts.get();
+  run(
+      [&] {
+        return tandem_gpu_impact_query_find(query, &bodies.get(),
+                                            static_cast<const tandem_motion*>(moves.data()), duration, of,
+                                            &options, stream);
+      },
+      [&] { return report_of(tandem_gpu_impact_query_get_report, query).where; });
+  const std::size_t found = report_of(tandem_gpu_impact_query_get_report, query).impacts;
+  const FoundPairs pairs = {tandem_gpu_impact_query_pairs(query), impacts, found};
+  return nb::make_tuple(
+      of == nullptr ? nb::cast(rows_of(pairs, stream)) : nb::none(),
+      Rows(memory_of(impacts, stream), tandem_gpu_impact_query_impacts(query), found, sizeof(tandem_impact)));
+}
+
+nb::tuple Query::verdicts(nb::object instances, double tolerance, nb::object given, const GpuFilter* filter,
+                          std::uintptr_t stream_number) {
+  const Turn turn(*this);
+  const OnDevice current(device());
+  const cudaStream_t stream = stream_of(stream_number);
+  const Instances& bodies = bodies_of(instances);
+  const FoundPairs pairs = pairs_of(given, bodies, true, 0, filter, stream);
+  const auto verdicts = tolerance_queries_.take(device(), [&](tandem_gpu_tolerance_query* made) {
+    return tandem_gpu_tolerance_query_set_assets(made, assets_.get(), stream);
+  });
+  tandem_gpu_tolerance_query* const query = verdicts.get();
+  run([&] { return tandem_gpu_tolerance_query_find(query, &bodies.get(), &pairs.pairs, tolerance, stream); },
+      [&] { return report_of(tandem_gpu_tolerance_query_get_report, query).where; });
+  return nb::make_tuple(given.is_none() ? nb::cast(rows_of(pairs, stream)) : nb::none(),
+                        Rows(memory_of(verdicts, stream), tandem_gpu_tolerance_query_verdicts(query),
+                             pairs.count, sizeof(tandem_verdict)));
+}
+
+void add_gpu_queries(nb::module_& module) {
+  nb::class_<Query>(module, "Query")
+      .def(nb::init<nb::object>())
+      .def("contacts", &Query::contacts, nb::arg(), nb::arg().none(), nb::arg(), nb::arg(), nb::arg(),
+           nb::arg(), nb::arg(), nb::arg(), nb::arg().none(), nb::arg())
+      .def("pairs", &Query::pairs, nb::arg(), nb::arg(), nb::arg(), nb::arg().none(), nb::arg())
+      .def("manifolds", &Query::manifolds)
+      .def("contained", &Query::contained)
+      .def("distances", &Query::distances, nb::arg(), nb::arg().none(), nb::arg().none(), nb::arg(),
+           nb::arg(), nb::arg().none(), nb::arg())
+      .def("impacts", &Query::impacts, nb::arg(), nb::arg(), nb::arg(), nb::arg().none(), nb::arg(),
+           nb::arg(), nb::arg().none(), nb::arg())
+      .def("verdicts", &Query::verdicts, nb::arg(), nb::arg(), nb::arg().none(), nb::arg().none(), nb::arg());
+  nb::class_<Step>(module, "Step")
+      .def(nb::init<nb::object, std::uint32_t, std::uint32_t, std::uint64_t, std::uint64_t, std::uint32_t,
+                    bool, double, bool, bool, bool>())
+      .def("enqueue", &Step::enqueue, nb::arg(), nb::arg().none(), nb::arg().none(), nb::arg())
+      .def("pairs", &Step::pairs)
+      .def("pair_count", &Step::pair_count)
+      .def("contacts", &Step::contacts)
+      .def("report", &Step::report)
+      .def("first_contact", &Step::first_contact)
+      .def("wait", &Step::wait);
+}
+
+}  // namespace tandem::python

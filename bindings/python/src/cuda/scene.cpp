@@ -1,0 +1,110 @@
+#include "scene.h"
+
+namespace tandem::python {
+namespace {
+
+std::uint32_t count_of(std::int64_t length, const GivenArray& array) {
+  if (length >= std::int64_t{TANDEM_NO_INDEX}) array.wrong_shape("fewer than 2^32 - 1 rows");
+  return static_cast<std::uint32_t>(length);
+}
+
+}  // namespace
+
+Assets::Assets(nb::list assets, int device, std::uint32_t contents, std::uintptr_t stream) : device_(device) {
+  std::vector<tandem_asset*> list;
+  for (nb::handle asset : assets) list.push_back(nb::cast<const Asset&>(asset).get());
+  const tandem_upload_options options = {sizeof options, contents};
+  std::uint64_t where = 0;
+  const OnDevice current(device);
+  const tandem_status status = [&] {
+    const nb::gil_scoped_release release;
+    return tandem_gpu_assets_upload(list.data(), list.size(), &options, stream_of(stream), nullptr, &assets_,
+                                    &where);
+  }();
+  check(status, where);
+}
+
+Instances::Instances(const Assets& assets, nb::handle asset, nb::handle pose, std::uintptr_t stream)
+    : pose_(pose, "pose", stream_of(stream), assets.device()), device_(assets.device()) {
+  pose_.require_type({kF64}, "float64");
+  const std::vector<std::int64_t>& shape = pose_.shape();
+  const bool rows = shape.size() == 2 && shape[1] == 12;
+  if (!rows && !(shape.size() == 3 && shape[1] == 4 && shape[2] == 3))
+    pose_.wrong_shape("(n, 12) or (n, 4, 3)");
+  instances_.pose = static_cast<const tandem_pose*>(pose_.data());
+  instances_.count = count_of(shape[0], pose_);
+  if (asset.is_none()) {
+    const OnDevice current(device_);
+    zeros_ = std::make_unique<Buffer>(instances_.count * sizeof(std::uint32_t));
+    check_cuda(cudaMemsetAsync(zeros_->data(), 0, zeros_->bytes(), stream_of(stream)));
+    instances_.asset = static_cast<const std::uint32_t*>(zeros_->data());
+    return;
+  }
+  asset_ = GivenArray(asset, "asset", stream_of(stream), device_);
+  asset_.require_type({kU32, kI32}, "uint32 or int32");
+  if (asset_.shape().size() != 1 || asset_.shape()[0] != shape[0])
+    asset_.wrong_shape(("(" + std::to_string(shape[0]) + ",)").c_str());
+  instances_.asset = static_cast<const std::uint32_t*>(asset_.data());
+}
+
+Pairs::Pairs(nb::handle pairs, std::uintptr_t stream, int device)
+    : given_(pairs, "pairs", stream_of(stream), device) {
+  given_.require_type({kU32, kI32}, "uint32 or int32");
+  const std::vector<std::int64_t>& shape = given_.shape();
+  if (shape.size() != 2 || shape[1] != 2) given_.wrong_shape("(m, 2)");
+  pairs_.pairs = static_cast<const tandem_object_pair*>(given_.data());
+  pairs_.capacity = count_of(shape[0], given_);
+}
+
+GpuFilter::GpuFilter(nb::handle motion, nb::handle group, nb::handle mask, nb::handle excluded,
+                     std::uintptr_t stream, int device) {
+  filter_.struct_size = sizeof filter_;
+  const auto take = [&](nb::handle given, const char* name, GivenArray& array,
+                        std::initializer_list<dlpack::DataType> types, const char* wanted) {
+    if (given.is_none()) return static_cast<const void*>(nullptr);
+    array = GivenArray(given, name, stream_of(stream), device);
+    array.require_type(types, wanted);
+    if (array.shape().size() != 1 || (count_ >= 0 && array.shape()[0] != count_))
+      array.wrong_shape(count_ >= 0 ? ("(" + std::to_string(count_) + ",)").c_str() : "(n,)");
+    count_ = array.shape()[0];
+    return array.data();
+  };
+  filter_.motion = static_cast<const std::uint8_t*>(take(motion, "motion", motion_, {kU8}, "uint8"));
+  filter_.group =
+      static_cast<const std::uint32_t*>(take(group, "group", group_, {kU32, kI32}, "uint32 or int32"));
+  filter_.mask =
+      static_cast<const std::uint32_t*>(take(mask, "mask", mask_, {kU32, kI32}, "uint32 or int32"));
+  if (excluded.is_none()) return;
+  const auto pairs = copy_rows<tandem_object_pair>(excluded);
+  const OnDevice current(device);
+  check(tandem_gpu_excluded_pairs_create(pairs.data(), pairs.size(), stream_of(stream), nullptr, &excluded_));
+  filter_.excluded = excluded_;
+}
+
+const tandem_gpu_pair_filter* GpuFilter::of(const GpuFilter* filter, std::size_t instances) {
+  if (filter == nullptr) return nullptr;
+  if (filter->count_ >= 0 && static_cast<std::size_t>(filter->count_) != instances)
+    throw nb::value_error(("filter is of " + std::to_string(filter->count_) + " instances where there are " +
+                           std::to_string(instances))
+                              .c_str());
+  return &filter->filter_;
+}
+
+void add_scenes(nb::module_& module) {
+  nb::class_<Assets>(module, "Assets")
+      .def(nb::init<nb::list, int, std::uint32_t, std::uintptr_t>())
+      .def_prop_ro("device", &Assets::device)
+      .def_prop_ro("bytes", &Assets::bytes);
+  nb::class_<Instances>(module, "Instances")
+      .def(nb::init<const Assets&, nb::handle, nb::handle, std::uintptr_t>(), nb::arg(), nb::arg().none(),
+           nb::arg(), nb::arg())
+      .def("__len__", &Instances::count);
+  nb::class_<Pairs>(module, "Pairs")
+      .def(nb::init<nb::handle, std::uintptr_t, int>())
+      .def("__len__", &Pairs::count);
+  nb::class_<GpuFilter>(module, "Filter")
+      .def(nb::init<nb::handle, nb::handle, nb::handle, nb::handle, std::uintptr_t, int>(), nb::arg().none(),
+           nb::arg().none(), nb::arg().none(), nb::arg().none(), nb::arg(), nb::arg());
+}
+
+}  // namespace tandem::python

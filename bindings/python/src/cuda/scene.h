@@ -1,0 +1,84 @@
+#pragma once
+#include "arrays.h"
+
+namespace tandem::python {
+
+/// Copies of assets in the memory of one GPU.
+class Assets {
+ public:
+  Assets(nb::list assets, int device, std::uint32_t contents, std::uintptr_t stream);
+  ~Assets() { tandem_gpu_assets_release(assets_); }
+  Assets(const Assets&) = delete;
+  Assets& operator=(const Assets&) = delete;
+  tandem_gpu_assets* get() const { return assets_; }
+  int device() const { return device_; }
+  std::size_t bytes() const { return tandem_gpu_assets_bytes(assets_); }
+
+ private:
+  tandem_gpu_assets* assets_ = nullptr;
+  int device_;
+};
+
+/// GPU memory of the package's own.
+class Buffer {
+ public:
+  explicit Buffer(std::size_t bytes) : bytes_(bytes) {
+    check_cuda(cudaMalloc(&data_, bytes == 0 ? 1 : bytes));
+  }
+  ~Buffer() { static_cast<void>(cudaFree(data_)); }
+  Buffer(const Buffer&) = delete;
+  Buffer& operator=(const Buffer&) = delete;
+  void* data() const { return data_; }
+  std::size_t bytes() const { return bytes_; }
+
+ private:
+  void* data_ = nullptr;
+  std::size_t bytes_;
+};
+
+/// Bodies: somebody's arrays of assets and poses, which are read where they are in every call.
+class Instances {
+ public:
+  Instances(const Assets& assets, nb::handle asset, nb::handle pose, std::uintptr_t stream);
+  const tandem_gpu_instances& get() const { return instances_; }
+  std::size_t count() const { return instances_.count; }
+  int device() const { return device_; }
+
+ private:
+  GivenArray asset_, pose_;
+  std::unique_ptr<Buffer> zeros_;
+  tandem_gpu_instances instances_ = {};
+  int device_;
+};
+
+/// Object pairs: somebody's array, or rows that a query found.
+class Pairs {
+ public:
+  Pairs(nb::handle pairs, std::uintptr_t stream, int device);
+  const tandem_gpu_pairs& get() const { return pairs_; }
+  std::size_t count() const { return pairs_.capacity; }
+
+ private:
+  GivenArray given_;
+  tandem_gpu_pairs pairs_ = {};
+};
+
+/// Which pairs a query looks at; its arrays are read where they are.
+class GpuFilter {
+ public:
+  GpuFilter(nb::handle motion, nb::handle group, nb::handle mask, nb::handle excluded, std::uintptr_t stream,
+            int device);
+  ~GpuFilter() { tandem_gpu_excluded_pairs_destroy(excluded_); }
+  GpuFilter(const GpuFilter&) = delete;
+  GpuFilter& operator=(const GpuFilter&) = delete;
+  /// Null for none; throws ValueError where it is of another number of instances.
+  static const tandem_gpu_pair_filter* of(const GpuFilter* filter, std::size_t instances);
+
+ private:
+  GivenArray motion_, group_, mask_;
+  tandem_gpu_excluded_pairs* excluded_ = nullptr;
+  tandem_gpu_pair_filter filter_ = {};
+  std::int64_t count_ = -1;  // any
+};
+
+}  // namespace tandem::python

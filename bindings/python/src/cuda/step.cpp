@@ -1,0 +1,99 @@
+#include "query.h"
+
+namespace tandem::python {
+
+Step::Step(nb::object assets, std::uint32_t instances, std::uint32_t pairs, std::uint64_t contacts,
+           std::uint64_t undecided, std::uint32_t mode, bool first_contact_only, double within,
+           bool add_error_bounds, bool sorted, bool grouped)
+    : assets_object_(assets),
+      assets_(nb::cast<const Assets&>(assets)),
+      options_(sized<tandem_gpu_query_options>()),
+      near_(sized<tandem_gpu_broad_phase_options>()),
+      contact_room_(contacts) {
+  options_.mode = mode;
+  options_.first_contact_only = first_contact_only;
+  options_.within = near_.within = within;
+  options_.add_error_bounds = add_error_bounds;
+  options_.sorted = near_.sorted = sorted;
+  options_.grouped = grouped;
+  const OnDevice current(assets_.device());
+  broad_phase_ = BroadPhases::make(assets_.device(), [&](tandem_gpu_broad_phase* made) {
+    return tandem_gpu_broad_phase_set_assets(made, assets_.get());
+  });
+  contacts_ = ContactQueries::make(assets_.device(), [&](tandem_gpu_contact_query* made) {
+    return tandem_gpu_contact_query_set_assets(made, assets_.get(), nullptr);
+  });
+  const tandem_gpu_broad_phase_capacity near_room = {instances, pairs};
+  const tandem_gpu_query_capacity room = {pairs, 0, contacts, undecided};
+  check_whole(tandem_gpu_broad_phase_reserve(broad_phase_.get(), &near_room, &near_));
+  check_whole(tandem_gpu_contact_query_reserve(contacts_.get(), &room, &options_));
+}
+
+void Step::enqueue(nb::object instances, nb::object pairs, nb::object filter, std::uintptr_t stream) {
+  const OnDevice current(assets_.device());
+  const Instances& bodies = nb::cast<const Instances&>(instances);
+  stream_ = stream_of(stream);
+  tandem_gpu_pairs of = {};
+  if (pairs.is_none()) {
+    near_.filter =
+        filter.is_none() ? nullptr : GpuFilter::of(&nb::cast<const GpuFilter&>(filter), bodies.count());
+    check_whole(tandem_gpu_broad_phase_enqueue(broad_phase_.get(), &bodies.get(), &near_, stream_));
+    of = tandem_gpu_broad_phase_pairs(broad_phase_.get());
+  } else {
+    of = nb::cast<const Pairs&>(pairs).get();
+  }
+  check_whole(tandem_gpu_contact_query_enqueue(contacts_.get(), &bodies.get(), &of, &options_, stream_));
+  instances_ = instances;
+  given_ = pairs;
+  filter_ = filter;
+}
+
+nb::object Step::pairs() const {
+  const tandem_gpu_pairs pairs = tandem_gpu_broad_phase_pairs(broad_phase_.get());
+  return nb::cast(Rows(memory_of(broad_phase_), pairs.pairs, pairs.capacity, sizeof(tandem_object_pair)));
+}
+
+nb::object Step::pair_count() const {
+  const tandem_gpu_pairs pairs = tandem_gpu_broad_phase_pairs(broad_phase_.get());
+  return nb::cast(Array(memory_of(broad_phase_), pairs.count, kU32, {1}, {1}));
+}
+
+Rows Step::contacts() const {
+  return {memory_of(contacts_), tandem_gpu_contact_query_contacts(contacts_.get()), contact_room_,
+          sizeof(tandem_contact)};
+}
+
+Rows Step::report() const {
+  return {memory_of(contacts_), tandem_gpu_contact_query_device_report(contacts_.get()), 1,
+          sizeof(tandem_gpu_query_report)};
+}
+
+Array Step::first_contact() const {
+  if (options_.grouped == 0) throw nb::value_error("contacts are not grouped");
+  const tandem_gpu_contact_groups groups = tandem_gpu_contact_query_groups(contacts_.get());
+  const auto pairs = std::int64_t{tandem_gpu_broad_phase_pairs(broad_phase_.get()).capacity};
+  return {memory_of(contacts_), groups.first_contact, kU32, {pairs + 1}, {1}};
+}
+
+nb::tuple Step::wait() const {
+  const OnDevice current(assets_.device());
+  const cudaError_t error = [&] {
+    const nb::gil_scoped_release release;
+    return cudaStreamSynchronize(stream_);
+  }();
+  check_cuda(error);
+  std::uint64_t pairs = 0;
+  if (given_.is_valid() && !given_.is_none()) {
+    pairs = nb::cast<const Pairs&>(given_).count();
+  } else {
+    tandem_gpu_broad_phase_report near;
+    check(tandem_gpu_broad_phase_get_report(broad_phase_.get(), &near), near.where);
+    pairs = near.found;
+  }
+  tandem_gpu_query_report report;
+  check(tandem_gpu_contact_query_get_report(contacts_.get(), &report), report.where);
+  return nb::make_tuple(report.complete != 0, pairs, report.contacts, report.needed.pairs,
+                        report.needed.contacts, report.needed.undecided);
+}
+
+}  // namespace tandem::python

@@ -1,0 +1,406 @@
+"""Queries on an NVIDIA GPU, of arrays that lie there: poses in and results out without a copy.
+
+    query = tandem.cuda.Query([cow])
+    found = query.contacts(pose=poses)                  # (n, 4, 3) float64 of PyTorch, CuPy, JAX, ...
+    faces = torch.from_dlpack(found.contacts["face_a"])  # the query's own memory
+
+Arrays are taken by DLPack or `__cuda_array_interface__`, and given by both. `stream` is where a call's work goes: a number, an object of PyTorch or CuPy, or None
+for the default stream.
+"""
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ._arrays import pairs_of
+from ._asset import Asset
+from ._errors import Error
+from ._query import Counters
+from ._rows import CONTACT, CONTAINMENT, DISTANCE, IMPACT, MANIFOLD, PAIR, POINT, VERDICT
+
+try:
+    from . import _cuda
+except ImportError as missing:
+    raise ImportError(f"tandem.cuda is not there: the package was built without CUDA, or CUDA's runtime is not found ({missing})") from missing
+
+__all__ = ["Array", "Contacts", "Contained", "Distances", "Filter", "Impacts", "Instances", "Manifolds", "Query", "Queued", "Rows", "TooLittleRoom", "Verdicts"]
+
+#: An array in GPU memory, with DLPack and `__cuda_array_interface__`, `shape`, `dtype` and `pointer`. It keeps the memory that it lies in.
+Array = _cuda.Array
+
+_MODES = {"exact": 0, "fast": 1, "boxes": 2}
+_CONTENTS = {"all": 0, "exact": 1, "manifolds": 2}
+_KINDS = {"u": 1, "f": 2}
+_REPORT = np.dtype([("failed", "<u4"), ("complete", "<u4"), ("where", "<u8"), ("needed_pairs", "<u4"), ("reserved", "<u4"), ("needed_contacts", "<u8"),
+                    ("needed_undecided", "<u8"), ("contacts", "<u8"), ("world_pairs", "<u8"), ("counters", "<u8", (7,))])
+
+
+def _columns(dtype: np.dtype[Any]) -> dict[str, tuple[int, int, int, int]]:
+    """Of each field what Rows.column() takes: offset, kind, bits and how many; 0: one."""
+    columns = {}
+    for name in dtype.names or ():
+        field, offset = dtype.fields[name][:2]  # type: ignore[index]
+        columns[name] = (offset, _KINDS[field.base.kind], 8 * field.base.itemsize, field.shape[0] if field.shape else 0)
+    return columns
+
+
+_FIELDS = {dtype: _columns(dtype) for dtype in (PAIR, CONTACT, MANIFOLD, POINT, CONTAINMENT, DISTANCE, IMPACT, VERDICT, _REPORT)}
+
+
+class Rows:
+    """Rows of a result in GPU memory, of one of the dtypes that the CPU's results have.
+
+    `rows["face_a"]` is a field of all of them, an Array in the same memory, (n,) or (n, 3), with a stride: PyTorch and CuPy take it as it is, JAX takes `words`
+    alone. As an array, Rows are their `words`. The memory stays as long as any of this, or what was made of it, is there.
+    """
+
+    __slots__ = ("_core", "dtype")
+
+    def __init__(self, core: _cuda.Rows, dtype: np.dtype[Any]):
+        self._core: _cuda.Rows = core
+        #: NumPy's, byte for byte.
+        self.dtype = dtype
+
+    def __len__(self) -> int:
+        return len(self._core)
+
+    def __getitem__(self, field: str) -> Array:
+        return self._core.column(*_FIELDS[self.dtype][field])
+
+    @property
+    def words(self) -> Array:
+        """All of it as whole numbers, contiguous, (n, k): uint32, or uint8 where a row is no multiple of 4 bytes."""
+        return self._core.words(8 if self.dtype.itemsize % 4 else 32)
+
+    def numpy(self) -> npt.NDArray[Any]:
+        """A copy in CPU memory, array of `dtype`; waits for the stream of the call that made the rows."""
+        return np.frombuffer(self._core.to_cpu(), self.dtype)
+
+    def __dlpack__(self, **arguments: Any) -> Any:
+        return self.words.__dlpack__(**arguments)
+
+    def __dlpack_device__(self) -> tuple[int, int]:
+        return self.words.__dlpack_device__()
+
+    @property
+    def __cuda_array_interface__(self) -> dict[str, Any]:
+        return self.words.__cuda_array_interface__
+
+    def __repr__(self) -> str:
+        return f"<tandem.cuda.Rows: {len(self)} of {', '.join(self.dtype.names or ())}>"
+
+
+class Contacts(NamedTuple):
+    """Object pairs, rows of PAIR, or what was given; triangles that meet, rows of CONTACT, in any order unless sorted or grouped; the work."""
+
+    pairs: Any
+    contacts: Rows
+    counters: Counters
+
+
+class Manifolds(NamedTuple):
+    """As the CPU's: rows of PAIR, MANIFOLD and POINT."""
+
+    pairs: Any
+    manifolds: Rows
+    points: Rows
+
+
+class Contained(NamedTuple):
+    """As the CPU's: rows of PAIR and CONTAINMENT."""
+
+    pairs: Any
+    contained: Rows
+
+
+class Distances(NamedTuple):
+    """Rows of PAIR and DISTANCE, one for each pair; as certified as the CPU's, but not its bytes."""
+
+    pairs: Any
+    distances: Rows
+
+
+class Impacts(NamedTuple):
+    """Rows of PAIR and IMPACT, one for each pair; with the guarantee of the CPU's, but not its bytes."""
+
+    pairs: Any
+    impacts: Rows
+
+
+class Verdicts(NamedTuple):
+    """As the CPU's: rows of PAIR and VERDICT."""
+
+    pairs: Any
+    verdicts: Rows
+
+
+class TooLittleRoom(Error):
+    """A queued query did not fit: contacts are missing. `pairs`, `contacts` and `undecided` are the room that it needs, exact for what follows from what did fit."""
+
+    def __init__(self, pairs: int, contacts: int, undecided: int):
+        super().__init__(f"too little room: reserve {pairs} pairs, {contacts} contacts, {undecided} undecided", name="TooLittleRoom")
+        self.pairs = pairs
+        self.contacts = contacts
+        self.undecided = undecided
+
+
+def _stream(stream: Any) -> int:
+    """The number of a stream."""
+    if stream is None:
+        return 0
+    if isinstance(stream, int):
+        if stream < 0:
+            raise ValueError(f"stream is {stream} where a cudaStream_t is wanted")
+        return stream
+    for name in ("cuda_stream", "ptr"):  # PyTorch, CuPy
+        number = getattr(stream, name, None)
+        if isinstance(number, int):
+            return number
+    protocol = getattr(stream, "__cuda_stream__", None)  # cuda.core
+    if protocol is not None:
+        return int((protocol() if callable(protocol) else protocol)[1])
+    raise TypeError(f"stream is {type(stream).__name__} where a number, a stream of PyTorch or CuPy, or None is wanted")
+
+
+def _found(found: _cuda.Rows | None, given: Any) -> Any:
+    """The pairs of a result: those that were found, or what was given."""
+    return given if found is None else Rows(found, PAIR)
+
+
+def _choice(name: str, given: Any, choices: dict[str, int]) -> int:
+    if given not in choices:
+        raise ValueError(f"{name} is {given!r} where one of {', '.join(choices)} is wanted")
+    return choices[given]
+
+
+class Instances:
+    """Bodies on a GPU: arrays of assets and poses, which every call reads where they are. Made once by `Query.instances`, it spares calls the look at the arrays;
+    what writes poses there goes on the stream of the calls, or is waited for."""
+
+    __slots__ = ("_core", "asset", "pose")
+
+    def __init__(self, core: _cuda.Instances, asset: Any, pose: Any):
+        self._core: _cuda.Instances = core
+        #: As they were given.
+        self.asset = asset
+        self.pose = pose
+
+    def __len__(self) -> int:
+        return len(self._core)
+
+
+class Filter:
+    """Which pairs a query looks at, of all whose world boxes meet; as the CPU's Filter, but its arrays lie in GPU memory and are read there in every call.
+
+    Args:
+        motion: (n,) uint8, of each instance MOVING, FIXED, KINEMATIC or SLEEPING.
+        group, mask: (n,) uint32 or int32.
+        excluded: (m, 2) or array of PAIR, in CPU memory, which are copied.
+    """
+
+    __slots__ = ("_core",)
+
+    def __init__(self, motion: Any = None, group: Any = None, mask: Any = None, excluded: npt.ArrayLike | None = None, *, device: int = 0, stream: Any = None):
+        self._core = _cuda.Filter(motion, group, mask, pairs_of(excluded), _stream(stream), device)
+
+
+class Queued:
+    """A query that `Query.enqueue` has queued: arrays that the stream fills, as long as there is room, and their numbers, all in GPU memory. They are the same
+    arrays in every call, and in every replay of a graph, until the next `Query.reserve`. Keep this as long as a graph that was captured with it."""
+
+    __slots__ = ("_core", "_kept")
+
+    def __init__(self, core: _cuda.Step, kept: tuple[Any, ...]):
+        self._core: _cuda.Step = core
+        self._kept = kept  # what the stream, or a graph, reads
+
+    @property
+    def pairs(self) -> Rows:
+        """Room for object pairs, rows of PAIR; the first `pair_count` of them are there. Where pairs were given: nothing."""
+        return Rows(self._core.pairs(), PAIR)
+
+    @property
+    def pair_count(self) -> Array:
+        """(1,) uint32; more than `len(pairs)` where they did not fit."""
+        return self._core.pair_count()
+
+    @property
+    def contacts(self) -> Rows:
+        """Room for contacts, rows of CONTACT; the first `contact_count` of them are there."""
+        return Rows(self._core.contacts(), CONTACT)
+
+    @property
+    def contact_count(self) -> Array:
+        """(1,) uint64."""
+        return self.report["contacts"]
+
+    @property
+    def first_contact(self) -> Array:
+        """Of grouped contacts: those of pair p are first_contact[p] up to first_contact[p + 1]; uint32."""
+        return self._core.first_contact()
+
+    @property
+    def report(self) -> Rows:
+        """One row: `failed`, not 0 where something is wrong; `complete`, 0 where something did not fit; `contacts`; `needed_pairs`, `needed_contacts`, ..."""
+        return Rows(self._core.report(), _REPORT)
+
+    def wait(self) -> tuple[int, int]:
+        """Waits for the stream; how many pairs and contacts there are.
+
+        Raises:
+            Error: what the GPU found wrong, with the instance or pair to blame.
+            TooLittleRoom: contacts are missing.
+        """
+        complete, pairs, contacts, needed_pairs, needed_contacts, needed_undecided = self._core.wait()
+        if not complete:
+            raise TooLittleRoom(needed_pairs, needed_contacts, needed_undecided)
+        return pairs, contacts
+
+
+class Query:
+    """Finds what happens between posed meshes on one GPU, from arrays in its memory.
+
+    Args:
+        assets: that instances refer to by their place in this list; copied to the GPU.
+        device: the GPU's number.
+        contents: "all"; "exact": what `contacts` in mode "exact" and `verdicts` take, a third less; "manifolds": these and what manifolds and contained bodies take.
+
+    Calls take the instances as `Query.instances` made them, or as two arrays:
+
+    - `asset`: (n,) uint32 or int32, or None where all are of asset 0;
+    - `pose`: (n, 4, 3) or (n, 12) float64: the three rows of the rotation, then the translation; world = rotation @ x + translation.
+
+    They must be contiguous and on the query's device: nothing is ever copied or converted. Wrong types raise TypeError, wrong shapes, strides and devices
+    ValueError. Error: an instance's pose is not rigid, ...; `where` is the instance or pair to blame.
+
+    Calls wait for their results, but for `enqueue`, and let other Python threads run meanwhile. The results lie in the query's memory, where nothing touches them
+    as long as anybody has them: a call that finds its memory in use takes other memory. What reads an array on another stream must be done when the array goes.
+    A query takes one call at a time: a second thread gets RuntimeError.
+    """
+
+    __slots__ = ("_assets", "_core", "_given", "_step", "__weakref__")
+
+    def __init__(self, assets: Iterable[Asset], *, device: int = 0, contents: Literal["all", "exact", "manifolds"] = "all", stream: Any = None):
+        if isinstance(assets, Asset):
+            raise TypeError("assets is one asset where a list of them is wanted")
+        cores = []
+        for place, asset in enumerate(assets):
+            if not isinstance(asset, Asset):
+                raise TypeError(f"assets: entry {place} is {type(asset).__name__} where an Asset is wanted")
+            cores.append(asset._core)
+        self._assets = _cuda.Assets(cores, device, _choice("contents", contents, _CONTENTS), _stream(stream))
+        self._core = _cuda.Query(self._assets)
+        self._given: Any = None  # the pairs of the last contacts()
+        self._step: _cuda.Step | None = None
+
+    @property
+    def device(self) -> int:
+        return self._assets.device
+
+    def instances(self, asset: Any = None, pose: Any = None, *, stream: Any = None) -> Instances:
+        """Looks at arrays once for many calls, which read them anew: see Instances."""
+        if pose is None:
+            raise TypeError("pose is missing")
+        return Instances(_cuda.Instances(self._assets, asset, pose, _stream(stream)), asset, pose)
+
+    def _bodies(self, instances: Instances | None, asset: Any, pose: Any, stream: int) -> _cuda.Instances:
+        if instances is None:
+            if pose is None:
+                raise TypeError("instances is missing, or pose")
+            return _cuda.Instances(self._assets, asset, pose, stream)
+        if asset is not None or pose is not None:
+            raise TypeError("instances stand instead of asset and pose, not beside them")
+        return instances._core
+
+    def _pairs(self, pairs: Any, stream: int) -> _cuda.Pairs | None:
+        return None if pairs is None else _cuda.Pairs(pairs, stream, self._assets.device)
+
+    def contacts(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, pairs: Any = None,
+                 mode: Literal["exact", "fast", "boxes"] = "exact", first_contact_only: bool = False, within: float = 0.0, add_error_bounds: bool = False,
+                 sorted: bool = False, grouped: bool = False, filter: Filter | None = None, stream: Any = None) -> Contacts:
+        """Finds every pair of triangles that meet: the same set as on the CPU.
+
+        Args:
+            pairs: (m, 2) uint32 or int32, or rows of PAIR; where not given, those whose world boxes meet.
+            sorted: pairs ascend, and contacts ascend by pair, face_a, face_b: the same bytes on every run.
+            grouped: contacts lie pair by pair, and `manifolds` and `contained` may follow.
+
+        The others: as of `tandem.Query.contacts`.
+        """
+        number = _stream(stream)
+        self._given = pairs
+        found = self._core.contacts(self._bodies(instances, asset, pose, number), self._pairs(pairs, number), _choice("mode", mode, _MODES), first_contact_only,
+                                    within, add_error_bounds, sorted, grouped, None if filter is None else filter._core, number)
+        return Contacts(_found(found[0], pairs), Rows(found[1], CONTACT), Counters._make(found[2]))
+
+    def pairs(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, sorted: bool = True, within: float = 0.0,
+              filter: Filter | None = None, stream: Any = None) -> Rows:
+        """The object pairs whose world boxes meet, rows of PAIR: a < b."""
+        number = _stream(stream)
+        found = self._core.pairs(self._bodies(instances, asset, pose, number), sorted, within, None if filter is None else filter._core, number)
+        return Rows(found, PAIR)
+
+    def manifolds(self, *, most_points: int = 7, match_previous: bool = True) -> Manifolds:
+        """Makes contact manifolds of the last `contacts(..., grouped=True)` of this query, whose arrays must be as they were, on its stream: where that was sorted
+        too, the rows of the CPU, byte for byte. They are copied within the GPU, since the query keeps its own to find the points again in the next step."""
+        if not 1 <= most_points <= 7:
+            raise ValueError(f"most_points is {most_points} where 1 to 7 is wanted")
+        pairs, manifolds, points = self._core.manifolds(most_points, match_previous)
+        return Manifolds(_found(pairs, self._given), Rows(manifolds, MANIFOLD), Rows(points, POINT))
+
+    def contained(self) -> Contained:
+        """Finds bodies within others of the last `contacts(..., grouped=True)`, which was in mode "exact" and for all contacts."""
+        pairs, contained = self._core.contained()
+        return Contained(_found(pairs, self._given), Rows(contained, CONTAINMENT))
+
+    def distances(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, pairs: Any = None, reach: float | None = None,
+                  absolute_tolerance: float = 0.0, relative_tolerance: float = 0.0, filter: Filter | None = None, stream: Any = None) -> Distances:
+        """Finds how near the surfaces are. Arguments: as of `tandem.Query.distances`."""
+        number = _stream(stream)
+        found = self._core.distances(self._bodies(instances, asset, pose, number), self._pairs(pairs, number), reach, absolute_tolerance, relative_tolerance,
+                                     None if filter is None else filter._core, number)
+        return Distances(_found(found[0], pairs), Rows(found[1], DISTANCE))
+
+    def impacts(self, instances: Instances | None = None, *, motion: Any, duration: float, asset: Any = None, pose: Any = None, pairs: Any = None,
+                tolerance: float = 0.0, sorted: bool = True, filter: Filter | None = None, stream: Any = None) -> Impacts:
+        """Finds until when moving bodies surely do not meet, in a step of `duration` seconds.
+
+        Args:
+            motion: (n, 3, 3) or (n, 9) float64: velocity of the centre, angular velocity, centre.
+        """
+        number = _stream(stream)
+        found = self._core.impacts(self._bodies(instances, asset, pose, number), motion, duration, self._pairs(pairs, number), tolerance, sorted,
+                                   None if filter is None else filter._core, number)
+        return Impacts(_found(found[0], pairs), Rows(found[1], IMPACT))
+
+    def verdicts(self, instances: Instances | None = None, *, tolerance: float, asset: Any = None, pose: Any = None, pairs: Any = None,
+                 filter: Filter | None = None, stream: Any = None) -> Verdicts:
+        """Tells of pairs whether they are apart, touch, or are within a tolerance. Arguments: as of `tandem.Query.verdicts`."""
+        number = _stream(stream)
+        found = self._core.verdicts(self._bodies(instances, asset, pose, number), tolerance, self._pairs(pairs, number),
+                                    None if filter is None else filter._core, number)
+        return Verdicts(_found(found[0], pairs), Rows(found[1], VERDICT))
+
+    def reserve(self, *, instances: int, pairs: int, contacts: int, undecided: int | None = None, mode: Literal["exact", "fast", "boxes"] = "exact",
+                first_contact_only: bool = False, within: float = 0.0, add_error_bounds: bool = False, sorted: bool = False, grouped: bool = False) -> None:
+        """Makes room for calls of `enqueue`, and says how they look for contacts. What was queued before keeps its own room.
+
+        Args:
+            undecided: candidates that are not decided quickly; None: as many as contacts.
+        """
+        self._step = _cuda.Step(self._assets, instances, pairs, contacts, contacts if undecided is None else undecided, _choice("mode", mode, _MODES),
+                                first_contact_only, within, add_error_bounds, sorted, grouped)
+
+    def enqueue(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, pairs: Any = None, filter: Filter | None = None,
+                stream: Any = None) -> Queued:
+        """Queues a query of contacts on the stream, and neither waits nor allocates: it may be captured into a CUDA graph, `with torch.cuda.graph(...)` too, where
+        `stream` is PyTorch's current one. The arrays are read when the stream comes to it."""
+        if self._step is None:
+            raise ValueError("nothing is reserved: call reserve() first")
+        number = _stream(stream)
+        given = self._bodies(instances, asset, pose, number), self._pairs(pairs, number), None if filter is None else filter._core
+        self._step.enqueue(*given, number)
+        return Queued(self._step, given)

@@ -1,0 +1,555 @@
+// Does all that the C interface does on a GPU and compares it with what it does on the CPU, in scenes of bodies that
+// fall into one another. C99. Usage: gpu_use_test ASSETS_FOLDER   Exit code 77: there is no GPU.
+#include <math.h>
+
+#include "gpu_c_test.h"
+
+enum { kBodies = 80, kSteps = 3 };
+
+static cudaStream_t stream;
+static tandem_asset* assets[3];
+static tandem_gpu_assets* gpu_assets;
+
+static uint64_t seed = 12345;
+
+static double random_number(void) {
+  seed = seed * 6364136223846793005u + 1442695040888963407u;
+  return (double)(seed >> 11) / 9007199254740992.0;
+}
+
+// A box of ten times the size, a box and a cow, of about the same size: the large boxes have others within.
+static void build_assets(const char* folder) {
+  Triangles large = read_obj(folder, "box_12.obj");
+  for (size_t i = 0; i < 3 * large.vertex_count; ++i) large.positions[i] *= 10;
+  const tandem_mesh mesh = mesh_of(&large);
+  CHECK_STATUS(tandem_asset_build(&mesh, NULL, NULL, &assets[0], NULL), TANDEM_OK);
+  free_mesh(&large);
+  assets[1] = build_obj(folder, "box_12.obj", NULL);
+  Triangles cow = read_obj(folder, "cow_1500.obj");
+  const tandem_mesh cow_mesh = mesh_of(&cow);
+  tandem_build_options options;
+  memset(&options, 0, sizeof options);
+  options.struct_size = sizeof options;
+  options.effort = TANDEM_EFFORT_FAST;
+  CHECK_STATUS(tandem_asset_build(&cow_mesh, &options, NULL, &assets[2], NULL), TANDEM_OK);
+  free_mesh(&cow);
+}
+
+// Bodies at random in a cube; those with even numbers move a little from step to step.
+static void place(tandem_instance* bodies, int step) {
+  tandem_asset_info cow;
+  cow.struct_size = sizeof cow;
+  CHECK_STATUS(tandem_asset_get_info(assets[2], &cow), TANDEM_OK);
+  const double size = 12 * (cow.upper[0] - cow.lower[0]);
+  seed = 4711;
+  for (int i = 0; i < kBodies; ++i) {
+    double q[4], length = 0;
+    tandem_instance* body = &bodies[i];
+    body->asset = i < 2 ? 0 : 1 + (uint32_t)i % 2;
+    body->reserved = 0;
+    for (int k = 0; k < 4; ++k) q[k] = random_number() - 0.5;
+    for (int k = 0; k < 4; ++k) length += q[k] * q[k];
+    for (int k = 0; k < 4; ++k) q[k] /= sqrt(length);
+    const double w = q[0], x = q[1], y = q[2], z = q[3];
+    const double rotation[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
+                                   {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
+                                   {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}};
+    memcpy(body->pose.rotation, rotation, sizeof rotation);
+    for (int k = 0; k < 3; ++k)
+      body->pose.translation[k] = size * random_number() / 4 + (i % 2 == 0 ? 1e-4 * size * step : 0);
+  }
+}
+
+static int compare_contacts(const void* x, const void* y) {
+  const tandem_contact *a = (const tandem_contact*)x, *b = (const tandem_contact*)y;
+  if (a->pair != b->pair) return a->pair < b->pair ? -1 : 1;
+  if (a->face_a != b->face_a) return a->face_a < b->face_a ? -1 : 1;
+  if (a->face_b != b->face_b) return a->face_b < b->face_b ? -1 : 1;
+  if (a->triangle_a != b->triangle_a) return a->triangle_a < b->triangle_a ? -1 : 1;
+  return a->triangle_b < b->triangle_b ? -1 : a->triangle_b > b->triangle_b;
+}
+
+// Whether rows in GPU memory have the bytes of rows in CPU memory.
+static int same(const void* on_gpu, const void* on_cpu, size_t bytes) {
+  void* copy = from_gpu(on_gpu, bytes);
+  const int equal = memcmp(copy, on_cpu, bytes) == 0;
+  free(copy);
+  return equal;
+}
+
+// Whether the GPU's contacts, in any order, are those of the CPU.
+static int same_contacts(const tandem_gpu_contact_query* query, const tandem_contact_query* expected) {
+  size_t count = 0;
+  tandem_gpu_query_report report;
+  const tandem_contact* on_cpu = tandem_contact_query_contacts(expected, &count);
+  CHECK_STATUS(tandem_gpu_contact_query_get_report(query, &report), TANDEM_OK);
+  if (report.complete != 1 || report.contacts != count || count == 0) return 0;
+  tandem_contact* sorted = (tandem_contact*)malloc(count * sizeof *sorted);
+  tandem_contact* found =
+      (tandem_contact*)from_gpu(tandem_gpu_contact_query_contacts(query), count * sizeof *found);
+  memcpy(sorted, on_cpu, count * sizeof *sorted);
+  qsort(sorted, count, sizeof *sorted, compare_contacts);
+  qsort(found, count, sizeof *found, compare_contacts);
+  const int equal = memcmp(sorted, found, count * sizeof *found) == 0;
+  free(sorted);
+  free(found);
+  return equal;
+}
+
+typedef struct Queries {
+  tandem_gpu_broad_phase* near;
+  tandem_gpu_contact_query* contacts;
+  tandem_gpu_manifolds* manifolds;
+  tandem_gpu_containment_query* contained;
+} Queries;
+
+static Queries make_queries(void) {
+  Queries made = {NULL, NULL, NULL, NULL};
+  CHECK_STATUS(tandem_gpu_broad_phase_create(NULL, &made.near), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_contact_query_create(NULL, &made.contacts), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_manifolds_create(NULL, &made.manifolds), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_containment_query_create(NULL, &made.contained), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_broad_phase_set_assets(made.near, gpu_assets), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_contact_query_set_assets(made.contacts, gpu_assets, stream), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_manifolds_set_assets(made.manifolds, gpu_assets, stream), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_containment_query_set_assets(made.contained, gpu_assets, stream), TANDEM_OK);
+  return made;
+}
+
+static void destroy(Queries* queries) {
+  tandem_gpu_containment_query_destroy(queries->contained);
+  tandem_gpu_manifolds_destroy(queries->manifolds);
+  tandem_gpu_contact_query_destroy(queries->contacts);
+  tandem_gpu_broad_phase_destroy(queries->near);
+}
+
+static tandem_gpu_broad_phase_options sorted_pairs(void) {
+  tandem_gpu_broad_phase_options options;
+  memset(&options, 0, sizeof options);
+  options.struct_size = sizeof options;
+  options.sorted = 1;
+  return options;
+}
+
+static tandem_gpu_query_options grouped_contacts(void) {
+  tandem_gpu_query_options options;
+  memset(&options, 0, sizeof options);
+  options.struct_size = sizeof options;
+  options.grouped = 1;
+  return options;
+}
+
+static tandem_contact_query* cpu_query(void) {
+  tandem_contact_query* query = NULL;
+  CHECK_STATUS(tandem_contact_query_create(NULL, &query), TANDEM_OK);
+  CHECK_STATUS(tandem_contact_query_set_assets(query, assets, 3), TANDEM_OK);
+  return query;
+}
+
+// Steps of a simulation: pairs, contacts, groups, manifolds with their former points, contained bodies.
+static void test_steps(void) {
+  tandem_instance bodies[kBodies];
+  place(bodies, 0);
+  GpuScene scene = scene_to_gpu(bodies, kBodies);
+  Queries queries = make_queries();
+  tandem_contact_query* expected = cpu_query();
+  const tandem_gpu_broad_phase_options sorted = sorted_pairs();
+  const tandem_gpu_query_options grouped = grouped_contacts();
+  for (int step = 0; step < kSteps; ++step) {
+    size_t count = 0, point_count = 0, pair_count = 0;
+    place(bodies, step);
+    write_poses(&scene, bodies, kBodies);
+    CHECK_STATUS(tandem_contact_query_find_contacts(expected, bodies, kBodies, NULL), TANDEM_OK);
+    CHECK_STATUS(tandem_gpu_broad_phase_find(queries.near, &scene.instances, &sorted, stream), TANDEM_OK);
+    const tandem_gpu_pairs pairs = tandem_gpu_broad_phase_pairs(queries.near);
+    const tandem_object_pair* expected_pairs = tandem_contact_query_pairs(expected, &pair_count);
+    tandem_gpu_broad_phase_report near;
+    CHECK_STATUS(tandem_gpu_broad_phase_get_report(queries.near, &near), TANDEM_OK);
+    CHECK(near.complete == 1 && near.count == pair_count && near.found == pair_count);
+    CHECK(same(pairs.pairs, expected_pairs, pair_count * sizeof *expected_pairs));
+    CHECK(same(tandem_gpu_broad_phase_device_report(queries.near), &near, sizeof near));
+
+    CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, &scene.instances, &pairs, &grouped, stream), TANDEM_OK);
+    CHECK(same_contacts(queries.contacts, expected));
+    tandem_gpu_query_report report;
+    CHECK_STATUS(tandem_gpu_contact_query_get_report(queries.contacts, &report), TANDEM_OK);
+    CHECK(same(tandem_gpu_contact_query_device_report(queries.contacts), &report, sizeof report));
+    CHECK(report.counters.object_pairs == pair_count && report.counters.contacts == report.contacts);
+    const tandem_gpu_contact_groups groups = tandem_gpu_contact_query_groups(queries.contacts);
+    tandem_gpu_group_counts* counts = (tandem_gpu_group_counts*)from_gpu(groups.counts, sizeof *counts);
+    CHECK(counts->pairs == pair_count && counts->contacts == report.contacts && counts->few + counts->many > 0);
+    free(counts);
+
+    CHECK_STATUS(tandem_contact_query_make_manifolds(expected, bodies, kBodies, NULL), TANDEM_OK);
+    CHECK_STATUS(tandem_gpu_manifolds_find(queries.manifolds, &scene.instances, &pairs, queries.contacts, NULL, stream),
+                 TANDEM_OK);
+    tandem_gpu_manifold_report made;
+    CHECK_STATUS(tandem_gpu_manifolds_get_report(queries.manifolds, &made), TANDEM_OK);
+    const tandem_manifold* manifolds = tandem_contact_query_manifolds(expected, &count);
+    const tandem_manifold_point* points = tandem_contact_query_points(expected, &point_count);
+    CHECK(made.complete == 1 && made.manifolds == count && made.points == point_count && count > 0);
+    CHECK(same(tandem_gpu_manifolds_manifolds(queries.manifolds), manifolds, count * sizeof *manifolds));
+    CHECK(same(tandem_gpu_manifolds_points(queries.manifolds), points, point_count * sizeof *points));
+    size_t followed = 0;
+    for (size_t i = 0; i < point_count; ++i) followed += points[i].previous != TANDEM_NO_INDEX;
+    CHECK((followed > 0) == (step > 0));
+
+    CHECK_STATUS(tandem_contact_query_find_contained(expected, bodies, kBodies, 1), TANDEM_OK);
+    CHECK_STATUS(
+        tandem_gpu_containment_query_find(queries.contained, &scene.instances, &pairs, queries.contacts, stream),
+        TANDEM_OK);
+    tandem_gpu_containment_report inside;
+    CHECK_STATUS(tandem_gpu_containment_query_get_report(queries.contained, &inside), TANDEM_OK);
+    const tandem_containment* contained = tandem_contact_query_contained(expected, &count);
+    CHECK(inside.complete == 1 && inside.contained == count && count > 0);
+    CHECK(same(tandem_gpu_containment_query_contained(queries.contained), contained, count * sizeof *contained));
+  }
+  CHECK(tandem_gpu_contact_query_bytes(queries.contacts) > 0 && tandem_gpu_manifolds_bytes(queries.manifolds) > 0);
+  tandem_contact_query_destroy(expected);
+  destroy(&queries);
+  free_gpu_scene(&scene);
+}
+
+// Modes, clearance, the first contacts, sorted contacts.
+static void test_options(void) {
+  tandem_instance bodies[kBodies];
+  place(bodies, 0);
+  GpuScene scene = scene_to_gpu(bodies, kBodies);
+  Queries queries = make_queries();
+  tandem_contact_query* expected = cpu_query();
+  for (int variant = 0; variant < 4; ++variant) {
+    tandem_query_options cpu;
+    memset(&cpu, 0, sizeof cpu);
+    cpu.struct_size = sizeof cpu;
+    cpu.mode = variant == 1 ? TANDEM_FAST : variant == 2 ? TANDEM_BOXES : TANDEM_EXACT;
+    cpu.within = variant == 3 ? 0.05 : 0;
+    tandem_gpu_broad_phase_options near = sorted_pairs();
+    near.within = cpu.within;
+    tandem_gpu_query_options options = grouped_contacts();
+    options.grouped = 0;
+    options.sorted = variant % 2;
+    options.mode = cpu.mode;
+    options.within = cpu.within;
+    CHECK_STATUS(tandem_contact_query_find_contacts(expected, bodies, kBodies, &cpu), TANDEM_OK);
+    CHECK_STATUS(tandem_gpu_broad_phase_find(queries.near, &scene.instances, &near, stream), TANDEM_OK);
+    const tandem_gpu_pairs pairs = tandem_gpu_broad_phase_pairs(queries.near);
+    CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, &scene.instances, &pairs, &options, stream), TANDEM_OK);
+    CHECK(same_contacts(queries.contacts, expected));
+    if (options.sorted) {
+      size_t count = 0;
+      (void)tandem_contact_query_contacts(expected, &count);
+      tandem_contact* found =
+          (tandem_contact*)from_gpu(tandem_gpu_contact_query_contacts(queries.contacts), count * sizeof *found);
+      for (size_t i = 1; i < count; ++i) CHECK(compare_contacts(&found[i - 1], &found[i]) < 0);
+      free(found);
+    }
+    // Nothing follows from contacts that are not grouped.
+    CHECK_STATUS(tandem_gpu_manifolds_find(queries.manifolds, &scene.instances, &pairs, queries.contacts, NULL, stream),
+                 TANDEM_CONTACTS_MISSING);
+  }
+  tandem_contact_query_destroy(expected);
+  destroy(&queries);
+  free_gpu_scene(&scene);
+}
+
+// Filters, kept bodies, excluded pairs.
+static void test_filters(void) {
+  tandem_instance bodies[kBodies];
+  uint8_t motion[kBodies];
+  uint32_t group[kBodies], mask[kBodies];
+  place(bodies, 0);
+  for (int i = 0; i < kBodies; ++i) {
+    motion[i] = i % 3 == 0 ? TANDEM_FIXED : TANDEM_MOVING;
+    group[i] = 1u << i % 4;
+    mask[i] = i % 5 == 0 ? 7 : 15;
+  }
+  GpuScene scene = scene_to_gpu(bodies, kBodies);
+  Queries queries = make_queries();
+  tandem_contact_query* expected = cpu_query();
+  size_t count = 0;
+  CHECK_STATUS(tandem_contact_query_find_pairs(expected, bodies, kBodies, NULL), TANDEM_OK);
+  const tandem_object_pair* all = tandem_contact_query_pairs(expected, &count);
+  CHECK(count > 20);
+  tandem_excluded_pairs* cpu_excluded = NULL;
+  tandem_gpu_excluded_pairs* excluded = NULL;
+  CHECK_STATUS(tandem_excluded_pairs_create(all, 20, NULL, &cpu_excluded), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_excluded_pairs_create(all, 20, stream, NULL, &excluded), TANDEM_OK);
+  tandem_pair_filter cpu_filter = {sizeof cpu_filter, 0, kBodies, motion, group, mask, cpu_excluded};
+  uint8_t* gpu_motion = (uint8_t*)to_gpu(motion, sizeof motion);
+  uint32_t *gpu_group = (uint32_t*)to_gpu(group, sizeof group), *gpu_mask = (uint32_t*)to_gpu(mask, sizeof mask);
+  tandem_gpu_pair_filter filter = {sizeof filter, 0, gpu_motion, gpu_group, gpu_mask, excluded};
+  tandem_query_options cpu;
+  memset(&cpu, 0, sizeof cpu);
+  cpu.struct_size = sizeof cpu;
+  cpu.filter = &cpu_filter;
+  tandem_gpu_broad_phase_options near = sorted_pairs();
+  near.filter = &filter;
+  CHECK_STATUS(tandem_contact_query_find_pairs(expected, bodies, kBodies, &cpu), TANDEM_OK);
+  const tandem_object_pair* pairs = tandem_contact_query_pairs(expected, &count);
+  for (int kept = 0; kept < 2; ++kept) {
+    if (kept)
+      CHECK_STATUS(tandem_gpu_broad_phase_keep_fixed(queries.near, &scene.instances, motion, stream), TANDEM_OK);
+    CHECK_STATUS(tandem_gpu_broad_phase_find(queries.near, &scene.instances, &near, stream), TANDEM_OK);
+    tandem_gpu_broad_phase_report report;
+    CHECK_STATUS(tandem_gpu_broad_phase_get_report(queries.near, &report), TANDEM_OK);
+    CHECK(report.count == count && count > 0);
+    CHECK(same(tandem_gpu_broad_phase_pairs(queries.near).pairs, pairs, count * sizeof *pairs));
+  }
+  tandem_gpu_excluded_pairs_destroy(excluded);
+  tandem_excluded_pairs_destroy(cpu_excluded);
+  tandem_contact_query_destroy(expected);
+  destroy(&queries);
+  cuda_must(cudaFree(gpu_motion));
+  cuda_must(cudaFree(gpu_group));
+  cuda_must(cudaFree(gpu_mask));
+  free_gpu_scene(&scene);
+}
+
+// A step that was captured once finds the contacts of poses that are written later. Pairs are the caller's, and their
+// number is in CPU memory.
+static void test_a_graph(void) {
+  tandem_instance bodies[kBodies];
+  tandem_object_pair all[kBodies * (kBodies - 1) / 2];
+  uint32_t pair_count = 0;
+  for (uint32_t a = 0; a < kBodies; ++a)
+    for (uint32_t b = a + 1; b < kBodies; ++b, ++pair_count) {
+      all[pair_count].a = a;
+      all[pair_count].b = b;
+    }
+  place(bodies, 0);
+  GpuScene scene = scene_to_gpu(bodies, kBodies);
+  Queries queries = make_queries();
+  tandem_contact_query* expected = cpu_query();
+  const tandem_gpu_pairs pairs = {(tandem_object_pair*)to_gpu(all, sizeof all), NULL, pair_count, 0};
+  const tandem_gpu_query_options grouped = grouped_contacts();
+  const tandem_gpu_query_capacity room = {pair_count, 0, 200000, 20000};
+  cudaGraph_t graph = NULL;
+  cudaGraphExec_t replay = NULL;
+  CHECK_STATUS(tandem_gpu_contact_query_reserve(queries.contacts, &room, &grouped), TANDEM_OK);
+  cuda_must(cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal));
+  CHECK_STATUS(tandem_gpu_contact_query_enqueue(queries.contacts, &scene.instances, &pairs, &grouped, stream), TANDEM_OK);
+  cuda_must(cudaStreamEndCapture(stream, &graph));
+  cuda_must(cudaGraphInstantiate(&replay, graph, 0));
+  for (int step = 0; step < kSteps; ++step) {
+    place(bodies, step);
+    write_poses(&scene, bodies, kBodies);
+    CHECK_STATUS(tandem_contact_query_find_contacts_of_pairs(expected, bodies, kBodies, all, pair_count, NULL),
+                 TANDEM_OK);
+    cuda_must(cudaGraphLaunch(replay, stream));
+    cuda_must(cudaStreamSynchronize(stream));
+    CHECK(same_contacts(queries.contacts, expected));
+  }
+  cuda_must(cudaGraphExecDestroy(replay));
+  cuda_must(cudaGraphDestroy(graph));
+  cuda_must(cudaFree((void*)pairs.pairs));
+  tandem_contact_query_destroy(expected);
+  destroy(&queries);
+  free_gpu_scene(&scene);
+}
+
+// Distances, times of impact and verdicts: as certified as the CPU's, or the same.
+static void test_distances_and_impacts(void) {
+  tandem_instance bodies[kBodies];
+  tandem_motion motion[kBodies];
+  place(bodies, 0);
+  memset(motion, 0, sizeof motion);
+  for (int i = 0; i < kBodies; ++i)
+    for (int k = 0; k < 3; ++k) {
+      motion[i].velocity[k] = 4 * random_number() - 2;
+      motion[i].angular_velocity[k] = 2 * random_number() - 1;
+      motion[i].center[k] = bodies[i].pose.translation[k];
+    }
+  GpuScene scene = scene_to_gpu(bodies, kBodies);
+  tandem_distance_query* expected = NULL;
+  tandem_gpu_distance_query* query = NULL;
+  size_t count = 0, pair_count = 0;
+  tandem_distance_options reach;
+  memset(&reach, 0, sizeof reach);
+  reach.struct_size = sizeof reach;
+  reach.limit_reach = 1;
+  reach.reach = 1;
+  CHECK_STATUS(tandem_distance_query_create(NULL, &expected), TANDEM_OK);
+  CHECK_STATUS(tandem_distance_query_set_assets(expected, assets, 3), TANDEM_OK);
+  CHECK_STATUS(tandem_distance_query_find(expected, bodies, kBodies, &reach), TANDEM_OK);
+  const tandem_distance* distances = tandem_distance_query_distances(expected, &count);
+  const tandem_object_pair* pairs = tandem_distance_query_pairs(expected, &pair_count);
+  const tandem_gpu_pairs given = {(tandem_object_pair*)to_gpu(pairs, pair_count * sizeof *pairs), NULL,
+                                  (uint32_t)pair_count, 0};
+  CHECK_STATUS(tandem_gpu_distance_query_create(NULL, &query), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_distance_query_set_assets(query, gpu_assets, stream), TANDEM_OK);
+  for (int again = 0; again < 2; ++again) {
+    size_t touching = 0, apart = 0;
+    tandem_gpu_distance_options options;
+    memset(&options, 0, sizeof options);
+    options.struct_size = sizeof options;
+    options.former = again ? tandem_gpu_distance_query_distances(query) : NULL;
+    CHECK_STATUS(tandem_gpu_distance_query_find(query, &scene.instances, &given, &options, stream), TANDEM_OK);
+    tandem_gpu_distance_report report;
+    CHECK_STATUS(tandem_gpu_distance_query_get_report(query, &report), TANDEM_OK);
+    CHECK(report.complete == 1 && report.counters.object_pairs == pair_count && count == pair_count);
+    tandem_distance* found =
+        (tandem_distance*)from_gpu(tandem_gpu_distance_query_distances(query), count * sizeof *found);
+    for (size_t i = 0; i < count; ++i) {
+      const tandem_distance *ours = &found[i], *theirs = &distances[i];
+      CHECK((ours->upper == 0) == (theirs->upper == 0));
+      CHECK(ours->lower <= ours->upper && ours->upper - ours->lower <= 1e-6 * ours->upper);
+      if (theirs->triangle_a == TANDEM_NO_INDEX) {
+        CHECK(ours->upper >= theirs->lower);
+      } else {
+        CHECK(ours->lower <= theirs->upper && theirs->lower <= ours->upper);
+      }
+      touching += ours->upper == 0;
+      apart += ours->upper != 0;
+    }
+    CHECK(touching > 0 && apart > 0);
+    free(found);
+  }
+  tandem_gpu_distance_query_destroy(query);
+
+  tandem_impact_query* expected_impacts = NULL;
+  tandem_gpu_impact_query* impact_query = NULL;
+  tandem_motion* gpu_motion = (tandem_motion*)to_gpu(motion, sizeof motion);
+  CHECK_STATUS(tandem_impact_query_create(NULL, &expected_impacts), TANDEM_OK);
+  CHECK_STATUS(tandem_impact_query_set_assets(expected_impacts, assets, 3), TANDEM_OK);
+  CHECK_STATUS(tandem_impact_query_find(expected_impacts, bodies, motion, kBodies, 0.1, NULL), TANDEM_OK);
+  const tandem_impact* impacts = tandem_impact_query_impacts(expected_impacts, &count);
+  const tandem_object_pair* swept = tandem_impact_query_pairs(expected_impacts, NULL);
+  tandem_gpu_impact_options sorted;
+  memset(&sorted, 0, sizeof sorted);
+  sorted.struct_size = sizeof sorted;
+  sorted.sorted = 1;
+  CHECK_STATUS(tandem_gpu_impact_query_create(NULL, &impact_query), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_impact_query_set_assets(impact_query, gpu_assets, stream), TANDEM_OK);
+  CHECK_STATUS(
+      tandem_gpu_impact_query_find(impact_query, &scene.instances, gpu_motion, 0.1, NULL, &sorted, stream), TANDEM_OK);
+  tandem_gpu_impact_report impact_report;
+  CHECK_STATUS(tandem_gpu_impact_query_get_report(impact_query, &impact_report), TANDEM_OK);
+  CHECK(impact_report.complete == 1 && impact_report.impacts == count && count > 0);
+  CHECK(same(tandem_gpu_impact_query_pairs(impact_query).pairs, swept, count * sizeof *swept));
+  tandem_impact* found_impacts =
+      (tandem_impact*)from_gpu(tandem_gpu_impact_query_impacts(impact_query), count * sizeof *found_impacts);
+  size_t met = 0;
+  for (size_t i = 0; i < count; ++i) {
+    // Both stop within the tolerance of the impact, which speeds of a few lengths a second pass in no time.
+    CHECK(fabs(found_impacts[i].t_safe - impacts[i].t_safe) < 1e-3);
+    CHECK((found_impacts[i].status == TANDEM_IMPACT_AT_START) == (impacts[i].status == TANDEM_IMPACT_AT_START));
+    met += impacts[i].status == TANDEM_IMPACT;
+  }
+  CHECK(met > 0);
+  free(found_impacts);
+  CHECK_STATUS(tandem_gpu_impact_query_find(impact_query, &scene.instances, gpu_motion, -1, NULL, &sorted, stream),
+               TANDEM_OUT_OF_RANGE);
+  CHECK_STATUS(tandem_gpu_impact_query_find(impact_query, &scene.instances, NULL, 1, NULL, &sorted, stream),
+               TANDEM_NULL_ARGUMENT);
+  tandem_gpu_impact_query_destroy(impact_query);
+  tandem_impact_query_destroy(expected_impacts);
+  cuda_must(cudaFree(gpu_motion));
+
+  tandem_tolerance_query* expected_verdicts = NULL;
+  tandem_gpu_tolerance_query* tolerance_query = NULL;
+  tandem_tolerance_options tolerance = {sizeof tolerance, 1, 0.01, NULL};
+  CHECK_STATUS(tandem_tolerance_query_create(NULL, &expected_verdicts), TANDEM_OK);
+  CHECK_STATUS(tandem_tolerance_query_set_assets(expected_verdicts, assets, 3), TANDEM_OK);
+  CHECK_STATUS(tandem_tolerance_query_decide_pairs(expected_verdicts, bodies, kBodies, pairs, pair_count, &tolerance),
+               TANDEM_OK);
+  const tandem_verdict* verdicts = tandem_tolerance_query_verdicts(expected_verdicts, &count);
+  CHECK_STATUS(tandem_gpu_tolerance_query_create(NULL, &tolerance_query), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_tolerance_query_set_assets(tolerance_query, gpu_assets, stream), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_tolerance_query_find(tolerance_query, &scene.instances, &given, 0.01, stream), TANDEM_OK);
+  tandem_gpu_tolerance_report decided;
+  CHECK_STATUS(tandem_gpu_tolerance_query_get_report(tolerance_query, &decided), TANDEM_OK);
+  CHECK(decided.complete == 1 && decided.apart + decided.touching + decided.within_tolerance == count);
+  CHECK(count == pair_count && decided.touching > 0 && decided.apart > 0);
+  CHECK(same(tandem_gpu_tolerance_query_verdicts(tolerance_query), verdicts, count * sizeof *verdicts));
+  tandem_gpu_tolerance_query_destroy(tolerance_query);
+  tandem_tolerance_query_destroy(expected_verdicts);
+  tandem_distance_query_destroy(expected);
+  cuda_must(cudaFree((void*)given.pairs));
+  free_gpu_scene(&scene);
+}
+
+// What is wrong has its name, and the instance to blame; nothing is lost where there is too little room.
+static void test_errors(void) {
+  tandem_instance bodies[kBodies];
+  place(bodies, 0);
+  bodies[17].pose.rotation[1][1] += 0.1;
+  GpuScene scene = scene_to_gpu(bodies, kBodies);
+  Queries queries = make_queries();
+  tandem_gpu_broad_phase_report near;
+  tandem_gpu_query_report report;
+  CHECK_STATUS(tandem_gpu_broad_phase_find(queries.near, &scene.instances, NULL, stream), TANDEM_POSE_NOT_RIGID);
+  CHECK_STATUS(tandem_gpu_broad_phase_get_report(queries.near, &near), TANDEM_POSE_NOT_RIGID);
+  CHECK(near.where == 17 && near.failed != 0 && near.count == 0);
+  place(bodies, 0);
+  write_poses(&scene, bodies, kBodies);
+  tandem_object_pair unknown[2] = {{0, 1}, {2, kBodies}};
+  tandem_gpu_pairs pairs = {(tandem_object_pair*)to_gpu(unknown, sizeof unknown), NULL, 2, 0};
+  CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, &scene.instances, &pairs, NULL, stream),
+               TANDEM_UNKNOWN_INSTANCE);
+  CHECK_STATUS(tandem_gpu_contact_query_get_report(queries.contacts, &report), TANDEM_UNKNOWN_INSTANCE);
+  CHECK(report.where == 1 && report.contacts == 0);
+  cuda_must(cudaFree((void*)pairs.pairs));
+
+  CHECK_STATUS(tandem_gpu_broad_phase_find(queries.near, &scene.instances, NULL, stream), TANDEM_OK);
+  pairs = tandem_gpu_broad_phase_pairs(queries.near);
+  CHECK_STATUS(tandem_gpu_contact_query_enqueue(queries.contacts, &scene.instances, &pairs, NULL, stream), TANDEM_OK);
+  cuda_must(cudaStreamSynchronize(stream));
+  CHECK_STATUS(tandem_gpu_contact_query_get_report(queries.contacts, &report), TANDEM_OK);
+  CHECK(report.complete == 0 && report.needed.pairs > 2);
+  tandem_gpu_query_options options = grouped_contacts();
+  CHECK_STATUS(tandem_gpu_contact_query_enqueue(queries.contacts, &scene.instances, &pairs, &options, stream),
+               TANDEM_OUT_OF_RANGE);
+  options.mode = 3;
+  CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, &scene.instances, &pairs, &options, stream),
+               TANDEM_BAD_OPTION);
+  options.struct_size = 12;
+  CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, &scene.instances, &pairs, &options, stream),
+               TANDEM_BAD_STRUCT_SIZE);
+  CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, NULL, &pairs, NULL, stream), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, &scene.instances, NULL, NULL, stream),
+               TANDEM_NULL_ARGUMENT);
+  destroy(&queries);
+
+  // Copies of a part of the assets, which die before the queries.
+  tandem_upload_options contents = {sizeof contents, TANDEM_CONTENTS_EXACT_QUERIES};
+  tandem_gpu_assets* part = NULL;
+  CHECK_STATUS(tandem_gpu_assets_upload(assets, 3, &contents, stream, NULL, &part, NULL), TANDEM_OK);
+  CHECK(tandem_gpu_assets_count(part) == 3 && tandem_gpu_assets_bytes(part) < tandem_gpu_assets_bytes(gpu_assets));
+  queries = make_queries();
+  tandem_gpu_distance_query* distances = NULL;
+  CHECK_STATUS(tandem_gpu_distance_query_create(NULL, &distances), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_distance_query_set_assets(distances, part, stream), TANDEM_NO_AXIS_ALIGNED_BLOCKS);
+  CHECK_STATUS(tandem_gpu_distance_query_find(distances, &scene.instances, &pairs, NULL, stream), TANDEM_ASSETS_MISSING);
+  tandem_gpu_distance_query_destroy(distances);
+  CHECK_STATUS(tandem_gpu_contact_query_set_assets(queries.contacts, part, stream), TANDEM_OK);
+  tandem_gpu_assets_release(part);
+  CHECK_STATUS(tandem_gpu_broad_phase_find(queries.near, &scene.instances, NULL, stream), TANDEM_OK);
+  pairs = tandem_gpu_broad_phase_pairs(queries.near);
+  options = grouped_contacts();
+  CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, &scene.instances, &pairs, &options, stream), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_manifolds_find(queries.manifolds, &scene.instances, &pairs, queries.contacts, NULL, stream),
+               TANDEM_ASSETS_MISSING);
+  options.mode = TANDEM_BOXES;
+  CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, &scene.instances, &pairs, &options, stream),
+               TANDEM_NO_AXIS_ALIGNED_BLOCKS);
+  destroy(&queries);
+  free_gpu_scene(&scene);
+}
+
+int main(int argc, char** argv) {
+  if (argc != 2) return printf("usage: gpu_use_test ASSETS_FOLDER\n"), 1;
+  if (!has_gpu()) return printf("there is no GPU\n"), NO_GPU;
+  cuda_must(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking));
+  build_assets(argv[1]);
+  CHECK_STATUS(tandem_gpu_assets_upload(assets, 3, NULL, stream, NULL, &gpu_assets, NULL), TANDEM_OK);
+  test_steps();
+  test_options();
+  test_filters();
+  test_a_graph();
+  test_distances_and_impacts();
+  test_errors();
+  tandem_gpu_assets_release(gpu_assets);
+  for (int i = 0; i < 3; ++i) tandem_asset_release(assets[i]);
+  cuda_must(cudaStreamDestroy(stream));
+  return failures != 0;
+}

@@ -1,0 +1,413 @@
+"""tandem.cuda: what it finds is what the CPU finds, from and to the arrays of PyTorch, CuPy and JAX, without a copy. Skipped where there is no GPU."""
+import doctest
+import gc
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tandem
+from meshes import BOX_FACES, BOX_VERTICES, read_obj
+
+os.environ.setdefault("XLA_PYTHON_CLIENT_PREALLOCATE", "false")  # JAX would take most of the GPU's memory
+cuda = pytest.importorskip("tandem.cuda", exc_type=ImportError)
+ROOT = Path(os.environ["TANDEM_SOURCE_DIR"])
+COUNT = 60
+
+
+def has_gpu():
+    try:
+        cuda.Query([])
+    except tandem.Error as error:
+        assert error.name == "NoGpu"
+        return False
+    return True
+
+
+GPU = has_gpu()
+needs_gpu = pytest.mark.skipif(not GPU, reason="there is no GPU")
+
+
+def rotations(random, count):
+    w, x, y, z = (q := random.normal(size=(4, count))) / np.linalg.norm(q, axis=0)
+    rows = [[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def make_scene(seed=1, count=COUNT):
+    random = np.random.default_rng(seed)
+    pose = np.concatenate([rotations(random, count), 2.5 * random.random((count, 1, 3))], axis=1)
+    return random.integers(0, 3, count).astype(np.uint32), pose
+
+
+def cpu_instances(asset, pose):
+    return tandem.instances(asset, pose[:, :3], pose[:, 3])
+
+
+@pytest.fixture(scope="module")
+def assets():
+    cow = tandem.build(*read_obj(ROOT / "assets/cow_1500.obj"), effort="fast")
+    return [tandem.build(BOX_VERTICES, BOX_FACES), cow, tandem.build(0.2 * BOX_VERTICES + 0.4, BOX_FACES)]
+
+
+class Torch:
+    def __init__(self):
+        self.torch = pytest.importorskip("torch")
+
+    def put(self, array):
+        return self.torch.from_numpy(array).cuda()
+
+    def take(self, array):
+        return self.torch.from_dlpack(array)
+
+    def pointer(self, array):
+        return array.data_ptr()
+
+    def cpu(self, array):
+        return array.cpu().numpy()
+
+
+class Cupy:
+    def __init__(self):
+        self.cupy = pytest.importorskip("cupy")
+
+    def put(self, array):
+        return self.cupy.asarray(array)
+
+    def take(self, array):
+        return self.cupy.from_dlpack(array)
+
+    def pointer(self, array):
+        return array.data.ptr
+
+    def cpu(self, array):
+        return array.get()
+
+
+class Jax:
+    def __init__(self):
+        self.jax = pytest.importorskip("jax")
+        self.jax.config.update("jax_enable_x64", True)
+
+    def put(self, array):
+        return self.jax.device_put(array)
+
+    def take(self, array):
+        return self.jax.dlpack.from_dlpack(array)
+
+    def pointer(self, array):
+        return array.unsafe_buffer_pointer()
+
+    def cpu(self, array):
+        return np.asarray(array)
+
+
+@pytest.fixture(params=[Torch, Cupy, Jax], ids=["torch", "cupy", "jax"])
+def library(request):
+    return request.param()
+
+
+def sorted_contacts(contacts):
+    return np.sort(contacts, order=["pair", "face_a", "face_b", "triangle_a", "triangle_b"])
+
+
+def test_without_a_gpu_the_reason_is_told():
+    program = "import tandem.cuda\ntry:\n    tandem.cuda.Query([])\nexcept tandem.Error as error:\n    print(error.name, error)"
+    told = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env={**os.environ, "CUDA_VISIBLE_DEVICES": ""})
+    assert told.stdout.startswith("NoGpu there is no GPU"), told.stderr
+
+
+@needs_gpu
+def test_contacts_are_those_of_the_cpu(assets, library):
+    asset, pose = make_scene()
+    on_cpu = tandem.Query(assets).contacts(cpu_instances(asset, pose))
+    query = cuda.Query(assets)
+    for shape in ((COUNT, 4, 3), (COUNT, 12)):
+        found = query.contacts(asset=library.put(asset), pose=library.put(pose.reshape(shape)), sorted=True)
+        assert len(on_cpu.contacts) > 1000
+        assert np.array_equal(found.pairs.numpy(), on_cpu.pairs)
+        assert np.array_equal(found.contacts.numpy(), sorted_contacts(on_cpu.contacts))
+        assert found.counters.contacts == len(on_cpu.contacts)
+
+
+@needs_gpu
+def test_results_are_the_memory_of_the_query(assets, library):
+    asset, pose = make_scene()
+    found = cuda.Query(assets).contacts(asset=library.put(asset), pose=library.put(pose), sorted=True)
+    words = library.take(found.contacts)
+    assert library.pointer(words) == found.contacts.words.pointer
+    assert words.shape == (len(found.contacts), 5)
+    expected = found.contacts.numpy()
+    assert np.array_equal(library.cpu(words), expected.view("<u4").reshape(-1, 5))
+    if not isinstance(library, Jax):  # which takes no strides
+        for name in ("pair", "triangle_b", "face_a"):
+            assert np.array_equal(library.cpu(library.take(found.contacts[name])), expected[name])
+    assert library.pointer(library.take(found.pairs)) == found.pairs.words.pointer
+
+
+@needs_gpu
+def test_the_array_interface_gives_the_same_memory(assets):
+    cupy = pytest.importorskip("cupy")
+    asset, pose = make_scene()
+    found = cuda.Query(assets).contacts(asset=cupy.asarray(asset), pose=cupy.asarray(pose), sorted=True)
+    faces = cupy.asarray(found.contacts["face_b"])
+    assert faces.data.ptr == found.contacts["face_b"].pointer == found.contacts.words.pointer + 16
+    assert np.array_equal(faces.get(), found.contacts.numpy()["face_b"])
+
+    class ByInterfaceAlone:
+        def __init__(self, array):
+            self.__cuda_array_interface__ = array.__cuda_array_interface__
+
+    again = cuda.Query(assets).contacts(asset=ByInterfaceAlone(cupy.asarray(asset)), pose=ByInterfaceAlone(cupy.asarray(pose)), sorted=True)
+    assert np.array_equal(again.contacts.numpy(), found.contacts.numpy())
+
+
+@needs_gpu
+def test_poses_are_read_where_they_are(assets):
+    """Instances that were looked at once: what is written to the array later is found."""
+    torch = pytest.importorskip("torch")
+    asset, pose = make_scene()
+    query, on_cpu, at = cuda.Query(assets), tandem.Query(assets), torch.from_numpy(pose).cuda()
+    bodies = query.instances(torch.from_numpy(asset).cuda(), at)
+    for step in range(3):
+        pose[:, 3] += 0.01 * step
+        pose[::2, 3, 0] += 0.02
+        at.copy_(torch.from_numpy(pose))
+        found = query.contacts(bodies, sorted=True)
+        assert np.array_equal(found.contacts.numpy(), sorted_contacts(on_cpu.contacts(cpu_instances(asset, pose)).contacts))
+
+
+@needs_gpu
+def test_results_outlive_calls_queries_and_assets(assets):
+    torch = pytest.importorskip("torch")
+    asset, pose = make_scene()
+    own = [tandem.Asset.from_bytes(bytes(one)) for one in assets]
+    query = cuda.Query(own)
+    first = query.contacts(asset=torch.from_numpy(asset).cuda(), pose=torch.from_numpy(pose).cuda(), sorted=True)
+    expected, words = first.contacts.numpy(), torch.from_dlpack(first.contacts)
+    for seed in range(4):  # which need other room, and other memory
+        asset, pose = make_scene(seed, 20 + 60 * seed)
+        query.contacts(asset=torch.from_numpy(asset).cuda(), pose=torch.from_numpy(pose).cuda())
+    del query, first, own
+    gc.collect()
+    asset, pose = make_scene(7, 200)
+    cuda.Query(assets).contacts(asset=torch.from_numpy(asset).cuda(), pose=torch.from_numpy(pose).cuda())
+    assert np.array_equal(words.cpu().numpy(), expected.view("<u4").reshape(-1, 5))
+
+
+@needs_gpu
+def test_memory_that_nobody_has_is_used_again(assets):
+    torch = pytest.importorskip("torch")
+    asset, pose = make_scene()
+    query = cuda.Query(assets)
+    bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
+    found = query.contacts(bodies)
+    places = set()
+    for _ in range(6):
+        found = query.contacts(bodies)
+        places.add(found.contacts.words.pointer)
+    assert len(places) == 2  # the one before lives until the name has the new one
+
+
+@needs_gpu
+def test_manifolds_and_contained_bodies_are_those_of_the_cpu(assets):
+    torch = pytest.importorskip("torch")
+    asset, pose = make_scene()
+    query, on_cpu = cuda.Query(assets), tandem.Query(assets)
+    followed = 0
+    for step in range(3):
+        pose[::2, 3, 0] += 1e-4
+        on_cpu.contacts(cpu_instances(asset, pose))
+        made, inside = on_cpu.manifolds(), on_cpu.contained()
+        found = query.contacts(asset=torch.from_numpy(asset).cuda(), pose=torch.from_numpy(pose).cuda(), sorted=True, grouped=True)
+        on_gpu = query.manifolds()
+        assert np.array_equal(on_gpu.pairs.numpy(), made.pairs) and np.array_equal(found.pairs.numpy(), made.pairs)
+        assert on_gpu.manifolds.numpy().tobytes() == made.manifolds.tobytes()
+        assert on_gpu.points.numpy().tobytes() == made.points.tobytes()
+        normals = torch.from_dlpack(on_gpu.manifolds["normal"])
+        assert np.array_equal(normals.cpu().numpy(), made.manifolds["normal"])
+        assert query.contained().contained.numpy().tobytes() == inside.contained.tobytes()
+        followed = np.count_nonzero(made.points["previous"] != tandem.NO_INDEX)
+    assert followed > 0 and len(inside.contained) > 0
+    query.contacts(asset=torch.from_numpy(asset).cuda(), pose=torch.from_numpy(pose).cuda())
+    with pytest.raises(tandem.Error) as caught:
+        query.manifolds()
+    assert caught.value.name == "ContactsMissing"
+
+
+@needs_gpu
+def test_distances_impacts_and_verdicts(assets):
+    torch = pytest.importorskip("torch")
+    asset, pose = make_scene()
+    query, on_cpu, instances = cuda.Query(assets), tandem.Query(assets), cpu_instances(asset, pose)
+    bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
+    theirs, ours = on_cpu.distances(instances, reach=0.5), query.distances(bodies, reach=0.5)
+    assert np.array_equal(ours.pairs.numpy(), theirs.pairs)
+    near = theirs.distances["triangle_a"] != tandem.NO_INDEX
+    lower, upper = (ours.distances.numpy()[name] for name in ("lower", "upper"))
+    assert near.any() and np.all(lower[near] <= theirs.distances["upper"][near]) and np.all(theirs.distances["lower"][near] <= upper[near])
+    assert np.array_equal(upper == 0, theirs.distances["upper"] == 0)
+    pairs = torch.tensor([[3, 1], [5, 9]], dtype=torch.int32, device="cuda")
+    assert np.array_equal(query.distances(bodies, pairs=pairs).distances.numpy()["upper"] == 0, on_cpu.distances(instances, pairs=[[3, 1], [5, 9]]).distances["upper"] == 0)
+
+    motion = np.zeros(COUNT, tandem.MOTION)
+    motion["velocity"] = np.random.default_rng(3).normal(size=(COUNT, 3))
+    motion["center"] = pose[:, 3]
+    theirs = on_cpu.impacts(instances, motion, 0.1)
+    found = query.impacts(bodies, motion=torch.from_numpy(motion.view("<f8").reshape(COUNT, 9)).cuda(), duration=0.1)
+    assert np.array_equal(found.pairs.numpy(), theirs.pairs)
+    assert np.allclose(found.impacts.numpy()["t_safe"], theirs.impacts["t_safe"], atol=1e-3)
+    assert np.array_equal(found.impacts.numpy()["status"] == tandem.IMPACT_AT_START, theirs.impacts["status"] == tandem.IMPACT_AT_START)
+
+    theirs, found = on_cpu.verdicts(instances, tolerance=0.01), query.verdicts(bodies, tolerance=0.01)
+    assert np.array_equal(found.pairs.numpy(), theirs.pairs) and np.array_equal(found.verdicts.numpy(), theirs.verdicts)
+
+
+@needs_gpu
+def test_filters_and_pairs(assets):
+    torch = pytest.importorskip("torch")
+    asset, pose = make_scene()
+    motion = np.where(np.arange(COUNT) % 3 == 0, tandem.FIXED, tandem.MOVING).astype(np.uint8)
+    on_cpu, query = tandem.Query(assets), cuda.Query(assets)
+    instances = cpu_instances(asset, pose)
+    excluded = on_cpu.pairs(instances)[:10]
+    expected = on_cpu.contacts(instances, filter=tandem.Filter(motion=motion, excluded=excluded))
+    bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
+    filter = cuda.Filter(motion=torch.from_numpy(motion).cuda(), excluded=excluded)
+    assert np.array_equal(query.pairs(bodies, filter=filter).numpy(), expected.pairs)
+    found = query.contacts(bodies, filter=filter, sorted=True)
+    assert np.array_equal(found.contacts.numpy(), sorted_contacts(expected.contacts))
+    given = query.contacts(bodies, pairs=found.pairs, sorted=True)
+    assert given.pairs is found.pairs and np.array_equal(given.contacts.numpy(), found.contacts.numpy())
+    with pytest.raises(ValueError, match="filter is of 3 instances where there are 60"):
+        query.contacts(bodies, filter=cuda.Filter(motion=torch.zeros(3, dtype=torch.uint8, device="cuda")))
+    near = query.contacts(bodies, within=0.02, sorted=True)
+    assert np.array_equal(near.contacts.numpy(), sorted_contacts(on_cpu.contacts(instances, within=0.02).contacts))
+
+
+@needs_gpu
+def test_streams_are_waited_for(assets):
+    """Poses that PyTorch writes on one stream, late, are found by a query on another, whose results PyTorch reads on a third."""
+    torch = pytest.importorskip("torch")
+    asset, pose = make_scene()
+    expected = sorted_contacts(tandem.Query(assets).contacts(cpu_instances(asset, pose)).contacts)
+    query = cuda.Query(assets)
+    numbers, late = torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda()
+    at = torch.zeros_like(late)
+    at[:, :3] = torch.eye(3, dtype=torch.float64, device="cuda")
+    query.contacts(asset=numbers, pose=at)
+    streams = [torch.cuda.Stream() for _ in range(3)]
+    torch.cuda.synchronize()
+    with torch.cuda.stream(streams[0]):
+        torch.cuda._sleep(50_000_000)
+        at.copy_(late)
+        found = query.contacts(asset=numbers, pose=at, sorted=True, stream=streams[1])
+    assert np.array_equal(found.contacts.numpy(), expected)
+    query.reserve(instances=COUNT, pairs=4000, contacts=100_000, sorted=True)
+    torch.cuda.synchronize()
+    with torch.cuda.stream(streams[1]):
+        torch.cuda._sleep(50_000_000)
+    queued = query.enqueue(asset=numbers, pose=at, stream=streams[1].cuda_stream)
+    with torch.cuda.stream(streams[2]):
+        words = torch.from_dlpack(queued.contacts).clone()
+    streams[2].synchronize()
+    assert np.array_equal(words.cpu().numpy()[: len(expected)], expected.view("<u4").reshape(-1, 5))
+    assert queued.wait()[1] == len(expected)
+
+
+@needs_gpu
+def test_a_graph_of_pytorch_finds_the_contacts_of_moved_poses(assets):
+    torch = pytest.importorskip("torch")
+    asset, pose = make_scene()
+    query, on_cpu, at, numbers = cuda.Query(assets), tandem.Query(assets), torch.from_numpy(pose).cuda(), torch.from_numpy(asset).cuda()
+    query.reserve(instances=COUNT, pairs=4000, contacts=100_000, sorted=True)
+    query.enqueue(asset=numbers, pose=at).wait()  # loads the kernels
+    graph, shift = torch.cuda.CUDAGraph(), torch.zeros(3, dtype=torch.float64, device="cuda")
+    with torch.cuda.graph(graph):
+        at[::2, 3] += shift
+        queued = query.enqueue(asset=numbers, pose=at, stream=torch.cuda.current_stream())
+        total = torch.from_dlpack(queued.contact_count).view(torch.int64).clone()
+    for step in range(3):
+        moved = np.array([0.01 * step, 0.0, 0.003])
+        shift.copy_(torch.from_numpy(moved))
+        graph.replay()
+        pose[::2, 3] += moved
+        expected = sorted_contacts(on_cpu.contacts(cpu_instances(asset, pose)).contacts)
+        torch.cuda.synchronize()
+        assert int(total) == len(expected) > 0
+        assert np.array_equal(queued.contacts.numpy()[: len(expected)], expected)
+
+
+@needs_gpu
+def test_too_little_room_is_told(assets):
+    torch = pytest.importorskip("torch")
+    asset, pose = make_scene()
+    query = cuda.Query(assets)
+    bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
+    with pytest.raises(ValueError, match="reserve"):
+        query.enqueue(bodies)
+    query.reserve(instances=COUNT, pairs=4000, contacts=10)
+    with pytest.raises(cuda.TooLittleRoom) as caught:
+        query.enqueue(bodies).wait()
+    query.reserve(instances=COUNT, pairs=4000, contacts=caught.value.contacts, undecided=100_000)
+    pairs, contacts = query.enqueue(bodies).wait()
+    assert contacts == len(query.contacts(bodies).contacts) and pairs == len(query.pairs(bodies))
+
+
+@needs_gpu
+def test_what_is_wrong_is_told(assets):
+    torch = pytest.importorskip("torch")
+    asset, pose = make_scene()
+    query, numbers, at = cuda.Query(assets), torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda()
+    for error, words, arguments in (
+            (TypeError, "pose lies in CPU memory", {"pose": pose}), (TypeError, "pose is float32 where float64 is wanted", {"pose": at.float()}),
+            (TypeError, "pose is list where an array in GPU memory", {"pose": [1, 2]}), (ValueError, r"pose has shape \(60, 3\)", {"pose": at[:, 3].contiguous()}),
+            (ValueError, "pose is not contiguous", {"pose": torch.cat([at, at], 2)[:, :, :3]}), (TypeError, "asset is int64 where uint32 or int32", {"asset": numbers.long(), "pose": at}),
+            (ValueError, r"asset has shape \(59,\) where \(60,\)", {"asset": numbers[1:], "pose": at}), (TypeError, "pose", {}),
+            (ValueError, r"pairs has shape \(3,\) where \(m, 2\)", {"pose": at, "pairs": torch.zeros(3, dtype=torch.int32, device="cuda")}),
+            (ValueError, "mode is 'best'", {"pose": at, "mode": "best"}), (TypeError, "stream is str", {"pose": at, "stream": "0"})):
+        with pytest.raises(error, match=words):
+            query.contacts(**arguments)
+
+    class Elsewhere:
+        def __dlpack__(self, **_):
+            raise AssertionError("not asked")
+
+        def __dlpack_device__(self):
+            return 2, 5
+
+    with pytest.raises(ValueError, match="pose lies in the memory of GPU 5 where that of GPU 0"):
+        query.contacts(pose=Elsewhere())
+    at[17, 1, 1] += 0.1
+    with pytest.raises(tandem.Error) as caught:
+        query.contacts(asset=numbers, pose=at)
+    assert (caught.value.name, caught.value.where, caught.value.subject) == ("PoseNotRigid", 17, "instance")
+    at = torch.from_numpy(pose).cuda()
+    numbers[23] = 3
+    with pytest.raises(tandem.Error) as caught:
+        query.contacts(asset=numbers, pose=at)
+    assert (caught.value.name, caught.value.where) == ("UnknownAsset", 23)
+    with pytest.raises(tandem.Error) as caught:
+        query.contacts(pose=at, pairs=torch.tensor([[0, 1], [0, 60]], dtype=torch.int32, device="cuda"))
+    assert (caught.value.name, caught.value.where, caught.value.subject) == ("UnknownInstance", 1, "pair")
+    assert len(query.contacts(pose=at).contacts) > 0
+    with pytest.raises(tandem.Error) as caught:
+        cuda.Query(assets, contents="exact").distances(pose=at)
+    assert caught.value.name == "NoAxisAlignedBlocks"
+
+
+@needs_gpu
+def test_the_page_shows_what_runs(assets, tmp_path, monkeypatch):
+    pytest.importorskip("torch")
+    assets[1].save(tmp_path / "cow.bvh")
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"^```pycon\n(.*?)^```$", (ROOT / "docs/python.md").read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    test = doctest.DocTestParser().get_doctest("\n".join(blocks), {}, "docs/python.md", None, 0)
+    failed, tried = doctest.DocTestRunner().run(test, clear_globs=False)
+    assert failed == 0 and tried > 10
+    assert len(test.globs["faces"]) > 0 and test.globs["contacts"] > 0

@@ -15,6 +15,7 @@ __all__ = ["Rows", "instances"]
 Rows = npt.NDArray[np.void]
 
 _MOST = 0xFFFFFFFF
+_IDENTITY, _ORIGIN = np.eye(3), np.zeros(3)
 _LAST_ROW = np.array([0.0, 0.0, 0.0, 1.0])
 
 
@@ -128,12 +129,15 @@ def instances(asset: npt.ArrayLike = 0, rotation: npt.ArrayLike | None = None, t
         if rotation is not None or translation is not None:
             raise TypeError("transform stands instead of rotation and translation, not beside them")
         matrices = floats(transform, "transform", 4, 4)
-        wrong = np.abs(matrices[..., 3, :] - _LAST_ROW).max(axis=-1) if matrices.size else np.zeros(0)
-        if not np.all(wrong <= 1e-6):
-            raise ValueError(f"transform: the last row of matrix {int(np.flatnonzero(~(wrong <= 1e-6))[0])} is not 0, 0, 0, 1")
-        rotation, translation = matrices[..., :3, :3], matrices[..., :3, 3]
-    rotations = np.eye(3) if rotation is None else floats(rotation, "rotation", 3, 3)
-    translations = np.zeros(3) if translation is None else floats(translation, "translation", 3)
+        last = matrices[..., 3, :]
+        if not (last == _LAST_ROW).all():
+            wrong = ~(np.abs(last - _LAST_ROW).max(axis=-1) <= 1e-6)
+            if wrong.any():
+                raise ValueError(f"transform: the last row of matrix {int(np.flatnonzero(wrong)[0])} is not 0, 0, 0, 1")
+        rotations, translations = matrices[..., :3, :3], matrices[..., :3, 3]
+    else:
+        rotations = _IDENTITY if rotation is None else floats(rotation, "rotation", 3, 3)
+        translations = _ORIGIN if translation is None else floats(translation, "translation", 3)
     numbers = whole_numbers(asset, "asset")
     if numbers.ndim > 1:
         raise ValueError(f"asset has shape {numbers.shape} where () or (n,) is wanted")

@@ -4,7 +4,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import tempfile
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -100,6 +99,7 @@ class Asset:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the file: whole, or not at all (into a temporary file beside it, which then gets its name)."""
+        import tempfile  # here, and not for every import of the package
         path = os.fspath(path)
         descriptor, aside = tempfile.mkstemp(prefix=".", suffix=".tmp", dir=os.path.dirname(path) or ".")
         try:

@@ -3,7 +3,6 @@ from __future__ import annotations
 
 import marshal
 import os
-import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from types import ModuleType
@@ -151,6 +150,7 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     read = tools.read(name, True)
     if read[0] is None:
         # assimp is run by a fork, which a process with threads must not do: a fresh interpreter can.
+        import subprocess  # here, and not for every import of the package
         script = ("import importlib.util, marshal, sys; spec = importlib.util.spec_from_file_location('_bvhbuild', sys.argv[1]); "
                   "tools = importlib.util.module_from_spec(spec); spec.loader.exec_module(tools); "
                   "marshal.dump(tools.read(sys.argv[2].encode('utf-8', 'surrogateescape'), False), sys.stdout.buffer)")

@@ -190,7 +190,7 @@ Array Rows::column(std::size_t offset, std::uint8_t code, std::uint8_t bits, std
 }
 
 nb::object Rows::to_cpu() const {
-  nb::object bytes = make_bytes(count_ * row_bytes_);
+  nb::object bytes = make_bytes(nullptr, count_ * row_bytes_);
   if (count_ == 0) return bytes;
   void* const to = bytes_begin(bytes);
   const OnDevice current(memory_.device);

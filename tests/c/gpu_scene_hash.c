@@ -75,6 +75,7 @@ static void print_scene(const char* file, uint32_t mode, double within) {
   free(contacts);
   const size_t repeat = getenv("TANDEM_REPEAT") != NULL ? (size_t)atoi(getenv("TANDEM_REPEAT")) : 0;
   double* taken = (double*)list(repeat, sizeof *taken);
+  near.sorted = 0;
   for (size_t i = 0; i < repeat; ++i) {
     taken[i] = -microseconds();
     if (scene.pairs == NULL) {

@@ -42,7 +42,7 @@ def rotations(random, count):
 def make_scene(seed=1, count=COUNT):
     random = np.random.default_rng(seed)
     pose = np.concatenate([rotations(random, count), 2.5 * random.random((count, 1, 3))], axis=1)
-    return random.integers(0, 3, count).astype(np.uint32), pose
+    return random.integers(0, 3, count).astype(np.uint32), np.ascontiguousarray(pose)
 
 
 def cpu_instances(asset, pose):
@@ -365,12 +365,14 @@ def test_what_is_wrong_is_told(assets):
     asset, pose = make_scene()
     query, numbers, at = cuda.Query(assets), torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda()
     for error, words, arguments in (
-            (TypeError, "pose lies in CPU memory", {"pose": pose}), (TypeError, "pose is float32 where float64 is wanted", {"pose": at.float()}),
+            (TypeError, "pose lies in CPU memory", {"pose": pose}), (TypeError, "pose lies in CPU memory", {"pose": torch.from_numpy(pose)}),
+            (TypeError, "pose is float32 where float64 is wanted", {"pose": at.float()}),
             (TypeError, "pose is list where an array in GPU memory", {"pose": [1, 2]}), (ValueError, r"pose has shape \(60, 3\)", {"pose": at[:, 3].contiguous()}),
             (ValueError, "pose is not contiguous", {"pose": torch.cat([at, at], 2)[:, :, :3]}), (TypeError, "asset is int64 where uint32 or int32", {"asset": numbers.long(), "pose": at}),
             (ValueError, r"asset has shape \(59,\) where \(60,\)", {"asset": numbers[1:], "pose": at}), (TypeError, "pose", {}),
             (ValueError, r"pairs has shape \(3,\) where \(m, 2\)", {"pose": at, "pairs": torch.zeros(3, dtype=torch.int32, device="cuda")}),
-            (ValueError, "mode is 'best'", {"pose": at, "mode": "best"}), (TypeError, "stream is str", {"pose": at, "stream": "0"})):
+            (ValueError, "mode is 'best'", {"pose": at, "mode": "best"}), (TypeError, "stream is str", {"pose": at, "stream": "0"}),
+            (ValueError, "pose requires a gradient", {"pose": at.clone().requires_grad_()})):
         with pytest.raises(error, match=words):
             query.contacts(**arguments)
 

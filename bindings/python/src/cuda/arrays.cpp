@@ -2,6 +2,7 @@
 
 #include <nanobind/stl/string.h>
 
+#include <cstdlib>
 #include <cstring>
 #include <utility>
 
@@ -10,6 +11,7 @@ namespace {
 
 constexpr const char* kCapsule = "dltensor";
 constexpr const char* kUsedCapsule = "used_dltensor";
+constexpr const char* kNotContiguous = " is not contiguous, and nothing is copied";
 const cudaStream_t kLegacy = cudaStreamLegacy;
 
 // What a capsule keeps until its consumer, or nobody, has taken it.
@@ -48,15 +50,29 @@ bool is_default(cudaStream_t stream) {
   return stream == nullptr || stream == kLegacy;
 }
 
-// Whether what the stream of the producer holds now comes before what is queued on `stream` from now on,
-// without its help. PyTorch's takes 10 us for what takes one: it makes an object of every stream.
-bool ready_on(nb::handle object, cudaStream_t stream, int device) {
+// Of a name such as "float64"; others than numbers of 8 bits and more are nothing that is wanted anywhere.
+dlpack::DataType type_named(const std::string& name) {
+  const std::size_t digits = name.find_first_of("0123456789");
+  const std::string kind = name.substr(0, digits);
+  const std::uint8_t code = kind == "int"     ? dlpack::kInt
+                            : kind == "uint"  ? dlpack::kUInt
+                            : kind == "float" ? dlpack::kFloat
+                                              : dlpack::kOther;
+  const int bits = digits == std::string::npos ? 0 : std::atoi(name.c_str() + digits);
+  return {code, static_cast<std::uint8_t>(bits), 1};
+}
+
+// Whether it is a tensor of PyTorch.
+bool is_torch(nb::handle object) {
   const nb::object module = object.type().attr("__module__");
-  if (PyUnicode_CompareWithASCIIString(module.ptr(), "torch") != 0) return false;
-  const nb::object current = nb::module_::import_("torch.cuda").attr("current_stream")(device);
-  const cudaStream_t producer = stream_of(nb::cast<std::uintptr_t>(current.attr("cuda_stream")));
-  if (producer != stream && !(is_default(producer) && is_default(stream))) order(producer, stream);
-  return true;
+  return PyUnicode_CompareWithASCIIString(module.ptr(), "torch") == 0;
+}
+
+// The number of PyTorch's current stream, as compilers for PyTorch ask for it: an object of the stream takes
+// 5 us.
+cudaStream_t torch_stream(int device) {
+  const nb::object number = nb::module_::import_("torch._C").attr("_cuda_getCurrentRawStream")(device);
+  return stream_of(nb::cast<std::uintptr_t>(number));
 }
 
 }  // namespace
@@ -174,7 +190,7 @@ Array Rows::column(std::size_t offset, std::uint8_t code, std::uint8_t bits, std
 }
 
 nb::object Rows::to_cpu() const {
-  nb::object bytes = make_bytes(count_ * row_bytes_);
+  nb::object bytes = make_bytes(nullptr, count_ * row_bytes_);
   if (count_ == 0) return bytes;
   void* const to = bytes_begin(bytes);
   const OnDevice current(memory_.device);
@@ -190,7 +206,9 @@ nb::object Rows::to_cpu() const {
 // ---- Arrays that are given
 
 GivenArray::GivenArray(nb::handle object, const char* name, cudaStream_t stream, int device) : name_(name) {
-  if (nb::hasattr(object, "__dlpack__") && nb::hasattr(object, "__dlpack_device__")) {
+  if (is_torch(object)) {
+    take_tensor(object, stream, device);
+  } else if (nb::hasattr(object, "__dlpack__") && nb::hasattr(object, "__dlpack_device__")) {
     take_capsule(object, stream, device);
   } else if (nb::hasattr(object, "__cuda_array_interface__")) {
     take_interface(nb::cast<nb::dict>(object.attr("__cuda_array_interface__")), stream, device);
@@ -229,10 +247,29 @@ void GivenArray::require_contiguous(const std::int64_t* strides, std::int64_t un
   std::int64_t wanted = unit;
   for (std::size_t i = shape_.size(); strides != nullptr && i-- > 0;) {
     if (shape_[i] == 0) return;
-    if (shape_[i] != 1 && strides[i] != wanted)
-      throw nb::value_error((name_ + " is not contiguous, of which nothing is copied").c_str());
+    if (shape_[i] != 1 && strides[i] != wanted) throw nb::value_error((name_ + kNotContiguous).c_str());
     wanted *= shape_[i];
   }
+}
+
+// PyTorch's protocols take 10 us for an array; this takes one.
+void GivenArray::take_tensor(nb::handle object, cudaStream_t stream, int device) {
+  if (!nb::cast<bool>(object.attr("is_cuda")))
+    throw nb::type_error((name_ + " lies in CPU memory where GPU memory is wanted").c_str());
+  require_device(nb::cast<int>(object.attr("get_device")()), device);
+  if (nb::cast<bool>(object.attr("requires_grad")))
+    throw nb::value_error(
+        (name_ + " requires a gradient, of which a query knows nothing: detach() it").c_str());
+  for (nb::handle length : object.attr("shape")) shape_.push_back(nb::cast<std::int64_t>(length));
+  if (!nb::cast<bool>(object.attr("is_contiguous")()))
+    throw nb::value_error((name_ + kNotContiguous).c_str());
+  const nb::object type = object.attr("dtype");
+  type_ = type_named(nb::cast<std::string>(nb::str(nb::handle(type))).substr(std::strlen("torch.")));
+  data_ = reinterpret_cast<const void*>(nb::cast<std::uintptr_t>(object.attr("data_ptr")()));
+  const cudaStream_t producer = torch_stream(device);
+  if (producer == stream || (is_default(producer) && is_default(stream))) return;
+  const OnDevice current(device);
+  order(producer, stream);
 }
 
 void GivenArray::take_capsule(nb::handle object, cudaStream_t stream, int device) {
@@ -242,10 +279,8 @@ void GivenArray::take_capsule(nb::handle object, cudaStream_t stream, int device
     throw nb::type_error(
         (name_ + " lies in CPU memory, or on another kind of device, where GPU memory is wanted").c_str());
   require_device(nb::cast<int>(nb::int_(where[1])), device);
-  const OnDevice current(device);  // PyTorch hands out arrays of the current device alone
-  const nb::object capsule = ready_on(object, stream, device)
-                                 ? object.attr("__dlpack__")(nb::arg("stream") = -1)
-                                 : object.attr("__dlpack__")(nb::arg("stream") = number_of(stream));
+  const OnDevice current(device);  // some hand out arrays of the current device alone
+  const nb::object capsule = object.attr("__dlpack__")(nb::arg("stream") = number_of(stream));
   auto* const managed = static_cast<dlpack::ManagedTensor*>(PyCapsule_GetPointer(capsule.ptr(), kCapsule));
   if (managed == nullptr || PyCapsule_SetName(capsule.ptr(), kUsedCapsule) != 0) throw nb::python_error();
   managed_ = managed;

@@ -114,6 +114,7 @@ class GivenArray {
   [[noreturn]] void wrong_shape(const char* wanted) const;
 
  private:
+  void take_tensor(nb::handle object, cudaStream_t stream, int device);
   void take_capsule(nb::handle object, cudaStream_t stream, int device);
   void take_interface(const nb::dict& interface, cudaStream_t stream, int device);
   void require_contiguous(const std::int64_t* strides, std::int64_t unit) const;

@@ -20,6 +20,7 @@ struct DataType {
 };
 
 inline constexpr std::uint8_t kInt = 0, kUInt = 1, kFloat = 2;
+inline constexpr std::uint8_t kOther = 255;  ///< no code of DLPack's
 
 struct Tensor {
   void* data;

@@ -24,6 +24,16 @@ Assets::Assets(nb::list assets, int device, std::uint32_t contents, std::uintptr
   check(status, where);
 }
 
+std::shared_ptr<Buffer> Assets::zeros(std::size_t count) const {
+  const std::size_t bytes = count * sizeof(std::uint32_t);
+  if (zeros_ != nullptr && zeros_->bytes() >= bytes) return zeros_;
+  const OnDevice current(device_);
+  auto made = std::make_shared<Buffer>(bytes + bytes / 2);
+  check_cuda(cudaMemset(made->data(), 0, made->bytes()));
+  check_cuda(cudaDeviceSynchronize());
+  return zeros_ = made;
+}
+
 Instances::Instances(const Assets& assets, nb::handle asset, nb::handle pose, std::uintptr_t stream)
     : pose_(pose, "pose", stream_of(stream), assets.device()), device_(assets.device()) {
   pose_.require_type({kF64}, "float64");
@@ -34,9 +44,7 @@ Instances::Instances(const Assets& assets, nb::handle asset, nb::handle pose, st
   instances_.pose = static_cast<const tandem_pose*>(pose_.data());
   instances_.count = count_of(shape[0], pose_);
   if (asset.is_none()) {
-    const OnDevice current(device_);
-    zeros_ = std::make_unique<Buffer>(instances_.count * sizeof(std::uint32_t));
-    check_cuda(cudaMemsetAsync(zeros_->data(), 0, zeros_->bytes(), stream_of(stream)));
+    zeros_ = assets.zeros(instances_.count);
     instances_.asset = static_cast<const std::uint32_t*>(zeros_->data());
     return;
   }

@@ -3,22 +3,6 @@
 
 namespace tandem::python {
 
-/// Copies of assets in the memory of one GPU.
-class Assets {
- public:
-  Assets(nb::list assets, int device, std::uint32_t contents, std::uintptr_t stream);
-  ~Assets() { tandem_gpu_assets_release(assets_); }
-  Assets(const Assets&) = delete;
-  Assets& operator=(const Assets&) = delete;
-  tandem_gpu_assets* get() const { return assets_; }
-  int device() const { return device_; }
-  std::size_t bytes() const { return tandem_gpu_assets_bytes(assets_); }
-
- private:
-  tandem_gpu_assets* assets_ = nullptr;
-  int device_;
-};
-
 /// GPU memory of the package's own.
 class Buffer {
  public:
@@ -36,6 +20,27 @@ class Buffer {
   std::size_t bytes_;
 };
 
+/// Copies of assets in the memory of one GPU.
+class Assets {
+ public:
+  Assets(nb::list assets, int device, std::uint32_t contents, std::uintptr_t stream);
+  ~Assets() { tandem_gpu_assets_release(assets_); }
+  Assets(const Assets&) = delete;
+  Assets& operator=(const Assets&) = delete;
+  tandem_gpu_assets* get() const { return assets_; }
+  int device() const { return device_; }
+  std::size_t bytes() const { return tandem_gpu_assets_bytes(assets_); }
+
+  /// So many zeros in GPU memory, the numbers of instances that are all of asset 0. Allocates, and waits for
+  /// the device, where there were never as many.
+  std::shared_ptr<Buffer> zeros(std::size_t count) const;
+
+ private:
+  tandem_gpu_assets* assets_ = nullptr;
+  int device_;
+  mutable std::shared_ptr<Buffer> zeros_;
+};
+
 /// Bodies: somebody's arrays of assets and poses, which are read where they are in every call.
 class Instances {
  public:
@@ -46,7 +51,7 @@ class Instances {
 
  private:
   GivenArray asset_, pose_;
-  std::unique_ptr<Buffer> zeros_;
+  std::shared_ptr<Buffer> zeros_;
   tandem_gpu_instances instances_ = {};
   int device_;
 };

@@ -23,6 +23,7 @@ Step::Step(nb::object assets, std::uint32_t instances, std::uint32_t pairs, std:
   contacts_ = ContactQueries::make(assets_.device(), [&](tandem_gpu_contact_query* made) {
     return tandem_gpu_contact_query_set_assets(made, assets_.get(), nullptr);
   });
+  static_cast<void>(assets_.zeros(instances));  // so that nothing need be made in a capture
   const tandem_gpu_broad_phase_capacity near_room = {instances, pairs};
   const tandem_gpu_query_capacity room = {pairs, 0, contacts, undecided};
   check_whole(tandem_gpu_broad_phase_reserve(broad_phase_.get(), &near_room, &near_));

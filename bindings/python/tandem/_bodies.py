@@ -11,7 +11,7 @@ import numpy as np
 import trimesh.triangles
 
 from . import INSIDE, INSTANCE, NO_INDEX, Asset, Filter, Query, build
-from ._convex import Array, Overlap, Solid, face_overlaps, overlap
+from ._convex import Array, Overlap, Solid, cross, face_overlaps, overlap
 
 RIGID = 4e-7  # what a pose may be off: queries take 1e-6, by another measure of the same matrix
 ROUNDING = 1e-5  # a matrix that is so near to a rotation is meant to be one
@@ -426,7 +426,7 @@ def _nearest(pair: Any, row: Any) -> Nearest:
 
 def unit_normals(corners: Array) -> Array:
     """(n, 3) of triangles (n, 3, 3)."""
-    normals: Array = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals: Array = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
     return normals
 
@@ -437,10 +437,10 @@ def meeting_points(a: Array, b: Array) -> Array:
     total, count = np.zeros((len(a), 3)), np.zeros(len(a))
     for edges, other in ((a, b), (b, a)):
         origin, u, v = other[:, 0], other[:, 1] - other[:, 0], other[:, 2] - other[:, 0]
-        normal = np.cross(u, v)
+        normal = cross(u, v)
         square = np.maximum((normal * normal).sum(axis=1), np.finfo(float).tiny)[:, None]
         # Of a point origin + s u + t v of the plane: s and t.
-        to_s, to_t = np.cross(v, normal) / square, np.cross(normal, u) / square
+        to_s, to_t = cross(v, normal) / square, cross(normal, u) / square
         heights = np.einsum("nij,nj->ni", edges - origin[:, None], normal)
         ends, heights_of_ends = np.roll(edges, -1, axis=1), np.roll(heights, -1, axis=1)
         crosses = heights * heights_of_ends < 0

@@ -17,6 +17,14 @@ FEW_CROSSINGS = 600  # of an edge of one body and one of the other
 CHUNK = 1 << 22  # numbers of a matrix that are there at a time
 
 
+def cross(u: Array, v: Array) -> Array:
+    """The cross products of vectors (..., 3); of few vectors NumPy 2's own takes twice as long, or more."""
+    products: Array = np.empty(np.broadcast_shapes(u.shape, v.shape))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        products[..., i] = u[..., j] * v[..., k] - u[..., k] * v[..., j]
+    return products
+
+
 @dataclass(frozen=True, slots=True)
 class Overlap:
     """How two bodies are parted by the shortest way. Lengths are in the bodies' unit."""
@@ -79,11 +87,11 @@ class Solid:
         return int(self._heights(points).argmin())
 
 
-def _hull(points: Array) -> Any:
+def _hull(points: Array, incremental: bool = False) -> Any:
     try:
-        return ConvexHull(points)
+        return ConvexHull(points, incremental)
     except QhullError:
-        return ConvexHull(points, qhull_options="QJ")  # flat to rounding: points are moved by as much
+        return ConvexHull(points, incremental, "QJ")  # flat to rounding: points are moved by as much
 
 
 def _chunks(rows: int, columns: int) -> list[slice]:
@@ -108,7 +116,8 @@ def overlap(a: Solid, b: Solid) -> Overlap:
     """
     tolerance = 1e-10 * (a.size + b.size)
     normals, ways = (_all_ways if len(a.edges) * len(b.edges) <= FEW_CROSSINGS else _nearest_ways)(a, b, tolerance)
-    normal = np.unique(np.round(normals[ways <= ways.min() + tolerance], 12), axis=0)[0]
+    shortest = np.round(normals[ways <= ways.min() + tolerance], 12)
+    normal = shortest[np.lexsort(shortest.T[::-1])[0]]
     depth = max(0.0, float((a.vertices @ normal).max() - (b.vertices @ normal).min()))
     point_a = _deepest_point(a, b, depth, normal, 10 * tolerance)
     return Overlap(depth, normal, point_a, point_a - depth * normal)
@@ -117,7 +126,7 @@ def overlap(a: Solid, b: Solid) -> Overlap:
 def _all_ways(a: Solid, b: Solid, tolerance: float) -> tuple[Array, Array]:
     """Directions (n, 3), among them the normals of all faces of D, and (n,) how far D goes along each: its faces are those of a, those of b turned round, and
     parallelograms of an edge each."""
-    crosses = np.cross(a.edges[:, None], b.edges[None]).reshape(-1, 3)
+    crosses = cross(a.edges[:, None], b.edges[None]).reshape(-1, 3)
     lengths = np.linalg.norm(crosses, axis=1)
     crosses = crosses[lengths > 1e-9] / lengths[lengths > 1e-9, None]
     normals = np.concatenate([a.normals, -b.normals, crosses, -crosses])
@@ -139,8 +148,8 @@ def _nearest_ways(a: Solid, b: Solid, tolerance: float) -> tuple[Array, Array]:
     if np.linalg.matrix_rank(points - points[0], tolerance) < 3:
         points = np.concatenate([points, a.vertices - b.vertices[0]])  # which spans space as a does
     shortest = np.inf  # of the ways that were tried
+    hull = _hull(points, incremental=True)
     while True:
-        hull = _hull(points)
         normals, offsets = hull.equations[:, :3], -hull.equations[:, 3]
         near = offsets <= shortest + tolerance
         normals, offsets = normals[near], offsets[near]
@@ -150,7 +159,7 @@ def _nearest_ways(a: Solid, b: Solid, tolerance: float) -> tuple[Array, Array]:
         beyond = (ways > offsets + tolerance) & (offsets <= shortest + tolerance)
         if not beyond.any():
             return normals, ways
-        points = np.concatenate([points[hull.vertices], found[beyond]])
+        hull.add_points(found[beyond])
 
 
 def _deepest_point(a: Solid, b: Solid, depth: float, normal: Array, tolerance: float) -> Array:
@@ -185,7 +194,7 @@ def face_overlaps(solid: Solid, corners: Array) -> tuple[Array, Array, Array]:
         planes[rows] = ways.argmin(axis=1)
         depths[rows] = ways.min(axis=1)
     normals = solid.normals[planes]
-    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    crosses = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     own = crosses / np.maximum(np.linalg.norm(crosses, axis=1), np.finfo(float).tiny)[:, None]
     heights = (own * corners[:, 0]).sum(axis=1)
     for side in (own, -own):

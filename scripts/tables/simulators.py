@@ -10,7 +10,7 @@ def pairs(rows):
 
 def scenes(rows):
     header = ["scene", "engine", "asked for", "found", "right", "contacts", "µs a step"]
-    cells = [[row["case"], _name(row), row["quantity"], row["value"], row["right"], row["contacts"], row["us_per_step"]] for row in rows if row["quantity"]]
+    cells = [[row["case"], _name(row), row["quantity"], row["value"], row["right"], row["contacts"], f"{int(row['us_per_step']):,}"] for row in rows if row["quantity"]]
     return tabular.markdown(header, cells, "lll")
 
 

@@ -4,13 +4,14 @@ from common import tabular
 
 def pairs(rows):
     header = ["bodies", "peer", "poses that touch", "missed", "poses apart", "invented"]
-    return tabular.markdown(header, [[row["case"], _name(row), row["touch"], row["missed"], row["apart"], row["invented"]] for row in rows if row["touch"]], "ll")
+    cells = [[row["case"], _name(row), row["touch"], row["missed"], row["apart"], row["invented"]] for row in rows if row["touch"]]
+    return tabular.markdown(header, cells, "ll")
 
 
 def scenes(rows):
-    header = ["scene", "engine", "height, m", "where it ought to be", "contacts, last second", "µs a step"]
-    cells = [[row["case"], _name(row), row["height"], row["right"], row["contacts"], row["us_per_step"]] for row in rows if row["height"]]
-    return tabular.markdown(header, cells, "ll")
+    header = ["scene", "engine", "asked for", "found", "right", "contacts", "µs a step"]
+    cells = [[row["case"], _name(row), row["quantity"], row["value"], row["right"], row["contacts"], f"{int(row['us_per_step']):,}"] for row in rows if row["quantity"]]
+    return tabular.markdown(header, cells, "lll")
 
 
 def _name(row):

@@ -86,8 +86,11 @@ def test_chain_hangs():
 
 
 def random_model(random):
-    """Overlapping cubes of random trees of bodies, with random filters and parameters: nothing is apart, so that contacts tell which pairs may collide."""
+    """Overlapping cubes of random trees of bodies, with random filters and parameters: no hulls are apart, so that contacts tell which pairs may collide."""
     names = {"body": 0, "geom": 0}
+
+    def words(values):
+        return " ".join(map(str, values))
 
     def take(kind):
         names[kind] += 1
@@ -96,10 +99,11 @@ def random_model(random):
     def geom():
         uniform = random.uniform
         solref = f"{uniform(0.01, 0.03)} {uniform(0.5, 2)}" if random.random() < 0.7 else f"{-uniform(100, 900)} {-uniform(1, 9)}"
-        return (f"<geom name='{take('geom')}' mesh='cube' pos='{uniform(-.3, .3)} {uniform(-.3, .3)} {uniform(-.3, .3)}' euler='{uniform(0, 90)} {uniform(0, 90)} {uniform(0, 90)}' "
-                f"friction='{uniform(0, 1)} {uniform(0, .1)} {uniform(0, .1)}' solref='{solref}' solimp='{uniform(.5, .9)} {uniform(.9, .99)} {uniform(.001, .1)} {uniform(.2, .8)} {uniform(1, 4)}' "
-                f"margin='{uniform(0, .01)}' gap='{random.choice([0, .002])}' solmix='{random.choice([0, 1, uniform()])}' priority='{random.choice([0, 0, 1])}' condim='{random.choice([1, 3, 4, 6])}' "
-                f"contype='{random.integers(4)}' conaffinity='{random.integers(4)}' adhesion='{uniform()}' surfacevel='{' '.join(map(str, uniform(size=6)))}'/>")
+        solimp = f"{uniform(.5, .9)} {uniform(.9, .99)} {uniform(.001, .1)} {uniform(.2, .8)} {uniform(1, 4)}"
+        return (f"<geom name='{take('geom')}' mesh='cube' pos='{words(uniform(-.3, .3, 3))}' euler='{words(uniform(0, 90, 3))}' margin='{uniform(0, .01)}' "
+                f"friction='{words(uniform(0, (1, .1, .1)))}' solref='{solref}' solimp='{solimp}' condim='{random.choice([1, 3, 4, 6])}' "
+                f"gap='{random.choice([0, .002])}' solmix='{random.choice([0, 1, uniform()])}' priority='{random.choice([0, 0, 1])}' adhesion='{uniform()}' "
+                f"contype='{random.integers(4)}' conaffinity='{random.integers(4)}' surfacevel='{words(uniform(size=6))}'/>")
 
     def body(depth):
         joint = random.choice(["", "<joint axis='0 1 0'/>"] if depth else ["", "<freejoint/>", "<joint type='slide'/>"])
@@ -110,12 +114,12 @@ def random_model(random):
     world = geom() + geom() + "".join(body(0) for _ in range(3))
     excluded = "".join(f"<exclude body1='b{a}' body2='b{b}'/>" for a, b in random.integers(1, names["body"] + 1, (3, 2)) if a != b)
     chosen = {tuple(random.choice(np.arange(3, names["geom"] + 1), 2, replace=False)) for _ in range(3)}
-    pairs = "".join(f"<pair geom1='g{a}' geom2='g{b}' condim='{random.choice([1, 3, 4, 6])}' friction='{' '.join(map(str, random.uniform(size=5)))}' "
+    pairs = "".join(f"<pair geom1='g{a}' geom2='g{b}' condim='{random.choice([1, 3, 4, 6])}' friction='{words(random.uniform(size=5))}' "
                     f"margin='{random.uniform(0, .01)}' gap='0.001' solref='0.015 1.1' solimp='.8 .9 .01 .5 2' adhesion='{random.uniform()}' "
                     f"solreffriction='{random.choice([0, 0.02])} 1'/>" for a, b in {tuple(sorted(pair)) for pair in chosen})
     flags = "".join(f" {name}='{random.choice(['enable', 'disable'])}'" for name in ("override", "filterparent"))
-    return (f"<mujoco><option o_margin='.003' o_friction='.4 .4 .1 .1 .1' o_solref='.03 1.1' o_solimp='.7 .9 .01 .4 2'><flag{flags}/></option><size memory='64M'/>"
-            f"<asset>{mesh_xml('cube', solids.box(0.5, 0.5, 0.5))}</asset><default><geom type='mesh'/></default><worldbody>{world}</worldbody>"
+    return (f"<mujoco><option o_margin='.003' o_friction='.4 .4 .1 .1 .1' o_solref='.03 1.1' o_solimp='.7 .9 .01 .4 2'><flag{flags}/></option>"
+            f"<size memory='64M'/><asset>{mesh_xml('cube', solids.box(0.5, 0.5, 0.5))}</asset><default><geom type='mesh'/></default><worldbody>{world}</worldbody>"
             f"<contact>{excluded}{pairs}</contact></mujoco>")
 
 
@@ -162,8 +166,10 @@ def test_surface_velocity_is_that_of_mujoco():
 WITHOUT_TOUCHING_MESHES = """
 <geom type='plane' size='5 5 0.1'/><geom mesh='box' pos='9 0 0'/>
 <body name='cart' pos='0 0 1'><joint name='slide' type='slide' axis='1 0 0' damping='0.1' range='-1 1' limited='true'/><geom type='box' size='0.1 0.1 0.1'/>
-  <body pos='0 0 -0.2'><joint name='swing' axis='0 1 0' frictionloss='0.01'/><geom type='capsule' size='0.03 0.2' pos='0 0 -0.2'/><site name='tip' pos='0 0 -0.4'/></body></body>
-<body pos='1 0 0.2'><freejoint/><geom mesh='box' priority='1'/><site name='site'/></body><body pos='1.1 0.1 0.9'><freejoint/><geom type='sphere' size='0.1'/></body>"""
+  <body pos='0 0 -0.2'><joint name='swing' axis='0 1 0' frictionloss='0.01'/><geom type='capsule' size='0.03 0.2' pos='0 0 -0.2'/>
+    <site name='tip' pos='0 0 -0.4'/></body></body>
+<body pos='1 0 0.2'><freejoint/><geom mesh='box' priority='1'/><site name='site'/></body>
+<body pos='1.1 0.1 0.9'><freejoint/><geom type='sphere' size='0.1'/></body>"""
 WITH_ALL_ELSE = """
 <tendon><spatial name='rope' stiffness='3' springlength='0.5'><site site='tip'/><site site='site'/></spatial></tendon>
 <equality><joint joint1='swing' polycoef='0.1 0 0 0 0' active='true'/></equality>
@@ -171,7 +177,10 @@ WITH_ALL_ELSE = """
 <sensor><e_potential/><e_kinetic/><framepos objtype='site' objname='tip'/><touch site='site'/><accelerometer site='site'/><tendonpos tendon='rope'/></sensor>"""
 
 
-@pytest.mark.parametrize("option", ["integrator='Euler'", "integrator='implicit' cone='elliptic'", "integrator='implicitfast' solver='CG' noslip_iterations='3'"])
+OPTIONS = ["integrator='Euler'", "integrator='implicit' cone='elliptic'", "integrator='implicitfast' solver='CG' noslip_iterations='3'"]
+
+
+@pytest.mark.parametrize("option", OPTIONS)
 def test_a_step_without_contacts_of_meshes_is_a_step_of_mujoco(option):
     model = model_of(WITHOUT_TOUCHING_MESHES, option, WITH_ALL_ELSE, box=solids.box(0.1, 0.2, 0.15))
     contacts = tandem.mujoco.MeshContacts(model)
@@ -185,7 +194,8 @@ def test_a_step_without_contacts_of_meshes_is_a_step_of_mujoco(option):
 
 
 def test_contacts_with_other_geoms_stay():
-    model = model_of("<geom type='plane' size='2 2 0.1'/>" + free("cup", "0 0 -0.001") + free("ball", "0 0 0.1385") + "<body pos='0.5 0 0.0999'><freejoint/><geom type='sphere' size='0.1'/></body>",
+    sphere = "<body pos='0.5 0 0.0999'><freejoint/><geom type='sphere' size='0.1'/></body>"
+    model = model_of("<geom type='plane' size='2 2 0.1'/>" + free("cup", "0 0 -0.001") + free("ball", "0 0 0.1385") + sphere,
                      cup=solids.cup(0.15, 0.18, 0.04, 0.25), ball=solids.ball(0.1))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -241,7 +251,8 @@ def test_what_is_met_only_on_the_way_is_no_contact():
 def test_the_program_of_the_page_runs():
     page = pathlib.Path(__file__).parents[2] / "docs" / "python_simulators.md"
     program = page.read_text().split("## MuJoCo")[1].split("```python\n")[1].split("```")[0]
-    scene = model_of("<geom type='plane' size='2 2 0.1'/>" + free("cup", "0 0 0") + free("ball", "0.01 0 0.4"), cup=solids.cup(0.15, 0.18, 0.04, 0.25), ball=solids.ball(0.1))
+    scene = model_of("<geom type='plane' size='2 2 0.1'/>" + free("cup", "0 0 0") + free("ball", "0.01 0 0.4"),
+                     cup=solids.cup(0.15, 0.18, 0.04, 0.25), ball=solids.ball(0.1))
     mujoco.mj_saveLastXML("scene.xml", scene)
     names = {"mujoco": mujoco, "tandem": tandem}
     exec(program, names)

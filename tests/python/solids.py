@@ -3,7 +3,7 @@ import numpy as np
 
 
 def lathe(profile, sides):
-    """Turns a polygon, (n, 2) of radius and height, about z: counterclockwise, radius to the right and height up. Its first and last corners may lie on the axis."""
+    """Turns a polygon about z: (n, 2) of radius and height, counterclockwise with the radius to the right. Its first and last corners may be on the axis."""
     profile = np.asarray(profile, float)
     place, vertices = [], []  # where each corner's ring of vertices begins
     angle = 2 * np.pi * np.arange(sides) / sides

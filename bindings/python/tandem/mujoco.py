@@ -26,7 +26,7 @@ _Array = NDArray[np.float64]
 # Contacts have a surface velocity, and may be speculative, from MuJoCo 4 on.
 _CONTACT_FIELDS = [name for name in dir(mujoco.MjContact) if not name.startswith("_")]
 _INTEGRATORS_THAT_COLLIDE = {mujoco.mjtIntegrator.mjINT_RK4: "RK4", mujoco.mjtIntegrator.mjINT_DISCRETE: "discrete"}
-_FLAGS_THAT_COLLIDE = {flag: name for flag, name in ((mujoco.mjtEnableBit.__members__.get(f"mjENBL_{name.upper()}"), name) for name in ("sleep", "speculative")) if flag}
+_FLAGS_THAT_COLLIDE = {flag: name for name in ("sleep", "speculative") if (flag := mujoco.mjtEnableBit.__members__.get(f"mjENBL_{name.upper()}"))}
 _LEAST_FRICTION = 1e-5  # mjMINMU
 _LEAST_MIX = 1e-15  # mjMINVAL
 
@@ -34,16 +34,22 @@ _LEAST_MIX = 1e-15  # mjMINVAL
 class MeshContacts:
     """Finds the contacts between mesh geoms of a model by Tandem, and leaves all others to MuJoCo.
 
-    The meshes are those of the model, with all their faces; their hulls play no part. A pair of geoms has the points of its manifolds, each
-    with the manifold's normal and its depth; where it is apart by less than its margin and gap, the points that are, found along the way from one to the other. Which pairs may collide is
-    MuJoCo's rule (contype and conaffinity, weld and parent bodies, <exclude>, <pair>), taken from the model when this is made; the callback
-    mjcb_contactfilter is not asked. Margin, gap, condim, friction, solref, solimp and what else a contact has are combined as MuJoCo does, from the
-    model as it is in each call.
+    The meshes are those of the model, with all their faces; their hulls play no part. A pair of geoms has the points of its manifolds, each with
+    the manifold's normal and its depth; where it is apart by less than its margin and gap, the points that are, found along the way from one to the
+    other. Which pairs may collide is MuJoCo's rule (contype and conaffinity, weld and parent bodies, <exclude>, <pair>), taken from the model when
+    this is made; the callback mjcb_contactfilter is not asked. Margin, gap, condim, friction, solref, solimp and what else a contact has are combined
+    as MuJoCo does, from the model as it is in each call. A mesh that is wholly within another does not touch it.
 
-    A mesh that is wholly within another does not touch it.
+    One call at a time; for threads that each have an MjData, make one for each.
 
-    model: not changed. most_points: of a manifold, 1 to 7. threads: of a query. effort: as of tandem.build(). Raises ValueError where no two
-    mesh geoms of the model may collide. One call at a time; for threads that each have an MjData, make one for each.
+    Args:
+        model: not changed.
+        most_points: of a manifold, 1 to 7.
+        threads: of a query.
+        effort: as of tandem.build().
+
+    Raises:
+        ValueError: no two mesh geoms of the model may collide.
     """
 
     def __init__(self, model: mujoco.MjModel, *, most_points: int = 7, threads: int = 1, effort: Literal["default", "fast", "best"] = "default") -> None:
@@ -66,12 +72,15 @@ class MeshContacts:
     def step(self, data: mujoco.MjData, count: int = 1) -> None:
         """Does what mj_step(model, data, count) does, with Tandem's contacts.
 
-        Raises ValueError where the model's integrator is RK4 or discrete, or sleeping or speculative contacts are enabled: these look for
-        contacts at places that MuJoCo does not open to others. Otherwise as collide().
+        Raises:
+            ValueError: the integrator is RK4 or discrete, or sleeping or speculative contacts are enabled: these look for contacts at places that
+                MuJoCo does not open to others.
+            MemoryError, tandem.Error: as of collide().
         """
         model, option = self.model, self.model.opt
         if option.integrator in _INTEGRATORS_THAT_COLLIDE:
-            raise ValueError(f"the integrator {_INTEGRATORS_THAT_COLLIDE[option.integrator]} looks for contacts by itself; take Euler, implicit or implicitfast")
+            raise ValueError(f"the integrator {_INTEGRATORS_THAT_COLLIDE[option.integrator]} looks for contacts by itself; "
+                             "take Euler, implicit or implicitfast")
         for _ in range(count):
             mujoco.mj_checkPos(model, data)
             mujoco.mj_checkVel(model, data)
@@ -107,9 +116,11 @@ class MeshContacts:
     def collide(self, data: mujoco.MjData) -> int:
         """Does what mj_collision(model, data) does, with Tandem's contacts, which come last in data.contact; returns how many they are.
 
-        For programs that call the stages of a step by themselves: after mj_fwdKinematics(), before mj_makeConstraint(). Raises MemoryError
-        where data has no room for all contacts (<size memory="..."/>); then data.contact has MuJoCo's other contacts alone. Raises tandem.Error
-        where a geom's pose is not a number.
+        For programs that call the stages of a step by themselves: after mj_fwdKinematics(), before mj_makeConstraint().
+
+        Raises:
+            MemoryError: data has no room for all contacts (<size memory="..."/>); data.contact then has MuJoCo's other contacts alone.
+            tandem.Error: a geom's pose is not a number.
         """
         mujoco.mj_collision(self.model, data)
         if self.model.opt.disableflags & (mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT):

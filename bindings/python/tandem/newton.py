@@ -32,9 +32,10 @@ class CollisionPipeline:
     """Newton's collision pipeline, but that Tandem finds the contacts between meshes.
 
     Pairs of mesh shapes have the points of their manifolds, each with the manifold's normal and the points of both surfaces; where shapes have margins
-    and the surfaces are apart by less than both, the points that are, found along the way from one to the other. Gaps, by which Newton looks for contacts before there are any, play no part between
-    meshes: collide in every substep. All other pairs, particles and soft contacts are Newton's. Which pairs may collide is told by
-    model.shape_contact_pairs, as it is when this is made. Meshes of a model on a GPU are looked at by the CPU, and collide() waits for the GPU.
+    and the surfaces are apart by less than both, the points that are, found along the way from one to the other. Gaps, by which Newton looks for
+    contacts before there are any, play no part between meshes: collide in every substep. All other pairs, particles and soft contacts are Newton's.
+    Which pairs may collide is told by model.shape_contact_pairs, as it is when this is made. Meshes of a model on a GPU are looked at by the CPU, and
+    collide() waits for the GPU.
 
     A mesh that is wholly within another does not touch it.
 
@@ -54,7 +55,7 @@ class CollisionPipeline:
         def values(name: str) -> npt.NDArray[Any]:
             return np.asarray(getattr(model, name).numpy())
 
-        pairs = np.sort(values("shape_contact_pairs").reshape(-1, 2).astype(np.intp), axis=1)
+        pairs = values("shape_contact_pairs").reshape(-1, 2).astype(np.intp)
         is_ours = (values("shape_type")[pairs] == newton.GeoType.MESH).all(axis=1)
         others: Any = wp.array(pairs[~is_ours].astype(np.int32), dtype=wp.vec2i, device=model.device)
         self.others = newton.CollisionPipeline(model, broad_phase="explicit", shape_pairs_filtered=others, **options)
@@ -68,7 +69,7 @@ class CollisionPipeline:
         self.instances = np.zeros(len(self.shapes), tandem.INSTANCE)  #: the shapes, posed as in the last call
         self.instances["asset"] = asset
         if len(self.shapes):
-            self._arguments = pair_arguments(len(self.shapes), np.searchsorted(self.shapes, pairs[is_ours]))
+            self._arguments = pair_arguments(len(self.shapes), np.searchsorted(self.shapes, np.sort(pairs[is_ours], axis=1)))
             self._query = tandem.Query(self.assets, threads=threads)
 
     def contacts(self) -> newton.Contacts:
@@ -89,7 +90,7 @@ class CollisionPipeline:
         if len(self.shapes) == 0:
             return 0
         poses: Any = state.body_q
-        body = poses.numpy().astype(np.float64)[self._body] if len(poses) else np.zeros((len(self.shapes), 7))
+        body = poses.numpy().astype(np.float64)[self._body]
         body[self._is_static] = 0, 0, 0, 0, 0, 0, 1
         rotation, inner = _rotations(body), self._in_body
         self.instances["rotation"] = rotation @ inner[0]

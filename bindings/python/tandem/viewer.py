@@ -52,9 +52,13 @@ def view(what: Any, instances: NDArray[np.void] | None = None, *, picture: str |
     hidden = off_screen or picture is not None
     shown = View(what, instances, off_screen=hidden, **options)
     try:
-        return shown.picture(picture) if hidden else shown.show()
+        if hidden:
+            return shown.picture(picture)
+        shown.show()
+        return None
     finally:
-        shown.close()
+        if hidden or not shown.plotter.notebook:
+            shown.close()
 
 
 class View:
@@ -141,10 +145,10 @@ class View:
         image = self.plotter.screenshot(path, return_img=True)
         return np.asarray(image)[..., :3]
 
-    def show(self) -> Any:
-        """Opens the window, with sliders, and waits until it is closed. In a notebook it returns pyvista's widget."""
+    def show(self) -> None:
+        """Opens the window, with sliders, and waits until it is closed. In a notebook it shows pyvista's widget."""
         self.add_sliders()
-        return self.plotter.show()
+        self.plotter.show()
 
     def add_sliders(self) -> None:
         """Adds a slider for the steps of a run, and one for the depth of the tree where its boxes are shown."""
@@ -205,7 +209,8 @@ class View:
     def _open(self, off_screen: bool, size: tuple[int, int]) -> None:
         self.plotter = _plotter(off_screen, size)
         self.plotter.set_background(BACKGROUND[0], top=BACKGROUND[1])
-        self.plotter.enable_anti_aliasing("ssaa" if off_screen else "fxaa")
+        if off_screen:
+            self.plotter.enable_anti_aliasing("ssaa")
         if self._opacity < 1:
             self.plotter.enable_depth_peeling(6)
         self._bodies = []

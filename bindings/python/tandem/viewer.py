@@ -68,7 +68,7 @@ class View:
 
     what, instances: as for view().
     contacts: tandem.Contacts of these instances, whose triangles are drawn in red; or True: a query finds them, anew
-        for each state of a run.
+        for each state of a run, of the pairs that the scene file or `motion` lets through.
     manifolds: tandem.Manifolds of these instances, drawn as points in the colour of their depths, with an arrow for the
         normal of each manifold, from a to b; or True as above.
     distances: tandem.Distances of these instances: a line between the nearest points of each pair, in the colour of
@@ -101,6 +101,7 @@ class View:
         self.scene = _scene(what, instances)
         moved = self.scene.motion if motion is None else np.asarray(motion)
         self._motion = np.broadcast_to(moved, self.scene.asset.shape)
+        self._filter = self.scene.filter if motion is None else tandem.Filter(motion=self._motion)
         self._use_levels(levels)
         for name, found in (("contacts", contacts), ("manifolds", manifolds), ("distances", distances)):
             if found not in (False, True, None) and (len(self.scene.steps) > 1 or levels is not None):
@@ -109,7 +110,7 @@ class View:
         self._query = tandem.Query(self._assets) if contacts is True or manifolds is True else None
         self.tree_depth, self._color = tree_depth, color
         inside = contacts is not False or manifolds is not False or distances is not None
-        self._opacity = opacity if opacity is not None else TRANSLUCENT if inside else 1.0
+        self.opacity = opacity if opacity is not None else TRANSLUCENT if inside else 1.0
         self._place()
         self._open(off_screen, size)
         self.state = self._state_after(step)
@@ -211,7 +212,7 @@ class View:
         self.plotter.set_background(BACKGROUND[0], top=BACKGROUND[1])
         if off_screen:
             self.plotter.enable_anti_aliasing("ssaa")
-        if self._opacity < 1:
+        if self.opacity < 1:
             self.plotter.enable_depth_peeling(6)
         self._bodies = []
         for row, triangles in enumerate(self._triangles):
@@ -225,8 +226,8 @@ class View:
             mapper.SetColorModeToDirectScalars()
             actor = vtk.vtkActor()
             actor.SetMapper(mapper)
-            actor.SetForceTranslucent(self._opacity < 1)  # the glyphs' colours have the opacity
-            actor.GetProperty().SetBackfaceCulling(self._opacity < 1 and bool(self._assets[row].levels[0].closed))
+            actor.SetForceTranslucent(self.opacity < 1)  # the glyphs' colours have the opacity
+            actor.GetProperty().SetBackfaceCulling(self.opacity < 1 and bool(self._assets[row].levels[0].closed))
             actor.GetProperty().SetAmbient(0.1)
             self.plotter.add_actor(actor, name=f"bodies {row}", reset_camera=False)
             self._bodies.append(mapper)
@@ -260,7 +261,7 @@ class View:
         self.plotter.renderer.ResetCameraClippingRange()
 
     def _draw_bodies(self) -> None:
-        opacity = np.full((len(self._asset), 1), round(255 * self._opacity), np.uint8)
+        opacity = np.full((len(self._asset), 1), round(255 * self.opacity), np.uint8)
         colour = np.concatenate([self.body_colours(), opacity], axis=1)
         centres = self._centres(self.state) - self.origin
         for row, mapper in enumerate(self._bodies):
@@ -285,7 +286,7 @@ class View:
         if self._query is not None:
             instances = tandem.instances(self._asset, rotation=self.scene.rotation[self.state],
                                          translation=self.scene.translation[self.state])
-            found = self._query.contacts(instances)
+            found = self._query.contacts(instances, pairs=self.scene.pairs, filter=self._filter)
             contacts = found if contacts is True else contacts
             manifolds = self._query.manifolds() if manifolds is True else manifolds
         if not isinstance(contacts, bool):

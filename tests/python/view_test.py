@@ -339,6 +339,23 @@ def test_a_scene_file_is_read_with_its_levels_and_motions(levelled, tmp_path):
     assert picture.shape == (SIZE[1], SIZE[0], 3) and picture.dtype == np.uint8
 
 
+@pytest.mark.parametrize(("name", "rows"), [("simulation/motion", [1, 1]), ("instances/group", [1, 2]), ("excluded", [[1, 0]]),
+                                            ("pairs", np.zeros((0, 2), "u4"))])
+def test_pairs_that_a_scene_file_leaves_out_are_not_red(shown, box, tmp_path, name, rows):
+    box.save(tmp_path / "box.bvh")
+    with h5py.File(tmp_path / "scene.h5", "w") as file:
+        file["assets"], file["instances/asset"] = ["box.bvh"], np.zeros(2, "u4")
+        file["instances/rotation"], file["instances/translation"] = np.stack([np.eye(3)] * 2), np.array([[0, 0, 0], [0.5, 0, 0]])
+        if name == "instances/group":
+            file["instances/mask"] = np.array([1, 2], "u4")
+    whole = shown(tmp_path / "scene.h5", contacts=True, color="level")
+    with h5py.File(tmp_path / "scene.h5", "r+") as file:
+        file[name] = np.array(rows, "u4")
+    limited = shown(tmp_path / "scene.h5", contacts=True, color="level")
+    bare = shown(tmp_path / "scene.h5", opacity=limited.opacity, color="level")
+    assert not np.array_equal(whole.picture(), bare.picture()) and np.array_equal(limited.picture(), bare.picture())
+
+
 def test_a_run_shows_its_steps_and_sliders_choose(shown, box, tmp_path):
     write_run(tmp_path / "run.h5", box)
     scene = scene_files.read(tmp_path / "run.h5")

@@ -28,6 +28,8 @@ class Scene:
     steps: NDArray[np.int64]  # (k,): steps made before each state, ascending
     rotation: NDArray[np.float64]  # (k, n, 3, 3): world = rotation x + translation
     translation: NDArray[np.float64]  # (k, n, 3)
+    pairs: NDArray[Any] | None = None  # (m, 2): those to test; None: those that `filter` lets through
+    filter: tandem.Filter | None = None
 
     def instances(self, state: int = -1) -> NDArray[np.void]:
         """The bodies of a state, (n,) of tandem.INSTANCE. Their assets are rows of `assets`, whatever `level` says."""
@@ -70,16 +72,20 @@ def _read(path: pathlib.Path, file: Any) -> Scene:
     if len(asset) and asset.max() >= len(names):
         raise ValueError(f"{path}: a body has asset {asset.max()} of {len(names)}")
     assets = [tandem.Asset.load(path.parent / name) for name in names]
+    motion = np.zeros(len(asset), np.uint8)
     if is_run:
-        motion = group["motion"][:].astype(np.uint8)
+        motion[:] = group["motion"][:]
         steps, rotation, translation = _states(path, file)
     else:
-        motion = np.zeros(len(asset), np.uint8)
         if "simulation/motion" in file:
             motion[:] = file["simulation/motion"][:]
         steps = np.zeros(1, np.int64)
         rotation, translation = group["rotation"][:][None], group["translation"][:][None]
-    return Scene(assets, asset, level, motion, steps, rotation.astype(float), translation.astype(float))
+    limits = {name: file[f"instances/{name}"][:] for name in ("group", "mask") if f"instances/{name}" in file}
+    if "excluded" in file:
+        limits["excluded"] = file["excluded"][:]
+    return Scene(assets, asset, level, motion, steps, rotation.astype(float), translation.astype(float),
+                 file["pairs"][:] if "pairs" in file else None, tandem.Filter(motion=motion, **limits))
 
 
 def _states(path: pathlib.Path, file: Any) -> tuple[NDArray[np.int64], NDArray[Any], NDArray[Any]]:

@@ -52,9 +52,13 @@ def view(what: Any, instances: NDArray[np.void] | None = None, *, picture: str |
     hidden = off_screen or picture is not None
     shown = View(what, instances, off_screen=hidden, **options)
     try:
-        return shown.picture(picture) if hidden else shown.show()
+        if hidden:
+            return shown.picture(picture)
+        shown.show()
+        return None
     finally:
-        shown.close()
+        if hidden or not shown.plotter.notebook:
+            shown.close()
 
 
 class View:
@@ -64,7 +68,7 @@ class View:
 
     what, instances: as for view().
     contacts: tandem.Contacts of these instances, whose triangles are drawn in red; or True: a query finds them, anew
-        for each state of a run.
+        for each state of a run, of the pairs that the scene file or `motion` lets through.
     manifolds: tandem.Manifolds of these instances, drawn as points in the colour of their depths, with an arrow for the
         normal of each manifold, from a to b; or True as above.
     distances: tandem.Distances of these instances: a line between the nearest points of each pair, in the colour of
@@ -97,6 +101,7 @@ class View:
         self.scene = _scene(what, instances)
         moved = self.scene.motion if motion is None else np.asarray(motion)
         self._motion = np.broadcast_to(moved, self.scene.asset.shape)
+        self._filter = self.scene.filter if motion is None else tandem.Filter(motion=self._motion)
         self._use_levels(levels)
         for name, found in (("contacts", contacts), ("manifolds", manifolds), ("distances", distances)):
             if found not in (False, True, None) and (len(self.scene.steps) > 1 or levels is not None):
@@ -105,7 +110,7 @@ class View:
         self._query = tandem.Query(self._assets) if contacts is True or manifolds is True else None
         self.tree_depth, self._color = tree_depth, color
         inside = contacts is not False or manifolds is not False or distances is not None
-        self._opacity = opacity if opacity is not None else TRANSLUCENT if inside else 1.0
+        self.opacity = opacity if opacity is not None else TRANSLUCENT if inside else 1.0
         self._place()
         self._open(off_screen, size)
         self.state = self._state_after(step)
@@ -141,10 +146,10 @@ class View:
         image = self.plotter.screenshot(path, return_img=True)
         return np.asarray(image)[..., :3]
 
-    def show(self) -> Any:
-        """Opens the window, with sliders, and waits until it is closed. In a notebook it returns pyvista's widget."""
+    def show(self) -> None:
+        """Opens the window, with sliders, and waits until it is closed. In a notebook it shows pyvista's widget."""
         self.add_sliders()
-        return self.plotter.show()
+        self.plotter.show()
 
     def add_sliders(self) -> None:
         """Adds a slider for the steps of a run, and one for the depth of the tree where its boxes are shown."""
@@ -205,8 +210,9 @@ class View:
     def _open(self, off_screen: bool, size: tuple[int, int]) -> None:
         self.plotter = _plotter(off_screen, size)
         self.plotter.set_background(BACKGROUND[0], top=BACKGROUND[1])
-        self.plotter.enable_anti_aliasing("ssaa" if off_screen else "fxaa")
-        if self._opacity < 1:
+        if off_screen:
+            self.plotter.enable_anti_aliasing("ssaa")
+        if self.opacity < 1:
             self.plotter.enable_depth_peeling(6)
         self._bodies = []
         for row, triangles in enumerate(self._triangles):
@@ -220,8 +226,8 @@ class View:
             mapper.SetColorModeToDirectScalars()
             actor = vtk.vtkActor()
             actor.SetMapper(mapper)
-            actor.SetForceTranslucent(self._opacity < 1)  # the glyphs' colours have the opacity
-            actor.GetProperty().SetBackfaceCulling(self._opacity < 1 and bool(self._assets[row].levels[0].closed))
+            actor.SetForceTranslucent(self.opacity < 1)  # the glyphs' colours have the opacity
+            actor.GetProperty().SetBackfaceCulling(self.opacity < 1 and bool(self._assets[row].levels[0].closed))
             actor.GetProperty().SetAmbient(0.1)
             self.plotter.add_actor(actor, name=f"bodies {row}", reset_camera=False)
             self._bodies.append(mapper)
@@ -255,7 +261,7 @@ class View:
         self.plotter.renderer.ResetCameraClippingRange()
 
     def _draw_bodies(self) -> None:
-        opacity = np.full((len(self._asset), 1), round(255 * self._opacity), np.uint8)
+        opacity = np.full((len(self._asset), 1), round(255 * self.opacity), np.uint8)
         colour = np.concatenate([self.body_colours(), opacity], axis=1)
         centres = self._centres(self.state) - self.origin
         for row, mapper in enumerate(self._bodies):
@@ -280,7 +286,7 @@ class View:
         if self._query is not None:
             instances = tandem.instances(self._asset, rotation=self.scene.rotation[self.state],
                                          translation=self.scene.translation[self.state])
-            found = self._query.contacts(instances)
+            found = self._query.contacts(instances, pairs=self.scene.pairs, filter=self._filter)
             contacts = found if contacts is True else contacts
             manifolds = self._query.manifolds() if manifolds is True else manifolds
         if not isinstance(contacts, bool):

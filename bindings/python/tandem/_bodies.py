@@ -244,10 +244,11 @@ class Search:
         pairs = _columns(found.pairs)
         bounds = np.searchsorted(found.contacts["pair"], np.arange(len(pairs) + 1))
         convex = self.bodies.convex[pairs]
+        is_open: Array = ~(convex[:, 0] | convex[:, 1])
         meet = np.diff(bounds) > 0
-        yield from self._surface_contacts(pairs, found.contacts[~convex.any(axis=1)[found.contacts["pair"]]])
+        yield from self._surface_contacts(pairs, found.contacts[is_open[found.contacts["pair"]]])
         meet[self._enclosed(pairs, contained)] = True
-        for pair in np.flatnonzero(meet & convex.any(axis=1)):
+        for pair in np.flatnonzero(meet & ~is_open):
             a, b = map(int, pairs[pair])
             if convex[pair].all():
                 yield self._convex_contact(a, b)

@@ -109,6 +109,28 @@ class DebianTest(unittest.TestCase):
         self.assertEqual(run(build / "build"), "4 triangles in 1 block, 1 left out\n")
         self.assertIn("52 pairs of triangles meet", run(build / "contacts_in_c", self.tree))
 
+    def test_a_project_takes_the_sources_as_a_part(self):
+        project, build = fresh("whole"), fresh("whole_build")
+        (project / "CMakeLists.txt").write_text(f"""cmake_minimum_required(VERSION 3.25)
+project(whole LANGUAGES CXX)
+set(TANDEM_TOOLS OFF)
+set(TANDEM_TESTS OFF)
+set(TANDEM_CUDA OFF)
+set(TANDEM_PYTHON OFF)
+add_subdirectory({SOURCE} tandem)
+foreach(target build c formats kernels runtime)
+  if(NOT TARGET tandem::${{target}})
+    message(FATAL_ERROR "no ${{target}}")
+  endif()
+endforeach()
+add_executable(sizes sizes.cpp)
+target_link_libraries(sizes PRIVATE tandem::formats)
+""")
+        (project / "sizes.cpp").write_text("#include <tandem/formats/block.h>\nstatic_assert(sizeof(tandem::Block) == 128);\nint main() {}\n")
+        run(CMAKE, "-S", project, "-B", build, "-G", os.environ["TANDEM_GENERATOR"])
+        run(CMAKE, "--build", build, "--target", "sizes")
+        run(build / "sizes")
+
     def test_the_tools_run(self):
         self.assertIn("box.bvh: sound", run(self.root / "usr/bin/bvhinfo", self.tree, "--verify"))
         scene = FOLDER / "scene.h5"

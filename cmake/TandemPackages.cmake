@@ -74,6 +74,10 @@ if(TANDEM_HAVE_CUDA)
    This package has the shared library with the C interface to queries on a GPU."
     DEPENDS "libtandem0 ${exact}")
   set(CPACK_DEBIAN_CUDA_PACKAGE_CONTROL_EXTRA ${triggers})
+  # CUDA's runtime comes with NVIDIA's packages or in other ways, so dpkg-shlibdeps may find no package that has it.
+  set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${PROJECT_BINARY_DIR}/bindings/c ${CUDAToolkit_LIBRARY_DIR})
+  set(CPACK_DEBIAN_CUDA_PACKAGE_RECOMMENDS cuda-cudart-${CUDAToolkit_VERSION_MAJOR}-${CUDAToolkit_VERSION_MINOR})
+  set(CPACK_DEBIAN_TOOLS_PACKAGE_RECOMMENDS ${CPACK_DEBIAN_CUDA_PACKAGE_RECOMMENDS})
   string(APPEND libraries ", libtandem-cuda0 ${exact}")
 endif()
 tandem_package(dev NAME libtandem-dev SECTION libdevel TEXT "${about}

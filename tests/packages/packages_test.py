@@ -20,15 +20,6 @@ PYTHON = os.environ.get("TANDEM_PACKAGE_PYTHON", "")  # of a virtual environment
 NAME = "tandem-0.1.0"
 OLDEST_GLIBC = (2, 36)  # Debian 12's; a wheel for manylinux_2_36 or older runs there
 
-PROGRAM = """
-import numpy as np
-import tandem
-vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
-body = tandem.build(vertices, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]], dtype=np.uint32))
-found = tandem.Query([body]).contacts(asset=[0, 0], translation=[[0, 0, 0], [0.25, 0.1, 0.05]])
-print(len(found.pairs), len(found.contacts), tandem.__file__)
-"""
-
 
 def run(*command, **arguments):
     done = subprocess.run([str(word) for word in command], text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, **arguments)
@@ -202,11 +193,13 @@ class WheelTest(unittest.TestCase):
         run(PYTHON, "-m", "venv", "--system-site-packages", venv)
         run(venv / "bin/pip", "install", "--no-index", "--no-deps", "--disable-pip-version-check", self.wheel)
         elsewhere = fresh("elsewhere")
+        run(os.environ["TANDEM_BVHBUILD"], SOURCE / "assets/cow_1500.obj", "-o", elsewhere / "cow.bvh", "--quiet")
         environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-        pairs, contacts, file = run(venv / "bin/python", "-c", PROGRAM, cwd=elsewhere, env=environment).split()
-        self.assertEqual(pairs, "1")
-        self.assertGreater(int(contacts), 0)
-        self.assertTrue(file.startswith(str(venv)))
+        page = (SOURCE / "docs/python.md").read_text(encoding="utf-8")
+        code, shown = re.search(r"^```python\n(.*?)^```\n```\n(.*?)^```$", page, re.MULTILINE | re.DOTALL).groups()
+        self.assertEqual(run(venv / "bin/python", "-c", code, cwd=elsewhere, env=environment), shown)
+        where = run(venv / "bin/python", "-c", "import tandem; print(tandem.__file__)", cwd=elsewhere, env=environment)
+        self.assertTrue(where.startswith(str(venv)), where)
 
 
 if __name__ == "__main__":

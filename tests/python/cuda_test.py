@@ -351,7 +351,7 @@ def test_too_little_room_is_told(assets):
     bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
     with pytest.raises(ValueError, match="reserve"):
         query.enqueue(bodies)
-    query.reserve(instances=COUNT, pairs=4000, contacts=10)
+    query.reserve(instances=COUNT, pairs=4000, contacts=10, undecided=100_000)
     with pytest.raises(cuda.TooLittleRoom) as caught:
         query.enqueue(bodies).wait()
     query.reserve(instances=COUNT, pairs=4000, contacts=caught.value.contacts, undecided=100_000)

@@ -138,7 +138,8 @@ class Verdicts(NamedTuple):
 
 
 class TooLittleRoom(Error):
-    """A queued query did not fit: contacts are missing. `pairs`, `contacts` and `undecided` are the room that it needs, exact for what follows from what did fit."""
+    """A queued query did not fit: contacts are missing. `pairs`, `contacts` and `undecided` are the room that it needs at least: exact for what follows from what
+    did fit, so that with them it may still want more of another."""
 
     def __init__(self, pairs: int, contacts: int, undecided: int):
         super().__init__(f"too little room: reserve {pairs} pairs, {contacts} contacts, {undecided} undecided", name="TooLittleRoom")

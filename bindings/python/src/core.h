@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tandem/tandem.h"
+#include "without_lock.h"
 
 namespace tandem::python {
 

@@ -2,6 +2,7 @@
 
 NB_MODULE(_tandem, module) {
   module.doc() = "The C interface for the package's Python files, which check what the caller gives.";
+  nanobind::set_leak_warnings(false);  // daemon threads keep what they have when the interpreter ends
   module.attr("version") = tandem_version();
   module.attr("NO_TRIANGLE") = tandem_status{TANDEM_NO_TRIANGLE};
   module.def("status_words", [](std::uint32_t status) {

@@ -248,7 +248,7 @@ class Query {
   template <typename Call, typename Where>
   static void run(const Call& call, const Where& where) {
     const tandem_status status = [&] {
-      const nb::gil_scoped_release release;
+      const WithoutLock other_threads_run;
       return call();
     }();
     if (status != TANDEM_OK) check(status, where());

@@ -115,7 +115,7 @@ nb::dict statistics(const Asset& asset) {
   TreeStatistics tree;
   std::vector<ExpectedWork> work;
   {
-    const nb::gil_scoped_release release;
+    const WithoutLock other_threads_run;
     tree = measure_tree(view.level(), header.lower, header.upper);
     for (std::uint32_t i = 0; i < view.levels.size(); ++i)
       work.push_back(sample_expected_work(view.levels_from(i, 1)));

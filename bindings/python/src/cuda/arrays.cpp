@@ -196,7 +196,7 @@ nb::object Rows::to_cpu() const {
   const OnDevice current(memory_.device);
   cudaError_t error = cudaMemcpyAsync(to, data_, count_ * row_bytes_, cudaMemcpyDeviceToHost, memory_.stream);
   if (error == cudaSuccess) {
-    const nb::gil_scoped_release release;
+    const WithoutLock other_threads_run;
     error = cudaStreamSynchronize(memory_.stream);
   }
   check_cuda(error);

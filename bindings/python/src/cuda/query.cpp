@@ -10,7 +10,7 @@ namespace {
 // Runs a call that waits for the GPU while other Python threads run. where: what the GPU's report says of it.
 template <typename Call>
 tandem_status call_freely(const Call& call) {
-  const nb::gil_scoped_release release;
+  const WithoutLock other_threads_run;
   return call();
 }
 

@@ -17,7 +17,7 @@ Assets::Assets(nb::list assets, int device, std::uint32_t contents, std::uintptr
   std::uint64_t where = 0;
   const OnDevice current(device);
   const tandem_status status = [&] {
-    const nb::gil_scoped_release release;
+    const WithoutLock other_threads_run;
     return tandem_gpu_assets_upload(list.data(), list.size(), &options, stream_of(stream), nullptr, &assets_,
                                     &where);
   }();

@@ -79,7 +79,7 @@ Array Step::first_contact() const {
 nb::tuple Step::wait() const {
   const OnDevice current(assets_.device());
   const cudaError_t error = [&] {
-    const nb::gil_scoped_release release;
+    const WithoutLock other_threads_run;
     return cudaStreamSynchronize(stream_);
   }();
   check_cuda(error);

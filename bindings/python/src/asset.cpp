@@ -18,7 +18,7 @@ Asset* open(const nb::bytes& path, bool read, bool quick) {
   tandem_asset* asset = nullptr;
   std::uint64_t where = 0;
   const tandem_status status = [&] {
-    const nb::gil_scoped_release release;
+    const WithoutLock other_threads_run;
     return tandem_asset_open(path.c_str(), &options, nullptr, &asset, &where);
   }();
   check(status, where);
@@ -33,7 +33,7 @@ Asset* from_bytes(nb::handle data, bool quick) {
   tandem_asset* asset = nullptr;
   std::uint64_t where = 0;
   const tandem_status status = [&] {
-    const nb::gil_scoped_release release;
+    const WithoutLock other_threads_run;
     return tandem_asset_from_memory(there(bytes.data()), bytes.size(), &options, nullptr, &asset, &where);
   }();
   check(status, where);
@@ -138,6 +138,11 @@ nb::bytes provenance(const Asset& asset) {
 
 // The bytes of the file, which live as long as the asset, to be read alone.
 int get_buffer(PyObject* self, Py_buffer* view, int flags) {
+  if (!nb::inst_ready(self)) {  // of Asset.__new__()
+    view->obj = nullptr;
+    PyErr_SetString(PyExc_BufferError, "the asset was never made");
+    return -1;
+  }
   std::size_t size;
   const void* data = tandem_asset_data(nb::inst_ptr<Asset>(self)->get(), &size);
   return PyBuffer_FillInfo(view, self, const_cast<void*>(data), static_cast<Py_ssize_t>(size), 1, flags);

@@ -1,7 +1,10 @@
 """Who may die before whom, threads, exceptions in callbacks, and Ctrl-C."""
 import gc
 import signal
+import subprocess
+import sys
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -131,16 +134,18 @@ def test_progress_ascends_and_comes_in_the_callers_thread():
     assert threads == {threading.get_ident()}
 
 
-def test_what_progress_raises_ends_the_build():
+@pytest.mark.parametrize("effort", ["default", "best"])
+def test_what_progress_raises_ends_the_build(effort):
     class Enough(Exception):
         pass
 
     def progress(share):
         raise Enough(share)
 
-    vertices, faces = sphere(50)
-    with pytest.raises(Enough):
-        tandem.build(vertices, faces, effort="best", progress=progress)
+    vertices, faces = sphere(50 if effort == "best" else 400)
+    with pytest.raises(Enough) as caught:
+        tandem.build(vertices, faces, effort=effort, threads=1, progress=progress)
+    assert 0 < caught.value.args[0] <= 1
 
 
 @pytest.mark.parametrize("levels", [None, "auto"])
@@ -156,6 +161,51 @@ def test_ctrl_c_ends_a_long_build(levels):
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
+
+
+@pytest.mark.parametrize("effort, levels", [("fast", None), ("default", None), ("default", ["4%"])])
+def test_ctrl_c_ends_a_build_before_its_next_step(effort, levels):
+    if levels:
+        pytest.importorskip("tandem._bvhbuild")
+    vertices, faces = sphere(280)
+    start = time.process_time()
+    tandem.build(vertices, faces, effort=effort)
+    whole = time.process_time() - start
+    signal.signal(signal.SIGALRM, signal.default_int_handler)
+    signal.setitimer(signal.ITIMER_REAL, 0.02)
+    start = time.process_time()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            tandem.build(vertices, faces, effort=effort, levels=levels)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    assert time.process_time() - start < 0.8 * whole
+
+
+DAEMON = """
+import threading, time
+import numpy as np
+import tandem
+SETUP
+def work():
+    while True:
+        WORK
+threading.Thread(target=work, daemon=True).start()
+time.sleep(0.5)
+"""
+
+
+@pytest.mark.parametrize("setup, work", [
+    ("query, rows = tandem.Query([tandem.build(np.random.rand(30, 3), np.arange(30).reshape(-1, 3))]), tandem.instances(translation=np.random.rand(40, 3))",
+     "query.contacts(rows)"),
+    ("", "tandem.build(np.random.rand(90000, 3), np.arange(90000).reshape(-1, 3), progress=lambda share: time.sleep(0.01))"),
+    ("", "tandem.build(np.random.rand(90000, 3), np.arange(90000).reshape(-1, 3), levels=['1%'], effort='best', progress=lambda share: sum(range(10**6)))")])
+def test_daemon_threads_in_a_call_let_the_process_end(setup, work):
+    if "levels" in work:
+        pytest.importorskip("tandem._bvhbuild")
+    done = subprocess.run([sys.executable, "-c", DAEMON.replace("SETUP", setup).replace("WORK", work)], capture_output=True, timeout=60)
+    assert (done.returncode, done.stderr) == (0, b"")
 
 
 def test_files_may_be_replaced_while_they_are_mapped(tmp_path):

@@ -85,6 +85,7 @@ CheckedImage build_file(const Options& options, const StoredMesh& mesh, AssetSou
   levels.push_back(build_level({mesh.points, mesh.triangles}, options, watch));
   levels[0].face = mesh.face;
   if (!options.levels.empty()) add_levels(options, mesh, watch, levels, outcome);
+  watch.look();
   outcome.interrupted = watch.stop;
   source.origin = mesh.origin;
   source.rounding_error = mesh.largest_rounding_error;

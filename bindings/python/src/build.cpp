@@ -14,10 +14,13 @@ namespace {
 
 using Part = std::tuple<std::string, std::string, std::uint64_t>;
 
+// A build whose result nobody wants need not go on to a whole tree, which is what returning 1 asks for. The C
+// interface's functions, linked into this module, take what is thrown here for a defect.
 std::uint32_t note(void* user, double share) {
   auto& watch = *static_cast<Watch*>(user);
   watch.share = share;
-  return watch.stop ? 1 : 0;
+  if (watch.stop) throw Stopped();
+  return 0;
 }
 
 nb::dict to_dict(const tandem_build_report& of) {

@@ -7,6 +7,8 @@
 #include <mutex>
 #include <thread>
 
+#include "without_lock.h"
+
 namespace tandem::python {
 
 /// What long work and the thread that waits for it tell each other.
@@ -14,6 +16,10 @@ struct Watch {
   std::atomic<double> share = 0;   ///< that is done
   std::atomic<bool> stop = false;  ///< the work is to end soon
 };
+
+/// What work throws that heeds Watch::stop. Nobody catches it: what made the work stop is thrown in its
+/// place.
+struct Stopped {};
 
 /// Runs work() in a thread of its own, without the interpreter's lock. Meanwhile the caller's thread, so that
 /// Ctrl-C works, looks for signals and calls progress(share) where it is not None. What either raises, and
@@ -35,11 +41,11 @@ void run_with_patience(Watch& watch, nanobind::handle progress, const Work& work
     ended.notify_one();
   });
   const auto join = [&] {
-    const nanobind::gil_scoped_release release;
+    const WithoutLock other_threads_run;
     worker.join();
   };
   const auto done_soon = [&] {
-    const nanobind::gil_scoped_release release;
+    const WithoutLock other_threads_run;
     std::unique_lock lock(mutex);
     return ended.wait_for(lock, std::chrono::milliseconds(50), [&] { return done; });
   };
@@ -47,7 +53,8 @@ void run_with_patience(Watch& watch, nanobind::handle progress, const Work& work
     double told = 0;
     while (!done_soon()) {
       if (PyErr_CheckSignals() != 0) throw nanobind::python_error();
-      if (const double share = watch.share; !progress.is_none() && share != told) progress(told = share);
+      if (const double share = watch.share; !progress.is_none() && share != told)
+        sleep_once_python_ended([&] { progress(told = share); });
     }
   } catch (...) {
     watch.stop = true;

@@ -12,8 +12,10 @@ namespace tandem::build {
 LevelParts build_parts(const Geometry& geometry, const BuildOptions& options, OptimisationWatch& watch) {
   LevelParts parts;
   parts.tree = build_tree(geometry, options.imaginary, options.effort, watch);
+  watch.look();
   if (options.gpu_blocks && geometry.triangles.size() < kMostOrientedTriangles)
     parts.oriented_blocks = orient_blocks(geometry, parts.tree, options.effort);
+  watch.look();
   if (options.topology && geometry.triangles.size() < kMostTopologyTriangles)
     parts.topology = make_topology(geometry, parts.tree);
   return parts;

@@ -26,11 +26,22 @@ class Optimiser {
   Optimiser(const Topology& topology, std::span<const Bounds> bounds, OptimisationWatch& watch)
       : tree_(topology, bounds), search_(tree_), watch_(watch) {}
 
-  // One pass over each region, then over the blocks above them.
-  void exchange_in_regions() {
+  // One pass over each region, then over the blocks above them. is_all: nothing comes after it; else it is
+  // too short for a share of its own.
+  void exchange_in_regions(bool is_all) {
     const std::vector<Region> regions = cut_into_regions(tree_, kRegionTriangles);
-    for_each_below(regions, [](ExchangeSearch& search, const Region& region) { search.pass(region); });
-    if (has_top(regions)) search_.pass(regions.back());
+    if (is_all) {
+      std::uint64_t children = 0;
+      for (const Region& region : regions) children += region.children.size();
+      watch_.expect(children);
+    }
+    const auto pass = [&](ExchangeSearch& search, const Region& region) {
+      if (watch_.stop) return;
+      search.pass(region);
+      watch_.count(is_all ? region.children.size() : 0);
+    };
+    for_each_below(regions, pass);
+    if (has_top(regions)) pass(search_, regions.back());
   }
 
   void anneal_regions() {
@@ -83,7 +94,7 @@ void OptimisationWatch::count(std::uint64_t units) {
 void optimise(Topology& topology, std::span<const Bounds> bounds, Effort effort, OptimisationWatch& watch) {
   if (effort == Effort::fast || topology.size() < 3) return;
   Optimiser optimiser(topology, bounds, watch);
-  optimiser.exchange_in_regions();
+  optimiser.exchange_in_regions(effort == Effort::standard);
   if (effort == Effort::best) {
     optimiser.exchange_everywhere();
     optimiser.anneal_regions();

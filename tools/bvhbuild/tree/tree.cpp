@@ -26,8 +26,11 @@ Tree build_tree(const Geometry& geometry, Imaginary imaginary, Effort effort) {
 
 Tree build_tree(const Geometry& geometry, Imaginary imaginary, Effort effort, OptimisationWatch& watch) {
   const std::vector<Bounds> bounds = normalized_bounds(geometry);
+  watch.look();
   Topology topology = build_topology(bounds, imaginary);
+  watch.look();
   optimise(topology, bounds, effort, watch);
+  watch.look();
   return emit(geometry, topology);
 }
 

@@ -178,7 +178,20 @@ static void test_building(void) {
 
   mesh.part_count = 1;
   CHECK_STATUS(tandem_asset_build(&mesh, NULL, NULL, &asset, NULL), TANDEM_BAD_PART);
+  const tandem_mesh_part many[] = {{"a", NULL, 0xFFFFFFFE}, {"b", NULL, 1}};
+  mesh.parts = many;
+  CHECK_STATUS(tandem_asset_build(&mesh, NULL, NULL, &asset, NULL), TANDEM_OK);
+  tandem_asset_release(asset);
+  mesh.part_count = 2;
+  CHECK_STATUS(tandem_asset_build(&mesh, NULL, NULL, &asset, NULL), TANDEM_BAD_PART);
   mesh.part_count = 0;
+  const uint32_t last_faces[] = {0, 0, 1, 0xFFFFFFFD}, beyond[] = {0, 0, 1, 0xFFFFFFFE};
+  mesh.faces = last_faces;
+  CHECK_STATUS(tandem_asset_build(&mesh, NULL, NULL, &asset, NULL), TANDEM_OK);
+  tandem_asset_release(asset);
+  mesh.faces = beyond;
+  CHECK_STATUS(tandem_asset_build(&mesh, NULL, NULL, &asset, NULL), TANDEM_TOO_MANY_TRIANGLES);
+  mesh.faces = faces;
   mesh.triangles = triangles + 6;
   mesh.triangle_count = 2;
   CHECK_STATUS(tandem_asset_build(&mesh, NULL, NULL, &asset, &report), TANDEM_NO_TRIANGLE);

@@ -49,6 +49,8 @@ def test_quads_by_array():
     assert box.levels[0].closed and sorted(box.faces()) == sorted([0, 1, 2, 3, 4, 5] * 2)
     named = tandem.build(BOX_VERTICES, quads, face_ids=[7, 8, 9, 9, 9, 9])
     assert sorted(set(named.faces().tolist())) == [7, 8, 9]
+    named = tandem.build(BOX_VERTICES, quads, face_ids=[2**32 - 3] * 6)
+    assert set(named.faces().tolist()) == {2**32 - 3}
 
 
 def test_formats_of_others_are_read_by_assimp_in_a_child(tmp_path):

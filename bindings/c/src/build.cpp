@@ -33,10 +33,11 @@ tandem_status read_mesh(const tandem_mesh& given, Source& source) {
   if (mesh.faces != nullptr) to.face = {mesh.faces, mesh.triangle_count};
   uint64_t faces = mesh.triangle_count;
   if (!to.face.empty()) faces = uint64_t{*std::max_element(to.face.begin(), to.face.end())} + 1;
+  if (faces >= kNoIndex) return TANDEM_TOO_MANY_TRIANGLES;
   to.face_count = faces;
   uint64_t named = 0;
   for (const tandem_mesh_part& part : std::span(mesh.parts, mesh.part_count)) {
-    if (part.face_count > kNoIndex) return TANDEM_BAD_PART;
+    if (part.face_count >= kNoIndex - named) return TANDEM_BAD_PART;
     source.parts.push_back({part.name != nullptr ? part.name : "", part.path != nullptr ? part.path : "",
                             named, part.face_count});
     named += part.face_count;

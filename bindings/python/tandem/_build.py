@@ -92,7 +92,8 @@ def build(vertices: npt.ArrayLike, faces: npt.ArrayLike | Sequence[Sequence[int]
         face_ids: (m,), the face of the caller's mesh that each one is a piece of; its own number where not given.
         parts: of each run of faces with a name: name, path and number of faces, or what `read_mesh` says.
         provenance: JSON that the file says of its making.
-        progress: called now and then, in this thread, with the share of the optimisation that is done. What it raises ends the build, as Ctrl-C does.
+        progress: called now and then, in this thread, with the share of the optimisation that is done; effort "fast" has none. What it raises ends the build
+            before the next step, as Ctrl-C does: within seconds for a million triangles.
         return_report: return (asset, BuildReport) instead of the asset.
 
     Raises:
@@ -109,7 +110,7 @@ def build(vertices: npt.ArrayLike, faces: npt.ArrayLike | Sequence[Sequence[int]
         raise ValueError(f"vertices has shape {points.shape} where (n, 3) is wanted")
     corners, face_begin = _polygons(faces)
     count = len(corners) // 3 if face_begin is None else len(face_begin) - 1
-    ids = None if face_ids is None else whole_numbers(face_ids, "face_ids", 0xFFFFFFFE)
+    ids = None if face_ids is None else whole_numbers(face_ids, "face_ids", 0xFFFFFFFD)
     if ids is not None and ids.shape != (count,):
         raise ValueError(f"face_ids has shape {ids.shape} where ({count},) is wanted")
     share = number(imaginary_share, "imaginary_share")
@@ -204,6 +205,8 @@ def _named_parts(parts: Parts | None) -> list[tuple[str, str, int]]:
             raise TypeError(f"parts: row {row} is not (name, path, number of faces)")
         named.append((_text(part[0], f"parts: row {row}: name"), _text(part[1], f"parts: row {row}: path"),
                       whole_number(part[-1], f"parts: row {row}: number of faces", 0, 0xFFFFFFFF)))
+    if sum(count for _, _, count in named) >= 0xFFFFFFFF:
+        raise ValueError("parts have 2^32 - 1 faces or more together")
     return named
 
 

@@ -29,14 +29,27 @@ nb::object to_bytes(const std::vector<Row>& rows) {
                                                  static_cast<Py_ssize_t>(rows.size() * sizeof(Row))));
 }
 
+// The contiguous bytes of a Python object, for as long as this lives.
+class Bytes {
+ public:
+  explicit Bytes(nb::handle object) {
+    if (PyObject_GetBuffer(object.ptr(), &view_, PyBUF_SIMPLE) != 0) throw nb::python_error();
+  }
+  ~Bytes() { PyBuffer_Release(&view_); }
+  Bytes(const Bytes&) = delete;
+  Bytes& operator=(const Bytes&) = delete;
+  const void* data() const { return view_.buf; }
+  std::size_t size() const { return static_cast<std::size_t>(view_.len); }
+
+ private:
+  Py_buffer view_;
+};
+
 template <typename Row>
 std::vector<Row> copy_rows(nb::handle object) {
-  Py_buffer view;
-  if (PyObject_GetBuffer(object.ptr(), &view, PyBUF_SIMPLE) != 0) throw nb::python_error();
-  const auto* first = static_cast<const Row*>(view.buf);
-  std::vector<Row> rows(first, first + static_cast<std::size_t>(view.len) / sizeof(Row));
-  PyBuffer_Release(&view);
-  return rows;
+  const Bytes bytes(object);
+  const auto* first = static_cast<const Row*>(bytes.data());
+  return {first, first + bytes.size() / sizeof(Row)};
 }
 
 // Points, corners of triangles, the face of each, parts, remarks. own_readers: without assimp, which is run
@@ -48,7 +61,7 @@ nb::tuple read(const nb::bytes& path, bool own_readers) {
   ImportResult imported;
   TriangleMesh triangles;
   {
-    const nb::gil_scoped_release release;
+    const python::WithoutLock other_threads_run;
     imported = import_mesh(name, options);
     CleanReport report;
     if (imported.ok) triangles = triangulate(imported.mesh, report);
@@ -120,10 +133,12 @@ nb::tuple build(nb::handle points, nb::handle corners, nb::handle face_begin, nb
   }
   std::uint64_t named = 0;
   for (const auto& [name, path, count] : parts) {
+    if (count >= kNoIndex - named) throw nb::value_error("parts: they have 2^32 - 1 faces or more together");
     polygons.parts.push_back({name, path, named, count});
     named += count;
   }
   if (parts.empty()) polygons.parts.push_back({{}, {}, 0, named = source.face_count});
+  if (named >= kNoIndex) throw nb::value_error("face_ids: there are 2^32 - 1 faces or more");
   if (named < source.face_count || (source.face_of.empty() && named != source.face_count))
     throw nb::value_error("parts: their faces are not those of the mesh");
 
@@ -144,7 +159,7 @@ nb::tuple build(nb::handle points, nb::handle corners, nb::handle face_begin, nb
     OptimisationWatch optimisation;
     optimisation.progress = [&](double share) {
       watch.share = share;
-      if (watch.stop) optimisation.stop = true;
+      if (watch.stop) throw python::Stopped();
     };
     const parallel::ThreadLimit limit(threads);
     TriangleMesh triangles = source.triangles(outcome.clean);
@@ -168,6 +183,7 @@ nb::tuple build(nb::handle points, nb::handle corners, nb::handle face_begin, nb
 
 NB_MODULE(_bvhbuild, module) {
   module.doc() = "Readers of mesh files, polygons and levels of detail, for the package's Python files.";
+  nanobind::set_leak_warnings(false);  // daemon threads keep what they have when the interpreter ends
   module.def("read", tandem::build::read);
   const auto none = [] { return nanobind::arg().none(); };
   const auto some = [] { return nanobind::arg(); };

@@ -216,7 +216,8 @@ typedef struct tandem_build_report {
 /// Builds an asset, whose bytes (tandem_asset_data()) are those that bvhbuild writes for the same triangles,
 /// but for the provenance, and the same whatever the threads. report: or null; filled also where no triangle
 /// can be used. The bytes come from the allocator; what building takes meanwhile, from the C++ runtime.
-/// Result: TANDEM_NO_TRIANGLE, TANDEM_TOO_MANY_TRIANGLES; TANDEM_BAD_PART where faces lie in no part.
+/// Result: TANDEM_NO_TRIANGLE; TANDEM_TOO_MANY_TRIANGLES, also where one of `faces` is 2^32 - 2 or more;
+/// TANDEM_BAD_PART where faces lie in no part, or the parts have 2^32 - 1 faces or more.
 TANDEM_API tandem_status tandem_asset_build(const tandem_mesh* mesh, const tandem_build_options* options,
                                             const tandem_allocator* allocator, tandem_asset** asset,
                                             tandem_build_report* report);

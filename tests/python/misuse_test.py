@@ -69,8 +69,6 @@ CASES = [
     (lambda q: q.contacts(ROWS, mode="exactly"), ValueError, "mode is 'exactly' where one of 'exact', 'fast', 'boxes'"),
     (lambda q: q.contacts(ROWS, mode=0), ValueError, "mode is 0"),
     (lambda q: q.contacts(ROWS, within="far"), TypeError, "within is str"),
-    (lambda q: q.contacts(ROWS, within=-1.0), tandem.Error, ""),
-    (lambda q: q.contacts(ROWS, within=np.nan), tandem.Error, ""),
     (lambda q: q.contacts(ROWS, within=10**400), ValueError, "within is 1000"),
     (lambda q: q.contacts(ROWS, threads=0), ValueError, "threads is 0 where 1 to 1024"),
     (lambda q: q.contacts(ROWS, threads=2000), ValueError, "threads is 2000"),
@@ -87,16 +85,11 @@ CASES = [
     (lambda q: q.contained(), tandem.Error, "did not find the contacts"),
     (lambda q: q.manifolds(most_points=0), ValueError, "most_points is 0"),
     (lambda q: q.manifolds(most_points=8), ValueError, "most_points is 8"),
-    (lambda q: q.distances(ROWS, reach=-1), tandem.Error, ""),
     (lambda q: q.distances(ROWS, reach=[1]), TypeError, "reach is list"),
-    (lambda q: q.distances(ROWS, relative_tolerance=np.nan), tandem.Error, ""),
     (lambda q: q.distances(ROWS, former=np.zeros(1)), TypeError, "former is an array of float64 .*FORMER"),
     (lambda q: q.impacts(ROWS, STILL[:1], 1.0), ValueError, r"motion has shape \(1,\) where \(2,\)"),
     (lambda q: q.impacts(ROWS, np.zeros((2, 9)), 1.0), TypeError, "motion is an array of float64 .*MOTION"),
-    (lambda q: q.impacts(ROWS, STILL, np.nan), tandem.Error, ""),
-    (lambda q: q.impacts(ROWS, STILL, -1.0), tandem.Error, ""),
     (lambda q: q.impacts(ROWS, STILL, None), TypeError, "duration is NoneType"),
-    (lambda q: q.verdicts(ROWS, tolerance=-1.0), tandem.Error, ""),
     (lambda q: q.keep_fixed(ROWS, [1]), ValueError, "motion has shape"),
     (lambda q: q.keep_fixed(ROWS, [0, 5]), tandem.Error, "instance 1"),
     (lambda q: q.keep_fixed(None, [0, 1]), TypeError, "instances is missing"),
@@ -111,6 +104,7 @@ CASES = [
     (lambda q: BOX.triangles("0"), TypeError, "level is str"),
     (lambda q: BOX.faces(-1), ValueError, "level is -1"),
     (lambda q: BOX.coarsest_level("x"), TypeError, "tolerance is str"),
+    (lambda q: memoryview(tandem._tandem.Asset.__new__(tandem._tandem.Asset)), BufferError, "the asset was never made"),
     (lambda q: tandem.Asset.load(5), TypeError, "5|int"),
     (lambda q: tandem.Asset.load("x", access="mmap"), ValueError, "access is 'mmap'"),
     (lambda q: tandem.Asset.from_bytes("text"), TypeError, "bytes-like"),
@@ -134,6 +128,8 @@ CASES = [
     (lambda q: tandem.build(BOX_VERTICES, BOX_FACES, imaginary_share="x"), TypeError, "imaginary_share is str"),
     (lambda q: tandem.build(BOX_VERTICES, BOX_FACES, face_ids=[1]), ValueError, r"face_ids has shape \(1,\) where \(12,\)"),
     (lambda q: tandem.build(BOX_VERTICES, BOX_FACES, face_ids=[2**32 - 1] * 12), ValueError, "face_ids: row 0"),
+    (lambda q: tandem.build(BOX_VERTICES, BOX_FACES, face_ids=[0] * 11 + [2**32 - 2]), ValueError, "face_ids: row 11"),
+    (lambda q: tandem.build(BOX_VERTICES, BOX_FACES, parts=[("a", "", 12), ("b", "", 2**32 - 13)]), ValueError, "parts have 2.32 - 1 faces"),
     (lambda q: tandem.build(BOX_VERTICES, BOX_FACES, parts=["ab"]), TypeError, "parts: row 0"),
     (lambda q: tandem.build(BOX_VERTICES, BOX_FACES, parts=[("a", "", 12), ("b", 5, 1)]), TypeError, "parts: row 1: path is int"),
     (lambda q: tandem.build(BOX_VERTICES, BOX_FACES, parts=[("a\0", "", 12)]), ValueError, "parts: row 0: name has a zero"),
@@ -142,6 +138,20 @@ CASES = [
     (lambda q: tandem.build(BOX_VERTICES, BOX_FACES, provenance=5), TypeError, "provenance is int"),
     (lambda q: tandem.build(BOX_VERTICES, BOX_FACES, progress=5), TypeError, "progress is int"),
 ]
+# Numbers of calls, each with what is too large for it.
+AMOUNTS = [
+    ("within", np.inf, lambda q, value: q.contacts(ROWS, within=value)),
+    ("within", 1e301, lambda q, value: q.pairs(ROWS, within=value)),
+    ("reach", None, lambda q, value: q.distances(ROWS, reach=value)),
+    ("absolute_tolerance", None, lambda q, value: q.distances(ROWS, absolute_tolerance=value)),
+    ("relative_tolerance", None, lambda q, value: q.distances(ROWS, relative_tolerance=value)),
+    ("duration", np.inf, lambda q, value: q.impacts(ROWS, STILL, value)),
+    ("tolerance", np.inf, lambda q, value: q.impacts(ROWS, STILL, 1.0, tolerance=value)),
+    ("tolerance", 1e301, lambda q, value: q.verdicts(ROWS, tolerance=value)),
+]
+for name, too_large, ask in AMOUNTS:
+    CASES += [(lambda q, ask=ask, value=value: ask(q, value), ValueError, f"^{name} is {re.escape(str(value))} where 0 to")
+              for value in (np.nan, -1.0, -np.inf, too_large) if value is not None]
 
 
 @pytest.mark.parametrize("number", range(len(CASES)))
@@ -153,6 +163,14 @@ def test_misuse(number):
     assert type(caught.value) is kind and re.search(words, str(caught.value)), str(caught.value)
     # The query works as ever.
     assert len(query.contacts(ROWS).contacts) == 18
+
+
+def test_the_largest_amounts_are_taken():
+    query = tandem.Query([BOX])
+    count = len(ROWS) * (len(ROWS) - 1) // 2
+    assert len(query.pairs(ROWS, within=1e300)) == len(query.verdicts(ROWS, tolerance=1e300).verdicts) == count
+    assert len(query.distances(ROWS, reach=np.inf, absolute_tolerance=np.inf).distances) == count
+    query.impacts(ROWS, STILL, np.finfo(float).max, tolerance=np.finfo(float).max)
 
 
 def test_an_error_leaves_no_contacts_to_make_manifolds_of():

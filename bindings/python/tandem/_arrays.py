@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import operator
+import sys
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ __all__ = ["Rows", "instances"]
 #: An array of rows, such as INSTANCE.
 Rows = npt.NDArray[np.void]
 
+#: The largest distance that queries take, as coordinates, and the largest number.
+FARTHEST, FINITE = 1e300, sys.float_info.max
 _MOST = 0xFFFFFFFF
 _IDENTITY, _ORIGIN = np.eye(3), np.zeros(3)
 _LAST_ROW = np.array([0.0, 0.0, 0.0, 1.0])
@@ -31,6 +34,14 @@ def number(value: Any, name: str) -> float:
         raise TypeError(f"{name} is {type(value).__name__} where a number is wanted") from None
     except OverflowError:
         raise ValueError(f"{name} is {value} where a float64 is wanted") from None
+
+
+def amount(value: Any, name: str, most: float) -> float:
+    """A float64 from 0 to `most`."""
+    found = number(value, name)
+    if not 0 <= found <= most:
+        raise ValueError(f"{name} is {found} where 0 to {most} is wanted")
+    return found
 
 
 def whole_number(value: Any, name: str, least: int, most: int) -> int:

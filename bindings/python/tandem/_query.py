@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _tandem
-from ._arrays import Rows, instances_of, number, pairs_of, rows, whole_number, whole_numbers
+from ._arrays import FARTHEST, FINITE, Rows, amount, instances_of, pairs_of, rows, whole_number, whole_numbers
 from ._asset import Asset, _choice
 from ._rows import CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, MANIFOLD, MOTION, PAIR, POINT, VERDICT
 
@@ -168,7 +168,7 @@ class Query:
         found = self._core.contacts(
             instances_of(instances, asset, rotation, translation, transform), None if pairs is None else pairs_of(pairs),
             _MODES[mode] if mode in _MODES else _choice("mode", mode, tuple(_MODES)), bool(first_contact_only), bool(self_pairs),
-            number(within, "within"), bool(add_error_bounds), _core_of(filter), self._threads if threads is None else self._number_of_threads(threads))
+            amount(within, "within", FARTHEST), bool(add_error_bounds), _core_of(filter), self._threads if threads is None else self._number_of_threads(threads))
         return Contacts(_frombuffer(found[0], PAIR), _frombuffer(found[1], CONTACT), Counters._make(found[2]))
 
     def pairs(self, instances: Rows | None = None, *, self_pairs: bool = False, within: float = 0.0, add_error_bounds: bool = False,
@@ -179,7 +179,7 @@ class Query:
         >>> query.pairs(translation=[[0, 0, 0], [0.5, 0, 0], [3, 0, 0]]).tolist()
         [(0, 1)]
         """
-        found = self._core.pairs(instances_of(instances, asset, rotation, translation, transform), bool(self_pairs), number(within, "within"),
+        found = self._core.pairs(instances_of(instances, asset, rotation, translation, transform), bool(self_pairs), amount(within, "within", FARTHEST),
                                  bool(add_error_bounds), _core_of(filter), self._number_of_threads(threads))
         return _frombuffer(found, PAIR)
 
@@ -242,8 +242,9 @@ class Query:
         [0.5]
         """
         found, distances = self._core.distances(
-            instances_of(instances, asset, rotation, translation, transform), pairs_of(pairs), None if reach is None else number(reach, "reach"),
-            number(absolute_tolerance, "absolute_tolerance"), number(relative_tolerance, "relative_tolerance"), _core_of(filter), None if former is None else rows(former, "former", FORMER), self._number_of_threads(threads))
+            instances_of(instances, asset, rotation, translation, transform), pairs_of(pairs), None if reach is None else amount(reach, "reach", np.inf),
+            amount(absolute_tolerance, "absolute_tolerance", np.inf), amount(relative_tolerance, "relative_tolerance", np.inf), _core_of(filter),
+            None if former is None else rows(former, "former", FORMER), self._number_of_threads(threads))
         return Distances(_frombuffer(found, PAIR), _frombuffer(distances, DISTANCE))
 
     def impacts(self, instances: Rows | None, motion: Rows, duration: float, *, pairs: npt.ArrayLike | None = None, tolerance: float = 0.0,
@@ -265,8 +266,8 @@ class Query:
         motions = rows(motion, "motion", MOTION)
         if motions.shape != posed.shape:
             raise ValueError(f"motion has shape {motions.shape} where {posed.shape} is wanted")
-        found, impacts = self._core.impacts(posed, motions, number(duration, "duration"), pairs_of(pairs), number(tolerance, "tolerance"), _core_of(filter),
-                                            self._number_of_threads(threads))
+        found, impacts = self._core.impacts(posed, motions, amount(duration, "duration", FINITE), pairs_of(pairs), amount(tolerance, "tolerance", FINITE),
+                                            _core_of(filter), self._number_of_threads(threads))
         return Impacts(_frombuffer(found, PAIR), _frombuffer(impacts, IMPACT))
 
     def verdicts(self, instances: Rows | None = None, *, tolerance: float, pairs: npt.ArrayLike | None = None, filter: Filter | None = None,
@@ -284,6 +285,6 @@ class Query:
         >>> query.verdicts(translation=[[0, 0, 0], [0.5, 0, 0]], tolerance=0.1).verdicts["verdict"].tolist() == [tandem.TOUCH]
         True
         """
-        found, verdicts = self._core.verdicts(instances_of(instances, asset, rotation, translation, transform), number(tolerance, "tolerance"),
+        found, verdicts = self._core.verdicts(instances_of(instances, asset, rotation, translation, transform), amount(tolerance, "tolerance", FARTHEST),
                                               pairs_of(pairs), _core_of(filter), self._number_of_threads(threads))
         return Verdicts(_frombuffer(found, PAIR), _frombuffer(verdicts, VERDICT))

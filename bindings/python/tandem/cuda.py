@@ -15,7 +15,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ._arrays import pairs_of
+from ._arrays import FARTHEST, FINITE, amount, pairs_of
 from ._asset import Asset
 from ._errors import Error
 from ._query import Counters
@@ -334,14 +334,15 @@ class Query:
         number = _stream(stream)
         self._given = pairs
         found = self._core.contacts(self._bodies(instances, asset, pose, number), self._pairs(pairs, number), _choice("mode", mode, _MODES), first_contact_only,
-                                    within, add_error_bounds, sorted, grouped, None if filter is None else filter._core, number)
+                                    amount(within, "within", FARTHEST), add_error_bounds, sorted, grouped, None if filter is None else filter._core, number)
         return Contacts(_found(found[0], pairs), Rows(found[1], CONTACT), Counters._make(found[2]))
 
     def pairs(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, sorted: bool = True, within: float = 0.0,
               filter: Filter | None = None, stream: Any = None) -> Rows:
         """The object pairs whose world boxes meet, rows of PAIR: a < b."""
         number = _stream(stream)
-        found = self._core.pairs(self._bodies(instances, asset, pose, number), sorted, within, None if filter is None else filter._core, number)
+        found = self._core.pairs(self._bodies(instances, asset, pose, number), sorted, amount(within, "within", FARTHEST),
+                                 None if filter is None else filter._core, number)
         return Rows(found, PAIR)
 
     def manifolds(self, *, most_points: int = 7, match_previous: bool = True) -> Manifolds:
@@ -361,8 +362,9 @@ class Query:
                   absolute_tolerance: float = 0.0, relative_tolerance: float = 0.0, filter: Filter | None = None, stream: Any = None) -> Distances:
         """Finds how near the surfaces are. Arguments: as of `tandem.Query.distances`."""
         number = _stream(stream)
-        found = self._core.distances(self._bodies(instances, asset, pose, number), self._pairs(pairs, number), reach, absolute_tolerance, relative_tolerance,
-                                     None if filter is None else filter._core, number)
+        found = self._core.distances(self._bodies(instances, asset, pose, number), self._pairs(pairs, number),
+                                     None if reach is None else amount(reach, "reach", np.inf), amount(absolute_tolerance, "absolute_tolerance", np.inf),
+                                     amount(relative_tolerance, "relative_tolerance", np.inf), None if filter is None else filter._core, number)
         return Distances(_found(found[0], pairs), Rows(found[1], DISTANCE))
 
     def impacts(self, instances: Instances | None = None, *, motion: Any, duration: float, asset: Any = None, pose: Any = None, pairs: Any = None,
@@ -373,15 +375,15 @@ class Query:
             motion: (n, 3, 3) or (n, 9) float64: velocity of the centre, angular velocity, centre.
         """
         number = _stream(stream)
-        found = self._core.impacts(self._bodies(instances, asset, pose, number), motion, duration, self._pairs(pairs, number), tolerance, sorted,
-                                   None if filter is None else filter._core, number)
+        found = self._core.impacts(self._bodies(instances, asset, pose, number), motion, amount(duration, "duration", FINITE), self._pairs(pairs, number),
+                                   amount(tolerance, "tolerance", FINITE), sorted, None if filter is None else filter._core, number)
         return Impacts(_found(found[0], pairs), Rows(found[1], IMPACT))
 
     def verdicts(self, instances: Instances | None = None, *, tolerance: float, asset: Any = None, pose: Any = None, pairs: Any = None,
                  filter: Filter | None = None, stream: Any = None) -> Verdicts:
         """Tells of pairs whether they are apart, touch, or are within a tolerance. Arguments: as of `tandem.Query.verdicts`."""
         number = _stream(stream)
-        found = self._core.verdicts(self._bodies(instances, asset, pose, number), tolerance, self._pairs(pairs, number),
+        found = self._core.verdicts(self._bodies(instances, asset, pose, number), amount(tolerance, "tolerance", FARTHEST), self._pairs(pairs, number),
                                     None if filter is None else filter._core, number)
         return Verdicts(_found(found[0], pairs), Rows(found[1], VERDICT))
 
@@ -393,7 +395,7 @@ class Query:
             undecided: candidates that are not decided quickly; None: as many as contacts.
         """
         self._step = _cuda.Step(self._assets, instances, pairs, contacts, contacts if undecided is None else undecided, _choice("mode", mode, _MODES),
-                                first_contact_only, within, add_error_bounds, sorted, grouped)
+                                first_contact_only, amount(within, "within", FARTHEST), add_error_bounds, sorted, grouped)
 
     def enqueue(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, pairs: Any = None, filter: Filter | None = None,
                 stream: Any = None) -> Queued:

@@ -370,7 +370,7 @@ class Query:
         """Finds until when moving bodies surely do not meet, in a step of `duration` seconds.
 
         Args:
-            motion: (n, 3, 3) or (n, 9) float64: velocity of the centre, angular velocity, centre.
+            motion: (n, 3, 3) or (n, 9) float64: velocity of the centre, angular velocity, and where the centre is in the world at the start.
         """
         number = _stream(stream)
         found = self._core.impacts(self._bodies(instances, asset, pose, number), motion, duration, self._pairs(pairs, number), tolerance, sorted,

@@ -1,4 +1,5 @@
 """tandem.cuda: what it finds is what the CPU finds, from and to the arrays of PyTorch, CuPy and JAX, without a copy. Skipped where there is no GPU."""
+import ctypes
 import doctest
 import gc
 import os
@@ -53,6 +54,65 @@ def cpu_instances(asset, pose):
 def assets():
     cow = tandem.build(*read_obj(ROOT / "assets/cow_1500.obj"), effort="fast")
     return [tandem.build(BOX_VERTICES, BOX_FACES), cow, tandem.build(0.2 * BOX_VERTICES + 0.4, BOX_FACES)]
+
+
+class Tensor(ctypes.Structure):
+    """DLManagedTensor of DLPack."""
+    _fields_ = [("data", ctypes.c_void_p), ("device", 2 * ctypes.c_int32), ("ndim", ctypes.c_int32), ("code", ctypes.c_uint8), ("bits", ctypes.c_uint8),
+                ("lanes", ctypes.c_uint16), ("shape", ctypes.POINTER(ctypes.c_int64)), ("strides", ctypes.POINTER(ctypes.c_int64)), ("byte_offset", ctypes.c_uint64),
+                ("context", ctypes.c_void_p), ("deleter", ctypes.CFUNCTYPE(None, ctypes.c_void_p))]
+
+
+class Producer:
+    """Hands out an array of uint32 by DLPack, said to lie on a GPU, and counts how often it comes back."""
+
+    def __init__(self, shape, strides, *, code=1, device=0):
+        self.device, self.given_back = device, 0
+        self.lengths = [(ctypes.c_int64 * len(shape))(*numbers) for numbers in (shape, strides)]
+        self.tensor = Tensor(None, (2, device), len(shape), code, 32, 1, *self.lengths, 0, None, Tensor._fields_[-1][1](self.delete))
+
+    def delete(self, _):
+        self.given_back += 1
+
+    def __dlpack_device__(self):
+        return 2, self.device
+
+    def __dlpack__(self, **_):
+        make = ctypes.pythonapi.PyCapsule_New
+        make.restype, make.argtypes = ctypes.py_object, (ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p)
+        return make(ctypes.addressof(self.tensor), b"dltensor", None)
+
+
+def test_arrays_are_given_back_once_whether_taken_or_refused():
+    stream = cuda._stream(None)
+    taken = Producer((0, 2), (2, 1))
+    pairs = cuda._cuda.Pairs(taken, stream, 0)
+    assert len(pairs) == 0 and taken.given_back == 0
+    del pairs
+    assert taken.given_back == 1
+    for error, words, refused in ((ValueError, "pairs is not contiguous", Producer((5, 2), (1, 5))), (ValueError, "pairs has shape", Producer((5, 3), (3, 1))),
+                                  (TypeError, "pairs is float32", Producer((5, 2), (2, 1), code=2))):
+        with pytest.raises(error, match=words):
+            cuda._cuda.Pairs(refused, stream, 0)
+        assert refused.given_back == 1
+
+
+class Interface:
+    def __init__(self, **told):
+        self.__cuda_array_interface__ = {"shape": (0, 2), "typestr": "<u4", "data": (0, False), "version": 3, "strides": None} | told
+
+
+def test_array_interfaces_are_not_believed_too_far():
+    stream = cuda._stream(None)
+    for told in ({}, {"typestr": "<i4"}, {"strides": (8, 4)}, {"mask": None}):
+        assert len(cuda._cuda.Pairs(Interface(**told), stream, 0)) == 0
+    for kind in ("|b1", "<c8", "<V4", "|O8", ">u4", "<u", "<f16", "<u3", "u4", "<\x004", "<u\x00"):
+        with pytest.raises(TypeError, match="pairs has elements"):
+            cuda._cuda.Pairs(Interface(typestr=kind), stream, 0)
+    for words, told in ((r"pairs has shape \(-1, 2\)", {"shape": (-1, 2)}), ("pairs has a mask", {"mask": Interface()}), ("pairs has 1 strides", {"strides": (4,)}),
+                        ("pairs has 3 strides", {"strides": (8, 4, 4)}), ("pairs is not contiguous", {"shape": (3, 2), "strides": (4, 12)})):
+        with pytest.raises(ValueError, match=words):
+            cuda._cuda.Pairs(Interface(**told), stream, 0)
 
 
 class Torch:

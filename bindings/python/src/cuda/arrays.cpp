@@ -2,8 +2,10 @@
 
 #include <nanobind/stl/string.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <cstring>
+#include <string_view>
 #include <utility>
 
 namespace tandem::python {
@@ -205,7 +207,10 @@ nb::object Rows::to_cpu() const {
 
 // ---- Arrays that are given
 
-GivenArray::GivenArray(nb::handle object, const char* name, cudaStream_t stream, int device) : name_(name) {
+// The delegation makes the destructor run, and give the array back, where something is wrong with it.
+GivenArray::GivenArray(nb::handle object, const char* name, cudaStream_t stream, int device)
+    : GivenArray() {
+  name_ = name;
   if (is_torch(object)) {
     take_tensor(object, stream, device);
   } else if (nb::hasattr(object, "__dlpack__") && nb::hasattr(object, "__dlpack_device__")) {
@@ -293,17 +298,26 @@ void GivenArray::take_capsule(nb::handle object, cudaStream_t stream, int device
 
 void GivenArray::take_interface(const nb::dict& interface, cudaStream_t stream, int device) {
   const std::string type = nb::cast<std::string>(interface["typestr"]);
-  if (type.size() < 3 || type[0] == '>')
-    throw nb::type_error((name_ + " has elements " + type + ", which nothing here takes").c_str());
+  const bool known = type.size() == 3 && type[0] != '>' && std::string_view("fiu").find(type[1]) != std::string_view::npos &&
+                     std::string_view("1248").find(type[2]) != std::string_view::npos;
+  if (!known) throw nb::type_error((name_ + " has elements " + type + ", which nothing here takes").c_str());
   const std::uint8_t code = type[1] == 'f' ? dlpack::kFloat : type[1] == 'i' ? dlpack::kInt : dlpack::kUInt;
-  type_ = {code, static_cast<std::uint8_t>(8 * std::stoi(type.substr(2))), 1};
+  type_ = {code, static_cast<std::uint8_t>(8 * (type[2] - '0')), 1};
   for (nb::handle length : nb::cast<nb::tuple>(interface["shape"]))
     shape_.push_back(nb::cast<std::int64_t>(length));
+  if (std::ranges::any_of(shape_, [](std::int64_t length) { return length < 0; }))
+    wrong_shape("lengths of 0 or more");
+  if (interface.contains("mask") && !interface["mask"].is_none())
+    throw nb::value_error((name_ + " has a mask, which nothing here takes").c_str());
   data_ = reinterpret_cast<const void*>(nb::cast<std::uintptr_t>(nb::cast<nb::tuple>(interface["data"])[0]));
   if (interface.contains("strides") && !interface["strides"].is_none()) {
     std::vector<std::int64_t> strides;
     for (nb::handle stride : nb::cast<nb::tuple>(interface["strides"]))
       strides.push_back(nb::cast<std::int64_t>(stride));
+    if (strides.size() != shape_.size())
+      throw nb::value_error((name_ + " has " + std::to_string(strides.size()) + " strides where its shape is " +
+                             text_of(shape_))
+                                .c_str());
     require_contiguous(strides.data(), type_.bits / 8);
   }
   cudaPointerAttributes attributes = {};

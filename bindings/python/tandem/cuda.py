@@ -5,7 +5,7 @@
     faces = torch.from_dlpack(found.contacts["face_a"])  # the query's own memory
 
 Arrays are taken by DLPack or `__cuda_array_interface__`, and given by both. `stream` is where a call's work goes: a number, an object of PyTorch or CuPy, or None
-for the default stream.
+for the default stream. The results keep such an object; where a number was given, the stream must live as long as they.
 """
 from __future__ import annotations
 
@@ -148,21 +148,21 @@ class TooLittleRoom(Error):
         self.undecided = undecided
 
 
-def _stream(stream: Any) -> int:
-    """The number of a stream."""
+def _stream(stream: Any) -> _cuda.Stream:
+    """A stream, which keeps the object that it was given as: CuPy destroys a stream with its object."""
     if stream is None:
-        return 0
+        return _cuda.Stream(0, None)
     if isinstance(stream, int):
         if stream < 0:
             raise ValueError(f"stream is {stream} where a cudaStream_t is wanted")
-        return stream
+        return _cuda.Stream(stream, None)
     for name in ("cuda_stream", "ptr"):  # PyTorch, CuPy
         number = getattr(stream, name, None)
         if isinstance(number, int):
-            return number
+            return _cuda.Stream(number, stream)
     protocol = getattr(stream, "__cuda_stream__", None)  # cuda.core
     if protocol is not None:
-        return int((protocol() if callable(protocol) else protocol)[1])
+        return _cuda.Stream(int((protocol() if callable(protocol) else protocol)[1]), stream)
     raise TypeError(f"stream is {type(stream).__name__} where a number, a stream of PyTorch or CuPy, or None is wanted")
 
 
@@ -307,7 +307,7 @@ class Query:
             raise TypeError("pose is missing")
         return Instances(_cuda.Instances(self._assets, asset, pose, _stream(stream)), asset, pose)
 
-    def _bodies(self, instances: Instances | None, asset: Any, pose: Any, stream: int) -> _cuda.Instances:
+    def _bodies(self, instances: Instances | None, asset: Any, pose: Any, stream: _cuda.Stream) -> _cuda.Instances:
         if instances is None:
             if pose is None:
                 raise TypeError("instances is missing, or pose")
@@ -316,7 +316,7 @@ class Query:
             raise TypeError("instances stand instead of asset and pose, not beside them")
         return instances._core
 
-    def _pairs(self, pairs: Any, stream: int) -> _cuda.Pairs | None:
+    def _pairs(self, pairs: Any, stream: _cuda.Stream) -> _cuda.Pairs | None:
         return None if pairs is None else _cuda.Pairs(pairs, stream, self._assets.device)
 
     def contacts(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, pairs: Any = None,
@@ -331,17 +331,17 @@ class Query:
 
         The others: as of `tandem.Query.contacts`.
         """
-        number = _stream(stream)
+        on = _stream(stream)
         self._given = pairs
-        found = self._core.contacts(self._bodies(instances, asset, pose, number), self._pairs(pairs, number), _choice("mode", mode, _MODES), first_contact_only,
-                                    within, add_error_bounds, sorted, grouped, None if filter is None else filter._core, number)
+        found = self._core.contacts(self._bodies(instances, asset, pose, on), self._pairs(pairs, on), _choice("mode", mode, _MODES), first_contact_only,
+                                    within, add_error_bounds, sorted, grouped, None if filter is None else filter._core, on)
         return Contacts(_found(found[0], pairs), Rows(found[1], CONTACT), Counters._make(found[2]))
 
     def pairs(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, sorted: bool = True, within: float = 0.0,
               filter: Filter | None = None, stream: Any = None) -> Rows:
         """The object pairs whose world boxes meet, rows of PAIR: a < b."""
-        number = _stream(stream)
-        found = self._core.pairs(self._bodies(instances, asset, pose, number), sorted, within, None if filter is None else filter._core, number)
+        on = _stream(stream)
+        found = self._core.pairs(self._bodies(instances, asset, pose, on), sorted, within, None if filter is None else filter._core, on)
         return Rows(found, PAIR)
 
     def manifolds(self, *, most_points: int = 7, match_previous: bool = True) -> Manifolds:
@@ -360,9 +360,9 @@ class Query:
     def distances(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, pairs: Any = None, reach: float | None = None,
                   absolute_tolerance: float = 0.0, relative_tolerance: float = 0.0, filter: Filter | None = None, stream: Any = None) -> Distances:
         """Finds how near the surfaces are. Arguments: as of `tandem.Query.distances`."""
-        number = _stream(stream)
-        found = self._core.distances(self._bodies(instances, asset, pose, number), self._pairs(pairs, number), reach, absolute_tolerance, relative_tolerance,
-                                     None if filter is None else filter._core, number)
+        on = _stream(stream)
+        found = self._core.distances(self._bodies(instances, asset, pose, on), self._pairs(pairs, on), reach, absolute_tolerance, relative_tolerance,
+                                     None if filter is None else filter._core, on)
         return Distances(_found(found[0], pairs), Rows(found[1], DISTANCE))
 
     def impacts(self, instances: Instances | None = None, *, motion: Any, duration: float, asset: Any = None, pose: Any = None, pairs: Any = None,
@@ -372,17 +372,17 @@ class Query:
         Args:
             motion: (n, 3, 3) or (n, 9) float64: velocity of the centre, angular velocity, centre.
         """
-        number = _stream(stream)
-        found = self._core.impacts(self._bodies(instances, asset, pose, number), motion, duration, self._pairs(pairs, number), tolerance, sorted,
-                                   None if filter is None else filter._core, number)
+        on = _stream(stream)
+        found = self._core.impacts(self._bodies(instances, asset, pose, on), motion, duration, self._pairs(pairs, on), tolerance, sorted,
+                                   None if filter is None else filter._core, on)
         return Impacts(_found(found[0], pairs), Rows(found[1], IMPACT))
 
     def verdicts(self, instances: Instances | None = None, *, tolerance: float, asset: Any = None, pose: Any = None, pairs: Any = None,
                  filter: Filter | None = None, stream: Any = None) -> Verdicts:
         """Tells of pairs whether they are apart, touch, or are within a tolerance. Arguments: as of `tandem.Query.verdicts`."""
-        number = _stream(stream)
-        found = self._core.verdicts(self._bodies(instances, asset, pose, number), tolerance, self._pairs(pairs, number),
-                                    None if filter is None else filter._core, number)
+        on = _stream(stream)
+        found = self._core.verdicts(self._bodies(instances, asset, pose, on), tolerance, self._pairs(pairs, on),
+                                    None if filter is None else filter._core, on)
         return Verdicts(_found(found[0], pairs), Rows(found[1], VERDICT))
 
     def reserve(self, *, instances: int, pairs: int, contacts: int, undecided: int | None = None, mode: Literal["exact", "fast", "boxes"] = "exact",
@@ -401,7 +401,7 @@ class Query:
         `stream` is PyTorch's current one. The arrays are read when the stream comes to it."""
         if self._step is None:
             raise ValueError("nothing is reserved: call reserve() first")
-        number = _stream(stream)
-        given = self._bodies(instances, asset, pose, number), self._pairs(pairs, number), None if filter is None else filter._core
-        self._step.enqueue(*given, number)
+        on = _stream(stream)
+        given = self._bodies(instances, asset, pose, on), self._pairs(pairs, on), None if filter is None else filter._core
+        self._step.enqueue(*given, on)
         return Queued(self._step, given)

@@ -344,6 +344,8 @@ void GivenArray::wrong_shape(const char* wanted) const {
 }
 
 void add_arrays(nb::module_& module) {
+  nb::class_<Stream>(module, "Stream")
+      .def(nb::init<std::uintptr_t, nb::object>(), nb::arg(), nb::arg().none());
   nb::class_<Array>(module, "Array")
       .def(
           "__dlpack__",

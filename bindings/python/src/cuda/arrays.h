@@ -37,11 +37,23 @@ inline cudaStream_t stream_of(std::uintptr_t number) {
   return reinterpret_cast<cudaStream_t>(number);
 }
 
+/// A stream, and the Python object, or None, that it lives as long as.
+class Stream {
+ public:
+  Stream() = default;
+  Stream(std::uintptr_t number, nb::object kept) : stream_(stream_of(number)), kept_(std::move(kept)) {}
+  operator cudaStream_t() const { return stream_; }
+
+ private:
+  cudaStream_t stream_ = nullptr;
+  nb::object kept_;
+};
+
 /// Where memory lies, what keeps it, and whether its contents may still be on their way on a stream.
 struct Memory {
   std::shared_ptr<const void> owner;
   int device = 0;
-  cudaStream_t stream = nullptr;
+  Stream stream;
   bool ready = true;  ///< the stream has passed what writes there
 };
 

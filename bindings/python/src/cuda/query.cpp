@@ -46,7 +46,7 @@ Query::Turn::Turn(Query& query) : query_(query) {
 }
 
 FoundPairs Query::find_pairs(const Instances& bodies, bool sorted, double within, const GpuFilter* filter,
-                             cudaStream_t stream) {
+                             const Stream& stream) {
   const auto broad_phase = broad_phases_.take(device(), [&](tandem_gpu_broad_phase* made) {
     return tandem_gpu_broad_phase_set_assets(made, assets_.get());
   });
@@ -62,22 +62,21 @@ FoundPairs Query::find_pairs(const Instances& bodies, bool sorted, double within
 }
 
 FoundPairs Query::pairs_of(nb::handle given, const Instances& bodies, bool sorted, double within,
-                           const GpuFilter* filter, cudaStream_t stream) {
+                           const GpuFilter* filter, const Stream& stream) {
   if (given.is_none()) return find_pairs(bodies, sorted, within, filter, stream);
   const Pairs& pairs = nb::cast<const Pairs&>(given);
   return {pairs.get(), nullptr, pairs.count()};
 }
 
-Rows Query::rows_of(const FoundPairs& pairs, cudaStream_t stream) const {
+Rows Query::rows_of(const FoundPairs& pairs, const Stream& stream) const {
   return {memory_of(pairs.owner, stream), pairs.pairs.pairs, pairs.count, sizeof(tandem_object_pair)};
 }
 
 nb::tuple Query::contacts(nb::object instances, nb::object given, std::uint32_t mode, bool first_contact_only,
                           double within, bool add_error_bounds, bool sorted, bool grouped,
-                          const GpuFilter* filter, std::uintptr_t stream_number) {
+                          const GpuFilter* filter, const Stream& stream) {
   const Turn turn(*this);
   const OnDevice current(device());
-  const cudaStream_t stream = stream_of(stream_number);
   const Instances& bodies = bodies_of(instances);
   last_.reset();
   const FoundPairs pairs = pairs_of(given, bodies, sorted, within, filter, stream);
@@ -103,11 +102,10 @@ nb::tuple Query::contacts(nb::object instances, nb::object given, std::uint32_t 
 }
 
 nb::object Query::pairs(nb::object instances, bool sorted, double within, const GpuFilter* filter,
-                        std::uintptr_t stream_number) {
+                        const Stream& stream) {
   const Turn turn(*this);
   const OnDevice current(device());
   last_.reset();
-  const cudaStream_t stream = stream_of(stream_number);
   return nb::cast(rows_of(find_pairs(bodies_of(instances), sorted, within, filter, stream), stream));
 }
 
@@ -117,7 +115,7 @@ const Query::Last& Query::last() const {
 }
 
 // A copy of rows that stay with the query, in memory that nobody has any more, or in new one.
-Rows Query::copy(const void* rows, std::size_t count, std::size_t row_bytes, cudaStream_t stream) {
+Rows Query::copy(const void* rows, std::size_t count, std::size_t row_bytes, const Stream& stream) {
   const std::size_t bytes = count * row_bytes;
   std::shared_ptr<Buffer> to;
   for (auto& made : copies_) {
@@ -180,10 +178,9 @@ nb::tuple Query::contained() {
 
 nb::tuple Query::distances(nb::object instances, nb::object given, std::optional<double> reach,
                            double absolute, double relative, const GpuFilter* filter,
-                           std::uintptr_t stream_number) {
+                           const Stream& stream) {
   const Turn turn(*this);
   const OnDevice current(device());
-  const cudaStream_t stream = stream_of(stream_number);
   const Instances& bodies = bodies_of(instances);
   const double within = reach.value_or(std::numeric_limits<double>::infinity());
   const FoundPairs pairs = pairs_of(given, bodies, true, within, filter, stream);
@@ -205,10 +202,9 @@ nb::tuple Query::distances(nb::object instances, nb::object given, std::optional
 
 nb::tuple Query::impacts(nb::object instances, nb::object motion, double duration, nb::object given,
                          double tolerance, bool sorted, const GpuFilter* filter,
-                         std::uintptr_t stream_number) {
+                         const Stream& stream) {
   const Turn turn(*this);
   const OnDevice current(device());
-  const cudaStream_t stream = stream_of(stream_number);
   const Instances& bodies = bodies_of(instances);
   const GivenArray moves(motion, "motion", stream, device());
   moves.require_type({kF64}, "float64");
@@ -242,10 +238,9 @@ nb::tuple Query::impacts(nb::object instances, nb::object motion, double duratio
 }
 
 nb::tuple Query::verdicts(nb::object instances, double tolerance, nb::object given, const GpuFilter* filter,
-                          std::uintptr_t stream_number) {
+                          const Stream& stream) {
   const Turn turn(*this);
   const OnDevice current(device());
-  const cudaStream_t stream = stream_of(stream_number);
   const Instances& bodies = bodies_of(instances);
   const FoundPairs pairs = pairs_of(given, bodies, true, 0, filter, stream);
   const auto verdicts = tolerance_queries_.take(device(), [&](tandem_gpu_tolerance_query* made) {

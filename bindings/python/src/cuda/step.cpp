@@ -30,10 +30,10 @@ Step::Step(nb::object assets, std::uint32_t instances, std::uint32_t pairs, std:
   check_whole(tandem_gpu_contact_query_reserve(contacts_.get(), &room, &options_));
 }
 
-void Step::enqueue(nb::object instances, nb::object pairs, nb::object filter, std::uintptr_t stream) {
+void Step::enqueue(nb::object instances, nb::object pairs, nb::object filter, const Stream& stream) {
   const OnDevice current(assets_.device());
   const Instances& bodies = nb::cast<const Instances&>(instances);
-  stream_ = stream_of(stream);
+  stream_ = stream;
   tandem_gpu_pairs of = {};
   if (pairs.is_none()) {
     near_.filter =

@@ -210,23 +210,26 @@ class Filter:
 
 class Queued:
     """A query that `Query.enqueue` has queued: arrays that the stream fills, as long as there is room, and their numbers, all in GPU memory. They are the same
-    arrays in every call, and in every replay of a graph, until the next `Query.reserve`. Keep this as long as a graph that was captured with it."""
+    arrays in every call, and in every replay of a graph, until the next `Query.reserve`. Keep this until the stream has passed the query, and as long as a graph
+    that was captured with it: it keeps the arrays that are read there."""
 
-    __slots__ = ("_core", "_kept")
+    __slots__ = ("_core", "_filter", "_given", "_instances")
 
-    def __init__(self, core: _cuda.Step, kept: tuple[Any, ...]):
+    def __init__(self, core: _cuda.Step, instances: _cuda.Instances, given: _cuda.Pairs | None, filter: _cuda.Filter | None):
         self._core: _cuda.Step = core
-        self._kept = kept  # what the stream, or a graph, reads
+        self._instances = instances
+        self._given = given
+        self._filter = filter
 
     @property
-    def pairs(self) -> Rows:
-        """Room for object pairs, rows of PAIR; the first `pair_count` of them are there. Where pairs were given: nothing."""
-        return Rows(self._core.pairs(), PAIR)
+    def pairs(self) -> Rows | None:
+        """Room for object pairs, rows of PAIR; the first `pair_count` of them are there. None where pairs were given."""
+        return Rows(self._core.pairs(), PAIR) if self._given is None else None
 
     @property
-    def pair_count(self) -> Array:
-        """(1,) uint32; more than `len(pairs)` where they did not fit."""
-        return self._core.pair_count()
+    def pair_count(self) -> Array | None:
+        """(1,) uint32; more than `len(pairs)` where they did not fit. None where pairs were given."""
+        return self._core.pair_count() if self._given is None else None
 
     @property
     def contacts(self) -> Rows:
@@ -248,14 +251,17 @@ class Queued:
         """One row: `failed`, not 0 where something is wrong; `complete`, 0 where something did not fit; `contacts`; `needed_pairs`, `needed_contacts`, ..."""
         return Rows(self._core.report(), _REPORT)
 
-    def wait(self) -> tuple[int, int]:
-        """Waits for the stream; how many pairs and contacts there are.
+    def wait(self, stream: Any = None) -> tuple[int, int]:
+        """Waits for a stream; how many pairs and contacts there are, of what ran last.
+
+        Args:
+            stream: that on which a graph was replayed. None: that of `enqueue`; where one was captured, all streams of the device.
 
         Raises:
             Error: what the GPU found wrong, with the instance or pair to blame.
             TooLittleRoom: contacts are missing.
         """
-        complete, pairs, contacts, needed_pairs, needed_contacts, needed_undecided = self._core.wait()
+        complete, pairs, contacts, needed_pairs, needed_contacts, needed_undecided = self._core.wait(self._given, None if stream is None else _stream(stream))
         if not complete:
             raise TooLittleRoom(needed_pairs, needed_contacts, needed_undecided)
         return pairs, contacts
@@ -332,9 +338,9 @@ class Query:
         The others: as of `tandem.Query.contacts`.
         """
         on = _stream(stream)
-        self._given = pairs
         found = self._core.contacts(self._bodies(instances, asset, pose, on), self._pairs(pairs, on), _choice("mode", mode, _MODES), first_contact_only,
                                     within, add_error_bounds, sorted, grouped, None if filter is None else filter._core, on)
+        self._given = pairs
         return Contacts(_found(found[0], pairs), Rows(found[1], CONTACT), Counters._make(found[2]))
 
     def pairs(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, sorted: bool = True, within: float = 0.0,
@@ -398,10 +404,11 @@ class Query:
     def enqueue(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, pairs: Any = None, filter: Filter | None = None,
                 stream: Any = None) -> Queued:
         """Queues a query of contacts on the stream, and neither waits nor allocates: it may be captured into a CUDA graph, `with torch.cuda.graph(...)` too, where
-        `stream` is PyTorch's current one. The arrays are read when the stream comes to it."""
+        `stream` is PyTorch's current one. The arrays are read when the stream comes to it: until then keep
+        them, or what this returns."""
         if self._step is None:
             raise ValueError("nothing is reserved: call reserve() first")
         on = _stream(stream)
         given = self._bodies(instances, asset, pose, on), self._pairs(pairs, on), None if filter is None else filter._core
         self._step.enqueue(*given, on)
-        return Queued(self._step, given)
+        return Queued(self._step, *given)

@@ -39,8 +39,8 @@ const Instances& bodies_of(const nb::object& instances) {
 
 }  // namespace
 
-Query::Turn::Turn(Query& query) : query_(query) {
-  if (!query.busy_.exchange(true)) return;
+Turn::Turn(std::atomic<bool>& busy) : busy_(busy) {
+  if (!busy.exchange(true)) return;
   PyErr_SetString(PyExc_RuntimeError, "the query is at work for another thread");
   throw nb::python_error();
 }
@@ -75,7 +75,7 @@ Rows Query::rows_of(const FoundPairs& pairs, const Stream& stream) const {
 nb::tuple Query::contacts(nb::object instances, nb::object given, std::uint32_t mode, bool first_contact_only,
                           double within, bool add_error_bounds, bool sorted, bool grouped,
                           const GpuFilter* filter, const Stream& stream) {
-  const Turn turn(*this);
+  const Turn turn(busy_);
   const OnDevice current(device());
   const Instances& bodies = bodies_of(instances);
   last_.reset();
@@ -103,7 +103,7 @@ nb::tuple Query::contacts(nb::object instances, nb::object given, std::uint32_t 
 
 nb::object Query::pairs(nb::object instances, bool sorted, double within, const GpuFilter* filter,
                         const Stream& stream) {
-  const Turn turn(*this);
+  const Turn turn(busy_);
   const OnDevice current(device());
   last_.reset();
   return nb::cast(rows_of(find_pairs(bodies_of(instances), sorted, within, filter, stream), stream));
@@ -132,7 +132,7 @@ Rows Query::copy(const void* rows, std::size_t count, std::size_t row_bytes, con
 }
 
 nb::tuple Query::manifolds(std::uint32_t most_points, bool match_previous) {
-  const Turn turn(*this);
+  const Turn turn(busy_);
   const OnDevice current(device());
   const Last& of = last();
   if (manifolds_ == nullptr)
@@ -157,7 +157,7 @@ nb::tuple Query::manifolds(std::uint32_t most_points, bool match_previous) {
 }
 
 nb::tuple Query::contained() {
-  const Turn turn(*this);
+  const Turn turn(busy_);
   const OnDevice current(device());
   const Last& of = last();
   if (contained_ == nullptr)
@@ -179,7 +179,7 @@ nb::tuple Query::contained() {
 nb::tuple Query::distances(nb::object instances, nb::object given, std::optional<double> reach,
                            double absolute, double relative, const GpuFilter* filter,
                            const Stream& stream) {
-  const Turn turn(*this);
+  const Turn turn(busy_);
   const OnDevice current(device());
   const Instances& bodies = bodies_of(instances);
   const double within = reach.value_or(std::numeric_limits<double>::infinity());
@@ -203,7 +203,7 @@ nb::tuple Query::distances(nb::object instances, nb::object given, std::optional
 nb::tuple Query::impacts(nb::object instances, nb::object motion, double duration, nb::object given,
                          double tolerance, bool sorted, const GpuFilter* filter,
                          const Stream& stream) {
-  const Turn turn(*this);
+  const Turn turn(busy_);
   const OnDevice current(device());
   const Instances& bodies = bodies_of(instances);
   const GivenArray moves(motion, "motion", stream, device());
@@ -239,7 +239,7 @@ nb::tuple Query::impacts(nb::object instances, nb::object motion, double duratio
 
 nb::tuple Query::verdicts(nb::object instances, double tolerance, nb::object given, const GpuFilter* filter,
                           const Stream& stream) {
-  const Turn turn(*this);
+  const Turn turn(busy_);
   const OnDevice current(device());
   const Instances& bodies = bodies_of(instances);
   const FoundPairs pairs = pairs_of(given, bodies, true, 0, filter, stream);
@@ -276,7 +276,7 @@ void add_gpu_queries(nb::module_& module) {
       .def("contacts", &Step::contacts)
       .def("report", &Step::report)
       .def("first_contact", &Step::first_contact)
-      .def("wait", &Step::wait);
+      .def("wait", &Step::wait, nb::arg().none(), nb::arg().none());
 }
 
 }  // namespace tandem::python

@@ -6,6 +6,18 @@
 
 namespace tandem::python {
 
+/// A turn at what takes one call at a time: a second thread gets RuntimeError.
+class Turn {
+ public:
+  explicit Turn(std::atomic<bool>& busy);
+  ~Turn() { busy_ = false; }
+  Turn(const Turn&) = delete;
+  Turn& operator=(const Turn&) = delete;
+
+ private:
+  std::atomic<bool>& busy_;
+};
+
 /// Deletes a handle of the C interface on its device.
 template <typename Of, void (*destroy)(Of*)>
 struct Destroy {
@@ -104,18 +116,6 @@ class Query {
   const Assets& assets() const { return assets_; }
 
  private:
-  // One call at a time: a second thread gets RuntimeError.
-  class Turn {
-   public:
-    explicit Turn(Query& query);
-    ~Turn() { query_.busy_ = false; }
-    Turn(const Turn&) = delete;
-    Turn& operator=(const Turn&) = delete;
-
-   private:
-    Query& query_;
-  };
-
   // What manifolds and contained bodies follow from.
   struct Last {
     nb::object instances, given;
@@ -156,12 +156,14 @@ class Step {
        std::uint64_t undecided, std::uint32_t mode, bool first_contact_only, double within,
        bool add_error_bounds, bool sorted, bool grouped);
   void enqueue(nb::object instances, nb::object pairs, nb::object filter, const Stream& stream);
-  nb::object pairs() const;
-  nb::object pair_count() const;
+  Rows pairs() const;
+  Array pair_count() const;
   Rows contacts() const;
   Rows report() const;
   Array first_contact() const;
-  nb::tuple wait() const;
+  /// given: the pairs of the call that is waited for, or None. stream: null: that of the last call, or, where
+  /// a call was captured, all of the device's, since its graph may run on any.
+  nb::tuple wait(nb::handle given, const Stream* stream);
 
  private:
   Memory memory_of(std::shared_ptr<const void> owner) const {
@@ -175,7 +177,9 @@ class Step {
   tandem_gpu_query_options options_;
   tandem_gpu_broad_phase_options near_;
   std::uint64_t contact_room_;
+  std::atomic<bool> busy_ = false;
   Stream stream_;
+  bool captured_ = false;
   nb::object instances_, given_, filter_;  // what the stream may still read
 };
 

@@ -130,7 +130,6 @@ class GivenArray {
   void take_capsule(nb::handle object, cudaStream_t stream, int device);
   void take_interface(const nb::dict& interface, cudaStream_t stream, int device);
   void require_contiguous(const std::int64_t* strides, std::int64_t unit) const;
-  void require_device(int id, int device) const;
 
   std::string name_;
   const void* data_ = nullptr;
@@ -140,6 +139,8 @@ class GivenArray {
   PyObject* kept_ = nullptr;
 };
 
+/// Throws ValueError where what the argument `name` has lies on GPU `id` instead of `device`.
+void require_device(const std::string& name, int id, int device);
 std::string name_of(dlpack::DataType type);
 std::string text_of(const std::vector<std::int64_t>& shape);
 

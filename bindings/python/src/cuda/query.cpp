@@ -33,10 +33,6 @@ nb::tuple counters_of(const tandem_gpu_query_counters& counters) {
                         counters.contacts);
 }
 
-const Instances& bodies_of(const nb::object& instances) {
-  return nb::cast<const Instances&>(instances);
-}
-
 }  // namespace
 
 Turn::Turn(std::atomic<bool>& busy) : busy_(busy) {
@@ -53,7 +49,7 @@ FoundPairs Query::find_pairs(const Instances& bodies, bool sorted, double within
   auto options = sized<tandem_gpu_broad_phase_options>();
   options.sorted = sorted;
   options.within = within;
-  options.filter = GpuFilter::of(filter, bodies.count());
+  options.filter = GpuFilter::of(filter, bodies);
   tandem_gpu_broad_phase* const query = broad_phase.get();
   run([&] { return tandem_gpu_broad_phase_find(query, &bodies.get(), &options, stream); },
       [&] { return report_of(tandem_gpu_broad_phase_get_report, query).where; });
@@ -77,7 +73,7 @@ nb::tuple Query::contacts(nb::object instances, nb::object given, std::uint32_t 
                           const GpuFilter* filter, const Stream& stream) {
   const Turn turn(busy_);
   const OnDevice current(device());
-  const Instances& bodies = bodies_of(instances);
+  const Instances& bodies = bodies_of(instances, device());
   last_.reset();
   const FoundPairs pairs = pairs_of(given, bodies, sorted, within, filter, stream);
   const auto contacts = contact_queries_.take(device(), [&](tandem_gpu_contact_query* made) {
@@ -106,7 +102,8 @@ nb::object Query::pairs(nb::object instances, bool sorted, double within, const 
   const Turn turn(busy_);
   const OnDevice current(device());
   last_.reset();
-  return nb::cast(rows_of(find_pairs(bodies_of(instances), sorted, within, filter, stream), stream));
+  return nb::cast(
+      rows_of(find_pairs(bodies_of(instances, device()), sorted, within, filter, stream), stream));
 }
 
 const Query::Last& Query::last() const {
@@ -142,7 +139,7 @@ nb::tuple Query::manifolds(std::uint32_t most_points, bool match_previous) {
   auto options = sized<tandem_gpu_manifold_options>();
   options.most_points = most_points;
   options.ignore_previous = !match_previous;
-  const Instances& bodies = bodies_of(of.instances);
+  const Instances& bodies = bodies_of(of.instances, device());
   tandem_gpu_manifolds* const made = manifolds_.get();
   check_whole(call_freely([&] {
     return tandem_gpu_manifolds_find(made, &bodies.get(), &of.pairs.pairs, of.contacts.get(), &options,
@@ -164,7 +161,7 @@ nb::tuple Query::contained() {
     contained_ = ContainmentQueries::make(device(), [&](tandem_gpu_containment_query* made) {
       return tandem_gpu_containment_query_set_assets(made, assets_.get(), of.stream);
     });
-  const Instances& bodies = bodies_of(of.instances);
+  const Instances& bodies = bodies_of(of.instances, device());
   tandem_gpu_containment_query* const query = contained_.get();
   check_whole(call_freely([&] {
     return tandem_gpu_containment_query_find(query, &bodies.get(), &of.pairs.pairs, of.contacts.get(),
@@ -177,11 +174,10 @@ nb::tuple Query::contained() {
 }
 
 nb::tuple Query::distances(nb::object instances, nb::object given, std::optional<double> reach,
-                           double absolute, double relative, const GpuFilter* filter,
-                           const Stream& stream) {
+                           double absolute, double relative, const GpuFilter* filter, const Stream& stream) {
   const Turn turn(busy_);
   const OnDevice current(device());
-  const Instances& bodies = bodies_of(instances);
+  const Instances& bodies = bodies_of(instances, device());
   const double within = reach.value_or(std::numeric_limits<double>::infinity());
   const FoundPairs pairs = pairs_of(given, bodies, true, within, filter, stream);
   const auto distances = distance_queries_.take(device(), [&](tandem_gpu_distance_query* made) {
@@ -201,11 +197,10 @@ nb::tuple Query::distances(nb::object instances, nb::object given, std::optional
 }
 
 nb::tuple Query::impacts(nb::object instances, nb::object motion, double duration, nb::object given,
-                         double tolerance, bool sorted, const GpuFilter* filter,
-                         const Stream& stream) {
+                         double tolerance, bool sorted, const GpuFilter* filter, const Stream& stream) {
   const Turn turn(busy_);
   const OnDevice current(device());
-  const Instances& bodies = bodies_of(instances);
+  const Instances& bodies = bodies_of(instances, device());
   const GivenArray moves(motion, "motion", stream, device());
   moves.require_type({kF64}, "float64");
   const auto count = static_cast<std::int64_t>(bodies.count());
@@ -220,7 +215,7 @@ nb::tuple Query::impacts(nb::object instances, nb::object motion, double duratio
   auto options = sized<tandem_gpu_impact_options>();
   options.sorted = sorted;
   options.tolerance = tolerance;
-  options.filter = GpuFilter::of(filter, bodies.count());
+  options.filter = GpuFilter::of(filter, bodies);
   const tandem_gpu_pairs* const of = given.is_none() ? nullptr : &nb::cast<const Pairs&>(given).get();
   tandem_gpu_impact_query* const query = impacts.get();
   run(
@@ -241,7 +236,7 @@ nb::tuple Query::verdicts(nb::object instances, double tolerance, nb::object giv
                           const Stream& stream) {
   const Turn turn(busy_);
   const OnDevice current(device());
-  const Instances& bodies = bodies_of(instances);
+  const Instances& bodies = bodies_of(instances, device());
   const FoundPairs pairs = pairs_of(given, bodies, true, 0, filter, stream);
   const auto verdicts = tolerance_queries_.take(device(), [&](tandem_gpu_tolerance_query* made) {
     return tandem_gpu_tolerance_query_set_assets(made, assets_.get(), stream);

@@ -18,8 +18,7 @@ Assets::Assets(nb::list assets, int device, std::uint32_t contents, const Stream
   const OnDevice current(device);
   const tandem_status status = [&] {
     const nb::gil_scoped_release release;
-    return tandem_gpu_assets_upload(list.data(), list.size(), &options, stream, nullptr, &assets_,
-                                    &where);
+    return tandem_gpu_assets_upload(list.data(), list.size(), &options, stream, nullptr, &assets_, &where);
   }();
   check(status, where);
 }
@@ -55,8 +54,13 @@ Instances::Instances(const Assets& assets, nb::handle asset, nb::handle pose, co
   instances_.asset = static_cast<const std::uint32_t*>(asset_.data());
 }
 
-Pairs::Pairs(nb::handle pairs, const Stream& stream, int device)
-    : given_(pairs, "pairs", stream, device) {
+const Instances& bodies_of(nb::handle instances, int device) {
+  const Instances& bodies = nb::cast<const Instances&>(instances);
+  require_device("instances", bodies.device(), device);
+  return bodies;
+}
+
+Pairs::Pairs(nb::handle pairs, const Stream& stream, int device) : given_(pairs, "pairs", stream, device) {
   given_.require_type({kU32, kI32}, "uint32 or int32");
   const std::vector<std::int64_t>& shape = given_.shape();
   if (shape.size() != 2 || shape[1] != 2) given_.wrong_shape("(m, 2)");
@@ -65,7 +69,8 @@ Pairs::Pairs(nb::handle pairs, const Stream& stream, int device)
 }
 
 GpuFilter::GpuFilter(nb::handle motion, nb::handle group, nb::handle mask, nb::handle excluded,
-                     const Stream& stream, int device) {
+                     const Stream& stream, int device)
+    : device_(device) {
   filter_.struct_size = sizeof filter_;
   const auto take = [&](nb::handle given, const char* name, GivenArray& array,
                         std::initializer_list<dlpack::DataType> types, const char* wanted) {
@@ -89,11 +94,12 @@ GpuFilter::GpuFilter(nb::handle motion, nb::handle group, nb::handle mask, nb::h
   filter_.excluded = excluded_;
 }
 
-const tandem_gpu_pair_filter* GpuFilter::of(const GpuFilter* filter, std::size_t instances) {
+const tandem_gpu_pair_filter* GpuFilter::of(const GpuFilter* filter, const Instances& bodies) {
   if (filter == nullptr) return nullptr;
-  if (filter->count_ >= 0 && static_cast<std::size_t>(filter->count_) != instances)
+  require_device("filter", filter->device_, bodies.device());
+  if (filter->count_ >= 0 && static_cast<std::size_t>(filter->count_) != bodies.count())
     throw nb::value_error(("filter is of " + std::to_string(filter->count_) + " instances where there are " +
-                           std::to_string(instances))
+                           std::to_string(bodies.count()))
                               .c_str());
   return &filter->filter_;
 }

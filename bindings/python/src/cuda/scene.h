@@ -56,6 +56,9 @@ class Instances {
   int device_;
 };
 
+/// Throws ValueError where they lie on another GPU.
+const Instances& bodies_of(nb::handle instances, int device);
+
 /// Object pairs: somebody's array, or rows that a query found.
 class Pairs {
  public:
@@ -76,14 +79,15 @@ class GpuFilter {
   ~GpuFilter() { tandem_gpu_excluded_pairs_destroy(excluded_); }
   GpuFilter(const GpuFilter&) = delete;
   GpuFilter& operator=(const GpuFilter&) = delete;
-  /// Null for none; throws ValueError where it is of another number of instances.
-  static const tandem_gpu_pair_filter* of(const GpuFilter* filter, std::size_t instances);
+  /// Null for none; throws ValueError where it is of another number of instances, or lies on another GPU.
+  static const tandem_gpu_pair_filter* of(const GpuFilter* filter, const Instances& bodies);
 
  private:
   GivenArray motion_, group_, mask_;
   tandem_gpu_excluded_pairs* excluded_ = nullptr;
   tandem_gpu_pair_filter filter_ = {};
   std::int64_t count_ = -1;  // any
+  int device_;
 };
 
 }  // namespace tandem::python

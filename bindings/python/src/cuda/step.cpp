@@ -33,15 +33,14 @@ Step::Step(nb::object assets, std::uint32_t instances, std::uint32_t pairs, std:
 void Step::enqueue(nb::object instances, nb::object pairs, nb::object filter, const Stream& stream) {
   const Turn turn(busy_);
   const OnDevice current(assets_.device());
-  const Instances& bodies = nb::cast<const Instances&>(instances);
+  const Instances& bodies = bodies_of(instances, assets_.device());
   cudaStreamCaptureStatus capture = cudaStreamCaptureStatusNone;
   check_cuda(cudaStreamIsCapturing(stream, &capture));
   captured_ = captured_ || capture != cudaStreamCaptureStatusNone;
   stream_ = stream;
   tandem_gpu_pairs of = {};
   if (pairs.is_none()) {
-    near_.filter =
-        filter.is_none() ? nullptr : GpuFilter::of(&nb::cast<const GpuFilter&>(filter), bodies.count());
+    near_.filter = filter.is_none() ? nullptr : GpuFilter::of(&nb::cast<const GpuFilter&>(filter), bodies);
     check_whole(tandem_gpu_broad_phase_enqueue(broad_phase_.get(), &bodies.get(), &near_, stream_));
     of = tandem_gpu_broad_phase_pairs(broad_phase_.get());
   } else {

@@ -87,6 +87,8 @@ def test_names_parts_and_faces():
     assert sorted(asset.faces().tolist()) == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5]
     with pytest.raises(tandem.Error) as caught:
         tandem.build(BOX_VERTICES, BOX_FACES, parts=[("lid", "", 2)])
+    with pytest.raises(ValueError, match="row 1 begins at face 3 where 2 is wanted"):
+        tandem.build(BOX_VERTICES, BOX_FACES, parts=[tandem.Part("lid", "", 0, 2), tandem.Part("rest", "", 3, 10)])
     assert caught.value.name == "BadPart"
 
 
@@ -102,7 +104,8 @@ def test_reports_what_was_left_out():
 def test_names_the_defect_of_a_file(tmp_path, box):
     with pytest.raises(tandem.FileError, match="nowhere.bvh: no such file") as caught:
         tandem.Asset.load(tmp_path / "nowhere.bvh")
-    assert isinstance(caught.value, OSError) and caught.value.name == "FileNotFound"
+    assert isinstance(caught.value, FileNotFoundError) and caught.value.name == "FileNotFound"
+    assert caught.value.filename == str(tmp_path / "nowhere.bvh") and str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
     with pytest.raises(tandem.Error) as caught:
         tandem.Asset.from_bytes(bytes(box)[:-1])
     assert caught.value.name == "Truncated"

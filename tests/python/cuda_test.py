@@ -5,12 +5,16 @@ import os
 import re
 import subprocess
 import sys
+import threading
+import time
+import weakref
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import tandem
+from fakes import Interface, OwnStream, Producer
 from meshes import BOX_FACES, BOX_VERTICES, read_obj
 
 os.environ.setdefault("XLA_PYTHON_CLIENT_PREALLOCATE", "false")  # JAX would take most of the GPU's memory
@@ -53,6 +57,44 @@ def cpu_instances(asset, pose):
 def assets():
     cow = tandem.build(*read_obj(ROOT / "assets/cow_1500.obj"), effort="fast")
     return [tandem.build(BOX_VERTICES, BOX_FACES), cow, tandem.build(0.2 * BOX_VERTICES + 0.4, BOX_FACES)]
+
+
+def test_arrays_are_given_back_once_whether_taken_or_refused():
+    stream = cuda._stream(None)
+    taken = Producer((0, 2), (2, 1))
+    pairs = cuda._cuda.Pairs(taken, stream, 0)
+    assert len(pairs) == 0 and taken.given_back == 0
+    del pairs
+    assert taken.given_back == 1
+    for error, words, refused in ((ValueError, "pairs is not contiguous", Producer((5, 2), (1, 5))), (ValueError, "pairs has shape", Producer((5, 3), (3, 1))),
+                                  (TypeError, "pairs is float32", Producer((5, 2), (2, 1), code=2))):
+        with pytest.raises(error, match=words):
+            cuda._cuda.Pairs(refused, stream, 0)
+        assert refused.given_back == 1
+
+
+def test_array_interfaces_are_not_believed_too_far():
+    stream = cuda._stream(None)
+    for told in ({}, {"typestr": "<i4"}, {"strides": (8, 4)}, {"mask": None}):
+        assert len(cuda._cuda.Pairs(Interface(**told), stream, 0)) == 0
+    for kind in ("|b1", "<c8", "<V4", "|O8", ">u4", "<u", "<f16", "<u3", "u4", "<\x004", "<u\x00"):
+        with pytest.raises(TypeError, match="pairs has elements"):
+            cuda._cuda.Pairs(Interface(typestr=kind), stream, 0)
+    for words, told in ((r"pairs has shape \(-1, 2\)", {"shape": (-1, 2)}), ("pairs has a mask", {"mask": Interface()}), ("pairs has 1 strides", {"strides": (4,)}),
+                        ("pairs has 3 strides", {"strides": (8, 4, 4)}), ("pairs is not contiguous", {"shape": (3, 2), "strides": (4, 12)})):
+        with pytest.raises(ValueError, match=words):
+            cuda._cuda.Pairs(Interface(**told), stream, 0)
+
+
+def test_a_stream_keeps_its_object():
+    own = OwnStream(7)
+    lives, kept = weakref.ref(own), cuda._stream(own)
+    del own
+    gc.collect()
+    assert lives() is not None
+    del kept
+    gc.collect()
+    assert lives() is None
 
 
 class Torch:
@@ -341,6 +383,112 @@ def test_a_graph_of_pytorch_finds_the_contacts_of_moved_poses(assets):
         torch.cuda.synchronize()
         assert int(total) == len(expected) > 0
         assert np.array_equal(queued.contacts.numpy()[: len(expected)], expected)
+
+
+@needs_gpu
+def test_waiting_after_a_replay(assets):
+    """A graph that is replayed late, on a stream that the query never saw."""
+    torch = pytest.importorskip("torch")
+    asset, pose = make_scene()
+    query, on_cpu, at, numbers = cuda.Query(assets), tandem.Query(assets), torch.from_numpy(pose).cuda(), torch.from_numpy(asset).cuda()
+    query.reserve(instances=COUNT, pairs=4000, contacts=100_000)
+    query.enqueue(asset=numbers, pose=at).wait()
+    graph, side, seen = torch.cuda.CUDAGraph(), torch.cuda.Stream(), set()
+    with torch.cuda.graph(graph):
+        at[::2, 3, 0] += 0.05
+        queued = query.enqueue(asset=numbers, pose=at, stream=torch.cuda.current_stream())
+    for stream in (side, None, side, None):
+        torch.cuda.synchronize()
+        with torch.cuda.stream(side):
+            torch.cuda._sleep(50_000_000)
+            graph.replay()
+        pairs, contacts = queued.wait(stream)
+        pose[::2, 3, 0] += 0.05
+        found = on_cpu.contacts(cpu_instances(asset, pose))
+        assert (pairs, contacts) == (len(found.pairs), len(found.contacts))
+        seen.add(contacts)
+    assert len(seen) == 4
+
+
+@needs_gpu
+def test_a_step_takes_one_call_at_a_time(assets):
+    torch = pytest.importorskip("torch")
+    asset, pose = make_scene()
+    query, stream, counts = cuda.Query(assets), torch.cuda.Stream(), []
+    bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
+    query.reserve(instances=COUNT, pairs=4000, contacts=100_000)
+    expected = query.enqueue(bodies).wait()
+    with torch.cuda.stream(stream):
+        torch.cuda._sleep(1_000_000_000)  # half a second
+    queued = query.enqueue(bodies, stream=stream)
+    thread = threading.Thread(target=lambda: counts.append(queued.wait()))
+    thread.start()
+    time.sleep(0.1)
+    with pytest.raises(RuntimeError, match="at work for another thread"):
+        query.enqueue(bodies)
+    with pytest.raises(RuntimeError, match="at work for another thread"):
+        queued.wait()
+    thread.join()
+    assert counts == [expected] == [query.enqueue(bodies).wait()]
+
+
+@needs_gpu
+def test_given_pairs_are_not_handed_out_as_found(assets):
+    torch = pytest.importorskip("torch")
+    asset, pose = make_scene()
+    query = cuda.Query(assets)
+    bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
+    found = query.contacts(bodies)
+    query.reserve(instances=COUNT, pairs=4000, contacts=100_000)
+    first = query.enqueue(bodies)
+    assert first.wait() == (len(found.pairs), len(found.contacts)) and len(first.pairs) == 4000
+    few = torch.tensor([[3, 1], [5, 9]], dtype=torch.int32, device="cuda")
+    queued = query.enqueue(bodies, pairs=few)
+    assert queued.pairs is None and queued.pair_count is None
+    assert queued.wait() == (2, len(query.contacts(bodies, pairs=few).contacts))
+
+    query.contacts(bodies, pairs=found.pairs, grouped=True)
+    with pytest.raises(ValueError, match="mode is 'best'"):
+        query.contacts(bodies, pairs=few, mode="best")
+    assert query.manifolds().pairs is found.pairs
+
+
+@needs_gpu
+def test_results_keep_their_stream(assets):
+    torch = pytest.importorskip("torch")
+    asset, pose = make_scene()
+    query, made = cuda.Query(assets), torch.cuda.Stream()
+    bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
+    query.reserve(instances=COUNT, pairs=4000, contacts=100_000)
+    for call in (lambda stream: query.contacts(bodies, stream=stream).contacts, lambda stream: query.enqueue(bodies, stream=stream).contacts):
+        own = OwnStream(made.cuda_stream)
+        lives, rows = weakref.ref(own), call(own)
+        del own
+        gc.collect()
+        assert lives() is not None and len(rows.numpy()) > 0
+        del rows
+        query.enqueue(bodies).wait()  # on another stream
+        gc.collect()
+        assert lives() is None
+
+
+@needs_gpu
+def test_what_lies_on_another_gpu_is_refused(assets):
+    torch = pytest.importorskip("torch")
+    asset, pose = make_scene()
+    query = cuda.Query(assets)
+    bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
+    query.reserve(instances=COUNT, pairs=4000, contacts=100_000)
+    filter = cuda.Filter(group=Producer((COUNT,), (1,), device=5), device=5)
+    for call in (query.contacts, query.pairs, query.enqueue):
+        with pytest.raises(ValueError, match="filter lies in the memory of GPU 5 where that of GPU 0"):
+            call(bodies, filter=filter)
+    if torch.cuda.device_count() > 1:
+        there = cuda.Query(assets, device=1).instances(torch.from_numpy(asset).to("cuda:1"), torch.from_numpy(pose).to("cuda:1"))
+        for call in (query.contacts, query.pairs, query.distances, query.enqueue):
+            with pytest.raises(ValueError, match="instances lies in the memory of GPU 1 where that of GPU 0"):
+                call(there)
+    assert query.enqueue(bodies).wait()[1] == len(query.contacts(bodies).contacts)
 
 
 @needs_gpu

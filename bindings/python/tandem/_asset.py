@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from . import _tandem
 from ._arrays import number, whole_number
-from ._errors import Error
+from ._errors import Error, with_path
 
 __all__ = ["Asset", "Level", "Part"]
 
@@ -90,7 +90,7 @@ class Asset:
         try:
             return Asset._of(_tandem.open(name, bool(read), bool(quick)))
         except Error as error:
-            raise type(error)(f"{os.fsdecode(path)}: {error}", error.status, error.name, error.subject, error.where) from None
+            raise with_path(error, os.fsdecode(path)) from None
 
     @staticmethod
     def from_bytes(data: Any, *, check: Literal["full", "quick"] = "full") -> Asset:
@@ -100,8 +100,11 @@ class Asset:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the file: whole, or not at all (into a temporary file beside it, which then gets its name)."""
         import tempfile  # here, and not for every import of the package
-        path = os.fspath(path)
-        descriptor, aside = tempfile.mkstemp(prefix=".", suffix=".tmp", dir=os.path.dirname(path) or ".")
+        path = os.path.realpath(path)  # a link stays one
+        try:
+            descriptor, aside = tempfile.mkstemp(prefix=".", suffix=".tmp", dir=os.path.dirname(path))
+        except OSError as error:
+            raise type(error)(error.errno, error.strerror, path) from None
         try:
             with open(descriptor, "wb") as file:
                 file.write(self.data)

@@ -199,13 +199,17 @@ def _words(levels: Levels | None) -> str:
 
 
 def _named_parts(parts: Parts | None) -> list[tuple[str, str, int]]:
-    named = []
+    named: list[tuple[str, str, int]] = []
+    next_face = 0
     for row, part in enumerate(parts or ()):
         if not isinstance(part, tuple) or len(part) not in (3, 4):
             raise TypeError(f"parts: row {row} is not (name, path, number of faces)")
+        if len(part) == 4 and part[2] != next_face:
+            raise ValueError(f"parts: row {row} begins at face {part[2]} where {next_face} is wanted: parts follow each other")
         named.append((_text(part[0], f"parts: row {row}: name"), _text(part[1], f"parts: row {row}: path"),
                       whole_number(part[-1], f"parts: row {row}: number of faces", 0, 0xFFFFFFFF)))
-    if sum(count for _, _, count in named) >= 0xFFFFFFFF:
+        next_face += named[-1][2]
+    if next_face >= 0xFFFFFFFF:
         raise ValueError("parts have 2^32 - 1 faces or more together")
     return named
 

@@ -1,6 +1,8 @@
 """What goes wrong, as exceptions."""
 from __future__ import annotations
 
+import errno
+
 __all__ = ["Error", "FileError"]
 
 
@@ -23,11 +25,28 @@ class Error(Exception):
 
 
 class FileError(Error, OSError):
-    """A file cannot be found, opened or read."""
+    """A file cannot be found, opened or read: `filename`. One that is not there is a FileNotFoundError too."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+class _FileNotFound(FileError, FileNotFoundError):
+    pass
 
 
 _FILE_STATUSES = range(100, 104)  # TANDEM_FILE_NOT_FOUND to TANDEM_CANNOT_READ
 _OUT_OF_MEMORY = 4
+
+
+def with_path(error: Error, path: str) -> Error:
+    """The same about the file of a path."""
+    kind = _FileNotFound if error.status == _FILE_STATUSES[0] else type(error)
+    told = kind(f"{path}: {error}", error.status, error.name, error.subject, error.where)
+    if isinstance(told, FileError):
+        told.filename = path
+        told.errno = errno.ENOENT if isinstance(told, FileNotFoundError) else None
+    return told
 
 
 def from_status(status: int, name: str, sentence: str, subject: str | None, where: int) -> BaseException:

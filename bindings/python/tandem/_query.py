@@ -254,12 +254,15 @@ class Query:
 
         Args:
             instances: at the start, or None where asset, rotation, ... are given.
-            motion: array of MOTION, one for each instance: m/s of the centre, rad/s about it.
+            motion: array of MOTION, one for each instance: velocity of its centre, rad/s about that, and where the centre is in the world at the start, such as
+                that of mass or the instance's translation. It matters where an instance turns: with zeros it goes around the world's origin.
             tolerance: how near triangles come before they stop a pair, as a part of the diagonal of the smaller body's bounds; 0: 1e-6.
 
         >>> motion = np.zeros(2, tandem.MOTION)
         >>> motion["velocity"][1] = [-1, 0, 0]
-        >>> query.impacts(None, motion, 2.0, translation=[[0, 0, 0], [1.5, 0, 0]]).impacts["t_safe"].round(3).tolist()
+        >>> motion["angular_velocity"][1] = [1, 0, 0]
+        >>> motion["center"] = translation = [[0, 0, 0], [1.5, 0, 0]]
+        >>> query.impacts(None, motion, 2.0, translation=translation).impacts["t_safe"].round(3).tolist()
         [0.5]
         """
         posed = instances_of(instances, asset, rotation, translation, transform)

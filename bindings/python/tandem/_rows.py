@@ -30,7 +30,7 @@ DISTANCE = np.dtype([("lower", "<f8"), ("upper", "<f8"), ("point_a", *_VECTOR), 
                      ("face_a", "<u4"), ("face_b", "<u4")])
 #: Triangles of a pair of instances that were nearest a step ago.
 FORMER = np.dtype([("a", "<u4"), ("b", "<u4"), ("triangle_a", "<u4"), ("triangle_b", "<u4")])
-#: How an instance moves: its centre straight ahead, and it turns about that.
+#: How an instance moves: its centre straight ahead, and it turns about that. `center` is where the centre is in the world at the start, such as that of mass.
 MOTION = np.dtype([("velocity", *_VECTOR), ("angular_velocity", *_VECTOR), ("center", *_VECTOR)])
 #: Until when two bodies surely do not meet.
 IMPACT = np.dtype([("t_safe", "<f8"), ("gap", "<f8"), ("point_a", *_VECTOR), ("point_b", *_VECTOR), ("triangle_a", "<u4"), ("triangle_b", "<u4"),

@@ -5,7 +5,7 @@
     faces = torch.from_dlpack(found.contacts["face_a"])  # the query's own memory
 
 Arrays are taken by DLPack or `__cuda_array_interface__`, and given by both. `stream` is where a call's work goes: a number, an object of PyTorch or CuPy, or None
-for the default stream.
+for the default stream. The results keep such an object; where a number was given, the stream must live as long as they.
 """
 from __future__ import annotations
 
@@ -148,21 +148,21 @@ class TooLittleRoom(Error):
         self.undecided = undecided
 
 
-def _stream(stream: Any) -> int:
-    """The number of a stream."""
+def _stream(stream: Any) -> _cuda.Stream:
+    """A stream, which keeps the object that it was given as: CuPy destroys a stream with its object."""
     if stream is None:
-        return 0
+        return _cuda.Stream(0, None)
     if isinstance(stream, int):
         if stream < 0:
             raise ValueError(f"stream is {stream} where a cudaStream_t is wanted")
-        return stream
+        return _cuda.Stream(stream, None)
     for name in ("cuda_stream", "ptr"):  # PyTorch, CuPy
         number = getattr(stream, name, None)
         if isinstance(number, int):
-            return number
+            return _cuda.Stream(number, stream)
     protocol = getattr(stream, "__cuda_stream__", None)  # cuda.core
     if protocol is not None:
-        return int((protocol() if callable(protocol) else protocol)[1])
+        return _cuda.Stream(int((protocol() if callable(protocol) else protocol)[1]), stream)
     raise TypeError(f"stream is {type(stream).__name__} where a number, a stream of PyTorch or CuPy, or None is wanted")
 
 
@@ -210,23 +210,26 @@ class Filter:
 
 class Queued:
     """A query that `Query.enqueue` has queued: arrays that the stream fills, as long as there is room, and their numbers, all in GPU memory. They are the same
-    arrays in every call, and in every replay of a graph, until the next `Query.reserve`. Keep this as long as a graph that was captured with it."""
+    arrays in every call, and in every replay of a graph, until the next `Query.reserve`. Keep this until the stream has passed the query, and as long as a graph
+    that was captured with it: it keeps the arrays that are read there."""
 
-    __slots__ = ("_core", "_kept")
+    __slots__ = ("_core", "_filter", "_given", "_instances")
 
-    def __init__(self, core: _cuda.Step, kept: tuple[Any, ...]):
+    def __init__(self, core: _cuda.Step, instances: _cuda.Instances, given: _cuda.Pairs | None, filter: _cuda.Filter | None):
         self._core: _cuda.Step = core
-        self._kept = kept  # what the stream, or a graph, reads
+        self._instances = instances
+        self._given = given
+        self._filter = filter
 
     @property
-    def pairs(self) -> Rows:
-        """Room for object pairs, rows of PAIR; the first `pair_count` of them are there. Where pairs were given: nothing."""
-        return Rows(self._core.pairs(), PAIR)
+    def pairs(self) -> Rows | None:
+        """Room for object pairs, rows of PAIR; the first `pair_count` of them are there. None where pairs were given."""
+        return Rows(self._core.pairs(), PAIR) if self._given is None else None
 
     @property
-    def pair_count(self) -> Array:
-        """(1,) uint32; more than `len(pairs)` where they did not fit."""
-        return self._core.pair_count()
+    def pair_count(self) -> Array | None:
+        """(1,) uint32; more than `len(pairs)` where they did not fit. None where pairs were given."""
+        return self._core.pair_count() if self._given is None else None
 
     @property
     def contacts(self) -> Rows:
@@ -248,14 +251,17 @@ class Queued:
         """One row: `failed`, not 0 where something is wrong; `complete`, 0 where something did not fit; `contacts`; `needed_pairs`, `needed_contacts`, ..."""
         return Rows(self._core.report(), _REPORT)
 
-    def wait(self) -> tuple[int, int]:
-        """Waits for the stream; how many pairs and contacts there are.
+    def wait(self, stream: Any = None) -> tuple[int, int]:
+        """Waits for a stream; how many pairs and contacts there are, of what ran last.
+
+        Args:
+            stream: that on which a graph was replayed. None: that of `enqueue`; where one was captured, all streams of the device.
 
         Raises:
             Error: what the GPU found wrong, with the instance or pair to blame.
             TooLittleRoom: contacts are missing.
         """
-        complete, pairs, contacts, needed_pairs, needed_contacts, needed_undecided = self._core.wait()
+        complete, pairs, contacts, needed_pairs, needed_contacts, needed_undecided = self._core.wait(self._given, None if stream is None else _stream(stream))
         if not complete:
             raise TooLittleRoom(needed_pairs, needed_contacts, needed_undecided)
         return pairs, contacts
@@ -307,7 +313,7 @@ class Query:
             raise TypeError("pose is missing")
         return Instances(_cuda.Instances(self._assets, asset, pose, _stream(stream)), asset, pose)
 
-    def _bodies(self, instances: Instances | None, asset: Any, pose: Any, stream: int) -> _cuda.Instances:
+    def _bodies(self, instances: Instances | None, asset: Any, pose: Any, stream: _cuda.Stream) -> _cuda.Instances:
         if instances is None:
             if pose is None:
                 raise TypeError("instances is missing, or pose")
@@ -316,7 +322,7 @@ class Query:
             raise TypeError("instances stand instead of asset and pose, not beside them")
         return instances._core
 
-    def _pairs(self, pairs: Any, stream: int) -> _cuda.Pairs | None:
+    def _pairs(self, pairs: Any, stream: _cuda.Stream) -> _cuda.Pairs | None:
         return None if pairs is None else _cuda.Pairs(pairs, stream, self._assets.device)
 
     def contacts(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, pairs: Any = None,
@@ -331,18 +337,18 @@ class Query:
 
         The others: as of `tandem.Query.contacts`.
         """
-        number = _stream(stream)
+        on = _stream(stream)
+        found = self._core.contacts(self._bodies(instances, asset, pose, on), self._pairs(pairs, on), _choice("mode", mode, _MODES), first_contact_only,
+                                    amount(within, "within", FARTHEST), add_error_bounds, sorted, grouped, None if filter is None else filter._core, on)
         self._given = pairs
-        found = self._core.contacts(self._bodies(instances, asset, pose, number), self._pairs(pairs, number), _choice("mode", mode, _MODES), first_contact_only,
-                                    amount(within, "within", FARTHEST), add_error_bounds, sorted, grouped, None if filter is None else filter._core, number)
         return Contacts(_found(found[0], pairs), Rows(found[1], CONTACT), Counters._make(found[2]))
 
     def pairs(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, sorted: bool = True, within: float = 0.0,
               filter: Filter | None = None, stream: Any = None) -> Rows:
         """The object pairs whose world boxes meet, rows of PAIR: a < b."""
-        number = _stream(stream)
-        found = self._core.pairs(self._bodies(instances, asset, pose, number), sorted, amount(within, "within", FARTHEST),
-                                 None if filter is None else filter._core, number)
+        on = _stream(stream)
+        found = self._core.pairs(self._bodies(instances, asset, pose, on), sorted, amount(within, "within", FARTHEST),
+                                 None if filter is None else filter._core, on)
         return Rows(found, PAIR)
 
     def manifolds(self, *, most_points: int = 7, match_previous: bool = True) -> Manifolds:
@@ -361,10 +367,10 @@ class Query:
     def distances(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, pairs: Any = None, reach: float | None = None,
                   absolute_tolerance: float = 0.0, relative_tolerance: float = 0.0, filter: Filter | None = None, stream: Any = None) -> Distances:
         """Finds how near the surfaces are. Arguments: as of `tandem.Query.distances`."""
-        number = _stream(stream)
-        found = self._core.distances(self._bodies(instances, asset, pose, number), self._pairs(pairs, number),
+        on = _stream(stream)
+        found = self._core.distances(self._bodies(instances, asset, pose, on), self._pairs(pairs, on),
                                      None if reach is None else amount(reach, "reach", np.inf), amount(absolute_tolerance, "absolute_tolerance", np.inf),
-                                     amount(relative_tolerance, "relative_tolerance", np.inf), None if filter is None else filter._core, number)
+                                     amount(relative_tolerance, "relative_tolerance", np.inf), None if filter is None else filter._core, on)
         return Distances(_found(found[0], pairs), Rows(found[1], DISTANCE))
 
     def impacts(self, instances: Instances | None = None, *, motion: Any, duration: float, asset: Any = None, pose: Any = None, pairs: Any = None,
@@ -372,19 +378,19 @@ class Query:
         """Finds until when moving bodies surely do not meet, in a step of `duration` seconds.
 
         Args:
-            motion: (n, 3, 3) or (n, 9) float64: velocity of the centre, angular velocity, centre.
+            motion: (n, 3, 3) or (n, 9) float64: velocity of the centre, angular velocity, and where the centre is in the world at the start.
         """
-        number = _stream(stream)
-        found = self._core.impacts(self._bodies(instances, asset, pose, number), motion, amount(duration, "duration", FINITE), self._pairs(pairs, number),
-                                   amount(tolerance, "tolerance", FINITE), sorted, None if filter is None else filter._core, number)
+        on = _stream(stream)
+        found = self._core.impacts(self._bodies(instances, asset, pose, on), motion, amount(duration, "duration", FINITE), self._pairs(pairs, on),
+                                   amount(tolerance, "tolerance", FINITE), sorted, None if filter is None else filter._core, on)
         return Impacts(_found(found[0], pairs), Rows(found[1], IMPACT))
 
     def verdicts(self, instances: Instances | None = None, *, tolerance: float, asset: Any = None, pose: Any = None, pairs: Any = None,
                  filter: Filter | None = None, stream: Any = None) -> Verdicts:
         """Tells of pairs whether they are apart, touch, or are within a tolerance. Arguments: as of `tandem.Query.verdicts`."""
-        number = _stream(stream)
-        found = self._core.verdicts(self._bodies(instances, asset, pose, number), amount(tolerance, "tolerance", FARTHEST), self._pairs(pairs, number),
-                                    None if filter is None else filter._core, number)
+        on = _stream(stream)
+        found = self._core.verdicts(self._bodies(instances, asset, pose, on), amount(tolerance, "tolerance", FARTHEST), self._pairs(pairs, on),
+                                    None if filter is None else filter._core, on)
         return Verdicts(_found(found[0], pairs), Rows(found[1], VERDICT))
 
     def reserve(self, *, instances: int, pairs: int, contacts: int, undecided: int | None = None, mode: Literal["exact", "fast", "boxes"] = "exact",
@@ -400,10 +406,11 @@ class Query:
     def enqueue(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, pairs: Any = None, filter: Filter | None = None,
                 stream: Any = None) -> Queued:
         """Queues a query of contacts on the stream, and neither waits nor allocates: it may be captured into a CUDA graph, `with torch.cuda.graph(...)` too, where
-        `stream` is PyTorch's current one. The arrays are read when the stream comes to it."""
+        `stream` is PyTorch's current one. The arrays are read when the stream comes to it: until then keep
+        them, or what this returns."""
         if self._step is None:
             raise ValueError("nothing is reserved: call reserve() first")
-        number = _stream(stream)
-        given = self._bodies(instances, asset, pose, number), self._pairs(pairs, number), None if filter is None else filter._core
-        self._step.enqueue(*given, number)
-        return Queued(self._step, given)
+        on = _stream(stream)
+        given = self._bodies(instances, asset, pose, on), self._pairs(pairs, on), None if filter is None else filter._core
+        self._step.enqueue(*given, on)
+        return Queued(self._step, *given)

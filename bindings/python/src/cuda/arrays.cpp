@@ -2,8 +2,10 @@
 
 #include <nanobind/stl/string.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <cstring>
+#include <string_view>
 #include <utility>
 
 namespace tandem::python {
@@ -95,13 +97,22 @@ void check_whole(tandem_status status) {
 
 OnDevice::OnDevice(int device) {
   int current = -1;
-  // Where there is no GPU, the call that follows says so.
-  if (cudaGetDevice(&current) == cudaSuccess && current != device && cudaSetDevice(device) == cudaSuccess)
+  // Where there is no such GPU, the call that follows says so.
+  if (cudaGetDevice(&current) != cudaSuccess || (current != device && cudaSetDevice(device) != cudaSuccess))
+    static_cast<void>(cudaGetLastError());
+  else if (current != device)
     before_ = current;
 }
 
 OnDevice::~OnDevice() {
   if (before_ >= 0) static_cast<void>(cudaSetDevice(before_));
+}
+
+void require_device(const std::string& name, int id, int device) {
+  if (id == device) return;
+  throw nb::value_error((name + " lies in the memory of GPU " + std::to_string(id) + " where that of GPU " +
+                         std::to_string(device) + " is wanted")
+                            .c_str());
 }
 
 std::string name_of(dlpack::DataType type) {
@@ -205,7 +216,9 @@ nb::object Rows::to_cpu() const {
 
 // ---- Arrays that are given
 
-GivenArray::GivenArray(nb::handle object, const char* name, cudaStream_t stream, int device) : name_(name) {
+// The delegation makes the destructor run, and give the array back, where something is wrong with it.
+GivenArray::GivenArray(nb::handle object, const char* name, cudaStream_t stream, int device) : GivenArray() {
+  name_ = name;
   if (is_torch(object)) {
     take_tensor(object, stream, device);
   } else if (nb::hasattr(object, "__dlpack__") && nb::hasattr(object, "__dlpack_device__")) {
@@ -236,13 +249,6 @@ GivenArray::~GivenArray() {
   Py_XDECREF(kept_);
 }
 
-void GivenArray::require_device(int id, int device) const {
-  if (id == device) return;
-  throw nb::value_error((name_ + " lies in the memory of GPU " + std::to_string(id) + " where that of GPU " +
-                         std::to_string(device) + " is wanted")
-                            .c_str());
-}
-
 void GivenArray::require_contiguous(const std::int64_t* strides, std::int64_t unit) const {
   std::int64_t wanted = unit;
   for (std::size_t i = shape_.size(); strides != nullptr && i-- > 0;) {
@@ -256,7 +262,7 @@ void GivenArray::require_contiguous(const std::int64_t* strides, std::int64_t un
 void GivenArray::take_tensor(nb::handle object, cudaStream_t stream, int device) {
   if (!nb::cast<bool>(object.attr("is_cuda")))
     throw nb::type_error((name_ + " lies in CPU memory where GPU memory is wanted").c_str());
-  require_device(nb::cast<int>(object.attr("get_device")()), device);
+  require_device(name_, nb::cast<int>(object.attr("get_device")()), device);
   if (nb::cast<bool>(object.attr("requires_grad")))
     throw nb::value_error(
         (name_ + " requires a gradient, of which a query knows nothing: detach() it").c_str());
@@ -278,7 +284,7 @@ void GivenArray::take_capsule(nb::handle object, cudaStream_t stream, int device
   if (kind != dlpack::kCuda && kind != dlpack::kCudaManaged)
     throw nb::type_error(
         (name_ + " lies in CPU memory, or on another kind of device, where GPU memory is wanted").c_str());
-  require_device(nb::cast<int>(nb::int_(where[1])), device);
+  require_device(name_, nb::cast<int>(nb::int_(where[1])), device);
   const OnDevice current(device);  // some hand out arrays of the current device alone
   const nb::object capsule = object.attr("__dlpack__")(nb::arg("stream") = number_of(stream));
   auto* const managed = static_cast<dlpack::ManagedTensor*>(PyCapsule_GetPointer(capsule.ptr(), kCapsule));
@@ -293,23 +299,33 @@ void GivenArray::take_capsule(nb::handle object, cudaStream_t stream, int device
 
 void GivenArray::take_interface(const nb::dict& interface, cudaStream_t stream, int device) {
   const std::string type = nb::cast<std::string>(interface["typestr"]);
-  if (type.size() < 3 || type[0] == '>')
-    throw nb::type_error((name_ + " has elements " + type + ", which nothing here takes").c_str());
+  const bool known = type.size() == 3 && type[0] != '>' &&
+                     std::string_view("fiu").find(type[1]) != std::string_view::npos &&
+                     std::string_view("1248").find(type[2]) != std::string_view::npos;
+  if (!known) throw nb::type_error((name_ + " has elements " + type + ", which nothing here takes").c_str());
   const std::uint8_t code = type[1] == 'f' ? dlpack::kFloat : type[1] == 'i' ? dlpack::kInt : dlpack::kUInt;
-  type_ = {code, static_cast<std::uint8_t>(8 * std::stoi(type.substr(2))), 1};
+  type_ = {code, static_cast<std::uint8_t>(8 * (type[2] - '0')), 1};
   for (nb::handle length : nb::cast<nb::tuple>(interface["shape"]))
     shape_.push_back(nb::cast<std::int64_t>(length));
+  if (std::ranges::any_of(shape_, [](std::int64_t length) { return length < 0; }))
+    wrong_shape("lengths of 0 or more");
+  if (interface.contains("mask") && !interface["mask"].is_none())
+    throw nb::value_error((name_ + " has a mask, which nothing here takes").c_str());
   data_ = reinterpret_cast<const void*>(nb::cast<std::uintptr_t>(nb::cast<nb::tuple>(interface["data"])[0]));
   if (interface.contains("strides") && !interface["strides"].is_none()) {
     std::vector<std::int64_t> strides;
     for (nb::handle stride : nb::cast<nb::tuple>(interface["strides"]))
       strides.push_back(nb::cast<std::int64_t>(stride));
+    if (strides.size() != shape_.size())
+      throw nb::value_error((name_ + " has " + std::to_string(strides.size()) +
+                             " strides where its shape is " + text_of(shape_))
+                                .c_str());
     require_contiguous(strides.data(), type_.bits / 8);
   }
   cudaPointerAttributes attributes = {};
   if (data_ != nullptr) {
     check_cuda(cudaPointerGetAttributes(&attributes, data_));
-    require_device(attributes.device, device);
+    require_device(name_, attributes.device, device);
   }
   // A stream that is told has to be waited for.
   if (!interface.contains("stream") || interface["stream"].is_none()) return;
@@ -330,6 +346,8 @@ void GivenArray::wrong_shape(const char* wanted) const {
 }
 
 void add_arrays(nb::module_& module) {
+  nb::class_<Stream>(module, "Stream")
+      .def(nb::init<std::uintptr_t, nb::object>(), nb::arg(), nb::arg().none());
   nb::class_<Array>(module, "Array")
       .def(
           "__dlpack__",

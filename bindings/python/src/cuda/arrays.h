@@ -37,11 +37,23 @@ inline cudaStream_t stream_of(std::uintptr_t number) {
   return reinterpret_cast<cudaStream_t>(number);
 }
 
+/// A stream, and the Python object, or None, that it lives as long as.
+class Stream {
+ public:
+  Stream() = default;
+  Stream(std::uintptr_t number, nb::object kept) : stream_(stream_of(number)), kept_(std::move(kept)) {}
+  operator cudaStream_t() const { return stream_; }
+
+ private:
+  cudaStream_t stream_ = nullptr;
+  nb::object kept_;
+};
+
 /// Where memory lies, what keeps it, and whether its contents may still be on their way on a stream.
 struct Memory {
   std::shared_ptr<const void> owner;
   int device = 0;
-  cudaStream_t stream = nullptr;
+  Stream stream;
   bool ready = true;  ///< the stream has passed what writes there
 };
 
@@ -118,7 +130,6 @@ class GivenArray {
   void take_capsule(nb::handle object, cudaStream_t stream, int device);
   void take_interface(const nb::dict& interface, cudaStream_t stream, int device);
   void require_contiguous(const std::int64_t* strides, std::int64_t unit) const;
-  void require_device(int id, int device) const;
 
   std::string name_;
   const void* data_ = nullptr;
@@ -128,6 +139,8 @@ class GivenArray {
   PyObject* kept_ = nullptr;
 };
 
+/// Throws ValueError where what the argument `name` has lies on GPU `id` instead of `device`.
+void require_device(const std::string& name, int id, int device);
 std::string name_of(dlpack::DataType type);
 std::string text_of(const std::vector<std::int64_t>& shape);
 

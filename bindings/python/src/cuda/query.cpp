@@ -33,27 +33,23 @@ nb::tuple counters_of(const tandem_gpu_query_counters& counters) {
                         counters.contacts);
 }
 
-const Instances& bodies_of(const nb::object& instances) {
-  return nb::cast<const Instances&>(instances);
-}
-
 }  // namespace
 
-Query::Turn::Turn(Query& query) : query_(query) {
-  if (!query.busy_.exchange(true)) return;
+Turn::Turn(std::atomic<bool>& busy) : busy_(busy) {
+  if (!busy.exchange(true)) return;
   PyErr_SetString(PyExc_RuntimeError, "the query is at work for another thread");
   throw nb::python_error();
 }
 
 FoundPairs Query::find_pairs(const Instances& bodies, bool sorted, double within, const GpuFilter* filter,
-                             cudaStream_t stream) {
+                             const Stream& stream) {
   const auto broad_phase = broad_phases_.take(device(), [&](tandem_gpu_broad_phase* made) {
     return tandem_gpu_broad_phase_set_assets(made, assets_.get());
   });
   auto options = sized<tandem_gpu_broad_phase_options>();
   options.sorted = sorted;
   options.within = within;
-  options.filter = GpuFilter::of(filter, bodies.count());
+  options.filter = GpuFilter::of(filter, bodies);
   tandem_gpu_broad_phase* const query = broad_phase.get();
   run([&] { return tandem_gpu_broad_phase_find(query, &bodies.get(), &options, stream); },
       [&] { return report_of(tandem_gpu_broad_phase_get_report, query).where; });
@@ -62,23 +58,22 @@ FoundPairs Query::find_pairs(const Instances& bodies, bool sorted, double within
 }
 
 FoundPairs Query::pairs_of(nb::handle given, const Instances& bodies, bool sorted, double within,
-                           const GpuFilter* filter, cudaStream_t stream) {
+                           const GpuFilter* filter, const Stream& stream) {
   if (given.is_none()) return find_pairs(bodies, sorted, within, filter, stream);
   const Pairs& pairs = nb::cast<const Pairs&>(given);
   return {pairs.get(), nullptr, pairs.count()};
 }
 
-Rows Query::rows_of(const FoundPairs& pairs, cudaStream_t stream) const {
+Rows Query::rows_of(const FoundPairs& pairs, const Stream& stream) const {
   return {memory_of(pairs.owner, stream), pairs.pairs.pairs, pairs.count, sizeof(tandem_object_pair)};
 }
 
 nb::tuple Query::contacts(nb::object instances, nb::object given, std::uint32_t mode, bool first_contact_only,
                           double within, bool add_error_bounds, bool sorted, bool grouped,
-                          const GpuFilter* filter, std::uintptr_t stream_number) {
-  const Turn turn(*this);
+                          const GpuFilter* filter, const Stream& stream) {
+  const Turn turn(busy_);
   const OnDevice current(device());
-  const cudaStream_t stream = stream_of(stream_number);
-  const Instances& bodies = bodies_of(instances);
+  const Instances& bodies = bodies_of(instances, device());
   last_.reset();
   const FoundPairs pairs = pairs_of(given, bodies, sorted, within, filter, stream);
   const auto contacts = contact_queries_.take(device(), [&](tandem_gpu_contact_query* made) {
@@ -103,12 +98,12 @@ nb::tuple Query::contacts(nb::object instances, nb::object given, std::uint32_t 
 }
 
 nb::object Query::pairs(nb::object instances, bool sorted, double within, const GpuFilter* filter,
-                        std::uintptr_t stream_number) {
-  const Turn turn(*this);
+                        const Stream& stream) {
+  const Turn turn(busy_);
   const OnDevice current(device());
   last_.reset();
-  const cudaStream_t stream = stream_of(stream_number);
-  return nb::cast(rows_of(find_pairs(bodies_of(instances), sorted, within, filter, stream), stream));
+  return nb::cast(
+      rows_of(find_pairs(bodies_of(instances, device()), sorted, within, filter, stream), stream));
 }
 
 const Query::Last& Query::last() const {
@@ -117,7 +112,7 @@ const Query::Last& Query::last() const {
 }
 
 // A copy of rows that stay with the query, in memory that nobody has any more, or in new one.
-Rows Query::copy(const void* rows, std::size_t count, std::size_t row_bytes, cudaStream_t stream) {
+Rows Query::copy(const void* rows, std::size_t count, std::size_t row_bytes, const Stream& stream) {
   const std::size_t bytes = count * row_bytes;
   std::shared_ptr<Buffer> to;
   for (auto& made : copies_) {
@@ -134,7 +129,7 @@ Rows Query::copy(const void* rows, std::size_t count, std::size_t row_bytes, cud
 }
 
 nb::tuple Query::manifolds(std::uint32_t most_points, bool match_previous) {
-  const Turn turn(*this);
+  const Turn turn(busy_);
   const OnDevice current(device());
   const Last& of = last();
   if (manifolds_ == nullptr)
@@ -144,7 +139,7 @@ nb::tuple Query::manifolds(std::uint32_t most_points, bool match_previous) {
   auto options = sized<tandem_gpu_manifold_options>();
   options.most_points = most_points;
   options.ignore_previous = !match_previous;
-  const Instances& bodies = bodies_of(of.instances);
+  const Instances& bodies = bodies_of(of.instances, device());
   tandem_gpu_manifolds* const made = manifolds_.get();
   check_whole(call_freely([&] {
     return tandem_gpu_manifolds_find(made, &bodies.get(), &of.pairs.pairs, of.contacts.get(), &options,
@@ -159,14 +154,14 @@ nb::tuple Query::manifolds(std::uint32_t most_points, bool match_previous) {
 }
 
 nb::tuple Query::contained() {
-  const Turn turn(*this);
+  const Turn turn(busy_);
   const OnDevice current(device());
   const Last& of = last();
   if (contained_ == nullptr)
     contained_ = ContainmentQueries::make(device(), [&](tandem_gpu_containment_query* made) {
       return tandem_gpu_containment_query_set_assets(made, assets_.get(), of.stream);
     });
-  const Instances& bodies = bodies_of(of.instances);
+  const Instances& bodies = bodies_of(of.instances, device());
   tandem_gpu_containment_query* const query = contained_.get();
   check_whole(call_freely([&] {
     return tandem_gpu_containment_query_find(query, &bodies.get(), &of.pairs.pairs, of.contacts.get(),
@@ -179,12 +174,10 @@ nb::tuple Query::contained() {
 }
 
 nb::tuple Query::distances(nb::object instances, nb::object given, std::optional<double> reach,
-                           double absolute, double relative, const GpuFilter* filter,
-                           std::uintptr_t stream_number) {
-  const Turn turn(*this);
+                           double absolute, double relative, const GpuFilter* filter, const Stream& stream) {
+  const Turn turn(busy_);
   const OnDevice current(device());
-  const cudaStream_t stream = stream_of(stream_number);
-  const Instances& bodies = bodies_of(instances);
+  const Instances& bodies = bodies_of(instances, device());
   const double within = reach.value_or(std::numeric_limits<double>::infinity());
   const FoundPairs pairs = pairs_of(given, bodies, true, within, filter, stream);
   const auto distances = distance_queries_.take(device(), [&](tandem_gpu_distance_query* made) {
@@ -204,12 +197,10 @@ nb::tuple Query::distances(nb::object instances, nb::object given, std::optional
 }
 
 nb::tuple Query::impacts(nb::object instances, nb::object motion, double duration, nb::object given,
-                         double tolerance, bool sorted, const GpuFilter* filter,
-                         std::uintptr_t stream_number) {
-  const Turn turn(*this);
+                         double tolerance, bool sorted, const GpuFilter* filter, const Stream& stream) {
+  const Turn turn(busy_);
   const OnDevice current(device());
-  const cudaStream_t stream = stream_of(stream_number);
-  const Instances& bodies = bodies_of(instances);
+  const Instances& bodies = bodies_of(instances, device());
   const GivenArray moves(motion, "motion", stream, device());
   moves.require_type({kF64}, "float64");
   const auto count = static_cast<std::int64_t>(bodies.count());
@@ -224,7 +215,7 @@ nb::tuple Query::impacts(nb::object instances, nb::object motion, double duratio
   auto options = sized<tandem_gpu_impact_options>();
   options.sorted = sorted;
   options.tolerance = tolerance;
-  options.filter = GpuFilter::of(filter, bodies.count());
+  options.filter = GpuFilter::of(filter, bodies);
   const tandem_gpu_pairs* const of = given.is_none() ? nullptr : &nb::cast<const Pairs&>(given).get();
   tandem_gpu_impact_query* const query = impacts.get();
   run(
@@ -242,11 +233,10 @@ nb::tuple Query::impacts(nb::object instances, nb::object motion, double duratio
 }
 
 nb::tuple Query::verdicts(nb::object instances, double tolerance, nb::object given, const GpuFilter* filter,
-                          std::uintptr_t stream_number) {
-  const Turn turn(*this);
+                          const Stream& stream) {
+  const Turn turn(busy_);
   const OnDevice current(device());
-  const cudaStream_t stream = stream_of(stream_number);
-  const Instances& bodies = bodies_of(instances);
+  const Instances& bodies = bodies_of(instances, device());
   const FoundPairs pairs = pairs_of(given, bodies, true, 0, filter, stream);
   const auto verdicts = tolerance_queries_.take(device(), [&](tandem_gpu_tolerance_query* made) {
     return tandem_gpu_tolerance_query_set_assets(made, assets_.get(), stream);
@@ -281,7 +271,7 @@ void add_gpu_queries(nb::module_& module) {
       .def("contacts", &Step::contacts)
       .def("report", &Step::report)
       .def("first_contact", &Step::first_contact)
-      .def("wait", &Step::wait);
+      .def("wait", &Step::wait, nb::arg().none(), nb::arg().none());
 }
 
 }  // namespace tandem::python

@@ -6,6 +6,18 @@
 
 namespace tandem::python {
 
+/// A turn at what takes one call at a time: a second thread gets RuntimeError.
+class Turn {
+ public:
+  explicit Turn(std::atomic<bool>& busy);
+  ~Turn() { busy_ = false; }
+  Turn(const Turn&) = delete;
+  Turn& operator=(const Turn&) = delete;
+
+ private:
+  std::atomic<bool>& busy_;
+};
+
 /// Deletes a handle of the C interface on its device.
 template <typename Of, void (*destroy)(Of*)>
 struct Destroy {
@@ -88,51 +100,39 @@ class Query {
 
   nb::tuple contacts(nb::object instances, nb::object pairs, std::uint32_t mode, bool first_contact_only,
                      double within, bool add_error_bounds, bool sorted, bool grouped, const GpuFilter* filter,
-                     std::uintptr_t stream);
+                     const Stream& stream);
   nb::object pairs(nb::object instances, bool sorted, double within, const GpuFilter* filter,
-                   std::uintptr_t stream);
+                   const Stream& stream);
   nb::tuple manifolds(std::uint32_t most_points, bool match_previous);
   nb::tuple contained();
   nb::tuple distances(nb::object instances, nb::object pairs, std::optional<double> reach, double absolute,
-                      double relative, const GpuFilter* filter, std::uintptr_t stream);
+                      double relative, const GpuFilter* filter, const Stream& stream);
   nb::tuple impacts(nb::object instances, nb::object motion, double duration, nb::object pairs,
-                    double tolerance, bool sorted, const GpuFilter* filter, std::uintptr_t stream);
+                    double tolerance, bool sorted, const GpuFilter* filter, const Stream& stream);
   nb::tuple verdicts(nb::object instances, double tolerance, nb::object pairs, const GpuFilter* filter,
-                     std::uintptr_t stream);
+                     const Stream& stream);
 
   int device() const { return assets_.device(); }
   const Assets& assets() const { return assets_; }
 
  private:
-  // One call at a time: a second thread gets RuntimeError.
-  class Turn {
-   public:
-    explicit Turn(Query& query);
-    ~Turn() { query_.busy_ = false; }
-    Turn(const Turn&) = delete;
-    Turn& operator=(const Turn&) = delete;
-
-   private:
-    Query& query_;
-  };
-
   // What manifolds and contained bodies follow from.
   struct Last {
     nb::object instances, given;
     FoundPairs pairs;
     std::shared_ptr<tandem_gpu_contact_query> contacts;
-    cudaStream_t stream = nullptr;
+    Stream stream;
   };
 
   FoundPairs find_pairs(const Instances& bodies, bool sorted, double within, const GpuFilter* filter,
-                        cudaStream_t stream);
+                        const Stream& stream);
   FoundPairs pairs_of(nb::handle given, const Instances& bodies, bool sorted, double within,
-                      const GpuFilter* filter, cudaStream_t stream);
-  Memory memory_of(std::shared_ptr<const void> owner, cudaStream_t stream) const {
+                      const GpuFilter* filter, const Stream& stream);
+  Memory memory_of(std::shared_ptr<const void> owner, const Stream& stream) const {
     return {std::move(owner), device(), stream, true};
   }
-  Rows rows_of(const FoundPairs& pairs, cudaStream_t stream) const;
-  Rows copy(const void* rows, std::size_t count, std::size_t row_bytes, cudaStream_t stream);
+  Rows rows_of(const FoundPairs& pairs, const Stream& stream) const;
+  Rows copy(const void* rows, std::size_t count, std::size_t row_bytes, const Stream& stream);
   const Last& last() const;
 
   nb::object assets_object_;
@@ -155,13 +155,15 @@ class Step {
   Step(nb::object assets, std::uint32_t instances, std::uint32_t pairs, std::uint64_t contacts,
        std::uint64_t undecided, std::uint32_t mode, bool first_contact_only, double within,
        bool add_error_bounds, bool sorted, bool grouped);
-  void enqueue(nb::object instances, nb::object pairs, nb::object filter, std::uintptr_t stream);
-  nb::object pairs() const;
-  nb::object pair_count() const;
+  void enqueue(nb::object instances, nb::object pairs, nb::object filter, const Stream& stream);
+  Rows pairs() const;
+  Array pair_count() const;
   Rows contacts() const;
   Rows report() const;
   Array first_contact() const;
-  nb::tuple wait() const;
+  /// given: the pairs of the call that is waited for, or None. stream: null: that of the last call, or, where
+  /// a call was captured, all of the device's, since its graph may run on any.
+  nb::tuple wait(nb::handle given, const Stream* stream);
 
  private:
   Memory memory_of(std::shared_ptr<const void> owner) const {
@@ -175,7 +177,9 @@ class Step {
   tandem_gpu_query_options options_;
   tandem_gpu_broad_phase_options near_;
   std::uint64_t contact_room_;
-  cudaStream_t stream_ = nullptr;
+  std::atomic<bool> busy_ = false;
+  Stream stream_;
+  bool captured_ = false;
   nb::object instances_, given_, filter_;  // what the stream may still read
 };
 

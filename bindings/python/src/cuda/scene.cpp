@@ -10,7 +10,7 @@ std::uint32_t count_of(std::int64_t length, const GivenArray& array) {
 
 }  // namespace
 
-Assets::Assets(nb::list assets, int device, std::uint32_t contents, std::uintptr_t stream) : device_(device) {
+Assets::Assets(nb::list assets, int device, std::uint32_t contents, const Stream& stream) : device_(device) {
   std::vector<tandem_asset*> list;
   for (nb::handle asset : assets) list.push_back(nb::cast<const Asset&>(asset).get());
   const tandem_upload_options options = {sizeof options, contents};
@@ -18,8 +18,7 @@ Assets::Assets(nb::list assets, int device, std::uint32_t contents, std::uintptr
   const OnDevice current(device);
   const tandem_status status = [&] {
     const WithoutLock other_threads_run;
-    return tandem_gpu_assets_upload(list.data(), list.size(), &options, stream_of(stream), nullptr, &assets_,
-                                    &where);
+    return tandem_gpu_assets_upload(list.data(), list.size(), &options, stream, nullptr, &assets_, &where);
   }();
   check(status, where);
 }
@@ -34,8 +33,8 @@ std::shared_ptr<Buffer> Assets::zeros(std::size_t count) const {
   return zeros_ = made;
 }
 
-Instances::Instances(const Assets& assets, nb::handle asset, nb::handle pose, std::uintptr_t stream)
-    : pose_(pose, "pose", stream_of(stream), assets.device()), device_(assets.device()) {
+Instances::Instances(const Assets& assets, nb::handle asset, nb::handle pose, const Stream& stream)
+    : pose_(pose, "pose", stream, assets.device()), device_(assets.device()) {
   pose_.require_type({kF64}, "float64");
   const std::vector<std::int64_t>& shape = pose_.shape();
   const bool rows = shape.size() == 2 && shape[1] == 12;
@@ -48,15 +47,20 @@ Instances::Instances(const Assets& assets, nb::handle asset, nb::handle pose, st
     instances_.asset = static_cast<const std::uint32_t*>(zeros_->data());
     return;
   }
-  asset_ = GivenArray(asset, "asset", stream_of(stream), device_);
+  asset_ = GivenArray(asset, "asset", stream, device_);
   asset_.require_type({kU32, kI32}, "uint32 or int32");
   if (asset_.shape().size() != 1 || asset_.shape()[0] != shape[0])
     asset_.wrong_shape(("(" + std::to_string(shape[0]) + ",)").c_str());
   instances_.asset = static_cast<const std::uint32_t*>(asset_.data());
 }
 
-Pairs::Pairs(nb::handle pairs, std::uintptr_t stream, int device)
-    : given_(pairs, "pairs", stream_of(stream), device) {
+const Instances& bodies_of(nb::handle instances, int device) {
+  const Instances& bodies = nb::cast<const Instances&>(instances);
+  require_device("instances", bodies.device(), device);
+  return bodies;
+}
+
+Pairs::Pairs(nb::handle pairs, const Stream& stream, int device) : given_(pairs, "pairs", stream, device) {
   given_.require_type({kU32, kI32}, "uint32 or int32");
   const std::vector<std::int64_t>& shape = given_.shape();
   if (shape.size() != 2 || shape[1] != 2) given_.wrong_shape("(m, 2)");
@@ -65,12 +69,13 @@ Pairs::Pairs(nb::handle pairs, std::uintptr_t stream, int device)
 }
 
 GpuFilter::GpuFilter(nb::handle motion, nb::handle group, nb::handle mask, nb::handle excluded,
-                     std::uintptr_t stream, int device) {
+                     const Stream& stream, int device)
+    : device_(device) {
   filter_.struct_size = sizeof filter_;
   const auto take = [&](nb::handle given, const char* name, GivenArray& array,
                         std::initializer_list<dlpack::DataType> types, const char* wanted) {
     if (given.is_none()) return static_cast<const void*>(nullptr);
-    array = GivenArray(given, name, stream_of(stream), device);
+    array = GivenArray(given, name, stream, device);
     array.require_type(types, wanted);
     if (array.shape().size() != 1 || (count_ >= 0 && array.shape()[0] != count_))
       array.wrong_shape(count_ >= 0 ? ("(" + std::to_string(count_) + ",)").c_str() : "(n,)");
@@ -85,33 +90,34 @@ GpuFilter::GpuFilter(nb::handle motion, nb::handle group, nb::handle mask, nb::h
   if (excluded.is_none()) return;
   const auto pairs = copy_rows<tandem_object_pair>(excluded);
   const OnDevice current(device);
-  check(tandem_gpu_excluded_pairs_create(pairs.data(), pairs.size(), stream_of(stream), nullptr, &excluded_));
+  check(tandem_gpu_excluded_pairs_create(pairs.data(), pairs.size(), stream, nullptr, &excluded_));
   filter_.excluded = excluded_;
 }
 
-const tandem_gpu_pair_filter* GpuFilter::of(const GpuFilter* filter, std::size_t instances) {
+const tandem_gpu_pair_filter* GpuFilter::of(const GpuFilter* filter, const Instances& bodies) {
   if (filter == nullptr) return nullptr;
-  if (filter->count_ >= 0 && static_cast<std::size_t>(filter->count_) != instances)
+  require_device("filter", filter->device_, bodies.device());
+  if (filter->count_ >= 0 && static_cast<std::size_t>(filter->count_) != bodies.count())
     throw nb::value_error(("filter is of " + std::to_string(filter->count_) + " instances where there are " +
-                           std::to_string(instances))
+                           std::to_string(bodies.count()))
                               .c_str());
   return &filter->filter_;
 }
 
 void add_scenes(nb::module_& module) {
   nb::class_<Assets>(module, "Assets")
-      .def(nb::init<nb::list, int, std::uint32_t, std::uintptr_t>())
+      .def(nb::init<nb::list, int, std::uint32_t, const Stream&>())
       .def_prop_ro("device", &Assets::device)
       .def_prop_ro("bytes", &Assets::bytes);
   nb::class_<Instances>(module, "Instances")
-      .def(nb::init<const Assets&, nb::handle, nb::handle, std::uintptr_t>(), nb::arg(), nb::arg().none(),
+      .def(nb::init<const Assets&, nb::handle, nb::handle, const Stream&>(), nb::arg(), nb::arg().none(),
            nb::arg(), nb::arg())
       .def("__len__", &Instances::count);
   nb::class_<Pairs>(module, "Pairs")
-      .def(nb::init<nb::handle, std::uintptr_t, int>())
+      .def(nb::init<nb::handle, const Stream&, int>())
       .def("__len__", &Pairs::count);
   nb::class_<GpuFilter>(module, "Filter")
-      .def(nb::init<nb::handle, nb::handle, nb::handle, nb::handle, std::uintptr_t, int>(), nb::arg().none(),
+      .def(nb::init<nb::handle, nb::handle, nb::handle, nb::handle, const Stream&, int>(), nb::arg().none(),
            nb::arg().none(), nb::arg().none(), nb::arg().none(), nb::arg(), nb::arg());
 }
 

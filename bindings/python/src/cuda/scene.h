@@ -23,7 +23,7 @@ class Buffer {
 /// Copies of assets in the memory of one GPU.
 class Assets {
  public:
-  Assets(nb::list assets, int device, std::uint32_t contents, std::uintptr_t stream);
+  Assets(nb::list assets, int device, std::uint32_t contents, const Stream& stream);
   ~Assets() { tandem_gpu_assets_release(assets_); }
   Assets(const Assets&) = delete;
   Assets& operator=(const Assets&) = delete;
@@ -44,7 +44,7 @@ class Assets {
 /// Bodies: somebody's arrays of assets and poses, which are read where they are in every call.
 class Instances {
  public:
-  Instances(const Assets& assets, nb::handle asset, nb::handle pose, std::uintptr_t stream);
+  Instances(const Assets& assets, nb::handle asset, nb::handle pose, const Stream& stream);
   const tandem_gpu_instances& get() const { return instances_; }
   std::size_t count() const { return instances_.count; }
   int device() const { return device_; }
@@ -56,10 +56,13 @@ class Instances {
   int device_;
 };
 
+/// Throws ValueError where they lie on another GPU.
+const Instances& bodies_of(nb::handle instances, int device);
+
 /// Object pairs: somebody's array, or rows that a query found.
 class Pairs {
  public:
-  Pairs(nb::handle pairs, std::uintptr_t stream, int device);
+  Pairs(nb::handle pairs, const Stream& stream, int device);
   const tandem_gpu_pairs& get() const { return pairs_; }
   std::size_t count() const { return pairs_.capacity; }
 
@@ -71,19 +74,20 @@ class Pairs {
 /// Which pairs a query looks at; its arrays are read where they are.
 class GpuFilter {
  public:
-  GpuFilter(nb::handle motion, nb::handle group, nb::handle mask, nb::handle excluded, std::uintptr_t stream,
+  GpuFilter(nb::handle motion, nb::handle group, nb::handle mask, nb::handle excluded, const Stream& stream,
             int device);
   ~GpuFilter() { tandem_gpu_excluded_pairs_destroy(excluded_); }
   GpuFilter(const GpuFilter&) = delete;
   GpuFilter& operator=(const GpuFilter&) = delete;
-  /// Null for none; throws ValueError where it is of another number of instances.
-  static const tandem_gpu_pair_filter* of(const GpuFilter* filter, std::size_t instances);
+  /// Null for none; throws ValueError where it is of another number of instances, or lies on another GPU.
+  static const tandem_gpu_pair_filter* of(const GpuFilter* filter, const Instances& bodies);
 
  private:
   GivenArray motion_, group_, mask_;
   tandem_gpu_excluded_pairs* excluded_ = nullptr;
   tandem_gpu_pair_filter filter_ = {};
   std::int64_t count_ = -1;  // any
+  int device_;
 };
 
 }  // namespace tandem::python

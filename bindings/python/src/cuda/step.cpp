@@ -30,14 +30,17 @@ Step::Step(nb::object assets, std::uint32_t instances, std::uint32_t pairs, std:
   check_whole(tandem_gpu_contact_query_reserve(contacts_.get(), &room, &options_));
 }
 
-void Step::enqueue(nb::object instances, nb::object pairs, nb::object filter, std::uintptr_t stream) {
+void Step::enqueue(nb::object instances, nb::object pairs, nb::object filter, const Stream& stream) {
+  const Turn turn(busy_);
   const OnDevice current(assets_.device());
-  const Instances& bodies = nb::cast<const Instances&>(instances);
-  stream_ = stream_of(stream);
+  const Instances& bodies = bodies_of(instances, assets_.device());
+  cudaStreamCaptureStatus capture = cudaStreamCaptureStatusNone;
+  check_cuda(cudaStreamIsCapturing(stream, &capture));
+  captured_ = captured_ || capture != cudaStreamCaptureStatusNone;
+  stream_ = stream;
   tandem_gpu_pairs of = {};
   if (pairs.is_none()) {
-    near_.filter =
-        filter.is_none() ? nullptr : GpuFilter::of(&nb::cast<const GpuFilter&>(filter), bodies.count());
+    near_.filter = filter.is_none() ? nullptr : GpuFilter::of(&nb::cast<const GpuFilter&>(filter), bodies);
     check_whole(tandem_gpu_broad_phase_enqueue(broad_phase_.get(), &bodies.get(), &near_, stream_));
     of = tandem_gpu_broad_phase_pairs(broad_phase_.get());
   } else {
@@ -49,14 +52,14 @@ void Step::enqueue(nb::object instances, nb::object pairs, nb::object filter, st
   filter_ = filter;
 }
 
-nb::object Step::pairs() const {
+Rows Step::pairs() const {
   const tandem_gpu_pairs pairs = tandem_gpu_broad_phase_pairs(broad_phase_.get());
-  return nb::cast(Rows(memory_of(broad_phase_), pairs.pairs, pairs.capacity, sizeof(tandem_object_pair)));
+  return {memory_of(broad_phase_), pairs.pairs, pairs.capacity, sizeof(tandem_object_pair)};
 }
 
-nb::object Step::pair_count() const {
+Array Step::pair_count() const {
   const tandem_gpu_pairs pairs = tandem_gpu_broad_phase_pairs(broad_phase_.get());
-  return nb::cast(Array(memory_of(broad_phase_), pairs.count, kU32, {1}, {1}));
+  return {memory_of(broad_phase_), pairs.count, kU32, {1}, {1}};
 }
 
 Rows Step::contacts() const {
@@ -76,16 +79,19 @@ Array Step::first_contact() const {
   return {memory_of(contacts_), groups.first_contact, kU32, {pairs + 1}, {1}};
 }
 
-nb::tuple Step::wait() const {
+nb::tuple Step::wait(nb::handle given, const Stream* stream) {
+  const Turn turn(busy_);
   const OnDevice current(assets_.device());
+  const cudaStream_t waited = stream != nullptr ? *stream : stream_;
+  const bool all = stream == nullptr && captured_;
   const cudaError_t error = [&] {
     const WithoutLock other_threads_run;
-    return cudaStreamSynchronize(stream_);
+    return all ? cudaDeviceSynchronize() : cudaStreamSynchronize(waited);
   }();
   check_cuda(error);
   std::uint64_t pairs = 0;
-  if (given_.is_valid() && !given_.is_none()) {
-    pairs = nb::cast<const Pairs&>(given_).count();
+  if (!given.is_none()) {
+    pairs = nb::cast<const Pairs&>(given).count();
   } else {
     tandem_gpu_broad_phase_report near;
     check(tandem_gpu_broad_phase_get_report(broad_phase_.get(), &near), near.where);

@@ -4,6 +4,7 @@ import contextlib
 import doctest
 import io
 import os
+import pickle
 import re
 import subprocess
 import sys
@@ -373,6 +374,13 @@ def test_every_stretch_of_a_mesh_is_built_once(monkeypatch):
         manager.add_object(f"c{frame}", ring, at(frame, 0, 0) @ scale_matrix(3))
         manager.in_collision_internal()
     assert len(builds) == 3
+
+
+def test_a_mesh_that_was_stretched_can_be_pickled():
+    ring = RING.copy()
+    assert not filled(MANAGERS["tandem"](), a=(ring, scale_matrix(2))).in_collision_single(BOX)
+    again = pickle.loads(pickle.dumps(ring))
+    assert filled(MANAGERS["tandem"](), a=(again, scale_matrix(0.4))).in_collision_single(BOX)
 
 
 def test_an_object_that_its_transform_leaves_nothing_of_is_named():

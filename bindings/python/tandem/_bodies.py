@@ -65,6 +65,13 @@ class Shape:
         self._stretched: WeakValueDictionary[bytes, Shape] = WeakValueDictionary()
         self._last_stretched: Shape | None = None
 
+    def __getstate__(self) -> dict[str, Any]:
+        """For a mesh that is pickled. Stretched shapes stay behind: weak references cannot be."""
+        return {name: value for name, value in vars(self).items() if name not in ("_stretched", "_last_stretched")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, _stretched=WeakValueDictionary(), _last_stretched=None)
+
     @staticmethod
     def of(mesh: Any) -> Shape:
         """The shape of a trimesh.Trimesh, which the mesh keeps as long as it does not change."""

@@ -29,7 +29,11 @@ def write_gearbox(path):
 
 with tempfile.TemporaryDirectory() as folder:
     write_gearbox(pathlib.Path(folder, "gearbox.obj"))
-    mesh = tandem.read_mesh(pathlib.Path(folder, "gearbox.obj"))
+    try:
+        mesh = tandem.read_mesh(pathlib.Path(folder, "gearbox.obj"))
+    except ImportError:
+        print("needs the mesh tools, which were not built")
+        sys.exit(77)
 
 names = [part.name for part in mesh.parts]
 assets = []

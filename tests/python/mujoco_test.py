@@ -267,6 +267,9 @@ def test_what_cannot_be_done_is_said():
     scene = "<geom mesh='floor'/>" + free("ball", "0 0 0.199")
     with pytest.raises(ValueError, match="no two mesh geoms"):
         tandem.mujoco.MeshContacts(model_of(free("ball", "0 0 0"), ball=shapes["ball"]))
+    for count in (0, 8):
+        with pytest.raises(ValueError, match=f"most_points {count}: is not from 1 to 7"):
+            tandem.mujoco.MeshContacts(model_of(scene, **shapes), most_points=count)
     for option, extra, message in (("integrator='RK4'", "", "RK4"), ("", "<option><flag sleep='enable'/></option>", "sleep")):
         model = model_of(scene, option, extra, **shapes)
         with pytest.raises(ValueError, match=message):

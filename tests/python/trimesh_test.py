@@ -4,6 +4,7 @@ import contextlib
 import doctest
 import io
 import os
+import pickle
 import re
 import subprocess
 import sys
@@ -18,6 +19,7 @@ pytest.importorskip("fcl")
 pytest.importorskip("scipy")
 
 import tandem
+import tandem._bodies
 import tandem.trimesh
 from tandem._bodies import meeting_points
 from tandem._convex import Solid, overlap
@@ -358,6 +360,36 @@ def test_a_stretched_body_that_turns_is_built_once():
         manager.in_collision_single(BOX)
         assets.add(id(manager._bodies.assets[0]))
     assert len(assets) == 1
+
+
+def test_every_stretch_of_a_mesh_is_built_once(monkeypatch):
+    builds = []
+    build = tandem._bodies.build
+    monkeypatch.setattr(tandem._bodies, "build", lambda *arguments, **options: builds.append(1) or build(*arguments, **options))
+    ring = RING.copy()
+    manager = filled(MANAGERS["tandem"](), a=(ring, scale_matrix(2)), b=(ring, at(9, 0, 0) @ scale_matrix(3)))
+    for frame in range(5):
+        manager.set_transform("a", at(0, frame, 0) @ scale_matrix(2))
+        manager.in_collision_internal()
+        manager.add_object(f"c{frame}", ring, at(frame, 0, 0) @ scale_matrix(3))
+        manager.in_collision_internal()
+    assert len(builds) == 3
+
+
+def test_a_mesh_that_was_stretched_can_be_pickled():
+    ring = RING.copy()
+    assert not filled(MANAGERS["tandem"](), a=(ring, scale_matrix(2))).in_collision_single(BOX)
+    again = pickle.loads(pickle.dumps(ring))
+    assert filled(MANAGERS["tandem"](), a=(again, scale_matrix(0.4))).in_collision_single(BOX)
+
+
+def test_an_object_that_its_transform_leaves_nothing_of_is_named():
+    manager = filled(MANAGERS["tandem"](), a=BOX, thing=(RING, np.diag([0, 0, 0, 1.0])))
+    for _ in range(2):
+        with pytest.raises(tandem.Error, match="thing, stretched by its transform: "):
+            manager.in_collision_internal()
+    manager.set_transform("thing", np.eye(4))
+    assert manager.in_collision_internal() is True
 
 
 def test_transforms_that_drift_from_a_rotation_are_taken_for_one():

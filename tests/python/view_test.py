@@ -49,7 +49,7 @@ def shown():
     views = []
 
     def make(*arguments, **options):
-        views.append(viewer.View(*arguments, off_screen=True, size=SIZE, **options))
+        views.append(viewer.View(*arguments, off_screen=True, **{"size": SIZE, **options}))
         return views[-1]
 
     yield make
@@ -247,6 +247,30 @@ def test_distances_are_lines_between_the_nearest_points(shown, box):
         assert picture[int(y) - 1:int(y) + 2, int(x), 1].max() > 0.5
 
 
+def test_bars_of_colours_are_beside_each_other_and_beside_the_bodies(shown, cow):
+    instances = tandem.instances([0, 0, 0], translation=[[0, 0, 0], [0.3, 0.2, 0], [2.5, 0, 0]])
+    distances = tandem.Query([cow]).distances(instances)
+    for manifolds, columns in ((False, 1), (True, 2)):
+        view = shown([cow], instances, distances=distances, manifolds=manifolds)
+        bars = [bar for _, bar in view.plotter.scalar_bars.items()]
+        left = sorted(bar.GetPosition()[0] for bar in bars)
+        assert len(bars) == columns and all(next - one >= bars[0].GetPosition2()[0] for one, next in zip(left, left[1:]))
+        vertices = cow.triangles().reshape(-1, 3)
+        x = np.array([projected(view, vertices + row["translation"])[:, 0] for row in instances])
+        assert 0 <= x.min() and x.max() < left[0] * SIZE[0]
+
+
+def test_a_legend_of_one_level_has_its_number(shown, box):
+    pictures = []
+    for label in ("level 0", "level 1"):
+        view = shown(box, color="level", size=(900, 562))
+        legend = view.plotter.renderer.legend
+        assert legend.GetEntryString(0) == "level 0"
+        legend.SetEntryString(0, label)
+        pictures.append(view.picture())
+    assert not np.array_equal(*pictures)
+
+
 def test_nothing_found_draws_nothing(shown, box):
     instances = tandem.instances([0, 0], translation=[[0, 0, 0], [0, 3, 0]])
     bare = shown([box], instances, opacity=0.35).picture()
@@ -396,6 +420,13 @@ def test_no_assets_are_kept_once_a_view_is_closed(box, tmp_path):
 @pytest.mark.parametrize(("options", "text"), [
     ({"color": "mood"}, "color 'mood': is none of body, asset, level"),
     ({"levels": 0, "contacts": "found"}, "contacts: belong to one state, at its levels"),
+    ({"levels": -1}, "levels: -1 is not from 0 to"),
+    ({"levels": [0, 0]}, r"levels: has shape \(2,\); one number or \(1,\) is needed"),
+    ({"motion": 9}, "motion: 9 is not from 0 to 3"),
+    ({"opacity": 2}, "opacity 2: is not from 0 to 1"),
+    ({"opacity": np.nan}, "opacity nan: is not from 0 to 1"),
+    ({"size": (0, 0)}, r"size \(0, 0\): is not a width and a height in pixels"),
+    ({"size": 3}, "size 3: is not a width"),
     ({"step": 4}, "step 4: the run keeps the states after"),
 ])
 def test_arguments_that_do_not_fit_are_named(box, options, text):
@@ -403,6 +434,20 @@ def test_arguments_that_do_not_fit_are_named(box, options, text):
         options = options | {"contacts": tandem.Query([box]).contacts(translation=[[0, 0, 0]])}
     with pytest.raises(ValueError, match=text):
         tandem.view(box, off_screen=True, **options)
+
+
+@pytest.mark.parametrize(("name", "given"), [("contacts", None), ("contacts", np.True_), ("manifolds", np.zeros(3)), ("distances", True), ("levels", 0.5),
+                                             ("motion", "fixed")])
+def test_arguments_of_another_type_are_named(box, name, given):
+    with pytest.raises(TypeError, match=f"^{name}: "):
+        tandem.view(box, off_screen=True, **{name: given})
+
+
+def test_what_is_missing_is_named_with_how_to_install_it(monkeypatch, box):
+    monkeypatch.delitem(sys.modules, "tandem.viewer")
+    monkeypatch.setitem(sys.modules, "pyvista", None)
+    with pytest.raises(ImportError, match=r"needs pyvista, vtk and h5py: pip install '\.\[view\]' in the folder of the sources"):
+        tandem.view(box, off_screen=True)
 
 
 def test_places_and_scenes_that_cannot_be_shown_are_refused(box, tmp_path):
@@ -420,8 +465,16 @@ def test_places_and_scenes_that_cannot_be_shown_are_refused(box, tmp_path):
         tandem.view(tmp_path / "empty.h5", off_screen=True)
     with pytest.raises(OSError):
         tandem.view(tmp_path / "none.h5", off_screen=True)
+    (tmp_path / "garbage.h5").write_bytes(b"no scene" * 99)
+    with pytest.raises(OSError, match="garbage.h5: .*signature"):
+        tandem.view(tmp_path / "garbage.h5", off_screen=True)
     with pytest.raises(ValueError, match="picture.jpg: is not a .png file"):
         tandem.view(box, picture=tmp_path / "picture.jpg")
+
+
+def test_a_path_of_an_asset_shows_the_asset(cow, tmp_path):
+    cow.save(tmp_path / "cow.bvh")
+    assert np.array_equal(tandem.view(tmp_path / "cow.bvh", off_screen=True, size=SIZE), tandem.view(cow, off_screen=True, size=SIZE))
 
 
 def command(*arguments):

@@ -32,10 +32,17 @@ NO_IMPACT, IMPACT_IN_STEP, IMPACT_AT_START = range(3)
 
 
 def view(what: _Any, instances: _Any = None, **options: _Any) -> _Any:
-    """Shows bodies and what was found of them, in a window or as a picture: tandem.viewer.view(), which needs pyvista."""
-    from .viewer import view as show
+    """Shows bodies and what was found of them, in a window or as a picture: tandem.viewer.view().
 
-    return show(what, instances, **options)
+    Raises ImportError, with how to install them, where pyvista, vtk or h5py are not there."""
+    try:
+        from .viewer import view as show
+
+        return show(what, instances, **options)
+    except ModuleNotFoundError as error:
+        if error.name not in ("h5py", "matplotlib", "pyvista", "vtk", "vtkmodules"):
+            raise
+        raise ImportError("tandem.view() needs pyvista, vtk and h5py: pip install '.[view]' in the folder of the sources") from error
 
 
 __version__ = f"{_tandem.version // 10000}.{_tandem.version // 100 % 100}.{_tandem.version % 100}"

@@ -21,7 +21,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         options.run(options)
     except ImportError as error:
-        print(f"tandem: {error}; python -m pip install tandem[view] has it", file=sys.stderr)
+        print(f"tandem: {error}", file=sys.stderr)
         return 1
     except (OSError, RuntimeError, ValueError, tandem.Error) as error:
         print(f"tandem: {error}", file=sys.stderr)
@@ -61,8 +61,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _view(options: argparse.Namespace) -> None:
-    what = tandem.Asset.load(options.file) if options.file.suffix == ".bvh" else options.file
-    tandem.view(what, picture=options.output, contacts=options.contacts, manifolds=options.manifolds,
+    tandem.view(options.file, picture=options.output, contacts=options.contacts, manifolds=options.manifolds,
                 levels=options.level, tree_depth=options.tree_depth, color=options.color, opacity=options.opacity,
                 step=options.step, azimuth=options.azimuth, elevation=options.elevation, size=(options.width, options.height))
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
+from weakref import WeakValueDictionary
 
 import numpy as np
 
 import trimesh.triangles
 
-from . import INSIDE, INSTANCE, NO_INDEX, Asset, Filter, Query, build
+from . import INSIDE, INSTANCE, NO_INDEX, Asset, Error, Filter, Query, build
 from ._convex import Array, Overlap, Solid, cross, face_overlaps, overlap
 
 RIGID = 4e-7  # what a pose may be off: queries take 1e-6, by another measure of the same matrix
@@ -61,7 +62,15 @@ class Shape:
         low, high = self.asset.bounds
         self.middle, self.half = (low + high) / 2, (high - low) / 2
         self._solid: Solid | None = None
-        self._stretched: tuple[bytes, Shape] | None = None
+        self._stretched: WeakValueDictionary[bytes, Shape] = WeakValueDictionary()
+        self._last_stretched: Shape | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For a mesh that is pickled. Stretched shapes stay behind: weak references cannot be."""
+        return {name: value for name, value in vars(self).items() if name not in ("_stretched", "_last_stretched")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, _stretched=WeakValueDictionary(), _last_stretched=None)
 
     @staticmethod
     def of(mesh: Any) -> Shape:
@@ -74,13 +83,15 @@ class Shape:
         return shape
 
     def stretched(self, stretch: Array) -> Shape:
-        """The shape with every vertex v at stretch v. The last one is kept."""
+        """The shape with every vertex v at stretch v. Those that bodies have are kept, and the last one."""
         key = stretch.tobytes()
-        if self._stretched is None or self._stretched[0] != key:
+        made = self._stretched.get(key)
+        if made is None:
             # Mirrored triangles would face inwards.
             faces = self.faces if np.linalg.det(stretch) > 0 else self.faces[:, ::-1]
-            self._stretched = key, Shape(self.vertices @ stretch.T, faces, self.is_convex)
-        return self._stretched[1]
+            made = self._stretched[key] = Shape(self.vertices @ stretch.T, faces, self.is_convex)
+        self._last_stretched = made
+        return made
 
     def solid(self) -> Solid:
         """The convex hull."""
@@ -156,7 +167,11 @@ class Bodies:
             for i in np.flatnonzero(~rigid):
                 self.rows["rotation"][i], stretch = _rotation_and_stretch(linear[i])
                 if stretch is not None:
-                    shapes[i] = shapes[i].stretched(stretch)
+                    try:
+                        shapes[i] = shapes[i].stretched(stretch)
+                    except Error as error:
+                        message = f"{self.names[i]}, stretched by its transform: {error}"
+                        raise Error(message, error.status, error.name, error.subject, error.where) from error
         if not _same(shapes, self.shapes):
             self.shapes = shapes
             numbers: dict[int, int] = {}

@@ -49,10 +49,12 @@ class MeshContacts:
         effort: as of tandem.build().
 
     Raises:
-        ValueError: no two mesh geoms of the model may collide.
+        ValueError: no two mesh geoms of the model may collide, or most_points is not 1 to 7.
     """
 
     def __init__(self, model: mujoco.MjModel, *, most_points: int = 7, threads: int = 1, effort: Literal["default", "fast", "best"] = "default") -> None:
+        if not 1 <= most_points <= 7:
+            raise ValueError(f"most_points {most_points}: is not from 1 to 7")
         self.model, self.most_points, self.threads = model, most_points, threads
         geom_pairs, explicit = _pairs_that_may_collide(model)
         if len(geom_pairs) == 0:

@@ -56,7 +56,13 @@ def read(path: str | os.PathLike[str]) -> Scene:
     import h5py  # type: ignore[import-untyped,import-not-found,unused-ignore]
 
     path = pathlib.Path(path)
-    with h5py.File(path) as file:
+    try:
+        opened = h5py.File(path)
+    except OSError as error:
+        if os.fspath(path) in str(error):
+            raise
+        raise OSError(f"{path}: {error}") from error
+    with opened as file:
         try:
             return _read(path, file)
         except KeyError as error:

@@ -64,7 +64,8 @@ class CollisionManager:
     def __init__(self, *, threads: int = 1) -> None:
         self._threads = threads
         self._objs: dict[Hashable, CollisionObject] = {}
-        self._bodies: Bodies | None = None  # None: objects came or went
+        self._bodies: Bodies | None = None
+        self._changed = False  # objects came or went
         self._moved = False
         self._joined: Bodies | None = None  # of the last query with objects from elsewhere
 
@@ -90,14 +91,14 @@ class CollisionManager:
             place[:3] = transform[:3]
         made = CollisionObject(Shape.of(mesh), place)
         self._objs[name] = made
-        self._bodies = None
+        self._changed = True
         return made
 
     def remove_object(self, name: Hashable) -> None:
         """Removes an object. Raises ValueError where there is none of that name."""
         self._check(name)
         del self._objs[name]
-        self._bodies = None
+        self._changed = True
 
     def set_transform(self, name: Hashable, transform: Array) -> None:
         """Moves an object to the transform, (4, 4) float. Raises ValueError where there is none of that name."""
@@ -201,12 +202,12 @@ class CollisionManager:
             raise ValueError(f"{name} not in collision manager!")
 
     def _placed(self) -> Bodies:
-        if self._bodies is None:
+        if self._bodies is None or self._changed:
             objects = self._objs.values()
             self._bodies = Bodies(list(self._objs), [thing._shape for thing in objects], [thing._place for thing in objects])
         elif self._moved:
             self._bodies.move([thing._place for thing in self._objs.values()])
-        self._moved = False
+        self._moved = self._changed = False
         return self._bodies
 
     def _search(self, alone: int | None = None) -> Search:

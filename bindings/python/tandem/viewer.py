@@ -32,6 +32,7 @@ TRANSLUCENT = 0.35
 POINT_PIXELS = 12
 VIEW_ANGLE = 24  # degrees, from the lower edge to the upper
 MARGIN = 0.03  # of the picture, on either side
+BAR = 0.12  # of the picture, for a bar of colours and its numbers
 NORMAL_LENGTH = 0.15  # of the median diagonal of the bodies
 COLORS = ("body", "asset", "level")
 
@@ -40,8 +41,8 @@ def view(what: Any, instances: NDArray[np.void] | None = None, *, picture: str |
          off_screen: bool = False, **options: Any) -> NDArray[np.uint8] | None:
     """Shows bodies and what was found of them.
 
-    what: the path of a scene file or of a run with states, an asset, or assets, to which `instances` belong
-        (tandem.instances()). With pictures of an asset alone it stands at the origin.
+    what: the path of a scene file, of a run with states or of a .bvh file, an asset, or assets, to which `instances`
+        belong (tandem.instances()). With pictures of an asset alone it stands at the origin.
     picture: path of a .png file to write; no window opens.
     off_screen: no window opens; needs neither a display nor a GPU.
     options: those of tandem.viewer.View: contacts, manifolds, distances, levels, motion, step, tree_depth, color,
@@ -85,8 +86,8 @@ class View:
     size: width and height in pixels.
     azimuth, elevation: degrees. From where one looks: 0 from +x, 90 from +y; above the horizon, z is up.
 
-    Raises ValueError for arguments that do not fit together, RuntimeError where there is nothing to draw with, and what
-    reading files and queries raise.
+    Raises TypeError and ValueError for arguments that do not fit, or not together, RuntimeError where there is nothing
+    to draw with, and what reading files and queries raise.
     """
 
     def __init__(self, what: Any, instances: NDArray[np.void] | None = None, *,
@@ -98,13 +99,24 @@ class View:
                  azimuth: float = -60, elevation: float = 24) -> None:
         if color not in COLORS:
             raise ValueError(f"color {color!r}: is none of {', '.join(COLORS)}")
+        if opacity is not None and not 0 <= opacity <= 1:
+            raise ValueError(f"opacity {opacity}: is not from 0 to 1")
+        if np.shape(size) != (2,) or np.asarray(size).dtype.kind not in "iu" or min(size) < 1:
+            raise ValueError(f"size {size}: is not a width and a height in pixels")
+        for name, given, kind in (("contacts", contacts, tandem.Contacts), ("manifolds", manifolds, tandem.Manifolds)):
+            if not isinstance(given, (bool, kind)):
+                raise TypeError(f"{name}: a {type(given).__name__} is neither tandem.{kind.__name__} nor a bool")
+        if not isinstance(distances, (tandem.Distances, type(None))):
+            raise TypeError(f"distances: a {type(distances).__name__} is neither tandem.Distances nor None")
         self.scene = _scene(what, instances)
-        moved = self.scene.motion if motion is None else np.asarray(motion)
-        self._motion = np.broadcast_to(moved, self.scene.asset.shape)
+        count = len(self.scene.asset)
+        self._motion = self.scene.motion if motion is None else _of_each("motion", motion, count, tandem.SLEEPING)
         self._filter = self.scene.filter if motion is None else tandem.Filter(motion=self._motion)
-        self._use_levels(levels)
+        self._level = (self.scene.level if levels is None else
+                       _of_each("levels", levels, count, np.iinfo(np.uint32).max).astype(np.uint32))
+        self._assets, self._asset = at_levels(self.scene.assets, self.scene.asset, self._level)
         for name, found in (("contacts", contacts), ("manifolds", manifolds), ("distances", distances)):
-            if found not in (False, True, None) and (len(self.scene.steps) > 1 or levels is not None):
+            if not isinstance(found, (bool, type(None))) and (len(self.scene.steps) > 1 or levels is not None):
                 raise ValueError(f"{name}: belong to one state, at its levels; let them be found by {name}=True")
         self._contacts, self._manifolds, self._distances = contacts, manifolds, distances
         self._query = tandem.Query(self._assets) if contacts is True or manifolds is True else None
@@ -117,7 +129,9 @@ class View:
         if color == "level":
             used = np.unique(self._level)
             labels = [[f"level {level}", _level_colours(int(used[-1]) + 1)[level] / 255] for level in used]
-            self.plotter.add_legend(labels, bcolor=None, border=False, size=(0.14, 0.05 * len(used)), face="rectangle")
+            # VTK cuts the number off where the legend is but one row high.
+            self.plotter.add_legend(labels, bcolor=None, border=False, size=(0.14, 0.05 * max(len(used), 2)),
+                                    face="rectangle")
         self._draw()
         self._look(azimuth, elevation, range(len(self.scene.steps)) if step is None else [self.state])
 
@@ -175,12 +189,6 @@ class View:
                                        pointb=(right, 0.08), color="black", fmt="%.0f", interaction_event="always",
                                        style="modern")
 
-    def _use_levels(self, levels: ArrayLike | None) -> None:
-        """Sets the assets that queries see and bodies show, of one level each, and which each body has."""
-        wanted = self.scene.level if levels is None else np.asarray(levels)
-        self._level = np.broadcast_to(wanted, self.scene.asset.shape).astype(np.uint32)
-        self._assets, self._asset = at_levels(self.scene.assets, self.scene.asset, self._level)
-
     def _place(self) -> None:
         """Meshes are drawn about their middles and the scene about its own: graphics hardware computes in float32."""
         self._triangles = [asset.triangles() for asset in self._assets]
@@ -233,7 +241,7 @@ class View:
             self._bodies.append(mapper)
 
     def _look(self, azimuth: float, elevation: float, states: Iterable[int]) -> None:
-        """Puts the camera as near as all bodies, in all of these states, are in the picture."""
+        """Puts the camera as near as all bodies, in all of these states, are in the picture, left of the bars."""
         a, e = np.radians([azimuth, elevation])
         back = np.array([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)])
         right = np.array([-np.sin(a), np.cos(a), 0])
@@ -242,12 +250,16 @@ class View:
         corners = self._bounds[self._asset[body]]
         seen = np.concatenate([self._posed(body, corners, state).reshape(-1, 3) for state in states]) @ axes.T
         width, height = self.plotter.window_size
-        half = np.tan(np.radians(VIEW_ANGLE / 2)) * np.array([width / height, 1]) * (1 - 2 * MARGIN)
+        whole = np.tan(np.radians(VIEW_ANGLE / 2)) * np.array([width / height, 1])
+        low, high = -whole * (1 - 2 * MARGIN), whole * (1 - 2 * MARGIN)
+        # A run may have contact points at another of its states, and a bar then.
+        bars = len(self.plotter.scalar_bars) if len(self.scene.steps) == 1 else int(self._manifolds is not False)
+        high[0] -= 2 * whole[0] * BAR * bars
         # The eye is the nearest place behind everything from which all points lie in the cone of the view. Across, it
         # is where the cones that touch the points on either side meet.
-        reach = np.stack([seen[:, :2] + seen[:, 2:] * half, seen[:, :2] - seen[:, 2:] * half])
-        middle = (reach[0].max(axis=0) + reach[1].min(axis=0)) / 2
-        away = ((reach[0].max(axis=0) - reach[1].min(axis=0)) / (2 * half)).max()
+        most, least = (seen[:, :2] + seen[:, 2:] * high).max(axis=0), (seen[:, :2] + seen[:, 2:] * low).min(axis=0)
+        away = ((most - least) / (high - low)).max()
+        middle = (most + least - (high + low) * away) / 2
         camera = self.plotter.camera
         camera.view_angle = VIEW_ANGLE
         camera.position = np.append(middle, away) @ axes
@@ -317,7 +329,8 @@ class View:
             normals = arrows.glyph(orient="normal", scale=False, factor=NORMAL_LENGTH * self._length,
                                    geom=pyvista.Arrow(tip_radius=0.07, tip_length=0.3, shaft_radius=0.022))
         self._put("points", points, scalars="depth", cmap="plasma", clim=_from_zero(found.points["depth"]),
-                  style="points", point_size=POINT_PIXELS, render_points_as_spheres=True, scalar_bar_args=_bar("depth"))
+                  style="points", point_size=POINT_PIXELS, render_points_as_spheres=True,
+                  scalar_bar_args=_bar("depth", 0))
         self._put("normals", normals, color=NORMAL_COLOUR, lighting=False)
 
     def _draw_distances(self, found: tandem.Distances) -> None:
@@ -328,7 +341,7 @@ class View:
             lines = pyvista.line_segments_from_points(ends.reshape(-1, 3))
             lines.cell_data["distance"] = near["upper"]
         self._put("distances", lines, scalars="distance", cmap="viridis", clim=_from_zero(near["upper"]), line_width=4,
-                  scalar_bar_args=_bar("distance"))
+                  scalar_bar_args=_bar("distance", 0 if self._manifolds is False else 1))
 
     def _draw_tree(self) -> None:
         edges = None
@@ -361,7 +374,7 @@ def _scene(what: Any, instances: NDArray[np.void] | None) -> Scene:
     if isinstance(what, Scene):
         return what
     if isinstance(what, (str, os.PathLike)):
-        scene = read(what)
+        scene = _scene(tandem.Asset.load(what), instances) if os.fspath(what).endswith(".bvh") else read(what)
     else:
         assets = [what] if isinstance(what, tandem.Asset) else list(what)
         given = tandem.instances(np.arange(len(assets))) if instances is None else instances
@@ -373,6 +386,18 @@ def _scene(what: Any, instances: NDArray[np.void] | None) -> Scene:
     if not (np.isfinite(scene.rotation).all() and np.isfinite(scene.translation).all()):
         raise ValueError("a body is not in a finite place")
     return scene
+
+
+def _of_each(name: str, given: ArrayLike, count: int, most: int) -> NDArray[Any]:
+    """An argument that is one number of each body, (n,), or one for all."""
+    numbers = np.asarray(given)
+    if numbers.dtype.kind not in "iu":
+        raise TypeError(f"{name}: {given!r} is not of integers")
+    if numbers.shape not in ((), (count,)):
+        raise ValueError(f"{name}: has shape {numbers.shape}; one number or ({count},) is needed")
+    if numbers.min() < 0 or numbers.max() > most:
+        raise ValueError(f"{name}: {given!r} is not from 0 to {most}")
+    return np.broadcast_to(numbers, (count,))
 
 
 def _plotter(off_screen: bool, size: tuple[int, int]) -> Any:
@@ -441,6 +466,7 @@ def _from_zero(values: Points) -> tuple[float, float]:
     return 0.0, float(values.max(initial=0)) or 1.0
 
 
-def _bar(title: str) -> dict[str, Any]:
-    return {"title": title, "vertical": True, "position_x": 0.89, "position_y": 0.15, "height": 0.7, "width": 0.05,
-            "color": "black", "fmt": "%.2g"}
+def _bar(title: str, column: int) -> dict[str, Any]:
+    """Of colours, in a column from the right."""
+    return {"title": title, "vertical": True, "position_x": 0.89 - BAR * column, "position_y": 0.15, "height": 0.7,
+            "width": 0.05, "color": "black", "fmt": "%.2g"}

@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 import tarfile
 import unittest
 import zipfile
@@ -86,7 +87,9 @@ class DebianTest(unittest.TestCase):
 
     def test_a_program_in_c_takes_pkg_config(self):
         tool(self, "cc", "pkg-config")
-        environment = os.environ | {"PKG_CONFIG_LIBDIR": str(self.libraries / "pkgconfig"), "PKG_CONFIG_SYSROOT_DIR": str(self.root)}
+        root = Path(self.enterContext(tempfile.TemporaryDirectory())) / "root"  # pkg-config does not quote spaces of this one
+        root.symlink_to(self.root)
+        environment = os.environ | {"PKG_CONFIG_LIBDIR": str(self.libraries / "pkgconfig"), "PKG_CONFIG_SYSROOT_DIR": str(root)}
         flags = run("pkg-config", "--cflags", "--libs", "tandem", env=environment).replace('"', "").split()
         program = FOLDER / "contacts_in_c"
         run("cc", "-std=c99", "-Wall", "-Werror", SOURCE / "tests/consumer/contacts.c", "-o", program, *flags)
@@ -108,7 +111,7 @@ set(TANDEM_TOOLS OFF)
 set(TANDEM_TESTS OFF)
 set(TANDEM_CUDA OFF)
 set(TANDEM_PYTHON OFF)
-add_subdirectory({SOURCE} tandem)
+add_subdirectory("{SOURCE}" tandem)
 foreach(target build c formats kernels runtime)
   if(NOT TARGET tandem::${{target}})
     message(FATAL_ERROR "no ${{target}}")

@@ -7,8 +7,8 @@ import re
 import shutil
 import subprocess
 import sys
-import tempfile
 import tarfile
+import tempfile
 import unittest
 import zipfile
 from pathlib import Path

@@ -78,9 +78,10 @@ def test_filters_pairs(query):
     assert query.pairs(rows, filter=tandem.Filter(motion=[tandem.FIXED, tandem.FIXED, tandem.MOVING])).tolist() == [(0, 2), (1, 2)]
     assert query.pairs(rows, filter=tandem.Filter(group=[1, 2, 3], mask=[2, 1, 1])).tolist() == [(0, 1), (0, 2)]
     assert query.contacts(rows, filter=tandem.Filter(excluded=[[1, 0], [2, 1]])).pairs.tolist() == [(0, 2)]
-    with pytest.raises(tandem.Error) as caught:
-        query.contacts(rows, filter=tandem.Filter(group=[1, 2]))
-    assert caught.value.name == "FilterMismatch"
+    for group in ([1, 2], []):
+        with pytest.raises(tandem.Error) as caught:
+            query.contacts(rows, filter=tandem.Filter(group=group))
+        assert caught.value.name == "FilterMismatch"
     with pytest.raises(ValueError, match="mask"):
         tandem.Filter(group=[1, 2], mask=[1])
 

@@ -197,7 +197,8 @@ class Query:
         self._core.keep_fixed(posed, motions, self._number_of_threads(threads))
 
     def manifolds(self, *, most_points: int = 7, match_previous: bool = True, threads: int | None = None) -> Manifolds:
-        """Makes contact manifolds of the last `contacts` of this query, whose instances it remembers.
+        """Makes contact manifolds of the last `contacts` of this query, whose instances it remembers. They need all contacts: with `first_contact_only` they are
+        of the one triangle pair that was found.
 
         Args:
             most_points: of a manifold, 1 to 7.

@@ -548,3 +548,31 @@ def test_distance_data_of_nobody():
 
 if __name__ == "__main__":
     sys.exit(pytest.main([__file__, "-q"]))
+
+
+def test_ignored_pairs_are_not_looked_at():
+    box = trimesh.creation.box()
+    manager = tandem.trimesh.CollisionManager()
+    for name, x in (("c", 0.6), ("a", 0.0), ("b", 0.3)):
+        manager.add_object(name, box, trimesh.transformations.translation_matrix([x, 0, 0]))
+    for a, b in (("b", "a"), ("a", "c")):
+        manager.set_pair_ignored(a, b)
+    assert manager.ignored_pairs == {("a", "b"), ("a", "c")} and manager.is_pair_ignored("a", "b") and manager.is_pair_ignored("b", "a")
+    assert manager.in_collision_internal(return_names=True) == (True, {("b", "c")})
+    assert manager.in_collision_internal() is True
+    assert {tuple(sorted(contact.names)) for contact in manager.in_collision_internal(return_data=True)[1]} == {("b", "c")}
+    assert manager.min_distance_internal(return_names=True)[1] == ("b", "c")
+    assert manager.min_distance_internal(name="a") == sys.float_info.max  # nobody is left
+    manager.set_pair_ignored("c", "b")
+    assert manager.in_collision_internal(return_names=True) == (False, set()) and manager.in_collision_internal() is False
+    assert manager.in_collision_single(box) is True
+    manager.set_pair_ignored("c", "b", ignored=False)
+    assert manager.in_collision_internal() is True
+    manager.remove_object("a")
+    assert manager.ignored_pairs == set()
+    for a, b in (("b", "b"), ("b", "ghost"), ("ghost", "b")):
+        with pytest.raises(ValueError, match=a if a == b else "ghost"):
+            manager.set_pair_ignored(a, b)
+    manager.set_pair_ignored("b", "c")
+    manager.clear_ignored_pairs()
+    assert manager.ignored_pairs == set() and not manager.is_pair_ignored("b", "c") and not manager.is_pair_ignored("b", "ghost")

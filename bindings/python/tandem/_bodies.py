@@ -219,20 +219,23 @@ def _same(some: Sequence[object], others: Sequence[object]) -> bool:
 
 
 class Search:
-    """A question about pairs of bodies: of all; of the first `first_side` with the others; or of the body `alone` with the others."""
+    """A question about pairs of bodies: of all; of the first `first_side` with the others; or of the body `alone` with the others. Never of `ignored` pairs."""
 
-    def __init__(self, bodies: Bodies, threads: int, first_side: int | None = None, alone: int | None = None) -> None:
+    def __init__(self, bodies: Bodies, threads: int, first_side: int | None = None, alone: int | None = None, ignored: list[tuple[int, int]] | None = None) -> None:
         self.bodies = bodies
         self._threads = threads
         count = len(bodies.names)
-        self._filter: Filter | None = None
+        sides: Array | None = None
         self._pair_count = count * (count - 1) // 2
         if first_side is not None or alone is not None:
             sides = np.ones(count, np.uint32)
             sides[slice(first_side, None) if alone is None else alone] = 2
             second = int((sides == 2).sum())
             self._pair_count = second * (count - second)
-            self._filter = Filter(group=sides, mask=3 - sides)
+        self._pair_count -= sum(alone is None or alone in pair for pair in ignored or ())
+        self._filter: Filter | None = None
+        if sides is not None or ignored:
+            self._filter = Filter(group=sides, mask=None if sides is None else 3 - sides, excluded=ignored or None)
 
     def any_collision(self) -> bool:
         """Whether there is one."""

@@ -64,6 +64,7 @@ class CollisionManager:
     def __init__(self, *, threads: int = 1) -> None:
         self._threads = threads
         self._objs: dict[Hashable, CollisionObject] = {}
+        self._ignored: set[tuple[Hashable, Hashable]] = set()
         self._bodies: Bodies | None = None
         self._changed = False  # objects came or went
         self._moved = False
@@ -95,9 +96,10 @@ class CollisionManager:
         return made
 
     def remove_object(self, name: Hashable) -> None:
-        """Removes an object. Raises ValueError where there is none of that name."""
+        """Removes an object, and the ignored pairs that it is in. Raises ValueError where there is none of that name."""
         self._check(name)
         del self._objs[name]
+        self._ignored = {pair for pair in self._ignored if name not in pair}
         self._changed = True
 
     def set_transform(self, name: Hashable, transform: Array) -> None:
@@ -107,6 +109,28 @@ class CollisionManager:
         place = self._objs[name]._place
         place[:3, :3], place[:3, 3] = rotation, translation
         self._moved = True
+
+    def set_pair_ignored(self, name_a: Hashable, name_b: Hashable, ignored: bool = True) -> None:
+        """Says that in_collision_internal() and min_distance_internal() do not look at a pair, such as links that meet at a joint; or, with False, that they do.
+        Raises ValueError where there is none of one of the names, or where they are one."""
+        self._check(name_a)
+        self._check(name_b)
+        if name_a == name_b:
+            raise ValueError(f"{name_a} is no pair")
+        (self._ignored.add if ignored else self._ignored.discard)(_pair(name_a, name_b))
+
+    def is_pair_ignored(self, name_a: Hashable, name_b: Hashable) -> bool:
+        """Whether a pair is ignored, its names in either order."""
+        return _pair(name_a, name_b) in self._ignored
+
+    def clear_ignored_pairs(self) -> None:
+        """Ignores no pair any more."""
+        self._ignored.clear()
+
+    @property
+    def ignored_pairs(self) -> set[tuple[Hashable, Hashable]]:
+        """The pairs of names that are ignored, each in alphabetical order."""
+        return set(self._ignored)
 
     def in_collision_single(self, mesh: Any, transform: Any = None, return_names: bool = False, return_data: bool = False) -> Any:
         """Tells whether a mesh at a transform, (4, 4) float, collides with any object.
@@ -132,7 +156,7 @@ class CollisionManager:
         contacts : list of ContactData
           All of them; if return_data. Normals point from the object that was added first to the other; where one of them is convex, to that.
         """
-        return self._collisions(self._search(), lambda a, b: tuple(sorted((a, b))), return_names, return_data)
+        return self._collisions(self._search(), _pair, return_names, return_data)
 
     def in_collision_other(self, other_manager: CollisionManager, return_names: bool = False, return_data: bool = False) -> Any:
         """Tells whether any object collides with one of another manager.
@@ -181,7 +205,7 @@ class CollisionManager:
         else:
             self._check(name)
             search = self._search(alone=list(self._objs).index(name))
-        return self._distance(search, (None, None), lambda a, b: tuple(sorted((a, b))), return_names, return_data)
+        return self._distance(search, (None, None), _pair, return_names, return_data)
 
     def min_distance_other(self, other_manager: CollisionManager, return_names: bool = False, return_data: bool = False) -> Any:
         """The distance between the two objects, one of each manager, that are nearest to each other.
@@ -211,7 +235,9 @@ class CollisionManager:
         return self._bodies
 
     def _search(self, alone: int | None = None) -> Search:
-        return Search(self._placed(), self._threads, alone=alone)
+        bodies = self._placed()
+        places = {name: place for place, name in enumerate(bodies.names)} if self._ignored else {}
+        return Search(bodies, self._threads, alone=alone, ignored=[(places[a], places[b]) for a, b in self._ignored])
 
     def _with_single(self, mesh: Any, transform: Any) -> Search:
         place = np.eye(4)
@@ -265,6 +291,11 @@ class CollisionManager:
             make: Any = DistanceData
             answer.append(make(names, nearest))
         return tuple(answer)
+
+
+def _pair(a: Any, b: Any) -> tuple[Any, Any]:
+    first, second = sorted((a, b))
+    return first, second
 
 
 def scene_to_collision(scene: Any) -> tuple[CollisionManager, dict[Hashable, CollisionObject]]:

@@ -1,6 +1,7 @@
 #pragma once
 #include <span>
 
+#include "same_layout.h"
 #include "tandem/kernels/contact_manifolds.h"
 #include "tandem/kernels/containment_query.h"
 #include "tandem/kernels/distance_query.h"
@@ -10,11 +11,6 @@
 
 /// Rows of the interface have the layout of the libraries' rows, so that they are handed over where they are.
 namespace tandem::c {
-
-#define TANDEM_SAME_SIZE(ours, theirs) \
-  static_assert(sizeof(ours) == sizeof(theirs) && alignof(ours) >= alignof(theirs))
-#define TANDEM_SAME_PLACE(ours, theirs, member) \
-  static_assert(offsetof(ours, member) == offsetof(theirs, member))
 
 TANDEM_SAME_SIZE(Pose, tandem_pose);
 TANDEM_SAME_PLACE(Pose, tandem_pose, translation);
@@ -77,9 +73,6 @@ TANDEM_SAME_PLACE(Impact, tandem_impact, face_a);
 TANDEM_SAME_PLACE(Impact, tandem_impact, face_b);
 TANDEM_SAME_PLACE(Impact, tandem_impact, status);
 TANDEM_SAME_SIZE(Motion, uint8_t);
-
-#undef TANDEM_SAME_SIZE
-#undef TANDEM_SAME_PLACE
 
 static_assert(TANDEM_NO_INDEX == kNoIndex);
 static_assert(TANDEM_MOVING == int(Motion::moving) && TANDEM_FIXED == int(Motion::fixed) &&

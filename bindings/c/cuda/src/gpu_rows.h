@@ -1,5 +1,6 @@
 #pragma once
 #include "rows.h"
+#include "same_layout.h"
 #include "tandem/kernels/gpu_broad_phase.h"
 #include "tandem/kernels/gpu_contact_manifolds.h"
 #include "tandem/kernels/gpu_containment_query.h"
@@ -11,10 +12,6 @@
 /// Rows of the interface that lie in GPU memory have the layout of the libraries'.
 namespace tandem::c {
 
-#define TANDEM_SAME_SIZE(ours, theirs) \
-  static_assert(sizeof(ours) == sizeof(theirs) && alignof(ours) >= alignof(theirs))
-#define TANDEM_SAME_PLACE(ours, theirs, member) \
-  static_assert(offsetof(ours, member) == offsetof(theirs, member))
 #define TANDEM_SAME_REPORT(ours, theirs) \
   TANDEM_SAME_SIZE(ours, theirs);        \
   static_assert(offsetof(ours, status) == 0 && offsetof(theirs, failed) == 0)
@@ -111,8 +108,6 @@ static_assert(offsetof(GpuToleranceReport, counters) == offsetof(tandem_gpu_tole
 static_assert(offsetof(ToleranceCounters, work) ==
               offsetof(tandem_gpu_tolerance_report, work) - offsetof(tandem_gpu_tolerance_report, apart));
 
-#undef TANDEM_SAME_SIZE
-#undef TANDEM_SAME_PLACE
 #undef TANDEM_SAME_REPORT
 
 static_assert(uint32_t(Status::kOk) == 0);

@@ -26,7 +26,7 @@ using namespace simulation;
 struct SimulateArguments {
   std::string mesh, ground, scene, engine = "tandem";
   std::uint32_t count = 0;
-  double jitter = 0.0005, tilt = 30, density = 1000, gravity = 9.81, slop = -1;
+  double jitter = 0.0005, tilt = 30, density = 1000, gravity = 9.81, slop = -1, rolling_resistance = -1;
   std::uint64_t seed = 1;
   bool fast = false, json = false, cold = false, continuous = false;
   SimulatorOptions simulator;
@@ -127,6 +127,7 @@ Json options_of(const char* kind, const SimulateArguments& arguments, const Star
           {"friction", solver.friction},
           {"restitution", solver.restitution},
           {"slop", solver.slop},
+          {"rolling_resistance", solver.rolling_resistance},
           {"correction", solver.correction},
           {"order", solver.order == ContactOrder::found ? "found" : "shuffled"},
           {"warm_start", solver.warm_start},
@@ -223,6 +224,8 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
   SimulatorOptions& options = arguments.simulator;
   options.gravity = {0, 0, -arguments.gravity};
   options.solver.slop = slop_of(arguments, start);
+  options.solver.rolling_resistance =
+      arguments.rolling_resistance >= 0 ? arguments.rolling_resistance : options.solver.slop;
   options.solver.warm_start = !arguments.cold;
   options.solver.seed = arguments.seed;
   if (options.solver.substeps == 0) options.solver.substeps = default_substeps(options.solver.kind);
@@ -297,6 +300,11 @@ void add_solver_options(CLI::App& command, SimulateArguments& arguments) {
   command.add_option("--slop", arguments.slop, "penetration that is left alone, in metres")
       ->check(between(0, 1e6))
       ->option_text("S [1/4000 of the first mesh's diagonal]");
+  command
+      .add_option("--rolling-resistance", arguments.rolling_resistance,
+                  "lever at which the force between two bodies resists that they turn, in metres; not by sweeps")
+      ->check(between(0, 1e6))
+      ->option_text("L [the slop]");
   command
       .add_option("--correction", solver.correction,
                   "part of the penetration beyond the slop that a step corrects")

@@ -122,7 +122,8 @@ std::vector<ContactImpulse> ImpulseCache::match(std::span<const ContactPoint> co
 KeptContacts ImpulseCache::with_those_just_lost(std::span<const ContactPoint> contacts,
                                                 std::span<const BodyProperties> bodies,
                                                 std::span<const BodyState> states,
-                                                std::span<const std::uint8_t> idle, double gap) const {
+                                                std::span<const std::uint8_t> idle, double gap,
+                                                double slop) const {
   constexpr double kNear = 0.02;      // of the smaller body's radius
   constexpr std::uint32_t kLife = 8;  // steps; boxes side by side would keep all that ever touched
   KeptContacts all;
@@ -138,7 +139,7 @@ KeptContacts ImpulseCache::with_those_just_lost(std::span<const ContactPoint> co
     for (std::size_t i = begin; i < end; ++i) {
       if (entries_[i].lost >= kLife) continue;
       const ContactPoint moved = moved_with_bodies(entries_[i], states);
-      if (moved.depth >= 0 || moved.depth < -gap || across(entries_[i], moved, states) > near) continue;
+      if (moved.depth > slop || moved.depth < -gap || across(entries_[i], moved, states) > near) continue;
       const auto is_near = [&](const ContactPoint& one) {
         return (one.position - moved.position).norm() <= near;
       };
@@ -161,7 +162,7 @@ void ImpulseCache::remember(const KeptContacts& kept, std::span<const ContactImp
     if (kept.entry[i] != KeptContacts::kFound) {
       fresh.push_back(entries_[kept.entry[i]]);
       fresh.back().impulse = impulses[i];
-      ++fresh.back().lost;
+      fresh.back().lost = impulses[i].normal > 0 ? 0 : fresh.back().lost + 1;
       continue;
     }
     const ContactPoint& contact = kept.contacts[i];

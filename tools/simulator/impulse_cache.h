@@ -22,7 +22,7 @@ struct CachedImpulse {
   Eigen::Vector3d in_a, in_b;   ///< the position, in the bodies' frames about their centres of mass
   Eigen::Vector3d normal_in_a;  ///< the normal, likewise
   double depth;
-  std::uint32_t lost;  ///< steps since it was found
+  std::uint32_t lost;  ///< steps since it was found or pushed
   ContactImpulse impulse;
 };
 
@@ -54,13 +54,12 @@ class ImpulseCache {
   /// The contacts, and with them those remembered that are not among them because their bodies have come
   /// apart a little since they were found: by no more than `gap` along the normal and a fiftieth of the
   /// smaller body's radius across it, and no other contact of the pair is that near; and for no more than
-  /// eight steps. Their depth is negative. Without them a body that is lifted off by a hair falls freely for
-  /// a whole step, and deeper than it was. By ascending pair. Pairs of two idle bodies are left out.
-  /// Conditions as for match() and remember(); gap
-  /// >= 0.
+  /// eight steps since they pushed. Their depth is negative. Without them a body that is lifted off by a hair
+  /// falls freely for a whole step, and deeper than it was. By ascending pair. Pairs of two idle bodies are
+  /// left out. Conditions as for match() and remember(); gap >= 0.
   KeptContacts with_those_just_lost(std::span<const ContactPoint> contacts,
                                     std::span<const BodyProperties> bodies, std::span<const BodyState> states,
-                                    std::span<const std::uint8_t> idle, double gap) const;
+                                    std::span<const std::uint8_t> idle, double gap, double slop) const;
 
   /// Forgets all but the pairs of two idle bodies, which no engine looks at, and remembers these contacts;
   /// where they have an entry, that of the contact when it was found.

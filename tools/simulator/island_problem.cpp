@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace tandem::simulation {
 namespace {
@@ -46,6 +47,7 @@ class ProblemMaker {
     const auto contacts = from_the_ground_up(input_.islands.contacts_of(island));
     reserve(contacts.size());
     for (const std::uint32_t contact : contacts) add_contact(contact, impulses[contact]);
+    add_pairs();
     return std::move(problem_);
   }
 
@@ -131,6 +133,41 @@ class ProblemMaker {
     problem_.rebound.push_back(bounces ? options_.restitution * approach : 0);
     problem_.impulse.push_back(
         {impulse.normal, first.dot(impulse.tangential), second.dot(impulse.tangential)});
+  }
+
+  // All contacts of a pair are in one layer, and so side by side.
+  void add_pairs() {
+    const auto pair_of = [&](std::uint32_t i) {
+      const ContactPoint& contact = input_.contacts[problem_.contacts[i]];
+      return std::pair(contact.body_a, contact.body_b);
+    };
+    const auto count = static_cast<std::uint32_t>(problem_.contact_count());
+    for (std::uint32_t begin = 0, end = 0; begin < count; begin = end) {
+      while (end < count && pair_of(end) == pair_of(begin)) ++end;
+      add_pair(begin, end, input_.contacts[problem_.contacts[begin]]);
+    }
+  }
+
+  void add_pair(std::uint32_t begin, std::uint32_t end, const ContactPoint& contact) {
+    TouchingPair pair = {begin, end, {}, spin_driven(contact.body_b) - spin_driven(contact.body_a), 0};
+    Matrix3d mobility = Matrix3d::Zero();
+    for (const std::uint32_t body : {problem_.a[begin], problem_.b[begin]}) {
+      if (body > 0) mobility += problem_.scale[body].spread * problem_.scale[body].spread.transpose();
+    }
+    pair.mobility = mobility.cwiseAbs().rowwise().sum().maxCoeff();
+    for (int k = 0; k < 3; ++k) {
+      pair.turn[k] = {Vector6::Zero(), Vector6::Zero()};
+      if (problem_.a[begin] > 0)
+        pair.turn[k].a.tail<3>() = -problem_.scale[problem_.a[begin]].spread.row(k).transpose();
+      if (problem_.b[begin] > 0)
+        pair.turn[k].b.tail<3>() = problem_.scale[problem_.b[begin]].spread.row(k).transpose();
+    }
+    problem_.pairs.push_back(pair);
+  }
+
+  Vector3d spin_driven(std::uint32_t body) const {
+    if (input_.bodies[body].motion != Motion::kinematic) return Vector3d::Zero();
+    return states_[body].angular_velocity;
   }
 
   const StepInput& input_;

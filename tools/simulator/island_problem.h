@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -27,6 +28,14 @@ struct MassScale {
   Eigen::Matrix3d spread;  ///< F
 };
 
+/// Two bodies that touch, and how b turns against a.
+struct TouchingPair {
+  std::uint32_t begin, end;        ///< of their contacts
+  std::array<ContactRow, 3> turn;  ///< about the axes of the world
+  Eigen::Vector3d drive;           ///< of turn
+  double mobility;                 ///< an impulse of 1 about any axis changes turn by no more
+};
+
 /// The bodies and contacts of one island in arrays, for one step: inertia, arms and directions stay those of
 /// its start. Bodies are known by their place here; 0 stands for all that contacts do not move, whose y is 0.
 struct IslandProblem {
@@ -44,9 +53,16 @@ struct IslandProblem {
   std::vector<double> rebound;           ///< velocity along the normal that restitution asks for, or 0
   std::vector<Eigen::Vector3d> impulse;  ///< along normal, first, second, as a whole step would need it
 
+  std::vector<TouchingPair> pairs;
+
   std::size_t contact_count() const { return contacts.size(); }
   double along(const ContactRow& row, std::size_t contact, const std::vector<Vector6>& y) const {
     return row.a.dot(y[a[contact]]) + row.b.dot(y[b[contact]]);
+  }
+  /// By how much b of a pair turns against a, but for what drives them.
+  Eigen::Vector3d turning(const TouchingPair& pair, const std::vector<Vector6>& y) const {
+    return {along(pair.turn[0], pair.begin, y), along(pair.turn[1], pair.begin, y),
+            along(pair.turn[2], pair.begin, y)};
   }
   /// One for both directions, or friction would not oppose the slip.
   double friction_mobility(std::size_t contact) const {

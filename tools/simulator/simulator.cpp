@@ -75,7 +75,7 @@ void Simulator::find_contacts(StepRecord& record) {
     record.penetration_mean += contact.depth / static_cast<double>(found.size());
   }
   const double gap = kFall * options_.gravity.norm() * options_.dt * options_.dt;
-  kept_ = cache_.with_those_just_lost(found, bodies_, states_, idle(), gap);
+  kept_ = cache_.with_those_just_lost(found, bodies_, states_, idle(), gap, options_.solver.slop);
 }
 
 void Simulator::solve(StepRecord& record) {

@@ -72,6 +72,27 @@ class BoxesOnPlane : public ContactFinder {
   std::vector<ContactPoint> points_;
 };
 
+class BallsOnPlane : public ContactFinder {
+ public:
+  BallsOnPlane(const Vector3d& normal, double radius) : normal_(normal), radius_(radius) {}
+
+  const std::vector<ContactPoint>& find(std::span<const BodyPose> bodies,
+                                        std::span<const std::uint8_t>) override {
+    points_.clear();
+    for (std::uint32_t i = 1; i < bodies.size(); ++i) {
+      const Vector3d center = to_world(bodies[i].pose, Vector3d::Zero());
+      const double depth = radius_ - normal_.dot(center);
+      if (depth >= 0) points_.push_back({0, i, center - radius_ * normal_, normal_, depth, 1});
+    }
+    return points_;
+  }
+
+ private:
+  Vector3d normal_;
+  double radius_;
+  std::vector<ContactPoint> points_;
+};
+
 }  // namespace
 
 BodyProperties box_body(const Vector3d& size, double mass) {
@@ -84,6 +105,15 @@ BodyProperties box_body(const Vector3d& size, double mass) {
   return body;
 }
 
+BodyProperties ball_body(double radius, double mass) {
+  BodyProperties body;
+  body.mass = mass;
+  body.radius = radius;
+  body.inertia = 0.4 * mass * radius * radius * Eigen::Matrix3d::Identity();
+  body.inverse_inertia = body.inertia.inverse();
+  return body;
+}
+
 BodyProperties fixed_body() {
   BodyProperties body;
   body.motion = Motion::fixed;
@@ -92,6 +122,10 @@ BodyProperties fixed_body() {
 
 std::unique_ptr<ContactFinder> boxes_on_plane(const Vector3d& normal, const Vector3d& size) {
   return std::make_unique<BoxesOnPlane>(normal, size);
+}
+
+std::unique_ptr<ContactFinder> balls_on_plane(const Vector3d& normal, double radius) {
+  return std::make_unique<BallsOnPlane>(normal, radius);
 }
 
 std::unique_ptr<ContactFinder> no_contacts() {

@@ -10,6 +10,9 @@ namespace tandem::simulation {
 /// A box of this mass with its centre at the origin of its frame.
 BodyProperties box_body(const Eigen::Vector3d& size, double mass);
 
+/// A solid ball of this mass with its centre at the origin of its frame.
+BodyProperties ball_body(double radius, double mass);
+
 /// A body that nothing moves.
 BodyProperties fixed_body();
 
@@ -17,6 +20,9 @@ BodyProperties fixed_body();
 /// The corners of each box that lie in the half-space are contacts, and so are those bottom corners of box i
 /// + 1 that lie below the top of box i, over its footprint in the frame of box i.
 std::unique_ptr<ContactFinder> boxes_on_plane(const Eigen::Vector3d& normal, const Eigen::Vector3d& size);
+
+/// Body 0 is the half-space as above; the other bodies are balls. Each has one contact with it, at its foot.
+std::unique_ptr<ContactFinder> balls_on_plane(const Eigen::Vector3d& normal, double radius);
 
 /// No contacts.
 std::unique_ptr<ContactFinder> no_contacts();

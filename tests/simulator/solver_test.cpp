@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -201,6 +202,45 @@ TEST(Newton, WhatDoesNotConvergeIsSolvedBySoftSteps) {
   EXPECT_EQ(results[0][1].position, results[1][1].position);
   EXPECT_EQ(results[0][1].velocity, results[1][1].velocity);
   EXPECT_TRUE(results[0][1].velocity.allFinite());
+}
+
+// About the world's origin, with bodies where they are at the start.
+Vector3d angular_momentum_of(const IslandProblem& problem, const OneStep& step) {
+  Vector3d sum = Vector3d::Zero();
+  for (std::size_t i = 1; i < problem.bodies.size(); ++i) {
+    const MassScale& scale = problem.scale[i];
+    const Vector3d linear = scale.root_mass * problem.velocity[i].head<3>();
+    sum += step.states[problem.bodies[i]].position.cross(linear);
+    sum += scale.spread.transpose().inverse() * problem.velocity[i].tail<3>();
+  }
+  return sum;
+}
+
+TEST(RollingResistance, TwoBodiesSlowEachOthersTurningAndKeepTheirAngularMomentum) {
+  for (const bool by_newton : {false, true}) {
+    OneStep step(Tower({1, 2}, kSlop));
+    step.states[2].velocity = {0, 0, -1};
+    step.states[2].angular_velocity = {0, 0, 3};
+    step.options.substeps = 16;
+    step.options.friction = 0;
+    step.options.rolling_resistance = 0.02;
+    step.touch(1, 2, {0.1, 0.2, 1});
+    IslandProblem problem = step.problem();
+    for (Vector6& gravity : problem.gravity) gravity.setZero();
+    const Vector3d before = angular_momentum_of(problem, step);
+    if (by_newton) {
+      ASSERT_TRUE(solve_newton_step(problem, step.input(), step.options).converged);
+    } else {
+      solve_soft_step(problem, step.input(), step.options);
+    }
+    EXPECT_LT((angular_momentum_of(problem, step) - before).norm(), 1e-12);
+    const TouchingPair& pair = problem.pairs[0];
+    const Vector3d turning = problem.turning(pair, problem.velocity);
+    EXPECT_LT(turning.z(), 2.95);
+    if (!by_newton) continue;  // by soft steps nothing pushes any more in the last substep
+    EXPECT_NEAR(pair.impulse.norm() / (step.options.rolling_resistance * problem.impulse[0].x()), 1, 1e-4);
+    EXPECT_LT(pair.impulse.normalized().dot(turning.normalized()), -0.9999);
+  }
 }
 
 TEST(Soft, TheOrderOfBodiesDoesNotFellATower) {

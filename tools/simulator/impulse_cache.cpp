@@ -71,13 +71,14 @@ class PairMatch {
   }
 
   void share_rest() {
-    double rest = 0;
+    double normal = 0;
+    Vector3d turning = Vector3d::Zero();
     for (std::size_t j = 0; j < old_.size(); ++j) {
-      if (!is_taken_[j]) rest += old_[j].impulse.normal;
+      if (!is_taken_[j]) normal += old_[j].impulse.normal, turning += old_[j].impulse.turning;
     }
     const auto without = static_cast<double>(std::count(has_one_.begin(), has_one_.end(), 0));
     for (std::size_t i = 0; i < now_.size(); ++i) {
-      if (!has_one_[i]) out_[i].normal = rest / without;
+      if (!has_one_[i]) out_[i].normal = normal / without, out_[i].turning = turning / without;
     }
   }
 

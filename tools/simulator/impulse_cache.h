@@ -13,6 +13,8 @@ namespace tandem::simulation {
 struct ContactImpulse {
   double normal = 0;                                     ///< along the contact's normal, >= 0
   Eigen::Vector3d tangential = Eigen::Vector3d::Zero();  ///< across it, in the world
+  Eigen::Vector3d turning = Eigen::Vector3d::Zero();     ///< what resists turning, in the world; each contact
+                                                         ///< of a pair has an equal part
 };
 
 /// An impulse and what its contact is known by in the next step.
@@ -44,8 +46,8 @@ class ImpulseCache {
  public:
   /// The impulse to start each contact with: that of the last step's contact between the same bodies with the
   /// same feature, or else of the nearest one that is within a tenth of the smaller body's radius; each is
-  /// given once. What then is left of a pair's normal impulse is shared out among its contacts that found
-  /// none, so that a pair pushes as it did although its points have changed. Condition: both lists come by
+  /// given once. What then is left of a pair's normal impulse and of what resists turning is shared out among
+  /// its contacts that found none, so that a pair pushes as it did although its points have changed. Condition: both lists come by
   /// ascending pair.
   std::vector<ContactImpulse> match(std::span<const ContactPoint> contacts,
                                     std::span<const BodyProperties> bodies,

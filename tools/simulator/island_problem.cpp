@@ -47,7 +47,7 @@ class ProblemMaker {
     const auto contacts = from_the_ground_up(input_.islands.contacts_of(island));
     reserve(contacts.size());
     for (const std::uint32_t contact : contacts) add_contact(contact, impulses[contact]);
-    add_pairs();
+    add_pairs(impulses);
     return std::move(problem_);
   }
 
@@ -136,7 +136,7 @@ class ProblemMaker {
   }
 
   // All contacts of a pair are in one layer, and so side by side.
-  void add_pairs() {
+  void add_pairs(std::span<const ContactImpulse> impulses) {
     const auto pair_of = [&](std::uint32_t i) {
       const ContactPoint& contact = input_.contacts[problem_.contacts[i]];
       return std::pair(contact.body_a, contact.body_b);
@@ -145,11 +145,16 @@ class ProblemMaker {
     for (std::uint32_t begin = 0, end = 0; begin < count; begin = end) {
       while (end < count && pair_of(end) == pair_of(begin)) ++end;
       add_pair(begin, end, input_.contacts[problem_.contacts[begin]]);
+      for (std::uint32_t i = begin; i < end; ++i)
+        problem_.pairs.back().impulse += impulses[problem_.contacts[i]].turning;
     }
   }
 
   void add_pair(std::uint32_t begin, std::uint32_t end, const ContactPoint& contact) {
-    TouchingPair pair = {begin, end, {}, spin_driven(contact.body_b) - spin_driven(contact.body_a), 0};
+    TouchingPair pair = {};
+    pair.begin = begin, pair.end = end;
+    pair.drive = spin_driven(contact.body_b) - spin_driven(contact.body_a);
+    pair.impulse = Vector3d::Zero();
     Matrix3d mobility = Matrix3d::Zero();
     for (const std::uint32_t body : {problem_.a[begin], problem_.b[begin]}) {
       if (body > 0) mobility += problem_.scale[body].spread * problem_.scale[body].spread.transpose();
@@ -225,7 +230,12 @@ void apply_solution(const IslandProblem& problem, const StepInput& input, std::s
   for (std::size_t i = 0; i < problem.contact_count(); ++i) {
     const Vector3d& impulse = problem.impulse[i];
     impulses[problem.contacts[i]] = {
-        impulse.x(), impulse.y() * problem.first_direction[i] + impulse.z() * problem.second_direction[i]};
+        impulse.x(), impulse.y() * problem.first_direction[i] + impulse.z() * problem.second_direction[i],
+        Vector3d::Zero()};
+  }
+  for (const TouchingPair& pair : problem.pairs) {
+    for (std::uint32_t i = pair.begin; i < pair.end; ++i)
+      impulses[problem.contacts[i]].turning = pair.impulse / (pair.end - pair.begin);
   }
 }
 

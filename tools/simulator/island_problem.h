@@ -34,6 +34,15 @@ struct TouchingPair {
   std::array<ContactRow, 3> turn;  ///< about the axes of the world
   Eigen::Vector3d drive;           ///< of turn
   double mobility;                 ///< an impulse of 1 about any axis changes turn by no more
+  Eigen::Vector3d impulse;         ///< against turning, as a whole step would need it
+
+  /// What the impulse adds to the y of its bodies.
+  Vector6 change_of_a(const Eigen::Vector3d& by) const {
+    return by.x() * turn[0].a + by.y() * turn[1].a + by.z() * turn[2].a;
+  }
+  Vector6 change_of_b(const Eigen::Vector3d& by) const {
+    return by.x() * turn[0].b + by.y() * turn[1].b + by.z() * turn[2].b;
+  }
 };
 
 /// The bodies and contacts of one island in arrays, for one step: inertia, arms and directions stay those of

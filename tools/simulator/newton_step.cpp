@@ -29,6 +29,7 @@ class NewtonStep {
   IslandResidual write(IslandProblem& problem) {
     problem.velocity = std::move(end_);
     problem.impulse = std::move(impulse_.contact);
+    for (std::size_t i = 0; i < problem.pairs.size(); ++i) problem.pairs[i].impulse = impulse_.turning[i];
     for (std::size_t j = 1; j < mean_.size(); ++j) problem.displacement[j] = input_.dt * mean_[j];
     return residual_of(problem, target_, options_.friction, 1);
   }
@@ -58,7 +59,9 @@ class NewtonStep {
       const double gap = std::max(0.0, problem_.separation[i]);
       goal.target.push_back(problem_.rebound[i] > 0 ? problem_.rebound[i] : -gap / input_.dt);
     }
-    take_impulses(goal, {problem_.impulse, std::vector<Vector3d>(problem_.pairs.size(), Vector3d::Zero())});
+    IslandImpulses before = {problem_.impulse, {}};
+    for (const TouchingPair& pair : problem_.pairs) before.turning.push_back(pair.impulse);
+    take_impulses(goal, before);
     return goal;
   }
 

@@ -167,7 +167,7 @@ Trajectory read_trajectory(const Hdf5Input& file, const std::string& path, std::
 
 void write_state(Hdf5Output& file, const SimulatorState& state) {
   std::vector<double> position, orientation, velocity, spin, in_a, in_b, normal_in_a, depth, normal,
-      tangential;
+      tangential, turning;
   for (const BodyState& body : state.states) {
     append(position, body.position), append(orientation, body.orientation);
     append(velocity, body.velocity), append(spin, body.angular_velocity);
@@ -180,6 +180,7 @@ void write_state(Hdf5Output& file, const SimulatorState& state) {
     append(in_a, entry.in_a), append(in_b, entry.in_b), append(normal_in_a, entry.normal_in_a);
     depth.push_back(entry.depth), lost.push_back(entry.lost);
     normal.push_back(entry.impulse.normal), append(tangential, entry.impulse.tangential);
+    append(turning, entry.impulse.turning);
   }
   const std::size_t bodies = state.states.size(), impulses = state.impulses.size();
   const std::vector<std::uint64_t> step = {state.step};
@@ -199,6 +200,7 @@ void write_state(Hdf5Output& file, const SimulatorState& state) {
   file.add("/state/impulses/lost", {impulses}, lost);
   file.add("/state/impulses/normal", {impulses}, normal);
   file.add("/state/impulses/tangential", {impulses, 3}, tangential);
+  file.add("/state/impulses/turning", {impulses, 3}, turning);
 }
 
 std::vector<CachedImpulse> read_impulses(const Hdf5Input& file, const std::string& path) {
@@ -210,9 +212,11 @@ std::vector<CachedImpulse> read_impulses(const Hdf5Input& file, const std::strin
   const auto lost = file.read_u32("/state/impulses/lost");
   const auto depth = file.read_f64("/state/impulses/depth"), normal = file.read_f64("/state/impulses/normal");
   const auto tangential = file.read_f64("/state/impulses/tangential", {3});
+  const auto turning = file.read_f64("/state/impulses/turning", {3});
   const std::size_t count = feature.size();
   for (const std::size_t rows : {pair.size() / 2, in_a.size() / 3, in_b.size() / 3, normal_in_a.size() / 3,
-                                 depth.size(), lost.size(), normal.size(), tangential.size() / 3}) {
+                                 depth.size(), lost.size(), normal.size(), tangential.size() / 3,
+                                 turning.size() / 3}) {
     if (rows != count) throw FileError(path + ": /state/impulses: datasets of different lengths");
   }
   std::vector<CachedImpulse> impulses;
@@ -225,7 +229,7 @@ std::vector<CachedImpulse> read_impulses(const Hdf5Input& file, const std::strin
                         vector_at(normal_in_a, i),
                         depth[i],
                         lost[i],
-                        {normal[i], vector_at(tangential, i)}});
+                        {normal[i], vector_at(tangential, i), vector_at(turning, i)}});
   }
   return impulses;
 }

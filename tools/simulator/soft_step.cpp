@@ -49,7 +49,7 @@ class SoftStep {
         for (std::size_t i = 0; i < contacts; ++i) relax(i, (k + 1) * h_);
       }
       for (std::size_t i = 0; i < contacts; ++i) visit_friction(i);
-      for (std::size_t i = 0; i < p_.pairs.size(); ++i) visit_turning(i);
+      for (TouchingPair& pair : p_.pairs) visit_turning(pair);
       for (std::size_t j = 1; j < bodies; ++j) pushed_[j] = p_.velocity[j] - start[j];
     }
     constexpr int kRestitutionSweeps = 10;
@@ -57,6 +57,7 @@ class SoftStep {
       for (std::size_t i = 0; i < contacts; ++i) restitute(i);
     }
     for (Vector3d& impulse : p_.impulse) impulse *= substeps_;
+    for (TouchingPair& pair : p_.pairs) pair.impulse *= substeps_;
   }
 
   // Condition: solve() was called.
@@ -74,7 +75,6 @@ class SoftStep {
     normal_mass_.resize(contacts), friction_mass_.resize(contacts);
     followed_ = p_.separation;
     strongest_.assign(contacts, 0);
-    turning_.assign(p_.pairs.size(), Vector3d::Zero());
     pushed_.assign(p_.bodies.size(), Vector6::Zero());
     for (std::size_t i = 0; i < contacts; ++i) {
       normal_mass_[i] = 1 / p_.normal[i].mobility();
@@ -82,6 +82,11 @@ class SoftStep {
       p_.impulse[i] /= substeps_;
       pushed_[p_.a[i]] += p_.change_of_a(i, p_.impulse[i]);
       pushed_[p_.b[i]] += p_.change_of_b(i, p_.impulse[i]);
+    }
+    for (TouchingPair& pair : p_.pairs) {
+      pair.impulse /= substeps_;
+      pushed_[p_.a[pair.begin]] += pair.change_of_a(pair.impulse);
+      pushed_[p_.b[pair.begin]] += pair.change_of_b(pair.impulse);
     }
   }
 
@@ -149,18 +154,18 @@ class SoftStep {
     impulse.y() = next1, impulse.z() = next2;
   }
 
-  void visit_turning(std::size_t i) {
-    const TouchingPair& pair = p_.pairs[i];
+  void visit_turning(TouchingPair& pair) {
     double push = 0;
     for (std::uint32_t contact = pair.begin; contact < pair.end; ++contact) push += p_.impulse[contact].x();
     const double bound = rolling_resistance_ * push;
     const Vector3d turning = p_.turning(pair, p_.velocity) + pair.drive;
-    Vector3d next = turning_[i] - turning / pair.mobility;
+    Vector3d next = pair.impulse - turning / pair.mobility;
     const double size = next.norm();
     if (size > bound) next *= bound / size;
-    const Vector3d change = next - turning_[i];
-    for (int k = 0; k < 3; ++k) add(pair.turn[k], pair.begin, change[k]);
-    turning_[i] = next;
+    const Vector3d change = next - pair.impulse;
+    p_.velocity[p_.a[pair.begin]] += pair.change_of_a(change);
+    p_.velocity[p_.b[pair.begin]] += pair.change_of_b(change);
+    pair.impulse = next;
   }
 
   bool is_rebound(std::size_t i) const { return p_.rebound[i] > 0 && strongest_[i] > 0; }
@@ -181,7 +186,6 @@ class SoftStep {
   std::vector<double> normal_mass_, friction_mass_;
   std::vector<double> followed_;   // separations as they change
   std::vector<double> opposed_;    // by how much depth the push is less
-  std::vector<Vector3d> turning_;  // impulses of the pairs against turning
   std::vector<double> strongest_;  // largest impulse along the normal
   std::vector<Vector6> pushed_;    // what the contacts of a substep have added to the velocities
 };

@@ -52,8 +52,10 @@ struct CurveMeasure {
   double length = 0;
   bool point = false;  ///< all pieces are points, as nearly as it can be told: the ends of one may differ
   bool closed = true;
-  Vector3 sheet_normal;  ///< of the pieces' triangles, from a towards b, times lengths, where it is not
-                         ///< closed; of open surfaces where there are any
+  bool by_area = true;   ///< the area says where the normal is: the curve is closed, and not so small that
+                         ///< rounding of its points decides
+  Vector3 sheet_normal;  ///< of the pieces' triangles, from a towards b, times lengths, where the area does
+                         ///< not say it; of open surfaces where there are any
   std::uint64_t key = 0;
 };
 

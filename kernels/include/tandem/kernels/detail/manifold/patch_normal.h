@@ -110,11 +110,14 @@ TANDEM_HD CurveMeasure NormalFinder<Team>::measure() {
   out.area = sums.area.value(unit * unit);
   out.length = sums.length.value(unit);
   const double of_points = bodies_.tolerance() * (end_ - begin_);
-  out.point = out.length <= of_points && norm(out.area) <= of_points * unit;  // polygons have area alone
+  const bool rounding = norm(out.area) <= of_points * unit;
+  out.point = out.length <= of_points && rounding;  // polygons have area alone
   out.closed = !(may_be_free && has_free_end()) && norm(sums.gap.value(unit)) <= kClosed * out.length;
   out.middle =
       summary_.origin + (out.length > 0 ? (unit / out.length) * sums.middle.value(unit) : plain_middle());
-  if (!out.closed) out.sheet_normal = sheet_normal();
+  out.by_area = out.closed && !rounding;
+  if (!out.by_area) out.sheet_normal = sheet_normal();
+  out.by_area = out.by_area || (out.closed && !(norm(out.sheet_normal) > kNoArea * out.length));
   return out;
 }
 
@@ -479,7 +482,7 @@ TANDEM_HD PatchNormal NormalFinder<Team>::find(const CurveMeasure& curve) {
   // Points may hide a patch that is smaller than rounding.
   out.touch = false;
   out.known = true;
-  out.n = face_nearest(normalized(curve.closed ? curve.area : curve.sheet_normal), curve.length);
+  out.n = face_nearest(normalized(curve.by_area ? curve.area : curve.sheet_normal), curve.length);
   return out;
 }
 

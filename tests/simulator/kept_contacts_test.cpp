@@ -92,6 +92,35 @@ TEST(KeptContacts, AContactIsKeptDownToTheSlop) {
   EXPECT_NEAR(kept.contacts[0].depth, 0.0005, 1e-15);
 }
 
+TEST(Jumps, OfWhatIsFoundDeeperThanBodiesMovedATenthCounts) {
+  Pair pair;
+  pair.remember({pair.contact}, 3);
+  pair.states[1].position.z() -= 0.0001;
+  const auto depth_of = [&](double depth, const Vector3d& position, const Vector3d& normal) {
+    ContactPoint found = pair.contact;
+    found.feature = 8;
+    found.depth = depth, found.position = position, found.normal = normal;
+    return pair.cache.without_jumps(std::vector{found}, pair.bodies, pair.states)[0].depth;
+  };
+  const Vector3d there = pair.contact.position, up = Vector3d::UnitZ();
+  EXPECT_NEAR(depth_of(0.0022, there, up), 0.0012 + 0.1 * 0.001, 1e-15);  // 0.001, and twice what it moved
+  EXPECT_NEAR(depth_of(0.0012, there, up), 0.0012, 1e-15);
+  EXPECT_EQ(depth_of(0.0003, there, up), 0.0003);
+  EXPECT_NEAR(depth_of(0.0022, there + Vector3d(0.017, 0, 0), up), 0.0013, 1e-15);
+  EXPECT_EQ(depth_of(0.0022, there + Vector3d(0.018, 0, 0), up), 0.0022);  // elsewhere
+  EXPECT_EQ(depth_of(0.0022, there, Vector3d::UnitX()), 0.0022);           // pushes elsewhere
+}
+
+TEST(Jumps, AnotherPairOrTheFirstContactOfOneCountsAtOnce) {
+  Pair pair;
+  EXPECT_EQ(pair.cache.without_jumps(std::vector{pair.contact}, pair.bodies, pair.states)[0].depth, 0.001);
+  pair.bodies.push_back(pair.bodies[0]), pair.states.push_back(pair.states[0]);
+  pair.remember({pair.contact}, 3);
+  ContactPoint other = pair.contact;
+  other.body_b = 2, other.depth = 1;
+  EXPECT_EQ(pair.cache.without_jumps(std::vector{other}, pair.bodies, pair.states)[0].depth, 1);
+}
+
 TEST(KeptContacts, AContactThatIsFoundTakesTheKeptOnesPlace) {
   Pair pair;
   pair.remember({pair.contact}, 3);

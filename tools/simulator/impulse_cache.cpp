@@ -8,6 +8,8 @@ namespace {
 
 using Eigen::Vector3d;
 
+constexpr double kNear = 0.02;  // contacts so near each other are one, by the smaller body's radius
+
 template <typename Contact>
 std::pair<std::uint32_t, std::uint32_t> pair_of(const Contact& contact) {
   return {contact.body_a, contact.body_b};
@@ -30,11 +32,15 @@ ContactPoint moved_with_bodies(const CachedImpulse& entry, std::span<const BodyS
           entry.feature};
 }
 
-// How far the bodies have carried its two sides apart across the normal.
+// How far the bodies have carried its two sides apart.
+Vector3d apart(const CachedImpulse& entry, std::span<const BodyState> states) {
+  return into_world(states[entry.body_b], entry.in_b) - into_world(states[entry.body_a], entry.in_a);
+}
+
+// The same across the normal.
 double across(const CachedImpulse& entry, const ContactPoint& moved, std::span<const BodyState> states) {
-  const Vector3d apart =
-      into_world(states[entry.body_b], entry.in_b) - into_world(states[entry.body_a], entry.in_a);
-  return (apart - moved.normal.dot(apart) * moved.normal).norm();
+  const Vector3d by = apart(entry, states);
+  return (by - moved.normal.dot(by) * moved.normal).norm();
 }
 
 // The contacts of one pair of bodies, old and new.
@@ -120,12 +126,44 @@ std::vector<ContactImpulse> ImpulseCache::match(std::span<const ContactPoint> co
   return impulses;
 }
 
+std::vector<ContactPoint> ImpulseCache::without_jumps(std::span<const ContactPoint> contacts,
+                                                      std::span<const BodyProperties> bodies,
+                                                      std::span<const BodyState> states) const {
+  constexpr double kCounts = 0.1, kSameWay = 0.7;
+  std::vector<ContactPoint> all(contacts.begin(), contacts.end());
+  std::vector<ContactPoint> known;
+  std::vector<double> moved;
+  std::size_t old = 0;
+  for (std::size_t begin = 0, end = 0; begin < all.size(); begin = end) {
+    const auto pair = pair_of(all[begin]);
+    while (end < all.size() && pair_of(all[end]) == pair) ++end;
+    while (old < entries_.size() && pair_of(entries_[old]) < pair) ++old;
+    known.clear(), moved.clear();
+    for (; old < entries_.size() && pair_of(entries_[old]) == pair; ++old) {
+      known.push_back(moved_with_bodies(entries_[old], states));
+      moved.push_back(apart(entries_[old], states).norm());
+    }
+    const double near = kNear * std::min(bodies[pair.first].radius, bodies[pair.second].radius);
+    for (std::size_t i = begin; i < end; ++i) {
+      std::size_t deepest = known.size();
+      for (std::size_t k = 0; k < known.size(); ++k) {
+        const bool is_there = (known[k].position - all[i].position).norm() <= near &&
+                              known[k].normal.dot(all[i].normal) >= kSameWay;
+        if (is_there && (deepest == known.size() || known[k].depth > known[deepest].depth)) deepest = k;
+      }
+      if (deepest == known.size()) continue;
+      const double explained = std::max(known[deepest].depth, 0.0) + moved[deepest];
+      if (all[i].depth > explained) all[i].depth = explained + kCounts * (all[i].depth - explained);
+    }
+  }
+  return all;
+}
+
 KeptContacts ImpulseCache::with_those_just_lost(std::span<const ContactPoint> contacts,
                                                 std::span<const BodyProperties> bodies,
                                                 std::span<const BodyState> states,
                                                 std::span<const std::uint8_t> idle, double gap,
                                                 double slop) const {
-  constexpr double kNear = 0.02;      // of the smaller body's radius
   constexpr std::uint32_t kLife = 8;  // steps; boxes side by side would keep all that ever touched
   KeptContacts all;
   auto next = contacts.begin();

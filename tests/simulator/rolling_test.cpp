@@ -88,8 +88,8 @@ TEST_P(Rolling, ABallThatSpinsOnTheSpotStopsAfterTheTimeOfTheClosedForm) {
 
 TEST_P(Rolling, ATableThatTurnsTakesABallAlong) {
   constexpr double kSpin = 0.3;
-  Simulator simulator = ball(0, 0.02, Vector3d::Zero(), Vector3d::Zero(), Motion::kinematic,
-                             kSpin * Vector3d::UnitZ());
+  Simulator simulator =
+      ball(0, 0.02, Vector3d::Zero(), Vector3d::Zero(), Motion::kinematic, kSpin * Vector3d::UnitZ());
   const BodyState& end = after(simulator, 2);
   EXPECT_NEAR(end.angular_velocity.z(), kSpin, 1e-6);
 }

@@ -301,8 +301,9 @@ void add_solver_options(CLI::App& command, SimulateArguments& arguments) {
       ->check(between(0, 1e6))
       ->option_text("S [1/4000 of the first mesh's diagonal]");
   command
-      .add_option("--rolling-resistance", arguments.rolling_resistance,
-                  "lever at which the force between two bodies resists that they turn, in metres; not by sweeps")
+      .add_option(
+          "--rolling-resistance", arguments.rolling_resistance,
+          "lever at which the force between two bodies resists that they turn, in metres; not by sweeps")
       ->check(between(0, 1e6))
       ->option_text("L [8 times the slop]");
   command

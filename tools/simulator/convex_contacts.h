@@ -14,11 +14,11 @@ struct IslandImpulses {
 
 /// What the least of the convex function depends on beside the rows.
 struct ConvexGoal {
-  std::vector<Vector6> free;           ///< y*: velocities without contacts
-  std::vector<double> target;          ///< of w along the normal
-  IslandImpulses impulse;              ///< l
-  std::vector<double> bound;           ///< of friction
-  std::vector<double> turning_bound;   ///< of what resists turning
+  std::vector<Vector6> free;          ///< y*: velocities without contacts
+  std::vector<double> target;         ///< of w along the normal
+  IslandImpulses impulse;             ///< l
+  std::vector<double> bound;          ///< of friction
+  std::vector<double> turning_bound;  ///< of what resists turning
 };
 
 /// Velocities y of an island that make the strictly convex function

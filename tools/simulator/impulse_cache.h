@@ -47,16 +47,16 @@ class ImpulseCache {
   /// The impulse to start each contact with: that of the last step's contact between the same bodies with the
   /// same feature, or else of the nearest one that is within a tenth of the smaller body's radius; each is
   /// given once. What then is left of a pair's normal impulse and of what resists turning is shared out among
-  /// its contacts that found none, so that a pair pushes as it did although its points have changed. Condition: both lists come by
-  /// ascending pair.
+  /// its contacts that found none, so that a pair pushes as it did although its points have changed.
+  /// Condition: both lists come by ascending pair.
   std::vector<ContactImpulse> match(std::span<const ContactPoint> contacts,
                                     std::span<const BodyProperties> bodies,
                                     std::span<const BodyState> states) const;
 
   /// The contacts, but where one lies near a remembered one and pushes nearly the same way it is deeper than
   /// that has become by no more than how far the bodies have moved there, and by a tenth of what it was found
-  /// deeper still. Depths of meshes jump where other triangles meet although the bodies hardly moved, and what
-  /// rests would be shaken by each jump. Conditions as for match().
+  /// deeper still. Depths of meshes jump where other triangles meet although the bodies hardly moved, and
+  /// what rests would be shaken by each jump. Conditions as for match().
   std::vector<ContactPoint> without_jumps(std::span<const ContactPoint> contacts,
                                           std::span<const BodyProperties> bodies,
                                           std::span<const BodyState> states) const;

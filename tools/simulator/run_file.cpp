@@ -214,9 +214,9 @@ std::vector<CachedImpulse> read_impulses(const Hdf5Input& file, const std::strin
   const auto tangential = file.read_f64("/state/impulses/tangential", {3});
   const auto turning = file.read_f64("/state/impulses/turning", {3});
   const std::size_t count = feature.size();
-  for (const std::size_t rows : {pair.size() / 2, in_a.size() / 3, in_b.size() / 3, normal_in_a.size() / 3,
-                                 depth.size(), lost.size(), normal.size(), tangential.size() / 3,
-                                 turning.size() / 3}) {
+  for (const std::size_t rows :
+       {pair.size() / 2, in_a.size() / 3, in_b.size() / 3, normal_in_a.size() / 3, depth.size(), lost.size(),
+        normal.size(), tangential.size() / 3, turning.size() / 3}) {
     if (rows != count) throw FileError(path + ": /state/impulses: datasets of different lengths");
   }
   std::vector<CachedImpulse> impulses;

@@ -257,6 +257,59 @@ TEST(SolidOnSolid, APointIsATouch) {
   EXPECT_LT(angle_between(vector_of(scene.manifolds()[0].normal), {1, 0, 0}), 1e-6);
 }
 
+/// A lies a micrometre in b, by one vertex whose triangles reach three centimetres further. (Found in a heap:
+/// the line through the corner of one met the other's body, and the depth was 0.3 m.)
+TEST(SolidOnSolid, ACornerBeyondThePatchIsNoPartOfIt) {
+  ManifoldScene scene;
+  const std::uint32_t shape = scene.add_shape(project_mesh("cow.obj"));
+  scene.add_body(shape, {{{0x1.5d60811fb6600p-8, -0x1.8ab0359f841fep-3, -0x1.f66506e122a16p-1},
+                          {0x1.f304ef699c810p-1, -0x1.bf7937995ca50p-3, 0x1.8aeb92e83c450p-5},
+                          {-0x1.ca1b18163e76ap-3, -0x1.e9c9fd6aaff71p-1, 0x1.7e4bd94218e40p-3}},
+                         {0x1.7bde1d4e616bfp+1, -0x1.72329a602722bp+2, -0x1.dff89dd82bbd0p-6}});
+  scene.add_body(shape, {{{0x1.ff8aeaf705513p-1, 0x1.33163f335f116p-8, 0x1.580ad57e45a27p-5},
+                          {0x1.37526766bcd66p-8, -0x1.fffe62a81157ep-1, -0x1.793b2fe9ff023p-10},
+                          {0x1.57fb9ba85ccedp-5, 0x1.ad31695d67d41p-10, -0x1.ff8c38e35c1e2p-1}},
+                         {0x1.e0b26104a9f69p+0, -0x1.9c511fd9a711bp+2, 0x1.192c3c7bf11c6p+0}});
+  scene.find();
+  ASSERT_EQ(scene.manifolds().size(), 1u);
+  EXPECT_NEAR(scene.manifolds()[0].depth, 0.00046, 0.00001);
+}
+
+/// Bodies of many bulges and hollows that come together until they overlap by less than a millimetre.
+TEST(SolidOnSolid, CowsThatHardlyMeetAreNotDeep) {
+  RandomPoses random(9);
+  for (const char* name : {"cow_1500.obj", "cow.obj"}) {
+    ManifoldScene scene;
+    const std::uint32_t shape = scene.add_shape(project_mesh(name));
+    scene.add_body(shape, kIdentityPose);
+    scene.add_body(shape, kIdentityPose);
+    double deepest = 0;
+    for (int trial = 0; trial < trials(400, 20); ++trial) {
+      SCOPED_TRACE(std::string(name) + " " + std::to_string(trial));
+      const Pose first = any_motion(random, 0), second = any_motion(random, 0);
+      const double x = random.symmetric(1), y = random.symmetric(1);
+      const auto meets_at = [&](double height) {
+        scene.bodies[0].pose = first;
+        scene.bodies[1].pose = after(shift(x, y, height), second);
+        scene.find();
+        return !scene.query.contacts().empty();
+      };
+      double apart = 2.5, met = apart;
+      while (met > -2.5 && !meets_at(met)) apart = met, met -= 0.05;
+      if (met <= -2.5) continue;
+      while (apart - met > 0.0005) {
+        const double middle = (apart + met) / 2;
+        (meets_at(middle) ? met : apart) = middle;
+      }
+      ASSERT_TRUE(meets_at(met));
+      for (const Manifold& m : scene.manifolds()) deepest = std::max(deepest, m.depth);
+      for (const Manifold& m : scene.manifolds()) EXPECT_LT(m.depth, 0.01);
+    }
+    RecordProperty("deepest", std::to_string(deepest));
+    std::printf("%s: %.5f m deep at most\n", name, deepest);
+  }
+}
+
 TEST(SolidOnSolid, FacesThatMeetHaveTheAreaThatTheyShare) {
   RandomPoses random(2);
   const std::vector<NamedMesh> prisms = {{"box", box(1, 0.75f, 0.5f)},

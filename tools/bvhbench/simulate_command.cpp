@@ -225,7 +225,7 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
   options.gravity = {0, 0, -arguments.gravity};
   options.solver.slop = slop_of(arguments, start);
   options.solver.rolling_resistance =
-      arguments.rolling_resistance >= 0 ? arguments.rolling_resistance : 8 * options.solver.slop;
+      arguments.rolling_resistance >= 0 ? arguments.rolling_resistance : 16 * options.solver.slop;
   options.solver.warm_start = !arguments.cold;
   options.solver.seed = arguments.seed;
   if (options.solver.substeps == 0) options.solver.substeps = default_substeps(options.solver.kind);
@@ -305,7 +305,7 @@ void add_solver_options(CLI::App& command, SimulateArguments& arguments) {
           "--rolling-resistance", arguments.rolling_resistance,
           "lever at which the force between two bodies resists that they turn, in metres; not by sweeps")
       ->check(between(0, 1e6))
-      ->option_text("L [8 times the slop]");
+      ->option_text("L [16 times the slop]");
   command
       .add_option("--correction", solver.correction,
                   "part of the penetration beyond the slop that a step corrects")

@@ -128,7 +128,7 @@ std::vector<ContactImpulse> ImpulseCache::match(std::span<const ContactPoint> co
 
 std::vector<ContactPoint> ImpulseCache::without_jumps(std::span<const ContactPoint> contacts,
                                                       std::span<const BodyProperties> bodies,
-                                                      std::span<const BodyState> states) const {
+                                                      std::span<const BodyState> states, double dt) const {
   constexpr double kCounts = 0.1, kSameWay = 0.7;
   std::vector<ContactPoint> all(contacts.begin(), contacts.end());
   std::vector<ContactPoint> known;
@@ -143,6 +143,10 @@ std::vector<ContactPoint> ImpulseCache::without_jumps(std::span<const ContactPoi
       known.push_back(moved_with_bodies(entries_[old], states));
       moved.push_back(apart(entries_[old], states).norm());
     }
+    const BodyState &a = states[pair.first], &b = states[pair.second];
+    const double by_speed =
+        dt * ((b.velocity - a.velocity).norm() + a.angular_velocity.norm() * bodies[pair.first].radius +
+              b.angular_velocity.norm() * bodies[pair.second].radius);
     const double near = kNear * std::min(bodies[pair.first].radius, bodies[pair.second].radius);
     for (std::size_t i = begin; i < end; ++i) {
       std::size_t deepest = known.size();
@@ -152,7 +156,7 @@ std::vector<ContactPoint> ImpulseCache::without_jumps(std::span<const ContactPoi
         if (is_there && (deepest == known.size() || known[k].depth > known[deepest].depth)) deepest = k;
       }
       if (deepest == known.size()) continue;
-      const double explained = std::max(known[deepest].depth, 0.0) + moved[deepest];
+      const double explained = std::max(known[deepest].depth, 0.0) + moved[deepest] + by_speed;
       if (all[i].depth > explained) all[i].depth = explained + kCounts * (all[i].depth - explained);
     }
   }
@@ -164,6 +168,7 @@ KeptContacts ImpulseCache::with_those_just_lost(std::span<const ContactPoint> co
                                                 std::span<const BodyState> states,
                                                 std::span<const std::uint8_t> idle, double gap,
                                                 double slop) const {
+  constexpr double kHair = 0.1;
   constexpr std::uint32_t kLife = 8;  // steps; boxes side by side would keep all that ever touched
   KeptContacts all;
   auto next = contacts.begin();
@@ -178,7 +183,8 @@ KeptContacts ImpulseCache::with_those_just_lost(std::span<const ContactPoint> co
     for (std::size_t i = begin; i < end; ++i) {
       if (entries_[i].lost >= kLife) continue;
       const ContactPoint moved = moved_with_bodies(entries_[i], states);
-      if (moved.depth > slop || moved.depth < -gap || across(entries_[i], moved, states) > near) continue;
+      if (moved.depth > kHair * slop || moved.depth < -gap || across(entries_[i], moved, states) > near)
+        continue;
       const auto is_near = [&](const ContactPoint& one) {
         return (one.position - moved.position).norm() <= near;
       };

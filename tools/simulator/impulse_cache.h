@@ -54,19 +54,19 @@ class ImpulseCache {
                                     std::span<const BodyState> states) const;
 
   /// The contacts, but where one lies near a remembered one and pushes nearly the same way it is deeper than
-  /// that has become by no more than how far the bodies have moved there, and by a tenth of what it was found
-  /// deeper still. Depths of meshes jump where other triangles meet although the bodies hardly moved, and
-  /// what rests would be shaken by each jump. Conditions as for match().
+  /// that has become by no more than how far the bodies' points have moved in a step of length dt, and by a
+  /// tenth of what it was found deeper still. Depths of meshes jump where other triangles meet although the
+  /// bodies hardly moved, and what rests would be shaken by each jump. Conditions as for match().
   std::vector<ContactPoint> without_jumps(std::span<const ContactPoint> contacts,
                                           std::span<const BodyProperties> bodies,
-                                          std::span<const BodyState> states) const;
+                                          std::span<const BodyState> states, double dt) const;
 
   /// The contacts, and with them those remembered that are not among them because their bodies have come
   /// apart a little since they were found: by no more than `gap` along the normal and a fiftieth of the
   /// smaller body's radius across it, and no other contact of the pair is that near; and for no more than
   /// eight steps since they pushed. Without them a body that is lifted off by a hair falls freely for a whole
-  /// step, and deeper than it was. They are mostly gaps, of negative depth, but stay while they are no deeper
-  /// than the slop: such contacts close without being found, by rounding or by a vertex a little beside. By
+  /// step, and deeper than it was. They are gaps, of negative depth, but stay while they are no deeper than a
+  /// tenth of the slop: a gap may close without being found, by rounding or by a vertex a little beside. By
   /// ascending pair. Pairs of two idle bodies are left out. Conditions as for match() and remember(); gap and
   /// slop >= 0.
   KeptContacts with_those_just_lost(std::span<const ContactPoint> contacts,

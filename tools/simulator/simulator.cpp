@@ -75,8 +75,8 @@ void Simulator::find_contacts(StepRecord& record) {
     record.penetration_mean += contact.depth / static_cast<double>(found.size());
   }
   const double gap = kFall * options_.gravity.norm() * options_.dt * options_.dt;
-  kept_ = cache_.with_those_just_lost(cache_.without_jumps(found, bodies_, states_), bodies_, states_, idle(),
-                                      gap, options_.solver.slop);
+  kept_ = cache_.with_those_just_lost(cache_.without_jumps(found, bodies_, states_, options_.dt), bodies_,
+                                      states_, idle(), gap, options_.solver.slop);
 }
 
 void Simulator::solve(StepRecord& record) {

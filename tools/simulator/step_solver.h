@@ -32,7 +32,7 @@ struct SolverOptions {
   double friction = 0.5;
   double restitution = 0;
   double slop = 5e-4;                ///< penetration that is left alone, a length
-  double rolling_resistance = 4e-3;  ///< a length: a pair of bodies resists turning against each other by up
+  double rolling_resistance = 8e-3;  ///< a length: a pair of bodies resists turning against each other by up
                                      ///< to this times the force that pushes them apart; not of sweeps
   bool warm_start = true;
 

@@ -310,6 +310,30 @@ TEST(SolidOnSolid, CowsThatHardlyMeetAreNotDeep) {
   }
 }
 
+/// The corner of a box that has come out of a thin plate on the far side: it is as deep as it has to go back.
+TEST(SolidOnSolid, ACornerThroughAThinPlateIsDeepByAllOfIt) {
+  RandomPoses random(10);
+  ManifoldScene scene;
+  scene.add_body(scene.add_shape(box(4, 4, 0.01f)), kIdentityPose);
+  const Mesh solid = box(1, 0.75f, 0.5f);
+  scene.add_body(scene.add_shape(solid), kIdentityPose);
+  for (int trial = 0; trial < trials(300, 20); ++trial) {
+    SCOPED_TRACE(trial);
+    const Pose pose = any_motion(random, 0);
+    const double lowest = -reach_along(triangles_of(solid, pose), {0, 0, -1});
+    const double depth = random.uniform(0.011, 0.05);
+    scene.bodies[1].pose = after(shift(0, 0, 0.005 - depth - lowest), pose);
+    const Pose motion = any_motion(random, 3);
+    scene.find(motion);
+    double deepest = 0;
+    for (const Manifold& m : scene.manifolds()) {
+      if (angle_between(vector_of(m.normal), rotate(motion, {0, 0, 1})) < kDegree)
+        deepest = std::max(deepest, m.depth);
+    }
+    EXPECT_NEAR(deepest, depth, 0.05 * depth);
+  }
+}
+
 TEST(SolidOnSolid, FacesThatMeetHaveTheAreaThatTheyShare) {
   RandomPoses random(2);
   const std::vector<NamedMesh> prisms = {{"box", box(1, 0.75f, 0.5f)},

@@ -311,9 +311,10 @@ TANDEM_HD void ManifoldMaker<Team>::sound_deepest(bool few, DepthMemory& shared)
 
 /// Looks whether lines that seem to overlap run within both bodies: where there are several curves, one may
 /// bound a hole, or one body may go through the other; and where the overlap is large beside the rim, the
-/// surfaces that the line found may not belong to the patch. A line through a vertex may touch its body there
-/// alone, so whether it runs on within that body is not asked: a vertex that is not within the other body is
-/// no part of the overlap, as where links of a chain hang in each other, or where the triangle of a corner
+/// surfaces that the line found may not belong to the patch. A vertex is part of its own body, which the line
+/// may touch there alone: that counts only where the vertex is not within the other body, and so its own may
+/// end before the other begins, as where links of a chain hang in each other. Where there is one curve,
+/// nothing goes through: then such a vertex is no part of the overlap, as the corner of a triangle that
 /// reaches far beyond the patch.
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::look_behind(DepthMemory& shared) {
@@ -337,10 +338,11 @@ TANDEM_HD void ManifoldMaker<Team>::look_behind(DepthMemory& shared) {
   for (std::uint32_t i = team_.rank(); i < count; i += team_.size()) {
     if (shared.line[i].side < 0) continue;
     Sounding& s = state_.sounding[i / 2];
-    if (s.vertex_of < 0)
-      s.behind[i % 2] = shared.line[i].best;
-    else if (static_cast<int>(i % 2) != s.vertex_of && shared.line[i].best.found())
+    const bool of_vertex = s.vertex_of >= 0, own_vertex = static_cast<int>(i % 2) == s.vertex_of;
+    if (of_vertex && !own_vertex && !several && shared.line[i].best.found())
       s.surface[i % 2] = {};
+    else if (!own_vertex || shared.line[i ^ 1u].best.found())
+      s.behind[i % 2] = shared.line[i].best;
   }
   team_.sync();
 }

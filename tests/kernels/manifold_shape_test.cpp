@@ -257,8 +257,8 @@ TEST(SolidOnSolid, APointIsATouch) {
   EXPECT_LT(angle_between(vector_of(scene.manifolds()[0].normal), {1, 0, 0}), 1e-6);
 }
 
-/// A lies a micrometre in b, by one vertex whose triangles reach three centimetres further. (Found in a heap:
-/// the line through the corner of one met the other's body, and the depth was 0.3 m.)
+/// Cows half a millimetre in each other, whose triangles there reach three centimetres further. (Found in a
+/// heap: the line through the corner of one met the other's body, and the depth was 0.3 m.)
 TEST(SolidOnSolid, ACornerBeyondThePatchIsNoPartOfIt) {
   ManifoldScene scene;
   const std::uint32_t shape = scene.add_shape(project_mesh("cow.obj"));

@@ -14,11 +14,11 @@ class MeshContactFinder : public ContactFinder {
     generator_.set_shapes(shapes);
   }
 
-  const std::vector<ContactPoint>& find(std::span<const BodyPose> bodies,
-                                        std::span<const std::uint8_t> idle) override {
+  const std::vector<ContactPoint>& find(std::span<const BodyPose> bodies, std::span<const std::uint8_t> idle,
+                                        std::span<const BodyPair> unmoved) override {
     engine_->find(bodies, idle, found_);
     const auto start = std::chrono::steady_clock::now();
-    const std::vector<ContactPoint>& points = generator_.generate(found_, bodies, options_);
+    const std::vector<ContactPoint>& points = generator_.generate(found_, bodies, unmoved, options_);
     const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
     report_ = {engine_->times(), taken.count(), engine_->counters(), generator_.statistics()};
     return points;

@@ -22,10 +22,12 @@ class ContactFinder {
  public:
   virtual ~ContactFinder() = default;
 
-  /// The contacts of bodies that stand like this, by ascending pair of bodies; pairs of two idle ones may be
-  /// left out. Valid until the next call. Condition: idle is empty or has an entry for each body.
+  /// The contacts of bodies that stand like this, by ascending pair of bodies; pairs of two idle ones and
+  /// those of `unmoved` may be left out. Valid until the next call. Conditions: idle is empty or has an entry
+  /// for each body; unmoved is ascending.
   virtual const std::vector<ContactPoint>& find(std::span<const BodyPose> bodies,
-                                                std::span<const std::uint8_t> idle) = 0;
+                                                std::span<const std::uint8_t> idle,
+                                                std::span<const BodyPair> unmoved) = 0;
 
   /// Of the last call.
   const FinderReport& report() const { return report_; }

@@ -165,24 +165,40 @@ Trajectory read_trajectory(const Hdf5Input& file, const std::string& path, std::
   return trajectory;
 }
 
+void write_contacts(Hdf5Output& file, std::span<const CachedContact> contacts) {
+  std::vector<double> in_a, in_b, normal_in_a, depth, translation, rotation, normal, tangential, turning;
+  std::vector<std::uint32_t> pair;
+  std::vector<std::uint64_t> feature;
+  for (const CachedContact& contact : contacts) {
+    pair.insert(pair.end(), {contact.body_a, contact.body_b});
+    feature.push_back(contact.feature);
+    append(in_a, contact.in_a), append(in_b, contact.in_b), append(normal_in_a, contact.normal_in_a);
+    depth.push_back(contact.depth);
+    append(translation, contact.found_at.translation), append(rotation, contact.found_at.rotation);
+    normal.push_back(contact.impulse.normal), append(tangential, contact.impulse.tangential);
+    append(turning, contact.impulse.turning);
+  }
+  const std::size_t count = contacts.size();
+  file.add("/state/contacts/pair", {count, 2}, pair);
+  file.add("/state/contacts/feature", {count}, feature);
+  file.add("/state/contacts/in_a", {count, 3}, in_a);
+  file.add("/state/contacts/in_b", {count, 3}, in_b);
+  file.add("/state/contacts/normal_in_a", {count, 3}, normal_in_a);
+  file.add("/state/contacts/depth", {count}, depth);
+  file.add("/state/contacts/found_at_translation", {count, 3}, translation);
+  file.add("/state/contacts/found_at_rotation", {count, 4}, rotation);
+  file.add("/state/contacts/normal_impulse", {count}, normal);
+  file.add("/state/contacts/tangential_impulse", {count, 3}, tangential);
+  file.add("/state/contacts/turning_impulse", {count, 3}, turning);
+}
+
 void write_state(Hdf5Output& file, const SimulatorState& state) {
-  std::vector<double> position, orientation, velocity, spin, in_a, in_b, normal_in_a, depth, normal,
-      tangential, turning;
+  std::vector<double> position, orientation, velocity, spin;
   for (const BodyState& body : state.states) {
     append(position, body.position), append(orientation, body.orientation);
     append(velocity, body.velocity), append(spin, body.angular_velocity);
   }
-  std::vector<std::uint32_t> pair, lost;
-  std::vector<std::uint64_t> feature;
-  for (const CachedImpulse& entry : state.impulses) {
-    pair.insert(pair.end(), {entry.body_a, entry.body_b});
-    feature.push_back(entry.feature);
-    append(in_a, entry.in_a), append(in_b, entry.in_b), append(normal_in_a, entry.normal_in_a);
-    depth.push_back(entry.depth), lost.push_back(entry.lost);
-    normal.push_back(entry.impulse.normal), append(tangential, entry.impulse.tangential);
-    append(turning, entry.impulse.turning);
-  }
-  const std::size_t bodies = state.states.size(), impulses = state.impulses.size();
+  const std::size_t bodies = state.states.size();
   const std::vector<std::uint64_t> step = {state.step};
   file.add("/state/step", {1}, step);
   file.add("/state/position", {bodies, 3}, position);
@@ -191,47 +207,40 @@ void write_state(Hdf5Output& file, const SimulatorState& state) {
   file.add("/state/angular_velocity", {bodies, 3}, spin);
   file.add("/state/quiet_seconds", {bodies}, state.quiet);
   file.add("/state/sleeping_group", {bodies}, state.groups);
-  file.add("/state/impulses/pair", {impulses, 2}, pair);
-  file.add("/state/impulses/feature", {impulses}, feature);
-  file.add("/state/impulses/in_a", {impulses, 3}, in_a);
-  file.add("/state/impulses/in_b", {impulses, 3}, in_b);
-  file.add("/state/impulses/normal_in_a", {impulses, 3}, normal_in_a);
-  file.add("/state/impulses/depth", {impulses}, depth);
-  file.add("/state/impulses/lost", {impulses}, lost);
-  file.add("/state/impulses/normal", {impulses}, normal);
-  file.add("/state/impulses/tangential", {impulses, 3}, tangential);
-  file.add("/state/impulses/turning", {impulses, 3}, turning);
+  write_contacts(file, state.contacts);
 }
 
-std::vector<CachedImpulse> read_impulses(const Hdf5Input& file, const std::string& path) {
-  const auto pair = file.read_u32("/state/impulses/pair", {2});
-  const auto feature = file.read_u64("/state/impulses/feature");
-  const auto in_a = file.read_f64("/state/impulses/in_a", {3});
-  const auto in_b = file.read_f64("/state/impulses/in_b", {3});
-  const auto normal_in_a = file.read_f64("/state/impulses/normal_in_a", {3});
-  const auto lost = file.read_u32("/state/impulses/lost");
-  const auto depth = file.read_f64("/state/impulses/depth"), normal = file.read_f64("/state/impulses/normal");
-  const auto tangential = file.read_f64("/state/impulses/tangential", {3});
-  const auto turning = file.read_f64("/state/impulses/turning", {3});
+std::vector<CachedContact> read_contacts(const Hdf5Input& file, const std::string& path) {
+  const auto pair = file.read_u32("/state/contacts/pair", {2});
+  const auto feature = file.read_u64("/state/contacts/feature");
+  const auto in_a = file.read_f64("/state/contacts/in_a", {3});
+  const auto in_b = file.read_f64("/state/contacts/in_b", {3});
+  const auto normal_in_a = file.read_f64("/state/contacts/normal_in_a", {3});
+  const auto depth = file.read_f64("/state/contacts/depth");
+  const auto translation = file.read_f64("/state/contacts/found_at_translation", {3});
+  const auto rotation = file.read_f64("/state/contacts/found_at_rotation", {4});
+  const auto normal = file.read_f64("/state/contacts/normal_impulse");
+  const auto tangential = file.read_f64("/state/contacts/tangential_impulse", {3});
+  const auto turning = file.read_f64("/state/contacts/turning_impulse", {3});
   const std::size_t count = feature.size();
-  for (const std::size_t rows :
-       {pair.size() / 2, in_a.size() / 3, in_b.size() / 3, normal_in_a.size() / 3, depth.size(), lost.size(),
-        normal.size(), tangential.size() / 3, turning.size() / 3}) {
-    if (rows != count) throw FileError(path + ": /state/impulses: datasets of different lengths");
+  for (const std::size_t rows : {pair.size() / 2, in_a.size() / 3, in_b.size() / 3, normal_in_a.size() / 3,
+                                 depth.size(), translation.size() / 3, rotation.size() / 4, normal.size(),
+                                 tangential.size() / 3, turning.size() / 3}) {
+    if (rows != count) throw FileError(path + ": /state/contacts: datasets of different lengths");
   }
-  std::vector<CachedImpulse> impulses;
+  std::vector<CachedContact> contacts;
   for (std::size_t i = 0; i < count; ++i) {
-    impulses.push_back({pair[2 * i],
+    contacts.push_back({pair[2 * i],
                         pair[2 * i + 1],
                         feature[i],
                         vector_at(in_a, i),
                         vector_at(in_b, i),
                         vector_at(normal_in_a, i),
                         depth[i],
-                        lost[i],
+                        {vector_at(translation, i), turn_at(rotation, i)},
                         {normal[i], vector_at(tangential, i), vector_at(turning, i)}});
   }
-  return impulses;
+  return contacts;
 }
 
 SimulatorState read_state(const Hdf5Input& file, const std::string& path, std::size_t bodies) {
@@ -243,14 +252,14 @@ SimulatorState read_state(const Hdf5Input& file, const std::string& path, std::s
   SimulatorState state;
   state.quiet = file.read_f64("/state/quiet_seconds");
   state.groups = file.read_u32("/state/sleeping_group");
-  state.impulses = read_impulses(file, path);
+  state.contacts = read_contacts(file, path);
   const bool fits = step.size() == 1 && position.size() == 3 * bodies && orientation.size() == 4 * bodies &&
                     velocity.size() == 3 * bodies && spin.size() == 3 * bodies &&
                     state.quiet.size() == bodies && state.groups.size() == bodies;
   if (!fits) throw FileError(path + ": /state: not of " + std::to_string(bodies) + " bodies");
-  for (const CachedImpulse& entry : state.impulses) {
-    if (std::max(entry.body_a, entry.body_b) >= bodies) {
-      throw FileError(path + ": /state/impulses/pair: names a body that there is none of");
+  for (const CachedContact& contact : state.contacts) {
+    if (std::max(contact.body_a, contact.body_b) >= bodies) {
+      throw FileError(path + ": /state/contacts/pair: names a body that there is none of");
     }
   }
   state.step = step[0];

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <chrono>
 
-#include "followed_contacts.h"
-
 namespace tandem::simulation {
 namespace {
 
@@ -66,32 +64,28 @@ StepRecord Simulator::step_in_arena() {
 }
 
 void Simulator::find_contacts(StepRecord& record) {
-  constexpr double kFall = 2;  // times what gravity lets a body fall in a step
-  const std::vector<ContactPoint>& found = finder_->find(poses(), idle());
+  const std::vector<BodyPair> unmoved = cache_.unmoved(bodies_, states_, options_.solver.slop);
+  const std::vector<ContactPoint>& found = finder_->find(poses(), idle(), unmoved);
+  cache_.update(found, unmoved, bodies_, states_, idle());
   take(record, finder_->report());
-  record.contacts = found.size();
-  for (const ContactPoint& contact : found) {
-    record.penetration_max = std::max(record.penetration_max, contact.depth);
-    record.penetration_mean += contact.depth / static_cast<double>(found.size());
+  record.contacts = cache_.contacts().size();
+  for (const ContactPoint& contact : cache_.contacts()) {
+    const double depth = std::max(contact.depth, 0.0);
+    record.penetration_max = std::max(record.penetration_max, depth);
+    record.penetration_mean += depth / static_cast<double>(record.contacts);
   }
-  const double gap = kFall * options_.gravity.norm() * options_.dt * options_.dt;
-  kept_ = cache_.with_those_just_lost(cache_.without_jumps(found, bodies_, states_, options_.dt), bodies_,
-                                      states_, idle(), gap, options_.solver.slop);
 }
 
 void Simulator::solve(StepRecord& record) {
-  islands_ = find_islands(acting_, kept_.contacts);
-  std::vector<ContactImpulse> impulses(kept_.contacts.size());
-  if (options_.solver.warm_start) impulses = cache_.match(kept_.contacts, bodies_, states_);
-  FollowedContacts followed(kept_.contacts, states_);
+  const std::span<const ContactPoint> contacts = cache_.contacts();
+  islands_ = find_islands(acting_, contacts);
+  std::vector<ContactImpulse> impulses(contacts.size());
+  if (options_.solver.warm_start) impulses = cache_.impulses();
   const std::vector<BodyState> before = continuous_ ? states_ : std::vector<BodyState>();
-  solver_->step(
-      {acting_, kept_.contacts, islands_, options_.dt, options_.gravity, step_, cache_.entries().empty()},
-      states_, impulses);
+  solver_->step({acting_, contacts, islands_, options_.dt, options_.gravity, step_, cache_.is_cold()},
+                states_, impulses);
   if (continuous_) continuous_->limit(acting_, before, states_, options_.solver.slop);
-  followed.follow(states_);
-  kept_.contacts = followed.contacts();
-  cache_.remember(kept_, impulses, states_, idle());
+  cache_.remember(impulses);
   record.residual_max = solver_->statistics().residual;
   record.residual_rms = solver_->statistics().residual_rms;
   record.islands = solver_->statistics().islands;
@@ -100,7 +94,7 @@ void Simulator::solve(StepRecord& record) {
 
 void Simulator::sleep() {
   if (!options_.sleep.enabled) return;
-  sleep_.wake_touched(acting_, kept_.contacts);
+  sleep_.wake_touched(acting_, cache_.contacts());
   sleep_.fall_asleep(bodies_, states_, islands_, options_.sleep, options_.dt);
   for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
     acting_[i].motion = sleep_.sleeps(i) ? Motion::fixed : bodies_[i].motion;
@@ -161,7 +155,7 @@ SimulatorState Simulator::save() const {
 void Simulator::restore(SimulatorState state) {
   step_ = state.step;
   states_ = std::move(state.states);
-  cache_.restore(std::move(state.impulses));
+  cache_.restore(std::move(state.contacts));
   sleep_.restore(std::move(state.quiet), std::move(state.groups));
   for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
     acting_[i].motion = sleep_.sleeps(i) ? Motion::fixed : bodies_[i].motion;

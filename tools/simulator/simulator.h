@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "contact_cache.h"
 #include "contact_finder.h"
 #include "continuous_motion.h"
 #include "sleep.h"
@@ -26,14 +27,15 @@ struct SimulatorOptions {
 struct SimulatorState {
   std::uint64_t step = 0;
   std::vector<BodyState> states;
-  std::vector<CachedImpulse> impulses;
+  std::vector<CachedContact> contacts;
   std::vector<double> quiet;          ///< of Sleep
   std::vector<std::uint32_t> groups;  ///< of Sleep
 };
 
 /// Moves rigid bodies, step by step: contacts where the bodies stand, velocities with gravity, contacts
-/// solved for, positions by the new velocities (semi-implicit Euler). With warm start, a step that has no
-/// impulse of the step before makes ten times the sweeps. The same bytes for any number of threads.
+/// solved for, positions by the new velocities (semi-implicit Euler). Bodies that have moved against each
+/// other by no more than the slop keep their contacts. With warm start, a step that has no impulse of the
+/// step before makes ten times the sweeps. The same bytes for any number of threads.
 class Simulator {
  public:
   /// continuous: what keeps fast bodies from passing through others; null: nothing does. Condition: as many
@@ -71,10 +73,9 @@ class Simulator {
   std::unique_ptr<ContinuousMotion> continuous_;
   SimulatorOptions options_;
   tbb::task_arena arena_;
-  KeptContacts kept_;  // of the step under way
   Islands islands_;
   std::unique_ptr<StepSolver> solver_;
-  ImpulseCache cache_;
+  ContactCache cache_;
   Sleep sleep_;
   std::uint64_t step_ = 0;
 };

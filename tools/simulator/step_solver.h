@@ -5,7 +5,6 @@
 #include <span>
 
 #include "contact_point.h"
-#include "impulse_cache.h"
 #include "islands.h"
 #include "rigid_body.h"
 

@@ -25,11 +25,19 @@ void ContactGenerator::set_shapes(std::span<const AssetView> shapes) {
 
 const std::vector<ContactPoint>& ContactGenerator::generate(const ContactList& found,
                                                             std::span<const BodyPose> bodies,
+                                                            std::span<const BodyPair> left_out,
                                                             const ContactOptions& options) {
   contacts_.clear();
-  contacts_.reserve(found.triangles.size());
-  for (const TriangleContact& c : found.triangles)
-    contacts_.push_back({c.pair, c.triangle_a, c.triangle_b, 0, 0});
+  for (auto begin = found.triangles.begin(); begin != found.triangles.end();) {
+    const auto end =
+        std::find_if(begin, found.triangles.end(), [&](const auto& c) { return c.pair != begin->pair; });
+    const ObjectPair& pair = found.pairs[begin->pair];
+    if (!std::binary_search(left_out.begin(), left_out.end(), BodyPair{pair.a, pair.b})) {
+      for (const TriangleContact& c : std::span(begin, end))
+        contacts_.push_back({c.pair, c.triangle_a, c.triangle_b, 0, 0});
+    }
+    begin = end;
+  }
   // The solvers remember by themselves what a point did in the step before.
   const ManifoldOptions manifold_options = {
       .match_previous = false, .most_points = options.points_per_patch, .threads = options.threads};

@@ -29,9 +29,10 @@ class ContactGenerator {
   /// the generator's use.
   void set_shapes(std::span<const AssetView> shapes);
 
-  /// The points come by ascending pair of bodies. Valid until the next call. Condition: `found` is an
-  /// engine's answer for these bodies.
+  /// The points come by ascending pair of bodies, those of the pairs `left_out` not at all. Valid until the
+  /// next call. Conditions: `found` is an engine's answer for these bodies; left_out is ascending.
   const std::vector<ContactPoint>& generate(const ContactList& found, std::span<const BodyPose> bodies,
+                                            std::span<const BodyPair> left_out = {},
                                             const ContactOptions& options = {});
 
   /// Of the last call.

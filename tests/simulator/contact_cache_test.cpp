@@ -1,0 +1,238 @@
+#include "simulator/contact_cache.h"
+
+#include <gtest/gtest.h>
+
+#include "analytic_contacts.h"
+
+namespace tandem::simulation {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kReach = 0.001;
+
+// A unit box on a slab, with one contact between them.
+struct BoxOnSlab {
+  std::vector<BodyProperties> bodies = {box_body({9, 9, 1}, 1), box_body({1, 1, 1}, 1)};
+  std::vector<BodyState> states = std::vector<BodyState>(2);
+  ContactPoint contact = {0, 1, {0.25, 0, 0.5}, Vector3d::UnitZ(), 0.002, 7};
+  ContactCache cache;
+
+  BoxOnSlab() { states[1].position.z() = 0.998; }
+
+  std::vector<ContactPoint> step(const std::vector<ContactPoint>& found,
+                                 std::span<const std::uint8_t> idle = {}) {
+    cache.update(found, cache.unmoved(bodies, states, kReach), bodies, states, idle);
+    return {cache.contacts().begin(), cache.contacts().end()};
+  }
+
+  void remember(const std::vector<double>& normal) {
+    std::vector<ContactImpulse> impulses;
+    for (const double size : normal) impulses.push_back({size, Vector3d::Zero(), Vector3d::Zero()});
+    cache.remember(impulses);
+  }
+};
+
+TEST(ContactCache, AnUnmovedPairKeepsItsContactsWhateverIsFound) {
+  BoxOnSlab on;
+  on.step({on.contact});
+  on.states[1].position += Vector3d(0.0006, 0, -0.0006);
+  ContactPoint other = on.contact;
+  other.position.x() = -0.25, other.depth = 1, other.feature = 8;
+  for (const auto& found : {std::vector<ContactPoint>{}, std::vector{other}, std::vector{other, other}}) {
+    const auto contacts = on.step(found);
+    ASSERT_EQ(contacts.size(), 1u);
+    EXPECT_EQ(contacts[0].feature, 7u);
+    EXPECT_NEAR(contacts[0].depth, 0.0026, 1e-15);
+    EXPECT_NEAR((contacts[0].position - Vector3d(0.2503, 0, 0.4997)).norm(), 0, 1e-15);
+    EXPECT_NEAR((contacts[0].normal - Vector3d::UnitZ()).norm(), 0, 1e-15);
+  }
+}
+
+TEST(ContactCache, WhatBodiesDoTogetherIsNoMotionAgainstEachOther) {
+  BoxOnSlab on;
+  on.step({on.contact});
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(2, Vector3d(1, 2, 3).normalized()));
+  for (BodyState& state : on.states) {
+    state.position = turn * state.position + Vector3d(5, -7, 2);
+    state.orientation = turn * state.orientation;
+  }
+  const auto contacts = on.step({});
+  ASSERT_EQ(contacts.size(), 1u);
+  EXPECT_NEAR(contacts[0].depth, 0.002, 1e-14);
+  EXPECT_NEAR((contacts[0].position - turn * on.contact.position - Vector3d(5, -7, 2)).norm(), 0, 1e-14);
+  EXPECT_NEAR((contacts[0].normal - turn * on.contact.normal).norm(), 0, 1e-14);
+}
+
+TEST(ContactCache, WhatComesApartIsAGapAndThenForgotten) {
+  BoxOnSlab on;
+  on.step({on.contact});
+  on.contact.depth = 0.0004;
+  on.states[1].position.z() += 0.0016;
+  ASSERT_EQ(on.step({on.contact}).size(), 1u);  // found anew, which is from where its motion counts now
+  on.states[1].position.z() += 0.0009;
+  const auto gap = on.step({});
+  ASSERT_EQ(gap.size(), 1u);
+  EXPECT_NEAR(gap[0].depth, -0.0005, 1e-15);
+  on.states[1].position.z() += 0.0002;
+  EXPECT_TRUE(on.step({}).empty());
+  EXPECT_TRUE(on.cache.entries().empty());
+}
+
+TEST(ContactCache, SlowMotionAddsUp) {
+  BoxOnSlab on;
+  on.step({on.contact});
+  int steps = 0;
+  for (on.contact.feature = 8; on.step({on.contact})[0].feature == 7; ++steps) {
+    on.states[1].position.x() += 0.0003;
+  }
+  EXPECT_EQ(steps, 4);
+}
+
+TEST(ContactCache, TurningIsMotionOfTheSmallerBodysFarthestPoint) {
+  const double radius = std::sqrt(3) / 2;
+  for (const double share : {0.9, 1.1}) {
+    const Eigen::Quaterniond turn(Eigen::AngleAxisd(share * kReach / radius, Vector3d::UnitY()));
+    BoxOnSlab on;
+    on.step({on.contact});
+    on.states[1].orientation = turn;
+    EXPECT_EQ(on.step({}).size(), share < 1 ? 1u : 0u) << share;
+  }
+  // Seen from a slab that turns, the box's centre moves too.
+  BoxOnSlab on;
+  on.step({on.contact});
+  on.states[0].orientation = Eigen::AngleAxisd(0.9 * kReach / radius, Vector3d::UnitY());
+  EXPECT_TRUE(on.step({}).empty());
+}
+
+TEST(ContactCache, PairsAreJudgedEachByItself) {
+  BoxOnSlab on;
+  on.bodies.push_back(on.bodies[1]), on.states.push_back(on.states[1]);
+  on.states[2].position.x() = 3;
+  ContactPoint second = on.contact, third = on.contact;
+  second.body_b = 2, second.position.x() = 3;
+  third.body_a = 1, third.body_b = 2, third.depth = 0.5;
+  on.step({on.contact, second});
+  on.states[2].position.x() += 0.01;
+  second.depth = 0.1;
+  ContactPoint first = on.contact;
+  first.depth = 0.1;
+  const auto contacts = on.step({first, second, third});
+  ASSERT_EQ(contacts.size(), 3u);
+  EXPECT_NEAR(contacts[0].depth, 0.002, 1e-15);
+  EXPECT_EQ(contacts[1].depth, 0.1);
+  EXPECT_EQ(contacts[2].depth, 0.5);
+}
+
+TEST(ContactCache, PairsThatSleepAreRememberedAsTheyWere) {
+  BoxOnSlab on;
+  on.step({on.contact});
+  on.remember({3});
+  const std::uint8_t idle[] = {1, 1};
+  on.states[1].position.z() += 0.01;
+  EXPECT_TRUE(on.step({}, idle).empty());
+  ASSERT_EQ(on.cache.entries().size(), 1u);
+  EXPECT_EQ(on.cache.entries()[0].impulse.normal, 3);
+}
+
+TEST(WarmStart, AnUnmovedPairGoesOnWithItsImpulses) {
+  BoxOnSlab on;
+  EXPECT_TRUE(on.cache.is_cold());
+  on.step({on.contact, on.contact});
+  EXPECT_TRUE(on.cache.is_cold());
+  const ContactImpulse impulse = {3, {1, 2, 0}, {4, 5, 6}};
+  on.cache.remember(std::vector{impulse, ContactImpulse{}});
+  on.step({});
+  EXPECT_FALSE(on.cache.is_cold());
+  const auto impulses = on.cache.impulses();
+  ASSERT_EQ(impulses.size(), 2u);
+  EXPECT_EQ(impulses[0].normal, 3);
+  EXPECT_EQ(impulses[0].tangential, impulse.tangential);
+  EXPECT_EQ(impulses[0].turning, impulse.turning);
+  EXPECT_EQ(impulses[1].normal, 0);
+}
+
+TEST(WarmStart, ImpulsesFollowFeaturesThenPlacesAndTheRestIsSharedOut) {
+  BoxOnSlab on;
+  ContactPoint second = on.contact, third = on.contact;
+  second.feature = 8, second.position.x() = 0.45;
+  third.feature = 9, third.position.x() = -0.3;
+  on.step({on.contact, second, third});
+  on.remember({1, 2, 4});
+
+  ContactPoint same = second, near = on.contact, far = third, farther = third;
+  same.position.x() = 0;
+  near.feature = 10, near.position.x() += 0.05;
+  far.feature = 11, far.position.x() = -0.45;
+  farther.feature = 12, farther.position.x() = -0.48;
+  on.states[1].position.y() += 0.002;
+  on.step({same, near, far, farther});
+  const auto matched = on.cache.impulses();
+  ASSERT_EQ(matched.size(), 4u);
+  EXPECT_EQ(matched[0].normal, 2);
+  EXPECT_EQ(matched[1].normal, 1);
+  EXPECT_EQ(matched[2].normal, 2);
+  EXPECT_EQ(matched[3].normal, 2);
+}
+
+// Finds the corners of a block at depths that jump by up to 0.8 mm from step to step.
+class FlickeringContacts : public ContactFinder {
+ public:
+  const std::vector<ContactPoint>& find(std::span<const BodyPose> bodies, std::span<const std::uint8_t> idle,
+                                        std::span<const BodyPair> unmoved) override {
+    points_ = corners_->find(bodies, idle, unmoved);
+    for (ContactPoint& point : points_) point.depth += kJump * static_cast<double>(++calls_ % 3);
+    return points_;
+  }
+
+ private:
+  static constexpr double kJump = 4e-4;
+  std::unique_ptr<ContactFinder> corners_ = boxes_on_plane(Vector3d::UnitZ(), {1, 1, 1});
+  std::vector<ContactPoint> points_;
+  std::uint64_t calls_ = 0;
+};
+
+// Found anew in each step they keep it moving at 0.04 to 0.2 m/s.
+TEST(ContactCache, ContactsThatFlickerDoNotShakeABlock) {
+  for (const SolverKind solver :
+       {SolverKind::automatic, SolverKind::soft, SolverKind::newton, SolverKind::sweeps}) {
+    SimulatorOptions options;
+    options.solver.kind = solver;
+    std::vector<BodyProperties> bodies = {fixed_body(), box_body({1, 1, 1}, 1)};
+    std::vector<BodyState> states(2);
+    states[1].position.z() = 0.5 - options.solver.slop;
+    Simulator simulator(bodies, states, std::make_unique<FlickeringContacts>(), options);
+    double fastest = 0;
+    for (int i = 0; i < 300; ++i) {
+      const StepRecord record = simulator.step();
+      if (i >= 240) fastest = std::max(fastest, record.speed_max + record.spin_max);
+    }
+    EXPECT_LT(fastest, 1e-5) << static_cast<int>(solver);
+  }
+}
+
+// What is lifted by a hair comes back onto the contacts that it had.
+TEST(ContactCache, ABlockLiftedByAHairLandsWithinTheSlop) {
+  for (const SolverKind solver :
+       {SolverKind::automatic, SolverKind::soft, SolverKind::newton, SolverKind::sweeps}) {
+    SimulatorOptions options;
+    options.solver.kind = solver;
+    std::vector<BodyProperties> bodies = {fixed_body(), box_body({1, 1, 1}, 1)};
+    std::vector<BodyState> states(2);
+    states[1].position.z() = 0.5 - 0.1 * options.solver.slop;
+    Simulator simulator(bodies, states, boxes_on_plane(Vector3d::UnitZ(), {1, 1, 1}), options);
+    simulator.step();
+    BodyState lifted = simulator.states()[1];
+    lifted.position.z() += 0.9 * options.solver.slop;
+    simulator.place(1, lifted);
+    for (int i = 0; i < 30; ++i) {
+      const StepRecord record = simulator.step();
+      EXPECT_EQ(record.contacts, 4u);
+      EXPECT_LE(record.penetration_max, options.solver.slop + 1e-5);
+      EXPECT_GE(simulator.states()[1].position.z(), 0.5 - options.solver.slop - 1e-5);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tandem::simulation

@@ -1,0 +1,185 @@
+#include "contact_cache.h"
+
+#include <algorithm>
+
+namespace tandem::simulation {
+namespace {
+
+using Eigen::Vector3d;
+
+template <typename Contact>
+BodyPair pair_of(const Contact& contact) {
+  return {contact.body_a, contact.body_b};
+}
+
+// The contacts of a pair that a list by ascending pair begins with.
+template <typename Contact>
+std::span<const Contact> head_of(std::span<const Contact> contacts, const BodyPair& pair) {
+  std::size_t count = 0;
+  while (count < contacts.size() && pair_of(contacts[count]) == pair) ++count;
+  return contacts.first(count);
+}
+
+Vector3d into_body(const BodyState& state, const Vector3d& point) {
+  return state.orientation.conjugate() * (point - state.position);
+}
+
+Vector3d into_world(const BodyState& state, const Vector3d& point) {
+  return state.position + state.orientation * point;
+}
+
+double smaller_radius(const BodyPair& pair, std::span<const BodyProperties> bodies) {
+  return std::min(bodies[pair.a].radius, bodies[pair.b].radius);
+}
+
+RelativePose relative_pose(const BodyPair& pair, std::span<const BodyProperties> bodies,
+                           std::span<const BodyState> states) {
+  const bool first_is_smaller = bodies[pair.a].radius < bodies[pair.b].radius;
+  const BodyState& smaller = states[first_is_smaller ? pair.a : pair.b];
+  const BodyState& larger = states[first_is_smaller ? pair.b : pair.a];
+  return {into_body(larger, smaller.position), larger.orientation.conjugate() * smaller.orientation};
+}
+
+CachedContact cached(const ContactPoint& contact, const RelativePose& found_at,
+                     std::span<const BodyState> states) {
+  const BodyState &a = states[contact.body_a], &b = states[contact.body_b];
+  return {contact.body_a,
+          contact.body_b,
+          contact.feature,
+          into_body(a, contact.position),
+          into_body(b, contact.position),
+          a.orientation.conjugate() * contact.normal,
+          contact.depth,
+          found_at,
+          {}};
+}
+
+// Where the bodies have carried a contact since it was found.
+ContactPoint moved_with_bodies(const CachedContact& entry, std::span<const BodyState> states) {
+  const BodyState &a = states[entry.body_a], &b = states[entry.body_b];
+  const Vector3d on_a = into_world(a, entry.in_a), on_b = into_world(b, entry.in_b);
+  const Vector3d normal = (a.orientation * entry.normal_in_a).normalized();
+  return {entry.body_a, entry.body_b, 0.5 * (on_a + on_b), normal, entry.depth - normal.dot(on_b - on_a),
+          entry.feature};
+}
+
+// Gives the contacts of one pair that were found the impulses of those remembered.
+class PairMatch {
+ public:
+  PairMatch(std::span<const CachedContact> old, std::span<CachedContact> now)
+      : old_(old), now_(now), is_taken_(old.size(), 0), has_one_(now.size(), 0) {}
+
+  void by_feature() {
+    for (std::size_t i = 0; i < now_.size(); ++i) {
+      if (now_[i].feature == 0) continue;
+      for (std::size_t j = 0; j < old_.size(); ++j) {
+        if (is_taken_[j] || old_[j].feature != now_[i].feature) continue;
+        take(i, j);
+        break;
+      }
+    }
+  }
+
+  void by_position(double reach) {
+    for (std::size_t i = 0; i < now_.size(); ++i) {
+      if (has_one_[i]) continue;
+      std::size_t nearest = old_.size();
+      double least = reach * reach;
+      for (std::size_t j = 0; j < old_.size(); ++j) {
+        const double apart = std::min((old_[j].in_a - now_[i].in_a).squaredNorm(),
+                                      (old_[j].in_b - now_[i].in_b).squaredNorm());
+        if (!is_taken_[j] && apart < least) least = apart, nearest = j;
+      }
+      if (nearest < old_.size()) take(i, nearest);
+    }
+  }
+
+  void share_rest() {
+    double normal = 0;
+    Vector3d turning = Vector3d::Zero();
+    for (std::size_t j = 0; j < old_.size(); ++j) {
+      if (!is_taken_[j]) normal += old_[j].impulse.normal, turning += old_[j].impulse.turning;
+    }
+    const auto without = static_cast<double>(std::count(has_one_.begin(), has_one_.end(), 0));
+    for (std::size_t i = 0; i < now_.size(); ++i) {
+      if (!has_one_[i])
+        now_[i].impulse.normal = normal / without, now_[i].impulse.turning = turning / without;
+    }
+  }
+
+ private:
+  void take(std::size_t now, std::size_t old) {
+    is_taken_[old] = has_one_[now] = 1;
+    now_[now].impulse = old_[old].impulse;
+  }
+
+  std::span<const CachedContact> old_;
+  std::span<CachedContact> now_;
+  std::vector<char> is_taken_, has_one_;
+};
+
+}  // namespace
+
+std::vector<BodyPair> ContactCache::unmoved(std::span<const BodyProperties> bodies,
+                                            std::span<const BodyState> states, double reach) const {
+  std::vector<BodyPair> pairs;
+  for (std::span<const CachedContact> rest = entries_; !rest.empty();) {
+    const BodyPair pair = pair_of(rest.front());
+    const RelativePose &then = rest.front().found_at, now = relative_pose(pair, bodies, states);
+    // A point's way is at most that of the centre and an arc about it.
+    const double way = (now.translation - then.translation).norm() +
+                       smaller_radius(pair, bodies) * now.rotation.angularDistance(then.rotation);
+    if (way <= reach) pairs.push_back(pair);
+    rest = rest.subspan(head_of(rest, pair).size());
+  }
+  return pairs;
+}
+
+void ContactCache::update(std::span<const ContactPoint> found, std::span<const BodyPair> unmoved,
+                          std::span<const BodyProperties> bodies, std::span<const BodyState> states,
+                          std::span<const std::uint8_t> idle) {
+  constexpr double kNear = 0.1;  // of the smaller body's radius
+  const std::vector<CachedContact> before = std::move(entries_);
+  is_cold_ = before.empty();
+  entries_.clear(), contacts_.clear(), place_.clear();
+  std::span<const CachedContact> rest = before;
+  while (!rest.empty() || !found.empty()) {
+    const BodyPair pair = rest.empty()    ? pair_of(found.front())
+                          : found.empty() ? pair_of(rest.front())
+                                          : std::min(pair_of(rest.front()), pair_of(found.front()));
+    const auto old = head_of(rest, pair);
+    const auto fresh = head_of(found, pair);
+    rest = rest.subspan(old.size()), found = found.subspan(fresh.size());
+    const std::size_t first = entries_.size();
+    if (!idle.empty() && idle[pair.a] && idle[pair.b]) {
+      entries_.insert(entries_.end(), old.begin(), old.end());
+      continue;
+    }
+    if (std::binary_search(unmoved.begin(), unmoved.end(), pair)) {
+      entries_.insert(entries_.end(), old.begin(), old.end());
+      for (const CachedContact& entry : old) contacts_.push_back(moved_with_bodies(entry, states));
+    } else {
+      const RelativePose now = relative_pose(pair, bodies, states);
+      for (const ContactPoint& contact : fresh) entries_.push_back(cached(contact, now, states));
+      contacts_.insert(contacts_.end(), fresh.begin(), fresh.end());
+      PairMatch match(old, std::span(entries_).subspan(first));
+      match.by_feature();
+      match.by_position(kNear * smaller_radius(pair, bodies));
+      match.share_rest();
+    }
+    for (std::size_t i = first; i < entries_.size(); ++i) place_.push_back(static_cast<std::uint32_t>(i));
+  }
+}
+
+std::vector<ContactImpulse> ContactCache::impulses() const {
+  std::vector<ContactImpulse> impulses;
+  impulses.reserve(place_.size());
+  for (const std::uint32_t i : place_) impulses.push_back(entries_[i].impulse);
+  return impulses;
+}
+
+void ContactCache::remember(std::span<const ContactImpulse> impulses) {
+  for (std::size_t i = 0; i < impulses.size(); ++i) entries_[place_[i]].impulse = impulses[i];
+}
+
+}  // namespace tandem::simulation

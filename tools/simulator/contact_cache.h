@@ -1,0 +1,73 @@
+#pragma once
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "contact_point.h"
+#include "rigid_body.h"
+
+namespace tandem::simulation {
+
+/// How the smaller of two bodies stands in the frame of the larger, about their centres of mass.
+struct RelativePose {
+  Eigen::Vector3d translation;
+  Eigen::Quaterniond rotation;
+};
+
+/// A contact of a step and its impulse, as the next step needs them.
+struct CachedContact {
+  std::uint32_t body_a, body_b;
+  std::uint64_t feature;
+  Eigen::Vector3d in_a, in_b;   ///< the position, in the bodies' frames about their centres of mass
+  Eigen::Vector3d normal_in_a;  ///< the normal, likewise
+  double depth;
+  RelativePose found_at;   ///< of its bodies; this and the above are of when it was found
+  ContactImpulse impulse;  ///< of the last step
+};
+
+/// Keeps the contacts of bodies that hardly move against each other, and impulses, so that a solver starts
+/// where it stopped. Contacts of meshes change with every triangle that comes or goes; found anew in each
+/// step they would shake what rests, and bodies that friction holds would creep until they slide.
+class ContactCache {
+ public:
+  /// The pairs whose contacts stay what they are: since these were found no point of the smaller body has
+  /// moved against the larger by more than `reach`, >= 0. Ascending.
+  std::vector<BodyPair> unmoved(std::span<const BodyProperties> bodies, std::span<const BodyState> states,
+                                double reach) const;
+
+  /// Makes the contacts of a step. Unmoved pairs have those remembered, moved with the bodies; these may have
+  /// become gaps. All others have those found, each with the impulse of the remembered one of the pair that
+  /// has the same feature, or else of the nearest one within a tenth of the smaller body's radius; each is
+  /// given once. What then is left of a pair's normal impulse and of what resists turning is shared out among
+  /// its contacts that got none, so that a pair pushes as it did although its points have changed. Pairs of
+  /// two idle bodies stay remembered and are left out. Conditions: found comes by ascending pair; unmoved is
+  /// unmoved()'s answer for these states; idle is empty or has an entry for each body.
+  void update(std::span<const ContactPoint> found, std::span<const BodyPair> unmoved,
+              std::span<const BodyProperties> bodies, std::span<const BodyState> states,
+              std::span<const std::uint8_t> idle);
+
+  /// Of the step that update() was last called for, by ascending pair.
+  std::span<const ContactPoint> contacts() const { return contacts_; }
+
+  /// Whether no contact had been remembered before.
+  bool is_cold() const { return is_cold_; }
+
+  /// What the contacts start with.
+  std::vector<ContactImpulse> impulses() const;
+
+  /// Takes what the contacts did. Condition: one for each.
+  void remember(std::span<const ContactImpulse> impulses);
+
+  std::span<const CachedContact> entries() const { return entries_; }
+  void restore(std::vector<CachedContact> entries) { entries_ = std::move(entries); }
+
+ private:
+  std::vector<CachedContact> entries_;  // by ascending pair
+  std::vector<ContactPoint> contacts_;
+  std::vector<std::uint32_t> place_;  // of each contact in entries_
+  bool is_cold_ = true;
+};
+
+}  // namespace tandem::simulation

@@ -9,7 +9,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kReach = 0.001;
+constexpr double kReach = 0.001, kGap = 0.005;
 
 // A unit box on a slab, with one contact between them.
 struct BoxOnSlab {
@@ -22,7 +22,7 @@ struct BoxOnSlab {
 
   std::vector<ContactPoint> step(const std::vector<ContactPoint>& found,
                                  std::span<const std::uint8_t> idle = {}) {
-    cache.update(found, cache.unmoved(bodies, states, kReach), bodies, states, idle);
+    cache.update(found, cache.unmoved(bodies, states, kReach), bodies, states, idle, kGap);
     return {cache.contacts().begin(), cache.contacts().end()};
   }
 
@@ -67,16 +67,59 @@ TEST(ContactCache, WhatBodiesDoTogetherIsNoMotionAgainstEachOther) {
 TEST(ContactCache, WhatComesApartIsAGapAndThenForgotten) {
   BoxOnSlab on;
   on.step({on.contact});
-  on.contact.depth = 0.0004;
-  on.states[1].position.z() += 0.0016;
-  ASSERT_EQ(on.step({on.contact}).size(), 1u);  // found anew, which is from where its motion counts now
-  on.states[1].position.z() += 0.0009;
-  const auto gap = on.step({});
-  ASSERT_EQ(gap.size(), 1u);
-  EXPECT_NEAR(gap[0].depth, -0.0005, 1e-15);
-  on.states[1].position.z() += 0.0002;
+  for (const double apart : {0.0029, 0.0069}) {  // 0.002 deep when found
+    on.states[1].position.z() = 0.998 + apart;
+    const auto gap = on.step({});
+    ASSERT_EQ(gap.size(), 1u);
+    EXPECT_NEAR(gap[0].depth, 0.002 - apart, 1e-15);
+  }
+  on.states[1].position.z() = 0.998 + 0.0081;
   EXPECT_TRUE(on.step({}).empty());
   EXPECT_TRUE(on.cache.entries().empty());
+}
+
+TEST(ContactCache, WhatSlidOrIsStillDeepIsNotJustLost) {
+  BoxOnSlab on;
+  on.step({on.contact});
+  on.states[1].position += Vector3d(0.02, 0, 0.003);  // a fiftieth of the radius is 0.0173
+  EXPECT_TRUE(on.step({}).empty());
+  BoxOnSlab deep;
+  deep.step({deep.contact});
+  deep.states[1].position += Vector3d(0.01, 0, 0.001);
+  EXPECT_TRUE(deep.step({}).empty());
+}
+
+TEST(ContactCache, WhatIsLostStaysAsLongAsItPushesAndEightStepsMore) {
+  BoxOnSlab on;
+  on.step({on.contact});
+  on.remember({1});
+  on.states[1].position.z() += 0.004;
+  const auto steps_until_forgotten = [&](double impulse) {
+    int steps = 0;
+    for (double way = 0.0011; steps < 20; ++steps, way = -way) {
+      on.states[1].position.y() += way;
+      if (on.step({}).empty()) break;
+      on.remember({impulse});
+    }
+    return steps;
+  };
+  EXPECT_EQ(steps_until_forgotten(1e-9), 20);
+  EXPECT_EQ(steps_until_forgotten(0), 8);
+}
+
+TEST(ContactCache, WhatIsFoundTakesThePlaceOfWhatIsLost) {
+  for (const double away : {0.01, 0.1}) {
+    BoxOnSlab on;
+    on.step({on.contact});
+    on.remember({3});
+    on.states[1].position.z() += 0.003;
+    ContactPoint found = on.contact;
+    found.position.x() -= away, found.feature = 8;
+    const auto contacts = on.step({found});
+    ASSERT_EQ(contacts.size(), away > 0.0173 ? 2u : 1u);
+    EXPECT_EQ(contacts[0].feature, 8u);
+    EXPECT_EQ(on.cache.impulses().back().normal, 3);
+  }
 }
 
 TEST(ContactCache, SlowMotionAddsUp) {
@@ -96,13 +139,13 @@ TEST(ContactCache, TurningIsMotionOfTheSmallerBodysFarthestPoint) {
     BoxOnSlab on;
     on.step({on.contact});
     on.states[1].orientation = turn;
-    EXPECT_EQ(on.step({}).size(), share < 1 ? 1u : 0u) << share;
+    EXPECT_EQ(on.cache.unmoved(on.bodies, on.states, kReach).size(), share < 1 ? 1u : 0u) << share;
   }
   // Seen from a slab that turns, the box's centre moves too.
   BoxOnSlab on;
   on.step({on.contact});
   on.states[0].orientation = Eigen::AngleAxisd(0.9 * kReach / radius, Vector3d::UnitY());
-  EXPECT_TRUE(on.step({}).empty());
+  EXPECT_TRUE(on.cache.unmoved(on.bodies, on.states, kReach).empty());
 }
 
 TEST(ContactCache, PairsAreJudgedEachByItself) {
@@ -215,21 +258,23 @@ TEST(ContactCache, ContactsThatFlickerDoNotShakeABlock) {
 TEST(ContactCache, ABlockLiftedByAHairLandsWithinTheSlop) {
   for (const SolverKind solver :
        {SolverKind::automatic, SolverKind::soft, SolverKind::newton, SolverKind::sweeps}) {
-    SimulatorOptions options;
-    options.solver.kind = solver;
-    std::vector<BodyProperties> bodies = {fixed_body(), box_body({1, 1, 1}, 1)};
-    std::vector<BodyState> states(2);
-    states[1].position.z() = 0.5 - 0.1 * options.solver.slop;
-    Simulator simulator(bodies, states, boxes_on_plane(Vector3d::UnitZ(), {1, 1, 1}), options);
-    simulator.step();
-    BodyState lifted = simulator.states()[1];
-    lifted.position.z() += 0.9 * options.solver.slop;
-    simulator.place(1, lifted);
-    for (int i = 0; i < 30; ++i) {
-      const StepRecord record = simulator.step();
-      EXPECT_EQ(record.contacts, 4u);
-      EXPECT_LE(record.penetration_max, options.solver.slop + 1e-5);
-      EXPECT_GE(simulator.states()[1].position.z(), 0.5 - options.solver.slop - 1e-5);
+    for (const double slops : {0.9, 1.2, 4.0}) {
+      SimulatorOptions options;
+      options.solver.kind = solver;
+      std::vector<BodyProperties> bodies = {fixed_body(), box_body({1, 1, 1}, 1)};
+      std::vector<BodyState> states(2);
+      states[1].position.z() = 0.5 - 0.1 * options.solver.slop;
+      Simulator simulator(bodies, states, boxes_on_plane(Vector3d::UnitZ(), {1, 1, 1}), options);
+      simulator.step();
+      BodyState lifted = simulator.states()[1];
+      lifted.position.z() += slops * options.solver.slop;
+      simulator.place(1, lifted);
+      for (int i = 0; i < 30; ++i) {
+        const StepRecord record = simulator.step();
+        EXPECT_EQ(record.contacts, 4u);
+        EXPECT_LE(record.penetration_max, options.solver.slop + 1e-5);
+        EXPECT_GE(simulator.states()[1].position.z(), 0.5 - options.solver.slop - 1e-5);
+      }
     }
   }
 }

@@ -51,6 +51,7 @@ CachedContact cached(const ContactPoint& contact, const RelativePose& found_at,
           a.orientation.conjugate() * contact.normal,
           contact.depth,
           found_at,
+          0,
           {}};
 }
 
@@ -63,7 +64,17 @@ ContactPoint moved_with_bodies(const CachedContact& entry, std::span<const BodyS
           entry.feature};
 }
 
-// Gives the contacts of one pair that were found the impulses of those remembered.
+// Whether it is a gap that may close again.
+bool is_just_lost(const CachedContact& entry, const ContactPoint& moved, std::span<const BodyState> states,
+                  double gap, double near) {
+  constexpr std::uint32_t kLife = 8;  // steps; boxes side by side would keep all that ever touched
+  const Vector3d by =
+      into_world(states[entry.body_b], entry.in_b) - into_world(states[entry.body_a], entry.in_a);
+  const double across = (by - moved.normal.dot(by) * moved.normal).norm();
+  return entry.quiet_steps < kLife && -gap <= moved.depth && moved.depth <= 0 && across <= near;
+}
+
+// Gives the contacts of one pair the impulses of those remembered.
 class PairMatch {
  public:
   PairMatch(std::span<const CachedContact> old, std::span<CachedContact> now)
@@ -137,8 +148,8 @@ std::vector<BodyPair> ContactCache::unmoved(std::span<const BodyProperties> bodi
 
 void ContactCache::update(std::span<const ContactPoint> found, std::span<const BodyPair> unmoved,
                           std::span<const BodyProperties> bodies, std::span<const BodyState> states,
-                          std::span<const std::uint8_t> idle) {
-  constexpr double kNear = 0.1;  // of the smaller body's radius
+                          std::span<const std::uint8_t> idle, double gap) {
+  constexpr double kNear = 0.02, kMatches = 0.1;  // of the smaller body's radius
   const std::vector<CachedContact> before = std::move(entries_);
   is_cold_ = before.empty();
   entries_.clear(), contacts_.clear(), place_.clear();
@@ -150,25 +161,41 @@ void ContactCache::update(std::span<const ContactPoint> found, std::span<const B
     const auto old = head_of(rest, pair);
     const auto fresh = head_of(found, pair);
     rest = rest.subspan(old.size()), found = found.subspan(fresh.size());
-    const std::size_t first = entries_.size();
     if (!idle.empty() && idle[pair.a] && idle[pair.b]) {
       entries_.insert(entries_.end(), old.begin(), old.end());
       continue;
     }
     if (std::binary_search(unmoved.begin(), unmoved.end(), pair)) {
-      entries_.insert(entries_.end(), old.begin(), old.end());
-      for (const CachedContact& entry : old) contacts_.push_back(moved_with_bodies(entry, states));
-    } else {
-      const RelativePose now = relative_pose(pair, bodies, states);
-      for (const ContactPoint& contact : fresh) entries_.push_back(cached(contact, now, states));
-      contacts_.insert(contacts_.end(), fresh.begin(), fresh.end());
-      PairMatch match(old, std::span(entries_).subspan(first));
-      match.by_feature();
-      match.by_position(kNear * smaller_radius(pair, bodies));
-      match.share_rest();
+      for (const CachedContact& entry : old) add(entry, moved_with_bodies(entry, states));
+      continue;
     }
-    for (std::size_t i = first; i < entries_.size(); ++i) place_.push_back(static_cast<std::uint32_t>(i));
+    const double radius = smaller_radius(pair, bodies), near = kNear * radius;
+    const RelativePose now = relative_pose(pair, bodies, states);
+    const std::size_t first = entries_.size(), first_contact = contacts_.size();
+    for (const ContactPoint& contact : fresh) add(cached(contact, now, states), contact);
+    for (CachedContact entry : old) {
+      const ContactPoint moved = moved_with_bodies(entry, states);
+      const auto is_near = [&](const ContactPoint& one) {
+        return (one.position - moved.position).norm() <= near;
+      };
+      if (!is_just_lost(entry, moved, states, gap, near)) continue;
+      if (std::any_of(contacts_.begin() + static_cast<std::ptrdiff_t>(first_contact), contacts_.end(),
+                      is_near))
+        continue;
+      entry.found_at = now, entry.impulse = {};
+      add(entry, moved);
+    }
+    PairMatch match(old, std::span(entries_).subspan(first));
+    match.by_feature();
+    match.by_position(kMatches * radius);
+    match.share_rest();
   }
+}
+
+void ContactCache::add(const CachedContact& entry, const ContactPoint& contact) {
+  place_.push_back(static_cast<std::uint32_t>(entries_.size()));
+  entries_.push_back(entry);
+  contacts_.push_back(contact);
 }
 
 std::vector<ContactImpulse> ContactCache::impulses() const {
@@ -179,7 +206,11 @@ std::vector<ContactImpulse> ContactCache::impulses() const {
 }
 
 void ContactCache::remember(std::span<const ContactImpulse> impulses) {
-  for (std::size_t i = 0; i < impulses.size(); ++i) entries_[place_[i]].impulse = impulses[i];
+  for (std::size_t i = 0; i < impulses.size(); ++i) {
+    CachedContact& entry = entries_[place_[i]];
+    entry.impulse = impulses[i];
+    entry.quiet_steps = impulses[i].normal > 0 ? 0 : entry.quiet_steps + 1;
+  }
 }
 
 }  // namespace tandem::simulation

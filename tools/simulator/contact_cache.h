@@ -23,8 +23,10 @@ struct CachedContact {
   Eigen::Vector3d in_a, in_b;   ///< the position, in the bodies' frames about their centres of mass
   Eigen::Vector3d normal_in_a;  ///< the normal, likewise
   double depth;
-  RelativePose found_at;   ///< of its bodies; this and the above are of when it was found
-  ContactImpulse impulse;  ///< of the last step
+  RelativePose found_at;  ///< of its bodies, when the pair's contacts were last found; those above are of
+                          ///< when this one was
+  std::uint32_t quiet_steps;  ///< since it was found or pushed
+  ContactImpulse impulse;     ///< of the last step
 };
 
 /// Keeps the contacts of bodies that hardly move against each other, and impulses, so that a solver starts
@@ -38,15 +40,21 @@ class ContactCache {
                                 double reach) const;
 
   /// Makes the contacts of a step. Unmoved pairs have those remembered, moved with the bodies; these may have
-  /// become gaps. All others have those found, each with the impulse of the remembered one of the pair that
-  /// has the same feature, or else of the nearest one within a tenth of the smaller body's radius; each is
-  /// given once. What then is left of a pair's normal impulse and of what resists turning is shared out among
-  /// its contacts that got none, so that a pair pushes as it did although its points have changed. Pairs of
-  /// two idle bodies stay remembered and are left out. Conditions: found comes by ascending pair; unmoved is
-  /// unmoved()'s answer for these states; idle is empty or has an entry for each body.
+  /// become gaps. All others have those found, and those just lost: remembered ones that are gaps of at most
+  /// `gap` along the normal, slid by at most a fiftieth of the smaller body's radius, with no other contact
+  /// of the pair that near, for at most eight steps since they pushed. Without these a body that comes off by
+  /// a hair falls freely for a whole step, and deeper than it was.
+  ///
+  /// These contacts start with the impulse of the remembered one of the pair that has the same feature, or
+  /// else of the nearest one within a tenth of the smaller body's radius; each is given once. What then is
+  /// left of a pair's normal impulse and of what resists turning is shared out among its contacts that got
+  /// none, so that a pair pushes as it did although its points have changed.
+  ///
+  /// Pairs of two idle bodies stay remembered and are left out. Conditions: found comes by ascending pair;
+  /// unmoved is unmoved()'s answer for these states; idle is empty or has an entry for each body; gap >= 0.
   void update(std::span<const ContactPoint> found, std::span<const BodyPair> unmoved,
               std::span<const BodyProperties> bodies, std::span<const BodyState> states,
-              std::span<const std::uint8_t> idle);
+              std::span<const std::uint8_t> idle, double gap);
 
   /// Of the step that update() was last called for, by ascending pair.
   std::span<const ContactPoint> contacts() const { return contacts_; }
@@ -64,6 +72,8 @@ class ContactCache {
   void restore(std::vector<CachedContact> entries) { entries_ = std::move(entries); }
 
  private:
+  void add(const CachedContact& entry, const ContactPoint& contact);
+
   std::vector<CachedContact> entries_;  // by ascending pair
   std::vector<ContactPoint> contacts_;
   std::vector<std::uint32_t> place_;  // of each contact in entries_

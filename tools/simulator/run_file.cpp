@@ -167,7 +167,7 @@ Trajectory read_trajectory(const Hdf5Input& file, const std::string& path, std::
 
 void write_contacts(Hdf5Output& file, std::span<const CachedContact> contacts) {
   std::vector<double> in_a, in_b, normal_in_a, depth, translation, rotation, normal, tangential, turning;
-  std::vector<std::uint32_t> pair;
+  std::vector<std::uint32_t> pair, quiet;
   std::vector<std::uint64_t> feature;
   for (const CachedContact& contact : contacts) {
     pair.insert(pair.end(), {contact.body_a, contact.body_b});
@@ -175,6 +175,7 @@ void write_contacts(Hdf5Output& file, std::span<const CachedContact> contacts) {
     append(in_a, contact.in_a), append(in_b, contact.in_b), append(normal_in_a, contact.normal_in_a);
     depth.push_back(contact.depth);
     append(translation, contact.found_at.translation), append(rotation, contact.found_at.rotation);
+    quiet.push_back(contact.quiet_steps);
     normal.push_back(contact.impulse.normal), append(tangential, contact.impulse.tangential);
     append(turning, contact.impulse.turning);
   }
@@ -187,6 +188,7 @@ void write_contacts(Hdf5Output& file, std::span<const CachedContact> contacts) {
   file.add("/state/contacts/depth", {count}, depth);
   file.add("/state/contacts/found_at_translation", {count, 3}, translation);
   file.add("/state/contacts/found_at_rotation", {count, 4}, rotation);
+  file.add("/state/contacts/quiet_steps", {count}, quiet);
   file.add("/state/contacts/normal_impulse", {count}, normal);
   file.add("/state/contacts/tangential_impulse", {count, 3}, tangential);
   file.add("/state/contacts/turning_impulse", {count, 3}, turning);
@@ -219,13 +221,14 @@ std::vector<CachedContact> read_contacts(const Hdf5Input& file, const std::strin
   const auto depth = file.read_f64("/state/contacts/depth");
   const auto translation = file.read_f64("/state/contacts/found_at_translation", {3});
   const auto rotation = file.read_f64("/state/contacts/found_at_rotation", {4});
+  const auto quiet = file.read_u32("/state/contacts/quiet_steps");
   const auto normal = file.read_f64("/state/contacts/normal_impulse");
   const auto tangential = file.read_f64("/state/contacts/tangential_impulse", {3});
   const auto turning = file.read_f64("/state/contacts/turning_impulse", {3});
   const std::size_t count = feature.size();
   for (const std::size_t rows : {pair.size() / 2, in_a.size() / 3, in_b.size() / 3, normal_in_a.size() / 3,
-                                 depth.size(), translation.size() / 3, rotation.size() / 4, normal.size(),
-                                 tangential.size() / 3, turning.size() / 3}) {
+                                 depth.size(), translation.size() / 3, rotation.size() / 4, quiet.size(),
+                                 normal.size(), tangential.size() / 3, turning.size() / 3}) {
     if (rows != count) throw FileError(path + ": /state/contacts: datasets of different lengths");
   }
   std::vector<CachedContact> contacts;
@@ -238,6 +241,7 @@ std::vector<CachedContact> read_contacts(const Hdf5Input& file, const std::strin
                         vector_at(normal_in_a, i),
                         depth[i],
                         {vector_at(translation, i), turn_at(rotation, i)},
+                        quiet[i],
                         {normal[i], vector_at(tangential, i), vector_at(turning, i)}});
   }
   return contacts;

@@ -64,9 +64,11 @@ StepRecord Simulator::step_in_arena() {
 }
 
 void Simulator::find_contacts(StepRecord& record) {
+  constexpr double kFall = 2;  // times what gravity lets a body fall in a step
   const std::vector<BodyPair> unmoved = cache_.unmoved(bodies_, states_, options_.solver.slop);
   const std::vector<ContactPoint>& found = finder_->find(poses(), idle(), unmoved);
-  cache_.update(found, unmoved, bodies_, states_, idle());
+  const double gap = kFall * options_.gravity.norm() * options_.dt * options_.dt;
+  cache_.update(found, unmoved, bodies_, states_, idle(), gap);
   take(record, finder_->report());
   record.contacts = cache_.contacts().size();
   for (const ContactPoint& contact : cache_.contacts()) {

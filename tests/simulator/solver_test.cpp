@@ -256,5 +256,26 @@ TEST(Soft, TheOrderOfBodiesDoesNotFellATower) {
   EXPECT_TRUE(std::is_sorted(heights.begin(), heights.end()));
 }
 
+// Two boxes that are held deep in each other from both sides push for what one side is deeper than the other.
+TEST(Soft, BodiesHeldFromBothSidesAreNotSqueezed) {
+  const double weight = kGravity * OneStep::kDt;
+  for (const double deeper : {0.0, 0.01}) {
+    OneStep step(Tower(masses(2), kSlop));
+    step.options.substeps = 16;
+    step.contacts = {{1, 2, {0, 0, 1.4}, {0, 0, 1}, 0.02 + deeper, 0},
+                     {1, 2, {0, 0, 0.6}, {0, 0, -1}, 0.02, 0}};
+    IslandProblem problem = step.problem();
+    solve_soft_step(problem, step.input(), step.options);
+    const double strongest = std::max(problem.impulse[0].x(), problem.impulse[1].x());
+    const double apart = problem.displacement[2].z() - problem.displacement[1].z();
+    EXPECT_LT(strongest, (deeper > 0 ? 200 : 60) * weight);  // 480 by the depth of each side alone
+    if (deeper > 0) {
+      EXPECT_GT(apart, 0.0005);  // the other way by the depth of each side alone
+    } else {
+      EXPECT_LT(std::fabs(apart), 0.001);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace tandem::simulation

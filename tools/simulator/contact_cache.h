@@ -23,8 +23,8 @@ struct CachedContact {
   Eigen::Vector3d in_a, in_b;   ///< the position, in the bodies' frames about their centres of mass
   Eigen::Vector3d normal_in_a;  ///< the normal, likewise
   double depth;
-  RelativePose found_at;  ///< of its bodies, when the pair's contacts were last found; those above are of
-                          ///< when this one was
+  RelativePose found_at;      ///< of its bodies, when the pair's contacts were last found; those above are of
+                              ///< when this one was
   std::uint32_t quiet_steps;  ///< since it was found or pushed
   ContactImpulse impulse;     ///< of the last step
 };

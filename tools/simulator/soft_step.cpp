@@ -23,6 +23,8 @@ class SoftStep {
  public:
   SoftStep(IslandProblem& problem, const StepInput& input, const SolverOptions& options)
       : p_(problem),
+        contacts_(input.contacts),
+        slop_(options.slop),
         friction_(options.friction),
         rolling_resistance_(options.rolling_resistance),
         substeps_(options.substeps),
@@ -34,6 +36,7 @@ class SoftStep {
     constexpr int kRelaxingSweeps = 2;
     const std::size_t bodies = p_.bodies.size(), contacts = p_.contact_count();
     prepare();
+    find_opposed();
     std::vector<Vector6> start(bodies);
     for (std::uint32_t k = 0; k < substeps_; ++k) {
       for (std::size_t j = 1; j < bodies; ++j) {
@@ -87,6 +90,28 @@ class SoftStep {
     }
   }
 
+  // Bodies that impact has driven into each other may be held from both sides: what pushes one way makes the
+  // other deeper, the pushes are hundreds of times their weight, and whichever point is found next throws
+  // them about. So a deep contact pushes for what it is deeper than the same pair's contacts that push
+  // against it.
+  void find_opposed() {
+    constexpr double kDeep = 4;  // slops
+    const double deep = kDeep * slop_;
+    opposed_.assign(p_.contact_count(), 0);
+    for (const TouchingPair& pair : p_.pairs) {
+      for (std::uint32_t i = pair.begin; i < pair.end; ++i) {
+        if (p_.separation[i] > -deep) continue;
+        const Vector3d& normal = contacts_[p_.contacts[i]].normal;
+        double opposed = 0;
+        for (std::uint32_t j = pair.begin; j < pair.end; ++j) {
+          const double along = normal.dot(contacts_[p_.contacts[j]].normal);
+          opposed = std::max(opposed, std::min(along, 0.0) * std::min(p_.separation[j], 0.0));
+        }
+        opposed_[i] = std::min(opposed, -deep - p_.separation[i]);
+      }
+    }
+  }
+
   void add(const ContactRow& row, std::size_t i, double impulse) {
     // What is not moved has a gradient of zero, so that place 0 stays 0.
     p_.velocity[p_.a[i]] += impulse * row.a;
@@ -107,9 +132,9 @@ class SoftStep {
   void visit_soft(std::size_t i) {
     constexpr double kFastestPush = 3;  // m/s
     if (followed_[i] > 0) return visit_normal(i, followed_[i] / h_, 1, 0);
+    const double s = std::min(0.0, followed_[i] + opposed_[i]);
     const Softness& soft = p_.a[i] == 0 || p_.b[i] == 0 ? against_unmoved_ : between_movers_;
-    visit_normal(i, std::max(soft.bias_rate * followed_[i], -kFastestPush), soft.mass_scale,
-                 soft.impulse_scale);
+    visit_normal(i, std::max(soft.bias_rate * s, -kFastestPush), soft.mass_scale, soft.impulse_scale);
   }
 
   void relax(std::size_t i, double time) {
@@ -153,12 +178,15 @@ class SoftStep {
   }
 
   IslandProblem& p_;
+  std::span<const ContactPoint> contacts_;
+  double slop_;
   double friction_, rolling_resistance_;
   std::uint32_t substeps_;
   double h_;
   Softness between_movers_, against_unmoved_;
   std::vector<double> normal_mass_, friction_mass_;
   std::vector<double> followed_;   // separations as they change
+  std::vector<double> opposed_;    // by how much depth the push is less
   std::vector<double> strongest_;  // largest impulse along the normal
   std::vector<Vector6> pushed_;    // what the contacts of a substep have added to the velocities
 };

@@ -149,7 +149,6 @@ std::vector<BodyPair> ContactCache::unmoved(std::span<const BodyProperties> bodi
 void ContactCache::update(std::span<const ContactPoint> found, std::span<const BodyPair> unmoved,
                           std::span<const BodyProperties> bodies, std::span<const BodyState> states,
                           std::span<const std::uint8_t> idle, double gap) {
-  constexpr double kNear = 0.02, kMatches = 0.1;  // of the smaller body's radius
   const std::vector<CachedContact> before = std::move(entries_);
   is_cold_ = before.empty();
   entries_.clear(), contacts_.clear(), place_.clear();
@@ -167,29 +166,33 @@ void ContactCache::update(std::span<const ContactPoint> found, std::span<const B
     }
     if (std::binary_search(unmoved.begin(), unmoved.end(), pair)) {
       for (const CachedContact& entry : old) add(entry, moved_with_bodies(entry, states));
-      continue;
+    } else {
+      renew(old, fresh, relative_pose(pair, bodies, states), states, gap, smaller_radius(pair, bodies));
     }
-    const double radius = smaller_radius(pair, bodies), near = kNear * radius;
-    const RelativePose now = relative_pose(pair, bodies, states);
-    const std::size_t first = entries_.size(), first_contact = contacts_.size();
-    for (const ContactPoint& contact : fresh) add(cached(contact, now, states), contact);
-    for (CachedContact entry : old) {
-      const ContactPoint moved = moved_with_bodies(entry, states);
-      const auto is_near = [&](const ContactPoint& one) {
-        return (one.position - moved.position).norm() <= near;
-      };
-      if (!is_just_lost(entry, moved, states, gap, near)) continue;
-      if (std::any_of(contacts_.begin() + static_cast<std::ptrdiff_t>(first_contact), contacts_.end(),
-                      is_near))
-        continue;
-      entry.found_at = now, entry.impulse = {};
-      add(entry, moved);
-    }
-    PairMatch match(old, std::span(entries_).subspan(first));
-    match.by_feature();
-    match.by_position(kMatches * radius);
-    match.share_rest();
   }
+}
+
+void ContactCache::renew(std::span<const CachedContact> old, std::span<const ContactPoint> found,
+                         const RelativePose& now, std::span<const BodyState> states, double gap,
+                         double radius) {
+  constexpr double kNear = 0.02, kMatches = 0.1;  // of the smaller body's radius
+  const double near = kNear * radius;
+  const std::size_t first = entries_.size(), first_contact = contacts_.size();
+  for (const ContactPoint& contact : found) add(cached(contact, now, states), contact);
+  for (CachedContact entry : old) {
+    const ContactPoint moved = moved_with_bodies(entry, states);
+    const auto is_near = [&](const ContactPoint& one) {
+      return (one.position - moved.position).norm() <= near;
+    };
+    const auto others = std::span(contacts_).subspan(first_contact);
+    if (!is_just_lost(entry, moved, states, gap, near) || std::ranges::any_of(others, is_near)) continue;
+    entry.found_at = now, entry.impulse = {};
+    add(entry, moved);
+  }
+  PairMatch match(old, std::span(entries_).subspan(first));
+  match.by_feature();
+  match.by_position(kMatches * radius);
+  match.share_rest();
 }
 
 void ContactCache::add(const CachedContact& entry, const ContactPoint& contact) {

@@ -72,6 +72,9 @@ class ContactCache {
   void restore(std::vector<CachedContact> entries) { entries_ = std::move(entries); }
 
  private:
+  // Of a pair that moved: makes its contacts of those found and those just lost.
+  void renew(std::span<const CachedContact> old, std::span<const ContactPoint> found, const RelativePose& now,
+             std::span<const BodyState> states, double gap, double radius);
   void add(const CachedContact& entry, const ContactPoint& contact);
 
   std::vector<CachedContact> entries_;  // by ascending pair

@@ -30,7 +30,8 @@ struct SolverOptions {
                                ///< bodies; 0: default_substeps()
   double friction = 0.5;
   double restitution = 0;
-  double slop = 5e-4;                ///< penetration that is left alone, a length
+  double slop = 5e-4;                ///< a length: penetration that is left alone, and how far bodies that
+                                     ///< touch may move against each other until contacts are found anew
   double rolling_resistance = 8e-3;  ///< a length: a pair of bodies resists turning against each other by up
                                      ///< to this times the force that pushes them apart; not of sweeps
   bool warm_start = true;

@@ -478,6 +478,28 @@ TEST_P(HostileScene, GivesUnitNormalsAndFiniteDepths) {
 INSTANTIATE_TEST_SUITE_P(Scenes, HostileScene, testing::ValuesIn(scene_families()),
                          [](const auto& tested) { return std::string(tested.param.name); });
 
+TEST(ContactGeneration, PairsLeftOutHaveNoPointsAndOthersTheSame) {
+  ContactScene scene;
+  const std::uint32_t box = scene.add_shape(cube(0.5f, 2));
+  for (int i = 0; i < 4; ++i) scene.add_body(box, at(0.3 * i, 0, 0.99 * i));
+  const auto all = scene.points();
+  scene.leave_out({{0, 1}, {0, 3}, {2, 3}});
+  const auto rest = scene.points();
+  std::vector<ContactPoint> expected;
+  for (const ContactPoint& point : all) {
+    if (point.body_a == 1 && point.body_b == 2) expected.push_back(point);
+  }
+  ASSERT_FALSE(expected.empty());
+  ASSERT_LT(expected.size(), all.size());
+  ASSERT_EQ(rest.size(), expected.size());
+  for (std::size_t i = 0; i < rest.size(); ++i) {
+    EXPECT_EQ(rest[i].body_a, 1u);
+    EXPECT_EQ(rest[i].position, expected[i].position);
+    EXPECT_EQ(rest[i].depth, expected[i].depth);
+    EXPECT_EQ(rest[i].feature, expected[i].feature);
+  }
+}
+
 TEST(ContactGeneration, ThreadsDoNotChangeAByte) {
   ContactScene scene;
   RandomPoses random(7);

@@ -466,7 +466,7 @@ TEST_P(HostileScene, GivesUnitNormalsAndFiniteDepths) {
     engine->find(scene.instances, {}, found);
     simulation::ContactGenerator generator;
     generator.set_shapes(scene.assets.views());
-    for (const ContactPoint& p : generator.generate(found, scene.instances)) {
+    for (const ContactPoint& p : generator.generate(found, scene.instances, {})) {
       ASSERT_TRUE(p.position.allFinite());
       ASSERT_NEAR(p.normal.norm(), 1, 1e-9);
       ASSERT_TRUE(p.depth >= 0 && std::isfinite(p.depth)) << p.depth;

@@ -136,7 +136,8 @@ std::vector<BodyPair> ContactCache::unmoved(std::span<const BodyProperties> bodi
   std::vector<BodyPair> pairs;
   for (std::span<const CachedContact> rest = entries_; !rest.empty();) {
     const BodyPair pair = pair_of(rest.front());
-    const RelativePose &then = rest.front().found_at, now = relative_pose(pair, bodies, states);
+    const RelativePose& then = rest.front().found_at;
+    const RelativePose now = relative_pose(pair, bodies, states);
     // A point's way is at most that of the centre and an arc about it.
     const double way = (now.translation - then.translation).norm() +
                        smaller_radius(pair, bodies) * now.rotation.angularDistance(then.rotation);

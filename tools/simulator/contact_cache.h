@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "contact_point.h"
@@ -23,19 +24,20 @@ struct CachedContact {
   Eigen::Vector3d in_a, in_b;   ///< the position, in the bodies' frames about their centres of mass
   Eigen::Vector3d normal_in_a;  ///< the normal, likewise
   double depth;
-  RelativePose found_at;      ///< of its bodies, when the pair's contacts were last found; those above are of
-                              ///< when this one was
-  std::uint32_t quiet_steps;  ///< since it was found or pushed
+  RelativePose found_at;  ///< when contacts of the pair were last found, the same for all of the pair; the
+                          ///< above is of when this contact was
+  std::uint32_t quiet_steps;  ///< since it was found or last pushed
   ContactImpulse impulse;     ///< of the last step
 };
 
-/// Keeps the contacts of bodies that hardly move against each other, and impulses, so that a solver starts
-/// where it stopped. Contacts of meshes change with every triangle that comes or goes; found anew in each
-/// step they would shake what rests, and bodies that friction holds would creep until they slide.
+/// Remembers the contacts of a step and their impulses. Pairs that have not moved by more than a given reach
+/// keep their contacts: contacts of meshes change with every triangle that comes or goes, and found anew in
+/// each step they would shake what rests. The others start from the impulses of the step before.
 class ContactCache {
  public:
   /// The pairs whose contacts stay what they are: since these were found no point of the smaller body has
-  /// moved against the larger by more than `reach`, >= 0. Ascending.
+  /// moved against the larger by more than `reach`, >= 0, by the bound of the centre's way and the arc that
+  /// the turn makes at the body's radius. Ascending.
   std::vector<BodyPair> unmoved(std::span<const BodyProperties> bodies, std::span<const BodyState> states,
                                 double reach) const;
 

@@ -261,11 +261,16 @@ SimulatorState read_state(const Hdf5Input& file, const std::string& path, std::s
                     velocity.size() == 3 * bodies && spin.size() == 3 * bodies &&
                     state.quiet.size() == bodies && state.groups.size() == bodies;
   if (!fits) throw FileError(path + ": /state: not of " + std::to_string(bodies) + " bodies");
+  const auto by_pair = [](const CachedContact& one, const CachedContact& other) {
+    return std::pair(one.body_a, one.body_b) < std::pair(other.body_a, other.body_b);
+  };
   for (const CachedContact& contact : state.contacts) {
-    if (std::max(contact.body_a, contact.body_b) >= bodies) {
-      throw FileError(path + ": /state/contacts/pair: names a body that there is none of");
+    if (contact.body_a >= contact.body_b || contact.body_b >= bodies) {
+      throw FileError(path + ": /state/contacts/pair: not two bodies of the run, the lower first");
     }
   }
+  if (!std::is_sorted(state.contacts.begin(), state.contacts.end(), by_pair))
+    throw FileError(path + ": /state/contacts/pair: not ascending");
   state.step = step[0];
   for (std::size_t i = 0; i < bodies; ++i) {
     state.states.push_back(

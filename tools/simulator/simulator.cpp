@@ -65,11 +65,14 @@ StepRecord Simulator::step_in_arena() {
 
 void Simulator::find_contacts(StepRecord& record) {
   constexpr double kFall = 2;  // times what gravity lets a body fall in a step
+  const std::vector<std::uint8_t> idle = this->idle();
   const std::vector<BodyPair> unmoved = cache_.unmoved(bodies_, states_, options_.solver.slop);
-  const std::vector<ContactPoint>& found = finder_->find(poses(), idle(), unmoved);
-  const double gap = kFall * options_.gravity.norm() * options_.dt * options_.dt;
-  cache_.update(found, unmoved, bodies_, states_, idle(), gap);
+  const std::vector<ContactPoint>& found = finder_->find(poses(), idle, unmoved);
   take(record, finder_->report());
+  const Clock::time_point start = Clock::now();
+  const double gap = kFall * options_.gravity.norm() * options_.dt * options_.dt;
+  cache_.update(found, unmoved, bodies_, states_, idle, gap);
+  record.contact_seconds += seconds_since(start);
   record.contacts = cache_.contacts().size();
   for (const ContactPoint& contact : cache_.contacts()) {
     const double depth = std::max(contact.depth, 0.0);

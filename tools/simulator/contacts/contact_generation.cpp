@@ -28,15 +28,11 @@ const std::vector<ContactPoint>& ContactGenerator::generate(const ContactList& f
                                                             std::span<const BodyPair> left_out,
                                                             const ContactOptions& options) {
   contacts_.clear();
-  for (auto begin = found.triangles.begin(); begin != found.triangles.end();) {
-    const auto end =
-        std::find_if(begin, found.triangles.end(), [&](const auto& c) { return c.pair != begin->pair; });
-    const ObjectPair& pair = found.pairs[begin->pair];
-    if (!std::binary_search(left_out.begin(), left_out.end(), BodyPair{pair.a, pair.b})) {
-      for (const TriangleContact& c : std::span(begin, end))
-        contacts_.push_back({c.pair, c.triangle_a, c.triangle_b, 0, 0});
-    }
-    begin = end;
+  std::vector<char> is_left_out;
+  for (const ObjectPair& pair : found.pairs)
+    is_left_out.push_back(std::binary_search(left_out.begin(), left_out.end(), BodyPair{pair.a, pair.b}));
+  for (const TriangleContact& c : found.triangles) {
+    if (!is_left_out[c.pair]) contacts_.push_back({c.pair, c.triangle_a, c.triangle_b, 0, 0});
   }
   // The solvers remember by themselves what a point did in the step before.
   const ManifoldOptions manifold_options = {

@@ -32,7 +32,7 @@ class ContactGenerator {
   /// The points come by ascending pair of bodies, those of the pairs `left_out` not at all. Valid until the
   /// next call. Conditions: `found` is an engine's answer for these bodies; left_out is ascending.
   const std::vector<ContactPoint>& generate(const ContactList& found, std::span<const BodyPose> bodies,
-                                            std::span<const BodyPair> left_out = {},
+                                            std::span<const BodyPair> left_out,
                                             const ContactOptions& options = {});
 
   /// Of the last call.

@@ -13,7 +13,7 @@ namespace tandem::simulation {
 /// How a step is solved.
 enum class SolverKind : std::uint8_t {
   automatic,  ///< for each island Newton where that is the cheaper, else soft
-  soft,       ///< substeps of one sweep over soft contacts and one relaxing sweep
+  soft,       ///< substeps of one sweep over soft contacts and two that relax them
   newton,     ///< Newton's method on the whole island; soft where it does not converge
   sweeps,     ///< projected Gauss-Seidel
 };

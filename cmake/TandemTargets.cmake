@@ -3,8 +3,10 @@ include(GNUInstallDirs)
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME dev)
 
 # Flags that every target of the project is compiled with. -ffp-contract=off: promised results must not depend
-# on whether a compiler fuses a multiply and an add.
+# on whether a compiler fuses a multiply and an add. Headers that are not installed are spelled from the project's
+# root on, such as "kernels/geometry/triangle_test.h".
 function(tandem_flags target)
+  target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR})
   target_compile_options(${target} PRIVATE
     $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion -ffp-contract=off>)
   # GCC 12 sees overlapping copies in std::string's operator+ where there are none (GCC bug 105651).
@@ -49,7 +51,7 @@ function(tandem_library name)
   endif()
 endfunction()
 
-# Includes are spelled from tools/ on, such as "scenes/scene_file.h".
+# Includes are spelled from tools/ on, such as "bvhbench/scenes/scene_file.h".
 # tandem_tool_library(scenes SOURCES a.cpp DEPENDS PUBLIC x PRIVATE y): target tandem_scenes.
 function(tandem_tool_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})

@@ -1,5 +1,5 @@
-#include <tandem/kernels/contact_manifolds.h>
 #include <tandem/kernels/contact_query.h>
+#include <tandem/kernels/manifold_query.h>
 #include <tandem/runtime/map.h>
 #include <algorithm>
 #include <cmath>
@@ -65,7 +65,7 @@ int main(int, char** argv) {
   using tandem::Motion, tandem::Status;
   tandem::MappedAsset cube;
   tandem::ContactQuery query;
-  tandem::ContactManifolds manifolds;
+  tandem::ManifoldQuery manifolds;
   if (cube.open(argv[1]) != Status::kOk) return std::printf("%s cannot be read\n", argv[1]), 1;
   const tandem::AssetView assets[] = {cube.view()};
   if (query.set_assets(assets) != Status::kOk || manifolds.set_assets(assets) != Status::kOk) return 1;

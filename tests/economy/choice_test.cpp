@@ -1,4 +1,4 @@
-#include "economy/choice.h"
+#include "bvhbench/economy/choice.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "economy/difference.h"
+#include "bvhbench/economy/difference.h"
 
 #include <gtest/gtest.h>
 

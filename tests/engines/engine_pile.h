@@ -1,7 +1,7 @@
 #pragma once
 #include <algorithm>
 
-#include "engines/registry.h"
+#include "bvhbench/engines/registry.h"
 #include "simulator/contact_scene.h"
 
 namespace tandem::test {

@@ -77,7 +77,7 @@ INSTANTIATE_TEST_SUITE_P(Engines, Engine, testing::ValuesIn(engine_names()), [](
   return name;
 });
 
-std::string message_of(std::string_view name, const QueryOptions& options = {}) {
+std::string message_of(std::string_view name, const ContactOptions& options = {}) {
   try {
     make_engine(name, options);
   } catch (const std::runtime_error& error) {

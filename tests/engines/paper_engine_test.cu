@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "engines/paper/paper_engine.h"
+#include "bvhbench/engines/paper/paper_engine.h"
 #include "gpu/gpu_scene_fixture.h"
 #include "kernels/query_scenes.h"
 #include "tandem/kernels/contact_query.h"
@@ -17,10 +17,10 @@ namespace tandem::bench {
 namespace {
 
 using test::all_pairs;
+using test::BodyScene;
 using test::download;
 using test::GpuScene;
 using test::RandomPoses;
-using test::Scene;
 using test::sorted;
 
 constexpr PaperFlags kFlags[] = {PaperFlags::words, PaperFlags::bytes, PaperFlags::bits};
@@ -33,10 +33,10 @@ struct CpuAnswer {
   Status status;
   std::uint64_t where;
   std::vector<Contact> contacts;
-  QueryCounters counters;
+  ContactCounters counters;
 };
 
-CpuAnswer ask_cpu(const Scene& scene, const std::vector<ObjectPair>& pairs) {
+CpuAnswer ask_cpu(const BodyScene& scene, const std::vector<ObjectPair>& pairs) {
   ContactQuery query;
   EXPECT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
   const Status status = query.find_contacts(scene.instances, pairs, {});
@@ -57,7 +57,7 @@ void expect_contacts(PaperEngine& engine, const GpuScene& scene, const CpuAnswer
     for (const PaperFlags flags : kFlags) {
       SCOPED_TRACE(testing::Message() << "flags " << static_cast<int>(flags) << " six axes " << six_axes);
       ASSERT_EQ(ask(engine, scene, {QueryMode::exact, flags, six_axes}), Status::kOk);
-      const QueryCounters& counters = engine.report().counters;
+      const ContactCounters& counters = engine.report().counters;
       ASSERT_EQ(counters.contacts, expected.contacts.size());
       ASSERT_EQ(contacts_of(engine), expected.contacts);
       EXPECT_EQ(counters.candidates,
@@ -68,7 +68,7 @@ void expect_contacts(PaperEngine& engine, const GpuScene& scene, const CpuAnswer
   }
 }
 
-void expect_contacts_of(const Scene& scene, const std::vector<ObjectPair>& pairs) {
+void expect_contacts_of(const BodyScene& scene, const std::vector<ObjectPair>& pairs) {
   const CpuAnswer expected = ask_cpu(scene, pairs);
   const GpuScene on_gpu(scene.assets, scene.instances, pairs);
   PaperEngine engine;
@@ -84,7 +84,7 @@ class PaperContacts : public test::GpuTest {};
 class PaperContactsOf : public test::GpuTestOf<test::SceneFamily> {};
 
 /// Whether the float32 box tests take every pair, which is what the engine can do.
-bool in_reach(const Scene& scene, const std::vector<ObjectPair>& pairs) {
+bool in_reach(const BodyScene& scene, const std::vector<ObjectPair>& pairs) {
   const auto pose = [&](const Instance& instance) {
     return for_stored_coordinates(instance.pose, scene.assets.views()[instance.asset].header->origin);
   };
@@ -101,7 +101,7 @@ bool in_reach(const Scene& scene, const std::vector<ObjectPair>& pairs) {
 TEST_P(PaperContactsOf, AreThoseOfTheCpu) {
   RandomPoses random(1);
   for (int trial = 0; trial < test::trials(15, 20); ++trial) {
-    const Scene scene = GetParam().make(random);
+    const BodyScene scene = GetParam().make(random);
     const std::vector<ObjectPair> pairs = all_pairs(scene.instances, trial % 2 == 0, random);
     SCOPED_TRACE(testing::Message() << "trial " << trial << '\n' << test::text(scene));
     if (in_reach(scene, pairs)) {
@@ -120,9 +120,9 @@ INSTANTIATE_TEST_SUITE_P(, PaperContactsOf, testing::ValuesIn(test::scene_famili
                          [](const auto& family) { return std::string(family.param.name); });
 
 /// Bodies at random places, close enough to meet.
-Scene pile(std::uint32_t bodies, std::uint32_t triangles, double spread, std::uint64_t seed) {
+BodyScene pile(std::uint32_t bodies, std::uint32_t triangles, double spread, std::uint64_t seed) {
   RandomPoses random(seed);
-  Scene scene;
+  BodyScene scene;
   scene.assets.add(test::soup(random, triangles, 0.1));
   scene.assets.add(test::cube(0.5f, 12));
   for (std::uint32_t i = 0; i < bodies; ++i) {
@@ -132,8 +132,8 @@ Scene pile(std::uint32_t bodies, std::uint32_t triangles, double spread, std::ui
 }
 
 /// Cubes that touch, face on face: every candidate is a hard case.
-Scene stack(int side, int cells) {
-  Scene scene;
+BodyScene stack(int side, int cells) {
+  BodyScene scene;
   scene.assets.add(test::cube(0.5f, cells));
   for (int i = 0; i < side * side * side; ++i) {
     Pose pose = kIdentityPose;
@@ -146,7 +146,7 @@ Scene stack(int side, int cells) {
 
 TEST_F(PaperContacts, OfAPileAreThoseOfTheCpu) {
   RandomPoses random(2);
-  const Scene scene = pile(150, 3000, 4, 7);
+  const BodyScene scene = pile(150, 3000, 4, 7);
   const auto pairs = all_pairs(scene.instances, false, random);
   EXPECT_GT(ask_cpu(scene, pairs).contacts.size(), 10000u);
   expect_contacts_of(scene, pairs);
@@ -154,7 +154,7 @@ TEST_F(PaperContacts, OfAPileAreThoseOfTheCpu) {
 
 TEST_F(PaperContacts, OfAnExactStackAreThoseOfTheCpu) {
   RandomPoses random(3);
-  const Scene scene = stack(4, 3);
+  const BodyScene scene = stack(4, 3);
   const auto pairs = all_pairs(scene.instances, true, random);
   EXPECT_GT(ask_cpu(scene, pairs).contacts.size(), 10000u);
   expect_contacts_of(scene, pairs);
@@ -163,7 +163,7 @@ TEST_F(PaperContacts, OfAnExactStackAreThoseOfTheCpu) {
 // Trees of different depths: one side descends alone for long.
 TEST_F(PaperContacts, OfALargeBodyAndASmallOneAreThoseOfTheCpu) {
   RandomPoses random(4);
-  Scene scene;
+  BodyScene scene;
   scene.assets.add(test::soup(random, 8000, 0.05));
   scene.assets.add(test::cube(0.5f));
   test::Mesh one;
@@ -176,7 +176,7 @@ TEST_F(PaperContacts, OfALargeBodyAndASmallOneAreThoseOfTheCpu) {
 
 // The same candidates, each once, as every node pair of the leaves says: no flag is lost and none is double.
 TEST_F(PaperContacts, OfRepeatedTrianglesAreAllPairs) {
-  Scene scene;
+  BodyScene scene;
   test::Mesh mesh;
   for (int i = 0; i < 700; ++i) mesh.add({0, 0, 0}, {1, 0, 0}, {0, 1, 0.5f});
   scene.assets.add(mesh);
@@ -200,7 +200,7 @@ TEST_F(PaperContacts, OfRepeatedTrianglesAreAllPairs) {
 
 TEST_F(PaperContacts, OfBoxesIncludeAllContacts) {
   RandomPoses random(5);
-  const Scene scene = pile(60, 800, 3, 9);
+  const BodyScene scene = pile(60, 800, 3, 9);
   const auto pairs = all_pairs(scene.instances, true, random);
   const CpuAnswer expected = ask_cpu(scene, pairs);
   const GpuScene on_gpu(scene.assets, scene.instances, pairs);
@@ -226,7 +226,7 @@ TEST_F(PaperContacts, OfLargerAndLargerScenesNeedNoNewEngine) {
   PaperEngine engine;
   std::size_t bytes = 0;
   for (const std::uint32_t bodies : {4u, 30u, 90u}) {
-    const Scene scene = pile(bodies, 800, 2, 10);
+    const BodyScene scene = pile(bodies, 800, 2, 10);
     const auto pairs = all_pairs(scene.instances, false, random);
     const CpuAnswer expected = ask_cpu(scene, pairs);
     const GpuScene on_gpu(scene.assets, scene.instances, pairs);
@@ -237,7 +237,7 @@ TEST_F(PaperContacts, OfLargerAndLargerScenesNeedNoNewEngine) {
     for (int again = 0; again < 3; ++again) expect_contacts(engine, on_gpu, expected);
     EXPECT_EQ(engine.bytes(), bytes);  // settled
   }
-  const Scene small = pile(3, 100, 1, 11);
+  const BodyScene small = pile(3, 100, 1, 11);
   const auto pairs = all_pairs(small.instances, false, random);
   const GpuScene on_gpu(small.assets, small.instances, pairs);
   ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk);
@@ -246,19 +246,19 @@ TEST_F(PaperContacts, OfLargerAndLargerScenesNeedNoNewEngine) {
 
 TEST_F(PaperContacts, OfNothingAreNone) {
   for (const bool instances : {false, true}) {
-    Scene scene = pile(2, 100, 1, 11);
+    BodyScene scene = pile(2, 100, 1, 11);
     if (!instances) scene.instances.clear();
     const GpuScene on_gpu(scene.assets, scene.instances, {});
     PaperEngine engine;
     ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk);
     EXPECT_EQ(ask(engine, on_gpu, {}), Status::kOk);
-    EXPECT_EQ(engine.report().counters, QueryCounters());
+    EXPECT_EQ(engine.report().counters, ContactCounters());
     EXPECT_EQ(engine.report().levels, 0u);
   }
 }
 
 TEST_F(PaperContacts, NameWhatIsWrong) {
-  Scene scene = pile(50, 100, 1, 12);
+  BodyScene scene = pile(50, 100, 1, 12);
   std::vector<ObjectPair> pairs;
   for (std::uint32_t i = 1; i < 50; ++i) pairs.push_back({0, i});
   const auto expect = [&](Status status, std::uint64_t where) {
@@ -276,7 +276,7 @@ TEST_F(PaperContacts, NameWhatIsWrong) {
 }
 
 TEST_F(PaperContacts, OutOfReachOfFloat32AreRefused) {
-  Scene scene = pile(4, 40, 1, 8);
+  BodyScene scene = pile(4, 40, 1, 8);
   for (Instance& instance : scene.instances) instance.pose.translation[1] += 1e52;
   const GpuScene on_gpu(scene.assets, scene.instances, {{0, 1}, {2, 3}});
   PaperEngine engine;
@@ -289,7 +289,7 @@ TEST_F(PaperContacts, OutOfReachOfFloat32AreRefused) {
 }
 
 TEST_F(PaperContacts, MoveFromOneOwnerToAnother) {
-  const Scene scene = pile(10, 300, 1, 14);
+  const BodyScene scene = pile(10, 300, 1, 14);
   const GpuScene on_gpu(scene.assets, scene.instances, {{0, 1}, {2, 3}});
   PaperEngine first;
   ASSERT_EQ(first.set_assets(on_gpu.assets(), nullptr), Status::kOk);

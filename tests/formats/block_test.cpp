@@ -6,9 +6,9 @@
 #include <random>
 #include <vector>
 
-#include "kernels/plain_boxes.h"
+#include "kernels/common/plain_boxes.h"
+#include "kernels/geometry/box_test.h"
 #include "tandem/formats/box.h"
-#include "tandem/kernels/detail/box_test.h"
 
 namespace tandem {
 namespace {

@@ -46,7 +46,7 @@ int main(int argc, char** argv) {
   tandem::GpuArray<tandem::AssetBounds> gpu_bounds;
   tandem::GpuArray<std::uint32_t> asset_of_body;
   tandem::GpuArray<tandem::Pose> poses;
-  tandem::GpuArray<tandem::GpuQueryReport> history;
+  tandem::GpuArray<tandem::GpuContactReport> history;
   for (const cudaError_t error : {gpu_bounds.upload({&bounds, 1}, stream), asset_of_body.reserve(kBodies),
                                   poses.reserve(kBodies), history.reserve(kSteps)}) {
     if (error != cudaSuccess) return fail("scene", tandem::status_of(error), error);
@@ -77,12 +77,12 @@ int main(int argc, char** argv) {
                     stream);
   }
 
-  std::vector<tandem::GpuQueryReport> reports(kSteps);
-  if (const cudaError_t error = tandem::download<tandem::GpuQueryReport>(history.data(), reports, stream);
+  std::vector<tandem::GpuContactReport> reports(kSteps);
+  if (const cudaError_t error = tandem::download<tandem::GpuContactReport>(history.data(), reports, stream);
       error != cudaSuccess)
     return fail("steps", tandem::status_of(error), error);
   for (int step = 0; step < kSteps; ++step) {
-    const tandem::GpuQueryReport& report = reports[step];
+    const tandem::GpuContactReport& report = reports[step];
     if (report.status != tandem::Status::kOk) {
       std::printf("step %d: body %d: ", step, static_cast<int>(report.where));
       return fail("contacts", report.status, cudaSuccess);

@@ -1,6 +1,6 @@
 #include <tandem/formats/gpu_status.h>
 #include <tandem/kernels/gpu_broad_phase.h>
-#include <tandem/kernels/gpu_contact_manifolds.h>
+#include <tandem/kernels/gpu_manifold_query.h>
 #include <tandem/kernels/motion.h>
 #include <tandem/runtime/map.h>
 #include <tandem/runtime/upload.h>
@@ -82,7 +82,7 @@ int main(int, char** argv) {
   DeviceAssets uploaded;
   GpuBroadPhase broad;
   GpuContactQuery query;
-  GpuContactManifolds manifolds;
+  GpuManifoldQuery manifolds;
   must(cube.open(argv[1])), must(uploaded.upload({&cube.view(), 1}, Contents::manifolds, stream));
   const GpuAsset asset = gpu_asset(uploaded.level(0), cube.view());
   bounds = asset_bounds(*cube.view().header);

@@ -6,10 +6,10 @@
 #include <random>
 #include <vector>
 
+#include "kernels/geometry/box_test.h"
+#include "kernels/geometry/relative_pose.h"
 #include "tandem/formats/gpu_memory.h"
 #include "tandem/formats/gpu_stream.h"
-#include "tandem/kernels/detail/box_test.h"
-#include "tandem/kernels/detail/relative_pose.h"
 #include "tandem/runtime/map.h"
 #include "tandem/runtime/upload.h"
 

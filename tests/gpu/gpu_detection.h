@@ -8,8 +8,8 @@
 #include "tandem/formats/gpu_memory.h"
 #include "tandem/formats/gpu_status.h"
 #include "tandem/kernels/gpu_broad_phase.h"
-#include "tandem/kernels/gpu_contact_manifolds.h"
 #include "tandem/kernels/gpu_containment_query.h"
+#include "tandem/kernels/gpu_manifold_query.h"
 #include "tandem/runtime/upload.h"
 
 namespace tandem::test {
@@ -75,7 +75,7 @@ class GpuDetection {
   std::uint32_t mesh_count_ = 0;
   GpuBroadPhase broad_;
   GpuContactQuery query_;
-  GpuContactManifolds manifolds_;
+  GpuManifoldQuery manifolds_;
   GpuContainmentQuery containment_;
 };
 

@@ -36,9 +36,9 @@ template <typename Parameter>
 using GpuTestOf = NeedsGpu<testing::TestWithParam<Parameter>>;
 
 /// With TANDEM_GPU_BLOCKS=N, queries take N blocks at most: for tools that are slow where warps wait.
-inline GpuQueryOptions gpu_options(QueryMode mode, bool first_contact_only = false) {
+inline GpuContactOptions gpu_options(QueryMode mode, bool first_contact_only = false) {
   const char* blocks = std::getenv("TANDEM_GPU_BLOCKS");
-  GpuQueryOptions options = {mode, first_contact_only};
+  GpuContactOptions options = {mode, first_contact_only};
   if (blocks != nullptr) options.most_blocks = static_cast<std::uint32_t>(std::atoi(blocks));
   return options;
 }
@@ -130,9 +130,9 @@ class GpuScene {
 };
 
 /// Bodies at random places, close enough to meet.
-inline Scene pile(std::uint32_t bodies, std::uint32_t triangles, double spread, std::uint64_t seed) {
+inline BodyScene pile(std::uint32_t bodies, std::uint32_t triangles, double spread, std::uint64_t seed) {
   RandomPoses random(seed);
-  Scene scene;
+  BodyScene scene;
   scene.assets.add(soup(random, triangles, 0.1));
   scene.assets.add(cube(0.5f, 12));
   for (std::uint32_t i = 0; i < bodies; ++i) {

@@ -5,16 +5,16 @@
 #include <utility>
 #include <vector>
 
-#include "device_limits.h"
 #include "gpu_scene_fixture.h"
+#include "kernels/common/device_limits.h"
+#include "kernels/contact/walk_shape.h"
 #include "tandem/kernels/gpu_broad_phase.h"
-#include "walk_shape.h"
 
 namespace tandem {
 namespace {
 
+using test::BodyScene;
 using test::GpuScene;
-using test::Scene;
 
 struct Kind {
   const char* name;
@@ -36,7 +36,7 @@ constexpr Kind kKinds[] = {{"Rtx3080", {101'376, 68, false}},
 /// The kind of GPU is that at the time of set_assets().
 class GpuOfKind : public test::GpuTestOf<Kind> {
  protected:
-  void expect_contacts_of_the_cpu(const Scene& scene, const std::vector<ObjectPair>& pairs) {
+  void expect_contacts_of_the_cpu(const BodyScene& scene, const std::vector<ObjectPair>& pairs) {
     const GpuScene on_gpu(scene.assets, scene.instances, pairs);
     GpuContactQuery gpu;
     {
@@ -47,7 +47,7 @@ class GpuOfKind : public test::GpuTestOf<Kind> {
     ContactQuery cpu;
     ASSERT_EQ(cpu.set_assets(scene.assets.views()), Status::kOk);
     for (const QueryMode mode : {QueryMode::exact, QueryMode::fast, QueryMode::boxes}) {
-      QueryOptions options;
+      ContactOptions options;
       options.mode = mode;
       ASSERT_EQ(cpu.find_contacts(scene.instances, pairs, options), Status::kOk);
       const std::vector<Contact> expected = test::sorted({cpu.contacts().begin(), cpu.contacts().end()});
@@ -65,7 +65,7 @@ class GpuOfKind : public test::GpuTestOf<Kind> {
 
 TEST_P(GpuOfKind, FindsTheContactsOfTheDeepestTrees) {
   test::RandomPoses random(51);
-  Scene scene;
+  BodyScene scene;
   const test::Mesh mesh = test::soup(random, test::kTrianglesOfDeepestTree, 0.7);
   scene.assets.add(mesh, test::make_file(mesh, test::deepest_tree(mesh)));
   ASSERT_EQ(scene.assets.views()[0].level().depth, kMaxDepth);
@@ -75,14 +75,14 @@ TEST_P(GpuOfKind, FindsTheContactsOfTheDeepestTrees) {
 
 TEST_P(GpuOfKind, FindsTheContactsOfAPile) {
   test::RandomPoses random(52);
-  const Scene scene = test::pile(60, 1500, 2, 52);
+  const BodyScene scene = test::pile(60, 1500, 2, 52);
   expect_contacts_of_the_cpu(scene, test::all_pairs(scene.instances, false, random));
 }
 
 /// Beyond the reach of float32, bodies are walked by world boxes.
 TEST_P(GpuOfKind, FindsContactsFarAway) {
   test::RandomPoses random(53);
-  Scene scene;
+  BodyScene scene;
   scene.assets.add(test::soup(random, 400, 0.1));
   for (int i = 0; i < 8; ++i) scene.instances.push_back({0, random.pose({1, 1, 0.1, 0, 4})});
   for (Instance& instance : scene.instances) instance.pose.translation[1] += 1e52;
@@ -100,7 +100,7 @@ Pairs sorted_pairs_of(GpuBroadPhase& broad, const GpuScene& scene, const GpuAsse
 }
 
 TEST_P(GpuOfKind, FindsObjectPairs) {
-  const Scene scene = test::pile(20'000, 12, 30, 54);
+  const BodyScene scene = test::pile(20'000, 12, 30, 54);
   const GpuScene on_gpu(scene.assets, scene.instances, {});
   std::vector<AssetBounds> bounds;
   for (const AssetView& view : scene.assets.views()) bounds.push_back(asset_bounds(*view.header));

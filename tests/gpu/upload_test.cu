@@ -9,10 +9,10 @@
 
 #include "build/sample_asset.h"
 #include "gpu_scene_fixture.h"
-#include "kernels/plain_boxes.h"
+#include "kernels/common/plain_boxes.h"
+#include "kernels/geometry/box_test.h"
 #include "made_files.h"
 #include "staged_copy.h"
-#include "tandem/kernels/detail/box_test.h"
 #include "tandem/runtime/upload.h"
 
 namespace tandem {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "work_sharing.h"
+#include "kernels/contact/work_sharing.h"
 
 namespace tandem::test {
 

@@ -1,5 +1,5 @@
 // How a walk is launched on GPUs of many kinds, and the room that its rule leaves in a warp's stack.
-#include "walk_shape.h"
+#include "kernels/contact/walk_shape.h"
 
 #include <gtest/gtest.h>
 

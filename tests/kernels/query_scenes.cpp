@@ -83,7 +83,7 @@ void move(Pose& pose, double x, double y, double z) {
 
 /// A number of instances of any asset, posed by `make_pose`.
 template <class MakePose>
-void add_instances(Scene& scene, RandomPoses& random, MakePose make_pose) {
+void add_instances(BodyScene& scene, RandomPoses& random, MakePose make_pose) {
   const std::uint64_t count = 2 + random.below(4);
   for (std::uint64_t i = 0; i < count; ++i) {
     scene.instances.push_back({static_cast<std::uint32_t>(random.below(scene.assets.size())), make_pose()});
@@ -105,24 +105,24 @@ Pose on_grid(RandomPoses& random, int size) {
   return pose;
 }
 
-Scene soups(RandomPoses& random) {
-  Scene scene;
+BodyScene soups(RandomPoses& random) {
+  BodyScene scene;
   for (int i = 0; i < 2; ++i)
     scene.assets.add(soup(random, any_count(random), pick(random, {0.2, 0.5, 1.0})));
   add_instances(scene, random, [&] { return near_origin(random, 1.2); });
   return scene;
 }
 
-Scene grids(RandomPoses& random) {
-  Scene scene;
+BodyScene grids(RandomPoses& random) {
+  BodyScene scene;
   const int size = pick(random, {1, 2, 4});
   for (int i = 0; i < 2; ++i) scene.assets.add(grid_soup(random, any_count(random), size));
   add_instances(scene, random, [&] { return on_grid(random, size); });
   return scene;
 }
 
-Scene flats(RandomPoses& random) {
-  Scene scene;
+BodyScene flats(RandomPoses& random) {
+  BodyScene scene;
   scene.assets.add(flat_soup(random, any_count(random)));
   scene.assets.add(any_mesh(random));
   const bool turned = random.below(2) == 0;
@@ -131,8 +131,8 @@ Scene flats(RandomPoses& random) {
 }
 
 /// Copies of triangles, and of instances.
-Scene duplicates(RandomPoses& random) {
-  Scene scene;
+BodyScene duplicates(RandomPoses& random) {
+  BodyScene scene;
   for (int i = 0; i < 2; ++i) scene.assets.add(repeated(random, any_mesh(random)));
   const Pose pose = near_origin(random, 1);
   add_instances(scene, random, [&] { return random.below(2) == 0 ? pose : near_origin(random, 1); });
@@ -140,8 +140,8 @@ Scene duplicates(RandomPoses& random) {
 }
 
 /// Cubes on a grid that share faces, edges and corners, or overlap by half a side.
-Scene cubes(RandomPoses& random) {
-  Scene scene;
+BodyScene cubes(RandomPoses& random) {
+  BodyScene scene;
   const float side = pick(random, {1.0f, 0.1f, 3.0f});
   scene.assets.add(cube(side / 2, 1));
   scene.assets.add(cube(side / 2, 2));
@@ -159,14 +159,14 @@ Scene cubes(RandomPoses& random) {
   return scene;
 }
 
-Scene simple(RandomPoses& random) {
-  return pick<Scene (*)(RandomPoses&)>(random, {soups, grids, flats, duplicates, cubes})(random);
+BodyScene simple(RandomPoses& random) {
+  return pick<BodyScene (*)(RandomPoses&)>(random, {soups, grids, flats, duplicates, cubes})(random);
 }
 
 /// So far away that posed vertices coincide, and that coordinates leave the range of expansion arithmetic.
 /// There, exact arithmetic is slow, so these meshes are small.
-Scene very_far_away(RandomPoses& random) {
-  Scene scene;
+BodyScene very_far_away(RandomPoses& random) {
+  BodyScene scene;
   for (int i = 0; i < 2; ++i)
     scene.assets.add(soup(random, 1 + static_cast<std::uint32_t>(random.below(3)), 1));
   add_instances(scene, random, [&] { return near_origin(random, 1); });
@@ -175,8 +175,8 @@ Scene very_far_away(RandomPoses& random) {
   return scene;
 }
 
-Scene far_away(RandomPoses& random) {
-  Scene scene = simple(random);
+BodyScene far_away(RandomPoses& random) {
+  BodyScene scene = simple(random);
   const double far = pick(random, {1e4, 1e7, 1e7, 1e12, 1e12, 1e12, 1e16, 1e51});
   double by[3];
   for (double& x : by) x = far * pick(random, {-1.0, 0.0, 1.0, 0.7});
@@ -185,8 +185,8 @@ Scene far_away(RandomPoses& random) {
 }
 
 /// Map coordinates: stored relative to an origin.
-Scene with_origin(RandomPoses& random) {
-  Scene scene;
+BodyScene with_origin(RandomPoses& random) {
+  BodyScene scene;
   std::array<double, 3> origin[2];
   for (auto& o : origin) {
     o = {pick(random, {0.0, 4.5e6, 1e12, 0.1}), pick(random, {5.2e5, -1e4}), pick(random, {100.3, 0.0})};
@@ -208,8 +208,8 @@ Scene with_origin(RandomPoses& random) {
   return scene;
 }
 
-Scene scaled(RandomPoses& random, double factor) {
-  Scene scene;
+BodyScene scaled(RandomPoses& random, double factor) {
+  BodyScene scene;
   const bool on_a_grid = random.below(2) == 0;
   for (int i = 0; i < 2; ++i) {
     Mesh mesh = on_a_grid ? grid_soup(random, any_count(random), 2) : any_mesh(random);
@@ -224,20 +224,20 @@ Scene scaled(RandomPoses& random, double factor) {
   return scene;
 }
 
-Scene huge(RandomPoses& random) {
+BodyScene huge(RandomPoses& random) {
   return scaled(random,
                 pick(random, {0x1p27, 0x1p31, 1e15, 1e25, 0x1p100, 1e36, 1.3e36, 1e37, 1.5e38, 3e38}));
 }
 
-Scene tiny(RandomPoses& random) {
+BodyScene tiny(RandomPoses& random) {
   return scaled(random, pick(random, {1e-6, 1e-15, 0x1p-80, 0x1p-90, 1e-30, 1e-38, 0x1p-140, 0x1p-149}));
 }
 
 /// Assets of every size about one place.
-Scene mixed_sizes(RandomPoses& random) {
+BodyScene mixed_sizes(RandomPoses& random) {
   constexpr double kSizes[] = {1, 1e-40, 1e-20, 1e-8, 1e-3, 1e4, 1e9, 1e20, 1e37, 1.5e38};
   const auto any_size = [&] { return kSizes[random.below(std::size(kSizes))]; };
-  Scene scene;
+  BodyScene scene;
   for (int i = 0; i < 4; ++i) {
     Mesh mesh = any_mesh(random);
     scale(mesh, any_size());
@@ -269,8 +269,8 @@ std::array<double, 3> point_of(RandomPoses& random, const PosedTriangle& triangl
 }
 
 /// A point of one instance put on a point of another, up to rounding, or a little off it.
-Scene touching(RandomPoses& random) {
-  Scene scene;
+BodyScene touching(RandomPoses& random) {
+  BodyScene scene;
   for (int i = 0; i < 2; ++i) scene.assets.add(any_mesh(random));
   const double far = pick(random, {0.0, 0.0, 10.0, 1e4, 1e7});
   scene.instances = {{0, near_origin(random, 1 + far)}, {1, any_rotation(random)}};
@@ -288,8 +288,8 @@ Scene touching(RandomPoses& random) {
 
 /// Bodies of many small triangles that just touch, or just miss, the plane of one of a few large ones from
 /// one side: what the planes of leaves have to tell apart.
-Scene on_ground(RandomPoses& random) {
-  Scene scene;
+BodyScene on_ground(RandomPoses& random) {
+  BodyScene scene;
   const double far = pick(random, {0.0, 0.0, 10.0, 1e4, 1e7});
   Mesh ground = soup(random, 1 + static_cast<std::uint32_t>(random.below(9)), 1);
   scale(ground, pick(random, {5.0, 50.0, 1e4}));
@@ -457,7 +457,7 @@ Pose any_rotation(RandomPoses& random) {
   }
 }
 
-double any_distance(RandomPoses& random, const Scene& scene) {
+double any_distance(RandomPoses& random, const BodyScene& scene) {
   double size = 0;
   for (const AssetView& asset : scene.assets.views()) {
     for (int k = 0; k < 3; ++k)
@@ -508,7 +508,7 @@ FaceContacts found_contacts(const ContactQuery& query) {
   return out;
 }
 
-std::vector<PosedTriangle> posed_triangles(const Scene& scene, std::uint32_t instance) {
+std::vector<PosedTriangle> posed_triangles(const BodyScene& scene, std::uint32_t instance) {
   const std::uint32_t asset = scene.instances[instance].asset;
   const Pose& pose = scene.instances[instance].pose;
   const Mesh& mesh = scene.assets.mesh(asset);
@@ -540,7 +540,7 @@ TrianglePair pair_of(const PosedTriangle& a, const PosedTriangle& b) {
   return pair;
 }
 
-FaceContacts all_contacts(const Scene& scene, std::uint32_t a, std::uint32_t b) {
+FaceContacts all_contacts(const BodyScene& scene, std::uint32_t a, std::uint32_t b) {
   if (a > b) std::swap(a, b);
   const auto of_a = posed_triangles(scene, a), of_b = posed_triangles(scene, b);
   FaceContacts out;
@@ -552,7 +552,7 @@ FaceContacts all_contacts(const Scene& scene, std::uint32_t a, std::uint32_t b) 
   return out;
 }
 
-FaceContacts all_contacts(const Scene& scene, bool selves) {
+FaceContacts all_contacts(const BodyScene& scene, bool selves) {
   FaceContacts out;
   for (std::uint32_t a = 0; a < scene.instances.size(); ++a) {
     for (std::uint32_t b = selves ? a : a + 1; b < scene.instances.size(); ++b) {
@@ -563,7 +563,7 @@ FaceContacts all_contacts(const Scene& scene, bool selves) {
   return out;
 }
 
-std::string text(const Scene& scene) {
+std::string text(const BodyScene& scene) {
   std::string out;
   char line[400];
   for (const Instance& instance : scene.instances) {

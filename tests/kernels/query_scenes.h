@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "build/sample_asset.h"
+#include "kernels/geometry/triangle_test.h"
 #include "random_pose.h"
 #include "tandem/kernels/contact_query.h"
-#include "tandem/kernels/detail/triangle_test.h"
 
 /// Seeded scenes of small meshes, from harmless to hostile, and their contacts by brute force.
 namespace tandem::test {
@@ -36,14 +36,14 @@ class SampleAssets {
   std::vector<Mesh> meshes_;
 };
 
-struct Scene {
+struct BodyScene {
   SampleAssets assets;
   std::vector<Instance> instances;
 };
 
 struct SceneFamily {
   const char* name;
-  Scene (*make)(RandomPoses&);
+  BodyScene (*make)(RandomPoses&);
 };
 
 inline std::ostream& operator<<(std::ostream& out, const SceneFamily& family) {
@@ -74,7 +74,7 @@ double radius_of(const AssetView& asset);
 Pose centred_at(const AssetView& asset, Pose pose, const double (&place)[3]);
 
 /// A distance to ask about: any size beside the scene's; whole numbers, so that grids have ties, among them.
-double any_distance(RandomPoses& random, const Scene& scene);
+double any_distance(RandomPoses& random, const BodyScene& scene);
 
 // Contacts.
 
@@ -92,17 +92,17 @@ FaceContacts found_contacts(const ContactQuery& query);
 using PosedTriangle = std::array<std::array<double, 3>, 3>;
 
 /// The vertices of an instance in world coordinates, as the design says, not by apply().
-std::vector<PosedTriangle> posed_triangles(const Scene& scene, std::uint32_t instance);
+std::vector<PosedTriangle> posed_triangles(const BodyScene& scene, std::uint32_t instance);
 
 TrianglePair pair_of(const PosedTriangle& a, const PosedTriangle& b);
 
 /// decide_exact() on every pair of triangles of every two instances, and within each instance if selves.
-FaceContacts all_contacts(const Scene& scene, bool selves);
+FaceContacts all_contacts(const BodyScene& scene, bool selves);
 
 /// The triangles of two instances, or within one.
-FaceContacts all_contacts(const Scene& scene, std::uint32_t a, std::uint32_t b);
+FaceContacts all_contacts(const BodyScene& scene, std::uint32_t a, std::uint32_t b);
 
 /// Whatever is needed to make the scene again in a debugger.
-std::string text(const Scene& scene);
+std::string text(const BodyScene& scene);
 
 }  // namespace tandem::test

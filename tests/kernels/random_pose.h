@@ -2,8 +2,8 @@
 #include <cmath>
 #include <random>
 
+#include "kernels/geometry/relative_pose.h"
 #include "tandem/formats/box.h"
-#include "tandem/kernels/detail/relative_pose.h"
 #include "tandem/kernels/pose.h"
 
 /// Poses and boxes that are hard on box tests.

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <cstdint>
 
+#include "kernels/geometry/oriented_test.h"
+#include "kernels/tolerance/sure_verdicts.h"
 #include "random_pose.h"
-#include "sure_verdicts.h"
-#include "tandem/kernels/detail/oriented_test.h"
 
 /// Rotations of blocks, from harmless to hostile.
 namespace tandem::test {

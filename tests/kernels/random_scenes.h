@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "query_scenes.h"
-#include "tandem/kernels/contact_manifolds.h"
 #include "tandem/kernels/contact_query.h"
 #include "tandem/kernels/containment_query.h"
+#include "tandem/kernels/manifold_query.h"
 
 /// Seeded scenes of any meshes, and all that a step of a simulation finds in them.
 namespace tandem::test {
@@ -54,7 +54,7 @@ class CpuDetection {
  private:
   std::uint32_t threads_;
   ContactQuery query_;
-  ContactManifolds manifolds_;
+  ManifoldQuery manifolds_;
   ContainmentQuery containment_;
 };
 

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "query_scenes.h"
-#include "tandem/kernels/detail/manifold/vector3.h"
+#include "tandem/kernels/detail/vector3.h"
 
 namespace tandem::test {
 namespace {

@@ -3,7 +3,7 @@
 #include <random>
 #include <vector>
 
-#include "tandem/kernels/detail/triangle_test.h"
+#include "kernels/geometry/triangle_test.h"
 
 /// Seeded families of triangle pairs, from harmless to hostile.
 namespace tandem {

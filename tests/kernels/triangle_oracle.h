@@ -1,7 +1,7 @@
 #pragma once
 #include <memory>
 
-#include "tandem/kernels/detail/triangle_test.h"
+#include "kernels/geometry/triangle_test.h"
 
 namespace tandem {
 

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <random>
 
+#include "kernels/geometry/triangle_distance.h"
 #include "kernels/query_scenes.h"
 #include "levels/hausdorff.h"
 #include "levels/stored_level.h"
-#include "tandem/kernels/detail/distance/triangle_distance.h"
 
 namespace tandem {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <random>
 
+#include "kernels/geometry/triangle_distance.h"
 #include "levels/stored_level.h"
-#include "tandem/kernels/detail/distance/triangle_distance.h"
 
 namespace tandem {
 namespace {

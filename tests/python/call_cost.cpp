@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
   for (int repeat = 0; repeat < 51; ++repeat) {
     const auto start = std::chrono::steady_clock::now();
     for (int call = 0; call < kCalls; ++call) {
-      if (query.find_contacts(bodies, tandem::QueryOptions()) != tandem::Status::kOk) return 1;
+      if (query.find_contacts(bodies, tandem::ContactOptions()) != tandem::Status::kOk) return 1;
     }
     const std::chrono::duration<double, std::micro> taken = std::chrono::steady_clock::now() - start;
     times.push_back(taken.count() / kCalls);

@@ -2,7 +2,7 @@
 #include <memory>
 #include <vector>
 
-#include "simulator/simulator.h"
+#include "bvhbench/simulator/simulator.h"
 
 /// Contacts by formula, for tests of the simulator without meshes.
 namespace tandem::simulation {

@@ -1,4 +1,4 @@
-#include "simulator/contact_cache.h"
+#include "bvhbench/simulator/contact_cache.h"
 
 #include <gtest/gtest.h>
 

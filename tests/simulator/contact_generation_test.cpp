@@ -1,12 +1,12 @@
-#include "simulator/contacts/contact_generation.h"
+#include "bvhbench/simulator/contacts/contact_generation.h"
 
 #include <gtest/gtest.h>
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 
+#include "bvhbench/engines/registry.h"
 #include "contact_scene.h"
-#include "engines/registry.h"
 
 namespace tandem::test {
 namespace {
@@ -459,7 +459,7 @@ class HostileScene : public testing::TestWithParam<SceneFamily> {};
 TEST_P(HostileScene, GivesUnitNormalsAndFiniteDepths) {
   RandomPoses random(12);
   for (int trial = 0; trial < trials(10, 20); ++trial) {
-    const Scene scene = GetParam().make(random);
+    const BodyScene scene = GetParam().make(random);
     const auto engine = make_engine("tandem");
     engine->set_shapes(scene.assets.views());
     ContactList found;

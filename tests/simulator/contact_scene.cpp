@@ -1,6 +1,6 @@
 #include "contact_scene.h"
 
-#include "engines/registry.h"
+#include "bvhbench/engines/registry.h"
 
 namespace tandem::test {
 

@@ -2,9 +2,9 @@
 #include <Eigen/Geometry>
 #include <vector>
 
+#include "bvhbench/simulator/contacts/contact_generation.h"
 #include "kernels/query_scenes.h"
 #include "kernels/solid_meshes.h"
-#include "simulator/contacts/contact_generation.h"
 
 /// Small scenes for contact generation.
 namespace tandem::test {

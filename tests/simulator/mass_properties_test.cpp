@@ -1,4 +1,4 @@
-#include "simulator/contacts/mass_properties.h"
+#include "bvhbench/simulator/contacts/mass_properties.h"
 
 #include <gtest/gtest.h>
 

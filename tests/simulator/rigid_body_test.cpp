@@ -1,4 +1,4 @@
-#include "simulator/rigid_body.h"
+#include "bvhbench/simulator/rigid_body.h"
 
 #include <gtest/gtest.h>
 

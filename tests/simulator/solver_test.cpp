@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "analytic_contacts.h"
-#include "simulator/newton_step.h"
-#include "simulator/soft_step.h"
+#include "bvhbench/simulator/newton_step.h"
+#include "bvhbench/simulator/soft_step.h"
 
 namespace tandem::simulation {
 namespace {

@@ -6,10 +6,10 @@
 #include <utility>
 
 #include "build/sample_asset.h"
+#include "kernels/common/traversal.h"
+#include "kernels/geometry/oriented_test.h"
 #include "statistics/near_contact.h"
 #include "tandem/kernels/contact_query.h"
-#include "tandem/kernels/detail/oriented_test.h"
-#include "tandem/kernels/detail/traversal.h"
 
 namespace tandem {
 namespace {

@@ -1,6 +1,6 @@
 #include "backend.h"
 
-#include "engines/registry.h"
+#include "bvhbench/engines/registry.h"
 
 namespace tandem::bench {
 namespace {

@@ -1,8 +1,8 @@
 #pragma once
 #include <string>
 
+#include "bvhbench/engines/engine.h"
 #include "command.h"
-#include "engines/engine.h"
 
 namespace tandem::bench {
 

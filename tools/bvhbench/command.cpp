@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "scenes/make_scene_parts.h"
+#include "bvhbench/scenes/make_scene_parts.h"
 
 namespace tandem::bench {
 
@@ -14,7 +14,7 @@ void refuse(const std::string& scene, Status status, std::uint64_t where) {
   throw FileError(text);
 }
 
-std::vector<std::string> files_of(const std::string& path, const Scene& scene) {
+std::vector<std::string> files_of(const std::string& path, const LoadedScene& scene) {
   std::vector<std::string> files = {path};
   for (const std::string& asset : scene.description.assets) {
     files.push_back((std::filesystem::path(path).parent_path() / asset).string());
@@ -22,7 +22,7 @@ std::vector<std::string> files_of(const std::string& path, const Scene& scene) {
   return files;
 }
 
-std::uint64_t triangles_of(const Scene& scene) {
+std::uint64_t triangles_of(const LoadedScene& scene) {
   std::uint64_t triangles = 0;
   for (const Instance& instance : scene.description.instances) {
     triangles += scene.view(instance.asset).level().triangle_count;

@@ -2,9 +2,9 @@
 #include <CLI/CLI.hpp>
 #include <functional>
 
+#include "bvhbench/scenes/scene_file.h"
 #include "common/exit_code.h"
 #include "common/option_helpers.h"
-#include "scenes/scene_file.h"
 
 /// What the subcommands of bvhbench share.
 namespace tandem::bench {
@@ -17,10 +17,10 @@ using Run = std::function<ExitCode()>;
 [[noreturn]] void refuse(const std::string& scene, Status status, std::uint64_t where);
 
 /// The scene file and its assets, as paths from here.
-std::vector<std::string> files_of(const std::string& path, const Scene& scene);
+std::vector<std::string> files_of(const std::string& path, const LoadedScene& scene);
 
 /// Of all instances together.
-std::uint64_t triangles_of(const Scene& scene);
+std::uint64_t triangles_of(const LoadedScene& scene);
 
 /// Refuses what is no cube of a whole number.
 CLI::Validator cube_of_a_whole_number();

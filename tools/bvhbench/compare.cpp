@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "scenes/contacts_file.h"
+#include "bvhbench/scenes/contacts_file.h"
 #include "tandem/formats/hash.h"
 #include "tandem/kernels/broad_phase.h"
 #include "timed_work.h"
@@ -26,14 +26,14 @@ std::uint64_t growth(std::uint64_t before, std::uint64_t after) {
 }
 
 struct Frame {
-  const Scene& scene;
+  const LoadedScene& scene;
   std::vector<AssetView> assets;
   std::vector<ObjectPair> pairs;
 
   std::span<const Instance> instances() const { return scene.description.instances; }
 };
 
-void check_instances(const std::string& path, const Scene& scene) {
+void check_instances(const std::string& path, const LoadedScene& scene) {
   const auto& instances = scene.description.instances;
   for (std::size_t i = 0; i < instances.size(); ++i) {
     const std::string which = path + ": instance " + std::to_string(i) + ": ";
@@ -42,7 +42,7 @@ void check_instances(const std::string& path, const Scene& scene) {
   }
 }
 
-std::vector<ObjectPair> given_pairs(const std::string& path, const Scene& scene) {
+std::vector<ObjectPair> given_pairs(const std::string& path, const LoadedScene& scene) {
   const std::vector<ObjectPair> pairs = normalised(*scene.description.pairs);
   for (const ObjectPair& pair : pairs) {
     if (pair.b >= scene.description.instances.size()) throw FileError(path + ": /pairs: no such instance");
@@ -52,7 +52,7 @@ std::vector<ObjectPair> given_pairs(const std::string& path, const Scene& scene)
   return pairs;
 }
 
-std::vector<ObjectPair> found_pairs(const std::string& path, const Scene& scene) {
+std::vector<ObjectPair> found_pairs(const std::string& path, const LoadedScene& scene) {
   std::vector<WorldBox> boxes;
   for (const Instance& instance : scene.description.instances) {
     const FileHeader& header = *scene.view(instance.asset).header;
@@ -141,7 +141,7 @@ void race(std::span<const std::unique_ptr<Engine>> peers, const Frame& frame, un
 
 SceneComparison compare(const std::string& path, std::span<const std::unique_ptr<Engine>> peers,
                         unsigned repeats) {
-  const Scene scene = read_scene(path);
+  const LoadedScene scene = read_scene(path);
   check_instances(path, scene);
   const Frame frame = {scene, scene.views(),
                        scene.description.pairs ? given_pairs(path, scene) : found_pairs(path, scene)};

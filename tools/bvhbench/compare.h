@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "engines/engine.h"
-#include "scenes/scene_file.h"
+#include "bvhbench/engines/engine.h"
+#include "bvhbench/scenes/scene_file.h"
 
 namespace tandem::bench {
 

@@ -10,11 +10,11 @@
 #include <optional>
 #include <set>
 
+#include "bvhbench/engines/registry.h"
+#include "bvhbench/scenes/hdf5_file.h"
 #include "compare_distance.h"
 #include "compare_impact.h"
 #include "compare_results.h"
-#include "engines/registry.h"
-#include "scenes/hdf5_file.h"
 
 namespace tandem::bench {
 namespace {

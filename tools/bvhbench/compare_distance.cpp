@@ -4,9 +4,9 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "bvhbench/engines/distance_engine.h"
 #include "command.h"
 #include "common/number_words.h"
-#include "engines/distance_engine.h"
 #include "timed_work.h"
 
 namespace tandem::bench {
@@ -17,7 +17,7 @@ struct CertifiedPairs {
   std::vector<double> lower, upper;
 };
 
-CertifiedPairs certified_pairs(const std::string& path, const Scene& scene, double reach) {
+CertifiedPairs certified_pairs(const std::string& path, const LoadedScene& scene, double reach) {
   DistanceQuery query;
   Status status = query.set_assets(scene.views());
   if (status == Status::kOk) status = query.find_distances(scene.description.instances, {.reach = reach});
@@ -43,7 +43,7 @@ double worst_error(const CertifiedPairs& pairs, const std::vector<double>& dista
 }
 
 // Of both bodies of every pair.
-std::uint64_t triangles_of_pairs(const Scene& scene, const std::vector<ObjectPair>& pairs) {
+std::uint64_t triangles_of_pairs(const LoadedScene& scene, const std::vector<ObjectPair>& pairs) {
   std::uint64_t sum = 0;
   for (const auto& [a, b] : pairs) {
     for (const std::uint32_t body : {a, b})
@@ -55,7 +55,7 @@ std::uint64_t triangles_of_pairs(const Scene& scene, const std::vector<ObjectPai
 }  // namespace
 
 DistanceComparison compare_distances(const std::string& path, double reach, unsigned repeats) {
-  const Scene scene = read_scene(path);
+  const LoadedScene scene = read_scene(path);
   const std::vector<AssetView> views = scene.views();
   const CertifiedPairs pairs = certified_pairs(path, scene, reach);
   DistanceComparison out;

@@ -5,9 +5,9 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "bvhbench/engines/impact_engine.h"
 #include "command.h"
 #include "common/number_words.h"
-#include "engines/impact_engine.h"
 #include "scene_motions.h"
 #include "tandem/kernels/contact_query.h"
 #include "timed_work.h"
@@ -37,7 +37,7 @@ void check_turns(const std::string& path, const std::vector<RigidMotion>& motion
 /// Looks for contacts of moving pairs at times in a step.
 class ContactSearch {
  public:
-  ContactSearch(const std::string& path, const Scene& scene, const std::vector<AssetView>& views,
+  ContactSearch(const std::string& path, const LoadedScene& scene, const std::vector<AssetView>& views,
                 const std::vector<RigidMotion>& motions, double duration)
       : path_(path), instances_(scene.description.instances), motions_(motions), duration_(duration) {
     if (const Status status = query_.set_assets(views); status != Status::kOk) refuse(path, status, 0);
@@ -77,7 +77,7 @@ class ContactSearch {
   ContactQuery query_;
 };
 
-std::vector<KnownImpact> known_impacts(const std::string& path, const Scene& scene,
+std::vector<KnownImpact> known_impacts(const std::string& path, const LoadedScene& scene,
                                        const std::vector<AssetView>& views,
                                        const std::vector<RigidMotion>& motions, double duration) {
   ImpactQuery query;
@@ -119,7 +119,7 @@ void judge(const std::vector<KnownImpact>& known, const std::vector<double>& tim
 }  // namespace
 
 ImpactComparison compare_impacts(const std::string& path, double duration, unsigned repeats) {
-  const Scene scene = read_scene(path);
+  const LoadedScene scene = read_scene(path);
   const std::vector<AssetView> views = scene.views();
   const std::vector<RigidMotion> motions = motions_of(path, scene);
   check_turns(path, motions, duration);

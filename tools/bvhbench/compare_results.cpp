@@ -7,8 +7,8 @@
 #include <limits>
 #include <map>
 
+#include "bvhbench/scenes/hdf5_file.h"
 #include "common/number_words.h"
-#include "scenes/hdf5_file.h"
 
 namespace tandem::bench {
 namespace {

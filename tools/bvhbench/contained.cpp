@@ -13,7 +13,7 @@ void require(Status status) {
 
 }  // namespace
 
-TimedContainments find_contained(const Scene& scene, std::span<const ObjectPair> pairs,
+TimedContainments find_contained(const LoadedScene& scene, std::span<const ObjectPair> pairs,
                                  std::span<const TriangleContact> contacts, std::uint32_t threads,
                                  std::uint32_t repeats) {
   std::vector<Contact> sorted;

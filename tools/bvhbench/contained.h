@@ -3,9 +3,9 @@
 #include <span>
 #include <vector>
 
+#include "bvhbench/engines/engine.h"
+#include "bvhbench/scenes/scene_file.h"
 #include "common/stopwatch.h"
-#include "engines/engine.h"
-#include "scenes/scene_file.h"
 #include "tandem/kernels/containment_query.h"
 
 namespace tandem::bench {
@@ -19,7 +19,7 @@ struct TimedContainments {
 /// Finds them on the CPU, `repeats` times. contacts: all of these pairs, in any order. Throws FileError,
 /// where an asset has no topology, std::bad_alloc, or std::runtime_error, where a thread could not be
 /// started.
-TimedContainments find_contained(const Scene& scene, std::span<const ObjectPair> pairs,
+TimedContainments find_contained(const LoadedScene& scene, std::span<const ObjectPair> pairs,
                                  std::span<const TriangleContact> contacts, std::uint32_t threads,
                                  std::uint32_t repeats);
 

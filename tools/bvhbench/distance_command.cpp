@@ -9,12 +9,12 @@
 #include <thread>
 
 #include "backend.h"
+#include "bvhbench/engines/registry.h"
+#include "bvhbench/scenes/contacts_file.h"
+#include "bvhbench/scenes/distance_file.h"
+#include "bvhbench/scenes/hdf5_file.h"
 #include "common/json.h"
 #include "common/number_words.h"
-#include "engines/registry.h"
-#include "scenes/contacts_file.h"
-#include "scenes/distance_file.h"
-#include "scenes/hdf5_file.h"
 
 namespace tandem::bench {
 namespace {
@@ -80,7 +80,7 @@ void run_on_gpu(const DistanceArguments& arguments, const BodiesApart& bodies, A
 }
 
 // Runs the query as often as asked; the answer is the last run's, which is every run's.
-Answer run_query(const DistanceArguments& arguments, const Scene& scene) {
+Answer run_query(const DistanceArguments& arguments, const LoadedScene& scene) {
   const SceneDescription& description = scene.description;
   const std::vector<AssetView> shapes = scene.views();
   const std::vector<ObjectPair> pairs = normalised(description.pairs.value_or(std::vector<ObjectPair>()));
@@ -118,7 +118,7 @@ Json finite_or_null(double x) {
   return std::isfinite(x) ? Json(x) : Json();
 }
 
-Json to_json(const DistanceArguments& arguments, const Scene& scene, const Answer& answer) {
+Json to_json(const DistanceArguments& arguments, const LoadedScene& scene, const Answer& answer) {
   const DistanceRecord& record = answer.record;
   Json json = {{"tool", "bvhbench distance"},
                {"version", TANDEM_VERSION},
@@ -162,7 +162,7 @@ void print_times(const char* label, const Seconds& seconds) {
               1e3 * median_of(seconds));
 }
 
-void print_summary(const DistanceArguments& arguments, const Scene& scene, const Answer& answer) {
+void print_summary(const DistanceArguments& arguments, const LoadedScene& scene, const Answer& answer) {
   const DistanceRecord& record = answer.record;
   const std::string place =
       arguments.on_gpu() ? answer.gpu.name
@@ -184,7 +184,7 @@ void print_summary(const DistanceArguments& arguments, const Scene& scene, const
 
 ExitCode run(const DistanceArguments& arguments) {
   if (arguments.on_gpu() && arguments.threads_given) throw UsageError("--threads is for the backend cpu");
-  const Scene scene = read_scene(arguments.scene);
+  const LoadedScene scene = read_scene(arguments.scene);
   if (!arguments.out.empty()) {
     keep_inputs(arguments.out, files_of(arguments.scene, scene));
     try_output(arguments.out);

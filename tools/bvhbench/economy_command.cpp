@@ -9,12 +9,12 @@
 #include <thread>
 
 #include "backend.h"
+#include "bvhbench/economy/choice.h"
+#include "bvhbench/scenes/hdf5_file.h"
+#include "bvhbench/scenes/scene_motion.h"
 #include "common/number_words.h"
 #include "common/random_pose.h"
-#include "economy/choice.h"
 #include "economy_report.h"
-#include "scenes/hdf5_file.h"
-#include "scenes/scene_motion.h"
 
 namespace tandem::bench {
 namespace {
@@ -50,7 +50,7 @@ Candidates candidates_of(LevelMeasurer& measurer) {
 }
 
 std::vector<AssetEconomy> measure_each(LevelMeasurer& measurer, const Candidates& candidates) {
-  const Scene& scene = measurer.scene();
+  const LoadedScene& scene = measurer.scene();
   std::vector<AssetEconomy> assets;
   for (std::size_t i = 0; i < candidates.assets(); ++i) {
     const AssetView view = scene.assets[i].view();

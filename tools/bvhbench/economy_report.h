@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "bvhbench/economy/measure.h"
 #include "common/json.h"
-#include "economy/measure.h"
 
 namespace tandem::bench {
 

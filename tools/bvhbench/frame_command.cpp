@@ -4,9 +4,9 @@
 #include <filesystem>
 #include <memory>
 
+#include "bvhbench/scenes/scene_file.h"
+#include "bvhbench/simulator/run_file.h"
 #include "common/number_words.h"
-#include "scenes/scene_file.h"
-#include "simulator/run_file.h"
 
 namespace tandem::bench {
 namespace {

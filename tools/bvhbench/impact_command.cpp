@@ -6,13 +6,13 @@
 #include <thread>
 
 #include "backend.h"
+#include "bvhbench/engines/registry.h"
+#include "bvhbench/scenes/contacts_file.h"
+#include "bvhbench/scenes/hdf5_file.h"
 #include "common/json.h"
 #include "common/number_words.h"
 #include "common/stopwatch.h"
-#include "engines/registry.h"
 #include "scene_motions.h"
-#include "scenes/contacts_file.h"
-#include "scenes/hdf5_file.h"
 #include "tandem/formats/hash.h"
 #include "tandem/kernels/impact_query.h"
 
@@ -95,7 +95,7 @@ ImpactTable run_on_gpu(const ImpactArguments& arguments, const MovingBodies& mov
   }
 }
 
-ImpactTable run_query(const ImpactArguments& arguments, const Scene& scene) {
+ImpactTable run_query(const ImpactArguments& arguments, const LoadedScene& scene) {
   const SceneDescription& description = scene.description;
   const std::vector<AssetView> shapes = scene.views();
   const std::vector<RigidMotion> motion = motions_of(arguments.scene, scene);
@@ -179,7 +179,7 @@ void write(const ImpactArguments& arguments, const ImpactTable& table) {
   file.write();
 }
 
-Json to_json(const ImpactArguments& arguments, const Scene& scene, const ImpactTable& table) {
+Json to_json(const ImpactArguments& arguments, const LoadedScene& scene, const ImpactTable& table) {
   const ImpactCounters& counters = table.counters;
   Json json = {
       {"tool", "bvhbench impact"},
@@ -220,7 +220,7 @@ void print_row(const char* label, std::uint64_t value) {
   std::printf("  %-14s %15s\n", label, with_commas(value).c_str());
 }
 
-void print_summary(const ImpactArguments& arguments, const Scene& scene, const ImpactTable& table) {
+void print_summary(const ImpactArguments& arguments, const LoadedScene& scene, const ImpactTable& table) {
   const ImpactCounters& counters = table.counters;
   const std::uint32_t threads = threads_of(arguments);
   const std::string place =
@@ -243,7 +243,7 @@ void print_summary(const ImpactArguments& arguments, const Scene& scene, const I
 
 ExitCode run(const ImpactArguments& arguments) {
   if (arguments.on_gpu() && arguments.threads_given) throw UsageError("--threads is for the backend cpu");
-  const Scene scene = read_scene(arguments.scene);
+  const LoadedScene scene = read_scene(arguments.scene);
   if (!arguments.out.empty()) keep_inputs(arguments.out, files_of(arguments.scene, scene));
   if (!arguments.out.empty()) try_output(arguments.out);
   const ImpactTable table = run_query(arguments, scene);

@@ -3,19 +3,19 @@
 #include <exception>
 #include <new>
 
+#include "bvhbench/engines/engine.h"
+#include "bvhbench/scenes/hdf5_file.h"
 #include "command.h"
 #include "common/option_helpers.h"
 #include "common/printable.h"
 #include "compare_command.h"
 #include "distance_command.h"
 #include "economy_command.h"
-#include "engines/engine.h"
 #include "frame_command.h"
 #include "impact_command.h"
 #include "poses_command.h"
 #include "query_command.h"
 #include "scene_command.h"
-#include "scenes/hdf5_file.h"
 #include "simulate_command.h"
 
 namespace {

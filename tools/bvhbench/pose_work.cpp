@@ -22,10 +22,10 @@ class PairQuery {
     check(query_.set_assets(assets));
   }
 
-  const QueryCounters& ask(const Pose& pose_of_b, bool first_contact_only) {
+  const ContactCounters& ask(const Pose& pose_of_b, bool first_contact_only) {
     const Instance instances[] = {{0, kIdentityPose}, {1, pose_of_b}};
     const ObjectPair pair = {0, 1};
-    QueryOptions options;
+    ContactOptions options;
     options.first_contact_only = first_contact_only;
     check(query_.find_contacts(instances, {&pair, 1}, options));
     return query_.counters();
@@ -98,7 +98,7 @@ PoseWork measure_poses(const NamedAsset& a, const NamedAsset& b, std::span<const
   const OrientedWork on_gpu(a.view, b.view);
   std::atomic<bool> oriented = true;
   for_each_pose(a, b, poses.size(), [&](PairQuery& query, std::size_t i) {
-    const QueryCounters& counters = query.ask(poses[i], false);
+    const ContactCounters& counters = query.ask(poses[i], false);
     work.block_pairs[i] = narrowed(counters.block_pairs);
     work.candidates[i] = narrowed(counters.candidates);
     work.contacts[i] = narrowed(counters.contacts);

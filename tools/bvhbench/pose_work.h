@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "scenes/scene_file.h"
+#include "bvhbench/scenes/scene_file.h"
 #include "statistics/near_contact.h"
 
 /// Poses of two bodies near contact, and what a query of each costs a tree (docs/poses.md).

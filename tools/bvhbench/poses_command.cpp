@@ -6,11 +6,11 @@
 #include <memory>
 #include <thread>
 
+#include "bvhbench/scenes/hdf5_file.h"
 #include "common/json.h"
 #include "common/number_words.h"
 #include "parallel/parallel.h"
 #include "pose_work.h"
-#include "scenes/hdf5_file.h"
 
 namespace tandem::bench {
 namespace {

@@ -7,21 +7,21 @@
 #include <thread>
 
 #include "backend.h"
+#include "bvhbench/engines/registry.h"
+#include "bvhbench/scenes/contacts_file.h"
+#include "bvhbench/scenes/hdf5_file.h"
+#include "bvhbench/scenes/scene_file.h"
 #include "common/json.h"
 #include "common/number_words.h"
 #include "contained.h"
-#include "engines/registry.h"
 #include "query_tolerance.h"
-#include "scenes/contacts_file.h"
-#include "scenes/hdf5_file.h"
-#include "scenes/scene_file.h"
 
 namespace tandem::bench {
 namespace {
 
 struct QueryArguments {
   std::string scene, out, backend = "cpu", gpu_engine = "tandem-cuda";
-  QueryOptions options;
+  ContactOptions options;
   std::optional<double> tolerance;
   std::uint32_t repeats = 1;
   bool grouped = false, sorted = false, traversal = false, manifolds = false, contained = false;
@@ -56,7 +56,7 @@ std::string name_of(Value wanted, const std::map<std::string, Value>& names) {
   return {};
 }
 
-QueryRecord record_of(const QueryArguments& arguments, const Scene& scene) {
+QueryRecord record_of(const QueryArguments& arguments, const LoadedScene& scene) {
   QueryRecord record;
   record.mode = name_of(arguments.options.mode, kModes);
   record.backend = arguments.backend;
@@ -69,7 +69,7 @@ QueryRecord record_of(const QueryArguments& arguments, const Scene& scene) {
 }
 
 // Takes the contacts.
-ContactTable table_of(const Scene& scene, TimedAnswer& timed) {
+ContactTable table_of(const LoadedScene& scene, TimedAnswer& timed) {
   const std::vector<AssetView> views = scene.views();
   const auto face = [&](std::uint32_t instance, std::uint32_t triangle) {
     const std::uint32_t shape = scene.description.instances[instance].asset;
@@ -84,7 +84,7 @@ ContactTable table_of(const Scene& scene, TimedAnswer& timed) {
 }
 
 // Runs the query as often as asked; the answer is the last run's, which is every run's.
-Answer run_query(const QueryArguments& arguments, const Scene& scene) {
+Answer run_query(const QueryArguments& arguments, const LoadedScene& scene) {
   const SceneDescription& description = scene.description;
   const std::vector<AssetView> views = scene.views();
   const std::vector<ObjectPair> pairs = normalised(description.pairs.value_or(std::vector<ObjectPair>()));
@@ -106,7 +106,7 @@ Answer run_query(const QueryArguments& arguments, const Scene& scene) {
   return answer;
 }
 
-Answer answer_of(const QueryArguments& arguments, const Scene& scene) {
+Answer answer_of(const QueryArguments& arguments, const LoadedScene& scene) {
   try {
     return run_query(arguments, scene);
   } catch (const EngineError& error) {
@@ -124,9 +124,9 @@ Json times(const Seconds& seconds) {
   return {{"best", best_of(seconds)}, {"median", median_of(seconds)}, {"all", seconds}};
 }
 
-Json to_json(const QueryArguments& arguments, const Scene& scene, const Answer& answer) {
+Json to_json(const QueryArguments& arguments, const LoadedScene& scene, const Answer& answer) {
   const QueryRecord& record = answer.record;
-  const QueryCounters& counters = record.counters;
+  const ContactCounters& counters = record.counters;
   Json json = {{"tool", "bvhbench query"},
                {"version", TANDEM_VERSION},
                {"scene", arguments.scene},
@@ -195,9 +195,9 @@ std::string place_of(const QueryArguments& arguments, const Answer& answer) {
   return with_commas(answer.record.threads) + (answer.record.threads == 1 ? " thread" : " threads");
 }
 
-void print_summary(const QueryArguments& arguments, const Scene& scene, const Answer& answer) {
+void print_summary(const QueryArguments& arguments, const LoadedScene& scene, const Answer& answer) {
   const QueryRecord& record = answer.record;
-  const QueryCounters& counters = record.counters;
+  const ContactCounters& counters = record.counters;
   std::printf("%s: %s on %s, %s\n", arguments.scene.c_str(), record.mode.c_str(), record.backend.c_str(),
               place_of(arguments, answer).c_str());
   print_row("instances", scene.description.instances.size());
@@ -232,7 +232,7 @@ void print_summary(const QueryArguments& arguments, const Scene& scene, const An
 }
 
 // What a backend cannot do.
-void check_arguments(const QueryArguments& arguments, const Scene& scene) {
+void check_arguments(const QueryArguments& arguments, const LoadedScene& scene) {
   if (arguments.options.self_pairs && scene.description.pairs) {
     throw UsageError(arguments.scene + ": gives its object pairs, so --self has nothing to add");
   }
@@ -279,7 +279,7 @@ void write(const QueryArguments& arguments, const Answer& answer) {
 
 // What it prints and writes is all about pairs of bodies, so options of contacts do not go with it.
 ExitCode run_by_tolerance(const QueryArguments& arguments) {
-  const QueryOptions& options = arguments.options;
+  const ContactOptions& options = arguments.options;
   if (options.mode != QueryMode::exact || options.first_contact_only || options.within > 0 ||
       options.self_pairs || arguments.manifolds || arguments.contained || arguments.traversal ||
       arguments.order() != OrderOnGpu::any || arguments.gpu_engine != "tandem-cuda") {
@@ -292,7 +292,7 @@ ExitCode run_by_tolerance(const QueryArguments& arguments) {
 
 ExitCode run(const QueryArguments& arguments) {
   if (arguments.tolerance) return run_by_tolerance(arguments);
-  const Scene scene = read_scene(arguments.scene);
+  const LoadedScene scene = read_scene(arguments.scene);
   if (!arguments.out.empty()) keep_inputs(arguments.out, files_of(arguments.scene, scene));
   check_arguments(arguments, scene);
   if (!arguments.out.empty()) try_output(arguments.out);
@@ -310,7 +310,7 @@ ExitCode run(const QueryArguments& arguments) {
 
 CLI::App* add_query(CLI::App& app, Run& run_later) {
   const auto arguments = std::make_shared<QueryArguments>();
-  QueryOptions& options = arguments->options;
+  ContactOptions& options = arguments->options;
   options.threads = std::max(1u, std::thread::hardware_concurrency());
   CLI::App* command = app.add_subcommand("query", "find every pair of triangles that meet in a scene");
   command->add_option("SCENE", arguments->scene, "scene file (HDF5)")->required()->check(file_name());

@@ -4,12 +4,12 @@
 #include <new>
 
 #include "backend.h"
+#include "bvhbench/engines/registry.h"
+#include "bvhbench/scenes/contacts_file.h"
+#include "bvhbench/scenes/hdf5_file.h"
+#include "bvhbench/scenes/verdicts_file.h"
 #include "common/json.h"
 #include "common/number_words.h"
-#include "engines/registry.h"
-#include "scenes/contacts_file.h"
-#include "scenes/hdf5_file.h"
-#include "scenes/verdicts_file.h"
 
 namespace tandem::bench {
 namespace {
@@ -52,7 +52,7 @@ TimedVerdicts time_on_gpu(const ToleranceArguments& arguments, const BodiesWithL
   }
 }
 
-Answer answer_of(const ToleranceArguments& arguments, const Scene& scene) {
+Answer answer_of(const ToleranceArguments& arguments, const LoadedScene& scene) {
   const SceneDescription& description = scene.description;
   const std::vector<AssetView> shapes = scene.finest_views();
   const std::vector<ObjectPair> pairs = normalised(description.pairs.value_or(std::vector<ObjectPair>()));
@@ -85,7 +85,7 @@ Json levels_of(const Answer& answer) {
   return levels;
 }
 
-Json to_json(const ToleranceArguments& arguments, const Scene& scene, const Answer& answer) {
+Json to_json(const ToleranceArguments& arguments, const LoadedScene& scene, const Answer& answer) {
   const VerdictRecord& record = answer.record;
   const ToleranceCounters& counters = record.counters;
   Json json = {{"tool", "bvhbench query"},
@@ -128,7 +128,7 @@ void print_times(const char* label, const Seconds& seconds) {
               1e3 * median_of(seconds));
 }
 
-void print_summary(const ToleranceArguments& arguments, const Scene& scene, const Answer& answer) {
+void print_summary(const ToleranceArguments& arguments, const LoadedScene& scene, const Answer& answer) {
   const VerdictRecord& record = answer.record;
   const ToleranceCounters& counters = record.counters;
   const std::string place =
@@ -152,7 +152,7 @@ void print_summary(const ToleranceArguments& arguments, const Scene& scene, cons
 }  // namespace
 
 ExitCode run_tolerance(const ToleranceArguments& arguments) {
-  const Scene scene = read_scene(arguments.scene);
+  const LoadedScene scene = read_scene(arguments.scene);
   if (!arguments.out.empty()) {
     keep_inputs(arguments.out, files_of(arguments.scene, scene));
     try_output(arguments.out);

@@ -4,10 +4,10 @@
 #include <cstdio>
 #include <memory>
 
+#include "bvhbench/scenes/make_scene.h"
+#include "bvhbench/scenes/make_scene_parts.h"
+#include "bvhbench/scenes/scene_file.h"
 #include "common/number_words.h"
-#include "scenes/make_scene.h"
-#include "scenes/make_scene_parts.h"
-#include "scenes/scene_file.h"
 
 namespace tandem::bench {
 namespace {

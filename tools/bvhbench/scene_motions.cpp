@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <optional>
 
-#include "scenes/hdf5_file.h"
-#include "scenes/scene_motion.h"
-#include "simulator/contacts/mass_properties.h"
+#include "bvhbench/scenes/hdf5_file.h"
+#include "bvhbench/scenes/scene_motion.h"
+#include "bvhbench/simulator/contacts/mass_properties.h"
 
 namespace tandem::bench {
 namespace {
@@ -13,7 +13,7 @@ namespace {
 // Centres of mass of the shapes, those of their assets' finest level, computed where they are asked for.
 class MassCenters {
  public:
-  explicit MassCenters(const Scene& scene) : scene_(scene), centers_(scene.shapes.size()) {}
+  explicit MassCenters(const LoadedScene& scene) : scene_(scene), centers_(scene.shapes.size()) {}
 
   // In the file's coordinates.
   const Eigen::Vector3d& of(std::uint32_t shape) {
@@ -30,13 +30,13 @@ class MassCenters {
     }
   }
 
-  const Scene& scene_;
+  const LoadedScene& scene_;
   std::vector<std::optional<Eigen::Vector3d>> centers_;
 };
 
 }  // namespace
 
-std::vector<RigidMotion> motions_of(const std::string& path, const Scene& scene) {
+std::vector<RigidMotion> motions_of(const std::string& path, const LoadedScene& scene) {
   const auto& instances = scene.description.instances;
   const auto& movers = scene.description.filter.motion;
   const SceneMotion told = read_motion(path, instances.size());

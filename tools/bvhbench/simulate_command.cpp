@@ -8,14 +8,14 @@
 #include <memory>
 #include <thread>
 
+#include "bvhbench/engines/registry.h"
+#include "bvhbench/scenes/hdf5_file.h"
+#include "bvhbench/scenes/make_scene_parts.h"
+#include "bvhbench/scenes/scene_file.h"
+#include "bvhbench/simulator/preparation.h"
+#include "bvhbench/simulator/run.h"
 #include "common/json.h"
 #include "common/number_words.h"
-#include "engines/registry.h"
-#include "scenes/hdf5_file.h"
-#include "scenes/make_scene_parts.h"
-#include "scenes/scene_file.h"
-#include "simulator/preparation.h"
-#include "simulator/run.h"
 
 namespace tandem::bench {
 namespace {
@@ -46,7 +46,7 @@ std::string solver_name(SolverKind kind) {
 
 // Meshes and bodies, before anything moves.
 struct Start {
-  Scene scene;  // its assets; instances of scene files alone
+  LoadedScene scene;  // its assets; instances of scene files alone
   std::vector<std::string> paths;
   Preparation bodies;
   std::optional<Reentry> reentry;

@@ -1,6 +1,6 @@
 #include "levels/piece.h"
 
-#include "tandem/kernels/detail/distance/triangle_distance.h"
+#include "kernels/geometry/triangle_distance.h"
 
 namespace tandem::levels {
 namespace {

@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/geometry/nearest_features.h"
 #include "tandem/formats/file.h"
-#include "tandem/kernels/detail/distance/nearest_features.h"
 
 /// Distances of a point from triangles in float64.
 ///

@@ -1,12 +1,12 @@
 #include <bit>
 #include <cmath>
 
+#include "kernels/common/block_pair.h"
+#include "kernels/common/traversal.h"
+#include "kernels/contact/candidate.h"
 #include "near_contact.h"
 #include "oriented_work.h"
 #include "statistics.h"
-#include "tandem/kernels/detail/block_pair.h"
-#include "tandem/kernels/detail/candidate.h"
-#include "tandem/kernels/detail/traversal.h"
 
 namespace tandem {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <bit>
 
-#include "tandem/kernels/detail/oriented_test.h"
-#include "tandem/kernels/detail/traversal.h"
+#include "kernels/common/traversal.h"
+#include "kernels/geometry/oriented_test.h"
 
 namespace tandem {
 namespace {

@@ -15,7 +15,7 @@ enum class Found { nothing, pairs, contacts, all_contacts };
 
 struct tandem_contact_query : Handle {
   ContactQuery query;
-  ContactManifolds manifolds;
+  ManifoldQuery manifolds;
   ContainmentQuery containment;
   Found found = Found::nothing;
   // Whether the two have the assets, and what they made of the last contacts.
@@ -31,7 +31,7 @@ struct tandem_contact_query : Handle {
 namespace {
 
 struct Options {
-  QueryOptions query;
+  ContactOptions query;
   PairFilter filter;
 };
 
@@ -53,7 +53,7 @@ tandem_status read_options(const tandem_query_options* given, size_t instances, 
   return read_filter(*read.filter, instances, options.filter, where);
 }
 
-Found found_with(const QueryOptions& options) {
+Found found_with(const ContactOptions& options) {
   const bool all = options.mode == QueryMode::exact && !options.first_contact_only && options.within == 0 &&
                    !options.add_error_bounds;
   return all ? Found::all_contacts : Found::contacts;
@@ -103,7 +103,7 @@ tandem_status tandem_contact_query_keep_fixed(tandem_contact_query* query, const
     if (!is_there(instances, count) || !is_there(motion, count)) return TANDEM_NULL_ARGUMENT;
     const size_t unknown = first_unknown_motion(motion, count);
     if (unknown != count) return self.fail(TANDEM_BAD_OPTION, unknown);
-    QueryOptions options;
+    ContactOptions options;
     options.threads = threads;
     const Status done =
         self.query.keep_fixed(rows<Instance>(instances, count), rows<Motion>(motion, count), options);
@@ -114,7 +114,7 @@ tandem_status tandem_contact_query_keep_fixed(tandem_contact_query* query, const
 tandem_status tandem_contact_query_find_pairs(tandem_contact_query* query, const tandem_instance* instances,
                                               size_t count, const tandem_query_options* options) {
   return find(query, is_there(instances, count), instances, count, options,
-              [](auto& self, auto bodies, const QueryOptions& read) {
+              [](auto& self, auto bodies, const ContactOptions& read) {
                 const Status status = self.query.find_pairs(bodies, read);
                 if (status == Status::kOk) self.found = Found::pairs;
                 return status;
@@ -125,7 +125,7 @@ tandem_status tandem_contact_query_find_contacts(tandem_contact_query* query,
                                                  const tandem_instance* instances, size_t count,
                                                  const tandem_query_options* options) {
   return find(query, is_there(instances, count), instances, count, options,
-              [](auto& self, auto bodies, const QueryOptions& read) {
+              [](auto& self, auto bodies, const ContactOptions& read) {
                 const Status status = self.query.find_contacts(bodies, read);
                 if (status == Status::kOk) self.found = found_with(read);
                 return status;
@@ -137,12 +137,13 @@ tandem_status tandem_contact_query_find_contacts_of_pairs(tandem_contact_query* 
                                                           const tandem_object_pair* pairs, size_t pair_count,
                                                           const tandem_query_options* options) {
   const bool lists_there = is_there(instances, count) && is_there(pairs, pair_count);
-  return find(
-      query, lists_there, instances, count, options, [&](auto& self, auto bodies, const QueryOptions& read) {
-        const Status status = self.query.find_contacts(bodies, rows<ObjectPair>(pairs, pair_count), read);
-        if (status == Status::kOk) self.found = found_with(read);
-        return status;
-      });
+  return find(query, lists_there, instances, count, options,
+              [&](auto& self, auto bodies, const ContactOptions& read) {
+                const Status status =
+                    self.query.find_contacts(bodies, rows<ObjectPair>(pairs, pair_count), read);
+                if (status == Status::kOk) self.found = found_with(read);
+                return status;
+              });
 }
 
 const tandem_object_pair* tandem_contact_query_pairs(const tandem_contact_query* query, size_t* count) {
@@ -162,7 +163,7 @@ uint64_t tandem_contact_query_where(const tandem_contact_query* query) {
 tandem_status tandem_contact_query_get_counters(const tandem_contact_query* query,
                                                 tandem_query_counters* counters) {
   if (query == nullptr) return TANDEM_NULL_ARGUMENT;
-  const QueryCounters from = query->found != Found::nothing ? query->query.counters() : QueryCounters();
+  const ContactCounters from = query->found != Found::nothing ? query->query.counters() : ContactCounters();
   tandem_query_counters filled = {};
   filled.object_pairs = from.object_pairs;
   filled.block_pairs = from.block_pairs;

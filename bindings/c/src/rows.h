@@ -2,10 +2,10 @@
 #include <span>
 
 #include "same_layout.h"
-#include "tandem/kernels/contact_manifolds.h"
 #include "tandem/kernels/containment_query.h"
 #include "tandem/kernels/distance_query.h"
 #include "tandem/kernels/impact_query.h"
+#include "tandem/kernels/manifold_query.h"
 #include "tandem/kernels/tolerance_query.h"
 #include "tandem/tandem.h"
 

@@ -4,9 +4,9 @@
 #include <atomic>
 #include <cmath>
 
+#include "kernels/geometry/triangle_test.h"
 #include "parallel/parallel.h"
 #include "tandem/formats/box.h"
-#include "tandem/kernels/detail/triangle_test.h"
 
 namespace tandem::build {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "tandem/kernels/detail/orientation.h"
+#include "kernels/geometry/orientation.h"
 
 namespace tandem::build {
 namespace {

@@ -7,7 +7,7 @@ using namespace tandem::c;
 
 namespace {
 
-tandem_status read_options(const tandem_gpu_query_options* given, GpuQueryOptions& options) {
+tandem_status read_options(const tandem_gpu_query_options* given, GpuContactOptions& options) {
   tandem_gpu_query_options read;
   if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return status;
   if (read.mode > TANDEM_BOXES || read.first_contact_only > 1 || read.sorted > 1 || read.grouped > 1 ||
@@ -31,7 +31,7 @@ tandem_status find(tandem_gpu_contact_query* query, const tandem_gpu_instances* 
     self.grouped = self.all_contacts = false;
     GpuInstances instances;
     GpuPairs pairs;
-    GpuQueryOptions options;
+    GpuContactOptions options;
     tandem_status status = read_options(given_options, options);
     if (status == TANDEM_OK) status = read_instances(given_instances, instances);
     if (status == TANDEM_OK) status = read_pairs(given_pairs, self.given_count.data(), pairs, stream);
@@ -70,7 +70,7 @@ tandem_status tandem_gpu_contact_query_reserve(tandem_gpu_contact_query* query,
   return with_assets(query, [&](tandem_gpu_contact_query& self) -> tandem_status {
     if (capacity == nullptr) return TANDEM_NULL_ARGUMENT;
     if (capacity->reserved != 0) return TANDEM_BAD_OPTION;
-    GpuQueryOptions read;
+    GpuContactOptions read;
     if (const tandem_status status = read_options(options, read); status != TANDEM_OK) return status;
     self.grouped = self.all_contacts = false;
     return told(self.query.reserve({capacity->pairs, capacity->contacts, capacity->undecided}, read),

@@ -4,7 +4,7 @@
 using namespace tandem;
 using namespace tandem::c;
 
-struct tandem_gpu_manifolds : GpuHandle<GpuContactManifolds> {};
+struct tandem_gpu_manifolds : GpuHandle<GpuManifoldQuery> {};
 
 namespace {
 
@@ -91,19 +91,19 @@ tandem_status tandem_gpu_manifolds_find(tandem_gpu_manifolds* manifolds,
 const tandem_manifold* tandem_gpu_manifolds_manifolds(const tandem_gpu_manifolds* manifolds) {
   using Rows = const tandem_manifold*;
   return of_query(manifolds, Rows{},
-                  [](const GpuContactManifolds& of) { return reinterpret_cast<Rows>(of.manifolds()); });
+                  [](const GpuManifoldQuery& of) { return reinterpret_cast<Rows>(of.manifolds()); });
 }
 
 const tandem_manifold_point* tandem_gpu_manifolds_points(const tandem_gpu_manifolds* manifolds) {
   using Rows = const tandem_manifold_point*;
   return of_query(manifolds, Rows{},
-                  [](const GpuContactManifolds& of) { return reinterpret_cast<Rows>(of.points()); });
+                  [](const GpuManifoldQuery& of) { return reinterpret_cast<Rows>(of.points()); });
 }
 
 const tandem_gpu_manifold_report* tandem_gpu_manifolds_device_report(const tandem_gpu_manifolds* manifolds) {
   using Report = const tandem_gpu_manifold_report*;
   return of_query(manifolds, Report{},
-                  [](const GpuContactManifolds& of) { return reinterpret_cast<Report>(of.device_report()); });
+                  [](const GpuManifoldQuery& of) { return reinterpret_cast<Report>(of.device_report()); });
 }
 
 tandem_status tandem_gpu_manifolds_get_report(const tandem_gpu_manifolds* manifolds,

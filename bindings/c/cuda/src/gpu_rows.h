@@ -2,10 +2,10 @@
 #include "rows.h"
 #include "same_layout.h"
 #include "tandem/kernels/gpu_broad_phase.h"
-#include "tandem/kernels/gpu_contact_manifolds.h"
 #include "tandem/kernels/gpu_containment_query.h"
 #include "tandem/kernels/gpu_distance_query.h"
 #include "tandem/kernels/gpu_impact_query.h"
+#include "tandem/kernels/gpu_manifold_query.h"
 #include "tandem/kernels/gpu_tolerance_query.h"
 #include "tandem/tandem_cuda.h"
 
@@ -22,20 +22,20 @@ TANDEM_SAME_PLACE(GpuBroadPhaseReport, tandem_gpu_broad_phase_report, where);
 TANDEM_SAME_PLACE(GpuBroadPhaseReport, tandem_gpu_broad_phase_report, count);
 TANDEM_SAME_PLACE(GpuBroadPhaseReport, tandem_gpu_broad_phase_report, found);
 
-TANDEM_SAME_SIZE(GpuQueryCapacity, tandem_gpu_query_capacity);
-TANDEM_SAME_PLACE(GpuQueryCapacity, tandem_gpu_query_capacity, contacts);
-TANDEM_SAME_PLACE(GpuQueryCapacity, tandem_gpu_query_capacity, undecided);
-TANDEM_SAME_SIZE(QueryCounters, tandem_gpu_query_counters);
-TANDEM_SAME_PLACE(QueryCounters, tandem_gpu_query_counters, candidates);
-TANDEM_SAME_PLACE(QueryCounters, tandem_gpu_query_counters, decided_exactly);
-TANDEM_SAME_PLACE(QueryCounters, tandem_gpu_query_counters, contacts);
-TANDEM_SAME_REPORT(GpuQueryReport, tandem_gpu_query_report);
-TANDEM_SAME_PLACE(GpuQueryReport, tandem_gpu_query_report, complete);
-TANDEM_SAME_PLACE(GpuQueryReport, tandem_gpu_query_report, where);
-TANDEM_SAME_PLACE(GpuQueryReport, tandem_gpu_query_report, needed);
-TANDEM_SAME_PLACE(GpuQueryReport, tandem_gpu_query_report, contacts);
-TANDEM_SAME_PLACE(GpuQueryReport, tandem_gpu_query_report, world_pairs);
-TANDEM_SAME_PLACE(GpuQueryReport, tandem_gpu_query_report, counters);
+TANDEM_SAME_SIZE(GpuContactCapacity, tandem_gpu_query_capacity);
+TANDEM_SAME_PLACE(GpuContactCapacity, tandem_gpu_query_capacity, contacts);
+TANDEM_SAME_PLACE(GpuContactCapacity, tandem_gpu_query_capacity, undecided);
+TANDEM_SAME_SIZE(ContactCounters, tandem_gpu_query_counters);
+TANDEM_SAME_PLACE(ContactCounters, tandem_gpu_query_counters, candidates);
+TANDEM_SAME_PLACE(ContactCounters, tandem_gpu_query_counters, decided_exactly);
+TANDEM_SAME_PLACE(ContactCounters, tandem_gpu_query_counters, contacts);
+TANDEM_SAME_REPORT(GpuContactReport, tandem_gpu_query_report);
+TANDEM_SAME_PLACE(GpuContactReport, tandem_gpu_query_report, complete);
+TANDEM_SAME_PLACE(GpuContactReport, tandem_gpu_query_report, where);
+TANDEM_SAME_PLACE(GpuContactReport, tandem_gpu_query_report, needed);
+TANDEM_SAME_PLACE(GpuContactReport, tandem_gpu_query_report, contacts);
+TANDEM_SAME_PLACE(GpuContactReport, tandem_gpu_query_report, world_pairs);
+TANDEM_SAME_PLACE(GpuContactReport, tandem_gpu_query_report, counters);
 TANDEM_SAME_SIZE(GpuGroupCounts, tandem_gpu_group_counts);
 TANDEM_SAME_PLACE(GpuGroupCounts, tandem_gpu_group_counts, contacts);
 TANDEM_SAME_PLACE(GpuGroupCounts, tandem_gpu_group_counts, few);

@@ -34,7 +34,7 @@ struct Contact {
 
 inline constexpr std::uint32_t kMostQueryThreads = 1024;
 
-struct QueryOptions {
+struct ContactOptions {
   QueryMode mode = QueryMode::exact;
   bool first_contact_only = false;  ///< the query reports one contact for each object pair that touches
   bool self_pairs = false;          ///< where the query finds the pairs: also each instance with itself
@@ -54,7 +54,7 @@ struct QueryOptions {
 };
 
 /// What a query did. The counters depend neither on the number of threads nor on the machine.
-struct QueryCounters {
+struct ContactCounters {
   std::uint64_t object_pairs = 0;
   std::uint64_t block_pairs = 0;  ///< 16 box tests each
   std::uint64_t candidates = 0;   ///< except in boxes mode, without those that planes of leaves tell apart
@@ -63,7 +63,7 @@ struct QueryCounters {
   std::uint64_t decided_exactly = 0;
   std::uint64_t contacts = 0;
 
-  friend bool operator==(const QueryCounters&, const QueryCounters&) = default;
+  friend bool operator==(const ContactCounters&, const ContactCounters&) = default;
 };
 
 /// Finds every pair of triangles that meet, of many posed instances of few assets, on the CPU. Keeps its
@@ -90,27 +90,27 @@ class ContactQuery {
   /// has motions, it says the same of what is kept. Result: as of find_pairs(); kKeptMismatch where the sizes
   /// differ. After an error, and after set_assets(), nothing is kept. Of the options: threads.
   Status keep_fixed(std::span<const Instance> instances, std::span<const Motion> motion,
-                    const QueryOptions& options = {});
+                    const ContactOptions& options = {});
 
   /// Finds the object pairs whose world boxes overlap, without their contacts, so that the caller can leave
   /// some out. Result: kOk; kUnknownAsset, kPoseNotRigid or kOutOfRange (beyond kLargestWorldCoordinate),
   /// where where() is the instance; kUnknownInstance, where where() is the filter's excluded pair;
   /// kKeptMismatch, kTooManyInstances, kTooManyPairs, kOutOfMemory or kCannotStartThread. After an error
   /// there are no pairs and no contacts.
-  Status find_pairs(std::span<const Instance> instances, const QueryOptions& options = {});
+  Status find_pairs(std::span<const Instance> instances, const ContactOptions& options = {});
 
   /// Finds the object pairs whose world boxes overlap, or are within `within`, and their contacts.
   /// find_contacts(instances, {}) is this one, with default options. Result: as above; kOutOfMemory also
   /// where the machine, or the limit of the process's control group, has not enough memory available for the
   /// contacts: Linux would grant it and kill the process later. In a steady state nothing is asked.
-  Status find_contacts(std::span<const Instance> instances, const QueryOptions& options = {});
+  Status find_contacts(std::span<const Instance> instances, const ContactOptions& options = {});
 
   /// Finds the contacts of the given object pairs, in either order of a and b. A pair of an instance with
   /// itself asks for the contacts within it: each pair of two different triangles once, neighbours in the
   /// mesh included, which touch. `pairs` may be pairs(), or a part of them; the filter is not asked. Result:
   /// as above, or kUnknownInstance: where() is the pair.
   Status find_contacts(std::span<const Instance> instances, std::span<const ObjectPair> pairs,
-                       const QueryOptions& options);
+                       const ContactOptions& options);
 
   /// The object pairs of the last call: a < b, or a = b for self pairs, sorted, where the query found them;
   /// as given else.
@@ -120,7 +120,7 @@ class ContactQuery {
   /// run and machine. Valid until the next call.
   std::span<const Contact> contacts() const;
 
-  const QueryCounters& counters() const;
+  const ContactCounters& counters() const;
 
   /// The instance or pair that is to blame for an error.
   std::uint64_t where() const;

@@ -5,7 +5,7 @@
 #include <span>
 
 #include "tandem/kernels/contact_query.h"
-#include "tandem/kernels/detail/distance/interval.h"
+#include "tandem/kernels/detail/interval.h"
 
 namespace tandem {
 

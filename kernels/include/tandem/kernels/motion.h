@@ -1,7 +1,7 @@
 #pragma once
 #include <cmath>
 
-#include "tandem/kernels/detail/manifold/vector3.h"
+#include "tandem/kernels/detail/vector3.h"
 #include "tandem/kernels/world_box.h"
 
 namespace tandem {

@@ -34,7 +34,7 @@ struct ToleranceOptions {
 /// What a query did. The counters depend neither on the number of threads nor on the machine.
 struct ToleranceCounters {
   std::uint64_t apart = 0, touching = 0, within_tolerance = 0;  ///< object pairs
-  QueryCounters work;                                           ///< of the contact query at these levels
+  ContactCounters work;                                         ///< of the contact query at these levels
 
   friend bool operator==(const ToleranceCounters&, const ToleranceCounters&) = default;
 };

@@ -11,7 +11,7 @@
 
 namespace tandem {
 
-struct GpuQueryOptions {
+struct GpuContactOptions {
   QueryMode mode = QueryMode::exact;
   /// The query reports one contact for each object pair that touches; which one is unspecified.
   bool first_contact_only = false;
@@ -35,11 +35,11 @@ struct GpuQueryOptions {
   /// Fewer leave multiprocessors to other work, and suit tools that are slow where warps wait.
   std::uint32_t most_blocks = 0;
 
-  /// Clearance: triangles whose distance is at most this count as contacts, as QueryOptions::within says;
+  /// Clearance: triangles whose distance is at most this count as contacts, as ContactOptions::within says;
   /// pairs that may have some are found by GpuBroadPhaseOptions::within. From 0 to kLargestWorldCoordinate.
   double within = 0;
 
-  /// Levels of detail: as QueryOptions::add_error_bounds says. Object pairs are found as without.
+  /// Levels of detail: as ContactOptions::add_error_bounds says. Object pairs are found as without.
   bool add_error_bounds = false;
 
   /// Whether distances are asked for at all, which takes other kernels, and more memory.
@@ -47,7 +47,7 @@ struct GpuQueryOptions {
 };
 
 /// How many of each a query has room for, or needs room for.
-struct GpuQueryCapacity {
+struct GpuContactCapacity {
   std::uint32_t pairs = 0;
   std::uint64_t contacts = 0;
   std::uint64_t undecided = 0;  ///< candidates that float32 cannot decide; of clearance, not quickly
@@ -59,7 +59,7 @@ inline constexpr std::size_t kMostWideBytes = std::size_t{2} << 20;
 /// GPU memory that a query of so many assets with room for so much holds at most: the bound of
 /// GpuContactQuery::bytes(), where it was never given more of them. options: those of all its calls.
 /// Instances cost it nothing, nor does the size of the assets.
-constexpr std::size_t most_query_bytes(const GpuQueryCapacity& capacity, const GpuQueryOptions& options,
+constexpr std::size_t most_query_bytes(const GpuContactCapacity& capacity, const GpuContactOptions& options,
                                        std::size_t assets) {
   constexpr std::size_t kFixed = std::size_t{9} << 20;  // work that warps give to each other, and the report
   const std::size_t per_contact = options.sorted ? 20 + 29 : options.grouped ? 20 + 20 : 20;
@@ -90,14 +90,14 @@ struct GpuContactGroups {
 
 /// The outcome of a query. It lies in GPU memory, and in CPU memory once the stream has come to the query's
 /// end.
-struct GpuQueryReport {
+struct GpuContactReport {
   Status status;              ///< kOk, or what find_contacts() of ContactQuery names; then no contacts
   std::uint32_t complete;     ///< 0 where something did not fit: contacts are missing then, see `needed`
   std::uint64_t where;        ///< the instance or pair that caused an error
-  GpuQueryCapacity needed;    ///< a lower bound; exact for what follows from things that did fit
+  GpuContactCapacity needed;  ///< a lower bound; exact for what follows from things that did fit
   std::uint64_t contacts;     ///< how many are stored
   std::uint64_t world_pairs;  ///< object pairs beyond float32, which are walked by world boxes, slowly
-  QueryCounters counters;
+  ContactCounters counters;
 };
 
 /// Finds every pair of triangles that meet, of many posed instances of few assets, on the GPU: the same set
@@ -121,7 +121,7 @@ class GpuContactQuery {
   /// come; of `within` and add_error_bounds counts whether they are of clearance. Result: kOk, kOutOfRange
   /// (sorted or grouped: 2^32 - 1 contacts or more; grouped: 2^31 pairs or more), kOutOfGpuMemory,
   /// kCudaFailed; after an error there is the room that there was, or none. Condition: set_assets().
-  Status reserve(const GpuQueryCapacity& capacity, const GpuQueryOptions& options = {});
+  Status reserve(const GpuContactCapacity& capacity, const GpuContactOptions& options = {});
 
   /// Queues a query behind what `stream` holds; it may be captured into a graph. The arrays must stay until
   /// it is done. A pair of an instance with itself asks for the contacts within it. Mode exact walks oriented
@@ -129,18 +129,18 @@ class GpuContactQuery {
   /// lacks them), kOutOfRange (sorted, grouped or of clearance, and reserved without; a distance that is
   /// none), kCudaFailed, or, where CUDA loads a kernel at its first launch and the GPU is full,
   /// kOutOfGpuMemory; what the GPU finds wrong is in the report. Condition: set_assets() and reserve().
-  Status enqueue(const GpuInstances& instances, const GpuPairs& pairs, const GpuQueryOptions& options,
+  Status enqueue(const GpuInstances& instances, const GpuPairs& pairs, const GpuContactOptions& options,
                  cudaStream_t stream);
 
   /// Enqueues a query and waits for it; where room was too small, makes room and starts again until the query
   /// is complete: rarely more than twice, and in a steady state once. Result: that of the report, or of a
   /// call that failed; kOutOfRange where pairs.capacity itself was too small.
-  Status find_contacts(const GpuInstances& instances, const GpuPairs& pairs, const GpuQueryOptions& options,
+  Status find_contacts(const GpuInstances& instances, const GpuPairs& pairs, const GpuContactOptions& options,
                        cudaStream_t stream);
 
   /// In GPU memory: report().contacts of them. Condition: set_assets().
   const Contact* contacts() const;
-  const GpuQueryReport* device_report() const;
+  const GpuContactReport* device_report() const;
 
   /// Condition: set_assets(), and reserve() for grouped contacts; valid until the next reserve().
   GpuContactGroups groups() const;
@@ -150,9 +150,9 @@ class GpuContactQuery {
   const std::uint32_t* met() const;
 
   /// In CPU memory. Condition: the stream has come to the end of the query.
-  const GpuQueryReport& report() const;
+  const GpuContactReport& report() const;
 
-  GpuQueryCapacity capacity() const;
+  GpuContactCapacity capacity() const;
   std::size_t bytes() const;  ///< GPU memory held, at most most_query_bytes()
   cudaError_t cuda_error() const;
 

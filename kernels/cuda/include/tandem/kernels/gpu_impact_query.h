@@ -19,7 +19,7 @@ struct GpuImpactOptions {
   bool sorted = false;
   /// Where the query finds the pairs: those that it looks at. Its arrays lie in GPU memory.
   PairFilter filter = {};
-  /// As of GpuQueryOptions, for the walks that look for contacts.
+  /// As of GpuContactOptions, for the walks that look for contacts.
   std::uint32_t most_blocks = 0;
 };
 
@@ -28,7 +28,7 @@ struct GpuImpactCapacity {
   std::uint32_t instances = 0;
   std::uint32_t pairs = 0;
   std::uint64_t contacts = 0;        ///< at the start, all of them
-  std::uint64_t undecided = 0;       ///< as of GpuQueryCapacity
+  std::uint64_t undecided = 0;       ///< as of GpuContactCapacity
   std::uint32_t parts = 0;           ///< of the step, of all pairs: half radians of turn, and halves of them
   std::uint32_t block_pairs = 0;     ///< of a round
   std::uint32_t triangle_pairs = 0;  ///< whose boxes may meet

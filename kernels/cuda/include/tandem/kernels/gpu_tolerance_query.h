@@ -19,7 +19,7 @@ struct GpuToleranceCapacity {
 };
 
 /// What it asks of a contact query.
-inline constexpr GpuQueryOptions kToleranceOptions = {.first_contact_only = true, .add_error_bounds = true};
+inline constexpr GpuContactOptions kToleranceOptions = {.first_contact_only = true, .add_error_bounds = true};
 
 /// GPU memory that a query of so many levels of assets, all together, with room for so much holds at most:
 /// the bound of GpuToleranceQuery::bytes(), where it was never given more of them.

@@ -1,0 +1,74 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+
+#include "kernels/common/block_pair.h"
+#include "kernels/common/lanes.h"
+#include "kernels/geometry/frame_distance.h"
+#include "kernels/geometry/relative_pose.h"
+#include "tandem/formats/view.h"
+#include "tandem/kernels/contact_query.h"
+
+// The contacts of one object pair: traversal, then the cascade on its candidates.
+namespace tandem {
+
+/// An instance as the narrow phase sees it.
+struct PosedTree {
+  LevelView tree;
+  TreeExtent extent;
+  double grid;       ///< grid_of() the tree
+  Pose pose;         ///< of stored coordinates
+  double error = 0;  ///< posed_level_error()
+};
+
+/// An object pair, and what is asked about it.
+struct PairTask {
+  const PosedTree *a, *b;
+  std::uint32_t pair = 0;
+  QueryMode mode = QueryMode::exact;
+  bool first_contact_only = false;
+  bool self;              ///< a and b are one instance: every two triangles once, none with itself
+  bool in_frame;          ///< float32 in a's frame can take the pair; else what follows has no meaning
+  RelativePose b_in_a;    ///< with slack for what is within reach too
+  float frame_error = 0;  ///< see frame_test.h; with what is within reach too
+  bool on_grid = false;   ///< lie_on_grid()
+  double within = 0;      ///< triangles at most so far apart count; 0: those that meet
+  distance::FrameClearance clearance = {};  ///< where that is not 0
+};
+
+/// What is to be known of these two, or of one instance with itself. What else is asked is up to the caller.
+PairTask pair_task(const PosedTree& a, const PosedTree& b, double within = 0);
+
+/// Where contacts go: room that grows.
+struct ContactSink {
+  Contact* next = nullptr;
+  Contact* end = nullptr;
+  void* owner = nullptr;
+  bool (*grow)(ContactSink&) = nullptr;  ///< makes room for at least one; false: out of memory
+  ContactCounters counters;
+};
+
+/// Adds the contacts of a pair to the sink, and what was done to its counters. False: out of memory.
+using NarrowPhase = bool (*)(const PairTask&, ContactSink&);
+
+/// The named way, or null where this machine or this build lacks it; all give the same contacts in the same
+/// order, and the same counters. Condition: task.in_frame.
+NarrowPhase narrow_phase(BlockPairVariant variant);
+
+/// For pairs that are not in_frame: boxes of nodes in world coordinates, float64. Slow, and right for all
+/// posed points that are finite.
+bool narrow_phase_by_world_boxes(const PairTask& task, ContactSink& sink);
+
+/// What the first stage left: decides on the posed vertices, by float64, then exactly. In fast mode, by
+/// float32 in a's frame.
+/// Where task.within is not 0, whether they are within it, in any mode.
+bool meet(const PairTask& task, std::uint32_t triangle_a, std::uint32_t triangle_b,
+          ContactCounters& counters);
+
+// Each defined in a file of its own, which is compiled for machines that have the instructions.
+bool narrow_phase_scalar(const PairTask& task, ContactSink& sink);
+bool narrow_phase_lanes4(const PairTask& task, ContactSink& sink);
+bool narrow_phase_avx2(const PairTask& task, ContactSink& sink);
+bool narrow_phase_avx512(const PairTask& task, ContactSink& sink);
+
+}  // namespace tandem

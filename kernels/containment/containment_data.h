@@ -1,0 +1,48 @@
+#pragma once
+#include <cuda_runtime.h>
+
+#include <cstdint>
+
+#include "kernels/common/launch.h"
+#include "kernels/common/pair_record.h"
+#include "kernels/geometry/inside_test.h"
+#include "tandem/kernels/gpu_containment_query.h"
+
+// What the kernels that find bodies within bodies share, all of it in GPU memory.
+namespace tandem::gpu {
+
+/// Where a row comes among those of its pair.
+struct FoundContainment {
+  Containment row;
+  std::uint32_t rank;
+};
+
+struct ContainmentState {
+  std::uint32_t next_pair;  ///< that no warp has taken
+  Counter found;            ///< rows, those without room too
+  GpuContainmentReport report;
+};
+
+/// Pairs whose rows are added up.
+inline constexpr std::uint32_t kPairsPerSum = 4096;
+
+struct ContainmentArgs {
+  const containment::Surface* surfaces;
+  GpuInstances instances;
+  GpuPairs pairs;
+  GpuContactGroups groups;
+  const GpuContactReport* query;
+  GpuContainmentCapacity capacity;
+  ContainmentState* state;
+  GpuContainmentReport* host_report;  ///< in CPU memory
+  std::uint32_t* rows_of_pair;
+  std::uint32_t* sums;  ///< of the rows of kPairsPerSum pairs each
+  FoundContainment* found;
+  Containment* contained;
+  DeviceLimits limits;
+};
+
+/// Finds all rows, and puts them in order.
+cudaError_t find_contained(const ContainmentArgs& args, cudaStream_t stream);
+
+}  // namespace tandem::gpu

@@ -1,0 +1,259 @@
+#include "kernels/distance/nearest_phase.h"
+
+#include <algorithm>
+
+#include "kernels/contact/candidate.h"
+#include "kernels/distance/nearest_walk.h"
+#include "kernels/geometry/frame_distance.h"
+
+namespace tandem {
+namespace {
+
+class NearestScalarMeans {
+ public:
+  using Bound = float;
+
+  explicit NearestScalarMeans(const NearestTask& task) : task_(task) {}
+
+  float limit(double distance) const { return bound_limit(task_, distance); }
+  double distance(float bound) const { return bound_distance(task_, bound); }
+
+  std::uint32_t bounds(const Block& a, const Block& b, float limit, float* out) const {
+    std::uint32_t mask = 0;
+    for (int i = 0; i < kNodesPerBlock; ++i) {
+      for (int j = 0; j < kNodesPerBlock; ++j) {
+        const int bit = 4 * i + j;
+        out[bit] = box_distance_bound(box_of(a, i), box_of(b, j), task_.frame.b_in_a);
+        if (out[bit] < limit) mask |= 1u << bit;
+      }
+    }
+    return mask;
+  }
+
+  std::uint32_t far_along(const NearBatch& batch, const float (&direction)[3], double at_least) const {
+    const distance::FrameDirection along = direction_of(task_, direction, at_least);
+    std::uint32_t mask = 0;
+    for (std::uint32_t i = 0; i < kNearBatch && i < batch.count; ++i) {
+      const auto [a, b] = corners(batch, i);
+      if (distance::is_far_along(a.corner, b.corner, along)) mask |= 1u << i;
+    }
+    return mask;
+  }
+
+  void bound(const NearBatch& batch, BoundedBatch& out) const {
+    const DistanceFrame& frame = task_.frame;
+    for (std::uint32_t i = 0; i < kNearBatch && i < batch.count; ++i) {
+      const auto [a, b] = corners(batch, i);
+      const auto interval = distance::frame_interval(a.corner, b.corner, frame.error);
+      out.lower[i] = static_cast<double>(interval.lower) * frame.least_in_world;
+      out.upper[i] = static_cast<double>(interval.upper) * frame.most_in_world;
+      for (int k = 0; k < 3; ++k) out.along[k][i] = interval.along.x[k];
+    }
+  }
+
+ private:
+  struct Corners {
+    TriangleInFrame a, b;
+  };
+  Corners corners(const NearBatch& batch, std::uint32_t i) const {
+    return {stored_triangle(task_.a->tree.triangles[batch.a[i]]),
+            posed_triangle(task_.frame.b_in_a, task_.b->tree.triangles[batch.b[i]])};
+  }
+
+  const NearestTask& task_;
+};
+
+class NearestWorldBoxMeans {
+ public:
+  using Bound = double;
+
+  explicit NearestWorldBoxMeans(const NearestTask& task) : task_(task) {}
+
+  double limit(double distance) const { return distance; }
+  double distance(double bound) const { return bound; }
+
+  std::uint32_t bounds(const Block& a, const Block& b, double limit, double* out) const {
+    std::uint32_t mask = 0;
+    for (int i = 0; i < kNodesPerBlock; ++i) {
+      if (a.kind[i] == NodeKind::imaginary) continue;
+      const WorldBox box_a = node_world_box(task_.a->pose, a, i);
+      for (int j = 0; j < kNodesPerBlock; ++j) {
+        if (b.kind[j] == NodeKind::imaginary) continue;
+        const WorldBox box_b = node_world_box(task_.b->pose, b, j);
+        const int bit = 4 * i + j;
+        out[bit] = distance_between(box_a, box_b);
+        if (out[bit] < limit) mask |= 1u << bit;
+      }
+    }
+    return mask;
+  }
+
+  std::uint32_t far_along(const NearBatch&, const float (&)[3], double) const { return 0; }
+
+  /// Nothing is known, so that all are settled.
+  void bound(const NearBatch&, BoundedBatch& out) const {
+    std::fill_n(out.lower, kNearBatch, 0.0);
+    std::fill_n(out.upper, kNearBatch, INFINITY);
+  }
+
+ private:
+  const NearestTask& task_;
+};
+
+}  // namespace
+
+NearestTask nearest_task(const PosedTree& a, const PosedTree& b, const DistanceTolerance& tolerance) {
+  NearestTask task;
+  task.a = &a;
+  task.b = &b;
+  task.tolerance = tolerance;
+  task.in_frame = distance_frame(a.pose, a.extent, b.pose, b.extent, task.frame);
+  return task;
+}
+
+double nearness(const NearestTask& task, const NearestSoFar& state) {
+  return state.found ? nearness_below(task.tolerance, state.upper) : state.upper;
+}
+
+float bound_limit(const NearestTask& task, double distance) {
+  return distance::limit_of(task.frame, distance);
+}
+
+double bound_distance(const NearestTask& task, float bound) {
+  return distance::distance_of(task.frame, bound);
+}
+
+distance::FrameDirection direction_of(const NearestTask& task, const float (&direction)[3], double at_least) {
+  return distance::frame_direction(task.frame, direction, at_least);
+}
+
+bool add_candidate(const NearCandidate& candidate, NearestSoFar& state) {
+  state.enough_memory = state.candidates.push(candidate);
+  return state.enough_memory;
+}
+
+bool leave(const BoundedBlockPair& pair, NearestSoFar& state) {
+  state.enough_memory = state.left.push(pair);
+  return state.enough_memory;
+}
+
+namespace {
+
+// The nearer of two, and of those at one distance the one with the lower triangles.
+void keep_nearer(const TriangleDistance& found, std::uint32_t triangle_a, std::uint32_t triangle_b,
+                 NearestSoFar& state) {
+  const double upper = found.interval.upper, best = state.best.interval.upper;
+  const bool first =
+      triangle_a != state.triangle_a ? triangle_a < state.triangle_a : triangle_b < state.triangle_b;
+  if (!(upper < best || (upper == best && first))) return;
+  state.best = found;
+  state.triangle_a = triangle_a;
+  state.triangle_b = triangle_b;
+}
+
+}  // namespace
+
+void settle(const NearestTask& task, std::uint32_t triangle_a, std::uint32_t triangle_b,
+            NearestSoFar& state) {
+  const TrianglePair pair = posed_pair(task.a->pose, task.a->tree.triangles[triangle_a], task.b->pose,
+                                       task.b->tree.triangles[triangle_b]);
+  const TriangleDistance found = triangle_distance(pair, task.tolerance);
+  ++state.counters.by_float64;
+  state.floor = std::min(state.floor, found.interval.lower);
+  if (found.interval.upper < state.upper) {
+    state.upper = found.interval.upper;
+    state.found = true;
+  }
+  keep_nearer(found, triangle_a, triangle_b, state);
+}
+
+bool take_over(NearestSoFar& from, NearestSoFar& state) {
+  if (!from.enough_memory) return false;
+  state.counters.block_pairs += from.counters.block_pairs;
+  state.counters.by_float32 += from.counters.by_float32;
+  state.counters.by_float64 += from.counters.by_float64;
+  state.floor = std::min(state.floor, from.floor);
+  if (from.found && from.upper < state.upper) {
+    state.upper = from.upper;
+    state.found = true;
+    state.has_direction = from.has_direction;
+    std::copy_n(from.direction, 3, state.direction);
+  }
+  keep_nearer(from.best, from.triangle_a, from.triangle_b, state);
+  for (const NearCandidate& candidate : from.candidates.view()) {
+    if (!add_candidate(candidate, state)) return false;
+  }
+  for (const BoundedBlockPair& pair : from.left.view()) {
+    if (!leave(pair, state)) return false;
+  }
+  return true;
+}
+
+namespace {
+
+// A lower bound: how far apart a candidate's triangles are along the direction of the best. Most of those
+// that are left have their nearest corner or edge in common with it, and so all but the same distance.
+double distance_along_best(const NearestTask& task, const NearCandidate& candidate,
+                           const NearestSoFar& state) {
+  return distance::distance_along_points(posed_pair(task.a->pose, task.a->tree.triangles[candidate.a],
+                                                    task.b->pose, task.b->tree.triangles[candidate.b]),
+                                         state.best.point_a, state.best.point_b);
+}
+
+}  // namespace
+
+void settle_candidates(const NearestTask& task, NearestSoFar& state) {
+  NearCandidate* const begin = state.candidates.data();
+  NearCandidate* const end = begin + state.candidates.size();
+  const auto* const first = std::min_element(
+      begin, end, [](const NearCandidate& x, const NearCandidate& y) { return x.upper < y.upper; });
+  if (first != end && first->upper < state.best.interval.upper) settle(task, first->a, first->b, state);
+  const auto near = [&](const NearCandidate& candidate) { return candidate.lower < nearness(task, state); };
+  NearCandidate* const far = std::partition(begin, end, near);
+  for (const NearCandidate* at = far; at < end; ++at) state.floor = std::min(state.floor, at->lower);
+  std::sort(begin, far, [](const NearCandidate& x, const NearCandidate& y) {
+    if (x.lower != y.lower) return x.lower < y.lower;
+    return x.a != y.a ? x.a < y.a : x.b < y.b;
+  });
+  for (const NearCandidate* at = begin; at < far && !state.touches(); ++at) {
+    if (at->a == state.triangle_a && at->b == state.triangle_b) continue;
+    const double lower = near(*at) ? distance_along_best(task, *at, state) : at->lower;
+    if (lower < nearness(task, state))
+      settle(task, at->a, at->b, state);
+    else
+      state.floor = std::min(state.floor, lower);
+  }
+  state.candidates.clear();
+}
+
+void nearest_phase_scalar(const NearestTask& task, const BoundedBlockPair* from, std::uint32_t count,
+                          NearestSoFar& state) {
+  NearestWalk<NearestScalarMeans>(task, state).run(from, count);
+}
+
+void nearest_phase_by_world_boxes(const NearestTask& task, const BoundedBlockPair* from, std::uint32_t count,
+                                  NearestSoFar& state) {
+  NearestWalk<NearestWorldBoxMeans>(task, state).run(from, count);
+}
+
+NearestPhase nearest_phase(BlockPairVariant variant) {
+  if (block_pair_test(variant) == nullptr) return nullptr;
+  switch (variant) {
+    case BlockPairVariant::scalar:
+      return nearest_phase_scalar;
+#ifdef TANDEM_HAVE_LANES
+    case BlockPairVariant::lanes4:
+      return nearest_phase_lanes4;
+#ifdef TANDEM_X86_LANES
+    case BlockPairVariant::avx2:
+      return nearest_phase_avx2;
+    case BlockPairVariant::avx512:
+      return nearest_phase_avx512;
+#endif
+#endif
+    default:
+      return nullptr;
+  }
+}
+
+}  // namespace tandem

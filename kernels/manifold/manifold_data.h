@@ -1,0 +1,123 @@
+#pragma once
+#include <cuda_runtime.h>
+
+#include <cstdint>
+
+#include "kernels/common/launch.h"
+#include "kernels/manifold/contact_curves.h"
+#include "kernels/manifold/finish.h"
+#include "kernels/manifold/patch.h"
+#include "tandem/kernels/gpu_manifold_query.h"
+
+// What the kernels that make manifolds share, all of it in GPU memory.
+namespace tandem::gpu {
+
+using Counter = unsigned long long;
+
+/// A curve of a pair of bodies.
+struct PairCurve {
+  std::uint32_t pair, curve;
+};
+
+/// manifold::PieceBounds of a pair, to which lanes add by atomic operations: all zeros before.
+struct PairPieces {
+  std::uint32_t pieces, segments, degenerate;
+  Counter outermost[6];  ///< in_order() of the upper bounds and of the negated lower ones
+};
+
+/// The patches of a pair: a list that next_of_pair leads along.
+struct PairPatches {
+  std::uint32_t first;  ///< kNoIndex where there is none
+  std::uint32_t patches, manifolds, points;
+  std::uint32_t first_manifold, first_point;
+  PairPieces pieces;
+};
+
+/// A patch between the kernels that make it.
+struct BegunPatch {
+  PairCurve of;
+  manifold::PatchState state;
+};
+
+/// The place of the points of a pair of bodies.
+struct PairEntry {
+  std::uint64_t bodies;
+  std::uint32_t first_point, points;
+};
+
+/// An entry of the table of the step before; of another step than `step` it is empty.
+struct alignas(8) TableEntry {
+  std::uint32_t step;
+  std::uint32_t first_point;
+  std::uint64_t bodies;
+  std::uint32_t points, unused;
+};
+
+struct ManifoldState {
+  // Cleared by each call.
+  std::uint32_t next_many, next_few, next_patch, tiles_taken;
+  std::uint32_t curves_of_many, curves_of_few, next_curve_of_many, next_curve_of_few;
+  std::uint32_t next_measured, next_finished;
+  Counter needed_points, segments, ambiguous_touches, open_curves;
+  std::uint32_t too_many_contacts, finished_blocks;
+
+  // Kept from call to call.
+  std::uint32_t step;      ///< of the table
+  std::uint32_t has_last;  ///< the last call made manifolds that the next one is to remember
+  std::uint32_t last_manifolds, last_points;
+  GpuManifoldReport report;
+};
+
+/// Pairs whose counts are added up at once, by a thread block.
+inline constexpr std::uint32_t kManifoldTile = 1024;
+
+struct ManifoldArgs {
+  const manifold::Shape* shapes;
+  GpuInstances instances;
+  GpuPairs pairs;
+  GpuContactGroups groups;
+  const GpuContactReport* query;
+  GpuManifoldCapacity capacity;
+  bool match_previous;
+  int most_points;
+
+  ManifoldState* state;
+  GpuManifoldReport* host_report;  ///< in CPU memory
+  manifold::PieceMemory pieces;
+  BegunPatch* begun;
+  manifold::Patch* patches;
+  std::uint32_t* next_of_pair;  ///< of each patch: the next of the same pair
+  PairPatches* of_pair;
+  manifold::PieceSummary* summaries;  ///< of each pair with contacts
+  PairCurve* curves;                  ///< those of many pieces from the beginning on, others from the end
+  Counter* tile_sums;
+
+  Manifold* manifolds;
+  ManifoldPoint* points;
+  PairEntry* entries;  ///< of each manifold: the first of a pair has the pair's points, others none
+
+  Manifold* manifolds_before;
+  ManifoldPoint* points_before;
+  TableEntry* table;
+  std::uint32_t table_size;
+
+  DeviceLimits limits;
+};
+
+/// Moves the table of the step before to a larger one, on the default stream.
+cudaError_t move_entries(const TableEntry* from, std::uint32_t from_size, TableEntry* to,
+                         std::uint32_t to_size, const ManifoldState* state);
+
+/// The next call finds nothing before it.
+cudaError_t forget_last(ManifoldState* state, cudaStream_t stream);
+
+/// Keeps the last call's points for matching.
+cudaError_t remember_points(const ManifoldArgs& args, cudaStream_t stream);
+
+/// Finds the curves of all pairs that have contacts, and makes their patches.
+cudaError_t make_patches(const ManifoldArgs& args, cudaStream_t stream);
+
+/// Gives them their places, writes manifolds and points, and the report.
+cudaError_t place_manifolds(const ManifoldArgs& args, cudaStream_t stream);
+
+}  // namespace tandem::gpu

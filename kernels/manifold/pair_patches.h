@@ -1,0 +1,75 @@
+#pragma once
+#include <algorithm>
+
+#include "kernels/manifold/manifold_maker.h"
+#include "kernels/manifold/manifold_means.h"
+#include "tandem/kernels/detail/buffer.h"
+
+namespace tandem {
+
+/// A thread that has means to be faster.
+struct MeansThread : manifold::OneThread {
+  const ManifoldMeans& best;
+  const ManifoldMeans& means() const { return best; }
+};
+
+/// The patches of pairs of bodies that one thread makes, and the memory that it takes.
+struct alignas(64) PairPatches {
+  Buffer<manifold::Patch> patches;
+  std::uint64_t segments = 0, ambiguous_touches = 0;
+
+  void clear() {
+    patches.clear();
+    segments = ambiguous_touches = 0;
+  }
+
+  /// Adds the patches of a pair. False: out of memory.
+  template <typename Team>
+  bool add(const Team& team, const manifold::BodyPair& bodies, const Contact* contacts, std::uint32_t count,
+           int most_points) {
+    manifold::PieceMemory memory;
+    if (!make_room(count, memory)) return false;
+    manifold::CurveFinder<Team> finder(team, bodies, memory);
+    const manifold::PieceSummary summary = finder.find(contacts, count, outline_.next);
+    segments += summary.segments;
+    manifold::ManifoldMaker<Team> maker(team, bodies, memory, summary, state_);
+    bool enough_memory = true;
+    const auto new_patch = [&]() -> manifold::Patch* {
+      enough_memory = enough_memory && patches.push({});
+      return enough_memory ? &patches[patches.size() - 1] : nullptr;
+    };
+    for (std::uint32_t curve = 0; curve < summary.curves; ++curve) {
+      if (!maker.begin(curve, outline_)) {
+        ++ambiguous_touches;
+        continue;
+      }
+      maker.measure_depths(curve, depths_);
+      maker.finish(curve, most_points, choice_, new_patch);
+    }
+    return enough_memory;
+  }
+
+ private:
+  static constexpr std::uint32_t kTableWords =
+      std::max(manifold::PieceMemory::kTableWords, ManifoldMeans::kTableWords);
+
+  bool make_room(std::size_t contacts, manifold::PieceMemory& memory) {
+    if (!pieces_.resize(contacts) || !normals_.resize(6 * contacts + 1) ||
+        !words_.resize((3 + kTableWords) * contacts + 1 + ManifoldMeans::kMoreTableWords))
+      return false;
+    std::uint32_t* const word = words_.data();
+    memory = {pieces_.data(),  normals_.data(),     word,
+              word + contacts, word + 2 * contacts, word + 3 * contacts + 1};
+    return true;
+  }
+
+  Buffer<manifold::Piece> pieces_;
+  Buffer<float> normals_;
+  Buffer<std::uint32_t> words_;
+  manifold::PatchState state_;
+  manifold::OutlineMemory outline_;
+  manifold::DepthMemory depths_;
+  manifold::ChoiceMemory choice_;
+};
+
+}  // namespace tandem

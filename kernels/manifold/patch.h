@@ -1,0 +1,243 @@
+#pragma once
+#include <cstdint>
+
+#include "kernels/manifold/contact_curves.h"
+#include "kernels/manifold/surface_line.h"
+#include "tandem/kernels/manifold.h"
+
+/// What the steps from a curve of pieces to a manifold pass on to each other.
+namespace tandem::manifold {
+
+/// A manifold before it has its place.
+struct Patch {
+  Manifold manifold;
+  std::uint64_t key;   ///< of its least piece: the order within a pair
+  std::uint64_t hole;  ///< 1: what lies within this curve is no contact, but a hole in another manifold's
+  ManifoldPoint point[kMostManifoldPoints];
+};
+
+/// The piece of the least key.
+struct LeastPiece {
+  std::uint64_t key = ~std::uint64_t{0};
+  std::uint32_t piece = kNoIndex;
+
+  TANDEM_HD void take(std::uint64_t of, std::uint32_t at) {
+    if (of < key) key = of, piece = at;
+  }
+};
+
+/// Sums over the pieces of a curve.
+struct CurveSums {
+  ExactVectorSum area, gap, middle;
+  ExactSum length;
+  LeastPiece least;
+
+  TANDEM_HD void add(const PieceMemory& memory, std::uint32_t at, const Vector3& origin, double one_by_unit) {
+    const Piece& piece = memory.pieces[at];
+    least.take(piece.key(), at);
+    if (piece.kind() == MeetingKind::polygon) return area.add(piece.end[1], one_by_unit * one_by_unit);
+    const Vector3 from = piece.end[0] - origin, along = piece.weight() * (piece.end[1] - piece.end[0]);
+    area.add(0.5 * cross(from, along), one_by_unit * one_by_unit);
+    gap.add(along, one_by_unit);
+    const double size = norm(along);
+    length.add(size, one_by_unit);
+    middle.add((size * one_by_unit) * (0.5 * (from + (piece.end[1] - origin))), one_by_unit);
+  }
+};
+
+/// What all pieces of a curve amount to.
+struct CurveMeasure {
+  Vector3 area;    ///< half the sum of r x dr, and polygons: from a towards b
+  Vector3 middle;  ///< of the pieces
+  double length = 0;
+  bool point = false;  ///< all pieces are points, as nearly as it can be told: the ends of one may differ
+  bool closed = true;
+  bool by_area = true;   ///< the area says where the normal is: the curve is closed, and not so small that
+                         ///< rounding of its points decides
+  Vector3 sheet_normal;  ///< of the pieces' triangles, from a towards b, times lengths, where the area does
+                         ///< not say it; of open surfaces where there are any
+  std::uint64_t key = 0;
+};
+
+/// Unit normals of float32 whose difference's square is less are of one face: half a milliradian.
+inline constexpr float kSameFace = 2e-7f;
+
+/// The face that lies most across a direction; of several that of the least piece.
+struct FaceAlong {
+  float along = 0.9f;  ///< faces that lie less across it do not count
+  LeastPiece least;
+
+  TANDEM_HD void take(float of_piece, std::uint64_t key, std::uint32_t piece) {
+    if (of_piece > along) along = of_piece, least = {};
+    if (of_piece == along) least.take(key, piece);
+  }
+};
+
+/// The heights of a patch's triangles along a direction.
+struct Spread {
+  double highest_a, lowest_b;
+};
+
+/// The most directions that are tried for a normal.
+inline constexpr int kMostTried = 11;
+
+/// The direction of a face, from a towards b.
+struct Direction {
+  Vector3 n;
+  std::uint32_t piece;  ///< one whose triangle has it
+};
+
+/// What a team shares while it looks for a normal.
+struct NormalMemory {
+  Direction direction[kMostTried];  ///< of faces of a, then of b
+  Vector3 tried[kMostTried];
+  Spread spread[kMostTried];
+};
+
+/// The direction in which the bodies of a patch push each other.
+struct PatchNormal {
+  Vector3 n;  ///< unit, from a towards b
+  bool known =
+      false;  ///< no: corners or edges that touch each other, where no direction is better than another
+  bool touch = false;  ///< the surfaces meet without area
+};
+
+/// A point of a patch where its curve has a corner, as the search for the outermost ones sees it.
+struct Candidate {
+  float x, y;
+  std::uint32_t reference;  ///< piece * 8 + number of its end or corner
+};
+static_assert(sizeof(Candidate) == 12);
+
+struct FloatPoint {
+  float x, y;
+};
+
+/// What a candidate is to have most of: distance from p, or distance beyond the line from p to q, times its
+/// length.
+struct RimValue {
+  FloatPoint p, q;
+  bool distance;
+
+  TANDEM_HD float operator()(const Candidate& c) const {
+    const float x = c.x - p.x, y = c.y - p.y;
+    return distance ? x * x + y * y : (q.y - p.y) * x - (q.x - p.x) * y;
+  }
+};
+
+/// The candidate that has most of something.
+struct Furthest {
+  float value;
+  std::uint32_t reference;
+
+  TANDEM_HD static std::uint64_t key(const PieceMemory& memory, std::uint32_t reference) {
+    const Piece& p = memory.pieces[reference / 8];
+    return std::uint64_t{p.triangle[0]} << 33 | std::uint64_t{p.triangle[1]} << 3 | (reference & 7u);
+  }
+  /// Of several the one whose triangles come first.
+  TANDEM_HD void take(const PieceMemory& memory, float of_c, std::uint32_t of) {
+    if (!(of_c >= value)) return;
+    if (of_c == value && (reference == kNoIndex || key(memory, of) >= key(memory, reference))) return;
+    value = of_c, reference = of;
+  }
+};
+
+/// Twice the area within a curve as it is seen along the normal, and that times its middle.
+struct RimMoments {
+  ExactSum twice_area, x, y;
+};
+
+/// A patch's outermost candidates, counter-clockwise.
+struct Rim {
+  std::uint32_t reference[kMostManifoldPoints];
+  FloatPoint at[kMostManifoldPoints];
+  int rank[kMostManifoldPoints];  ///< how many were found before
+  int points;
+};
+
+/// What a team shares while it looks for a rim.
+struct RimMemory {
+  Rim rim;
+  Furthest of_side[kMostManifoldPoints];  ///< beyond the side from point i to the next: what it would add
+  int first, second;                      ///< sides that are to be looked beyond
+  bool complete;
+};
+
+/// A point that a manifold may have, and the line across the patch that measures the depth there.
+struct Sounding {
+  Vector2 at, line;         ///< the line runs a little further inside
+  double height;            ///< of the point
+  double target[2];         ///< the height near which the line is to meet a's surface, b's
+  std::uint32_t reference;  ///< of a rim point: the candidate. Else kNoIndex
+  std::uint64_t feature;
+  int rank = 0;         ///< of a rim point
+  int vertex_of = -1;   ///< the side whose vertex it is; -1: none's
+  Crossing surface[2];  ///< a's, that faces along the normal; b's, that faces against it
+  Crossing behind[2];   ///< where a begins, on the line, if that is above b's surface; where b ends, if that
+                        ///< is below a's
+  bool looked_behind;
+
+  TANDEM_HD double overlap() const {
+    return surface[0].found() && surface[1].found() ? surface[0].height - surface[1].height : 0;
+  }
+  /// Whether the line runs within both, as far as it was looked at.
+  TANDEM_HD bool within() const {
+    if (!(overlap() > 0)) return false;
+    if (!looked_behind) return true;
+    const double begin = std::fmax(surface[1].height, behind[0].found() ? behind[0].height : -INFINITY);
+    const double end = std::fmin(surface[0].height, behind[1].found() ? behind[1].height : INFINITY);
+    return begin < end;
+  }
+  /// Whether one body ends within the other. Condition: looked_behind, within().
+  TANDEM_HD bool goes_through() const { return behind[0].found() || behind[1].found(); }
+};
+
+/// Rim, the middle, and twice a's highest vertex and b's lowest.
+inline constexpr int kMostSoundings = static_cast<int>(kMostManifoldPoints) + 5;
+
+/// A point that a manifold may have, as those that it has are chosen.
+struct Chosen {
+  Vector2 at;
+  double height, depth, from_middle;
+  std::uint64_t feature;
+  std::uint32_t triangle[2];
+  bool inner;
+};
+
+/// What is known of a patch from one step to the next.
+struct PatchState {
+  Sounding sounding[kMostSoundings];  ///< of the rim, of the middle, of vertices
+  int rim_points, soundings;
+  bool touch, closed;
+  PatchFrame frame;
+  Vector3 area;            ///< CurveMeasure's
+  Vector2 middle;          ///< of the rim
+  Vector2 middle_of_area;  ///< that of the rim where there is none
+  double extent;           ///< of the rim, from its middle
+  std::uint64_t key;
+  std::uint32_t candidates;
+};
+
+/// What a team shares while it finds a patch's normal and rim.
+struct OutlineMemory {
+  NormalMemory normal;
+  RimMemory rim;
+  std::uint32_t next;
+};
+
+/// What a team shares while it measures a patch's depths.
+struct DepthMemory {
+  LineQuestion line[2 * kMostSoundings];
+  Prism prism;
+  PrismTest prism_test[2];
+  Extreme extreme[4];
+};
+
+/// What a team shares while it chooses a patch's points.
+struct ChoiceMemory {
+  Chosen candidate[kMostSoundings], chosen[kMostSoundings];
+  Patch* patch;
+  std::uint32_t count;
+};
+
+}  // namespace tandem::manifold

@@ -1,0 +1,27 @@
+#pragma once
+#include "kernels/manifold/body.h"
+
+namespace tandem::manifold {
+
+/// lower, upper, origin: as a file's header has them.
+inline void set_bounds(const float (&lower)[3], const float (&upper)[3], const double (&origin)[3],
+                       Shape& shape) {
+  const Vector3 from = {lower[0], lower[1], lower[2]}, to = {upper[0], upper[1], upper[2]};
+  for (int k = 0; k < 3; ++k) shape.origin[k] = origin[k];
+  shape.center = 0.5 * (from + to);
+  shape.diagonal = norm(to - from);
+}
+
+/// What manifolds need to know of a level of an asset. Condition: it has topology.
+inline Shape shape_of(const FileHeader& header, const LevelView& level) {
+  Shape shape;
+  shape.triangles = level.triangles;
+  shape.topology = level.topology;
+  shape.blocks = level.blocks;
+  shape.oriented_blocks = level.oriented_blocks;
+  set_bounds(header.lower, header.upper, header.origin, shape);
+  shape.closed = level.closed;
+  return shape;
+}
+
+}  // namespace tandem::manifold

@@ -1,0 +1,440 @@
+#pragma once
+#include <bit>
+#include <cstdint>
+
+#include "kernels/manifold/body.h"
+#include "kernels/manifold/team.h"
+
+/// Questions to the trees of posed bodies: where a line meets its surface, and which of its vertices reaches
+/// furthest. Boxes are tested in float32 with slack; triangles and vertices decide in float64. So the answers
+/// do not depend on which blocks are walked, nor in which order. Imaginary boxes are told by their extent,
+/// and where a product is too large for float32, so that comparisons fail, a box passes.
+namespace tandem::manifold {
+
+/// Float32 rounds coordinates, products and sums to 2^-24 of |box| + |point|; a dozen of them amount to less
+/// than this part. The tolerance of triangles, 10^-12, is far below.
+inline constexpr float kBoxSlack = 0x1p-18f;
+
+/// The plane of a patch and the lines across it.
+struct PatchFrame {
+  Vector3 origin, u, v, n;
+
+  PatchFrame() = default;
+  TANDEM_HD PatchFrame(const Vector3& at, const Vector3& normal)
+      : origin(at), u(unit_orthogonal(normal)), v(cross(normal, u)), n(normal) {}
+
+  TANDEM_HD Vector2 flat(const Vector3& x) const {
+    const Vector3 d = x - origin;
+    return {dot(u, d), dot(v, d)};
+  }
+  TANDEM_HD double height(const Vector3& x) const { return dot(n, x - origin); }
+  TANDEM_HD Vector3 at(const Vector2& x, double h) const { return origin + x.x * u + x.y * v + h * n; }
+};
+
+struct FloatVector {
+  float x[3];
+};
+
+TANDEM_HD inline float dot(const FloatVector& p, const FloatVector& q) {
+  return p.x[0] * q.x[0] + p.x[1] * q.x[1] + p.x[2] * q.x[2];
+}
+
+/// A direction of the world along the axes of the mesh.
+TANDEM_HD inline FloatVector in_mesh(const Body& body, const Vector3& direction) {
+  FloatVector out{};
+  for (int k = 0; k < 3; ++k) {
+    const auto& r = body.pose.rotation;
+    out.x[k] = static_cast<float>(r[0][k] * direction.x + r[1][k] * direction.y + r[2][k] * direction.z);
+  }
+  return out;
+}
+
+/// A point of the world in stored coordinates.
+TANDEM_HD inline FloatVector point_in_mesh(const Body& body, const Vector3& point) {
+  const double* t = body.pose.translation;
+  return in_mesh(body, point - Vector3{t[0], t[1], t[2]});
+}
+
+/// How much float32 may be off for boxes of this body near a point of stored coordinates.
+TANDEM_HD inline float slack_near(const Body& body, const FloatVector& point) {
+  const Shape& shape = *body.shape;
+  const double far = std::fabs(shape.center.x) + std::fabs(shape.center.y) + std::fabs(shape.center.z) +
+                     shape.diagonal + std::fabs(point.x[0]) + std::fabs(point.x[1]) + std::fabs(point.x[2]);
+  return static_cast<float>(far) * kBoxSlack + static_cast<float>(body.reach) * 0x1p-42f;
+}
+
+/// The axes of a block's frame, as rows, along those of the mesh.
+struct BlockAxes {
+  FloatVector axis[3];
+
+  TANDEM_HD explicit BlockAxes(const BlockRotation& rotation) {
+    const ScaledRotation r = scaled_rotation(rotation);
+    const float by_length = 1 / r.squared_length;
+    for (int k = 0; k < 3; ++k) {
+      for (int i = 0; i < 3; ++i) axis[k].x[i] = r.scaled[i][k] * by_length;
+    }
+  }
+  TANDEM_HD FloatVector operator()(const FloatVector& p) const {
+    return {{dot(axis[0], p), dot(axis[1], p), dot(axis[2], p)}};
+  }
+};
+
+/// The nodes of a block whose boxes pass a test, a bit each. The block is read as a whole: float4 loads on a
+/// GPU.
+template <typename AnyBlock, typename Test>
+TANDEM_HD inline unsigned nodes_that_pass(const AnyBlock& block, const Test& test) {
+  unsigned mask = 0;
+#ifdef __CUDA_ARCH__
+#pragma unroll
+#endif
+  for (int i = 0; i < kNodesPerBlock; ++i) {
+    const FloatVector center = {{block.center[0][i], block.center[1][i], block.center[2][i]}};
+    const FloatVector half = {{block.half_extent[0][i], block.half_extent[1][i], block.half_extent[2][i]}};
+    mask |= test.passes(center, half) ? 1u << i : 0u;
+  }
+  return mask;
+}
+
+/// What lies below those nodes of a block that pass a test.
+struct Below {
+  unsigned mask = 0;  ///< these nodes
+  bool leaves = false;
+  std::uint32_t index[kNodesPerBlock];  ///< of blocks, or of triangles where they are leaves
+};
+
+/// Imaginary boxes pass no test that compares with <=.
+template <typename Test>
+TANDEM_HD inline Below look_below(const Shape& shape, std::uint32_t index, const Test& test) {
+  Below out;
+  if (shape.blocks != nullptr) {
+    const Block& block = shape.blocks[index];
+    out.mask = nodes_that_pass(block, test);
+    out.leaves = block.is_leaf_block();
+    for (int i = 0; i < kNodesPerBlock; ++i) out.index[i] = block.index[i];
+  } else {
+    const OrientedBlock block = shape.oriented_blocks[index];
+    out.mask = nodes_that_pass(block, test.turned(BlockAxes(block.rotation)));
+    out.leaves = (block.first_below & OrientedBlock::kIsLeafBlock) != 0;
+    const std::uint32_t first = block.first_below & ~OrientedBlock::kIsLeafBlock;
+    for (int i = 0; i < kNodesPerBlock; ++i) out.index[i] = first + static_cast<std::uint32_t>(i);
+  }
+  return out;
+}
+
+/// Answers a question about a posed body, by one thread. A GPU has a way of its own (manifold_team.cuh).
+/// asked: of a group that has no question false.
+/// Questions: body(question) says which body is walked; test(question) has passes(center, half_extent), and
+/// turned(axes), the same test for boxes along these axes; visit(question, triangle, found) looks at a
+/// triangle; better(question, found, other) is the better of two, whatever their order; merge(question,
+/// found) keeps what is better than what is known. A Found is true where there is something.
+template <typename Questions>
+TANDEM_HD inline void walk_surface(const OneThreadGroup&, Questions& questions, std::uint32_t question,
+                                   bool asked) {
+  if (!asked) return;
+  std::uint32_t waiting[3 * kMaxDepth + 1] = {0};
+  for (int count = 1; count > 0;) {
+    const Below below =
+        look_below(*questions.body(question).shape, waiting[--count], questions.test(question));
+    typename Questions::Found found;
+    for (int i = 0; i < kNodesPerBlock; ++i) {
+      if ((below.mask >> i & 1u) == 0) continue;
+      if (below.leaves)
+        questions.visit(question, below.index[i], found);
+      else
+        waiting[count++] = below.index[i];
+    }
+    if (found) questions.merge(question, found);
+  }
+}
+
+/// Where a line along a patch's normal meets a surface.
+struct Crossing {
+  double height = 0;
+  std::uint32_t triangle = kNoIndex;
+
+  TANDEM_HD bool found() const { return triangle != kNoIndex; }
+};
+
+/// Triangles that the normal grazes at less than this sine are walls, which have no height.
+inline constexpr double kWall = 0.01;
+
+/// Boxes that the line meets, no further from the target along it than `reach`, and with heights above it
+/// between `lower` and `upper`.
+struct LineTest {
+  FloatVector point, direction;  // at the target's height
+  float lower, upper, slack, reach;
+
+  TANDEM_HD LineTest turned(const BlockAxes& axes) const {
+    return {axes(point), axes(direction), lower, upper, slack, reach};
+  }
+  TANDEM_HD bool passes(const FloatVector& c, const FloatVector& h) const {
+    const float x = c.x[0] - point.x[0], y = c.x[1] - point.x[1], z = c.x[2] - point.x[2];
+    const float p = direction.x[0], q = direction.x[1], r = direction.x[2];
+    const float ap = std::fabs(p), aq = std::fabs(q), ar = std::fabs(r);
+    if (!(h.x[0] >= 0)) return false;
+    if (std::fabs(y * r - z * q) > h.x[1] * ar + h.x[2] * aq + slack) return false;
+    if (std::fabs(z * p - x * r) > h.x[2] * ap + h.x[0] * ar + slack) return false;
+    if (std::fabs(x * q - y * p) > h.x[0] * aq + h.x[1] * ap + slack) return false;
+    const float along = x * p + y * q + z * r, extent = h.x[0] * ap + h.x[1] * aq + h.x[2] * ar + slack;
+    return !(std::fabs(along) - extent > reach || along + extent < lower || along - extent > upper);
+  }
+};
+
+/// Which crossing of a line with a surface is asked for: the one nearest in height to `target`, between lower
+/// and upper, of triangles whose outward normals point along the frame's (facing 1) or against it (-1). Of
+/// two as near the triangle that comes first.
+struct LineQuestion {
+  Vector2 at;
+  double target, lower, upper;
+  double most;  ///< it is looked for no further from the target
+  int side, facing;
+
+  // The test of boxes.
+  FloatVector point, direction;
+  float lower_along, upper_along, slack, reach;
+
+  double nearest;
+  Crossing best;
+};
+
+class LineQuestions {
+ public:
+  TANDEM_HD LineQuestions(const BodyPair& bodies, const PatchFrame& frame, LineQuestion* questions)
+      : bodies_(bodies), frame_(frame), questions_(questions) {}
+
+  /// expected: how far from the target it is, mostly; it is looked for there first.
+  TANDEM_HD void ask(std::uint32_t question, int side, int facing, const Vector2& at, double target,
+                     double lower, double upper, double expected) {
+    LineQuestion& q = questions_[question];
+    q.at = at;
+    q.target = target, q.lower = lower, q.upper = upper;
+    q.side = side, q.facing = facing;
+    q.most = expected;
+  }
+
+  /// Makes the test of boxes.
+  TANDEM_HD void prepare(std::uint32_t question) {
+    LineQuestion& q = questions_[question];
+    const Body& body = bodies_[q.side];
+    q.point = point_in_mesh(body, frame_.at(q.at, q.target));
+    q.direction = in_mesh(body, frame_.n);
+    q.slack = slack_near(body, q.point);
+    q.lower_along = static_cast<float>(q.lower - q.target) - q.slack;
+    q.upper_along = static_cast<float>(q.upper - q.target) + q.slack;
+    look_within(q, q.most);
+  }
+
+  /// Answers the first `count` questions; those of no side were not asked.
+  template <typename Means>
+  void answer(const Means& means, std::uint32_t count) {
+    for (int side = 0; side < 2; ++side) {
+      LineQuestion* asked[Means::kMostLines];
+      int lines = 0;
+      for (std::uint32_t i = 0; i < count; ++i) {
+        if (questions_[i].side == side) asked[lines++] = &questions_[i];
+      }
+      if (lines > 0) means.answer_lines(bodies_[side], frame_, asked, lines);
+    }
+  }
+
+  /// Where nothing lies as near as expected, it has to be looked for further away. Not all boxes there were
+  /// looked at, so what was found there need not be the nearest.
+  TANDEM_HD void look_further(std::uint32_t question) {
+    look_within(questions_[question], questions_[question].nearest);
+  }
+  TANDEM_HD bool has_to_look_further(std::uint32_t question) const {
+    const LineQuestion& q = questions_[question];
+    return q.nearest > q.most && q.most != INFINITY;
+  }
+
+  struct Found {
+    double distance = INFINITY;
+    Crossing crossing;
+    TANDEM_HD explicit operator bool() const { return crossing.found(); }
+  };
+
+  TANDEM_HD const Body& body(std::uint32_t question) const { return bodies_[questions_[question].side]; }
+  TANDEM_HD LineTest test(std::uint32_t question) const {
+    const LineQuestion& q = questions_[question];
+    return {q.point, q.direction, q.lower_along, q.upper_along, q.slack, q.reach};
+  }
+  TANDEM_HD void visit(std::uint32_t question, std::uint32_t t, Found& found) const {
+    const LineQuestion& q = questions_[question];
+    const Body& body = bodies_[q.side];
+    const Triangle stored = body.shape->triangles[t];
+    Vector3 corner[3];
+    for (int k = 0; k < 3; ++k) corner[k] = body.posed(stored.corner[k]) - frame_.origin;
+    const Vector3 normal = cross(corner[1] - corner[0], corner[2] - corner[0]);
+    const double area = dot(frame_.n, normal), size = norm(normal);
+    const bool turned = is_turned(body.shape->topology[t].flags);
+    if ((area > 0) != ((q.facing > 0) != turned) || !(std::fabs(area) > kWall * size)) return;
+    Vector2 side[3];
+    for (int k = 0; k < 3; ++k) side[k] = Vector2{dot(frame_.u, corner[k]), dot(frame_.v, corner[k])} - q.at;
+    // Shares of the corners. What lies on an edge, or beside it by no more than rounding of posed points and
+    // a little of the triangle, belongs to both triangles: no line slips through.
+    const double first = cross(side[1], side[2]) / area, second = cross(side[2], side[0]) / area,
+                 third = cross(side[0], side[1]) / area;
+    const double little = 1e-9 + 0x1p-48 * body.reach * std::sqrt(size) / std::fabs(area);
+    if (!(first >= -little && second >= -little && third >= -little)) return;
+    const double height = first * dot(frame_.n, corner[0]) + second * dot(frame_.n, corner[1]) +
+                          third * dot(frame_.n, corner[2]);
+    if (!(height >= q.lower && height <= q.upper)) return;
+    const Found here = {std::fabs(height - q.target), {height, t}};
+    if (is_nearer(here, found)) found = here;
+  }
+  TANDEM_HD static bool is_nearer(const Found& x, const Found& than) {
+    return x.distance < than.distance ||
+           (x.distance == than.distance && x.crossing.triangle < than.crossing.triangle);
+  }
+  TANDEM_HD static Found better(std::uint32_t, const Found& x, const Found& y) {
+    return is_nearer(y, x) ? y : x;
+  }
+  TANDEM_HD void merge(std::uint32_t question, const Found& found) {
+    LineQuestion& q = questions_[question];
+    if (!is_nearer(found, {q.nearest, q.best})) return;
+    q.nearest = found.distance, q.best = found.crossing;
+    q.reach = lesser(q.reach, static_cast<float>(found.distance) + q.slack);
+  }
+
+ private:
+  TANDEM_HD static void look_within(LineQuestion& q, double most) {
+    q.most = most;
+    q.reach = static_cast<float>(most) + q.slack;
+    q.nearest = INFINITY;
+    q.best = {};
+  }
+
+  const BodyPair& bodies_;
+  const PatchFrame& frame_;
+  LineQuestion* questions_;
+};
+
+/// The part of space across a convex polygon in a patch's plane, between two heights.
+struct Prism {
+  static constexpr int kMostSides = 8;
+
+  PatchFrame frame;
+  Vector2 outward[kMostSides];  // unit normals of the sides
+  double offset[kMostSides];    // inside: outward * x <= offset
+  int sides = 0;
+  Vector2 axis[2];           // unit vectors; a rectangle around the polygon lies along them
+  double least[2], most[2];  // it reaches from least to most along each
+  double lower, upper;
+  double above_a,
+      below_b;  ///< vertices of a that are not above this do not matter, nor those of b not below this
+
+  TANDEM_HD bool contains(const Vector2& x) const {
+    bool inside = true;
+    for (int i = 0; i < sides; ++i) inside = inside && dot(outward[i], x) <= offset[i];
+    return inside;
+  }
+};
+
+/// Boxes that reach into the box around a prism, and further along its last axis than what is known.
+struct PrismTest {
+  FloatVector axis[3], origin;
+  float least[3], most[3], slack;
+
+  TANDEM_HD PrismTest turned(const BlockAxes& axes) const {
+    PrismTest out = *this;
+    for (int k = 0; k < 3; ++k) out.axis[k] = axes(axis[k]);
+    out.origin = axes(origin);
+    return out;
+  }
+  TANDEM_HD bool passes(const FloatVector& c, const FloatVector& h) const {
+    const FloatVector d = {{c.x[0] - origin.x[0], c.x[1] - origin.x[1], c.x[2] - origin.x[2]}};
+    bool all = h.x[0] >= 0;
+#ifdef __CUDA_ARCH__
+#pragma unroll
+#endif
+    for (int k = 0; k < 3; ++k) {
+      const FloatVector& e = axis[k];
+      const float at = dot(e, d), extent = std::fabs(e.x[0]) * h.x[0] + std::fabs(e.x[1]) * h.x[1] +
+                                           std::fabs(e.x[2]) * h.x[2];
+      all = all && !(at + extent < least[k]) && !(at - extent > most[k]);
+    }
+    return all;
+  }
+};
+
+/// A vertex of a triangle.
+struct Extreme {
+  Vector2 at;
+  double height = 0;
+  std::uint32_t vertex = kNoIndex;
+
+  TANDEM_HD bool found() const { return vertex != kNoIndex; }
+  TANDEM_HD explicit operator bool() const { return found(); }
+};
+
+/// The highest vertex of a (question 0) and the lowest of b (1) in a prism. Of several the one of the least
+/// number.
+class ExtremeQuestions {
+ public:
+  /// test, extreme: two each, that all of the team see.
+  TANDEM_HD ExtremeQuestions(const BodyPair& bodies, const Prism& prism, PrismTest* test, Extreme* extreme)
+      : bodies_(bodies), prism_(prism), test_(test), extreme_(extreme) {}
+
+  TANDEM_HD void ask(std::uint32_t question) {
+    const Body& body = bodies_[static_cast<int>(question)];
+    const PatchFrame& frame = prism_.frame;
+    PrismTest& test = test_[question];
+    test.origin = point_in_mesh(body, frame.origin);
+    const float slack = slack_near(body, test.origin);
+    for (int k = 0; k < 2; ++k) {
+      test.axis[k] = in_mesh(body, prism_.axis[k].x * frame.u + prism_.axis[k].y * frame.v);
+      test.least[k] = static_cast<float>(prism_.least[k]) - slack;
+      test.most[k] = static_cast<float>(prism_.most[k]) + slack;
+    }
+    test.axis[2] = in_mesh(body, question == 0 ? frame.n : -frame.n);
+    const double least =
+        question == 0 ? greater(prism_.lower, prism_.above_a) : greater(-prism_.upper, -prism_.below_b);
+    test.least[2] = static_cast<float>(least) - slack;
+    test.most[2] = static_cast<float>(question == 0 ? prism_.upper : -prism_.lower) + slack;
+    test.slack = slack;
+    extreme_[question] = {};
+  }
+
+  using Found = Extreme;
+
+  TANDEM_HD const Body& body(std::uint32_t question) const { return bodies_[static_cast<int>(question)]; }
+  TANDEM_HD const PrismTest& test(std::uint32_t question) const { return test_[question]; }
+  TANDEM_HD void visit(std::uint32_t question, std::uint32_t t, Found& found) const {
+    const Body& of = body(question);
+    const PatchFrame& frame = prism_.frame;
+    const TriangleTopology topology = of.shape->topology[t];
+    const Triangle stored = of.shape->triangles[t];
+    for (int k = 0; k < 3; ++k) {
+      const Vector3 x = of.posed(stored.corner[k]);
+      const double height = frame.height(x);
+      if (!(height >= prism_.lower && height <= prism_.upper)) continue;
+      if (!(question == 0 ? height > prism_.above_a : height < prism_.below_b)) continue;
+      const Extreme here = {frame.flat(x), height, topology.vertex[k]};
+      if (is_further(question, here, found) && prism_.contains(here.at)) found = here;
+    }
+  }
+  TANDEM_HD void merge(std::uint32_t question, const Found& found) {
+    if (!is_further(question, found, extreme_[question])) return;
+    extreme_[question] = found;
+    const double along = question == 0 ? found.height : -found.height;
+    test_[question].least[2] = static_cast<float>(along) - test_[question].slack;
+  }
+  TANDEM_HD static Found better(std::uint32_t question, const Found& x, const Found& y) {
+    return y.found() && is_further(question, y, x) ? y : x;
+  }
+
+  TANDEM_HD static bool is_further(std::uint32_t question, const Extreme& x, const Extreme& than) {
+    if (!than.found()) return true;
+    const double of_x = question == 0 ? x.height : -x.height,
+                 of_than = question == 0 ? than.height : -than.height;
+    return of_x > of_than || (of_x == of_than && x.vertex < than.vertex);
+  }
+
+ private:
+  const BodyPair& bodies_;
+  const Prism& prism_;
+  PrismTest* test_;
+  Extreme* extreme_;
+};
+
+}  // namespace tandem::manifold

@@ -1,0 +1,81 @@
+#pragma once
+#include <cstdint>
+
+#include "tandem/formats/platform.h"
+
+namespace tandem::manifold {
+
+/// A group of one thread: those who walk through a tree together.
+struct OneThreadGroup {
+  TANDEM_HD static std::uint32_t rank() { return 0; }
+  TANDEM_HD static void sync() {}
+};
+
+/// Those who make the manifolds of an object pair together: one thread of a CPU here, a warp or a thread
+/// block on a GPU (kernels/manifold/manifold_team.cuh). Each takes every size()-th thing from rank() on. What
+/// they find together must not depend on how many they are nor on who comes first.
+struct OneThread {
+  TANDEM_HD static std::uint32_t rank() { return 0; }
+  TANDEM_HD static std::uint32_t size() { return 1; }
+
+  /// What all have written to memory is seen by all.
+  TANDEM_HD static void sync() {}
+
+  template <typename T>
+  TANDEM_HD static T sum(T value) {
+    return value;
+  }
+  template <typename T>
+  TANDEM_HD static T least(T value) {
+    return value;
+  }
+  template <typename T>
+  TANDEM_HD static T greatest(T value) {
+    return value;
+  }
+  /// The same of each of several values: sooner than one after the other.
+  template <typename T, int kCount>
+  TANDEM_HD static void sums(T (&)[kCount]) {}
+  template <typename T, int kCount>
+  TANDEM_HD static void least_ones(T (&)[kCount]) {}
+  template <typename T, int kCount>
+  TANDEM_HD static void greatest_ones(T (&)[kCount]) {}
+  TANDEM_HD static bool any(bool value) { return value; }
+
+  /// Calls of(group, i, true) for all i below `count`, each by one group of the team: those who walk a tree
+  /// together. Groups that run in step with others and have none call of(group, i, false). kWidth: how many
+  /// a group of a GPU has.
+  template <int kWidth, typename Of>
+  TANDEM_HD static void for_each_group(std::uint32_t count, const Of& of) {
+    for (std::uint32_t i = 0; i < count; ++i) of(OneThreadGroup(), i, true);
+  }
+  /// As many as are worth while for each of two questions.
+  static constexpr int kHalf = 1;
+
+  /// On memory that all see.
+  TANDEM_HD static std::uint32_t load(const std::uint32_t& at) { return at; }
+  TANDEM_HD static void store(std::uint32_t& at, std::uint32_t value) { at = value; }
+  /// The same while others may write there.
+  TANDEM_HD static std::uint32_t concurrent_load(std::uint32_t& at) { return at; }
+  TANDEM_HD static void concurrent_store(std::uint32_t& at, std::uint32_t value) { at = value; }
+  TANDEM_HD static std::uint32_t add(std::uint32_t& at, std::uint32_t value) {
+    const std::uint32_t before = at;
+    at += value;
+    return before;
+  }
+  TANDEM_HD static std::uint32_t compare_and_swap(std::uint32_t& at, std::uint32_t expected,
+                                                  std::uint32_t value) {
+    const std::uint32_t before = at;
+    if (before == expected) at = value;
+    return before;
+  }
+};
+
+/// A thread of a CPU that has instructions for several things at a time: means() has other ways to the same
+/// answers (kernels/manifold/manifold_means.h).
+template <typename Team>
+concept HasMeans = requires(const Team& team) {
+  team.means();
+};
+
+}  // namespace tandem::manifold

@@ -1,0 +1,597 @@
+#include "tandem/kernels/gpu_broad_phase.h"
+
+#include <algorithm>
+#include <bit>
+#include <cub/device/device_radix_sort.cuh>
+#include <new>
+
+#include "kernels/scene/broad_phase_boxes.cuh"
+#include "kernels/scene/broad_phase_direct.cuh"
+#include "kernels/scene/broad_phase_kept.cuh"
+#include "kernels/scene/broad_phase_keys.cuh"
+#include "kernels/scene/broad_phase_limits.h"
+#include "kernels/scene/broad_phase_tree.cuh"
+#include "kernels/scene/broad_phase_walk.cuh"
+#include "tandem/formats/gpu_memory.h"
+#include "tandem/formats/gpu_status.h"
+#include "tandem/kernels/detail/buffer.h"
+
+namespace tandem {
+namespace {
+
+// ---------------------------------------------------------------------------------------------------------
+// The tree. A block of 1,024 threads writes as many leaves, the 32 nodes above them and the one above those.
+
+__global__ void __launch_bounds__(kFanOut* kFanOut)
+    build_lower_levels(const WorldBox* boxes, const Key* sorted, int index_bits, const Survey* survey,
+                       const __grid_constant__ Tree tree) {
+  __shared__ Node above[kFanOut];
+  gpu::wait_for_kernel_before();
+  const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
+  const std::uint32_t lane = threadIdx.x % kFanOut, warp = threadIdx.x / kFanOut;
+  Node node = nothing();
+  if (i < tree.count[0]) {
+    const Scale scale = scale_of(*survey);
+    node.box = static_cast<std::uint32_t>(sorted[i] & ((1ull << index_bits) - 1));
+    const WorldBox box = load(boxes, node.box);
+    for (int k = 0; k < 3; ++k) {
+      node.lo[k] = scale(box.lo[k], k);
+      node.hi[k] = scale(box.hi[k], k);
+    }
+    tree.level(0)[i] = node;
+  }
+  node = union_of_warp(node);
+  const std::uint32_t parent = i / kFanOut;
+  if (lane == 0) {
+    above[warp] = node;
+    if (parent < tree.count[1]) tree.level(1)[parent] = node;
+  }
+  if (tree.top < 2) return;
+  __syncthreads();
+  if (warp != 0) return;
+  node = union_of_warp(above[lane]);
+  if (lane == 0) tree.level(2)[blockIdx.x] = node;
+}
+
+__global__ void __launch_bounds__(kFanOut* kFanOut) build_upper_levels(const __grid_constant__ Tree tree) {
+  gpu::wait_for_kernel_before();
+  const std::uint32_t lane = threadIdx.x % kFanOut, warp = threadIdx.x / kFanOut;
+  for (int level = 3; level <= tree.top; ++level) {
+    for (std::uint32_t i = warp; i < tree.count[level]; i += kFanOut) {
+      const std::uint32_t child = i * kFanOut + lane;
+      const Node node =
+          union_of_warp(child < tree.count[level - 1] ? tree.level(level - 1)[child] : nothing());
+      if (lane == 0) tree.level(level)[i] = node;
+    }
+    __syncthreads();
+  }
+}
+
+// ---------------------------------------------------------------------------------------------------------
+// The end.
+
+__global__ void report_pairs(const __grid_constant__ Output output) {
+  gpu::wait_for_kernel_before();
+  write_report(output, output.counters->found);
+}
+
+// Keys of no pair: they come last, because of two numbers of so many bits that a < b not both are all ones.
+__global__ void fill_rest(unsigned long long* keys, std::uint32_t capacity,
+                          const GpuBroadPhaseReport* report) {
+  gpu::wait_for_kernel_before();
+  const std::uint64_t i = static_cast<std::uint64_t>(blockIdx.x) * blockDim.x + threadIdx.x;
+  if (i >= report->count && i < capacity) keys[i] = ~0ull;
+}
+
+__global__ void unpack_keys(const unsigned long long* keys, std::uint32_t capacity, int bits,
+                            ObjectPair* pairs, const GpuBroadPhaseReport* report) {
+  gpu::wait_for_kernel_before();
+  const std::uint64_t i = static_cast<std::uint64_t>(blockIdx.x) * blockDim.x + threadIdx.x;
+  if (i >= report->count || i >= capacity) return;
+  const unsigned long long key = keys[i];
+  pairs[i] = {static_cast<std::uint32_t>(key >> bits),
+              static_cast<std::uint32_t>(key & ((1ull << bits) - 1))};
+}
+
+// ---------------------------------------------------------------------------------------------------------
+// How work is cut.
+
+std::uint32_t blocks_for(std::uint64_t threads, std::uint32_t size) {
+  return static_cast<std::uint32_t>((threads + size - 1) / size);
+}
+
+// So many blocks at most share the tests of each against each.
+constexpr std::uint32_t kMostDirectBlocks = 2048;
+
+// Bits of an index of a box.
+int index_bits(std::uint32_t boxes) {
+  return static_cast<int>(std::bit_width(std::max(boxes, 2u) - 1));
+}
+
+// The lowest bit that keys of so many boxes are sorted by, which have so many bits of an index. Eight bits
+// cost one pass of the sort; the fewer boxes, the less it matters that some lie in one cell of the curve.
+int first_bit(std::uint32_t boxes, int bits) {
+  const int passes = boxes <= 1u << 14 ? 3 : boxes <= 1u << 18 ? 4 : 6;
+  return std::max(64 - 8 * passes, bits);
+}
+
+// Warps that share a group: so many that small scenes fill a GPU too.
+std::uint32_t split_of(std::uint32_t groups) {
+  constexpr std::uint32_t kEnoughWarps = 8192;
+  std::uint32_t split = 1;
+  while (split < 8 && groups * split < kEnoughWarps) split *= 2;
+  return split;
+}
+
+template <typename Boxes>
+constexpr bool is_listed = false;
+template <typename Boxes>
+constexpr bool is_listed<Listed<Boxes>> = true;
+
+bool is_none(const PairFilter& filter) {
+  return filter.motion == nullptr && filter.group == nullptr && filter.mask == nullptr &&
+         filter.excluded.slots == nullptr;
+}
+
+// What a call is about: numbers of boxes or instances, where their boxes lie once they have been taken, where
+// those of them lie that are kept, and how pairs are to be written.
+struct Call {
+  std::uint32_t numbers;
+  const WorldBox* boxes;
+  const WorldBox* kept;
+  bool sorted;
+  cudaStream_t stream;
+};
+
+// What is kept of fixed boxes.
+struct Kept {
+  // In place of the number of boxes, where those that were kept are lost: no call is of so many.
+  static constexpr std::uint32_t kLost = kNoIndex;
+
+  std::uint32_t of = 0;  // so many boxes or instances; 0: nothing is kept
+  bool posed = false;    // of instances
+  std::uint32_t free_count = 0;
+  GpuArray<std::uint32_t> list;  // of those that are not kept, then of those that are
+  GpuArray<Node> nodes;
+  GpuArray<Survey> survey;
+  Tree tree = {};
+
+  std::size_t bytes() const { return list.bytes() + nodes.bytes() + survey.bytes(); }
+};
+
+}  // namespace
+
+struct GpuBroadPhase::State {
+  GpuArray<WorldBox> boxes;
+  GpuArray<Key> keys[2];
+  GpuArray<Node> nodes;
+  GpuArray<unsigned long long> pairs, sorted_pairs;
+  GpuArray<unsigned char> sorting;  // CUB's
+  GpuArray<Survey> survey;
+  Kept kept;
+  GpuArray<Counters> counters;
+  bool counters_are_fresh = false;  // a search that ends leaves them so
+  GpuArray<GpuBroadPhaseReport> report;
+  PinnedArray<GpuBroadPhaseReport> host_report;
+  GpuBroadPhaseCapacity capacity;
+  gpu::DeviceLimits limits = {};
+  cudaError_t error = cudaSuccess;
+
+  // Of a call: true, or what went wrong is kept.
+  bool ok(cudaError_t result) {
+    if (result == cudaSuccess) return true;
+    error = result;
+    static_cast<void>(cudaGetLastError());  // later calls must not report it again
+    return false;
+  }
+  Status failure() const { return status_of(error); }
+
+  bool reserve_fixed();
+  bool reserve_boxes(std::uint32_t count);
+  bool reserve_pairs(std::uint32_t count, bool sorted);
+  bool reserve_sorting();
+  bool reserve_taken(std::uint32_t count);
+  bool reserve_kept(std::uint32_t count, std::uint32_t fixed);
+  Status refusal(std::uint32_t count, bool posed, const GpuBroadPhaseOptions& options) const;
+  Output output(const Call& call);
+  template <typename... Parameters, typename... Arguments>
+  bool launch(std::uint32_t blocks, std::uint32_t threads, cudaStream_t stream, void (*kernel)(Parameters...),
+              const Arguments&... arguments);
+  bool refresh(cudaStream_t stream);
+  bool begin(cudaStream_t stream) { return counters_are_fresh || refresh(stream); }
+  void end(bool queued, cudaStream_t stream);
+  template <typename Boxes, typename Rule>
+  bool test_all(const Boxes& from, std::uint32_t count, const Rule& rule, const Call& call);
+  template <typename Boxes>
+  bool make_tree(const Boxes& from, const Tree& tree, Survey* surveyed, const Call& call);
+  template <typename Boxes, typename Rule>
+  bool collect_with_kept(const Boxes& from, const Rule& rule, const Call& call);
+  template <typename Rule>
+  bool collect(const Tree& tree, const Rule& rule, const Call& call);
+  bool sort_pairs(const Call& call);
+  template <typename Boxes, typename Rule>
+  bool find(const Boxes& from, std::uint32_t count, const Rule& rule, const Call& call);
+  template <typename Boxes, typename Rule>
+  bool pose_and_find(const Boxes& from, std::uint32_t count, const Rule& rule, const Call& call);
+  template <typename Boxes, typename Rule>
+  bool grow_and_find(const Boxes& from, std::uint32_t count, const Rule& rule, double within, Call call);
+  template <typename Boxes>
+  Status run(const Boxes& all, const GpuBroadPhaseOptions& options, const Call& call);
+  Status list(std::span<const Motion> motion, cudaStream_t stream);
+  template <typename Boxes>
+  Status keep(const Boxes& all, const WorldBox* boxes, std::span<const Motion> motion, cudaStream_t stream);
+  template <typename Enqueue>
+  Status find_all(GpuBroadPhase& self, GpuBroadPhaseCapacity wanted, const GpuBroadPhaseOptions& options,
+                  cudaStream_t stream, const Enqueue& enqueue);
+};
+
+bool GpuBroadPhase::State::refresh(cudaStream_t stream) {
+  return ok(cudaMemcpyAsync(counters.data(), &kFreshCounters, sizeof kFreshCounters, cudaMemcpyHostToDevice,
+                            stream));
+}
+
+// What is captured has not run: the counters are as before.
+void GpuBroadPhase::State::end(bool queued, cudaStream_t stream) {
+  cudaStreamCaptureStatus capture = cudaStreamCaptureStatusNone;
+  static_cast<void>(cudaStreamIsCapturing(stream, &capture));
+  if (capture == cudaStreamCaptureStatusNone) counters_are_fresh = queued;
+}
+
+bool GpuBroadPhase::State::reserve_fixed() {
+  if (host_report.data() != nullptr) return true;
+  if (!ok(gpu::limits_of_device(limits)) || !ok(survey.reserve(1)) || !ok(counters.reserve(1)) ||
+      !ok(report.reserve(1)) || !ok(cudaMemset(report.data(), 0, report.bytes())) || !refresh(nullptr) ||
+      !ok(cudaStreamSynchronize(nullptr)) || !ok(host_report.reserve(1)))
+    return false;
+  *host_report = {};
+  counters_are_fresh = true;
+  return true;
+}
+
+bool GpuBroadPhase::State::reserve_boxes(std::uint32_t count) {
+  if (count <= capacity.boxes) return true;
+  capacity.boxes = 0;
+  for (int i = 0; i < 2; ++i) {
+    if (!ok(keys[i].reserve(count))) return false;
+  }
+  if (!ok(nodes.reserve(nodes_of(tree_over(count, nullptr))))) return false;
+  capacity.boxes = count;
+  return reserve_sorting();
+}
+
+bool GpuBroadPhase::State::reserve_pairs(std::uint32_t count, bool sorted) {
+  const std::uint32_t before = capacity.pairs;
+  if (count > before) {
+    capacity.pairs = 0;
+    if (!ok(pairs.reserve(count))) return false;
+    capacity.pairs = count;
+  }
+  if (!sorted || sorted_pairs.room() >= capacity.pairs) return true;
+  return ok(sorted_pairs.reserve(capacity.pairs)) && reserve_sorting();
+}
+
+// Room for boxes of instances, or grown ones. What was kept in room that is too small now is lost.
+bool GpuBroadPhase::State::reserve_taken(std::uint32_t count) {
+  if (count > boxes.room() && kept.of != 0 && kept.posed) kept.of = Kept::kLost;
+  return ok(boxes.reserve(count));
+}
+
+bool GpuBroadPhase::State::reserve_kept(std::uint32_t count, std::uint32_t fixed) {
+  return ok(kept.list.reserve(count)) && ok(kept.survey.reserve(1)) &&
+         ok(kept.nodes.reserve(nodes_of(tree_over(fixed, nullptr))));
+}
+
+// As much as sorting up to the capacity takes: CUB asks for a part that does not depend on the number, and
+// one that grows with it.
+bool GpuBroadPhase::State::reserve_sorting() {
+  std::size_t bytes = 0, pair_bytes = 0;
+  cub::DoubleBuffer<Key> key(keys[0].data(), keys[1].data());
+  if (!ok(cub::DeviceRadixSort::SortKeys(nullptr, bytes, key, capacity.boxes))) return false;
+  if (sorted_pairs.room() != 0) {
+    cub::DoubleBuffer<unsigned long long> pair(pairs.data(), sorted_pairs.data());
+    if (!ok(cub::DeviceRadixSort::SortKeys(nullptr, pair_bytes, pair, capacity.pairs))) return false;
+  }
+  return ok(sorting.reserve(std::max(bytes, pair_bytes)));
+}
+
+// Why a call cannot be queued.
+Status GpuBroadPhase::State::refusal(std::uint32_t count, bool posed,
+                                     const GpuBroadPhaseOptions& options) const {
+  if (count > capacity.boxes || (options.sorted && sorted_pairs.room() < capacity.pairs) ||
+      !(options.within >= 0) || (options.within > 0 && count > boxes.room()))
+    return Status::kOutOfRange;
+  if (kept.of != 0 && (kept.of != count || kept.posed != posed)) return Status::kKeptMismatch;
+  return options.filter.excluded.instances > count ? Status::kUnknownInstance : Status::kOk;
+}
+
+Output GpuBroadPhase::State::output(const Call& call) {
+  return {pairs.data(),         capacity.pairs,  call.sorted ? index_bits(call.numbers) : 0,
+          call.sorted ? 0 : 32, counters.data(), report.data(),
+          host_report.data()};
+}
+
+template <typename... Parameters, typename... Arguments>
+bool GpuBroadPhase::State::launch(std::uint32_t blocks, std::uint32_t threads, cudaStream_t stream,
+                                  void (*kernel)(Parameters...), const Arguments&... arguments) {
+  return ok(gpu::launch_after({blocks, threads, 0, stream, limits.early_launch}, kernel, arguments...));
+}
+
+template <typename Boxes, typename Rule>
+bool GpuBroadPhase::State::test_all(const Boxes& from, std::uint32_t count, const Rule& rule,
+                                    const Call& call) {
+  const std::uint32_t tiles = std::max(blocks_for(count, kTile), 1u), tasks = tiles * (tiles + 1) / 2,
+                      tasks_each = blocks_for(tasks, kMostDirectBlocks);
+  return launch(blocks_for(tasks, tasks_each), kTileThreads, call.stream, collect_directly<Boxes, Rule>, from,
+                count, rule, output(call), tasks_each, tasks);
+}
+
+// from: where the boxes of the tree come from.
+template <typename Boxes>
+bool GpuBroadPhase::State::make_tree(const Boxes& from, const Tree& tree, Survey* surveyed,
+                                     const Call& call) {
+  const std::uint32_t count = tree.count[0];
+  const int bits = index_bits(call.numbers);
+  if (!launch(4, kSamples * kThreadsPerSample, call.stream, survey_boxes<Boxes>, from, count, surveyed) ||
+      !launch(blocks_for(count, 256), 256, call.stream, make_keys<Boxes>, from, count, bits, surveyed,
+              keys[0].data(), counters.data()))
+    return false;
+  cub::DoubleBuffer<Key> key(keys[0].data(), keys[1].data());
+  std::size_t bytes = sorting.room();
+  if (!ok(cub::DeviceRadixSort::SortKeys(sorting.data(), bytes, key, count, first_bit(count, bits), 64,
+                                         call.stream)))
+    return false;
+  constexpr std::uint32_t kThreads = kFanOut * kFanOut;
+  return launch(blocks_for(count, kThreads), kThreads, call.stream, build_lower_levels, call.boxes,
+                key.Current(), bits, surveyed, tree) &&
+         (tree.top <= 2 || launch(1, kThreads, call.stream, build_upper_levels, tree));
+}
+
+template <typename Boxes, typename Rule>
+bool GpuBroadPhase::State::collect_with_kept(const Boxes& from, const Rule& rule, const Call& call) {
+  const std::uint32_t blocks = std::min(blocks_for(kept.free_count, kKeptWarps), kMostKeptBlocks);
+  return blocks == 0 || launch(blocks, kKeptWarps * kFanOut, call.stream, collect_kept<Boxes, Rule>, from,
+                               kept.free_count, kept.tree, kept.survey.data(), call.kept, rule, output(call));
+}
+
+template <typename Rule>
+bool GpuBroadPhase::State::collect(const Tree& tree, const Rule& rule, const Call& call) {
+  const Output out = output(call);
+  const std::uint32_t split = split_of(tree.count[1]);
+  const std::uint32_t blocks = blocks_for(static_cast<std::uint64_t>(tree.count[1]) * split, kWarps);
+  return launch(blocks, kWarps * kFanOut, call.stream, collect_pairs<Rule>, tree, split, call.boxes, rule,
+                out) &&
+         launch(1, 1, call.stream, report_pairs, out);
+}
+
+// Sorts as many keys as there is room for, because the CPU does not know their number.
+bool GpuBroadPhase::State::sort_pairs(const Call& call) {
+  if (capacity.pairs == 0) return true;
+  const int bits = index_bits(call.numbers);
+  const std::uint32_t blocks = blocks_for(capacity.pairs, 256);
+  if (!launch(blocks, 256, call.stream, fill_rest, pairs.data(), capacity.pairs, report.data())) return false;
+  cub::DoubleBuffer<unsigned long long> key(pairs.data(), sorted_pairs.data());
+  std::size_t bytes = sorting.room();
+  if (!ok(cub::DeviceRadixSort::SortKeys(sorting.data(), bytes, key, capacity.pairs, 0, 2 * bits,
+                                         call.stream)))
+    return false;
+  return launch(blocks, 256, call.stream, unpack_keys, key.Current(), capacity.pairs, bits,
+                reinterpret_cast<ObjectPair*>(pairs.data()), report.data());
+}
+
+// The pairs with what is kept come first, because the last kernel of the others writes the report.
+template <typename Boxes, typename Rule>
+bool GpuBroadPhase::State::find(const Boxes& from, std::uint32_t count, const Rule& rule, const Call& call) {
+  if constexpr (is_listed<Boxes>) {
+    if (!collect_with_kept(from, rule, call)) return false;
+  }
+  if (count <= kFewBoxes) {
+    if (!test_all(from, count, rule, call)) return false;
+  } else {
+    const Tree tree = tree_over(count, nodes.data());
+    if (!make_tree(from, tree, survey.data(), call) || !collect(tree, rule, call)) return false;
+  }
+  return !call.sorted || sort_pairs(call);
+}
+
+// A middling number of instances is posed by a kernel of its own.
+template <typename Boxes, typename Rule>
+bool GpuBroadPhase::State::pose_and_find(const Boxes& from, std::uint32_t count, const Rule& rule,
+                                         const Call& call) {
+  if constexpr (Boxes::kPosed) {
+    if (count > kFewPosed && count <= kFewBoxes) {
+      return launch(blocks_for(count, 256), 256, call.stream, pose_boxes<Boxes>, from, count,
+                    counters.data()) &&
+             find(from.lying_at(boxes.data()), count, rule, call);
+    }
+  }
+  return find(from, count, rule, call);
+}
+
+// Boxes within reach of each other meet when each is larger by half of it; or one by all of it where the
+// other is kept, which is kept for any reach.
+template <typename Boxes, typename Rule>
+bool GpuBroadPhase::State::grow_and_find(const Boxes& from, std::uint32_t count, const Rule& rule,
+                                         double within, Call call) {
+  if (!(within > 0)) return pose_and_find(from, count, rule, call);
+  const double margin = is_listed<Boxes> ? within : 0.5 * within;
+  call.boxes = boxes.data();
+  return (count == 0 || launch(blocks_for(count, 256), 256, call.stream, grow_boxes<Boxes>, from, count,
+                               margin, boxes.data(), counters.data())) &&
+         find(from.lying_at(boxes.data()), count, rule, call);
+}
+
+// all: boxes or instances, the kept ones included.
+template <typename Boxes>
+Status GpuBroadPhase::State::run(const Boxes& all, const GpuBroadPhaseOptions& options, const Call& call) {
+  const Status status = refusal(call.numbers, Boxes::kPosed, options);
+  if (status != Status::kOk) return status;
+  bool queued = begin(call.stream);
+  if (queued && kept.of != 0) {
+    queued = grow_and_find(Listed<Boxes>{all, kept.list.data()}, kept.free_count,
+                           FilteredPairs{options.filter}, options.within, call);
+  } else if (queued && !is_none(options.filter)) {
+    queued = grow_and_find(all, call.numbers, FilteredPairs{options.filter}, options.within, call);
+  } else if (queued) {
+    queued = grow_and_find(all, call.numbers, EveryPair{}, options.within, call);
+  }
+  end(queued, call.stream);
+  return queued ? Status::kOk : failure();
+}
+
+// Uploads what motions say of which boxes are kept, and waits.
+Status GpuBroadPhase::State::list(std::span<const Motion> motion, cudaStream_t stream) {
+  Buffer<std::uint32_t> numbers;
+  if (!numbers.resize(motion.size())) return Status::kOutOfMemory;
+  std::uint32_t free_end = 0, end = kept.free_count;
+  for (std::uint32_t i = 0; i < motion.size(); ++i)
+    numbers[motion[i] == Motion::fixed ? end++ : free_end++] = i;
+  const bool uploaded = ok(kept.list.upload(numbers.view(), stream)) && ok(cudaStreamSynchronize(stream));
+  return uploaded ? Status::kOk : failure();
+}
+
+// lie: where the boxes of those that are kept are to be found.
+template <typename Boxes>
+Status GpuBroadPhase::State::keep(const Boxes& all, const WorldBox* lie, std::span<const Motion> motion,
+                                  cudaStream_t stream) {
+  const auto count = static_cast<std::uint32_t>(motion.size());
+  const auto fixed = static_cast<std::uint32_t>(std::count(motion.begin(), motion.end(), Motion::fixed));
+  if (fixed == 0) return Status::kOk;
+  kept.free_count = count - fixed;
+  if (!reserve_fixed() || !reserve_boxes(count) || !reserve_kept(count, fixed)) return failure();
+  if (const Status status = list(motion, stream); status != Status::kOk) return status;
+  kept.tree = tree_over(fixed, kept.nodes.data());
+  const Call call = {count, lie, lie, false, stream};
+  const bool queued = begin(stream) &&
+                      make_tree(Listed<Boxes>{all, kept.list.data() + kept.free_count}, kept.tree,
+                                kept.survey.data(), call) &&
+                      launch(1, 1, stream, report_pairs, output(call));
+  end(queued, stream);
+  if (!queued || !ok(cudaStreamSynchronize(stream))) return failure();
+  if (host_report->status != Status::kOk) return host_report->status;
+  kept.of = count;
+  kept.posed = Boxes::kPosed;
+  return Status::kOk;
+}
+
+// The first guess of room is four pairs for each box.
+template <typename Enqueue>
+Status GpuBroadPhase::State::find_all(GpuBroadPhase& self, GpuBroadPhaseCapacity wanted,
+                                      const GpuBroadPhaseOptions& options, cudaStream_t stream,
+                                      const Enqueue& enqueue) {
+  std::uint64_t room = capacity.pairs > 0 ? capacity.pairs : 4ull * wanted.boxes + 1024;
+  for (;;) {
+    wanted.pairs = static_cast<std::uint32_t>(std::min<std::uint64_t>(room, kNoIndex - 1));
+    if (const Status status = self.reserve(wanted, options); status != Status::kOk) return status;
+    if (const Status status = enqueue(); status != Status::kOk) return status;
+    if (!ok(cudaStreamSynchronize(stream))) return failure();
+    const GpuBroadPhaseReport& told = *host_report;
+    if (told.status != Status::kOk || told.complete != 0) return told.status;
+    if (told.found >= kNoIndex) return Status::kTooManyPairs;
+    room = told.found + told.found / 4;
+  }
+}
+
+GpuBroadPhase::GpuBroadPhase() = default;
+GpuBroadPhase::GpuBroadPhase(GpuBroadPhase&&) noexcept = default;
+GpuBroadPhase& GpuBroadPhase::operator=(GpuBroadPhase&&) noexcept = default;
+GpuBroadPhase::~GpuBroadPhase() = default;
+
+bool GpuBroadPhase::provide_state() {
+  if (state_ == nullptr) state_.reset(new (std::nothrow) State);
+  return state_ != nullptr;
+}
+
+Status GpuBroadPhase::reserve(const GpuBroadPhaseCapacity& capacity, const GpuBroadPhaseOptions& options) {
+  if (capacity.boxes == kNoIndex) return Status::kOutOfRange;
+  if (!provide_state()) return Status::kOutOfMemory;
+  const bool enough =
+      state_->reserve_fixed() && state_->reserve_boxes(capacity.boxes) &&
+      state_->reserve_pairs(capacity.pairs, options.sorted) &&
+      state_->reserve_taken(std::max(capacity.instances, options.within > 0 ? capacity.boxes : 0));
+  return enough ? Status::kOk : state_->failure();
+}
+
+Status GpuBroadPhase::keep_fixed(const WorldBox* boxes, std::span<const Motion> motion, cudaStream_t stream) {
+  if (!provide_state()) return Status::kOutOfMemory;
+  state_->kept.of = 0;
+  if (motion.size() >= kNoIndex) return Status::kOutOfRange;
+  if (reinterpret_cast<std::uintptr_t>(boxes) % 16 != 0) return Status::kMisaligned;
+  return state_->keep(GivenBoxes{boxes}, boxes, motion, stream);
+}
+
+Status GpuBroadPhase::keep_fixed(const GpuInstances& instances, const GpuAssetBounds& assets,
+                                 std::span<const Motion> motion, cudaStream_t stream) {
+  if (!provide_state()) return Status::kOutOfMemory;
+  State& state = *state_;
+  state.kept.of = 0;
+  if (motion.size() != instances.count) return Status::kKeptMismatch;
+  if (!state.reserve_taken(instances.count)) return state.failure();
+  WorldBox* const boxes = state.boxes.data();
+  return state.keep(PosedBoxes{instances, assets, boxes}, boxes, motion, stream);
+}
+
+Status GpuBroadPhase::enqueue(const WorldBox* boxes, std::uint32_t count, const GpuBroadPhaseOptions& options,
+                              cudaStream_t stream) {
+  if (state_ == nullptr) return Status::kOutOfRange;
+  if (reinterpret_cast<std::uintptr_t>(boxes) % 16 != 0) return Status::kMisaligned;
+  return state_->run(GivenBoxes{boxes}, options, {count, boxes, boxes, options.sorted, stream});
+}
+
+Status GpuBroadPhase::enqueue(const GpuInstances& instances, const GpuAssetBounds& assets,
+                              const GpuBroadPhaseOptions& options, cudaStream_t stream) {
+  if (state_ == nullptr || instances.count > state_->boxes.room()) return Status::kOutOfRange;
+  WorldBox* const boxes = state_->boxes.data();
+  return state_->run(PosedBoxes{instances, assets, boxes}, options,
+                     {instances.count, boxes, boxes, options.sorted, stream});
+}
+
+Status GpuBroadPhase::find_pairs(const WorldBox* boxes, std::uint32_t count,
+                                 const GpuBroadPhaseOptions& options, cudaStream_t stream) {
+  if (!provide_state()) return Status::kOutOfMemory;
+  return state_->find_all(*this, {count, 0, 0}, options, stream,
+                          [&] { return enqueue(boxes, count, options, stream); });
+}
+
+Status GpuBroadPhase::find_pairs(const GpuInstances& instances, const GpuAssetBounds& assets,
+                                 const GpuBroadPhaseOptions& options, cudaStream_t stream) {
+  if (!provide_state()) return Status::kOutOfMemory;
+  return state_->find_all(*this, {instances.count, 0, instances.count}, options, stream,
+                          [&] { return enqueue(instances, assets, options, stream); });
+}
+
+GpuPairs GpuBroadPhase::pairs() const {
+  return {reinterpret_cast<const ObjectPair*>(state_->pairs.data()), &state_->report->count,
+          state_->capacity.pairs};
+}
+
+const WorldBox* GpuBroadPhase::boxes() const {
+  return state_->boxes.data();
+}
+const GpuBroadPhaseReport* GpuBroadPhase::device_report() const {
+  return state_->report.data();
+}
+const GpuBroadPhaseReport& GpuBroadPhase::report() const {
+  return *state_->host_report;
+}
+
+GpuBroadPhaseCapacity GpuBroadPhase::capacity() const {
+  if (state_ == nullptr) return {};
+  GpuBroadPhaseCapacity capacity = state_->capacity;
+  capacity.instances = static_cast<std::uint32_t>(state_->boxes.room());
+  capacity.kept = static_cast<std::uint32_t>(state_->kept.list.room());
+  return capacity;
+}
+
+std::size_t GpuBroadPhase::bytes() const {
+  if (state_ == nullptr) return 0;
+  const State& s = *state_;
+  return s.boxes.bytes() + s.kept.bytes() + s.keys[0].bytes() + s.keys[1].bytes() + s.nodes.bytes() +
+         s.pairs.bytes() + s.sorted_pairs.bytes() + s.sorting.bytes() + s.survey.bytes() +
+         s.counters.bytes() + s.report.bytes();
+}
+
+cudaError_t GpuBroadPhase::cuda_error() const {
+  return state_ == nullptr ? cudaSuccess : state_->error;
+}
+
+}  // namespace tandem

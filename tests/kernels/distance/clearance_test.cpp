@@ -1,0 +1,223 @@
+// Clearance: triangles within a distance of each other, against all pairs of triangles, and every way to
+// compute them against the others.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "kernels/contact/contact_query_fixture.h"
+#include "kernels/contact/narrow_phase.h"
+#include "kernels/geometry/grid_test.h"
+#include "kernels/geometry/triangle_distance.h"
+
+namespace tandem {
+namespace {
+
+using test::any_distance;
+using test::FaceContacts;
+using test::PosedTriangle;
+
+bool are_within(const PosedTriangle& a, const PosedTriangle& b, double d) {
+  const TrianglePair pair = test::pair_of(a, b);
+  const DistanceInterval found = triangle_distance(pair, {0, 1e-12}).interval;
+  if (found.lower > d || found.upper <= d) return found.upper <= d;
+  return exact::are_within(pair, d);
+}
+
+FaceContacts all_within(const BodyScene& scene, double d, bool selves) {
+  std::vector<std::vector<PosedTriangle>> posed;
+  for (std::uint32_t i = 0; i < scene.instances.size(); ++i) posed.push_back(posed_triangles(scene, i));
+  FaceContacts out;
+  for (std::uint32_t a = 0; a < posed.size(); ++a) {
+    for (std::uint32_t b = selves ? a : a + 1; b < posed.size(); ++b) {
+      for (std::uint32_t i = 0; i < posed[a].size(); ++i) {
+        for (std::uint32_t j = a == b ? i + 1 : 0; j < posed[b].size(); ++j) {
+          if (are_within(posed[a][i], posed[b][j], d)) out.push_back({a, b, i, j});
+        }
+      }
+    }
+  }
+  return out;
+}
+
+class ClearanceScenes : public testing::TestWithParam<test::SceneFamily> {
+ protected:
+  template <class Check>
+  void for_scenes(int count, Check check) {
+    for (int seed = 0; seed < count && !HasFailure(); ++seed) {
+      RandomPoses random(1868 + static_cast<std::uint64_t>(seed));
+      const BodyScene scene = GetParam().make(random);
+      const double d = any_distance(random, scene);
+      check(scene, d, seed);
+      if (HasFailure()) std::printf("%s, seed %d, d %a:\n%s", GetParam().name, seed, d, text(scene).c_str());
+    }
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(All, ClearanceScenes, testing::ValuesIn(test::scene_families()),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+TEST_P(ClearanceScenes, HaveThePairsOfExactArithmeticOnAllTriangles) {
+  ContactQuery query;
+  std::uint64_t beyond_contacts = 0;
+  for_scenes(test::trials(30, 20), [&](const BodyScene& scene, double d, int seed) {
+    ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+    ContactOptions options;
+    options.self_pairs = seed % 3 == 0;
+    options.within = d;
+    options.threads = 1 + static_cast<std::uint32_t>(seed % 2);
+    ASSERT_EQ(query.find_contacts(scene.instances, options), Status::kOk);
+    EXPECT_EQ(found_contacts(query), all_within(scene, d, options.self_pairs)) << d;
+    const ContactCounters& c = query.counters();
+    EXPECT_EQ(c.candidates, c.decided_by_float32 + c.decided_by_float64 + c.decided_exactly);
+    const std::size_t within = query.contacts().size();
+    options.within = 0;
+    ASSERT_EQ(query.find_contacts(scene.instances, options), Status::kOk);
+    beyond_contacts += within - query.contacts().size();
+  });
+  EXPECT_GT(beyond_contacts, 0u);
+}
+
+TEST_P(ClearanceScenes, HaveAFirstPairWhereTheyHaveAny) {
+  ContactQuery all, first;
+  for_scenes(test::trials(30, 20), [&](const BodyScene& scene, double d, int) {
+    ASSERT_EQ(all.set_assets(scene.assets.views()), Status::kOk);
+    ASSERT_EQ(first.set_assets(scene.assets.views()), Status::kOk);
+    ContactOptions options;
+    options.within = d;
+    ASSERT_EQ(all.find_contacts(scene.instances, options), Status::kOk);
+    options.first_contact_only = true;
+    ASSERT_EQ(first.find_contacts(scene.instances, options), Status::kOk);
+    // Which pair comes first is unspecified.
+    std::set<std::uint32_t> expected, found;
+    const std::vector<Contact> within = contacts_of(all);
+    for (const Contact& contact : within) expected.insert(contact.pair);
+    for (const Contact& contact : first.contacts()) {
+      EXPECT_TRUE(found.insert(contact.pair).second);
+      EXPECT_NE(std::find(within.begin(), within.end(), contact), within.end());
+    }
+    EXPECT_EQ(found, expected);
+  });
+}
+
+PosedTree posed_tree(const BodyScene& scene, std::uint32_t instance) {
+  const AssetView& asset = scene.assets.views()[scene.instances[instance].asset];
+  const LevelView level = asset.level();
+  return {level, extent_of(level.blocks[0]), 0,
+          for_stored_coordinates(scene.instances[instance].pose, asset.header->origin)};
+}
+
+struct Answer {
+  std::vector<Contact> contacts;
+  ContactCounters counters;
+};
+
+Answer run(NarrowPhase way, const PairTask& task) {
+  std::vector<Contact> room(1 << 16);
+  ContactSink sink;
+  sink.next = room.data();
+  sink.end = room.data() + room.size();
+  sink.grow = [](ContactSink&) { return false; };
+  EXPECT_TRUE(way(task, sink));
+  room.resize(static_cast<std::size_t>(sink.next - room.data()));
+  return {room, sink.counters};
+}
+
+std::vector<std::pair<std::uint32_t, std::uint32_t>> sorted_triangles(const Answer& answer) {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> out;
+  for (const Contact& contact : answer.contacts) out.emplace_back(contact.triangle_a, contact.triangle_b);
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+TEST_P(ClearanceScenes, GiveTheSameBitsInEveryVariant) {
+  for_scenes(test::trials(20, 20), [&](const BodyScene& scene, double d, int seed) {
+    std::vector<PosedTree> trees;
+    for (std::uint32_t i = 0; i < scene.instances.size(); ++i) trees.push_back(posed_tree(scene, i));
+    for (const PosedTree& a : trees) {
+      for (const PosedTree& b : trees) {
+        PairTask task = pair_task(a, b, d);
+        task.mode = seed % 4 == 3 ? QueryMode::boxes : QueryMode::exact;
+        if (!task.in_frame) continue;
+        const Answer scalar = run(narrow_phase(BlockPairVariant::scalar), task);
+        for (const BlockPairVariant variant : kBlockPairVariants) {
+          const NarrowPhase way = narrow_phase(variant);
+          if (way == nullptr) continue;
+          const Answer answer = run(way, task);
+          EXPECT_EQ(answer.contacts, scalar.contacts) << static_cast<int>(variant);
+          EXPECT_EQ(answer.counters, scalar.counters) << static_cast<int>(variant);
+        }
+        if (task.mode == QueryMode::exact) {
+          EXPECT_EQ(sorted_triangles(run(narrow_phase_by_world_boxes, task)), sorted_triangles(scalar));
+        }
+      }
+    }
+  });
+}
+
+TEST(Clearance, CountsATieAndNothingBeyond) {
+  BodyScene scene = row_of_cubes(3);
+  for (int i = 0; i < 3; ++i) scene.instances[i].pose.translation[0] = 1.25 * i;
+  ContactQuery query;
+  ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+  ASSERT_EQ(query.find_contacts(scene.instances, {.within = 0.25}), Status::kOk);
+  // The faces of two squares, all of them within the gap, and the others' that share an edge with them.
+  EXPECT_EQ(found_contacts(query), all_within(scene, 0.25, false));
+  EXPECT_FALSE(query.contacts().empty());
+  EXPECT_GT(query.counters().decided_exactly, 0u);
+  ASSERT_EQ(query.find_contacts(scene.instances, {.within = std::nextafter(0.25, 0)}), Status::kOk);
+  EXPECT_TRUE(query.contacts().empty());
+  ASSERT_EQ(query.find_contacts(scene.instances, {.within = 1.49}), Status::kOk);
+  EXPECT_EQ(query.pairs().size(), 2u);
+  ASSERT_EQ(query.find_contacts(scene.instances, {.within = 1.5}), Status::kOk);
+  EXPECT_EQ(query.pairs().size(), 3u);  // their world boxes are 1.5 apart
+}
+
+TEST(Clearance, TiesAtPythagoreanDistances) {
+  BodyScene scene = row_of_cubes(2);
+  ContactQuery query;
+  ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+  scene.instances[1].pose = at(4, 5, 0);  // edges 3 and 4 apart
+  ASSERT_EQ(query.find_contacts(scene.instances, {.within = 5}), Status::kOk);
+  EXPECT_EQ(found_contacts(query), all_within(scene, 5, false));
+  EXPECT_FALSE(query.contacts().empty());
+  ASSERT_EQ(query.find_contacts(scene.instances, {.within = std::nextafter(5, 0)}), Status::kOk);
+  EXPECT_TRUE(query.contacts().empty());
+  scene.instances[1].pose = at(3, 4, 7);  // corners 2, 3 and 6 apart
+  ASSERT_EQ(query.find_contacts(scene.instances, {.within = 7}), Status::kOk);
+  EXPECT_EQ(found_contacts(query), all_within(scene, 7, false));
+  EXPECT_FALSE(query.contacts().empty());
+  ASSERT_EQ(query.find_contacts(scene.instances, {.within = std::nextafter(7, 0)}), Status::kOk);
+  EXPECT_TRUE(query.contacts().empty());
+}
+
+TEST(Clearance, KeptInstancesAreFoundWithinAnyDistance) {
+  const BodyScene scene = crowd(5, 80);
+  std::vector<Motion> motion(scene.instances.size(), Motion::moving);
+  for (std::size_t i = 0; i < motion.size(); i += 2) motion[i] = Motion::fixed;
+  const PairFilter filter = {.motion = motion.data()};
+  ContactQuery kept, anew;
+  for (ContactQuery* query : {&kept, &anew}) ASSERT_EQ(query->set_assets(scene.assets.views()), Status::kOk);
+  ASSERT_EQ(kept.keep_fixed(scene.instances, motion), Status::kOk);
+  for (const double d : {0.0, 0.1, 0.5}) {
+    ASSERT_EQ(kept.find_contacts(scene.instances, {.filter = &filter, .within = d}), Status::kOk);
+    ASSERT_EQ(anew.find_contacts(scene.instances, {.filter = &filter, .within = d}), Status::kOk);
+    EXPECT_EQ(found_contacts(kept), found_contacts(anew)) << d;
+  }
+}
+
+TEST(Clearance, RefusesWhatIsNoDistance) {
+  const BodyScene scene = row_of_cubes(2);
+  ContactQuery query;
+  ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+  for (const double d : {-1.0, std::nan(""), HUGE_VAL, 1e301})
+    EXPECT_EQ(query.find_contacts(scene.instances, {.within = d}), Status::kOutOfRange) << d;
+  EXPECT_EQ(query.find_contacts(scene.instances, {.within = 1e300}), Status::kOk);
+}
+
+}  // namespace
+}  // namespace tandem

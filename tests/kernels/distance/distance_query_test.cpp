@@ -1,0 +1,289 @@
+#include "tandem/kernels/distance_query.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "kernels/contact/contact_query_fixture.h"
+#include "kernels/distance/nearest_phase.h"
+#include "kernels/geometry/triangle_distance.h"
+
+// Whole distance queries against all pairs of triangles, and every way to compute them against the others.
+namespace tandem {
+namespace {
+
+using test::PosedTriangle;
+
+/// The instances moved from the first one, so that there is room between them.
+BodyScene spread_out(BodyScene scene, double factor) {
+  const Pose first = scene.instances[0].pose;
+  for (Instance& instance : scene.instances) {
+    for (int k = 0; k < 3; ++k) {
+      double& t = instance.pose.translation[k];
+      t = first.translation[k] + factor * (t - first.translation[k]);
+    }
+  }
+  return scene;
+}
+
+std::vector<std::vector<PosedTriangle>> posed(const BodyScene& scene) {
+  std::vector<std::vector<PosedTriangle>> out;
+  for (std::uint32_t i = 0; i < scene.instances.size(); ++i) out.push_back(posed_triangles(scene, i));
+  return out;
+}
+
+/// The least interval over all pairs of triangles.
+DistanceInterval least_distance(const std::vector<PosedTriangle>& a, const std::vector<PosedTriangle>& b) {
+  DistanceInterval least = {INFINITY, INFINITY};
+  for (const PosedTriangle& x : a) {
+    for (const PosedTriangle& y : b) {
+      const DistanceInterval next = triangle_distance(test::pair_of(x, y), {0, 1e-12}).interval;
+      least.lower = std::min(least.lower, next.lower);
+      least.upper = std::min(least.upper, next.upper);
+      if (least.upper == 0) return least;
+    }
+  }
+  return least;
+}
+
+double between(const double* p, const double* q) {
+  return std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
+}
+
+std::vector<ObjectDistance> distances_of(const DistanceQuery& query) {
+  return {query.distances().begin(), query.distances().end()};
+}
+
+class DistanceScenes : public testing::TestWithParam<test::SceneFamily> {
+ protected:
+  template <class Check>
+  void for_scenes(int count, Check check) {
+    for (int seed = 0; seed < count && !HasFailure(); ++seed) {
+      RandomPoses random(4711 + static_cast<std::uint64_t>(seed));
+      const BodyScene scene = spread_out(GetParam().make(random), seed % 4);
+      check(scene, seed);
+      if (HasFailure()) std::printf("%s, seed %d:\n%s", GetParam().name, seed, text(scene).c_str());
+    }
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(All, DistanceScenes, testing::ValuesIn(test::scene_families()),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+TEST_P(DistanceScenes, EveryIntervalHoldsTheLeastOfAllTriangles) {
+  DistanceQuery query;
+  for_scenes(test::trials(24, 20), [&](const BodyScene& scene, int seed) {
+    ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+    const DistanceTolerance tolerance = {seed % 3 == 1 ? 0.01 : 0, seed % 3 == 2 ? 0.1 : 1e-6};
+    ASSERT_EQ(query.find_distances(scene.instances, {.tolerance = tolerance}), Status::kOk);
+    const auto triangles = posed(scene);
+    const std::size_t n = scene.instances.size();
+    ASSERT_EQ(query.pairs().size(), n * (n - 1) / 2);
+    for (std::size_t i = 0; i < query.pairs().size(); ++i) {
+      const auto [a, b] = query.pairs()[i];
+      const ObjectDistance& found = query.distances()[i];
+      const DistanceInterval truth = least_distance(triangles[a], triangles[b]);
+      EXPECT_LE(found.lower, truth.upper) << a << " " << b;
+      EXPECT_GE(found.upper, truth.lower) << a << " " << b;
+      EXPECT_EQ(found.upper == 0, truth.upper == 0) << a << " " << b;
+      EXPECT_LE(found.upper - found.lower, allowed_width(tolerance, found.upper)) << a << " " << b;
+      ASSERT_NE(found.triangle_a, kNoIndex);
+      const auto& asset = [&](std::uint32_t of) {
+        return scene.assets.views()[scene.instances[of].asset].level();
+      };
+      EXPECT_EQ(found.face_a, asset(a).triangles[found.triangle_a].source_face());
+      EXPECT_EQ(found.face_b, asset(b).triangles[found.triangle_b].source_face());
+      // The triangles named are as near as told; faces are numbered as the mesh's triangles are.
+      const DistanceInterval named =
+          triangle_distance(test::pair_of(triangles[a][found.face_a], triangles[b][found.face_b]), {0, 1e-12})
+              .interval;
+      EXPECT_LE(named.lower, found.upper);
+      EXPECT_GE(named.upper, found.lower);
+    }
+  });
+}
+
+TEST_P(DistanceScenes, TouchingPairsAreThoseWithContacts) {
+  DistanceQuery query;
+  ContactQuery contacts;
+  for_scenes(test::trials(20, 10), [&](const BodyScene& scene, int) {
+    ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+    ASSERT_EQ(contacts.set_assets(scene.assets.views()), Status::kOk);
+    ASSERT_EQ(contacts.find_contacts(scene.instances, {.first_contact_only = true}), Status::kOk);
+    ASSERT_EQ(query.find_distances(scene.instances, contacts.pairs(), {.reach = 0}), Status::kOk);
+    std::vector<bool> touch(contacts.pairs().size());
+    for (const Contact& contact : contacts.contacts()) touch[contact.pair] = true;
+    for (std::size_t i = 0; i < touch.size(); ++i)
+      EXPECT_EQ(query.distances()[i].upper == 0, touch[i]) << query.pairs()[i].a << " " << query.pairs()[i].b;
+    EXPECT_EQ(query.counters().touching,
+              static_cast<std::uint64_t>(std::count(touch.begin(), touch.end(), true)));
+  });
+}
+
+/// What each variant makes of one pair, without the query around it.
+std::vector<double> walk(NearestPhase phase, const NearestTask& task, DistanceCounters& counters) {
+  NearestSoFar state;
+  state.reset(INFINITY);
+  const BoundedBlockPair roots = {0, 0, 0, 0xFFFF};
+  phase(task, &roots, 1, state);
+  if (!state.touches()) settle_candidates(task, state);
+  counters = state.counters;
+  return {state.upper, state.floor, static_cast<double>(state.triangle_a),
+          static_cast<double>(state.triangle_b)};
+}
+
+TEST_P(DistanceScenes, EveryVariantDoesTheSame) {
+  for_scenes(test::trials(12, 10), [&](const BodyScene& scene, int) {
+    std::vector<PosedTree> trees;
+    for (const Instance& instance : scene.instances) {
+      const AssetView& asset = scene.assets.views()[instance.asset];
+      const LevelView level = asset.level();
+      trees.push_back({level, extent_of(level.blocks[0]), 0,
+                       for_stored_coordinates(instance.pose, asset.header->origin)});
+    }
+    for (std::size_t a = 0; a < trees.size(); ++a) {
+      for (std::size_t b = a + 1; b < trees.size(); ++b) {
+        const NearestTask task = nearest_task(trees[a], trees[b], {});
+        if (!task.in_frame) continue;
+        DistanceCounters expected, counters;
+        const std::vector<double> answer = walk(nearest_phase_scalar, task, expected);
+        for (const BlockPairVariant variant : kBlockPairVariants) {
+          if (nearest_phase(variant) == nullptr) continue;
+          EXPECT_EQ(walk(nearest_phase(variant), task, counters), answer) << static_cast<int>(variant);
+          EXPECT_EQ(counters, expected) << static_cast<int>(variant);
+        }
+      }
+    }
+  });
+}
+
+TEST_P(DistanceScenes, WhatIsBeyondReachIsToldAsSuch) {
+  DistanceQuery query, all;
+  for_scenes(test::trials(8, 10), [&](const BodyScene& scene, int) {
+    ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+    ASSERT_EQ(all.set_assets(scene.assets.views()), Status::kOk);
+    ASSERT_EQ(all.find_distances(scene.instances), Status::kOk);
+    if (all.pairs().empty()) return;
+    const double reach = all.distances()[all.pairs().size() / 2].lower;
+    ASSERT_EQ(query.find_distances(scene.instances, {.reach = reach}), Status::kOk);
+    std::size_t next = 0;
+    for (std::size_t i = 0; i < all.pairs().size(); ++i) {
+      const auto [a, b] = all.pairs()[i];
+      const bool there =
+          next < query.pairs().size() && query.pairs()[next].a == a && query.pairs()[next].b == b;
+      if (all.distances()[i].upper <= reach) {
+        ASSERT_TRUE(there);
+      }
+      if (!there) continue;
+      const ObjectDistance& found = query.distances()[next++];
+      EXPECT_LE(found.lower, all.distances()[i].upper);
+      EXPECT_GE(found.upper, all.distances()[i].lower);
+      if (all.distances()[i].upper <= reach) {
+        EXPECT_NE(found.triangle_a, kNoIndex);
+      }
+      if (found.triangle_a == kNoIndex) {
+        EXPECT_GE(found.lower, reach);
+      }
+    }
+  });
+}
+
+TEST(DistanceQuery, ThreadsAndFormerNearestDoNotMatter) {
+  const BodyScene scene = spread_out(crowd(3, 60), 4);
+  DistanceQuery query;
+  ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+  ASSERT_EQ(query.find_distances(scene.instances, {.reach = 3}), Status::kOk);
+  const std::vector<ObjectDistance> expected = distances_of(query);
+  const DistanceCounters counters = query.counters();
+  ASSERT_GT(expected.size(), 50u);
+  std::vector<FormerNearest> former;
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    const auto [a, b] = query.pairs()[i];
+    former.push_back({a, b, expected[i].triangle_a, expected[i].triangle_b});
+  }
+  for (const std::uint32_t threads : {2u, 3u, 16u}) {
+    ASSERT_EQ(query.find_distances(scene.instances, {.reach = 3, .threads = threads}), Status::kOk);
+    EXPECT_EQ(distances_of(query), expected) << threads;
+    EXPECT_EQ(query.counters(), counters) << threads;
+  }
+  ASSERT_EQ(query.find_distances(scene.instances, {.reach = 3, .former = former}), Status::kOk);
+  EXPECT_LT(query.counters().block_pairs, counters.block_pairs);
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    EXPECT_LE(query.distances()[i].lower, expected[i].upper);
+    EXPECT_GE(query.distances()[i].upper, expected[i].lower);
+  }
+}
+
+TEST(DistanceQuery, OneLargePairIsSpreadOverThreadsAlike) {
+  RandomPoses random(8);
+  BodyScene scene;
+  scene.assets.add(test::cube(0.5f, 120));  // 172,800 triangles
+  scene.assets.add(test::soup(random, 100'000, 0.01));
+  scene.instances = {{0, at(0, 0, 0)}, {1, at(1.52, 0.3, -0.2)}, {0, at(3.5, 0, 0)}};
+  DistanceQuery query;
+  ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+  const std::vector<ObjectPair> pairs = {{0, 1}, {2, 0}, {1, 1}};
+  ASSERT_EQ(query.find_distances(scene.instances, pairs, {}), Status::kOk);
+  const std::vector<ObjectDistance> expected = distances_of(query);
+  EXPECT_LE(expected[1].lower, 2.5);
+  EXPECT_GE(expected[1].upper, 2.5);
+  EXPECT_EQ(expected[2].upper, 0);
+  for (const std::uint32_t threads : {2u, 5u}) {
+    ASSERT_EQ(query.find_distances(scene.instances, pairs, {.threads = threads}), Status::kOk);
+    EXPECT_EQ(distances_of(query), expected);
+  }
+  // The least over all triangles of the soup is that to the face at x = 0.5, found one by one.
+  double least = HUGE_VAL;
+  for (const PosedTriangle& triangle : posed_triangles(scene, 1)) {
+    for (const auto& corner : triangle) {
+      const double outside[3] = {corner[0] - 0.5, std::max(std::fabs(corner[1]) - 0.5, 0.0),
+                                 std::max(std::fabs(corner[2]) - 0.5, 0.0)};
+      const double none[3] = {};
+      least = std::min(least, between(outside, none));
+    }
+  }
+  EXPECT_NEAR(expected[0].upper, least, 1e-6 * least);
+}
+
+TEST(DistanceQuery, OfCubesInARowIsTheGap) {
+  BodyScene scene = row_of_cubes(3);
+  for (int i = 0; i < 3; ++i) scene.instances[i].pose.translation[0] = 1.25 * i;
+  DistanceQuery query;
+  ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+  ASSERT_EQ(query.find_distances(scene.instances, {.reach = 0.25}), Status::kOk);
+  ASSERT_EQ(query.pairs().size(), 2u);
+  for (const ObjectDistance& found : query.distances()) {
+    EXPECT_LE(found.lower, 0.25);
+    EXPECT_GE(found.upper, 0.25);
+    EXPECT_NEAR(between(found.point_a, found.point_b), 0.25, 1e-15);
+  }
+}
+
+TEST(DistanceQuery, RefusesWhatIsWrong) {
+  const BodyScene scene = row_of_cubes(3);
+  DistanceQuery query;
+  const AssetView nothing[1] = {};
+  EXPECT_EQ(query.set_assets(nothing), Status::kUnknownAsset);
+  ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+  EXPECT_EQ(query.find_distances(scene.instances, {.reach = -1}), Status::kOutOfRange);
+  EXPECT_EQ(query.find_distances(scene.instances, {.tolerance = {0, NAN}}), Status::kOutOfRange);
+  const ObjectPair bad[] = {{0, 1}, {0, 3}};
+  EXPECT_EQ(query.find_distances(scene.instances, bad, {}), Status::kUnknownInstance);
+  EXPECT_EQ(query.where(), 1u);
+  std::vector<Instance> instances = scene.instances;
+  instances[1].pose.rotation[0][0] = 2;
+  EXPECT_EQ(query.find_distances(instances), Status::kPoseNotRigid);
+  EXPECT_EQ(query.where(), 1u);
+  instances[1] = {7, kIdentityPose};
+  EXPECT_EQ(query.find_distances(instances), Status::kUnknownAsset);
+  EXPECT_TRUE(query.pairs().empty() && query.distances().empty());
+  EXPECT_EQ(query.find_distances(scene.instances), Status::kOk);
+  EXPECT_EQ(query.distances().size(), 3u);
+}
+
+}  // namespace
+}  // namespace tandem

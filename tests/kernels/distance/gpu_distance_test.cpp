@@ -1,0 +1,295 @@
+// Distances on the GPU: certified like those of the CPU, 0 for the same pairs, and the same bytes on every
+// run.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "gpu/gpu_scene_fixture.h"
+#include "kernels/contact/contact_query_fixture.h"
+#include "kernels/geometry/triangle_distance.h"
+#include "tandem/formats/gpu_stream.h"
+#include "tandem/kernels/gpu_distance_query.h"
+
+namespace tandem {
+namespace {
+
+using test::GpuScene;
+using test::RandomPoses;
+using Distances = std::vector<ObjectDistance>;
+
+/// The instances moved from the first one, so that there is room between them.
+BodyScene spread_out(BodyScene scene, double factor) {
+  const Pose first = scene.instances[0].pose;
+  for (Instance& instance : scene.instances) {
+    for (int k = 0; k < 3; ++k) {
+      double& t = instance.pose.translation[k];
+      t = first.translation[k] + factor * (t - first.translation[k]);
+    }
+  }
+  return scene;
+}
+
+std::vector<ObjectPair> every_pair(const BodyScene& scene, bool selves = false) {
+  RandomPoses random(1);
+  return test::all_pairs(scene.instances, selves, random);
+}
+
+Distances of_cpu(const BodyScene& scene, const std::vector<ObjectPair>& pairs,
+                 const DistanceOptions& options) {
+  DistanceQuery query;
+  EXPECT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+  EXPECT_EQ(query.find_distances(scene.instances, pairs, options), Status::kOk);
+  return {query.distances().begin(), query.distances().end()};
+}
+
+/// A scene on the GPU, and a query of it.
+struct Found {
+  Found(const BodyScene& of, const std::vector<ObjectPair>& given)
+      : scene(of.assets, of.instances, given), pairs(given.size()) {
+    EXPECT_EQ(query.set_assets(scene.assets(), nullptr), Status::kOk);
+  }
+  Status find(const GpuDistanceOptions& options = {}) {
+    return query.find_distances(scene.instances(), scene.pairs(), options, nullptr);
+  }
+  Status enqueue(const GpuDistanceOptions& options, cudaStream_t stream) {
+    return query.enqueue(scene.instances(), scene.pairs(), options, stream);
+  }
+  Distances distances() const { return test::download(query.distances(), pairs); }
+
+  GpuScene scene;
+  std::size_t pairs;
+  GpuDistanceQuery query;
+};
+
+bool same_bytes(const Distances& x, const Distances& y) {
+  return x.size() == y.size() && std::memcmp(x.data(), y.data(), x.size() * sizeof(ObjectDistance)) == 0;
+}
+
+void expect_overlap(const DistanceInterval& x, const DistanceInterval& y) {
+  EXPECT_LE(x.lower, y.upper);
+  EXPECT_GE(x.upper, y.lower);
+}
+
+/// The row against that of the CPU, which has no reach and the usual tolerance.
+void expect_certified(const BodyScene& scene, const ObjectPair& pair, const ObjectDistance& found,
+                      const ObjectDistance& truth, const DistanceTolerance& tolerance, double reach) {
+  SCOPED_TRACE(std::to_string(pair.a) + " " + std::to_string(pair.b));
+  expect_overlap({found.lower, found.upper}, {truth.lower, truth.upper});
+  EXPECT_EQ(found.upper == 0, truth.upper == 0);
+  if (found.triangle_a == kNoIndex) {
+    EXPECT_GE(found.lower, reach);
+    EXPECT_EQ(found.upper, INFINITY);
+    EXPECT_GE(truth.upper, reach);
+    return;
+  }
+  EXPECT_LE(found.upper - found.lower, allowed_width(tolerance, found.upper));
+  const auto level = [&](std::uint32_t of) {
+    return scene.assets.views()[scene.instances[of].asset].level();
+  };
+  ASSERT_LT(found.triangle_a, level(pair.a).triangle_count);
+  ASSERT_LT(found.triangle_b, level(pair.b).triangle_count);
+  EXPECT_EQ(found.face_a, level(pair.a).triangles[found.triangle_a].source_face());
+  EXPECT_EQ(found.face_b, level(pair.b).triangles[found.triangle_b].source_face());
+  // The triangles that are named are as near as told. Faces are numbered as the mesh's triangles are.
+  const auto a = posed_triangles(scene, pair.a), b = posed_triangles(scene, pair.b);
+  const TriangleDistance named =
+      triangle_distance(test::pair_of(a[found.face_a], b[found.face_b]), {0, 1e-12});
+  expect_overlap({found.lower, found.upper}, named.interval);
+}
+
+class GpuDistances : public test::GpuTest {};
+
+class GpuDistanceScenes : public test::GpuTestOf<test::SceneFamily> {
+ protected:
+  template <class Check>
+  void for_scenes(int count, Check check) {
+    for (int seed = 0; seed < count && !HasFailure(); ++seed) {
+      RandomPoses random(1147 + static_cast<std::uint64_t>(seed));
+      const BodyScene scene = spread_out(GetParam().make(random), seed % 4);
+      check(scene, seed);
+      if (HasFailure()) std::printf("%s, seed %d:\n%s", GetParam().name, seed, text(scene).c_str());
+    }
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(All, GpuDistanceScenes, testing::ValuesIn(test::scene_families()),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+TEST_P(GpuDistanceScenes, AreCertified) {
+  for_scenes(test::trials(24, 20), [&](const BodyScene& scene, int seed) {
+    const std::vector<ObjectPair> pairs = every_pair(scene, true);
+    const Distances truth = of_cpu(scene, pairs, {});
+    const DistanceTolerance tolerance = {seed % 3 == 1 ? 0.01 : 0, seed % 3 == 2 ? 0.1 : 1e-6};
+    Found found(scene, pairs);
+    for (const double reach : {static_cast<double>(INFINITY), truth[pairs.size() / 2].upper}) {
+      ASSERT_EQ(found.find({.tolerance = tolerance, .reach = reach}), Status::kOk);
+      const Distances distances = found.distances();
+      std::uint64_t touching = 0;
+      for (std::size_t i = 0; i < pairs.size(); ++i) {
+        expect_certified(scene, pairs[i], distances[i], truth[i], tolerance, reach);
+        touching += distances[i].upper == 0;
+      }
+      EXPECT_EQ(found.query.report().counters.touching, touching);
+      EXPECT_EQ(found.query.report().counters.object_pairs, pairs.size());
+      EXPECT_LE(found.query.bytes(),
+                most_distance_bytes(found.query.capacity(), scene.assets.views().size()));
+    }
+  });
+}
+
+TEST_P(GpuDistanceScenes, AreTheSameBytesOnEveryRun) {
+  for_scenes(test::trials(4, 10), [&](const BodyScene& scene, int) {
+    Found found(scene, every_pair(scene));
+    ASSERT_EQ(found.find(), Status::kOk);
+    const Distances first = found.distances();
+    const GpuDistanceReport report = found.query.report();
+    for (int i = 0; i < 8; ++i) {
+      ASSERT_EQ(found.find(), Status::kOk);
+      EXPECT_TRUE(same_bytes(found.distances(), first));
+      EXPECT_EQ(found.query.report().counters, report.counters);
+    }
+  });
+}
+
+TEST_F(GpuDistances, OfManyPairsAreCertified) {
+  const BodyScene scene = spread_out(crowd(5, 300), 3);
+  const std::vector<ObjectPair> pairs = every_pair(scene);
+  const Distances truth = of_cpu(scene, pairs, {});
+  Found found(scene, pairs);
+  ASSERT_EQ(found.find(), Status::kOk);
+  const Distances distances = found.distances();
+  for (std::size_t i = 0; i < pairs.size() && !HasFailure(); ++i)
+    expect_certified(scene, pairs[i], distances[i], truth[i], {}, INFINITY);
+  // Those of a step ago lead to the same.
+  ASSERT_EQ(found.find({.former = found.query.distances()}), Status::kOk);
+  const Distances again = found.distances();
+  for (std::size_t i = 0; i < pairs.size() && !HasFailure(); ++i)
+    expect_certified(scene, pairs[i], again[i], truth[i], {}, INFINITY);
+}
+
+TEST_F(GpuDistances, OfOneLargePair) {
+  RandomPoses random(8);
+  BodyScene scene;
+  scene.assets.add(test::cube(0.5f, 120));  // 172,800 triangles
+  scene.assets.add(test::soup(random, 100'000, 0.01));
+  scene.instances = {{0, at(0, 0, 0)}, {1, at(1.52, 0.3, -0.2)}, {0, at(3.5, 0, 0)}, {0, at(0.4, 0.1, 0.2)}};
+  const std::vector<ObjectPair> pairs = {{0, 1}, {2, 0}, {1, 1}, {0, 3}};
+  const Distances truth = of_cpu(scene, pairs, {});
+  Found found(scene, pairs);
+  ASSERT_EQ(found.find(), Status::kOk);
+  const Distances distances = found.distances();
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    expect_overlap({distances[i].lower, distances[i].upper}, {truth[i].lower, truth[i].upper});
+    EXPECT_EQ(distances[i].upper == 0, truth[i].upper == 0);
+  }
+  EXPECT_EQ(found.query.report().counters.touching, 2u);
+}
+
+/// Cubes that nearly touch, one with coordinates that differ in size by 2^-400: exact arithmetic needs more
+/// words than there is room for at first.
+TEST_F(GpuDistances, WhatNeedsWiderNumbersIsToldAndGetsThem) {
+  BodyScene scene;
+  scene.assets.add(test::cube(0.5f, 2));
+  scene.instances = {{0, at(0, 0, 0)}, {0, at(1 + 0x1p-52, 0x1p-400, 0)}};
+  const std::vector<ObjectPair> pairs = {{0, 1}};
+  const Distances truth = of_cpu(scene, pairs, {});
+  ASSERT_GT(truth[0].lower, 0);
+  Found found(scene, pairs);
+  ASSERT_EQ(found.query.reserve({1, 1u << 12, 1u << 12, 1u << 10, kFewWords}), Status::kOk);
+  ASSERT_EQ(found.enqueue({}, nullptr), Status::kOk);
+  ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
+  EXPECT_EQ(found.query.report().complete, 0u);
+  EXPECT_GT(found.query.report().needed.words, kFewWords);
+  ASSERT_EQ(found.find(), Status::kOk);
+  EXPECT_EQ(found.query.report().complete, 1u);
+  expect_certified(scene, pairs[0], found.distances()[0], truth[0], {}, INFINITY);
+}
+
+TEST_F(GpuDistances, WhatDoesNotFitIsToldAndNothingIsLostOnTheRetry) {
+  const BodyScene scene = spread_out(crowd(3, 60), 1.2);
+  const std::vector<ObjectPair> pairs = every_pair(scene);
+  Found found(scene, pairs);
+  ASSERT_EQ(found.find(), Status::kOk);
+  const Distances expected = found.distances();
+  const GpuDistanceCapacity needed = found.query.report().needed;
+  ASSERT_GT(needed.settled, 1u);
+  for (std::uint32_t GpuDistanceCapacity::*const member :
+       {&GpuDistanceCapacity::pairs, &GpuDistanceCapacity::block_pairs, &GpuDistanceCapacity::triangle_pairs,
+        &GpuDistanceCapacity::settled}) {
+    GpuDistanceCapacity small = needed;
+    small.*member -= 1;
+    Found tight(scene, pairs);
+    ASSERT_EQ(tight.query.reserve(small), Status::kOk);
+    ASSERT_EQ(tight.enqueue({}, nullptr), Status::kOk);
+    ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
+    EXPECT_EQ(tight.query.report().complete, 0u);
+    EXPECT_GE(tight.query.report().needed.*member, needed.*member);
+    ASSERT_EQ(tight.query.reserve(needed), Status::kOk);
+    ASSERT_EQ(tight.enqueue({}, nullptr), Status::kOk);
+    ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
+    EXPECT_EQ(tight.query.report().complete, 1u);
+    EXPECT_TRUE(same_bytes(tight.distances(), expected));
+  }
+}
+
+TEST_F(GpuDistances, AGraphFollowsTheBodies) {
+  BodyScene scene = row_of_cubes(2);
+  const std::vector<ObjectPair> pairs = {{1, 0}};
+  GpuArray<Pose> poses;
+  GpuArray<std::uint32_t> assets = test::on_gpu(std::vector<std::uint32_t>{0, 0});
+  ASSERT_EQ(poses.reserve(2), cudaSuccess);
+  Found found(scene, pairs);
+  ASSERT_EQ(found.query.reserve({1, 1u << 12, 1u << 12, 1u << 10, 0}), Status::kOk);
+  GpuStream stream;
+  GpuGraph graph;
+  ASSERT_EQ(stream.create(), cudaSuccess);
+  ASSERT_EQ(graph.capture(stream.get(),
+                          [&] {
+                            EXPECT_EQ(found.query.enqueue({assets.data(), poses.data(), 2},
+                                                          found.scene.pairs(), {.reach = 4}, stream.get()),
+                                      Status::kOk);
+                          }),
+            cudaSuccess);
+  for (const double gap : {0.5, 0.0, 3.0, 5.0, 0.25}) {
+    std::vector<Pose> moved = {scene.instances[0].pose, scene.instances[0].pose};
+    moved[1].translation[0] += 1 + gap;
+    ASSERT_EQ(poses.upload(moved, stream.get()), cudaSuccess);
+    ASSERT_EQ(graph.launch(stream.get()), cudaSuccess);
+    ASSERT_EQ(stream.wait(), cudaSuccess);
+    const ObjectDistance distance = found.distances()[0];
+    if (gap < 4) {
+      expect_overlap({distance.lower, distance.upper}, {gap, gap});
+    } else {
+      EXPECT_TRUE(distance.upper == INFINITY && distance.lower >= 4);
+    }
+  }
+}
+
+TEST_F(GpuDistances, ErrorsAreNamed) {
+  const BodyScene scene = row_of_cubes(3);
+  const auto status_of = [](const BodyScene& wrong, const std::vector<ObjectPair>& pairs,
+                            std::uint64_t where) {
+    Found found(wrong, pairs);
+    const Status status = found.find();
+    EXPECT_EQ(found.query.report().where, where);
+    return status;
+  };
+  EXPECT_EQ(status_of(scene, {{0, 1}, {0, 3}}, 1), Status::kUnknownInstance);
+  BodyScene wrong = row_of_cubes(3);
+  wrong.instances[1].pose.rotation[0][0] = 2;
+  EXPECT_EQ(status_of(wrong, {{0, 2}}, 1), Status::kPoseNotRigid);
+  wrong.instances[1] = {7, kIdentityPose};
+  EXPECT_EQ(status_of(wrong, {{0, 1}}, 1), Status::kUnknownAsset);
+  wrong.instances[1] = {0, at(2e300, 0, 0)};
+  EXPECT_EQ(status_of(wrong, {{0, 1}}, 1), Status::kOutOfRange);
+  Found found(scene, {{0, 1}});
+  EXPECT_EQ(found.find({.reach = -1}), Status::kOutOfRange);
+  EXPECT_EQ(found.find({.tolerance = {0, NAN}}), Status::kOutOfRange);
+  EXPECT_EQ(found.find(), Status::kOk);
+  GpuScene oriented(scene.assets, scene.instances, {{0, 1}}, Contents::exact_queries);
+  EXPECT_EQ(found.query.set_assets(oriented.assets(), nullptr), Status::kNoAxisAlignedBlocks);
+}
+
+}  // namespace
+}  // namespace tandem

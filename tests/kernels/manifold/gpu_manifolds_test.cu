@@ -1,0 +1,308 @@
+// Contact manifolds on the GPU: the bytes of the CPU.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "gpu/gpu_scene_fixture.h"
+#include "tandem/kernels/gpu_manifold_query.h"
+
+namespace tandem {
+namespace {
+
+using test::BodyScene;
+using test::download;
+using test::GpuScene;
+
+GpuContactOptions grouped() {
+  GpuContactOptions options = test::gpu_options(QueryMode::exact);
+  options.grouped = true;
+  return options;
+}
+
+struct Result {
+  std::vector<Manifold> manifolds;
+  std::vector<ManifoldPoint> points;
+  ManifoldCounters counters;
+};
+
+Result result_of(const GpuManifoldQuery& made) {
+  return {download(made.manifolds(), made.report().manifolds), download(made.points(), made.report().points),
+          made.report().counters};
+}
+
+template <typename Element>
+bool same_bytes(const std::vector<Element>& x, const std::vector<Element>& y) {
+  return x.size() == y.size() && std::memcmp(x.data(), y.data(), x.size() * sizeof(Element)) == 0;
+}
+
+/// The first difference, for people.
+void explain_difference(const Result& cpu, const Result& gpu) {
+  for (std::size_t i = 0; i < std::min(cpu.manifolds.size(), gpu.manifolds.size()); ++i) {
+    const Manifold &x = cpu.manifolds[i], &y = gpu.manifolds[i];
+    if (std::memcmp(&x, &y, sizeof x) == 0) continue;
+    ADD_FAILURE() << "manifold " << i << " of pair " << x.pair << " " << y.pair << ", points "
+                  << x.point_count << " " << y.point_count << ", flags " << x.flags << " " << y.flags
+                  << ", depth " << x.depth << " " << y.depth - x.depth << ", normal off "
+                  << x.normal[0] - y.normal[0] << " " << x.normal[1] - y.normal[1] << " "
+                  << x.normal[2] - y.normal[2] << ", centre off " << x.centre[0] - y.centre[0]
+                  << ", area off " << x.area_vector[0] - y.area_vector[0];
+    break;
+  }
+  for (std::size_t i = 0; i < std::min(cpu.points.size(), gpu.points.size()); ++i) {
+    const ManifoldPoint &x = cpu.points[i], &y = gpu.points[i];
+    if (std::memcmp(&x, &y, sizeof x) == 0) continue;
+    ADD_FAILURE() << "point " << i << " of manifold " << x.manifold << " " << y.manifold << ", id " << x.id
+                  << " " << y.id << ", depth " << x.depth << " " << y.depth - x.depth << ", position off "
+                  << x.position[0] - y.position[0] << ", in a off " << x.in_a[0] - y.in_a[0] << ", faces "
+                  << x.face_a << " " << y.face_a << " " << x.face_b << " " << y.face_b << ", previous "
+                  << x.previous << " " << y.previous;
+    return;
+  }
+}
+
+void expect_same(const Result& cpu, const Result& gpu) {
+  EXPECT_EQ(cpu.manifolds.size(), gpu.manifolds.size());
+  EXPECT_EQ(cpu.points.size(), gpu.points.size());
+  EXPECT_EQ(cpu.counters.segments, gpu.counters.segments);
+  EXPECT_EQ(cpu.counters, gpu.counters);
+  if (!same_bytes(cpu.manifolds, gpu.manifolds) || !same_bytes(cpu.points, gpu.points))
+    explain_difference(cpu, gpu);
+}
+
+/// Both sides of a scene, which goes on from step to step.
+class BothSides {
+ public:
+  explicit BothSides(const test::SampleAssets& assets, Contents contents = Contents::manifolds) {
+    const auto files = assets.views();
+    EXPECT_EQ(query_.set_assets(files), Status::kOk);
+    EXPECT_EQ(manifolds_.set_assets(files), Status::kOk);
+    EXPECT_EQ(uploaded_.upload(files, contents, nullptr), Status::kOk);
+    for (std::size_t i = 0; i < files.size(); ++i)
+      gpu_assets_.push_back(gpu_asset(uploaded_.level(i), files[i]));
+    EXPECT_EQ(gpu_query_.set_assets(gpu_assets_, nullptr), Status::kOk);
+    EXPECT_EQ(gpu_.set_assets(gpu_assets_, nullptr), Status::kOk);
+  }
+
+  /// Makes the manifolds of the CPU, and of the GPU as often as room was too small, and compares them.
+  /// Result: how many points there are.
+  std::size_t step(const std::vector<Instance>& instances, const std::vector<ObjectPair>& pairs,
+                   bool match_previous = true) {
+    const Result cpu = on_cpu(instances, pairs, match_previous);
+    const OnGpu scene(instances, pairs);
+    EXPECT_EQ(gpu_query_.find_contacts(scene.instances(), scene.pairs(), grouped(), nullptr), Status::kOk);
+    EXPECT_EQ(
+        gpu_.make(scene.instances(), scene.pairs(), gpu_query_, {.match_previous = match_previous}, nullptr),
+        Status::kOk);
+    EXPECT_LE(gpu_.bytes(), most_manifold_bytes(gpu_.capacity(), gpu_assets_.size()));
+    expect_same(cpu, result_of(gpu_));
+    return cpu.points.size();
+  }
+
+  Result on_cpu(const std::vector<Instance>& instances, const std::vector<ObjectPair>& pairs,
+                bool match_previous) {
+    EXPECT_EQ(query_.find_contacts(instances, pairs, {}), Status::kOk);
+    EXPECT_EQ(manifolds_.make(instances, pairs, query_.contacts(), {.match_previous = match_previous}),
+              Status::kOk);
+    return {{manifolds_.manifolds().begin(), manifolds_.manifolds().end()},
+            {manifolds_.points().begin(), manifolds_.points().end()},
+            manifolds_.counters()};
+  }
+
+  /// Instances and pairs in GPU memory.
+  struct OnGpu {
+    OnGpu(const std::vector<Instance>& instances, const std::vector<ObjectPair>& pairs)
+        : pairs_(test::on_gpu(pairs)),
+          count_(test::on_gpu(std::vector<std::uint32_t>{static_cast<std::uint32_t>(pairs.size())})),
+          instance_count_(static_cast<std::uint32_t>(instances.size())),
+          pair_count_(static_cast<std::uint32_t>(pairs.size())) {
+      std::vector<std::uint32_t> assets;
+      std::vector<Pose> poses;
+      for (const Instance& instance : instances) {
+        assets.push_back(instance.asset);
+        poses.push_back(instance.pose);
+      }
+      asset_ = test::on_gpu(assets);
+      pose_ = test::on_gpu(poses);
+    }
+    GpuInstances instances() const { return {asset_.data(), pose_.data(), instance_count_}; }
+    GpuPairs pairs() const { return {pairs_.data(), count_.data(), pair_count_}; }
+
+    GpuArray<std::uint32_t> asset_;
+    GpuArray<Pose> pose_;
+    GpuArray<ObjectPair> pairs_;
+    GpuArray<std::uint32_t> count_;
+    std::uint32_t instance_count_, pair_count_;
+  };
+
+  GpuContactQuery& gpu_query() { return gpu_query_; }
+  GpuManifoldQuery& gpu() { return gpu_; }
+
+ private:
+  ContactQuery query_;
+  ManifoldQuery manifolds_;
+  DeviceAssets uploaded_;
+  std::vector<GpuAsset> gpu_assets_;
+  GpuContactQuery gpu_query_;
+  GpuManifoldQuery gpu_;
+};
+
+/// Moves and turns a little.
+void move(std::vector<Instance>& instances, test::RandomPoses& random, double by) {
+  for (Instance& instance : instances) {
+    for (double& x : instance.pose.translation) x += random.symmetric(by);
+    const double angle = random.symmetric(by), c = std::cos(angle), s = std::sin(angle);
+    auto& r = instance.pose.rotation;
+    for (int k = 0; k < 3; ++k) {
+      const double x = r[0][k], y = r[1][k];
+      r[0][k] = c * x - s * y, r[1][k] = s * x + c * y;
+    }
+  }
+}
+
+/// Cubes of several meshes that overlap a little, and one far larger.
+BodyScene boxes(std::uint32_t bodies, double spread, std::uint64_t seed) {
+  test::RandomPoses random(seed);
+  BodyScene scene;
+  for (const int cells : {1, 3, 8}) scene.assets.add(test::cube(0.5f, cells));
+  scene.assets.add(test::cube(2.0f, 2));
+  for (std::uint32_t i = 0; i < bodies; ++i) {
+    scene.instances.push_back({i % 16 == 0 ? 3u : i % 3, random.pose({1, 1, spread, 0, 4})});
+  }
+  return scene;
+}
+
+class GpuManifolds : public test::GpuTest {};
+
+class GpuManifoldsOfFamily : public test::GpuTestOf<test::SceneFamily> {};
+
+TEST_P(GpuManifoldsOfFamily, AreTheCpus) {
+  test::RandomPoses random(51);
+  for (int trial = 0; trial < test::trials(5, 20); ++trial) {
+    BodyScene scene = GetParam().make(random);
+    BothSides both(scene.assets);
+    const std::vector<ObjectPair> pairs = test::all_pairs(scene.instances, true, random);
+    both.step(scene.instances, pairs);
+    if (HasFailure()) break;
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Scenes, GpuManifoldsOfFamily, testing::ValuesIn(test::scene_families()),
+                         [](const auto& tested) { return std::string(tested.param.name); });
+
+TEST_F(GpuManifolds, GoOnFromStepToStep) {
+  for (const Contents contents : {Contents::manifolds, Contents::all}) {
+    BodyScene scene = boxes(120, 4, 52);
+    test::RandomPoses random(53);
+    BothSides both(scene.assets, contents);
+    std::size_t points = 0;
+    for (int step = 0; step < 8; ++step) {
+      points += both.step(scene.instances, test::all_pairs(scene.instances, false, random), step != 4);
+      if (HasFailure()) return;
+      move(scene.instances, random, 2e-3);
+    }
+    EXPECT_GT(points, 1000u);
+  }
+}
+
+TEST_F(GpuManifolds, OfPairsWithManyContacts) {
+  BodyScene scene = test::pile(12, 3000, 0.5, 54);
+  test::RandomPoses random(55);
+  BothSides both(scene.assets);
+  for (int step = 0; step < 3 && !HasFailure(); ++step) {
+    EXPECT_GT(both.step(scene.instances, test::all_pairs(scene.instances, true, random)), 100u);
+    move(scene.instances, random, 1e-3);
+  }
+}
+
+/// Boxes in a lattice, as they lie in an exact stack: ties all over.
+TEST_F(GpuManifolds, OfAnExactStack) {
+  BodyScene scene;
+  test::RandomPoses random(56);
+  scene.assets.add(test::cube(0.5f, 1));
+  scene.assets.add(test::cube(0.5f, 4));
+  for (std::uint32_t i = 0; i < 64; ++i) {
+    Instance instance = {i % 2, kIdentityPose};
+    instance.pose.translation[0] = i % 4 + 1e5, instance.pose.translation[1] = i / 4 % 4,
+    instance.pose.translation[2] = i / 16;
+    scene.instances.push_back(instance);
+  }
+  BothSides both(scene.assets);
+  EXPECT_GT(both.step(scene.instances, test::all_pairs(scene.instances, false, random)), 300u);
+}
+
+/// What does not fit is told, and the retry finds the points of the step before nevertheless.
+TEST_F(GpuManifolds, WithoutRoomTellWhatTheyNeed) {
+  BodyScene scene = boxes(60, 3, 57);
+  test::RandomPoses random(58);
+  BothSides both(scene.assets);
+  std::vector<ObjectPair> pairs = test::all_pairs(scene.instances, false, random);
+  for (int step = 0; step < 3; ++step) {
+    const Result cpu = both.on_cpu(scene.instances, pairs, true);
+    const BothSides::OnGpu on_gpu(scene.instances, pairs);
+    ASSERT_EQ(both.gpu_query().find_contacts(on_gpu.instances(), on_gpu.pairs(), grouped(), nullptr),
+              Status::kOk);
+    if (step == 0) {
+      ASSERT_EQ(both.gpu().reserve({.pairs = 1, .contacts = 1, .manifolds = 1, .points = 1}), Status::kOk);
+      ASSERT_EQ(both.gpu().enqueue(on_gpu.instances(), on_gpu.pairs(), both.gpu_query(), {}, nullptr),
+                Status::kOk);
+      ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
+      EXPECT_EQ(both.gpu().report().complete, 0u);
+      EXPECT_EQ(both.gpu().report().needed.pairs, pairs.size());
+      EXPECT_EQ(both.gpu().report().manifolds, 0u);
+    }
+    ASSERT_EQ(both.gpu().make(on_gpu.instances(), on_gpu.pairs(), both.gpu_query(), {}, nullptr),
+              Status::kOk);
+    expect_same(cpu, result_of(both.gpu()));
+    move(scene.instances, random, 1e-3);
+    // Twice the bodies from the second step on: more than there was room for.
+    if (step == 0) {
+      const std::vector<Instance> first = scene.instances;
+      for (Instance instance : first) {
+        instance.pose.translation[0] += 20;
+        scene.instances.push_back(instance);
+      }
+      pairs = test::all_pairs(scene.instances, false, random);
+    }
+  }
+}
+
+TEST_F(GpuManifolds, OfAGraphThatIsReplayed) {
+  BodyScene scene = boxes(60, 3, 59);
+  test::RandomPoses random(60);
+  BothSides both(scene.assets);
+  const std::vector<ObjectPair> pairs = test::all_pairs(scene.instances, false, random);
+  both.step(scene.instances, pairs);
+  const BothSides::OnGpu on_gpu(scene.instances, pairs);
+  ASSERT_EQ(cudaDeviceSynchronize(), cudaSuccess);  // the stream does not wait for copies on the default one
+  GpuStream stream;
+  ASSERT_EQ(stream.create(), cudaSuccess);
+  GpuGraph graph;
+  ASSERT_EQ(graph.capture(stream.get(),
+                          [&] {
+                            EXPECT_EQ(both.gpu_query().enqueue(on_gpu.instances(), on_gpu.pairs(), grouped(),
+                                                               stream.get()),
+                                      Status::kOk);
+                            EXPECT_EQ(both.gpu().enqueue(on_gpu.instances(), on_gpu.pairs(), both.gpu_query(),
+                                                         {}, stream.get()),
+                                      Status::kOk);
+                          }),
+            cudaSuccess);
+  for (int step = 0; step < 3; ++step) {
+    ASSERT_EQ(graph.launch(stream.get()), cudaSuccess);
+    ASSERT_EQ(stream.wait(), cudaSuccess);
+    expect_same(both.on_cpu(scene.instances, pairs, true), result_of(both.gpu()));
+  }
+}
+
+TEST_F(GpuManifolds, NeedTopology) {
+  BodyScene scene = boxes(2, 1, 61);
+  const auto files = scene.assets.views();
+  DeviceAssets uploaded;
+  ASSERT_EQ(uploaded.upload(files, Contents::exact_queries, nullptr), Status::kOk);
+  const GpuAsset asset = gpu_asset(uploaded.level(0), files[0]);
+  GpuManifoldQuery manifolds;
+  EXPECT_EQ(manifolds.set_assets({&asset, 1}, nullptr), Status::kNoTopology);
+}
+
+}  // namespace
+}  // namespace tandem

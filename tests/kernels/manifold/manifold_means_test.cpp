@@ -1,0 +1,107 @@
+#include <algorithm>
+#include <cstring>
+
+#include "kernels/manifold/pair_patches.h"
+#include "kernels/manifold/shape.h"
+#include "manifold_scene.h"
+
+#ifdef TANDEM_HAVE_LANES
+namespace tandem::test {
+namespace {
+
+using manifold::Patch;
+
+struct PatchesOfPair {
+  std::vector<Patch> patches;
+  std::uint64_t segments, ambiguous_touches;
+};
+
+template <typename Team>
+PatchesOfPair patches_of(const Team& team, const manifold::BodyPair& bodies,
+                         std::span<const Contact> contacts) {
+  PairPatches made;
+  EXPECT_TRUE(made.add(team, bodies, contacts.data(), static_cast<std::uint32_t>(contacts.size()),
+                       static_cast<int>(kMostManifoldPoints)));
+  PatchesOfPair out = {{}, made.segments, made.ambiguous_touches};
+  out.patches.assign(made.patches.data(), made.patches.data() + made.patches.size());
+  std::sort(out.patches.begin(), out.patches.end(),
+            [](const Patch& x, const Patch& y) { return x.key < y.key; });
+  return out;
+}
+
+void expect_same(const PatchesOfPair& x, const PatchesOfPair& y) {
+  EXPECT_EQ(x.segments, y.segments);
+  EXPECT_EQ(x.ambiguous_touches, y.ambiguous_touches);
+  ASSERT_EQ(x.patches.size(), y.patches.size());
+  for (std::size_t i = 0; i < x.patches.size(); ++i) {
+    const Patch &p = x.patches[i], &q = y.patches[i];
+    EXPECT_EQ(p.key, q.key);
+    EXPECT_EQ(p.hole, q.hole);
+    EXPECT_EQ(std::memcmp(&p.manifold, &q.manifold, sizeof(Manifold)), 0);
+    EXPECT_EQ(std::memcmp(p.point, q.point, p.manifold.point_count * sizeof(ManifoldPoint)), 0);
+  }
+}
+
+// Of all pairs of a scene, by every variant that this machine has. Result: how many patches there are.
+std::size_t compare_variants(ManifoldScene& scene) {
+  scene.find();
+  std::vector<manifold::Shape> shapes;
+  for (const AssetView& view : scene.assets.views())
+    shapes.push_back(manifold::shape_of(*view.header, view.level()));
+  const std::span<const Contact> contacts = scene.query.contacts();
+  std::size_t patches = 0;
+  for (std::size_t first = 0, end = 0; first < contacts.size(); first = end) {
+    while (end < contacts.size() && contacts[end].pair == contacts[first].pair) ++end;
+    const ObjectPair pair = scene.query.pairs()[contacts[first].pair];
+    const Instance &a = scene.posed[pair.a], &b = scene.posed[pair.b];
+    const manifold::BodyPair bodies = {{shapes[a.asset], a.pose}, {shapes[b.asset], b.pose}};
+    const auto of_pair = contacts.subspan(first, end - first);
+    const PatchesOfPair plain = patches_of(manifold::OneThread(), bodies, of_pair);
+    patches += plain.patches.size();
+    for (const BlockPairVariant variant : kBlockPairVariants) {
+      const ManifoldMeans* const means = manifold_means(variant);
+      if (means == nullptr) continue;
+      SCOPED_TRACE(static_cast<int>(variant));
+      expect_same(plain, patches_of(MeansThread{{}, *means}, bodies, of_pair));
+    }
+  }
+  return patches;
+}
+
+TEST(ManifoldMeans, EveryVariantGivesTheSameBytes) {
+  std::size_t patches = 0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    ManifoldScene scene;
+    RandomPoses random(seed);
+    for (const Mesh& mesh : {cube(0.3f, 2), tetrahedron(), sphere(0.4, 3), pipe(12, 0.2, 0.4, 0.4f),
+                             sheet(1, 6), project_mesh("cow_1500.obj")}) {
+      scene.add_shape(mesh);
+    }
+    for (int i = 0; i < 40; ++i)
+      scene.add_body(static_cast<std::uint32_t>(random.below(6)), any_motion(random, 1));
+    patches += compare_variants(scene);
+  }
+  EXPECT_GT(patches, 500u);
+}
+
+TEST(ManifoldMeans, CornersInPlanesAreTheSameToo) {
+  std::size_t patches = 0;
+  for (const double far : {0.0, 1e4}) {
+    for (const int cells : {1, 3}) {
+      ManifoldScene scene;
+      scene.add_shape(cube(0.5f, cells));
+      scene.add_shape(sheet(3, 4));
+      for (int i = 0; i < 4; ++i) {
+        for (int j = 0; j < 3; ++j) scene.add_body(0, shift(far + i, 0.25 * j, j));
+      }
+      scene.add_body(1, shift(far, 0, 0));
+      scene.add_body(0, after(shift(far, 0, 2.9), turn(1, 0.3)));
+      patches += compare_variants(scene);
+    }
+  }
+  EXPECT_GT(patches, 40u);
+}
+
+}  // namespace
+}  // namespace tandem::test
+#endif

@@ -1,0 +1,379 @@
+#include "tandem/kernels/pair_filter.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <tuple>
+
+#include "filter_oracle.h"
+#include "kernels/common/worker_threads.h"
+#include "kernels/contact/contact_query_fixture.h"
+
+namespace tandem {
+namespace {
+
+using test::FilterArrays;
+using test::FilterOracle;
+using test::random_filter;
+
+using Boxes = std::vector<WorldBox>;
+using Pairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
+
+constexpr unsigned kAllParts = 15, kMotionPart = 1;
+
+Pairs brute_force(const Boxes& boxes, const FilterArrays& filter, bool self_pairs = false) {
+  const FilterOracle oracle(filter);
+  Pairs pairs;
+  for (std::uint32_t a = 0; a < boxes.size(); ++a) {
+    for (std::uint32_t b = self_pairs ? a : a + 1; b < boxes.size(); ++b) {
+      if (overlap(boxes[a], boxes[b]) && oracle.looks_at(a, b)) pairs.emplace_back(a, b);
+    }
+  }
+  return pairs;
+}
+
+Pairs pairs_of(const BroadPhase& broad_phase) {
+  Pairs pairs;
+  for (const ObjectPair& pair : broad_phase.pairs()) pairs.emplace_back(pair.a, pair.b);
+  return pairs;
+}
+
+// Boxes on a grid of quarters, so that many touch exactly; a huge one among them.
+Boxes scattered(std::size_t count, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  const double side = std::cbrt(static_cast<double>(count) + 1) / 1.5;
+  Boxes boxes(count);
+  for (WorldBox& box : boxes) {
+    for (int k = 0; k < 3; ++k) {
+      box.lo[k] = std::round(4 * side * uniform(random)) / 4;
+      box.hi[k] = box.lo[k] + std::round(4 * uniform(random)) / 4;
+    }
+  }
+  if (count > 100) boxes[count / 3] = {{-1e6, -1e6, -1e6}, {1e6, 1e6, 1e6}};
+  return boxes;
+}
+
+TEST(PairFilter, LooksAtPairsInWhichOneMovesAndAtKinematicOnesThatMeetSleepingOnes) {
+  constexpr Motion m = Motion::moving, f = Motion::fixed, k = Motion::kinematic, s = Motion::sleeping;
+  for (const auto& [a, b, meet] : {std::tuple{m, m, true},
+                                   {m, f, true},
+                                   {m, k, true},
+                                   {m, s, true},
+                                   {f, m, true},
+                                   {f, f, false},
+                                   {f, k, false},
+                                   {f, s, false},
+                                   {k, m, true},
+                                   {k, f, false},
+                                   {k, k, false},
+                                   {k, s, true},
+                                   {s, m, true},
+                                   {s, f, false},
+                                   {s, k, true},
+                                   {s, s, false}}) {
+    EXPECT_EQ(motions_meet(a, b), meet) << static_cast<int>(a) << " " << static_cast<int>(b);
+  }
+}
+
+TEST(PairFilter, EachMaskMustNameAGroupOfTheOther) {
+  EXPECT_TRUE(groups_meet(1, 2, 2, 1));
+  EXPECT_FALSE(groups_meet(1, 2, 2, 2));
+  EXPECT_FALSE(groups_meet(1, 1, 2, 1));
+  EXPECT_TRUE(groups_meet(0x80000000u, 0x80000000u, 0x80000000u, 0x80000000u));
+  EXPECT_FALSE(groups_meet(~0u, ~0u, 0, ~0u));
+  EXPECT_FALSE(groups_meet(~0u, 0, ~0u, ~0u));
+  const PairFilter none;
+  EXPECT_TRUE(none.looks_at(0, 1));
+  const std::uint32_t group[] = {0, 1};
+  PairFilter groups;
+  groups.group = group;
+  EXPECT_FALSE(groups.looks_at(0, 1));
+  EXPECT_TRUE(groups.looks_at(1, 1));
+}
+
+TEST(ExcludedPairTable, HoldsExactlyItsPairsInBothOrders) {
+  ExcludedPairTable table;
+  std::mt19937_64 random(5);
+  for (const std::size_t count : {0, 1, 2, 3, 4, 5, 1000, 100000}) {
+    // Few numbers, so that pairs come again; and the largest there are.
+    std::vector<ObjectPair> pairs;
+    std::set<std::pair<std::uint32_t, std::uint32_t>> expected;
+    const std::uint64_t numbers = 1 + static_cast<std::uint64_t>(std::sqrt(static_cast<double>(count)));
+    const auto any = [&] {
+      const auto i = static_cast<std::uint32_t>(random() % numbers);
+      return random() % 2 == 0 ? i : kNoIndex - 1 - i;
+    };
+    std::uint32_t last = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      pairs.push_back({any(), any()});
+      expected.insert(std::minmax(pairs[i].a, pairs[i].b));
+      last = std::max({last, pairs[i].a, pairs[i].b});
+    }
+    ASSERT_EQ(table.set(pairs), Status::kOk);
+    for (const auto& [a, b] : pairs) {
+      EXPECT_TRUE(table.view().contains(a, b));
+      EXPECT_TRUE(table.view().contains(b, a));
+    }
+    for (int i = 0; i < 1000; ++i) {
+      const std::uint32_t a = any(), b = any();
+      EXPECT_EQ(table.view().contains(a, b), expected.count(std::minmax(a, b)) == 1) << a << " " << b;
+    }
+    EXPECT_EQ(table.view().instances, count == 0 ? 0 : last + 1);
+    if (count == 0) continue;
+    const ObjectPair& blamed = pairs[table.view().row];
+    EXPECT_EQ(std::max(blamed.a, blamed.b), last);
+  }
+  const ObjectPair impossible[] = {{1, 2}, {3, kNoIndex}};
+  EXPECT_EQ(table.set(impossible), Status::kUnknownInstance);
+  EXPECT_FALSE(table.view().contains(1, 2));
+}
+
+TEST(BroadPhaseFilter, FindsThePairsOfBruteForceWhateverTheFilterTheWorkersAndWhatIsKept) {
+  BroadPhase broad_phase;
+  WorkerThreads threads;
+  ASSERT_TRUE(threads.provide(16));
+  std::size_t found = 0, left_out = 0;
+  for (const std::uint32_t count : {0u, 1u, 2u, 5u, 17u, 300u, 2500u}) {
+    const Boxes boxes = scattered(count, count);
+    for (unsigned parts = 0; parts <= kAllParts; ++parts) {
+      const FilterArrays filter = random_filter(count, parts, 100 * count + parts);
+      ExcludedPairTable table;
+      const PairFilter view = filter.view(table);
+      for (const bool self_pairs : {false, true}) {
+        const Pairs expected = brute_force(boxes, filter, self_pairs);
+        found += expected.size();
+        left_out += brute_force(boxes, {}, self_pairs).size() - expected.size();
+        for (const bool keep : {false, true}) {
+          broad_phase.forget_fixed();
+          std::uint64_t work = 0;
+          for (const std::uint32_t workers : {1u, 2u, 3u, 7u, 16u}) {
+            if (keep && !filter.motion.empty()) {
+              ASSERT_EQ(broad_phase.keep_fixed(boxes, filter.motion, threads, workers), Status::kOk);
+            }
+            ASSERT_EQ(broad_phase.find_pairs(boxes, view, self_pairs, threads, workers), Status::kOk);
+            EXPECT_EQ(pairs_of(broad_phase), expected)
+                << count << " boxes, filter " << parts << ", keep " << keep << ", " << workers << " workers";
+            EXPECT_TRUE(workers == 1 || broad_phase.group_pairs() == work);
+            work = broad_phase.group_pairs();
+          }
+        }
+      }
+    }
+  }
+  EXPECT_GT(found, 10000u);
+  EXPECT_GT(left_out, 10000u);
+}
+
+// Few free boxes beside many kept ones and the other way round: trees of all heights meet.
+TEST(BroadPhaseFilter, KeptTreesMayBeHigherOrLowerThanTheOthers) {
+  BroadPhase broad_phase;
+  for (const std::uint32_t count : {2u, 6u, 40u, 400u, 3000u}) {
+    const Boxes boxes = scattered(count, 7);
+    for (const std::uint32_t rare : {1u, 2u, 5u, 30u, 200u}) {
+      if (2 * rare > count) continue;
+      for (const bool few_fixed : {false, true}) {
+        FilterArrays filter;
+        for (std::uint32_t i = 0; i < count; ++i)
+          filter.motion.push_back((i % (count / rare) == 0) == few_fixed ? Motion::fixed : Motion::moving);
+        ExcludedPairTable table;
+        ASSERT_EQ(broad_phase.keep_fixed(boxes, filter.motion), Status::kOk);
+        ASSERT_EQ(broad_phase.find_pairs(boxes, filter.view(table)), Status::kOk);
+        EXPECT_EQ(pairs_of(broad_phase), brute_force(boxes, filter)) << count << " " << rare << few_fixed;
+        // Without a filter too, no pair of two that are kept is found.
+        ASSERT_EQ(broad_phase.find_pairs(boxes), Status::kOk);
+        EXPECT_EQ(pairs_of(broad_phase), brute_force(boxes, filter));
+      }
+    }
+  }
+}
+
+TEST(BroadPhaseFilter, LooksAtNoKeptBoxAgain) {
+  BroadPhase broad_phase;
+  const std::uint32_t count = 1000;
+  Boxes boxes = scattered(count, 3);
+  const FilterArrays filter = random_filter(count, kMotionPart, 3);
+  ExcludedPairTable table;
+  ASSERT_EQ(broad_phase.keep_fixed(boxes, filter.motion), Status::kOk);
+  const Pairs expected = brute_force(boxes, filter);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (filter.motion[i] == Motion::fixed) boxes[i].lo[0] = std::nan("");
+  }
+  ASSERT_EQ(broad_phase.find_pairs(boxes, filter.view(table)), Status::kOk);
+  EXPECT_EQ(pairs_of(broad_phase), expected);
+  broad_phase.forget_fixed();
+  EXPECT_EQ(broad_phase.find_pairs(boxes, filter.view(table)), Status::kOutOfRange);
+}
+
+// Work counted, not timed.
+TEST(BroadPhaseFilter, KeptBoxesThatNothingMeetsCostNextToNothing) {
+  BroadPhase broad_phase;
+  Boxes boxes = scattered(1000, 11);
+  ASSERT_EQ(broad_phase.find_pairs(boxes), Status::kOk);
+  const std::uint64_t alone = broad_phase.group_pairs();
+  std::vector<Motion> motion(boxes.size(), Motion::moving);
+  for (int i = 0; i < 100'000; ++i) {
+    const double x = 1.5e6 + i % 317, y = 1.5e6 + i / 317;
+    boxes.push_back({{x, y, -1}, {x + 1, y + 1, 0}});
+    motion.push_back(Motion::fixed);
+  }
+  PairFilter filter;
+  filter.motion = motion.data();
+  ASSERT_EQ(broad_phase.find_pairs(boxes, filter), Status::kOk);
+  const Pairs expected = pairs_of(broad_phase);
+  EXPECT_GT(broad_phase.group_pairs(), 20 * alone);
+  ASSERT_EQ(broad_phase.keep_fixed(boxes, motion), Status::kOk);
+  ASSERT_EQ(broad_phase.find_pairs(boxes, filter), Status::kOk);
+  EXPECT_EQ(pairs_of(broad_phase), expected);
+  EXPECT_LT(broad_phase.group_pairs(), alone + alone / 4);
+}
+
+TEST(BroadPhaseFilter, NamesWhatItCannotTakeAndKeepsNothingThen) {
+  BroadPhase broad_phase;
+  Boxes boxes = scattered(50, 1);
+  std::vector<Motion> motion(50, Motion::fixed);
+  EXPECT_EQ(broad_phase.keep_fixed(boxes, std::span(motion).first(49)), Status::kKeptMismatch);
+  ASSERT_EQ(broad_phase.keep_fixed(boxes, motion), Status::kOk);
+  EXPECT_EQ(broad_phase.kept_of(), 50u);
+  EXPECT_EQ(broad_phase.find_pairs(boxes), Status::kOk);
+  EXPECT_EQ(broad_phase.pairs().size(), 0u);
+  EXPECT_EQ(broad_phase.find_pairs(std::span(boxes).first(49)), Status::kKeptMismatch);
+  boxes[20].hi[1] = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(broad_phase.find_pairs(boxes), Status::kOk);
+  EXPECT_EQ(broad_phase.keep_fixed(boxes, motion), Status::kOutOfRange);
+  EXPECT_EQ(broad_phase.kept_of(), 0u);
+  boxes[20].hi[1] = 1;
+  ExcludedPairTable table;
+  const ObjectPair excluded[] = {{1, 2}, {50, 3}};
+  ASSERT_EQ(table.set(excluded), Status::kOk);
+  PairFilter filter;
+  filter.excluded = table.view();
+  EXPECT_EQ(broad_phase.find_pairs(boxes, filter), Status::kUnknownInstance);
+  ASSERT_EQ(broad_phase.keep_fixed({}, {}), Status::kOk);
+  EXPECT_EQ(broad_phase.find_pairs({}), Status::kOk);
+}
+
+class FilteredQuery : public Query {};
+
+// The contacts of the pairs that the oracle leaves, of all that a query without a filter finds.
+std::vector<Contact> left_by(const FilterArrays& filter, const ContactQuery& all) {
+  const FilterOracle oracle(filter);
+  std::vector<std::uint32_t> row;
+  std::uint32_t rows = 0;
+  for (const ObjectPair& pair : all.pairs())
+    row.push_back(oracle.looks_at(pair.a, pair.b) ? rows++ : kNoIndex);
+  std::vector<Contact> left;
+  for (Contact contact : all.contacts()) {
+    contact.pair = row[contact.pair];
+    if (contact.pair != kNoIndex) left.push_back(contact);
+  }
+  return left;
+}
+
+TEST_F(FilteredQuery, FindsTheContactsOfThePairsThatTheFilterLooksAt) {
+  const BodyScene scene = crowd(21, 150);
+  const auto count = static_cast<std::uint32_t>(scene.instances.size());
+  ContactQuery all, some, kept;
+  for (ContactQuery* query : {&all, &some, &kept})
+    ASSERT_EQ(query->set_assets(scene.assets.views()), Status::kOk);
+  for (const unsigned parts : {1u, 6u, 8u, kAllParts}) {
+    const FilterArrays filter = random_filter(count, parts, parts);
+    ExcludedPairTable table;
+    const PairFilter view = filter.view(table);
+    for (std::uint32_t threads = 1; threads <= 16; threads += 5) {
+      ContactOptions options;
+      options.threads = threads;
+      options.self_pairs = parts == kAllParts;
+      ASSERT_EQ(all.find_contacts(scene.instances, options), Status::kOk);
+      const std::vector<Contact> expected = left_by(filter, all);
+      EXPECT_FALSE(expected.empty());
+      EXPECT_LT(expected.size(), all.contacts().size());
+      options.filter = &view;
+      ASSERT_EQ(some.find_contacts(scene.instances, options), Status::kOk);
+      EXPECT_EQ(contacts_of(some), expected);
+      ASSERT_EQ(
+          kept.keep_fixed(scene.instances,
+                          filter.motion.empty() ? std::vector<Motion>(count, Motion::moving) : filter.motion,
+                          options),
+          Status::kOk);
+      ASSERT_EQ(kept.find_contacts(scene.instances, options), Status::kOk);
+      EXPECT_EQ(contacts_of(kept), expected);
+      EXPECT_EQ(kept.counters(), some.counters());
+    }
+  }
+}
+
+TEST_F(FilteredQuery, KeptInstancesStayWhereTheyWereUntilTheyAreKeptAnew) {
+  BodyScene scene = row_of_cubes(20);
+  std::vector<Motion> motion(20, Motion::fixed);
+  motion[4] = motion[11] = Motion::moving;
+  ASSERT_EQ(query_.set_assets(scene.assets.views()), Status::kOk);
+  ASSERT_EQ(query_.keep_fixed(scene.instances, motion), Status::kOk);
+  for (std::size_t i = 0; i < 20; ++i) {
+    if (motion[i] == Motion::fixed) scene.instances[i] = {77, at(std::nan(""), 0, 0)};
+  }
+  ASSERT_EQ(query_.find_contacts(scene.instances), Status::kOk);
+  EXPECT_EQ(pairs_of(query_), (Pairs{{3, 4}, {4, 5}, {10, 11}, {11, 12}}));
+  const std::size_t contacts = query_.contacts().size();
+  EXPECT_GT(contacts, 0u);
+  // Given pairs take what is kept too.
+  const ObjectPair given[] = {{5, 4}, {7, 6}};
+  ASSERT_EQ(query_.find_contacts(scene.instances, given, {}), Status::kOk);
+  EXPECT_EQ(query_.contacts().size(), contacts / 2);
+  scene.instances[11].pose.translation[2] = 5;
+  ASSERT_EQ(query_.find_contacts(scene.instances), Status::kOk);
+  EXPECT_EQ(query_.contacts().size(), contacts / 2);
+  scene.instances[11].asset = 1;
+  EXPECT_EQ(query_.find_contacts(scene.instances), Status::kUnknownAsset);
+  EXPECT_EQ(query_.where(), 11u);
+  EXPECT_EQ(query_.find_contacts(std::span(scene.instances).first(12)), Status::kKeptMismatch);
+  EXPECT_TRUE(query_.pairs().empty());
+  EXPECT_EQ(query_.keep_fixed(scene.instances, motion), Status::kUnknownAsset);
+  EXPECT_EQ(query_.where(), 0u);
+  EXPECT_EQ(query_.find_contacts(scene.instances), Status::kUnknownAsset);
+  EXPECT_EQ(query_.where(), 0u);
+  scene = row_of_cubes(20);
+  ASSERT_EQ(query_.keep_fixed(scene.instances, motion), Status::kOk);
+  ASSERT_EQ(query_.set_assets(scene.assets.views()), Status::kOk);
+  ASSERT_EQ(query_.find_pairs(scene.instances), Status::kOk);
+  EXPECT_EQ(query_.pairs().size(), 19u);
+}
+
+// The lines are those of docs/queries.md.
+TEST_F(FilteredQuery, IsAskedAsTheDocumentationShows) {
+  const BodyScene scene = row_of_cubes(3);
+  const std::vector<Instance>& bodies = scene.instances;
+  ContactQuery& query = query_;
+  ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+  const Motion motion[] = {Motion::fixed, Motion::moving, Motion::moving};  // of each instance
+  const ObjectPair joints[] = {{1, 2}};
+  ExcludedPairTable excluded;
+  Status status = excluded.set(joints);
+  const PairFilter filter = {.motion = motion, .excluded = excluded.view()};
+  if (status == Status::kOk) status = query.find_contacts(bodies, {.filter = &filter});
+  EXPECT_EQ(status, Status::kOk);
+  EXPECT_EQ(pairs_of(query), (Pairs{{0, 1}}));
+}
+
+TEST_F(FilteredQuery, NamesTheExcludedPairOfAnInstanceThatThereIsNot) {
+  const BodyScene scene = row_of_cubes(5);
+  ExcludedPairTable table;
+  const ObjectPair excluded[] = {{0, 1}, {5, 1}, {2, 3}};
+  ASSERT_EQ(table.set(excluded), Status::kOk);
+  PairFilter filter;
+  filter.excluded = table.view();
+  ContactOptions options;
+  options.filter = &filter;
+  ASSERT_EQ(query_.set_assets(scene.assets.views()), Status::kOk);
+  EXPECT_EQ(query_.find_contacts(scene.instances, options), Status::kUnknownInstance);
+  EXPECT_EQ(query_.where(), 1u);
+  ASSERT_EQ(table.set(std::span(excluded).first(1)), Status::kOk);
+  filter.excluded = table.view();
+  ASSERT_EQ(query_.find_contacts(scene.instances, options), Status::kOk);
+  EXPECT_EQ(pairs_of(query_), (Pairs{{1, 2}, {2, 3}, {3, 4}}));
+}
+
+}  // namespace
+}  // namespace tandem

@@ -1,0 +1,103 @@
+#include <BulletCollision/CollisionShapes/btTriangleIndexVertexArray.h>
+#include <BulletCollision/Gimpact/btGImpactShape.h>
+
+#include "library_engine.h"
+
+namespace tandem {
+namespace {
+
+/// A mesh, and Bullet's shape that looks at it.
+class BulletMesh {
+ public:
+  explicit BulletMesh(const LevelView& level)
+      : mesh_(index_mesh(level)),
+        triangles_(static_cast<int>(mesh_.triangle_count()), mesh_.corners.data(), 3 * sizeof(int),
+                   static_cast<int>(mesh_.vertex_count()), mesh_.vertices.data(), 3 * sizeof(float)),
+        shape_(&triangles_) {
+    shape_.setMargin(0);  // else triangles touch from afar
+    shape_.updateBound();
+    part_ = shape_.getMeshPart(0);
+    part_->lockChildShapes();  // for good: what btGImpactCollisionAlgorithm does around each pair
+  }
+  BulletMesh(const BulletMesh&) = delete;
+  BulletMesh& operator=(const BulletMesh&) = delete;
+  ~BulletMesh() { part_->unlockChildShapes(); }
+
+  const btGImpactMeshShapePart& part() const { return *part_; }
+
+ private:
+  IndexedMesh mesh_;
+  btTriangleIndexVertexArray triangles_;
+  btGImpactMeshShape shape_;
+  btGImpactMeshShapePart* part_;
+};
+
+btTransform transform(const Pose& pose) {
+  const auto cast = [](double x) { return static_cast<btScalar>(x); };
+  const auto& r = pose.rotation;
+  const btMatrix3x3 basis(cast(r[0][0]), cast(r[0][1]), cast(r[0][2]), cast(r[1][0]), cast(r[1][1]),
+                          cast(r[1][2]), cast(r[2][0]), cast(r[2][1]), cast(r[2][2]));
+  const double* t = pose.translation;
+  return btTransform(basis, btVector3(cast(t[0]), cast(t[1]), cast(t[2])));
+}
+
+/// The steps of btGImpactCollisionAlgorithm::collide_sat_triangles on one pair of triangles.
+bool triangles_collide(const btGImpactMeshShapePart& part_a, const btTransform& at_a, int triangle_a,
+                       const btGImpactMeshShapePart& part_b, const btTransform& at_b, int triangle_b) {
+  btPrimitiveTriangle a, b;
+  part_a.getPrimitiveTriangle(triangle_a, a);
+  part_b.getPrimitiveTriangle(triangle_b, b);
+  a.applyTransform(at_a);
+  b.applyTransform(at_b);
+  a.buildTriPlane();
+  b.buildTriPlane();
+  GIM_TRIANGLE_CONTACT contact;
+  return a.overlap_test_conservative(b) && a.find_triangle_collision_clip_method(b, contact);
+}
+
+class BulletEngine final : public LibraryEngine {
+ public:
+  std::string_view name() const override { return "bullet"; }
+  std::string label() const override { return "Bullet"; }
+  std::string settings() const override {
+    return "btGImpactMeshShape (quantised AABB trees), GImpact's own test of triangles, margin 0, float32";
+  }
+
+ private:
+  void clear_shapes() override { meshes_.clear(); }
+  void add_shape(const LevelView& level) override { meshes_.push_back(std::make_unique<BulletMesh>(level)); }
+
+  void place(std::span<const Pose> poses) override {
+    transforms_.clear();
+    for (const Pose& pose : poses) transforms_.push_back(transform(pose));
+  }
+
+  void collide(std::uint32_t pair, std::uint32_t a, std::uint32_t b) override {
+    const btGImpactMeshShapePart &part_a = part_of(a), &part_b = part_of(b);
+    const btTransform &at_a = transforms_[static_cast<int>(a)], &at_b = transforms_[static_cast<int>(b)];
+    found_.resize(0);
+    btGImpactBoxSet::find_collision(part_a.getBoxSet(), at_a, part_b.getBoxSet(), at_b, found_);
+    candidates_ += static_cast<std::uint64_t>(found_.size());
+    for (int i = 0; i < found_.size(); ++i) {
+      const int triangle_a = found_[i].m_index1, triangle_b = found_[i].m_index2;
+      if (!triangles_collide(part_a, at_a, triangle_a, part_b, at_b, triangle_b)) continue;
+      add_contact(pair, static_cast<std::uint32_t>(triangle_a), static_cast<std::uint32_t>(triangle_b));
+    }
+  }
+
+  const btGImpactMeshShapePart& part_of(std::uint32_t body) const {
+    return meshes_[shape_of()[body]]->part();
+  }
+
+  std::vector<std::unique_ptr<BulletMesh>> meshes_;
+  btAlignedObjectArray<btTransform> transforms_;
+  btPairSet found_;
+};
+
+}  // namespace
+
+std::unique_ptr<Engine> make_bullet(const ContactOptions&) {
+  return std::make_unique<BulletEngine>();
+}
+
+}  // namespace tandem

@@ -1,0 +1,76 @@
+#include "library_engine.h"
+
+#include <algorithm>
+#include <array>
+#include <map>
+
+namespace tandem {
+
+IndexedMesh index_mesh(const LevelView& level) {
+  IndexedMesh mesh;
+  std::map<std::array<float, 3>, int> index_of;
+  for (const Triangle& triangle : std::span(level.triangles, level.triangle_count)) {
+    for (const Triangle::Corner& corner : triangle.corner) {
+      const std::array<float, 3> position = {corner.position[0], corner.position[1], corner.position[2]};
+      const auto [found, is_new] = index_of.try_emplace(position, static_cast<int>(mesh.vertex_count()));
+      if (is_new) mesh.vertices.insert(mesh.vertices.end(), position.begin(), position.end());
+      mesh.corners.push_back(found->second);
+    }
+  }
+  return mesh;
+}
+
+void LibraryEngine::set_shapes(std::span<const AssetView> shapes) {
+  shapes_.assign(shapes.begin(), shapes.end());
+  shape_of_.clear();
+  broad_phase_.reset();
+  clear_shapes();
+  for (const AssetView& shape : shapes_) add_shape(shape.level());
+}
+
+void LibraryEngine::update(std::span<const BodyPose> bodies) {
+  bodies_ = bodies;
+  const std::vector<Pose> poses = stored_poses(bodies);
+  const auto same = [](const BodyPose& body, std::uint32_t shape) { return body.asset == shape; };
+  if (std::equal(bodies.begin(), bodies.end(), shape_of_.begin(), shape_of_.end(), same)) {
+    return place(poses);
+  }
+  shape_of_.clear();
+  for (const BodyPose& body : bodies) shape_of_.push_back(body.asset);
+  make_bodies(poses);
+}
+
+std::span<const ObjectPair> LibraryEngine::find_pairs() {
+  if (broad_phase_ == nullptr) {
+    broad_phase_ = std::make_unique<ContactQuery>();
+    require(broad_phase_->set_assets(shapes_), broad_phase_->where());
+  }
+  ContactOptions options;
+  options.filter = &filter_;
+  require(broad_phase_->find_pairs(bodies_, options), broad_phase_->where());
+  return broad_phase_->pairs();
+}
+
+void LibraryEngine::query(std::span<const ObjectPair> pairs) {
+  contacts_.clear();
+  candidates_ = 0;
+  for (std::uint32_t pair = 0; pair < pairs.size(); ++pair) collide(pair, pairs[pair].a, pairs[pair].b);
+}
+
+bool LibraryEngine::contacts(std::vector<TriangleContact>& found) {
+  found = contacts_;
+  return true;
+}
+
+// From the poses of the files' coordinates.
+std::vector<Pose> LibraryEngine::stored_poses(std::span<const BodyPose> bodies) const {
+  std::vector<Pose> poses;
+  poses.reserve(bodies.size());
+  for (const BodyPose& body : bodies) {
+    if (body.asset >= shapes_.size()) require(Status::kUnknownAsset, poses.size());
+    poses.push_back(for_stored_coordinates(body.pose, shapes_[body.asset].header->origin));
+  }
+  return poses;
+}
+
+}  // namespace tandem

@@ -1,0 +1,69 @@
+#pragma once
+#include <compare>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/stopwatch.h"
+#include "tandem/kernels/contact_query.h"
+#include "tandem/kernels/containment_query.h"
+#include "tandem/kernels/manifold.h"
+
+namespace tandem::bench {
+
+/// The answer of a query in the order of a contacts file, by source faces, so that the answers of different
+/// programs can be compared.
+struct ContactTable {
+  std::vector<ObjectPair> pairs;      ///< sorted; a < b, or a = b for an instance with itself
+  std::vector<std::uint32_t> pair;    ///< a row of pairs for each contact; contacts are sorted by pair,
+  std::vector<std::uint32_t> face_a;  ///< then face_a, source face of pairs[pair].a,
+  std::vector<std::uint32_t> face_b;  ///< then face_b; of an instance with itself face_a <= face_b
+};
+
+/// Each pair once, a <= b, sorted.
+std::vector<ObjectPair> normalised(std::span<const ObjectPair> pairs);
+
+/// Source faces that meet, of the instances in row `pair` of the object pairs.
+struct FaceContact {
+  std::uint32_t pair, face_a, face_b;
+
+  friend auto operator<=>(const FaceContact&, const FaceContact&) = default;
+};
+
+/// Condition on pairs: normalised.
+ContactTable make_table(std::span<const ObjectPair> pairs, std::vector<FaceContact> contacts);
+
+/// XXH64 of pairs, pair, face_a and face_b, one after the other, as little-endian 32-bit numbers.
+std::uint64_t hash_of(const ContactTable& table);
+
+/// How the contacts came about: the attributes of a contacts file.
+struct QueryRecord {
+  std::string mode, backend;
+  bool first_contact = false, self_pairs = false, given_pairs = false;
+  double within = 0;  ///< clearance
+  std::uint64_t threads = 1;
+  Seconds seconds;  ///< of each repeat, at least one
+  ContactCounters counters;
+};
+
+/// Contact manifolds that go with a ContactTable: Manifold::pair is a row of its pairs.
+struct ManifoldTable {
+  std::span<const Manifold> manifolds;
+  std::span<const ManifoldPoint> points;
+  ManifoldCounters counters;
+  Seconds seconds;  ///< of each repeat, at least one
+};
+
+/// Bodies within bodies: Containment::pair is a row of a ContactTable's pairs.
+struct ContainedTable {
+  std::span<const Containment> rows;
+  Seconds seconds;  ///< of each repeat, at least one
+};
+
+/// Writes a contacts file (docs/scenes.md), whole or not at all. manifolds, contained: or null. Throws
+/// OutputError.
+void write_contacts(const std::string& path, const ContactTable& table, const QueryRecord& record,
+                    const ManifoldTable* manifolds = nullptr, const ContainedTable* contained = nullptr);
+
+}  // namespace tandem::bench

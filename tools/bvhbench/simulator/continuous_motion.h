@@ -1,0 +1,53 @@
+#pragma once
+#include <span>
+#include <vector>
+
+#include "rigid_body.h"
+#include "tandem/kernels/impact_query.h"
+#include "tandem/kernels/manifold_query.h"
+
+namespace tandem::simulation {
+
+/// Keeps fast bodies from passing through others in a step: they are carried to where they first meet
+/// another body, a slop deep, so that the next step has a contact there and stops them. Where two touch
+/// already they go on until they are deeper in each other by a part of the thinner one's inner radius. What
+/// is left of the step's way is lost, velocities are not.
+///
+/// A body is fast where one of its points moves by more than half the inner radius of the thinnest closed
+/// shape: half the least side of its bounds. Steps without a fast body cost next to nothing.
+class ContinuousMotion {
+ public:
+  /// What the shapes look at must outlive it. Throws std::runtime_error where a shape cannot be taken.
+  ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads);
+
+  /// Takes back what of the way from `before` to `after` leads through other bodies. Throws
+  /// std::runtime_error where a query fails.
+  void limit(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
+             std::span<BodyState> after, double slop);
+
+ private:
+  double inner_radius(const BodyProperties& body) const { return inner_radius_[body.shape]; }
+  bool find_fast(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
+                 std::span<const BodyState> after);
+  bool stop(std::span<const BodyProperties> bodies, std::span<const BodyState> before, double slop);
+  double stop_of(const Impact& impact, const ObjectPair& pair, double reach, double slop) const;
+  double stop_of_touching(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
+                          const ObjectPair& pair, double reach, double slop);
+  double depth_at(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
+                  const ObjectPair& pair, double part);
+
+  ImpactQuery query_;
+  ContactQuery contacts_;
+  ManifoldQuery manifolds_;
+  std::vector<double> inner_radius_;  // of each shape; infinite where it is not closed
+  std::uint32_t threads_;
+
+  std::vector<Motion> fast_;           // moving: fast; fixed: not
+  std::vector<Eigen::Vector3d> turn_;  // of each body, in the whole step
+  std::vector<Eigen::Vector3d> way_;   // of its centre of mass
+  std::vector<double> part_, stop_;    // of both, that it goes; and of that, in a round
+  std::vector<Instance> instances_;
+  std::vector<RigidMotion> motion_;
+};
+
+}  // namespace tandem::simulation

@@ -1,0 +1,170 @@
+#include "run.h"
+
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+
+#include "bvhbench/scenes/hdf5_file.h"
+
+namespace tandem::simulation {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_between(Clock::time_point start, Clock::time_point end) {
+  return std::chrono::duration<double>(end - start).count();
+}
+
+volatile std::sig_atomic_t g_signal = 0;
+
+void take_note(int signal) {
+  g_signal = signal;
+}
+
+// While it lives, signals that ask a process to end are noted.
+class SignalNotes {
+ public:
+  SignalNotes() {
+    struct sigaction action {};
+    action.sa_handler = take_note;
+    g_signal = 0;
+    for (std::size_t i = 0; i < kSignals.size(); ++i) {
+      ::sigaction(kSignals[i], nullptr, &previous_[i]);
+      if (previous_[i].sa_handler != SIG_IGN) ::sigaction(kSignals[i], &action, nullptr);
+    }
+  }
+  ~SignalNotes() {
+    for (std::size_t i = 0; i < kSignals.size(); ++i) ::sigaction(kSignals[i], &previous_[i], nullptr);
+  }
+  SignalNotes(const SignalNotes&) = delete;
+  SignalNotes& operator=(const SignalNotes&) = delete;
+
+  bool any() const { return g_signal != 0; }
+
+  // Lets the signal do what it does to programs that take no note of it.
+  [[noreturn]] void obey() const {
+    const int signal = g_signal;
+    ::signal(signal, SIG_DFL);
+    ::raise(signal);
+    std::abort();
+  }
+
+ private:
+  static constexpr std::array<int, 3> kSignals = {SIGINT, SIGTERM, SIGHUP};
+  std::array<struct sigaction, kSignals.size()> previous_{};
+};
+
+// One line on a terminal.
+class ProgressLine {
+ public:
+  ProgressLine(std::string what, std::uint32_t steps) : what_(std::move(what)), steps_(steps) {}
+  ~ProgressLine() { clear(); }
+
+  void show(std::size_t made, const StepRecord& record) {
+    constexpr double kInterval = 0.2;
+    const Clock::time_point now = Clock::now();
+    if (first_ == 0) first_ = made;
+    if (!terminal_ || seconds_between(shown_, now) < kInterval) return;
+    shown_ = now;
+    const double each = seconds_between(start_, now) / static_cast<double>(made - first_ + 1);
+    std::fprintf(stderr,
+                 "\r\x1b[K%s: step %zu of %u, %.1f ms each, %.0f s left; %llu triangle pairs, %llu contacts, "
+                 "fastest %.3g m/s",
+                 what_.c_str(), made, steps_, 1e3 * each, each * static_cast<double>(steps_ - made),
+                 static_cast<unsigned long long>(record.triangle_pairs),
+                 static_cast<unsigned long long>(record.contacts), record.speed_max);
+    std::fflush(stderr);
+  }
+  void clear() {
+    if (terminal_) std::fputs("\r\x1b[K", stderr);
+  }
+
+ private:
+  bool terminal_ = ::isatty(STDERR_FILENO) == 1;
+  std::string what_;
+  std::uint32_t steps_;
+  std::size_t first_ = 0;
+  Clock::time_point start_ = Clock::now(), shown_ = start_;
+};
+
+// When to write next: writing takes at most a twentieth of the time.
+class Checkpoints {
+ public:
+  explicit Checkpoints(double interval) : interval_(interval) {}
+
+  bool is_due() const { return seconds_between(last_, Clock::now()) >= std::max(interval_, 20 * cost_); }
+
+  template <typename Write>
+  void write(const Write& write) {
+    const Clock::time_point start = Clock::now();
+    write();
+    last_ = Clock::now();
+    cost_ = seconds_between(start, last_);
+  }
+
+ private:
+  double interval_, cost_ = 0;
+  Clock::time_point last_ = Clock::now();
+};
+
+RunResults start(Simulator& simulator, const RunDescription& run, const RunOptions& options) {
+  const std::string part = part_file(options.output);
+  RunResults results;
+  if (options.resume && std::filesystem::exists(part)) {
+    results = read_run(part, run);
+    simulator.restore(results.state);
+  } else {
+    results.trajectory.every = options.trajectory_every;
+    results.trajectory.keep(0, simulator.states());
+  }
+  results.trajectory.every = options.trajectory_every;
+  return results;
+}
+
+}  // namespace
+
+std::string part_file(const std::string& output) {
+  return output + ".part";
+}
+
+RunResults run_simulation(Simulator& simulator, const RunDescription& run,
+                          const std::optional<Reentry>& reentry, const RunOptions& options) {
+  RunResults results = start(simulator, run, options);
+  const SignalNotes signals;
+  const std::string part = part_file(options.output);
+  ProgressLine progress(options.output, options.steps);
+  Checkpoints checkpoints(options.checkpoint_seconds);
+  const auto write = [&](const std::string& path) {
+    results.state = simulator.save();
+    write_run(path, run, results);
+  };
+  while (results.records.size() < options.steps) {
+    StepRecord record = simulator.step();
+    const auto made = static_cast<std::uint32_t>(results.records.size() + 1);
+    if (run.triangles > 0) {
+      record.contact_ratio = static_cast<double>(record.triangle_pairs) / static_cast<double>(run.triangles);
+    }
+    if (reentry) record.reentered = reentry->apply(simulator, made);
+    results.records.push_back(record);
+    results.trajectory.keep(made, simulator.states());
+    progress.show(made, record);
+    if (signals.any()) {
+      write(part);
+      progress.clear();
+      std::fprintf(stderr, "bvhbench: %s: stopped after step %u of %u; --resume goes on\n", part.c_str(),
+                   made, options.steps);
+      signals.obey();
+    }
+    if (checkpoints.is_due()) checkpoints.write([&] { write(part); });
+  }
+  write(options.output);
+  std::error_code none;  // there may be no part file
+  std::filesystem::remove(part, none);
+  return results;
+}
+
+}  // namespace tandem::simulation

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace tandem::economy {
 namespace {
@@ -11,6 +12,10 @@ namespace {
 Patch patch(std::uint32_t a, std::uint32_t b, double x, double depth, double degrees = 0) {
   const double angle = degrees * std::numbers::pi / 180;
   return {{a, b}, {std::sin(angle), 0, std::cos(angle)}, {x, 0, 0}, depth};
+}
+
+Difference between(std::vector<Patch> finest, std::vector<Patch> coarser) {
+  return difference({0, 0, {}, std::move(finest)}, {0, 0, {}, std::move(coarser)});
 }
 
 TEST(Spread, TellsWhatPartsOfTheNumbersAreAtMost) {
@@ -41,10 +46,8 @@ TEST(Difference, CountsPairsThatTouchAtOneLevelAlone) {
 }
 
 TEST(Difference, MatchesTheNearestManifoldsOfAPairWhateverTheirOrder) {
-  Findings finest, coarser;
-  finest.patches = {patch(0, 1, 0, 0.5), patch(0, 1, 10, 0.2), patch(2, 3, 0, 1)};
-  coarser.patches = {patch(2, 3, 0.1, 1.25, 3), patch(0, 1, 9, 0.3), patch(0, 1, 1, 0.5)};
-  const Difference found = difference(finest, coarser);
+  const Difference found = between({patch(0, 1, 0, 0.5), patch(0, 1, 10, 0.2), patch(2, 3, 0, 1)},
+                                   {patch(2, 3, 0.1, 1.25, 3), patch(0, 1, 9, 0.3), patch(0, 1, 1, 0.5)});
   EXPECT_EQ(found.matched, 3u);
   EXPECT_EQ(found.lost_patches + found.new_patches, 0u);
   EXPECT_NEAR(found.depth.mean, (0 + 0.1 + 0.25) / 3, 1e-15);
@@ -53,20 +56,15 @@ TEST(Difference, MatchesTheNearestManifoldsOfAPairWhateverTheirOrder) {
 }
 
 TEST(Difference, NeverMatchesManifoldsOfDifferentPairs) {
-  Findings finest, coarser;
-  finest.patches = {patch(0, 1, 0, 0.5)};
-  coarser.patches = {patch(0, 2, 0, 0.25)};
-  const Difference found = difference(finest, coarser);
+  const Difference found = between({patch(0, 1, 0, 0.5)}, {patch(0, 2, 0, 0.25)});
   EXPECT_EQ(found.matched, 0u);
   EXPECT_EQ(found.lost_patches, 1u);
   EXPECT_EQ(found.new_patches, 1u);
 }
 
 TEST(Difference, CountsTheWholeDepthOfAManifoldWithoutAMatch) {
-  Findings finest, coarser;
-  finest.patches = {patch(0, 1, 0, 0.5), patch(0, 1, 5, 0.01)};
-  coarser.patches = {patch(0, 1, 0, 0.5), patch(7, 8, 0, 0.125)};
-  const Difference found = difference(finest, coarser);
+  const Difference found =
+      between({patch(0, 1, 0, 0.5), patch(0, 1, 5, 0.01)}, {patch(0, 1, 0, 0.5), patch(7, 8, 0, 0.125)});
   EXPECT_EQ(found.matched, 1u);
   EXPECT_EQ(found.lost_patches, 1u);
   EXPECT_EQ(found.new_patches, 1u);
@@ -75,10 +73,8 @@ TEST(Difference, CountsTheWholeDepthOfAManifoldWithoutAMatch) {
 }
 
 TEST(Difference, OfASmallAngleKeepsItsDigits) {
-  Findings finest, coarser;
-  finest.patches = {patch(0, 1, 0, 0, 0)};
-  coarser.patches = {patch(0, 1, 0, 0, 1e-9)};
-  EXPECT_NEAR(difference(finest, coarser).angle.largest, 1e-9, 1e-18);
+  const Difference found = between({patch(0, 1, 0, 0, 0)}, {patch(0, 1, 0, 0, 1e-9)});
+  EXPECT_NEAR(found.angle.largest, 1e-9, 1e-18);
 }
 
 }  // namespace

@@ -6,9 +6,9 @@
 #include <filesystem>
 
 #include "bvhbench/scenes/contacts_file.h"
+#include "bvhbench/scenes/make_scene.h"
+#include "bvhbench/scenes/scene_file.h"
 #include "tandem/formats/hash.h"
-#include "tandem/kernels/broad_phase.h"
-#include "timed_work.h"
 
 namespace tandem::bench {
 namespace {
@@ -53,19 +53,13 @@ std::vector<ObjectPair> given_pairs(const std::string& path, const LoadedScene& 
 }
 
 std::vector<ObjectPair> found_pairs(const std::string& path, const LoadedScene& scene) {
-  std::vector<WorldBox> boxes;
-  for (const Instance& instance : scene.description.instances) {
-    const FileHeader& header = *scene.view(instance.asset).header;
-    boxes.push_back(
-        world_box(for_stored_coordinates(instance.pose, header.origin), header.lower, header.upper));
-  }
   ExcludedPairTable excluded;
-  BroadPhase broad_phase;
-  const PairFilter filter = scene.description.filter.view(excluded);
-  if (const Status status = broad_phase.find_pairs(boxes, filter); status != Status::kOk) {
-    throw FileError(path + ": " + explain(status));
+  try {
+    return find_box_pairs(scene.views(), scene.description.instances,
+                          scene.description.filter.view(excluded));
+  } catch (const std::runtime_error& error) {
+    throw FileError(path + ": " + error.what());
   }
-  return {broad_phase.pairs().begin(), broad_phase.pairs().end()};
 }
 
 void prepare(Engine& peer, const Frame& frame, PeerResult& result) {
@@ -107,7 +101,7 @@ std::uint64_t count_missing(const std::vector<TriangleContact>& a, const std::ve
   return difference.size();
 }
 
-std::size_t find_reference(std::span<const std::unique_ptr<Engine>> peers) {
+std::size_t find_reference(Peers peers) {
   const auto find = [&](const auto& matches) {
     return static_cast<std::size_t>(std::find_if(peers.begin(), peers.end(), matches) - peers.begin());
   };
@@ -127,20 +121,9 @@ void judge(SceneComparison& comparison, const std::vector<Contacts>& answers, st
   }
 }
 
-void race(std::span<const std::unique_ptr<Engine>> peers, const Frame& frame, unsigned repeats,
-          std::vector<PeerResult>& results) {
-  for (unsigned repeat = 0; repeat < repeats; ++repeat) {
-    for (std::size_t i = 0; i < peers.size(); ++i) {
-      if (peers[i]->is_reference()) continue;
-      results[i].query_seconds.push_back(seconds_of([&] { peers[i]->query(frame.pairs); }));
-    }
-  }
-}
-
 }  // namespace
 
-SceneComparison compare(const std::string& path, std::span<const std::unique_ptr<Engine>> peers,
-                        unsigned repeats) {
+SceneComparison compare(const std::string& path, Peers peers, unsigned repeats) {
   const LoadedScene scene = read_scene(path);
   check_instances(path, scene);
   const Frame frame = {scene, scene.views(),
@@ -160,7 +143,9 @@ SceneComparison compare(const std::string& path, std::span<const std::unique_ptr
   }
   judge(comparison, answers, find_reference(peers));
   answers.clear();
-  race(peers, frame, repeats, comparison.peers);
+  race(
+      peers, repeats, comparison.peers, [&](Engine& peer) { peer.query(frame.pairs); },
+      [](const Engine&, const PeerResult&) {});
   return comparison;
 }
 

@@ -1,22 +1,15 @@
 #pragma once
 #include <cstdint>
-#include <memory>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
-#include "bvhbench/engines/engine.h"
-#include "bvhbench/scenes/scene_file.h"
+#include "timed_work.h"
 
 namespace tandem::bench {
 
-/// What one peer did on one scene.
-struct PeerResult {
-  std::string name, settings;
-  double build_seconds = 0;        ///< once
-  double update_seconds = 0;       ///< each frame, best of up to three
-  Seconds query_seconds;           ///< each repeat; a single one for the reference
+/// What one peer did on one scene. Its update time is the best of up to three.
+struct PeerResult : PeerTimes {
   std::uint64_t memory_bytes = 0;  ///< held after build and update: heap growth, and what malloc does not see
   std::uint64_t work_bytes = 0;    ///< by which the first query made it grow: queues, results
   std::optional<std::uint64_t> contacts;          ///< nothing where the library does not tell
@@ -35,10 +28,8 @@ struct SceneComparison {
   std::vector<PeerResult> peers;
 };
 
-/// Runs a scene through the peers. Queries are repeated in turn, one peer after the other, so that a drifting
-/// machine drifts for all. The reference is CGAL, or Tandem exact without it. Throws FileError of a scene
-/// that cannot be compared, std::runtime_error of a peer.
-SceneComparison compare(const std::string& path, std::span<const std::unique_ptr<Engine>> peers,
-                        unsigned repeats);
+/// Runs a scene through the peers, whose queries are repeated in turn. The reference is CGAL, or Tandem exact
+/// without it. Throws FileError of a scene that cannot be compared, std::runtime_error of a peer.
+SceneComparison compare(const std::string& path, Peers peers, unsigned repeats);
 
 }  // namespace tandem::bench

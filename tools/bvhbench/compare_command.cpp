@@ -42,21 +42,22 @@ std::string processor() {
   return "unknown";
 }
 
-std::vector<std::unique_ptr<Engine>> chosen_peers(const std::vector<std::string>& chosen) {
-  std::vector<std::unique_ptr<Engine>> peers;
-  for (const std::string_view name : peer_names()) {
-    if (!chosen.empty() && std::find(chosen.begin(), chosen.end(), name) == chosen.end()) continue;
-    for (auto& peer : make_peers(name)) peers.push_back(std::move(peer));
-  }
-  return peers;
-}
-
 // Results are filed under the scenes' names.
 void check_names(const std::vector<std::string>& scenes) {
   std::set<std::string> names;
   for (const std::string& scene : scenes) {
     if (names.insert(std::filesystem::path(scene).stem().string()).second) continue;
     throw UsageError(scene + ": another scene has the same name");
+  }
+}
+
+// Calls compare(scene); ends the command where Tandem refuses the scene.
+template <typename Compare>
+auto compare_or_refuse(const std::string& scene, const Compare& compare) {
+  try {
+    return compare(scene);
+  } catch (const EngineError& error) {
+    refuse(scene, error.status, error.where);
   }
 }
 
@@ -67,7 +68,7 @@ ExitCode run_scenes(const CompareArguments& arguments, const std::string& option
     throw UsageError("--out and --peers are for contacts, so " + option + " does not go with them");
   Json results = Json::array();
   for (const std::string& scene : arguments.scenes) {
-    const auto compared = compare(scene);
+    const auto compared = compare_or_refuse(scene, compare);
     if (arguments.json) {
       results.push_back(to_json(compared));
       continue;
@@ -105,7 +106,8 @@ ExitCode run_compare(const CompareArguments& arguments) {
   const char* commit = std::getenv("TANDEM_COMMIT");
   CompareResults results = {processor(), commit == nullptr ? "" : commit, arguments.repeats, {}};
   for (const std::string& scene : arguments.scenes) {
-    results.scenes.push_back(compare(scene, chosen_peers(arguments.engines), arguments.repeats));
+    results.scenes.push_back(
+        compare(scene, make_peers(ContactOptions(), arguments.engines), arguments.repeats));
     if (arguments.json) continue;
     std::printf("%s%s", results.scenes.size() > 1 ? "\n" : "", to_text(results.scenes.back()).c_str());
     std::fflush(stdout);

@@ -4,10 +4,9 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "bvhbench/engines/distance_engine.h"
+#include "bvhbench/engines/registry.h"
 #include "command.h"
 #include "common/number_words.h"
-#include "timed_work.h"
 
 namespace tandem::bench {
 namespace {
@@ -17,18 +16,18 @@ struct CertifiedPairs {
   std::vector<double> lower, upper;
 };
 
-CertifiedPairs certified_pairs(const std::string& path, const LoadedScene& scene, double reach) {
-  DistanceQuery query;
-  Status status = query.set_assets(scene.views());
-  if (status == Status::kOk) status = query.find_distances(scene.description.instances, {.reach = reach});
-  if (status != Status::kOk) refuse(path, status, query.where());
+CertifiedPairs certified_pairs(const LoadedScene& scene, const std::vector<AssetView>& views, double reach) {
+  const auto engine = make_engine("tandem", DistanceOptions{.reach = reach});
+  engine->set_shapes(views);
+  engine->update(scene.description.instances);
+  const TimedDistances found = engine->time_distances({});
   CertifiedPairs out;
-  for (std::size_t i = 0; i < query.pairs().size(); ++i) {
-    const ObjectDistance& found = query.distances()[i];
-    if (found.upper == 0 || found.upper > reach) continue;
-    out.pairs.push_back(query.pairs()[i]);
-    out.lower.push_back(found.lower);
-    out.upper.push_back(found.upper);
+  for (std::size_t i = 0; i < found.pairs.size(); ++i) {
+    const ObjectDistance& distance = found.rows[i];
+    if (distance.upper == 0 || distance.upper > reach) continue;
+    out.pairs.push_back(found.pairs[i]);
+    out.lower.push_back(distance.lower);
+    out.upper.push_back(distance.upper);
   }
   return out;
 }
@@ -57,33 +56,29 @@ std::uint64_t triangles_of_pairs(const LoadedScene& scene, const std::vector<Obj
 DistanceComparison compare_distances(const std::string& path, double reach, unsigned repeats) {
   const LoadedScene scene = read_scene(path);
   const std::vector<AssetView> views = scene.views();
-  const CertifiedPairs pairs = certified_pairs(path, scene, reach);
+  const CertifiedPairs pairs = certified_pairs(scene, views, reach);
   DistanceComparison out;
   out.name = std::filesystem::path(path).stem().string();
   out.reach = reach;
   out.instances = scene.description.instances.size();
   out.object_pairs = pairs.pairs.size();
-  auto engines = distance_engines();
+  auto engines = make_peers(DistanceOptions());
   if (triangles_of_pairs(scene, pairs.pairs) > kMostReferenceTriangles)
     std::erase_if(engines, [](const auto& engine) { return engine->is_reference(); });
   for (const auto& engine : engines) {
-    DistancePeer peer;
+    DistancePeer& peer = out.peers.emplace_back();
     peer.name = engine->label();
     peer.settings = engine->settings();
     peer.build_seconds = seconds_of([&] { engine->set_shapes(views); });
     engine->update(scene.description.instances);
-    out.peers.push_back(peer);
   }
   std::vector<double> distances;
-  for (unsigned i = 0; i < repeats; ++i) {
-    for (std::size_t e = 0; e < engines.size(); ++e) {
-      if (i > 0 && engines[e]->is_reference()) continue;
-      DistancePeer& peer = out.peers[e];
-      peer.query_seconds.push_back(seconds_of([&] { engines[e]->find(pairs.pairs, distances); }));
-      peer.worst_error = worst_error(pairs, distances);
-      if (engines[e]->is_reference()) peer.outside = engines[e]->outside(pairs.lower, pairs.upper);
-    }
-  }
+  race(
+      engines, repeats, out.peers, [&](Engine& engine) { engine.find_distances(pairs.pairs, distances); },
+      [&](const Engine& engine, DistancePeer& peer) {
+        peer.worst_error = worst_error(pairs, distances);
+        if (engine.is_reference()) peer.outside = engine.outside(pairs.lower, pairs.upper);
+      });
   return out;
 }
 

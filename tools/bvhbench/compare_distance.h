@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "common/json.h"
-#include "common/stopwatch.h"
+#include "timed_work.h"
 
 namespace tandem::bench {
 
@@ -14,11 +14,8 @@ namespace tandem::bench {
 inline constexpr std::uint64_t kMostReferenceTriangles = 10'000'000;
 
 /// What one library did for the distances of a scene.
-struct DistancePeer {
-  std::string name, settings;
-  double build_seconds = 0;  ///< once
-  Seconds query_seconds;     ///< each repeat
-  double worst_error = 0;    ///< how far beyond the certified interval, relative to it, in the worst pair
+struct DistancePeer : PeerTimes {
+  double worst_error = 0;  ///< how far beyond the certified interval, relative to it, in the worst pair
   std::optional<std::uint64_t> outside;  ///< of the reference: intervals that do not hold its exact distance
 };
 

@@ -5,12 +5,10 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "bvhbench/engines/impact_engine.h"
+#include "bvhbench/engines/registry.h"
 #include "command.h"
 #include "common/number_words.h"
 #include "scene_motions.h"
-#include "tandem/kernels/contact_query.h"
-#include "timed_work.h"
 
 namespace tandem::bench {
 namespace {
@@ -37,10 +35,10 @@ void check_turns(const std::string& path, const std::vector<RigidMotion>& motion
 /// Looks for contacts of moving pairs at times in a step.
 class ContactSearch {
  public:
-  ContactSearch(const std::string& path, const LoadedScene& scene, const std::vector<AssetView>& views,
+  ContactSearch(const LoadedScene& scene, const std::vector<AssetView>& views,
                 const std::vector<RigidMotion>& motions, double duration)
-      : path_(path), instances_(scene.description.instances), motions_(motions), duration_(duration) {
-    if (const Status status = query_.set_assets(views); status != Status::kOk) refuse(path, status, 0);
+      : instances_(scene.description.instances), motions_(motions), duration_(duration) {
+    engine_->set_shapes(views);
   }
 
   /// The first of 151 times after `safe` at which one is found: soon after it, then at even times.
@@ -65,30 +63,31 @@ class ContactSearch {
     };
     const Instance two[] = {at(pair.a), at(pair.b)};
     const ObjectPair both[] = {{0, 1}};
-    const Status status = query_.find_contacts(two, both, {.first_contact_only = true});
-    if (status != Status::kOk) refuse(path_, status, query_.where());
-    return !query_.contacts().empty();
+    engine_->update(two);
+    engine_->query(both);
+    engine_->contacts(found_);
+    return !found_.empty();
   }
 
-  const std::string& path_;
   const std::vector<Instance>& instances_;
   const std::vector<RigidMotion>& motions_;
   const double duration_;
-  ContactQuery query_;
+  const std::unique_ptr<Engine> engine_ = make_engine("tandem", ContactOptions{.first_contact_only = true});
+  std::vector<TriangleContact> found_;
 };
 
-std::vector<KnownImpact> known_impacts(const std::string& path, const LoadedScene& scene,
-                                       const std::vector<AssetView>& views,
+std::vector<KnownImpact> known_impacts(const LoadedScene& scene, const std::vector<AssetView>& views,
                                        const std::vector<RigidMotion>& motions, double duration) {
-  ImpactQuery query;
-  Status status = query.set_assets(views);
-  if (status == Status::kOk) status = query.find(scene.description.instances, motions, duration);
-  if (status != Status::kOk) refuse(path, status, query.where());
-  ContactSearch search(path, scene, views, motions, duration);
+  const auto engine = make_engine("tandem", ImpactOptions());
+  engine->set_shapes(views);
+  engine->set_motion(motions, duration);
+  engine->update(scene.description.instances);
+  const TimedImpacts found = engine->time_impacts({});
+  ContactSearch search(scene, views, motions, duration);
   std::vector<KnownImpact> known;
-  for (std::size_t i = 0; i < query.pairs().size(); ++i) {
-    const Impact& impact = query.impacts()[i];
-    const ObjectPair& pair = query.pairs()[i];
+  for (std::size_t i = 0; i < found.pairs.size(); ++i) {
+    const Impact& impact = found.rows[i];
+    const ObjectPair& pair = found.pairs[i];
     if (impact.status == ImpactStatus::none) known.push_back({pair, INFINITY, INFINITY});
     if (impact.status == ImpactStatus::at_start) known.push_back({pair, 0, 0});
     if (impact.status == ImpactStatus::found)
@@ -123,7 +122,7 @@ ImpactComparison compare_impacts(const std::string& path, double duration, unsig
   const std::vector<AssetView> views = scene.views();
   const std::vector<RigidMotion> motions = motions_of(path, scene);
   check_turns(path, motions, duration);
-  const std::vector<KnownImpact> known = known_impacts(path, scene, views, motions, duration);
+  const std::vector<KnownImpact> known = known_impacts(scene, views, motions, duration);
   ImpactComparison out;
   out.name = std::filesystem::path(path).stem().string();
   out.duration = duration;
@@ -136,23 +135,19 @@ ImpactComparison compare_impacts(const std::string& path, double duration, unsig
     out.stopped += contact != 0 && std::isfinite(safe);
     out.in_contact += contact != 0 && std::isfinite(contact);
   }
-  const auto engines = impact_engines();
+  const auto engines = make_peers(ImpactOptions());
   for (const auto& engine : engines) {
-    ImpactPeer peer;
+    ImpactPeer& peer = out.peers.emplace_back();
     peer.name = engine->label();
     peer.settings = engine->settings();
     peer.build_seconds = seconds_of([&] { engine->set_shapes(views); });
-    peer.update_seconds = seconds_of([&] { engine->update(scene.description.instances, motions, duration); });
-    out.peers.push_back(peer);
+    engine->set_motion(motions, duration);
+    peer.update_seconds = seconds_of([&] { engine->update(scene.description.instances); });
   }
   std::vector<double> times;
-  for (unsigned i = 0; i < repeats; ++i) {
-    for (std::size_t e = 0; e < engines.size(); ++e) {
-      if (i > 0 && engines[e]->runs_once()) continue;
-      out.peers[e].query_seconds.push_back(seconds_of([&] { engines[e]->find(pairs, times); }));
-      if (i == 0) judge(known, times, duration, out.peers[e]);
-    }
-  }
+  race(
+      engines, repeats, out.peers, [&](Engine& engine) { engine.find_impacts(pairs, times); },
+      [&](const Engine&, ImpactPeer& peer) { judge(known, times, duration, peer); });
   return out;
 }
 

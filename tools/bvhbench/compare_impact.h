@@ -4,20 +4,17 @@
 #include <vector>
 
 #include "common/json.h"
-#include "common/stopwatch.h"
+#include "timed_work.h"
 
 namespace tandem::bench {
 
 /// What one library did for the times of impact of a scene. Judged by what Tandem certifies, no contact until
 /// then, and by contacts that its exact query finds later in the step.
-struct ImpactPeer {
-  std::string name, settings;
-  double build_seconds = 0, update_seconds = 0;  ///< once
-  Seconds query_seconds;                         ///< each repeat
-  std::uint64_t found = 0;                       ///< pairs with a time of impact
-  std::uint64_t invented = 0;                    ///< of them, those that surely have no contact in the step
-  std::uint64_t missed = 0;                      ///< pairs without one, though a contact was found
-  std::uint64_t late = 0;  ///< pairs whose time is after that of a contact that was found
+struct ImpactPeer : PeerTimes {
+  std::uint64_t found = 0;     ///< pairs with a time of impact
+  std::uint64_t invented = 0;  ///< of them, those that surely have no contact in the step
+  std::uint64_t missed = 0;    ///< pairs without one, though a contact was found
+  std::uint64_t late = 0;      ///< pairs whose time is after that of a contact that was found
   /// Of pairs with a time that is sure to be early or late: how much, in parts of the step.
   double median_early = 0, most_early = 0, most_late = 0;
 };

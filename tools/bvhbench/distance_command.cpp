@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <limits>
 #include <memory>
-#include <new>
 #include <thread>
 
 #include "backend.h"
@@ -39,39 +38,18 @@ struct Answer {
   GpuUse gpu;
 };
 
-void require(const std::string& scene, const DistanceQuery& query, Status status) {
-  if (status == Status::kOutOfMemory) throw std::bad_alloc();
-  if (status != Status::kOk) refuse(scene, status, query.where());
-}
-
-void run_on_cpu(const DistanceArguments& arguments, const BodiesApart& bodies, Answer& answer) {
-  DistanceOptions options = arguments.options;
-  options.filter = &bodies.filter;
-  DistanceQuery query;
-  require(arguments.scene, query, query.set_assets(bodies.shapes));
-  for (std::uint32_t i = 0; i < arguments.repeats; ++i) {
-    Stopwatch watch;
-    const Status status = bodies.given != nullptr
-                              ? query.find_distances(bodies.bodies, *bodies.given, options)
-                              : query.find_distances(bodies.bodies, options);
-    answer.record.seconds.push_back(watch.lap());
-    require(arguments.scene, query, status);
-  }
-  answer.record.counters = query.counters();
-  answer.pairs.assign(query.pairs().begin(), query.pairs().end());
-  answer.distances.assign(query.distances().begin(), query.distances().end());
-}
-
-void run_on_gpu(const DistanceArguments& arguments, const BodiesApart& bodies, Answer& answer) {
+// Asks as often as wanted; the answer is the last one, which is every one.
+TimedDistances ask(const DistanceArguments& arguments, const LoadedScene& scene) {
+  const SceneDescription& description = scene.description;
+  const std::vector<AssetView> shapes = scene.views();
+  const std::vector<ObjectPair> pairs = normalised(description.pairs.value_or(std::vector<ObjectPair>()));
+  ExcludedPairTable excluded;
   try {
-    TimedDistances timed = distances_on_gpu()(bodies, arguments.repeats);
-    answer.record.seconds = timed.seconds;
-    answer.record.counters = timed.counters;
-    answer.pairs = std::move(timed.pairs);
-    answer.distances = std::move(timed.distances);
-    answer.rounds = timed.rounds;
-    answer.nearest = timed.nearest;
-    answer.gpu = timed.gpu;
+    const auto engine = make_engine(arguments.on_gpu() ? "tandem-cuda" : "tandem", arguments.options);
+    engine->set_shapes(shapes);
+    engine->set_filter(description.filter.view(excluded));
+    engine->update(description.instances);
+    return engine->time_distances({description.pairs ? &pairs : nullptr, arguments.repeats});
   } catch (const EngineError& error) {
     refuse(arguments.scene, error.status, error.where);
   } catch (const GpuError& error) {
@@ -79,27 +57,22 @@ void run_on_gpu(const DistanceArguments& arguments, const BodiesApart& bodies, A
   }
 }
 
-// Runs the query as often as asked; the answer is the last run's, which is every run's.
 Answer run_query(const DistanceArguments& arguments, const LoadedScene& scene) {
-  const SceneDescription& description = scene.description;
-  const std::vector<AssetView> shapes = scene.views();
-  const std::vector<ObjectPair> pairs = normalised(description.pairs.value_or(std::vector<ObjectPair>()));
-  ExcludedPairTable excluded;
-  const DistanceOptions& options = arguments.options;
-  const BodiesApart bodies = {shapes,
-                              description.instances,
-                              options.tolerance,
-                              options.reach,
-                              description.pairs ? &pairs : nullptr,
-                              description.filter.view(excluded)};
+  TimedDistances timed = ask(arguments, scene);
   Answer answer;
   DistanceRecord& record = answer.record;
   record.backend = arguments.backend;
-  record.tolerance = options.tolerance;
-  record.reach = options.reach;
-  record.given_pairs = description.pairs.has_value();
-  record.threads = arguments.on_gpu() ? 0 : options.threads;
-  (arguments.on_gpu() ? run_on_gpu : run_on_cpu)(arguments, bodies, answer);
+  record.tolerance = arguments.options.tolerance;
+  record.reach = arguments.options.reach;
+  record.given_pairs = scene.description.pairs.has_value();
+  record.threads = arguments.on_gpu() ? 0 : arguments.options.threads;
+  record.seconds = timed.whole;
+  record.counters = timed.counters;
+  answer.pairs = std::move(timed.pairs);
+  answer.distances = std::move(timed.rows);
+  answer.rounds = timed.rounds;
+  answer.nearest = timed.narrow;
+  answer.gpu = timed.gpu;
   return answer;
 }
 

@@ -2,7 +2,6 @@
 
 #include <cstdio>
 #include <memory>
-#include <new>
 #include <thread>
 
 #include "backend.h"
@@ -57,37 +56,20 @@ ImpactTable table_of(std::span<const ObjectPair> pairs, std::span<const Impact> 
   return table;
 }
 
-// Runs the query as often as asked; the answer is every run's.
-ImpactTable run_on_cpu(const ImpactArguments& arguments, const MovingBodies& moving) {
-  ImpactOptions options = arguments.options;
-  options.filter = &moving.filter;
-  ImpactQuery query;
-  Seconds seconds;
-  Status status = query.set_assets(moving.shapes);
-  for (std::uint32_t i = 0; i < arguments.repeats && status == Status::kOk; ++i) {
-    Stopwatch watch;
-    status = moving.given != nullptr
-                 ? query.find(moving.bodies, moving.motion, moving.duration, *moving.given, options)
-                 : query.find(moving.bodies, moving.motion, moving.duration, options);
-    seconds.push_back(watch.lap());
-  }
-  if (status == Status::kOutOfMemory) throw std::bad_alloc();
-  if (status != Status::kOk) refuse(arguments.scene, status, query.where());
-  ImpactTable table = table_of(query.pairs(), query.impacts());
-  table.counters = query.counters();
-  table.seconds = seconds;
-  return table;
-}
-
-ImpactTable run_on_gpu(const ImpactArguments& arguments, const MovingBodies& moving) {
+// Asks as often as wanted; the answer is every one's.
+TimedImpacts ask(const ImpactArguments& arguments, const LoadedScene& scene,
+                 const std::vector<RigidMotion>& motion) {
+  const SceneDescription& description = scene.description;
+  const std::vector<AssetView> shapes = scene.views();
+  const std::vector<ObjectPair> pairs = normalised(description.pairs.value_or(std::vector<ObjectPair>()));
+  ExcludedPairTable excluded;
   try {
-    const TimedImpacts timed = impacts_on_gpu()(moving, arguments.repeats);
-    ImpactTable table = table_of(timed.pairs, timed.impacts);
-    table.counters = timed.counters;
-    table.seconds = timed.seconds;
-    table.rounds = timed.rounds;
-    table.gpu = timed.gpu;
-    return table;
+    const auto engine = make_engine(arguments.on_gpu() ? "tandem-cuda" : "tandem", arguments.options);
+    engine->set_shapes(shapes);
+    engine->set_filter(description.filter.view(excluded));
+    engine->set_motion(motion, arguments.duration);
+    engine->update(description.instances);
+    return engine->time_impacts({description.pairs ? &pairs : nullptr, arguments.repeats});
   } catch (const EngineError& error) {
     refuse(arguments.scene, error.status, error.where);
   } catch (const GpuError& error) {
@@ -96,20 +78,14 @@ ImpactTable run_on_gpu(const ImpactArguments& arguments, const MovingBodies& mov
 }
 
 ImpactTable run_query(const ImpactArguments& arguments, const LoadedScene& scene) {
-  const SceneDescription& description = scene.description;
-  const std::vector<AssetView> shapes = scene.views();
   const std::vector<RigidMotion> motion = motions_of(arguments.scene, scene);
-  const std::vector<ObjectPair> pairs = normalised(description.pairs.value_or(std::vector<ObjectPair>()));
-  ExcludedPairTable excluded;
-  const MovingBodies moving = {shapes,
-                               description.instances,
-                               motion,
-                               arguments.duration,
-                               arguments.options.tolerance,
-                               description.pairs ? &pairs : nullptr,
-                               description.filter.view(excluded)};
-  ImpactTable table = arguments.on_gpu() ? run_on_gpu(arguments, moving) : run_on_cpu(arguments, moving);
+  const TimedImpacts timed = ask(arguments, scene, motion);
+  ImpactTable table = table_of(timed.pairs, timed.rows);
   table.motion = motion;
+  table.counters = timed.counters;
+  table.seconds = timed.whole;
+  table.rounds = timed.rounds;
+  table.gpu = timed.gpu;
   return table;
 }
 

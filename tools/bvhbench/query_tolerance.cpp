@@ -1,7 +1,6 @@
 #include "query_tolerance.h"
 
 #include <cstdio>
-#include <new>
 
 #include "backend.h"
 #include "bvhbench/engines/registry.h"
@@ -19,32 +18,18 @@ struct Answer {
   VerdictRecord record;
 };
 
-void require(const std::string& scene, const ToleranceQuery& query, Status status) {
-  if (status == Status::kOutOfMemory) throw std::bad_alloc();
-  if (status != Status::kOk) refuse(scene, status, query.where());
-}
-
-TimedVerdicts time_on_cpu(const ToleranceArguments& arguments, const BodiesWithLevels& bodies) {
-  const ToleranceOptions options = {arguments.tolerance, arguments.threads, &bodies.filter};
-  ToleranceQuery query;
-  TimedVerdicts timed;
-  require(arguments.scene, query, query.set_assets(bodies.shapes));
-  for (std::uint32_t i = 0; i < arguments.repeats; ++i) {
-    Stopwatch watch;
-    const Status status = bodies.given != nullptr ? query.decide(bodies.bodies, *bodies.given, options)
-                                                  : query.decide(bodies.bodies, options);
-    timed.seconds.push_back(watch.lap());
-    require(arguments.scene, query, status);
-  }
-  timed.counters = query.counters();
-  timed.pairs.assign(query.pairs().begin(), query.pairs().end());
-  timed.verdicts.assign(query.verdicts().begin(), query.verdicts().end());
-  return timed;
-}
-
-TimedVerdicts time_on_gpu(const ToleranceArguments& arguments, const BodiesWithLevels& bodies) {
+TimedVerdicts ask(const ToleranceArguments& arguments, const LoadedScene& scene) {
+  const SceneDescription& description = scene.description;
+  const std::vector<AssetView> shapes = scene.finest_views();
+  const std::vector<ObjectPair> pairs = normalised(description.pairs.value_or(std::vector<ObjectPair>()));
+  ExcludedPairTable excluded;
   try {
-    return verdicts_on_gpu()(bodies, arguments.repeats);
+    const auto engine = make_engine(arguments.backend == "cuda" ? "tandem-cuda" : "tandem",
+                                    ToleranceOptions{arguments.tolerance, arguments.threads});
+    engine->set_shapes(shapes);
+    engine->set_filter(description.filter.view(excluded));
+    engine->update(description.instances);
+    return engine->time_verdicts({description.pairs ? &pairs : nullptr, arguments.repeats});
   } catch (const EngineError& error) {
     refuse(arguments.scene, error.status, error.where);
   } catch (const GpuError& error) {
@@ -53,20 +38,12 @@ TimedVerdicts time_on_gpu(const ToleranceArguments& arguments, const BodiesWithL
 }
 
 Answer answer_of(const ToleranceArguments& arguments, const LoadedScene& scene) {
-  const SceneDescription& description = scene.description;
-  const std::vector<AssetView> shapes = scene.finest_views();
-  const std::vector<ObjectPair> pairs = normalised(description.pairs.value_or(std::vector<ObjectPair>()));
-  ExcludedPairTable excluded;
-  const BodiesWithLevels bodies = {shapes, description.instances, arguments.tolerance,
-                                   description.pairs ? &pairs : nullptr, description.filter.view(excluded)};
-  const bool on_gpu = arguments.backend == "cuda";
-  Answer answer;
-  answer.timed = (on_gpu ? time_on_gpu : time_on_cpu)(arguments, bodies);
+  Answer answer = {ask(arguments, scene), {}};
   answer.record = {arguments.backend,
                    arguments.tolerance,
-                   description.pairs.has_value(),
-                   on_gpu ? 0 : arguments.threads,
-                   answer.timed.seconds,
+                   scene.description.pairs.has_value(),
+                   arguments.backend == "cuda" ? 0 : arguments.threads,
+                   answer.timed.whole,
                    answer.timed.counters};
   return answer;
 }
@@ -78,7 +55,7 @@ Json times(const Seconds& seconds) {
 // How many pairs the levels of their bodies decided, by those of a and of b.
 Json levels_of(const Answer& answer) {
   std::map<std::pair<int, int>, std::uint64_t> counted;
-  for (const PairVerdict& verdict : answer.timed.verdicts) ++counted[{verdict.level_a, verdict.level_b}];
+  for (const PairVerdict& verdict : answer.timed.rows) ++counted[{verdict.level_a, verdict.level_b}];
   Json levels = Json::array();
   for (const auto& [level, pairs] : counted)
     levels.push_back({{"level_a", level.first}, {"level_b", level.second}, {"pairs", pairs}});
@@ -106,7 +83,7 @@ Json to_json(const ToleranceArguments& arguments, const LoadedScene& scene, cons
                {"decided_at", levels_of(answer)},
                {"block_pairs", counters.work.block_pairs},
                {"candidates", counters.work.candidates},
-               {"hash", hexadecimal(hash_of(answer.timed.pairs, answer.timed.verdicts))},
+               {"hash", hexadecimal(hash_of(answer.timed.pairs, answer.timed.rows))},
                {"seconds", times(record.seconds)}};
   if (arguments.backend == "cuda") {
     json["gpu"] = answer.timed.gpu.name;
@@ -114,7 +91,7 @@ Json to_json(const ToleranceArguments& arguments, const LoadedScene& scene, cons
     json["gpu_bytes_bound"] = answer.timed.gpu.bytes_bound;
     json["gpu_bytes_taken"] = answer.timed.gpu.bytes_taken;
     json["upload_seconds"] = answer.timed.gpu.upload;
-    json["deciding_seconds"] = times(answer.timed.deciding);
+    json["deciding_seconds"] = times(answer.timed.narrow);
   }
   return json;
 }
@@ -144,9 +121,8 @@ void print_summary(const ToleranceArguments& arguments, const LoadedScene& scene
   print_row("block pairs", counters.work.block_pairs);
   print_row("candidates", counters.work.candidates);
   print_times("milliseconds", record.seconds);
-  if (record.backend == "cuda") print_times("  deciding", answer.timed.deciding);
-  std::printf("  %-16s %s\n", "hash",
-              hexadecimal(hash_of(answer.timed.pairs, answer.timed.verdicts)).c_str());
+  if (record.backend == "cuda") print_times("  deciding", answer.timed.narrow);
+  std::printf("  %-16s %s\n", "hash", hexadecimal(hash_of(answer.timed.pairs, answer.timed.rows)).c_str());
 }
 
 }  // namespace
@@ -159,7 +135,7 @@ ExitCode run_tolerance(const ToleranceArguments& arguments) {
   }
   const Answer answer = answer_of(arguments, scene);
   if (!arguments.out.empty())
-    write_verdicts(arguments.out, answer.timed.pairs, answer.timed.verdicts, answer.record);
+    write_verdicts(arguments.out, answer.timed.pairs, answer.timed.rows, answer.record);
   if (arguments.json) {
     std::puts(pretty(to_json(arguments, scene, answer)).c_str());
   } else {

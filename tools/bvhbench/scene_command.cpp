@@ -67,7 +67,7 @@ ExitCode run(const SceneArguments& arguments, const Maker& make) {
     scene.level = levels_of(arguments, scene.instances);
     scene.filter.motion = std::move(bodies.motion);
     ExcludedPairTable excluded;
-    pairs = count_box_pairs(assets, scene.instances, scene.filter.view(excluded));
+    pairs = find_box_pairs(assets, scene.instances, scene.filter.view(excluded)).size();
   } catch (const std::runtime_error& impossible) {
     throw UsageError(arguments.mesh + ": " + impossible.what());
   }

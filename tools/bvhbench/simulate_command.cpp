@@ -236,8 +236,9 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
   }
   const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, options.threads);
   arguments.contacts.threads = options.threads;
-  auto engine = make_engine(arguments.engine, {.mode = arguments.fast ? QueryMode::fast : QueryMode::exact,
-                                               .threads = options.threads});
+  auto engine = make_engine(arguments.engine,
+                            ContactOptions{.mode = arguments.fast ? QueryMode::fast : QueryMode::exact,
+                                           .threads = options.threads});
   std::unique_ptr<ContinuousMotion> continuous;
   if (arguments.continuous) continuous = std::make_unique<ContinuousMotion>(start.shapes(), options.threads);
   Simulator simulator(start.bodies.bodies, start.bodies.states,

@@ -1,6 +1,12 @@
 #pragma once
 #include <cfenv>
 #include <ctime>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "bvhbench/engines/engine.h"
 
 namespace tandem::bench {
 
@@ -31,6 +37,31 @@ double seconds_of(const Work& work) {
   const double start = thread_seconds();
   work();
   return thread_seconds() - start;
+}
+
+/// What every comparison tells of a peer.
+struct PeerTimes {
+  std::string name, settings;
+  double build_seconds = 0;   ///< once
+  double update_seconds = 0;  ///< each frame
+  Seconds query_seconds;      ///< each repeat; a single one for peers that run once
+};
+
+using Peers = std::span<const std::unique_ptr<Engine>>;
+
+/// Asks the peers in turn, so that a drifting machine drifts for all: calls ask(peer) `repeats` times, once
+/// for one that runs once and has no time yet, and adds what it took to the peer's result. Calls judge(peer,
+/// result) when the result has its first time.
+template <class Result, class Ask, class Judge>
+void race(Peers peers, unsigned repeats, std::vector<Result>& results, const Ask& ask, const Judge& judge) {
+  for (unsigned repeat = 0; repeat < repeats; ++repeat) {
+    for (std::size_t i = 0; i < peers.size(); ++i) {
+      Seconds& seconds = results[i].query_seconds;
+      if (peers[i]->runs_once() && !seconds.empty()) continue;
+      seconds.push_back(seconds_of([&] { ask(*peers[i]); }));
+      if (seconds.size() == 1) judge(*peers[i], results[i]);
+    }
+  }
 }
 
 }  // namespace tandem::bench

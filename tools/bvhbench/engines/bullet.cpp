@@ -10,7 +10,7 @@ namespace {
 class BulletMesh {
  public:
   explicit BulletMesh(const LevelView& level)
-      : mesh_(index_mesh(level)),
+      : mesh_(level),
         triangles_(static_cast<int>(mesh_.triangle_count()), mesh_.corners.data(), 3 * sizeof(int),
                    static_cast<int>(mesh_.vertex_count()), mesh_.vertices.data(), 3 * sizeof(float)),
         shape_(&triangles_) {
@@ -55,25 +55,23 @@ bool triangles_collide(const btGImpactMeshShapePart& part_a, const btTransform& 
   return a.overlap_test_conservative(b) && a.find_triangle_collision_clip_method(b, contact);
 }
 
-class BulletEngine final : public LibraryEngine {
+class BulletEngine final : public EngineWith<BulletMesh> {
  public:
-  std::string_view name() const override { return "bullet"; }
+  using EngineWith::EngineWith;
+
   std::string label() const override { return "Bullet"; }
   std::string settings() const override {
     return "btGImpactMeshShape (quantised AABB trees), GImpact's own test of triangles, margin 0, float32";
   }
 
  private:
-  void clear_shapes() override { meshes_.clear(); }
-  void add_shape(const LevelView& level) override { meshes_.push_back(std::make_unique<BulletMesh>(level)); }
-
   void place(std::span<const Pose> poses) override {
     transforms_.clear();
     for (const Pose& pose : poses) transforms_.push_back(transform(pose));
   }
 
   void collide(std::uint32_t pair, std::uint32_t a, std::uint32_t b) override {
-    const btGImpactMeshShapePart &part_a = part_of(a), &part_b = part_of(b);
+    const btGImpactMeshShapePart &part_a = shape(a).part(), &part_b = shape(b).part();
     const btTransform &at_a = transforms_[static_cast<int>(a)], &at_b = transforms_[static_cast<int>(b)];
     found_.resize(0);
     btGImpactBoxSet::find_collision(part_a.getBoxSet(), at_a, part_b.getBoxSet(), at_b, found_);
@@ -85,19 +83,14 @@ class BulletEngine final : public LibraryEngine {
     }
   }
 
-  const btGImpactMeshShapePart& part_of(std::uint32_t body) const {
-    return meshes_[shape_of()[body]]->part();
-  }
-
-  std::vector<std::unique_ptr<BulletMesh>> meshes_;
   btAlignedObjectArray<btTransform> transforms_;
   btPairSet found_;
 };
 
 }  // namespace
 
-std::unique_ptr<Engine> make_bullet(const ContactOptions&) {
-  return std::make_unique<BulletEngine>();
+std::unique_ptr<Engine> make_bullet(std::string_view name, const Question&) {
+  return std::make_unique<BulletEngine>(name);
 }
 
 }  // namespace tandem

@@ -1,12 +1,17 @@
 // CGAL 5.5 relies on another header for it, which has it no more in Boost 1.90.
 #include <boost/next_prior.hpp>
 
+#include <CGAL/AABB_traits.h>
+#include <CGAL/AABB_tree.h>
+#include <CGAL/AABB_triangle_primitive.h>
 #include <CGAL/Bbox_3.h>
 #include <CGAL/Exact_predicates_exact_constructions_kernel.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/box_intersection_d.h>
 
 #include <algorithm>
+#include <cmath>
+#include <stdexcept>
 #include <variant>
 
 #include "library_engine.h"
@@ -15,6 +20,24 @@ namespace tandem {
 namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Constructions = CGAL::Exact_predicates_exact_constructions_kernel;
+
+Kernel::Point_3 point(const double* p) {
+  return {p[0], p[1], p[2]};
+}
+Constructions::Point_3 exact(const Kernel::Point_3& p) {
+  return {p.x(), p.y(), p.z()};
+}
+
+/// Float64 corners in the world.
+PosedTriangle posed(const Pose& stored_pose, const Triangle& triangle) {
+  PosedTriangle out;
+  for (int i = 0; i < 3; ++i) {
+    const float* v = triangle.corner[i].position;
+    apply(stored_pose, v[0], v[1], v[2], out.corner[i]);
+  }
+  return out;
+}
 
 /// A posed triangle. `flat`: a segment or a point.
 struct ExactTriangle {
@@ -24,27 +47,20 @@ struct ExactTriangle {
 };
 
 ExactTriangle exact_triangle(std::uint32_t index, const PosedTriangle& posed) {
-  const auto point = [&](int i) {
-    return Kernel::Point_3(posed.corner[i][0], posed.corner[i][1], posed.corner[i][2]);
-  };
-  const Kernel::Point_3 p = point(0), q = point(1), r = point(2);
+  const Kernel::Point_3 p = point(posed.corner[0]), q = point(posed.corner[1]), r = point(posed.corner[2]);
   return {index, CGAL::collinear(p, q, r), Kernel::Triangle_3(p, q, r)};
 }
 
 // CGAL's intersection tests refuse flat triangles; these are dispatched as what they are.
 namespace flat {
 
-using Constructions = CGAL::Exact_predicates_exact_constructions_kernel;
 using Point = Constructions::Point_3;
 using Segment = Constructions::Segment_3;
 using Shape = std::variant<Point, Segment, Constructions::Triangle_3>;
 
 Shape shape(const ExactTriangle& t) {
   Point p[3];
-  for (int i = 0; i < 3; ++i) {
-    const Kernel::Point_3& corner = t.triangle[i];
-    p[i] = Point(corner.x(), corner.y(), corner.z());
-  }
+  for (int i = 0; i < 3; ++i) p[i] = exact(t.triangle[i]);
   if (!t.flat) return Constructions::Triangle_3(p[0], p[1], p[2]);
   std::sort(p, p + 3,
             [](const Point& x, const Point& y) { return CGAL::compare_xyz(x, y) == CGAL::SMALLER; });
@@ -72,15 +88,6 @@ bool meet(const ExactTriangle& a, const ExactTriangle& b) {
   if (!a.flat && !b.flat) return CGAL::do_intersect(a.triangle, b.triangle);
   return std::visit([](const auto& x, const auto& y) { return flat::meet(x, y); }, flat::shape(a),
                     flat::shape(b));
-}
-
-PosedTriangle posed(const Pose& stored_pose, const Triangle& triangle) {
-  PosedTriangle out;
-  for (int i = 0; i < 3; ++i) {
-    const float* v = triangle.corner[i].position;
-    apply(stored_pose, v[0], v[1], v[2], out.corner[i]);
-  }
-  return out;
 }
 
 CGAL::Bbox_3 box_of(const PosedTriangle& t) {
@@ -116,9 +123,10 @@ struct Reaching {
 };
 
 /// The answer that the others are held against: boxes compared in float64, triangles in exact arithmetic.
-class CgalEngine final : public LibraryEngine {
+class CgalContacts final : public EngineWith<LevelView> {
  public:
-  std::string_view name() const override { return "cgal"; }
+  using EngineWith::EngineWith;
+
   std::string label() const override { return "CGAL"; }
   std::string settings() const override {
     return "box_intersection_d over the posed float64 triangles, do_intersect with exact predicates";
@@ -126,18 +134,15 @@ class CgalEngine final : public LibraryEngine {
   bool is_reference() const override { return true; }
 
  private:
-  void clear_shapes() override { levels_.clear(); }
-  void add_shape(const LevelView& level) override { levels_.push_back(level); }
-
   void place(std::span<const Pose> poses) override {
     poses_.assign(poses.begin(), poses.end());
     boxes_.clear();
-    for (std::size_t i = 0; i < poses_.size(); ++i) boxes_.push_back(box_of(level_of(i), poses_[i]));
+    for (std::uint32_t i = 0; i < poses_.size(); ++i) boxes_.push_back(box_of(shape(i), poses_[i]));
   }
 
   void collide(std::uint32_t pair, std::uint32_t a, std::uint32_t b) override {
-    Reaching of_a(level_of(a), poses_[a], boxes_[b]);
-    Reaching of_b(level_of(b), poses_[b], boxes_[a]);
+    Reaching of_a(shape(a), poses_[a], boxes_[b]);
+    Reaching of_b(shape(b), poses_[b], boxes_[a]);
     const auto decide = [&](const TriangleBox& box_a, const TriangleBox& box_b) {
       ++candidates_;
       if (!meet(*box_a.handle(), *box_b.handle())) return;
@@ -147,17 +152,130 @@ class CgalEngine final : public LibraryEngine {
                              decide);
   }
 
-  const LevelView& level_of(std::size_t body) const { return levels_[shape_of()[body]]; }
-
-  std::vector<LevelView> levels_;
   std::vector<Pose> poses_;
   std::vector<CGAL::Bbox_3> boxes_;
 };
 
+using Triangles = std::vector<Kernel::Triangle_3>;
+using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
+using Tree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
+using BoxOfTriangle = CGAL::Box_intersection_d::Box_with_handle_d<double, 3, const Kernel::Triangle_3*>;
+
+Constructions::Triangle_3 exact(const Kernel::Triangle_3& t) {
+  return {exact(t[0]), exact(t[1]), exact(t[2])};
+}
+
+/// The triangles of a level in the world, with the float64 corners that "exact" refers to.
+Triangles posed(const Pose& stored_pose, const LevelView& level) {
+  Triangles triangles;
+  for (std::uint32_t i = 0; i < level.triangle_count; ++i) {
+    const ExactTriangle triangle = exact_triangle(i, posed(stored_pose, level.triangles[i]));
+    if (triangle.flat) throw std::runtime_error("CGAL has no distances of flat triangles");
+    triangles.push_back(triangle.triangle);
+  }
+  return triangles;
+}
+
+double squared_gap(const CGAL::Bbox_3& box, const Kernel::Point_3& p) {
+  double sum = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double gap = std::max({box.min(k) - p[k], p[k] - box.max(k), 0.0});
+    sum += gap * gap;
+  }
+  return sum;
+}
+
+/// The exact square of a distance that is least, or more: that of a corner of a and the triangle of b that
+/// the tree, in float64, takes for the nearest.
+Constructions::FT bound(const Triangles& a, const Tree& tree) {
+  const Kernel::Triangle_3* nearest = nullptr;
+  Kernel::Point_3 corner;
+  double least = INFINITY;
+  for (const Kernel::Triangle_3& triangle : a) {
+    for (int i = 0; i < 3; ++i) {
+      if (squared_gap(tree.bbox(), triangle[i]) >= least) continue;
+      const auto [point, primitive] = tree.closest_point_and_primitive(triangle[i]);
+      const double square = CGAL::squared_distance(point, triangle[i]);
+      if (square >= least) continue;
+      least = square;
+      nearest = &*primitive;
+      corner = triangle[i];
+    }
+  }
+  return CGAL::squared_distance(exact(corner), exact(*nearest));
+}
+
+/// The exact square of the distance of two surfaces: the least of all pairs of triangles with boxes that come
+/// within the bound of each other.
+Constructions::FT squared_distance(const Triangles& a, const Triangles& b) {
+  Tree tree(b.begin(), b.end());
+  Constructions::FT least = bound(a, tree);
+  const double reach = std::nextafter(std::sqrt(CGAL::to_interval(least).second), INFINITY);
+  std::vector<BoxOfTriangle> boxes_a, boxes_b;
+  for (const Kernel::Triangle_3& triangle : b) boxes_b.emplace_back(triangle.bbox(), &triangle);
+  for (const Kernel::Triangle_3& triangle : a) {
+    const CGAL::Bbox_3 box = triangle.bbox();
+    double lower[3], upper[3];
+    for (int k = 0; k < 3; ++k) {
+      lower[k] = std::nextafter(box.min(k) - reach, -INFINITY);
+      upper[k] = std::nextafter(box.max(k) + reach, INFINITY);
+    }
+    boxes_a.emplace_back(CGAL::Bbox_3(lower[0], lower[1], lower[2], upper[0], upper[1], upper[2]), &triangle);
+  }
+  CGAL::box_intersection_d(boxes_a.begin(), boxes_a.end(), boxes_b.begin(), boxes_b.end(),
+                           [&](const BoxOfTriangle& x, const BoxOfTriangle& y) {
+                             const Constructions::FT square =
+                                 CGAL::squared_distance(exact(*x.handle()), exact(*y.handle()));
+                             if (square < least) least = square;
+                           });
+  return least;
+}
+
+/// What other distances are held against: the least of the squares of the distances of triangles, in exact
+/// arithmetic.
+class CgalDistances final : public EngineWith<LevelView> {
+ public:
+  using EngineWith::EngineWith;
+
+  std::string label() const override { return "CGAL"; }
+  std::string settings() const override {
+    return "AABB_tree for a bound, squared_distance of triangles with exact constructions";
+  }
+  bool is_reference() const override { return true; }
+
+  void find_distances(std::span<const ObjectPair> pairs, std::vector<double>& distances) override {
+    squares_.clear();
+    LibraryEngine::find_distances(pairs, distances);
+  }
+
+  std::uint64_t outside(std::span<const double> lower, std::span<const double> upper) const override {
+    std::uint64_t count = 0;
+    for (std::size_t i = 0; i < squares_.size(); ++i) {
+      const Constructions::FT least(lower[i]), most(upper[i]);
+      if (squares_[i] < least * least || squares_[i] > most * most) ++count;
+    }
+    return count;
+  }
+
+ private:
+  void place(std::span<const Pose> poses) override { poses_.assign(poses.begin(), poses.end()); }
+
+  double distance(std::uint32_t a, std::uint32_t b) override {
+    squares_.push_back(squared_distance(triangles_of(a), triangles_of(b)));
+    return std::sqrt(CGAL::to_double(squares_.back()));
+  }
+
+  Triangles triangles_of(std::uint32_t body) const { return posed(poses_[body], shape(body)); }
+
+  std::vector<Pose> poses_;
+  std::vector<Constructions::FT> squares_;
+};
+
 }  // namespace
 
-std::unique_ptr<Engine> make_cgal(const ContactOptions&) {
-  return std::make_unique<CgalEngine>();
+std::unique_ptr<Engine> make_cgal(std::string_view name, const Question& question) {
+  if (std::holds_alternative<DistanceOptions>(question)) return std::make_unique<CgalDistances>(name);
+  return std::make_unique<CgalContacts>(name);
 }
 
 }  // namespace tandem

@@ -107,10 +107,10 @@ void decide(void* user, RTCCollision* found, unsigned count) {
 /// How the trees follow the bodies: made anew each frame, or their boxes fitted again.
 enum class Following { rebuild, refit };
 
-class EmbreeEngine final : public LibraryEngine {
+class EmbreeEngine final : public EngineWith<IndexedMesh> {
  public:
-  explicit EmbreeEngine(Following following)
-      : following_(following), device_(rtcNewDevice("threads=1,set_affinity=0")) {
+  EmbreeEngine(std::string_view name, Following following)
+      : EngineWith(name), following_(following), device_(rtcNewDevice("threads=1,set_affinity=0")) {
     if (device_ == nullptr) throw std::runtime_error("Embree: no device");
   }
   ~EmbreeEngine() override {
@@ -118,7 +118,6 @@ class EmbreeEngine final : public LibraryEngine {
     rtcReleaseDevice(device_);
   }
 
-  std::string_view name() const override { return rebuilds() ? "embree" : "embree-refit"; }
   std::string label() const override { return rebuilds() ? "Embree" : "Embree refit"; }
   std::string settings() const override {
     return std::string("rtcCollide, a world-space tree for every body, ") +
@@ -136,9 +135,8 @@ class EmbreeEngine final : public LibraryEngine {
 
   void clear_shapes() override {
     clear_bodies();
-    meshes_.clear();
+    EngineWith::clear_shapes();
   }
-  void add_shape(const LevelView& level) override { meshes_.push_back(index_mesh(level)); }
 
   void clear_bodies() {
     for (const EmbreeBody& body : bodies_) rtcReleaseScene(body.scene), rtcReleaseGeometry(body.geometry);
@@ -147,8 +145,8 @@ class EmbreeEngine final : public LibraryEngine {
   void make_bodies(std::span<const Pose> poses) override {
     clear_bodies();
     bodies_.resize(poses.size());
-    for (std::size_t i = 0; i < bodies_.size(); ++i) {
-      bodies_[i].mesh = &meshes_[shape_of()[i]];
+    for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
+      bodies_[i].mesh = &shape(i);
       bodies_[i].place(poses[i]);
       make_scene(bodies_[i]);
     }
@@ -194,18 +192,13 @@ class EmbreeEngine final : public LibraryEngine {
 
   Following following_;
   RTCDevice device_;
-  std::vector<IndexedMesh> meshes_;
   std::vector<EmbreeBody> bodies_;
 };
 
 }  // namespace
 
-std::unique_ptr<Engine> make_embree(const ContactOptions&) {
-  return std::make_unique<EmbreeEngine>(Following::rebuild);
-}
-
-std::unique_ptr<Engine> make_embree_refit(const ContactOptions&) {
-  return std::make_unique<EmbreeEngine>(Following::refit);
+std::unique_ptr<Engine> make_embree(std::string_view name, const Question&) {
+  return std::make_unique<EmbreeEngine>(name, name == "embree-refit" ? Following::refit : Following::rebuild);
 }
 
 }  // namespace tandem

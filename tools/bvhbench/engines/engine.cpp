@@ -46,6 +46,9 @@ void sort_contacts(std::vector<TriangleContact>& contacts) {
 
 }  // namespace
 
+void Engine::cannot(const char* what) const {
+  throw std::logic_error("the engine " + std::string(name_) + " was not made to " + what);
+}
 TimedAnswer Engine::time_query(const TimedQuery& asked) {
   TimedAnswer answer;
   std::span<const ObjectPair> pairs;
@@ -71,9 +74,9 @@ void Engine::find(std::span<const BodyPose> bodies, std::span<const std::uint8_t
   counters_ = {};
   Stopwatch watch;
   update(bodies);
-  motion_.clear();
-  for (const std::uint8_t rests : idle) motion_.push_back(rests != 0 ? Motion::fixed : Motion::moving);
-  set_filter({idle.empty() ? nullptr : motion_.data()});
+  idle_motion_.clear();
+  for (const std::uint8_t rests : idle) idle_motion_.push_back(rests != 0 ? Motion::fixed : Motion::moving);
+  set_filter({idle.empty() ? nullptr : idle_motion_.data()});
   times_.update = watch.lap();
   const std::span<const ObjectPair> pairs = find_pairs();
   found.pairs.assign(pairs.begin(), pairs.end());
@@ -93,15 +96,11 @@ std::span<const ObjectPair> Engine::find_pairs_and_query() {
   return pairs;
 }
 
-void Engine::make_manifolds(std::span<const ObjectPair>, TimedManifolds&) {
-  throw std::logic_error("an engine that makes no manifolds");
-}
-
 void Engine::require(Status status, std::uint64_t where) const {
   if (status == Status::kOk) return;
   if (status == Status::kOutOfMemory) throw std::bad_alloc();
   const std::string blamed = subject(status) != nullptr ? "body " + std::to_string(where) + ": " : "";
-  throw EngineError(std::string(name()) + ": " + blamed + explain(status), status, where);
+  throw EngineError(std::string(name_) + ": " + blamed + explain(status), status, where);
 }
 
 }  // namespace tandem

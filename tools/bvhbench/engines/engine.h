@@ -2,18 +2,27 @@
 #include <compare>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "common/stopwatch.h"
 #include "tandem/kernels/contact_query.h"
+#include "tandem/kernels/distance_query.h"
+#include "tandem/kernels/impact_query.h"
 #include "tandem/kernels/manifold.h"
+#include "tandem/kernels/tolerance_query.h"
 
 namespace tandem {
+
+/// What an engine is made to answer, with the options of that question: contacts, distances, impacts or
+/// verdicts. Options' filters are not looked at: Engine::set_filter() names the filter.
+using Question = std::variant<ContactOptions, DistanceOptions, ImpactOptions, ToleranceOptions>;
 
 /// A body: its shape, by place in the list given to set_shapes(), and where it stands. The pose speaks of the
 /// coordinates of the mesh file.
@@ -47,10 +56,12 @@ struct EngineTimes {
 /// The order of contacts in GPU memory: any, pair by pair, or, of pairs too, as a contacts file has it.
 enum class OrderOnGpu : std::uint8_t { any, grouped, sorted };
 
-/// What `bvhbench query` asks for.
+/// How a question is asked when it is timed.
 struct TimedQuery {
   const std::vector<ObjectPair>* given = nullptr;  ///< normalised; null: the engine finds the pairs
   std::uint32_t repeats = 1;
+
+  /// These are for contacts.
   OrderOnGpu order = OrderOnGpu::any;  ///< on a GPU
   bool traversal = false;              ///< on a GPU: the walk of the trees is timed alone too
   bool manifolds = false;              ///< contact manifolds are made of what each repeat finds, and timed
@@ -75,16 +86,33 @@ struct TimedManifolds {
   Seconds seconds;  ///< of each repeat, beside the query's
 };
 
-/// What a timed query found, and how long that took.
-struct TimedAnswer {
-  std::vector<ObjectPair> pairs;          ///< sorted
+/// The pairs that a timed question was about, and how long its repeats took.
+struct TimedRun {
+  std::vector<ObjectPair> pairs;  ///< sorted
+  Seconds whole;                  ///< the broad phase, where pairs are found, and the question
+  Seconds narrow;                 ///< on a GPU: the question without the broad phase
+  GpuUse gpu;                     ///< of engines on a GPU
+};
+
+/// The contacts that a timed query found.
+struct TimedAnswer : TimedRun {
   std::vector<TriangleContact> contacts;  ///< in no order
-  Seconds whole;                          ///< both steps, and what it takes to start them
-  Seconds broad_phase, narrow;            ///< the two steps where they are timed apart, as on a GPU
+  Seconds broad_phase;                    ///< where it is timed apart, as on a GPU
   Seconds traversal;                      ///< the walk of the same pairs, without triangle tests
   TimedManifolds manifolds;               ///< where they were asked for
-  GpuUse gpu;                             ///< of engines on a GPU
 };
+
+/// The answer to a question that has a row for each pair.
+template <typename RowOfPair, typename CountersOfRows>
+struct TimedRows : TimedRun {
+  using Row = RowOfPair;
+  std::vector<Row> rows;
+  CountersOfRows counters;
+  std::uint32_t rounds = 0;  ///< on a GPU: of block pairs, where the question counts them
+};
+using TimedDistances = TimedRows<ObjectDistance, DistanceCounters>;
+using TimedImpacts = TimedRows<Impact, ImpactCounters>;
+using TimedVerdicts = TimedRows<PairVerdict, ToleranceCounters>;
 
 /// A number that an engine counts, and its name.
 using Counter = std::pair<std::string, std::uint64_t>;
@@ -109,24 +137,32 @@ struct GpuError : std::runtime_error {
   std::string reason;  ///< what CUDA says of it, or the free memory where there is too little
 };
 
-/// Finds which triangles of which bodies meet. An engine is given shapes and then, as often as wanted, bodies
-/// and pairs of bodies. Functions throw EngineError, GpuError or std::bad_alloc where a call fails, and
-/// std::runtime_error where a library does not say more.
+/// A way to answer one question about bodies, Tandem's or another library's. An engine is given shapes and
+/// then, as often as wanted, bodies and pairs of bodies. Condition of each function of a question: the engine
+/// was made for that question, else it throws std::logic_error. Functions throw EngineError, GpuError or
+/// std::bad_alloc where a call fails, and std::runtime_error where a library does not say more.
 class Engine {
  public:
-  Engine() = default;
+  /// name: as the registry has it, whose text it refers to.
+  explicit Engine(std::string_view name) : name_(name) {}
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;
   virtual ~Engine() = default;
 
   /// Such as "embree-refit", as make_engine() knows it.
-  virtual std::string_view name() const = 0;
+  std::string_view name() const { return name_; }
 
-  /// The same for tables, with the mode: "Embree refit", "Tandem exact".
-  virtual std::string label() const { return std::string(name()); }
+  /// The name for tables, with the mode: "Embree refit", "Tandem exact".
+  virtual std::string label() const { return std::string(name_); }
 
   /// The data structure, the precision and whatever else the figures depend on, in a line.
   virtual std::string settings() const { return {}; }
+
+  /// Whether the answer is exact, found without Tandem's own code.
+  virtual bool is_reference() const { return false; }
+
+  /// Whether the engine is so slow that it is asked once and not raced.
+  virtual bool runs_once() const { return is_reference(); }
 
   /// Names the shapes that bodies refer to, and makes what lasts as long as they. What the views look at must
   /// outlive the engine's use.
@@ -136,8 +172,16 @@ class Engine {
   /// something for each body then start anew. `bodies` must stay until the next call.
   virtual void update(std::span<const BodyPose> bodies) = 0;
 
-  /// Which pairs find_pairs() finds from now on; at first all. Its arrays lie in CPU memory, have an entry
-  /// for each body, and must stay as long as pairs are asked for.
+  /// How the bodies of the next update() move in a step of `duration` seconds, for impacts. `motion` must
+  /// stay as long as they. Conditions: there is one for each of them; duration > 0; for engines that are not
+  /// Tandem's, no body turns by half a turn or more.
+  void set_motion(std::span<const RigidMotion> motion, double duration) {
+    motion_ = motion;
+    duration_ = duration;
+  }
+
+  /// Names the pairs that are found from now on; at first all. The arrays of the filter lie in CPU memory,
+  /// have an entry for each body, and must stay as long as pairs are asked for.
   void set_filter(const PairFilter& filter) { filter_ = filter; }
 
   /// Lets find_pairs() take the bodies that the filter calls fixed as they stand, until the next update(),
@@ -146,17 +190,18 @@ class Engine {
 
   /// Finds the pairs of bodies whose world boxes meet, and that the filter looks at: a < b, sorted. Valid
   /// until the next call of a function that is not const.
-  virtual std::span<const ObjectPair> find_pairs() = 0;
+  virtual std::span<const ObjectPair> find_pairs() { cannot("find pairs"); }
 
   /// Finds and keeps the contacts of these pairs, which may be those of find_pairs().
-  virtual void query(std::span<const ObjectPair> pairs) = 0;
+  virtual void query(std::span<const ObjectPair> /*pairs*/) { cannot("find contacts"); }
 
   /// Puts what the last query found into `found`, in no order, each once. Result: false where the library
   /// does not tell the triangles.
-  virtual bool contacts(std::vector<TriangleContact>& found) = 0;
+  virtual bool contacts(std::vector<TriangleContact>& /*found*/) { cannot("find contacts"); }
 
-  /// Finds pairs, where none are given, and contacts, `repeats` times, and tells what each took; fixed bodies
-  /// are kept before. Condition: update(); order, traversal and manifolds are for engines that have them.
+  /// Finds pairs, where none are given, and contacts, as often as asked, and tells what each took; fixed
+  /// bodies are kept before. Condition: update(); order, traversal and manifolds are for engines that have
+  /// them.
   virtual TimedAnswer time_query(const TimedQuery& asked);
 
   /// What a simulator asks for: update(), find_pairs(), query() and contacts(), in the order of a
@@ -164,11 +209,35 @@ class Engine {
   /// bodies are left out of both lists. The filter that there was is forgotten.
   void find(std::span<const BodyPose> bodies, std::span<const std::uint8_t> idle, ContactList& found);
 
-  /// Of the last find().
+  /// Puts the distance of each pair into `distances`; it is 0 or less where bodies meet.
+  virtual void find_distances(std::span<const ObjectPair> /*pairs*/, std::vector<double>& /*distances*/) {
+    cannot("find distances");
+  }
+
+  /// How many pairs of the last find_distances() have an exact distance that is not in [lower, upper], as
+  /// exact arithmetic decides. Condition: is_reference().
+  virtual std::uint64_t outside(std::span<const double> /*lower*/, std::span<const double> /*upper*/) const {
+    cannot("judge distances");
+  }
+
+  /// Puts the time when the bodies of each pair meet into `times`, in seconds; it is infinite where they do
+  /// not meet in the step. Condition: set_motion() before update().
+  virtual void find_impacts(std::span<const ObjectPair> /*pairs*/, std::vector<double>& /*times*/) {
+    cannot("find impacts");
+  }
+
+  /// Find pairs, where none are given, and answer the question for each of them, as often as asked. On a GPU
+  /// the question is run until everything has room, and each repeat is a graph that is replayed and timed by
+  /// events. Condition: update(), for impacts after set_motion().
+  virtual TimedDistances time_distances(const TimedQuery& /*asked*/) { cannot("time distances"); }
+  virtual TimedImpacts time_impacts(const TimedQuery& /*asked*/) { cannot("time impacts"); }
+  virtual TimedVerdicts time_verdicts(const TimedQuery& /*asked*/) { cannot("time verdicts"); }
+
+  /// What the phases of the last find() took.
   const EngineTimes& times() const { return times_; }
 
-  /// Of the last query. Counts that an engine does not keep as Tandem does are 0; after find(), object_pairs
-  /// and contacts are always there.
+  /// What the last query for contacts counted. Counts that an engine does not keep as Tandem does are 0;
+  /// after find(), object_pairs and contacts are always there.
   const ContactCounters& counters() const { return counters_; }
 
   /// What the engine counted in the last query, by names of its own.
@@ -177,16 +246,18 @@ class Engine {
   /// Memory held that malloc knows nothing of: mapped files, pages from the operating system.
   virtual std::uint64_t bytes_beside_heap() const { return 0; }
 
-  /// Whether contacts() is the exact answer, found without Tandem's own code; asked once, not raced.
-  virtual bool is_reference() const { return false; }
-
  protected:
-  /// find_pairs() and query() of these. Result: the pairs.
+  /// Calls find_pairs() and query() of these. Result: the pairs.
   virtual std::span<const ObjectPair> find_pairs_and_query();
 
   /// Makes contact manifolds of what the last query found between these pairs, which were its pairs. Adds the
-  /// seconds that it took. Throws std::logic_error of an engine that has none.
-  virtual void make_manifolds(std::span<const ObjectPair> pairs, TimedManifolds& made);
+  /// seconds that it took.
+  virtual void make_manifolds(std::span<const ObjectPair> /*pairs*/, TimedManifolds& /*made*/) {
+    cannot("make manifolds");
+  }
+
+  /// Throws std::logic_error. what: was asked of an engine that was not made for it.
+  [[noreturn]] void cannot(const char* what) const;
 
   /// Throws what a status other than kOk calls for. `where`: the body to blame, where there is one.
   void require(Status status, std::uint64_t where) const;
@@ -194,9 +265,24 @@ class Engine {
   EngineTimes times_;
   ContactCounters counters_;
   PairFilter filter_;
+  std::span<const RigidMotion> motion_;
+  double duration_ = 0;
 
  private:
-  std::vector<Motion> motion_;  // what find() makes of idle bodies
+  std::string_view name_;
+  std::vector<Motion> idle_motion_;  // what find() makes of idle bodies
 };
+
+/// Makes the engine for the question out of those of one way to answer all of them.
+template <typename Contacts, typename Distances, typename Impacts, typename Verdicts>
+std::unique_ptr<Engine> make_for(const Question& question, std::string_view name) {
+  if (const auto* distances = std::get_if<DistanceOptions>(&question))
+    return std::make_unique<Distances>(name, *distances);
+  if (const auto* impacts = std::get_if<ImpactOptions>(&question))
+    return std::make_unique<Impacts>(name, *impacts);
+  if (const auto* verdicts = std::get_if<ToleranceOptions>(&question))
+    return std::make_unique<Verdicts>(name, *verdicts);
+  return std::make_unique<Contacts>(name, std::get<ContactOptions>(question));
+}
 
 }  // namespace tandem

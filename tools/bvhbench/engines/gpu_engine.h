@@ -31,105 +31,104 @@ struct StagedArray {
   }
 };
 
-/// Throws what a call that failed calls for. name: of the engine; step: what was done.
-void check_on_gpu(const std::string& name, Status status, cudaError_t error, const char* step);
-
-/// Contacts in GPU memory.
-struct GpuContacts {
-  const Contact* data;
-  std::size_t count;
+/// What a question on a GPU takes of a scene.
+struct GpuNeeds {
+  Contents contents = Contents::all;  ///< of the shapes
+  bool all_levels = false;            ///< of each shape, not its first alone
+  bool finds_pairs = false;           ///< the question finds its pairs itself, without a broad phase before
+  double within = 0;                  ///< how far apart the boxes of pairs may be
 };
 
-/// A query behind Tandem's broad phase, both on the current GPU.
+/// A scene on the current GPU, and the pairs of its bodies: what engines there share, whatever the question.
 class GpuEngine : public Engine {
  public:
-  std::string_view name() const final { return name_; }
   void set_shapes(std::span<const AssetView> shapes) final;
   void update(std::span<const BodyPose> bodies) final;
   void keep_fixed() final;
   std::span<const ObjectPair> find_pairs() final;
-  void query(std::span<const ObjectPair> pairs) final;
-  bool contacts(std::vector<TriangleContact>& found) final;
-
-  /// The query runs until everything has room, then again for each repeat, timed by events.
-  TimedAnswer time_query(const TimedQuery& asked) final;
 
  protected:
-  /// contents: what it uploads of shapes; within: of clearance, how far apart the boxes of pairs may be.
   /// Throws GpuError where no GPU can be used.
-  GpuEngine(std::string_view name, Contents contents, double within = 0);
+  GpuEngine(std::string_view name, const GpuNeeds& needs);
 
   cudaStream_t stream() const { return stream_.get(); }
   std::span<const GpuAsset> shapes() const { return shapes_; }
   const GpuInstances& instances() const { return instances_; }
+  const RigidMotion* motion_on_gpu() const { return motions_.on_gpu.data(); }
 
   /// Throw what a call that failed calls for. `step`: what was done.
   void check(cudaError_t error, const char* step) const;
   void check(Status status, cudaError_t error, const char* step) const;
+  /// Throws what the call of a query calls for, whose status may name an instance or a pair.
+  template <typename Query>
+  void check(Status status, const Query& query, const char* step) const {
+    if (subject(status) != nullptr) require(status, query.report().where);
+    check(status, query.cuda_error(), step);
+  }
 
   /// Tells the query of shapes().
   virtual void name_shapes() = 0;
 
-  /// Finds the contacts of these pairs, of instances(), and waits for them.
-  virtual void ask(const GpuPairs& pairs, OrderOnGpu order) = 0;
+  /// Uploads the filter, which is in GPU memory until the next call.
+  const PairFilter& upload_filter();
 
-  /// What the last ask(), or repeat of it, found; sets counters_.
-  virtual GpuContacts found() = 0;
+  /// Finds the pairs that the filter looks at, until there is room for all.
+  void find_pairs_on_gpu(bool sorted);
+  /// Queues that again.
+  void enqueue_broad_phase(bool sorted);
+  /// The pairs that were found, and how many there are.
+  GpuPairs pairs_found() const { return broad_phase_.pairs(); }
+  std::uint32_t count_found() const { return broad_phase_.report().count; }
+  /// Whether these are all that find_pairs() found, which lie on the GPU already.
+  bool are_on_gpu(std::span<const ObjectPair> pairs) const;
 
-  /// Queues on stream() what comes before a query: the pairs, and an event that is recorded with these flags.
-  using Before = std::function<void(unsigned event_flags)>;
+  /// Queues the copy of pairs.
+  GpuPairs upload(std::span<const ObjectPair> pairs);
 
-  /// What queues `before` and the query of these pairs once more. Conditions: ask() of the same went well;
-  /// what `before` looks at stays.
-  virtual std::function<void()> repeatable(const GpuPairs& pairs, OrderOnGpu order, const Before& before) = 0;
+  /// Whether the broad phase finds the pairs that the question is about.
+  bool has_broad_phase(const TimedQuery& asked) const {
+    return asked.given == nullptr && !needs_.finds_pairs;
+  }
+  /// Uploads the pairs that are given, or finds them; none where the question does.
+  GpuPairs pairs_of(const TimedQuery& asked, bool sorted);
 
-  /// The same with contact manifolds of what the query finds, behind `between`. Engines that have none throw.
-  virtual std::function<void()> repeatable_with_manifolds(const GpuPairs& pairs, OrderOnGpu order,
-                                                          const Before& before, const Before& between);
-
-  /// What the last repeat of these made, their rows those of the GPU's pairs.
-  virtual void take_manifolds(TimedManifolds&) {}
-
-  /// Times the walk of the trees alone.
-  virtual Seconds time_walk(const GpuPairs&, std::uint32_t) { return {}; }
-
-  /// GPU memory of the query, and what its rule says it is at most; 0: there is no rule.
-  virtual std::size_t query_bytes() const = 0;
-  virtual std::size_t most_bytes(OrderOnGpu) const { return 0; }
+  /// Captures what `work` queues. Result: replays the graph.
+  std::function<void()> captured(const std::function<void()>& work);
 
   /// Runs what `run` queues, and tells the seconds from `begin` to `end`.
   void run_between(const GpuEvent& begin, const std::function<void()>& run, const GpuEvent& end) const;
   double seconds_between(const GpuEvent& begin, const GpuEvent& end) const;
+  Seconds time_repeats(std::uint32_t repeats, const std::function<void()>& run) const;
+
+  /// Tells what was taken of the GPU. bytes, bound: of the query alone, and what its rule and that of the
+  /// broad phase say that both take at most; 0: there is no rule.
+  GpuUse use(const TimedQuery& asked, std::size_t bytes, std::size_t bound) const;
+  const GpuBroadPhase& broad_phase() const { return broad_phase_; }
 
  private:
   GpuAssetBounds bounds() const;
   GpuBroadPhaseOptions broad_phase_options(bool sorted) const;
+  template <typename Elements, typename Element, typename Get>
+  void stage(const Elements& elements, StagedArray<Element>& array, const char* step, const Get& get);
   template <typename Element>
   const Element* upload_of_each(const Element* of_each, StagedArray<Element>& array);
-  void upload_filter();
-  void find_pairs_on_gpu(bool sorted);
-  GpuPairs upload(std::span<const ObjectPair> pairs);
-  void time_repeats(const GpuPairs& pairs, const TimedQuery& asked, TimedAnswer& answer);
-  void take(const GpuPairs& pairs, const GpuContacts& contacts, OrderOnGpu order, TimedAnswer& answer) const;
   std::size_t scene_bytes(const TimedQuery& asked) const;
-  GpuUse use(const TimedQuery& asked) const;
 
-  std::string name_;
-  Contents contents_;
-  double within_;
+  GpuNeeds needs_;
   std::size_t free_at_start_ = 0;
   double upload_of_shapes_ = 0, upload_of_bodies_ = 0;  // seconds
   GpuStream stream_;
   DeviceAssets uploaded_;
   std::vector<GpuAsset> shapes_;
+  std::uint32_t bounds_count_ = 0;
   StagedArray<AssetBounds> bounds_;
   StagedArray<std::uint32_t> shape_of_, pair_count_;
   StagedArray<Pose> poses_;
+  StagedArray<RigidMotion> motions_;
   StagedArray<ObjectPair> given_pairs_;
   PinnedArray<ObjectPair> found_pairs_;
-  PinnedArray<Contact> contacts_;
   GpuInstances instances_ = {};
-  StagedArray<Motion> motion_;
+  StagedArray<Motion> filter_motion_;
   StagedArray<std::uint32_t> group_, mask_;
   GpuExcludedPairs excluded_;
   PairFilter filter_on_gpu_;

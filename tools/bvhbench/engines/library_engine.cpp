@@ -6,18 +6,16 @@
 
 namespace tandem {
 
-IndexedMesh index_mesh(const LevelView& level) {
-  IndexedMesh mesh;
+IndexedMesh::IndexedMesh(const LevelView& level) {
   std::map<std::array<float, 3>, int> index_of;
   for (const Triangle& triangle : std::span(level.triangles, level.triangle_count)) {
     for (const Triangle::Corner& corner : triangle.corner) {
       const std::array<float, 3> position = {corner.position[0], corner.position[1], corner.position[2]};
-      const auto [found, is_new] = index_of.try_emplace(position, static_cast<int>(mesh.vertex_count()));
-      if (is_new) mesh.vertices.insert(mesh.vertices.end(), position.begin(), position.end());
-      mesh.corners.push_back(found->second);
+      const auto [found, is_new] = index_of.try_emplace(position, static_cast<int>(vertex_count()));
+      if (is_new) vertices.insert(vertices.end(), position.begin(), position.end());
+      corners.push_back(found->second);
     }
   }
-  return mesh;
 }
 
 void LibraryEngine::set_shapes(std::span<const AssetView> shapes) {
@@ -60,6 +58,22 @@ void LibraryEngine::query(std::span<const ObjectPair> pairs) {
 bool LibraryEngine::contacts(std::vector<TriangleContact>& found) {
   found = contacts_;
   return true;
+}
+
+void LibraryEngine::find_distances(std::span<const ObjectPair> pairs, std::vector<double>& distances) {
+  distances.clear();
+  for (const auto& [a, b] : pairs) distances.push_back(distance(a, b));
+}
+
+void LibraryEngine::find_impacts(std::span<const ObjectPair> pairs, std::vector<double>& times) {
+  times.clear();
+  for (const auto& [a, b] : pairs) times.push_back(impact(a, b));
+}
+
+Pose LibraryEngine::end_of_step(std::uint32_t body) const {
+  const BodyPose& at_start = bodies_[body];
+  return for_stored_coordinates(pose_at(at_start.pose, motion_[body], duration_),
+                                shapes_[at_start.asset].header->origin);
 }
 
 // From the poses of the files' coordinates.

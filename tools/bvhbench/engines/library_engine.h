@@ -8,6 +8,8 @@ namespace tandem {
 /// An asset's level 0 as other libraries take it: corners that coincide share a vertex; triangles in leaf
 /// order.
 struct IndexedMesh {
+  explicit IndexedMesh(const LevelView& level);
+
   std::vector<float> vertices;  ///< x y z, stored coordinates
   std::vector<int> corners;     ///< three for each triangle
 
@@ -15,22 +17,24 @@ struct IndexedMesh {
   std::size_t triangle_count() const { return corners.size() / 3; }
 };
 
-IndexedMesh index_mesh(const LevelView& level);
-
 /// Float64 corners in the world: the definition that "exact" refers to.
 struct PosedTriangle {
   double corner[3][3];
 };
 
 /// Someone else's collision library, on one thread, which Tandem's broad phase on the CPU tells the pairs of
-/// bodies.
+/// bodies. It says how a pair is asked, by the function of its question: collide(), distance() or impact().
 class LibraryEngine : public Engine {
  public:
+  using Engine::Engine;
+
   void set_shapes(std::span<const AssetView> shapes) final;
   void update(std::span<const BodyPose> bodies) final;
   std::span<const ObjectPair> find_pairs() final;
   void query(std::span<const ObjectPair> pairs) override;
   bool contacts(std::vector<TriangleContact>& found) override;
+  void find_distances(std::span<const ObjectPair> pairs, std::vector<double>& distances) override;
+  void find_impacts(std::span<const ObjectPair> pairs, std::vector<double>& times) final;
   std::vector<Counter> named_counters() const override { return {{"candidates", candidates_}}; }
 
  protected:
@@ -47,10 +51,21 @@ class LibraryEngine : public Engine {
   virtual void place(std::span<const Pose> poses) = 0;
 
   /// Adds the contacts of bodies a and b to contacts_, and what was looked at to candidates_.
-  virtual void collide(std::uint32_t pair, std::uint32_t a, std::uint32_t b) = 0;
+  virtual void collide(std::uint32_t /*pair*/, std::uint32_t /*a*/, std::uint32_t /*b*/) {
+    cannot("find contacts");
+  }
+
+  /// The distance of bodies a and b, 0 or less where they meet.
+  virtual double distance(std::uint32_t /*a*/, std::uint32_t /*b*/) { cannot("find distances"); }
+
+  /// When bodies a and b meet, in seconds; infinite where they do not.
+  virtual double impact(std::uint32_t /*a*/, std::uint32_t /*b*/) { cannot("find impacts"); }
 
   /// The shape of each body.
   std::span<const std::uint32_t> shape_of() const { return shape_of_; }
+
+  /// Where a body is at the end of the step; the pose speaks of stored coordinates.
+  Pose end_of_step(std::uint32_t body) const;
 
   void add_contact(std::uint32_t pair, std::uint64_t triangle_a, std::uint64_t triangle_b) {
     contacts_.push_back(
@@ -67,6 +82,22 @@ class LibraryEngine : public Engine {
   std::vector<AssetView> shapes_;
   std::vector<std::uint32_t> shape_of_;
   std::unique_ptr<ContactQuery> broad_phase_;  ///< made when pairs are asked for
+};
+
+/// A library that keeps a Shape, made of a level, of each shape.
+template <typename Shape>
+class EngineWith : public LibraryEngine {
+ public:
+  using LibraryEngine::LibraryEngine;
+
+ protected:
+  const Shape& shape(std::uint32_t body) const { return *kept_[shape_of()[body]]; }
+  void clear_shapes() override { kept_.clear(); }
+
+ private:
+  void add_shape(const LevelView& level) final { kept_.push_back(std::make_unique<Shape>(level)); }
+
+  std::vector<std::unique_ptr<Shape>> kept_;
 };
 
 }  // namespace tandem

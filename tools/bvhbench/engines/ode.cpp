@@ -21,7 +21,7 @@ struct OdeLibrary {
 /// A mesh, and OPCODE's tree over it.
 class OdeMesh {
  public:
-  explicit OdeMesh(const LevelView& level) : mesh_(index_mesh(level)), data_(dGeomTriMeshDataCreate()) {
+  explicit OdeMesh(const LevelView& level) : mesh_(level), data_(dGeomTriMeshDataCreate()) {
     dGeomTriMeshDataBuildSingle(data_, mesh_.vertices.data(), 3 * sizeof(float),
                                 static_cast<int>(mesh_.vertex_count()), mesh_.corners.data(),
                                 static_cast<int>(mesh_.corners.size()), 3 * sizeof(dTriIndex));
@@ -50,16 +50,15 @@ void set_pose(dGeomID geom, const Pose& pose) {
 /// OPCODE inside ODE finds all pairs of triangles and keeps them to itself: dCollide hands out contact
 /// points, of which those of several pairs are merged. With one contact asked for, the search is the whole
 /// search, and next to nothing is spent on points.
-class OdeEngine final : public LibraryEngine {
+class OdeEngine final : public EngineWith<OdeMesh> {
  public:
+  using EngineWith::EngineWith;
   ~OdeEngine() override { clear_bodies(); }
 
-  std::string_view name() const override { return "ode"; }
   std::string label() const override { return "ODE"; }
   std::string settings() const override {
     return "OPCODE through dCollide: finds all pairs of triangles, hands out one contact point; trees "
-           "float32, "
-           "poses float64";
+           "float32, poses float64";
   }
   bool contacts(std::vector<TriangleContact>&) override { return false; }
   std::vector<Counter> named_counters() const override {
@@ -74,9 +73,8 @@ class OdeEngine final : public LibraryEngine {
  private:
   void clear_shapes() override {
     clear_bodies();
-    meshes_.clear();
+    EngineWith::clear_shapes();
   }
-  void add_shape(const LevelView& level) override { meshes_.push_back(std::make_unique<OdeMesh>(level)); }
 
   void clear_bodies() {
     for (dGeomID geom : geoms_) dGeomDestroy(geom);
@@ -84,9 +82,8 @@ class OdeEngine final : public LibraryEngine {
   }
   void make_bodies(std::span<const Pose> poses) override {
     clear_bodies();
-    for (const std::uint32_t shape : shape_of()) {
-      geoms_.push_back(dCreateTriMesh(nullptr, meshes_[shape]->data(), nullptr, nullptr, nullptr));
-    }
+    for (std::uint32_t i = 0; i < poses.size(); ++i)
+      geoms_.push_back(dCreateTriMesh(nullptr, shape(i).data(), nullptr, nullptr, nullptr));
     place(poses);
   }
 
@@ -100,15 +97,14 @@ class OdeEngine final : public LibraryEngine {
   }
 
   OdeLibrary library_;
-  std::vector<std::unique_ptr<OdeMesh>> meshes_;
   std::vector<dGeomID> geoms_;
   std::uint64_t touching_pairs_ = 0;
 };
 
 }  // namespace
 
-std::unique_ptr<Engine> make_ode(const ContactOptions&) {
-  return std::make_unique<OdeEngine>();
+std::unique_ptr<Engine> make_ode(std::string_view name, const Question&) {
+  return std::make_unique<OdeEngine>(name);
 }
 
 }  // namespace tandem

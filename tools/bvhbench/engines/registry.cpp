@@ -4,38 +4,66 @@
 
 namespace tandem {
 
-using Engines = std::unique_ptr<Engine>(const ContactOptions& options);
+using Maker = std::unique_ptr<Engine>(std::string_view name, const Question& question);
 // Each in a file of its own.
-Engines make_tandem, make_tandem_cuda, make_paper, make_paper_bits, make_fcl, make_embree, make_embree_refit,
-    make_bullet, make_ode, make_cgal;
+Maker make_tandem, make_tandem_cuda, make_paper, make_fcl, make_coal, make_embree, make_bullet, make_ode,
+    make_cgal;
 
 namespace {
 
+// Questions that an engine answers: bits by the place of their options in Question.
+enum : unsigned { kContacts = 1, kDistances = 2, kImpacts = 4, kVerdicts = 8, kAll = 15 };
+
+// What compare does not run has no library. Those that simulate tell all contacts, and right.
+enum class Use : std::uint8_t { compares, simulates };
+
 struct Entry {
   std::string_view name;
-  std::string_view peer;  // what compare calls it; empty: not compared
-  bool simulates;         // all contacts are told, and right
+  std::string_view library;  // what compare calls it; empty: not compared
+  unsigned questions;
+  Use use;
   std::string_view needs;
-  Engines* make;  // null where what it needs was not found
+  Maker* make;  // null where what it needs was not found
   bool has_modes = false;
+
+  bool answers(const Question& question) const { return (questions >> question.index() & 1u) != 0; }
 };
 
-constexpr Engines* where(bool found, Engines* make) {
+constexpr Maker* where(bool found, Maker* make) {
   return found ? make : nullptr;
 }
 
+constexpr auto kSimulates = Use::simulates, kCompares = Use::compares;
+constexpr Maker *kTandemCuda = where(TANDEM_HAVE_CUDA, make_tandem_cuda),
+                *kPaper = where(TANDEM_HAVE_CUDA, make_paper), *kFcl = where(TANDEM_HAVE_FCL, make_fcl),
+                *kCoal = where(TANDEM_HAVE_COAL, make_coal),
+                *kEmbree = where(TANDEM_HAVE_EMBREE, make_embree),
+                *kBullet = where(TANDEM_HAVE_BULLET, make_bullet), *kOde = where(TANDEM_HAVE_ODE, make_ode);
+
 constexpr Entry kEntries[] = {
-    {"tandem", "tandem", true, "", make_tandem, true},
-    {"tandem-cuda", "", true, "CUDA", where(TANDEM_HAVE_CUDA, make_tandem_cuda), true},
-    {"paper", "", true, "CUDA", where(TANDEM_HAVE_CUDA, make_paper), true},
-    {"paper-bits", "", true, "CUDA", where(TANDEM_HAVE_CUDA, make_paper_bits), true},
-    {"fcl", "fcl", true, "FCL", where(TANDEM_HAVE_FCL, make_fcl)},
-    {"embree", "embree", true, "Embree 3", where(TANDEM_HAVE_EMBREE, make_embree)},
-    {"embree-refit", "embree", true, "Embree 3", where(TANDEM_HAVE_EMBREE, make_embree_refit)},
-    {"bullet", "bullet", false, "Bullet", where(TANDEM_HAVE_BULLET, make_bullet)},
-    {"ode", "ode", false, "ODE", where(TANDEM_HAVE_ODE, make_ode)},
-    {"cgal", "cgal", false, "", make_cgal},
+    {"tandem", "tandem", kAll, kSimulates, "", make_tandem, true},
+    {"tandem-cuda", "", kAll, kSimulates, "CUDA", kTandemCuda, true},
+    {"paper", "", kContacts, kSimulates, "CUDA", kPaper, true},
+    {"paper-bits", "", kContacts, kSimulates, "CUDA", kPaper, true},
+    {"fcl", "fcl", kContacts, kSimulates, "FCL", kFcl},
+    {"fcl-rss", "fcl", kDistances, kCompares, "FCL", kFcl},
+    {"fcl-obbrss", "fcl", kDistances, kCompares, "FCL", kFcl},
+    {"fcl-oriented", "fcl", kImpacts, kCompares, "FCL", kFcl},
+    {"fcl-10-poses", "fcl", kImpacts, kCompares, "FCL", kFcl},
+    {"fcl-100-poses", "fcl", kImpacts, kCompares, "FCL", kFcl},
+    {"fcl-public", "fcl", kImpacts, kCompares, "FCL", kFcl},
+    {"coal-rss", "coal", kDistances, kCompares, "Coal", kCoal},
+    {"coal-obbrss", "coal", kDistances, kCompares, "Coal", kCoal},
+    {"embree", "embree", kContacts, kSimulates, "Embree 3", kEmbree},
+    {"embree-refit", "embree", kContacts, kSimulates, "Embree 3", kEmbree},
+    {"bullet", "bullet", kContacts, kCompares, "Bullet", kBullet},
+    {"ode", "ode", kContacts, kCompares, "ODE", kOde},
+    {"cgal", "cgal", kContacts | kDistances, kCompares, "", make_cgal},
 };
+
+bool is_compared(const Entry& entry, const Question& question) {
+  return !entry.library.empty() && entry.make != nullptr && entry.answers(question);
+}
 
 const Entry* find_entry(std::string_view name) {
   const auto* found =
@@ -54,7 +82,7 @@ std::string list_of_names() {
 std::vector<std::string_view> engine_names() {
   std::vector<std::string_view> names;
   for (const Entry& entry : kEntries) {
-    if (entry.simulates) names.push_back(entry.name);
+    if (entry.use == kSimulates) names.push_back(entry.name);
   }
   return names;
 }
@@ -64,7 +92,7 @@ bool is_built_in(std::string_view name) {
   return entry != nullptr && entry->make != nullptr;
 }
 
-std::unique_ptr<Engine> make_engine(std::string_view name, const ContactOptions& options) {
+std::unique_ptr<Engine> make_engine(std::string_view name, const Question& question) {
   const Entry* entry = find_entry(name);
   const std::string quoted(name);
   if (entry == nullptr) throw std::runtime_error("no engine " + quoted + ": there are " + list_of_names());
@@ -72,43 +100,35 @@ std::unique_ptr<Engine> make_engine(std::string_view name, const ContactOptions&
     throw std::runtime_error("the engine " + quoted + " is not built in: " + std::string(entry->needs) +
                              " was not found when this program was built");
   }
-  if (options.mode != QueryMode::exact && !entry->has_modes) {
+  if (!entry->answers(question))
+    throw std::runtime_error("the engine " + quoted + " does not answer this question");
+  const auto* contacts = std::get_if<ContactOptions>(&question);
+  if (contacts != nullptr && contacts->mode != QueryMode::exact && !entry->has_modes) {
     throw std::runtime_error("the engine " + quoted + " has no fast mode");
   }
-  return entry->make(options);
-}
-
-DistancesOnGpu* distances_on_gpu() {
-  constexpr DistancesOnGpu* kFound = TANDEM_HAVE_CUDA ? time_distances_on_gpu : nullptr;
-  return kFound;
-}
-
-ImpactsOnGpu* impacts_on_gpu() {
-  constexpr ImpactsOnGpu* kFound = TANDEM_HAVE_CUDA ? time_impacts_on_gpu : nullptr;
-  return kFound;
-}
-
-VerdictsOnGpu* verdicts_on_gpu() {
-  constexpr VerdictsOnGpu* kFound = TANDEM_HAVE_CUDA ? time_verdicts_on_gpu : nullptr;
-  return kFound;
+  return entry->make(entry->name, question);
 }
 
 std::vector<std::string_view> peer_names() {
   std::vector<std::string_view> names;
   for (const Entry& entry : kEntries) {
-    if (entry.peer.empty() || entry.make == nullptr) continue;
-    if (names.empty() || names.back() != entry.peer) names.push_back(entry.peer);
+    if (!is_compared(entry, ContactOptions())) continue;
+    if (names.empty() || names.back() != entry.library) names.push_back(entry.library);
   }
   return names;
 }
 
-std::vector<std::unique_ptr<Engine>> make_peers(std::string_view peer) {
+std::vector<std::unique_ptr<Engine>> make_peers(const Question& question,
+                                                const std::vector<std::string>& libraries) {
   std::vector<std::unique_ptr<Engine>> peers;
   for (const Entry& entry : kEntries) {
-    if (entry.peer != peer || entry.make == nullptr) continue;
-    for (const QueryMode mode : {QueryMode::exact, QueryMode::fast, QueryMode::boxes}) {
-      if (mode == QueryMode::exact || entry.has_modes) peers.push_back(entry.make({.mode = mode}));
-    }
+    if (!is_compared(entry, question)) continue;
+    if (!libraries.empty() && std::find(libraries.begin(), libraries.end(), entry.library) == libraries.end())
+      continue;
+    peers.push_back(entry.make(entry.name, question));
+    if (!entry.has_modes || !std::holds_alternative<ContactOptions>(question)) continue;
+    for (const QueryMode mode : {QueryMode::fast, QueryMode::boxes})
+      peers.push_back(entry.make(entry.name, ContactOptions{.mode = mode}));
   }
   return peers;
 }

@@ -1,19 +1,29 @@
+#include <algorithm>
 #include <memory>
+#include <tuple>
 
-#include "gpu_engine.h"
-#include "tandem/formats/gpu_memory.h"
+#include "gpu_contacts.h"
 #include "tandem/kernels/gpu_contact_query.h"
+#include "tandem/kernels/gpu_distance_query.h"
+#include "tandem/kernels/gpu_impact_query.h"
 #include "tandem/kernels/gpu_manifold_query.h"
+#include "tandem/kernels/gpu_tolerance_query.h"
 
 namespace tandem {
 namespace {
 
-/// Tandem on the GPU.
-class TandemCudaEngine final : public GpuEngine {
+template <typename Report>
+void check_repeat(const Report& report) {
+  if (report.status != Status::kOk || report.complete == 0)
+    throw std::runtime_error("the GPU: a repeat of the query found something else than the first");
+}
+
+class CudaContacts final : public GpuContactEngine {
  public:
-  explicit TandemCudaEngine(const ContactOptions& options)
-      : GpuEngine("tandem-cuda", options.mode == QueryMode::exact ? Contents::manifolds : Contents::all,
-                  options.within),
+  CudaContacts(std::string_view name, const ContactOptions& options)
+      : GpuContactEngine(name,
+                         {.contents = options.mode == QueryMode::exact ? Contents::manifolds : Contents::all,
+                          .within = options.within}),
         options_(options) {}
 
  private:
@@ -29,14 +39,11 @@ class TandemCudaEngine final : public GpuEngine {
 
   void ask(const GpuPairs& pairs, OrderOnGpu order) override {
     const Status status = query_.find_contacts(instances(), pairs, options(order), stream());
-    if (subject(status) != nullptr) require(status, query_.report().where);
-    check(status, query_.cuda_error(), "contacts");
+    check(status, query_, "contacts");
   }
 
   GpuContacts found() override {
-    if (query_.report().status != Status::kOk || query_.report().complete == 0) {
-      throw std::runtime_error("the GPU: a repeat of the query found something else than the first");
-    }
+    check_repeat(query_.report());
     counters_ = query_.report().counters;
     return {query_.contacts(), query_.report().contacts};
   }
@@ -86,15 +93,7 @@ class TandemCudaEngine final : public GpuEngine {
     const Status status =
         walk.reserve({.pairs = static_cast<std::uint32_t>(counters_.object_pairs)}, walk_alone);
     check(status, walk.cuda_error(), "traversal");
-    const auto run = captured([&] { enqueue(walk, pairs, walk_alone, "traversal"); });
-    GpuEvent begin, end;
-    for (GpuEvent* event : {&begin, &end}) check(event->create(), "an event");
-    Seconds seconds;
-    for (std::uint32_t i = 0; i < repeats; ++i) {
-      run_between(begin, run, end);
-      seconds.push_back(seconds_between(begin, end));
-    }
-    return seconds;
+    return time_repeats(repeats, captured([&] { enqueue(walk, pairs, walk_alone, "traversal"); }));
   }
 
   void name_shapes_to(GpuContactQuery& query) const {
@@ -108,12 +107,6 @@ class TandemCudaEngine final : public GpuEngine {
     check(status, query.cuda_error(), step);
   }
 
-  std::function<void()> captured(const std::function<void()>& work) {
-    const auto graph = std::make_shared<GpuGraph>();
-    check(graph->capture(stream(), work), "a graph");
-    return [this, graph] { check(graph->launch(stream()), "a graph"); };
-  }
-
   std::size_t query_bytes() const override { return query_.bytes(); }
   std::size_t most_bytes(OrderOnGpu order) const override {
     return most_query_bytes(query_.capacity(), options(order), shapes().size());
@@ -124,10 +117,160 @@ class TandemCudaEngine final : public GpuEngine {
   GpuManifoldQuery manifolds_;
 };
 
+/// A question that has a row for each pair.
+template <typename Query>
+class CudaRows : public GpuEngine {
+ protected:
+  using GpuEngine::GpuEngine;
+
+  void name_shapes() override { check(set_assets(), query_.cuda_error(), "assets"); }
+
+  /// Tell the query of shapes(); find the rows of these pairs, until everything has room; queue that once
+  /// more. Without pairs, the query finds them itself.
+  virtual Status set_assets() = 0;
+  virtual Status find(const GpuPairs& pairs) = 0;
+  virtual Status enqueue(const GpuPairs& pairs) = 0;
+
+  /// Makes room for what a repeat may need beyond the first run.
+  virtual void make_room_for_repeats() {}
+
+  /// What the rule of the query says that it takes of the GPU at most.
+  virtual std::size_t most_bytes() const = 0;
+
+  /// The pairs that were found, in GPU memory.
+  virtual std::span<const ObjectPair> found() const { return {pairs_found().pairs, count_found()}; }
+
+  /// Times the question. step: what it does; rows(): where the rows lie in GPU memory.
+  template <typename Timed, typename Rows>
+  Timed time(const TimedQuery& asked, const char* step, const Rows& rows) {
+    const GpuPairs pairs = pairs_of(asked, true);
+    check(find(pairs), query_, step);
+    make_room_for_repeats();
+    const auto again = [&] { check(enqueue(pairs), query_.cuda_error(), step); };
+    Timed out;
+    out.narrow = time_repeats(asked.repeats, captured(again));
+    out.whole = !has_broad_phase(asked) ? out.narrow : time_repeats(asked.repeats, captured([&] {
+                                                                      enqueue_broad_phase(true);
+                                                                      again();
+                                                                    }));
+    check_repeat(query_.report());
+    const std::span<const ObjectPair> answered =
+        asked.given == nullptr ? found() : std::span(pairs.pairs, asked.given->size());
+    out.counters = query_.report().counters;
+    out.pairs.resize(answered.size());
+    out.rows.resize(answered.size());
+    check(download(answered.data(), std::span(out.pairs), stream()), "download");
+    check(download(rows(), std::span(out.rows), stream()), "download");
+    out.gpu = use(asked, query_.bytes(), broad_phase().bytes() + most_bytes());
+    return out;
+  }
+
+  Query query_;
+};
+
+class CudaDistances final : public CudaRows<GpuDistanceQuery> {
+ public:
+  CudaDistances(std::string_view name, const DistanceOptions& options)
+      : CudaRows(name, {.within = options.reach}),
+        options_{.tolerance = options.tolerance, .reach = options.reach} {}
+
+  TimedDistances time_distances(const TimedQuery& asked) override {
+    auto out = time<TimedDistances>(asked, "distances", [&] { return query_.distances(); });
+    out.rounds = query_.report().rounds;
+    return out;
+  }
+
+ private:
+  Status set_assets() override { return query_.set_assets(shapes(), stream()); }
+  Status find(const GpuPairs& pairs) override {
+    return query_.find_distances(instances(), pairs, options_, stream());
+  }
+  Status enqueue(const GpuPairs& pairs) override {
+    return query_.enqueue(instances(), pairs, options_, stream());
+  }
+  std::size_t most_bytes() const override { return most_distance_bytes(query_.capacity(), shapes().size()); }
+
+  const GpuDistanceOptions options_;
+};
+
+// By a, then b. On the CPU, as contacts are sorted there: it is no part of a step.
+void sort(TimedImpacts& found) {
+  std::vector<std::pair<ObjectPair, Impact>> rows;
+  for (std::size_t i = 0; i < found.pairs.size(); ++i) rows.emplace_back(found.pairs[i], found.rows[i]);
+  std::sort(rows.begin(), rows.end(), [](const auto& x, const auto& y) {
+    return std::pair(x.first.a, x.first.b) < std::pair(y.first.a, y.first.b);
+  });
+  for (std::size_t i = 0; i < rows.size(); ++i) std::tie(found.pairs[i], found.rows[i]) = rows[i];
+}
+
+class CudaImpacts final : public CudaRows<GpuImpactQuery> {
+ public:
+  CudaImpacts(std::string_view name, const ImpactOptions& options)
+      : CudaRows(name, {.finds_pairs = true}), options_{.tolerance = options.tolerance} {}
+
+  TimedImpacts time_impacts(const TimedQuery& asked) override {
+    options_.filter = upload_filter();
+    auto out = time<TimedImpacts>(asked, "impacts", [&] { return query_.impacts(); });
+    out.rounds = query_.report().rounds;
+    if (asked.given == nullptr) sort(out);
+    return out;
+  }
+
+ private:
+  Status set_assets() override { return query_.set_assets(shapes(), stream()); }
+  Status find(const GpuPairs& pairs) override {
+    if (pairs.count == nullptr)
+      return query_.find(instances(), motion_on_gpu(), duration_, options_, stream());
+    return query_.find(instances(), motion_on_gpu(), duration_, pairs, options_, stream());
+  }
+  Status enqueue(const GpuPairs& pairs) override {
+    if (pairs.count == nullptr)
+      return query_.enqueue(instances(), motion_on_gpu(), duration_, options_, stream());
+    return query_.enqueue(instances(), motion_on_gpu(), duration_, pairs, options_, stream());
+  }
+  std::size_t most_bytes() const override {
+    return most_impact_bytes(query_.capacity(), shapes().size(), false);
+  }
+  std::span<const ObjectPair> found() const override {
+    return {query_.pairs().pairs, query_.report().impacts};
+  }
+
+  GpuImpactOptions options_;
+};
+
+class CudaVerdicts final : public CudaRows<GpuToleranceQuery> {
+ public:
+  CudaVerdicts(std::string_view name, const ToleranceOptions& options)
+      : CudaRows(name, {.contents = Contents::exact_queries, .all_levels = true}),
+        tolerance_(options.tolerance) {}
+
+  TimedVerdicts time_verdicts(const TimedQuery& asked) override {
+    return time<TimedVerdicts>(asked, "verdicts", [&] { return query_.verdicts(); });
+  }
+
+ private:
+  Status set_assets() override { return query_.set_levels(shapes(), stream()); }
+  Status find(const GpuPairs& pairs) override {
+    return query_.decide(instances(), pairs, tolerance_, stream());
+  }
+  Status enqueue(const GpuPairs& pairs) override {
+    return query_.enqueue(instances(), pairs, tolerance_, stream());
+  }
+  // What is looked at before a pair's first contact is found differs from run to run.
+  void make_room_for_repeats() override {
+    GpuToleranceCapacity room = query_.report().needed;
+    room.undecided += room.undecided / 2 + 1024;
+    check(query_.reserve(room), query_.cuda_error(), "room");
+  }
+  std::size_t most_bytes() const override { return most_tolerance_bytes(query_.capacity(), shapes().size()); }
+
+  const double tolerance_;
+};
+
 }  // namespace
 
-std::unique_ptr<Engine> make_tandem_cuda(const ContactOptions& options) {
-  return std::make_unique<TandemCudaEngine>(options);
+std::unique_ptr<Engine> make_tandem_cuda(std::string_view name, const Question& question) {
+  return make_for<CudaContacts, CudaDistances, CudaImpacts, CudaVerdicts>(question, name);
 }
 
 }  // namespace tandem

@@ -44,9 +44,9 @@ std::vector<Instance> make_coincident(const AssetView& body, std::uint32_t count
 std::vector<Instance> make_field(const AssetView& body, std::uint32_t fixed, std::uint32_t count,
                                  double spacing, const SceneSeed&);
 
-/// World boxes of the instances that meet, and that the filter looks at: the object pairs that a query finds.
-/// Throws std::bad_alloc, std::runtime_error (coordinates beyond what a query takes).
-std::uint64_t count_box_pairs(const std::vector<AssetView>& assets, const std::vector<Instance>& instances,
-                              const PairFilter& filter = {});
+/// Finds the instances whose world boxes meet, and that the filter looks at: the object pairs that a query
+/// finds, a < b, sorted. Throws std::bad_alloc, std::runtime_error (coordinates beyond what a query takes).
+std::vector<ObjectPair> find_box_pairs(const std::vector<AssetView>& assets,
+                                       const std::vector<Instance>& instances, const PairFilter& filter = {});
 
 }  // namespace tandem::bench

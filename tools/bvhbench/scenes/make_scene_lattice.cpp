@@ -133,8 +133,8 @@ std::vector<Instance> make_pile(const AssetView& body, std::uint32_t count, doub
   // Neighbours go with the density, the spacing's inverse cube; where a step by that leaves what is known of
   // the spacing, it is halved instead.
   for (int step = 0; step < kMostSteps && best_miss > 0.005; ++step) {
-    const auto pairs = count_box_pairs({body}, spread(draft, bounds.centre(), spacing));
-    const double found = 2 * static_cast<double>(pairs) / count;
+    const auto pairs = find_box_pairs({body}, spread(draft, bounds.centre(), spacing));
+    const double found = 2 * static_cast<double>(pairs.size()) / count;
     const double miss = std::fabs(found - neighbours) / neighbours;
     if (miss < best_miss) best_miss = miss, best = spacing;
     (found > neighbours ? too_close : too_wide) = spacing;

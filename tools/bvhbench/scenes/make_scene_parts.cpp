@@ -21,8 +21,8 @@ std::uint32_t root_above(std::uint32_t count, int power) {
   return n;
 }
 
-std::uint64_t count_box_pairs(const std::vector<AssetView>& assets, const std::vector<Instance>& instances,
-                              const PairFilter& filter) {
+std::vector<ObjectPair> find_box_pairs(const std::vector<AssetView>& assets,
+                                       const std::vector<Instance>& instances, const PairFilter& filter) {
   std::vector<WorldBox> boxes;
   boxes.reserve(instances.size());
   for (const Instance& instance : instances) {
@@ -34,7 +34,7 @@ std::uint64_t count_box_pairs(const std::vector<AssetView>& assets, const std::v
   const Status status = broad_phase.find_pairs(boxes, filter);
   if (status == Status::kOutOfMemory) throw std::bad_alloc();
   if (status != Status::kOk) throw std::runtime_error(explain(status));
-  return broad_phase.pairs().size();
+  return {broad_phase.pairs().begin(), broad_phase.pairs().end()};
 }
 
 }  // namespace tandem::bench

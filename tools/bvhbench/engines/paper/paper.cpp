@@ -1,19 +1,16 @@
 #include <memory>
 
-#include "bvhbench/engines/gpu_engine.h"
+#include "bvhbench/engines/gpu_contacts.h"
 #include "paper_engine.h"
 
 namespace tandem {
 namespace {
 
 /// The paper's scheme, which asks the CPU after each level of the trees.
-class PaperSchemeEngine final : public GpuEngine {
+class PaperSchemeEngine final : public GpuContactEngine {
  public:
   PaperSchemeEngine(std::string_view name, bench::PaperFlags flags, QueryMode mode)
-      : GpuEngine(name, Contents::all) {
-    options_.mode = mode;
-    options_.flags = flags;
-  }
+      : GpuContactEngine(name, {.contents = Contents::all}), options_{.mode = mode, .flags = flags} {}
 
  private:
   void name_shapes() override {
@@ -23,8 +20,7 @@ class PaperSchemeEngine final : public GpuEngine {
 
   void ask(const GpuPairs& pairs, OrderOnGpu) override {
     const Status status = query_.find_contacts(instances(), pairs, options_, stream());
-    if (subject(status) != nullptr) require(status, query_.report().where);
-    check(status, query_.cuda_error(), "contacts");
+    check(status, query_, "contacts");
     times_.triangle_tests = 1e-3 * static_cast<double>(query_.report().triangle_ms);
   }
 
@@ -48,12 +44,9 @@ class PaperSchemeEngine final : public GpuEngine {
 
 }  // namespace
 
-std::unique_ptr<Engine> make_paper(const ContactOptions& options) {
-  return std::make_unique<PaperSchemeEngine>("paper", bench::PaperFlags::words, options.mode);
-}
-
-std::unique_ptr<Engine> make_paper_bits(const ContactOptions& options) {
-  return std::make_unique<PaperSchemeEngine>("paper-bits", bench::PaperFlags::bits, options.mode);
+std::unique_ptr<Engine> make_paper(std::string_view name, const Question& question) {
+  const auto flags = name == "paper-bits" ? bench::PaperFlags::bits : bench::PaperFlags::words;
+  return std::make_unique<PaperSchemeEngine>(name, flags, std::get<ContactOptions>(question).mode);
 }
 
 }  // namespace tandem

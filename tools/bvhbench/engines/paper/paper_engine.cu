@@ -31,7 +31,7 @@ struct PaperEngine::State {
   GpuArray<GpuAsset> assets;
   GpuArray<paper::PairRecord> records;
   GpuArray<Entry> levels[2];
-  GpuArray<std::uint8_t> flags[2];
+  GpuArray<std::uint32_t> flags[2];
   GpuArray<std::uint32_t> sums;  ///< two rows
   GpuArray<std::uint8_t> scratch;
   GpuArray<Entry> candidates;
@@ -68,8 +68,8 @@ struct PaperEngine::State {
 
   bool set_assets(std::span<const GpuAsset> given, cudaStream_t stream);
   Status prepare(paper::QueryArgs& args, cudaStream_t stream);
-  Status traverse(const PaperOptions& options, cudaStream_t stream);
-  bool test_level(paper::Level& level, const PaperOptions& options, cudaStream_t stream);
+  Status traverse(PaperFlags kind, cudaStream_t stream);
+  bool test_level(paper::Level& level, PaperFlags kind, cudaStream_t stream);
   bool read_total(const std::uint32_t* total, paper::FlagArray array, cudaStream_t stream) {
     return ok(cudaMemcpyAsync(&answers->totals[array], total, sizeof *total, cudaMemcpyDeviceToHost, stream));
   }
@@ -112,33 +112,33 @@ Status PaperEngine::State::prepare(paper::QueryArgs& args, cudaStream_t stream) 
 }
 
 /// One iteration of the paper's loop but for the collection: flags, their prefix sums, and the totals.
-bool PaperEngine::State::test_level(paper::Level& level, const PaperOptions& options, cudaStream_t stream) {
-  const std::size_t count = paper::sum_count(options.flags, level.count);
+bool PaperEngine::State::test_level(paper::Level& level, PaperFlags kind, cudaStream_t stream) {
+  const std::size_t count = paper::sum_count(kind, level.count);
   for (const auto array : {kCollision, kLeaf}) {
-    if (!ok(flags[array].grow(count * paper::flag_bytes(options.flags)))) return false;
+    if (!ok(flags[array].grow(count))) return false;
     level.flags[array] = flags[array].data();
   }
   if (!ok(sums.grow(2 * count))) return false;
   level.sums[kCollision] = sums.data();
   level.sums[kLeaf] = sums.data() + count;
   std::size_t scratch_bytes = 0;
-  if (!ok(paper::scan(level, options.flags, nullptr, scratch_bytes, stream)) ||
+  if (!ok(paper::scan(level, kind, nullptr, scratch_bytes, stream)) ||
       !ok(scratch.grow(std::max<std::size_t>(scratch_bytes, 1))))
     return false;
   scratch_bytes = scratch.room();
-  return ok(paper::collide(level, options, stream)) &&
-         ok(paper::scan(level, options.flags, scratch.data(), scratch_bytes, stream)) &&
+  return ok(paper::collide(level, kind, stream)) &&
+         ok(paper::scan(level, kind, scratch.data(), scratch_bytes, stream)) &&
          read_total(level.sums[kCollision] + (count - 1), kCollision, stream) &&
          read_total(level.sums[kLeaf] + (count - 1), kLeaf, stream) && ok(cudaStreamSynchronize(stream));
 }
 
-Status PaperEngine::State::traverse(const PaperOptions& options, cudaStream_t stream) {
+Status PaperEngine::State::traverse(PaperFlags kind, cudaStream_t stream) {
   std::uint64_t count = answers->pair_count;
   candidate_count = 0;
   for (int current = 0; count != 0; current = 1 - current) {
     if (count > paper::kMostBlockPairs) return Status::kOutOfGpuMemory;
     paper::Level level = {levels[current].data(), static_cast<std::uint32_t>(count), records.data(), {}, {}};
-    if (!test_level(level, options, stream)) return status();
+    if (!test_level(level, kind, stream)) return status();
     report.levels += 1;
     report.counters.block_pairs += count;
     report.largest_level = std::max(report.largest_level, count);
@@ -148,7 +148,7 @@ Status PaperEngine::State::traverse(const PaperOptions& options, cudaStream_t st
     if (!ok(next.grow(below)) || !ok(candidates.grow(candidate_count + leaves, candidate_count)))
       return status();
     if ((below | leaves) != 0 &&
-        !ok(paper::collect(level, options.flags, next.data(), candidates.data() + candidate_count, stream)))
+        !ok(paper::collect(level, kind, next.data(), candidates.data() + candidate_count, stream)))
       return status();
     candidate_count += leaves;
     count = below;
@@ -203,7 +203,7 @@ Status PaperEngine::State::run(paper::QueryArgs& args, const PaperOptions& optio
   Status result = prepare(args, stream);
   if (result != Status::kOk || !ok(moments[kPrepared].record(stream)))
     return result != Status::kOk ? result : status();
-  result = traverse(options, stream);
+  result = traverse(options.flags, stream);
   if (result != Status::kOk || !ok(moments[kTraversed].record(stream)))
     return result != Status::kOk ? result : status();
   if (!test_triangles(args, options.mode, stream)) return status();

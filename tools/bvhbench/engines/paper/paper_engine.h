@@ -13,7 +13,6 @@ namespace tandem::bench {
 /// How the two flag arrays of a level are stored.
 enum class PaperFlags : std::uint8_t {
   words,  ///< 32 bits a flag, as the paper's
-  bytes,  ///< 8 bits
   bits,   ///< 1 bit, and a prefix sum over the 32 flags of a warp rather than over single ones: the paper's
           ///< open end
 };
@@ -21,7 +20,6 @@ enum class PaperFlags : std::uint8_t {
 struct PaperOptions {
   QueryMode mode = QueryMode::exact;
   PaperFlags flags = PaperFlags::words;
-  bool six_axes = false;  ///< the face axes alone, rather than all 15 that the paper tests
 };
 
 /// What a query did, and how long it took on the GPU, waits for the CPU included.

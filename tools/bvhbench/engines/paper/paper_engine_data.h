@@ -33,15 +33,12 @@ struct Level {
   const Entry* pairs;
   std::uint32_t count;
   const PairRecord* records;
-  void* flags[2];          ///< by FlagArray
-  std::uint32_t* sums[2];  ///< by FlagArray: exclusive prefix sums over the flags
+  std::uint32_t* flags[2];  ///< by FlagArray
+  std::uint32_t* sums[2];   ///< by FlagArray: exclusive prefix sums over the flags
 };
 
 inline std::size_t sum_count(PaperFlags kind, std::size_t block_pairs) {
   return 1 + (kind == PaperFlags::bits ? (block_pairs + 1) / 2 : block_pairs * kThreadsOfPair);
-}
-inline std::size_t flag_bytes(PaperFlags kind) {
-  return kind == PaperFlags::bytes ? 1 : 4;
 }
 
 /// Zero when a query begins.
@@ -74,7 +71,7 @@ struct TriangleArgs {
 cudaError_t prepare(const QueryArgs& args, Entry* first_level, cudaStream_t stream);
 
 /// The collision kernel: tests the boxes of all block pairs and writes both flag arrays.
-cudaError_t collide(const Level& level, const PaperOptions& options, cudaStream_t stream);
+cudaError_t collide(const Level& level, PaperFlags kind, cudaStream_t stream);
 
 /// Prefix sums over both flag arrays. Without scratch memory: writes how many bytes of it are needed.
 cudaError_t scan(const Level& level, PaperFlags kind, void* scratch, std::size_t& scratch_bytes,

@@ -1,7 +1,6 @@
 #include <thrust/iterator/transform_iterator.h>
 
 #include <cub/device/device_scan.cuh>
-#include <type_traits>
 
 #include "kernels/contact/leaf_planes.h"
 #include "kernels/geometry/box_test.h"
@@ -26,10 +25,7 @@ using gpu::pose_of;
 /// Where a thread's two flags are.
 template <PaperFlags kKind>
 struct Flags {
-  using Element = std::conditional_t<kKind == PaperFlags::bytes, std::uint8_t, std::uint32_t>;
-
-  __device__ static void write(void* array, std::uint64_t thread, std::uint64_t threads, bool flag) {
-    auto* flags = static_cast<Element*>(array);
+  __device__ static void write(std::uint32_t* flags, std::uint64_t thread, std::uint64_t threads, bool flag) {
     if constexpr (kKind == PaperFlags::bits) {
       const std::uint32_t lanes = __ballot_sync(kAllLanes, flag);
       if (thread % 32 == 0 && thread < threads) flags[thread / 32] = lanes;
@@ -41,9 +37,8 @@ struct Flags {
   }
 
   /// Whether it is set; if so, its number among those that are.
-  __device__ static bool read(const void* array, const std::uint32_t* sums, std::uint64_t thread,
+  __device__ static bool read(const std::uint32_t* flags, const std::uint32_t* sums, std::uint64_t thread,
                               std::uint32_t& number) {
-    const auto* flags = static_cast<const Element*>(array);
     if constexpr (kKind == PaperFlags::bits) {
       const std::uint32_t lanes = flags[thread / 32], below = lanes_below();
       if ((lanes & (below + 1)) == 0) return false;
@@ -61,7 +56,7 @@ struct Flags {
 /// j of b, 4 i + j being its number. Where one block is a leaf block, the other descends, and of the threads
 /// whose internal node is the same the first that hits sets the flag, so that no pair is added twice (the
 /// paper's figure 3).
-template <bool kSixAxes, PaperFlags kKind>
+template <PaperFlags kKind>
 __global__ void __launch_bounds__(kThreads) collide_level(const __grid_constant__ Level level) {
   // One float4 more than is used: so the two block pairs of a warp lie in different banks.
   __shared__ float4 nodes[kPairsOfBlock][2 * kFloat4s + 1];
@@ -85,8 +80,7 @@ __global__ void __launch_bounds__(kThreads) collide_level(const __grid_constant_
   const bool leaf_a = __float_as_uint(a[kKind0]) == kLeafKind,
              leaf_b = __float_as_uint(b[kKind0]) == kLeafKind;
   const RelativePose pose = pose_of(record);
-  const bool overlaps =
-      active && (kSixAxes ? overlap_6_axes(box_a, box_b, pose) : overlap_15_axes(box_a, box_b, pose));
+  const bool overlaps = active && overlap_15_axes(box_a, box_b, pose);
   std::uint32_t mask = __ballot_sync(kAllLanes, overlaps) >> (threadIdx.x % 32 - lane) & kAllNodePairs;
   if (record.instance_a == record.instance_b && pair.a == pair.b) mask &= own_node_pairs(leaf_a);
   const bool hit = (mask >> lane & 1u) != 0;
@@ -164,40 +158,23 @@ unsigned blocks_for(std::uint64_t threads) {
 
 }  // namespace
 
-cudaError_t collide(const Level& level, const PaperOptions& options, cudaStream_t stream) {
-  const auto launch = [&](auto kernel) {
-    kernel<<<blocks_for(std::uint64_t{level.count} * kThreadsOfPair), kThreads, 0, stream>>>(level);
-    return cudaGetLastError();
-  };
-  switch (options.flags) {
-    case PaperFlags::words:
-      return options.six_axes ? launch(collide_level<true, PaperFlags::words>)
-                              : launch(collide_level<false, PaperFlags::words>);
-    case PaperFlags::bytes:
-      return options.six_axes ? launch(collide_level<true, PaperFlags::bytes>)
-                              : launch(collide_level<false, PaperFlags::bytes>);
-    case PaperFlags::bits:
-      return options.six_axes ? launch(collide_level<true, PaperFlags::bits>)
-                              : launch(collide_level<false, PaperFlags::bits>);
-  }
-  return cudaErrorInvalidValue;
+cudaError_t collide(const Level& level, PaperFlags kind, cudaStream_t stream) {
+  const auto kernel =
+      kind == PaperFlags::words ? collide_level<PaperFlags::words> : collide_level<PaperFlags::bits>;
+  kernel<<<blocks_for(std::uint64_t{level.count} * kThreadsOfPair), kThreads, 0, stream>>>(level);
+  return cudaGetLastError();
 }
 
 cudaError_t scan(const Level& level, PaperFlags kind, void* scratch, std::size_t& scratch_bytes,
                  cudaStream_t stream) {
   const std::size_t count = sum_count(kind, level.count);
   for (const FlagArray array : {kCollision, kLeaf}) {
-    const auto* words = static_cast<const std::uint32_t*>(level.flags[array]);
+    const std::uint32_t* words = level.flags[array];
     std::uint32_t* sums = level.sums[array];
-    cudaError_t error = cudaSuccess;
-    if (kind == PaperFlags::words)
-      error = scan_array(words, sums, count, scratch, scratch_bytes, stream);
-    else if (kind == PaperFlags::bytes)
-      error = scan_array(static_cast<const std::uint8_t*>(level.flags[array]), sums, count, scratch,
-                         scratch_bytes, stream);
-    else
-      error = scan_array(thrust::make_transform_iterator(words, CountBits()), sums, count, scratch,
-                         scratch_bytes, stream);
+    const cudaError_t error = kind == PaperFlags::words
+                                  ? scan_array(words, sums, count, scratch, scratch_bytes, stream)
+                                  : scan_array(thrust::make_transform_iterator(words, CountBits()), sums,
+                                               count, scratch, scratch_bytes, stream);
     if (error != cudaSuccess || scratch == nullptr) return error;
   }
   return cudaSuccess;
@@ -205,9 +182,8 @@ cudaError_t scan(const Level& level, PaperFlags kind, void* scratch, std::size_t
 
 cudaError_t collect(const Level& level, PaperFlags kind, Entry* next, Entry* candidates,
                     cudaStream_t stream) {
-  const auto kernel = kind == PaperFlags::words   ? collect_level<PaperFlags::words>
-                      : kind == PaperFlags::bytes ? collect_level<PaperFlags::bytes>
-                                                  : collect_level<PaperFlags::bits>;
+  const auto kernel =
+      kind == PaperFlags::words ? collect_level<PaperFlags::words> : collect_level<PaperFlags::bits>;
   kernel<<<blocks_for(std::uint64_t{level.count} * kThreadsOfPair), kThreads, 0, stream>>>(level, next,
                                                                                            candidates);
   return cudaGetLastError();

@@ -4,9 +4,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "check_oriented.h"
-#include "check_topology.h"
-#include "check_tree.h"
+#include "check_level.h"
 #include "tandem/formats/hash.h"
 
 namespace tandem {
@@ -46,46 +44,34 @@ Status check_header(const FileHeader& header) {
   return table_end <= header.file_bytes ? Status::kOk : Status::kBadSectionTable;
 }
 
-std::uint64_t element_bytes(SectionKind kind) {
-  switch (kind) {
-    case SectionKind::levels:
-      return sizeof(Level);
-    case SectionKind::blocks:
-      return sizeof(Block);
-    case SectionKind::triangles:
-      return sizeof(Triangle);
-    case SectionKind::parts:
-      return sizeof(Part);
-    case SectionKind::strings:
-      return 1;
-    case SectionKind::provenance:
-      return 1;
-    case SectionKind::oriented_blocks:
-      return sizeof(OrientedBlock);
-    case SectionKind::topology:
-      return sizeof(TriangleTopology);
-    case SectionKind::components:
-      return sizeof(SurfaceComponent);
-  }
-  return 0;
-}
+struct SectionRule {
+  SectionKind kind;
+  std::uint64_t element_bytes;
+  bool is_of_level;  // else of the whole file
+};
 
-bool belongs_to_level(SectionKind kind) {
-  return kind == SectionKind::blocks || kind == SectionKind::triangles ||
-         kind == SectionKind::oriented_blocks || kind == SectionKind::topology ||
-         kind == SectionKind::components;
-}
+constexpr SectionRule kSectionRules[] = {
+    {SectionKind::levels, sizeof(Level), false},
+    {SectionKind::blocks, sizeof(Block), true},
+    {SectionKind::triangles, sizeof(Triangle), true},
+    {SectionKind::parts, sizeof(Part), false},
+    {SectionKind::strings, 1, false},
+    {SectionKind::provenance, 1, false},
+    {SectionKind::oriented_blocks, sizeof(OrientedBlock), true},
+    {SectionKind::topology, sizeof(TriangleTopology), true},
+    {SectionKind::components, sizeof(SurfaceComponent), true},
+};
 
 Status check_section(const Section& section, const FileHeader& header) {
-  const std::uint64_t element = element_bytes(section.kind);
-  if (element == 0) return Status::kUnknownSection;
-  if (section.level >= (belongs_to_level(section.kind) ? header.level_count : 1))
+  const auto rule = std::find_if(std::begin(kSectionRules), std::end(kSectionRules),
+                                 [&](const SectionRule& known) { return known.kind == section.kind; });
+  if (rule == std::end(kSectionRules) || section.level >= (rule->is_of_level ? header.level_count : 1))
     return Status::kUnknownSection;
   if (section.offset % kSectionAlignment != 0) return Status::kSectionMisaligned;
   if (section.offset > header.file_bytes || section.bytes > header.file_bytes - section.offset) {
     return Status::kSectionOutOfBounds;
   }
-  if (section.bytes % element != 0 || section.bytes / element != section.count)
+  if (section.bytes % rule->element_bytes != 0 || section.bytes / rule->element_bytes != section.count)
     return Status::kSectionSizeMismatch;
   return Status::kOk;
 }

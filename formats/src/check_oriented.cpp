@@ -1,7 +1,6 @@
-#include "check_oriented.h"
-
 #include <cmath>
 
+#include "check_level.h"
 #include "tandem/formats/box.h"
 
 namespace tandem {

@@ -1,11 +1,10 @@
-#include "check_topology.h"
-
 #include <algorithm>
 #include <bit>
 #include <cstdint>
 #include <memory>
 #include <type_traits>
 
+#include "check_level.h"
 #include "tandem/formats/allocator.h"
 #include "tandem/formats/enclosed_volume.h"
 

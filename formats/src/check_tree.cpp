@@ -1,8 +1,7 @@
-#include "check_tree.h"
-
 #include <algorithm>
 #include <cmath>
 
+#include "check_level.h"
 #include "tandem/formats/box.h"
 
 namespace tandem {

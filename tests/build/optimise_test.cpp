@@ -1,4 +1,4 @@
-#include "bvhbuild/tree/optimise.h"
+#include "bvhbuild/tree/topology.h"
 
 #include <gtest/gtest.h>
 
@@ -6,11 +6,9 @@
 #include <cstring>
 #include <random>
 
+#include "bvhbuild/tree/bounds.h"
 #include "bvhbuild/tree/exchange_search.h"
-#include "bvhbuild/tree/free_tree.h"
-#include "bvhbuild/tree/minimal_tree.h"
-#include "bvhbuild/tree/normalize.h"
-#include "bvhbuild/tree/region.h"
+#include "bvhbuild/tree/working_tree.h"
 #include "parallel/parallel.h"
 #include "sample_asset.h"
 #include "statistics/statistics.h"

@@ -3,7 +3,7 @@
 #include <numeric>
 #include <random>
 
-#include "bvhbuild/tree/emit.h"
+#include "bvhbuild/tree/topology.h"
 
 namespace tandem::test {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "bvhbuild/tree/assemble.h"
-#include "bvhbuild/tree/oriented_blocks.h"
+#include "bvhbuild/tree/tree.h"
 #include "tandem/formats/box.h"
 #include "tandem/formats/check.h"
 

@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "bvhbuild/import/read_gltf.h"
+#include "bvhbuild/import/readers.h"
 #include "mesh_invariants.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -1,4 +1,4 @@
-#include "bvhbuild/import/read_stl.h"
+#include "bvhbuild/import/readers.h"
 #include "fuzz_reader.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "bvhbuild/import/read_result.h"
+#include "bvhbuild/import/import.h"
 #include "mesh_invariants.h"
 
 namespace tandem::build {

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "bvhbuild/import/read_gltf.h"
+#include "bvhbuild/import/readers.h"
 #include "temp_folder.h"
 
 namespace tandem::build {

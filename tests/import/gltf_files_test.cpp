@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "bvhbuild/import/gltf_buffer.h"
+#include "bvhbuild/import/gltf_model.h"
 #include "bvhbuild/import/import.h"
 #include "gltf_file.h"
 

@@ -2,7 +2,7 @@
 #include <cstddef>
 #include <string>
 
-#include "bvhbuild/import/read_result.h"
+#include "bvhbuild/import/import.h"
 
 namespace tandem::build {
 

@@ -1,4 +1,4 @@
-#include "bvhbuild/import/number_text.h"
+#include "bvhbuild/import/scanner.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 #include <cmath>
 #include <string>
 
-#include "bvhbuild/import/read_obj.h"
+#include "bvhbuild/import/readers.h"
 #include "reader_test.h"
 
 namespace tandem::build {

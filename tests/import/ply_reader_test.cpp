@@ -2,7 +2,7 @@
 #include <cmath>
 #include <string>
 
-#include "bvhbuild/import/read_ply.h"
+#include "bvhbuild/import/readers.h"
 #include "reader_test.h"
 
 namespace tandem::build {

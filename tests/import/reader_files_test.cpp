@@ -6,10 +6,7 @@
 #include <iterator>
 #include <string>
 
-#include "bvhbuild/import/read_obj.h"
-#include "bvhbuild/import/read_off.h"
-#include "bvhbuild/import/read_ply.h"
-#include "bvhbuild/import/read_stl.h"
+#include "bvhbuild/import/readers.h"
 #include "reader_test.h"
 
 namespace tandem::build {

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "bvhbuild/import/read_result.h"
+#include "bvhbuild/import/import.h"
 #include "mesh_invariants.h"
 
 namespace tandem::build {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <string>
 
-#include "bvhbuild/import/read_stl.h"
+#include "bvhbuild/import/readers.h"
 #include "reader_test.h"
 
 namespace tandem::build {

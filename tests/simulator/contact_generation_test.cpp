@@ -1,4 +1,4 @@
-#include "bvhbench/simulator/contacts/contact_generation.h"
+#include "bvhbench/simulator/contacts.h"
 
 #include <gtest/gtest.h>
 #include <algorithm>

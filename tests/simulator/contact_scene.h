@@ -2,7 +2,7 @@
 #include <Eigen/Geometry>
 #include <vector>
 
-#include "bvhbench/simulator/contacts/contact_generation.h"
+#include "bvhbench/simulator/contacts.h"
 #include "kernels/query_scenes.h"
 #include "kernels/solid_meshes.h"
 

@@ -1,4 +1,4 @@
-#include "bvhbench/simulator/contacts/mass_properties.h"
+#include "bvhbench/simulator/mass_properties.h"
 
 #include <gtest/gtest.h>
 

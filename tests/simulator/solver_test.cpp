@@ -5,8 +5,7 @@
 #include <cmath>
 
 #include "analytic_contacts.h"
-#include "bvhbench/simulator/newton_step.h"
-#include "bvhbench/simulator/soft_step.h"
+#include "bvhbench/simulator/island_problem.h"
 
 namespace tandem::simulation {
 namespace {
@@ -120,7 +119,7 @@ struct OneStep {
     islands = find_islands(bodies, contacts);
     const std::vector<ContactImpulse> none(contacts.size());
     std::vector<std::uint32_t> place(bodies.size());
-    return make_island_problem(input(), 0, states, none, options, find_layers(bodies, contacts), place);
+    return make_island_problem(input(), 0, {states, none}, options, find_layers(bodies, contacts), place);
   }
   StepInput input() const { return {bodies, contacts, islands, kDt, {0, 0, -kGravity}, 0, true}; }
 

@@ -5,7 +5,7 @@
 
 #include "bvhbench/scenes/hdf5_file.h"
 #include "bvhbench/scenes/scene_motion.h"
-#include "bvhbench/simulator/contacts/mass_properties.h"
+#include "bvhbench/simulator/mass_properties.h"
 
 namespace tandem::bench {
 namespace {

@@ -1,7 +1,6 @@
 #include "level_pipeline.h"
 
-#include <algorithm>
-#include <cmath>
+#include <array>
 
 #include "bvhbuild/levels/ladder.h"
 #include "bvhbuild/levels/self_contacts.h"
@@ -10,19 +9,8 @@
 namespace tandem::build {
 namespace {
 
-double diagonal(const float* lower, const float* upper) {
-  return std::hypot(double{upper[0]} - lower[0], double{upper[1]} - lower[1], double{upper[2]} - lower[2]);
-}
-
 double diagonal(const StoredMesh& mesh) {
-  std::array<float, 3> lower = mesh.points[0], upper = lower;
-  for (const auto& point : mesh.points) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      lower[k] = std::min(lower[k], point[k]);
-      upper[k] = std::max(upper[k], point[k]);
-    }
-  }
-  return diagonal(lower.data(), upper.data());
+  return corner_bounds({mesh.points, mesh.triangles}).diagonal();
 }
 
 std::vector<double> wanted_lengths(const Options& options, const StoredMesh& mesh) {
@@ -97,7 +85,8 @@ CheckedImage build_file(const Options& options, const StoredMesh& mesh, AssetSou
 
 void describe_levels(const AssetView& asset, Outcome& outcome) {
   const FileHeader& header = *asset.header;
-  const double whole = diagonal(header.lower, header.upper);
+  const CornerBounds bounds = {std::to_array(header.lower), std::to_array(header.upper)};
+  const double whole = bounds.diagonal();
   for (std::uint32_t i = 0; i < asset.levels.size(); ++i) {
     const LevelView view = asset.level(i);
     LevelOutcome& level = outcome.levels[i];

@@ -3,10 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "bvhbuild/levels/level_mesh.h"
 #include "bvhbuild/meshing/stored_mesh.h"
 #include "bvhbuild/tree/assemble.h"
-#include "bvhbuild/tree/level_parts.h"
 #include "pipeline.h"
 
 namespace tandem::build {

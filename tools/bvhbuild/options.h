@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "bvhbuild/import/import.h"
-#include "bvhbuild/levels/level_errors.h"
+#include "bvhbuild/levels/ladder.h"
 #include "common/exit_code.h"
 #include "tandem/build/build_options.h"
 

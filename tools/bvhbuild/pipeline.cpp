@@ -1,39 +1,28 @@
 #include "pipeline.h"
 
-#include <chrono>
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "bvhbuild/import/import.h"
 #include "bvhbuild/meshing/clean.h"
 #include "bvhbuild/meshing/stored_mesh.h"
 #include "bvhbuild/meshing/triangulate.h"
+#include "common/json.h"
 #include "common/number_words.h"
 #include "common/output_file.h"
 #include "common/printable.h"
-#include "interrupt.h"
+#include "common/stopwatch.h"
 #include "level_pipeline.h"
 #include "parallel/parallel.h"
-#include "progress.h"
-#include "provenance.h"
+#include "tandem/formats/hash.h"
+#include "terminal.h"
 
 namespace tandem::build {
 namespace {
 
 namespace fs = std::filesystem;
-
-// Adds the time since it was made to `seconds`.
-class Stopwatch {
- public:
-  explicit Stopwatch(double& seconds) : seconds_(seconds) {}
-  ~Stopwatch() {
-    seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  }
-  Stopwatch(const Stopwatch&) = delete;
-  Stopwatch& operator=(const Stopwatch&) = delete;
-
- private:
-  double& seconds_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 Outcome& fail(Outcome& outcome, ExitCode code, const fs::path& file, const std::string& reason) {
   outcome.exit_code = code;
@@ -86,19 +75,67 @@ std::string why_no_triangle(const Outcome& outcome, const LeftOut& left_out) {
   return "holds no usable triangle: " + joined(causes);
 }
 
+InputDigest digest_of(const std::filesystem::path& path) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (file < 0) return {};
+  InputDigest digest;
+  struct stat info {};
+  if (::fstat(file, &info) == 0 && S_ISREG(info.st_mode) && info.st_size > 0) {
+    const auto bytes = static_cast<std::size_t>(info.st_size);
+    void* data = ::mmap(nullptr, bytes, PROT_READ, MAP_PRIVATE, file, 0);
+    if (data != MAP_FAILED) {
+      digest = {bytes, xxh64(data, bytes)};
+      ::munmap(data, bytes);
+    }
+  }
+  ::close(file);
+  return digest;
+}
+
+/// The provenance section of a file: input, its hash, options that shape the tree, tool, what cleaning met.
+/// Nothing that varies from run to run or with the number of threads, so that the same input gives the same
+/// bytes. Keys in docs/json.md.
+std::string provenance_json(const Options& options, const Outcome& outcome) {
+  Json found = Json::object();
+  for (const Finding& finding : findings(outcome.clean)) {
+    if (finding.count > 0) found[finding.key] = finding.count;
+  }
+  Json shaping = {{"imaginary", name(options.imaginary)}, {"effort", name(options.effort)}};
+  if (!options.gpu_blocks) shaping["gpu_blocks"] = false;
+  if (!options.topology) shaping["topology"] = false;
+  if (!options.levels.empty()) {
+    shaping["levels"] = Json::array();
+    for (const LevelError& error : options.levels) shaping["levels"].push_back(name(error));
+  }
+  if (outcome.interrupted) shaping["interrupted"] = true;
+  const Json json = {{"tool", "bvhbuild"},
+                     {"version", TANDEM_VERSION},
+                     {"input",
+                      {{"file", options.input.filename().string()},
+                       {"bytes", outcome.input.bytes},
+                       {"xxh64", hexadecimal(outcome.input.hash)},
+                       {"reader", outcome.reader},
+                       {"faces", outcome.clean.faces},
+                       {"vertices", outcome.clean.vertices}}},
+                     {"options", shaping},
+                     {"findings", found}};
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 StoredMesh prepare(PolygonMesh& polygons, Outcome& outcome) {
-  const Stopwatch watch(outcome.seconds.clean);
+  Stopwatch stopwatch;
   TriangleMesh triangles = triangulate(polygons, outcome.clean);
   clean(triangles, outcome.clean);
   StoredMesh mesh = to_single_precision(triangles, outcome.clean);
   std::copy(mesh.origin.begin(), mesh.origin.end(), outcome.origin);
   outcome.rounding_error = mesh.largest_rounding_error;
+  outcome.seconds.clean = stopwatch.lap();
   return mesh;
 }
 
 Image build_image(const Options& options, const PolygonMesh& polygons, const StoredMesh& mesh,
                   Progress& progress, Outcome& outcome) {
-  const Stopwatch stopwatch(outcome.seconds.build);
+  Stopwatch stopwatch;
   OptimisationWatch watch;
   watch.progress = [&](double share) { progress.share(share); };
   const StopOnInterrupt interrupt(options.effort == Effort::best ? &watch.stop : nullptr);
@@ -114,6 +151,7 @@ Image build_image(const Options& options, const PolygonMesh& polygons, const Sto
   outcome.hash = hexadecimal(header.hash);
   outcome.file_bytes = header.file_bytes;
   if (!options.levels.empty()) describe_levels(asset, outcome);
+  outcome.seconds.build = stopwatch.lap();
   return std::move(image);
 }
 
@@ -128,12 +166,10 @@ Outcome run_pipeline(const Options& options) {
   Progress progress(!options.quiet, printable(options.input.filename().string()));
 
   progress.step("import");
-  ImportResult imported;
-  {
-    const Stopwatch watch(outcome.seconds.import);
-    imported = import_mesh(options.input, options.import);
-    outcome.input = digest_of(options.input);
-  }
+  Stopwatch stopwatch;
+  ImportResult imported = import_mesh(options.input, options.import);
+  outcome.input = digest_of(options.input);
+  outcome.seconds.import = stopwatch.lap();
   if (!imported.ok) return fail(outcome, kUnreadableInput, options.input, imported.error);
   PolygonMesh& polygons = imported.mesh;
   outcome.reader = polygons.reader;
@@ -158,11 +194,9 @@ Outcome run_pipeline(const Options& options) {
   const Image image = build_image(options, polygons, mesh, progress, outcome);
 
   progress.step("write");
-  std::string error;
-  {
-    const Stopwatch watch(outcome.seconds.write);
-    error = write_whole_file(options.output, {image.data(), image.size()});
-  }
+  stopwatch.lap();
+  const std::string error = write_whole_file(options.output, {image.data(), image.size()});
+  outcome.seconds.write = stopwatch.lap();
   if (!error.empty()) return fail(outcome, kUnwritableOutput, options.output, error);
   return outcome;
 }

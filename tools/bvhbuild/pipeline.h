@@ -6,12 +6,17 @@
 
 #include "bvhbuild/levels/ladder.h"
 #include "common/exit_code.h"
-#include "input_digest.h"
 #include "options.h"
 #include "statistics/statistics.h"
 #include "tandem/build/clean_report.h"
 
 namespace tandem::build {
+
+/// Size and XXH64 of a file's bytes: what `xxhsum -H64` prints. Both zero where the file cannot be read.
+struct InputDigest {
+  std::uint64_t bytes = 0;
+  std::uint64_t hash = 0;
+};
 
 /// One level of the file that was written.
 struct LevelOutcome {

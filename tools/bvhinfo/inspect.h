@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "level_check.h"
+#include "statistics/statistics.h"
 #include "statistics/statistics_json.h"
-#include "statistics/surface_counts.h"
 #include "tandem/runtime/map.h"
 
 namespace tandem {

@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <span>
 
-#include "levels/point_distance.h"
+#include "levels/nearest_triangle.h"
 #include "tandem/formats/view.h"
 
 namespace tandem::levels {

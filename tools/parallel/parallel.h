@@ -88,13 +88,15 @@ Sum reduce(std::size_t count, std::size_t grain, const Sum& zero, const Part& pa
 /// Calls first() and second().
 template <typename First, typename Second>
 void invoke(const First& first, const Second& second) {
-  for_each(2, [&](std::size_t i) {
-    if (i == 0) {
-      first();
-    } else {
-      second();
-    }
-  });
+  for_each(2, [&](std::size_t i) { i == 0 ? first() : second(); });
+}
+
+/// Calls first() and second() on this thread where it is not worth_while to share them.
+template <typename First, typename Second>
+void invoke_if(bool worth_while, const First& first, const Second& second) {
+  if (worth_while) return invoke(first, second);
+  first();
+  second();
 }
 
 /// Sorts by <. Ranges of up to `grain` are sorted by one thread.

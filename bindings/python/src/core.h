@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "bytes.h"
 #include "tandem/tandem.h"
 #include "without_lock.h"
 
@@ -17,41 +18,7 @@ namespace nb = nanobind;
 /// Throws the Python exception of a status that is not TANDEM_OK (tandem._errors.from_status).
 void check(tandem_status status, std::uint64_t where = 0);
 
-/// The contiguous bytes of a Python object, for as long as this lives.
-class Bytes {
- public:
-  explicit Bytes(nb::handle object);
-  ~Bytes() { PyBuffer_Release(&view_); }
-  Bytes(const Bytes&) = delete;
-  Bytes& operator=(const Bytes&) = delete;
-  const void* data() const { return view_.buf; }
-  std::size_t size() const { return static_cast<std::size_t>(view_.len); }
-
- private:
-  Py_buffer view_;
-};
-
-/// Throws ValueError: a buffer is not of whole rows. The package's Python files never let that happen.
-[[noreturn]] void throw_broken_rows();
-
-/// A copy of an array's rows, which other threads cannot change while the interpreter runs them.
-template <typename Row>
-std::vector<Row> copy_rows(nb::handle object) {
-  const Bytes bytes(object);
-  if (bytes.size() % sizeof(Row) != 0) throw_broken_rows();
-  const Row* first = static_cast<const Row*>(bytes.data());
-  return {first, first + bytes.size() / sizeof(Row)};
-}
-
-/// A new bytearray with a copy of bytes; null: not yet filled.
-nb::object make_bytes(const void* bytes, std::size_t size);
 void* bytes_begin(nb::handle bytearray);
-
-/// A copy of rows that a query has, as a bytearray: NumPy makes an array of it that owns it.
-template <typename Row>
-nb::object to_python(const Row* rows, std::size_t count) {
-  return make_bytes(rows, count * sizeof(Row));
-}
 
 /// A checked file in memory, by one reference to it.
 class Asset {

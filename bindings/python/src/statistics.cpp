@@ -7,7 +7,6 @@
 #include "core.h"
 #include "handles.h"
 #include "levels/level_bytes.h"
-#include "statistics/surface_counts.h"
 
 namespace tandem::python {
 namespace {

@@ -1,5 +1,3 @@
-#include "closed_mesh_check.h"
-
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/connected_components.h>
 #include <CGAL/Polygon_mesh_processing/orientation.h>
@@ -9,6 +7,8 @@
 #include <CGAL/Surface_mesh.h>
 
 #include <algorithm>
+
+#include "mesh.h"
 
 namespace tandem::makeassets {
 namespace {

@@ -4,11 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "closed_mesh_check.h"
-#include "cow_mesh.h"
-#include "rock.h"
-#include "terrain.h"
-#include "write_mesh.h"
+#include "shapes.h"
 
 namespace {
 

@@ -7,9 +7,12 @@ namespace {
 
 using Eigen::Vector3d;
 
-template <typename Contact>
-BodyPair pair_of(const Contact& contact) {
+BodyPair pair_of(const ContactPoint& contact) {
   return {contact.body_a, contact.body_b};
+}
+
+BodyPair pair_of(const CachedContact& contact) {
+  return contact.pair;
 }
 
 // The contacts of a pair that a list by ascending pair begins with.
@@ -20,36 +23,24 @@ std::span<const Contact> head_of(std::span<const Contact> contacts, const BodyPa
   return contacts.first(count);
 }
 
-Vector3d into_body(const BodyState& state, const Vector3d& point) {
-  return state.orientation.conjugate() * (point - state.position);
-}
-
-Vector3d into_world(const BodyState& state, const Vector3d& point) {
-  return state.position + state.orientation * point;
-}
-
 double smaller_radius(const BodyPair& pair, std::span<const BodyProperties> bodies) {
   return std::min(bodies[pair.a].radius, bodies[pair.b].radius);
 }
 
-RelativePose relative_pose(const BodyPair& pair, std::span<const BodyProperties> bodies,
-                           std::span<const BodyState> states) {
+PairPose pair_pose(const BodyPair& pair, std::span<const BodyProperties> bodies,
+                   std::span<const BodyState> states) {
   const bool first_is_smaller = bodies[pair.a].radius < bodies[pair.b].radius;
   const BodyState& smaller = states[first_is_smaller ? pair.a : pair.b];
   const BodyState& larger = states[first_is_smaller ? pair.b : pair.a];
   return {into_body(larger, smaller.position), larger.orientation.conjugate() * smaller.orientation};
 }
 
-CachedContact cached(const ContactPoint& contact, const RelativePose& found_at,
+CachedContact cached(const ContactPoint& contact, const PairPose& found_at,
                      std::span<const BodyState> states) {
-  const BodyState &a = states[contact.body_a], &b = states[contact.body_b];
-  return {contact.body_a,
-          contact.body_b,
+  return {pair_of(contact),
           contact.feature,
-          into_body(a, contact.position),
-          into_body(b, contact.position),
-          a.orientation.conjugate() * contact.normal,
-          contact.depth,
+          anchor_of(contact, states),
+          states[contact.body_a].orientation.conjugate() * contact.normal,
           found_at,
           0,
           {}};
@@ -57,19 +48,18 @@ CachedContact cached(const ContactPoint& contact, const RelativePose& found_at,
 
 // Where the bodies have carried a contact since it was found.
 ContactPoint moved_with_bodies(const CachedContact& entry, std::span<const BodyState> states) {
-  const BodyState &a = states[entry.body_a], &b = states[entry.body_b];
-  const Vector3d on_a = into_world(a, entry.in_a), on_b = into_world(b, entry.in_b);
-  const Vector3d normal = (a.orientation * entry.normal_in_a).normalized();
-  return {entry.body_a, entry.body_b, 0.5 * (on_a + on_b), normal, entry.depth - normal.dot(on_b - on_a),
-          entry.feature};
+  const Vector3d normal = (states[entry.pair.a].orientation * entry.normal_in_a).normalized();
+  ContactPoint moved = {entry.pair.a, entry.pair.b, {}, normal, 0, entry.feature};
+  carry(moved, entry.anchor, states);
+  return moved;
 }
 
 // Whether it is a gap that may close again.
 bool is_just_lost(const CachedContact& entry, const ContactPoint& moved, std::span<const BodyState> states,
                   double gap, double near) {
   constexpr std::uint32_t kLife = 8;  // steps; boxes side by side would keep all that ever touched
-  const Vector3d by =
-      into_world(states[entry.body_b], entry.in_b) - into_world(states[entry.body_a], entry.in_a);
+  const Vector3d by = into_world(states[entry.pair.b], entry.anchor.in_b) -
+                      into_world(states[entry.pair.a], entry.anchor.in_a);
   const double across = (by - moved.normal.dot(by) * moved.normal).norm();
   return entry.quiet_steps < kLife && -gap <= moved.depth && moved.depth <= 0 && across <= near;
 }
@@ -97,8 +87,8 @@ class PairMatch {
       std::size_t nearest = old_.size();
       double least = reach * reach;
       for (std::size_t j = 0; j < old_.size(); ++j) {
-        const double apart = std::min((old_[j].in_a - now_[i].in_a).squaredNorm(),
-                                      (old_[j].in_b - now_[i].in_b).squaredNorm());
+        const double apart = std::min((old_[j].anchor.in_a - now_[i].anchor.in_a).squaredNorm(),
+                                      (old_[j].anchor.in_b - now_[i].anchor.in_b).squaredNorm());
         if (!is_taken_[j] && apart < least) least = apart, nearest = j;
       }
       if (nearest < old_.size()) take(i, nearest);
@@ -136,8 +126,8 @@ std::vector<BodyPair> ContactCache::unmoved(std::span<const BodyProperties> bodi
   std::vector<BodyPair> pairs;
   for (std::span<const CachedContact> rest = entries_; !rest.empty();) {
     const BodyPair pair = pair_of(rest.front());
-    const RelativePose& then = rest.front().found_at;
-    const RelativePose now = relative_pose(pair, bodies, states);
+    const PairPose& then = rest.front().found_at;
+    const PairPose now = pair_pose(pair, bodies, states);
     // A point's way is at most that of the centre and an arc about it.
     const double way = (now.translation - then.translation).norm() +
                        smaller_radius(pair, bodies) * now.rotation.angularDistance(then.rotation);
@@ -168,14 +158,13 @@ void ContactCache::update(std::span<const ContactPoint> found, std::span<const B
     if (std::binary_search(unmoved.begin(), unmoved.end(), pair)) {
       for (const CachedContact& entry : old) add(entry, moved_with_bodies(entry, states));
     } else {
-      renew(old, fresh, relative_pose(pair, bodies, states), states, gap, smaller_radius(pair, bodies));
+      renew(old, fresh, pair_pose(pair, bodies, states), states, gap, smaller_radius(pair, bodies));
     }
   }
 }
 
 void ContactCache::renew(std::span<const CachedContact> old, std::span<const ContactPoint> found,
-                         const RelativePose& now, std::span<const BodyState> states, double gap,
-                         double radius) {
+                         const PairPose& now, std::span<const BodyState> states, double gap, double radius) {
   constexpr double kNear = 0.02, kMatches = 0.1;  // of the smaller body's radius
   const double near = kNear * radius;
   const std::size_t first = entries_.size(), first_contact = contacts_.size();

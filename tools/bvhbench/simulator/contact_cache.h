@@ -6,26 +6,24 @@
 #include <utility>
 #include <vector>
 
-#include "contact_point.h"
-#include "rigid_body.h"
+#include "contacts.h"
 
 namespace tandem::simulation {
 
 /// How the smaller of two bodies stands in the frame of the larger, about their centres of mass.
-struct RelativePose {
+struct PairPose {
   Eigen::Vector3d translation;
   Eigen::Quaterniond rotation;
 };
 
 /// A contact of a step and its impulse, as the next step needs them.
 struct CachedContact {
-  std::uint32_t body_a, body_b;
+  BodyPair pair;
   std::uint64_t feature;
-  Eigen::Vector3d in_a, in_b;   ///< the position, in the bodies' frames about their centres of mass
-  Eigen::Vector3d normal_in_a;  ///< the normal, likewise
-  double depth;
-  RelativePose found_at;  ///< when contacts of the pair were last found, the same for all of the pair; the
-                          ///< above is of when this contact was
+  ContactAnchor anchor;
+  Eigen::Vector3d normal_in_a;  ///< the normal, in a's frame
+  PairPose found_at;  ///< when contacts of the pair were last found, the same for all of the pair; the
+                      ///< above is of when this contact was
   std::uint32_t quiet_steps;  ///< since it was found or last pushed
   ContactImpulse impulse;     ///< of the last step
 };
@@ -75,7 +73,7 @@ class ContactCache {
 
  private:
   // Of a pair that moved: makes its contacts of those found and those just lost.
-  void renew(std::span<const CachedContact> old, std::span<const ContactPoint> found, const RelativePose& now,
+  void renew(std::span<const CachedContact> old, std::span<const ContactPoint> found, const PairPose& now,
              std::span<const BodyState> states, double gap, double radius);
   void add(const CachedContact& entry, const ContactPoint& contact);
 

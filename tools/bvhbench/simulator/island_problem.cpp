@@ -28,13 +28,6 @@ Vector6 gradient(const MassScale& scale, const Vector3d& direction, const Vector
   return row;
 }
 
-// Any unit vector across the normal, the same for the same normal.
-Vector3d across(const Vector3d& normal) {
-  int smallest = 0;
-  normal.cwiseAbs().minCoeff(&smallest);
-  return normal.cross(Vector3d::Unit(smallest)).normalized();
-}
-
 class ProblemMaker {
  public:
   ProblemMaker(const StepInput& input, std::span<const BodyState> states, const SolverOptions& options,
@@ -185,16 +178,15 @@ class ProblemMaker {
 
 }  // namespace
 
-IslandProblem make_island_problem(const StepInput& input, std::size_t island,
-                                  std::span<const BodyState> states, std::span<const ContactImpulse> impulses,
+IslandProblem make_island_problem(const StepInput& input, std::size_t island, const StepStart& start,
                                   const SolverOptions& options, std::span<const std::uint32_t> layers,
                                   std::span<std::uint32_t> place) {
-  return ProblemMaker(input, states, options, layers, place).make(island, impulses);
+  return ProblemMaker(input, start.states, options, layers, place).make(island, start.impulses);
 }
 
-IslandResidual residual_of(const IslandProblem& problem, std::span<const double> target, double friction,
-                           double share) {
-  IslandResidual all;
+Residual residual_of(const IslandProblem& problem, std::span<const double> target, double friction,
+                     double share) {
+  Residual all;
   for (std::size_t i = 0; i < problem.contact_count(); ++i) {
     const ContactRow* rows[] = {&problem.normal[i], &problem.first[i], &problem.second[i]};
     const Vector3d impulse = share * problem.impulse[i];
@@ -207,9 +199,7 @@ IslandResidual residual_of(const IslandProblem& problem, std::span<const double>
       const double rest =
           k == 0 ? 0 : std::sqrt(std::max(0.0, bound * bound - impulse[3 - k] * impulse[3 - k]));
       const double next = k == 0 ? std::max(0.0, wanted) : std::clamp(wanted, -rest, rest);
-      const double residual = std::fabs(next - impulse[k]) * mobility;
-      all.largest = std::max(all.largest, residual);
-      all.squares += residual * residual;
+      all.add(std::fabs(next - impulse[k]) * mobility);
     }
   }
   return all;

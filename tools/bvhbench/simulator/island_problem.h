@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -86,25 +87,60 @@ struct IslandProblem {
   }
 };
 
-/// What is left of a step's problem, as SolverStatistics says.
-struct IslandResidual {
-  double largest = 0, squares = 0;
-};
-
 /// target: of the velocities along the normals. share: part of the problem's impulses that the law is asked
 /// of.
-IslandResidual residual_of(const IslandProblem& problem, std::span<const double> target, double friction,
-                           double share);
+Residual residual_of(const IslandProblem& problem, std::span<const double> target, double friction,
+                     double share);
+
+/// The bodies at the start of a step, and the impulses that its contacts start with.
+struct StepStart {
+  std::span<const BodyState> states;
+  std::span<const ContactImpulse> impulses;
+};
 
 /// The contacts come by ascending layer of their lower body (find_layers()), so that a sweep goes up from the
 /// ground. place: for each body of the step a number that this may change.
-IslandProblem make_island_problem(const StepInput& input, std::size_t island,
-                                  std::span<const BodyState> states, std::span<const ContactImpulse> impulses,
+IslandProblem make_island_problem(const StepInput& input, std::size_t island, const StepStart& start,
                                   const SolverOptions& options, std::span<const std::uint32_t> layers,
                                   std::span<std::uint32_t> place);
 
 /// Moves the island's bodies by the displacement, gives them the velocities, and hands out the impulses.
 void apply_solution(const IslandProblem& problem, const StepInput& input, std::span<BodyState> states,
                     std::span<ContactImpulse> impulses);
+
+/// Solves a step in substeps of length h = dt / substeps. Each: velocities by gravity and the impulses of the
+/// substep before; one sweep over soft normal rows; positions by the new velocities; two relaxing sweeps over
+/// the normal rows without their push; one over friction, within the cone of the impulse that the normal row
+/// has then, and one over rolling resistance. Restitution comes after all substeps.
+///
+/// A soft row is a damped spring of frequency f = 1 / (8 h) and damping ratio 10 (2 f and 5 against what does
+/// not move), taken implicitly: it gives way to what one sweep cannot solve, and its push never becomes
+/// speed, because the relaxing sweeps take it back.
+///
+/// Results: velocity, displacement, impulse of the problem, and what its last substep leaves undone.
+Residual solve_soft_step(IslandProblem& problem, const StepInput& input, const SolverOptions& options);
+
+/// What Newton's method did.
+struct NewtonReport {
+  bool converged = false;
+  std::uint32_t factorisations = 0;
+  std::uint32_t passes = 0;
+  Residual residual;
+};
+
+/// Solves a step of a whole island to convergence, in passes. Each finds the velocities that make the
+/// function of ConvexContacts least, with the impulses and the bounds of friction that the pass before ended
+/// with; the first starts from those of the step before. At the least, a contact misses its law by R times
+/// the change of its impulse, so passes end in Coulomb's law without any softness (the method of multipliers;
+/// Tresca's iteration for friction). They end when another would change no velocity of a contact by more than
+/// 10^-4 of what gravity gives in a step, and 10^-6 of the fastest approach.
+///
+/// The displacement is that of the velocities nearest, in the metric of mass, to the mean of those at the
+/// start and at the end, that bring no contact deeper than the slop and take away the part `correction` of
+/// what is deeper. The mean makes sliding and stopping right to second order.
+///
+/// Results, if it converged: velocity, displacement and impulse of the problem; else these stay what they
+/// were.
+NewtonReport solve_newton_step(IslandProblem& problem, const StepInput& input, const SolverOptions& options);
 
 }  // namespace tandem::simulation

@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "bvhbench/engines/engine.h"
-#include "bvhbench/simulator/contacts/mass_properties.h"
+#include "mass_properties.h"
 
 namespace tandem::simulation {
 
@@ -26,6 +26,14 @@ struct BodyState {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();
 };
+
+/// A point of the world in the body's frame about its centre of mass, and back.
+inline Eigen::Vector3d into_body(const BodyState& state, const Eigen::Vector3d& point) {
+  return state.orientation.conjugate() * (point - state.position);
+}
+inline Eigen::Vector3d into_world(const BodyState& state, const Eigen::Vector3d& point) {
+  return state.position + state.orientation * point;
+}
 
 /// Properties of a dynamic body of a mesh with this mass. radius is left as it is.
 BodyProperties body_properties(std::uint32_t shape, const MassProperties& mesh, double density);

@@ -1,7 +1,9 @@
 #include "run_file.h"
 
 #include <algorithm>
-#include <variant>
+#include <functional>
+#include <type_traits>
+#include <utility>
 
 #include "bvhbench/scenes/hdf5_file.h"
 
@@ -14,113 +16,160 @@ using bench::Hdf5Output;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-struct Column {
-  const char* name;
-  std::variant<double StepRecord::*, std::uint64_t StepRecord::*, Vector3d StepRecord::*> member;
+// What a value is in a dataset: its type there, and how many numbers.
+template <typename Value>
+struct Stored {
+  using Number = Value;
+  static constexpr std::size_t kWidth = 1;
+  static void append(std::vector<Number>& numbers, const Value& value) { numbers.push_back(value); }
+  static Value at(const std::vector<Number>& numbers, std::size_t i) { return numbers[i]; }
 };
 
-// Every dataset of /frames, one row for each step.
-const Column kColumns[] = {
-    {"time", &StepRecord::time},
-    {"seconds/update", &StepRecord::update_seconds},
-    {"seconds/broad_phase", &StepRecord::broad_phase_seconds},
-    {"seconds/traversal", &StepRecord::traversal_seconds},
-    {"seconds/triangle_tests", &StepRecord::triangle_test_seconds},
-    {"seconds/transfer", &StepRecord::transfer_seconds},
-    {"seconds/contacts", &StepRecord::contact_seconds},
-    {"seconds/solver", &StepRecord::solver_seconds},
-    {"seconds/step", &StepRecord::step_seconds},
-    {"object_pairs", &StepRecord::object_pairs},
-    {"block_pairs", &StepRecord::block_pairs},
-    {"candidates", &StepRecord::candidates},
-    {"triangle_pairs", &StepRecord::triangle_pairs},
-    {"segments", &StepRecord::segments},
-    {"patches", &StepRecord::patches},
-    {"open_curves", &StepRecord::open_curves},
-    {"contacts", &StepRecord::contacts},
-    {"islands", &StepRecord::islands},
-    {"newton_islands", &StepRecord::newton_islands},
-    {"sleeping", &StepRecord::sleeping},
-    {"reentered", &StepRecord::reentered},
-    {"contact_ratio", &StepRecord::contact_ratio},
-    {"contact_area", &StepRecord::contact_area},
-    {"penetration_max", &StepRecord::penetration_max},
-    {"penetration_mean", &StepRecord::penetration_mean},
-    {"residual_max", &StepRecord::residual_max},
-    {"residual_rms", &StepRecord::residual_rms},
-    {"kinetic_energy", &StepRecord::kinetic_energy},
-    {"potential_energy", &StepRecord::potential_energy},
-    {"linear_momentum", &StepRecord::linear_momentum},
-    {"angular_momentum", &StepRecord::angular_momentum},
-    {"speed_max", &StepRecord::speed_max},
-    {"speed_mean", &StepRecord::speed_mean},
-    {"spin_max", &StepRecord::spin_max},
+template <>
+struct Stored<Vector3d> {
+  using Number = double;
+  static constexpr std::size_t kWidth = 3;
+  static void append(std::vector<double>& numbers, const Vector3d& vector) {
+    numbers.insert(numbers.end(), vector.data(), vector.data() + 3);
+  }
+  static Vector3d at(const std::vector<double>& numbers, std::size_t i) {
+    return Vector3d(numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]);
+  }
 };
 
-std::string name_of(const Column& column) {
-  return std::string("/frames/") + column.name;
-}
-
-void append(std::vector<double>& numbers, const Vector3d& vector) {
-  numbers.insert(numbers.end(), vector.data(), vector.data() + 3);
-}
-
-void append(std::vector<double>& numbers, const Quaterniond& turn) {
-  numbers.insert(numbers.end(), {turn.w(), turn.x(), turn.y(), turn.z()});
-}
-
-Vector3d vector_at(const std::vector<double>& numbers, std::size_t i) {
-  return Vector3d(numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]);
-}
-
-Quaterniond turn_at(const std::vector<double>& numbers, std::size_t i) {
-  return Quaterniond(numbers[4 * i], numbers[4 * i + 1], numbers[4 * i + 2], numbers[4 * i + 3]);
-}
-
-void write_records(Hdf5Output& file, const std::vector<StepRecord>& records) {
-  for (const Column& column : kColumns) {
-    if (const auto* number = std::get_if<double StepRecord::*>(&column.member)) {
-      std::vector<double> values;
-      for (const StepRecord& record : records) values.push_back(record.**number);
-      file.add(name_of(column), {records.size()}, values);
-    } else if (const auto* count = std::get_if<std::uint64_t StepRecord::*>(&column.member)) {
-      std::vector<std::uint64_t> values;
-      for (const StepRecord& record : records) values.push_back(record.**count);
-      file.add(name_of(column), {records.size()}, values);
-    } else {
-      std::vector<double> values;
-      for (const StepRecord& record : records) {
-        append(values, record.*std::get<Vector3d StepRecord::*>(column.member));
-      }
-      file.add(name_of(column), {records.size(), 3}, values);
-    }
+template <>
+struct Stored<Quaterniond> {
+  using Number = double;
+  static constexpr std::size_t kWidth = 4;
+  static void append(std::vector<double>& numbers, const Quaterniond& turn) {
+    numbers.insert(numbers.end(), {turn.w(), turn.x(), turn.y(), turn.z()});
   }
-}
-
-// One of the columns into all records, which are made with the first.
-template <typename Values, typename Value>
-void fill(std::vector<StepRecord>& records, std::size_t width, const Values& values, const Value& value_at) {
-  if (records.empty()) records.resize(values.size() / width);
-  for (std::size_t i = 0; i < std::min(records.size(), values.size() / width); ++i) value_at(records[i], i);
-}
-
-std::vector<StepRecord> read_records(const Hdf5Input& file) {
-  std::vector<StepRecord> records;
-  for (const Column& column : kColumns) {
-    if (const auto* number = std::get_if<double StepRecord::*>(&column.member)) {
-      const auto values = file.read_f64(name_of(column));
-      fill(records, 1, values, [&](StepRecord& record, std::size_t i) { record.** number = values[i]; });
-    } else if (const auto* count = std::get_if<std::uint64_t StepRecord::*>(&column.member)) {
-      const auto values = file.read_u64(name_of(column));
-      fill(records, 1, values, [&](StepRecord& record, std::size_t i) { record.** count = values[i]; });
-    } else {
-      const auto member = std::get<Vector3d StepRecord::*>(column.member);
-      const auto values = file.read_f64(name_of(column), {3});
-      fill(records, 3, values,
-           [&](StepRecord& record, std::size_t i) { record.*member = vector_at(values, i); });
-    }
+  static Quaterniond at(const std::vector<double>& numbers, std::size_t i) {
+    return Quaterniond(numbers[4 * i], numbers[4 * i + 1], numbers[4 * i + 2], numbers[4 * i + 3]);
   }
-  return records;
+};
+
+template <>
+struct Stored<BodyPair> {
+  using Number = std::uint32_t;
+  static constexpr std::size_t kWidth = 2;
+  static void append(std::vector<std::uint32_t>& numbers, const BodyPair& pair) {
+    numbers.insert(numbers.end(), {pair.a, pair.b});
+  }
+  static BodyPair at(const std::vector<std::uint32_t>& numbers, std::size_t i) {
+    return {numbers[2 * i], numbers[2 * i + 1]};
+  }
+};
+
+// The datasets of a kind of row: calls visit(name, member) for each, one row for each element.
+template <typename Visit>
+void for_each_column(const StepRecord&, const Visit& visit) {
+  visit("/frames/time", &StepRecord::time);
+  visit("/frames/seconds/update", &StepRecord::update_seconds);
+  visit("/frames/seconds/broad_phase", &StepRecord::broad_phase_seconds);
+  visit("/frames/seconds/traversal", &StepRecord::traversal_seconds);
+  visit("/frames/seconds/triangle_tests", &StepRecord::triangle_test_seconds);
+  visit("/frames/seconds/transfer", &StepRecord::transfer_seconds);
+  visit("/frames/seconds/contacts", &StepRecord::contact_seconds);
+  visit("/frames/seconds/solver", &StepRecord::solver_seconds);
+  visit("/frames/seconds/step", &StepRecord::step_seconds);
+  visit("/frames/object_pairs", &StepRecord::object_pairs);
+  visit("/frames/block_pairs", &StepRecord::block_pairs);
+  visit("/frames/candidates", &StepRecord::candidates);
+  visit("/frames/triangle_pairs", &StepRecord::triangle_pairs);
+  visit("/frames/segments", &StepRecord::segments);
+  visit("/frames/patches", &StepRecord::patches);
+  visit("/frames/open_curves", &StepRecord::open_curves);
+  visit("/frames/contacts", &StepRecord::contacts);
+  visit("/frames/islands", &StepRecord::islands);
+  visit("/frames/newton_islands", &StepRecord::newton_islands);
+  visit("/frames/sleeping", &StepRecord::sleeping);
+  visit("/frames/reentered", &StepRecord::reentered);
+  visit("/frames/contact_ratio", &StepRecord::contact_ratio);
+  visit("/frames/contact_area", &StepRecord::contact_area);
+  visit("/frames/penetration_max", &StepRecord::penetration_max);
+  visit("/frames/penetration_mean", &StepRecord::penetration_mean);
+  visit("/frames/residual_max", &StepRecord::residual_max);
+  visit("/frames/residual_rms", &StepRecord::residual_rms);
+  visit("/frames/kinetic_energy", &StepRecord::kinetic_energy);
+  visit("/frames/potential_energy", &StepRecord::potential_energy);
+  visit("/frames/linear_momentum", &StepRecord::linear_momentum);
+  visit("/frames/angular_momentum", &StepRecord::angular_momentum);
+  visit("/frames/speed_max", &StepRecord::speed_max);
+  visit("/frames/speed_mean", &StepRecord::speed_mean);
+  visit("/frames/spin_max", &StepRecord::spin_max);
+}
+
+template <typename Visit>
+void for_each_column(const BodyState&, const Visit& visit) {
+  visit("/state/position", &BodyState::position);
+  visit("/state/orientation", &BodyState::orientation);
+  visit("/state/velocity", &BodyState::velocity);
+  visit("/state/angular_velocity", &BodyState::angular_velocity);
+}
+
+template <typename Visit>
+void for_each_column(const CachedContact&, const Visit& visit) {
+  visit("/state/contacts/pair", &CachedContact::pair);
+  visit("/state/contacts/feature", &CachedContact::feature);
+  visit(
+      "/state/contacts/in_a", [](auto& c) -> auto& { return c.anchor.in_a; });
+  visit(
+      "/state/contacts/in_b", [](auto& c) -> auto& { return c.anchor.in_b; });
+  visit("/state/contacts/normal_in_a", &CachedContact::normal_in_a);
+  visit(
+      "/state/contacts/depth", [](auto& c) -> auto& { return c.anchor.depth; });
+  visit(
+      "/state/contacts/found_at_translation", [](auto& c) -> auto& { return c.found_at.translation; });
+  visit(
+      "/state/contacts/found_at_rotation", [](auto& c) -> auto& { return c.found_at.rotation; });
+  visit("/state/contacts/quiet_steps", &CachedContact::quiet_steps);
+  visit(
+      "/state/contacts/normal_impulse", [](auto& c) -> auto& { return c.impulse.normal; });
+  visit(
+      "/state/contacts/tangential_impulse", [](auto& c) -> auto& { return c.impulse.tangential; });
+  visit(
+      "/state/contacts/turning_impulse", [](auto& c) -> auto& { return c.impulse.turning; });
+}
+
+template <typename Of>
+bench::Shape row_shape() {
+  return Of::kWidth == 1 ? bench::Shape() : bench::Shape{Of::kWidth};
+}
+
+template <typename Row>
+void write_rows(Hdf5Output& file, const std::vector<Row>& rows) {
+  for_each_column(Row(), [&](const char* name, auto member) {
+    using Of = Stored<std::decay_t<decltype(std::invoke(member, rows[0]))>>;
+    std::vector<typename Of::Number> numbers;
+    for (const Row& row : rows) Of::append(numbers, std::invoke(member, row));
+    bench::Shape shape = row_shape<Of>();
+    shape.insert(shape.begin(), rows.size());
+    file.add(name, shape, numbers);
+  });
+}
+
+template <typename Number>
+std::vector<Number> read_numbers(const Hdf5Input& file, const char* name, const bench::Shape& row) {
+  if constexpr (std::is_same_v<Number, double>) return file.read_f64(name, row);
+  if constexpr (std::is_same_v<Number, std::uint32_t>) return file.read_u32(name, row);
+  if constexpr (std::is_same_v<Number, std::uint64_t>) return file.read_u64(name, row);
+}
+
+// Reads rows, as many as the first dataset has. Result: whether all have as many.
+template <typename Row>
+bool read_rows(const Hdf5Input& file, std::vector<Row>& rows) {
+  bool first = true, alike = true;
+  for_each_column(Row(), [&](const char* name, auto member) {
+    using Of = Stored<std::decay_t<decltype(std::invoke(member, rows[0]))>>;
+    const auto numbers = read_numbers<typename Of::Number>(file, name, row_shape<Of>());
+    const std::size_t count = numbers.size() / Of::kWidth;
+    alike = alike && (first || count == rows.size());
+    if (std::exchange(first, false)) rows.resize(count);
+    for (std::size_t i = 0; i < std::min(rows.size(), count); ++i)
+      std::invoke(member, rows[i]) = Of::at(numbers, i);
+  });
+  return alike;
 }
 
 void write_bodies(Hdf5Output& file, const RunDescription& run) {
@@ -131,7 +180,7 @@ void write_bodies(Hdf5Output& file, const RunDescription& run) {
     level.push_back(run.shapes[body.shape].level);
     motion.push_back(static_cast<std::uint32_t>(body.motion));
     mass.push_back(body.motion == Motion::moving ? body.mass : 0);
-    append(center, body.center);
+    Stored<Vector3d>::append(center, body.center);
     inertia.insert(inertia.end(), body.inertia.data(), body.inertia.data() + 9);  // symmetric
   }
   const std::size_t count = run.bodies.size();
@@ -165,117 +214,34 @@ Trajectory read_trajectory(const Hdf5Input& file, const std::string& path, std::
   return trajectory;
 }
 
-void write_contacts(Hdf5Output& file, std::span<const CachedContact> contacts) {
-  std::vector<double> in_a, in_b, normal_in_a, depth, translation, rotation, normal, tangential, turning;
-  std::vector<std::uint32_t> pair, quiet;
-  std::vector<std::uint64_t> feature;
-  for (const CachedContact& contact : contacts) {
-    pair.insert(pair.end(), {contact.body_a, contact.body_b});
-    feature.push_back(contact.feature);
-    append(in_a, contact.in_a), append(in_b, contact.in_b), append(normal_in_a, contact.normal_in_a);
-    depth.push_back(contact.depth);
-    append(translation, contact.found_at.translation), append(rotation, contact.found_at.rotation);
-    quiet.push_back(contact.quiet_steps);
-    normal.push_back(contact.impulse.normal), append(tangential, contact.impulse.tangential);
-    append(turning, contact.impulse.turning);
-  }
-  const std::size_t count = contacts.size();
-  file.add("/state/contacts/pair", {count, 2}, pair);
-  file.add("/state/contacts/feature", {count}, feature);
-  file.add("/state/contacts/in_a", {count, 3}, in_a);
-  file.add("/state/contacts/in_b", {count, 3}, in_b);
-  file.add("/state/contacts/normal_in_a", {count, 3}, normal_in_a);
-  file.add("/state/contacts/depth", {count}, depth);
-  file.add("/state/contacts/found_at_translation", {count, 3}, translation);
-  file.add("/state/contacts/found_at_rotation", {count, 4}, rotation);
-  file.add("/state/contacts/quiet_steps", {count}, quiet);
-  file.add("/state/contacts/normal_impulse", {count}, normal);
-  file.add("/state/contacts/tangential_impulse", {count, 3}, tangential);
-  file.add("/state/contacts/turning_impulse", {count, 3}, turning);
-}
-
 void write_state(Hdf5Output& file, const SimulatorState& state) {
-  std::vector<double> position, orientation, velocity, spin;
-  for (const BodyState& body : state.states) {
-    append(position, body.position), append(orientation, body.orientation);
-    append(velocity, body.velocity), append(spin, body.angular_velocity);
-  }
   const std::size_t bodies = state.states.size();
   const std::vector<std::uint64_t> step = {state.step};
   file.add("/state/step", {1}, step);
-  file.add("/state/position", {bodies, 3}, position);
-  file.add("/state/orientation", {bodies, 4}, orientation);
-  file.add("/state/velocity", {bodies, 3}, velocity);
-  file.add("/state/angular_velocity", {bodies, 3}, spin);
+  write_rows(file, state.states);
   file.add("/state/quiet_seconds", {bodies}, state.quiet);
   file.add("/state/sleeping_group", {bodies}, state.groups);
-  write_contacts(file, state.contacts);
-}
-
-std::vector<CachedContact> read_contacts(const Hdf5Input& file, const std::string& path) {
-  const auto pair = file.read_u32("/state/contacts/pair", {2});
-  const auto feature = file.read_u64("/state/contacts/feature");
-  const auto in_a = file.read_f64("/state/contacts/in_a", {3});
-  const auto in_b = file.read_f64("/state/contacts/in_b", {3});
-  const auto normal_in_a = file.read_f64("/state/contacts/normal_in_a", {3});
-  const auto depth = file.read_f64("/state/contacts/depth");
-  const auto translation = file.read_f64("/state/contacts/found_at_translation", {3});
-  const auto rotation = file.read_f64("/state/contacts/found_at_rotation", {4});
-  const auto quiet = file.read_u32("/state/contacts/quiet_steps");
-  const auto normal = file.read_f64("/state/contacts/normal_impulse");
-  const auto tangential = file.read_f64("/state/contacts/tangential_impulse", {3});
-  const auto turning = file.read_f64("/state/contacts/turning_impulse", {3});
-  const std::size_t count = feature.size();
-  for (const std::size_t rows : {pair.size() / 2, in_a.size() / 3, in_b.size() / 3, normal_in_a.size() / 3,
-                                 depth.size(), translation.size() / 3, rotation.size() / 4, quiet.size(),
-                                 normal.size(), tangential.size() / 3, turning.size() / 3}) {
-    if (rows != count) throw FileError(path + ": /state/contacts: datasets of different lengths");
-  }
-  std::vector<CachedContact> contacts;
-  for (std::size_t i = 0; i < count; ++i) {
-    contacts.push_back({pair[2 * i],
-                        pair[2 * i + 1],
-                        feature[i],
-                        vector_at(in_a, i),
-                        vector_at(in_b, i),
-                        vector_at(normal_in_a, i),
-                        depth[i],
-                        {vector_at(translation, i), turn_at(rotation, i)},
-                        quiet[i],
-                        {normal[i], vector_at(tangential, i), vector_at(turning, i)}});
-  }
-  return contacts;
+  write_rows(file, state.contacts);
 }
 
 SimulatorState read_state(const Hdf5Input& file, const std::string& path, std::size_t bodies) {
-  const auto position = file.read_f64("/state/position", {3});
-  const auto orientation = file.read_f64("/state/orientation", {4});
-  const auto velocity = file.read_f64("/state/velocity", {3});
-  const auto spin = file.read_f64("/state/angular_velocity", {3});
-  const auto step = file.read_u64("/state/step");
   SimulatorState state;
+  const bool alike = read_rows(file, state.states);
+  const auto step = file.read_u64("/state/step");
   state.quiet = file.read_f64("/state/quiet_seconds");
   state.groups = file.read_u32("/state/sleeping_group");
-  state.contacts = read_contacts(file, path);
-  const bool fits = step.size() == 1 && position.size() == 3 * bodies && orientation.size() == 4 * bodies &&
-                    velocity.size() == 3 * bodies && spin.size() == 3 * bodies &&
+  if (!read_rows(file, state.contacts))
+    throw FileError(path + ": /state/contacts: datasets of different lengths");
+  const bool fits = alike && step.size() == 1 && state.states.size() == bodies &&
                     state.quiet.size() == bodies && state.groups.size() == bodies;
   if (!fits) throw FileError(path + ": /state: not of " + std::to_string(bodies) + " bodies");
-  const auto by_pair = [](const CachedContact& one, const CachedContact& other) {
-    return std::pair(one.body_a, one.body_b) < std::pair(other.body_a, other.body_b);
-  };
   for (const CachedContact& contact : state.contacts) {
-    if (contact.body_a >= contact.body_b || contact.body_b >= bodies) {
+    if (contact.pair.a >= contact.pair.b || contact.pair.b >= bodies)
       throw FileError(path + ": /state/contacts/pair: not two bodies of the run, the lower first");
-    }
   }
-  if (!std::is_sorted(state.contacts.begin(), state.contacts.end(), by_pair))
+  if (!std::ranges::is_sorted(state.contacts, {}, &CachedContact::pair))
     throw FileError(path + ": /state/contacts/pair: not ascending");
   state.step = step[0];
-  for (std::size_t i = 0; i < bodies; ++i) {
-    state.states.push_back(
-        {vector_at(position, i), turn_at(orientation, i), vector_at(velocity, i), vector_at(spin, i)});
-  }
   return state;
 }
 
@@ -311,7 +277,8 @@ void Trajectory::keep(std::uint32_t step, std::span<const BodyState> states) {
   if (every == 0 || step % every != 0) return;
   frame.push_back(step);
   for (const BodyState& state : states)
-    append(position, state.position), append(orientation, state.orientation);
+    Stored<Vector3d>::append(position, state.position),
+        Stored<Quaterniond>::append(orientation, state.orientation);
 }
 
 void write_run(const std::string& path, const RunDescription& run, const RunResults& results) {
@@ -320,7 +287,7 @@ void write_run(const std::string& path, const RunDescription& run, const RunResu
   file.attribute("steps", std::uint64_t{results.records.size()});
   file.attribute("triangles", run.triangles);
   write_bodies(file, run);
-  write_records(file, results.records);
+  write_rows(file, results.records);
   write_trajectory(file, results.trajectory, run.bodies.size());
   write_state(file, results.state);
   file.write();
@@ -330,7 +297,7 @@ RunResults read_run(const std::string& path, const RunDescription& expected) {
   const Hdf5Input file(path);
   check_options(file, path, expected.options);
   RunResults results;
-  results.records = read_records(file);
+  read_rows(file, results.records);
   if (file.has("/trajectory")) results.trajectory = read_trajectory(file, path, expected.bodies.size());
   results.state = read_state(file, path, expected.bodies.size());
   if (results.records.size() != results.state.step) {
@@ -364,10 +331,10 @@ StoredFrame read_frame(const std::string& path, std::uint32_t frame) {
     const std::size_t at = static_cast<std::size_t>(found - kept.begin()) * shape.size() + i;
     BodyProperties body;
     body.shape = shape[i];
-    body.center = vector_at(center, i);
+    body.center = Stored<Vector3d>::at(center, i);
     BodyState state;
-    state.position = vector_at(trajectory.position, at);
-    state.orientation = turn_at(trajectory.orientation, at);
+    state.position = Stored<Vector3d>::at(trajectory.position, at);
+    state.orientation = Stored<Quaterniond>::at(trajectory.orientation, at);
     stored.poses.push_back(pose_of(body, state));
   }
   return stored;

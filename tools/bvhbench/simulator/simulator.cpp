@@ -1,16 +1,11 @@
 #include "simulator.h"
 
 #include <algorithm>
-#include <chrono>
+
+#include "common/stopwatch.h"
 
 namespace tandem::simulation {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 void take(StepRecord& record, const FinderReport& report) {
   record.update_seconds = report.engine.update;
@@ -50,16 +45,16 @@ StepRecord Simulator::step() {
 }
 
 StepRecord Simulator::step_in_arena() {
-  const Clock::time_point start = Clock::now();
+  Stopwatch step, phase;
   StepRecord record;
   find_contacts(record);
-  const Clock::time_point found = Clock::now();
+  phase.lap();
   solve(record);
   sleep();
-  record.solver_seconds = seconds_since(found);
+  record.solver_seconds = phase.lap();
   record.time = static_cast<double>(++step_) * options_.dt;
   take_measures(record);
-  record.step_seconds = seconds_since(start);
+  record.step_seconds = step.lap();
   return record;
 }
 
@@ -69,10 +64,10 @@ void Simulator::find_contacts(StepRecord& record) {
   const std::vector<BodyPair> unmoved = cache_.unmoved(bodies_, states_, options_.solver.slop);
   const std::vector<ContactPoint>& found = finder_->find(poses(), idle, unmoved);
   take(record, finder_->report());
-  const Clock::time_point start = Clock::now();
+  Stopwatch stopwatch;
   const double gap = kFall * options_.gravity.norm() * options_.dt * options_.dt;
   cache_.update(found, unmoved, bodies_, states_, idle, gap);
-  record.contact_seconds += seconds_since(start);
+  record.contact_seconds += stopwatch.lap();
   record.contacts = cache_.contacts().size();
   for (const ContactPoint& contact : cache_.contacts()) {
     const double depth = std::max(contact.depth, 0.0);
@@ -101,6 +96,10 @@ void Simulator::sleep() {
   if (!options_.sleep.enabled) return;
   sleep_.wake_touched(acting_, cache_.contacts());
   sleep_.fall_asleep(bodies_, states_, islands_, options_.sleep, options_.dt);
+  update_acting();
+}
+
+void Simulator::update_acting() {
   for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
     acting_[i].motion = sleep_.sleeps(i) ? Motion::fixed : bodies_[i].motion;
   }
@@ -141,9 +140,7 @@ void Simulator::take_measures(StepRecord& record) const {
 void Simulator::place(std::uint32_t body, const BodyState& state) {
   states_[body] = state;
   sleep_.wake(body);
-  for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
-    acting_[i].motion = sleep_.sleeps(i) ? Motion::fixed : bodies_[i].motion;
-  }
+  update_acting();
 }
 
 SimulatorState Simulator::save() const {
@@ -162,9 +159,7 @@ void Simulator::restore(SimulatorState state) {
   states_ = std::move(state.states);
   cache_.restore(std::move(state.contacts));
   sleep_.restore(std::move(state.quiet), std::move(state.groups));
-  for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
-    acting_[i].motion = sleep_.sleeps(i) ? Motion::fixed : bodies_[i].motion;
-  }
+  update_acting();
 }
 
 }  // namespace tandem::simulation

@@ -1,7 +1,7 @@
-#include "soft_step.h"
-
 #include <algorithm>
 #include <cmath>
+
+#include "island_problem.h"
 
 namespace tandem::simulation {
 namespace {
@@ -61,7 +61,7 @@ class SoftStep {
   }
 
   // Condition: solve() was called.
-  IslandResidual residual() const {
+  Residual residual() const {
     std::vector<double> target(p_.contact_count());
     for (std::size_t i = 0; i < target.size(); ++i) {
       target[i] = is_rebound(i) ? p_.rebound[i] : -std::max(0.0, followed_[i]) / h_;
@@ -193,7 +193,7 @@ class SoftStep {
 
 }  // namespace
 
-IslandResidual solve_soft_step(IslandProblem& problem, const StepInput& input, const SolverOptions& options) {
+Residual solve_soft_step(IslandProblem& problem, const StepInput& input, const SolverOptions& options) {
   SoftStep step(problem, input, options);
   step.solve();
   return step.residual();

@@ -1,9 +1,95 @@
 #include "step_solver.h"
 
-#include "island_solver.h"
-#include "sweep_solver.h"
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include "island_problem.h"
 
 namespace tandem::simulation {
+namespace {
+
+using Eigen::Vector3d;
+
+void fly(const StepInput& input, std::uint32_t body, std::span<BodyState> states) {
+  states[body].velocity += input.dt * input.gravity;
+  advance(input.bodies[body], states[body], Vector3d::Zero(), Vector3d::Zero(), input.dt);
+}
+
+// Whether factorising the island's matrix costs no more than what Newton's method has to do for each contact:
+// with bodies by layer the matrix is a band, and eliminating w bodies that hang together with as many of the
+// next layer takes about (6 w)^3 multiplications.
+bool is_slender(const Islands& islands, std::size_t island, std::span<const std::uint32_t> layers) {
+  constexpr double kForAContact = 3000;
+  std::vector<std::uint32_t> layer;
+  for (const std::uint32_t body : islands.bodies_of(island)) layer.push_back(layers[body]);
+  std::sort(layer.begin(), layer.end());
+  double work = 0;
+  for (auto begin = layer.begin(); begin != layer.end();) {
+    const auto end = std::upper_bound(begin, layer.end(), *begin);
+    work += std::pow(6 * static_cast<double>(end - begin), 3);
+    begin = end;
+  }
+  return work <= kForAContact * static_cast<double>(islands.contacts_of(island).size());
+}
+
+// Solves islands by themselves; bodies that no contact holds fly.
+class IslandSolver final : public StepSolver {
+ public:
+  explicit IslandSolver(const SolverOptions& options) : options_(options) {}
+
+  void step(const StepInput& input, std::span<BodyState> states,
+            std::span<ContactImpulse> impulses) override {
+    place_.resize(input.bodies.size());
+    const std::vector<std::uint32_t> layers = find_layers(input.bodies, input.contacts);
+    std::vector<Residual> residuals(input.islands.size());
+    std::atomic<std::uint64_t> by_newton = 0;
+    tbb::parallel_for(std::size_t{0}, input.islands.size(), [&](std::size_t i) {
+      if (input.islands.contacts_of(i).empty()) {
+        for (const std::uint32_t body : input.islands.bodies_of(i)) fly(input, body, states);
+        return;
+      }
+      IslandProblem problem = make_island_problem(input, i, {states, impulses}, options_, layers, place_);
+      NewtonReport newton;
+      if (wants_newton(input.islands, i, layers)) newton = solve_newton_step(problem, input, options_);
+      by_newton += newton.converged ? 1 : 0;
+      residuals[i] = newton.converged ? newton.residual : solve_soft_step(problem, input, options_);
+      apply_solution(problem, input, states, impulses);
+    });
+    for (std::uint32_t i = 0; i < states.size(); ++i) {
+      if (input.bodies[i].motion == Motion::kinematic)
+        advance(input.bodies[i], states[i], Vector3d::Zero(), Vector3d::Zero(), input.dt);
+    }
+    sum_up(input.islands, residuals);
+    statistics_.newton_islands = by_newton;
+  }
+
+ private:
+  bool wants_newton(const Islands& islands, std::size_t island, std::span<const std::uint32_t> layers) const {
+    if (options_.kind == SolverKind::automatic) return is_slender(islands, island, layers);
+    return options_.kind == SolverKind::newton;
+  }
+
+  SolverOptions options_;
+  std::vector<std::uint32_t> place_;
+};
+
+}  // namespace
+
+void StepSolver::sum_up(const Islands& islands, std::span<const Residual> residuals) {
+  statistics_ = {};
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    statistics_.islands += islands.contacts_of(i).empty() ? 0 : 1;
+    statistics_.residual = std::max(statistics_.residual, residuals[i].largest);
+    statistics_.residual_rms += residuals[i].squares;
+  }
+  statistics_.contacts = islands.contacts.size();
+  if (statistics_.contacts == 0) return;
+  statistics_.residual_rms =
+      std::sqrt(statistics_.residual_rms / (3 * static_cast<double>(statistics_.contacts)));
+}
 
 std::uint32_t default_substeps(SolverKind kind) {
   constexpr std::uint32_t kSoft = 16;
@@ -13,7 +99,7 @@ std::uint32_t default_substeps(SolverKind kind) {
 std::unique_ptr<StepSolver> make_step_solver(const SolverOptions& options) {
   SolverOptions complete = options;
   if (complete.substeps == 0) complete.substeps = default_substeps(options.kind);
-  if (complete.kind == SolverKind::sweeps) return std::make_unique<SweepSolver>(complete);
+  if (complete.kind == SolverKind::sweeps) return make_sweep_solver(complete);
   return std::make_unique<IslandSolver>(complete);
 }
 

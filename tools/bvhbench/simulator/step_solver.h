@@ -1,12 +1,11 @@
 #pragma once
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <span>
 
-#include "contact_point.h"
 #include "islands.h"
-#include "rigid_body.h"
 
 namespace tandem::simulation {
 
@@ -69,6 +68,16 @@ struct SolverStatistics {
   std::uint64_t contacts = 0;        ///< of which at least one body is dynamic
 };
 
+/// What rows leave undone.
+struct Residual {
+  double largest = 0, squares = 0;
+
+  void add(double row) {
+    largest = std::max(largest, row);
+    squares += row * row;
+  }
+};
+
 /// Moves bodies through a step under gravity and contacts. The same bytes for any number of threads.
 class StepSolver {
  public:
@@ -83,9 +92,16 @@ class StepSolver {
   const SolverStatistics& statistics() const { return statistics_; }
 
  protected:
+  /// Makes the statistics of a step, but for newton_islands. residuals: of each island.
+  void sum_up(const Islands& islands, std::span<const Residual> residuals);
+
   SolverStatistics statistics_;
 };
 
+/// Solves islands by themselves, side by side on the threads of the caller's oneTBB arena.
 std::unique_ptr<StepSolver> make_step_solver(const SolverOptions& options);
+
+/// The solver of SolverKind::sweeps.
+std::unique_ptr<StepSolver> make_sweep_solver(const SolverOptions& options);
 
 }  // namespace tandem::simulation

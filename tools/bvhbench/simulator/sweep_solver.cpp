@@ -1,5 +1,3 @@
-#include "sweep_solver.h"
-
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -8,29 +6,37 @@
 #include <limits>
 
 #include "common/random_pose.h"
-#include "followed_contacts.h"
+#include "step_solver.h"
 
 namespace tandem::simulation {
+
+namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
+// Velocities that correct penetration and are forgotten after they have moved the bodies.
+struct Correction {
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();
+};
+
 // A body while contacts are solved.
-struct ContactSolver::Mover {
+struct Mover {
   Vector3d velocity, spin;
   double inverse_mass;
   Matrix3d inverse_inertia;  // in the world
 };
 
 // One direction of a contact: w = direction . (v_b - v_a) + arm_b . spin_b - arm_a . spin_a.
-struct ContactSolver::Row {
+struct Row {
   Vector3d direction, arm_a, arm_b;
   Vector3d turn_a, turn_b;        // what an impulse of 1 adds to the spins, less the sign of a
   double mobility_a, mobility_b;  // what it adds to w through either body
   double impulse;
 };
 
-struct ContactSolver::Joint {
+struct Joint {
   std::uint32_t a, b;
   double inverse_mass_a, inverse_mass_b;
   Row tangent[2], normal;
@@ -38,12 +44,6 @@ struct ContactSolver::Joint {
   double push;          // of the correction along the normal
   double push_impulse;  // that of the correction
 };
-
-namespace {
-
-using Row = ContactSolver::Row;
-using Joint = ContactSolver::Joint;
-using Mover = ContactSolver::Mover;
 
 // Which bodies of a contact an impulse moves: shock propagation holds the lower one.
 struct Held {
@@ -114,13 +114,6 @@ double visit_correction(Joint& joint, std::vector<Correction>& corrections, cons
   return std::fabs(change) * moves;
 }
 
-// Any unit vector across the normal, the same for the same normal.
-Vector3d across(const Vector3d& normal) {
-  int smallest = 0;
-  normal.cwiseAbs().minCoeff(&smallest);
-  return normal.cross(Vector3d::Unit(smallest)).normalized();
-}
-
 Row make_row(const Vector3d& direction, const Vector3d& from_a, const Vector3d& from_b, const Mover& a,
              const Mover& b) {
   Row row;
@@ -136,7 +129,8 @@ Row make_row(const Vector3d& direction, const Vector3d& from_a, const Vector3d& 
 }
 
 Joint make_joint(const ContactPoint& contact, std::span<const BodyState> states,
-                 const std::vector<Mover>& movers, const SolverOptions& options, const SolverStep& step) {
+                 const std::vector<Mover>& movers, const SolverOptions& options, const StepInput& part) {
+  const double gravity_speed = part.dt * part.gravity.norm();
   constexpr double kSlips = 0.01;      // of what gravity gives in a step
   constexpr double kBouncesAbove = 2;  // times that
   const Mover &a = movers[contact.body_a], &b = movers[contact.body_b];
@@ -146,17 +140,16 @@ Joint make_joint(const ContactPoint& contact, std::span<const BodyState> states,
   const double approach = -relative.dot(contact.normal);
   const Vector3d slip = relative + approach * contact.normal;
   const double speed = slip.norm();
-  const Vector3d first =
-      speed > kSlips * step.gravity_speed ? Vector3d(slip / speed) : across(contact.normal);
+  const Vector3d first = speed > kSlips * gravity_speed ? Vector3d(slip / speed) : across(contact.normal);
   Joint joint;
   joint.a = contact.body_a, joint.b = contact.body_b;
   joint.inverse_mass_a = a.inverse_mass, joint.inverse_mass_b = b.inverse_mass;
   joint.tangent[0] = make_row(first, from_a, from_b, a, b);
   joint.tangent[1] = make_row(contact.normal.cross(first), from_a, from_b, a, b);
   joint.normal = make_row(contact.normal, from_a, from_b, a, b);
-  joint.target = approach > kBouncesAbove * step.gravity_speed ? options.restitution * approach : 0;
-  if (contact.depth < 0) joint.target = contact.depth / step.dt;
-  joint.push = options.correction * std::max(0.0, contact.depth - options.slop) / step.dt;
+  joint.target = approach > kBouncesAbove * gravity_speed ? options.restitution * approach : 0;
+  if (contact.depth < 0) joint.target = contact.depth / part.dt;
+  joint.push = options.correction * std::max(0.0, contact.depth - options.slop) / part.dt;
   joint.push_impulse = 0;
   return joint;
 }
@@ -185,10 +178,6 @@ void shuffle(std::vector<std::uint32_t>& order, std::uint64_t seed) {
   Random random(seed);
   for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.next() % i]);
 }
-
-struct Residuals {
-  double largest = 0, squares = 0;
-};
 
 // The contacts of one island.
 class IslandSweeps {
@@ -236,18 +225,14 @@ class IslandSweeps {
     }
   }
 
-  Residuals residuals() const {
-    Residuals all;
-    const auto take = [&](double residual) {
-      all.largest = std::max(all.largest, residual);
-      all.squares += residual * residual;
-    };
+  Residual residual() const {
+    Residual all;
     for (const std::uint32_t i : order_) {
       const Joint& joint = joints_[i];
       const Mover &a = movers_[joint.a], &b = movers_[joint.b];
       const double bound = options_.friction * joint.normal.impulse;
-      for (const Row& row : joint.tangent) take(residual_of(row, 0, -bound, bound, a, b));
-      take(residual_of(joint.normal, joint.target, 0, kUnbounded, a, b));
+      for (const Row& row : joint.tangent) all.add(residual_of(row, 0, -bound, bound, a, b));
+      all.add(residual_of(joint.normal, joint.target, 0, kUnbounded, a, b));
     }
     return all;
   }
@@ -291,88 +276,139 @@ void for_each(std::size_t count, const Work& work) {
   });
 }
 
-}  // namespace
+// Moves with their bodies, between two searches for contacts, the contacts that a step was given.
+class FollowedContacts {
+ public:
+  FollowedContacts(std::span<const ContactPoint> contacts, std::span<const BodyState> states)
+      : contacts_(contacts.begin(), contacts.end()) {
+    for (const ContactPoint& contact : contacts) anchors_.push_back(anchor_of(contact, states));
+  }
 
-ContactSolver::ContactSolver() = default;
-ContactSolver::~ContactSolver() = default;
+  void follow(std::span<const BodyState> states) {
+    for (std::size_t i = 0; i < contacts_.size(); ++i) carry(contacts_[i], anchors_[i], states);
+  }
 
-void ContactSolver::solve(std::span<const BodyProperties> bodies, std::span<BodyState> states,
-                          std::span<const ContactPoint> contacts, const Islands& islands,
-                          std::span<ContactImpulse> impulses, const SolverOptions& options,
-                          const SolverStep& step) {
-  movers_.resize(bodies.size());
-  joints_.resize(contacts.size());
-  corrections_.assign(bodies.size(), {});
-  for_each(bodies.size(), [&](std::size_t i) { movers_[i] = make_mover(bodies[i], states[i]); });
-  for_each(contacts.size(),
-           [&](std::size_t i) { joints_[i] = make_joint(contacts[i], states, movers_, options, step); });
-  const auto layers =
-      options.shock_propagation ? find_layers(bodies, contacts) : std::vector<std::uint32_t>();
-  constexpr double kStill = 1e-9;  // of what gravity gives in a step
-  std::vector<Residuals> residuals(islands.size());
-  // Without contacts there is nothing to do, and most islands of a slide are such.
-  tbb::parallel_for(std::size_t{0}, islands.size(), [&](std::size_t i) {
-    const auto members = islands.contacts_of(i);
-    if (members.empty()) return;
+  const std::vector<ContactPoint>& contacts() const { return contacts_; }
+
+ private:
+  std::vector<ContactPoint> contacts_;
+  std::vector<ContactAnchor> anchors_;
+};
+
+// Projected Gauss-Seidel on the velocity-level complementarity problem of contacts with a friction pyramid
+// (Stewart and Trinkle 1996; Erleben 2007): for each contact, with w the relative velocity of b at the
+// point,
+//
+//     0 <= lambda_n  complementary to  w_n - target >= 0
+//     -mu lambda_n <= lambda_t <= mu lambda_n,  w_t = 0 in between, opposed to lambda_t at a bound
+//
+// target: restitution times the speed of approach where that is more than gravity gives in two steps, else
+// 0. The first tangent is that in which the bodies slip, so that sliding friction has Coulomb's size
+// whatever its direction.
+//
+// Penetration beyond the slop is taken away by a second set of velocities, which push along normals alone,
+// move the bodies once, and never become kinetic energy (split impulses).
+//
+// An island is done before all sweeps are made when one changes no velocity by more than 10⁻⁹ of what
+// gravity gives in a step. Islands are solved side by side by the threads of the caller's oneTBB arena. The
+// same bytes for any number of them.
+//
+// There are as many solutions as substeps. With warm start, a step that has no impulse of the step before
+// makes ten times the sweeps.
+class SweepSolver final : public StepSolver {
+ public:
+  explicit SweepSolver(const SolverOptions& options) : options_(options) {}
+
+  void step(const StepInput& input, std::span<BodyState> states,
+            std::span<ContactImpulse> impulses) override {
+    constexpr std::uint32_t kCold = 10;
+    SolverOptions options = options_;
+    if (options.warm_start && input.is_cold) options.iterations *= kCold;  // or stacks sink at once
+    const double dt = input.dt / options.substeps;
+    FollowedContacts followed(input.contacts, states);
+    for (std::uint32_t i = 0; i < options.substeps; ++i) {
+      if (i > 0) followed.follow(states);
+      for (std::size_t body = 0; body < states.size(); ++body) {
+        if (input.bodies[body].motion == Motion::moving) states[body].velocity += dt * input.gravity;
+      }
+      solve({input.bodies, followed.contacts(), input.islands, dt, input.gravity,
+             input.number * options.substeps + i, input.is_cold},
+            options, states, impulses);
+      for (std::size_t body = 0; body < states.size(); ++body) {
+        advance(input.bodies[body], states[body], corrections_[body].velocity,
+                corrections_[body].angular_velocity, dt);
+      }
+    }
+  }
+
+ private:
+  // Solves for the velocities at the end of a part of a step. Results: states' velocities, impulses,
+  // corrections_. Condition: velocities include all that is not contacts.
+  void solve(const StepInput& part, const SolverOptions& options, std::span<BodyState> states,
+             std::span<ContactImpulse> impulses) {
+    begin(part, options, states);
+    const auto layers =
+        options.shock_propagation ? find_layers(part.bodies, part.contacts) : std::vector<std::uint32_t>();
+    std::vector<Residual> residuals(part.islands.size());
+    // Without contacts there is nothing to do, and most islands of a slide are such.
+    tbb::parallel_for(std::size_t{0}, part.islands.size(), [&](std::size_t i) {
+      if (!part.islands.contacts_of(i).empty())
+        residuals[i] = solve_island(part, part.islands.contacts_of(i), options, impulses, layers);
+    });
+    sum_up(part.islands, residuals);
+    hand_out(part, states, impulses);
+  }
+
+  void begin(const StepInput& part, const SolverOptions& options, std::span<const BodyState> states) {
+    movers_.resize(part.bodies.size());
+    joints_.resize(part.contacts.size());
+    corrections_.assign(part.bodies.size(), {});
+    for_each(part.bodies.size(), [&](std::size_t i) { movers_[i] = make_mover(part.bodies[i], states[i]); });
+    for_each(part.contacts.size(), [&](std::size_t i) {
+      joints_[i] = make_joint(part.contacts[i], states, movers_, options, part);
+    });
+  }
+
+  Residual solve_island(const StepInput& part, std::span<const std::uint32_t> members,
+                        const SolverOptions& options, std::span<const ContactImpulse> impulses,
+                        std::span<const std::uint32_t> layers) {
+    constexpr double kStill = 1e-9;  // of what gravity gives in a step
     if (options.warm_start) {
       for (const std::uint32_t j : members) warm_start(joints_[j], impulses[j], options.friction, movers_);
     }
     IslandSweeps solver(members, joints_, movers_, corrections_, options);
-    if (options.order == ContactOrder::shuffled) {
-      solver.shuffle_order(options.seed ^ (step.number * 0x9E3779B97F4A7C15u + members.front()));
-    }
-    solver.solve(kStill * step.gravity_speed);
+    if (options.order == ContactOrder::shuffled)
+      solver.shuffle_order(options.seed ^ (part.number * 0x9E3779B97F4A7C15u + members.front()));
+    solver.solve(kStill * (part.dt * part.gravity.norm()));
     if (options.shock_propagation) solver.propagate_shock(layers);
-    residuals[i] = solver.residuals();
-  });
-
-  statistics_ = {};
-  for (std::size_t i = 0; i < islands.size(); ++i) {
-    statistics_.islands += islands.contacts_of(i).empty() ? 0 : 1;
-    statistics_.residual = std::max(statistics_.residual, residuals[i].largest);
-    statistics_.residual_rms += residuals[i].squares;
+    return solver.residual();
   }
-  statistics_.contacts = islands.contacts.size();
-  if (statistics_.contacts > 0) {
-    statistics_.residual_rms =
-        std::sqrt(statistics_.residual_rms / (3 * static_cast<double>(statistics_.contacts)));
-  }
-  for_each(bodies.size(), [&](std::size_t i) {
-    if (bodies[i].motion != Motion::moving) return;
-    states[i].velocity = movers_[i].velocity;
-    states[i].angular_velocity = movers_[i].spin;
-  });
-  for_each(contacts.size(), [&](std::size_t i) {
-    const Joint& joint = joints_[i];
-    impulses[i].normal = joint.normal.impulse;
-    impulses[i].tangential = joint.tangent[0].impulse * joint.tangent[0].direction +
-                             joint.tangent[1].impulse * joint.tangent[1].direction;
-  });
-}
 
-SweepSolver::SweepSolver(const SolverOptions& options) : options_(options) {}
-
-void SweepSolver::step(const StepInput& input, std::span<BodyState> states,
-                       std::span<ContactImpulse> impulses) {
-  constexpr std::uint32_t kCold = 10;
-  SolverOptions options = options_;
-  if (options.warm_start && input.is_cold) options.iterations *= kCold;  // or stacks sink at once
-  const double dt = input.dt / options.substeps;
-  FollowedContacts followed(input.contacts, states);
-  for (std::uint32_t i = 0; i < options.substeps; ++i) {
-    if (i > 0) followed.follow(states);
-    for (std::size_t body = 0; body < states.size(); ++body) {
-      if (input.bodies[body].motion == Motion::moving) states[body].velocity += dt * input.gravity;
-    }
-    solver_.solve(input.bodies, states, followed.contacts(), input.islands, impulses, options,
-                  {dt, dt * input.gravity.norm(), input.number * options.substeps + i});
-    const auto corrections = solver_.corrections();
-    for (std::size_t body = 0; body < states.size(); ++body) {
-      advance(input.bodies[body], states[body], corrections[body].velocity,
-              corrections[body].angular_velocity, dt);
-    }
+  void hand_out(const StepInput& part, std::span<BodyState> states,
+                std::span<ContactImpulse> impulses) const {
+    for_each(part.bodies.size(), [&](std::size_t i) {
+      if (part.bodies[i].motion != Motion::moving) return;
+      states[i].velocity = movers_[i].velocity;
+      states[i].angular_velocity = movers_[i].spin;
+    });
+    for_each(part.contacts.size(), [&](std::size_t i) {
+      const Joint& joint = joints_[i];
+      impulses[i].normal = joint.normal.impulse;
+      impulses[i].tangential = joint.tangent[0].impulse * joint.tangent[0].direction +
+                               joint.tangent[1].impulse * joint.tangent[1].direction;
+    });
   }
-  statistics_ = solver_.statistics();
+
+  SolverOptions options_;
+  std::vector<Mover> movers_;
+  std::vector<Joint> joints_;
+  std::vector<Correction> corrections_;
+};
+
+}  // namespace
+
+std::unique_ptr<StepSolver> make_sweep_solver(const SolverOptions& options) {
+  return std::make_unique<SweepSolver>(options);
 }
 
 }  // namespace tandem::simulation

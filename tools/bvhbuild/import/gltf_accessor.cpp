@@ -7,7 +7,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "binary_number.h"
+#include "scanner.h"
 
 namespace tandem::build {
 namespace {

@@ -2,7 +2,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "bvhbuild/meshing/polygon_mesh.h"
 #include "gltf_model.h"
 
 namespace tandem::build {

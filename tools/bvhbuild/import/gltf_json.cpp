@@ -1,9 +1,11 @@
 #include "gltf_json.h"
 
 #include <algorithm>
+#include <bit>
+#include <cstdint>
 
 #include "common/printable.h"
-#include "gltf_model.h"
+#include "scanner.h"
 
 namespace tandem::build {
 namespace {
@@ -72,7 +74,33 @@ void check_size(std::string_view text, std::uint64_t most_bytes) {
     throw GltfError("its JSON takes more than the memory limit (--memory-limit)");
 }
 
+constexpr std::uint64_t kHeaderBytes = 12;  // magic, version, length of the file
+constexpr std::uint32_t kJson = 0x4E4F534A, kBinary = 0x004E4942;
+
+std::uint32_t word(std::string_view bytes, std::uint64_t offset) {
+  return load_number<std::uint32_t, std::endian::little>(bytes.data() + offset);
+}
+
+struct Chunk {
+  std::uint32_t type;
+  std::string_view bytes;
+};
+
+/// Takes a chunk off the front of what is left of a file.
+Chunk take_chunk(std::string_view& left, const char* name) {
+  constexpr std::uint64_t kHead = 8;  // length of the chunk, type
+  if (left.size() < kHead || word(left, 0) > left.size() - kHead)
+    throw GltfError("its " + std::string(name) + " chunk is cut short");
+  const Chunk chunk{word(left, 4), left.substr(kHead, word(left, 0))};
+  left.remove_prefix(kHead + chunk.bytes.size());
+  return chunk;
+}
+
 }  // namespace
+
+std::string numbered(const char* list, std::int64_t index) {
+  return std::string(list) + "[" + std::to_string(index) + "]";
+}
 
 GltfObject::GltfObject(const Json& json, const GltfObject* parent, const char* name, std::int64_t item)
     : json_(json), parent_(parent), name_(name), item_(item) {
@@ -160,6 +188,33 @@ Json parse_gltf_json(std::string_view text, std::uint64_t most_bytes) {
   } catch (const Json::exception& error) {
     throw GltfError(parse_failure(error.what()));
   }
+}
+
+void check_gltf_version(const std::string& version) {
+  if (version.empty()) throw GltfError("is no glTF: its JSON names no asset.version");
+  if (version.starts_with("1.") || version == "1") throw GltfError(kGltf1Error);
+  if (version.starts_with("2.") || version == "2") return;
+  throw GltfError("is glTF " + in_quotes(version) + "; Tandem reads glTF 2");
+}
+
+GltfContainer open_gltf_container(std::string_view bytes) {
+  if (!bytes.starts_with("glTF")) return {false, bytes, {}};
+  if (bytes.size() < kHeaderBytes) throw GltfError("its GLB header is cut short");
+  check_gltf_version(std::to_string(word(bytes, 4)) + ".0");
+  const std::uint64_t promised = word(bytes, 8);
+  if (promised > bytes.size())
+    throw GltfError("its GLB header promises " + std::to_string(promised) + " bytes, the file holds " +
+                    std::to_string(bytes.size()));
+  std::string_view left = bytes.substr(0, promised);
+  left.remove_prefix(std::min<std::uint64_t>(kHeaderBytes, promised));
+  const Chunk json = take_chunk(left, "JSON");
+  if (json.type != kJson) throw GltfError("its first chunk is not JSON");
+  GltfContainer container{true, json.bytes, {}};
+  while (!left.empty() && container.chunk.empty()) {
+    const Chunk chunk = take_chunk(left, "binary");
+    if (chunk.type == kBinary) container.chunk = chunk.bytes;
+  }
+  return container;
 }
 
 }  // namespace tandem::build

@@ -2,11 +2,20 @@
 #include <cstdint>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace tandem::build {
+
+/// Why a glTF file cannot be read. read_gltf() makes a ReadResult of it.
+struct GltfError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Names an item of a list for messages: "accessors[3]".
+std::string numbered(const char* list, std::int64_t index);
 
 /// An object in the JSON of a glTF file. It knows its way there, so that errors name it.
 ///
@@ -52,5 +61,24 @@ class GltfObject {
 /// Throws a GltfError for text that is no JSON, nested more than 500 deep, or of so many values that they and
 /// what is made of them may take more than `most_bytes` bytes.
 nlohmann::json parse_gltf_json(std::string_view text, std::uint64_t most_bytes);
+
+/// What a file of glTF 1 is refused with.
+inline constexpr const char* kGltf1Error = "is glTF 1; Tandem reads glTF 2";
+
+/// Throws a GltfError for another version than 2.
+void check_gltf_version(const std::string& version);
+
+/// Where the parts of a glTF file lie, which is either JSON text or a binary container (GLB).
+struct GltfContainer {
+  bool is_binary = false;
+  std::string_view json;
+  std::string_view chunk;  ///< the binary one; empty when there is none
+};
+
+/// Finds the parts by what the bytes are, whatever the file's ending. Chunks of a GLB begin where the one
+/// before ends, padded or not; those of other types are passed over (glTF 2.0, section 4.4).
+///
+/// Throws a GltfError for chunks that reach out of the file, and for another version than 2.
+GltfContainer open_gltf_container(std::string_view bytes);
 
 }  // namespace tandem::build

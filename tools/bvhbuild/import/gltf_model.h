@@ -1,21 +1,41 @@
 #pragma once
 #include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "affine.h"
-#include "gltf_buffer.h"
 #include "gltf_json.h"
+#include "input_file.h"
+#include "mesh_assembly.h"
 
 namespace tandem::build {
 
-/// Why a glTF file cannot be read. read_gltf() makes a ReadResult of it.
-struct GltfError : std::runtime_error {
-  using std::runtime_error::runtime_error;
+/// A buffer of a glTF file.
+struct GltfBuffer {
+  std::vector<char> decoded;              ///< the bytes of a data URI; empty for other buffers
+  std::shared_ptr<const InputFile> file;  ///< the file that the bytes lie in; null for other buffers
+  std::string_view bytes;                 ///< of `decoded`, of `file`, or of the container
 };
+
+/// Where the bytes of buffers may lie.
+struct GltfBufferPlaces {
+  std::filesystem::path folder;         ///< that file names are relative to
+  bool is_binary = false;               ///< whether this is a GLB file
+  std::string_view chunk;               ///< its binary chunk
+  std::uint64_t most_bytes_in_files{};  ///< that may still be read; each file that is read lowers it
+  /// The files that buffers were found in. Each is read once, whatever names the buffers call it by.
+  std::map<InputFile::Identity, std::shared_ptr<const InputFile>> files;
+};
+
+/// Replaces escapes: "a%20b.bin" becomes "a b.bin". Everything else stays as it is.
+std::string percent_decoded(std::string_view text);
+
+/// Decodes base64 up to the first character that is no digit of it, and at most `most_bytes` bytes.
+std::vector<char> base64_decoded(std::string_view text, std::uint64_t most_bytes);
 
 /// The parts of a glTF file that say where its triangles are, as the file has them: no index, offset or count
 /// in here is checked. An index of -1 stands for a member that the file leaves out.
@@ -81,18 +101,12 @@ struct GltfModel {
   std::vector<std::string> remarks;  ///< for the report, at most a few
 };
 
-/// Names an item of a list for messages: "accessors[3]".
-std::string numbered(const char* list, std::int64_t index);
-
 /// Reads the model out of a glTF file's JSON, and the buffers from where they are.
 ///
 /// Throws a GltfError for another version than 2; for extensions that hide the triangles from us, by name;
 /// for buffers that are missing or too short; for members of a wrong type; and for transforms that are not
 /// affine.
 GltfModel read_gltf_model(const GltfObject& root, GltfBufferPlaces places);
-
-/// Throws a GltfError for another version than 2.
-void check_gltf_version(const std::string& version);
 
 /// Whether assimp may be able to read a file that was refused with this error: glTF 1, or Draco compression.
 bool is_for_another_gltf_reader(std::string_view error);

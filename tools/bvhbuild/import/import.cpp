@@ -4,17 +4,10 @@
 #include <exception>
 #include <new>
 #include <string_view>
-#include <utility>
 
-#include "assimp_child.h"
 #include "gltf_model.h"
 #include "input_file.h"
-#include "read_gltf.h"
-#include "read_obj.h"
-#include "read_off.h"
-#include "read_ply.h"
-#include "read_result.h"
-#include "read_stl.h"
+#include "readers.h"
 
 namespace tandem::build {
 namespace {
@@ -104,14 +97,13 @@ ReadResult read(const std::filesystem::path& path, const ImportOptions& options)
 
 }  // namespace
 
-ImportResult import_mesh(const std::filesystem::path& path, const ImportOptions& options) {
+ReadResult import_mesh(const std::filesystem::path& path, const ImportOptions& options) {
   try {
-    ReadResult result = read(path, options);
-    return {result.ok, std::move(result.mesh), std::move(result.error)};
+    return read(path, options);
   } catch (const std::bad_alloc&) {
-    return {false, {}, "not enough memory to read it"};
+    return read_failure("not enough memory to read it");
   } catch (const std::exception& error) {
-    return {false, {}, error.what()};
+    return read_failure(error.what());
   }
 }
 

@@ -1,12 +1,25 @@
 #pragma once
+#include <cstdint>
 #include <filesystem>
+#include <string>
+#include <utility>
 
-#include "read_limits.h"
-#include "read_result.h"
+#include "bvhbuild/meshing/polygon_mesh.h"
 
 namespace tandem::build {
 
 enum class Reader { automatic, tandem, assimp };
+
+/// How much memory a file may take to read, and how much larger than its file a scene may be.
+struct ReadLimits {
+  /// The most address space that the child process which runs assimp may take; the largest file for our own
+  /// readers, and the most that the buffers of a glTF file and its triangles may take.
+  std::uint64_t memory_bytes = std::uint64_t{8} << 30;
+  /// Vertices and faces that a scene may have beyond one for each byte of its files: instances repeat meshes,
+  /// and counts promise elements without data. assimp may take 192 bytes of memory for each of them and for
+  /// each byte of the file. A tree over 4 million faces takes below 1 GiB and 10 s.
+  std::uint64_t expansion = 4'000'000;
+};
 
 struct ImportOptions {
   Reader reader = Reader::automatic;
@@ -14,7 +27,19 @@ struct ImportOptions {
   ReadLimits limits;
 };
 
+/// What reading a mesh gives: the polygons, or the reason why there are none.
+struct ReadResult {
+  bool ok = false;
+  PolygonMesh mesh;
+  std::string error;  ///< when not ok: the reason without the file's name, "line 12: ...", "the reader
+                      ///< crashed (signal 11)"
+};
+
 using ImportResult = ReadResult;
+
+inline ReadResult read_failure(std::string reason) {
+  return {false, {}, std::move(reason)};
+}
 
 /// Reads the polygons of a mesh file.
 ///
@@ -23,6 +48,6 @@ using ImportResult = ReadResult;
 /// `options`, so that its crashes, endless loops and appetite become errors. Leaves no file, process or
 /// signal handler behind. Result: never throws; a file that holds no face at all is ok with no faces. Must be
 /// called while the process has a single thread (it may fork).
-ImportResult import_mesh(const std::filesystem::path& path, const ImportOptions& options);
+ReadResult import_mesh(const std::filesystem::path& path, const ImportOptions& options);
 
 }  // namespace tandem::build

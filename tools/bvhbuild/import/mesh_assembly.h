@@ -1,13 +1,42 @@
 #pragma once
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
 
-#include "bvhbuild/meshing/polygon_mesh.h"
-#include "read_result.h"
+#include "import.h"
 
 namespace tandem::build {
+
+/// Rows of an affine map in float64: x' = a[0] x + a[1] y + a[2] z + a[3].
+using Affine = std::array<std::array<double, 4>, 3>;
+
+inline constexpr Affine kIdentity{{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
+
+/// First `inner`, then `outer`. An identity stays out of the arithmetic.
+inline Affine combined(const Affine& outer, const Affine& inner) {
+  if (outer == kIdentity) return inner;
+  if (inner == kIdentity) return outer;
+  Affine result{};
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column) {
+      double sum = column == 3 ? outer[row][3] : 0;
+      for (int k = 0; k < 3; ++k) sum += outer[row][k] * inner[k][column];
+      result[row][column] = sum;
+    }
+  return result;
+}
+
+/// An identity stays out of the arithmetic, so that a coordinate that is not finite spoils no other one.
+inline Point transformed(const Affine& t, const Point& p) {
+  if (t == kIdentity) return p;
+  Point q;
+  for (int row = 0; row < 3; ++row)
+    q[row] = t[row][0] * p[0] + t[row][1] * p[1] + t[row][2] * p[2] + t[row][3];
+  return q;
+}
 
 /// A polygon mesh that a reader puts together in the file's order.
 class MeshAssembly {
@@ -58,6 +87,38 @@ class MeshAssembly {
   std::size_t name_bytes_left_;
   bool names_left_out_ = false;
   int index_remarks_ = 0;
+};
+
+/// Turns the indices of triangle strips into the triangles they stand for.
+///
+/// Index i of a strip makes the triangle (i-2, i-1, i); every other one, counted from the strip's start, is
+/// turned over, so that all face the same way. A triangle that names a vertex twice only leads the strip
+/// elsewhere: it is no face.
+class TriangleStrip {
+ public:
+  explicit TriangleStrip(MeshAssembly& mesh) : mesh_(mesh) {}
+
+  void restart() { length_ = 0; }
+
+  void add(std::int64_t index) {
+    if (length_ >= 2) add_triangle(index);
+    before_last_ = std::exchange(last_, index);
+    ++length_;
+  }
+
+ private:
+  void add_triangle(std::int64_t index) {
+    if (index == last_ || index == before_last_ || last_ == before_last_) return mesh_.leave_out_strip_turn();
+    const bool turned = length_ % 2 == 1;
+    mesh_.add_corner(turned ? last_ : before_last_);
+    mesh_.add_corner(turned ? before_last_ : last_);
+    mesh_.add_corner(index);
+    mesh_.end_face();
+  }
+
+  MeshAssembly& mesh_;
+  std::uint64_t length_ = 0;
+  std::int64_t before_last_ = 0, last_ = 0;
 };
 
 }  // namespace tandem::build

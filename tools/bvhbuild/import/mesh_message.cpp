@@ -9,16 +9,28 @@ namespace {
 constexpr std::uint64_t kBegin = 0x4873654d6d646e54u;
 constexpr std::uint64_t kEnd = 0x646e456d646e5421u;
 
+/// Writer and MessageReader have the same functions, so that what a message holds is listed once.
 class Writer {
  public:
   explicit Writer(const MessageSink& sink) : sink_(sink) {}
 
-  void number(std::uint64_t value) { sink_(&value, sizeof value); }
+  bool number(std::uint64_t value) {
+    sink_(&value, sizeof value);
+    return true;
+  }
+  bool flag(bool value) { return number(value); }
 
   template <class Sequence>
-  void sequence(const Sequence& items) {
+  bool sequence(const Sequence& items) {
     number(items.size());
     if (!items.empty()) sink_(items.data(), items.size() * sizeof(items[0]));
+    return true;
+  }
+
+  template <class Item, class Write>
+  bool list(const std::vector<Item>& items, const Write& write) {
+    number(items.size());
+    return std::all_of(items.begin(), items.end(), write);
   }
 
  private:
@@ -31,6 +43,12 @@ class MessageReader {
       : source_(source), bytes_left_(most_bytes) {}
 
   bool number(std::uint64_t& value) { return source_(&value, sizeof value); }
+  bool flag(bool& value) {
+    std::uint64_t stored = 0;
+    if (!number(stored)) return false;
+    value = stored != 0;
+    return true;
+  }
 
   bool expect(std::uint64_t wanted) {
     std::uint64_t value = 0;
@@ -74,11 +92,6 @@ class MessageReader {
   std::uint64_t bytes_left_;
 };
 
-bool read_part(MessageReader& reader, SourcePart& part) {
-  return reader.sequence(part.name) && reader.sequence(part.node_path) && reader.number(part.first_face) &&
-         reader.number(part.face_count);
-}
-
 bool faces_are_sound(const PolygonMesh& mesh) {
   const auto& begin = mesh.face_begin;
   if (begin.empty() || begin.front() != 0 || begin.back() != mesh.corners.size()) return false;
@@ -96,38 +109,19 @@ bool parts_are_sound(const PolygonMesh& mesh) {
   return next == mesh.face_count();
 }
 
-bool read_mesh(MessageReader& reader, PolygonMesh& mesh) {
-  const auto read_text = [&](std::string& text) { return reader.sequence(text); };
-  const auto read_one_part = [&](SourcePart& part) { return read_part(reader, part); };
-  std::uint64_t single = 0, points = 0, lines = 0, turns = 0;
-  if (!reader.sequence(mesh.points) || !reader.sequence(mesh.corners) || !reader.sequence(mesh.face_begin))
-    return false;
-  if (!reader.list(mesh.parts, read_one_part) || !reader.list(mesh.remarks, read_text)) return false;
-  if (!reader.number(points) || !reader.number(lines) || !reader.number(turns)) return false;
-  if (!reader.sequence(mesh.reader) || !reader.number(single)) return false;
-  mesh.left_out = {points != 0, lines != 0, turns != 0};
-  mesh.single_precision = single != 0;
-  return mesh.points.size() <= kNoVertex && faces_are_sound(mesh) && parts_are_sound(mesh);
-}
-
-void write_mesh(Writer& writer, const PolygonMesh& mesh) {
-  writer.sequence(mesh.points);
-  writer.sequence(mesh.corners);
-  writer.sequence(mesh.face_begin);
-  writer.number(mesh.parts.size());
-  for (const SourcePart& part : mesh.parts) {
-    writer.sequence(part.name);
-    writer.sequence(part.node_path);
-    writer.number(part.first_face);
-    writer.number(part.face_count);
-  }
-  writer.number(mesh.remarks.size());
-  for (const std::string& remark : mesh.remarks) writer.sequence(remark);
-  writer.number(mesh.left_out.points);
-  writer.number(mesh.left_out.lines);
-  writer.number(mesh.left_out.strip_turns);
-  writer.sequence(mesh.reader);
-  writer.number(mesh.single_precision);
+/// Writes or reads a mesh. Stream: a Writer of a constant mesh, or a MessageReader.
+template <class Stream, class Mesh>
+bool pass_mesh(Stream& stream, Mesh& mesh) {
+  const auto pass_text = [&](auto& text) { return stream.sequence(text); };
+  const auto pass_part = [&](auto& part) {
+    return pass_text(part.name) && pass_text(part.node_path) && stream.number(part.first_face) &&
+           stream.number(part.face_count);
+  };
+  return stream.sequence(mesh.points) && stream.sequence(mesh.corners) && stream.sequence(mesh.face_begin) &&
+         stream.list(mesh.parts, pass_part) && stream.list(mesh.remarks, pass_text) &&
+         stream.flag(mesh.left_out.points) && stream.flag(mesh.left_out.lines) &&
+         stream.flag(mesh.left_out.strip_turns) && pass_text(mesh.reader) &&
+         stream.flag(mesh.single_precision);
 }
 
 }  // namespace
@@ -135,19 +129,22 @@ void write_mesh(Writer& writer, const PolygonMesh& mesh) {
 void write_message(const ReadResult& result, const MessageSink& sink) {
   Writer writer(sink);
   writer.number(kBegin);
-  writer.number(result.ok);
+  writer.flag(result.ok);
   writer.sequence(result.error);
-  if (result.ok) write_mesh(writer, result.mesh);
+  if (result.ok) pass_mesh(writer, result.mesh);
   writer.number(kEnd);
 }
 
 bool read_message(const MessageSource& source, std::uint64_t most_bytes, ReadResult& result) {
   result = {};
   MessageReader reader(source, most_bytes);
-  std::uint64_t ok = 0;
-  if (!reader.expect(kBegin) || !reader.number(ok) || !reader.sequence(result.error)) return false;
-  if (ok != 0 && !read_mesh(reader, result.mesh)) return false;
-  result.ok = ok != 0;
+  bool ok = false;
+  if (!reader.expect(kBegin) || !reader.flag(ok) || !reader.sequence(result.error)) return false;
+  const PolygonMesh& mesh = result.mesh;
+  if (ok && !(pass_mesh(reader, result.mesh) && mesh.points.size() <= kNoVertex && faces_are_sound(mesh) &&
+              parts_are_sound(mesh)))
+    return false;
+  result.ok = ok;
   return reader.expect(kEnd);
 }
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <functional>
 
-#include "read_result.h"
+#include "import.h"
 
 namespace tandem::build {
 

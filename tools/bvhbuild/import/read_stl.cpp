@@ -1,15 +1,13 @@
-#include "read_stl.h"
-
 #include <bit>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <utility>
 
-#include "binary_number.h"
 #include "common/printable.h"
 #include "mesh_assembly.h"
-#include "text_scanner.h"
+#include "readers.h"
+#include "scanner.h"
 
 namespace tandem::build {
 namespace {
@@ -63,106 +61,94 @@ class TextReader {
  public:
   explicit TextReader(std::string_view bytes) : text_(bytes), mesh_("tandem STL", bytes.size()) {}
 
-  ReadResult read();
+  ReadResult read() {
+    while (accept("solid"))
+      if (!solid()) return read_failure(std::move(error_));
+    if (!text_.at_end()) {
+      fail_expecting("'solid'");
+      return read_failure(std::move(error_));
+    }
+    return mesh_.finish();
+  }
+
   /// Takes the next word if it is `keyword`, whatever its case.
-  bool accept(std::string_view keyword);
+  bool accept(std::string_view keyword) {
+    skip_space_and_comments();
+    if (!equals_ignoring_case(text_.word(), keyword)) return false;
+    text_.skip_word();
+    return true;
+  }
 
  private:
-  void skip_space_and_comments();
-  bool solid();
-  bool facet();
-  void skip_normal();
-  bool loop();
-  bool vertex();
-  bool expect(std::string_view keyword);
-  bool fail_expecting(std::string_view what);
+  // STL has no comments, but programs write them in all these ways.
+  void skip_space_and_comments() {
+    for (text_.skip_space();; text_.skip_space()) {
+      const char c = text_.peek();
+      const bool comment = c == '#' || c == ';' || (c == '/' && text_.word().starts_with("//"));
+      if (!comment) return;
+      text_.skip_to_line_end();
+    }
+  }
+
+  bool solid() {
+    mesh_.begin_part(text_.take_line(), {});
+    while (accept("facet"))
+      if (!facet()) return false;
+    if (!accept("endsolid")) return fail_expecting("'facet' or 'endsolid'");
+    text_.skip_to_line_end();
+    return true;
+  }
+
+  bool facet() {
+    skip_normal();
+    if (!loop() || !expect("endfacet")) return false;
+    mesh_.end_face();
+    return true;
+  }
+
+  // Normals are often wrong or no numbers at all, and nobody needs them: whatever stands before the loop
+  // falls away.
+  void skip_normal() {
+    constexpr int kMostWords = 4;  // "normal" and three numbers
+    for (int words = 0; words < kMostWords; ++words) {
+      skip_space_and_comments();
+      if (equals_ignoring_case(text_.word(), "outer")) return;
+      text_.skip_word();
+    }
+  }
+
+  bool loop() {
+    if (!expect("outer") || !expect("loop")) return false;
+    while (accept("vertex"))
+      if (!vertex()) return false;
+    return accept("endloop") || fail_expecting("'vertex' or 'endloop'");
+  }
+
+  bool vertex() {
+    Point point;
+    for (double& coordinate : point) {
+      skip_space_and_comments();
+      if (!text_.read_real(coordinate)) return fail_expecting("a coordinate");
+    }
+    mesh_.add_corner(static_cast<std::int64_t>(mesh_.point_count()));
+    mesh_.add_point(point);
+    return true;
+  }
+
+  bool expect(std::string_view keyword) {
+    return accept(keyword) || fail_expecting("'" + std::string(keyword) + "'");
+  }
+
+  bool fail_expecting(std::string_view what) {
+    const std::string found = text_.at_end() ? "the file ends" : in_quotes(text_.word());
+    error_ = text_.line() + ": " + found + " where " + std::string(what) + " is expected";
+    return false;
+  }
 
   TextScanner text_;
   MeshAssembly mesh_;
   std::string error_;
 };
-
-ReadResult TextReader::read() {
-  while (accept("solid"))
-    if (!solid()) return read_failure(std::move(error_));
-  if (!text_.at_end()) {
-    fail_expecting("'solid'");
-    return read_failure(std::move(error_));
-  }
-  return mesh_.finish();
-}
-
-bool TextReader::solid() {
-  mesh_.begin_part(text_.take_line(), {});
-  while (accept("facet"))
-    if (!facet()) return false;
-  if (!accept("endsolid")) return fail_expecting("'facet' or 'endsolid'");
-  text_.skip_to_line_end();
-  return true;
-}
-
-bool TextReader::facet() {
-  skip_normal();
-  if (!loop() || !expect("endfacet")) return false;
-  mesh_.end_face();
-  return true;
-}
-
-// Normals are often wrong or no numbers at all, and nobody needs them: whatever stands before the loop falls
-// away.
-void TextReader::skip_normal() {
-  constexpr int kMostWords = 4;  // "normal" and three numbers
-  for (int words = 0; words < kMostWords; ++words) {
-    skip_space_and_comments();
-    if (equals_ignoring_case(text_.word(), "outer")) return;
-    text_.skip_word();
-  }
-}
-
-bool TextReader::loop() {
-  if (!expect("outer") || !expect("loop")) return false;
-  while (accept("vertex"))
-    if (!vertex()) return false;
-  return accept("endloop") || fail_expecting("'vertex' or 'endloop'");
-}
-
-bool TextReader::vertex() {
-  Point point;
-  for (double& coordinate : point) {
-    skip_space_and_comments();
-    if (!text_.read_real(coordinate)) return fail_expecting("a coordinate");
-  }
-  mesh_.add_corner(static_cast<std::int64_t>(mesh_.point_count()));
-  mesh_.add_point(point);
-  return true;
-}
-
-// STL has no comments, but programs write them in all these ways.
-void TextReader::skip_space_and_comments() {
-  for (text_.skip_space();; text_.skip_space()) {
-    const char c = text_.peek();
-    const bool comment = c == '#' || c == ';' || (c == '/' && text_.word().starts_with("//"));
-    if (!comment) return;
-    text_.skip_to_line_end();
-  }
-}
-
-bool TextReader::accept(std::string_view keyword) {
-  skip_space_and_comments();
-  if (!equals_ignoring_case(text_.word(), keyword)) return false;
-  text_.skip_word();
-  return true;
-}
-
-bool TextReader::expect(std::string_view keyword) {
-  return accept(keyword) || fail_expecting("'" + std::string(keyword) + "'");
-}
-
-bool TextReader::fail_expecting(std::string_view what) {
-  const std::string found = text_.at_end() ? "the file ends" : in_quotes(text_.word());
-  error_ = text_.line() + ": " + found + " where " + std::string(what) + " is expected";
-  return false;
-}
 
 // A binary file keeps zero bytes near its start: its count of triangles is below 2^24, or its coordinates are
 // floats, or its header is padded. Text has none.

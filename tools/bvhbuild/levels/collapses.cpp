@@ -27,17 +27,11 @@ using Quadrics = simplification::GarlandHeckbert_plane_policies<Mesh, Kernel>;
 // Takes stored coordinates to a box of edge 1 to 2 around zero and back. Only the centre can round.
 class Frame {
  public:
-  explicit Frame(std::span<const std::array<float, 3>> points) {
-    for (const auto& point : points) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        lower_[k] = std::min(lower_[k], point[k]);
-        upper_[k] = std::max(upper_[k], point[k]);
-      }
-    }
+  explicit Frame(const Geometry& geometry) : bounds_(corner_bounds(geometry)) {
     double longest = 0;
     for (std::size_t k = 0; k < 3; ++k) {
-      centre_[k] = static_cast<float>((double{lower_[k]} + upper_[k]) / 2);
-      longest = std::max(longest, double{upper_[k]} - lower_[k]);
+      centre_[k] = static_cast<float>((double{bounds_.lower[k]} + bounds_.upper[k]) / 2);
+      longest = std::max(longest, double{bounds_.upper[k]} - bounds_.lower[k]);
     }
     if (longest > 0) exponent_ = std::ilogb(longest);
   }
@@ -53,15 +47,14 @@ class Frame {
     for (std::size_t k = 0; k < 3; ++k) {
       const double along = std::ldexp(point[static_cast<int>(k)], exponent_) + centre_[k];
       // Clamped first: what is beyond float32 may not be cast.
-      result[k] = static_cast<float>(std::clamp(along, double{lower_[k]}, double{upper_[k]})) + 0.0f;
+      result[k] =
+          static_cast<float>(std::clamp(along, double{bounds_.lower[k]}, double{bounds_.upper[k]})) + 0.0f;
     }
     return result;
   }
 
  private:
-  static constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  std::array<float, 3> lower_ = {kInfinity, kInfinity, kInfinity};
-  std::array<float, 3> upper_ = {-kInfinity, -kInfinity, -kInfinity};
+  CornerBounds bounds_;
   std::array<double, 3> centre_ = {};
   int exponent_ = 0;
 };
@@ -336,7 +329,7 @@ std::pair<Mesh, std::vector<std::uint32_t>> surface_mesh(const OpenedMesh& opene
 std::vector<Collapse> collapse_edges(const OpenedMesh& opened, const LevelView& finest, double distance) {
   std::vector<Collapse> collapses;
   std::vector<bool> fixed = opened.fixed;
-  const Frame frame(opened.points);
+  const Frame frame({opened.points, opened.triangles});
   auto [mesh, face] = surface_mesh(opened, frame, fixed);
   const Quadrics quadrics(mesh);
   Guard guard(opened, face, finest, distance);

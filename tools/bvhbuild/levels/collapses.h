@@ -4,7 +4,6 @@
 #include <span>
 #include <vector>
 
-#include "level_mesh.h"
 #include "opened_mesh.h"
 #include "tandem/formats/view.h"
 

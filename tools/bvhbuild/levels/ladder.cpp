@@ -2,18 +2,70 @@
 
 #include <algorithm>
 #include <atomic>
+#include <charconv>
 #include <cmath>
 #include <optional>
 
 #include "collapses.h"
-#include "laid_level.h"
 #include "levels/hausdorff.h"
 #include "levels/nearest_triangle.h"
 #include "opened_mesh.h"
 #include "parallel/parallel.h"
+#include "tandem/formats/file.h"
 
 namespace tandem::build {
+
 namespace {
+
+std::optional<LevelError> parse(std::string_view word) {
+  const bool of_diagonal = word.ends_with('%');
+  if (of_diagonal) word.remove_suffix(1);
+  double value = 0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (error != std::errc() || end != word.data() + word.size()) return std::nullopt;
+  if (!std::isfinite(value) || !(value > 0)) return std::nullopt;
+  return LevelError{of_diagonal ? value / 100 : value, of_diagonal};
+}
+
+// A level as it lies in a file, as far as distances from it need it: blocks, corners and the numbers of
+// vertices. The tree must outlive it.
+class LaidLevel {
+ public:
+  LaidLevel(const Geometry& geometry, const Tree& tree) : tree_(tree) {
+    std::vector<std::uint32_t> number(geometry.points.size(), kNoIndex);
+    triangles_.reserve(tree.order.size());
+    topology_.reserve(tree.order.size());
+    for (const std::uint32_t source : tree.order) {
+      Triangle& triangle = triangles_.emplace_back(Triangle{});
+      TriangleTopology& topology = topology_.emplace_back(TriangleTopology{});
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint32_t point = geometry.triangles[source][k];
+        std::copy_n(geometry.points[point].data(), 3, triangle.corner[k].position);
+        if (number[point] == kNoIndex) number[point] = vertex_count_++;
+        topology.vertex[k] = number[point];
+      }
+    }
+  }
+
+  LevelView view() const {
+    LevelView view;
+    view.blocks = tree_.blocks.data();
+    view.triangles = triangles_.data();
+    view.topology = topology_.data();
+    view.block_count = static_cast<std::uint32_t>(tree_.blocks.size());
+    view.triangle_count = static_cast<std::uint32_t>(triangles_.size());
+    view.leaf_block_count = tree_.leaf_block_count;
+    view.depth = tree_.depth;
+    view.vertex_count = vertex_count_;
+    return view;
+  }
+
+ private:
+  const Tree& tree_;
+  std::vector<Triangle> triangles_;
+  std::vector<TriangleTopology> topology_;
+  std::uint32_t vertex_count_ = 0;
+};
 
 // What part of the wanted error the simplifier may use, at first and where it turns out to be too much: the
 // surface is farther off between the points that it looks at than in them.
@@ -123,6 +175,37 @@ class Search {
 };
 
 }  // namespace
+
+std::string parse_level_errors(const std::string& text, std::vector<LevelError>& errors) {
+  errors.clear();
+  if (text == "auto") {
+    errors = {{0.001, true}, {0.003, true}, {0.01, true}, {0.03, true}};
+    return {};
+  }
+  double largest[2] = {};  // of lengths, of shares
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    const std::string word = text.substr(begin, end - begin);
+    const std::optional<LevelError> error = parse(word);
+    if (!error)
+      return "'" + word + "' is no error of a level: auto, or positive numbers, each with % or without";
+    double& before = largest[error->of_diagonal ? 1 : 0];
+    if (!(error->value > before)) return "'" + word + "' is not larger than the error before: errors ascend";
+    before = error->value;
+    errors.push_back(*error);
+    begin = end + 1;
+  }
+  if (errors.size() < kMaxLevels) return {};
+  return std::to_string(errors.size()) + " levels: a file has room for " + std::to_string(kMaxLevels - 1) +
+         " beside the finest";
+}
+
+std::string name(const LevelError& error) {
+  char text[40];
+  const double value = error.of_diagonal ? error.value * 100 : error.value;
+  const int digits = std::snprintf(text, sizeof text, "%.6g", value);
+  return std::string(text, static_cast<std::size_t>(digits)) + (error.of_diagonal ? "%" : "");
+}
 
 Ladder make_ladder(const FinestLevel& finest, std::span<const double> wanted,
                    const OptimisationWatch& watch) {

@@ -1,14 +1,31 @@
 #pragma once
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
-#include "bvhbuild/tree/surface_topology.h"
-#include "bvhbuild/tree/tree.h"
-#include "level_mesh.h"
-#include "tandem/build/effort.h"
+#include "opened_mesh.h"
+#include "tandem/build/build_options.h"
 
 namespace tandem::build {
+
+/// How far a level may be from the finest: a length in the unit of the file, or a share of the diagonal of
+/// the finest's bounds.
+struct LevelError {
+  double value = 0;
+  bool of_diagonal = false;  ///< `value` is a share, not a length
+
+  double length(double diagonal) const { return of_diagonal ? value * diagonal : value; }
+  bool operator==(const LevelError&) const = default;
+};
+
+/// Reads "0.1%,0.3%,2", or "auto", which stands for 0.1 %, 0.3 %, 1 % and 3 % of the diagonal. Result: what
+/// is wrong with the text, for people, or nothing. Errors are positive and finite, at most kMaxLevels - 1 of
+/// them; those of one kind ascend.
+std::string parse_level_errors(const std::string& text, std::vector<LevelError>& errors);
+
+/// As parse_level_errors() reads it: "0.3%", "2".
+std::string name(const LevelError& error);
 
 /// A level beyond the finest, without the tree that it will get.
 struct LadderLevel {

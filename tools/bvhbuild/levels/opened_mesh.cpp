@@ -1,32 +1,13 @@
 #include "opened_mesh.h"
 
 #include <algorithm>
-#include <numeric>
 
 #include "bvhbuild/meshing/index_table.h"
-#include "bvhbuild/tree/surface_edges.h"
+#include "bvhbuild/tree/surface_topology.h"
+#include "common/union_find.h"
 
 namespace tandem::build {
 namespace {
-
-// Sets that grow together; each is known by its lowest member.
-class UnionFind {
- public:
-  explicit UnionFind(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0u); }
-
-  std::uint32_t find(std::uint32_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(std::uint32_t i, std::uint32_t j) {
-    i = find(i);
-    j = find(j);
-    parent_[std::max(i, j)] = std::min(i, j);
-  }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
 
 bool is_segment(const TriangleTopology& triangle) {
   const std::uint32_t(&v)[3] = triangle.vertex;

@@ -3,10 +3,18 @@
 #include <cstdint>
 #include <vector>
 
+#include "bvhbuild/meshing/triangle_mesh.h"
 #include "bvhbuild/tree/surface_topology.h"
 #include "bvhbuild/tree/tree.h"
 
 namespace tandem::build {
+
+/// A coarser mesh, in the stored coordinates of the asset.
+struct LevelMesh {
+  std::vector<std::array<float, 3>> points;
+  std::vector<TriangleIndices> triangles;
+  std::vector<std::uint32_t> was;  ///< of each triangle: the one of level 0, in leaf order, that became it
+};
 
 /// A mesh whose edges have one side or two that run in opposite directions, and whose triangles around each
 /// vertex follow each other over such edges: what simplifiers ask for. It is the surface of a level, cut open

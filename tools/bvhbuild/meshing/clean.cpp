@@ -10,8 +10,6 @@
 namespace tandem::build {
 namespace {
 
-constexpr std::size_t kTrianglesAtOnce = 1 << 14;
-
 /// Calls visit(i, hash(i)) in order for all i below `count`, with the table's slots on their way from memory:
 /// welding is bound by cache misses, and a batch waits for them together.
 template <class Hash, class Visit>
@@ -133,7 +131,102 @@ void count_duplicates(const TriangleMesh& mesh, CleanReport& report) {
   });
 }
 
+struct Noun {
+  const char *one, *many;
+};
+constexpr Noun kFaces = {"face", "faces"}, kVertices = {"vertex", "vertices"},
+               kTriangles = {"triangle", "triangles"};
+
+/// A row of findings(), whose sentence is put together as "3 faces name a vertex ...".
+struct FindingKind {
+  const char* key;
+  std::uint64_t CleanReport::*count;
+  Noun noun, verb;
+  const char *rest, *fate;
+  bool defect, loses_faces;
+
+  Finding of(const CleanReport& report) const {
+    const std::uint64_t n = report.*count;
+    const bool one = n == 1;
+    const std::string what = std::to_string(n) + " " + (one ? noun.one : noun.many) + " " +
+                             (one ? verb.one : verb.many) + " " + rest;
+    return {key, n, what, fate, defect, loses_faces};
+  }
+};
+
+constexpr bool kDefect = true, kNoDefect = false, kLoses = true, kKeeps = false;
+constexpr Noun kHave = {"has", "have"};
+
+constexpr FindingKind kFindingKinds[] = {
+    {"faces_index_out_of_range",
+     &CleanReport::faces_index_out_of_range,
+     kFaces,
+     {"names", "name"},
+     "a vertex that the file does not have",
+     "dropped",
+     kDefect,
+     kLoses},
+    {"faces_too_few_corners", &CleanReport::faces_too_few_corners, kFaces, kHave, "fewer than three corners",
+     "dropped", kDefect, kLoses},
+    {"faces_not_finite", &CleanReport::faces_not_finite, kFaces, kHave,
+     "a coordinate that is NaN or infinite", "dropped", kDefect, kLoses},
+    {"faces_too_large", &CleanReport::faces_too_large, kFaces, kHave, "a coordinate too large for float32",
+     "dropped", kDefect, kLoses},
+    {"faces_repeated_corner", &CleanReport::faces_repeated_corner, kFaces, kHave,
+     "two corners in a row in the same place", "taken for one corner", kDefect, kKeeps},
+    {"faces_not_simple", &CleanReport::faces_not_simple, kFaces, kHave, "an outline that crosses itself",
+     "split as a fan", kDefect, kKeeps},
+    {"vertices_unreferenced",
+     &CleanReport::vertices_unreferenced,
+     kVertices,
+     {"belongs", "belong"},
+     "to no face",
+     "dropped",
+     kDefect,
+     kKeeps},
+    {"vertices_welded",
+     &CleanReport::vertices_welded,
+     kVertices,
+     {"lies", "lie"},
+     "exactly on an earlier one",
+     "welded",
+     kNoDefect,
+     kKeeps},
+    {"triangles_degenerate", &CleanReport::triangles_degenerate, kTriangles, kHave, "all corners on one line",
+     "dropped", kDefect, kLoses},
+    {"triangles_duplicate",
+     &CleanReport::triangles_duplicate,
+     kTriangles,
+     {"repeats", "repeat"},
+     "an earlier one, in either direction",
+     "kept",
+     kDefect,
+     kKeeps},
+    {"triangles_duplicate_reversed",
+     &CleanReport::triangles_duplicate_reversed,
+     kTriangles,
+     {"repeats", "repeat"},
+     "an earlier one with the opposite orientation",
+     "kept",
+     kDefect,
+     kKeeps},
+    {"triangles_flattened",
+     &CleanReport::triangles_flattened,
+     kTriangles,
+     {"becomes", "become"},
+     "flat when rounded to float32",
+     "kept",
+     kDefect,
+     kKeeps},
+};
+
 }  // namespace
+
+std::vector<Finding> findings(const CleanReport& report) {
+  std::vector<Finding> all;
+  for (const FindingKind& kind : kFindingKinds) all.push_back(kind.of(report));
+  return all;
+}
 
 void clean(TriangleMesh& mesh, CleanReport& report) {
   weld(mesh, report);

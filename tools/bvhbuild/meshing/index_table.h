@@ -6,17 +6,21 @@
 
 namespace tandem::build {
 
-/// Mixes three words into a hash whose high bits are as good as its low ones: rounds of SplitMix64 (Steele,
-/// Lea & Flood 2014). Each round is a bijection, so with two of the words fixed, different third words never
-/// collide: no value of one word can make another drop out.
+inline constexpr std::uint64_t kSplitMixStep = 0x9e3779b97f4a7c15u;
+
+/// A round of SplitMix64 (Steele, Lea & Flood 2014): the number that its generator draws in this state.
+inline std::uint64_t split_mix(std::uint64_t state) {
+  std::uint64_t x = state + kSplitMixStep;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+  return x ^ (x >> 31);
+}
+
+/// Mixes three words into a hash whose high bits are as good as its low ones. Each round is a bijection, so
+/// with two of the words fixed, different third words never collide: no value of one word can make another
+/// drop out.
 inline std::uint64_t hash_words(std::uint64_t a, std::uint64_t b, std::uint64_t c) {
-  const auto mix = [](std::uint64_t x) {
-    x += 0x9e3779b97f4a7c15u;
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-    return x ^ (x >> 31);
-  };
-  return mix(mix(mix(a) + b) + c);
+  return split_mix(split_mix(split_mix(a) + b) + c);
 }
 
 /// Open addressing over indices: the things themselves stay with the caller, a slot costs four bytes.

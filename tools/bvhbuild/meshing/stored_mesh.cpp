@@ -10,8 +10,6 @@
 namespace tandem::build {
 namespace {
 
-constexpr std::size_t kTrianglesAtOnce = 1 << 14;
-
 bool all_single(const TriangleMesh& mesh) {
   return std::all_of(mesh.points.begin(), mesh.points.end(), [](const Point& p) {
     return std::all_of(p.begin(), p.end(), [](double x) { return double{static_cast<float>(x)} == x; });

@@ -4,6 +4,8 @@
 #include <cstring>
 #include <new>
 #include <stdexcept>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "tandem/formats/allocator.h"
@@ -86,20 +88,6 @@ void write_triangles(const AssetLevel& level, std::span<const Part> parts, Trian
   }
 }
 
-void write_bounds(const AssetLevel& level, FileHeader& header) {
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  std::fill_n(header.lower, 3, kInfinity);
-  std::fill_n(header.upper, 3, -kInfinity);
-  for (const auto& corners : level.geometry.triangles) {
-    for (const std::uint32_t vertex : corners) {
-      for (int k = 0; k < 3; ++k) {
-        header.lower[k] = std::min(header.lower[k], level.geometry.points[vertex][k]);
-        header.upper[k] = std::max(header.upper[k], level.geometry.points[vertex][k]);
-      }
-    }
-  }
-}
-
 Plan plan_sections(const PartTable& table, const AssetSource& source, std::span<const AssetLevel> levels) {
   std::size_t optional = 0;
   for (const AssetLevel& level : levels)
@@ -131,7 +119,9 @@ FileHeader make_header(const AssetSource& source, std::span<const AssetLevel> le
   header.version_minor = kVersionMinor;
   header.file_bytes = plan.file_bytes();
   std::copy(source.origin.begin(), source.origin.end(), header.origin);
-  write_bounds(levels[0], header);
+  const CornerBounds bounds = corner_bounds(levels[0].geometry);
+  std::copy_n(bounds.lower.begin(), 3, header.lower);
+  std::copy_n(bounds.upper.begin(), 3, header.upper);
   header.source_faces = source.source_faces;
   header.rounding_error = source.rounding_error;
   header.section_count = static_cast<std::uint32_t>(plan.sections().size());
@@ -154,9 +144,38 @@ Level make_level(const AssetLevel& level) {
 }
 
 // Copies into the image and checks that the copy fills its section exactly.
-void fill(Image& image, const Section& section, const void* data, std::size_t bytes) {
+template <typename Rows>
+void fill(Image& image, const Section& section, const Rows& rows) {
+  const std::size_t bytes = std::size(rows) * sizeof(*std::data(rows));
   if (bytes != section.bytes) throw std::logic_error("a section has another size than planned");
-  if (bytes != 0) std::memcpy(image.data() + section.offset, data, bytes);
+  if (bytes != 0) std::memcpy(image.data() + section.offset, std::data(rows), bytes);
+}
+
+void write_section(const Section& section, const AssetSource& source, std::span<const AssetLevel> levels,
+                   const PartTable& table, Image& image) {
+  const AssetLevel& level = levels[section.level];
+  std::vector<Level> rows;
+  switch (section.kind) {
+    case SectionKind::levels:
+      for (const AssetLevel& each : levels) rows.push_back(make_level(each));
+      return fill(image, section, rows);
+    case SectionKind::blocks:
+      return fill(image, section, level.tree->blocks);
+    case SectionKind::oriented_blocks:
+      return fill(image, section, level.oriented_blocks);
+    case SectionKind::topology:
+      return fill(image, section, level.topology->triangles);
+    case SectionKind::components:
+      return fill(image, section, level.topology->components);
+    case SectionKind::triangles:
+      return write_triangles(level, table.parts, reinterpret_cast<Triangle*>(image.data() + section.offset));
+    case SectionKind::parts:
+      return fill(image, section, table.parts);
+    case SectionKind::strings:
+      return fill(image, section, table.strings);
+    case SectionKind::provenance:
+      return fill(image, section, source.provenance);
+  }
 }
 
 }  // namespace
@@ -177,51 +196,29 @@ Image assemble(const AssetSource& source, std::span<const AssetLevel> levels) {
   const FileHeader header = make_header(source, levels, plan);
   std::memcpy(image.data(), &header, sizeof header);
   std::memcpy(image.data() + sizeof header, plan.sections().data(), plan.sections().size() * sizeof(Section));
-
-  std::vector<Level> rows;
-  for (const AssetLevel& level : levels) rows.push_back(make_level(level));
-  for (const Section& section : plan.sections()) {
-    switch (section.kind) {
-      case SectionKind::levels:
-        fill(image, section, rows.data(), rows.size() * sizeof(Level));
-        break;
-      case SectionKind::blocks: {
-        const std::vector<Block>& blocks = levels[section.level].tree->blocks;
-        fill(image, section, blocks.data(), blocks.size() * sizeof(Block));
-        break;
-      }
-      case SectionKind::oriented_blocks: {
-        const std::span<const OrientedBlock> blocks = levels[section.level].oriented_blocks;
-        fill(image, section, blocks.data(), blocks.size_bytes());
-        break;
-      }
-      case SectionKind::topology: {
-        const std::vector<TriangleTopology>& triangles = levels[section.level].topology->triangles;
-        fill(image, section, triangles.data(), triangles.size() * sizeof(TriangleTopology));
-        break;
-      }
-      case SectionKind::components: {
-        const std::vector<SurfaceComponent>& components = levels[section.level].topology->components;
-        fill(image, section, components.data(), components.size() * sizeof(SurfaceComponent));
-        break;
-      }
-      case SectionKind::triangles:
-        write_triangles(levels[section.level], table.parts,
-                        reinterpret_cast<Triangle*>(image.data() + section.offset));
-        break;
-      case SectionKind::parts:
-        fill(image, section, table.parts.data(), table.parts.size() * sizeof(Part));
-        break;
-      case SectionKind::strings:
-        fill(image, section, table.strings.data(), table.strings.size());
-        break;
-      case SectionKind::provenance:
-        fill(image, section, source.provenance.data(), source.provenance.size());
-        break;
-    }
-  }
+  for (const Section& section : plan.sections()) write_section(section, source, levels, table, image);
   seal(image.data(), image.size());
   return image;
+}
+
+LevelParts build_parts(const Geometry& geometry, const BuildOptions& options, OptimisationWatch& watch) {
+  LevelParts parts;
+  parts.tree = build_tree(geometry, options.imaginary, options.effort, watch);
+  watch.look();
+  if (options.gpu_blocks && geometry.triangles.size() < kMostOrientedTriangles)
+    parts.oriented_blocks = orient_blocks(geometry, parts.tree, options.effort);
+  watch.look();
+  if (options.topology && geometry.triangles.size() < kMostTopologyTriangles)
+    parts.topology = make_topology(geometry, parts.tree);
+  return parts;
+}
+
+CheckedImage assemble_checked(const AssetSource& source, std::span<const AssetLevel> levels) {
+  Image image = assemble(source, levels);
+  const CheckResult checked = check(image.data(), image.size());
+  if (checked.status != Status::kOk)
+    throw std::logic_error(std::string("the tree that was built is not sound: ") + explain(checked.status));
+  return {std::move(image), checked.asset};
 }
 
 }  // namespace tandem::build

@@ -1,10 +1,13 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "surface_topology.h"
+#include "tandem/build/build_options.h"
 #include "tandem/build/image.h"
 #include "tandem/build/mesh.h"
 #include "tandem/formats/oriented_block.h"
@@ -35,5 +38,20 @@ struct AssetSource {
 /// should the bytes written differ from the bytes planned. Condition: 1 to kMaxLevels levels, each with at
 /// least one triangle; faces of triangles lie in parts.
 Image assemble(const AssetSource& source, std::span<const AssetLevel> levels);
+
+/// The tree of a level and what belongs to it.
+struct LevelParts {
+  Tree tree;
+  std::vector<OrientedBlock> oriented_blocks;
+  std::optional<SurfaceTopology> topology;
+};
+
+/// Builds what the options ask for, as far as there are not too many triangles for it. The result does not
+/// depend on the number of threads.
+LevelParts build_parts(const Geometry& geometry, const BuildOptions& options, OptimisationWatch& watch);
+
+/// Assembles a file and has the checker prove it: what is written, every program can load. Throws
+/// std::bad_alloc, and std::logic_error on a defect of the program.
+CheckedImage assemble_checked(const AssetSource& source, std::span<const AssetLevel> levels);
 
 }  // namespace tandem::build

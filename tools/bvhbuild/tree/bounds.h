@@ -2,6 +2,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
+
+#include "tree.h"
 
 namespace tandem::build {
 
@@ -33,5 +36,10 @@ struct alignas(16) Bounds {
  private:
   static constexpr float kInfinity = std::numeric_limits<float>::infinity();
 };
+
+/// The bounds of all triangles, moved and scaled so that the lower corner of the mesh lies at zero and its
+/// longest edge between 1 and 2: surfaces of huge, tiny or far meshes neither overflow nor vanish.
+/// Coordinates are finite floats; their differences and the scaled ones are taken in float64.
+std::vector<Bounds> normalized_bounds(const Geometry& geometry);
 
 }  // namespace tandem::build

@@ -2,10 +2,10 @@
 
 #include <charconv>
 
+#include "assemble.h"
 #include "bvhbuild/meshing/clean.h"
 #include "bvhbuild/meshing/stored_mesh.h"
-#include "bvhbuild/meshing/take_triangles.h"
-#include "level_parts.h"
+#include "bvhbuild/meshing/triangle_mesh.h"
 #include "parallel/parallel.h"
 
 namespace tandem::build {

@@ -2,7 +2,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "region.h"
 #include "working_tree.h"
 
 namespace tandem::build {

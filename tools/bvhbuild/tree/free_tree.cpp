@@ -1,10 +1,8 @@
-#include "free_tree.h"
-
 #include <algorithm>
 
-#include "depth.h"
 #include "parallel/parallel.h"
 #include "splitter.h"
+#include "topology.h"
 
 namespace tandem::build {
 namespace {
@@ -52,12 +50,7 @@ class BinaryTree {
     Bounds bounds, other;
     const auto build_left = [&] { bounds = build(left(node), {range.begin, middle}, depth + 1); };
     const auto build_right = [&] { other = build(right(node), {middle, range.end}, depth + 1); };
-    if (range.size() > kSerialSize) {
-      parallel::invoke(build_left, build_right);
-    } else {
-      build_left();
-      build_right();
-    }
+    parallel::invoke_if(range.size() > kSerialSize, build_left, build_right);
     bounds.grow(other);
     self.visit_cost = bounds.visit_cost();
     return bounds;

@@ -1,11 +1,9 @@
-#include "minimal_tree.h"
-
 #include <algorithm>
 
-#include "depth.h"
 #include "legal_splits.h"
 #include "parallel/parallel.h"
 #include "splitter.h"
+#include "topology.h"
 
 namespace tandem::build {
 namespace {
@@ -19,16 +17,6 @@ struct Groups {
     for (int i = 0; i < other.count; ++i) range[count++] = other.range[i];
   }
 };
-
-template <typename Left, typename Right>
-void maybe_parallel(bool parallel, const Left& left, const Right& right) {
-  if (parallel) {
-    parallel::invoke(left, right);
-  } else {
-    left();
-    right();
-  }
-}
 
 class Builder {
  public:
@@ -65,7 +53,7 @@ class Builder {
                       std::uint32_t depth) {
     if (last - first == 1) return build_block(groups.range[first], child[first], depth + 1);
     const int middle = (first + last) / 2;
-    maybe_parallel(
+    parallel::invoke_if(
         groups.range[last - 1].end - groups.range[first].begin > kSerialSize,
         [&] { build_children(groups, child, first, middle, depth); },
         [&] { build_children(groups, child, middle, last, depth); });
@@ -83,7 +71,7 @@ class Builder {
 
     const std::uint32_t left_slots = legal.left_slots(best.left), middle = range.begin + best.left;
     Groups left, right;
-    maybe_parallel(
+    parallel::invoke_if(
         range.size() > kSerialSize,
         [&] {
           left = split({range.begin, middle}, left_slots, depth);

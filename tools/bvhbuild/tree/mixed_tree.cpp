@@ -1,13 +1,8 @@
-#include "mixed_tree.h"
-
 #include <algorithm>
 #include <cstdlib>
 #include <optional>
 
-#include "free_tree.h"
-#include "minimal_tree.h"
 #include "parallel/parallel.h"
-#include "region.h"
 #include "working_tree.h"
 
 namespace tandem::build {
@@ -31,12 +26,6 @@ struct Replacement {
   }
 };
 
-double cost_of(const WorkingTree& tree, std::uint32_t root, std::span<const std::uint32_t> blocks) {
-  double cost = 0;
-  for (const std::uint32_t block : blocks) cost += block == root ? 0.0 : tree[block].box.visit_cost();
-  return cost;
-}
-
 // Another tree over what hangs below the region's root.
 Replacement replacement_of(const WorkingTree& tree, const Region& region, std::span<const Bounds> bounds,
                            const Builder& build) {
@@ -52,7 +41,7 @@ Replacement replacement_of(const WorkingTree& tree, const Region& region, std::s
   replacement.topology = build(their_bounds);
   const WorkingTree other(replacement.topology, their_bounds);
   const Region whole = cut_into_regions(other, ~0u).front();
-  replacement.saving = cost_of(tree, region.root, region.blocks) - cost_of(other, 0, whole.blocks);
+  replacement.saving = cost_of(tree, region) - cost_of(other, whole);
   replacement.more_blocks =
       static_cast<std::int64_t>(whole.blocks.size()) - static_cast<std::int64_t>(region.blocks.size());
   replacement.fits = region.depth + other[0].height - 1 <= kMaxDepth;

@@ -1,10 +1,9 @@
-#include "oriented_blocks.h"
-
 #include <algorithm>
 #include <cmath>
 
 #include "parallel/parallel.h"
 #include "tandem/formats/box.h"
+#include "tree.h"
 
 namespace tandem::build {
 namespace {

@@ -1,4 +1,5 @@
 #pragma once
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -7,6 +8,7 @@
 #include <vector>
 
 #include "bounds.h"
+#include "tandem/formats/block.h"
 
 namespace tandem::build {
 
@@ -86,5 +88,13 @@ class TriangleSplitter {
       scratch_[3];  // bits of the right sides' costs; one side's triangles while partitioning
   std::vector<std::uint8_t> goes_left_;  // by triangle
 };
+
+/// Whether a group of n triangles at this depth must be split evenly from here on, so that the tree ends
+/// above kMaxDepth. Even splits at least halve a group, give or take the few positions to the nearest legal
+/// one, at each level.
+constexpr bool must_split_evenly(std::uint32_t depth, std::uint32_t n) {
+  constexpr std::uint32_t kReserve = 4;
+  return depth + static_cast<std::uint32_t>(std::bit_width(n)) + kReserve >= kMaxDepth;
+}
 
 }  // namespace tandem::build

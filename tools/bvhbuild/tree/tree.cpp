@@ -1,15 +1,78 @@
 #include "tree.h"
 
-#include "emit.h"
-#include "free_tree.h"
-#include "minimal_tree.h"
-#include "mixed_tree.h"
-#include "normalize.h"
-#include "optimise.h"
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "parallel/parallel.h"
+#include "tandem/formats/box.h"
+#include "topology.h"
 
 namespace tandem::build {
-
 namespace {
+
+constexpr std::size_t kBlocksAtOnce = 1 << 12;
+
+// Where a block of the topology comes to lie, and its children.
+struct Place {
+  std::uint32_t block;           // of the topology
+  std::uint32_t first_triangle;  // of a leaf block: where its triangles start in the file
+  std::uint32_t child[kNodesPerBlock];
+};
+
+// All blocks, each after its parent, those below a node before those below the next one.
+class DepthFirst {
+ public:
+  explicit DepthFirst(const Topology& topology) : topology_(topology) {
+    places_.reserve(topology.size());
+    number(0, 1);
+  }
+
+  std::vector<Place> take() { return std::move(places_); }
+  std::uint32_t depth() const { return depth_; }
+
+ private:
+  std::uint32_t number(std::uint32_t block, std::uint32_t depth) {
+    const auto self = static_cast<std::uint32_t>(places_.size());
+    const TopologyBlock& from = topology_[block];
+    places_.push_back({block, triangles_, {}});
+    depth_ = std::max(depth_, depth);
+    if (from.is_leaf_block) {
+      triangles_ += from.count;
+    } else {
+      for (int i = 0; i < from.count; ++i) {
+        const std::uint32_t child = number(from.child[i], depth + 1);
+        places_[self].child[i] = child;
+      }
+    }
+    return self;
+  }
+
+  const Topology& topology_;
+  std::vector<Place> places_;
+  std::uint32_t triangles_ = 0, depth_ = 0;
+};
+
+Box box_of_triangle(const Geometry& geometry, std::uint32_t triangle) {
+  const auto& corners = geometry.triangles[triangle];
+  Position lo, hi;
+  for (int k = 0; k < 3; ++k) {
+    const float a = geometry.points[corners[0]][k], b = geometry.points[corners[1]][k],
+                c = geometry.points[corners[2]][k];
+    lo[k] = std::min({a, b, c});
+    hi[k] = std::max({a, b, c});
+  }
+  return enclose(lo, hi);
+}
+
+void emit_leaf_block(const Geometry& geometry, const TopologyBlock& from, const Place& place, Tree& tree,
+                     Block& block) {
+  for (std::uint32_t i = 0; i < from.count; ++i) {
+    const std::uint32_t number = place.first_triangle + i;
+    tree.order[number] = from.child[i];
+    set_node(block, static_cast<int>(i), box_of_triangle(geometry, from.child[i]), number, NodeKind::leaf);
+  }
+}
 
 Topology build_topology(std::span<const Bounds> bounds, Imaginary imaginary) {
   if (imaginary == Imaginary::minimal) return build_minimal_tree(bounds);
@@ -18,6 +81,50 @@ Topology build_topology(std::span<const Bounds> bounds, Imaginary imaginary) {
 }
 
 }  // namespace
+
+double CornerBounds::diagonal() const {
+  return std::hypot(double{upper[0]} - lower[0], double{upper[1]} - lower[1], double{upper[2]} - lower[2]);
+}
+
+CornerBounds corner_bounds(const Geometry& geometry) {
+  CornerBounds bounds;
+  bounds.lower.fill(std::numeric_limits<float>::infinity());
+  bounds.upper.fill(-std::numeric_limits<float>::infinity());
+  for (const auto& corners : geometry.triangles) {
+    for (const std::uint32_t vertex : corners) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        bounds.lower[k] = std::min(bounds.lower[k], geometry.points[vertex][k]);
+        bounds.upper[k] = std::max(bounds.upper[k], geometry.points[vertex][k]);
+      }
+    }
+  }
+  return bounds;
+}
+
+Tree emit(const Geometry& geometry, const Topology& topology) {
+  DepthFirst numbering(topology);
+  const std::vector<Place> places = numbering.take();
+  Tree tree;
+  tree.depth = numbering.depth();
+  tree.blocks.resize(places.size());
+  tree.order.resize(geometry.triangles.size());
+  parallel::for_parts(places.size(), kBlocksAtOnce, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t b = begin; b != end; ++b) {
+      const TopologyBlock& from = topology[places[b].block];
+      for (int i = from.count; i < kNodesPerBlock; ++i) set_imaginary(tree.blocks[b], i);
+      if (from.is_leaf_block) emit_leaf_block(geometry, from, places[b], tree, tree.blocks[b]);
+    }
+  });
+  for (std::size_t b = places.size(); b-- > 0;) {  // children before parents, whose boxes enclose them
+    const TopologyBlock& from = topology[places[b].block];
+    tree.leaf_block_count += from.is_leaf_block;
+    for (int i = 0; i < from.count && !from.is_leaf_block; ++i) {
+      const std::uint32_t child = places[b].child[i];
+      set_node(tree.blocks[b], i, enclose(tree.blocks[child]), child, NodeKind::internal);
+    }
+  }
+  return tree;
+}
 
 Tree build_tree(const Geometry& geometry, Imaginary imaginary, Effort effort) {
   OptimisationWatch watch;

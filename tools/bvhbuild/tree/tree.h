@@ -6,6 +6,7 @@
 
 #include "tandem/build/build_options.h"
 #include "tandem/formats/block.h"
+#include "tandem/formats/oriented_block.h"
 
 namespace tandem::build {
 
@@ -25,6 +26,15 @@ struct Geometry {
   std::span<const std::array<std::uint32_t, 3>> triangles;
 };
 
+/// The bounds of the corners of all triangles; empty where there is none.
+struct CornerBounds {
+  std::array<float, 3> lower, upper;
+
+  double diagonal() const;
+};
+
+CornerBounds corner_bounds(const Geometry& geometry);
+
 /// Builds the pure 4-ary tree of all triangles, blocks in depth-first order, and optimises it.
 /// The result depends on the triangles, `imaginary` and `effort` alone, not on the number of threads
 /// (and on watch.stop, if somebody sets it). Condition: at least one and fewer
@@ -32,5 +42,10 @@ struct Geometry {
 Tree build_tree(const Geometry& geometry, Imaginary imaginary = Imaginary::minimal,
                 Effort effort = Effort::standard);
 Tree build_tree(const Geometry& geometry, Imaginary imaginary, Effort effort, OptimisationWatch& watch);
+
+/// The oriented blocks of a tree, in the order in which they lie in the file: for each block a frame that
+/// fits the triangles below it, searched for as long as `effort` says, and in that frame the boxes of its
+/// nodes. The result does not depend on the number of threads. Condition: fewer than kMostOrientedTriangles.
+std::vector<OrientedBlock> orient_blocks(const Geometry& geometry, const Tree& tree, Effort effort);
 
 }  // namespace tandem::build

@@ -1,5 +1,8 @@
 #pragma once
-#include "tandem/build/effort.h"
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <mutex>
 
 namespace tandem::build {
 
@@ -16,6 +19,13 @@ struct Imaginary {
 
 inline constexpr Imaginary Imaginary::minimal{0}, Imaginary::free{1};
 
+/// How much time goes into making a tree cheap to query.
+enum class Effort : std::uint8_t {
+  fast,      ///< greedy splits only
+  standard,  ///< then one pass of exchanges: at most twice as long again
+  best,      ///< then simulated annealing: minutes for 10^5 triangles
+};
+
 /// What a .bvh file is to hold beside its triangles, and how long to look for a good tree, by how many
 /// threads.
 struct BuildOptions {
@@ -24,6 +34,27 @@ struct BuildOptions {
   bool gpu_blocks = true;  ///< the file gets oriented blocks
   bool topology = true;    ///< the file gets topology
   unsigned threads = 0;    ///< that build, at most; 0: as many as the process may use
+};
+
+/// Lets somebody look on while a tree is optimised, and end it.
+class OptimisationWatch {
+ public:
+  /// Called now and then, by one thread at a time, with the share that is done. What it throws ends the
+  /// build.
+  std::function<void(double share)> progress = [](double) {};
+  /// Once set, optimisation ends within a second or so, with the best tree so far.
+  std::atomic<bool> stop = false;
+
+  /// For the optimiser: how many units of work there are, and that some more are done.
+  void expect(std::uint64_t units) { expected_ = units; }
+  void count(std::uint64_t units);
+  /// For the builder: between two of its steps.
+  void look() { count(0); }
+
+ private:
+  std::uint64_t expected_ = 1;
+  std::mutex mutex_;
+  std::uint64_t done_ = 0;
 };
 
 }  // namespace tandem::build

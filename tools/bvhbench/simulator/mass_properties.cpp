@@ -1,0 +1,294 @@
+#include "mass_properties.h"
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <stdexcept>
+#include <tuple>
+
+#include "common/union_find.h"
+
+namespace tandem::simulation {
+namespace {
+
+/// How the triangles of a mesh hang together: corners at the same stored position share a vertex.
+struct Surface {
+  /// Two vertices that one triangle or more have in common, lower < upper.
+  struct Edge {
+    std::uint32_t lower, upper;
+    std::uint32_t triangles;  ///< that have it
+  };
+
+  /// The triangles are those of the level, in its order.
+  std::vector<std::array<float, 3>> position;         ///< of each vertex, stored coordinates
+  std::vector<std::array<std::uint32_t, 3>> corner;   ///< vertices of each triangle
+  std::vector<std::array<std::uint32_t, 3>> edge_of;  ///< edges of each triangle; k joins corners k, k + 1
+  std::vector<Edge> edge;
+  std::vector<std::uint8_t> turned;  ///< of each triangle: its winding is against the rest's
+  std::uint32_t components = 0;
+
+  std::uint64_t boundary_edges = 0;  ///< of an odd number of triangles
+  std::uint64_t contradicting_edges =
+      0;                                ///< that triangles do not run along in both directions equally often
+  std::uint64_t turned_components = 0;  ///< inside out as a whole
+  std::uint64_t turned_triangles = 0;   ///< beside the rest of their component, so that windings agree
+  bool orientable = true;               ///< windings agree, once what is marked as turned is
+  bool closed = true;                   ///< every edge is run along equally often in both directions, then
+
+  std::uint32_t triangle_count() const { return static_cast<std::uint32_t>(corner.size()); }
+};
+
+void take_vertices(const LevelView& level, Surface& surface) {
+  surface.position.resize(level.vertex_count);
+  for (std::uint32_t t = 0; t < level.triangle_count; ++t) {
+    const TriangleTopology& triangle = level.topology[t];
+    surface.corner.push_back({triangle.vertex[0], triangle.vertex[1], triangle.vertex[2]});
+    surface.turned.push_back(is_turned(triangle.flags));
+    for (int k = 0; k < 3; ++k) {
+      const float* p = level.triangles[t].corner[k].position;
+      surface.position[triangle.vertex[k]] = {p[0] + 0.0f, p[1] + 0.0f, p[2] + 0.0f};  // -0 is 0
+    }
+  }
+}
+
+void find_edges(Surface& surface) {
+  struct Side {
+    std::uint32_t lower, upper, place;  // place: 3 * triangle + k
+  };
+  std::vector<Side> sides;
+  sides.reserve(3 * surface.corner.size());
+  for (std::uint32_t t = 0; t < surface.triangle_count(); ++t) {
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const std::uint32_t u = surface.corner[t][k], v = surface.corner[t][(k + 1) % 3];
+      sides.push_back({std::min(u, v), std::max(u, v), 3 * t + k});
+    }
+  }
+  std::sort(sides.begin(), sides.end(), [](const Side& x, const Side& y) {
+    return std::tie(x.lower, x.upper, x.place) < std::tie(y.lower, y.upper, y.place);
+  });
+  surface.edge_of.resize(surface.corner.size());
+  for (const Side& side : sides) {
+    const bool same = !surface.edge.empty() && surface.edge.back().lower == side.lower &&
+                      surface.edge.back().upper == side.upper;
+    if (!same) surface.edge.push_back({side.lower, side.upper, 0});
+    ++surface.edge.back().triangles;
+    surface.edge_of[side.place / 3][side.place % 3] = static_cast<std::uint32_t>(surface.edge.size() - 1);
+  }
+}
+
+// What is turned: whole components, or triangles beside the rest of their component.
+void count_turned(const LevelView& level, Surface& surface) {
+  UnionFind triangles(surface.triangle_count());  // of each component
+  std::vector<std::uint32_t> first(surface.edge.size(), kNoIndex);
+  for (std::uint32_t t = 0; t < surface.triangle_count(); ++t) {
+    for (const std::uint32_t e : surface.edge_of[t]) {
+      if (first[e] == kNoIndex) first[e] = t;
+      triangles.join(t, first[e]);
+    }
+  }
+  std::vector<std::uint32_t> turned(surface.triangle_count(), 0);
+  for (std::uint32_t t = 0; t < surface.triangle_count(); ++t) turned[triangles.find(t)] += surface.turned[t];
+  for (const SurfaceComponent& component : std::span(level.components, level.component_count)) {
+    const std::uint32_t t = component.first_triangle, all = component.triangle_count;
+    const bool most = 2 * turned[t] > all || (2 * turned[t] == all && surface.turned[t] != 0);
+    surface.turned_components += most;
+    surface.turned_triangles += most ? all - turned[t] : turned[t];
+  }
+}
+
+// Whether triangle t, as it is marked, runs along its edge k from the lower to the upper vertex.
+bool runs_up(const Surface& surface, std::uint32_t t, std::uint32_t k) {
+  return (surface.corner[t][k] < surface.corner[t][(k + 1) % 3]) != (surface.turned[t] != 0);
+}
+
+// How often each edge is run along upwards less downwards, as triangles are marked or as they are.
+std::vector<int> balance(const Surface& surface, bool as_marked) {
+  std::vector<int> sum(surface.edge.size(), 0);
+  for (std::uint32_t t = 0; t < surface.triangle_count(); ++t) {
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const bool up =
+          as_marked ? runs_up(surface, t, k) : surface.corner[t][k] < surface.corner[t][(k + 1) % 3];
+      sum[surface.edge_of[t][k]] += up ? 1 : -1;
+    }
+  }
+  return sum;
+}
+
+void count_defects(Surface& surface) {
+  const std::vector<int> before = balance(surface, false);
+  for (std::size_t e = 0; e < surface.edge.size(); ++e) {
+    const bool odd = surface.edge[e].triangles % 2 != 0;
+    surface.boundary_edges += odd;
+    surface.contradicting_edges += !odd && before[e] != 0;
+  }
+  const std::vector<int> after = balance(surface, true);
+  for (std::size_t e = 0; e < surface.edge.size(); ++e) {
+    if (after[e] == 0) continue;
+    surface.closed = false;
+    if (surface.edge[e].triangles % 2 == 0) surface.orientable = false;
+  }
+}
+
+// The surface of a level with topology, from which come vertices and what is turned. Throws
+// std::runtime_error where the level has none.
+Surface make_surface(const LevelView& level) {
+  if (level.topology == nullptr)
+    throw std::runtime_error("the asset has no topology: build it without --no-topology");
+  Surface surface;
+  surface.components = level.component_count;
+  take_vertices(level, surface);
+  find_edges(surface);
+  count_turned(level, surface);
+  count_defects(surface);
+  return surface;
+}
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+// A volume below this part of the diagonal's cube is rounding.
+constexpr double kFlat = 1e-13;
+
+// Adds and keeps what each addition rounds off, to add it in the end: Knuth's two-sum, entry by entry.
+template <typename Value>
+class Sum {
+ public:
+  explicit Sum(const Value& zero) : sum_(zero), lost_(zero) {}
+
+  void add(const Value& value) {
+    const Value next = sum_ + value;
+    const Value rest = next - sum_;
+    lost_ += (sum_ - (next - rest)) + (value - rest);
+    sum_ = next;
+  }
+  Value value() const { return sum_ + lost_; }
+
+ private:
+  Value sum_, lost_;
+};
+
+// Integrals of 1, x and x x^T over a body or a surface.
+struct Moments {
+  double zeroth;
+  Vector3d first;
+  Matrix3d second;
+};
+
+Matrix3d product(const Vector3d& x) {
+  return x * x.transpose();
+}
+
+// Of the tetrahedron between the origin and a triangle: exact, since a polynomial of degree 2 over a simplex
+// is a mean over its corners and their sum (Eberly 2002, "Polyhedral mass properties", gives the same).
+Moments solid_moments(const Vector3d& p, const Vector3d& q, const Vector3d& r) {
+  const double volume = p.dot(q.cross(r)) / 6;
+  const Vector3d sum = p + q + r;
+  return {volume, volume / 4 * sum, volume / 20 * (product(p) + product(q) + product(r) + product(sum))};
+}
+
+// Of the triangle itself.
+Moments shell_moments(const Vector3d& p, const Vector3d& q, const Vector3d& r) {
+  const double area = (q - p).cross(r - p).norm() / 2;
+  const Vector3d sum = p + q + r;
+  return {area, area / 3 * sum, area / 12 * (product(p) + product(q) + product(r) + product(sum))};
+}
+
+// The middle of the bounds: what integrals are taken about, so that nothing large cancels.
+Vector3d middle(const FileHeader& header) {
+  const Vector3d lower(header.lower[0], header.lower[1], header.lower[2]);
+  const Vector3d upper(header.upper[0], header.upper[1], header.upper[2]);
+  return (lower + upper) / 2;
+}
+
+double diagonal(const FileHeader& header) {
+  Vector3d extent;
+  for (int k = 0; k < 3; ++k) extent[k] = static_cast<double>(header.upper[k]) - header.lower[k];
+  return extent.norm();
+}
+
+template <typename Of>
+Moments integrate(const Surface& surface, const Vector3d& about, const Of& of) {
+  Sum<double> zeroth(0);
+  Sum<Vector3d> first(Vector3d::Zero());
+  Sum<Matrix3d> second(Matrix3d::Zero());
+  for (std::uint32_t t = 0; t < surface.triangle_count(); ++t) {
+    Vector3d x[3];
+    for (int k = 0; k < 3; ++k) {
+      const auto& position = surface.position[surface.corner[t][k]];
+      x[k] = Vector3d(position[0], position[1], position[2]) - about;
+    }
+    if (surface.turned[t] != 0) std::swap(x[1], x[2]);
+    const Moments part = of(x[0], x[1], x[2]);
+    zeroth.add(part.zeroth);
+    first.add(part.first);
+    second.add(part.second);
+  }
+  return {zeroth.value(), first.value(), second.value()};
+}
+
+// thickness: what a mass per area is multiplied by; 1 of solids.
+MassProperties properties_of(const Moments& moments, const Vector3d& about, const double* origin,
+                             double thickness) {
+  const Vector3d center = moments.first / moments.zeroth;
+  const Matrix3d spread = thickness * (moments.second - moments.zeroth * product(center));
+  MassProperties properties;
+  properties.volume = thickness * moments.zeroth;
+  properties.center = Vector3d(origin[0], origin[1], origin[2]) + (about + center);
+  properties.inertia_per_density = spread.trace() * Matrix3d::Identity() - spread;
+  return properties;
+}
+
+std::string counted(std::uint64_t count, const char* one, const char* many) {
+  return std::to_string(count) + " " + (count == 1 ? one : many);
+}
+
+void add_findings(const Surface& surface, std::vector<std::string>& findings) {
+  if (surface.contradicting_edges != 0) {
+    findings.push_back(
+        "windings contradict each other along " + counted(surface.contradicting_edges, "edge", "edges") +
+        (surface.orientable
+             ? ": " + counted(surface.turned_triangles, "triangle is taken", "triangles are taken") +
+                   " to be wound the other way"
+             : ", and no winding makes them agree"));
+  }
+  if (surface.turned_components != 0) {
+    findings.push_back(surface.components == 1
+                           ? "inside out: taken to be wound the other way"
+                           : counted(surface.turned_components, "component is", "components are") +
+                                 " inside out and no cavity of another: taken to be wound the other way");
+  }
+  if (surface.boundary_edges != 0) {
+    findings.push_back("open: " + counted(surface.boundary_edges, "boundary edge", "boundary edges"));
+  }
+  if (surface.components > 1) {
+    findings.push_back(counted(surface.components, "component", "components") +
+                       ": their masses are added, where they overlap too");
+  }
+}
+
+}  // namespace
+
+MassReport mass_properties(const AssetView& asset) {
+  const Surface surface = make_surface(asset.level());
+  const FileHeader& header = *asset.header;
+  const Vector3d about = middle(header);
+  const double size = diagonal(header);
+  MassReport report = {{}, MassModel::solid, surface.components, {}};
+  add_findings(surface, report.findings);
+  if (surface.closed) {
+    const Moments moments = integrate(surface, about, solid_moments);
+    if (moments.zeroth > kFlat * size * size * size) {
+      report.properties = properties_of(moments, about, header.origin, 1);
+      return report;
+    }
+    report.findings.push_back("encloses no volume");
+  }
+  const Moments moments = integrate(surface, about, shell_moments);
+  if (!(moments.zeroth > 0)) throw std::runtime_error("the mesh has no extent, and so no mass");
+  report.model = MassModel::shell;
+  report.findings.push_back("taken for a shell, its thickness a hundredth of the mesh's diagonal");
+  report.properties = properties_of(moments, about, header.origin, kShellThickness * size);
+  return report;
+}
+
+}  // namespace tandem::simulation

@@ -1,0 +1,28 @@
+#include "bounds.h"
+
+#include "bvhbuild/meshing/triangle_mesh.h"
+#include "parallel/parallel.h"
+
+namespace tandem::build {
+
+std::vector<Bounds> normalized_bounds(const Geometry& geometry) {
+  const CornerBounds all = corner_bounds(geometry);
+  double longest = 0;
+  for (std::size_t k = 0; k < 3; ++k) longest = std::max(longest, double{all.upper[k]} - all.lower[k]);
+  const double scale = longest > 0 ? std::ldexp(1.0, -std::ilogb(longest)) : 1;
+  std::vector<Bounds> bounds(geometry.triangles.size());
+  parallel::for_parts(bounds.size(), kTrianglesAtOnce, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t != end; ++t) {
+      for (const std::uint32_t vertex : geometry.triangles[t]) {
+        for (std::size_t k = 0; k < 3; ++k) {
+          const auto x = static_cast<float>((geometry.points[vertex][k] - double{all.lower[k]}) * scale);
+          bounds[t].lo[k] = std::min(bounds[t].lo[k], x);
+          bounds[t].hi[k] = std::max(bounds[t].hi[k], x);
+        }
+      }
+    }
+  });
+  return bounds;
+}
+
+}  // namespace tandem::build

@@ -115,7 +115,8 @@ TEST(Engines, FindTheSameWithThreads) {
   const Pile pile;
   ContactList lists[2];
   for (const std::uint32_t threads : {1u, 4u}) {
-    const auto engine = make_engine("tandem", ContactOptions{.threads = threads});
+    const auto engine = make_engine("tandem");
+    engine->set_threads(threads);
     engine->set_shapes(pile.assets.views());
     engine->find(pile.bodies, {}, lists[threads == 1 ? 0 : 1]);
   }

@@ -21,17 +21,22 @@ TimedContainments find_contained(const LoadedScene& scene, std::span<const Objec
   for (const auto& [pair, a, b] : contacts) sorted.push_back({pair, a, b, 0, 0});
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const Contact& x, const Contact& y) { return x.pair < y.pair; });
+  Scene bodies;
   ContainmentQuery query;
-  const Status status = query.set_assets(scene.views());
-  if (status == Status::kNoTopology) throw FileError(scene.name_of(query.where()) + ": " + explain(status));
-  require(status);
+  bodies.set_threads(threads);
+  const std::vector<AssetView> assets = scene.views();
+  require(bodies.set_assets(assets));
+  require(bodies.place(scene.description.instances));
   TimedContainments found;
   for (std::uint32_t i = 0; i < repeats; ++i) {
     Stopwatch watch;
-    require(query.find(scene.description.instances, pairs, sorted, threads));
+    const Status status = query.find(bodies, pairs, sorted);
     found.seconds.push_back(watch.lap());
+    if (status == Status::kNoTopology)
+      throw FileError(scene.name_of(bodies.where()) + ": " + explain(status));
+    require(status);
   }
-  found.rows.assign(query.contained().begin(), query.contained().end());
+  found.rows.assign(query.rows().begin(), query.rows().end());
   return found;
 }
 

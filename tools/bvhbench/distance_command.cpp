@@ -196,7 +196,7 @@ CLI::App* add_distance(CLI::App& app, Run& run_later) {
       ->option_text("A [0]");
   CLI::Option* threads =
       command->add_option("--threads", options.threads, "threads; the distances do not depend on them")
-          ->check(CLI::Range(1u, kMostQueryThreads))
+          ->check(CLI::Range(1u, kMostSceneThreads))
           ->option_text("N [all]");
   command->add_option("--repeat", arguments->repeats, "times to run the query, for its timing")
       ->check(CLI::Range(1, 1000000))

@@ -211,7 +211,7 @@ CLI::App* add_economy(CLI::App& app, Run& run_later) {
       ->option_text("SECONDS [0]");
   add_backend(*command, arguments->backend);
   command->add_option("--threads", settings.threads, "threads; what is found does not depend on them")
-      ->check(CLI::Range(1u, kMostQueryThreads))
+      ->check(CLI::Range(1u, kMostSceneThreads))
       ->option_text("N [all]");
   command->add_option("--repeat", settings.repeats, "times to run each query, for its timing")
       ->check(CLI::Range(1, 1000000))

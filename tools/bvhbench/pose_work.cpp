@@ -19,7 +19,7 @@ class PairQuery {
  public:
   PairQuery(const NamedAsset& a, const NamedAsset& b) : path_(b.path) {
     const AssetView assets[] = {a.view, b.view};
-    check(query_.set_assets(assets));
+    check(scene_.set_assets(assets));
   }
 
   const ContactCounters& ask(const Pose& pose_of_b, bool first_contact_only) {
@@ -27,7 +27,8 @@ class PairQuery {
     const ObjectPair pair = {0, 1};
     ContactOptions options;
     options.first_contact_only = first_contact_only;
-    check(query_.find_contacts(instances, {&pair, 1}, options));
+    check(scene_.place(instances));
+    check(query_.find(scene_, {&pair, 1}, options));
     return query_.counters();
   }
 
@@ -38,6 +39,7 @@ class PairQuery {
   }
 
   std::string path_;
+  Scene scene_;
   ContactQuery query_;
 };
 

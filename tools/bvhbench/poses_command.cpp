@@ -275,7 +275,7 @@ CLI::App* add_poses(CLI::App& app, Run& run_later) {
   add(add_choice(*command, "--set", kSets, arguments->set, "which of two streams, with nothing in common"),
       "training|validation [validation]");
   command->add_option("--threads", arguments->threads, "threads; the figures do not depend on them")
-      ->check(CLI::Range(1u, kMostQueryThreads))
+      ->check(CLI::Range(1u, kMostSceneThreads))
       ->option_text("N [all]");
   command
       ->add_option("-o,--output", arguments->output,

@@ -351,7 +351,7 @@ CLI::App* add_query(CLI::App& app, Run& run_later) {
   command->add_flag("--self", options.self_pairs, "also each instance with itself");
   CLI::Option* threads =
       command->add_option("--threads", options.threads, "threads; the contacts do not depend on them")
-          ->check(CLI::Range(1u, kMostQueryThreads))
+          ->check(CLI::Range(1u, kMostSceneThreads))
           ->option_text("N [all]");
   command->add_option("--repeat", arguments->repeats, "times to run the query, for its timing")
       ->check(CLI::Range(1, 1000000))

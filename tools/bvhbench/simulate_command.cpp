@@ -237,8 +237,7 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
   const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, options.threads);
   arguments.contacts.threads = options.threads;
   auto engine = make_engine(arguments.engine,
-                            ContactOptions{.mode = arguments.fast ? QueryMode::fast : QueryMode::exact,
-                                           .threads = options.threads});
+                            ContactOptions{.mode = arguments.fast ? QueryMode::fast : QueryMode::exact});
   std::unique_ptr<ContinuousMotion> continuous;
   if (arguments.continuous) continuous = std::make_unique<ContinuousMotion>(start.shapes(), options.threads);
   Simulator simulator(start.bodies.bodies, start.bodies.states,
@@ -343,7 +342,7 @@ void add_run_options(CLI::App& command, SimulateArguments& arguments) {
       ->check(between(1e-12, 1e12))
       ->option_text("D [1000]");
   command.add_option("--threads", arguments.simulator.threads, "threads; the results do not depend on them")
-      ->check(CLI::Range(1u, kMostQueryThreads))
+      ->check(CLI::Range(1u, kMostSceneThreads))
       ->option_text("N [all]");
   command.add_option("--trajectory", run.trajectory_every, "keep the state after every K-th step; 0: none")
       ->option_text("K [0]");

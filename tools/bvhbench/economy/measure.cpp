@@ -64,7 +64,8 @@ SimulationSettings LevelMeasurer::simulation() const {
 Measures LevelMeasurer::query(const Levels& levels) {
   const bench::SceneDescription& told = scene_.description;
   const auto pairs = bench::normalised(told.pairs.value_or(std::vector<ObjectPair>()));
-  const auto engine = make_engine(settings_.engine, ContactOptions{.threads = settings_.threads});
+  const auto engine = make_engine(settings_.engine);
+  engine->set_threads(settings_.threads);
   ExcludedPairTable excluded;
   engine->set_shapes(scene_.views());
   engine->set_filter(told.filter.view(excluded));

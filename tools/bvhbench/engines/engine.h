@@ -21,7 +21,7 @@
 namespace tandem {
 
 /// What an engine is made to answer, with the options of that question: contacts, distances, impacts or
-/// verdicts. Options' filters are not looked at: Engine::set_filter() names the filter.
+/// verdicts.
 using Question = std::variant<ContactOptions, DistanceOptions, ImpactOptions, ToleranceOptions>;
 
 /// A body: its shape, by place in the list given to set_shapes(), and where it stands. The pose speaks of the
@@ -164,6 +164,10 @@ class Engine {
   /// Whether the engine is so slow that it is asked once and not raced.
   virtual bool runs_once() const { return is_reference(); }
 
+  /// Sets how many threads questions may use, where the engine can use more than one; at first 1. No answer
+  /// depends on it.
+  void set_threads(std::uint32_t threads) { threads_ = threads; }
+
   /// Names the shapes that bodies refer to, and makes what lasts as long as they. What the views look at must
   /// outlive the engine's use.
   virtual void set_shapes(std::span<const AssetView> shapes) = 0;
@@ -264,6 +268,7 @@ class Engine {
 
   EngineTimes times_;
   ContactCounters counters_;
+  std::uint32_t threads_ = 1;
   PairFilter filter_;
   std::span<const RigidMotion> motion_;
   double duration_ = 0;

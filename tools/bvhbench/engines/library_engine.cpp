@@ -21,7 +21,7 @@ IndexedMesh::IndexedMesh(const LevelView& level) {
 void LibraryEngine::set_shapes(std::span<const AssetView> shapes) {
   shapes_.assign(shapes.begin(), shapes.end());
   shape_of_.clear();
-  broad_phase_.reset();
+  scene_.reset();
   clear_shapes();
   for (const AssetView& shape : shapes_) add_shape(shape.level());
 }
@@ -39,14 +39,13 @@ void LibraryEngine::update(std::span<const BodyPose> bodies) {
 }
 
 std::span<const ObjectPair> LibraryEngine::find_pairs() {
-  if (broad_phase_ == nullptr) {
-    broad_phase_ = std::make_unique<ContactQuery>();
-    require(broad_phase_->set_assets(shapes_), broad_phase_->where());
+  if (scene_ == nullptr) {
+    scene_ = std::make_unique<Scene>();
+    require(scene_->set_assets(shapes_), scene_->where());
   }
-  ContactOptions options;
-  options.filter = &filter_;
-  require(broad_phase_->find_pairs(bodies_, options), broad_phase_->where());
-  return broad_phase_->pairs();
+  require(scene_->place(bodies_, filter_), scene_->where());
+  require(scene_->find_pairs(), scene_->where());
+  return scene_->pairs();
 }
 
 void LibraryEngine::query(std::span<const ObjectPair> pairs) {

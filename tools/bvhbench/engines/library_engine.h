@@ -81,7 +81,7 @@ class LibraryEngine : public Engine {
   std::span<const BodyPose> bodies_;
   std::vector<AssetView> shapes_;
   std::vector<std::uint32_t> shape_of_;
-  std::unique_ptr<ContactQuery> broad_phase_;  ///< made when pairs are asked for
+  std::unique_ptr<Scene> scene_;  ///< made when pairs are asked for
 };
 
 /// A library that keeps a Shape, made of a level, of each shape.

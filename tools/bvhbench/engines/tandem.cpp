@@ -1,6 +1,7 @@
 #include <cmath>
 #include <memory>
-#include <optional>
+#include <type_traits>
+#include <vector>
 
 #include "engine.h"
 #include "tandem/kernels/manifold_query.h"
@@ -8,41 +9,84 @@
 namespace tandem {
 namespace {
 
-/// What Tandem's questions share on the CPU: the query is told the shapes, and asked as often as wanted.
-template <typename Query, typename Options>
+/// What Tandem's questions share on the CPU: the scene has the shapes and the bodies, and the query is asked
+/// of it as often as wanted.
+template <typename Query>
 class TandemEngine : public Engine {
  public:
-  TandemEngine(std::string_view name, const Options& options) : Engine(name), options_(options) {
-    options_.filter = &filter_;
-  }
+  using Options = typename Query::Options;
+
+  TandemEngine(std::string_view name, const Options& options) : Engine(name), options_(options) {}
 
   std::string label() const override { return "Tandem"; }
 
-  void set_shapes(std::span<const AssetView> shapes) override { check(query_.set_assets(shapes)); }
-  void update(std::span<const BodyPose> bodies) override { bodies_ = bodies; }
+  void set_shapes(std::span<const AssetView> shapes) override { check(scene_.set_assets(shapes)); }
+  void update(std::span<const BodyPose> bodies) override {
+    bodies_ = bodies;
+    placed_ = false;
+  }
 
  protected:
-  void check(Status status) const { require(status, query_.where()); }
+  void check(Status status) const { require(status, scene_.where()); }
 
-  /// ask(): finds pairs, where none are given, and a row for each. rows(): what it found.
-  template <typename Timed, typename Ask, typename Rows>
-  Timed time(const TimedQuery& asked, const Ask& ask, const Rows& rows) {
-    Timed timed;
-    for (std::uint32_t i = 0; i < asked.repeats; ++i) {
-      Stopwatch watch;
-      const Status status = ask();
-      timed.whole.push_back(watch.lap());
-      check(status);
+  // Not in update(): the filter may be told after it.
+  Status place() {
+    scene_.set_threads(threads_);
+    placed_ = true;
+    return scene_.place(bodies_, filter_);
+  }
+
+  // Asks about the pairs that are given, or those that the scene finds.
+  Status ask(const std::vector<ObjectPair>* given) {
+    if constexpr (std::is_same_v<Query, ImpactQuery>) {
+      options_.motion = motion_;
+      options_.duration = duration_;
     }
+    return given != nullptr ? query_.find(scene_, *given, options_) : query_.find(scene_, options_);
+  }
+
+  // Brings about what a step begins with: all bodies but those that the filter calls fixed stood elsewhere,
+  // and a tree of the fixed ones is kept. A new scene without fixed bodies needs none of it.
+  void stand_elsewhere() {
+    if (!placed_ && filter_.motion == nullptr) return;
+    elsewhere_.assign(bodies_.begin(), bodies_.end());
+    for (std::size_t i = 0; i < elsewhere_.size(); ++i) {
+      double& x = elsewhere_[i].pose.translation[0];
+      if (filter_.motion == nullptr || filter_.motion[i] != Motion::fixed) x = std::nextafter(x, 0.5 * x + 1);
+    }
+    check(scene_.place(elsewhere_, filter_));
+    check(scene_.find_pairs());
+  }
+
+  // Places the bodies and asks. Result: seconds.
+  double time_step(const std::vector<ObjectPair>* given) {
+    stand_elsewhere();
+    Stopwatch watch;
+    Status status = place();
+    if (status == Status::kOk) status = ask(given);
+    const double seconds = watch.lap();
+    check(status);
+    return seconds;
+  }
+
+  template <typename Timed>
+  Timed time(const TimedQuery& asked) {
+    Timed timed;
+    for (std::uint32_t i = 0; i < asked.repeats; ++i) timed.whole.push_back(time_step(asked.given));
     timed.counters = query_.counters();
     timed.pairs.assign(query_.pairs().begin(), query_.pairs().end());
-    timed.rows.assign(rows().begin(), rows().end());
+    timed.rows.assign(query_.rows().begin(), query_.rows().end());
     return timed;
   }
 
   Options options_;
+  Scene scene_;
   Query query_;
   std::span<const BodyPose> bodies_;
+  bool placed_ = false;
+
+ private:
+  std::vector<BodyPose> elsewhere_;
 };
 
 constexpr const char* kLabels[] = {"Tandem exact", "Tandem fast", "Tandem boxes"};
@@ -50,7 +94,7 @@ constexpr const char* kSettings[] = {"4-ary AABB trees in one file each, exact o
                                      "the same trees, triangles decided in float32",
                                      "the same trees, triangles whose boxes overlap"};
 
-class TandemContacts final : public TandemEngine<ContactQuery, ContactOptions> {
+class TandemContacts final : public TandemEngine<ContactQuery> {
  public:
   using TandemEngine::TandemEngine;
 
@@ -59,36 +103,26 @@ class TandemContacts final : public TandemEngine<ContactQuery, ContactOptions> {
 
   void set_shapes(std::span<const AssetView> shapes) override {
     TandemEngine::set_shapes(shapes);
-    shapes_.assign(shapes.begin(), shapes.end());
-    manifolds_.reset();
     file_bytes_ = 0;
     for (const AssetView& shape : shapes) file_bytes_ += shape.header->file_bytes;
   }
 
-  void update(std::span<const BodyPose> bodies) override {
-    TandemEngine::update(bodies);
-    check(query_.keep_fixed({}, {}));
-  }
-
-  void keep_fixed() override {
-    if (filter_.motion != nullptr)
-      check(query_.keep_fixed(bodies_, {filter_.motion, bodies_.size()}, options_));
-  }
-
   std::span<const ObjectPair> find_pairs() override {
-    check(query_.find_pairs(bodies_, options_));
-    return query_.pairs();
+    check(place());
+    check(scene_.find_pairs(options_.within, options_.self_pairs));
+    return scene_.pairs();
   }
 
   void query(std::span<const ObjectPair> pairs) override {
-    check(query_.find_contacts(bodies_, pairs, options_));
+    if (!placed_) check(place());
+    check(query_.find(scene_, pairs, options_));
     counters_ = query_.counters();
   }
 
   bool contacts(std::vector<TriangleContact>& found) override {
     found.clear();
-    found.reserve(query_.contacts().size());
-    for (const Contact& c : query_.contacts()) found.push_back({c.pair, c.triangle_a, c.triangle_b});
+    found.reserve(query_.rows().size());
+    for (const Contact& c : query_.rows()) found.push_back({c.pair, c.triangle_a, c.triangle_b});
     return true;
   }
 
@@ -102,88 +136,72 @@ class TandemContacts final : public TandemEngine<ContactQuery, ContactOptions> {
 
   std::uint64_t bytes_beside_heap() const override { return file_bytes_; }
 
- protected:
-  std::span<const ObjectPair> find_pairs_and_query() override {
-    check(query_.find_contacts(bodies_, options_));
-    counters_ = query_.counters();
-    return query_.pairs();
-  }
-
-  void make_manifolds(std::span<const ObjectPair> pairs, TimedManifolds& made) override {
-    if (!manifolds_) {
-      manifolds_.emplace();
-      require(manifolds_->set_assets(shapes_), manifolds_->where());
+  TimedAnswer time_query(const TimedQuery& asked) override {
+    TimedAnswer answer;
+    for (std::uint32_t i = 0; i < asked.repeats; ++i) {
+      answer.whole.push_back(time_step(asked.given));
+      if (asked.manifolds) make_manifolds(answer.manifolds);
     }
-    Stopwatch watch;
-    const Status status = manifolds_->make(bodies_, pairs, query_.contacts(),
-                                           {.match_previous = false, .threads = options_.threads});
-    made.seconds.push_back(watch.lap());
-    require(status, manifolds_->where());
-    made.manifolds.assign(manifolds_->manifolds().begin(), manifolds_->manifolds().end());
-    made.points.assign(manifolds_->points().begin(), manifolds_->points().end());
-    made.counters = manifolds_->counters();
+    counters_ = query_.counters();
+    answer.pairs.assign(query_.pairs().begin(), query_.pairs().end());
+    contacts(answer.contacts);
+    return answer;
   }
 
  private:
-  std::vector<AssetView> shapes_;
-  std::optional<ManifoldQuery> manifolds_;  // of shapes_, once they are asked for
+  void make_manifolds(TimedManifolds& made) {
+    Stopwatch watch;
+    const Status status = manifolds_.find(scene_, query_, {.match_previous = false});
+    made.seconds.push_back(watch.lap());
+    check(status);
+    made.manifolds.assign(manifolds_.rows().begin(), manifolds_.rows().end());
+    made.points.assign(manifolds_.points().begin(), manifolds_.points().end());
+    made.counters = manifolds_.counters();
+  }
+
+  ManifoldQuery manifolds_;
   std::uint64_t file_bytes_ = 0;
 };
 
-class TandemDistances final : public TandemEngine<DistanceQuery, DistanceOptions> {
+class TandemDistances final : public TandemEngine<DistanceQuery> {
  public:
   using TandemEngine::TandemEngine;
 
   std::string settings() const override { return "certified, relative 1e-6"; }
 
   void find_distances(std::span<const ObjectPair> pairs, std::vector<double>& distances) override {
-    check(query_.find_distances(bodies_, pairs, options_));
+    check(place());
+    check(query_.find(scene_, pairs, options_));
     distances.clear();
-    for (const ObjectDistance& found : query_.distances()) distances.push_back(found.upper);
+    for (const ObjectDistance& found : query_.rows()) distances.push_back(found.upper);
   }
 
-  TimedDistances time_distances(const TimedQuery& asked) override {
-    const auto ask = [&] {
-      return asked.given != nullptr ? query_.find_distances(bodies_, *asked.given, options_)
-                                    : query_.find_distances(bodies_, options_);
-    };
-    return time<TimedDistances>(asked, ask, [&] { return query_.distances(); });
-  }
+  TimedDistances time_distances(const TimedQuery& asked) override { return time<TimedDistances>(asked); }
 };
 
-class TandemImpacts final : public TandemEngine<ImpactQuery, ImpactOptions> {
+class TandemImpacts final : public TandemEngine<ImpactQuery> {
  public:
   using TandemEngine::TandemEngine;
 
   std::string settings() const override { return "certified, gap of 1e-6 of the smaller body"; }
 
   void find_impacts(std::span<const ObjectPair> pairs, std::vector<double>& times) override {
-    check(query_.find(bodies_, motion_, duration_, pairs, options_));
+    const std::vector<ObjectPair> given(pairs.begin(), pairs.end());
+    check(place());
+    check(ask(&given));
     times.clear();
-    for (const Impact& impact : query_.impacts())
+    for (const Impact& impact : query_.rows())
       times.push_back(impact.status == ImpactStatus::none ? INFINITY : impact.t_safe);
   }
 
-  TimedImpacts time_impacts(const TimedQuery& asked) override {
-    const auto ask = [&] {
-      return asked.given != nullptr ? query_.find(bodies_, motion_, duration_, *asked.given, options_)
-                                    : query_.find(bodies_, motion_, duration_, options_);
-    };
-    return time<TimedImpacts>(asked, ask, [&] { return query_.impacts(); });
-  }
+  TimedImpacts time_impacts(const TimedQuery& asked) override { return time<TimedImpacts>(asked); }
 };
 
-class TandemVerdicts final : public TandemEngine<ToleranceQuery, ToleranceOptions> {
+class TandemVerdicts final : public TandemEngine<ToleranceQuery> {
  public:
   using TandemEngine::TandemEngine;
 
-  TimedVerdicts time_verdicts(const TimedQuery& asked) override {
-    const auto ask = [&] {
-      return asked.given != nullptr ? query_.decide(bodies_, *asked.given, options_)
-                                    : query_.decide(bodies_, options_);
-    };
-    return time<TimedVerdicts>(asked, ask, [&] { return query_.verdicts(); });
-  }
+  TimedVerdicts time_verdicts(const TimedQuery& asked) override { return time<TimedVerdicts>(asked); }
 };
 
 }  // namespace

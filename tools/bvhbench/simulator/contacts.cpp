@@ -65,7 +65,7 @@ Eigen::Vector3d across(const Eigen::Vector3d& normal) {
 }
 
 void ContactGenerator::set_shapes(std::span<const AssetView> shapes) {
-  throw_unless_ok(manifolds_.set_assets(shapes), manifolds_.where());
+  throw_unless_ok(scene_.set_assets(shapes), scene_.where());
 }
 
 const std::vector<ContactPoint>& ContactGenerator::generate(const ContactList& found,
@@ -80,12 +80,13 @@ const std::vector<ContactPoint>& ContactGenerator::generate(const ContactList& f
     if (!is_left_out[c.pair]) contacts_.push_back({c.pair, c.triangle_a, c.triangle_b, 0, 0});
   }
   // The solvers remember by themselves what a point did in the step before.
-  const ManifoldOptions manifold_options = {
-      .match_previous = false, .most_points = options.points_per_patch, .threads = options.threads};
-  throw_unless_ok(manifolds_.make(bodies, found.pairs, contacts_, manifold_options), manifolds_.where());
+  const ManifoldOptions manifold_options = {.match_previous = false, .most_points = options.points_per_patch};
+  scene_.set_threads(options.threads);
+  throw_unless_ok(scene_.place(bodies), scene_.where());
+  throw_unless_ok(manifolds_.find(scene_, found.pairs, contacts_, manifold_options), scene_.where());
   points_.clear();
   statistics_ = {manifolds_.counters(), 0, 0};
-  for (const Manifold& manifold : manifolds_.manifolds()) {
+  for (const Manifold& manifold : manifolds_.rows()) {
     const ObjectPair& pair = found.pairs[manifold.pair];
     const Eigen::Vector3d normal = vector_of(manifold.normal);
     statistics_.area += std::fabs(vector_of(manifold.area_vector).dot(normal));
@@ -100,6 +101,7 @@ const std::vector<ContactPoint>& ContactGenerator::generate(const ContactList& f
 std::unique_ptr<ContactFinder> make_mesh_contact_finder(std::unique_ptr<Engine> engine,
                                                         std::span<const AssetView> shapes,
                                                         const ContactPointOptions& options) {
+  engine->set_threads(options.threads);
   return std::make_unique<MeshContactFinder>(std::move(engine), shapes, options);
 }
 

@@ -81,6 +81,7 @@ class ContactGenerator {
   const ContactStatistics& statistics() const { return statistics_; }
 
  private:
+  Scene scene_;
   ManifoldQuery manifolds_;
   std::vector<Contact> contacts_;
   std::vector<ContactPoint> points_;

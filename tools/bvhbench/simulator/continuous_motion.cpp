@@ -53,11 +53,10 @@ void require(Status status) {
 
 }  // namespace
 
-ContinuousMotion::ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads)
-    : threads_(threads) {
-  require(query_.set_assets(shapes));
-  require(contacts_.set_assets(shapes));
-  require(manifolds_.set_assets(shapes));
+ContinuousMotion::ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads) {
+  moving_.set_threads(threads);
+  require(moving_.set_assets(shapes));
+  require(two_.set_assets(shapes));
   for (const AssetView& shape : shapes) inner_radius_.push_back(inner_radius_of(shape));
 }
 
@@ -112,10 +111,11 @@ double ContinuousMotion::depth_at(std::span<const BodyProperties> bodies, std::s
     state.orientation = turned(state.orientation, part * part_[body] * turn_[body]);
     instances[i] = pose_of(bodies[body], state);
   }
-  require(contacts_.find_contacts(instances, pairs, {}));
-  require(manifolds_.make(instances, pairs, contacts_.contacts(), {.match_previous = false}));
+  require(two_.place(instances));
+  require(contacts_.find(two_, pairs, {}));
+  require(manifolds_.find(two_, contacts_, {.match_previous = false}));
   double depth = 0;
-  for (const Manifold& manifold : manifolds_.manifolds())
+  for (const Manifold& manifold : manifolds_.rows())
     depth = std::max(depth, (manifold.flags & kGoesThrough) != 0 ? INFINITY : manifold.depth);
   return depth;
 }
@@ -150,12 +150,12 @@ bool ContinuousMotion::stop(std::span<const BodyProperties> bodies, std::span<co
       motion_[i].center[k] = before[i].position[k];
     }
   }
-  const PairFilter filter = {.motion = fast_.data()};
-  require(query_.find(instances_, motion_, 1, {.tolerance = 1e-8, .threads = threads_, .filter = &filter}));
+  require(moving_.place(instances_, {.motion = fast_.data()}));
+  require(query_.find(moving_, {.motion = motion_, .duration = 1, .tolerance = 1e-8}));
   stop_.assign(bodies.size(), 1);
   bool earlier = false;
   for (std::size_t i = 0; i < query_.pairs().size(); ++i) {
-    const Impact& impact = query_.impacts()[i];
+    const Impact& impact = query_.rows()[i];
     if (impact.status == ImpactStatus::none) continue;
     const ObjectPair& pair = query_.pairs()[i];
     const double thinner = std::min(inner_radius(bodies[pair.a]), inner_radius(bodies[pair.b]));

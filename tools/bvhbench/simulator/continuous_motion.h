@@ -36,11 +36,11 @@ class ContinuousMotion {
   double depth_at(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
                   const ObjectPair& pair, double part);
 
+  Scene moving_, two_;  // all bodies, and two of them
   ImpactQuery query_;
   ContactQuery contacts_;
   ManifoldQuery manifolds_;
   std::vector<double> inner_radius_;  // of each shape; infinite where it is not closed
-  std::uint32_t threads_;
 
   std::vector<Motion> fast_;           // moving: fast; fixed: not
   std::vector<Eigen::Vector3d> turn_;  // of each body, in the whole step

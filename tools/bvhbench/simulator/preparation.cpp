@@ -47,23 +47,23 @@ class Lattice {
 };
 
 // The second body of each pair that touches.
-std::vector<std::uint32_t> touching(ContactQuery& query, const std::vector<Instance>& bodies) {
-  ContactOptions options;
-  options.first_contact_only = true;
-  const Status status = query.find_contacts(bodies, options);
+std::vector<std::uint32_t> touching(Scene& scene, const std::vector<Instance>& bodies) {
+  ContactQuery query;
+  Status status = scene.place(bodies);
+  if (status == Status::kOk) status = query.find(scene, {.first_contact_only = true});
   if (status == Status::kOutOfMemory) throw std::bad_alloc();
   if (status != Status::kOk) throw std::runtime_error(explain(status));
   std::vector<std::uint32_t> found;
-  for (const Contact& contact : query.contacts()) found.push_back(query.pairs()[contact.pair].b);
+  for (const Contact& contact : query.rows()) found.push_back(query.pairs()[contact.pair].b);
   return found;
 }
 
 // Draws bodies anew until none touch; false: that did not help.
-bool spread(const Lattice& lattice, ContactQuery& query, Random& random, std::vector<Instance>& bodies) {
+bool spread(const Lattice& lattice, Scene& scene, Random& random, std::vector<Instance>& bodies) {
   constexpr int kRounds = 60;
   for (std::uint32_t i = 0; i < bodies.size(); ++i) bodies[i] = lattice.draw(i, random);
   for (int round = 0; round < kRounds; ++round) {
-    const std::vector<std::uint32_t> again = touching(query, bodies);
+    const std::vector<std::uint32_t> again = touching(scene, bodies);
     if (again.empty()) return true;
     for (const std::uint32_t i : again) bodies[i] = lattice.draw(i, random);
   }
@@ -186,12 +186,12 @@ Configuration unstructured_pile(const AssetView& body, const AssetView& ground, 
                                 std::uint64_t seed) {
   constexpr double kClosest = 0.55, kWider = 1.1;  // of the diagonal, at which no two can touch
   const AssetView assets[] = {body};
-  ContactQuery query;
-  if (query.set_assets(assets) != Status::kOk) throw std::bad_alloc();
+  Scene scene;
+  if (scene.set_assets(assets) != Status::kOk) throw std::bad_alloc();
   Random random(seed);
   std::vector<Instance> bodies(count);
   double spacing = kClosest * bounds_of(body).diagonal();
-  while (!spread(Lattice(body, bounds_of(ground), count, spacing), query, random, bodies)) spacing *= kWider;
+  while (!spread(Lattice(body, bounds_of(ground), count, spacing), scene, random, bodies)) spacing *= kWider;
   Configuration pile;
   pile.add({1, kIdentityPose}, Motion::fixed);
   for (const Instance& instance : bodies) pile.add(instance, Motion::moving);

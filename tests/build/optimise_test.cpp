@@ -16,8 +16,7 @@
 namespace tandem::build {
 namespace {
 
-using test::Bytes;
-using test::Mesh;
+using namespace test;
 
 // A wavy sheet: neighbours share corners, as in a real mesh.
 Mesh sheet(std::uint32_t squares) {
@@ -52,7 +51,7 @@ double cost_of(const WorkingTree& tree) {
 }
 
 TreeStatistics statistics_of(const Mesh& mesh, Imaginary imaginary, Effort effort) {
-  const Bytes file(test::make_file(mesh, imaginary, effort));
+  const Bytes file(make_file(mesh, imaginary, effort));
   const CheckResult result = file.check();
   EXPECT_EQ(result.status, Status::kOk) << name(result.status) << " at " << result.where;
   if (result.status != Status::kOk) return {};
@@ -62,7 +61,7 @@ TreeStatistics statistics_of(const Mesh& mesh, Imaginary imaginary, Effort effor
 TEST(Optimise, KeepsTheMinimumOfImaginaryNodesWhateverTheEffort) {
   for (const Effort effort : {Effort::fast, Effort::standard, Effort::best}) {
     for (const std::uint32_t n : {1u, 4u, 5u, 16u, 17u, 63u, 64u, 65u, 301u}) {
-      const TreeStatistics statistics = statistics_of(test::random_mesh(n, n), Imaginary::minimal, effort);
+      const TreeStatistics statistics = statistics_of(random_mesh(n, n), Imaginary::minimal, effort);
       EXPECT_EQ(statistics.leaf_nodes, n);
       EXPECT_EQ(statistics.imaginary_nodes, statistics.imaginary_minimum) << n;
     }
@@ -89,8 +88,8 @@ std::uint32_t expect_depth_first(const std::vector<Block>& blocks, std::uint32_t
 TEST(Optimise, BlocksLieDepthFirstWhateverTheEffort) {
   for (const Effort effort : {Effort::fast, Effort::standard, Effort::best}) {
     for (const Imaginary imaginary : {Imaginary::minimal, Imaginary{0.02}, Imaginary{0.1}, Imaginary::free}) {
-      for (const Mesh& mesh : {test::random_mesh(1, 1), test::random_mesh(5, 5), sheet(8), nested(100)}) {
-        Bytes file(test::make_file(mesh, imaginary, effort));
+      for (const Mesh& mesh : {random_mesh(1, 1), random_mesh(5, 5), sheet(8), nested(100)}) {
+        Bytes file(make_file(mesh, imaginary, effort));
         const std::vector<Block> blocks(file.blocks(), file.blocks() + file.level().block_count);
         std::uint32_t triangles = 0;
         EXPECT_EQ(expect_depth_first(blocks, 0, triangles), blocks.size());
@@ -102,7 +101,7 @@ TEST(Optimise, BlocksLieDepthFirstWhateverTheEffort) {
 }
 
 TEST(Optimise, MoreEffortNeverCostsMore) {
-  for (const Mesh& mesh : {sheet(12), test::random_mesh(300, 5), nested(200)}) {
+  for (const Mesh& mesh : {sheet(12), random_mesh(300, 5), nested(200)}) {
     const std::vector<Bounds> bounds = normalized_bounds(mesh.geometry());
     for (const auto build : {build_minimal_tree, build_free_tree}) {
       Topology topology = build(bounds);
@@ -138,11 +137,11 @@ TEST(Optimise, NeverDeepensATreeBeyondWhatAFileMayHold) {
 }
 
 TEST(Optimise, BytesAreTheSameForOneThreadAndForMany) {
-  const Mesh mesh = test::random_mesh(20'000, 3);  // several regions
+  const Mesh mesh = random_mesh(20'000, 3);  // several regions
   std::vector<Image> files;
   for (const unsigned threads : {1, 2, 8}) {
     const parallel::ThreadLimit limit(threads);
-    files.push_back(test::make_file(mesh, Imaginary::minimal, Effort::standard));
+    files.push_back(make_file(mesh, Imaginary::minimal, Effort::standard));
   }
   for (const Image& file : files) {
     ASSERT_EQ(file.size(), files[0].size());
@@ -152,8 +151,8 @@ TEST(Optimise, BytesAreTheSameForOneThreadAndForMany) {
 
 TEST(Optimise, BestEffortIsDeterministicToo) {
   const Mesh mesh = sheet(12);
-  const Image a = test::make_file(mesh, Imaginary::minimal, Effort::best),
-              b = test::make_file(mesh, Imaginary::minimal, Effort::best);
+  const Image a = make_file(mesh, Imaginary::minimal, Effort::best),
+              b = make_file(mesh, Imaginary::minimal, Effort::best);
   ASSERT_EQ(a.size(), b.size());
   EXPECT_EQ(std::memcmp(a.data(), b.data(), a.size()), 0);
 }
@@ -190,7 +189,7 @@ TEST(Optimise, ProgressGoesFromNothingToAll) {
 TEST(ExchangeSearch, PredictsTheChangeOfTheWholeCost) {
   std::mt19937 random(7);
   for (const auto build : {build_minimal_tree, build_free_tree}) {
-    const Mesh mesh = test::random_mesh(150, 11);
+    const Mesh mesh = random_mesh(150, 11);
     const std::vector<Bounds> bounds = normalized_bounds(mesh.geometry());
     WorkingTree tree(build(bounds), bounds);
     ExchangeSearch search(tree);

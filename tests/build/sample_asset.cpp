@@ -32,31 +32,34 @@ build::Image make_file(const Mesh& mesh, build::Imaginary imaginary, build::Effo
   return make_file(mesh, build::build_tree(mesh.geometry(), imaginary, effort), effort);
 }
 
-build::Image make_file(const Mesh& mesh, const build::Tree& tree, build::Effort effort) {
-  const std::size_t n = mesh.triangles.size();
-  std::vector<std::uint32_t> face(n);
-  std::iota(face.begin(), face.end(), 0u);
-  const std::vector<build::SourcePart> parts = {{"left", "scene/left", 0, n / 2},
-                                                {"right", "", n / 2, n - n / 2}};
-  build::AssetSource source;
-  source.source_faces = n;
-  source.parts = parts;
-  source.provenance = "{\"tool\":\"test\"}";
-  const auto oriented_blocks = build::orient_blocks(mesh.geometry(), tree, effort);
-  const build::SurfaceTopology topology = build::make_topology(mesh.geometry(), tree);
-  const build::AssetLevel level{mesh.geometry(), face, &tree, oriented_blocks, 0, &topology};
-  return build::assemble(source, {&level, 1});
-}
-
-build::Image make_file_of_levels(std::span<const Mesh> meshes) {
-  const std::size_t faces = meshes[0].triangles.size();
-  std::vector<std::uint32_t> face(faces);
-  std::iota(face.begin(), face.end(), 0u);
-  const std::vector<build::SourcePart> parts = {{"all", "", 0, faces}};
+build::Image assembled(std::span<const build::AssetLevel> levels, std::size_t faces,
+                       std::span<const build::SourcePart> parts) {
   build::AssetSource source;
   source.source_faces = faces;
   source.parts = parts;
   source.provenance = "{\"tool\":\"test\"}";
+  return build::assemble(source, levels);
+}
+
+static std::vector<std::uint32_t> numbers(std::size_t count) {
+  std::vector<std::uint32_t> out(count);
+  std::iota(out.begin(), out.end(), 0u);
+  return out;
+}
+
+build::Image make_file(const Mesh& mesh, const build::Tree& tree, build::Effort effort) {
+  const std::size_t n = mesh.triangles.size();
+  const std::vector<std::uint32_t> face = numbers(n);
+  const build::SourcePart parts[] = {{"left", "scene/left", 0, n / 2}, {"right", "", n / 2, n - n / 2}};
+  const auto oriented_blocks = build::orient_blocks(mesh.geometry(), tree, effort);
+  const build::SurfaceTopology topology = build::make_topology(mesh.geometry(), tree);
+  const build::AssetLevel level{mesh.geometry(), face, &tree, oriented_blocks, 0, &topology};
+  return assembled({&level, 1}, n, parts);
+}
+
+build::Image make_file_of_levels(std::span<const Mesh> meshes) {
+  const std::size_t faces = meshes[0].triangles.size();
+  const std::vector<std::uint32_t> face = numbers(faces);
   struct Built {
     build::Tree tree;
     std::vector<OrientedBlock> oriented_blocks;
@@ -73,7 +76,8 @@ build::Image make_file_of_levels(std::span<const Mesh> meshes) {
   for (std::size_t i = 0; i < meshes.size(); ++i)
     levels.push_back({meshes[i].geometry(), face, &built[i].tree, built[i].oriented_blocks,
                       static_cast<double>(i), &built[i].topology});
-  return build::assemble(source, levels);
+  const build::SourcePart part = {"all", "", 0, faces};
+  return assembled(levels, faces, {&part, 1});
 }
 
 std::vector<Mesh> random_levels(std::uint32_t triangles, std::uint32_t levels, std::uint64_t seed) {

@@ -3,8 +3,6 @@
 #include <cstring>
 #include <new>
 #include <span>
-#include <string>
-#include <system_error>
 #include <vector>
 
 #include "bvhbuild/tree/assemble.h"
@@ -31,6 +29,10 @@ build::Image make_file(const Mesh& mesh, build::Imaginary imaginary = build::Ima
                        build::Effort effort = build::Effort::standard);
 build::Image make_file(const Mesh& mesh, const build::Tree& tree,
                        build::Effort effort = build::Effort::standard);
+
+/// The bytes of a file of these levels, whose source has so many faces.
+build::Image assembled(std::span<const build::AssetLevel> levels, std::size_t faces,
+                       std::span<const build::SourcePart> parts);
 
 /// A file of several levels, each with all sections that a level can have; level i has the error bound i.
 /// Conditions: the first mesh has at least as many triangles as each of the others, and its bounds hold them.
@@ -72,6 +74,7 @@ class Bytes {
   TriangleTopology* topology() { return elements<TriangleTopology>(SectionKind::topology); }
   SurfaceComponent* components() { return elements<SurfaceComponent>(SectionKind::components); }
   Triangle* triangles() { return elements<Triangle>(SectionKind::triangles); }
+  Part* parts() { return elements<Part>(SectionKind::parts); }
   Level& level() { return *elements<Level>(SectionKind::levels); }
 
   CheckResult check(CheckDepth depth = CheckDepth::full) const { return tandem::check(data_, size_, depth); }

@@ -3,18 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <random>
 
+#include "level_oracle.h"
 #include "sample_asset.h"
-#include "topology_oracle.h"
 
-namespace tandem {
+namespace tandem::test {
 namespace {
-
-using test::Bytes;
-using test::make_file;
-using test::Mesh;
 
 using Point = std::array<float, 3>;
 
@@ -45,7 +40,7 @@ struct Made {
     EXPECT_EQ(result.status, Status::kOk) << name(result.status) << " " << result.where;
     if (result.status != Status::kOk) return;
     level = result.asset.level();
-    EXPECT_EQ(test::defect_of_topology(level), nullptr) << test::defect_of_topology(level);
+    EXPECT_EQ(defect_of_topology(level), nullptr) << defect_of_topology(level);
   }
   /// Whether the triangle of the mesh is turned. Source face i is triangle i.
   bool is_turned(std::uint32_t face) const {
@@ -310,4 +305,4 @@ TEST(Topology, OfSharedPointsIsThatOfPointsOfTheirOwn) {
 }
 
 }  // namespace
-}  // namespace tandem
+}  // namespace tandem::test

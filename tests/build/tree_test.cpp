@@ -1,25 +1,26 @@
-#include "bvhbuild/tree/tree.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
+#include <random>
 
 #include "bvhbuild/tree/legal_splits.h"
 #include "bvhbuild/tree/splitter.h"
+#include "bvhbuild/tree/tree.h"
 #include "parallel/parallel.h"
 #include "sample_asset.h"
 #include "statistics/statistics.h"
+#include "tandem/build/build_asset.h"
 
 namespace tandem::build {
 namespace {
 
-using test::Bytes;
-using test::Mesh;
+using namespace test;
 
 // The checker proves that each triangle hangs below one leaf, that boxes contain and that no block is
 // partial; what is left is the bound.
 void expect_sound(const Mesh& mesh, Imaginary imaginary, const std::string& what) {
-  const Bytes file(test::make_file(mesh, imaginary));
+  const Bytes file(make_file(mesh, imaginary));
   const CheckResult result = file.check();
   ASSERT_EQ(result.status, Status::kOk) << what << ": " << name(result.status) << " at " << result.where;
   const TreeStatistics statistics =
@@ -35,7 +36,7 @@ void expect_sound(const Mesh& mesh, Imaginary imaginary, const std::string& what
 
 // The multiset of triangles in the file is that of the mesh: each source face once, at its own coordinates.
 void expect_every_triangle_once(const Mesh& mesh, Imaginary imaginary) {
-  const Bytes file(test::make_file(mesh, imaginary));
+  const Bytes file(make_file(mesh, imaginary));
   const LevelView level = file.check().asset.level();
   std::vector<int> seen(mesh.triangles.size(), 0);
   for (std::uint32_t t = 0; t < level.triangle_count; ++t) {
@@ -83,12 +84,12 @@ Mesh geometric_series(std::uint32_t n) {
 
 TEST(Tree, MeetsTheBoundForEverySizeUpTo2000) {
   for (std::uint32_t n = 1; n <= 2000; ++n)
-    expect_sound(test::random_mesh(n, n), Imaginary::minimal, std::to_string(n));
+    expect_sound(random_mesh(n, n), Imaginary::minimal, std::to_string(n));
 }
 
 TEST(Tree, FreeTreesAreSoundForEverySizeUpTo500) {
   for (std::uint32_t n = 1; n <= 500; ++n)
-    expect_sound(test::random_mesh(n, n), Imaginary::free, std::to_string(n));
+    expect_sound(random_mesh(n, n), Imaginary::free, std::to_string(n));
 }
 
 TEST(Tree, DegenerateMeshesAreSoundForManySizes) {
@@ -106,7 +107,7 @@ TEST(Tree, DegenerateMeshesAreSoundForManySizes) {
 TEST(Tree, HoldsEveryTriangleOnceAndUnchanged) {
   for (const std::uint32_t n : {1u, 7u, 64u, 1000u, 20000u}) {
     for (const Imaginary imaginary : {Imaginary::minimal, Imaginary::free}) {
-      expect_every_triangle_once(test::random_mesh(n, n), imaginary);
+      expect_every_triangle_once(random_mesh(n, n), imaginary);
     }
   }
 }
@@ -130,7 +131,7 @@ TEST(Tree, StaysWithinTheDepthLimitWhereGreedySplitsWouldPeel) {
 
 TEST(Tree, TakesTheLargestTheSmallestAndTheFarthestCoordinates) {
   const auto scaled = [](float scale, float offset) {
-    Mesh mesh = test::random_mesh(333, 9);
+    Mesh mesh = random_mesh(333, 9);
     for (auto& point : mesh.points) {
       for (float& x : point) x = (x - 0.5f) * scale + offset;
     }
@@ -148,12 +149,12 @@ TEST(Tree, TakesTheLargestTheSmallestAndTheFarthestCoordinates) {
 }
 
 TEST(Tree, BytesAreTheSameForOneThreadAndForMany) {
-  const Mesh mesh = test::random_mesh(50 * kSweepSize, 3);  // binned and swept
+  const Mesh mesh = random_mesh(50 * kSweepSize, 3);  // binned and swept
   for (const Imaginary imaginary : {Imaginary::minimal, Imaginary::free}) {
     std::vector<Image> files;
     for (const unsigned threads : {1, 2, 8}) {
       const parallel::ThreadLimit limit(threads);
-      files.push_back(test::make_file(mesh, imaginary));
+      files.push_back(make_file(mesh, imaginary));
     }
     for (const Image& file : files) {
       ASSERT_EQ(file.size(), files[0].size());
@@ -179,6 +180,86 @@ TEST(Tree, KeepsClustersTogether) {
     for (std::size_t first = 0; first < 64; first += 4) {
       for (int i = 1; i < 4; ++i) EXPECT_EQ(tree.order[first] / 4, tree.order[first + i] / 4);
     }
+  }
+}
+
+TEST(LegalSplits, ThereIsAlwaysOneForTwoLeafBlocksAndTwoSlots) {
+  for (std::uint32_t n = 5; n <= 3000; ++n) {
+    for (std::uint32_t slots = 2; slots <= 4; ++slots) {
+      const LegalSplits splits(n, slots);
+      bool found = false;
+      for (std::uint32_t left = 1; left < n && !found; ++left) found = splits.left_slots(left) != 0;
+      EXPECT_TRUE(found) << n << " triangles in " << slots << " slots";
+    }
+  }
+}
+
+TEST(LegalSplits, LieDenselyAroundTheMiddle) {
+  for (std::uint32_t n = 100; n <= 3000; ++n) {
+    const LegalSplits splits(n, 4);
+    std::uint32_t distance = 0;
+    while (splits.left_slots(n / 2 - distance) == 0 && splits.left_slots(n / 2 + distance) == 0) ++distance;
+    EXPECT_LE(distance, 12u) << n;
+  }
+}
+
+TEST(LegalSplits, KeepTheNumberOfBlocks) {
+  for (std::uint32_t n = 5; n <= 400; ++n) {
+    const LegalSplits splits(n, 4);
+    for (std::uint32_t left = 1; left < n; ++left) {
+      const std::uint32_t slots = splits.left_slots(left);
+      if (slots == 0) continue;
+      const auto blocks = [](std::uint32_t triangles, std::uint32_t k) {
+        return leaf_blocks_for(triangles) + internal_blocks_for(leaf_blocks_for(triangles), k);
+      };
+      EXPECT_EQ(blocks(left, slots) + blocks(n - left, 4 - slots), blocks(n, 4)) << n << " at " << left;
+    }
+  }
+}
+
+// A bumpy sheet of 2 n^2 triangles with some soup over it: large enough that threads share every step.
+struct Sheet {
+  std::vector<Point> points;
+  std::vector<TriangleIndices> triangles;
+
+  explicit Sheet(std::uint32_t n) {
+    std::mt19937 random(7);
+    const auto uniform = [&] { return static_cast<double>(random()) / 4294967296.0; };
+    for (std::uint32_t i = 0; i <= n; ++i) {
+      for (std::uint32_t j = 0; j <= n; ++j)
+        points.push_back({i / double{1024}, j / double{1024}, 0.01 * uniform()});
+    }
+    for (std::uint32_t i = 0; i < n; ++i) {
+      for (std::uint32_t j = 0; j < n; ++j) {
+        const std::uint32_t a = i * (n + 1) + j, b = a + n + 1;
+        triangles.push_back({a, b, a + 1});
+        triangles.push_back({a + 1, b, b + 1});
+      }
+    }
+    for (std::uint32_t k = 0; k < n; ++k) {
+      const auto first = static_cast<std::uint32_t>(points.size());
+      for (int corner = 0; corner < 3; ++corner) points.push_back({uniform(), uniform(), uniform()});
+      triangles.push_back({first, first + 1, first + 2});
+    }
+  }
+
+  std::vector<std::byte> built(BuildOptions options, unsigned threads) const {
+    options.threads = threads;
+    OptimisationWatch watch;
+    const BuiltAsset asset = build_asset({points, triangles, {}, 0, {}}, options, {}, watch);
+    EXPECT_TRUE(asset.file);
+    const Image& image = asset.file->image;
+    return {image.data(), image.data() + image.size()};
+  }
+};
+
+TEST(BuildAsset, GivesTheSameBytesWhateverTheNumberOfThreads) {
+  const Sheet sheet(170);  // 57,970 triangles: beyond what is binned, and several regions of the optimiser
+  for (const Imaginary imaginary : {Imaginary::minimal, Imaginary::free, Imaginary{0.1}}) {
+    const BuildOptions options = {.imaginary = imaginary};
+    const std::vector<std::byte> one = sheet.built(options, 1);
+    for (const unsigned threads : {2u, 3u, 16u})
+      EXPECT_TRUE(sheet.built(options, threads) == one) << imaginary.share << ", " << threads << " threads";
   }
 }
 

@@ -11,7 +11,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <stdexcept>
-#include <string>
 #include <vector>
 
 namespace tandem::build {

@@ -11,8 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "build/oriented_oracle.h"
-#include "build/topology_oracle.h"
+#include "build/level_oracle.h"
 #include "tandem/formats/check.h"
 
 namespace {
@@ -107,14 +106,9 @@ void examine(const CheckResult& result) {
   for (std::uint32_t i = 0; i < asset.levels.size(); ++i) {
     const LevelView level = asset.level(i);
     walk(asset, level);
-    if (level.oriented_blocks != nullptr) {
-      const char* defect = test::defect_of_oriented_blocks(level);
-      demand(defect == nullptr, defect);
-    }
-    if (level.topology != nullptr) {
-      const char* defect = test::defect_of_topology(level);
-      demand(defect == nullptr, defect);
-    }
+    const char* defect = level.oriented_blocks != nullptr ? test::defect_of_oriented_blocks(level) : nullptr;
+    if (defect == nullptr && level.topology != nullptr) defect = test::defect_of_topology(level);
+    demand(defect == nullptr, defect);
   }
   for (const Part& part : asset.parts) {
     read_text(asset.name_of(part));

@@ -7,7 +7,7 @@
 #include <unordered_set>
 #include <vector>
 
-#include "warp_program.h"
+#include "model_warp.h"
 #include "weak_memory.h"
 
 /// Warps of a walk that share work by gpu::WorkSharing, the code that the GPU runs, in all orders that

@@ -9,12 +9,11 @@
 #include <vector>
 
 #include "bvhbuild/import/readers.h"
+#include "reader_test.h"
 #include "temp_folder.h"
 
 namespace tandem::build {
 namespace fs = std::filesystem;
-
-using Face = std::vector<std::uint32_t>;
 
 template <class T>
 inline std::string bytes_of(const std::vector<T>& numbers) {
@@ -124,14 +123,6 @@ class GltfFile : public ::testing::Test {
   test::TempFolder temporary_;
   fs::path folder_ = temporary_.path();
 };
-
-inline std::vector<Face> faces_of(const PolygonMesh& mesh) {
-  std::vector<Face> faces;
-  for (std::size_t f = 0; f < mesh.face_count(); ++f)
-    faces.emplace_back(mesh.corners.begin() + mesh.face_begin[f],
-                       mesh.corners.begin() + mesh.face_begin[f + 1]);
-  return faces;
-}
 
 inline std::string joined(const std::vector<std::string>& remarks) {
   std::string text;

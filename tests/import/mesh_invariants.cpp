@@ -1,6 +1,5 @@
 #include "mesh_invariants.h"
 
-#include <algorithm>
 #include <string_view>
 
 #include "common/printable.h"

@@ -1,7 +1,12 @@
+#include <gtest/gtest.h>
+
 #include <cmath>
+#include <limits>
 #include <string>
+#include <string_view>
 
 #include "bvhbuild/import/readers.h"
+#include "bvhbuild/import/scanner.h"
 #include "reader_test.h"
 
 namespace tandem::build {
@@ -13,12 +18,6 @@ const std::string kFourVertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
 
 ReadResult read(const std::string& file) {
   return read_from(read_obj, file);
-}
-
-void expect_faces(const std::string& file, const std::vector<Face>& faces) {
-  const ReadResult result = read(file);
-  EXPECT_TRUE(result.ok) << result.error;
-  EXPECT_EQ(faces_of(result), faces) << file;
 }
 
 TEST(ObjReader, KeepsCoordinatesInDoublePrecision) {
@@ -34,50 +33,66 @@ TEST(ObjReader, PassesOverWeightsAndColoursOfVertices) {
   EXPECT_EQ(result.mesh.points[2], (Point{7, 8, 9}));
 }
 
-TEST(ObjReader, TakesTheVertexOutOfEveryKindOfCorner) {
+TEST(ObjReader, ReadsFacesAndRemarksWhatIsOdd) {
   expect_faces(
-      kFourVertices + "f 1 2 3\nf 1/9 2/9 3/9\nf 1//9 2//9 3//9\nf 1/9/9 2/9/9 3/9/9\nf 1/ 2// 3/9/\n",
-      {{0, 1, 2}, {0, 1, 2}, {0, 1, 2}, {0, 1, 2}, {0, 1, 2}});
-}
-
-TEST(ObjReader, KeepsPolygonsWhole) {
-  expect_faces(kFourVertices + "f 1 2 3 4\nf 4 3 2 1 4\n", {{0, 1, 2, 3}, {3, 2, 1, 0, 3}});
-}
-
-TEST(ObjReader, RelativeIndicesCountFromTheCurrentEnd) {
-  expect_faces(kFourVertices + "f -4 -3 -2\nv 9 9 9\nf -1 -2 -5\n", {{0, 1, 2}, {4, 3, 0}});
-}
-
-TEST(ObjReader, FacesMayComeBeforeTheirVertices) {
-  const ReadResult result = read("f 1 2 4\n" + kFourVertices);
-  EXPECT_EQ(faces_of(result), (std::vector<Face>{{0, 1, 3}}));
-  EXPECT_TRUE(result.mesh.remarks.empty());
-}
-
-TEST(ObjReader, RemarksIndicesThatNameNoVertexAndKeepsTheFace) {
-  const ReadResult result = read(kFourVertices + "f 1 2 99\nf 0 1 2\nf -9 1 2\n");
-  ASSERT_TRUE(result.ok);
-  EXPECT_EQ(faces_of(result), (std::vector<Face>{{0, 1, 98}, {kNoVertex, 0, 1}, {kNoVertex, 0, 1}}));
-  EXPECT_EQ(result.mesh.remarks,
-            (std::vector<std::string>{"line 5: face index 99 of 4 vertices",
-                                      "line 6: face index 0, but OBJ counts vertices from 1",
-                                      "line 7: face index -9 counts back past the first vertex"}));
-}
-
-TEST(ObjReader, RemarksTheFirstIndexPastTheLastVertex) {
-  EXPECT_EQ(read(kFourVertices + "f 1 2 4\nf 1 2 5\n").mesh.remarks,
-            (std::vector<std::string>{"line 6: face index 5 of 4 vertices"}));
-}
-
-TEST(ObjReader, RemarksAnIndexThatNeverCameAmongThoseThatCameLater) {
-  EXPECT_EQ(read("f 1 2 4\nf 1 99 2\nf 2 0 99\n" + kFourVertices).mesh.remarks,
-            (std::vector<std::string>{"line 2: face index 99 of 4 vertices",
-                                      "line 3: face index 0, but OBJ counts vertices from 1"}));
-}
-
-TEST(ObjReader, IndicesTooLargeForTheirTypeNameNoVertex) {
-  expect_faces(kFourVertices + "f 1 2 4294967296\nf 1 2 4294967295\nf 1 2 99999999999999999999999\n",
-               {{0, 1, kNoVertex}, {0, 1, kNoVertex - 1}, {0, 1, kNoVertex}});
+      read_obj,
+      {
+          {"the vertex of every kind of corner",
+           kFourVertices + "f 1 2 3\nf 1/9 2/9 3/9\nf 1//9 2//9 3//9\nf 1/9/9 2/9/9 3/9/9\nf 1/ 2// 3/9/\n",
+           {{0, 1, 2}, {0, 1, 2}, {0, 1, 2}, {0, 1, 2}, {0, 1, 2}}},
+          {"polygons stay whole",
+           kFourVertices + "f 1 2 3 4\nf 4 3 2 1 4\n",
+           {{0, 1, 2, 3}, {3, 2, 1, 0, 3}}},
+          {"relative indices count from the current end",
+           kFourVertices + "f -4 -3 -2\nv 9 9 9\nf -1 -2 -5\n",
+           {{0, 1, 2}, {4, 3, 0}}},
+          {"indices too large for their type",
+           kFourVertices + "f 1 2 4294967296\nf 1 2 4294967295\nf 1 2 99999999999999999999999\n",
+           {{0, 1, kNoVertex}, {0, 1, kNoVertex - 1}, {0, 1, kNoVertex}},
+           {},
+           true},
+          {"tabs, blanks, comments and a byte order mark",
+           "\xEF\xBB\xBFv 0 0 0\n\t v\t1  0 0 \t\n  # v 5 5 5\nv 0 1 0# near\nv 0 0 1 # far\n f 1 2 4 # c "
+           "3\nf 1 "
+           "2 3#\n",
+           {{0, 1, 3}, {0, 1, 2}}},
+          {"a line goes on behind a backslash",
+           "v 0 0 \\\n0\nv 1 \\ \r\n 0 0\nv 0 1 0 \\\n1 1 1\nf 1 2\\\n \\\n3\n",
+           {{0, 1, 2}}},
+          {"a backslash at the end of a comment",
+           "# C:\\meshes\\\nv 0 0 0\nv 1 0 0\no a\\\nv 0 1 0\nf 1 2 3 # \\\nf 3 2 1\n",
+           {{0, 1, 2}, {2, 1, 0}}},
+          {"a backslash at the end of the file", kFourVertices + "f 1 2 3 \\", {{0, 1, 2}}},
+          {"unknown statements",
+           "mtllib a.mtl\nvn 0 0 1\nvt 0 0\nvp 1 2\ns off\nusemtl x\nweird 1 2\n" + kFourVertices +
+               "f 1 2 3\n",
+           {{0, 1, 2}}},
+          {"materials do not reorder faces",
+           kFourVertices + "usemtl a\nf 1 2 3\nusemtl b\nf 2 3 4\nusemtl a\nf 1 3 4\n",
+           {{0, 1, 2}, {1, 2, 3}, {0, 2, 3}}},
+          {"faces before their vertices", "f 1 2 4\n" + kFourVertices, {{0, 1, 3}}},
+          {"the first index past the last vertex",
+           kFourVertices + "f 1 2 4\nf 1 2 5\n",
+           {{0, 1, 3}, {0, 1, 4}},
+           {"line 6: face index 5 of 4 vertices"}},
+          {"indices that name no vertex",
+           kFourVertices + "f 1 2 99\nf 0 1 2\nf -9 1 2\n",
+           {{0, 1, 98}, {kNoVertex, 0, 1}, {kNoVertex, 0, 1}},
+           {"line 5: face index 99 of 4 vertices", "line 6: face index 0, but OBJ counts vertices from 1",
+            "line 7: face index -9 counts back past the first vertex"}},
+          {"an index that never comes among those that come later",
+           "f 1 2 4\nf 1 99 2\nf 2 0 99\n" + kFourVertices,
+           {{0, 1, 3}, {0, 98, 1}, {1, kNoVertex, 98}},
+           {"line 2: face index 99 of 4 vertices", "line 3: face index 0, but OBJ counts vertices from 1"}},
+          {"any number of corners, but no points and lines",
+           kFourVertices + "p 1\nl 1 2 3\nf 1 2\nf 1\nf\nf 99 2\nf 2 3 4\n",
+           {{0, 1}, {0}, {}, {98, 1}, {1, 2, 3}},
+           {"line 10: face index 99 of 4 vertices"}},
+          {"free-form surfaces",
+           kFourVertices + "cstype bspline\ndeg 1 1\nsurf 0 1 0 1 1 2 \\\n3 4\nparm u 0 1\nend\n",
+           {},
+           {"free-form surfaces are not read"}},
+      });
 }
 
 TEST(ObjReader, RemarksAtMostFourIndices) {
@@ -86,46 +101,11 @@ TEST(ObjReader, RemarksAtMostFourIndices) {
   EXPECT_EQ(read(file).mesh.remarks.size(), 4u);
 }
 
-TEST(ObjReader, CountsFacesOfAnyNumberOfCornersButNoPointsAndLines) {
-  const ReadResult result = read(kFourVertices + "p 1\nl 1 2 3\nf 1 2\nf 1\nf\nf 99 2\nf 2 3 4\n");
-  EXPECT_EQ(faces_of(result), (std::vector<Face>{{0, 1}, {0}, {}, {98, 1}, {1, 2, 3}}));
-  EXPECT_EQ(result.mesh.remarks.size(), 1u);
-}
-
 TEST(ObjReader, ReadsAllLineEnds) {
   for (const std::string end : {"\n", "\r\n", "\r"})
-    expect_faces("v 0 0 0" + end + "v 1 0 0" + end + "v 0 1 0" + end + end + "f 1 2 3", {{0, 1, 2}});
-}
-
-TEST(ObjReader, ReadsTabsBlanksCommentsAndAByteOrderMark) {
-  expect_faces(
-      "\xEF\xBB\xBFv 0 0 0\n\t v\t1  0 0 \t\n  # v 5 5 5\nv 0 1 0# near\nv 0 0 1 # far\n f 1 2 4 # c 3\nf 1 "
-      "2 3#\n",
-      {{0, 1, 3}, {0, 1, 2}});
-}
-
-TEST(ObjReader, GoesOnBehindABackslash) {
-  expect_faces("v 0 0 \\\n0\nv 1 \\ \r\n 0 0\nv 0 1 0 \\\n1 1 1\nf 1 2\\\n \\\n3\n", {{0, 1, 2}});
-}
-
-TEST(ObjReader, ABackslashAtTheEndOfACommentHidesNothing) {
-  expect_faces("# C:\\meshes\\\nv 0 0 0\nv 1 0 0\no a\\\nv 0 1 0\nf 1 2 3 # \\\nf 3 2 1\n",
-               {{0, 1, 2}, {2, 1, 0}});
-}
-
-TEST(ObjReader, ABackslashAtTheEndOfTheFileEndsTheFace) {
-  expect_faces(kFourVertices + "f 1 2 3 \\", {{0, 1, 2}});
-}
-
-TEST(ObjReader, PassesOverUnknownStatements) {
-  expect_faces(
-      "mtllib a.mtl\nvn 0 0 1\nvt 0 0\nvp 1 2\ns off\nusemtl x\nweird 1 2\n" + kFourVertices + "f 1 2 3\n",
-      {{0, 1, 2}});
-}
-
-TEST(ObjReader, MaterialsDoNotReorderFaces) {
-  expect_faces(kFourVertices + "usemtl a\nf 1 2 3\nusemtl b\nf 2 3 4\nusemtl a\nf 1 3 4\n",
-               {{0, 1, 2}, {1, 2, 3}, {0, 2, 3}});
+    expect_faces(
+        read_obj,
+        {{"a line end", "v 0 0 0" + end + "v 1 0 0" + end + "v 0 1 0" + end + end + "f 1 2 3", {{0, 1, 2}}}});
 }
 
 TEST(ObjReader, ObjectsAndGroupsBecomeParts) {
@@ -171,27 +151,20 @@ TEST(ObjReader, ReadsCoordinatesThatAreNotFinite) {
   EXPECT_EQ(result.mesh.points[2], (Point{INFINITY, -INFINITY, 0}));
 }
 
-TEST(ObjReader, RemarksFreeFormSurfaces) {
-  const ReadResult result =
-      read(kFourVertices + "cstype bspline\ndeg 1 1\nsurf 0 1 0 1 1 2 \\\n3 4\nparm u 0 1\nend\n");
-  ASSERT_TRUE(result.ok);
-  EXPECT_EQ(result.mesh.remarks, (std::vector<std::string>{"free-form surfaces are not read"}));
-}
-
-TEST(ObjReader, NamesTheLineOfEachDefect) {
-  EXPECT_EQ(read("v 0 0 0\nv 1 2\n").error, "line 2: a vertex needs three coordinates");
-  EXPECT_EQ(read("v 0 0 0\r\n\r\nv 1 2 x\r\n").error, "line 3: 'x' is not a number");
-  EXPECT_EQ(read("v 0x1 0 0\n").error, "line 1: '0x1' is not a number");
-  EXPECT_EQ(read("v 1\rv 2").error, "line 1: a vertex needs three coordinates");
-  EXPECT_EQ(read(kFourVertices + "f 1 2 3.0\n").error, "line 5: '3.0' is not a vertex index");
-  EXPECT_EQ(read(kFourVertices + "f 1 2 \\\n/3\n").error, "line 6: '/3' is not a vertex index");
-}
-
-TEST(ObjReader, RefusesWhatIsNoObjFile) {
-  EXPECT_EQ(read("").error, "the file is empty");
-  EXPECT_EQ(read("# nothing\n").error, "no line begins with 'v' or 'f': this is not an OBJ file");
-  EXPECT_EQ(read("\x89PNG\r\n\x1A\n").error, "no line begins with 'v' or 'f': this is not an OBJ file");
-  EXPECT_EQ(read("v 0 0 0\n\0"s).error, "byte 8: a zero byte, where an OBJ file holds only text (UTF-8)");
+TEST(ObjReader, NamesTheLineOfEachDefectAndRefusesWhatIsNoObjFile) {
+  expect_errors(read_obj,
+                {
+                    {"v 0 0 0\nv 1 2\n", "line 2: a vertex needs three coordinates"},
+                    {"v 0 0 0\r\n\r\nv 1 2 x\r\n", "line 3: 'x' is not a number"},
+                    {"v 0x1 0 0\n", "line 1: '0x1' is not a number"},
+                    {"v 1\rv 2", "line 1: a vertex needs three coordinates"},
+                    {kFourVertices + "f 1 2 3.0\n", "line 5: '3.0' is not a vertex index"},
+                    {kFourVertices + "f 1 2 \\\n/3\n", "line 6: '/3' is not a vertex index"},
+                    {"", "the file is empty"},
+                    {"# nothing\n", "no line begins with 'v' or 'f': this is not an OBJ file"},
+                    {"\x89PNG\r\n\x1A\n", "no line begins with 'v' or 'f': this is not an OBJ file"},
+                    {"v 0 0 0\n\0"s, "byte 8: a zero byte, where an OBJ file holds only text (UTF-8)"},
+                });
 }
 
 TEST(ObjReader, AFileOfVerticesAloneHasNoFaces) {
@@ -210,6 +183,85 @@ TEST(ObjReader, SurvivesEveryCut) {
 }
 TEST(ObjReader, SurvivesEveryChangedByte) {
   expect_changed_bytes_are_harmless(read_obj, kAllSorts);
+}
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+// The number that all of `text` is, or -77 where it is none.
+double real(std::string_view text) {
+  double value = -77;
+  const char* const last = text.data() + text.size();
+  return parse_real(text.data(), last, value) == last ? value : -77;
+}
+
+std::int64_t integer(std::string_view text) {
+  std::int64_t value = -77;
+  const char* const last = text.data() + text.size();
+  return parse_integer(text.data(), last, value) == last ? value : -77;
+}
+
+TEST(NumberText, ReadsEveryWayToWriteADecimalAndKeepsAllBitsOfADouble) {
+  const std::pair<std::string, double> numbers[] = {{"0", 0.0},
+                                                    {"-1.5", -1.5},
+                                                    {"+1.5", 1.5},
+                                                    {"1.", 1.0},
+                                                    {".5", 0.5},
+                                                    {"-.5e+1", -5.0},
+                                                    {"25E-2", 0.25},
+                                                    {"0.1", 0.1},
+                                                    {"0.1000000000000000055511151231257827", 0.1},
+                                                    {"9007199254740993", 9007199254740992.0},
+                                                    {"2.2250738585072011e-308", 2.2250738585072011e-308},
+                                                    {"5e-324", 5e-324},
+                                                    {"1e-42", 1e-42}};
+  for (const auto& [text, value] : numbers) EXPECT_EQ(real(text), value) << text;
+  EXPECT_TRUE(std::signbit(real("-0")));
+  const std::pair<const char*, std::int64_t> integers[] = {
+      {"0", 0}, {"+12", 12}, {"-12", -12}, {"007", 7}, {"4294967295", 4294967295}};
+  for (const auto& [text, value] : integers) EXPECT_EQ(integer(text), value) << text;
+}
+
+TEST(NumberText, TooLargeIsInfiniteAndTooSmallIsZero) {
+  const std::pair<std::string, double> numbers[] = {
+      {"1e400", kInf},
+      {"-1e400", -kInf},
+      {"1e-400", 0.0},
+      {"0.0001e400", kInf},
+      {"10000e-400", 0.0},
+      {"1e99999999999999999999999", kInf},
+      {"1e-99999999999999999999999", 0.0},
+      {"0e99999999999999999999999", 0.0},
+      {std::string(400, '9'), kInf},
+      {"0." + std::string(400, '0') + "1", 0.0},
+      {"0." + std::string(1000, '0') + "1e400", 0.0},
+      {std::string("1") + std::string(1000, '0') + "e-400", kInf}};
+  for (const auto& [text, value] : numbers) EXPECT_EQ(real(text), value) << text;
+  EXPECT_TRUE(std::signbit(real("-1e-400")));
+}
+
+TEST(NumberText, ReadsNonFiniteNumbersOfAnyProgram) {
+  for (const char* text : {"nan", "NaN", "-nan", "NAN", "nan(ind)", "-nan(ind)", "1.#QNAN", "1.#qnan0",
+                           "-1.#IND", "1.#IND00", "1.#SNAN"})
+    EXPECT_TRUE(std::isnan(real(text))) << text;
+  for (const char* text : {"inf", "+Inf", "INF", "infinity", "Infinity", "1.#INF", "1.#inf", "1.#INF00"})
+    EXPECT_EQ(real(text), kInf) << text;
+  for (const char* text : {"-inf", "-1.#INF", "-INFINITY"}) EXPECT_EQ(real(text), -kInf) << text;
+}
+
+TEST(NumberText, RefusesWhatIsNoDecimal) {
+  for (const char* text :
+       {"", "-", "+", ".", "e5", "+-1", "-+1", "--1", "0x10", "1e", "1,5", "one", "1.#", "1.#FOO", "2.#INF"})
+    EXPECT_EQ(real(text), -77) << text;
+}
+
+TEST(NumberText, IntegersPastEveryCountStayPastIt) {
+  EXPECT_GT(integer("99999999999999999999999999"), std::int64_t{1} << 56);
+  EXPECT_LT(integer("-99999999999999999999999999"), -(std::int64_t{1} << 56));
+}
+
+TEST(NumberText, RefusesWhatIsNoInteger) {
+  for (const char* text : {"", "-", "3.0", "1e3", "0x10", "--1", "+-1", "12a"})
+    EXPECT_EQ(integer(text), -77) << text;
 }
 
 }  // namespace

@@ -14,12 +14,6 @@ ReadResult read(const std::string& file) {
   return read_from(read_off, file);
 }
 
-void expect_faces(const std::string& file, const std::vector<Face>& faces) {
-  const ReadResult result = read(file);
-  EXPECT_TRUE(result.ok) << result.error;
-  EXPECT_EQ(faces_of(result), faces) << file;
-}
-
 void append(std::string& file, std::uint32_t bits) {
   for (int shift = 24; shift >= 0; shift -= 8) file += static_cast<char>(bits >> shift);
 }
@@ -41,7 +35,7 @@ std::string binary(const std::string& keyword, int extra) {
 TEST(OffReader, ReadsPointsAndFacesInOrder) {
   const ReadResult result = read("OFF\n3 2 0\n" + kThreeVertices + "3 0 1 2\n4 2 1 0 1\n");
   ASSERT_TRUE(result.ok) << result.error;
-  EXPECT_EQ(faces_of(result), (std::vector<Face>{{0, 1, 2}, {2, 1, 0, 1}}));
+  EXPECT_EQ(faces_of(result.mesh), (std::vector<Face>{{0, 1, 2}, {2, 1, 0, 1}}));
   EXPECT_EQ(result.mesh.points[2], (Point{0, 1, 0.1}));
 }
 
@@ -51,83 +45,74 @@ TEST(OffReader, CountsMayStandOnTheKeywordsLineOrWithoutIt) {
                            "\xEF\xBB\xBFOFF\r3 1 0\r", "# c\nOFF # c\n# c\n3 1 0\n"}) {
     const ReadResult result = read(head + kThreeVertices + "3 0 1 2\n");
     ASSERT_TRUE(result.ok) << result.error << head;
-    EXPECT_EQ(faces_of(result), (std::vector<Face>{{0, 1, 2}}));
+    EXPECT_EQ(faces_of(result.mesh), (std::vector<Face>{{0, 1, 2}}));
     EXPECT_EQ(result.mesh.points[0], (Point{5, 0, 0})) << head;
   }
 }
 
-TEST(OffReader, FacesMaySpreadOverLines) {
-  expect_faces("OFF\n3 3 0\n" + kThreeVertices + "3\n0 1\n2\n3 2 1 # c\n# c\n\n0\n 3 0 2 1",
-               {{0, 1, 2}, {2, 1, 0}, {0, 2, 1}});
-}
-
-TEST(OffReader, PassesOverColoursOfFaces) {
-  expect_faces(
-      "OFF\n3 4 0\n" + kThreeVertices + "3 0 1 2 255 0 0\n3 0 1 2 0.5 0.5 0.5 1\n3 0 1\n2 7\n3 2 1 0 # red\n",
-      {{0, 1, 2}, {0, 1, 2}, {0, 1, 2}, {2, 1, 0}});
+TEST(OffReader, ReadsFacesAndRemarksWhatIsOdd) {
+  expect_faces(read_off, {
+                             {"faces over several lines",
+                              "OFF\n3 3 0\n" + kThreeVertices + "3\n0 1\n2\n3 2 1 # c\n# c\n\n0\n 3 0 2 1",
+                              {{0, 1, 2}, {2, 1, 0}, {0, 2, 1}}},
+                             {"colours of faces",
+                              "OFF\n3 4 0\n" + kThreeVertices +
+                                  "3 0 1 2 255 0 0\n3 0 1 2 0.5 0.5 0.5 1\n3 0 1\n2 7\n3 2 1 0 # red\n",
+                              {{0, 1, 2}, {0, 1, 2}, {0, 1, 2}, {2, 1, 0}}},
+                             {"faces of any number of corners",
+                              "OFF\n3 4 0\n" + kThreeVertices + "2 0 1\n0\n1 2\n3 0 1 2\n",
+                              {{0, 1}, {}, {2}, {0, 1, 2}}},
+                             {"indices that name no vertex",
+                              "OFF\n3 2 0\n" + kThreeVertices + "3 0 1 3\n3\n-1 4294967295\n 2\n",
+                              {{0, 1, 3}, {kNoVertex, kNoVertex, 2}},
+                              {"line 6: face index 3 of 3 vertices", "line 8: face index -1 of 3 vertices",
+                               "line 8: face index 4294967295 of 3 vertices"}},
+                             {"no vertices and faces", "OFF\n0 0 0\n", {}},
+                             {"no line end behind none", "OFF\n0 0 0", {}},
+                         });
 }
 
 TEST(OffReader, PassesOverWhatThePrefixPromisesOfVertices) {
   for (const char* keyword : {"COFF", "NOFF", "STOFF", "CNOFF", "NCOFF", "STCNOFF", "OFF"})
-    expect_faces(std::string(keyword) + "\n3 1 0\n0 0 0 1 0 0 1\n1 0 0 1 0 0 1 # c\n0 1 0 0 0 0 0\n3 0 1 2\n",
-                 {{0, 1, 2}});
-}
-
-TEST(OffReader, RefusesOtherDimensionsByName) {
-  EXPECT_EQ(read("4OFF\n3 1 0\n").error,
-            "line 1: '4OFF' holds points of other than three dimensions, which are not read");
-  EXPECT_EQ(read("C4nOFF\n3 1 0\n").error,
-            "line 1: 'C4nOFF' holds points of other than three dimensions, which are not read");
-  EXPECT_EQ(read("XOFF\n").error, "line 1: 'XOFF' is no kind of OFF file known here");
-  EXPECT_EQ(read("ply\n").error, "line 1: 'ply' where 'OFF' is expected");
-}
-
-TEST(OffReader, RemarksIndicesThatNameNoVertexAndKeepsTheFace) {
-  const ReadResult result = read("OFF\n3 2 0\n" + kThreeVertices + "3 0 1 3\n3\n-1 4294967295\n 2\n");
-  ASSERT_TRUE(result.ok) << result.error;
-  EXPECT_EQ(faces_of(result), (std::vector<Face>{{0, 1, 3}, {kNoVertex, kNoVertex, 2}}));
-  EXPECT_EQ(result.mesh.remarks, (std::vector<std::string>{"line 6: face index 3 of 3 vertices",
-                                                           "line 8: face index -1 of 3 vertices",
-                                                           "line 8: face index 4294967295 of 3 vertices"}));
-}
-
-TEST(OffReader, CountsFacesOfAnyNumberOfCorners) {
-  expect_faces("OFF\n3 4 0\n" + kThreeVertices + "2 0 1\n0\n1 2\n3 0 1 2\n", {{0, 1}, {}, {2}, {0, 1, 2}});
-}
-
-TEST(OffReader, RefusesCountsThatAreNotThoseOfTheData) {
-  EXPECT_EQ(read("OFF\n4 1 0\n" + kThreeVertices + "3 0 1 2\n").error,
-            "line 6: the header promises 1 faces, the data ends after 0");
-  EXPECT_EQ(read("OFF\n3 2 0\n" + kThreeVertices + "3 0 1 2\n").error,
-            "line 6: the header promises 2 faces, the data ends after 1");
-  EXPECT_EQ(read("OFF\n3 1 0\n" + kThreeVertices + "3 0 1 2\n3 0 1 2\n").error,
-            "line 7: the file goes on after the vertices and faces that its header promises");
-  EXPECT_EQ(read("OFF\n6 1 0\n" + kThreeVertices + "3 0 1 2 9 9 9 9 9 9\n3 0 1\n").error,
-            "line 7: the header promises 6 vertices, the data ends after 5");
-}
-
-TEST(OffReader, RefusesCountsThatTheFileHasNoRoomFor) {
-  EXPECT_EQ(read("OFF\n4000000000 1 0\n0 0 0\n").error,
-            "line 2: the header promises 4000000000 vertices, the file has room for at most 1");
-  EXPECT_EQ(read("OFF\n0 99999999999999999999 0\n").error.substr(0, 27), "line 2: the header promises");
-  EXPECT_EQ(read("OFF\n1 1 0\n0 0 0\n999999999 0 0 0\n").error,
-            "line 4: the header promises 1 faces, the data ends after 0");
-  EXPECT_EQ(read("OFF\n-1 1 0\n").error, "line 2: a count of -1");
+    expect_faces(read_off, {{keyword,
+                             std::string(keyword) +
+                                 "\n3 1 0\n0 0 0 1 0 0 1\n1 0 0 1 0 0 1 # c\n0 1 0 0 0 0 0\n3 0 1 2\n",
+                             {{0, 1, 2}}}});
 }
 
 TEST(OffReader, NamesTheLineOfEachDefect) {
-  EXPECT_EQ(read("OFF\n3 x 0\n").error, "line 2: 'x' where a count is expected");
-  EXPECT_EQ(read("OFF\n1 0 0\n0 zero 0\n").error, "line 3: 'zero' where a coordinate is expected");
-  EXPECT_EQ(read("OFF\n3 1 0\n" + kThreeVertices + "3 0 1 2.0\n").error,
-            "line 6: '2.0' where a vertex index is expected");
-  EXPECT_EQ(read("OFF\n3 1 0\n" + kThreeVertices + "-3 0 1 2\n").error, "line 6: a face of -3 corners");
-  EXPECT_EQ(read("OFF").error, "line 1: the file ends where a count is expected");
-  EXPECT_EQ(read("").error, "the file is empty");
+  expect_errors(
+      read_off,
+      {
+          {"4OFF\n3 1 0\n", "line 1: '4OFF' holds points of other than three dimensions, which are not read"},
+          {"C4nOFF\n3 1 0\n",
+           "line 1: 'C4nOFF' holds points of other than three dimensions, which are not read"},
+          {"XOFF\n", "line 1: 'XOFF' is no kind of OFF file known here"},
+          {"ply\n", "line 1: 'ply' where 'OFF' is expected"},
+          {"OFF\n4 1 0\n" + kThreeVertices + "3 0 1 2\n",
+           "line 6: the header promises 1 faces, the data ends after 0"},
+          {"OFF\n3 2 0\n" + kThreeVertices + "3 0 1 2\n",
+           "line 6: the header promises 2 faces, the data ends after 1"},
+          {"OFF\n3 1 0\n" + kThreeVertices + "3 0 1 2\n3 0 1 2\n",
+           "line 7: the file goes on after the vertices and faces that its header promises"},
+          {"OFF\n6 1 0\n" + kThreeVertices + "3 0 1 2 9 9 9 9 9 9\n3 0 1\n",
+           "line 7: the header promises 6 vertices, the data ends after 5"},
+          {"OFF\n4000000000 1 0\n0 0 0\n",
+           "line 2: the header promises 4000000000 vertices, the file has room for at most 1"},
+          {"OFF\n1 1 0\n0 0 0\n999999999 0 0 0\n",
+           "line 4: the header promises 1 faces, the data ends after 0"},
+          {"OFF\n-1 1 0\n", "line 2: a count of -1"},
+          {"OFF\n3 x 0\n", "line 2: 'x' where a count is expected"},
+          {"OFF\n1 0 0\n0 zero 0\n", "line 3: 'zero' where a coordinate is expected"},
+          {"OFF\n3 1 0\n" + kThreeVertices + "3 0 1 2.0\n", "line 6: '2.0' where a vertex index is expected"},
+          {"OFF\n3 1 0\n" + kThreeVertices + "-3 0 1 2\n", "line 6: a face of -3 corners"},
+          {"OFF", "line 1: the file ends where a count is expected"},
+          {"", "the file is empty"},
+      });
 }
 
-TEST(OffReader, AnEmptyMeshIsNoError) {
-  EXPECT_TRUE(read("OFF\n0 0 0\n").ok);
-  EXPECT_TRUE(read("OFF\n0 0 0").ok);
+TEST(OffReader, RefusesACountPastEveryNumber) {
+  EXPECT_EQ(read("OFF\n0 99999999999999999999 0\n").error.substr(0, 27), "line 2: the header promises");
 }
 
 TEST(OffReader, ReadsCoordinatesThatAreNotFinite) {
@@ -142,7 +127,7 @@ TEST(OffReader, ReadsBinaryFiles) {
        {std::pair{"OFF", 0}, {"NOFF", 3}, {"COFF", 4}, {"STOFF", 2}, {"STCNOFF", 9}}) {
     const ReadResult result = read(binary(keyword, extra));
     ASSERT_TRUE(result.ok) << result.error;
-    EXPECT_EQ(faces_of(result), (std::vector<Face>{{0, 1, 2}, {2, 1, 0}}));
+    EXPECT_EQ(faces_of(result.mesh), (std::vector<Face>{{0, 1, 2}, {2, 1, 0}}));
     EXPECT_EQ(result.mesh.points[2], (Point{2.5, 1, 1}));
   }
 }

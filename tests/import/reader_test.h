@@ -26,13 +26,42 @@ inline ReadResult read_from(Read read, std::string_view bytes) {
   return result;
 }
 
-inline std::vector<Face> faces_of(const ReadResult& result) {
+inline std::vector<Face> faces_of(const PolygonMesh& mesh) {
   std::vector<Face> faces;
-  const PolygonMesh& mesh = result.mesh;
   for (std::size_t f = 0; f < mesh.face_count(); ++f)
     faces.emplace_back(mesh.corners.begin() + mesh.face_begin[f],
                        mesh.corners.begin() + mesh.face_begin[f + 1]);
   return faces;
+}
+
+/// A file that a reader takes, and what is in it.
+struct FaceRow {
+  const char* what;
+  std::string file;
+  std::vector<Face> faces;
+  std::vector<std::string> remarks = {};
+  bool has_any_remarks = false;  ///< remarks are not looked at
+};
+
+inline void expect_faces(Read read, const std::vector<FaceRow>& rows) {
+  for (const FaceRow& row : rows) {
+    SCOPED_TRACE(row.what);
+    const ReadResult result = read_from(read, row.file);
+    EXPECT_TRUE(result.ok) << result.error;
+    EXPECT_EQ(faces_of(result.mesh), row.faces) << row.file;
+    if (!row.has_any_remarks) {
+      EXPECT_EQ(result.mesh.remarks, row.remarks) << row.file;
+    }
+  }
+}
+
+/// A file that a reader refuses, and what it says.
+struct ErrorRow {
+  std::string file, error;
+};
+
+inline void expect_errors(Read read, const std::vector<ErrorRow>& rows) {
+  for (const ErrorRow& row : rows) EXPECT_EQ(read_from(read, row.file).error, row.error) << row.file;
 }
 
 /// A whole file reads as `faces` faces; cut anywhere, it never gives more, and never a point that is not a

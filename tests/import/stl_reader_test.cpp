@@ -1,4 +1,3 @@
-#include <array>
 #include <bit>
 #include <cmath>
 #include <string>
@@ -37,12 +36,19 @@ std::string facet(const std::string& vertices) {
 }
 const std::string kCorners = "   vertex 0 0 0\n   vertex 1 0 0\n   vertex 0 1e-1 0\n";
 
-TEST(StlReader, ReadsBinaryFacets) {
-  const ReadResult result = read(binary("made by hand", 2, 2));
-  ASSERT_TRUE(result.ok) << result.error;
-  EXPECT_EQ(faces_of(result), (std::vector<Face>{{0, 1, 2}, {3, 4, 5}}));
-  EXPECT_EQ(result.mesh.points[5], (Point{1, 0, 0.1f}));
-  EXPECT_TRUE(result.mesh.remarks.empty());
+TEST(StlReader, ReadsFacesAndRemarksWhatIsOdd) {
+  expect_faces(read_stl, {{"binary facets", binary("made by hand", 2, 2), {{0, 1, 2}, {3, 4, 5}}},
+                          {"bytes after the last triangle",
+                           binary("x", 1, 1) + "more",
+                           {{0, 1, 2}},
+                           {"4 bytes after the last triangle are passed over"}},
+                          {"facets of more or fewer vertices",
+                           "solid\n" + facet(kCorners + "vertex 0 0 1\n") +
+                               facet("vertex 0 0 0\nvertex 1 1 1\n") + facet(kCorners) + "endsolid\n",
+                           {{0, 1, 2, 3}, {4, 5}, {6, 7, 8}}},
+                          {"no triangles", binary("x", 0, 0), {}},
+                          {"a solid of nothing", "solid x\nendsolid x\n", {}}});
+  EXPECT_EQ(read(binary("made by hand", 2, 2)).mesh.points[5], (Point{1, 0, 0.1f}));
 }
 
 TEST(StlReader, SizeDecidesBeforeTheWordSolid) {
@@ -50,34 +56,12 @@ TEST(StlReader, SizeDecidesBeforeTheWordSolid) {
   EXPECT_EQ(read(binary("solid\nfacet normal 0 0 0", 1, 1) + "x").mesh.face_count(), 1u);
 }
 
-TEST(StlReader, PassesOverBytesAfterTheLastTriangle) {
-  const ReadResult result = read(binary("x", 1, 1) + "more");
-  ASSERT_TRUE(result.ok) << result.error;
-  EXPECT_EQ(result.mesh.face_count(), 1u);
-  EXPECT_EQ(result.mesh.remarks,
-            (std::vector<std::string>{"4 bytes after the last triangle are passed over"}));
-}
-
-TEST(StlReader, RefusesAPromiseThatTheFileDoesNotKeep) {
-  EXPECT_EQ(read(binary("x", 4294967295u, 12)).error,
-            "the header promises 4294967295 triangles (200 GiB), the file holds 12");
-  EXPECT_EQ(read(binary("solid x", 3, 2)).error,
-            "the header promises 3 triangles (150 bytes), the file holds 2");
-}
-
-TEST(StlReader, NoTrianglesAreNoError) {
-  const ReadResult result = read(binary("x", 0, 0));
-  EXPECT_TRUE(result.ok) << result.error;
-  EXPECT_EQ(result.mesh.face_count(), 0u);
-  EXPECT_TRUE(read("solid x\nendsolid x\n").ok);
-}
-
 TEST(StlReader, ReadsTextInAnyCaseAndLayout) {
   const ReadResult result = read(
       "SOLID a\rFacet NORMAL 0 0 1 Outer LOOP Vertex 0 0 .1 VERTEX\r\n1 0 0\n\tvertex 0 1 0 EndLoop "
       "endfacet\nEndSolid");
   ASSERT_TRUE(result.ok) << result.error;
-  EXPECT_EQ(faces_of(result), (std::vector<Face>{{0, 1, 2}}));
+  EXPECT_EQ(faces_of(result.mesh), (std::vector<Face>{{0, 1, 2}}));
   EXPECT_EQ(result.mesh.points[0], (Point{0, 0, 0.1}));
 }
 
@@ -100,13 +84,6 @@ TEST(StlReader, SolidsBecomeParts) {
   EXPECT_EQ(result.mesh.parts[1].face_count, 2u);
 }
 
-TEST(StlReader, FacetsOfMoreOrFewerVerticesAreFacesToo) {
-  const ReadResult result = read("solid\n" + facet(kCorners + "vertex 0 0 1\n") +
-                                 facet("vertex 0 0 0\nvertex 1 1 1\n") + facet(kCorners) + "endsolid\n");
-  ASSERT_TRUE(result.ok) << result.error;
-  EXPECT_EQ(faces_of(result), (std::vector<Face>{{0, 1, 2, 3}, {4, 5}, {6, 7, 8}}));
-}
-
 TEST(StlReader, PassesOverComments) {
   const ReadResult result = read("# by hand\nsolid a\n; one\n" + facet(kCorners) + "// two\n" +
                                  facet("# three\n" + kCorners) + "endsolid a # end\n");
@@ -122,21 +99,24 @@ TEST(StlReader, ReadsCoordinatesThatAreNotFinite) {
   EXPECT_EQ(result.mesh.points[0][2], -INFINITY);
 }
 
-TEST(StlReader, NamesTheLineOfEachDefect) {
-  EXPECT_EQ(read("solid a\nfacit\n").error, "line 2: 'facit' where 'facet' or 'endsolid' is expected");
-  EXPECT_EQ(read("solid a\n" + facet("vertex 0 0\n" + kCorners) + "endsolid").error,
-            "line 5: 'vertex' where a coordinate is expected");
-  EXPECT_EQ(read("solid a\n" + facet(kCorners)).error,
-            "line 8: the file ends where 'facet' or 'endsolid' is expected");
-  EXPECT_EQ(read("solid a\nendsolid a\nmore\n").error, "line 3: 'more' where 'solid' is expected");
-  EXPECT_EQ(read("solid a\nfacet normal 0 0 0\nloop\n").error, "line 3: 'loop' where 'outer' is expected");
-}
-
-TEST(StlReader, RefusesWhatIsNoStlFile) {
-  EXPECT_EQ(read("").error, "the file is empty");
-  EXPECT_EQ(read("v 0 0 0\n").error,
-            "neither a text STL, which begins with 'solid', nor a binary one, which has at least 84 bytes: "
-            "this has 8");
+TEST(StlReader, NamesTheLineOfEachDefectAndRefusesWhatIsNoStlFile) {
+  expect_errors(
+      read_stl,
+      {
+          {"solid a\nfacit\n", "line 2: 'facit' where 'facet' or 'endsolid' is expected"},
+          {"solid a\n" + facet("vertex 0 0\n" + kCorners) + "endsolid",
+           "line 5: 'vertex' where a coordinate is expected"},
+          {"solid a\n" + facet(kCorners), "line 8: the file ends where 'facet' or 'endsolid' is expected"},
+          {"solid a\nendsolid a\nmore\n", "line 3: 'more' where 'solid' is expected"},
+          {"solid a\nfacet normal 0 0 0\nloop\n", "line 3: 'loop' where 'outer' is expected"},
+          {"", "the file is empty"},
+          {"v 0 0 0\n",
+           "neither a text STL, which begins with 'solid', nor a binary one, which has at least 84 bytes: "
+           "this has 8"},
+          {binary("x", 4294967295u, 12),
+           "the header promises 4294967295 triangles (200 GiB), the file holds 12"},
+          {binary("solid x", 3, 2), "the header promises 3 triangles (150 bytes), the file holds 2"},
+      });
 }
 
 const std::string kText =

@@ -285,4 +285,29 @@ const std::vector<TriangleFamily>& triangle_families() {
   return families;
 }
 
+std::string TriangleFamily::identifier() const {
+  std::string out = name;
+  std::replace(out.begin(), out.end(), ' ', '_');
+  return out;
+}
+
+std::string text(const TrianglePair& pair) {
+  std::string out;
+  for (const auto* t : {&pair.a, &pair.b}) {
+    for (const auto& corner : *t) {
+      char line[120];
+      std::snprintf(line, sizeof line, "  {%a, %a, %a},\n", corner[0], corner[1], corner[2]);
+      out += line;
+    }
+  }
+  return out;
+}
+
+TrianglePair swapped(const TrianglePair& pair) {
+  TrianglePair out;
+  std::copy_n(&pair.a[0][0], 9, &out.b[0][0]);
+  std::copy_n(&pair.b[0][0], 9, &out.a[0][0]);
+  return out;
+}
+
 }  // namespace tandem

@@ -1,6 +1,7 @@
 #pragma once
 #include <ostream>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "kernels/geometry/triangle_test.h"
@@ -13,11 +14,20 @@ using Random = std::mt19937_64;
 struct TriangleFamily {
   const char* name;
   TrianglePair (*make)(Random&);
+
+  /// The name with _ for blanks.
+  std::string identifier() const;
 };
 
 inline std::ostream& operator<<(std::ostream& out, const TriangleFamily& family) {
   return out << family.name;
 }
+
+/// All coordinates of a pair, as C++ reads them.
+std::string text(const TrianglePair& pair);
+
+/// The pair with a for b.
+TrianglePair swapped(const TrianglePair& pair);
 
 /// Every family. Each pair is finite.
 const std::vector<TriangleFamily>& triangle_families();

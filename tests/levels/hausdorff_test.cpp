@@ -1,22 +1,19 @@
 // Surfaces whose Hausdorff distance is known.
-#include "levels/hausdorff.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
+#include "kernels/geometry/triangle_distance.h"
+#include "kernels/query_scenes.h"
 #include "kernels/solid_meshes.h"
+#include "levels/hausdorff.h"
+#include "levels/nearest_triangle.h"
 #include "levels/stored_level.h"
 #include "parallel/parallel.h"
 
-namespace tandem {
+namespace tandem::test {
 namespace {
-
-using test::joined;
-using test::Mesh;
-using test::moved;
-using test::StoredLevel;
 
 Mesh scaled(Mesh mesh, float factor) {
   for (auto& point : mesh.points)
@@ -52,11 +49,11 @@ void expect_distance(const Mesh& a, const Mesh& b, double distance) {
 }
 
 TEST(Hausdorff, OfParallelSheetsIsTheirDistance) {
-  expect_distance(test::sheet(4, 3), moved(test::sheet(4, 5), 0, 0, 0.25f), 0.25);
+  expect_distance(sheet(4, 3), moved(sheet(4, 5), 0, 0, 0.25f), 0.25);
 }
 
 TEST(Hausdorff, OfASheetInALargerOneIsThatOfTheCorners) {
-  expect_distance(test::sheet(4, 3), test::sheet(2, 7), std::sqrt(2.0));
+  expect_distance(sheet(4, 3), sheet(2, 7), std::sqrt(2.0));
 }
 
 TEST(Hausdorff, OfATentOverASheetIsItsHeight) {
@@ -65,12 +62,12 @@ TEST(Hausdorff, OfATentOverASheetIsItsHeight) {
   tent.add({1, -1, 0}, {1, 1, 0}, {0, 0, 0.5f});
   tent.add({1, 1, 0}, {-1, 1, 0}, {0, 0, 0.5f});
   tent.add({-1, 1, 0}, {-1, -1, 0}, {0, 0, 0.5f});
-  expect_distance(tent, test::sheet(2, 6), 0.5);
+  expect_distance(tent, sheet(2, 6), 0.5);
 }
 
 TEST(Hausdorff, OfASpikeIsItsLength) {
   const Mesh spike = triangle({0.1f, 0, 0}, {0.11f, 0, 0}, {0.105f, 0, 30});
-  expect_distance(joined(test::sheet(2, 6), spike), test::sheet(2, 6), 30);
+  expect_distance(joined(sheet(2, 6), spike), sheet(2, 6), 30);
 }
 
 /// No corner of any triangle is far from the other surface.
@@ -82,9 +79,9 @@ TEST(Hausdorff, IsFoundWithinFacesBetweenTwoSurfaces) {
 }
 
 TEST(Hausdorff, IsFoundWhereManySurfacesAreEquallyNear) {
-  const Mesh cube = test::box(2, 2, 2);
-  expect_distance(joined(cube, test::sheet(2, 1)), cube, 1);
-  expect_distance(joined(cube, scaled(test::sheet(2, 1), 0.9f)), cube, 1);
+  const Mesh cube = box(2, 2, 2);
+  expect_distance(joined(cube, sheet(2, 1)), cube, 1);
+  expect_distance(joined(cube, scaled(sheet(2, 1), 0.9f)), cube, 1);
 }
 
 /// The wall's points are as far as they are from the seam of two sheets that meet at a right angle.
@@ -110,7 +107,7 @@ TEST(Hausdorff, OfPointsAndSegmentsIsThatOfTheHulls) {
 
 TEST(Hausdorff, OfOneSurfaceDividedTwiceIsNearlyNothing) {
   for (const float factor : {1.0f, 1e-30f, 1e30f}) {
-    const Mesh a = scaled(test::sheet(2, 3), factor), b = scaled(test::sheet(2, 16), factor);
+    const Mesh a = scaled(sheet(2, 3), factor), b = scaled(sheet(2, 16), factor);
     const HausdorffBound found = bound(a, b);
     EXPECT_LE(found.upper, 0x1p-23 * factor);
     EXPECT_LT(found.lower, found.upper);
@@ -120,7 +117,7 @@ TEST(Hausdorff, OfOneSurfaceDividedTwiceIsNearlyNothing) {
 }
 
 TEST(Hausdorff, OfASurfaceFromItselfIsNearlyNothing) {
-  const Mesh mesh = joined(test::random_mesh(500, 3), test::sphere(2, 3));
+  const Mesh mesh = joined(random_mesh(500, 3), sphere(2, 3));
   const HausdorffBound found = bound(mesh, mesh);
   EXPECT_LE(found.upper, 2 * 0x1p-36);
   EXPECT_EQ(found.lower, 0);
@@ -155,7 +152,7 @@ TEST(Hausdorff, OfTrianglesAtTheOriginIsNothing) {
 
 /// An icosahedron's kind of test: the middles of the coarse sphere's triangles are the farthest.
 TEST(Hausdorff, OfSpheresIsTheHeightOfTheCoarseOnesCaps) {
-  const Mesh coarse = test::sphere(1, 0), fine = test::sphere(1, 5);
+  const Mesh coarse = sphere(1, 0), fine = sphere(1, 5);
   const HausdorffBound found = bound(coarse, fine);
   const double height = 1 - 1 / std::sqrt(3.0);  // of the octahedron
   EXPECT_LE(found.lower, height * (1 + 1e-6));
@@ -165,7 +162,7 @@ TEST(Hausdorff, OfSpheresIsTheHeightOfTheCoarseOnesCaps) {
 /// Scaling by powers of two rounds nothing, down to denormal coordinates and up to the largest. Boxes are
 /// rounded where coordinates are single steps of denormal numbers.
 TEST(Hausdorff, ScalesWithItsSurfaces) {
-  const Mesh a = scaled(test::sphere(1000, 2), 1), b = scaled(test::sphere(1000, 1), 1);
+  const Mesh a = scaled(sphere(1000, 2), 1), b = scaled(sphere(1000, 1), 1);
   const auto whole = [](Mesh mesh) {
     for (auto& point : mesh.points)
       for (float& x : point) x = std::round(x);
@@ -187,11 +184,11 @@ TEST(Hausdorff, ScalesWithItsSurfaces) {
 /// Coordinates have steps of 1 there, and so the surfaces do.
 TEST(Hausdorff, HoldsFarFromTheOrigin) {
   const float far = 0x1p23f;
-  expect_distance(moved(test::sheet(64, 4), far, far, far), moved(test::sheet(64, 8), far, far, far + 3), 3);
+  expect_distance(moved(sheet(64, 4), far, far, far), moved(sheet(64, 8), far, far, far + 3), 3);
 }
 
 TEST(Hausdorff, IsTheSameWithoutTopology) {
-  const StoredLevel a(test::sphere(1, 3)), b(test::sphere(1, 2));
+  const StoredLevel a(sphere(1, 3)), b(sphere(1, 2));
   const HausdorffBound with = hausdorff_bound(a.view(), b.view());
   const HausdorffBound without = hausdorff_bound(a.triangles_only(), b.triangles_only());
   EXPECT_LE(without.lower, with.upper);
@@ -200,7 +197,7 @@ TEST(Hausdorff, IsTheSameWithoutTopology) {
 }
 
 TEST(Hausdorff, DoesNotDependOnThreads) {
-  const StoredLevel a(joined(test::sphere(1, 5), test::sphere(0.97, 4))), b(test::sphere(1, 3));
+  const StoredLevel a(joined(sphere(1, 5), sphere(0.97, 4))), b(sphere(1, 3));
   HausdorffBound found[2];
   for (const int i : {0, 1}) {
     const parallel::ThreadLimit threads(i == 0 ? 1 : 4);
@@ -214,7 +211,7 @@ TEST(Hausdorff, DoesNotDependOnThreads) {
 }
 
 TEST(Hausdorff, HoldsWhenPiecesRunOutAndSaysSo) {
-  const Mesh coarse = test::sphere(1, 0), fine = test::sphere(1, 4);
+  const Mesh coarse = sphere(1, 0), fine = sphere(1, 4);
   HausdorffOptions options;
   const HausdorffBound narrow = bound(coarse, fine, options);
   options.most_pieces = 0;
@@ -234,7 +231,7 @@ Mesh cubes_of_a_grid(float step, std::uint64_t seed) {
   for (int i = 0; i < 12; ++i) {
     float place[3];
     for (float& x : place) x = static_cast<float>(random() % 9) * step;
-    mesh = joined(mesh, moved(test::box(step, step, step), place[0], place[1], place[2]));
+    mesh = joined(mesh, moved(box(step, step, step), place[0], place[1], place[2]));
   }
   return mesh;
 }
@@ -274,7 +271,7 @@ TEST(Hausdorff, ABoundFoundWithSomeTreesIsProvedWithOthers) {
 }
 
 TEST(Hausdorff, DecidesWhetherItIsWithinAWantedLength) {
-  const StoredLevel coarse(test::sphere(1, 1)), fine(test::sphere(1, 5));
+  const StoredLevel coarse(sphere(1, 1)), fine(sphere(1, 5));
   const HausdorffBound found = hausdorff_bound(coarse.view(), fine.view());
   for (const double factor : {0.1, 0.5, 0.99, 1.001, 1.5, 10.0}) {
     HausdorffOptions options;
@@ -292,5 +289,206 @@ TEST(Hausdorff, DecidesWhetherItIsWithinAWantedLength) {
   }
 }
 
+// Random surfaces, of which any point must be as near to the other as the bound says.
+
+using Random = std::mt19937_64;
+using Position = std::array<double, 3>;
+
+double uniform(Random& random) {
+  return static_cast<double>(random() >> 11) * 0x1p-53;
+}
+
+/// A corner of the families below.
+using MakeCorner = std::array<float, 3> (*)(Random&);
+
+std::array<float, 3> anywhere(Random& random) {
+  return {static_cast<float>(uniform(random)), static_cast<float>(uniform(random)),
+          static_cast<float>(uniform(random))};
+}
+std::array<float, 3> on_a_grid(Random& random) {
+  const auto place = [&] { return static_cast<float>(random() % 4); };
+  return {place(), place(), place()};
+}
+std::array<float, 3> in_a_plane(Random& random) {
+  return {static_cast<float>(uniform(random)), static_cast<float>(uniform(random)), 0.5f};
+}
+std::array<float, 3> near_a_plane(Random& random) {
+  return {static_cast<float>(uniform(random)), static_cast<float>(uniform(random)),
+          static_cast<float>(1e-3 * uniform(random))};
+}
+std::array<float, 3> on_a_line(Random& random) {
+  return {static_cast<float>(random() % 64), 0, 0};
+}
+std::array<float, 3> far_away(Random& random) {
+  const auto place = [&] { return 0x1p20f + static_cast<float>(random() % 64) / 8; };
+  return {place(), place(), place()};
+}
+std::array<float, 3> of_any_magnitude(Random& random) {
+  const auto place = [&] {
+    return static_cast<float>(std::ldexp(uniform(random) - 0.5, static_cast<int>(random() % 270) - 144));
+  };
+  return {place(), place(), place()};
+}
+
+struct Family {
+  const char* name;
+  MakeCorner make;
+};
+
+constexpr Family kFamilies[] = {{"Anywhere", anywhere},
+                                {"OnAGrid", on_a_grid},
+                                {"InAPlane", in_a_plane},
+                                {"NearAPlane", near_a_plane},
+                                {"OnALine", on_a_line},
+                                {"FarAway", far_away},
+                                {"OfAnyMagnitude", of_any_magnitude}};
+
+/// Triangles with corners of a family: large ones, small ones, needles, segments and points.
+Mesh make_mesh(const Family& family, Random& random) {
+  Mesh mesh;
+  const int count = 1 + static_cast<int>(random() % 12);
+  for (int t = 0; t < count; ++t) {
+    const std::array<float, 3> a = family.make(random), b = family.make(random), c = family.make(random);
+    const auto near = [&](const std::array<float, 3>& p, const std::array<float, 3>& q, float share) {
+      std::array<float, 3> out;
+      for (int k = 0; k < 3; ++k) out[k] = p[k] + share * (q[k] - p[k]);
+      return out;
+    };
+    switch (random() % 8) {
+      case 0:
+        mesh.add(a, near(a, b, 0.1f), near(a, c, 0.1f));
+        break;
+      case 1:
+        mesh.add(a, b, near(b, c, 1e-6f));
+        break;
+      case 2:
+        mesh.add(a, b, b);
+        break;
+      case 3:
+        mesh.add(a, a, a);
+        break;
+      default:
+        mesh.add(a, b, c);
+    }
+  }
+  return mesh;
+}
+
+Position point_on(const Mesh& mesh, Random& random) {
+  const auto& triangle = mesh.triangles[random() % mesh.triangles.size()];
+  double x = uniform(random), y = uniform(random);
+  if (random() % 4 == 0) y = 0;
+  if (x + y > 1) {
+    x = 1 - x;
+    y = 1 - y;
+  }
+  Position out;
+  for (int k = 0; k < 3; ++k) {
+    const double a = mesh.points[triangle[0]][k], b = mesh.points[triangle[1]][k],
+                 c = mesh.points[triangle[2]][k];
+    out[k] = a + (x * (b - a) + y * (c - a));
+  }
+  return out;
+}
+
+/// A proved interval of the distance of a point from the mesh.
+DistanceInterval distance_from(const Mesh& mesh, const Position& p) {
+  DistanceInterval least = {INFINITY, INFINITY};
+  for (const auto& triangle : mesh.triangles) {
+    TrianglePair pair;
+    for (int i = 0; i < 3; ++i) {
+      for (int k = 0; k < 3; ++k) {
+        pair.a[i][k] = p[k];
+        pair.b[i][k] = mesh.points[triangle[i]][k];
+      }
+    }
+    const DistanceInterval interval = triangle_distance(pair).interval;
+    least.lower = std::min(least.lower, interval.lower);
+    least.upper = std::min(least.upper, interval.upper);
+  }
+  return least;
+}
+
+double largest_coordinate(const Mesh& a, const Mesh& b) {
+  double largest = 0;
+  for (const Mesh* mesh : {&a, &b})
+    for (const auto& point : mesh->points)
+      for (const float x : point) largest = std::max(largest, double{std::fabs(x)});
+  return largest;
+}
+
+class RandomSurfaces : public ::testing::TestWithParam<Family> {};
+
+/// Samples are computed, so they may be beside the surface by the rounding of float64.
+TEST_P(RandomSurfaces, AreAsNearAsTheBoundSays) {
+  const int trials = test::trials(60, 50);
+  int narrow = 0;
+  for (int trial = 0; trial < trials; ++trial) {
+    Random random(static_cast<std::uint64_t>(trial));
+    const Mesh a = make_mesh(GetParam(), random);
+    const Mesh b = random() % 4 == 0 ? a : make_mesh(GetParam(), random);
+    const HausdorffBound found = hausdorff_bound(StoredLevel(a).view(), StoredLevel(b).view());
+    const double rounding = 0x1p-50 * largest_coordinate(a, b);
+    double farthest = 0;
+    for (int sample = 0; sample < 400; ++sample) {
+      const DistanceInterval near_b = distance_from(b, point_on(a, random)),
+                             near_a = distance_from(a, point_on(b, random));
+      ASSERT_LE(near_b.lower, found.upper + rounding) << "trial " << trial;
+      ASSERT_LE(near_a.lower, found.upper + rounding) << "trial " << trial;
+      farthest = std::max({farthest, near_a.upper, near_b.upper});
+    }
+    const Position point = {found.point[0], found.point[1], found.point[2]};
+    EXPECT_LE(distance_from(found.point_on_a ? a : b, point).lower, 0x1p-40 * largest_coordinate(a, b));
+    EXPECT_GE(distance_from(found.point_on_a ? b : a, point).upper, found.lower) << "trial " << trial;
+    EXPECT_LE(farthest, found.upper + rounding) << "trial " << trial;
+    EXPECT_TRUE(found.narrow) << "trial " << trial;
+    narrow += found.upper <= found.lower * 1.0021 ||
+              found.upper <= found.lower + 0x1p-35 * largest_coordinate(a, b);
+  }
+  EXPECT_EQ(narrow, trials);
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, RandomSurfaces, ::testing::ValuesIn(kFamilies),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+/// Asked for with every triangle as the hint in turn, the search finds what trying all triangles finds.
+TEST(NearestTriangle, IsTheNearestOfAll) {
+  const StoredLevel stored(random_mesh(300, 7));
+  const LevelView& level = stored.view();
+  std::mt19937_64 random(1);
+  const auto place = [&] { return static_cast<double>(random() >> 11) * 0x1p-52 - 0.5; };
+  for (std::uint32_t hint = 0; hint < level.triangle_count; ++hint) {
+    const levels::Point p = {{place(), place(), place()}};
+    double least = INFINITY, proved = INFINITY;
+    for (std::uint32_t t = 0; t < level.triangle_count; ++t) {
+      TrianglePair pair;
+      for (int i = 0; i < 3; ++i) {
+        for (int k = 0; k < 3; ++k) {
+          pair.a[i][k] = p.x[k];
+          pair.b[i][k] = level.triangles[t].corner[i].position[k];
+        }
+      }
+      const DistanceInterval interval = triangle_distance(pair).interval;
+      least = std::min(least, interval.upper);
+      proved = std::min(proved, interval.lower);
+    }
+    const levels::NearestTriangle found = levels::nearest_triangle(level, p, hint);
+    EXPECT_NEAR(std::sqrt(found.square), least, 1e-14);
+    const double lower = levels::proved_distance(level, p, hint);
+    EXPECT_LE(lower, least);
+    EXPECT_GE(lower, proved * (1 - 1e-9) - 1e-14);
+  }
+}
+
+/// A needle of which float64 computes nothing right but its edges.
+TEST(NearestTriangle, OfANeedleIsNearAnEdge) {
+  Mesh mesh;
+  mesh.add({0, 0, 0}, {1, 0x1p-40f, 0}, {0.5f, 0x1p-41f, 0});
+  const StoredLevel stored(mesh);
+  const levels::Point p = {{0.75, 0, 1}};
+  EXPECT_NEAR(levels::nearest_triangle(stored.view(), p, 0).square, 1, 1e-15);
+  EXPECT_NEAR(levels::proved_distance(stored.view(), p, 0), 1, 1e-11);
+}
+
 }  // namespace
-}  // namespace tandem
+}  // namespace tandem::test

@@ -11,14 +11,10 @@
 #include "levels/stored_level.h"
 #include "tandem/kernels/contact_query.h"
 
-namespace tandem {
+namespace tandem::test {
 namespace {
 
 using build::count_self_contacts;
-using test::joined;
-using test::Mesh;
-using test::moved;
-using test::StoredLevel;
 
 /// Large triangles on a coarse grid: many meet, many have corners in common, some are flat.
 Mesh crossing(std::uint32_t triangles, std::uint64_t seed) {
@@ -53,8 +49,8 @@ std::uint64_t found_by_query(const AssetView& asset) {
 }
 
 TEST(SelfContacts, AreThoseOfTheContactQuery) {
-  const Mesh balls = joined(test::sphere(1, 3), moved(test::sphere(1, 3), 1, 0, 0));
-  for (const Mesh& mesh : {crossing(300, 1), crossing(3, 2), balls, test::random_mesh(3000, 3)}) {
+  const Mesh balls = joined(sphere(1, 3), moved(sphere(1, 3), 1, 0, 0));
+  for (const Mesh& mesh : {crossing(300, 1), crossing(3, 2), balls, random_mesh(3000, 3)}) {
     const StoredLevel level(mesh);
     const std::uint64_t expected = found_by_query(level.asset());
     EXPECT_GT(expected, 0u);
@@ -65,8 +61,8 @@ TEST(SelfContacts, AreThoseOfTheContactQuery) {
 }
 
 TEST(SelfContacts, OfASolidThereAreNone) {
-  EXPECT_EQ(count_self_contacts(StoredLevel(test::sphere(1, 4)).view(), 0), 0u);
+  EXPECT_EQ(count_self_contacts(StoredLevel(sphere(1, 4)).view(), 0), 0u);
 }
 
 }  // namespace
-}  // namespace tandem
+}  // namespace tandem::test

@@ -25,6 +25,45 @@ bool any_at(const std::vector<ContactPoint>& points, const Vector3d& x, double t
   });
 }
 
+/// Lies on its ridge along y.
+Mesh roof() {
+  Mesh roof;
+  roof.add({0, -0.25f, 0}, {1, -0.25f, 1}, {-1, -0.25f, 1});
+  roof.add({0, 0.25f, 0}, {-1, 0.25f, 1}, {1, 0.25f, 1});
+  roof.add({0, -0.25f, 0}, {0, 0.25f, 0}, {1, 0.25f, 1});
+  roof.add({0, -0.25f, 0}, {1, 0.25f, 1}, {1, -0.25f, 1});
+  roof.add({0, 0.25f, 0}, {0, -0.25f, 0}, {-1, -0.25f, 1});
+  roof.add({0, 0.25f, 0}, {-1, -0.25f, 1}, {-1, 0.25f, 1});
+  roof.add({-1, -0.25f, 1}, {1, -0.25f, 1}, {1, 0.25f, 1});
+  roof.add({-1, -0.25f, 1}, {1, 0.25f, 1}, {-1, 0.25f, 1});
+  return roof;
+}
+
+/// Two bodies, each of a mesh of its own.
+ContactScene scene_of(const Mesh& a, const Isometry3d& pose_a, const Mesh& b, const Isometry3d& pose_b) {
+  ContactScene scene = scene_of(a, pose_a, b, pose_b);
+  return scene;
+}
+
+/// There are points, and all have this normal.
+void expect_normals(const std::vector<ContactPoint>& points, const Vector3d& normal,
+                    double tolerance = 1e-9) {
+  EXPECT_FALSE(points.empty());
+  for (const ContactPoint& p : points) EXPECT_LT((p.normal - normal).norm(), tolerance);
+}
+
+double deepest_of(const std::vector<ContactPoint>& points) {
+  double deepest = 0;
+  for (const ContactPoint& p : points) deepest = std::max(deepest, p.depth);
+  return deepest;
+}
+
+void expect_different_features(const std::vector<ContactPoint>& points) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (std::size_t j = i + 1; j < points.size(); ++j) EXPECT_NE(points[i].feature, points[j].feature);
+  }
+}
+
 // All points have this normal and depth.
 void expect_all(const std::vector<ContactPoint>& points, const Vector3d& normal, double depth,
                 double tolerance) {
@@ -51,9 +90,8 @@ class BoxOnBox : public testing::TestWithParam<BoxPair> {};
 
 TEST_P(BoxOnBox, HasTheOverlapsCornersItsNormalAndItsDepth) {
   const BoxPair& pair = GetParam();
-  ContactScene scene;
-  scene.add_body(scene.add_shape(cube(0.5f, pair.cells_a)), at(0, 0, 0));
-  scene.add_body(scene.add_shape(cube(0.5f, pair.cells_b)), at(pair.shift_x, pair.shift_y, 1 - pair.depth));
+  ContactScene scene = scene_of(cube(0.5f, pair.cells_a), at(0, 0, 0), cube(0.5f, pair.cells_b),
+                                at(pair.shift_x, pair.shift_y, 1 - pair.depth));
   RandomPoses random(1);
   for (int trial = 0; trial < 20; ++trial) {
     const Isometry3d motion = trial == 0 ? Isometry3d::Identity() : random_motion(random, 3);
@@ -128,10 +166,7 @@ TEST(ContactGeneration, NeighboursInAStackPushAlongTheirFacesOnly) {
 
 TEST(ContactGeneration, BodiesThatTouchInAnEdgeOrACornerOfBothHaveNoPointAndAreCounted) {
   for (const double z : {0.0, 1.0}) {
-    ContactScene scene;
-    const std::uint32_t shape = scene.add_shape(cube(0.5f));
-    scene.add_body(shape, at(0, 0, 0));
-    scene.add_body(shape, at(1, 1, z));
+    ContactScene scene = scene_of(cube(0.5f), at(0, 0, 0), cube(0.5f), at(1, 1, z));
     EXPECT_TRUE(scene.points().empty());
     EXPECT_GT(scene.triangle_pairs(), 0u);
     EXPECT_EQ(scene.statistics().counters.ambiguous_touches, 1u);
@@ -147,9 +182,7 @@ TEST(ContactGeneration, ACornerThatTouchesAFaceExactlyHasThatFacesNormal) {
   tip.add({-1, -1, 1}, {1, -1, 1}, {1, 1, 1});
   tip.add({-1, -1, 1}, {1, 1, 1}, {-1, 1, 1});
   for (const double x : {0.0, 0.125}) {  // on the diagonal between two triangles, and within one
-    ContactScene scene;
-    scene.add_body(scene.add_shape(cube(0.5f)), at(0, 0, 0));
-    scene.add_body(scene.add_shape(tip), at(x, 0, 0.5));
+    ContactScene scene = scene_of(cube(0.5f), at(0, 0, 0), tip, at(x, 0, 0.5));
     const auto points = scene.points();
     expect_all(points, kZ, 0, 0);
     ASSERT_EQ(points.size(), 1u);
@@ -158,18 +191,7 @@ TEST(ContactGeneration, ACornerThatTouchesAFaceExactlyHasThatFacesNormal) {
 }
 
 TEST(ContactGeneration, AnEdgeThatTouchesAFaceExactlyHasThatFacesNormalAndBothItsEnds) {
-  Mesh roof;  // lies on its ridge along y
-  roof.add({0, -0.25f, 0}, {1, -0.25f, 1}, {-1, -0.25f, 1});
-  roof.add({0, 0.25f, 0}, {-1, 0.25f, 1}, {1, 0.25f, 1});
-  roof.add({0, -0.25f, 0}, {0, 0.25f, 0}, {1, 0.25f, 1});
-  roof.add({0, -0.25f, 0}, {1, 0.25f, 1}, {1, -0.25f, 1});
-  roof.add({0, 0.25f, 0}, {0, -0.25f, 0}, {-1, -0.25f, 1});
-  roof.add({0, 0.25f, 0}, {-1, -0.25f, 1}, {-1, 0.25f, 1});
-  roof.add({-1, -0.25f, 1}, {1, -0.25f, 1}, {1, 0.25f, 1});
-  roof.add({-1, -0.25f, 1}, {1, 0.25f, 1}, {-1, 0.25f, 1});
-  ContactScene scene;
-  scene.add_body(scene.add_shape(cube(0.5f)), at(0, 0, 0));
-  scene.add_body(scene.add_shape(roof), at(0.125, 0, 0.5));
+  ContactScene scene = scene_of(cube(0.5f), at(0, 0, 0), roof(), at(0.125, 0, 0.5));
   const auto points = scene.points();
   expect_all(points, kZ, 0, 0);
   EXPECT_EQ(points.size(), 2u);
@@ -186,13 +208,8 @@ TEST(ContactGeneration, CrossedEdgesPushAcrossBoth) {
     scene.add_body(shape, turned(std::atan(1.0), kX));
     scene.add_body(shape, at(0, 0, 2 * half - depth) * turned(std::atan(1.0), Vector3d::UnitY()));
     const auto points = scene.points();
-    ASSERT_FALSE(points.empty());
-    double deepest = 0;
-    for (const ContactPoint& p : points) {
-      EXPECT_LT((p.normal - kZ).norm(), 1e-6);
-      deepest = std::max(deepest, p.depth);
-    }
-    EXPECT_NEAR(deepest, depth, 1e-6 * depth + 1e-12);
+    expect_normals(points, kZ, 1e-6);
+    EXPECT_NEAR(deepest_of(points), depth, 1e-6 * depth + 1e-12);
   }
 }
 
@@ -204,12 +221,11 @@ TEST(ContactGeneration, ASharpTipInAFacePushesAlongTheFace) {
   tip.add({0, 0, 0}, {0, -0.125f, 1}, {-0.125f, 0.125f, 1});
   tip.add({-0.125f, 0.125f, 1}, {0, -0.125f, 1}, {0.125f, 0.0625f, 1});
   for (const bool ground : {true, false}) {
-    ContactScene scene;
-    scene.add_body(scene.add_shape(ground ? sheet(1, 1) : cube(0.5f)), at(0, 0, ground ? 0 : -0.5));
-    scene.add_body(scene.add_shape(tip), at(0.1, 0.2, -0.05) * turned(0.4, kX));
+    ContactScene scene = scene_of(ground ? sheet(1, 1) : cube(0.5f), at(0, 0, ground ? 0 : -0.5), tip,
+                                  at(0.1, 0.2, -0.05) * turned(0.4, kX));
     const auto points = scene.points();
     EXPECT_EQ(points.size(), 4u);  // the tip, and three around it, where the depth ends
-    for (const ContactPoint& p : points) EXPECT_LT((p.normal - kZ).norm(), 1e-9);
+    expect_normals(points, kZ);
     EXPECT_NEAR(scene.statistics().depth, 0.05, 1e-9);
   }
 }
@@ -218,9 +234,8 @@ TEST(ContactGeneration, ABoxOnATiltedSheetStandsOnItsFourCorners) {
   const Isometry3d slope = turned(0.35, Vector3d(0.3, 1, 0));
   for (const int cells : {1, 7, 40}) {
     for (const double depth : {1e-4, 0.02}) {
-      ContactScene scene;
-      scene.add_body(scene.add_shape(sheet(4, cells)), slope);
-      scene.add_body(scene.add_shape(cube(0.5f)), slope * at(0.31, 0.17, 0.5 - depth) * turned(0.6, kZ));
+      ContactScene scene =
+          scene_of(sheet(4, cells), slope, cube(0.5f), slope * at(0.31, 0.17, 0.5 - depth) * turned(0.6, kZ));
       const auto points = scene.points();
       expect_all(points, slope.linear() * kZ, depth, 1e-12);
       EXPECT_EQ(points.size(), 4u) << cells;
@@ -231,9 +246,7 @@ TEST(ContactGeneration, ABoxOnATiltedSheetStandsOnItsFourCorners) {
 }
 
 TEST(ContactGeneration, ABoxThatHangsOverASheetsBorderStandsOnTheSheet) {
-  ContactScene scene;
-  scene.add_body(scene.add_shape(sheet(4, 5)), at(0, 0, 0));
-  scene.add_body(scene.add_shape(cube(0.5f)), at(1.8, 0, 0.49));
+  ContactScene scene = scene_of(sheet(4, 5), at(0, 0, 0), cube(0.5f), at(1.8, 0, 0.49));
   const auto points = scene.points();
   EXPECT_GT(scene.statistics().counters.open_curves, 0u);
   ASSERT_FALSE(points.empty());
@@ -265,18 +278,12 @@ TEST(ContactGeneration, ATiltedBoxIsDeepWhereItsEdgeIs) {
 TEST(ContactGeneration, SpheresPushAlongTheLineOfTheirMiddlesByTheirOverlap) {
   RandomPoses random(3);
   for (const double overlap : {0.01, 0.1, 0.6}) {
-    ContactScene scene;
-    scene.add_body(scene.add_shape(sphere(1, 5)), random_motion(random, 0));
-    scene.add_body(scene.add_shape(sphere(0.5, 4)), at(0, 0, 1.5 - overlap) * random_motion(random, 0));
+    const Isometry3d turn_a = random_motion(random, 0), turn_b = random_motion(random, 0);
+    ContactScene scene = scene_of(sphere(1, 5), turn_a, sphere(0.5, 4), at(0, 0, 1.5 - overlap) * turn_b);
     const auto points = scene.points();
-    ASSERT_FALSE(points.empty());
-    double deepest = 0;
-    for (const ContactPoint& p : points) {
-      EXPECT_LT((p.normal - kZ).norm(), 0.03);
-      EXPECT_GE(p.depth, 0);
-      deepest = std::max(deepest, p.depth);
-    }
-    EXPECT_NEAR(deepest, overlap, 0.006);
+    expect_normals(points, kZ, 0.03);
+    for (const ContactPoint& p : points) EXPECT_GE(p.depth, 0);
+    EXPECT_NEAR(deepest_of(points), overlap, 0.006);
     const double height = (1 + (1.5 - overlap) * (1.5 - overlap) - 0.25) / (2 * (1.5 - overlap));
     const double circle = 3.14159265358979323846 * (1 - height * height);
     EXPECT_NEAR(scene.statistics().area, circle, 0.03 * circle + 0.01);
@@ -296,45 +303,29 @@ TEST(ContactGeneration, LegsHaveAPatchEach) {
 
 // Where edges cross, the overlap is deepest in the middle, which no edge or vertex names.
 TEST(ContactGeneration, PointsOfSeveralPatchesHaveDifferentFeatures) {
-  Mesh roof;  // lies on its ridge along y
-  roof.add({0, -0.25f, 0}, {1, -0.25f, 1}, {-1, -0.25f, 1});
-  roof.add({0, 0.25f, 0}, {-1, 0.25f, 1}, {1, 0.25f, 1});
-  roof.add({0, -0.25f, 0}, {0, 0.25f, 0}, {1, 0.25f, 1});
-  roof.add({0, -0.25f, 0}, {1, 0.25f, 1}, {1, -0.25f, 1});
-  roof.add({0, 0.25f, 0}, {0, -0.25f, 0}, {-1, -0.25f, 1});
-  roof.add({0, 0.25f, 0}, {-1, -0.25f, 1}, {-1, 0.25f, 1});
-  roof.add({-1, -0.25f, 1}, {1, -0.25f, 1}, {1, 0.25f, 1});
-  roof.add({-1, -0.25f, 1}, {1, 0.25f, 1}, {-1, 0.25f, 1});
-  ContactScene scene;
-  scene.add_body(scene.add_shape(box(6, 1, 1)), turned(std::atan(1.0), kX));
-  scene.add_body(scene.add_shape(joined(moved(roof, -1.5f, 0, 0), moved(roof, 1.5f, 0, 0))),
-                 at(0, 0, std::sqrt(0.5) - 0.01));
+  ContactScene scene = scene_of(box(6, 1, 1), turned(std::atan(1.0), kX),
+                                joined(moved(roof(), -1.5f, 0, 0), moved(roof(), 1.5f, 0, 0)),
+                                at(0, 0, std::sqrt(0.5) - 0.01));
   const auto points = scene.points();
   EXPECT_EQ(scene.statistics().counters.manifolds, 2u);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    for (std::size_t j = i + 1; j < points.size(); ++j) EXPECT_NE(points[i].feature, points[j].feature);
-  }
+  expect_different_features(points);
 }
 
 TEST(ContactGeneration, TheCowStandsOnItsFourHooves) {
   for (const char* mesh : {"cow_1500.obj", "cow.obj"}) {
-    ContactScene scene;
-    scene.add_body(scene.add_shape(sheet(6, 10)), at(0, 0, 0));
-    scene.add_body(scene.add_shape(project_mesh(mesh)), at(0.05, 0.02, -0.004));
+    ContactScene scene = scene_of(sheet(6, 10), at(0, 0, 0), project_mesh(mesh), at(0.05, 0.02, -0.004));
     const auto points = scene.points();
     EXPECT_EQ(scene.statistics().counters.manifolds, 4u);
     EXPECT_GE(points.size(), 12u);
     EXPECT_NEAR(scene.statistics().depth, 0.004, 4e-4);
-    for (const ContactPoint& p : points) EXPECT_LT((p.normal - kZ).norm(), 1e-9);
+    expect_normals(points, kZ);
   }
 }
 
 // A body that went half through a plate is pushed out on the side on which its middle is.
 TEST(ContactGeneration, ABodyThatGoesThroughAPlateIsPushedToTheSideOfItsMiddle) {
   for (const double z : {0.3, -0.3}) {
-    ContactScene scene;
-    scene.add_body(scene.add_shape(box(4, 4, 0.1f)), at(0, 0, 0));
-    scene.add_body(scene.add_shape(sphere(0.5, 3)), at(0.13, 0.07, z));
+    ContactScene scene = scene_of(box(4, 4, 0.1f), at(0, 0, 0), sphere(0.5, 3), at(0.13, 0.07, z));
     const auto points = scene.points();
     ASSERT_FALSE(points.empty());
     for (const ContactPoint& p : points) EXPECT_GT(p.normal.z() * (z > 0 ? 1 : -1), 0.99);
@@ -342,18 +333,14 @@ TEST(ContactGeneration, ABodyThatGoesThroughAPlateIsPushedToTheSideOfItsMiddle) 
 }
 
 TEST(ContactGeneration, ABodyWithinAnotherIsNoContact) {
-  ContactScene scene;
-  scene.add_body(scene.add_shape(cube(0.5f)), at(0, 0, 0));
-  scene.add_body(scene.add_shape(cube(0.2f)), at(0.05, 0, 0));
+  ContactScene scene = scene_of(cube(0.5f), at(0, 0, 0), cube(0.2f), at(0.05, 0, 0));
   EXPECT_TRUE(scene.points().empty());
 }
 
 TEST(ContactGeneration, InsideOutMeshesPushTheSameWay) {
   Mesh inside_out = cube(0.5f, 2);
   for (auto& t : inside_out.triangles) std::swap(t[1], t[2]);
-  ContactScene scene;
-  scene.add_body(scene.add_shape(cube(0.5f)), at(0, 0, 0));
-  scene.add_body(scene.add_shape(inside_out), at(0.1, 0.2, 0.999));
+  ContactScene scene = scene_of(cube(0.5f), at(0, 0, 0), inside_out, at(0.1, 0.2, 0.999));
   expect_all(scene.points(), kZ, 1e-3, 1e-12);
 }
 
@@ -409,17 +396,15 @@ TEST(ContactGeneration, PointsMoveWithTheBodies) {
 }
 
 TEST(ContactGeneration, FeaturesLastWhileABoxSettles) {
-  ContactScene scene;
-  scene.add_body(scene.add_shape(cube(0.5f)), at(0, 0, 0));
-  scene.add_body(scene.add_shape(cube(0.5f)), at(0.1, 0.2, 0.999));
+  ContactScene scene = scene_of(cube(0.5f), at(0, 0, 0), cube(0.5f), at(0.1, 0.2, 0.999));
   const auto before = scene.points();
   scene.move_body(1, at(0.1 + 1e-5, 0.2 - 1e-5, 0.9985) * turned(1e-6, kX));
   const auto after = scene.points();
   ASSERT_EQ(before.size(), after.size());
-  for (std::size_t i = 0; i < before.size(); ++i) {
-    for (std::size_t j = i + 1; j < before.size(); ++j) EXPECT_NE(before[i].feature, before[j].feature);
+  expect_different_features(before);
+  for (const ContactPoint& q : before) {
     EXPECT_TRUE(std::any_of(after.begin(), after.end(), [&](const ContactPoint& p) {
-      return p.feature == before[i].feature && (p.position - before[i].position).norm() < 1e-3;
+      return p.feature == q.feature && (p.position - q.position).norm() < 1e-3;
     }));
   }
 }

@@ -4,9 +4,7 @@
 Environment: that of tool_test.py, and TANDEM_BVHBENCH.
 """
 import json
-import os
 import pathlib
-import re
 import subprocess
 import time
 import unittest
@@ -15,8 +13,8 @@ import h5py
 import numpy as np
 
 import bvh_file
-from bench_test import IDENTITY, BenchTest, drop_hint, table_of
-from tool_test import DONE, SOURCE_DIR, UNREADABLE_INPUT, USAGE
+from bench_test import BVHBENCH, IDENTITY, BenchTest, change, datasets, documented_keys, table_of
+from tool_test import BVHBUILD, DONE, SOURCE_DIR, UNREADABLE_INPUT, USAGE
 
 ERRORS = "1%,5%"  # of two coarser levels
 
@@ -28,6 +26,10 @@ def obj_of(triangles):
     return "\n".join(lines + ["f %d %d %d" % tuple(face + 1) for face in index.reshape(-1, 3)]) + "\n"
 
 
+def levels_in(scene):
+    return datasets(scene)["instances/level"].tolist()
+
+
 class LevelsBenchTest(BenchTest):
     """Each test has the cow of 1,500 triangles with two coarser levels, in/cow.bvh."""
 
@@ -37,8 +39,7 @@ class LevelsBenchTest(BenchTest):
         super().setUp()
         self.cow = self.inputs / "cow.bvh"
         if self.cow_with_levels is None:
-            result = self.build(SOURCE_DIR / "assets/cow_1500.obj", "-o", self.cow, "--levels", ERRORS, "-q")
-            self.assertEqual((result.returncode, result.stderr), (DONE, b""))
+            self.succeeds(BVHBUILD, SOURCE_DIR / "assets/cow_1500.obj", "-o", self.cow, "--levels", ERRORS, "-q")
             type(self).cow_with_levels = self.cow.read_bytes()
         self.cow.write_bytes(self.cow_with_levels)
         self.triangles = [len(bvh_file.read(self.cow, level).triangles) for level in range(3)]
@@ -76,10 +77,7 @@ class SceneLevels(LevelsBenchTest):
             path = self.mesh_of(f"level_{i}", obj_of(bvh_file.read(self.cow, i).world))
             self.assertEqual(len(bvh_file.read(path).triangles), self.triangles[i])
             names.append(f"../in/{path.name}")
-        with h5py.File(self.scene, "r+") as file:
-            del file["assets"], file["instances/level"]
-            file["instances/asset"][:] = self.LEVELS
-            file["assets"] = np.array(names, dtype=h5py.string_dtype())
+        change(self.scene, assets=np.array(names, dtype=h5py.string_dtype()), instances_level=None, instances_asset=np.array(self.LEVELS, "u4"))
 
     def test_a_query_takes_the_meshes_of_the_levels(self):
         self.write_at_levels()
@@ -90,14 +88,12 @@ class SceneLevels(LevelsBenchTest):
         for key in ("triangles", "object_pairs", "contacts", "manifolds", "points", "segments"):
             self.assertEqual(found[key], alone[key], key)
         self.assertGreater(found["contacts"], 100)
-        with h5py.File(self.contacts) as file:  # faces are of the source file, at any level
-            self.assertLess(file["contacts/face_a"][:].max(), 1500)
+        self.assertLess(table_of(self.contacts)["contacts/face_a"].max(), 1500)  # faces are of the source file, at any level
 
     def results(self, command, *words):
         out = self.outputs / f"{command}.h5"
         self.passes(command, self.scene, *words, "--out", out)
-        with h5py.File(out) as file:
-            return {name: column[:] for name, column in file["distance" if command == "distance" else "impact"].items()}
+        return {name.removeprefix(f"{command}/"): column for name, column in datasets(out).items() if name.startswith(command)}
 
     def test_distances_are_those_of_the_levels(self):
         self.write_at_levels(apart=2.5)
@@ -134,22 +130,19 @@ class SceneLevels(LevelsBenchTest):
 
     def test_scenes_are_made_at_a_level(self):
         self.passes("scene", "pile", "--mesh", self.cow, "--count", 20, "--level", 2, "-o", self.scene)
-        with h5py.File(self.scene) as file:
-            self.assertEqual(file["instances/level"][:].tolist(), [2] * 20)
-            at_2 = file["instances/translation"][:]
+        self.assertEqual(levels_in(self.scene), [2] * 20)
+        at_2 = datasets(self.scene)["instances/translation"]
         plain = self.outputs / "plain.h5"
         self.passes("scene", "pile", "--mesh", self.cow, "--count", 20, "--level", 0, "-o", plain)
-        with h5py.File(plain) as file:
-            self.assertNotIn("level", file["instances"])
-            self.assertTrue((file["instances/translation"][:] == at_2).all())  # boxes are those of level 0
+        self.assertNotIn("instances/level", datasets(plain))
+        self.assertTrue((datasets(plain)["instances/translation"] == at_2).all())  # boxes are those of level 0
         result = self.bench("scene", "pile", "--mesh", self.cow, "--level", 3, "-o", self.outputs / "none.h5")
-        self.assert_fails(drop_hint(result), USAGE, "cow.bvh", "has 3 levels, so there is no level 3")
+        self.assert_fails(result, USAGE, "cow.bvh", "has 3 levels, so there is no level 3")
 
     def test_only_bodies_are_at_the_level_not_the_ground(self):
         self.passes("scene", "slide", "--mesh", self.cow, "--ground", self.mesh_of("ground", (SOURCE_DIR / "assets/ground.obj").read_bytes()),
                     "--count", 5, "--level", 1, "-o", self.scene)
-        with h5py.File(self.scene) as file:
-            self.assertEqual(file["instances/level"][:].tolist(), [0] + [1] * 5)
+        self.assertEqual(levels_in(self.scene), [0] + [1] * 5)
 
 
 class SimulatedLevels(LevelsBenchTest):
@@ -160,24 +153,21 @@ class SimulatedLevels(LevelsBenchTest):
 
     def test_a_body_weighs_what_its_finest_level_weighs(self):
         self.write_cows(3)
-        with h5py.File(self.run_of("finest.h5")) as file:
-            self.assertNotIn("level", file["bodies"])
-            expected = {name: file[f"bodies/{name}"][:] for name in ("mass", "inertia", "center_of_mass")}
+        finest = datasets(self.run_of("finest.h5"))
+        self.assertNotIn("bodies/level", finest)
         self.write_cows(3, **self.levels(0, 2, 1))
-        with h5py.File(self.run_of("coarser.h5")) as file:
-            self.assertEqual(file["bodies/level"][:].tolist(), [0, 2, 1])
-            self.assertEqual(file["bodies/asset"][:].tolist(), [0, 0, 0])
-            self.assertEqual(len(file["assets"]), 1)
-            for name, values in expected.items():
-                self.assertTrue((file[f"bodies/{name}"][:] == values).all(), name)
+        coarser = datasets(self.run_of("coarser.h5"))
+        self.assertEqual([coarser[f"bodies/{name}"].tolist() for name in ("level", "asset")], [[0, 2, 1], [0, 0, 0]])
+        self.assertEqual(len(coarser["assets"]), 1)
+        for name in ("bodies/mass", "bodies/inertia", "bodies/center_of_mass"):
+            self.assertTrue((coarser[name] == finest[name]).all(), name)
 
     def test_a_frame_keeps_the_levels(self):
         self.write_cows(3, **self.levels(0, 2, 1))
         frame = self.outputs / "frame.h5"
         self.passes("frame", self.run_of("run.h5"), "--frame", 4, "-o", frame)
-        with h5py.File(frame) as file:
-            self.assertEqual(file["instances/level"][:].tolist(), [0, 2, 1])
-            self.assertEqual(file["instances/asset"][:].tolist(), [0, 0, 0])
+        self.assertEqual(levels_in(frame), [0, 2, 1])
+        self.assertEqual(datasets(frame)["instances/asset"].tolist(), [0, 0, 0])
         self.passes("query", frame)
 
     def test_a_run_does_not_go_on_at_other_levels(self):
@@ -220,8 +210,7 @@ class Economy(LevelsBenchTest):
     def test_subdivided_cows_need_no_more_than_the_first(self):
         """cow.obj is cow_1500.obj, each triangle split into four: the same surface."""
         self.cow.unlink()
-        result = self.build(SOURCE_DIR / "assets/cow.obj", "-o", self.cow, "--levels", "0.001%", "-q")
-        self.assertEqual(result.returncode, DONE, result.stderr)
+        self.succeeds(BVHBUILD, SOURCE_DIR / "assets/cow.obj", "-o", self.cow, "--levels", "0.001%", "-q")
         self.write_cows()
         told = self.economy("--tolerance", "0.001%")
         levels, chosen = told["assets"][0]["levels"], told["assets"][0]["recommended_level"]
@@ -291,21 +280,15 @@ class Economy(LevelsBenchTest):
         self.write_cows_and_cubes(1)
         with_it = self.economy("--tolerance", "1%")
         self.assertEqual((with_it["assets"][2]["instances"], len(with_it["assets"][2]["levels"])), (0, 1))
-        with h5py.File(self.scene, "r+") as file:
-            names = file["assets"][:2]
-            del file["assets"]
-            file["assets"] = names
+        names = datasets(self.scene)["assets"][:2]
+        change(self.scene, assets=names)
         self.assertEqual(self.economy("--tolerance", "1%")["finest"]["bytes"], with_it["finest"]["bytes"])
-        with h5py.File(self.scene, "r+") as file:
-            del file["assets"], file["instances/asset"]
-            file["assets"] = [b"../in/cow.bvh"] + list(names)
-            file["instances/asset"] = np.array([1, 1, 2], "u4")
+        change(self.scene, assets=[b"../in/cow.bvh"] + list(names), instances_asset=np.array([1, 1, 2], "u4"))
         applied = self.outputs / "applied.h5"
         told = self.economy("--tolerance", "20%", "--apply", applied)
         self.assertEqual(told["finest"]["bytes"], with_it["finest"]["bytes"])
-        with h5py.File(applied) as file:
-            self.assertEqual(file["instances/asset"][:].tolist(), [1, 1, 2])
-            self.assertEqual(file["instances/level"][:].tolist(), [told["assets"][1]["recommended_level"]] * 2 + [0])
+        self.assertEqual(datasets(applied)["instances/asset"].tolist(), [1, 1, 2])
+        self.assertEqual(levels_in(applied), [told["assets"][1]["recommended_level"]] * 2 + [0])
 
     def test_apply_writes_the_scene_with_the_levels(self):
         velocity = np.arange(60.0).reshape(20, 3)
@@ -316,19 +299,19 @@ class Economy(LevelsBenchTest):
         told = self.economy("--tolerance", "20%", "--apply", folder / "applied.h5")
         level = told["assets"][0]["recommended_level"]
         self.assertEqual(level, 2)
-        with h5py.File(folder / "applied.h5") as file:
-            self.assertEqual(file["instances/level"][:].tolist(), [level] * 20)
-            self.assertEqual(file["assets"][0].decode(), "../../in/cow.bvh")
-            self.assertTrue((file["simulation/velocity"][:] == velocity).all())
-            self.assertTrue((file["simulation/density"][:] == 500).all())
-            self.assertEqual(file["excluded"][:].tolist(), [[0, 1]])
+        applied = datasets(folder / "applied.h5")
+        self.assertEqual(applied["instances/level"].tolist(), [level] * 20)
+        self.assertEqual(applied["assets"][0].decode(), "../../in/cow.bvh")
+        self.assertTrue((applied["simulation/velocity"] == velocity).all())
+        self.assertTrue((applied["simulation/density"] == 500).all())
+        self.assertEqual(applied["excluded"].tolist(), [[0, 1]])
         found = json.loads(self.passes("query", folder / "applied.h5", "--json"))
         self.assertEqual(found["contacts"], told["recommended"]["contacts"])
 
     def test_apply_writes_the_scene_that_was_measured(self):
         self.write_cows(simulation_velocity=np.ones((20, 3)))
         applied = self.outputs / "applied.h5"
-        command = [os.environ["TANDEM_BVHBENCH"], "economy", self.scene, "--tolerance", "20%", "--threads", "2", "--repeat", "1000", "--apply", applied]
+        command = [BVHBENCH, "economy", self.scene, "--tolerance", "20%", "--threads", "2", "--repeat", "1000", "--apply", applied]
         with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as running:
             tasks = pathlib.Path(f"/proc/{running.pid}/task")
             while running.poll() is None and len(list(tasks.glob("*"))) == 1:
@@ -336,9 +319,8 @@ class Economy(LevelsBenchTest):
             self.scene.unlink()  # now that it measures
             errors = running.communicate()[1]
         self.assertEqual((running.returncode, errors), (DONE, b""))
-        with h5py.File(applied) as file:
-            self.assertEqual(file["instances/level"][:].tolist(), [2] * 20)
-            self.assertTrue((file["simulation/velocity"][:] == 1).all())
+        self.assertEqual(levels_in(applied), [2] * 20)
+        self.assertTrue((datasets(applied)["simulation/velocity"] == 1).all())
 
     def test_simulated_bodies_are_compared_where_they_end(self):
         self.write_cows(4)
@@ -353,9 +335,7 @@ class Economy(LevelsBenchTest):
 
     def test_the_keys_of_json_are_those_of_its_documentation(self):
         self.write_cows(4)
-        page = (SOURCE_DIR / "docs" / "json.md").read_text().split("## `bvhbench economy")[1].split("\n## ")[0]
-        keys = [[key for line in part.split("\n") if line.startswith("| `") for key in re.findall(r"`(\w+)`", line.split("|")[1])]
-                for part in page.split("\n\n**")]
+        keys = documented_keys("economy", "\n\n[*][*]")
         told = self.economy("--tolerance", "5%", "--simulate", "0.1")
         level = told["assets"][0]["levels"][0]
         self.assertEqual([list(told), list(told["assets"][0]), list(level)], keys[:3])
@@ -364,10 +344,10 @@ class Economy(LevelsBenchTest):
     def test_what_it_refuses(self):
         self.write_cows(2)
         for words in ((), ("--tolerance", "1%", "--time", "1")):
-            self.assert_fails(drop_hint(self.bench("economy", self.scene, *words)), USAGE, "[--tolerance,--time,--memory]")
+            self.assert_fails(self.bench("economy", self.scene, *words), USAGE, "[--tolerance,--time,--memory]")
         for tolerance in ("-1", "one", "%", "nan", "inf%"):
-            self.assert_fails(drop_hint(self.bench("economy", self.scene, f"--tolerance={tolerance}")), USAGE, tolerance)
-        self.assert_fails(drop_hint(self.bench("economy", self.scene, "--tolerance", "1", "--apply", self.cow)), USAGE, "cow.bvh")
+            self.assert_fails(self.bench("economy", self.scene, f"--tolerance={tolerance}"), USAGE, tolerance)
+        self.assert_fails(self.bench("economy", self.scene, "--tolerance", "1", "--apply", self.cow), USAGE, "cow.bvh")
         self.write_scene(asset=(), rotation=np.zeros((0, 3, 3)), translation=np.zeros((0, 3)), assets=("../in/cow.bvh",))
         self.assert_fails(self.bench("economy", self.scene, "--tolerance", "1"), UNREADABLE_INPUT, "/instances", "there is none")
 

@@ -1,16 +1,18 @@
 #!/usr/bin/python3
-"""bvhinfo from the outside: its page and its JSON, several files, files that are not there or are wrong.
+"""bvhinfo from the outside: its page and its JSON, several files, files that are not there or are wrong. Levels side by side, and their error
+bounds proved anew.
 
 Environment: TANDEM_BVHBUILD, TANDEM_BVHINFO (the binaries), TANDEM_SOURCE_DIR.
 """
 import json
+import math
 import os
 import unittest
 
 import bvh_file
 import numpy as np
 
-from tool_test import CUBE_OBJ, DONE, TRIANGLE_OBJ, UNREADABLE_INPUT, ToolTest
+from tool_test import CUBE_OBJ, DONE, TRIANGLE_OBJ, UNREADABLE_INPUT, USAGE, ToolTest, obj, sheet
 
 
 class Info(ToolTest):
@@ -21,9 +23,6 @@ class Info(ToolTest):
             "blocks_with_fill", "bounds", "origin", "rounding_error", "source_faces", "source", "parts", "levels",
             "sections"}
     VERDICT_KEYS = {"file", "sound", "status", "where", "error", "bytes", "check_seconds"}
-
-    def json_of(self, *arguments):
-        return json.loads(self.info("--json", *arguments).stdout)
 
     def test_the_page_shows_what_people_look_for(self):
         page = self.info(self.built("cube.obj", CUBE_OBJ))
@@ -45,12 +44,12 @@ class Info(ToolTest):
 
     def test_the_page_tells_parts_of_one_face_many_and_none(self):
         mesh = "o one\n" + TRIANGLE_OBJ + "o two\nf 1 2 3\no many\nf 1 2 3\n"
-        page = self.info(with_second_part_emptied(self.built("a.obj", mesh))).stdout
+        page = self.info(changed(self.built("a.obj", mesh), empty_second_part)).stdout
         for line in (b"one  face 0\n", b"(no name)  no faces\n", b"many  faces 1 to 2\n"):
             self.assertIn(line, page)
 
     def test_json_of_one_file_is_an_object_with_all_keys(self):
-        info = self.json_of(self.built("cube.obj", CUBE_OBJ))
+        info = self.info_json(self.built("cube.obj", CUBE_OBJ))
         self.assertEqual(set(info), self.KEYS)
         self.assertEqual((info["triangles"], info["imaginary_nodes"], info["partial_leaf_blocks"]), (12, 1, 0))
         self.assertEqual(info["bounds"], {"lower": [0, 0, 0], "upper": [1, 1, 1]})
@@ -58,7 +57,7 @@ class Info(ToolTest):
 
     def test_json_of_two_files_is_an_array(self):
         out = self.built("cube.obj", CUBE_OBJ)
-        pair = self.json_of(out, out)
+        pair = self.info_json(out, out)
         self.assertEqual([info["triangles"] for info in pair], [12, 12])
 
     def test_two_files_are_set_side_by_side(self):
@@ -69,13 +68,13 @@ class Info(ToolTest):
         rows = {line.split()[0]: line.split()[1:] for line in table.stdout.decode().splitlines()}
         self.assertEqual(rows["a.bvh"], ["b.bvh"])
         self.assertEqual(rows["triangles"], ["12", "12", "x1.000"])
-        counts = [info["imaginary_nodes"] for info in self.json_of(a, b)]
+        counts = [info["imaginary_nodes"] for info in self.info_json(a, b)]
         self.assertEqual(rows["imaginary_nodes"][:2], [str(count) for count in counts])
 
     def test_a_file_without_oriented_blocks_says_so(self):
         a = self.built("cube.obj", CUBE_OBJ).rename(self.outputs / "a.bvh")
         b = self.built("cube.obj", CUBE_OBJ, "--no-gpu-blocks").rename(self.outputs / "b.bvh")
-        with_them, without = self.json_of(a, b)
+        with_them, without = self.info_json(a, b)
         self.assertGreaterEqual(with_them["expected_oriented_block_pairs"], 1)
         self.assertEqual(without["expected_block_pairs"], with_them["expected_block_pairs"])
         for key in ("expected_oriented_block_pairs", "expected_oriented_candidates"):
@@ -93,7 +92,7 @@ class Info(ToolTest):
         a = self.built("cube.obj", "\n".join(turned) + "\n").rename(self.outputs / "a.bvh")
         b = self.built("cube.obj", CUBE_OBJ, "--no-topology").rename(self.outputs / "b.bvh")
         c = self.built("one.obj", TRIANGLE_OBJ).rename(self.outputs / "c.bvh")
-        with_it, without, one = self.json_of(a, b, c)
+        with_it, without, one = self.info_json(a, b, c)
         self.assertEqual(with_it["surface"], {"vertices": 8, "components": 1, "closed_components": 1, "turned_triangles": 2,
                                               "boundary_edges": 0, "sides_at_edges_of_many": 0})
         self.assertEqual((one["surface"]["boundary_edges"], one["surface"]["closed_components"]), (3, 0))
@@ -106,7 +105,7 @@ class Info(ToolTest):
         result = self.info("--verify", out)
         self.assertEqual(result.returncode, DONE)
         self.assertIn(f"{out}: sound", result.stdout.decode())
-        verdict = self.json_of("--verify", out)
+        verdict = self.info_json("--verify", out)
         self.assertEqual(set(verdict), self.VERDICT_KEYS)
         self.assertEqual((verdict["sound"], verdict["status"], verdict["error"]), (True, "Ok", None))
 
@@ -141,7 +140,7 @@ class Info(ToolTest):
             self.assertEqual(result.stderr.decode(), f"bvhinfo: {missing}: no such file (FileNotFound)\n")
             for word in words:
                 self.assertIn(word, result.stdout.decode())
-        sound = [verdict["sound"] for verdict in self.json_of("--verify", out, missing)]
+        sound = [verdict["sound"] for verdict in self.info_json("--verify", out, missing)]
         self.assertEqual(sound, [True, False])
 
     def test_folders_pipes_and_empty_files_are_refused(self):
@@ -151,8 +150,8 @@ class Info(ToolTest):
         self.assert_fails(self.info(self.write("empty.bvh", b"")), UNREADABLE_INPUT, "not a Tandem .bvh file")
 
 
-def with_second_part_emptied(path):
-    """The .bvh file, its second part without name and faces: other tools may write such parts."""
+def changed(path, change):
+    """The .bvh file after change(its tables by name, as arrays that can be written to), its hash right."""
     raw = bytearray(path.read_bytes())
     *_, section_count, _, _ = bvh_file.HEADER.unpack_from(raw)
     tables = {}
@@ -160,14 +159,124 @@ def with_second_part_emptied(path):
         kind, _, offset, _, count = bvh_file.SECTION.unpack_from(raw, bvh_file.HEADER.size + i * bvh_file.SECTION.size)
         name, row = bvh_file.KINDS[kind]
         tables[name] = np.frombuffer(raw, row, count, offset)
+    change(tables)
+    raw[8:16] = bvh_file.xxh64(bytes(raw[16:])).to_bytes(8, "little")
+    path.write_bytes(raw)
+    return path
+
+
+def empty_second_part(tables):
+    """Takes name and faces from the second part: other tools may write such parts."""
     parts, part_of = tables["parts"], tables["triangles"]["corner"]["w"][:, 1]
     parts["first_face"][2] -= parts["face_count"][1]
     parts["face_count"][2] += parts["face_count"][1]
     parts["face_count"][1] = parts["name_bytes"][1] = 0
     part_of[part_of == 1] = 2
-    raw[8:16] = bvh_file.xxh64(bytes(raw[16:])).to_bytes(8, "little")
-    path.write_bytes(raw)
-    return path
+
+
+def hills(cells):
+    """A height field, its border at height 0, as OBJ."""
+    return obj(*sheet(cells, lambda x, y: 0.3 * np.sin(9 * x * y + x) * x * (1 - x) * y * (1 - y) + 0.02 * np.sin(40 * x) * np.sin(3 * np.pi * y)))
+
+
+def with_error_bound(path, level, bound):
+    def change(tables):
+        tables["levels"]["error_bound"][level] = bound
+    return changed(path, change)
+
+
+class InfoOfLevels(ToolTest):
+    LEVEL_KEYS = {"triangles", "blocks", "depth", "bytes", "error_bound", "error_bound_relative", "closed",
+                  "expected_block_pairs", "expected_candidates", "expected_oriented_block_pairs",
+                  "expected_oriented_candidates"}
+    CHECK_KEYS = {"level", "status", "triangles", "error_bound", "distance_lower", "distance_upper"}
+
+    def setUp(self):
+        super().setUp()
+        self.file = self.built("hills.obj", hills(24), "--levels", "0.3%,2%")
+        self.bounds = [float(bound) for bound in bvh_file.read(self.file).levels["error_bound"]]
+        self.assertEqual(len(self.bounds), 3)
+
+    def test_levels_are_shown_side_by_side(self):
+        info = self.info_json(self.file)
+        for level in info["levels"]:
+            self.assertEqual(set(level), self.LEVEL_KEYS)
+        finest, *coarser = info["levels"]
+        for key in ("triangles", "depth", "expected_block_pairs", "expected_oriented_candidates"):
+            self.assertEqual(finest[key], info[key])
+        counts = [level["triangles"] for level in info["levels"]]
+        self.assertEqual(counts, sorted(counts, reverse=True))
+        bounds = info["bounds"]
+        diagonal = math.dist(bounds["lower"], bounds["upper"])
+        for level, bound in zip(coarser, self.bounds[1:]):
+            self.assertEqual(level["error_bound"], bound)
+            self.assertAlmostEqual(level["error_bound_relative"], bound / diagonal, 12)
+            self.assertFalse(level["closed"])
+            self.assertNotEqual(level["expected_block_pairs"], finest["expected_block_pairs"])
+        for i, level in enumerate(info["levels"]):
+            kinds = bvh_file.OF_A_LEVEL
+            self.assertEqual(level["bytes"], sum(s["bytes"] for s in info["sections"] if s["level"] == i and s["kind"] in kinds))
+        page = self.info(self.file).stdout.decode()
+        self.assertIn("  levels       triangles", page)
+        for count in counts:
+            self.assertIn(f" {count:,} ", page)
+
+    def test_a_closed_level_is_said_to_be_closed_and_one_without_topology_is_not_judged(self):
+        closed = self.info_json(self.built("cube.obj", CUBE_OBJ))["levels"]
+        unknown = self.info_json(self.built("cube.obj", CUBE_OBJ, "--no-topology"))["levels"]
+        self.assertEqual([closed[0]["closed"], unknown[0]["closed"]], [True, None])
+        self.assertNotIn(b"  levels       triangles", self.info(self.built("cube.obj", CUBE_OBJ)).stdout)
+
+    def test_error_bounds_that_hold_are_proved(self):
+        result = self.info("--verify", "--levels", self.file)
+        self.assertEqual((result.returncode, result.stderr), (DONE, b""))
+        self.assertIn(f"{self.file}: sound", result.stdout.decode())
+        verdict = self.info_json("--verify", "--levels", self.file)
+        self.assertEqual((verdict["sound"], verdict["status"], verdict["where"]), (True, "Ok", None))
+        self.assertEqual([check["level"] for check in verdict["levels"]], [1, 2])
+        for check, bound in zip(verdict["levels"], self.bounds[1:]):
+            self.assertEqual(set(check), self.CHECK_KEYS)
+            self.assertEqual((check["status"], check["error_bound"]), ("Ok", bound))
+            self.assertLessEqual(check["distance_lower"], check["distance_upper"])
+            self.assertLessEqual(check["distance_upper"], bound)
+            self.assertGreater(check["distance_lower"], bound / 1.05)
+
+    def test_a_bound_that_is_too_small_is_found(self):
+        for level, factor in ((1, 0.99), (1, 0), (2, 0.99)):
+            with self.subTest(level=level, factor=factor):
+                bad = with_error_bound(self.built("hills.obj", hills(24), "--levels", "0.3%,2%"), level,
+                                       factor * self.bounds[level])
+                self.assertEqual(self.info("--verify", bad).returncode, DONE)  # the checker can't know
+                result = self.info("--verify", "--levels", bad)
+                self.assert_fails(result, UNREADABLE_INPUT, bad, "ErrorBoundTooSmall", f"level {level}",
+                                  f"{factor * self.bounds[level]:.12g}")
+                verdict = self.info_json("--verify", "--levels", bad)
+                self.assertEqual((verdict["sound"], verdict["status"], verdict["where"], verdict["bytes"]),
+                                 (False, "ErrorBoundTooSmall", level, None))
+                statuses = ["Ok", "Ok"]
+                statuses[level - 1] = "ErrorBoundTooSmall"
+                self.assertEqual([check["status"] for check in verdict["levels"]], statuses)
+                self.assertGreater(verdict["levels"][level - 1]["distance_lower"], factor * self.bounds[level])
+                self.assertIn(f"{verdict['levels'][level - 1]['distance_lower']:.12g}", verdict["error"])
+
+    def test_a_bound_that_is_too_large_holds(self):
+        large = with_error_bound(self.file, 2, 7 * self.bounds[2])
+        self.assertEqual(self.info("--verify", "--levels", large).returncode, DONE)
+        check = self.info_json("--verify", "--levels", large)["levels"][1]
+        self.assertEqual(check["status"], "Ok")
+        self.assertLessEqual(check["distance_upper"], self.bounds[2])
+
+    def test_a_file_of_one_level_has_nothing_to_prove(self):
+        verdict = self.info_json("--verify", "--levels", self.built("cube.obj", CUBE_OBJ))
+        self.assertEqual((verdict["sound"], verdict["levels"]), (True, []))
+
+    def test_a_file_that_the_checker_refuses_has_no_levels(self):
+        cut = self.write("cut.bvh", self.file.read_bytes()[:-1])
+        self.assert_fails(self.info("--verify", "--levels", cut), UNREADABLE_INPUT, cut, "Truncated")
+        self.assertNotIn("levels", self.info_json("--verify", "--levels", cut))
+
+    def test_levels_are_an_option_of_verify(self):
+        self.assertEqual(self.info("--levels", self.file).returncode, USAGE)
 
 
 if __name__ == "__main__":

@@ -15,8 +15,8 @@ import unittest
 
 import numpy as np
 
-from tool_test import (BVHBUILD, BVHINFO, COLLADA_TRIANGLE, CUBE_OBJ, DONE, NO_TRIANGLE, TRIANGLE_OBJ, UNREADABLE_INPUT, UNWRITABLE_OUTPUT,
-                       USAGE, ToolTest, grid_ply, scattered_obj)
+from tool_test import (BVHBUILD, BVHINFO, COLLADA_TRIANGLE, CUBE_OBJ, DONE, NO_TRIANGLE, TRIANGLE_OBJ, UNREADABLE_INPUT, UNWRITABLE_OUTPUT, USAGE, ToolTest,
+                       grid_ply, limited_files, scattered_obj)
 
 # assimp reads this for ever.
 ENDLESS_PLY = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x"
@@ -29,37 +29,25 @@ class Usage(ToolTest):
                                         "--quiet", "--threads", "--reader", "--time-limit", "--memory-limit", "--expansion-limit",
                                         "--no-topology", "--version", "Exit codes: 0 done")),
                             (BVHINFO, ("FILE", "--json", "--verify", "--version", "Exit codes: 0 all sound"))):
-            result = self.run_tool(tool, "--help")
-            self.assertEqual((result.returncode, result.stderr), (DONE, b""))
+            help_text = self.succeeds(tool, "--help")
             for word in words:
-                self.assertIn(word.encode(), result.stdout)
+                self.assertIn(word, help_text)
 
     def test_version_is_one_line_with_a_number(self):
         for tool, name in ((BVHBUILD, "bvhbuild"), (BVHINFO, "bvhinfo")):
-            result = self.run_tool(tool, "--version")
-            self.assertEqual((result.returncode, result.stderr), (DONE, b""))
-            self.assertRegex(result.stdout.decode(), rf"^{name} \d+\.\d+\.\d+\n$")
+            self.assertRegex(self.succeeds(tool, "--version"), rf"^{name} \d+\.\d+\.\d+\n$")
 
-    def test_no_arguments_are_refused(self):
-        self.assert_fails(self.build(), USAGE, "MESH is required")
-        self.assert_fails(self.info(), USAGE, "FILE is required")
-
-    def test_an_output_is_required(self):
-        self.assert_fails(self.build(self.write("a.obj", TRIANGLE_OBJ)), USAGE, "--output")
-
-    def test_unknown_options_and_surplus_arguments_are_named(self):
+    def test_wrong_arguments_are_named_and_a_misspelt_option_before_what_is_missing(self):
         mesh = self.write("a.obj", TRIANGLE_OBJ)
-        self.assert_fails(self.build(mesh, "-o", self.out, "--fast"), USAGE, "--fast")
-        self.assert_fails(self.build(mesh, "second.obj", "-o", self.out), USAGE, "second.obj")
-        self.assert_fails(self.info("--fast", mesh), USAGE, "--fast")
-        self.assert_nothing_written()
-
-    def test_a_misspelt_option_is_named_before_what_is_missing(self):
-        mesh = self.write("a.obj", TRIANGLE_OBJ)
-        for arguments, word in (((mesh, "--outptu", self.out), "there is no option --outptu\n"),
-                                ((mesh, "-o", self.out, "--efort", "best", "--jsno"), "there is no option --efort\n"),
-                                ((mesh, "-o", self.out, "one", "two"), "not expected: one two\n")):
-            self.assert_fails(self.build(*arguments), USAGE, word)
+        for tool, arguments, word in ((BVHBUILD, (), "MESH is required"), (BVHINFO, (), "FILE is required"), (BVHBUILD, (mesh,), "--output"),
+                                      (BVHBUILD, (mesh, "-o", self.out, "--fast"), "--fast"), (BVHINFO, ("--fast", mesh), "--fast"),
+                                      (BVHBUILD, (mesh, "second.obj", "-o", self.out), "second.obj"),
+                                      (BVHBUILD, (mesh, "--outptu", self.out), "there is no option --outptu\n"),
+                                      (BVHBUILD, (mesh, "-o", self.out, "--efort", "best", "--jsno"), "there is no option --efort\n"),
+                                      (BVHBUILD, (mesh, "-o", self.out, "one", "two"), "not expected: one two\n"),
+                                      (BVHBUILD, ("", "-o", self.out), "MESH"), (BVHBUILD, (mesh, "-o", ""), "--output")):
+            with self.subTest(arguments=arguments):
+                self.assert_fails(self.run_tool(tool, *arguments), USAGE, word)
         self.assert_nothing_written()
 
     def test_standard_input_and_output_are_refused_by_name(self):
@@ -80,29 +68,18 @@ class Usage(ToolTest):
                     self.assert_fails(self.build(mesh, "-o", self.out, f"{option}={value}"), USAGE, option)
         self.assert_nothing_written()
 
-    def test_empty_names_are_refused(self):
-        self.assert_fails(self.build("", "-o", self.out), USAGE, "MESH")
-        self.assert_fails(self.build(self.write("a.obj", TRIANGLE_OBJ), "-o", ""), USAGE, "--output")
-
-
 class UnreadableInput(ToolTest):
     def assert_refused(self, path, *words, code=UNREADABLE_INPUT, **options):
         self.assert_fails(self.build(path, "-o", self.out, **options), code, path, *words)
         self.assert_nothing_written()
 
-    def test_a_missing_file_is_named(self):
-        self.assert_refused(self.inputs / "none.obj", "no such file")
-
-    def test_a_folder_is_no_mesh(self):
-        self.assert_refused(self.inputs, "is a folder")
-
-    def test_an_empty_file_is_named(self):
-        for ending in ("obj", "ply", "stl", "off", "gltf", "glb", "dae"):
-            self.assert_refused(self.write(f"empty.{ending}", b""), "empty")
-
-    def test_a_pipe_is_refused_instead_of_waited_for(self):
+    def test_what_is_no_mesh_is_named(self):
         os.mkfifo(self.inputs / "pipe.obj")
-        self.assert_refused(self.inputs / "pipe.obj", "not a regular file")
+        empty = [(self.write(f"empty.{ending}", b""), "empty") for ending in ("obj", "ply", "stl", "off", "gltf", "glb", "dae")]
+        for path, word in ((self.inputs / "none.obj", "no such file"), (self.inputs, "is a folder"), (self.inputs / "pipe.obj", "not a regular file"),
+                           *empty, (self.write("notes.xyz", "hello\n"), ""), (self.write("noending", "hello\n"), "")):
+            with self.subTest(path.name):
+                self.assert_refused(path, word)
 
     def test_a_file_without_permission_is_named(self):
         path = self.write("secret.obj", TRIANGLE_OBJ)
@@ -118,10 +95,6 @@ class UnreadableInput(ToolTest):
         result = self.build(self.write("garbage.obj", garbage), "-o", self.out)
         self.assertIn(result.returncode, (UNREADABLE_INPUT, NO_TRIANGLE))
         self.assert_nothing_written()
-
-    def test_an_unknown_ending_is_refused(self):
-        self.assert_refused(self.write("notes.xyz", "hello\n"))
-        self.assert_refused(self.write("noending", "hello\n"))
 
     def test_motion_capture_is_refused_by_name(self):
         path = self.write("walk.bvh", "HIERARCHY\nROOT Hips\n{\n}\n")
@@ -252,11 +225,12 @@ class UnwritableOutput(ToolTest):
         self.assert_fails(self.build(self.mesh, "-o", out, **options), code, out, *words)
         self.assert_nothing_written()
 
-    def test_a_missing_folder_is_named(self):
-        self.assert_refused(self.outputs / "none" / "a.bvh", "there is no folder")
-
-    def test_a_folder_is_no_output(self):
-        self.assert_refused(self.outputs, "is a folder")
+    def test_what_is_no_output_is_named(self):
+        for out, word, options in ((self.outputs / "none" / "a.bvh", "there is no folder", {}), (self.outputs, "is a folder", {}),
+                                   ("/dev/full", "No space left on device", {}), (self.out, "File too large", limited_files(16384))):
+            with self.subTest(word):
+                self.assert_refused(out, word, **options)
+        self.assert_full_disk_is_told(BVHBUILD, self.mesh)
 
     def test_a_file_is_no_folder(self):
         self.assert_fails(self.build(self.mesh, "-o", self.mesh / "a.bvh"), UNWRITABLE_OUTPUT, self.mesh / "a.bvh")
@@ -269,28 +243,10 @@ class UnwritableOutput(ToolTest):
             self.assert_refused(out, "is the input", code=USAGE)
         self.assertEqual(self.mesh.read_bytes(), before)
 
-    def test_a_full_device_is_told(self):
-        self.assert_refused("/dev/full", "No space left on device")
-
     def test_a_folder_without_permission_is_told(self):
         options = unprivileged(self)
         self.outputs.chmod(0o555)
         self.assert_refused(self.out, "ermission denied", **options)
-
-    def test_a_file_size_limit_is_told_and_leaves_nothing(self):
-        def limit():
-            resource.setrlimit(resource.RLIMIT_FSIZE, (16384, 16384))
-            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        self.assert_refused(self.out, "File too large", preexec_fn=limit)
-
-    def test_a_full_disk_is_told_and_leaves_nothing(self):
-        script = ('mount -t tmpfs -o size=64k tandem "$1" || exit 77; "$2" "$3" -o "$1/a.bvh"; code=$?; ls -A "$1"; '
-                  'exit $code')
-        result = self.run_tool("unshare", "-m", "sh", "-c", script, "sh", self.outputs, BVHBUILD, self.mesh)
-        if result.returncode in (1, 77):
-            self.skipTest("no file system may be mounted here")
-        self.assertEqual((result.returncode, result.stdout), (UNWRITABLE_OUTPUT, b""))
-        self.assertIn(b"No space left on device", result.stderr)
 
     def test_a_failed_build_leaves_an_older_file_as_it_was(self):
         self.out.write_bytes(b"older")
@@ -317,7 +273,7 @@ class Paths(ToolTest):
                 self.assertEqual(self.info(out).returncode, DONE)
                 report = self.build(mesh, "-o", out, "--json")
                 self.assertEqual(json.loads(report.stdout)["exit_code"], DONE)
-                self.assertIn("triangles", json.loads(self.info(out, "--json").stdout))
+                self.assertIn("triangles", self.info_json(out))
         self.assertEqual(sorted(os.listdir(self.outputs)), sorted(name + ".bvh" for name in self.NAMES))
 
     def test_messages_hold_no_control_characters_of_names(self):
@@ -393,14 +349,10 @@ class Signals(ToolTest):
             self.assert_nothing_written()
         self.assertGreater(killed, 0, "no signal came in time: the test shows nothing")
 
-
     def interrupted_build(self, *arguments):
         """What a build of best effort reports that Ctrl-C ended while it optimised."""
         mesh = self.write("large.ply", grid_ply(100))
-        try:
-            ours, theirs = pty.openpty()
-        except OSError as error:
-            self.skipTest(f"no terminal to be had: {error}")
+        ours, theirs = terminal(self)
         process = subprocess.Popen([BVHBUILD, mesh, "-o", self.out, "--effort", "best", *arguments], stdout=subprocess.PIPE, stderr=theirs)
         os.close(theirs)
         text = b""
@@ -416,14 +368,14 @@ class Signals(ToolTest):
         self.assertTrue(json.loads(self.interrupted_build("--json"))["interrupted"])
         self.assertIn(b"effort best, interrupted: the best tree until then\n", self.info(self.out).stdout)
         self.assertEqual(self.info("--verify", self.out).returncode, DONE)
-        info = json.loads(self.info("--json", self.out).stdout)
+        info = self.info_json(self.out)
         self.assertEqual(info["imaginary_nodes"], info["imaginary_minimum"])
 
     def test_ctrl_c_leaves_out_the_levels_that_are_not_made_yet(self):
         report = self.interrupted_build("--levels", "0.1%,1%")
         for error in (b"0.1%", b"1%"):
             self.assertIn(b"no level for " + error + b": its making was interrupted\n", report)
-        self.assertEqual(len(json.loads(self.info("--json", self.out).stdout)["levels"]), 1)
+        self.assertEqual(len(self.info_json(self.out)["levels"]), 1)
         self.assertEqual(self.info("--verify", "--levels", self.out).returncode, DONE)
 
 
@@ -445,10 +397,7 @@ class Streams(ToolTest):
 
     def on_terminal(self, *arguments):
         """Runs bvhbuild with a terminal as standard error; the exit code and what the terminal got."""
-        try:
-            ours, theirs = pty.openpty()
-        except OSError as error:
-            self.skipTest(f"no terminal to be had: {error}")
+        ours, theirs = terminal(self)
         result = self.build(*arguments, stderr=theirs)
         os.close(theirs)
         text = b""
@@ -500,12 +449,58 @@ class Streams(ToolTest):
         self.assertEqual(self.info(self.out, "--verify").returncode, DONE)
 
 
+class BuildJson(ToolTest):
+    ALWAYS = {"tool", "version", "exit_code", "error", "input", "output", "reader", "single_precision_reader", "faces",
+              "vertices", "remarks", "findings", "seconds", "peak_memory_bytes"}
+    AFTER_SUCCESS = {"interrupted", "parts", "origin", "rounding_error", "tree", "gpu_blocks", "topology", "bytes",
+                     "hash"}
+    FINDINGS = {"faces_index_out_of_range", "faces_too_few_corners", "faces_not_finite", "faces_too_large",
+                "faces_repeated_corner", "faces_not_simple",
+                "vertices_unreferenced", "vertices_welded", "triangles_degenerate", "triangles_duplicate",
+                "triangles_duplicate_reversed", "triangles_flattened"}
+
+    def test_a_success_has_all_keys(self):
+        report = self.built_json("a.obj", CUBE_OBJ)
+        self.assertEqual(set(report), self.ALWAYS | self.AFTER_SUCCESS)
+        self.assertEqual(set(report["findings"]), self.FINDINGS)
+        self.assertEqual(set(report["seconds"]), {"import", "clean", "build", "write"})
+        self.assertEqual((report["exit_code"], report["error"]), (DONE, None))
+        self.assertEqual((report["faces"], report["vertices"], report["tree"]["triangles"]), (6, 8, 12))
+        self.assertEqual(report["bytes"], self.out.stat().st_size)
+        self.assertEqual(report["hash"], self.info_json(self.out)["hash"])
+
+    def test_what_a_file_lacks_is_told(self):
+        for key, option, word in (("gpu_blocks", "--no-gpu-blocks", b"oriented blocks"), ("topology", "--no-topology", b"topology")):
+            with self.subTest(option):
+                self.assertTrue(self.built_json("a.obj", CUBE_OBJ)[key])
+                self.assertFalse(self.built_json("a.obj", CUBE_OBJ, option)[key])
+                self.assertIn(b"no " + word, self.build(self.inputs / "a.obj", "-o", self.out, option).stdout)
+                self.assertNotIn(word.split()[0], self.build(self.inputs / "a.obj", "-o", self.out).stdout)
+
+    def test_a_failure_has_its_reason_on_both_streams(self):
+        for path, out, code in ((self.inputs / "none.obj", self.out, UNREADABLE_INPUT),
+                                (self.write("l.obj", "v 0 0 0\n"), self.out, NO_TRIANGLE),
+                                (self.write("a.obj", CUBE_OBJ), "/dev/full", UNWRITABLE_OUTPUT)):
+            result = self.build(path, "-o", out, "--json")
+            report = json.loads(result.stdout)
+            self.assertEqual((result.returncode, report["exit_code"]), (code, code))
+            self.assertEqual(set(report), self.ALWAYS)
+            self.assertEqual(result.stderr.decode(), f"bvhbuild: {report['error']}\n")
+
+    def test_a_mesh_with_defects_counts_them(self):
+        unclean = CUBE_OBJ + "v 0 0 0\nv 5 5 5\nf 1 2 2\nf 1 2 99\nf 4 3 2 9\n"
+        found = self.built_json("a.obj", unclean)["findings"]
+        for key, count in (("faces_index_out_of_range", 1), ("vertices_unreferenced", 1), ("vertices_welded", 1), ("triangles_degenerate", 1),
+                           ("triangles_duplicate", 2)):
+            self.assertEqual(found[key], count, key)
+
+
 class Overlap(ToolTest):
     def test_a_mesh_of_coincident_triangles_is_shown_without_figures_of_work(self):
         out = self.built("a.obj", TRIANGLE_OBJ + "f 1 2 3\n" * 20000)
         for arguments in ([out], [out, out]):
             self.assertEqual(self.info(*arguments).returncode, DONE)
-        self.assertIsNone(json.loads(self.info(out, "--json").stdout)["expected_block_pairs"])
+        self.assertIsNone(self.info_json(out)["expected_block_pairs"])
 
 
 class Strict(ToolTest):
@@ -546,6 +541,14 @@ def unprivileged(test):
     except (OSError, subprocess.SubprocessError):
         test.skipTest("runs as root, and nobody else may run the tool")
     return options
+
+
+def terminal(test):
+    """Both ends of a terminal: ours, and that of the tool."""
+    try:
+        return pty.openpty()
+    except OSError as error:
+        test.skipTest(f"no terminal to be had: {error}")
 
 
 def children_of(process):

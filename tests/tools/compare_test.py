@@ -4,7 +4,6 @@
 Environment: that of tool_test.py, and TANDEM_BVHBENCH.
 """
 import json
-import os
 import subprocess
 import unittest
 
@@ -12,56 +11,39 @@ import h5py
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tool_test import CUBE_OBJ, DONE, SOURCE_DIR, UNREADABLE_INPUT, UNWRITABLE_OUTPUT, USAGE, ToolTest
+from bench_test import BenchTest
+from tool_test import DONE, SOURCE_DIR, UNREADABLE_INPUT, UNWRITABLE_OUTPUT, USAGE
 
-BVHBENCH = os.environ["TANDEM_BVHBENCH"]
 PLOT = SOURCE_DIR / "scripts/plot_compare"
 TANDEM = ["Tandem exact", "Tandem fast", "Tandem boxes"]
 ARRAYS = {"build_seconds", "update_seconds", "query_seconds_best", "query_seconds_median", "contacts", "missed", "invented",
           "memory_bytes", "work_bytes"}
 
 
-class CompareTest(ToolTest):
+class CompareTest(BenchTest):
     def setUp(self):
         super().setUp()
-        self.built("cube.obj", CUBE_OBJ)
         self.results = self.outputs / "results.h5"
 
-    def write_scene(self, name, rotation, translation, pairs=None):
-        path = self.outputs / f"{name}.h5"
-        with h5py.File(path, "w") as file:
-            file.create_dataset("assets", data=[self.out.name], dtype=h5py.string_dtype())
-            file["instances/asset"] = np.zeros(len(rotation), "u4")
-            file["instances/rotation"] = rotation
-            file["instances/translation"] = np.asarray(translation, "f8")
-            if pairs is not None:
-                file["pairs"] = np.asarray(pairs, "u4").reshape(-1, 2)
-        return path
+    def scene_of(self, name, rotation, translation, pairs=None):
+        self.scene = self.outputs / f"{name}.h5"
+        self.write_scene([0] * len(rotation), rotation, translation, pairs=None if pairs is None else np.array(pairs, "u4"))
+        return self.scene
 
     def heap(self):
         """Cubes in general position, close enough to meet."""
         rng = np.random.default_rng(1)
-        return self.write_scene("heap", Rotation.random(20, rng).as_matrix(), rng.uniform(0, 2.5, (20, 3)))
+        return self.scene_of("heap", Rotation.random(20, rng).as_matrix(), rng.uniform(0, 2.5, (20, 3)))
 
     def stack(self):
         """Cubes that share corners, edges and faces, all turned by the same rotation: rounding parts some of them."""
         grid = np.stack(np.meshgrid(*[np.arange(3.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
         rotation = Rotation.random(random_state=np.random.default_rng(2)).as_matrix()
-        return self.write_scene("stack", np.tile(rotation, (27, 1, 1)), grid @ rotation.T)
-
-    def compare(self, *arguments, **options):
-        return self.run_tool(BVHBENCH, "compare", *map(os.fspath, arguments), **options)
-
-    def assert_refuses(self, arguments, code, *words):
-        result = self.compare(*arguments)
-        result.stderr = result.stderr.replace(b"\nTry 'bvhbench --help'.", b"")
-        self.assert_fails(result, code, *words)
+        return self.scene_of("stack", np.tile(rotation, (27, 1, 1)), grid @ rotation.T)
 
     def compared(self, *arguments):
         """The JSON: a list of scenes, each with its peers by name."""
-        result = self.compare(*arguments, "--json", "--repeat", "2")
-        self.assertEqual((result.returncode, result.stderr), (DONE, b""))
-        scenes = json.loads(result.stdout)["scenes"]
+        scenes = json.loads(self.passes("compare", *arguments, "--json", "--repeat", "2"))["scenes"]
         for scene in scenes:
             scene["peers"] = {peer["name"]: peer for peer in scene["peers"]}
         return scenes
@@ -103,7 +85,7 @@ class CompareTest(ToolTest):
 
     def test_given_pairs_alone_are_asked(self):
         rotation = np.tile(np.eye(3), (3, 1, 1))
-        scene, = self.compared(self.write_scene("given", rotation, [[0, 0, 0], [0.5, 0.5, 0.5], [1, 1, 1]], [[1, 0]]))
+        scene, = self.compared(self.scene_of("given", rotation, [[0, 0, 0], [0.5, 0.5, 0.5], [1, 1, 1]], [[1, 0]]))
         self.assertEqual(scene["object_pairs"], 1)
         self.assertEqual(scene["peers"]["Tandem exact"]["missed"], 0)
 
@@ -134,9 +116,7 @@ class CompareTest(ToolTest):
     def test_the_chart_is_drawn_of_the_file(self):
         self.need_matplotlib()
         self.compared(self.stack(), "--out", self.results)
-        result = self.run_tool(PLOT, self.results, "-o", self.outputs / "chart")
-        self.assertEqual(result.returncode, DONE, result.stderr)
-        self.assertIn(b"| Tandem exact |", result.stdout)
+        self.assertIn("| Tandem exact |", self.succeeds(PLOT, self.results, "-o", self.outputs / "chart"))
         self.assertGreater((self.outputs / "chart.png").stat().st_size, 1000)
         self.assertIn(b"<svg", (self.outputs / "chart.svg").read_bytes()[:2000])
 
@@ -152,8 +132,8 @@ class CompareTest(ToolTest):
 
     def test_refuses_what_it_cannot_compare(self):
         heap = self.heap()
-        itself = self.write_scene("itself", np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3)), [[1, 1]])
-        skewed = self.write_scene("skewed", np.full((2, 3, 3), 0.5), np.zeros((2, 3)))
+        itself = self.scene_of("itself", np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3)), [[1, 1]])
+        skewed = self.scene_of("skewed", np.full((2, 3, 3), 0.5), np.zeros((2, 3)))
         for arguments, code, words in [
                 ([heap, "--peers", "tandem,rapid"], USAGE, ["rapid"]), ([heap, "--repeat", "0"], USAGE, ["--repeat"]),
                 ([heap, heap], USAGE, ["heap.h5", "same name"]), ([self.outputs / "none.h5"], UNREADABLE_INPUT, ["none.h5"]),
@@ -161,7 +141,7 @@ class CompareTest(ToolTest):
                 ([skewed], UNREADABLE_INPUT, ["skewed.h5", "instance 0", "rigid"]),
                 ([heap, "--peers", "tandem", "--out", "/none/r.h5"], UNWRITABLE_OUTPUT, ["/none/r.h5"])]:
             with self.subTest(words):
-                self.assert_refuses(arguments, code, *words)
+                self.assert_fails(self.bench("compare", *arguments), code, *words)
 
 
 if __name__ == "__main__":

@@ -24,48 +24,18 @@ SKIPPED = 77
 MOST_SECONDS = 10
 MOST_BYTES = 1 << 30
 
-# Where the triangles of the index are not those of the tree.
-TRIANGLES = {
-    "Spider_ascii.stl": 1368 - 56,   # 56 name a corner twice
-    "cubevt.obj": 12,                # the index has assimp's count
-    "elephant.ply": 39290,           # strips; the index has assimp's count
-    "cube_binary_starts_with_nl.ply": 12,  # crashes assimp, so the index has no count
-    "test-nan.obj": 36 - 2,          # one quad has a corner that is not finite
-    "malformed.obj": 7,              # 6 quads: two with an index out of range, one that names a corner twice
-    "w_degtri_four.off": 4 - 1,      # one triangle is flat
-    "w_degenerate.obj": 8 - 4,       # the needle and the denormal triangle are thin, but no line
-    "w_nan.ply": 12 - 4,             # four triangles share the vertex that is not finite
-    "w_index_oob.ply": 12 - 1,       # one triangle names vertex 99 of 8
-    "w_index_oob.off": 4 - 2,        # one triangle names vertex -1, one 77
-}
+# What must come out of the meshes: triangles of the tree (-1: it cannot be read), what the message says where there is no tree, counts that the report
+# must show, and why the triangles are not those of the index, where they are not.
+with open(SOURCE_DIR / "tests/meshing/shared_meshes.csv", encoding="utf-8", newline="") as table:
+    EXPECTED = {row["file"]: row | {"triangles": int(row["triangles"])} for row in csv.DictReader(table)}
+FINDINGS = {name: {key: int(count) for key, count in (pair.split("=") for pair in row["findings"].split(";"))}
+            for name, row in EXPECTED.items() if row["findings"]}
 
-# Files of which no tree can be built: exit code and a word of the message.
-FAILURES = {
-    "empty.obj": (UNREADABLE_INPUT, "empty"),
-    "stl_empty_bin.stl": (NO_TRIANGLE, "no usable triangle"),
-    "ply_points_bin.ply": (NO_TRIANGLE, "no usable triangle"),
-    "test_lines.obj": (NO_TRIANGLE, "no usable triangle"),
-    "Mesh_PrimitiveMode_00.gltf": (NO_TRIANGLE, "no usable triangle"),
-    "crash-30d6d0f7c529b3b66b4131700b7a4580cd7082df.ply": (UNREADABLE_INPUT, "end_header"),
-    "w_count_lies.stl": (UNREADABLE_INPUT, "promises 4294967295 triangles"),
-    "w_truncated.stl": (UNREADABLE_INPUT, "promises 300 triangles"),
-    "w_truncated.ply": (UNREADABLE_INPUT, "promises 1000 faces"),
-    "w_ply_header_cut.ply": (UNREADABLE_INPUT, "cut in its header"),
-}
 
-# Defects that the report must count, by the key of the finding.
-FINDINGS = {
-    "bun_zipper.ply": {"vertices_unreferenced": 1113},
-    "Spider_ascii.stl": {"triangles_degenerate": 56},
-    "test-nan.obj": {"faces_not_finite": 1},
-    "malformed.obj": {"faces_index_out_of_range": 2},
-    "w_degtri_four.off": {"triangles_degenerate": 1},
-    "w_degenerate.obj": {"triangles_degenerate": 4},
-    "w_duplicates.obj": {"triangles_duplicate": 36, "triangles_duplicate_reversed": 12},
-    "w_nan.ply": {"faces_not_finite": 4},
-    "w_index_oob.ply": {"faces_index_out_of_range": 1},
-    "w_index_oob.off": {"faces_index_out_of_range": 2},
-}
+def failure_of(name):
+    """Exit code and a word of the message, or DONE."""
+    row = EXPECTED.get(name, {"triangles": 1, "message": ""})
+    return {-1: UNREADABLE_INPUT, 0: NO_TRIANGLE}.get(row["triangles"], DONE), row["message"]
 
 
 @dataclasses.dataclass
@@ -123,7 +93,7 @@ class Corpus(ToolTest):
         self.assert_nothing_written()
 
     def test_every_file_of_the_index_is_there(self):
-        for name in [*index(), *TRIANGLES, *FAILURES, *FINDINGS]:
+        for name in [*index(), *EXPECTED]:
             self.assertTrue((MESHES / name).is_file(), name)
             self.assertIn(name, index())
 
@@ -131,11 +101,13 @@ class Corpus(ToolTest):
         for name, triangles in index().items():
             with self.subTest(file=name):
                 run = self.measured_build(name)
-                code, word = FAILURES.get(name, (DONE, ""))
+                code, word = failure_of(name)
                 self.assertEqual(run.code, code, run.message)
                 if code == DONE:
                     self.assertEqual(run.message, "")
-                    self.assertEqual(self.assert_sound_output()["triangles"], TRIANGLES.get(name, triangles))
+                    row = EXPECTED.get(name, {"triangles": triangles, "differs": ""})
+                    self.assertEqual(self.assert_sound_output()["triangles"], row["triangles"])
+                    self.assertEqual(row["triangles"] != triangles, row["differs"] != "")
                     for key, count in FINDINGS.get(name, {}).items():
                         self.assertEqual(run.report["findings"][key], count, key)
                 else:

@@ -15,8 +15,7 @@
 namespace tandem::bench {
 namespace {
 
-using test::Bytes;
-using test::Mesh;
+using namespace test;
 
 constexpr Bounds kUnitCube = {{0, 0, 0}, {1, 1, 1}};
 const double kRadius = 0.5 * kUnitCube.diagonal();
@@ -39,7 +38,7 @@ Mesh ring(std::uint32_t sides, float offset = 0) {
 
 struct TestAsset {
   explicit TestAsset(const Mesh& mesh, build::Imaginary imaginary = build::Imaginary::minimal)
-      : bytes(test::make_file(mesh, imaginary)) {
+      : bytes(make_file(mesh, imaginary)) {
     const CheckResult result = bytes.check();
     EXPECT_EQ(result.status, Status::kOk);
     asset = {"test.bvh", result.asset};

@@ -12,10 +12,9 @@
 #include "statistics/near_contact.h"
 #include "tandem/kernels/contact_query.h"
 
-namespace tandem {
+namespace tandem::test {
 namespace {
 
-using test::Bytes;
 using FacePairs = std::set<std::pair<std::uint32_t, std::uint32_t>>;
 
 // Contacts of a at the identity and b, by the boxes of the mesh's axes.
@@ -73,8 +72,8 @@ TEST(OrientedWork, CountsCandidatesAmongWhichAreAllContacts) {
   std::size_t met = 0;
   for (const std::uint32_t n : {1u, 5u, 40u, 300u}) {
     for (const std::uint32_t m : {3u, 64u, 300u}) {
-      const Bytes file_a(test::make_file(test::random_mesh(n, n))),
-          file_b(test::make_file(test::random_mesh(m, m + 1), build::Imaginary::free));
+      const Bytes file_a(make_file(random_mesh(n, n))),
+          file_b(make_file(random_mesh(m, m + 1), build::Imaginary::free));
       const AssetView a = file_a.check().asset, b = file_b.check().asset;
       const OrientedWork work(a, b);
       Random random(n + 7 * m);
@@ -98,7 +97,7 @@ TEST(OrientedWork, CountsCandidatesAmongWhichAreAllContacts) {
 }
 
 TEST(OrientedWork, StopsWhereThereIsMoreThanItMayCount) {
-  const Bytes file(test::make_file(test::random_mesh(300, 1)));
+  const Bytes file(make_file(random_mesh(300, 1)));
   const AssetView asset = file.check().asset;
   const OrientedWork work(asset, asset);
   const auto all = work.count(kIdentityPose);
@@ -109,10 +108,10 @@ TEST(OrientedWork, StopsWhereThereIsMoreThanItMayCount) {
 }
 
 TEST(OrientedWork, SaysNothingOfWhatNoGpuWalks) {
-  const test::Mesh mesh = test::random_mesh(20, 1);
-  test::Mesh far = mesh;
+  const Mesh mesh = random_mesh(20, 1);
+  Mesh far = mesh;
   for (auto& point : far.points) point[0] *= 1e37f;
-  const Bytes file(test::make_file(mesh)), far_file(test::make_file(far));
+  const Bytes file(make_file(mesh)), far_file(make_file(far));
   const AssetView asset = file.check().asset;
   EXPECT_TRUE(OrientedWork(asset, asset).count(kIdentityPose));
   EXPECT_FALSE(OrientedWork(asset, far_file.check().asset).count(kIdentityPose));
@@ -120,4 +119,4 @@ TEST(OrientedWork, SaysNothingOfWhatNoGpuWalks) {
 }
 
 }  // namespace
-}  // namespace tandem
+}  // namespace tandem::test

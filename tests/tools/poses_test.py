@@ -10,8 +10,8 @@ import unittest
 import h5py
 import numpy as np
 
-from bench_test import BenchTest, drop_hint
-from tool_test import DONE, UNREADABLE_INPUT, UNWRITABLE_OUTPUT, USAGE, scattered_obj
+from bench_test import BenchTest, change, datasets
+from tool_test import BVHBUILD, UNREADABLE_INPUT, UNWRITABLE_OUTPUT, USAGE, scattered_obj
 
 COUNTERS = ("block_pairs", "candidates", "contacts")
 ORIENTED = ("oriented_block_pairs", "oriented_candidates")
@@ -28,15 +28,14 @@ class PosesTest(BenchTest):
     def tree(self, imaginary, seed=1, *options):
         path = self.inputs / f"{imaginary}_{seed}{''.join(options)}.bvh"
         mesh = self.write("scattered.obj", scattered_obj(300, seed))
-        result = self.build(mesh, "-o", path, "--imaginary", imaginary, *options)
-        self.assertEqual(result.returncode, DONE, result.stderr)
+        self.succeeds(BVHBUILD, mesh, "-o", path, "--imaginary", imaginary, *options)
         return path
 
     def poses(self, *arguments):
         return json.loads(self.passes("poses", *arguments, "--json"))
 
     def refused(self, code, *arguments, words=()):
-        self.assert_fails(drop_hint(self.bench("poses", *arguments)), code, *words)
+        self.assert_fails(self.bench("poses", *arguments), code, *words)
         self.assertFalse(self.other.exists())
 
 
@@ -50,8 +49,7 @@ class Poses(PosesTest):
     def test_sets_and_seeds_differ_and_more_poses_begin_with_the_fewer(self):
         def translations(*arguments):
             self.passes("poses", self.minimal, *arguments, "-o", self.file)
-            with h5py.File(self.file) as file:
-                return file["instances/translation"][1:]
+            return datasets(self.file)["instances/translation"][1:]
         base = translations("--count", "30")
         self.assertTrue((base == translations("--count", "60")[:30]).all())
         self.assertTrue((base == translations("--count", "30", "--set", "validation", "--seed", "1")).all())
@@ -61,10 +59,10 @@ class Poses(PosesTest):
     def test_poses_do_not_depend_on_the_tree(self):
         for tree, path in ((self.minimal, self.file), (self.free, self.other)):
             self.passes("poses", tree, "--count", "50", "-o", path)
-        with h5py.File(self.file) as one, h5py.File(self.other) as two:
-            for name in ("instances/rotation", "instances/translation", "poses/depth", "poses/geometry", "counts/contacts"):
-                self.assertTrue((one[name][:] == two[name][:]).all(), name)
-            self.assertTrue((one["counts/block_pairs"][:] != two["counts/block_pairs"][:]).any())
+        one, two = datasets(self.file), datasets(self.other)
+        for name in ("instances/rotation", "instances/translation", "poses/depth", "poses/geometry", "counts/contacts"):
+            self.assertTrue((one[name] == two[name]).all(), name)
+        self.assertTrue((one["counts/block_pairs"] != two["counts/block_pairs"]).any())
 
     def test_stored_poses_give_the_figures_that_made_poses_give(self):
         made = self.poses(self.minimal, self.free, "--count", "50", "--seed", "3", "--set", "training", "-o", self.file)
@@ -151,21 +149,11 @@ class PosesRefusals(PosesTest):
         self.passes("poses", self.minimal, "--count", "5", "-o", self.file)
         whole = self.file.read_bytes()
 
-        def change(name, value):
-            def write(file):
-                del file[name]
-                file[name] = value
-            return write
-        for edit in (change("pairs", np.zeros((5, 2), "u4")), change("pairs", np.array([[0, i] for i in range(1, 5)], "u4")),
-                     change("poses/depth", np.zeros(4)), change("poses/geometry", ["a", "b"]),
-                     change("poses/stream", ["training"])):
+        for wrong in ({"pairs": np.zeros((5, 2), "u4")}, {"pairs": np.array([[0, i] for i in range(1, 5)], "u4")}, {"poses_depth": np.zeros(4)},
+                      {"poses_geometry": ["a", "b"]}, {"poses_stream": ["training"]}, {"poses": None}):
             self.file.write_bytes(whole)
-            with h5py.File(self.file, "a") as file:
-                edit(file)
+            change(self.file, **wrong)
             self.refused(UNREADABLE_INPUT, self.minimal, "--poses", self.file, words=(self.file, "none of poses"))
-        with h5py.File(self.file, "a") as file:
-            del file["poses"]
-        self.refused(UNREADABLE_INPUT, self.minimal, "--poses", self.file, words=(self.file, "none of poses"))
         self.file.write_bytes(whole[:-700])
         self.refused(UNREADABLE_INPUT, self.minimal, "--poses", self.file, words=(self.file,))
 

@@ -7,35 +7,23 @@ import os
 import sys
 import unittest
 
-import h5py
 import matplotlib.image
 import numpy as np
 
 import render
-from tool_test import CUBE_OBJ, DONE, SOURCE_DIR, UNREADABLE_INPUT, ToolTest
+from bench_test import BenchTest, change
+from tool_test import DONE, SOURCE_DIR, UNREADABLE_INPUT
 
-BVHBENCH = os.environ["TANDEM_BVHBENCH"]
 SLAB_OBJ = "v -20 -20 0\nv 20 -20 0\nv 20 20 0\nv -20 20 0\nf 1 2 3 4\n"
 FROM_X = ("--azimuth", "0", "--elevation", "0", "--width", "120", "--height", "60")  # +y is right, +z up
 
 
-class RenderTest(ToolTest):
+class RenderTest(BenchTest):
     """Each test can render, and has a cube of side 1 that begins at the origin."""
-
-    def setUp(self):
-        super().setUp()
-        self.cube = self.built("cube.obj", CUBE_OBJ)
-        self.scene = self.outputs / "scene.h5"
 
     def write_scene(self, translations, motion=None):
         count = len(translations)
-        with h5py.File(self.scene, "w") as file:
-            file["assets"] = [self.cube.name]
-            file["instances/asset"] = np.zeros(count, "u4")
-            file["instances/rotation"] = np.stack([np.eye(3)] * count)
-            file["instances/translation"] = np.array(translations, float)
-            if motion:
-                file["simulation/motion"] = np.array(motion, "u4")
+        super().write_scene([0] * count, [np.eye(3)] * count, translations, simulation_motion=None if motion is None else np.array(motion, "u4"))
 
     def render(self, source, *arguments, name="picture.png"):
         output = self.outputs / name
@@ -48,16 +36,10 @@ class RenderTest(ToolTest):
         self.assertEqual((result.returncode, result.stderr), (DONE, b""))
         return matplotlib.image.imread(output)[..., :3]
 
-    def bench(self, *arguments):
-        result = self.run_tool(BVHBENCH, *map(os.fspath, arguments))
-        self.assertEqual(result.returncode, DONE, result.stderr)
-
     def pile(self):
-        cow, slab, run = self.inputs / "cow.bvh", self.inputs / "slab.bvh", self.outputs / "run.h5"
-        self.assertEqual(self.build(SOURCE_DIR / "assets/cow_1500.obj", "-o", cow).returncode, DONE)
-        self.assertEqual(self.build(self.write("slab.obj", SLAB_OBJ), "-o", slab).returncode, DONE)
-        self.bench("simulate", "pile", "--mesh", cow, "--ground", slab, "--count", "8", "--frames", "20",
-                   "--trajectory", "10", "-o", run)
+        cow, slab = self.mesh_of("cow", (SOURCE_DIR / "assets/cow_1500.obj").read_bytes()), self.mesh_of("slab", SLAB_OBJ)
+        run = self.outputs / "run.h5"
+        self.passes("simulate", "pile", "--mesh", cow, "--ground", slab, "--count", "8", "--frames", "20", "--trajectory", "10", "-o", run)
         return run
 
     def is_backdrop(self, picture):
@@ -116,14 +98,9 @@ class RenderedScenes(RenderTest):
         np.testing.assert_allclose(self.picture(self.scene, *FROM_X)[30, 60], both[30, 60], atol=0.01)
 
     def test_a_shadow_falls_away_from_the_sun_which_is_on_the_left(self):
-        plate = self.inputs / "plate.bvh"
-        made = self.build(self.write("plate.obj", "v -1 -1 0\nv 2 -1 0\nv 2 2 0\nv -1 2 0\nf 1 2 3 4\n"), "-o", plate)
-        self.assertEqual(made.returncode, DONE)
+        plate = self.mesh_of("plate", "v -1 -1 0\nv 2 -1 0\nv 2 2 0\nv -1 2 0\nf 1 2 3 4\n")
         self.write_scene([[0, 0, 0], [0, 0, 0]])
-        with h5py.File(self.scene, "r+") as file:
-            del file["assets"]
-            file["assets"] = [self.cube.name, os.fspath(plate)]
-            file["instances/asset"][:] = [0, 1]
+        change(self.scene, assets=[f"../in/{mesh.name}" for mesh in (self.mesh, plate)], instances_asset=np.array([0, 1], "u4"))
         picture = self.picture(self.scene, "--azimuth", "0", "--elevation", "70", "--width", "120", "--height", "120")
         left, right = (picture[60:80, columns].mean() for columns in (slice(24, 30), slice(90, 96)))
         self.assertLess(right, 0.8 * left)
@@ -138,7 +115,7 @@ class RenderedScenes(RenderTest):
 class RenderedRuns(RenderTest):
     def test_a_state_of_a_run_looks_as_the_scene_made_of_it(self):
         run = self.pile()
-        self.bench("frame", run, "--frame", "10", "-o", self.scene)
+        self.passes("frame", run, "--frame", "10", "-o", self.scene)
         of_run = self.picture(run, "--frame", "10", "--width", "160")
         self.assertLess(np.abs(of_run - self.picture(self.scene, "--width", "160")).max(axis=2).mean(), 1e-3)
         self.assertGreater(np.abs(of_run - self.picture(run, "--width", "160")).max(axis=2).mean(), 1e-2)
@@ -164,19 +141,19 @@ class RenderedRuns(RenderTest):
         self.assertIn(b"does not keep the state after step 7, but every 10th up to 20", result.stderr)
         result, _ = self.render(self.scene, name="picture.bmp")
         self.assertIn(b"picture.bmp: neither .png nor .webp nor .gif", result.stderr)
-        result, _ = self.render(self.cube)
+        result, _ = self.render(self.mesh)
         self.assertEqual(result.returncode, UNREADABLE_INPUT)
-        self.assertIn(b"mesh.bvh", result.stderr)
+        self.assertIn(b"cube.bvh", result.stderr)
 
 
 class BrokenAssets(RenderTest):
     def test_an_asset_that_is_not_one_is_named(self):
         self.write_scene([[0, 0, 0]])
-        for broken in (b"", b"no asset", self.cube.read_bytes()[:-7]):
-            self.cube.write_bytes(broken)
+        for broken in (b"", b"no asset", self.mesh.read_bytes()[:-7]):
+            self.mesh.write_bytes(broken)
             result, output = self.render(self.scene)
             self.assertEqual(result.returncode, UNREADABLE_INPUT)
-            self.assertIn(b"mesh.bvh: not a .bvh file", result.stderr)
+            self.assertIn(b"cube.bvh: not a .bvh file", result.stderr)
             self.assertFalse(output.exists())
 
 

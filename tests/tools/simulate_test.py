@@ -11,21 +11,18 @@ import subprocess
 import time
 import unittest
 
-import h5py
 import numpy as np
 
-from tool_test import DONE, SOURCE_DIR, UNREADABLE_INPUT, USAGE, ToolTest
+from bench_test import BVHBENCH, BenchTest, attributes, datasets
+from tool_test import SOURCE_DIR, UNREADABLE_INPUT, USAGE
 
-BVHBENCH = os.environ["TANDEM_BVHBENCH"]
 SLAB_OBJ = ("v -30 -30 -5\nv 30 -30 -5\nv 30 30 -5\nv -30 30 -5\nv -30 -30 0\nv 30 -30 0\nv 30 30 0\nv -30 30 0\n"
             "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n")
 MEASURED = "/frames/seconds/"  # what no two runs have in common
 
 
-class SimulateTest(ToolTest):
-    """Each test has the cubes, a cow, a slab and a sheet, and a name for a run."""
-
-    built_meshes = {}
+class SimulateTest(BenchTest):
+    """Each test has a cube about the origin, and a name for a run."""
 
     def setUp(self):
         super().setUp()
@@ -33,26 +30,11 @@ class SimulateTest(ToolTest):
         self.cube_obj = (SOURCE_DIR / "assets/box_12.obj").read_bytes()
         self.cube = self.mesh_of("cube", self.cube_obj)
 
-    def mesh_of(self, name, content):
-        path = self.inputs / f"{name}.bvh"
-        if content not in self.built_meshes:
-            result = self.build(self.write(f"{name}.obj", content), "-o", path)
-            self.assertEqual(result.returncode, DONE, result.stderr)
-            self.built_meshes[content] = path.read_bytes()
-        return self.write(path.name, self.built_meshes[content])
-
     def asset(self, name):
         return self.mesh_of(name, (SOURCE_DIR / f"assets/{name}.obj").read_bytes())
 
-    def bench(self, *arguments, **options):
-        result = self.run_tool(BVHBENCH, *map(os.fspath, arguments), **options)
-        result.stderr = result.stderr.replace(b"\nTry 'bvhbench --help'.", b"")
-        return result
-
-    def passes(self, *arguments):
-        result = self.bench(*arguments)
-        self.assertEqual((result.returncode, result.stderr), (DONE, b""))
-        return result.stdout.decode()
+    def cows(self):
+        return ["--mesh", self.asset("cow_1500"), "--ground", self.asset("ground")]
 
     def simulate(self, kind, *arguments, out=None):
         return self.passes("simulate", kind, *arguments, "-o", out or self.run_file)
@@ -62,11 +44,7 @@ class SimulateTest(ToolTest):
 
     def contents(self, path):
         """All datasets and attributes but what is measured in seconds."""
-        found = {}
-        with h5py.File(path) as file:
-            file.visititems(lambda name, item: found.update({"/" + name: item[()].tobytes()})
-                            if isinstance(item, h5py.Dataset) else None)
-            found.update({name: str(value) for name, value in file.attrs.items()})
+        found = {"/" + name: data.tobytes() for name, data in datasets(path).items()} | {name: str(value) for name, value in attributes(path).items()}
         return {name: value for name, value in found.items() if not name.startswith(MEASURED)}
 
     def assert_same_run(self, first, second):
@@ -80,80 +58,63 @@ class Runs(SimulateTest):
         summary = json.loads(self.stack("--frames", "120", "--json"))
         self.assertEqual((summary["bodies"], summary["triangles"], summary["steps"]), (36, 27 * 12, 120))
         self.assertLess(summary["last"]["speed_max"], 1e-3)
-        with h5py.File(self.run_file) as file:
-            self.assertEqual(file.attrs["configuration"], "stack")
-            self.assertEqual(file.attrs["iterations"], 30)
-            self.assertIn("tandem_version", file.attrs)
-            ratio = file["/frames/contact_ratio"][:]
-            self.assertTrue(np.array_equal(ratio, file["/frames/triangle_pairs"][:] / (27 * 12)))
-            energy = file["/frames/kinetic_energy"][:] + file["/frames/potential_energy"][:]
-            self.assertLessEqual(energy[-1], energy[0] + 1e-3 * abs(energy[0]))
-            self.assertTrue((file["/frames/seconds/step"][:] > 0).all())
+        told, run = attributes(self.run_file), datasets(self.run_file)
+        self.assertEqual((told["configuration"], told["iterations"]), ("stack", 30))
+        self.assertIn("tandem_version", told)
+        self.assertTrue(np.array_equal(run["frames/contact_ratio"], run["frames/triangle_pairs"] / (27 * 12)))
+        energy = run["frames/kinetic_energy"] + run["frames/potential_energy"]
+        self.assertLessEqual(energy[-1], energy[0] + 1e-3 * abs(energy[0]))
+        self.assertTrue((run["frames/seconds/step"] > 0).all())
 
     def test_threads_do_not_change_the_results(self):
         others = self.outputs / "others.h5"
-        cow, ground = self.asset("cow_1500"), self.asset("ground")
-        pile = ["--mesh", cow, "--ground", ground, "--count", "20", "--frames", "90", "--trajectory", "10"]
+        pile = [*self.cows(), "--count", "20", "--frames", "90", "--trajectory", "10"]
         self.simulate("pile", *pile, "--threads", "1")
         self.simulate("pile", *pile, "--threads", "4", out=others)
         self.assert_same_run(self.run_file, others)
 
     def test_another_seed_gives_another_pile(self):
-        cow, ground = self.asset("cow_1500"), self.asset("ground")
         others = self.outputs / "others.h5"
-        pile = ["--mesh", cow, "--ground", ground, "--count", "8", "--frames", "1", "--trajectory", "1"]
+        pile = [*self.cows(), "--count", "8", "--frames", "1", "--trajectory", "1"]
         self.simulate("pile", *pile)
         self.simulate("pile", *pile, "--seed", "2", out=others)
         self.assertNotEqual(self.contents(self.run_file)["start"], self.contents(others)["start"])
 
     def test_rocks_that_leave_the_slide_come_back_at_its_top(self):
-        cow, ground = self.asset("cow_1500"), self.asset("ground")
-        self.simulate("slide", "--mesh", cow, "--ground", ground, "--count", "100", "--tilt", "45", "--friction", "0.1",
+        self.simulate("slide", *self.cows(), "--count", "100", "--tilt", "45", "--friction", "0.1",
                       "--frames", "60", "--trajectory", "1")
-        with h5py.File(self.run_file) as file:
-            self.assertGreater(file["/frames/reentered"][:].sum(), 0)
-            x = file["/trajectory/position"][:, file["/bodies/motion"][:] == 0, 0]
-            self.assertLess(np.diff(x, axis=0).min(), -30)
-            self.assertLess(np.abs(x).max(), 25)
+        run = datasets(self.run_file)
+        self.assertGreater(run["frames/reentered"].sum(), 0)
+        x = run["trajectory/position"][:, run["bodies/motion"] == 0, 0]
+        self.assertLess(np.diff(x, axis=0).min(), -30)
+        self.assertLess(np.abs(x).max(), 25)
 
     def test_a_scene_moves_as_its_file_says(self):
         slab = self.mesh_of("slab", SLAB_OBJ)
-        scene = self.outputs / "scene.h5"
-        with h5py.File(scene, "w") as file:
-            file["assets"] = [os.fspath(slab), os.fspath(self.cube)]
-            file["instances/asset"] = np.array([0, 1, 1], "u4")
-            file["instances/rotation"] = np.stack([np.eye(3)] * 3)
-            file["instances/translation"] = np.array([[0, 0, 0], [0, 0, 0.5], [5, 0, 20.0]])
-            file["simulation/motion"] = np.array([1, 0, 2], "u4")
-            file["simulation/velocity"] = np.array([[0, 0, 0], [2, 0, 0], [0, 1.5, 0]])
-            file["simulation/density"] = np.array([1, 500.0, 1])
-        self.simulate("scene", scene, "--frames", "60", "--trajectory", "60", "--friction", "0.25")
-        with h5py.File(self.run_file) as file:
-            moved = file["/trajectory/position"][1] - file["/trajectory/position"][0]
-            self.assertEqual(list(moved[0]), [0, 0, 0])
-            self.assertAlmostEqual(file["/bodies/mass"][1], 500, places=6)
-            # 2 m/s braked by 0.25 g come to rest after 0.82 s, 0.815 m further on.
-            self.assertAlmostEqual(moved[1, 0], 2**2 / (2 * 0.25 * 9.81), delta=0.03)
-            np.testing.assert_allclose(moved[2], [0, 1.5, 0], atol=1e-12)
+        self.write_scene((0, 1, 1), [np.eye(3)] * 3, [[0, 0, 0], [0, 0, 0.5], [5, 0, 20]], [os.fspath(slab), os.fspath(self.cube)],
+                         simulation_motion=np.array([1, 0, 2], "u4"), simulation_velocity=np.array([[0, 0, 0], [2, 0, 0], [0, 1.5, 0]]),
+                         simulation_density=np.array([1, 500.0, 1]))
+        self.simulate("scene", self.scene, "--frames", "60", "--trajectory", "60", "--friction", "0.25")
+        run = datasets(self.run_file)
+        moved = run["trajectory/position"][1] - run["trajectory/position"][0]
+        self.assertEqual(list(moved[0]), [0, 0, 0])
+        self.assertAlmostEqual(run["bodies/mass"][1], 500, places=6)
+        # 2 m/s braked by 0.25 g come to rest after 0.82 s, 0.815 m further on.
+        self.assertAlmostEqual(moved[1, 0], 2**2 / (2 * 0.25 * 9.81), delta=0.03)
+        np.testing.assert_allclose(moved[2], [0, 1.5, 0], atol=1e-12)
 
     def test_continuous_keeps_fast_plates_from_passing_through(self):
         plate = self.mesh_of("plate", re.sub(rb"^v (\S+) (\S+) (\S+)", lambda v: b"v %s %s %f" % (v[1], v[2], 0.01 * float(v[3])),
                                              self.cube_obj, flags=re.M))
-        scene, speeds = self.outputs / "scene.h5", np.array([1.0, 3, 10, 30, 100])
+        speeds = np.array([1.0, 3, 10, 30, 100])
         at = np.array([(3 * i, 0, z) for i, speed in enumerate(speeds) for z in (0, 0.02 + speed / 30)])
-        with h5py.File(scene, "w") as file:
-            file["assets"] = [os.fspath(plate)]
-            file["instances/asset"] = np.zeros(10, "u4")
-            file["instances/rotation"] = np.stack([np.eye(3)] * 10)
-            file["instances/translation"] = at
-            file["simulation/motion"] = np.array([1, 0] * 5, "u4")
-            file["simulation/velocity"] = np.array([(0, 0, v) for speed in speeds for v in (0, -speed)])
-        arguments = [scene, "--frames", "12", "--trajectory", "12", "--gravity", "0"]
+        self.write_scene([0] * 10, [np.eye(3)] * 10, at, [os.fspath(plate)], simulation_motion=np.array([1, 0] * 5, "u4"),
+                         simulation_velocity=np.array([(0, 0, v) for speed in speeds for v in (0, -speed)]))
+        arguments = [self.scene, "--frames", "12", "--trajectory", "12", "--gravity", "0"]
         behind = []
         for options in ((), ("--continuous",)):
             self.simulate("scene", *arguments, *options)
-            with h5py.File(self.run_file) as file:
-                behind.append((file["/trajectory/position"][-1, 1::2, 2] < 0).tolist())
+            behind.append((datasets(self.run_file)["trajectory/position"][-1, 1::2, 2] < 0).tolist())
         self.assertEqual(behind[0], [False, True, True, True, True])
         self.assertEqual(behind[1], [False] * 5)
 
@@ -165,12 +126,10 @@ class Runs(SimulateTest):
         self.assertEqual(runs[0], runs[1])
 
     def test_usage_errors_say_what_is_wrong(self):
-        self.assert_fails(self.bench("simulate", "stack", "--mesh", self.cube, "--count", "26", "--frames", "1", "-o",
-                                     self.run_file), USAGE, "26 is no cube of a whole number")
-        self.assert_fails(self.bench("simulate", "stack", "--mesh", self.cube, "--frames", "1", "--engine", "magic",
-                                     "-o", self.run_file), USAGE, "magic", "tandem")
-        self.assert_fails(self.bench("simulate", "stack", "--mesh", self.inputs / "none.bvh", "--frames", "1", "-o",
-                                     self.run_file), UNREADABLE_INPUT, "none.bvh", "no such file")
+        for mesh, options, code, words in ((self.cube, ["--count", "26"], USAGE, ["26 is no cube of a whole number"]),
+                                           (self.cube, ["--engine", "magic"], USAGE, ["magic", "tandem"]),
+                                           (self.inputs / "none.bvh", [], UNREADABLE_INPUT, ["none.bvh", "no such file"])):
+            self.assert_fails(self.bench("simulate", "stack", "--mesh", mesh, *options, "--frames", "1", "-o", self.run_file), code, *words)
         self.assert_nothing_written()
 
 
@@ -192,10 +151,6 @@ class Resuming(SimulateTest):
             time.sleep(0.01)
         self.fail("no part file")
 
-    def steps(self, path):
-        with h5py.File(path) as file:
-            return int(file.attrs["steps"])
-
     def test_a_stopped_run_goes_on_to_the_same_results(self):
         whole = self.outputs / "whole.h5"
         self.simulate("stack", "--mesh", self.cube, "--count", "64", *self.OPTIONS, out=whole)
@@ -207,7 +162,7 @@ class Resuming(SimulateTest):
                 process.communicate(timeout=60)
                 self.assertEqual(process.returncode, -sent)
                 self.assertFalse(self.run_file.exists())
-                self.assertLess(self.steps(part), 100)
+                self.assertLess(attributes(part)["steps"], 100)
                 self.simulate("stack", "--mesh", self.cube, "--count", "64", *self.OPTIONS, "--resume")
                 self.assertFalse(part.exists())
                 self.assert_same_run(whole, self.run_file)
@@ -233,16 +188,13 @@ class Resuming(SimulateTest):
 
 class Frames(SimulateTest):
     def test_a_frame_is_a_scene_with_the_contacts_of_the_run(self):
-        cow, ground = self.asset("cow_1500"), self.asset("ground")
-        self.simulate("pile", "--mesh", cow, "--ground", ground, "--count", "20", "--frames", "80", "--trajectory",
+        self.simulate("pile", *self.cows(), "--count", "20", "--frames", "80", "--trajectory",
                       "20")
         for frame in (0, 60):
             scene = self.outputs / f"frame{frame}.h5"
             self.passes("frame", self.run_file, "--frame", str(frame), "-o", scene)
             found = json.loads(self.passes("query", scene, "--json"))
-            with h5py.File(self.run_file) as file:
-                self.assertEqual(found["contacts"],
-                                 int(file["/frames/triangle_pairs"][frame]))
+            self.assertEqual(found["contacts"], datasets(self.run_file)["frames/triangle_pairs"][frame])
         self.assertGreater(found["contacts"], 0)
         self.assertIn("Tandem exact", self.passes("compare", scene))
 

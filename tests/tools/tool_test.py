@@ -2,6 +2,8 @@
 import json
 import os
 import pathlib
+import re
+import resource
 import shutil
 import subprocess
 import tempfile
@@ -51,6 +53,12 @@ class ToolTest(unittest.TestCase):
                    **options}
         return subprocess.run([tool, *arguments], **options)
 
+    def succeeds(self, tool, *arguments, **options):
+        """The standard output of a tool that ends well and says nothing on standard error."""
+        result = self.run_tool(tool, *map(str, arguments), **options)
+        self.assertEqual((result.returncode, result.stderr), (DONE, b""))
+        return result.stdout.decode()
+
     def build(self, *arguments, **options):
         return self.run_tool(BVHBUILD, *arguments, **options)
 
@@ -64,15 +72,15 @@ class ToolTest(unittest.TestCase):
 
     def built(self, name, content, *arguments):
         """The .bvh file made of a mesh with this content."""
-        result = self.build(self.write(name, content), "-o", self.out, *arguments)
-        self.assertEqual(result.returncode, DONE, result.stderr)
-        self.assertEqual(result.stderr, b"")
+        self.succeeds(BVHBUILD, self.write(name, content), "-o", self.out, *arguments)
         return self.out
 
     def built_json(self, name, content, *arguments):
-        result = self.build(self.write(name, content), "-o", self.out, "--json", *arguments)
-        self.assertEqual(result.returncode, DONE, result.stderr)
-        return json.loads(result.stdout)
+        return json.loads(self.succeeds(BVHBUILD, self.write(name, content), "-o", self.out, "--json", *arguments))
+
+    def info_json(self, *arguments):
+        """What bvhinfo tells of files, sound or not."""
+        return json.loads(self.info("--json", *arguments).stdout)
 
     def assert_fails(self, result, code, *words):
         """The exit code is `code`, standard output empty, and standard error one line that holds all words."""
@@ -82,12 +90,27 @@ class ToolTest(unittest.TestCase):
         self.assertTrue(message.startswith(f"{pathlib.Path(result.args[0]).name}: "), message)
         for word in words:
             self.assertIn(os.fspath(word), message)
-        lines = message.removesuffix("\n").removesuffix("\nTry 'bvhbuild --help'.").removesuffix(
-            "\nTry 'bvhinfo --help'.")
-        self.assertEqual(len(lines.split("\n")), 1, message)
+        self.assertEqual(len(re.sub(r"\nTry '\w+ --help'\.$", "", message.removesuffix("\n")).split("\n")), 1, message)
 
     def assert_nothing_written(self):
         self.assertEqual(os.listdir(self.outputs), [])
+
+    def assert_full_disk_is_told(self, *command):
+        """The command, which `-o` is added to, finds its disk full: it says so, and leaves nothing there."""
+        script = 'mount -t tmpfs -o size=64k tandem "$0" || exit 77; "$@" -o "$0/out"; code=$?; ls -A "$0"; exit $code'
+        result = self.run_tool("unshare", "-m", "sh", "-c", script, self.outputs, *command)
+        if result.returncode in (1, 77):
+            self.skipTest("no file system may be mounted here")
+        self.assertEqual((result.returncode, result.stdout), (UNWRITABLE_OUTPUT, b""))
+        self.assertIn(b"No space left on device", result.stderr)
+
+
+def limited_files(size):
+    """Options of a process whose files may have so many bytes."""
+    def limit():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    return {"preexec_fn": limit}
 
 
 def grid_ply(cells):
@@ -104,10 +127,33 @@ def grid_ply(cells):
     return header.encode() + points.tobytes() + faces.tobytes()
 
 
+def obj(points, faces, first=1):
+    """An OBJ of triangles, which name its points from `first` on."""
+    lines = ["v {:.9g} {:.9g} {:.9g}".format(*point) for point in points]
+    return "\n".join(lines + ["f {} {} {}".format(*(np.asarray(face) + first)) for face in faces]) + "\n"
+
+
+def sheet(rows, height):
+    """A square of 2 rows^2 triangles over [0, 1]^2, its heights given: points and faces."""
+    at = np.arange(rows + 1) / rows
+    x, y = (a.ravel() for a in np.meshgrid(at, at, indexing="ij"))
+    corner = lambda i, j: i * (rows + 1) + j
+    faces = []
+    for i in range(rows):
+        for j in range(rows):
+            faces += [(corner(i, j), corner(i + 1, j), corner(i + 1, j + 1)),
+                      (corner(i, j), corner(i + 1, j + 1), corner(i, j + 1))]
+    return np.stack([x, y, height(x, y)], 1), faces
+
+
+def soup_obj(points, number="{:.9g}"):
+    """An OBJ of triangles that have three points each of their own."""
+    points = list(points)
+    lines = ["v " + " ".join(number.format(x) for x in point) for point in points]
+    return "\n".join(lines + [f"f {i + 1} {i + 2} {i + 3}" for i in range(0, len(points), 3)]) + "\n"
+
+
 def scattered_obj(triangles, seed=1):
     """Small triangles at random places, each with vertices of its own."""
     random = np.random.default_rng(seed)
-    corners = random.random((triangles, 1, 3)) + 0.1 * random.random((triangles, 3, 3))
-    lines = ["v %.9g %.9g %.9g" % tuple(point) for point in corners.reshape(-1, 3)]
-    lines += [f"f {3 * i + 1} {3 * i + 2} {3 * i + 3}" for i in range(triangles)]
-    return "\n".join(lines) + "\n"
+    return soup_obj((random.random((triangles, 1, 3)) + 0.1 * random.random((triangles, 3, 3))).reshape(-1, 3))

@@ -11,7 +11,7 @@ import bvh_file
 import numpy as np
 
 from tool_test import (COLLADA_TRIANGLE, CUBE_OBJ, DONE, SOURCE_DIR, TRIANGLE_OBJ, ToolTest, grid_ply,
-                       scattered_obj)
+                       scattered_obj, soup_obj)
 
 
 def corner_sets(file):
@@ -86,24 +86,19 @@ class Oracle(ToolTest):
         self.assertEqual(sorted(file.source_face), list(range(53)))
 
     def test_coordinates_of_all_magnitudes_are_contained(self):
-        lines, value = [], 1e-45
+        points, value = [], 1e-45
         while value < 3e38:
-            lines += [f"v {value:.9g} 0 {-value:.9g}", f"v 0 {value:.9g} 1", f"v {-value:.9g} 3 {value:.9g}"]
+            points += [(value, 0, -value), (0, value, 1), (-value, 3, value)]
             value *= 37
-        count = len(lines) // 3
-        faces = [f"f {3 * i + 1} {3 * i + 2} {3 * i + 3}" for i in range(count)]
-        self.assert_sound(self.built("a.obj", "\n".join(lines + faces) + "\n"), count)
+        self.assert_sound(self.built("a.obj", soup_obj(points)), len(points) // 3)
 
     def test_flat_tiny_huge_and_far_meshes_are_sound(self):
-        def obj(points):
-            lines = ["v {:.9g} {:.9g} {:.9g}".format(*point) for point in points]
-            return "\n".join(lines + [f"f {i + 1} {i + 2} {i + 3}" for i in range(0, len(lines), 3)]) + "\n"
         points = np.random.default_rng(1).uniform(-1, 1, (90, 3))
         flat = points * (1, 0, 1) + (0, 0.3, 0)
         for cloud in (flat, points * 1e-44, points * 1e-38, points * 3e38, points + 1e6, points * 1e-3 + (5e5, -7e6, 0),
                       points[:, :1] * (1, 2, -3)):
             for effort in ("fast", "default"):
-                self.built("a.obj", obj(cloud), "--effort", effort)
+                self.built("a.obj", soup_obj(cloud), "--effort", effort)
                 file = bvh_file.read(self.out)
                 self.assert_sound(self.out, len(file.triangles))
 
@@ -201,10 +196,8 @@ class Coordinates(ToolTest):
     def test_map_coordinates_keep_their_detail(self):
         random = np.random.default_rng(7)
         points = np.round([651234.567, 5403210.123, 412.345] + 80 * random.random((300, 3)), 3)
-        lines = ["v %.3f %.3f %.3f" % tuple(point) for point in points]
-        lines += [f"f {3 * i + 1} {3 * i + 2} {3 * i + 3}" for i in range(100)]
-        file = bvh_file.read(self.built("town.obj", "\n".join(lines) + "\n"))
-        wanted = np.array([line.split()[1:] for line in lines if line[0] == "v"], np.float64).reshape(-1, 3, 3)
+        file = bvh_file.read(self.built("town.obj", soup_obj(points, "{:.3f}")))
+        wanted = np.array([["%.3f" % x for x in point] for point in points], np.float64).reshape(-1, 3, 3)
         error = np.abs(file.world - wanted[file.source_face]).max()
         self.assertTrue(file.origin.any())
         # Half an ulp of float32 at the 40 m that a vertex is away from the middle, with a margin of two.
@@ -213,9 +206,7 @@ class Coordinates(ToolTest):
 
     def test_float32_coordinates_are_stored_as_they_are_around_a_zero_origin(self):
         points = np.random.default_rng(8).normal(size=(30, 3)).astype(np.float32)
-        lines = ["v {!r} {!r} {!r}".format(*point) for point in points.astype(np.float64).tolist()]
-        lines += [f"f {3 * i + 1} {3 * i + 2} {3 * i + 3}" for i in range(10)]
-        file = bvh_file.read(self.built("a.obj", "\n".join(lines) + "\n"))
+        file = bvh_file.read(self.built("a.obj", soup_obj(points.astype(np.float64).tolist(), "{!r}")))
         self.assertEqual((list(file.origin), file.rounding_error), ([0, 0, 0], 0))
         np.testing.assert_array_equal(file.corners, points.reshape(-1, 3, 3)[file.source_face])
 

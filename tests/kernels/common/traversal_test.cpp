@@ -1,27 +1,27 @@
-#include "kernels/common/traversal.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <utility>
 
 #include "build/sample_asset.h"
+#include "kernels/common/block_pair.h"
 #include "kernels/common/plain_boxes.h"
+#include "kernels/common/traversal.h"
 #include "kernels/geometry/box_test.h"
+#include "kernels/random_pose.h"
+#include "plain_boxes.h"
 
-namespace tandem {
+namespace tandem::test {
 namespace {
-
-using test::Bytes;
-using test::Mesh;
 
 // Boxes of one frame: a test that is exact and monotone, so that the candidates are known without a tree.
 std::uint32_t aligned_mask(const Block& a, const Block& b) {
   std::uint32_t mask = 0;
   for (int i = 0; i < kNodesPerBlock; ++i) {
     for (int j = 0; j < kNodesPerBlock; ++j) {
-      if (test::overlap_aligned(box_of(a, i), box_of(b, j))) mask |= 1u << (4 * i + j);
+      if (overlap_aligned(box_of(a, i), box_of(b, j))) mask |= 1u << (4 * i + j);
     }
   }
   return mask;
@@ -69,8 +69,8 @@ TEST(Traversal, MeetsEveryCandidateOnceWhateverTheSizesOfTheTrees) {
   for (const std::uint32_t n : {1u, 3u, 4u, 5u, 17u, 64u, 300u}) {
     for (const std::uint32_t m : {1u, 2u, 4u, 7u, 33u, 100u, 500u}) {
       for (const auto imaginary : {build::Imaginary::minimal, build::Imaginary::free}) {
-        const Bytes file_a(test::make_file(test::random_mesh(n, n), imaginary));
-        const Bytes file_b(test::make_file(test::random_mesh(m, 1000 + m), build::Imaginary::minimal));
+        const Bytes file_a(make_file(random_mesh(n, n), imaginary));
+        const Bytes file_b(make_file(random_mesh(m, 1000 + m), build::Imaginary::minimal));
         const AssetView a = file_a.check().asset, b = file_b.check().asset;
         const Candidates candidates = walk(a.level(), b.level());
         EXPECT_EQ(candidates, brute_force(a.level(), b.level())) << n << " against " << m;
@@ -82,8 +82,7 @@ TEST(Traversal, MeetsEveryCandidateOnceWhateverTheSizesOfTheTrees) {
 }
 
 TEST(Traversal, IsTheSameFromBothSides) {
-  const Bytes file_a(test::make_file(test::random_mesh(400, 1))),
-      file_b(test::make_file(test::random_mesh(50, 2)));
+  const Bytes file_a(make_file(random_mesh(400, 1))), file_b(make_file(random_mesh(50, 2)));
   const AssetView a = file_a.check().asset, b = file_b.check().asset;
   Candidates swapped;
   for (const auto& [faces, times] : walk(b.level(), a.level())) swapped[{faces.second, faces.first}] = times;
@@ -91,7 +90,7 @@ TEST(Traversal, IsTheSameFromBothSides) {
 }
 
 TEST(Traversal, StopsWhenAsked) {
-  const Bytes file(test::make_file(test::random_mesh(400, 1)));
+  const Bytes file(make_file(random_mesh(400, 1)));
   const LevelView tree = file.check().asset.level();
   int calls = 0;
   const auto once = [&](const Block&, const Block&, std::uint32_t) { return ++calls < 1; };
@@ -195,5 +194,100 @@ TEST(Traversal, TheStackHoldsWhatFullTreesOfTheGreatestDepthPutOn) {
   EXPECT_LE(RecordingStack::highest, kTraversalStackSize);
 }
 
+Block any_block(RandomPoses& random, const Scale& scale) {
+  Block block;
+  const int real = static_cast<int>(random.below(4)) + 1;
+  for (int i = 0; i < kNodesPerBlock; ++i) {
+    Position lo, hi;
+    if (i < real)
+      set_node(block, i, random.box(scale, lo, hi), 0, NodeKind::leaf);
+    else
+      set_imaginary(block, i);
+  }
+  return block;
+}
+
+constexpr float kSpecial[] = {0.0f,
+                              -0.0f,
+                              1e-45f,
+                              1.0f,
+                              -1.0f,
+                              3.4e38f,
+                              -3.4e38f,
+                              std::numeric_limits<float>::infinity(),
+                              -std::numeric_limits<float>::infinity(),
+                              std::numeric_limits<float>::quiet_NaN()};
+
+void spoil(RandomPoses& random, float* values, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) {
+    if (random.below(8) == 0) values[i] = kSpecial[random.below(std::size(kSpecial))];
+  }
+}
+
+TEST(BlockPair, EveryWayGivesTheSameMask) {
+  RandomPoses random(1);
+  std::uint64_t hits = 0, ways = 0;
+  for (const BlockPairVariant variant : kBlockPairVariants) ways += block_pair_test(variant) != nullptr;
+  for (int i = 0; i < 1'000'000; ++i) {
+    Scale scale;
+    scale.size = random.below(2) == 0 ? 1 : 0.3;
+    scale.turn = random.below(4) == 0 ? 0 : 4;
+    Block a = any_block(random, scale), b = any_block(random, scale);
+    scale.translation = 0.5;
+    RelativePose pose;
+    ASSERT_EQ(relative_pose(random.pose(scale), extent_of(a), random.pose(scale), extent_of(b), pose),
+              RelativePoseStatus::kOk);
+    if (i % 4 == 0) {  // what no checked file holds, too
+      spoil(random, &a.center[0][0], 24);
+      spoil(random, &b.center[0][0], 24);
+      spoil(random, &pose.rotation[0][0], sizeof pose / sizeof(float));
+    }
+    const unsigned expected = block_pair_mask(a, b, pose);
+    hits += expected != 0;
+    for (const BlockPairVariant variant : kBlockPairVariants) {
+      const BlockPairTest test = block_pair_test(variant);
+      if (test == nullptr) continue;
+      ASSERT_EQ(test(a, b, pose), expected) << static_cast<int>(variant) << " " << i;
+    }
+    ASSERT_EQ(block_pair_test()(a, b, pose), expected);
+  }
+  EXPECT_GT(hits, 100'000u);
+  RecordProperty("ways", static_cast<int>(ways));
+}
+
+TEST(BlockPair, ImaginaryNodesNeverOverlap) {
+  RandomPoses random(2);
+  for (int i = 0; i < 100'000; ++i) {
+    const Block a = any_block(random, {}), b = any_block(random, {});
+    RelativePose pose;
+    ASSERT_EQ(relative_pose(random.pose({}), extent_of(a), random.pose({}), extent_of(b), pose),
+              RelativePoseStatus::kOk);
+    const unsigned mask = block_pair_test()(a, b, pose);
+    for (int bit = 0; bit < 16; ++bit) {
+      if ((mask >> bit & 1) == 0) continue;
+      ASSERT_EQ(a.kind[bit / 4], NodeKind::leaf);
+      ASSERT_EQ(b.kind[bit % 4], NodeKind::leaf);
+    }
+  }
+}
+
+TEST(BlockPair, BitsStandForTheNodesTheyShould) {
+  Block a, b;
+  for (int i = 0; i < 4; ++i) {
+    const auto at = static_cast<float>(10 * i);
+    set_node(a, i, {{at, 0, 0}, {1, 1, 1}}, 0, NodeKind::leaf);
+    set_node(b, i, {{30 - at, 0, 0}, {1, 1, 1}}, 0, NodeKind::leaf);
+  }
+  const RelativePose same = without_slack(kIdentityPose.rotation, kIdentityPose.translation);
+  for (const BlockPairVariant variant : kBlockPairVariants) {
+    const BlockPairTest test = block_pair_test(variant);
+    if (test == nullptr) continue;
+    EXPECT_EQ(test(a, b, same), 1u << 3 | 1u << 6 | 1u << 9 | 1u << 12);
+    Block first = b;
+    for (int i = 1; i < 4; ++i) set_imaginary(first, i);  // b's node 0 lies at a's node 3
+    EXPECT_EQ(test(a, first, same), 1u << 12);
+  }
+}
+
 }  // namespace
-}  // namespace tandem
+}  // namespace tandem::test

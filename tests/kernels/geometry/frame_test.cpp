@@ -13,10 +13,8 @@
 #include "kernels/query_scenes.h"
 #include "kernels/triangle_families.h"
 
-namespace tandem {
+namespace tandem::test {
 namespace {
-
-using test::RandomPoses;
 
 // Volumes of float64 points with as good as no rounding: 113 bits against the 24 that are looked at.
 #ifdef __SIZEOF_FLOAT128__
@@ -63,7 +61,7 @@ TreeExtent extent_around(const float (&t)[3][3]) {
     lo[k] = std::min({t[0][k], t[1][k], t[2][k]});
     hi[k] = std::max({t[0][k], t[1][k], t[2][k]});
   }
-  return test::extent_of(enclose(lo, hi));
+  return extent_of(enclose(lo, hi));
 }
 
 using Corners = frame::Point<float>[3];
@@ -153,16 +151,13 @@ void print(const char* name, const Tally& tally) {
 
 class FrameFamilies : public testing::TestWithParam<TriangleFamily> {};
 
-INSTANTIATE_TEST_SUITE_P(All, FrameFamilies, testing::ValuesIn(triangle_families()), [](const auto& test) {
-  std::string name = test.param.name;
-  std::replace(name.begin(), name.end(), ' ', '_');
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(All, FrameFamilies, testing::ValuesIn(triangle_families()),
+                         [](const auto& test) { return test.param.identifier(); });
 
 TEST_P(FrameFamilies, AreDecidedRightlyOrNotAtAll) {
   RandomPoses random(11);
   Tally tally;
-  const int count = test::trials(10'000, 500);
+  const int count = trials(10'000, 500);
   for (int i = 0; i < count && !HasFatalFailure(); ++i) {
     Stored stored;
     if (store(random, GetParam().make(random.engine()), stored)) expect_right(stored, tally);
@@ -236,7 +231,7 @@ bool nearly_touching(RandomPoses& random, Stored& out) {
 TEST(FrameTest, DecidesPairsThatNearlyTouchRightlyOrNotAtAll) {
   RandomPoses random(12);
   Tally tally;
-  const int count = test::trials(250'000, 160);
+  const int count = trials(250'000, 160);
   for (int i = 0; i < count && !HasFatalFailure(); ++i) {
     Stored stored;
     if (nearly_touching(random, stored)) expect_right(stored, tally);
@@ -251,7 +246,7 @@ TEST(FrameTest, DecidesPairsThatNearlyTouchRightlyOrNotAtAll) {
 TEST(FrameTest, DecidesNothingBeyondItsRange) {
   RandomPoses random(13);
   Tally tally;
-  for (int i = 0; i < test::trials(20'000, 100) && !HasFatalFailure(); ++i) {
+  for (int i = 0; i < trials(20'000, 100) && !HasFatalFailure(); ++i) {
     TrianglePair pair = generic_pair(random.engine());
     const double scale = std::exp2(random.uniform(-149, 127));
     Stored stored = {{}, {}, any_pose(random, scale), any_pose(random, scale)};
@@ -470,7 +465,7 @@ double largest_share(Kind kind, int starts, int steps) {
 class FrameBound : public testing::TestWithParam<Kind> {};
 
 TEST_P(FrameBound, HoldsUnderAttack) {
-  const double share = largest_share(GetParam(), test::trials(60, 5), test::trials(3000, 10));
+  const double share = largest_share(GetParam(), trials(60, 5), trials(3000, 10));
   EXPECT_LT(share, 1);
   EXPECT_GT(share, GetParam() >= Kind::corners_of_b ? 0.4 : 0.5);
 }
@@ -502,7 +497,7 @@ TEST(FrameTest, BoundIsReachedWherePosingRoundsMost) {
 TEST(FrameTest, BoundHoldsForPairsThatNearlyTouchAndForAllFamilies) {
   RandomPoses random(16);
   double largest = 0;
-  for (int i = 0; i < test::trials(20'000, 500) && !HasFatalFailure(); ++i) {
+  for (int i = 0; i < trials(20'000, 500) && !HasFatalFailure(); ++i) {
     const Stored stored = any_start(random);
     for (const Kind kind : {Kind::plane_of_a, Kind::plane_of_b, Kind::edges}) {
       const double share = share_of_bound(stored, kind);
@@ -514,4 +509,4 @@ TEST(FrameTest, BoundHoldsForPairsThatNearlyTouchAndForAllFamilies) {
 }
 
 }  // namespace
-}  // namespace tandem
+}  // namespace tandem::test

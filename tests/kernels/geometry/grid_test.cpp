@@ -12,10 +12,8 @@
 #include "kernels/geometry/orientation.h"
 #include "kernels/query_scenes.h"
 
-namespace tandem {
+namespace tandem::test {
 namespace {
-
-using test::RandomPoses;
 
 /// Two triangles of integers, times the unit, and where they stand.
 struct Integers {
@@ -78,8 +76,8 @@ int integer(RandomPoses& random, int largest) {
 Integers random_pair(RandomPoses& random, const int (&largest)[3]) {
   Integers pair;
   pair.unit = std::ldexp(1, integer(random, 30));
-  pair.pose_a = test::quarter_turn(random);
-  pair.pose_b = test::quarter_turn(random);
+  pair.pose_a = quarter_turn(random);
+  pair.pose_b = quarter_turn(random);
   const double far = random.below(2) == 0 ? 0 : std::ldexp(1, static_cast<int>(random.below(52)));
   double shift_a[3], shift_b[3];
   // The room of a coordinate, half of D on each side of 0, goes to the triangles or to where they stand.
@@ -256,30 +254,30 @@ TEST(GridTest, ErrsOnlyBeyondTheLimit) {
   EXPECT_GT(beyond.wrong, 100);
 }
 
-double grid_of_mesh(const test::Mesh& mesh) {
-  test::SampleAssets assets;
+double grid_of_mesh(const Mesh& mesh) {
+  SampleAssets assets;
   assets.add(mesh);
   const LevelView level = assets.views()[0].level();
   return grid_of(level, extent_of(level.blocks[0]));
 }
 
 TEST(GridOf, IsTheLargestPowerOfTwoInAllCoordinatesOrNone) {
-  EXPECT_EQ(grid_of_mesh(test::cube(0.5f)), 0.5);
-  EXPECT_EQ(grid_of_mesh(test::cube(0.5f, 8)), 0.125);
-  EXPECT_EQ(grid_of_mesh(test::cube(6)), 2);
-  EXPECT_EQ(grid_of_mesh(test::cube(0x1p-39f)), 0x1p-39);
-  EXPECT_EQ(grid_of_mesh(test::cube(0x1p-41f)), 0);
-  EXPECT_EQ(grid_of_mesh(test::cube(0.3f)), 0);
+  EXPECT_EQ(grid_of_mesh(cube(0.5f)), 0.5);
+  EXPECT_EQ(grid_of_mesh(cube(0.5f, 8)), 0.125);
+  EXPECT_EQ(grid_of_mesh(cube(6)), 2);
+  EXPECT_EQ(grid_of_mesh(cube(0x1p-39f)), 0x1p-39);
+  EXPECT_EQ(grid_of_mesh(cube(0x1p-41f)), 0);
+  EXPECT_EQ(grid_of_mesh(cube(0.3f)), 0);
   RandomPoses random(3);
-  EXPECT_EQ(grid_of_mesh(test::soup(random, 5, 1)), 0);
+  EXPECT_EQ(grid_of_mesh(soup(random, 5, 1)), 0);
 }
 
 /// Cubes that are turned by quarters and fill space, far from the origin.
-test::BodyScene stack_of_cubes(RandomPoses& random, double far) {
-  test::BodyScene scene;
-  scene.assets.add(test::cube(0.5f, 2));
+BodyScene stack_of_cubes(RandomPoses& random, double far) {
+  BodyScene scene;
+  scene.assets.add(cube(0.5f, 2));
   for (int i = 0; i < 27; ++i) {
-    Pose pose = test::quarter_turn(random);
+    Pose pose = quarter_turn(random);
     const int place[3] = {i % 3, i / 3 % 3, i / 9};
     for (int k = 0; k < 3; ++k) pose.translation[k] = far + place[k];
     scene.instances.push_back({0, pose});
@@ -289,21 +287,21 @@ test::BodyScene stack_of_cubes(RandomPoses& random, double far) {
 
 TEST(GridTest, DecidesAllOfAStackOfCubes) {
   RandomPoses random(4);
-  const test::BodyScene scene = stack_of_cubes(random, 1e7);
+  const BodyScene scene = stack_of_cubes(random, 1e7);
   test::Asked<ContactQuery> query;
   ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
   ASSERT_EQ(query.find(scene.instances), Status::kOk);
   EXPECT_EQ(query.counters().decided_by_float32, query.counters().candidates);
-  EXPECT_EQ(test::found_contacts(query), all_contacts(scene, false));
+  EXPECT_EQ(found_contacts(query), all_contacts(scene, false));
   EXPECT_GT(query.rows().size(), 10'000u);
 }
 
 /// Faces that part or overlap by a last bit of a coordinate, or by far less, among others that touch.
 TEST(GridTest, LeavesToOthersWhatIsMovedByALastBit) {
   RandomPoses random(5);
-  for (int trial = 0; trial < test::trials(20, 20); ++trial) {
+  for (int trial = 0; trial < trials(20, 20); ++trial) {
     const double far = trial % 3 == 0 ? 0 : trial % 3 == 1 ? 1e7 : 0x1p40;
-    test::BodyScene scene = stack_of_cubes(random, far);
+    BodyScene scene = stack_of_cubes(random, far);
     for (Instance& body : scene.instances) {
       double& x = body.pose.translation[random.below(3)];
       switch (random.below(5)) {
@@ -323,11 +321,11 @@ TEST(GridTest, LeavesToOthersWhatIsMovedByALastBit) {
     test::Asked<ContactQuery> query;
     ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
     ASSERT_EQ(query.find(scene.instances), Status::kOk);
-    EXPECT_EQ(test::found_contacts(query), all_contacts(scene, false));
+    EXPECT_EQ(found_contacts(query), all_contacts(scene, false));
     EXPECT_GT(query.counters().decided_by_float32, 0u);
     EXPECT_LT(query.counters().decided_by_float32, query.counters().candidates);
   }
 }
 
 }  // namespace
-}  // namespace tandem
+}  // namespace tandem::test

@@ -9,15 +9,8 @@
 #include "kernels/random_rotation.h"
 #include "kernels/tolerance/sure_verdicts.h"
 
-namespace tandem {
+namespace tandem::test {
 namespace {
-
-using test::any_scale;
-using test::Direction;
-using test::Quaternion;
-using test::RandomPoses;
-using test::Real;
-using test::Scale;
 
 constexpr Real kU = 0x1p-24L;
 
@@ -29,7 +22,7 @@ std::int64_t squared_length(const Quaternion& q) {
 
 // The frame is whole numbers, n times a rotation, and no reflection.
 void expect_exact_rotation(const Quaternion& q) {
-  const BlockFrame frame = frame_of(test::packed(q));
+  const BlockFrame frame = frame_of(packed(q));
   std::int64_t m[3][3];
   for (int i = 0; i < 3; ++i) {
     for (int k = 0; k < 3; ++k) {
@@ -53,7 +46,7 @@ void expect_exact_rotation(const Quaternion& q) {
 
 // x' of q x conjugated(q), for x along axis k: n times the frame's axis.
 void expect_axes_of_quaternion(const Quaternion& q) {
-  const BlockFrame frame = frame_of(test::packed(q));
+  const BlockFrame frame = frame_of(packed(q));
   const std::int64_t w = q[0], v[3] = {q[1], q[2], q[3]};
   for (int k = 0; k < 3; ++k) {
     for (int i = 0; i < 3; ++i) {
@@ -72,8 +65,8 @@ TEST(BlockFrame, IsExactlyARotationTimesAWholeNumber) {
     ASSERT_NO_FATAL_FAILURE(expect_axes_of_quaternion(q));
   }
   RandomPoses random(1);
-  for (std::uint64_t i = test::hundredth_of(20'000'000); i > 0; --i) {
-    const Quaternion q = test::random_quaternion(random);
+  for (std::uint64_t i = hundredth_of(20'000'000); i > 0; --i) {
+    const Quaternion q = random_quaternion(random);
     ASSERT_NO_FATAL_FAILURE(expect_exact_rotation(q));
     ASSERT_NO_FATAL_FAILURE(expect_axes_of_quaternion(q));
   }
@@ -82,14 +75,14 @@ TEST(BlockFrame, IsExactlyARotationTimesAWholeNumber) {
 TEST(BlockRotation, KeepsAQuaternionOfWholeNumbers) {
   RandomPoses random(2);
   for (int i = 0; i < 100'000; ++i) {
-    Quaternion q = test::random_quaternion(random);
+    Quaternion q = random_quaternion(random);
     q[random.below(4)] = random.below(2) == 0 ? kLargestQuaternionPart : -kLargestQuaternionPart;
     const float size = std::exp2(static_cast<float>(random.below(200)) - 120);
     const BlockRotation r = rotation_near(size * static_cast<float>(q[0]), size * static_cast<float>(q[1]),
                                           size * static_cast<float>(q[2]), size * static_cast<float>(q[3]));
-    ASSERT_EQ(test::unpacked(r), q);
+    ASSERT_EQ(unpacked(r), q);
   }
-  EXPECT_EQ(test::unpacked(kNoRotation), (Quaternion{kLargestQuaternionPart, 0, 0, 0}));
+  EXPECT_EQ(unpacked(kNoRotation), (Quaternion{kLargestQuaternionPart, 0, 0, 0}));
 }
 
 // Three parts off by half a unit of 2047 at most; angles between rotations are twice those of quaternions.
@@ -100,7 +93,7 @@ TEST(BlockRotation, IsWithinAThousandthOfWhatWasAskedFor) {
   for (int i = 0; i < 1'000'000; ++i) {
     float part[4];
     for (float& p : part) p = static_cast<float>(random.symmetric(1) * (random.below(4) == 0 ? 1e-3 : 1));
-    const Quaternion q = test::unpacked(rotation_near(part[0], part[1], part[2], part[3]));
+    const Quaternion q = unpacked(rotation_near(part[0], part[1], part[2], part[3]));
     double asked = 0, got = 0, across = 0;
     for (int k = 0; k < 4; ++k) {
       asked += static_cast<double>(part[k]) * part[k];
@@ -139,17 +132,17 @@ void random_vertex(RandomPoses& random, const Scale& scale, const Direction& cen
 TEST(BlockBox, ContainsItsVerticesAndReachesNoFartherThanTheProofSays) {
   RandomPoses random(4);
   Real worst_along = 0, worst_reach = -1;
-  for (std::uint64_t trial = test::hundredth_of(50'000'000); trial > 0; --trial) {
+  for (std::uint64_t trial = hundredth_of(50'000'000); trial > 0; --trial) {
     const Scale scale = any_scale(random);
-    const BlockRotation rotation = test::packed(test::random_quaternion(random));
+    const BlockRotation rotation = packed(random_quaternion(random));
     const ScaledRotation scaled = scaled_rotation(rotation);
-    const BlockFrame frame = test::any_frame_of(rotation, random);
+    const BlockFrame frame = any_frame_of(rotation, random);
     Direction center;
     for (Real& x : center) x = random.symmetric(scale.center);
     float vertex[4][3];
     const auto count = 1 + random.below(4);
     Real farthest = 0;
-    const Direction axis = test::axes_of(frame)[0];
+    const Direction axis = axes_of(frame)[0];
     const Real on_axis = random.below(4) == 0 ? random.symmetric(scale.size) : 0;  // reaches farthest
     for (std::uint64_t v = 0; v < count; ++v) {
       random_vertex(random, scale, center, vertex[v]);
@@ -218,7 +211,7 @@ Real length(const Direction& v) {
 void compare_pose(const RelativePose& given, const BlockFrame& frame_a, const BlockFrame& frame_b,
                   Worst& worst) {
   const OrientedPose pose = oriented_pose(given.rotation, given.translation, 0, frame_a, frame_b);
-  const auto p = test::axes_of(frame_a), r = test::axes_of(frame_b);
+  const auto p = axes_of(frame_a), r = axes_of(frame_b);
   Direction rotation[3]{}, off[3]{}, t{}, off_t{};
   Real mu_squared = 1, given_length = 0;
   for (int j = 0; j < 3; ++j) {
@@ -260,13 +253,13 @@ TEST(OrientedPose, IsWithinTheBoundsOfTheProof) {
   RandomPoses random(5);
   Worst worst;
   std::uint64_t made = 0;
-  const std::uint64_t count = test::hundredth_of(50'000'000);
+  const std::uint64_t count = hundredth_of(50'000'000);
   for (std::uint64_t i = 0; i < count; ++i) {
     Poses poses;
     if (!relate(random, any_scale(random), poses)) continue;
     ++made;
-    const BlockFrame a = test::any_frame_of(test::packed(test::random_quaternion(random)), random),
-                     b = test::any_frame_of(test::packed(test::random_quaternion(random)), random);
+    const BlockFrame a = any_frame_of(packed(random_quaternion(random)), random),
+                     b = any_frame_of(packed(random_quaternion(random)), random);
     ASSERT_NO_FATAL_FAILURE(compare_pose(poses.b_in_a, a, b, worst)) << "trial " << i;
   }
   std::printf("largest errors, of their bounds: rows %.2f, columns %.2f, T %.2f and %.2f, T' %.2f\n",
@@ -311,10 +304,9 @@ TEST(OrientedBlocks, ImaginaryOnesOverlapNothing) {
     Poses poses;
     const Scale scale = any_scale(random);
     if (!relate(random, scale, poses)) continue;
-    const OrientedPose pose = oriented_pose(poses.b_in_a.rotation, poses.b_in_a.translation,
-                                            oriented_slack(poses.b_in_a, poses.a, poses.b),
-                                            frame_of(test::packed(test::random_quaternion(random))),
-                                            frame_of(test::packed(test::random_quaternion(random))));
+    const OrientedPose pose = oriented_pose(
+        poses.b_in_a.rotation, poses.b_in_a.translation, oriented_slack(poses.b_in_a, poses.a, poses.b),
+        frame_of(packed(random_quaternion(random))), frame_of(packed(random_quaternion(random))));
     with_zeros += pose.rotation[0][0] == 0 || pose.rotation[0][1] == 0;
     Position lo, hi;
     const Box real = random.box(scale, lo, hi);
@@ -330,4 +322,4 @@ TEST(OrientedBlocks, ImaginaryOnesOverlapNothing) {
 }
 
 }  // namespace
-}  // namespace tandem
+}  // namespace tandem::test

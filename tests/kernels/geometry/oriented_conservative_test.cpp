@@ -8,17 +8,8 @@
 #include "kernels/random_rotation.h"
 #include "kernels/tolerance/sure_verdicts.h"
 
-namespace tandem {
+namespace tandem::test {
 namespace {
-
-using test::any_scale;
-using test::cross;
-using test::Direction;
-using test::plane_separates;
-using test::Point;
-using test::RandomPoses;
-using test::Real;
-using test::Scale;
 
 constexpr Real dot(const Direction& a, const Direction& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -52,10 +43,10 @@ struct Body {
 
 void begin(RandomPoses& random, const Scale& scale, Body& body) {
   body.pose = random.pose(scale);
-  const BlockRotation rotation = test::packed(test::random_quaternion(random));
+  const BlockRotation rotation = packed(random_quaternion(random));
   body.rotation = scaled_rotation(rotation);
-  body.frame = test::any_frame_of(rotation, random);
-  body.axes = test::axes_of(body.frame);
+  body.frame = any_frame_of(rotation, random);
+  body.axes = axes_of(body.frame);
   body.vertices.clear();
 }
 
@@ -77,7 +68,7 @@ void enclose_vertices(RandomPoses& random, Body& body) {
     for (const auto& vertex : body.vertices)
       lo[k] = std::min(lo[k], vertex[k]), hi[k] = std::max(hi[k], vertex[k]);
   }
-  body.extent = test::extent_of(enclose(lo, hi));
+  body.extent = extent_of(enclose(lo, hi));
   const double larger = random.below(8) == 0 ? 2 : 1;
   double squared = 0;
   for (double& reach : body.extent.reach) reach *= larger, squared += reach * reach;
@@ -203,7 +194,7 @@ bool make_trial(RandomPoses& random, const Scale& scale, int which, Trial& trial
 TEST(OrientedBlocks, WhatTheyCallApartIsApartInExactArithmetic) {
   RandomPoses random(1);
   std::uint64_t apart[6] = {}, made = 0;
-  const std::uint64_t count = test::hundredth_of(40'000'000);
+  const std::uint64_t count = hundredth_of(40'000'000);
   for (std::uint64_t i = 0; i < count; ++i) {
     Trial trial;
     const auto which = static_cast<int>(random.below(6));
@@ -250,7 +241,7 @@ bool make_contact(RandomPoses& random, const Scale& scale, int which, Trial& tri
     b.vertices.push_back(vertex);
   }
   const std::vector<Point> around = b.points();
-  if (!test::surely_inside(p, {around[0], around[1], around[2], around[3]})) return false;
+  if (!surely_inside(p, {around[0], around[1], around[2], around[3]})) return false;
   Direction far;  // in b's frame, beyond p along the direction
   for (int k = 0; k < 3; ++k) {
     far[k] = dot(b.posed_axis(k), along) < 0 ? -random.uniform(0, scale.size) : random.uniform(0, scale.size);
@@ -264,7 +255,7 @@ bool make_contact(RandomPoses& random, const Scale& scale, int which, Trial& tri
 TEST(OrientedBlocks, ContactsByConstructionAreNeverCalledApart) {
   RandomPoses random(2);
   std::uint64_t made = 0;
-  const std::uint64_t count = test::hundredth_of(60'000'000);
+  const std::uint64_t count = hundredth_of(60'000'000);
   for (std::uint64_t i = 0; i < count; ++i) {
     Trial trial;
     if (!make_contact(random, any_scale(random), static_cast<int>(random.below(6)), trial)) continue;
@@ -286,14 +277,13 @@ TEST(OrientedBlocks, AreApartAtAnyDistanceInRange) {
       there.translation[i % 3] = i % 2 == 0 ? t : -t;
       RelativePose b_in_a;
       ASSERT_EQ(relative_pose(here, extent, there, extent, b_in_a), RelativePoseStatus::kOk);
-      const OrientedPose pose =
-          oriented_pose(b_in_a.rotation, b_in_a.translation, oriented_slack(b_in_a, extent, extent),
-                        frame_of(test::packed(test::random_quaternion(random))),
-                        frame_of(test::packed(test::random_quaternion(random))));
+      const OrientedPose pose = oriented_pose(
+          b_in_a.rotation, b_in_a.translation, oriented_slack(b_in_a, extent, extent),
+          frame_of(packed(random_quaternion(random))), frame_of(packed(random_quaternion(random))));
       EXPECT_FALSE(overlap_oriented(box, box, pose)) << t;
     }
   }
 }
 
 }  // namespace
-}  // namespace tandem
+}  // namespace tandem::test

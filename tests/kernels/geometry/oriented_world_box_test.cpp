@@ -5,16 +5,56 @@
 
 #include <cstdio>
 
+#include "kernels/random_rotation.h"
 #include "kernels/tolerance/sure_verdicts.h"
-#include "oriented_body.h"
+#include "tandem/formats/oriented_block.h"
 
-namespace tandem {
+namespace tandem::test {
 namespace {
 
-using test::any_scale;
-using test::OrientedBody;
-using test::RandomPoses;
-using test::Scale;
+/// An oriented block with few vertices below its first node, as bvhbuild would make it.
+struct OrientedBody {
+  std::vector<std::array<float, 3>> vertices;
+  TreeExtent extent;
+  OrientedBlock block;  ///< nodes 1 to 3 are imaginary
+};
+
+void set_imaginary(OrientedBlock& block, int node) {
+  for (int k = 0; k < 3; ++k) {
+    block.center[k][node] = kImaginaryCenter;
+    block.half_extent[k][node] = kImaginaryHalfExtent;
+  }
+}
+
+/// The box of node 0 around the vertices, and a tree that reaches as far as they do.
+void enclose_vertices(OrientedBody& body, const BlockRotation& rotation) {
+  Position lo, hi;
+  for (int k = 0; k < 3; ++k) {
+    lo[k] = hi[k] = body.vertices[0][k];
+    for (const auto& vertex : body.vertices)
+      lo[k] = std::min(lo[k], vertex[k]), hi[k] = std::max(hi[k], vertex[k]);
+  }
+  Block root;
+  set_node(root, 0, enclose(lo, hi), 0, NodeKind::leaf);
+  for (int node = 1; node < kNodesPerBlock; ++node) set_imaginary(root, node);
+  body.extent = extent_of(root);
+  double squared = 0;
+  for (const double reach : body.extent.reach) squared += reach * reach;
+  const ScaledRotation scaled = scaled_rotation(rotation);
+  body.block = {};
+  for (int node = 1; node < kNodesPerBlock; ++node) set_imaginary(body.block, node);
+  for (int k = 0; k < 3; ++k) {
+    double lowest = HUGE_VAL, highest = -HUGE_VAL;
+    for (const auto& vertex : body.vertices) {
+      const float x[3] = {vertex[0], vertex[1], vertex[2]};
+      const double at = along_axis(scaled, k, x);
+      lowest = std::min(lowest, at), highest = std::max(highest, at);
+    }
+    box_along(lowest, highest, std::sqrt(squared), body.block.center[k][0], body.block.half_extent[k][0]);
+  }
+  body.block.rotation = rotation;
+  body.block.size = oriented_size(body.block);
+}
 
 bool contains(const WorldBox& box, const double (&point)[3]) {
   bool inside = true;
@@ -23,7 +63,7 @@ bool contains(const WorldBox& box, const double (&point)[3]) {
 }
 
 BlockRotation any_rotation(RandomPoses& random) {
-  return test::packed(test::random_quaternion(random));
+  return packed(random_quaternion(random));
 }
 
 OrientedBody any_body(RandomPoses& random, const Scale& scale) {
@@ -42,7 +82,7 @@ OrientedBody any_body(RandomPoses& random, const Scale& scale) {
 TEST(OrientedWorldBox, ContainsEveryPosedVertexAtAnyDistance) {
   constexpr double kFar[] = {0, 1, 1e4, 1e7, 1e12, 1e52, 1e150, 1e299};
   RandomPoses random(1);
-  for (std::uint64_t trial = test::hundredth_of(30'000'000); trial > 0; --trial) {
+  for (std::uint64_t trial = hundredth_of(30'000'000); trial > 0; --trial) {
     Scale scale = any_scale(random);
     const OrientedBody body = any_body(random, scale);
     scale.translation =
@@ -59,11 +99,11 @@ TEST(OrientedWorldBox, ContainsEveryPosedVertexAtAnyDistance) {
 
 /// A box whose corners are vertices, with nothing to spare: frames that turn float32 numbers into such.
 TEST(OrientedWorldBox, NeedsItsMarginAndNoMore) {
-  constexpr test::Quaternion kExact[] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {1, 1, 1, 1}, {1, -1, 1, -1}};
+  constexpr Quaternion kExact[] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {1, 1, 1, 1}, {1, -1, 1, -1}};
   RandomPoses random(2);
   double worst = 0;
-  for (std::uint64_t trial = test::hundredth_of(30'000'000); trial > 0; --trial) {
-    const BlockRotation rotation = test::packed(kExact[random.below(std::size(kExact))]);
+  for (std::uint64_t trial = hundredth_of(30'000'000); trial > 0; --trial) {
+    const BlockRotation rotation = packed(kExact[random.below(std::size(kExact))]);
     const ScaledRotation scaled = scaled_rotation(rotation);
     OrientedBlock block = {};
     block.rotation = rotation;
@@ -126,4 +166,4 @@ TEST(OrientedWorldBox, TheMaskHasWhatMeetsAndNothingFarApart) {
 }
 
 }  // namespace
-}  // namespace tandem
+}  // namespace tandem::test

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <string>
 
 #include "kernels/triangle_families.h"
 #include "kernels/triangle_oracle.h"
@@ -21,29 +20,10 @@ int pairs_per_family() {
   return std::getenv("TANDEM_LONG") != nullptr ? 50'000 : 5'000;
 }
 
-std::string text(const TrianglePair& pair) {
-  std::string out;
-  for (const auto* t : {&pair.a, &pair.b}) {
-    for (const auto& corner : *t) {
-      char line[120];
-      std::snprintf(line, sizeof line, "  {%a, %a, %a},\n", corner[0], corner[1], corner[2]);
-      out += line;
-    }
-  }
-  return out;
-}
-
 bool in_range(const TrianglePair& pair) {
   const auto fits = [](double x) { return std::fabs(x) <= kLargestWorldCoordinate; };
   return std::all_of(&pair.a[0][0], &pair.a[0][0] + 9, fits) &&
          std::all_of(&pair.b[0][0], &pair.b[0][0] + 9, fits);
-}
-
-TrianglePair swapped(const TrianglePair& pair) {
-  TrianglePair out;
-  std::copy_n(&pair.a[0][0], 9, &out.b[0][0]);
-  std::copy_n(&pair.b[0][0], 9, &out.a[0][0]);
-  return out;
 }
 
 /// The largest difference of coordinates, which errors of points are measured by.
@@ -119,12 +99,6 @@ void expect_every_stage_right(const TrianglePair& pair) {
       << text(pair);
 }
 
-std::string family_name(const testing::TestParamInfo<TriangleFamily>& family) {
-  std::string name = family.param.name;
-  std::replace(name.begin(), name.end(), ' ', '_');
-  return name;
-}
-
 /// are_within() at the distance rounded either way, and next to it.
 void expect_decisions_right(const TrianglePair& pair) {
   const DistanceOracle oracle(pair);
@@ -161,7 +135,8 @@ TEST_P(TriangleDistances, ClearanceIsDecidedExactly) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Families, TriangleDistances, testing::ValuesIn(triangle_families()), family_name);
+INSTANTIATE_TEST_SUITE_P(Families, TriangleDistances, testing::ValuesIn(triangle_families()),
+                         [](const auto& test) { return test.param.identifier(); });
 
 // Triangles that are nearly in touch, beside those of the families.
 
@@ -268,7 +243,8 @@ constexpr TriangleFamily kNear[] = {{"generic_gap", generic_gap},
                                     {"far_away", far_away},
                                     {"large_and_small", large_and_small}};
 
-INSTANTIATE_TEST_SUITE_P(Near, TriangleDistances, testing::ValuesIn(kNear), family_name);
+INSTANTIATE_TEST_SUITE_P(Near, TriangleDistances, testing::ValuesIn(kNear),
+                         [](const auto& test) { return test.param.identifier(); });
 
 // Closed forms, which are met exactly where they are float64 numbers.
 

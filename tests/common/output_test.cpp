@@ -1,5 +1,3 @@
-#include "common/output_file.h"
-
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -8,6 +6,8 @@
 #include <fstream>
 #include <vector>
 
+#include "common/output_file.h"
+#include "common/printable.h"
 #include "temp_folder.h"
 
 namespace tandem::build {
@@ -34,32 +34,25 @@ TEST_F(OutputFile, WritesAllBytesAndLeavesNothingElse) {
   EXPECT_EQ(files(), 1u);
 }
 
-TEST_F(OutputFile, ReplacesWhatWasThere) {
-  std::ofstream(folder_ / "a") << "old";
-  EXPECT_EQ(write_whole_file(folder_ / "a", bytes(5)), "");
-  EXPECT_EQ(fs::file_size(folder_ / "a"), 5u);
-}
-
-TEST_F(OutputFile, KeepsASymbolicLink) {
-  std::ofstream(folder_ / "target") << "old";
-  fs::create_symlink(folder_ / "target", folder_ / "link");
-  EXPECT_EQ(write_whole_file(folder_ / "link", bytes(7)), "");
-  EXPECT_TRUE(fs::is_symlink(folder_ / "link"));
-  EXPECT_EQ(fs::file_size(folder_ / "target"), 7u);
-}
-
-TEST_F(OutputFile, FollowsALinkToNothing) {
-  fs::create_symlink("target", folder_ / "link");
-  EXPECT_EQ(write_whole_file(folder_ / "link", bytes(7)), "");
-  EXPECT_TRUE(fs::is_symlink(folder_ / "link"));
-  EXPECT_EQ(fs::file_size(folder_ / "target"), 7u);
-}
-
-TEST_F(OutputFile, KeepsThePermissionsOfAFileThatItReplaces) {
+TEST_F(OutputFile, ReplacesWhatWasThereAndKeepsItsPermissions) {
   std::ofstream(folder_ / "a") << "old";
   fs::permissions(folder_ / "a", fs::perms::owner_read | fs::perms::owner_write);
   EXPECT_EQ(write_whole_file(folder_ / "a", bytes(5)), "");
+  EXPECT_EQ(fs::file_size(folder_ / "a"), 5u);
   EXPECT_EQ(fs::status(folder_ / "a").permissions(), fs::perms::owner_read | fs::perms::owner_write);
+}
+
+TEST_F(OutputFile, FollowsALinkToAFileOrToNothingAndKeepsIt) {
+  for (const bool exists : {true, false}) {
+    SCOPED_TRACE(exists ? "a file" : "nothing");
+    const fs::path target = folder_ / (exists ? "target" : "none"),
+                   link = folder_ / (exists ? "link" : "broken");
+    if (exists) std::ofstream(target) << "old";
+    fs::create_symlink(exists ? target : target.filename(), link);
+    EXPECT_EQ(write_whole_file(link, bytes(7)), "");
+    EXPECT_TRUE(fs::is_symlink(link));
+    EXPECT_EQ(fs::file_size(target), 7u);
+  }
 }
 
 TEST_F(OutputFile, NamesTheReasonOfAFailureAndLeavesNothing) {
@@ -100,6 +93,26 @@ TEST_F(OutputFile, ASignalRemovesTheTemporaryFile) {
   ::waitpid(child, &status, 0);
   EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGTERM);
   for (const auto& entry : fs::directory_iterator(folder_)) EXPECT_EQ(entry.path().filename(), "a");
+}
+
+using namespace std::string_view_literals;
+
+TEST(Printable, LeavesUtf8AsItIsAndReplacesTheRestAndControlCharacters) {
+  for (const auto& [text, printed, what] :
+       {std::tuple{"K\u00fche \u725b \U0001F404"sv, "K\u00fche \u725b \U0001F404", "UTF-8"},
+        {"K\xFChe"sv, "K\uFFFDhe", "Latin-1"},
+        {"\xC0\xAF"sv, "\uFFFD\uFFFD", "overlong"},
+        {"\xED\xA0\x80"sv, "\uFFFD\uFFFD\uFFFD", "a surrogate"},
+        {"\xF4\x90\x80\x80"sv, "\uFFFD\uFFFD\uFFFD\uFFFD", "past U+10FFFF"},
+        {"cut \xE7\x89"sv, "cut \uFFFD\uFFFD", "a cut character"},
+        {"a\0b\x1B[31m\x7F"sv, "a\uFFFDb\uFFFD[31m\uFFFD", "control characters"}})
+    EXPECT_EQ(printable(text, 100), printed) << what;
+}
+
+TEST(Printable, CutsLongTextBetweenCharacters) {
+  EXPECT_EQ(printable("abcdef", 3), "abc...");
+  EXPECT_EQ(printable("ab\u725b", 4), "ab...");
+  EXPECT_EQ(printable("abc", 3), "abc");
 }
 
 }  // namespace

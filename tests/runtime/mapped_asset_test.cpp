@@ -1,16 +1,20 @@
 // Views of runs of levels, and what of a file is copied to a GPU for them.
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <vector>
 
+#include "build/sample_asset.h"
 #include "copy_plan.h"
 #include "gpu/made_files.h"
 #include "tandem/runtime/map.h"
 #include "temp_folder.h"
 
-namespace tandem {
+namespace tandem::test {
 namespace {
 
 constexpr std::uint32_t kTriangles[] = {2001, 300, 20, 7};
@@ -18,16 +22,16 @@ constexpr double kErrors[] = {0, 0.001, 0.01, 0.1};
 constexpr std::uint32_t kLevels = 4;
 
 /// Four levels; the coarser ones are the first triangles of the finest.
-test::Bytes four_levels() {
-  const test::Mesh finest = test::random_mesh(kTriangles[0], 5);
-  std::vector<test::MadeLevel> levels;
+Bytes four_levels() {
+  const Mesh finest = random_mesh(kTriangles[0], 5);
+  std::vector<MadeLevel> levels;
   for (std::uint32_t i = 0; i < kLevels; ++i) {
-    test::Mesh mesh = finest;
+    Mesh mesh = finest;
     mesh.triangles.resize(kTriangles[i]);
     mesh.points.resize(3 * kTriangles[i]);
-    levels.push_back(test::built_level(mesh, kErrors[i]));
+    levels.push_back(built_level(mesh, kErrors[i]));
   }
-  return test::made_file(levels);
+  return made_file(levels);
 }
 
 void expect_same(const LevelView& view, const LevelView& expected) {
@@ -42,7 +46,7 @@ void expect_same(const LevelView& view, const LevelView& expected) {
 }
 
 TEST(LevelViews, ShowARunOfLevelsFromAnyOnThatOthersTakeAsLevel0) {
-  const test::Bytes file = four_levels();
+  const Bytes file = four_levels();
   const AssetView all = file.check().asset;
   for (std::uint32_t first = 0; first < kLevels; ++first) {
     for (std::uint32_t count = 1; count <= kLevels + 1; ++count) {
@@ -60,7 +64,7 @@ TEST(LevelViews, ShowARunOfLevelsFromAnyOnThatOthersTakeAsLevel0) {
 }
 
 TEST(LevelViews, AreThoseOfTheCheckWhereTheFileWasCheckedBefore) {
-  const test::Bytes file = four_levels();
+  const Bytes file = four_levels();
   const AssetView checked = file.check().asset;
   const AssetView view = view_of_checked(checked.header);
   EXPECT_EQ(view.header, checked.header);
@@ -76,16 +80,17 @@ TEST(LevelViews, AreThoseOfTheCheckWhereTheFileWasCheckedBefore) {
 }
 
 TEST(LevelViews, NameTheCoarsestLevelWithinATolerance) {
-  const test::Bytes file = four_levels();
+  const Bytes file = four_levels();
   const AssetView all = file.check().asset;
-  EXPECT_EQ(all.coarsest_level(0), 0u);
-  EXPECT_EQ(all.coarsest_level(std::nextafter(0.001, 0)), 0u);
-  EXPECT_EQ(all.coarsest_level(0.001), 1u);
-  EXPECT_EQ(all.coarsest_level(0.05), 2u);
-  EXPECT_EQ(all.coarsest_level(0.1), 3u);
-  EXPECT_EQ(all.coarsest_level(1e300), 3u);
-  EXPECT_EQ(all.coarsest_level(-1), 0u);
-  EXPECT_EQ(all.coarsest_level(std::nan("")), 0u);
+  for (const auto& [tolerance, level] : {std::pair{0.0, 0u},
+                                         {std::nextafter(0.001, 0), 0u},
+                                         {0.001, 1u},
+                                         {0.05, 2u},
+                                         {0.1, 3u},
+                                         {1e300, 3u},
+                                         {-1.0, 0u},
+                                         {std::nan(""), 0u}})
+    EXPECT_EQ(all.coarsest_level(tolerance), level) << tolerance;
   EXPECT_EQ(all.levels_from(1).coarsest_level(0.05), 1u);
   EXPECT_EQ(all.levels_from(1).coarsest_level(0), 0u);
   EXPECT_EQ(all.levels_from(0, 2).coarsest_level(1), 1u);
@@ -117,7 +122,7 @@ bool is_in(const std::vector<Piece>& pieces, const void* element) {
 }
 
 TEST(LevelViews, AreCopiedWithoutTheOtherLevels) {
-  const test::Bytes file = four_levels();
+  const Bytes file = four_levels();
   const AssetView all = file.check().asset;
   for (const Contents contents : {Contents::all, Contents::exact_queries, Contents::manifolds}) {
     for (std::uint32_t first = 0; first < kLevels; ++first) {
@@ -147,7 +152,7 @@ TEST(LevelViews, AreCopiedWithoutTheOtherLevels) {
 }
 
 TEST(LevelViews, OfAWholeFileAreCopiedAsItIs) {
-  const test::Bytes file = four_levels();
+  const Bytes file = four_levels();
   const AssetView all = file.check().asset;
   const std::vector<Piece> pieces = pieces_of(all, Contents::all);
   ASSERT_EQ(pieces.size(), 1u);
@@ -173,16 +178,16 @@ TEST(LevelViews, TakeMemoryOfTheProcessForTheLevelsThatAreUsed) {
 #ifndef __linux__
   GTEST_SKIP() << "no /proc/self/smaps here";
 #else
-  std::vector<test::MadeLevel> levels;
+  std::vector<MadeLevel> levels;
   for (const std::uint32_t triangles : {120'000u, 100u}) {
-    test::Mesh mesh = test::random_mesh(120'000, 5);
+    Mesh mesh = random_mesh(120'000, 5);
     mesh.triangles.resize(triangles);
     levels.push_back({mesh,
                       build::build_tree(mesh.geometry(), build::Imaginary::minimal, build::Effort::fast),
                       levels.empty() ? 0.0 : 0.5});
   }
-  const test::Bytes bytes = test::made_file(levels);
-  const test::TempFolder folder;
+  const Bytes bytes = made_file(levels);
+  const TempFolder folder;
   const std::string path =
       folder.write("a.bvh", {reinterpret_cast<const char*>(bytes.check().asset.header), bytes.size()})
           .string();
@@ -203,5 +208,74 @@ TEST(LevelViews, TakeMemoryOfTheProcessForTheLevelsThatAreUsed) {
 #endif
 }
 
+namespace fs = std::filesystem;
+
+class Map : public testing::TestWithParam<Access> {
+ protected:
+  std::string write(const char* file, const void* data, std::size_t size) const {
+    return temporary_.write(file, {static_cast<const char*>(data), size}).string();
+  }
+  std::string write_asset(const char* file, std::uint32_t triangles) const {
+    const build::Image image = make_file(random_mesh(triangles, 1));
+    return write(file, image.data(), image.size());
+  }
+
+  TempFolder temporary_;
+  fs::path folder_ = temporary_.path();
+};
+
+INSTANTIATE_TEST_SUITE_P(Access, Map, testing::Values(Access::map, Access::read));
+
+TEST_P(Map, HandsOutACheckedView) {
+  MappedAsset asset;
+  ASSERT_EQ(asset.open(write_asset("a b.bvh", 100).c_str(), GetParam()), Status::kOk);
+  EXPECT_EQ(asset.view().level().triangle_count, 100u);
+  EXPECT_EQ(asset.is_mapped(), GetParam() == Access::map);
+  EXPECT_EQ(reinterpret_cast<std::uintptr_t>(asset.view().level().blocks) % 128, 0u);
+}
+
+TEST_P(Map, NamesWhatCannotBeOpened) {
+  MappedAsset asset;
+  EXPECT_EQ(asset.open((folder_ / "missing").c_str(), GetParam()), Status::kFileNotFound);
+  EXPECT_EQ(asset.open(folder_.c_str(), GetParam()), Status::kNotARegularFile);
+  EXPECT_EQ(asset.open(write("empty", "", 0).c_str(), GetParam()), Status::kNotTandem);
+  EXPECT_EQ(asset.open(write("walk.bvh", "HIERARCHY\nROOT", 14).c_str(), GetParam()),
+            Status::kBiovisionMotionCapture);
+  EXPECT_EQ(asset.data(), nullptr);
+}
+
+TEST_P(Map, ADefectClosesTheFileAndSaysWhere) {
+  build::Image image = make_file(random_mesh(100, 1));
+  const auto blocks = check(image.data(), image.size()).asset.level().blocks;
+  const_cast<Block*>(blocks)[3].center[0][0] = 1e30f;
+  seal(image.data(), image.size());
+  MappedAsset asset;
+  EXPECT_EQ(asset.open(write("bad.bvh", image.data(), image.size()).c_str(), GetParam()),
+            Status::kChildOutsideParentBox);
+  EXPECT_LT(asset.where(), 3u);
+  EXPECT_EQ(asset.data(), nullptr);
+}
+
+TEST_P(Map, MovesAndReopens) {
+  MappedAsset first;
+  ASSERT_EQ(first.open(write_asset("a.bvh", 10).c_str(), GetParam()), Status::kOk);
+  MappedAsset second = std::move(first);
+  EXPECT_EQ(second.view().level().triangle_count, 10u);
+  ASSERT_EQ(second.open(write_asset("b.bvh", 20).c_str(), GetParam()), Status::kOk);
+  EXPECT_EQ(second.view().level().triangle_count, 20u);
+  second.close();
+  EXPECT_EQ(second.data(), nullptr);
+}
+
+TEST(MapPipe, IsRefusedWithoutWaiting) {
+  const std::string path =
+      (fs::temp_directory_path() / ("tandem pipe " + std::to_string(::getpid()))).string();
+  ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
+  MappedAsset asset;
+  EXPECT_EQ(asset.open(path.c_str()), Status::kNotARegularFile);
+  EXPECT_EQ(asset.open(path.c_str(), Access::read), Status::kNotARegularFile);
+  fs::remove(path);
+}
+
 }  // namespace
-}  // namespace tandem
+}  // namespace tandem::test

@@ -30,7 +30,7 @@ struct SimulateArguments {
   std::uint64_t seed = 1;
   bool fast = false, json = false, cold = false, continuous = false;
   SimulatorOptions simulator;
-  ContactOptions contacts;
+  ContactPointOptions contacts;
   RunOptions run;
 };
 

@@ -8,7 +8,7 @@ namespace {
 class MeshContactFinder : public ContactFinder {
  public:
   MeshContactFinder(std::unique_ptr<Engine> engine, std::span<const AssetView> shapes,
-                    const ContactOptions& options)
+                    const ContactPointOptions& options)
       : engine_(std::move(engine)), options_(options) {
     engine_->set_shapes(shapes);
     generator_.set_shapes(shapes);
@@ -27,7 +27,7 @@ class MeshContactFinder : public ContactFinder {
  private:
   std::unique_ptr<Engine> engine_;
   ContactGenerator generator_;
-  ContactOptions options_;
+  ContactPointOptions options_;
   ContactList found_;
 };
 
@@ -35,7 +35,7 @@ class MeshContactFinder : public ContactFinder {
 
 std::unique_ptr<ContactFinder> make_mesh_contact_finder(std::unique_ptr<Engine> engine,
                                                         std::span<const AssetView> shapes,
-                                                        const ContactOptions& options) {
+                                                        const ContactPointOptions& options) {
   return std::make_unique<MeshContactFinder>(std::move(engine), shapes, options);
 }
 

@@ -40,6 +40,6 @@ class ContactFinder {
 /// the shapes look at must outlive it.
 std::unique_ptr<ContactFinder> make_mesh_contact_finder(std::unique_ptr<Engine> engine,
                                                         std::span<const AssetView> shapes,
-                                                        const ContactOptions& options);
+                                                        const ContactPointOptions& options);
 
 }  // namespace tandem::simulation

@@ -26,7 +26,7 @@ void ContactGenerator::set_shapes(std::span<const AssetView> shapes) {
 const std::vector<ContactPoint>& ContactGenerator::generate(const ContactList& found,
                                                             std::span<const BodyPose> bodies,
                                                             std::span<const BodyPair> left_out,
-                                                            const ContactOptions& options) {
+                                                            const ContactPointOptions& options) {
   contacts_.clear();
   std::vector<char> is_left_out;
   for (const ObjectPair& pair : found.pairs)

@@ -9,7 +9,7 @@
 
 namespace tandem::simulation {
 
-struct ContactOptions {
+struct ContactPointOptions {
   std::uint32_t points_per_patch = kMostManifoldPoints;  ///< at most, from 1
   std::uint32_t threads = 1;
 };
@@ -33,7 +33,7 @@ class ContactGenerator {
   /// next call. Conditions: `found` is an engine's answer for these bodies; left_out is ascending.
   const std::vector<ContactPoint>& generate(const ContactList& found, std::span<const BodyPose> bodies,
                                             std::span<const BodyPair> left_out,
-                                            const ContactOptions& options = {});
+                                            const ContactPointOptions& options = {});
 
   /// Of the last call.
   const ContactStatistics& statistics() const { return statistics_; }

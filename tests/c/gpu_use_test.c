@@ -458,8 +458,8 @@ static void test_distances_and_impacts(void) {
   CHECK_STATUS(tandem_gpu_tolerance_query_find(tolerance_query, &scene.instances, &given, 0.01, stream), TANDEM_OK);
   tandem_gpu_tolerance_report decided;
   CHECK_STATUS(tandem_gpu_tolerance_query_get_report(tolerance_query, &decided), TANDEM_OK);
-  CHECK(decided.complete == 1 && decided.apart + decided.touching + decided.within_tolerance == count);
-  CHECK(count == pair_count && decided.touching > 0 && decided.apart > 0);
+  CHECK(decided.complete == 1 && decided.counters.apart + decided.counters.touching + decided.counters.within_tolerance == count);
+  CHECK(count == pair_count && decided.counters.touching > 0 && decided.counters.apart > 0);
   CHECK(same(tandem_gpu_tolerance_query_verdicts(tolerance_query), verdicts, count * sizeof *verdicts));
   tandem_gpu_tolerance_query_destroy(tolerance_query);
   tandem_tolerance_query_destroy(expected_verdicts);
@@ -479,7 +479,7 @@ static void test_errors(void) {
   tandem_gpu_query_report report;
   CHECK_STATUS(tandem_gpu_broad_phase_find(queries.near, &scene.instances, NULL, stream), TANDEM_POSE_NOT_RIGID);
   CHECK_STATUS(tandem_gpu_broad_phase_get_report(queries.near, &near), TANDEM_POSE_NOT_RIGID);
-  CHECK(near.where == 17 && near.failed != 0 && near.count == 0);
+  CHECK(near.where == 17 && near.status != TANDEM_OK && near.count == 0);
   place(bodies, 0);
   write_poses(&scene, bodies, kBodies);
   tandem_object_pair unknown[2] = {{0, 1}, {2, kBodies}};

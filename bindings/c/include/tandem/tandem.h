@@ -50,8 +50,8 @@ enum {
   TANDEM_NULL_ARGUMENT = 1,    ///< a pointer is null, or a list that is not empty; where: its place in a list
   TANDEM_BAD_STRUCT_SIZE = 2,  ///< of an options struct, or bytes of it that this version does not know
   TANDEM_BAD_OPTION = 3,       ///< a number that names no choice, or a reserved field that is not zero
-  TANDEM_OUT_OF_MEMORY = 4,
-  TANDEM_CANNOT_START_THREAD = 5,
+  TANDEM_OUT_OF_MEMORY = 4,    ///< the allocator, or the machine, has not enough
+  TANDEM_CANNOT_START_THREAD = 5,  ///< the system refuses
   TANDEM_INTERNAL_ERROR = 6,       ///< a defect of the library
   TANDEM_UNKNOWN_LEVEL = 7,        ///< a level or part that the asset does not have
   TANDEM_FILTER_MISMATCH = 8,      ///< a filter of another number of bodies
@@ -305,7 +305,7 @@ typedef struct tandem_pose {
   double translation[3];
 } tandem_pose;
 
-/// A body: an asset, and where it stands.
+/// An asset as a body.
 typedef struct tandem_instance {
   uint32_t asset;     ///< place in the list of the scene's assets; TANDEM_NO_INDEX: the body was removed
   uint32_t reserved;  ///< not looked at
@@ -491,6 +491,7 @@ typedef struct tandem_manifold {
                    ///< cross does not close; TANDEM_GOES_THROUGH: one body goes through the other here
 } tandem_manifold;
 
+/// A point of a manifold.
 typedef struct tandem_manifold_point {
   double position[3];       ///< world, half-way between the surfaces
   double in_a[3], in_b[3];  ///< on the surface of a, of b, in the coordinates of its mesh file

@@ -6,20 +6,12 @@
 #include "kernels/common/lanes.h"
 #include "kernels/geometry/frame_distance.h"
 #include "kernels/geometry/relative_pose.h"
+#include "kernels/scene/scene_state.h"
 #include "tandem/formats/view.h"
 #include "tandem/kernels/contact_query.h"
 
 // The contacts of one object pair: traversal, then the cascade on its candidates.
 namespace tandem {
-
-/// An instance as the narrow phase sees it.
-struct PosedTree {
-  LevelView tree;
-  TreeExtent extent;
-  double grid;       ///< grid_of() the tree
-  Pose pose;         ///< of stored coordinates
-  double error = 0;  ///< posed_level_error()
-};
 
 /// An object pair, and what is asked about it.
 struct PairTask {

@@ -1,14 +1,11 @@
 #include "tandem/kernels/containment_query.h"
 
 #include <algorithm>
-#include <new>
 #include <tuple>
 
-#include "kernels/common/instance_check.h"
-#include "kernels/common/worker_threads.h"
 #include "kernels/containment/component_labels.h"
 #include "kernels/containment/containment_rule.h"
-#include "tandem/kernels/detail/buffer.h"
+#include "kernels/scene/scene_state.h"
 
 namespace tandem {
 namespace {
@@ -61,7 +58,7 @@ bool is_inside(const PosedSurface& body, const double* p) {
   return odd;
 }
 
-struct alignas(64) Found : Allocated {
+struct Found {
   Buffer<Containment> rows;
   bool enough_memory = true;
 };
@@ -69,107 +66,66 @@ struct alignas(64) Found : Allocated {
 }  // namespace
 
 struct ContainmentQuery::State : Allocated {
+  std::uint64_t assets_id = 0;  // whose surfaces these are
   Buffer<Surface> surfaces;
   Buffer<std::uint32_t> labels;
-  Buffer<Pose> poses;           // of stored coordinates
   Buffer<std::uint32_t> begin;  // of each pair's contacts
-  Buffer<Containment> contained;
-  std::uint64_t where = 0;
+  PerWorker<Found> found;
 
-  WorkerThreads threads;
-  std::unique_ptr<Found[]> found;
-  std::uint32_t found_count = 0;
-
-  Status fail(Status status, std::uint64_t at) {
-    where = at;
-    contained.clear();
-    return status;
-  }
-  Status set_assets(std::span<const AssetView> assets);
-  Status pose(std::span<const Instance> instances);
-  Status check(std::span<const Instance> instances, std::span<const ObjectPair> pairs,
-               std::span<const Contact> contacts);
-  Status provide_workers(std::uint32_t wanted);
-  void find(std::uint32_t pair, std::span<const Instance> instances, const ObjectPair& bodies,
+  Status name_surfaces(SceneState& scene);
+  Status check(SceneState& scene, std::span<const ObjectPair> pairs, std::span<const Contact> contacts);
+  void find(std::uint32_t pair, const SceneState& scene, const ObjectPair& bodies,
             std::span<const Contact> contacts, Found& out) const;
-  Status gather(std::uint32_t workers);
 };
 
-Status ContainmentQuery::State::set_assets(std::span<const AssetView> assets) {
+Status ContainmentQuery::State::name_surfaces(SceneState& scene) {
+  if (assets_id == scene.assets_id) return Status::kOk;
+  assets_id = 0;
   surfaces.clear();
   std::size_t labelled = 0;
-  for (std::size_t i = 0; i < assets.size(); ++i) {
-    if (assets[i].header == nullptr || assets[i].levels.empty()) return fail(Status::kUnknownAsset, i);
-    const LevelView level = assets[i].level();
-    if (level.topology == nullptr) return fail(Status::kNoTopology, i);
-    if (!surfaces.push(surface_of(*assets[i].header, level))) return fail(Status::kOutOfMemory, i);
+  for (std::size_t i = 0; i < scene.assets.size(); ++i) {
+    const LevelView& level = scene.assets[i].tree;
+    if (level.topology == nullptr) return scene.fail(Status::kNoTopology, i);
+    if (!surfaces.push(surface_of(*scene.assets[i].view.header, level)))
+      return scene.fail(Status::kOutOfMemory, i);
     if (level.component_count != 1) labelled += level.triangle_count;
   }
-  if (!labels.resize(labelled)) return fail(Status::kOutOfMemory, 0);
+  if (!labels.resize(labelled)) return scene.fail(Status::kOutOfMemory, 0);
   std::uint32_t* next = labels.data();
-  for (std::size_t i = 0; i < assets.size(); ++i) {
-    const LevelView level = assets[i].level();
+  for (std::size_t i = 0; i < scene.assets.size(); ++i) {
+    const LevelView& level = scene.assets[i].tree;
     if (level.component_count == 1) continue;
-    if (!containment::label_triangles(level, next)) return fail(Status::kOutOfMemory, i);
+    if (!containment::label_triangles(level, next)) return scene.fail(Status::kOutOfMemory, i);
     surfaces[i].labels = next;
     next += level.triangle_count;
   }
+  assets_id = scene.assets_id;
   return Status::kOk;
 }
 
-Status ContainmentQuery::State::pose(std::span<const Instance> instances) {
-  if (instances.size() >= kNoIndex) return fail(Status::kTooManyInstances, 0);
-  if (!poses.resize(instances.size())) return fail(Status::kOutOfMemory, 0);
-  for (std::size_t i = 0; i < instances.size(); ++i) {
-    WorldBox box;
-    const Status status = pose_instance(surfaces.data(), static_cast<std::uint32_t>(surfaces.size()),
-                                        instances[i].asset, instances[i].pose, poses[i], box);
-    if (status != Status::kOk) return fail(status, i);
-  }
-  return Status::kOk;
-}
-
-// Checks pairs and contacts, and finds where each pair's contacts begin.
-Status ContainmentQuery::State::check(std::span<const Instance> instances, std::span<const ObjectPair> pairs,
+// Checks contacts, and finds where each pair's begin.
+Status ContainmentQuery::State::check(SceneState& scene, std::span<const ObjectPair> pairs,
                                       std::span<const Contact> contacts) {
-  if (pairs.size() >= kNoIndex) return fail(Status::kTooManyPairs, 0);
-  if (contacts.size() >= kNoIndex) return fail(Status::kOutOfRange, contacts.size());
-  if (!begin.resize(pairs.size() + 1)) return fail(Status::kOutOfMemory, 0);
+  if (contacts.size() >= kNoIndex) return scene.fail(Status::kOutOfRange, contacts.size());
+  if (!begin.resize(pairs.size() + 1)) return scene.fail(Status::kOutOfMemory, 0);
   std::size_t next = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const Status status = check_pair(pairs[i], static_cast<std::uint32_t>(instances.size()));
-    if (status != Status::kOk) return fail(status, i);
     begin[i] = static_cast<std::uint32_t>(next);
-    const Surface &a = surfaces[instances[pairs[i].a].asset], &b = surfaces[instances[pairs[i].b].asset];
+    const LevelView &a = scene.bodies[pairs[i].a].tree, &b = scene.bodies[pairs[i].b].tree;
     for (; next < contacts.size() && contacts[next].pair == i; ++next) {
       if (contacts[next].triangle_a >= a.triangle_count || contacts[next].triangle_b >= b.triangle_count)
-        return fail(Status::kUnknownContact, next);
+        return scene.fail(Status::kUnknownContact, next);
     }
   }
   begin[pairs.size()] = static_cast<std::uint32_t>(next);
-  return next == contacts.size() ? Status::kOk : fail(Status::kUnknownContact, next);
+  return next == contacts.size() ? Status::kOk : scene.fail(Status::kUnknownContact, next);
 }
 
-Status ContainmentQuery::State::provide_workers(std::uint32_t wanted) {
-  if (!threads.provide(wanted)) return fail(Status::kCannotStartThread, 0);
-  if (wanted > found_count) {
-    found.reset(new (std::nothrow) Found[wanted]);
-    found_count = found == nullptr ? 0 : wanted;
-    if (found == nullptr) return fail(Status::kOutOfMemory, 0);
-  }
-  for (std::uint32_t i = 0; i < wanted; ++i) {
-    found[i].rows.clear();
-    found[i].enough_memory = true;
-  }
-  return Status::kOk;
-}
-
-void ContainmentQuery::State::find(std::uint32_t pair, std::span<const Instance> instances,
-                                   const ObjectPair& bodies, std::span<const Contact> contacts,
-                                   Found& out) const {
+void ContainmentQuery::State::find(std::uint32_t pair, const SceneState& scene, const ObjectPair& bodies,
+                                   std::span<const Contact> contacts, Found& out) const {
   if (bodies.a == bodies.b) return;
-  const PosedSurface body[2] = {{&surfaces[instances[bodies.a].asset], poses[bodies.a]},
-                                {&surfaces[instances[bodies.b].asset], poses[bodies.b]}};
+  const PosedSurface body[2] = {{&surfaces[scene.instances[bodies.a].asset], scene.bodies[bodies.a].pose},
+                                {&surfaces[scene.instances[bodies.b].asset], scene.bodies[bodies.b].pose}};
   for (std::uint32_t inner = 0; inner < 2; ++inner) {
     const PosedSurface& outer = body[1 - inner];
     const std::uint32_t* label = body[inner].surface->labels;
@@ -188,60 +144,49 @@ void ContainmentQuery::State::find(std::uint32_t pair, std::span<const Instance>
 }
 
 // Which worker found what is chance; the order of the rows is not.
-Status ContainmentQuery::State::gather(std::uint32_t workers) {
-  contained.clear();
+Status ContainmentQuery::answer(SceneState& scene, State& state, std::span<const Contact> contacts) {
+  const std::span<const ObjectPair> pairs = pairs_.view();
+  if (const Status status = state.check(scene, pairs, contacts); status != Status::kOk) return status;
+  const std::uint32_t workers = scene.workers_for(pairs.size(), kPairsAtOnce);
+  if (!scene.threads.provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
+  if (!state.found.provide(workers)) return scene.fail(Status::kOutOfMemory, 0);
   for (std::uint32_t i = 0; i < workers; ++i) {
-    if (!found[i].enough_memory) return fail(Status::kOutOfMemory, 0);
-    for (const Containment& row : found[i].rows.view()) {
-      if (!contained.push(row)) return fail(Status::kOutOfMemory, 0);
-    }
+    state.found[i].rows.clear();
+    state.found[i].enough_memory = true;
   }
-  std::sort(contained.data(), contained.data() + contained.size(),
-            [](const Containment& x, const Containment& y) {
-              return std::tie(x.pair, x.inner, x.component) < std::tie(y.pair, y.inner, y.component);
-            });
-  return Status::kOk;
-}
-
-ContainmentQuery::ContainmentQuery() : state_(new (std::nothrow) State) {}
-ContainmentQuery::ContainmentQuery(ContainmentQuery&&) noexcept = default;
-ContainmentQuery& ContainmentQuery::operator=(ContainmentQuery&&) noexcept = default;
-ContainmentQuery::~ContainmentQuery() = default;
-
-Status ContainmentQuery::set_assets(std::span<const AssetView> assets) {
-  if (state_ == nullptr) return Status::kOutOfMemory;
-  const Status status = state_->set_assets(assets);
-  if (status != Status::kOk) state_->surfaces.clear();
-  return status;
-}
-
-Status ContainmentQuery::find(std::span<const Instance> instances, std::span<const ObjectPair> pairs,
-                              std::span<const Contact> contacts, std::uint32_t threads) {
-  if (state_ == nullptr) return Status::kOutOfMemory;
-  State& state = *state_;
-  Status status = state.pose(instances);
-  if (status == Status::kOk) status = state.check(instances, pairs, contacts);
-  if (status != Status::kOk) return status;
-  const auto workers = static_cast<std::uint32_t>(
-      std::clamp<std::size_t>(pairs.size() / kPairsAtOnce, 1, std::clamp(threads, 1u, kMostQueryThreads)));
-  if ((status = state.provide_workers(workers)) != Status::kOk) return status;
-  state.threads.for_parts(workers, pairs.size(), kPairsAtOnce,
+  scene.threads.for_parts(workers, pairs.size(), kPairsAtOnce,
                           [&](std::size_t from, std::size_t to, std::uint32_t worker) {
                             for (std::size_t i = from; i < to; ++i) {
                               const std::uint32_t first = state.begin[i], end = state.begin[i + 1];
-                              state.find(static_cast<std::uint32_t>(i), instances, pairs[i],
+                              state.find(static_cast<std::uint32_t>(i), scene, pairs[i],
                                          contacts.subspan(first, end - first), state.found[worker]);
                             }
                           });
-  return state.gather(workers);
+  rows_.clear();
+  counters_ = {pairs.size(), 0, 0};
+  for (std::uint32_t i = 0; i < workers; ++i) {
+    if (!state.found[i].enough_memory) return scene.fail(Status::kOutOfMemory, 0);
+    for (const Containment& row : state.found[i].rows.view()) {
+      if (!rows_.push(row)) return scene.fail(Status::kOutOfMemory, 0);
+      counters_.inside += (row.flags & kInside) != 0;
+      counters_.outer_open += (row.flags & kOuterOpen) != 0;
+    }
+  }
+  std::sort(rows_.data(), rows_.data() + rows_.size(), [](const Containment& x, const Containment& y) {
+    return std::tie(x.pair, x.inner, x.component) < std::tie(y.pair, y.inner, y.component);
+  });
+  return Status::kOk;
 }
 
-std::span<const Containment> ContainmentQuery::contained() const {
-  return state_ != nullptr ? state_->contained.view() : std::span<const Containment>();
-}
-
-std::uint64_t ContainmentQuery::where() const {
-  return state_ != nullptr ? state_->where : 0;
+Status ContainmentQuery::find(Scene& in, std::span<const ObjectPair> pairs,
+                              std::span<const Contact> contacts) {
+  SceneState* const scene = in.state();
+  State* const state = state_.provide();
+  if (scene == nullptr || state == nullptr) return forget(Status::kOutOfMemory);
+  Status status = state->name_surfaces(*scene);
+  if (status == Status::kOk) status = scene->take_pairs(pairs, pairs_);
+  if (status == Status::kOk) status = answer(*scene, *state, contacts);
+  return status == Status::kOk ? status : forget(status);
 }
 
 }  // namespace tandem

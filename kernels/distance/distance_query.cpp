@@ -1,19 +1,16 @@
 #include "tandem/kernels/distance_query.h"
 
 #include <algorithm>
-#include <atomic>
-#include <new>
 
-#include "kernels/common/instance_check.h"
 #include "kernels/common/traversal.h"
-#include "kernels/common/worker_threads.h"
 #include "kernels/distance/nearest_phase.h"
+#include "kernels/scene/scene_state.h"
 
 namespace tandem {
 namespace {
 
-// Instances that a worker poses, and pairs that it takes, at a time.
-constexpr std::size_t kInstancesAtOnce = 64, kMostPairsAtOnce = 16;
+// Pairs that a worker takes at a time.
+constexpr std::size_t kMostPairsAtOnce = 16;
 
 // Pairs of bodies with more triangles than this, together, are spread over all threads, one after the other.
 constexpr std::uint64_t kSpreadFrom = std::uint64_t{1} << 18;
@@ -22,13 +19,6 @@ constexpr std::uint64_t kSpreadFrom = std::uint64_t{1} << 18;
 // walks make a round, in which none knows what the others find. Threads take them as they come.
 constexpr std::uint64_t kVisitsAlone = 2048, kVisitsInRound = 512;
 constexpr std::size_t kWalksInRound = 64;
-
-struct Asset {
-  LevelView tree;
-  TreeExtent extent;
-  double origin[3];
-  float lower[3], upper[3];
-};
 
 NearestPhase best_nearest_phase() {
   NearestPhase best = nullptr;
@@ -44,11 +34,6 @@ void add_to(DistanceCounters& sum, const DistanceCounters& part) {
   sum.by_float64 += part.by_float64;
 }
 
-// What the walks of one round may find is kept in slots of their own.
-struct alignas(64) Slot : Allocated {
-  NearestSoFar state;
-};
-
 bool is_near_first(const BoundedBlockPair& x, const BoundedBlockPair& y) {
   if (x.bound != y.bound) return x.bound < y.bound;
   return x.a != y.a ? x.a < y.a : x.b < y.b;
@@ -57,44 +42,17 @@ bool is_near_first(const BoundedBlockPair& x, const BoundedBlockPair& y) {
 }  // namespace
 
 struct DistanceQuery::State : Allocated {
-  Buffer<Asset> assets;
-  Buffer<PosedTree> instances;
-  Buffer<WorldBox> boxes;
-  BroadPhase broad_phase;
-  Buffer<ObjectPair> given_pairs;
-  std::span<const ObjectPair> pairs;  // found or given
-  Buffer<ObjectDistance> distances;
-  DistanceCounters counters;
-  std::uint64_t where = 0;
-
   NearestPhase nearest_phase = best_nearest_phase();
-  DistanceOptions options;
-  WorkerThreads threads;
-  std::unique_ptr<Slot[]> slots;  // one for each worker, or for each walk of a round
-  std::size_t slot_count = 0;
+  PerWorker<NearestSoFar> slots;  // one for each worker, or for each walk of a round
   Buffer<BoundedBlockPair> walks;
 
-  Status fail(Status status, std::uint64_t at) {
-    where = at;
-    forget_results();
-    return status;
-  }
-  void forget_results() {
-    pairs = {};
-    distances.clear();
-    counters = {};
-  }
+  // Of the call.
+  SceneState* scene = nullptr;
+  DistanceOptions options;
+  std::span<const ObjectPair> pairs;
+  ObjectDistance* distances = nullptr;
+  DistanceCounters* counters = nullptr;
 
-  std::uint32_t workers_for(std::size_t things, std::size_t at_once) const {
-    const std::size_t parts = (things + at_once - 1) / at_once;
-    return static_cast<std::uint32_t>(
-        std::clamp<std::size_t>(parts, 1, std::clamp(options.threads, 1u, kMostQueryThreads)));
-  }
-  Status check_options();
-  Status pose_instances(std::span<const Instance> posed);
-  Status find_pairs();
-  Status take_pairs(std::span<const ObjectPair> given);
-  bool provide_slots(std::size_t count);
   bool is_spread(const ObjectPair& pair) const;
   NearestTask task_of(const ObjectPair& pair) const;
   void begin(const NearestTask& task, const ObjectPair& pair, NearestSoFar& state) const;
@@ -105,83 +63,17 @@ struct DistanceQuery::State : Allocated {
   bool walk_round(const NearestTask& task, std::size_t first, NearestSoFar& state);
   bool find_spread(std::size_t pair);
   void finish(std::size_t pair, const NearestTask& task, NearestSoFar& state);
-  Status find_distances_of_pairs();
+  Status find_all();
 };
 
-Status DistanceQuery::State::check_options() {
-  const auto fits = [](double x) { return x >= 0; };
-  const DistanceTolerance& tolerance = options.tolerance;
-  return fits(options.reach) && fits(tolerance.absolute) && fits(tolerance.relative)
-             ? Status::kOk
-             : fail(Status::kOutOfRange, 0);
-}
-
-// Of instances that are refused the first is to blame.
-Status DistanceQuery::State::pose_instances(std::span<const Instance> posed) {
-  if (posed.size() >= kNoIndex) return fail(Status::kTooManyInstances, 0);
-  if (!instances.resize(posed.size()) || !boxes.resize(posed.size())) return fail(Status::kOutOfMemory, 0);
-  const auto asset_count = static_cast<std::uint32_t>(std::min<std::size_t>(assets.size(), kNoIndex));
-  const auto pose_one = [&](std::size_t i) {
-    const Instance& instance = posed[i];
-    const Status status =
-        pose_instance(assets.data(), asset_count, instance.asset, instance.pose, instances[i].pose, boxes[i]);
-    if (status != Status::kOk) return status;
-    instances[i].tree = assets[instance.asset].tree;
-    instances[i].extent = assets[instance.asset].extent;
-    return status;
-  };
-  const std::uint32_t workers = workers_for(posed.size(), kInstancesAtOnce);
-  if (!threads.provide(workers)) return fail(Status::kCannotStartThread, 0);
-  std::atomic<std::size_t> refused = posed.size();
-  threads.for_parts(workers, posed.size(), kInstancesAtOnce,
-                    [&](std::size_t i, std::size_t end, std::uint32_t) {
-                      while (i < end && pose_one(i) == Status::kOk) ++i;
-                      std::size_t first = refused;
-                      while (i < end && i < first && !refused.compare_exchange_weak(first, i)) {
-                      }
-                    });
-  return refused == posed.size() ? Status::kOk : fail(pose_one(refused), refused);
-}
-
-Status DistanceQuery::State::find_pairs() {
-  // Two boxes that are within reach of each other meet when each is larger by half of it.
-  for (WorldBox& box : std::span(boxes.data(), boxes.size())) box = grown(box, 0.5 * options.reach);
-  const PairFilter filter = options.filter != nullptr ? *options.filter : PairFilter();
-  const Status status = broad_phase.find_pairs(boxes.view(), filter, false, threads,
-                                               workers_for(boxes.size(), kInstancesAtOnce));
-  if (status != Status::kOk)
-    return fail(status, status == Status::kUnknownInstance ? filter.excluded.row : 0);
-  pairs = broad_phase.pairs();
-  return status;
-}
-
-Status DistanceQuery::State::take_pairs(std::span<const ObjectPair> given) {
-  if (given.size() >= kNoIndex) return fail(Status::kTooManyPairs, 0);
-  if (!given_pairs.resize(given.size())) return fail(Status::kOutOfMemory, 0);
-  for (std::size_t i = 0; i < given.size(); ++i) {
-    const Status status = check_pair(given[i], static_cast<std::uint32_t>(instances.size()));
-    if (status != Status::kOk) return fail(status, i);
-    given_pairs[i] = given[i];
-  }
-  pairs = given_pairs.view();
-  return Status::kOk;
-}
-
-bool DistanceQuery::State::provide_slots(std::size_t count) {
-  if (count <= slot_count) return true;
-  slots.reset(new (std::nothrow) Slot[count]);
-  slot_count = slots != nullptr ? count : 0;
-  return slots != nullptr;
-}
-
 bool DistanceQuery::State::is_spread(const ObjectPair& pair) const {
-  return pair.a != pair.b &&
-         std::uint64_t{instances[pair.a].tree.triangle_count} + instances[pair.b].tree.triangle_count >=
-             kSpreadFrom;
+  return pair.a != pair.b && std::uint64_t{scene->bodies[pair.a].tree.triangle_count} +
+                                     scene->bodies[pair.b].tree.triangle_count >=
+                                 kSpreadFrom;
 }
 
 NearestTask DistanceQuery::State::task_of(const ObjectPair& pair) const {
-  return nearest_task(instances[pair.a], instances[pair.b], options.tolerance);
+  return nearest_task(scene->bodies[pair.a], scene->bodies[pair.b], options.tolerance);
 }
 
 // Nothing is known but what the former nearest triangles tell.
@@ -234,7 +126,7 @@ bool DistanceQuery::State::walk_round(const NearestTask& task, std::size_t first
   const std::size_t count = std::min(walks.size() - first, kWalksInRound);
   const auto walk = [&](std::size_t i, std::size_t end, std::uint32_t) {
     for (; i < end; ++i) {
-      NearestSoFar& own = slots[i].state;
+      NearestSoFar& own = slots[i];
       own.reset(INFINITY);
       own.counters = {};
       own.upper = state.upper;
@@ -245,9 +137,9 @@ bool DistanceQuery::State::walk_round(const NearestTask& task, std::size_t first
       phase_of(task)(task, &walks[first + i], 1, own);
     }
   };
-  threads.for_parts(workers_for(count, 1), count, 1, walk);
+  scene->threads.for_parts(scene->workers_for(count, 1), count, 1, walk);
   for (std::size_t i = 0; i < count; ++i) {
-    if (!take_over(slots[i].state, state)) return false;
+    if (!take_over(slots[i], state)) return false;
   }
   return true;
 }
@@ -268,102 +160,58 @@ bool DistanceQuery::State::find_spread(std::size_t pair) {
     }
   }
   finish(pair, task, whole);
-  add_to(counters, whole.counters);
+  add_to(*counters, whole.counters);
   return whole.enough_memory;
 }
 
-Status DistanceQuery::State::find_distances_of_pairs() {
-  if (!distances.resize(pairs.size())) return fail(Status::kOutOfMemory, 0);
-  const std::uint32_t most = std::clamp(options.threads, 1u, kMostQueryThreads);
+Status DistanceQuery::State::find_all() {
+  const std::uint32_t most = scene->most_workers;
   const std::size_t at_once = std::clamp(pairs.size() / (32 * most), std::size_t{1}, kMostPairsAtOnce);
-  const std::uint32_t workers = workers_for(pairs.size(), at_once);
-  if (!provide_slots(std::max<std::size_t>(workers, kWalksInRound))) return fail(Status::kOutOfMemory, 0);
-  if (!threads.provide(most)) return fail(Status::kCannotStartThread, 0);
-  for (std::size_t i = 0; i < slot_count; ++i) {
-    slots[i].state.counters = {};
-    slots[i].state.enough_memory = true;
-    slots[i].state.most_visits = ~std::uint64_t{0};
+  const std::uint32_t workers = scene->workers_for(pairs.size(), at_once);
+  if (!slots.provide(std::max<std::size_t>(workers, kWalksInRound)))
+    return scene->fail(Status::kOutOfMemory, 0);
+  if (!scene->threads.provide(most)) return scene->fail(Status::kCannotStartThread, 0);
+  for (std::size_t i = 0; i < slots.size(); ++i) {
+    slots[i].counters = {};
+    slots[i].enough_memory = true;
+    slots[i].most_visits = ~std::uint64_t{0};
   }
-  threads.for_parts(workers, pairs.size(), at_once,
-                    [&](std::size_t i, std::size_t end, std::uint32_t worker) {
-                      for (; i < end; ++i) {
-                        if (!is_spread(pairs[i])) find_one(i, slots[worker].state);
-                      }
-                    });
-  counters = {};
-  for (std::size_t i = 0; i < slot_count; ++i) {
-    if (!slots[i].state.enough_memory) return fail(Status::kOutOfMemory, 0);
-    add_to(counters, slots[i].state.counters);
+  scene->threads.for_parts(workers, pairs.size(), at_once,
+                           [&](std::size_t i, std::size_t end, std::uint32_t worker) {
+                             for (; i < end; ++i) {
+                               if (!is_spread(pairs[i])) find_one(i, slots[worker]);
+                             }
+                           });
+  for (std::size_t i = 0; i < slots.size(); ++i) {
+    if (!slots[i].enough_memory) return scene->fail(Status::kOutOfMemory, 0);
+    add_to(*counters, slots[i].counters);
   }
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    if (is_spread(pairs[i]) && !find_spread(i)) return fail(Status::kOutOfMemory, 0);
-  }
-  counters.object_pairs = pairs.size();
-  for (const ObjectDistance& distance : distances.view()) counters.touching += distance.upper == 0;
-  return Status::kOk;
-}
-
-DistanceQuery::DistanceQuery() : state_(new (std::nothrow) State) {}
-DistanceQuery::DistanceQuery(DistanceQuery&&) noexcept = default;
-DistanceQuery& DistanceQuery::operator=(DistanceQuery&&) noexcept = default;
-DistanceQuery::~DistanceQuery() = default;
-
-Status DistanceQuery::set_assets(std::span<const AssetView> assets) {
-  if (state_ == nullptr) return Status::kOutOfMemory;
-  state_->forget_results();
-  state_->assets.clear();
-  for (std::size_t i = 0; i < assets.size(); ++i) {
-    if (assets[i].header == nullptr || assets[i].levels.empty())
-      return state_->fail(Status::kUnknownAsset, i);
-  }
-  if (!state_->assets.resize(assets.size())) return Status::kOutOfMemory;
-  for (std::size_t i = 0; i < assets.size(); ++i) {
-    Asset& asset = state_->assets[i];
-    asset.tree = assets[i].level();
-    asset.extent = extent_of(asset.tree.blocks[0]);
-    const FileHeader& header = *assets[i].header;
-    std::copy_n(header.origin, 3, asset.origin);
-    std::copy_n(header.lower, 3, asset.lower);
-    std::copy_n(header.upper, 3, asset.upper);
+    if (is_spread(pairs[i]) && !find_spread(i)) return scene->fail(Status::kOutOfMemory, 0);
   }
   return Status::kOk;
 }
 
-Status DistanceQuery::find_distances(std::span<const Instance> instances, const DistanceOptions& options) {
-  if (state_ == nullptr) return Status::kOutOfMemory;
-  state_->forget_results();
-  state_->options = options;
-  Status status = state_->check_options();
-  if (status == Status::kOk) status = state_->pose_instances(instances);
-  if (status == Status::kOk) status = state_->find_pairs();
-  return status == Status::kOk ? state_->find_distances_of_pairs() : status;
-}
-
-Status DistanceQuery::find_distances(std::span<const Instance> instances, std::span<const ObjectPair> pairs,
-                                     const DistanceOptions& options) {
-  if (state_ == nullptr) return Status::kOutOfMemory;
-  state_->options = options;
-  Status status = state_->check_options();
-  if (status == Status::kOk) status = state_->pose_instances(instances);
-  if (status == Status::kOk) status = state_->take_pairs(pairs);
-  return status == Status::kOk ? state_->find_distances_of_pairs() : status;
-}
-
-std::span<const ObjectPair> DistanceQuery::pairs() const {
-  return state_ != nullptr ? state_->pairs : std::span<const ObjectPair>();
-}
-
-std::span<const ObjectDistance> DistanceQuery::distances() const {
-  return state_ != nullptr ? state_->distances.view() : std::span<const ObjectDistance>();
-}
-
-const DistanceCounters& DistanceQuery::counters() const {
-  static constexpr DistanceCounters kNone;
-  return state_ != nullptr ? state_->counters : kNone;
-}
-
-std::uint64_t DistanceQuery::where() const {
-  return state_ != nullptr ? state_->where : 0;
+Status DistanceQuery::answer(SceneState& scene, const std::span<const ObjectPair>* given,
+                             const DistanceOptions& options) {
+  const DistanceTolerance& tolerance = options.tolerance;
+  if (!(options.reach >= 0 && tolerance.absolute >= 0 && tolerance.relative >= 0))
+    return scene.fail(Status::kOutOfRange, 0);
+  State* const state = state_.provide();
+  if (state == nullptr) return scene.fail(Status::kOutOfMemory, 0);
+  Status status = scene.take_or_find_pairs(given, options.reach, false, pairs_);
+  if (status != Status::kOk) return status;
+  if (!rows_.resize(pairs_.size())) return scene.fail(Status::kOutOfMemory, 0);
+  counters_ = {};
+  state->scene = &scene;
+  state->options = options;
+  state->pairs = pairs_.view();
+  state->distances = rows_.data();
+  state->counters = &counters_;
+  status = state->find_all();
+  counters_.object_pairs = pairs_.size();
+  for (const ObjectDistance& distance : rows_.view()) counters_.touching += distance.upper == 0;
+  return status;
 }
 
 }  // namespace tandem

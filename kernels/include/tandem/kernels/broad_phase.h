@@ -5,17 +5,13 @@
 
 #include "tandem/formats/status.h"
 #include "tandem/kernels/detail/buffer.h"
+#include "tandem/kernels/object_pair.h"
 #include "tandem/kernels/pair_filter.h"
 #include "tandem/kernels/world_box.h"
 
 namespace tandem {
 
 class WorkerThreads;
-
-/// Two instances whose world boxes meet; a < b.
-struct ObjectPair {
-  std::uint32_t a, b;
-};
 
 /// Finds all pairs of world boxes that meet, or those of them that a filter looks at. Keeps its memory from
 /// call to call: in a steady state nothing is allocated. Throws nothing.

@@ -3,8 +3,8 @@
 
 #include "tandem/formats/block.h"
 #include "tandem/formats/status.h"
-#include "tandem/kernels/broad_phase.h"
 #include "tandem/kernels/detail/buffer.h"
+#include "tandem/kernels/object_pair.h"
 #include "tandem/kernels/pair_filter.h"
 
 namespace tandem {

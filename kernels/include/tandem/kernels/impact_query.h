@@ -1,9 +1,8 @@
 #pragma once
 #include <cstdint>
-#include <memory>
 #include <span>
 
-#include "tandem/kernels/contact_query.h"
+#include "tandem/kernels/detail/question.h"
 #include "tandem/kernels/motion.h"
 
 namespace tandem {
@@ -26,11 +25,11 @@ struct Impact {
 };
 
 struct ImpactOptions {
+  std::span<const RigidMotion> motion =
+      {};               ///< of each instance, from where it stands; a removed one's is not looked at
+  double duration = 0;  ///< of the step, in seconds
   /// How near triangles come before they stop a pair: a part of the diagonal of the smaller body's bounds.
   double tolerance = 1e-6;
-  std::uint32_t threads = 1;  ///< with the caller's, kMostQueryThreads at most; results don't depend on it
-  /// Where the query finds the pairs: those that it looks at; null: all. It must stay as long as the call.
-  const PairFilter* filter = nullptr;
 };
 
 /// What a query did. The counters depend neither on the number of threads nor on the machine.
@@ -49,52 +48,24 @@ struct ImpactCounters {
   friend bool operator==(const ImpactCounters&, const ImpactCounters&) = default;
 };
 
-/// Finds until when moving instances surely do not meet, on the CPU. Keeps its memory from call to call.
-/// Throws nothing. Movable, not copyable; one query at a time, several objects side by side. Takes about 100
-/// KB of the calling thread's stack. Rounds to nearest and keeps subnormals.
+/// Finds until when moving instances surely do not meet. The scene finds the object pairs whose boxes, swept
+/// by the motions, meet. There is one row for each pair; an instance and itself do not move relative to each
+/// other. find() takes about 100 KB of the calling thread's stack. Result of find(): as of ContactQuery;
+/// kMotionMismatch where there are not as many motions as instances; kOutOfRange where the duration or the
+/// tolerance is negative or not finite, and where an instance, which where() of the scene names, turns by
+/// more than kLargestTurn, or its centre, place or displacement are beyond kLargestMovingCoordinate.
 ///
 /// **Guarantee.** Unless a pair is in contact at the start, no triangles of its two instances meet at any
 /// time in [0, t_safe]: neither those that move as RigidMotion defines, nor those that apply() makes of
 /// pose_at(). Meshes need not be closed: a surface in another's inside is no contact. Proofs: pair_motion.h,
 /// box_times.h and triangle_impact.h.
-class ImpactQuery {
- public:
-  ImpactQuery();
-  ImpactQuery(ImpactQuery&&) noexcept;
-  ImpactQuery& operator=(ImpactQuery&&) noexcept;
-  ~ImpactQuery();
-
-  /// Names the assets that instances refer to, as ContactQuery::set_assets() does.
-  Status set_assets(std::span<const AssetView> assets);
-
-  /// Finds the object pairs whose boxes, swept by their motions of a step of `duration` seconds, meet, and
-  /// when each of them does. motion: of each instance. Result: as of ContactQuery::find_contacts();
-  /// kMotionMismatch where there are not as many motions as instances; kOutOfRange, where where() is the
-  /// instance, also where it turns by more than kLargestTurn, or its centre, place or displacement are beyond
-  /// kLargestMovingCoordinate; and where the duration or the tolerance is negative or not finite. After an
-  /// error there are no pairs and no impacts.
-  Status find(std::span<const Instance> instances, std::span<const RigidMotion> motion, double duration,
-              const ImpactOptions& options = {});
-
-  /// The same of given object pairs, in either order of a and b; the filter is not asked. An instance and
-  /// itself do not move relative to each other. Result: as above, or kUnknownInstance: where() is the pair.
-  Status find(std::span<const Instance> instances, std::span<const RigidMotion> motion, double duration,
-              std::span<const ObjectPair> pairs, const ImpactOptions& options);
-
-  /// The object pairs of the last call: a < b, sorted, where the query found them; as given else.
-  std::span<const ObjectPair> pairs() const;
-
-  /// When each of them meets. Valid until the next call.
-  std::span<const Impact> impacts() const;
-
-  const ImpactCounters& counters() const;
-
-  /// The asset, instance or pair that is to blame for an error.
-  std::uint64_t where() const;
-
+class ImpactQuery : public PairQuestion<ImpactQuery, Impact, ImpactCounters, ImpactOptions> {
  private:
+  friend PairQuestion;
   struct State;
-  std::unique_ptr<State> state_;
+  Status answer(SceneState& scene, const std::span<const ObjectPair>* given, const ImpactOptions& options);
+
+  Kept<State> state_;
 };
 
 }  // namespace tandem

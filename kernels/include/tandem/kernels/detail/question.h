@@ -1,0 +1,93 @@
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "tandem/kernels/detail/buffer.h"
+#include "tandem/kernels/scene.h"
+
+namespace tandem {
+
+/// What a question found: the object pairs that it was about, rows, and counters. All are valid until the
+/// question is asked again. After an error there is nothing.
+template <typename Row, typename Counters>
+class Answer {
+ public:
+  /// The object pairs: a < b, or a = b for self pairs, sorted, where the scene found them; as given else.
+  std::span<const ObjectPair> pairs() const { return pairs_.view(); }
+
+  std::span<const Row> rows() const { return rows_.view(); }
+
+  /// What the question did. Counters depend neither on the number of threads nor on the machine.
+  const Counters& counters() const { return counters_; }
+
+ protected:
+  Status forget(Status status) {
+    pairs_.clear();
+    rows_.clear();
+    counters_ = {};
+    return status;
+  }
+
+  Buffer<ObjectPair> pairs_;
+  Buffer<Row> rows_;
+  Counters counters_;
+};
+
+/// Owns a question's memory, which is made when it is first asked and kept from call to call. Movable, not
+/// copyable. Members of Of::Memory are known to the question's source alone.
+template <typename Memory>
+class Kept {
+ public:
+  Kept() = default;
+  Kept(Kept&& other) noexcept { *this = std::move(other); }
+  Kept& operator=(Kept&& other) noexcept {
+    std::swap(memory_, other.memory_);
+    std::swap(delete_, other.delete_);
+    return *this;
+  }
+  ~Kept() {
+    if (memory_ != nullptr) delete_(memory_);
+  }
+
+  Memory* get() const { return memory_; }
+
+  /// Makes the memory where there is none. Result: the memory, or null.
+  Memory* provide() {
+    if (memory_ == nullptr) {
+      memory_ = new (std::nothrow) Memory;
+      delete_ = [](Memory* memory) { delete memory; };
+    }
+    return memory_;
+  }
+
+ private:
+  Memory* memory_ = nullptr;
+  void (*delete_)(Memory*) = nullptr;
+};
+
+/// A question about the object pairs of a scene: those that the scene finds, or those that the caller gives.
+/// Of: the question, which has answer(scene, given pairs or null, options).
+template <typename Of, typename Row, typename Counters, typename Options>
+class PairQuestion : public Answer<Row, Counters> {
+ public:
+  /// Asks about the pairs that the scene finds.
+  Status find(Scene& scene, const Options& options = {}) { return ask(scene, nullptr, options); }
+
+  /// Asks about the given object pairs, in either order of a and b; the filter is not asked. They may be
+  /// those of this or another question, or a part of them. Result: also kUnknownInstance, where where() of
+  /// the scene is the pair.
+  Status find(Scene& scene, std::span<const ObjectPair> pairs, const Options& options) {
+    return ask(scene, &pairs, options);
+  }
+
+ private:
+  Status ask(Scene& scene, const std::span<const ObjectPair>* given, const Options& options) {
+    SceneState* const state = scene.state();
+    if (state == nullptr) return this->forget(Status::kOutOfMemory);
+    const Status status = static_cast<Of*>(this)->answer(*state, given, options);
+    return status == Status::kOk ? status : this->forget(status);
+  }
+};
+
+}  // namespace tandem

@@ -1,0 +1,11 @@
+#pragma once
+#include <cstdint>
+
+namespace tandem {
+
+/// Two instances whose world boxes meet; a < b, or a = b for an instance and itself.
+struct ObjectPair {
+  std::uint32_t a, b;
+};
+
+}  // namespace tandem

@@ -1,0 +1,464 @@
+#include "tandem/kernels/scene.h"
+
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include "kernels/common/instance_check.h"
+#include "kernels/geometry/grid_test.h"
+#include "kernels/geometry/level_error.h"
+#include "kernels/scene/scene_state.h"
+
+namespace tandem {
+namespace {
+
+// Bodies that a worker poses at a time: some microseconds of work.
+constexpr std::size_t kBodiesAtOnce = 64;
+
+// So many bodies are looked for among all one by one, instead of in a tree that is made of all.
+constexpr std::size_t kFewChanged = 16;
+
+std::uint64_t next_assets_id() {
+  static std::atomic<std::uint64_t> last = 0;
+  return ++last;
+}
+
+SceneAsset scene_asset(const AssetView& view) {
+  const FileHeader& header = *view.header;
+  SceneAsset asset = {view, view.level(), {}, 0, {}, {}, {}, 0};
+  asset.extent = extent_of(asset.tree.blocks[0]);
+  asset.grid = grid_of(asset.tree, asset.extent);
+  double squared = 0;
+  for (int k = 0; k < 3; ++k) {
+    asset.origin[k] = header.origin[k];
+    asset.lower[k] = header.lower[k];
+    asset.upper[k] = header.upper[k];
+    const double side = static_cast<double>(header.upper[k]) - static_cast<double>(header.lower[k]);
+    squared += side * side;
+  }
+  asset.diagonal = std::sqrt(squared);
+  return asset;
+}
+
+// Whether a body that was placed, and not removed, stands as another instance says.
+bool stands_so(const Instance& x, const Instance& y) {
+  return x.asset != kNoIndex && x.asset == y.asset && std::memcmp(&x.pose, &y.pose, sizeof(Pose)) == 0;
+}
+
+// The box of a removed body: it meets none, as its lower bounds are above all upper ones.
+constexpr double kFar = kLargestWorldCoordinate;
+constexpr WorldBox kNowhere = {{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}};
+
+bool meet(const WorldBox& a, const WorldBox& b) {
+  bool meet = true;
+  for (int k = 0; k < 3; ++k) meet = meet && a.lo[k] <= b.hi[k] && b.lo[k] <= a.hi[k];
+  return meet;
+}
+
+bool comes_before(const ObjectPair& x, const ObjectPair& y) {
+  return x.a != y.a ? x.a < y.a : x.b < y.b;
+}
+
+template <typename Entry>
+const Entry* data_or_null(const Buffer<Entry>& entries) {
+  return entries.size() != 0 ? entries.data() : nullptr;
+}
+
+}  // namespace
+
+PairFilter SceneState::filter() const {
+  return {data_or_null(motion), data_or_null(group), data_or_null(mask), excluded};
+}
+
+Status SceneState::set_assets(std::span<const AssetView> views) {
+  forget_bodies();
+  assets.clear();
+  assets_id = next_assets_id();
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (views[i].header == nullptr || views[i].levels.empty()) return fail(Status::kUnknownAsset, i);
+  }
+  if (views.size() >= kNoIndex || !assets.resize(views.size())) return fail(Status::kOutOfMemory, 0);
+  for (std::size_t i = 0; i < views.size(); ++i) assets[i] = scene_asset(views[i]);
+  return Status::kOk;
+}
+
+void SceneState::forget_bodies() {
+  instances.clear();
+  bodies.clear();
+  boxes.clear();
+  changed_.clear();
+  changed_count_ = 0;
+  removed_ = 0;
+  motion.clear();
+  group.clear();
+  mask.clear();
+  excluded = {};
+  found_of_.valid = fixed_kept_ = false;
+  broad_phase_.forget_fixed();
+}
+
+bool SceneState::reserve_bodies(std::size_t count) {
+  return instances.resize(count) && bodies.resize(count) && boxes.resize(count) && changed_.resize(count);
+}
+
+// A body's tree, pose of stored coordinates and world box. After an error nothing has changed.
+Status SceneState::pose(std::uint32_t body, const Instance& instance) {
+  Pose stored;
+  WorldBox box;
+  const Status status = pose_instance(assets.data(), static_cast<std::uint32_t>(assets.size()),
+                                      instance.asset, instance.pose, stored, box);
+  if (status != Status::kOk) return status;
+  const SceneAsset& asset = assets[instance.asset];
+  bodies[body] = {asset.tree, asset.extent, asset.grid, stored,
+                  posed_level_error(asset.tree, asset.lower, asset.upper, stored)};
+  boxes[body] = box;
+  instances[body] = instance;
+  return Status::kOk;
+}
+
+void SceneState::note_change(std::uint32_t body) {
+  changed_count_ += changed_[body] == 0;
+  changed_[body] = 1;
+}
+
+// Every part ends with its own first instance that is refused; the first of these is to blame.
+Status SceneState::pose_all(std::span<const Instance> placed, bool some_stand) {
+  const std::uint32_t workers = workers_for(placed.size(), kBodiesAtOnce);
+  if (!threads.provide(workers)) return fail(Status::kCannotStartThread, 0);
+  std::atomic<std::size_t> first_refused = placed.size(), changes = 0;
+  const auto pose_part = [&](std::size_t i, std::size_t end, std::uint32_t) {
+    std::size_t changed_here = 0;
+    for (; i < end; ++i) {
+      if (some_stand && stands_so(instances[i], placed[i])) continue;
+      if (pose(static_cast<std::uint32_t>(i), placed[i]) != Status::kOk) break;
+      changed_here += changed_[i] == 0;
+      changed_[i] = 1;
+    }
+    changes += changed_here;
+    std::size_t first = first_refused;
+    while (i < end && i < first && !first_refused.compare_exchange_weak(first, i)) {
+    }
+  };
+  threads.for_parts(workers, placed.size(), kBodiesAtOnce, pose_part);
+  changed_count_ += changes;
+  const std::size_t refused = first_refused;
+  if (refused == placed.size()) return Status::kOk;
+  return fail(pose(static_cast<std::uint32_t>(refused), placed[refused]), refused);
+}
+
+Status SceneState::place(std::span<const Instance> placed, const PairFilter& filter) {
+  const auto failed = [&](Status status) {
+    forget_bodies();
+    return status;
+  };
+  if (placed.size() >= kNoIndex) return failed(fail(Status::kTooManyInstances, 0));
+  if (filter.excluded.instances > placed.size())
+    return failed(fail(Status::kUnknownInstance, filter.excluded.row));
+  const bool some_stand = placed.size() == instances.size();
+  if (!some_stand) {
+    forget_bodies();
+    if (!reserve_bodies(placed.size())) return failed(fail(Status::kOutOfMemory, 0));
+    std::fill_n(changed_.data(), placed.size(), std::uint8_t{0});
+  }
+  if (const Status status = pose_all(placed, some_stand); status != Status::kOk) return failed(status);
+  removed_ = 0;
+  const Status status = set_filter(filter);
+  return status == Status::kOk ? status : failed(status);
+}
+
+// Whether the entries are others than before; they are copied then. They are cleared where there is no
+// memory.
+template <typename Entry>
+bool SceneState::copy_entries(const Entry* from, Buffer<Entry>& to) {
+  const std::size_t count = from != nullptr ? instances.size() : 0;
+  if (to.size() == count && (count == 0 || std::memcmp(to.data(), from, count * sizeof(Entry)) == 0))
+    return false;
+  if (to.resize(count)) {
+    std::copy_n(from, count, to.data());
+  } else {
+    to.clear();
+  }
+  return true;
+}
+
+// What lies in a table of excluded pairs may have changed where it lies.
+Status SceneState::set_filter(const PairFilter& filter) {
+  const bool other_motion = copy_entries(filter.motion, motion);
+  const bool other_group = copy_entries(filter.group, group), other_mask = copy_entries(filter.mask, mask);
+  const bool other_excluded = excluded.slots != nullptr || filter.excluded.slots != nullptr;
+  excluded = filter.excluded;
+  if (other_motion) fixed_kept_ = false;
+  if (other_motion || other_group || other_mask || other_excluded) found_of_.valid = false;
+  const bool all_there = (filter.motion == nullptr || motion.size() == instances.size()) &&
+                         (filter.group == nullptr || group.size() == instances.size()) &&
+                         (filter.mask == nullptr || mask.size() == instances.size());
+  return all_there ? Status::kOk : fail(Status::kOutOfMemory, 0);
+}
+
+// Where there are no entries, all bodies have the usual one.
+template <typename Entry>
+bool SceneState::add_entry(Entry entry, Entry usual, Buffer<Entry>& to, std::uint32_t body,
+                           std::size_t count) {
+  if (to.size() == 0 && entry == usual) return true;
+  if (to.size() == 0) {
+    if (!to.resize(count)) return false;
+    std::fill_n(to.data(), count, usual);
+  }
+  while (to.size() < count) {
+    if (!to.push(usual)) return false;
+  }
+  to[body] = entry;
+  return true;
+}
+
+Status SceneState::add(const Instance& instance, const BodyFilter& filter, std::uint32_t& body) {
+  const std::size_t before = instances.size();
+  std::uint32_t free = 0;
+  while (removed_ != 0 && is_body(free)) ++free;
+  if (removed_ == 0) free = static_cast<std::uint32_t>(before);
+  const std::size_t count = std::max<std::size_t>(before, std::size_t{free} + 1);
+  if (count >= kNoIndex) return fail(Status::kTooManyInstances, 0);
+  const auto shrink = [&](Status status) {
+    const auto drop = [&](auto& entries) { (void)entries.resize(std::min(entries.size(), before)); };
+    drop(instances), drop(bodies), drop(boxes), drop(changed_), drop(motion), drop(group), drop(mask);
+    return fail(status, 0);
+  };
+  if (count > before &&
+      !(instances.push({kNoIndex, {}}) && bodies.push({}) && boxes.push(kNowhere) && changed_.push(0)))
+    return shrink(Status::kOutOfMemory);
+  const BodyFilter usual;
+  if (!add_entry(filter.motion, usual.motion, motion, free, count) ||
+      !add_entry(filter.group, usual.group, group, free, count) ||
+      !add_entry(filter.mask, usual.mask, mask, free, count))
+    return shrink(Status::kOutOfMemory);
+  if (const Status status = pose(free, instance); status != Status::kOk) return shrink(status);
+  removed_ -= count == before;
+  note_change(free);
+  // The broad phase's tree is of as many bodies as there were.
+  if (count > before) fixed_kept_ = false;
+  if (count > before && reach_boxes_.size() == before && !reach_boxes_.push(kNowhere))
+    found_of_.valid = false;
+  if (filter.motion != usual.motion) found_of_.valid = false;
+  body = free;
+  return Status::kOk;
+}
+
+Status SceneState::move(std::span<const std::uint32_t> numbers, std::span<const Pose> poses) {
+  if (numbers.size() != poses.size()) return fail(Status::kMotionMismatch, 0);
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    if (!is_body(numbers[i])) return fail(Status::kUnknownInstance, i);
+    Pose stored;
+    WorldBox box;
+    const Status status = pose_instance(assets.data(), static_cast<std::uint32_t>(assets.size()),
+                                        instances[numbers[i]].asset, poses[i], stored, box);
+    if (status != Status::kOk) return fail(status, i);
+  }
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    (void)pose(numbers[i], {instances[numbers[i]].asset, poses[i]});
+    note_change(numbers[i]);
+  }
+  return Status::kOk;
+}
+
+Status SceneState::set_motion(std::uint32_t body, Motion what) {
+  if (!is_body(body)) return fail(Status::kUnknownInstance, 0);
+  if (motion.size() == 0 && what == Motion::moving) return Status::kOk;
+  if (!add_entry(what, Motion::moving, motion, body, instances.size())) return fail(Status::kOutOfMemory, 0);
+  found_of_.valid = fixed_kept_ = false;
+  return Status::kOk;
+}
+
+Status SceneState::remove(std::uint32_t body) {
+  if (!is_body(body)) return fail(Status::kUnknownInstance, 0);
+  instances[body].asset = kNoIndex;
+  boxes[body] = kNowhere;
+  note_change(body);
+  ++removed_;
+  return Status::kOk;
+}
+
+Status SceneState::take_pairs(std::span<const ObjectPair> given, Buffer<ObjectPair>& taken) {
+  if (given.size() >= kNoIndex) return fail(Status::kTooManyPairs, 0);
+  if (!taken.resize(given.size())) return fail(Status::kOutOfMemory, 0);
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    if (!is_body(given[i].a) || !is_body(given[i].b)) return fail(Status::kUnknownInstance, i);
+    taken[i] = given[i];
+  }
+  return Status::kOk;
+}
+
+Status SceneState::take_or_find_pairs(const std::span<const ObjectPair>* given, double reach, bool self_pairs,
+                                      Buffer<ObjectPair>& taken) {
+  if (given != nullptr) return take_pairs(*given, taken);
+  if (const Status status = find_pairs(reach, self_pairs); status != Status::kOk) {
+    taken.clear();
+    return status;
+  }
+  if (!taken.resize(found_.size())) return fail(Status::kOutOfMemory, 0);
+  std::copy_n(found_.data(), found_.size(), taken.data());
+  return Status::kOk;
+}
+
+Status SceneState::find_pairs(double reach, bool self_pairs) {
+  if (!(reach >= 0)) return fail(Status::kOutOfRange, 0);
+  const bool same = found_of_.valid && found_of_.reach == reach && found_of_.self_pairs == self_pairs;
+  if (same && changed_count_ == 0) return Status::kOk;
+  for (std::size_t i = 0; i < motion.size() && fixed_kept_ && changed_count_ != 0; ++i)
+    fixed_kept_ = changed_[i] == 0 || motion[i] != Motion::fixed;
+  found_of_ = {false, reach, self_pairs};
+  const Status status = same && changed_count_ <= kFewChanged ? search_changed() : search_all();
+  if (status != Status::kOk) return fail(status, 0);
+  std::fill_n(changed_.data(), changed_.size(), std::uint8_t{0});
+  changed_count_ = 0;
+  found_of_.valid = true;
+  return Status::kOk;
+}
+
+// Boxes within reach of each other meet when each is larger by half of it; or one by all of it where the
+// other is fixed and kept as it is, for any reach. Errors of levels need no more: a world box is made of
+// bounds that hold all levels, the finest one too, which is what questions are about.
+WorldBox SceneState::box_within_reach(std::uint32_t body) const {
+  const bool is_fixed = motion.size() != 0 && motion[body] == Motion::fixed;
+  if (is_fixed || !is_body(body)) return boxes[body];
+  return grown(boxes[body], any_fixed_ ? found_of_.reach : 0.5 * found_of_.reach);
+}
+
+// Keeps a tree of the fixed bodies as they stand, where there are any.
+Status SceneState::keep_fixed_bodies() {
+  any_fixed_ =
+      std::find(motion.data(), motion.data() + motion.size(), Motion::fixed) != motion.data() + motion.size();
+  if (!any_fixed_) broad_phase_.forget_fixed();
+  if (!any_fixed_ || fixed_kept_) return Status::kOk;
+  const std::uint32_t workers = workers_for(boxes.size(), kBodiesAtOnce);
+  if (!threads.provide(workers)) return Status::kCannotStartThread;
+  const Status status = broad_phase_.keep_fixed(boxes.view(), motion.view(), threads, workers);
+  fixed_kept_ = status == Status::kOk;
+  return status;
+}
+
+// Whether a removed body is a pair with itself is not asked of its box.
+Status SceneState::search_all() {
+  if (const Status status = keep_fixed_bodies(); status != Status::kOk) return status;
+  const bool within_reach = found_of_.reach > 0;
+  if (within_reach && !reach_boxes_.resize(boxes.size())) return Status::kOutOfMemory;
+  for (std::uint32_t i = 0; within_reach && i < boxes.size(); ++i) reach_boxes_[i] = box_within_reach(i);
+  const std::uint32_t workers = workers_for(broad_phase_.free_count(boxes.size()), kBodiesAtOnce);
+  if (!threads.provide(workers)) return Status::kCannotStartThread;
+  const Status status = broad_phase_.find_pairs((within_reach ? reach_boxes_ : boxes).view(), filter(),
+                                                found_of_.self_pairs, threads, workers);
+  if (status != Status::kOk) return status;
+  const std::span<const ObjectPair> all = broad_phase_.pairs();
+  if (!found_.resize(all.size())) return Status::kOutOfMemory;
+  ObjectPair* const begin = found_.data();
+  ObjectPair* end = begin;
+  if (removed_ == 0) {
+    end = std::copy(all.begin(), all.end(), begin);
+  } else {
+    end =
+        std::copy_if(all.begin(), all.end(), begin, [&](const ObjectPair& pair) { return is_body(pair.a); });
+  }
+  return found_.resize(static_cast<std::size_t>(end - begin)) ? Status::kOk : Status::kOutOfMemory;
+}
+
+// The pairs of few bodies that changed, which are looked for among all, instead of those that they had.
+Status SceneState::search_changed() {
+  const bool within_reach = found_of_.reach > 0;
+  const Buffer<WorldBox>& of = within_reach ? reach_boxes_ : boxes;
+  for (std::uint32_t i = 0; within_reach && i < boxes.size(); ++i) {
+    if (changed_[i] != 0) reach_boxes_[i] = box_within_reach(i);
+  }
+  const PairFilter asked = filter();
+  fresh_.clear();
+  for (const ObjectPair& pair : found_.view()) {
+    if (changed_[pair.a] == 0 && changed_[pair.b] == 0 && !fresh_.push(pair)) return Status::kOutOfMemory;
+  }
+  const std::size_t kept = fresh_.size();
+  for (std::uint32_t i = 0; i < boxes.size(); ++i) {
+    if (changed_[i] == 0 || !is_body(i)) continue;
+    for (std::uint32_t j = 0; j < boxes.size(); ++j) {
+      if (j == i ? !found_of_.self_pairs : (changed_[j] != 0 && j < i) || !meet(of[i], of[j])) continue;
+      if (asked.looks_at(i, j) && !fresh_.push({std::min(i, j), std::max(i, j)})) return Status::kOutOfMemory;
+    }
+  }
+  if (fresh_.size() >= kNoIndex) return Status::kTooManyPairs;
+  ObjectPair* const begin = fresh_.data();
+  ObjectPair* const end = begin + fresh_.size();
+  std::sort(begin + kept, end, comes_before);
+  if (!found_.resize(fresh_.size())) return Status::kOutOfMemory;
+  std::merge(begin, begin + kept, begin + kept, end, found_.data(), comes_before);
+  return Status::kOk;
+}
+
+Scene::Scene() = default;
+Scene::Scene(Scene&&) noexcept = default;
+Scene& Scene::operator=(Scene&&) noexcept = default;
+Scene::~Scene() = default;
+
+SceneState* Scene::state() {
+  if (state_ == nullptr) state_.reset(new (std::nothrow) SceneState);
+  return state_.get();
+}
+
+void Scene::set_threads(std::uint32_t threads) {
+  if (SceneState* const s = state()) s->most_workers = std::clamp(threads, 1u, kMostSceneThreads);
+}
+
+Status Scene::set_assets(std::span<const AssetView> assets) {
+  SceneState* const s = state();
+  if (s == nullptr) return Status::kOutOfMemory;
+  const Status status = s->set_assets(assets);
+  if (status != Status::kOk) s->assets.clear();
+  return status;
+}
+
+Status Scene::place(std::span<const Instance> instances, const PairFilter& filter) {
+  SceneState* const s = state();
+  return s != nullptr ? s->place(instances, filter) : Status::kOutOfMemory;
+}
+
+Status Scene::add(const Instance& instance, std::uint32_t& body, const BodyFilter& filter) {
+  SceneState* const s = state();
+  return s != nullptr ? s->add(instance, filter, body) : Status::kOutOfMemory;
+}
+
+Status Scene::move(std::span<const std::uint32_t> bodies, std::span<const Pose> poses) {
+  SceneState* const s = state();
+  return s != nullptr ? s->move(bodies, poses) : Status::kOutOfMemory;
+}
+
+Status Scene::move(std::uint32_t body, const Pose& pose) {
+  return move(std::span(&body, 1), std::span(&pose, 1));
+}
+
+Status Scene::set_motion(std::uint32_t body, Motion motion) {
+  SceneState* const s = state();
+  return s != nullptr ? s->set_motion(body, motion) : Status::kOutOfMemory;
+}
+
+Status Scene::remove(std::uint32_t body) {
+  SceneState* const s = state();
+  return s != nullptr ? s->remove(body) : Status::kOutOfMemory;
+}
+
+Status Scene::find_pairs(double reach, bool self_pairs) {
+  SceneState* const s = state();
+  if (s == nullptr) return Status::kOutOfMemory;
+  const Status status = s->take_or_find_pairs(nullptr, reach, self_pairs, s->pairs);
+  if (status != Status::kOk) s->pairs.clear();
+  return status;
+}
+
+std::span<const ObjectPair> Scene::pairs() const {
+  return state_ != nullptr ? state_->pairs.view() : std::span<const ObjectPair>();
+}
+
+std::span<const Instance> Scene::instances() const {
+  return state_ != nullptr ? state_->instances.view() : std::span<const Instance>();
+}
+
+std::uint64_t Scene::where() const {
+  return state_ != nullptr ? state_->where : 0;
+}
+
+}  // namespace tandem

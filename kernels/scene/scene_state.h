@@ -1,0 +1,142 @@
+#pragma once
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <new>
+#include <span>
+
+#include "kernels/common/worker_threads.h"
+#include "kernels/geometry/relative_pose.h"
+#include "tandem/kernels/broad_phase.h"
+#include "tandem/kernels/detail/buffer.h"
+#include "tandem/kernels/scene.h"
+
+// What questions know of a scene.
+namespace tandem {
+
+/// An asset as questions look at it: the first level that its view shows.
+struct SceneAsset {
+  AssetView view;
+  LevelView tree;
+  TreeExtent extent;
+  double grid;  ///< grid_of() the tree
+  double origin[3];
+  float lower[3], upper[3];
+  double diagonal;  ///< of the bounds
+};
+
+/// A body as the walks of trees see it.
+struct PosedTree {
+  LevelView tree;
+  TreeExtent extent;
+  double grid;       ///< grid_of() the tree
+  Pose pose;         ///< of stored coordinates
+  double error = 0;  ///< posed_level_error()
+};
+
+/// What each worker of a question has of its own, kept from call to call.
+template <typename Worker>
+class PerWorker {
+ public:
+  /// Makes room for so many where there are fewer, and forgets what was in those before then. False: out of
+  /// memory, and there are none.
+  [[nodiscard]] bool provide(std::size_t count) {
+    if (count <= count_) return true;
+    workers_.reset(new (std::nothrow) Slot[count]);
+    count_ = workers_ != nullptr ? count : 0;
+    return workers_ != nullptr;
+  }
+  std::size_t size() const { return count_; }
+  Worker& operator[](std::size_t i) { return workers_[i].worker; }
+
+ private:
+  struct alignas(64) Slot : Allocated {
+    Worker worker;
+  };
+  std::unique_ptr<Slot[]> workers_;
+  std::size_t count_ = 0;
+};
+
+struct SceneState : Allocated {
+  Buffer<SceneAsset> assets;
+  std::uint64_t assets_id = 0;  // a number that no other list of assets of this process has
+
+  // By the bodies' numbers.
+  Buffer<Instance> instances;
+  Buffer<PosedTree> bodies;
+  Buffer<WorldBox> boxes;
+  Buffer<Motion> motion;  // this and the next two: empty where the filter has none
+  Buffer<std::uint32_t> group, mask;
+  ExcludedPairs excluded;
+
+  WorkerThreads threads;
+  std::uint32_t most_workers = 1;
+  std::uint64_t where = 0;
+  Buffer<ObjectPair> pairs;  // of Scene::find_pairs()
+
+  Status fail(Status status, std::uint64_t at) {
+    where = at;
+    return status;
+  }
+
+  PairFilter filter() const;
+
+  bool is_body(std::uint32_t i) const { return i < instances.size() && instances[i].asset != kNoIndex; }
+  const SceneAsset& asset_of(std::uint32_t body) const { return assets[instances[body].asset]; }
+
+  /// As many workers as may be used, but no more than find something to do.
+  std::uint32_t workers_for(std::size_t things, std::size_t at_once) const {
+    const std::size_t parts = (things + at_once - 1) / at_once;
+    return static_cast<std::uint32_t>(std::clamp<std::size_t>(parts, 1, most_workers));
+  }
+
+  /// The pairs of a question: the given ones, checked, or where `given` is null those that the scene finds.
+  /// Result: as of Scene::find_pairs(); kUnknownInstance or kTooManyPairs.
+  Status take_or_find_pairs(const std::span<const ObjectPair>* given, double reach, bool self_pairs,
+                            Buffer<ObjectPair>& pairs);
+  Status take_pairs(std::span<const ObjectPair> given, Buffer<ObjectPair>& pairs);
+
+  // What Scene does.
+  Status set_assets(std::span<const AssetView> views);
+  Status place(std::span<const Instance> placed, const PairFilter& filter);
+  Status add(const Instance& instance, const BodyFilter& filter, std::uint32_t& body);
+  Status move(std::span<const std::uint32_t> numbers, std::span<const Pose> poses);
+  Status set_motion(std::uint32_t body, Motion what);
+  Status remove(std::uint32_t body);
+
+ private:
+  // What the list of pairs that was found last is about.
+  struct FoundPairs {
+    bool valid = false;  // but for the bodies that changed since
+    double reach = 0;
+    bool self_pairs = false;
+  };
+
+  void forget_bodies();
+  bool reserve_bodies(std::size_t count);
+  Status pose(std::uint32_t body, const Instance& instance);
+  Status pose_all(std::span<const Instance> placed, bool some_stand);
+  void note_change(std::uint32_t body);
+  Status set_filter(const PairFilter& filter);
+  template <typename Entry>
+  bool copy_entries(const Entry* from, Buffer<Entry>& to);
+  template <typename Entry>
+  bool add_entry(Entry entry, Entry usual, Buffer<Entry>& to, std::uint32_t body, std::size_t count);
+  Status find_pairs(double reach, bool self_pairs);
+  Status keep_fixed_bodies();
+  Status search_all();
+  Status search_changed();
+  WorldBox box_within_reach(std::uint32_t body) const;
+
+  BroadPhase broad_phase_;
+  Buffer<WorldBox> reach_boxes_;  // larger, so that those within reach meet
+  Buffer<ObjectPair> found_, fresh_;
+  FoundPairs found_of_;
+  Buffer<std::uint8_t> changed_;  // of each body: since pairs were found
+  std::size_t changed_count_ = 0;
+  bool any_fixed_ = false;
+  bool fixed_kept_ = false;  // the broad phase has a tree of the fixed bodies as they stand
+  std::uint32_t removed_ = 0;
+};
+
+}  // namespace tandem

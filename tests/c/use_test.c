@@ -100,7 +100,7 @@ static void test_assets(void) {
     CHECK(level.vertex_count > 700 && level.vertex_count < 800 && level.component_count >= 1);
     uint64_t faces = 0;
     for (uint32_t t = 0; t < level.triangle_count; ++t) {
-      faces += level.triangles[t].corner[0].word;
+      faces += level.triangles[t].corner[0].w;
       for (int k = 0; k < 3; ++k) {
         const float* p = level.triangles[t].corner[k].position;
         for (int x = 0; x < 3; ++x) CHECK(p[x] >= info.lower[x] && p[x] <= info.upper[x]);
@@ -167,7 +167,7 @@ static void test_building(void) {
   level.struct_size = sizeof level;
   CHECK_STATUS(tandem_asset_get_level(asset, 0, &level), TANDEM_OK);
   CHECK(level.triangle_count == 2 && level.closed == 0);
-  CHECK(level.triangles[0].corner[0].word == 0 && level.triangles[1].corner[0].word == 0);
+  CHECK(level.triangles[0].corner[0].w == 0 && level.triangles[1].corner[0].w == 0);
   tandem_part part;
   part.struct_size = sizeof part;
   CHECK_STATUS(tandem_asset_get_part(asset, 0, &part), TANDEM_OK);

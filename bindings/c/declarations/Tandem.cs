@@ -97,7 +97,7 @@ public unsafe struct tandem_asset_info {
 [StructLayout(LayoutKind.Sequential)]
 public unsafe struct tandem_corner {
   public fixed float position[3];
-  public uint word;
+  public uint w;
 }
 
 [StructLayout(LayoutKind.Sequential)]

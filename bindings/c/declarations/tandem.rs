@@ -243,7 +243,7 @@ pub struct tandem_asset_info {
 #[derive(Clone, Copy)]
 pub struct tandem_corner {
     pub position: [f32; 3],
-    pub word: u32,
+    pub w: u32,
 }
 
 #[repr(C)]

@@ -1,7 +1,7 @@
 // Written by scripts/write_interface from bindings/c/include/tandem/tandem.h. Do not edit it.
 // clang-format off
 TANDEM_SAME_SIZE(Triangle::Corner, tandem_corner); TANDEM_SAME_PLACE(Triangle::Corner, tandem_corner, position); TANDEM_SAME_PLACE(Triangle::Corner,
-  tandem_corner, word);
+  tandem_corner, w);
 TANDEM_SAME_SIZE(Triangle, tandem_triangle); TANDEM_SAME_PLACE(Triangle, tandem_triangle, corner);
 TANDEM_SAME_SIZE(Pose, tandem_pose); TANDEM_SAME_PLACE(Pose, tandem_pose, rotation); TANDEM_SAME_PLACE(Pose, tandem_pose, translation);
 TANDEM_SAME_SIZE(Instance, tandem_instance); TANDEM_SAME_PLACE(Instance, tandem_instance, asset); TANDEM_SAME_PLACE(Instance, tandem_instance, pose);

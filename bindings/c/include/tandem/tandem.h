@@ -247,7 +247,7 @@ TANDEM_API tandem_status tandem_asset_get_info(const tandem_asset* asset, tandem
 
 typedef struct tandem_corner {
   float position[3];  ///< in stored coordinates
-  uint32_t word;      ///< of corner 0: the face of the mesh file; of corner 1: the part; of corner 2: 0
+  uint32_t w;         ///< of corner 0: the face of the mesh file; of corner 1: the part; of corner 2: 0
 } tandem_corner;
 
 typedef struct tandem_triangle {

@@ -41,11 +41,11 @@ std::span<const Row> rows(const Given* given, size_t count) {
   return {reinterpret_cast<const Row*>(given), count};
 }
 
-/// The libraries' rows as the caller reads them; count: or null.
+/// The libraries' rows as the caller reads them, null where there are none; count: or null.
 template <typename Row, typename Found>
 const Row* result(std::span<const Found> found, size_t* count) {
   if (count != nullptr) *count = found.size();
-  return reinterpret_cast<const Row*>(found.data());
+  return reinterpret_cast<const Row*>(found.empty() ? nullptr : found.data());
 }
 
 }  // namespace tandem::c

@@ -16,7 +16,7 @@ namespace {
 // Bodies that a worker poses at a time: some microseconds of work.
 constexpr std::size_t kBodiesAtOnce = 64;
 
-// So many bodies are looked for among all one by one, instead of in a tree that is made of all.
+// So many bodies, or fewer, are tested against all, without a tree.
 constexpr std::size_t kFewChanged = 16;
 
 std::uint64_t next_assets_id() {
@@ -304,10 +304,21 @@ Status SceneState::find_pairs(double reach, bool self_pairs) {
   if (!(reach >= 0)) return fail(Status::kOutOfRange, 0);
   const bool same = found_of_.valid && found_of_.reach == reach && found_of_.self_pairs == self_pairs;
   if (same && changed_count_ == 0) return Status::kOk;
-  for (std::size_t i = 0; i < motion.size() && fixed_kept_ && changed_count_ != 0; ++i)
-    fixed_kept_ = changed_[i] == 0 || motion[i] != Motion::fixed;
+  bool any_fixed = false;
+  for (std::uint32_t i = 0; i < motion.size(); ++i) {
+    const bool is_fixed = motion[i] == Motion::fixed;
+    any_fixed = any_fixed || (is_fixed && is_body(i));
+    fixed_kept_ = fixed_kept_ && !(is_fixed && changed_[i] != 0);
+  }
+  bool few = same && any_fixed == any_fixed_ && changed_count_ <= kFewChanged;
+  any_fixed_ = any_fixed;
   found_of_ = {false, reach, self_pairs};
-  const Status status = same && changed_count_ <= kFewChanged ? search_changed() : search_all();
+  if (!few && boxes.size() <= kFewChanged) {
+    few = true;
+    found_.clear();
+    std::fill_n(changed_.data(), changed_.size(), std::uint8_t{1});
+  }
+  const Status status = few ? search_changed() : search_all();
   if (status != Status::kOk) return fail(status, 0);
   std::fill_n(changed_.data(), changed_.size(), std::uint8_t{0});
   changed_count_ = 0;
@@ -364,6 +375,7 @@ Status SceneState::search_all() {
 // The pairs of few bodies that changed, which are looked for among all, instead of those that they had.
 Status SceneState::search_changed() {
   const bool within_reach = found_of_.reach > 0;
+  if (within_reach && !reach_boxes_.resize(boxes.size())) return Status::kOutOfMemory;
   const Buffer<WorldBox>& of = within_reach ? reach_boxes_ : boxes;
   for (std::uint32_t i = 0; within_reach && i < boxes.size(); ++i) {
     if (changed_[i] != 0) reach_boxes_[i] = box_within_reach(i);

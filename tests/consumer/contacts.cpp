@@ -9,21 +9,23 @@ int main(int, char** argv) {
   if (const tandem::Status status = file.open(argv[1]); status != tandem::Status::kOk) {
     return std::printf("%s: %s\n", argv[1], tandem::explain(status)), 1;
   }
+  tandem::Scene scene;
   tandem::ContactQuery query;
   const tandem::AssetView assets[] = {file.view()};
-  if (query.set_assets(assets) != tandem::Status::kOk) return std::puts("not enough memory"), 1;
+  if (scene.set_assets(assets) != tandem::Status::kOk) return std::puts("not enough memory"), 1;
 
   std::vector<tandem::Instance> bodies(10, {.asset = 0, .pose = tandem::kIdentityPose});
   for (const double spacing : {1.5, 1.0, 0.5}) {
     for (std::size_t i = 0; i < bodies.size(); ++i)
       bodies[i].pose.translation[0] = spacing * static_cast<double>(i);
-    if (const tandem::Status status = query.find_contacts(bodies); status != tandem::Status::kOk) {
-      return std::printf("body %d: %s\n", static_cast<int>(query.where()), tandem::explain(status)), 1;
-    }
+    tandem::Status status = scene.place(bodies);
+    if (status == tandem::Status::kOk) status = query.find(scene);
+    if (status != tandem::Status::kOk)
+      return std::printf("body %d: %s\n", static_cast<int>(scene.where()), tandem::explain(status)), 1;
     std::printf("spacing %.1f: %zu pairs of bodies, %zu of triangles\n", spacing, query.pairs().size(),
-                query.contacts().size());
-    if (query.contacts().empty()) continue;
-    const tandem::Contact& first = query.contacts()[0];
+                query.rows().size());
+    if (query.rows().empty()) continue;
+    const tandem::Contact& first = query.rows()[0];
     const tandem::ObjectPair& pair = query.pairs()[first.pair];
     std::printf("  such as face %u of body %u and face %u of body %u\n", first.face_a, pair.a, first.face_b,
                 pair.b);

@@ -64,11 +64,12 @@ void move(tandem::Pose& pose, const Body& body) {
 int main(int, char** argv) {
   using tandem::Motion, tandem::Status;
   tandem::MappedAsset cube;
+  tandem::Scene scene;
   tandem::ContactQuery query;
   tandem::ManifoldQuery manifolds;
   if (cube.open(argv[1]) != Status::kOk) return std::printf("%s cannot be read\n", argv[1]), 1;
   const tandem::AssetView assets[] = {cube.view()};
-  if (query.set_assets(assets) != Status::kOk || manifolds.set_assets(assets) != Status::kOk) return 1;
+  if (scene.set_assets(assets) != Status::kOk) return 1;
   std::vector<tandem::Instance> poses(kBodies, {0, tandem::kIdentityPose});
   std::vector<Body> bodies(kBodies);
   std::vector<Motion> motion(kBodies, Motion::fixed);
@@ -84,12 +85,12 @@ int main(int, char** argv) {
   std::vector<Touch> touches, before;
   for (int step = 1; step <= 1200; ++step) {
     for (Body& body : bodies) body.velocity.z -= 9.81 * kStep * body.by_mass;  // of mass 1, or none
-    if (query.find_contacts(poses, {.filter = &filter}) != Status::kOk) return 1;
-    if (manifolds.make(poses, query.pairs(), query.contacts()) != Status::kOk) return 1;
+    if (scene.place(poses, filter) != Status::kOk || query.find(scene) != Status::kOk) return 1;
+    if (manifolds.find(scene, query) != Status::kOk) return 1;
     std::swap(touches, before), touches.clear();
     double deepest = 0;
     for (const tandem::ManifoldPoint& p : manifolds.points()) {
-      const tandem::Manifold& m = manifolds.manifolds()[p.manifold];
+      const tandem::Manifold& m = manifolds.rows()[p.manifold];
       const auto [i, j] = query.pairs()[m.pair];
       Body &a = bodies[i], &b = bodies[j];
       for (const std::uint32_t k : {i, j})  // who is hit wakes

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "engine_pile.h"
+#include "kernels/asked.h"
 
 namespace tandem::test {
 namespace {
@@ -23,14 +24,14 @@ TEST_P(Engine, FindsThePairsThatContactQueryFindsStepAfterStep) {
   const auto engine = make_engine(GetParam());
   EXPECT_EQ(engine->name(), GetParam());
   engine->set_shapes(pile.assets.views());
-  ContactQuery query;
+  test::Asked<ContactQuery> query;
   ASSERT_EQ(query.set_assets(pile.assets.views()), Status::kOk);
   for (int step = 0; step < 3; ++step) {
     const ContactList list = found_by(*engine, pile);
-    ASSERT_EQ(query.find_contacts(pile.bodies), Status::kOk);
+    ASSERT_EQ(query.find(pile.bodies), Status::kOk);
     ContactList expected;
     expected.pairs.assign(query.pairs().begin(), query.pairs().end());
-    for (const Contact& c : query.contacts()) {
+    for (const Contact& c : query.rows()) {
       expected.triangles.push_back({c.pair, c.triangle_a, c.triangle_b});
     }
     std::sort(expected.triangles.begin(), expected.triangles.end());

@@ -495,9 +495,9 @@ std::ostream& operator<<(std::ostream& out, const FaceContact& contact) {
              << ')';
 }
 
-FaceContacts found_contacts(const ContactQuery& query) {
+FaceContacts found_contacts(const test::Asked<ContactQuery>& query) {
   FaceContacts out;
-  for (const Contact& contact : query.contacts()) {
+  for (const Contact& contact : query.rows()) {
     const ObjectPair pair = query.pairs()[contact.pair];
     FaceContact face = {pair.a, pair.b, contact.face_a, contact.face_b};
     if (pair.a > pair.b) face = {pair.b, pair.a, contact.face_b, contact.face_a};

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "build/sample_asset.h"
+#include "kernels/asked.h"
 #include "kernels/geometry/triangle_test.h"
 #include "random_pose.h"
 #include "tandem/kernels/contact_query.h"
@@ -87,7 +88,7 @@ std::ostream& operator<<(std::ostream& out, const FaceContact& contact);
 using FaceContacts = std::vector<FaceContact>;  // sorted
 
 /// What the last call found; a contact that was reported twice is there twice.
-FaceContacts found_contacts(const ContactQuery& query);
+FaceContacts found_contacts(const test::Asked<ContactQuery>& query);
 
 using PosedTriangle = std::array<std::array<double, 3>, 3>;
 

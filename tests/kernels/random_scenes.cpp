@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <tuple>
 
+#include "kernels/asked.h"
 #include "solid_meshes.h"
 
 namespace tandem::test {
@@ -163,8 +164,8 @@ class Maker {
       const double middle = 0.5 * (touching + apart);
       stand(body, other, direction, middle);
       const Instance both[] = {posed(other), posed(body)};
-      require(query_.find_contacts(both, {.first_contact_only = true}), "contacts");
-      (query_.contacts().empty() ? apart : touching) = middle;
+      require(query_.find(both, {.first_contact_only = true}), "contacts");
+      (query_.rows().empty() ? apart : touching) = middle;
     }
     return touching;
   }
@@ -190,7 +191,7 @@ class Maker {
 
   std::span<const AssetView> meshes_;
   RandomPoses random_;
-  ContactQuery query_;
+  Asked<ContactQuery> query_;
   std::uint32_t first_;  // the mesh that sets the scale
   double size_, far_;
   double origin_[3];
@@ -307,19 +308,19 @@ SampleAssets sample_meshes() {
   return assets;
 }
 
-CpuDetection::CpuDetection(std::span<const AssetView> meshes, std::uint32_t threads) : threads_(threads) {
-  require(query_.set_assets(meshes), "contacts");
-  require(manifolds_.set_assets(meshes), "manifolds");
-  require(containment_.set_assets(meshes), "containment");
+CpuDetection::CpuDetection(std::span<const AssetView> meshes, std::uint32_t threads) {
+  scene_.set_threads(threads);
+  require(scene_.set_assets(meshes), "assets");
 }
 
 Detected CpuDetection::step(std::span<const Instance> instances) {
-  require(query_.find_contacts(instances, {.threads = threads_}), "contacts");
-  require(manifolds_.make(instances, query_.pairs(), query_.contacts(), {.threads = threads_}), "manifolds");
-  require(containment_.find(instances, query_.pairs(), query_.contacts(), threads_), "containment");
+  require(scene_.place(instances), "bodies");
+  require(query_.find(scene_), "contacts");
+  require(manifolds_.find(scene_, query_), "manifolds");
+  require(containment_.find(scene_, query_), "containment");
   const auto copy = [](auto list) { return std::vector(list.begin(), list.end()); };
-  Detected out = {copy(query_.pairs()),      copy(query_.contacts()), copy(manifolds_.manifolds()),
-                  copy(manifolds_.points()), manifolds_.counters(),   copy(containment_.contained())};
+  Detected out = {copy(query_.pairs()),      copy(query_.rows()),   copy(manifolds_.rows()),
+                  copy(manifolds_.points()), manifolds_.counters(), copy(containment_.rows())};
   sort(out.contacts);
   return out;
 }

@@ -52,7 +52,7 @@ class CpuDetection {
   Detected step(std::span<const Instance> instances);
 
  private:
-  std::uint32_t threads_;
+  Scene scene_;
   ContactQuery query_;
   ManifoldQuery manifolds_;
   ContainmentQuery containment_;

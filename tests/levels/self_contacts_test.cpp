@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <random>
 
+#include "kernels/asked.h"
 #include "kernels/solid_meshes.h"
 #include "levels/stored_level.h"
 #include "tandem/kernels/contact_query.h"
@@ -40,13 +41,13 @@ bool share_a_corner(const Triangle& a, const Triangle& b) {
 }
 
 std::uint64_t found_by_query(const AssetView& asset) {
-  ContactQuery query;
+  test::Asked<ContactQuery> query;
   const Instance instance = {0, kIdentityPose};
   const ObjectPair itself = {0, 0};
   EXPECT_EQ(query.set_assets({&asset, 1}), Status::kOk);
-  EXPECT_EQ(query.find_contacts({&instance, 1}, {&itself, 1}, {}), Status::kOk);
+  EXPECT_EQ(query.find({&instance, 1}, {&itself, 1}, {}), Status::kOk);
   const Triangle* triangles = asset.level().triangles;
-  return std::count_if(query.contacts().begin(), query.contacts().end(), [&](const Contact& contact) {
+  return std::count_if(query.rows().begin(), query.rows().end(), [&](const Contact& contact) {
     return !share_a_corner(triangles[contact.triangle_a], triangles[contact.triangle_b]);
   });
 }

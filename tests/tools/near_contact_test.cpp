@@ -8,6 +8,7 @@
 
 #include "build/sample_asset.h"
 #include "bvhbench/pose_work.h"
+#include "kernels/asked.h"
 #include "parallel/parallel.h"
 #include "statistics/statistics.h"
 
@@ -200,7 +201,7 @@ TEST(PoseWork, DoesNotDependOnThreads) {
 TEST(PoseWork, ExpectedWorkIsThatOfBoxesInTheFirstValidationPoses) {
   const TestAsset body(ring(300, 10));
   const AssetView assets[] = {body.asset.view};
-  ContactQuery query;
+  test::Asked<ContactQuery> query;
   ASSERT_EQ(query.set_assets(assets), Status::kOk);
   constexpr std::uint32_t kPoses = 20;
   double block_pairs = 0, candidates = 0;
@@ -209,7 +210,7 @@ TEST(PoseWork, ExpectedWorkIsThatOfBoxesInTheFirstValidationPoses) {
     poses.push_back(pose.b);
     const Instance instances[] = {{0, kIdentityPose}, {0, pose.b}};
     const ObjectPair pair = {0, 1};
-    ASSERT_EQ(query.find_contacts(instances, {&pair, 1}, {.mode = QueryMode::boxes}), Status::kOk);
+    ASSERT_EQ(query.find(instances, {&pair, 1}, {.mode = QueryMode::boxes}), Status::kOk);
     block_pairs += static_cast<double>(query.counters().block_pairs) / kPoses;
     candidates += static_cast<double>(query.counters().candidates) / kPoses;
   }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "build/sample_asset.h"
+#include "kernels/asked.h"
 #include "kernels/common/traversal.h"
 #include "kernels/geometry/oriented_test.h"
 #include "statistics/near_contact.h"
@@ -22,11 +23,11 @@ FacePairs contacts(const AssetView& a, const AssetView& b, const Pose& pose_of_b
   const AssetView assets[] = {a, b};
   const Instance instances[] = {{0, kIdentityPose}, {1, pose_of_b}};
   const ObjectPair pair = {0, 1};
-  ContactQuery query;
+  test::Asked<ContactQuery> query;
   EXPECT_EQ(query.set_assets(assets), Status::kOk);
-  EXPECT_EQ(query.find_contacts(instances, {&pair, 1}, {}), Status::kOk);
+  EXPECT_EQ(query.find(instances, {&pair, 1}, {}), Status::kOk);
   FacePairs faces;
-  for (const Contact& contact : query.contacts()) faces.insert({contact.face_a, contact.face_b});
+  for (const Contact& contact : query.rows()) faces.insert({contact.face_a, contact.face_b});
   return faces;
 }
 

@@ -7,6 +7,7 @@
 #include <map>
 #include <vector>
 
+#include "kernels/asked.h"
 #include "kernels/contact/narrow_phase.h"
 #include "kernels/geometry/grid_test.h"
 #include "kernels/query_scenes.h"
@@ -39,7 +40,8 @@ INSTANTIATE_TEST_SUITE_P(All, Scenes, testing::ValuesIn(test::scene_families()),
                          [](const auto& test) { return std::string(test.param.name); });
 
 /// The pairs by world boxes, which hold all posed vertices.
-void expect_pairs_of_world_boxes(const BodyScene& scene, const ContactQuery& query, bool selves) {
+void expect_pairs_of_world_boxes(const BodyScene& scene, const test::Asked<ContactQuery>& query,
+                                 bool selves) {
   const auto count = static_cast<std::uint32_t>(scene.instances.size());
   std::vector<WorldBox> boxes;
   for (std::uint32_t i = 0; i < count; ++i) {
@@ -65,9 +67,9 @@ void expect_pairs_of_world_boxes(const BodyScene& scene, const ContactQuery& que
   EXPECT_EQ(found, expected);
 }
 
-void expect_sound_contacts(const BodyScene& scene, const ContactQuery& query) {
+void expect_sound_contacts(const BodyScene& scene, const test::Asked<ContactQuery>& query) {
   std::uint32_t last = 0;
-  for (const Contact& contact : query.contacts()) {
+  for (const Contact& contact : query.rows()) {
     ASSERT_GE(contact.pair, last);
     ASSERT_LT(contact.pair, query.pairs().size());
     last = contact.pair;
@@ -85,24 +87,24 @@ void expect_sound_contacts(const BodyScene& scene, const ContactQuery& query) {
   }
 }
 
-void expect_sound_counters(const ContactQuery& query) {
+void expect_sound_counters(const test::Asked<ContactQuery>& query) {
   const ContactCounters& c = query.counters();
   EXPECT_EQ(c.object_pairs, query.pairs().size());
-  EXPECT_EQ(c.contacts, query.contacts().size());
+  EXPECT_EQ(c.contacts, query.rows().size());
   EXPECT_EQ(c.candidates, c.decided_by_float32 + c.decided_by_float64 + c.decided_exactly);
   EXPECT_GE(c.candidates, c.contacts);
   EXPECT_GE(c.block_pairs, c.object_pairs);
 }
 
 TEST_P(Scenes, HaveTheContactsOfExactArithmeticOnAllPairsOfTriangles) {
-  ContactQuery query;
+  test::Asked<ContactQuery> query;
   ContactCounters sum{};
   const int count = test::trials(250, 200);
   for_scenes(count, [&](const BodyScene& scene, int seed) {
     ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
     ContactOptions options;
     options.self_pairs = seed % 3 == 0;
-    ASSERT_EQ(query.find_contacts(scene.instances, options), Status::kOk);
+    ASSERT_EQ(query.find(scene.instances, options), Status::kOk);
     EXPECT_EQ(found_contacts(query), all_contacts(scene, options.self_pairs));
     expect_pairs_of_world_boxes(scene, query, options.self_pairs);
     expect_sound_contacts(scene, query);
@@ -122,10 +124,10 @@ TEST_P(Scenes, HaveTheContactsOfExactArithmeticOnAllPairsOfTriangles) {
 
 /// decide_exact(), by which the test above judges, against CGAL.
 TEST_P(Scenes, HaveTheContactsThatCgalFinds) {
-  ContactQuery query;
+  test::Asked<ContactQuery> query;
   for_scenes(test::trials(40, 50), [&](const BodyScene& scene, int) {
     ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-    ASSERT_EQ(query.find_contacts(scene.instances), Status::kOk);
+    ASSERT_EQ(query.find(scene.instances), Status::kOk);
     FaceContacts expected;
     for (std::uint32_t b = 1; b < scene.instances.size(); ++b) {
       for (std::uint32_t a = 0; a < b; ++a) {
@@ -143,16 +145,16 @@ TEST_P(Scenes, HaveTheContactsThatCgalFinds) {
 }
 
 TEST_P(Scenes, HaveTheirContactsAmongTheCandidates) {
-  ContactQuery exact, boxes;
+  test::Asked<ContactQuery> exact, boxes;
   std::uint64_t dropped = 0;
   for_scenes(test::trials(60, 100), [&](const BodyScene& scene, int seed) {
     ContactOptions options;
     options.self_pairs = seed % 2 == 0;
     ASSERT_EQ(exact.set_assets(scene.assets.views()), Status::kOk);
     ASSERT_EQ(boxes.set_assets(scene.assets.views()), Status::kOk);
-    ASSERT_EQ(exact.find_contacts(scene.instances, options), Status::kOk);
+    ASSERT_EQ(exact.find(scene.instances, options), Status::kOk);
     options.mode = QueryMode::boxes;
-    ASSERT_EQ(boxes.find_contacts(scene.instances, options), Status::kOk);
+    ASSERT_EQ(boxes.find(scene.instances, options), Status::kOk);
     const FaceContacts contacts = found_contacts(exact), candidates = found_contacts(boxes);
     EXPECT_TRUE(std::includes(candidates.begin(), candidates.end(), contacts.begin(), contacts.end()));
     EXPECT_EQ(std::adjacent_find(candidates.begin(), candidates.end()), candidates.end());
@@ -171,21 +173,21 @@ TEST_P(Scenes, HaveTheirContactsAmongTheCandidates) {
 }
 
 TEST_P(Scenes, HaveAFirstContactWhereTheyHaveAny) {
-  ContactQuery all, first;
+  test::Asked<ContactQuery> all, first;
   for_scenes(test::trials(60, 100), [&](const BodyScene& scene, int seed) {
     ContactOptions options;
     options.self_pairs = seed % 2 == 0;
     options.mode = seed % 5 == 0 ? QueryMode::boxes : QueryMode::exact;
     ASSERT_EQ(all.set_assets(scene.assets.views()), Status::kOk);
     ASSERT_EQ(first.set_assets(scene.assets.views()), Status::kOk);
-    ASSERT_EQ(all.find_contacts(scene.instances, options), Status::kOk);
+    ASSERT_EQ(all.find(scene.instances, options), Status::kOk);
     options.first_contact_only = true;
-    ASSERT_EQ(first.find_contacts(scene.instances, options), Status::kOk);
+    ASSERT_EQ(first.find(scene.instances, options), Status::kOk);
     std::vector<Contact> expected;
-    for (const Contact& contact : all.contacts()) {
+    for (const Contact& contact : all.rows()) {
       if (expected.empty() || expected.back().pair != contact.pair) expected.push_back(contact);
     }
-    const std::vector<Contact> found(first.contacts().begin(), first.contacts().end());
+    const std::vector<Contact> found(first.rows().begin(), first.rows().end());
     // In the order of discovery, so the first of all.
     EXPECT_EQ(found, expected);
     EXPECT_EQ(first.counters().contacts, expected.size());
@@ -300,13 +302,13 @@ TEST(ContactQuery, FindsAllContactsOfDenseMeshes) {
                        random.below(2) == 0 ? build::Imaginary::minimal : build::Imaginary::free);
     }
     for (std::uint32_t k = 0; k < 3; ++k) scene.instances.push_back({k % 2, any_rotation(random)});
-    ContactQuery query;
+    test::Asked<ContactQuery> query;
     ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
     ContactOptions options;
     options.self_pairs = true;
-    ASSERT_EQ(query.find_contacts(scene.instances, options), Status::kOk);
+    ASSERT_EQ(query.find(scene.instances, options), Status::kOk);
     EXPECT_EQ(found_contacts(query), all_contacts(scene, true));
-    EXPECT_GT(query.contacts().size(), 2000u);
+    EXPECT_GT(query.rows().size(), 2000u);
   }
 }
 

@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "kernels/asked.h"
 #include "kernels/query_scenes.h"
 #include "tandem/kernels/contact_query.h"
 
@@ -14,11 +15,12 @@ using test::BodyScene;
 using test::found_contacts;
 using test::RandomPoses;
 
-inline std::vector<Contact> contacts_of(const ContactQuery& query) {
-  return {query.contacts().begin(), query.contacts().end()};
+template <typename Query>
+std::vector<Contact> contacts_of(const Query& query) {
+  return {query.rows().begin(), query.rows().end()};
 }
 
-inline std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_of(const ContactQuery& query) {
+inline std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_of(const test::Asked<ContactQuery>& query) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> out;
   for (const ObjectPair& pair : query.pairs()) out.emplace_back(pair.a, pair.b);
   return out;
@@ -59,15 +61,15 @@ class Query : public testing::Test {
  protected:
   void ask(const BodyScene& scene, const ContactOptions& options = {}) {
     ASSERT_EQ(query_.set_assets(scene.assets.views()), Status::kOk);
-    ASSERT_EQ(query_.find_contacts(scene.instances, options), Status::kOk);
+    ASSERT_EQ(query_.find(scene.instances, options), Status::kOk);
   }
   void ask(const BodyScene& scene, const std::vector<ObjectPair>& pairs, const ContactOptions& options = {}) {
     ASSERT_EQ(query_.set_assets(scene.assets.views()), Status::kOk);
-    ASSERT_EQ(query_.find_contacts(scene.instances, pairs, options), Status::kOk);
+    ASSERT_EQ(query_.find(scene.instances, pairs, options), Status::kOk);
   }
   void expect_nothing() {
     EXPECT_TRUE(query_.pairs().empty());
-    EXPECT_TRUE(query_.contacts().empty());
+    EXPECT_TRUE(query_.rows().empty());
     EXPECT_EQ(query_.counters(), ContactCounters{});
   }
   /// Right in spite of what came before.
@@ -75,10 +77,10 @@ class Query : public testing::Test {
     const BodyScene scene = row_of_cubes(3);
     ask(scene);
     EXPECT_EQ(found_contacts(query_), all_contacts(scene, false));
-    EXPECT_FALSE(query_.contacts().empty());
+    EXPECT_FALSE(query_.rows().empty());
   }
 
-  ContactQuery query_;
+  test::Asked<ContactQuery> query_;
 };
 
 }  // namespace tandem

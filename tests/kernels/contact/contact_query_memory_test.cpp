@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <vector>
 
+#include "kernels/asked.h"
 #include "kernels/query_scenes.h"
 #include "tandem/kernels/contact_query.h"
 #include "tandem/kernels/detail/available_memory.h"
@@ -106,9 +107,9 @@ BodyScene crowd() {
 }
 
 /// The allocations of one call.
-long allocations_of(ContactQuery& query, const BodyScene& scene, const ContactOptions& options) {
+long allocations_of(test::Asked<ContactQuery>& query, const BodyScene& scene, const ContactOptions& options) {
   const long before = allocations;
-  EXPECT_EQ(query.find_contacts(scene.instances, options), Status::kOk);
+  EXPECT_EQ(query.find(scene.instances, options), Status::kOk);
   return allocations - before;
 }
 
@@ -124,14 +125,15 @@ TEST(QueryMemory, IsNotAllocatedInASteadyState) {
   const BodyScene scene = crowd();
   for (const std::uint32_t threads : {1u, 3u}) {
     for (const bool selves : {false, true}) {
-      ContactQuery query;
+      test::Asked<ContactQuery> query;
       ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-      const ContactOptions options = {QueryMode::exact, false, selves, threads};
+      query.scene.set_threads(threads);
+      const ContactOptions options = {.self_pairs = selves};
       EXPECT_GT(allocations_of(query, scene, options), 0);
       allocations_of(query, scene, options);
       for (int i = 0; i < 30; ++i)
         EXPECT_EQ(allocations_of(query, scene, options), 0) << threads << ", call " << i;
-      EXPECT_GT(query.contacts().size(), 1000u);
+      EXPECT_GT(query.rows().size(), 1000u);
     }
   }
 }
@@ -139,29 +141,29 @@ TEST(QueryMemory, IsNotAllocatedInASteadyState) {
 /// Refuses memory from the n-th allocation on, or the n-th alone, for every n that a query comes to.
 TEST(QueryMemory, WhereItEndsIsSaidAndForgotten) {
   const BodyScene scene = crowd();
-  ContactQuery whole;
+  test::Asked<ContactQuery> whole;
   ASSERT_EQ(whole.set_assets(scene.assets.views()), Status::kOk);
-  ASSERT_EQ(whole.find_contacts(scene.instances), Status::kOk);
+  ASSERT_EQ(whole.find(scene.instances), Status::kOk);
   for (const std::uint32_t threads : {1u, 3u}) {
     for (const bool once : {false, true}) {
       bool failed = true;
       for (long n = 0; failed; ++n) {
         ASSERT_LT(n, 1000);
-        const ContactOptions options = {QueryMode::exact, false, false, threads};
         failed = false;
         one_fails_only = once;
         fails_from = allocations + n;
         Status assets_set = Status::kOutOfMemory, found = Status::kOutOfMemory;
         bool threw = false, nothing = false;
-        ContactQuery query;
+        test::Asked<ContactQuery> query;
         try {
+          query.scene.set_threads(threads);
           assets_set = query.set_assets(scene.assets.views());
-          if (assets_set == Status::kOk) found = query.find_contacts(scene.instances, options);
+          if (assets_set == Status::kOk) found = query.find(scene.instances);
         } catch (...) {
           threw = true;
         }
         fails_from = -1;
-        nothing = query.contacts().empty() && query.pairs().empty();
+        nothing = query.rows().empty() && query.pairs().empty();
         failed = threw || assets_set != Status::kOk || found != Status::kOk;
         EXPECT_FALSE(threw) << "threads " << threads << ", allocation " << n;
         if (failed && !threw) {
@@ -170,11 +172,10 @@ TEST(QueryMemory, WhereItEndsIsSaidAndForgotten) {
               << name(found) << ", threads " << threads << ", allocation " << n;
           EXPECT_TRUE(nothing) << "threads " << threads << ", allocation " << n;
         }
-        if (query.set_assets(scene.assets.views()) != Status::kOk) continue;  // it has no state
-        ASSERT_EQ(query.find_contacts(scene.instances, options), Status::kOk)
-            << threads << ", allocation " << n;
-        EXPECT_TRUE(std::equal(query.contacts().begin(), query.contacts().end(), whole.contacts().begin(),
-                               whole.contacts().end()));
+        ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+        ASSERT_EQ(query.find(scene.instances), Status::kOk) << threads << ", allocation " << n;
+        EXPECT_TRUE(
+            std::equal(query.rows().begin(), query.rows().end(), whole.rows().begin(), whole.rows().end()));
       }
     }
   }
@@ -187,38 +188,38 @@ TEST(QueryMemory, ThatTheMachineDoesNotHaveIsNotTaken) {
   BodyScene scene;
   scene.assets.add(test::soup(random, 3000, 2));
   for (int i = 0; i < 4; ++i) scene.instances.push_back({0, kIdentityPose});
-  ContactQuery query;
+  test::Asked<ContactQuery> query;
   ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
   for (const std::uint32_t threads : {1u, 3u}) {
-    const ContactOptions options = {QueryMode::boxes, false, false, threads};
+    query.scene.set_threads(threads);
+    const ContactOptions options = {.mode = QueryMode::boxes};
     memory_of_machine = std::uint64_t{70} << 20;
-    EXPECT_EQ(query.find_contacts(scene.instances, options), Status::kOutOfMemory) << threads;
-    EXPECT_TRUE(query.contacts().empty());
+    EXPECT_EQ(query.find(scene.instances, options), Status::kOutOfMemory) << threads;
+    EXPECT_TRUE(query.rows().empty());
     memory_of_machine = UINT64_MAX;
-    ASSERT_EQ(query.find_contacts(scene.instances, options), Status::kOk) << threads;
-    EXPECT_GT(query.contacts().size_bytes(), std::size_t{100} << 20);
-    query = ContactQuery();
+    ASSERT_EQ(query.find(scene.instances, options), Status::kOk) << threads;
+    EXPECT_GT(query.rows().size_bytes(), std::size_t{100} << 20);
+    query = {};
     ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
   }
 }
 
 TEST(QueryThreads, ThatCannotBeStartedAreNamed) {
   const BodyScene scene = crowd();
-  ContactQuery query;
+  test::Asked<ContactQuery> query;
   ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-  ContactOptions options;
-  options.threads = 4;
+  query.scene.set_threads(4);
   for (int left = 0; left < 3; ++left) {
     threads_left = left;
-    const Status status = query.find_contacts(scene.instances, options);
+    const Status status = query.find(scene.instances);
     threads_left = -1;
     EXPECT_EQ(status, Status::kCannotStartThread);
-    EXPECT_TRUE(query.contacts().empty());
+    EXPECT_TRUE(query.rows().empty());
     EXPECT_TRUE(query.pairs().empty());
     EXPECT_EQ(query.counters(), ContactCounters{});
   }
-  EXPECT_EQ(query.find_contacts(scene.instances, options), Status::kOk);
-  EXPECT_FALSE(query.contacts().empty());
+  EXPECT_EQ(query.find(scene.instances), Status::kOk);
+  EXPECT_FALSE(query.rows().empty());
 }
 
 }  // namespace

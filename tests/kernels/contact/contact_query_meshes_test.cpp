@@ -17,6 +17,7 @@
 #include "bvhbuild/meshing/clean.h"
 #include "bvhbuild/meshing/stored_mesh.h"
 #include "bvhbuild/meshing/triangulate.h"
+#include "kernels/asked.h"
 #include "kernels/query_scenes.h"
 
 namespace tandem {
@@ -203,8 +204,8 @@ class QueryOfSharedMesh : public ::testing::TestWithParam<MeshFile> {
   bool touch() {
     ContactOptions options;
     options.first_contact_only = true;
-    EXPECT_EQ(query_.find_contacts(scene_.instances, options), Status::kOk);
-    return !query_.contacts().empty();
+    EXPECT_EQ(query_.find(scene_.instances, options), Status::kOk);
+    return !query_.rows().empty();
   }
 
   /// Instance 1 on its way to instance 0 along a direction.
@@ -217,7 +218,7 @@ class QueryOfSharedMesh : public ::testing::TestWithParam<MeshFile> {
   static constexpr const char* kOther = "link5.stl";
   BodyScene scene_;
   double radius_ = 0;
-  ContactQuery query_;
+  test::Asked<ContactQuery> query_;
 };
 
 TEST_P(QueryOfSharedMesh, FindsTheContactsOfNearPosesThatASweepFinds) {
@@ -241,9 +242,9 @@ TEST_P(QueryOfSharedMesh, FindsTheContactsOfNearPosesThatASweepFinds) {
     }
     for (const double depth : {0.0, 1e-12, 0.01, 0.03}) {
       stand_at(touching - depth * radius_, rotation, direction);
-      ASSERT_EQ(query_.find_contacts(scene_.instances), Status::kOk);
+      ASSERT_EQ(query_.find(scene_.instances), Status::kOk);
       ASSERT_EQ(found_contacts(query_), sweep(scene_, 0, 1)) << "pose " << i << ", depth " << depth;
-      contacts += query_.contacts().size();
+      contacts += query_.rows().size();
     }
   }
   EXPECT_GT(contacts, 0u);
@@ -255,7 +256,7 @@ TEST_P(QueryOfSharedMesh, FindsTheContactsWithinThatASweepFinds) {
   scene_.instances = {{0, centred_at(scene_.assets.views()[0], any_rotation(random), origin)}};
   ContactOptions options;
   options.self_pairs = true;
-  ASSERT_EQ(query_.find_contacts(scene_.instances, options), Status::kOk);
+  ASSERT_EQ(query_.find(scene_.instances, options), Status::kOk);
   EXPECT_EQ(found_contacts(query_), sweep(scene_, 0, 0));
 }
 
@@ -265,9 +266,9 @@ TEST_P(QueryOfSharedMesh, FindsTheContactsWithItsCopyThatASweepFinds) {
   const double origin[3] = {0, 0, 0};
   const Pose pose = centred_at(scene_.assets.views()[0], any_rotation(random), origin);
   scene_.instances = {{0, pose}, {0, pose}};
-  ASSERT_EQ(query_.find_contacts(scene_.instances), Status::kOk);
+  ASSERT_EQ(query_.find(scene_.instances), Status::kOk);
   EXPECT_EQ(found_contacts(query_), sweep(scene_, 0, 1));
-  EXPECT_GE(query_.contacts().size(), scene_.assets.mesh(0).triangles.size());
+  EXPECT_GE(query_.rows().size(), scene_.assets.mesh(0).triangles.size());
 }
 
 INSTANTIATE_TEST_SUITE_P(All, QueryOfSharedMesh, testing::ValuesIn(kFiles), [](const auto& test) {

@@ -16,13 +16,14 @@ TEST_F(Query, DoesNotDependOnThreads) {
     const BodyScene scene = crowd(seed, 60);
     for (const QueryMode mode : {QueryMode::exact, QueryMode::fast, QueryMode::boxes}) {
       for (const bool first_only : {false, true}) {
-        ContactOptions options = {mode, first_only, true, 1};
+        const ContactOptions options = {mode, first_only, true};
+        query_.scene.set_threads(1);
         ask(scene, options);
         const std::vector<Contact> expected = contacts_of(query_);
         const ContactCounters counters = query_.counters();
         EXPECT_GT(counters.object_pairs, 8 * 16u);
         for (const std::uint32_t threads : {0u, 2u, 3u, 8u, 3u, 40u}) {
-          options.threads = threads;
+          query_.scene.set_threads(threads);
           ask(scene, options);
           EXPECT_EQ(contacts_of(query_), expected) << threads;
           EXPECT_EQ(query_.counters(), counters) << threads;
@@ -60,19 +61,20 @@ TEST_F(Query, OfManyInstancesDoesNotDependOnThreads) {
       EXPECT_GT(pairs.size(), static_cast<std::size_t>(instances));
       EXPECT_GT(expected.size(), static_cast<std::size_t>(instances));
       std::reverse(given.begin(), given.end());
-      options.threads = 1;
+      query_.scene.set_threads(1);
       ask(scene, given, options);
       const std::vector<Contact> reversed = contacts_of(query_);
       EXPECT_EQ(reversed.size(), expected.size());
       for (const std::uint32_t threads : {2u, 3u, 4u, 16u, 5u, 100u}) {
-        options.threads = threads;
+        query_.scene.set_threads(threads);
         ask(scene, options);
         EXPECT_EQ(pairs_of(query_), pairs) << threads;
         EXPECT_EQ(contacts_of(query_), expected) << threads;
         EXPECT_EQ(query_.counters(), counters) << threads;
-        ASSERT_EQ(query_.find_pairs(scene.instances, options), Status::kOk);
+        ASSERT_EQ(query_.scene.find_pairs(0, selves), Status::kOk);
+        ASSERT_EQ(query_.find(scene.instances, query_.scene.pairs(), options), Status::kOk);
         EXPECT_EQ(pairs_of(query_), pairs) << threads;
-        ASSERT_EQ(query_.find_contacts(scene.instances, query_.pairs(), options), Status::kOk);
+        ASSERT_EQ(query_.find(scene.instances, query_.pairs(), options), Status::kOk);
         EXPECT_EQ(contacts_of(query_), expected) << threads;
         ask(scene, given, options);
         EXPECT_EQ(contacts_of(query_), reversed) << threads;
@@ -91,8 +93,7 @@ TEST_F(Query, NamesTheFirstInstanceThatItRefusesWhateverTheThreads) {
                                                  {{0, at(0, 1e305, 0)}, Status::kOutOfRange}};
   ASSERT_EQ(query_.set_assets(scene.assets.views()), Status::kOk);
   for (const std::uint32_t threads : {1u, 2u, 4u, 16u}) {
-    ContactOptions options;
-    options.threads = threads;
+    query_.scene.set_threads(threads);
     for (std::size_t kind = 0; kind < 3; ++kind) {
       for (const std::size_t first : {0, 63, 64, 700, 1499}) {
         std::vector<Instance> instances = scene.instances;
@@ -100,16 +101,13 @@ TEST_F(Query, NamesTheFirstInstanceThatItRefusesWhateverTheThreads) {
         for (std::size_t i = first + 1; i < instances.size(); i += 37) {
           instances[i] = refused[(kind + i) % 3].first;
         }
-        EXPECT_EQ(query_.find_contacts(instances, options), refused[kind].second) << threads << " " << first;
-        EXPECT_EQ(query_.where(), first) << threads;
-        expect_nothing();
-        EXPECT_EQ(query_.find_pairs(instances, options), refused[kind].second) << threads << " " << first;
+        EXPECT_EQ(query_.find(instances), refused[kind].second) << threads << " " << first;
         EXPECT_EQ(query_.where(), first) << threads;
         expect_nothing();
       }
     }
-    ASSERT_EQ(query_.find_contacts(scene.instances, options), Status::kOk);
-    EXPECT_FALSE(query_.contacts().empty());
+    ASSERT_EQ(query_.find(scene.instances), Status::kOk);
+    EXPECT_FALSE(query_.rows().empty());
   }
 }
 
@@ -118,7 +116,7 @@ TEST_F(Query, TakesMoreThreadsThanPairs) {
     const BodyScene scene = row_of_cubes(cubes);
     for (const bool selves : {false, true}) {
       ContactOptions options;
-      options.threads = 8;
+      query_.scene.set_threads(8);
       options.self_pairs = selves;
       ask(scene, options);
       EXPECT_EQ(found_contacts(query_), all_contacts(scene, selves));
@@ -130,15 +128,14 @@ TEST_F(Query, ManyObjectsWorkSideBySide) {
   const BodyScene scene = crowd(5, 20);
   ask(scene);
   const std::vector<Contact> expected = contacts_of(query_);
-  std::vector<ContactQuery> queries(4);
+  std::vector<test::Asked<ContactQuery>> queries(4);
   for (int round = 0; round < 3; ++round) {
     for (std::size_t i = 0; i < queries.size(); ++i) {
-      ContactOptions options;
-      options.threads = static_cast<std::uint32_t>(i + 1);
+      queries[i].scene.set_threads(static_cast<std::uint32_t>(i + 1));
       ASSERT_EQ(queries[i].set_assets(scene.assets.views()), Status::kOk);
-      ASSERT_EQ(queries[i].find_contacts(scene.instances, options), Status::kOk);
+      ASSERT_EQ(queries[i].find(scene.instances), Status::kOk);
     }
-    for (const ContactQuery& query : queries) EXPECT_EQ(contacts_of(query), expected);
+    for (const test::Asked<ContactQuery>& query : queries) EXPECT_EQ(contacts_of(query), expected);
   }
 }
 
@@ -149,16 +146,15 @@ TEST_F(Query, ManyObjectsOfManyThreadsWorkAtOnce) {
   const std::vector<Contact> expected = contacts_of(query_);
   const auto work = [&](std::uint32_t first) {
     for (std::uint32_t round = 0; round < 4; ++round) {
-      ContactQuery query;
+      test::Asked<ContactQuery> query;
       EXPECT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-      ContactOptions options;
       for (const std::uint32_t more : {0u, 4u, 1u, 9u}) {
-        options.threads = first + more;
-        EXPECT_EQ(query.find_contacts(scene.instances, options), Status::kOk);
+        query.scene.set_threads(first + more);
+        EXPECT_EQ(query.find(scene.instances), Status::kOk);
         EXPECT_EQ(contacts_of(query), expected);
       }
-      ContactQuery moved = std::move(query);
-      EXPECT_EQ(moved.find_contacts(scene.instances, options), Status::kOk);
+      test::Asked<ContactQuery> moved = std::move(query);
+      EXPECT_EQ(moved.find(scene.instances), Status::kOk);
       EXPECT_EQ(contacts_of(moved), expected);
     }
   };

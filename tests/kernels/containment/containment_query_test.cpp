@@ -26,14 +26,16 @@ using Rows = std::vector<Containment>;
 class Containments : public testing::Test {
  protected:
   Rows find(const BodyScene& scene, const std::vector<ObjectPair>& pairs, std::uint32_t threads = 1) {
-    EXPECT_EQ(contacts_.set_assets(scene.assets.views()), Status::kOk);
-    EXPECT_EQ(contacts_.find_contacts(scene.instances, pairs, {}), Status::kOk);
-    EXPECT_EQ(query_.set_assets(scene.assets.views()), Status::kOk);
-    EXPECT_EQ(query_.find(scene.instances, pairs, contacts_.contacts(), threads), Status::kOk);
-    return {query_.contained().begin(), query_.contained().end()};
+    scene_.set_threads(threads);
+    EXPECT_EQ(scene_.set_assets(scene.assets.views()), Status::kOk);
+    EXPECT_EQ(scene_.place(scene.instances), Status::kOk);
+    EXPECT_EQ(contacts_.find(scene_, pairs, {}), Status::kOk);
+    EXPECT_EQ(query_.find(scene_, contacts_), Status::kOk);
+    return {query_.rows().begin(), query_.rows().end()};
   }
   Rows find(const BodyScene& scene) { return find(scene, every_pair(scene, true)); }
 
+  Scene scene_;
   ContactQuery contacts_;
   ContainmentQuery query_;
 };
@@ -110,7 +112,7 @@ TEST_F(Containments, AreThoseOfBruteForce) {
     const auto pairs = every_pair(scene.scene);
     const Rows expected = all_contained(scene, pairs);
     ASSERT_EQ(find(scene.scene, pairs), expected);
-    touching += contacts_.contacts().size();
+    touching += contacts_.rows().size();
     for (const Containment& row : expected) {
       inside += (row.flags & kInside) != 0;
       open += (row.flags & kOuterOpen) != 0;
@@ -187,44 +189,34 @@ TEST_F(Containments, RefuseWhatQueriesRefuse) {
   nest.scene.instances = {{0, at(0, 0, 0)}, {0, at(0.5, 0, 0)}, {0, at(0, 0.5, 0)}};
   const std::vector<ObjectPair> pairs = {{0, 1}, {0, 2}};
   find(nest.scene, pairs);
-  const std::vector<Contact> contacts(contacts_.contacts().begin(), contacts_.contacts().end());
+  const std::vector<Contact> contacts(contacts_.rows().begin(), contacts_.rows().end());
 
   auto wrong = contacts;
   std::swap(wrong.front(), wrong.back());
-  EXPECT_EQ(query_.find(nest.scene.instances, pairs, wrong), Status::kUnknownContact);
-  EXPECT_EQ(query_.where(), 1u);
+  EXPECT_EQ(query_.find(scene_, pairs, wrong), Status::kUnknownContact);
+  EXPECT_EQ(scene_.where(), 1u);
   wrong = contacts;
   wrong.back().pair = 2;
-  EXPECT_EQ(query_.find(nest.scene.instances, pairs, wrong), Status::kUnknownContact);
-  EXPECT_EQ(query_.where(), wrong.size() - 1);
+  EXPECT_EQ(query_.find(scene_, pairs, wrong), Status::kUnknownContact);
+  EXPECT_EQ(scene_.where(), wrong.size() - 1);
   wrong = contacts;
   wrong[0].triangle_a = 12;
-  EXPECT_EQ(query_.find(nest.scene.instances, pairs, wrong), Status::kUnknownContact);
+  EXPECT_EQ(query_.find(scene_, pairs, wrong), Status::kUnknownContact);
   wrong = contacts;
   wrong[0].triangle_b = 12;
-  EXPECT_EQ(query_.find(nest.scene.instances, pairs, wrong), Status::kUnknownContact);
-  EXPECT_EQ(query_.where(), 0u);
+  EXPECT_EQ(query_.find(scene_, pairs, wrong), Status::kUnknownContact);
+  EXPECT_EQ(scene_.where(), 0u);
 
-  EXPECT_EQ(query_.find(nest.scene.instances, std::vector<ObjectPair>{{0, 1}, {3, 0}}, {}),
-            Status::kUnknownInstance);
-  EXPECT_EQ(query_.where(), 1u);
-  auto instances = nest.scene.instances;
-  instances[1].asset = 1;
-  EXPECT_EQ(query_.find(instances, pairs, contacts), Status::kUnknownAsset);
-  EXPECT_EQ(query_.where(), 1u);
-  instances = nest.scene.instances;
-  instances[2].pose.rotation[0][0] = 1.1;
-  EXPECT_EQ(query_.find(instances, pairs, contacts), Status::kPoseNotRigid);
-  EXPECT_EQ(query_.where(), 2u);
-  EXPECT_TRUE(query_.contained().empty());
+  EXPECT_EQ(query_.find(scene_, std::vector<ObjectPair>{{0, 1}, {3, 0}}, {}), Status::kUnknownInstance);
+  EXPECT_EQ(scene_.where(), 1u);
+  EXPECT_TRUE(query_.rows().empty());
 
   test::Bytes without = test::made_file(std::vector{test::built_level(cube(1))}, true, false);
   const CheckResult checked = without.check();
   ASSERT_EQ(checked.status, Status::kOk);
-  EXPECT_EQ(query_.set_assets(std::vector{nest.scene.assets.views()[0], checked.asset}), Status::kNoTopology);
-  EXPECT_EQ(query_.where(), 1u);
-  EXPECT_EQ(query_.find(nest.scene.instances, pairs, {}), Status::kUnknownAsset);
-  EXPECT_EQ(query_.set_assets(std::vector{AssetView{}}), Status::kUnknownAsset);
+  EXPECT_EQ(scene_.set_assets(std::vector{nest.scene.assets.views()[0], checked.asset}), Status::kOk);
+  EXPECT_EQ(query_.find(scene_, {}, {}), Status::kNoTopology);
+  EXPECT_EQ(scene_.where(), 1u);
 }
 
 }  // namespace

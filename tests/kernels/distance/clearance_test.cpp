@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "kernels/asked.h"
 #include "kernels/contact/contact_query_fixture.h"
 #include "kernels/contact/narrow_phase.h"
 #include "kernels/geometry/grid_test.h"
@@ -62,41 +63,41 @@ INSTANTIATE_TEST_SUITE_P(All, ClearanceScenes, testing::ValuesIn(test::scene_fam
                          [](const auto& test) { return std::string(test.param.name); });
 
 TEST_P(ClearanceScenes, HaveThePairsOfExactArithmeticOnAllTriangles) {
-  ContactQuery query;
+  test::Asked<ContactQuery> query;
   std::uint64_t beyond_contacts = 0;
   for_scenes(test::trials(30, 20), [&](const BodyScene& scene, double d, int seed) {
     ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
     ContactOptions options;
     options.self_pairs = seed % 3 == 0;
     options.within = d;
-    options.threads = 1 + static_cast<std::uint32_t>(seed % 2);
-    ASSERT_EQ(query.find_contacts(scene.instances, options), Status::kOk);
+    query.scene.set_threads(1 + static_cast<std::uint32_t>(seed % 2));
+    ASSERT_EQ(query.find(scene.instances, options), Status::kOk);
     EXPECT_EQ(found_contacts(query), all_within(scene, d, options.self_pairs)) << d;
     const ContactCounters& c = query.counters();
     EXPECT_EQ(c.candidates, c.decided_by_float32 + c.decided_by_float64 + c.decided_exactly);
-    const std::size_t within = query.contacts().size();
+    const std::size_t within = query.rows().size();
     options.within = 0;
-    ASSERT_EQ(query.find_contacts(scene.instances, options), Status::kOk);
-    beyond_contacts += within - query.contacts().size();
+    ASSERT_EQ(query.find(scene.instances, options), Status::kOk);
+    beyond_contacts += within - query.rows().size();
   });
   EXPECT_GT(beyond_contacts, 0u);
 }
 
 TEST_P(ClearanceScenes, HaveAFirstPairWhereTheyHaveAny) {
-  ContactQuery all, first;
+  test::Asked<ContactQuery> all, first;
   for_scenes(test::trials(30, 20), [&](const BodyScene& scene, double d, int) {
     ASSERT_EQ(all.set_assets(scene.assets.views()), Status::kOk);
     ASSERT_EQ(first.set_assets(scene.assets.views()), Status::kOk);
     ContactOptions options;
     options.within = d;
-    ASSERT_EQ(all.find_contacts(scene.instances, options), Status::kOk);
+    ASSERT_EQ(all.find(scene.instances, options), Status::kOk);
     options.first_contact_only = true;
-    ASSERT_EQ(first.find_contacts(scene.instances, options), Status::kOk);
+    ASSERT_EQ(first.find(scene.instances, options), Status::kOk);
     // Which pair comes first is unspecified.
     std::set<std::uint32_t> expected, found;
     const std::vector<Contact> within = contacts_of(all);
     for (const Contact& contact : within) expected.insert(contact.pair);
-    for (const Contact& contact : first.contacts()) {
+    for (const Contact& contact : first.rows()) {
       EXPECT_TRUE(found.insert(contact.pair).second);
       EXPECT_NE(std::find(within.begin(), within.end(), contact), within.end());
     }
@@ -162,61 +163,66 @@ TEST_P(ClearanceScenes, GiveTheSameBitsInEveryVariant) {
 TEST(Clearance, CountsATieAndNothingBeyond) {
   BodyScene scene = row_of_cubes(3);
   for (int i = 0; i < 3; ++i) scene.instances[i].pose.translation[0] = 1.25 * i;
-  ContactQuery query;
+  test::Asked<ContactQuery> query;
   ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-  ASSERT_EQ(query.find_contacts(scene.instances, {.within = 0.25}), Status::kOk);
+  ASSERT_EQ(query.find(scene.instances, {.within = 0.25}), Status::kOk);
   // The faces of two squares, all of them within the gap, and the others' that share an edge with them.
   EXPECT_EQ(found_contacts(query), all_within(scene, 0.25, false));
-  EXPECT_FALSE(query.contacts().empty());
+  EXPECT_FALSE(query.rows().empty());
   EXPECT_GT(query.counters().decided_exactly, 0u);
-  ASSERT_EQ(query.find_contacts(scene.instances, {.within = std::nextafter(0.25, 0)}), Status::kOk);
-  EXPECT_TRUE(query.contacts().empty());
-  ASSERT_EQ(query.find_contacts(scene.instances, {.within = 1.49}), Status::kOk);
+  ASSERT_EQ(query.find(scene.instances, {.within = std::nextafter(0.25, 0)}), Status::kOk);
+  EXPECT_TRUE(query.rows().empty());
+  ASSERT_EQ(query.find(scene.instances, {.within = 1.49}), Status::kOk);
   EXPECT_EQ(query.pairs().size(), 2u);
-  ASSERT_EQ(query.find_contacts(scene.instances, {.within = 1.5}), Status::kOk);
+  ASSERT_EQ(query.find(scene.instances, {.within = 1.5}), Status::kOk);
   EXPECT_EQ(query.pairs().size(), 3u);  // their world boxes are 1.5 apart
 }
 
 TEST(Clearance, TiesAtPythagoreanDistances) {
   BodyScene scene = row_of_cubes(2);
-  ContactQuery query;
+  test::Asked<ContactQuery> query;
   ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
   scene.instances[1].pose = at(4, 5, 0);  // edges 3 and 4 apart
-  ASSERT_EQ(query.find_contacts(scene.instances, {.within = 5}), Status::kOk);
+  ASSERT_EQ(query.find(scene.instances, {.within = 5}), Status::kOk);
   EXPECT_EQ(found_contacts(query), all_within(scene, 5, false));
-  EXPECT_FALSE(query.contacts().empty());
-  ASSERT_EQ(query.find_contacts(scene.instances, {.within = std::nextafter(5, 0)}), Status::kOk);
-  EXPECT_TRUE(query.contacts().empty());
+  EXPECT_FALSE(query.rows().empty());
+  ASSERT_EQ(query.find(scene.instances, {.within = std::nextafter(5, 0)}), Status::kOk);
+  EXPECT_TRUE(query.rows().empty());
   scene.instances[1].pose = at(3, 4, 7);  // corners 2, 3 and 6 apart
-  ASSERT_EQ(query.find_contacts(scene.instances, {.within = 7}), Status::kOk);
+  ASSERT_EQ(query.find(scene.instances, {.within = 7}), Status::kOk);
   EXPECT_EQ(found_contacts(query), all_within(scene, 7, false));
-  EXPECT_FALSE(query.contacts().empty());
-  ASSERT_EQ(query.find_contacts(scene.instances, {.within = std::nextafter(7, 0)}), Status::kOk);
-  EXPECT_TRUE(query.contacts().empty());
+  EXPECT_FALSE(query.rows().empty());
+  ASSERT_EQ(query.find(scene.instances, {.within = std::nextafter(7, 0)}), Status::kOk);
+  EXPECT_TRUE(query.rows().empty());
 }
 
 TEST(Clearance, KeptInstancesAreFoundWithinAnyDistance) {
   const BodyScene scene = crowd(5, 80);
   std::vector<Motion> motion(scene.instances.size(), Motion::moving);
   for (std::size_t i = 0; i < motion.size(); i += 2) motion[i] = Motion::fixed;
-  const PairFilter filter = {.motion = motion.data()};
-  ContactQuery kept, anew;
-  for (ContactQuery* query : {&kept, &anew}) ASSERT_EQ(query->set_assets(scene.assets.views()), Status::kOk);
-  ASSERT_EQ(kept.keep_fixed(scene.instances, motion), Status::kOk);
+  test::Asked<ContactQuery> kept, anew;
+  for (auto* query : {&kept, &anew}) ASSERT_EQ(query->set_assets(scene.assets.views()), Status::kOk);
+  kept.filter.motion = motion.data();
+  std::vector<ObjectPair> not_both_fixed;
+  for (std::uint32_t b = 0; b < motion.size(); ++b) {
+    for (std::uint32_t a = 0; a < b; ++a) {
+      if (a % 2 != 0 || b % 2 != 0) not_both_fixed.push_back({a, b});
+    }
+  }
   for (const double d : {0.0, 0.1, 0.5}) {
-    ASSERT_EQ(kept.find_contacts(scene.instances, {.filter = &filter, .within = d}), Status::kOk);
-    ASSERT_EQ(anew.find_contacts(scene.instances, {.filter = &filter, .within = d}), Status::kOk);
+    ASSERT_EQ(kept.find(scene.instances, {.within = d}), Status::kOk);
+    ASSERT_EQ(anew.find(scene.instances, not_both_fixed, {.within = d}), Status::kOk);
     EXPECT_EQ(found_contacts(kept), found_contacts(anew)) << d;
   }
 }
 
 TEST(Clearance, RefusesWhatIsNoDistance) {
   const BodyScene scene = row_of_cubes(2);
-  ContactQuery query;
+  test::Asked<ContactQuery> query;
   ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
   for (const double d : {-1.0, std::nan(""), HUGE_VAL, 1e301})
-    EXPECT_EQ(query.find_contacts(scene.instances, {.within = d}), Status::kOutOfRange) << d;
-  EXPECT_EQ(query.find_contacts(scene.instances, {.within = 1e300}), Status::kOk);
+    EXPECT_EQ(query.find(scene.instances, {.within = d}), Status::kOutOfRange) << d;
+  EXPECT_EQ(query.find(scene.instances, {.within = 1e300}), Status::kOk);
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
 #include "tandem/kernels/distance_query.h"
+#include "kernels/asked.h"
 
 #include <gtest/gtest.h>
 
@@ -54,8 +55,8 @@ double between(const double* p, const double* q) {
   return std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]);
 }
 
-std::vector<ObjectDistance> distances_of(const DistanceQuery& query) {
-  return {query.distances().begin(), query.distances().end()};
+std::vector<ObjectDistance> distances_of(const test::Asked<DistanceQuery>& query) {
+  return {query.rows().begin(), query.rows().end()};
 }
 
 class DistanceScenes : public testing::TestWithParam<test::SceneFamily> {
@@ -75,17 +76,17 @@ INSTANTIATE_TEST_SUITE_P(All, DistanceScenes, testing::ValuesIn(test::scene_fami
                          [](const auto& test) { return std::string(test.param.name); });
 
 TEST_P(DistanceScenes, EveryIntervalHoldsTheLeastOfAllTriangles) {
-  DistanceQuery query;
+  test::Asked<DistanceQuery> query;
   for_scenes(test::trials(24, 20), [&](const BodyScene& scene, int seed) {
     ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
     const DistanceTolerance tolerance = {seed % 3 == 1 ? 0.01 : 0, seed % 3 == 2 ? 0.1 : 1e-6};
-    ASSERT_EQ(query.find_distances(scene.instances, {.tolerance = tolerance}), Status::kOk);
+    ASSERT_EQ(query.find(scene.instances, {.tolerance = tolerance}), Status::kOk);
     const auto triangles = posed(scene);
     const std::size_t n = scene.instances.size();
     ASSERT_EQ(query.pairs().size(), n * (n - 1) / 2);
     for (std::size_t i = 0; i < query.pairs().size(); ++i) {
       const auto [a, b] = query.pairs()[i];
-      const ObjectDistance& found = query.distances()[i];
+      const ObjectDistance& found = query.rows()[i];
       const DistanceInterval truth = least_distance(triangles[a], triangles[b]);
       EXPECT_LE(found.lower, truth.upper) << a << " " << b;
       EXPECT_GE(found.upper, truth.lower) << a << " " << b;
@@ -108,17 +109,17 @@ TEST_P(DistanceScenes, EveryIntervalHoldsTheLeastOfAllTriangles) {
 }
 
 TEST_P(DistanceScenes, TouchingPairsAreThoseWithContacts) {
-  DistanceQuery query;
-  ContactQuery contacts;
+  test::Asked<DistanceQuery> query;
+  test::Asked<ContactQuery> contacts;
   for_scenes(test::trials(20, 10), [&](const BodyScene& scene, int) {
     ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
     ASSERT_EQ(contacts.set_assets(scene.assets.views()), Status::kOk);
-    ASSERT_EQ(contacts.find_contacts(scene.instances, {.first_contact_only = true}), Status::kOk);
-    ASSERT_EQ(query.find_distances(scene.instances, contacts.pairs(), {.reach = 0}), Status::kOk);
+    ASSERT_EQ(contacts.find(scene.instances, {.first_contact_only = true}), Status::kOk);
+    ASSERT_EQ(query.find(scene.instances, contacts.pairs(), {.reach = 0}), Status::kOk);
     std::vector<bool> touch(contacts.pairs().size());
-    for (const Contact& contact : contacts.contacts()) touch[contact.pair] = true;
+    for (const Contact& contact : contacts.rows()) touch[contact.pair] = true;
     for (std::size_t i = 0; i < touch.size(); ++i)
-      EXPECT_EQ(query.distances()[i].upper == 0, touch[i]) << query.pairs()[i].a << " " << query.pairs()[i].b;
+      EXPECT_EQ(query.rows()[i].upper == 0, touch[i]) << query.pairs()[i].a << " " << query.pairs()[i].b;
     EXPECT_EQ(query.counters().touching,
               static_cast<std::uint64_t>(std::count(touch.begin(), touch.end(), true)));
   });
@@ -162,27 +163,27 @@ TEST_P(DistanceScenes, EveryVariantDoesTheSame) {
 }
 
 TEST_P(DistanceScenes, WhatIsBeyondReachIsToldAsSuch) {
-  DistanceQuery query, all;
+  test::Asked<DistanceQuery> query, all;
   for_scenes(test::trials(8, 10), [&](const BodyScene& scene, int) {
     ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
     ASSERT_EQ(all.set_assets(scene.assets.views()), Status::kOk);
-    ASSERT_EQ(all.find_distances(scene.instances), Status::kOk);
+    ASSERT_EQ(all.find(scene.instances), Status::kOk);
     if (all.pairs().empty()) return;
-    const double reach = all.distances()[all.pairs().size() / 2].lower;
-    ASSERT_EQ(query.find_distances(scene.instances, {.reach = reach}), Status::kOk);
+    const double reach = all.rows()[all.pairs().size() / 2].lower;
+    ASSERT_EQ(query.find(scene.instances, {.reach = reach}), Status::kOk);
     std::size_t next = 0;
     for (std::size_t i = 0; i < all.pairs().size(); ++i) {
       const auto [a, b] = all.pairs()[i];
       const bool there =
           next < query.pairs().size() && query.pairs()[next].a == a && query.pairs()[next].b == b;
-      if (all.distances()[i].upper <= reach) {
+      if (all.rows()[i].upper <= reach) {
         ASSERT_TRUE(there);
       }
       if (!there) continue;
-      const ObjectDistance& found = query.distances()[next++];
-      EXPECT_LE(found.lower, all.distances()[i].upper);
-      EXPECT_GE(found.upper, all.distances()[i].lower);
-      if (all.distances()[i].upper <= reach) {
+      const ObjectDistance& found = query.rows()[next++];
+      EXPECT_LE(found.lower, all.rows()[i].upper);
+      EXPECT_GE(found.upper, all.rows()[i].lower);
+      if (all.rows()[i].upper <= reach) {
         EXPECT_NE(found.triangle_a, kNoIndex);
       }
       if (found.triangle_a == kNoIndex) {
@@ -194,9 +195,9 @@ TEST_P(DistanceScenes, WhatIsBeyondReachIsToldAsSuch) {
 
 TEST(DistanceQuery, ThreadsAndFormerNearestDoNotMatter) {
   const BodyScene scene = spread_out(crowd(3, 60), 4);
-  DistanceQuery query;
+  test::Asked<DistanceQuery> query;
   ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-  ASSERT_EQ(query.find_distances(scene.instances, {.reach = 3}), Status::kOk);
+  ASSERT_EQ(query.find(scene.instances, {.reach = 3}), Status::kOk);
   const std::vector<ObjectDistance> expected = distances_of(query);
   const DistanceCounters counters = query.counters();
   ASSERT_GT(expected.size(), 50u);
@@ -206,15 +207,16 @@ TEST(DistanceQuery, ThreadsAndFormerNearestDoNotMatter) {
     former.push_back({a, b, expected[i].triangle_a, expected[i].triangle_b});
   }
   for (const std::uint32_t threads : {2u, 3u, 16u}) {
-    ASSERT_EQ(query.find_distances(scene.instances, {.reach = 3, .threads = threads}), Status::kOk);
+    query.scene.set_threads(threads);
+    ASSERT_EQ(query.find(scene.instances, {.reach = 3}), Status::kOk);
     EXPECT_EQ(distances_of(query), expected) << threads;
     EXPECT_EQ(query.counters(), counters) << threads;
   }
-  ASSERT_EQ(query.find_distances(scene.instances, {.reach = 3, .former = former}), Status::kOk);
+  ASSERT_EQ(query.find(scene.instances, {.reach = 3, .former = former}), Status::kOk);
   EXPECT_LT(query.counters().block_pairs, counters.block_pairs);
   for (std::size_t i = 0; i < expected.size(); ++i) {
-    EXPECT_LE(query.distances()[i].lower, expected[i].upper);
-    EXPECT_GE(query.distances()[i].upper, expected[i].lower);
+    EXPECT_LE(query.rows()[i].lower, expected[i].upper);
+    EXPECT_GE(query.rows()[i].upper, expected[i].lower);
   }
 }
 
@@ -224,16 +226,17 @@ TEST(DistanceQuery, OneLargePairIsSpreadOverThreadsAlike) {
   scene.assets.add(test::cube(0.5f, 120));  // 172,800 triangles
   scene.assets.add(test::soup(random, 100'000, 0.01));
   scene.instances = {{0, at(0, 0, 0)}, {1, at(1.52, 0.3, -0.2)}, {0, at(3.5, 0, 0)}};
-  DistanceQuery query;
+  test::Asked<DistanceQuery> query;
   ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
   const std::vector<ObjectPair> pairs = {{0, 1}, {2, 0}, {1, 1}};
-  ASSERT_EQ(query.find_distances(scene.instances, pairs, {}), Status::kOk);
+  ASSERT_EQ(query.find(scene.instances, pairs, {}), Status::kOk);
   const std::vector<ObjectDistance> expected = distances_of(query);
   EXPECT_LE(expected[1].lower, 2.5);
   EXPECT_GE(expected[1].upper, 2.5);
   EXPECT_EQ(expected[2].upper, 0);
   for (const std::uint32_t threads : {2u, 5u}) {
-    ASSERT_EQ(query.find_distances(scene.instances, pairs, {.threads = threads}), Status::kOk);
+    query.scene.set_threads(threads);
+    ASSERT_EQ(query.find(scene.instances, pairs, {}), Status::kOk);
     EXPECT_EQ(distances_of(query), expected);
   }
   // The least over all triangles of the soup is that to the face at x = 0.5, found one by one.
@@ -252,11 +255,11 @@ TEST(DistanceQuery, OneLargePairIsSpreadOverThreadsAlike) {
 TEST(DistanceQuery, OfCubesInARowIsTheGap) {
   BodyScene scene = row_of_cubes(3);
   for (int i = 0; i < 3; ++i) scene.instances[i].pose.translation[0] = 1.25 * i;
-  DistanceQuery query;
+  test::Asked<DistanceQuery> query;
   ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-  ASSERT_EQ(query.find_distances(scene.instances, {.reach = 0.25}), Status::kOk);
+  ASSERT_EQ(query.find(scene.instances, {.reach = 0.25}), Status::kOk);
   ASSERT_EQ(query.pairs().size(), 2u);
-  for (const ObjectDistance& found : query.distances()) {
+  for (const ObjectDistance& found : query.rows()) {
     EXPECT_LE(found.lower, 0.25);
     EXPECT_GE(found.upper, 0.25);
     EXPECT_NEAR(between(found.point_a, found.point_b), 0.25, 1e-15);
@@ -265,24 +268,24 @@ TEST(DistanceQuery, OfCubesInARowIsTheGap) {
 
 TEST(DistanceQuery, RefusesWhatIsWrong) {
   const BodyScene scene = row_of_cubes(3);
-  DistanceQuery query;
+  test::Asked<DistanceQuery> query;
   const AssetView nothing[1] = {};
   EXPECT_EQ(query.set_assets(nothing), Status::kUnknownAsset);
   ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-  EXPECT_EQ(query.find_distances(scene.instances, {.reach = -1}), Status::kOutOfRange);
-  EXPECT_EQ(query.find_distances(scene.instances, {.tolerance = {0, NAN}}), Status::kOutOfRange);
+  EXPECT_EQ(query.find(scene.instances, {.reach = -1}), Status::kOutOfRange);
+  EXPECT_EQ(query.find(scene.instances, {.tolerance = {0, NAN}}), Status::kOutOfRange);
   const ObjectPair bad[] = {{0, 1}, {0, 3}};
-  EXPECT_EQ(query.find_distances(scene.instances, bad, {}), Status::kUnknownInstance);
+  EXPECT_EQ(query.find(scene.instances, bad, {}), Status::kUnknownInstance);
   EXPECT_EQ(query.where(), 1u);
   std::vector<Instance> instances = scene.instances;
   instances[1].pose.rotation[0][0] = 2;
-  EXPECT_EQ(query.find_distances(instances), Status::kPoseNotRigid);
+  EXPECT_EQ(query.find(instances), Status::kPoseNotRigid);
   EXPECT_EQ(query.where(), 1u);
   instances[1] = {7, kIdentityPose};
-  EXPECT_EQ(query.find_distances(instances), Status::kUnknownAsset);
-  EXPECT_TRUE(query.pairs().empty() && query.distances().empty());
-  EXPECT_EQ(query.find_distances(scene.instances), Status::kOk);
-  EXPECT_EQ(query.distances().size(), 3u);
+  EXPECT_EQ(query.find(instances), Status::kUnknownAsset);
+  EXPECT_TRUE(query.pairs().empty() && query.rows().empty());
+  EXPECT_EQ(query.find(scene.instances), Status::kOk);
+  EXPECT_EQ(query.rows().size(), 3u);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // The stage for everything that ties: exact where its conditions hold, and the conditions no wider than that.
 #include "kernels/geometry/grid_test.h"
+#include "kernels/asked.h"
 
 #include <gtest/gtest.h>
 
@@ -289,12 +290,12 @@ test::BodyScene stack_of_cubes(RandomPoses& random, double far) {
 TEST(GridTest, DecidesAllOfAStackOfCubes) {
   RandomPoses random(4);
   const test::BodyScene scene = stack_of_cubes(random, 1e7);
-  ContactQuery query;
+  test::Asked<ContactQuery> query;
   ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-  ASSERT_EQ(query.find_contacts(scene.instances), Status::kOk);
+  ASSERT_EQ(query.find(scene.instances), Status::kOk);
   EXPECT_EQ(query.counters().decided_by_float32, query.counters().candidates);
   EXPECT_EQ(test::found_contacts(query), all_contacts(scene, false));
-  EXPECT_GT(query.contacts().size(), 10'000u);
+  EXPECT_GT(query.rows().size(), 10'000u);
 }
 
 /// Faces that part or overlap by a last bit of a coordinate, or by far less, among others that touch.
@@ -319,9 +320,9 @@ TEST(GridTest, LeavesToOthersWhatIsMovedByALastBit) {
           break;
       }
     }
-    ContactQuery query;
+    test::Asked<ContactQuery> query;
     ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-    ASSERT_EQ(query.find_contacts(scene.instances), Status::kOk);
+    ASSERT_EQ(query.find(scene.instances), Status::kOk);
     EXPECT_EQ(test::found_contacts(query), all_contacts(scene, false));
     EXPECT_GT(query.counters().decided_by_float32, 0u);
     EXPECT_LT(query.counters().decided_by_float32, query.counters().candidates);

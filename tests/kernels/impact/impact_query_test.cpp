@@ -1,5 +1,6 @@
 // Times of impact, on the CPU.
 #include "tandem/kernels/impact_query.h"
+#include "kernels/asked.h"
 
 #include <gtest/gtest.h>
 
@@ -27,12 +28,25 @@ class Impacts : public testing::Test {
   Impact impact(const MovingScene& moves, const ImpactOptions& options = {}) {
     const ObjectPair pair[] = {{0, 1}};
     EXPECT_EQ(query_.set_assets(moves.scene.assets.views()), Status::kOk);
-    EXPECT_EQ(query_.find(moves.scene.instances, moves.motion, moves.duration, pair, options), Status::kOk);
-    EXPECT_EQ(query_.impacts().size(), 1u);
-    return query_.impacts()[0];
+    EXPECT_EQ(ask_of(moves, moves.duration, pair, options), Status::kOk);
+    EXPECT_EQ(query_.rows().size(), 1u);
+    return query_.rows()[0];
   }
 
-  ImpactQuery query_;
+  /// Asks about the pairs that are found.
+  Status ask_of(const MovingScene& moves, double duration, ImpactOptions options = {}) {
+    options.motion = moves.motion;
+    options.duration = duration;
+    return query_.find(moves.scene.instances, options);
+  }
+  Status ask_of(const MovingScene& moves, double duration, std::span<const ObjectPair> pairs,
+                ImpactOptions options = {}) {
+    options.motion = moves.motion;
+    options.duration = duration;
+    return query_.find(moves.scene.instances, pairs, options);
+  }
+
+  test::Asked<ImpactQuery> query_;
 };
 
 MovingScene two_cubes(const Pose& second, const RigidMotion& first_moves, const RigidMotion& second_moves) {
@@ -142,9 +156,9 @@ TEST_F(Impacts, AnInstanceAndItselfDoNotMoveRelativeToEachOther) {
   moves.add(1, kIdentityPose, moving(1, 2, 3));
   const ObjectPair pairs[] = {{0, 0}, {1, 1}};
   ASSERT_EQ(query_.set_assets(moves.scene.assets.views()), Status::kOk);
-  ASSERT_EQ(query_.find(moves.scene.instances, moves.motion, 1, pairs, {}), Status::kOk);
-  EXPECT_EQ(query_.impacts()[0].status, ImpactStatus::none);
-  EXPECT_EQ(query_.impacts()[1].status, ImpactStatus::at_start);
+  ASSERT_EQ(ask_of(moves, 1, pairs), Status::kOk);
+  EXPECT_EQ(query_.rows()[0].status, ImpactStatus::none);
+  EXPECT_EQ(query_.rows()[1].status, ImpactStatus::at_start);
 }
 
 TEST_F(Impacts, ErrorsAreNamedAndLeaveNothing) {
@@ -152,9 +166,9 @@ TEST_F(Impacts, ErrorsAreNamedAndLeaveNothing) {
   const ObjectPair pair[] = {{0, 1}}, unknown[] = {{0, 1}, {0, 2}};
   ASSERT_EQ(query_.set_assets(moves.scene.assets.views()), Status::kOk);
   const auto ask = [&](double duration = 1, const ImpactOptions& options = {}) {
-    const Status status = query_.find(moves.scene.instances, moves.motion, duration, pair, options);
-    EXPECT_EQ(query_.impacts().size(), status == Status::kOk ? 1u : 0u);
-    EXPECT_EQ(query_.pairs().size(), query_.impacts().size());
+    const Status status = ask_of(moves, duration, pair, options);
+    EXPECT_EQ(query_.rows().size(), status == Status::kOk ? 1u : 0u);
+    EXPECT_EQ(query_.pairs().size(), query_.rows().size());
     return status;
   };
   EXPECT_EQ(ask(), Status::kOk);
@@ -165,9 +179,10 @@ TEST_F(Impacts, ErrorsAreNamedAndLeaveNothing) {
   ImpactOptions options;
   options.tolerance = NAN;
   EXPECT_EQ(ask(1, options), Status::kOutOfRange);
-  EXPECT_EQ(query_.find(moves.scene.instances, moves.motion, 1, unknown, {}), Status::kUnknownInstance);
+  EXPECT_EQ(ask_of(moves, 1, unknown), Status::kUnknownInstance);
   EXPECT_EQ(query_.where(), 1u);
-  EXPECT_EQ(query_.find(moves.scene.instances, std::span(moves.motion).first(1), 1), Status::kMotionMismatch);
+  EXPECT_EQ(query_.find(moves.scene.instances, {.motion = std::span(moves.motion).first(1), .duration = 1}),
+            Status::kMotionMismatch);
   const std::vector<RigidMotion> good = moves.motion;
   const auto refused = [&](double& number, double value) {
     number = value;
@@ -184,27 +199,27 @@ TEST_F(Impacts, ErrorsAreNamedAndLeaveNothing) {
   moves.scene.instances[1].asset = 1;
   EXPECT_EQ(ask(), Status::kUnknownAsset);
   EXPECT_EQ(query_.where(), 1u);
-  EXPECT_EQ(ImpactQuery().find({}, {}, 1), Status::kOk);
+  EXPECT_EQ(test::Asked<ImpactQuery>().find({}, {.duration = 1}), Status::kOk);
 }
 
 TEST_F(Impacts, PairsThatAreLeftOutDoNotMeet) {
   const MovingScene moves = moving_crowd(3, 60);
   ASSERT_EQ(query_.set_assets(moves.scene.assets.views()), Status::kOk);
-  ASSERT_EQ(query_.find(moves.scene.instances, moves.motion, 1), Status::kOk);
+  ASSERT_EQ(ask_of(moves, 1), Status::kOk);
   std::vector<ObjectPair> all;
   for (std::uint32_t b = 1; b < 60; ++b) {
     for (std::uint32_t a = 0; a < b; ++a) all.push_back({a, b});
   }
   const std::vector<ObjectPair> pairs(query_.pairs().begin(), query_.pairs().end());
-  const std::vector<Impact> impacts(query_.impacts().begin(), query_.impacts().end());
-  ASSERT_EQ(query_.find(moves.scene.instances, moves.motion, 1, all, {}), Status::kOk);
+  const std::vector<Impact> impacts(query_.rows().begin(), query_.rows().end());
+  ASSERT_EQ(ask_of(moves, 1, all), Status::kOk);
   EXPECT_LT(pairs.size(), all.size());
   std::size_t matched = 0, meet = 0;
   for (std::size_t i = 0; i < all.size(); ++i) {
     const auto found = std::find_if(pairs.begin(), pairs.end(), [&](const ObjectPair& pair) {
       return pair.a == all[i].a && pair.b == all[i].b;
     });
-    const Impact& impact = query_.impacts()[i];
+    const Impact& impact = query_.rows()[i];
     meet += impact.status != ImpactStatus::none;
     if (found == pairs.end()) {
       EXPECT_EQ(impact.status, ImpactStatus::none) << all[i].a << ' ' << all[i].b;
@@ -220,21 +235,20 @@ TEST_F(Impacts, PairsThatAreLeftOutDoNotMeet) {
 TEST_F(Impacts, ThreadsChangeNothing) {
   const MovingScene moves = moving_crowd(4, 80);
   ASSERT_EQ(query_.set_assets(moves.scene.assets.views()), Status::kOk);
-  ASSERT_EQ(query_.find(moves.scene.instances, moves.motion, 1), Status::kOk);
-  const std::vector<Impact> alone(query_.impacts().begin(), query_.impacts().end());
+  ASSERT_EQ(ask_of(moves, 1), Status::kOk);
+  const std::vector<Impact> alone(query_.rows().begin(), query_.rows().end());
   const ImpactCounters counters = query_.counters();
   EXPECT_EQ(counters.object_pairs, alone.size());
   EXPECT_GT(counters.found, 0u);
   EXPECT_GT(counters.at_start, 0u);
   for (const std::uint32_t threads : {2u, 5u, 16u}) {
-    ImpactOptions options;
-    options.threads = threads;
+    query_.scene.set_threads(threads);
     for (int i = 0; i < 5; ++i) {
-      ASSERT_EQ(query_.find(moves.scene.instances, moves.motion, 1, options), Status::kOk);
-      ASSERT_EQ(query_.impacts().size(), alone.size());
+      ASSERT_EQ(ask_of(moves, 1), Status::kOk);
+      ASSERT_EQ(query_.rows().size(), alone.size());
       EXPECT_EQ(query_.counters(), counters);
       for (std::size_t row = 0; row < alone.size(); ++row) {
-        const Impact &x = query_.impacts()[row], &y = alone[row];
+        const Impact &x = query_.rows()[row], &y = alone[row];
         EXPECT_EQ(x.t_safe, y.t_safe);
         EXPECT_EQ(x.gap, y.gap);
         EXPECT_EQ(x.triangle_a, y.triangle_a);
@@ -251,13 +265,11 @@ TEST_F(Impacts, FiltersLeavePairsOut) {
   const ObjectPair joint[] = {{1, 0}};
   ExcludedPairTable excluded;
   ASSERT_EQ(excluded.set(joint), Status::kOk);
-  const PairFilter filter = {.excluded = excluded.view()};
-  ImpactOptions options;
-  options.filter = &filter;
   ASSERT_EQ(query_.set_assets(moves.scene.assets.views()), Status::kOk);
-  ASSERT_EQ(query_.find(moves.scene.instances, moves.motion, 1), Status::kOk);
+  ASSERT_EQ(ask_of(moves, 1), Status::kOk);
   EXPECT_EQ(query_.pairs().size(), 1u);
-  ASSERT_EQ(query_.find(moves.scene.instances, moves.motion, 1, options), Status::kOk);
+  query_.filter.excluded = excluded.view();
+  ASSERT_EQ(ask_of(moves, 1), Status::kOk);
   EXPECT_EQ(query_.pairs().size(), 0u);
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "kernels/asked.h"
 #include "kernels/contact/contact_query_fixture.h"
 #include "kernels/geometry/triangle_distance.h"
 #include "kernels/solid_meshes.h"
@@ -144,14 +145,14 @@ class ImpactChecker {
     const ObjectPair pair[] = {{pair_[0], pair_[1]}};
     ContactOptions first;
     first.first_contact_only = true;
-    EXPECT_EQ(contacts_.find_contacts(at, pair, first), Status::kOk);
-    return !contacts_.contacts().empty();
+    EXPECT_EQ(contacts_.find(at, pair, first), Status::kOk);
+    return !contacts_.rows().empty();
   }
 
  private:
   const MovingScene& moves_;
   const std::uint32_t pair_[2];
-  ContactQuery contacts_;
+  test::Asked<ContactQuery> contacts_;
 };
 
 /// Random motions, families of them.

@@ -34,11 +34,11 @@ TEST(ManifoldQuery, TheOrderOfTheContactsDoesNotMatter) {
   const std::vector<ManifoldPoint> points(scene.points().begin(), scene.points().end());
   const ManifoldCounters counters = scene.made.counters();
   EXPECT_GT(manifolds.size(), 50u);
-  std::vector<Contact> contacts(scene.query.contacts().begin(), scene.query.contacts().end());
+  std::vector<Contact> contacts(scene.query.rows().begin(), scene.query.rows().end());
   std::mt19937_64 random(2);
   for (int trial = 0; trial < 10; ++trial) {
     std::shuffle(contacts.begin(), contacts.end(), random);
-    ASSERT_EQ(scene.made.make(scene.posed, scene.query.pairs(), contacts, {.match_previous = false}),
+    ASSERT_EQ(scene.made.find(scene.scene, scene.query.pairs(), contacts, {.match_previous = false}),
               Status::kOk);
     EXPECT_TRUE(same_bytes<Manifold>(manifolds, scene.manifolds()));
     EXPECT_TRUE(same_bytes<ManifoldPoint>(points, scene.points()));
@@ -56,8 +56,9 @@ TEST(ManifoldQuery, ThreadsDoNotChangeAByte) {
       for (double& x : one.bodies[i].pose.translation) x += random.symmetric(1e-3);
       many.bodies[i].pose = one.bodies[i].pose;
     }
-    one.find(kIdentityPose, {.threads = 1});
-    many.find(kIdentityPose, {.threads = threads});
+    many.scene.set_threads(threads);
+    one.find(kIdentityPose, {});
+    many.find(kIdentityPose, {});
     EXPECT_TRUE(same_bytes(one.manifolds(), many.manifolds())) << threads;
     EXPECT_TRUE(same_bytes(one.points(), many.points())) << threads;
     EXPECT_EQ(one.made.counters(), many.made.counters());
@@ -158,13 +159,13 @@ TEST(ManifoldQuery, AnInstanceWithItselfHasNone) {
   ManifoldScene scene;
   scene.add_shape(joined(cube(0.5f), moved(cube(0.5f), 0.25f, 0.25f, 0.75f)));
   scene.add_body(0, kIdentityPose);
-  ASSERT_EQ(scene.query.set_assets(scene.assets.views()), Status::kOk);
-  ASSERT_EQ(scene.made.set_assets(scene.assets.views()), Status::kOk);
-  ASSERT_EQ(scene.query.find_contacts(scene.bodies, {.self_pairs = true}), Status::kOk);
-  ASSERT_FALSE(scene.query.contacts().empty());
-  ASSERT_EQ(scene.made.make(scene.bodies, scene.query.pairs(), scene.query.contacts()), Status::kOk);
+  ASSERT_EQ(scene.scene.set_assets(scene.assets.views()), Status::kOk);
+  ASSERT_EQ(scene.scene.place(scene.bodies), Status::kOk);
+  ASSERT_EQ(scene.query.find(scene.scene, {.self_pairs = true}), Status::kOk);
+  ASSERT_FALSE(scene.query.rows().empty());
+  ASSERT_EQ(scene.made.find(scene.scene, scene.query), Status::kOk);
   EXPECT_TRUE(scene.manifolds().empty());
-  EXPECT_EQ(scene.made.counters().contacts, scene.query.contacts().size());
+  EXPECT_EQ(scene.made.counters().contacts, scene.query.rows().size());
 }
 
 // Two bodies that overlap in several places, or not at all.
@@ -413,14 +414,13 @@ class WrongInput : public testing::Test {
     scene.add_body(0, kIdentityPose);
     scene.add_body(0, shift(0.1, 0.2, 0.999));
     scene.find();
-    contacts.assign(scene.query.contacts().begin(), scene.query.contacts().end());
+    contacts.assign(scene.query.rows().begin(), scene.query.rows().end());
     pairs.assign(scene.query.pairs().begin(), scene.query.pairs().end());
-    instances = scene.posed;
     ASSERT_EQ(scene.points().size(), 4u);
   }
   void expect(Status status, std::uint64_t where) {
-    EXPECT_EQ(scene.made.make(instances, pairs, contacts), status);
-    EXPECT_EQ(scene.made.where(), where);
+    EXPECT_EQ(scene.made.find(scene.scene, pairs, contacts), status);
+    EXPECT_EQ(scene.scene.where(), where);
     EXPECT_TRUE(scene.manifolds().empty());
     EXPECT_TRUE(scene.points().empty());
     EXPECT_EQ(scene.made.counters(), ManifoldCounters{});
@@ -431,7 +431,6 @@ class WrongInput : public testing::Test {
   }
 
   ManifoldScene scene;
-  std::vector<Instance> instances;
   std::vector<ObjectPair> pairs;
   std::vector<Contact> contacts;
 };
@@ -453,43 +452,29 @@ TEST_F(WrongInput, PairsThatNameNoInstanceAreRefused) {
   expect(Status::kUnknownInstance, 0);
 }
 
-TEST_F(WrongInput, InstancesThatNameNoAssetAreRefused) {
-  instances[1].asset = 1;
-  expect(Status::kUnknownAsset, 1);
-}
-
-TEST_F(WrongInput, PosesThatAreNotRigidOrTooFarAreRefused) {
-  instances[1].pose.rotation[0][0] = 1.001;
-  expect(Status::kPoseNotRigid, 1);
-  instances = scene.posed;
-  instances[0].pose.translation[2] = 1e301;
-  expect(Status::kOutOfRange, 0);
-}
-
 TEST(ManifoldQuery, AssetsWithoutTopologyAreRefused) {
   SampleAssets assets;
   assets.add(cube(0.5f));
   Bytes file(make_file(cube(0.5f)));
   const AssetView view = file.check().asset;
   file.section(SectionKind::topology).kind = SectionKind::provenance;
+  Scene scene;
   ManifoldQuery made;
   const AssetView both[] = {assets.views()[0], view};
-  EXPECT_EQ(made.set_assets(both), Status::kNoTopology);
-  EXPECT_EQ(made.where(), 1u);
-  const AssetView none[] = {AssetView{}};
-  EXPECT_EQ(made.set_assets(none), Status::kUnknownAsset);
-  EXPECT_EQ(made.where(), 0u);
-  // There are no assets now.
-  const Instance instance = {0, kIdentityPose};
-  EXPECT_EQ(made.make({&instance, 1}, {}, {}), Status::kUnknownAsset);
+  ASSERT_EQ(scene.set_assets(both), Status::kOk);
+  EXPECT_EQ(made.find(scene, {}, {}), Status::kNoTopology);
+  EXPECT_EQ(scene.where(), 1u);
+  ASSERT_EQ(scene.set_assets(assets.views()), Status::kOk);
+  EXPECT_EQ(made.find(scene, {}, {}), Status::kOk);
 }
 
 TEST(ManifoldQuery, NothingHasNoManifolds) {
+  Scene scene;
   ManifoldQuery made;
-  EXPECT_EQ(made.make({}, {}, {}), Status::kOk);
-  EXPECT_TRUE(made.manifolds().empty());
+  EXPECT_EQ(made.find(scene, {}, {}), Status::kOk);
+  EXPECT_TRUE(made.rows().empty());
   ManifoldQuery moved = std::move(made);
-  EXPECT_EQ(moved.make({}, {}, {}), Status::kOk);
+  EXPECT_EQ(moved.find(scene, {}, {}), Status::kOk);
 }
 
 }  // namespace

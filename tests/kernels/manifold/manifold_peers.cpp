@@ -70,20 +70,20 @@ class TandemPeer final : public Peer {
  public:
   TandemPeer(const Mesh& a, const Mesh& b) {
     assets_.add(a), assets_.add(b);
-    check(query_.set_assets(assets_.views()));
-    check(manifolds_.set_assets(assets_.views()));
+    check(scene_.set_assets(assets_.views()));
   }
   void collide(const Pose& a, const Pose& b) override {
     const Instance bodies[] = {{0, a}, {1, b}};
     const ObjectPair pair[] = {{0, 1}};
-    check(query_.find_contacts(bodies, pair, {}));
-    check(manifolds_.make(bodies, query_.pairs(), query_.contacts(), {.match_previous = false}));
+    check(scene_.place(bodies));
+    check(query_.find(scene_, pair, {}));
+    check(manifolds_.find(scene_, query_, {.match_previous = false}));
   }
   Answer answer() const override {
     Answer out;
     for (const ManifoldPoint& p : manifolds_.points())
-      out.add(vector_of(manifolds_.manifolds()[p.manifold].normal), p.depth);
-    for (const Manifold& m : manifolds_.manifolds()) out.depth = std::max(out.depth, m.depth);
+      out.add(vector_of(manifolds_.rows()[p.manifold].normal), p.depth);
+    for (const Manifold& m : manifolds_.rows()) out.depth = std::max(out.depth, m.depth);
     return out;
   }
 
@@ -93,6 +93,7 @@ class TandemPeer final : public Peer {
   }
 
   SampleAssets assets_;
+  Scene scene_;
   ContactQuery query_;
   ManifoldQuery manifolds_;
 };

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "kernels/asked.h"
 #include "kernels/query_scenes.h"
 #include "kernels/solid_meshes.h"
 #include "tandem/kernels/contact_query.h"
@@ -71,17 +72,17 @@ class ManifoldScene {
   /// Finds the manifolds of all bodies, moved by `motion` first.
   void find(const Pose& motion = kIdentityPose, const ManifoldOptions& options = {.match_previous = false}) {
     if (named_shapes_ != assets.size()) {
-      ASSERT_EQ(query.set_assets(assets.views()), Status::kOk);
-      ASSERT_EQ(made.set_assets(assets.views()), Status::kOk);
+      ASSERT_EQ(scene.set_assets(assets.views()), Status::kOk);
       named_shapes_ = assets.size();
     }
     posed.clear();
     for (const Instance& body : bodies) posed.push_back({body.asset, after(motion, body.pose)});
-    ASSERT_EQ(query.find_contacts(posed), Status::kOk);
-    ASSERT_EQ(made.make(posed, query.pairs(), query.contacts(), options), Status::kOk);
+    ASSERT_EQ(scene.place(posed), Status::kOk);
+    ASSERT_EQ(query.find(scene), Status::kOk);
+    ASSERT_EQ(made.find(scene, query, options), Status::kOk);
   }
 
-  std::span<const Manifold> manifolds() const { return made.manifolds(); }
+  std::span<const Manifold> manifolds() const { return made.rows(); }
   std::span<const ManifoldPoint> points() const { return made.points(); }
   std::span<const ManifoldPoint> points_of(const Manifold& m) const {
     return made.points().subspan(m.first_point, m.point_count);
@@ -89,6 +90,7 @@ class ManifoldScene {
 
   SampleAssets assets;
   std::vector<Instance> bodies, posed;
+  Scene scene;
   ContactQuery query;
   ManifoldQuery made;
 

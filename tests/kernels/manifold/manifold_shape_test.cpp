@@ -292,7 +292,7 @@ TEST(SolidOnSolid, CowsThatHardlyMeetAreNotDeep) {
         scene.bodies[0].pose = first;
         scene.bodies[1].pose = after(shift(x, y, height), second);
         scene.find();
-        return !scene.query.contacts().empty();
+        return !scene.query.rows().empty();
       };
       double apart = 2.5, met = apart;
       while (met > -2.5 && !meets_at(met)) apart = met, met -= 0.05;
@@ -444,8 +444,9 @@ double touching_height(ManifoldScene& scene, Pose pose) {
     const double z = (apart + meeting) / 2;
     pose.translation[0] = x, pose.translation[1] = y, pose.translation[2] = z;
     scene.posed = {scene.bodies[0], {scene.bodies[1].asset, pose}};
-    EXPECT_EQ(scene.query.find_contacts(scene.posed, {.first_contact_only = true}), Status::kOk);
-    (scene.query.contacts().empty() ? apart : meeting) = z;
+    EXPECT_EQ(scene.scene.place(scene.posed), Status::kOk);
+    EXPECT_EQ(scene.query.find(scene.scene, {.first_contact_only = true}), Status::kOk);
+    (scene.query.rows().empty() ? apart : meeting) = z;
   }
   return apart;
 }

@@ -258,14 +258,14 @@ TEST(BroadPhaseFilter, NamesWhatItCannotTakeAndKeepsNothingThen) {
 class FilteredQuery : public Query {};
 
 // The contacts of the pairs that the oracle leaves, of all that a query without a filter finds.
-std::vector<Contact> left_by(const FilterArrays& filter, const ContactQuery& all) {
+std::vector<Contact> left_by(const FilterArrays& filter, const test::Asked<ContactQuery>& all) {
   const FilterOracle oracle(filter);
   std::vector<std::uint32_t> row;
   std::uint32_t rows = 0;
   for (const ObjectPair& pair : all.pairs())
     row.push_back(oracle.looks_at(pair.a, pair.b) ? rows++ : kNoIndex);
   std::vector<Contact> left;
-  for (Contact contact : all.contacts()) {
+  for (Contact contact : all.rows()) {
     contact.pair = row[contact.pair];
     if (contact.pair != kNoIndex) left.push_back(contact);
   }
@@ -275,86 +275,46 @@ std::vector<Contact> left_by(const FilterArrays& filter, const ContactQuery& all
 TEST_F(FilteredQuery, FindsTheContactsOfThePairsThatTheFilterLooksAt) {
   const BodyScene scene = crowd(21, 150);
   const auto count = static_cast<std::uint32_t>(scene.instances.size());
-  ContactQuery all, some, kept;
-  for (ContactQuery* query : {&all, &some, &kept})
-    ASSERT_EQ(query->set_assets(scene.assets.views()), Status::kOk);
+  test::Asked<ContactQuery> all, some;
+  for (auto* query : {&all, &some}) ASSERT_EQ(query->set_assets(scene.assets.views()), Status::kOk);
   for (const unsigned parts : {1u, 6u, 8u, kAllParts}) {
     const FilterArrays filter = random_filter(count, parts, parts);
     ExcludedPairTable table;
     const PairFilter view = filter.view(table);
     for (std::uint32_t threads = 1; threads <= 16; threads += 5) {
-      ContactOptions options;
-      options.threads = threads;
-      options.self_pairs = parts == kAllParts;
-      ASSERT_EQ(all.find_contacts(scene.instances, options), Status::kOk);
+      all.scene.set_threads(threads);
+      some.scene.set_threads(threads);
+      const ContactOptions options = {.self_pairs = parts == kAllParts};
+      ASSERT_EQ(all.find(scene.instances, options), Status::kOk);
       const std::vector<Contact> expected = left_by(filter, all);
       EXPECT_FALSE(expected.empty());
-      EXPECT_LT(expected.size(), all.contacts().size());
-      options.filter = &view;
-      ASSERT_EQ(some.find_contacts(scene.instances, options), Status::kOk);
-      EXPECT_EQ(contacts_of(some), expected);
-      ASSERT_EQ(
-          kept.keep_fixed(scene.instances,
-                          filter.motion.empty() ? std::vector<Motion>(count, Motion::moving) : filter.motion,
-                          options),
-          Status::kOk);
-      ASSERT_EQ(kept.find_contacts(scene.instances, options), Status::kOk);
-      EXPECT_EQ(contacts_of(kept), expected);
-      EXPECT_EQ(kept.counters(), some.counters());
+      EXPECT_LT(expected.size(), all.rows().size());
+      some.filter = view;
+      for (int step = 0; step < 2; ++step) {  // the second keeps what the first found
+        ASSERT_EQ(some.find(scene.instances, options), Status::kOk);
+        EXPECT_EQ(contacts_of(some), expected);
+      }
     }
   }
 }
 
-TEST_F(FilteredQuery, KeptInstancesStayWhereTheyWereUntilTheyAreKeptAnew) {
-  BodyScene scene = row_of_cubes(20);
-  std::vector<Motion> motion(20, Motion::fixed);
-  motion[4] = motion[11] = Motion::moving;
-  ASSERT_EQ(query_.set_assets(scene.assets.views()), Status::kOk);
-  ASSERT_EQ(query_.keep_fixed(scene.instances, motion), Status::kOk);
-  for (std::size_t i = 0; i < 20; ++i) {
-    if (motion[i] == Motion::fixed) scene.instances[i] = {77, at(std::nan(""), 0, 0)};
-  }
-  ASSERT_EQ(query_.find_contacts(scene.instances), Status::kOk);
-  EXPECT_EQ(pairs_of(query_), (Pairs{{3, 4}, {4, 5}, {10, 11}, {11, 12}}));
-  const std::size_t contacts = query_.contacts().size();
-  EXPECT_GT(contacts, 0u);
-  // Given pairs take what is kept too.
-  const ObjectPair given[] = {{5, 4}, {7, 6}};
-  ASSERT_EQ(query_.find_contacts(scene.instances, given, {}), Status::kOk);
-  EXPECT_EQ(query_.contacts().size(), contacts / 2);
-  scene.instances[11].pose.translation[2] = 5;
-  ASSERT_EQ(query_.find_contacts(scene.instances), Status::kOk);
-  EXPECT_EQ(query_.contacts().size(), contacts / 2);
-  scene.instances[11].asset = 1;
-  EXPECT_EQ(query_.find_contacts(scene.instances), Status::kUnknownAsset);
-  EXPECT_EQ(query_.where(), 11u);
-  EXPECT_EQ(query_.find_contacts(std::span(scene.instances).first(12)), Status::kKeptMismatch);
-  EXPECT_TRUE(query_.pairs().empty());
-  EXPECT_EQ(query_.keep_fixed(scene.instances, motion), Status::kUnknownAsset);
-  EXPECT_EQ(query_.where(), 0u);
-  EXPECT_EQ(query_.find_contacts(scene.instances), Status::kUnknownAsset);
-  EXPECT_EQ(query_.where(), 0u);
-  scene = row_of_cubes(20);
-  ASSERT_EQ(query_.keep_fixed(scene.instances, motion), Status::kOk);
-  ASSERT_EQ(query_.set_assets(scene.assets.views()), Status::kOk);
-  ASSERT_EQ(query_.find_pairs(scene.instances), Status::kOk);
-  EXPECT_EQ(query_.pairs().size(), 19u);
-}
-
 // The lines are those of docs/queries.md.
 TEST_F(FilteredQuery, IsAskedAsTheDocumentationShows) {
-  const BodyScene scene = row_of_cubes(3);
-  const std::vector<Instance>& bodies = scene.instances;
-  ContactQuery& query = query_;
-  ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+  const BodyScene cubes = row_of_cubes(3);
+  const std::vector<Instance>& bodies = cubes.instances;
+  Scene scene;
+  ContactQuery query;
+  ASSERT_EQ(scene.set_assets(cubes.assets.views()), Status::kOk);
   const Motion motion[] = {Motion::fixed, Motion::moving, Motion::moving};  // of each instance
   const ObjectPair joints[] = {{1, 2}};
   ExcludedPairTable excluded;
   Status status = excluded.set(joints);
   const PairFilter filter = {.motion = motion, .excluded = excluded.view()};
-  if (status == Status::kOk) status = query.find_contacts(bodies, {.filter = &filter});
+  if (status == Status::kOk) status = scene.place(bodies, filter);
+  if (status == Status::kOk) status = query.find(scene);
   EXPECT_EQ(status, Status::kOk);
-  EXPECT_EQ(pairs_of(query), (Pairs{{0, 1}}));
+  ASSERT_EQ(query.pairs().size(), 1u);
+  EXPECT_EQ(query.pairs()[0].b, 1u);
 }
 
 TEST_F(FilteredQuery, NamesTheExcludedPairOfAnInstanceThatThereIsNot) {
@@ -362,16 +322,13 @@ TEST_F(FilteredQuery, NamesTheExcludedPairOfAnInstanceThatThereIsNot) {
   ExcludedPairTable table;
   const ObjectPair excluded[] = {{0, 1}, {5, 1}, {2, 3}};
   ASSERT_EQ(table.set(excluded), Status::kOk);
-  PairFilter filter;
-  filter.excluded = table.view();
-  ContactOptions options;
-  options.filter = &filter;
+  query_.filter.excluded = table.view();
   ASSERT_EQ(query_.set_assets(scene.assets.views()), Status::kOk);
-  EXPECT_EQ(query_.find_contacts(scene.instances, options), Status::kUnknownInstance);
+  EXPECT_EQ(query_.find(scene.instances), Status::kUnknownInstance);
   EXPECT_EQ(query_.where(), 1u);
   ASSERT_EQ(table.set(std::span(excluded).first(1)), Status::kOk);
-  filter.excluded = table.view();
-  ASSERT_EQ(query_.find_contacts(scene.instances, options), Status::kOk);
+  query_.filter.excluded = table.view();
+  ASSERT_EQ(query_.find(scene.instances), Status::kOk);
   EXPECT_EQ(pairs_of(query_), (Pairs{{1, 2}, {2, 3}, {3, 4}}));
 }
 

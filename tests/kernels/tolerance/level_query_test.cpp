@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <set>
 
+#include "kernels/asked.h"
 #include "kernels/geometry/level_error.h"
 #include "level_scenes.h"
 
@@ -24,9 +25,10 @@ std::vector<ObjectPair> every_pair(std::size_t count) {
 }
 
 /// The pairs of instances, ascending, that have a contact.
-std::set<std::pair<std::uint32_t, std::uint32_t>> pairs_with_contacts(const ContactQuery& query) {
+std::set<std::pair<std::uint32_t, std::uint32_t>> pairs_with_contacts(
+    const test::Asked<ContactQuery>& query) {
   std::set<std::pair<std::uint32_t, std::uint32_t>> out;
-  for (const Contact& contact : query.contacts()) {
+  for (const Contact& contact : query.rows()) {
     const auto [a, b] = query.pairs()[contact.pair];
     out.insert(std::minmax(a, b));
   }
@@ -67,73 +69,71 @@ void for_scenes(int count, Check check) {
 }
 
 TEST(LevelQuery, NoContactAtAnyLevelMeansApartAtTheFinest) {
-  ContactQuery finest, coarse;
+  test::Asked<ContactQuery> finest, coarse;
   std::size_t met = 0, told_apart = 0, asked = 0;
-  for_scenes(test::trials(400, 50),
-             [&](const BodyScene& scene, const LevelViews& views, RandomPoses& random) {
-               const double within =
-                   random.below(2) == 0 ? 0 : test::any_distance(random, scene) * random.uniform(0, 0.2);
-               const std::vector<ObjectPair> pairs = every_pair(scene.instances.size());
-               ASSERT_EQ(finest.set_assets(scene.assets.views()), Status::kOk);
-               ASSERT_EQ(finest.find_contacts(scene.instances, pairs, {.within = within}), Status::kOk);
-               const auto truth = pairs_with_contacts(finest);
-               ASSERT_EQ(coarse.set_assets(views.views), Status::kOk);
-               for (int trial = 0; trial < 6; ++trial) {
-                 const auto bodies = at_levels(scene, views, any_levels(scene, random));
-                 const ContactOptions options = {.first_contact_only = trial % 2 == 0,
-                                                 .threads = 1 + static_cast<std::uint32_t>(trial % 2),
-                                                 .within = within,
-                                                 .add_error_bounds = true};
-                 ASSERT_EQ(trial % 3 == 0 ? coarse.find_contacts(bodies, options)
-                                          : coarse.find_contacts(bodies, pairs, options),
-                           Status::kOk);
-                 const auto near = pairs_with_contacts(coarse);
-                 EXPECT_TRUE(std::includes(near.begin(), near.end(), truth.begin(), truth.end()));
-                 asked += pairs.size();
-                 met += truth.size();
-                 told_apart += pairs.size() - near.size();
-               }
-             });
+  for_scenes(
+      test::trials(400, 50), [&](const BodyScene& scene, const LevelViews& views, RandomPoses& random) {
+        const double within =
+            random.below(2) == 0 ? 0 : test::any_distance(random, scene) * random.uniform(0, 0.2);
+        const std::vector<ObjectPair> pairs = every_pair(scene.instances.size());
+        ASSERT_EQ(finest.set_assets(scene.assets.views()), Status::kOk);
+        ASSERT_EQ(finest.find(scene.instances, pairs, {.within = within}), Status::kOk);
+        const auto truth = pairs_with_contacts(finest);
+        ASSERT_EQ(coarse.set_assets(views.views), Status::kOk);
+        for (int trial = 0; trial < 6; ++trial) {
+          const auto bodies = at_levels(scene, views, any_levels(scene, random));
+          coarse.scene.set_threads(1 + static_cast<std::uint32_t>(trial % 2));
+          const ContactOptions options = {
+              .first_contact_only = trial % 2 == 0, .within = within, .add_error_bounds = true};
+          ASSERT_EQ(trial % 3 == 0 ? coarse.find(bodies, options) : coarse.find(bodies, pairs, options),
+                    Status::kOk);
+          const auto near = pairs_with_contacts(coarse);
+          EXPECT_TRUE(std::includes(near.begin(), near.end(), truth.begin(), truth.end()));
+          asked += pairs.size();
+          met += truth.size();
+          told_apart += pairs.size() - near.size();
+        }
+      });
   EXPECT_GT(met, asked / 10);
   EXPECT_GT(told_apart, asked / 10);
 }
 
 TEST(LevelQuery, AContactIsWithinTwiceTheErrorsAtTheFinest) {
-  ContactQuery finest, coarse;
+  test::Asked<ContactQuery> finest, coarse;
   std::size_t beyond = 0;
   for_scenes(
       test::trials(200, 50), [&](const BodyScene& scene, const LevelViews& views, RandomPoses& random) {
         ASSERT_EQ(finest.set_assets(scene.assets.views()), Status::kOk);
         ASSERT_EQ(coarse.set_assets(views.views), Status::kOk);
         const LevelOfBody level = any_levels(scene, random);
-        ASSERT_EQ(coarse.find_contacts(at_levels(scene, views, level), every_pair(level.size()),
-                                       {.first_contact_only = true, .add_error_bounds = true}),
+        ASSERT_EQ(coarse.find(at_levels(scene, views, level), every_pair(level.size()),
+                              {.first_contact_only = true, .add_error_bounds = true}),
                   Status::kOk);
         for (const auto& pair : pairs_with_contacts(coarse)) {
           const auto [a, b] = pair;
           const double d = 2 * (1 + 1e-15) * (error_of(scene, a, level[a]) + error_of(scene, b, level[b]));
           const ObjectPair both[] = {{a, b}};
-          ASSERT_EQ(finest.find_contacts(scene.instances, both, {.within = d}), Status::kOk);
-          EXPECT_FALSE(finest.contacts().empty());
-          ASSERT_EQ(finest.find_contacts(scene.instances, both, {}), Status::kOk);
-          beyond += finest.contacts().empty() ? 1 : 0;
+          ASSERT_EQ(finest.find(scene.instances, both, {.within = d}), Status::kOk);
+          EXPECT_FALSE(finest.rows().empty());
+          ASSERT_EQ(finest.find(scene.instances, both, {}), Status::kOk);
+          beyond += finest.rows().empty() ? 1 : 0;
         }
       });
   EXPECT_GT(beyond, 0u);
 }
 
 TEST(LevelQuery, FinestLevelsAreDecidedAsWithout) {
-  ContactQuery plain, with;
+  test::Asked<ContactQuery> plain, with;
   for_scenes(test::trials(60, 20), [&](const BodyScene& scene, const LevelViews&, RandomPoses& random) {
     ASSERT_EQ(plain.set_assets(scene.assets.views()), Status::kOk);
     ASSERT_EQ(with.set_assets(scene.assets.views()), Status::kOk);
     for (const double within : {0.0, test::any_distance(random, scene)}) {
       const bool selves = random.below(2) == 0;
-      ASSERT_EQ(plain.find_contacts(scene.instances, {.self_pairs = selves, .within = within}), Status::kOk);
-      ASSERT_EQ(with.find_contacts(scene.instances,
-                                   {.self_pairs = selves, .within = within, .add_error_bounds = true}),
-                Status::kOk);
-      EXPECT_TRUE(std::ranges::equal(plain.contacts(), with.contacts()));
+      ASSERT_EQ(plain.find(scene.instances, {.self_pairs = selves, .within = within}), Status::kOk);
+      ASSERT_EQ(
+          with.find(scene.instances, {.self_pairs = selves, .within = within, .add_error_bounds = true}),
+          Status::kOk);
+      EXPECT_TRUE(std::ranges::equal(plain.rows(), with.rows()));
       EXPECT_EQ(plain.counters(), with.counters());
     }
   });
@@ -146,33 +146,37 @@ TEST(LevelQuery, AnInstanceWithItselfIsAskedForContactsOfItsLevel) {
   scene.instances = {{0, random.pose({})}};
   const LevelViews views(scene.assets.views());
   const ObjectPair self[] = {{0, 0}};
-  ContactQuery query;
+  test::Asked<ContactQuery> query;
   ASSERT_EQ(query.set_assets(views.views), Status::kOk);
   for (std::uint32_t level = 0; level < 3; ++level) {
     const auto body = at_levels(scene, views, {level});
-    ASSERT_EQ(query.find_contacts(body, self, {}), Status::kOk);
-    const std::vector<Contact> plain(query.contacts().begin(), query.contacts().end());
-    ASSERT_EQ(query.find_contacts(body, self, {.add_error_bounds = true}), Status::kOk);
-    EXPECT_TRUE(std::ranges::equal(query.contacts(), plain));
+    ASSERT_EQ(query.find(body, self, {}), Status::kOk);
+    const std::vector<Contact> plain(query.rows().begin(), query.rows().end());
+    ASSERT_EQ(query.find(body, self, {.add_error_bounds = true}), Status::kOk);
+    EXPECT_TRUE(std::ranges::equal(query.rows(), plain));
   }
 }
 
 TEST(LevelQuery, KeptInstancesAreFoundAtTheirLevels) {
-  ContactQuery kept, anew;
+  test::Asked<ContactQuery> kept, anew;
   std::size_t found = 0;
   for_scenes(40, [&](const BodyScene& scene, const LevelViews& views, RandomPoses& random) {
     const auto bodies = at_levels(scene, views, any_levels(scene, random));
     std::vector<Motion> motion(bodies.size(), Motion::moving);
     for (std::size_t i = 0; i < motion.size(); i += 2) motion[i] = Motion::fixed;
-    const PairFilter filter = {.motion = motion.data()};
+    std::vector<ObjectPair> not_both_fixed;
+    for (const ObjectPair& pair : every_pair(bodies.size())) {
+      if (motion[pair.a] != Motion::fixed || motion[pair.b] != Motion::fixed) not_both_fixed.push_back(pair);
+    }
     ASSERT_EQ(kept.set_assets(views.views), Status::kOk);
     ASSERT_EQ(anew.set_assets(views.views), Status::kOk);
-    ASSERT_EQ(kept.keep_fixed(bodies, motion), Status::kOk);
-    const ContactOptions options = {.filter = &filter, .add_error_bounds = true};
-    ASSERT_EQ(kept.find_contacts(bodies, options), Status::kOk);
-    ASSERT_EQ(anew.find_contacts(bodies, options), Status::kOk);
-    EXPECT_TRUE(std::ranges::equal(kept.contacts(), anew.contacts()));
-    found += kept.contacts().size();
+    kept.filter.motion = motion.data();
+    const ContactOptions options = {.add_error_bounds = true};
+    ASSERT_EQ(kept.find(bodies, options), Status::kOk);
+    ASSERT_EQ(anew.find(bodies, not_both_fixed, options), Status::kOk);
+    EXPECT_EQ(pairs_with_contacts(kept), pairs_with_contacts(anew));
+    EXPECT_EQ(kept.rows().size(), anew.rows().size());
+    found += kept.rows().size();
   });
   EXPECT_GT(found, 0u);
 }
@@ -196,7 +200,7 @@ class Spikes {
 };
 
 TEST(LevelQuery, TheSlackCoversRotationsThatAreNotQuiteRigidAndRounding) {
-  ContactQuery finest, coarse;
+  test::Asked<ContactQuery> finest, coarse;
   int met = 0, missed_without_slack = 0;
   for (int seed = 0; seed < test::trials(3000, 30); ++seed) {
     RandomPoses random(9000 + static_cast<std::uint64_t>(seed));
@@ -222,8 +226,8 @@ TEST(LevelQuery, TheSlackCoversRotationsThatAreNotQuiteRigidAndRounding) {
     const auto touch = [&](double by) {
       for (int k = 0; k < 3; ++k)
         scene.instances[1].pose.translation[k] = pose.translation[k] + pose.rotation[k][2] * by;
-      EXPECT_EQ(finest.find_contacts(scene.instances, every_pair(2), {}), Status::kOk);
-      return !finest.contacts().empty();
+      EXPECT_EQ(finest.find(scene.instances, every_pair(2), {}), Status::kOk);
+      return !finest.rows().empty();
     };
     for (int i = 0; i < 200 && near < far; ++i) {
       const double middle = near + (far - near) / 2;
@@ -236,11 +240,10 @@ TEST(LevelQuery, TheSlackCoversRotationsThatAreNotQuiteRigidAndRounding) {
     ASSERT_EQ(coarse.set_assets(views.views), Status::kOk);
     for (const LevelOfBody& level : {LevelOfBody{1, 1}, {0, 1}, {1, 0}}) {
       const auto bodies = at_levels(scene, views, level);
-      ASSERT_EQ(coarse.find_contacts(bodies, every_pair(2), {.add_error_bounds = true}), Status::kOk);
-      EXPECT_FALSE(coarse.contacts().empty()) << seed;
-      ASSERT_EQ(coarse.find_contacts(bodies, every_pair(2), {.within = height * (level[0] + level[1])}),
-                Status::kOk);
-      missed_without_slack += coarse.contacts().empty() ? 1 : 0;
+      ASSERT_EQ(coarse.find(bodies, every_pair(2), {.add_error_bounds = true}), Status::kOk);
+      EXPECT_FALSE(coarse.rows().empty()) << seed;
+      ASSERT_EQ(coarse.find(bodies, every_pair(2), {.within = height * (level[0] + level[1])}), Status::kOk);
+      missed_without_slack += coarse.rows().empty() ? 1 : 0;
     }
   }
   EXPECT_GT(met, 1000);

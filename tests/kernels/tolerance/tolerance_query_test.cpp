@@ -1,5 +1,6 @@
 // Queries by tolerance: verdicts against the finest levels.
 #include "tandem/kernels/tolerance_query.h"
+#include "kernels/asked.h"
 
 #include <gtest/gtest.h>
 
@@ -16,24 +17,24 @@ using test::RandomPoses;
 
 /// Whether the finest surfaces of each pair meet, by the contact query.
 std::vector<bool> truth_of(const BodyScene& scene, std::span<const ObjectPair> pairs) {
-  ContactQuery query;
+  test::Asked<ContactQuery> query;
   EXPECT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-  EXPECT_EQ(query.find_contacts(scene.instances, pairs, {.first_contact_only = true}), Status::kOk);
+  EXPECT_EQ(query.find(scene.instances, pairs, {.first_contact_only = true}), Status::kOk);
   std::vector<bool> meet(pairs.size());
-  for (const Contact& contact : query.contacts()) meet[contact.pair] = true;
+  for (const Contact& contact : query.rows()) meet[contact.pair] = true;
   return meet;
 }
 
 /// Expects the verdicts of the last call to be right and the counters to tell of them.
-void expect_right(const ToleranceQuery& query, const BodyScene& scene, double tolerance) {
-  ASSERT_EQ(query.verdicts().size(), query.pairs().size());
+void expect_right(const test::Asked<ToleranceQuery>& query, const BodyScene& scene, double tolerance) {
+  ASSERT_EQ(query.rows().size(), query.pairs().size());
   const std::vector<bool> meet = truth_of(scene, query.pairs());
-  DistanceQuery distance;
+  test::Asked<DistanceQuery> distance;
   ASSERT_EQ(distance.set_assets(scene.assets.views()), Status::kOk);
-  ASSERT_EQ(distance.find_distances(scene.instances, query.pairs(), {}), Status::kOk);
+  ASSERT_EQ(distance.find(scene.instances, query.pairs(), {}), Status::kOk);
   ToleranceCounters counted;
   for (std::size_t i = 0; i < meet.size(); ++i) {
-    const auto [verdict, level_a, level_b] = query.verdicts()[i];
+    const auto [verdict, level_a, level_b] = query.rows()[i];
     switch (verdict) {
       case ToleranceVerdict::apart:
         ++counted.apart;
@@ -47,7 +48,7 @@ void expect_right(const ToleranceQuery& query, const BodyScene& scene, double to
       case ToleranceVerdict::within_tolerance:
         ++counted.within_tolerance;
         EXPECT_GT(level_a + level_b, 0);
-        EXPECT_LE(distance.distances()[i].upper, tolerance * (1 + 1e-5));
+        EXPECT_LE(distance.rows()[i].upper, tolerance * (1 + 1e-5));
         break;
     }
   }
@@ -75,27 +76,26 @@ double any_tolerance(RandomPoses& random, const BodyScene& scene) {
 }
 
 TEST(ToleranceQuery, VerdictsAreThoseOfTheFinestLevelsWhereTheyAreCertain) {
-  ToleranceQuery query, threaded;
+  test::Asked<ToleranceQuery> query, threaded;
   ToleranceCounters all;
   for (int seed = 0; seed < test::trials(400, 50) && !HasFailure(); ++seed) {
     RandomPoses random(815 + static_cast<std::uint64_t>(seed));
     const BodyScene scene = test::any_level_scene(random);
     const double tolerance = any_tolerance(random, scene);
     ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-    ASSERT_EQ(query.decide(scene.instances, {.tolerance = tolerance}), Status::kOk);
+    ASSERT_EQ(query.find(scene.instances, {.tolerance = tolerance}), Status::kOk);
     expect_right(query, scene, tolerance);
     ASSERT_EQ(threaded.set_assets(scene.assets.views()), Status::kOk);
-    ASSERT_EQ(threaded.decide(scene.instances, {.tolerance = tolerance, .threads = 2}), Status::kOk);
-    EXPECT_TRUE(std::ranges::equal(query.verdicts(), threaded.verdicts()));
+    ASSERT_EQ(threaded.find(scene.instances, {.tolerance = tolerance}), Status::kOk);
+    EXPECT_TRUE(std::ranges::equal(query.rows(), threaded.rows()));
     EXPECT_EQ(query.counters(), threaded.counters());
     // The same pairs, given.
     std::vector<ObjectPair> pairs(query.pairs().begin(), query.pairs().end());
-    const std::vector<PairVerdict> verdicts(query.verdicts().begin(), query.verdicts().end());
+    const std::vector<PairVerdict> verdicts(query.rows().begin(), query.rows().end());
     for (ObjectPair& pair : pairs) std::swap(pair.a, pair.b);
-    ASSERT_EQ(query.decide(scene.instances, pairs, {.tolerance = tolerance}), Status::kOk);
+    ASSERT_EQ(query.find(scene.instances, pairs, {.tolerance = tolerance}), Status::kOk);
     expect_right(query, scene, tolerance);
-    for (std::size_t i = 0; i < pairs.size(); ++i)
-      EXPECT_EQ(query.verdicts()[i].verdict, verdicts[i].verdict);
+    for (std::size_t i = 0; i < pairs.size(); ++i) EXPECT_EQ(query.rows()[i].verdict, verdicts[i].verdict);
     EXPECT_TRUE(tolerance > 0 || query.counters().within_tolerance == 0);
     all.apart += query.counters().apart;
     all.touching += query.counters().touching;
@@ -123,11 +123,11 @@ class Balls : public testing::Test {
     scene_.instances[0].pose.translation[0] = away;
     scene_.instances[1].pose.translation[0] = away + 2 + gap;
     const ObjectPair both[] = {{0, 1}};
-    EXPECT_EQ(query_.decide(scene_.instances, both, {.tolerance = tolerance}), Status::kOk);
-    return query_.verdicts()[0];
+    EXPECT_EQ(query_.find(scene_.instances, both, {.tolerance = tolerance}), Status::kOk);
+    return query_.rows()[0];
   }
   BodyScene scene_;
-  ToleranceQuery query_;
+  test::Asked<ToleranceQuery> query_;
 };
 
 TEST_F(Balls, AreLookedAtAtTheCoarsestLevelThatTells) {
@@ -153,41 +153,42 @@ TEST_F(Balls, FarAwayRoundingIsAnErrorToo) {
 
 TEST_F(Balls, AnInstanceTouchesItself) {
   const ObjectPair selves[] = {{0, 0}, {1, 1}};
-  ASSERT_EQ(query_.decide(scene_.instances, selves, {.tolerance = 1}), Status::kOk);
-  for (const PairVerdict& verdict : query_.verdicts())
+  ASSERT_EQ(query_.find(scene_.instances, selves, {.tolerance = 1}), Status::kOk);
+  for (const PairVerdict& verdict : query_.rows())
     EXPECT_EQ(verdict, (PairVerdict{ToleranceVerdict::touching, 0, 0}));
 }
 
 TEST_F(Balls, WhatIsWrongIsSaid) {
   for (const double bad : {-1.0, std::nan(""), HUGE_VAL, 1e301})
-    EXPECT_EQ(query_.decide(scene_.instances, {.tolerance = bad}), Status::kOutOfRange);
+    EXPECT_EQ(query_.find(scene_.instances, {.tolerance = bad}), Status::kOutOfRange);
   const ObjectPair none[] = {{0, 1}, {0, 2}};
-  EXPECT_EQ(query_.decide(scene_.instances, none, {}), Status::kUnknownInstance);
+  EXPECT_EQ(query_.find(scene_.instances, none, {}), Status::kUnknownInstance);
   EXPECT_EQ(query_.where(), 1u);
   EXPECT_TRUE(query_.pairs().empty());
   scene_.instances[1].asset = 1;
-  EXPECT_EQ(query_.decide(scene_.instances, {}), Status::kUnknownAsset);
+  EXPECT_EQ(query_.find(scene_.instances, {}), Status::kUnknownAsset);
   EXPECT_EQ(query_.where(), 1u);
   scene_.instances[1].asset = 0;
   scene_.instances[1].pose.rotation[0][0] = 2;
-  EXPECT_EQ(query_.decide(scene_.instances, {}), Status::kPoseNotRigid);
+  EXPECT_EQ(query_.find(scene_.instances, {}), Status::kPoseNotRigid);
   const AssetView views[] = {scene_.assets.views()[0], scene_.assets.views()[0].levels_from(1)};
-  EXPECT_EQ(query_.set_assets(views), Status::kNoFinestLevel);
+  scene_.instances[1].pose = kIdentityPose;
+  EXPECT_EQ(query_.set_assets(views), Status::kOk);
+  EXPECT_EQ(query_.find(scene_.instances, {}), Status::kNoFinestLevel);
   EXPECT_EQ(query_.where(), 1u);
   const AssetView empty[] = {{}};
   EXPECT_EQ(query_.set_assets(empty), Status::kUnknownAsset);
-  scene_.instances[1].pose = kIdentityPose;
-  EXPECT_EQ(query_.decide(scene_.instances, {}), Status::kUnknownAsset);
+  EXPECT_EQ(query_.find(scene_.instances, {}), Status::kUnknownAsset);
 }
 
 TEST_F(Balls, PairsOfTheLastCallMayBeGivenAgain) {
   verdict_at(-0.1, 0);
-  ASSERT_EQ(query_.decide(scene_.instances, {}), Status::kOk);
+  ASSERT_EQ(query_.find(scene_.instances, {}), Status::kOk);
   ASSERT_EQ(query_.pairs().size(), 1u);
-  ASSERT_EQ(query_.decide(scene_.instances, query_.pairs(), {}), Status::kOk);
+  ASSERT_EQ(query_.find(scene_.instances, query_.pairs(), {}), Status::kOk);
   ASSERT_EQ(query_.pairs().size(), 1u);
-  EXPECT_EQ(query_.verdicts()[0].verdict, ToleranceVerdict::touching);
-  ASSERT_EQ(query_.decide({}, {}), Status::kOk);
+  EXPECT_EQ(query_.rows()[0].verdict, ToleranceVerdict::touching);
+  ASSERT_EQ(query_.find({}, {}), Status::kOk);
   EXPECT_TRUE(query_.pairs().empty());
   EXPECT_EQ(query_.counters(), ToleranceCounters());
 }

@@ -68,9 +68,11 @@ class Kept {
 
 /// A question about the object pairs of a scene: those that the scene finds, or those that the caller gives.
 /// Of: the question, which has answer(scene, given pairs or null, options).
-template <typename Of, typename Row, typename Counters, typename Options>
+template <typename Of, typename Row, typename Counters, typename OptionsOf>
 class PairQuestion : public Answer<Row, Counters> {
  public:
+  using Options = OptionsOf;
+
   /// Asks about the pairs that the scene finds.
   Status find(Scene& scene, const Options& options = {}) { return ask(scene, nullptr, options); }
 

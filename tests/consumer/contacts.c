@@ -15,8 +15,10 @@ int main(int argc, char** argv) {
   if (status == TANDEM_OK) {
     size_t count;
     const tandem_contact* contacts = tandem_scene_contacts(scene, &count);
-    printf("%zu pairs of triangles meet\n", count);
-    if (count > 0) printf("faces %u and %u\n", (unsigned)contacts[0].face_a, (unsigned)contacts[0].face_b);
+    printf("%zu pairs of triangles meet", count);
+    if (count > 0)
+      printf(", such as faces %u and %u", (unsigned)contacts[0].face_a, (unsigned)contacts[0].face_b);
+    printf("\n");
   } else {
     printf("%s\n", tandem_status_explain(status));
   }

@@ -1,5 +1,5 @@
 //! Tandem's C interface, without its comments. Written by scripts/write_interface from bindings/c/include/tandem/tandem.h. Do not edit it.
-#![allow(non_camel_case_types)]
+#![allow(dead_code, non_camel_case_types)]
 use std::ffi::{c_char, c_void};
 
 pub type tandem_status = u32;

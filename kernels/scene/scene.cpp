@@ -227,6 +227,8 @@ Status SceneState::add(const Instance& instance, const BodyFilter& filter, std::
   if (count > before &&
       !(instances.push({kNoIndex, {}}) && bodies.push({}) && boxes.push(kNowhere) && changed_.push(0)))
     return shrink(Status::kOutOfMemory);
+  // The broad phase's tree of fixed bodies is of as many bodies as there were, and may have the removed one.
+  if (count > before || (free < motion.size() && motion[free] == Motion::fixed)) fixed_kept_ = false;
   const BodyFilter usual;
   if (!add_entry(filter.motion, usual.motion, motion, free, count) ||
       !add_entry(filter.group, usual.group, group, free, count) ||
@@ -235,11 +237,8 @@ Status SceneState::add(const Instance& instance, const BodyFilter& filter, std::
   if (const Status status = pose(free, instance); status != Status::kOk) return shrink(status);
   removed_ -= count == before;
   note_change(free);
-  // The broad phase's tree is of as many bodies as there were.
-  if (count > before) fixed_kept_ = false;
   if (count > before && reach_boxes_.size() == before && !reach_boxes_.push(kNowhere))
     found_of_.valid = false;
-  if (filter.motion != usual.motion) found_of_.valid = false;
   body = free;
   return Status::kOk;
 }
@@ -348,7 +347,7 @@ Status SceneState::keep_fixed_bodies() {
   return status;
 }
 
-// Whether a removed body is a pair with itself is not asked of its box.
+// A removed body may still be a pair: with itself, which is not asked of its box, or where reach is infinite.
 Status SceneState::search_all() {
   if (const Status status = keep_fixed_bodies(); status != Status::kOk) return status;
   const bool within_reach = found_of_.reach > 0;
@@ -366,8 +365,8 @@ Status SceneState::search_all() {
   if (removed_ == 0) {
     end = std::copy(all.begin(), all.end(), begin);
   } else {
-    end =
-        std::copy_if(all.begin(), all.end(), begin, [&](const ObjectPair& pair) { return is_body(pair.a); });
+    end = std::copy_if(all.begin(), all.end(), begin,
+                       [&](const ObjectPair& pair) { return is_body(pair.a) && is_body(pair.b); });
   }
   return found_.resize(static_cast<std::size_t>(end - begin)) ? Status::kOk : Status::kOutOfMemory;
 }
@@ -390,6 +389,7 @@ Status SceneState::search_changed() {
     if (changed_[i] == 0 || !is_body(i)) continue;
     for (std::uint32_t j = 0; j < boxes.size(); ++j) {
       if (j == i ? !found_of_.self_pairs : (changed_[j] != 0 && j < i) || !meet(of[i], of[j])) continue;
+      if (!is_body(j)) continue;  // with an infinite reach even its box is met
       if (asked.looks_at(i, j) && !fresh_.push({std::min(i, j), std::max(i, j)})) return Status::kOutOfMemory;
     }
   }

@@ -462,19 +462,19 @@ TEST(ManifoldQuery, AssetsWithoutTopologyAreRefused) {
   ManifoldQuery made;
   const AssetView both[] = {assets.views()[0], view};
   ASSERT_EQ(scene.set_assets(both), Status::kOk);
-  EXPECT_EQ(made.find(scene, {}, {}), Status::kNoTopology);
+  EXPECT_EQ(made.find(scene, std::span<const ObjectPair>(), {}), Status::kNoTopology);
   EXPECT_EQ(scene.where(), 1u);
   ASSERT_EQ(scene.set_assets(assets.views()), Status::kOk);
-  EXPECT_EQ(made.find(scene, {}, {}), Status::kOk);
+  EXPECT_EQ(made.find(scene, std::span<const ObjectPair>(), {}), Status::kOk);
 }
 
 TEST(ManifoldQuery, NothingHasNoManifolds) {
   Scene scene;
   ManifoldQuery made;
-  EXPECT_EQ(made.find(scene, {}, {}), Status::kOk);
+  EXPECT_EQ(made.find(scene, std::span<const ObjectPair>(), {}), Status::kOk);
   EXPECT_TRUE(made.rows().empty());
   ManifoldQuery moved = std::move(made);
-  EXPECT_EQ(moved.find(scene, {}, {}), Status::kOk);
+  EXPECT_EQ(moved.find(scene, std::span<const ObjectPair>(), {}), Status::kOk);
 }
 
 }  // namespace

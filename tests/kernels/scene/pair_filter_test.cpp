@@ -10,6 +10,7 @@
 #include "filter_oracle.h"
 #include "kernels/common/worker_threads.h"
 #include "kernels/contact/contact_query_fixture.h"
+#include "tandem/kernels/broad_phase.h"
 
 namespace tandem {
 namespace {

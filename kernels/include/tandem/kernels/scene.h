@@ -8,6 +8,7 @@
 #include "tandem/kernels/object_pair.h"
 #include "tandem/kernels/pair_filter.h"
 #include "tandem/kernels/pose.h"
+#include "tandem/kernels/world_box.h"
 
 namespace tandem {
 

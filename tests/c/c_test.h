@@ -85,6 +85,28 @@ static inline tandem_asset* build_obj(const char* folder, const char* name,
   return asset;
 }
 
+/// A scene of these assets.
+static inline tandem_scene* scene_of(tandem_asset* const* assets, size_t count,
+                                     const tandem_allocator* allocator) {
+  tandem_scene* scene = NULL;
+  CHECK_STATUS(tandem_scene_create(allocator, &scene), TANDEM_OK);
+  CHECK_STATUS(tandem_scene_set_assets(scene, assets, count), TANDEM_OK);
+  return scene;
+}
+
+static inline size_t contact_count(const tandem_scene* scene) {
+  size_t count = 0;
+  (void)tandem_scene_contacts(scene, &count);
+  return count;
+}
+
+/// How many object pairs a question was about.
+static inline size_t pair_count(const tandem_scene* scene, uint32_t question) {
+  size_t count = 0;
+  (void)tandem_scene_pairs(scene, question, &count);
+  return count;
+}
+
 /// An instance of asset 0 that is not turned.
 static inline tandem_instance at(double x, double y, double z) {
   tandem_instance instance;

@@ -100,7 +100,7 @@ static void test_assets(void) {
     CHECK(level.vertex_count > 700 && level.vertex_count < 800 && level.component_count >= 1);
     uint64_t faces = 0;
     for (uint32_t t = 0; t < level.triangle_count; ++t) {
-      faces += level.triangles[t].corner[0].word;
+      faces += level.triangles[t].corner[0].w;
       for (int k = 0; k < 3; ++k) {
         const float* p = level.triangles[t].corner[k].position;
         for (int x = 0; x < 3; ++x) CHECK(p[x] >= info.lower[x] && p[x] <= info.upper[x]);
@@ -167,7 +167,7 @@ static void test_building(void) {
   level.struct_size = sizeof level;
   CHECK_STATUS(tandem_asset_get_level(asset, 0, &level), TANDEM_OK);
   CHECK(level.triangle_count == 2 && level.closed == 0);
-  CHECK(level.triangles[0].corner[0].word == 0 && level.triangles[1].corner[0].word == 0);
+  CHECK(level.triangles[0].corner[0].w == 0 && level.triangles[1].corner[0].w == 0);
   tandem_part part;
   part.struct_size = sizeof part;
   CHECK_STATUS(tandem_asset_get_part(asset, 0, &part), TANDEM_OK);
@@ -241,81 +241,99 @@ static void test_building(void) {
 // The row of cubes of docs/queries.md.
 static void test_contacts(const tandem_allocator* allocator) {
   tandem_asset* cube = build_obj(assets_folder, "box_12.obj", allocator);
-  tandem_contact_query* query = NULL;
-  CHECK_STATUS(tandem_contact_query_create(allocator, &query), TANDEM_OK);
-  CHECK_STATUS(tandem_contact_query_set_assets(query, &cube, 1), TANDEM_OK);
-  tandem_asset_release(cube);  // the query has one of its own
+  tandem_scene* scene = scene_of(&cube, 1, allocator);
+  tandem_asset_release(cube);  // the scene has one of its own
   tandem_instance row[10];
   const double spacing[] = {1.5, 1, 0.5};
   const size_t expected_pairs[] = {0, 9, 17}, expected_contacts[] = {0, 558, 964};
   size_t count = 0;
   for (int step = 0; step < 3; ++step) {
     for (int i = 0; i < 10; ++i) row[i] = at(spacing[step] * i, 0, 0);
+    CHECK_STATUS(tandem_scene_place(scene, row, 10, NULL), TANDEM_OK);
     for (uint32_t threads = 0; threads < 4; ++threads) {
-      tandem_query_options options = {sizeof options, TANDEM_EXACT, 0, 0, 0, 0, 0, NULL};
-      options.threads = threads;
-      CHECK_STATUS(tandem_contact_query_find_contacts(query, row, 10, &options), TANDEM_OK);
-      (void)tandem_contact_query_pairs(query, &count);
-      CHECK(count == expected_pairs[step]);
-      const tandem_contact* contacts = tandem_contact_query_contacts(query, &count);
+      CHECK_STATUS(tandem_scene_set_threads(scene, threads), TANDEM_OK);
+      CHECK_STATUS(tandem_scene_find_contacts(scene, NULL), TANDEM_OK);
+      CHECK(pair_count(scene, TANDEM_CONTACTS) == expected_pairs[step]);
+      const tandem_contact* contacts = tandem_scene_contacts(scene, &count);
       CHECK(count == expected_contacts[step]);
       if (count > 0) CHECK(contacts[0].pair == 0 && contacts[0].face_a == 10 && contacts[0].face_b == 10);
     }
   }
-  tandem_query_counters counters;
+  tandem_counters counters;
   counters.struct_size = sizeof counters;
-  CHECK_STATUS(tandem_contact_query_get_counters(query, &counters), TANDEM_OK);
-  CHECK(counters.object_pairs == 17 && counters.contacts == 964 && counters.block_pairs > 0);
+  CHECK_STATUS(tandem_scene_get_counters(scene, &counters), TANDEM_OK);
+  CHECK(counters.contacts.object_pairs == 17 && counters.contacts.contacts == 964);
+  CHECK(counters.contacts.block_pairs > 0 && counters.distances.object_pairs == 0);
 
-  // First contacts, given pairs, candidates, clearance, an instance with itself.
-  tandem_query_options options = {sizeof options, TANDEM_EXACT, 1, 0, 2, 0, 0, NULL};
-  CHECK_STATUS(tandem_contact_query_find_contacts(query, row, 10, &options), TANDEM_OK);
-  (void)tandem_contact_query_contacts(query, &count);
-  CHECK(count == 17);
+  // First contacts, given pairs, candidates, clearance, a body with itself.
+  tandem_contact_options options = {sizeof options, TANDEM_EXACT, 1, 0, 0, 0, 0, NULL, 0};
+  CHECK_STATUS(tandem_scene_find_contacts(scene, &options), TANDEM_OK);
+  CHECK(contact_count(scene) == 17);
   options.first_contact_only = 0;
   const tandem_object_pair pair = {1, 0};
-  CHECK_STATUS(tandem_contact_query_find_contacts_of_pairs(query, row, 10, &pair, 1, &options), TANDEM_OK);
-  const tandem_object_pair* pairs = tandem_contact_query_pairs(query, &count);
+  options.pairs = &pair;
+  options.pair_count = 1;
+  CHECK_STATUS(tandem_scene_find_contacts(scene, &options), TANDEM_OK);
+  const tandem_object_pair* pairs = tandem_scene_pairs(scene, TANDEM_CONTACTS, &count);
   CHECK(count == 1 && pairs[0].a == 1 && pairs[0].b == 0);
-  size_t exact = 0, boxes = 0;
-  (void)tandem_contact_query_contacts(query, &exact);
+  const size_t exact = contact_count(scene);
   options.mode = TANDEM_BOXES;
-  CHECK_STATUS(tandem_contact_query_find_contacts_of_pairs(query, row, 10, &pair, 1, &options), TANDEM_OK);
-  (void)tandem_contact_query_contacts(query, &boxes);
-  CHECK(exact > 0 && boxes >= exact);
+  CHECK_STATUS(tandem_scene_find_contacts(scene, &options), TANDEM_OK);
+  CHECK(exact > 0 && contact_count(scene) >= exact);
+  options.pair_count = 0;  // given, but none
+  CHECK_STATUS(tandem_scene_find_contacts(scene, &options), TANDEM_OK);
+  CHECK(pair_count(scene, TANDEM_CONTACTS) == 0);
   options.mode = TANDEM_EXACT;
+  options.pairs = NULL;
   for (int i = 0; i < 10; ++i) row[i] = at(1.25 * i, 0, 0);
+  CHECK_STATUS(tandem_scene_place(scene, row, 10, NULL), TANDEM_OK);
   options.within = 0.25;
-  CHECK_STATUS(tandem_contact_query_find_contacts(query, row, 10, &options), TANDEM_OK);
-  (void)tandem_contact_query_pairs(query, &count);
-  CHECK(count == 9);
-  (void)tandem_contact_query_contacts(query, &count);
-  CHECK(count >= 9 * 4);
+  CHECK_STATUS(tandem_scene_find_contacts(scene, &options), TANDEM_OK);
+  CHECK(pair_count(scene, TANDEM_CONTACTS) == 9 && contact_count(scene) >= 9 * 4);
   options.within = 0.2499;
-  CHECK_STATUS(tandem_contact_query_find_contacts(query, row, 10, &options), TANDEM_OK);
-  (void)tandem_contact_query_contacts(query, &count);
-  CHECK(count == 0);
+  CHECK_STATUS(tandem_scene_find_contacts(scene, &options), TANDEM_OK);
+  CHECK(contact_count(scene) == 0);
   options.within = 0;
   options.self_pairs = 1;
-  CHECK_STATUS(tandem_contact_query_find_contacts(query, row, 10, &options), TANDEM_OK);
-  (void)tandem_contact_query_pairs(query, &count);
-  CHECK(count == 10);
-  CHECK_STATUS(tandem_contact_query_find_pairs(query, row, 10, NULL), TANDEM_OK);
-  (void)tandem_contact_query_pairs(query, &count);
-  CHECK(count == 0);
+  CHECK_STATUS(tandem_scene_find_contacts(scene, &options), TANDEM_OK);
+  CHECK(pair_count(scene, TANDEM_CONTACTS) == 10);
+  tandem_pair_options reaching = {sizeof reaching, 0, 0};
+  CHECK_STATUS(tandem_scene_find_pairs(scene, NULL), TANDEM_OK);
+  CHECK(pair_count(scene, TANDEM_PAIRS) == 0);
+  reaching.reach = 0.25;
+  CHECK_STATUS(tandem_scene_find_pairs(scene, &reaching), TANDEM_OK);
+  CHECK(pair_count(scene, TANDEM_PAIRS) == 9);
+  reaching.self_pairs = 1;
+  CHECK_STATUS(tandem_scene_find_pairs(scene, &reaching), TANDEM_OK);
+  CHECK(pair_count(scene, TANDEM_PAIRS) == 19);
 
-  // The pairs that the query found, without the first, are given to it.
+  // The pairs that the scene found, without the first, are given to it.
   for (int i = 0; i < 10; ++i) row[i] = at(0.5 * i, 0, 0);
-  CHECK_STATUS(tandem_contact_query_find_pairs(query, row, 10, NULL), TANDEM_OK);
-  pairs = tandem_contact_query_pairs(query, &count);
-  CHECK(count == 17 && tandem_contact_query_contacts(query, NULL) == NULL);
-  CHECK_STATUS(tandem_contact_query_find_contacts_of_pairs(query, row, 10, pairs + 1, count - 1, NULL), TANDEM_OK);
-  pairs = tandem_contact_query_pairs(query, &count);
+  CHECK_STATUS(tandem_scene_place(scene, row, 10, NULL), TANDEM_OK);
+  CHECK_STATUS(tandem_scene_find_pairs(scene, NULL), TANDEM_OK);
+  pairs = tandem_scene_pairs(scene, TANDEM_PAIRS, &count);
+  CHECK(count == 17);
+  options.pairs = pairs + 1;
+  options.pair_count = count - 1;
+  CHECK_STATUS(tandem_scene_find_contacts(scene, &options), TANDEM_OK);
+  pairs = tandem_scene_pairs(scene, TANDEM_CONTACTS, &count);
   CHECK(count == 16 && pairs[0].a == 0 && pairs[0].b == 2);
-  (void)tandem_contact_query_contacts(query, &count);
-  CHECK(count == 964 - 52);
+  CHECK(contact_count(scene) == 964 - 52 && pair_count(scene, TANDEM_PAIRS) == 17);
+  // Those of a question are given to the same question.
+  options.pairs = pairs + 15;
+  options.pair_count = 1;
+  CHECK_STATUS(tandem_scene_find_contacts(scene, &options), TANDEM_OK);
+  pairs = tandem_scene_pairs(scene, TANDEM_CONTACTS, &count);
+  CHECK(count == 1 && pairs[0].b == 9);
+  tandem_scene_destroy(scene);
+}
 
-  // Filters: one fixed, two that a joint connects, two groups; and fixed ones that are kept.
+// Filters: two fixed, two that a joint connects, two groups.
+static void test_filters(const tandem_allocator* allocator) {
+  tandem_asset* cube = build_obj(assets_folder, "box_12.obj", allocator);
+  tandem_scene* scene = scene_of(&cube, 1, allocator);
+  tandem_asset_release(cube);
+  tandem_instance row[10];
   for (int i = 0; i < 10; ++i) row[i] = at(0.9 * i, 0, 0);
   uint8_t motion[10] = {TANDEM_FIXED, TANDEM_FIXED, 0, 0, 0, 0, 0, 0, 0, TANDEM_SLEEPING};
   uint32_t group[10] = {1, 1, 1, 1, 1, 2, 2, 2, 2, 2}, mask[10] = {1, 1, 1, 1, 1, 2, 2, 2, 2, 2};
@@ -330,19 +348,86 @@ static void test_contacts(const tandem_allocator* allocator) {
   filter.group = group;
   filter.mask = mask;
   filter.excluded = excluded;
-  options.self_pairs = 0;
-  options.filter = &filter;
-  CHECK_STATUS(tandem_contact_query_find_contacts(query, row, 10, &options), TANDEM_OK);
-  pairs = tandem_contact_query_pairs(query, &count);
-  CHECK(count == 6);  // 9 but 0-1 (fixed), 2-3 (joint) and 4-5 (groups)
-  for (size_t i = 0; i < count; ++i) CHECK(pairs[i].a != 0 && pairs[i].a != 2 && pairs[i].a != 4);
-  CHECK_STATUS(tandem_contact_query_keep_fixed(query, row, motion, 10, 1), TANDEM_OK);
-  CHECK_STATUS(tandem_contact_query_find_contacts(query, row, 10, &options), TANDEM_OK);
-  (void)tandem_contact_query_pairs(query, &count);
-  CHECK(count == 6);
-  CHECK_STATUS(tandem_contact_query_find_contacts(query, row, 9, NULL), TANDEM_KEPT_MISMATCH);
-  tandem_excluded_pairs_destroy(excluded);
-  tandem_contact_query_destroy(query);
+  CHECK_STATUS(tandem_scene_place(scene, row, 10, &filter), TANDEM_OK);
+  tandem_excluded_pairs_destroy(excluded);  // the scene has them
+  memset(motion, 0, sizeof motion);         // and has copied the rest
+  size_t count = 0;
+  for (int step = 0; step < 2; ++step) {
+    CHECK_STATUS(tandem_scene_find_contacts(scene, NULL), TANDEM_OK);
+    const tandem_object_pair* pairs = tandem_scene_pairs(scene, TANDEM_CONTACTS, &count);
+    CHECK(count == 6);  // 9 but 0-1 (fixed), 2-3 (joint) and 4-5 (groups)
+    for (size_t i = 0; i < count; ++i) CHECK(pairs[i].a != 0 && pairs[i].a != 2 && pairs[i].a != 4);
+    // One that moves goes where it was, past the fixed ones, which the scene keeps.
+    const uint32_t mover = 8;
+    const tandem_pose away = at(0.9 * 8, 5, 0).pose;
+    CHECK_STATUS(tandem_scene_move(scene, &mover, &away, 1), TANDEM_OK);
+    CHECK_STATUS(tandem_scene_find_contacts(scene, NULL), TANDEM_OK);
+    CHECK(pair_count(scene, TANDEM_CONTACTS) == 4);
+    CHECK_STATUS(tandem_scene_move(scene, &mover, &row[mover].pose, 1), TANDEM_OK);
+  }
+  CHECK_STATUS(tandem_scene_set_motion(scene, 1, TANDEM_MOVING), TANDEM_OK);
+  CHECK_STATUS(tandem_scene_find_contacts(scene, NULL), TANDEM_OK);
+  CHECK(pair_count(scene, TANDEM_CONTACTS) == 7);
+  CHECK_STATUS(tandem_scene_place(scene, row, 9, NULL), TANDEM_OK);
+  CHECK_STATUS(tandem_scene_find_contacts(scene, NULL), TANDEM_OK);
+  CHECK(pair_count(scene, TANDEM_CONTACTS) == 8);
+  tandem_scene_destroy(scene);
+}
+
+// Bodies come, go and move one by one, as in a scene that is placed anew.
+static void test_single_bodies(const tandem_allocator* allocator) {
+  tandem_asset* cube = build_obj(assets_folder, "box_12.obj", allocator);
+  tandem_scene* scene = scene_of(&cube, 1, allocator);
+  tandem_asset_release(cube);
+  const tandem_questions questions = {sizeof questions, 0, NULL, NULL, NULL, NULL, NULL, NULL};
+  uint32_t number = 7;
+  size_t count = 0;
+  CHECK(tandem_scene_instances(scene, &count) == NULL && count == 0);
+  for (uint32_t i = 0; i < 4; ++i) {
+    const tandem_instance body = at(0.9 * i, 0, 0);
+    CHECK_STATUS(tandem_scene_add(scene, &body, NULL, &number), TANDEM_OK);
+    CHECK(number == i);
+    CHECK_STATUS(tandem_scene_find_contacts(scene, NULL), TANDEM_OK);
+    CHECK(pair_count(scene, TANDEM_CONTACTS) == i && contact_count(scene) == 52 * i);
+  }
+  // Without 1 there are 2-3; its number is free.
+  CHECK_STATUS(tandem_scene_remove(scene, 1), TANDEM_OK);
+  CHECK_STATUS(tandem_scene_find_contacts(scene, NULL), TANDEM_OK);
+  const tandem_object_pair* pairs = tandem_scene_pairs(scene, TANDEM_CONTACTS, &count);
+  CHECK(count == 1 && pairs[0].a == 2 && pairs[0].b == 3);
+  const tandem_instance* instances = tandem_scene_instances(scene, &count);
+  CHECK(count == 4 && instances[1].asset == TANDEM_NO_INDEX && instances[2].pose.translation[0] == 1.8);
+  CHECK_STATUS(tandem_scene_remove(scene, 1), TANDEM_UNKNOWN_INSTANCE);
+  CHECK_STATUS(tandem_scene_set_motion(scene, 1, TANDEM_FIXED), TANDEM_UNKNOWN_INSTANCE);
+  const uint32_t two[2] = {3, 1};
+  const tandem_pose poses[2] = {at(0, 0, 0).pose, at(0, 0, 0).pose};
+  CHECK_STATUS(tandem_scene_move(scene, two, poses, 2), TANDEM_UNKNOWN_INSTANCE);
+  CHECK(tandem_scene_where(scene) == 1);
+  CHECK(tandem_scene_instances(scene, NULL)[3].pose.translation[0] > 2);  // nothing has changed
+  // It comes again, fixed, in a group that meets none but 0.
+  const uint8_t fixed = TANDEM_FIXED;
+  const uint32_t all = ~0u, none = 0;
+  tandem_pair_filter filter = {sizeof filter, 0, 1, &fixed, &all, &none, NULL};
+  const tandem_instance body = at(0.9, 0, 0);
+  CHECK_STATUS(tandem_scene_add(scene, &body, &filter, &number), TANDEM_OK);
+  CHECK(number == 1);
+  CHECK_STATUS(tandem_scene_find_contacts(scene, NULL), TANDEM_OK);
+  CHECK(pair_count(scene, TANDEM_CONTACTS) == 1);
+  CHECK_STATUS(tandem_scene_remove(scene, 1), TANDEM_OK);
+  filter.mask = &all;
+  CHECK_STATUS(tandem_scene_add(scene, &body, &filter, &number), TANDEM_OK);
+  CHECK_STATUS(tandem_scene_find_contacts(scene, NULL), TANDEM_OK);
+  CHECK(number == 1 && pair_count(scene, TANDEM_CONTACTS) == 3);
+  // All apart; and nothing is asked.
+  const uint32_t numbers[4] = {0, 1, 2, 3};
+  tandem_pose apart[4];
+  for (int i = 0; i < 4; ++i) apart[i] = at(3 * i, 0, 0).pose;
+  CHECK_STATUS(tandem_scene_move(scene, numbers, apart, 4), TANDEM_OK);
+  CHECK_STATUS(tandem_scene_find(scene, &questions), TANDEM_OK);
+  CHECK(contact_count(scene) == 3 * 52);  // of before
+  CHECK_STATUS(tandem_scene_find_contacts(scene, NULL), TANDEM_OK);
+  CHECK(contact_count(scene) == 0);
+  tandem_scene_destroy(scene);
 }
 
 static void test_manifolds_and_containment(const tandem_allocator* allocator) {
@@ -354,58 +439,76 @@ static void test_manifolds_and_containment(const tandem_allocator* allocator) {
   tandem_asset* list[2] = {cube, NULL};
   CHECK_STATUS(tandem_asset_build(&mesh, NULL, allocator, &list[1], NULL), TANDEM_OK);
   free_mesh(&small);
-  tandem_contact_query* query = NULL;
-  CHECK_STATUS(tandem_contact_query_create(allocator, &query), TANDEM_OK);
-  CHECK_STATUS(tandem_contact_query_set_assets(query, list, 2), TANDEM_OK);
+  tandem_scene* scene = scene_of(list, 2, allocator);
   tandem_instance bodies[3] = {at(0, 0, 0), at(0.875, 0, 0), at(0.125, 0, 0)};
   bodies[2].asset = 1;  // inside both
-  CHECK_STATUS(tandem_contact_query_make_manifolds(query, bodies, 3, NULL), TANDEM_CONTACTS_MISSING);
+  CHECK_STATUS(tandem_scene_place(scene, bodies, 3, NULL), TANDEM_OK);
+  CHECK_STATUS(tandem_scene_find_manifolds(scene, NULL), TANDEM_CONTACTS_MISSING);
+  // Contacts, manifolds and contained bodies in one call; the others are not asked.
+  tandem_contact_options first = {sizeof first, TANDEM_EXACT, 0, 0, 0, 0, 0, NULL, 0};
+  const tandem_manifold_options manifold_options = {sizeof manifold_options, 0, 0, 0};
+  const tandem_questions questions = {sizeof questions, 1, NULL, &first, &manifold_options, NULL, NULL, NULL};
+  size_t count = 0, points = 0;
   for (int step = 0; step < 2; ++step) {
-    CHECK_STATUS(tandem_contact_query_find_contacts(query, bodies, 3, NULL), TANDEM_OK);
-    CHECK_STATUS(tandem_contact_query_make_manifolds(query, bodies, 3, NULL), TANDEM_OK);
-    size_t count = 0, points = 0;
-    const tandem_manifold* manifolds = tandem_contact_query_manifolds(query, &count);
-    const tandem_manifold_point* point = tandem_contact_query_points(query, &points);
+    CHECK_STATUS(tandem_scene_find(scene, &questions), TANDEM_OK);
+    const tandem_manifold* manifolds = tandem_scene_manifolds(scene, &count);
+    const tandem_manifold_point* point = tandem_scene_points(scene, &points);
     CHECK(count == 1 && manifolds[0].point_count == points && points >= 4);
     CHECK(near(manifolds[0].normal[0], 1) && near(manifolds[0].depth, 0.125));
     for (size_t i = 0; i < points; ++i) {
       CHECK(near(point[i].depth, 0.125) && point[i].id != 0 && point[i].manifold == 0);
       CHECK((point[i].previous == TANDEM_NO_INDEX) == (step == 0));
     }
-    CHECK_STATUS(tandem_contact_query_find_contained(query, bodies, 3, 2), TANDEM_OK);
-    const tandem_containment* contained = tandem_contact_query_contained(query, &count);
+    const tandem_containment* contained = tandem_scene_contained(scene, &count);
     CHECK(count == 1 && contained[0].inner == 1 && contained[0].component == 0);
     CHECK(contained[0].flags == TANDEM_INSIDE);
-    const tandem_object_pair* pairs = tandem_contact_query_pairs(query, &count);
+    const tandem_object_pair* pairs = tandem_scene_pairs(scene, TANDEM_CONTACTS, &count);
     CHECK(contained[0].pair < count && pairs[contained[0].pair].a == 0 && pairs[contained[0].pair].b == 2);
+    CHECK(tandem_scene_distances(scene, &count) == NULL && count == 0);
+    tandem_counters counters;
+    counters.struct_size = sizeof counters;
+    CHECK_STATUS(tandem_scene_get_counters(scene, &counters), TANDEM_OK);
+    CHECK(counters.manifolds.manifolds == 1 && counters.manifolds.points == points);
+    CHECK(counters.contained.inside == 1 && counters.contained.object_pairs == 2);
   }
-  tandem_query_options first = {sizeof first, TANDEM_EXACT, 1, 0, 1, 0, 0, NULL};
-  CHECK_STATUS(tandem_contact_query_find_contacts(query, bodies, 3, &first), TANDEM_OK);
-  CHECK_STATUS(tandem_contact_query_find_contained(query, bodies, 3, 1), TANDEM_CONTACTS_MISSING);
+  // Contacts of bodies that have moved since are not those of the bodies as they stand.
+  const uint32_t mover = 2;
+  const tandem_pose nearer = at(0.25, 0, 0).pose;
+  CHECK_STATUS(tandem_scene_move(scene, &mover, &nearer, 1), TANDEM_OK);
+  CHECK_STATUS(tandem_scene_find_contained(scene), TANDEM_CONTACTS_MISSING);
+  CHECK_STATUS(tandem_scene_find_manifolds(scene, NULL), TANDEM_CONTACTS_MISSING);
+  CHECK(tandem_scene_manifolds(scene, &count) == NULL && count == 0 && contact_count(scene) > 0);
+  first.first_contact_only = 1;
+  CHECK_STATUS(tandem_scene_find(scene, &questions), TANDEM_CONTACTS_MISSING);
+  CHECK(contact_count(scene) == 1 && tandem_scene_contained(scene, &count) == NULL);
+  CHECK_STATUS(tandem_scene_find_manifolds(scene, NULL), TANDEM_OK);
+  CHECK_STATUS(tandem_scene_find_contacts(scene, &first), TANDEM_OK);
+  CHECK(tandem_scene_manifolds(scene, &count) == NULL && count == 0);
+  CHECK_STATUS(tandem_scene_find_contained(scene), TANDEM_CONTACTS_MISSING);
   tandem_asset_release(list[0]);
   tandem_asset_release(list[1]);
-  tandem_contact_query_destroy(query);
+  tandem_scene_destroy(scene);
 }
 
 // The bodies of docs/distance.md and docs/impact.md.
 static void test_distances_and_impacts(const tandem_allocator* allocator) {
   tandem_asset* cube = build_obj(assets_folder, "box_12.obj", allocator);
-  tandem_distance_query* distances = NULL;
-  CHECK_STATUS(tandem_distance_query_create(allocator, &distances), TANDEM_OK);
-  CHECK_STATUS(tandem_distance_query_set_assets(distances, &cube, 1), TANDEM_OK);
+  tandem_scene* scene = scene_of(&cube, 1, allocator);
+  tandem_asset_release(cube);
+  CHECK_STATUS(tandem_scene_set_threads(scene, 2), TANDEM_OK);
   tandem_instance row[3] = {at(0, 0, 0), at(1.5, 0, 0), at(3, 0, 0)};
+  CHECK_STATUS(tandem_scene_place(scene, row, 3, NULL), TANDEM_OK);
   tandem_distance_options options;
   memset(&options, 0, sizeof options);
   options.struct_size = sizeof options;
   options.limit_reach = 1;
   options.reach = 2;
-  options.threads = 2;
   const double expected[3] = {0.5, 2, 0.5};
   size_t count = 0;
   tandem_former_nearest former = {0, 1, 0, 0};
   for (int step = 0; step < 2; ++step) {
-    CHECK_STATUS(tandem_distance_query_find(distances, row, 3, &options), TANDEM_OK);
-    const tandem_distance* found = tandem_distance_query_distances(distances, &count);
+    CHECK_STATUS(tandem_scene_find_distances(scene, &options), TANDEM_OK);
+    const tandem_distance* found = tandem_scene_distances(scene, &count);
     CHECK(count == 3);
     for (size_t i = 0; i < count; ++i) {
       CHECK(found[i].lower <= expected[i] && expected[i] <= found[i].upper);
@@ -418,19 +521,19 @@ static void test_distances_and_impacts(const tandem_allocator* allocator) {
   }
   const tandem_object_pair far_pair = {2, 0};
   options.reach = 1;
-  CHECK_STATUS(tandem_distance_query_find_of_pairs(distances, row, 3, &far_pair, 1, &options), TANDEM_OK);
-  const tandem_distance* beyond = tandem_distance_query_distances(distances, &count);
+  options.pairs = &far_pair;
+  options.pair_count = 1;
+  CHECK_STATUS(tandem_scene_find_distances(scene, &options), TANDEM_OK);
+  const tandem_distance* beyond = tandem_scene_distances(scene, &count);
   CHECK(count == 1 && beyond[0].triangle_a == TANDEM_NO_INDEX && beyond[0].lower >= 1);
-  CHECK(tandem_distance_query_pairs(distances, &count)[0].a == 2);
-  tandem_distance_query_destroy(distances);
+  CHECK(tandem_scene_pairs(scene, TANDEM_DISTANCES, &count)[0].a == 2);
 
-  tandem_impact_query* impacts = NULL;
-  CHECK_STATUS(tandem_impact_query_create(allocator, &impacts), TANDEM_OK);
-  CHECK_STATUS(tandem_impact_query_set_assets(impacts, &cube, 1), TANDEM_OK);
   tandem_instance bodies[2] = {at(0, 0, 0), at(3, 0, 0)};
   tandem_motion motion[2] = {{{0, 0, 0}, {0, 0, 0}, {0, 0, 0}}, {{-400, 0, 0}, {0, 0, 0}, {3, 0, 0}}};
-  CHECK_STATUS(tandem_impact_query_find(impacts, bodies, motion, 2, 1.0 / 60, NULL), TANDEM_OK);
-  const tandem_impact* found = tandem_impact_query_impacts(impacts, &count);
+  tandem_impact_options moving = {sizeof moving, 0, 1.0 / 60, 0, motion, 2, NULL, 0};
+  CHECK_STATUS(tandem_scene_place(scene, bodies, 2, NULL), TANDEM_OK);
+  CHECK_STATUS(tandem_scene_find_impacts(scene, &moving), TANDEM_OK);
+  const tandem_impact* found = tandem_scene_impacts(scene, &count);
   CHECK(count == 1 && found[0].status == TANDEM_IMPACT && found[0].t_safe < 0.005);
   CHECK(found[0].t_safe > 0.005 - 1e-8 && found[0].face_a == 3 && found[0].face_b == 11);
   tandem_pose stopped;
@@ -438,29 +541,36 @@ static void test_distances_and_impacts(const tandem_allocator* allocator) {
   CHECK(stopped.translation[0] > 1 && stopped.translation[0] < 1.00001);
   const tandem_object_pair pair = {1, 0};
   motion[1].velocity[0] = 400;
-  CHECK_STATUS(tandem_impact_query_find_of_pairs(impacts, bodies, motion, 2, 0.25, &pair, 1, NULL), TANDEM_OK);
-  found = tandem_impact_query_impacts(impacts, &count);
+  moving.duration = 0.25;
+  moving.pairs = &pair;
+  moving.pair_count = 1;
+  CHECK_STATUS(tandem_scene_find_impacts(scene, &moving), TANDEM_OK);
+  found = tandem_scene_impacts(scene, &count);
   CHECK(count == 1 && found[0].status == TANDEM_NO_IMPACT && found[0].t_safe == 0.25);
-  CHECK(tandem_impact_query_pairs(impacts, &count)[0].a == 1);
-  tandem_impact_query_destroy(impacts);
+  CHECK(tandem_scene_pairs(scene, TANDEM_IMPACTS, &count)[0].a == 1);
+  moving.motion_count = 1;
+  CHECK_STATUS(tandem_scene_find_impacts(scene, &moving), TANDEM_MOTION_MISMATCH);
+  CHECK(tandem_scene_impacts(scene, &count) == NULL && count == 0);
 
-  // Without coarser levels, a query by tolerance decides all.
-  tandem_tolerance_query* tolerance = NULL;
-  CHECK_STATUS(tandem_tolerance_query_create(allocator, &tolerance), TANDEM_OK);
-  CHECK_STATUS(tandem_tolerance_query_set_assets(tolerance, &cube, 1), TANDEM_OK);
-  tandem_asset_release(cube);
+  // Without coarser levels, a tolerance decides all.
   const tandem_object_pair both[2] = {{0, 1}, {1, 2}};
   row[1] = at(0.75, 0, 0);
-  tandem_tolerance_options by = {sizeof by, 1, 0.1, NULL};
-  CHECK_STATUS(tandem_tolerance_query_decide_pairs(tolerance, row, 3, both, 2, &by), TANDEM_OK);
-  const tandem_verdict* verdicts = tandem_tolerance_query_verdicts(tolerance, &count);
+  CHECK_STATUS(tandem_scene_place(scene, row, 3, NULL), TANDEM_OK);
+  const tandem_tolerance_options by = {sizeof by, 0, 0.1, both, 2};
+  CHECK_STATUS(tandem_scene_find_verdicts(scene, &by), TANDEM_OK);
+  const tandem_verdict* verdicts = tandem_scene_verdicts(scene, &count);
   CHECK(count == 2 && verdicts[0].verdict == TANDEM_TOUCH && verdicts[1].verdict == TANDEM_APART);
-  CHECK_STATUS(tandem_tolerance_query_decide(tolerance, row, 3, NULL), TANDEM_OK);
-  CHECK(tandem_tolerance_query_pairs(tolerance, &count)[0].b == 1 && count == 1);
-  tandem_tolerance_query_destroy(tolerance);
+  CHECK_STATUS(tandem_scene_find_verdicts(scene, NULL), TANDEM_OK);
+  CHECK(tandem_scene_pairs(scene, TANDEM_VERDICTS, &count)[0].b == 1 && count == 1);
+  tandem_counters counters;
+  counters.struct_size = sizeof counters;
+  CHECK_STATUS(tandem_scene_get_counters(scene, &counters), TANDEM_OK);
+  CHECK(counters.verdicts.touching == 1 && counters.verdicts.work.object_pairs == 1);
+  CHECK(counters.distances.object_pairs == 1 && counters.impacts.object_pairs == 0);
+  tandem_scene_destroy(scene);
 }
 
-// Two threads, a query each, one asset, which goes while they work.
+// Two threads, a scene each, one asset, which goes while they work.
 typedef struct Job {
   tandem_asset* asset;
   size_t contacts;
@@ -469,17 +579,19 @@ typedef struct Job {
 
 static void* work(void* user) {
   Job* job = (Job*)user;
-  tandem_contact_query* query = NULL;
-  job->status = tandem_contact_query_create(NULL, &query);
-  if (job->status == TANDEM_OK) job->status = tandem_contact_query_set_assets(query, &job->asset, 1);
+  tandem_scene* scene = NULL;
+  job->status = tandem_scene_create(NULL, &scene);
+  if (job->status == TANDEM_OK) job->status = tandem_scene_set_threads(scene, 2);
+  if (job->status == TANDEM_OK) job->status = tandem_scene_set_assets(scene, &job->asset, 1);
   tandem_asset_release(job->asset);
-  tandem_query_options options = {sizeof options, TANDEM_EXACT, 0, 0, 2, 0, 0, NULL};
   tandem_instance bodies[4];
   for (int i = 0; i < 4; ++i) bodies[i] = at(0.1 * i, 0.03 * i, 0);
-  for (int step = 0; step < 20 && job->status == TANDEM_OK; ++step)
-    job->status = tandem_contact_query_find_contacts(query, bodies, 4, &options);
-  (void)tandem_contact_query_contacts(query, &job->contacts);
-  tandem_contact_query_destroy(query);
+  for (int step = 0; step < 20 && job->status == TANDEM_OK; ++step) {
+    job->status = tandem_scene_place(scene, bodies, 4, NULL);
+    if (job->status == TANDEM_OK) job->status = tandem_scene_find_contacts(scene, NULL);
+  }
+  job->contacts = contact_count(scene);
+  tandem_scene_destroy(scene);
   return NULL;
 }
 
@@ -504,11 +616,15 @@ int main(int argc, char** argv) {
   test_assets();
   test_building();
   test_contacts(NULL);
+  test_filters(NULL);
+  test_single_bodies(NULL);
   test_manifolds_and_containment(NULL);
   test_distances_and_impacts(NULL);
   test_threads();
   // All memory of handles and results is the allocator's, and comes back.
   test_contacts(&allocator);
+  test_filters(&allocator);
+  test_single_bodies(&allocator);
   CHECK(counted.blocks == 0 && counted.bytes == 0 && counted.ever > 20);
   test_manifolds_and_containment(&allocator);
   test_distances_and_impacts(&allocator);

@@ -62,7 +62,7 @@ tandem_status tandem_asset_open(const char* path, const tandem_open_options* opt
                         read.reserved == 0);
   if (status != TANDEM_OK) return status;
   const Access access = read.access == TANDEM_ACCESS_READ ? Access::read : Access::map;
-  return make_asset(allocator, asset, [&](tandem_asset& made) {
+  return create(allocator, asset, [&](tandem_asset& made) {
     const Status opened = made.file.open(path, access, depth_of(read.check_depth));
     if (where != nullptr) *where = made.file.where();
     made.view = made.file.view();
@@ -79,8 +79,8 @@ tandem_status tandem_asset_from_memory(const void* data, size_t bytes, const tan
   if (status == TANDEM_OK)
     status = bad_unless(read.check_depth <= TANDEM_CHECK_QUICK && read.borrow <= 1 && read.reserved == 0);
   if (status != TANDEM_OK) return status;
-  return make_asset(allocator, asset,
-                    [&](tandem_asset& made) { return take_bytes(made, data, bytes, read, where); });
+  return create(allocator, asset,
+                [&](tandem_asset& made) { return take_bytes(made, data, bytes, read, where); });
 }
 
 void tandem_asset_retain(tandem_asset* asset) {

@@ -100,10 +100,8 @@ tandem_status take(build::BuiltAsset built, tandem_asset& made) {
 tandem_status tandem_asset_build(const tandem_mesh* mesh, const tandem_build_options* options,
                                  const tandem_allocator* allocator, tandem_asset** asset,
                                  tandem_build_report* report) {
-  if (asset == nullptr) return TANDEM_NULL_ARGUMENT;
-  *asset = nullptr;
-  if (mesh == nullptr) return TANDEM_NULL_ARGUMENT;
-  try {
+  return create(allocator, asset, [&](tandem_asset& made) -> tandem_status {
+    if (mesh == nullptr) return TANDEM_NULL_ARGUMENT;
     tandem_build_options read;
     build::BuildOptions understood;
     Source source;
@@ -111,14 +109,8 @@ tandem_status tandem_asset_build(const tandem_mesh* mesh, const tandem_build_opt
     if (status == TANDEM_OK) status = read_mesh(*mesh, source);
     if (status == TANDEM_OK && report != nullptr) status = write_struct(tandem_build_report{}, report);
     if (status != TANDEM_OK) return status;
-    return make_asset(allocator, asset, [&](tandem_asset& made) {
-      build::BuiltAsset built = build_with(source, understood, read);
-      if (report != nullptr) (void)write_struct(report_of(built.clean), report);
-      return take(std::move(built), made);
-    });
-  } catch (const std::bad_alloc&) {
-    return TANDEM_OUT_OF_MEMORY;
-  } catch (...) {
-    return TANDEM_INTERNAL_ERROR;
-  }
+    build::BuiltAsset built = build_with(source, understood, read);
+    if (report != nullptr) (void)write_struct(report_of(built.clean), report);
+    return take(std::move(built), made);
+  });
 }

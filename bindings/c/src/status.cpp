@@ -1,9 +1,12 @@
-#include "status.h"
+#include "tandem/formats/status.h"
 
-namespace tandem::c {
+#include "tandem/tandem.h"
+
+using tandem::Status;
+
 namespace {
 
-// What this interface adds.
+// What this interface adds to the statuses of the libraries.
 struct Entry {
   tandem_status status;
   const char *name, *subject, *sentence;
@@ -19,7 +22,7 @@ constexpr Entry kEntries[] = {
     {TANDEM_UNKNOWN_LEVEL, "UnknownLevel", nullptr, "the asset has no such level or part"},
     {TANDEM_FILTER_MISMATCH, "FilterMismatch", nullptr, "a filter is of another number of instances"},
     {TANDEM_CONTACTS_MISSING, "ContactsMissing", nullptr,
-     "the query's last call did not find the contacts that this one needs"},
+     "the contacts that manifolds or contained bodies need were not found of the bodies as they stand"},
     {TANDEM_NO_TRIANGLE, "NoTriangle", nullptr, "none of the triangles can be used"},
     {TANDEM_ASSETS_MISSING, "AssetsMissing", nullptr,
      "a handle was given no assets, or others than the query whose contacts it takes"},
@@ -35,29 +38,21 @@ const Entry* entry_of(tandem_status status) {
 
 }  // namespace
 
-}  // namespace tandem::c
-
-using tandem::Status;
-using namespace tandem::c;
-
 const char* tandem_status_name(tandem_status status) {
-  if (Status known = Status::kOk; from_c(status, known)) return tandem::name(known);
   const Entry* entry = entry_of(status);
-  return entry != nullptr ? entry->name : "Unnamed";
+  return entry != nullptr ? entry->name : tandem::name(static_cast<Status>(status));
 }
 
 const char* tandem_status_explain(tandem_status status) {
-  if (Status known = Status::kOk; from_c(status, known)) return tandem::explain(known);
   const Entry* entry = entry_of(status);
-  return entry != nullptr ? entry->sentence : "a status that this version does not know";
+  return entry != nullptr ? entry->sentence : tandem::explain(static_cast<Status>(status));
 }
 
 const char* tandem_status_subject(tandem_status status) {
   // In this interface these two come with the asset that lacks something.
   if (status == TANDEM_NO_TOPOLOGY || status == TANDEM_NO_FINEST_LEVEL) return "asset";
-  if (Status known = Status::kOk; from_c(status, known)) return tandem::subject(known);
   const Entry* entry = entry_of(status);
-  return entry != nullptr ? entry->subject : nullptr;
+  return entry != nullptr ? entry->subject : tandem::subject(static_cast<Status>(status));
 }
 
 uint32_t tandem_version(void) {

@@ -118,7 +118,7 @@ nb::object words(const Asset& asset, std::uint32_t number, std::uint32_t corner)
   nb::object bytes = make_bytes(nullptr, of.triangle_count * sizeof(std::uint32_t));
   auto* to = static_cast<std::uint32_t*>(bytes_begin(bytes));
   for (const tandem_triangle& triangle : std::span(of.triangles, of.triangle_count))
-    *to++ = triangle.corner[corner].word;
+    *to++ = triangle.corner[corner].w;
   return bytes;
 }
 

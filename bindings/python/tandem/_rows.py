@@ -1,39 +1,35 @@
-"""Rows of arguments and results: NumPy dtypes that are, byte for byte, the structs of tandem.h."""
-from __future__ import annotations
-
+"""Rows of arguments and results: NumPy dtypes that are, byte for byte, the structs of tandem.h. They have no holes, so that NumPy keeps them
+wherever it copies. Written by scripts/write_interface from it. Do not edit it."""
 import numpy as np
 
 __all__ = ["CONTACT", "CONTAINMENT", "DISTANCE", "FORMER", "IMPACT", "INSTANCE", "MANIFOLD", "MOTION", "NO_INDEX", "PAIR", "POINT", "VERDICT"]
 
-#: What is not there: a triangle, a face, a former point.
+#: What is not there: a triangle, a face, a former point, the asset of a removed body.
 NO_INDEX = 0xFFFFFFFF
-
-_VECTOR = ("<f8", (3,))
-# Without holes, so that NumPy keeps the dtype wherever it copies.
-
-#: Where a body stands: world = rotation @ x + translation, x in the mesh file's coordinates.
-INSTANCE = np.dtype([("asset", "<u4"), ("reserved", "<u4"), ("rotation", "<f8", (3, 3)), ("translation", *_VECTOR)])
-#: Two instances.
+#: An asset as a body. Where a body stands: world = rotation x + translation, x in the mesh file's coordinates; rows of the rotation are consecutive.
+#: Rigid to 1e-6, else TANDEM_POSE_NOT_RIGID.
+INSTANCE = np.dtype([("asset", "<u4"), ("reserved", "<u4"), ("rotation", "<f8", (3, 3)), ("translation", "<f8", (3,))])
+#: Two bodies.
 PAIR = np.dtype([("a", "<u4"), ("b", "<u4")])
-#: Two triangles that meet: `pair` is the row of the list of pairs.
+#: Two triangles that meet: triangle_a belongs to body a of the object pair, triangle_b to b.
 CONTACT = np.dtype([("pair", "<u4"), ("triangle_a", "<u4"), ("triangle_b", "<u4"), ("face_a", "<u4"), ("face_b", "<u4")])
-#: A connected region in which the surfaces of two bodies meet.
-MANIFOLD = np.dtype([("normal", *_VECTOR), ("area_vector", *_VECTOR), ("centre", *_VECTOR), ("depth", "<f8"), ("pair", "<u4"), ("first_point", "<u4"),
-                     ("point_count", "<u4"), ("flags", "<u4")])
+#: A connected region in which the surfaces of two bodies meet (docs/contacts.md).
+MANIFOLD = np.dtype([("normal", "<f8", (3,)), ("area_vector", "<f8", (3,)), ("centre", "<f8", (3,)), ("depth", "<f8"), ("pair", "<u4"),
+        ("first_point", "<u4"), ("point_count", "<u4"), ("flags", "<u4")])
 #: A point of a manifold.
-POINT = np.dtype([("position", *_VECTOR), ("in_a", *_VECTOR), ("in_b", *_VECTOR), ("depth", "<f8"), ("id", "<u8"), ("face_a", "<u4"), ("face_b", "<u4"),
-                  ("previous", "<u4"), ("manifold", "<u4")])
+POINT = np.dtype([("position", "<f8", (3,)), ("in_a", "<f8", (3,)), ("in_b", "<f8", (3,)), ("depth", "<f8"), ("id", "<u8"), ("face_a", "<u4"),
+        ("face_b", "<u4"), ("previous", "<u4"), ("manifold", "<u4")])
 #: A component of a body that meets nothing of another and lies within it.
 CONTAINMENT = np.dtype([("pair", "<u4"), ("inner", "<u4"), ("component", "<u4"), ("flags", "<u4")])
-#: How near two bodies are.
-DISTANCE = np.dtype([("lower", "<f8"), ("upper", "<f8"), ("point_a", *_VECTOR), ("point_b", *_VECTOR), ("triangle_a", "<u4"), ("triangle_b", "<u4"),
-                     ("face_a", "<u4"), ("face_b", "<u4")])
-#: Triangles of a pair of instances that were nearest a step ago.
+#: How near the surfaces of two bodies are (docs/distance.md).
+DISTANCE = np.dtype([("lower", "<f8"), ("upper", "<f8"), ("point_a", "<f8", (3,)), ("point_b", "<f8", (3,)), ("triangle_a", "<u4"), ("triangle_b",
+        "<u4"), ("face_a", "<u4"), ("face_b", "<u4")])
+#: Triangles of a pair of bodies that were nearest a step ago.
 FORMER = np.dtype([("a", "<u4"), ("b", "<u4"), ("triangle_a", "<u4"), ("triangle_b", "<u4")])
-#: How an instance moves: its centre straight ahead, and it turns about that. `center` is where the centre is in the world at the start, such as that of mass.
-MOTION = np.dtype([("velocity", *_VECTOR), ("angular_velocity", *_VECTOR), ("center", *_VECTOR)])
-#: Until when two bodies surely do not meet.
-IMPACT = np.dtype([("t_safe", "<f8"), ("gap", "<f8"), ("point_a", *_VECTOR), ("point_b", *_VECTOR), ("triangle_a", "<u4"), ("triangle_b", "<u4"),
-                   ("face_a", "<u4"), ("face_b", "<u4"), ("status", "u1"), ("reserved", "u1", (7,))])
-#: Whether two bodies meet, and which of their levels it was asked of.
+#: The centre goes straight ahead and the body turns about it, both at constant speed.
+MOTION = np.dtype([("velocity", "<f8", (3,)), ("angular_velocity", "<f8", (3,)), ("center", "<f8", (3,))])
+#: Until when two moving bodies surely do not meet (docs/impact.md).
+IMPACT = np.dtype([("t_safe", "<f8"), ("gap", "<f8"), ("point_a", "<f8", (3,)), ("point_b", "<f8", (3,)), ("triangle_a", "<u4"), ("triangle_b",
+        "<u4"), ("face_a", "<u4"), ("face_b", "<u4"), ("status", "u1"), ("reserved", "u1", (7,))])
+#: Whether two bodies meet (docs/levels.md).
 VERDICT = np.dtype([("verdict", "u1"), ("level_a", "u1"), ("level_b", "u1")])

@@ -58,17 +58,9 @@ tandem_status tandem_gpu_assets_upload(tandem_asset* const* assets, size_t count
   tandem_upload_options read;
   if (const tandem_status status = read_struct(options, read); status != TANDEM_OK) return status;
   if (read.contents > TANDEM_CONTENTS_MANIFOLDS) return TANDEM_BAD_OPTION;
-  tandem_gpu_assets* made = nullptr;
-  if (const tandem_status status = create_gpu(allocator, &made); status != TANDEM_OK) return status;
-  const tandem_status status = guarded(made, [&](tandem_gpu_assets& self) {
-    return upload(self, assets, count, static_cast<Contents>(read.contents), stream);
+  return create(allocator, uploaded, [&](tandem_gpu_assets& made) {
+    return upload(made, assets, count, static_cast<Contents>(read.contents), stream);
   });
-  if (status == TANDEM_OK) {
-    *uploaded = made;
-  } else {
-    delete made;
-  }
-  return status;
 }
 
 void tandem_gpu_assets_retain(tandem_gpu_assets* assets) {

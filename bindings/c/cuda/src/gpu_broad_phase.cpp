@@ -1,5 +1,4 @@
 #include "gpu_handles.h"
-#include "gpu_rows.h"
 
 using namespace tandem;
 using namespace tandem::c;
@@ -32,32 +31,20 @@ tandem_status find(tandem_gpu_broad_phase* broad_phase, const tandem_gpu_instanc
 
 }  // namespace
 
-tandem_status tandem_gpu_broad_phase_create(const tandem_allocator* allocator,
-                                            tandem_gpu_broad_phase** broad_phase) {
-  return create_gpu(allocator, broad_phase);
-}
-
-void tandem_gpu_broad_phase_destroy(tandem_gpu_broad_phase* broad_phase) {
-  delete broad_phase;
-}
+TANDEM_GPU_HANDLE(tandem_gpu_broad_phase, tandem_gpu_broad_phase_report)
 
 tandem_status tandem_gpu_broad_phase_set_assets(tandem_gpu_broad_phase* broad_phase,
                                                 tandem_gpu_assets* assets) {
-  return guarded(broad_phase, [&](tandem_gpu_broad_phase& self) {
-    return self.take(
-        assets, [] { return Status::kOk; },
-        [&] {
-          self.query = GpuBroadPhase();  // which forgets what it kept
-          return self.query.reserve({});
-        });
+  return take_assets(broad_phase, assets, [](GpuBroadPhase& query) {
+    query = GpuBroadPhase();  // which forgets what it kept
+    return Status::kOk;
   });
 }
 
 tandem_status tandem_gpu_broad_phase_reserve(tandem_gpu_broad_phase* broad_phase,
                                              const tandem_gpu_broad_phase_capacity* capacity,
                                              const tandem_gpu_broad_phase_options* options) {
-  return with_assets(broad_phase, [&](tandem_gpu_broad_phase& self) -> tandem_status {
-    if (capacity == nullptr) return TANDEM_NULL_ARGUMENT;
+  return reserve(broad_phase, capacity, [&](tandem_gpu_broad_phase& self) {
     GpuBroadPhaseOptions read;
     if (const tandem_status status = read_options(options, read); status != TANDEM_OK) return status;
     return told(self.query.reserve({capacity->instances, capacity->pairs, capacity->instances}, read),
@@ -100,20 +87,4 @@ tandem_status tandem_gpu_broad_phase_find(tandem_gpu_broad_phase* broad_phase,
 tandem_gpu_pairs tandem_gpu_broad_phase_pairs(const tandem_gpu_broad_phase* broad_phase) {
   return of_query(broad_phase, tandem_gpu_pairs{},
                   [](const GpuBroadPhase& query) { return pairs_to_c(query.pairs()); });
-}
-
-const tandem_gpu_broad_phase_report* tandem_gpu_broad_phase_device_report(
-    const tandem_gpu_broad_phase* broad_phase) {
-  using Report = const tandem_gpu_broad_phase_report*;
-  return of_query(broad_phase, Report{},
-                  [](const GpuBroadPhase& query) { return reinterpret_cast<Report>(query.device_report()); });
-}
-
-tandem_status tandem_gpu_broad_phase_get_report(const tandem_gpu_broad_phase* broad_phase,
-                                                tandem_gpu_broad_phase_report* report) {
-  return get_report(broad_phase, report);
-}
-
-size_t tandem_gpu_broad_phase_bytes(const tandem_gpu_broad_phase* broad_phase) {
-  return bytes_of(broad_phase);
 }

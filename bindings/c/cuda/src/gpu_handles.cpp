@@ -1,7 +1,6 @@
 #include "gpu_handles.h"
 
 #include "fill_count.h"
-#include "rows.h"
 #include "tandem/kernels/excluded_pairs.h"
 
 namespace tandem::c {
@@ -60,17 +59,12 @@ int tandem_cuda_error(void) {
 tandem_status tandem_gpu_excluded_pairs_create(const tandem_object_pair* pairs, size_t count,
                                                tandem_stream stream, const tandem_allocator* allocator,
                                                tandem_gpu_excluded_pairs** excluded) {
-  if (const tandem_status status = create_gpu(allocator, excluded); status != TANDEM_OK) return status;
-  const tandem_status status = guarded(*excluded, [&](tandem_gpu_excluded_pairs& made) -> tandem_status {
+  return create(allocator, excluded, [&](tandem_gpu_excluded_pairs& made) -> tandem_status {
     if (!is_there(pairs, count)) return TANDEM_NULL_ARGUMENT;
     ExcludedPairTable table;
     if (const Status set = table.set(rows<ObjectPair>(pairs, count)); set != Status::kOk) return to_c(set);
     return told(made.table.upload(table.view(), stream), made.table);
   });
-  if (status == TANDEM_OK) return TANDEM_OK;
-  delete *excluded;
-  *excluded = nullptr;
-  return status;
 }
 
 void tandem_gpu_excluded_pairs_destroy(tandem_gpu_excluded_pairs* excluded) {

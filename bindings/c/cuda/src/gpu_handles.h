@@ -2,15 +2,22 @@
 #include <cuda_runtime_api.h>
 
 #include <atomic>
-#include <new>
+#include <bit>
+#include <functional>
 
 #include "entry.h"
-#include "status.h"
+#include "rows.h"
 #include "tandem/formats/gpu_memory.h"
 #include "tandem/formats/gpu_status.h"
 #include "tandem/kernels/detail/buffer.h"
+#include "tandem/kernels/gpu_broad_phase.h"
+#include "tandem/kernels/gpu_containment_query.h"
+#include "tandem/kernels/gpu_distance_query.h"
 #include "tandem/kernels/gpu_excluded_pairs.h"
+#include "tandem/kernels/gpu_impact_query.h"
+#include "tandem/kernels/gpu_manifold_query.h"
 #include "tandem/kernels/gpu_scene.h"
+#include "tandem/kernels/gpu_tolerance_query.h"
 #include "tandem/runtime/upload.h"
 #include "tandem/tandem_cuda.h"
 
@@ -31,6 +38,8 @@ struct tandem_gpu_excluded_pairs : tandem::Allocated {
 };
 
 namespace tandem::c {
+
+#include "gpu_layouts.h"
 
 /// The interface's number of what a call returned; keeps the error of CUDA's behind it for
 /// tandem_cuda_error().
@@ -57,31 +66,39 @@ template <typename Query>
 struct GpuHandle : GivenAssets {
   GpuArray<uint32_t> given_count;  ///< of pairs whose number the caller has in CPU memory
   Query query;
+};
 
-  /// Gives it the assets by `name`, and room for nothing by `prepare`, so that its arrays are there. After an
-  /// error there are no assets.
-  template <typename Name, typename Prepare>
-  tandem_status take(tandem_gpu_assets* given, const Name& name, const Prepare& prepare) {
+/// Makes a handle, which takes no GPU memory yet.
+template <typename Of>
+tandem_status create_gpu(const tandem_allocator* allocator, Of** handle) noexcept {
+  return create(allocator, handle, [](Of&) { return tandem_status{TANDEM_OK}; });
+}
+
+/// Gives a handle the assets by `name`, and room for nothing, so that its arrays are there. After an error
+/// there are no assets.
+template <typename Of, typename Name>
+tandem_status take_assets(Of* handle, tandem_gpu_assets* given, const Name& name) noexcept {
+  return guarded(handle, [&](Of& self) -> tandem_status {
     if (given == nullptr) return TANDEM_NULL_ARGUMENT;
     tandem_gpu_assets_retain(given);
-    tandem_gpu_assets* const before = assets;
-    assets = nullptr;
-    Status status = name();
-    if (status == Status::kOk) status = prepare();
-    tandem_status result = told(status, query);
+    tandem_gpu_assets* const before = self.assets;
+    self.assets = nullptr;
+    Status status = name(self.query);
+    if (status == Status::kOk) status = self.query.reserve({});
+    tandem_status result = told(status, self.query);
     if (result == TANDEM_OK) {
-      const cudaError_t error = given_count.reserve(1);
+      const cudaError_t error = self.given_count.reserve(1);
       result = told(status_of(error), error);
     }
     tandem_gpu_assets_release(before);
     if (result == TANDEM_OK) {
-      assets = given;
+      self.assets = given;
     } else {
       tandem_gpu_assets_release(given);
     }
     return result;
-  }
-};
+  });
+}
 
 /// Runs the body of a function that needs assets.
 template <typename Of, typename Body>
@@ -91,25 +108,37 @@ tandem_status with_assets(Of* handle, const Body& body) noexcept {
   });
 }
 
-/// Makes a handle. The objects inside take no GPU memory yet.
-template <typename Of>
-tandem_status create_gpu(const tandem_allocator* given, Of** handle) noexcept {
-  if (handle == nullptr) return TANDEM_NULL_ARGUMENT;
-  *handle = nullptr;
-  Allocator allocator;
-  if (const tandem_status status = read_allocator(given, allocator); status != TANDEM_OK) return status;
-  const AllocatorScope scope(allocator);
-  Of* const made = new (std::nothrow) Of;
-  if (made == nullptr) return TANDEM_OUT_OF_MEMORY;
-  made->allocator = allocator;
-  *handle = made;
-  return TANDEM_OK;
+/// Makes room for what a capacity says, by the query's reserve() with what `options` gives for it.
+template <typename Of, typename Capacity, typename Body>
+tandem_status reserve(Of* handle, const Capacity* capacity, const Body& body) noexcept {
+  return with_assets(handle, [&](Of& self) -> tandem_status {
+    if (capacity == nullptr) return TANDEM_NULL_ARGUMENT;
+    if constexpr (requires { capacity->reserved; }) {
+      if (capacity->reserved != 0) return TANDEM_BAD_OPTION;
+    }
+    return body(self);
+  });
+}
+
+/// The same where a query has no options that reserve() needs to know. Room: the query's capacity.
+template <typename Room, typename Of, typename Capacity>
+tandem_status reserve(Of* handle, const Capacity* capacity) noexcept {
+  return reserve(handle, capacity, [&](Of& self) {
+    return told(self.query.reserve(std::bit_cast<Room>(*capacity)), self.query);
+  });
 }
 
 /// What a handle's query has, or `none` before it has assets.
 template <typename Of, typename Result, typename Get>
 Result of_query(const Of* handle, Result none, const Get& get) {
-  return handle != nullptr && handle->assets != nullptr ? get(handle->query) : none;
+  return handle != nullptr && handle->assets != nullptr ? std::invoke(get, handle->query) : none;
+}
+
+/// Rows in GPU memory that a query has.
+template <typename Row, typename Of, typename Get>
+const Row* rows_of(const Of* handle, const Get& get) {
+  const auto rows = [&](const auto& query) { return reinterpret_cast<const Row*>(std::invoke(get, query)); };
+  return of_query(handle, static_cast<const Row*>(nullptr), rows);
 }
 
 /// What the GPU found: fills the caller's report, where there is one.
@@ -122,10 +151,23 @@ tandem_status get_report(const Of* handle, Report* report) {
   return told(handle->query.report().status, cudaSuccess);
 }
 
-template <typename Of>
-size_t bytes_of(const Of* handle) {
-  return handle != nullptr ? handle->query.bytes() + handle->given_count.bytes() : 0;
-}
+/// Defines the functions that all handles have in the same form.
+#define TANDEM_GPU_HANDLE(handle, report_row)                                                \
+  tandem_status handle##_create(const tandem_allocator* allocator, handle** made) {          \
+    return create_gpu(allocator, made);                                                      \
+  }                                                                                          \
+  void handle##_destroy(handle* of) {                                                        \
+    delete of;                                                                               \
+  }                                                                                          \
+  const report_row* handle##_device_report(const handle* of) {                               \
+    return rows_of<report_row>(of, [](const auto& query) { return query.device_report(); }); \
+  }                                                                                          \
+  tandem_status handle##_get_report(const handle* of, report_row* report) {                  \
+    return get_report(of, report);                                                           \
+  }                                                                                          \
+  size_t handle##_bytes(const handle* of) {                                                  \
+    return of != nullptr ? of->query.bytes() + of->given_count.bytes() : 0;                  \
+  }
 
 /// The caller's instances. Result: TANDEM_OK, TANDEM_NULL_ARGUMENT or TANDEM_BAD_OPTION.
 tandem_status read_instances(const tandem_gpu_instances* given, GpuInstances& instances);
@@ -136,5 +178,10 @@ tandem_status read_pairs(const tandem_gpu_pairs* given, uint32_t* room, GpuPairs
 
 /// The filter of a call; null: none.
 tandem_status read_gpu_filter(const tandem_gpu_pair_filter* given, PairFilter& filter);
+
+/// Pairs of a library as the caller reads them.
+inline tandem_gpu_pairs pairs_to_c(const GpuPairs& pairs) {
+  return {reinterpret_cast<const tandem_object_pair*>(pairs.pairs), pairs.count, pairs.capacity, 0};
+}
 
 }  // namespace tandem::c

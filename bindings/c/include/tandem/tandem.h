@@ -1,5 +1,6 @@
 /// Tandem's C interface: exact contacts, manifolds, distances and times of impact of posed meshes, on the
-/// CPU. C99 and C++; link with -ltandem. docs/c.md is its page.
+/// CPU. C99 and C++; link with -ltandem. docs/c.md is its page. scripts/write_interface writes from this
+/// header what other languages and the libraries' own rows need to know of it.
 ///
 /// Conventions, of every function:
 /// - It returns a tandem_status, TANDEM_OK or what is wrong; or the answer itself where nothing can be wrong.
@@ -11,10 +12,10 @@
 ///   function fills begins with its size as well, which the caller sets. `reserved` is zero.
 /// - Rows of arguments and results (instances, pairs, contacts, ...) never change their layout.
 /// - Strings are UTF-8. Lengths are in the files' unit, angles in radians, times in seconds.
-/// - A handle of a query takes one call at a time; several handles work side by side. Assets never change,
-///   and any number of threads may use them. Queries start threads where options ask for them, and keep them.
-/// - Rounding is to nearest, subnormals included, as every thread begins. A query takes about 100 KB of the
-///   stack.
+/// - A scene takes one call at a time; several scenes work side by side. Assets never change, and any number
+///   of threads may use them. A scene starts the threads that it may use, and keeps them.
+/// - Rounding is to nearest, subnormals included, as every thread begins. A question takes about 100 KB of
+///   the stack.
 #ifndef TANDEM_TANDEM_H
 #define TANDEM_TANDEM_H
 
@@ -46,18 +47,20 @@ typedef uint32_t tandem_status;
 enum {
   TANDEM_OK = 0,
   // The use of this interface, and what the system refuses.
-  TANDEM_NULL_ARGUMENT = 1,    ///< a pointer is null, or a list that is not empty; where: its place in a list
-  TANDEM_BAD_STRUCT_SIZE = 2,  ///< of an options struct, or bytes of it that this version does not know
-  TANDEM_BAD_OPTION = 3,       ///< a number that names no choice, or a reserved field that is not zero
-  TANDEM_OUT_OF_MEMORY = 4,
-  TANDEM_CANNOT_START_THREAD = 5,
+  TANDEM_NULL_ARGUMENT = 1,    ///< a pointer or a list that is not empty is null; where: its place in a list
+  TANDEM_BAD_STRUCT_SIZE = 2,  ///< struct_size was not set, or a field is set that this version does not know
+  TANDEM_BAD_OPTION = 3,       ///< a number names no choice, or a reserved field is not zero
+  TANDEM_OUT_OF_MEMORY = 4,    ///< the allocator, or the machine, has not enough memory
+  TANDEM_CANNOT_START_THREAD = 5,  ///< the system refuses to start a thread
   TANDEM_INTERNAL_ERROR = 6,       ///< a defect of the library
-  TANDEM_UNKNOWN_LEVEL = 7,        ///< a level or part that the asset does not have
-  TANDEM_FILTER_MISMATCH = 8,      ///< a filter of another number of instances
-  TANDEM_CONTACTS_MISSING = 9,     ///< the query's last call did not find the contacts that this call needs
-  TANDEM_NO_TRIANGLE = 11,         ///< none of the triangles can be used
-  TANDEM_TOO_MANY_TRIANGLES = 12,  ///< 2^32 - 1 or more
-  TANDEM_ASSETS_MISSING = 13,      ///< of a handle of tandem_cuda.h
+  TANDEM_UNKNOWN_LEVEL = 7,        ///< the asset does not have the level or part
+  TANDEM_FILTER_MISMATCH = 8,      ///< a filter is of another number of bodies
+  TANDEM_CONTACTS_MISSING = 9,  ///< manifolds or contained bodies are asked for, and the contacts that they
+                                ///< need were not found of the bodies as they stand
+  TANDEM_NO_TRIANGLE = 11,      ///< none of the triangles can be used
+  TANDEM_TOO_MANY_TRIANGLES = 12,  ///< there are 2^32 - 1 triangles or more
+  TANDEM_ASSETS_MISSING = 13,  ///< a handle of tandem_cuda.h was given no assets, or others than the query
+                               ///< whose contacts it takes
   // A file, or bytes of one. Of the defects that are there, the first in this order.
   // clang-format off
   TANDEM_FILE_NOT_FOUND = 100, TANDEM_NOT_A_REGULAR_FILE = 101, TANDEM_CANNOT_OPEN = 102,
@@ -81,7 +84,7 @@ enum {
   TANDEM_TRIANGLE_OUTSIDE_ORIENTED_BOX = 173,
   TANDEM_BAD_TOPOLOGY = 180, TANDEM_VERTEX_ORDER = 181, TANDEM_VERTEX_MISMATCH = 182,
   TANDEM_EDGE_MISMATCH = 183, TANDEM_BAD_WINDING = 184, TANDEM_COMPONENT_MISMATCH = 185,
-  // A query.
+  // Bodies and questions.
   TANDEM_OUT_OF_RANGE = 200, TANDEM_UNKNOWN_ASSET = 201, TANDEM_UNKNOWN_INSTANCE = 202,
   TANDEM_UNKNOWN_CONTACT = 203, TANDEM_POSE_NOT_RIGID = 204, TANDEM_TOO_MANY_INSTANCES = 205,
   TANDEM_TOO_MANY_PAIRS = 206, TANDEM_KEPT_MISMATCH = 207, TANDEM_MOTION_MISMATCH = 208,
@@ -106,7 +109,7 @@ TANDEM_API const char* tandem_status_subject(tandem_status status);
 
 /// Where memory comes from. A handle keeps a copy of it and takes all of its memory there, results included;
 /// what `user` points to outlives the handle. Both functions may be called by several threads at a time, also
-/// by those that queries start. The library's own are only what the C++ runtime and the system take to start
+/// by those that scenes start. The library's own are only what the C++ runtime and the system take to start
 /// a thread. Null pointers to allocators stand for the C library's memory.
 typedef struct tandem_allocator {
   uint32_t struct_size;
@@ -121,7 +124,7 @@ typedef struct tandem_allocator {
 /// ---- Assets
 
 /// What one .bvh file holds, checked. It never changes, and its references are counted: whoever has it from a
-/// function below has one, and a query has one of each of its assets. The count may be changed by several
+/// function below has one, and a scene has one of each of its assets. The count may be changed by several
 /// threads at a time.
 typedef struct tandem_asset tandem_asset;
 
@@ -246,7 +249,7 @@ TANDEM_API tandem_status tandem_asset_get_info(const tandem_asset* asset, tandem
 
 typedef struct tandem_corner {
   float position[3];  ///< in stored coordinates
-  uint32_t word;      ///< of corner 0: the face of the mesh file; of corner 1: the part; of corner 2: 0
+  uint32_t w;         ///< of corner 0: the face of the mesh file; of corner 1: the part; of corner 2: 0
 } tandem_corner;
 
 typedef struct tandem_triangle {
@@ -275,8 +278,8 @@ TANDEM_API tandem_status tandem_asset_get_level(const tandem_asset* asset, uint3
 TANDEM_API uint32_t tandem_asset_coarsest_level(const tandem_asset* asset, double tolerance);
 
 /// An asset that shows `count` levels of another from level `first` on, or as many as there are; 0: all.
-/// Queries use the first that an asset shows. The bytes are the same, and stay as long as either. Result:
-/// TANDEM_UNKNOWN_LEVEL where there is no level `first`.
+/// Questions look at the first that an asset shows. The bytes are the same, and stay as long as either.
+/// Result: TANDEM_UNKNOWN_LEVEL where there is no level `first`.
 TANDEM_API tandem_status tandem_asset_levels_from(tandem_asset* asset, uint32_t first, uint32_t count,
                                                   tandem_asset** levels);
 
@@ -295,68 +298,139 @@ TANDEM_API tandem_status tandem_asset_get_part(const tandem_asset* asset, uint32
 /// JSON that says how the file was made; without a zero at the end.
 TANDEM_API const char* tandem_asset_provenance(const tandem_asset* asset, size_t* bytes);
 
-/// ---- Rows
+/// ---- Bodies
 
-/// Where an instance stands: world = rotation x + translation, x in the mesh file's coordinates; rows of the
+/// Where a body stands: world = rotation x + translation, x in the mesh file's coordinates; rows of the
 /// rotation are consecutive. Rigid to 1e-6, else TANDEM_POSE_NOT_RIGID.
 typedef struct tandem_pose {
   double rotation[3][3];
   double translation[3];
 } tandem_pose;
 
+/// An asset as a body.
 typedef struct tandem_instance {
-  uint32_t asset;     ///< place in the list of the query's assets
+  uint32_t asset;     ///< place in the list of the scene's assets; TANDEM_NO_INDEX: the body was removed
   uint32_t reserved;  ///< not looked at
   tandem_pose pose;
 } tandem_instance;
 
+/// Two bodies.
 typedef struct tandem_object_pair {
-  uint32_t a, b;  ///< instances
+  uint32_t a, b;
 } tandem_object_pair;
 
-/// What is not there: a triangle, a face, a former point.
+/// What is not there: a triangle, a face, a former point, the asset of a removed body.
 #define TANDEM_NO_INDEX 0xFFFFFFFFu
 
-/// What moves an instance: forces; nothing; the caller; nothing until the caller wakes it.
+/// What moves a body: forces; nothing; the caller; nothing until the caller wakes it.
 enum { TANDEM_MOVING = 0, TANDEM_FIXED = 1, TANDEM_KINEMATIC = 2, TANDEM_SLEEPING = 3 };
 
-/// A set of pairs of instances, which queries do not look at.
+/// A set of pairs of bodies, which scenes do not look at. A scene that was given it keeps it.
 typedef struct tandem_excluded_pairs tandem_excluded_pairs;
 
 /// Takes pairs in any order, each as often as wanted. Result: TANDEM_UNKNOWN_INSTANCE where one names
-/// instance 2^32 - 1. A query asks whether there are the others.
+/// body 2^32 - 1. A scene asks whether there are the others.
 TANDEM_API tandem_status tandem_excluded_pairs_create(const tandem_object_pair* pairs, size_t count,
                                                       const tandem_allocator* allocator,
                                                       tandem_excluded_pairs** excluded);
+/// Null does nothing.
 TANDEM_API void tandem_excluded_pairs_destroy(tandem_excluded_pairs* excluded);
 
-/// Which pairs a query looks at, of all whose world boxes meet (docs/queries.md). Arrays have `count`
-/// entries, one for each instance (TANDEM_FILTER_MISMATCH where there are others), or are null. All stay as
-/// long as the call that has the filter among its options.
+/// Which pairs a scene looks at (docs/queries.md). Arrays have `count` entries, one for each body
+/// (TANDEM_FILTER_MISMATCH where there are others), or are null. The scene copies them.
 typedef struct tandem_pair_filter {
   uint32_t struct_size;
   uint32_t reserved;
   size_t count;
   const uint8_t* motion;                  ///< TANDEM_MOVING, ...; null: all move
-  const uint32_t* group;                  ///< the groups that an instance is in, a bit each; null: all
+  const uint32_t* group;                  ///< the groups that a body is in, a bit each; null: all
   const uint32_t* mask;                   ///< the groups that it meets; null: all
   const tandem_excluded_pairs* excluded;  ///< or null
 } tandem_pair_filter;
 
-/// ---- Contacts, manifolds, contained bodies
+/// ---- Scenes
 
-/// Finds every pair of triangles that meet, and what follows from them.
-typedef struct tandem_contact_query tandem_contact_query;
+/// Bodies, of which any number of questions can be asked. Poses are checked when bodies are placed or moved,
+/// and object pairs are found once for all questions of one reach. A body is known by its number: its place
+/// in the list that was placed, or what tandem_scene_add() gave. The number of a removed body is used again.
+typedef struct tandem_scene tandem_scene;
 
-TANDEM_API tandem_status tandem_contact_query_create(const tandem_allocator* allocator,
-                                                     tandem_contact_query** query);
+TANDEM_API tandem_status tandem_scene_create(const tandem_allocator* allocator, tandem_scene** scene);
 /// Gives up its assets, and its results are gone. Null does nothing.
-TANDEM_API void tandem_contact_query_destroy(tandem_contact_query* query);
+TANDEM_API void tandem_scene_destroy(tandem_scene* scene);
 
-/// Names the assets that instances refer to, and takes a reference to each. Queries use the first level that
-/// each shows. After an error there are no assets. Forgets results, fixed instances and former points.
-TANDEM_API tandem_status tandem_contact_query_set_assets(tandem_contact_query* query,
-                                                         tandem_asset* const* assets, size_t count);
+/// Sets how many threads a call may use, the caller's included: 1 at first, at most 1,024; 0: 1. No result
+/// depends on it.
+TANDEM_API tandem_status tandem_scene_set_threads(tandem_scene* scene, uint32_t threads);
+
+/// Names the assets that bodies refer to, and takes a reference to each. Questions look at the first level
+/// that each shows; tandem_scene_find_verdicts() looks at all. There are no bodies and no results afterwards;
+/// after an error there are no assets either. where: the place of an asset that is null.
+TANDEM_API tandem_status tandem_scene_set_assets(tandem_scene* scene, tandem_asset* const* assets,
+                                                 size_t count);
+
+/// Places all bodies anew; those that stand as before cost next to nothing. filter: or null. Result:
+/// TANDEM_OK, or, where tandem_scene_where() is the body: TANDEM_UNKNOWN_ASSET, TANDEM_POSE_NOT_RIGID,
+/// TANDEM_OUT_OF_RANGE (beyond 1e300), TANDEM_BAD_OPTION (its motion); TANDEM_UNKNOWN_INSTANCE, where it is
+/// the filter's excluded pair; TANDEM_FILTER_MISMATCH, TANDEM_TOO_MANY_INSTANCES, TANDEM_OUT_OF_MEMORY,
+/// TANDEM_CANNOT_START_THREAD. After an error there are no bodies.
+TANDEM_API tandem_status tandem_scene_place(tandem_scene* scene, const tandem_instance* instances,
+                                            size_t count, const tandem_pair_filter* filter);
+
+/// Adds a body, whose number becomes *body: the lowest that is free. filter: or null; its arrays have one
+/// entry, and it excludes no pairs (else TANDEM_BAD_OPTION): those that tandem_scene_place() was given stay.
+/// Result: as of tandem_scene_place(). After an error nothing has changed, and *body is TANDEM_NO_INDEX.
+TANDEM_API tandem_status tandem_scene_add(tandem_scene* scene, const tandem_instance* instance,
+                                          const tandem_pair_filter* filter, uint32_t* body);
+
+/// Moves bodies to other poses. Result: as of tandem_scene_place(), where tandem_scene_where() is the place
+/// in these lists; TANDEM_UNKNOWN_INSTANCE where there is no such body. After an error nothing has changed.
+TANDEM_API tandem_status tandem_scene_move(tandem_scene* scene, const uint32_t* bodies,
+                                           const tandem_pose* poses, size_t count);
+
+/// Changes what moves a body. Result: TANDEM_UNKNOWN_INSTANCE, TANDEM_BAD_OPTION, TANDEM_OUT_OF_MEMORY.
+TANDEM_API tandem_status tandem_scene_set_motion(tandem_scene* scene, uint32_t body, uint32_t motion);
+
+/// Removes a body: no question finds it any more. Result: TANDEM_UNKNOWN_INSTANCE.
+TANDEM_API tandem_status tandem_scene_remove(tandem_scene* scene, uint32_t body);
+
+/// All bodies by number, valid until bodies are placed, added or removed.
+TANDEM_API const tandem_instance* tandem_scene_instances(const tandem_scene* scene, size_t* count);
+
+/// The asset, body, pair or contact that is to blame for the last call's error; 0 after TANDEM_OK.
+TANDEM_API uint64_t tandem_scene_where(const tandem_scene* scene);
+
+/// ---- Questions
+///
+/// A question is asked by its tandem_scene_find_...(). Its rows, the object pairs that it was about, and its
+/// counters stay until it is asked again, or the assets are set; after an error it has none. Functions that
+/// give rows return null and 0 where there are none, or with null for the scene. Where options have `pairs`,
+/// the question is about these, in either order of a and b, and the filter is not asked; they may be those
+/// that any question has, or a part of them. With null the scene finds the pairs. Results of all:
+/// TANDEM_UNKNOWN_INSTANCE, where tandem_scene_where() is the given pair; TANDEM_TOO_MANY_PAIRS,
+/// TANDEM_OUT_OF_MEMORY, TANDEM_CANNOT_START_THREAD.
+
+/// The questions that are about object pairs. Manifolds and contained bodies are about those of contacts.
+enum { TANDEM_PAIRS = 0, TANDEM_CONTACTS = 1, TANDEM_DISTANCES = 2, TANDEM_IMPACTS = 3, TANDEM_VERDICTS = 4 };
+
+/// The object pairs of a question: sorted, a < b, or a = b for self pairs, where the scene found them; as
+/// given else. Null and 0 where there is no such question.
+TANDEM_API const tandem_object_pair* tandem_scene_pairs(const tandem_scene* scene, uint32_t question,
+                                                        size_t* count);
+
+/// ---- Object pairs
+
+typedef struct tandem_pair_options {
+  uint32_t struct_size;
+  uint32_t self_pairs;  ///< 1: also each body with itself
+  double reach;         ///< pairs whose world boxes are at most so far apart, or a little beyond
+} tandem_pair_options;
+
+/// Finds the object pairs whose world boxes overlap, or are within reach of each other, so that the caller
+/// can leave some out before asking about them. Result: TANDEM_OUT_OF_RANGE where reach is negative or NaN.
+TANDEM_API tandem_status tandem_scene_find_pairs(tandem_scene* scene, const tandem_pair_options* options);
+
+/// ---- Contacts
 
 enum {
   TANDEM_EXACT = 0,  ///< contact pairs, as exact arithmetic on the posed vertices finds them
@@ -364,80 +438,45 @@ enum {
   TANDEM_BOXES = 2   ///< candidates: triangles whose boxes overlap
 };
 
-typedef struct tandem_query_options {
+typedef struct tandem_contact_options {
   uint32_t struct_size;
-  uint32_t mode;                     ///< TANDEM_EXACT, TANDEM_FAST or TANDEM_BOXES
-  uint32_t first_contact_only;       ///< 1: one contact for each object pair that touches
-  uint32_t self_pairs;               ///< 1: where the query finds the pairs, also each instance with itself
-  uint32_t threads;                  ///< with the caller's; 0: 1, at most 1,024. Results do not depend on it
-  uint32_t add_error_bounds;         ///< 1: a pair without a contact is surely apart at the finest levels too
-  double within;                     ///< clearance: triangles at most so far apart count, decided exactly
-  const tandem_pair_filter* filter;  ///< or null; where the query finds the pairs
-} tandem_query_options;
+  uint32_t mode;                ///< TANDEM_EXACT, TANDEM_FAST or TANDEM_BOXES
+  uint32_t first_contact_only;  ///< 1: one contact for each object pair that touches
+  uint32_t self_pairs;          ///< 1: where the scene finds the pairs, also each body with itself
+  uint32_t add_error_bounds;    ///< 1: a pair without a contact is surely apart at the finest levels too
+  uint32_t reserved;
+  double within;                    ///< clearance: triangles at most so far apart count, decided exactly
+  const tandem_object_pair* pairs;  ///< or null
+  size_t pair_count;
+} tandem_contact_options;
 
-/// Two triangles that meet: triangle_a belongs to instance a of the object pair, triangle_b to b.
+/// Two triangles that meet: triangle_a belongs to body a of the object pair, triangle_b to b.
 typedef struct tandem_contact {
   uint32_t pair;                    ///< row of the list of object pairs
   uint32_t triangle_a, triangle_b;  ///< tandem_level::triangles[triangle_a]
   uint32_t face_a, face_b;          ///< of the mesh files
 } tandem_contact;
 
-/// Keeps the instances whose motion is TANDEM_FIXED as they stand: calls to come, which must be of as many
-/// instances (TANDEM_KEPT_MISMATCH), take the time of the others. Again when one of them has moved or others
-/// are fixed. motion: `count` entries. Results are forgotten.
-TANDEM_API tandem_status tandem_contact_query_keep_fixed(tandem_contact_query* query,
-                                                         const tandem_instance* instances,
-                                                         const uint8_t* motion, size_t count,
-                                                         uint32_t threads);
-
-/// Finds the object pairs whose world boxes overlap, without their contacts.
-TANDEM_API tandem_status tandem_contact_query_find_pairs(tandem_contact_query* query,
-                                                         const tandem_instance* instances, size_t count,
-                                                         const tandem_query_options* options);
-
-/// Finds the object pairs whose world boxes overlap, and their contacts. Result: TANDEM_OK, or, where
-/// tandem_contact_query_where() is the instance: TANDEM_UNKNOWN_ASSET, TANDEM_POSE_NOT_RIGID,
-/// TANDEM_OUT_OF_RANGE (beyond 1e300), TANDEM_BAD_OPTION (its motion); TANDEM_UNKNOWN_INSTANCE, where it is
-/// the filter's excluded pair; TANDEM_FILTER_MISMATCH, TANDEM_KEPT_MISMATCH, TANDEM_TOO_MANY_INSTANCES,
-/// TANDEM_TOO_MANY_PAIRS, TANDEM_OUT_OF_MEMORY, TANDEM_CANNOT_START_THREAD. After an error there are no
-/// results.
-TANDEM_API tandem_status tandem_contact_query_find_contacts(tandem_contact_query* query,
-                                                            const tandem_instance* instances, size_t count,
-                                                            const tandem_query_options* options);
-
-/// The same of given object pairs, in either order of a and b; the filter is not asked. A pair of an instance
-/// with itself asks for the contacts within it. They may be tandem_contact_query_pairs(), or a part of them.
-/// Result: as above, or TANDEM_UNKNOWN_INSTANCE: where is the pair.
-TANDEM_API tandem_status tandem_contact_query_find_contacts_of_pairs(
-    tandem_contact_query* query, const tandem_instance* instances, size_t count,
-    const tandem_object_pair* pairs, size_t pair_count, const tandem_query_options* options);
-
-/// The object pairs of the last call: sorted, a < b, or a = b for self pairs, where the query found them; as
-/// given else. Valid, as all results are, until the query's next call. With null: null and 0.
-TANDEM_API const tandem_object_pair* tandem_contact_query_pairs(const tandem_contact_query* query,
-                                                                size_t* count);
-/// By ascending pair; within a pair in an order that is the same on every run and machine.
-TANDEM_API const tandem_contact* tandem_contact_query_contacts(const tandem_contact_query* query,
-                                                               size_t* count);
-/// The asset, instance, pair or contact that is to blame for the last error; 0 after TANDEM_OK.
-TANDEM_API uint64_t tandem_contact_query_where(const tandem_contact_query* query);
-
-typedef struct tandem_query_counters {
-  uint32_t struct_size;
-  uint32_t reserved;
+typedef struct tandem_contact_counters {
   uint64_t object_pairs, block_pairs, candidates;
   uint64_t decided_by_float32, decided_by_float64, decided_exactly;
   uint64_t contacts;
-} tandem_query_counters;
+} tandem_contact_counters;
 
-TANDEM_API tandem_status tandem_contact_query_get_counters(const tandem_contact_query* query,
-                                                           tandem_query_counters* counters);
+/// Finds every pair of triangles that meet. A given pair of a body with itself asks for the contacts within
+/// it. Result: TANDEM_OUT_OF_RANGE where `within` is no distance.
+TANDEM_API tandem_status tandem_scene_find_contacts(tandem_scene* scene,
+                                                    const tandem_contact_options* options);
+/// By ascending pair; within a pair in an order that is the same on every run and machine.
+TANDEM_API const tandem_contact* tandem_scene_contacts(const tandem_scene* scene, size_t* count);
+
+/// ---- Manifolds
 
 typedef struct tandem_manifold_options {
   uint32_t struct_size;
-  uint32_t threads;
   uint32_t most_points;      ///< of a manifold, 1 to 7; 0: 7
   uint32_t ignore_previous;  ///< 1: points are not looked for among those of the last call
+  uint32_t reserved;
 } tandem_manifold_options;
 
 enum { TANDEM_TOUCHING = 1, TANDEM_OPEN_CURVE = 2, TANDEM_GOES_THROUGH = 4 };
@@ -454,6 +493,7 @@ typedef struct tandem_manifold {
                    ///< cross does not close; TANDEM_GOES_THROUGH: one body goes through the other here
 } tandem_manifold;
 
+/// A point of a manifold.
 typedef struct tandem_manifold_point {
   double position[3];       ///< world, half-way between the surfaces
   double in_a[3], in_b[3];  ///< on the surface of a, of b, in the coordinates of its mesh file
@@ -464,19 +504,24 @@ typedef struct tandem_manifold_point {
   uint32_t manifold;        ///< that it belongs to
 } tandem_manifold_point;
 
-/// Makes contact manifolds of the query's last contacts: TANDEM_CONTACTS_MISSING where its last call found
-/// none or failed. instances: those of that call. Needs topology of all assets: TANDEM_NO_TOPOLOGY, where is
-/// the asset. Contacts and pairs stay. After an error there are no manifolds, and the next call finds no
-/// points before it.
-TANDEM_API tandem_status tandem_contact_query_make_manifolds(tandem_contact_query* query,
-                                                             const tandem_instance* instances, size_t count,
-                                                             const tandem_manifold_options* options);
-/// By ascending pair; their points, manifold by manifold. Valid until manifolds are made again, or the assets
-/// are set.
-TANDEM_API const tandem_manifold* tandem_contact_query_manifolds(const tandem_contact_query* query,
-                                                                 size_t* count);
-TANDEM_API const tandem_manifold_point* tandem_contact_query_points(const tandem_contact_query* query,
-                                                                    size_t* count);
+typedef struct tandem_manifold_counters {
+  uint64_t contacts;
+  uint64_t segments;  ///< contacts whose triangles share a line
+  uint64_t manifolds, points;
+  uint64_t open_curves;        ///< manifolds with TANDEM_OPEN_CURVE
+  uint64_t ambiguous_touches;  ///< corner on corner or edge along edge, of which there is no manifold
+} tandem_manifold_counters;
+
+/// Makes contact manifolds of the contacts, which are those of all bodies as they stand: else
+/// TANDEM_CONTACTS_MISSING. Needs topology of all assets: TANDEM_NO_TOPOLOGY, where tandem_scene_where() is
+/// the asset. After an error the next call finds no points before it.
+TANDEM_API tandem_status tandem_scene_find_manifolds(tandem_scene* scene,
+                                                     const tandem_manifold_options* options);
+/// By ascending pair; their points, manifold by manifold. They go when contacts are found again.
+TANDEM_API const tandem_manifold* tandem_scene_manifolds(const tandem_scene* scene, size_t* count);
+TANDEM_API const tandem_manifold_point* tandem_scene_points(const tandem_scene* scene, size_t* count);
+
+/// ---- Contained bodies
 
 /// A component of a body that meets nothing of another and lies within it.
 typedef struct tandem_containment {
@@ -488,71 +533,20 @@ typedef struct tandem_containment {
 
 enum { TANDEM_INSIDE = 1, TANDEM_OUTER_OPEN = 2 };
 
-/// Finds bodies within others, which no contact tells, of the query's last object pairs.
-/// TANDEM_CONTACTS_MISSING where that call was not in mode TANDEM_EXACT with `within` 0, or found the first
-/// contacts only. instances, needs, results: as of manifolds. threads: 0: 1.
-TANDEM_API tandem_status tandem_contact_query_find_contained(tandem_contact_query* query,
-                                                             const tandem_instance* instances, size_t count,
-                                                             uint32_t threads);
-TANDEM_API const tandem_containment* tandem_contact_query_contained(const tandem_contact_query* query,
-                                                                    size_t* count);
+typedef struct tandem_containment_counters {
+  uint64_t object_pairs;
+  uint64_t inside, outer_open;  ///< rows with these flags
+} tandem_containment_counters;
 
-/// ---- Levels of detail
-
-/// Tells of pairs of bodies with levels of detail whether they surely do not meet, surely meet, or are within
-/// a tolerance (docs/levels.md). Each body is looked at at the coarsest of its levels that can tell.
-typedef struct tandem_tolerance_query tandem_tolerance_query;
-
-TANDEM_API tandem_status tandem_tolerance_query_create(const tandem_allocator* allocator,
-                                                       tandem_tolerance_query** query);
-TANDEM_API void tandem_tolerance_query_destroy(tandem_tolerance_query* query);
-/// Result: TANDEM_NO_FINEST_LEVEL, where is the asset, where an asset does not show the file's level 0.
-TANDEM_API tandem_status tandem_tolerance_query_set_assets(tandem_tolerance_query* query,
-                                                           tandem_asset* const* assets, size_t count);
-
-typedef struct tandem_tolerance_options {
-  uint32_t struct_size;
-  uint32_t threads;
-  double tolerance;                  ///< what need not be told apart from touching; 0: all is decided
-  const tandem_pair_filter* filter;  ///< or null; where the query finds the pairs
-} tandem_tolerance_options;
-
-enum { TANDEM_APART = 0, TANDEM_TOUCH = 1, TANDEM_WITHIN_TOLERANCE = 2 };
-
-typedef struct tandem_verdict {
-  uint8_t verdict;           ///< TANDEM_APART: the finest surfaces do not meet, TANDEM_TOUCH: they do, ...
-  uint8_t level_a, level_b;  ///< of the bodies, that it was asked of
-} tandem_verdict;
-
-/// Finds the object pairs whose world boxes overlap, and the verdicts on them; or those on given pairs.
-/// Result: as of tandem_contact_query_find_contacts().
-TANDEM_API tandem_status tandem_tolerance_query_decide(tandem_tolerance_query* query,
-                                                       const tandem_instance* instances, size_t count,
-                                                       const tandem_tolerance_options* options);
-TANDEM_API tandem_status tandem_tolerance_query_decide_pairs(tandem_tolerance_query* query,
-                                                             const tandem_instance* instances, size_t count,
-                                                             const tandem_object_pair* pairs,
-                                                             size_t pair_count,
-                                                             const tandem_tolerance_options* options);
-TANDEM_API const tandem_object_pair* tandem_tolerance_query_pairs(const tandem_tolerance_query* query,
-                                                                  size_t* count);
-/// One for each pair.
-TANDEM_API const tandem_verdict* tandem_tolerance_query_verdicts(const tandem_tolerance_query* query,
-                                                                 size_t* count);
-TANDEM_API uint64_t tandem_tolerance_query_where(const tandem_tolerance_query* query);
+/// Finds bodies within others, which no contact tells, among the object pairs of the contacts.
+/// TANDEM_CONTACTS_MISSING where these are not all contacts of the bodies as they stand, in mode TANDEM_EXACT
+/// with `within` 0. Needs, results: as of manifolds.
+TANDEM_API tandem_status tandem_scene_find_contained(tandem_scene* scene);
+TANDEM_API const tandem_containment* tandem_scene_contained(const tandem_scene* scene, size_t* count);
 
 /// ---- Distances
 
-/// Finds how near the surfaces of bodies are (docs/distance.md).
-typedef struct tandem_distance_query tandem_distance_query;
-
-TANDEM_API tandem_status tandem_distance_query_create(const tandem_allocator* allocator,
-                                                      tandem_distance_query** query);
-TANDEM_API void tandem_distance_query_destroy(tandem_distance_query* query);
-TANDEM_API tandem_status tandem_distance_query_set_assets(tandem_distance_query* query,
-                                                          tandem_asset* const* assets, size_t count);
-
-/// Triangles of a pair of instances that were nearest a step ago.
+/// Triangles of a pair of bodies that were nearest a step ago.
 typedef struct tandem_former_nearest {
   uint32_t a, b;
   uint32_t triangle_a, triangle_b;
@@ -560,17 +554,17 @@ typedef struct tandem_former_nearest {
 
 typedef struct tandem_distance_options {
   uint32_t struct_size;
-  uint32_t threads;
   uint32_t limit_reach;  ///< 1: pairs surely farther apart than `reach` have no nearest points
-  uint32_t reserved;
   double reach;
   double absolute_tolerance;            ///< upper - lower <= max(absolute, relative * upper)
   double relative_tolerance;            ///< 0: 1e-6; at the finest 2^-48
-  const tandem_pair_filter* filter;     ///< or null; where the query finds the pairs
   const tandem_former_nearest* former;  ///< or null: by ascending a, then b, where to begin to look
   size_t former_count;
+  const tandem_object_pair* pairs;  ///< or null
+  size_t pair_count;
 } tandem_distance_options;
 
+/// How near the surfaces of two bodies are (docs/distance.md).
 typedef struct tandem_distance {
   double lower, upper;              ///< lower <= distance <= upper; 0, 0 exactly where triangles meet
   double point_a[3], point_b[3];    ///< the nearest points that were found
@@ -578,36 +572,22 @@ typedef struct tandem_distance {
   uint32_t face_a, face_b;
 } tandem_distance;
 
-/// Finds the object pairs whose world boxes are within reach, and their distances; or those of given pairs.
-/// Result: as of tandem_contact_query_find_contacts(); a tolerance or reach that is negative or NaN is
-/// TANDEM_OUT_OF_RANGE.
-TANDEM_API tandem_status tandem_distance_query_find(tandem_distance_query* query,
-                                                    const tandem_instance* instances, size_t count,
-                                                    const tandem_distance_options* options);
-TANDEM_API tandem_status tandem_distance_query_find_of_pairs(tandem_distance_query* query,
-                                                             const tandem_instance* instances, size_t count,
-                                                             const tandem_object_pair* pairs,
-                                                             size_t pair_count,
-                                                             const tandem_distance_options* options);
-TANDEM_API const tandem_object_pair* tandem_distance_query_pairs(const tandem_distance_query* query,
-                                                                 size_t* count);
+typedef struct tandem_distance_counters {
+  uint64_t object_pairs, block_pairs;
+  uint64_t by_float32, by_float64;  ///< triangle pairs
+  uint64_t touching;                ///< object pairs at distance 0
+} tandem_distance_counters;
+
+/// Finds the distances of object pairs; the scene finds those whose world boxes are within reach. Result:
+/// TANDEM_OUT_OF_RANGE where a tolerance or the reach is negative or NaN.
+TANDEM_API tandem_status tandem_scene_find_distances(tandem_scene* scene,
+                                                     const tandem_distance_options* options);
 /// One for each pair.
-TANDEM_API const tandem_distance* tandem_distance_query_distances(const tandem_distance_query* query,
-                                                                  size_t* count);
-TANDEM_API uint64_t tandem_distance_query_where(const tandem_distance_query* query);
+TANDEM_API const tandem_distance* tandem_scene_distances(const tandem_scene* scene, size_t* count);
 
 /// ---- Times of impact
 
-/// Finds until when moving bodies surely do not meet (docs/impact.md).
-typedef struct tandem_impact_query tandem_impact_query;
-
-TANDEM_API tandem_status tandem_impact_query_create(const tandem_allocator* allocator,
-                                                    tandem_impact_query** query);
-TANDEM_API void tandem_impact_query_destroy(tandem_impact_query* query);
-TANDEM_API tandem_status tandem_impact_query_set_assets(tandem_impact_query* query,
-                                                        tandem_asset* const* assets, size_t count);
-
-/// The centre goes straight ahead and the instance turns about it, both at constant speed.
+/// The centre goes straight ahead and the body turns about it, both at constant speed.
 typedef struct tandem_motion {
   double velocity[3];          ///< of the centre
   double angular_velocity[3];  ///< radians a second
@@ -616,14 +596,19 @@ typedef struct tandem_motion {
 
 typedef struct tandem_impact_options {
   uint32_t struct_size;
-  uint32_t threads;
-  double tolerance;  ///< how near triangles come before they stop a pair, as a part of the diagonal of the
-                     ///< smaller body's bounds; 0: 1e-6
-  const tandem_pair_filter* filter;  ///< or null; where the query finds the pairs
+  uint32_t reserved;
+  double duration;   ///< of the step
+  double tolerance;  ///< how near triangles come before they stop a pair, as a part of the diagonal
+                     ///< of the smaller body's bounds; 0: 1e-6
+  const tandem_motion* motion;  ///< of each body, else TANDEM_MOTION_MISMATCH
+  size_t motion_count;
+  const tandem_object_pair* pairs;  ///< or null
+  size_t pair_count;
 } tandem_impact_options;
 
 enum { TANDEM_NO_IMPACT = 0, TANDEM_IMPACT = 1, TANDEM_IMPACT_AT_START = 2 };
 
+/// Until when two moving bodies surely do not meet (docs/impact.md).
 typedef struct tandem_impact {
   double t_safe;  ///< no triangles of the two meet before; the whole step where there is no impact
   double gap;     ///< of the two triangles then
@@ -634,28 +619,86 @@ typedef struct tandem_impact {
   uint8_t reserved[7];
 } tandem_impact;
 
-/// Finds the object pairs whose boxes meet when swept by the motions of a step of `duration`, and when each
-/// of them does; or that of given pairs. motion: `count` entries. Result: as of
-/// tandem_contact_query_find_contacts(); TANDEM_OUT_OF_RANGE also of motions, the duration and the tolerance.
-TANDEM_API tandem_status tandem_impact_query_find(tandem_impact_query* query,
-                                                  const tandem_instance* instances,
-                                                  const tandem_motion* motion, size_t count, double duration,
-                                                  const tandem_impact_options* options);
-TANDEM_API tandem_status tandem_impact_query_find_of_pairs(tandem_impact_query* query,
-                                                           const tandem_instance* instances,
-                                                           const tandem_motion* motion, size_t count,
-                                                           double duration, const tandem_object_pair* pairs,
-                                                           size_t pair_count,
-                                                           const tandem_impact_options* options);
-TANDEM_API const tandem_object_pair* tandem_impact_query_pairs(const tandem_impact_query* query,
-                                                               size_t* count);
+typedef struct tandem_impact_counters {
+  uint64_t object_pairs, at_start, found;
+  uint64_t walks, block_pairs, triangle_pairs;
+  uint64_t advanced, steps, most_steps, unconverged;
+} tandem_impact_counters;
+
+/// Finds when object pairs meet in a step; the scene finds those whose boxes, swept by the motions, meet.
+/// Result: TANDEM_OUT_OF_RANGE of motions, the duration and the tolerance.
+TANDEM_API tandem_status tandem_scene_find_impacts(tandem_scene* scene, const tandem_impact_options* options);
 /// One for each pair.
-TANDEM_API const tandem_impact* tandem_impact_query_impacts(const tandem_impact_query* query, size_t* count);
-TANDEM_API uint64_t tandem_impact_query_where(const tandem_impact_query* query);
+TANDEM_API const tandem_impact* tandem_scene_impacts(const tandem_scene* scene, size_t* count);
 
 /// The pose at time t of what stands at `start` at time 0; t_safe holds for it too.
 TANDEM_API tandem_status tandem_pose_at(const tandem_pose* start, const tandem_motion* motion, double t,
                                         tandem_pose* pose);
+
+/// ---- Levels of detail
+
+typedef struct tandem_tolerance_options {
+  uint32_t struct_size;
+  uint32_t reserved;
+  double tolerance;                 ///< what need not be told apart from touching; 0: all is decided
+  const tandem_object_pair* pairs;  ///< or null
+  size_t pair_count;
+} tandem_tolerance_options;
+
+enum { TANDEM_APART = 0, TANDEM_TOUCH = 1, TANDEM_WITHIN_TOLERANCE = 2 };
+
+/// Whether two bodies meet (docs/levels.md).
+typedef struct tandem_verdict {
+  uint8_t verdict;           ///< TANDEM_APART: the finest surfaces do not meet, TANDEM_TOUCH: they do, ...
+  uint8_t level_a, level_b;  ///< of the bodies, that it was asked of
+} tandem_verdict;
+
+typedef struct tandem_tolerance_counters {
+  uint64_t apart, touching, within_tolerance;  ///< object pairs
+  tandem_contact_counters work;
+} tandem_tolerance_counters;
+
+/// Tells of object pairs whether they surely do not meet, surely meet, or are within a tolerance. Each body
+/// is looked at at the coarsest of its levels that can tell. Result: TANDEM_NO_FINEST_LEVEL, where
+/// tandem_scene_where() is the asset, where an asset does not show the file's level 0; TANDEM_OUT_OF_RANGE
+/// where the tolerance is no distance.
+TANDEM_API tandem_status tandem_scene_find_verdicts(tandem_scene* scene,
+                                                    const tandem_tolerance_options* options);
+/// One for each pair.
+TANDEM_API const tandem_verdict* tandem_scene_verdicts(const tandem_scene* scene, size_t* count);
+
+/// ---- Several questions
+
+/// What tandem_scene_find() asks. Null: the question is not asked.
+typedef struct tandem_questions {
+  uint32_t struct_size;
+  uint32_t contained;  ///< 1: bodies within others
+  const tandem_pair_options* pairs;
+  const tandem_contact_options* contacts;
+  const tandem_manifold_options* manifolds;
+  const tandem_distance_options* distances;
+  const tandem_impact_options* impacts;
+  const tandem_tolerance_options* verdicts;
+} tandem_questions;
+
+/// Asks several questions: pairs, contacts, manifolds, contained bodies, distances, impacts, verdicts, in
+/// this order, until one fails. Result: that of the one that fails.
+TANDEM_API tandem_status tandem_scene_find(tandem_scene* scene, const tandem_questions* questions);
+
+/// What the questions did. Counters depend neither on the number of threads nor on the machine; those of a
+/// question that has no results are 0.
+typedef struct tandem_counters {
+  uint32_t struct_size;
+  uint32_t reserved;
+  tandem_contact_counters contacts;
+  tandem_manifold_counters manifolds;
+  tandem_containment_counters contained;
+  tandem_distance_counters distances;
+  tandem_impact_counters impacts;
+  tandem_tolerance_counters verdicts;
+} tandem_counters;
+
+TANDEM_API tandem_status tandem_scene_get_counters(const tandem_scene* scene, tandem_counters* counters);
 
 #ifdef __cplusplus
 }

@@ -27,7 +27,7 @@ Report report_of(tandem_status (*get)(const Of*, Report*), const Of* query) {
   return report;
 }
 
-nb::tuple counters_of(const tandem_gpu_query_counters& counters) {
+nb::tuple counters_of(const tandem_contact_counters& counters) {
   return nb::make_tuple(counters.object_pairs, counters.block_pairs, counters.candidates,
                         counters.decided_by_float32, counters.decided_by_float64, counters.decided_exactly,
                         counters.contacts);

@@ -4,12 +4,13 @@
 namespace tandem {
 
 /// What can be wrong with a .bvh file, with loading it, or with a query: one name per defect.
-/// The checker tests for the defects in this order; the first that it finds is returned.
+/// The checker tests for the defects in this order; the first that it finds is returned. Numbers are those of
+/// tandem.h, which never change; those that a GPU finds are below 256.
 enum class [[nodiscard]] Status : std::uint32_t{
     kOk = 0,
     // Getting at the bytes.
-    kFileNotFound, kNotARegularFile, kCannotOpen, kCannotRead, kOutOfMemory,
-    kMisaligned,  ///< bytes in memory must start at a multiple of 128
+    kFileNotFound = 100, kNotARegularFile, kCannotOpen, kCannotRead, kOutOfMemory = 4,
+    kMisaligned = 104,  ///< bytes in memory must start at a multiple of 128
     // What kind of file it is.
     kBiovisionMotionCapture,  ///< the other .bvh: starts with HIERARCHY
     kNotTandem,
@@ -19,7 +20,7 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kTrailingBytes,   ///< more bytes than the header says
     kContentChanged,  ///< the hash differs: some byte is not what was written
     // Header and sections. From here on the hash is right, so the writer is wrong or hostile.
-    kBadHeader,        ///< a reserved byte is set, a count is zero or past its limit
+    kBadHeader = 120,  ///< a reserved byte is set, a count is zero or past its limit
     kBadSectionTable,  ///< the table itself does not fit
     kUnknownSection,   ///< of a kind that this version does not define, or of a level that is not in the file
     kSectionMisaligned,    ///< offset no multiple of 256
@@ -31,7 +32,7 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kBadLevel,  ///< counts of a level that contradict each other or its sections
     kBadPart,   ///< a part whose strings or faces lie outside
     // The tree.
-    kBadNodeKind,
+    kBadNodeKind = 140,
     kImaginaryBeforeReal,  ///< imaginary nodes come last in a block
     kEmptyBlock,           ///< a block of imaginary nodes only
     kPartialLeafBlock,     ///< leaves and internal nodes in one block
@@ -51,19 +52,19 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kBoundsMismatch,      ///< the header's bounds are not those of level 0's triangles
     kLevelOutsideBounds,  ///< a coarser level reaches beyond the header's bounds
     // The oriented blocks.
-    kOrientedBlockMismatch,  ///< an oriented block names other children or triangles than its block
-    kBadRotation,            ///< a rotation that is no quaternion of whole numbers in their range
-    kBadOrientedBox,         ///< a box that is none, that reaches too far, or a size that is not the boxes'
+    kOrientedBlockMismatch = 170,  ///< an oriented block names other children or triangles than its block
+    kBadRotation,                  ///< a rotation that is no quaternion of whole numbers in their range
+    kBadOrientedBox,  ///< a box that is none, that reaches too far, or a size that is not the boxes'
     kTriangleOutsideOrientedBox,  ///< of a node above it
     // The topology.
-    kBadTopology,     ///< a vertex out of range, an unknown flag set, or a component that is none
-    kVertexOrder,     ///< vertices are not numbered by first appearance
-    kVertexMismatch,  ///< corners of one vertex at different positions, or the other way round
-    kEdgeMismatch,    ///< a boundary or an edge of many triangles where there is none, or the other way round
-    kBadWinding,      ///< windings, once turned, disagree or are inside out where that can be known
+    kBadTopology = 180,  ///< a vertex out of range, an unknown flag set, or a component that is none
+    kVertexOrder,        ///< vertices are not numbered by first appearance
+    kVertexMismatch,     ///< corners of one vertex at different positions, or the other way round
+    kEdgeMismatch,  ///< a boundary or an edge of many triangles where there is none, or the other way round
+    kBadWinding,    ///< windings, once turned, disagree or are inside out where that can be known
     kComponentMismatch,  ///< the components are not those of the triangles, or open where said to be closed
     // Querying.
-    kOutOfRange,        ///< a coordinate that is NaN or larger than the query can take
+    kOutOfRange = 200,  ///< a coordinate that is NaN or larger than the query can take
     kUnknownAsset,      ///< an instance of an asset that the query was not given
     kUnknownInstance,   ///< an object pair that names an instance that does not exist
     kUnknownContact,    ///< a contact that names an object pair or a triangle that does not exist
@@ -72,13 +73,13 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kTooManyPairs,      ///< 2^32 - 1 object pairs or more
     kKeptMismatch,      ///< fixed instances are kept of a list of another length
     kMotionMismatch,    ///< not as many motions as instances
-    kCannotStartThread,
-    kNoOrientedBlocks,     ///< exact queries on a GPU need them, and the asset was given without
+    kCannotStartThread = 5,
+    kNoOrientedBlocks = 209,  ///< exact queries on a GPU need them, and the asset was given without
     kNoAxisAlignedBlocks,  ///< the other modes of queries on a GPU need them, and the asset was given without
     kNoTopology,           ///< contact manifolds need it, and the file has none
     kNoFinestLevel,        ///< queries by tolerance need it, and the view leaves it out
     // On a GPU; status_of() of gpu_status.h names CUDA's errors.
-    kNoGpu,            ///< none here, none that this process may use, or no driver
+    kNoGpu = 300,      ///< none here, none that this process may use, or no driver
     kDriverTooOld,     ///< for the CUDA version that the program was built with
     kGpuNotSupported,  ///< the program holds no code for a GPU of this kind
     kOutOfGpuMemory,

@@ -123,11 +123,11 @@ typedef struct tandem_gpu_broad_phase_capacity {
 } tandem_gpu_broad_phase_capacity;
 
 typedef struct tandem_gpu_broad_phase_report {
-  uint32_t failed;    ///< not 0: an error, which get_report() names; then there are no pairs
-  uint32_t complete;  ///< 0: there was no room for all pairs
-  uint32_t where;     ///< the instance to blame
-  uint32_t count;     ///< pairs; 2^32 - 1 where there are as many or more
-  uint64_t found;     ///< pairs, stored or not
+  tandem_status status;  ///< TANDEM_OK, or an error; then there are no pairs
+  uint32_t complete;     ///< 0: there was no room for all pairs
+  uint32_t where;        ///< the instance to blame
+  uint32_t count;        ///< pairs; 2^32 - 1 where there are as many or more
+  uint64_t found;        ///< pairs, stored or not
 } tandem_gpu_broad_phase_report;
 
 TANDEM_API tandem_status tandem_gpu_broad_phase_create(const tandem_allocator* allocator,
@@ -192,20 +192,14 @@ typedef struct tandem_gpu_query_capacity {
   uint64_t undecided;  ///< candidates that are not decided quickly
 } tandem_gpu_query_capacity;
 
-typedef struct tandem_gpu_query_counters {
-  uint64_t object_pairs, block_pairs, candidates;
-  uint64_t decided_by_float32, decided_by_float64, decided_exactly;
-  uint64_t contacts;
-} tandem_gpu_query_counters;
-
 typedef struct tandem_gpu_query_report {
-  uint32_t failed;    ///< not 0: an error, which get_report() names; then there are no contacts
-  uint32_t complete;  ///< 0: something did not fit, and contacts are missing
-  uint64_t where;     ///< the instance or pair to blame
+  tandem_status status;              ///< TANDEM_OK, or an error; then there are no contacts
+  uint32_t complete;                 ///< 0: something did not fit, and contacts are missing
+  uint64_t where;                    ///< the instance or pair to blame
   tandem_gpu_query_capacity needed;  ///< exact for what follows from things that did fit
   uint64_t contacts;                 ///< how many are stored
   uint64_t world_pairs;              ///< object pairs beyond float32, which take long
-  tandem_gpu_query_counters counters;
+  tandem_contact_counters counters;
 } tandem_gpu_query_report;
 
 typedef struct tandem_gpu_group_counts {
@@ -276,21 +270,13 @@ typedef struct tandem_gpu_manifold_capacity {
   uint32_t manifolds, points;
 } tandem_gpu_manifold_capacity;
 
-typedef struct tandem_gpu_manifold_counters {
-  uint64_t contacts;
-  uint64_t segments;  ///< contacts whose triangles share a line
-  uint64_t manifolds, points;
-  uint64_t open_curves;        ///< manifolds with TANDEM_OPEN_CURVE
-  uint64_t ambiguous_touches;  ///< corner on corner or edge along edge, of which there is no manifold
-} tandem_gpu_manifold_counters;
-
 typedef struct tandem_gpu_manifold_report {
-  uint32_t failed;
+  tandem_status status;
   uint32_t
       complete;  ///< 0: something did not fit, or the query was not complete; then there are no manifolds
   tandem_gpu_manifold_capacity needed;  ///< where the query is complete
   uint32_t manifolds, points;
-  tandem_gpu_manifold_counters counters;
+  tandem_manifold_counters counters;
 } tandem_gpu_manifold_report;
 
 TANDEM_API tandem_status tandem_gpu_manifolds_create(const tandem_allocator* allocator,
@@ -328,7 +314,7 @@ typedef struct tandem_gpu_containment_capacity {
 } tandem_gpu_containment_capacity;
 
 typedef struct tandem_gpu_containment_report {
-  uint32_t failed;
+  tandem_status status;
   uint32_t complete;  ///< 0: something did not fit, or the query was not complete; then nothing is contained
   tandem_gpu_containment_capacity needed;
   uint32_t contained;
@@ -386,20 +372,14 @@ typedef struct tandem_gpu_distance_capacity {
   uint32_t words;           ///< of a coordinate in exact arithmetic; 0: 8
 } tandem_gpu_distance_capacity;
 
-typedef struct tandem_gpu_distance_counters {
-  uint64_t object_pairs, block_pairs;
-  uint64_t by_float32, by_float64;  ///< triangle pairs
-  uint64_t touching;                ///< object pairs at distance 0
-} tandem_gpu_distance_counters;
-
 typedef struct tandem_gpu_distance_report {
-  uint32_t failed;
+  tandem_status status;
   uint32_t complete;  ///< 0: something did not fit; then distances mean nothing
   uint64_t where;     ///< the instance or pair to blame
   tandem_gpu_distance_capacity needed;
   uint64_t world_pairs;
   uint32_t rounds;  ///< of the walk
-  tandem_gpu_distance_counters counters;
+  tandem_distance_counters counters;
 } tandem_gpu_distance_report;
 
 TANDEM_API tandem_status tandem_gpu_distance_query_create(const tandem_allocator* allocator,
@@ -454,20 +434,14 @@ typedef struct tandem_gpu_impact_capacity {
   uint32_t reserved;
 } tandem_gpu_impact_capacity;
 
-typedef struct tandem_gpu_impact_counters {
-  uint64_t object_pairs, at_start, found;
-  uint64_t walks, block_pairs, triangle_pairs;
-  uint64_t advanced, steps, most_steps, unconverged;
-} tandem_gpu_impact_counters;
-
 typedef struct tandem_gpu_impact_report {
-  uint32_t failed;
+  tandem_status status;
   uint32_t complete;  ///< 0: something did not fit; then there are no impacts
   uint64_t where;     ///< the instance or pair to blame
   tandem_gpu_impact_capacity needed;
   uint32_t impacts;  ///< one for each object pair
   uint32_t rounds;
-  tandem_gpu_impact_counters counters;
+  tandem_impact_counters counters;
 } tandem_gpu_impact_report;
 
 TANDEM_API tandem_status tandem_gpu_impact_query_create(const tandem_allocator* allocator,
@@ -515,13 +489,12 @@ typedef struct tandem_gpu_tolerance_capacity {
 } tandem_gpu_tolerance_capacity;
 
 typedef struct tandem_gpu_tolerance_report {
-  uint32_t failed;
+  tandem_status status;
   uint32_t complete;  ///< 0: something did not fit; then verdicts mean nothing
   uint64_t where;     ///< the instance or pair to blame
   tandem_gpu_tolerance_capacity needed;
   uint64_t world_pairs;
-  uint64_t apart, touching, within_tolerance;  ///< object pairs
-  tandem_gpu_query_counters work;
+  tandem_tolerance_counters counters;
 } tandem_gpu_tolerance_report;
 
 TANDEM_API tandem_status tandem_gpu_tolerance_query_create(const tandem_allocator* allocator,

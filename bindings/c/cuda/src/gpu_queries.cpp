@@ -1,0 +1,400 @@
+#include <utility>
+
+#include "gpu_handles.h"
+
+using namespace tandem;
+using namespace tandem::c;
+
+struct tandem_gpu_contact_query : GpuHandle<GpuContactQuery> {
+  bool grouped = false;       // the contacts of the last call are
+  bool all_contacts = false;  // and are all there are, without distance
+
+  // Whether what follows from contacts may be asked of it by a handle with these assets.
+  tandem_status serves(const tandem_gpu_assets* with, bool needs_all) const {
+    if (assets != with) return TANDEM_ASSETS_MISSING;
+    return grouped && (all_contacts || !needs_all) ? TANDEM_OK : TANDEM_CONTACTS_MISSING;
+  }
+
+  void note(const GpuContactOptions& options, Status status) {
+    grouped = status == Status::kOk && options.grouped;
+    all_contacts =
+        grouped && options.mode == QueryMode::exact && !options.first_contact_only && !options.of_clearance();
+  }
+};
+
+struct tandem_gpu_manifolds : GpuHandle<GpuManifoldQuery> {};
+struct tandem_gpu_containment_query : GpuHandle<GpuContainmentQuery> {};
+struct tandem_gpu_distance_query : GpuHandle<GpuDistanceQuery> {};
+struct tandem_gpu_impact_query : GpuHandle<GpuImpactQuery> {};
+struct tandem_gpu_tolerance_query : GpuHandle<GpuToleranceQuery> {};
+
+namespace {
+
+// The options of the libraries, and whether the caller's are sound.
+template <typename Options>
+using Read = std::pair<tandem_status, Options>;
+
+struct NoOptions {};
+
+Read<NoOptions> read_options(const NoOptions*) {
+  return {TANDEM_OK, {}};
+}
+
+Read<double> read_options(const double* tolerance) {
+  return {TANDEM_OK, *tolerance};
+}
+
+Read<GpuContactOptions> read_options(const tandem_gpu_query_options* given) {
+  tandem_gpu_query_options read;
+  if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return {status, {}};
+  if (read.mode > TANDEM_BOXES || read.first_contact_only > 1 || read.sorted > 1 || read.grouped > 1 ||
+      read.add_error_bounds > 1 || read.reserved != 0)
+    return {TANDEM_BAD_OPTION, {}};
+  GpuContactOptions options;
+  options.mode = static_cast<QueryMode>(read.mode);
+  options.first_contact_only = read.first_contact_only != 0;
+  options.sorted = read.sorted != 0;
+  options.grouped = read.grouped != 0;
+  options.add_error_bounds = read.add_error_bounds != 0;
+  options.within = read.within;
+  options.most_blocks = read.most_blocks;
+  return {TANDEM_OK, options};
+}
+
+Read<GpuManifoldOptions> read_options(const tandem_gpu_manifold_options* given) {
+  tandem_gpu_manifold_options read;
+  if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return {status, {}};
+  if (read.most_points > kMostManifoldPoints || read.ignore_previous > 1 || read.reserved != 0)
+    return {TANDEM_BAD_OPTION, {}};
+  GpuManifoldOptions options;
+  if (read.most_points != 0) options.most_points = read.most_points;
+  options.match_previous = read.ignore_previous == 0;
+  return {TANDEM_OK, options};
+}
+
+Read<GpuDistanceOptions> read_options(const tandem_gpu_distance_options* given) {
+  tandem_gpu_distance_options read;
+  if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return {status, {}};
+  if (read.limit_reach > 1) return {TANDEM_BAD_OPTION, {}};
+  GpuDistanceOptions options;
+  options.tolerance.absolute = read.absolute_tolerance;
+  if (read.relative_tolerance != 0) options.tolerance.relative = read.relative_tolerance;
+  if (read.limit_reach != 0) options.reach = read.reach;
+  options.former = reinterpret_cast<const ObjectDistance*>(read.former);
+  return {TANDEM_OK, options};
+}
+
+Read<GpuImpactOptions> read_options(const tandem_gpu_impact_options* given) {
+  tandem_gpu_impact_options read;
+  if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return {status, {}};
+  if (read.sorted > 1 || read.reserved != 0) return {TANDEM_BAD_OPTION, {}};
+  GpuImpactOptions options;
+  options.sorted = read.sorted != 0;
+  if (read.tolerance != 0) options.tolerance = read.tolerance;
+  options.most_blocks = read.most_blocks;
+  const tandem_status status = read_gpu_filter(read.filter, options.filter);
+  return {status, options};
+}
+
+// What every call is given.
+struct Asked {
+  const tandem_gpu_instances* instances;
+  const tandem_gpu_pairs* pairs;  // null: there are none, where that may be
+  tandem_stream stream;
+  bool finds_pairs = false;  // where there are none
+};
+
+// Runs a call of a query: call(self, instances, pairs, options).
+template <typename Of, typename Given, typename Call>
+tandem_status ask(Of* query, const Asked& asked, const Given* given, const Call& call) {
+  return with_assets(query, [&](Of& self) -> tandem_status {
+    GpuInstances instances;
+    GpuPairs pairs = {};
+    auto [status, options] = read_options(given);
+    if (status == TANDEM_OK) status = read_instances(asked.instances, instances);
+    if (status == TANDEM_OK && (asked.pairs != nullptr || !asked.finds_pairs))
+      status = read_pairs(asked.pairs, self.given_count.data(), pairs, asked.stream);
+    return status == TANDEM_OK ? call(self, instances, pairs, options) : status;
+  });
+}
+
+// A call that is about the contacts of another query.
+template <typename Of, typename Given, typename Call>
+tandem_status ask_behind(Of* query, const tandem_gpu_contact_query* contacts, bool needs_all,
+                         const Asked& asked, const Given* given, const Call& call) {
+  return with_assets(query, [&](Of& self) -> tandem_status {
+    if (contacts == nullptr) return TANDEM_NULL_ARGUMENT;
+    const tandem_status status = contacts->serves(self.assets, needs_all);
+    return status == TANDEM_OK ? ask(query, asked, given, call) : status;
+  });
+}
+
+template <typename Of>
+tandem_status set_assets(Of* query, tandem_gpu_assets* assets, tandem_stream stream) {
+  return take_assets(query, assets, [&](auto& of) { return of.set_assets(assets->assets.view(), stream); });
+}
+
+tandem_gpu_contact_query* forget_contacts(tandem_gpu_contact_query* query) {
+  if (query != nullptr) query->grouped = query->all_contacts = false;
+  return query;
+}
+
+}  // namespace
+
+TANDEM_GPU_HANDLE(tandem_gpu_contact_query, tandem_gpu_query_report)
+TANDEM_GPU_HANDLE(tandem_gpu_manifolds, tandem_gpu_manifold_report)
+TANDEM_GPU_HANDLE(tandem_gpu_containment_query, tandem_gpu_containment_report)
+TANDEM_GPU_HANDLE(tandem_gpu_distance_query, tandem_gpu_distance_report)
+TANDEM_GPU_HANDLE(tandem_gpu_impact_query, tandem_gpu_impact_report)
+TANDEM_GPU_HANDLE(tandem_gpu_tolerance_query, tandem_gpu_tolerance_report)
+
+tandem_status tandem_gpu_contact_query_set_assets(tandem_gpu_contact_query* query, tandem_gpu_assets* assets,
+                                                  tandem_stream stream) {
+  return set_assets(forget_contacts(query), assets, stream);
+}
+
+tandem_status tandem_gpu_contact_query_reserve(tandem_gpu_contact_query* query,
+                                               const tandem_gpu_query_capacity* capacity,
+                                               const tandem_gpu_query_options* given) {
+  return reserve(query, capacity, [&](tandem_gpu_contact_query& self) {
+    const auto [status, options] = read_options(given);
+    if (status != TANDEM_OK) return status;
+    forget_contacts(&self);
+    return told(self.query.reserve(std::bit_cast<GpuContactCapacity>(*capacity), options), self.query);
+  });
+}
+
+tandem_status tandem_gpu_contact_query_enqueue(tandem_gpu_contact_query* query,
+                                               const tandem_gpu_instances* instances,
+                                               const tandem_gpu_pairs* pairs,
+                                               const tandem_gpu_query_options* given, tandem_stream stream) {
+  return ask(forget_contacts(query), {instances, pairs, stream}, given,
+             [&](auto& self, const auto& bodies, const auto& of, const auto& options) {
+               const Status status = self.query.enqueue(bodies, of, options, stream);
+               self.note(options, status);
+               return told(status, self.query);
+             });
+}
+
+tandem_status tandem_gpu_contact_query_find(tandem_gpu_contact_query* query,
+                                            const tandem_gpu_instances* instances,
+                                            const tandem_gpu_pairs* pairs,
+                                            const tandem_gpu_query_options* given, tandem_stream stream) {
+  return ask(forget_contacts(query), {instances, pairs, stream}, given,
+             [&](auto& self, const auto& bodies, const auto& of, const auto& options) {
+               const Status status = self.query.find_contacts(bodies, of, options, stream);
+               self.note(options, status);
+               return told(status, self.query);
+             });
+}
+
+const tandem_contact* tandem_gpu_contact_query_contacts(const tandem_gpu_contact_query* query) {
+  return rows_of<tandem_contact>(query, &GpuContactQuery::contacts);
+}
+
+tandem_gpu_contact_groups tandem_gpu_contact_query_groups(const tandem_gpu_contact_query* query) {
+  return of_query(query, tandem_gpu_contact_groups{}, [](const GpuContactQuery& of) {
+    const GpuContactGroups groups = of.groups();
+    return tandem_gpu_contact_groups{reinterpret_cast<const tandem_contact*>(groups.contacts),
+                                     groups.first_contact, groups.few, groups.many,
+                                     reinterpret_cast<const tandem_gpu_group_counts*>(groups.counts)};
+  });
+}
+
+const uint32_t* tandem_gpu_contact_query_met(const tandem_gpu_contact_query* query) {
+  return rows_of<uint32_t>(query, &GpuContactQuery::met);
+}
+
+tandem_status tandem_gpu_manifolds_set_assets(tandem_gpu_manifolds* manifolds, tandem_gpu_assets* assets,
+                                              tandem_stream stream) {
+  return set_assets(manifolds, assets, stream);
+}
+
+tandem_status tandem_gpu_manifolds_reserve(tandem_gpu_manifolds* manifolds,
+                                           const tandem_gpu_manifold_capacity* capacity) {
+  return reserve<GpuManifoldCapacity>(manifolds, capacity);
+}
+
+tandem_status tandem_gpu_manifolds_enqueue(tandem_gpu_manifolds* manifolds,
+                                           const tandem_gpu_instances* instances,
+                                           const tandem_gpu_pairs* pairs,
+                                           const tandem_gpu_contact_query* query,
+                                           const tandem_gpu_manifold_options* given, tandem_stream stream) {
+  return ask_behind(manifolds, query, false, {instances, pairs, stream}, given,
+                    [&](auto& self, const auto& bodies, const auto& of, const auto& options) {
+                      return told(self.query.enqueue(bodies, of, query->query, options, stream), self.query);
+                    });
+}
+
+tandem_status tandem_gpu_manifolds_find(tandem_gpu_manifolds* manifolds,
+                                        const tandem_gpu_instances* instances, const tandem_gpu_pairs* pairs,
+                                        const tandem_gpu_contact_query* query,
+                                        const tandem_gpu_manifold_options* given, tandem_stream stream) {
+  return ask_behind(manifolds, query, false, {instances, pairs, stream}, given,
+                    [&](auto& self, const auto& bodies, const auto& of, const auto& options) {
+                      return told(self.query.make(bodies, of, query->query, options, stream), self.query);
+                    });
+}
+
+const tandem_manifold* tandem_gpu_manifolds_manifolds(const tandem_gpu_manifolds* manifolds) {
+  return rows_of<tandem_manifold>(manifolds, &GpuManifoldQuery::manifolds);
+}
+
+const tandem_manifold_point* tandem_gpu_manifolds_points(const tandem_gpu_manifolds* manifolds) {
+  return rows_of<tandem_manifold_point>(manifolds, &GpuManifoldQuery::points);
+}
+
+tandem_status tandem_gpu_containment_query_set_assets(tandem_gpu_containment_query* query,
+                                                      tandem_gpu_assets* assets, tandem_stream stream) {
+  return set_assets(query, assets, stream);
+}
+
+tandem_status tandem_gpu_containment_query_reserve(tandem_gpu_containment_query* query,
+                                                   const tandem_gpu_containment_capacity* capacity) {
+  return reserve<GpuContainmentCapacity>(query, capacity);
+}
+
+tandem_status tandem_gpu_containment_query_enqueue(tandem_gpu_containment_query* query,
+                                                   const tandem_gpu_instances* instances,
+                                                   const tandem_gpu_pairs* pairs,
+                                                   const tandem_gpu_contact_query* contacts,
+                                                   tandem_stream stream) {
+  const NoOptions none;
+  return ask_behind(query, contacts, true, {instances, pairs, stream}, &none,
+                    [&](auto& self, const auto& bodies, const auto& of, const auto&) {
+                      return told(self.query.enqueue(bodies, of, contacts->query, stream), self.query);
+                    });
+}
+
+tandem_status tandem_gpu_containment_query_find(tandem_gpu_containment_query* query,
+                                                const tandem_gpu_instances* instances,
+                                                const tandem_gpu_pairs* pairs,
+                                                const tandem_gpu_contact_query* contacts,
+                                                tandem_stream stream) {
+  const NoOptions none;
+  return ask_behind(query, contacts, true, {instances, pairs, stream}, &none,
+                    [&](auto& self, const auto& bodies, const auto& of, const auto&) {
+                      return told(self.query.find(bodies, of, contacts->query, stream), self.query);
+                    });
+}
+
+const tandem_containment* tandem_gpu_containment_query_contained(const tandem_gpu_containment_query* query) {
+  return rows_of<tandem_containment>(query, &GpuContainmentQuery::contained);
+}
+
+tandem_status tandem_gpu_distance_query_set_assets(tandem_gpu_distance_query* query,
+                                                   tandem_gpu_assets* assets, tandem_stream stream) {
+  return set_assets(query, assets, stream);
+}
+
+tandem_status tandem_gpu_distance_query_reserve(tandem_gpu_distance_query* query,
+                                                const tandem_gpu_distance_capacity* capacity) {
+  return reserve<GpuDistanceCapacity>(query, capacity);
+}
+
+tandem_status tandem_gpu_distance_query_enqueue(tandem_gpu_distance_query* query,
+                                                const tandem_gpu_instances* instances,
+                                                const tandem_gpu_pairs* pairs,
+                                                const tandem_gpu_distance_options* given,
+                                                tandem_stream stream) {
+  return ask(query, {instances, pairs, stream}, given,
+             [&](auto& self, const auto& bodies, const auto& of, const auto& options) {
+               return told(self.query.enqueue(bodies, of, options, stream), self.query);
+             });
+}
+
+tandem_status tandem_gpu_distance_query_find(tandem_gpu_distance_query* query,
+                                             const tandem_gpu_instances* instances,
+                                             const tandem_gpu_pairs* pairs,
+                                             const tandem_gpu_distance_options* given, tandem_stream stream) {
+  return ask(query, {instances, pairs, stream}, given,
+             [&](auto& self, const auto& bodies, const auto& of, const auto& options) {
+               return told(self.query.find_distances(bodies, of, options, stream), self.query);
+             });
+}
+
+const tandem_distance* tandem_gpu_distance_query_distances(const tandem_gpu_distance_query* query) {
+  return rows_of<tandem_distance>(query, &GpuDistanceQuery::distances);
+}
+
+tandem_status tandem_gpu_impact_query_set_assets(tandem_gpu_impact_query* query, tandem_gpu_assets* assets,
+                                                 tandem_stream stream) {
+  return set_assets(query, assets, stream);
+}
+
+tandem_status tandem_gpu_impact_query_reserve(tandem_gpu_impact_query* query,
+                                              const tandem_gpu_impact_capacity* capacity,
+                                              const tandem_gpu_impact_options* given) {
+  return reserve(query, capacity, [&](tandem_gpu_impact_query& self) {
+    const auto [status, options] = read_options(given);
+    if (status != TANDEM_OK) return status;
+    return told(self.query.reserve(std::bit_cast<GpuImpactCapacity>(*capacity), options), self.query);
+  });
+}
+
+tandem_status tandem_gpu_impact_query_enqueue(tandem_gpu_impact_query* query,
+                                              const tandem_gpu_instances* instances,
+                                              const tandem_motion* motion, double duration,
+                                              const tandem_gpu_pairs* pairs,
+                                              const tandem_gpu_impact_options* given, tandem_stream stream) {
+  const auto* const moves = reinterpret_cast<const RigidMotion*>(motion);
+  return ask(query, {instances, pairs, stream, true}, given,
+             [&](auto& self, const auto& bodies, const auto& of, const auto& options) -> tandem_status {
+               if (!is_there(motion, bodies.count)) return TANDEM_NULL_ARGUMENT;
+               return told(self.query.enqueue(bodies, moves, duration, of, options, stream), self.query);
+             });
+}
+
+tandem_status tandem_gpu_impact_query_find(tandem_gpu_impact_query* query,
+                                           const tandem_gpu_instances* instances, const tandem_motion* motion,
+                                           double duration, const tandem_gpu_pairs* pairs,
+                                           const tandem_gpu_impact_options* given, tandem_stream stream) {
+  const auto* const moves = reinterpret_cast<const RigidMotion*>(motion);
+  return ask(query, {instances, pairs, stream, true}, given,
+             [&](auto& self, const auto& bodies, const auto& of, const auto& options) -> tandem_status {
+               if (!is_there(motion, bodies.count)) return TANDEM_NULL_ARGUMENT;
+               return told(self.query.find(bodies, moves, duration, of, options, stream), self.query);
+             });
+}
+
+tandem_gpu_pairs tandem_gpu_impact_query_pairs(const tandem_gpu_impact_query* query) {
+  return of_query(query, tandem_gpu_pairs{}, [](const GpuImpactQuery& of) { return pairs_to_c(of.pairs()); });
+}
+
+const tandem_impact* tandem_gpu_impact_query_impacts(const tandem_gpu_impact_query* query) {
+  return rows_of<tandem_impact>(query, &GpuImpactQuery::impacts);
+}
+
+tandem_status tandem_gpu_tolerance_query_set_assets(tandem_gpu_tolerance_query* query,
+                                                    tandem_gpu_assets* assets, tandem_stream stream) {
+  return take_assets(query, assets, [&](auto& of) { return of.set_levels(assets->levels.view(), stream); });
+}
+
+tandem_status tandem_gpu_tolerance_query_reserve(tandem_gpu_tolerance_query* query,
+                                                 const tandem_gpu_tolerance_capacity* capacity) {
+  return reserve<GpuToleranceCapacity>(query, capacity);
+}
+
+tandem_status tandem_gpu_tolerance_query_enqueue(tandem_gpu_tolerance_query* query,
+                                                 const tandem_gpu_instances* instances,
+                                                 const tandem_gpu_pairs* pairs, double tolerance,
+                                                 tandem_stream stream) {
+  return ask(query, {instances, pairs, stream}, &tolerance,
+             [&](auto& self, const auto& bodies, const auto& of, double asked) {
+               return told(self.query.enqueue(bodies, of, asked, stream), self.query);
+             });
+}
+
+tandem_status tandem_gpu_tolerance_query_find(tandem_gpu_tolerance_query* query,
+                                              const tandem_gpu_instances* instances,
+                                              const tandem_gpu_pairs* pairs, double tolerance,
+                                              tandem_stream stream) {
+  return ask(query, {instances, pairs, stream}, &tolerance,
+             [&](auto& self, const auto& bodies, const auto& of, double asked) {
+               return told(self.query.decide(bodies, of, asked, stream), self.query);
+             });
+}
+
+const tandem_verdict* tandem_gpu_tolerance_query_verdicts(const tandem_gpu_tolerance_query* query) {
+  return rows_of<tandem_verdict>(query, &GpuToleranceQuery::verdicts);
+}

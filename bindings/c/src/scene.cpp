@@ -1,0 +1,480 @@
+#include "tandem/kernels/scene.h"
+
+#include <bit>
+
+#include "handles.h"
+#include "rows.h"
+
+using namespace tandem;
+using namespace tandem::c;
+
+namespace {
+
+// The assets that a scene was given, a reference to each.
+class AssetList {
+ public:
+  AssetList() = default;
+  AssetList(const AssetList&) = delete;
+  AssetList& operator=(const AssetList&) = delete;
+  ~AssetList() { clear(); }
+
+  // Takes references to these instead of those before. Result: TANDEM_OK; TANDEM_NULL_ARGUMENT, with its
+  // place; or TANDEM_OUT_OF_MEMORY; then there are none.
+  tandem_status set(tandem_asset* const* assets, size_t count, uint64_t& where) {
+    tandem_status status = is_there(assets, count) ? TANDEM_OK : TANDEM_NULL_ARGUMENT;
+    for (size_t i = 0; i < count && status == TANDEM_OK; ++i) {
+      if (assets[i] != nullptr) continue;
+      status = TANDEM_NULL_ARGUMENT;
+      where = i;
+    }
+    // Those that come are taken before others go: they may be the same.
+    Buffer<tandem_asset*> taken;
+    Buffer<AssetView> views;
+    if (status == TANDEM_OK && (!taken.resize(count) || !views.resize(count))) status = TANDEM_OUT_OF_MEMORY;
+    for (size_t i = 0; i < count && status == TANDEM_OK; ++i) {
+      tandem_asset_retain(taken[i] = assets[i]);
+      views[i] = assets[i]->view;
+    }
+    clear();
+    if (status != TANDEM_OK) return status;
+    assets_ = std::move(taken);
+    views_ = std::move(views);
+    return TANDEM_OK;
+  }
+
+  void clear() {
+    for (tandem_asset* asset : assets_.view()) tandem_asset_release(asset);
+    assets_.clear();
+    views_.clear();
+  }
+
+  std::span<const AssetView> views() const { return views_.view(); }
+
+ private:
+  Buffer<tandem_asset*> assets_;
+  Buffer<AssetView> views_;
+};
+
+// A question, and whether it has an answer.
+template <typename Query>
+struct Asked {
+  Query query;
+  bool found = false;
+};
+
+// What manifolds and contained bodies can be made of: the contacts of the bodies as they stand.
+enum class Standing { none, some, all };
+
+}  // namespace
+
+struct tandem_scene : Allocated {
+  Allocator allocator;
+  AssetList assets;
+  const tandem_excluded_pairs* excluded = nullptr;
+  uint64_t where = 0;
+  Scene scene;
+  bool pairs_found = false;
+  Standing standing = Standing::none;
+  Asked<ContactQuery> contacts;
+  Asked<ManifoldQuery> manifolds;
+  Asked<ContainmentQuery> contained;
+  Asked<DistanceQuery> distances;
+  Asked<ImpactQuery> impacts;
+  Asked<ToleranceQuery> verdicts;
+
+  ~tandem_scene() { keep(nullptr); }
+
+  tandem_status fail(tandem_status status, uint64_t at) {
+    where = at;
+    return status;
+  }
+  tandem_status told(Status status) {
+    return status == Status::kOk ? tandem_status{TANDEM_OK} : fail(to_c(status), scene.where());
+  }
+  void forget_contacts() {
+    standing = Standing::none;
+    contacts.found = manifolds.found = contained.found = false;
+  }
+  // Has a reference to these instead of those before.
+  void keep(const tandem_excluded_pairs* pairs) {
+    if (pairs != nullptr) pairs->references.fetch_add(1, std::memory_order_relaxed);
+    tandem_excluded_pairs_destroy(const_cast<tandem_excluded_pairs*>(excluded));
+    excluded = pairs;
+  }
+};
+
+namespace {
+
+// Runs the body of a function, see guarded(); `where` begins as 0.
+template <typename Body>
+tandem_status enter(tandem_scene* scene, const Body& body) noexcept {
+  return guarded(scene, [&](tandem_scene& self) -> tandem_status {
+    self.where = 0;
+    return body(self);
+  });
+}
+
+// The filter of so many bodies, which is zeros where none is given. Result: TANDEM_OK,
+// TANDEM_BAD_STRUCT_SIZE, TANDEM_BAD_OPTION, where `where` is the body with a motion that there is not, or
+// TANDEM_FILTER_MISMATCH.
+tandem_status read_filter(const tandem_pair_filter* given, size_t bodies, tandem_pair_filter& read,
+                          uint64_t& where) {
+  if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return status;
+  if (read.reserved != 0) return TANDEM_BAD_OPTION;
+  const bool has_rows = read.motion != nullptr || read.group != nullptr || read.mask != nullptr;
+  if (has_rows && read.count != bodies) return TANDEM_FILTER_MISMATCH;
+  const size_t unknown = read.motion != nullptr ? first_unknown_motion(read.motion, bodies) : bodies;
+  if (unknown == bodies) return TANDEM_OK;
+  where = unknown;
+  return TANDEM_BAD_OPTION;
+}
+
+tandem_status place(tandem_scene& self, const tandem_instance* instances, size_t count,
+                    const tandem_pair_filter* filter) {
+  tandem_pair_filter read;
+  if (!is_there(instances, count)) return TANDEM_NULL_ARGUMENT;
+  const tandem_status status = read_filter(filter, count, read, self.where);
+  if (status != TANDEM_OK) return status;
+  const auto* motion = reinterpret_cast<const Motion*>(read.motion);
+  const ExcludedPairs excluded = read.excluded != nullptr ? read.excluded->table.view() : ExcludedPairs();
+  const Status placed =
+      self.scene.place(rows<Instance>(instances, count), {motion, read.group, read.mask, excluded});
+  if (placed == Status::kOk) self.keep(read.excluded);
+  return self.told(placed);
+}
+
+// The options of the libraries. Those that are not looked at here are checked by the libraries.
+tandem_status read_options(const tandem_contact_options& given, ContactOptions& options) {
+  if (given.mode > TANDEM_BOXES || given.first_contact_only > 1 || given.self_pairs > 1 ||
+      given.add_error_bounds > 1 || given.reserved != 0)
+    return TANDEM_BAD_OPTION;
+  options.mode = static_cast<QueryMode>(given.mode);
+  options.first_contact_only = given.first_contact_only != 0;
+  options.self_pairs = given.self_pairs != 0;
+  options.within = given.within;
+  options.add_error_bounds = given.add_error_bounds != 0;
+  return TANDEM_OK;
+}
+
+tandem_status read_options(const tandem_distance_options& given, DistanceOptions& options) {
+  if (given.limit_reach > 1) return TANDEM_BAD_OPTION;
+  if (!is_there(given.former, given.former_count)) return TANDEM_NULL_ARGUMENT;
+  options.tolerance.absolute = given.absolute_tolerance;
+  if (given.relative_tolerance != 0) options.tolerance.relative = given.relative_tolerance;
+  if (given.limit_reach != 0) options.reach = given.reach;
+  options.former = rows<FormerNearest>(given.former, given.former_count);
+  return TANDEM_OK;
+}
+
+tandem_status read_options(const tandem_impact_options& given, ImpactOptions& options) {
+  if (given.reserved != 0) return TANDEM_BAD_OPTION;
+  if (!is_there(given.motion, given.motion_count)) return TANDEM_NULL_ARGUMENT;
+  options.motion = rows<RigidMotion>(given.motion, given.motion_count);
+  options.duration = given.duration;
+  if (given.tolerance != 0) options.tolerance = given.tolerance;
+  return TANDEM_OK;
+}
+
+tandem_status read_options(const tandem_tolerance_options& given, ToleranceOptions& options) {
+  if (given.reserved != 0) return TANDEM_BAD_OPTION;
+  options.tolerance = given.tolerance;
+  return TANDEM_OK;
+}
+
+// Asks about the pairs that the options name, or where they name none, about those that the scene finds.
+template <typename Query, typename Given, typename Options>
+tandem_status find(tandem_scene& self, Asked<Query>& asked, const Given* given, Options& options) {
+  asked.found = false;
+  Given read;
+  tandem_status status = read_struct(given, read);
+  if (status == TANDEM_OK) status = read_options(read, options);
+  if (status == TANDEM_OK && !is_there(read.pairs, read.pair_count)) status = TANDEM_NULL_ARGUMENT;
+  if (status != TANDEM_OK) return status;
+  const Status done =
+      read.pairs != nullptr
+          ? asked.query.find(self.scene, rows<ObjectPair>(read.pairs, read.pair_count), options)
+          : asked.query.find(self.scene, options);
+  asked.found = done == Status::kOk;
+  return self.told(done);
+}
+
+template <typename Options, typename Query, typename Given>
+tandem_status find(tandem_scene* scene, Asked<Query> tandem_scene::*question, const Given* given) {
+  return enter(scene, [&](tandem_scene& self) {
+    Options options;
+    return find(self, self.*question, given, options);
+  });
+}
+
+tandem_status find_manifolds(tandem_scene& self, const tandem_manifold_options* given) {
+  tandem_manifold_options read;
+  if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return status;
+  if (read.most_points > kMostManifoldPoints || read.ignore_previous > 1 || read.reserved != 0)
+    return TANDEM_BAD_OPTION;
+  if (self.standing == Standing::none) return TANDEM_CONTACTS_MISSING;
+  ManifoldOptions options;
+  options.match_previous = read.ignore_previous == 0;
+  if (read.most_points != 0) options.most_points = read.most_points;
+  return self.told(self.manifolds.query.find(self.scene, self.contacts.query, options));
+}
+
+template <typename Query>
+std::span<const ObjectPair> pairs_of(const Asked<Query>& asked) {
+  return asked.found ? asked.query.pairs() : std::span<const ObjectPair>();
+}
+
+// The rows of a question, or what else `get` gives, as the caller reads them.
+template <typename Row, typename Query, typename Get>
+const Row* rows_of(const tandem_scene* scene, const Asked<Query> tandem_scene::*question, size_t* count,
+                   const Get& get) {
+  using Rows = decltype(get((scene->*question).query));
+  const bool there = scene != nullptr && (scene->*question).found;
+  return result<Row>(there ? get((scene->*question).query) : Rows(), count);
+}
+
+constexpr auto kRows = [](const auto& query) { return query.rows(); };
+
+template <typename Counters, typename Query>
+void copy_counters(const Asked<Query>& asked, Counters& counters) {
+  if (asked.found) counters = std::bit_cast<Counters>(asked.query.counters());
+}
+
+}  // namespace
+
+tandem_status tandem_scene_create(const tandem_allocator* allocator, tandem_scene** scene) {
+  return create(allocator, scene, [](tandem_scene& made) -> tandem_status {
+    return made.scene.state() != nullptr ? TANDEM_OK : TANDEM_OUT_OF_MEMORY;
+  });
+}
+
+void tandem_scene_destroy(tandem_scene* scene) {
+  delete scene;
+}
+
+tandem_status tandem_scene_set_threads(tandem_scene* scene, uint32_t threads) {
+  return enter(scene, [&](tandem_scene& self) {
+    self.scene.set_threads(threads);
+    return TANDEM_OK;
+  });
+}
+
+tandem_status tandem_scene_set_assets(tandem_scene* scene, tandem_asset* const* assets, size_t count) {
+  return enter(scene, [&](tandem_scene& self) {
+    self.forget_contacts();
+    self.pairs_found = self.distances.found = self.impacts.found = self.verdicts.found = false;
+    // Points of before are not those of other assets.
+    self.manifolds.query.forget_points();
+    tandem_status status = self.assets.set(assets, count, self.where);
+    const Status named = self.scene.set_assets(self.assets.views());
+    if (status == TANDEM_OK) status = self.told(named);
+    if (status != TANDEM_OK) {
+      (void)self.scene.set_assets({});
+      self.assets.clear();
+    }
+    self.keep(nullptr);
+    return status;
+  });
+}
+
+tandem_status tandem_scene_place(tandem_scene* scene, const tandem_instance* instances, size_t count,
+                                 const tandem_pair_filter* filter) {
+  return enter(scene, [&](tandem_scene& self) {
+    self.standing = Standing::none;
+    const tandem_status status = place(self, instances, count, filter);
+    if (status != TANDEM_OK) {
+      (void)self.scene.place({});
+      self.keep(nullptr);
+    }
+    return status;
+  });
+}
+
+tandem_status tandem_scene_add(tandem_scene* scene, const tandem_instance* instance,
+                               const tandem_pair_filter* filter, uint32_t* body) {
+  if (body != nullptr) *body = TANDEM_NO_INDEX;
+  return enter(scene, [&](tandem_scene& self) -> tandem_status {
+    if (instance == nullptr || body == nullptr) return TANDEM_NULL_ARGUMENT;
+    tandem_pair_filter read;
+    if (const tandem_status status = read_filter(filter, 1, read, self.where); status != TANDEM_OK)
+      return status;
+    if (read.excluded != nullptr) return TANDEM_BAD_OPTION;
+    BodyFilter of_body;
+    if (read.motion != nullptr) of_body.motion = static_cast<Motion>(*read.motion);
+    if (read.group != nullptr) of_body.group = *read.group;
+    if (read.mask != nullptr) of_body.mask = *read.mask;
+    uint32_t number = 0;
+    const Status added = self.scene.add(*rows<Instance>(instance, 1).data(), number, of_body);
+    if (added != Status::kOk) return self.told(added);
+    self.standing = Standing::none;
+    *body = number;
+    return TANDEM_OK;
+  });
+}
+
+tandem_status tandem_scene_move(tandem_scene* scene, const uint32_t* bodies, const tandem_pose* poses,
+                                size_t count) {
+  return enter(scene, [&](tandem_scene& self) -> tandem_status {
+    if (!is_there(bodies, count) || !is_there(poses, count)) return TANDEM_NULL_ARGUMENT;
+    const Status moved = self.scene.move(std::span(bodies, count), rows<Pose>(poses, count));
+    if (moved == Status::kOk) self.standing = Standing::none;
+    return self.told(moved);
+  });
+}
+
+tandem_status tandem_scene_set_motion(tandem_scene* scene, uint32_t body, uint32_t motion) {
+  return enter(scene, [&](tandem_scene& self) {
+    return motion <= TANDEM_SLEEPING ? self.told(self.scene.set_motion(body, static_cast<Motion>(motion)))
+                                     : tandem_status{TANDEM_BAD_OPTION};
+  });
+}
+
+tandem_status tandem_scene_remove(tandem_scene* scene, uint32_t body) {
+  return enter(scene, [&](tandem_scene& self) {
+    const Status removed = self.scene.remove(body);
+    if (removed == Status::kOk) self.standing = Standing::none;
+    return self.told(removed);
+  });
+}
+
+const tandem_instance* tandem_scene_instances(const tandem_scene* scene, size_t* count) {
+  return result<tandem_instance>(scene != nullptr ? scene->scene.instances() : std::span<const Instance>(),
+                                 count);
+}
+
+uint64_t tandem_scene_where(const tandem_scene* scene) {
+  return scene != nullptr ? scene->where : 0;
+}
+
+const tandem_object_pair* tandem_scene_pairs(const tandem_scene* scene, uint32_t question, size_t* count) {
+  std::span<const ObjectPair> pairs;
+  if (scene != nullptr && question == TANDEM_PAIRS && scene->pairs_found) pairs = scene->scene.pairs();
+  if (scene != nullptr && question == TANDEM_CONTACTS) pairs = pairs_of(scene->contacts);
+  if (scene != nullptr && question == TANDEM_DISTANCES) pairs = pairs_of(scene->distances);
+  if (scene != nullptr && question == TANDEM_IMPACTS) pairs = pairs_of(scene->impacts);
+  if (scene != nullptr && question == TANDEM_VERDICTS) pairs = pairs_of(scene->verdicts);
+  return result<tandem_object_pair>(pairs, count);
+}
+
+tandem_status tandem_scene_find_pairs(tandem_scene* scene, const tandem_pair_options* options) {
+  return enter(scene, [&](tandem_scene& self) -> tandem_status {
+    self.pairs_found = false;
+    tandem_pair_options read;
+    if (const tandem_status status = read_struct(options, read); status != TANDEM_OK) return status;
+    if (read.self_pairs > 1) return TANDEM_BAD_OPTION;
+    const Status done = self.scene.find_pairs(read.reach, read.self_pairs != 0);
+    self.pairs_found = done == Status::kOk;
+    return self.told(done);
+  });
+}
+
+tandem_status tandem_scene_find_contacts(tandem_scene* scene, const tandem_contact_options* options) {
+  return enter(scene, [&](tandem_scene& self) {
+    self.forget_contacts();
+    ContactOptions read;
+    const tandem_status status = find(self, self.contacts, options, read);
+    const bool all = read.mode == QueryMode::exact && !read.first_contact_only && read.within == 0 &&
+                     !read.add_error_bounds;
+    if (status == TANDEM_OK) self.standing = all ? Standing::all : Standing::some;
+    return status;
+  });
+}
+
+tandem_status tandem_scene_find_manifolds(tandem_scene* scene, const tandem_manifold_options* options) {
+  return enter(scene, [&](tandem_scene& self) {
+    const tandem_status status = find_manifolds(self, options);
+    self.manifolds.found = status == TANDEM_OK;
+    if (status != TANDEM_OK) self.manifolds.query.forget_points();
+    return status;
+  });
+}
+
+tandem_status tandem_scene_find_contained(tandem_scene* scene) {
+  return enter(scene, [&](tandem_scene& self) -> tandem_status {
+    self.contained.found = false;
+    if (self.standing != Standing::all) return TANDEM_CONTACTS_MISSING;
+    const Status done = self.contained.query.find(self.scene, self.contacts.query);
+    self.contained.found = done == Status::kOk;
+    return self.told(done);
+  });
+}
+
+tandem_status tandem_scene_find_distances(tandem_scene* scene, const tandem_distance_options* options) {
+  return find<DistanceOptions>(scene, &tandem_scene::distances, options);
+}
+
+tandem_status tandem_scene_find_impacts(tandem_scene* scene, const tandem_impact_options* options) {
+  return find<ImpactOptions>(scene, &tandem_scene::impacts, options);
+}
+
+tandem_status tandem_scene_find_verdicts(tandem_scene* scene, const tandem_tolerance_options* options) {
+  return find<ToleranceOptions>(scene, &tandem_scene::verdicts, options);
+}
+
+tandem_status tandem_scene_find(tandem_scene* scene, const tandem_questions* questions) {
+  return enter(scene, [&](tandem_scene& self) -> tandem_status {
+    if (questions == nullptr) return TANDEM_NULL_ARGUMENT;
+    tandem_questions read;
+    tandem_status status = read_struct(questions, read);
+    if (status == TANDEM_OK && read.contained > 1) status = TANDEM_BAD_OPTION;
+    const auto ask = [&](auto find, const auto* options) {
+      if (status == TANDEM_OK && options != nullptr) status = find(&self, options);
+    };
+    ask(tandem_scene_find_pairs, read.pairs);
+    ask(tandem_scene_find_contacts, read.contacts);
+    ask(tandem_scene_find_manifolds, read.manifolds);
+    if (status == TANDEM_OK && read.contained != 0) status = tandem_scene_find_contained(&self);
+    ask(tandem_scene_find_distances, read.distances);
+    ask(tandem_scene_find_impacts, read.impacts);
+    ask(tandem_scene_find_verdicts, read.verdicts);
+    return status;
+  });
+}
+
+const tandem_contact* tandem_scene_contacts(const tandem_scene* scene, size_t* count) {
+  return rows_of<tandem_contact>(scene, &tandem_scene::contacts, count, kRows);
+}
+
+const tandem_manifold* tandem_scene_manifolds(const tandem_scene* scene, size_t* count) {
+  return rows_of<tandem_manifold>(scene, &tandem_scene::manifolds, count, kRows);
+}
+
+const tandem_manifold_point* tandem_scene_points(const tandem_scene* scene, size_t* count) {
+  return rows_of<tandem_manifold_point>(scene, &tandem_scene::manifolds, count,
+                                        [](const ManifoldQuery& query) { return query.points(); });
+}
+
+const tandem_containment* tandem_scene_contained(const tandem_scene* scene, size_t* count) {
+  return rows_of<tandem_containment>(scene, &tandem_scene::contained, count, kRows);
+}
+
+const tandem_distance* tandem_scene_distances(const tandem_scene* scene, size_t* count) {
+  return rows_of<tandem_distance>(scene, &tandem_scene::distances, count, kRows);
+}
+
+const tandem_impact* tandem_scene_impacts(const tandem_scene* scene, size_t* count) {
+  return rows_of<tandem_impact>(scene, &tandem_scene::impacts, count, kRows);
+}
+
+const tandem_verdict* tandem_scene_verdicts(const tandem_scene* scene, size_t* count) {
+  return rows_of<tandem_verdict>(scene, &tandem_scene::verdicts, count, kRows);
+}
+
+tandem_status tandem_scene_get_counters(const tandem_scene* scene, tandem_counters* counters) {
+  if (scene == nullptr) return TANDEM_NULL_ARGUMENT;
+  tandem_counters filled = {};
+  copy_counters(scene->contacts, filled.contacts);
+  copy_counters(scene->manifolds, filled.manifolds);
+  copy_counters(scene->contained, filled.contained);
+  copy_counters(scene->distances, filled.distances);
+  copy_counters(scene->impacts, filled.impacts);
+  copy_counters(scene->verdicts, filled.verdicts);
+  return write_struct(filled, counters);
+}
+
+tandem_status tandem_pose_at(const tandem_pose* start, const tandem_motion* motion, double t,
+                             tandem_pose* pose) {
+  if (start == nullptr || motion == nullptr || pose == nullptr) return TANDEM_NULL_ARGUMENT;
+  const Pose moved = pose_at(std::bit_cast<Pose>(*start), std::bit_cast<RigidMotion>(*motion), t);
+  *pose = std::bit_cast<tandem_pose>(moved);
+  return TANDEM_OK;
+}

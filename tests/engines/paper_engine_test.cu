@@ -29,21 +29,6 @@ std::vector<Contact> contacts_of(const PaperEngine& engine) {
   return sorted(download(engine.contacts(), engine.report().counters.contacts));
 }
 
-struct CpuAnswer {
-  Status status;
-  std::uint64_t where;
-  std::vector<Contact> contacts;
-  ContactCounters counters;
-};
-
-CpuAnswer ask_cpu(const BodyScene& scene, const std::vector<ObjectPair>& pairs) {
-  ContactQuery query;
-  EXPECT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-  const Status status = query.find_contacts(scene.instances, pairs, {});
-  return {status, query.where(), sorted({query.contacts().begin(), query.contacts().end()}),
-          query.counters()};
-}
-
 Status ask(PaperEngine& engine, const GpuScene& scene, const PaperOptions& options) {
   const Status status = engine.find_contacts(scene.instances(), scene.pairs(), options, nullptr);
   EXPECT_EQ(engine.cuda_error(), cudaSuccess) << cudaGetErrorString(engine.cuda_error());
@@ -51,7 +36,7 @@ Status ask(PaperEngine& engine, const GpuScene& scene, const PaperOptions& optio
 }
 
 /// The exact contacts, by every way of storing flags and both box tests.
-void expect_contacts(PaperEngine& engine, const GpuScene& scene, const CpuAnswer& expected) {
+void expect_contacts(PaperEngine& engine, const GpuScene& scene, const test::ContactAnswer& expected) {
   for (const bool six_axes : {false, true}) {
     std::uint64_t block_pairs = 0;
     for (const PaperFlags flags : kFlags) {
@@ -69,7 +54,7 @@ void expect_contacts(PaperEngine& engine, const GpuScene& scene, const CpuAnswer
 }
 
 void expect_contacts_of(const BodyScene& scene, const std::vector<ObjectPair>& pairs) {
-  const CpuAnswer expected = ask_cpu(scene, pairs);
+  const test::ContactAnswer expected = test::ask_cpu(scene, pairs);
   const GpuScene on_gpu(scene.assets, scene.instances, pairs);
   PaperEngine engine;
   ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk)
@@ -202,7 +187,7 @@ TEST_F(PaperContacts, OfBoxesIncludeAllContacts) {
   RandomPoses random(5);
   const BodyScene scene = pile(60, 800, 3, 9);
   const auto pairs = all_pairs(scene.instances, true, random);
-  const CpuAnswer expected = ask_cpu(scene, pairs);
+  const test::ContactAnswer expected = test::ask_cpu(scene, pairs);
   const GpuScene on_gpu(scene.assets, scene.instances, pairs);
   PaperEngine engine;
   ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk);
@@ -228,7 +213,7 @@ TEST_F(PaperContacts, OfLargerAndLargerScenesNeedNoNewEngine) {
   for (const std::uint32_t bodies : {4u, 30u, 90u}) {
     const BodyScene scene = pile(bodies, 800, 2, 10);
     const auto pairs = all_pairs(scene.instances, false, random);
-    const CpuAnswer expected = ask_cpu(scene, pairs);
+    const test::ContactAnswer expected = test::ask_cpu(scene, pairs);
     const GpuScene on_gpu(scene.assets, scene.instances, pairs);
     ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk);
     expect_contacts(engine, on_gpu, expected);
@@ -241,7 +226,7 @@ TEST_F(PaperContacts, OfLargerAndLargerScenesNeedNoNewEngine) {
   const auto pairs = all_pairs(small.instances, false, random);
   const GpuScene on_gpu(small.assets, small.instances, pairs);
   ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk);
-  expect_contacts(engine, on_gpu, ask_cpu(small, pairs));
+  expect_contacts(engine, on_gpu, test::ask_cpu(small, pairs));
 }
 
 TEST_F(PaperContacts, OfNothingAreNone) {
@@ -262,7 +247,7 @@ TEST_F(PaperContacts, NameWhatIsWrong) {
   std::vector<ObjectPair> pairs;
   for (std::uint32_t i = 1; i < 50; ++i) pairs.push_back({0, i});
   const auto expect = [&](Status status, std::uint64_t where) {
-    const CpuAnswer expected = ask_cpu(scene, pairs);
+    const test::ContactAnswer expected = test::ask_cpu(scene, pairs);
     EXPECT_EQ(expected.status, status);
     EXPECT_EQ(expected.where, where);
     expect_contacts_of(scene, pairs);

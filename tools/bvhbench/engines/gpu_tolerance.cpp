@@ -16,7 +16,7 @@ class GpuToleranceRun : GpuRun {
       for (std::uint32_t level = 0; level < shapes_[i].levels.size(); ++level)
         levels_.push_back(gpu_asset(uploaded_.level(i, level), shapes_[i], level));
     }
-    check(query_.set_levels(levels_, stream_.get()), query_.cuda_error(), "assets");
+    check(query_.set_assets(levels_, stream_.get()), query_.cuda_error(), "assets");
     end_upload();
   }
 

@@ -1,6 +1,7 @@
 #include <memory>
 
 #include "gpu_engine.h"
+#include "kernels/contact/only_walk.h"
 #include "tandem/formats/gpu_memory.h"
 #include "tandem/kernels/gpu_contact_query.h"
 #include "tandem/kernels/gpu_manifold_query.h"
@@ -80,8 +81,9 @@ class TandemCudaEngine final : public GpuEngine {
   }
 
   Seconds time_walk(const GpuPairs& pairs, std::uint32_t repeats) override {
-    const GpuContactOptions walk_alone = {.walk_only = true, .within = options_.within};
+    const GpuContactOptions walk_alone = {.within = options_.within};
     GpuContactQuery walk;
+    only_walk(walk, true);
     name_shapes_to(walk);
     const Status status =
         walk.reserve({.pairs = static_cast<std::uint32_t>(counters_.object_pairs)}, walk_alone);

@@ -36,7 +36,7 @@ tandem_status tandem_gpu_tolerance_query_set_assets(tandem_gpu_tolerance_query* 
                                                     tandem_gpu_assets* assets, tandem_stream stream) {
   return guarded(query, [&](tandem_gpu_tolerance_query& self) {
     return self.take(
-        assets, [&] { return self.query.set_levels(assets->levels.view(), stream); },
+        assets, [&] { return self.query.set_assets(assets->levels.view(), stream); },
         [&] { return self.query.reserve({}); });
   });
 }

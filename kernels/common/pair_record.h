@@ -107,6 +107,20 @@ __device__ inline Pose stored_pose(const GpuInstances& instances, const GpuAsset
   return for_stored_coordinates(instances.pose[instance], assets[instances.asset[instance]].origin);
 }
 
+template <typename Args>
+__device__ inline Pose stored_pose(const Args& args, std::uint32_t instance) {
+  return stored_pose(args.instances, args.assets, instance);
+}
+
+/// How many of the given object pairs a query looks at: those that there are and that have room.
+template <typename Args>
+__device__ inline std::uint32_t pair_count(const Args& args) {
+  const std::uint32_t count = *args.given.count;
+  const std::uint32_t room =
+      args.given.capacity < args.capacity.pairs ? args.given.capacity : args.capacity.pairs;
+  return count < room ? count : room;
+}
+
 __device__ inline Status check_instance(const GpuInstances& instances, const GpuAsset* assets,
                                         std::uint32_t asset_count, std::uint32_t instance) {
   Pose stored;

@@ -123,6 +123,12 @@ struct SortingRoom {
 /// Sorting keeps two rows of 64-bit keys where its result is to come, each row aligned.
 inline constexpr std::size_t kContactsForKeys = 32;
 
+/// More room for candidates than a query needed, because what it looks at before it finds a pair's first
+/// contact differs from run to run.
+constexpr std::uint64_t with_spare(std::uint64_t undecided) {
+  return undecided + undecided / 2 + 1024;
+}
+
 /// Which blocks a query of this mode walks.
 TANDEM_HD constexpr BlockKind walked_kind(QueryMode mode) {
   return mode == QueryMode::exact ? BlockKind::oriented : BlockKind::axis_aligned;
@@ -149,20 +155,8 @@ cudaError_t sort_contacts(const QueryArgs& args, const SortingRoom& room, cudaSt
 
 #ifdef __CUDACC__
 
-__device__ inline std::uint32_t pair_count(const QueryArgs& args) {
-  const std::uint32_t count = *args.given.count;
-  const std::uint32_t room =
-      args.given.capacity < args.capacity.pairs ? args.given.capacity : args.capacity.pairs;
-  return count < room ? count : room;
-}
-
 __device__ inline bool failed(const QueryArgs& args) {
   return *static_cast<volatile Counter*>(&args.state->error) != 0;
-}
-
-/// The pose of stored coordinates.
-__device__ inline Pose stored_pose(const QueryArgs& args, std::uint32_t instance) {
-  return stored_pose(args.instances, args.assets, instance);
 }
 
 /// How near triangles of two instances have to be in a query of clearance. In files that are compiled without

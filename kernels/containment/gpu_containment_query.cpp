@@ -1,54 +1,39 @@
 #include "tandem/kernels/gpu_containment_query.h"
 
 #include <algorithm>
-#include <new>
 
+#include "kernels/common/gpu_host.h"
 #include "kernels/containment/component_labels.h"
 #include "kernels/containment/containment_data.h"
-#include "tandem/formats/gpu_memory.h"
-#include "tandem/formats/gpu_status.h"
 #include "tandem/kernels/detail/buffer.h"
 
-namespace tandem {
+namespace tandem::gpu {
 
 using containment::Surface;
 
-struct GpuContainmentQuery::State {
-  GpuArray<Surface> surfaces;
-  GpuArray<std::uint32_t> labels;
-  gpu::DeviceLimits limits = {};
-  GpuArray<gpu::ContainmentState> state;
-  PinnedArray<GpuContainmentReport> report;
-  GpuArray<std::uint32_t> rows_of_pair, sums;
-  GpuArray<gpu::FoundContainment> found;
-  GpuArray<Containment> contained;
-  GpuContainmentCapacity capacity;
-  cudaError_t error = cudaSuccess;
+struct ContainmentHost : GpuHost<ContainmentState, GpuContainmentReport> {
+  RoomArray<Surface> surfaces{*this};
+  RoomArray<std::uint32_t> labels{*this};
 
-  Status keep(cudaError_t result) {
-    error = result;
-    if (result != cudaSuccess) static_cast<void>(cudaGetLastError());  // later calls must not report it again
-    return status_of(result);
-  }
-  Status provide_reports();
+  Room<std::uint32_t> of_pairs{*this};
+  RoomArray<std::uint32_t> rows_of_pair{of_pairs};
+  RoomArray<std::uint32_t> sums{of_pairs, [](std::uint64_t pairs) { return pairs / kPairsPerSum + 1; }};
+  Room<std::uint32_t> of_rows{*this};
+  RoomArray<FoundContainment> found{of_rows};
+  RoomArray<Containment> contained{of_rows};
+
   Status make_surface(const GpuAsset& asset, std::uint32_t* labels_of_it, cudaStream_t stream, Surface& out);
   Status set_assets(std::span<const GpuAsset> assets, cudaStream_t stream);
-  Status reserve(const GpuContainmentCapacity& wanted);
+  GpuContainmentCapacity capacity() const { return {of_pairs.count(), of_rows.count()}; }
+  Status reserve(const GpuContainmentCapacity& wanted, const GpuNoOptions&) {
+    const Status status = keep(of_pairs.grow(wanted.pairs));
+    return status == Status::kOk ? keep(of_rows.grow(wanted.contained)) : status;
+  }
 };
 
-Status GpuContainmentQuery::State::provide_reports() {
-  Status status = keep(gpu::limits_of_device(limits));
-  if (status == Status::kOk) status = keep(state.reserve(1));
-  if (status != Status::kOk || report.data() != nullptr) return status;
-  status = keep(report.reserve(1));
-  if (status == Status::kOutOfGpuMemory) status = Status::kOutOfMemory;
-  if (status == Status::kOk) *report = {};
-  return status;
-}
-
 // labels_of_it: in CPU memory, to be filled where there is more than one component.
-Status GpuContainmentQuery::State::make_surface(const GpuAsset& asset, std::uint32_t* labels_of_it,
-                                                cudaStream_t stream, Surface& out) {
+Status ContainmentHost::make_surface(const GpuAsset& asset, std::uint32_t* labels_of_it, cudaStream_t stream,
+                                     Surface& out) {
   LevelView level = asset.tree;
   out = {};
   out.triangles = level.triangles;
@@ -79,7 +64,7 @@ Status GpuContainmentQuery::State::make_surface(const GpuAsset& asset, std::uint
   return containment::label_triangles(level, labels_of_it) ? Status::kOk : Status::kOutOfMemory;
 }
 
-Status GpuContainmentQuery::State::set_assets(std::span<const GpuAsset> assets, cudaStream_t stream) {
+Status ContainmentHost::set_assets(std::span<const GpuAsset> assets, cudaStream_t stream) {
   std::size_t labelled = 0;
   for (const GpuAsset& asset : assets) {
     if (asset.tree.topology == nullptr) return Status::kNoTopology;
@@ -88,7 +73,7 @@ Status GpuContainmentQuery::State::set_assets(std::span<const GpuAsset> assets, 
   Buffer<Surface> made;
   Buffer<std::uint32_t> made_labels;
   if (!made.resize(assets.size()) || !made_labels.resize(labelled)) return Status::kOutOfMemory;
-  Status status = provide_reports();
+  Status status = provide_fixed_memory();
   if (status == Status::kOk) status = keep(labels.reserve(labelled));
   std::size_t next = 0;
   for (std::size_t i = 0; i < assets.size() && status == Status::kOk; ++i) {
@@ -102,87 +87,41 @@ Status GpuContainmentQuery::State::set_assets(std::span<const GpuAsset> assets, 
   return status == Status::kOk ? keep(cudaStreamSynchronize(stream)) : status;
 }
 
-Status GpuContainmentQuery::State::reserve(const GpuContainmentCapacity& wanted) {
-  Status status = Status::kOk;
-  if (wanted.pairs > capacity.pairs || sums.room() == 0) {
-    capacity.pairs = 0;
-    status = keep(rows_of_pair.grow(wanted.pairs));
-    if (status == Status::kOk) status = keep(sums.reserve(rows_of_pair.room() / gpu::kPairsPerSum + 1));
-    if (status == Status::kOk) capacity.pairs = static_cast<std::uint32_t>(rows_of_pair.room());
-  }
-  if (status == Status::kOk && wanted.contained > capacity.contained) {
-    capacity.contained = 0;
-    status = keep(found.grow(wanted.contained));
-    if (status == Status::kOk) status = keep(contained.reserve(found.room()));
-    if (status == Status::kOk) capacity.contained = static_cast<std::uint32_t>(found.room());
-  }
-  return status;
-}
+}  // namespace tandem::gpu
 
-GpuContainmentQuery::GpuContainmentQuery() : state_(new (std::nothrow) State) {}
-GpuContainmentQuery::GpuContainmentQuery(GpuContainmentQuery&&) noexcept = default;
-GpuContainmentQuery& GpuContainmentQuery::operator=(GpuContainmentQuery&&) noexcept = default;
-GpuContainmentQuery::~GpuContainmentQuery() = default;
+namespace tandem {
 
-Status GpuContainmentQuery::set_assets(std::span<const GpuAsset> assets, cudaStream_t stream) {
-  return state_ != nullptr ? state_->set_assets(assets, stream) : Status::kOutOfMemory;
-}
-
-Status GpuContainmentQuery::reserve(const GpuContainmentCapacity& capacity) {
-  return state_->reserve(capacity);
-}
+struct GpuContainmentKind::Host : gpu::ContainmentHost {};
+template class GpuQuestion<GpuContainmentKind>;
+template class GpuAssetQuestion<GpuContainmentKind>;
 
 Status GpuContainmentQuery::enqueue(const GpuInstances& instances, const GpuPairs& pairs,
                                     const GpuContactQuery& query, cudaStream_t stream) {
-  const State& s = *state_;
-  const gpu::ContainmentArgs args = {
-      s.surfaces.data(), instances,          pairs,           query.groups(),        query.device_report(),
-      s.capacity,        s.state.data(),     s.report.data(), s.rows_of_pair.data(), s.sums.data(),
-      s.found.data(),    s.contained.data(), s.limits};
-  return state_->keep(gpu::find_contained(args, stream));
+  const gpu::ContainmentHost& host = *host_;
+  gpu::ContainmentArgs args = {};
+  host.fill(args, instances);
+  args.surfaces = host.surfaces.data();
+  args.pairs = pairs;
+  args.groups = query.groups();
+  args.query = query.device_report();
+  args.capacity = host.capacity();
+  args.rows_of_pair = host.rows_of_pair.data();
+  args.sums = host.sums.data();
+  args.found = host.found.data();
+  args.contained = host.contained.data();
+  return host_->keep(gpu::find_contained(args, stream));
 }
 
 Status GpuContainmentQuery::find(const GpuInstances& instances, const GpuPairs& pairs,
                                  const GpuContactQuery& query, cudaStream_t stream) {
-  GpuContainmentCapacity wanted = capacity();
-  wanted.pairs = std::max(wanted.pairs, pairs.capacity);
-  for (;;) {
-    Status status = reserve(wanted);
-    if (status == Status::kOk) status = enqueue(instances, pairs, query, stream);
-    if (status == Status::kOk) status = state_->keep(cudaStreamSynchronize(stream));
-    if (status != Status::kOk) return status;
-    if (report().status != Status::kOk) return report().status;
-    if (report().complete != 0) return Status::kOk;
-    if (query.report().complete == 0) return Status::kOutOfRange;
-    wanted = report().needed;
-  }
+  GpuContainmentCapacity first = capacity();
+  first.pairs = std::max(first.pairs, pairs.capacity);
+  return gpu::find_behind(query, *host_, first, GpuNoOptions{}, stream,
+                          [&] { return enqueue(instances, pairs, query, stream); });
 }
 
 const Containment* GpuContainmentQuery::contained() const {
-  return state_->contained.data();
-}
-
-const GpuContainmentReport* GpuContainmentQuery::device_report() const {
-  return &state_->state->report;
-}
-
-const GpuContainmentReport& GpuContainmentQuery::report() const {
-  return *state_->report;
-}
-
-GpuContainmentCapacity GpuContainmentQuery::capacity() const {
-  return state_ != nullptr ? state_->capacity : GpuContainmentCapacity{};
-}
-
-std::size_t GpuContainmentQuery::bytes() const {
-  if (state_ == nullptr) return 0;
-  const State& s = *state_;
-  return s.surfaces.bytes() + s.labels.bytes() + s.state.bytes() + s.rows_of_pair.bytes() + s.sums.bytes() +
-         s.found.bytes() + s.contained.bytes();
-}
-
-cudaError_t GpuContainmentQuery::cuda_error() const {
-  return state_ != nullptr ? state_->error : cudaSuccess;
+  return host_->contained.data();
 }
 
 }  // namespace tandem

@@ -123,13 +123,6 @@ cudaError_t settle_distances(const DistanceArgs& args, cudaStream_t stream);
 
 #ifdef __CUDACC__
 
-__device__ inline std::uint32_t pair_count(const DistanceArgs& args) {
-  const std::uint32_t count = *args.given.count;
-  const std::uint32_t room =
-      args.given.capacity < args.capacity.pairs ? args.given.capacity : args.capacity.pairs;
-  return count < room ? count : room;
-}
-
 __device__ inline Counter as_bits(double x) {
   return static_cast<Counter>(__double_as_longlong(x));
 }
@@ -161,10 +154,6 @@ __device__ inline double upper_in(const DistanceArgs& args, const NearState& sta
 /// nearness() of the CPU.
 __device__ inline double nearness(const DistanceArgs& args, double upper) {
   return upper < args.beyond_reach ? nearness_below(args.tolerance, upper) : upper;
-}
-
-__device__ inline Pose stored_pose(const DistanceArgs& args, std::uint32_t instance) {
-  return stored_pose(args.instances, args.assets, instance);
 }
 
 /// Triangles of a pair, in world coordinates.

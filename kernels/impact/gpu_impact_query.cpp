@@ -3,222 +3,129 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <new>
 
+#include "kernels/common/gpu_host.h"
 #include "kernels/impact/impact_data.h"
-#include "tandem/formats/gpu_memory.h"
-#include "tandem/formats/gpu_status.h"
 
-namespace tandem {
+namespace tandem::gpu {
 namespace {
 
 // Parts are numbered in keys of 32 bits beside their number in the piece.
 constexpr std::uint32_t kMostParts = (1u << 25) - 1;
+
+// Poses of pairs are numbered in 32 bits too.
+constexpr std::uint32_t kMostPairs = (kNoIndex - 1 - kFewestImpactSamples) / kImpactSamplesPerPair;
 
 // Trees with fewer levels have few block pairs whatever is looked for.
 constexpr std::uint32_t kFewestLevelsToSample = 4;
 
 // What most_impact_bytes() counts with; a hash table has fewer than four places for each part.
 static_assert(sizeof(impact::MovingBody) + sizeof(WorldBox) == 264);
-static_assert(sizeof(gpu::ImpactPair) + sizeof(Impact) + 3 * sizeof(double) + 2 * sizeof(std::uint32_t) ==
-              240);
-static_assert(sizeof(gpu::PairRecord) + 2 * sizeof(std::uint32_t) == 168);
-static_assert(sizeof(gpu::ImpactPart) + 4 * 2 * sizeof(std::uint32_t) == 656);
-static_assert(2 * sizeof(gpu::ImpactBlockPair) == 48);
-static_assert(sizeof(gpu::ImpactTrianglePair) + sizeof(gpu::AdvancedPair) == 56);
+static_assert(sizeof(ImpactPair) + sizeof(Impact) + 3 * sizeof(double) + 2 * sizeof(std::uint32_t) == 240);
+static_assert(sizeof(PairRecord) + 2 * sizeof(std::uint32_t) == 168);
+static_assert(sizeof(ImpactPart) + 4 * 2 * sizeof(std::uint32_t) == 656);
+static_assert(2 * sizeof(ImpactBlockPair) == 48);
+static_assert(sizeof(ImpactTrianglePair) + sizeof(AdvancedPair) == 56);
 
-template <typename Number>
-Number grown(Number wanted, Number present) {
-  return wanted <= present ? present : std::max(wanted, present + present / 2);
+std::uint64_t samples_of(std::uint64_t pairs) {
+  return kImpactSamplesPerPair * pairs + kFewestImpactSamples;
 }
-
-GpuImpactCapacity larger(const GpuImpactCapacity& x, const GpuImpactCapacity& y) {
-  return {std::max(x.instances, y.instances),
-          std::max(x.pairs, y.pairs),
-          std::max(x.contacts, y.contacts),
-          std::max(x.undecided, y.undecided),
-          std::max(x.parts, y.parts),
-          std::max(x.block_pairs, y.block_pairs),
-          std::max(x.triangle_pairs, y.triangle_pairs)};
+std::uint64_t keys_of(std::uint64_t parts) {
+  return std::bit_ceil(2 * parts);
 }
 
 }  // namespace
 
-struct GpuImpactQuery::State {
-  GpuArray<GpuAsset> assets;
-  std::uint32_t asset_count = 0, depth = 1;
-  gpu::DeviceLimits limits = {};
-  GpuArray<gpu::ImpactState> state;
-  PinnedArray<GpuImpactReport> report;
+struct ImpactHost : GpuHost<ImpactState, GpuImpactReport> {
+  AssetList assets{*this};
   GpuBroadPhase broad_phase;
   GpuContactQuery contacts;  // at the start
 
-  GpuArray<impact::MovingBody> bodies;
-  GpuArray<WorldBox> boxes;
-  GpuArray<gpu::ImpactPair> pairs;
-  GpuArray<double> sought;
-  GpuArray<gpu::Counter> stops, triangles;
-  GpuArray<Impact> impacts;
-  GpuArray<gpu::ImpactPart> parts;
-  GpuArray<std::uint32_t> part_keys, part_of_key;
-  GpuArray<gpu::ImpactBlockPair> block_pairs;
-  GpuArray<gpu::ImpactTrianglePair> triangle_pairs;
-  GpuArray<gpu::AdvancedPair> advanced;
+  Room<std::uint32_t> of_instances{*this};
+  RoomArray<impact::MovingBody> bodies{of_instances};
+  RoomArray<WorldBox> boxes{of_instances};
 
-  GpuArray<std::uint32_t> is_sampled, sampled_pairs, met;
-  GpuArray<gpu::PairRecord> samples;
-  GpuArray<gpu::QueryState> walk_state;  // of the walk of samples
-  GpuArray<gpu::Chunk> chunks;
+  Room<std::uint32_t> of_pairs{*this};
+  RoomArray<ImpactPair> pairs{of_pairs};
+  RoomArray<double> sought{of_pairs};
+  RoomArray<Counter> stops{of_pairs}, triangles{of_pairs};
+  RoomArray<Impact> impacts{of_pairs};
+  RoomArray<std::uint32_t> is_sampled{of_pairs}, sampled_pairs{of_pairs};
+  RoomArray<std::uint32_t> met{of_pairs, [](std::uint64_t count) { return 2 * samples_of(count); }};
+  RoomArray<PairRecord> samples{of_pairs, samples_of};
 
-  GpuImpactCapacity capacity;
-  cudaError_t error = cudaSuccess;
+  Room<std::uint32_t> of_parts{*this};
+  RoomArray<ImpactPart> parts{of_parts};
+  RoomArray<std::uint32_t> part_keys{of_parts, keys_of}, part_of_key{of_parts, keys_of};
+  Room<std::uint32_t> of_block_pairs{*this};
+  RoomArray<ImpactBlockPair> block_pairs{of_block_pairs, times<2>};  // two rounds
+  Room<std::uint32_t> of_triangle_pairs{*this};
+  RoomArray<ImpactTrianglePair> triangle_pairs{of_triangle_pairs};
+  RoomArray<AdvancedPair> advanced{of_triangle_pairs};
 
-  // Keeps what CUDA says of a call.
-  Status keep(cudaError_t result) {
-    error = result;
-    if (result != cudaSuccess) static_cast<void>(cudaGetLastError());  // later calls must not report it again
-    return status_of(result);
+  RoomArray<QueryState> walk_state{*this};  // of the walk of samples
+  RoomArray<Chunk> chunks{*this};
+
+  std::size_t bytes() const { return Memory::bytes() + broad_phase.bytes() + contacts.bytes(); }
+  GpuImpactCapacity capacity() const {
+    const GpuContactCapacity at_start = contacts.capacity();
+    return {of_instances.count(), of_pairs.count(),       at_start.contacts,        at_start.undecided,
+            of_parts.count(),     of_block_pairs.count(), of_triangle_pairs.count()};
   }
-  template <typename... Arrays>
-  Status reserve_all(std::size_t count, Arrays&... arrays) {
-    Status status = Status::kOk;
-    const auto reserve_one = [&](auto& array) {
-      if (status == Status::kOk) status = keep(array.reserve(count));
-    };
-    (reserve_one(arrays), ...);
-    return status;
-  }
-
   std::uint32_t most_samples() const { return static_cast<std::uint32_t>(samples.room()); }
-  Status provide_fixed_memory(cudaStream_t stream);
   Status set_assets(std::span<const GpuAsset> given, cudaStream_t stream);
-  Status reserve_instances(std::uint32_t wanted);
-  Status reserve_pairs(std::uint32_t wanted);
-  Status reserve_parts(std::uint32_t wanted);
-  Status reserve_block_pairs(std::uint32_t wanted);
-  Status reserve_triangle_pairs(std::uint32_t wanted);
   Status reserve(const GpuImpactCapacity& wanted, const GpuImpactOptions& options);
 
-  gpu::ImpactArgs args(const GpuInstances& instances, const RigidMotion* motion, double duration,
-                       const GpuPairs& given, const GpuImpactOptions& options);
-  gpu::QueryArgs sample_args(const gpu::ImpactArgs& args, std::uint32_t which,
-                             std::uint32_t most_blocks) const;
-  cudaError_t clear(const gpu::ImpactArgs& args, cudaStream_t stream);
-  cudaError_t end_at_samples(const gpu::ImpactArgs& args, std::uint32_t most_blocks, cudaStream_t stream);
-  cudaError_t walk(const gpu::ImpactArgs& args, std::uint32_t most_blocks, cudaStream_t stream);
-  Status enqueue(const gpu::ImpactArgs& args, const GpuImpactOptions& options, cudaStream_t stream);
+  ImpactArgs args(const GpuInstances& instances, const RigidMotion* motion, double duration,
+                  const GpuPairs& given, const GpuImpactOptions& options);
+  QueryArgs sample_args(const ImpactArgs& args, std::uint32_t which, std::uint32_t most_blocks) const;
+  cudaError_t clear(const ImpactArgs& args, cudaStream_t stream);
+  cudaError_t end_at_samples(const ImpactArgs& args, std::uint32_t most_blocks, cudaStream_t stream);
+  cudaError_t walk(const ImpactArgs& args, std::uint32_t most_blocks, cudaStream_t stream);
+  Status enqueue(const ImpactArgs& args, const GpuImpactOptions& options, cudaStream_t stream);
 };
 
-Status GpuImpactQuery::State::provide_fixed_memory(cudaStream_t stream) {
-  if (report.data() != nullptr) return Status::kOk;
-  Status status = keep(gpu::limits_of_device(limits));
-  if (status == Status::kOk) status = reserve_all(1, state, walk_state);
-  if (status == Status::kOk) status = keep(chunks.reserve(gpu::most_mailboxes(limits)));
-  if (status == Status::kOk) status = keep(cudaMemsetAsync(chunks.data(), 0, chunks.bytes(), stream));
-  if (status != Status::kOk) return status;
-  status = keep(report.reserve(1));
-  if (status == Status::kOk) *report = {};
-  return status == Status::kOutOfGpuMemory ? Status::kOutOfMemory : status;
+Status ImpactHost::set_assets(std::span<const GpuAsset> given, cudaStream_t stream) {
+  const AssetSummary all = summary_of(given);
+  if (!all.axis_aligned) return Status::kNoAxisAlignedBlocks;
+  if (!all.oriented) return Status::kNoOrientedBlocks;
+  assets.count = 0;
+  Status status = provide_fixed_memory([&] {
+    Status made = keep(walk_state.reserve(1));
+    if (made == Status::kOk) made = keep(chunks.reserve(most_mailboxes(limits)));
+    return made == Status::kOk ? keep(cudaMemsetAsync(chunks.data(), 0, chunks.bytes(), stream)) : made;
+  });
+  if (status == Status::kOk) status = keep(contacts.set_assets(given, stream), contacts);
+  return status == Status::kOk ? assets.set(given, all, *this, stream) : status;
 }
 
-Status GpuImpactQuery::State::set_assets(std::span<const GpuAsset> given, cudaStream_t stream) {
-  std::uint32_t deepest = 1;
-  for (const GpuAsset& asset : given) {
-    if (asset.tree.blocks == nullptr) return Status::kNoAxisAlignedBlocks;
-    if (asset.tree.oriented_blocks == nullptr) return Status::kNoOrientedBlocks;
-    deepest = std::max(deepest, asset.tree.depth);
+// There is always a part, which lanes without a block pair may look at.
+Status ImpactHost::reserve(const GpuImpactCapacity& wanted, const GpuImpactOptions& options) {
+  if (wanted.pairs > kMostPairs) return Status::kOutOfGpuMemory;
+  if (wanted.parts > kMostParts) return Status::kOutOfRange;
+  Status status = keep(of_instances.grow(wanted.instances));
+  if (status == Status::kOk) status = keep(of_pairs.grow(wanted.pairs, kMostPairs));
+  if (status == Status::kOk) status = keep(of_parts.grow(std::max(wanted.parts, 1u), kMostParts));
+  if (status == Status::kOk) status = keep(of_block_pairs.grow(wanted.block_pairs));
+  if (status == Status::kOk) status = keep(of_triangle_pairs.grow(wanted.triangle_pairs));
+  if (status == Status::kOk) {
+    status = keep(broad_phase.reserve({of_instances.count(), of_pairs.count()}, {.sorted = options.sorted}),
+                  broad_phase);
   }
-  asset_count = 0;
-  Status status = provide_fixed_memory(stream);
-  if (status == Status::kOk) status = contacts.set_assets(given, stream);
-  if (status == Status::kOk) status = keep(assets.upload(given, stream));
-  if (status == Status::kOk) status = keep(cudaStreamSynchronize(stream));
   if (status != Status::kOk) return status;
-  asset_count = static_cast<std::uint32_t>(given.size());
-  depth = deepest;
-  return Status::kOk;
+  return keep(contacts.reserve({of_pairs.count(), wanted.contacts, wanted.undecided}), contacts);
 }
 
-Status GpuImpactQuery::State::reserve_instances(std::uint32_t wanted) {
-  if (wanted <= capacity.instances) return Status::kOk;
-  const std::uint32_t count = grown(wanted, capacity.instances);
-  capacity.instances = 0;
-  const Status status = reserve_all(count, bodies, boxes);
-  if (status == Status::kOk) capacity.instances = count;
-  return status;
-}
-
-Status GpuImpactQuery::State::reserve_pairs(std::uint32_t wanted) {
-  if (wanted <= capacity.pairs && samples.room() != 0) return Status::kOk;
-  const std::uint32_t count = grown(wanted, capacity.pairs);
-  const std::size_t poses = kImpactSamplesPerPair * std::size_t{count} + kFewestImpactSamples;
-  if (poses >= kNoIndex) return Status::kOutOfGpuMemory;
-  capacity.pairs = 0;
-  Status status = reserve_all(count, pairs, sought, stops, triangles, impacts, is_sampled, sampled_pairs);
-  if (status == Status::kOk) status = keep(met.reserve(2 * poses));
-  if (status == Status::kOk) status = keep(samples.reserve(poses));
-  if (status == Status::kOk) capacity.pairs = count;
-  return status;
-}
-
-// There is always one, which lanes without a block pair may look at.
-Status GpuImpactQuery::State::reserve_parts(std::uint32_t wanted) {
-  if (wanted <= capacity.parts && capacity.parts != 0) return Status::kOk;
-  if (wanted > kMostParts) return Status::kOutOfRange;
-  const std::uint32_t count = std::clamp(grown(wanted, capacity.parts), 1u, kMostParts);
-  capacity.parts = 0;
-  Status status = keep(parts.reserve(count));
-  if (status == Status::kOk) status = reserve_all(std::bit_ceil(2 * count), part_keys, part_of_key);
-  if (status == Status::kOk) capacity.parts = count;
-  return status;
-}
-
-Status GpuImpactQuery::State::reserve_block_pairs(std::uint32_t wanted) {
-  if (wanted <= capacity.block_pairs) return Status::kOk;
-  const std::uint32_t count = grown(wanted, capacity.block_pairs);
-  capacity.block_pairs = 0;
-  const Status status = keep(block_pairs.reserve(2 * std::size_t{count}));
-  if (status == Status::kOk) capacity.block_pairs = count;
-  return status;
-}
-
-Status GpuImpactQuery::State::reserve_triangle_pairs(std::uint32_t wanted) {
-  if (wanted <= capacity.triangle_pairs) return Status::kOk;
-  const std::uint32_t count = grown(wanted, capacity.triangle_pairs);
-  capacity.triangle_pairs = 0;
-  const Status status = reserve_all(count, triangle_pairs, advanced);
-  if (status == Status::kOk) capacity.triangle_pairs = count;
-  return status;
-}
-
-Status GpuImpactQuery::State::reserve(const GpuImpactCapacity& wanted, const GpuImpactOptions& options) {
-  Status status = reserve_instances(wanted.instances);
-  if (status == Status::kOk) status = reserve_pairs(wanted.pairs);
-  if (status == Status::kOk) status = reserve_parts(wanted.parts);
-  if (status == Status::kOk) status = reserve_block_pairs(wanted.block_pairs);
-  if (status == Status::kOk) status = reserve_triangle_pairs(wanted.triangle_pairs);
-  if (status == Status::kOk)
-    status = broad_phase.reserve({capacity.instances, capacity.pairs}, {.sorted = options.sorted});
-  if (status == Status::kOk) status = contacts.reserve({capacity.pairs, wanted.contacts, wanted.undecided});
-  capacity.contacts = contacts.capacity().contacts;
-  capacity.undecided = contacts.capacity().undecided;
-  return status;
-}
-
-gpu::ImpactArgs GpuImpactQuery::State::args(const GpuInstances& instances, const RigidMotion* motion,
-                                            double duration, const GpuPairs& given,
-                                            const GpuImpactOptions& options) {
-  gpu::ImpactArgs args = {};
-  args.assets = assets.data();
-  args.asset_count = asset_count;
-  args.instances = instances;
+ImpactArgs ImpactHost::args(const GpuInstances& instances, const RigidMotion* motion, double duration,
+                            const GpuPairs& given, const GpuImpactOptions& options) {
+  ImpactArgs args = {};
+  fill(args, instances);
+  assets.fill(args);
   args.motion = motion;
   args.duration = duration;
   args.tolerance = options.tolerance;
   args.given = given;
-  args.capacity = capacity;
-  args.state = state.data();
-  args.host_report = report.data();
+  args.capacity = capacity();
   args.query = contacts.device_report();
   args.contacts = contacts.contacts();
   args.bodies = bodies.data();
@@ -232,23 +139,22 @@ gpu::ImpactArgs GpuImpactQuery::State::args(const GpuInstances& instances, const
   args.part_keys = part_keys.data();
   args.part_of_key = part_of_key.data();
   args.most_keys = static_cast<std::uint32_t>(part_keys.room());
-  args.frontier = {block_pairs.data(), state->waiting, capacity.block_pairs};
-  args.triangle_pairs = {triangle_pairs.data(), &state->triangle_pairs, capacity.triangle_pairs};
-  args.advanced = {advanced.data(), &state->advanced, capacity.triangle_pairs};
+  args.frontier = {block_pairs.data(), state->waiting, of_block_pairs.count()};
+  args.triangle_pairs = {triangle_pairs.data(), &state->triangle_pairs, of_triangle_pairs.count()};
+  args.advanced = {advanced.data(), &state->advanced, of_triangle_pairs.count()};
   args.is_sampled = is_sampled.data();
   args.sampled_pairs = sampled_pairs.data();
   args.met[0] = met.data();
   args.met[1] = met.data() + most_samples();
   args.samples = samples.data();
   args.most_samples = most_samples();
-  args.limits = limits;
   return args;
 }
 
 // A walk that only marks which samples have a contact that float32 is sure of.
-gpu::QueryArgs GpuImpactQuery::State::sample_args(const gpu::ImpactArgs& args, std::uint32_t which,
-                                                  std::uint32_t most_blocks) const {
-  gpu::QueryArgs walk = {};
+QueryArgs ImpactHost::sample_args(const ImpactArgs& args, std::uint32_t which,
+                                  std::uint32_t most_blocks) const {
+  QueryArgs walk = {};
   walk.assets = args.assets;
   walk.asset_count = args.asset_count;
   walk.instances = args.instances;
@@ -261,53 +167,50 @@ gpu::QueryArgs GpuImpactQuery::State::sample_args(const gpu::ImpactArgs& args, s
   walk.pairs = args.samples;
   walk.met = args.met[which];
   walk.limits = limits;
-  walk.shape = gpu::walk_shape(limits, depth, most_blocks);
+  walk.shape = walk_shape(limits, assets.all.depth, most_blocks);
   return walk;
 }
 
-cudaError_t GpuImpactQuery::State::clear(const gpu::ImpactArgs& args, cudaStream_t stream) {
-  cudaError_t result = cudaMemsetAsync(args.state, 0, sizeof(gpu::ImpactState), stream);
+cudaError_t ImpactHost::clear(const ImpactArgs& args, cudaStream_t stream) {
+  cudaError_t result = cudaMemsetAsync(args.state, 0, sizeof(ImpactState), stream);
   if (result == cudaSuccess) result = cudaMemsetAsync(args.part_keys, 0xFF, part_keys.bytes(), stream);
   if (result == cudaSuccess && triangles.bytes() != 0)
     result = cudaMemsetAsync(args.triangles, 0xFF, triangles.bytes(), stream);
   return result;
 }
 
-cudaError_t GpuImpactQuery::State::end_at_samples(const gpu::ImpactArgs& args, std::uint32_t most_blocks,
-                                                  cudaStream_t stream) {
-  cudaError_t result = gpu::list_sampled_pairs(args, stream);
+cudaError_t ImpactHost::end_at_samples(const ImpactArgs& args, std::uint32_t most_blocks,
+                                       cudaStream_t stream) {
+  cudaError_t result = list_sampled_pairs(args, stream);
   for (std::uint32_t which = 0; which < 2 && result == cudaSuccess; ++which) {
-    result = cudaMemsetAsync(walk_state.data(), 0, sizeof(gpu::QueryState), stream);
-    if (result == cudaSuccess) result = gpu::pose_samples(args, which, stream);
-    if (result == cudaSuccess) result = gpu::walk_exact(sample_args(args, which, most_blocks), stream);
+    result = cudaMemsetAsync(walk_state.data(), 0, sizeof(QueryState), stream);
+    if (result == cudaSuccess) result = pose_samples(args, which, stream);
+    if (result == cudaSuccess) result = walk_exact(sample_args(args, which, most_blocks), stream);
   }
   return result == cudaSuccess ? gpu::end_at_samples(args, stream) : result;
 }
 
-cudaError_t GpuImpactQuery::State::walk(const gpu::ImpactArgs& args, std::uint32_t most_blocks,
-                                        cudaStream_t stream) {
-  const std::uint32_t rounds = gpu::impact_rounds_of(depth);
-  cudaError_t result = gpu::begin_impacts(args, stream);
+cudaError_t ImpactHost::walk(const ImpactArgs& args, std::uint32_t most_blocks, cudaStream_t stream) {
+  const std::uint32_t depth = assets.all.depth, rounds = impact_rounds_of(depth);
+  cudaError_t result = begin_impacts(args, stream);
   std::uint32_t first = 0;
   if (result == cudaSuccess && depth >= kFewestLevelsToSample) {
-    first = gpu::kSampledRound;
-    result = gpu::walk_impacts(args, 0, first, stream);
+    first = kSampledRound;
+    result = walk_impacts(args, 0, first, stream);
     if (result == cudaSuccess) result = end_at_samples(args, most_blocks, stream);
   }
-  if (result == cudaSuccess) result = gpu::walk_impacts(args, first, rounds, stream);
-  if (result == cudaSuccess) result = gpu::advance_impacts(args, stream);
-  return result == cudaSuccess ? gpu::write_impacts(args, stream) : result;
+  if (result == cudaSuccess) result = walk_impacts(args, first, rounds, stream);
+  return result == cudaSuccess ? queue(args, stream, advance_impacts, write_impacts) : result;
 }
 
 // args.given: null where the pairs are to be found.
-Status GpuImpactQuery::State::enqueue(const gpu::ImpactArgs& given, const GpuImpactOptions& options,
-                                      cudaStream_t stream) {
-  gpu::ImpactArgs args = given;
+Status ImpactHost::enqueue(const ImpactArgs& given, const GpuImpactOptions& options, cudaStream_t stream) {
+  ImpactArgs args = given;
   const auto is_size = [](double x) { return x >= 0 && std::isfinite(x); };
-  if (!is_size(args.duration) || !is_size(args.tolerance) || args.instances.count > capacity.instances)
+  if (!is_size(args.duration) || !is_size(args.tolerance) || args.instances.count > of_instances.count())
     return Status::kOutOfRange;
   Status status = keep(clear(args, stream));
-  if (status == Status::kOk) status = keep(gpu::move_bodies(args, stream));
+  if (status == Status::kOk) status = keep(move_bodies(args, stream));
   if (status == Status::kOk && args.given.count == nullptr) {
     status = broad_phase.enqueue(boxes.data(), args.instances.count,
                                  {.sorted = options.sorted, .filter = options.filter}, stream);
@@ -319,18 +222,13 @@ Status GpuImpactQuery::State::enqueue(const gpu::ImpactArgs& given, const GpuImp
   return status == Status::kOk ? keep(walk(args, options.most_blocks, stream)) : status;
 }
 
-GpuImpactQuery::GpuImpactQuery() : state_(new (std::nothrow) State) {}
-GpuImpactQuery::GpuImpactQuery(GpuImpactQuery&&) noexcept = default;
-GpuImpactQuery& GpuImpactQuery::operator=(GpuImpactQuery&&) noexcept = default;
-GpuImpactQuery::~GpuImpactQuery() = default;
+}  // namespace tandem::gpu
 
-Status GpuImpactQuery::set_assets(std::span<const GpuAsset> assets, cudaStream_t stream) {
-  return state_ != nullptr ? state_->set_assets(assets, stream) : Status::kOutOfMemory;
-}
+namespace tandem {
 
-Status GpuImpactQuery::reserve(const GpuImpactCapacity& capacity, const GpuImpactOptions& options) {
-  return state_->reserve(capacity, options);
-}
+struct GpuImpactKind::Host : gpu::ImpactHost {};
+template class GpuQuestion<GpuImpactKind>;
+template class GpuAssetQuestion<GpuImpactKind>;
 
 Status GpuImpactQuery::enqueue(const GpuInstances& instances, const RigidMotion* motion, double duration,
                                const GpuImpactOptions& options, cudaStream_t stream) {
@@ -339,8 +237,7 @@ Status GpuImpactQuery::enqueue(const GpuInstances& instances, const RigidMotion*
 
 Status GpuImpactQuery::enqueue(const GpuInstances& instances, const RigidMotion* motion, double duration,
                                const GpuPairs& pairs, const GpuImpactOptions& options, cudaStream_t stream) {
-  State& s = *state_;
-  return s.enqueue(s.args(instances, motion, duration, pairs, options), options, stream);
+  return host_->enqueue(host_->args(instances, motion, duration, pairs, options), options, stream);
 }
 
 Status GpuImpactQuery::find(const GpuInstances& instances, const RigidMotion* motion, double duration,
@@ -350,56 +247,26 @@ Status GpuImpactQuery::find(const GpuInstances& instances, const RigidMotion* mo
 
 Status GpuImpactQuery::find(const GpuInstances& instances, const RigidMotion* motion, double duration,
                             const GpuPairs& pairs, const GpuImpactOptions& options, cudaStream_t stream) {
-  GpuImpactCapacity wanted = capacity();
-  wanted.instances = std::max(wanted.instances, instances.count);
-  if (pairs.count != nullptr) wanted.pairs = std::max(wanted.pairs, pairs.capacity);
-  for (;;) {
-    Status status = reserve(wanted, options);
-    if (status == Status::kOk) status = enqueue(instances, motion, duration, pairs, options, stream);
-    if (status == Status::kOk) status = state_->keep(cudaStreamSynchronize(stream));
-    if (status != Status::kOk) return status;
-    if (report().status != Status::kOk) return report().status;
-    if (report().complete != 0) return Status::kOk;
-    if (pairs.count != nullptr && report().needed.pairs > pairs.capacity) return Status::kOutOfRange;
-    if (report().needed.pairs == kNoIndex) return Status::kTooManyPairs;
-    wanted = larger(capacity(), report().needed);
-    wanted.parts = std::min(wanted.parts, kMostParts + 1);  // what is more is refused
-  }
+  const bool given = pairs.count != nullptr;
+  GpuImpactCapacity first = capacity();
+  first.instances = std::max(first.instances, instances.count);
+  if (given) first.pairs = std::max(first.pairs, pairs.capacity);
+  return gpu::find_until_complete(
+      *host_, first, options, stream,
+      [&] { return enqueue(instances, motion, duration, pairs, options, stream); },
+      [&](const GpuImpactReport& report, GpuImpactCapacity& wanted) {
+        wanted = report.needed;
+        if (given && wanted.pairs > pairs.capacity) return Status::kOutOfRange;
+        return wanted.pairs == kNoIndex ? Status::kTooManyPairs : Status::kOk;
+      });
 }
 
 GpuPairs GpuImpactQuery::pairs() const {
-  return state_->broad_phase.pairs();
+  return host_->broad_phase.pairs();
 }
 
 const Impact* GpuImpactQuery::impacts() const {
-  return state_->impacts.data();
-}
-
-const GpuImpactReport* GpuImpactQuery::device_report() const {
-  return &state_->state->report;
-}
-
-const GpuImpactReport& GpuImpactQuery::report() const {
-  return *state_->report;
-}
-
-GpuImpactCapacity GpuImpactQuery::capacity() const {
-  return state_ != nullptr ? state_->capacity : GpuImpactCapacity{};
-}
-
-std::size_t GpuImpactQuery::bytes() const {
-  if (state_ == nullptr) return 0;
-  const State& s = *state_;
-  return s.assets.bytes() + s.state.bytes() + s.broad_phase.bytes() + s.contacts.bytes() + s.bodies.bytes() +
-         s.boxes.bytes() + s.pairs.bytes() + s.sought.bytes() + s.stops.bytes() + s.triangles.bytes() +
-         s.impacts.bytes() + s.parts.bytes() + s.part_keys.bytes() + s.part_of_key.bytes() +
-         s.block_pairs.bytes() + s.triangle_pairs.bytes() + s.advanced.bytes() + s.is_sampled.bytes() +
-         s.sampled_pairs.bytes() + s.met.bytes() + s.samples.bytes() + s.walk_state.bytes() +
-         s.chunks.bytes();
-}
-
-cudaError_t GpuImpactQuery::cuda_error() const {
-  return state_ != nullptr ? state_->error : cudaSuccess;
+  return host_->impacts.data();
 }
 
 }  // namespace tandem

@@ -10,6 +10,9 @@
 /// curves.
 namespace tandem::manifold {
 
+/// The most contacts of a pair of bodies: pieces are numbered in 28 bits, and table entries in 32.
+inline constexpr std::uint32_t kMostContactsOfPair = std::uint32_t{1} << 27;
+
 /// What a pair of triangles has in common, in short. Corners of polygons are computed again where they are
 /// asked for.
 struct alignas(16) Piece {

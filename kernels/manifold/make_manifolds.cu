@@ -67,9 +67,6 @@ __device__ std::uint32_t most_of_warp(const GpuGroupCounts& counts) {
   return counts.few + counts.many > kManyPairs ? 512 : 128;
 }
 
-// Pieces are numbered in 28 bits, and table entries in 32.
-constexpr std::uint32_t kMostContactsOfPair = std::uint32_t{1} << 27;
-
 __device__ bool has_query(const ManifoldArgs& args) {
   return args.query->status == Status::kOk && args.query->complete != 0 &&
          args.query->contacts <= args.capacity.contacts && *args.pairs.count <= args.capacity.pairs;
@@ -192,7 +189,7 @@ __global__ void __launch_bounds__(kFinders, 2) find_curves(const __grid_constant
     const std::uint32_t pair = kIsLarge<AnyTeam> ? groups.many[row] : groups.few[row],
                         count = args.of_pair[pair].pieces.pieces;
     if (count == 0) return;
-    if (count > kMostContactsOfPair) {
+    if (count > manifold::kMostContactsOfPair) {
       if (team.rank() == 0) state.too_many_contacts = 1;
       return;
     }

@@ -18,9 +18,6 @@ using manifold::Shape;
 // Pairs with contacts that a thread takes at a time.
 constexpr std::size_t kPairsAtOnce = 16;
 
-// Pieces are numbered in 28 bits, and table entries in 32.
-constexpr std::uint32_t kMostContactsOfPair = std::uint32_t{1} << 27;
-
 // A pair that has contacts: where its patches lie, and where its manifolds and points go.
 struct Row {
   std::uint32_t pair;
@@ -122,7 +119,7 @@ Status ManifoldQuery::State::group(SceneState& scene, std::size_t pairs, std::sp
   for (std::size_t i = 0; i < pairs; ++i) {
     if (begin[i + 1] > 0 && !rows.push({static_cast<std::uint32_t>(i), 0, 0, 0, 0, 0, 0, 0}))
       return scene.fail(Status::kOutOfMemory, 0);
-    if (begin[i + 1] > kMostContactsOfPair) return scene.fail(Status::kOutOfRange, i);
+    if (begin[i + 1] > manifold::kMostContactsOfPair) return scene.fail(Status::kOutOfRange, i);
     begin[i + 1] += begin[i];
   }
   if (ascending) return Status::kOk;

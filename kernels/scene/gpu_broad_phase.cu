@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <bit>
 #include <cub/device/device_radix_sort.cuh>
-#include <new>
 
+#include "kernels/common/gpu_host.h"
 #include "kernels/scene/broad_phase_boxes.cuh"
 #include "kernels/scene/broad_phase_direct.cuh"
 #include "kernels/scene/broad_phase_kept.cuh"
@@ -12,8 +12,6 @@
 #include "kernels/scene/broad_phase_limits.h"
 #include "kernels/scene/broad_phase_tree.cuh"
 #include "kernels/scene/broad_phase_walk.cuh"
-#include "tandem/formats/gpu_memory.h"
-#include "tandem/formats/gpu_status.h"
 #include "tandem/kernels/detail/buffer.h"
 
 namespace tandem {
@@ -100,6 +98,10 @@ std::uint32_t blocks_for(std::uint64_t threads, std::uint32_t size) {
   return static_cast<std::uint32_t>((threads + size - 1) / size);
 }
 
+std::uint64_t nodes_over(std::uint64_t boxes) {
+  return nodes_of(tree_over(static_cast<std::uint32_t>(boxes), nullptr));
+}
+
 // So many blocks at most share the tests of each against each.
 constexpr std::uint32_t kMostDirectBlocks = 2048;
 
@@ -151,42 +153,46 @@ struct Kept {
   std::uint32_t of = 0;  // so many boxes or instances; 0: nothing is kept
   bool posed = false;    // of instances
   std::uint32_t free_count = 0;
-  GpuArray<std::uint32_t> list;  // of those that are not kept, then of those that are
-  GpuArray<Node> nodes;
-  GpuArray<Survey> survey;
   Tree tree = {};
+};
 
-  std::size_t bytes() const { return list.bytes() + nodes.bytes() + survey.bytes(); }
+// What the kernels write at their end, apart from each other.
+struct Outcome {
+  Counters counters;
+  alignas(128) GpuBroadPhaseReport report;
 };
 
 }  // namespace
 
-struct GpuBroadPhase::State {
-  GpuArray<WorldBox> boxes;
-  GpuArray<Key> keys[2];
-  GpuArray<Node> nodes;
-  GpuArray<unsigned long long> pairs, sorted_pairs;
-  GpuArray<unsigned char> sorting;  // CUB's
-  GpuArray<Survey> survey;
-  Kept kept;
-  GpuArray<Counters> counters;
+using gpu::Room;
+using gpu::RoomArray;
+
+struct BroadPhaseHost : gpu::GpuHost<Outcome, GpuBroadPhaseReport> {
   bool counters_are_fresh = false;  // a search that ends leaves them so
-  GpuArray<GpuBroadPhaseReport> report;
-  PinnedArray<GpuBroadPhaseReport> host_report;
-  GpuBroadPhaseCapacity capacity;
-  gpu::DeviceLimits limits = {};
-  cudaError_t error = cudaSuccess;
+  RoomArray<Survey> survey{*this};
 
-  // Of a call: true, or what went wrong is kept.
-  bool ok(cudaError_t result) {
-    if (result == cudaSuccess) return true;
-    error = result;
-    static_cast<void>(cudaGetLastError());  // later calls must not report it again
-    return false;
-  }
+  Room<std::uint32_t> of_boxes{*this};
+  RoomArray<Key> keys{of_boxes}, other_keys{of_boxes};
+  RoomArray<Node> nodes{of_boxes, nodes_over};
+  Room<std::uint32_t> of_pairs{*this};
+  RoomArray<unsigned long long> pairs{of_pairs};
+  RoomArray<unsigned long long> sorted_pairs{*this};
+  RoomArray<unsigned char> sorting{*this};  // CUB's
+  RoomArray<WorldBox> boxes{*this};         // of instances, or grown ones
+
+  Kept kept;
+  RoomArray<std::uint32_t> kept_list{*this};  // of those that are not kept, then of those that are
+  RoomArray<Node> kept_nodes{*this};
+  RoomArray<Survey> kept_survey{*this};
+
+  bool ok(cudaError_t result) { return GpuHost::keep(result) == Status::kOk; }
   Status failure() const { return status_of(error); }
+  GpuBroadPhaseCapacity capacity() const {
+    return {of_boxes.count(), of_pairs.count(), static_cast<std::uint32_t>(boxes.room()),
+            static_cast<std::uint32_t>(kept_list.room())};
+  }
 
-  bool reserve_fixed();
+  Status reserve(const GpuBroadPhaseCapacity& wanted, const GpuBroadPhaseOptions& options);
   bool reserve_boxes(std::uint32_t count);
   bool reserve_pairs(std::uint32_t count, bool sorted);
   bool reserve_sorting();
@@ -197,6 +203,7 @@ struct GpuBroadPhase::State {
   template <typename... Parameters, typename... Arguments>
   bool launch(std::uint32_t blocks, std::uint32_t threads, cudaStream_t stream, void (*kernel)(Parameters...),
               const Arguments&... arguments);
+  bool provide_fixed();
   bool refresh(cudaStream_t stream);
   bool begin(cudaStream_t stream) { return counters_are_fresh || refresh(stream); }
   void end(bool queued, cudaStream_t stream);
@@ -219,106 +226,97 @@ struct GpuBroadPhase::State {
   Status run(const Boxes& all, const GpuBroadPhaseOptions& options, const Call& call);
   Status list(std::span<const Motion> motion, cudaStream_t stream);
   template <typename Boxes>
-  Status keep(const Boxes& all, const WorldBox* boxes, std::span<const Motion> motion, cudaStream_t stream);
+  Status keep_fixed(const Boxes& all, const WorldBox* boxes, std::span<const Motion> motion,
+                    cudaStream_t stream);
   template <typename Enqueue>
-  Status find_all(GpuBroadPhase& self, GpuBroadPhaseCapacity wanted, const GpuBroadPhaseOptions& options,
-                  cudaStream_t stream, const Enqueue& enqueue);
+  Status find_all(GpuBroadPhaseCapacity wanted, const GpuBroadPhaseOptions& options, cudaStream_t stream,
+                  const Enqueue& enqueue);
 };
 
-bool GpuBroadPhase::State::refresh(cudaStream_t stream) {
-  return ok(cudaMemcpyAsync(counters.data(), &kFreshCounters, sizeof kFreshCounters, cudaMemcpyHostToDevice,
+bool BroadPhaseHost::refresh(cudaStream_t stream) {
+  return ok(cudaMemcpyAsync(&state->counters, &kFreshCounters, sizeof kFreshCounters, cudaMemcpyHostToDevice,
                             stream));
 }
 
 // What is captured has not run: the counters are as before.
-void GpuBroadPhase::State::end(bool queued, cudaStream_t stream) {
+void BroadPhaseHost::end(bool queued, cudaStream_t stream) {
   cudaStreamCaptureStatus capture = cudaStreamCaptureStatusNone;
   static_cast<void>(cudaStreamIsCapturing(stream, &capture));
   if (capture == cudaStreamCaptureStatusNone) counters_are_fresh = queued;
 }
 
-bool GpuBroadPhase::State::reserve_fixed() {
-  if (host_report.data() != nullptr) return true;
-  if (!ok(gpu::limits_of_device(limits)) || !ok(survey.reserve(1)) || !ok(counters.reserve(1)) ||
-      !ok(report.reserve(1)) || !ok(cudaMemset(report.data(), 0, report.bytes())) || !refresh(nullptr) ||
-      !ok(cudaStreamSynchronize(nullptr)) || !ok(host_report.reserve(1)))
-    return false;
-  *host_report = {};
-  counters_are_fresh = true;
-  return true;
+bool BroadPhaseHost::provide_fixed() {
+  const auto provide_rest = [&] {
+    const bool done = ok(survey.reserve(1)) &&
+                      ok(cudaMemset(&state->report, 0, sizeof(GpuBroadPhaseReport))) && refresh(nullptr) &&
+                      ok(cudaStreamSynchronize(nullptr));
+    counters_are_fresh = done;
+    return done ? Status::kOk : failure();
+  };
+  return provide_fixed_memory(provide_rest) == Status::kOk;
 }
 
-bool GpuBroadPhase::State::reserve_boxes(std::uint32_t count) {
-  if (count <= capacity.boxes) return true;
-  capacity.boxes = 0;
-  for (int i = 0; i < 2; ++i) {
-    if (!ok(keys[i].reserve(count))) return false;
-  }
-  if (!ok(nodes.reserve(nodes_of(tree_over(count, nullptr))))) return false;
-  capacity.boxes = count;
-  return reserve_sorting();
+bool BroadPhaseHost::reserve_boxes(std::uint32_t count) {
+  if (count <= of_boxes.count()) return true;
+  if (ok(of_boxes.fit(count)) && reserve_sorting()) return true;
+  of_boxes.forget();
+  return false;
 }
 
-bool GpuBroadPhase::State::reserve_pairs(std::uint32_t count, bool sorted) {
-  const std::uint32_t before = capacity.pairs;
-  if (count > before) {
-    capacity.pairs = 0;
-    if (!ok(pairs.reserve(count))) return false;
-    capacity.pairs = count;
-  }
-  if (!sorted || sorted_pairs.room() >= capacity.pairs) return true;
-  return ok(sorted_pairs.reserve(capacity.pairs)) && reserve_sorting();
+bool BroadPhaseHost::reserve_pairs(std::uint32_t count, bool sorted) {
+  if (!ok(of_pairs.fit(count))) return false;
+  if (!sorted || sorted_pairs.room() >= of_pairs.count()) return true;
+  return ok(sorted_pairs.reserve(of_pairs.count())) && reserve_sorting();
 }
 
-// Room for boxes of instances, or grown ones. What was kept in room that is too small now is lost.
-bool GpuBroadPhase::State::reserve_taken(std::uint32_t count) {
+// What was kept in room that is too small now is lost.
+bool BroadPhaseHost::reserve_taken(std::uint32_t count) {
   if (count > boxes.room() && kept.of != 0 && kept.posed) kept.of = Kept::kLost;
   return ok(boxes.reserve(count));
 }
 
-bool GpuBroadPhase::State::reserve_kept(std::uint32_t count, std::uint32_t fixed) {
-  return ok(kept.list.reserve(count)) && ok(kept.survey.reserve(1)) &&
-         ok(kept.nodes.reserve(nodes_of(tree_over(fixed, nullptr))));
+bool BroadPhaseHost::reserve_kept(std::uint32_t count, std::uint32_t fixed) {
+  return ok(kept_list.reserve(count)) && ok(kept_survey.reserve(1)) &&
+         ok(kept_nodes.reserve(nodes_over(fixed)));
 }
 
 // As much as sorting up to the capacity takes: CUB asks for a part that does not depend on the number, and
 // one that grows with it.
-bool GpuBroadPhase::State::reserve_sorting() {
+bool BroadPhaseHost::reserve_sorting() {
   std::size_t bytes = 0, pair_bytes = 0;
-  cub::DoubleBuffer<Key> key(keys[0].data(), keys[1].data());
-  if (!ok(cub::DeviceRadixSort::SortKeys(nullptr, bytes, key, capacity.boxes))) return false;
+  cub::DoubleBuffer<Key> key(keys.data(), other_keys.data());
+  if (!ok(cub::DeviceRadixSort::SortKeys(nullptr, bytes, key, of_boxes.count()))) return false;
   if (sorted_pairs.room() != 0) {
     cub::DoubleBuffer<unsigned long long> pair(pairs.data(), sorted_pairs.data());
-    if (!ok(cub::DeviceRadixSort::SortKeys(nullptr, pair_bytes, pair, capacity.pairs))) return false;
+    if (!ok(cub::DeviceRadixSort::SortKeys(nullptr, pair_bytes, pair, of_pairs.count()))) return false;
   }
   return ok(sorting.reserve(std::max(bytes, pair_bytes)));
 }
 
 // Why a call cannot be queued.
-Status GpuBroadPhase::State::refusal(std::uint32_t count, bool posed,
-                                     const GpuBroadPhaseOptions& options) const {
-  if (count > capacity.boxes || (options.sorted && sorted_pairs.room() < capacity.pairs) ||
-      !(options.within >= 0) || (options.within > 0 && count > boxes.room()))
+Status BroadPhaseHost::refusal(std::uint32_t count, bool posed, const GpuBroadPhaseOptions& options) const {
+  if (report.data() == nullptr || count > of_boxes.count() ||
+      (options.sorted && sorted_pairs.room() < of_pairs.count()) || !(options.within >= 0) ||
+      (options.within > 0 && count > boxes.room()))
     return Status::kOutOfRange;
   if (kept.of != 0 && (kept.of != count || kept.posed != posed)) return Status::kKeptMismatch;
   return options.filter.excluded.instances > count ? Status::kUnknownInstance : Status::kOk;
 }
 
-Output GpuBroadPhase::State::output(const Call& call) {
-  return {pairs.data(),         capacity.pairs,  call.sorted ? index_bits(call.numbers) : 0,
-          call.sorted ? 0 : 32, counters.data(), report.data(),
-          host_report.data()};
+Output BroadPhaseHost::output(const Call& call) {
+  return {pairs.data(),         of_pairs.count(), call.sorted ? index_bits(call.numbers) : 0,
+          call.sorted ? 0 : 32, &state->counters, &state->report,
+          report.data()};
 }
 
 template <typename... Parameters, typename... Arguments>
-bool GpuBroadPhase::State::launch(std::uint32_t blocks, std::uint32_t threads, cudaStream_t stream,
-                                  void (*kernel)(Parameters...), const Arguments&... arguments) {
+bool BroadPhaseHost::launch(std::uint32_t blocks, std::uint32_t threads, cudaStream_t stream,
+                            void (*kernel)(Parameters...), const Arguments&... arguments) {
   return ok(gpu::launch_after({blocks, threads, 0, stream, limits.early_launch}, kernel, arguments...));
 }
 
 template <typename Boxes, typename Rule>
-bool GpuBroadPhase::State::test_all(const Boxes& from, std::uint32_t count, const Rule& rule,
-                                    const Call& call) {
+bool BroadPhaseHost::test_all(const Boxes& from, std::uint32_t count, const Rule& rule, const Call& call) {
   const std::uint32_t tiles = std::max(blocks_for(count, kTile), 1u), tasks = tiles * (tiles + 1) / 2,
                       tasks_each = blocks_for(tasks, kMostDirectBlocks);
   return launch(blocks_for(tasks, tasks_each), kTileThreads, call.stream, collect_directly<Boxes, Rule>, from,
@@ -327,15 +325,14 @@ bool GpuBroadPhase::State::test_all(const Boxes& from, std::uint32_t count, cons
 
 // from: where the boxes of the tree come from.
 template <typename Boxes>
-bool GpuBroadPhase::State::make_tree(const Boxes& from, const Tree& tree, Survey* surveyed,
-                                     const Call& call) {
+bool BroadPhaseHost::make_tree(const Boxes& from, const Tree& tree, Survey* surveyed, const Call& call) {
   const std::uint32_t count = tree.count[0];
   const int bits = index_bits(call.numbers);
   if (!launch(4, kSamples * kThreadsPerSample, call.stream, survey_boxes<Boxes>, from, count, surveyed) ||
       !launch(blocks_for(count, 256), 256, call.stream, make_keys<Boxes>, from, count, bits, surveyed,
-              keys[0].data(), counters.data()))
+              keys.data(), &state->counters))
     return false;
-  cub::DoubleBuffer<Key> key(keys[0].data(), keys[1].data());
+  cub::DoubleBuffer<Key> key(keys.data(), other_keys.data());
   std::size_t bytes = sorting.room();
   if (!ok(cub::DeviceRadixSort::SortKeys(sorting.data(), bytes, key, count, first_bit(count, bits), 64,
                                          call.stream)))
@@ -347,14 +344,14 @@ bool GpuBroadPhase::State::make_tree(const Boxes& from, const Tree& tree, Survey
 }
 
 template <typename Boxes, typename Rule>
-bool GpuBroadPhase::State::collect_with_kept(const Boxes& from, const Rule& rule, const Call& call) {
+bool BroadPhaseHost::collect_with_kept(const Boxes& from, const Rule& rule, const Call& call) {
   const std::uint32_t blocks = std::min(blocks_for(kept.free_count, kKeptWarps), kMostKeptBlocks);
   return blocks == 0 || launch(blocks, kKeptWarps * kFanOut, call.stream, collect_kept<Boxes, Rule>, from,
-                               kept.free_count, kept.tree, kept.survey.data(), call.kept, rule, output(call));
+                               kept.free_count, kept.tree, kept_survey.data(), call.kept, rule, output(call));
 }
 
 template <typename Rule>
-bool GpuBroadPhase::State::collect(const Tree& tree, const Rule& rule, const Call& call) {
+bool BroadPhaseHost::collect(const Tree& tree, const Rule& rule, const Call& call) {
   const Output out = output(call);
   const std::uint32_t split = split_of(tree.count[1]);
   const std::uint32_t blocks = blocks_for(static_cast<std::uint64_t>(tree.count[1]) * split, kWarps);
@@ -364,23 +361,23 @@ bool GpuBroadPhase::State::collect(const Tree& tree, const Rule& rule, const Cal
 }
 
 // Sorts as many keys as there is room for, because the CPU does not know their number.
-bool GpuBroadPhase::State::sort_pairs(const Call& call) {
-  if (capacity.pairs == 0) return true;
+bool BroadPhaseHost::sort_pairs(const Call& call) {
+  const std::uint32_t room = of_pairs.count();
+  if (room == 0) return true;
   const int bits = index_bits(call.numbers);
-  const std::uint32_t blocks = blocks_for(capacity.pairs, 256);
-  if (!launch(blocks, 256, call.stream, fill_rest, pairs.data(), capacity.pairs, report.data())) return false;
+  const std::uint32_t blocks = blocks_for(room, 256);
+  if (!launch(blocks, 256, call.stream, fill_rest, pairs.data(), room, device_report())) return false;
   cub::DoubleBuffer<unsigned long long> key(pairs.data(), sorted_pairs.data());
   std::size_t bytes = sorting.room();
-  if (!ok(cub::DeviceRadixSort::SortKeys(sorting.data(), bytes, key, capacity.pairs, 0, 2 * bits,
-                                         call.stream)))
+  if (!ok(cub::DeviceRadixSort::SortKeys(sorting.data(), bytes, key, room, 0, 2 * bits, call.stream)))
     return false;
-  return launch(blocks, 256, call.stream, unpack_keys, key.Current(), capacity.pairs, bits,
-                reinterpret_cast<ObjectPair*>(pairs.data()), report.data());
+  return launch(blocks, 256, call.stream, unpack_keys, key.Current(), room, bits,
+                reinterpret_cast<ObjectPair*>(pairs.data()), device_report());
 }
 
 // The pairs with what is kept come first, because the last kernel of the others writes the report.
 template <typename Boxes, typename Rule>
-bool GpuBroadPhase::State::find(const Boxes& from, std::uint32_t count, const Rule& rule, const Call& call) {
+bool BroadPhaseHost::find(const Boxes& from, std::uint32_t count, const Rule& rule, const Call& call) {
   if constexpr (is_listed<Boxes>) {
     if (!collect_with_kept(from, rule, call)) return false;
   }
@@ -395,12 +392,12 @@ bool GpuBroadPhase::State::find(const Boxes& from, std::uint32_t count, const Ru
 
 // A middling number of instances is posed by a kernel of its own.
 template <typename Boxes, typename Rule>
-bool GpuBroadPhase::State::pose_and_find(const Boxes& from, std::uint32_t count, const Rule& rule,
-                                         const Call& call) {
+bool BroadPhaseHost::pose_and_find(const Boxes& from, std::uint32_t count, const Rule& rule,
+                                   const Call& call) {
   if constexpr (Boxes::kPosed) {
     if (count > kFewPosed && count <= kFewBoxes) {
       return launch(blocks_for(count, 256), 256, call.stream, pose_boxes<Boxes>, from, count,
-                    counters.data()) &&
+                    &state->counters) &&
              find(from.lying_at(boxes.data()), count, rule, call);
     }
   }
@@ -410,24 +407,24 @@ bool GpuBroadPhase::State::pose_and_find(const Boxes& from, std::uint32_t count,
 // Boxes within reach of each other meet when each is larger by half of it; or one by all of it where the
 // other is kept, which is kept for any reach.
 template <typename Boxes, typename Rule>
-bool GpuBroadPhase::State::grow_and_find(const Boxes& from, std::uint32_t count, const Rule& rule,
-                                         double within, Call call) {
+bool BroadPhaseHost::grow_and_find(const Boxes& from, std::uint32_t count, const Rule& rule, double within,
+                                   Call call) {
   if (!(within > 0)) return pose_and_find(from, count, rule, call);
   const double margin = is_listed<Boxes> ? within : 0.5 * within;
   call.boxes = boxes.data();
   return (count == 0 || launch(blocks_for(count, 256), 256, call.stream, grow_boxes<Boxes>, from, count,
-                               margin, boxes.data(), counters.data())) &&
+                               margin, boxes.data(), &state->counters)) &&
          find(from.lying_at(boxes.data()), count, rule, call);
 }
 
 // all: boxes or instances, the kept ones included.
 template <typename Boxes>
-Status GpuBroadPhase::State::run(const Boxes& all, const GpuBroadPhaseOptions& options, const Call& call) {
+Status BroadPhaseHost::run(const Boxes& all, const GpuBroadPhaseOptions& options, const Call& call) {
   const Status status = refusal(call.numbers, Boxes::kPosed, options);
   if (status != Status::kOk) return status;
   bool queued = begin(call.stream);
   if (queued && kept.of != 0) {
-    queued = grow_and_find(Listed<Boxes>{all, kept.list.data()}, kept.free_count,
+    queued = grow_and_find(Listed<Boxes>{all, kept_list.data()}, kept.free_count,
                            FilteredPairs{options.filter}, options.within, call);
   } else if (queued && !is_none(options.filter)) {
     queued = grow_and_find(all, call.numbers, FilteredPairs{options.filter}, options.within, call);
@@ -439,35 +436,35 @@ Status GpuBroadPhase::State::run(const Boxes& all, const GpuBroadPhaseOptions& o
 }
 
 // Uploads what motions say of which boxes are kept, and waits.
-Status GpuBroadPhase::State::list(std::span<const Motion> motion, cudaStream_t stream) {
+Status BroadPhaseHost::list(std::span<const Motion> motion, cudaStream_t stream) {
   Buffer<std::uint32_t> numbers;
   if (!numbers.resize(motion.size())) return Status::kOutOfMemory;
   std::uint32_t free_end = 0, end = kept.free_count;
   for (std::uint32_t i = 0; i < motion.size(); ++i)
     numbers[motion[i] == Motion::fixed ? end++ : free_end++] = i;
-  const bool uploaded = ok(kept.list.upload(numbers.view(), stream)) && ok(cudaStreamSynchronize(stream));
+  const bool uploaded = ok(kept_list.upload(numbers.view(), stream)) && ok(cudaStreamSynchronize(stream));
   return uploaded ? Status::kOk : failure();
 }
 
 // lie: where the boxes of those that are kept are to be found.
 template <typename Boxes>
-Status GpuBroadPhase::State::keep(const Boxes& all, const WorldBox* lie, std::span<const Motion> motion,
+Status BroadPhaseHost::keep_fixed(const Boxes& all, const WorldBox* lie, std::span<const Motion> motion,
                                   cudaStream_t stream) {
   const auto count = static_cast<std::uint32_t>(motion.size());
   const auto fixed = static_cast<std::uint32_t>(std::count(motion.begin(), motion.end(), Motion::fixed));
   if (fixed == 0) return Status::kOk;
   kept.free_count = count - fixed;
-  if (!reserve_fixed() || !reserve_boxes(count) || !reserve_kept(count, fixed)) return failure();
+  if (!provide_fixed() || !reserve_boxes(count) || !reserve_kept(count, fixed)) return failure();
   if (const Status status = list(motion, stream); status != Status::kOk) return status;
-  kept.tree = tree_over(fixed, kept.nodes.data());
+  kept.tree = tree_over(fixed, kept_nodes.data());
   const Call call = {count, lie, lie, false, stream};
   const bool queued = begin(stream) &&
-                      make_tree(Listed<Boxes>{all, kept.list.data() + kept.free_count}, kept.tree,
-                                kept.survey.data(), call) &&
+                      make_tree(Listed<Boxes>{all, kept_list.data() + kept.free_count}, kept.tree,
+                                kept_survey.data(), call) &&
                       launch(1, 1, stream, report_pairs, output(call));
   end(queued, stream);
   if (!queued || !ok(cudaStreamSynchronize(stream))) return failure();
-  if (host_report->status != Status::kOk) return host_report->status;
+  if (report->status != Status::kOk) return report->status;
   kept.of = count;
   kept.posed = Boxes::kPosed;
   return Status::kOk;
@@ -475,123 +472,85 @@ Status GpuBroadPhase::State::keep(const Boxes& all, const WorldBox* lie, std::sp
 
 // The first guess of room is four pairs for each box.
 template <typename Enqueue>
-Status GpuBroadPhase::State::find_all(GpuBroadPhase& self, GpuBroadPhaseCapacity wanted,
-                                      const GpuBroadPhaseOptions& options, cudaStream_t stream,
-                                      const Enqueue& enqueue) {
-  std::uint64_t room = capacity.pairs > 0 ? capacity.pairs : 4ull * wanted.boxes + 1024;
-  for (;;) {
-    wanted.pairs = static_cast<std::uint32_t>(std::min<std::uint64_t>(room, kNoIndex - 1));
-    if (const Status status = self.reserve(wanted, options); status != Status::kOk) return status;
-    if (const Status status = enqueue(); status != Status::kOk) return status;
-    if (!ok(cudaStreamSynchronize(stream))) return failure();
-    const GpuBroadPhaseReport& told = *host_report;
-    if (told.status != Status::kOk || told.complete != 0) return told.status;
-    if (told.found >= kNoIndex) return Status::kTooManyPairs;
-    room = told.found + told.found / 4;
-  }
+Status BroadPhaseHost::find_all(GpuBroadPhaseCapacity first, const GpuBroadPhaseOptions& options,
+                                cudaStream_t stream, const Enqueue& enqueue) {
+  const auto pairs_of = [](std::uint64_t room) {
+    return static_cast<std::uint32_t>(std::min<std::uint64_t>(room, kNoIndex - 1));
+  };
+  first.pairs = of_pairs.count() > 0 ? of_pairs.count() : pairs_of(4ull * first.boxes + 1024);
+  return gpu::find_until_complete(*this, first, options, stream, enqueue,
+                                  [&](const GpuBroadPhaseReport& told, GpuBroadPhaseCapacity& wanted) {
+                                    wanted.pairs = pairs_of(told.found + told.found / 4);
+                                    return told.found >= kNoIndex ? Status::kTooManyPairs : Status::kOk;
+                                  });
 }
 
-GpuBroadPhase::GpuBroadPhase() = default;
-GpuBroadPhase::GpuBroadPhase(GpuBroadPhase&&) noexcept = default;
-GpuBroadPhase& GpuBroadPhase::operator=(GpuBroadPhase&&) noexcept = default;
-GpuBroadPhase::~GpuBroadPhase() = default;
-
-bool GpuBroadPhase::provide_state() {
-  if (state_ == nullptr) state_.reset(new (std::nothrow) State);
-  return state_ != nullptr;
+Status BroadPhaseHost::reserve(const GpuBroadPhaseCapacity& wanted, const GpuBroadPhaseOptions& options) {
+  if (wanted.boxes == kNoIndex) return Status::kOutOfRange;
+  const bool enough = provide_fixed() && reserve_boxes(wanted.boxes) &&
+                      reserve_pairs(wanted.pairs, options.sorted) &&
+                      reserve_taken(std::max(wanted.instances, options.within > 0 ? wanted.boxes : 0));
+  return enough ? Status::kOk : failure();
 }
 
-Status GpuBroadPhase::reserve(const GpuBroadPhaseCapacity& capacity, const GpuBroadPhaseOptions& options) {
-  if (capacity.boxes == kNoIndex) return Status::kOutOfRange;
-  if (!provide_state()) return Status::kOutOfMemory;
-  const bool enough =
-      state_->reserve_fixed() && state_->reserve_boxes(capacity.boxes) &&
-      state_->reserve_pairs(capacity.pairs, options.sorted) &&
-      state_->reserve_taken(std::max(capacity.instances, options.within > 0 ? capacity.boxes : 0));
-  return enough ? Status::kOk : state_->failure();
-}
+struct GpuBroadPhaseKind::Host : BroadPhaseHost {};
+template class GpuQuestion<GpuBroadPhaseKind>;
 
 Status GpuBroadPhase::keep_fixed(const WorldBox* boxes, std::span<const Motion> motion, cudaStream_t stream) {
-  if (!provide_state()) return Status::kOutOfMemory;
-  state_->kept.of = 0;
+  if (host_ == nullptr) return Status::kOutOfMemory;
+  host_->kept.of = 0;
   if (motion.size() >= kNoIndex) return Status::kOutOfRange;
   if (reinterpret_cast<std::uintptr_t>(boxes) % 16 != 0) return Status::kMisaligned;
-  return state_->keep(GivenBoxes{boxes}, boxes, motion, stream);
+  return host_->keep_fixed(GivenBoxes{boxes}, boxes, motion, stream);
 }
 
 Status GpuBroadPhase::keep_fixed(const GpuInstances& instances, const GpuAssetBounds& assets,
                                  std::span<const Motion> motion, cudaStream_t stream) {
-  if (!provide_state()) return Status::kOutOfMemory;
-  State& state = *state_;
-  state.kept.of = 0;
+  if (host_ == nullptr) return Status::kOutOfMemory;
+  BroadPhaseHost& host = *host_;
+  host.kept.of = 0;
   if (motion.size() != instances.count) return Status::kKeptMismatch;
-  if (!state.reserve_taken(instances.count)) return state.failure();
-  WorldBox* const boxes = state.boxes.data();
-  return state.keep(PosedBoxes{instances, assets, boxes}, boxes, motion, stream);
+  if (!host.reserve_taken(instances.count)) return host.failure();
+  WorldBox* const boxes = host.boxes.data();
+  return host.keep_fixed(PosedBoxes{instances, assets, boxes}, boxes, motion, stream);
 }
 
 Status GpuBroadPhase::enqueue(const WorldBox* boxes, std::uint32_t count, const GpuBroadPhaseOptions& options,
                               cudaStream_t stream) {
-  if (state_ == nullptr) return Status::kOutOfRange;
+  if (host_ == nullptr) return Status::kOutOfRange;
   if (reinterpret_cast<std::uintptr_t>(boxes) % 16 != 0) return Status::kMisaligned;
-  return state_->run(GivenBoxes{boxes}, options, {count, boxes, boxes, options.sorted, stream});
+  return host_->run(GivenBoxes{boxes}, options, {count, boxes, boxes, options.sorted, stream});
 }
 
 Status GpuBroadPhase::enqueue(const GpuInstances& instances, const GpuAssetBounds& assets,
                               const GpuBroadPhaseOptions& options, cudaStream_t stream) {
-  if (state_ == nullptr || instances.count > state_->boxes.room()) return Status::kOutOfRange;
-  WorldBox* const boxes = state_->boxes.data();
-  return state_->run(PosedBoxes{instances, assets, boxes}, options,
-                     {instances.count, boxes, boxes, options.sorted, stream});
+  if (host_ == nullptr || instances.count > host_->boxes.room()) return Status::kOutOfRange;
+  WorldBox* const boxes = host_->boxes.data();
+  return host_->run(PosedBoxes{instances, assets, boxes}, options,
+                    {instances.count, boxes, boxes, options.sorted, stream});
 }
 
 Status GpuBroadPhase::find_pairs(const WorldBox* boxes, std::uint32_t count,
                                  const GpuBroadPhaseOptions& options, cudaStream_t stream) {
-  if (!provide_state()) return Status::kOutOfMemory;
-  return state_->find_all(*this, {count, 0, 0}, options, stream,
-                          [&] { return enqueue(boxes, count, options, stream); });
+  if (host_ == nullptr) return Status::kOutOfMemory;
+  return host_->find_all({count, 0, 0}, options, stream,
+                         [&] { return enqueue(boxes, count, options, stream); });
 }
 
 Status GpuBroadPhase::find_pairs(const GpuInstances& instances, const GpuAssetBounds& assets,
                                  const GpuBroadPhaseOptions& options, cudaStream_t stream) {
-  if (!provide_state()) return Status::kOutOfMemory;
-  return state_->find_all(*this, {instances.count, 0, instances.count}, options, stream,
-                          [&] { return enqueue(instances, assets, options, stream); });
+  if (host_ == nullptr) return Status::kOutOfMemory;
+  return host_->find_all({instances.count, 0, instances.count}, options, stream,
+                         [&] { return enqueue(instances, assets, options, stream); });
 }
 
 GpuPairs GpuBroadPhase::pairs() const {
-  return {reinterpret_cast<const ObjectPair*>(state_->pairs.data()), &state_->report->count,
-          state_->capacity.pairs};
+  return {reinterpret_cast<const ObjectPair*>(host_->pairs.data()), &host_->device_report()->count,
+          host_->of_pairs.count()};
 }
 
 const WorldBox* GpuBroadPhase::boxes() const {
-  return state_->boxes.data();
-}
-const GpuBroadPhaseReport* GpuBroadPhase::device_report() const {
-  return state_->report.data();
-}
-const GpuBroadPhaseReport& GpuBroadPhase::report() const {
-  return *state_->host_report;
-}
-
-GpuBroadPhaseCapacity GpuBroadPhase::capacity() const {
-  if (state_ == nullptr) return {};
-  GpuBroadPhaseCapacity capacity = state_->capacity;
-  capacity.instances = static_cast<std::uint32_t>(state_->boxes.room());
-  capacity.kept = static_cast<std::uint32_t>(state_->kept.list.room());
-  return capacity;
-}
-
-std::size_t GpuBroadPhase::bytes() const {
-  if (state_ == nullptr) return 0;
-  const State& s = *state_;
-  return s.boxes.bytes() + s.kept.bytes() + s.keys[0].bytes() + s.keys[1].bytes() + s.nodes.bytes() +
-         s.pairs.bytes() + s.sorted_pairs.bytes() + s.sorting.bytes() + s.survey.bytes() +
-         s.counters.bytes() + s.report.bytes();
-}
-
-cudaError_t GpuBroadPhase::cuda_error() const {
-  return state_ == nullptr ? cudaSuccess : state_->error;
+  return host_->boxes.data();
 }
 
 }  // namespace tandem

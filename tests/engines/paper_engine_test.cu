@@ -30,21 +30,6 @@ std::vector<Contact> contacts_of(const PaperEngine& engine) {
   return sorted(download(engine.contacts(), engine.report().counters.contacts));
 }
 
-struct CpuAnswer {
-  Status status;
-  std::uint64_t where;
-  std::vector<Contact> contacts;
-  ContactCounters counters;
-};
-
-CpuAnswer ask_cpu(const BodyScene& scene, const std::vector<ObjectPair>& pairs) {
-  ContactQuery query;
-  EXPECT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-  const Status status = query.find_contacts(scene.instances, pairs, {});
-  return {status, query.where(), sorted({query.contacts().begin(), query.contacts().end()}),
-          query.counters()};
-}
-
 Status ask(PaperEngine& engine, const GpuScene& scene, const PaperOptions& options) {
   const Status status = engine.find_contacts(scene.instances(), scene.pairs(), options, nullptr);
   EXPECT_EQ(engine.cuda_error(), cudaSuccess) << cudaGetErrorString(engine.cuda_error());
@@ -60,7 +45,7 @@ PaperEngine engine_of(const GpuScene& scene) {
 }
 
 /// The exact contacts, by every way of storing flags.
-void expect_contacts(PaperEngine& engine, const GpuScene& scene, const CpuAnswer& expected) {
+void expect_contacts(PaperEngine& engine, const GpuScene& scene, const test::ContactAnswer& expected) {
   std::uint64_t block_pairs = 0;
   for (const PaperFlags flags : kFlags) {
     SCOPED_TRACE(testing::Message() << "flags " << static_cast<int>(flags));
@@ -76,7 +61,7 @@ void expect_contacts(PaperEngine& engine, const GpuScene& scene, const CpuAnswer
 }
 
 void expect_contacts_of(const BodyScene& scene, const std::vector<ObjectPair>& pairs) {
-  const CpuAnswer expected = ask_cpu(scene, pairs);
+  const test::ContactAnswer expected = test::ask_cpu(scene, pairs);
   const GpuScene on_gpu(scene.assets, scene.instances, pairs);
   PaperEngine engine = engine_of(on_gpu);
   if (expected.status == Status::kOk) return expect_contacts(engine, on_gpu, expected);
@@ -140,7 +125,7 @@ TEST_F(PaperContacts, OfAPileAreThoseOfTheCpu) {
   RandomPoses random(2);
   const BodyScene scene = pile(150, 3000, 4, 7);
   const auto pairs = all_pairs(scene.instances, false, random);
-  EXPECT_GT(ask_cpu(scene, pairs).contacts.size(), 10000u);
+  EXPECT_GT(test::ask_cpu(scene, pairs).contacts.size(), 10000u);
   expect_contacts_of(scene, pairs);
 }
 
@@ -148,7 +133,7 @@ TEST_F(PaperContacts, OfAnExactStackAreThoseOfTheCpu) {
   RandomPoses random(3);
   const BodyScene scene = stack(4, 3);
   const auto pairs = all_pairs(scene.instances, true, random);
-  EXPECT_GT(ask_cpu(scene, pairs).contacts.size(), 10000u);
+  EXPECT_GT(test::ask_cpu(scene, pairs).contacts.size(), 10000u);
   expect_contacts_of(scene, pairs);
 }
 
@@ -193,7 +178,7 @@ TEST_F(PaperContacts, OfBoxesIncludeAllContacts) {
   RandomPoses random(5);
   const BodyScene scene = pile(60, 800, 3, 9);
   const auto pairs = all_pairs(scene.instances, true, random);
-  const CpuAnswer expected = ask_cpu(scene, pairs);
+  const test::ContactAnswer expected = test::ask_cpu(scene, pairs);
   const GpuScene on_gpu(scene.assets, scene.instances, pairs);
   PaperEngine engine = engine_of(on_gpu);
   ASSERT_EQ(ask(engine, on_gpu, {QueryMode::boxes, PaperFlags::bits}), Status::kOk);
@@ -210,7 +195,7 @@ TEST_F(PaperContacts, OfLargerAndLargerScenesNeedNoNewEngine) {
   for (const std::uint32_t bodies : {4u, 30u, 90u}) {
     const BodyScene scene = pile(bodies, 800, 2, 10);
     const auto pairs = all_pairs(scene.instances, false, random);
-    const CpuAnswer expected = ask_cpu(scene, pairs);
+    const test::ContactAnswer expected = test::ask_cpu(scene, pairs);
     const GpuScene on_gpu(scene.assets, scene.instances, pairs);
     ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk);
     expect_contacts(engine, on_gpu, expected);
@@ -223,7 +208,7 @@ TEST_F(PaperContacts, OfLargerAndLargerScenesNeedNoNewEngine) {
   const auto pairs = all_pairs(small.instances, false, random);
   const GpuScene on_gpu(small.assets, small.instances, pairs);
   ASSERT_EQ(engine.set_assets(on_gpu.assets(), nullptr), Status::kOk);
-  expect_contacts(engine, on_gpu, ask_cpu(small, pairs));
+  expect_contacts(engine, on_gpu, test::ask_cpu(small, pairs));
 }
 
 TEST_F(PaperContacts, OfNothingAreNone) {
@@ -243,7 +228,7 @@ TEST_F(PaperContacts, NameWhatIsWrong) {
   std::vector<ObjectPair> pairs;
   for (std::uint32_t i = 1; i < 50; ++i) pairs.push_back({0, i});
   const auto expect = [&](Status status, std::uint64_t where) {
-    const CpuAnswer expected = ask_cpu(scene, pairs);
+    const test::ContactAnswer expected = test::ask_cpu(scene, pairs);
     EXPECT_EQ(expected.status, status);
     EXPECT_EQ(expected.where, where);
     expect_contacts_of(scene, pairs);

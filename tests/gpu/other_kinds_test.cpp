@@ -44,13 +44,8 @@ class GpuOfKind : public test::GpuTestOf<Kind> {
       ASSERT_EQ(gpu.set_assets(on_gpu.assets(), nullptr), Status::kOk);
     }
     EXPECT_GE(gpu.bytes(), 512 * gpu::most_mailboxes(GetParam().limits));
-    ContactQuery cpu;
-    ASSERT_EQ(cpu.set_assets(scene.assets.views()), Status::kOk);
-    for (const QueryMode mode : {QueryMode::exact, QueryMode::fast, QueryMode::boxes}) {
-      ContactOptions options;
-      options.mode = mode;
-      ASSERT_EQ(cpu.find_contacts(scene.instances, pairs, options), Status::kOk);
-      const std::vector<Contact> expected = test::sorted({cpu.contacts().begin(), cpu.contacts().end()});
+    for (const QueryMode mode : test::kModes) {
+      const std::vector<Contact> expected = test::ask_cpu(scene, pairs, {.mode = mode}).contacts;
       ASSERT_GT(expected.size(), 10'000u);
       for (int repeat = 0; repeat < 3; ++repeat) {
         ASSERT_EQ(gpu.find_contacts(on_gpu.instances(), on_gpu.pairs(), test::gpu_options(mode), nullptr),
@@ -102,15 +97,12 @@ Pairs sorted_pairs_of(GpuBroadPhase& broad, const GpuScene& scene, const GpuAsse
 TEST_P(GpuOfKind, FindsObjectPairs) {
   const BodyScene scene = test::pile(20'000, 12, 30, 54);
   const GpuScene on_gpu(scene.assets, scene.instances, {});
-  std::vector<AssetBounds> bounds;
-  for (const AssetView& view : scene.assets.views()) bounds.push_back(asset_bounds(*view.header));
-  const GpuArray<AssetBounds> gpu_bounds = test::on_gpu(bounds);
-  const GpuAssetBounds assets = {gpu_bounds.data(), static_cast<std::uint32_t>(bounds.size())};
+  const test::GpuBounds bounds(scene.assets);
   GpuBroadPhase as_it_is, other;
-  const Pairs expected = sorted_pairs_of(as_it_is, on_gpu, assets);
+  const Pairs expected = sorted_pairs_of(as_it_is, on_gpu, bounds.view());
   ASSERT_GT(expected.size(), 1000u);
   const gpu::PretendedDevice pretended(GetParam().limits);
-  EXPECT_EQ(sorted_pairs_of(other, on_gpu, assets), expected);
+  EXPECT_EQ(sorted_pairs_of(other, on_gpu, bounds.view()), expected);
 }
 
 INSTANTIATE_TEST_SUITE_P(, GpuOfKind, testing::ValuesIn(kKinds),

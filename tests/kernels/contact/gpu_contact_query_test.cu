@@ -1,86 +1,41 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cctype>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
-#include <map>
-#include <memory>
 #include <thread>
-#include <tuple>
 #include <vector>
 
 #include "gpu/gpu_scene_fixture.h"
+#include "kernels/contact/only_walk.h"
 #include "kernels/geometry/triangle_test.h"
-#include "kernels/query_scenes.h"
 #include "kernels/triangle_families.h"
-#include "tandem/kernels/contact_query.h"
-#include "tandem/kernels/gpu_contact_query.h"
-#include "tandem/runtime/upload.h"
 
 namespace tandem {
 namespace {
 
 using test::all_pairs;
+using test::AskedContacts;
 using test::BodyScene;
-using test::download;
-using test::GpuScene;
-using test::on_gpu;
+using test::ContactAnswer;
+using test::kModes;
 using test::pile;
 using test::RandomPoses;
-using test::sorted;
-
-constexpr QueryMode kModes[] = {QueryMode::exact, QueryMode::fast, QueryMode::boxes};
-
-std::vector<Contact> contacts_of(const GpuContactQuery& query) {
-  return sorted(download(query.contacts(), query.report().contacts));
-}
 
 /// Both answers to the same question.
 struct Answers {
-  Status cpu_status, gpu_status;
-  std::uint64_t cpu_where = 0, gpu_where = 0;
-  std::vector<Contact> cpu, gpu;
-  ContactCounters cpu_counters, gpu_counters;
+  ContactAnswer cpu, gpu;
 };
 
-Answers ask(const test::SampleAssets& assets, const std::vector<Instance>& instances,
-            const std::vector<ObjectPair>& pairs, QueryMode mode, bool first_contact_only = false) {
-  Answers out;
-  ContactQuery cpu;
-  EXPECT_EQ(cpu.set_assets(assets.views()), Status::kOk);
-  ContactOptions options;
-  options.mode = mode;
-  options.first_contact_only = first_contact_only;
-  out.cpu_status = cpu.find_contacts(instances, pairs, options);
-  out.cpu_where = cpu.where();
-  out.cpu = sorted({cpu.contacts().begin(), cpu.contacts().end()});
-  out.cpu_counters = cpu.counters();
-
-  const GpuScene scene(assets, instances, pairs);
-  GpuContactQuery gpu;
-  EXPECT_EQ(gpu.set_assets(scene.assets(), nullptr), Status::kOk) << cudaGetErrorString(gpu.cuda_error());
-  const GpuContactOptions gpu_options = test::gpu_options(mode, first_contact_only);
-  out.gpu_status = gpu.find_contacts(scene.instances(), scene.pairs(), gpu_options, nullptr);
-  EXPECT_EQ(gpu.cuda_error(), cudaSuccess) << cudaGetErrorString(gpu.cuda_error());
-  out.gpu_where = gpu.report().where;
-  out.gpu = contacts_of(gpu);
-  out.gpu_counters = gpu.report().counters;
-  return out;
+Answers ask(const BodyScene& scene, const std::vector<ObjectPair>& pairs, QueryMode mode = QueryMode::exact,
+            bool first_contact_only = false) {
+  return {test::ask_cpu(scene, pairs, {.mode = mode, .first_contact_only = first_contact_only}),
+          test::ask_gpu(scene, pairs, test::gpu_options(mode, first_contact_only))};
 }
 
 void expect_equal(const Answers& answers, QueryMode mode) {
-  ASSERT_EQ(answers.gpu_status, answers.cpu_status);
-  if (answers.cpu_status != Status::kOk) EXPECT_EQ(answers.gpu_where, answers.cpu_where);
-  ASSERT_EQ(answers.gpu.size(), answers.cpu.size());
-  EXPECT_EQ(answers.gpu, answers.cpu);
-  EXPECT_EQ(answers.gpu_counters.contacts, answers.cpu_counters.contacts);
-  EXPECT_EQ(answers.gpu_counters.object_pairs, answers.cpu_counters.object_pairs);
-  if (mode == QueryMode::exact) return;  // fused operations may shift candidates within the slack
-  EXPECT_EQ(answers.gpu_counters.block_pairs, answers.cpu_counters.block_pairs);
-  EXPECT_EQ(answers.gpu_counters.candidates, answers.cpu_counters.candidates);
-  EXPECT_EQ(answers.gpu_counters.decided_by_float32, answers.cpu_counters.decided_by_float32);
+  test::expect_equal(answers.gpu, answers.cpu, mode);
 }
 
 class GpuContacts : public test::GpuTest {};
@@ -95,7 +50,7 @@ TEST_P(GpuContactsOf, AreThoseOfTheCpu) {
     for (const QueryMode mode : kModes) {
       SCOPED_TRACE(testing::Message() << "trial " << trial << " mode " << static_cast<int>(mode) << '\n'
                                       << test::text(scene));
-      expect_equal(ask(scene.assets, scene.instances, pairs, mode), mode);
+      expect_equal(ask(scene, pairs, mode), mode);
       if (HasFatalFailure() || HasNonfatalFailure()) return;
     }
   }
@@ -109,8 +64,8 @@ TEST_F(GpuContacts, OfAPileAreThoseOfTheCpu) {
   const BodyScene scene = pile(150, 3000, 4, 7);
   const auto pairs = all_pairs(scene.instances, false, random);
   for (const QueryMode mode : kModes) {
-    const Answers answers = ask(scene.assets, scene.instances, pairs, mode);
-    EXPECT_GT(answers.cpu.size(), 10000u);
+    const Answers answers = ask(scene, pairs, mode);
+    EXPECT_GT(answers.cpu.contacts.size(), 10000u);
     expect_equal(answers, mode);
   }
 }
@@ -126,8 +81,8 @@ TEST_F(GpuContacts, OfCoincidentBodiesAreThoseOfTheCpu) {
   for (const std::vector<ObjectPair>& pairs :
        {std::vector<ObjectPair>{{0, 1}}, std::vector<ObjectPair>{{3, 2}, {1, 1}}}) {
     for (const QueryMode mode : kModes) {
-      const Answers answers = ask(scene.assets, scene.instances, pairs, mode);
-      EXPECT_GT(answers.cpu.size(), 10000u);
+      const Answers answers = ask(scene, pairs, mode);
+      EXPECT_GT(answers.cpu.contacts.size(), 10000u);
       expect_equal(answers, mode);
     }
   }
@@ -141,8 +96,8 @@ TEST_F(GpuContacts, OfRepeatedTrianglesAreAllPairs) {
   scene.assets.add(mesh);
   scene.instances = {{0, kIdentityPose}, {0, kIdentityPose}};
   for (const QueryMode mode : {QueryMode::exact, QueryMode::boxes}) {
-    const Answers answers = ask(scene.assets, scene.instances, {{0, 1}}, mode);
-    EXPECT_EQ(answers.gpu.size(), 700u * 700u);
+    const Answers answers = ask(scene, {{0, 1}}, mode);
+    EXPECT_EQ(answers.gpu.contacts.size(), 700u * 700u);
     expect_equal(answers, mode);
   }
 }
@@ -153,7 +108,7 @@ TEST_F(GpuContacts, FarAwayAreThoseOfTheCpu) {
     BodyScene scene = pile(20, far > 1e10 ? 40 : 1000, 1, 8);
     for (Instance& instance : scene.instances) instance.pose.translation[1] += far;
     const auto pairs = all_pairs(scene.instances, false, random);
-    for (const QueryMode mode : kModes) expect_equal(ask(scene.assets, scene.instances, pairs, mode), mode);
+    for (const QueryMode mode : kModes) expect_equal(ask(scene, pairs, mode), mode);
   }
 }
 
@@ -162,17 +117,11 @@ TEST_F(GpuContacts, FirstOnesAreOfThePairsThatHaveAny) {
   const BodyScene scene = pile(60, 800, 3, 9);
   const auto pairs = all_pairs(scene.instances, false, random);
   for (const QueryMode mode : kModes) {
-    const Answers all = ask(scene.assets, scene.instances, pairs, mode);
-    const Answers first = ask(scene.assets, scene.instances, pairs, mode, true);
-    std::map<std::uint32_t, int> wanted, found;
-    for (const Contact& contact : all.cpu) wanted[contact.pair] = 1;
-    for (const Contact& contact : first.gpu) {
-      ++found[contact.pair];
-      EXPECT_TRUE(std::binary_search(all.cpu.begin(), all.cpu.end(), contact, test::comes_before));
-    }
-    EXPECT_EQ(found, wanted);
-    EXPECT_EQ(first.gpu_counters.contacts, wanted.size());
-    EXPECT_LE(first.gpu_counters.block_pairs, all.gpu_counters.block_pairs);
+    const Answers all = ask(scene, pairs, mode);
+    const Answers first = ask(scene, pairs, mode, true);
+    test::expect_one_of_each_pair(first.gpu.contacts, all.cpu.contacts);
+    EXPECT_EQ(first.gpu.counters.contacts, first.gpu.contacts.size());
+    EXPECT_LE(first.gpu.counters.block_pairs, all.gpu.counters.block_pairs);
   }
 }
 
@@ -182,11 +131,11 @@ TEST_F(GpuContacts, OfASmallSceneInEveryMode) {
   const BodyScene scene = pile(10, 150, 0.7, 15);
   const auto pairs = all_pairs(scene.instances, true, random);
   for (const QueryMode mode : kModes) {
-    const Answers all = ask(scene.assets, scene.instances, pairs, mode);
-    EXPECT_GT(all.cpu.size(), 100u);
+    const Answers all = ask(scene, pairs, mode);
+    EXPECT_GT(all.cpu.contacts.size(), 100u);
     expect_equal(all, mode);
-    const Answers first = ask(scene.assets, scene.instances, pairs, mode, true);
-    EXPECT_EQ(first.gpu.size(), first.cpu.size());
+    const Answers first = ask(scene, pairs, mode, true);
+    EXPECT_EQ(first.gpu.contacts.size(), first.cpu.contacts.size());
   }
 }
 
@@ -194,58 +143,50 @@ TEST_F(GpuContacts, ThatDoNotFitAreAskedForAndFoundOnTheRetry) {
   RandomPoses random(6);
   const BodyScene scene = pile(40, 800, 2, 10);
   const auto pairs = all_pairs(scene.instances, false, random);
-  const GpuScene on_gpu(scene.assets, scene.instances, pairs);
-  const Answers expected = ask(scene.assets, scene.instances, pairs, QueryMode::exact);
-  GpuContactQuery query;
-  ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
-  ASSERT_EQ(query.reserve({10, 100, 0}), Status::kOk);
-  ASSERT_EQ(query.enqueue(on_gpu.instances(), on_gpu.pairs(), {}, nullptr), Status::kOk);
-  ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
-  EXPECT_EQ(query.report().status, Status::kOk);
-  EXPECT_EQ(query.report().complete, 0u);
-  EXPECT_EQ(query.report().needed.pairs, pairs.size());
-  EXPECT_LE(query.report().contacts, 100u);
+  const std::vector<Contact> expected = ask(scene, pairs).cpu.contacts;
+  AskedContacts gpu(scene, pairs);
+  ASSERT_EQ(gpu.query.reserve({10, 100, 0}), Status::kOk);
+  gpu.run(GpuContactOptions{});
+  EXPECT_EQ(gpu.report().status, Status::kOk);
+  EXPECT_EQ(gpu.report().complete, 0u);
+  EXPECT_EQ(gpu.report().needed.pairs, pairs.size());
+  EXPECT_LE(gpu.report().contacts, 100u);
 
-  ASSERT_EQ(query.reserve({query.report().needed.pairs, 100, 0}), Status::kOk);
-  ASSERT_EQ(query.enqueue(on_gpu.instances(), on_gpu.pairs(), {}, nullptr), Status::kOk);
-  ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
-  EXPECT_EQ(query.report().complete, 0u);
-  EXPECT_EQ(query.report().contacts, 100u);
-  EXPECT_GT(query.report().needed.contacts, 100u);
-  EXPECT_LE(query.report().needed.contacts, expected.cpu.size());
+  ASSERT_EQ(gpu.query.reserve({gpu.report().needed.pairs, 100, 0}), Status::kOk);
+  gpu.run(GpuContactOptions{});
+  EXPECT_EQ(gpu.report().complete, 0u);
+  EXPECT_EQ(gpu.report().contacts, 100u);
+  EXPECT_GT(gpu.report().needed.contacts, 100u);
+  EXPECT_LE(gpu.report().needed.contacts, expected.size());
 
-  ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, nullptr), Status::kOk);
-  EXPECT_EQ(query.report().complete, 1u);
-  EXPECT_EQ(contacts_of(query), expected.cpu);
-  const GpuContactCapacity settled = query.capacity();
-  ASSERT_EQ(query.enqueue(on_gpu.instances(), on_gpu.pairs(), {}, nullptr), Status::kOk);
-  ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
-  EXPECT_EQ(query.report().complete, 1u);
-  EXPECT_EQ(contacts_of(query), expected.cpu);
-  EXPECT_EQ(query.capacity().contacts, settled.contacts);
+  ASSERT_EQ(gpu.find(), Status::kOk);
+  const GpuContactCapacity settled = gpu.query.capacity();
+  for (int run = 0; run < 2; ++run) {
+    EXPECT_EQ(gpu.report().complete, 1u);
+    EXPECT_EQ(gpu.contacts(), expected);
+    gpu.run(GpuContactOptions{});
+  }
+  EXPECT_EQ(gpu.query.capacity().contacts, settled.contacts);
 }
 
 TEST_F(GpuContacts, OfMorePairsThanTheirArrayHoldsAreNotComplete) {
   const BodyScene scene = pile(4, 100, 1, 11);
-  const GpuScene on_gpu(scene.assets, scene.instances, {{0, 1}, {0, 2}, {0, 3}});
-  GpuContactQuery query;
-  ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
-  GpuPairs pairs = on_gpu.pairs();
+  AskedContacts gpu(scene, {{0, 1}, {0, 2}, {0, 3}});
+  GpuPairs pairs = gpu.scene.pairs();
   pairs.capacity = 2;
-  EXPECT_EQ(query.find_contacts(on_gpu.instances(), pairs, {}, nullptr), Status::kOutOfRange);
-  EXPECT_EQ(query.report().complete, 0u);
-  EXPECT_EQ(query.report().needed.pairs, 3u);
+  EXPECT_EQ(gpu.query.find_contacts(gpu.scene.instances(), pairs, {}, nullptr), Status::kOutOfRange);
+  EXPECT_EQ(gpu.report().complete, 0u);
+  EXPECT_EQ(gpu.report().needed.pairs, 3u);
 }
 
 TEST_F(GpuContacts, OfNothingAreNone) {
-  const BodyScene scene = pile(2, 100, 1, 11);
-  for (const bool instances : {false, true}) {
-    const GpuScene on_gpu(scene.assets, instances ? scene.instances : std::vector<Instance>(), {});
-    GpuContactQuery query;
-    ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
-    ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, nullptr), Status::kOk);
-    EXPECT_EQ(query.report().contacts, 0u);
-    EXPECT_EQ(query.report().counters, ContactCounters());
+  BodyScene scene = pile(2, 100, 1, 11);
+  for (const bool instances : {true, false}) {
+    if (!instances) scene.instances.clear();
+    AskedContacts gpu(scene, {});
+    ASSERT_EQ(gpu.find(), Status::kOk);
+    EXPECT_EQ(gpu.report().contacts, 0u);
+    EXPECT_EQ(gpu.report().counters, ContactCounters());
   }
 }
 
@@ -254,12 +195,12 @@ TEST_F(GpuContacts, NameWhatIsWrong) {
   std::vector<ObjectPair> pairs;
   for (std::uint32_t i = 1; i < 50; ++i) pairs.push_back({0, i});
   const auto expect = [&](Status status, std::uint64_t where) {
-    const Answers answers = ask(scene.assets, scene.instances, pairs, QueryMode::exact);
-    EXPECT_EQ(answers.gpu_status, status);
-    EXPECT_EQ(answers.gpu_where, where);
-    EXPECT_TRUE(answers.gpu.empty());
-    EXPECT_EQ(answers.cpu_status, status);
-    EXPECT_EQ(answers.cpu_where, where);
+    const auto [cpu, gpu] = ask(scene, pairs);
+    EXPECT_EQ(gpu.status, status);
+    EXPECT_EQ(gpu.where, where);
+    EXPECT_TRUE(gpu.contacts.empty());
+    EXPECT_EQ(cpu.status, status);
+    EXPECT_EQ(cpu.where, where);
   };
   pairs[20].b = 50;
   expect(Status::kUnknownInstance, 20);
@@ -277,36 +218,26 @@ TEST_F(GpuContacts, AreTheSameOnEveryRunSideBySideAndInAGraph) {
   RandomPoses random(13);
   const BodyScene scene = pile(100, 1500, 3, 13);
   const auto pairs = all_pairs(scene.instances, false, random);
-  const Answers expected = ask(scene.assets, scene.instances, pairs, QueryMode::exact);
-  const GpuScene on_gpu(scene.assets, scene.instances, pairs);
-  constexpr int kQueries = 3;
-  GpuContactQuery queries[kQueries];
-  GpuStream streams[kQueries];
-  for (int i = 0; i < kQueries; ++i) {
-    ASSERT_EQ(streams[i].create(), cudaSuccess);
-    ASSERT_EQ(queries[i].set_assets(on_gpu.assets(), streams[i].get()), Status::kOk);
-    ASSERT_EQ(queries[i].find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, streams[i].get()),
-              Status::kOk);
+  const std::vector<Contact> expected = ask(scene, pairs).cpu.contacts;
+  test::GraphStream streams[3];
+  std::vector<AskedContacts> queries;
+  for (const test::GraphStream& stream : streams) {
+    queries.emplace_back(scene, pairs, Contents::all, stream.get());
+    ASSERT_EQ(queries.back().find({}, stream.get()), Status::kOk);
   }
   for (int run = 0; run < 10; ++run) {
-    for (int i = 0; i < kQueries; ++i) {
-      ASSERT_EQ(queries[i].enqueue(on_gpu.instances(), on_gpu.pairs(), {}, streams[i].get()), Status::kOk);
-    }
-    for (int i = 0; i < kQueries; ++i) {
-      ASSERT_EQ(streams[i].wait(), cudaSuccess);
+    for (int i = 0; i < 3; ++i)
+      ASSERT_EQ(queries[i].enqueue(streams[i].get(), GpuContactOptions{}), Status::kOk);
+    for (int i = 0; i < 3; ++i) {
+      ASSERT_EQ(cudaStreamSynchronize(streams[i].get()), cudaSuccess);
       EXPECT_EQ(queries[i].report().complete, 1u);
-      ASSERT_EQ(contacts_of(queries[i]), expected.cpu);
+      ASSERT_EQ(queries[i].contacts(), expected);
     }
   }
-  GpuGraph graph;
-  const auto enqueue = [&] {
-    EXPECT_EQ(queries[0].enqueue(on_gpu.instances(), on_gpu.pairs(), {}, streams[0].get()), Status::kOk);
-  };
-  ASSERT_EQ(graph.capture(streams[0].get(), enqueue), cudaSuccess);
+  streams[0].capture([&] { return queries[0].enqueue(streams[0].get(), GpuContactOptions{}); });
   for (int run = 0; run < 3; ++run) {
-    ASSERT_EQ(graph.launch(streams[0].get()), cudaSuccess);
-    ASSERT_EQ(streams[0].wait(), cudaSuccess);
-    EXPECT_EQ(contacts_of(queries[0]), expected.cpu);
+    streams[0].launch();
+    EXPECT_EQ(queries[0].contacts(), expected);
   }
 }
 
@@ -314,24 +245,23 @@ TEST_F(GpuContacts, AreTheSameOnEveryRunSideBySideAndInAGraph) {
 TEST_F(GpuContacts, AreNoneWhereTheTreesAreWalkedOnly) {
   RandomPoses random(21);
   const BodyScene scene = pile(60, 1500, 3, 21);
-  const GpuScene on_gpu(scene.assets, scene.instances, all_pairs(scene.instances, false, random));
-  GpuContactQuery query;
-  ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
-  ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, nullptr), Status::kOk);
-  const auto contacts = contacts_of(query);
-  const ContactCounters whole = query.report().counters;
+  AskedContacts gpu(scene, all_pairs(scene.instances, false, random));
+  ASSERT_EQ(gpu.find(), Status::kOk);
+  const std::vector<Contact> contacts = gpu.contacts();
+  const ContactCounters whole = gpu.report().counters;
   ASSERT_GT(contacts.size(), 100u);
-  ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {.walk_only = true}, nullptr),
-            Status::kOk);
-  const ContactCounters walk = query.report().counters;
-  EXPECT_EQ(query.report().contacts, 0u);
+  only_walk(gpu.query, true);
+  ASSERT_EQ(gpu.find(), Status::kOk);
+  const ContactCounters walk = gpu.report().counters;
+  EXPECT_EQ(gpu.report().contacts, 0u);
   EXPECT_EQ(walk.decided_by_float32 + walk.decided_by_float64 + walk.decided_exactly, 0u);
   EXPECT_NEAR(static_cast<double>(walk.block_pairs), static_cast<double>(whole.block_pairs),
               1e-3 * static_cast<double>(whole.block_pairs));
   EXPECT_NEAR(static_cast<double>(walk.candidates), static_cast<double>(whole.candidates),
               1e-3 * static_cast<double>(whole.candidates));
-  ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, nullptr), Status::kOk);
-  EXPECT_EQ(contacts_of(query), contacts);
+  only_walk(gpu.query, false);
+  ASSERT_EQ(gpu.find(), Status::kOk);
+  EXPECT_EQ(gpu.contacts(), contacts);
 }
 
 /// Keeps multiprocessors busy, each with a block that leaves no shared memory.
@@ -364,13 +294,11 @@ TEST_F(GpuContacts, DoNotDependOnWhenBlocksBegin) {
     const bool of_first_block = i / 4 % processors == 0;
     pairs.push_back(of_first_block ? ObjectPair{0, far} : close[static_cast<std::size_t>(i) % close.size()]);
   }
-  const Answers expected = ask(scene.assets, scene.instances, pairs, QueryMode::exact);
-  const GpuScene on_gpu(scene.assets, scene.instances, pairs);
+  const std::vector<Contact> expected = ask(scene, pairs).cpu.contacts;
   GpuStream streams[2];
   for (GpuStream& stream : streams) ASSERT_EQ(stream.create(), cudaSuccess);
-  GpuContactQuery query;
-  ASSERT_EQ(query.set_assets(on_gpu.assets(), streams[0].get()), Status::kOk);
-  ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, streams[0].get()), Status::kOk);
+  AskedContacts gpu(scene, pairs, Contents::all, streams[0].get());
+  ASSERT_EQ(gpu.find({}, streams[0].get()), Status::kOk);
   int bytes = 0;
   ASSERT_EQ(cudaDeviceGetAttribute(&bytes, cudaDevAttrMaxSharedMemoryPerBlockOptin, 0), cudaSuccess);
   ASSERT_EQ(cudaFuncSetAttribute(hold, cudaFuncAttributeMaxDynamicSharedMemorySize, bytes), cudaSuccess);
@@ -380,7 +308,7 @@ TEST_F(GpuContacts, DoNotDependOnWhenBlocksBegin) {
   hold<<<processors - 1, 32, bytes, streams[1].get()>>>(released.data());
   ASSERT_EQ(cudaGetLastError(), cudaSuccess);
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  ASSERT_EQ(query.enqueue(on_gpu.instances(), on_gpu.pairs(), {}, streams[0].get()), Status::kOk);
+  ASSERT_EQ(gpu.enqueue(streams[0].get(), GpuContactOptions{}), Status::kOk);
   const bool done = is_done_within_seconds(streams[0].get(), 20);
   *static_cast<volatile int*>(released.data()) = 1;
   if (!done && !is_done_within_seconds(streams[0].get(), 2)) {
@@ -388,21 +316,19 @@ TEST_F(GpuContacts, DoNotDependOnWhenBlocksBegin) {
     std::_Exit(1);  // nothing else can be done with the GPU
   }
   EXPECT_TRUE(done);
-  EXPECT_EQ(contacts_of(query), expected.cpu);
+  EXPECT_EQ(gpu.contacts(), expected);
   ASSERT_EQ(streams[1].wait(), cudaSuccess);
 }
 
 TEST_F(GpuContacts, MoveFromOneOwnerToAnother) {
   const BodyScene scene = pile(10, 300, 1, 14);
-  const GpuScene on_gpu(scene.assets, scene.instances, {{0, 1}, {2, 3}});
-  GpuContactQuery first;
-  ASSERT_EQ(first.set_assets(on_gpu.assets(), nullptr), Status::kOk);
-  ASSERT_EQ(first.find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, nullptr), Status::kOk);
-  const auto expected = contacts_of(first);
-  GpuContactQuery second = std::move(first);
-  EXPECT_EQ(contacts_of(second), expected);
-  ASSERT_EQ(second.find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, nullptr), Status::kOk);
-  EXPECT_EQ(contacts_of(second), expected);
+  AskedContacts first(scene, {{0, 1}, {2, 3}});
+  ASSERT_EQ(first.find(), Status::kOk);
+  const std::vector<Contact> expected = first.contacts();
+  AskedContacts second = std::move(first);
+  EXPECT_EQ(second.contacts(), expected);
+  ASSERT_EQ(second.find(), Status::kOk);
+  EXPECT_EQ(second.contacts(), expected);
 }
 
 struct Decided {
@@ -421,12 +347,12 @@ TEST_P(GpuTriangles, AreDecidedAsOnTheCpu) {
   std::vector<TrianglePair> pairs;
   for (int i = 0; i < test::trials(20000, 50); ++i) pairs.push_back(GetParam().make(random));
   const int count = static_cast<int>(pairs.size());
-  const auto device = on_gpu(pairs);
-  const auto decided = on_gpu(std::vector<Decided>(pairs.size()));
+  const auto device = test::on_gpu(pairs);
+  const auto decided = test::on_gpu(std::vector<Decided>(pairs.size()));
   decide_all<<<(count + 63) / 64, 64>>>(device.data(), count, decided.data());
   ASSERT_EQ(cudaGetLastError(), cudaSuccess);
   ASSERT_EQ(cudaDeviceSynchronize(), cudaSuccess);
-  const std::vector<Decided> found = download(decided.data(), pairs.size());
+  const std::vector<Decided> found = test::download(decided.data(), pairs.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const Verdict expected = decide_exact(pairs[i]);
     ASSERT_EQ(found[i].exact, expected) << "pair " << i;
@@ -434,12 +360,8 @@ TEST_P(GpuTriangles, AreDecidedAsOnTheCpu) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(, GpuTriangles, testing::ValuesIn(triangle_families()), [](const auto& family) {
-  std::string name = family.param.name;
-  std::replace_if(
-      name.begin(), name.end(), [](char c) { return std::isalnum(static_cast<unsigned char>(c)) == 0; }, '_');
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(, GpuTriangles, testing::ValuesIn(triangle_families()),
+                         [](const auto& tested) { return test::family_name(tested); });
 
 }  // namespace
 }  // namespace tandem

@@ -1,33 +1,18 @@
 // Contacts grouped by pair on the GPU: those of the CPU, and ranges that are theirs.
 #include <gtest/gtest.h>
 
-#include <tuple>
-
 #include "gpu/gpu_scene_fixture.h"
 
 namespace tandem {
 namespace {
 
+using test::AskedContacts;
 using test::BodyScene;
 using test::download;
-using test::GpuScene;
-
-GpuContactOptions grouped(QueryMode mode = QueryMode::exact) {
-  GpuContactOptions options = test::gpu_options(mode);
-  options.grouped = true;
-  return options;
-}
-
-std::vector<Contact> contacts_of_cpu(const BodyScene& scene, const std::vector<ObjectPair>& pairs,
-                                     QueryMode mode) {
-  ContactQuery query;
-  EXPECT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-  EXPECT_EQ(query.find_contacts(scene.instances, pairs, {.mode = mode}), Status::kOk);
-  return test::sorted({query.contacts().begin(), query.contacts().end()});
-}
 
 /// What groups() tells, in CPU memory.
 struct Groups {
+  explicit Groups(const AskedContacts& asked) : Groups(asked.query) {}
   explicit Groups(const GpuContactQuery& query)
       : counts(download(query.groups().counts, 1).front()),
         contacts(download(query.groups().contacts, counts.contacts)),
@@ -56,6 +41,14 @@ void check_ranges(const Groups& groups) {
   EXPECT_TRUE(std::ranges::equal(groups.contacts, pair_of, {}, &Contact::pair));
 }
 
+Groups groups_of(const BodyScene& scene, const std::vector<ObjectPair>& pairs) {
+  AskedContacts gpu(scene, pairs);
+  EXPECT_EQ(gpu.find(test::grouped_options()), Status::kOk);
+  const Groups groups(gpu);
+  check_ranges(groups);
+  return groups;
+}
+
 class GpuGrouped : public test::GpuTest {};
 
 TEST_F(GpuGrouped, ContactsAreTheCpus) {
@@ -64,15 +57,12 @@ TEST_F(GpuGrouped, ContactsAreTheCpus) {
   const std::vector<ObjectPair> all = test::all_pairs(scene.instances, true, random);
   for (const std::size_t count : {std::size_t{0}, std::size_t{1}, std::size_t{60}, all.size()}) {
     const std::vector<ObjectPair> pairs(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count));
-    const GpuScene on_gpu(scene.assets, scene.instances, pairs);
-    GpuContactQuery query;
-    ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
-    for (const QueryMode mode : {QueryMode::exact, QueryMode::fast, QueryMode::boxes}) {
-      const std::vector<Contact> expected = contacts_of_cpu(scene, pairs, mode);
-      ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), grouped(mode), nullptr), Status::kOk);
-      const Groups groups(query);
+    AskedContacts gpu(scene, pairs);
+    for (const QueryMode mode : test::kModes) {
+      ASSERT_EQ(gpu.find(test::grouped_options(mode)), Status::kOk);
+      const Groups groups(gpu);
       EXPECT_EQ(groups.counts.pairs, count);
-      EXPECT_EQ(test::sorted(groups.contacts), expected);
+      EXPECT_EQ(test::sorted(groups.contacts), test::ask_cpu(scene, pairs, {.mode = mode}).contacts);
       check_ranges(groups);
     }
   }
@@ -91,14 +81,9 @@ TEST_F(GpuGrouped, ManyPairsOfOneContact) {
     pairs.push_back(random.below(5) < 2 ? ObjectPair{0, 1} : ObjectPair{0, 2});
     touching += pairs.back().b == 1;
   }
-  const GpuScene on_gpu(scene.assets, scene.instances, pairs);
-  GpuContactQuery query;
-  ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
-  ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), grouped(), nullptr), Status::kOk);
-  const Groups groups(query);
+  const Groups groups = groups_of(scene, pairs);
   EXPECT_EQ(groups.counts.contacts, touching);
   EXPECT_EQ(groups.counts.few, touching);
-  check_ranges(groups);
   for (const std::uint32_t pair : groups.few) EXPECT_EQ(pairs[pair].b, 1u);
 }
 
@@ -106,16 +91,11 @@ TEST_F(GpuGrouped, OnePairHasAllContacts) {
   BodyScene scene = test::pile(2, 3000, 0, 44);
   scene.instances[1].asset = 0;
   const std::vector<ObjectPair> pairs = {{0, 1}};
-  const std::vector<Contact> expected = contacts_of_cpu(scene, pairs, QueryMode::exact);
+  const std::vector<Contact> expected = test::ask_cpu(scene, pairs).contacts;
   ASSERT_GT(expected.size(), kFewContacts);
-  const GpuScene on_gpu(scene.assets, scene.instances, pairs);
-  GpuContactQuery query;
-  ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
-  ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), grouped(), nullptr), Status::kOk);
-  const Groups groups(query);
+  const Groups groups = groups_of(scene, pairs);
   EXPECT_EQ(groups.counts.many, 1u);
   EXPECT_EQ(test::sorted(groups.contacts), expected);
-  check_ranges(groups);
 }
 
 TEST_F(GpuGrouped, FewEndsWhereManyBegins) {
@@ -128,46 +108,29 @@ TEST_F(GpuGrouped, FewEndsWhereManyBegins) {
   mesh.triangles.push_back(mesh.triangles.front());
   scene.assets.add(mesh);
   scene.instances = {{0, kIdentityPose}, {1, kIdentityPose}, {2, kIdentityPose}};
-  const GpuScene on_gpu(scene.assets, scene.instances, {{0, 1}, {0, 2}});
-  GpuContactQuery query;
-  ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
-  ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), grouped(), nullptr), Status::kOk);
-  const Groups groups(query);
+  const Groups groups = groups_of(scene, {{0, 1}, {0, 2}});
   EXPECT_EQ(groups.first_contact, (std::vector<std::uint32_t>{0, kFewContacts, 2 * kFewContacts + 1}));
-  check_ranges(groups);
 }
 
 TEST_F(GpuGrouped, AGraphGroupsAgainAndSortedContactsHaveTheSameRanges) {
   const BodyScene scene = test::pile(20, 500, 1, 46);
   const std::vector<ObjectPair> pairs = {{0, 1}, {7, 2}, {3, 8}, {4, 19}, {5, 6}};
-  const std::vector<Contact> expected = contacts_of_cpu(scene, pairs, QueryMode::exact);
-  const GpuScene on_gpu(scene.assets, scene.instances, pairs);
-  GpuContactQuery query;
-  GpuStream owner;
-  ASSERT_EQ(owner.create(), cudaSuccess);
-  const cudaStream_t stream = owner.get();
-  ASSERT_EQ(query.set_assets(on_gpu.assets(), stream), Status::kOk);
-  GpuContactOptions both = grouped();
+  const std::vector<Contact> expected = test::ask_cpu(scene, pairs).contacts;
+  test::GraphStream stream;
+  AskedContacts gpu(scene, pairs, Contents::all, stream.get());
+  GpuContactOptions both = test::grouped_options();
   both.sorted = true;
-  ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), both, stream), Status::kOk);
-  const Groups in_order(query);
+  ASSERT_EQ(gpu.find(both, stream.get()), Status::kOk);
+  const Groups in_order(gpu);
   EXPECT_EQ(test::sorted(in_order.contacts), expected);
   check_ranges(in_order);
-  const auto key = [](const Contact& c) {
-    return std::tie(c.pair, c.face_a, c.face_b, c.triangle_a, c.triangle_b);
-  };
-  EXPECT_TRUE(std::ranges::is_sorted(in_order.contacts, {}, key));
-  GpuGraph graph;
-  const auto enqueue = [&] {
-    EXPECT_EQ(query.enqueue(on_gpu.instances(), on_gpu.pairs(), grouped(), stream), Status::kOk);
-  };
-  ASSERT_EQ(graph.capture(stream, enqueue), cudaSuccess);
+  EXPECT_TRUE(std::ranges::is_sorted(in_order.contacts, {}, test::order_of));
+  stream.capture([&] { return gpu.enqueue(stream.get(), test::grouped_options()); });
   for (int run = 0; run < 3; ++run) {
-    ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, stream), Status::kOk);
-    EXPECT_EQ(test::sorted(download(query.contacts(), query.report().contacts)), expected);
-    ASSERT_EQ(graph.launch(stream), cudaSuccess);
-    ASSERT_EQ(cudaStreamSynchronize(stream), cudaSuccess);
-    const Groups again(query);
+    ASSERT_EQ(gpu.find({}, stream.get()), Status::kOk);
+    EXPECT_EQ(gpu.contacts(), expected);
+    stream.launch();
+    const Groups again(gpu);
     EXPECT_EQ(test::sorted(again.contacts), expected);
     EXPECT_EQ(again.first_contact, in_order.first_contact);
     check_ranges(again);
@@ -177,22 +140,14 @@ TEST_F(GpuGrouped, AGraphGroupsAgainAndSortedContactsHaveTheSameRanges) {
 TEST_F(GpuGrouped, WhatDoesNotFitOrFailsIsToldAsEver) {
   BodyScene scene = test::pile(10, 500, 1, 23);
   const std::vector<ObjectPair> pairs = {{0, 1}, {2, 3}, {4, 5}, {6, 7}};
-  const GpuScene on_gpu(scene.assets, scene.instances, pairs);
-  GpuContactQuery query;
-  ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
-  ASSERT_EQ(query.reserve({4, 50, 100}), Status::kOk);
-  EXPECT_EQ(query.enqueue(on_gpu.instances(), on_gpu.pairs(), grouped(), nullptr), Status::kOutOfRange);
-  ASSERT_EQ(query.reserve({4, 50, 100}, grouped()), Status::kOk);
-  ASSERT_EQ(query.enqueue(on_gpu.instances(), on_gpu.pairs(), grouped(), nullptr), Status::kOk);
-  ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
-  EXPECT_EQ(query.report().complete, 0u);
-  const Groups some(query);
+  AskedContacts gpu(scene, pairs);
+  test::expect_what_fits(gpu, test::grouped_options());
+  const Groups some(gpu);
   EXPECT_EQ(some.counts.contacts, 50u);
   check_ranges(some);
   scene.instances[3].pose.rotation[0][0] += 1;
-  const GpuScene wrong(scene.assets, scene.instances, pairs);
-  EXPECT_EQ(query.find_contacts(wrong.instances(), wrong.pairs(), grouped(), nullptr), Status::kPoseNotRigid);
-  const Groups none(query);
+  test::expect_not_rigid(gpu, scene, pairs, test::grouped_options());
+  const Groups none(gpu);
   EXPECT_EQ(none.counts.contacts, 0u);
   EXPECT_EQ(none.first_contact, std::vector<std::uint32_t>(5, 0));
   check_ranges(none);
@@ -200,14 +155,11 @@ TEST_F(GpuGrouped, WhatDoesNotFitOrFailsIsToldAsEver) {
 
 TEST_F(GpuGrouped, PairsThatDoNotFitHaveNoRange) {
   const BodyScene scene = test::pile(10, 500, 1, 47);
-  const GpuScene on_gpu(scene.assets, scene.instances, {{0, 1}, {2, 3}, {4, 5}, {6, 7}});
-  GpuContactQuery query;
-  ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
-  ASSERT_EQ(query.reserve({3, 10'000, 10'000}, grouped()), Status::kOk);
-  ASSERT_EQ(query.enqueue(on_gpu.instances(), on_gpu.pairs(), grouped(), nullptr), Status::kOk);
-  ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
-  EXPECT_EQ(query.report().complete, 0u);
-  const Groups groups(query);
+  AskedContacts gpu(scene, {{0, 1}, {2, 3}, {4, 5}, {6, 7}});
+  ASSERT_EQ(gpu.query.reserve({3, 10'000, 10'000}, test::grouped_options()), Status::kOk);
+  gpu.run(test::grouped_options());
+  EXPECT_EQ(gpu.report().complete, 0u);
+  const Groups groups(gpu);
   EXPECT_EQ(groups.counts.pairs, 3u);
   check_ranges(groups);
 }

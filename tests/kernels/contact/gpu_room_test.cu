@@ -7,6 +7,7 @@
 namespace tandem {
 namespace {
 
+using test::AskedContacts;
 using test::BodyScene;
 using test::GpuScene;
 
@@ -45,10 +46,9 @@ TEST_F(GpuRoom, AFullGpuIsToldByItsNameAndIsNoEnd) {
   const std::vector<ObjectPair> pairs = pairs_of(100);
   const build::Image large = test::make_file(test::random_mesh(100000, 1));
   const AssetView large_view = check(large.data(), large.size()).asset;
-  const GpuScene on_gpu(scene.assets, scene.instances, pairs);
-  GpuContactQuery query, another;
-  ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
-  ASSERT_EQ(query.reserve({1, 1, 1}), Status::kOk);
+  AskedContacts gpu(scene, pairs);
+  GpuContactQuery another;
+  ASSERT_EQ(gpu.query.reserve({1, 1, 1}), Status::kOk);
   GpuBroadPhase broad;
   DeviceAssets assets;
   const std::vector<AssetView> many(50, large_view);  // by threads
@@ -60,19 +60,18 @@ TEST_F(GpuRoom, AFullGpuIsToldByItsNameAndIsNoEnd) {
     EXPECT_EQ(assets.count(), 0u);
     EXPECT_EQ(broad.reserve({1'000'000, 1'000'000, 1'000'000}), Status::kOutOfGpuMemory);
     EXPECT_EQ(broad.cuda_error(), cudaErrorMemoryAllocation);
-    EXPECT_EQ(another.set_assets(on_gpu.assets(), nullptr), Status::kOutOfGpuMemory);
-    EXPECT_EQ(query.reserve({1'000'000, 1'000'000, 1'000'000}), Status::kOutOfGpuMemory);
-    EXPECT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {.sorted = true}, nullptr),
-              Status::kOutOfGpuMemory);
-    EXPECT_EQ(query.cuda_error(), cudaErrorMemoryAllocation);
+    EXPECT_EQ(another.set_assets(gpu.scene.assets(), nullptr), Status::kOutOfGpuMemory);
+    EXPECT_EQ(gpu.query.reserve({1'000'000, 1'000'000, 1'000'000}), Status::kOutOfGpuMemory);
+    EXPECT_EQ(gpu.find({.sorted = true}), Status::kOutOfGpuMemory);
+    EXPECT_EQ(gpu.query.cuda_error(), cudaErrorMemoryAllocation);
     EXPECT_EQ(cudaGetLastError(), cudaSuccess);  // nothing that failed is left behind
   }
   EXPECT_EQ(assets.upload(many, Contents::all, nullptr), Status::kOk);
   EXPECT_EQ(assets.bytes(), 50 * large.size());
   EXPECT_EQ(broad.reserve({1'000'000, 1'000'000, 1'000'000}), Status::kOk);
-  for (GpuContactQuery* each : {&query, &another}) {
-    ASSERT_EQ(each->set_assets(on_gpu.assets(), nullptr), Status::kOk);
-    EXPECT_EQ(each->find_contacts(on_gpu.instances(), on_gpu.pairs(), {.sorted = true}, nullptr),
+  for (GpuContactQuery* each : {&gpu.query, &another}) {
+    ASSERT_EQ(each->set_assets(gpu.scene.assets(), nullptr), Status::kOk);
+    EXPECT_EQ(each->find_contacts(gpu.scene.instances(), gpu.scene.pairs(), {.sorted = true}, nullptr),
               Status::kOk);
     EXPECT_GT(each->report().contacts, 100000u);
   }
@@ -118,11 +117,9 @@ TEST_F(GpuRoom, AQueryHoldsNoMoreThanItsRuleSays) {
 
 TEST_F(GpuRoom, AQueryThatGrewHoldsNoMoreThanItsRuleSays) {
   const BodyScene scene = test::pile(100, 3000, 1, 33);
-  const GpuScene on_gpu(scene.assets, scene.instances, pairs_of(100));
-  GpuContactQuery query;
-  ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
-  ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {.sorted = true}, nullptr), Status::kOk);
-  EXPECT_LE(query.bytes(), most_query_bytes(query.capacity(), {.sorted = true}, on_gpu.assets().size()));
+  AskedContacts gpu(scene, pairs_of(100));
+  ASSERT_EQ(gpu.find({.sorted = true}), Status::kOk);
+  EXPECT_LE(gpu.query.bytes(), most_query_bytes(gpu.query.capacity(), {.sorted = true}, scene.assets.size()));
 }
 
 /// Queries keep nothing of trees.
@@ -131,12 +128,10 @@ TEST_F(GpuRoom, AQueryOfLargeTreesHoldsNoMoreThanItsRuleSays) {
   BodyScene scene;
   scene.assets.add(test::soup(random, 600'000, 0.01));
   scene.instances = {{0, kIdentityPose}};
-  const GpuScene on_gpu(scene.assets, scene.instances, {});
-  GpuContactQuery query;
-  ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
-  const std::size_t most = most_query_bytes(query.capacity(), {}, on_gpu.assets().size());
-  EXPECT_LE(query.bytes(), most);
-  EXPECT_LE(most, query.bytes() + query.bytes() / 5 + (9 << 20));
+  const AskedContacts gpu(scene, {});
+  const std::size_t most = most_query_bytes(gpu.query.capacity(), {}, scene.assets.size());
+  EXPECT_LE(gpu.query.bytes(), most);
+  EXPECT_LE(most, gpu.query.bytes() + gpu.query.bytes() / 5 + (9 << 20));
 }
 
 TEST_F(GpuRoom, ABroadPhaseHoldsNoMoreThanItsRuleSays) {

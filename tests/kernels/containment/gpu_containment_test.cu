@@ -13,24 +13,11 @@ using test::PartedScene;
 using test::RandomPoses;
 using Rows = std::vector<Containment>;
 
-GpuContactOptions grouped() {
-  GpuContactOptions options = test::gpu_options(QueryMode::exact);
-  options.grouped = true;
-  return options;
-}
-
-Rows rows_of(const GpuContainmentQuery& query) {
-  return test::download(query.contained(), query.report().contained);
-}
-
 Rows rows_of_cpu(const PartedScene& parted, const std::vector<ObjectPair>& pairs) {
   const test::BodyScene& scene = parted.scene;
-  ContactQuery contacts;
   ContainmentQuery query;
-  EXPECT_EQ(contacts.set_assets(scene.assets.views()), Status::kOk);
-  EXPECT_EQ(contacts.find_contacts(scene.instances, pairs, {}), Status::kOk);
   EXPECT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-  EXPECT_EQ(query.find(scene.instances, pairs, contacts.contacts()), Status::kOk);
+  EXPECT_EQ(query.find(scene.instances, pairs, test::ask_cpu(scene, pairs).contacts), Status::kOk);
   return {query.contained().begin(), query.contained().end()};
 }
 
@@ -43,21 +30,26 @@ std::size_t triangles_with_labels(const test::BodyScene& scene) {
 }
 
 /// A scene on the GPU, its contacts found and grouped.
-struct Found {
-  Found(const PartedScene& parted, const std::vector<ObjectPair>& given, Contents contents)
-      : scene(parted.scene.assets, parted.scene.instances, given, contents) {
-    EXPECT_EQ(contacts.set_assets(scene.assets(), nullptr), Status::kOk);
-    EXPECT_EQ(contacts.find_contacts(scene.instances(), scene.pairs(), grouped(), nullptr), Status::kOk);
-    EXPECT_EQ(query.set_assets(scene.assets(), nullptr), Status::kOk);
+struct Found : test::AskedContacts {
+  Found(const PartedScene& parted, const std::vector<ObjectPair>& given, Contents contents = Contents::all,
+        Status status = Status::kOk)
+      : AskedContacts(parted.scene, given, contents) {
+    EXPECT_EQ(AskedContacts::find(test::grouped_options()), status);
+    EXPECT_EQ(contained.set_assets(scene.assets(), nullptr), Status::kOk);
   }
-  Status find() { return query.find(scene.instances(), scene.pairs(), contacts, nullptr); }
+  Status find() { return contained.find(scene.instances(), scene.pairs(), query, nullptr); }
   Status enqueue(cudaStream_t stream) {
-    return query.enqueue(scene.instances(), scene.pairs(), contacts, stream);
+    return contained.enqueue(scene.instances(), scene.pairs(), query, stream);
   }
+  GpuContainmentReport after(const GpuContainmentCapacity& capacity) {
+    EXPECT_EQ(contained.reserve(capacity), Status::kOk);
+    EXPECT_EQ(enqueue(nullptr), Status::kOk);
+    EXPECT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
+    return contained.report();
+  }
+  Rows rows() const { return test::download(contained.contained(), contained.report().contained); }
 
-  GpuScene scene;
-  GpuContactQuery contacts;
-  GpuContainmentQuery query;
+  GpuContainmentQuery contained;
 };
 
 class GpuContainments : public test::GpuTest {
@@ -68,9 +60,10 @@ class GpuContainments : public test::GpuTest {
     const Rows expected = rows_of_cpu(parted, pairs);
     Found found(parted, pairs, contents);
     EXPECT_EQ(found.find(), Status::kOk);
-    EXPECT_EQ(rows_of(found.query), expected);
-    EXPECT_LE(found.query.bytes(), most_containment_bytes(found.query.capacity(), parted.scene.assets.size(),
-                                                          triangles_with_labels(parted.scene)));
+    EXPECT_EQ(found.rows(), expected);
+    EXPECT_LE(found.contained.bytes(),
+              most_containment_bytes(found.contained.capacity(), parted.scene.assets.size(),
+                                     triangles_with_labels(parted.scene)));
     return expected.size();
   }
 };
@@ -109,29 +102,22 @@ TEST_F(GpuContainments, WhatDoesNotFitIsToldAndNothingIsLostOnTheRetry) {
   const Rows expected = rows_of_cpu(scene, pairs);
   ASSERT_GT(expected.size(), 2u);
   const auto rows = static_cast<std::uint32_t>(expected.size());
-  Found found(scene, pairs, Contents::all);
-  const auto after = [&](const GpuContainmentCapacity& capacity) {
-    EXPECT_EQ(found.query.reserve(capacity), Status::kOk);
-    EXPECT_EQ(found.enqueue(nullptr), Status::kOk);
-    EXPECT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
-    return found.query.report();
-  };
-  EXPECT_EQ(after({0, rows}).complete, 0u);
-  EXPECT_EQ(found.query.report().needed.pairs, count);
-  EXPECT_EQ(found.query.report().contained, 0u);
+  Found found(scene, pairs);
+  const GpuContainmentReport without_pairs = found.after({0, rows});
+  EXPECT_EQ(without_pairs.complete, 0u);
+  EXPECT_EQ(without_pairs.needed.pairs, count);
+  EXPECT_EQ(without_pairs.contained, 0u);
 
-  Found other(scene, pairs, Contents::all);
-  EXPECT_EQ(other.query.reserve({count, rows - 1}), Status::kOk);
-  EXPECT_EQ(other.enqueue(nullptr), Status::kOk);
-  EXPECT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
-  EXPECT_EQ(other.query.report().complete, 0u);
-  EXPECT_EQ(other.query.report().needed.contained, rows);
-  EXPECT_EQ(other.query.report().contained, 0u);
+  Found other(scene, pairs);
+  const GpuContainmentReport without_a_row = other.after({count, rows - 1});
+  EXPECT_EQ(without_a_row.complete, 0u);
+  EXPECT_EQ(without_a_row.needed.contained, rows);
+  EXPECT_EQ(without_a_row.contained, 0u);
 
-  EXPECT_EQ(after({count, rows}).complete, 1u);
-  EXPECT_EQ(rows_of(found.query), expected);
+  EXPECT_EQ(found.after({count, rows}).complete, 1u);
+  EXPECT_EQ(found.rows(), expected);
   EXPECT_EQ(other.find(), Status::kOk);
-  EXPECT_EQ(rows_of(other.query), expected);
+  EXPECT_EQ(other.rows(), expected);
 }
 
 TEST_F(GpuContainments, AGraphFindsThemAgain) {
@@ -139,43 +125,30 @@ TEST_F(GpuContainments, AGraphFindsThemAgain) {
   const auto pairs = test::every_pair(scene.scene);
   Found found(scene, pairs, Contents::manifolds);
   ASSERT_EQ(found.find(), Status::kOk);
-  const Rows expected = rows_of(found.query);
+  const Rows expected = found.rows();
   EXPECT_FALSE(expected.empty());
-  GpuStream stream;
-  ASSERT_EQ(stream.create(), cudaSuccess);
-  GpuGraph graph;
-  ASSERT_EQ(graph.capture(stream.get(), [&] { EXPECT_EQ(found.enqueue(stream.get()), Status::kOk); }),
-            cudaSuccess);
+  test::GraphStream stream;
+  stream.capture([&] { return found.enqueue(stream.get()); });
   for (int i = 0; i < 3; ++i) {
-    ASSERT_EQ(cudaMemset(const_cast<Containment*>(found.query.contained()), 0xFF,
+    ASSERT_EQ(cudaMemset(const_cast<Containment*>(found.contained.contained()), 0xFF,
                          expected.size() * sizeof(Containment)),
               cudaSuccess);
-    ASSERT_EQ(graph.launch(stream.get()), cudaSuccess);
-    ASSERT_EQ(cudaStreamSynchronize(stream.get()), cudaSuccess);
-    EXPECT_EQ(rows_of(found.query), expected);
+    stream.launch();
+    EXPECT_EQ(found.rows(), expected);
   }
 }
 
 TEST_F(GpuContainments, OfAQueryThatFailedThereAreNone) {
   PartedScene scene = test::crowded_nest(5, 8);
   scene.scene.instances[3].pose.rotation[0][0] = 2;
-  const auto pairs = test::every_pair(scene.scene);
-  const GpuScene on_gpu(scene.scene.assets, scene.scene.instances, pairs);
-  GpuContactQuery contacts;
-  GpuContainmentQuery query;
-  EXPECT_EQ(contacts.set_assets(on_gpu.assets(), nullptr), Status::kOk);
-  EXPECT_EQ(contacts.find_contacts(on_gpu.instances(), on_gpu.pairs(), grouped(), nullptr),
-            Status::kPoseNotRigid);
-  EXPECT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
-  EXPECT_EQ(query.find(on_gpu.instances(), on_gpu.pairs(), contacts, nullptr), Status::kPoseNotRigid);
-  EXPECT_EQ(query.report().contained, 0u);
+  Found found(scene, test::every_pair(scene.scene), Contents::all, Status::kPoseNotRigid);
+  EXPECT_EQ(found.find(), Status::kPoseNotRigid);
+  EXPECT_EQ(found.contained.report().contained, 0u);
 }
 
 TEST_F(GpuContainments, NeedTopology) {
-  const PartedScene scene = test::crowded_nest(5, 8);
-  const GpuScene on_gpu(scene.scene.assets, scene.scene.instances, {}, Contents::exact_queries);
-  GpuContainmentQuery query;
-  EXPECT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kNoTopology);
+  test::expect_needed<GpuContainmentQuery>(test::crowded_nest(5, 8).scene, Contents::exact_queries,
+                                           Status::kNoTopology);
 }
 
 }  // namespace

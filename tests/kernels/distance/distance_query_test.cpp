@@ -5,11 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <string>
 #include <vector>
 
-#include "kernels/contact/contact_query_fixture.h"
+#include "kernels/distance/distance_scenes.h"
 #include "kernels/distance/nearest_phase.h"
 #include "kernels/geometry/triangle_distance.h"
 
@@ -18,18 +17,6 @@ namespace tandem {
 namespace {
 
 using test::PosedTriangle;
-
-/// The instances moved from the first one, so that there is room between them.
-BodyScene spread_out(BodyScene scene, double factor) {
-  const Pose first = scene.instances[0].pose;
-  for (Instance& instance : scene.instances) {
-    for (int k = 0; k < 3; ++k) {
-      double& t = instance.pose.translation[k];
-      t = first.translation[k] + factor * (t - first.translation[k]);
-    }
-  }
-  return scene;
-}
 
 std::vector<std::vector<PosedTriangle>> posed(const BodyScene& scene) {
   std::vector<std::vector<PosedTriangle>> out;
@@ -63,12 +50,7 @@ class DistanceScenes : public testing::TestWithParam<test::SceneFamily> {
  protected:
   template <class Check>
   void for_scenes(int count, Check check) {
-    for (int seed = 0; seed < count && !HasFailure(); ++seed) {
-      RandomPoses random(4711 + static_cast<std::uint64_t>(seed));
-      const BodyScene scene = spread_out(GetParam().make(random), seed % 4);
-      check(scene, seed);
-      if (HasFailure()) std::printf("%s, seed %d:\n%s", GetParam().name, seed, text(scene).c_str());
-    }
+    for_spread_scenes(GetParam(), 4711, count, check);
   }
 };
 

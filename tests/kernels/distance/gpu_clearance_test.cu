@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -13,15 +12,12 @@ namespace tandem {
 namespace {
 
 using test::all_pairs;
+using test::AskedContacts;
 using test::BodyScene;
-using test::download;
-using test::GpuScene;
-using test::on_gpu;
+using test::ContactAnswer;
+using test::kModes;
 using test::pile;
 using test::RandomPoses;
-using test::sorted;
-
-constexpr QueryMode kModes[] = {QueryMode::exact, QueryMode::fast, QueryMode::boxes};
 
 GpuContactOptions within(double d, QueryMode mode = QueryMode::exact, bool first_contact_only = false) {
   GpuContactOptions options = test::gpu_options(mode, first_contact_only);
@@ -29,46 +25,28 @@ GpuContactOptions within(double d, QueryMode mode = QueryMode::exact, bool first
   return options;
 }
 
-std::vector<Contact> contacts_of(const GpuContactQuery& query) {
-  return sorted(download(query.contacts(), query.report().contacts));
+ContactAnswer of_cpu(const BodyScene& scene, const std::vector<ObjectPair>& pairs, double d,
+                     QueryMode mode = QueryMode::exact) {
+  ContactAnswer found = test::ask_cpu(scene, pairs, {.mode = mode, .within = d});
+  EXPECT_EQ(found.status, Status::kOk);
+  return found;
 }
 
-struct Answer {
-  std::vector<Contact> contacts;
-  ContactCounters counters;
-};
-
-Answer of_cpu(const BodyScene& scene, const std::vector<ObjectPair>& pairs, double d,
-              QueryMode mode = QueryMode::exact) {
-  ContactQuery query;
-  EXPECT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-  EXPECT_EQ(query.find_contacts(scene.instances, pairs, {.mode = mode, .within = d}), Status::kOk);
-  return {sorted({query.contacts().begin(), query.contacts().end()}), query.counters()};
-}
-
-Answer of_gpu(const BodyScene& scene, const std::vector<ObjectPair>& pairs,
-              const GpuContactOptions& options) {
-  const GpuScene device(scene.assets, scene.instances, pairs);
-  GpuContactQuery query;
-  EXPECT_EQ(query.set_assets(device.assets(), nullptr), Status::kOk);
-  EXPECT_EQ(query.find_contacts(device.instances(), device.pairs(), options, nullptr), Status::kOk)
-      << cudaGetErrorString(query.cuda_error());
-  return {contacts_of(query), query.report().counters};
+ContactAnswer of_gpu(const BodyScene& scene, const std::vector<ObjectPair>& pairs,
+                     const GpuContactOptions& options) {
+  ContactAnswer found = test::ask_gpu(scene, pairs, options);
+  EXPECT_EQ(found.status, Status::kOk);
+  return found;
 }
 
 void expect_as_cpu(const BodyScene& scene, const std::vector<ObjectPair>& pairs, double d, QueryMode mode) {
-  const Answer cpu = of_cpu(scene, pairs, d, mode), gpu = of_gpu(scene, pairs, within(d, mode));
-  ASSERT_EQ(gpu.contacts.size(), cpu.contacts.size());
-  EXPECT_EQ(gpu.contacts, cpu.contacts);
-  const ContactCounters &of_gpu = gpu.counters, &of_cpu = cpu.counters;
+  const ContactAnswer gpu = of_gpu(scene, pairs, within(d, mode));
+  test::expect_equal(gpu, of_cpu(scene, pairs, d, mode), mode);
+  const ContactCounters& counters = gpu.counters;
   if (mode != QueryMode::boxes) {
-    EXPECT_EQ(of_gpu.candidates,
-              of_gpu.decided_by_float32 + of_gpu.decided_by_float64 + of_gpu.decided_exactly);
+    EXPECT_EQ(counters.candidates,
+              counters.decided_by_float32 + counters.decided_by_float64 + counters.decided_exactly);
   }
-  if (mode == QueryMode::exact) return;  // other blocks are walked, and operations fused
-  EXPECT_EQ(of_gpu.block_pairs, of_cpu.block_pairs);
-  EXPECT_EQ(of_gpu.candidates, of_cpu.candidates);
-  EXPECT_EQ(of_gpu.decided_by_float32, of_cpu.decided_by_float32);
 }
 
 class GpuClearance : public test::GpuTest {};
@@ -116,7 +94,7 @@ TEST_F(GpuClearance, CountsATieAndNothingBeyond) {
         scene.instances = {at(far, 0, far), at(far + tie.x, tie.y, far + tie.z)};
         for (const QueryMode mode : {QueryMode::exact, QueryMode::fast}) {
           expect_as_cpu(scene, {{0, 1}}, tie.distance, mode);
-          const Answer found = of_gpu(scene, {{0, 1}}, within(tie.distance, mode));
+          const ContactAnswer found = of_gpu(scene, {{0, 1}}, within(tie.distance, mode));
           EXPECT_FALSE(found.contacts.empty());
           EXPECT_GT(found.counters.decided_exactly, 0u);
           const double less = std::nextafter(tie.distance, 0.0);
@@ -176,15 +154,10 @@ TEST_F(GpuClearance, FirstOnesAreOfThePairsThatHaveAny) {
   const BodyScene scene = pile(60, 800, 3, 9);
   const auto pairs = all_pairs(scene.instances, false, random);
   for (const QueryMode mode : kModes) {
-    const Answer all = of_cpu(scene, pairs, 0.1, mode), first = of_gpu(scene, pairs, within(0.1, mode, true));
-    std::map<std::uint32_t, int> wanted, found;
-    for (const Contact& contact : all.contacts) wanted[contact.pair] = 1;
-    for (const Contact& contact : first.contacts) {
-      ++found[contact.pair];
-      EXPECT_TRUE(std::binary_search(all.contacts.begin(), all.contacts.end(), contact, test::comes_before));
-    }
-    EXPECT_EQ(found, wanted);
-    EXPECT_EQ(first.counters.contacts, wanted.size());
+    const std::vector<Contact> all = of_cpu(scene, pairs, 0.1, mode).contacts;
+    const ContactAnswer first = of_gpu(scene, pairs, within(0.1, mode, true));
+    test::expect_one_of_each_pair(first.contacts, all);
+    EXPECT_EQ(first.counters.contacts, first.contacts.size());
   }
 }
 
@@ -205,23 +178,20 @@ TEST_F(GpuClearance, OfASmallSceneInEveryMode) {
 
 TEST_F(GpuClearance, OfPairsThatABroadPhaseFinds) {
   const BodyScene scene = pile(150, 300, 8, 12);
-  const GpuScene device(scene.assets, scene.instances, {});
-  std::vector<AssetBounds> bounds;
-  for (const AssetView& asset : scene.assets.views()) bounds.push_back(asset_bounds(*asset.header));
-  const auto device_bounds = on_gpu(bounds);
+  AskedContacts gpu(scene, {});
+  const test::GpuBounds bounds(scene.assets);
   GpuBroadPhase broad_phase;
-  GpuContactQuery query;
-  ASSERT_EQ(query.set_assets(device.assets(), nullptr), Status::kOk);
   ContactQuery cpu;
   ASSERT_EQ(cpu.set_assets(scene.assets.views()), Status::kOk);
   for (const double d : {0.05, 0.5}) {
-    ASSERT_EQ(broad_phase.find_pairs(device.instances(), {device_bounds.data(), 2},
-                                     {.sorted = true, .within = d}, nullptr),
+    ASSERT_EQ(
+        broad_phase.find_pairs(gpu.scene.instances(), bounds.view(), {.sorted = true, .within = d}, nullptr),
+        Status::kOk);
+    ASSERT_EQ(gpu.query.find_contacts(gpu.scene.instances(), broad_phase.pairs(), within(d), nullptr),
               Status::kOk);
-    ASSERT_EQ(query.find_contacts(device.instances(), broad_phase.pairs(), within(d), nullptr), Status::kOk);
     ASSERT_EQ(cpu.find_contacts(scene.instances, {.within = d}), Status::kOk);
     EXPECT_EQ(broad_phase.report().found, cpu.pairs().size());
-    EXPECT_EQ(contacts_of(query), sorted({cpu.contacts().begin(), cpu.contacts().end()}));
+    EXPECT_EQ(gpu.contacts(), test::sorted({cpu.contacts().begin(), cpu.contacts().end()}));
   }
 }
 
@@ -229,55 +199,44 @@ TEST_F(GpuClearance, ThatDoesNotFitIsAskedForAndFoundOnTheRetry) {
   RandomPoses random(6);
   const BodyScene scene = pile(40, 800, 2, 10);
   const auto pairs = all_pairs(scene.instances, false, random);
-  const GpuScene device(scene.assets, scene.instances, pairs);
-  const Answer expected = of_cpu(scene, pairs, 0.1);
+  const std::vector<Contact> expected = of_cpu(scene, pairs, 0.1).contacts;
   const GpuContactOptions options = within(0.1);
-  const auto enqueue = [&](GpuContactQuery& query) {
-    EXPECT_EQ(query.enqueue(device.instances(), device.pairs(), options, nullptr), Status::kOk);
-    EXPECT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
-  };
-  GpuContactQuery query;
-  ASSERT_EQ(query.set_assets(device.assets(), nullptr), Status::kOk);
-  ASSERT_EQ(query.reserve({10, 100, 0}), Status::kOk);
-  EXPECT_EQ(query.enqueue(device.instances(), device.pairs(), options, nullptr), Status::kOutOfRange)
-      << "reserved for contacts alone";
+  AskedContacts gpu(scene, pairs);
+  ASSERT_EQ(gpu.query.reserve({10, 100, 0}), Status::kOk);
+  EXPECT_EQ(gpu.enqueue(nullptr, options), Status::kOutOfRange) << "reserved for contacts alone";
   for (const std::uint32_t room : {10u, static_cast<std::uint32_t>(pairs.size())}) {
-    ASSERT_EQ(query.reserve({room, 100, 20}, options), Status::kOk);
-    enqueue(query);
-    EXPECT_EQ(query.report().status, Status::kOk);
-    EXPECT_EQ(query.report().complete, 0u);
-    EXPECT_EQ(query.report().needed.pairs, pairs.size());
+    ASSERT_EQ(gpu.query.reserve({room, 100, 20}, options), Status::kOk);
+    gpu.run(options);
+    EXPECT_EQ(gpu.report().status, Status::kOk);
+    EXPECT_EQ(gpu.report().complete, 0u);
+    EXPECT_EQ(gpu.report().needed.pairs, pairs.size());
   }
-  EXPECT_EQ(query.report().contacts, 100u);
-  EXPECT_GT(query.report().needed.undecided, 20u);
-  ASSERT_EQ(query.find_contacts(device.instances(), device.pairs(), options, nullptr), Status::kOk);
-  EXPECT_EQ(contacts_of(query), expected.contacts);
-  enqueue(query);
-  EXPECT_EQ(query.report().complete, 1u);
-  EXPECT_EQ(contacts_of(query), expected.contacts);
-  EXPECT_LE(query.bytes(), most_query_bytes(query.capacity(), options, scene.assets.size()));
-  ASSERT_EQ(
-      query.find_contacts(device.instances(), device.pairs(), test::gpu_options(QueryMode::exact), nullptr),
-      Status::kOk);
-  EXPECT_EQ(contacts_of(query), of_cpu(scene, pairs, 0).contacts) << "contacts again";
+  EXPECT_EQ(gpu.report().contacts, 100u);
+  EXPECT_GT(gpu.report().needed.undecided, 20u);
+  ASSERT_EQ(gpu.find(options), Status::kOk);
+  EXPECT_EQ(gpu.contacts(), expected);
+  gpu.run(options);
+  EXPECT_EQ(gpu.report().complete, 1u);
+  EXPECT_EQ(gpu.contacts(), expected);
+  EXPECT_LE(gpu.query.bytes(), most_query_bytes(gpu.query.capacity(), options, scene.assets.size()));
+  ASSERT_EQ(gpu.find(test::gpu_options(QueryMode::exact)), Status::kOk);
+  EXPECT_EQ(gpu.contacts(), of_cpu(scene, pairs, 0).contacts) << "contacts again";
 }
 
 TEST_F(GpuClearance, IsGroupedAndSorted) {
   RandomPoses random(7);
   const BodyScene scene = pile(40, 800, 2, 11);
   const auto pairs = all_pairs(scene.instances, false, random);
-  const GpuScene device(scene.assets, scene.instances, pairs);
-  const Answer expected = of_cpu(scene, pairs, 0.1);
+  const std::vector<Contact> expected = of_cpu(scene, pairs, 0.1).contacts;
   for (const bool by_triangle : {false, true}) {
     GpuContactOptions options = within(0.1);
     options.grouped = true;
     options.sorted = by_triangle;
-    GpuContactQuery query;
-    ASSERT_EQ(query.set_assets(device.assets(), nullptr), Status::kOk);
-    ASSERT_EQ(query.find_contacts(device.instances(), device.pairs(), options, nullptr), Status::kOk);
-    EXPECT_EQ(contacts_of(query), expected.contacts);
-    const auto first = download(query.groups().first_contact, pairs.size() + 1);
-    const auto contacts = download(query.contacts(), query.report().contacts);
+    AskedContacts gpu(scene, pairs);
+    ASSERT_EQ(gpu.find(options), Status::kOk);
+    EXPECT_EQ(gpu.contacts(), expected);
+    const auto first = test::download(gpu.query.groups().first_contact, pairs.size() + 1);
+    const auto contacts = gpu.stored();
     EXPECT_EQ(first.back(), contacts.size());
     for (std::uint32_t pair = 0; pair < pairs.size(); ++pair) {
       for (std::uint32_t i = first[pair]; i < first[pair + 1]; ++i) ASSERT_EQ(contacts[i].pair, pair);
@@ -293,37 +252,25 @@ TEST_F(GpuClearance, IsTheSameOnEveryRunOfAGraph) {
   RandomPoses random(13);
   const BodyScene scene = pile(60, 800, 3, 13);
   const auto pairs = all_pairs(scene.instances, false, random);
-  const Answer expected = of_cpu(scene, pairs, 0.05);
-  const GpuScene device(scene.assets, scene.instances, pairs);
-  GpuContactQuery query;
-  GpuStream stream;
-  GpuGraph graph;
-  ASSERT_EQ(stream.create(), cudaSuccess);
-  ASSERT_EQ(query.set_assets(device.assets(), stream.get()), Status::kOk);
-  ASSERT_EQ(query.find_contacts(device.instances(), device.pairs(), within(0.05), stream.get()), Status::kOk);
-  const auto enqueue = [&] {
-    EXPECT_EQ(query.enqueue(device.instances(), device.pairs(), within(0.05), stream.get()), Status::kOk);
-  };
-  ASSERT_EQ(graph.capture(stream.get(), enqueue), cudaSuccess);
+  const std::vector<Contact> expected = of_cpu(scene, pairs, 0.05).contacts;
+  test::GraphStream stream;
+  AskedContacts gpu(scene, pairs, Contents::all, stream.get());
+  ASSERT_EQ(gpu.find(within(0.05), stream.get()), Status::kOk);
+  stream.capture([&] { return gpu.enqueue(stream.get(), within(0.05)); });
   for (int run = 0; run < 5; ++run) {
-    ASSERT_EQ(graph.launch(stream.get()), cudaSuccess);
-    ASSERT_EQ(stream.wait(), cudaSuccess);
-    EXPECT_EQ(query.report().complete, 1u);
-    EXPECT_EQ(contacts_of(query), expected.contacts);
+    stream.launch();
+    EXPECT_EQ(gpu.report().complete, 1u);
+    EXPECT_EQ(gpu.contacts(), expected);
   }
 }
 
 TEST_F(GpuClearance, RefusesWhatIsNoDistance) {
   const BodyScene scene = pile(2, 100, 0.5, 11);
-  const GpuScene device(scene.assets, scene.instances, {{0, 1}});
-  GpuContactQuery query;
-  ASSERT_EQ(query.set_assets(device.assets(), nullptr), Status::kOk);
-  for (const double d : {-1.0, std::nan(""), HUGE_VAL, 1e301}) {
-    EXPECT_EQ(query.find_contacts(device.instances(), device.pairs(), within(d), nullptr),
-              Status::kOutOfRange);
-  }
-  EXPECT_EQ(query.find_contacts(device.instances(), device.pairs(), within(1e300), nullptr), Status::kOk);
-  EXPECT_EQ(query.report().contacts, of_cpu(scene, {{0, 1}}, 1e300).contacts.size());
+  AskedContacts gpu(scene, {{0, 1}});
+  for (const double d : {-1.0, std::nan(""), HUGE_VAL, 1e301})
+    EXPECT_EQ(gpu.find(within(d)), Status::kOutOfRange);
+  EXPECT_EQ(gpu.find(within(1e300)), Status::kOk);
+  EXPECT_EQ(gpu.report().contacts, of_cpu(scene, {{0, 1}}, 1e300).contacts.size());
 }
 
 }  // namespace

@@ -6,29 +6,15 @@
 #include <cstring>
 
 #include "gpu/gpu_scene_fixture.h"
-#include "kernels/contact/contact_query_fixture.h"
+#include "kernels/distance/distance_scenes.h"
 #include "kernels/geometry/triangle_distance.h"
-#include "tandem/formats/gpu_stream.h"
 #include "tandem/kernels/gpu_distance_query.h"
 
 namespace tandem {
 namespace {
 
-using test::GpuScene;
 using test::RandomPoses;
 using Distances = std::vector<ObjectDistance>;
-
-/// The instances moved from the first one, so that there is room between them.
-BodyScene spread_out(BodyScene scene, double factor) {
-  const Pose first = scene.instances[0].pose;
-  for (Instance& instance : scene.instances) {
-    for (int k = 0; k < 3; ++k) {
-      double& t = instance.pose.translation[k];
-      t = first.translation[k] + factor * (t - first.translation[k]);
-    }
-  }
-  return scene;
-}
 
 std::vector<ObjectPair> every_pair(const BodyScene& scene, bool selves = false) {
   RandomPoses random(1);
@@ -44,22 +30,14 @@ Distances of_cpu(const BodyScene& scene, const std::vector<ObjectPair>& pairs,
 }
 
 /// A scene on the GPU, and a query of it.
-struct Found {
-  Found(const BodyScene& of, const std::vector<ObjectPair>& given)
-      : scene(of.assets, of.instances, given), pairs(given.size()) {
-    EXPECT_EQ(query.set_assets(scene.assets(), nullptr), Status::kOk);
-  }
+struct Found : test::AskedOnGpu<GpuDistanceQuery> {
+  using AskedOnGpu::AskedOnGpu;
+
   Status find(const GpuDistanceOptions& options = {}) {
     return query.find_distances(scene.instances(), scene.pairs(), options, nullptr);
   }
-  Status enqueue(const GpuDistanceOptions& options, cudaStream_t stream) {
-    return query.enqueue(scene.instances(), scene.pairs(), options, stream);
-  }
-  Distances distances() const { return test::download(query.distances(), pairs); }
-
-  GpuScene scene;
-  std::size_t pairs;
-  GpuDistanceQuery query;
+  void run() { AskedOnGpu::run(GpuDistanceOptions{}); }
+  Distances distances() const { return test::download(query.distances(), scene.pairs().capacity); }
 };
 
 bool same_bytes(const Distances& x, const Distances& y) {
@@ -104,12 +82,7 @@ class GpuDistanceScenes : public test::GpuTestOf<test::SceneFamily> {
  protected:
   template <class Check>
   void for_scenes(int count, Check check) {
-    for (int seed = 0; seed < count && !HasFailure(); ++seed) {
-      RandomPoses random(1147 + static_cast<std::uint64_t>(seed));
-      const BodyScene scene = spread_out(GetParam().make(random), seed % 4);
-      check(scene, seed);
-      if (HasFailure()) std::printf("%s, seed %d:\n%s", GetParam().name, seed, text(scene).c_str());
-    }
+    for_spread_scenes(GetParam(), 1147, count, check);
   }
 };
 
@@ -130,8 +103,8 @@ TEST_P(GpuDistanceScenes, AreCertified) {
         expect_certified(scene, pairs[i], distances[i], truth[i], tolerance, reach);
         touching += distances[i].upper == 0;
       }
-      EXPECT_EQ(found.query.report().counters.touching, touching);
-      EXPECT_EQ(found.query.report().counters.object_pairs, pairs.size());
+      EXPECT_EQ(found.report().counters.touching, touching);
+      EXPECT_EQ(found.report().counters.object_pairs, pairs.size());
       EXPECT_LE(found.query.bytes(),
                 most_distance_bytes(found.query.capacity(), scene.assets.views().size()));
     }
@@ -143,11 +116,11 @@ TEST_P(GpuDistanceScenes, AreTheSameBytesOnEveryRun) {
     Found found(scene, every_pair(scene));
     ASSERT_EQ(found.find(), Status::kOk);
     const Distances first = found.distances();
-    const GpuDistanceReport report = found.query.report();
+    const GpuDistanceReport report = found.report();
     for (int i = 0; i < 8; ++i) {
       ASSERT_EQ(found.find(), Status::kOk);
       EXPECT_TRUE(same_bytes(found.distances(), first));
-      EXPECT_EQ(found.query.report().counters, report.counters);
+      EXPECT_EQ(found.report().counters, report.counters);
     }
   });
 }
@@ -183,7 +156,7 @@ TEST_F(GpuDistances, OfOneLargePair) {
     expect_overlap({distances[i].lower, distances[i].upper}, {truth[i].lower, truth[i].upper});
     EXPECT_EQ(distances[i].upper == 0, truth[i].upper == 0);
   }
-  EXPECT_EQ(found.query.report().counters.touching, 2u);
+  EXPECT_EQ(found.report().counters.touching, 2u);
 }
 
 /// Cubes that nearly touch, one with coordinates that differ in size by 2^-400: exact arithmetic needs more
@@ -197,12 +170,11 @@ TEST_F(GpuDistances, WhatNeedsWiderNumbersIsToldAndGetsThem) {
   ASSERT_GT(truth[0].lower, 0);
   Found found(scene, pairs);
   ASSERT_EQ(found.query.reserve({1, 1u << 12, 1u << 12, 1u << 10, kFewWords}), Status::kOk);
-  ASSERT_EQ(found.enqueue({}, nullptr), Status::kOk);
-  ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
-  EXPECT_EQ(found.query.report().complete, 0u);
-  EXPECT_GT(found.query.report().needed.words, kFewWords);
+  found.run();
+  EXPECT_EQ(found.report().complete, 0u);
+  EXPECT_GT(found.report().needed.words, kFewWords);
   ASSERT_EQ(found.find(), Status::kOk);
-  EXPECT_EQ(found.query.report().complete, 1u);
+  EXPECT_EQ(found.report().complete, 1u);
   expect_certified(scene, pairs[0], found.distances()[0], truth[0], {}, INFINITY);
 }
 
@@ -212,7 +184,7 @@ TEST_F(GpuDistances, WhatDoesNotFitIsToldAndNothingIsLostOnTheRetry) {
   Found found(scene, pairs);
   ASSERT_EQ(found.find(), Status::kOk);
   const Distances expected = found.distances();
-  const GpuDistanceCapacity needed = found.query.report().needed;
+  const GpuDistanceCapacity needed = found.report().needed;
   ASSERT_GT(needed.settled, 1u);
   for (std::uint32_t GpuDistanceCapacity::*const member :
        {&GpuDistanceCapacity::pairs, &GpuDistanceCapacity::block_pairs, &GpuDistanceCapacity::triangle_pairs,
@@ -221,14 +193,12 @@ TEST_F(GpuDistances, WhatDoesNotFitIsToldAndNothingIsLostOnTheRetry) {
     small.*member -= 1;
     Found tight(scene, pairs);
     ASSERT_EQ(tight.query.reserve(small), Status::kOk);
-    ASSERT_EQ(tight.enqueue({}, nullptr), Status::kOk);
-    ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
-    EXPECT_EQ(tight.query.report().complete, 0u);
-    EXPECT_GE(tight.query.report().needed.*member, needed.*member);
+    tight.run();
+    EXPECT_EQ(tight.report().complete, 0u);
+    EXPECT_GE(tight.report().needed.*member, needed.*member);
     ASSERT_EQ(tight.query.reserve(needed), Status::kOk);
-    ASSERT_EQ(tight.enqueue({}, nullptr), Status::kOk);
-    ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
-    EXPECT_EQ(tight.query.report().complete, 1u);
+    tight.run();
+    EXPECT_EQ(tight.report().complete, 1u);
     EXPECT_TRUE(same_bytes(tight.distances(), expected));
   }
 }
@@ -241,22 +211,16 @@ TEST_F(GpuDistances, AGraphFollowsTheBodies) {
   ASSERT_EQ(poses.reserve(2), cudaSuccess);
   Found found(scene, pairs);
   ASSERT_EQ(found.query.reserve({1, 1u << 12, 1u << 12, 1u << 10, 0}), Status::kOk);
-  GpuStream stream;
-  GpuGraph graph;
-  ASSERT_EQ(stream.create(), cudaSuccess);
-  ASSERT_EQ(graph.capture(stream.get(),
-                          [&] {
-                            EXPECT_EQ(found.query.enqueue({assets.data(), poses.data(), 2},
-                                                          found.scene.pairs(), {.reach = 4}, stream.get()),
-                                      Status::kOk);
-                          }),
-            cudaSuccess);
+  test::GraphStream stream;
+  stream.capture([&] {
+    return found.query.enqueue({assets.data(), poses.data(), 2}, found.scene.pairs(), {.reach = 4},
+                               stream.get());
+  });
   for (const double gap : {0.5, 0.0, 3.0, 5.0, 0.25}) {
     std::vector<Pose> moved = {scene.instances[0].pose, scene.instances[0].pose};
     moved[1].translation[0] += 1 + gap;
     ASSERT_EQ(poses.upload(moved, stream.get()), cudaSuccess);
-    ASSERT_EQ(graph.launch(stream.get()), cudaSuccess);
-    ASSERT_EQ(stream.wait(), cudaSuccess);
+    stream.launch();
     const ObjectDistance distance = found.distances()[0];
     if (gap < 4) {
       expect_overlap({distance.lower, distance.upper}, {gap, gap});
@@ -272,7 +236,7 @@ TEST_F(GpuDistances, ErrorsAreNamed) {
                             std::uint64_t where) {
     Found found(wrong, pairs);
     const Status status = found.find();
-    EXPECT_EQ(found.query.report().where, where);
+    EXPECT_EQ(found.report().where, where);
     return status;
   };
   EXPECT_EQ(status_of(scene, {{0, 1}, {0, 3}}, 1), Status::kUnknownInstance);
@@ -287,8 +251,7 @@ TEST_F(GpuDistances, ErrorsAreNamed) {
   EXPECT_EQ(found.find({.reach = -1}), Status::kOutOfRange);
   EXPECT_EQ(found.find({.tolerance = {0, NAN}}), Status::kOutOfRange);
   EXPECT_EQ(found.find(), Status::kOk);
-  GpuScene oriented(scene.assets, scene.instances, {{0, 1}}, Contents::exact_queries);
-  EXPECT_EQ(found.query.set_assets(oriented.assets(), nullptr), Status::kNoAxisAlignedBlocks);
+  test::expect_needed<GpuDistanceQuery>(scene, Contents::exact_queries, Status::kNoAxisAlignedBlocks);
 }
 
 }  // namespace

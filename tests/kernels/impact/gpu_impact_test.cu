@@ -13,7 +13,6 @@
 namespace tandem {
 namespace {
 
-using test::GpuScene;
 using test::ImpactChecker;
 using test::moving;
 using test::MovingScene;
@@ -32,13 +31,9 @@ GpuImpactOptions gpu_options(bool sorted = false) {
 const GpuImpactOptions kSorted = gpu_options(true);
 
 /// A scene with motions on the GPU, and a query of it.
-struct Moved {
+struct Moved : test::AskedOnGpu<GpuImpactQuery> {
   explicit Moved(const MovingScene& moves, const Pairs& given = {})
-      : scene(moves.scene.assets, moves.scene.instances, given),
-        motion(on_gpu(moves.motion)),
-        duration(moves.duration) {
-    EXPECT_EQ(query.set_assets(scene.assets(), nullptr), Status::kOk);
-  }
+      : AskedOnGpu(moves.scene, given), motion(on_gpu(moves.motion)), duration(moves.duration) {}
   Status find(const GpuImpactOptions& options = gpu_options()) {
     return query.find(scene.instances(), motion.data(), duration, options, nullptr);
   }
@@ -51,10 +46,8 @@ struct Moved {
   Impacts impacts() const { return test::download(query.impacts(), query.report().impacts); }
   Pairs pairs() const { return test::download(query.pairs().pairs, query.report().impacts); }
 
-  GpuScene scene;
   GpuArray<RigidMotion> motion;
   double duration;
-  GpuImpactQuery query;
 };
 
 /// Byte by byte but for what lies behind the status.
@@ -130,11 +123,7 @@ TEST_P(GpuImpactFamilies, NothingTouchesUntilTSafeAndThenTheGapIsWhatIsTold) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, GpuImpactFamilies, testing::ValuesIn(test::kMotionFamilies),
-                         [](const auto& family) {
-                           std::string name = family.param.name;
-                           std::replace(name.begin(), name.end(), ' ', '_');
-                           return name;
-                         });
+                         [](const auto& tested) { return test::family_name(tested); });
 
 /// Bodies whose trees are deep enough to be posed at times of the step. Some go through others.
 MovingScene shower(std::uint64_t seed, int count, std::uint32_t triangles, double speed) {
@@ -173,7 +162,7 @@ TEST_F(GpuImpacts, OfManyBodiesAreCertifiedAndNearlyThoseOfTheCpu) {
     EXPECT_GT(meet, 10u);
     EXPECT_GT(at_start, 5u);
     EXPECT_LE(other, found.size() / 100);
-    const ImpactCounters& counters = moved.query.report().counters;
+    const ImpactCounters& counters = moved.report().counters;
     EXPECT_EQ(counters.object_pairs, pairs.size());
     EXPECT_EQ(counters.found, meet);
     EXPECT_EQ(counters.at_start, at_start);
@@ -212,25 +201,21 @@ TEST_F(GpuImpacts, EveryRunAndEveryReplayHasTheSameBytes) {
   Moved moved(moves);
   ASSERT_EQ(moved.find(kSorted), Status::kOk);
   const Impacts expected = moved.impacts();
-  const ImpactCounters counters = moved.query.report().counters;
+  const ImpactCounters counters = moved.report().counters;
   EXPECT_GT(counters.found, 5u);
-  GpuStream stream;
-  ASSERT_EQ(stream.create(), cudaSuccess);
-  GpuGraph graph;
-  ASSERT_EQ(
-      graph.capture(stream.get(), [&] { EXPECT_EQ(moved.enqueue(kSorted, stream.get()), Status::kOk); }),
-      cudaSuccess);
+  test::GraphStream stream;
+  stream.capture([&] { return moved.enqueue(kSorted, stream.get()); });
   for (int i = 0; i < 6; ++i) {
     ASSERT_EQ(cudaMemset(const_cast<Impact*>(moved.query.impacts()), 0xFF, expected.size() * sizeof(Impact)),
               cudaSuccess);
     if (i % 2 == 0) {
-      ASSERT_EQ(graph.launch(stream.get()), cudaSuccess);
+      stream.launch();
     } else {
       ASSERT_EQ(moved.enqueue(kSorted, stream.get()), Status::kOk);
     }
     ASSERT_EQ(cudaStreamSynchronize(stream.get()), cudaSuccess);
     EXPECT_TRUE(same(moved.impacts(), expected));
-    EXPECT_EQ(moved.query.report().counters, counters);
+    EXPECT_EQ(moved.report().counters, counters);
   }
   Moved again(moves);
   ASSERT_EQ(again.find(kSorted), Status::kOk);
@@ -242,7 +227,7 @@ TEST_F(GpuImpacts, WhatDoesNotFitIsToldAndNothingIsLostOnTheRetry) {
   Moved whole(moves);
   ASSERT_EQ(whole.find(kSorted), Status::kOk);
   const Impacts expected = whole.impacts();
-  const GpuImpactCapacity needed = whole.query.report().needed;
+  const GpuImpactCapacity needed = whole.report().needed;
   const auto starved = [&](auto GpuImpactCapacity::*what) {
     GpuImpactCapacity capacity = needed;
     capacity.undecided += needed.undecided / 2 + 1024;
@@ -251,17 +236,16 @@ TEST_F(GpuImpacts, WhatDoesNotFitIsToldAndNothingIsLostOnTheRetry) {
     EXPECT_EQ(moved.query.reserve(capacity, kSorted), Status::kOk);
     EXPECT_EQ(moved.enqueue(kSorted, nullptr), Status::kOk);
     EXPECT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
-    EXPECT_EQ(moved.query.report().complete, 0u);
-    EXPECT_EQ(moved.query.report().impacts, 0u);
-    EXPECT_GE(moved.query.report().needed.*what, needed.*what);
+    EXPECT_EQ(moved.report().complete, 0u);
+    EXPECT_EQ(moved.report().impacts, 0u);
+    EXPECT_GE(moved.report().needed.*what, needed.*what);
     EXPECT_EQ(moved.find(kSorted), Status::kOk);
     EXPECT_TRUE(same(moved.impacts(), expected));
   };
-  starved(&GpuImpactCapacity::pairs);
   starved(&GpuImpactCapacity::contacts);
-  starved(&GpuImpactCapacity::parts);
-  starved(&GpuImpactCapacity::block_pairs);
-  starved(&GpuImpactCapacity::triangle_pairs);
+  for (const auto member : {&GpuImpactCapacity::pairs, &GpuImpactCapacity::parts,
+                            &GpuImpactCapacity::block_pairs, &GpuImpactCapacity::triangle_pairs})
+    starved(member);
 
   Moved moved(moves);
   EXPECT_EQ(moved.query.reserve({}, kSorted), Status::kOk);
@@ -309,11 +293,11 @@ TEST_F(GpuImpacts, FiltersLeavePairsOut) {
   GpuImpactOptions options = gpu_options();
   Moved moved(moves);
   ASSERT_EQ(moved.find(options), Status::kOk);
-  EXPECT_EQ(moved.query.report().impacts, pairs_of_cpu(moves).size());
-  EXPECT_EQ(moved.query.report().impacts, 1u);
+  EXPECT_EQ(moved.report().impacts, pairs_of_cpu(moves).size());
+  EXPECT_EQ(moved.report().impacts, 1u);
   options.filter.excluded = excluded.view();
   ASSERT_EQ(moved.find(options), Status::kOk);
-  EXPECT_EQ(moved.query.report().impacts, 0u);
+  EXPECT_EQ(moved.report().impacts, 0u);
 }
 
 TEST_F(GpuImpacts, ErrorsAreNamedAndLeaveNothing) {
@@ -325,9 +309,9 @@ TEST_F(GpuImpacts, ErrorsAreNamedAndLeaveNothing) {
     Moved moved(moves, pairs);
     const Status status = moved.find_given();
     if (status != Status::kOk) {
-      EXPECT_EQ(moved.query.report().where, where);
-      EXPECT_EQ(moved.query.report().impacts, 0u);
-      EXPECT_EQ(moved.find(), moved.query.report().status);
+      EXPECT_EQ(moved.report().where, where);
+      EXPECT_EQ(moved.report().impacts, 0u);
+      EXPECT_EQ(moved.find(), moved.report().status);
     }
     return status;
   };
@@ -349,7 +333,7 @@ TEST_F(GpuImpacts, ErrorsAreNamedAndLeaveNothing) {
   moves.scene.instances[1] = {0, at(3, 0, 0)};
   Moved unknown(moves, {{0, 1}, {0, 2}});
   EXPECT_EQ(unknown.find_given(), Status::kUnknownInstance);
-  EXPECT_EQ(unknown.query.report().where, 1u);
+  EXPECT_EQ(unknown.report().where, 1u);
   Moved moved(moves, {{0, 1}});
   for (const double duration : {-1.0, static_cast<double>(INFINITY), static_cast<double>(NAN)}) {
     moved.duration = duration;
@@ -362,10 +346,8 @@ TEST_F(GpuImpacts, ErrorsAreNamedAndLeaveNothing) {
 }
 
 TEST_F(GpuImpacts, NeedBothKindsOfBlocks) {
-  const MovingScene moves = test::moving_crowd(3, 2);
-  const GpuScene scene(moves.scene.assets, moves.scene.instances, {}, Contents::exact_queries);
-  GpuImpactQuery query;
-  EXPECT_EQ(query.set_assets(scene.assets(), nullptr), Status::kNoAxisAlignedBlocks);
+  test::expect_needed<GpuImpactQuery>(test::moving_crowd(3, 2).scene, Contents::exact_queries,
+                                      Status::kNoAxisAlignedBlocks);
 }
 
 }  // namespace

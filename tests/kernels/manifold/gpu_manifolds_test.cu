@@ -14,12 +14,6 @@ using test::BodyScene;
 using test::download;
 using test::GpuScene;
 
-GpuContactOptions grouped() {
-  GpuContactOptions options = test::gpu_options(QueryMode::exact);
-  options.grouped = true;
-  return options;
-}
-
 struct Result {
   std::vector<Manifold> manifolds;
   std::vector<ManifoldPoint> points;
@@ -73,15 +67,13 @@ void expect_same(const Result& cpu, const Result& gpu) {
 /// Both sides of a scene, which goes on from step to step.
 class BothSides {
  public:
-  explicit BothSides(const test::SampleAssets& assets, Contents contents = Contents::manifolds) {
+  explicit BothSides(const test::SampleAssets& assets, Contents contents = Contents::manifolds)
+      : uploaded_(assets, {}, {}, contents) {
     const auto files = assets.views();
     EXPECT_EQ(query_.set_assets(files), Status::kOk);
     EXPECT_EQ(manifolds_.set_assets(files), Status::kOk);
-    EXPECT_EQ(uploaded_.upload(files, contents, nullptr), Status::kOk);
-    for (std::size_t i = 0; i < files.size(); ++i)
-      gpu_assets_.push_back(gpu_asset(uploaded_.level(i), files[i]));
-    EXPECT_EQ(gpu_query_.set_assets(gpu_assets_, nullptr), Status::kOk);
-    EXPECT_EQ(gpu_.set_assets(gpu_assets_, nullptr), Status::kOk);
+    EXPECT_EQ(gpu_query_.set_assets(uploaded_.assets(), nullptr), Status::kOk);
+    EXPECT_EQ(gpu_.set_assets(uploaded_.assets(), nullptr), Status::kOk);
   }
 
   /// Makes the manifolds of the CPU, and of the GPU as often as room was too small, and compares them.
@@ -89,12 +81,13 @@ class BothSides {
   std::size_t step(const std::vector<Instance>& instances, const std::vector<ObjectPair>& pairs,
                    bool match_previous = true) {
     const Result cpu = on_cpu(instances, pairs, match_previous);
-    const OnGpu scene(instances, pairs);
-    EXPECT_EQ(gpu_query_.find_contacts(scene.instances(), scene.pairs(), grouped(), nullptr), Status::kOk);
+    const GpuScene scene(std::span<const AssetView>(), instances, pairs);
+    EXPECT_EQ(gpu_query_.find_contacts(scene.instances(), scene.pairs(), test::grouped_options(), nullptr),
+              Status::kOk);
     EXPECT_EQ(
         gpu_.make(scene.instances(), scene.pairs(), gpu_query_, {.match_previous = match_previous}, nullptr),
         Status::kOk);
-    EXPECT_LE(gpu_.bytes(), most_manifold_bytes(gpu_.capacity(), gpu_assets_.size()));
+    EXPECT_LE(gpu_.bytes(), most_manifold_bytes(gpu_.capacity(), uploaded_.assets().size()));
     expect_same(cpu, result_of(gpu_));
     return cpu.points.size();
   }
@@ -109,40 +102,13 @@ class BothSides {
             manifolds_.counters()};
   }
 
-  /// Instances and pairs in GPU memory.
-  struct OnGpu {
-    OnGpu(const std::vector<Instance>& instances, const std::vector<ObjectPair>& pairs)
-        : pairs_(test::on_gpu(pairs)),
-          count_(test::on_gpu(std::vector<std::uint32_t>{static_cast<std::uint32_t>(pairs.size())})),
-          instance_count_(static_cast<std::uint32_t>(instances.size())),
-          pair_count_(static_cast<std::uint32_t>(pairs.size())) {
-      std::vector<std::uint32_t> assets;
-      std::vector<Pose> poses;
-      for (const Instance& instance : instances) {
-        assets.push_back(instance.asset);
-        poses.push_back(instance.pose);
-      }
-      asset_ = test::on_gpu(assets);
-      pose_ = test::on_gpu(poses);
-    }
-    GpuInstances instances() const { return {asset_.data(), pose_.data(), instance_count_}; }
-    GpuPairs pairs() const { return {pairs_.data(), count_.data(), pair_count_}; }
-
-    GpuArray<std::uint32_t> asset_;
-    GpuArray<Pose> pose_;
-    GpuArray<ObjectPair> pairs_;
-    GpuArray<std::uint32_t> count_;
-    std::uint32_t instance_count_, pair_count_;
-  };
-
   GpuContactQuery& gpu_query() { return gpu_query_; }
   GpuManifoldQuery& gpu() { return gpu_; }
 
  private:
   ContactQuery query_;
   ManifoldQuery manifolds_;
-  DeviceAssets uploaded_;
-  std::vector<GpuAsset> gpu_assets_;
+  GpuScene uploaded_;
   GpuContactQuery gpu_query_;
   GpuManifoldQuery gpu_;
 };
@@ -187,7 +153,7 @@ TEST_P(GpuManifoldsOfFamily, AreTheCpus) {
   }
 }
 INSTANTIATE_TEST_SUITE_P(Scenes, GpuManifoldsOfFamily, testing::ValuesIn(test::scene_families()),
-                         [](const auto& tested) { return std::string(tested.param.name); });
+                         [](const auto& tested) { return test::family_name(tested); });
 
 TEST_F(GpuManifolds, GoOnFromStepToStep) {
   for (const Contents contents : {Contents::manifolds, Contents::all}) {
@@ -238,9 +204,10 @@ TEST_F(GpuManifolds, WithoutRoomTellWhatTheyNeed) {
   std::vector<ObjectPair> pairs = test::all_pairs(scene.instances, false, random);
   for (int step = 0; step < 3; ++step) {
     const Result cpu = both.on_cpu(scene.instances, pairs, true);
-    const BothSides::OnGpu on_gpu(scene.instances, pairs);
-    ASSERT_EQ(both.gpu_query().find_contacts(on_gpu.instances(), on_gpu.pairs(), grouped(), nullptr),
-              Status::kOk);
+    const GpuScene on_gpu(std::span<const AssetView>(), scene.instances, pairs);
+    ASSERT_EQ(
+        both.gpu_query().find_contacts(on_gpu.instances(), on_gpu.pairs(), test::grouped_options(), nullptr),
+        Status::kOk);
     if (step == 0) {
       ASSERT_EQ(both.gpu().reserve({.pairs = 1, .contacts = 1, .manifolds = 1, .points = 1}), Status::kOk);
       ASSERT_EQ(both.gpu().enqueue(on_gpu.instances(), on_gpu.pairs(), both.gpu_query(), {}, nullptr),
@@ -272,36 +239,22 @@ TEST_F(GpuManifolds, OfAGraphThatIsReplayed) {
   BothSides both(scene.assets);
   const std::vector<ObjectPair> pairs = test::all_pairs(scene.instances, false, random);
   both.step(scene.instances, pairs);
-  const BothSides::OnGpu on_gpu(scene.instances, pairs);
-  ASSERT_EQ(cudaDeviceSynchronize(), cudaSuccess);  // the stream does not wait for copies on the default one
-  GpuStream stream;
-  ASSERT_EQ(stream.create(), cudaSuccess);
-  GpuGraph graph;
-  ASSERT_EQ(graph.capture(stream.get(),
-                          [&] {
-                            EXPECT_EQ(both.gpu_query().enqueue(on_gpu.instances(), on_gpu.pairs(), grouped(),
-                                                               stream.get()),
-                                      Status::kOk);
-                            EXPECT_EQ(both.gpu().enqueue(on_gpu.instances(), on_gpu.pairs(), both.gpu_query(),
-                                                         {}, stream.get()),
-                                      Status::kOk);
-                          }),
-            cudaSuccess);
+  const GpuScene on_gpu(std::span<const AssetView>(), scene.instances, pairs);
+  test::GraphStream stream;
+  stream.capture([&] {
+    EXPECT_EQ(
+        both.gpu_query().enqueue(on_gpu.instances(), on_gpu.pairs(), test::grouped_options(), stream.get()),
+        Status::kOk);
+    return both.gpu().enqueue(on_gpu.instances(), on_gpu.pairs(), both.gpu_query(), {}, stream.get());
+  });
   for (int step = 0; step < 3; ++step) {
-    ASSERT_EQ(graph.launch(stream.get()), cudaSuccess);
-    ASSERT_EQ(stream.wait(), cudaSuccess);
+    stream.launch();
     expect_same(both.on_cpu(scene.instances, pairs, true), result_of(both.gpu()));
   }
 }
 
 TEST_F(GpuManifolds, NeedTopology) {
-  BodyScene scene = boxes(2, 1, 61);
-  const auto files = scene.assets.views();
-  DeviceAssets uploaded;
-  ASSERT_EQ(uploaded.upload(files, Contents::exact_queries, nullptr), Status::kOk);
-  const GpuAsset asset = gpu_asset(uploaded.level(0), files[0]);
-  GpuManifoldQuery manifolds;
-  EXPECT_EQ(manifolds.set_assets({&asset, 1}, nullptr), Status::kNoTopology);
+  test::expect_needed<GpuManifoldQuery>(boxes(2, 1, 61), Contents::exact_queries, Status::kNoTopology);
 }
 
 }  // namespace

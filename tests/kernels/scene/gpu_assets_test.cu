@@ -5,33 +5,20 @@
 
 #include "gpu/gpu_scene_fixture.h"
 #include "gpu/made_files.h"
-#include "tandem/kernels/contact_query.h"
+#include "kernels/contact/only_walk.h"
 
 namespace tandem {
 namespace {
 
+using test::AskedContacts;
 using test::BodyScene;
 using test::Bytes;
-using test::download;
 using test::GpuScene;
+using test::kModes;
 using test::MadeLevel;
-using test::on_gpu;
 using test::RandomPoses;
 
-constexpr QueryMode kModes[] = {QueryMode::exact, QueryMode::fast, QueryMode::boxes};
-
 class GpuAssets : public test::GpuTest {};
-
-std::vector<Contact> contacts_on_cpu(std::span<const AssetView> assets,
-                                     const std::vector<Instance>& instances,
-                                     const std::vector<ObjectPair>& pairs, QueryMode mode) {
-  ContactQuery query;
-  EXPECT_EQ(query.set_assets(assets), Status::kOk);
-  ContactOptions options;
-  options.mode = mode;
-  EXPECT_EQ(query.find_contacts(instances, pairs, options), Status::kOk);
-  return test::sorted({query.contacts().begin(), query.contacts().end()});
-}
 
 std::vector<Contact> contacts_on_gpu(std::span<const GpuAsset> assets, const GpuScene& scene,
                                      QueryMode mode) {
@@ -40,27 +27,23 @@ std::vector<Contact> contacts_on_gpu(std::span<const GpuAsset> assets, const Gpu
   EXPECT_EQ(query.find_contacts(scene.instances(), scene.pairs(), test::gpu_options(mode), nullptr),
             Status::kOk)
       << cudaGetErrorString(query.cuda_error());
-  return test::sorted(download(query.contacts(), query.report().contacts));
+  return test::sorted(test::download(query.contacts(), query.report().contacts));
 }
 
 TEST_F(GpuAssets, OfExactQueriesAloneAnswerThemAndNoOthers) {
   RandomPoses random(1);
   const BodyScene scene = test::pile(30, 600, 1, 51);
   const auto pairs = test::all_pairs(scene.instances, true, random);
-  const GpuScene on_gpu(scene.assets, scene.instances, pairs, Contents::exact_queries);
-  const auto expected = contacts_on_cpu(scene.assets.views(), scene.instances, pairs, QueryMode::exact);
+  AskedContacts gpu(scene, pairs, Contents::exact_queries);
+  const auto expected = test::ask_cpu(scene, pairs).contacts;
   EXPECT_GT(expected.size(), 1000u);
-  EXPECT_EQ(contacts_on_gpu(on_gpu.assets(), on_gpu, QueryMode::exact), expected);
-  GpuContactQuery query;
-  ASSERT_EQ(query.set_assets(on_gpu.assets(), nullptr), Status::kOk);
+  EXPECT_EQ(contacts_on_gpu(gpu.scene.assets(), gpu.scene, QueryMode::exact), expected);
   for (const QueryMode mode : {QueryMode::fast, QueryMode::boxes}) {
-    EXPECT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {mode}, nullptr),
-              Status::kNoAxisAlignedBlocks);
-    EXPECT_EQ(query.enqueue(on_gpu.instances(), on_gpu.pairs(), {mode}, nullptr),
-              Status::kNoAxisAlignedBlocks);
+    EXPECT_EQ(gpu.find({mode}), Status::kNoAxisAlignedBlocks);
+    EXPECT_EQ(gpu.enqueue(nullptr, GpuContactOptions{mode}), Status::kNoAxisAlignedBlocks);
   }
-  ASSERT_EQ(query.find_contacts(on_gpu.instances(), on_gpu.pairs(), {}, nullptr), Status::kOk);
-  EXPECT_EQ(query.report().contacts, expected.size());
+  ASSERT_EQ(gpu.find(), Status::kOk);
+  EXPECT_EQ(gpu.report().contacts, expected.size());
 }
 
 TEST_F(GpuAssets, WithoutOrientedBlocksAnswerAllButExactQueries) {
@@ -76,7 +59,7 @@ TEST_F(GpuAssets, WithoutOrientedBlocksAnswerAllButExactQueries) {
   const GpuAsset assets[] = {gpu_asset(uploaded.level(0), views[0]), gpu_asset(uploaded.level(1), views[1])};
   const GpuScene scene(std::span<const AssetView>(), instances, pairs);
   for (const QueryMode mode : {QueryMode::fast, QueryMode::boxes}) {
-    const auto expected = contacts_on_cpu(views, instances, pairs, mode);
+    const auto expected = test::ask_cpu(views, instances, pairs, {.mode = mode}).contacts;
     EXPECT_GT(expected.size(), 100u);
     EXPECT_EQ(contacts_on_gpu(assets, scene, mode), expected);
   }
@@ -84,8 +67,8 @@ TEST_F(GpuAssets, WithoutOrientedBlocksAnswerAllButExactQueries) {
   ASSERT_EQ(query.set_assets(assets, nullptr), Status::kOk);
   EXPECT_EQ(query.find_contacts(scene.instances(), scene.pairs(), {}, nullptr), Status::kNoOrientedBlocks);
   EXPECT_EQ(query.enqueue(scene.instances(), scene.pairs(), {}, nullptr), Status::kNoOrientedBlocks);
-  EXPECT_EQ(query.enqueue(scene.instances(), scene.pairs(), {.walk_only = true}, nullptr),
-            Status::kNoOrientedBlocks);
+  only_walk(query, true);
+  EXPECT_EQ(query.enqueue(scene.instances(), scene.pairs(), {}, nullptr), Status::kNoOrientedBlocks);
   // An upload for exact queries of such a file has triangles alone.
   ASSERT_EQ(uploaded.upload({views, 1}, Contents::exact_queries, nullptr), Status::kOk);
   EXPECT_EQ(uploaded.level(0).oriented_blocks, nullptr);
@@ -122,7 +105,7 @@ TEST_F(GpuAssets, OfEveryLevelHaveThatLevelsContacts) {
       const GpuAsset level = gpu_asset(uploaded.level(0, i), view, i);
       for (const QueryMode mode : kModes) {
         if (contents == Contents::exact_queries && mode != QueryMode::exact) continue;
-        const auto expected = contacts_on_cpu({&single, 1}, instances, pairs, mode);
+        const auto expected = test::ask_cpu({&single, 1}, instances, pairs, {.mode = mode}).contacts;
         EXPECT_FALSE(expected.empty());
         EXPECT_EQ(contacts_on_gpu({&level, 1}, scene, mode), expected) << "level " << i;
       }
@@ -147,7 +130,7 @@ TEST_F(GpuAssets, OfTheGreatestDepthAreWalked) {
     const GpuScene scene(std::span<const AssetView>(), instances, pairs);
     for (const QueryMode mode : kModes)
       EXPECT_EQ(contacts_on_gpu({&on_gpu, 1}, scene, mode),
-                contacts_on_cpu({&view, 1}, instances, pairs, mode))
+                test::ask_cpu({&view, 1}, instances, pairs, {.mode = mode}).contacts)
           << "depth " << depth;
   }
 }
@@ -165,7 +148,7 @@ TEST_F(GpuAssets, OfManyKindsAreWalkedTogether) {
     const GpuScene on_gpu(scene.assets, scene.instances, pairs, contents);
     for (const QueryMode mode : kModes) {
       if (contents == Contents::exact_queries && mode != QueryMode::exact) continue;
-      const auto expected = contacts_on_cpu(scene.assets.views(), scene.instances, pairs, mode);
+      const auto expected = test::ask_cpu(scene, pairs, {.mode = mode}).contacts;
       EXPECT_GT(expected.size(), 1000u);
       EXPECT_EQ(contacts_on_gpu(on_gpu.assets(), on_gpu, mode), expected);
     }

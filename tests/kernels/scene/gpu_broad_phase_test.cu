@@ -1,73 +1,37 @@
-#include "tandem/kernels/gpu_broad_phase.h"
-
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <limits>
-#include <random>
 #include <string>
 #include <thread>
-#include <vector>
 
-#include "gpu/gpu_scene_fixture.h"
-#include "kernels/scene/broad_phase_limits.h"
+#include "kernels/scene/gpu_broad_phase_fixture.h"
 
 namespace tandem {
 namespace {
 
+using test::before;
+using test::Boxes;
 using test::download;
+using test::kFew;
+using test::kMany;
+using test::of_cpu;
 using test::on_gpu;
-
-// Numbers of boxes: some that are tested each against each, some that a tree is made of.
-constexpr std::uint32_t kFew = 3000, kMany = 20000;
-static_assert(kFewPosed < kFew && kFew <= kFewBoxes && kFewBoxes < kMany);
+using test::Pairs;
+using test::same;
+using test::stored;
 
 class GpuBroadPhaseTest : public test::GpuTest {};
 
-using Boxes = std::vector<WorldBox>;
-using Pairs = std::vector<ObjectPair>;
-
-bool before(const ObjectPair& x, const ObjectPair& y) {
-  return x.a != y.a ? x.a < y.a : x.b < y.b;
-}
-
-bool same(const Pairs& x, const Pairs& y) {
-  return x.size() == y.size() && (x.empty() || std::memcmp(x.data(), y.data(), x.size() * sizeof x[0]) == 0);
-}
-
-Pairs of_cpu(const Boxes& boxes) {
-  BroadPhase broad_phase;
-  EXPECT_EQ(broad_phase.find_pairs(boxes), Status::kOk);
-  return {broad_phase.pairs().begin(), broad_phase.pairs().end()};
-}
-
-// What the last call stored.
-Pairs stored(const GpuBroadPhase& broad_phase) {
-  const GpuPairs pairs = broad_phase.pairs();
-  return download(pairs.pairs, std::min(download(pairs.count, 1)[0], pairs.capacity));
-}
-
-Pairs of_gpu(GpuBroadPhase& broad_phase, const Boxes& boxes, bool sorted) {
-  const auto device = on_gpu(boxes);
-  EXPECT_EQ(
-      broad_phase.find_pairs(device.data(), static_cast<std::uint32_t>(boxes.size()), {sorted}, nullptr),
-      Status::kOk)
-      << cudaGetErrorString(broad_phase.cuda_error());
-  EXPECT_EQ(broad_phase.report().complete, 1u);
-  Pairs pairs = stored(broad_phase);
-  EXPECT_EQ(pairs.size(), broad_phase.report().found);
-  if (!sorted) std::sort(pairs.begin(), pairs.end(), before);
-  return pairs;
+Pairs of_gpu(GpuBroadPhase& broad_phase, const Boxes& boxes, const GpuBroadPhaseOptions& options) {
+  return test::of_gpu(broad_phase, on_gpu(boxes), boxes.size(), options);
 }
 
 void expect_same_as_cpu(GpuBroadPhase& broad_phase, const Boxes& boxes, const std::string& what) {
   const Pairs expected = of_cpu(boxes);
-  EXPECT_TRUE(same(of_gpu(broad_phase, boxes, false), expected))
-      << what << ", " << expected.size() << " pairs";
-  EXPECT_TRUE(same(of_gpu(broad_phase, boxes, true), expected)) << what << ", sorted";
+  EXPECT_TRUE(same(of_gpu(broad_phase, boxes, {}), expected)) << what << ", " << expected.size() << " pairs";
+  EXPECT_TRUE(same(of_gpu(broad_phase, boxes, {true}), expected)) << what << ", sorted";
 }
 
 // The edge of equal cubes in the unit cube that have so many neighbours each.
@@ -112,31 +76,10 @@ Boxes lattice(int side, double offset) {
 
 TEST_F(GpuBroadPhaseTest, AnyNumberOfBoxes) {
   GpuBroadPhase broad_phase;
-  for (const std::uint32_t count : {0u,
-                                    1u,
-                                    2u,
-                                    3u,
-                                    4u,
-                                    5u,
-                                    31u,
-                                    32u,
-                                    33u,
-                                    63u,
-                                    64u,
-                                    65u,
-                                    127u,
-                                    128u,
-                                    129u,
-                                    1000u,
-                                    1023u,
-                                    1024u,
-                                    1025u,
-                                    kFew,
-                                    kFewBoxes - 1,
-                                    kFewBoxes,
-                                    kFewBoxes + 1,
-                                    2 * kFewBoxes,
-                                    33000u}) {
+  std::vector<std::uint32_t> counts = {0, 1000, kFew, 2 * kFewBoxes, 33000};
+  for (const std::uint32_t count : {2u, 4u, 32u, 64u, 128u, 1024u, kFewBoxes})
+    counts.insert(counts.end(), {count - 1, count, count + 1});
+  for (const std::uint32_t count : counts) {
     for (const double spread : {0.0, 3.0}) {
       const double edge = 4 * edge_for(count + 1, 6);
       expect_same_as_cpu(broad_phase, scattered(count, edge, spread, count), std::to_string(count));
@@ -264,12 +207,12 @@ TEST_F(GpuBroadPhaseTest, TouchingByTheLastBitIsMeeting) {
                    {{x, 0, 0}, {x + size, 1, 1}},
                    {{next, 0, 0}, {x + size, 1, 1}},
                    {{x - 1e3, 5, 5}, {x + 1e3, 6, 6}}};
-    EXPECT_TRUE(same(of_gpu(broad_phase, boxes, true), {{0, 1}, {1, 2}})) << x;
+    EXPECT_TRUE(same(of_gpu(broad_phase, boxes, {true}), {{0, 1}, {1, 2}})) << x;
     for (std::uint32_t i = 0; i < kMany; ++i) {
       const double y = 10 + 2.0 * i;
       boxes.push_back({{x, y, 0}, {x, y + 1, 1}});
     }
-    EXPECT_TRUE(same(of_gpu(broad_phase, boxes, true), {{0, 1}, {1, 2}})) << x << ", of many";
+    EXPECT_TRUE(same(of_gpu(broad_phase, boxes, {true}), {{0, 1}, {1, 2}})) << x << ", of many";
   }
 }
 
@@ -290,8 +233,7 @@ void expect_overflow_is_reported(const Boxes& boxes) {
     GpuBroadPhase broad_phase;
     for (const std::uint32_t room : {0u, 1u, 1000u, static_cast<std::uint32_t>(expected.size()) - 1}) {
       ASSERT_EQ(broad_phase.reserve({count, room}, {sorted}), Status::kOk);
-      ASSERT_EQ(broad_phase.enqueue(device.data(), count, {sorted}, nullptr), Status::kOk);
-      ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
+      test::run(broad_phase, device, count, {sorted});
       EXPECT_EQ(broad_phase.report().status, Status::kOk);
       EXPECT_EQ(broad_phase.report().complete, 0u);
       EXPECT_EQ(broad_phase.report().found, expected.size());
@@ -301,8 +243,7 @@ void expect_overflow_is_reported(const Boxes& boxes) {
       EXPECT_TRUE(std::includes(expected.begin(), expected.end(), some.begin(), some.end(), before));
     }
     ASSERT_EQ(broad_phase.reserve({count, broad_phase.report().count}, {sorted}), Status::kOk);
-    ASSERT_EQ(broad_phase.enqueue(device.data(), count, {sorted}, nullptr), Status::kOk);
-    ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
+    test::run(broad_phase, device, count, {sorted});
     EXPECT_EQ(broad_phase.report().complete, 1u);
     EXPECT_EQ(std::memcmp(download(broad_phase.device_report(), 1).data(), &broad_phase.report(),
                           sizeof(GpuBroadPhaseReport)),
@@ -339,8 +280,7 @@ TEST_F(GpuBroadPhaseTest, NamesTheFirstBoxThatItCannotTakeAndGoesOnAfterwards) {
   const auto device = on_gpu(Boxes(10, {{0, 0, 0}, {1, 1, 1}}));
   GpuBroadPhase unprepared;
   EXPECT_EQ(unprepared.enqueue(device.data(), 10, {}, nullptr), Status::kOutOfRange);
-  const auto* shifted = reinterpret_cast<const WorldBox*>(reinterpret_cast<const char*>(device.data()) + 8);
-  EXPECT_EQ(broad_phase.enqueue(shifted, 9, {}, nullptr), Status::kMisaligned);
+  EXPECT_EQ(broad_phase.enqueue(test::misaligned(device), 9, {}, nullptr), Status::kMisaligned);
 }
 
 Boxes grown_by(Boxes boxes, double margin) {
@@ -351,20 +291,12 @@ Boxes grown_by(Boxes boxes, double margin) {
 void expect_grown_as_cpu(GpuBroadPhase& broad_phase, const Boxes& boxes, double within) {
   const Boxes larger = grown_by(boxes, 0.5 * within);
   const Pairs expected = of_cpu(larger);
-  const auto device = on_gpu(boxes);
   for (const bool sorted : {false, true}) {
-    const GpuBroadPhaseOptions options = {.sorted = sorted, .within = within};
-    ASSERT_EQ(
-        broad_phase.find_pairs(device.data(), static_cast<std::uint32_t>(boxes.size()), options, nullptr),
-        Status::kOk);
-    Pairs pairs = stored(broad_phase);
-    if (!sorted) std::sort(pairs.begin(), pairs.end(), before);
+    const Pairs pairs = of_gpu(broad_phase, boxes, {.sorted = sorted, .within = within});
     EXPECT_TRUE(same(pairs, expected)) << boxes.size() << " boxes within " << within << ": " << pairs.size()
                                        << " instead of " << expected.size();
   }
-  const Boxes taken = download(broad_phase.boxes(), boxes.size());
-  EXPECT_TRUE(boxes.empty() ||
-              std::memcmp(taken.data(), larger.data(), boxes.size() * sizeof(WorldBox)) == 0);
+  EXPECT_TRUE(same(download(broad_phase.boxes(), boxes.size()), larger));
   EXPECT_LE(broad_phase.bytes(), most_broad_phase_bytes(broad_phase.capacity(), true));
   expect_same_as_cpu(broad_phase, boxes, "not grown any more");
 }
@@ -467,20 +399,14 @@ void expect_graph_serves_frames(std::uint32_t count) {
   const auto device = on_gpu(boxes);
   GpuBroadPhase broad_phase;
   ASSERT_EQ(broad_phase.reserve({count, 10 * count}, {true}), Status::kOk);
-  GpuStream stream;
-  ASSERT_EQ(stream.create(), cudaSuccess);
-  GpuGraph graph;
-  const auto enqueue = [&] {
-    EXPECT_EQ(broad_phase.enqueue(device.data(), count, {true}, stream.get()), Status::kOk);
-  };
-  ASSERT_EQ(graph.capture(stream.get(), enqueue), cudaSuccess);
+  test::GraphStream stream;
+  stream.capture([&] { return broad_phase.enqueue(device.data(), count, {true}, stream.get()); });
   for (const Boxes* frame : {&boxes, &later, &boxes}) {
     const auto upload = on_gpu(*frame);
     ASSERT_EQ(cudaMemcpy(device.data(), upload.data(), count * sizeof(WorldBox), cudaMemcpyDeviceToDevice),
               cudaSuccess);
     ASSERT_EQ(cudaDeviceSynchronize(), cudaSuccess);
-    ASSERT_EQ(graph.launch(stream.get()), cudaSuccess);
-    ASSERT_EQ(stream.wait(), cudaSuccess);
+    stream.launch();
     EXPECT_TRUE(same(stored(broad_phase), of_cpu(*frame)));
   }
 }
@@ -489,56 +415,26 @@ TEST_F(GpuBroadPhaseTest, MayBeCapturedIntoAGraph) {
   for (const std::uint32_t count : {kFew, kMany}) expect_graph_serves_frames(count);
 }
 
-Pose random_pose(std::mt19937_64& random, double distance) {
-  std::normal_distribution<double> normal;
-  double q[4], length = 0;
-  for (double& x : q) {
-    x = normal(random);
-    length += x * x;
-  }
-  for (double& x : q) x /= std::sqrt(length);
-  const auto [w, x, y, z] = q;
-  return {{{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
-           {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
-           {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}},
-          {distance * normal(random), distance * normal(random), distance * normal(random)}};
-}
-
-struct Instances {
-  std::vector<std::uint32_t> asset;
-  std::vector<Pose> pose;
-};
-
-Status find_pairs(GpuBroadPhase& broad_phase, const Instances& instances,
+Status find_pairs(GpuBroadPhase& broad_phase, const test::Bodies& bodies,
                   const std::vector<AssetBounds>& bounds, double within = 0) {
-  const auto asset = on_gpu(instances.asset);
-  const auto pose = on_gpu(instances.pose);
-  const auto assets = on_gpu(bounds);
-  return broad_phase.find_pairs(
-      {asset.data(), pose.data(), static_cast<std::uint32_t>(instances.asset.size())},
-      {assets.data(), static_cast<std::uint32_t>(bounds.size())}, {.sorted = true, .within = within},
-      nullptr);
+  const test::GpuBodies instances(bodies);
+  return broad_phase.find_pairs(instances.view(), test::GpuBounds(bounds).view(),
+                                {.sorted = true, .within = within}, nullptr);
 }
 
 void expect_poses_as_the_cpu(GpuBroadPhase& broad_phase, std::uint32_t count) {
   const std::vector<AssetBounds> bounds = {{{0, 0, 0}, {-1, -0.5f, -0.25f}, {1, 0.5f, 0.75f}},
                                            {{1e6, -2e6, 0.1}, {0, 0, 0}, {3, 2, 1}},
                                            {{0, 0, 0}, {1e-40f, -1e-30f, 0}, {1e-39f, 0, 7}}};
-  std::mt19937_64 random(81);
-  Instances instances;
+  test::RandomPoses random(81);
+  test::Bodies instances;
   for (std::uint32_t i = 0; i < count; ++i) {
-    instances.asset.push_back(random() % 3);
-    instances.pose.push_back(random_pose(random, i % 2 == 0 ? std::cbrt(0.4 * count) : 1e9));
+    instances.asset.push_back(static_cast<std::uint32_t>(random.below(3)));
+    instances.pose.push_back(random.pose({1, 1, i % 2 == 0 ? 1.5 * std::cbrt(0.4 * count) : 1e9, 0, 4}));
   }
-  Boxes boxes;
-  for (std::size_t i = 0; i < instances.asset.size(); ++i) {
-    const AssetBounds& asset = bounds[instances.asset[i]];
-    boxes.push_back(
-        world_box(for_stored_coordinates(instances.pose[i], asset.origin), asset.lower, asset.upper));
-  }
+  const Boxes boxes = instances.boxes(bounds);
   ASSERT_EQ(find_pairs(broad_phase, instances, bounds), Status::kOk);
-  const Boxes posed = download(broad_phase.boxes(), boxes.size());
-  EXPECT_EQ(std::memcmp(posed.data(), boxes.data(), boxes.size() * sizeof(WorldBox)), 0);
+  EXPECT_TRUE(same(download(broad_phase.boxes(), boxes.size()), boxes));
   const Pairs expected = of_cpu(boxes);
   EXPECT_GT(expected.size(), count / 20);
   EXPECT_TRUE(same(stored(broad_phase), expected));

@@ -1,43 +1,37 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <limits>
-#include <random>
 #include <string>
-#include <vector>
 
-#include "gpu/gpu_scene_fixture.h"
-#include "kernels/scene/broad_phase_limits.h"
 #include "kernels/scene/filter_oracle.h"
-#include "tandem/kernels/gpu_broad_phase.h"
+#include "kernels/scene/gpu_broad_phase_fixture.h"
 #include "tandem/kernels/gpu_excluded_pairs.h"
 
 // Filters, and fixed boxes that are kept, on a GPU: the CPU is the oracle.
 namespace tandem {
 namespace {
 
+using test::Bodies;
+using test::Boxes;
 using test::download;
 using test::FilterArrays;
+using test::GpuBodies;
+using test::GpuBounds;
+using test::kFew;
+using test::kMany;
 using test::on_gpu;
+using test::Pairs;
 using test::random_filter;
+using test::same;
 
-constexpr std::uint32_t kFew = 3000, kMany = 20000;
-static_assert(kFewPosed < kFew && kFew <= kFewBoxes && kFewBoxes < kMany);
 constexpr unsigned kAllParts = 15, kMotionPart = 1;
 
 class GpuFilterTest : public test::GpuTest {};
 
-using Boxes = std::vector<WorldBox>;
-using Pairs = std::vector<ObjectPair>;
-
-bool before(const ObjectPair& x, const ObjectPair& y) {
-  return x.a != y.a ? x.a < y.a : x.b < y.b;
-}
-
-bool same(const Pairs& x, const Pairs& y) {
-  return x.size() == y.size() && (x.empty() || std::memcmp(x.data(), y.data(), x.size() * sizeof x[0]) == 0);
+Pairs stored(const GpuBroadPhase& broad_phase) {
+  const Pairs all = test::stored(broad_phase);
+  EXPECT_EQ(all.size(), broad_phase.report().found);
+  return all;
 }
 
 /// The arrays of a filter in GPU memory.
@@ -60,16 +54,7 @@ class GpuFilter {
 
 Pairs of_cpu(const Boxes& boxes, const FilterArrays& filter) {
   ExcludedPairTable table;
-  BroadPhase broad_phase;
-  EXPECT_EQ(broad_phase.find_pairs(boxes, filter.view(table)), Status::kOk);
-  return {broad_phase.pairs().begin(), broad_phase.pairs().end()};
-}
-
-Pairs stored(const GpuBroadPhase& broad_phase) {
-  const GpuPairs pairs = broad_phase.pairs();
-  Pairs all = download(pairs.pairs, std::min(download(pairs.count, 1)[0], pairs.capacity));
-  EXPECT_EQ(all.size(), broad_phase.report().found);
-  return all;
+  return test::of_cpu(boxes, filter.view(table));
 }
 
 // Boxes on a grid, so that many touch exactly, with about as many neighbours each whatever their number; a
@@ -109,13 +94,7 @@ void expect_as_cpu(GpuBroadPhase& broad_phase, const Boxes& boxes, const FilterA
             Status::kOk)
       << what;
   for (const bool sorted : {false, true}) {
-    const GpuBroadPhaseOptions options = {sorted, on_device.view(), within};
-    ASSERT_EQ(
-        broad_phase.find_pairs(device.data(), static_cast<std::uint32_t>(boxes.size()), options, nullptr),
-        Status::kOk)
-        << what << " " << cudaGetErrorString(broad_phase.cuda_error());
-    Pairs pairs = stored(broad_phase);
-    if (!sorted) std::sort(pairs.begin(), pairs.end(), before);
+    const Pairs pairs = test::of_gpu(broad_phase, device, boxes.size(), {sorted, on_device.view(), within});
     EXPECT_TRUE(same(pairs, expected)) << what << ", keep " << keep << ", sorted " << sorted << ": "
                                        << pairs.size() << " instead of " << expected.size();
     EXPECT_LE(broad_phase.bytes(), most_broad_phase_bytes(broad_phase.capacity(), true)) << what;
@@ -181,12 +160,6 @@ TEST_F(GpuFilterTest, KeptBoxesMayBeElsewhereThanTheOthers) {
   }
 }
 
-/// Instances of boxes in GPU memory.
-struct Bodies {
-  std::vector<std::uint32_t> asset;
-  std::vector<Pose> pose;
-};
-
 Bodies scattered_bodies(std::uint32_t count, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> uniform(0, 1);
@@ -204,38 +177,14 @@ Bodies scattered_bodies(std::uint32_t count, std::uint64_t seed) {
 const std::vector<AssetBounds> kBounds = {{{0, 0, 0}, {-1, -0.5f, -0.25f}, {1, 0.5f, 0.75f}},
                                           {{1, -2, 0.5}, {-1, 0, 0}, {1, 2, 1}}};
 
-Boxes boxes_of(const Bodies& bodies) {
-  Boxes boxes;
-  for (std::size_t i = 0; i < bodies.asset.size(); ++i) {
-    const AssetBounds& asset = kBounds[bodies.asset[i]];
-    boxes.push_back(
-        world_box(for_stored_coordinates(bodies.pose[i], asset.origin), asset.lower, asset.upper));
-  }
-  return boxes;
-}
-
-class GpuBodies {
- public:
-  explicit GpuBodies(const Bodies& bodies)
-      : asset_(on_gpu(bodies.asset)),
-        pose_(on_gpu(bodies.pose)),
-        count_(static_cast<std::uint32_t>(bodies.asset.size())) {}
-  GpuInstances view() const { return {asset_.data(), pose_.data(), count_}; }
-
- private:
-  GpuArray<std::uint32_t> asset_;
-  GpuArray<Pose> pose_;
-  std::uint32_t count_;
-};
-
 TEST_F(GpuFilterTest, KeptInstancesAreNotLookedAtAgain) {
-  const auto device_bounds = on_gpu(kBounds);
-  const GpuAssetBounds bounds = {device_bounds.data(), 2};
+  const GpuBounds on_device_bounds(kBounds);
+  const GpuAssetBounds bounds = on_device_bounds.view();
   GpuBroadPhase broad_phase;
   for (const std::uint32_t count : {40u, 2 * kFewPosed, 3 * kFewPosed, 2 * kFewBoxes, 5 * kFewBoxes}) {
     SCOPED_TRACE(count);
     Bodies bodies = scattered_bodies(count, count);
-    const Boxes boxes = boxes_of(bodies);
+    const Boxes boxes = bodies.boxes(kBounds);
     const FilterArrays filter = random_filter(count, kAllParts, count);
     const GpuFilter on_device(filter);
     const Pairs expected = of_cpu(boxes, filter);
@@ -249,8 +198,7 @@ TEST_F(GpuFilterTest, KeptInstancesAreNotLookedAtAgain) {
     const GpuBodies later(bodies);
     ASSERT_EQ(broad_phase.find_pairs(later.view(), bounds, {true, on_device.view()}, nullptr), Status::kOk);
     EXPECT_TRUE(same(stored(broad_phase), expected));
-    const Boxes posed = download(broad_phase.boxes(), count);
-    EXPECT_EQ(std::memcmp(posed.data(), boxes.data(), count * sizeof(WorldBox)), 0);
+    EXPECT_TRUE(same(download(broad_phase.boxes(), count), boxes));
     const GpuBroadPhaseOptions near = {true, on_device.view(), 0.25};
     ASSERT_EQ(broad_phase.find_pairs(later.view(), bounds, near, nullptr), Status::kOk);
     EXPECT_TRUE(same(stored(broad_phase), of_cpu(grown_for(boxes, filter, true, 0.25), filter)));
@@ -269,8 +217,7 @@ TEST_F(GpuFilterTest, NamesWhatItCannotTake) {
   filter.motion[8] = Motion::moving;
   GpuBroadPhase broad_phase;
   auto device = on_gpu(boxes);
-  const auto* shifted = reinterpret_cast<const WorldBox*>(reinterpret_cast<const char*>(device.data()) + 8);
-  EXPECT_EQ(broad_phase.keep_fixed(shifted, filter.motion, nullptr), Status::kMisaligned);
+  EXPECT_EQ(broad_phase.keep_fixed(test::misaligned(device), filter.motion, nullptr), Status::kMisaligned);
   ASSERT_EQ(broad_phase.keep_fixed(device.data(), filter.motion, nullptr), Status::kOk);
   EXPECT_EQ(broad_phase.find_pairs(device.data(), kFew - 1, {}, nullptr), Status::kKeptMismatch);
   ASSERT_EQ(broad_phase.find_pairs(device.data(), kFew, {true}, nullptr), Status::kOk);
@@ -298,8 +245,8 @@ TEST_F(GpuFilterTest, NamesWhatItCannotTake) {
   // What is kept of instances is lost where room for more is made, and the caller is told.
   const Bodies bodies = scattered_bodies(kFew, 1);
   const GpuBodies on_device(bodies);
-  const auto device_bounds = on_gpu(kBounds);
-  const GpuAssetBounds bounds = {device_bounds.data(), 2};
+  const GpuBounds on_device_bounds(kBounds);
+  const GpuAssetBounds bounds = on_device_bounds.view();
   EXPECT_EQ(broad_phase.keep_fixed(on_device.view(), bounds, std::span(filter.motion).first(9), nullptr),
             Status::kKeptMismatch);
   ASSERT_EQ(broad_phase.keep_fixed(on_device.view(), bounds, filter.motion, nullptr), Status::kOk);
@@ -322,13 +269,11 @@ TEST_F(GpuFilterTest, OverflowIsReportedAndARetryLosesNothing) {
     ASSERT_EQ(broad_phase.keep_fixed(device.data(), filter.motion, nullptr), Status::kOk);
     ASSERT_EQ(broad_phase.reserve({count, 100}, {true}), Status::kOk);
     const GpuBroadPhaseOptions options = {true, on_device.view()};
-    ASSERT_EQ(broad_phase.enqueue(device.data(), count, options, nullptr), Status::kOk);
-    ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
+    test::run(broad_phase, device, count, options);
     EXPECT_EQ(broad_phase.report().complete, 0u);
     EXPECT_EQ(broad_phase.report().found, expected.size());
     ASSERT_EQ(broad_phase.reserve({count, broad_phase.report().count}, {true}), Status::kOk);
-    ASSERT_EQ(broad_phase.enqueue(device.data(), count, options, nullptr), Status::kOk);
-    ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
+    test::run(broad_phase, device, count, options);
     EXPECT_EQ(broad_phase.report().complete, 1u);
     EXPECT_TRUE(same(stored(broad_phase), expected));
   }
@@ -344,18 +289,13 @@ TEST_F(GpuFilterTest, AGraphSeesFlagsThatChange) {
     GpuBroadPhase broad_phase;
     ASSERT_EQ(broad_phase.keep_fixed(device.data(), filter.motion, nullptr), Status::kOk);
     ASSERT_EQ(broad_phase.reserve({count, 20 * count}, {true}), Status::kOk);
-    GpuStream stream;
-    GpuGraph graph;
-    ASSERT_EQ(stream.create(), cudaSuccess);
-    const GpuBroadPhaseOptions options = {true, on_device.view()};
-    const auto enqueue = [&] {
-      EXPECT_EQ(broad_phase.enqueue(device.data(), count, options, stream.get()), Status::kOk);
-    };
-    ASSERT_EQ(graph.capture(stream.get(), enqueue), cudaSuccess);
+    test::GraphStream stream;
+    stream.capture([&] {
+      return broad_phase.enqueue(device.data(), count, {true, on_device.view()}, stream.get());
+    });
     std::size_t last = 0;
     for (int step = 0; step < 3; ++step) {
-      ASSERT_EQ(graph.launch(stream.get()), cudaSuccess);
-      ASSERT_EQ(stream.wait(), cudaSuccess);
+      stream.launch();
       const Pairs expected = of_cpu(boxes, filter);
       EXPECT_TRUE(same(stored(broad_phase), expected));
       EXPECT_NE(expected.size(), last);

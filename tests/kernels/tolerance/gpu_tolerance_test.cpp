@@ -21,6 +21,25 @@ using test::sorted;
 
 class GpuTolerance : public test::GpuTest {};
 
+/// A tolerance query about the levels of a scene.
+struct AskedLevels {
+  AskedLevels(const BodyScene& of, const std::vector<ObjectPair>& pairs, cudaStream_t stream = nullptr)
+      : scene(of.assets, of.instances, pairs, Contents::exact_queries) {
+    EXPECT_EQ(query.set_assets(scene.levels(), stream), Status::kOk);
+  }
+  Status decide(double tolerance, cudaStream_t stream = nullptr) {
+    return query.decide(scene.instances(), scene.pairs(), tolerance, stream);
+  }
+  Status enqueue(double tolerance, cudaStream_t stream = nullptr) {
+    return query.enqueue(scene.instances(), scene.pairs(), tolerance, stream);
+  }
+  std::vector<PairVerdict> verdicts() const { return download(query.verdicts(), scene.pairs().capacity); }
+  const GpuToleranceReport& report() const { return query.report(); }
+
+  GpuScene scene;
+  GpuToleranceQuery query;
+};
+
 /// Instances at random levels, by place among the views of single levels.
 std::vector<Instance> at_any_levels(const BodyScene& scene, const LevelViews& views, RandomPoses& random) {
   std::vector<Instance> out = scene.instances;
@@ -38,7 +57,7 @@ void expect_cpus_contacts(const LevelViews& views, const std::vector<Instance>& 
   const GpuScene device(views.views, bodies, pairs);
   GpuContactQuery query;
   ASSERT_EQ(query.set_assets(device.assets(), nullptr), Status::kOk);
-  for (const QueryMode mode : {QueryMode::exact, QueryMode::fast, QueryMode::boxes}) {
+  for (const QueryMode mode : test::kModes) {
     SCOPED_TRACE(testing::Message() << "mode " << static_cast<int>(mode) << " within " << within);
     ASSERT_EQ(cpu.find_contacts(bodies, pairs, {.mode = mode, .within = within, .add_error_bounds = true}),
               Status::kOk);
@@ -111,7 +130,7 @@ TEST_F(GpuTolerance, VerdictsAreTheCpus) {
     const BodyScene scene = test::any_level_scene(random);
     const auto pairs = all_pairs(scene.instances, trial % 2 == 0, random);
     const GpuScene device(scene.assets, scene.instances, pairs, Contents::exact_queries);
-    ASSERT_EQ(query.set_levels(device.levels(), nullptr), Status::kOk);
+    ASSERT_EQ(query.set_assets(device.levels(), nullptr), Status::kOk);
     const AssetView& asset = scene.assets.views()[random.below(2)];
     const double error = asset.levels[random.below(asset.levels.size())].error_bound;
     for (const double tolerance : {0.0, 4.1 * error, test::any_distance(random, scene)}) {
@@ -137,13 +156,11 @@ TEST_F(GpuTolerance, OfAPileIsTheCpusAtEveryTolerance) {
   RandomPoses random(3);
   const BodyScene scene = pile_of_levels(80, 4, 7);
   const auto pairs = all_pairs(scene.instances, false, random);
-  const GpuScene device(scene.assets, scene.instances, pairs, Contents::exact_queries);
-  GpuToleranceQuery query;
-  ASSERT_EQ(query.set_levels(device.levels(), nullptr), Status::kOk);
+  AskedLevels gpu(scene, pairs);
   std::uint64_t certain = 0;
   for (const double tolerance : {0.2, 0.05, 0.02, 1e-3, 0.0}) {
-    expect_cpus_verdicts(scene, pairs, device, query, tolerance);
-    const ToleranceCounters& counters = query.report().counters;
+    expect_cpus_verdicts(scene, pairs, gpu.scene, gpu.query, tolerance);
+    const ToleranceCounters& counters = gpu.report().counters;
     EXPECT_GE(counters.apart + counters.touching, certain) << "a smaller tolerance leaves less open";
     certain = counters.apart + counters.touching;
   }
@@ -154,26 +171,18 @@ TEST_F(GpuTolerance, IsTheSameOnEveryRunOfAGraph) {
   RandomPoses random(4);
   const BodyScene scene = pile_of_levels(80, 4, 8);
   const auto pairs = all_pairs(scene.instances, false, random);
-  const GpuScene device(scene.assets, scene.instances, pairs, Contents::exact_queries);
-  GpuToleranceQuery query;
-  GpuStream stream;
-  GpuGraph graph;
-  ASSERT_EQ(stream.create(), cudaSuccess);
-  ASSERT_EQ(query.set_levels(device.levels(), stream.get()), Status::kOk);
-  ASSERT_EQ(query.decide(device.instances(), device.pairs(), 0.02, stream.get()), Status::kOk);
-  const std::vector<PairVerdict> expected = download(query.verdicts(), pairs.size());
-  const std::uint64_t within = query.report().counters.within_tolerance;
+  test::GraphStream stream;
+  AskedLevels gpu(scene, pairs, stream.get());
+  ASSERT_EQ(gpu.decide(0.02, stream.get()), Status::kOk);
+  const std::vector<PairVerdict> expected = gpu.verdicts();
+  const std::uint64_t within = gpu.report().counters.within_tolerance;
   EXPECT_GT(within, 0u);
-  const auto enqueue = [&] {
-    EXPECT_EQ(query.enqueue(device.instances(), device.pairs(), 0.02, stream.get()), Status::kOk);
-  };
-  ASSERT_EQ(graph.capture(stream.get(), enqueue), cudaSuccess);
+  stream.capture([&] { return gpu.enqueue(0.02, stream.get()); });
   for (int run = 0; run < 5; ++run) {
-    ASSERT_EQ(graph.launch(stream.get()), cudaSuccess);
-    ASSERT_EQ(stream.wait(), cudaSuccess);
-    EXPECT_EQ(query.report().complete, 1u);
-    EXPECT_EQ(query.report().counters.within_tolerance, within);
-    EXPECT_EQ(download(query.verdicts(), pairs.size()), expected);
+    stream.launch();
+    EXPECT_EQ(gpu.report().complete, 1u);
+    EXPECT_EQ(gpu.report().counters.within_tolerance, within);
+    EXPECT_EQ(gpu.verdicts(), expected);
   }
 }
 
@@ -181,58 +190,52 @@ TEST_F(GpuTolerance, WhatDoesNotFitIsAskedFor) {
   RandomPoses random(5);
   const BodyScene scene = pile_of_levels(60, 3, 9);
   const auto pairs = all_pairs(scene.instances, false, random);
-  const GpuScene device(scene.assets, scene.instances, pairs, Contents::exact_queries);
-  GpuToleranceQuery query;
-  ASSERT_EQ(query.set_levels(device.levels(), nullptr), Status::kOk);
+  AskedLevels gpu(scene, pairs);
   const auto count = static_cast<std::uint32_t>(scene.instances.size());
-  ASSERT_EQ(query.reserve({count - 1, 10, 0}), Status::kOk);
-  EXPECT_EQ(query.enqueue(device.instances(), device.pairs(), 0, nullptr), Status::kOutOfRange);
+  ASSERT_EQ(gpu.query.reserve({count - 1, 10, 0}), Status::kOk);
+  EXPECT_EQ(gpu.enqueue(0), Status::kOutOfRange);
   for (const std::uint32_t room : {10u, static_cast<std::uint32_t>(pairs.size())}) {
-    ASSERT_EQ(query.reserve({count, room, 1}), Status::kOk);
-    ASSERT_EQ(query.enqueue(device.instances(), device.pairs(), 0, nullptr), Status::kOk);
+    ASSERT_EQ(gpu.query.reserve({count, room, 1}), Status::kOk);
+    ASSERT_EQ(gpu.enqueue(0), Status::kOk);
     ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
-    EXPECT_EQ(query.report().status, Status::kOk);
-    EXPECT_EQ(query.report().complete, 0u);
-    EXPECT_EQ(query.report().needed.pairs, pairs.size());
-    EXPECT_EQ(query.report().needed.instances, count);
+    EXPECT_EQ(gpu.report().status, Status::kOk);
+    EXPECT_EQ(gpu.report().complete, 0u);
+    EXPECT_EQ(gpu.report().needed.pairs, pairs.size());
+    EXPECT_EQ(gpu.report().needed.instances, count);
   }
-  EXPECT_GT(query.report().needed.undecided, 1u);
-  expect_cpus_verdicts(scene, pairs, device, query, 0);
+  EXPECT_GT(gpu.report().needed.undecided, 1u);
+  expect_cpus_verdicts(scene, pairs, gpu.scene, gpu.query, 0);
 }
 
 TEST_F(GpuTolerance, WhatIsWrongIsSaid) {
   BodyScene scene = pile_of_levels(4, 1, 10);
   const std::vector<ObjectPair> pairs = {{0, 1}, {1, 2}, {2, 3}};
-  GpuToleranceQuery query;
   {
-    const GpuScene device(scene.assets, scene.instances, pairs, Contents::exact_queries);
-    EXPECT_EQ(query.set_levels(device.levels().subspan(1), nullptr), Status::kNoFinestLevel);
-    std::vector<GpuAsset> gap(device.levels().begin(), device.levels().begin() + 3);
-    gap.erase(gap.begin() + 1);
-    EXPECT_EQ(query.set_levels(gap, nullptr), Status::kNoFinestLevel);
-    std::vector<GpuAsset> of_two(device.levels().begin(), device.levels().begin() + 2);
+    AskedLevels gpu(scene, pairs);
+    const auto levels = gpu.scene.levels();
+    EXPECT_EQ(gpu.query.set_assets(levels.subspan(1), nullptr), Status::kNoFinestLevel);
+    EXPECT_EQ(gpu.query.set_assets(std::vector<GpuAsset>{levels[0], levels[2]}, nullptr),
+              Status::kNoFinestLevel);
+    std::vector<GpuAsset> of_two = {levels[0], levels[1]};
     of_two[1].lower[0] -= 1;
-    EXPECT_EQ(query.set_levels(of_two, nullptr), Status::kNoFinestLevel);
-    ASSERT_EQ(query.set_levels(device.levels(), nullptr), Status::kOk);
+    EXPECT_EQ(gpu.query.set_assets(of_two, nullptr), Status::kNoFinestLevel);
+    ASSERT_EQ(gpu.query.set_assets(levels, nullptr), Status::kOk);
     for (const double bad : {-1.0, std::nan(""), HUGE_VAL, 1e301})
-      EXPECT_EQ(query.decide(device.instances(), device.pairs(), bad, nullptr), Status::kOutOfRange);
-    ASSERT_EQ(query.decide(device.instances(), device.pairs(), 1e300, nullptr), Status::kOk);
+      EXPECT_EQ(gpu.decide(bad), Status::kOutOfRange);
+    ASSERT_EQ(gpu.decide(1e300), Status::kOk);
   }
-  const auto status_of = [&](const std::vector<ObjectPair>& given) {
-    const GpuScene device(scene.assets, scene.instances, given, Contents::exact_queries);
-    EXPECT_EQ(query.set_levels(device.levels(), nullptr), Status::kOk);
-    return query.decide(device.instances(), device.pairs(), 0.1, nullptr);
+  const auto expect = [&](const std::vector<ObjectPair>& given, Status status, std::uint64_t where) {
+    AskedLevels gpu(scene, given);
+    EXPECT_EQ(gpu.decide(0.1), status);
+    EXPECT_EQ(gpu.report().where, where);
+    EXPECT_EQ(gpu.report().counters, ToleranceCounters());
   };
-  EXPECT_EQ(status_of({{0, 1}, {1, 4}}), Status::kUnknownInstance);
-  EXPECT_EQ(query.report().where, 1u);
+  expect({{0, 1}, {1, 4}}, Status::kUnknownInstance, 1);
   scene.instances[2].asset = 2;
-  EXPECT_EQ(status_of(pairs), Status::kUnknownAsset);
-  EXPECT_EQ(query.report().where, 2u);
+  expect(pairs, Status::kUnknownAsset, 2);
   scene.instances[2].asset = 0;
   scene.instances[3].pose.rotation[1][1] = 3;
-  EXPECT_EQ(status_of(pairs), Status::kPoseNotRigid);
-  EXPECT_EQ(query.report().where, 3u);
-  EXPECT_EQ(query.report().counters, ToleranceCounters());
+  expect(pairs, Status::kPoseNotRigid, 3);
 }
 
 TEST_F(GpuTolerance, AViewsLevelsAloneAreUploaded) {

@@ -3,6 +3,7 @@
 #include <tuple>
 
 #include "gpu_contacts.h"
+#include "kernels/contact/only_walk.h"
 #include "tandem/kernels/gpu_contact_query.h"
 #include "tandem/kernels/gpu_distance_query.h"
 #include "tandem/kernels/gpu_impact_query.h"
@@ -87,8 +88,9 @@ class CudaContacts final : public GpuContactEngine {
   }
 
   Seconds time_walk(const GpuPairs& pairs, std::uint32_t repeats) override {
-    const GpuContactOptions walk_alone = {.walk_only = true, .within = options_.within};
+    const GpuContactOptions walk_alone = {.within = options_.within};
     GpuContactQuery walk;
+    only_walk(walk, true);
     name_shapes_to(walk);
     const Status status =
         walk.reserve({.pairs = static_cast<std::uint32_t>(counters_.object_pairs)}, walk_alone);

@@ -367,7 +367,7 @@ const tandem_impact* tandem_gpu_impact_query_impacts(const tandem_gpu_impact_que
 
 tandem_status tandem_gpu_tolerance_query_set_assets(tandem_gpu_tolerance_query* query,
                                                     tandem_gpu_assets* assets, tandem_stream stream) {
-  return take_assets(query, assets, [&](auto& of) { return of.set_levels(assets->levels.view(), stream); });
+  return take_assets(query, assets, [&](auto& of) { return of.set_assets(assets->levels.view(), stream); });
 }
 
 tandem_status tandem_gpu_tolerance_query_reserve(tandem_gpu_tolerance_query* query,

@@ -1,13 +1,9 @@
 #pragma once
-#include <cuda_runtime_api.h>
-
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <span>
 
-#include "tandem/formats/status.h"
-#include "tandem/kernels/gpu_scene.h"
+#include "tandem/kernels/gpu_question.h"
 #include "tandem/kernels/pair_filter.h"
 #include "tandem/kernels/world_box.h"
 
@@ -42,8 +38,7 @@ constexpr std::size_t most_broad_phase_bytes(const GpuBroadPhaseCapacity& capaci
          38 * std::size_t{capacity.kept} + (sorted ? 17 : 8) * std::size_t{capacity.pairs};
 }
 
-/// The outcome of a broad phase. It lies in GPU memory, and in CPU memory once the stream has come to the
-/// broad phase's end.
+/// The outcome of a broad phase.
 struct GpuBroadPhaseReport {
   Status status;           ///< kOk, or kOutOfRange, kUnknownAsset, kPoseNotRigid; then there are no pairs
   std::uint32_t complete;  ///< 0: there was no room for all pairs; those stored are some of them
@@ -52,32 +47,30 @@ struct GpuBroadPhaseReport {
   std::uint64_t found;     ///< how many pairs there are, stored or not
 };
 
+/// The types of this question, see GpuQuestion.
+struct GpuBroadPhaseKind {
+  struct Host;
+  using Capacity = GpuBroadPhaseCapacity;
+  using Report = GpuBroadPhaseReport;
+  using Options = GpuBroadPhaseOptions;
+};
+extern template class GpuQuestion<GpuBroadPhaseKind>;
+
 /// Finds all pairs of world boxes that meet, or those of them that a filter looks at, on the GPU: the same
-/// set as BroadPhase. enqueue() neither waits
-/// for the GPU nor allocates. Throws nothing. Movable, not copyable. An object runs one broad phase at a
-/// time: enqueue the next on the same stream, or when the last has ended. Several objects can run side by
-/// side.
+/// set as BroadPhase. See GpuQuestion.
 ///
 /// Few boxes are tested each against each, by one kernel that poses them too. Many are sorted by class of
 /// size, then along a space-filling curve, and grouped by 32 into a tree of fan-out 32. One warp takes a
 /// group and walks the part of the tree that lies behind it, so a pair is found once, by the smaller box: one
 /// huge box among many small ones costs each of them a test. O(n log n) for boxes of bounded overlap. Boxes
 /// of fixed instances may be kept in a tree of their own, which a warp walks for each of the others.
-class GpuBroadPhase {
+///
+/// reserve() also returns kOutOfRange for 2^32 - 1 boxes, and what status_of() of gpu_status.h names: kNoGpu,
+/// kDriverTooOld, kGpuNotSupported. Where it makes room for more instances, what was kept of them is lost,
+/// and enqueue() returns kKeptMismatch until keep_fixed() is called again. bytes() is at most
+/// most_broad_phase_bytes().
+class GpuBroadPhase : public GpuQuestion<GpuBroadPhaseKind> {
  public:
-  GpuBroadPhase();
-  GpuBroadPhase(GpuBroadPhase&&) noexcept;
-  GpuBroadPhase& operator=(GpuBroadPhase&&) noexcept;
-  ~GpuBroadPhase();  ///< waits for the device
-
-  /// Makes room for at least so much on the current device, waiting for it where memory grows. `options`:
-  /// those of the calls to come. Where room for more instances is made, what was kept of them is lost, and
-  /// enqueue() returns kKeptMismatch until keep_fixed() is called again.
-  /// Result: kOk, kOutOfRange (2^32 - 1 boxes), kOutOfGpuMemory, kOutOfMemory, or
-  /// another that status_of() of gpu_status.h names: kNoGpu, kDriverTooOld, kGpuNotSupported, kCudaFailed;
-  /// after an error there is the room that there was, or less.
-  Status reserve(const GpuBroadPhaseCapacity& capacity, const GpuBroadPhaseOptions& options = {});
-
   /// Keeps the boxes, or instances, whose motion is fixed as they are: calls of enqueue() to come, which must
   /// be of as many, find no pair of two of them and take the time of the others. Given boxes must go on lying
   /// in the array that enqueue() gets; assets and poses of kept instances are not looked at again. Call it
@@ -91,11 +84,10 @@ class GpuBroadPhase {
   Status keep_fixed(const GpuInstances& instances, const GpuAssetBounds& assets,
                     std::span<const Motion> motion, cudaStream_t stream);
 
-  /// Queues a broad phase of the boxes behind what `stream` holds; may be captured into a graph. `boxes`, in
-  /// GPU memory at a multiple of 16 bytes, must stay until it is done. Result: kOk, kMisaligned, kOutOfRange
-  /// (more than reserved for; `within` negative or NaN), kUnknownInstance (the filter excludes a pair of
-  /// boxes that there are not), kKeptMismatch (fixed ones are kept of another number of boxes, or of
-  /// instances) or kCudaFailed; what the GPU finds wrong is in the report. kOutOfRange there: a coordinate
+  /// Queues a broad phase of the boxes behind what `stream` holds. They lie in GPU memory at a multiple of 16
+  /// bytes. Result: also kMisaligned, kOutOfRange (more than reserved for; `within` negative or NaN),
+  /// kUnknownInstance (the filter excludes a pair of boxes that there are not), kKeptMismatch (fixed ones are
+  /// kept of another number of boxes, or of instances). The report's status may be kOutOfRange: a coordinate
   /// that is NaN or beyond kLargestWorldCoordinate. Condition: reserve() with these options.
   Status enqueue(const WorldBox* boxes, std::uint32_t count, const GpuBroadPhaseOptions& options,
                  cudaStream_t stream);
@@ -105,35 +97,21 @@ class GpuBroadPhase {
   Status enqueue(const GpuInstances& instances, const GpuAssetBounds& assets,
                  const GpuBroadPhaseOptions& options, cudaStream_t stream);
 
-  /// Enqueues a broad phase and waits for it; where there was too little room, makes room for a quarter more
-  /// than needed and starts again: at most twice, and in a steady state once. Result: that of the report, or
-  /// of a call that failed; kTooManyPairs where there are 2^32 - 1 or more.
+  /// Finds all pairs, and waits for them. Where there was too little room, it makes room for a quarter more
+  /// than needed and starts again: at most twice. Result: also kTooManyPairs where there are 2^32 - 1 or
+  /// more.
   Status find_pairs(const WorldBox* boxes, std::uint32_t count, const GpuBroadPhaseOptions& options,
                     cudaStream_t stream);
   Status find_pairs(const GpuInstances& instances, const GpuAssetBounds& assets,
                     const GpuBroadPhaseOptions& options, cudaStream_t stream);
 
-  /// Pairs, a < b, and their number, in GPU memory; complete where the number is at most the capacity. Valid
-  /// until reserve(). Condition: reserve() returned kOk.
+  /// Pairs, a < b, and their number, in GPU memory; complete where the number is at most the capacity.
+  /// Condition: reserve() returned kOk.
   GpuPairs pairs() const;
 
-  /// The world boxes that enqueue() and keep_fixed() computed of instances, in GPU memory; with `within`,
-  /// those of enqueue() are the larger ones.
+  /// The world boxes that enqueue() and keep_fixed() computed of instances; with `within`, those of enqueue()
+  /// are the larger ones.
   const WorldBox* boxes() const;
-
-  const GpuBroadPhaseReport* device_report() const;
-
-  /// In CPU memory. Condition: the stream has come to the end of the broad phase.
-  const GpuBroadPhaseReport& report() const;
-
-  GpuBroadPhaseCapacity capacity() const;
-  std::size_t bytes() const;  ///< GPU memory held, at most most_broad_phase_bytes()
-  cudaError_t cuda_error() const;
-
- private:
-  struct State;
-  bool provide_state();
-  std::unique_ptr<State> state_;
 };
 
 }  // namespace tandem

@@ -1,13 +1,9 @@
 #pragma once
-#include <cuda_runtime_api.h>
-
 #include <cstddef>
 #include <cstdint>
-#include <memory>
-#include <span>
 
 #include "tandem/kernels/contact_query.h"
-#include "tandem/kernels/gpu_scene.h"
+#include "tandem/kernels/gpu_question.h"
 
 namespace tandem {
 
@@ -26,10 +22,6 @@ struct GpuContactOptions {
   /// is unspecified, unless they are sorted too. Grouping takes time for the contacts and pairs that there
   /// are, not for as many as there is room for.
   bool grouped = false;
-
-  /// In exact mode, the query only walks the trees and counts block pairs and candidates; it finds no
-  /// contacts. This measures what the walk takes of a query's time. The other modes ignore it.
-  bool walk_only = false;
 
   /// The most thread blocks, of 512 threads, that look for contacts at a time; 0: as many as the GPU holds.
   /// Fewer leave multiprocessors to other work, and suit tools that are slow where warps wait.
@@ -88,8 +80,7 @@ struct GpuContactGroups {
   const GpuGroupCounts* counts;     ///< one, in GPU memory
 };
 
-/// The outcome of a query. It lies in GPU memory, and in CPU memory once the stream has come to the query's
-/// end.
+/// The outcome of a query.
 struct GpuContactReport {
   Status status;              ///< kOk, or what find_contacts() of ContactQuery names; then no contacts
   std::uint32_t complete;     ///< 0 where something did not fit: contacts are missing then, see `needed`
@@ -100,65 +91,46 @@ struct GpuContactReport {
   ContactCounters counters;
 };
 
+/// The types of this question, see GpuQuestion.
+struct GpuContactKind {
+  struct Host;
+  using Capacity = GpuContactCapacity;
+  using Report = GpuContactReport;
+  using Options = GpuContactOptions;
+};
+extern template class GpuQuestion<GpuContactKind>;
+extern template class GpuAssetQuestion<GpuContactKind>;
+
 /// Finds every pair of triangles that meet, of many posed instances of few assets, on the GPU: the same set
-/// of contacts as ContactQuery. enqueue() neither waits for the GPU nor allocates. Throws nothing. Movable,
-/// not copyable. An object runs one query at a time: enqueue the next on the same stream, or when the last
-/// has ended. Several objects can run side by side.
-class GpuContactQuery {
+/// of contacts as ContactQuery. See GpuQuestion.
+///
+/// set_assets() also returns kOutOfRange for a tree of 2^29 - 1 blocks or more. reserve() makes room for
+/// clearance where `within` or add_error_bounds is set; it also returns kOutOfRange (sorted or grouped: 2^32
+/// - 1 contacts or more; grouped: 2^31 pairs or more). bytes() is at most most_query_bytes().
+class GpuContactQuery : public GpuAssetQuestion<GpuContactKind> {
  public:
-  GpuContactQuery();
-  GpuContactQuery(GpuContactQuery&&) noexcept;
-  GpuContactQuery& operator=(GpuContactQuery&&) noexcept;
-  ~GpuContactQuery();  ///< waits for the device
-
-  /// Names the assets that instances refer to, on the current device, after what `stream` holds: copies the
-  /// list, and returns when that is done. What the trees point to must outlive the queries. Result: kOk,
-  /// kOutOfRange (a tree of 2^29 - 1 blocks or more), kOutOfGpuMemory, kOutOfMemory, or another that
-  /// status_of() of gpu_status.h names: kNoGpu, kDriverTooOld, kGpuNotSupported, kCudaFailed.
-  Status set_assets(std::span<const GpuAsset> assets, cudaStream_t stream);
-
-  /// Makes room for at least so much, waiting for the device where it grows. `options`: those of the calls to
-  /// come; of `within` and add_error_bounds counts whether they are of clearance. Result: kOk, kOutOfRange
-  /// (sorted or grouped: 2^32 - 1 contacts or more; grouped: 2^31 pairs or more), kOutOfGpuMemory,
-  /// kCudaFailed; after an error there is the room that there was, or none. Condition: set_assets().
-  Status reserve(const GpuContactCapacity& capacity, const GpuContactOptions& options = {});
-
-  /// Queues a query behind what `stream` holds; it may be captured into a graph. The arrays must stay until
-  /// it is done. A pair of an instance with itself asks for the contacts within it. Mode exact walks oriented
-  /// blocks, the others axis-aligned ones. Result: kOk, kNoOrientedBlocks or kNoAxisAlignedBlocks (an asset
-  /// lacks them), kOutOfRange (sorted, grouped or of clearance, and reserved without; a distance that is
-  /// none), kCudaFailed, or, where CUDA loads a kernel at its first launch and the GPU is full,
-  /// kOutOfGpuMemory; what the GPU finds wrong is in the report. Condition: set_assets() and reserve().
+  /// Queues a query behind what `stream` holds. A pair of an instance with itself asks for the contacts
+  /// within it. Mode exact walks oriented blocks, the others axis-aligned ones. Result: also
+  /// kNoOrientedBlocks or kNoAxisAlignedBlocks (an asset lacks them), kOutOfRange (sorted, grouped or of
+  /// clearance, and reserved without; a distance that is none). Condition: set_assets() and reserve().
   Status enqueue(const GpuInstances& instances, const GpuPairs& pairs, const GpuContactOptions& options,
                  cudaStream_t stream);
 
-  /// Enqueues a query and waits for it; where room was too small, makes room and starts again until the query
-  /// is complete: rarely more than twice, and in a steady state once. Result: that of the report, or of a
-  /// call that failed; kOutOfRange where pairs.capacity itself was too small.
+  /// Finds all contacts, and waits for them: rarely more than two turns.
   Status find_contacts(const GpuInstances& instances, const GpuPairs& pairs, const GpuContactOptions& options,
                        cudaStream_t stream);
 
-  /// In GPU memory: report().contacts of them. Condition: set_assets().
-  const Contact* contacts() const;
-  const GpuContactReport* device_report() const;
+  const Contact* contacts() const;  ///< report().contacts of them. Condition: set_assets()
 
-  /// Condition: set_assets(), and reserve() for grouped contacts; valid until the next reserve().
+  /// Condition: set_assets(), and reserve() for grouped contacts.
   GpuContactGroups groups() const;
 
-  /// Of each pair whether it has a contact, not 0 where it has, in GPU memory; valid behind a query with
-  /// first_contact_only whose report is kOk and complete. Condition: reserve().
+  /// Of each pair whether it has a contact, not 0 where it has; valid behind a query with first_contact_only
+  /// whose report is kOk and complete. Condition: reserve().
   const std::uint32_t* met() const;
 
-  /// In CPU memory. Condition: the stream has come to the end of the query.
-  const GpuContactReport& report() const;
-
-  GpuContactCapacity capacity() const;
-  std::size_t bytes() const;  ///< GPU memory held, at most most_query_bytes()
-  cudaError_t cuda_error() const;
-
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  friend void only_walk(GpuContactQuery& query, bool only);  // for measuring: kernels/contact/only_walk.h
 };
 
 }  // namespace tandem

@@ -1,14 +1,10 @@
 #pragma once
-#include <cuda_runtime_api.h>
-
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <memory>
-#include <span>
 
 #include "tandem/kernels/distance_query.h"
-#include "tandem/kernels/gpu_scene.h"
+#include "tandem/kernels/gpu_question.h"
 
 namespace tandem {
 
@@ -45,8 +41,7 @@ constexpr std::size_t most_distance_bytes(const GpuDistanceCapacity& capacity, s
          76 * std::size_t{capacity.settled};
 }
 
-/// The outcome of a query. It lies in GPU memory, and in CPU memory once the stream has come to the query's
-/// end.
+/// The outcome of a query.
 struct GpuDistanceReport {
   Status status;               ///< kOk, or what find_distances() of DistanceQuery names; then no distances
   std::uint32_t complete;      ///< 0 where something did not fit, see `needed`; then distances mean nothing
@@ -57,57 +52,33 @@ struct GpuDistanceReport {
   DistanceCounters counters;
 };
 
+/// The types of this question, see GpuQuestion.
+struct GpuDistanceKind {
+  struct Host;
+  using Capacity = GpuDistanceCapacity;
+  using Report = GpuDistanceReport;
+  using Options = GpuNoOptions;
+};
+extern template class GpuQuestion<GpuDistanceKind>;
+extern template class GpuAssetQuestion<GpuDistanceKind>;
+
 /// Finds how near the surfaces of posed instances are, of many pairs or of few huge ones, on the GPU: the
 /// distances of DistanceQuery, as certified, 0, 0 for the same pairs; not the same bytes, but the same bytes
-/// on every run of one kind of GPU. enqueue() neither waits for the GPU nor allocates. Throws nothing.
-/// Movable, not copyable. An object runs one query at a time: enqueue the next on the same stream, or when
-/// the last has ended. Several objects can run side by side.
-class GpuDistanceQuery {
+/// on every run of one kind of GPU. See GpuQuestion. Assets need axis-aligned blocks. bytes() is at most
+/// most_distance_bytes().
+class GpuDistanceQuery : public GpuAssetQuestion<GpuDistanceKind> {
  public:
-  GpuDistanceQuery();
-  GpuDistanceQuery(GpuDistanceQuery&&) noexcept;
-  GpuDistanceQuery& operator=(GpuDistanceQuery&&) noexcept;
-  ~GpuDistanceQuery();  ///< waits for the device
-
-  /// Names the assets that instances refer to, on the current device, after what `stream` holds: copies the
-  /// list, and returns when that is done. What the trees point to must outlive the queries. Result: kOk,
-  /// kNoAxisAlignedBlocks (an asset lacks them), kOutOfRange (2^32 - 1 assets), kOutOfGpuMemory,
-  /// kOutOfMemory, or another that status_of() of gpu_status.h names: kNoGpu, kDriverTooOld,
-  /// kGpuNotSupported, kCudaFailed.
-  Status set_assets(std::span<const GpuAsset> assets, cudaStream_t stream);
-
-  /// Makes room for at least so much, waiting for the device where it grows. Result: kOk, kOutOfGpuMemory,
-  /// kCudaFailed; after an error there is the room that there was, or none. Condition: set_assets().
-  Status reserve(const GpuDistanceCapacity& capacity);
-
-  /// Queues a query behind what `stream` holds; it may be captured into a graph. The arrays must stay until
-  /// it is done. Pairs may be in either order of a and b; an instance is at distance 0 from itself. Result:
-  /// kOk, kOutOfRange (a tolerance or reach that is negative or NaN), kCudaFailed, or, where CUDA loads a
-  /// kernel at its first launch and the GPU is full, kOutOfGpuMemory; what the GPU finds wrong is in the
-  /// report. Condition: set_assets() and reserve().
+  /// Queues a query behind what `stream` holds. Pairs may be in either order of a and b; an instance is at
+  /// distance 0 from itself. Result: also kOutOfRange (a tolerance or reach that is negative or NaN).
+  /// Condition: set_assets() and reserve().
   Status enqueue(const GpuInstances& instances, const GpuPairs& pairs, const GpuDistanceOptions& options,
                  cudaStream_t stream);
 
-  /// Enqueues a query and waits for it; where room was too small, makes room and starts again until the query
-  /// is complete: in a steady state once. Result: that of the report, or of a call that failed; kOutOfRange
-  /// where pairs.capacity itself was too small.
+  /// Finds all distances, and waits for them.
   Status find_distances(const GpuInstances& instances, const GpuPairs& pairs,
                         const GpuDistanceOptions& options, cudaStream_t stream);
 
-  /// In GPU memory: one for each pair. Valid until the next reserve().
-  const ObjectDistance* distances() const;
-  const GpuDistanceReport* device_report() const;
-
-  /// In CPU memory. Condition: the stream has come to the end of the query.
-  const GpuDistanceReport& report() const;
-
-  GpuDistanceCapacity capacity() const;
-  std::size_t bytes() const;  ///< GPU memory held, at most most_distance_bytes()
-  cudaError_t cuda_error() const;
-
- private:
-  struct State;
-  std::unique_ptr<State> state_;
+  const ObjectDistance* distances() const;  ///< one for each pair
 };
 
 }  // namespace tandem

@@ -1,10 +1,6 @@
 #pragma once
-#include <cuda_runtime_api.h>
-
 #include <cstddef>
 #include <cstdint>
-#include <memory>
-#include <span>
 
 #include "tandem/kernels/gpu_broad_phase.h"
 #include "tandem/kernels/gpu_contact_query.h"
@@ -49,8 +45,7 @@ constexpr std::size_t most_impact_bytes(const GpuImpactCapacity& capacity, std::
          most_broad_phase_bytes({capacity.instances, capacity.pairs}, sorted);
 }
 
-/// The outcome of a query. It lies in GPU memory, and in CPU memory once the stream has come to the query's
-/// end.
+/// The outcome of a query.
 struct GpuImpactReport {
   Status status;             ///< kOk, or what ImpactQuery::find() names; then there are no impacts
   std::uint32_t complete;    ///< 0 where something did not fit; then there are no impacts, see `needed`
@@ -61,71 +56,48 @@ struct GpuImpactReport {
   ImpactCounters counters;   ///< walks: pieces of pairs. Not those of the CPU, but the same on every run
 };
 
+/// The types of this question, see GpuQuestion.
+struct GpuImpactKind {
+  struct Host;
+  using Capacity = GpuImpactCapacity;
+  using Report = GpuImpactReport;
+  using Options = GpuImpactOptions;
+};
+extern template class GpuQuestion<GpuImpactKind>;
+extern template class GpuAssetQuestion<GpuImpactKind>;
+
 /// Finds until when moving instances surely do not meet, on the GPU: an Impact for each object pair with the
-/// guarantee of ImpactQuery, but not its bytes; the same bytes on every run on one kind of GPU. enqueue()
-/// neither waits for the GPU nor allocates. Throws nothing. Movable, not copyable. An object runs one query
-/// at a time: enqueue the next on the same stream, or when the last has ended.
+/// guarantee of ImpactQuery, but not its bytes; the same bytes on every run on one kind of GPU. See
+/// GpuQuestion.
 ///
 /// A contact at the start is that of the least triangle of a, then of b. `gap` is an upper bound, above the
 /// gap by 2^-45 of where the triangles lie relative to each other at most.
-class GpuImpactQuery {
+///
+/// Assets need axis-aligned and oriented blocks. reserve() also returns kOutOfRange for 2^25 parts or more.
+/// bytes() is at most most_impact_bytes().
+class GpuImpactQuery : public GpuAssetQuestion<GpuImpactKind> {
  public:
-  GpuImpactQuery();
-  GpuImpactQuery(GpuImpactQuery&&) noexcept;
-  GpuImpactQuery& operator=(GpuImpactQuery&&) noexcept;
-  ~GpuImpactQuery();  ///< waits for the device
-
-  /// Names the assets that instances refer to, on the current device, after what `stream` holds: copies the
-  /// list, and returns when that is done. What the trees point to must outlive the queries. Result: as of
-  /// GpuContactQuery::set_assets(); kNoOrientedBlocks or kNoAxisAlignedBlocks, where an asset lacks one of
-  /// both.
-  Status set_assets(std::span<const GpuAsset> assets, cudaStream_t stream);
-
-  /// Makes room for at least so much, waiting for the device where it grows. `options`: those of the calls to
-  /// come. Result: as of GpuContactQuery::reserve() and GpuBroadPhase::reserve(); kOutOfRange also for 2^25
-  /// parts or more. Condition: set_assets().
-  Status reserve(const GpuImpactCapacity& capacity, const GpuImpactOptions& options = {});
-
-  /// Queues a query behind what `stream` holds; it may be captured into a graph. Finds the object pairs whose
-  /// boxes, swept by their motions of a step of `duration` seconds, meet, and when each of them does.
-  /// motion: of each instance, in GPU memory. The arrays must stay until it is done. Result: kOk;
-  /// kOutOfRange, where the duration or the tolerance is negative or not finite, or there are more instances
-  /// than reserved for; kUnknownInstance, kCudaFailed, kOutOfGpuMemory, as of GpuBroadPhase::enqueue(); what
-  /// the GPU finds wrong is in the report. Condition: set_assets() and reserve() with these options.
+  /// Queues a query behind what `stream` holds. It finds the object pairs whose boxes, swept by their motions
+  /// of a step of `duration` seconds, meet, and when each of them does. motion: of each instance, in GPU
+  /// memory. Result: also kOutOfRange, where the duration or the tolerance is negative or not finite, or
+  /// there are more instances than reserved for; kUnknownInstance as of GpuBroadPhase::enqueue(). Condition:
+  /// set_assets() and reserve() with these options.
   Status enqueue(const GpuInstances& instances, const RigidMotion* motion, double duration,
                  const GpuImpactOptions& options, cudaStream_t stream);
 
-  /// The same of given object pairs, in either order of a and b; the filter is not asked. An instance and
-  /// itself do not move relative to each other.
+  /// Asks for given object pairs instead, in either order of a and b; the filter is not asked. An instance
+  /// and itself do not move relative to each other.
   Status enqueue(const GpuInstances& instances, const RigidMotion* motion, double duration,
                  const GpuPairs& pairs, const GpuImpactOptions& options, cudaStream_t stream);
 
-  /// Enqueues a query and waits for it; where room was too small, makes room and starts again until the query
-  /// is complete: in a steady state once. Result: that of the report, or of a call that failed; kOutOfRange
-  /// where pairs.capacity itself was too small.
+  /// Finds all impacts, of pairs that the query finds or of given ones, and waits for them.
   Status find(const GpuInstances& instances, const RigidMotion* motion, double duration,
               const GpuImpactOptions& options, cudaStream_t stream);
   Status find(const GpuInstances& instances, const RigidMotion* motion, double duration,
               const GpuPairs& pairs, const GpuImpactOptions& options, cudaStream_t stream);
 
-  /// The object pairs that the query found, in GPU memory. Valid until reserve().
-  GpuPairs pairs() const;
-
-  /// When each of them, or of the given ones, meets, in GPU memory: report().impacts of them.
-  const Impact* impacts() const;
-
-  const GpuImpactReport* device_report() const;
-
-  /// In CPU memory. Condition: the stream has come to the end of the query.
-  const GpuImpactReport& report() const;
-
-  GpuImpactCapacity capacity() const;
-  std::size_t bytes() const;  ///< GPU memory held, at most most_impact_bytes()
-  cudaError_t cuda_error() const;
-
- private:
-  struct State;
-  std::unique_ptr<State> state_;
+  GpuPairs pairs() const;         ///< the object pairs that the query found
+  const Impact* impacts() const;  ///< report().impacts of them: when each pair meets
 };
 
 }  // namespace tandem

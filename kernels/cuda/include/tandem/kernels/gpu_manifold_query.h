@@ -1,13 +1,8 @@
 #pragma once
-#include <cuda_runtime_api.h>
-
 #include <cstddef>
 #include <cstdint>
-#include <memory>
-#include <span>
 
 #include "tandem/kernels/gpu_contact_query.h"
-#include "tandem/kernels/gpu_scene.h"
 #include "tandem/kernels/manifold_query.h"
 
 namespace tandem {
@@ -44,57 +39,41 @@ struct GpuManifoldReport {
   ManifoldCounters counters;
 };
 
+/// The types of this question, see GpuQuestion.
+struct GpuManifoldKind {
+  struct Host;
+  using Capacity = GpuManifoldCapacity;
+  using Report = GpuManifoldReport;
+  using Options = GpuNoOptions;
+};
+extern template class GpuQuestion<GpuManifoldKind>;
+extern template class GpuAssetQuestion<GpuManifoldKind>;
+
 /// Makes contact manifolds of the contacts that a GpuContactQuery found, on the GPU: the same bytes as
-/// ManifoldQuery makes of them. enqueue() neither waits for the GPU nor allocates. Throws nothing.
-/// Movable, not copyable. An object runs one call at a time.
-class GpuManifoldQuery {
+/// ManifoldQuery makes of them. See GpuQuestion; instances and pairs are those of the contact query.
+///
+/// Assets, the list given to the contact query, need topology; set_assets() forgets the last call. reserve()
+/// keeps what the last call found for the next one to match; it also returns kOutOfRange (contacts or points:
+/// 2^31 or more). bytes() is at most most_manifold_bytes().
+class GpuManifoldQuery : public GpuAssetQuestion<GpuManifoldKind> {
  public:
-  GpuManifoldQuery();
-  GpuManifoldQuery(GpuManifoldQuery&&) noexcept;
-  GpuManifoldQuery& operator=(GpuManifoldQuery&&) noexcept;
-  ~GpuManifoldQuery();  ///< waits for the device
-
-  /// Names the assets that instances refer to, the list given to the query, on the current device, after what
-  /// `stream` holds. Result: kOk; kNoTopology, where an asset was uploaded without; or kOutOfGpuMemory,
-  /// kOutOfMemory, kNoGpu, kDriverTooOld, kGpuNotSupported, kCudaFailed. Forgets the last call.
-  Status set_assets(std::span<const GpuAsset> assets, cudaStream_t stream);
-
-  /// Makes room for at least so much, waiting for the device where it grows. What the last call found is kept
-  /// for the next one to match. Result: kOk, kOutOfGpuMemory, kOutOfRange (contacts or points: 2^31 or more),
-  /// kCudaFailed. Condition: set_assets().
-  Status reserve(const GpuManifoldCapacity& capacity);
-
-  /// Queues the making of manifolds behind what `stream` holds, the query among it; it may be captured into a
-  /// graph. The arrays must stay until it is done. instances, pairs: those of the query. query: one whose
-  /// contacts are grouped. Result: kOk, kCudaFailed, or kOutOfGpuMemory, where CUDA loads a kernel at its
-  /// first launch; what the GPU finds is in the report. Condition: set_assets() and reserve().
+  /// Queues the making of manifolds behind what `stream` holds, the contact query among it, whose contacts
+  /// are grouped. Condition: set_assets() and reserve().
   Status enqueue(const GpuInstances& instances, const GpuPairs& pairs, const GpuContactQuery& query,
                  const GpuManifoldOptions& options, cudaStream_t stream);
 
-  /// Makes manifolds of a query that has ended and is complete, and waits for them; where room was too small,
-  /// makes room and starts again. Result: that of the report, or of a call that failed.
+  /// Makes manifolds of a contact query that has ended, and waits for them. Result: also kOutOfRange where
+  /// that query is not complete.
   Status make(const GpuInstances& instances, const GpuPairs& pairs, const GpuContactQuery& query,
               const GpuManifoldOptions& options, cudaStream_t stream);
 
-  /// In GPU memory, in the order of ManifoldQuery where the pairs are in its order; report().manifolds and
-  /// report().points of them.
+  /// In the order of ManifoldQuery where the pairs are in its order; report().manifolds and report().points
+  /// of them.
   const Manifold* manifolds() const;
   const ManifoldPoint* points() const;
-  const GpuManifoldReport* device_report() const;
-
-  /// In CPU memory. Condition: the stream has come to the end of the call.
-  const GpuManifoldReport& report() const;
 
   /// Queues that the next call finds no points before it.
   Status forget_points(cudaStream_t stream);
-
-  GpuManifoldCapacity capacity() const;
-  std::size_t bytes() const;  ///< GPU memory held, at most most_manifold_bytes()
-  cudaError_t cuda_error() const;
-
- private:
-  struct State;
-  std::unique_ptr<State> state_;
 };
 
 }  // namespace tandem

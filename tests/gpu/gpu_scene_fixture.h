@@ -10,6 +10,7 @@
 #include <tuple>
 #include <vector>
 
+#include "kernels/asked.h"
 #include "kernels/query_scenes.h"
 #include "tandem/formats/gpu_memory.h"
 #include "tandem/formats/gpu_stream.h"
@@ -207,11 +208,10 @@ struct ContactAnswer {
 
 inline ContactAnswer ask_cpu(std::span<const AssetView> assets, const std::vector<Instance>& instances,
                              const std::vector<ObjectPair>& pairs, const ContactOptions& options = {}) {
-  ContactQuery query;
+  Asked<ContactQuery> query;
   EXPECT_EQ(query.set_assets(assets), Status::kOk);
-  const Status status = query.find_contacts(instances, pairs, options);
-  return {status, query.where(), sorted({query.contacts().begin(), query.contacts().end()}),
-          query.counters()};
+  const Status status = query.find(instances, pairs, options);
+  return {status, query.where(), sorted({query.rows().begin(), query.rows().end()}), query.counters()};
 }
 inline ContactAnswer ask_cpu(const BodyScene& scene, const std::vector<ObjectPair>& pairs,
                              const ContactOptions& options = {}) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "gpu/gpu_scene_fixture.h"
+#include "kernels/asked.h"
 #include "tandem/kernels/contact_query.h"
 
 namespace tandem {
@@ -27,10 +28,10 @@ std::vector<Contact> in_order(std::vector<Contact> contacts) {
 
 /// Few thread blocks, and the CPU, find the same contacts, whoever gives work to whom.
 void expect_contacts_of_the_cpu(const BodyScene& scene, const std::vector<ObjectPair>& pairs) {
-  ContactQuery cpu;
+  test::Asked<ContactQuery> cpu;
   ASSERT_EQ(cpu.set_assets(scene.assets.views()), Status::kOk);
-  ASSERT_EQ(cpu.find_contacts(scene.instances, pairs, {}), Status::kOk);
-  const std::vector<Contact> expected = in_order({cpu.contacts().begin(), cpu.contacts().end()});
+  ASSERT_EQ(cpu.find(scene.instances, pairs, {}), Status::kOk);
+  const std::vector<Contact> expected = in_order({cpu.rows().begin(), cpu.rows().end()});
   ASSERT_GT(expected.size(), 1000u);
   const GpuScene on_gpu(scene.assets, scene.instances, pairs);
   GpuContactQuery gpu;

@@ -15,10 +15,12 @@ using Rows = std::vector<Containment>;
 
 Rows rows_of_cpu(const PartedScene& parted, const std::vector<ObjectPair>& pairs) {
   const test::BodyScene& scene = parted.scene;
+  Scene bodies;
   ContainmentQuery query;
-  EXPECT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-  EXPECT_EQ(query.find(scene.instances, pairs, test::ask_cpu(scene, pairs).contacts), Status::kOk);
-  return {query.contained().begin(), query.contained().end()};
+  EXPECT_EQ(bodies.set_assets(scene.assets.views()), Status::kOk);
+  EXPECT_EQ(bodies.place(scene.instances), Status::kOk);
+  EXPECT_EQ(query.find(bodies, pairs, test::ask_cpu(scene, pairs).contacts), Status::kOk);
+  return {query.rows().begin(), query.rows().end()};
 }
 
 std::size_t triangles_with_labels(const test::BodyScene& scene) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "gpu/gpu_scene_fixture.h"
+#include "kernels/asked.h"
 #include "tandem/kernels/gpu_broad_phase.h"
 
 namespace tandem {
@@ -181,7 +182,7 @@ TEST_F(GpuClearance, OfPairsThatABroadPhaseFinds) {
   AskedContacts gpu(scene, {});
   const test::GpuBounds bounds(scene.assets);
   GpuBroadPhase broad_phase;
-  ContactQuery cpu;
+  test::Asked<ContactQuery> cpu;
   ASSERT_EQ(cpu.set_assets(scene.assets.views()), Status::kOk);
   for (const double d : {0.05, 0.5}) {
     ASSERT_EQ(
@@ -189,9 +190,9 @@ TEST_F(GpuClearance, OfPairsThatABroadPhaseFinds) {
         Status::kOk);
     ASSERT_EQ(gpu.query.find_contacts(gpu.scene.instances(), broad_phase.pairs(), within(d), nullptr),
               Status::kOk);
-    ASSERT_EQ(cpu.find_contacts(scene.instances, {.within = d}), Status::kOk);
+    ASSERT_EQ(cpu.find(scene.instances, {.within = d}), Status::kOk);
     EXPECT_EQ(broad_phase.report().found, cpu.pairs().size());
-    EXPECT_EQ(gpu.contacts(), test::sorted({cpu.contacts().begin(), cpu.contacts().end()}));
+    EXPECT_EQ(gpu.contacts(), test::sorted({cpu.rows().begin(), cpu.rows().end()}));
   }
 }
 

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "gpu/gpu_scene_fixture.h"
+#include "kernels/asked.h"
 #include "kernels/distance/distance_scenes.h"
 #include "kernels/geometry/triangle_distance.h"
 #include "tandem/kernels/gpu_distance_query.h"
@@ -23,10 +24,10 @@ std::vector<ObjectPair> every_pair(const BodyScene& scene, bool selves = false) 
 
 Distances of_cpu(const BodyScene& scene, const std::vector<ObjectPair>& pairs,
                  const DistanceOptions& options) {
-  DistanceQuery query;
+  test::Asked<DistanceQuery> query;
   EXPECT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-  EXPECT_EQ(query.find_distances(scene.instances, pairs, options), Status::kOk);
-  return {query.distances().begin(), query.distances().end()};
+  EXPECT_EQ(query.find(scene.instances, pairs, options), Status::kOk);
+  return {query.rows().begin(), query.rows().end()};
 }
 
 /// A scene on the GPU, and a query of it.

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "gpu/gpu_scene_fixture.h"
+#include "kernels/asked.h"
 #include "kernels/impact/moving_scenes.h"
 #include "tandem/kernels/excluded_pairs.h"
 #include "tandem/kernels/gpu_excluded_pairs.h"
@@ -58,23 +59,25 @@ bool same(const Impacts& x, const Impacts& y) {
   return x.size() == y.size() && std::equal(x.begin(), x.end(), y.begin(), equal);
 }
 
+ImpactOptions step_of(const MovingScene& moves, double tolerance = 1e-6) {
+  return {.motion = moves.motion, .duration = moves.duration, .tolerance = tolerance};
+}
+
 class GpuImpacts : public test::GpuTest {
  protected:
   /// What the CPU finds with the same pairs.
   Impacts of_cpu(const MovingScene& moves, const Pairs& pairs, double tolerance = 1e-6) {
     EXPECT_EQ(cpu_.set_assets(moves.scene.assets.views()), Status::kOk);
-    ImpactOptions options;
-    options.tolerance = tolerance;
-    EXPECT_EQ(cpu_.find(moves.scene.instances, moves.motion, moves.duration, pairs, options), Status::kOk);
-    return {cpu_.impacts().begin(), cpu_.impacts().end()};
+    EXPECT_EQ(cpu_.find(moves.scene.instances, pairs, step_of(moves, tolerance)), Status::kOk);
+    return {cpu_.rows().begin(), cpu_.rows().end()};
   }
   Pairs pairs_of_cpu(const MovingScene& moves) {
     EXPECT_EQ(cpu_.set_assets(moves.scene.assets.views()), Status::kOk);
-    EXPECT_EQ(cpu_.find(moves.scene.instances, moves.motion, moves.duration), Status::kOk);
+    EXPECT_EQ(cpu_.find(moves.scene.instances, step_of(moves)), Status::kOk);
     return {cpu_.pairs().begin(), cpu_.pairs().end()};
   }
 
-  ImpactQuery cpu_;
+  test::Asked<ImpactQuery> cpu_;
 };
 
 Impact impact_of(Moved& moved, double tolerance = 1e-6) {
@@ -91,7 +94,7 @@ class GpuImpactFamilies : public test::GpuTestOf<test::MotionFamily> {};
 TEST_P(GpuImpactFamilies, NothingTouchesUntilTSafeAndThenTheGapIsWhatIsTold) {
   RandomPoses random(11);
   const int count = test::trials(200, 20);
-  ImpactQuery cpu;
+  test::Asked<ImpactQuery> cpu;
   int found = 0, none = 0, other_status = 0, later = 0;
   for (int i = 0; i < count && !HasFailure(); ++i) {
     SCOPED_TRACE(i);
@@ -106,8 +109,8 @@ TEST_P(GpuImpactFamilies, NothingTouchesUntilTSafeAndThenTheGapIsWhatIsTold) {
 
     const ObjectPair pair[] = {{0, 1}};
     ASSERT_EQ(cpu.set_assets(moves.scene.assets.views()), Status::kOk);
-    ASSERT_EQ(cpu.find(moves.scene.instances, moves.motion, moves.duration, pair, options), Status::kOk);
-    const Impact& of_cpu = cpu.impacts()[0];
+    ASSERT_EQ(cpu.find(moves.scene.instances, pair, step_of(moves, options.tolerance)), Status::kOk);
+    const Impact& of_cpu = cpu.rows()[0];
     other_status += impact.status != of_cpu.status;
     later += std::fabs(impact.t_safe - of_cpu.t_safe) > 1e-4 * moves.duration;
   }
@@ -177,11 +180,11 @@ TEST_F(GpuImpacts, AContactAtTheStartIsTheLeastOfThePair) {
   ASSERT_EQ(moved.find(kSorted), Status::kOk);
   const Pairs pairs = moved.pairs();
   const Impacts found = moved.impacts();
-  ContactQuery contacts;
+  test::Asked<ContactQuery> contacts;
   ASSERT_EQ(contacts.set_assets(moves.scene.assets.views()), Status::kOk);
-  ASSERT_EQ(contacts.find_contacts(moves.scene.instances, pairs, {}), Status::kOk);
+  ASSERT_EQ(contacts.find(moves.scene.instances, pairs, {}), Status::kOk);
   std::vector<std::pair<std::uint32_t, std::uint32_t>> least(pairs.size(), {kNoIndex, kNoIndex});
-  for (const Contact& contact : contacts.contacts())
+  for (const Contact& contact : contacts.rows())
     least[contact.pair] = std::min(least[contact.pair], {contact.triangle_a, contact.triangle_b});
   std::size_t touching = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "gpu/gpu_scene_fixture.h"
+#include "kernels/asked.h"
 #include "tandem/kernels/gpu_manifold_query.h"
 
 namespace tandem {
@@ -71,7 +72,6 @@ class BothSides {
       : uploaded_(assets, {}, {}, contents) {
     const auto files = assets.views();
     EXPECT_EQ(query_.set_assets(files), Status::kOk);
-    EXPECT_EQ(manifolds_.set_assets(files), Status::kOk);
     EXPECT_EQ(gpu_query_.set_assets(uploaded_.assets(), nullptr), Status::kOk);
     EXPECT_EQ(gpu_.set_assets(uploaded_.assets(), nullptr), Status::kOk);
   }
@@ -94,10 +94,9 @@ class BothSides {
 
   Result on_cpu(const std::vector<Instance>& instances, const std::vector<ObjectPair>& pairs,
                 bool match_previous) {
-    EXPECT_EQ(query_.find_contacts(instances, pairs, {}), Status::kOk);
-    EXPECT_EQ(manifolds_.make(instances, pairs, query_.contacts(), {.match_previous = match_previous}),
-              Status::kOk);
-    return {{manifolds_.manifolds().begin(), manifolds_.manifolds().end()},
+    EXPECT_EQ(query_.find(instances, pairs, {}), Status::kOk);
+    EXPECT_EQ(manifolds_.find(query_.scene, query_.query, {.match_previous = match_previous}), Status::kOk);
+    return {{manifolds_.rows().begin(), manifolds_.rows().end()},
             {manifolds_.points().begin(), manifolds_.points().end()},
             manifolds_.counters()};
   }
@@ -106,7 +105,7 @@ class BothSides {
   GpuManifoldQuery& gpu() { return gpu_; }
 
  private:
-  ContactQuery query_;
+  test::Asked<ContactQuery> query_;
   ManifoldQuery manifolds_;
   GpuScene uploaded_;
   GpuContactQuery gpu_query_;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "gpu/gpu_scene_fixture.h"
+#include "kernels/asked.h"
 #include "kernels/tolerance/level_scenes.h"
 #include "tandem/kernels/gpu_tolerance_query.h"
 
@@ -52,21 +53,21 @@ std::vector<Instance> at_any_levels(const BodyScene& scene, const LevelViews& vi
 
 void expect_cpus_contacts(const LevelViews& views, const std::vector<Instance>& bodies,
                           const std::vector<ObjectPair>& pairs, double within, std::uint64_t& world_pairs) {
-  ContactQuery cpu;
+  test::Asked<ContactQuery> cpu;
   ASSERT_EQ(cpu.set_assets(views.views), Status::kOk);
   const GpuScene device(views.views, bodies, pairs);
   GpuContactQuery query;
   ASSERT_EQ(query.set_assets(device.assets(), nullptr), Status::kOk);
   for (const QueryMode mode : test::kModes) {
     SCOPED_TRACE(testing::Message() << "mode " << static_cast<int>(mode) << " within " << within);
-    ASSERT_EQ(cpu.find_contacts(bodies, pairs, {.mode = mode, .within = within, .add_error_bounds = true}),
+    ASSERT_EQ(cpu.find(bodies, pairs, {.mode = mode, .within = within, .add_error_bounds = true}),
               Status::kOk);
     GpuContactOptions options = test::gpu_options(mode);
     options.within = within;
     options.add_error_bounds = true;
     ASSERT_EQ(query.find_contacts(device.instances(), device.pairs(), options, nullptr), Status::kOk);
     EXPECT_EQ(sorted(download(query.contacts(), query.report().contacts)),
-              sorted({cpu.contacts().begin(), cpu.contacts().end()}));
+              sorted({cpu.rows().begin(), cpu.rows().end()}));
     EXPECT_LE(query.bytes(), most_query_bytes(query.capacity(), options, views.views.size()));
     world_pairs += query.report().world_pairs;
   }
@@ -105,16 +106,16 @@ TEST_F(GpuTolerance, ContactsAtLevelsBeyondFloat32AreTheCpus) {
 /// Runs decide() of both and expects the same of them.
 void expect_cpus_verdicts(const BodyScene& scene, const std::vector<ObjectPair>& pairs,
                           const GpuScene& device, GpuToleranceQuery& query, double tolerance) {
-  ToleranceQuery cpu;
+  test::Asked<ToleranceQuery> cpu;
   ASSERT_EQ(cpu.set_assets(scene.assets.views()), Status::kOk);
-  ASSERT_EQ(cpu.decide(scene.instances, pairs, {.tolerance = tolerance}), Status::kOk);
+  ASSERT_EQ(cpu.find(scene.instances, pairs, {.tolerance = tolerance}), Status::kOk);
   ASSERT_EQ(query.decide(device.instances(), device.pairs(), tolerance, nullptr), Status::kOk)
       << cudaGetErrorString(query.cuda_error());
   const std::vector<PairVerdict> verdicts = download(query.verdicts(), pairs.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    EXPECT_EQ(verdicts[i], cpu.verdicts()[i])
+    EXPECT_EQ(verdicts[i], cpu.rows()[i])
         << "pair " << i << ": " << static_cast<int>(verdicts[i].verdict) << " at " << int{verdicts[i].level_a}
-        << ", " << int{verdicts[i].level_b} << ", not " << static_cast<int>(cpu.verdicts()[i].verdict);
+        << ", " << int{verdicts[i].level_b} << ", not " << static_cast<int>(cpu.rows()[i].verdict);
   }
   const ToleranceCounters &found = query.report().counters, &expected = cpu.counters();
   EXPECT_EQ(found.apart, expected.apart);

@@ -212,7 +212,7 @@ tandem_status tandem_gpu_manifolds_enqueue(tandem_gpu_manifolds* manifolds,
                                            const tandem_gpu_instances* instances,
                                            const tandem_gpu_pairs* pairs,
                                            const tandem_gpu_contact_query* query,
-                                           const tandem_gpu_manifold_options* given, tandem_stream stream) {
+                                           const tandem_manifold_options* given, tandem_stream stream) {
   return ask_behind(manifolds, query, false, {instances, pairs, stream}, given,
                     [&](auto& self, auto& bodies, auto& of, auto& options) {
                       return self.enqueue(bodies, of, query->query, options, stream);
@@ -222,7 +222,7 @@ tandem_status tandem_gpu_manifolds_enqueue(tandem_gpu_manifolds* manifolds,
 tandem_status tandem_gpu_manifolds_find(tandem_gpu_manifolds* manifolds,
                                         const tandem_gpu_instances* instances, const tandem_gpu_pairs* pairs,
                                         const tandem_gpu_contact_query* query,
-                                        const tandem_gpu_manifold_options* given, tandem_stream stream) {
+                                        const tandem_manifold_options* given, tandem_stream stream) {
   return ask_behind(manifolds, query, false, {instances, pairs, stream}, given,
                     [&](auto& self, auto& bodies, auto& of, auto& options) {
                       return self.make(bodies, of, query->query, options, stream);

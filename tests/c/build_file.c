@@ -12,14 +12,10 @@ int main(int argc, char** argv) {
   char* provenance = (char*)calloc(bytes + 1, 1);
   memcpy(provenance, json, bytes);
 
-  tandem_build_options options;
-  memset(&options, 0, sizeof options);
-  options.struct_size = sizeof options;
-  options.effort = atoi(argv[5]) ? TANDEM_EFFORT_FAST : TANDEM_EFFORT_DEFAULT;
-  options.no_gpu_blocks = (uint32_t)atoi(argv[6]);
-  options.no_topology = (uint32_t)atoi(argv[7]);
-  options.imaginary_share = atoi(argv[8]);
-  options.provenance = provenance;
+  tandem_build_options options = {.struct_size = sizeof options, .effort = atoi(argv[5]) ? TANDEM_EFFORT_FAST :
+                                  TANDEM_EFFORT_DEFAULT, .no_gpu_blocks = (uint32_t)atoi(argv[6]),
+                                  .no_topology = (uint32_t)atoi(argv[7]), .imaginary_share = atoi(argv[8]),
+                                  .provenance = provenance};
   Triangles triangles = read_obj(argv[1], argv[2]);
   tandem_mesh mesh = mesh_of(&triangles);
   // The parts that bvhbuild's reader found.

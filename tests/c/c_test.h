@@ -64,13 +64,11 @@ static inline void free_mesh(Triangles* mesh) {
 }
 
 static inline tandem_mesh mesh_of(const Triangles* from) {
-  tandem_mesh mesh;
-  memset(&mesh, 0, sizeof mesh);
-  mesh.struct_size = sizeof mesh;
-  mesh.positions = from->positions;
-  mesh.vertex_count = from->vertex_count;
-  mesh.triangles = from->triangles;
-  mesh.triangle_count = from->triangle_count;
+  tandem_mesh mesh = {.struct_size = sizeof mesh,
+                      .positions = from->positions,
+                      .vertex_count = from->vertex_count,
+                      .triangles = from->triangles,
+                      .triangle_count = from->triangle_count};
   return mesh;
 }
 
@@ -109,8 +107,7 @@ static inline size_t pair_count(const tandem_scene* scene, uint32_t question) {
 
 /// An instance of asset 0 that is not turned.
 static inline tandem_instance at(double x, double y, double z) {
-  tandem_instance instance;
-  memset(&instance, 0, sizeof instance);
+  tandem_instance instance = {0};
   for (int k = 0; k < 3; ++k) instance.pose.rotation[k][k] = 1;
   instance.pose.translation[0] = x;
   instance.pose.translation[1] = y;

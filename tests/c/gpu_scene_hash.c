@@ -34,23 +34,11 @@ static void print_scene(const char* file, uint32_t mode, double within) {
 
   GpuScene on_gpu = scene_to_gpu(scene.instances, scene.count);
   uint8_t* motion = scene.motion != NULL ? (uint8_t*)to_gpu(scene.motion, scene.count) : NULL;
-  tandem_gpu_pair_filter filter;
-  memset(&filter, 0, sizeof filter);
-  filter.struct_size = sizeof filter;
-  filter.motion = motion;
-  tandem_gpu_broad_phase_options near;
-  memset(&near, 0, sizeof near);
-  near.struct_size = sizeof near;
-  near.sorted = 1;
-  near.within = within;
-  near.filter = &filter;
-  tandem_gpu_query_options options;
-  memset(&options, 0, sizeof options);
-  options.struct_size = sizeof options;
-  options.mode = mode;
-  options.within = near.within;
-  tandem_gpu_pairs pairs;
-  memset(&pairs, 0, sizeof pairs);
+  tandem_gpu_pair_filter filter = {.struct_size = sizeof filter, .motion = motion};
+  tandem_gpu_broad_phase_options near = {.struct_size = sizeof near, .sorted = 1, .within = within,
+                                         .filter = &filter};
+  tandem_gpu_query_options options = {.struct_size = sizeof options, .mode = mode, .within = near.within};
+  tandem_gpu_pairs pairs = {0};
   tandem_object_pair* given = NULL;
   uint32_t pair_count = (uint32_t)scene.pair_count;
   if (scene.pairs != NULL) {

@@ -27,10 +27,7 @@ static void build_assets(const char* folder) {
   assets[1] = build_obj(folder, "box_12.obj", NULL);
   Triangles cow = read_obj(folder, "cow_1500.obj");
   const tandem_mesh cow_mesh = mesh_of(&cow);
-  tandem_build_options options;
-  memset(&options, 0, sizeof options);
-  options.struct_size = sizeof options;
-  options.effort = TANDEM_EFFORT_FAST;
+  tandem_build_options options = {.struct_size = sizeof options, .effort = TANDEM_EFFORT_FAST};
   CHECK_STATUS(tandem_asset_build(&cow_mesh, &options, NULL, &assets[2], NULL), TANDEM_OK);
   free_mesh(&cow);
 }
@@ -124,18 +121,12 @@ static void destroy(Queries* queries) {
 }
 
 static tandem_gpu_broad_phase_options sorted_pairs(void) {
-  tandem_gpu_broad_phase_options options;
-  memset(&options, 0, sizeof options);
-  options.struct_size = sizeof options;
-  options.sorted = 1;
+  tandem_gpu_broad_phase_options options = {.struct_size = sizeof options, .sorted = 1};
   return options;
 }
 
 static tandem_gpu_query_options grouped_contacts(void) {
-  tandem_gpu_query_options options;
-  memset(&options, 0, sizeof options);
-  options.struct_size = sizeof options;
-  options.grouped = 1;
+  tandem_gpu_query_options options = {.struct_size = sizeof options, .grouped = 1};
   return options;
 }
 
@@ -219,11 +210,8 @@ static void test_options(void) {
   Queries queries = make_queries();
   tandem_scene* expected = cpu_scene(bodies);
   for (int variant = 0; variant < 4; ++variant) {
-    tandem_contact_options cpu;
-    memset(&cpu, 0, sizeof cpu);
-    cpu.struct_size = sizeof cpu;
-    cpu.mode = variant == 1 ? TANDEM_FAST : variant == 2 ? TANDEM_BOXES : TANDEM_EXACT;
-    cpu.within = variant == 3 ? 0.05 : 0;
+    tandem_contact_options cpu = {.struct_size = sizeof cpu, .mode = variant == 1 ? TANDEM_FAST : variant == 2 ?
+                                  TANDEM_BOXES : TANDEM_EXACT, .within = variant == 3 ? 0.05 : 0};
     tandem_gpu_broad_phase_options near = sorted_pairs();
     near.within = cpu.within;
     tandem_gpu_query_options options = grouped_contacts();
@@ -362,11 +350,7 @@ static void test_distances_and_impacts(void) {
   tandem_scene* expected = cpu_scene(bodies);
   tandem_gpu_distance_query* query = NULL;
   size_t count = 0, pair_count = 0;
-  tandem_distance_options reach;
-  memset(&reach, 0, sizeof reach);
-  reach.struct_size = sizeof reach;
-  reach.limit_reach = 1;
-  reach.reach = 1;
+  tandem_distance_options reach = {.struct_size = sizeof reach, .limit_reach = 1, .reach = 1};
   CHECK_STATUS(tandem_scene_find_distances(expected, &reach), TANDEM_OK);
   const tandem_distance* distances = tandem_scene_distances(expected, &count);
   const tandem_object_pair* pairs = tandem_scene_pairs(expected, TANDEM_DISTANCES, &pair_count);
@@ -376,10 +360,8 @@ static void test_distances_and_impacts(void) {
   CHECK_STATUS(tandem_gpu_distance_query_set_assets(query, gpu_assets, stream), TANDEM_OK);
   for (int again = 0; again < 2; ++again) {
     size_t touching = 0, apart = 0;
-    tandem_gpu_distance_options options;
-    memset(&options, 0, sizeof options);
-    options.struct_size = sizeof options;
-    options.former = again ? tandem_gpu_distance_query_distances(query) : NULL;
+    tandem_gpu_distance_options options = {.struct_size = sizeof options, .former = again ?
+                                           tandem_gpu_distance_query_distances(query) : NULL};
     CHECK_STATUS(tandem_gpu_distance_query_find(query, &scene.instances, &given, &options, stream), TANDEM_OK);
     tandem_gpu_distance_report report;
     CHECK_STATUS(tandem_gpu_distance_query_get_report(query, &report), TANDEM_OK);
@@ -409,10 +391,7 @@ static void test_distances_and_impacts(void) {
   CHECK_STATUS(tandem_scene_find_impacts(expected, &moving), TANDEM_OK);
   const tandem_impact* impacts = tandem_scene_impacts(expected, &count);
   const tandem_object_pair* swept = tandem_scene_pairs(expected, TANDEM_IMPACTS, NULL);
-  tandem_gpu_impact_options sorted;
-  memset(&sorted, 0, sizeof sorted);
-  sorted.struct_size = sizeof sorted;
-  sorted.sorted = 1;
+  tandem_gpu_impact_options sorted = {.struct_size = sizeof sorted, .sorted = 1};
   CHECK_STATUS(tandem_gpu_impact_query_create(NULL, &impact_query), TANDEM_OK);
   CHECK_STATUS(tandem_gpu_impact_query_set_assets(impact_query, gpu_assets, stream), TANDEM_OK);
   CHECK_STATUS(

@@ -18,15 +18,10 @@ int main(int argc, char** argv) {
     return printf("usage: scene_hash SCENE MODE FIRST_ONLY SELF_PAIRS WITHIN THREADS [TOLERANCE]\n"), 1;
   Scene from = read_scene(argv[1]);
   const tandem_pair_filter filter = {sizeof filter, 0, from.count, from.motion, NULL, NULL, NULL};
-  tandem_contact_options options;
-  memset(&options, 0, sizeof options);
-  options.struct_size = sizeof options;
-  options.mode = (uint32_t)atoi(argv[2]);
-  options.first_contact_only = (uint32_t)atoi(argv[3]);
-  options.self_pairs = (uint32_t)atoi(argv[4]);
-  options.within = atof(argv[5]);
-  options.pairs = from.pairs;
-  options.pair_count = from.pair_count;
+  tandem_contact_options options = {.struct_size = sizeof options, .mode = (uint32_t)atoi(argv[2]),
+                                    .first_contact_only = (uint32_t)atoi(argv[3]),
+                                    .self_pairs = (uint32_t)atoi(argv[4]), .within = atof(argv[5]), .pairs = from.pairs, .pair_count
+                                    = from.pair_count};
   tandem_scene* scene = scene_of(from.assets, from.asset_count, NULL);
   release_assets(&from);
   CHECK_STATUS(tandem_scene_set_threads(scene, (uint32_t)atoi(argv[6])), TANDEM_OK);

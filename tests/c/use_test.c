@@ -147,19 +147,9 @@ static void test_building(void) {
   const uint32_t triangles[] = {0, 1, 2, 0, 2, 3, 0, 1, 4, 0, 1, 9};
   const uint32_t faces[] = {0, 0, 1, 2};
   const tandem_mesh_part parts[] = {{"square", "scene/square", 1}, {"rest", NULL, 2}};
-  tandem_mesh mesh;
-  memset(&mesh, 0, sizeof mesh);
-  mesh.struct_size = sizeof mesh;
-  mesh.positions = positions;
-  mesh.vertex_count = 5;
-  mesh.triangles = triangles;
-  mesh.triangle_count = 4;
-  mesh.faces = faces;
-  mesh.parts = parts;
-  mesh.part_count = 2;
-  tandem_build_report report;
-  memset(&report, 0, sizeof report);
-  report.struct_size = sizeof report;
+  tandem_mesh mesh = {.struct_size = sizeof mesh, .positions = positions, .vertex_count = 5, .triangles = triangles,
+                      .triangle_count = 4, .faces = faces, .parts = parts, .part_count = 2};
+  tandem_build_report report = {.struct_size = sizeof report};
   tandem_asset* asset = NULL;
   CHECK_STATUS(tandem_asset_build(&mesh, NULL, NULL, &asset, &report), TANDEM_OK);
   CHECK(report.degenerate == 1 && report.index_out_of_range == 1 && report.vertices_welded == 0);
@@ -340,14 +330,8 @@ static void test_filters(const tandem_allocator* allocator) {
   const tandem_object_pair joint = {3, 2};
   tandem_excluded_pairs* excluded = NULL;
   CHECK_STATUS(tandem_excluded_pairs_create(&joint, 1, allocator, &excluded), TANDEM_OK);
-  tandem_pair_filter filter;
-  memset(&filter, 0, sizeof filter);
-  filter.struct_size = sizeof filter;
-  filter.count = 10;
-  filter.motion = motion;
-  filter.group = group;
-  filter.mask = mask;
-  filter.excluded = excluded;
+  tandem_pair_filter filter = {.struct_size = sizeof filter, .count = 10, .motion = motion, .group = group,
+                               .mask = mask, .excluded = excluded};
   CHECK_STATUS(tandem_scene_place(scene, row, 10, &filter), TANDEM_OK);
   tandem_excluded_pairs_destroy(excluded);  // the scene has them
   memset(motion, 0, sizeof motion);         // and has copied the rest
@@ -498,11 +482,7 @@ static void test_distances_and_impacts(const tandem_allocator* allocator) {
   CHECK_STATUS(tandem_scene_set_threads(scene, 2), TANDEM_OK);
   tandem_instance row[3] = {at(0, 0, 0), at(1.5, 0, 0), at(3, 0, 0)};
   CHECK_STATUS(tandem_scene_place(scene, row, 3, NULL), TANDEM_OK);
-  tandem_distance_options options;
-  memset(&options, 0, sizeof options);
-  options.struct_size = sizeof options;
-  options.limit_reach = 1;
-  options.reach = 2;
+  tandem_distance_options options = {.struct_size = sizeof options, .limit_reach = 1, .reach = 2};
   const double expected[3] = {0.5, 2, 0.5};
   size_t count = 0;
   tandem_former_nearest former = {0, 1, 0, 0};

@@ -2,26 +2,24 @@
 #include <cstddef>
 #include <span>
 
+#include "entry.h"
 #include "tandem/kernels/containment_query.h"
 #include "tandem/kernels/distance_query.h"
 #include "tandem/kernels/impact_query.h"
 #include "tandem/kernels/manifold_query.h"
 #include "tandem/kernels/tolerance_query.h"
-#include "tandem/tandem.h"
 
-// Assertions that a row of a library and that of the interface lie alike.
-#define TANDEM_SAME_SIZE(ours, theirs) \
-  static_assert(sizeof(ours) == sizeof(theirs) && alignof(ours) >= alignof(theirs))
-#define TANDEM_SAME_PLACE(ours, theirs, member) \
-  static_assert(offsetof(ours, member) == offsetof(theirs, member))
+// Assertions that a row of a library, Ours, and that of the interface, Theirs, lie alike.
+#define TANDEM_SAME_SIZE() static_assert(sizeof(Ours) == sizeof(Theirs) && alignof(Ours) >= alignof(Theirs))
+#define TANDEM_SAME(member) static_assert(offsetof(Ours, member) == offsetof(Theirs, member))
 
 /// Rows of the interface have the layout of the libraries' rows, so that they are handed over where they are.
 namespace tandem::c {
 
 #include "layouts.h"
 
-TANDEM_SAME_SIZE(Motion, uint8_t);
 static_assert(TANDEM_NO_INDEX == kNoIndex && TANDEM_OK == uint32_t(Status::kOk));
+static_assert(sizeof(Motion) == sizeof(uint8_t));
 static_assert(TANDEM_MOVING == int(Motion::moving) && TANDEM_FIXED == int(Motion::fixed) &&
               TANDEM_KINEMATIC == int(Motion::kinematic) && TANDEM_SLEEPING == int(Motion::sleeping));
 static_assert(TANDEM_EXACT == int(QueryMode::exact) && TANDEM_FAST == int(QueryMode::fast) &&
@@ -46,6 +44,19 @@ template <typename Row, typename Found>
 const Row* result(std::span<const Found> found, size_t* count) {
   if (count != nullptr) *count = found.size();
   return reinterpret_cast<const Row*>(found.empty() ? nullptr : found.data());
+}
+
+/// The options of manifolds, on the CPU or on a GPU. Result: TANDEM_OK, TANDEM_BAD_STRUCT_SIZE or
+/// TANDEM_BAD_OPTION.
+template <typename Options>
+tandem_status read_manifold_options(const tandem_manifold_options* given, Options& options) {
+  tandem_manifold_options read;
+  if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return status;
+  if (read.most_points > kMostManifoldPoints || read.ignore_previous > 1 || read.reserved != 0)
+    return TANDEM_BAD_OPTION;
+  options.match_previous = read.ignore_previous == 0;
+  if (read.most_points != 0) options.most_points = read.most_points;
+  return TANDEM_OK;
 }
 
 }  // namespace tandem::c

@@ -10,51 +10,6 @@ using namespace tandem::c;
 
 namespace {
 
-// The assets that a scene was given, a reference to each.
-class AssetList {
- public:
-  AssetList() = default;
-  AssetList(const AssetList&) = delete;
-  AssetList& operator=(const AssetList&) = delete;
-  ~AssetList() { clear(); }
-
-  // Takes references to these instead of those before. Result: TANDEM_OK; TANDEM_NULL_ARGUMENT, with its
-  // place; or TANDEM_OUT_OF_MEMORY; then there are none.
-  tandem_status set(tandem_asset* const* assets, size_t count, uint64_t& where) {
-    tandem_status status = is_there(assets, count) ? TANDEM_OK : TANDEM_NULL_ARGUMENT;
-    for (size_t i = 0; i < count && status == TANDEM_OK; ++i) {
-      if (assets[i] != nullptr) continue;
-      status = TANDEM_NULL_ARGUMENT;
-      where = i;
-    }
-    // Those that come are taken before others go: they may be the same.
-    Buffer<tandem_asset*> taken;
-    Buffer<AssetView> views;
-    if (status == TANDEM_OK && (!taken.resize(count) || !views.resize(count))) status = TANDEM_OUT_OF_MEMORY;
-    for (size_t i = 0; i < count && status == TANDEM_OK; ++i) {
-      tandem_asset_retain(taken[i] = assets[i]);
-      views[i] = assets[i]->view;
-    }
-    clear();
-    if (status != TANDEM_OK) return status;
-    assets_ = std::move(taken);
-    views_ = std::move(views);
-    return TANDEM_OK;
-  }
-
-  void clear() {
-    for (tandem_asset* asset : assets_.view()) tandem_asset_release(asset);
-    assets_.clear();
-    views_.clear();
-  }
-
-  std::span<const AssetView> views() const { return views_.view(); }
-
- private:
-  Buffer<tandem_asset*> assets_;
-  Buffer<AssetView> views_;
-};
-
 // A question, and whether it has an answer.
 template <typename Query>
 struct Asked {
@@ -69,7 +24,7 @@ enum class Standing { none, some, all };
 
 struct tandem_scene : Allocated {
   Allocator allocator;
-  AssetList assets;
+  Buffer<tandem_asset*> assets;  // a reference to each
   const tandem_excluded_pairs* excluded = nullptr;
   uint64_t where = 0;
   Scene scene;
@@ -82,7 +37,10 @@ struct tandem_scene : Allocated {
   Asked<ImpactQuery> impacts;
   Asked<ToleranceQuery> verdicts;
 
-  ~tandem_scene() { keep(nullptr); }
+  ~tandem_scene() {
+    release_assets();
+    keep(nullptr);
+  }
 
   tandem_status fail(tandem_status status, uint64_t at) {
     where = at;
@@ -90,6 +48,10 @@ struct tandem_scene : Allocated {
   }
   tandem_status told(Status status) {
     return status == Status::kOk ? tandem_status{TANDEM_OK} : fail(to_c(status), scene.where());
+  }
+  void release_assets() {
+    for (tandem_asset* asset : assets.view()) tandem_asset_release(asset);
+    assets.clear();
   }
   void forget_contacts() {
     standing = Standing::none;
@@ -112,6 +74,31 @@ tandem_status enter(tandem_scene* scene, const Body& body) noexcept {
     self.where = 0;
     return body(self);
   });
+}
+
+// Takes references to these assets instead of those before. After an error there are none.
+tandem_status set_assets(tandem_scene& self, tandem_asset* const* assets, size_t count) {
+  tandem_status status = is_there(assets, count) ? TANDEM_OK : TANDEM_NULL_ARGUMENT;
+  for (size_t i = 0; i < count && status == TANDEM_OK; ++i) {
+    if (assets[i] == nullptr) status = self.fail(TANDEM_NULL_ARGUMENT, i);
+  }
+  // Those that come are taken before others go: they may be the same.
+  Buffer<tandem_asset*> taken;
+  Buffer<AssetView> views;
+  if (status == TANDEM_OK && (!taken.resize(count) || !views.resize(count))) status = TANDEM_OUT_OF_MEMORY;
+  for (size_t i = 0; i < count && status == TANDEM_OK; ++i) {
+    tandem_asset_retain(taken[i] = assets[i]);
+    views[i] = assets[i]->view;
+  }
+  self.release_assets();
+  if (status == TANDEM_OK) {
+    self.assets = std::move(taken);
+    status = self.told(self.scene.set_assets(views.view()));
+  }
+  if (status == TANDEM_OK) return status;
+  (void)self.scene.set_assets({});
+  self.release_assets();
+  return status;
 }
 
 // The filter of so many bodies, which is zeros where none is given. Result: TANDEM_OK,
@@ -207,14 +194,9 @@ tandem_status find(tandem_scene* scene, Asked<Query> tandem_scene::*question, co
 }
 
 tandem_status find_manifolds(tandem_scene& self, const tandem_manifold_options* given) {
-  tandem_manifold_options read;
-  if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return status;
-  if (read.most_points > kMostManifoldPoints || read.ignore_previous > 1 || read.reserved != 0)
-    return TANDEM_BAD_OPTION;
-  if (self.standing == Standing::none) return TANDEM_CONTACTS_MISSING;
   ManifoldOptions options;
-  options.match_previous = read.ignore_previous == 0;
-  if (read.most_points != 0) options.most_points = read.most_points;
+  if (const tandem_status status = read_manifold_options(given, options); status != TANDEM_OK) return status;
+  if (self.standing == Standing::none) return TANDEM_CONTACTS_MISSING;
   return self.told(self.manifolds.query.find(self.scene, self.contacts.query, options));
 }
 
@@ -264,13 +246,7 @@ tandem_status tandem_scene_set_assets(tandem_scene* scene, tandem_asset* const* 
     self.pairs_found = self.distances.found = self.impacts.found = self.verdicts.found = false;
     // Points of before are not those of other assets.
     self.manifolds.query.forget_points();
-    tandem_status status = self.assets.set(assets, count, self.where);
-    const Status named = self.scene.set_assets(self.assets.views());
-    if (status == TANDEM_OK) status = self.told(named);
-    if (status != TANDEM_OK) {
-      (void)self.scene.set_assets({});
-      self.assets.clear();
-    }
+    const tandem_status status = set_assets(self, assets, count);
     self.keep(nullptr);
     return status;
   });

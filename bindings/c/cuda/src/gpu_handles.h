@@ -66,6 +66,11 @@ template <typename Query>
 struct GpuHandle : GivenAssets {
   GpuArray<uint32_t> given_count;  ///< of pairs whose number the caller has in CPU memory
   Query query;
+
+  /// What a handle hides that keeps in mind what its last call found: a call begins, a call has ended.
+  void forget() {}
+  template <typename Options>
+  void note(const Options&, Status) {}
 };
 
 /// Makes a handle, which takes no GPU memory yet.
@@ -79,6 +84,7 @@ tandem_status create_gpu(const tandem_allocator* allocator, Of** handle) noexcep
 template <typename Of, typename Name>
 tandem_status take_assets(Of* handle, tandem_gpu_assets* given, const Name& name) noexcept {
   return guarded(handle, [&](Of& self) -> tandem_status {
+    self.forget();
     if (given == nullptr) return TANDEM_NULL_ARGUMENT;
     tandem_gpu_assets_retain(given);
     tandem_gpu_assets* const before = self.assets;

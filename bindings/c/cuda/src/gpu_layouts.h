@@ -1,53 +1,32 @@
 // Written by scripts/write_interface from bindings/c/cuda/include/tandem/tandem_cuda.h. Do not edit it.
 // clang-format off
-TANDEM_SAME_SIZE(GpuBroadPhaseReport, tandem_gpu_broad_phase_report); TANDEM_SAME_PLACE(GpuBroadPhaseReport, tandem_gpu_broad_phase_report, status);
-  TANDEM_SAME_PLACE(GpuBroadPhaseReport, tandem_gpu_broad_phase_report, complete); TANDEM_SAME_PLACE(GpuBroadPhaseReport,
-  tandem_gpu_broad_phase_report, where); TANDEM_SAME_PLACE(GpuBroadPhaseReport, tandem_gpu_broad_phase_report, count);
-  TANDEM_SAME_PLACE(GpuBroadPhaseReport, tandem_gpu_broad_phase_report, found);
-TANDEM_SAME_SIZE(GpuContactCapacity, tandem_gpu_query_capacity); TANDEM_SAME_PLACE(GpuContactCapacity, tandem_gpu_query_capacity, pairs);
-  TANDEM_SAME_PLACE(GpuContactCapacity, tandem_gpu_query_capacity, contacts); TANDEM_SAME_PLACE(GpuContactCapacity, tandem_gpu_query_capacity,
-  undecided);
-TANDEM_SAME_SIZE(GpuContactReport, tandem_gpu_query_report); TANDEM_SAME_PLACE(GpuContactReport, tandem_gpu_query_report, status);
-  TANDEM_SAME_PLACE(GpuContactReport, tandem_gpu_query_report, complete); TANDEM_SAME_PLACE(GpuContactReport, tandem_gpu_query_report, where);
-  TANDEM_SAME_PLACE(GpuContactReport, tandem_gpu_query_report, needed); TANDEM_SAME_PLACE(GpuContactReport, tandem_gpu_query_report, contacts);
-  TANDEM_SAME_PLACE(GpuContactReport, tandem_gpu_query_report, world_pairs); TANDEM_SAME_PLACE(GpuContactReport, tandem_gpu_query_report, counters);
-TANDEM_SAME_SIZE(GpuGroupCounts, tandem_gpu_group_counts); TANDEM_SAME_PLACE(GpuGroupCounts, tandem_gpu_group_counts, pairs);
-  TANDEM_SAME_PLACE(GpuGroupCounts, tandem_gpu_group_counts, contacts); TANDEM_SAME_PLACE(GpuGroupCounts, tandem_gpu_group_counts, few);
-  TANDEM_SAME_PLACE(GpuGroupCounts, tandem_gpu_group_counts, many);
-TANDEM_SAME_SIZE(GpuManifoldCapacity, tandem_gpu_manifold_capacity); TANDEM_SAME_PLACE(GpuManifoldCapacity, tandem_gpu_manifold_capacity, pairs);
-  TANDEM_SAME_PLACE(GpuManifoldCapacity, tandem_gpu_manifold_capacity, contacts); TANDEM_SAME_PLACE(GpuManifoldCapacity, tandem_gpu_manifold_capacity,
-  manifolds); TANDEM_SAME_PLACE(GpuManifoldCapacity, tandem_gpu_manifold_capacity, points);
-TANDEM_SAME_SIZE(GpuManifoldReport, tandem_gpu_manifold_report); TANDEM_SAME_PLACE(GpuManifoldReport, tandem_gpu_manifold_report, status);
-  TANDEM_SAME_PLACE(GpuManifoldReport, tandem_gpu_manifold_report, complete); TANDEM_SAME_PLACE(GpuManifoldReport, tandem_gpu_manifold_report,
-  needed); TANDEM_SAME_PLACE(GpuManifoldReport, tandem_gpu_manifold_report, manifolds); TANDEM_SAME_PLACE(GpuManifoldReport,
-  tandem_gpu_manifold_report, points); TANDEM_SAME_PLACE(GpuManifoldReport, tandem_gpu_manifold_report, counters);
-TANDEM_SAME_SIZE(GpuContainmentCapacity, tandem_gpu_containment_capacity); TANDEM_SAME_PLACE(GpuContainmentCapacity, tandem_gpu_containment_capacity,
-  pairs); TANDEM_SAME_PLACE(GpuContainmentCapacity, tandem_gpu_containment_capacity, contained);
-TANDEM_SAME_SIZE(GpuContainmentReport, tandem_gpu_containment_report); TANDEM_SAME_PLACE(GpuContainmentReport, tandem_gpu_containment_report, status);
-  TANDEM_SAME_PLACE(GpuContainmentReport, tandem_gpu_containment_report, complete); TANDEM_SAME_PLACE(GpuContainmentReport,
-  tandem_gpu_containment_report, needed); TANDEM_SAME_PLACE(GpuContainmentReport, tandem_gpu_containment_report, contained);
-TANDEM_SAME_SIZE(GpuDistanceCapacity, tandem_gpu_distance_capacity); TANDEM_SAME_PLACE(GpuDistanceCapacity, tandem_gpu_distance_capacity, pairs);
-  TANDEM_SAME_PLACE(GpuDistanceCapacity, tandem_gpu_distance_capacity, block_pairs); TANDEM_SAME_PLACE(GpuDistanceCapacity,
-  tandem_gpu_distance_capacity, triangle_pairs); TANDEM_SAME_PLACE(GpuDistanceCapacity, tandem_gpu_distance_capacity, settled);
-  TANDEM_SAME_PLACE(GpuDistanceCapacity, tandem_gpu_distance_capacity, words);
-TANDEM_SAME_SIZE(GpuDistanceReport, tandem_gpu_distance_report); TANDEM_SAME_PLACE(GpuDistanceReport, tandem_gpu_distance_report, status);
-  TANDEM_SAME_PLACE(GpuDistanceReport, tandem_gpu_distance_report, complete); TANDEM_SAME_PLACE(GpuDistanceReport, tandem_gpu_distance_report, where);
-  TANDEM_SAME_PLACE(GpuDistanceReport, tandem_gpu_distance_report, needed); TANDEM_SAME_PLACE(GpuDistanceReport, tandem_gpu_distance_report,
-  world_pairs); TANDEM_SAME_PLACE(GpuDistanceReport, tandem_gpu_distance_report, rounds); TANDEM_SAME_PLACE(GpuDistanceReport,
-  tandem_gpu_distance_report, counters);
-TANDEM_SAME_SIZE(GpuImpactCapacity, tandem_gpu_impact_capacity); TANDEM_SAME_PLACE(GpuImpactCapacity, tandem_gpu_impact_capacity, instances);
-  TANDEM_SAME_PLACE(GpuImpactCapacity, tandem_gpu_impact_capacity, pairs); TANDEM_SAME_PLACE(GpuImpactCapacity, tandem_gpu_impact_capacity, contacts);
-  TANDEM_SAME_PLACE(GpuImpactCapacity, tandem_gpu_impact_capacity, undecided); TANDEM_SAME_PLACE(GpuImpactCapacity, tandem_gpu_impact_capacity,
-  parts); TANDEM_SAME_PLACE(GpuImpactCapacity, tandem_gpu_impact_capacity, block_pairs); TANDEM_SAME_PLACE(GpuImpactCapacity,
-  tandem_gpu_impact_capacity, triangle_pairs);
-TANDEM_SAME_SIZE(GpuImpactReport, tandem_gpu_impact_report); TANDEM_SAME_PLACE(GpuImpactReport, tandem_gpu_impact_report, status);
-  TANDEM_SAME_PLACE(GpuImpactReport, tandem_gpu_impact_report, complete); TANDEM_SAME_PLACE(GpuImpactReport, tandem_gpu_impact_report, where);
-  TANDEM_SAME_PLACE(GpuImpactReport, tandem_gpu_impact_report, needed); TANDEM_SAME_PLACE(GpuImpactReport, tandem_gpu_impact_report, impacts);
-  TANDEM_SAME_PLACE(GpuImpactReport, tandem_gpu_impact_report, rounds); TANDEM_SAME_PLACE(GpuImpactReport, tandem_gpu_impact_report, counters);
-TANDEM_SAME_SIZE(GpuToleranceCapacity, tandem_gpu_tolerance_capacity); TANDEM_SAME_PLACE(GpuToleranceCapacity, tandem_gpu_tolerance_capacity,
-  instances); TANDEM_SAME_PLACE(GpuToleranceCapacity, tandem_gpu_tolerance_capacity, pairs); TANDEM_SAME_PLACE(GpuToleranceCapacity,
-  tandem_gpu_tolerance_capacity, undecided);
-TANDEM_SAME_SIZE(GpuToleranceReport, tandem_gpu_tolerance_report); TANDEM_SAME_PLACE(GpuToleranceReport, tandem_gpu_tolerance_report, status);
-  TANDEM_SAME_PLACE(GpuToleranceReport, tandem_gpu_tolerance_report, complete); TANDEM_SAME_PLACE(GpuToleranceReport, tandem_gpu_tolerance_report,
-  where); TANDEM_SAME_PLACE(GpuToleranceReport, tandem_gpu_tolerance_report, needed); TANDEM_SAME_PLACE(GpuToleranceReport,
-  tandem_gpu_tolerance_report, world_pairs); TANDEM_SAME_PLACE(GpuToleranceReport, tandem_gpu_tolerance_report, counters);
+struct Same_tandem_gpu_broad_phase_report { using Ours = GpuBroadPhaseReport; using Theirs = tandem_gpu_broad_phase_report; TANDEM_SAME_SIZE();
+  TANDEM_SAME(status); TANDEM_SAME(complete); TANDEM_SAME(where); TANDEM_SAME(count); TANDEM_SAME(found); };
+struct Same_tandem_gpu_query_capacity { using Ours = GpuContactCapacity; using Theirs = tandem_gpu_query_capacity; TANDEM_SAME_SIZE();
+  TANDEM_SAME(pairs); TANDEM_SAME(contacts); TANDEM_SAME(undecided); };
+struct Same_tandem_gpu_query_report { using Ours = GpuContactReport; using Theirs = tandem_gpu_query_report; TANDEM_SAME_SIZE(); TANDEM_SAME(status);
+  TANDEM_SAME(complete); TANDEM_SAME(where); TANDEM_SAME(needed); TANDEM_SAME(contacts); TANDEM_SAME(world_pairs); TANDEM_SAME(counters); };
+struct Same_tandem_gpu_group_counts { using Ours = GpuGroupCounts; using Theirs = tandem_gpu_group_counts; TANDEM_SAME_SIZE(); TANDEM_SAME(pairs);
+  TANDEM_SAME(contacts); TANDEM_SAME(few); TANDEM_SAME(many); };
+struct Same_tandem_gpu_manifold_capacity { using Ours = GpuManifoldCapacity; using Theirs = tandem_gpu_manifold_capacity; TANDEM_SAME_SIZE();
+  TANDEM_SAME(pairs); TANDEM_SAME(contacts); TANDEM_SAME(manifolds); TANDEM_SAME(points); };
+struct Same_tandem_gpu_manifold_report { using Ours = GpuManifoldReport; using Theirs = tandem_gpu_manifold_report; TANDEM_SAME_SIZE();
+  TANDEM_SAME(status); TANDEM_SAME(complete); TANDEM_SAME(needed); TANDEM_SAME(manifolds); TANDEM_SAME(points); TANDEM_SAME(counters); };
+struct Same_tandem_gpu_containment_capacity { using Ours = GpuContainmentCapacity; using Theirs = tandem_gpu_containment_capacity; TANDEM_SAME_SIZE();
+  TANDEM_SAME(pairs); TANDEM_SAME(contained); };
+struct Same_tandem_gpu_containment_report { using Ours = GpuContainmentReport; using Theirs = tandem_gpu_containment_report; TANDEM_SAME_SIZE();
+  TANDEM_SAME(status); TANDEM_SAME(complete); TANDEM_SAME(needed); TANDEM_SAME(contained); };
+struct Same_tandem_gpu_distance_capacity { using Ours = GpuDistanceCapacity; using Theirs = tandem_gpu_distance_capacity; TANDEM_SAME_SIZE();
+  TANDEM_SAME(pairs); TANDEM_SAME(block_pairs); TANDEM_SAME(triangle_pairs); TANDEM_SAME(settled); TANDEM_SAME(words); };
+struct Same_tandem_gpu_distance_report { using Ours = GpuDistanceReport; using Theirs = tandem_gpu_distance_report; TANDEM_SAME_SIZE();
+  TANDEM_SAME(status); TANDEM_SAME(complete); TANDEM_SAME(where); TANDEM_SAME(needed); TANDEM_SAME(world_pairs); TANDEM_SAME(rounds);
+  TANDEM_SAME(counters); };
+struct Same_tandem_gpu_impact_capacity { using Ours = GpuImpactCapacity; using Theirs = tandem_gpu_impact_capacity; TANDEM_SAME_SIZE();
+  TANDEM_SAME(instances); TANDEM_SAME(pairs); TANDEM_SAME(contacts); TANDEM_SAME(undecided); TANDEM_SAME(parts); TANDEM_SAME(block_pairs);
+  TANDEM_SAME(triangle_pairs); };
+struct Same_tandem_gpu_impact_report { using Ours = GpuImpactReport; using Theirs = tandem_gpu_impact_report; TANDEM_SAME_SIZE(); TANDEM_SAME(status);
+  TANDEM_SAME(complete); TANDEM_SAME(where); TANDEM_SAME(needed); TANDEM_SAME(impacts); TANDEM_SAME(rounds); TANDEM_SAME(counters); };
+struct Same_tandem_gpu_tolerance_capacity { using Ours = GpuToleranceCapacity; using Theirs = tandem_gpu_tolerance_capacity; TANDEM_SAME_SIZE();
+  TANDEM_SAME(instances); TANDEM_SAME(pairs); TANDEM_SAME(undecided); };
+struct Same_tandem_gpu_tolerance_report { using Ours = GpuToleranceReport; using Theirs = tandem_gpu_tolerance_report; TANDEM_SAME_SIZE();
+  TANDEM_SAME(status); TANDEM_SAME(complete); TANDEM_SAME(where); TANDEM_SAME(needed); TANDEM_SAME(world_pairs); TANDEM_SAME(counters); };

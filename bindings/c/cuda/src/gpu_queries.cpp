@@ -15,6 +15,7 @@ struct tandem_gpu_contact_query : GpuHandle<GpuContactQuery> {
     return grouped && (all_contacts || !needs_all) ? TANDEM_OK : TANDEM_CONTACTS_MISSING;
   }
 
+  void forget() { grouped = all_contacts = false; }
   void note(const GpuContactOptions& options, Status status) {
     grouped = status == Status::kOk && options.grouped;
     all_contacts =
@@ -35,6 +36,7 @@ template <typename Options>
 using Read = std::pair<tandem_status, Options>;
 
 struct NoOptions {};
+constexpr const NoOptions* kNoOptions = nullptr;
 
 Read<NoOptions> read_options(const NoOptions*) {
   return {TANDEM_OK, {}};
@@ -61,15 +63,10 @@ Read<GpuContactOptions> read_options(const tandem_gpu_query_options* given) {
   return {TANDEM_OK, options};
 }
 
-Read<GpuManifoldOptions> read_options(const tandem_gpu_manifold_options* given) {
-  tandem_gpu_manifold_options read;
-  if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return {status, {}};
-  if (read.most_points > kMostManifoldPoints || read.ignore_previous > 1 || read.reserved != 0)
-    return {TANDEM_BAD_OPTION, {}};
+Read<GpuManifoldOptions> read_options(const tandem_manifold_options* given) {
   GpuManifoldOptions options;
-  if (read.most_points != 0) options.most_points = read.most_points;
-  options.match_previous = read.ignore_previous == 0;
-  return {TANDEM_OK, options};
+  const tandem_status status = read_manifold_options(given, options);
+  return {status, options};
 }
 
 Read<GpuDistanceOptions> read_options(const tandem_gpu_distance_options* given) {
@@ -99,22 +96,26 @@ Read<GpuImpactOptions> read_options(const tandem_gpu_impact_options* given) {
 // What every call is given.
 struct Asked {
   const tandem_gpu_instances* instances;
-  const tandem_gpu_pairs* pairs;  // null: there are none, where that may be
+  const tandem_gpu_pairs* pairs;
   tandem_stream stream;
-  bool finds_pairs = false;  // where there are none
+  bool finds_pairs = false;  // where `pairs` is null
 };
 
-// Runs a call of a query: call(self, instances, pairs, options).
+// Runs a call of a query: call(query, instances, pairs, options).
 template <typename Of, typename Given, typename Call>
 tandem_status ask(Of* query, const Asked& asked, const Given* given, const Call& call) {
   return with_assets(query, [&](Of& self) -> tandem_status {
+    self.forget();
     GpuInstances instances;
     GpuPairs pairs = {};
-    auto [status, options] = read_options(given);
-    if (status == TANDEM_OK) status = read_instances(asked.instances, instances);
-    if (status == TANDEM_OK && (asked.pairs != nullptr || !asked.finds_pairs))
-      status = read_pairs(asked.pairs, self.given_count.data(), pairs, asked.stream);
-    return status == TANDEM_OK ? call(self, instances, pairs, options) : status;
+    auto [read, options] = read_options(given);
+    if (read == TANDEM_OK) read = read_instances(asked.instances, instances);
+    if (read == TANDEM_OK && (asked.pairs != nullptr || !asked.finds_pairs))
+      read = read_pairs(asked.pairs, self.given_count.data(), pairs, asked.stream);
+    if (read != TANDEM_OK) return read;
+    const Status status = call(self.query, instances, pairs, options);
+    self.note(options, status);
+    return told(status, self.query);
   });
 }
 
@@ -129,29 +130,34 @@ tandem_status ask_behind(Of* query, const tandem_gpu_contact_query* contacts, bo
   });
 }
 
-template <typename Of>
-tandem_status set_assets(Of* query, tandem_gpu_assets* assets, tandem_stream stream) {
-  return take_assets(query, assets, [&](auto& of) { return of.set_assets(assets->assets.view(), stream); });
-}
-
-tandem_gpu_contact_query* forget_contacts(tandem_gpu_contact_query* query) {
-  if (query != nullptr) query->grouped = query->all_contacts = false;
-  return query;
+// A call about bodies that move; the library looks at motions only where there are bodies.
+template <typename Call>
+tandem_status ask_moving(tandem_gpu_impact_query* query, const Asked& asked, const tandem_motion* motion,
+                         const tandem_gpu_impact_options* given, const Call& call) {
+  if (asked.instances == nullptr || is_there(motion, asked.instances->count))
+    return ask(query, asked, given, call);
+  return with_assets(query, [&](auto&) {
+    const auto [status, options] = read_options(given);
+    return status == TANDEM_OK ? tandem_status{TANDEM_NULL_ARGUMENT} : status;
+  });
 }
 
 }  // namespace
 
-TANDEM_GPU_HANDLE(tandem_gpu_contact_query, tandem_gpu_query_report)
-TANDEM_GPU_HANDLE(tandem_gpu_manifolds, tandem_gpu_manifold_report)
-TANDEM_GPU_HANDLE(tandem_gpu_containment_query, tandem_gpu_containment_report)
-TANDEM_GPU_HANDLE(tandem_gpu_distance_query, tandem_gpu_distance_report)
-TANDEM_GPU_HANDLE(tandem_gpu_impact_query, tandem_gpu_impact_report)
-TANDEM_GPU_HANDLE(tandem_gpu_tolerance_query, tandem_gpu_tolerance_report)
+// All but the tolerance query look at the first level that an asset shows.
+#define TANDEM_GPU_QUERY(handle, report_row)                                                          \
+  TANDEM_GPU_HANDLE(handle, report_row)                                                               \
+  tandem_status handle##_set_assets(handle* query, tandem_gpu_assets* assets, tandem_stream stream) { \
+    return take_assets(query, assets,                                                                 \
+                       [&](auto& of) { return of.set_assets(assets->assets.view(), stream); });       \
+  }
 
-tandem_status tandem_gpu_contact_query_set_assets(tandem_gpu_contact_query* query, tandem_gpu_assets* assets,
-                                                  tandem_stream stream) {
-  return set_assets(forget_contacts(query), assets, stream);
-}
+TANDEM_GPU_QUERY(tandem_gpu_contact_query, tandem_gpu_query_report)
+TANDEM_GPU_QUERY(tandem_gpu_manifolds, tandem_gpu_manifold_report)
+TANDEM_GPU_QUERY(tandem_gpu_containment_query, tandem_gpu_containment_report)
+TANDEM_GPU_QUERY(tandem_gpu_distance_query, tandem_gpu_distance_report)
+TANDEM_GPU_QUERY(tandem_gpu_impact_query, tandem_gpu_impact_report)
+TANDEM_GPU_HANDLE(tandem_gpu_tolerance_query, tandem_gpu_tolerance_report)
 
 tandem_status tandem_gpu_contact_query_reserve(tandem_gpu_contact_query* query,
                                                const tandem_gpu_query_capacity* capacity,
@@ -159,7 +165,7 @@ tandem_status tandem_gpu_contact_query_reserve(tandem_gpu_contact_query* query,
   return reserve(query, capacity, [&](tandem_gpu_contact_query& self) {
     const auto [status, options] = read_options(given);
     if (status != TANDEM_OK) return status;
-    forget_contacts(&self);
+    self.forget();
     return told(self.query.reserve(std::bit_cast<GpuContactCapacity>(*capacity), options), self.query);
   });
 }
@@ -168,24 +174,16 @@ tandem_status tandem_gpu_contact_query_enqueue(tandem_gpu_contact_query* query,
                                                const tandem_gpu_instances* instances,
                                                const tandem_gpu_pairs* pairs,
                                                const tandem_gpu_query_options* given, tandem_stream stream) {
-  return ask(forget_contacts(query), {instances, pairs, stream}, given,
-             [&](auto& self, const auto& bodies, const auto& of, const auto& options) {
-               const Status status = self.query.enqueue(bodies, of, options, stream);
-               self.note(options, status);
-               return told(status, self.query);
-             });
+  return ask(query, {instances, pairs, stream}, given,
+             [&](auto& self, auto&... read) { return self.enqueue(read..., stream); });
 }
 
 tandem_status tandem_gpu_contact_query_find(tandem_gpu_contact_query* query,
                                             const tandem_gpu_instances* instances,
                                             const tandem_gpu_pairs* pairs,
                                             const tandem_gpu_query_options* given, tandem_stream stream) {
-  return ask(forget_contacts(query), {instances, pairs, stream}, given,
-             [&](auto& self, const auto& bodies, const auto& of, const auto& options) {
-               const Status status = self.query.find_contacts(bodies, of, options, stream);
-               self.note(options, status);
-               return told(status, self.query);
-             });
+  return ask(query, {instances, pairs, stream}, given,
+             [&](auto& self, auto&... read) { return self.find_contacts(read..., stream); });
 }
 
 const tandem_contact* tandem_gpu_contact_query_contacts(const tandem_gpu_contact_query* query) {
@@ -205,11 +203,6 @@ const uint32_t* tandem_gpu_contact_query_met(const tandem_gpu_contact_query* que
   return rows_of<uint32_t>(query, &GpuContactQuery::met);
 }
 
-tandem_status tandem_gpu_manifolds_set_assets(tandem_gpu_manifolds* manifolds, tandem_gpu_assets* assets,
-                                              tandem_stream stream) {
-  return set_assets(manifolds, assets, stream);
-}
-
 tandem_status tandem_gpu_manifolds_reserve(tandem_gpu_manifolds* manifolds,
                                            const tandem_gpu_manifold_capacity* capacity) {
   return reserve<GpuManifoldCapacity>(manifolds, capacity);
@@ -219,20 +212,20 @@ tandem_status tandem_gpu_manifolds_enqueue(tandem_gpu_manifolds* manifolds,
                                            const tandem_gpu_instances* instances,
                                            const tandem_gpu_pairs* pairs,
                                            const tandem_gpu_contact_query* query,
-                                           const tandem_gpu_manifold_options* given, tandem_stream stream) {
+                                           const tandem_manifold_options* given, tandem_stream stream) {
   return ask_behind(manifolds, query, false, {instances, pairs, stream}, given,
-                    [&](auto& self, const auto& bodies, const auto& of, const auto& options) {
-                      return told(self.query.enqueue(bodies, of, query->query, options, stream), self.query);
+                    [&](auto& self, auto& bodies, auto& of, auto& options) {
+                      return self.enqueue(bodies, of, query->query, options, stream);
                     });
 }
 
 tandem_status tandem_gpu_manifolds_find(tandem_gpu_manifolds* manifolds,
                                         const tandem_gpu_instances* instances, const tandem_gpu_pairs* pairs,
                                         const tandem_gpu_contact_query* query,
-                                        const tandem_gpu_manifold_options* given, tandem_stream stream) {
+                                        const tandem_manifold_options* given, tandem_stream stream) {
   return ask_behind(manifolds, query, false, {instances, pairs, stream}, given,
-                    [&](auto& self, const auto& bodies, const auto& of, const auto& options) {
-                      return told(self.query.make(bodies, of, query->query, options, stream), self.query);
+                    [&](auto& self, auto& bodies, auto& of, auto& options) {
+                      return self.make(bodies, of, query->query, options, stream);
                     });
 }
 
@@ -242,11 +235,6 @@ const tandem_manifold* tandem_gpu_manifolds_manifolds(const tandem_gpu_manifolds
 
 const tandem_manifold_point* tandem_gpu_manifolds_points(const tandem_gpu_manifolds* manifolds) {
   return rows_of<tandem_manifold_point>(manifolds, &GpuManifoldQuery::points);
-}
-
-tandem_status tandem_gpu_containment_query_set_assets(tandem_gpu_containment_query* query,
-                                                      tandem_gpu_assets* assets, tandem_stream stream) {
-  return set_assets(query, assets, stream);
 }
 
 tandem_status tandem_gpu_containment_query_reserve(tandem_gpu_containment_query* query,
@@ -259,10 +247,9 @@ tandem_status tandem_gpu_containment_query_enqueue(tandem_gpu_containment_query*
                                                    const tandem_gpu_pairs* pairs,
                                                    const tandem_gpu_contact_query* contacts,
                                                    tandem_stream stream) {
-  const NoOptions none;
-  return ask_behind(query, contacts, true, {instances, pairs, stream}, &none,
-                    [&](auto& self, const auto& bodies, const auto& of, const auto&) {
-                      return told(self.query.enqueue(bodies, of, contacts->query, stream), self.query);
+  return ask_behind(query, contacts, true, {instances, pairs, stream}, kNoOptions,
+                    [&](auto& self, auto& bodies, auto& of, auto&) {
+                      return self.enqueue(bodies, of, contacts->query, stream);
                     });
 }
 
@@ -271,20 +258,14 @@ tandem_status tandem_gpu_containment_query_find(tandem_gpu_containment_query* qu
                                                 const tandem_gpu_pairs* pairs,
                                                 const tandem_gpu_contact_query* contacts,
                                                 tandem_stream stream) {
-  const NoOptions none;
-  return ask_behind(query, contacts, true, {instances, pairs, stream}, &none,
-                    [&](auto& self, const auto& bodies, const auto& of, const auto&) {
-                      return told(self.query.find(bodies, of, contacts->query, stream), self.query);
+  return ask_behind(query, contacts, true, {instances, pairs, stream}, kNoOptions,
+                    [&](auto& self, auto& bodies, auto& of, auto&) {
+                      return self.find(bodies, of, contacts->query, stream);
                     });
 }
 
 const tandem_containment* tandem_gpu_containment_query_contained(const tandem_gpu_containment_query* query) {
   return rows_of<tandem_containment>(query, &GpuContainmentQuery::contained);
-}
-
-tandem_status tandem_gpu_distance_query_set_assets(tandem_gpu_distance_query* query,
-                                                   tandem_gpu_assets* assets, tandem_stream stream) {
-  return set_assets(query, assets, stream);
 }
 
 tandem_status tandem_gpu_distance_query_reserve(tandem_gpu_distance_query* query,
@@ -298,9 +279,7 @@ tandem_status tandem_gpu_distance_query_enqueue(tandem_gpu_distance_query* query
                                                 const tandem_gpu_distance_options* given,
                                                 tandem_stream stream) {
   return ask(query, {instances, pairs, stream}, given,
-             [&](auto& self, const auto& bodies, const auto& of, const auto& options) {
-               return told(self.query.enqueue(bodies, of, options, stream), self.query);
-             });
+             [&](auto& self, auto&... read) { return self.enqueue(read..., stream); });
 }
 
 tandem_status tandem_gpu_distance_query_find(tandem_gpu_distance_query* query,
@@ -308,18 +287,11 @@ tandem_status tandem_gpu_distance_query_find(tandem_gpu_distance_query* query,
                                              const tandem_gpu_pairs* pairs,
                                              const tandem_gpu_distance_options* given, tandem_stream stream) {
   return ask(query, {instances, pairs, stream}, given,
-             [&](auto& self, const auto& bodies, const auto& of, const auto& options) {
-               return told(self.query.find_distances(bodies, of, options, stream), self.query);
-             });
+             [&](auto& self, auto&... read) { return self.find_distances(read..., stream); });
 }
 
 const tandem_distance* tandem_gpu_distance_query_distances(const tandem_gpu_distance_query* query) {
   return rows_of<tandem_distance>(query, &GpuDistanceQuery::distances);
-}
-
-tandem_status tandem_gpu_impact_query_set_assets(tandem_gpu_impact_query* query, tandem_gpu_assets* assets,
-                                                 tandem_stream stream) {
-  return set_assets(query, assets, stream);
 }
 
 tandem_status tandem_gpu_impact_query_reserve(tandem_gpu_impact_query* query,
@@ -338,11 +310,10 @@ tandem_status tandem_gpu_impact_query_enqueue(tandem_gpu_impact_query* query,
                                               const tandem_gpu_pairs* pairs,
                                               const tandem_gpu_impact_options* given, tandem_stream stream) {
   const auto* const moves = reinterpret_cast<const RigidMotion*>(motion);
-  return ask(query, {instances, pairs, stream, true}, given,
-             [&](auto& self, const auto& bodies, const auto& of, const auto& options) -> tandem_status {
-               if (!is_there(motion, bodies.count)) return TANDEM_NULL_ARGUMENT;
-               return told(self.query.enqueue(bodies, moves, duration, of, options, stream), self.query);
-             });
+  return ask_moving(query, {instances, pairs, stream, true}, motion, given,
+                    [&](auto& self, auto& bodies, auto& of, auto& options) {
+                      return self.enqueue(bodies, moves, duration, of, options, stream);
+                    });
 }
 
 tandem_status tandem_gpu_impact_query_find(tandem_gpu_impact_query* query,
@@ -350,11 +321,10 @@ tandem_status tandem_gpu_impact_query_find(tandem_gpu_impact_query* query,
                                            double duration, const tandem_gpu_pairs* pairs,
                                            const tandem_gpu_impact_options* given, tandem_stream stream) {
   const auto* const moves = reinterpret_cast<const RigidMotion*>(motion);
-  return ask(query, {instances, pairs, stream, true}, given,
-             [&](auto& self, const auto& bodies, const auto& of, const auto& options) -> tandem_status {
-               if (!is_there(motion, bodies.count)) return TANDEM_NULL_ARGUMENT;
-               return told(self.query.find(bodies, moves, duration, of, options, stream), self.query);
-             });
+  return ask_moving(query, {instances, pairs, stream, true}, motion, given,
+                    [&](auto& self, auto& bodies, auto& of, auto& options) {
+                      return self.find(bodies, moves, duration, of, options, stream);
+                    });
 }
 
 tandem_gpu_pairs tandem_gpu_impact_query_pairs(const tandem_gpu_impact_query* query) {
@@ -380,9 +350,7 @@ tandem_status tandem_gpu_tolerance_query_enqueue(tandem_gpu_tolerance_query* que
                                                  const tandem_gpu_pairs* pairs, double tolerance,
                                                  tandem_stream stream) {
   return ask(query, {instances, pairs, stream}, &tolerance,
-             [&](auto& self, const auto& bodies, const auto& of, double asked) {
-               return told(self.query.enqueue(bodies, of, asked, stream), self.query);
-             });
+             [&](auto& self, auto&... read) { return self.enqueue(read..., stream); });
 }
 
 tandem_status tandem_gpu_tolerance_query_find(tandem_gpu_tolerance_query* query,
@@ -390,9 +358,7 @@ tandem_status tandem_gpu_tolerance_query_find(tandem_gpu_tolerance_query* query,
                                               const tandem_gpu_pairs* pairs, double tolerance,
                                               tandem_stream stream) {
   return ask(query, {instances, pairs, stream}, &tolerance,
-             [&](auto& self, const auto& bodies, const auto& of, double asked) {
-               return told(self.query.decide(bodies, of, asked, stream), self.query);
-             });
+             [&](auto& self, auto&... read) { return self.decide(read..., stream); });
 }
 
 const tandem_verdict* tandem_gpu_tolerance_query_verdicts(const tandem_gpu_tolerance_query* query) {

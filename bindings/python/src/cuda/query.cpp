@@ -136,7 +136,7 @@ nb::tuple Query::manifolds(std::uint32_t most_points, bool match_previous) {
     manifolds_ = ManifoldMakers::make(device(), [&](tandem_gpu_manifolds* made) {
       return tandem_gpu_manifolds_set_assets(made, assets_.get(), of.stream);
     });
-  auto options = sized<tandem_gpu_manifold_options>();
+  auto options = sized<tandem_manifold_options>();
   options.most_points = most_points;
   options.ignore_previous = !match_previous;
   const Instances& bodies = bodies_of(of.instances, device());

@@ -253,15 +253,8 @@ TANDEM_API size_t tandem_gpu_contact_query_bytes(const tandem_gpu_contact_query*
 
 /// ---- Contact manifolds
 
-/// Makes the manifolds of grouped contacts: the bytes that tandem_contact_query_make_manifolds() makes.
+/// Makes the manifolds of grouped contacts: the bytes that tandem_scene_find_manifolds() makes.
 typedef struct tandem_gpu_manifolds tandem_gpu_manifolds;
-
-typedef struct tandem_gpu_manifold_options {
-  uint32_t struct_size;
-  uint32_t most_points;      ///< of a manifold, 1 to 7; 0: 7
-  uint32_t ignore_previous;  ///< 1: points are not looked for among those of the last call
-  uint32_t reserved;
-} tandem_gpu_manifold_options;
 
 typedef struct tandem_gpu_manifold_capacity {
   uint32_t pairs;
@@ -291,11 +284,11 @@ TANDEM_API tandem_status tandem_gpu_manifolds_reserve(tandem_gpu_manifolds* mani
 /// call did not group contacts.
 TANDEM_API tandem_status tandem_gpu_manifolds_enqueue(
     tandem_gpu_manifolds* manifolds, const tandem_gpu_instances* instances, const tandem_gpu_pairs* pairs,
-    const tandem_gpu_contact_query* query, const tandem_gpu_manifold_options* options, tandem_stream stream);
+    const tandem_gpu_contact_query* query, const tandem_manifold_options* options, tandem_stream stream);
 /// Behind a query that has ended and is complete.
 TANDEM_API tandem_status tandem_gpu_manifolds_find(
     tandem_gpu_manifolds* manifolds, const tandem_gpu_instances* instances, const tandem_gpu_pairs* pairs,
-    const tandem_gpu_contact_query* query, const tandem_gpu_manifold_options* options, tandem_stream stream);
+    const tandem_gpu_contact_query* query, const tandem_manifold_options* options, tandem_stream stream);
 TANDEM_API const tandem_manifold* tandem_gpu_manifolds_manifolds(const tandem_gpu_manifolds* manifolds);
 TANDEM_API const tandem_manifold_point* tandem_gpu_manifolds_points(const tandem_gpu_manifolds* manifolds);
 TANDEM_API const tandem_gpu_manifold_report* tandem_gpu_manifolds_device_report(

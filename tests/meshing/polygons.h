@@ -3,8 +3,7 @@
 #include <initializer_list>
 #include <vector>
 
-#include "bvhbuild/meshing/polygon_mesh.h"
-#include "bvhbuild/meshing/triangle_mesh.h"
+#include "bvhbuild/meshing/meshing.h"
 
 namespace tandem::build {
 

@@ -10,9 +10,7 @@
 #include <string>
 
 #include "bvhbuild/import/import.h"
-#include "bvhbuild/meshing/clean.h"
-#include "bvhbuild/meshing/stored_mesh.h"
-#include "bvhbuild/meshing/triangulate.h"
+#include "bvhbuild/meshing/meshing.h"
 
 namespace tandem::build {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "bvhbuild/meshing/triangulate.h"
+#include "bvhbuild/meshing/meshing.h"
 #include "polygons.h"
 
 namespace tandem::build {

@@ -7,7 +7,6 @@
 #include <random>
 
 #include "bvhbuild/tree/bounds.h"
-#include "bvhbuild/tree/exchange_search.h"
 #include "bvhbuild/tree/working_tree.h"
 #include "parallel/parallel.h"
 #include "sample_asset.h"

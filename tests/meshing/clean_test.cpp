@@ -7,7 +7,7 @@
 #include <set>
 #include <string>
 
-#include "bvhbuild/meshing/clean.h"
+#include "bvhbuild/meshing/meshing.h"
 #include "parallel/parallel.h"
 #include "tandem/build/clean_report.h"
 

@@ -1,4 +1,4 @@
-#include "bvhbuild/meshing/stored_mesh.h"
+#include "bvhbuild/meshing/meshing.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "bvhbuild/meshing/triangulate.h"
+#include "bvhbuild/meshing/meshing.h"
 
 #include <gtest/gtest.h>
 
@@ -12,8 +12,7 @@
 #include <random>
 #include <set>
 
-#include "bvhbuild/meshing/polygon_mesh.h"
-#include "bvhbuild/meshing/triangle_mesh.h"
+#include "bvhbuild/meshing/meshing.h"
 #include "tandem/formats/box.h"
 
 namespace tandem::build {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "bvhbuild/meshing/stored_mesh.h"
+#include "bvhbuild/meshing/meshing.h"
 #include "bvhbuild/tree/assemble.h"
 #include "pipeline.h"
 

@@ -6,9 +6,7 @@
 #include <unistd.h>
 
 #include "bvhbuild/import/import.h"
-#include "bvhbuild/meshing/clean.h"
-#include "bvhbuild/meshing/stored_mesh.h"
-#include "bvhbuild/meshing/triangulate.h"
+#include "bvhbuild/meshing/meshing.h"
 #include "common/json.h"
 #include "common/number_words.h"
 #include "common/output_file.h"

@@ -15,15 +15,12 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Velocities that correct penetration and are forgotten after they have moved the bodies.
-struct Correction {
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
-  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();
+struct Velocities {
+  Vector3d velocity = Vector3d::Zero(), spin = Vector3d::Zero();
 };
 
 // A body while contacts are solved.
-struct Mover {
-  Vector3d velocity, spin;
+struct Mover : Velocities {
   double inverse_mass;
   Matrix3d inverse_inertia;  // in the world
 };
@@ -50,11 +47,12 @@ struct Held {
   double a = 1, b = 1;
 };
 
-double relative_velocity(const Row& row, const Mover& a, const Mover& b) {
+double relative_velocity(const Row& row, const Velocities& a, const Velocities& b) {
   return row.direction.dot(b.velocity - a.velocity) + row.arm_b.dot(b.spin) - row.arm_a.dot(a.spin);
 }
 
-void push_apart(const Joint& joint, const Row& row, double impulse, Mover& a, Mover& b, const Held& held) {
+void push_apart(const Joint& joint, const Row& row, double impulse, Velocities& a, Velocities& b,
+                const Held& held) {
   // A body that nothing moves is shared by islands, so it is not written to.
   if (joint.inverse_mass_a > 0 && held.a > 0) {
     a.velocity -= (impulse * joint.inverse_mass_a) * row.direction;
@@ -70,47 +68,56 @@ double mobility(const Row& row, const Held& held) {
   return held.a * row.mobility_a + held.b * row.mobility_b;
 }
 
-// Visits one row: lambda = clamp(lambda - (w - target) / mobility). Result: by how much w has changed.
-double visit(const Joint& joint, Row& row, double target, double lower, double upper, Mover& a, Mover& b,
-             const Held& held) {
+// What w is to be, as far as the bounds of the impulse let it.
+struct Law {
+  double target, lower, upper;
+
+  // lambda = clamp(lambda - (w - target) / mobility)
+  double impulse(const Row& row, double moves, const Velocities& a, const Velocities& b) const {
+    return std::clamp(row.impulse - (relative_velocity(row, a, b) - target) / moves, lower, upper);
+  }
+};
+
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
+
+Law law_of_normal(const Joint& joint) {
+  return {joint.target, 0, kUnbounded};
+}
+
+Law law_of_friction(const Joint& joint, double friction) {
+  const double bound = friction * joint.normal.impulse;
+  return {0, -bound, bound};
+}
+
+// Visits one row. Result: by how much w has changed.
+double visit(const Joint& joint, Row& row, const Law& law, Mover& a, Mover& b, const Held& held) {
   const double moves = mobility(row, held);
   if (moves <= 0) return 0;
-  const double wanted = row.impulse - (relative_velocity(row, a, b) - target) / moves;
-  const double impulse = std::clamp(wanted, lower, upper);
+  const double impulse = law.impulse(row, moves, a, b);
   const double change = impulse - row.impulse;
   push_apart(joint, row, change, a, b, held);
   row.impulse = impulse;
   return std::fabs(change) * moves;
 }
 
-constexpr double kUnbounded = std::numeric_limits<double>::infinity();
-
 double visit_velocity(Joint& joint, std::vector<Mover>& movers, double friction, const Held& held) {
   Mover &a = movers[joint.a], &b = movers[joint.b];
-  const double bound = friction * joint.normal.impulse;
-  const double first = visit(joint, joint.tangent[0], 0, -bound, bound, a, b, held);
-  const double second = visit(joint, joint.tangent[1], 0, -bound, bound, a, b, held);
-  return std::max({first, second, visit(joint, joint.normal, joint.target, 0, kUnbounded, a, b, held)});
+  const Law slip = law_of_friction(joint, friction);
+  const double first = visit(joint, joint.tangent[0], slip, a, b, held);
+  const double second = visit(joint, joint.tangent[1], slip, a, b, held);
+  return std::max({first, second, visit(joint, joint.normal, law_of_normal(joint), a, b, held)});
 }
 
-double visit_correction(Joint& joint, std::vector<Correction>& corrections, const Held& held) {
-  const Row& row = joint.normal;
-  const double moves = mobility(row, held);
+// corrections: velocities that correct penetration and are forgotten after they have moved the bodies.
+double visit_correction(Joint& joint, std::vector<Velocities>& corrections, const Held& held) {
+  const double moves = mobility(joint.normal, held);
   if (moves <= 0) return 0;
-  Correction &a = corrections[joint.a], &b = corrections[joint.b];
-  const double w = row.direction.dot(b.velocity - a.velocity) + row.arm_b.dot(b.angular_velocity) -
-                   row.arm_a.dot(a.angular_velocity);
+  Velocities &a = corrections[joint.a], &b = corrections[joint.b];
+  const double w = relative_velocity(joint.normal, a, b);
   const double impulse = std::max(0.0, joint.push_impulse - (w - joint.push) / moves);
   const double change = impulse - joint.push_impulse;
   joint.push_impulse = impulse;
-  if (joint.inverse_mass_a > 0 && held.a > 0) {
-    a.velocity -= (change * joint.inverse_mass_a) * row.direction;
-    a.angular_velocity -= change * row.turn_a;
-  }
-  if (joint.inverse_mass_b > 0 && held.b > 0) {
-    b.velocity += (change * joint.inverse_mass_b) * row.direction;
-    b.angular_velocity += change * row.turn_b;
-  }
+  push_apart(joint, joint.normal, change, a, b, held);
   return std::fabs(change) * moves;
 }
 
@@ -167,11 +174,9 @@ void warm_start(Joint& joint, const ContactImpulse& impulse, double friction, st
 }
 
 // What a visit would change, in metres per second.
-double residual_of(const Row& row, double target, double lower, double upper, const Mover& a,
-                   const Mover& b) {
+double residual_of(const Row& row, const Law& law, const Mover& a, const Mover& b) {
   const double moves = mobility(row, {});
-  const double wanted = row.impulse - (relative_velocity(row, a, b) - target) / moves;
-  return std::fabs(std::clamp(wanted, lower, upper) - row.impulse) * moves;
+  return std::fabs(law.impulse(row, moves, a, b) - row.impulse) * moves;
 }
 
 void shuffle(std::vector<std::uint32_t>& order, std::uint64_t seed) {
@@ -183,7 +188,7 @@ void shuffle(std::vector<std::uint32_t>& order, std::uint64_t seed) {
 class IslandSweeps {
  public:
   IslandSweeps(std::span<const std::uint32_t> contacts, std::vector<Joint>& joints,
-               std::vector<Mover>& movers, std::vector<Correction>& corrections, const SolverOptions& options)
+               std::vector<Mover>& movers, std::vector<Velocities>& corrections, const SolverOptions& options)
       : order_(contacts.begin(), contacts.end()),
         joints_(joints),
         movers_(movers),
@@ -230,9 +235,9 @@ class IslandSweeps {
     for (const std::uint32_t i : order_) {
       const Joint& joint = joints_[i];
       const Mover &a = movers_[joint.a], &b = movers_[joint.b];
-      const double bound = options_.friction * joint.normal.impulse;
-      for (const Row& row : joint.tangent) all.add(residual_of(row, 0, -bound, bound, a, b));
-      all.add(residual_of(joint.normal, joint.target, 0, kUnbounded, a, b));
+      const Law slip = law_of_friction(joint, options_.friction);
+      for (const Row& row : joint.tangent) all.add(residual_of(row, slip, a, b));
+      all.add(residual_of(joint.normal, law_of_normal(joint), a, b));
     }
     return all;
   }
@@ -257,15 +262,16 @@ class IslandSweeps {
   std::vector<std::uint32_t> order_;
   std::vector<Joint>& joints_;
   std::vector<Mover>& movers_;
-  std::vector<Correction>& corrections_;
+  std::vector<Velocities>& corrections_;
   const SolverOptions& options_;
 };
 
 Mover make_mover(const BodyProperties& body, const BodyState& state) {
   const bool moves = body.motion == Motion::moving;
   const Vector3d still = Vector3d::Zero();
-  return {body.motion == Motion::fixed ? still : state.velocity,
-          body.motion == Motion::fixed ? still : state.angular_velocity, moves ? 1 / body.mass : 0,
+  const bool is_fixed = body.motion == Motion::fixed;
+  return {{is_fixed ? still : state.velocity, is_fixed ? still : state.angular_velocity},
+          moves ? 1 / body.mass : 0,
           world_inverse_inertia(body, state)};
 }
 
@@ -335,8 +341,7 @@ class SweepSolver final : public StepSolver {
              input.number * options.substeps + i, input.is_cold},
             options, states, impulses);
       for (std::size_t body = 0; body < states.size(); ++body) {
-        advance(input.bodies[body], states[body], corrections_[body].velocity,
-                corrections_[body].angular_velocity, dt);
+        advance(input.bodies[body], states[body], corrections_[body].velocity, corrections_[body].spin, dt);
       }
     }
   }
@@ -402,7 +407,7 @@ class SweepSolver final : public StepSolver {
   SolverOptions options_;
   std::vector<Mover> movers_;
   std::vector<Joint> joints_;
-  std::vector<Correction> corrections_;
+  std::vector<Velocities> corrections_;
 };
 
 }  // namespace

@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-#include "bvhbuild/meshing/polygon_mesh.h"
+#include "bvhbuild/meshing/meshing.h"
 
 namespace tandem::build {
 

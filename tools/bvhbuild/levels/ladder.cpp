@@ -9,7 +9,6 @@
 #include "collapses.h"
 #include "levels/hausdorff.h"
 #include "levels/nearest_triangle.h"
-#include "opened_mesh.h"
 #include "parallel/parallel.h"
 #include "tandem/formats/file.h"
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "opened_mesh.h"
+#include "collapses.h"
 #include "tandem/build/build_options.h"
 
 namespace tandem::build {

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "kernels/geometry/orientation.h"
-#include "polygon_mesh.h"
+#include "meshing.h"
 
 namespace tandem::build {
 

@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "polygon_mesh.h"
+#include "meshing.h"
 
 namespace tandem::build {
 

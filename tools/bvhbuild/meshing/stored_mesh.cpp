@@ -1,4 +1,4 @@
-#include "stored_mesh.h"
+#include "meshing.h"
 
 #include <algorithm>
 #include <cmath>

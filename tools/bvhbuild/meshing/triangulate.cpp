@@ -1,4 +1,4 @@
-#include "triangulate.h"
+#include "meshing.h"
 
 #include <CGAL/Constrained_Delaunay_triangulation_2.h>
 #include <CGAL/Constrained_triangulation_face_base_2.h>

@@ -1,6 +1,6 @@
 #include "bounds.h"
 
-#include "bvhbuild/meshing/triangle_mesh.h"
+#include "bvhbuild/meshing/meshing.h"
 #include "parallel/parallel.h"
 
 namespace tandem::build {

@@ -3,9 +3,7 @@
 #include <charconv>
 
 #include "assemble.h"
-#include "bvhbuild/meshing/clean.h"
-#include "bvhbuild/meshing/stored_mesh.h"
-#include "bvhbuild/meshing/triangle_mesh.h"
+#include "bvhbuild/meshing/meshing.h"
 #include "parallel/parallel.h"
 
 namespace tandem::build {

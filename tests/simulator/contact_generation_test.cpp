@@ -41,7 +41,9 @@ Mesh roof() {
 
 /// Two bodies, each of a mesh of its own.
 ContactScene scene_of(const Mesh& a, const Isometry3d& pose_a, const Mesh& b, const Isometry3d& pose_b) {
-  ContactScene scene = scene_of(a, pose_a, b, pose_b);
+  ContactScene scene;
+  for (const auto& [mesh, pose] : {std::pair(&a, &pose_a), std::pair(&b, &pose_b)})
+    scene.add_body(scene.add_shape(*mesh), *pose);
   return scene;
 }
 

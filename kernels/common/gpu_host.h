@@ -82,9 +82,10 @@ struct GpuHost : Memory {
     return provide_fixed_memory([] { return Status::kOk; });
   }
 
-  /// Writes what the arguments of all kernels of a question have.
+  /// Writes what the arguments of all kernels of a question have, and where its arrays lie.
   template <typename Args>
   void fill(Args& args, const GpuInstances& instances) const {
+    name_arrays(args);
     args.instances = instances;
     args.state = state.data();
     args.host_report = report.data();
@@ -151,47 +152,49 @@ Status find_behind(const Query& query, Host& host, const Capacity& wanted, const
 
 namespace tandem {
 
-template <typename Kind>
-GpuQuestion<Kind>::GpuQuestion() : host_(new (std::nothrow) typename Kind::Host) {}
-template <typename Kind>
-GpuQuestion<Kind>::GpuQuestion(GpuQuestion&&) noexcept = default;
-template <typename Kind>
-GpuQuestion<Kind>& GpuQuestion<Kind>::operator=(GpuQuestion&&) noexcept = default;
-template <typename Kind>
-GpuQuestion<Kind>::~GpuQuestion() = default;
+template <typename Capacity, typename Report, typename Options>
+GpuQuestion<Capacity, Report, Options>::GpuQuestion() : host_(new (std::nothrow) gpu::HostOf<Report>) {}
+template <typename Capacity, typename Report, typename Options>
+GpuQuestion<Capacity, Report, Options>::GpuQuestion(GpuQuestion&&) noexcept = default;
+template <typename Capacity, typename Report, typename Options>
+GpuQuestion<Capacity, Report, Options>& GpuQuestion<Capacity, Report, Options>::operator=(
+    GpuQuestion&&) noexcept = default;
+template <typename Capacity, typename Report, typename Options>
+GpuQuestion<Capacity, Report, Options>::~GpuQuestion() = default;
 
-template <typename Kind>
-Status GpuQuestion<Kind>::reserve(const Capacity& wanted, const Options& options) {
+template <typename Capacity, typename Report, typename Options>
+Status GpuQuestion<Capacity, Report, Options>::reserve(const Capacity& wanted, const Options& options) {
   return host_ != nullptr ? host_->reserve(wanted, options) : Status::kOutOfMemory;
 }
 
-template <typename Kind>
-const typename Kind::Report* GpuQuestion<Kind>::device_report() const {
+template <typename Capacity, typename Report, typename Options>
+const Report* GpuQuestion<Capacity, Report, Options>::device_report() const {
   return host_->device_report();
 }
 
-template <typename Kind>
-const typename Kind::Report& GpuQuestion<Kind>::report() const {
+template <typename Capacity, typename Report, typename Options>
+const Report& GpuQuestion<Capacity, Report, Options>::report() const {
   return *host_->report;
 }
 
-template <typename Kind>
-typename Kind::Capacity GpuQuestion<Kind>::capacity() const {
+template <typename Capacity, typename Report, typename Options>
+Capacity GpuQuestion<Capacity, Report, Options>::capacity() const {
   return host_ != nullptr ? host_->capacity() : Capacity{};
 }
 
-template <typename Kind>
-std::size_t GpuQuestion<Kind>::bytes() const {
+template <typename Capacity, typename Report, typename Options>
+std::size_t GpuQuestion<Capacity, Report, Options>::bytes() const {
   return host_ != nullptr ? host_->bytes() : 0;
 }
 
-template <typename Kind>
-cudaError_t GpuQuestion<Kind>::cuda_error() const {
+template <typename Capacity, typename Report, typename Options>
+cudaError_t GpuQuestion<Capacity, Report, Options>::cuda_error() const {
   return host_ != nullptr ? host_->error : cudaSuccess;
 }
 
-template <typename Kind>
-Status GpuAssetQuestion<Kind>::set_assets(std::span<const GpuAsset> assets, cudaStream_t stream) {
+template <typename Capacity, typename Report, typename Options>
+Status GpuAssetQuestion<Capacity, Report, Options>::set_assets(std::span<const GpuAsset> assets,
+                                                               cudaStream_t stream) {
   return this->host_ != nullptr ? this->host_->set_assets(assets, stream) : Status::kOutOfMemory;
 }
 

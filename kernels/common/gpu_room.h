@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <type_traits>
 
 #include "tandem/formats/gpu_memory.h"
 
@@ -18,6 +19,7 @@ class ListedArray {
   virtual std::size_t bytes_held() const = 0;
   virtual void give_back() = 0;
   virtual cudaError_t provide(std::uint64_t count) = 0;  ///< for so many of what the room counts
+  virtual void name_to(void*) const {}                   ///< writes its place to a kernel's arguments
 
  protected:
   /// room: null for an array whose size its owner chooses.
@@ -42,6 +44,12 @@ class Memory {
     for (const ListedArray* array = first_; array != nullptr; array = array->next_)
       sum += array->bytes_held();
     return sum;
+  }
+
+  /// Writes to the arguments of a kernel where the arrays lie that these name.
+  template <typename Args>
+  void name_arrays(Args& args) const {
+    for (const ListedArray* array = first_; array != nullptr; array = array->next_) array->name_to(&args);
   }
 
   void give_back(const void* room) {
@@ -132,7 +140,7 @@ enum class Growth { forgets, keeps };
 
 /// An array of a question, in GPU memory.
 template <typename Element>
-class RoomArray : public GpuArray<Element>, private ListedArray {
+class RoomArray : public GpuArray<Element>, public ListedArray {
  public:
   RoomArray(Memory& memory) : ListedArray(memory, nullptr) {}
   template <typename Number>
@@ -152,6 +160,25 @@ class RoomArray : public GpuArray<Element>, private ListedArray {
 
   ElementsFor elements_ = one_for_each;
   Growth growth_ = Growth::forgets;
+};
+
+template <typename Args, typename Element>
+Args args_with(Element* Args::*);
+template <typename Args, typename Element>
+std::remove_const_t<Element> element_of(Element* Args::*);
+
+/// An array that kernels know as this member of their arguments.
+template <auto kMember>
+class ArgArray : public RoomArray<decltype(element_of(kMember))> {
+ public:
+  using Base = RoomArray<decltype(element_of(kMember))>;
+  using Base::Base;
+  using Base::operator=;
+
+ private:
+  void name_to(void* args) const override {
+    static_cast<decltype(args_with(kMember))*>(args)->*kMember = this->data();
+  }
 };
 
 }  // namespace tandem::gpu

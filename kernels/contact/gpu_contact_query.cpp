@@ -27,23 +27,25 @@ std::uint64_t sums_of_tiles(std::uint64_t pairs) {
 
 }  // namespace
 
-struct ContactHost : GpuHost<QueryState, GpuContactReport> {
+template <>
+struct HostOf<GpuContactReport> : GpuHost<QueryState, GpuContactReport> {
   AssetList assets{*this};
   bool state_is_clear = false;  // a query that ends leaves it so
   bool walks_only = false;
-  RoomArray<Chunk> chunks{*this};
+  ArgArray<&QueryArgs::chunks> chunks{*this};
 
   Room<std::uint32_t> of_pairs{*this};
-  RoomArray<PairRecord> pairs{of_pairs};
-  RoomArray<std::uint32_t> world_pairs{of_pairs}, met{of_pairs};
+  ArgArray<&QueryArgs::pairs> pairs{of_pairs};
+  ArgArray<&QueryArgs::world_pairs> world_pairs{of_pairs};
+  ArgArray<&QueryArgs::met> met{of_pairs};
   Room<std::uint64_t> of_contacts{*this};
   RoomArray<Contact> contacts{of_contacts, [](std::uint64_t count) { return count + kContactsForKeys; }};
   Room<std::uint64_t> of_undecided{*this};
-  RoomArray<Candidate> undecided{of_undecided};  // what float32 leaves
+  ArgArray<&QueryArgs::undecided> undecided{of_undecided};  // what float32 leaves
 
   Room<std::uint32_t> of_clearance{*this};
-  RoomArray<distance::FrameClearance> clearances{of_clearance};
-  RoomArray<WideRoom> wide_rooms{*this};
+  ArgArray<&QueryArgs::clearances> clearances{of_clearance};
+  ArgArray<&QueryArgs::wide_rooms> wide_rooms{*this};
 
   // Contacts as they are found, where they are sorted or grouped then.
   Room<std::uint64_t> of_ungrouped{*this};
@@ -60,149 +62,130 @@ struct ContactHost : GpuHost<QueryState, GpuContactReport> {
   GpuContactCapacity capacity() const {
     return {of_pairs.count(), of_contacts.count(), of_undecided.count()};
   }
-  Status set_assets(std::span<const GpuAsset> given, cudaStream_t stream);
-  Status reserve(const GpuContactCapacity& wanted, const GpuContactOptions& options);
-  Status reserve_clearance();
-  Status reserve_ungrouped();
-  Status reserve_sorting();
-  Status reserve_grouping();
-  Grouping grouping(const GpuContactOptions& options) const;
-  Status refusal(const GpuContactOptions& options) const;
   bool can_clear() const { return of_clearance.has(of_pairs.count()) && wide_rooms.room() != 0; }
   bool can_sort() const { return of_sorted.has(of_contacts.count()) && sorting.room() != 0; }
   bool can_group() const { return of_ungrouped.has(of_contacts.count()) && of_grouped.has(of_pairs.count()); }
-  QueryArgs args(const GpuInstances& instances, const GpuPairs& given, const GpuContactOptions& options);
-  cudaError_t launch(const QueryArgs& args, cudaStream_t stream);
+
+  Status set_assets(std::span<const GpuAsset> given, cudaStream_t stream) {
+    const AssetSummary all = summary_of(given);
+    if (all.blocks >= kMostBlocks) return Status::kOutOfRange;
+    const Status status = provide_fixed_memory([&] {
+      Status made = keep(chunks.reserve(most_mailboxes(limits)));
+      if (made == Status::kOk) made = keep(cudaMemsetAsync(state.data(), 0, state.bytes(), stream));
+      if (made == Status::kOk) made = keep(cudaMemsetAsync(chunks.data(), 0, chunks.bytes(), stream));
+      if (made == Status::kOk) made = keep(cudaStreamSynchronize(stream));
+      state_is_clear = made == Status::kOk;
+      return made;
+    });
+    return status == Status::kOk ? assets.set(given, all, *this, stream) : status;
+  }
+
+  Status reserve(const GpuContactCapacity& wanted, const GpuContactOptions& options) {
+    if (wanted.undecided > kMostUndecided) return Status::kOutOfGpuMemory;
+    Status status = keep(of_pairs.grow(wanted.pairs));
+    if (status == Status::kOk) status = keep(of_contacts.grow(wanted.contacts));
+    if (status == Status::kOk) status = keep(of_undecided.grow(wanted.undecided, kMostUndecided));
+    if (status == Status::kOk && options.of_clearance()) status = reserve_clearance();
+    if (status == Status::kOk && options.sorted) status = reserve_sorting();
+    return status == Status::kOk && options.grouped ? reserve_grouping() : status;
+  }
+
+  Status reserve_clearance() {
+    Status status = keep(of_clearance.fit(of_pairs.count()));
+    if (status != Status::kOk || wide_rooms.room() != 0) return status;
+    status = keep(wide_rooms.reserve(kWideRooms));
+    if (status == Status::kOk) status = keep(cudaMemset(wide_rooms.data(), 0, wide_rooms.bytes()));
+    if (status == Status::kOk) status = keep(cudaDeviceSynchronize());
+    if (status != Status::kOk) wide_rooms.free();
+    return status;
+  }
+
+  Status reserve_ungrouped() {
+    return of_contacts.count() < kNoIndex ? keep(of_ungrouped.fit(of_contacts.count())) : Status::kOutOfRange;
+  }
+
+  Status reserve_sorting() {
+    if (can_sort()) return Status::kOk;
+    of_sorted.give_back();
+    sorting.free();
+    std::size_t bytes = 0;
+    Status status = reserve_ungrouped();
+    if (status == Status::kOk) status = keep(sorting_bytes(of_contacts.count(), bytes));
+    if (status == Status::kOk) status = keep(of_sorted.fit(of_contacts.count()));
+    return status == Status::kOk ? keep(sorting.reserve(std::max<std::size_t>(bytes, 1))) : status;
+  }
+
+  Status reserve_grouping() {
+    if (can_group()) return Status::kOk;
+    if (of_pairs.count() >= kMostGroupedPairs) return Status::kOutOfRange;
+    const Status status = reserve_ungrouped();
+    return status == Status::kOk ? keep(of_grouped.fit(of_pairs.count())) : status;
+  }
+
+  Grouping grouping(const GpuContactOptions& options) const {
+    if (!options.grouped) return {};
+    return {next.data(),
+            first_contact.data(),
+            few.data(),
+            many.data(),
+            tile_sums.data(),
+            tile_sums.data() + tiles_of(of_pairs.count()),
+            options.sorted ? nullptr : contacts.data()};
+  }
+
+  // Why a query with these options cannot be queued.
+  Status refusal(const GpuContactOptions& options) const {
+    const bool oriented = walked_kind(options.mode) == BlockKind::oriented;
+    if (oriented && !assets.all.oriented) return Status::kNoOrientedBlocks;
+    if (!oriented && !assets.all.axis_aligned) return Status::kNoAxisAlignedBlocks;
+    const bool has_room = (!options.sorted || can_sort()) && (!options.grouped || can_group()) &&
+                          (!options.of_clearance() || can_clear());
+    const bool is_distance = options.within >= 0 && options.within <= kLargestWorldCoordinate;
+    return has_room && is_distance ? Status::kOk : Status::kOutOfRange;
+  }
+
+  QueryArgs args(const GpuInstances& instances, const GpuPairs& given, const GpuContactOptions& options) {
+    QueryArgs args = {};
+    fill(args, instances);
+    assets.fill(args);
+    args.given = given;
+    args.mode = options.mode;
+    args.first_contact_only = options.first_contact_only;
+    args.walk_only = walks_only && options.mode == QueryMode::exact;
+    args.capacity = capacity();
+    args.contacts = options.sorted || options.grouped ? ungrouped.data() : contacts.data();
+    args.grouping = grouping(options);
+    args.shape = walk_shape(limits, assets.all.depth, options.most_blocks);
+    args.within = options.within;
+    args.adds_errors = options.add_error_bounds;
+    args.near = options.of_clearance();
+    return args;
+  }
+
+  // All kernels of a query but those that group and sort.
+  cudaError_t launch(const QueryArgs& args, cudaStream_t stream) {
+    cudaError_t result = cudaSuccess;
+    if (!state_is_clear) result = cudaMemsetAsync(args.state, 0, sizeof(QueryState), stream);
+    cudaStreamCaptureStatus capture = cudaStreamCaptureStatusNone;
+    if (result == cudaSuccess) result = cudaStreamIsCapturing(stream, &capture);
+    const auto walk = args.mode == QueryMode::exact ? walk_exact : walk_unfused;
+    if (result == cudaSuccess) result = queue(args, stream, prepare_pairs, walk, decide_rest);
+    // What is captured has not run: the state is as before.
+    if (capture == cudaStreamCaptureStatusNone) state_is_clear = result == cudaSuccess;
+    return result;
+  }
 };
-
-Status ContactHost::set_assets(std::span<const GpuAsset> given, cudaStream_t stream) {
-  const AssetSummary all = summary_of(given);
-  if (all.blocks >= kMostBlocks) return Status::kOutOfRange;
-  const Status status = provide_fixed_memory([&] {
-    Status made = keep(chunks.reserve(most_mailboxes(limits)));
-    if (made == Status::kOk) made = keep(cudaMemsetAsync(state.data(), 0, state.bytes(), stream));
-    if (made == Status::kOk) made = keep(cudaMemsetAsync(chunks.data(), 0, chunks.bytes(), stream));
-    if (made == Status::kOk) made = keep(cudaStreamSynchronize(stream));
-    state_is_clear = made == Status::kOk;
-    return made;
-  });
-  return status == Status::kOk ? assets.set(given, all, *this, stream) : status;
-}
-
-Status ContactHost::reserve(const GpuContactCapacity& wanted, const GpuContactOptions& options) {
-  if (wanted.undecided > kMostUndecided) return Status::kOutOfGpuMemory;
-  Status status = keep(of_pairs.grow(wanted.pairs));
-  if (status == Status::kOk) status = keep(of_contacts.grow(wanted.contacts));
-  if (status == Status::kOk) status = keep(of_undecided.grow(wanted.undecided, kMostUndecided));
-  if (status == Status::kOk && options.of_clearance()) status = reserve_clearance();
-  if (status == Status::kOk && options.sorted) status = reserve_sorting();
-  return status == Status::kOk && options.grouped ? reserve_grouping() : status;
-}
-
-Status ContactHost::reserve_clearance() {
-  Status status = keep(of_clearance.fit(of_pairs.count()));
-  if (status != Status::kOk || wide_rooms.room() != 0) return status;
-  status = keep(wide_rooms.reserve(kWideRooms));
-  if (status == Status::kOk) status = keep(cudaMemset(wide_rooms.data(), 0, wide_rooms.bytes()));
-  if (status == Status::kOk) status = keep(cudaDeviceSynchronize());
-  if (status != Status::kOk) wide_rooms.free();
-  return status;
-}
-
-Status ContactHost::reserve_ungrouped() {
-  return of_contacts.count() < kNoIndex ? keep(of_ungrouped.fit(of_contacts.count())) : Status::kOutOfRange;
-}
-
-Status ContactHost::reserve_sorting() {
-  if (can_sort()) return Status::kOk;
-  of_sorted.give_back();
-  sorting.free();
-  std::size_t bytes = 0;
-  Status status = reserve_ungrouped();
-  if (status == Status::kOk) status = keep(sorting_bytes(of_contacts.count(), bytes));
-  if (status == Status::kOk) status = keep(of_sorted.fit(of_contacts.count()));
-  return status == Status::kOk ? keep(sorting.reserve(std::max<std::size_t>(bytes, 1))) : status;
-}
-
-Status ContactHost::reserve_grouping() {
-  if (can_group()) return Status::kOk;
-  if (of_pairs.count() >= kMostGroupedPairs) return Status::kOutOfRange;
-  const Status status = reserve_ungrouped();
-  return status == Status::kOk ? keep(of_grouped.fit(of_pairs.count())) : status;
-}
-
-Grouping ContactHost::grouping(const GpuContactOptions& options) const {
-  if (!options.grouped) return {};
-  return {next.data(),
-          first_contact.data(),
-          few.data(),
-          many.data(),
-          tile_sums.data(),
-          tile_sums.data() + tiles_of(of_pairs.count()),
-          options.sorted ? nullptr : contacts.data()};
-}
-
-// Why a query with these options cannot be queued.
-Status ContactHost::refusal(const GpuContactOptions& options) const {
-  const bool oriented = walked_kind(options.mode) == BlockKind::oriented;
-  if (oriented && !assets.all.oriented) return Status::kNoOrientedBlocks;
-  if (!oriented && !assets.all.axis_aligned) return Status::kNoAxisAlignedBlocks;
-  const bool has_room = (!options.sorted || can_sort()) && (!options.grouped || can_group()) &&
-                        (!options.of_clearance() || can_clear());
-  const bool is_distance = options.within >= 0 && options.within <= kLargestWorldCoordinate;
-  return has_room && is_distance ? Status::kOk : Status::kOutOfRange;
-}
-
-QueryArgs ContactHost::args(const GpuInstances& instances, const GpuPairs& given,
-                            const GpuContactOptions& options) {
-  QueryArgs args = {};
-  fill(args, instances);
-  assets.fill(args);
-  args.given = given;
-  args.mode = options.mode;
-  args.first_contact_only = options.first_contact_only;
-  args.walk_only = walks_only && options.mode == QueryMode::exact;
-  args.capacity = capacity();
-  args.chunks = chunks.data();
-  args.pairs = pairs.data();
-  args.world_pairs = world_pairs.data();
-  args.met = met.data();
-  args.contacts = options.sorted || options.grouped ? ungrouped.data() : contacts.data();
-  args.grouping = grouping(options);
-  args.undecided = undecided.data();
-  args.shape = walk_shape(limits, assets.all.depth, options.most_blocks);
-  args.within = options.within;
-  args.adds_errors = options.add_error_bounds;
-  args.near = options.of_clearance();
-  args.clearances = clearances.data();
-  args.wide_rooms = wide_rooms.data();
-  return args;
-}
-
-// All kernels of a query but those that group and sort.
-cudaError_t ContactHost::launch(const QueryArgs& args, cudaStream_t stream) {
-  cudaError_t result = cudaSuccess;
-  if (!state_is_clear) result = cudaMemsetAsync(args.state, 0, sizeof(QueryState), stream);
-  cudaStreamCaptureStatus capture = cudaStreamCaptureStatusNone;
-  if (result == cudaSuccess) result = cudaStreamIsCapturing(stream, &capture);
-  const auto walk = args.mode == QueryMode::exact ? walk_exact : walk_unfused;
-  if (result == cudaSuccess) result = queue(args, stream, prepare_pairs, walk, decide_rest);
-  // What is captured has not run: the state is as before.
-  if (capture == cudaStreamCaptureStatusNone) state_is_clear = result == cudaSuccess;
-  return result;
-}
 
 }  // namespace tandem::gpu
 
 namespace tandem {
 
-struct GpuContactKind::Host : gpu::ContactHost {};
-template class GpuQuestion<GpuContactKind>;
-template class GpuAssetQuestion<GpuContactKind>;
+template class GpuQuestion<GpuContactCapacity, GpuContactReport, GpuContactOptions>;
+template class GpuAssetQuestion<GpuContactCapacity, GpuContactReport, GpuContactOptions>;
 
 Status GpuContactQuery::enqueue(const GpuInstances& instances, const GpuPairs& pairs,
                                 const GpuContactOptions& options, cudaStream_t stream) {
-  gpu::ContactHost& host = *host_;
+  auto& host = *host_;
   if (const Status status = host.refusal(options); status != Status::kOk) return status;
   const gpu::QueryArgs args = host.args(instances, pairs, options);
   cudaError_t error = host.launch(args, stream);
@@ -232,7 +215,7 @@ const Contact* GpuContactQuery::contacts() const {
 }
 
 GpuContactGroups GpuContactQuery::groups() const {
-  const gpu::ContactHost& host = *host_;
+  const auto& host = *host_;
   return {host.contacts.data(), host.first_contact.data(), host.few.data(), host.many.data(),
           &host.state->groups};
 }

@@ -11,104 +11,97 @@ namespace tandem::gpu {
 
 using containment::Surface;
 
-struct ContainmentHost : GpuHost<ContainmentState, GpuContainmentReport> {
-  RoomArray<Surface> surfaces{*this};
+template <>
+struct HostOf<GpuContainmentReport> : GpuHost<ContainmentState, GpuContainmentReport> {
+  ArgArray<&ContainmentArgs::surfaces> surfaces{*this};
   RoomArray<std::uint32_t> labels{*this};
 
   Room<std::uint32_t> of_pairs{*this};
-  RoomArray<std::uint32_t> rows_of_pair{of_pairs};
-  RoomArray<std::uint32_t> sums{of_pairs, [](std::uint64_t pairs) { return pairs / kPairsPerSum + 1; }};
+  ArgArray<&ContainmentArgs::rows_of_pair> rows_of_pair{of_pairs};
+  ArgArray<&ContainmentArgs::sums> sums{of_pairs,
+                                        [](std::uint64_t pairs) { return pairs / kPairsPerSum + 1; }};
   Room<std::uint32_t> of_rows{*this};
-  RoomArray<FoundContainment> found{of_rows};
-  RoomArray<Containment> contained{of_rows};
+  ArgArray<&ContainmentArgs::found> found{of_rows};
+  ArgArray<&ContainmentArgs::contained> contained{of_rows};
 
-  Status make_surface(const GpuAsset& asset, std::uint32_t* labels_of_it, cudaStream_t stream, Surface& out);
-  Status set_assets(std::span<const GpuAsset> assets, cudaStream_t stream);
   GpuContainmentCapacity capacity() const { return {of_pairs.count(), of_rows.count()}; }
   Status reserve(const GpuContainmentCapacity& wanted, const GpuNoOptions&) {
     const Status status = keep(of_pairs.grow(wanted.pairs));
     return status == Status::kOk ? keep(of_rows.grow(wanted.contained)) : status;
   }
+
+  // labels_of_it: in CPU memory, to be filled where there is more than one component.
+  Status make_surface(const GpuAsset& asset, std::uint32_t* labels_of_it, cudaStream_t stream, Surface& out) {
+    LevelView level = asset.tree;
+    out = {};
+    out.triangles = level.triangles;
+    out.blocks = level.blocks;
+    out.oriented_blocks = level.oriented_blocks;
+    out.components = level.components;
+    out.triangle_count = level.triangle_count;
+    out.component_count = level.component_count;
+    out.closed = out.any_closed = level.closed;
+    std::copy_n(asset.origin, 3, out.origin);
+    std::copy_n(asset.lower, 3, out.lower);
+    std::copy_n(asset.upper, 3, out.upper);
+    out.farthest = farthest_of(asset.extent);
+    if (level.component_count == 1) return Status::kOk;
+    Buffer<TriangleTopology> topology;
+    Buffer<SurfaceComponent> components;
+    if (!topology.resize(level.triangle_count) || !components.resize(level.component_count))
+      return Status::kOutOfMemory;
+    Status status =
+        keep(download<TriangleTopology>(level.topology, {topology.data(), topology.size()}, stream));
+    if (status == Status::kOk)
+      status =
+          keep(download<SurfaceComponent>(level.components, {components.data(), components.size()}, stream));
+    if (status != Status::kOk) return status;
+    level.topology = topology.data(), level.components = components.data();
+    for (const SurfaceComponent& component : components.view())
+      out.any_closed = out.any_closed || is_closed(component);
+    return containment::label_triangles(level, labels_of_it) ? Status::kOk : Status::kOutOfMemory;
+  }
+
+  Status set_assets(std::span<const GpuAsset> assets, cudaStream_t stream) {
+    std::size_t labelled = 0;
+    for (const GpuAsset& asset : assets) {
+      if (asset.tree.topology == nullptr) return Status::kNoTopology;
+      if (asset.tree.component_count != 1) labelled += asset.tree.triangle_count;
+    }
+    Buffer<Surface> made;
+    Buffer<std::uint32_t> made_labels;
+    if (!made.resize(assets.size()) || !made_labels.resize(labelled)) return Status::kOutOfMemory;
+    Status status = provide_fixed_memory();
+    if (status == Status::kOk) status = keep(labels.reserve(labelled));
+    std::size_t next = 0;
+    for (std::size_t i = 0; i < assets.size() && status == Status::kOk; ++i) {
+      status = make_surface(assets[i], made_labels.data() + next, stream, made[i]);
+      if (assets[i].tree.component_count == 1) continue;
+      made[i].labels = labels.data() + next;
+      next += assets[i].tree.triangle_count;
+    }
+    if (status == Status::kOk) status = keep(labels.upload(made_labels.view(), stream));
+    if (status == Status::kOk) status = keep(surfaces.upload(made.view(), stream));
+    return status == Status::kOk ? keep(cudaStreamSynchronize(stream)) : status;
+  }
 };
-
-// labels_of_it: in CPU memory, to be filled where there is more than one component.
-Status ContainmentHost::make_surface(const GpuAsset& asset, std::uint32_t* labels_of_it, cudaStream_t stream,
-                                     Surface& out) {
-  LevelView level = asset.tree;
-  out = {};
-  out.triangles = level.triangles;
-  out.blocks = level.blocks;
-  out.oriented_blocks = level.oriented_blocks;
-  out.components = level.components;
-  out.triangle_count = level.triangle_count;
-  out.component_count = level.component_count;
-  out.closed = out.any_closed = level.closed;
-  std::copy_n(asset.origin, 3, out.origin);
-  std::copy_n(asset.lower, 3, out.lower);
-  std::copy_n(asset.upper, 3, out.upper);
-  out.farthest = farthest_of(asset.extent);
-  if (level.component_count == 1) return Status::kOk;
-  Buffer<TriangleTopology> topology;
-  Buffer<SurfaceComponent> components;
-  if (!topology.resize(level.triangle_count) || !components.resize(level.component_count))
-    return Status::kOutOfMemory;
-  Status status =
-      keep(download<TriangleTopology>(level.topology, {topology.data(), topology.size()}, stream));
-  if (status == Status::kOk)
-    status =
-        keep(download<SurfaceComponent>(level.components, {components.data(), components.size()}, stream));
-  if (status != Status::kOk) return status;
-  level.topology = topology.data(), level.components = components.data();
-  for (const SurfaceComponent& component : components.view())
-    out.any_closed = out.any_closed || is_closed(component);
-  return containment::label_triangles(level, labels_of_it) ? Status::kOk : Status::kOutOfMemory;
-}
-
-Status ContainmentHost::set_assets(std::span<const GpuAsset> assets, cudaStream_t stream) {
-  std::size_t labelled = 0;
-  for (const GpuAsset& asset : assets) {
-    if (asset.tree.topology == nullptr) return Status::kNoTopology;
-    if (asset.tree.component_count != 1) labelled += asset.tree.triangle_count;
-  }
-  Buffer<Surface> made;
-  Buffer<std::uint32_t> made_labels;
-  if (!made.resize(assets.size()) || !made_labels.resize(labelled)) return Status::kOutOfMemory;
-  Status status = provide_fixed_memory();
-  if (status == Status::kOk) status = keep(labels.reserve(labelled));
-  std::size_t next = 0;
-  for (std::size_t i = 0; i < assets.size() && status == Status::kOk; ++i) {
-    status = make_surface(assets[i], made_labels.data() + next, stream, made[i]);
-    if (assets[i].tree.component_count == 1) continue;
-    made[i].labels = labels.data() + next;
-    next += assets[i].tree.triangle_count;
-  }
-  if (status == Status::kOk) status = keep(labels.upload(made_labels.view(), stream));
-  if (status == Status::kOk) status = keep(surfaces.upload(made.view(), stream));
-  return status == Status::kOk ? keep(cudaStreamSynchronize(stream)) : status;
-}
 
 }  // namespace tandem::gpu
 
 namespace tandem {
 
-struct GpuContainmentKind::Host : gpu::ContainmentHost {};
-template class GpuQuestion<GpuContainmentKind>;
-template class GpuAssetQuestion<GpuContainmentKind>;
+template class GpuQuestion<GpuContainmentCapacity, GpuContainmentReport>;
+template class GpuAssetQuestion<GpuContainmentCapacity, GpuContainmentReport>;
 
 Status GpuContainmentQuery::enqueue(const GpuInstances& instances, const GpuPairs& pairs,
                                     const GpuContactQuery& query, cudaStream_t stream) {
-  const gpu::ContainmentHost& host = *host_;
+  const auto& host = *host_;
   gpu::ContainmentArgs args = {};
   host.fill(args, instances);
-  args.surfaces = host.surfaces.data();
   args.pairs = pairs;
   args.groups = query.groups();
   args.query = query.device_report();
   args.capacity = host.capacity();
-  args.rows_of_pair = host.rows_of_pair.data();
-  args.sums = host.sums.data();
-  args.found = host.found.data();
-  args.contained = host.contained.data();
   return host_->keep(gpu::find_contained(args, stream));
 }
 

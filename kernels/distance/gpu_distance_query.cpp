@@ -34,85 +34,75 @@ std::uint32_t with_spare(std::uint32_t needed, std::uint32_t present) {
 
 }  // namespace
 
-struct DistanceHost : GpuHost<DistanceState, GpuDistanceReport> {
+template <>
+struct HostOf<GpuDistanceReport> : GpuHost<DistanceState, GpuDistanceReport> {
   AssetList assets{*this};
 
   Room<std::uint32_t> of_pairs{*this};
-  RoomArray<DistanceRecord> records{of_pairs};
-  RoomArray<NearState> near_states{of_pairs};
-  RoomArray<Narrowing> narrowings{of_pairs};
-  RoomArray<ObjectDistance> distances{of_pairs};
+  ArgArray<&DistanceArgs::records> records{of_pairs};
+  ArgArray<&DistanceArgs::near_states> near_states{of_pairs};
+  ArgArray<&DistanceArgs::narrowings> narrowings{of_pairs};
+  ArgArray<&DistanceArgs::distances> distances{of_pairs};
   RoomArray<std::uint32_t> walked{of_pairs};
   Room<std::uint32_t> of_block_pairs{*this};
   RoomArray<BlockPairEntry> frontier{of_block_pairs, times<2>};  // two rounds
   Room<std::uint32_t> of_triangle_pairs{*this};
   RoomArray<TrianglePairEntry> near{of_triangle_pairs};
-  RoomArray<FrameBounds> bounds{of_triangle_pairs};
+  ArgArray<&DistanceArgs::bounds> bounds{of_triangle_pairs};
   Room<std::uint32_t> of_settled{*this};
   RoomArray<TrianglePairEntry> rest{of_settled};
-  RoomArray<TriangleDistance> rest_distances{of_settled};
+  ArgArray<&DistanceArgs::rest_distances> rest_distances{of_settled};
   std::uint32_t words = 0;
 
   GpuDistanceCapacity capacity() const {
     return {of_pairs.count(), of_block_pairs.count(), of_triangle_pairs.count(), of_settled.count(), words};
   }
-  Status set_assets(std::span<const GpuAsset> given, cudaStream_t stream);
-  Status reserve(const GpuDistanceCapacity& wanted, const GpuNoOptions&);
+
+  Status set_assets(std::span<const GpuAsset> given, cudaStream_t stream) {
+    const AssetSummary all = summary_of(given);
+    if (!all.axis_aligned) return Status::kNoAxisAlignedBlocks;
+    const Status status = provide_fixed_memory();
+    return status == Status::kOk ? assets.set(given, all, *this, stream) : status;
+  }
+
+  Status reserve(const GpuDistanceCapacity& wanted, const GpuNoOptions&) {
+    if (std::max({wanted.pairs, wanted.block_pairs, wanted.triangle_pairs, wanted.settled}) > kMostRoom)
+      return Status::kOutOfGpuMemory;
+    words = std::max({words, wanted.words, kFewWords});
+    Status status = keep(of_pairs.grow(wanted.pairs, kMostRoom));
+    if (status == Status::kOk) status = keep(of_block_pairs.fit(wanted.block_pairs));
+    if (status == Status::kOk) status = keep(of_triangle_pairs.grow(wanted.triangle_pairs, kMostRoom));
+    return status == Status::kOk ? keep(of_settled.grow(wanted.settled, kMostRoom)) : status;
+  }
+
   DistanceArgs args(const GpuInstances& instances, const GpuPairs& pairs,
-                    const GpuDistanceOptions& options) const;
+                    const GpuDistanceOptions& options) const {
+    DistanceState* const s = state.data();
+    DistanceArgs args = {};
+    fill(args, instances);
+    assets.fill(args);
+    args.given = pairs;
+    args.tolerance = options.tolerance;
+    args.beyond_reach = std::nextafter(options.reach, INFINITY);
+    args.former = options.former;
+    args.capacity = capacity();
+    args.walked = {walked.data(), &s->walked, of_pairs.count()};
+    args.narrow = {frontier.data(), s->narrow_rounds, of_block_pairs.count()};
+    args.frontier = {frontier.data(), s->rounds, of_block_pairs.count()};
+    args.seeds = {near.data(), &s->seeds, of_triangle_pairs.count()};
+    args.near = {near.data(), &s->near, of_triangle_pairs.count()};
+    args.rest = {rest.data(), &s->rest, of_settled.count()};
+    args.rounds = rounds_of(assets.all.depth, assets.all.depth);
+    return args;
+  }
 };
-
-Status DistanceHost::set_assets(std::span<const GpuAsset> given, cudaStream_t stream) {
-  const AssetSummary all = summary_of(given);
-  if (!all.axis_aligned) return Status::kNoAxisAlignedBlocks;
-  const Status status = provide_fixed_memory();
-  return status == Status::kOk ? assets.set(given, all, *this, stream) : status;
-}
-
-Status DistanceHost::reserve(const GpuDistanceCapacity& wanted, const GpuNoOptions&) {
-  if (std::max({wanted.pairs, wanted.block_pairs, wanted.triangle_pairs, wanted.settled}) > kMostRoom)
-    return Status::kOutOfGpuMemory;
-  words = std::max({words, wanted.words, kFewWords});
-  Status status = keep(of_pairs.grow(wanted.pairs, kMostRoom));
-  if (status == Status::kOk) status = keep(of_block_pairs.fit(wanted.block_pairs));
-  if (status == Status::kOk) status = keep(of_triangle_pairs.grow(wanted.triangle_pairs, kMostRoom));
-  return status == Status::kOk ? keep(of_settled.grow(wanted.settled, kMostRoom)) : status;
-}
-
-DistanceArgs DistanceHost::args(const GpuInstances& instances, const GpuPairs& pairs,
-                                const GpuDistanceOptions& options) const {
-  DistanceState* const s = state.data();
-  DistanceArgs args = {};
-  fill(args, instances);
-  assets.fill(args);
-  args.given = pairs;
-  args.tolerance = options.tolerance;
-  args.beyond_reach = std::nextafter(options.reach, INFINITY);
-  args.former = options.former;
-  args.capacity = capacity();
-  args.records = records.data();
-  args.near_states = near_states.data();
-  args.narrowings = narrowings.data();
-  args.distances = distances.data();
-  args.walked = {walked.data(), &s->walked, of_pairs.count()};
-  args.narrow = {frontier.data(), s->narrow_rounds, of_block_pairs.count()};
-  args.frontier = {frontier.data(), s->rounds, of_block_pairs.count()};
-  args.seeds = {near.data(), &s->seeds, of_triangle_pairs.count()};
-  args.near = {near.data(), &s->near, of_triangle_pairs.count()};
-  args.bounds = bounds.data();
-  args.rest = {rest.data(), &s->rest, of_settled.count()};
-  args.rest_distances = rest_distances.data();
-  args.rounds = rounds_of(assets.all.depth, assets.all.depth);
-  return args;
-}
 
 }  // namespace tandem::gpu
 
 namespace tandem {
 
-struct GpuDistanceKind::Host : gpu::DistanceHost {};
-template class GpuQuestion<GpuDistanceKind>;
-template class GpuAssetQuestion<GpuDistanceKind>;
+template class GpuQuestion<GpuDistanceCapacity, GpuDistanceReport>;
+template class GpuAssetQuestion<GpuDistanceCapacity, GpuDistanceReport>;
 
 Status GpuDistanceQuery::enqueue(const GpuInstances& instances, const GpuPairs& pairs,
                                  const GpuDistanceOptions& options, cudaStream_t stream) {

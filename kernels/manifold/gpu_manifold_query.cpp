@@ -26,133 +26,115 @@ manifold::Shape shape_of(const GpuAsset& asset) {
 
 }  // namespace
 
-struct ManifoldHost : GpuHost<ManifoldState, GpuManifoldReport> {
-  RoomArray<manifold::Shape> shapes{*this};
+template <>
+struct HostOf<GpuManifoldReport> : GpuHost<ManifoldState, GpuManifoldReport> {
+  ArgArray<&ManifoldArgs::shapes> shapes{*this};
 
   Room<std::uint32_t> of_pairs{*this};
-  RoomArray<PairPatches> of_pair{of_pairs};
-  RoomArray<manifold::PieceSummary> summaries{of_pairs};
-  RoomArray<Counter> tile_sums{of_pairs, [](std::uint64_t pairs) { return pairs / kManifoldTile + 1; }};
-  RoomArray<TableEntry> table{*this};  // of the pairs of the call before
+  ArgArray<&ManifoldArgs::of_pair> of_pair{of_pairs};
+  ArgArray<&ManifoldArgs::summaries> summaries{of_pairs};
+  ArgArray<&ManifoldArgs::tile_sums> tile_sums{of_pairs,
+                                               [](std::uint64_t pairs) { return pairs / kManifoldTile + 1; }};
+  ArgArray<&ManifoldArgs::table> table{*this};  // of the pairs of the call before
 
   Room<std::uint64_t> of_contacts{*this};
   RoomArray<manifold::Piece> pieces{of_contacts};
   RoomArray<float> normals{of_contacts, times<6>};
   RoomArray<std::uint32_t> curve{of_contacts}, order{of_contacts};
-  RoomArray<PairCurve> curves{of_contacts};
+  ArgArray<&ManifoldArgs::curves> curves{of_contacts};
   RoomArray<std::uint32_t> words{of_contacts, times<manifold::PieceMemory::kTableWords>};
   RoomArray<std::uint32_t> start{*this};  // of contacts and pairs
 
   Room<std::uint32_t> of_manifolds{*this};
-  RoomArray<Manifold> manifolds{of_manifolds, one_for_each, Growth::keeps};
-  RoomArray<Manifold> manifolds_before{of_manifolds, one_for_each, Growth::keeps};
-  RoomArray<PairEntry> entries{of_manifolds, one_for_each, Growth::keeps};
-  RoomArray<BegunPatch> begun{of_manifolds};
-  RoomArray<manifold::Patch> patches{of_manifolds};
-  RoomArray<std::uint32_t> next_of_pair{of_manifolds};
+  ArgArray<&ManifoldArgs::manifolds> manifolds{of_manifolds, one_for_each, Growth::keeps};
+  ArgArray<&ManifoldArgs::manifolds_before> manifolds_before{of_manifolds, one_for_each, Growth::keeps};
+  ArgArray<&ManifoldArgs::entries> entries{of_manifolds, one_for_each, Growth::keeps};
+  ArgArray<&ManifoldArgs::begun> begun{of_manifolds};
+  ArgArray<&ManifoldArgs::patches> patches{of_manifolds};
+  ArgArray<&ManifoldArgs::next_of_pair> next_of_pair{of_manifolds};
 
   Room<std::uint32_t> of_points{*this};
-  RoomArray<ManifoldPoint> points{of_points, one_for_each, Growth::keeps};
-  RoomArray<ManifoldPoint> points_before{of_points, one_for_each, Growth::keeps};
+  ArgArray<&ManifoldArgs::points> points{of_points, one_for_each, Growth::keeps};
+  ArgArray<&ManifoldArgs::points_before> points_before{of_points, one_for_each, Growth::keeps};
 
   GpuManifoldCapacity capacity() const {
     return {of_pairs.count(), of_contacts.count(), of_manifolds.count(), of_points.count()};
   }
-  Status set_assets(std::span<const GpuAsset> given, cudaStream_t stream);
-  Status enlarge_table();
-  Status reserve(const GpuManifoldCapacity& wanted, const GpuNoOptions&);
+
+  Status set_assets(std::span<const GpuAsset> given, cudaStream_t stream) {
+    if (!summary_of(given).topology) return Status::kNoTopology;
+    Status status = provide_fixed_memory();
+    if (status != Status::kOk) return status;
+    std::unique_ptr<manifold::Shape[]> made(new (std::nothrow) manifold::Shape[given.size()]);
+    if (made == nullptr) return Status::kOutOfMemory;
+    std::transform(given.begin(), given.end(), made.get(), shape_of);
+    ManifoldState initial = {};
+    initial.step = 1;
+    status = keep(shapes.upload({made.get(), given.size()}, stream));
+    if (status == Status::kOk) status = keep(state.upload({&initial, 1}, stream));
+    if (status == Status::kOk && table.room() != 0)
+      status = keep(cudaMemsetAsync(table.data(), 0, table.bytes(), stream));
+    return status == Status::kOk ? keep(cudaStreamSynchronize(stream)) : status;
+  }
+
+  // Moves what the table holds to a larger one where there is room for more pairs than before.
+  Status enlarge_table() {
+    const std::size_t size = 2 * std::size_t{of_pairs.count()} + 32;
+    if (size <= table.room()) return Status::kOk;
+    GpuArray<TableEntry> larger;
+    Status status = keep(larger.reserve(size));
+    if (status == Status::kOk) status = keep(cudaMemset(larger.data(), 0, larger.bytes()));
+    if (status == Status::kOk && table.room() != 0) {
+      status = keep(move_entries(table.data(), static_cast<std::uint32_t>(table.room()), larger.data(),
+                                 static_cast<std::uint32_t>(larger.room()), state.data()));
+    }
+    if (status == Status::kOk) status = keep(cudaDeviceSynchronize());
+    if (status == Status::kOk) table = std::move(larger);
+    return status;
+  }
+
+  // The pieces of a call are not needed by the next; manifolds and points are, which it is to match.
+  Status reserve(const GpuManifoldCapacity& wanted, const GpuNoOptions&) {
+    if (wanted.pairs >= kMost / 2 || wanted.contacts >= kMost || wanted.manifolds >= kMost ||
+        wanted.points >= kMost)
+      return Status::kOutOfRange;
+    Status status = Status::kOk;
+    if (!of_pairs.has(wanted.pairs)) {
+      status = keep(of_pairs.grow(wanted.pairs));
+      if (status == Status::kOk) status = enlarge_table();
+      if (status != Status::kOk) of_pairs.forget();
+    }
+    if (status == Status::kOk) status = keep(of_contacts.grow(wanted.contacts));
+    if (status == Status::kOk) {
+      status = keep(start.reserve(of_contacts.count() + of_pairs.count() + 1));
+      if (status != Status::kOk) of_contacts.forget();
+    }
+    if (status == Status::kOk) status = keep(of_manifolds.grow(wanted.manifolds));
+    return status == Status::kOk ? keep(of_points.grow(wanted.points)) : status;
+  }
+
   ManifoldArgs args(const GpuInstances& instances, const GpuPairs& pairs, const GpuContactQuery& query,
-                    const GpuManifoldOptions& options) const;
+                    const GpuManifoldOptions& options) const {
+    ManifoldArgs args = {};
+    fill(args, instances);
+    args.pairs = pairs;
+    args.groups = query.groups();
+    args.query = query.device_report();
+    args.capacity = capacity();
+    args.match_previous = options.match_previous;
+    args.most_points = static_cast<int>(std::clamp(options.most_points, 1u, kMostManifoldPoints));
+    args.pieces = {pieces.data(), normals.data(), curve.data(), order.data(), start.data(), words.data()};
+    args.table_size = static_cast<std::uint32_t>(table.room());
+    return args;
+  }
 };
-
-Status ManifoldHost::set_assets(std::span<const GpuAsset> given, cudaStream_t stream) {
-  if (!summary_of(given).topology) return Status::kNoTopology;
-  Status status = provide_fixed_memory();
-  if (status != Status::kOk) return status;
-  std::unique_ptr<manifold::Shape[]> made(new (std::nothrow) manifold::Shape[given.size()]);
-  if (made == nullptr) return Status::kOutOfMemory;
-  std::transform(given.begin(), given.end(), made.get(), shape_of);
-  ManifoldState initial = {};
-  initial.step = 1;
-  status = keep(shapes.upload({made.get(), given.size()}, stream));
-  if (status == Status::kOk) status = keep(state.upload({&initial, 1}, stream));
-  if (status == Status::kOk && table.room() != 0)
-    status = keep(cudaMemsetAsync(table.data(), 0, table.bytes(), stream));
-  return status == Status::kOk ? keep(cudaStreamSynchronize(stream)) : status;
-}
-
-// Moves what the table holds to a larger one where there is room for more pairs than before.
-Status ManifoldHost::enlarge_table() {
-  const std::size_t size = 2 * std::size_t{of_pairs.count()} + 32;
-  if (size <= table.room()) return Status::kOk;
-  GpuArray<TableEntry> larger;
-  Status status = keep(larger.reserve(size));
-  if (status == Status::kOk) status = keep(cudaMemset(larger.data(), 0, larger.bytes()));
-  if (status == Status::kOk && table.room() != 0) {
-    status = keep(move_entries(table.data(), static_cast<std::uint32_t>(table.room()), larger.data(),
-                               static_cast<std::uint32_t>(larger.room()), state.data()));
-  }
-  if (status == Status::kOk) status = keep(cudaDeviceSynchronize());
-  if (status == Status::kOk) table = std::move(larger);
-  return status;
-}
-
-// The pieces of a call are not needed by the next; manifolds and points are, which it is to match.
-Status ManifoldHost::reserve(const GpuManifoldCapacity& wanted, const GpuNoOptions&) {
-  if (wanted.pairs >= kMost / 2 || wanted.contacts >= kMost || wanted.manifolds >= kMost ||
-      wanted.points >= kMost)
-    return Status::kOutOfRange;
-  Status status = Status::kOk;
-  if (!of_pairs.has(wanted.pairs)) {
-    status = keep(of_pairs.grow(wanted.pairs));
-    if (status == Status::kOk) status = enlarge_table();
-    if (status != Status::kOk) of_pairs.forget();
-  }
-  if (status == Status::kOk) status = keep(of_contacts.grow(wanted.contacts));
-  if (status == Status::kOk) {
-    status = keep(start.reserve(of_contacts.count() + of_pairs.count() + 1));
-    if (status != Status::kOk) of_contacts.forget();
-  }
-  if (status == Status::kOk) status = keep(of_manifolds.grow(wanted.manifolds));
-  return status == Status::kOk ? keep(of_points.grow(wanted.points)) : status;
-}
-
-ManifoldArgs ManifoldHost::args(const GpuInstances& instances, const GpuPairs& pairs,
-                                const GpuContactQuery& query, const GpuManifoldOptions& options) const {
-  ManifoldArgs args = {};
-  fill(args, instances);
-  args.shapes = shapes.data();
-  args.pairs = pairs;
-  args.groups = query.groups();
-  args.query = query.device_report();
-  args.capacity = capacity();
-  args.match_previous = options.match_previous;
-  args.most_points = static_cast<int>(std::clamp(options.most_points, 1u, kMostManifoldPoints));
-  args.pieces = {pieces.data(), normals.data(), curve.data(), order.data(), start.data(), words.data()};
-  args.begun = begun.data();
-  args.patches = patches.data();
-  args.next_of_pair = next_of_pair.data();
-  args.of_pair = of_pair.data();
-  args.summaries = summaries.data();
-  args.curves = curves.data();
-  args.tile_sums = tile_sums.data();
-  args.manifolds = manifolds.data();
-  args.points = points.data();
-  args.entries = entries.data();
-  args.manifolds_before = manifolds_before.data();
-  args.points_before = points_before.data();
-  args.table = table.data();
-  args.table_size = static_cast<std::uint32_t>(table.room());
-  return args;
-}
 
 }  // namespace tandem::gpu
 
 namespace tandem {
 
-struct GpuManifoldKind::Host : gpu::ManifoldHost {};
-template class GpuQuestion<GpuManifoldKind>;
-template class GpuAssetQuestion<GpuManifoldKind>;
+template class GpuQuestion<GpuManifoldCapacity, GpuManifoldReport>;
+template class GpuAssetQuestion<GpuManifoldCapacity, GpuManifoldReport>;
 
 Status GpuManifoldQuery::enqueue(const GpuInstances& instances, const GpuPairs& pairs,
                                  const GpuContactQuery& query, const GpuManifoldOptions& options,

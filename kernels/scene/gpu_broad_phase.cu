@@ -167,7 +167,8 @@ struct Outcome {
 using gpu::Room;
 using gpu::RoomArray;
 
-struct BroadPhaseHost : gpu::GpuHost<Outcome, GpuBroadPhaseReport> {
+template <>
+struct gpu::HostOf<GpuBroadPhaseReport> : gpu::GpuHost<Outcome, GpuBroadPhaseReport> {
   bool counters_are_fresh = false;  // a search that ends leaves them so
   RoomArray<Survey> survey{*this};
 
@@ -192,309 +193,268 @@ struct BroadPhaseHost : gpu::GpuHost<Outcome, GpuBroadPhaseReport> {
             static_cast<std::uint32_t>(kept_list.room())};
   }
 
-  Status reserve(const GpuBroadPhaseCapacity& wanted, const GpuBroadPhaseOptions& options);
-  bool reserve_boxes(std::uint32_t count);
-  bool reserve_pairs(std::uint32_t count, bool sorted);
-  bool reserve_sorting();
-  bool reserve_taken(std::uint32_t count);
-  bool reserve_kept(std::uint32_t count, std::uint32_t fixed);
-  Status refusal(std::uint32_t count, bool posed, const GpuBroadPhaseOptions& options) const;
-  Output output(const Call& call);
+  bool begin(cudaStream_t stream) { return counters_are_fresh || refresh(stream); }
+
+  bool refresh(cudaStream_t stream) {
+    return ok(cudaMemcpyAsync(&state->counters, &kFreshCounters, sizeof kFreshCounters,
+                              cudaMemcpyHostToDevice, stream));
+  }
+
+  // What is captured has not run: the counters are as before.
+  void end(bool queued, cudaStream_t stream) {
+    cudaStreamCaptureStatus capture = cudaStreamCaptureStatusNone;
+    static_cast<void>(cudaStreamIsCapturing(stream, &capture));
+    if (capture == cudaStreamCaptureStatusNone) counters_are_fresh = queued;
+  }
+
+  bool provide_fixed() {
+    const auto provide_rest = [&] {
+      const bool done = ok(survey.reserve(1)) &&
+                        ok(cudaMemset(&state->report, 0, sizeof(GpuBroadPhaseReport))) && refresh(nullptr) &&
+                        ok(cudaStreamSynchronize(nullptr));
+      counters_are_fresh = done;
+      return done ? Status::kOk : failure();
+    };
+    return provide_fixed_memory(provide_rest) == Status::kOk;
+  }
+
+  bool reserve_boxes(std::uint32_t count) {
+    if (count <= of_boxes.count()) return true;
+    if (ok(of_boxes.fit(count)) && reserve_sorting()) return true;
+    of_boxes.forget();
+    return false;
+  }
+
+  bool reserve_pairs(std::uint32_t count, bool sorted) {
+    if (!ok(of_pairs.fit(count))) return false;
+    if (!sorted || sorted_pairs.room() >= of_pairs.count()) return true;
+    return ok(sorted_pairs.reserve(of_pairs.count())) && reserve_sorting();
+  }
+
+  // What was kept in room that is too small now is lost.
+  bool reserve_taken(std::uint32_t count) {
+    if (count > boxes.room() && kept.of != 0 && kept.posed) kept.of = Kept::kLost;
+    return ok(boxes.reserve(count));
+  }
+
+  bool reserve_kept(std::uint32_t count, std::uint32_t fixed) {
+    return ok(kept_list.reserve(count)) && ok(kept_survey.reserve(1)) &&
+           ok(kept_nodes.reserve(nodes_over(fixed)));
+  }
+
+  // As much as sorting up to the capacity takes: CUB asks for a part that does not depend on the number, and
+  // one that grows with it.
+  bool reserve_sorting() {
+    std::size_t bytes = 0, pair_bytes = 0;
+    cub::DoubleBuffer<Key> key(keys.data(), other_keys.data());
+    if (!ok(cub::DeviceRadixSort::SortKeys(nullptr, bytes, key, of_boxes.count()))) return false;
+    if (sorted_pairs.room() != 0) {
+      cub::DoubleBuffer<unsigned long long> pair(pairs.data(), sorted_pairs.data());
+      if (!ok(cub::DeviceRadixSort::SortKeys(nullptr, pair_bytes, pair, of_pairs.count()))) return false;
+    }
+    return ok(sorting.reserve(std::max(bytes, pair_bytes)));
+  }
+
+  // Why a call cannot be queued.
+  Status refusal(std::uint32_t count, bool posed, const GpuBroadPhaseOptions& options) const {
+    if (report.data() == nullptr || count > of_boxes.count() ||
+        (options.sorted && sorted_pairs.room() < of_pairs.count()) || !(options.within >= 0) ||
+        (options.within > 0 && count > boxes.room()))
+      return Status::kOutOfRange;
+    if (kept.of != 0 && (kept.of != count || kept.posed != posed)) return Status::kKeptMismatch;
+    return options.filter.excluded.instances > count ? Status::kUnknownInstance : Status::kOk;
+  }
+
+  Output output(const Call& call) {
+    return {pairs.data(),         of_pairs.count(), call.sorted ? index_bits(call.numbers) : 0,
+            call.sorted ? 0 : 32, &state->counters, &state->report,
+            report.data()};
+  }
+
   template <typename... Parameters, typename... Arguments>
   bool launch(std::uint32_t blocks, std::uint32_t threads, cudaStream_t stream, void (*kernel)(Parameters...),
-              const Arguments&... arguments);
-  bool provide_fixed();
-  bool refresh(cudaStream_t stream);
-  bool begin(cudaStream_t stream) { return counters_are_fresh || refresh(stream); }
-  void end(bool queued, cudaStream_t stream);
+              const Arguments&... arguments) {
+    return ok(gpu::launch_after({blocks, threads, 0, stream, limits.early_launch}, kernel, arguments...));
+  }
+
   template <typename Boxes, typename Rule>
-  bool test_all(const Boxes& from, std::uint32_t count, const Rule& rule, const Call& call);
+  bool test_all(const Boxes& from, std::uint32_t count, const Rule& rule, const Call& call) {
+    const std::uint32_t tiles = std::max(blocks_for(count, kTile), 1u), tasks = tiles * (tiles + 1) / 2,
+                        tasks_each = blocks_for(tasks, kMostDirectBlocks);
+    return launch(blocks_for(tasks, tasks_each), kTileThreads, call.stream, collect_directly<Boxes, Rule>,
+                  from, count, rule, output(call), tasks_each, tasks);
+  }
+
+  // from: where the boxes of the tree come from.
   template <typename Boxes>
-  bool make_tree(const Boxes& from, const Tree& tree, Survey* surveyed, const Call& call);
+  bool make_tree(const Boxes& from, const Tree& tree, Survey* surveyed, const Call& call) {
+    const std::uint32_t count = tree.count[0];
+    const int bits = index_bits(call.numbers);
+    if (!launch(4, kSamples * kThreadsPerSample, call.stream, survey_boxes<Boxes>, from, count, surveyed) ||
+        !launch(blocks_for(count, 256), 256, call.stream, make_keys<Boxes>, from, count, bits, surveyed,
+                keys.data(), &state->counters))
+      return false;
+    cub::DoubleBuffer<Key> key(keys.data(), other_keys.data());
+    std::size_t bytes = sorting.room();
+    if (!ok(cub::DeviceRadixSort::SortKeys(sorting.data(), bytes, key, count, first_bit(count, bits), 64,
+                                           call.stream)))
+      return false;
+    constexpr std::uint32_t kThreads = kFanOut * kFanOut;
+    return launch(blocks_for(count, kThreads), kThreads, call.stream, build_lower_levels, call.boxes,
+                  key.Current(), bits, surveyed, tree) &&
+           (tree.top <= 2 || launch(1, kThreads, call.stream, build_upper_levels, tree));
+  }
+
   template <typename Boxes, typename Rule>
-  bool collect_with_kept(const Boxes& from, const Rule& rule, const Call& call);
+  bool collect_with_kept(const Boxes& from, const Rule& rule, const Call& call) {
+    const std::uint32_t blocks = std::min(blocks_for(kept.free_count, kKeptWarps), kMostKeptBlocks);
+    return blocks == 0 ||
+           launch(blocks, kKeptWarps * kFanOut, call.stream, collect_kept<Boxes, Rule>, from, kept.free_count,
+                  kept.tree, kept_survey.data(), call.kept, rule, output(call));
+  }
+
   template <typename Rule>
-  bool collect(const Tree& tree, const Rule& rule, const Call& call);
-  bool sort_pairs(const Call& call);
-  template <typename Boxes, typename Rule>
-  bool find(const Boxes& from, std::uint32_t count, const Rule& rule, const Call& call);
-  template <typename Boxes, typename Rule>
-  bool pose_and_find(const Boxes& from, std::uint32_t count, const Rule& rule, const Call& call);
-  template <typename Boxes, typename Rule>
-  bool grow_and_find(const Boxes& from, std::uint32_t count, const Rule& rule, double within, Call call);
-  template <typename Boxes>
-  Status run(const Boxes& all, const GpuBroadPhaseOptions& options, const Call& call);
-  Status list(std::span<const Motion> motion, cudaStream_t stream);
-  template <typename Boxes>
-  Status keep_fixed(const Boxes& all, const WorldBox* boxes, std::span<const Motion> motion,
-                    cudaStream_t stream);
-  template <typename Enqueue>
-  Status find_all(GpuBroadPhaseCapacity wanted, const GpuBroadPhaseOptions& options, cudaStream_t stream,
-                  const Enqueue& enqueue);
-};
-
-bool BroadPhaseHost::refresh(cudaStream_t stream) {
-  return ok(cudaMemcpyAsync(&state->counters, &kFreshCounters, sizeof kFreshCounters, cudaMemcpyHostToDevice,
-                            stream));
-}
-
-// What is captured has not run: the counters are as before.
-void BroadPhaseHost::end(bool queued, cudaStream_t stream) {
-  cudaStreamCaptureStatus capture = cudaStreamCaptureStatusNone;
-  static_cast<void>(cudaStreamIsCapturing(stream, &capture));
-  if (capture == cudaStreamCaptureStatusNone) counters_are_fresh = queued;
-}
-
-bool BroadPhaseHost::provide_fixed() {
-  const auto provide_rest = [&] {
-    const bool done = ok(survey.reserve(1)) &&
-                      ok(cudaMemset(&state->report, 0, sizeof(GpuBroadPhaseReport))) && refresh(nullptr) &&
-                      ok(cudaStreamSynchronize(nullptr));
-    counters_are_fresh = done;
-    return done ? Status::kOk : failure();
-  };
-  return provide_fixed_memory(provide_rest) == Status::kOk;
-}
-
-bool BroadPhaseHost::reserve_boxes(std::uint32_t count) {
-  if (count <= of_boxes.count()) return true;
-  if (ok(of_boxes.fit(count)) && reserve_sorting()) return true;
-  of_boxes.forget();
-  return false;
-}
-
-bool BroadPhaseHost::reserve_pairs(std::uint32_t count, bool sorted) {
-  if (!ok(of_pairs.fit(count))) return false;
-  if (!sorted || sorted_pairs.room() >= of_pairs.count()) return true;
-  return ok(sorted_pairs.reserve(of_pairs.count())) && reserve_sorting();
-}
-
-// What was kept in room that is too small now is lost.
-bool BroadPhaseHost::reserve_taken(std::uint32_t count) {
-  if (count > boxes.room() && kept.of != 0 && kept.posed) kept.of = Kept::kLost;
-  return ok(boxes.reserve(count));
-}
-
-bool BroadPhaseHost::reserve_kept(std::uint32_t count, std::uint32_t fixed) {
-  return ok(kept_list.reserve(count)) && ok(kept_survey.reserve(1)) &&
-         ok(kept_nodes.reserve(nodes_over(fixed)));
-}
-
-// As much as sorting up to the capacity takes: CUB asks for a part that does not depend on the number, and
-// one that grows with it.
-bool BroadPhaseHost::reserve_sorting() {
-  std::size_t bytes = 0, pair_bytes = 0;
-  cub::DoubleBuffer<Key> key(keys.data(), other_keys.data());
-  if (!ok(cub::DeviceRadixSort::SortKeys(nullptr, bytes, key, of_boxes.count()))) return false;
-  if (sorted_pairs.room() != 0) {
-    cub::DoubleBuffer<unsigned long long> pair(pairs.data(), sorted_pairs.data());
-    if (!ok(cub::DeviceRadixSort::SortKeys(nullptr, pair_bytes, pair, of_pairs.count()))) return false;
+  bool collect(const Tree& tree, const Rule& rule, const Call& call) {
+    const Output out = output(call);
+    const std::uint32_t split = split_of(tree.count[1]);
+    const std::uint32_t blocks = blocks_for(static_cast<std::uint64_t>(tree.count[1]) * split, kWarps);
+    return launch(blocks, kWarps * kFanOut, call.stream, collect_pairs<Rule>, tree, split, call.boxes, rule,
+                  out) &&
+           launch(1, 1, call.stream, report_pairs, out);
   }
-  return ok(sorting.reserve(std::max(bytes, pair_bytes)));
-}
 
-// Why a call cannot be queued.
-Status BroadPhaseHost::refusal(std::uint32_t count, bool posed, const GpuBroadPhaseOptions& options) const {
-  if (report.data() == nullptr || count > of_boxes.count() ||
-      (options.sorted && sorted_pairs.room() < of_pairs.count()) || !(options.within >= 0) ||
-      (options.within > 0 && count > boxes.room()))
-    return Status::kOutOfRange;
-  if (kept.of != 0 && (kept.of != count || kept.posed != posed)) return Status::kKeptMismatch;
-  return options.filter.excluded.instances > count ? Status::kUnknownInstance : Status::kOk;
-}
-
-Output BroadPhaseHost::output(const Call& call) {
-  return {pairs.data(),         of_pairs.count(), call.sorted ? index_bits(call.numbers) : 0,
-          call.sorted ? 0 : 32, &state->counters, &state->report,
-          report.data()};
-}
-
-template <typename... Parameters, typename... Arguments>
-bool BroadPhaseHost::launch(std::uint32_t blocks, std::uint32_t threads, cudaStream_t stream,
-                            void (*kernel)(Parameters...), const Arguments&... arguments) {
-  return ok(gpu::launch_after({blocks, threads, 0, stream, limits.early_launch}, kernel, arguments...));
-}
-
-template <typename Boxes, typename Rule>
-bool BroadPhaseHost::test_all(const Boxes& from, std::uint32_t count, const Rule& rule, const Call& call) {
-  const std::uint32_t tiles = std::max(blocks_for(count, kTile), 1u), tasks = tiles * (tiles + 1) / 2,
-                      tasks_each = blocks_for(tasks, kMostDirectBlocks);
-  return launch(blocks_for(tasks, tasks_each), kTileThreads, call.stream, collect_directly<Boxes, Rule>, from,
-                count, rule, output(call), tasks_each, tasks);
-}
-
-// from: where the boxes of the tree come from.
-template <typename Boxes>
-bool BroadPhaseHost::make_tree(const Boxes& from, const Tree& tree, Survey* surveyed, const Call& call) {
-  const std::uint32_t count = tree.count[0];
-  const int bits = index_bits(call.numbers);
-  if (!launch(4, kSamples * kThreadsPerSample, call.stream, survey_boxes<Boxes>, from, count, surveyed) ||
-      !launch(blocks_for(count, 256), 256, call.stream, make_keys<Boxes>, from, count, bits, surveyed,
-              keys.data(), &state->counters))
-    return false;
-  cub::DoubleBuffer<Key> key(keys.data(), other_keys.data());
-  std::size_t bytes = sorting.room();
-  if (!ok(cub::DeviceRadixSort::SortKeys(sorting.data(), bytes, key, count, first_bit(count, bits), 64,
-                                         call.stream)))
-    return false;
-  constexpr std::uint32_t kThreads = kFanOut * kFanOut;
-  return launch(blocks_for(count, kThreads), kThreads, call.stream, build_lower_levels, call.boxes,
-                key.Current(), bits, surveyed, tree) &&
-         (tree.top <= 2 || launch(1, kThreads, call.stream, build_upper_levels, tree));
-}
-
-template <typename Boxes, typename Rule>
-bool BroadPhaseHost::collect_with_kept(const Boxes& from, const Rule& rule, const Call& call) {
-  const std::uint32_t blocks = std::min(blocks_for(kept.free_count, kKeptWarps), kMostKeptBlocks);
-  return blocks == 0 || launch(blocks, kKeptWarps * kFanOut, call.stream, collect_kept<Boxes, Rule>, from,
-                               kept.free_count, kept.tree, kept_survey.data(), call.kept, rule, output(call));
-}
-
-template <typename Rule>
-bool BroadPhaseHost::collect(const Tree& tree, const Rule& rule, const Call& call) {
-  const Output out = output(call);
-  const std::uint32_t split = split_of(tree.count[1]);
-  const std::uint32_t blocks = blocks_for(static_cast<std::uint64_t>(tree.count[1]) * split, kWarps);
-  return launch(blocks, kWarps * kFanOut, call.stream, collect_pairs<Rule>, tree, split, call.boxes, rule,
-                out) &&
-         launch(1, 1, call.stream, report_pairs, out);
-}
-
-// Sorts as many keys as there is room for, because the CPU does not know their number.
-bool BroadPhaseHost::sort_pairs(const Call& call) {
-  const std::uint32_t room = of_pairs.count();
-  if (room == 0) return true;
-  const int bits = index_bits(call.numbers);
-  const std::uint32_t blocks = blocks_for(room, 256);
-  if (!launch(blocks, 256, call.stream, fill_rest, pairs.data(), room, device_report())) return false;
-  cub::DoubleBuffer<unsigned long long> key(pairs.data(), sorted_pairs.data());
-  std::size_t bytes = sorting.room();
-  if (!ok(cub::DeviceRadixSort::SortKeys(sorting.data(), bytes, key, room, 0, 2 * bits, call.stream)))
-    return false;
-  return launch(blocks, 256, call.stream, unpack_keys, key.Current(), room, bits,
-                reinterpret_cast<ObjectPair*>(pairs.data()), device_report());
-}
-
-// The pairs with what is kept come first, because the last kernel of the others writes the report.
-template <typename Boxes, typename Rule>
-bool BroadPhaseHost::find(const Boxes& from, std::uint32_t count, const Rule& rule, const Call& call) {
-  if constexpr (is_listed<Boxes>) {
-    if (!collect_with_kept(from, rule, call)) return false;
+  // Sorts as many keys as there is room for, because the CPU does not know their number.
+  bool sort_pairs(const Call& call) {
+    const std::uint32_t room = of_pairs.count();
+    if (room == 0) return true;
+    const int bits = index_bits(call.numbers);
+    const std::uint32_t blocks = blocks_for(room, 256);
+    if (!launch(blocks, 256, call.stream, fill_rest, pairs.data(), room, device_report())) return false;
+    cub::DoubleBuffer<unsigned long long> key(pairs.data(), sorted_pairs.data());
+    std::size_t bytes = sorting.room();
+    if (!ok(cub::DeviceRadixSort::SortKeys(sorting.data(), bytes, key, room, 0, 2 * bits, call.stream)))
+      return false;
+    return launch(blocks, 256, call.stream, unpack_keys, key.Current(), room, bits,
+                  reinterpret_cast<ObjectPair*>(pairs.data()), device_report());
   }
-  if (count <= kFewBoxes) {
-    if (!test_all(from, count, rule, call)) return false;
-  } else {
-    const Tree tree = tree_over(count, nodes.data());
-    if (!make_tree(from, tree, survey.data(), call) || !collect(tree, rule, call)) return false;
-  }
-  return !call.sorted || sort_pairs(call);
-}
 
-// A middling number of instances is posed by a kernel of its own.
-template <typename Boxes, typename Rule>
-bool BroadPhaseHost::pose_and_find(const Boxes& from, std::uint32_t count, const Rule& rule,
-                                   const Call& call) {
-  if constexpr (Boxes::kPosed) {
-    if (count > kFewPosed && count <= kFewBoxes) {
-      return launch(blocks_for(count, 256), 256, call.stream, pose_boxes<Boxes>, from, count,
-                    &state->counters) &&
-             find(from.lying_at(boxes.data()), count, rule, call);
+  // The pairs with what is kept come first, because the last kernel of the others writes the report.
+  template <typename Boxes, typename Rule>
+  bool find(const Boxes& from, std::uint32_t count, const Rule& rule, const Call& call) {
+    if constexpr (is_listed<Boxes>) {
+      if (!collect_with_kept(from, rule, call)) return false;
     }
+    if (count <= kFewBoxes) {
+      if (!test_all(from, count, rule, call)) return false;
+    } else {
+      const Tree tree = tree_over(count, nodes.data());
+      if (!make_tree(from, tree, survey.data(), call) || !collect(tree, rule, call)) return false;
+    }
+    return !call.sorted || sort_pairs(call);
   }
-  return find(from, count, rule, call);
-}
 
-// Boxes within reach of each other meet when each is larger by half of it; or one by all of it where the
-// other is kept, which is kept for any reach.
-template <typename Boxes, typename Rule>
-bool BroadPhaseHost::grow_and_find(const Boxes& from, std::uint32_t count, const Rule& rule, double within,
-                                   Call call) {
-  if (!(within > 0)) return pose_and_find(from, count, rule, call);
-  const double margin = is_listed<Boxes> ? within : 0.5 * within;
-  call.boxes = boxes.data();
-  return (count == 0 || launch(blocks_for(count, 256), 256, call.stream, grow_boxes<Boxes>, from, count,
-                               margin, boxes.data(), &state->counters)) &&
-         find(from.lying_at(boxes.data()), count, rule, call);
-}
-
-// all: boxes or instances, the kept ones included.
-template <typename Boxes>
-Status BroadPhaseHost::run(const Boxes& all, const GpuBroadPhaseOptions& options, const Call& call) {
-  const Status status = refusal(call.numbers, Boxes::kPosed, options);
-  if (status != Status::kOk) return status;
-  bool queued = begin(call.stream);
-  if (queued && kept.of != 0) {
-    queued = grow_and_find(Listed<Boxes>{all, kept_list.data()}, kept.free_count,
-                           FilteredPairs{options.filter}, options.within, call);
-  } else if (queued && !is_none(options.filter)) {
-    queued = grow_and_find(all, call.numbers, FilteredPairs{options.filter}, options.within, call);
-  } else if (queued) {
-    queued = grow_and_find(all, call.numbers, EveryPair{}, options.within, call);
+  // A middling number of instances is posed by a kernel of its own.
+  template <typename Boxes, typename Rule>
+  bool pose_and_find(const Boxes& from, std::uint32_t count, const Rule& rule, const Call& call) {
+    if constexpr (Boxes::kPosed) {
+      if (count > kFewPosed && count <= kFewBoxes) {
+        return launch(blocks_for(count, 256), 256, call.stream, pose_boxes<Boxes>, from, count,
+                      &state->counters) &&
+               find(from.lying_at(boxes.data()), count, rule, call);
+      }
+    }
+    return find(from, count, rule, call);
   }
-  end(queued, call.stream);
-  return queued ? Status::kOk : failure();
-}
 
-// Uploads what motions say of which boxes are kept, and waits.
-Status BroadPhaseHost::list(std::span<const Motion> motion, cudaStream_t stream) {
-  Buffer<std::uint32_t> numbers;
-  if (!numbers.resize(motion.size())) return Status::kOutOfMemory;
-  std::uint32_t free_end = 0, end = kept.free_count;
-  for (std::uint32_t i = 0; i < motion.size(); ++i)
-    numbers[motion[i] == Motion::fixed ? end++ : free_end++] = i;
-  const bool uploaded = ok(kept_list.upload(numbers.view(), stream)) && ok(cudaStreamSynchronize(stream));
-  return uploaded ? Status::kOk : failure();
-}
+  // Boxes within reach of each other meet when each is larger by half of it; or one by all of it where the
+  // other is kept, which is kept for any reach.
+  template <typename Boxes, typename Rule>
+  bool grow_and_find(const Boxes& from, std::uint32_t count, const Rule& rule, double within, Call call) {
+    if (!(within > 0)) return pose_and_find(from, count, rule, call);
+    const double margin = is_listed<Boxes> ? within : 0.5 * within;
+    call.boxes = boxes.data();
+    return (count == 0 || launch(blocks_for(count, 256), 256, call.stream, grow_boxes<Boxes>, from, count,
+                                 margin, boxes.data(), &state->counters)) &&
+           find(from.lying_at(boxes.data()), count, rule, call);
+  }
 
-// lie: where the boxes of those that are kept are to be found.
-template <typename Boxes>
-Status BroadPhaseHost::keep_fixed(const Boxes& all, const WorldBox* lie, std::span<const Motion> motion,
-                                  cudaStream_t stream) {
-  const auto count = static_cast<std::uint32_t>(motion.size());
-  const auto fixed = static_cast<std::uint32_t>(std::count(motion.begin(), motion.end(), Motion::fixed));
-  if (fixed == 0) return Status::kOk;
-  kept.free_count = count - fixed;
-  if (!provide_fixed() || !reserve_boxes(count) || !reserve_kept(count, fixed)) return failure();
-  if (const Status status = list(motion, stream); status != Status::kOk) return status;
-  kept.tree = tree_over(fixed, kept_nodes.data());
-  const Call call = {count, lie, lie, false, stream};
-  const bool queued = begin(stream) &&
-                      make_tree(Listed<Boxes>{all, kept_list.data() + kept.free_count}, kept.tree,
-                                kept_survey.data(), call) &&
-                      launch(1, 1, stream, report_pairs, output(call));
-  end(queued, stream);
-  if (!queued || !ok(cudaStreamSynchronize(stream))) return failure();
-  if (report->status != Status::kOk) return report->status;
-  kept.of = count;
-  kept.posed = Boxes::kPosed;
-  return Status::kOk;
-}
+  // all: boxes or instances, the kept ones included.
+  template <typename Boxes>
+  Status run(const Boxes& all, const GpuBroadPhaseOptions& options, const Call& call) {
+    const Status status = refusal(call.numbers, Boxes::kPosed, options);
+    if (status != Status::kOk) return status;
+    bool queued = begin(call.stream);
+    if (queued && kept.of != 0) {
+      queued = grow_and_find(Listed<Boxes>{all, kept_list.data()}, kept.free_count,
+                             FilteredPairs{options.filter}, options.within, call);
+    } else if (queued && !is_none(options.filter)) {
+      queued = grow_and_find(all, call.numbers, FilteredPairs{options.filter}, options.within, call);
+    } else if (queued) {
+      queued = grow_and_find(all, call.numbers, EveryPair{}, options.within, call);
+    }
+    end(queued, call.stream);
+    return queued ? Status::kOk : failure();
+  }
 
-// The first guess of room is four pairs for each box.
-template <typename Enqueue>
-Status BroadPhaseHost::find_all(GpuBroadPhaseCapacity first, const GpuBroadPhaseOptions& options,
-                                cudaStream_t stream, const Enqueue& enqueue) {
-  const auto pairs_of = [](std::uint64_t room) {
-    return static_cast<std::uint32_t>(std::min<std::uint64_t>(room, kNoIndex - 1));
-  };
-  first.pairs = of_pairs.count() > 0 ? of_pairs.count() : pairs_of(4ull * first.boxes + 1024);
-  return gpu::find_until_complete(*this, first, options, stream, enqueue,
-                                  [&](const GpuBroadPhaseReport& told, GpuBroadPhaseCapacity& wanted) {
-                                    wanted.pairs = pairs_of(told.found + told.found / 4);
-                                    return told.found >= kNoIndex ? Status::kTooManyPairs : Status::kOk;
-                                  });
-}
+  // Uploads what motions say of which boxes are kept, and waits.
+  Status list(std::span<const Motion> motion, cudaStream_t stream) {
+    Buffer<std::uint32_t> numbers;
+    if (!numbers.resize(motion.size())) return Status::kOutOfMemory;
+    std::uint32_t free_end = 0, end = kept.free_count;
+    for (std::uint32_t i = 0; i < motion.size(); ++i)
+      numbers[motion[i] == Motion::fixed ? end++ : free_end++] = i;
+    const bool uploaded = ok(kept_list.upload(numbers.view(), stream)) && ok(cudaStreamSynchronize(stream));
+    return uploaded ? Status::kOk : failure();
+  }
 
-Status BroadPhaseHost::reserve(const GpuBroadPhaseCapacity& wanted, const GpuBroadPhaseOptions& options) {
-  if (wanted.boxes == kNoIndex) return Status::kOutOfRange;
-  const bool enough = provide_fixed() && reserve_boxes(wanted.boxes) &&
-                      reserve_pairs(wanted.pairs, options.sorted) &&
-                      reserve_taken(std::max(wanted.instances, options.within > 0 ? wanted.boxes : 0));
-  return enough ? Status::kOk : failure();
-}
+  // lie: where the boxes of those that are kept are to be found.
+  template <typename Boxes>
+  Status keep_fixed(const Boxes& all, const WorldBox* lie, std::span<const Motion> motion,
+                    cudaStream_t stream) {
+    const auto count = static_cast<std::uint32_t>(motion.size());
+    const auto fixed = static_cast<std::uint32_t>(std::count(motion.begin(), motion.end(), Motion::fixed));
+    if (fixed == 0) return Status::kOk;
+    kept.free_count = count - fixed;
+    if (!provide_fixed() || !reserve_boxes(count) || !reserve_kept(count, fixed)) return failure();
+    if (const Status status = list(motion, stream); status != Status::kOk) return status;
+    kept.tree = tree_over(fixed, kept_nodes.data());
+    const Call call = {count, lie, lie, false, stream};
+    const bool queued = begin(stream) &&
+                        make_tree(Listed<Boxes>{all, kept_list.data() + kept.free_count}, kept.tree,
+                                  kept_survey.data(), call) &&
+                        launch(1, 1, stream, report_pairs, output(call));
+    end(queued, stream);
+    if (!queued || !ok(cudaStreamSynchronize(stream))) return failure();
+    if (report->status != Status::kOk) return report->status;
+    kept.of = count;
+    kept.posed = Boxes::kPosed;
+    return Status::kOk;
+  }
 
-struct GpuBroadPhaseKind::Host : BroadPhaseHost {};
-template class GpuQuestion<GpuBroadPhaseKind>;
+  // The first guess of room is four pairs for each box.
+  template <typename Enqueue>
+  Status find_all(GpuBroadPhaseCapacity first, const GpuBroadPhaseOptions& options, cudaStream_t stream,
+                  const Enqueue& enqueue) {
+    const auto pairs_of = [](std::uint64_t room) {
+      return static_cast<std::uint32_t>(std::min<std::uint64_t>(room, kNoIndex - 1));
+    };
+    first.pairs = of_pairs.count() > 0 ? of_pairs.count() : pairs_of(4ull * first.boxes + 1024);
+    return gpu::find_until_complete(*this, first, options, stream, enqueue,
+                                    [&](const GpuBroadPhaseReport& told, GpuBroadPhaseCapacity& wanted) {
+                                      wanted.pairs = pairs_of(told.found + told.found / 4);
+                                      return told.found >= kNoIndex ? Status::kTooManyPairs : Status::kOk;
+                                    });
+  }
+
+  Status reserve(const GpuBroadPhaseCapacity& wanted, const GpuBroadPhaseOptions& options) {
+    if (wanted.boxes == kNoIndex) return Status::kOutOfRange;
+    const bool enough = provide_fixed() && reserve_boxes(wanted.boxes) &&
+                        reserve_pairs(wanted.pairs, options.sorted) &&
+                        reserve_taken(std::max(wanted.instances, options.within > 0 ? wanted.boxes : 0));
+    return enough ? Status::kOk : failure();
+  }
+};
+template class GpuQuestion<GpuBroadPhaseCapacity, GpuBroadPhaseReport, GpuBroadPhaseOptions>;
 
 Status GpuBroadPhase::keep_fixed(const WorldBox* boxes, std::span<const Motion> motion, cudaStream_t stream) {
   if (host_ == nullptr) return Status::kOutOfMemory;
@@ -507,7 +467,7 @@ Status GpuBroadPhase::keep_fixed(const WorldBox* boxes, std::span<const Motion> 
 Status GpuBroadPhase::keep_fixed(const GpuInstances& instances, const GpuAssetBounds& assets,
                                  std::span<const Motion> motion, cudaStream_t stream) {
   if (host_ == nullptr) return Status::kOutOfMemory;
-  BroadPhaseHost& host = *host_;
+  auto& host = *host_;
   host.kept.of = 0;
   if (motion.size() != instances.count) return Status::kKeptMismatch;
   if (!host.reserve_taken(instances.count)) return host.failure();

@@ -25,93 +25,84 @@ bool follows(const GpuAsset& finer, const GpuAsset& coarser) {
 
 }  // namespace
 
-struct ToleranceHost : GpuHost<ToleranceState, GpuToleranceReport> {
+template <>
+struct HostOf<GpuToleranceReport> : GpuHost<ToleranceState, GpuToleranceReport> {
   GpuContactQuery contacts;  // of which each level is an asset
-  RoomArray<GpuAsset> levels{*this};
-  RoomArray<levels::LevelRange> assets{*this};
+  ArgArray<&ToleranceArgs::levels> levels{*this};
+  ArgArray<&ToleranceArgs::assets> assets{*this};
   std::uint32_t asset_count = 0;
 
   Room<std::uint32_t> of_instances{*this};
-  RoomArray<std::uint32_t> level{of_instances}, asset{of_instances};
+  ArgArray<&ToleranceArgs::level> level{of_instances};
+  ArgArray<&ToleranceArgs::asset> asset{of_instances};
   Room<std::uint32_t> of_pairs{*this};
-  RoomArray<PairVerdict> verdicts{of_pairs};
+  ArgArray<&ToleranceArgs::verdicts> verdicts{of_pairs};
 
   std::size_t bytes() const { return Memory::bytes() + contacts.bytes(); }
   GpuToleranceCapacity capacity() const {
     return {of_instances.count(), of_pairs.count(), contacts.capacity().undecided};
   }
-  Status set_assets(std::span<const GpuAsset> given, cudaStream_t stream);
-  Status reserve(const GpuToleranceCapacity& wanted, const GpuNoOptions&);
-  ToleranceArgs args(const GpuInstances& instances, const GpuPairs& pairs, double tolerance) const;
-  Status enqueue(const ToleranceArgs& args, cudaStream_t stream);
-};
 
-Status ToleranceHost::set_assets(std::span<const GpuAsset> given, cudaStream_t stream) {
-  Buffer<levels::LevelRange> ranges;
-  std::uint32_t most = 1;
-  for (std::size_t i = 0; i < given.size(); ++i) {
-    if (given[i].tree.oriented_blocks == nullptr) return Status::kNoOrientedBlocks;
-    const bool begins = given[i].tree.number == 0;
-    if (!begins && (i == 0 || !follows(given[i - 1], given[i]))) return Status::kNoFinestLevel;
-    if (begins && !ranges.push({static_cast<std::uint32_t>(i), 0})) return Status::kOutOfMemory;
-    most = std::max(most, ++ranges[ranges.size() - 1].count);
+  Status set_assets(std::span<const GpuAsset> given, cudaStream_t stream) {
+    Buffer<levels::LevelRange> ranges;
+    std::uint32_t most = 1;
+    for (std::size_t i = 0; i < given.size(); ++i) {
+      if (given[i].tree.oriented_blocks == nullptr) return Status::kNoOrientedBlocks;
+      const bool begins = given[i].tree.number == 0;
+      if (!begins && (i == 0 || !follows(given[i - 1], given[i]))) return Status::kNoFinestLevel;
+      if (begins && !ranges.push({static_cast<std::uint32_t>(i), 0})) return Status::kOutOfMemory;
+      most = std::max(most, ++ranges[ranges.size() - 1].count);
+    }
+    if (most > kMaxLevels) return Status::kOutOfRange;
+    asset_count = 0;
+    Status status = provide_fixed_memory();
+    if (status == Status::kOk) status = keep(contacts.set_assets(given, stream), contacts);
+    if (status == Status::kOk) status = keep(levels.upload(given, stream));
+    if (status == Status::kOk) status = keep(assets.upload(ranges.view(), stream));
+    if (status == Status::kOk) status = keep(cudaStreamSynchronize(stream));
+    if (status != Status::kOk) return status;
+    asset_count = static_cast<std::uint32_t>(ranges.size());
+    return Status::kOk;
   }
-  if (most > kMaxLevels) return Status::kOutOfRange;
-  asset_count = 0;
-  Status status = provide_fixed_memory();
-  if (status == Status::kOk) status = keep(contacts.set_assets(given, stream), contacts);
-  if (status == Status::kOk) status = keep(levels.upload(given, stream));
-  if (status == Status::kOk) status = keep(assets.upload(ranges.view(), stream));
-  if (status == Status::kOk) status = keep(cudaStreamSynchronize(stream));
-  if (status != Status::kOk) return status;
-  asset_count = static_cast<std::uint32_t>(ranges.size());
-  return Status::kOk;
-}
 
-// There is room for as many pairs as the contact query has room for.
-Status ToleranceHost::reserve(const GpuToleranceCapacity& wanted, const GpuNoOptions&) {
-  const GpuContactCapacity of_contacts = {wanted.pairs, wanted.pairs, wanted.undecided};
-  Status status = keep(of_instances.grow(wanted.instances));
-  if (status == Status::kOk) status = keep(contacts.reserve(of_contacts, kToleranceOptions), contacts);
-  if (status != Status::kOk) return status;
-  const GpuContactCapacity room = contacts.capacity();
-  return keep(of_pairs.fit(static_cast<std::uint32_t>(std::min<std::uint64_t>(room.pairs, room.contacts))));
-}
+  // There is room for as many pairs as the contact query has room for.
+  Status reserve(const GpuToleranceCapacity& wanted, const GpuNoOptions&) {
+    const GpuContactCapacity of_contacts = {wanted.pairs, wanted.pairs, wanted.undecided};
+    Status status = keep(of_instances.grow(wanted.instances));
+    if (status == Status::kOk) status = keep(contacts.reserve(of_contacts, kToleranceOptions), contacts);
+    if (status != Status::kOk) return status;
+    const GpuContactCapacity room = contacts.capacity();
+    return keep(of_pairs.fit(static_cast<std::uint32_t>(std::min<std::uint64_t>(room.pairs, room.contacts))));
+  }
 
-ToleranceArgs ToleranceHost::args(const GpuInstances& instances, const GpuPairs& pairs,
-                                  double tolerance) const {
-  ToleranceArgs args = {};
-  fill(args, instances);
-  args.levels = levels.data();
-  args.assets = assets.data();
-  args.asset_count = asset_count;
-  args.given = pairs;
-  args.tolerance = tolerance;
-  args.pair_capacity = of_pairs.count();
-  args.level = level.data();
-  args.asset = asset.data();
-  args.verdicts = verdicts.data();
-  args.met = contacts.met();
-  args.query = contacts.device_report();
-  return args;
-}
+  ToleranceArgs args(const GpuInstances& instances, const GpuPairs& pairs, double tolerance) const {
+    ToleranceArgs args = {};
+    fill(args, instances);
+    args.asset_count = asset_count;
+    args.given = pairs;
+    args.tolerance = tolerance;
+    args.pair_capacity = of_pairs.count();
+    args.met = contacts.met();
+    args.query = contacts.device_report();
+    return args;
+  }
 
-Status ToleranceHost::enqueue(const ToleranceArgs& args, cudaStream_t stream) {
-  const GpuInstances posed = {args.asset, args.instances.pose, args.instances.count};
-  GpuContactOptions options = kToleranceOptions;
-  options.add_error_bounds = args.tolerance > 0;  // else all stand for their finest levels
-  Status status = keep(choose_levels(args, stream));
-  if (status == Status::kOk) status = keep(contacts.enqueue(posed, args.given, options, stream), contacts);
-  return status == Status::kOk ? keep(judge_pairs(args, stream)) : status;
-}
+  Status enqueue(const ToleranceArgs& args, cudaStream_t stream) {
+    const GpuInstances posed = {args.asset, args.instances.pose, args.instances.count};
+    GpuContactOptions options = kToleranceOptions;
+    options.add_error_bounds = args.tolerance > 0;  // else all stand for their finest levels
+    Status status = keep(choose_levels(args, stream));
+    if (status == Status::kOk) status = keep(contacts.enqueue(posed, args.given, options, stream), contacts);
+    return status == Status::kOk ? keep(judge_pairs(args, stream)) : status;
+  }
+};
 
 }  // namespace tandem::gpu
 
 namespace tandem {
 
-struct GpuToleranceKind::Host : gpu::ToleranceHost {};
-template class GpuQuestion<GpuToleranceKind>;
-template class GpuAssetQuestion<GpuToleranceKind>;
+template class GpuQuestion<GpuToleranceCapacity, GpuToleranceReport>;
+template class GpuAssetQuestion<GpuToleranceCapacity, GpuToleranceReport>;
 
 Status GpuToleranceQuery::enqueue(const GpuInstances& instances, const GpuPairs& pairs, double tolerance,
                                   cudaStream_t stream) {

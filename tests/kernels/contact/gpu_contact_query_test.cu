@@ -38,6 +38,16 @@ void expect_equal(const Answers& answers, QueryMode mode) {
   test::expect_equal(answers.gpu, answers.cpu, mode);
 }
 
+/// Both find the same in every mode, and more than so many contacts.
+void expect_equal_in_every_mode(const BodyScene& scene, const std::vector<ObjectPair>& pairs,
+                                std::size_t contacts) {
+  for (const QueryMode mode : kModes) {
+    const Answers answers = ask(scene, pairs, mode);
+    EXPECT_GT(answers.cpu.contacts.size(), contacts);
+    expect_equal(answers, mode);
+  }
+}
+
 class GpuContacts : public test::GpuTest {};
 
 class GpuContactsOf : public test::GpuTestOf<test::SceneFamily> {};
@@ -62,12 +72,7 @@ INSTANTIATE_TEST_SUITE_P(, GpuContactsOf, testing::ValuesIn(test::scene_families
 TEST_F(GpuContacts, OfAPileAreThoseOfTheCpu) {
   RandomPoses random(2);
   const BodyScene scene = pile(150, 3000, 4, 7);
-  const auto pairs = all_pairs(scene.instances, false, random);
-  for (const QueryMode mode : kModes) {
-    const Answers answers = ask(scene, pairs, mode);
-    EXPECT_GT(answers.cpu.contacts.size(), 10000u);
-    expect_equal(answers, mode);
-  }
+  expect_equal_in_every_mode(scene, all_pairs(scene.instances, false, random), 10000);
 }
 
 // One object pair: its work must be shared out among warps, and all of its triangles are hard cases.
@@ -79,13 +84,8 @@ TEST_F(GpuContacts, OfCoincidentBodiesAreThoseOfTheCpu) {
   const Pose pose = random.pose({1, 1, 10, 0, 4});
   scene.instances = {{0, pose}, {0, pose}, {1, pose}, {1, pose}};
   for (const std::vector<ObjectPair>& pairs :
-       {std::vector<ObjectPair>{{0, 1}}, std::vector<ObjectPair>{{3, 2}, {1, 1}}}) {
-    for (const QueryMode mode : kModes) {
-      const Answers answers = ask(scene, pairs, mode);
-      EXPECT_GT(answers.cpu.contacts.size(), 10000u);
-      expect_equal(answers, mode);
-    }
-  }
+       {std::vector<ObjectPair>{{0, 1}}, std::vector<ObjectPair>{{3, 2}, {1, 1}}})
+    expect_equal_in_every_mode(scene, pairs, 10000);
 }
 
 // Every node pair hits, so that stacks grow as fast as they can.
@@ -130,10 +130,8 @@ TEST_F(GpuContacts, OfASmallSceneInEveryMode) {
   RandomPoses random(15);
   const BodyScene scene = pile(10, 150, 0.7, 15);
   const auto pairs = all_pairs(scene.instances, true, random);
+  expect_equal_in_every_mode(scene, pairs, 100);
   for (const QueryMode mode : kModes) {
-    const Answers all = ask(scene, pairs, mode);
-    EXPECT_GT(all.cpu.contacts.size(), 100u);
-    expect_equal(all, mode);
     const Answers first = ask(scene, pairs, mode, true);
     EXPECT_EQ(first.gpu.contacts.size(), first.cpu.contacts.size());
   }

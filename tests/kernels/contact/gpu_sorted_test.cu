@@ -41,11 +41,8 @@ class GpuSorted : public test::GpuTest {};
 TEST_F(GpuSorted, ContactsAreTheCpusSorted) {
   BodyScene scene = test::pile(60, 800, 2, 21);
   share_faces(scene);
-  std::vector<ObjectPair> pairs;
-  for (std::uint32_t a = 0; a < 60; ++a) {
-    for (std::uint32_t b = a; b < 60; ++b)
-      pairs.push_back((a + b) % 2 == 0 ? ObjectPair{a, b} : ObjectPair{b, a});
-  }
+  test::RandomPoses random(21);
+  const std::vector<ObjectPair> pairs = test::all_pairs(scene.instances, true, random);
   AskedContacts gpu(scene, pairs);
   for (const QueryMode mode : test::kModes) {
     const std::vector<Contact> expected = expected_of(scene, pairs, mode);

@@ -62,6 +62,36 @@ inline void run(GpuBroadPhase& broad_phase, const GpuArray<WorldBox>& boxes, std
   ASSERT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
 }
 
+/// Room for too few pairs: some of them are stored, none twice, and the report tells how many there are; with
+/// room for these, all are found.
+inline void expect_overflow_is_reported(GpuBroadPhase& broad_phase, const GpuArray<WorldBox>& boxes,
+                                        std::uint32_t count, const GpuBroadPhaseOptions& options,
+                                        const Pairs& expected) {
+  const auto size = static_cast<std::uint32_t>(expected.size());
+  ASSERT_GT(size, 3u);
+  for (const std::uint32_t room : {0u, 1u, size / 2, size - 1}) {
+    ASSERT_EQ(broad_phase.reserve({count, room}, options), Status::kOk);
+    run(broad_phase, boxes, count, options);
+    EXPECT_EQ(broad_phase.report().status, Status::kOk);
+    EXPECT_EQ(broad_phase.report().complete, 0u);
+    EXPECT_EQ(broad_phase.report().found, expected.size());
+    Pairs some = stored(broad_phase);
+    ASSERT_EQ(some.size(), room);
+    std::sort(some.begin(), some.end(), before);
+    EXPECT_TRUE(std::includes(expected.begin(), expected.end(), some.begin(), some.end(), before));
+  }
+  ASSERT_EQ(broad_phase.reserve({count, broad_phase.report().count}, options), Status::kOk);
+  run(broad_phase, boxes, count, options);
+  EXPECT_EQ(broad_phase.report().complete, 1u);
+  EXPECT_EQ(std::memcmp(download(broad_phase.device_report(), 1).data(), &broad_phase.report(),
+                        sizeof(GpuBroadPhaseReport)),
+            0);
+  Pairs all = stored(broad_phase);
+  if (!options.sorted) std::sort(all.begin(), all.end(), before);
+  EXPECT_TRUE(same(all, expected));
+  EXPECT_LE(broad_phase.bytes(), most_broad_phase_bytes(broad_phase.capacity(), options.sorted));
+}
+
 /// Instances of boxes, and their copy in GPU memory.
 struct Bodies {
   std::vector<std::uint32_t> asset;

@@ -267,15 +267,7 @@ TEST_F(GpuFilterTest, OverflowIsReportedAndARetryLosesNothing) {
     const auto device = on_gpu(boxes);
     GpuBroadPhase broad_phase;
     ASSERT_EQ(broad_phase.keep_fixed(device.data(), filter.motion, nullptr), Status::kOk);
-    ASSERT_EQ(broad_phase.reserve({count, 100}, {true}), Status::kOk);
-    const GpuBroadPhaseOptions options = {true, on_device.view()};
-    test::run(broad_phase, device, count, options);
-    EXPECT_EQ(broad_phase.report().complete, 0u);
-    EXPECT_EQ(broad_phase.report().found, expected.size());
-    ASSERT_EQ(broad_phase.reserve({count, broad_phase.report().count}, {true}), Status::kOk);
-    test::run(broad_phase, device, count, options);
-    EXPECT_EQ(broad_phase.report().complete, 1u);
-    EXPECT_TRUE(same(stored(broad_phase), expected));
+    test::expect_overflow_is_reported(broad_phase, device, count, {true, on_device.view()}, expected);
   }
 }
 

@@ -47,14 +47,7 @@ struct GpuBroadPhaseReport {
   std::uint64_t found;     ///< how many pairs there are, stored or not
 };
 
-/// The types of this question, see GpuQuestion.
-struct GpuBroadPhaseKind {
-  struct Host;
-  using Capacity = GpuBroadPhaseCapacity;
-  using Report = GpuBroadPhaseReport;
-  using Options = GpuBroadPhaseOptions;
-};
-extern template class GpuQuestion<GpuBroadPhaseKind>;
+extern template class GpuQuestion<GpuBroadPhaseCapacity, GpuBroadPhaseReport, GpuBroadPhaseOptions>;
 
 /// Finds all pairs of world boxes that meet, or those of them that a filter looks at, on the GPU: the same
 /// set as BroadPhase. See GpuQuestion.
@@ -69,7 +62,7 @@ extern template class GpuQuestion<GpuBroadPhaseKind>;
 /// kDriverTooOld, kGpuNotSupported. Where it makes room for more instances, what was kept of them is lost,
 /// and enqueue() returns kKeptMismatch until keep_fixed() is called again. bytes() is at most
 /// most_broad_phase_bytes().
-class GpuBroadPhase : public GpuQuestion<GpuBroadPhaseKind> {
+class GpuBroadPhase : public GpuQuestion<GpuBroadPhaseCapacity, GpuBroadPhaseReport, GpuBroadPhaseOptions> {
  public:
   /// Keeps the boxes, or instances, whose motion is fixed as they are: calls of enqueue() to come, which must
   /// be of as many, find no pair of two of them and take the time of the others. Given boxes must go on lying

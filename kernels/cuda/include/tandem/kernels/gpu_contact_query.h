@@ -91,15 +91,8 @@ struct GpuContactReport {
   ContactCounters counters;
 };
 
-/// The types of this question, see GpuQuestion.
-struct GpuContactKind {
-  struct Host;
-  using Capacity = GpuContactCapacity;
-  using Report = GpuContactReport;
-  using Options = GpuContactOptions;
-};
-extern template class GpuQuestion<GpuContactKind>;
-extern template class GpuAssetQuestion<GpuContactKind>;
+extern template class GpuQuestion<GpuContactCapacity, GpuContactReport, GpuContactOptions>;
+extern template class GpuAssetQuestion<GpuContactCapacity, GpuContactReport, GpuContactOptions>;
 
 /// Finds every pair of triangles that meet, of many posed instances of few assets, on the GPU: the same set
 /// of contacts as ContactQuery. See GpuQuestion.
@@ -107,7 +100,7 @@ extern template class GpuAssetQuestion<GpuContactKind>;
 /// set_assets() also returns kOutOfRange for a tree of 2^29 - 1 blocks or more. reserve() makes room for
 /// clearance where `within` or add_error_bounds is set; it also returns kOutOfRange (sorted or grouped: 2^32
 /// - 1 contacts or more; grouped: 2^31 pairs or more). bytes() is at most most_query_bytes().
-class GpuContactQuery : public GpuAssetQuestion<GpuContactKind> {
+class GpuContactQuery : public GpuAssetQuestion<GpuContactCapacity, GpuContactReport, GpuContactOptions> {
  public:
   /// Queues a query behind what `stream` holds. A pair of an instance with itself asks for the contacts
   /// within it. Mode exact walks oriented blocks, the others axis-aligned ones. Result: also

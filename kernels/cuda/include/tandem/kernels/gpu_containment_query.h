@@ -31,15 +31,8 @@ struct GpuContainmentReport {
   std::uint32_t contained;
 };
 
-/// The types of this question, see GpuQuestion.
-struct GpuContainmentKind {
-  struct Host;
-  using Capacity = GpuContainmentCapacity;
-  using Report = GpuContainmentReport;
-  using Options = GpuNoOptions;
-};
-extern template class GpuQuestion<GpuContainmentKind>;
-extern template class GpuAssetQuestion<GpuContainmentKind>;
+extern template class GpuQuestion<GpuContainmentCapacity, GpuContainmentReport>;
+extern template class GpuAssetQuestion<GpuContainmentCapacity, GpuContainmentReport>;
 
 /// Finds what lies within another body of an object pair without touching it, on the GPU: what
 /// ContainmentQuery finds, in its order. See GpuQuestion; instances and pairs are those of a contact query in
@@ -47,7 +40,7 @@ extern template class GpuAssetQuestion<GpuContainmentKind>;
 ///
 /// Assets, the list given to the contact query, need topology, which set_assets() takes back to the CPU once
 /// for those with more than one component. bytes() is at most most_containment_bytes().
-class GpuContainmentQuery : public GpuAssetQuestion<GpuContainmentKind> {
+class GpuContainmentQuery : public GpuAssetQuestion<GpuContainmentCapacity, GpuContainmentReport> {
  public:
   /// Queues the search behind what `stream` holds, the contact query among it. That groups its contacts;
   /// where no body has two components, the first contact of each pair will do. Condition: set_assets() and

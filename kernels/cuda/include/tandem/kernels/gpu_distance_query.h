@@ -52,21 +52,14 @@ struct GpuDistanceReport {
   DistanceCounters counters;
 };
 
-/// The types of this question, see GpuQuestion.
-struct GpuDistanceKind {
-  struct Host;
-  using Capacity = GpuDistanceCapacity;
-  using Report = GpuDistanceReport;
-  using Options = GpuNoOptions;
-};
-extern template class GpuQuestion<GpuDistanceKind>;
-extern template class GpuAssetQuestion<GpuDistanceKind>;
+extern template class GpuQuestion<GpuDistanceCapacity, GpuDistanceReport>;
+extern template class GpuAssetQuestion<GpuDistanceCapacity, GpuDistanceReport>;
 
 /// Finds how near the surfaces of posed instances are, of many pairs or of few huge ones, on the GPU: the
 /// distances of DistanceQuery, as certified, 0, 0 for the same pairs; not the same bytes, but the same bytes
 /// on every run of one kind of GPU. See GpuQuestion. Assets need axis-aligned blocks. bytes() is at most
 /// most_distance_bytes().
-class GpuDistanceQuery : public GpuAssetQuestion<GpuDistanceKind> {
+class GpuDistanceQuery : public GpuAssetQuestion<GpuDistanceCapacity, GpuDistanceReport> {
  public:
   /// Queues a query behind what `stream` holds. Pairs may be in either order of a and b; an instance is at
   /// distance 0 from itself. Result: also kOutOfRange (a tolerance or reach that is negative or NaN).

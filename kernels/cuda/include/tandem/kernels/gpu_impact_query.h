@@ -56,15 +56,8 @@ struct GpuImpactReport {
   ImpactCounters counters;   ///< walks: pieces of pairs. Not those of the CPU, but the same on every run
 };
 
-/// The types of this question, see GpuQuestion.
-struct GpuImpactKind {
-  struct Host;
-  using Capacity = GpuImpactCapacity;
-  using Report = GpuImpactReport;
-  using Options = GpuImpactOptions;
-};
-extern template class GpuQuestion<GpuImpactKind>;
-extern template class GpuAssetQuestion<GpuImpactKind>;
+extern template class GpuQuestion<GpuImpactCapacity, GpuImpactReport, GpuImpactOptions>;
+extern template class GpuAssetQuestion<GpuImpactCapacity, GpuImpactReport, GpuImpactOptions>;
 
 /// Finds until when moving instances surely do not meet, on the GPU: an Impact for each object pair with the
 /// guarantee of ImpactQuery, but not its bytes; the same bytes on every run on one kind of GPU. See
@@ -75,7 +68,7 @@ extern template class GpuAssetQuestion<GpuImpactKind>;
 ///
 /// Assets need axis-aligned and oriented blocks. reserve() also returns kOutOfRange for 2^25 parts or more.
 /// bytes() is at most most_impact_bytes().
-class GpuImpactQuery : public GpuAssetQuestion<GpuImpactKind> {
+class GpuImpactQuery : public GpuAssetQuestion<GpuImpactCapacity, GpuImpactReport, GpuImpactOptions> {
  public:
   /// Queues a query behind what `stream` holds. It finds the object pairs whose boxes, swept by their motions
   /// of a step of `duration` seconds, meet, and when each of them does. motion: of each instance, in GPU

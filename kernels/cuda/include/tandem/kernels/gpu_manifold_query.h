@@ -39,15 +39,8 @@ struct GpuManifoldReport {
   ManifoldCounters counters;
 };
 
-/// The types of this question, see GpuQuestion.
-struct GpuManifoldKind {
-  struct Host;
-  using Capacity = GpuManifoldCapacity;
-  using Report = GpuManifoldReport;
-  using Options = GpuNoOptions;
-};
-extern template class GpuQuestion<GpuManifoldKind>;
-extern template class GpuAssetQuestion<GpuManifoldKind>;
+extern template class GpuQuestion<GpuManifoldCapacity, GpuManifoldReport>;
+extern template class GpuAssetQuestion<GpuManifoldCapacity, GpuManifoldReport>;
 
 /// Makes contact manifolds of the contacts that a GpuContactQuery found, on the GPU: the same bytes as
 /// ManifoldQuery makes of them. See GpuQuestion; instances and pairs are those of the contact query.
@@ -55,7 +48,7 @@ extern template class GpuAssetQuestion<GpuManifoldKind>;
 /// Assets, the list given to the contact query, need topology; set_assets() forgets the last call. reserve()
 /// keeps what the last call found for the next one to match; it also returns kOutOfRange (contacts or points:
 /// 2^31 or more). bytes() is at most most_manifold_bytes().
-class GpuManifoldQuery : public GpuAssetQuestion<GpuManifoldKind> {
+class GpuManifoldQuery : public GpuAssetQuestion<GpuManifoldCapacity, GpuManifoldReport> {
  public:
   /// Queues the making of manifolds behind what `stream` holds, the contact query among it, whose contacts
   /// are grouped. Condition: set_assets() and reserve().

@@ -10,6 +10,11 @@
 
 namespace tandem {
 
+namespace gpu {
+template <typename Report>
+struct HostOf;  // the memory of the question that has this report
+}
+
 /// The options of a question whose room does not depend on any.
 struct GpuNoOptions {};
 
@@ -29,15 +34,10 @@ struct GpuNoOptions {};
 /// Throws nothing. Movable, not copyable. An object answers one call at a time: enqueue the next on the same
 /// stream, or when the last has ended. Several objects can run side by side.
 ///
-/// Kind: names the types of a question. Host owns its memory. Capacity says how many of each thing there is
-/// room for, or how many there have to be. Options are those that its room depends on. Report is the outcome
-/// of a call.
-template <typename Kind>
+/// Capacity: how many of each thing there is room for, or how many there have to be. Report: the outcome of a
+/// call. Options: those that the room depends on.
+template <typename Capacity, typename Report, typename Options = GpuNoOptions>
 class GpuQuestion {
-  using Capacity = typename Kind::Capacity;
-  using Report = typename Kind::Report;
-  using Options = typename Kind::Options;
-
  public:
   GpuQuestion();
   GpuQuestion(GpuQuestion&&) noexcept;
@@ -60,12 +60,12 @@ class GpuQuestion {
   cudaError_t cuda_error() const;
 
  protected:
-  std::unique_ptr<typename Kind::Host> host_;  ///< null where there was no memory for it
+  std::unique_ptr<gpu::HostOf<Report>> host_;  ///< null where there was no memory for it
 };
 
 /// A question whose instances refer to a list of assets.
-template <typename Kind>
-class GpuAssetQuestion : public GpuQuestion<Kind> {
+template <typename Capacity, typename Report, typename Options = GpuNoOptions>
+class GpuAssetQuestion : public GpuQuestion<Capacity, Report, Options> {
  public:
   /// Names the assets that instances refer to, on the current device, after what `stream` holds: copies what
   /// is to be known of them, and returns when that is done. What the trees point to must outlive the calls.

@@ -37,15 +37,8 @@ struct GpuToleranceReport {
   ToleranceCounters counters;
 };
 
-/// The types of this question, see GpuQuestion.
-struct GpuToleranceKind {
-  struct Host;
-  using Capacity = GpuToleranceCapacity;
-  using Report = GpuToleranceReport;
-  using Options = GpuNoOptions;
-};
-extern template class GpuQuestion<GpuToleranceKind>;
-extern template class GpuAssetQuestion<GpuToleranceKind>;
+extern template class GpuQuestion<GpuToleranceCapacity, GpuToleranceReport>;
+extern template class GpuAssetQuestion<GpuToleranceCapacity, GpuToleranceReport>;
 
 /// Tells of pairs of bodies with levels of detail whether they surely do not meet, surely meet, or are within
 /// a tolerance, on the GPU: the verdicts of ToleranceQuery, at the same levels, which the GPU chooses. See
@@ -55,7 +48,7 @@ extern template class GpuAssetQuestion<GpuToleranceKind>;
 /// tree.number is 0 begins an asset; instances name assets by their order. Levels need oriented blocks. It
 /// also returns kNoFinestLevel (a level is not the one behind the level before it, or the first is no finest
 /// one) and kOutOfRange (an asset of more than kMaxLevels). bytes() is at most most_tolerance_bytes().
-class GpuToleranceQuery : public GpuAssetQuestion<GpuToleranceKind> {
+class GpuToleranceQuery : public GpuAssetQuestion<GpuToleranceCapacity, GpuToleranceReport> {
  public:
   /// Queues a query behind what `stream` holds. Pairs may be in either order of a and b; an instance touches
   /// itself. tolerance: as of ToleranceOptions. Result: also kOutOfRange (more instances than reserved for, a

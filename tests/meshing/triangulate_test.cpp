@@ -12,7 +12,6 @@
 #include <random>
 #include <set>
 
-#include "bvhbuild/meshing/meshing.h"
 #include "tandem/formats/box.h"
 
 namespace tandem::build {

@@ -4,8 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "common/json.h"
-#include "common/stopwatch.h"
+#include "common/report.h"
 
 namespace tandem::bench {
 
@@ -35,7 +34,7 @@ struct DistanceComparison {
 /// Throws FileError of a scene that cannot be compared, std::runtime_error of a library.
 DistanceComparison compare_distances(const std::string& path, double reach, unsigned repeats);
 
-std::string to_text(const DistanceComparison& comparison);
-Json to_json(const DistanceComparison& comparison);
+/// In the text a line for each library.
+Report report_of(const DistanceComparison& comparison);
 
 }  // namespace tandem::bench

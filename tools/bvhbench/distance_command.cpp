@@ -1,106 +1,51 @@
-#include "distance_command.h"
-
-#include <algorithm>
-#include <cmath>
-#include <cstdio>
 #include <limits>
-#include <memory>
-#include <new>
-#include <thread>
 
-#include "backend.h"
 #include "bvhbench/engines/registry.h"
-#include "bvhbench/scenes/contacts_file.h"
-#include "bvhbench/scenes/distance_file.h"
-#include "bvhbench/scenes/hdf5_file.h"
-#include "common/json.h"
-#include "common/number_words.h"
+#include "bvhbench/scenes/columns.h"
+#include "question.h"
 
 namespace tandem::bench {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-struct DistanceArguments {
-  std::string scene, out, backend = "cpu";
+struct DistanceArguments : CommonArguments {
+  DistanceTolerance tolerance;
+  double reach = kInfinity;
+};
+
+constexpr CounterRow<DistanceCounters> kCounters[] = {
+    {"touching", "  touching", &DistanceCounters::touching},
+    {"block_pairs", "block pairs", &DistanceCounters::block_pairs},
+    {"by_float32", "triangle pairs", &DistanceCounters::by_float32},
+    {"by_float64", "  by float64", &DistanceCounters::by_float64},
+};
+
+TimedDistances find_on_cpu(const DistanceArguments& arguments, const BodiesApart& bodies) {
   DistanceOptions options;
-  std::uint32_t repeats = 1;
-  bool json = false, threads_given = false;
-
-  bool on_gpu() const { return backend == "cuda"; }
-};
-
-struct Answer {
-  std::vector<ObjectPair> pairs;
-  std::vector<ObjectDistance> distances;
-  DistanceRecord record;
-  std::uint32_t rounds = 0;  // of the GPU's
-  Seconds nearest;
-  GpuUse gpu;
-};
-
-void require(const std::string& scene, const DistanceQuery& query, Status status) {
-  if (status == Status::kOutOfMemory) throw std::bad_alloc();
-  if (status != Status::kOk) refuse(scene, status, query.where());
-}
-
-void run_on_cpu(const DistanceArguments& arguments, const BodiesApart& bodies, Answer& answer) {
-  DistanceOptions options = arguments.options;
+  options.tolerance = bodies.tolerance;
+  options.reach = bodies.reach;
+  options.threads = arguments.threads();
   options.filter = &bodies.filter;
   DistanceQuery query;
-  require(arguments.scene, query, query.set_assets(bodies.shapes));
-  for (std::uint32_t i = 0; i < arguments.repeats; ++i) {
-    Stopwatch watch;
-    const Status status = bodies.given != nullptr
-                              ? query.find_distances(bodies.bodies, *bodies.given, options)
-                              : query.find_distances(bodies.bodies, options);
-    answer.record.seconds.push_back(watch.lap());
-    require(arguments.scene, query, status);
-  }
-  answer.record.counters = query.counters();
-  answer.pairs.assign(query.pairs().begin(), query.pairs().end());
-  answer.distances.assign(query.distances().begin(), query.distances().end());
+  auto found = time_on_cpu<TimedDistances>(arguments, bodies, query, [&](const auto&... given) {
+    return query.find_distances(bodies.bodies, given..., options);
+  });
+  found.distances.assign(query.distances().begin(), query.distances().end());
+  return found;
 }
 
-void run_on_gpu(const DistanceArguments& arguments, const BodiesApart& bodies, Answer& answer) {
-  try {
-    TimedDistances timed = distances_on_gpu()(bodies, arguments.repeats);
-    answer.record.seconds = timed.seconds;
-    answer.record.counters = timed.counters;
-    answer.pairs = std::move(timed.pairs);
-    answer.distances = std::move(timed.distances);
-    answer.rounds = timed.rounds;
-    answer.nearest = timed.nearest;
-    answer.gpu = timed.gpu;
-  } catch (const EngineError& error) {
-    refuse(arguments.scene, error.status, error.where);
-  } catch (const GpuError& error) {
-    refuse_gpu(arguments.scene, error);
-  }
-}
-
-// Runs the query as often as asked; the answer is the last run's, which is every run's.
-Answer run_query(const DistanceArguments& arguments, const LoadedScene& scene) {
-  const SceneDescription& description = scene.description;
+// The answer is every run's.
+TimedDistances find(const DistanceArguments& arguments, const LoadedScene& scene) {
   const std::vector<AssetView> shapes = scene.views();
-  const std::vector<ObjectPair> pairs = normalised(description.pairs.value_or(std::vector<ObjectPair>()));
-  ExcludedPairTable excluded;
-  const DistanceOptions& options = arguments.options;
-  const BodiesApart bodies = {shapes,
-                              description.instances,
-                              options.tolerance,
-                              options.reach,
-                              description.pairs ? &pairs : nullptr,
-                              description.filter.view(excluded)};
-  Answer answer;
-  DistanceRecord& record = answer.record;
-  record.backend = arguments.backend;
-  record.tolerance = options.tolerance;
-  record.reach = options.reach;
-  record.given_pairs = description.pairs.has_value();
-  record.threads = arguments.on_gpu() ? 0 : options.threads;
-  (arguments.on_gpu() ? run_on_gpu : run_on_cpu)(arguments, bodies, answer);
-  return answer;
+  const ScenePairs pairs(scene.description);
+  const BodiesApart bodies = {
+      shapes,        scene.description.instances, arguments.tolerance, arguments.reach, pairs.given(),
+      pairs.filter()};
+  return answer_of(arguments.scene, scene, [&] {
+    return arguments.on_gpu() ? distances_on_gpu()(bodies, arguments.repeats)
+                              : find_on_cpu(arguments, bodies);
+  });
 }
 
 // Infinite where there are no pairs.
@@ -110,132 +55,71 @@ double least_upper(const std::vector<ObjectDistance>& distances) {
   return least;
 }
 
-Json times(const Seconds& seconds) {
-  return {{"best", best_of(seconds)}, {"median", median_of(seconds)}, {"all", seconds}};
+// XXH64 of pairs and of lower and upper bounds, one after the other, as a distances file has them.
+std::uint64_t hash_of(const TimedDistances& found) {
+  const std::span<const ObjectDistance> distances = found.distances;
+  return hash_of_columns(flat(found.pairs), column(distances, &ObjectDistance::lower),
+                         column(distances, &ObjectDistance::upper));
 }
 
-Json finite_or_null(double x) {
-  return std::isfinite(x) ? Json(x) : Json();
-}
-
-Json to_json(const DistanceArguments& arguments, const LoadedScene& scene, const Answer& answer) {
-  const DistanceRecord& record = answer.record;
-  Json json = {{"tool", "bvhbench distance"},
-               {"version", TANDEM_VERSION},
-               {"scene", arguments.scene},
-               {"output", arguments.out.empty() ? Json() : Json(arguments.out)},
-               {"backend", record.backend},
-               {"reach", finite_or_null(record.reach)},
-               {"absolute_tolerance", record.tolerance.absolute},
-               {"relative_tolerance", record.tolerance.relative},
-               {"given_pairs", record.given_pairs},
-               {"threads", record.threads},
-               {"assets", scene.assets.size()},
-               {"instances", scene.description.instances.size()},
-               {"triangles", triangles_of(scene)},
-               {"object_pairs", record.counters.object_pairs},
-               {"touching", record.counters.touching},
-               {"block_pairs", record.counters.block_pairs},
-               {"by_float32", record.counters.by_float32},
-               {"by_float64", record.counters.by_float64},
-               {"least", finite_or_null(least_upper(answer.distances))},
-               {"hash", hexadecimal(hash_of(answer.pairs, answer.distances))},
-               {"seconds", times(record.seconds)}};
+Report report_of(const DistanceArguments& arguments, const LoadedScene& scene, const TimedDistances& found) {
+  Report report = report_of(arguments, "distance", "distances", found.gpu.name);
+  report.add({{"reach", arguments.reach},
+              {"absolute_tolerance", arguments.tolerance.absolute},
+              {"relative_tolerance", arguments.tolerance.relative}});
+  add_setting(report, arguments, scene);
+  report["triangles"].row("triangles");
+  add_object_pairs(report, found.counters.object_pairs, scene);
+  report.add(kCounters, found.counters);
+  report.add_json("least", least_upper(found.distances));
+  add_outcome(report, hash_of(found), found.seconds);
   if (arguments.on_gpu()) {
-    json["rounds"] = answer.rounds;
-    json["gpu"] = answer.gpu.name;
-    json["gpu_bytes"] = answer.gpu.bytes;
-    json["gpu_bytes_bound"] = answer.gpu.bytes_bound;
-    json["gpu_bytes_taken"] = answer.gpu.bytes_taken;
-    json["upload_seconds"] = answer.gpu.upload;
-    json["distances_seconds"] = times(answer.nearest);
+    report.add_json("rounds", found.rounds).row("rounds");
+    add_gpu_name(report, found.gpu);
+    add_gpu_use(report, found.gpu);
+    report.add_json("distances_seconds", times(found.nearest));
   }
-  return json;
+  report["least"].row("least", Unit::length);
+  report["seconds"].row("milliseconds", Unit::milliseconds);
+  if (arguments.on_gpu()) report["distances_seconds"].row("  distances", Unit::milliseconds);
+  return report;
 }
 
-void print_row(const char* label, std::uint64_t value, const char* remark = "") {
-  std::printf("  %-14s %15s%s\n", label, with_commas(value).c_str(), remark);
-}
-
-void print_times(const char* label, const Seconds& seconds) {
-  std::printf("  %-14s %15.3f  best of %zu, median %.3f\n", label, 1e3 * best_of(seconds), seconds.size(),
-              1e3 * median_of(seconds));
-}
-
-void print_summary(const DistanceArguments& arguments, const LoadedScene& scene, const Answer& answer) {
-  const DistanceRecord& record = answer.record;
-  const std::string place =
-      arguments.on_gpu() ? answer.gpu.name
-                         : with_commas(record.threads) + (record.threads == 1 ? " thread" : " threads");
-  std::printf("%s: distances on %s, %s\n", arguments.scene.c_str(), record.backend.c_str(), place.c_str());
-  print_row("instances", scene.description.instances.size());
-  print_row("triangles", triangles_of(scene));
-  print_row("object pairs", record.counters.object_pairs, record.given_pairs ? "  given" : "  found");
-  print_row("  touching", record.counters.touching);
-  print_row("block pairs", record.counters.block_pairs);
-  print_row("triangle pairs", record.counters.by_float32);
-  print_row("  by float64", record.counters.by_float64);
-  if (arguments.on_gpu()) print_row("rounds", answer.rounds);
-  std::printf("  %-14s %15.6g\n", "least", least_upper(answer.distances));
-  print_times("milliseconds", record.seconds);
-  if (arguments.on_gpu()) print_times("  distances", answer.nearest);
-  std::printf("  %-14s %s\n", "hash", hexadecimal(hash_of(answer.pairs, answer.distances)).c_str());
+void add_datasets(Hdf5Output& file, const TimedDistances& found) {
+  const std::span<const ObjectDistance> distances = found.distances;
+  add_pairs(file, "/pairs", found.pairs);
+  add_column(file, "/distance/lower", distances, &ObjectDistance::lower);
+  add_column(file, "/distance/upper", distances, &ObjectDistance::upper);
+  add_column(file, "/distance/point_a", distances, &ObjectDistance::point_a);
+  add_column(file, "/distance/point_b", distances, &ObjectDistance::point_b);
+  add_column(file, "/distance/face_a", distances, &ObjectDistance::face_a);
+  add_column(file, "/distance/face_b", distances, &ObjectDistance::face_b);
 }
 
 ExitCode run(const DistanceArguments& arguments) {
-  if (arguments.on_gpu() && arguments.threads_given) throw UsageError("--threads is for the backend cpu");
-  const LoadedScene scene = read_scene(arguments.scene);
-  if (!arguments.out.empty()) {
-    keep_inputs(arguments.out, files_of(arguments.scene, scene));
-    try_output(arguments.out);
-  }
-  const Answer answer = run_query(arguments, scene);
-  if (!arguments.out.empty()) write_distances(arguments.out, answer.pairs, answer.distances, answer.record);
-  if (arguments.json) {
-    std::puts(pretty(to_json(arguments, scene, answer)).c_str());
-  } else {
-    print_summary(arguments, scene, answer);
-  }
-  return kDone;
+  const LoadedScene scene = open_scene(arguments);
+  const TimedDistances found = find(arguments, scene);
+  Report report = report_of(arguments, scene, found);
+  return finish(arguments, report, [&](Hdf5Output& file) { add_datasets(file, found); });
 }
 
 }  // namespace
 
-CLI::App* add_distance(CLI::App& app, Run& run_later) {
-  const auto arguments = std::make_shared<DistanceArguments>();
-  DistanceOptions& options = arguments->options;
-  options.threads = std::max(1u, std::thread::hardware_concurrency());
-  CLI::App* command = app.add_subcommand("distance", "find how near the bodies of a scene are");
-  command->add_option("SCENE", arguments->scene, "scene file (HDF5)")->required()->check(file_name());
-  add_backend(*command, arguments->backend);
-  command->add_option("--reach", options.reach, "pairs farther apart than this are only told to be so")
-      ->check(between(0, kInfinity))
-      ->option_text("D [no limit]");
-  command
-      ->add_option("--tolerance", options.tolerance.relative,
-                   "how wide the interval of a distance may be, relative to it")
-      ->check(between(0, 1))
-      ->option_text("R [1e-6]");
-  command
-      ->add_option("--absolute", options.tolerance.absolute,
-                   "or how wide in units of length, if that is more")
-      ->check(between(0, kInfinity))
-      ->option_text("A [0]");
-  CLI::Option* threads =
-      command->add_option("--threads", options.threads, "threads; the distances do not depend on them")
-          ->check(CLI::Range(1u, kMostQueryThreads))
-          ->option_text("N [all]");
-  command->add_option("--repeat", arguments->repeats, "times to run the query, for its timing")
-      ->check(CLI::Range(1, 1000000))
-      ->option_text("N [1]");
-  command->add_option("--out", arguments->out, "the distances file to write; appears whole or not at all")
-      ->check(file_name());
-  command->add_flag("--json", arguments->json, "print the summary as JSON");
-  command->final_callback([arguments, threads, &run_later] {
-    arguments->threads_given = threads->count() > 0;
-    run_later = [arguments] { return run(*arguments); };
-  });
-  return command;
+void add_distance(CLI::App& app, Run& run_later) {
+  const auto [command, arguments] = add_command<DistanceArguments>(
+      app, run_later, "distance", "find how near the bodies of a scene are", run);
+  add_options(command, {scene_argument(arguments),
+                        backend_option(arguments),
+                        {"--reach", arguments.reach, "D [no limit]",
+                         "pairs farther apart than this are only told to be so", between(0, kInfinity)},
+                        {"--tolerance", arguments.tolerance.relative, "R [1e-6]",
+                         "how wide the interval of a distance may be, relative to it", between(0, 1)},
+                        {"--absolute", arguments.tolerance.absolute, "A [0]",
+                         "or how wide in units of length, if that is more", between(0, kInfinity)},
+                        threads_option(arguments, "the distances do"),
+                        repeat_option(arguments),
+                        output_option(arguments, "the distances file to write; appears whole or not at all"),
+                        json_option(arguments)});
 }
 
 }  // namespace tandem::bench

@@ -1,17 +1,13 @@
-#include "compare_command.h"
-
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <limits>
-#include <memory>
-#include <optional>
 #include <set>
 
 #include "bvhbench/engines/registry.h"
-#include "bvhbench/scenes/hdf5_file.h"
+#include "command.h"
 #include "compare_distance.h"
 #include "compare_impact.h"
 #include "compare_results.h"
@@ -19,11 +15,10 @@
 namespace tandem::bench {
 namespace {
 
-struct CompareArguments {
+struct CompareArguments : CommonArguments {
+  CompareArguments() { repeats = 5; }
+
   std::vector<std::string> scenes, engines;
-  unsigned repeats = 5;
-  std::string out;
-  bool json = false;
   std::optional<double> distances_within;  ///< distances are compared, not contacts
   std::optional<double> impacts_within;    ///< times of impact are compared, not contacts
 };
@@ -61,92 +56,86 @@ auto compare_or_refuse(const std::string& scene, const Compare& compare) {
   }
 }
 
-// Compares scene by scene, without a file of results. option: what asked for it.
+// Compares scene by scene, and prints the text of each at once. Result: what JSON says of them.
 template <typename Compare>
-ExitCode run_scenes(const CompareArguments& arguments, const std::string& option, const Compare& compare) {
-  if (!arguments.out.empty() || !arguments.engines.empty())
-    throw UsageError("--out and --peers are for contacts, so " + option + " does not go with them");
-  Json results = Json::array();
+Json compare_scenes(const CompareArguments& arguments, const char* between, const Compare& compare) {
+  Json scenes = Json::array();
   for (const std::string& scene : arguments.scenes) {
-    const auto compared = compare_or_refuse(scene, compare);
-    if (arguments.json) {
-      results.push_back(to_json(compared));
-      continue;
-    }
-    std::fputs(to_text(compared).c_str(), stdout);
+    const Report report = compare_or_refuse(scene, compare);
+    scenes.push_back(report.json());
+    if (arguments.json) continue;
+    std::printf("%s%s", scenes.size() > 1 ? between : "", report.text().c_str());
     std::fflush(stdout);
   }
-  if (arguments.json) {
-    const Json json = {{"tool", "bvhbench compare " + option},
-                       {"version", TANDEM_VERSION},
-                       {"processor", processor()},
-                       {"repeats", arguments.repeats},
-                       {"scenes", results}};
-    std::puts(pretty(json).c_str());
-  }
+  return scenes;
+}
+
+// A comparison without a file of results. option: what asked for it.
+template <typename Compare>
+ExitCode run_without_file(const CompareArguments& arguments, const std::string& option,
+                          const Compare& compare) {
+  if (!arguments.output.empty() || !arguments.engines.empty())
+    throw UsageError("--out and --peers are for contacts, so " + option + " does not go with them");
+  Report report;
+  report.add({{"tool", "bvhbench compare " + option},
+              {"version", TANDEM_VERSION},
+              {"processor", processor()},
+              {"repeats", arguments.repeats},
+              {"scenes", compare_scenes(arguments, "", compare)}});
+  print(arguments, report);
   return kDone;
 }
 
 ExitCode run_compare(const CompareArguments& arguments) {
   check_names(arguments.scenes);
   if (arguments.distances_within) {
-    return run_scenes(arguments, "--distance", [&](const std::string& scene) {
-      return compare_distances(scene, *arguments.distances_within, arguments.repeats);
+    return run_without_file(arguments, "--distance", [&](const std::string& scene) {
+      return report_of(compare_distances(scene, *arguments.distances_within, arguments.repeats));
     });
   }
   if (arguments.impacts_within) {
-    return run_scenes(arguments, "--impact", [&](const std::string& scene) {
-      return compare_impacts(scene, *arguments.impacts_within, arguments.repeats);
+    return run_without_file(arguments, "--impact", [&](const std::string& scene) {
+      return report_of(compare_impacts(scene, *arguments.impacts_within, arguments.repeats));
     });
   }
-  if (!arguments.out.empty()) {
-    keep_inputs(arguments.out, arguments.scenes);
-    try_output(arguments.out);
-  }
+  check_output(arguments, arguments.scenes);
   const char* commit = std::getenv("TANDEM_COMMIT");
   CompareResults results = {processor(), commit == nullptr ? "" : commit, arguments.repeats, {}};
-  for (const std::string& scene : arguments.scenes) {
+  Json scenes = compare_scenes(arguments, "\n", [&](const std::string& scene) {
     results.scenes.push_back(
         compare(scene, make_peers(ContactOptions(), arguments.engines), arguments.repeats));
-    if (arguments.json) continue;
-    std::printf("%s%s", results.scenes.size() > 1 ? "\n" : "", to_text(results.scenes.back()).c_str());
-    std::fflush(stdout);
-  }
-  if (!arguments.out.empty()) write_results(arguments.out, results);
-  if (arguments.json) std::puts(pretty(to_json(results)).c_str());
+    return report_of(results.scenes.back());
+  });
+  if (!arguments.output.empty()) write_results(arguments.output, results);
+  Report report;
+  report.add({{"machine", results.machine},
+              {"commit", or_null(results.commit)},
+              {"repeats", results.repeats},
+              {"scenes", std::move(scenes)}});
+  print(arguments, report);
   return kDone;
 }
 
 }  // namespace
 
-CLI::App* add_compare(CLI::App& app, Run& run) {
-  CLI::App* command =
-      app.add_subcommand("compare", "run scenes through Tandem and other libraries, side by side");
-  const auto arguments = std::make_shared<CompareArguments>();
-  command->add_option("SCENE", arguments->scenes, "scene files, .h5")->required()->check(file_name());
-  command->add_option("--peers", arguments->engines, "engines, all unless given")
-      ->delimiter(',')
-      ->check(CLI::IsMember(peer_names()))
-      ->option_text(join(peer_names()));
-  command->add_option("--repeat", arguments->repeats, "timed queries of each")
-      ->check(CLI::Range(1u, 100000u))
-      ->option_text("N [5]");
-  command->add_option("--out", arguments->out, "write the results here, as HDF5")->check(file_name());
-  CLI::Option* distances = command
-                               ->add_option("--distance", arguments->distances_within,
-                                            "compare distances instead, of pairs that are apart and within D")
-                               ->check(between(0, std::numeric_limits<double>::infinity()))
-                               ->option_text("D");
-  command
-      ->add_option("--impact", arguments->impacts_within,
-                   "compare times of impact instead, of the scene's motions for T seconds")
-      ->check(between(1e-9, 1e9))
-      ->option_text("T")
-      ->excludes(distances);
-  command->add_flag("--json", arguments->json, "print JSON");
-  command->footer("Times are of one thread. docs/comparison.md says what is compared, and how.");
-  command->final_callback([arguments, &run] { run = [arguments] { return run_compare(*arguments); }; });
-  return command;
+void add_compare(CLI::App& app, Run& run_later) {
+  const auto [command, arguments] = add_command<CompareArguments>(
+      app, run_later, "compare", "run scenes through Tandem and other libraries, side by side", run_compare);
+  add_options(command,
+              {required({"SCENE", arguments.scenes, "", "scene files, .h5", file_name()}),
+               {"--peers", arguments.engines, join(peer_names()), "engines, all unless given",
+                CLI::IsMember(peer_names())},
+               {"--repeat", arguments.repeats, "N [5]", "timed queries of each", CLI::Range(1u, 100000u)},
+               output_option(arguments, "write the results here, as HDF5"),
+               {"--distance", arguments.distances_within, "D",
+                "compare distances instead, of pairs that are apart and within D",
+                between(0, std::numeric_limits<double>::infinity())},
+               {"--impact", arguments.impacts_within, "T",
+                "compare times of impact instead, of the scene's motions for T seconds", between(1e-9, 1e9)},
+               {"--json", arguments.json, "print JSON"}});
+  command.get_option("--peers")->delimiter(',');
+  command.get_option("--impact")->excludes(command.get_option("--distance"));
+  command.footer("Times are of one thread. docs/comparison.md says what is compared, and how.");
 }
 
 }  // namespace tandem::bench

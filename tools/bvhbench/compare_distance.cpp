@@ -1,7 +1,6 @@
 #include "compare_distance.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 
 #include "bvhbench/engines/registry.h"
@@ -82,42 +81,35 @@ DistanceComparison compare_distances(const std::string& path, double reach, unsi
   return out;
 }
 
-std::string to_text(const DistanceComparison& comparison) {
-  char line[200];
-  std::snprintf(line, sizeof line, "%s: %s instances, %s pairs apart and within %g\n",
-                comparison.name.c_str(), with_commas(comparison.instances).c_str(),
-                with_commas(comparison.object_pairs).c_str(), comparison.reach);
-  std::string out = line;
-  for (const DistancePeer& peer : comparison.peers) {
-    const double best = best_of(peer.query_seconds);
-    std::snprintf(line, sizeof line, "  %-12s %10.3f ms  %8.2f times  error %.1e  built in %.3f s\n",
-                  peer.name.c_str(), 1e3 * best, best / best_of(comparison.peers[0].query_seconds),
-                  peer.worst_error, peer.build_seconds);
-    out += line;
-    if (!peer.outside) continue;
-    std::snprintf(line, sizeof line, "  %-12s %s of Tandem's intervals do not hold its exact distance\n", "",
-                  with_commas(*peer.outside).c_str());
-    out += line;
-  }
-  return out;
-}
-
-Json to_json(const DistanceComparison& comparison) {
+Report report_of(const DistanceComparison& comparison) {
+  Report report;
+  report.line(format("%s: %s instances, %s pairs apart and within %g", comparison.name.c_str(),
+                     with_commas(comparison.instances).c_str(), with_commas(comparison.object_pairs).c_str(),
+                     comparison.reach));
   Json peers = Json::array();
   for (const DistancePeer& peer : comparison.peers) {
+    const double best = best_of(peer.query_seconds);
+    report.line(format("  %-12s %10.3f ms  %8.2f times  error %.1e  built in %.3f s", peer.name.c_str(),
+                       1e3 * best, best / best_of(comparison.peers[0].query_seconds), peer.worst_error,
+                       peer.build_seconds));
+    if (peer.outside) {
+      report.line(format("  %-12s %s of Tandem's intervals do not hold its exact distance", "",
+                         with_commas(*peer.outside).c_str()));
+    }
     peers.push_back({{"name", peer.name},
                      {"settings", peer.settings},
                      {"build_seconds", peer.build_seconds},
-                     {"best_seconds", best_of(peer.query_seconds)},
+                     {"best_seconds", best},
                      {"median_seconds", median_of(peer.query_seconds)},
                      {"worst_error", peer.worst_error},
-                     {"outside", peer.outside ? Json(*peer.outside) : Json()}});
+                     {"outside", or_null(peer.outside)}});
   }
-  return {{"scene", comparison.name},
-          {"reach", comparison.reach},
-          {"instances", comparison.instances},
-          {"object_pairs", comparison.object_pairs},
-          {"peers", peers}};
+  report.add({{"scene", comparison.name},
+              {"reach", comparison.reach},
+              {"instances", comparison.instances},
+              {"object_pairs", comparison.object_pairs},
+              {"peers", std::move(peers)}});
+  return report;
 }
 
 }  // namespace tandem::bench

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "common/json.h"
+#include "common/report.h"
 #include "timed_work.h"
 
 namespace tandem::bench {
@@ -32,7 +32,7 @@ struct DistanceComparison {
 /// Throws FileError of a scene that cannot be compared, std::runtime_error of a library.
 DistanceComparison compare_distances(const std::string& path, double reach, unsigned repeats);
 
-std::string to_text(const DistanceComparison& comparison);
-Json to_json(const DistanceComparison& comparison);
+/// In the text a line for each library.
+Report report_of(const DistanceComparison& comparison);
 
 }  // namespace tandem::bench

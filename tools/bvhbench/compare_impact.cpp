@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 
 #include "bvhbench/engines/registry.h"
@@ -151,36 +150,26 @@ ImpactComparison compare_impacts(const std::string& path, double duration, unsig
   return out;
 }
 
-std::string to_text(const ImpactComparison& comparison) {
-  char line[240];
-  std::snprintf(line, sizeof line,
-                "%s: %s instances move for %g s, %s pairs: %s touch already, %s stop, of which %s meet\n",
-                comparison.name.c_str(), with_commas(comparison.instances).c_str(), comparison.duration,
-                with_commas(comparison.object_pairs).c_str(), with_commas(comparison.at_start).c_str(),
-                with_commas(comparison.stopped).c_str(), with_commas(comparison.in_contact).c_str());
-  std::string out = line;
-  for (const ImpactPeer& peer : comparison.peers) {
-    const double best = best_of(peer.query_seconds);
-    std::snprintf(
-        line, sizeof line,
-        "  %-14s %10.3f ms %8.2f times %7s found %6s missed %6s late by %.0e %6s invented, early by "
-        "%.0e, at most %.0e\n",
-        peer.name.c_str(), 1e3 * best, best / best_of(comparison.peers[0].query_seconds),
-        with_commas(peer.found).c_str(), with_commas(peer.missed).c_str(), with_commas(peer.late).c_str(),
-        peer.most_late, with_commas(peer.invented).c_str(), peer.median_early, peer.most_early);
-    out += line;
-  }
-  return out;
-}
-
-Json to_json(const ImpactComparison& comparison) {
+Report report_of(const ImpactComparison& comparison) {
+  Report report;
+  report.line(format("%s: %s instances move for %g s, %s pairs: %s touch already, %s stop, of which %s meet",
+                     comparison.name.c_str(), with_commas(comparison.instances).c_str(), comparison.duration,
+                     with_commas(comparison.object_pairs).c_str(), with_commas(comparison.at_start).c_str(),
+                     with_commas(comparison.stopped).c_str(), with_commas(comparison.in_contact).c_str()));
   Json peers = Json::array();
   for (const ImpactPeer& peer : comparison.peers) {
+    const double best = best_of(peer.query_seconds);
+    report.line(format(
+        "  %-14s %10.3f ms %8.2f times %7s found %6s missed %6s late by %.0e %6s invented, early by %.0e, at "
+        "most %.0e",
+        peer.name.c_str(), 1e3 * best, best / best_of(comparison.peers[0].query_seconds),
+        with_commas(peer.found).c_str(), with_commas(peer.missed).c_str(), with_commas(peer.late).c_str(),
+        peer.most_late, with_commas(peer.invented).c_str(), peer.median_early, peer.most_early));
     peers.push_back({{"name", peer.name},
                      {"settings", peer.settings},
                      {"build_seconds", peer.build_seconds},
                      {"update_seconds", peer.update_seconds},
-                     {"best_seconds", best_of(peer.query_seconds)},
+                     {"best_seconds", best},
                      {"median_seconds", median_of(peer.query_seconds)},
                      {"found", peer.found},
                      {"missed", peer.missed},
@@ -190,14 +179,15 @@ Json to_json(const ImpactComparison& comparison) {
                      {"most_early", peer.most_early},
                      {"most_late", peer.most_late}});
   }
-  return {{"scene", comparison.name},
-          {"dt", comparison.duration},
-          {"instances", comparison.instances},
-          {"object_pairs", comparison.object_pairs},
-          {"at_start", comparison.at_start},
-          {"stopped", comparison.stopped},
-          {"in_contact", comparison.in_contact},
-          {"peers", peers}};
+  report.add({{"scene", comparison.name},
+              {"dt", comparison.duration},
+              {"instances", comparison.instances},
+              {"object_pairs", comparison.object_pairs},
+              {"at_start", comparison.at_start},
+              {"stopped", comparison.stopped},
+              {"in_contact", comparison.in_contact},
+              {"peers", std::move(peers)}});
+  return report;
 }
 
 }  // namespace tandem::bench

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "common/json.h"
+#include "common/report.h"
 #include "timed_work.h"
 
 namespace tandem::bench {
@@ -35,7 +35,7 @@ struct ImpactComparison {
 /// cannot be compared, std::runtime_error of a library.
 ImpactComparison compare_impacts(const std::string& path, double duration, unsigned repeats);
 
-std::string to_text(const ImpactComparison& comparison);
-Json to_json(const ImpactComparison& comparison);
+/// In the text a line for each library.
+Report report_of(const ImpactComparison& comparison);
 
 }  // namespace tandem::bench

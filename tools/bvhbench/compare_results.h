@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "common/json.h"
+#include "common/report.h"
 #include "compare.h"
 
 namespace tandem::bench {
@@ -15,11 +15,8 @@ struct CompareResults {
   std::vector<SceneComparison> scenes;
 };
 
-/// Under the stable keys of docs/comparison.md.
-Json to_json(const CompareResults& results);
-
-/// A table for people.
-std::string to_text(const SceneComparison& comparison);
+/// In JSON the stable keys of docs/comparison.md, in the text a table for people.
+Report report_of(const SceneComparison& comparison);
 
 /// Writes the HDF5 file of docs/comparison.md, whole or not at all. Throws OutputError.
 void write_results(const std::string& path, const CompareResults& results);

@@ -1,14 +1,9 @@
-#include "economy_command.h"
-
 #include <tbb/global_control.h>
 
 #include <charconv>
 #include <cmath>
-#include <cstdio>
-#include <memory>
-#include <thread>
+#include <filesystem>
 
-#include "backend.h"
 #include "bvhbench/economy/choice.h"
 #include "bvhbench/scenes/hdf5_file.h"
 #include "bvhbench/scenes/scene_motion.h"
@@ -114,31 +109,18 @@ EconomyResult measure(const EconomyArguments& arguments, LevelMeasurer& measurer
   return result;
 }
 
-EconomyResult result_of(const EconomyArguments& arguments, LevelMeasurer& measurer) {
-  try {
-    return measure(arguments, measurer);
-  } catch (const EngineError& error) {
-    if (error.status == Status::kNoTopology)
-      throw FileError(arguments.scene + ": " + measurer.scene().name_of(error.where) + ": " +
-                      explain(error.status));
-    refuse(arguments.scene, error.status, error.where);
-  } catch (const GpuError& error) {
-    refuse_gpu(arguments.scene, error);
-  }
-}
-
 // Writes the measured scene, with all that docs/scenes.md knows, at these levels.
 void write_at_levels(const EconomyArguments& arguments, const LevelMeasurer& measurer,
                      const SceneMotion& motion, const Levels& levels) {
   SceneDescription scene = measurer.scene().description;
   const auto folder = std::filesystem::path(arguments.scene).parent_path();
-  for (std::string& asset : scene.assets) asset = seen_from(arguments.apply, (folder / asset).string());
+  for (std::string& asset : scene.assets) asset = seen_from(arguments.output, (folder / asset).string());
   scene.level.clear();
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     scene.instances[i].asset = measurer.asset_of()[i];
     scene.level.push_back(levels[scene.instances[i].asset]);
   }
-  Hdf5Output file(arguments.apply);
+  Hdf5Output file(arguments.output);
   add_scene(file, scene);
   add_motion(file, motion);
   file.write();
@@ -146,84 +128,58 @@ void write_at_levels(const EconomyArguments& arguments, const LevelMeasurer& mea
 
 // What is wrong with a budget that even the cheapest levels exceed.
 std::string excess_of(const EconomyArguments& arguments, const Measures& cheapest) {
-  char text[128];
-  if (arguments.bytes) {
-    std::snprintf(text, sizeof text, "--memory %s: the cheapest levels take %s bytes",
-                  with_commas(*arguments.bytes).c_str(), with_commas(memory_of(cheapest)).c_str());
-  } else {
-    std::snprintf(text, sizeof text, "--time %g: the cheapest levels take %g ms", *arguments.milliseconds,
-                  1e3 * seconds_of(cheapest));
-  }
-  return text + std::string(arguments.apply.empty() ? "" : "; " + arguments.apply + " is not written");
+  const std::string text = arguments.bytes
+                               ? "--memory " + with_commas(*arguments.bytes) + ": the cheapest levels take " +
+                                     with_commas(memory_of(cheapest)) + " bytes"
+                               : format("--time %g: the cheapest levels take %g ms", *arguments.milliseconds,
+                                        1e3 * seconds_of(cheapest));
+  return text + (arguments.output.empty() ? "" : "; " + arguments.output + " is not written");
 }
 
 ExitCode run(const EconomyArguments& arguments) {
-  LevelMeasurer measurer(arguments.scene, arguments.settings);
-  if (measurer.scene().description.instances.empty())
-    throw FileError(arguments.scene + ": /instances: there is none");
+  const economy::MeasureSettings settings = {arguments.on_gpu() ? "tandem-cuda" : "tandem",
+                                             arguments.threads(), arguments.repeats,
+                                             arguments.simulated_seconds};
+  LevelMeasurer measurer(arguments.scene, settings);
+  const LoadedScene& scene = measurer.scene();
+  if (scene.description.instances.empty()) throw FileError(arguments.scene + ": /instances: there is none");
   SceneMotion motion;  // read now: the file may be another when all is measured
-  if (!arguments.apply.empty()) {
-    motion = read_motion(arguments.scene, measurer.asset_of().size());
-    keep_inputs(arguments.apply, files_of(arguments.scene, measurer.scene()));
-    try_output(arguments.apply);
-  }
-  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, arguments.settings.threads);
-  const EconomyResult result = result_of(arguments, measurer);
-  if (!arguments.apply.empty() && result.within)
+  if (!arguments.output.empty()) motion = read_motion(arguments.scene, measurer.asset_of().size());
+  check_output(arguments, files_of(arguments.scene, scene));
+  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, settings.threads);
+  const EconomyResult result =
+      answer_of(arguments.scene, scene, [&] { return measure(arguments, measurer); });
+  if (!arguments.output.empty() && result.within)
     write_at_levels(arguments, measurer, motion, result.recommended.levels);
-  if (arguments.json) {
-    std::puts(pretty(to_json(arguments, result)).c_str());
-  } else {
-    print(arguments, result);
-  }
+  print(arguments, report_of(arguments, result));
   if (!result.within) throw UsageError(arguments.scene + ": " + excess_of(arguments, result.recommended));
   return kDone;
 }
 
 }  // namespace
 
-CLI::App* add_economy(CLI::App& app, Run& run_later) {
-  const auto arguments = std::make_shared<EconomyArguments>();
-  economy::MeasureSettings& settings = arguments->settings;
-  settings.threads = std::max(1u, std::thread::hardware_concurrency());
-  settings.repeats = 3;
-  CLI::App* command = app.add_subcommand("economy", "find out which levels of detail are enough for a scene");
-  command->add_option("SCENE", arguments->scene, "scene file (HDF5)")->required()->check(file_name());
-  CLI::Option_group* limit = command->add_option_group("limit");
+void add_economy(CLI::App& app, Run& run_later) {
+  const auto [command, arguments] = add_command<EconomyArguments>(
+      app, run_later, "economy", "find out which levels of detail are enough for a scene", run);
+  add_options(command, {scene_argument(arguments)});
+  CLI::Option_group* limit = command.add_option_group("limit");
   limit->require_option(1);
-  limit
-      ->add_option_function<std::string>(
-          "--tolerance", [=](const std::string& text) { parse_tolerance(text, *arguments); },
-          "by how much surfaces may be off, proved, and depths, measured")
-      ->option_text("LENGTH|PERCENT%");
-  limit->add_option("--time", arguments->milliseconds, "for query and manifolds, or with --simulate a step")
-      ->check(between(0, 1e9))
-      ->option_text("MS");
-  limit
-      ->add_option("--memory", arguments->bytes,
-                   "for the levels of all assets, or all that a GPU query takes")
-      ->transform(CLI::AsSizeValue(false))
-      ->option_text("BYTES");
-  command
-      ->add_option("--simulate", settings.simulated_seconds,
-                   "also let bodies move, so long, and compare where they end")
-      ->check(between(0, 1e6))
-      ->option_text("SECONDS [0]");
-  add_backend(*command, arguments->backend);
-  command->add_option("--threads", settings.threads, "threads; what is found does not depend on them")
-      ->check(CLI::Range(1u, kMostSceneThreads))
-      ->option_text("N [all]");
-  command->add_option("--repeat", settings.repeats, "times to run each query, for its timing")
-      ->check(CLI::Range(1, 1000000))
-      ->option_text("N [3]");
-  command->add_option("--apply", arguments->apply, "the scene file to write, with the recommended levels")
-      ->check(file_name());
-  command->add_flag("--json", arguments->json, "print the results as JSON");
-  command->final_callback([arguments, &run_later] {
-    if (arguments->backend == "cuda") arguments->settings.engine = "tandem-cuda";
-    run_later = [arguments] { return run(*arguments); };
-  });
-  return command;
+  add_options(*limit,
+              {{"--tolerance", [&told = arguments](const std::string& text) { parse_tolerance(text, told); },
+                "LENGTH|PERCENT%", "by how much surfaces may be off, proved, and depths, measured"},
+               {"--time", arguments.milliseconds, "MS", "for query and manifolds, or with --simulate a step",
+                between(0, 1e9)},
+               {"--memory", arguments.bytes, "BYTES",
+                "for the levels of all assets, or all that a GPU query takes"}});
+  limit->get_option("--memory")->transform(CLI::AsSizeValue(false));
+  add_options(command,
+              {{"--simulate", arguments.simulated_seconds, "SECONDS [0]",
+                "also let bodies move, so long, and compare where they end", between(0, 1e6)},
+               backend_option(arguments),
+               threads_option(arguments, "what is found does"),
+               repeat_option(arguments, "each query"),
+               output_option(arguments, "the scene file to write, with the recommended levels", "--apply"),
+               json_option(arguments, "the results")});
 }
 
 }  // namespace tandem::bench

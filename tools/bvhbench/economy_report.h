@@ -4,19 +4,19 @@
 #include <vector>
 
 #include "bvhbench/economy/measure.h"
-#include "common/json.h"
+#include "command.h"
 
 namespace tandem::bench {
 
 /// What `bvhbench economy` was asked: one of the three limits.
-struct EconomyArguments {
-  std::string scene, backend = "cpu", apply;
+struct EconomyArguments : CommonArguments {
+  EconomyArguments() { repeats = 3; }
+
   std::optional<double> tolerance;     ///< a length, or a part of diagonals
   bool relative = false;               ///< which of these
   std::optional<double> milliseconds;  ///< of query and manifolds, or of a simulated step
   std::optional<std::uint64_t> bytes;  ///< of all levels, or of GPU memory
-  economy::MeasureSettings settings;
-  bool json = false;
+  double simulated_seconds = 0;        ///< 0: nothing is simulated
 };
 
 /// What was found of one asset.
@@ -44,9 +44,7 @@ double seconds_of(const economy::Measures& measures);
 /// Of the query on the GPU, or else of the levels.
 std::uint64_t memory_of(const economy::Measures& measures);
 
-Json to_json(const EconomyArguments& arguments, const EconomyResult& result);
-
-/// For people: a table of each asset, and what is recommended and lost by it.
-void print(const EconomyArguments& arguments, const EconomyResult& result);
+/// In the text a table of each asset, and what is recommended and lost by it.
+Report report_of(const EconomyArguments& arguments, const EconomyResult& result);
 
 }  // namespace tandem::bench

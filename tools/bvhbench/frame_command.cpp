@@ -1,18 +1,15 @@
-#include "frame_command.h"
-
 #include <cstdio>
 #include <filesystem>
-#include <memory>
 
-#include "bvhbench/scenes/scene_file.h"
 #include "bvhbench/simulator/run_file.h"
+#include "command.h"
 #include "common/number_words.h"
 
 namespace tandem::bench {
 namespace {
 
-struct FrameArguments {
-  std::string run, output;
+struct FrameArguments : CommonArguments {
+  std::string run;
   std::uint32_t frame = 0;
 };
 
@@ -34,21 +31,14 @@ ExitCode run(const FrameArguments& arguments) {
 
 }  // namespace
 
-CLI::App* add_frame(CLI::App& app, Run& run_later) {
-  const auto arguments = std::make_shared<FrameArguments>();
-  CLI::App* command = app.add_subcommand("frame", "save a kept state of a simulation as a scene file");
-  command->add_option("RUN", arguments->run, "file of a simulation with a trajectory")
-      ->required()
-      ->check(file_name());
-  command->add_option("--frame", arguments->frame, "steps made before the state; 0: the start")
-      ->required()
-      ->option_text("K");
-  command
-      ->add_option("-o,--output", arguments->output, "the scene file to write; appears whole or not at all")
-      ->required()
-      ->check(file_name());
-  command->final_callback([arguments, &run_later] { run_later = [arguments] { return run(*arguments); }; });
-  return command;
+void add_frame(CLI::App& app, Run& run_later) {
+  const auto [command, arguments] = add_command<FrameArguments>(
+      app, run_later, "frame", "save a kept state of a simulation as a scene file", run);
+  add_options(command,
+              {required({"RUN", arguments.run, "", "file of a simulation with a trajectory", file_name()}),
+               required({"--frame", arguments.frame, "K", "steps made before the state; 0: the start"}),
+               required(output_option(arguments, "the scene file to write; appears whole or not at all",
+                                      "-o,--output"))});
 }
 
 }  // namespace tandem::bench

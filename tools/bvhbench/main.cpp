@@ -8,15 +8,6 @@
 #include "command.h"
 #include "common/option_helpers.h"
 #include "common/printable.h"
-#include "compare_command.h"
-#include "distance_command.h"
-#include "economy_command.h"
-#include "frame_command.h"
-#include "impact_command.h"
-#include "poses_command.h"
-#include "query_command.h"
-#include "scene_command.h"
-#include "simulate_command.h"
 
 namespace {
 
@@ -61,7 +52,6 @@ int main(int argc, char** argv) {
   app.footer(kFooter);
   app.require_subcommand(1);
   Run run;
-  // Each subcommand is a header and a line here.
   add_scene(app, run);
   add_query(app, run);
   add_impact(app, run);

@@ -1,13 +1,8 @@
-#include "poses_command.h"
-
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
-#include <memory>
-#include <thread>
 
 #include "bvhbench/scenes/hdf5_file.h"
-#include "common/json.h"
+#include "command.h"
 #include "common/number_words.h"
 #include "parallel/parallel.h"
 #include "pose_work.h"
@@ -18,16 +13,27 @@ namespace {
 const std::map<std::string, PoseSet> kSets = {{"training", PoseSet::training},
                                               {"validation", PoseSet::validation}};
 
-struct PosesArguments {
+struct PosesArguments : CommonArguments {
   std::vector<std::string> trees;
-  std::string with, poses, output;
+  std::string with, poses;
   std::uint32_t count = 1000;
   std::uint64_t seed = 1;
   PoseSet set = PoseSet::validation;
-  std::uint32_t threads = 1;
-  bool json = false;
+};
 
-  std::string set_name() const { return set == PoseSet::training ? "training" : "validation"; }
+// What is counted in each pose.
+struct PoseCounter {
+  const char *key, *label;  // label: in the text; null: it is in JSON alone
+  std::vector<std::uint32_t> PoseWork::*column;
+  double unit;  // by which the column is multiplied
+};
+constexpr PoseCounter kCounters[] = {
+    {"block_pairs", "block pairs", &PoseWork::block_pairs, 1},
+    {"box_tests", nullptr, &PoseWork::block_pairs, kNodesPerBlock* kNodesPerBlock},
+    {"candidates", "candidates", &PoseWork::candidates, 1},
+    {"oriented_block_pairs", "oriented block pairs", &PoseWork::oriented_block_pairs, 1},
+    {"oriented_candidates", "oriented candidates", &PoseWork::oriented_candidates, 1},
+    {"contacts", "contacts", &PoseWork::contacts, 1},
 };
 
 // The trees in the order given, and the second body, if it is not the tree itself.
@@ -63,7 +69,7 @@ Poses make(const PosesArguments& arguments, const Bodies& bodies) {
     poses.of_b.push_back(pose.b);
     poses.notes.depth.push_back(pose.depth);
   }
-  poses.notes.stream = {arguments.set_name(), std::to_string(arguments.seed)};
+  poses.notes.stream = {name_of(arguments.set, kSets), std::to_string(arguments.seed)};
   poses.notes.geometry = {hexadecimal(geometry_hash(a.view))};
   if (bodies.with) poses.notes.geometry.push_back(hexadecimal(geometry_hash(bodies.with->view)));
   return poses;
@@ -128,24 +134,16 @@ void write(const std::string& path, const Bodies& bodies, const Poses& poses,
   std::vector<std::string> names;
   for (const NamedAsset& tree : bodies.trees) names.push_back(seen_from(path, tree.path));
   file.add("/counts/trees", names);
-  const auto add = [&](const char* name, std::vector<std::uint32_t> PoseWork::*column) {
+  for (const auto& [key, label, column, unit] : kCounters) {
+    if (label == nullptr) continue;
     std::vector<std::uint32_t> all;
     for (const PoseWork& of_tree : work) {
       all.insert(all.end(), (of_tree.*column).begin(), (of_tree.*column).end());
       all.resize(all.size() + poses.of_b.size() - (of_tree.*column).size());
     }
-    file.add(name, {work.size(), poses.of_b.size()}, all);
-  };
-  add("/counts/block_pairs", &PoseWork::block_pairs);
-  add("/counts/candidates", &PoseWork::candidates);
-  add("/counts/oriented_block_pairs", &PoseWork::oriented_block_pairs);
-  add("/counts/oriented_candidates", &PoseWork::oriented_candidates);
-  add("/counts/contacts", &PoseWork::contacts);
+    file.add(std::string("/counts/") + key, {work.size(), poses.of_b.size()}, all);
+  }
   file.write();
-}
-
-Json number(double value) {
-  return std::isfinite(value) ? Json(value) : Json();
 }
 
 Json to_json(const std::vector<std::uint32_t>& values, const std::vector<std::uint32_t>& base, double unit) {
@@ -153,68 +151,53 @@ Json to_json(const std::vector<std::uint32_t>& values, const std::vector<std::ui
   const Spread spread = spread_of(values);
   const Ratio ratio = ratio_of(values, base);
   return {{"mean", unit * spread.mean},
-          {"standard_error", number(unit * spread.standard_error)},
+          {"standard_error", unit * spread.standard_error},
           {"quartiles", {unit * spread.lower_quartile, unit * spread.median, unit * spread.upper_quartile}},
-          {"ratio", number(ratio.value)},
-          {"ratio_standard_error", number(ratio.standard_error)}};
+          {"ratio", ratio.value},
+          {"ratio_standard_error", ratio.standard_error}};
 }
 
-void print_json(const PosesArguments& arguments, const Bodies& bodies, const Poses& poses,
-                const std::vector<PoseWork>& work) {
-  constexpr double kBoxTests = kNodesPerBlock * kNodesPerBlock;
-  const auto or_null = [](const std::string& text) { return text.empty() ? Json() : Json(text); };
+std::string to_text(const char* label, const std::vector<std::uint32_t>& values,
+                    const std::vector<std::uint32_t>& base) {
+  if (values.empty()) return format("%-20s %11s", label, "-");
+  const Spread spread = spread_of(values);
+  const std::string text =
+      format("%-20s %11.1f  %8.1f  %9.0f %9.0f %9.0f", label, spread.mean, spread.standard_error,
+             spread.lower_quartile, spread.median, spread.upper_quartile);
+  const Ratio ratio = ratio_of(values, base);
+  if (&values == &base || !std::isfinite(ratio.value)) return text;
+  return text + format("   x%.3f  %.3f", ratio.value, ratio.standard_error);
+}
+
+Report report_of(const PosesArguments& arguments, const Bodies& bodies, const Poses& poses,
+                 const std::vector<PoseWork>& work) {
+  const std::string &set = poses.notes.stream[0], &seed = poses.notes.stream[1];
+  Report report;
+  report.line(with_commas(poses.of_b.size()) + " " + set + " poses near contact, seed " + seed +
+              (bodies.with ? ", with " + bodies.with->path : ""));
+  report.add({{"tool", "bvhbench poses"},
+              {"version", TANDEM_VERSION},
+              {"poses", or_null(arguments.poses)},
+              {"output", or_null(arguments.output)},
+              {"with", bodies.with ? Json(bodies.with->path) : Json()},
+              {"set", set},
+              {"seed", seed},
+              {"count", poses.of_b.size()}});
+  report.line(format("%-22s %11s  %8s  %9s %9s %9s%s", "", "mean", "error", "quarter", "median", "3 quarters",
+                     work.size() > 1 ? "  to the first  error" : ""));
   Json trees = Json::array();
   for (std::size_t i = 0; i < work.size(); ++i) {
-    trees.push_back(
-        {{"file", bodies.trees[i].path},
-         {"triangles", bodies.trees[i].view.level().triangle_count},
-         {"block_pairs", to_json(work[i].block_pairs, work[0].block_pairs, 1)},
-         {"box_tests", to_json(work[i].block_pairs, work[0].block_pairs, kBoxTests)},
-         {"candidates", to_json(work[i].candidates, work[0].candidates, 1)},
-         {"oriented_block_pairs", to_json(work[i].oriented_block_pairs, work[0].oriented_block_pairs, 1)},
-         {"oriented_candidates", to_json(work[i].oriented_candidates, work[0].oriented_candidates, 1)},
-         {"contacts", to_json(work[i].contacts, work[0].contacts, 1)}});
+    Json& tree = trees.emplace_back(
+        Json{{"file", bodies.trees[i].path}, {"triangles", bodies.trees[i].view.level().triangle_count}});
+    report.line(bodies.trees[i].path);
+    for (const auto& [key, label, column, unit] : kCounters) {
+      const std::vector<std::uint32_t>&values = work[i].*column, &base = work[0].*column;
+      tree[key] = to_json(values, base, unit);
+      if (label != nullptr) report.line("  " + to_text(label, values, base));
+    }
   }
-  const Json json = {{"tool", "bvhbench poses"},
-                     {"version", TANDEM_VERSION},
-                     {"poses", or_null(arguments.poses)},
-                     {"output", or_null(arguments.output)},
-                     {"with", bodies.with ? Json(bodies.with->path) : Json()},
-                     {"set", poses.notes.stream[0]},
-                     {"seed", poses.notes.stream[1]},
-                     {"count", poses.of_b.size()},
-                     {"trees", trees}};
-  std::puts(pretty(json).c_str());
-}
-
-void print_counter(const char* name, const std::vector<std::uint32_t>& values,
-                   const std::vector<std::uint32_t>& base, bool first) {
-  if (values.empty()) {
-    std::printf("  %-20s %11s\n", name, "-");
-    return;
-  }
-  const Spread spread = spread_of(values);
-  std::printf("  %-20s %11.1f  %8.1f  %9.0f %9.0f %9.0f", name, spread.mean, spread.standard_error,
-              spread.lower_quartile, spread.median, spread.upper_quartile);
-  const Ratio ratio = ratio_of(values, base);
-  if (!first && std::isfinite(ratio.value)) std::printf("   x%.3f  %.3f", ratio.value, ratio.standard_error);
-  std::puts("");
-}
-
-void print_text(const Bodies& bodies, const Poses& poses, const std::vector<PoseWork>& work) {
-  std::printf("%s %s poses near contact, seed %s%s%s\n", with_commas(poses.of_b.size()).c_str(),
-              poses.notes.stream[0].c_str(), poses.notes.stream[1].c_str(), bodies.with ? ", with " : "",
-              bodies.with ? bodies.with->path.c_str() : "");
-  std::printf("%-22s %11s  %8s  %9s %9s %9s%s\n", "", "mean", "error", "quarter", "median", "3 quarters",
-              work.size() > 1 ? "  to the first  error" : "");
-  for (std::size_t i = 0; i < work.size(); ++i) {
-    std::printf("%s\n", bodies.trees[i].path.c_str());
-    print_counter("block pairs", work[i].block_pairs, work[0].block_pairs, i == 0);
-    print_counter("candidates", work[i].candidates, work[0].candidates, i == 0);
-    print_counter("oriented block pairs", work[i].oriented_block_pairs, work[0].oriented_block_pairs, i == 0);
-    print_counter("oriented candidates", work[i].oriented_candidates, work[0].oriented_candidates, i == 0);
-    print_counter("contacts", work[i].contacts, work[0].contacts, i == 0);
-  }
+  report.add("trees", std::move(trees));
+  return report;
 }
 
 ExitCode run(const PosesArguments& arguments) {
@@ -232,7 +215,7 @@ ExitCode run(const PosesArguments& arguments) {
   for (const std::string& path : arguments.trees) bodies.trees.push_back(bodies.open(path));
   if (!with.empty()) bodies.with = bodies.open(with);
 
-  const parallel::ThreadLimit limit(arguments.threads);
+  const parallel::ThreadLimit limit(arguments.threads());
   const Poses poses = arguments.poses.empty() ? make(arguments, bodies) : take(std::move(stored));
   const std::string from = arguments.poses.empty() ? bodies.trees[0].path : arguments.poses;
   for (const NamedAsset& tree : bodies.trees) check_geometry(tree, poses.notes.geometry[0], from);
@@ -246,44 +229,32 @@ ExitCode run(const PosesArguments& arguments) {
     }
   }
   if (!arguments.output.empty()) write(arguments.output, bodies, poses, work);
-  if (arguments.json) {
-    print_json(arguments, bodies, poses, work);
-  } else {
-    print_text(bodies, poses, work);
-  }
+  print(arguments, report_of(arguments, bodies, poses, work));
   return kDone;
 }
 
 }  // namespace
 
-CLI::App* add_poses(CLI::App& app, Run& run_later) {
-  const auto arguments = std::make_shared<PosesArguments>();
-  arguments->threads = std::max(1u, std::thread::hardware_concurrency());
-  CLI::App* command =
-      app.add_subcommand("poses", "measure trees by the work of queries in random poses near contact");
-  command->add_option("TREE", arguments->trees, ".bvh files over one mesh, measured in the same poses")
-      ->required()
-      ->check(file_name());
-  command->add_option("--with", arguments->with, ".bvh file of the second body [the tree itself]")
-      ->check(file_name());
-  CLI::Option* poses =
-      command->add_option("--poses", arguments->poses, "take the poses of this file, which -o wrote")
-          ->check(file_name());
-  const auto add = [&](CLI::Option* option, const char* text) { option->option_text(text)->excludes(poses); };
-  add(command->add_option("--count", arguments->count, "poses")->check(CLI::Range(1, 1'000'000)), "N [1000]");
-  add(command->add_option("--seed", arguments->seed, "other poses")->check(CLI::NonNegativeNumber), "N [1]");
-  add(add_choice(*command, "--set", kSets, arguments->set, "which of two streams, with nothing in common"),
-      "training|validation [validation]");
-  command->add_option("--threads", arguments->threads, "threads; the figures do not depend on them")
-      ->check(CLI::Range(1u, kMostSceneThreads))
-      ->option_text("N [all]");
-  command
-      ->add_option("-o,--output", arguments->output,
-                   "write the poses and each one's figures: a scene file; appears whole or not at all")
-      ->check(file_name());
-  command->add_flag("--json", arguments->json, "print the figures as JSON");
-  command->final_callback([arguments, &run_later] { run_later = [arguments] { return run(*arguments); }; });
-  return command;
+void add_poses(CLI::App& app, Run& run_later) {
+  const auto [command, arguments] = add_command<PosesArguments>(
+      app, run_later, "poses", "measure trees by the work of queries in random poses near contact", run);
+  add_options(
+      command,
+      {required({"TREE", arguments.trees, "", ".bvh files over one mesh, measured in the same poses",
+                 file_name()}),
+       {"--with", arguments.with, "", ".bvh file of the second body [the tree itself]", file_name()},
+       {"--poses", arguments.poses, "", "take the poses of this file, which -o wrote", file_name()},
+       {"--count", arguments.count, "N [1000]", "poses", CLI::Range(1, 1'000'000)},
+       seed_option(arguments.seed, "other poses"),
+       {"--set", arguments.set, kSets, "training|validation [validation]",
+        "which of two streams, with nothing in common"},
+       threads_option(arguments, "the figures do"),
+       output_option(arguments,
+                     "write the poses and each one's figures: a scene file; appears whole or not at all",
+                     "-o,--output"),
+       json_option(arguments, "the figures")});
+  for (const char* made : {"--count", "--seed", "--set"})
+    command.get_option(made)->excludes(command.get_option("--poses"));
 }
 
 }  // namespace tandem::bench

@@ -1,20 +1,10 @@
 #pragma once
-#include <cstdint>
-#include <string>
-
-#include "command.h"
+#include "question.h"
 
 namespace tandem::bench {
 
-/// What `bvhbench query --tolerance` was asked for.
-struct ToleranceArguments {
-  std::string scene, out, backend;
-  double tolerance;
-  std::uint32_t threads, repeats;
-  bool json;
-};
-
-/// Finds what is certain of the pairs of a scene, whose bodies stand for all their levels, and prints it.
-ExitCode run_tolerance(const ToleranceArguments& arguments);
+/// `bvhbench query --tolerance`: finds what is certain of the pairs of a scene, whose bodies stand for all
+/// their levels, writes the file that was asked for, and prints a report.
+ExitCode run_tolerance(const CommonArguments& arguments, double tolerance);
 
 }  // namespace tandem::bench

@@ -1,19 +1,16 @@
-#include "scene_command.h"
-
 #include <algorithm>
 #include <cstdio>
-#include <memory>
 
 #include "bvhbench/scenes/make_scene.h"
 #include "bvhbench/scenes/make_scene_parts.h"
-#include "bvhbench/scenes/scene_file.h"
+#include "command.h"
 #include "common/number_words.h"
 
 namespace tandem::bench {
 namespace {
 
-struct SceneArguments {
-  std::string mesh, ground, output;
+struct SceneArguments : CommonArguments {
+  std::string mesh, ground;
   std::uint32_t count = 0, fixed = 100'000, level = 0;
   double jitter = 0.001, neighbours = 6.5, spacing = 0.7, tilt = 20;
   bool exact = false;
@@ -79,69 +76,63 @@ ExitCode run(const SceneArguments& arguments, const Maker& make) {
 }
 
 // A subcommand for a kind of scene, with the options that all kinds have.
-CLI::App* add_kind(CLI::App& scene, Run& run_later, const std::shared_ptr<SceneArguments>& arguments,
-                   const char* kind, const char* help, std::uint32_t count, const Maker& make) {
-  CLI::App* command = scene.add_subcommand(kind, help);
-  command->add_option("--mesh", arguments->mesh, ".bvh file of the bodies")->required()->check(file_name());
-  command->add_option("--count", arguments->count, "how many")
-      ->check(CLI::Range(1, 10'000'000))
-      ->option_text("N [" + std::to_string(count) + "]");
-  command->add_option("--level", arguments->level, "of detail of the bodies; 0: the finest")
-      ->check(CLI::NonNegativeNumber)
-      ->option_text("N [0]");
-  command->add_option("--seed", arguments->seed, "another scene of the kind")
-      ->check(CLI::NonNegativeNumber)
-      ->option_text("N [1]");
-  command->add_option("--offset", arguments->offset, "added to every translation")
-      ->expected(3)
-      ->check(between(-1e300, 1e300))
-      ->option_text("X Y Z [0 0 0]");
-  command
-      ->add_option("-o,--output", arguments->output, "the scene file to write; appears whole or not at all")
-      ->required()
-      ->check(file_name());
-  command->final_callback([=, &run_later] {
-    if (arguments->count == 0) arguments->count = count;
-    run_later = [arguments, make] { return run(*arguments, make); };
-  });
-  return command;
+std::pair<CLI::App&, SceneArguments&> add_kind(CLI::App& scene, Run& run_later, const char* kind,
+                                               const char* help, std::uint32_t count, const Maker& make) {
+  const auto [command, arguments] = add_command<SceneArguments>(
+      scene, run_later, kind, help, [=](const SceneArguments& told) { return run(told, make); });
+  add_options(
+      command,
+      {mesh_option(arguments.mesh),
+       count_option(arguments.count, count),
+       {"--level", arguments.level, "N [0]", "of detail of the bodies; 0: the finest",
+        CLI::NonNegativeNumber},
+       seed_option(arguments.seed, "another scene of the kind"),
+       {"--offset", arguments.offset, "X Y Z [0 0 0]", "added to every translation", between(-1e300, 1e300)},
+       required(
+           output_option(arguments, "the scene file to write; appears whole or not at all", "-o,--output"))});
+  command.get_option("--offset")->expected(3);
+  return {command, arguments};
+}
+
+// The spacing of kinds on a lattice.
+OptionRow spacing_option(SceneArguments& arguments) {
+  return {"--spacing", arguments.spacing, "S [0.7]", "of the lattice, in lengths of the body's longest side",
+          between(0.01, 1000)};
 }
 
 }  // namespace
 
-CLI::App* add_scene(CLI::App& app, Run& run_later) {
-  const auto arguments = std::make_shared<SceneArguments>();
+void add_scene(CLI::App& app, Run& run_later) {
   CLI::App* scene = app.add_subcommand("scene", "make a scene file of many posed meshes");
   scene->require_subcommand(1);
   const auto add = [&](const char* kind, const char* help, std::uint32_t count, const Maker& make) {
-    return add_kind(*scene, run_later, arguments, kind, help, count, make);
+    return add_kind(*scene, run_later, kind, help, count, make);
   };
 
-  CLI::App* stack =
+  const auto [stack, stacked] =
       add("stack", "a cube of boxes, face to face", 1000, [](const auto& a, const Assets& assets) {
         return Bodies{make_stack(assets[0], root_above(a.count, 3), a.exact ? 0 : a.jitter, a.scene_seed())};
       });
-  stack->get_option("--count")->check(cube_of_a_whole_number());
-  stack->add_option("--jitter", arguments->jitter, "how far boxes are moved at most, in box lengths")
-      ->check(between(0, 0.5))
-      ->option_text("J [0.001]");
-  stack->add_flag("--exact", arguments->exact, "faces coincide exactly")
-      ->excludes(stack->get_option("--jitter"));
+  stack.get_option("--count")->check(cube_of_a_whole_number());
+  add_options(stack, {{"--jitter", stacked.jitter, "J [0.001]",
+                       "how far boxes are moved at most, in box lengths", between(0, 0.5)},
+                      {"--exact", stacked.exact, "faces coincide exactly"}});
+  stack.get_option("--exact")->excludes(stack.get_option("--jitter"));
 
-  CLI::App* pile = add("pile", "bodies at random rotations, close together", 1000,
-                       [](const auto& a, const Assets& assets) {
-                         return Bodies{make_pile(assets[0], a.count, a.neighbours, a.scene_seed())};
-                       });
-  pile->add_option("--neighbours", arguments->neighbours,
-                   "bodies whose world box meets that of a body, on average")
-      ->check(between(0.01, 1000))
-      ->option_text("N [6.5]");
+  const auto [pile, piled] = add("pile", "bodies at random rotations, close together", 1000,
+                                 [](const auto& a, const Assets& assets) {
+                                   return Bodies{make_pile(assets[0], a.count, a.neighbours, a.scene_seed())};
+                                 });
+  add_options(pile, {{"--neighbours", piled.neighbours, "N [6.5]",
+                      "bodies whose world box meets that of a body, on average", between(0.01, 1000)}});
 
-  CLI::App* lattice = add("lattice", "bodies at random rotations on a lattice of a given spacing", 1000,
-                          [](const auto& a, const Assets& assets) {
-                            return Bodies{make_lattice(assets[0], a.count, a.spacing, a.scene_seed())};
-                          });
-  CLI::App* field =
+  const auto [lattice, placed] =
+      add("lattice", "bodies at random rotations on a lattice of a given spacing", 1000,
+          [](const auto& a, const Assets& assets) {
+            return Bodies{make_lattice(assets[0], a.count, a.spacing, a.scene_seed())};
+          });
+  add_options(lattice, {spacing_option(placed)});
+  const auto [field, heaped] =
       add("field", "a heap of moving bodies on a layer of fixed ones", 1000,
           [](const auto& a, const Assets& assets) {
             Bodies bodies = {make_field(assets[0], a.fixed, a.count, a.spacing, a.scene_seed())};
@@ -149,29 +140,21 @@ CLI::App* add_scene(CLI::App& app, Run& run_later) {
             std::fill_n(bodies.motion.begin(), a.fixed, Motion::fixed);
             return bodies;
           });
-  field->add_option("--fixed", arguments->fixed, "how many fixed ones")
-      ->check(CLI::Range(0, 10'000'000))
-      ->option_text("N [100000]");
-  for (CLI::App* on_lattice : {lattice, field}) {
-    on_lattice
-        ->add_option("--spacing", arguments->spacing, "of the lattice, in lengths of the body's longest side")
-        ->check(between(0.01, 1000))
-        ->option_text("S [0.7]");
-  }
+  add_options(field,
+              {{"--fixed", heaped.fixed, "N [100000]", "how many fixed ones", CLI::Range(0, 10'000'000)},
+               spacing_option(heaped)});
 
-  CLI::App* slide = add("slide", "bodies strewn on a tilted sheet of ground", 2500,
-                        [](const auto& a, const Assets& assets) {
-                          return Bodies{make_slide(assets[0], assets[1], a.count, a.tilt, a.scene_seed())};
-                        });
-  slide->add_option("--ground", arguments->ground, ".bvh file of the sheet")->required()->check(file_name());
-  slide->add_option("--tilt", arguments->tilt, "slope of the ground along x")
-      ->check(between(-90, 90))
-      ->option_text("DEGREES [20]");
+  const auto [slide, sliding] = add(
+      "slide", "bodies strewn on a tilted sheet of ground", 2500, [](const auto& a, const Assets& assets) {
+        return Bodies{make_slide(assets[0], assets[1], a.count, a.tilt, a.scene_seed())};
+      });
+  add_options(slide,
+              {ground_option(sliding.ground, "sheet"),
+               {"--tilt", sliding.tilt, "DEGREES [20]", "slope of the ground along x", between(-90, 90)}});
 
   add("coincident", "pairs of bodies in exactly the same pose", 50, [](const auto& a, const Assets& assets) {
     return Bodies{make_coincident(assets[0], a.count, a.scene_seed())};
   });
-  return scene;
 }
 
 }  // namespace tandem::bench

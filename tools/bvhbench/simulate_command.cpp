@@ -1,20 +1,15 @@
-#include "simulate_command.h"
-
 #include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <memory>
-#include <thread>
 
 #include "bvhbench/engines/registry.h"
 #include "bvhbench/scenes/hdf5_file.h"
 #include "bvhbench/scenes/make_scene_parts.h"
-#include "bvhbench/scenes/scene_file.h"
 #include "bvhbench/simulator/preparation.h"
 #include "bvhbench/simulator/run.h"
-#include "common/json.h"
+#include "command.h"
 #include "common/number_words.h"
 
 namespace tandem::bench {
@@ -23,12 +18,12 @@ namespace {
 namespace fs = std::filesystem;
 using namespace simulation;
 
-struct SimulateArguments {
-  std::string mesh, ground, scene, engine = "tandem";
+struct SimulateArguments : CommonArguments {
+  std::string mesh, ground, engine = "tandem";
   std::uint32_t count = 0;
   double jitter = 0.0005, tilt = 30, density = 1000, gravity = 9.81, slop = -1, rolling_resistance = -1;
   std::uint64_t seed = 1;
-  bool fast = false, json = false, cold = false, continuous = false;
+  bool fast = false, cold = false, continuous = false;
   SimulatorOptions simulator;
   ContactPointOptions contacts;
   RunOptions run;
@@ -39,10 +34,8 @@ const std::map<std::string, SolverKind> kSolvers = {{"auto", SolverKind::automat
                                                     {"newton", SolverKind::newton},
                                                     {"sweeps", SolverKind::sweeps}};
 
-std::string solver_name(SolverKind kind) {
-  const auto is_it = [&](const auto& entry) { return entry.second == kind; };
-  return std::find_if(kSolvers.begin(), kSolvers.end(), is_it)->first;
-}
+const std::map<std::string, ContactOrder> kOrders = {{"found", ContactOrder::found},
+                                                     {"shuffled", ContactOrder::shuffled}};
 
 // Meshes and bodies, before anything moves.
 struct Start {
@@ -119,7 +112,7 @@ Json options_of(const char* kind, const SimulateArguments& arguments, const Star
           {"mode", arguments.fast ? "fast" : "exact"},
           {"points_per_patch", arguments.contacts.points_per_patch},
           {"dt", simulator.dt},
-          {"solver", solver_name(solver.kind)},
+          {"solver", name_of(solver.kind, kSolvers)},
           {"substeps", solver.substeps},
           {"gravity", arguments.gravity},
           {"iterations", solver.iterations},
@@ -129,7 +122,7 @@ Json options_of(const char* kind, const SimulateArguments& arguments, const Star
           {"slop", solver.slop},
           {"rolling_resistance", solver.rolling_resistance},
           {"correction", solver.correction},
-          {"order", solver.order == ContactOrder::found ? "found" : "shuffled"},
+          {"order", name_of(solver.order, kOrders)},
           {"warm_start", solver.warm_start},
           {"shock_propagation", solver.shock_propagation},
           {"sleeping", simulator.sleep.enabled},
@@ -148,64 +141,56 @@ RunDescription describe(const char* kind, const SimulateArguments& arguments, co
   return run;
 }
 
-struct Means {
-  double step = 0, collision = 0, contacts = 0, solver = 0, ratio = 0;
-};
-
-Means means_of(const std::vector<StepRecord>& records) {
-  Means means;
-  const auto count = static_cast<double>(records.size());
-  for (const StepRecord& record : records) {
-    means.step += record.step_seconds / count;
-    means.collision += (record.update_seconds + record.broad_phase_seconds + record.traversal_seconds +
-                        record.triangle_test_seconds + record.transfer_seconds) /
-                       count;
-    means.contacts += record.contact_seconds / count;
-    means.solver += record.solver_seconds / count;
-    means.ratio += record.contact_ratio / count;
-  }
-  return means;
+// Of all steps.
+template <typename Value>
+double mean_of(const std::vector<StepRecord>& records, const Value& value) {
+  double mean = 0;
+  for (const StepRecord& record : records)
+    mean += std::invoke(value, record) / static_cast<double>(records.size());
+  return mean;
 }
 
-Json to_json(const char* kind, const SimulateArguments& arguments, const RunDescription& run,
-             const RunResults& results) {
-  const Means means = means_of(results.records);
-  const StepRecord& last = results.records.back();
-  return {{"tool", "bvhbench simulate"},
-          {"version", TANDEM_VERSION},
-          {"configuration", kind},
-          {"output", arguments.run.output},
-          {"bodies", run.bodies.size()},
-          {"triangles", run.triangles},
-          {"steps", results.records.size()},
-          {"options", run.options},
-          {"seconds_per_step",
-           {{"all", means.step},
-            {"collision", means.collision},
-            {"contacts", means.contacts},
-            {"solver", means.solver}}},
-          {"contact_ratio", means.ratio},
-          {"last",
-           {{"contacts", last.contacts},
-            {"penetration_max", last.penetration_max},
-            {"speed_max", last.speed_max},
-            {"spin_max", last.spin_max},
-            {"residual_max", last.residual_max},
-            {"kinetic_energy", last.kinetic_energy}}}};
+double collision_seconds(const StepRecord& record) {
+  return record.update_seconds + record.broad_phase_seconds + record.traversal_seconds +
+         record.triangle_test_seconds + record.transfer_seconds;
 }
 
-void print_summary(const SimulateArguments& arguments, const RunDescription& run, const RunResults& results) {
-  const Means means = means_of(results.records);
+Report report_of(const char* kind, const SimulateArguments& arguments, const RunDescription& run,
+                 const RunResults& results) {
+  const double collision = mean_of(results.records, collision_seconds);
+  const double contacts = mean_of(results.records, &StepRecord::contact_seconds);
+  const double solver = mean_of(results.records, &StepRecord::solver_seconds);
   const StepRecord& last = results.records.back();
-  std::printf("%s: %s steps of %s bodies\n", arguments.run.output.c_str(),
-              with_commas(results.records.size()).c_str(), with_commas(run.bodies.size()).c_str());
-  std::printf("  %-18s %10.3f  collision %.3f, contacts %.3f, solver %.3f\n", "milliseconds",
-              1e3 * means.step, 1e3 * means.collision, 1e3 * means.contacts, 1e3 * means.solver);
-  std::printf("  %-18s %10.4f  triangle pairs by triangles, mean\n", "contact ratio", means.ratio);
-  std::printf("  %-18s %10s  in the last step\n", "contacts", with_commas(last.contacts).c_str());
-  std::printf("  %-18s %10.2e  in the last step\n", "penetration", last.penetration_max);
-  std::printf("  %-18s %10.2e  of the fastest body at the end; %.2e by turning\n", "speed", last.speed_max,
-              last.spin_max);
+  Report report(18, 10);
+  report.line(arguments.output + ": " + with_commas(results.records.size()) + " steps of " +
+              with_commas(run.bodies.size()) + " bodies");
+  report.add({{"tool", "bvhbench simulate"},
+              {"version", TANDEM_VERSION},
+              {"configuration", kind},
+              {"output", arguments.output},
+              {"bodies", run.bodies.size()},
+              {"triangles", run.triangles},
+              {"steps", results.records.size()},
+              {"options", run.options}});
+  report.add("seconds_per_step/all", mean_of(results.records, &StepRecord::step_seconds))
+      .row("milliseconds", Unit::milliseconds,
+           format("  collision %.3f, contacts %.3f, solver %.3f", 1e3 * collision, 1e3 * contacts,
+                  1e3 * solver));
+  report.add({{"seconds_per_step/collision", collision},
+              {"seconds_per_step/contacts", contacts},
+              {"seconds_per_step/solver", solver}});
+  report.add("contact_ratio", mean_of(results.records, &StepRecord::contact_ratio))
+      .row("contact ratio", Unit::decimals, "  triangle pairs by triangles, mean");
+  report.add("last/contacts", last.contacts).row("contacts", Unit::count, "  in the last step");
+  report.add("last/penetration_max", last.penetration_max)
+      .row("penetration", Unit::magnitude, "  in the last step");
+  report.add("last/speed_max", last.speed_max)
+      .row("speed", Unit::magnitude,
+           format("  of the fastest body at the end; %.2e by turning", last.spin_max));
+  report.add({{"last/spin_max", last.spin_max},
+              {"last/residual_max", last.residual_max},
+              {"last/kinetic_energy", last.kinetic_energy}});
+  return report;
 }
 
 // Whether the run is there already: with --resume there is nothing left to do.
@@ -215,13 +200,14 @@ bool is_done(const SimulateArguments& arguments, const RunDescription& run) {
 }
 
 ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up) {
-  keep_inputs(arguments.run.output, {arguments.mesh, arguments.ground, arguments.scene});
-  try_output(arguments.run.output);
+  check_output(arguments, {arguments.mesh, arguments.ground, arguments.scene});
+  arguments.run.output = arguments.output;
   Start start;
   set_up(arguments, start);
   for (const std::string& finding : start.bodies.findings)
     std::fprintf(stderr, "bvhbench: %s\n", finding.c_str());
   SimulatorOptions& options = arguments.simulator;
+  options.threads = arguments.threads();
   options.gravity = {0, 0, -arguments.gravity};
   options.solver.slop = slop_of(arguments, start);
   options.solver.rolling_resistance =
@@ -231,7 +217,7 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
   if (options.solver.substeps == 0) options.solver.substeps = default_substeps(options.solver.kind);
   const RunDescription description = describe(kind, arguments, start);
   if (is_done(arguments, description)) {
-    std::printf("%s: is done\n", arguments.run.output.c_str());
+    std::printf("%s: is done\n", arguments.output.c_str());
     return kDone;
   }
   const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, options.threads);
@@ -244,16 +230,9 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
                       make_mesh_contact_finder(std::move(engine), start.shapes(), arguments.contacts),
                       options, std::move(continuous));
   const RunResults results = run_simulation(simulator, description, start.reentry, arguments.run);
-  if (arguments.json) {
-    std::puts(pretty(to_json(kind, arguments, description, results)).c_str());
-  } else {
-    print_summary(arguments, description, results);
-  }
+  print(arguments, report_of(kind, arguments, description, results));
   return kDone;
 }
-
-const std::map<std::string, ContactOrder> kOrders = {{"found", ContactOrder::found},
-                                                     {"shuffled", ContactOrder::shuffled}};
 
 CLI::Validator engine_name() {
   const auto defect = [](const std::string& name) -> std::string {
@@ -271,158 +250,101 @@ CLI::Validator engine_name() {
 void add_solver_options(CLI::App& command, SimulateArguments& arguments) {
   SimulatorOptions& simulator = arguments.simulator;
   SolverOptions& solver = simulator.solver;
-  add_choice(command, "--solver", kSolvers, solver.kind,
-             "how a step is solved: 'soft' or 'newton', 'auto' of these two, or 'sweeps'")
-      ->option_text("auto|soft|newton|sweeps [auto]");
-  command.add_option("--dt", simulator.dt, "seconds of a step")
-      ->check(between(1e-9, 1e3))
-      ->option_text("SECONDS [1/60]");
-  command.add_option("--substeps", solver.substeps, "parts of a step that share its contacts")
-      ->check(CLI::Range(1, 10'000))
-      ->option_text("N [16, with sweeps 1]");
-  command.add_option("--iterations", solver.iterations, "sweeps for velocities in each part of a step")
-      ->check(CLI::Range(0, 1'000'000))
-      ->option_text("N [30]");
-  command
-      .add_option("--position-iterations", solver.position_iterations,
-                  "sweeps for the correction of penetration in each part")
-      ->check(CLI::Range(0, 1'000'000))
-      ->option_text("N [30]");
-  command.add_option("--gravity", arguments.gravity, "along -z, in m/s^2")
-      ->check(between(-1e6, 1e6))
-      ->option_text("G [9.81]");
-  command.add_option("--friction", solver.friction, "coefficient of friction")
-      ->check(between(0, 1e6))
-      ->option_text("MU [0.5]");
-  command.add_option("--restitution", solver.restitution, "part of the speed that an impact gives back")
-      ->check(between(0, 1))
-      ->option_text("E [0]");
-  command.add_option("--slop", arguments.slop, "penetration that is left alone, in metres")
-      ->check(between(0, 1e6))
-      ->option_text("S [1/4000 of the first mesh's diagonal]");
-  command
-      .add_option(
-          "--rolling-resistance", arguments.rolling_resistance,
-          "lever at which the force between two bodies resists that they turn, in metres; not by sweeps")
-      ->check(between(0, 1e6))
-      ->option_text("L [16 times the slop]");
-  command
-      .add_option("--correction", solver.correction,
-                  "part of the penetration beyond the slop that a step corrects")
-      ->check(between(0, 1))
-      ->option_text("B [0.2]");
-  add_choice(command, "--order", kOrders, solver.order,
-             "in which contacts are solved: as 'found', or 'shuffled'")
-      ->option_text("found|shuffled [found]");
-  command.add_flag("--cold", arguments.cold, "start each step without the impulses of the step before");
-  command.add_flag("--shock", solver.shock_propagation,
-                   "propagate shocks from the ground up after the sweeps");
-  command.add_flag("--sleep", simulator.sleep.enabled, "let islands at rest fall asleep");
-  command.add_flag("--continuous", arguments.continuous,
-                   "carry fast bodies to where they first meet others, so that none passes through");
-  command.add_option("--sleep-speed", simulator.sleep.speed, "below which a body is at rest, in m/s")
-      ->check(between(0, 1e6))
-      ->option_text("V [0.01]");
+  add_options(
+      command,
+      {{"--solver", solver.kind, kSolvers, "auto|soft|newton|sweeps [auto]",
+        "how a step is solved: 'soft' or 'newton', 'auto' of these two, or 'sweeps'"},
+       {"--dt", simulator.dt, "SECONDS [1/60]", "seconds of a step", between(1e-9, 1e3)},
+       {"--substeps", solver.substeps, "N [16, with sweeps 1]", "parts of a step that share its contacts",
+        CLI::Range(1, 10'000)},
+       {"--iterations", solver.iterations, "N [30]", "sweeps for velocities in each part of a step",
+        CLI::Range(0, 1'000'000)},
+       {"--position-iterations", solver.position_iterations, "N [30]",
+        "sweeps for the correction of penetration in each part", CLI::Range(0, 1'000'000)},
+       {"--gravity", arguments.gravity, "G [9.81]", "along -z, in m/s^2", between(-1e6, 1e6)},
+       {"--friction", solver.friction, format("MU [%g]", solver.friction), "coefficient of friction",
+        between(0, 1e6)},
+       {"--restitution", solver.restitution, "E [0]", "part of the speed that an impact gives back",
+        between(0, 1)},
+       {"--slop", arguments.slop, "S [1/4000 of the first mesh's diagonal]",
+        "penetration that is left alone, in metres", between(0, 1e6)},
+       {"--rolling-resistance", arguments.rolling_resistance, "L [16 times the slop]",
+        "lever at which the force between two bodies resists that they turn, in metres; not by sweeps",
+        between(0, 1e6)},
+       {"--correction", solver.correction, "B [0.2]",
+        "part of the penetration beyond the slop that a step corrects", between(0, 1)},
+       {"--order", solver.order, kOrders, "found|shuffled [found]",
+        "in which contacts are solved: as 'found', or 'shuffled'"},
+       {"--cold", arguments.cold, "start each step without the impulses of the step before"},
+       {"--shock", solver.shock_propagation, "propagate shocks from the ground up after the sweeps"},
+       {"--sleep", simulator.sleep.enabled, "let islands at rest fall asleep"},
+       {"--continuous", arguments.continuous,
+        "carry fast bodies to where they first meet others, so that none passes through"},
+       {"--sleep-speed", simulator.sleep.speed, "V [0.01]", "below which a body is at rest, in m/s",
+        between(0, 1e6)}});
 }
 
 void add_run_options(CLI::App& command, SimulateArguments& arguments) {
   RunOptions& run = arguments.run;
-  command.add_option("--frames", run.steps, "steps to make")
-      ->required()
-      ->check(CLI::Range(1, 1'000'000'000))
-      ->option_text("N");
-  command.add_option("--engine", arguments.engine, "what finds the triangles that meet")
-      ->check(engine_name())
-      ->option_text("NAME [tandem]");
-  command.add_flag("--fast", arguments.fast, "let the engine decide triangles in float32");
-  command.add_option("--points-per-patch", arguments.contacts.points_per_patch, "contact points, at most")
-      ->check(CLI::Range(1u, kMostManifoldPoints))
-      ->option_text("N [" + std::to_string(arguments.contacts.points_per_patch) + "]");
-  command.add_option("--density", arguments.density, "of the bodies, in kg/m^3")
-      ->check(between(1e-12, 1e12))
-      ->option_text("D [1000]");
-  command.add_option("--threads", arguments.simulator.threads, "threads; the results do not depend on them")
-      ->check(CLI::Range(1u, kMostSceneThreads))
-      ->option_text("N [all]");
-  command.add_option("--trajectory", run.trajectory_every, "keep the state after every K-th step; 0: none")
-      ->option_text("K [0]");
-  command.add_option("--checkpoint", run.checkpoint_seconds, "seconds between two writings of OUTPUT.part")
-      ->check(between(0, 1e9))
-      ->option_text("S [60]");
-  command.add_flag("--resume", run.resume, "go on from OUTPUT.part; nothing to do where OUTPUT is done");
-  command.add_flag("--json", arguments.json, "print the summary as JSON");
-  command.add_option("-o,--output", run.output, "the run file to write; appears whole or not at all")
-      ->required()
-      ->check(file_name());
-}
-
-CLI::App* add_kind(CLI::App& simulate, Run& run_later, const std::shared_ptr<SimulateArguments>& arguments,
-                   const char* kind, const char* help, const SetUp& set_up) {
-  CLI::App* command = simulate.add_subcommand(kind, help);
-  add_solver_options(*command, *arguments);
-  add_run_options(*command, *arguments);
-  command->final_callback([=, &run_later] { run_later = [=] { return run(kind, *arguments, set_up); }; });
-  return command;
+  std::uint32_t& points = arguments.contacts.points_per_patch;
+  add_options(
+      command,
+      {required({"--frames", run.steps, "N", "steps to make", CLI::Range(1, 1'000'000'000)}),
+       {"--engine", arguments.engine, "NAME [tandem]", "what finds the triangles that meet", engine_name()},
+       {"--fast", arguments.fast, "let the engine decide triangles in float32"},
+       {"--points-per-patch", points, format("N [%u]", points), "contact points, at most",
+        CLI::Range(1u, kMostManifoldPoints)},
+       {"--density", arguments.density, "D [1000]", "of the bodies, in kg/m^3", between(1e-12, 1e12)},
+       threads_option(arguments, "the results do"),
+       {"--trajectory", run.trajectory_every, "K [0]", "keep the state after every K-th step; 0: none"},
+       {"--checkpoint", run.checkpoint_seconds, "S [60]", "seconds between two writings of OUTPUT.part",
+        between(0, 1e9)},
+       {"--resume", run.resume, "go on from OUTPUT.part; nothing to do where OUTPUT is done"},
+       json_option(arguments),
+       required(
+           output_option(arguments, "the run file to write; appears whole or not at all", "-o,--output"))});
 }
 
 // What the paper's configurations have and scene files have not.
-void add_configuration(CLI::App& command, SimulateArguments& arguments, std::uint32_t count) {
-  arguments.count = count;
-  command.add_option("--mesh", arguments.mesh, ".bvh file of the bodies")->required()->check(file_name());
-  command.add_option("--count", arguments.count, "how many")
-      ->check(CLI::Range(1, 10'000'000))
-      ->option_text("N [" + std::to_string(count) + "]");
-  command.add_option("--seed", arguments.seed, "another start of the kind; and of --order shuffled")
-      ->check(CLI::NonNegativeNumber)
-      ->option_text("N [1]");
-}
-
-void add_ground(CLI::App& command, SimulateArguments& arguments) {
-  command.add_option("--ground", arguments.ground, ".bvh file of the ground, which is fixed")
-      ->required()
-      ->check(file_name());
+void add_configuration(CLI::App& command, SimulateArguments& arguments) {
+  add_options(command, {mesh_option(arguments.mesh), count_option(arguments.count, 1000),
+                        seed_option(arguments.seed, "another start of the kind; and of --order shuffled")});
 }
 
 }  // namespace
 
-CLI::App* add_simulate(CLI::App& app, Run& run_later) {
+void add_simulate(CLI::App& app, Run& run_later) {
   CLI::App* simulate = app.add_subcommand("simulate", "let bodies move, and keep what that takes");
   simulate->require_subcommand(1);
-  const auto add = [&](const char* kind, const char* help, const SetUp& set_up) {
-    const auto arguments = std::make_shared<SimulateArguments>();
-    arguments->simulator.threads = std::max(1u, std::thread::hardware_concurrency());
-    return std::pair(add_kind(*simulate, run_later, arguments, kind, help, set_up), arguments);
+  const auto add = [&](const char* kind, const char* help, const SetUp& set_up, double friction = 0.5) {
+    const auto added = add_command<SimulateArguments>(
+        *simulate, run_later, kind, help,
+        [=](const SimulateArguments& told) { return run(kind, told, set_up); });
+    added.second.simulator.solver.friction = friction;
+    add_solver_options(added.first, added.second);
+    add_run_options(added.first, added.second);
+    return added;
   };
 
   const auto [slide, sliding] =
-      add("slide", "rocks that slide down a tilted ground, again and again", set_up_slide);
-  add_configuration(*slide, *sliding, 1000);
-  add_ground(*slide, *sliding);
-  slide->add_option("--tilt", sliding->tilt, "slope of the ground along x")
-      ->check(between(0, 80))
-      ->option_text("DEGREES [30]");
-  sliding->simulator.solver.friction = 0.4;
-  slide->get_option("--friction")->option_text("MU [0.4]");
+      add("slide", "rocks that slide down a tilted ground, again and again", set_up_slide, 0.4);
+  add_configuration(slide, sliding);
+  add_options(slide,
+              {ground_option(sliding.ground, "ground, which is fixed"),
+               {"--tilt", sliding.tilt, "DEGREES [30]", "slope of the ground along x", between(0, 80)}});
 
   const auto [pile, falling] = add("pile", "bodies that fall on the ground and on each other", set_up_pile);
-  add_configuration(*pile, *falling, 1000);
-  add_ground(*pile, *falling);
+  add_configuration(pile, falling);
+  add_options(pile, {ground_option(falling.ground, "ground, which is fixed")});
 
   const auto [stack, standing] = add("stack", "a cube of boxes on a floor of boxes", set_up_stack);
-  add_configuration(*stack, *standing, 1000);
-  stack->get_option("--count")->check(cube_of_a_whole_number());
-  stack
-      ->add_option("--jitter", standing->jitter,
-                   "how far boxes are moved along x and y at most, in box lengths")
-      ->check(between(0, 0.1))
-      ->option_text("J [0.0005]");
+  add_configuration(stack, standing);
+  stack.get_option("--count")->check(cube_of_a_whole_number());
+  add_options(stack, {{"--jitter", standing.jitter, "J [0.0005]",
+                       "how far boxes are moved along x and y at most, in box lengths", between(0, 0.1)}});
 
   const auto [scene, any] = add("scene", "the bodies of a scene file", set_up_scene);
-  scene->add_option("SCENE", any->scene, "scene file (HDF5)")->required()->check(file_name());
-  scene->add_option("--seed", any->seed, "of --order shuffled")
-      ->check(CLI::NonNegativeNumber)
-      ->option_text("N [1]");
-  return simulate;
+  add_options(scene, {scene_argument(any), seed_option(any.seed, "of --order shuffled")});
 }
 
 }  // namespace tandem::bench

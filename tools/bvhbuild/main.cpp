@@ -52,11 +52,8 @@ ExitCode complain(const std::string& what, ExitCode code) {
 
 void print(const Options& options, const Outcome& outcome) {
   if (outcome.exit_code != kDone) complain(outcome.error, outcome.exit_code);
-  if (options.json) {
-    std::fputs(json_report(options, outcome).c_str(), stdout);
-  } else if (!options.quiet && outcome.exit_code == kDone) {
-    std::fputs(text_report(options, outcome).c_str(), stdout);
-  }
+  if (!options.json && (options.quiet || outcome.exit_code != kDone)) return;
+  std::fputs(report_of(options, outcome).words(options.json).c_str(), stdout);
 }
 
 }  // namespace

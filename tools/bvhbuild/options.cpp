@@ -49,56 +49,41 @@ CLI::Validator level_errors() {
 }
 
 void add_options(CLI::App& app, Options& options, double& memory_gib, double& expansion) {
-  app.add_option("MESH", options.input,
-                 "mesh file: OBJ, PLY, STL, OFF, glTF/GLB, DAE and what else assimp reads")
-      ->required()
-      ->check(file_name());
-  app.add_option("-o,--output", options.output, "the .bvh file to write; appears whole or not at all")
-      ->required()
-      ->check(file_name());
-  app.add_option_function<std::string>(
-         "--imaginary", [&options](const std::string& text) { parse_imaginary(text, options.imaginary); },
-         "padding nodes: 'minimal' (the proven fewest), 'free', or at most a share of all nodes")
-      ->check(imaginary_share())
-      ->option_text("minimal|free|SHARE [minimal]");
-  add_choice(
-      app, "--effort", kEffortNames, options.effort,
-      "time that goes into a tree that is cheap to query; 'best' takes minutes for 100,000 triangles, and "
-      "Ctrl-C ends it with the best tree so far")
-      ->option_text("fast|default|best [default]");
-  app.add_flag_callback(
-      "--no-gpu-blocks", [&options] { options.gpu_blocks = false; },
-      "leave out the oriented blocks, which exact queries on a GPU walk; the file is a quarter smaller");
-  app.add_flag_callback(
-      "--no-topology", [&options] { options.topology = false; },
-      "leave out how triangles hang together, which contact manifolds need: 16 bytes a triangle");
-  app.add_option_function<std::string>(
-         "--levels", [&options](const std::string& text) { parse_level_errors(text, options.levels); },
-         "coarser levels of the mesh, each proved to be at most so far from the finest: lengths, or with % "
-         "of "
-         "the diagonal of its bounds, ascending; 'auto' is 0.1%,0.3%,1%,3%")
-      ->check(level_errors())
-      ->option_text("E1,E2,...|auto");
-  app.add_flag("--strict", options.strict, "take anything dropped or found amiss in the mesh for an error");
-  app.add_flag("--json", options.json, "print the report as JSON");
-  app.add_flag("-q,--quiet", options.quiet, "print nothing but errors");
-  app.add_option("--threads", options.threads, "threads for building; the result does not depend on them")
-      ->check(CLI::Range(1, 4096))
-      ->option_text("N [all]");
-  add_choice(app, "--reader", kReaderNames, options.import.reader, "who reads the mesh")
-      ->option_text("auto|tandem|assimp [auto]");
-  app.add_option("--time-limit", options.import.time_limit_seconds, "seconds that assimp may take")
-      ->check(between(0.01, 1e6))
-      ->option_text("S [120]");
-  app.add_option("--memory-limit", memory_gib, "GiB of memory that reading may take")
-      ->check(between(0.1, 1e6))
-      ->option_text("GIB [8]");
-  app.add_option(
-         "--expansion-limit", expansion,
-         "vertices and faces that a scene may have beyond what the bytes of its file can hold: instances "
-         "repeat meshes, and counts may promise what is not there")
-      ->check(between(0, 1e15))
-      ->option_text("N [4000000]");
+  tandem::add_options(
+      app,
+      {required({"MESH", options.input, "",
+                 "mesh file: OBJ, PLY, STL, OFF, glTF/GLB, DAE and what else assimp reads", file_name()}),
+       required({"-o,--output", options.output, "", "the .bvh file to write; appears whole or not at all",
+                 file_name()}),
+       {"--imaginary", [&options](const std::string& text) { parse_imaginary(text, options.imaginary); },
+        "minimal|free|SHARE [minimal]",
+        "padding nodes: 'minimal' (the proven fewest), 'free', or at most a share of all nodes",
+        imaginary_share()},
+       {"--effort", options.effort, kEffortNames, "fast|default|best [default]",
+        "time that goes into a tree that is cheap to query; 'best' takes minutes for 100,000 triangles, and "
+        "Ctrl-C ends it with the best tree so far"},
+       {"--no-gpu-blocks", OptionRow::Cleared{options.gpu_blocks},
+        "leave out the oriented blocks, which exact queries on a GPU walk; the file is a quarter smaller"},
+       {"--no-topology", OptionRow::Cleared{options.topology},
+        "leave out how triangles hang together, which contact manifolds need: 16 bytes a triangle"},
+       {"--levels", [&options](const std::string& text) { parse_level_errors(text, options.levels); },
+        "E1,E2,...|auto",
+        "coarser levels of the mesh, each proved to be at most so far from the finest: lengths, or with % of "
+        "the diagonal of its bounds, ascending; 'auto' is 0.1%,0.3%,1%,3%",
+        level_errors()},
+       {"--strict", options.strict, "take anything dropped or found amiss in the mesh for an error"},
+       {"--json", options.json, "print the report as JSON"},
+       {"-q,--quiet", options.quiet, "print nothing but errors"},
+       {"--threads", options.threads, "N [all]", "threads for building; the result does not depend on them",
+        CLI::Range(1, 4096)},
+       {"--reader", options.import.reader, kReaderNames, "auto|tandem|assimp [auto]", "who reads the mesh"},
+       {"--time-limit", options.import.time_limit_seconds, "S [120]", "seconds that assimp may take",
+        between(0.01, 1e6)},
+       {"--memory-limit", memory_gib, "GIB [8]", "GiB of memory that reading may take", between(0.1, 1e6)},
+       {"--expansion-limit", expansion, "N [4000000]",
+        "vertices and faces that a scene may have beyond what the bytes of its file can hold: instances "
+        "repeat meshes, and counts may promise what is not there",
+        between(0, 1e15)}});
   app.set_version_flag("--version", "bvhbuild " TANDEM_VERSION);
   app.footer(kFooter);
 }
@@ -124,10 +109,7 @@ std::string name(Imaginary imaginary) {
 }
 
 std::string name(Effort effort) {
-  for (const auto& [text, value] : kEffortNames) {
-    if (value == effort) return text;
-  }
-  return {};
+  return name_of(effort, kEffortNames);
 }
 
 }  // namespace tandem::build

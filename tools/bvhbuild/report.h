@@ -1,14 +1,11 @@
 #pragma once
-#include <string>
-
+#include "common/report.h"
 #include "pipeline.h"
 
 namespace tandem::build {
 
-/// What bvhbuild prints on success: a few lines for people.
-std::string text_report(const Options& options, const Outcome& outcome);
-
-/// What bvhbuild --json prints, on success and on failure. Keys in docs/json.md.
-std::string json_report(const Options& options, const Outcome& outcome);
+/// What bvhbuild prints: its text, on success, is a few lines for people; its JSON, on success and on
+/// failure, has the keys of docs/json.md.
+Report report_of(const Options& options, const Outcome& outcome);
 
 }  // namespace tandem::build

@@ -1,7 +1,6 @@
 #include "level_check.h"
 
 #include <algorithm>
-#include <cstdio>
 
 #include "common/number_words.h"
 
@@ -30,9 +29,7 @@ LevelCheck check_error_bound(const LevelView& finest, const LevelView& level, st
 
 /// Enough digits to tell two numbers apart that are.
 std::string digits(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.12g", value);
-  return text;
+  return format("%.12g", value);
 }
 
 }  // namespace

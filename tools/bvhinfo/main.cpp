@@ -35,53 +35,52 @@ std::pair<const char*, Json> defect(const Inspection& inspection) {
   return {name(inspection.status), has_number ? Json(inspection.asset.where()) : Json()};
 }
 
-Json verdict(const Inspection& inspection) {
+Report verdict_of(const Inspection& inspection) {
   const bool sound = inspection.is_sound();
   const auto [status, where] = defect(inspection);
-  Json json = {{"file", inspection.path},
-               {"sound", sound},
-               {"status", status},
-               {"where", where},
-               {"error", sound ? Json() : Json(defect_of(inspection))},
-               {"bytes", sound ? Json(inspection.asset.bytes()) : Json()},
-               {"check_seconds", inspection.check_seconds}};
-  if (!inspection.level_checks) return json;
-  json["levels"] = Json::array();
-  for (const LevelCheck& check : *inspection.level_checks) json["levels"].push_back(to_json(check));
-  json["levels_seconds"] = inspection.level_check_seconds;
-  return json;
-}
-
-void print_verdict(const Inspection& inspection) {
-  if (!inspection.is_sound()) return;
   const double seconds = inspection.check_seconds;
-  std::printf("%s: sound (%s checked in %.1f ms, %.2f GB/s)\n", printable(inspection.path).c_str(),
-              human_bytes(inspection.asset.bytes()).c_str(), 1e3 * seconds,
-              static_cast<double>(inspection.asset.bytes()) / seconds / 1e9);
-  if (!inspection.level_checks) return;
-  for (const LevelCheck& check : *inspection.level_checks) std::printf("  %s\n", line_of(check).c_str());
+  const auto bytes = static_cast<double>(inspection.asset.bytes());
+  Report report;
+  if (sound) {
+    report.line(format("%s: sound (%s checked in %.1f ms, %.2f GB/s)", printable(inspection.path).c_str(),
+                       human_bytes(inspection.asset.bytes()).c_str(), 1e3 * seconds, bytes / seconds / 1e9));
+  }
+  report.add({{"file", inspection.path},
+              {"sound", sound},
+              {"status", status},
+              {"where", where},
+              {"error", sound ? Json() : Json(defect_of(inspection))},
+              {"bytes", sound ? Json(inspection.asset.bytes()) : Json()},
+              {"check_seconds", seconds}});
+  if (!inspection.level_checks) return report;
+  Json levels = Json::array();
+  for (const LevelCheck& check : *inspection.level_checks) {
+    levels.push_back(to_json(check));
+    if (sound) report.line("  " + line_of(check));
+  }
+  report.add("levels", std::move(levels));
+  report.add("levels_seconds", inspection.level_check_seconds);
+  return report;
 }
 
 /// The page of a sound file; two or more side by side. Files that are not sound are left out.
 void print_sound(std::vector<Inspection> inspections) {
   std::erase_if(inspections, [](const Inspection& inspection) { return inspection.status != Status::kOk; });
   if (inspections.empty()) return;
-  std::fputs((inspections.size() > 1 ? comparison(inspections) : page(inspections[0])).c_str(), stdout);
+  std::fputs((inspections.size() > 1 ? comparison(inspections) : report_of(inspections[0]).text()).c_str(),
+             stdout);
 }
 
 void print(const Options& options, std::vector<Inspection> inspections) {
-  if (options.json) {
-    Json output = Json::array();
-    for (const Inspection& inspection : inspections) {
-      const bool whole = inspection.status == Status::kOk && !options.verify;
-      output.push_back(whole ? to_json(inspection) : verdict(inspection));
-    }
-    std::puts(pretty(inspections.size() == 1 ? output[0] : output).c_str());
-  } else if (options.verify) {
-    for (const Inspection& inspection : inspections) print_verdict(inspection);
-  } else {
-    print_sound(std::move(inspections));
+  if (!options.json && !options.verify) return print_sound(std::move(inspections));
+  Json all = Json::array();
+  for (const Inspection& inspection : inspections) {
+    const bool whole = inspection.status == Status::kOk && !options.verify;
+    const Report report = whole ? report_of(inspection) : verdict_of(inspection);
+    all.push_back(report.json());
+    if (!options.json) std::fputs(report.text().c_str(), stdout);
   }
+  if (options.json) std::puts(pretty(all.size() == 1 ? all[0] : all).c_str());
 }
 
 ExitCode run(const Options& options) {
@@ -106,11 +105,11 @@ ExitCode run(const Options& options) {
 int main(int argc, char** argv) {
   CLI::App app("Shows what is in a Tandem .bvh file. Two or more files are set side by side.", "bvhinfo");
   Options options;
-  app.add_option("FILE", options.files, ".bvh files")->required();
-  app.add_flag("--json", options.json, "print JSON: an object for one file, an array for several");
-  CLI::Option* verify =
-      app.add_flag("--verify", options.verify, "only check the files and say whether they are sound");
-  app.add_flag("--levels", options.levels, "prove the error bounds of levels of detail anew")->needs(verify);
+  add_options(app, {required({"FILE", options.files, "", ".bvh files"}),
+                    {"--json", options.json, "print JSON: an object for one file, an array for several"},
+                    {"--verify", options.verify, "only check the files and say whether they are sound"},
+                    {"--levels", options.levels, "prove the error bounds of levels of detail anew"}});
+  app.get_option("--levels")->needs(app.get_option("--verify"));
   app.set_version_flag("--version", "bvhinfo " TANDEM_VERSION);
   app.footer(
       "Every file is checked in full before anything else is read.\nExit codes: 0 all sound, 1 usage, 2 a "

@@ -1,26 +1,108 @@
 #include "page.h"
 
 #include <algorithm>
-#include <cstdarg>
-#include <cstdio>
+#include <cmath>
 #include <filesystem>
 #include <string_view>
+#include <utility>
 
 #include "common/number_words.h"
 #include "common/printable.h"
+#include "levels/level_bytes.h"
 
 namespace tandem {
 namespace {
 
 constexpr std::size_t kPartsShown = 12;
 
-[[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...) {
-  char text[512];
-  va_list arguments;
-  va_start(arguments, pattern);
-  std::vsnprintf(text, sizeof text, pattern, arguments);
-  va_end(arguments);
-  return text;
+constexpr std::pair<SectionKind, const char*> kSectionKinds[] = {
+    {SectionKind::levels, "levels"},
+    {SectionKind::blocks, "blocks"},
+    {SectionKind::triangles, "triangles"},
+    {SectionKind::parts, "parts"},
+    {SectionKind::strings, "strings"},
+    {SectionKind::provenance, "provenance"},
+    {SectionKind::oriented_blocks, "oriented_blocks"},
+    {SectionKind::topology, "topology"},
+    {SectionKind::components, "components"},
+};
+
+const char* name(SectionKind kind) {
+  for (const auto& [known, name] : kSectionKinds) {
+    if (known == kind) return name;
+  }
+  return "unknown";
+}
+
+Json sections_json(const AssetView& view) {
+  Json sections = Json::array();
+  for (const Section& s : view.sections) {
+    sections.push_back({{"kind", name(s.kind)},
+                        {"level", s.level},
+                        {"offset", s.offset},
+                        {"bytes", s.bytes},
+                        {"count", s.count}});
+  }
+  return sections;
+}
+
+Json surface_json(const SurfaceCounts& counts) {
+  return {{"vertices", counts.vertices},
+          {"components", counts.components},
+          {"closed_components", counts.closed_components},
+          {"turned_triangles", counts.turned_triangles},
+          {"boundary_edges", counts.boundary_edges},
+          {"sides_at_edges_of_many", counts.sides_at_edges_of_many}};
+}
+
+/// The keys of docs/json.md, null where nothing was sampled.
+Json work_json(const ExpectedWork& work) {
+  const bool sampled = work.poses > 0;
+  const auto& oriented = work.oriented;
+  return {{"expected_block_pairs", sampled ? Json(work.block_pairs) : Json()},
+          {"expected_candidates", sampled ? Json(work.candidates) : Json()},
+          {"expected_oriented_block_pairs", oriented ? Json(oriented->block_pairs) : Json()},
+          {"expected_oriented_candidates", oriented ? Json(oriented->candidates) : Json()}};
+}
+
+/// Of the bounds of level 0.
+double diagonal(const FileHeader& header) {
+  double square = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double side = double{header.upper[k]} - double{header.lower[k]};
+    square += side * side;
+  }
+  return std::sqrt(square);
+}
+
+Json levels_json(const Inspection& inspection) {
+  const AssetView& view = inspection.asset.view();
+  Json levels = Json::array();
+  for (std::uint32_t i = 0; i < view.levels.size(); ++i) {
+    const LevelView level = view.level(i);
+    const double relative = level.error_bound / diagonal(*view.header);
+    Json json = {{"triangles", level.triangle_count},
+                 {"blocks", level.block_count},
+                 {"depth", level.depth},
+                 {"bytes", bytes_of_level(view, i)},
+                 {"error_bound", level.error_bound},
+                 {"error_bound_relative", std::isfinite(relative) ? Json(relative) : Json()},
+                 {"closed", level.topology != nullptr ? Json(level.closed) : Json()}};
+    json.update(work_json(inspection.work[i]));
+    levels.push_back(std::move(json));
+  }
+  return levels;
+}
+
+Json parts_json(const AssetView& view) {
+  Json parts = Json::array();
+  for (const Part& part : view.parts) {
+    parts.push_back({{"name", view.name_of(part)},
+                     {"path", view.path_of(part)},
+                     {"first_face", part.first_face},
+                     {"face_count", part.face_count}});
+  }
+  return parts;
 }
 
 std::string point(const float* p) {
@@ -42,19 +124,22 @@ std::string text_of(const Json& json, const char* key) {
   return harmless(found->is_string() ? found->get<std::string>() : found->dump());
 }
 
-std::string source_lines(const Inspection& inspection) {
-  const Json& source = inspection.source;
-  if (!source.is_object() || !source.contains("input")) return "  source       unknown\n";
+void add_source(const Json& source, Report& report) {
+  if (!source.is_object() || !source.contains("input")) {
+    report.row("source", "unknown");
+    return;
+  }
   const Json& input = source["input"];
-  std::string text = "  source       " + text_of(input, "file") + ", " + text_of(input, "bytes") +
-                     " bytes, XXH64 " + text_of(input, "xxh64") + ", read by " + text_of(input, "reader") +
-                     "\n";
-  text += "  built by     " + text_of(source, "tool") + " " + text_of(source, "version");
-  if (!source.contains("options")) return text + "\n";
-  const Json& options = source["options"];
-  text += ", imaginary nodes " + text_of(options, "imaginary") + ", effort " + text_of(options, "effort");
-  const bool interrupted = options.is_object() && options.value("interrupted", Json()) == true;
-  return text + (interrupted ? ", interrupted: the best tree until then\n" : "\n");
+  report.row("source", text_of(input, "file") + ", " + text_of(input, "bytes") + " bytes, XXH64 " +
+                           text_of(input, "xxh64") + ", read by " + text_of(input, "reader"));
+  std::string built = text_of(source, "tool") + " " + text_of(source, "version");
+  if (source.contains("options")) {
+    const Json& options = source["options"];
+    built += ", imaginary nodes " + text_of(options, "imaginary") + ", effort " + text_of(options, "effort");
+    const bool interrupted = options.is_object() && options.value("interrupted", Json()) == true;
+    if (interrupted) built += ", interrupted: the best tree until then";
+  }
+  report.row("built by", built);
 }
 
 std::string faces_of(const Part& part) {
@@ -64,37 +149,34 @@ std::string faces_of(const Part& part) {
          with_commas(part.first_face + part.face_count - 1);
 }
 
-std::string part_lines(const AssetView& view) {
-  std::string text = format("  parts        %zu\n", view.parts.size());
+void add_parts(const AssetView& view, Report& report) {
+  report.row("parts", std::to_string(view.parts.size()));
   for (std::size_t i = 0; i < std::min(view.parts.size(), kPartsShown); ++i) {
     const Part& part = view.parts[i];
     const std::string path = harmless(view.path_of(part));
     const std::string name = harmless(view.name_of(part));
-    text += "               " + (path.empty() ? "" : path + " : ") + (name.empty() ? "(no name)" : name) +
-            "  " + faces_of(part) + "\n";
+    report.row(" ", (path.empty() ? "" : path + " : ") + (name.empty() ? "(no name)" : name) + "  " +
+                        faces_of(part));
   }
   if (view.parts.size() > kPartsShown)
-    text += format("               and %zu more\n", view.parts.size() - kPartsShown);
-  return text;
+    report.row(" ", format("and %zu more", view.parts.size() - kPartsShown));
 }
 
-std::string work_lines(const LevelView& level, const ExpectedWork& work) {
-  std::string text = "  query work   not sampled: the mesh overlaps itself too much, or is too large\n";
-  if (work.poses != 0)
-    text = format("  query work   %.1f block pairs, %.1f candidates expected near contact (%u poses)\n",
-                  work.block_pairs, work.candidates, work.poses);
+void add_work(const LevelView& level, const ExpectedWork& work, Report& report) {
+  report.row("query work", work.poses == 0
+                               ? "not sampled: the mesh overlaps itself too much, or is too large"
+                               : format("%.1f block pairs, %.1f candidates expected near contact (%u poses)",
+                                        work.block_pairs, work.candidates, work.poses));
   if (work.oriented)
-    text += format("  on a GPU     %.1f oriented block pairs, %.1f candidates\n", work.oriented->block_pairs,
-                   work.oriented->candidates);
+    report.row("on a GPU", format("%.1f oriented block pairs, %.1f candidates", work.oriented->block_pairs,
+                                  work.oriented->candidates));
   if (level.oriented_blocks == nullptr)
-    text += "  on a GPU     no exact queries: the file has no oriented blocks\n";
-  return text;
+    report.row("on a GPU", "no exact queries: the file has no oriented blocks");
 }
 
-std::string surface_line(const std::optional<SurfaceCounts>& surface) {
-  if (!surface) return "  surface      no topology: contact manifolds refuse the file\n";
-  std::string text = "  surface      " + with_commas(surface->vertices) + " vertices, " +
-                     with_commas(surface->components) +
+std::string surface_words(const std::optional<SurfaceCounts>& surface) {
+  if (!surface) return "no topology: contact manifolds refuse the file";
+  std::string text = with_commas(surface->vertices) + " vertices, " + with_commas(surface->components) +
                      (surface->components == 1 ? " component, " : " components, ");
   if (surface->closed_components == surface->components) {
     text += "closed";
@@ -107,20 +189,21 @@ std::string surface_line(const std::optional<SurfaceCounts>& surface) {
         ", " + with_commas(surface->sides_at_edges_of_many) + " sides at edges of more than two triangles";
   if (surface->turned_triangles != 0)
     text += ", " + with_commas(surface->turned_triangles) + " triangles taken to be wound the other way";
-  return text + "\n";
+  return text;
 }
 
-std::string tree_lines(const TreeStatistics& tree) {
-  std::string text = "  triangles    " + with_commas(tree.triangles) + "\n";
-  text += "  nodes        " + with_commas(tree.nodes) + ": " + with_commas(tree.leaf_nodes) + " leaves, " +
-          with_commas(tree.internal_nodes) + " internal, " + with_commas(tree.imaginary_nodes) +
-          format(" imaginary (%.2f %%, minimum %llu)\n", 100 * tree.imaginary_fraction,
-                 static_cast<unsigned long long>(tree.imaginary_minimum));
-  text += "  blocks       " + with_commas(tree.leaf_blocks) + " leaf, " + with_commas(tree.internal_blocks) +
-          " internal, " + with_commas(tree.partial_leaf_blocks) + " partial leaf blocks\n";
-  text += format("  depth        %u blocks\n  leaf fill    %.2f %%\n  SAH cost     %.3f\n", tree.depth,
-                 100 * tree.leaf_fill, tree.sah_cost);
-  return text;
+void add_tree(const TreeStatistics& tree, Report& report) {
+  report.row("triangles", with_commas(tree.triangles));
+  report.row("nodes", with_commas(tree.nodes) + ": " + with_commas(tree.leaf_nodes) + " leaves, " +
+                          with_commas(tree.internal_nodes) + " internal, " +
+                          with_commas(tree.imaginary_nodes) +
+                          format(" imaginary (%.2f %%, minimum %llu)", 100 * tree.imaginary_fraction,
+                                 static_cast<unsigned long long>(tree.imaginary_minimum)));
+  report.row("blocks", with_commas(tree.leaf_blocks) + " leaf, " + with_commas(tree.internal_blocks) +
+                           " internal, " + with_commas(tree.partial_leaf_blocks) + " partial leaf blocks");
+  report.row("depth", format("%u blocks", tree.depth));
+  report.row("leaf fill", format("%.2f %%", 100 * tree.leaf_fill));
+  report.row("SAH cost", format("%.3f", tree.sah_cost));
 }
 
 std::string bar(std::uint64_t count, std::uint64_t largest) {
@@ -130,47 +213,43 @@ std::string bar(std::uint64_t count, std::uint64_t largest) {
 }
 
 template <typename Counts>
-std::string histogram(const char* title, const Counts& counts, std::size_t first, std::size_t label_offset) {
+void add_histogram(const char* title, const Counts& counts, std::size_t first, std::size_t label_offset,
+                   Report& report) {
   const std::uint64_t largest = *std::max_element(std::begin(counts), std::end(counts));
-  std::string text = std::string("  ") + title + "\n";
+  report.line(std::string("  ") + title);
   for (std::size_t i = first; i < std::size(counts); ++i) {
     if (counts[i] == 0) continue;
-    text += format("  %11zu  %12s  ", i + label_offset, with_commas(counts[i]).c_str()) +
-            bar(counts[i], largest) + "\n";
+    report.line(format("  %11zu  %12s  ", i + label_offset, with_commas(counts[i]).c_str()) +
+                bar(counts[i], largest));
   }
-  return text;
 }
 
-std::string section_lines(const Json& sections) {
-  std::string text = "  sections\n";
-  for (const Json& section : sections) {
-    text += format("  %15s  level %u  offset %12s  %12s bytes  %10s elements\n",
-                   section["kind"].get<std::string>().c_str(), section["level"].get<unsigned>(),
-                   with_commas(section["offset"].get<std::uint64_t>()).c_str(),
-                   with_commas(section["bytes"].get<std::uint64_t>()).c_str(),
-                   with_commas(section["count"].get<std::uint64_t>()).c_str());
+void add_section_lines(const AssetView& view, Report& report) {
+  report.line("  sections");
+  for (const Section& section : view.sections) {
+    report.line(format("  %15s  level %u  offset %12s  %12s bytes  %10s elements", name(section.kind),
+                       section.level, with_commas(section.offset).c_str(), with_commas(section.bytes).c_str(),
+                       with_commas(section.count).c_str()));
   }
-  return text;
 }
 
 /// Levels side by side.
-std::string level_lines(const Json& levels) {
-  std::string text =
-      "  levels       triangles     blocks  depth         bytes  error bound  of diagonal  block pairs\n";
+void add_level_lines(const Json& levels, Report& report) {
+  report.line(
+      "  levels       triangles     blocks  depth         bytes  error bound  of diagonal  block pairs");
   for (std::size_t i = 0; i < levels.size(); ++i) {
     const Json& level = levels[i];
     const Json &relative = level["error_bound_relative"], &pairs = level["expected_block_pairs"],
                &closed = level["closed"];
-    text +=
-        format("  %6zu %15s %10s %6u %13s  %11.5g  %11s  %11s%s\n", i,
+    report.line(
+        format("  %6zu %15s %10s %6u %13s  %11.5g  %11s  %11s%s", i,
                with_commas(level["triangles"].get<std::uint64_t>()).c_str(),
                with_commas(level["blocks"].get<std::uint64_t>()).c_str(), level["depth"].get<unsigned>(),
                with_commas(level["bytes"].get<std::uint64_t>()).c_str(), level["error_bound"].get<double>(),
                relative.is_null() ? "-" : format("%.3g %%", 100 * relative.get<double>()).c_str(),
                pairs.is_null() ? "-" : format("%.1f", pairs.get<double>()).c_str(),
-               closed == true ? "  closed" : "");
+               closed == true ? "  closed" : ""));
   }
-  return text;
 }
 
 // The figures that people compare when they tune, in the order of the page.
@@ -201,31 +280,54 @@ std::string figure(const Json& value) {
 
 }  // namespace
 
-std::string page(const Inspection& inspection) {
+Report report_of(const Inspection& inspection) {
   const AssetView& view = inspection.asset.view();
   const FileHeader& header = *view.header;
-  std::string text = harmless(inspection.path) + ": Tandem tree, format " +
-                     std::to_string(header.version_major) + "." + std::to_string(header.version_minor) +
-                     ", " + human_bytes(header.file_bytes) + ", hash " + hexadecimal(header.hash) + "\n";
-  text += source_lines(inspection);
-  text += part_lines(view);
-  text += "  bounds       " + point(header.lower) + " to " + point(header.upper) + "\n";
-  text += "  origin       " + point(header.origin) + format(", rounding error %.3g\n", header.rounding_error);
-  text += surface_line(inspection.surface);
-  text += tree_lines(inspection.tree);
-  text += work_lines(view.level(), inspection.work[0]);
-  if (view.levels.size() > 1) text += level_lines(to_json(inspection)["levels"]);
-  text += histogram("leaf blocks at depth", inspection.tree.leaf_blocks_at_depth, 0, 1);
-  text +=
-      histogram("blocks with so many nodes that are not imaginary", inspection.tree.blocks_with_fill, 1, 0);
-  return text + section_lines(to_json(inspection)["sections"]);
+  const std::string version =
+      std::to_string(header.version_major) + "." + std::to_string(header.version_minor);
+  Report report(12, 0);
+  report.line(harmless(inspection.path) + ": Tandem tree, format " + version + ", " +
+              human_bytes(header.file_bytes) + ", hash " + hexadecimal(header.hash));
+  report.add({{"file", inspection.path},
+              {"version", version},
+              {"hash", hexadecimal(header.hash)},
+              {"bytes", header.file_bytes}});
+  for (const Json& figures : {to_json(inspection.tree), work_json(inspection.work[0])})
+    for (const auto& [key, value] : figures.items()) report.add(key, value);
+  report.add({{"surface", inspection.surface ? surface_json(*inspection.surface) : Json()},
+              {"leaf_blocks_at_depth", inspection.tree.leaf_blocks_at_depth},
+              {"blocks_with_fill", inspection.tree.blocks_with_fill},
+              {"bounds/lower", header.lower},
+              {"bounds/upper", header.upper},
+              {"origin", header.origin},
+              {"rounding_error", header.rounding_error},
+              {"source_faces", header.source_faces},
+              {"source", inspection.source},
+              {"parts", parts_json(view)}});
+  const Json levels = levels_json(inspection);
+  report.add("levels", levels);
+  report.add("sections", sections_json(view));
+
+  add_source(inspection.source, report);
+  add_parts(view, report);
+  report.row("bounds", point(header.lower) + " to " + point(header.upper));
+  report.row("origin", point(header.origin) + format(", rounding error %.3g", header.rounding_error));
+  report.row("surface", surface_words(inspection.surface));
+  add_tree(inspection.tree, report);
+  add_work(view.level(), inspection.work[0], report);
+  if (view.levels.size() > 1) add_level_lines(levels, report);
+  add_histogram("leaf blocks at depth", inspection.tree.leaf_blocks_at_depth, 0, 1, report);
+  add_histogram("blocks with so many nodes that are not imaginary", inspection.tree.blocks_with_fill, 1, 0,
+                report);
+  add_section_lines(view, report);
+  return report;
 }
 
 std::string comparison(const std::vector<Inspection>& inspections) {
   std::vector<Json> files;
   std::string text = format("%-30s", "");
   for (const Inspection& inspection : inspections) {
-    files.push_back(to_json(inspection));
+    files.push_back(report_of(inspection).json());
     const std::string name = std::filesystem::path(inspection.path).filename().string();
     text += format(" %24s", printable(name, name.size() > 24 ? 21 : 24).c_str());
   }

@@ -2,17 +2,16 @@
 #include <string>
 #include <vector>
 
+#include "common/report.h"
 #include "inspect.h"
 
 namespace tandem {
 
-/// The readable page of one file. Condition: the inspection is complete.
-std::string page(const Inspection& inspection);
+/// One file: its text is a page for people, its JSON has the keys of docs/json.md. Condition: the inspection
+/// is complete.
+Report report_of(const Inspection& inspection);
 
 /// Two or more files side by side, each figure with its ratio to the first file's.
 std::string comparison(const std::vector<Inspection>& inspections);
-
-/// The JSON object of one file. Keys in docs/json.md.
-Json to_json(const Inspection& inspection);
 
 }  // namespace tandem

@@ -1,5 +1,6 @@
 #pragma once
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 namespace tandem {
@@ -8,6 +9,18 @@ namespace tandem {
 using Json = nlohmann::ordered_json;
 
 /// Text for a terminal or a pipe; bytes that are no UTF-8 become U+FFFD.
-std::string pretty(const Json& json);
+inline std::string pretty(const Json& json) {
+  return json.dump(2, ' ', false, Json::error_handler_t::replace);
+}
+
+template <typename Value>
+Json or_null(const std::optional<Value>& value) {
+  return value ? Json(*value) : Json();
+}
+
+/// Null of an empty text.
+inline Json or_null(const std::string& text) {
+  return text.empty() ? Json() : Json(text);
+}
 
 }  // namespace tandem

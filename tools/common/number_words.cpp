@@ -1,13 +1,12 @@
 #include "number_words.h"
 
+#include <cstdarg>
 #include <cstdio>
 
 namespace tandem {
 
 std::string hexadecimal(std::uint64_t value) {
-  char text[17];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(value));
-  return text;
+  return format("%016llx", static_cast<unsigned long long>(value));
 }
 
 std::string with_commas(std::uint64_t value) {
@@ -25,8 +24,22 @@ std::string human_bytes(std::uint64_t bytes) {
     value /= 1024;
     ++unit;
   }
-  char text[32];
-  std::snprintf(text, sizeof text, unit > 0 && value < 100 ? "%.1f %s" : "%.0f %s", value, kUnits[unit]);
+  return format(unit > 0 && value < 100 ? "%.1f %s" : "%.0f %s", value, kUnits[unit]);
+}
+
+std::string threads_words(std::uint64_t threads) {
+  return with_commas(threads) + (threads == 1 ? " thread" : " threads");
+}
+
+std::string format(const char* pattern, ...) {
+  va_list values;
+  va_start(values, pattern);
+  va_list again;
+  va_copy(again, values);
+  std::string text(static_cast<std::size_t>(std::vsnprintf(nullptr, 0, pattern, values)), '\0');
+  va_end(values);
+  std::vsnprintf(text.data(), text.size() + 1, pattern, again);
+  va_end(again);
   return text;
 }
 

@@ -14,4 +14,10 @@ std::string with_commas(std::uint64_t value);
 /// "527 KiB", "1.2 GiB".
 std::string human_bytes(std::uint64_t bytes);
 
+/// "1 thread", "4 threads".
+std::string threads_words(std::uint64_t threads);
+
+/// What printf() would print.
+[[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...);
+
 }  // namespace tandem

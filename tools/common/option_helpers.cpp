@@ -25,6 +25,20 @@ CLI::Validator file_name() {
   return CLI::Validator(defect, "");
 }
 
+OptionRow required(OptionRow row) {
+  row.required_ = true;
+  return row;
+}
+
+void add_options(CLI::App& app, std::initializer_list<OptionRow> rows) {
+  for (const OptionRow& row : rows) {
+    CLI::Option* option = row.add_(app);
+    if (row.check_) option->check(*row.check_);
+    if (!row.values_.empty()) option->option_text(row.values_);
+    option->required(row.required_);
+  }
+}
+
 namespace {
 
 std::string joined(const std::vector<std::string>& words) {

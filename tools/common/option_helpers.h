@@ -1,6 +1,10 @@
 #pragma once
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <functional>
+#include <initializer_list>
 #include <map>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -15,14 +19,71 @@ struct UsageError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// An option whose values are the names and nothing else: CLI::Transformer would take an enumeration's
-/// numbers too.
+/// The name of a value. Condition: it has one.
 template <typename T>
-CLI::Option* add_choice(CLI::App& app, const char* flag, const std::map<std::string, T>& names, T& chosen,
-                        const char* help) {
-  const auto choose = [&names, &chosen](const std::string& word) { chosen = names.at(word); };
-  return app.add_option_function<std::string>(flag, choose, help)->check(CLI::IsMember(&names));
+const std::string& name_of(const T& value, const std::map<std::string, T>& names) {
+  return std::find_if(names.begin(), names.end(), [&](const auto& name) { return name.second == value; })
+      ->first;
 }
+
+/// An option of a command line, or one of its arguments: a row of its table of options.
+class OptionRow {
+ public:
+  /// name: such as "SCENE", "--repeat" or "-o,--output". values: what the help says of the value, such as
+  /// "N [1]"; empty: its type. The value must outlive the command line.
+  template <typename T>
+  OptionRow(const char* name, T& value, std::string values, std::string help,
+            std::optional<CLI::Validator> check = {})
+      : values_(std::move(values)), check_(std::move(check)) {
+    add_ = [=, &value](CLI::App& app) { return app.add_option(name, value, help); };
+  }
+
+  /// An option whose values are the names and nothing else: CLI::Transformer would take an enumeration's
+  /// numbers too. The names must outlive the command line.
+  template <typename T>
+  OptionRow(const char* name, T& chosen, const std::map<std::string, T>& names, std::string values,
+            std::string help)
+      : values_(std::move(values)), check_(CLI::IsMember(&names)) {
+    const auto choose = [&names, &chosen](const std::string& word) { chosen = names.at(word); };
+    add_ = [=](CLI::App& app) { return app.add_option_function<std::string>(name, choose, help); };
+  }
+
+  /// An option that `take` is given the text of.
+  OptionRow(const char* name, std::function<void(const std::string&)> take, std::string values,
+            std::string help, std::optional<CLI::Validator> check = {})
+      : values_(std::move(values)), check_(std::move(check)) {
+    add_ = [=](CLI::App& app) { return app.add_option_function<std::string>(name, take, help); };
+  }
+
+  /// An option without a value.
+  OptionRow(const char* name, bool& given, std::string help) {
+    add_ = [=, &given](CLI::App& app) { return app.add_flag(name, given, help); };
+  }
+
+  /// An option without a value that makes something false.
+  struct Cleared {
+    bool& value;
+  };
+  OptionRow(const char* name, Cleared cleared, std::string help) {
+    const auto clear = [&value = cleared.value] { value = false; };
+    add_ = [=](CLI::App& app) { return app.add_flag_callback(name, clear, help); };
+  }
+
+  friend OptionRow required(OptionRow row);
+  friend void add_options(CLI::App& app, std::initializer_list<OptionRow> rows);
+
+ private:
+  std::function<CLI::Option*(CLI::App&)> add_;
+  std::string values_;
+  std::optional<CLI::Validator> check_;
+  bool required_ = false;
+};
+
+/// The row of an option that must be given.
+OptionRow required(OptionRow row);
+
+/// Gives a command these options, in the order of its help.
+void add_options(CLI::App& app, std::initializer_list<OptionRow> rows);
 
 /// Refuses what is no number from lower to upper. CLI::Range lets NaN pass.
 CLI::Validator between(double lower, double upper);

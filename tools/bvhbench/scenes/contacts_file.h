@@ -2,10 +2,9 @@
 #include <compare>
 #include <cstdint>
 #include <span>
-#include <string>
 #include <vector>
 
-#include "common/stopwatch.h"
+#include "hdf5_file.h"
 #include "tandem/kernels/contact_query.h"
 #include "tandem/kernels/containment_query.h"
 #include "tandem/kernels/manifold.h"
@@ -37,33 +36,14 @@ ContactTable make_table(std::span<const ObjectPair> pairs, std::vector<FaceConta
 /// XXH64 of pairs, pair, face_a and face_b, one after the other, as little-endian 32-bit numbers.
 std::uint64_t hash_of(const ContactTable& table);
 
-/// How the contacts came about: the attributes of a contacts file.
-struct QueryRecord {
-  std::string mode, backend;
-  bool first_contact = false, self_pairs = false, given_pairs = false;
-  double within = 0;  ///< clearance
-  std::uint64_t threads = 1;
-  Seconds seconds;  ///< of each repeat, at least one
-  ContactCounters counters;
-};
+/// Adds the datasets of a contacts file (docs/scenes.md). Throws OutputError.
+void add_contacts(Hdf5Output& file, const ContactTable& table);
 
-/// Contact manifolds that go with a ContactTable: Manifold::pair is a row of its pairs.
-struct ManifoldTable {
-  std::span<const Manifold> manifolds;
-  std::span<const ManifoldPoint> points;
-  ManifoldCounters counters;
-  Seconds seconds;  ///< of each repeat, at least one
-};
+/// Adds those of contact manifolds. Manifold::pair is a row of the table's pairs.
+void add_manifolds(Hdf5Output& file, std::span<const Manifold> manifolds,
+                   std::span<const ManifoldPoint> points);
 
-/// Bodies within bodies: Containment::pair is a row of a ContactTable's pairs.
-struct ContainedTable {
-  std::span<const Containment> rows;
-  Seconds seconds;  ///< of each repeat, at least one
-};
-
-/// Writes a contacts file (docs/scenes.md), whole or not at all. manifolds, contained: or null. Throws
-/// OutputError.
-void write_contacts(const std::string& path, const ContactTable& table, const QueryRecord& record,
-                    const ManifoldTable* manifolds = nullptr, const ContainedTable* contained = nullptr);
+/// Adds those of bodies within bodies. Containment::pair is a row of the table's pairs.
+void add_contained(Hdf5Output& file, std::span<const Containment> rows);
 
 }  // namespace tandem::bench

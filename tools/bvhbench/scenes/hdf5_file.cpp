@@ -394,6 +394,22 @@ void Hdf5Output::attribute(const std::string& name, const std::string& value) {
   attribute(name, type, &text);
 }
 
+void Hdf5Output::attributes(const Report& report) {
+  for (const auto& [key, value, in_json, in_file] : report.entries()) {
+    if (!in_file) continue;
+    if (value.is_object()) {
+      attribute("best_" + key, value["best"].get<double>());
+      attribute("median_" + key, value["median"].get<double>());
+    } else if (value.is_string()) {
+      attribute(key, value.get<std::string>());
+    } else if (value.is_number_float()) {
+      attribute(key, value.get<double>());
+    } else if (!value.is_null()) {
+      attribute(key, value.is_boolean() ? std::uint64_t{value.get<bool>()} : value.get<std::uint64_t>());
+    }
+  }
+}
+
 std::vector<std::byte> Hdf5Output::image() {
   if (H5Fflush(file_, H5F_SCOPE_GLOBAL) < 0) refuse(last_reason());
   const ssize_t bytes = H5Fget_file_image(file_, nullptr, 0);

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/report.h"
 #include "scene_file.h"
 
 /// The part of HDF5 that scenes and contacts need, with errors that name the file and what is wrong in it.
@@ -85,6 +86,10 @@ class Hdf5Output {
   void attribute(const std::string& name, std::uint64_t value);
   void attribute(const std::string& name, double value);
   void attribute(const std::string& name, const std::string& value);
+
+  /// Adds the entries of a report that a file has: numbers and texts, booleans as 0 and 1, and of times,
+  /// unless they are null, best and median.
+  void attributes(const Report& report);
 
   /// Makes the file at the path hold all of it, or leaves it as it was.
   void write();

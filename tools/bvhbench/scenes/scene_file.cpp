@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <new>
 
-#include "hdf5_file.h"
+#include "columns.h"
 #include "scene_child.h"
 
 namespace tandem::bench {
@@ -209,12 +209,6 @@ LoadedScene read_scene(const std::string& path) {
 }
 
 namespace {
-
-void add_pairs(Hdf5Output& file, const char* name, const std::vector<ObjectPair>& pairs) {
-  std::vector<std::uint32_t> numbers;
-  for (const ObjectPair& pair : pairs) numbers.insert(numbers.end(), {pair.a, pair.b});
-  file.add(name, {pairs.size(), 2}, numbers);
-}
 
 void add_filter(Hdf5Output& file, const SceneFilter& filter) {
   const auto add = [&](const char* name, const std::vector<std::uint32_t>& values) {

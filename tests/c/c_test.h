@@ -26,6 +26,22 @@ static int failures = 0;
     }                                                                                             \
   } while (0)
 
+/// An allocator that has no memory.
+static inline void* refuse(void* user, size_t bytes, size_t alignment) {
+  (void)user;
+  (void)bytes;
+  (void)alignment;
+  return NULL;
+}
+
+static inline void take_back(void* user, void* memory, size_t bytes, size_t alignment) {
+  (void)user;
+  (void)memory;
+  (void)bytes;
+  (void)alignment;
+  ++failures;  // it gave none
+}
+
 typedef struct Triangles {
   double* positions;
   uint32_t* triangles;

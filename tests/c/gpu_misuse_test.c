@@ -4,21 +4,6 @@
 
 #include "c_test.h"
 
-static void* refuse(void* user, size_t bytes, size_t alignment) {
-  (void)user;
-  (void)bytes;
-  (void)alignment;
-  return NULL;
-}
-
-static void take_back(void* user, void* memory, size_t bytes, size_t alignment) {
-  (void)user;
-  (void)memory;
-  (void)bytes;
-  (void)alignment;
-  ++failures;  // it gave none
-}
-
 static void test_an_upload(tandem_asset* cube) {
   tandem_asset* const list[2] = {cube, NULL};
   tandem_upload_options options = {sizeof options, TANDEM_CONTENTS_ALL};

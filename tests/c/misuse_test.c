@@ -2,21 +2,6 @@
 #define _POSIX_C_SOURCE 200112L
 #include "c_test.h"
 
-static void* refuse(void* user, size_t bytes, size_t alignment) {
-  (void)user;
-  (void)bytes;
-  (void)alignment;
-  return NULL;
-}
-
-static void take_back(void* user, void* memory, size_t bytes, size_t alignment) {
-  (void)user;
-  (void)memory;
-  (void)bytes;
-  (void)alignment;
-  ++failures;  // it gave none
-}
-
 // Grants some allocations, then none.
 static int grants_left;
 

@@ -6,19 +6,8 @@ using namespace tandem::c;
 
 namespace {
 
-constexpr tandem_status bad_unless(bool good) {
-  return good ? TANDEM_OK : TANDEM_BAD_OPTION;
-}
-
 CheckDepth depth_of(uint32_t check_depth) {
   return check_depth == TANDEM_CHECK_QUICK ? CheckDepth::quick : CheckDepth::full;
-}
-
-// Clears what a function that makes an asset returns by pointers; false: there is no place for the asset.
-bool begin(tandem_asset** asset, uint64_t* where) {
-  if (where != nullptr) *where = 0;
-  if (asset != nullptr) *asset = nullptr;
-  return asset != nullptr;
 }
 
 tandem_status checked(const void* data, size_t bytes, const tandem_memory_options& options, uint64_t* where,
@@ -54,15 +43,14 @@ tandem_asset::~tandem_asset() {
 
 tandem_status tandem_asset_open(const char* path, const tandem_open_options* options,
                                 const tandem_allocator* allocator, tandem_asset** asset, uint64_t* where) {
-  if (!begin(asset, where) || path == nullptr) return TANDEM_NULL_ARGUMENT;
-  tandem_open_options read;
-  tandem_status status = read_struct(options, read);
-  if (status == TANDEM_OK)
-    status = bad_unless(read.access <= TANDEM_ACCESS_READ && read.check_depth <= TANDEM_CHECK_QUICK &&
-                        read.reserved == 0);
-  if (status != TANDEM_OK) return status;
-  const Access access = read.access == TANDEM_ACCESS_READ ? Access::read : Access::map;
-  return create(allocator, asset, [&](tandem_asset& made) {
+  if (where != nullptr) *where = 0;
+  return create(allocator, asset, [&](tandem_asset& made) -> tandem_status {
+    if (path == nullptr) return TANDEM_NULL_ARGUMENT;
+    tandem_open_options read;
+    if (const tandem_status status = read_struct(options, read); status != TANDEM_OK) return status;
+    if (read.access > TANDEM_ACCESS_READ || read.check_depth > TANDEM_CHECK_QUICK || read.reserved != 0)
+      return TANDEM_BAD_OPTION;
+    const Access access = read.access == TANDEM_ACCESS_READ ? Access::read : Access::map;
     const Status opened = made.file.open(path, access, depth_of(read.check_depth));
     if (where != nullptr) *where = made.file.where();
     made.view = made.file.view();
@@ -73,14 +61,15 @@ tandem_status tandem_asset_open(const char* path, const tandem_open_options* opt
 tandem_status tandem_asset_from_memory(const void* data, size_t bytes, const tandem_memory_options* options,
                                        const tandem_allocator* allocator, tandem_asset** asset,
                                        uint64_t* where) {
-  if (!begin(asset, where) || !is_there(data, bytes)) return TANDEM_NULL_ARGUMENT;
-  tandem_memory_options read;
-  tandem_status status = read_struct(options, read);
-  if (status == TANDEM_OK)
-    status = bad_unless(read.check_depth <= TANDEM_CHECK_QUICK && read.borrow <= 1 && read.reserved == 0);
-  if (status != TANDEM_OK) return status;
-  return create(allocator, asset,
-                [&](tandem_asset& made) { return take_bytes(made, data, bytes, read, where); });
+  if (where != nullptr) *where = 0;
+  return create(allocator, asset, [&](tandem_asset& made) -> tandem_status {
+    if (!is_there(data, bytes)) return TANDEM_NULL_ARGUMENT;
+    tandem_memory_options read;
+    if (const tandem_status status = read_struct(options, read); status != TANDEM_OK) return status;
+    if (read.check_depth > TANDEM_CHECK_QUICK || read.borrow > 1 || read.reserved != 0)
+      return TANDEM_BAD_OPTION;
+    return take_bytes(made, data, bytes, read, where);
+  });
 }
 
 void tandem_asset_retain(tandem_asset* asset) {
@@ -139,7 +128,8 @@ uint32_t tandem_asset_coarsest_level(const tandem_asset* asset, double tolerance
 
 tandem_status tandem_asset_levels_from(tandem_asset* asset, uint32_t first, uint32_t count,
                                        tandem_asset** levels) {
-  if (!begin(levels, nullptr) || asset == nullptr) return TANDEM_NULL_ARGUMENT;
+  if (levels != nullptr) *levels = nullptr;
+  if (levels == nullptr || asset == nullptr) return TANDEM_NULL_ARGUMENT;
   if (first >= asset->view.levels.size()) return TANDEM_UNKNOWN_LEVEL;
   const AllocatorScope scope(asset->allocator);
   auto* const made = new (std::nothrow) tandem_asset;

@@ -15,7 +15,8 @@ inline tandem_status to_c(Status status) {
   return static_cast<tandem_status>(status);
 }
 
-/// No struct will ever be larger: what says so was not initialised.
+/// No struct will ever be larger: what says so was not initialised. None has grown since the first version
+/// that had it, so that the least size is that of now.
 inline constexpr uint32_t kLargestStruct = 4096;
 
 /// The options as this version knows them. given: null for the defaults, which are zeros. Result: TANDEM_OK

@@ -11,16 +11,15 @@
 ///   room makes some and starts again. Uploads, ..._set_assets(), ..._reserve() and ..._destroy() wait too.
 /// - Functions work on the calling thread's current device (cudaSetDevice()); a handle belongs to the device
 ///   that was current when it was given its assets.
-/// - What the GPU finds wrong is in a query's report: ..._device_report() in GPU memory, for kernels that
-/// follow;
-///   ..._get_report(), once the stream has passed the call, in CPU memory, with the status as its result.
+/// - A query's report has the status of what the GPU finds wrong: ..._device_report() in GPU memory, for
+///   kernels that follow; ..._get_report(), once the stream has passed the call, in CPU memory, with the
+///   status as its result too.
 /// - Structs that lie in GPU memory, and capacities, are rows: they have no struct_size and never change.
 /// - A handle that was not given assets yet, or others than the query whose contacts it takes, returns
 ///   TANDEM_ASSETS_MISSING. Any call may return TANDEM_OUT_OF_MEMORY, and of the GPU TANDEM_NO_GPU,
 ///   TANDEM_DRIVER_TOO_OLD, TANDEM_GPU_NOT_SUPPORTED, TANDEM_OUT_OF_GPU_MEMORY or TANDEM_CUDA_FAILED.
 /// - GPU memory comes from cudaMalloc(). An allocator gives the memory of the handle itself; what its query
-/// keeps
-///   in CPU memory, some kilobytes, comes from the C++ runtime.
+///   keeps in CPU memory, some kilobytes, comes from the C++ runtime.
 #ifndef TANDEM_TANDEM_CUDA_H
 #define TANDEM_TANDEM_CUDA_H
 
@@ -168,7 +167,7 @@ TANDEM_API size_t tandem_gpu_broad_phase_bytes(const tandem_gpu_broad_phase* bro
 
 /// ---- Contacts
 
-/// Finds every pair of triangles that meet, of given object pairs: the same set as tandem_contact_query.
+/// Finds every pair of triangles that meet, of given object pairs: the set of tandem_scene_find_contacts().
 typedef struct tandem_gpu_contact_query tandem_gpu_contact_query;
 
 /// reserve() has to know of sorted, grouped, within and add_error_bounds too.
@@ -265,8 +264,7 @@ typedef struct tandem_gpu_manifold_capacity {
 
 typedef struct tandem_gpu_manifold_report {
   tandem_status status;
-  uint32_t
-      complete;  ///< 0: something did not fit, or the query was not complete; then there are no manifolds
+  uint32_t complete;  ///< 0: something did not fit, or the query is not complete; there are no manifolds then
   tandem_gpu_manifold_capacity needed;  ///< where the query is complete
   uint32_t manifolds, points;
   tandem_manifold_counters counters;
@@ -299,7 +297,7 @@ TANDEM_API size_t tandem_gpu_manifolds_bytes(const tandem_gpu_manifolds* manifol
 
 /// ---- Contained bodies
 
-/// Finds bodies within others, which no contact tells: the rows of tandem_contact_query_find_contained().
+/// Finds bodies within others, which no contact tells: the rows of tandem_scene_find_contained().
 typedef struct tandem_gpu_containment_query tandem_gpu_containment_query;
 
 typedef struct tandem_gpu_containment_capacity {
@@ -344,7 +342,8 @@ TANDEM_API size_t tandem_gpu_containment_query_bytes(const tandem_gpu_containmen
 
 /// ---- Distances
 
-/// Finds how near the bodies of given pairs are: as certified as tandem_distance_query, but not its bytes.
+/// Finds how near the bodies of given pairs are: as certified as tandem_scene_find_distances()
+/// finds it, but not the same bytes.
 typedef struct tandem_gpu_distance_query tandem_gpu_distance_query;
 
 typedef struct tandem_gpu_distance_options {
@@ -405,8 +404,8 @@ TANDEM_API size_t tandem_gpu_distance_query_bytes(const tandem_gpu_distance_quer
 
 /// ---- Times of impact
 
-/// Finds until when moving bodies surely do not meet: the guarantee of tandem_impact_query, but not its
-/// bytes.
+/// Finds until when moving bodies surely do not meet: the guarantee of
+/// tandem_scene_find_impacts(), but not the same bytes.
 typedef struct tandem_gpu_impact_query tandem_gpu_impact_query;
 
 typedef struct tandem_gpu_impact_options {
@@ -473,7 +472,7 @@ TANDEM_API size_t tandem_gpu_impact_query_bytes(const tandem_gpu_impact_query* q
 
 /// ---- Levels of detail
 
-/// Comes to the verdicts of tandem_tolerance_query, at the same levels, on given pairs.
+/// Comes to the verdicts of tandem_scene_find_verdicts(), at the same levels, on given pairs.
 typedef struct tandem_gpu_tolerance_query tandem_gpu_tolerance_query;
 
 typedef struct tandem_gpu_tolerance_capacity {

@@ -41,11 +41,13 @@ void LibraryEngine::update(std::span<const BodyPose> bodies) {
 std::span<const ObjectPair> LibraryEngine::find_pairs() {
   if (broad_phase_ == nullptr) {
     broad_phase_ = std::make_unique<ContactQuery>();
-    require(broad_phase_->set_assets(shapes_), broad_phase_->where());
+    const Status status = broad_phase_->set_assets(shapes_);
+    require(status, broad_phase_->where());
   }
   ContactOptions options;
   options.filter = &filter_;
-  require(broad_phase_->find_pairs(bodies_, options), broad_phase_->where());
+  const Status status = broad_phase_->find_pairs(bodies_, options);
+  require(status, broad_phase_->where());
   return broad_phase_->pairs();
 }
 

@@ -112,7 +112,8 @@ class TandemContacts final : public TandemEngine<ContactQuery, ContactOptions> {
   void make_manifolds(std::span<const ObjectPair> pairs, TimedManifolds& made) override {
     if (!manifolds_) {
       manifolds_.emplace();
-      require(manifolds_->set_assets(shapes_), manifolds_->where());
+      const Status status = manifolds_->set_assets(shapes_);
+      require(status, manifolds_->where());
     }
     Stopwatch watch;
     const Status status = manifolds_->make(bodies_, pairs, query_.contacts(),

@@ -73,22 +73,20 @@ TEST(Engines, RefuseAQuestionThatTheyDoNotAnswer) {
 }
 
 TEST(Engines, FindTheSameDistances) {
-  const Pile pile(8);
-  std::vector<ObjectPair> pairs;
+  Pile pile(3);
+  for (std::size_t i = 1; i < pile.bodies.size(); ++i)
+    pile.bodies[i].pose.translation[0] = 3 * static_cast<double>(i);
+  const std::vector<ObjectPair> pairs = {{1, 2}, {2, 3}, {1, 3}};
   std::vector<double> expected, distances;
   for (const auto& engine : make_peers(DistanceOptions())) {
     engine->set_shapes(pile.assets.views());
     engine->update(pile.bodies);
-    if (engine->name() == "tandem") {
-      pairs = engine->time_distances({}).pairs;
-      engine->find_distances(pairs, expected);
-    }
     engine->find_distances(pairs, distances);
-    ASSERT_EQ(distances.size(), expected.size()) << engine->label();
+    if (expected.empty()) expected = distances;
+    ASSERT_EQ(distances.size(), pairs.size()) << engine->label();
     for (std::size_t i = 0; i < pairs.size(); ++i)
-      EXPECT_NEAR(std::max(distances[i], 0.0), expected[i], 1e-5) << engine->label();
+      EXPECT_NEAR(distances[i], expected[i], 1e-5) << engine->label();
   }
-  EXPECT_GT(pairs.size(), 20u);
 }
 
 TEST(Engines, FindImpactsOfTheGivenPairsAsOfThoseThatTheyFind) {

@@ -39,12 +39,14 @@ void LibraryEngine::update(std::span<const BodyPose> bodies) {
 }
 
 std::span<const ObjectPair> LibraryEngine::find_pairs() {
+  Status status = Status::kOk;
   if (scene_ == nullptr) {
     scene_ = std::make_unique<Scene>();
-    require(scene_->set_assets(shapes_), scene_->where());
+    status = scene_->set_assets(shapes_);
   }
-  require(scene_->place(bodies_, filter_), scene_->where());
-  require(scene_->find_pairs(), scene_->where());
+  if (status == Status::kOk) status = scene_->place(bodies_, filter_);
+  if (status == Status::kOk) status = scene_->find_pairs();
+  require(status, scene_->where());
   return scene_->pairs();
 }
 

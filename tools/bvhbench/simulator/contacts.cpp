@@ -12,8 +12,9 @@ Eigen::Vector3d vector_of(const double (&x)[3]) {
   return {x[0], x[1], x[2]};
 }
 
-void throw_unless_ok(Status status, std::uint64_t where) {
+void throw_unless_ok(Status status, const Scene& scene) {
   if (status == Status::kOk) return;
+  const std::uint64_t where = scene.where();
   const std::string blamed =
       subject(status) != nullptr ? std::string(subject(status)) + " " + std::to_string(where) + ": " : "";
   throw EngineError("contact manifolds: " + blamed + explain(status), status, where);
@@ -65,7 +66,7 @@ Eigen::Vector3d across(const Eigen::Vector3d& normal) {
 }
 
 void ContactGenerator::set_shapes(std::span<const AssetView> shapes) {
-  throw_unless_ok(scene_.set_assets(shapes), scene_.where());
+  throw_unless_ok(scene_.set_assets(shapes), scene_);
 }
 
 const std::vector<ContactPoint>& ContactGenerator::generate(const ContactList& found,
@@ -82,8 +83,8 @@ const std::vector<ContactPoint>& ContactGenerator::generate(const ContactList& f
   // The solvers remember by themselves what a point did in the step before.
   const ManifoldOptions manifold_options = {.match_previous = false, .most_points = options.points_per_patch};
   scene_.set_threads(options.threads);
-  throw_unless_ok(scene_.place(bodies), scene_.where());
-  throw_unless_ok(manifolds_.find(scene_, found.pairs, contacts_, manifold_options), scene_.where());
+  throw_unless_ok(scene_.place(bodies), scene_);
+  throw_unless_ok(manifolds_.find(scene_, found.pairs, contacts_, manifold_options), scene_);
   points_.clear();
   statistics_ = {manifolds_.counters(), 0, 0};
   for (const Manifold& manifold : manifolds_.rows()) {

@@ -59,15 +59,25 @@ test::Mesh inner_soup(test::RandomPoses& random, std::uint32_t triangles) {
   return mesh;
 }
 
-TEST_F(Gpu, AnUploadedFileHasTheSameBytes) {
-  const build::Image image = test::make_file(test::random_mesh(5000, 1));
-  const CheckResult checked = check(image.data(), image.size());
-  ASSERT_EQ(checked.status, Status::kOk);
+/// A file, and its copy in GPU memory.
+struct Uploaded {
+  explicit Uploaded(const test::Bytes& bytes, Contents contents = Contents::all)
+      : file(bytes), view(file.check().asset) {
+    EXPECT_EQ(file.check().status, Status::kOk);
+    EXPECT_EQ(assets.upload({&view, 1}, contents, nullptr), Status::kOk)
+        << cudaGetErrorString(assets.cuda_error());
+  }
+  explicit Uploaded(const test::Mesh& mesh) : Uploaded(test::Bytes(test::make_file(mesh))) {}
+
+  test::Bytes file;
+  AssetView view;
   DeviceAssets assets;
-  ASSERT_EQ(assets.upload({&checked.asset, 1}, Contents::all, nullptr), Status::kOk)
-      << cudaGetErrorString(assets.cuda_error());
-  EXPECT_EQ(assets.bytes(), image.size());
-  expect_same(checked.asset.level(), assets.level(0), Contents::all);
+};
+
+TEST_F(Gpu, AnUploadedFileHasTheSameBytes) {
+  const Uploaded uploaded(test::random_mesh(5000, 1));
+  EXPECT_EQ(uploaded.assets.bytes(), uploaded.file.size());
+  expect_same(uploaded.view.level(), uploaded.assets.level(0), Contents::all);
 }
 
 TEST_F(Gpu, AnUploadHasWhatItIsFor) {
@@ -99,13 +109,10 @@ TEST_F(Gpu, AnUploadHasWhatItIsFor) {
 TEST_F(Gpu, AFileWithoutTopologyIsUploadedForManifoldsWithoutIt) {
   test::RandomPoses random(7);
   const test::MadeLevel level = test::built_level(test::soup(random, 30, 0.1));
-  const test::Bytes file = test::made_file({&level, 1}, true, false);
-  const AssetView view = file.check().asset;
-  DeviceAssets assets;
-  ASSERT_EQ(assets.upload({&view, 1}, Contents::manifolds, nullptr), Status::kOk);
-  EXPECT_NE(assets.level(0).triangles, nullptr);
-  EXPECT_EQ(assets.level(0).topology, nullptr);
-  EXPECT_EQ(assets.level(0).components, nullptr);
+  const Uploaded uploaded(test::made_file({&level, 1}, true, false), Contents::manifolds);
+  EXPECT_NE(uploaded.assets.level(0).triangles, nullptr);
+  EXPECT_EQ(uploaded.assets.level(0).topology, nullptr);
+  EXPECT_EQ(uploaded.assets.level(0).components, nullptr);
 }
 
 /// Files from one triangle on, of one level and of several, and so many views of them, in turn, that threads
@@ -216,14 +223,11 @@ TEST_F(Gpu, ACopyThatFailsSaysSo) {
 }
 
 TEST_F(Gpu, AssetsMoveAndUploadAgain) {
-  const build::Image image = test::make_file(test::random_mesh(100, 1));
-  const AssetView view = check(image.data(), image.size()).asset;
-  DeviceAssets first;
-  ASSERT_EQ(first.upload({&view, 1}, Contents::all, nullptr), Status::kOk);
-  DeviceAssets second = std::move(first);
-  EXPECT_EQ(first.count(), 0u);
+  Uploaded first(test::random_mesh(100, 1));
+  DeviceAssets second = std::move(first.assets);
+  EXPECT_EQ(first.assets.count(), 0u);
   EXPECT_EQ(second.count(), 1u);
-  ASSERT_EQ(second.upload({&view, 1}, Contents::all, nullptr), Status::kOk);
+  ASSERT_EQ(second.upload({&first.view, 1}, Contents::all, nullptr), Status::kOk);
   EXPECT_EQ(second.level(0).triangle_count, 100u);
   ASSERT_EQ(second.upload({}, Contents::all, nullptr), Status::kOk);
   EXPECT_EQ(second.count(), 0u);
@@ -241,12 +245,9 @@ __global__ void count_leaves(LevelView level, unsigned* leaves) {
 }
 
 TEST_F(Gpu, KernelsReadTheTreeInPlace) {
-  const build::Image image = test::make_file(test::random_mesh(5001, 2));
-  const AssetView view = check(image.data(), image.size()).asset;
-  DeviceAssets assets;
-  ASSERT_EQ(assets.upload({&view, 1}, Contents::all, nullptr), Status::kOk);
+  const Uploaded uploaded(test::random_mesh(5001, 2));
   const auto leaves = on_gpu(std::vector<unsigned>{0});
-  const LevelView level = assets.level(0);
+  const LevelView level = uploaded.assets.level(0);
   count_leaves<<<(level.block_count + 127) / 128, 128>>>(level, leaves.data());
   ASSERT_EQ(cudaGetLastError(), cudaSuccess);
   EXPECT_EQ(download(leaves.data(), 1)[0], 5001u);

@@ -33,17 +33,14 @@ class FullGpu {
 
 class GpuRoom : public test::GpuTest {};
 
-std::vector<ObjectPair> pairs_of(std::uint32_t bodies) {
-  std::vector<ObjectPair> pairs;
-  for (std::uint32_t a = 0; a < bodies; ++a) {
-    for (std::uint32_t b = a + 1; b < bodies; ++b) pairs.push_back({a, b});
-  }
-  return pairs;
+std::vector<ObjectPair> every_pair(const BodyScene& scene) {
+  test::RandomPoses random(1);
+  return test::all_pairs(scene.instances, false, random);
 }
 
 TEST_F(GpuRoom, AFullGpuIsToldByItsNameAndIsNoEnd) {
   const BodyScene scene = test::pile(100, 3000, 1, 31);
-  const std::vector<ObjectPair> pairs = pairs_of(100);
+  const std::vector<ObjectPair> pairs = every_pair(scene);
   const build::Image large = test::make_file(test::random_mesh(100000, 1));
   const AssetView large_view = check(large.data(), large.size()).asset;
   AskedContacts gpu(scene, pairs);
@@ -95,7 +92,7 @@ class Taken {
 
 TEST_F(GpuRoom, AQueryHoldsNoMoreThanItsRuleSays) {
   const BodyScene scene = test::pile(4, 100, 1, 32);
-  const GpuScene on_gpu(scene.assets, scene.instances, pairs_of(4));
+  const GpuScene on_gpu(scene.assets, scene.instances, every_pair(scene));
   for (const GpuContactOptions& options :
        {GpuContactOptions{}, {.sorted = true}, {.grouped = true}, {.sorted = true, .grouped = true}}) {
     for (const GpuContactCapacity wanted :
@@ -117,7 +114,7 @@ TEST_F(GpuRoom, AQueryHoldsNoMoreThanItsRuleSays) {
 
 TEST_F(GpuRoom, AQueryThatGrewHoldsNoMoreThanItsRuleSays) {
   const BodyScene scene = test::pile(100, 3000, 1, 33);
-  AskedContacts gpu(scene, pairs_of(100));
+  AskedContacts gpu(scene, every_pair(scene));
   ASSERT_EQ(gpu.find({.sorted = true}), Status::kOk);
   EXPECT_LE(gpu.query.bytes(), most_query_bytes(gpu.query.capacity(), {.sorted = true}, scene.assets.size()));
 }

@@ -30,6 +30,12 @@ std::vector<Contact> contacts_on_gpu(std::span<const GpuAsset> assets, const Gpu
   return test::sorted(test::download(query.contacts(), query.report().contacts));
 }
 
+/// Two bodies that meet.
+std::vector<Instance> two_bodies(RandomPoses& random, double spread, std::uint32_t second_asset = 0) {
+  const Pose first = random.pose({1, 1, spread, 0, 4});
+  return {{0, first}, {second_asset, random.pose({1, 1, spread, 0, 4})}};
+}
+
 TEST_F(GpuAssets, OfExactQueriesAloneAnswerThemAndNoOthers) {
   RandomPoses random(1);
   const BodyScene scene = test::pile(30, 600, 1, 51);
@@ -51,8 +57,7 @@ TEST_F(GpuAssets, WithoutOrientedBlocksAnswerAllButExactQueries) {
   const MadeLevel levels[] = {test::built_level(test::soup(random, 900, 0.2))};
   const Bytes file = test::made_file(levels, false), other = test::made_file(levels);
   const AssetView views[] = {file.check().asset, other.check().asset};
-  const std::vector<Instance> instances = {{0, random.pose({1, 1, 0.1, 0, 4})},
-                                           {1, random.pose({1, 1, 0.1, 0, 4})}};
+  const std::vector<Instance> instances = two_bodies(random, 0.1, 1);
   const std::vector<ObjectPair> pairs = {{0, 1}, {0, 0}};
   DeviceAssets uploaded;
   ASSERT_EQ(uploaded.upload(views, Contents::all, nullptr), Status::kOk);
@@ -93,8 +98,7 @@ TEST_F(GpuAssets, OfEveryLevelHaveThatLevelsContacts) {
   const Bytes file = test::made_file(levels);
   ASSERT_EQ(file.check().status, Status::kOk);
   const AssetView view = file.check().asset;
-  const std::vector<Instance> instances = {{0, random.pose({1, 1, 0.2, 0, 4})},
-                                           {0, random.pose({1, 1, 0.2, 0, 4})}};
+  const std::vector<Instance> instances = two_bodies(random, 0.2);
   const std::vector<ObjectPair> pairs = {{0, 1}, {1, 1}};
   const GpuScene scene(std::span<const AssetView>(), instances, pairs);
   for (const Contents contents : {Contents::all, Contents::exact_queries}) {
@@ -121,8 +125,7 @@ TEST_F(GpuAssets, OfTheGreatestDepthAreWalked) {
     const Bytes file = test::made_file(levels);
     ASSERT_EQ(file.check().status, Status::kOk);
     const AssetView view = file.check().asset;
-    const std::vector<Instance> instances = {{0, random.pose({1, 1, 0.1, 0, 4})},
-                                             {0, random.pose({1, 1, 0.1, 0, 4})}};
+    const std::vector<Instance> instances = two_bodies(random, 0.1);
     const std::vector<ObjectPair> pairs = {{0, 1}, {0, 0}};
     DeviceAssets uploaded;
     ASSERT_EQ(uploaded.upload({&view, 1}, Contents::all, nullptr), Status::kOk);

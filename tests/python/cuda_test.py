@@ -167,7 +167,7 @@ def test_without_a_gpu_the_reason_is_told():
 @needs_gpu
 def test_contacts_are_those_of_the_cpu(assets, library):
     asset, pose = make_scene()
-    on_cpu = tandem.Query(assets).contacts(cpu_instances(asset, pose))
+    on_cpu = tandem.Scene(assets, cpu_instances(asset, pose)).contacts()
     query = cuda.Query(assets)
     for shape in ((COUNT, 4, 3), (COUNT, 12)):
         found = query.contacts(asset=library.put(asset), pose=library.put(pose.reshape(shape)), sorted=True)
@@ -214,14 +214,14 @@ def test_poses_are_read_where_they_are(assets):
     """Instances that were looked at once: what is written to the array later is found."""
     torch = pytest.importorskip("torch")
     asset, pose = make_scene()
-    query, on_cpu, at = cuda.Query(assets), tandem.Query(assets), torch.from_numpy(pose).cuda()
+    query, on_cpu, at = cuda.Query(assets), tandem.Scene(assets), torch.from_numpy(pose).cuda()
     bodies = query.instances(torch.from_numpy(asset).cuda(), at)
     for step in range(3):
         pose[:, 3] += 0.01 * step
         pose[::2, 3, 0] += 0.02
         at.copy_(torch.from_numpy(pose))
         found = query.contacts(bodies, sorted=True)
-        assert np.array_equal(found.contacts.numpy(), sorted_contacts(on_cpu.contacts(cpu_instances(asset, pose)).contacts))
+        assert np.array_equal(found.contacts.numpy(), sorted_contacts(on_cpu.place(cpu_instances(asset, pose)).contacts().contacts))
 
 
 @needs_gpu
@@ -260,11 +260,11 @@ def test_memory_that_nobody_has_is_used_again(assets):
 def test_manifolds_and_contained_bodies_are_those_of_the_cpu(assets):
     torch = pytest.importorskip("torch")
     asset, pose = make_scene()
-    query, on_cpu = cuda.Query(assets), tandem.Query(assets)
+    query, on_cpu = cuda.Query(assets), tandem.Scene(assets)
     followed = 0
     for step in range(3):
         pose[::2, 3, 0] += 1e-4
-        on_cpu.contacts(cpu_instances(asset, pose))
+        on_cpu.place(cpu_instances(asset, pose)).contacts()
         made, inside = on_cpu.manifolds(), on_cpu.contained()
         found = query.contacts(asset=torch.from_numpy(asset).cuda(), pose=torch.from_numpy(pose).cuda(), sorted=True, grouped=True)
         on_gpu = query.manifolds()
@@ -286,27 +286,27 @@ def test_manifolds_and_contained_bodies_are_those_of_the_cpu(assets):
 def test_distances_impacts_and_verdicts(assets):
     torch = pytest.importorskip("torch")
     asset, pose = make_scene()
-    query, on_cpu, instances = cuda.Query(assets), tandem.Query(assets), cpu_instances(asset, pose)
+    query, on_cpu, instances = cuda.Query(assets), tandem.Scene(assets), cpu_instances(asset, pose)
     bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
-    theirs, ours = on_cpu.distances(instances, reach=0.5), query.distances(bodies, reach=0.5)
+    theirs, ours = on_cpu.place(instances).distances(reach=0.5), query.distances(bodies, reach=0.5)
     assert np.array_equal(ours.pairs.numpy(), theirs.pairs)
     near = theirs.distances["triangle_a"] != tandem.NO_INDEX
     lower, upper = (ours.distances.numpy()[name] for name in ("lower", "upper"))
     assert near.any() and np.all(lower[near] <= theirs.distances["upper"][near]) and np.all(theirs.distances["lower"][near] <= upper[near])
     assert np.array_equal(upper == 0, theirs.distances["upper"] == 0)
     pairs = torch.tensor([[3, 1], [5, 9]], dtype=torch.int32, device="cuda")
-    assert np.array_equal(query.distances(bodies, pairs=pairs).distances.numpy()["upper"] == 0, on_cpu.distances(instances, pairs=[[3, 1], [5, 9]]).distances["upper"] == 0)
+    assert np.array_equal(query.distances(bodies, pairs=pairs).distances.numpy()["upper"] == 0, on_cpu.place(instances).distances(pairs=[[3, 1], [5, 9]]).distances["upper"] == 0)
 
     motion = np.zeros(COUNT, tandem.MOTION)
     motion["velocity"] = np.random.default_rng(3).normal(size=(COUNT, 3))
     motion["center"] = pose[:, 3]
-    theirs = on_cpu.impacts(instances, motion, 0.1)
+    theirs = on_cpu.place(instances).impacts(motion, 0.1)
     found = query.impacts(bodies, motion=torch.from_numpy(motion.view("<f8").reshape(COUNT, 9)).cuda(), duration=0.1)
     assert np.array_equal(found.pairs.numpy(), theirs.pairs)
     assert np.allclose(found.impacts.numpy()["t_safe"], theirs.impacts["t_safe"], atol=1e-3)
     assert np.array_equal(found.impacts.numpy()["status"] == tandem.IMPACT_AT_START, theirs.impacts["status"] == tandem.IMPACT_AT_START)
 
-    theirs, found = on_cpu.verdicts(instances, tolerance=0.01), query.verdicts(bodies, tolerance=0.01)
+    theirs, found = on_cpu.place(instances).verdicts(tolerance=0.01), query.verdicts(bodies, tolerance=0.01)
     assert np.array_equal(found.pairs.numpy(), theirs.pairs) and np.array_equal(found.verdicts.numpy(), theirs.verdicts)
 
 
@@ -315,10 +315,10 @@ def test_filters_and_pairs(assets):
     torch = pytest.importorskip("torch")
     asset, pose = make_scene()
     motion = np.where(np.arange(COUNT) % 3 == 0, tandem.FIXED, tandem.MOVING).astype(np.uint8)
-    on_cpu, query = tandem.Query(assets), cuda.Query(assets)
+    on_cpu, query = tandem.Scene(assets), cuda.Query(assets)
     instances = cpu_instances(asset, pose)
-    excluded = on_cpu.pairs(instances)[:10]
-    expected = on_cpu.contacts(instances, filter=tandem.Filter(motion=motion, excluded=excluded))
+    excluded = on_cpu.place(instances).pairs()[:10]
+    expected = on_cpu.place(instances, filter=tandem.Filter(motion=motion, excluded=excluded)).contacts()
     bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
     filter = cuda.Filter(motion=torch.from_numpy(motion).cuda(), excluded=excluded)
     assert np.array_equal(query.pairs(bodies, filter=filter).numpy(), expected.pairs)
@@ -329,7 +329,7 @@ def test_filters_and_pairs(assets):
     with pytest.raises(ValueError, match="filter is of 3 instances where there are 60"):
         query.contacts(bodies, filter=cuda.Filter(motion=torch.zeros(3, dtype=torch.uint8, device="cuda")))
     near = query.contacts(bodies, within=0.02, sorted=True)
-    assert np.array_equal(near.contacts.numpy(), sorted_contacts(on_cpu.contacts(instances, within=0.02).contacts))
+    assert np.array_equal(near.contacts.numpy(), sorted_contacts(on_cpu.place(instances).contacts(within=0.02).contacts))
 
 
 @needs_gpu
@@ -337,7 +337,7 @@ def test_streams_are_waited_for(assets):
     """Poses that PyTorch writes on one stream, late, are found by a query on another, whose results PyTorch reads on a third."""
     torch = pytest.importorskip("torch")
     asset, pose = make_scene()
-    expected = sorted_contacts(tandem.Query(assets).contacts(cpu_instances(asset, pose)).contacts)
+    expected = sorted_contacts(tandem.Scene(assets, cpu_instances(asset, pose)).contacts().contacts)
     query = cuda.Query(assets)
     numbers, late = torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda()
     at = torch.zeros_like(late)
@@ -366,7 +366,7 @@ def test_streams_are_waited_for(assets):
 def test_a_graph_of_pytorch_finds_the_contacts_of_moved_poses(assets):
     torch = pytest.importorskip("torch")
     asset, pose = make_scene()
-    query, on_cpu, at, numbers = cuda.Query(assets), tandem.Query(assets), torch.from_numpy(pose).cuda(), torch.from_numpy(asset).cuda()
+    query, on_cpu, at, numbers = cuda.Query(assets), tandem.Scene(assets), torch.from_numpy(pose).cuda(), torch.from_numpy(asset).cuda()
     query.reserve(instances=COUNT, pairs=4000, contacts=100_000, sorted=True)
     query.enqueue(asset=numbers, pose=at).wait()  # loads the kernels
     graph, shift = torch.cuda.CUDAGraph(), torch.zeros(3, dtype=torch.float64, device="cuda")
@@ -379,7 +379,7 @@ def test_a_graph_of_pytorch_finds_the_contacts_of_moved_poses(assets):
         shift.copy_(torch.from_numpy(moved))
         graph.replay()
         pose[::2, 3] += moved
-        expected = sorted_contacts(on_cpu.contacts(cpu_instances(asset, pose)).contacts)
+        expected = sorted_contacts(on_cpu.place(cpu_instances(asset, pose)).contacts().contacts)
         torch.cuda.synchronize()
         assert int(total) == len(expected) > 0
         assert np.array_equal(queued.contacts.numpy()[: len(expected)], expected)
@@ -390,7 +390,7 @@ def test_waiting_after_a_replay(assets):
     """A graph that is replayed late, on a stream that the query never saw."""
     torch = pytest.importorskip("torch")
     asset, pose = make_scene()
-    query, on_cpu, at, numbers = cuda.Query(assets), tandem.Query(assets), torch.from_numpy(pose).cuda(), torch.from_numpy(asset).cuda()
+    query, on_cpu, at, numbers = cuda.Query(assets), tandem.Scene(assets), torch.from_numpy(pose).cuda(), torch.from_numpy(asset).cuda()
     query.reserve(instances=COUNT, pairs=4000, contacts=100_000)
     query.enqueue(asset=numbers, pose=at).wait()
     graph, side, seen = torch.cuda.CUDAGraph(), torch.cuda.Stream(), set()
@@ -404,7 +404,7 @@ def test_waiting_after_a_replay(assets):
             graph.replay()
         pairs, contacts = queued.wait(stream)
         pose[::2, 3, 0] += 0.05
-        found = on_cpu.contacts(cpu_instances(asset, pose))
+        found = on_cpu.place(cpu_instances(asset, pose)).contacts()
         assert (pairs, contacts) == (len(found.pairs), len(found.contacts))
         seen.add(contacts)
     assert len(seen) == 4

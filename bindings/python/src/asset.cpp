@@ -11,8 +11,7 @@ const void* there(const void* data) {
 }
 
 Asset* open(const nb::bytes& path, bool read, bool quick) {
-  tandem_open_options options = {};
-  options.struct_size = sizeof options;
+  auto options = sized<tandem_open_options>();
   options.access = read ? TANDEM_ACCESS_READ : TANDEM_ACCESS_MAP;
   options.check_depth = quick ? TANDEM_CHECK_QUICK : TANDEM_CHECK_FULL;
   tandem_asset* asset = nullptr;
@@ -27,8 +26,7 @@ Asset* open(const nb::bytes& path, bool read, bool quick) {
 
 Asset* from_bytes(nb::handle data, bool quick) {
   const Bytes bytes(data);
-  tandem_memory_options options = {};
-  options.struct_size = sizeof options;
+  auto options = sized<tandem_memory_options>();
   options.check_depth = quick ? TANDEM_CHECK_QUICK : TANDEM_CHECK_FULL;
   tandem_asset* asset = nullptr;
   std::uint64_t where = 0;
@@ -47,15 +45,13 @@ Asset* levels_from(const Asset& asset, std::uint32_t first, std::uint32_t count)
 }
 
 tandem_asset_info info_of(const Asset& asset) {
-  tandem_asset_info info = {};
-  info.struct_size = sizeof info;
+  auto info = sized<tandem_asset_info>();
   check(tandem_asset_get_info(asset.get(), &info));
   return info;
 }
 
 tandem_level level_of(const Asset& asset, std::uint32_t level) {
-  tandem_level result = {};
-  result.struct_size = sizeof result;
+  auto result = sized<tandem_level>();
   check(tandem_asset_get_level(asset.get(), level, &result));
   return result;
 }
@@ -123,8 +119,7 @@ nb::object words(const Asset& asset, std::uint32_t number, std::uint32_t corner)
 }
 
 nb::tuple part(const Asset& asset, std::uint32_t number) {
-  tandem_part of = {};
-  of.struct_size = sizeof of;
+  auto of = sized<tandem_part>();
   check(tandem_asset_get_part(asset.get(), number, &of));
   return nb::make_tuple(nb::bytes(of.name, of.name_bytes), nb::bytes(of.path, of.path_bytes), of.first_face,
                         of.face_count);

@@ -48,8 +48,7 @@ nb::tuple build(nb::handle positions, nb::handle triangles, nb::handle faces, co
   std::vector<tandem_mesh_part> mesh_parts;
   for (const auto& [name, path, count] : parts) mesh_parts.push_back({name.c_str(), path.c_str(), count});
 
-  tandem_mesh mesh = {};
-  mesh.struct_size = sizeof mesh;
+  auto mesh = sized<tandem_mesh>();
   mesh.positions = points.data();
   mesh.vertex_count = points.size() / 3;
   mesh.triangles = corners.data();
@@ -59,8 +58,7 @@ nb::tuple build(nb::handle positions, nb::handle triangles, nb::handle faces, co
   mesh.part_count = mesh_parts.size();
 
   Watch watch;
-  tandem_build_options options = {};
-  options.struct_size = sizeof options;
+  auto options = sized<tandem_build_options>();
   options.effort = effort;
   options.no_gpu_blocks = !gpu_blocks;
   options.no_topology = !topology;
@@ -71,8 +69,7 @@ nb::tuple build(nb::handle positions, nb::handle triangles, nb::handle faces, co
   options.user = &watch;
 
   std::unique_ptr<tandem_asset, decltype(&tandem_asset_release)> asset(nullptr, tandem_asset_release);
-  tandem_build_report report = {};
-  report.struct_size = sizeof report;
+  auto report = sized<tandem_build_report>();
   tandem_status status = TANDEM_OK;
   run_with_patience(watch, progress, [&] {
     tandem_asset* made = nullptr;

@@ -1,5 +1,7 @@
 #include "core.h"
 
+#include <stdexcept>
+
 namespace tandem::python {
 
 void check(tandem_status status, std::uint64_t where) {
@@ -29,6 +31,10 @@ nb::object make_bytes(const void* bytes, std::size_t size) {
 
 void* bytes_begin(nb::handle bytearray) {
   return PyByteArray_AsString(bytearray.ptr());
+}
+
+Turn::Turn(std::atomic<bool>& busy, const char* refused) : busy_(busy) {
+  if (busy_.exchange(true)) throw std::runtime_error(refused);
 }
 
 }  // namespace tandem::python

@@ -3,6 +3,7 @@
 /// check what the caller gave, and name the arguments.
 #include <nanobind/nanobind.h>
 
+#include <atomic>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -34,24 +35,43 @@ class Bytes {
 /// Throws ValueError: a buffer is not of whole rows. The package's Python files never let that happen.
 [[noreturn]] void throw_broken_rows();
 
-/// A copy of an array's rows, which other threads cannot change while the interpreter runs them.
+/// A copy of an array's rows, which other threads cannot change while the interpreter runs them. Its data()
+/// is not null, which stands for no array, also where there are no rows.
 template <typename Row>
 std::vector<Row> copy_rows(nb::handle object) {
   const Bytes bytes(object);
   if (bytes.size() % sizeof(Row) != 0) throw_broken_rows();
   const Row* first = static_cast<const Row*>(bytes.data());
-  return {first, first + bytes.size() / sizeof(Row)};
+  const std::size_t count = bytes.size() / sizeof(Row);
+  std::vector<Row> copy;
+  copy.reserve(count + 1);
+  copy.assign(first, first + count);
+  return copy;
+}
+
+/// An options struct of the C interface with its size, and zeros.
+template <typename Options>
+Options sized() {
+  Options options = {};
+  options.struct_size = sizeof options;
+  return options;
 }
 
 /// A new bytearray with a copy of bytes; null: not yet filled.
 nb::object make_bytes(const void* bytes, std::size_t size);
 void* bytes_begin(nb::handle bytearray);
 
-/// A copy of rows that a query has, as a bytearray: NumPy makes an array of it that owns it.
-template <typename Row>
-nb::object to_python(const Row* rows, std::size_t count) {
-  return make_bytes(rows, count * sizeof(Row));
-}
+/// A turn at what takes one call at a time: a second thread gets RuntimeError, which says `refused`.
+class Turn {
+ public:
+  Turn(std::atomic<bool>& busy, const char* refused);
+  ~Turn() { busy_ = false; }
+  Turn(const Turn&) = delete;
+  Turn& operator=(const Turn&) = delete;
+
+ private:
+  std::atomic<bool>& busy_;
+};
 
 /// A checked file in memory, by one reference to it.
 class Asset {
@@ -66,7 +86,7 @@ class Asset {
   tandem_asset* asset_;
 };
 
-/// Which pairs a query looks at; has copies of what it was made of, and never changes.
+/// Which pairs a scene looks at; has copies of what it was made of, and never changes.
 class Filter {
  public:
   Filter(nb::object motion, nb::object group, nb::object mask, nb::object excluded);
@@ -91,6 +111,6 @@ nb::dict statistics(const Asset& asset);
 void add_assets(nb::module_& module);
 void add_builder(nb::module_& module);
 void add_filters(nb::module_& module);
-void add_queries(nb::module_& module);
+void add_scenes(nb::module_& module);
 
 }  // namespace tandem::python

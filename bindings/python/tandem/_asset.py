@@ -135,7 +135,7 @@ class Asset:
         return f"<tandem.Asset of {self.levels[0].triangle_count} triangles, {self._info['level_count']} levels>"
 
     def levels_from(self, first: int, count: int = 0) -> Asset:
-        """An asset that shows `count` levels of this one from level `first` on; 0: all. Queries use the first that an asset shows. The bytes are shared.
+        """An asset that shows `count` levels of this one from level `first` on; 0: all. Questions are about the first that an asset shows. The bytes are shared.
 
         Raises:
             Error: there is no level `first`.

@@ -18,8 +18,8 @@ import numpy.typing as npt
 from ._arrays import FARTHEST, FINITE, amount, pairs_of
 from ._asset import Asset
 from ._errors import Error
-from ._query import Counters
 from ._rows import CONTACT, CONTAINMENT, DISTANCE, IMPACT, MANIFOLD, PAIR, POINT, VERDICT
+from ._scene import Counters, cores_of
 
 try:
     from . import _cuda
@@ -34,7 +34,7 @@ Array = _cuda.Array
 _MODES = {"exact": 0, "fast": 1, "boxes": 2}
 _CONTENTS = {"all": 0, "exact": 1, "manifolds": 2}
 _KINDS = {"u": 1, "f": 2}
-_REPORT = np.dtype([("failed", "<u4"), ("complete", "<u4"), ("where", "<u8"), ("needed_pairs", "<u4"), ("reserved", "<u4"), ("needed_contacts", "<u8"),
+_REPORT = np.dtype([("status", "<u4"), ("complete", "<u4"), ("where", "<u8"), ("needed_pairs", "<u4"), ("reserved", "<u4"), ("needed_contacts", "<u8"),
                     ("needed_undecided", "<u8"), ("contacts", "<u8"), ("world_pairs", "<u8"), ("counters", "<u8", (7,))])
 
 
@@ -248,7 +248,7 @@ class Queued:
 
     @property
     def report(self) -> Rows:
-        """One row: `failed`, not 0 where something is wrong; `complete`, 0 where something did not fit; `contacts`; `needed_pairs`, `needed_contacts`, ..."""
+        """One row: `status`, not 0 where something is wrong; `complete`, 0 where something did not fit; `contacts`; `needed_pairs`, `needed_contacts`, ..."""
         return Rows(self._core.report(), _REPORT)
 
     def wait(self, stream: Any = None) -> tuple[int, int]:
@@ -291,14 +291,7 @@ class Query:
     __slots__ = ("_assets", "_core", "_given", "_step", "__weakref__")
 
     def __init__(self, assets: Iterable[Asset], *, device: int = 0, contents: Literal["all", "exact", "manifolds"] = "all", stream: Any = None):
-        if isinstance(assets, Asset):
-            raise TypeError("assets is one asset where a list of them is wanted")
-        cores = []
-        for place, asset in enumerate(assets):
-            if not isinstance(asset, Asset):
-                raise TypeError(f"assets: entry {place} is {type(asset).__name__} where an Asset is wanted")
-            cores.append(asset._core)
-        self._assets = _cuda.Assets(cores, device, _choice("contents", contents, _CONTENTS), _stream(stream))
+        self._assets = _cuda.Assets(cores_of(assets), device, _choice("contents", contents, _CONTENTS), _stream(stream))
         self._core = _cuda.Query(self._assets)
         self._given: Any = None  # the pairs of the last contacts()
         self._step: _cuda.Step | None = None

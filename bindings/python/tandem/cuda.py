@@ -328,7 +328,7 @@ class Query:
             sorted: pairs ascend, and contacts ascend by pair, face_a, face_b: the same bytes on every run.
             grouped: contacts lie pair by pair, and `manifolds` and `contained` may follow.
 
-        The others: as of `tandem.Query.contacts`.
+        The others: as of `tandem.Scene.contacts`.
         """
         on = _stream(stream)
         found = self._core.contacts(self._bodies(instances, asset, pose, on), self._pairs(pairs, on), _choice("mode", mode, _MODES), first_contact_only,
@@ -359,7 +359,7 @@ class Query:
 
     def distances(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, pairs: Any = None, reach: float | None = None,
                   absolute_tolerance: float = 0.0, relative_tolerance: float = 0.0, filter: Filter | None = None, stream: Any = None) -> Distances:
-        """Finds how near the surfaces are. Arguments: as of `tandem.Query.distances`."""
+        """Finds how near the surfaces are. Arguments: as of `tandem.Scene.distances`."""
         on = _stream(stream)
         found = self._core.distances(self._bodies(instances, asset, pose, on), self._pairs(pairs, on),
                                      None if reach is None else amount(reach, "reach", np.inf), amount(absolute_tolerance, "absolute_tolerance", np.inf),
@@ -380,7 +380,7 @@ class Query:
 
     def verdicts(self, instances: Instances | None = None, *, tolerance: float, asset: Any = None, pose: Any = None, pairs: Any = None,
                  filter: Filter | None = None, stream: Any = None) -> Verdicts:
-        """Tells of pairs whether they are apart, touch, or are within a tolerance. Arguments: as of `tandem.Query.verdicts`."""
+        """Tells of pairs whether they are apart, touch, or are within a tolerance. Arguments: as of `tandem.Scene.verdicts`."""
         on = _stream(stream)
         found = self._core.verdicts(self._bodies(instances, asset, pose, on), amount(tolerance, "tolerance", FARTHEST), self._pairs(pairs, on),
                                     None if filter is None else filter._core, on)

@@ -68,7 +68,7 @@ class View:
     the boxes.
 
     what, instances: as for view().
-    contacts: tandem.Contacts of these instances, whose triangles are drawn in red; or True: a query finds them, anew
+    contacts: tandem.Contacts of these instances, whose triangles are drawn in red; or True: they are found, anew
         for each state of a run, of the pairs that the scene file or `motion` lets through.
     manifolds: tandem.Manifolds of these instances, drawn as points in the colour of their depths, with an arrow for the
         normal of each manifold, from a to b; or True as above.
@@ -87,7 +87,7 @@ class View:
     azimuth, elevation: degrees. From where one looks: 0 from +x, 90 from +y; above the horizon, z is up.
 
     Raises TypeError and ValueError for arguments that do not fit, or not together, RuntimeError where there is nothing
-    to draw with, and what reading files and queries raise.
+    to draw with, and what reading files and scenes raise.
     """
 
     def __init__(self, what: Any, instances: NDArray[np.void] | None = None, *,

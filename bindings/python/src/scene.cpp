@@ -49,9 +49,8 @@ class Scene {
     const auto rows = copy_rows<tandem_instance>(instance);
     if (rows.size() != 1) throw_broken_rows();
     std::uint32_t body = TANDEM_NO_INDEX;
-    change([&](tandem_scene* scene) {
-      return tandem_scene_add(scene, rows.data(), Filter::of(filter), &body);
-    });
+    change(
+        [&](tandem_scene* scene) { return tandem_scene_add(scene, rows.data(), Filter::of(filter), &body); });
     return body;
   }
 
@@ -107,10 +106,10 @@ class Scene {
     auto counters = sized<tandem_counters>();
     check(tandem_scene_get_counters(scene_.get(), &counters));
     const tandem_contact_counters& of = counters.contacts;
-    return nb::make_tuple(pairs_of(TANDEM_CONTACTS), rows<tandem_scene_contacts>(),
-                          nb::make_tuple(of.object_pairs, of.block_pairs, of.candidates,
-                                         of.decided_by_float32, of.decided_by_float64, of.decided_exactly,
-                                         of.contacts));
+    return nb::make_tuple(
+        pairs_of(TANDEM_CONTACTS), rows<tandem_scene_contacts>(),
+        nb::make_tuple(of.object_pairs, of.block_pairs, of.candidates, of.decided_by_float32,
+                       of.decided_by_float64, of.decided_exactly, of.contacts));
   }
 
   nb::tuple manifolds(std::uint32_t most_points, bool match_previous) {

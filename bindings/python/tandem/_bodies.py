@@ -139,9 +139,11 @@ class Bodies:
         self.move(range(len(names)), places)
 
     def _name_assets(self) -> None:
-        numbers: dict[int, int] = {}
-        self.rows["asset"] = [numbers.setdefault(id(shape), len(numbers)) for shape in self.shapes]
-        self.assets = [shape.asset for shape in {id(shape): shape for shape in self.shapes}.values()]
+        different = list({id(shape): shape for shape in self.shapes}.values())
+        numbers = {id(shape): number for number, shape in enumerate(different)}
+        self.rows["asset"] = [numbers[id(shape)] for shape in self.shapes]
+        self.assets = [shape.asset for shape in different]
+        self._middle, self._half = (np.array([getattr(shape, name) for shape in different]).reshape(-1, 3) for name in ("middle", "half"))
         self._scene: Scene | None = None
         self._asked: Asked | None = None  # that the scene's filter is of; None: the bodies are yet to be placed there
         self._moved: set[int] = set()  # since they were placed there
@@ -241,8 +243,9 @@ class Bodies:
 
     def boxes(self) -> tuple[Array, Array]:
         """(n, 3) the least and the greatest coordinates of boxes that the bodies lie in."""
-        middles = np.einsum("nij,nj->ni", self.rows["rotation"], np.array([shape.middle for shape in self.shapes])) + self.rows["translation"]
-        halves = np.einsum("nij,nj->ni", np.abs(self.rows["rotation"]), np.array([shape.half for shape in self.shapes]))
+        asset, rotation = self.rows["asset"], self.rows["rotation"]
+        middles = np.einsum("nij,nj->ni", rotation, self._middle[asset]) + self.rows["translation"]
+        halves = np.einsum("nij,nj->ni", np.abs(rotation), self._half[asset])
         return middles - halves, middles + halves
 
 
@@ -316,7 +319,11 @@ class Search:
         scene = self._scene()
         lows, highs = self.bodies.boxes()
         extent = float(np.linalg.norm(highs.max(axis=0) - lows.min(axis=0)))
-        reach = extent / 256 if self._pair_count > FEW_PAIRS else None
+        reach = None
+        if self._pair_count > FEW_PAIRS:
+            pair = self._nearest_boxes(lows, highs)
+            # Of one body and many, all that can be as near as the one whose box is the nearest.
+            reach = extent / 256 if pair is None else float(scene.distances(pairs=[pair]).distances["upper"][0])
         while True:
             found = scene.distances(reach=reach, relative_tolerance=PRECISION)
             distances = found.distances["upper"].copy()
@@ -327,6 +334,19 @@ class Search:
                 return _nearest(found.pairs[first], found.distances[first])
             assert reach is not None
             reach = 4 * reach if reach < extent else None
+
+    def _nearest_boxes(self, lows: Array, highs: Array) -> tuple[int, int] | None:
+        """Where one body is asked about with others, it and that of these whose box is the nearest to its own; else None."""
+        first_side, body, ignored = self._asked
+        if first_side == len(lows) - 1:
+            body = first_side
+        if body is None:
+            return None
+        gaps = np.maximum(np.maximum(lows - highs[body], lows[body] - highs), 0)
+        squares = np.einsum("ni,ni->n", gaps, gaps)
+        squares[[body, *(other for pair in ignored if body in pair for other in pair)]] = np.inf
+        other = int(squares.argmin())
+        return min(body, other), max(body, other)
 
     def _deepest(self, pairs: Array) -> Nearest:
         """Of pairs (n, 2) that collide the one that is the deepest, the first of equals."""

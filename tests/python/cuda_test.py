@@ -59,6 +59,19 @@ def assets():
     return [tandem.build(BOX_VERTICES, BOX_FACES), cow, tandem.build(0.2 * BOX_VERTICES + 0.4, BOX_FACES)]
 
 
+@pytest.fixture
+def torch():
+    return pytest.importorskip("torch")
+
+
+@pytest.fixture
+def posed(assets, torch):
+    """A query, and the scene as its instances."""
+    asset, pose = make_scene()
+    query = cuda.Query(assets)
+    return query, query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
+
+
 def test_arrays_are_given_back_once_whether_taken_or_refused():
     stream = cuda._stream(None)
     taken = Producer((0, 2), (2, 1))
@@ -210,9 +223,8 @@ def test_the_array_interface_gives_the_same_memory(assets):
 
 
 @needs_gpu
-def test_poses_are_read_where_they_are(assets):
+def test_poses_are_read_where_they_are(torch, assets):
     """Instances that were looked at once: what is written to the array later is found."""
-    torch = pytest.importorskip("torch")
     asset, pose = make_scene()
     query, on_cpu, at = cuda.Query(assets), tandem.Scene(assets), torch.from_numpy(pose).cuda()
     bodies = query.instances(torch.from_numpy(asset).cuda(), at)
@@ -225,8 +237,7 @@ def test_poses_are_read_where_they_are(assets):
 
 
 @needs_gpu
-def test_results_outlive_calls_queries_and_assets(assets):
-    torch = pytest.importorskip("torch")
+def test_results_outlive_calls_queries_and_assets(torch, assets):
     asset, pose = make_scene()
     own = [tandem.Asset.from_bytes(bytes(one)) for one in assets]
     query = cuda.Query(own)
@@ -243,11 +254,8 @@ def test_results_outlive_calls_queries_and_assets(assets):
 
 
 @needs_gpu
-def test_memory_that_nobody_has_is_used_again(assets):
-    torch = pytest.importorskip("torch")
-    asset, pose = make_scene()
-    query = cuda.Query(assets)
-    bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
+def test_memory_that_nobody_has_is_used_again(posed):
+    query, bodies = posed
     found = query.contacts(bodies)
     places = set()
     for _ in range(6):
@@ -257,8 +265,7 @@ def test_memory_that_nobody_has_is_used_again(assets):
 
 
 @needs_gpu
-def test_manifolds_and_contained_bodies_are_those_of_the_cpu(assets):
-    torch = pytest.importorskip("torch")
+def test_manifolds_and_contained_bodies_are_those_of_the_cpu(torch, assets):
     asset, pose = make_scene()
     query, on_cpu = cuda.Query(assets), tandem.Scene(assets)
     followed = 0
@@ -283,8 +290,7 @@ def test_manifolds_and_contained_bodies_are_those_of_the_cpu(assets):
 
 
 @needs_gpu
-def test_distances_impacts_and_verdicts(assets):
-    torch = pytest.importorskip("torch")
+def test_distances_impacts_and_verdicts(torch, assets):
     asset, pose = make_scene()
     query, on_cpu, instances = cuda.Query(assets), tandem.Scene(assets), cpu_instances(asset, pose)
     bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
@@ -311,8 +317,7 @@ def test_distances_impacts_and_verdicts(assets):
 
 
 @needs_gpu
-def test_filters_and_pairs(assets):
-    torch = pytest.importorskip("torch")
+def test_filters_and_pairs(torch, assets):
     asset, pose = make_scene()
     motion = np.where(np.arange(COUNT) % 3 == 0, tandem.FIXED, tandem.MOVING).astype(np.uint8)
     on_cpu, query = tandem.Scene(assets), cuda.Query(assets)
@@ -333,9 +338,8 @@ def test_filters_and_pairs(assets):
 
 
 @needs_gpu
-def test_streams_are_waited_for(assets):
+def test_streams_are_waited_for(torch, assets):
     """Poses that PyTorch writes on one stream, late, are found by a query on another, whose results PyTorch reads on a third."""
-    torch = pytest.importorskip("torch")
     asset, pose = make_scene()
     expected = sorted_contacts(tandem.Scene(assets, cpu_instances(asset, pose)).contacts().contacts)
     query = cuda.Query(assets)
@@ -363,8 +367,7 @@ def test_streams_are_waited_for(assets):
 
 
 @needs_gpu
-def test_a_graph_of_pytorch_finds_the_contacts_of_moved_poses(assets):
-    torch = pytest.importorskip("torch")
+def test_a_graph_of_pytorch_finds_the_contacts_of_moved_poses(torch, assets):
     asset, pose = make_scene()
     query, on_cpu, at, numbers = cuda.Query(assets), tandem.Scene(assets), torch.from_numpy(pose).cuda(), torch.from_numpy(asset).cuda()
     query.reserve(instances=COUNT, pairs=4000, contacts=100_000, sorted=True)
@@ -386,9 +389,8 @@ def test_a_graph_of_pytorch_finds_the_contacts_of_moved_poses(assets):
 
 
 @needs_gpu
-def test_waiting_after_a_replay(assets):
+def test_waiting_after_a_replay(torch, assets):
     """A graph that is replayed late, on a stream that the query never saw."""
-    torch = pytest.importorskip("torch")
     asset, pose = make_scene()
     query, on_cpu, at, numbers = cuda.Query(assets), tandem.Scene(assets), torch.from_numpy(pose).cuda(), torch.from_numpy(asset).cuda()
     query.reserve(instances=COUNT, pairs=4000, contacts=100_000)
@@ -411,8 +413,7 @@ def test_waiting_after_a_replay(assets):
 
 
 @needs_gpu
-def test_a_step_takes_one_call_at_a_time(assets):
-    torch = pytest.importorskip("torch")
+def test_a_step_takes_one_call_at_a_time(torch, assets):
     asset, pose = make_scene()
     query, stream, counts = cuda.Query(assets), torch.cuda.Stream(), []
     bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
@@ -433,11 +434,8 @@ def test_a_step_takes_one_call_at_a_time(assets):
 
 
 @needs_gpu
-def test_given_pairs_are_not_handed_out_as_found(assets):
-    torch = pytest.importorskip("torch")
-    asset, pose = make_scene()
-    query = cuda.Query(assets)
-    bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
+def test_given_pairs_are_not_handed_out_as_found(torch, posed):
+    query, bodies = posed
     found = query.contacts(bodies)
     query.reserve(instances=COUNT, pairs=4000, contacts=100_000)
     first = query.enqueue(bodies)
@@ -454,8 +452,7 @@ def test_given_pairs_are_not_handed_out_as_found(assets):
 
 
 @needs_gpu
-def test_results_keep_their_stream(assets):
-    torch = pytest.importorskip("torch")
+def test_results_keep_their_stream(torch, assets):
     asset, pose = make_scene()
     query, made = cuda.Query(assets), torch.cuda.Stream()
     bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
@@ -473,11 +470,8 @@ def test_results_keep_their_stream(assets):
 
 
 @needs_gpu
-def test_what_lies_on_another_gpu_is_refused(assets):
-    torch = pytest.importorskip("torch")
-    asset, pose = make_scene()
-    query = cuda.Query(assets)
-    bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
+def test_what_lies_on_another_gpu_is_refused(torch, posed, assets):
+    (query, bodies), (asset, pose) = posed, make_scene()
     query.reserve(instances=COUNT, pairs=4000, contacts=100_000)
     filter = cuda.Filter(group=Producer((COUNT,), (1,), device=5), device=5)
     for call in (query.contacts, query.pairs, query.enqueue):
@@ -492,11 +486,8 @@ def test_what_lies_on_another_gpu_is_refused(assets):
 
 
 @needs_gpu
-def test_too_little_room_is_told(assets):
-    torch = pytest.importorskip("torch")
-    asset, pose = make_scene()
-    query = cuda.Query(assets)
-    bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
+def test_too_little_room_is_told(posed):
+    query, bodies = posed
     with pytest.raises(ValueError, match="reserve"):
         query.enqueue(bodies)
     query.reserve(instances=COUNT, pairs=4000, contacts=10, undecided=100_000)
@@ -508,8 +499,7 @@ def test_too_little_room_is_told(assets):
 
 
 @needs_gpu
-def test_what_is_wrong_is_told(assets):
-    torch = pytest.importorskip("torch")
+def test_what_is_wrong_is_told(torch, assets):
     asset, pose = make_scene()
     query, numbers, at = cuda.Query(assets), torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda()
     for error, words, arguments in (

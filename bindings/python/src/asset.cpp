@@ -77,20 +77,12 @@ nb::dict info(const Asset& asset) {
   return result;
 }
 
-nb::dict level(const Asset& asset, std::uint32_t number) {
+// In the order of tandem.Level.
+nb::tuple level(const Asset& asset, std::uint32_t number) {
   const tandem_level of = level_of(asset, number);
-  nb::dict result;
-  result["triangle_count"] = of.triangle_count;
-  result["block_count"] = of.block_count;
-  result["leaf_block_count"] = of.leaf_block_count;
-  result["depth"] = of.depth;
-  result["error_bound"] = of.error_bound;
-  result["has_oriented_blocks"] = of.has_oriented_blocks != 0;
-  result["has_topology"] = of.has_topology != 0;
-  result["vertex_count"] = of.vertex_count;
-  result["component_count"] = of.component_count;
-  result["closed"] = of.closed != 0;
-  return result;
+  return nb::make_tuple(of.triangle_count, of.block_count, of.leaf_block_count, of.depth, of.error_bound,
+                        of.has_oriented_blocks != 0, of.has_topology != 0, of.vertex_count,
+                        of.component_count, of.closed != 0);
 }
 
 // float64 corners in the mesh file's coordinates, three triples for each triangle.

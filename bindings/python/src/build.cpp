@@ -23,18 +23,10 @@ std::uint32_t note(void* user, double share) {
   return 0;
 }
 
-nb::dict to_dict(const tandem_build_report& of) {
-  nb::dict report;
-  report["index_out_of_range"] = of.index_out_of_range;
-  report["not_finite"] = of.not_finite;
-  report["too_large"] = of.too_large;
-  report["degenerate"] = of.degenerate;
-  report["duplicate"] = of.duplicate;
-  report["duplicate_reversed"] = of.duplicate_reversed;
-  report["flattened"] = of.flattened;
-  report["vertices_unreferenced"] = of.vertices_unreferenced;
-  report["vertices_welded"] = of.vertices_welded;
-  return report;
+// In the order of tandem.BuildReport.
+nb::tuple to_tuple(const tandem_build_report& of) {
+  return nb::make_tuple(of.index_out_of_range, of.not_finite, of.too_large, of.degenerate, of.duplicate,
+                        of.duplicate_reversed, of.flattened, of.vertices_unreferenced, of.vertices_welded);
 }
 
 // Positions and triangles by rows; faces of triangles or None; names, paths and counts of faces of parts.
@@ -77,7 +69,7 @@ nb::tuple build(nb::handle positions, nb::handle triangles, nb::handle faces, co
     asset.reset(made);
   });
   check(status);
-  return nb::make_tuple(nb::cast(Asset(asset.release())), to_dict(report));
+  return nb::make_tuple(nb::cast(Asset(asset.release())), to_tuple(report));
 }
 
 }  // namespace

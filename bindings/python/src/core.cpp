@@ -14,14 +14,6 @@ void check(tandem_status status, std::uint64_t where) {
   throw nb::python_error();
 }
 
-Bytes::Bytes(nb::handle object) {
-  if (PyObject_GetBuffer(object.ptr(), &view_, PyBUF_SIMPLE) != 0) throw nb::python_error();
-}
-
-void throw_broken_rows() {
-  throw nb::value_error("a buffer does not hold whole rows");
-}
-
 nb::object make_bytes(const void* bytes, std::size_t size) {
   PyObject* made =
       PyByteArray_FromStringAndSize(static_cast<const char*>(bytes), static_cast<Py_ssize_t>(size));

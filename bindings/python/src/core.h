@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "bytes.h"
 #include "tandem/tandem.h"
 #include "without_lock.h"
 
@@ -17,37 +18,6 @@ namespace nb = nanobind;
 
 /// Throws the Python exception of a status that is not TANDEM_OK (tandem._errors.from_status).
 void check(tandem_status status, std::uint64_t where = 0);
-
-/// The contiguous bytes of a Python object, for as long as this lives.
-class Bytes {
- public:
-  explicit Bytes(nb::handle object);
-  ~Bytes() { PyBuffer_Release(&view_); }
-  Bytes(const Bytes&) = delete;
-  Bytes& operator=(const Bytes&) = delete;
-  const void* data() const { return view_.buf; }
-  std::size_t size() const { return static_cast<std::size_t>(view_.len); }
-
- private:
-  Py_buffer view_;
-};
-
-/// Throws ValueError: a buffer is not of whole rows. The package's Python files never let that happen.
-[[noreturn]] void throw_broken_rows();
-
-/// A copy of an array's rows, which other threads cannot change while the interpreter runs them. Its data()
-/// is not null, which stands for no array, also where there are no rows.
-template <typename Row>
-std::vector<Row> copy_rows(nb::handle object) {
-  const Bytes bytes(object);
-  if (bytes.size() % sizeof(Row) != 0) throw_broken_rows();
-  const Row* first = static_cast<const Row*>(bytes.data());
-  const std::size_t count = bytes.size() / sizeof(Row);
-  std::vector<Row> copy;
-  copy.reserve(count + 1);
-  copy.assign(first, first + count);
-  return copy;
-}
 
 /// An options struct of the C interface with its size, and zeros.
 template <typename Options>

@@ -153,7 +153,7 @@ class Asset:
     @property
     def levels(self) -> list[Level]:
         """The levels of detail that the asset shows, the finest first."""
-        return [Level(**self._core.level(level)) for level in range(self._info["level_count"])]
+        return [Level(*self._core.level(level)) for level in range(self._info["level_count"])]
 
     @property
     def first_level(self) -> int:

@@ -8,6 +8,7 @@
 #include <tuple>
 #include <vector>
 
+#include "bindings/python/src/bytes.h"
 #include "bindings/python/src/patience.h"
 #include "bvhbuild/import/import.h"
 #include "bvhbuild/level_pipeline.h"
@@ -27,29 +28,6 @@ template <typename Row>
 nb::object to_bytes(const std::vector<Row>& rows) {
   return nb::steal(PyByteArray_FromStringAndSize(reinterpret_cast<const char*>(rows.data()),
                                                  static_cast<Py_ssize_t>(rows.size() * sizeof(Row))));
-}
-
-// The contiguous bytes of a Python object, for as long as this lives.
-class Bytes {
- public:
-  explicit Bytes(nb::handle object) {
-    if (PyObject_GetBuffer(object.ptr(), &view_, PyBUF_SIMPLE) != 0) throw nb::python_error();
-  }
-  ~Bytes() { PyBuffer_Release(&view_); }
-  Bytes(const Bytes&) = delete;
-  Bytes& operator=(const Bytes&) = delete;
-  const void* data() const { return view_.buf; }
-  std::size_t size() const { return static_cast<std::size_t>(view_.len); }
-
- private:
-  Py_buffer view_;
-};
-
-template <typename Row>
-std::vector<Row> copy_rows(nb::handle object) {
-  const Bytes bytes(object);
-  const auto* first = static_cast<const Row*>(bytes.data());
-  return {first, first + bytes.size() / sizeof(Row)};
 }
 
 // Points, corners of triangles, the face of each, parts, remarks. own_readers: without assimp, which is run
@@ -85,18 +63,11 @@ std::string provenance_of(const Options& options, const Outcome& outcome) {
   return json.dump();
 }
 
-nb::dict to_dict(const CleanReport& of) {
-  nb::dict report;
-  report["index_out_of_range"] = of.faces_index_out_of_range;
-  report["not_finite"] = of.faces_not_finite;
-  report["too_large"] = of.faces_too_large;
-  report["degenerate"] = of.triangles_degenerate;
-  report["duplicate"] = of.triangles_duplicate;
-  report["duplicate_reversed"] = of.triangles_duplicate_reversed;
-  report["flattened"] = of.triangles_flattened;
-  report["vertices_unreferenced"] = of.vertices_unreferenced;
-  report["vertices_welded"] = of.vertices_welded;
-  return report;
+// In the order of tandem.BuildReport.
+nb::tuple to_tuple(const CleanReport& of) {
+  return nb::make_tuple(of.faces_index_out_of_range, of.faces_not_finite, of.faces_too_large,
+                        of.triangles_degenerate, of.triangles_duplicate, of.triangles_duplicate_reversed,
+                        of.triangles_flattened, of.vertices_unreferenced, of.vertices_welded);
 }
 
 // A mesh as the caller has it.
@@ -121,12 +92,12 @@ nb::tuple build(nb::handle points, nb::handle corners, nb::handle face_begin, nb
                 const nb::object& provenance, nb::handle progress) {
   Source source;
   PolygonMesh& polygons = source.polygons;
-  polygons.points = copy_rows<Point>(points);
-  polygons.corners = copy_rows<std::uint32_t>(corners);
-  polygons.face_begin = copy_rows<std::uint32_t>(face_begin);
+  polygons.points = python::copy_rows<Point>(points);
+  polygons.corners = python::copy_rows<std::uint32_t>(corners);
+  polygons.face_begin = python::copy_rows<std::uint32_t>(face_begin);
   source.face_count = polygons.face_count();
   if (!face_of.is_none()) {
-    source.face_of = copy_rows<std::uint32_t>(face_of);
+    source.face_of = python::copy_rows<std::uint32_t>(face_of);
     source.face_count = 0;
     for (const std::uint32_t face : source.face_of)
       source.face_count = std::max(source.face_count, std::uint64_t{face} + 1);
@@ -175,7 +146,7 @@ nb::tuple build(nb::handle points, nb::handle corners, nb::handle face_begin, nb
   if (!defect.empty()) throw nb::value_error(defect.c_str());
   nb::object bytes = nb::none();
   if (file) bytes = nb::bytes(reinterpret_cast<const char*>(file->image.data()), file->image.size());
-  return nb::make_tuple(bytes, to_dict(outcome.clean));
+  return nb::make_tuple(bytes, to_tuple(outcome.clean));
 }
 
 }  // namespace

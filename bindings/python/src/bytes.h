@@ -1,0 +1,44 @@
+#pragma once
+#include <nanobind/nanobind.h>
+
+#include <cstddef>
+#include <vector>
+
+namespace tandem::python {
+
+/// The contiguous bytes of a Python object, for as long as this lives.
+class Bytes {
+ public:
+  explicit Bytes(nanobind::handle object) {
+    if (PyObject_GetBuffer(object.ptr(), &view_, PyBUF_SIMPLE) != 0) throw nanobind::python_error();
+  }
+  ~Bytes() { PyBuffer_Release(&view_); }
+  Bytes(const Bytes&) = delete;
+  Bytes& operator=(const Bytes&) = delete;
+  const void* data() const { return view_.buf; }
+  std::size_t size() const { return static_cast<std::size_t>(view_.len); }
+
+ private:
+  Py_buffer view_;
+};
+
+/// Throws ValueError: a buffer is not of whole rows. The package's Python files never let that happen.
+[[noreturn]] inline void throw_broken_rows() {
+  throw nanobind::value_error("a buffer does not hold whole rows");
+}
+
+/// A copy of an array's rows, which other threads cannot change while the interpreter runs them. Its data()
+/// is not null, which stands for no array, also where there are no rows.
+template <typename Row>
+std::vector<Row> copy_rows(nanobind::handle object) {
+  const Bytes bytes(object);
+  if (bytes.size() % sizeof(Row) != 0) throw_broken_rows();
+  const Row* first = static_cast<const Row*>(bytes.data());
+  const std::size_t count = bytes.size() / sizeof(Row);
+  std::vector<Row> copy;
+  copy.reserve(count + 1);
+  copy.assign(first, first + count);
+  return copy;
+}
+
+}  // namespace tandem::python

@@ -75,8 +75,9 @@ class Filter {
   tandem_pair_filter filter_ = {};
 };
 
-/// What bvhinfo tells of a file, but for its name, its hash, its parts and its making.
-nb::dict statistics(const Asset& asset);
+/// What bvhinfo measures: the version of the file, its tree, of each level its bytes and the work to expect,
+/// and the surface of the first, or None.
+nb::tuple statistics(const Asset& asset);
 
 void add_assets(nb::module_& module);
 void add_builder(nb::module_& module);

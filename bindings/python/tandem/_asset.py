@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 from typing import Any, Literal, NamedTuple
 
@@ -16,6 +17,11 @@ from ._errors import Error, with_path
 __all__ = ["Asset", "Level", "Part"]
 
 _MOST = 0xFFFFFFFF
+# Of a .bvh file, version 1 (formats/FORMAT.md).
+_SECTION = np.dtype([("kind", "<u4"), ("level", "<u4"), ("offset", "<u8"), ("bytes", "<u8"), ("count", "<u8")])
+_SECTION_COUNT, _SECTION_TABLE = 96, 128
+_SECTION_KINDS = ("levels", "blocks", "triangles", "parts", "strings", "provenance", "oriented_blocks", "topology", "components")
+_WORK = ("expected_block_pairs", "expected_candidates", "expected_oriented_block_pairs", "expected_oriented_candidates")
 
 
 class Level(NamedTuple):
@@ -219,8 +225,23 @@ class Asset:
     def statistics(self) -> dict[str, Any]:
         """What `bvhinfo --json` tells, under its keys (docs/json.md), but for "file": figures of the trees, and the work that queries are expected to do, which
         is sampled and takes a while."""
-        parts = [part._asdict() for part in self.parts]
-        return {**self._core.statistics(), "hash": self.hash, "parts": parts, "source": self.provenance}
+        (major, minor), tree, measured, surface = self._core.statistics()
+        lower, upper = self._info["lower"], self._info["upper"]
+        diagonal = math.sqrt(sum((high - low) * (high - low) for low, high in zip(lower, upper)))
+        levels = [{"triangles": level.triangle_count, "blocks": level.block_count, "depth": level.depth, "bytes": size, "error_bound": level.error_bound,
+                   "error_bound_relative": level.error_bound / diagonal if diagonal else None, "closed": level.closed if level.has_topology else None,
+                   **dict(zip(_WORK, work))} for level, (size, work) in zip(self.levels, measured)]
+        sections = [dict(zip(("kind", *(_SECTION.names or ())[1:]), (_SECTION_KINDS[kind - 1], *rest))) for kind, *rest in sections_of(self).tolist()]
+        return {"version": f"{major}.{minor}", "hash": self.hash, "bytes": self.file_bytes, **tree, **dict(zip(_WORK, measured[0][1])), "surface": surface,
+                "bounds": {"lower": list(lower), "upper": list(upper)}, "origin": list(self._info["origin"]), "rounding_error": self.rounding_error,
+                "source_faces": self.source_faces, "source": self.provenance, "parts": [part._asdict() for part in self.parts], "levels": levels,
+                "sections": sections}
+
+
+def sections_of(asset: Asset) -> npt.NDArray[np.void]:
+    """The table of a file's sections: kind, level, offset, bytes and count of each."""
+    count = int(np.frombuffer(asset.data, "<u4", 1, _SECTION_COUNT)[0])
+    return np.frombuffer(asset.data, _SECTION, count, _SECTION_TABLE)
 
 
 def _restore(data: bytes, first_level: int, level_count: int) -> Asset:

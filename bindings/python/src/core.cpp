@@ -25,6 +25,11 @@ void* bytes_begin(nb::handle bytearray) {
   return PyByteArray_AsString(bytearray.ptr());
 }
 
+nb::tuple counters_of(const tandem_contact_counters& of) {
+  return nb::make_tuple(of.object_pairs, of.block_pairs, of.candidates, of.decided_by_float32,
+                        of.decided_by_float64, of.decided_exactly, of.contacts);
+}
+
 Turn::Turn(std::atomic<bool>& busy, const char* refused) : busy_(busy) {
   if (busy_.exchange(true)) throw std::runtime_error(refused);
 }

@@ -75,6 +75,9 @@ class Filter {
   tandem_pair_filter filter_ = {};
 };
 
+/// In the order of tandem.Counters.
+nb::tuple counters_of(const tandem_contact_counters& counters);
+
 /// What bvhinfo measures: the version of the file, its tree, of each level its bytes and the work to expect,
 /// and the surface of the first, or None.
 nb::tuple statistics(const Asset& asset);

@@ -105,11 +105,8 @@ class Scene {
     find_contacts(options);
     auto counters = sized<tandem_counters>();
     check(tandem_scene_get_counters(scene_.get(), &counters));
-    const tandem_contact_counters& of = counters.contacts;
-    return nb::make_tuple(
-        pairs_of(TANDEM_CONTACTS), rows<tandem_scene_contacts>(),
-        nb::make_tuple(of.object_pairs, of.block_pairs, of.candidates, of.decided_by_float32,
-                       of.decided_by_float64, of.decided_exactly, of.contacts));
+    return nb::make_tuple(pairs_of(TANDEM_CONTACTS), rows<tandem_scene_contacts>(),
+                          counters_of(counters.contacts));
   }
 
   nb::tuple manifolds(std::uint32_t most_points, bool match_previous) {

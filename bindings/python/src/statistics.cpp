@@ -19,24 +19,11 @@ nb::list to_list(const Values& values) {
   return list;
 }
 
-nb::dict to_dict(const TreeStatistics& s) {
-  nb::dict to;
-  to["triangles"] = s.triangles;
-  to["nodes"] = s.nodes;
-  to["leaf_nodes"] = s.leaf_nodes;
-  to["internal_nodes"] = s.internal_nodes;
-  to["imaginary_nodes"] = s.imaginary_nodes;
-  to["imaginary_minimum"] = s.imaginary_minimum;
-  to["imaginary_fraction"] = s.imaginary_fraction;
-  to["leaf_blocks"] = s.leaf_blocks;
-  to["internal_blocks"] = s.internal_blocks;
-  to["partial_leaf_blocks"] = s.partial_leaf_blocks;
-  to["depth"] = s.depth;
-  to["leaf_fill"] = s.leaf_fill;
-  to["sah_cost"] = s.sah_cost;
-  to["leaf_blocks_at_depth"] = to_list(s.leaf_blocks_at_depth);
-  to["blocks_with_fill"] = to_list(s.blocks_with_fill);
-  return to;
+nb::tuple to_tuple(const TreeStatistics& s) {
+  return nb::make_tuple(s.triangles, s.nodes, s.leaf_nodes, s.internal_nodes, s.imaginary_nodes,
+                        s.imaginary_minimum, s.imaginary_fraction, s.leaf_blocks, s.internal_blocks,
+                        s.partial_leaf_blocks, s.depth, s.leaf_fill, s.sah_cost,
+                        to_list(s.leaf_blocks_at_depth), to_list(s.blocks_with_fill));
 }
 
 // Block pairs and candidates, then those of oriented blocks.
@@ -51,14 +38,8 @@ nb::tuple to_tuple(const ExpectedWork& work) {
 nb::object surface_of(const LevelView& level) {
   const auto counts = count_surface(level);
   if (!counts) return nb::none();
-  nb::dict surface;
-  surface["vertices"] = counts->vertices;
-  surface["components"] = counts->components;
-  surface["closed_components"] = counts->closed_components;
-  surface["turned_triangles"] = counts->turned_triangles;
-  surface["boundary_edges"] = counts->boundary_edges;
-  surface["sides_at_edges_of_many"] = counts->sides_at_edges_of_many;
-  return surface;
+  return nb::make_tuple(counts->vertices, counts->components, counts->closed_components,
+                        counts->turned_triangles, counts->boundary_edges, counts->sides_at_edges_of_many);
 }
 
 }  // namespace
@@ -77,7 +58,7 @@ nb::tuple statistics(const Asset& asset) {
   nb::list levels;
   for (std::uint32_t i = 0; i < view.levels.size(); ++i)
     levels.append(nb::make_tuple(bytes_of_level(view, i), to_tuple(work[i])));
-  return nb::make_tuple(nb::make_tuple(header.version_major, header.version_minor), to_dict(tree), levels,
+  return nb::make_tuple(nb::make_tuple(header.version_major, header.version_minor), to_tuple(tree), levels,
                         surface_of(view.level()));
 }
 

@@ -5,16 +5,6 @@
 #include <limits>
 
 namespace tandem::python {
-namespace {
-
-nb::tuple counters_of(const tandem_contact_counters& counters) {
-  return nb::make_tuple(counters.object_pairs, counters.block_pairs, counters.candidates,
-                        counters.decided_by_float32, counters.decided_by_float64, counters.decided_exactly,
-                        counters.contacts);
-}
-
-}  // namespace
-
 FoundPairs Query::find_pairs(const Instances& bodies, bool sorted, double within, const GpuFilter* filter,
                              const Stream& stream) {
   const auto broad_phase = broad_phases_.take(assets_, stream);

@@ -41,9 +41,9 @@ for part in mesh.parts:
     of_part = (mesh.face_ids >= part.first_face) & (mesh.face_ids < part.first_face + part.face_count)
     assets.append(tandem.build(mesh.vertices, mesh.triangles[of_part]))
 everything = tandem.instances(np.arange(len(assets)))
-query = tandem.Query(assets)
-found = query.contacts(everything)
-manifolds = query.manifolds()
+scene = tandem.Scene(assets, everything)
+found = scene.contacts()
+manifolds = scene.manifolds()
 
 # Parts that touch face to face meet as well; the depth tells a joint from a clash. The shaft turns freely in its bearings, whose
 # facets come within 0.002 mm of its own: decisions are exact, so there is no tolerance to choose.
@@ -54,7 +54,7 @@ for row in np.unique(found.contacts["pair"]):
     clashes += [row] if depth > 0.001 else []
     print(f"{names[a]} and {names[b]}", f"CLASH, {depth:.2f} mm deep" if depth > 0.001 else "touch")
 # A part that lies wholly within another meets nothing of it; that is another question.
-contained = query.contained()
+contained = scene.contained()
 for row in contained.contained:
     a, b = contained.pairs[row["pair"]]
     print("{0} lies WITHIN {1}".format(*(names[a], names[b]) if row["inner"] == 0 else (names[b], names[a])))

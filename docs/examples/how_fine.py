@@ -22,7 +22,7 @@ translation = random.uniform(-1.9, 1.9, (60, 3))
 
 finest = None
 for number, level in enumerate(cow.levels):
-    found = tandem.Query([cow.levels_from(number, 1)]).contacts(rotation=rotation, translation=translation)
+    found = tandem.Scene([cow.levels_from(number, 1)], rotation=rotation, translation=translation).contacts()
     touching = set(map(tuple, found.pairs[np.unique(found.contacts["pair"])].tolist()))
     finest = finest or touching
     print(f"level {number}: {level.triangle_count:6,} triangles, off by at most {100 * level.error_bound / diagonal:.2f} % of the diagonal: "
@@ -30,7 +30,7 @@ for number, level in enumerate(cow.levels):
 
 # Whoever gives a tolerance gets answers about the finest surfaces, each from the coarsest levels that prove it.
 tolerance = 0.01 * diagonal
-told = tandem.Query([cow]).verdicts(rotation=rotation, translation=translation, tolerance=tolerance).verdicts
+told = tandem.Scene([cow], rotation=rotation, translation=translation).verdicts(tolerance=tolerance).verdicts
 for verdict, meaning in ((tandem.APART, "surely apart"), (tandem.TOUCH, "surely touch"), (tandem.WITHIN_TOLERANCE, "at most 1 % of the diagonal apart")):
     rows = told[told["verdict"] == verdict]
     print(f"{len(rows):4} pairs {meaning}, of which {np.count_nonzero(rows['level_a'])} were decided at a coarser level")

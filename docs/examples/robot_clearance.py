@@ -28,7 +28,7 @@ def poses(turn, shoulder, elbow):
 # The cell stands still, and links that a joint joins are not asked about.
 joined = [("table", "base"), ("base", "upper arm"), ("upper arm", "forearm"), ("forearm", "gripper")]
 asked = tandem.Filter(motion=[tandem.FIXED] * 3 + [tandem.MOVING] * 4, excluded=[[names.index(a), names.index(b)] for a, b in joined])
-query = tandem.Query(assets)
+scene = tandem.Scene(assets)
 
 
 def tightest(lift):
@@ -37,7 +37,7 @@ def tightest(lift):
     for turn in range(0, 121, 5):
         rotation, translation = poses(turn, lift, 55)
         instances = tandem.instances(np.arange(len(assets)), rotation=rotation, translation=translation)
-        found = query.distances(instances, reach=0.5, filter=asked)
+        found = scene.place(instances, filter=asked).distances(reach=0.5)
         row = found.distances["lower"].argmin()  # no two points are nearer than that: it is proved, not estimated
         if nearest is None or found.distances["lower"][row] < nearest[0] - 1e-6:
             nearest = found.distances["lower"][row], found.pairs[row], turn, instances, found

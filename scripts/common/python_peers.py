@@ -27,10 +27,10 @@ class Tandem:
 
     def __init__(self, vertices, faces, rotation, translation):
         import tandem
-        self.query = tandem.Query([tandem.build(vertices, faces)])
+        self.scene = tandem.Scene([tandem.build(vertices, faces)])
 
     def frame(self, rotation, translation):
-        self.found = self.query.contacts(asset=0, rotation=rotation, translation=translation)
+        self.found = self.scene.place(rotation=rotation, translation=translation).contacts()
 
     def contacts(self):
         pairs, contacts = self.found.pairs[self.found.contacts["pair"]], self.found.contacts
@@ -41,7 +41,7 @@ class TandemPairs(Tandem):
     name = "Tandem, bodies only"
 
     def frame(self, rotation, translation):
-        self.found = self.query.contacts(asset=0, rotation=rotation, translation=translation, first_contact_only=True)
+        self.found = self.scene.place(rotation=rotation, translation=translation).contacts(first_contact_only=True)
 
     def contacts(self):
         return super().contacts()[:, :2]

@@ -9,6 +9,7 @@ import threading
 import time
 import weakref
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -59,6 +60,19 @@ def assets():
     return [tandem.build(BOX_VERTICES, BOX_FACES), cow, tandem.build(0.2 * BOX_VERTICES + 0.4, BOX_FACES)]
 
 
+@pytest.fixture
+def torch():
+    return pytest.importorskip("torch")
+
+
+@pytest.fixture
+def posed(assets, torch):
+    """A query, and the scene as its instances."""
+    asset, pose = make_scene()
+    query = cuda.Query(assets)
+    return query, query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
+
+
 def test_arrays_are_given_back_once_whether_taken_or_refused():
     stream = cuda._stream(None)
     taken = Producer((0, 2), (2, 1))
@@ -97,61 +111,24 @@ def test_a_stream_keeps_its_object():
     assert lives() is None
 
 
-class Torch:
-    def __init__(self):
-        self.torch = pytest.importorskip("torch")
-
-    def put(self, array):
-        return self.torch.from_numpy(array).cuda()
-
-    def take(self, array):
-        return self.torch.from_dlpack(array)
-
-    def pointer(self, array):
-        return array.data_ptr()
-
-    def cpu(self, array):
-        return array.cpu().numpy()
+def of_torch(torch):
+    return SimpleNamespace(put=lambda array: torch.from_numpy(array).cuda(), take=torch.from_dlpack, pointer=lambda array: array.data_ptr(),
+                           cpu=lambda array: array.cpu().numpy(), takes_strides=True)
 
 
-class Cupy:
-    def __init__(self):
-        self.cupy = pytest.importorskip("cupy")
-
-    def put(self, array):
-        return self.cupy.asarray(array)
-
-    def take(self, array):
-        return self.cupy.from_dlpack(array)
-
-    def pointer(self, array):
-        return array.data.ptr
-
-    def cpu(self, array):
-        return array.get()
+def of_cupy(cupy):
+    return SimpleNamespace(put=cupy.asarray, take=cupy.from_dlpack, pointer=lambda array: array.data.ptr, cpu=lambda array: array.get(), takes_strides=True)
 
 
-class Jax:
-    def __init__(self):
-        self.jax = pytest.importorskip("jax")
-        self.jax.config.update("jax_enable_x64", True)
-
-    def put(self, array):
-        return self.jax.device_put(array)
-
-    def take(self, array):
-        return self.jax.dlpack.from_dlpack(array)
-
-    def pointer(self, array):
-        return array.unsafe_buffer_pointer()
-
-    def cpu(self, array):
-        return np.asarray(array)
+def of_jax(jax):
+    jax.config.update("jax_enable_x64", True)
+    return SimpleNamespace(put=jax.device_put, take=jax.dlpack.from_dlpack, pointer=lambda array: array.unsafe_buffer_pointer(), cpu=np.asarray,
+                           takes_strides=False)
 
 
-@pytest.fixture(params=[Torch, Cupy, Jax], ids=["torch", "cupy", "jax"])
+@pytest.fixture(params=[of_torch, of_cupy, of_jax], ids=["torch", "cupy", "jax"])
 def library(request):
-    return request.param()
+    return request.param(pytest.importorskip(request.param.__name__.removeprefix("of_")))
 
 
 def sorted_contacts(contacts):
@@ -167,7 +144,7 @@ def test_without_a_gpu_the_reason_is_told():
 @needs_gpu
 def test_contacts_are_those_of_the_cpu(assets, library):
     asset, pose = make_scene()
-    on_cpu = tandem.Query(assets).contacts(cpu_instances(asset, pose))
+    on_cpu = tandem.Scene(assets, cpu_instances(asset, pose)).contacts()
     query = cuda.Query(assets)
     for shape in ((COUNT, 4, 3), (COUNT, 12)):
         found = query.contacts(asset=library.put(asset), pose=library.put(pose.reshape(shape)), sorted=True)
@@ -186,7 +163,7 @@ def test_results_are_the_memory_of_the_query(assets, library):
     assert words.shape == (len(found.contacts), 5)
     expected = found.contacts.numpy()
     assert np.array_equal(library.cpu(words), expected.view("<u4").reshape(-1, 5))
-    if not isinstance(library, Jax):  # which takes no strides
+    if library.takes_strides:
         for name in ("pair", "triangle_b", "face_a"):
             assert np.array_equal(library.cpu(library.take(found.contacts[name])), expected[name])
     assert library.pointer(library.take(found.pairs)) == found.pairs.words.pointer
@@ -210,23 +187,21 @@ def test_the_array_interface_gives_the_same_memory(assets):
 
 
 @needs_gpu
-def test_poses_are_read_where_they_are(assets):
+def test_poses_are_read_where_they_are(torch, assets):
     """Instances that were looked at once: what is written to the array later is found."""
-    torch = pytest.importorskip("torch")
     asset, pose = make_scene()
-    query, on_cpu, at = cuda.Query(assets), tandem.Query(assets), torch.from_numpy(pose).cuda()
+    query, on_cpu, at = cuda.Query(assets), tandem.Scene(assets), torch.from_numpy(pose).cuda()
     bodies = query.instances(torch.from_numpy(asset).cuda(), at)
     for step in range(3):
         pose[:, 3] += 0.01 * step
         pose[::2, 3, 0] += 0.02
         at.copy_(torch.from_numpy(pose))
         found = query.contacts(bodies, sorted=True)
-        assert np.array_equal(found.contacts.numpy(), sorted_contacts(on_cpu.contacts(cpu_instances(asset, pose)).contacts))
+        assert np.array_equal(found.contacts.numpy(), sorted_contacts(on_cpu.place(cpu_instances(asset, pose)).contacts().contacts))
 
 
 @needs_gpu
-def test_results_outlive_calls_queries_and_assets(assets):
-    torch = pytest.importorskip("torch")
+def test_results_outlive_calls_queries_and_assets(torch, assets):
     asset, pose = make_scene()
     own = [tandem.Asset.from_bytes(bytes(one)) for one in assets]
     query = cuda.Query(own)
@@ -243,11 +218,8 @@ def test_results_outlive_calls_queries_and_assets(assets):
 
 
 @needs_gpu
-def test_memory_that_nobody_has_is_used_again(assets):
-    torch = pytest.importorskip("torch")
-    asset, pose = make_scene()
-    query = cuda.Query(assets)
-    bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
+def test_memory_that_nobody_has_is_used_again(posed):
+    query, bodies = posed
     found = query.contacts(bodies)
     places = set()
     for _ in range(6):
@@ -257,14 +229,13 @@ def test_memory_that_nobody_has_is_used_again(assets):
 
 
 @needs_gpu
-def test_manifolds_and_contained_bodies_are_those_of_the_cpu(assets):
-    torch = pytest.importorskip("torch")
+def test_manifolds_and_contained_bodies_are_those_of_the_cpu(torch, assets):
     asset, pose = make_scene()
-    query, on_cpu = cuda.Query(assets), tandem.Query(assets)
+    query, on_cpu = cuda.Query(assets), tandem.Scene(assets)
     followed = 0
     for step in range(3):
         pose[::2, 3, 0] += 1e-4
-        on_cpu.contacts(cpu_instances(asset, pose))
+        on_cpu.place(cpu_instances(asset, pose)).contacts()
         made, inside = on_cpu.manifolds(), on_cpu.contained()
         found = query.contacts(asset=torch.from_numpy(asset).cuda(), pose=torch.from_numpy(pose).cuda(), sorted=True, grouped=True)
         on_gpu = query.manifolds()
@@ -283,42 +254,40 @@ def test_manifolds_and_contained_bodies_are_those_of_the_cpu(assets):
 
 
 @needs_gpu
-def test_distances_impacts_and_verdicts(assets):
-    torch = pytest.importorskip("torch")
+def test_distances_impacts_and_verdicts(torch, assets):
     asset, pose = make_scene()
-    query, on_cpu, instances = cuda.Query(assets), tandem.Query(assets), cpu_instances(asset, pose)
+    query, on_cpu, instances = cuda.Query(assets), tandem.Scene(assets), cpu_instances(asset, pose)
     bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
-    theirs, ours = on_cpu.distances(instances, reach=0.5), query.distances(bodies, reach=0.5)
+    theirs, ours = on_cpu.place(instances).distances(reach=0.5), query.distances(bodies, reach=0.5)
     assert np.array_equal(ours.pairs.numpy(), theirs.pairs)
     near = theirs.distances["triangle_a"] != tandem.NO_INDEX
     lower, upper = (ours.distances.numpy()[name] for name in ("lower", "upper"))
     assert near.any() and np.all(lower[near] <= theirs.distances["upper"][near]) and np.all(theirs.distances["lower"][near] <= upper[near])
     assert np.array_equal(upper == 0, theirs.distances["upper"] == 0)
     pairs = torch.tensor([[3, 1], [5, 9]], dtype=torch.int32, device="cuda")
-    assert np.array_equal(query.distances(bodies, pairs=pairs).distances.numpy()["upper"] == 0, on_cpu.distances(instances, pairs=[[3, 1], [5, 9]]).distances["upper"] == 0)
+    assert np.array_equal(query.distances(bodies, pairs=pairs).distances.numpy()["upper"] == 0, on_cpu.place(instances).distances(pairs=[[3, 1], [5, 9]]).distances["upper"] == 0)
 
     motion = np.zeros(COUNT, tandem.MOTION)
     motion["velocity"] = np.random.default_rng(3).normal(size=(COUNT, 3))
     motion["center"] = pose[:, 3]
-    theirs = on_cpu.impacts(instances, motion, 0.1)
+    theirs = on_cpu.place(instances).impacts(motion, 0.1)
     found = query.impacts(bodies, motion=torch.from_numpy(motion.view("<f8").reshape(COUNT, 9)).cuda(), duration=0.1)
     assert np.array_equal(found.pairs.numpy(), theirs.pairs)
     assert np.allclose(found.impacts.numpy()["t_safe"], theirs.impacts["t_safe"], atol=1e-3)
     assert np.array_equal(found.impacts.numpy()["status"] == tandem.IMPACT_AT_START, theirs.impacts["status"] == tandem.IMPACT_AT_START)
 
-    theirs, found = on_cpu.verdicts(instances, tolerance=0.01), query.verdicts(bodies, tolerance=0.01)
+    theirs, found = on_cpu.place(instances).verdicts(tolerance=0.01), query.verdicts(bodies, tolerance=0.01)
     assert np.array_equal(found.pairs.numpy(), theirs.pairs) and np.array_equal(found.verdicts.numpy(), theirs.verdicts)
 
 
 @needs_gpu
-def test_filters_and_pairs(assets):
-    torch = pytest.importorskip("torch")
+def test_filters_and_pairs(torch, assets):
     asset, pose = make_scene()
     motion = np.where(np.arange(COUNT) % 3 == 0, tandem.FIXED, tandem.MOVING).astype(np.uint8)
-    on_cpu, query = tandem.Query(assets), cuda.Query(assets)
+    on_cpu, query = tandem.Scene(assets), cuda.Query(assets)
     instances = cpu_instances(asset, pose)
-    excluded = on_cpu.pairs(instances)[:10]
-    expected = on_cpu.contacts(instances, filter=tandem.Filter(motion=motion, excluded=excluded))
+    excluded = on_cpu.place(instances).pairs()[:10]
+    expected = on_cpu.place(instances, filter=tandem.Filter(motion=motion, excluded=excluded)).contacts()
     bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
     filter = cuda.Filter(motion=torch.from_numpy(motion).cuda(), excluded=excluded)
     assert np.array_equal(query.pairs(bodies, filter=filter).numpy(), expected.pairs)
@@ -329,15 +298,14 @@ def test_filters_and_pairs(assets):
     with pytest.raises(ValueError, match="filter is of 3 instances where there are 60"):
         query.contacts(bodies, filter=cuda.Filter(motion=torch.zeros(3, dtype=torch.uint8, device="cuda")))
     near = query.contacts(bodies, within=0.02, sorted=True)
-    assert np.array_equal(near.contacts.numpy(), sorted_contacts(on_cpu.contacts(instances, within=0.02).contacts))
+    assert np.array_equal(near.contacts.numpy(), sorted_contacts(on_cpu.place(instances).contacts(within=0.02).contacts))
 
 
 @needs_gpu
-def test_streams_are_waited_for(assets):
+def test_streams_are_waited_for(torch, assets):
     """Poses that PyTorch writes on one stream, late, are found by a query on another, whose results PyTorch reads on a third."""
-    torch = pytest.importorskip("torch")
     asset, pose = make_scene()
-    expected = sorted_contacts(tandem.Query(assets).contacts(cpu_instances(asset, pose)).contacts)
+    expected = sorted_contacts(tandem.Scene(assets, cpu_instances(asset, pose)).contacts().contacts)
     query = cuda.Query(assets)
     numbers, late = torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda()
     at = torch.zeros_like(late)
@@ -363,10 +331,9 @@ def test_streams_are_waited_for(assets):
 
 
 @needs_gpu
-def test_a_graph_of_pytorch_finds_the_contacts_of_moved_poses(assets):
-    torch = pytest.importorskip("torch")
+def test_a_graph_of_pytorch_finds_the_contacts_of_moved_poses(torch, assets):
     asset, pose = make_scene()
-    query, on_cpu, at, numbers = cuda.Query(assets), tandem.Query(assets), torch.from_numpy(pose).cuda(), torch.from_numpy(asset).cuda()
+    query, on_cpu, at, numbers = cuda.Query(assets), tandem.Scene(assets), torch.from_numpy(pose).cuda(), torch.from_numpy(asset).cuda()
     query.reserve(instances=COUNT, pairs=4000, contacts=100_000, sorted=True)
     query.enqueue(asset=numbers, pose=at).wait()  # loads the kernels
     graph, shift = torch.cuda.CUDAGraph(), torch.zeros(3, dtype=torch.float64, device="cuda")
@@ -379,18 +346,17 @@ def test_a_graph_of_pytorch_finds_the_contacts_of_moved_poses(assets):
         shift.copy_(torch.from_numpy(moved))
         graph.replay()
         pose[::2, 3] += moved
-        expected = sorted_contacts(on_cpu.contacts(cpu_instances(asset, pose)).contacts)
+        expected = sorted_contacts(on_cpu.place(cpu_instances(asset, pose)).contacts().contacts)
         torch.cuda.synchronize()
         assert int(total) == len(expected) > 0
         assert np.array_equal(queued.contacts.numpy()[: len(expected)], expected)
 
 
 @needs_gpu
-def test_waiting_after_a_replay(assets):
+def test_waiting_after_a_replay(torch, assets):
     """A graph that is replayed late, on a stream that the query never saw."""
-    torch = pytest.importorskip("torch")
     asset, pose = make_scene()
-    query, on_cpu, at, numbers = cuda.Query(assets), tandem.Query(assets), torch.from_numpy(pose).cuda(), torch.from_numpy(asset).cuda()
+    query, on_cpu, at, numbers = cuda.Query(assets), tandem.Scene(assets), torch.from_numpy(pose).cuda(), torch.from_numpy(asset).cuda()
     query.reserve(instances=COUNT, pairs=4000, contacts=100_000)
     query.enqueue(asset=numbers, pose=at).wait()
     graph, side, seen = torch.cuda.CUDAGraph(), torch.cuda.Stream(), set()
@@ -404,15 +370,14 @@ def test_waiting_after_a_replay(assets):
             graph.replay()
         pairs, contacts = queued.wait(stream)
         pose[::2, 3, 0] += 0.05
-        found = on_cpu.contacts(cpu_instances(asset, pose))
+        found = on_cpu.place(cpu_instances(asset, pose)).contacts()
         assert (pairs, contacts) == (len(found.pairs), len(found.contacts))
         seen.add(contacts)
     assert len(seen) == 4
 
 
 @needs_gpu
-def test_a_step_takes_one_call_at_a_time(assets):
-    torch = pytest.importorskip("torch")
+def test_a_step_takes_one_call_at_a_time(torch, assets):
     asset, pose = make_scene()
     query, stream, counts = cuda.Query(assets), torch.cuda.Stream(), []
     bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
@@ -433,11 +398,8 @@ def test_a_step_takes_one_call_at_a_time(assets):
 
 
 @needs_gpu
-def test_given_pairs_are_not_handed_out_as_found(assets):
-    torch = pytest.importorskip("torch")
-    asset, pose = make_scene()
-    query = cuda.Query(assets)
-    bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
+def test_given_pairs_are_not_handed_out_as_found(torch, posed):
+    query, bodies = posed
     found = query.contacts(bodies)
     query.reserve(instances=COUNT, pairs=4000, contacts=100_000)
     first = query.enqueue(bodies)
@@ -454,8 +416,7 @@ def test_given_pairs_are_not_handed_out_as_found(assets):
 
 
 @needs_gpu
-def test_results_keep_their_stream(assets):
-    torch = pytest.importorskip("torch")
+def test_results_keep_their_stream(torch, assets):
     asset, pose = make_scene()
     query, made = cuda.Query(assets), torch.cuda.Stream()
     bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
@@ -473,11 +434,8 @@ def test_results_keep_their_stream(assets):
 
 
 @needs_gpu
-def test_what_lies_on_another_gpu_is_refused(assets):
-    torch = pytest.importorskip("torch")
-    asset, pose = make_scene()
-    query = cuda.Query(assets)
-    bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
+def test_what_lies_on_another_gpu_is_refused(torch, posed, assets):
+    (query, bodies), (asset, pose) = posed, make_scene()
     query.reserve(instances=COUNT, pairs=4000, contacts=100_000)
     filter = cuda.Filter(group=Producer((COUNT,), (1,), device=5), device=5)
     for call in (query.contacts, query.pairs, query.enqueue):
@@ -492,11 +450,8 @@ def test_what_lies_on_another_gpu_is_refused(assets):
 
 
 @needs_gpu
-def test_too_little_room_is_told(assets):
-    torch = pytest.importorskip("torch")
-    asset, pose = make_scene()
-    query = cuda.Query(assets)
-    bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
+def test_too_little_room_is_told(posed):
+    query, bodies = posed
     with pytest.raises(ValueError, match="reserve"):
         query.enqueue(bodies)
     query.reserve(instances=COUNT, pairs=4000, contacts=10, undecided=100_000)
@@ -508,8 +463,7 @@ def test_too_little_room_is_told(assets):
 
 
 @needs_gpu
-def test_what_is_wrong_is_told(assets):
-    torch = pytest.importorskip("torch")
+def test_what_is_wrong_is_told(torch, assets):
     asset, pose = make_scene()
     query, numbers, at = cuda.Query(assets), torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda()
     for error, words, arguments in (

@@ -35,7 +35,7 @@ def test_pages_show_what_happens(page, tmp_path, monkeypatch):
 
 def modules():
     """All that are imported with the package alone."""
-    names = [name for _, name, _ in pkgutil.iter_modules(tandem.__path__) if name in ("_arrays", "_asset", "_build", "_errors", "_query", "_rows")]
+    names = [name for _, name, _ in pkgutil.iter_modules(tandem.__path__) if name in ("_arrays", "_asset", "_build", "_errors", "_rows", "_scene")]
     return [tandem] + [importlib.import_module(f"tandem.{name}") for name in names]
 
 
@@ -43,7 +43,7 @@ def test_docstrings_show_what_happens():
     examples = 0
     for module in modules():
         box = tandem.build(BOX_VERTICES, BOX_FACES)
-        failed, tried = doctest.testmod(module, extraglobs={"tandem": tandem, "np": np, "box": box, "query": tandem.Query([box])})
+        failed, tried = doctest.testmod(module, extraglobs={"tandem": tandem, "np": np, "box": box, "scene": tandem.Scene([box])})
         assert failed == 0
         examples += tried
     assert examples > 25

@@ -29,17 +29,17 @@ except ImportError as missing:
 
 class OnCpu:
     def __init__(self, assets):
-        self.query = tandem.Query(assets, threads=4)
+        self.scene = tandem.Scene(assets, threads=4)
 
     def put(self, asset, pose, pairs):
         return tandem.instances(asset, pose[:, :3], pose[:, 3]), pairs
 
     def contacts(self, instances, pairs):
-        found = self.query.contacts(instances, pairs=pairs)
+        found = self.scene.place(instances).contacts(pairs=pairs)
         return found.pairs, found.contacts
 
     def calls(self, instances, pairs):
-        return {"instances": lambda: self.query.contacts(instances, pairs=pairs)}
+        return {"instances": lambda: self.contacts(instances, pairs)}
 
 
 class OnGpu:
@@ -62,7 +62,7 @@ class OnGpu:
 
 
 def door(name):
-    """What makes a query of assets."""
+    """What opens assets."""
     if name == "numpy":
         return OnCpu
     try:

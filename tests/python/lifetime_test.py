@@ -12,7 +12,7 @@ import pytest
 import tandem
 from meshes import BOX_FACES, BOX_VERTICES
 
-SCENE = tandem.instances(translation=np.random.default_rng(1).uniform(0, 6, (400, 3)))
+BODIES = tandem.instances(translation=np.random.default_rng(1).uniform(0, 6, (400, 3)))
 
 
 def sphere(count):
@@ -27,16 +27,16 @@ def sphere(count):
     return vertices, faces
 
 
-def test_assets_die_before_queries_and_queries_before_arrays():
+def test_assets_die_before_scenes_and_scenes_before_arrays():
     arrays = []
     for number in range(5):
-        query = tandem.Query([tandem.build(BOX_VERTICES, BOX_FACES), tandem.build(BOX_VERTICES / 2, BOX_FACES).levels_from(0)])
+        scene = tandem.Scene([tandem.build(BOX_VERTICES, BOX_FACES), tandem.build(BOX_VERTICES / 2, BOX_FACES).levels_from(0)], BODIES)
         gc.collect()
-        found = query.contacts(SCENE)
-        manifolds, distances = query.manifolds(), query.distances(SCENE[:20])
-        verdicts, impacts = query.verdicts(SCENE[:20], tolerance=0.1), query.impacts(SCENE[:20], np.zeros(20, tandem.MOTION), 1.0)
+        found, manifolds = scene.contacts(), scene.manifolds()
+        scene.place(BODIES[:20])
+        distances, verdicts, impacts = scene.distances(), scene.verdicts(tolerance=0.1), scene.impacts(np.zeros(20, tandem.MOTION), 1.0)
         arrays.append([array for result in (found[:2], manifolds, distances, verdicts, impacts) for array in result])
-        del query, found, manifolds, distances, verdicts, impacts
+        del scene, found, manifolds, distances, verdicts, impacts
         gc.collect()
     for array in zip(*arrays):
         for other in array[1:]:
@@ -53,14 +53,14 @@ def test_views_of_bytes_outlive_assets():
     assert bytes(view) == bytes(again) and (triangles == expected).all()
 
 
-def test_threads_share_assets_and_have_queries_of_their_own():
+def test_threads_share_assets_and_have_scenes_of_their_own():
     box = tandem.build(BOX_VERTICES, BOX_FACES)
-    expected = tandem.Query([box]).contacts(SCENE).contacts.tobytes()
+    expected = tandem.Scene([box], BODIES).contacts().contacts.tobytes()
     same = []
 
     def ask(threads):
-        query = tandem.Query([box], threads=threads)
-        same.extend(query.contacts(SCENE).contacts.tobytes() == expected for _ in range(5))
+        scene = tandem.Scene([box], BODIES, threads=threads)
+        same.extend(scene.contacts().contacts.tobytes() == expected for _ in range(5))
 
     workers = [threading.Thread(target=ask, args=(1 + number % 3,)) for number in range(6)]
     for worker in workers:
@@ -70,16 +70,15 @@ def test_threads_share_assets_and_have_queries_of_their_own():
     assert same == [True] * 30
 
 
-def test_a_query_takes_one_call_at_a_time_while_other_threads_run():
-    query = tandem.Query([tandem.build(BOX_VERTICES, BOX_FACES)])
-    scene = tandem.instances(translation=np.random.default_rng(2).uniform(0, 3, (700, 3)))
-    expected = len(query.contacts(scene).contacts)
+def test_a_scene_takes_one_call_at_a_time_while_other_threads_run():
+    scene = tandem.Scene([tandem.build(BOX_VERTICES, BOX_FACES)], translation=np.random.default_rng(2).uniform(0, 3, (700, 3)))
+    expected = len(scene.contacts().contacts)
     refused, found, done = [], [], threading.Event()
 
     def work():
         for _ in range(5):
             try:
-                found.append(len(query.contacts(scene).contacts))
+                found.append(len(scene.contacts().contacts))
             except RuntimeError as error:
                 refused.append(str(error))
         done.set()
@@ -88,26 +87,26 @@ def test_a_query_takes_one_call_at_a_time_while_other_threads_run():
     worker.start()
     while not done.is_set():  # runs only where calls let it
         try:
-            found.append(len(query.contacts(SCENE[:2]).contacts) * 0 + expected)
+            found.append(len(scene.contacts(pairs=[[0, 1]]).contacts) * 0 + expected)
         except RuntimeError as error:
             refused.append(str(error))
     worker.join()
-    assert set(refused) == {"another thread is in a call of this query"}
+    assert set(refused) == {"another thread is in a call of this scene"}
     assert set(found) == {expected}
 
 
 def test_arguments_may_change_during_a_call():
     box = tandem.build(BOX_VERTICES, BOX_FACES)
-    scene = tandem.instances(translation=np.random.default_rng(3).uniform(0, 4, (500, 3)))
-    expected = tandem.Query([box]).contacts(scene).contacts.tobytes()
+    bodies = tandem.instances(translation=np.random.default_rng(3).uniform(0, 4, (500, 3)))
+    expected = tandem.Scene([box], bodies).contacts().contacts.tobytes()
     results, start = [], threading.Barrier(2)
 
     def work():
-        query = tandem.Query([box])
+        scene = tandem.Scene([box])
         start.wait()
-        rows = scene.copy()
+        rows = bodies.copy()
         changing.append(rows)
-        results.append(query.contacts(rows).contacts.tobytes())
+        results.append(scene.place(rows).contacts().contacts.tobytes())
 
     changing = []
     worker = threading.Thread(target=work)
@@ -197,8 +196,7 @@ time.sleep(0.5)
 
 
 @pytest.mark.parametrize("setup, work", [
-    ("query, rows = tandem.Query([tandem.build(np.random.rand(30, 3), np.arange(30).reshape(-1, 3))]), tandem.instances(translation=np.random.rand(40, 3))",
-     "query.contacts(rows)"),
+    ("scene = tandem.Scene([tandem.build(np.random.rand(30, 3), np.arange(30).reshape(-1, 3))], translation=np.random.rand(40, 3))", "scene.contacts()"),
     ("", "tandem.build(np.random.rand(90000, 3), np.arange(90000).reshape(-1, 3), progress=lambda share: time.sleep(0.01))"),
     ("", "tandem.build(np.random.rand(90000, 3), np.arange(90000).reshape(-1, 3), levels=['1%'], effort='best', progress=lambda share: sum(range(10**6)))")])
 def test_daemon_threads_in_a_call_let_the_process_end(setup, work):

@@ -99,7 +99,7 @@ def test_the_program_of_the_page_runs():
 
 
 def test_rows_are_manifolds_in_the_frames_of_bodies():
-    """Turned and moved shapes of turned and moved bodies, scaled, on a fixed one: rows are those of a query with the poses that follow."""
+    """Turned and moved shapes of turned and moved bodies, scaled, on a fixed one: rows are those of a scene with the poses that follow."""
     ball, floor = solids.ball(1.0), solids.box(1, 1, 0.1)
     builder = builder_of((floor,))
     turned, quaternion = turn((1, 2, 3), 0.7), turn((0, 1, 1), 0.4)
@@ -115,9 +115,7 @@ def test_rows_are_manifolds_in_the_frames_of_bodies():
     rotation = np.array(wp.quat_to_matrix(wp.quat(*quaternion) * wp.quat(*turned)), float).reshape(3, 3)
     u, _, v = np.linalg.svd(rotation)
     assets = [tandem.build(*floor), tandem.build(ball[0].astype("f4").astype(float) * scale.astype("f4"), ball[1])]
-    query = tandem.Query(assets)
-    query.contacts(asset=[0, 1], rotation=[np.eye(3), u @ v], translation=[[0, 0, 0], [0.2, 0.1, 0.2]])
-    made = query.manifolds()
+    made = tandem.Scene(assets, asset=[0, 1], rotation=[np.eye(3), u @ v], translation=[[0, 0, 0], [0.2, 0.1, 0.2]]).manifolds()
     assert len(made.points) > 3 and len(made.points) == len(rows(contacts, "normal"))
     np.testing.assert_allclose(rows(contacts, "normal"), made.manifolds["normal"][made.points["manifold"]], atol=1e-5)
     distance = wp.zeros(contacts.rigid_contact_max, dtype=float)

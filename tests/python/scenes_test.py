@@ -47,7 +47,8 @@ def through_c(scene, instances, names, mode, self_pairs, within):
 
 def through_python(scene, mode="exact", self_pairs=False, within=0.0, threads=1):
     assets, instances, pairs, filter = load_scene(scene)
-    found = tandem.Query(assets).contacts(instances, pairs=pairs, filter=filter, mode=mode, self_pairs=self_pairs, within=within, threads=threads)
+    scene = tandem.Scene(assets, instances, filter=filter, threads=threads)
+    found = scene.contacts(pairs=pairs, mode=mode, self_pairs=self_pairs, within=within)
     return len(found.pairs), len(found.contacts), hash_of(found.pairs, found.contacts)
 
 

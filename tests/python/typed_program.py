@@ -31,28 +31,33 @@ def assets(folder: Path) -> list[tandem.Asset]:
     return [loaded, whole]
 
 
-def ask(query: tandem.Query) -> None:
+def ask(scene: tandem.Scene) -> None:
     rows = tandem.instances(asset=[0, 1], rotation=np.eye(3), translation=[[0.0, 0.0, 0.0], [0.5, 0.25, 0.125]])
     filter = tandem.Filter(motion=[tandem.MOVING, tandem.FIXED], group=[1, 1], mask=[1, 1], excluded=[[0, 0]])
-    contacts: tandem.Contacts = query.contacts(rows, mode="exact", first_contact_only=False, self_pairs=False, within=0.0, add_error_bounds=False, filter=filter,
-                                               threads=1)
+    scene.threads = 2
+    contacts: tandem.Contacts = scene.place(rows, filter=filter).contacts(mode="exact", first_contact_only=False, self_pairs=False, within=0.0,
+                                                                          add_error_bounds=False)
     work: tandem.Counters = contacts.counters
     faces: npt.NDArray[np.uint32] = contacts.contacts["face_a"]
-    manifolds: tandem.Manifolds = query.manifolds(most_points=4, match_previous=False)
-    query.contacts(rows)
-    contained: tandem.Contained = query.contained()
-    distances: tandem.Distances = query.distances(rows, reach=1.0, absolute_tolerance=1e-9, relative_tolerance=1e-9, former=np.zeros(0, tandem.FORMER))
-    impacts: tandem.Impacts = query.impacts(rows, np.zeros(2, tandem.MOTION), 1.0, tolerance=1e-5)
-    verdicts: tandem.Verdicts = query.verdicts(rows, tolerance=0.1, pairs=[[0, 1]])
-    query.keep_fixed(rows, [tandem.MOVING, tandem.FIXED])
+    manifolds: tandem.Manifolds = scene.manifolds(most_points=4, match_previous=False)
+    contained: tandem.Contained = scene.contained()
+    distances: tandem.Distances = scene.distances(reach=1.0, absolute_tolerance=1e-9, relative_tolerance=1e-9, former=np.zeros(0, tandem.FORMER))
+    impacts: tandem.Impacts = scene.impacts(np.zeros(2, tandem.MOTION), 1.0, tolerance=1e-5)
+    verdicts: tandem.Verdicts = scene.verdicts(tolerance=0.1, pairs=[[0, 1]])
+    body: int = scene.add(1, translation=[0.0, 0.0, 0.25], motion=tandem.KINEMATIC, group=1, mask=1)
+    scene.move(body, rotation=np.eye(3))
+    scene.move([0, body], rows)
+    scene.set_motion(body, tandem.MOVING)
+    scene.remove(body)
+    bodies: npt.NDArray[np.void] = scene.instances
     print(work.contacts, faces.max(), len(manifolds.manifolds), len(manifolds.points), len(contained.contained), distances.distances["upper"],
-          impacts.impacts["status"], verdicts.verdicts["verdict"], len(query.pairs(rows)))
+          impacts.impacts["status"], verdicts.verdicts["verdict"], len(scene.pairs(reach=0.5)), len(bodies))
     try:
-        query.contacts(transform=np.zeros((2, 4, 4)))
+        scene.place(transform=np.zeros((2, 4, 4)))
     except ValueError as error:
         print(error)
     try:
-        query.contacts(asset=[0, 2])
+        scene.place(asset=[0, 2])
     except tandem.Error as error:
         status: int = error.status
         where: int | None = error.where
@@ -62,7 +67,7 @@ def ask(query: tandem.Query) -> None:
 
 def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
-        ask(tandem.Query(assets(Path(folder)), threads=1))
+        ask(tandem.Scene(assets(Path(folder)), threads=1))
     try:
         mesh: tandem.Mesh = tandem.read_mesh("nowhere.obj")
         print(mesh.vertices.shape, mesh.triangles.shape, mesh.face_ids.shape, mesh.parts, mesh.remarks)

@@ -189,7 +189,7 @@ def test_opacity_is_what_was_asked_for(shown, box):
 
 def test_triangles_that_meet_are_red_and_no_others(shown, box):
     instances = tandem.instances([0, 0, 0], translation=[[0, 0, 0], [0, 0.5, 0.25], [0, 4, 0]])
-    found = tandem.Query([box]).contacts(instances)
+    found = tandem.Scene([box], instances).contacts()
     for contacts in (True, found):
         view = shown([box], instances, contacts=contacts, opacity=0.05, azimuth=30)
         picture = hues(view.picture())
@@ -204,9 +204,7 @@ def test_triangles_that_meet_are_red_and_no_others(shown, box):
 def test_contact_points_are_where_they_are_in_the_colour_of_their_depths(shown, box):
     c, s = np.cos(0.1), np.sin(0.1)
     instances = tandem.instances([0, 0], rotation=[np.eye(3), [[c, 0, s], [0, 1, 0], [-s, 0, c]]], translation=[[0, 0, 0], [0.2, 0.3, 0.95]])
-    query = tandem.Query([box])
-    query.contacts(instances)
-    manifolds = query.manifolds()
+    manifolds = tandem.Scene([box], instances).manifolds()
     view = shown([box], instances, manifolds=manifolds, opacity=0)
     picture = view.picture()
     at = projected(view, manifolds.points["position"])
@@ -223,9 +221,7 @@ def test_contact_points_are_where_they_are_in_the_colour_of_their_depths(shown, 
 
 def test_normals_point_from_a_to_b(shown, box):
     instances = tandem.instances([0, 0], translation=[[0, 0, 0], [0, 0.95, 0]])
-    query = tandem.Query([box])
-    query.contacts(instances)
-    manifolds = query.manifolds()
+    manifolds = tandem.Scene([box], instances).manifolds()
     assert np.allclose(manifolds.manifolds["normal"], [[0, 1, 0]])
     view = shown([box], instances, manifolds=manifolds, opacity=0, azimuth=0, elevation=0)
     dark = view.picture()[:, :270].max(axis=2) < 150  # the bar of depths is on the right
@@ -238,7 +234,7 @@ def test_normals_point_from_a_to_b(shown, box):
 
 def test_distances_are_lines_between_the_nearest_points(shown, box):
     instances = tandem.instances([0, 0], translation=[[0, 0, 0], [0, 2, 0]])
-    found = tandem.Query([box]).distances(instances)
+    found = tandem.Scene([box], instances).distances()
     view = shown([box], instances, distances=found, azimuth=0, elevation=20)
     picture = hues(view.picture())
     for share in (0.25, 0.5, 0.75):
@@ -249,7 +245,7 @@ def test_distances_are_lines_between_the_nearest_points(shown, box):
 
 def test_bars_of_colours_are_beside_each_other_and_beside_the_bodies(shown, cow):
     instances = tandem.instances([0, 0, 0], translation=[[0, 0, 0], [0.3, 0.2, 0], [2.5, 0, 0]])
-    distances = tandem.Query([cow]).distances(instances)
+    distances = tandem.Scene([cow], instances).distances()
     for manifolds, columns in ((False, 1), (True, 2)):
         view = shown([cow], instances, distances=distances, manifolds=manifolds)
         bars = [bar for _, bar in view.plotter.scalar_bars.items()]
@@ -431,7 +427,7 @@ def test_no_assets_are_kept_once_a_view_is_closed(box, tmp_path):
 ])
 def test_arguments_that_do_not_fit_are_named(box, options, text):
     if options.get("contacts"):
-        options = options | {"contacts": tandem.Query([box]).contacts(translation=[[0, 0, 0]])}
+        options = options | {"contacts": tandem.Scene([box], translation=[[0, 0, 0]]).contacts()}
     with pytest.raises(ValueError, match=text):
         tandem.view(box, off_screen=True, **options)
 

@@ -64,18 +64,11 @@ std::string provenance_of(const Options& options, const Outcome& outcome) {
   return json.dump();
 }
 
-nb::dict to_dict(const CleanReport& of) {
-  nb::dict report;
-  report["index_out_of_range"] = of.faces_index_out_of_range;
-  report["not_finite"] = of.faces_not_finite;
-  report["too_large"] = of.faces_too_large;
-  report["degenerate"] = of.triangles_degenerate;
-  report["duplicate"] = of.triangles_duplicate;
-  report["duplicate_reversed"] = of.triangles_duplicate_reversed;
-  report["flattened"] = of.triangles_flattened;
-  report["vertices_unreferenced"] = of.vertices_unreferenced;
-  report["vertices_welded"] = of.vertices_welded;
-  return report;
+// In the order of tandem.BuildReport.
+nb::tuple to_tuple(const CleanReport& of) {
+  return nb::make_tuple(of.faces_index_out_of_range, of.faces_not_finite, of.faces_too_large,
+                        of.triangles_degenerate, of.triangles_duplicate, of.triangles_duplicate_reversed,
+                        of.triangles_flattened, of.vertices_unreferenced, of.vertices_welded);
 }
 
 // A mesh as the caller has it.
@@ -158,7 +151,7 @@ nb::tuple build(nb::handle points, nb::handle corners, nb::handle face_begin, nb
   if (!defect.empty()) throw nb::value_error(defect.c_str());
   nb::object bytes = nb::none();
   if (file) bytes = nb::bytes(reinterpret_cast<const char*>(file->image.data()), file->image.size());
-  return nb::make_tuple(bytes, to_dict(outcome.clean));
+  return nb::make_tuple(bytes, to_tuple(outcome.clean));
 }
 
 }  // namespace

@@ -11,8 +11,7 @@ const void* there(const void* data) {
 }
 
 Asset* open(const nb::bytes& path, bool read, bool quick) {
-  tandem_open_options options = {};
-  options.struct_size = sizeof options;
+  auto options = sized<tandem_open_options>();
   options.access = read ? TANDEM_ACCESS_READ : TANDEM_ACCESS_MAP;
   options.check_depth = quick ? TANDEM_CHECK_QUICK : TANDEM_CHECK_FULL;
   tandem_asset* asset = nullptr;
@@ -27,8 +26,7 @@ Asset* open(const nb::bytes& path, bool read, bool quick) {
 
 Asset* from_bytes(nb::handle data, bool quick) {
   const Bytes bytes(data);
-  tandem_memory_options options = {};
-  options.struct_size = sizeof options;
+  auto options = sized<tandem_memory_options>();
   options.check_depth = quick ? TANDEM_CHECK_QUICK : TANDEM_CHECK_FULL;
   tandem_asset* asset = nullptr;
   std::uint64_t where = 0;
@@ -46,85 +44,38 @@ Asset* levels_from(const Asset& asset, std::uint32_t first, std::uint32_t count)
   return new Asset(levels);
 }
 
-tandem_asset_info info_of(const Asset& asset) {
-  tandem_asset_info info = {};
-  info.struct_size = sizeof info;
-  check(tandem_asset_get_info(asset.get(), &info));
-  return info;
-}
-
 tandem_level level_of(const Asset& asset, std::uint32_t level) {
-  tandem_level result = {};
-  result.struct_size = sizeof result;
+  auto result = sized<tandem_level>();
   check(tandem_asset_get_level(asset.get(), level, &result));
   return result;
 }
 
-template <typename Value>
-nb::tuple three(const Value* v) {
-  return nb::make_tuple(double{v[0]}, double{v[1]}, double{v[2]});
+// In the order of tandem._asset.Info.
+nb::tuple info(const Asset& asset) {
+  auto of = sized<tandem_asset_info>();
+  check(tandem_asset_get_info(asset.get(), &of));
+  const auto three = [](const auto* v) { return nb::make_tuple(double{v[0]}, double{v[1]}, double{v[2]}); };
+  return nb::make_tuple(of.level_count, of.first_level, of.part_count, of.file_bytes, of.hash,
+                        of.source_faces, three(of.origin), of.rounding_error, three(of.lower),
+                        three(of.upper));
 }
 
-nb::dict info(const Asset& asset) {
-  const tandem_asset_info of = info_of(asset);
-  nb::dict result;
-  result["level_count"] = of.level_count;
-  result["first_level"] = of.first_level;
-  result["part_count"] = of.part_count;
-  result["file_bytes"] = of.file_bytes;
-  result["hash"] = of.hash;
-  result["source_faces"] = of.source_faces;
-  result["origin"] = three(of.origin);
-  result["rounding_error"] = of.rounding_error;
-  result["lower"] = three(of.lower);
-  result["upper"] = three(of.upper);
-  return result;
-}
-
-nb::dict level(const Asset& asset, std::uint32_t number) {
+// In the order of tandem.Level.
+nb::tuple level(const Asset& asset, std::uint32_t number) {
   const tandem_level of = level_of(asset, number);
-  nb::dict result;
-  result["triangle_count"] = of.triangle_count;
-  result["block_count"] = of.block_count;
-  result["leaf_block_count"] = of.leaf_block_count;
-  result["depth"] = of.depth;
-  result["error_bound"] = of.error_bound;
-  result["has_oriented_blocks"] = of.has_oriented_blocks != 0;
-  result["has_topology"] = of.has_topology != 0;
-  result["vertex_count"] = of.vertex_count;
-  result["component_count"] = of.component_count;
-  result["closed"] = of.closed != 0;
-  return result;
+  return nb::make_tuple(of.triangle_count, of.block_count, of.leaf_block_count, of.depth, of.error_bound,
+                        of.has_oriented_blocks != 0, of.has_topology != 0, of.vertex_count,
+                        of.component_count, of.closed != 0);
 }
 
-// float64 corners in the mesh file's coordinates, three triples for each triangle.
+// Rows of tandem_triangle.
 nb::object triangles(const Asset& asset, std::uint32_t number) {
   const tandem_level of = level_of(asset, number);
-  const tandem_asset_info about = info_of(asset);
-  const std::size_t count = of.triangle_count;
-  nb::object bytes = make_bytes(nullptr, count * 9 * sizeof(double));
-  double* to = static_cast<double*>(bytes_begin(bytes));
-  for (const tandem_triangle& triangle : std::span(of.triangles, count)) {
-    for (const tandem_corner& corner : triangle.corner) {
-      for (int k = 0; k < 3; ++k) *to++ = double{corner.position[k]} + about.origin[k];
-    }
-  }
-  return bytes;
-}
-
-// uint32: word 0 of each triangle is the face of the mesh file, word 1 the part.
-nb::object words(const Asset& asset, std::uint32_t number, std::uint32_t corner) {
-  const tandem_level of = level_of(asset, number);
-  nb::object bytes = make_bytes(nullptr, of.triangle_count * sizeof(std::uint32_t));
-  auto* to = static_cast<std::uint32_t*>(bytes_begin(bytes));
-  for (const tandem_triangle& triangle : std::span(of.triangles, of.triangle_count))
-    *to++ = triangle.corner[corner].w;
-  return bytes;
+  return make_bytes(of.triangles, of.triangle_count * sizeof(tandem_triangle));
 }
 
 nb::tuple part(const Asset& asset, std::uint32_t number) {
-  tandem_part of = {};
-  of.struct_size = sizeof of;
+  auto of = sized<tandem_part>();
   check(tandem_asset_get_part(asset.get(), number, &of));
   return nb::make_tuple(nb::bytes(of.name, of.name_bytes), nb::bytes(of.path, of.path_bytes), of.first_face,
                         of.face_count);
@@ -162,7 +113,6 @@ void add_assets(nb::module_& module) {
       .def("info", info)
       .def("level", level)
       .def("triangles", triangles)
-      .def("words", words)
       .def("part", part)
       .def("provenance", provenance)
       .def("statistics", statistics);

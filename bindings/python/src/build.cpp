@@ -23,18 +23,10 @@ std::uint32_t note(void* user, double share) {
   return 0;
 }
 
-nb::dict to_dict(const tandem_build_report& of) {
-  nb::dict report;
-  report["index_out_of_range"] = of.index_out_of_range;
-  report["not_finite"] = of.not_finite;
-  report["too_large"] = of.too_large;
-  report["degenerate"] = of.degenerate;
-  report["duplicate"] = of.duplicate;
-  report["duplicate_reversed"] = of.duplicate_reversed;
-  report["flattened"] = of.flattened;
-  report["vertices_unreferenced"] = of.vertices_unreferenced;
-  report["vertices_welded"] = of.vertices_welded;
-  return report;
+// In the order of tandem.BuildReport.
+nb::tuple to_tuple(const tandem_build_report& of) {
+  return nb::make_tuple(of.index_out_of_range, of.not_finite, of.too_large, of.degenerate, of.duplicate,
+                        of.duplicate_reversed, of.flattened, of.vertices_unreferenced, of.vertices_welded);
 }
 
 // Positions and triangles by rows; faces of triangles or None; names, paths and counts of faces of parts.
@@ -48,8 +40,7 @@ nb::tuple build(nb::handle positions, nb::handle triangles, nb::handle faces, co
   std::vector<tandem_mesh_part> mesh_parts;
   for (const auto& [name, path, count] : parts) mesh_parts.push_back({name.c_str(), path.c_str(), count});
 
-  tandem_mesh mesh = {};
-  mesh.struct_size = sizeof mesh;
+  auto mesh = sized<tandem_mesh>();
   mesh.positions = points.data();
   mesh.vertex_count = points.size() / 3;
   mesh.triangles = corners.data();
@@ -59,8 +50,7 @@ nb::tuple build(nb::handle positions, nb::handle triangles, nb::handle faces, co
   mesh.part_count = mesh_parts.size();
 
   Watch watch;
-  tandem_build_options options = {};
-  options.struct_size = sizeof options;
+  auto options = sized<tandem_build_options>();
   options.effort = effort;
   options.no_gpu_blocks = !gpu_blocks;
   options.no_topology = !topology;
@@ -71,8 +61,7 @@ nb::tuple build(nb::handle positions, nb::handle triangles, nb::handle faces, co
   options.user = &watch;
 
   std::unique_ptr<tandem_asset, decltype(&tandem_asset_release)> asset(nullptr, tandem_asset_release);
-  tandem_build_report report = {};
-  report.struct_size = sizeof report;
+  auto report = sized<tandem_build_report>();
   tandem_status status = TANDEM_OK;
   run_with_patience(watch, progress, [&] {
     tandem_asset* made = nullptr;
@@ -80,7 +69,7 @@ nb::tuple build(nb::handle positions, nb::handle triangles, nb::handle faces, co
     asset.reset(made);
   });
   check(status);
-  return nb::make_tuple(nb::cast(Asset(asset.release())), to_dict(report));
+  return nb::make_tuple(nb::cast(Asset(asset.release())), to_tuple(report));
 }
 
 }  // namespace

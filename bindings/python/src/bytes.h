@@ -1,6 +1,7 @@
 #pragma once
 #include <nanobind/nanobind.h>
 
+#include <cstddef>
 #include <vector>
 
 /// Raw rows that the package's Python files and its extensions hand each other.
@@ -27,13 +28,18 @@ class Bytes {
   throw nanobind::value_error("a buffer does not hold whole rows");
 }
 
-/// A copy of an array's rows, which other threads cannot change while the interpreter runs them.
+/// A copy of an array's rows, which other threads cannot change while the interpreter runs them. Its data()
+/// is not null, which stands for no array, also where there are no rows.
 template <typename Row>
 std::vector<Row> copy_rows(nanobind::handle object) {
   const Bytes bytes(object);
   if (bytes.size() % sizeof(Row) != 0) throw_broken_rows();
   const Row* first = static_cast<const Row*>(bytes.data());
-  return {first, first + bytes.size() / sizeof(Row)};
+  const std::size_t count = bytes.size() / sizeof(Row);
+  std::vector<Row> copy;
+  copy.reserve(count + 1);
+  copy.assign(first, first + count);
+  return copy;
 }
 
 /// A new bytearray with a copy of bytes; null: not yet filled.

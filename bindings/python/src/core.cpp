@@ -1,5 +1,7 @@
 #include "core.h"
 
+#include <stdexcept>
+
 namespace tandem::python {
 
 void check(tandem_status status, std::uint64_t where) {
@@ -14,6 +16,15 @@ void check(tandem_status status, std::uint64_t where) {
 
 void* bytes_begin(nb::handle bytearray) {
   return PyByteArray_AsString(bytearray.ptr());
+}
+
+nb::tuple counters_of(const tandem_contact_counters& of) {
+  return nb::make_tuple(of.object_pairs, of.block_pairs, of.candidates, of.decided_by_float32,
+                        of.decided_by_float64, of.decided_exactly, of.contacts);
+}
+
+Turn::Turn(std::atomic<bool>& busy, const char* refused) : busy_(busy) {
+  if (busy_.exchange(true)) throw std::runtime_error(refused);
 }
 
 }  // namespace tandem::python

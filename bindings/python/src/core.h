@@ -3,6 +3,7 @@
 /// check what the caller gave, and name the arguments.
 #include <nanobind/nanobind.h>
 
+#include <atomic>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -18,7 +19,27 @@ namespace nb = nanobind;
 /// Throws the Python exception of a status that is not TANDEM_OK (tandem._errors.from_status).
 void check(tandem_status status, std::uint64_t where = 0);
 
+/// An options struct of the C interface with its size, and zeros.
+template <typename Options>
+Options sized() {
+  Options options = {};
+  options.struct_size = sizeof options;
+  return options;
+}
+
 void* bytes_begin(nb::handle bytearray);
+
+/// A turn at what takes one call at a time: a second thread gets RuntimeError, which says `refused`.
+class Turn {
+ public:
+  Turn(std::atomic<bool>& busy, const char* refused);
+  ~Turn() { busy_ = false; }
+  Turn(const Turn&) = delete;
+  Turn& operator=(const Turn&) = delete;
+
+ private:
+  std::atomic<bool>& busy_;
+};
 
 /// A checked file in memory, by one reference to it.
 class Asset {
@@ -33,7 +54,7 @@ class Asset {
   tandem_asset* asset_;
 };
 
-/// Which pairs a query looks at; has copies of what it was made of, and never changes.
+/// Which pairs a scene looks at; has copies of what it was made of, and never changes.
 class Filter {
  public:
   Filter(nb::object motion, nb::object group, nb::object mask, nb::object excluded);
@@ -52,12 +73,16 @@ class Filter {
   tandem_pair_filter filter_ = {};
 };
 
-/// What bvhinfo tells of a file, but for its name, its hash, its parts and its making.
-nb::dict statistics(const Asset& asset);
+/// In the order of tandem.Counters.
+nb::tuple counters_of(const tandem_contact_counters& counters);
+
+/// What bvhinfo measures: the version of the file, its tree, of each level its bytes and the work to expect,
+/// and the surface of the first, or None.
+nb::tuple statistics(const Asset& asset);
 
 void add_assets(nb::module_& module);
 void add_builder(nb::module_& module);
 void add_filters(nb::module_& module);
-void add_queries(nb::module_& module);
+void add_scenes(nb::module_& module);
 
 }  // namespace tandem::python

@@ -7,7 +7,6 @@ template <typename Value>
 const Value* take(nb::handle given, std::vector<Value>& values, std::size_t& count) {
   if (given.is_none()) return nullptr;
   values = copy_rows<Value>(given);
-  values.reserve(1);  // an array of no entries is not null, which stands for none
   count = values.size();
   return values.data();
 }

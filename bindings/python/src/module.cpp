@@ -12,5 +12,5 @@ NB_MODULE(_tandem, module) {
   tandem::python::add_assets(module);
   tandem::python::add_builder(module);
   tandem::python::add_filters(module);
-  tandem::python::add_queries(module);
+  tandem::python::add_scenes(module);
 }

@@ -1,12 +1,11 @@
 """Exact collision detection of posed triangle meshes: contacts, manifolds, distances, times of impact.
 
-In the examples of the docstrings, `box` is a cube of unit length with a corner at 0, `query` is tandem.Query([box]), and `np` is NumPy.
+In the examples of the docstrings, `box` is a cube of unit length with a corner at 0, `scene` is tandem.Scene([box]), and `np` is NumPy.
 
 >>> import tandem
 >>> box = tandem.build([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
->>> query = tandem.Query([box])
->>> found = query.contacts(translation=[[0, 0, 0], [0.25, 0.25, 0.25]])
->>> len(found.contacts) > 0
+>>> scene = tandem.Scene([box], translation=[[0, 0, 0], [0.25, 0.25, 0.25]])
+>>> len(scene.contacts().contacts) > 0
 True
 """
 from typing import Any as _Any
@@ -16,10 +15,10 @@ from ._arrays import instances
 from ._asset import Asset, Level, Part
 from ._build import BuildReport, Mesh, build, read_mesh
 from ._errors import Error, FileError
-from ._query import Contacts, Contained, Counters, Distances, Filter, Impacts, Manifolds, Query, Verdicts
 from ._rows import CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, INSTANCE, MANIFOLD, MOTION, NO_INDEX, PAIR, POINT, VERDICT
+from ._scene import Contacts, Contained, Counters, Distances, Filter, Impacts, Manifolds, Scene, Verdicts
 
-#: What moves an instance (Filter): forces; nothing; the caller; nothing until the caller wakes it.
+#: What moves a body (Filter): forces; nothing; the caller; nothing until the caller wakes it.
 MOVING, FIXED, KINEMATIC, SLEEPING = range(4)
 #: Flags of manifolds: without overlap; the curve in which the surfaces cross does not close; one body goes through the other.
 TOUCHING, OPEN_CURVE, GOES_THROUGH = 1, 2, 4
@@ -51,5 +50,5 @@ __all__ = [
     "APART", "CONTACT", "CONTAINMENT", "DISTANCE", "FIXED", "FORMER", "GOES_THROUGH", "IMPACT", "IMPACT_AT_START", "IMPACT_IN_STEP", "INSIDE", "INSTANCE",
     "KINEMATIC", "MANIFOLD", "MOTION", "MOVING", "NO_IMPACT", "NO_INDEX", "OPEN_CURVE", "OUTER_OPEN", "PAIR", "POINT", "SLEEPING", "TOUCH", "TOUCHING", "VERDICT",
     "WITHIN_TOLERANCE", "Asset", "BuildReport", "Contacts", "Contained", "Counters", "Distances", "Error", "FileError", "Filter", "Impacts", "Level", "Manifolds", "Mesh",
-    "Part", "Query", "Verdicts", "build", "instances", "read_mesh", "view",
+    "Part", "Scene", "Verdicts", "build", "instances", "read_mesh", "view",
 ]

@@ -15,7 +15,7 @@ __all__ = ["Rows", "instances"]
 #: An array of rows, such as INSTANCE.
 Rows = npt.NDArray[np.void]
 
-#: The largest distance that queries take, as coordinates, and the largest number.
+#: The largest distance that questions take, as coordinates, and the largest number.
 FARTHEST, FINITE = 1e300, sys.float_info.max
 _MOST = 0xFFFFFFFF
 _IDENTITY, _ORIGIN = np.eye(3), np.zeros(3)
@@ -122,7 +122,7 @@ def instances(asset: npt.ArrayLike = 0, rotation: npt.ArrayLike | None = None, t
     """Bodies, posed: one for each row of the longest argument; an argument without rows, or with one, is that of all.
 
     Args:
-        asset: place in the query's list of assets, () or (n,).
+        asset: place in the scene's list of assets, () or (n,).
         rotation: (3, 3) or (n, 3, 3); the identity where it is not given.
         translation: (3,) or (n, 3), in the assets' unit; 0 where it is not given.
         transform: (4, 4) or (n, 4, 4) instead of both; the last row is 0, 0, 0, 1.
@@ -131,7 +131,7 @@ def instances(asset: npt.ArrayLike = 0, rotation: npt.ArrayLike | None = None, t
         An array of INSTANCE, (n,).
 
     Raises:
-        ValueError, TypeError: which name the argument and the row. Whether rotations are rigid is looked at by queries.
+        ValueError, TypeError: which name the argument and the row. Whether rotations are rigid is looked at by scenes.
 
     >>> tandem.instances(translation=[[0, 0, 0], [2, 0, 0]])["translation"][1]
     array([2., 0., 0.])

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 from typing import Any, Literal, NamedTuple
 
@@ -16,6 +17,16 @@ from ._errors import Error, with_path
 __all__ = ["Asset", "Level", "Part"]
 
 _MOST = 0xFFFFFFFF
+# Of a .bvh file, version 1 (formats/FORMAT.md).
+_SECTION = np.dtype([("kind", "<u4"), ("level", "<u4"), ("offset", "<u8"), ("bytes", "<u8"), ("count", "<u8")])
+_SECTION_COUNT, _SECTION_TABLE = 96, 128
+_SECTION_KINDS = ("levels", "blocks", "triangles", "parts", "strings", "provenance", "oriented_blocks", "topology", "components")
+_CORNER = np.dtype([("position", "<f4", 3), ("w", "<u4")])  # of tandem.h
+# What statistics() tells, in the order of the extension's numbers.
+_TREE = ("triangles", "nodes", "leaf_nodes", "internal_nodes", "imaginary_nodes", "imaginary_minimum", "imaginary_fraction", "leaf_blocks", "internal_blocks",
+         "partial_leaf_blocks", "depth", "leaf_fill", "sah_cost", "leaf_blocks_at_depth", "blocks_with_fill")
+_SURFACE = ("vertices", "components", "closed_components", "turned_triangles", "boundary_edges", "sides_at_edges_of_many")
+_WORK = ("expected_block_pairs", "expected_candidates", "expected_oriented_block_pairs", "expected_oriented_candidates")
 
 
 class Level(NamedTuple):
@@ -40,6 +51,21 @@ class Level(NamedTuple):
     closed: bool
 
 
+class Info(NamedTuple):
+    """What Asset says of itself."""
+
+    level_count: int
+    first_level: int
+    part_count: int
+    file_bytes: int
+    hash: int
+    source_faces: int
+    origin: tuple[float, float, float]
+    rounding_error: float
+    lower: tuple[float, float, float]
+    upper: tuple[float, float, float]
+
+
 class Part(NamedTuple):
     """A run of faces that the mesh file gives a name."""
 
@@ -58,7 +84,7 @@ class Asset:
 
     __slots__ = ("_core", "_info", "__weakref__")
     _core: _tandem.Asset
-    _info: dict[str, Any]
+    _info: Info
 
     def __init__(self) -> None:
         raise TypeError("Asset.load, Asset.from_bytes and tandem.build make assets")
@@ -67,7 +93,7 @@ class Asset:
     def _of(cls, core: _tandem.Asset) -> Asset:
         made = cls.__new__(cls)
         made._core = core
-        made._info = core.info()
+        made._info = Info(*core.info())
         return made
 
     @staticmethod
@@ -129,13 +155,13 @@ class Asset:
         return self.data
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _restore, (bytes(self), self._info["first_level"], self._info["level_count"])
+        return _restore, (bytes(self), self._info.first_level, self._info.level_count)
 
     def __repr__(self) -> str:
-        return f"<tandem.Asset of {self.levels[0].triangle_count} triangles, {self._info['level_count']} levels>"
+        return f"<tandem.Asset of {self.levels[0].triangle_count} triangles, {self._info.level_count} levels>"
 
     def levels_from(self, first: int, count: int = 0) -> Asset:
-        """An asset that shows `count` levels of this one from level `first` on; 0: all. Queries use the first that an asset shows. The bytes are shared.
+        """An asset that shows `count` levels of this one from level `first` on; 0: all. Questions are about the first that an asset shows. The bytes are shared.
 
         Raises:
             Error: there is no level `first`.
@@ -153,16 +179,16 @@ class Asset:
     @property
     def levels(self) -> list[Level]:
         """The levels of detail that the asset shows, the finest first."""
-        return [Level(**self._core.level(level)) for level in range(self._info["level_count"])]
+        return [Level(*self._core.level(level)) for level in range(self._info.level_count)]
 
     @property
     def first_level(self) -> int:
         """The file's number of the finest level that the asset shows."""
-        return int(self._info["first_level"])
+        return self._info.first_level
 
     def triangles(self, level: int = 0) -> npt.NDArray[np.float64]:
         """Corners of a level's triangles, (n, 3, 3), in the mesh file's coordinates; triangles as contacts number them."""
-        return np.frombuffer(self._core.triangles(whole_number(level, "level", 0, _MOST)), np.float64).reshape(-1, 3, 3)
+        return self._corners(level)["position"] + self.origin
 
     def faces(self, level: int = 0) -> npt.NDArray[np.uint32]:
         """Of each triangle of a level, the face of the mesh file that it comes from, (n,).
@@ -170,42 +196,45 @@ class Asset:
         >>> box.triangles().shape, sorted(box.faces().tolist()) == list(range(12))
         ((12, 3, 3), True)
         """
-        return np.frombuffer(self._core.words(whole_number(level, "level", 0, _MOST), 0), np.uint32)
+        return np.ascontiguousarray(self._corners(level)["w"][:, 0])
+
+    def _corners(self, level: int) -> npt.NDArray[np.void]:
+        return np.frombuffer(self._core.triangles(whole_number(level, "level", 0, _MOST)), _CORNER).reshape(-1, 3)
 
     @property
     def bounds(self) -> npt.NDArray[np.float64]:
         """The lower and the upper corner of all levels, (2, 3), in the mesh file's coordinates."""
-        return np.array([self._info["lower"], self._info["upper"]]) + self.origin
+        return np.array([self._info.lower, self._info.upper]) + self.origin
 
     @property
     def origin(self) -> npt.NDArray[np.float64]:
         """What is added to stored coordinates, (3,)."""
-        return np.array(self._info["origin"])
+        return np.array(self._info.origin)
 
     @property
     def rounding_error(self) -> float:
         """How far a stored coordinate is from that of the mesh file, at most."""
-        return float(self._info["rounding_error"])
+        return self._info.rounding_error
 
     @property
     def hash(self) -> str:
         """Of the content, as bvhinfo prints it."""
-        return f"{self._info['hash']:016x}"
+        return f"{self._info.hash:016x}"
 
     @property
     def file_bytes(self) -> int:
         """Of the file, with all levels."""
-        return int(self._info["file_bytes"])
+        return self._info.file_bytes
 
     @property
     def source_faces(self) -> int:
         """Faces of the mesh file."""
-        return int(self._info["source_faces"])
+        return self._info.source_faces
 
     @property
     def parts(self) -> list[Part]:
         """The objects, groups or scene nodes that the mesh file names."""
-        found = (self._core.part(part) for part in range(self._info["part_count"]))
+        found = (self._core.part(part) for part in range(self._info.part_count))
         return [Part(name.decode(errors="replace"), path.decode(errors="replace"), first, count) for name, path, first, count in found]
 
     @property
@@ -219,13 +248,29 @@ class Asset:
     def statistics(self) -> dict[str, Any]:
         """What `bvhinfo --json` tells, under its keys (docs/json.md), but for "file": figures of the trees, and the work that queries are expected to do, which
         is sampled and takes a while."""
-        parts = [part._asdict() for part in self.parts]
-        return {**self._core.statistics(), "hash": self.hash, "parts": parts, "source": self.provenance}
+        (major, minor), tree, measured, surface = self._core.statistics()
+        lower, upper = self._info.lower, self._info.upper
+        diagonal = math.sqrt(sum((high - low) * (high - low) for low, high in zip(lower, upper)))
+        levels = [{"triangles": level.triangle_count, "blocks": level.block_count, "depth": level.depth, "bytes": size, "error_bound": level.error_bound,
+                   "error_bound_relative": level.error_bound / diagonal if diagonal else None, "closed": level.closed if level.has_topology else None,
+                   **dict(zip(_WORK, work))} for level, (size, work) in zip(self.levels, measured)]
+        sections = [dict(zip(("kind", *(_SECTION.names or ())[1:]), (_SECTION_KINDS[kind - 1], *rest))) for kind, *rest in sections_of(self).tolist()]
+        return {"version": f"{major}.{minor}", "hash": self.hash, "bytes": self.file_bytes, **dict(zip(_TREE, tree)), **dict(zip(_WORK, measured[0][1])),
+                "surface": None if surface is None else dict(zip(_SURFACE, surface)),
+                "bounds": {"lower": list(lower), "upper": list(upper)}, "origin": list(self._info.origin), "rounding_error": self.rounding_error,
+                "source_faces": self.source_faces, "source": self.provenance, "parts": [part._asdict() for part in self.parts], "levels": levels,
+                "sections": sections}
+
+
+def sections_of(asset: Asset) -> npt.NDArray[np.void]:
+    """The table of a file's sections: kind, level, offset, bytes and count of each."""
+    count = int(np.frombuffer(asset.data, "<u4", 1, _SECTION_COUNT)[0])
+    return np.frombuffer(asset.data, _SECTION, count, _SECTION_TABLE)
 
 
 def _restore(data: bytes, first_level: int, level_count: int) -> Asset:
     whole = Asset.from_bytes(data)
-    if (first_level, level_count) == (0, whole._info["level_count"]):
+    if (first_level, level_count) == (0, whole._info.level_count):
         return whole
     return whole.levels_from(first_level, level_count)
 

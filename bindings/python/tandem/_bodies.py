@@ -1,4 +1,4 @@
-"""Bodies at their places and what a query finds between them: what `tandem.trimesh` is made of."""
+"""Bodies at their places and what is found between them: what `tandem.trimesh` is made of."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ import numpy as np
 
 import trimesh.triangles
 
-from . import INSIDE, INSTANCE, NO_INDEX, Asset, Error, Filter, Query, build
+from . import FIXED, INSIDE, INSTANCE, NO_INDEX, Asset, Error, Filter, Scene, build
 from ._convex import Array, Overlap, Solid, cross, face_overlaps, overlap
 
-RIGID = 4e-7  # what a pose may be off: queries take 1e-6, by another measure of the same matrix
+RIGID = 4e-7  # what a pose may be off: scenes take 1e-6, by another measure of the same matrix
 ROUNDING = 1e-5  # a matrix that is so near to a rotation is meant to be one
 PRECISION = 1e-12  # of distances, relative
 SMALL = 10_000  # faces of a mesh
 FEW_PAIRS = 64  # whose distances are asked for at once
 MEETING_STEPS = 32
+IDENTITY = np.eye(3)
 CONTACTS_AT_A_TIME = 1 << 16
 
 
@@ -50,7 +51,7 @@ class Nearest:
 
 
 class Shape:
-    """What a mesh is to queries: an asset, and whether it is solid."""
+    """What a mesh is to scenes: an asset, and whether it is solid."""
 
     def __init__(self, vertices: Array, faces: Array, is_convex: bool) -> None:
         self.faces = faces
@@ -114,75 +115,108 @@ def _rotation_and_stretch(matrix: Array) -> tuple[Array, Array | None]:
     return rotation, np.round(stretch / unit, 12) * unit + 0.0  # not -0
 
 
+#: Which pairs are asked about, see Search: first_side, alone and ignored.
+Asked = tuple[int | None, int | None, tuple[tuple[int, int], ...]]
+
+
 class Bodies:
     """Shapes at places, with names. The places are (4, 4) matrices.
 
-    Attributes: `rows`, array of tandem.INSTANCE; `shapes`, those that the rows' assets are of; `convex` (n,), which are.
+    Attributes: `rows`, array of tandem.INSTANCE; `given`, the shapes that were given; `shapes`, those that the rows' assets are of: stretched where a place
+    stretches; `convex` (n,), which are; `ours`, of joined ones, the first.
     """
+
+    ours: Bodies | None = None
 
     def __init__(self, names: list[Hashable], shapes: list[Shape], places: list[Array]) -> None:
         self.names = names
-        self._given = shapes
+        self.given = shapes
         self.rows = np.zeros(len(names), INSTANCE)
         self.convex = np.array([shape.is_convex for shape in shapes], bool)
-        self.shapes: list[Shape] = []
-        self.assets: list[Asset] = []
-        self._query: Query | None = None
+        self.shapes = list(shapes)
         self._solids: dict[int, Solid] = {}
-        self.move(places)
+        self._name_assets()
+        self.move(range(len(names)), places)
+
+    def _name_assets(self) -> None:
+        different = list({id(shape): shape for shape in self.shapes}.values())
+        numbers = {id(shape): number for number, shape in enumerate(different)}
+        self.rows["asset"] = [numbers[id(shape)] for shape in self.shapes]
+        self.assets = [shape.asset for shape in different]
+        self._middle, self._half = (np.array([getattr(shape, name) for shape in different]).reshape(-1, 3) for name in ("middle", "half"))
+        self._scene: Scene | None = None
+        self._asked: Asked | None = None  # that the scene's filter is of; None: the bodies are yet to be placed there
+        self._moved: set[int] = set()  # since they were placed there
 
     @staticmethod
     def joined(ours: Bodies, theirs: Bodies, former: Bodies | None) -> Bodies:
-        """Both, ours first. Takes the query of the former result where that is of the same assets."""
+        """Both, ours first. Takes the scene of the former result where that is of the same assets."""
         both = object.__new__(Bodies)
+        both.ours = ours
         both.names = ours.names + theirs.names
-        both._given = []
+        both.given = ours.given + theirs.given
         both.shapes = ours.shapes + theirs.shapes
         both.convex = np.concatenate([ours.convex, theirs.convex])
-        both.assets = ours.assets + theirs.assets
-        both.rows = np.empty(len(both.names), INSTANCE)
-        both.rows[: len(ours.rows)], both.rows[len(ours.rows) :] = ours.rows, theirs.rows
-        both.rows["asset"][len(ours.rows) :] += len(ours.assets)
+        both.rows = np.concatenate([ours.rows, theirs.rows])
         both._solids = {}
-        both._query = former._query if former is not None and _same(former.assets, both.assets) else None
+        both._name_assets()
+        if former is not None and _same(former.assets, both.assets):
+            both._scene = former._scene
         return both
 
-    def move(self, places: list[Array]) -> None:
-        """Puts the bodies at other places. Raises ValueError where one is not finite."""
+    def move(self, bodies: Sequence[int], places: list[Array]) -> None:
+        """Puts bodies at other places. Raises ValueError where one is not finite."""
         if not places:
             return
-        self._solids = {}
         matrices = np.array(places)
         linear = matrices[:, :3, :3]
-        self.rows["rotation"] = linear
-        self.rows["translation"] = matrices[:, :3, 3]
-        finite = np.isfinite(matrices[:, :3]).all(axis=(1, 2))
-        if not finite.all():
-            raise ValueError(f"the transform of {self.names[int(finite.argmin())]} is not finite")
-        off = np.abs(linear.transpose(0, 2, 1) @ linear - np.eye(3)).max(axis=(1, 2))
-        rigid = (off <= RIGID) & (np.linalg.det(linear) > 0)
-        shapes = self._given
-        if not rigid.all():
-            shapes = list(shapes)
-            for i in np.flatnonzero(~rigid):
-                self.rows["rotation"][i], stretch = _rotation_and_stretch(linear[i])
-                if stretch is not None:
-                    try:
-                        shapes[i] = shapes[i].stretched(stretch)
-                    except Error as error:
-                        message = f"{self.names[i]}, stretched by its transform: {error}"
-                        raise Error(message, error.status, error.name, error.subject, error.where) from error
-        if not _same(shapes, self.shapes):
-            self.shapes = shapes
-            numbers: dict[int, int] = {}
-            self.rows["asset"] = [numbers.setdefault(id(shape), len(numbers)) for shape in shapes]
-            self.assets = [shape.asset for shape in {id(shape): shape for shape in shapes}.values()]
-            self._query = None
+        self.rows["rotation"][bodies] = linear
+        self.rows["translation"][bodies] = matrices[:, :3, 3]
+        if not np.isfinite(matrices[:, :3]).all():
+            first = int(np.isfinite(matrices[:, :3]).all(axis=(1, 2)).argmin())
+            raise ValueError(f"the transform of {self.names[bodies[first]]} is not finite")
+        off = np.abs(linear.transpose(0, 2, 1) @ linear - IDENTITY).max(axis=(1, 2))
+        rigid = ((off <= RIGID) & (np.linalg.det(linear) > 0)).tolist()
+        shapes = [self.given[body] if rigid[i] else self._turned(body, linear[i]) for i, body in enumerate(bodies)]
+        same = _same(shapes, [self.shapes[body] for body in bodies])
+        for body, shape in zip(bodies, shapes):
+            self.shapes[body] = shape
+            self._solids.pop(body, None)
+        self._moved.update(bodies)
+        if not same:
+            self._name_assets()
 
-    def query(self) -> Query:
-        if self._query is None:
-            self._query = Query(self.assets)
-        return self._query
+    def _turned(self, body: int, linear: Array) -> Shape:
+        """The shape of a body whose place is not rigid; its rotation goes into the rows."""
+        self.rows["rotation"][body], stretch = _rotation_and_stretch(linear)
+        if stretch is None:
+            return self.given[body]
+        try:
+            return self.given[body].stretched(stretch)
+        except Error as error:
+            message = f"{self.names[body]}, stretched by its transform: {error}"
+            raise Error(message, error.status, error.name, error.subject, error.where) from error
+
+    def scene(self, asked: Asked, threads: int) -> Scene:
+        """The bodies where they stand, and with a filter that asks about some pairs."""
+        if self._scene is None:
+            self._scene = Scene(self.assets, threads=threads)
+        if self._asked != asked:
+            self._scene.place(self.rows, filter=self._filter(*asked))
+        elif self._moved:
+            moved = sorted(self._moved)
+            self._scene.move(moved, self.rows[moved])
+        self._asked = asked
+        self._moved.clear()
+        return self._scene
+
+    def _filter(self, first_side: int | None, alone: int | None, ignored: tuple[tuple[int, int], ...]) -> Filter | None:
+        if first_side is None and alone is None:
+            return Filter(excluded=ignored) if ignored else None
+        sides = np.ones(len(self.names), np.uint32)
+        sides[slice(first_side, None) if alone is None else alone] = 2
+        # The first side stands still from call to call, as far as the scene is to know: it finds no pairs within it.
+        return Filter(motion=np.where(sides == 1, FIXED, 0), group=sides, mask=3 - sides, excluded=ignored or None)
 
     def solid(self, body: int) -> Solid:
         """The convex hull of a body where it stands."""
@@ -209,8 +243,9 @@ class Bodies:
 
     def boxes(self) -> tuple[Array, Array]:
         """(n, 3) the least and the greatest coordinates of boxes that the bodies lie in."""
-        middles = np.einsum("nij,nj->ni", self.rows["rotation"], np.array([shape.middle for shape in self.shapes])) + self.rows["translation"]
-        halves = np.einsum("nij,nj->ni", np.abs(self.rows["rotation"]), np.array([shape.half for shape in self.shapes]))
+        asset, rotation = self.rows["asset"], self.rows["rotation"]
+        middles = np.einsum("nij,nj->ni", rotation, self._middle[asset]) + self.rows["translation"]
+        halves = np.einsum("nij,nj->ni", np.abs(rotation), self._half[asset])
         return middles - halves, middles + halves
 
 
@@ -223,42 +258,43 @@ class Search:
 
     def __init__(self, bodies: Bodies, threads: int, first_side: int | None = None, alone: int | None = None, ignored: list[tuple[int, int]] | None = None) -> None:
         self.bodies = bodies
-        self._threads = threads
         count = len(bodies.names)
-        sides: Array | None = None
         self._pair_count = count * (count - 1) // 2
         if first_side is not None or alone is not None:
-            sides = np.ones(count, np.uint32)
-            sides[slice(first_side, None) if alone is None else alone] = 2
-            second = int((sides == 2).sum())
+            second = 1 if first_side is None else count - first_side
             self._pair_count = second * (count - second)
         self._pair_count -= sum(alone is None or alone in pair for pair in ignored or ())
-        self._filter: Filter | None = None
-        if sides is not None or ignored:
-            self._filter = Filter(group=sides, mask=None if sides is None else 3 - sides, excluded=ignored or None)
+        self._asked: Asked = (first_side, alone, tuple(ignored or ()))
+        self._threads = threads
+
+    def _scene(self) -> Scene:
+        return self.bodies.scene(self._asked, self._threads)
 
     def any_collision(self) -> bool:
         """Whether there is one."""
         if self._pair_count == 0:
             return False
-        pairs, meet = self._first_contacts()
-        return bool(meet.any()) or bool(self._enclosed_pairs(pairs[~meet]))
+        found = self._scene().contacts(first_contact_only=True)
+        return len(found.contacts) > 0 or bool(len(found.pairs) and self._enclosed_pairs(_columns(found.pairs)))
 
     def colliding_pairs(self) -> set[tuple[int, int]]:
         """The pairs of bodies (a, b), a < b, that collide: whose surfaces meet, or one of whom is convex and has a component of the other inside."""
         if self._pair_count == 0:
             return set()
-        pairs, meet = self._first_contacts()
-        return {(int(a), int(b)) for a, b in pairs[meet]} | self._enclosed_pairs(pairs[~meet])
+        found = self._scene().contacts(first_contact_only=True)
+        pairs = _columns(found.pairs)
+        meet = np.zeros(len(pairs), bool)
+        meet[found.contacts["pair"]] = True
+        return set(map(tuple, pairs[meet].tolist())) | self._enclosed_pairs(pairs[~meet])
 
     def contacts(self) -> Iterator[Contact]:
         """All contacts: one for each pair of convex bodies; of a convex body and another one for each face of the other that meets the solid; one for each
         pair of faces of others that meet."""
         if self._pair_count == 0:
             return
-        query, rows = self.bodies.query(), self.bodies.rows
-        found = query.contacts(rows, filter=self._filter, threads=self._threads)
-        contained = query.contained(threads=self._threads).contained
+        scene = self._scene()
+        found = scene.contacts()
+        contained = scene.contained().contained
         pairs = _columns(found.pairs)
         bounds = np.searchsorted(found.contacts["pair"], np.arange(len(pairs) + 1))
         convex = self.bodies.convex[pairs]
@@ -280,12 +316,16 @@ class Search:
         colliding = self.colliding_pairs()
         if colliding:
             return self._deepest(np.array(sorted(colliding)))
-        query, rows = self.bodies.query(), self.bodies.rows
+        scene = self._scene()
         lows, highs = self.bodies.boxes()
         extent = float(np.linalg.norm(highs.max(axis=0) - lows.min(axis=0)))
-        reach = extent / 256 if self._pair_count > FEW_PAIRS else None
+        reach = None
+        if self._pair_count > FEW_PAIRS:
+            pair = self._nearest_boxes(lows, highs)
+            # Of one body and many, all that can be as near as the one whose box is the nearest.
+            reach = extent / 256 if pair is None else float(scene.distances(pairs=[pair]).distances["upper"][0])
         while True:
-            found = query.distances(rows, reach=reach, relative_tolerance=PRECISION, filter=self._filter, threads=self._threads)
+            found = scene.distances(reach=reach, relative_tolerance=PRECISION)
             distances = found.distances["upper"].copy()
             distances[found.distances["triangle_a"] == NO_INDEX] = np.inf
             # What is not in the list, or has no points, is farther away than the reach.
@@ -294,6 +334,19 @@ class Search:
                 return _nearest(found.pairs[first], found.distances[first])
             assert reach is not None
             reach = 4 * reach if reach < extent else None
+
+    def _nearest_boxes(self, lows: Array, highs: Array) -> tuple[int, int] | None:
+        """Where one body is asked about with others, it and that of these whose box is the nearest to its own; else None."""
+        first_side, body, ignored = self._asked
+        if first_side == len(lows) - 1:
+            body = first_side
+        if body is None:
+            return None
+        gaps = np.maximum(np.maximum(lows - highs[body], lows[body] - highs), 0)
+        squares = np.einsum("ni,ni->n", gaps, gaps)
+        squares[[body, *(other for pair in ignored if body in pair for other in pair)]] = np.inf
+        other = int(squares.argmin())
+        return min(body, other), max(body, other)
 
     def _deepest(self, pairs: Array) -> Nearest:
         """Of pairs (n, 2) that collide the one that is the deepest, the first of equals."""
@@ -314,14 +367,6 @@ class Search:
         assert deepest is not None
         return deepest
 
-    def _first_contacts(self) -> tuple[Array, Array]:
-        """(n, 2) the pairs whose boxes meet, and (n,) whether their surfaces do."""
-        found = self.bodies.query().contacts(self.bodies.rows, first_contact_only=True, filter=self._filter, threads=self._threads)
-        pairs = _columns(found.pairs)
-        meet = np.zeros(len(pairs), bool)
-        meet[found.contacts["pair"]] = True
-        return pairs, meet
-
     def _enclosed_pairs(self, apart: Array) -> set[tuple[int, int]]:
         """Of pairs (n, 2) whose surfaces do not meet, those with a component of one body inside the other, which is convex."""
         if not self.bodies.convex.any():
@@ -329,10 +374,10 @@ class Search:
         apart = apart[self.bodies.convex[apart].any(axis=1)]
         if len(apart) == 0:
             return set()
-        query = self.bodies.query()
-        query.contacts(self.bodies.rows, pairs=apart, threads=self._threads)
-        rows = self._enclosed(apart, query.contained(threads=self._threads).contained)
-        return {(int(a), int(b)) for a, b in apart[rows]}
+        scene = self._scene()
+        scene.contacts(pairs=apart)
+        rows = self._enclosed(apart, scene.contained().contained)
+        return set(map(tuple, apart[rows].tolist()))
 
     def _enclosed(self, pairs: Array, contained: Array) -> Array:
         """(n,) the rows of the pairs with a component of one body inside the other, which is convex."""
@@ -346,15 +391,15 @@ class Search:
             solids = self.bodies.solid(a), self.bodies.solid(b)
             found = overlap(*solids)
             return Nearest(a, b, -found.depth, [found.point_a, found.point_b], *self._faces(a, b, found))
-        query, pair = self.bodies.query(), [(a, b)]
+        scene, pair = self._scene(), [(a, b)]
         if convex.any():
-            meeting = query.contacts(self.bodies.rows, pairs=pair, threads=self._threads).contacts
+            meeting = scene.contacts(pairs=pair).contacts
             deepest = max(self._face_contacts(a, b, meeting), key=lambda contact: contact.penetration_depth)
             half = deepest.normal * deepest.penetration_depth / 2
             ends = [(deepest.a, deepest.pos + half, deepest.b1), (deepest.b, deepest.pos - half, deepest.b2)]
             (_, point_a, face_a), (_, point_b, face_b) = sorted(ends, key=lambda end: end[0])
             return Nearest(a, b, -deepest.penetration_depth, [point_a, point_b], face_a, face_b)
-        return _nearest((a, b), query.distances(self.bodies.rows, pairs=pair, threads=self._threads).distances[0])
+        return _nearest((a, b), scene.distances(pairs=pair).distances[0])
 
     def _faces(self, a: int, b: int, found: Overlap) -> tuple[int, int]:
         """The faces of two convex bodies whose corners are the farthest along the way that parts them; of equals the first."""
@@ -413,7 +458,7 @@ class Search:
             corners_b = self.bodies.corners_of(b[rows], meeting["face_b"][rows])
             points[rows] = meeting_points(corners_a, corners_b)
             normals[rows] = unit_normals(corners_a)
-        found = self.bodies.query().manifolds(match_previous=False, threads=self._threads)
+        found = self._scene().manifolds(match_previous=False)
         regions, places = found.manifolds, found.points["position"]
         which, starts = np.unique(meeting["pair"], return_index=True)
         for pair, start, end in zip(which, starts, np.append(starts[1:], len(meeting))):

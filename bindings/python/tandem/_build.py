@@ -134,7 +134,7 @@ def build(vertices: npt.ArrayLike, faces: npt.ArrayLike | Sequence[Sequence[int]
         if data is None:
             raise _no_triangle()
         asset = Asset.from_bytes(data)
-    return (asset, BuildReport(**report)) if return_report else asset
+    return (asset, BuildReport(*report)) if return_report else asset
 
 
 def read_mesh(path: str | os.PathLike[str]) -> Mesh:

@@ -1,4 +1,4 @@
-"""What the adapters for solvers share: which pairs a query is asked for, and where bodies come near each other."""
+"""What the adapters for solvers share: which pairs a scene is asked about, and where bodies come near each other."""
 
 from __future__ import annotations
 
@@ -7,24 +7,26 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from numpy.typing import NDArray
 
 import tandem
 
 _Array = NDArray[np.float64]
+Asked = tuple[NDArray[np.uint32] | None, tandem.Filter | None]
 
 
-def pair_arguments(count: int, allowed: NDArray[np.integer[Any]]) -> dict[str, Any]:
-    """Arguments of a query's methods that ask for the pairs `allowed`, (m, 2) with a < b, of `count` instances and for no others.
+def asked_pairs(count: int, allowed: NDArray[np.integer[Any]]) -> Asked:
+    """Pairs and filter that ask a scene about the pairs `allowed`, (m, 2) with a < b, of `count` instances and about no others.
 
-    They name the pairs where less than half of all are allowed, as in many small worlds, and else exclude the others of those that the
-    query finds.
+    The pairs are named where less than half of all are allowed, as in many small worlds; else the filter excludes the others of those that the
+    scene finds.
     """
     if 4 * len(allowed) < count * (count - 1):
-        return {"pairs": np.unique(np.asarray(allowed, np.uint32), axis=0)}
+        return np.unique(np.asarray(allowed, np.uint32), axis=0), None
     others = np.triu(np.ones((count, count), bool), 1)
     others[allowed[:, 0], allowed[:, 1]] = False
-    return {"filter": tandem.Filter(excluded=np.argwhere(others).astype(np.uint32))}
+    return None, tandem.Filter(excluded=np.argwhere(others).astype(np.uint32))
 
 
 class Touches:
@@ -34,13 +36,14 @@ class Touches:
     the surfaces, in the coordinates of the assets, (n, 3). gap: how far the surfaces are apart, less than 0 where they overlap, (n,).
     """
 
-    def __init__(self, query: tandem.Query, instances: NDArray[np.void], most_points: int, arguments: dict[str, Any]) -> None:
-        """The points of all manifolds. arguments: those of query.contacts() that say which pairs are asked for."""
-        self._query, self._instances, self._most_points, self._arguments = query, instances, most_points, arguments
-        self._take(query.contacts(instances, **arguments).pairs)
+    def __init__(self, scene: tandem.Scene, instances: NDArray[np.void], most_points: int, asked: Asked) -> None:
+        """The points of all manifolds of the instances, which the scene gets. asked: what asked_pairs() gave."""
+        self._scene, self._instances, self._most_points, (self._pairs, filter) = scene, instances, most_points, asked
+        self._take(scene.place(instances, filter=filter), self._pairs)
 
-    def _take(self, pairs: NDArray[np.void]) -> None:
-        made = self._query.manifolds(most_points=self._most_points, match_previous=False)
+    def _take(self, scene: tandem.Scene, asked: npt.ArrayLike | None) -> None:
+        pairs = scene.contacts(pairs=asked).pairs
+        made = scene.manifolds(most_points=self._most_points, match_previous=False)
         manifold = made.points["manifold"]
         self.pair = made.manifolds["pair"][manifold].astype(np.intp)  # the row among pairs
         self.a, self.b = pairs["a"][self.pair].astype(np.intp), pairs["b"][self.pair].astype(np.intp)
@@ -53,7 +56,7 @@ class Touches:
         One body is moved towards the other by the reach, in the direction of their nearest points. The points of the manifolds that it then has are
         those that are within reach along that direction; it is moved back with them. A pair that has no manifold even so has its nearest points.
         """
-        found = self._query.distances(self._instances, reach=largest, **self._arguments)
+        found = self._scene.distances(pairs=self._pairs, reach=largest)
         a, b = found.pairs["a"].astype(np.intp), found.pairs["b"].astype(np.intp)
         way = found.distances["point_b"] - found.distances["point_a"]
         gap, within = np.linalg.norm(way, axis=1), reach(a, b)
@@ -65,7 +68,7 @@ class Touches:
         moved = self._instances[np.stack([a, b], axis=1).ravel()]  # each pair has two instances of its own
         moved["translation"][1::2] -= within[:, None] * way
         touches = copy.copy(self)
-        touches._take(self._query.contacts(moved, pairs=np.arange(2 * len(a)).reshape(-1, 2)).pairs)
+        touches._take(self._scene.place(moved), np.arange(2 * len(a)).reshape(-1, 2))
         back = (within[:, None] * way)[touches.pair]
         gap_back = touches.gap + np.einsum("ni,ni->n", back, touches.normal)
         # No surfaces are nearer than `lower`: what seems so met on the way, and not along it. Depths are right to a hundredth.

@@ -16,10 +16,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ._arrays import FARTHEST, FINITE, amount, pairs_of
-from ._asset import Asset
+from ._asset import Asset, _choice
 from ._errors import Error
-from ._query import Counters
 from ._rows import CONTACT, CONTAINMENT, DISTANCE, IMPACT, MANIFOLD, PAIR, POINT, VERDICT
+from ._scene import Counters, cores_of
 
 try:
     from . import _cuda
@@ -31,10 +31,10 @@ __all__ = ["Array", "Contacts", "Contained", "Distances", "Filter", "Impacts", "
 #: An array in GPU memory, with DLPack and `__cuda_array_interface__`, `shape`, `dtype` and `pointer`. It keeps the memory that it lies in.
 Array = _cuda.Array
 
-_MODES = {"exact": 0, "fast": 1, "boxes": 2}
-_CONTENTS = {"all": 0, "exact": 1, "manifolds": 2}
+_MODES = ("exact", "fast", "boxes")
+_CONTENTS = ("all", "exact", "manifolds")
 _KINDS = {"u": 1, "f": 2}
-_REPORT = np.dtype([("failed", "<u4"), ("complete", "<u4"), ("where", "<u8"), ("needed_pairs", "<u4"), ("reserved", "<u4"), ("needed_contacts", "<u8"),
+_REPORT = np.dtype([("status", "<u4"), ("complete", "<u4"), ("where", "<u8"), ("needed_pairs", "<u4"), ("reserved", "<u4"), ("needed_contacts", "<u8"),
                     ("needed_undecided", "<u8"), ("contacts", "<u8"), ("world_pairs", "<u8"), ("counters", "<u8", (7,))])
 
 
@@ -93,48 +93,19 @@ class Rows:
         return f"<tandem.cuda.Rows: {len(self)} of {', '.join(self.dtype.names or ())}>"
 
 
-class Contacts(NamedTuple):
-    """Object pairs, rows of PAIR, or what was given; triangles that meet, rows of CONTACT, in any order unless sorted or grouped; the work."""
-
-    pairs: Any
-    contacts: Rows
-    counters: Counters
-
-
-class Manifolds(NamedTuple):
-    """As the CPU's: rows of PAIR, MANIFOLD and POINT."""
-
-    pairs: Any
-    manifolds: Rows
-    points: Rows
-
-
-class Contained(NamedTuple):
-    """As the CPU's: rows of PAIR and CONTAINMENT."""
-
-    pairs: Any
-    contained: Rows
-
-
-class Distances(NamedTuple):
-    """Rows of PAIR and DISTANCE, one for each pair; as certified as the CPU's, but not its bytes."""
-
-    pairs: Any
-    distances: Rows
-
-
-class Impacts(NamedTuple):
-    """Rows of PAIR and IMPACT, one for each pair; with the guarantee of the CPU's, but not its bytes."""
-
-    pairs: Any
-    impacts: Rows
-
-
-class Verdicts(NamedTuple):
-    """As the CPU's: rows of PAIR and VERDICT."""
-
-    pairs: Any
-    verdicts: Rows
+# Results, with the fields of the CPU's: `pairs` are rows of PAIR, or what was given.
+#: Rows of CONTACT, in any order unless sorted or grouped, and the work.
+Contacts = NamedTuple("Contacts", [("pairs", Any), ("contacts", Rows), ("counters", Counters)])
+#: Rows of MANIFOLD and POINT.
+Manifolds = NamedTuple("Manifolds", [("pairs", Any), ("manifolds", Rows), ("points", Rows)])
+#: Rows of CONTAINMENT.
+Contained = NamedTuple("Contained", [("pairs", Any), ("contained", Rows)])
+#: Rows of DISTANCE, one for each pair; as certified as the CPU's, but not its bytes.
+Distances = NamedTuple("Distances", [("pairs", Any), ("distances", Rows)])
+#: Rows of IMPACT, one for each pair; with the guarantee of the CPU's, but not its bytes.
+Impacts = NamedTuple("Impacts", [("pairs", Any), ("impacts", Rows)])
+#: Rows of VERDICT, one for each pair.
+Verdicts = NamedTuple("Verdicts", [("pairs", Any), ("verdicts", Rows)])
 
 
 class TooLittleRoom(Error):
@@ -169,12 +140,6 @@ def _stream(stream: Any) -> _cuda.Stream:
 def _found(found: _cuda.Rows | None, given: Any) -> Any:
     """The pairs of a result: those that were found, or what was given."""
     return given if found is None else Rows(found, PAIR)
-
-
-def _choice(name: str, given: Any, choices: dict[str, int]) -> int:
-    if given not in choices:
-        raise ValueError(f"{name} is {given!r} where one of {', '.join(choices)} is wanted")
-    return choices[given]
 
 
 class Instances:
@@ -248,7 +213,7 @@ class Queued:
 
     @property
     def report(self) -> Rows:
-        """One row: `failed`, not 0 where something is wrong; `complete`, 0 where something did not fit; `contacts`; `needed_pairs`, `needed_contacts`, ..."""
+        """One row: `status`, not 0 where something is wrong; `complete`, 0 where something did not fit; `contacts`; `needed_pairs`, `needed_contacts`, ..."""
         return Rows(self._core.report(), _REPORT)
 
     def wait(self, stream: Any = None) -> tuple[int, int]:
@@ -291,14 +256,7 @@ class Query:
     __slots__ = ("_assets", "_core", "_given", "_step", "__weakref__")
 
     def __init__(self, assets: Iterable[Asset], *, device: int = 0, contents: Literal["all", "exact", "manifolds"] = "all", stream: Any = None):
-        if isinstance(assets, Asset):
-            raise TypeError("assets is one asset where a list of them is wanted")
-        cores = []
-        for place, asset in enumerate(assets):
-            if not isinstance(asset, Asset):
-                raise TypeError(f"assets: entry {place} is {type(asset).__name__} where an Asset is wanted")
-            cores.append(asset._core)
-        self._assets = _cuda.Assets(cores, device, _choice("contents", contents, _CONTENTS), _stream(stream))
+        self._assets = _cuda.Assets(cores_of(assets), device, _choice("contents", contents, _CONTENTS), _stream(stream))
         self._core = _cuda.Query(self._assets)
         self._given: Any = None  # the pairs of the last contacts()
         self._step: _cuda.Step | None = None
@@ -313,17 +271,16 @@ class Query:
             raise TypeError("pose is missing")
         return Instances(_cuda.Instances(self._assets, asset, pose, _stream(stream)), asset, pose)
 
-    def _bodies(self, instances: Instances | None, asset: Any, pose: Any, stream: _cuda.Stream) -> _cuda.Instances:
-        if instances is None:
-            if pose is None:
-                raise TypeError("instances is missing, or pose")
-            return _cuda.Instances(self._assets, asset, pose, stream)
-        if asset is not None or pose is not None:
+    def _about(self, instances: Instances | None, asset: Any, pose: Any, pairs: Any, filter: Filter | None, stream: Any
+               ) -> tuple[_cuda.Instances, _cuda.Pairs | None, _cuda.Filter | None, _cuda.Stream]:
+        """What a call is about: bodies, pairs and filter, and its stream."""
+        on = _stream(stream)
+        if instances is not None and (asset is not None or pose is not None):
             raise TypeError("instances stand instead of asset and pose, not beside them")
-        return instances._core
-
-    def _pairs(self, pairs: Any, stream: _cuda.Stream) -> _cuda.Pairs | None:
-        return None if pairs is None else _cuda.Pairs(pairs, stream, self._assets.device)
+        if instances is None and pose is None:
+            raise TypeError("instances is missing, or pose")
+        bodies = _cuda.Instances(self._assets, asset, pose, on) if instances is None else instances._core
+        return bodies, None if pairs is None else _cuda.Pairs(pairs, on, self._assets.device), None if filter is None else filter._core, on
 
     def contacts(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, pairs: Any = None,
                  mode: Literal["exact", "fast", "boxes"] = "exact", first_contact_only: bool = False, within: float = 0.0, add_error_bounds: bool = False,
@@ -335,21 +292,19 @@ class Query:
             sorted: pairs ascend, and contacts ascend by pair, face_a, face_b: the same bytes on every run.
             grouped: contacts lie pair by pair, and `manifolds` and `contained` may follow.
 
-        The others: as of `tandem.Query.contacts`.
+        The others: as of `tandem.Scene.contacts`.
         """
-        on = _stream(stream)
-        found = self._core.contacts(self._bodies(instances, asset, pose, on), self._pairs(pairs, on), _choice("mode", mode, _MODES), first_contact_only,
-                                    amount(within, "within", FARTHEST), add_error_bounds, sorted, grouped, None if filter is None else filter._core, on)
+        bodies, given, chosen, on = self._about(instances, asset, pose, pairs, filter, stream)
+        found = self._core.contacts(bodies, given, _choice("mode", mode, _MODES), first_contact_only, amount(within, "within", FARTHEST), add_error_bounds,
+                                    sorted, grouped, chosen, on)
         self._given = pairs
         return Contacts(_found(found[0], pairs), Rows(found[1], CONTACT), Counters._make(found[2]))
 
     def pairs(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, sorted: bool = True, within: float = 0.0,
               filter: Filter | None = None, stream: Any = None) -> Rows:
         """The object pairs whose world boxes meet, rows of PAIR: a < b."""
-        on = _stream(stream)
-        found = self._core.pairs(self._bodies(instances, asset, pose, on), sorted, amount(within, "within", FARTHEST),
-                                 None if filter is None else filter._core, on)
-        return Rows(found, PAIR)
+        bodies, _, chosen, on = self._about(instances, asset, pose, None, filter, stream)
+        return Rows(self._core.pairs(bodies, sorted, amount(within, "within", FARTHEST), chosen, on), PAIR)
 
     def manifolds(self, *, most_points: int = 7, match_previous: bool = True) -> Manifolds:
         """Makes contact manifolds of the last `contacts(..., grouped=True)` of this query, whose arrays must be as they were, on its stream: where that was sorted
@@ -366,11 +321,10 @@ class Query:
 
     def distances(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, pairs: Any = None, reach: float | None = None,
                   absolute_tolerance: float = 0.0, relative_tolerance: float = 0.0, filter: Filter | None = None, stream: Any = None) -> Distances:
-        """Finds how near the surfaces are. Arguments: as of `tandem.Query.distances`."""
-        on = _stream(stream)
-        found = self._core.distances(self._bodies(instances, asset, pose, on), self._pairs(pairs, on),
-                                     None if reach is None else amount(reach, "reach", np.inf), amount(absolute_tolerance, "absolute_tolerance", np.inf),
-                                     amount(relative_tolerance, "relative_tolerance", np.inf), None if filter is None else filter._core, on)
+        """Finds how near the surfaces are. Arguments: as of `tandem.Scene.distances`."""
+        bodies, given, chosen, on = self._about(instances, asset, pose, pairs, filter, stream)
+        found = self._core.distances(bodies, given, None if reach is None else amount(reach, "reach", np.inf),
+                                     amount(absolute_tolerance, "absolute_tolerance", np.inf), amount(relative_tolerance, "relative_tolerance", np.inf), chosen, on)
         return Distances(_found(found[0], pairs), Rows(found[1], DISTANCE))
 
     def impacts(self, instances: Instances | None = None, *, motion: Any, duration: float, asset: Any = None, pose: Any = None, pairs: Any = None,
@@ -380,17 +334,15 @@ class Query:
         Args:
             motion: (n, 3, 3) or (n, 9) float64: velocity of the centre, angular velocity, and where the centre is in the world at the start.
         """
-        on = _stream(stream)
-        found = self._core.impacts(self._bodies(instances, asset, pose, on), motion, amount(duration, "duration", FINITE), self._pairs(pairs, on),
-                                   amount(tolerance, "tolerance", FINITE), sorted, None if filter is None else filter._core, on)
+        bodies, given, chosen, on = self._about(instances, asset, pose, pairs, filter, stream)
+        found = self._core.impacts(bodies, motion, amount(duration, "duration", FINITE), given, amount(tolerance, "tolerance", FINITE), sorted, chosen, on)
         return Impacts(_found(found[0], pairs), Rows(found[1], IMPACT))
 
     def verdicts(self, instances: Instances | None = None, *, tolerance: float, asset: Any = None, pose: Any = None, pairs: Any = None,
                  filter: Filter | None = None, stream: Any = None) -> Verdicts:
-        """Tells of pairs whether they are apart, touch, or are within a tolerance. Arguments: as of `tandem.Query.verdicts`."""
-        on = _stream(stream)
-        found = self._core.verdicts(self._bodies(instances, asset, pose, on), amount(tolerance, "tolerance", FARTHEST), self._pairs(pairs, on),
-                                    None if filter is None else filter._core, on)
+        """Tells of pairs whether they are apart, touch, or are within a tolerance. Arguments: as of `tandem.Scene.verdicts`."""
+        bodies, given, chosen, on = self._about(instances, asset, pose, pairs, filter, stream)
+        found = self._core.verdicts(bodies, amount(tolerance, "tolerance", FARTHEST), given, chosen, on)
         return Verdicts(_found(found[0], pairs), Rows(found[1], VERDICT))
 
     def reserve(self, *, instances: int, pairs: int, contacts: int, undecided: int | None = None, mode: Literal["exact", "fast", "boxes"] = "exact",
@@ -410,7 +362,6 @@ class Query:
         them, or what this returns."""
         if self._step is None:
             raise ValueError("nothing is reserved: call reserve() first")
-        on = _stream(stream)
-        given = self._bodies(instances, asset, pose, on), self._pairs(pairs, on), None if filter is None else filter._core
-        self._step.enqueue(*given, on)
-        return Queued(self._step, *given)
+        bodies, given, chosen, on = self._about(instances, asset, pose, pairs, filter, stream)
+        self._step.enqueue(bodies, given, chosen, on)
+        return Queued(self._step, bodies, given, chosen)

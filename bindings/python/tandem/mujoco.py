@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import tandem
-from tandem._solver_pairs import Touches, pair_arguments
+from tandem._solver_pairs import Touches, asked_pairs
 
 __all__ = ["MeshContacts"]
 
@@ -45,7 +45,7 @@ class MeshContacts:
     Args:
         model: not changed.
         most_points: of a manifold, 1 to 7.
-        threads: of a query.
+        threads: of a scene.
         effort: as of tandem.build().
 
     Raises:
@@ -66,9 +66,9 @@ class MeshContacts:
         self.assets = [_asset_of(model, mesh, effort) for mesh in meshes]  #: of the meshes that these geoms have
         self.instances = np.zeros(len(self.geoms), tandem.INSTANCE)  #: the geoms, posed as in the last call
         self.instances["asset"] = asset
-        self._query = tandem.Query(self.assets, threads=threads)
+        self._scene = tandem.Scene(self.assets, threads=threads)
         rows = np.searchsorted(self.geoms, geom_pairs)
-        self._arguments = pair_arguments(len(self.geoms), rows)
+        self._asked = asked_pairs(len(self.geoms), rows)
         self._explicit = {(int(a), int(b)): int(pair) for (a, b), pair in zip(geom_pairs, explicit) if pair >= 0}
 
     def step(self, data: mujoco.MjData, count: int = 1) -> None:
@@ -130,7 +130,7 @@ class MeshContacts:
         self._drop_hull_contacts(data)
         self.instances["rotation"] = data.geom_xmat[self.geoms].reshape(-1, 3, 3)
         self.instances["translation"] = data.geom_xpos[self.geoms]
-        touches = Touches(self._query, self.instances, self.most_points, self._arguments)
+        touches = Touches(self._scene, self.instances, self.most_points, self._asked)
         if (reach := self._reach()) > 0:
             touches.add_near(self._reach_of, reach)
         geom = np.stack([self.geoms[touches.a], self.geoms[touches.b]], axis=1)

@@ -17,7 +17,7 @@ import numpy.typing as npt
 import warp as wp  # type: ignore[import-untyped,import-not-found,unused-ignore]
 
 import tandem
-from tandem._solver_pairs import Touches, pair_arguments
+from tandem._solver_pairs import Touches, asked_pairs
 
 __all__ = ["CollisionPipeline"]
 
@@ -42,7 +42,7 @@ class CollisionPipeline:
     Args:
         model: of any number of worlds.
         most_points: of a manifold, 1 to 7.
-        threads: of a query.
+        threads: of a scene.
         effort: as of tandem.build().
         options: of newton.CollisionPipeline, such as rigid_contact_max, the room for contacts, of which Newton has an estimate.
     """
@@ -69,8 +69,8 @@ class CollisionPipeline:
         self.instances = np.zeros(len(self.shapes), tandem.INSTANCE)  #: the shapes, posed as in the last call
         self.instances["asset"] = asset
         if len(self.shapes):
-            self._arguments = pair_arguments(len(self.shapes), np.searchsorted(self.shapes, np.sort(pairs[is_ours], axis=1)))
-            self._query = tandem.Query(self.assets, threads=threads)
+            self._asked = asked_pairs(len(self.shapes), np.searchsorted(self.shapes, np.sort(pairs[is_ours], axis=1)))
+            self._scene = tandem.Scene(self.assets, threads=threads)
 
     def contacts(self) -> newton.Contacts:
         """Room for the contacts of collide()."""
@@ -95,7 +95,7 @@ class CollisionPipeline:
         rotation, inner = _rotations(body), self._in_body
         self.instances["rotation"] = rotation @ inner[0]
         self.instances["translation"] = np.einsum("nij,nj->ni", rotation, inner[1]) + body[:, :3]
-        touches = Touches(self._query, self.instances, self.most_points, self._arguments)
+        touches = Touches(self._scene, self.instances, self.most_points, self._asked)
         if self._margin.max() > 0:
             touches.add_near(lambda a, b: self._margin[a] + self._margin[b], 2 * float(self._margin.max()))
         margins = self._margin[touches.a], self._margin[touches.b]

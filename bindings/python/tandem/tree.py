@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 
 import tandem
 
+from ._asset import sections_of
+
 # Places in a .bvh file, version 1 (formats/FORMAT.md).
-_SECTION_TABLE = 128
-_SECTION_COUNT = 96
-_SECTION = np.dtype([("kind", "<u4"), ("level", "<u4"), ("offset", "<u8"), ("bytes", "<u8"), ("count", "<u8")])
 _BLOCKS = 2
 _BLOCK = np.dtype([("centre", "<f4", (3, 4)), ("half_extent", "<f4", (3, 4)), ("index", "<u4", 4), ("kind", "<u4", 4)])
 _INTERNAL, _LEAF = 0, 1
@@ -45,12 +44,10 @@ def boxes(asset: tandem.Asset, depth: int, level: int = 0) -> NDArray[np.float64
 
 
 def _blocks(asset: tandem.Asset, level: int) -> NDArray[np.void]:
-    raw = asset.data
-    count = int(np.frombuffer(raw, "<u4", 1, _SECTION_COUNT)[0])
-    table = np.frombuffer(raw, _SECTION, count, _SECTION_TABLE)
+    table = sections_of(asset)
     wanted = asset.first_level + level
     section = table[(table["kind"] == _BLOCKS) & (table["level"] == wanted)][0]
-    return np.frombuffer(raw, _BLOCK, int(section["count"]), int(section["offset"]))
+    return np.frombuffer(asset.data, _BLOCK, int(section["count"]), int(section["offset"]))
 
 
 _NODE = np.dtype([("centre", "<f4", 3), ("half_extent", "<f4", 3), ("index", "<u4"), ("kind", "<u4")])

@@ -66,9 +66,10 @@ class CollisionManager:
         self._objs: dict[Hashable, CollisionObject] = {}
         self._ignored: set[tuple[Hashable, Hashable]] = set()
         self._bodies: Bodies | None = None
+        self._number: dict[Hashable, int] = {}  # of the objects, among the bodies
         self._changed = False  # objects came or went
-        self._moved = False
-        self._joined: Bodies | None = None  # of the last query with objects from elsewhere
+        self._moved: set[Hashable] = set()
+        self._joined: Bodies | None = None  # of the last question about objects from elsewhere, ours first
 
     def add_object(self, name: Hashable, mesh: Any, transform: Any = None) -> CollisionObject:
         """Adds an object, in place of the one of that name if there is one.
@@ -108,7 +109,7 @@ class CollisionManager:
         rotation, translation = transform[:3, :3], transform[:3, 3]
         place = self._objs[name]._place
         place[:3, :3], place[:3, 3] = rotation, translation
-        self._moved = True
+        self._moved.add(name)
 
     def set_pair_ignored(self, name_a: Hashable, name_b: Hashable, ignored: bool = True) -> None:
         """Says that in_collision_internal() and min_distance_internal() do not look at a pair, such as links that meet at a joint; or, with False, that they do.
@@ -200,12 +201,9 @@ class CollisionManager:
 
         Raises ValueError where there is none of that name; TypeError where names or data are asked for and there is one object, or none.
         """
-        if name is None:
-            search = self._search()
-        else:
+        if name is not None:
             self._check(name)
-            search = self._search(alone=list(self._objs).index(name))
-        return self._distance(search, (None, None), _pair, return_names, return_data)
+        return self._distance(self._search(name), (None, None), _pair, return_names, return_data)
 
     def min_distance_other(self, other_manager: CollisionManager, return_names: bool = False, return_data: bool = False) -> Any:
         """The distance between the two objects, one of each manager, that are nearest to each other.
@@ -227,24 +225,35 @@ class CollisionManager:
 
     def _placed(self) -> Bodies:
         if self._bodies is None or self._changed:
+            self._number = {name: number for number, name in enumerate(self._objs)}
             objects = self._objs.values()
             self._bodies = Bodies(list(self._objs), [thing._shape for thing in objects], [thing._place for thing in objects])
         elif self._moved:
-            self._bodies.move([thing._place for thing in self._objs.values()])
-        self._moved = self._changed = False
+            moved = [self._number[name] for name in self._moved]
+            places = [self._objs[name]._place for name in self._moved]
+            self._bodies.move(moved, places)
+            if self._joined is not None and self._joined.ours is self._bodies:
+                self._joined.move(moved, places)
+        self._moved.clear()
+        self._changed = False
         return self._bodies
 
-    def _search(self, alone: int | None = None) -> Search:
-        bodies = self._placed()
-        places = {name: place for place, name in enumerate(bodies.names)} if self._ignored else {}
-        return Search(bodies, self._threads, alone=alone, ignored=[(places[a], places[b]) for a, b in self._ignored])
+    def _search(self, name: Hashable = None) -> Search:
+        bodies, number = self._placed(), self._number
+        alone = None if name is None else number[name]
+        return Search(bodies, self._threads, alone=alone, ignored=sorted((number[a], number[b]) for a, b in self._ignored))
 
     def _with_single(self, mesh: Any, transform: Any) -> Search:
         place = np.eye(4)
         if transform is not None:
             place[:3, :3] = transform[:3, :3]
             place[:3, 3] = transform[:3, 3]
-        return self._with(Bodies([EXTERNAL], [Shape.of(mesh)], [place]))
+        shape, ours = Shape.of(mesh), self._placed()
+        count, joined = len(ours.names), self._joined
+        if joined is None or joined.ours is not ours or joined.names[count:] != [EXTERNAL] or joined.given[count] is not shape:
+            return self._with(Bodies([EXTERNAL], [shape], [place]))
+        joined.move([count], [place])
+        return Search(joined, self._threads, first_side=count)
 
     def _with_other(self, other: CollisionManager) -> Search:
         return self._with(other._placed())

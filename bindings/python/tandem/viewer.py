@@ -68,7 +68,7 @@ class View:
     the boxes.
 
     what, instances: as for view().
-    contacts: tandem.Contacts of these instances, whose triangles are drawn in red; or True: a query finds them, anew
+    contacts: tandem.Contacts of these instances, whose triangles are drawn in red; or True: they are found, anew
         for each state of a run, of the pairs that the scene file or `motion` lets through.
     manifolds: tandem.Manifolds of these instances, drawn as points in the colour of their depths, with an arrow for the
         normal of each manifold, from a to b; or True as above.
@@ -87,7 +87,7 @@ class View:
     azimuth, elevation: degrees. From where one looks: 0 from +x, 90 from +y; above the horizon, z is up.
 
     Raises TypeError and ValueError for arguments that do not fit, or not together, RuntimeError where there is nothing
-    to draw with, and what reading files and queries raise.
+    to draw with, and what reading files and scenes raise.
     """
 
     def __init__(self, what: Any, instances: NDArray[np.void] | None = None, *,
@@ -119,7 +119,7 @@ class View:
             if not isinstance(found, (bool, type(None))) and (len(self.scene.steps) > 1 or levels is not None):
                 raise ValueError(f"{name}: belong to one state, at its levels; let them be found by {name}=True")
         self._contacts, self._manifolds, self._distances = contacts, manifolds, distances
-        self._query = tandem.Query(self._assets) if contacts is True or manifolds is True else None
+        self._asked = tandem.Scene(self._assets) if contacts is True or manifolds is True else None
         self.tree_depth, self._color = tree_depth, color
         inside = contacts is not False or manifolds is not False or distances is not None
         self.opacity = opacity if opacity is not None else TRANSLUCENT if inside else 1.0
@@ -295,12 +295,12 @@ class View:
 
     def _draw_found(self) -> None:
         contacts, manifolds = self._contacts, self._manifolds
-        if self._query is not None:
-            instances = tandem.instances(self._asset, rotation=self.scene.rotation[self.state],
-                                         translation=self.scene.translation[self.state])
-            found = self._query.contacts(instances, pairs=self.scene.pairs, filter=self._filter)
+        if self._asked is not None:
+            self._asked.place(asset=self._asset, rotation=self.scene.rotation[self.state],
+                              translation=self.scene.translation[self.state], filter=self._filter)
+            found = self._asked.contacts(pairs=self.scene.pairs)
             contacts = found if contacts is True else contacts
-            manifolds = self._query.manifolds() if manifolds is True else manifolds
+            manifolds = self._asked.manifolds() if manifolds is True else manifolds
         if not isinstance(contacts, bool):
             self._draw_contacts(contacts)
         if not isinstance(manifolds, bool):

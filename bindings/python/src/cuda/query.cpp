@@ -5,56 +5,17 @@
 #include <limits>
 
 namespace tandem::python {
-namespace {
-
-// Runs a call that waits for the GPU while other Python threads run. where: what the GPU's report says of it.
-template <typename Call>
-tandem_status call_freely(const Call& call) {
-  const WithoutLock other_threads_run;
-  return call();
-}
-
-template <typename Call, typename Where>
-void run(const Call& call, const Where& where) {
-  const tandem_status status = call_freely(call);
-  if (status != TANDEM_OK) check(status, where());
-}
-
-template <typename Report, typename Of>
-Report report_of(tandem_status (*get)(const Of*, Report*), const Of* query) {
-  Report report = {};
-  static_cast<void>(get(query, &report));
-  return report;
-}
-
-nb::tuple counters_of(const tandem_contact_counters& counters) {
-  return nb::make_tuple(counters.object_pairs, counters.block_pairs, counters.candidates,
-                        counters.decided_by_float32, counters.decided_by_float64, counters.decided_exactly,
-                        counters.contacts);
-}
-
-}  // namespace
-
-Turn::Turn(std::atomic<bool>& busy) : busy_(busy) {
-  if (!busy.exchange(true)) return;
-  PyErr_SetString(PyExc_RuntimeError, "the query is at work for another thread");
-  throw nb::python_error();
-}
-
 FoundPairs Query::find_pairs(const Instances& bodies, bool sorted, double within, const GpuFilter* filter,
                              const Stream& stream) {
-  const auto broad_phase = broad_phases_.take(device(), [&](tandem_gpu_broad_phase* made) {
-    return tandem_gpu_broad_phase_set_assets(made, assets_.get());
-  });
+  const auto broad_phase = broad_phases_.take(assets_, stream);
   auto options = sized<tandem_gpu_broad_phase_options>();
   options.sorted = sorted;
   options.within = within;
   options.filter = GpuFilter::of(filter, bodies);
-  tandem_gpu_broad_phase* const query = broad_phase.get();
-  run([&] { return tandem_gpu_broad_phase_find(query, &bodies.get(), &options, stream); },
-      [&] { return report_of(tandem_gpu_broad_phase_get_report, query).where; });
-  return {tandem_gpu_broad_phase_pairs(query), broad_phase,
-          report_of(tandem_gpu_broad_phase_get_report, query).count};
+  const auto report = BroadPhases::run(broad_phase, [&](tandem_gpu_broad_phase* query) {
+    return tandem_gpu_broad_phase_find(query, &bodies.get(), &options, stream);
+  });
+  return {tandem_gpu_broad_phase_pairs(broad_phase.get()), broad_phase, report.count};
 }
 
 FoundPairs Query::pairs_of(nb::handle given, const Instances& bodies, bool sorted, double within,
@@ -64,21 +25,21 @@ FoundPairs Query::pairs_of(nb::handle given, const Instances& bodies, bool sorte
   return {pairs.get(), nullptr, pairs.count()};
 }
 
-Rows Query::rows_of(const FoundPairs& pairs, const Stream& stream) const {
-  return {memory_of(pairs.owner, stream), pairs.pairs.pairs, pairs.count, sizeof(tandem_object_pair)};
+nb::object Query::rows_of(const FoundPairs& pairs, const Stream& stream) const {
+  if (pairs.owner == nullptr) return nb::none();
+  return nb::cast(
+      Rows(memory_of(pairs.owner, stream), pairs.pairs.pairs, pairs.count, sizeof(tandem_object_pair)));
 }
 
 nb::tuple Query::contacts(nb::object instances, nb::object given, std::uint32_t mode, bool first_contact_only,
                           double within, bool add_error_bounds, bool sorted, bool grouped,
                           const GpuFilter* filter, const Stream& stream) {
-  const Turn turn(busy_);
+  const Turn turn(busy_, kBusy);
   const OnDevice current(device());
   const Instances& bodies = bodies_of(instances, device());
   last_.reset();
   const FoundPairs pairs = pairs_of(given, bodies, sorted, within, filter, stream);
-  const auto contacts = contact_queries_.take(device(), [&](tandem_gpu_contact_query* made) {
-    return tandem_gpu_contact_query_set_assets(made, assets_.get(), stream);
-  });
+  const auto contacts = contact_queries_.take(assets_, stream);
   auto options = sized<tandem_gpu_query_options>();
   options.mode = mode;
   options.first_contact_only = first_contact_only;
@@ -86,24 +47,22 @@ nb::tuple Query::contacts(nb::object instances, nb::object given, std::uint32_t 
   options.grouped = grouped;
   options.add_error_bounds = add_error_bounds;
   options.within = within;
-  tandem_gpu_contact_query* const query = contacts.get();
-  run([&] { return tandem_gpu_contact_query_find(query, &bodies.get(), &pairs.pairs, &options, stream); },
-      [&] { return report_of(tandem_gpu_contact_query_get_report, query).where; });
-  const auto report = report_of(tandem_gpu_contact_query_get_report, query);
+  const auto report = ContactQueries::run(contacts, [&](tandem_gpu_contact_query* query) {
+    return tandem_gpu_contact_query_find(query, &bodies.get(), &pairs.pairs, &options, stream);
+  });
   if (grouped) last_ = Last{instances, given, pairs, contacts, stream};
-  return nb::make_tuple(given.is_none() ? nb::cast(rows_of(pairs, stream)) : nb::none(),
-                        Rows(memory_of(contacts, stream), tandem_gpu_contact_query_contacts(query),
+  return nb::make_tuple(rows_of(pairs, stream),
+                        Rows(memory_of(contacts, stream), tandem_gpu_contact_query_contacts(contacts.get()),
                              report.contacts, sizeof(tandem_contact)),
                         counters_of(report.counters));
 }
 
 nb::object Query::pairs(nb::object instances, bool sorted, double within, const GpuFilter* filter,
                         const Stream& stream) {
-  const Turn turn(busy_);
+  const Turn turn(busy_, kBusy);
   const OnDevice current(device());
   last_.reset();
-  return nb::cast(
-      rows_of(find_pairs(bodies_of(instances, device()), sorted, within, filter, stream), stream));
+  return rows_of(find_pairs(bodies_of(instances, device()), sorted, within, filter, stream), stream);
 }
 
 const Query::Last& Query::last() const {
@@ -129,76 +88,65 @@ Rows Query::copy(const void* rows, std::size_t count, std::size_t row_bytes, con
 }
 
 nb::tuple Query::manifolds(std::uint32_t most_points, bool match_previous) {
-  const Turn turn(busy_);
+  const Turn turn(busy_, kBusy);
   const OnDevice current(device());
   const Last& of = last();
-  if (manifolds_ == nullptr)
-    manifolds_ = ManifoldMakers::make(device(), [&](tandem_gpu_manifolds* made) {
-      return tandem_gpu_manifolds_set_assets(made, assets_.get(), of.stream);
-    });
+  if (manifolds_ == nullptr) manifolds_ = ManifoldMakers::make(assets_, of.stream);
   auto options = sized<tandem_manifold_options>();
   options.most_points = most_points;
   options.ignore_previous = !match_previous;
   const Instances& bodies = bodies_of(of.instances, device());
-  tandem_gpu_manifolds* const made = manifolds_.get();
-  check_whole(call_freely([&] {
-    return tandem_gpu_manifolds_find(made, &bodies.get(), &of.pairs.pairs, of.contacts.get(), &options,
+  const auto report = ManifoldMakers::run(manifolds_, [&](tandem_gpu_manifolds* maker) {
+    return tandem_gpu_manifolds_find(maker, &bodies.get(), &of.pairs.pairs, of.contacts.get(), &options,
                                      of.stream);
-  }));
-  const auto report = report_of(tandem_gpu_manifolds_get_report, made);
+  });
   // The query keeps its own, to find points again in the next step.
+  tandem_gpu_manifolds* const made = manifolds_.get();
   return nb::make_tuple(
-      of.given.is_none() ? nb::cast(rows_of(of.pairs, of.stream)) : nb::none(),
+      rows_of(of.pairs, of.stream),
       copy(tandem_gpu_manifolds_manifolds(made), report.manifolds, sizeof(tandem_manifold), of.stream),
       copy(tandem_gpu_manifolds_points(made), report.points, sizeof(tandem_manifold_point), of.stream));
 }
 
 nb::tuple Query::contained() {
-  const Turn turn(busy_);
+  const Turn turn(busy_, kBusy);
   const OnDevice current(device());
   const Last& of = last();
-  if (contained_ == nullptr)
-    contained_ = ContainmentQueries::make(device(), [&](tandem_gpu_containment_query* made) {
-      return tandem_gpu_containment_query_set_assets(made, assets_.get(), of.stream);
-    });
+  if (contained_ == nullptr) contained_ = ContainmentQueries::make(assets_, of.stream);
   const Instances& bodies = bodies_of(of.instances, device());
-  tandem_gpu_containment_query* const query = contained_.get();
-  check_whole(call_freely([&] {
+  const auto report = ContainmentQueries::run(contained_, [&](tandem_gpu_containment_query* query) {
     return tandem_gpu_containment_query_find(query, &bodies.get(), &of.pairs.pairs, of.contacts.get(),
                                              of.stream);
-  }));
-  const auto report = report_of(tandem_gpu_containment_query_get_report, query);
-  return nb::make_tuple(of.given.is_none() ? nb::cast(rows_of(of.pairs, of.stream)) : nb::none(),
-                        copy(tandem_gpu_containment_query_contained(query), report.contained,
+  });
+  return nb::make_tuple(rows_of(of.pairs, of.stream),
+                        copy(tandem_gpu_containment_query_contained(contained_.get()), report.contained,
                              sizeof(tandem_containment), of.stream));
 }
 
 nb::tuple Query::distances(nb::object instances, nb::object given, std::optional<double> reach,
                            double absolute, double relative, const GpuFilter* filter, const Stream& stream) {
-  const Turn turn(busy_);
+  const Turn turn(busy_, kBusy);
   const OnDevice current(device());
   const Instances& bodies = bodies_of(instances, device());
   const double within = reach.value_or(std::numeric_limits<double>::infinity());
   const FoundPairs pairs = pairs_of(given, bodies, true, within, filter, stream);
-  const auto distances = distance_queries_.take(device(), [&](tandem_gpu_distance_query* made) {
-    return tandem_gpu_distance_query_set_assets(made, assets_.get(), stream);
-  });
+  const auto distances = distance_queries_.take(assets_, stream);
   auto options = sized<tandem_gpu_distance_options>();
   options.limit_reach = reach.has_value();
   options.reach = reach.value_or(0);
   options.absolute_tolerance = absolute;
   options.relative_tolerance = relative;
-  tandem_gpu_distance_query* const query = distances.get();
-  run([&] { return tandem_gpu_distance_query_find(query, &bodies.get(), &pairs.pairs, &options, stream); },
-      [&] { return report_of(tandem_gpu_distance_query_get_report, query).where; });
-  return nb::make_tuple(given.is_none() ? nb::cast(rows_of(pairs, stream)) : nb::none(),
-                        Rows(memory_of(distances, stream), tandem_gpu_distance_query_distances(query),
-                             pairs.count, sizeof(tandem_distance)));
+  DistanceQueries::run(distances, [&](tandem_gpu_distance_query* query) {
+    return tandem_gpu_distance_query_find(query, &bodies.get(), &pairs.pairs, &options, stream);
+  });
+  return nb::make_tuple(rows_of(pairs, stream), Rows(memory_of(distances, stream),
+                                                     tandem_gpu_distance_query_distances(distances.get()),
+                                                     pairs.count, sizeof(tandem_distance)));
 }
 
 nb::tuple Query::impacts(nb::object instances, nb::object motion, double duration, nb::object given,
                          double tolerance, bool sorted, const GpuFilter* filter, const Stream& stream) {
-  const Turn turn(busy_);
+  const Turn turn(busy_, kBusy);
   const OnDevice current(device());
   const Instances& bodies = bodies_of(instances, device());
   const GivenArray moves(motion, "motion", stream, device());
@@ -209,43 +157,35 @@ nb::tuple Query::impacts(nb::object instances, nb::object motion, double duratio
   if (!flat && shape != std::vector<std::int64_t>{count, 3, 3})
     moves.wrong_shape(
         ("(" + std::to_string(count) + ", 9) or (" + std::to_string(count) + ", 3, 3)").c_str());
-  const auto impacts = impact_queries_.take(device(), [&](tandem_gpu_impact_query* made) {
-    return tandem_gpu_impact_query_set_assets(made, assets_.get(), stream);
-  });
+  const auto impacts = impact_queries_.take(assets_, stream);
   auto options = sized<tandem_gpu_impact_options>();
   options.sorted = sorted;
   options.tolerance = tolerance;
   options.filter = GpuFilter::of(filter, bodies);
   const tandem_gpu_pairs* const of = given.is_none() ? nullptr : &nb::cast<const Pairs&>(given).get();
-  tandem_gpu_impact_query* const query = impacts.get();
-  run(
-      [&] {
-        return tandem_gpu_impact_query_find(query, &bodies.get(),
-                                            static_cast<const tandem_motion*>(moves.data()), duration, of,
-                                            &options, stream);
-      },
-      [&] { return report_of(tandem_gpu_impact_query_get_report, query).where; });
-  const std::size_t found = report_of(tandem_gpu_impact_query_get_report, query).impacts;
-  const FoundPairs pairs = {tandem_gpu_impact_query_pairs(query), impacts, found};
-  return nb::make_tuple(
-      of == nullptr ? nb::cast(rows_of(pairs, stream)) : nb::none(),
-      Rows(memory_of(impacts, stream), tandem_gpu_impact_query_impacts(query), found, sizeof(tandem_impact)));
+  const auto report = ImpactQueries::run(impacts, [&](tandem_gpu_impact_query* query) {
+    const auto* rows = static_cast<const tandem_motion*>(moves.data());
+    return tandem_gpu_impact_query_find(query, &bodies.get(), rows, duration, of, &options, stream);
+  });
+  FoundPairs pairs = {tandem_gpu_impact_query_pairs(impacts.get()), nullptr, report.impacts};
+  if (of == nullptr) pairs.owner = impacts;
+  return nb::make_tuple(rows_of(pairs, stream),
+                        Rows(memory_of(impacts, stream), tandem_gpu_impact_query_impacts(impacts.get()),
+                             report.impacts, sizeof(tandem_impact)));
 }
 
 nb::tuple Query::verdicts(nb::object instances, double tolerance, nb::object given, const GpuFilter* filter,
                           const Stream& stream) {
-  const Turn turn(busy_);
+  const Turn turn(busy_, kBusy);
   const OnDevice current(device());
   const Instances& bodies = bodies_of(instances, device());
   const FoundPairs pairs = pairs_of(given, bodies, true, 0, filter, stream);
-  const auto verdicts = tolerance_queries_.take(device(), [&](tandem_gpu_tolerance_query* made) {
-    return tandem_gpu_tolerance_query_set_assets(made, assets_.get(), stream);
+  const auto verdicts = tolerance_queries_.take(assets_, stream);
+  ToleranceQueries::run(verdicts, [&](tandem_gpu_tolerance_query* query) {
+    return tandem_gpu_tolerance_query_find(query, &bodies.get(), &pairs.pairs, tolerance, stream);
   });
-  tandem_gpu_tolerance_query* const query = verdicts.get();
-  run([&] { return tandem_gpu_tolerance_query_find(query, &bodies.get(), &pairs.pairs, tolerance, stream); },
-      [&] { return report_of(tandem_gpu_tolerance_query_get_report, query).where; });
-  return nb::make_tuple(given.is_none() ? nb::cast(rows_of(pairs, stream)) : nb::none(),
-                        Rows(memory_of(verdicts, stream), tandem_gpu_tolerance_query_verdicts(query),
+  return nb::make_tuple(rows_of(pairs, stream),
+                        Rows(memory_of(verdicts, stream), tandem_gpu_tolerance_query_verdicts(verdicts.get()),
                              pairs.count, sizeof(tandem_verdict)));
 }
 

@@ -6,18 +6,6 @@
 
 namespace tandem::python {
 
-/// A turn at what takes one call at a time: a second thread gets RuntimeError.
-class Turn {
- public:
-  explicit Turn(std::atomic<bool>& busy);
-  ~Turn() { busy_ = false; }
-  Turn(const Turn&) = delete;
-  Turn& operator=(const Turn&) = delete;
-
- private:
-  std::atomic<bool>& busy_;
-};
-
 /// Deletes a handle of the C interface on its device.
 template <typename Of, void (*destroy)(Of*)>
 struct Destroy {
@@ -28,58 +16,69 @@ struct Destroy {
   }
 };
 
-/// Handles of one kind. Arrays of results lie in a handle's memory and keep it: it is used again when the
+/// A question's handles. Arrays of results lie in a handle's memory and keep it: it is used again when the
 /// last of them is gone, and until then a call takes another.
-template <typename Of, tandem_status (*create)(const tandem_allocator*, Of**), void (*destroy)(Of*)>
-class Pool {
+template <auto create, auto destroy, auto set_assets, auto get_report>
+class Pool;
+
+template <typename Of, typename Report, tandem_status (*create)(const tandem_allocator*, Of**),
+          void (*destroy)(Of*), auto set_assets, tandem_status (*get_report)(const Of*, Report*)>
+class Pool<create, destroy, set_assets, get_report> {
  public:
   using Pointer = std::shared_ptr<Of>;
 
-  /// set_assets: what names its assets to a new one.
-  template <typename SetAssets>
-  Pointer take(int device, const SetAssets& set_assets) {
+  Pointer take(const Assets& assets, const Stream& stream) {
     for (const Pointer& made : all_) {
       if (made.use_count() == 1) return made;
     }
-    Pointer made = make(device, set_assets);
-    all_.push_back(made);
-    return made;
+    all_.push_back(make(assets, stream));
+    return all_.back();
   }
 
   /// One that is not in the pool.
-  template <typename SetAssets>
-  static Pointer make(int device, const SetAssets& set_assets) {
+  static Pointer make(const Assets& assets, const Stream& stream) {
     Of* handle = nullptr;
     check_whole(create(nullptr, &handle));
-    Pointer made(handle, Destroy<Of, destroy>{device});
-    check_whole(set_assets(handle));
+    Pointer made(handle, Destroy<Of, destroy>{assets.device()});
+    if constexpr (requires { set_assets(handle, assets.get()); }) {
+      check_whole(set_assets(handle, assets.get()));
+    } else {
+      check_whole(set_assets(handle, assets.get(), stream));
+    }
     return made;
+  }
+
+  /// Makes a call that waits for the GPU while other Python threads run. Returns its report; throws what is
+  /// wrong, with the number to blame that the report has.
+  template <typename Call>
+  static Report run(const Pointer& handle, const Call& call) {
+    const tandem_status status = [&] {
+      const WithoutLock other_threads_run;
+      return call(handle.get());
+    }();
+    Report report = {};
+    static_cast<void>(get_report(handle.get(), &report));
+    if constexpr (requires { report.where; }) {
+      check(status, report.where);
+    } else {
+      check_whole(status);
+    }
+    return report;
   }
 
  private:
   std::vector<Pointer> all_;
 };
 
-template <typename Options>
-Options sized() {
-  Options options = {};
-  options.struct_size = sizeof options;
-  return options;
-}
-
-using BroadPhases =
-    Pool<tandem_gpu_broad_phase, tandem_gpu_broad_phase_create, tandem_gpu_broad_phase_destroy>;
-using ContactQueries =
-    Pool<tandem_gpu_contact_query, tandem_gpu_contact_query_create, tandem_gpu_contact_query_destroy>;
-using DistanceQueries =
-    Pool<tandem_gpu_distance_query, tandem_gpu_distance_query_create, tandem_gpu_distance_query_destroy>;
-using ImpactQueries =
-    Pool<tandem_gpu_impact_query, tandem_gpu_impact_query_create, tandem_gpu_impact_query_destroy>;
-using ToleranceQueries =
-    Pool<tandem_gpu_tolerance_query, tandem_gpu_tolerance_query_create, tandem_gpu_tolerance_query_destroy>;
-using ManifoldMakers = Pool<tandem_gpu_manifolds, tandem_gpu_manifolds_create, tandem_gpu_manifolds_destroy>;
-using ContainmentQueries = Pool<tandem_gpu_containment_query, tandem_gpu_containment_query_create,
-                                tandem_gpu_containment_query_destroy>;
+#define TANDEM_POOL(handle) Pool<handle##_create, handle##_destroy, handle##_set_assets, handle##_get_report>
+using BroadPhases = TANDEM_POOL(tandem_gpu_broad_phase);
+using ContactQueries = TANDEM_POOL(tandem_gpu_contact_query);
+using DistanceQueries = TANDEM_POOL(tandem_gpu_distance_query);
+using ImpactQueries = TANDEM_POOL(tandem_gpu_impact_query);
+using ToleranceQueries = TANDEM_POOL(tandem_gpu_tolerance_query);
+using ManifoldMakers = TANDEM_POOL(tandem_gpu_manifolds);
+using ContainmentQueries = TANDEM_POOL(tandem_gpu_containment_query);
+#undef TANDEM_POOL
 
 /// Object pairs that a call works on, and what keeps them.
 struct FoundPairs {
@@ -88,11 +87,7 @@ struct FoundPairs {
   std::size_t count = 0;
 };
 
-/// How a call looks for contacts.
-struct ContactOptions {
-  tandem_gpu_query_options query;
-  bool sorted;
-};
+constexpr const char* kBusy = "the query is at work for another thread";
 
 class Query {
  public:
@@ -120,7 +115,7 @@ class Query {
   struct Last {
     nb::object instances, given;
     FoundPairs pairs;
-    std::shared_ptr<tandem_gpu_contact_query> contacts;
+    ContactQueries::Pointer contacts;
     Stream stream;
   };
 
@@ -131,7 +126,8 @@ class Query {
   Memory memory_of(std::shared_ptr<const void> owner, const Stream& stream) const {
     return {std::move(owner), device(), stream, true};
   }
-  Rows rows_of(const FoundPairs& pairs, const Stream& stream) const;
+  /// The rows of pairs that were found; None where they were given.
+  nb::object rows_of(const FoundPairs& pairs, const Stream& stream) const;
   Rows copy(const void* rows, std::size_t count, std::size_t row_bytes, const Stream& stream);
   const Last& last() const;
 

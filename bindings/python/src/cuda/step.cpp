@@ -17,12 +17,8 @@ Step::Step(nb::object assets, std::uint32_t instances, std::uint32_t pairs, std:
   options_.sorted = near_.sorted = sorted;
   options_.grouped = grouped;
   const OnDevice current(assets_.device());
-  broad_phase_ = BroadPhases::make(assets_.device(), [&](tandem_gpu_broad_phase* made) {
-    return tandem_gpu_broad_phase_set_assets(made, assets_.get());
-  });
-  contacts_ = ContactQueries::make(assets_.device(), [&](tandem_gpu_contact_query* made) {
-    return tandem_gpu_contact_query_set_assets(made, assets_.get(), nullptr);
-  });
+  broad_phase_ = BroadPhases::make(assets_, Stream());
+  contacts_ = ContactQueries::make(assets_, Stream());
   static_cast<void>(assets_.zeros(instances));  // so that nothing need be made in a capture
   const tandem_gpu_broad_phase_capacity near_room = {instances, pairs};
   const tandem_gpu_query_capacity room = {pairs, 0, contacts, undecided};
@@ -31,7 +27,7 @@ Step::Step(nb::object assets, std::uint32_t instances, std::uint32_t pairs, std:
 }
 
 void Step::enqueue(nb::object instances, nb::object pairs, nb::object filter, const Stream& stream) {
-  const Turn turn(busy_);
+  const Turn turn(busy_, kBusy);
   const OnDevice current(assets_.device());
   const Instances& bodies = bodies_of(instances, assets_.device());
   cudaStreamCaptureStatus capture = cudaStreamCaptureStatusNone;
@@ -80,7 +76,7 @@ Array Step::first_contact() const {
 }
 
 nb::tuple Step::wait(nb::handle given, const Stream* stream) {
-  const Turn turn(busy_);
+  const Turn turn(busy_, kBusy);
   const OnDevice current(assets_.device());
   const cudaStream_t waited = stream != nullptr ? *stream : stream_;
   const bool all = stream == nullptr && captured_;

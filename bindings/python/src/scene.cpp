@@ -1,0 +1,241 @@
+#include <memory>
+
+#include "core.h"
+
+namespace tandem::python {
+namespace {
+
+// The object pairs that a question is told of, or none where the scene is to find them.
+class GivenPairs {
+ public:
+  explicit GivenPairs(nb::handle pairs) : given_(!pairs.is_none()) {
+    if (given_) rows_ = copy_rows<tandem_object_pair>(pairs);
+  }
+  template <typename Options>
+  void put_into(Options& options) const {
+    options.pairs = given_ ? rows_.data() : nullptr;
+    options.pair_count = rows_.size();
+  }
+
+ private:
+  bool given_;
+  std::vector<tandem_object_pair> rows_;
+};
+
+class Scene {
+ public:
+  explicit Scene(nb::list assets) {
+    std::vector<tandem_asset*> list;
+    for (nb::handle asset : assets) list.push_back(nb::cast<const Asset&>(asset).get());
+    tandem_scene* made = nullptr;
+    check(tandem_scene_create(nullptr, &made));
+    scene_.reset(made);
+    check(tandem_scene_set_assets(made, list.data(), list.size()));
+  }
+
+  void set_threads(std::uint32_t threads) {
+    const Turn turn = take_turn();
+    ask([&](tandem_scene* scene) { return tandem_scene_set_threads(scene, threads); });
+  }
+
+  void place(nb::handle instances, const Filter* filter) {
+    const auto rows = copy_rows<tandem_instance>(instances);
+    change([&](tandem_scene* scene) {
+      return tandem_scene_place(scene, rows.data(), rows.size(), Filter::of(filter));
+    });
+  }
+
+  std::uint32_t add(nb::handle instance, const Filter* filter) {
+    const auto rows = copy_rows<tandem_instance>(instance);
+    if (rows.size() != 1) throw_broken_rows();
+    std::uint32_t body = TANDEM_NO_INDEX;
+    change(
+        [&](tandem_scene* scene) { return tandem_scene_add(scene, rows.data(), Filter::of(filter), &body); });
+    return body;
+  }
+
+  void move(nb::handle bodies, nb::handle instances) {
+    const auto numbers = copy_rows<std::uint32_t>(bodies);
+    std::vector<tandem_pose> poses;
+    for (const tandem_instance& instance : copy_rows<tandem_instance>(instances))
+      poses.push_back(instance.pose);
+    if (poses.size() != numbers.size()) throw_broken_rows();
+    change([&](tandem_scene* scene) {
+      return tandem_scene_move(scene, numbers.data(), poses.data(), poses.size());
+    });
+  }
+
+  void set_motion(std::uint32_t body, std::uint32_t motion) {
+    const Turn turn = take_turn();
+    ask([&](tandem_scene* scene) { return tandem_scene_set_motion(scene, body, motion); });
+  }
+
+  void remove(std::uint32_t body) {
+    change([&](tandem_scene* scene) { return tandem_scene_remove(scene, body); });
+  }
+
+  nb::object instances() const { return rows<tandem_scene_instances>(); }
+
+  std::size_t count() const {
+    std::size_t bodies;
+    tandem_scene_instances(scene_.get(), &bodies);
+    return bodies;
+  }
+
+  nb::object pairs(double reach, bool self_pairs) {
+    const Turn turn = take_turn();
+    auto options = sized<tandem_pair_options>();
+    options.reach = reach;
+    options.self_pairs = self_pairs;
+    ask([&](tandem_scene* scene) { return tandem_scene_find_pairs(scene, &options); });
+    return pairs_of(TANDEM_PAIRS);
+  }
+
+  nb::tuple contacts(nb::handle pairs, std::uint32_t mode, bool first_contact_only, bool self_pairs,
+                     double within, bool add_error_bounds) {
+    const Turn turn = take_turn();
+    const GivenPairs given(pairs);
+    auto options = sized<tandem_contact_options>();
+    options.mode = mode;
+    options.first_contact_only = first_contact_only;
+    options.self_pairs = self_pairs;
+    options.add_error_bounds = add_error_bounds;
+    options.within = within;
+    given.put_into(options);
+    find_contacts(options);
+    auto counters = sized<tandem_counters>();
+    check(tandem_scene_get_counters(scene_.get(), &counters));
+    return nb::make_tuple(pairs_of(TANDEM_CONTACTS), rows<tandem_scene_contacts>(),
+                          counters_of(counters.contacts));
+  }
+
+  nb::tuple manifolds(std::uint32_t most_points, bool match_previous) {
+    const Turn turn = take_turn();
+    find_missing_contacts();
+    auto options = sized<tandem_manifold_options>();
+    options.most_points = most_points;
+    options.ignore_previous = !match_previous;
+    ask([&](tandem_scene* scene) { return tandem_scene_find_manifolds(scene, &options); });
+    return nb::make_tuple(pairs_of(TANDEM_CONTACTS), rows<tandem_scene_manifolds>(),
+                          rows<tandem_scene_points>());
+  }
+
+  nb::tuple contained() {
+    const Turn turn = take_turn();
+    find_missing_contacts();
+    ask(tandem_scene_find_contained);
+    return nb::make_tuple(pairs_of(TANDEM_CONTACTS), rows<tandem_scene_contained>());
+  }
+
+  nb::tuple distances(nb::handle pairs, nb::handle reach, double absolute_tolerance,
+                      double relative_tolerance, nb::handle former) {
+    const Turn turn = take_turn();
+    const GivenPairs given(pairs);
+    std::vector<tandem_former_nearest> nearest;
+    if (!former.is_none()) nearest = copy_rows<tandem_former_nearest>(former);
+    auto options = sized<tandem_distance_options>();
+    options.limit_reach = !reach.is_none();
+    options.reach = reach.is_none() ? 0 : nb::cast<double>(reach);
+    options.absolute_tolerance = absolute_tolerance;
+    options.relative_tolerance = relative_tolerance;
+    options.former = nearest.data();
+    options.former_count = nearest.size();
+    given.put_into(options);
+    ask([&](tandem_scene* scene) { return tandem_scene_find_distances(scene, &options); });
+    return nb::make_tuple(pairs_of(TANDEM_DISTANCES), rows<tandem_scene_distances>());
+  }
+
+  nb::tuple impacts(nb::handle motion, double duration, nb::handle pairs, double tolerance) {
+    const Turn turn = take_turn();
+    const GivenPairs given(pairs);
+    const auto motions = copy_rows<tandem_motion>(motion);
+    auto options = sized<tandem_impact_options>();
+    options.duration = duration;
+    options.tolerance = tolerance;
+    options.motion = motions.data();
+    options.motion_count = motions.size();
+    given.put_into(options);
+    ask([&](tandem_scene* scene) { return tandem_scene_find_impacts(scene, &options); });
+    return nb::make_tuple(pairs_of(TANDEM_IMPACTS), rows<tandem_scene_impacts>());
+  }
+
+  nb::tuple verdicts(double tolerance, nb::handle pairs) {
+    const Turn turn = take_turn();
+    const GivenPairs given(pairs);
+    auto options = sized<tandem_tolerance_options>();
+    options.tolerance = tolerance;
+    given.put_into(options);
+    ask([&](tandem_scene* scene) { return tandem_scene_find_verdicts(scene, &options); });
+    return nb::make_tuple(pairs_of(TANDEM_VERDICTS), rows<tandem_scene_verdicts>());
+  }
+
+ private:
+  // The scene takes one call at a time, whichever threads make them.
+  Turn take_turn() { return Turn(busy_, "another thread is in a call of this scene"); }
+
+  // Makes a call of the C interface without the interpreter's lock.
+  template <typename Call>
+  void ask(const Call& call) {
+    tandem_scene* const scene = scene_.get();
+    const tandem_status status = [&] {
+      const WithoutLock other_threads_run;
+      return call(scene);
+    }();
+    if (status != TANDEM_OK) check(status, tandem_scene_where(scene));
+  }
+
+  // Makes a call after which bodies are elsewhere or others.
+  template <typename Call>
+  void change(const Call& call) {
+    const Turn turn = take_turn();
+    contacts_asked_ = false;
+    ask(call);
+  }
+
+  void find_contacts(const tandem_contact_options& options) {
+    contacts_asked_ = true;
+    ask([&](tandem_scene* scene) { return tandem_scene_find_contacts(scene, &options); });
+  }
+
+  void find_missing_contacts() {
+    if (!contacts_asked_) find_contacts(sized<tandem_contact_options>());
+  }
+
+  // A copy of rows that the scene has, as a bytearray: NumPy makes an array of it that owns it.
+  template <auto get, typename... Which>
+  nb::object rows(Which... which) const {
+    std::size_t count;
+    const auto* first = get(scene_.get(), which..., &count);
+    return make_bytes(first, count * sizeof *first);
+  }
+  nb::object pairs_of(std::uint32_t question) const { return rows<tandem_scene_pairs>(question); }
+
+  std::unique_ptr<tandem_scene, decltype(&tandem_scene_destroy)> scene_{nullptr, tandem_scene_destroy};
+  std::atomic<bool> busy_ = false;
+  bool contacts_asked_ = false;  // since bodies were last changed
+};
+
+}  // namespace
+
+void add_scenes(nb::module_& module) {
+  const auto none = [] { return nb::arg().none(); };
+  nb::class_<Scene>(module, "Scene")
+      .def(nb::init<nb::list>())
+      .def("set_threads", &Scene::set_threads)
+      .def("place", &Scene::place, nb::arg(), none())
+      .def("add", &Scene::add, nb::arg(), none())
+      .def("move", &Scene::move)
+      .def("set_motion", &Scene::set_motion)
+      .def("remove", &Scene::remove)
+      .def("instances", &Scene::instances)
+      .def("count", &Scene::count)
+      .def("pairs", &Scene::pairs)
+      .def("contacts", &Scene::contacts, none(), nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg())
+      .def("manifolds", &Scene::manifolds)
+      .def("contained", &Scene::contained)
+      .def("distances", &Scene::distances, none(), none(), nb::arg(), nb::arg(), none())
+      .def("impacts", &Scene::impacts, nb::arg(), nb::arg(), none(), nb::arg())
+      .def("verdicts", &Scene::verdicts, nb::arg(), none());
+}
+
+}  // namespace tandem::python

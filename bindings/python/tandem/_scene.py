@@ -1,0 +1,355 @@
+"""Scenes: bodies, and what is asked of them: what meets, how near, and when."""
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _tandem
+from ._arrays import FARTHEST, FINITE, Rows, amount, instances_of, pairs_of, rows, whole_number, whole_numbers
+from ._asset import Asset, _choice
+from ._rows import CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, INSTANCE, MANIFOLD, MOTION, PAIR, POINT, VERDICT
+
+__all__ = ["Contacts", "Contained", "Counters", "Distances", "Filter", "Impacts", "Manifolds", "Scene", "Verdicts"]
+
+_frombuffer = np.frombuffer
+_MODES = {"exact": 0, "fast": 1, "boxes": 2}
+_MOST = 0xFFFFFFFF
+
+
+class Counters(NamedTuple):
+    """Work that a call did."""
+
+    object_pairs: int
+    block_pairs: int
+    candidates: int
+    decided_by_float32: int
+    decided_by_float64: int
+    decided_exactly: int
+    contacts: int
+
+
+class Contacts(NamedTuple):
+    """Object pairs, array of PAIR, and triangles that meet, array of CONTACT, by ascending pair."""
+
+    pairs: Rows
+    contacts: Rows
+    counters: Counters
+
+
+class Manifolds(NamedTuple):
+    """Object pairs; their contact regions, array of MANIFOLD by ascending pair; the points of these, array of POINT, manifold by manifold."""
+
+    pairs: Rows
+    manifolds: Rows
+    points: Rows
+
+
+class Contained(NamedTuple):
+    """Object pairs, and components of bodies that lie within another, array of CONTAINMENT."""
+
+    pairs: Rows
+    contained: Rows
+
+
+class Distances(NamedTuple):
+    """Object pairs, and the distance of each, array of DISTANCE."""
+
+    pairs: Rows
+    distances: Rows
+
+
+class Impacts(NamedTuple):
+    """Object pairs, and when each of them meets, array of IMPACT."""
+
+    pairs: Rows
+    impacts: Rows
+
+
+class Verdicts(NamedTuple):
+    """Object pairs, and what is known of each, array of VERDICT."""
+
+    pairs: Rows
+    verdicts: Rows
+
+
+class Filter:
+    """Which pairs of bodies a scene looks at, of all whose world boxes meet. Keeps copies of what it is made of.
+
+    Args:
+        motion: (n,), of each body MOVING, FIXED, KINEMATIC or SLEEPING; pairs without anything that moves are not looked at.
+        group: (n,), the groups that a body is in, a bit each; all where not given.
+        mask: (n,), the groups that it meets; all where not given. Two are looked at where each is in a group of the other's mask.
+        excluded: (m, 2) or array of PAIR: pairs that are not looked at, in any order.
+
+    >>> fixed = tandem.Filter(motion=[tandem.FIXED, tandem.FIXED, tandem.MOVING])
+    >>> scene.place(translation=np.zeros((3, 3)), filter=fixed).pairs().tolist()
+    [(0, 2), (1, 2)]
+    """
+
+    __slots__ = ("_core",)
+
+    def __init__(self, motion: npt.ArrayLike | None = None, group: npt.ArrayLike | None = None, mask: npt.ArrayLike | None = None,
+                 excluded: npt.ArrayLike | None = None):
+        motions = None if motion is None else whole_numbers(motion, "motion", 255, np.uint8)
+        groups = None if group is None else whole_numbers(group, "group")
+        masks = None if mask is None else whole_numbers(mask, "mask")
+        shapes = {name: array.shape for name, array in (("motion", motions), ("group", groups), ("mask", masks)) if array is not None}
+        for name, shape in shapes.items():
+            if len(shape) != 1 or shape != next(iter(shapes.values())):
+                raise ValueError(f"{name} has shape {shape} where (n,) is wanted, the same as of the others")
+        self._core = _tandem.Filter(motions, groups, masks, pairs_of(excluded, "excluded"))
+
+
+def _core_of(filter: Filter | None) -> _tandem.Filter | None:
+    if filter is None:
+        return None
+    if not isinstance(filter, Filter):
+        raise TypeError(f"filter is {type(filter).__name__} where a tandem.Filter is wanted")
+    return filter._core
+
+
+def cores_of(assets: Iterable[Asset]) -> list[_tandem.Asset]:
+    """What the extensions take a list of assets for."""
+    if isinstance(assets, Asset):
+        raise TypeError("assets is one asset where a list of them is wanted")
+    cores = []
+    for place, asset in enumerate(assets):
+        if not isinstance(asset, Asset):
+            raise TypeError(f"assets: entry {place} is {type(asset).__name__} where an Asset is wanted")
+        cores.append(asset._core)
+    return cores
+
+
+class Scene:
+    """Posed meshes, of which any number of questions can be asked.
+
+    Args:
+        assets: that bodies refer to by their place in this list. The scene keeps them.
+        instances, filter, asset, rotation, translation, transform: bodies, as of `place`; none where none of these is given.
+        threads: that a call may use, 1 to 1,024, the caller's thread included. Results do not depend on it.
+
+    A body is known by its number: its place in the list that was placed, or what `add` returned. The scene checks poses when bodies are placed or moved, and
+    finds object pairs once for all questions of one reach. Fixed bodies (Filter, `set_motion`) cost nothing while they stay.
+
+    Questions are about the pairs whose world boxes meet, a < b, sorted, which the filter lets through; or about `pairs`, an array of PAIR or whole numbers
+    (m, 2). Error: a body that there is not, with the pair as `where`. Results are arrays that the caller owns.
+
+    Calls let other Python threads run. A scene takes one call at a time: a second thread gets RuntimeError; several scenes may share assets.
+
+    >>> scene = tandem.Scene([box], translation=[[0, 0, 0], [2, 0, 0]])
+    >>> body = scene.add(translation=[0.5, 0, 0])
+    >>> scene.contacts().pairs.tolist(), scene.distances(pairs=[[1, 2]]).distances["upper"].round(9).tolist()
+    ([(0, 2)], [0.5])
+    >>> scene.move(body, translation=[1.5, 0, 0])
+    >>> scene.contacts().pairs.tolist()
+    [(1, 2)]
+    """
+
+    __slots__ = ("_core", "_threads", "__weakref__")
+
+    def __init__(self, assets: Iterable[Asset], instances: Rows | None = None, *, threads: int = 1, filter: Filter | None = None,
+                 asset: npt.ArrayLike | None = None, rotation: npt.ArrayLike | None = None, translation: npt.ArrayLike | None = None,
+                 transform: npt.ArrayLike | None = None):
+        self._core = _tandem.Scene(cores_of(assets))
+        self._threads = 1
+        self.threads = threads
+        if not (instances is None and filter is None and asset is None and rotation is None and translation is None and transform is None):
+            self.place(instances, filter=filter, asset=asset, rotation=rotation, translation=translation, transform=transform)
+
+    @property
+    def threads(self) -> int:
+        """How many threads a call may use. May be set."""
+        return self._threads
+
+    @threads.setter
+    def threads(self, threads: int) -> None:
+        number = whole_number(threads, "threads", 1, 1024)
+        if number != self._threads:
+            self._core.set_threads(number)
+            self._threads = number
+
+    @property
+    def instances(self) -> Rows:
+        """The bodies by number, a copy, array of INSTANCE. Removed ones have the asset NO_INDEX."""
+        return _frombuffer(self._core.instances(), INSTANCE)
+
+    def place(self, instances: Rows | None = None, *, filter: Filter | None = None, asset: npt.ArrayLike | None = None, rotation: npt.ArrayLike | None = None,
+              translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None) -> Scene:
+        """Places all bodies anew; those that stand as before cost next to nothing. Returns the scene.
+
+        Args:
+            instances: array of INSTANCE, or instead of it `asset`, `rotation`, `translation` or `transform` (see `tandem.instances`).
+            filter: where the scene finds the pairs.
+
+        Raises:
+            Error: a pose that is not rigid to 1e-6, a number that is not finite or beyond 1e300, an asset that there is not; `where` is the instance. There are
+                no bodies then.
+
+        >>> scene.place(rotation=np.ones((3, 3)))
+        Traceback (most recent call last):
+        tandem._errors.Error: instance 0: a pose is not a rotation and a translation
+        """
+        self._core.place(instances_of(instances, asset, rotation, translation, transform), _core_of(filter))
+        return self
+
+    def add(self, asset: int = 0, *, rotation: npt.ArrayLike | None = None, translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None,
+            motion: int = 0, group: int = _MOST, mask: int = _MOST) -> int:
+        """Adds a body and leaves the others alone. Returns its number, the lowest that is free.
+
+        Args:
+            asset, rotation, translation, transform: of one body (see `tandem.instances`).
+            motion, group, mask: the body's, as of Filter.
+
+        Raises:
+            Error: as of `place`; nothing has changed then.
+
+        >>> scene.place(translation=np.zeros((2, 3))).add(translation=[0, 0, 3])
+        2
+        """
+        body = instances_of(None, asset, rotation, translation, transform)
+        if len(body) != 1:
+            raise ValueError(f"{len(body)} bodies where one is wanted")
+        return self._core.add(body, Filter([motion], [group], [mask])._core)
+
+    def move(self, bodies: npt.ArrayLike, instances: Rows | None = None, *, rotation: npt.ArrayLike | None = None,
+             translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None) -> None:
+        """Moves a body, or several, and leaves the others alone.
+
+        Args:
+            bodies: a number, or (n,) of them.
+            instances: array of INSTANCE, whose poses they get, or instead of it `rotation`, `translation` or `transform` (see `tandem.instances`).
+
+        Raises:
+            Error: as of `place`, or a body that there is not; `where` is the place in `bodies`. Nothing has changed then.
+        """
+        numbers = whole_numbers(bodies, "bodies").reshape(-1)
+        poses = instances_of(instances, None, rotation, translation, transform)
+        if len(poses) != len(numbers):
+            if len(poses) != 1:
+                raise ValueError(f"different numbers of rows: bodies {len(numbers)}, poses {len(poses)}")
+            poses = np.repeat(poses, len(numbers))
+        self._core.move(numbers, poses)
+
+    def set_motion(self, body: int, motion: int) -> None:
+        """Changes what moves a body: MOVING, FIXED, KINEMATIC or SLEEPING."""
+        self._core.set_motion(whole_number(body, "body", 0, _MOST), whole_number(motion, "motion", 0, 3))
+
+    def remove(self, body: int) -> None:
+        """Removes a body: no question finds it any more, and `add` uses its number again."""
+        self._core.remove(whole_number(body, "body", 0, _MOST))
+
+    def pairs(self, *, reach: float = 0.0, self_pairs: bool = False) -> Rows:
+        """The object pairs whose world boxes are at most `reach` apart, or a little beyond, array of PAIR: a < b, sorted; with self_pairs also each body with
+        itself.
+
+        >>> scene.place(translation=[[0, 0, 0], [0.5, 0, 0], [3, 0, 0]]).pairs().tolist()
+        [(0, 1)]
+        """
+        return _frombuffer(self._core.pairs(amount(reach, "reach", np.inf), bool(self_pairs)), PAIR)
+
+    def contacts(self, *, pairs: npt.ArrayLike | None = None, mode: Literal["exact", "fast", "boxes"] = "exact", first_contact_only: bool = False,
+                 self_pairs: bool = False, within: float = 0.0, add_error_bounds: bool = False) -> Contacts:
+        """Finds every pair of triangles that meet.
+
+        Args:
+            mode: "exact": as exact arithmetic on the posed vertices finds them; "fast": by float32, which may err where rounding does; "boxes": triangles whose
+                boxes overlap.
+            first_contact_only: one contact for each object pair that touches.
+            self_pairs: where the scene finds the pairs, also each body with itself.
+            within: clearance: triangles at most so far apart count, decided exactly.
+            add_error_bounds: a pair without a contact is surely apart at the finest levels too.
+
+        >>> pairs, contacts, counters = scene.place(translation=[[0, 0, 0], [0.5, 0.5, 0.5]]).contacts()
+        >>> pairs.tolist(), len(contacts), counters.contacts
+        ([(0, 1)], 18, 18)
+        """
+        found = self._core.contacts(None if pairs is None else pairs_of(pairs), _MODES[mode] if mode in _MODES else _choice("mode", mode, tuple(_MODES)),
+                                    bool(first_contact_only), bool(self_pairs), amount(within, "within", FARTHEST), bool(add_error_bounds))
+        return Contacts(_frombuffer(found[0], PAIR), _frombuffer(found[1], CONTACT), Counters._make(found[2]))
+
+    def manifolds(self, *, most_points: int = 7, match_previous: bool = True) -> Manifolds:
+        """Makes contact manifolds of the last `contacts`, or, where none were asked for since bodies were placed, moved, added or removed, of all contacts, which
+        are found first. They need all contacts: with `first_contact_only` they are of the one triangle pair that was found.
+
+        Args:
+            most_points: of a manifold, 1 to 7.
+            match_previous: points are looked for among those of the last call, and keep their `id`.
+
+        Raises:
+            Error: the last `contacts` raised one; an asset has no topology.
+
+        >>> _, manifolds, points = scene.place(translation=[[0, 0, 0], [0.1, 0.2, 0.75]]).manifolds()
+        >>> manifolds["normal"].tolist(), manifolds["depth"].tolist(), len(points)
+        ([[0.0, 0.0, 1.0]], [0.25], 4)
+        """
+        pairs, manifolds, points = self._core.manifolds(whole_number(most_points, "most_points", 1, 7), bool(match_previous))
+        return Manifolds(_frombuffer(pairs, PAIR), _frombuffer(manifolds, MANIFOLD), _frombuffer(points, POINT))
+
+    def contained(self) -> Contained:
+        """Finds bodies within others, which no contact tells, among the pairs of the last `contacts`, which are found first as for `manifolds`. Error where they
+        were not in mode "exact", all, and with `within` 0.
+
+        >>> small = tandem.build(box.triangles().reshape(-1, 3) / 4 + 0.25, np.arange(36).reshape(12, 3))
+        >>> tandem.Scene([box, small], asset=[0, 1]).contained().contained["inner"].tolist()
+        [1]
+        """
+        pairs, contained = self._core.contained()
+        return Contained(_frombuffer(pairs, PAIR), _frombuffer(contained, CONTAINMENT))
+
+    def distances(self, *, pairs: npt.ArrayLike | None = None, reach: float | None = None, absolute_tolerance: float = 0.0, relative_tolerance: float = 0.0,
+                  former: Rows | None = None) -> Distances:
+        """Finds how near the surfaces are: `lower` <= distance <= `upper`, both 0 exactly where triangles meet.
+
+        Args:
+            pairs: where not given, those whose world boxes are within reach.
+            reach: pairs that are surely farther apart have NO_INDEX for triangles; None: all are looked at.
+            absolute_tolerance, relative_tolerance: upper - lower <= max(absolute, relative * upper); relative 0: 1e-6.
+            former: array of FORMER by ascending a, then b: where to begin to look.
+
+        >>> scene.place(translation=[[0, 0, 0], [1.5, 0, 0]]).distances().distances["upper"].round(9).tolist()
+        [0.5]
+        """
+        found, distances = self._core.distances(
+            pairs_of(pairs), None if reach is None else amount(reach, "reach", np.inf), amount(absolute_tolerance, "absolute_tolerance", np.inf),
+            amount(relative_tolerance, "relative_tolerance", np.inf), None if former is None else rows(former, "former", FORMER))
+        return Distances(_frombuffer(found, PAIR), _frombuffer(distances, DISTANCE))
+
+    def impacts(self, motion: Rows, duration: float, *, pairs: npt.ArrayLike | None = None, tolerance: float = 0.0) -> Impacts:
+        """Finds until when moving bodies surely do not meet, in a step of `duration` seconds, of the object pairs whose boxes meet when swept.
+
+        Args:
+            motion: array of MOTION, one for each body, which stands as at the start: velocity of its centre, rad/s about that, and where the centre is in the
+                world at the start, such as that of mass or the body's translation. It matters where a body turns: with zeros it goes around the world's origin.
+            tolerance: how near triangles come before they stop a pair, as a part of the diagonal of the smaller body's bounds; 0: 1e-6.
+
+        >>> motion = np.zeros(2, tandem.MOTION)
+        >>> motion["velocity"][1] = [-1, 0, 0]
+        >>> motion["angular_velocity"][1] = [1, 0, 0]
+        >>> motion["center"] = translation = [[0, 0, 0], [1.5, 0, 0]]
+        >>> scene.place(translation=translation).impacts(motion, 2.0).impacts["t_safe"].round(3).tolist()
+        [0.5]
+        """
+        motions = rows(motion, "motion", MOTION)
+        if motions.shape != (self._core.count(),):
+            raise ValueError(f"motion has shape {motions.shape} where ({self._core.count()},) is wanted")
+        found, impacts = self._core.impacts(motions, amount(duration, "duration", FINITE), pairs_of(pairs), amount(tolerance, "tolerance", FINITE))
+        return Impacts(_frombuffer(found, PAIR), _frombuffer(impacts, IMPACT))
+
+    def verdicts(self, *, tolerance: float, pairs: npt.ArrayLike | None = None) -> Verdicts:
+        """Tells of pairs whether they surely do not meet (APART), surely meet (TOUCH), or are within a tolerance (WITHIN_TOLERANCE), each body at the coarsest of
+        its levels that can tell.
+
+        Args:
+            tolerance: what need not be told apart from touching; 0: all is decided.
+
+        Raises:
+            Error: an asset does not show its file's level 0; `where` is the asset.
+
+        >>> scene.place(translation=[[0, 0, 0], [0.5, 0, 0]]).verdicts(tolerance=0.1).verdicts["verdict"].tolist() == [tandem.TOUCH]
+        True
+        """
+        found, verdicts = self._core.verdicts(amount(tolerance, "tolerance", FARTHEST), pairs_of(pairs))
+        return Verdicts(_frombuffer(found, PAIR), _frombuffer(verdicts, VERDICT))

@@ -155,6 +155,31 @@ def test_managers_tell_the_same_story(story):
     both_say(ending)
 
 
+def test_a_manager_that_changes_answers_as_a_new_one_does():
+    rng, manager, objects = np.random.default_rng(8), MANAGERS["tandem"](), {}
+    shapes = [RING, BOX, BALL]
+    other = filled(MANAGERS["tandem"](), one=(RING, at(1, 0, 0)), two=(BOX, at(0, 2, 0)))
+    for step in range(120):
+        name, pose = f"body{rng.integers(9)}", rotation_matrix(rng.uniform(0, 6), rng.normal(size=3)) @ at(*rng.uniform(-2, 2, 3))
+        if step % 10 == 7:
+            pose[:3, :3] *= 1.5
+        if name not in objects:
+            objects[name] = shapes[rng.integers(3)], pose
+            manager.add_object(name, *objects[name])
+        elif rng.random() < 0.2:
+            del objects[name]
+            manager.remove_object(name)
+        else:
+            objects[name] = objects[name][0], pose
+            manager.set_transform(name, pose)
+        probe, place = shapes[step // 20 % 3], at(*rng.uniform(-3, 3, 3))
+        for ask in (lambda it: it.in_collision_single(probe, place, return_names=True), lambda it: it.min_distance_single(probe, place),
+                    lambda it: it.in_collision_other(other, return_names=True), lambda it: it.in_collision_internal(return_names=True),
+                    lambda it: it.min_distance_internal(next(iter(objects), None))):
+            if rng.random() < 0.5:
+                assert plain(ask(manager)) == plain(ask(filled(MANAGERS["tandem"](), **objects)))
+
+
 def test_a_convex_mesh_is_solid_and_another_is_its_surface():
     ring = trimesh.creation.torus(10.0, 3.0)
     for inner in (BOX, BALL, RING):

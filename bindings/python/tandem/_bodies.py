@@ -202,6 +202,7 @@ class Bodies:
         if self._scene is None:
             self._scene = Scene(self.assets, threads=threads)
         if self._asked != asked:
+            self._asked = None  # until it is done
             self._scene.place(self.rows, filter=self._filter(*asked))
         elif self._moved:
             moved = sorted(self._moved)

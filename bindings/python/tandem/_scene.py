@@ -212,7 +212,8 @@ class Scene:
         body = instances_of(None, asset, rotation, translation, transform)
         if len(body) != 1:
             raise ValueError(f"{len(body)} bodies where one is wanted")
-        return self._core.add(body, Filter([motion], [group], [mask])._core)
+        filter = None if (motion, group, mask) == (0, _MOST, _MOST) else Filter([motion], [group], [mask])
+        return self._core.add(body, _core_of(filter))
 
     def move(self, bodies: npt.ArrayLike, instances: Rows | None = None, *, rotation: npt.ArrayLike | None = None,
              translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None) -> None:

@@ -2,7 +2,7 @@
 # functions that were not inlined. Usage: cmake -D NM=nm -D "OBJECTS=a.o;b.o" -P variant_symbols.cmake
 set(found 0)
 foreach(object IN LISTS OBJECTS)
-  if(NOT object MATCHES "/src/avx[0-9]+\\.cpp")
+  if(NOT object MATCHES "/variants/avx[0-9]+\\.cpp")
     continue()
   endif()
   math(EXPR found "${found} + 1")

@@ -255,7 +255,7 @@ class CudaVerdicts final : public CudaRows<GpuToleranceQuery> {
   }
 
  private:
-  Status set_assets() override { return query_.set_levels(shapes(), stream()); }
+  Status set_assets() override { return query_.set_assets(shapes(), stream()); }
   Status find(const GpuPairs& pairs) override {
     return query_.decide(instances(), pairs, tolerance_, stream());
   }

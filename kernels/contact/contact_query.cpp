@@ -15,27 +15,9 @@ constexpr std::size_t kMostPairsInChunk = 16, kChunksForEach = 32;
 // Chunks whose contacts a worker copies at a time: some microseconds of work.
 constexpr std::size_t kChunksAtOnce = 8;
 
-NarrowPhase best_narrow_phase() {
-  NarrowPhase best = nullptr;
-  for (const BlockPairVariant variant : kBlockPairVariants) {
-    if (const NarrowPhase way = narrow_phase(variant); way != nullptr) best = way;
-  }
-  return best;
-}
-
-void add_to(ContactCounters& sum, const ContactCounters& part) {
-  sum.object_pairs += part.object_pairs;
-  sum.block_pairs += part.block_pairs;
-  sum.candidates += part.candidates;
-  sum.decided_by_float32 += part.decided_by_float32;
-  sum.decided_by_float64 += part.decided_by_float64;
-  sum.decided_exactly += part.decided_exactly;
-  sum.contacts += part.contacts;
-}
-
 }  // namespace
 
-ContactFinder::ContactFinder() : narrow_phase_(best_narrow_phase()) {}
+ContactFinder::ContactFinder() : narrow_phase_(best_way(narrow_phase)) {}
 
 bool ContactFinder::grow_contacts(ContactSink& sink) {
   Worker& owner = *static_cast<Worker*>(sink.owner);
@@ -105,7 +87,10 @@ Status ContactFinder::collect(SceneState& scene, Buffer<Contact>& contacts, Cont
   counters.object_pairs = pairs_.size();
   for (std::uint32_t i = 0; i < active_workers_; ++i) {
     if (!workers_[i].enough_memory) return scene.fail(Status::kOutOfMemory, 0);
-    add_to(counters, workers_[i].counters);
+    add_to(counters, workers_[i].counters,
+           {&ContactCounters::block_pairs, &ContactCounters::candidates, &ContactCounters::decided_by_float32,
+            &ContactCounters::decided_by_float64, &ContactCounters::decided_exactly,
+            &ContactCounters::contacts});
     total += workers_[i].contacts.size();
   }
   if (active_workers_ == 1) {

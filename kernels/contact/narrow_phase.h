@@ -47,6 +47,17 @@ using NarrowPhase = bool (*)(const PairTask&, ContactSink&);
 /// order, and the same counters. Condition: task.in_frame.
 NarrowPhase narrow_phase(BlockPairVariant variant);
 
+/// The widest way that this machine and this build have. way_of: narrow_phase() or another that takes a
+/// variant.
+template <typename Way>
+Way best_way(Way (*way_of)(BlockPairVariant)) {
+  Way best = nullptr;
+  for (const BlockPairVariant variant : kBlockPairVariants) {
+    if (const Way way = way_of(variant); way != nullptr) best = way;
+  }
+  return best;
+}
+
 /// For pairs that are not in_frame: boxes of nodes in world coordinates, float64. Slow, and right for all
 /// posed points that are finite.
 bool narrow_phase_by_world_boxes(const PairTask& task, ContactSink& sink);

@@ -20,18 +20,10 @@ constexpr std::uint64_t kSpreadFrom = std::uint64_t{1} << 18;
 constexpr std::uint64_t kVisitsAlone = 2048, kVisitsInRound = 512;
 constexpr std::size_t kWalksInRound = 64;
 
-NearestPhase best_nearest_phase() {
-  NearestPhase best = nullptr;
-  for (const BlockPairVariant variant : kBlockPairVariants) {
-    if (const NearestPhase way = nearest_phase(variant); way != nullptr) best = way;
-  }
-  return best;
-}
-
 void add_to(DistanceCounters& sum, const DistanceCounters& part) {
-  sum.block_pairs += part.block_pairs;
-  sum.by_float32 += part.by_float32;
-  sum.by_float64 += part.by_float64;
+  tandem::add_to(
+      sum, part,
+      {&DistanceCounters::block_pairs, &DistanceCounters::by_float32, &DistanceCounters::by_float64});
 }
 
 bool is_near_first(const BoundedBlockPair& x, const BoundedBlockPair& y) {
@@ -42,7 +34,7 @@ bool is_near_first(const BoundedBlockPair& x, const BoundedBlockPair& y) {
 }  // namespace
 
 struct DistanceQuery::State : Allocated {
-  NearestPhase nearest_phase = best_nearest_phase();
+  NearestPhase nearest_phase = best_way(tandem::nearest_phase);
   PerWorker<NearestSoFar> slots;  // one for each worker, or for each walk of a round
   Buffer<BoundedBlockPair> walks;
 

@@ -26,15 +26,11 @@ struct Worker {
 };
 
 void add_to(ImpactCounters& sum, const ImpactCounters& part) {
-  sum.at_start += part.at_start;
-  sum.found += part.found;
-  sum.walks += part.walks;
-  sum.block_pairs += part.block_pairs;
-  sum.triangle_pairs += part.triangle_pairs;
-  sum.advanced += part.advanced;
-  sum.steps += part.steps;
+  using C = ImpactCounters;
+  tandem::add_to(sum, part,
+                 {&C::at_start, &C::found, &C::walks, &C::block_pairs, &C::triangle_pairs, &C::advanced,
+                  &C::steps, &C::unconverged});
   sum.most_steps = std::max(sum.most_steps, part.most_steps);
-  sum.unconverged += part.unconverged;
 }
 
 void write(const Vector3& x, double (&out)[3]) {

@@ -1,6 +1,7 @@
 #pragma once
 #include <algorithm>
 #include <cstdint>
+#include <initializer_list>
 #include <memory>
 #include <new>
 #include <span>
@@ -56,6 +57,12 @@ class PerWorker {
   std::unique_ptr<Slot[]> workers_;
   std::size_t count_ = 0;
 };
+
+/// Adds what a worker counted.
+template <typename Counters>
+void add_to(Counters& sum, const Counters& part, std::initializer_list<std::uint64_t Counters::*> members) {
+  for (const auto member : members) sum.*member += part.*member;
+}
 
 struct SceneState : Allocated {
   Buffer<SceneAsset> assets;

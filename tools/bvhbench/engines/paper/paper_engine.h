@@ -51,7 +51,7 @@ class PaperEngine {
   Status set_assets(std::span<const GpuAsset> assets, cudaStream_t stream);
 
   /// Waits for the stream, once for each level of the trees and twice more. Keeps its memory from call to
-  /// call: in a steady state nothing is allocated. Result: kOk; what find_contacts() of ContactQuery names;
+  /// call: in a steady state nothing is allocated. Result: kOk; what a scene or ContactQuery names;
   /// kOutOfRange of a pair out of reach of float32 too, and where pairs.capacity is too small;
   /// kOutOfGpuMemory of a level beyond 2^28 - 1 block pairs too; kCudaFailed. After an error there are no
   /// contacts. Condition: set_assets() went well.

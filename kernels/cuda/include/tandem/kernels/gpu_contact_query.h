@@ -82,7 +82,7 @@ struct GpuContactGroups {
 
 /// The outcome of a query.
 struct GpuContactReport {
-  Status status;              ///< kOk, or what find_contacts() of ContactQuery names; then no contacts
+  Status status;              ///< kOk, or what a scene or ContactQuery names; then no contacts
   std::uint32_t complete;     ///< 0 where something did not fit: contacts are missing then, see `needed`
   std::uint64_t where;        ///< the instance or pair that caused an error
   GpuContactCapacity needed;  ///< a lower bound; exact for what follows from things that did fit

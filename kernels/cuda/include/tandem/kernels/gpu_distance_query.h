@@ -43,7 +43,7 @@ constexpr std::size_t most_distance_bytes(const GpuDistanceCapacity& capacity, s
 
 /// The outcome of a query.
 struct GpuDistanceReport {
-  Status status;               ///< kOk, or what find_distances() of DistanceQuery names; then no distances
+  Status status;               ///< kOk, or what a scene or DistanceQuery names; then no distances
   std::uint32_t complete;      ///< 0 where something did not fit, see `needed`; then distances mean nothing
   std::uint64_t where;         ///< the instance or pair that caused an error
   GpuDistanceCapacity needed;  ///< a lower bound; exact for what follows from things that did fit

@@ -47,7 +47,7 @@ constexpr std::size_t most_impact_bytes(const GpuImpactCapacity& capacity, std::
 
 /// The outcome of a query.
 struct GpuImpactReport {
-  Status status;             ///< kOk, or what ImpactQuery::find() names; then there are no impacts
+  Status status;             ///< kOk, or what a scene or ImpactQuery names; then no impacts
   std::uint32_t complete;    ///< 0 where something did not fit; then there are no impacts, see `needed`
   std::uint64_t where;       ///< the instance or pair that caused an error
   GpuImpactCapacity needed;  ///< a lower bound; exact for what follows from things that did fit

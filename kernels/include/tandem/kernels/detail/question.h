@@ -1,7 +1,8 @@
 #pragma once
 #include <cstdint>
-#include <memory>
+#include <new>
 #include <span>
+#include <utility>
 
 #include "tandem/kernels/detail/buffer.h"
 #include "tandem/kernels/scene.h"
@@ -35,7 +36,7 @@ class Answer {
 };
 
 /// Owns a question's memory, which is made when it is first asked and kept from call to call. Movable, not
-/// copyable. Members of Of::Memory are known to the question's source alone.
+/// copyable. Only provide() needs to know what the memory is, so that headers need not.
 template <typename Memory>
 class Kept {
  public:

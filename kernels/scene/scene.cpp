@@ -182,7 +182,7 @@ bool SceneState::copy_entries(const Entry* from, Buffer<Entry>& to) {
   return true;
 }
 
-// What lies in a table of excluded pairs may have changed where it lies.
+// The caller may have changed a table of excluded pairs in its place, so the pairs are found anew.
 Status SceneState::set_filter(const PairFilter& filter) {
   const bool other_motion = copy_entries(filter.motion, motion);
   const bool other_group = copy_entries(filter.group, group), other_mask = copy_entries(filter.mask, mask);
@@ -196,7 +196,7 @@ Status SceneState::set_filter(const PairFilter& filter) {
   return all_there ? Status::kOk : fail(Status::kOutOfMemory, 0);
 }
 
-// Where there are no entries, all bodies have the usual one.
+// An empty list says that all bodies have the usual entry.
 template <typename Entry>
 bool SceneState::add_entry(Entry entry, Entry usual, Buffer<Entry>& to, std::uint32_t body,
                            std::size_t count) {

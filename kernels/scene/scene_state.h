@@ -12,7 +12,7 @@
 #include "tandem/kernels/detail/buffer.h"
 #include "tandem/kernels/scene.h"
 
-// What questions know of a scene.
+// The state of a scene, as questions see it.
 namespace tandem {
 
 /// An asset as questions look at it: the first level that its view shows.
@@ -35,7 +35,7 @@ struct PosedTree {
   double error = 0;  ///< posed_level_error()
 };
 
-/// What each worker of a question has of its own, kept from call to call.
+/// Owns what each worker of a question has for itself, and keeps it from call to call.
 template <typename Worker>
 class PerWorker {
  public:
@@ -91,7 +91,7 @@ struct SceneState : Allocated {
   bool is_body(std::uint32_t i) const { return i < instances.size() && instances[i].asset != kNoIndex; }
   const SceneAsset& asset_of(std::uint32_t body) const { return assets[instances[body].asset]; }
 
-  /// As many workers as may be used, but no more than find something to do.
+  /// Counts the workers to use: as many as are allowed, but no more than find something to do.
   std::uint32_t workers_for(std::size_t things, std::size_t at_once) const {
     const std::size_t parts = (things + at_once - 1) / at_once;
     return static_cast<std::uint32_t>(std::clamp<std::size_t>(parts, 1, most_workers));
@@ -103,7 +103,7 @@ struct SceneState : Allocated {
                             Buffer<ObjectPair>& pairs);
   Status take_pairs(std::span<const ObjectPair> given, Buffer<ObjectPair>& pairs);
 
-  // What Scene does.
+  // These functions are those of Scene.
   Status set_assets(std::span<const AssetView> views);
   Status place(std::span<const Instance> placed, const PairFilter& filter);
   Status add(const Instance& instance, const BodyFilter& filter, std::uint32_t& body);
@@ -112,7 +112,7 @@ struct SceneState : Allocated {
   Status remove(std::uint32_t body);
 
  private:
-  // What the list of pairs that was found last is about.
+  // The question that the list of found pairs answers.
   struct FoundPairs {
     bool valid = false;  // but for the bodies that changed since
     double reach = 0;

@@ -19,7 +19,7 @@ struct Instance {
   Pose pose;
 };
 
-/// What a body has of each array of a PairFilter.
+/// One body's entries in the arrays of a PairFilter.
 struct BodyFilter {
   Motion motion = Motion::moving;
   std::uint32_t group = ~std::uint32_t{0}, mask = ~std::uint32_t{0};
@@ -98,7 +98,7 @@ class Scene {
   /// asked of it.
   std::uint64_t where() const;
 
-  /// What questions look at; null where there is no memory for it.
+  /// Returns the state that questions look at, or null where there is no memory for it.
   SceneState* state();
 
  private:

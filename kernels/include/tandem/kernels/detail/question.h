@@ -19,7 +19,8 @@ class Answer {
 
   std::span<const Row> rows() const { return rows_.view(); }
 
-  /// What the question did. Counters depend neither on the number of threads nor on the machine.
+  /// Returns what was counted on the way. Counters depend neither on the number of threads nor on the
+  /// machine.
   const Counters& counters() const { return counters_; }
 
  protected:

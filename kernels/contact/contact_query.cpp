@@ -145,10 +145,11 @@ Status ContactQuery::answer(SceneState& scene, const std::span<const ObjectPair>
                             const ContactOptions& options) {
   if (!(options.within >= 0 && options.within <= kLargestWorldCoordinate))
     return scene.fail(Status::kOutOfRange, 0);
-  State* const state = state_.provide();
-  if (state == nullptr) return scene.fail(Status::kOutOfMemory, 0);
   const Status status = scene.take_or_find_pairs(given, options.within, options.self_pairs, pairs_);
   if (status != Status::kOk) return status;
+  if (scene.device != nullptr) return scene.ask_device(options, found());
+  State* const state = state_.provide();
+  if (state == nullptr) return scene.fail(Status::kOutOfMemory, 0);
   return state->finder.find(scene, scene.bodies.view(), pairs_.view(), options, rows_, counters_);
 }
 

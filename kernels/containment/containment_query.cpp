@@ -85,7 +85,6 @@ Status ContainmentQuery::State::name_surfaces(SceneState& scene) {
   std::size_t labelled = 0;
   for (std::size_t i = 0; i < scene.assets.size(); ++i) {
     const LevelView& level = scene.assets[i].tree;
-    if (level.topology == nullptr) return scene.fail(Status::kNoTopology, i);
     if (!surfaces.push(surface_of(*scene.assets[i].view.header, level)))
       return scene.fail(Status::kOutOfMemory, i);
     if (level.component_count != 1) labelled += level.triangle_count;
@@ -144,9 +143,14 @@ void ContainmentQuery::State::find(std::uint32_t pair, const SceneState& scene, 
 }
 
 // Which worker found what is chance; the order of the rows is not.
-Status ContainmentQuery::answer(SceneState& scene, State& state, std::span<const Contact> contacts) {
+Status ContainmentQuery::answer(SceneState& scene, std::span<const Contact> contacts) {
   const std::span<const ObjectPair> pairs = pairs_.view();
-  if (const Status status = state.check(scene, pairs, contacts); status != Status::kOk) return status;
+  State* const provided = state_.provide();
+  if (provided == nullptr) return scene.fail(Status::kOutOfMemory, 0);
+  State& state = *provided;
+  Status status = state.name_surfaces(scene);
+  if (status == Status::kOk) status = state.check(scene, pairs, contacts);
+  if (status != Status::kOk) return status;
   const std::uint32_t workers = scene.workers_for(pairs.size(), kPairsAtOnce);
   if (!scene.threads.provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
   if (!state.found.provide(workers)) return scene.fail(Status::kOutOfMemory, 0);
@@ -178,15 +182,27 @@ Status ContainmentQuery::answer(SceneState& scene, State& state, std::span<const
   return Status::kOk;
 }
 
-Status ContainmentQuery::find(Scene& in, std::span<const ObjectPair> pairs,
-                              std::span<const Contact> contacts) {
+// query: that has found the contacts, or null.
+Status ContainmentQuery::ask(Scene& in, std::span<const ObjectPair> pairs, std::span<const Contact> contacts,
+                             const ContactQuery* query) {
   SceneState* const scene = in.state();
-  State* const state = state_.provide();
-  if (scene == nullptr || state == nullptr) return forget(Status::kOutOfMemory);
-  Status status = state->name_surfaces(*scene);
+  if (scene == nullptr) return forget(Status::kOutOfMemory);
+  const DeviceMemory* const on_device = query != nullptr ? query->on_device_of(*scene) : nullptr;
+  Status status = scene->require_topology();
   if (status == Status::kOk) status = scene->take_pairs(pairs, pairs_);
-  if (status == Status::kOk) status = answer(*scene, *state, contacts);
+  if (status == Status::kOk) {
+    status = on_device != nullptr ? scene->ask_device(*on_device, found()) : answer(*scene, contacts);
+  }
   return status == Status::kOk ? status : forget(status);
+}
+
+Status ContainmentQuery::find(Scene& scene, std::span<const ObjectPair> pairs,
+                              std::span<const Contact> contacts) {
+  return ask(scene, pairs, contacts, nullptr);
+}
+
+Status ContainmentQuery::find(Scene& scene, const ContactQuery& contacts) {
+  return ask(scene, contacts.pairs(), contacts.rows(), &contacts);
 }
 
 }  // namespace tandem

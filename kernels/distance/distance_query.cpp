@@ -189,10 +189,11 @@ Status DistanceQuery::answer(SceneState& scene, const std::span<const ObjectPair
   const DistanceTolerance& tolerance = options.tolerance;
   if (!(options.reach >= 0 && tolerance.absolute >= 0 && tolerance.relative >= 0))
     return scene.fail(Status::kOutOfRange, 0);
-  State* const state = state_.provide();
-  if (state == nullptr) return scene.fail(Status::kOutOfMemory, 0);
   Status status = scene.take_or_find_pairs(given, options.reach, false, pairs_);
   if (status != Status::kOk) return status;
+  if (scene.device != nullptr) return scene.ask_device(options, found());
+  State* const state = state_.provide();
+  if (state == nullptr) return scene.fail(Status::kOutOfMemory, 0);
   if (!rows_.resize(pairs_.size())) return scene.fail(Status::kOutOfMemory, 0);
   counters_ = {};
   state->scene = &scene;

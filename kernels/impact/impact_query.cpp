@@ -33,6 +33,13 @@ void add_to(ImpactCounters& sum, const ImpactCounters& part) {
   sum.most_steps = std::max(sum.most_steps, part.most_steps);
 }
 
+Status check(SceneState& scene, const ImpactOptions& options) {
+  if (options.motion.size() != scene.bodies.size()) return scene.fail(Status::kMotionMismatch, 0);
+  const bool fits = options.duration >= 0 && std::isfinite(options.duration) && options.tolerance >= 0 &&
+                    std::isfinite(options.tolerance);
+  return fits ? Status::kOk : scene.fail(Status::kOutOfRange, 0);
+}
+
 void write(const Vector3& x, double (&out)[3]) {
   out[0] = x.x;
   out[1] = x.y;
@@ -79,10 +86,6 @@ struct ImpactQuery::State : Allocated {
 // Removed bodies stay where they are, nowhere.
 Status ImpactQuery::State::move(SceneState& scene, const ImpactOptions& options) {
   const std::size_t count = scene.bodies.size();
-  if (options.motion.size() != count) return scene.fail(Status::kMotionMismatch, 0);
-  const bool fits = options.duration >= 0 && std::isfinite(options.duration) && options.tolerance >= 0 &&
-                    std::isfinite(options.tolerance);
-  if (!fits) return scene.fail(Status::kOutOfRange, 0);
   if (!bodies.resize(count) || !boxes.resize(count)) return scene.fail(Status::kOutOfMemory, 0);
   for (std::uint32_t i = 0; i < count; ++i) {
     boxes[i] = scene.boxes[i];
@@ -147,11 +150,14 @@ Impact ImpactQuery::State::impact_of(std::size_t row, const ObjectPair& pair, co
 
 Status ImpactQuery::answer(SceneState& scene, const std::span<const ObjectPair>* given,
                            const ImpactOptions& options) {
+  Status status = check(scene, options);
+  if (status == Status::kOk && given != nullptr) status = scene.take_pairs(*given, pairs_);
+  if (status != Status::kOk) return status;
+  if (scene.device != nullptr) return scene.ask_device(options, given == nullptr, found());
   State* const state = state_.provide();
   if (state == nullptr) return scene.fail(Status::kOutOfMemory, 0);
-  Status status = state->move(scene, options);
-  if (status == Status::kOk)
-    status = given != nullptr ? scene.take_pairs(*given, pairs_) : state->find_pairs(scene, pairs_);
+  status = state->move(scene, options);
+  if (status == Status::kOk && given == nullptr) status = state->find_pairs(scene, pairs_);
   if (status == Status::kOk) status = state->find_contacts_at_start(scene, pairs_.view());
   if (status != Status::kOk) return status;
   const std::uint32_t workers = scene.workers_for(pairs_.size(), kPairsAtOnce);

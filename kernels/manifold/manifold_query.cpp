@@ -62,6 +62,7 @@ struct ManifoldQuery::State : Allocated {
   Buffer<PairPoints> pair_points_before;
 
   Status name_shapes(SceneState& scene);
+  Status check_bodies(SceneState& scene) const;
   Status check(SceneState& scene, std::span<const ObjectPair> pairs, std::span<const Contact> contacts) const;
   Status group(SceneState& scene, std::size_t pairs, std::span<const Contact>& contacts);
   void make_patches(std::size_t from, std::size_t to, std::uint32_t worker, const SceneState& scene,
@@ -77,9 +78,9 @@ Status ManifoldQuery::State::name_shapes(SceneState& scene) {
   assets_id = 0;
   pair_points_before.clear();
   shapes.clear();
+  if (const Status status = scene.require_topology(); status != Status::kOk) return status;
   for (std::size_t i = 0; i < scene.assets.size(); ++i) {
     const SceneAsset& asset = scene.assets[i];
-    if (asset.tree.topology == nullptr) return scene.fail(Status::kNoTopology, i);
     if (!shapes.push(manifold::shape_of(*asset.view.header, asset.tree)))
       return scene.fail(Status::kOutOfMemory, i);
   }
@@ -87,14 +88,18 @@ Status ManifoldQuery::State::name_shapes(SceneState& scene) {
   return Status::kOk;
 }
 
-Status ManifoldQuery::State::check(SceneState& scene, std::span<const ObjectPair> pairs,
-                                   std::span<const Contact> contacts) const {
-  if (contacts.size() >= kNoIndex / 8) return scene.fail(Status::kOutOfRange, contacts.size());
+Status ManifoldQuery::State::check_bodies(SceneState& scene) const {
   for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
     if (!scene.is_body(i)) continue;
     const manifold::Body body(shapes[scene.instances[i].asset], scene.instances[i].pose);
     if (!(body.reach <= kLargestWorldCoordinate)) return scene.fail(Status::kOutOfRange, i);
   }
+  return Status::kOk;
+}
+
+Status ManifoldQuery::State::check(SceneState& scene, std::span<const ObjectPair> pairs,
+                                   std::span<const Contact> contacts) const {
+  if (contacts.size() >= kNoIndex / 8) return scene.fail(Status::kOutOfRange, contacts.size());
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     const Contact& contact = contacts[i];
     const bool known = contact.pair < pairs.size() &&
@@ -267,18 +272,24 @@ Status ManifoldQuery::answer(SceneState& scene, State& state, std::span<const Co
                                                                : scene.fail(Status::kOutOfMemory, 0);
 }
 
-Status ManifoldQuery::find(Scene& in, std::span<const ObjectPair> pairs, std::span<const Contact> contacts,
-                           const ManifoldOptions& options) {
+// query: that has found the contacts, or null.
+Status ManifoldQuery::ask(Scene& in, std::span<const ObjectPair> pairs, std::span<const Contact> contacts,
+                          const ContactQuery* query, const ManifoldOptions& options) {
   SceneState* const scene = in.state();
   State* const state = state_.provide();
   Status status = Status::kOutOfMemory;
   if (scene != nullptr && state != nullptr) {
-    if (!options.match_previous) forget_points();
+    const DeviceMemory* const on_device = query != nullptr ? query->on_device_of(*scene) : nullptr;
+    if (!options.match_previous || on_device != nullptr) state->pair_points_before.clear();
     std::swap(rows_, state->manifolds_before);
     std::swap(points_, state->points_before);
     status = state->name_shapes(*scene);
     if (status == Status::kOk) status = scene->take_pairs(pairs, pairs_);
-    if (status == Status::kOk) status = answer(*scene, *state, contacts, options);
+    if (status == Status::kOk) status = state->check_bodies(*scene);
+    if (status == Status::kOk) {
+      status = on_device != nullptr ? scene->ask_device(options, *on_device, points_, found())
+                                    : answer(*scene, *state, contacts, options);
+    }
   }
   if (status == Status::kOk) return status;
   forget_points();
@@ -286,8 +297,18 @@ Status ManifoldQuery::find(Scene& in, std::span<const ObjectPair> pairs, std::sp
   return forget(status);
 }
 
+Status ManifoldQuery::find(Scene& scene, std::span<const ObjectPair> pairs, std::span<const Contact> contacts,
+                           const ManifoldOptions& options) {
+  return ask(scene, pairs, contacts, nullptr, options);
+}
+
+Status ManifoldQuery::find(Scene& scene, const ContactQuery& contacts, const ManifoldOptions& options) {
+  return ask(scene, contacts.pairs(), contacts.rows(), &contacts, options);
+}
+
 void ManifoldQuery::forget_points() {
   if (State* const state = state_.get()) state->pair_points_before.clear();
+  memory_on_device_.reset();
 }
 
 }  // namespace tandem

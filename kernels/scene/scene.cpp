@@ -80,10 +80,20 @@ Status SceneState::set_assets(std::span<const AssetView> views) {
   }
   if (views.size() >= kNoIndex || !assets.resize(views.size())) return fail(Status::kOutOfMemory, 0);
   for (std::size_t i = 0; i < views.size(); ++i) assets[i] = scene_asset(views[i]);
+  if (device == nullptr) return Status::kOk;
+  device->allocator = current_allocator();
+  return device->set_assets(*this);
+}
+
+Status SceneState::require_topology() {
+  for (std::size_t i = 0; i < assets.size(); ++i) {
+    if (assets[i].tree.topology == nullptr) return fail(Status::kNoTopology, i);
+  }
   return Status::kOk;
 }
 
 void SceneState::forget_bodies() {
+  ++version;
   instances.clear();
   bodies.clear();
   boxes.clear();
@@ -118,6 +128,7 @@ Status SceneState::pose(std::uint32_t body, const Instance& instance) {
 }
 
 void SceneState::note_change(std::uint32_t body) {
+  ++version;
   changed_count_ += changed_[body] == 0;
   changed_[body] = 1;
 }
@@ -155,6 +166,7 @@ Status SceneState::place(std::span<const Instance> placed, const PairFilter& fil
   if (placed.size() >= kNoIndex) return failed(fail(Status::kTooManyInstances, 0));
   if (filter.excluded.instances > placed.size())
     return failed(fail(Status::kUnknownInstance, filter.excluded.row));
+  ++version;
   const bool some_stand = placed.size() == instances.size();
   if (!some_stand) {
     forget_bodies();
@@ -264,6 +276,7 @@ Status SceneState::set_motion(std::uint32_t body, Motion what) {
   if (!is_body(body)) return fail(Status::kUnknownInstance, 0);
   if (motion.size() == 0 && what == Motion::moving) return Status::kOk;
   if (!add_entry(what, Motion::moving, motion, body, instances.size())) return fail(Status::kOutOfMemory, 0);
+  ++version;
   found_of_.valid = fixed_kept_ = false;
   return Status::kOk;
 }
@@ -334,6 +347,13 @@ WorldBox SceneState::box_within_reach(std::uint32_t body) const {
   return grown(boxes[body], any_fixed_ ? found_of_.reach : 0.5 * found_of_.reach);
 }
 
+bool SceneState::widen_boxes() {
+  if (!(found_of_.reach > 0)) return true;
+  if (!reach_boxes_.resize(boxes.size())) return false;
+  for (std::uint32_t i = 0; i < boxes.size(); ++i) reach_boxes_[i] = box_within_reach(i);
+  return true;
+}
+
 // Keeps a tree of the fixed bodies as they stand, where there are any.
 Status SceneState::keep_fixed_bodies() {
   any_fixed_ =
@@ -347,15 +367,28 @@ Status SceneState::keep_fixed_bodies() {
   return status;
 }
 
+Status SceneState::search_by_device() {
+  if (!widen_boxes()) return Status::kOutOfMemory;
+  device->allocator = current_allocator();
+  Status status = device->find_pairs(*this, found_of_.reach, fixed_kept_, fresh_);
+  const PairFilter asked = filter();
+  for (std::uint32_t i = 0; found_of_.self_pairs && i < boxes.size() && status == Status::kOk; ++i) {
+    if (is_body(i) && asked.looks_at(i, i) && !fresh_.push({i, i})) status = Status::kOutOfMemory;
+  }
+  if (status == Status::kOk && found_of_.self_pairs)
+    std::sort(fresh_.data(), fresh_.data() + fresh_.size(), comes_before);
+  std::swap(found_, fresh_);
+  return status;
+}
+
 // A removed body may still be a pair: with itself, which is not asked of its box, or where reach is infinite.
 Status SceneState::search_all() {
+  if (device != nullptr) return search_by_device();
   if (const Status status = keep_fixed_bodies(); status != Status::kOk) return status;
-  const bool within_reach = found_of_.reach > 0;
-  if (within_reach && !reach_boxes_.resize(boxes.size())) return Status::kOutOfMemory;
-  for (std::uint32_t i = 0; within_reach && i < boxes.size(); ++i) reach_boxes_[i] = box_within_reach(i);
+  if (!widen_boxes()) return Status::kOutOfMemory;
   const std::uint32_t workers = workers_for(broad_phase_.free_count(boxes.size()), kBodiesAtOnce);
   if (!threads.provide(workers)) return Status::kCannotStartThread;
-  const Status status = broad_phase_.find_pairs((within_reach ? reach_boxes_ : boxes).view(), filter(),
+  const Status status = broad_phase_.find_pairs((found_of_.reach > 0 ? reach_boxes_ : boxes).view(), filter(),
                                                 found_of_.self_pairs, threads, workers);
   if (status != Status::kOk) return status;
   const std::span<const ObjectPair> all = broad_phase_.pairs();
@@ -410,6 +443,19 @@ Scene::~Scene() = default;
 SceneState* Scene::state() {
   if (state_ == nullptr) state_.reset(new (std::nothrow) SceneState);
   return state_.get();
+}
+
+void destroy(SceneDevice* device) {
+  delete device;
+}
+
+Status Scene::answer_on(SceneDevice* device) {
+  std::unique_ptr<SceneDevice> taken(device);
+  SceneState* const s = state();
+  if (s == nullptr || device == nullptr) return Status::kOutOfMemory;
+  if (device->state_bytes != sizeof(SceneState)) return Status::kUnsupportedVersion;
+  s->device = std::move(taken);
+  return Status::kOk;
 }
 
 void Scene::set_threads(std::uint32_t threads) {

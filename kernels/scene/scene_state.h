@@ -8,6 +8,7 @@
 
 #include "kernels/common/worker_threads.h"
 #include "kernels/geometry/relative_pose.h"
+#include "kernels/scene/scene_device.h"
 #include "tandem/kernels/broad_phase.h"
 #include "tandem/kernels/detail/buffer.h"
 #include "tandem/kernels/scene.h"
@@ -81,6 +82,9 @@ struct SceneState : Allocated {
   std::uint64_t where = 0;
   Buffer<ObjectPair> pairs;  // of Scene::find_pairs()
 
+  std::unique_ptr<SceneDevice> device;  // that answers; null: the CPU does
+  std::uint64_t version = 0;            // of the bodies and their filter: another after each change
+
   Status fail(Status status, std::uint64_t at) {
     where = at;
     return status;
@@ -88,8 +92,18 @@ struct SceneState : Allocated {
 
   PairFilter filter() const;
 
+  /// Asks the device. Condition: there is one.
+  template <typename... About>
+  Status ask_device(About&&... about) {
+    device->allocator = current_allocator();
+    return device->find(*this, about...);
+  }
+
   bool is_body(std::uint32_t i) const { return i < instances.size() && instances[i].asset != kNoIndex; }
   const SceneAsset& asset_of(std::uint32_t body) const { return assets[instances[body].asset]; }
+
+  /// Result: kOk, or kNoTopology where an asset has none.
+  Status require_topology();
 
   /// Counts the workers to use: as many as are allowed, but no more than find something to do.
   std::uint32_t workers_for(std::size_t things, std::size_t at_once) const {
@@ -132,8 +146,10 @@ struct SceneState : Allocated {
   Status find_pairs(double reach, bool self_pairs);
   Status keep_fixed_bodies();
   Status search_all();
+  Status search_by_device();
   Status search_changed();
   WorldBox box_within_reach(std::uint32_t body) const;
+  bool widen_boxes();
 
   BroadPhase broad_phase_;
   Buffer<WorldBox> reach_boxes_;  // larger, so that those within reach meet
@@ -145,5 +161,12 @@ struct SceneState : Allocated {
   bool fixed_kept_ = false;  // the broad phase has a tree of the fixed bodies as they stand
   std::uint32_t removed_ = 0;
 };
+
+template <typename Row, typename Counters>
+const DeviceMemory* Answer<Row, Counters>::on_device_of(const SceneState& scene) const {
+  const bool is_there = scene.device != nullptr && memory_on_device_ != nullptr &&
+                        memory_on_device_->assets_id == scene.assets_id;
+  return is_there ? memory_on_device_.get() : nullptr;
+}
 
 }  // namespace tandem

@@ -86,6 +86,7 @@ Status ToleranceQuery::answer(SceneState& scene, const std::span<const ObjectPai
   Status status = state->name_levels(scene);
   if (status == Status::kOk) status = scene.take_or_find_pairs(given, 0, false, pairs_);
   if (status != Status::kOk) return status;
+  if (scene.device != nullptr) return scene.ask_device(options, found());
   if (!state->choose_levels(scene, options.tolerance) || !rows_.resize(pairs_.size()))
     return scene.fail(Status::kOutOfMemory, 0);
   counters_ = {};

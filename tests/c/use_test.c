@@ -588,6 +588,7 @@ static void test_threads(void) {
 
 int main(int argc, char** argv) {
   if (argc != 3) return printf("usage: use_test ASSETS_FOLDER WORK_FOLDER\n"), 1;
+  if (!has_device()) return printf("there is no GPU\n"), NO_DEVICE;
   assets_folder = argv[1];
   work_folder = argv[2];
   Counted counted;

@@ -541,6 +541,8 @@ public static unsafe class Native {
   [DllImport("tandem")] public static extern uint tandem_excluded_pairs_create(tandem_object_pair* pairs, UIntPtr count, tandem_allocator* allocator, IntPtr* excluded);
   [DllImport("tandem")] public static extern void tandem_excluded_pairs_destroy(IntPtr excluded);
   [DllImport("tandem")] public static extern uint tandem_scene_create(tandem_allocator* allocator, IntPtr* scene);
+  [DllImport("tandem")] public static extern uint tandem_scene_create_on(IntPtr device, tandem_allocator* allocator, IntPtr* scene);
+  [DllImport("tandem")] public static extern void tandem_device_destroy(IntPtr device);
   [DllImport("tandem")] public static extern void tandem_scene_destroy(IntPtr scene);
   [DllImport("tandem")] public static extern uint tandem_scene_set_threads(IntPtr scene, uint threads);
   [DllImport("tandem")] public static extern uint tandem_scene_set_assets(IntPtr scene, IntPtr* assets, UIntPtr count);

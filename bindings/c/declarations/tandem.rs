@@ -141,6 +141,11 @@ pub struct tandem_scene {
 }
 
 #[repr(C)]
+pub struct tandem_device {
+    _private: [u8; 0],
+}
+
+#[repr(C)]
 #[derive(Clone, Copy)]
 pub struct tandem_allocator {
     pub struct_size: u32,
@@ -595,6 +600,8 @@ extern "C" {
     pub fn tandem_excluded_pairs_create(pairs: *const tandem_object_pair, count: usize, allocator: *const tandem_allocator, excluded: *mut *mut tandem_excluded_pairs) -> tandem_status;
     pub fn tandem_excluded_pairs_destroy(excluded: *mut tandem_excluded_pairs);
     pub fn tandem_scene_create(allocator: *const tandem_allocator, scene: *mut *mut tandem_scene) -> tandem_status;
+    pub fn tandem_scene_create_on(device: *mut tandem_device, allocator: *const tandem_allocator, scene: *mut *mut tandem_scene) -> tandem_status;
+    pub fn tandem_device_destroy(device: *mut tandem_device);
     pub fn tandem_scene_destroy(scene: *mut tandem_scene);
     pub fn tandem_scene_set_threads(scene: *mut tandem_scene, threads: u32) -> tandem_status;
     pub fn tandem_scene_set_assets(scene: *mut tandem_scene, assets: *const *mut tandem_asset, count: usize) -> tandem_status;

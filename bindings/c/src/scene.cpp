@@ -1,6 +1,7 @@
 #include "tandem/kernels/scene.h"
 
 #include <bit>
+#include <utility>
 
 #include "handles.h"
 #include "rows.h"
@@ -227,6 +228,25 @@ tandem_status tandem_scene_create(const tandem_allocator* allocator, tandem_scen
   return create(allocator, scene, [](tandem_scene& made) -> tandem_status {
     return made.scene.state() != nullptr ? TANDEM_OK : TANDEM_OUT_OF_MEMORY;
   });
+}
+
+tandem_status tandem_scene_create_on(tandem_device* device, const tandem_allocator* allocator,
+                                     tandem_scene** scene) {
+  auto* taken = reinterpret_cast<SceneDevice*>(device);
+  tandem_status status = taken != nullptr ? TANDEM_OK : TANDEM_NULL_ARGUMENT;
+  if (status == TANDEM_OK) {
+    status = create(allocator, scene, [&](tandem_scene& made) -> tandem_status {
+      return to_c(made.scene.answer_on(std::exchange(taken, nullptr)));
+    });
+  } else if (scene != nullptr) {
+    *scene = nullptr;
+  }
+  destroy(taken);
+  return status;
+}
+
+void tandem_device_destroy(tandem_device* device) {
+  destroy(reinterpret_cast<SceneDevice*>(device));
 }
 
 void tandem_scene_destroy(tandem_scene* scene) {

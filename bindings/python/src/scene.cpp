@@ -24,13 +24,16 @@ class GivenPairs {
 
 class Scene {
  public:
-  explicit Scene(nb::list assets) {
+  // device: a tandem_device as a number, or 0: the CPU answers.
+  Scene(nb::list assets, std::uintptr_t device) {
     std::vector<tandem_asset*> list;
     for (nb::handle asset : assets) list.push_back(nb::cast<const Asset&>(asset).get());
     tandem_scene* made = nullptr;
-    check(tandem_scene_create(nullptr, &made));
+    auto* const answers = reinterpret_cast<tandem_device*>(device);
+    check(answers == nullptr ? tandem_scene_create(nullptr, &made)
+                             : tandem_scene_create_on(answers, nullptr, &made));
     scene_.reset(made);
-    check(tandem_scene_set_assets(made, list.data(), list.size()));
+    ask([&](tandem_scene* scene) { return tandem_scene_set_assets(scene, list.data(), list.size()); });
   }
 
   void set_threads(std::uint32_t threads) {
@@ -220,7 +223,7 @@ class Scene {
 void add_scenes(nb::module_& module) {
   const auto none = [] { return nb::arg().none(); };
   nb::class_<Scene>(module, "Scene")
-      .def(nb::init<nb::list>())
+      .def(nb::init<nb::list, std::uintptr_t>())
       .def("set_threads", &Scene::set_threads)
       .def("place", &Scene::place, nb::arg(), none())
       .def("add", &Scene::add, nb::arg(), none())

@@ -3,6 +3,8 @@ from typing import Any
 
 from . import _tandem
 
+def make_device(number: int, /) -> int: ...
+
 class Stream:
     def __init__(self, number: int, kept: Any, /) -> None: ...
 

@@ -111,6 +111,18 @@ def _core_of(filter: Filter | None) -> _tandem.Filter | None:
     return filter._core
 
 
+def _device(name: str) -> int:
+    """What answers a scene's questions, as the extensions know it; 0: the CPU."""
+    if name == "cpu":
+        return 0
+    kind, _, number = name.partition(":") if isinstance(name, str) else ("", "", "")
+    if kind != "cuda" or not (number or "0").isdecimal():
+        raise ValueError(f"device is {name!r} where 'cpu', 'cuda' or 'cuda:1' is wanted")
+    from . import cuda  # says why it is not there
+
+    return cuda.make_device(int(number or 0))
+
+
 def cores_of(assets: Iterable[Asset]) -> list[_tandem.Asset]:
     """What the extensions take a list of assets for."""
     if isinstance(assets, Asset):
@@ -130,6 +142,8 @@ class Scene:
         assets: that bodies refer to by their place in this list. The scene keeps them.
         instances, filter, asset, rotation, translation, transform: bodies, as of `place`; none where none of these is given.
         threads: that a call may use, 1 to 1,024, the caller's thread included. Results do not depend on it.
+        device: "cpu", or "cuda" or "cuda:1", the GPU that answers all questions. Contacts, manifolds, contained bodies and verdicts are the same;
+            distances and impacts are as certified, but not the same bytes. `tandem.cuda` is for poses and results that lie in GPU memory.
 
     A body is known by its number: its place in the list that was placed, or what `add` returned. The scene checks poses when bodies are placed or moved, and
     finds object pairs once for all questions of one reach. Fixed bodies (Filter, `set_motion`) cost nothing while they stay.
@@ -152,8 +166,8 @@ class Scene:
 
     def __init__(self, assets: Iterable[Asset], instances: Rows | None = None, *, threads: int = 1, filter: Filter | None = None,
                  asset: npt.ArrayLike | None = None, rotation: npt.ArrayLike | None = None, translation: npt.ArrayLike | None = None,
-                 transform: npt.ArrayLike | None = None):
-        self._core = _tandem.Scene(cores_of(assets))
+                 transform: npt.ArrayLike | None = None, device: str = "cpu"):
+        self._core = _tandem.Scene(cores_of(assets), _device(device))
         self._threads = 1
         self.threads = threads
         if not (instances is None and filter is None and asset is None and rotation is None and translation is None and transform is None):

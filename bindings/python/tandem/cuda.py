@@ -31,6 +31,8 @@ __all__ = ["Array", "Contacts", "Contained", "Distances", "Filter", "Impacts", "
 #: An array in GPU memory, with DLPack and `__cuda_array_interface__`, `shape`, `dtype` and `pointer`. It keeps the memory that it lies in.
 Array = _cuda.Array
 
+make_device = _cuda.make_device  # for tandem.Scene
+
 _MODES = ("exact", "fast", "boxes")
 _CONTENTS = ("all", "exact", "manifolds")
 _KINDS = {"u": 1, "f": 2}

@@ -56,6 +56,16 @@ int tandem_cuda_error(void) {
   return last_cuda_error;
 }
 
+tandem_status tandem_gpu_device_create(const tandem_allocator* given, tandem_device** device) {
+  if (device == nullptr) return TANDEM_NULL_ARGUMENT;
+  *device = nullptr;
+  Allocator allocator;
+  if (const tandem_status status = read_allocator(given, allocator); status != TANDEM_OK) return status;
+  const AllocatorScope scope(allocator);
+  *device = reinterpret_cast<tandem_device*>(gpu_scene_device());
+  return *device != nullptr ? TANDEM_OK : TANDEM_OUT_OF_MEMORY;
+}
+
 tandem_status tandem_gpu_excluded_pairs_create(const tandem_object_pair* pairs, size_t count,
                                                tandem_stream stream, const tandem_allocator* allocator,
                                                tandem_gpu_excluded_pairs** excluded) {

@@ -356,6 +356,16 @@ typedef struct tandem_pair_filter {
 typedef struct tandem_scene tandem_scene;
 
 TANDEM_API tandem_status tandem_scene_create(const tandem_allocator* allocator, tandem_scene** scene);
+
+/// What answers the questions of a scene in place of the CPU: tandem_gpu_device_create() makes one.
+typedef struct tandem_device tandem_device;
+/// Makes a scene whose questions a device answers, and which owns the device; after an error the device is
+/// destroyed. Result: also TANDEM_UNSUPPORTED_VERSION, where the two libraries are not of one version.
+TANDEM_API tandem_status tandem_scene_create_on(tandem_device* device, const tandem_allocator* allocator,
+                                                tandem_scene** scene);
+/// Destroys a device that no scene was made of. Null does nothing.
+TANDEM_API void tandem_device_destroy(tandem_device* device);
+
 /// Gives up its assets, and its results are gone. Null does nothing.
 TANDEM_API void tandem_scene_destroy(tandem_scene* scene);
 

@@ -44,13 +44,15 @@ class ContainmentQuery : public Answer<Containment, ContainmentCounters> {
   /// the contact: it names a pair or a triangle that does not exist, or comes behind one of a later pair;
   /// kTooManyPairs, kOutOfMemory or kCannotStartThread.
   Status find(Scene& scene, std::span<const ObjectPair> pairs, std::span<const Contact> contacts);
-  Status find(Scene& scene, const ContactQuery& contacts) {
-    return find(scene, contacts.pairs(), contacts.rows());
-  }
+
+  /// Asks about the contacts that a question found, where the scene's device has them on the device.
+  Status find(Scene& scene, const ContactQuery& contacts);
 
  private:
   struct State;
-  Status answer(SceneState& scene, State& state, std::span<const Contact> contacts);
+  Status ask(Scene& scene, std::span<const ObjectPair> pairs, std::span<const Contact> contacts,
+             const ContactQuery* query);
+  Status answer(SceneState& scene, std::span<const Contact> contacts);
 
   Kept<State> state_;
 };

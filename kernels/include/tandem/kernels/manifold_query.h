@@ -27,9 +27,10 @@ class ManifoldQuery : public Answer<Manifold, ManifoldCounters> {
   /// next call finds no points before it.
   Status find(Scene& scene, std::span<const ObjectPair> pairs, std::span<const Contact> contacts,
               const ManifoldOptions& options = {});
-  Status find(Scene& scene, const ContactQuery& contacts, const ManifoldOptions& options = {}) {
-    return find(scene, contacts.pairs(), contacts.rows(), options);
-  }
+
+  /// Makes the manifolds of the contacts that a question found, where the scene's device has them on the
+  /// device.
+  Status find(Scene& scene, const ContactQuery& contacts, const ManifoldOptions& options = {});
 
   /// The points of the manifolds, manifold by manifold. Valid as the rows.
   std::span<const ManifoldPoint> points() const { return points_.view(); }
@@ -39,6 +40,8 @@ class ManifoldQuery : public Answer<Manifold, ManifoldCounters> {
 
  private:
   struct State;
+  Status ask(Scene& scene, std::span<const ObjectPair> pairs, std::span<const Contact> contacts,
+             const ContactQuery* query, const ManifoldOptions& options);
   Status answer(SceneState& scene, State& state, std::span<const Contact> contacts,
                 const ManifoldOptions& options);
 

@@ -29,6 +29,12 @@ inline constexpr std::uint32_t kMostSceneThreads = 1024;
 
 struct SceneState;
 
+/// What answers the questions of a scene in place of the CPU; see GpuScene.
+class SceneDevice;
+
+/// Destroys a device that no scene owns; null too.
+void destroy(SceneDevice* device);
+
 /// Bodies, of which any number of questions can be asked, on the CPU: contacts, manifolds, distances and so
 /// on. The scene owns the instances, their motions and groups, their world boxes, the broad phase, the
 /// threads and the memory of these. It checks each pose once, when a body is placed or moved, and finds the
@@ -97,6 +103,11 @@ class Scene {
   /// The asset, instance, pair or contact that is to blame for the last error of this scene or of a question
   /// asked of it.
   std::uint64_t where() const;
+
+  /// Has a device answer the questions, of a scene that has no assets yet. The scene owns the device; after
+  /// an error it is destroyed. Result: kOk, kOutOfMemory, where it may be that there is no device, or
+  /// kUnsupportedVersion, where it comes from a library of another version.
+  Status answer_on(SceneDevice* device);
 
   /// Returns the state that questions look at, or null where there is no memory for it.
   SceneState* state();

@@ -36,6 +36,18 @@ typedef struct CUstream_st* tandem_stream;
 /// header returned on the calling thread; 0 before.
 TANDEM_API int tandem_cuda_error(void);
 
+/// ---- Scenes whose questions a GPU answers
+
+/// Makes a scene whose questions the current GPU answers: all functions of tandem.h take it, and rows come
+/// back to CPU memory. A program whose scenes tandem_scene_create() makes runs on a GPU with this one word.
+/// Contacts, manifolds, contained bodies and verdicts are those of the CPU; distances and impacts are as
+/// certified, but not the same bytes. tandem_scene_set_assets() copies assets to the GPU, questions copy
+/// bodies that have changed. Any function may return a status of the GPU, and TANDEM_NO_ORIENTED_BLOCKS.
+/// The rest of this header is for programs whose poses or results lie in GPU memory.
+TANDEM_API tandem_status tandem_gpu_scene_create(const tandem_allocator* allocator, tandem_scene** scene);
+/// Makes what answers on the current GPU, for tandem_scene_create_on().
+TANDEM_API tandem_status tandem_gpu_device_create(const tandem_allocator* allocator, tandem_device** device);
+
 /// ---- Assets in GPU memory
 
 /// Copies of assets in the memory of one GPU: the levels that they show. They never change, and references

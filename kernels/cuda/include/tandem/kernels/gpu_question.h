@@ -6,7 +6,7 @@
 #include <span>
 
 #include "tandem/formats/status.h"
-#include "tandem/kernels/gpu_scene.h"
+#include "tandem/kernels/gpu_arrays.h"
 
 namespace tandem {
 

@@ -1,68 +1,30 @@
 #pragma once
-#include <algorithm>
-#include <cstdint>
+#include "tandem/kernels/scene.h"
 
-#include "tandem/formats/box.h"
-#include "tandem/formats/view.h"
-#include "tandem/kernels/broad_phase.h"
-#include "tandem/kernels/pose.h"
-
-// A scene as queries on a GPU take it: arrays in GPU memory that belong to the caller.
 namespace tandem {
 
-/// An asset as queries on the GPU take it. Owns nothing.
-struct GpuAsset {
-  LevelView tree;     ///< pointers into GPU memory, as DeviceAssets::level() gives them
-  TreeExtent extent;  ///< of the tree
-  double origin[3];
-  float lower[3], upper[3];
-  std::uint64_t source_faces;  ///< how many there are: contacts name faces below this number
-};
+/// Makes what answers a scene's questions on the current GPU, for Scene::answer_on(); null where there is no
+/// memory for it.
+SceneDevice* gpu_scene_device();
 
-/// The asset that lies in GPU memory with level `level` of a file, which lies in CPU memory. on_gpu: as
-/// DeviceAssets::level() gives it. Condition: level < file.levels.size().
-inline GpuAsset gpu_asset(const LevelView& on_gpu, const AssetView& file, std::uint32_t level = 0) {
-  GpuAsset asset = {on_gpu, extent_of(file.level(level).blocks[0]), {}, {}, {}, file.header->source_faces};
-  std::copy_n(file.header->origin, 3, asset.origin);
-  std::copy_n(file.header->lower, 3, asset.lower);
-  std::copy_n(file.header->upper, 3, asset.upper);
-  return asset;
-}
-
-/// What a broad phase needs to know of an asset: its bounds in stored coordinates, as the file's header has
-/// them.
-struct AssetBounds {
-  double origin[3];
-  float lower[3], upper[3];
-};
-
-inline AssetBounds asset_bounds(const FileHeader& header) {
-  AssetBounds bounds = {};
-  std::copy_n(header.origin, 3, bounds.origin);
-  std::copy_n(header.lower, 3, bounds.lower);
-  std::copy_n(header.upper, 3, bounds.upper);
-  return bounds;
-}
-
-/// Asset bounds as an array in GPU memory.
-struct GpuAssetBounds {
-  const AssetBounds* bounds;
-  std::uint32_t count;
-};
-
-/// Instances as arrays in GPU memory, which a simulation may write there. Poses apply to the file's
-/// coordinates.
-struct GpuInstances {
-  const std::uint32_t* asset;  ///< by place in the list of assets, or of their bounds
-  const Pose* pose;
-  std::uint32_t count;
-};
-
-/// Object pairs and their number, both in GPU memory, as a broad phase on the GPU leaves them there.
-struct GpuPairs {
-  const ObjectPair* pairs;
-  const std::uint32_t* count;  ///< in GPU memory
-  std::uint32_t capacity;      ///< room in `pairs`; where *count is more, the query is not complete
+/// A scene whose questions a GPU answers: the functions, the questions and the rows in CPU memory are those
+/// of Scene. Bodies and assets are copied to the GPU when they have changed, rows come back. Who has poses or
+/// wants rows in GPU memory asks GpuContactQuery and the others, which take arrays there.
+///
+/// Contacts, manifolds, contained bodies and verdicts are those of the CPU, contacts by pair, face_a, face_b;
+/// distances and impacts are as certified, but not the same bytes. DistanceOptions::former is not looked at.
+/// Manifolds and contained bodies are found on the GPU where they are asked of a ContactQuery that the scene
+/// has answered, and by the CPU of contacts that are given as a list. So are object pairs after few bodies
+/// have changed. set_threads() is about the CPU.
+///
+/// Each function may also return kNoGpu, kDriverTooOld, kGpuNotSupported, kOutOfGpuMemory or kCudaFailed.
+/// Questions of contacts in mode exact, impacts and verdicts return kNoOrientedBlocks where an asset has
+/// none, and where() is that asset.
+class GpuScene : public Scene {
+ public:
+  /// The scene is on the current GPU, and waits for what is on its default stream. Where there is no memory
+  /// for that, the CPU answers.
+  GpuScene() { static_cast<void>(answer_on(gpu_scene_device())); }
 };
 
 }  // namespace tandem

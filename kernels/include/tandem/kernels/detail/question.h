@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <memory>
 #include <new>
 #include <span>
 #include <utility>
@@ -8,6 +9,21 @@
 #include "tandem/kernels/scene.h"
 
 namespace tandem {
+
+/// What a question keeps from call to call on a device that answers it in place of the CPU.
+struct DeviceMemory : Allocated {
+  std::uint64_t assets_id = 0;  ///< that of the scene's assets
+  virtual ~DeviceMemory() = default;
+};
+
+/// Where a device leaves what it finds; `pairs` is what it is asked about.
+template <typename Row, typename Counters>
+struct DeviceAnswer {
+  Buffer<ObjectPair>& pairs;
+  Buffer<Row>& rows;
+  Counters& counters;
+  std::unique_ptr<DeviceMemory>& memory;
+};
 
 /// What a question found: the object pairs that it was about, rows, and counters. All are valid until the
 /// question is asked again. After an error there is nothing.
@@ -23,17 +39,25 @@ class Answer {
   /// machine.
   const Counters& counters() const { return counters_; }
 
+  /// Returns what the device of this scene has of the rows, for questions about them; null where the CPU
+  /// found them.
+  const DeviceMemory* on_device_of(const SceneState& scene) const;
+
  protected:
   Status forget(Status status) {
     pairs_.clear();
     rows_.clear();
     counters_ = {};
+    memory_on_device_.reset();
     return status;
   }
+
+  DeviceAnswer<Row, Counters> found() { return {pairs_, rows_, counters_, memory_on_device_}; }
 
   Buffer<ObjectPair> pairs_;
   Buffer<Row> rows_;
   Counters counters_;
+  std::unique_ptr<DeviceMemory> memory_on_device_;
 };
 
 /// Owns a question's memory, which is made when it is first asked and kept from call to call. Movable, not

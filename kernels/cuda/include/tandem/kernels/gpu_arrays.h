@@ -1,0 +1,68 @@
+#pragma once
+#include <algorithm>
+#include <cstdint>
+
+#include "tandem/formats/box.h"
+#include "tandem/formats/view.h"
+#include "tandem/kernels/broad_phase.h"
+#include "tandem/kernels/pose.h"
+
+// A scene as queries on a GPU take it: arrays in GPU memory that belong to the caller.
+namespace tandem {
+
+/// An asset as queries on the GPU take it. Owns nothing.
+struct GpuAsset {
+  LevelView tree;     ///< pointers into GPU memory, as DeviceAssets::level() gives them
+  TreeExtent extent;  ///< of the tree
+  double origin[3];
+  float lower[3], upper[3];
+  std::uint64_t source_faces;  ///< how many there are: contacts name faces below this number
+};
+
+/// The asset that lies in GPU memory with level `level` of a file, which lies in CPU memory. on_gpu: as
+/// DeviceAssets::level() gives it. Condition: level < file.levels.size().
+inline GpuAsset gpu_asset(const LevelView& on_gpu, const AssetView& file, std::uint32_t level = 0) {
+  GpuAsset asset = {on_gpu, extent_of(file.level(level).blocks[0]), {}, {}, {}, file.header->source_faces};
+  std::copy_n(file.header->origin, 3, asset.origin);
+  std::copy_n(file.header->lower, 3, asset.lower);
+  std::copy_n(file.header->upper, 3, asset.upper);
+  return asset;
+}
+
+/// What a broad phase needs to know of an asset: its bounds in stored coordinates, as the file's header has
+/// them.
+struct AssetBounds {
+  double origin[3];
+  float lower[3], upper[3];
+};
+
+inline AssetBounds asset_bounds(const FileHeader& header) {
+  AssetBounds bounds = {};
+  std::copy_n(header.origin, 3, bounds.origin);
+  std::copy_n(header.lower, 3, bounds.lower);
+  std::copy_n(header.upper, 3, bounds.upper);
+  return bounds;
+}
+
+/// Asset bounds as an array in GPU memory.
+struct GpuAssetBounds {
+  const AssetBounds* bounds;
+  std::uint32_t count;
+};
+
+/// Instances as arrays in GPU memory, which a simulation may write there. Poses apply to the file's
+/// coordinates.
+struct GpuInstances {
+  const std::uint32_t* asset;  ///< by place in the list of assets, or of their bounds
+  const Pose* pose;
+  std::uint32_t count;
+};
+
+/// Object pairs and their number, both in GPU memory, as a broad phase on the GPU leaves them there.
+struct GpuPairs {
+  const ObjectPair* pairs;
+  const std::uint32_t* count;  ///< in GPU memory
+  std::uint32_t capacity;      ///< room in `pairs`; where *count is more, the query is not complete
+};
+
+}  // namespace tandem

@@ -1,0 +1,367 @@
+#include "tandem/kernels/gpu_scene.h"
+
+#include <algorithm>
+#include <memory>
+#include <new>
+#include <span>
+#include <type_traits>
+
+#include "kernels/scene/scene_state.h"
+#include "tandem/formats/gpu_memory.h"
+#include "tandem/formats/gpu_status.h"
+#include "tandem/kernels/gpu_broad_phase.h"
+#include "tandem/kernels/gpu_containment_query.h"
+#include "tandem/kernels/gpu_distance_query.h"
+#include "tandem/kernels/gpu_excluded_pairs.h"
+#include "tandem/kernels/gpu_impact_query.h"
+#include "tandem/kernels/gpu_manifold_query.h"
+#include "tandem/kernels/gpu_tolerance_query.h"
+#include "tandem/runtime/upload.h"
+
+namespace tandem {
+namespace {
+
+constexpr cudaStream_t kStream = nullptr;
+
+/// What a question of a scene keeps on the GPU.
+template <typename Query>
+struct QueryMemory : DeviceMemory {
+  Query query;
+};
+
+/// While it lives, a GPU is the current one, and memory comes from an allocator.
+class Here {
+ public:
+  Here(int gpu, const Allocator& allocator) : scope_(allocator) {
+    error_ = cudaGetDevice(&before_);
+    if (error_ == cudaSuccess && before_ != gpu) error_ = cudaSetDevice(gpu);
+  }
+  ~Here() { static_cast<void>(cudaSetDevice(before_)); }
+  Here(const Here&) = delete;
+  Here& operator=(const Here&) = delete;
+
+  Status status() const { return status_of(error_); }
+
+ private:
+  AllocatorScope scope_;
+  int before_ = 0;
+  cudaError_t error_;
+};
+
+class Gpu final : public SceneDevice {
+ public:
+  Gpu() {
+    found_gpu_ = status_of(cudaGetDevice(&gpu_));
+    state_bytes = sizeof(SceneState);
+  }
+
+  Status set_assets(SceneState& scene) override {
+    assets_id_ = 0;
+    const Here here(gpu_, allocator);
+    Status status = found_gpu_ == Status::kOk ? here.status() : found_gpu_;
+    if (status == Status::kOk) status = upload_assets(scene);
+    if (status != Status::kOk) return scene.fail(status, 0);
+    assets_id_ = scene.assets_id;
+    version_ = scene.version - 1;
+    return status;
+  }
+
+  Status find_pairs(SceneState& scene, double reach, bool& fixed_kept, Buffer<ObjectPair>& pairs) override {
+    const Here here(gpu_, allocator);
+    Status status = take_bodies(scene);
+    if (status == Status::kOk) status = keep_fixed(scene, fixed_kept);
+    const GpuBroadPhaseOptions options = {.sorted = true, .filter = filter_, .within = reach};
+    if (status == Status::kOk) status = broad_phase_.find_pairs(instances_, bounds(), options, kStream);
+    if (status == Status::kOk) status = copy(broad_phase_.pairs().pairs, broad_phase_.report().found, pairs);
+    return status;
+  }
+
+  Status find(SceneState& scene, const ContactOptions& options,
+              const DeviceAnswer<Contact, ContactCounters>& found) override {
+    const bool is_exact = options.mode == QueryMode::exact;
+    const Status has_blocks = is_exact ? require_oriented_blocks(scene) : Status::kOk;
+    GpuContactOptions on_gpu = {.mode = options.mode, .first_contact_only = options.first_contact_only};
+    on_gpu.sorted = on_gpu.grouped = true;
+    on_gpu.within = options.within;
+    on_gpu.add_error_bounds = options.add_error_bounds;
+    return ask<GpuContactQuery>(scene, found, has_blocks, [&](auto& query) {
+      Status status = query.find_contacts(instances_, pairs_, on_gpu, kStream);
+      if (status == Status::kOk) status = copy(query.contacts(), query.report().contacts, found.rows);
+      return status;
+    });
+  }
+
+  Status find(SceneState& scene, const DistanceOptions& options,
+              const DeviceAnswer<ObjectDistance, DistanceCounters>& found) override {
+    const GpuDistanceOptions on_gpu = {options.tolerance, options.reach};
+    return ask<GpuDistanceQuery>(scene, found, Status::kOk, [&](auto& query) {
+      Status status = query.find_distances(instances_, pairs_, on_gpu, kStream);
+      if (status == Status::kOk) status = copy(query.distances(), found.pairs.size(), found.rows);
+      return status;
+    });
+  }
+
+  Status find(SceneState& scene, const ToleranceOptions& options,
+              const DeviceAnswer<PairVerdict, ToleranceCounters>& found) override {
+    return ask<GpuToleranceQuery>(scene, found, require_oriented_blocks(scene), [&](auto& query) {
+      Status status = query.decide(instances_, pairs_, options.tolerance, kStream);
+      if (status == Status::kOk) status = copy(query.verdicts(), found.pairs.size(), found.rows);
+      return status;
+    });
+  }
+
+  Status find(SceneState& scene, const ImpactOptions& options, bool finds_pairs,
+              const DeviceAnswer<Impact, ImpactCounters>& found) override {
+    GpuImpactOptions on_gpu;
+    on_gpu.tolerance = options.tolerance;
+    on_gpu.sorted = true;
+    const auto find_impacts = [&](auto& query) {
+      Status status = upload_motions(scene, options.motion);
+      on_gpu.filter = filter_;
+      const RigidMotion* const motions = motions_on_gpu_.data();
+      if (status != Status::kOk) return status;
+      status = finds_pairs ? query.find(instances_, motions, options.duration, on_gpu, kStream)
+                           : query.find(instances_, motions, options.duration, pairs_, on_gpu, kStream);
+      const std::uint32_t count = query.report().impacts;
+      if (status == Status::kOk) status = copy(query.impacts(), count, found.rows);
+      if (status == Status::kOk && finds_pairs) status = copy(query.pairs().pairs, count, found.pairs);
+      return status;
+    };
+    if (finds_pairs) found.pairs.clear();
+    const bool is_empty = finds_pairs ? scene.bodies.size() == 0 : found.pairs.size() == 0;
+    return ask<GpuImpactQuery>(scene, found, require_oriented_blocks(scene), find_impacts, is_empty);
+  }
+
+  Status find(SceneState& scene, const ManifoldOptions& options, const DeviceMemory& contacts,
+              Buffer<ManifoldPoint>& points, const DeviceAnswer<Manifold, ManifoldCounters>& found) override {
+    if (found.pairs.size() == 0) found.memory.reset();  // no points of before are found again
+    points.clear();
+    const GpuManifoldOptions on_gpu = {options.match_previous, options.most_points};
+    return ask<GpuManifoldQuery>(scene, found, Status::kOk, [&](auto& query) {
+      Status status = query.make(instances_, pairs_, query_of<GpuContactQuery>(contacts), on_gpu, kStream);
+      if (status == Status::kOk) status = copy(query.manifolds(), query.report().manifolds, found.rows);
+      if (status == Status::kOk) status = copy(query.points(), query.report().points, points);
+      return status;
+    });
+  }
+
+  Status find(SceneState& scene, const DeviceMemory& contacts,
+              const DeviceAnswer<Containment, ContainmentCounters>& found) override {
+    const Status status = ask<GpuContainmentQuery>(scene, found, Status::kOk, [&](auto& query) {
+      Status done = query.find(instances_, pairs_, query_of<GpuContactQuery>(contacts), kStream);
+      if (done == Status::kOk) done = copy(query.contained(), query.report().contained, found.rows);
+      return done;
+    });
+    found.counters = {found.pairs.size(), 0, 0};
+    for (const Containment& row : found.rows.view()) {
+      found.counters.inside += (row.flags & kInside) != 0;
+      found.counters.outer_open += (row.flags & kOuterOpen) != 0;
+    }
+    return status;
+  }
+
+ private:
+  template <typename Query>
+  static const Query& query_of(const DeviceMemory& memory) {
+    return static_cast<const QueryMemory<Query>&>(memory).query;
+  }
+
+  GpuAssetBounds bounds() const { return {bounds_.data(), static_cast<std::uint32_t>(assets_.size())}; }
+
+  static Status require_oriented_blocks(SceneState& scene) {
+    for (std::size_t i = 0; i < scene.assets.size(); ++i) {
+      if (scene.assets[i].tree.oriented_blocks == nullptr) return scene.fail(Status::kNoOrientedBlocks, i);
+    }
+    return Status::kOk;
+  }
+
+  Status upload_assets(SceneState& scene) {
+    const std::size_t count = scene.assets.size();
+    Buffer<AssetView> views;
+    Buffer<AssetBounds> bounds;
+    levels_.clear();
+    if (!views.resize(count) || !bounds.resize(count) || !assets_.resize(count)) return Status::kOutOfMemory;
+    for (std::size_t i = 0; i < count; ++i) {
+      views[i] = scene.assets[i].view;
+      bounds[i] = asset_bounds(*views[i].header);
+    }
+    if (const Status status = files_.upload(views.view(), Contents::all, kStream); status != Status::kOk)
+      return status;
+    for (std::size_t i = 0; i < count; ++i) {
+      assets_[i] = gpu_asset(files_.level(i), views[i]);
+      for (std::uint32_t l = 0; l < views[i].levels.size(); ++l) {
+        if (!levels_.push(gpu_asset(files_.level(i, l), views[i], l))) return Status::kOutOfMemory;
+      }
+    }
+    const Status status = upload(bounds.view(), bounds_);
+    return status == Status::kOk ? wait() : status;
+  }
+
+  // Copies the bodies where they have changed. Removed ones are in no group, and so in no pair.
+  Status take_bodies(SceneState& scene) {
+    if (version_ == scene.version) return Status::kOk;
+    const std::size_t count = scene.instances.size();
+    const bool any_removed = std::any_of(scene.instances.data(), scene.instances.data() + count,
+                                         [](const Instance& instance) { return instance.asset == kNoIndex; });
+    if (!asset_.resize(count) || !pose_.resize(count)) return Status::kOutOfMemory;
+    if (any_removed && (!group_.resize(count) || !mask_.resize(count))) return Status::kOutOfMemory;
+    const PairFilter filter = scene.filter();
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const bool is_there = scene.is_body(i);
+      asset_[i] = is_there ? scene.instances[i].asset : 0;
+      pose_[i] = is_there ? scene.instances[i].pose : kIdentityPose;
+      if (!any_removed) continue;
+      group_[i] = !is_there ? 0 : filter.group != nullptr ? filter.group[i] : ~0u;
+      mask_[i] = !is_there ? 0 : filter.mask != nullptr ? filter.mask[i] : ~0u;
+    }
+    Status status = upload(asset_.view(), asset_on_gpu_);
+    if (status == Status::kOk) status = upload(pose_.view(), pose_on_gpu_);
+    instances_ = {asset_on_gpu_.data(), pose_on_gpu_.data(), static_cast<std::uint32_t>(count)};
+    if (status == Status::kOk) status = excluded_.upload(filter.excluded, kStream);
+    filter_ = {};
+    filter_.excluded = excluded_.view();
+    if (status == Status::kOk) status = upload(scene.motion, motion_on_gpu_, filter_.motion);
+    if (status == Status::kOk)
+      status = upload(any_removed ? group_ : scene.group, group_on_gpu_, filter_.group);
+    if (status == Status::kOk) status = upload(any_removed ? mask_ : scene.mask, mask_on_gpu_, filter_.mask);
+    if (status == Status::kOk) status = wait();
+    if (status == Status::kOk) version_ = scene.version;
+    return status;
+  }
+
+  // Queues a copy; room grows by half at least, for bodies that are added one by one.
+  template <typename Entry>
+  static Status upload(std::span<const Entry> entries, GpuArray<Entry>& room) {
+    const cudaError_t error = room.grow(entries.size());
+    return status_of(error == cudaSuccess ? room.upload(entries, kStream) : error);
+  }
+  template <typename Entry>
+  static Status upload(const Buffer<Entry>& entries, GpuArray<Entry>& room, const Entry*& on_gpu) {
+    const Status status = upload(entries.view(), room);
+    on_gpu = entries.size() != 0 ? room.data() : nullptr;
+    return status;
+  }
+  static Status wait() { return status_of(cudaStreamSynchronize(kStream)); }
+
+  Status upload_pairs(std::span<const ObjectPair> pairs) {
+    const auto count = static_cast<std::uint32_t>(pairs.size());
+    Status status = upload(pairs, pair_on_gpu_);
+    if (status == Status::kOk) status = upload(std::span<const std::uint32_t>(&count, 1), pair_count_);
+    pairs_ = {pair_on_gpu_.data(), pair_count_.data(), count};
+    return status == Status::kOk ? wait() : status;
+  }
+
+  // The motion of a removed body, which may be anything, is not looked at.
+  Status upload_motions(const SceneState& scene, std::span<const RigidMotion> motions) {
+    if (!motions_.resize(motions.size())) return Status::kOutOfMemory;
+    for (std::uint32_t i = 0; i < motions.size(); ++i)
+      motions_[i] = scene.is_body(i) ? motions[i] : RigidMotion{};
+    const Status status = upload(motions_.view(), motions_on_gpu_);
+    return status == Status::kOk ? wait() : status;
+  }
+
+  Status keep_fixed(SceneState& scene, bool& fixed_kept) {
+    const Motion* const begin = scene.motion.data();
+    const bool any_fixed =
+        std::find(begin, begin + scene.motion.size(), Motion::fixed) != begin + scene.motion.size();
+    if (any_fixed ? fixed_kept : !keeps_fixed_) return Status::kOk;
+    Buffer<Motion> all_moving;
+    if (!any_fixed && !all_moving.resize(instances_.count)) return Status::kOutOfMemory;
+    std::fill_n(all_moving.data(), all_moving.size(), Motion::moving);
+    const Status status = broad_phase_.keep_fixed(instances_, bounds(),
+                                                  (any_fixed ? scene.motion : all_moving).view(), kStream);
+    keeps_fixed_ = any_fixed;
+    fixed_kept = any_fixed && status == Status::kOk;
+    return status;
+  }
+
+  template <typename Row>
+  static Status copy(const Row* from, std::uint64_t count, Buffer<Row>& to) {
+    if (!to.resize(count)) return Status::kOutOfMemory;
+    return status_of(download(from, std::span(to.data(), count), kStream));
+  }
+
+  // Asks a question about found.pairs by call(query), which copies the rows. has_blocks: whether the assets
+  // have what it walks.
+  template <typename Query, typename Row, typename Counters, typename Call>
+  Status ask(SceneState& scene, const DeviceAnswer<Row, Counters>& found, Status has_blocks,
+             const Call& call) {
+    return ask<Query>(scene, found, has_blocks, call, found.pairs.size() == 0);
+  }
+
+  template <typename Query, typename Row, typename Counters, typename Call>
+  Status ask(SceneState& scene, const DeviceAnswer<Row, Counters>& found, Status has_blocks, const Call& call,
+             bool is_empty) {
+    found.rows.clear();
+    found.counters = {};
+    if (has_blocks != Status::kOk || is_empty) return has_blocks;
+    const Here here(gpu_, allocator);
+    Status status = here.status();
+    if (status == Status::kOk) status = take_bodies(scene);
+    if (status == Status::kOk) status = upload_pairs(found.pairs.view());
+    Query* query = nullptr;
+    if (status == Status::kOk) status = provide(found.memory, query);
+    if (status != Status::kOk) return scene.fail(status, 0);
+    status = call(*query);
+    std::uint64_t where = 0;
+    if constexpr (requires { query->report().where; }) {
+      if (query->report().status == status) where = query->report().where;
+    }
+    if (status != Status::kOk) return scene.fail(status, where);
+    if constexpr (requires { found.counters = query->report().counters; })
+      found.counters = query->report().counters;
+    return status;
+  }
+
+  // The query of a question, which knows these assets.
+  template <typename Query>
+  Status provide(std::unique_ptr<DeviceMemory>& memory, Query*& query) {
+    if (memory == nullptr || memory->assets_id != assets_id_) {
+      auto* const made = new (std::nothrow) QueryMemory<Query>;
+      memory.reset(made);
+      if (made == nullptr) return Status::kOutOfMemory;
+      constexpr bool takes_levels = std::is_same_v<Query, GpuToleranceQuery>;
+      const Status status = made->query.set_assets((takes_levels ? levels_ : assets_).view(), kStream);
+      if (status != Status::kOk) {
+        memory.reset();
+        return status;
+      }
+      made->assets_id = assets_id_;
+    }
+    query = &static_cast<QueryMemory<Query>&>(*memory).query;
+    return Status::kOk;
+  }
+
+  int gpu_ = 0;
+  Status found_gpu_;
+  std::uint64_t assets_id_ = 0;  // of the scene's assets that are on the GPU
+  std::uint64_t version_ = 0;    // of its bodies
+  DeviceAssets files_;
+  Buffer<GpuAsset> assets_, levels_;  // the first level of each, and all
+  GpuArray<AssetBounds> bounds_;
+
+  // What is copied, and the copies.
+  Buffer<std::uint32_t> asset_, group_, mask_;
+  Buffer<Pose> pose_;
+  Buffer<RigidMotion> motions_;
+  GpuArray<std::uint32_t> asset_on_gpu_, group_on_gpu_, mask_on_gpu_, pair_count_;
+  GpuArray<Pose> pose_on_gpu_;
+  GpuArray<Motion> motion_on_gpu_;
+  GpuArray<RigidMotion> motions_on_gpu_;
+  GpuArray<ObjectPair> pair_on_gpu_;
+  GpuExcludedPairs excluded_;
+  GpuInstances instances_ = {};
+  GpuPairs pairs_ = {};
+  PairFilter filter_;
+
+  GpuBroadPhase broad_phase_;
+  bool keeps_fixed_ = false;
+};
+
+}  // namespace
+
+SceneDevice* gpu_scene_device() {
+  return new (std::nothrow) Gpu;
+}
+
+}  // namespace tandem

@@ -1,0 +1,394 @@
+#pragma once
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <tuple>
+#include <type_traits>
+#include <vector>
+
+#include "kernels/contact/contact_query_fixture.h"
+#include "tandem/kernels/containment_query.h"
+#include "tandem/kernels/distance_query.h"
+#include "tandem/kernels/impact_query.h"
+#include "tandem/kernels/manifold_query.h"
+#include "tandem/kernels/scene.h"
+#include "tandem/kernels/tolerance_query.h"
+
+/// Bodies that are placed, added, moved and removed: what a scene finds, on whatever device, is what a scene
+/// on the CPU finds that is made of these bodies at once.
+namespace tandem {
+
+using Pairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
+
+inline Pairs pairs_of(const Scene& scene) {
+  Pairs out;
+  for (const ObjectPair& pair : scene.pairs()) out.emplace_back(pair.a, pair.b);
+  return out;
+}
+
+/// Whether scenes of this kind can be made here.
+template <typename TheScene>
+bool is_usable() {
+  return true;
+}
+
+/// All questions of a scene.
+struct Questions {
+  ContactQuery contacts;
+  ManifoldQuery manifolds;
+  ContainmentQuery contained;
+  DistanceQuery distances;
+  ImpactQuery impacts;
+  ToleranceQuery verdicts;
+
+  /// Asks them. match_previous: whether points are looked for among those of the call before.
+  void ask(Scene& scene, double reach, bool self_pairs, bool match_previous) {
+    std::vector<RigidMotion> motion(scene.instances().size());
+    RandomPoses random(motion.size());
+    for (std::size_t i = 0; i < motion.size(); ++i) {
+      for (double& x : motion[i].velocity) x = random.symmetric(0.5);
+      for (double& x : motion[i].angular_velocity) x = random.symmetric(1);
+      std::copy_n(scene.instances()[i].pose.translation, 3, motion[i].center);
+    }
+    ASSERT_EQ(verdicts.find(scene, {.tolerance = 0.1}), Status::kOk);
+    ASSERT_EQ(impacts.find(scene, {.motion = motion, .duration = 0.2}), Status::kOk);
+    ASSERT_EQ(contacts.find(scene, {.self_pairs = self_pairs}), Status::kOk);
+    ASSERT_EQ(distances.find(scene, {.reach = reach}), Status::kOk);
+    ASSERT_EQ(manifolds.find(scene, contacts, {.match_previous = match_previous}), Status::kOk);
+    ASSERT_EQ(contained.find(scene, contacts), Status::kOk);
+  }
+};
+
+inline std::vector<Contact> sorted(std::span<const Contact> rows) {
+  std::vector<Contact> out(rows.begin(), rows.end());
+  std::ranges::sort(out, {}, [](const Contact& c) {
+    return std::tuple(c.pair, c.face_a, c.face_b, c.triangle_a, c.triangle_b);
+  });
+  return out;
+}
+
+template <typename Row>
+void expect_same_bytes(std::span<const Row> here, std::span<const Row> there) {
+  ASSERT_EQ(here.size(), there.size());
+  EXPECT_TRUE(here.empty() || std::memcmp(here.data(), there.data(), here.size_bytes()) == 0);
+}
+
+/// Expects the same of all questions but distances and impacts, which are only as certified: their intervals
+/// meet, and they tell the same pairs apart from those that touch.
+inline void expect_same_answers(const Questions& here, const Questions& there) {
+  EXPECT_EQ(sorted(here.contacts.rows()), sorted(there.contacts.rows()));
+  expect_same_bytes(here.manifolds.rows(), there.manifolds.rows());
+  expect_same_bytes(here.manifolds.points(), there.manifolds.points());
+  EXPECT_EQ(here.manifolds.counters(), there.manifolds.counters());
+  EXPECT_TRUE(std::ranges::equal(here.contained.rows(), there.contained.rows()));
+  EXPECT_EQ(here.contained.counters(), there.contained.counters());
+  EXPECT_TRUE(std::ranges::equal(here.verdicts.rows(), there.verdicts.rows()));
+  ASSERT_EQ(here.distances.rows().size(), there.distances.rows().size());
+  for (std::size_t i = 0; i < here.distances.rows().size(); ++i) {
+    const ObjectDistance &x = here.distances.rows()[i], &y = there.distances.rows()[i];
+    EXPECT_TRUE(x.lower <= y.upper && y.lower <= x.upper) << i;
+    EXPECT_EQ(x.upper == 0, y.upper == 0) << i;
+  }
+  ASSERT_EQ(here.impacts.rows().size(), there.impacts.rows().size());
+  for (std::size_t i = 0; i < here.impacts.rows().size(); ++i) {
+    const Impact &x = here.impacts.rows()[i], &y = there.impacts.rows()[i];
+    EXPECT_EQ(here.impacts.pairs()[i].b, there.impacts.pairs()[i].b);
+    EXPECT_EQ(x.status, y.status) << i;
+    EXPECT_NEAR(x.t_safe, y.t_safe, 1e-4) << i;
+  }
+}
+
+/// A scene that changes step by step, beside a list of its bodies.
+template <typename TheScene>
+class ChangingScene {
+ public:
+  explicit ChangingScene(std::uint64_t seed, int bodies) : random_(seed), start_(crowd(seed, bodies)) {
+    EXPECT_EQ(scene_.set_assets(start_.assets.views()), Status::kOk);
+    bodies_ = start_.instances;
+    filters_.resize(bodies_.size());
+    for (BodyFilter& filter : filters_) filter = any_filter();
+    place();
+  }
+
+  Scene& scene() { return scene_; }
+
+  void place() {
+    drop_removed();
+    const Arrays arrays(filters_);
+    ASSERT_EQ(scene_.place(bodies_, arrays.view()), Status::kOk);
+  }
+
+  /// One of the ways to change the scene.
+  void change() {
+    const auto body = static_cast<std::uint32_t>(random_.below(bodies_.size()));
+    const bool there = bodies_[body].asset != kNoIndex;
+    switch (random_.below(6)) {
+      case 0: {
+        std::uint32_t number = kNoIndex;
+        const Instance added = any_instance();
+        const BodyFilter filter = any_filter();
+        ASSERT_EQ(scene_.add(added, number, filter), Status::kOk);
+        ASSERT_LE(number, bodies_.size());
+        if (number == bodies_.size()) bodies_.push_back({kNoIndex, {}}), filters_.push_back({});
+        ASSERT_EQ(bodies_[number].asset, kNoIndex);
+        bodies_[number] = added;
+        filters_[number] = filter;
+        return;
+      }
+      case 1:
+        ASSERT_EQ(scene_.remove(body), there ? Status::kOk : Status::kUnknownInstance);
+        bodies_[body].asset = kNoIndex;
+        return;
+      case 2:
+        filters_[body].motion = static_cast<Motion>(random_.below(4));
+        ASSERT_EQ(scene_.set_motion(body, filters_[body].motion),
+                  there ? Status::kOk : Status::kUnknownInstance);
+        return;
+      default:
+        const Pose pose = any_instance().pose;
+        ASSERT_EQ(scene_.move(body, pose), there ? Status::kOk : Status::kUnknownInstance);
+        if (there) bodies_[body].pose = pose;
+    }
+  }
+
+  /// Expects what a scene finds that is made anew of the bodies, whose numbers are their places among them.
+  void expect_same(double reach, bool self_pairs) {
+    std::vector<Instance> bodies;
+    std::vector<BodyFilter> filters;
+    std::vector<std::uint32_t> number;
+    for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
+      if (bodies_[i].asset == kNoIndex) continue;
+      bodies.push_back(bodies_[i]);
+      filters.push_back(filters_[i]);
+      number.push_back(i);
+    }
+    const Arrays arrays(filters);
+    Scene anew;
+    ASSERT_EQ(anew.set_assets(start_.assets.views()), Status::kOk);
+    ASSERT_EQ(anew.place(bodies, arrays.view()), Status::kOk);
+    ASSERT_EQ(anew.find_pairs(reach, self_pairs), Status::kOk);
+    Pairs expected;
+    for (const auto& [a, b] : pairs_of(anew)) expected.emplace_back(number[a], number[b]);
+    ASSERT_EQ(scene_.find_pairs(reach, self_pairs), Status::kOk);
+    EXPECT_EQ(pairs_of(scene_), expected);
+    ContactQuery here, there;
+    const ContactOptions options = {.self_pairs = self_pairs, .within = reach};
+    ASSERT_EQ(here.find(scene_, options), Status::kOk);
+    ASSERT_EQ(there.find(anew, options), Status::kOk);
+    EXPECT_EQ(sorted(here.rows()), sorted(there.rows()));
+    if constexpr (std::is_same_v<TheScene, Scene>) {
+      EXPECT_EQ(here.counters(), there.counters());
+    }
+    found_ += here.rows().size();
+  }
+
+  std::size_t found() const { return found_; }
+
+ private:
+  struct Arrays {
+    explicit Arrays(const std::vector<BodyFilter>& filters) {
+      for (const BodyFilter& filter : filters) {
+        motion.push_back(filter.motion);
+        group.push_back(filter.group);
+        mask.push_back(filter.mask);
+      }
+    }
+    PairFilter view() const { return {motion.data(), group.data(), mask.data(), {}}; }
+    std::vector<Motion> motion;
+    std::vector<std::uint32_t> group, mask;
+  };
+
+  // place() takes bodies that are there.
+  void drop_removed() {
+    for (std::size_t i = bodies_.size(); i-- > 0;) {
+      if (bodies_[i].asset != kNoIndex) continue;
+      bodies_.erase(bodies_.begin() + static_cast<std::ptrdiff_t>(i));
+      filters_.erase(filters_.begin() + static_cast<std::ptrdiff_t>(i));
+    }
+  }
+
+  Instance any_instance() {
+    Pose pose = any_rotation(random_);
+    for (double& x : pose.translation) x = random_.symmetric(3);
+    return {static_cast<std::uint32_t>(random_.below(3)), pose};
+  }
+  BodyFilter any_filter() {
+    BodyFilter filter;
+    if (random_.below(3) == 0) filter.motion = static_cast<Motion>(random_.below(4));
+    if (random_.below(4) == 0) filter.group = 1u << random_.below(3);
+    if (random_.below(4) == 0) filter.mask = ~(1u << random_.below(3));
+    return filter;
+  }
+
+  RandomPoses random_;
+  BodyScene start_;
+  TheScene scene_;
+  std::vector<Instance> bodies_;
+  std::vector<BodyFilter> filters_;
+  std::size_t found_ = 0;
+};
+
+template <typename TheScene>
+class SceneOn : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!is_usable<TheScene>()) GTEST_SKIP() << "no GPU here";
+  }
+};
+TYPED_TEST_SUITE_P(SceneOn);
+
+TYPED_TEST_P(SceneOn, FindsThePairsOfItsBodiesWhateverChanged) {
+  std::size_t found = 0;
+  for (std::uint64_t seed = 0; seed < 12; ++seed) {
+    ChangingScene<TypeParam> changing(seed, 40 + static_cast<int>(seed) * 5);
+    if (seed % 3 == 1) changing.scene().set_threads(3);
+    RandomPoses random(100 + seed);
+    double reach = 0;
+    bool selves = false;
+    for (int step = 0; step < 30 && !testing::Test::HasFailure(); ++step) {
+      SCOPED_TRACE(testing::Message() << "seed " << seed << ", step " << step);
+      const std::uint64_t changes = random.below(3) == 0 ? random.below(40) : random.below(4);
+      for (std::uint64_t i = 0; i < changes; ++i) changing.change();
+      if (random.below(6) == 0) changing.place();
+      if (random.below(4) == 0) reach = random.below(2) == 0 ? 0 : random.uniform(0, 1);
+      if (random.below(5) == 0) selves = !selves;
+      changing.expect_same(reach, selves);
+    }
+    found += changing.found();
+  }
+  EXPECT_GT(found, 10'000u);
+}
+
+TYPED_TEST_P(SceneOn, RefusesWhatIsWrongAndStaysAsItWas) {
+  const BodyScene cubes = row_of_cubes(4);
+  TypeParam scene;
+  ASSERT_EQ(scene.set_assets(cubes.assets.views()), Status::kOk);
+  ASSERT_EQ(scene.place(cubes.instances), Status::kOk);
+  ASSERT_EQ(scene.find_pairs(), Status::kOk);
+  const Pairs expected = pairs_of(scene);
+  ASSERT_EQ(expected.size(), 3u);
+  Pose scaled = kIdentityPose;
+  scaled.rotation[1][1] = 2;
+  const std::uint32_t numbers[] = {2, 0}, unknown[] = {1, 4};
+  const Pose poses[] = {at(50, 0, 0), scaled};
+  std::uint32_t body = 77;
+  EXPECT_EQ(scene.move(numbers, poses), Status::kPoseNotRigid);
+  EXPECT_EQ(scene.where(), 1u);
+  EXPECT_EQ(scene.move(unknown, poses), Status::kUnknownInstance);
+  EXPECT_EQ(scene.where(), 1u);
+  EXPECT_EQ(scene.move(numbers, std::span(poses).first(1)), Status::kMotionMismatch);
+  EXPECT_EQ(scene.move(0, at(0, 1e301, 0)), Status::kOutOfRange);
+  EXPECT_EQ(scene.add({1, kIdentityPose}, body), Status::kUnknownAsset);
+  EXPECT_EQ(scene.add({0, scaled}, body, {.motion = Motion::fixed, .group = 1, .mask = 1}),
+            Status::kPoseNotRigid);
+  EXPECT_EQ(body, 77u);
+  EXPECT_EQ(scene.remove(4), Status::kUnknownInstance);
+  EXPECT_EQ(scene.set_motion(9, Motion::fixed), Status::kUnknownInstance);
+  EXPECT_EQ(scene.find_pairs(-1), Status::kOutOfRange);
+  EXPECT_EQ(scene.find_pairs(std::nan("")), Status::kOutOfRange);
+  EXPECT_TRUE(scene.pairs().empty());
+  ASSERT_EQ(scene.find_pairs(), Status::kOk);
+  EXPECT_EQ(pairs_of(scene), expected);
+  EXPECT_EQ(scene.instances().size(), 4u);
+}
+
+TYPED_TEST_P(SceneOn, ARemovedBodyIsNoneAndItsNumberIsUsedAgain) {
+  const BodyScene cubes = row_of_cubes(4);
+  TypeParam scene;
+  ASSERT_EQ(scene.set_assets(cubes.assets.views()), Status::kOk);
+  ASSERT_EQ(scene.place(cubes.instances), Status::kOk);
+  ASSERT_EQ(scene.remove(1), Status::kOk);
+  EXPECT_EQ(scene.remove(1), Status::kUnknownInstance);
+  EXPECT_EQ(scene.move(1, kIdentityPose), Status::kUnknownInstance);
+  ContactQuery contacts;
+  const ObjectPair given[] = {{2, 3}, {0, 1}};
+  EXPECT_EQ(contacts.find(scene, given, {}), Status::kUnknownInstance);
+  EXPECT_EQ(scene.where(), 1u);
+  ASSERT_EQ(scene.find_pairs(std::numeric_limits<double>::infinity(), true), Status::kOk);
+  EXPECT_EQ(pairs_of(scene), (Pairs{{0, 0}, {0, 2}, {0, 3}, {2, 2}, {2, 3}, {3, 3}}));
+  DistanceQuery distances;
+  ASSERT_EQ(distances.find(scene), Status::kOk);
+  EXPECT_EQ(distances.rows().size(), 3u);
+  std::vector<RigidMotion> motion(4, RigidMotion{});
+  motion[1].velocity[0] = std::nan("");  // of no body
+  ImpactQuery impacts;
+  ASSERT_EQ(impacts.find(scene, {.motion = motion, .duration = 1}), Status::kOk);
+  EXPECT_EQ(impacts.rows().size(), 1u);
+  std::uint32_t body = kNoIndex;
+  ASSERT_EQ(scene.add({0, at(1, 0, 0)}, body), Status::kOk);
+  EXPECT_EQ(body, 1u);
+  ASSERT_EQ(scene.add({0, at(4, 0, 0)}, body), Status::kOk);
+  EXPECT_EQ(body, 4u);
+  ASSERT_EQ(scene.find_pairs(), Status::kOk);
+  EXPECT_EQ(pairs_of(scene), (Pairs{{0, 1}, {1, 2}, {2, 3}, {3, 4}}));
+}
+
+/// One scene, all questions: what each finds does not depend on which others were asked before, nor on what
+/// answers.
+TYPED_TEST_P(SceneOn, AnswersManyQuestionsAboutTheSameBodies) {
+  for (std::uint64_t seed = 0; seed < 6 && !testing::Test::HasFailure(); ++seed) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    const BodyScene bodies = crowd(11 + seed, 60);
+    TypeParam scene;
+    Scene on_cpu;
+    Questions here, there;
+    for (Scene* of : {static_cast<Scene*>(&scene), &on_cpu}) {
+      ASSERT_EQ(of->set_assets(bodies.assets.views()), Status::kOk);
+      ASSERT_EQ(of->place(bodies.instances), Status::kOk);
+    }
+    std::size_t contacts = 0;
+    for (int step = 0; step < 4; ++step) {
+      SCOPED_TRACE(testing::Message() << "step " << step);
+      const double x = step == 1 ? 100 : 1 + 0.01 * step;
+      for (Scene* of : {static_cast<Scene*>(&scene), &on_cpu}) {
+        ASSERT_EQ(of->move(3, at(x, 0, 0)), Status::kOk);
+        if (step == 2) {
+          ASSERT_EQ(of->remove(7), Status::kOk);
+        }
+        if (step == 3) {
+          ASSERT_EQ(of->set_motion(5, Motion::fixed), Status::kOk);
+        }
+      }
+      here.ask(scene, 0.5, step == 2, step != 1);
+      there.ask(on_cpu, 0.5, step == 2, step != 1);
+      expect_same_answers(here, there);
+      EXPECT_EQ(here.verdicts.pairs().size() + (step == 2 ? 59 : 0), here.contacts.pairs().size());
+      EXPECT_GT(here.distances.pairs().size(), here.verdicts.pairs().size());
+      EXPECT_GT(here.impacts.rows().size(), here.verdicts.pairs().size());
+      EXPECT_GT(here.manifolds.rows().size(), 10u);
+      contacts += here.contacts.rows().size();
+    }
+    EXPECT_GT(contacts, 1000u);
+    // Of contacts that are given as a list, the CPU makes the same manifolds.
+    ManifoldQuery of_list;
+    ASSERT_EQ(here.manifolds.find(scene, here.contacts, {.match_previous = false}), Status::kOk);
+    ASSERT_EQ(of_list.find(scene, here.contacts.pairs(), here.contacts.rows(), {.match_previous = false}),
+              Status::kOk);
+    expect_same_bytes(of_list.rows(), here.manifolds.rows());
+  }
+}
+
+/// Nothing to look at is no error, and what was asked before does not show.
+TYPED_TEST_P(SceneOn, AnswersOfNoBodiesAreEmpty) {
+  const BodyScene cubes = row_of_cubes(3);
+  TypeParam scene;
+  Questions questions;
+  ASSERT_EQ(scene.set_assets(cubes.assets.views()), Status::kOk);
+  for (const auto bodies : {cubes.instances.size(), std::size_t{0}, cubes.instances.size()}) {
+    ASSERT_EQ(scene.place(std::span(cubes.instances).first(bodies)), Status::kOk);
+    questions.ask(scene, 0.5, false, true);
+    EXPECT_EQ(questions.contacts.rows().empty(), bodies == 0);
+    EXPECT_EQ(questions.manifolds.rows().empty(), bodies == 0);
+    EXPECT_EQ(questions.impacts.rows().empty(), bodies == 0);
+    EXPECT_EQ(questions.verdicts.rows().size(), questions.verdicts.pairs().size());
+    for (const ManifoldPoint& point : questions.manifolds.points()) EXPECT_EQ(point.previous, kNoIndex);
+  }
+}
+
+REGISTER_TYPED_TEST_SUITE_P(SceneOn, FindsThePairsOfItsBodiesWhateverChanged,
+                            RefusesWhatIsWrongAndStaysAsItWas, ARemovedBodyIsNoneAndItsNumberIsUsedAgain,
+                            AnswersManyQuestionsAboutTheSameBodies, AnswersOfNoBodiesAreEmpty);
+
+}  // namespace tandem

@@ -130,7 +130,8 @@ static void test_assets(void) {
   uint64_t where = 0;
   tandem_asset* none = NULL;
   CHECK_STATUS(tandem_asset_from_memory(aligned, bytes, NULL, NULL, &none, &where), TANDEM_CONTENT_CHANGED);
-  CHECK_STATUS(tandem_asset_from_memory(aligned, bytes, &borrowing, NULL, &none, &where), TANDEM_CONTENT_CHANGED);
+  CHECK_STATUS(tandem_asset_from_memory(aligned, bytes, &borrowing, NULL, &none, &where),
+               TANDEM_CONTENT_CHANGED);
   CHECK(none == NULL && releases == 1);
   CHECK_STATUS(tandem_asset_open("/nowhere/cow.bvh", NULL, NULL, &none, &where), TANDEM_FILE_NOT_FOUND);
   free(aligned);
@@ -147,8 +148,14 @@ static void test_building(void) {
   const uint32_t triangles[] = {0, 1, 2, 0, 2, 3, 0, 1, 4, 0, 1, 9};
   const uint32_t faces[] = {0, 0, 1, 2};
   const tandem_mesh_part parts[] = {{"square", "scene/square", 1}, {"rest", NULL, 2}};
-  tandem_mesh mesh = {.struct_size = sizeof mesh, .positions = positions, .vertex_count = 5, .triangles = triangles,
-                      .triangle_count = 4, .faces = faces, .parts = parts, .part_count = 2};
+  tandem_mesh mesh = {.struct_size = sizeof mesh,
+                      .positions = positions,
+                      .vertex_count = 5,
+                      .triangles = triangles,
+                      .triangle_count = 4,
+                      .faces = faces,
+                      .parts = parts,
+                      .part_count = 2};
   tandem_build_report report = {.struct_size = sizeof report};
   tandem_asset* asset = NULL;
   CHECK_STATUS(tandem_asset_build(&mesh, NULL, NULL, &asset, &report), TANDEM_OK);
@@ -330,8 +337,12 @@ static void test_filters(const tandem_allocator* allocator) {
   const tandem_object_pair joint = {3, 2};
   tandem_excluded_pairs* excluded = NULL;
   CHECK_STATUS(tandem_excluded_pairs_create(&joint, 1, allocator, &excluded), TANDEM_OK);
-  tandem_pair_filter filter = {.struct_size = sizeof filter, .count = 10, .motion = motion, .group = group,
-                               .mask = mask, .excluded = excluded};
+  tandem_pair_filter filter = {.struct_size = sizeof filter,
+                               .count = 10,
+                               .motion = motion,
+                               .group = group,
+                               .mask = mask,
+                               .excluded = excluded};
   CHECK_STATUS(tandem_scene_place(scene, row, 10, &filter), TANDEM_OK);
   tandem_excluded_pairs_destroy(excluded);  // the scene has them
   memset(motion, 0, sizeof motion);         // and has copied the rest
@@ -363,7 +374,10 @@ static void test_single_bodies(const tandem_allocator* allocator) {
   tandem_asset* cube = build_obj(assets_folder, "box_12.obj", allocator);
   tandem_scene* scene = scene_of(&cube, 1, allocator);
   tandem_asset_release(cube);
-  const tandem_questions questions = {sizeof questions, 0, NULL, NULL, NULL, NULL, NULL, NULL};
+  const double points[] = {0.25, 0.5, 0.5, 50, 50, 50};
+  const tandem_bodies_at_options at_points = {
+      .struct_size = sizeof at_points, .points = points, .point_count = 2};
+  const tandem_questions questions = {.struct_size = sizeof questions, .bodies_at = &at_points};
   uint32_t number = 7;
   size_t count = 0;
   CHECK(tandem_scene_instances(scene, &count) == NULL && count == 0);
@@ -409,6 +423,8 @@ static void test_single_bodies(const tandem_allocator* allocator) {
   CHECK_STATUS(tandem_scene_move(scene, numbers, apart, 4), TANDEM_OK);
   CHECK_STATUS(tandem_scene_find(scene, &questions), TANDEM_OK);
   CHECK(contact_count(scene) == 3 * 52);  // of before
+  const tandem_body_at* there = tandem_scene_bodies_at(scene, &count);
+  CHECK(count == 1 && there->point == 0 && there->body == 0);
   CHECK_STATUS(tandem_scene_find_contacts(scene, NULL), TANDEM_OK);
   CHECK(contact_count(scene) == 0);
   tandem_scene_destroy(scene);
@@ -431,7 +447,8 @@ static void test_manifolds_and_containment(const tandem_allocator* allocator) {
   // Contacts, manifolds and contained bodies in one call; the others are not asked.
   tandem_contact_options first = {sizeof first, TANDEM_EXACT, 0, 0, 0, 0, 0, NULL, 0};
   const tandem_manifold_options manifold_options = {sizeof manifold_options, 0, 0, 0};
-  const tandem_questions questions = {sizeof questions, 1, NULL, &first, &manifold_options, NULL, NULL, NULL};
+  const tandem_questions questions = {
+      .struct_size = sizeof questions, .contained = 1, .contacts = &first, .manifolds = &manifold_options};
   size_t count = 0, points = 0;
   for (int step = 0; step < 2; ++step) {
     CHECK_STATUS(tandem_scene_find(scene, &questions), TANDEM_OK);

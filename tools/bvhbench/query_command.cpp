@@ -1,7 +1,11 @@
+#include <array>
+#include <optional>
+
 #include "bvhbench/engines/registry.h"
 #include "bvhbench/scenes/contacts_file.h"
 #include "contained.h"
 #include "query_tolerance.h"
+#include "tandem/kernels/bodies_at_query.h"
 
 namespace tandem::bench {
 namespace {
@@ -11,6 +15,7 @@ struct QueryArguments : CommonArguments {
   QueryMode mode = QueryMode::exact;
   double within = 0;
   std::optional<double> tolerance;
+  std::optional<std::array<double, 3>> at;
   bool first_contact = false, self_pairs = false;
   bool grouped = false, sorted = false, traversal = false, manifolds = false, contained = false;
 
@@ -51,6 +56,20 @@ const std::map<std::string, QueryMode> kModes = {
 
 const std::map<std::string, std::string> kGpuEngines = {
     {"tandem", "tandem-cuda"}, {"paper", "paper"}, {"paper-bits", "paper-bits"}};
+
+// The bodies whose world boxes contain a point.
+std::vector<std::uint32_t> bodies_at(const LoadedScene& scene, const double (&point)[1][3]) {
+  Scene bodies;
+  BodiesAtQuery query;
+  const std::vector<AssetView> views = scene.views();
+  Status status = bodies.set_assets(views);
+  if (status == Status::kOk) status = bodies.place(scene.description.instances);
+  if (status == Status::kOk) status = query.find(bodies, {.points = point});
+  if (status != Status::kOk) throw std::runtime_error(explain(status));
+  std::vector<std::uint32_t> found;
+  for (const BodyAt& row : query.rows()) found.push_back(row.body);
+  return found;
+}
 
 // Takes the contacts.
 ContactTable table_of(const LoadedScene& scene, TimedAnswer& timed) {
@@ -139,6 +158,12 @@ Report report_of(const QueryArguments& arguments, const LoadedScene& scene, cons
     report.add_json("contained_rows", answer.contained.rows.size());
     report.add("contained_seconds", times(answer.contained.seconds))
         .row("  contained", Unit::milliseconds, " on top");
+  }
+  if (arguments.at) {
+    const auto& [x, y, z] = *arguments.at;
+    const std::vector<std::uint32_t> found = bodies_at(scene, {{x, y, z}});
+    report.add_json("bodies_at", found);
+    report.add_json("bodies_at_count", found.size()).row("bodies there");
   }
   if (arguments.on_gpu()) add_gpu(report, arguments, answer.timed);
   return report;
@@ -235,6 +260,8 @@ void add_query(CLI::App& app, Run& run_later) {
                {"--manifolds", arguments.manifolds, "also contact manifolds: normals, depths and points"},
                {"--contained", arguments.contained,
                 "also bodies that lie within others without touching them, found on the CPU"},
+               {"--at", arguments.at, "X Y Z", "also which bodies' world boxes contain this point",
+                between(-kLargestWorldCoordinate, kLargestWorldCoordinate)},
                {"--self", arguments.self_pairs, "also each instance with itself"},
                threads_option(arguments, "the contacts do"),
                repeat_option(arguments),

@@ -377,6 +377,20 @@ public unsafe struct tandem_tolerance_counters {
 }
 
 [StructLayout(LayoutKind.Sequential)]
+public unsafe struct tandem_bodies_at_options {
+  public uint struct_size;
+  public uint reserved;
+  public double* points;
+  public UIntPtr point_count;
+}
+
+[StructLayout(LayoutKind.Sequential)]
+public unsafe struct tandem_body_at {
+  public uint point;
+  public uint body;
+}
+
+[StructLayout(LayoutKind.Sequential)]
 public unsafe struct tandem_questions {
   public uint struct_size;
   public uint contained;
@@ -386,6 +400,7 @@ public unsafe struct tandem_questions {
   public tandem_distance_options* distances;
   public tandem_impact_options* impacts;
   public tandem_tolerance_options* verdicts;
+  public tandem_bodies_at_options* bodies_at;
 }
 
 [StructLayout(LayoutKind.Sequential)]
@@ -569,6 +584,8 @@ public static unsafe class Native {
   [DllImport("tandem")] public static extern uint tandem_pose_at(tandem_pose* start, tandem_motion* motion, double t, tandem_pose* pose);
   [DllImport("tandem")] public static extern uint tandem_scene_find_verdicts(IntPtr scene, tandem_tolerance_options* options);
   [DllImport("tandem")] public static extern tandem_verdict* tandem_scene_verdicts(IntPtr scene, UIntPtr* count);
+  [DllImport("tandem")] public static extern uint tandem_scene_find_bodies_at(IntPtr scene, tandem_bodies_at_options* options);
+  [DllImport("tandem")] public static extern tandem_body_at* tandem_scene_bodies_at(IntPtr scene, UIntPtr* count);
   [DllImport("tandem")] public static extern uint tandem_scene_find(IntPtr scene, tandem_questions* questions);
   [DllImport("tandem")] public static extern uint tandem_scene_get_counters(IntPtr scene, tandem_counters* counters);
 }

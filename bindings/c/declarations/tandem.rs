@@ -555,6 +555,22 @@ pub struct tandem_tolerance_counters {
 
 #[repr(C)]
 #[derive(Clone, Copy)]
+pub struct tandem_bodies_at_options {
+    pub struct_size: u32,
+    pub reserved: u32,
+    pub points: *const f64,
+    pub point_count: usize,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct tandem_body_at {
+    pub point: u32,
+    pub body: u32,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
 pub struct tandem_questions {
     pub struct_size: u32,
     pub contained: u32,
@@ -564,6 +580,7 @@ pub struct tandem_questions {
     pub distances: *const tandem_distance_options,
     pub impacts: *const tandem_impact_options,
     pub verdicts: *const tandem_tolerance_options,
+    pub bodies_at: *const tandem_bodies_at_options,
 }
 
 #[repr(C)]
@@ -628,6 +645,8 @@ extern "C" {
     pub fn tandem_pose_at(start: *const tandem_pose, motion: *const tandem_motion, t: f64, pose: *mut tandem_pose) -> tandem_status;
     pub fn tandem_scene_find_verdicts(scene: *mut tandem_scene, options: *const tandem_tolerance_options) -> tandem_status;
     pub fn tandem_scene_verdicts(scene: *const tandem_scene, count: *mut usize) -> *const tandem_verdict;
+    pub fn tandem_scene_find_bodies_at(scene: *mut tandem_scene, options: *const tandem_bodies_at_options) -> tandem_status;
+    pub fn tandem_scene_bodies_at(scene: *const tandem_scene, count: *mut usize) -> *const tandem_body_at;
     pub fn tandem_scene_find(scene: *mut tandem_scene, questions: *const tandem_questions) -> tandem_status;
     pub fn tandem_scene_get_counters(scene: *const tandem_scene, counters: *mut tandem_counters) -> tandem_status;
 }

@@ -41,3 +41,4 @@ struct Same_tandem_verdict { using Ours = PairVerdict; using Theirs = tandem_ver
   TANDEM_SAME(level_b); };
 struct Same_tandem_tolerance_counters { using Ours = ToleranceCounters; using Theirs = tandem_tolerance_counters; TANDEM_SAME_SIZE();
   TANDEM_SAME(apart); TANDEM_SAME(touching); TANDEM_SAME(within_tolerance); TANDEM_SAME(work); };
+struct Same_tandem_body_at { using Ours = BodyAt; using Theirs = tandem_body_at; TANDEM_SAME_SIZE(); TANDEM_SAME(point); TANDEM_SAME(body); };

@@ -3,6 +3,7 @@
 #include <span>
 
 #include "entry.h"
+#include "tandem/kernels/bodies_at_query.h"
 #include "tandem/kernels/containment_query.h"
 #include "tandem/kernels/distance_query.h"
 #include "tandem/kernels/impact_query.h"

@@ -37,6 +37,7 @@ struct tandem_scene : Allocated {
   Asked<DistanceQuery> distances;
   Asked<ImpactQuery> impacts;
   Asked<ToleranceQuery> verdicts;
+  Asked<BodiesAtQuery> bodies_at;
 
   ~tandem_scene() {
     release_assets();
@@ -169,6 +170,13 @@ tandem_status read_options(const tandem_tolerance_options& given, ToleranceOptio
   return TANDEM_OK;
 }
 
+tandem_status read_options(const tandem_bodies_at_options& given, BodiesAtOptions& options) {
+  if (given.reserved != 0) return TANDEM_BAD_OPTION;
+  if (!is_there(given.points, given.point_count)) return TANDEM_NULL_ARGUMENT;
+  options.points = {reinterpret_cast<const double(*)[3]>(given.points), given.point_count};
+  return TANDEM_OK;
+}
+
 // Asks about the pairs that the options name, or where they name none, about those that the scene finds.
 template <typename Query, typename Given, typename Options>
 tandem_status find(tandem_scene& self, Asked<Query>& asked, const Given* given, Options& options) {
@@ -176,12 +184,19 @@ tandem_status find(tandem_scene& self, Asked<Query>& asked, const Given* given, 
   Given read;
   tandem_status status = read_struct(given, read);
   if (status == TANDEM_OK) status = read_options(read, options);
-  if (status == TANDEM_OK && !is_there(read.pairs, read.pair_count)) status = TANDEM_NULL_ARGUMENT;
+  std::span<const ObjectPair> pairs;
+  if constexpr (requires { read.pairs; }) {
+    if (status == TANDEM_OK && !is_there(read.pairs, read.pair_count)) status = TANDEM_NULL_ARGUMENT;
+    pairs = rows<ObjectPair>(read.pairs, read.pair_count);
+  }
   if (status != TANDEM_OK) return status;
-  const Status done =
-      read.pairs != nullptr
-          ? asked.query.find(self.scene, rows<ObjectPair>(read.pairs, read.pair_count), options)
-          : asked.query.find(self.scene, options);
+  Status done = Status::kOk;
+  if constexpr (requires { asked.query.find(self.scene, pairs, options); }) {
+    done = pairs.data() != nullptr ? asked.query.find(self.scene, pairs, options)
+                                   : asked.query.find(self.scene, options);
+  } else {
+    done = asked.query.find(self.scene, options);
+  }
   asked.found = done == Status::kOk;
   return self.told(done);
 }
@@ -263,7 +278,8 @@ tandem_status tandem_scene_set_threads(tandem_scene* scene, uint32_t threads) {
 tandem_status tandem_scene_set_assets(tandem_scene* scene, tandem_asset* const* assets, size_t count) {
   return enter(scene, [&](tandem_scene& self) {
     self.forget_contacts();
-    self.pairs_found = self.distances.found = self.impacts.found = self.verdicts.found = false;
+    self.pairs_found = self.distances.found = self.impacts.found = self.verdicts.found =
+        self.bodies_at.found = false;
     // Points of before are not those of other assets.
     self.manifolds.query.forget_points();
     const tandem_status status = set_assets(self, assets, count);
@@ -406,6 +422,10 @@ tandem_status tandem_scene_find_verdicts(tandem_scene* scene, const tandem_toler
   return find<ToleranceOptions>(scene, &tandem_scene::verdicts, options);
 }
 
+tandem_status tandem_scene_find_bodies_at(tandem_scene* scene, const tandem_bodies_at_options* options) {
+  return find<BodiesAtOptions>(scene, &tandem_scene::bodies_at, options);
+}
+
 tandem_status tandem_scene_find(tandem_scene* scene, const tandem_questions* questions) {
   return enter(scene, [&](tandem_scene& self) -> tandem_status {
     if (questions == nullptr) return TANDEM_NULL_ARGUMENT;
@@ -422,6 +442,7 @@ tandem_status tandem_scene_find(tandem_scene* scene, const tandem_questions* que
     ask(tandem_scene_find_distances, read.distances);
     ask(tandem_scene_find_impacts, read.impacts);
     ask(tandem_scene_find_verdicts, read.verdicts);
+    ask(tandem_scene_find_bodies_at, read.bodies_at);
     return status;
   });
 }
@@ -453,6 +474,10 @@ const tandem_impact* tandem_scene_impacts(const tandem_scene* scene, size_t* cou
 
 const tandem_verdict* tandem_scene_verdicts(const tandem_scene* scene, size_t* count) {
   return rows_of<tandem_verdict>(scene, &tandem_scene::verdicts, count, kRows);
+}
+
+const tandem_body_at* tandem_scene_bodies_at(const tandem_scene* scene, size_t* count) {
+  return rows_of<tandem_body_at>(scene, &tandem_scene::bodies_at, count, kRows);
 }
 
 tandem_status tandem_scene_get_counters(const tandem_scene* scene, tandem_counters* counters) {

@@ -172,6 +172,16 @@ class Scene {
     return nb::make_tuple(pairs_of(TANDEM_VERDICTS), rows<tandem_scene_verdicts>());
   }
 
+  nb::object bodies_at(nb::handle points) {
+    const Turn turn = take_turn();
+    const auto coordinates = copy_rows<double>(points);
+    auto options = sized<tandem_bodies_at_options>();
+    options.points = coordinates.data();
+    options.point_count = coordinates.size() / 3;
+    ask([&](tandem_scene* scene) { return tandem_scene_find_bodies_at(scene, &options); });
+    return rows<tandem_scene_bodies_at>();
+  }
+
  private:
   // The scene takes one call at a time, whichever threads make them.
   Turn take_turn() { return Turn(busy_, "another thread is in a call of this scene"); }
@@ -238,7 +248,8 @@ void add_scenes(nb::module_& module) {
       .def("contained", &Scene::contained)
       .def("distances", &Scene::distances, none(), none(), nb::arg(), nb::arg(), none())
       .def("impacts", &Scene::impacts, nb::arg(), nb::arg(), none(), nb::arg())
-      .def("verdicts", &Scene::verdicts, nb::arg(), none());
+      .def("verdicts", &Scene::verdicts, nb::arg(), none())
+      .def("bodies_at", &Scene::bodies_at);
 }
 
 }  // namespace tandem::python

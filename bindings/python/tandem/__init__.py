@@ -15,7 +15,7 @@ from ._arrays import instances
 from ._asset import Asset, Level, Part
 from ._build import BuildReport, Mesh, build, read_mesh
 from ._errors import Error, FileError
-from ._rows import CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, INSTANCE, MANIFOLD, MOTION, NO_INDEX, PAIR, POINT, VERDICT
+from ._rows import BODY_AT, CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, INSTANCE, MANIFOLD, MOTION, NO_INDEX, PAIR, POINT, VERDICT
 from ._scene import Contacts, Contained, Counters, Distances, Filter, Impacts, Manifolds, Scene, Verdicts
 
 #: What moves a body (Filter): forces; nothing; the caller; nothing until the caller wakes it.

@@ -2,7 +2,7 @@
 wherever it copies. Written by scripts/write_interface from it. Do not edit it."""
 import numpy as np
 
-__all__ = ["CONTACT", "CONTAINMENT", "DISTANCE", "FORMER", "IMPACT", "INSTANCE", "MANIFOLD", "MOTION", "NO_INDEX", "PAIR", "POINT", "VERDICT"]
+__all__ = ["BODY_AT", "CONTACT", "CONTAINMENT", "DISTANCE", "FORMER", "IMPACT", "INSTANCE", "MANIFOLD", "MOTION", "NO_INDEX", "PAIR", "POINT", "VERDICT"]
 
 #: What is not there: a triangle, a face, a former point, the asset of a removed body.
 NO_INDEX = 0xFFFFFFFF
@@ -33,3 +33,5 @@ IMPACT = np.dtype([("t_safe", "<f8"), ("gap", "<f8"), ("point_a", "<f8", (3,)), 
         "<u4"), ("face_a", "<u4"), ("face_b", "<u4"), ("status", "u1"), ("reserved", "u1", (7,))])
 #: Whether two bodies meet (docs/levels.md).
 VERDICT = np.dtype([("verdict", "u1"), ("level_a", "u1"), ("level_b", "u1")])
+#: A body whose world box contains a point.
+BODY_AT = np.dtype([("point", "<u4"), ("body", "<u4")])

@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _tandem
-from ._arrays import FARTHEST, FINITE, Rows, amount, instances_of, pairs_of, rows, whole_number, whole_numbers
+from ._arrays import FARTHEST, FINITE, Rows, amount, floats, instances_of, pairs_of, rows, whole_number, whole_numbers
 from ._asset import Asset, _choice
-from ._rows import CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, INSTANCE, MANIFOLD, MOTION, PAIR, POINT, VERDICT
+from ._rows import BODY_AT, CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, INSTANCE, MANIFOLD, MOTION, PAIR, POINT, VERDICT
 
 __all__ = ["Contacts", "Contained", "Counters", "Distances", "Filter", "Impacts", "Manifolds", "Scene", "Verdicts"]
 
@@ -368,3 +368,11 @@ class Scene:
         """
         found, verdicts = self._core.verdicts(amount(tolerance, "tolerance", FARTHEST), pairs_of(pairs))
         return Verdicts(_frombuffer(found, PAIR), _frombuffer(verdicts, VERDICT))
+
+    def bodies_at(self, points: npt.ArrayLike) -> Rows:
+        """Finds which bodies' world boxes contain points, (n, 3) or one: array of BODY_AT by point, then by body.
+
+        >>> scene.place(translation=[[0, 0, 0], [0.5, 0, 0]]).bodies_at([[0.25, 0.5, 0.5], [0.75, 0.5, 0.5]]).tolist()
+        [(0, 0), (1, 0), (1, 1)]
+        """
+        return _frombuffer(self._core.bodies_at(floats(points, "points", 3)), BODY_AT)

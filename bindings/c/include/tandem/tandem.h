@@ -677,6 +677,26 @@ TANDEM_API tandem_status tandem_scene_find_verdicts(tandem_scene* scene,
 /// One for each pair.
 TANDEM_API const tandem_verdict* tandem_scene_verdicts(const tandem_scene* scene, size_t* count);
 
+/// ---- Bodies at points
+
+typedef struct tandem_bodies_at_options {
+  uint32_t struct_size;
+  uint32_t reserved;
+  const double* points;  ///< in the world, x, y, z of each
+  size_t point_count;
+} tandem_bodies_at_options;
+
+/// A body whose world box contains a point.
+typedef struct tandem_body_at {
+  uint32_t point, body;
+} tandem_body_at;
+
+/// Finds which bodies' world boxes contain points: rows by point, then by body. Result: TANDEM_OUT_OF_RANGE,
+/// where `where` is the point.
+TANDEM_API tandem_status tandem_scene_find_bodies_at(tandem_scene* scene,
+                                                     const tandem_bodies_at_options* options);
+TANDEM_API const tandem_body_at* tandem_scene_bodies_at(const tandem_scene* scene, size_t* count);
+
 /// ---- Several questions
 
 /// What tandem_scene_find() asks. Null: the question is not asked.
@@ -689,10 +709,11 @@ typedef struct tandem_questions {
   const tandem_distance_options* distances;
   const tandem_impact_options* impacts;
   const tandem_tolerance_options* verdicts;
+  const tandem_bodies_at_options* bodies_at;
 } tandem_questions;
 
-/// Asks several questions: pairs, contacts, manifolds, contained bodies, distances, impacts, verdicts, in
-/// this order, until one fails. Result: that of the one that fails.
+/// Asks several questions, in the order of tandem_questions but bodies within others behind manifolds, until
+/// one fails. Result: that of the one that fails.
 TANDEM_API tandem_status tandem_scene_find(tandem_scene* scene, const tandem_questions* questions);
 
 /// What the questions did. Counters depend neither on the number of threads nor on the machine; those of a

@@ -1,0 +1,39 @@
+#include "tandem/kernels/bodies_at_query.h"
+
+#include <cmath>
+
+#include "kernels/scene/scene_state.h"
+
+namespace tandem {
+namespace {
+
+bool contains(const WorldBox& box, const double (&point)[3]) {
+  bool inside = true;
+  for (int k = 0; k < 3; ++k) inside = inside && box.lo[k] <= point[k] && point[k] <= box.hi[k];
+  return inside;
+}
+
+bool is_in_range(const double (&point)[3]) {
+  bool in_range = true;
+  for (double x : point) in_range = in_range && std::abs(x) <= kLargestWorldCoordinate;
+  return in_range;
+}
+
+}  // namespace
+
+Status BodiesAtQuery::find(Scene& in, const BodiesAtOptions& options) {
+  forget(Status::kOk);
+  SceneState* const scene = in.state();
+  if (scene == nullptr) return Status::kOutOfMemory;
+  for (std::uint32_t p = 0; p < options.points.size(); ++p) {
+    if (!is_in_range(options.points[p])) return forget(scene->fail(Status::kOutOfRange, p));
+    for (std::uint32_t body = 0; body < scene->boxes.size(); ++body) {
+      if (contains(scene->boxes[body], options.points[p]) && !rows_.push({p, body}))
+        return forget(scene->fail(Status::kOutOfMemory, p));
+    }
+  }
+  counters_ = {options.points.size(), options.points.size() * scene->boxes.size()};
+  return Status::kOk;
+}
+
+}  // namespace tandem

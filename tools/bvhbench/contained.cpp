@@ -4,14 +4,16 @@
 #include <new>
 
 namespace tandem::bench {
-namespace {
 
 void require(Status status) {
   if (status == Status::kOutOfMemory) throw std::bad_alloc();
   if (status != Status::kOk) throw std::runtime_error(explain(status));
 }
 
-}  // namespace
+PlacedBodies::PlacedBodies(const LoadedScene& file) : assets(file.views()) {
+  require(scene.set_assets(assets));
+  require(scene.place(file.description.instances));
+}
 
 TimedContainments find_contained(const LoadedScene& scene, std::span<const ObjectPair> pairs,
                                  std::span<const TriangleContact> contacts, std::uint32_t threads,
@@ -21,19 +23,16 @@ TimedContainments find_contained(const LoadedScene& scene, std::span<const Objec
   for (const auto& [pair, a, b] : contacts) sorted.push_back({pair, a, b, 0, 0});
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const Contact& x, const Contact& y) { return x.pair < y.pair; });
-  Scene bodies;
+  PlacedBodies bodies(scene);
+  bodies.scene.set_threads(threads);
   ContainmentQuery query;
-  bodies.set_threads(threads);
-  const std::vector<AssetView> assets = scene.views();
-  require(bodies.set_assets(assets));
-  require(bodies.place(scene.description.instances));
   TimedContainments found;
   for (std::uint32_t i = 0; i < repeats; ++i) {
     Stopwatch watch;
-    const Status status = query.find(bodies, pairs, sorted);
+    const Status status = query.find(bodies.scene, pairs, sorted);
     found.seconds.push_back(watch.lap());
     if (status == Status::kNoTopology)
-      throw FileError(scene.name_of(bodies.where()) + ": " + explain(status));
+      throw FileError(scene.name_of(bodies.scene.where()) + ": " + explain(status));
     require(status);
   }
   found.rows.assign(query.rows().begin(), query.rows().end());

@@ -10,6 +10,17 @@
 
 namespace tandem::bench {
 
+/// Throws std::bad_alloc or std::runtime_error where something is wrong.
+void require(Status status);
+
+/// The bodies of a scene file on the CPU, to ask questions of.
+struct PlacedBodies {
+  std::vector<AssetView> assets;
+  Scene scene;
+
+  explicit PlacedBodies(const LoadedScene& file);
+};
+
 /// Bodies within bodies, and what finding them took beside the query, each time.
 struct TimedContainments {
   std::vector<Containment> rows;

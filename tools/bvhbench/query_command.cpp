@@ -57,20 +57,6 @@ const std::map<std::string, QueryMode> kModes = {
 const std::map<std::string, std::string> kGpuEngines = {
     {"tandem", "tandem-cuda"}, {"paper", "paper"}, {"paper-bits", "paper-bits"}};
 
-// The bodies whose world boxes contain a point.
-std::vector<std::uint32_t> bodies_at(const LoadedScene& scene, const double (&point)[1][3]) {
-  Scene bodies;
-  BodiesAtQuery query;
-  const std::vector<AssetView> views = scene.views();
-  Status status = bodies.set_assets(views);
-  if (status == Status::kOk) status = bodies.place(scene.description.instances);
-  if (status == Status::kOk) status = query.find(bodies, {.points = point});
-  if (status != Status::kOk) throw std::runtime_error(explain(status));
-  std::vector<std::uint32_t> found;
-  for (const BodyAt& row : query.rows()) found.push_back(row.body);
-  return found;
-}
-
 // Takes the contacts.
 ContactTable table_of(const LoadedScene& scene, TimedAnswer& timed) {
   const std::vector<AssetView> views = scene.views();
@@ -161,9 +147,14 @@ Report report_of(const QueryArguments& arguments, const LoadedScene& scene, cons
   }
   if (arguments.at) {
     const auto& [x, y, z] = *arguments.at;
-    const std::vector<std::uint32_t> found = bodies_at(scene, {{x, y, z}});
-    report.add_json("bodies_at", found);
-    report.add_json("bodies_at_count", found.size()).row("bodies there");
+    const double point[][3] = {{x, y, z}};
+    BodiesAtQuery query;
+    PlacedBodies bodies_there(scene);
+    require(query.find(bodies_there.scene, {.points = point}));
+    Json bodies = Json::array();
+    for (const BodyAt& row : query.rows()) bodies.push_back(row.body);
+    report.add_json("bodies_at_count", bodies.size()).row("bodies there");
+    report.add_json("bodies_at", std::move(bodies));
   }
   if (arguments.on_gpu()) add_gpu(report, arguments, answer.timed);
   return report;

@@ -201,10 +201,10 @@ tandem_status find(tandem_scene& self, Asked<Query>& asked, const Given* given, 
   return self.told(done);
 }
 
-template <typename Options, typename Query, typename Given>
+template <typename Query, typename Given>
 tandem_status find(tandem_scene* scene, Asked<Query> tandem_scene::*question, const Given* given) {
   return enter(scene, [&](tandem_scene& self) {
-    Options options;
+    typename Query::Options options;
     return find(self, self.*question, given, options);
   });
 }
@@ -410,21 +410,24 @@ tandem_status tandem_scene_find_contained(tandem_scene* scene) {
   });
 }
 
-tandem_status tandem_scene_find_distances(tandem_scene* scene, const tandem_distance_options* options) {
-  return find<DistanceOptions>(scene, &tandem_scene::distances, options);
-}
+// The rows of a question, and for those whose options are all that there is to say, how it is asked.
+#define TANDEM_SCENE_ROWS(question, row)                                         \
+  const row* tandem_scene_##question(const tandem_scene* scene, size_t* count) { \
+    return rows_of<row>(scene, &tandem_scene::question, count, kRows);           \
+  }
+#define TANDEM_SCENE_QUESTION(question, given, row)                                       \
+  tandem_status tandem_scene_find_##question(tandem_scene* scene, const given* options) { \
+    return find(scene, &tandem_scene::question, options);                                 \
+  }                                                                                       \
+  TANDEM_SCENE_ROWS(question, row)
 
-tandem_status tandem_scene_find_impacts(tandem_scene* scene, const tandem_impact_options* options) {
-  return find<ImpactOptions>(scene, &tandem_scene::impacts, options);
-}
-
-tandem_status tandem_scene_find_verdicts(tandem_scene* scene, const tandem_tolerance_options* options) {
-  return find<ToleranceOptions>(scene, &tandem_scene::verdicts, options);
-}
-
-tandem_status tandem_scene_find_bodies_at(tandem_scene* scene, const tandem_bodies_at_options* options) {
-  return find<BodiesAtOptions>(scene, &tandem_scene::bodies_at, options);
-}
+TANDEM_SCENE_ROWS(contacts, tandem_contact)
+TANDEM_SCENE_ROWS(manifolds, tandem_manifold)
+TANDEM_SCENE_ROWS(contained, tandem_containment)
+TANDEM_SCENE_QUESTION(distances, tandem_distance_options, tandem_distance)
+TANDEM_SCENE_QUESTION(impacts, tandem_impact_options, tandem_impact)
+TANDEM_SCENE_QUESTION(verdicts, tandem_tolerance_options, tandem_verdict)
+TANDEM_SCENE_QUESTION(bodies_at, tandem_bodies_at_options, tandem_body_at)
 
 tandem_status tandem_scene_find(tandem_scene* scene, const tandem_questions* questions) {
   return enter(scene, [&](tandem_scene& self) -> tandem_status {
@@ -447,37 +450,9 @@ tandem_status tandem_scene_find(tandem_scene* scene, const tandem_questions* que
   });
 }
 
-const tandem_contact* tandem_scene_contacts(const tandem_scene* scene, size_t* count) {
-  return rows_of<tandem_contact>(scene, &tandem_scene::contacts, count, kRows);
-}
-
-const tandem_manifold* tandem_scene_manifolds(const tandem_scene* scene, size_t* count) {
-  return rows_of<tandem_manifold>(scene, &tandem_scene::manifolds, count, kRows);
-}
-
 const tandem_manifold_point* tandem_scene_points(const tandem_scene* scene, size_t* count) {
   return rows_of<tandem_manifold_point>(scene, &tandem_scene::manifolds, count,
                                         [](const ManifoldQuery& query) { return query.points(); });
-}
-
-const tandem_containment* tandem_scene_contained(const tandem_scene* scene, size_t* count) {
-  return rows_of<tandem_containment>(scene, &tandem_scene::contained, count, kRows);
-}
-
-const tandem_distance* tandem_scene_distances(const tandem_scene* scene, size_t* count) {
-  return rows_of<tandem_distance>(scene, &tandem_scene::distances, count, kRows);
-}
-
-const tandem_impact* tandem_scene_impacts(const tandem_scene* scene, size_t* count) {
-  return rows_of<tandem_impact>(scene, &tandem_scene::impacts, count, kRows);
-}
-
-const tandem_verdict* tandem_scene_verdicts(const tandem_scene* scene, size_t* count) {
-  return rows_of<tandem_verdict>(scene, &tandem_scene::verdicts, count, kRows);
-}
-
-const tandem_body_at* tandem_scene_bodies_at(const tandem_scene* scene, size_t* count) {
-  return rows_of<tandem_body_at>(scene, &tandem_scene::bodies_at, count, kRows);
 }
 
 tandem_status tandem_scene_get_counters(const tandem_scene* scene, tandem_counters* counters) {

@@ -144,8 +144,8 @@ class Scene {
     options.former = nearest.data();
     options.former_count = nearest.size();
     given.put_into(options);
-    ask([&](tandem_scene* scene) { return tandem_scene_find_distances(scene, &options); });
-    return nb::make_tuple(pairs_of(TANDEM_DISTANCES), rows<tandem_scene_distances>());
+    const nb::object found = answer<tandem_scene_find_distances, tandem_scene_distances>(options);
+    return nb::make_tuple(pairs_of(TANDEM_DISTANCES), found);
   }
 
   nb::tuple impacts(nb::handle motion, double duration, nb::handle pairs, double tolerance) {
@@ -158,8 +158,8 @@ class Scene {
     options.motion = motions.data();
     options.motion_count = motions.size();
     given.put_into(options);
-    ask([&](tandem_scene* scene) { return tandem_scene_find_impacts(scene, &options); });
-    return nb::make_tuple(pairs_of(TANDEM_IMPACTS), rows<tandem_scene_impacts>());
+    const nb::object found = answer<tandem_scene_find_impacts, tandem_scene_impacts>(options);
+    return nb::make_tuple(pairs_of(TANDEM_IMPACTS), found);
   }
 
   nb::tuple verdicts(double tolerance, nb::handle pairs) {
@@ -168,8 +168,8 @@ class Scene {
     auto options = sized<tandem_tolerance_options>();
     options.tolerance = tolerance;
     given.put_into(options);
-    ask([&](tandem_scene* scene) { return tandem_scene_find_verdicts(scene, &options); });
-    return nb::make_tuple(pairs_of(TANDEM_VERDICTS), rows<tandem_scene_verdicts>());
+    const nb::object found = answer<tandem_scene_find_verdicts, tandem_scene_verdicts>(options);
+    return nb::make_tuple(pairs_of(TANDEM_VERDICTS), found);
   }
 
   nb::object bodies_at(nb::handle points) {
@@ -178,8 +178,7 @@ class Scene {
     auto options = sized<tandem_bodies_at_options>();
     options.points = coordinates.data();
     options.point_count = coordinates.size() / 3;
-    ask([&](tandem_scene* scene) { return tandem_scene_find_bodies_at(scene, &options); });
-    return rows<tandem_scene_bodies_at>();
+    return answer<tandem_scene_find_bodies_at, tandem_scene_bodies_at>(options);
   }
 
  private:
@@ -195,6 +194,13 @@ class Scene {
       return call(scene);
     }();
     if (status != TANDEM_OK) check(status, tandem_scene_where(scene));
+  }
+
+  // Asks a question; its rows.
+  template <auto find, auto get, typename Options>
+  nb::object answer(const Options& options) {
+    ask([&](tandem_scene* scene) { return find(scene, &options); });
+    return rows<get>();
   }
 
   // Makes a call after which bodies are elsewhere or others.

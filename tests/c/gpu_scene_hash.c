@@ -1,4 +1,5 @@
-// Finds the contacts of scenes on the GPU through the C interface and prints what scene_hash prints of each. C99.
+// Finds the contacts of scenes on the GPU through the C interface and prints of each how many pairs and contacts there
+// are, and their hash. C99.
 // Usage: gpu_scene_hash MODE WITHIN SCENE...   Exit code 77: there is no GPU.
 // TANDEM_REPEAT=N: then makes N calls of both kinds again and says how many microseconds the median of them took.
 #define _POSIX_C_SOURCE 200112L

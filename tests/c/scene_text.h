@@ -1,4 +1,4 @@
-/// Scenes as c_scenes_test.py writes them: lines "asset PATH", then "instances N" and N lines of an asset's
+/// Scenes as scripts/gpu_doors writes them: lines "asset PATH", then "instances N" and N lines of an asset's
 /// number and twelve numbers of a pose, then "motion" with N numbers or "pairs M" with M lines of two. And
 /// the hash of contacts, by the rule of docs/scenes.md. C99.
 #ifndef TANDEM_TESTS_C_SCENE_TEXT_H

@@ -191,18 +191,3 @@ def test_an_error_leaves_no_contacts_to_make_manifolds_of():
     with pytest.raises(tandem.Error):
         scene.place(poses(translation=np.nan))
     assert len(scene.instances) == len(scene.manifolds().pairs) == 0
-
-
-def test_what_cannot_be_added_or_moved_changes_nothing():
-    scene = tandem.Scene([BOX], ROWS)
-    for call in (lambda: scene.add(translation=np.full(3, np.nan)), lambda: scene.move([0, 1], poses(translation=np.nan)), lambda: scene.remove(5)):
-        with pytest.raises(tandem.Error):
-            call()
-        assert scene.instances.tobytes() == ROWS.tobytes() and len(scene.contacts().contacts) == 18
-
-
-def test_manifolds_name_the_asset_without_topology():
-    scene = tandem.Scene([BOX, tandem.build(BOX_VERTICES, BOX_FACES, topology=False)], ROWS)
-    with pytest.raises(tandem.Error) as caught:
-        scene.manifolds()
-    assert (caught.value.name, caught.value.subject, caught.value.where) == ("NoTopology", "asset", 1)

@@ -6,24 +6,6 @@ import xxhash
 import tandem
 
 
-def load_scene(path):
-    """Assets, instances, pairs or None, filter or None."""
-    with h5py.File(path) as file:
-        assets = [tandem.Asset.load(path.parent / name) for name in file["assets"].asstr()[:]]
-        group = file["instances"]
-        instances = tandem.instances(group["asset"][:], group["rotation"][:], group["translation"][:])
-        pairs = np.sort(file["pairs"][:].view(tandem.PAIR).reshape(-1)) if "pairs" in file else None
-        filter = tandem.Filter(file["simulation/motion"][:]) if "simulation/motion" in file else None
-    return assets, instances, pairs, filter
-
-
-def save_scene(path, names, instances):
-    with h5py.File(path, "w") as file:
-        file["assets"] = names
-        for column in ("asset", "rotation", "translation"):
-            file[f"instances/{column}"] = instances[column]
-
-
 def hash_of(pairs, contacts):
     """Of object pairs, and the faces of contacts, sorted; within a body the lower face comes first."""
     face_a, face_b = contacts["face_a"].copy(), contacts["face_b"].copy()

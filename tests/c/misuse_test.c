@@ -200,7 +200,8 @@ static void test_bad_options(tandem_asset* cube) {
   filter.count = 1;
   CHECK_STATUS(tandem_scene_add(scene, bodies, &filter, &number), TANDEM_BAD_OPTION);
   const tandem_object_pair joint = {0, 1};
-  CHECK_STATUS(tandem_excluded_pairs_create(&joint, 1, NULL, (tandem_excluded_pairs**)&filter.excluded), TANDEM_OK);
+  CHECK_STATUS(tandem_excluded_pairs_create(&joint, 1, NULL, (tandem_excluded_pairs**)&filter.excluded),
+               TANDEM_OK);
   filter.motion = motion;
   CHECK_STATUS(tandem_scene_add(scene, bodies, &filter, &number), TANDEM_BAD_OPTION);
   filter.motion = NULL;
@@ -264,7 +265,8 @@ static void test_allocators(const char* folder) {
   const tandem_motion still[3] = {{{0}, {0}, {0}}, {{0}, {0}, {0}}, {{0}, {0}, {0}}};
   const tandem_impact_options impacts = {sizeof impacts, 0, 1, 0, still, 3, NULL, 0};
   const tandem_tolerance_options verdicts = {sizeof verdicts, 0, 0, NULL, 0};
-  const tandem_questions all = {sizeof all, 1, &pairs, &contacts, &manifolds, &distances, &impacts, &verdicts};
+  const tandem_questions all = {sizeof all, 1,          &pairs,   &contacts,
+                                &manifolds, &distances, &impacts, &verdicts};
   int succeeded = 0, refused = 0;
   for (int granted = 0; granted < 300 && succeeded == 0; ++granted) {
     grants_left = granted;

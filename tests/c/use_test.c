@@ -130,7 +130,8 @@ static void test_assets(void) {
   uint64_t where = 0;
   tandem_asset* none = NULL;
   CHECK_STATUS(tandem_asset_from_memory(aligned, bytes, NULL, NULL, &none, &where), TANDEM_CONTENT_CHANGED);
-  CHECK_STATUS(tandem_asset_from_memory(aligned, bytes, &borrowing, NULL, &none, &where), TANDEM_CONTENT_CHANGED);
+  CHECK_STATUS(tandem_asset_from_memory(aligned, bytes, &borrowing, NULL, &none, &where),
+               TANDEM_CONTENT_CHANGED);
   CHECK(none == NULL && releases == 1);
   CHECK_STATUS(tandem_asset_open("/nowhere/cow.bvh", NULL, NULL, &none, &where), TANDEM_FILE_NOT_FOUND);
   free(aligned);
@@ -147,8 +148,14 @@ static void test_building(void) {
   const uint32_t triangles[] = {0, 1, 2, 0, 2, 3, 0, 1, 4, 0, 1, 9};
   const uint32_t faces[] = {0, 0, 1, 2};
   const tandem_mesh_part parts[] = {{"square", "scene/square", 1}, {"rest", NULL, 2}};
-  tandem_mesh mesh = {.struct_size = sizeof mesh, .positions = positions, .vertex_count = 5, .triangles = triangles,
-                      .triangle_count = 4, .faces = faces, .parts = parts, .part_count = 2};
+  tandem_mesh mesh = {.struct_size = sizeof mesh,
+                      .positions = positions,
+                      .vertex_count = 5,
+                      .triangles = triangles,
+                      .triangle_count = 4,
+                      .faces = faces,
+                      .parts = parts,
+                      .part_count = 2};
   tandem_build_report report = {.struct_size = sizeof report};
   tandem_asset* asset = NULL;
   CHECK_STATUS(tandem_asset_build(&mesh, NULL, NULL, &asset, &report), TANDEM_OK);
@@ -228,8 +235,8 @@ static void test_building(void) {
   free_mesh(&cow);
 }
 
-// What tests/contract/ does not ask: rows that are given back to the scene that has them, options that are null,
-// several questions in one call, and poses in between. The memory of all is the allocator's.
+// What tests/contract/ does not ask: rows that are given back to the scene that has them, options that are
+// null, several questions in one call, and poses in between. The memory of all is the allocator's.
 static void test_rows_and_calls(const tandem_allocator* allocator) {
   tandem_asset* cube = build_obj(assets_folder, "box_12.obj", allocator);
   tandem_scene* scene = scene_of(&cube, 1, allocator);
@@ -242,7 +249,8 @@ static void test_rows_and_calls(const tandem_allocator* allocator) {
   size_t count = 0;
   const tandem_object_pair* pairs = tandem_scene_pairs(scene, TANDEM_PAIRS, &count);
   CHECK(count == 17);
-  tandem_contact_options options = {.struct_size = sizeof options, .pairs = pairs + 1, .pair_count = count - 1};
+  tandem_contact_options options = {
+      .struct_size = sizeof options, .pairs = pairs + 1, .pair_count = count - 1};
   CHECK_STATUS(tandem_scene_find_contacts(scene, &options), TANDEM_OK);
   CHECK(contact_count(scene) == 964 - 52 && pair_count(scene, TANDEM_PAIRS) == 17);
   pairs = tandem_scene_pairs(scene, TANDEM_CONTACTS, &count);
@@ -280,7 +288,8 @@ static void test_rows_and_calls(const tandem_allocator* allocator) {
   tandem_counters counters;
   counters.struct_size = sizeof counters;
   CHECK_STATUS(tandem_scene_get_counters(scene, &counters), TANDEM_OK);
-  CHECK(counters.contacts.contacts == 964 && counters.verdicts.touching == 17 && counters.impacts.object_pairs == 0);
+  CHECK(counters.contacts.contacts == 964 && counters.verdicts.touching == 17 &&
+        counters.impacts.object_pairs == 0);
 
   const tandem_pose start = at(3, 0, 0).pose;
   const tandem_motion motion = {{-400, 0, 0}, {0, 0, 0}, {3, 0, 0}};

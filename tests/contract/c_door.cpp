@@ -11,7 +11,8 @@
 namespace tandem::test {
 namespace {
 
-static_assert(sizeof(tandem_object_pair) == sizeof(ObjectPair) && sizeof(tandem_motion) == sizeof(RigidMotion));
+static_assert(sizeof(tandem_object_pair) == sizeof(ObjectPair) &&
+              sizeof(tandem_motion) == sizeof(RigidMotion));
 
 /// The bytes that an allocator has handed out and not got back.
 struct Counted {
@@ -22,14 +23,14 @@ void* take(void* user, std::size_t bytes, std::size_t alignment) {
   auto* const counted = static_cast<Counted*>(user);
   counted->bytes += static_cast<std::int64_t>(bytes);
   ++counted->blocks;
-  return ::operator new(bytes, std::align_val_t{alignment}, std::nothrow);
+  return ::operator new (bytes, std::align_val_t{alignment}, std::nothrow);
 }
 
 void give_back(void* user, void* memory, std::size_t bytes, std::size_t alignment) {
   auto* const counted = static_cast<Counted*>(user);
   counted->bytes -= static_cast<std::int64_t>(bytes);
   --counted->blocks;
-  ::operator delete(memory, std::align_val_t{alignment});
+  ::operator delete (memory, std::align_val_t{alignment});
 }
 
 tandem_pose pose_of(const Pose& from) {
@@ -47,7 +48,8 @@ Options sized() {
 }
 
 template <typename Row>
-std::span<const Row> rows_of(const Row* (*get)(const tandem_scene*, std::size_t*), const tandem_scene* scene) {
+std::span<const Row> rows_of(const Row* (*get)(const tandem_scene*, std::size_t*),
+                             const tandem_scene* scene) {
   std::size_t count = 77;
   const Row* const rows = get(scene, &count);
   EXPECT_EQ(rows == nullptr, count == 0);
@@ -56,9 +58,7 @@ std::span<const Row> rows_of(const Row* (*get)(const tandem_scene*, std::size_t*
 
 class CDoor final : public Door {
  public:
-  explicit CDoor(SceneMaker* create) {
-    EXPECT_EQ(create(&allocator_, &scene_), TANDEM_OK);
-  }
+  explicit CDoor(SceneMaker* create) { EXPECT_EQ(create(&allocator_, &scene_), TANDEM_OK); }
   ~CDoor() override {
     tandem_scene_destroy(scene_);
     EXPECT_EQ(counted_.bytes, 0);
@@ -191,7 +191,9 @@ class CDoor final : public Door {
   }
 
  private:
-  Outcome told(tandem_status status) const { return {tandem_status_name(status), tandem_scene_where(scene_)}; }
+  Outcome told(tandem_status status) const {
+    return {tandem_status_name(status), tandem_scene_where(scene_)};
+  }
 
   Found shown(tandem_status status, std::uint32_t question) const {
     std::size_t count = 0;
@@ -204,9 +206,10 @@ class CDoor final : public Door {
     auto filter = sized<tandem_pair_filter>();
     tandem_excluded_pairs* excluded = nullptr;
     if (!bodies.excluded.empty()) {
-      EXPECT_EQ(tandem_excluded_pairs_create(reinterpret_cast<const tandem_object_pair*>(bodies.excluded.data()),
-                                             bodies.excluded.size(), &allocator_, &excluded),
-                TANDEM_OK);
+      EXPECT_EQ(
+          tandem_excluded_pairs_create(reinterpret_cast<const tandem_object_pair*>(bodies.excluded.data()),
+                                       bodies.excluded.size(), &allocator_, &excluded),
+          TANDEM_OK);
     }
     filter.motion = bodies.motion.empty() ? nullptr : bodies.motion.data();
     filter.group = bodies.group.empty() ? nullptr : bodies.group.data();

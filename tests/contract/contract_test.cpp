@@ -1,5 +1,5 @@
-// Holds every door of C++ and C to the table scenes.json. tests/python/contract_test.py and command_test.py hold
-// the Python package and bvhbench to the same table.
+// Holds every door of C++ and C to the table scenes.json. tests/python/contract_test.py and command_test.py
+// hold the Python package and bvhbench to the same table.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -98,8 +98,11 @@ std::vector<Number> column(const Json& filter, const char* name) {
 }
 
 Bodies bodies_of(const Json& list, const Json& filter) {
-  Bodies bodies = {instances_of(list), column<std::uint8_t>(filter, "motion"),
-                   column<std::uint32_t>(filter, "group"), column<std::uint32_t>(filter, "mask"), {}};
+  Bodies bodies = {instances_of(list),
+                   column<std::uint8_t>(filter, "motion"),
+                   column<std::uint32_t>(filter, "group"),
+                   column<std::uint32_t>(filter, "mask"),
+                   {}};
   if (filter.contains("excluded")) bodies.excluded = pairs_of(filter["excluded"]);
   return bodies;
 }
@@ -146,7 +149,8 @@ void expect_rows(const std::vector<Json>& rows, const Json& expected) {
     for (const auto& [field, values] : fields.items()) {
       ASSERT_EQ(rows.size(), values.size()) << field;
       for (std::size_t i = 0; i < rows.size(); ++i)
-        EXPECT_PRED2(kind[0] == 'c' ? is_equal : is_within, rows[i].at(field), values[i]) << field << " of row " << i;
+        EXPECT_PRED2(kind[0] == 'c' ? is_equal : is_within, rows[i].at(field), values[i])
+            << field << " of row " << i;
     }
   }
 }
@@ -172,7 +176,8 @@ void expect_found(Found found, const Json& expected) {
   expect_rows(found.rows, expected);
   if (expected.contains("points")) expect_rows(found.points, expected["points"]);
   const Json counters = expected.value("counters", Json::object());
-  for (const auto& [counter, count] : counters.items()) EXPECT_EQ(found.counters.at(counter), count) << counter;
+  for (const auto& [counter, count] : counters.items())
+    EXPECT_EQ(found.counters.at(counter), count) << counter;
   if (expected.contains("hash")) {
     EXPECT_EQ(hash_of(found), expected["hash"]);
   }
@@ -196,7 +201,8 @@ void take_step(Door& door, const Json& step) {
     door.set_threads(step["threads"]);
   } else if (step.contains("standing")) {
     Json assets = Json::array();
-    for (const std::uint32_t asset : door.assets_of_bodies()) assets.push_back(asset == kNoIndex ? Json() : Json(asset));
+    for (const std::uint32_t asset : door.assets_of_bodies())
+      assets.push_back(asset == kNoIndex ? Json() : Json(asset));
     EXPECT_EQ(assets, step["standing"]);
   } else {
     expect_found(door.ask(step["ask"], step), expected);
@@ -205,7 +211,9 @@ void take_step(Door& door, const Json& step) {
 
 using Parameter = std::tuple<NamedDoor, Json>;
 
-void PrintTo(const NamedDoor& door, std::ostream* out) { *out << door.name; }
+void PrintTo(const NamedDoor& door, std::ostream* out) {
+  *out << door.name;
+}
 
 class Contract : public testing::TestWithParam<Parameter> {};
 

@@ -85,7 +85,10 @@ class CppDoor final : public Door {
 
   template <typename Query>
   Found shown(const Query& query, Status status) const {
-    return {told(status), {query.pairs().begin(), query.pairs().end()}, objects_of(query.rows()), {},
+    return {told(status),
+            {query.pairs().begin(), query.pairs().end()},
+            objects_of(query.rows()),
+            {},
             object_of(query.counters())};
   }
 

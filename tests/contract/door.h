@@ -19,7 +19,7 @@ using Json = nlohmann::json;
 /// Bodies of the table, ready for any door.
 struct Bodies {
   std::vector<Instance> instances;
-  std::vector<std::uint8_t> motion;        ///< or empty, as the next three
+  std::vector<std::uint8_t> motion;  ///< or empty, as the next three
   std::vector<std::uint32_t> group, mask;
   std::vector<ObjectPair> excluded;
 };
@@ -107,21 +107,22 @@ Json plain(const Value& value) {
 template <typename Row>
 Json object_of(const Row& row) {
   Json object = Json::object();
+// clang-format off
 #define TANDEM_FIELD(field) \
   if constexpr (requires { row.field; }) object[#field] = plain(row.field);
-  TANDEM_FIELD(pair) TANDEM_FIELD(triangle_a) TANDEM_FIELD(triangle_b) TANDEM_FIELD(face_a) TANDEM_FIELD(face_b)
-  TANDEM_FIELD(normal) TANDEM_FIELD(area_vector) TANDEM_FIELD(centre) TANDEM_FIELD(depth)
-  TANDEM_FIELD(first_point) TANDEM_FIELD(point_count) TANDEM_FIELD(flags) TANDEM_FIELD(position)
-  TANDEM_FIELD(in_a) TANDEM_FIELD(in_b) TANDEM_FIELD(id) TANDEM_FIELD(previous) TANDEM_FIELD(manifold)
-  TANDEM_FIELD(inner) TANDEM_FIELD(component) TANDEM_FIELD(lower) TANDEM_FIELD(upper) TANDEM_FIELD(point_a)
-  TANDEM_FIELD(point_b) TANDEM_FIELD(t_safe) TANDEM_FIELD(gap) TANDEM_FIELD(status) TANDEM_FIELD(verdict)
-  TANDEM_FIELD(level_a) TANDEM_FIELD(level_b)
-  TANDEM_FIELD(object_pairs) TANDEM_FIELD(contacts) TANDEM_FIELD(manifolds) TANDEM_FIELD(points)
-  TANDEM_FIELD(open_curves) TANDEM_FIELD(ambiguous_touches) TANDEM_FIELD(inside) TANDEM_FIELD(outer_open)
-  TANDEM_FIELD(touching) TANDEM_FIELD(at_start) TANDEM_FIELD(found) TANDEM_FIELD(apart)
-  TANDEM_FIELD(within_tolerance)
+  TANDEM_FIELD(pair) TANDEM_FIELD(triangle_a) TANDEM_FIELD(triangle_b) TANDEM_FIELD(face_a)
+  TANDEM_FIELD(face_b) TANDEM_FIELD(normal) TANDEM_FIELD(area_vector) TANDEM_FIELD(centre)
+  TANDEM_FIELD(depth) TANDEM_FIELD(first_point) TANDEM_FIELD(point_count) TANDEM_FIELD(flags)
+  TANDEM_FIELD(position) TANDEM_FIELD(in_a) TANDEM_FIELD(in_b) TANDEM_FIELD(id) TANDEM_FIELD(previous)
+  TANDEM_FIELD(manifold) TANDEM_FIELD(inner) TANDEM_FIELD(component) TANDEM_FIELD(lower) TANDEM_FIELD(upper)
+  TANDEM_FIELD(point_a) TANDEM_FIELD(point_b) TANDEM_FIELD(t_safe) TANDEM_FIELD(gap) TANDEM_FIELD(status)
+  TANDEM_FIELD(verdict) TANDEM_FIELD(level_a) TANDEM_FIELD(level_b) TANDEM_FIELD(object_pairs)
+  TANDEM_FIELD(contacts) TANDEM_FIELD(manifolds) TANDEM_FIELD(points) TANDEM_FIELD(open_curves)
+  TANDEM_FIELD(ambiguous_touches) TANDEM_FIELD(inside) TANDEM_FIELD(outer_open) TANDEM_FIELD(touching)
+  TANDEM_FIELD(at_start) TANDEM_FIELD(found) TANDEM_FIELD(apart) TANDEM_FIELD(within_tolerance)
 #undef TANDEM_FIELD
-  return object;
+      // clang-format on
+      return object;
 }
 
 template <typename Rows>

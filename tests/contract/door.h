@@ -120,9 +120,9 @@ Json object_of(const Row& row) {
   TANDEM_FIELD(contacts) TANDEM_FIELD(manifolds) TANDEM_FIELD(points) TANDEM_FIELD(open_curves)
   TANDEM_FIELD(ambiguous_touches) TANDEM_FIELD(inside) TANDEM_FIELD(outer_open) TANDEM_FIELD(touching)
   TANDEM_FIELD(at_start) TANDEM_FIELD(found) TANDEM_FIELD(apart) TANDEM_FIELD(within_tolerance)
+  // clang-format on
 #undef TANDEM_FIELD
-      // clang-format on
-      return object;
+                                                      return object;
 }
 
 template <typename Rows>

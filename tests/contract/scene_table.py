@@ -57,6 +57,19 @@ def option(value):
     return float(value) if value in ("nan", "inf", "-inf") else value
 
 
+def hash_of(pairs, contacts):
+    """XXH64 of object pairs and of the faces of contacts, sorted, by the rule of docs/scenes.md; within a body the lower face comes first."""
+    import xxhash
+
+    face_a, face_b = contacts["face_a"].copy(), contacts["face_b"].copy()
+    of = pairs[contacts["pair"]]
+    swapped = (of["a"] == of["b"]) & (face_b < face_a)
+    face_a[swapped], face_b[swapped] = face_b[swapped], face_a[swapped]
+    order = np.lexsort((face_b, face_a, contacts["pair"]))
+    words = [pairs.view("<u4"), contacts["pair"][order], face_a[order], face_b[order]]
+    return xxhash.xxh64(np.concatenate(words).astype("<u4").tobytes()).hexdigest()
+
+
 def expect_rows(columns, count, expected):
     """Compares `count` rows, whose columns are lists, with the "rows", "least_rows", "columns" and "ranges" of an expectation. Columns that the door does not
     have are returned."""

@@ -1,4 +1,4 @@
-"""Contacts, manifolds, distances, impacts of small scenes whose answers are known."""
+"""How the package takes bodies and gives arrays. What the answers are is in contract_test.py."""
 import gc
 
 import numpy as np

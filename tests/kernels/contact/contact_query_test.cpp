@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -63,33 +62,6 @@ TEST_F(Query, IsTheSameForGivenPairsAsForFoundOnes) {
     ask(scene, pairs);
     EXPECT_EQ(contacts_of(query_), found);
     EXPECT_EQ(query_.counters(), counters);
-  }
-}
-
-TEST_F(Query, DoesNotDependOnTheOrderOfInstances) {
-  for (std::uint64_t seed = 0; seed < 10; ++seed) {
-    const BodyScene scene = crowd(seed, 12);
-    ask(scene);
-    const FaceContacts expected = found_contacts(query_);
-    std::vector<std::uint32_t> order(scene.instances.size());
-    std::iota(order.begin(), order.end(), 0u);
-    RandomPoses random(seed);
-    std::shuffle(order.begin(), order.end(), random.engine());
-    std::vector<Instance> shuffled;
-    for (const std::uint32_t i : order) shuffled.push_back(scene.instances[i]);
-    ASSERT_EQ(query_.find(shuffled), Status::kOk);
-    FaceContacts found;
-    for (auto contact : found_contacts(query_)) {
-      contact.a = order[contact.a];
-      contact.b = order[contact.b];
-      if (contact.a > contact.b) {
-        std::swap(contact.a, contact.b);
-        std::swap(contact.face_a, contact.face_b);
-      }
-      found.push_back(contact);
-    }
-    std::sort(found.begin(), found.end());
-    EXPECT_EQ(found, expected);
   }
 }
 

@@ -9,7 +9,6 @@
 #include <numbers>
 
 #include "moving_scenes.h"
-#include "tandem/kernels/excluded_pairs.h"
 
 namespace tandem {
 namespace {

@@ -68,20 +68,6 @@ class Manifolds(BenchTest):
         self.assertTrue((np.diff(table["manifolds/pair"].astype(int)) >= 0).all())
         self.assertTrue((table["points/id"] != 0).all())
 
-    def test_manifolds_do_not_change_with_threads_and_leave_the_contacts_as_they_are(self):
-        self.make("pile", "--count", "60")
-        self.query("--out", self.contacts)
-        plain, tables = table_of(self.contacts), []
-        for threads in ("1", "2", "7"):
-            self.query("--manifolds", "--threads", threads, "--out", self.contacts)
-            tables.append({name: column.tolist() for name, column in table_of(self.contacts).items()})
-        self.assertEqual(tables[0], tables[1])
-        self.assertEqual(tables[0], tables[2])
-        for name, column in plain.items():
-            self.assertEqual(tables[0][name], column.tolist())
-            self.assertNotIn("manifolds", name)
-
-
 class Contained(BenchTest):
     def contained(self):
         """Reports of a query with --contained, and the rows of its contacts file by name."""
@@ -92,19 +78,6 @@ class Contained(BenchTest):
         self.assertEqual((report["contained_rows"], report["contained"]), (len(rows["pair"]), rows["inside"].sum()))
         self.assertEqual(len(report["contained_seconds"]["all"]), 2)
         return report, {name: column.tolist() for name, column in rows.items()}
-
-    def write_nest(self, inner, outer):
-        """A cube of inner's mesh, within one of outer's that is ten times as large."""
-        asset = [self.mesh_of("small", inner), self.mesh_of("large", re.sub(r"(?m)^(v .*)$", self.enlarged, outer))]
-        self.write_scene(asset=(0, 1), translation=((0, 0, 0), (-4, -4, -4)), assets=[f"../in/{mesh.name}" for mesh in asset])
-
-    @staticmethod
-    def enlarged(line):
-        return "v " + " ".join(str(10 * float(word)) for word in line.group(1).split()[1:])
-
-    def test_a_cube_within_an_open_one_is_said_to_be(self):
-        self.write_nest(CUBE_OBJ, CUBE_OBJ.rsplit("f ", 1)[0])
-        self.assertEqual(self.contained()[1], {"pair": [0], "inner": [0], "component": [0], "inside": [0], "open": [1]})
 
     def test_what_touches_is_not_contained(self):
         self.make("pile", "--count", "50")
@@ -160,22 +133,6 @@ class Distance(BenchTest):
         self.assertEqual(rows["upper"][1], np.inf)
         self.assertGreaterEqual(rows["lower"][1], 1)
         self.assertEqual(rows["face_a"][1], 2**32 - 1)
-
-    def test_threads_and_repeats_change_no_bytes(self):
-        self.make("pile", "--count", "40")
-        expected = self.distance("--reach", "1", "--threads", "1")
-        for arguments in (["--threads", "3"], ["--repeat", "3"]):
-            report, rows, _ = self.distance("--reach", "1", *arguments)
-            self.assertEqual(report["hash"], expected[0]["hash"])
-            for name, column in rows.items():
-                self.assertEqual(column.tobytes(), expected[1][name].tobytes(), name)
-
-    def test_a_wider_tolerance_is_kept(self):
-        self.make("pile", "--count", "40")
-        _, narrow, _ = self.distance()
-        _, wide, _ = self.distance("--tolerance", "0.2")
-        self.assertTrue((wide["upper"] - wide["lower"] <= 0.2 * wide["upper"]).all())
-        self.assertTrue((wide["lower"] <= narrow["upper"]).all() and (wide["upper"] >= narrow["lower"]).all())
 
     def test_people_are_told_too(self):
         self.row_of_cubes(0, 1.25)
@@ -395,13 +352,6 @@ class Tolerance(ToleranceTest):
         self.assertGreater(counted[0][APART], 10)
         self.assertGreater(counted[0][TOUCHING], 10)
         self.assertGreater(counted[-1][WITHIN], counted[1][WITHIN])
-
-    def test_threads_change_nothing(self):
-        path, errors = self.with_levels(SOURCE_DIR / "assets" / "cow.obj")
-        self.write_near_poses(path, 40, 0.02)
-        one, two = (self.decide(5 * errors[2], "--threads", threads) for threads in "12")
-        self.assertEqual(one[0]["hash"], two[0]["hash"])
-        self.assertTrue(all((one[1][name] == two[1][name]).all() for name in one[1]))
 
     def test_a_file_of_one_level_is_decided_exactly(self):
         self.write_scene(translation=((0, 0, 0), (1, 0, 0)))

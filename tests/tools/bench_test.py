@@ -192,21 +192,6 @@ class Query(BenchTest):
             self.assert_fails(self.bench("query", self.scene, "--out", path), USAGE, "would be overwritten")
             self.assertEqual(path.read_bytes(), before)
 
-    def test_threads_and_repeats_change_nothing_but_time(self):
-        self.make("pile", "--count", "60")
-        hashes = {self.query("--threads", str(threads), "--repeat", "2")["hash"] for threads in (1, 2, 7)}
-        self.assertEqual(len(hashes), 1)
-
-    def test_self_adds_each_instance_with_itself(self):
-        self.write_scene()
-        report = self.query("--self", "--out", self.contacts)
-        table = table_of(self.contacts)
-        self.assertTrue(report["self_pairs"])
-        self.assertEqual(table["pairs"].tolist(), [[0, 0], [0, 1], [1, 1]])
-        itself = table["contacts/pair"] != 1
-        self.assertTrue(itself.any())
-        self.assertTrue((table["contacts/face_a"][itself] <= table["contacts/face_b"][itself]).all())
-
     def test_the_summary_is_for_people(self):
         self.write_scene()
         text = self.passes("query", self.scene)

@@ -99,30 +99,11 @@ static inline tandem_asset* build_obj(const char* folder, const char* name,
   return asset;
 }
 
-/// With TANDEM_ON_GPU a program's scenes are on a GPU.
-#ifdef TANDEM_ON_GPU
-#include <tandem/tandem_cuda.h>
-#define CREATE_SCENE tandem_gpu_scene_create
-#else
-#define CREATE_SCENE tandem_scene_create
-#endif
-
-enum { NO_DEVICE = 77 };
-
-/// Whether scenes can be made here.
-static inline int has_device(void) {
-  tandem_scene* scene = NULL;
-  const tandem_status status = CREATE_SCENE(NULL, &scene);
-  const int is_there = status == TANDEM_OK && tandem_scene_set_assets(scene, NULL, 0) == TANDEM_OK;
-  tandem_scene_destroy(scene);
-  return is_there;
-}
-
 /// A scene of these assets.
 static inline tandem_scene* scene_of(tandem_asset* const* assets, size_t count,
                                      const tandem_allocator* allocator) {
   tandem_scene* scene = NULL;
-  CHECK_STATUS(CREATE_SCENE(allocator, &scene), TANDEM_OK);
+  CHECK_STATUS(tandem_scene_create(allocator, &scene), TANDEM_OK);
   CHECK_STATUS(tandem_scene_set_assets(scene, assets, count), TANDEM_OK);
   return scene;
 }

@@ -18,7 +18,8 @@ static void test_an_upload(tandem_asset* cube) {
   options.contents = 3;
   CHECK_STATUS(tandem_gpu_assets_upload(&cube, 1, &options, NULL, NULL, &assets, NULL), TANDEM_BAD_OPTION);
   options.struct_size = 3;
-  CHECK_STATUS(tandem_gpu_assets_upload(&cube, 1, &options, NULL, NULL, &assets, NULL), TANDEM_BAD_STRUCT_SIZE);
+  CHECK_STATUS(tandem_gpu_assets_upload(&cube, 1, &options, NULL, NULL, &assets, NULL),
+               TANDEM_BAD_STRUCT_SIZE);
   tandem_allocator none = {sizeof none, 0, NULL, refuse, take_back};
   CHECK_STATUS(tandem_gpu_assets_upload(&cube, 1, NULL, NULL, &none, &assets, NULL), TANDEM_OUT_OF_MEMORY);
   CHECK(tandem_cuda_error() == 0);
@@ -41,29 +42,29 @@ static const tandem_gpu_instances bodies = {NULL, NULL, 0, 0};
 static const tandem_gpu_pairs pairs = {NULL, NULL, 0, 0};
 
 // Of a kind of query: without a handle, without an allocator that gives, without assets.
-#define TEST_HANDLE(kind, use, room, result)                                               \
-  do {                                                                                     \
-    kind* handle = NULL;                                                                   \
-    kind##_capacity_t capacity;                                                            \
-    tandem_allocator half = {sizeof half, 0, NULL, refuse, NULL};                          \
-    tandem_allocator none = {sizeof none, 0, NULL, refuse, take_back};                     \
-    memset(&capacity, 0, sizeof capacity);                                                 \
-    CHECK_STATUS(kind##_create(NULL, NULL), TANDEM_NULL_ARGUMENT);                         \
-    CHECK_STATUS(kind##_create(&half, &handle), TANDEM_NULL_ARGUMENT);                     \
-    CHECK_STATUS(kind##_create(&none, &handle), TANDEM_OUT_OF_MEMORY);                     \
-    CHECK(handle == NULL && result == NULL);                                               \
-    CHECK_STATUS(use, TANDEM_NULL_ARGUMENT);                                               \
-    CHECK_STATUS(room, TANDEM_NULL_ARGUMENT);                                              \
-    CHECK_STATUS(kind##_get_report(handle, NULL), TANDEM_NULL_ARGUMENT);                   \
-    CHECK(kind##_device_report(handle) == NULL && kind##_bytes(handle) == 0);              \
-    CHECK_STATUS(kind##_create(NULL, &handle), TANDEM_OK);                                 \
-    CHECK(handle != NULL && result == NULL);                                               \
-    CHECK_STATUS(use, TANDEM_ASSETS_MISSING);                                              \
-    CHECK_STATUS(room, TANDEM_ASSETS_MISSING);                                             \
-    CHECK_STATUS(kind##_get_report(handle, NULL), TANDEM_ASSETS_MISSING);                  \
-    CHECK(kind##_device_report(handle) == NULL && kind##_bytes(handle) == 0);              \
-    kind##_destroy(handle);                                                                \
-    kind##_destroy(NULL);                                                                  \
+#define TEST_HANDLE(kind, use, room, result)                                  \
+  do {                                                                        \
+    kind* handle = NULL;                                                      \
+    kind##_capacity_t capacity;                                               \
+    tandem_allocator half = {sizeof half, 0, NULL, refuse, NULL};             \
+    tandem_allocator none = {sizeof none, 0, NULL, refuse, take_back};        \
+    memset(&capacity, 0, sizeof capacity);                                    \
+    CHECK_STATUS(kind##_create(NULL, NULL), TANDEM_NULL_ARGUMENT);            \
+    CHECK_STATUS(kind##_create(&half, &handle), TANDEM_NULL_ARGUMENT);        \
+    CHECK_STATUS(kind##_create(&none, &handle), TANDEM_OUT_OF_MEMORY);        \
+    CHECK(handle == NULL && result == NULL);                                  \
+    CHECK_STATUS(use, TANDEM_NULL_ARGUMENT);                                  \
+    CHECK_STATUS(room, TANDEM_NULL_ARGUMENT);                                 \
+    CHECK_STATUS(kind##_get_report(handle, NULL), TANDEM_NULL_ARGUMENT);      \
+    CHECK(kind##_device_report(handle) == NULL && kind##_bytes(handle) == 0); \
+    CHECK_STATUS(kind##_create(NULL, &handle), TANDEM_OK);                    \
+    CHECK(handle != NULL && result == NULL);                                  \
+    CHECK_STATUS(use, TANDEM_ASSETS_MISSING);                                 \
+    CHECK_STATUS(room, TANDEM_ASSETS_MISSING);                                \
+    CHECK_STATUS(kind##_get_report(handle, NULL), TANDEM_ASSETS_MISSING);     \
+    CHECK(kind##_device_report(handle) == NULL && kind##_bytes(handle) == 0); \
+    kind##_destroy(handle);                                                   \
+    kind##_destroy(NULL);                                                     \
   } while (0)
 
 typedef tandem_gpu_broad_phase_capacity tandem_gpu_broad_phase_capacity_t;
@@ -78,12 +79,14 @@ static void test_handles(void) {
   tandem_gpu_contact_query* query = NULL;
   CHECK_STATUS(tandem_gpu_contact_query_create(NULL, &query), TANDEM_OK);
   TEST_HANDLE(tandem_gpu_broad_phase, tandem_gpu_broad_phase_find(handle, &bodies, NULL, NULL),
-              tandem_gpu_broad_phase_reserve(handle, &capacity, NULL), tandem_gpu_broad_phase_pairs(handle).pairs);
+              tandem_gpu_broad_phase_reserve(handle, &capacity, NULL),
+              tandem_gpu_broad_phase_pairs(handle).pairs);
   TEST_HANDLE(tandem_gpu_broad_phase, tandem_gpu_broad_phase_enqueue(handle, &bodies, NULL, NULL),
               tandem_gpu_broad_phase_keep_fixed(handle, &bodies, NULL, NULL),
               tandem_gpu_broad_phase_pairs(handle).count);
   TEST_HANDLE(tandem_gpu_contact_query, tandem_gpu_contact_query_find(handle, &bodies, &pairs, NULL, NULL),
-              tandem_gpu_contact_query_reserve(handle, &capacity, NULL), tandem_gpu_contact_query_contacts(handle));
+              tandem_gpu_contact_query_reserve(handle, &capacity, NULL),
+              tandem_gpu_contact_query_contacts(handle));
   TEST_HANDLE(tandem_gpu_contact_query, tandem_gpu_contact_query_enqueue(handle, &bodies, &pairs, NULL, NULL),
               tandem_gpu_contact_query_reserve(handle, NULL, NULL),
               tandem_gpu_contact_query_groups(handle).first_contact);
@@ -92,15 +95,19 @@ static void test_handles(void) {
               tandem_gpu_manifolds_reserve(handle, &capacity), tandem_gpu_manifolds_manifolds(handle));
   TEST_HANDLE(tandem_gpu_manifolds, tandem_gpu_manifolds_enqueue(handle, &bodies, &pairs, query, NULL, NULL),
               tandem_gpu_manifolds_reserve(handle, &capacity), tandem_gpu_manifolds_points(handle));
-  TEST_HANDLE(tandem_gpu_containment_query, tandem_gpu_containment_query_find(handle, &bodies, &pairs, query, NULL),
+  TEST_HANDLE(tandem_gpu_containment_query,
+              tandem_gpu_containment_query_find(handle, &bodies, &pairs, query, NULL),
               tandem_gpu_containment_query_reserve(handle, &capacity),
               tandem_gpu_containment_query_contained(handle));
   TEST_HANDLE(tandem_gpu_distance_query, tandem_gpu_distance_query_find(handle, &bodies, &pairs, NULL, NULL),
-              tandem_gpu_distance_query_reserve(handle, &capacity), tandem_gpu_distance_query_distances(handle));
-  TEST_HANDLE(tandem_gpu_impact_query, tandem_gpu_impact_query_find(handle, &bodies, NULL, 1, NULL, NULL, NULL),
-              tandem_gpu_impact_query_reserve(handle, &capacity, NULL), tandem_gpu_impact_query_impacts(handle));
+              tandem_gpu_distance_query_reserve(handle, &capacity),
+              tandem_gpu_distance_query_distances(handle));
+  TEST_HANDLE(
+      tandem_gpu_impact_query, tandem_gpu_impact_query_find(handle, &bodies, NULL, 1, NULL, NULL, NULL),
+      tandem_gpu_impact_query_reserve(handle, &capacity, NULL), tandem_gpu_impact_query_impacts(handle));
   TEST_HANDLE(tandem_gpu_tolerance_query, tandem_gpu_tolerance_query_find(handle, &bodies, &pairs, 0, NULL),
-              tandem_gpu_tolerance_query_reserve(handle, &capacity), tandem_gpu_tolerance_query_verdicts(handle));
+              tandem_gpu_tolerance_query_reserve(handle, &capacity),
+              tandem_gpu_tolerance_query_verdicts(handle));
   CHECK_STATUS(tandem_gpu_contact_query_set_assets(query, NULL, NULL), TANDEM_NULL_ARGUMENT);
   tandem_gpu_contact_query_destroy(query);
 }

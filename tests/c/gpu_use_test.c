@@ -1,5 +1,5 @@
-// Does all that the C interface does on a GPU and compares it with what it does on the CPU, in scenes of bodies that
-// fall into one another. C99. Usage: gpu_use_test ASSETS_FOLDER   Exit code 77: there is no GPU.
+// Does all that the C interface does on a GPU and compares it with what it does on the CPU, in scenes of
+// bodies that fall into one another. C99. Usage: gpu_use_test ASSETS_FOLDER   Exit code 77: there is no GPU.
 #include <math.h>
 
 #include "gpu_c_test.h"
@@ -161,7 +161,8 @@ static void test_steps(void) {
     CHECK(same(pairs.pairs, expected_pairs, pair_count * sizeof *expected_pairs));
     CHECK(same(tandem_gpu_broad_phase_device_report(queries.near), &near, sizeof near));
 
-    CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, &scene.instances, &pairs, &grouped, stream), TANDEM_OK);
+    CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, &scene.instances, &pairs, &grouped, stream),
+                 TANDEM_OK);
     CHECK(same_contacts(queries.contacts, expected));
     tandem_gpu_query_report report;
     CHECK_STATUS(tandem_gpu_contact_query_get_report(queries.contacts, &report), TANDEM_OK);
@@ -169,11 +170,13 @@ static void test_steps(void) {
     CHECK(report.counters.object_pairs == pair_count && report.counters.contacts == report.contacts);
     const tandem_gpu_contact_groups groups = tandem_gpu_contact_query_groups(queries.contacts);
     tandem_gpu_group_counts* counts = (tandem_gpu_group_counts*)from_gpu(groups.counts, sizeof *counts);
-    CHECK(counts->pairs == pair_count && counts->contacts == report.contacts && counts->few + counts->many > 0);
+    CHECK(counts->pairs == pair_count && counts->contacts == report.contacts &&
+          counts->few + counts->many > 0);
     free(counts);
 
     CHECK_STATUS(tandem_scene_find_manifolds(expected, NULL), TANDEM_OK);
-    CHECK_STATUS(tandem_gpu_manifolds_find(queries.manifolds, &scene.instances, &pairs, queries.contacts, NULL, stream),
+    CHECK_STATUS(tandem_gpu_manifolds_find(queries.manifolds, &scene.instances, &pairs, queries.contacts,
+                                           NULL, stream),
                  TANDEM_OK);
     tandem_gpu_manifold_report made;
     CHECK_STATUS(tandem_gpu_manifolds_get_report(queries.manifolds, &made), TANDEM_OK);
@@ -187,16 +190,18 @@ static void test_steps(void) {
     CHECK((followed > 0) == (step > 0));
 
     CHECK_STATUS(tandem_scene_find_contained(expected), TANDEM_OK);
-    CHECK_STATUS(
-        tandem_gpu_containment_query_find(queries.contained, &scene.instances, &pairs, queries.contacts, stream),
-        TANDEM_OK);
+    CHECK_STATUS(tandem_gpu_containment_query_find(queries.contained, &scene.instances, &pairs,
+                                                   queries.contacts, stream),
+                 TANDEM_OK);
     tandem_gpu_containment_report inside;
     CHECK_STATUS(tandem_gpu_containment_query_get_report(queries.contained, &inside), TANDEM_OK);
     const tandem_containment* contained = tandem_scene_contained(expected, &count);
     CHECK(inside.complete == 1 && inside.contained == count && count > 0);
-    CHECK(same(tandem_gpu_containment_query_contained(queries.contained), contained, count * sizeof *contained));
+    CHECK(same(tandem_gpu_containment_query_contained(queries.contained), contained,
+               count * sizeof *contained));
   }
-  CHECK(tandem_gpu_contact_query_bytes(queries.contacts) > 0 && tandem_gpu_manifolds_bytes(queries.manifolds) > 0);
+  CHECK(tandem_gpu_contact_query_bytes(queries.contacts) > 0 &&
+        tandem_gpu_manifolds_bytes(queries.manifolds) > 0);
   tandem_scene_destroy(expected);
   destroy(&queries);
   free_gpu_scene(&scene);
@@ -210,8 +215,11 @@ static void test_options(void) {
   Queries queries = make_queries();
   tandem_scene* expected = cpu_scene(bodies);
   for (int variant = 0; variant < 4; ++variant) {
-    tandem_contact_options cpu = {.struct_size = sizeof cpu, .mode = variant == 1 ? TANDEM_FAST : variant == 2 ?
-                                  TANDEM_BOXES : TANDEM_EXACT, .within = variant == 3 ? 0.05 : 0};
+    tandem_contact_options cpu = {.struct_size = sizeof cpu,
+                                  .mode = variant == 1   ? TANDEM_FAST
+                                          : variant == 2 ? TANDEM_BOXES
+                                                         : TANDEM_EXACT,
+                                  .within = variant == 3 ? 0.05 : 0};
     tandem_gpu_broad_phase_options near = sorted_pairs();
     near.within = cpu.within;
     tandem_gpu_query_options options = grouped_contacts();
@@ -222,18 +230,20 @@ static void test_options(void) {
     CHECK_STATUS(tandem_scene_find_contacts(expected, &cpu), TANDEM_OK);
     CHECK_STATUS(tandem_gpu_broad_phase_find(queries.near, &scene.instances, &near, stream), TANDEM_OK);
     const tandem_gpu_pairs pairs = tandem_gpu_broad_phase_pairs(queries.near);
-    CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, &scene.instances, &pairs, &options, stream), TANDEM_OK);
+    CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, &scene.instances, &pairs, &options, stream),
+                 TANDEM_OK);
     CHECK(same_contacts(queries.contacts, expected));
     if (options.sorted) {
       size_t count = 0;
       (void)tandem_scene_contacts(expected, &count);
-      tandem_contact* found =
-          (tandem_contact*)from_gpu(tandem_gpu_contact_query_contacts(queries.contacts), count * sizeof *found);
+      tandem_contact* found = (tandem_contact*)from_gpu(tandem_gpu_contact_query_contacts(queries.contacts),
+                                                        count * sizeof *found);
       for (size_t i = 1; i < count; ++i) CHECK(compare_contacts(&found[i - 1], &found[i]) < 0);
       free(found);
     }
     // Nothing follows from contacts that are not grouped.
-    CHECK_STATUS(tandem_gpu_manifolds_find(queries.manifolds, &scene.instances, &pairs, queries.contacts, NULL, stream),
+    CHECK_STATUS(tandem_gpu_manifolds_find(queries.manifolds, &scene.instances, &pairs, queries.contacts,
+                                           NULL, stream),
                  TANDEM_CONTACTS_MISSING);
   }
   tandem_scene_destroy(expected);
@@ -265,7 +275,8 @@ static void test_filters(void) {
   CHECK_STATUS(tandem_gpu_excluded_pairs_create(all, 20, stream, NULL, &excluded), TANDEM_OK);
   tandem_pair_filter cpu_filter = {sizeof cpu_filter, 0, kBodies, motion, group, mask, cpu_excluded};
   uint8_t* gpu_motion = (uint8_t*)to_gpu(motion, sizeof motion);
-  uint32_t *gpu_group = (uint32_t*)to_gpu(group, sizeof group), *gpu_mask = (uint32_t*)to_gpu(mask, sizeof mask);
+  uint32_t *gpu_group = (uint32_t*)to_gpu(group, sizeof group),
+           *gpu_mask = (uint32_t*)to_gpu(mask, sizeof mask);
   tandem_gpu_pair_filter filter = {sizeof filter, 0, gpu_motion, gpu_group, gpu_mask, excluded};
   tandem_gpu_broad_phase_options near = sorted_pairs();
   near.filter = &filter;
@@ -274,7 +285,8 @@ static void test_filters(void) {
   const tandem_object_pair* pairs = tandem_scene_pairs(expected, TANDEM_PAIRS, &count);
   for (int kept = 0; kept < 2; ++kept) {
     if (kept)
-      CHECK_STATUS(tandem_gpu_broad_phase_keep_fixed(queries.near, &scene.instances, motion, stream), TANDEM_OK);
+      CHECK_STATUS(tandem_gpu_broad_phase_keep_fixed(queries.near, &scene.instances, motion, stream),
+                   TANDEM_OK);
     CHECK_STATUS(tandem_gpu_broad_phase_find(queries.near, &scene.instances, &near, stream), TANDEM_OK);
     tandem_gpu_broad_phase_report report;
     CHECK_STATUS(tandem_gpu_broad_phase_get_report(queries.near, &report), TANDEM_OK);
@@ -291,8 +303,8 @@ static void test_filters(void) {
   free_gpu_scene(&scene);
 }
 
-// A step that was captured once finds the contacts of poses that are written later. Pairs are the caller's, and their
-// number is in CPU memory.
+// A step that was captured once finds the contacts of poses that are written later. Pairs are the caller's,
+// and their number is in CPU memory.
 static void test_a_graph(void) {
   tandem_instance bodies[kBodies];
   tandem_object_pair all[kBodies * (kBodies - 1) / 2];
@@ -314,7 +326,8 @@ static void test_a_graph(void) {
   cudaGraphExec_t replay = NULL;
   CHECK_STATUS(tandem_gpu_contact_query_reserve(queries.contacts, &room, &grouped), TANDEM_OK);
   cuda_must(cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal));
-  CHECK_STATUS(tandem_gpu_contact_query_enqueue(queries.contacts, &scene.instances, &pairs, &grouped, stream), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_contact_query_enqueue(queries.contacts, &scene.instances, &pairs, &grouped, stream),
+               TANDEM_OK);
   cuda_must(cudaStreamEndCapture(stream, &graph));
   cuda_must(cudaGraphInstantiate(&replay, graph, 0));
   for (int step = 0; step < kSteps; ++step) {
@@ -360,9 +373,10 @@ static void test_distances_and_impacts(void) {
   CHECK_STATUS(tandem_gpu_distance_query_set_assets(query, gpu_assets, stream), TANDEM_OK);
   for (int again = 0; again < 2; ++again) {
     size_t touching = 0, apart = 0;
-    tandem_gpu_distance_options options = {.struct_size = sizeof options, .former = again ?
-                                           tandem_gpu_distance_query_distances(query) : NULL};
-    CHECK_STATUS(tandem_gpu_distance_query_find(query, &scene.instances, &given, &options, stream), TANDEM_OK);
+    tandem_gpu_distance_options options = {
+        .struct_size = sizeof options, .former = again ? tandem_gpu_distance_query_distances(query) : NULL};
+    CHECK_STATUS(tandem_gpu_distance_query_find(query, &scene.instances, &given, &options, stream),
+                 TANDEM_OK);
     tandem_gpu_distance_report report;
     CHECK_STATUS(tandem_gpu_distance_query_get_report(query, &report), TANDEM_OK);
     CHECK(report.complete == 1 && report.counters.object_pairs == pair_count && count == pair_count);
@@ -395,7 +409,8 @@ static void test_distances_and_impacts(void) {
   CHECK_STATUS(tandem_gpu_impact_query_create(NULL, &impact_query), TANDEM_OK);
   CHECK_STATUS(tandem_gpu_impact_query_set_assets(impact_query, gpu_assets, stream), TANDEM_OK);
   CHECK_STATUS(
-      tandem_gpu_impact_query_find(impact_query, &scene.instances, gpu_motion, 0.1, NULL, &sorted, stream), TANDEM_OK);
+      tandem_gpu_impact_query_find(impact_query, &scene.instances, gpu_motion, 0.1, NULL, &sorted, stream),
+      TANDEM_OK);
   tandem_gpu_impact_report impact_report;
   CHECK_STATUS(tandem_gpu_impact_query_get_report(impact_query, &impact_report), TANDEM_OK);
   CHECK(impact_report.complete == 1 && impact_report.impacts == count && count > 0);
@@ -406,13 +421,15 @@ static void test_distances_and_impacts(void) {
   for (size_t i = 0; i < count; ++i) {
     // Both stop within the tolerance of the impact, which speeds of a few lengths a second pass in no time.
     CHECK(fabs(found_impacts[i].t_safe - impacts[i].t_safe) < 1e-3);
-    CHECK((found_impacts[i].status == TANDEM_IMPACT_AT_START) == (impacts[i].status == TANDEM_IMPACT_AT_START));
+    CHECK((found_impacts[i].status == TANDEM_IMPACT_AT_START) ==
+          (impacts[i].status == TANDEM_IMPACT_AT_START));
     met += impacts[i].status == TANDEM_IMPACT;
   }
   CHECK(met > 0);
   free(found_impacts);
-  CHECK_STATUS(tandem_gpu_impact_query_find(impact_query, &scene.instances, gpu_motion, -1, NULL, &sorted, stream),
-               TANDEM_OUT_OF_RANGE);
+  CHECK_STATUS(
+      tandem_gpu_impact_query_find(impact_query, &scene.instances, gpu_motion, -1, NULL, &sorted, stream),
+      TANDEM_OUT_OF_RANGE);
   CHECK_STATUS(tandem_gpu_impact_query_find(impact_query, &scene.instances, NULL, 1, NULL, &sorted, stream),
                TANDEM_NULL_ARGUMENT);
   tandem_gpu_impact_query_destroy(impact_query);
@@ -424,7 +441,8 @@ static void test_distances_and_impacts(void) {
   const tandem_verdict* verdicts = tandem_scene_verdicts(expected, &count);
   CHECK_STATUS(tandem_gpu_tolerance_query_create(NULL, &tolerance_query), TANDEM_OK);
   CHECK_STATUS(tandem_gpu_tolerance_query_set_assets(tolerance_query, gpu_assets, stream), TANDEM_OK);
-  CHECK_STATUS(tandem_gpu_tolerance_query_find(tolerance_query, &scene.instances, &given, 0.01, stream), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_tolerance_query_find(tolerance_query, &scene.instances, &given, 0.01, stream),
+               TANDEM_OK);
   tandem_gpu_tolerance_report decided;
   CHECK_STATUS(tandem_gpu_tolerance_query_get_report(tolerance_query, &decided), TANDEM_OK);
   const tandem_tolerance_counters of = decided.counters;
@@ -446,7 +464,8 @@ static void test_errors(void) {
   Queries queries = make_queries();
   tandem_gpu_broad_phase_report near;
   tandem_gpu_query_report report;
-  CHECK_STATUS(tandem_gpu_broad_phase_find(queries.near, &scene.instances, NULL, stream), TANDEM_POSE_NOT_RIGID);
+  CHECK_STATUS(tandem_gpu_broad_phase_find(queries.near, &scene.instances, NULL, stream),
+               TANDEM_POSE_NOT_RIGID);
   CHECK_STATUS(tandem_gpu_broad_phase_get_report(queries.near, &near), TANDEM_POSE_NOT_RIGID);
   CHECK(near.where == 17 && near.status != TANDEM_OK && near.count == 0);
   place(bodies, 0);
@@ -461,7 +480,8 @@ static void test_errors(void) {
 
   CHECK_STATUS(tandem_gpu_broad_phase_find(queries.near, &scene.instances, NULL, stream), TANDEM_OK);
   pairs = tandem_gpu_broad_phase_pairs(queries.near);
-  CHECK_STATUS(tandem_gpu_contact_query_enqueue(queries.contacts, &scene.instances, &pairs, NULL, stream), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_contact_query_enqueue(queries.contacts, &scene.instances, &pairs, NULL, stream),
+               TANDEM_OK);
   cuda_must(cudaStreamSynchronize(stream));
   CHECK_STATUS(tandem_gpu_contact_query_get_report(queries.contacts, &report), TANDEM_OK);
   CHECK(report.complete == 0 && report.needed.pairs > 2);
@@ -474,7 +494,8 @@ static void test_errors(void) {
   options.struct_size = 12;
   CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, &scene.instances, &pairs, &options, stream),
                TANDEM_BAD_STRUCT_SIZE);
-  CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, NULL, &pairs, NULL, stream), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, NULL, &pairs, NULL, stream),
+               TANDEM_NULL_ARGUMENT);
   CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, &scene.instances, NULL, NULL, stream),
                TANDEM_NULL_ARGUMENT);
   destroy(&queries);
@@ -483,21 +504,25 @@ static void test_errors(void) {
   tandem_upload_options contents = {sizeof contents, TANDEM_CONTENTS_EXACT_QUERIES};
   tandem_gpu_assets* part = NULL;
   CHECK_STATUS(tandem_gpu_assets_upload(assets, 3, &contents, stream, NULL, &part, NULL), TANDEM_OK);
-  CHECK(tandem_gpu_assets_count(part) == 3 && tandem_gpu_assets_bytes(part) < tandem_gpu_assets_bytes(gpu_assets));
+  CHECK(tandem_gpu_assets_count(part) == 3 &&
+        tandem_gpu_assets_bytes(part) < tandem_gpu_assets_bytes(gpu_assets));
   queries = make_queries();
   tandem_gpu_distance_query* distances = NULL;
   CHECK_STATUS(tandem_gpu_distance_query_create(NULL, &distances), TANDEM_OK);
   CHECK_STATUS(tandem_gpu_distance_query_set_assets(distances, part, stream), TANDEM_NO_AXIS_ALIGNED_BLOCKS);
-  CHECK_STATUS(tandem_gpu_distance_query_find(distances, &scene.instances, &pairs, NULL, stream), TANDEM_ASSETS_MISSING);
+  CHECK_STATUS(tandem_gpu_distance_query_find(distances, &scene.instances, &pairs, NULL, stream),
+               TANDEM_ASSETS_MISSING);
   tandem_gpu_distance_query_destroy(distances);
   CHECK_STATUS(tandem_gpu_contact_query_set_assets(queries.contacts, part, stream), TANDEM_OK);
   tandem_gpu_assets_release(part);
   CHECK_STATUS(tandem_gpu_broad_phase_find(queries.near, &scene.instances, NULL, stream), TANDEM_OK);
   pairs = tandem_gpu_broad_phase_pairs(queries.near);
   options = grouped_contacts();
-  CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, &scene.instances, &pairs, &options, stream), TANDEM_OK);
-  CHECK_STATUS(tandem_gpu_manifolds_find(queries.manifolds, &scene.instances, &pairs, queries.contacts, NULL, stream),
-               TANDEM_ASSETS_MISSING);
+  CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, &scene.instances, &pairs, &options, stream),
+               TANDEM_OK);
+  CHECK_STATUS(
+      tandem_gpu_manifolds_find(queries.manifolds, &scene.instances, &pairs, queries.contacts, NULL, stream),
+      TANDEM_ASSETS_MISSING);
   options.mode = TANDEM_BOXES;
   CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, &scene.instances, &pairs, &options, stream),
                TANDEM_NO_AXIS_ALIGNED_BLOCKS);

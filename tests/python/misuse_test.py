@@ -47,27 +47,19 @@ CASES = [
     (lambda s: s.place(asset=[0.0, 1.0]), TypeError, "asset has float64"),
     (lambda s: s.place(asset=[[0, 0]]), ValueError, "asset has shape"),
     (lambda s: s.place(poses(asset=1)), tandem.Error, "instance 1: .*asset"),
-    (lambda s: s.place(poses(rotation=np.eye(3) * 1.01)), tandem.Error, "instance 1: .*rotation"),
     (lambda s: s.place(poses(rotation=np.diag([1, 1, -1]))), tandem.Error, "instance 1: .*rotation"),
     (lambda s: s.place(poses(translation=np.nan)), tandem.Error, "instance 1"),
-    (lambda s: s.place(poses(translation=np.inf)), tandem.Error, "instance 1"),
-    (lambda s: s.place(poses(translation=1e301)), tandem.Error, "instance 1"),
     (lambda s: s.add(translation=np.full(3, np.nan)), tandem.Error, "instance 0"),
     (lambda s: s.add(1), tandem.Error, "instance 0: .*asset"),
     (lambda s: s.add([0, 0]), ValueError, "2 bodies where one is wanted"),
     (lambda s: s.add(motion=9), tandem.Error, "instance 0"),
-    (lambda s: s.move([1, 0], poses(translation=np.nan)), tandem.Error, "instance 1"),
-    (lambda s: s.move(7, translation=np.zeros(3)), tandem.Error, "instance"),
     (lambda s: s.move([0, 1], translation=np.zeros((3, 3))), ValueError, "different numbers of rows: bodies 2, poses 3"),
     (lambda s: s.move(0), TypeError, "instances is missing"),
     (lambda s: s.move("0", translation=np.zeros(3)), TypeError, "bodies has"),
-    (lambda s: s.remove(2), tandem.Error, "instance"),
     (lambda s: s.remove(-1), ValueError, "body is -1"),
-    (lambda s: s.set_motion(2, 0), tandem.Error, "instance"),
     (lambda s: s.set_motion(0, 4), ValueError, "motion is 4"),
     # Pairs.
     (lambda s: s.contacts(pairs=[[0, 2]]), tandem.Error, "pair 0"),
-    (lambda s: s.distances(pairs=[[0, 1], [0, 9]]), tandem.Error, "pair 1"),
     (lambda s: s.contacts(pairs=[[0, 1], [-1, 0]]), ValueError, "pairs: row 1"),
     (lambda s: s.contacts(pairs=[0, 1]), ValueError, r"pairs has shape \(2,\)"),
     (lambda s: s.contacts(pairs=[[0, 1, 2]]), ValueError, r"pairs has shape \(1, 3\)"),
@@ -83,8 +75,7 @@ CASES = [
     (lambda s: setattr(s, "threads", 2000), ValueError, "threads is 2000"),
     (lambda s: setattr(s, "threads", 1.5), TypeError, "threads is float"),
     (lambda s: s.place(ROWS, filter=[1, 1]), TypeError, "filter is list"),
-    (lambda s: s.place(ROWS, filter=tandem.Filter(motion=[0, 1, 0])), tandem.Error, "filter"),
-    (lambda s: s.place(ROWS, filter=tandem.Filter(motion=[0, 9])), tandem.Error, "instance 1"),
+    (lambda s: s.place(ROWS, filter=tandem.Filter(group=[])), tandem.Error, "filter"),
     (lambda s: s.place(ROWS, filter=tandem.Filter(excluded=[[0, 7]])), tandem.Error, "instance"),
     (lambda s: tandem.Filter(motion=[0, 256]), ValueError, "motion: row 1"),
     (lambda s: tandem.Filter(motion=[[0, 1]]), ValueError, "motion has shape"),
@@ -191,18 +182,3 @@ def test_an_error_leaves_no_contacts_to_make_manifolds_of():
     with pytest.raises(tandem.Error):
         scene.place(poses(translation=np.nan))
     assert len(scene.instances) == len(scene.manifolds().pairs) == 0
-
-
-def test_what_cannot_be_added_or_moved_changes_nothing():
-    scene = tandem.Scene([BOX], ROWS)
-    for call in (lambda: scene.add(translation=np.full(3, np.nan)), lambda: scene.move([0, 1], poses(translation=np.nan)), lambda: scene.remove(5)):
-        with pytest.raises(tandem.Error):
-            call()
-        assert scene.instances.tobytes() == ROWS.tobytes() and len(scene.contacts().contacts) == 18
-
-
-def test_manifolds_name_the_asset_without_topology():
-    scene = tandem.Scene([BOX, tandem.build(BOX_VERTICES, BOX_FACES, topology=False)], ROWS)
-    with pytest.raises(tandem.Error) as caught:
-        scene.manifolds()
-    assert (caught.value.name, caught.value.subject, caught.value.where) == ("NoTopology", "asset", 1)

@@ -174,16 +174,6 @@ class Query(BenchTest):
         met = set(zip(table["contacts/face_a"].tolist(), table["contacts/face_b"].tolist()))
         self.assertEqual(met, {(1, 5), (1, 2), (3, 0), (3, 2), (4, 0), (4, 5)})
 
-    def test_cubes_apart_have_no_contacts(self):
-        self.write_scene(translation=((0, 0, 0), (3, 0, 0)))
-        report = self.query("--out", self.contacts)
-        self.assertEqual((report["object_pairs"], report["contacts"]), (0, 0))
-        self.assertEqual([len(column) for column in table_of(self.contacts).values()], [0, 0, 0, 0])
-
-    def test_a_scene_of_nothing_has_no_contacts(self):
-        self.write_scene((), np.zeros((0, 3, 3)), np.zeros((0, 3)), ())
-        self.assertEqual(self.query()["contacts"], 0)
-
     def test_given_pairs_in_any_order_give_the_contacts_of_found_ones(self):
         self.make("pile", "--count", "40")
         self.query("--out", self.contacts)
@@ -195,80 +185,12 @@ class Query(BenchTest):
             for name, column in table_of(self.contacts).items():
                 self.assertEqual(column.tolist(), found[name].tolist())
 
-    def test_filters_of_a_scene_leave_out_pairs(self):
-        """What a query with filters finds is what one without finds of the pairs that they leave."""
-        self.make("pile", "--count", "60", "--neighbours", "12")
-        self.query("--out", self.contacts)
-        found = table_of(self.contacts)
-        random = np.random.default_rng(5)
-        motion, bits = random.integers(0, 4, 60), random.integers(0, 8, (2, 60))
-        excluded = found["pairs"][::3, ::-1]
-        a, b = found["pairs"].T
-        moves = (motion[a] == 0) | (motion[b] == 0) | ((motion[a] >= 2) & (motion[b] >= 2) & (motion[a] != motion[b]))
-        meets = ((bits[0][a] & bits[1][b]) != 0) & ((bits[0][b] & bits[1][a]) != 0)
-        third = np.arange(len(a)) % 3 == 0
-        everything = {"simulation/motion": motion, "instances/group": bits[0], "instances/mask": bits[1], "excluded": excluded}
-        for names, left in ((["simulation/motion"], moves), (["instances/group", "instances/mask"], meets),
-                            (["excluded"], ~third), (list(everything), moves & meets & ~third)):
-            change(self.scene, **{name.replace("/", "_"): everything[name] if name in names else None for name in everything})
-            self.assertTrue(0 < left.sum() < len(left))
-            for threads in ("1", "3"):
-                self.query("--threads", threads, "--repeat", "2", "--out", self.contacts)
-                table = table_of(self.contacts)
-                self.assertEqual(table["pairs"].tolist(), found["pairs"][left].tolist())
-                rows = left[found["contacts/pair"]]
-                for name in ("contacts/face_a", "contacts/face_b"):
-                    self.assertEqual(table[name].tolist(), found[name][rows].tolist())
-        # Given pairs are tested as they are.
-        change(self.scene, pairs=found["pairs"])
-        self.query("--out", self.contacts)
-        self.assertEqual(table_of(self.contacts)["pairs"].tolist(), found["pairs"].tolist())
-
-    def test_fixed_bodies_of_a_field_have_no_pairs_of_their_own(self):
-        self.make("field", "--fixed", "100", "--count", "8")
-        self.assertEqual(datasets(self.scene)["simulation/motion"].tolist(), [1] * 100 + [0] * 8)
-        self.query("--out", self.contacts)
-        pairs = table_of(self.contacts)["pairs"]
-        self.assertTrue((pairs[:, 1] >= 100).all())
-        self.assertTrue((pairs[:, 0] < 100).any())
-
     def test_neither_scene_nor_mesh_is_overwritten_by_contacts(self):
         self.write_scene()
         for path in (self.scene, self.mesh):
             before = path.read_bytes()
             self.assert_fails(self.bench("query", self.scene, "--out", path), USAGE, "would be overwritten")
             self.assertEqual(path.read_bytes(), before)
-
-    def test_threads_and_repeats_change_nothing_but_time(self):
-        self.make("pile", "--count", "60")
-        hashes = {self.query("--threads", str(threads), "--repeat", "2")["hash"] for threads in (1, 2, 7)}
-        self.assertEqual(len(hashes), 1)
-
-    def test_first_contact_asks_only_whether_they_touch(self):
-        self.make("pile", "--count", "50")
-        self.query("--out", self.contacts)
-        touching = set(table_of(self.contacts)["contacts/pair"].tolist())
-        self.query("--first-contact", "--out", self.contacts)
-        self.assertEqual(table_of(self.contacts)["contacts/pair"].tolist(), sorted(touching))
-
-    def test_boxes_miss_no_contact(self):
-        self.make("pile", "--count", "50")
-        rows = []
-        for mode in ("exact", "boxes"):
-            self.query("--mode", mode, "--out", self.contacts)
-            table = table_of(self.contacts)
-            rows.append(set(zip(*(table[f"contacts/{name}"].tolist() for name in ("pair", "face_a", "face_b")))))
-        self.assertLessEqual(rows[0], rows[1])
-
-    def test_self_adds_each_instance_with_itself(self):
-        self.write_scene()
-        report = self.query("--self", "--out", self.contacts)
-        table = table_of(self.contacts)
-        self.assertTrue(report["self_pairs"])
-        self.assertEqual(table["pairs"].tolist(), [[0, 0], [0, 1], [1, 1]])
-        itself = table["contacts/pair"] != 1
-        self.assertTrue(itself.any())
-        self.assertTrue((table["contacts/face_a"][itself] <= table["contacts/face_b"][itself]).all())
 
     def test_the_summary_is_for_people(self):
         self.write_scene()
@@ -360,17 +282,6 @@ class WrongScenes(BenchTest):
         self.assert_refused(UNREADABLE_INPUT, self.scene, "/pairs: row 1 names instance 2 of 2")
         self.write_scene(excluded=np.array([[0, 1], [0, 0], [7, 1]], "u4"))
         self.assert_refused(UNREADABLE_INPUT, self.scene, "/excluded: row 2 names instance 7 of 2")
-
-    def test_a_pose_that_is_not_rigid_is_named(self):
-        mirror, scaled, broken = np.diag([1.0, 1, -1]), 2 * IDENTITY, IDENTITY * np.nan
-        for rotation in (mirror, scaled, broken, np.zeros((3, 3))):
-            self.write_scene(rotation=(IDENTITY, rotation))
-            self.assert_refused(UNREADABLE_INPUT, self.scene, "instance 1: a pose is not a rotation and a translation")
-        for place in (np.nan, np.inf):
-            self.write_scene(translation=((0, place, 0), (0, 0, 0)))
-            self.assert_refused(UNREADABLE_INPUT, self.scene, "instance 0: ")
-        self.write_scene(translation=((0, 0, 0), (0, 1e305, 0)))
-        self.assert_refused(UNREADABLE_INPUT, self.scene, "instance 1: ")
 
     def test_an_asset_that_cannot_be_read_is_named(self):
         whole = self.mesh.read_bytes()

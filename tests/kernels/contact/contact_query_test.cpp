@@ -3,8 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <limits>
-#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -25,66 +23,6 @@ TEST_F(Query, AnswersBeforeAnythingIsGiven) {
   expect_nothing();
   EXPECT_EQ(query_.find({}, std::span<const ObjectPair>(), {}), Status::kOk);
   expect_nothing();
-}
-
-TEST_F(Query, FindsNothingInEmptyScenes) {
-  expect_usable();
-  EXPECT_EQ(query_.find({}), Status::kOk);
-  expect_nothing();
-  expect_usable();
-  EXPECT_EQ(query_.set_assets({}), Status::kOk);
-  EXPECT_EQ(query_.find({}), Status::kOk);
-  expect_nothing();
-}
-
-TEST_F(Query, FindsNoPairOfOneInstance) {
-  BodyScene scene = row_of_cubes(1);
-  ask(scene);
-  expect_nothing();
-  ContactOptions options;
-  options.self_pairs = true;
-  ask(scene, options);
-  EXPECT_EQ(pairs_of(query_), (std::vector<std::pair<std::uint32_t, std::uint32_t>>{{0, 0}}));
-  EXPECT_EQ(found_contacts(query_), all_contacts(scene, true));
-}
-
-TEST_F(Query, TakesNoGivenPairs) {
-  expect_usable();
-  ask(row_of_cubes(3), std::vector<ObjectPair>{});
-  expect_nothing();
-}
-
-TEST_F(Query, FindsSelfPairsAmongTheOthersInOrder) {
-  BodyScene scene = row_of_cubes(3);
-  scene.instances.insert(scene.instances.begin(), {0, at(100, 0, 0)});
-  scene.instances.push_back({0, at(-100, 0, 0)});
-  ContactOptions options;
-  options.self_pairs = true;
-  ask(scene, options);
-  EXPECT_EQ(pairs_of(query_), (std::vector<std::pair<std::uint32_t, std::uint32_t>>{
-                                  {0, 0}, {1, 1}, {1, 2}, {2, 2}, {2, 3}, {3, 3}, {4, 4}}));
-  EXPECT_EQ(found_contacts(query_), all_contacts(scene, true));
-  options.self_pairs = false;
-  ask(scene, options);
-  EXPECT_EQ(found_contacts(query_), all_contacts(scene, false));
-}
-
-TEST_F(Query, KeepsGivenPairsAsTheyAreRepeatedAndSwapped) {
-  const BodyScene scene = row_of_cubes(3);
-  const std::vector<ObjectPair> given = {{2, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 1}, {0, 1}};
-  ask(scene, given);
-  ASSERT_EQ(query_.pairs().size(), given.size());
-  for (std::size_t i = 0; i < given.size(); ++i) {
-    EXPECT_EQ(query_.pairs()[i].a, given[i].a);
-    EXPECT_EQ(query_.pairs()[i].b, given[i].b);
-  }
-  FaceContacts expected;
-  for (const ObjectPair& pair : given) {
-    const FaceContacts more = all_contacts(scene, pair.a, pair.b);
-    expected.insert(expected.end(), more.begin(), more.end());
-  }
-  std::sort(expected.begin(), expected.end());
-  EXPECT_EQ(found_contacts(query_), expected);
 }
 
 TEST_F(Query, TakesTheAssetsThatWereGivenLast) {
@@ -124,33 +62,6 @@ TEST_F(Query, IsTheSameForGivenPairsAsForFoundOnes) {
     ask(scene, pairs);
     EXPECT_EQ(contacts_of(query_), found);
     EXPECT_EQ(query_.counters(), counters);
-  }
-}
-
-TEST_F(Query, DoesNotDependOnTheOrderOfInstances) {
-  for (std::uint64_t seed = 0; seed < 10; ++seed) {
-    const BodyScene scene = crowd(seed, 12);
-    ask(scene);
-    const FaceContacts expected = found_contacts(query_);
-    std::vector<std::uint32_t> order(scene.instances.size());
-    std::iota(order.begin(), order.end(), 0u);
-    RandomPoses random(seed);
-    std::shuffle(order.begin(), order.end(), random.engine());
-    std::vector<Instance> shuffled;
-    for (const std::uint32_t i : order) shuffled.push_back(scene.instances[i]);
-    ASSERT_EQ(query_.find(shuffled), Status::kOk);
-    FaceContacts found;
-    for (auto contact : found_contacts(query_)) {
-      contact.a = order[contact.a];
-      contact.b = order[contact.b];
-      if (contact.a > contact.b) {
-        std::swap(contact.a, contact.b);
-        std::swap(contact.face_a, contact.face_b);
-      }
-      found.push_back(contact);
-    }
-    std::sort(found.begin(), found.end());
-    EXPECT_EQ(found, expected);
   }
 }
 
@@ -216,77 +127,7 @@ TEST_F(Query, FastIsExactWhereTrianglesAreGeneric) {
 
 // --- Errors.
 
-/// Errors of instances are the same for pairs found and given, and leave nothing behind.
-class QueryErrors : public Query {
- protected:
-  void expect_error(const Instance& bad, Status status) {
-    for (const std::size_t place : {0u, 1u, 3u}) {
-      BodyScene scene = row_of_cubes(4);
-      scene.instances[place] = bad;
-      ASSERT_EQ(query_.set_assets(scene.assets.views()), Status::kOk);
-      EXPECT_EQ(query_.find(scene.instances), status);
-      EXPECT_EQ(query_.where(), place);
-      expect_nothing();
-      expect_usable();
-      const std::vector<ObjectPair> pairs = {{0, 1}, {1, 2}};
-      EXPECT_EQ(query_.find(scene.instances, pairs, {}), status);
-      EXPECT_EQ(query_.where(), place);
-      expect_nothing();
-      expect_usable();
-    }
-  }
-};
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(),
-                 kInf = std::numeric_limits<double>::infinity();
-
-TEST_F(QueryErrors, NameAnUnknownAsset) {
-  expect_error({1, kIdentityPose}, Status::kUnknownAsset);
-  expect_error({0xFFFFFFFF, kIdentityPose}, Status::kUnknownAsset);
-}
-
-TEST_F(QueryErrors, NameAnUnknownAssetWhereNoneWasGiven) {
-  const std::vector<Instance> instances = {{0, kIdentityPose}};
-  EXPECT_EQ(query_.find(instances), Status::kUnknownAsset);
-  EXPECT_EQ(query_.where(), 0u);
-  expect_usable();
-}
-
-TEST_F(QueryErrors, NameAPoseThatIsNotRigid) {
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      for (const double x : {kNaN, kInf, -kInf, 0.5, 1e200}) {
-        Pose pose = kIdentityPose;
-        pose.rotation[i][j] = x;
-        expect_error({0, pose}, Status::kPoseNotRigid);
-      }
-    }
-    for (const double x : {kNaN, kInf, -kInf}) {
-      Pose pose = kIdentityPose;
-      pose.translation[i] = x;
-      expect_error({0, pose}, Status::kPoseNotRigid);
-    }
-    Pose mirror = kIdentityPose;
-    mirror.rotation[i][i] = -1;
-    expect_error({0, mirror}, Status::kPoseNotRigid);
-    Pose scaled = kIdentityPose;
-    scaled.rotation[i][i] = 1 + 2e-6;
-    expect_error({0, scaled}, Status::kPoseNotRigid);
-  }
-  expect_error({0, Pose{}}, Status::kPoseNotRigid);
-}
-
-TEST_F(QueryErrors, NameWhatIsOutOfRange) {
-  for (int i = 0; i < 3; ++i) {
-    for (const double x : {1.1e300, -1.1e300, 1.7e308, -1.7e308}) {
-      Pose pose = kIdentityPose;
-      pose.translation[i] = x;
-      expect_error({0, pose}, Status::kOutOfRange);
-    }
-  }
-}
-
-TEST_F(QueryErrors, NameAnOriginThatIsOutOfRange) {
+TEST_F(Query, NamesAnOriginThatIsOutOfRange) {
   BodyScene scene;
   scene.assets.add(test::cube(0.5f));
   scene.assets.add(test::cube(0.5f), {1e308, 1e308, 1e308});
@@ -300,43 +141,6 @@ TEST_F(QueryErrors, NameAnOriginThatIsOutOfRange) {
   EXPECT_EQ(query_.find(scene.instances), Status::kOutOfRange);
   expect_nothing();
   expect_usable();
-}
-
-TEST_F(QueryErrors, NameAnUnknownInstance) {
-  const BodyScene scene = row_of_cubes(3);
-  for (const ObjectPair bad : {ObjectPair{3, 0}, ObjectPair{0, 3}, ObjectPair{0xFFFFFFFF, 0xFFFFFFFF}}) {
-    for (const std::size_t place : {0u, 2u}) {
-      std::vector<ObjectPair> pairs = {{0, 1}, {1, 2}, {0, 2}};
-      pairs[place] = bad;
-      ASSERT_EQ(query_.set_assets(scene.assets.views()), Status::kOk);
-      EXPECT_EQ(query_.find(scene.instances, pairs, {}), Status::kUnknownInstance);
-      EXPECT_EQ(query_.where(), place);
-      expect_nothing();
-      expect_usable();
-    }
-  }
-  const std::vector<ObjectPair> pairs = {{0, 0}};
-  EXPECT_EQ(query_.find({}, pairs, {}), Status::kUnknownInstance);
-}
-
-/// The largest of everything that is in range.
-TEST_F(QueryErrors, AreNotWhatIsBarelyInRange) {
-  BodyScene scene = row_of_cubes(2);
-  for (Instance& instance : scene.instances) instance.pose = at(1e300, -1e300, 1e300);
-  ask(scene);
-  EXPECT_EQ(query_.rows().size(), 144u);  // every vertex rounds to one point
-  scene.instances[1].pose = at(1e300, 1e300, 1e300);
-  ask(scene);
-  EXPECT_TRUE(query_.rows().empty());
-}
-
-TEST_F(QueryErrors, AreOfInstancesBeforePairs) {
-  BodyScene scene = row_of_cubes(2);
-  scene.instances[1].asset = 9;
-  const std::vector<ObjectPair> pairs = {{0, 7}};
-  ASSERT_EQ(query_.set_assets(scene.assets.views()), Status::kOk);
-  EXPECT_EQ(query_.find(scene.instances, pairs, {}), Status::kUnknownAsset);
-  EXPECT_EQ(query_.where(), 1u);
 }
 
 // --- Moving.

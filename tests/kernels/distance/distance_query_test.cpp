@@ -234,41 +234,5 @@ TEST(DistanceQuery, OneLargePairIsSpreadOverThreadsAlike) {
   EXPECT_NEAR(expected[0].upper, least, 1e-6 * least);
 }
 
-TEST(DistanceQuery, OfCubesInARowIsTheGap) {
-  BodyScene scene = row_of_cubes(3);
-  for (int i = 0; i < 3; ++i) scene.instances[i].pose.translation[0] = 1.25 * i;
-  test::Asked<DistanceQuery> query;
-  ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-  ASSERT_EQ(query.find(scene.instances, {.reach = 0.25}), Status::kOk);
-  ASSERT_EQ(query.pairs().size(), 2u);
-  for (const ObjectDistance& found : query.rows()) {
-    EXPECT_LE(found.lower, 0.25);
-    EXPECT_GE(found.upper, 0.25);
-    EXPECT_NEAR(between(found.point_a, found.point_b), 0.25, 1e-15);
-  }
-}
-
-TEST(DistanceQuery, RefusesWhatIsWrong) {
-  const BodyScene scene = row_of_cubes(3);
-  test::Asked<DistanceQuery> query;
-  const AssetView nothing[1] = {};
-  EXPECT_EQ(query.set_assets(nothing), Status::kUnknownAsset);
-  ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-  EXPECT_EQ(query.find(scene.instances, {.reach = -1}), Status::kOutOfRange);
-  EXPECT_EQ(query.find(scene.instances, {.tolerance = {0, NAN}}), Status::kOutOfRange);
-  const ObjectPair bad[] = {{0, 1}, {0, 3}};
-  EXPECT_EQ(query.find(scene.instances, bad, {}), Status::kUnknownInstance);
-  EXPECT_EQ(query.where(), 1u);
-  std::vector<Instance> instances = scene.instances;
-  instances[1].pose.rotation[0][0] = 2;
-  EXPECT_EQ(query.find(instances), Status::kPoseNotRigid);
-  EXPECT_EQ(query.where(), 1u);
-  instances[1] = {7, kIdentityPose};
-  EXPECT_EQ(query.find(instances), Status::kUnknownAsset);
-  EXPECT_TRUE(query.pairs().empty() && query.rows().empty());
-  EXPECT_EQ(query.find(scene.instances), Status::kOk);
-  EXPECT_EQ(query.rows().size(), 3u);
-}
-
 }  // namespace
 }  // namespace tandem

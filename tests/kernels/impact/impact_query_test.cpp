@@ -9,7 +9,6 @@
 #include <numbers>
 
 #include "moving_scenes.h"
-#include "tandem/kernels/excluded_pairs.h"
 
 namespace tandem {
 namespace {
@@ -77,11 +76,6 @@ TEST_F(Impacts, AFinerToleranceComesNearer) {
     EXPECT_GT(found.gap, 0.4 * std::sqrt(3) * options.tolerance);
     EXPECT_LE(found.gap, std::sqrt(3) * options.tolerance);
   }
-}
-
-TEST_F(Impacts, BothMovementsCount) {
-  const MovingScene moves = two_cubes(at(3, 0, 0), moving(3, 1, 0), moving(-1, 1, 0));
-  EXPECT_NEAR(impact(moves).t_safe, 0.5, 1e-6);
 }
 
 TEST_F(Impacts, ASpinningPlateStrikesWhereItsCircleMeetsTheWall) {
@@ -161,47 +155,6 @@ TEST_F(Impacts, AnInstanceAndItselfDoNotMoveRelativeToEachOther) {
   EXPECT_EQ(query_.rows()[1].status, ImpactStatus::at_start);
 }
 
-TEST_F(Impacts, ErrorsAreNamedAndLeaveNothing) {
-  MovingScene moves = two_cubes(at(3, 0, 0), moving(1, 0, 0), kAtRest);
-  const ObjectPair pair[] = {{0, 1}}, unknown[] = {{0, 1}, {0, 2}};
-  ASSERT_EQ(query_.set_assets(moves.scene.assets.views()), Status::kOk);
-  const auto ask = [&](double duration = 1, const ImpactOptions& options = {}) {
-    const Status status = ask_of(moves, duration, pair, options);
-    EXPECT_EQ(query_.rows().size(), status == Status::kOk ? 1u : 0u);
-    EXPECT_EQ(query_.pairs().size(), query_.rows().size());
-    return status;
-  };
-  EXPECT_EQ(ask(), Status::kOk);
-  EXPECT_EQ(ask(0), Status::kOk);
-  EXPECT_EQ(ask(-1), Status::kOutOfRange);
-  EXPECT_EQ(ask(INFINITY), Status::kOutOfRange);
-  EXPECT_EQ(ask(NAN), Status::kOutOfRange);
-  ImpactOptions options;
-  options.tolerance = NAN;
-  EXPECT_EQ(ask(1, options), Status::kOutOfRange);
-  EXPECT_EQ(ask_of(moves, 1, unknown), Status::kUnknownInstance);
-  EXPECT_EQ(query_.where(), 1u);
-  EXPECT_EQ(query_.find(moves.scene.instances, {.motion = std::span(moves.motion).first(1), .duration = 1}),
-            Status::kMotionMismatch);
-  const std::vector<RigidMotion> good = moves.motion;
-  const auto refused = [&](double& number, double value) {
-    number = value;
-    EXPECT_EQ(ask(), Status::kOutOfRange) << value;
-    EXPECT_EQ(query_.where(), 1u);
-    moves.motion = good;
-  };
-  refused(moves.motion[1].velocity[0], NAN);
-  refused(moves.motion[1].velocity[1], 1e101);
-  refused(moves.motion[1].center[2], INFINITY);
-  refused(moves.motion[1].angular_velocity[0], 1.001 * kLargestTurn);
-  moves.motion[1].angular_velocity[0] = kLargestTurn;
-  EXPECT_EQ(ask(), Status::kOk);
-  moves.scene.instances[1].asset = 1;
-  EXPECT_EQ(ask(), Status::kUnknownAsset);
-  EXPECT_EQ(query_.where(), 1u);
-  EXPECT_EQ(test::Asked<ImpactQuery>().find({}, {.duration = 1}), Status::kOk);
-}
-
 TEST_F(Impacts, PairsThatAreLeftOutDoNotMeet) {
   const MovingScene moves = moving_crowd(3, 60);
   ASSERT_EQ(query_.set_assets(moves.scene.assets.views()), Status::kOk);
@@ -258,19 +211,6 @@ TEST_F(Impacts, ThreadsChangeNothing) {
       }
     }
   }
-}
-
-TEST_F(Impacts, FiltersLeavePairsOut) {
-  const MovingScene moves = two_cubes(at(3, 0, 0), moving(3, 0, 0), kAtRest);
-  const ObjectPair joint[] = {{1, 0}};
-  ExcludedPairTable excluded;
-  ASSERT_EQ(excluded.set(joint), Status::kOk);
-  ASSERT_EQ(query_.set_assets(moves.scene.assets.views()), Status::kOk);
-  ASSERT_EQ(ask_of(moves, 1), Status::kOk);
-  EXPECT_EQ(query_.pairs().size(), 1u);
-  query_.filter.excluded = excluded.view();
-  ASSERT_EQ(ask_of(moves, 1), Status::kOk);
-  EXPECT_EQ(query_.pairs().size(), 0u);
 }
 
 class ImpactFamilies : public Impacts, public testing::WithParamInterface<MotionFamily> {};

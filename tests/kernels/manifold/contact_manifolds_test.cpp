@@ -452,30 +452,5 @@ TEST_F(WrongInput, PairsThatNameNoInstanceAreRefused) {
   expect(Status::kUnknownInstance, 0);
 }
 
-TEST(ManifoldQuery, AssetsWithoutTopologyAreRefused) {
-  SampleAssets assets;
-  assets.add(cube(0.5f));
-  Bytes file(make_file(cube(0.5f)));
-  const AssetView view = file.check().asset;
-  file.section(SectionKind::topology).kind = SectionKind::provenance;
-  Scene scene;
-  ManifoldQuery made;
-  const AssetView both[] = {assets.views()[0], view};
-  ASSERT_EQ(scene.set_assets(both), Status::kOk);
-  EXPECT_EQ(made.find(scene, std::span<const ObjectPair>(), {}), Status::kNoTopology);
-  EXPECT_EQ(scene.where(), 1u);
-  ASSERT_EQ(scene.set_assets(assets.views()), Status::kOk);
-  EXPECT_EQ(made.find(scene, std::span<const ObjectPair>(), {}), Status::kOk);
-}
-
-TEST(ManifoldQuery, NothingHasNoManifolds) {
-  Scene scene;
-  ManifoldQuery made;
-  EXPECT_EQ(made.find(scene, std::span<const ObjectPair>(), {}), Status::kOk);
-  EXPECT_TRUE(made.rows().empty());
-  ManifoldQuery moved = std::move(made);
-  EXPECT_EQ(moved.find(scene, std::span<const ObjectPair>(), {}), Status::kOk);
-}
-
 }  // namespace
 }  // namespace tandem::test

@@ -318,20 +318,5 @@ TEST_F(FilteredQuery, IsAskedAsTheDocumentationShows) {
   EXPECT_EQ(query.pairs()[0].b, 1u);
 }
 
-TEST_F(FilteredQuery, NamesTheExcludedPairOfAnInstanceThatThereIsNot) {
-  const BodyScene scene = row_of_cubes(5);
-  ExcludedPairTable table;
-  const ObjectPair excluded[] = {{0, 1}, {5, 1}, {2, 3}};
-  ASSERT_EQ(table.set(excluded), Status::kOk);
-  query_.filter.excluded = table.view();
-  ASSERT_EQ(query_.set_assets(scene.assets.views()), Status::kOk);
-  EXPECT_EQ(query_.find(scene.instances), Status::kUnknownInstance);
-  EXPECT_EQ(query_.where(), 1u);
-  ASSERT_EQ(table.set(std::span(excluded).first(1)), Status::kOk);
-  query_.filter.excluded = table.view();
-  ASSERT_EQ(query_.find(scene.instances), Status::kOk);
-  EXPECT_EQ(pairs_of(query_), (Pairs{{1, 2}, {2, 3}, {3, 4}}));
-}
-
 }  // namespace
 }  // namespace tandem

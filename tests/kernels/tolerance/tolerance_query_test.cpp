@@ -158,21 +158,9 @@ TEST_F(Balls, AnInstanceTouchesItself) {
     EXPECT_EQ(verdict, (PairVerdict{ToleranceVerdict::touching, 0, 0}));
 }
 
-TEST_F(Balls, WhatIsWrongIsSaid) {
-  for (const double bad : {-1.0, std::nan(""), HUGE_VAL, 1e301})
-    EXPECT_EQ(query_.find(scene_.instances, {.tolerance = bad}), Status::kOutOfRange);
-  const ObjectPair none[] = {{0, 1}, {0, 2}};
-  EXPECT_EQ(query_.find(scene_.instances, none, {}), Status::kUnknownInstance);
-  EXPECT_EQ(query_.where(), 1u);
-  EXPECT_TRUE(query_.pairs().empty());
-  scene_.instances[1].asset = 1;
-  EXPECT_EQ(query_.find(scene_.instances, {}), Status::kUnknownAsset);
-  EXPECT_EQ(query_.where(), 1u);
-  scene_.instances[1].asset = 0;
-  scene_.instances[1].pose.rotation[0][0] = 2;
-  EXPECT_EQ(query_.find(scene_.instances, {}), Status::kPoseNotRigid);
+TEST_F(Balls, AViewWithoutTheFinestLevelIsRefused) {
   const AssetView views[] = {scene_.assets.views()[0], scene_.assets.views()[0].levels_from(1)};
-  scene_.instances[1].pose = kIdentityPose;
+  scene_.instances[1].asset = 1;
   EXPECT_EQ(query_.set_assets(views), Status::kOk);
   EXPECT_EQ(query_.find(scene_.instances, {}), Status::kNoFinestLevel);
   EXPECT_EQ(query_.where(), 1u);

@@ -7,13 +7,13 @@
 namespace tandem {
 namespace {
 
-bool contains(const WorldBox& box, const double (&point)[3]) {
+bool contains(const WorldBox& box, const std::array<double, 3>& point) {
   bool inside = true;
   for (int k = 0; k < 3; ++k) inside = inside && box.lo[k] <= point[k] && point[k] <= box.hi[k];
   return inside;
 }
 
-bool is_in_range(const double (&point)[3]) {
+bool is_in_range(const std::array<double, 3>& point) {
   bool in_range = true;
   for (double x : point) in_range = in_range && std::abs(x) <= kLargestWorldCoordinate;
   return in_range;

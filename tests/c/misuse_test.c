@@ -123,7 +123,7 @@ static void test_struct_sizes(tandem_asset* cube) {
   const tandem_distance_options distances = {0, 0, 0, 0, 0, NULL, 0, NULL, 0};
   const tandem_impact_options impacts = {0, 0, 0, 0, NULL, 0, NULL, 0};
   const tandem_tolerance_options verdicts = {0, 0, 0, NULL, 0};
-  const tandem_questions questions = {0, 0, NULL, NULL, NULL, NULL, NULL, NULL};
+  const tandem_questions questions = {.struct_size = 0};
   CHECK_STATUS(tandem_scene_find_pairs(scene, &pairs), TANDEM_BAD_STRUCT_SIZE);
   CHECK_STATUS(tandem_scene_find_manifolds(scene, &manifolds), TANDEM_BAD_STRUCT_SIZE);
   CHECK_STATUS(tandem_scene_find_distances(scene, &distances), TANDEM_BAD_STRUCT_SIZE);
@@ -174,7 +174,7 @@ static void test_bad_options(tandem_asset* cube) {
   CHECK_STATUS(tandem_scene_find_impacts(scene, NULL), TANDEM_MOTION_MISMATCH);
   const tandem_tolerance_options reserved = {sizeof reserved, 1, 0, NULL, 0};
   CHECK_STATUS(tandem_scene_find_verdicts(scene, &reserved), TANDEM_BAD_OPTION);
-  const tandem_questions questions = {sizeof questions, 2, NULL, NULL, NULL, NULL, NULL, NULL};
+  const tandem_questions questions = {.struct_size = sizeof questions, .contained = 2};
   CHECK_STATUS(tandem_scene_find(scene, &questions), TANDEM_BAD_OPTION);
   CHECK(tandem_scene_pairs(scene, 5, NULL) == NULL && tandem_scene_pairs(scene, ~0u, NULL) == NULL);
   CHECK_STATUS(tandem_scene_set_motion(scene, 0, 4), TANDEM_BAD_OPTION);
@@ -265,8 +265,8 @@ static void test_allocators(const char* folder) {
   const tandem_motion still[3] = {{{0}, {0}, {0}}, {{0}, {0}, {0}}, {{0}, {0}, {0}}};
   const tandem_impact_options impacts = {sizeof impacts, 0, 1, 0, still, 3, NULL, 0};
   const tandem_tolerance_options verdicts = {sizeof verdicts, 0, 0, NULL, 0};
-  const tandem_questions all = {sizeof all, 1,          &pairs,   &contacts,
-                                &manifolds, &distances, &impacts, &verdicts};
+  const tandem_questions all = {sizeof all, 1,        &pairs,    &contacts, &manifolds,
+                                &distances, &impacts, &verdicts, NULL};
   int succeeded = 0, refused = 0;
   for (int granted = 0; granted < 300 && succeeded == 0; ++granted) {
     grants_left = granted;

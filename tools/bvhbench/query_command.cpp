@@ -146,15 +146,13 @@ Report report_of(const QueryArguments& arguments, const LoadedScene& scene, cons
         .row("  contained", Unit::milliseconds, " on top");
   }
   if (arguments.at) {
-    const auto& [x, y, z] = *arguments.at;
-    const double point[][3] = {{x, y, z}};
+    PlacedBodies bodies(scene);
     BodiesAtQuery query;
-    PlacedBodies bodies_there(scene);
-    require(query.find(bodies_there.scene, {.points = point}));
-    Json bodies = Json::array();
-    for (const BodyAt& row : query.rows()) bodies.push_back(row.body);
-    report.add_json("bodies_at_count", bodies.size()).row("bodies there");
-    report.add_json("bodies_at", std::move(bodies));
+    require(query.find(bodies.scene, {.points = std::span(&*arguments.at, 1)}));
+    Json there = Json::array();
+    for (const BodyAt& row : query.rows()) there.push_back(row.body);
+    report.add_json("bodies_at", there);
+    report.add_json("bodies_at_count", there.size()).row("bodies there");
   }
   if (arguments.on_gpu()) add_gpu(report, arguments, answer.timed);
   return report;

@@ -173,7 +173,7 @@ tandem_status read_options(const tandem_tolerance_options& given, ToleranceOptio
 tandem_status read_options(const tandem_bodies_at_options& given, BodiesAtOptions& options) {
   if (given.reserved != 0) return TANDEM_BAD_OPTION;
   if (!is_there(given.points, given.point_count)) return TANDEM_NULL_ARGUMENT;
-  options.points = {reinterpret_cast<const double(*)[3]>(given.points), given.point_count};
+  options.points = {reinterpret_cast<const std::array<double, 3>*>(given.points), given.point_count};
   return TANDEM_OK;
 }
 

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -11,7 +12,7 @@ namespace tandem {
 namespace {
 
 /// How far a point is inside the box of a body's posed bounds; negative outside.
-double depth_in_box(const AssetView& asset, const Pose& pose, const double (&point)[3]) {
+double depth_in_box(const AssetView& asset, const Pose& pose, const std::array<double, 3>& point) {
   double least = std::numeric_limits<double>::infinity();
   for (int k = 0; k < 3; ++k) {
     double lo = pose.translation[k], hi = lo;
@@ -34,7 +35,7 @@ TEST(BodiesAt, AreThoseWhoseBoxesContainThePoint) {
   ASSERT_EQ(scene.place(bodies.instances), Status::kOk);
   ASSERT_EQ(scene.remove(17), Status::kOk);
   RandomPoses random(1);
-  double points[200][3];
+  std::array<std::array<double, 3>, 200> points;
   for (auto& point : points) {
     for (double& x : point) x = random.symmetric(4);
   }
@@ -60,10 +61,10 @@ TEST(BodiesAt, BordersCountAndWhatIsNoPointIsNamed) {
   ASSERT_EQ(scene.set_assets(cubes.assets.views()), Status::kOk);
   ASSERT_EQ(scene.place(cubes.instances), Status::kOk);
   BodiesAtQuery query;
-  const double points[][3] = {{0.5, 0.5, -0.5}, {0.25, 0, 0}, {1.25, 0, 0.75}};
+  const std::array<double, 3> points[] = {{0.5, 0.5, -0.5}, {0.25, 0, 0}, {1.25, 0, 0.75}};
   ASSERT_EQ(query.find(scene, {.points = points}), Status::kOk);
   EXPECT_TRUE(std::ranges::equal(query.rows(), std::vector<BodyAt>{{0, 0}, {0, 1}, {1, 0}}));
-  const double wrong[][3] = {{0, 0, 0}, {0, std::nan(""), 0}};
+  const std::array<double, 3> wrong[] = {{0, 0, 0}, {0, std::nan(""), 0}};
   EXPECT_EQ(query.find(scene, {.points = wrong}), Status::kOutOfRange);
   EXPECT_EQ(scene.where(), 1u);
   EXPECT_TRUE(query.rows().empty());

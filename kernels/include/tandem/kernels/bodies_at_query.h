@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <cstdint>
 #include <span>
 
@@ -15,7 +16,7 @@ struct BodyAt {
 };
 
 struct BodiesAtOptions {
-  std::span<const double[3]> points;  ///< in the world
+  std::span<const std::array<double, 3>> points;  ///< in the world
 };
 
 struct BodiesAtCounters {

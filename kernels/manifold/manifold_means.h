@@ -1,5 +1,5 @@
 #pragma once
-#include "kernels/common/block_pair.h"
+#include "kernels/common/lane_variant.h"
 #include "kernels/common/lanes.h"
 #include "kernels/manifold/contact_curves.h"
 #include "kernels/manifold/patch.h"
@@ -61,13 +61,15 @@ struct ManifoldMeans {
   manifold::Extreme (*find_extreme)(const manifold::Body& body, const manifold::Prism& prism, int side);
 };
 
-/// The named way, or null where this machine or this build lacks it.
-const ManifoldMeans* manifold_means(BlockPairVariant variant);
+/// The named way, or null where this machine or this build lacks it; there is no scalar one.
+inline const ManifoldMeans* manifold_means(BlockPairVariant variant) {
+  return way_of<const ManifoldMeans*>(variant, nullptr, &LaneVariant::manifold_means);
+}
 
 /// Of the widest vectors that this machine has. Condition: TANDEM_HAVE_LANES.
-const ManifoldMeans& best_manifold_means();
-
-// Each defined in a file of its own, which is compiled for machines that have the instructions.
-extern const ManifoldMeans kManifoldMeansLanes4, kManifoldMeansAvx2, kManifoldMeansAvx512;
+inline const ManifoldMeans& best_manifold_means() {
+  static const ManifoldMeans& best = *best_way(manifold_means);
+  return best;
+}
 
 }  // namespace tandem

@@ -1,6 +1,7 @@
 #include "kernels/common/block_pair.h"
 
-#include "kernels/common/block_pair_variants.h"
+#include "kernels/common/lane_variant.h"
+#include "kernels/common/lanes.h"
 
 // Vectors of 8 and 16 lanes are compiled for x86-64 with the flags that kernels/CMakeLists.txt gives.
 #if defined(TANDEM_HAVE_LANES) && defined(TANDEM_X86_LANES)
@@ -29,23 +30,23 @@ bool has_avx512() {
 
 }  // namespace
 
-BlockPairTest block_pair_test(BlockPairVariant variant) {
-  if (variant == BlockPairVariant::scalar) return block_pair_mask;
+const LaneVariant* lane_variant(BlockPairVariant variant) {
 #ifdef TANDEM_HAVE_LANES
-  if (variant == BlockPairVariant::lanes4) return block_pair_mask_lanes4;
+  if (variant == BlockPairVariant::lanes4) return &kLanes4;
 #endif
 #ifdef TANDEM_HAVE_X86_LANES
-  if (variant == BlockPairVariant::avx2 && has_avx2()) return block_pair_mask_avx2;
-  if (variant == BlockPairVariant::avx512 && has_avx512()) return block_pair_mask_avx512;
+  if (variant == BlockPairVariant::avx2 && has_avx2()) return &kAvx2;
+  if (variant == BlockPairVariant::avx512 && has_avx512()) return &kAvx512;
 #endif
   return nullptr;
 }
 
+BlockPairTest block_pair_test(BlockPairVariant variant) {
+  return way_of(variant, block_pair_mask, &LaneVariant::block_pair_test);
+}
+
 BlockPairTest block_pair_test() {
-  if (has_avx512()) return block_pair_test(BlockPairVariant::avx512);
-  if (has_avx2()) return block_pair_test(BlockPairVariant::avx2);
-  const BlockPairTest lanes4 = block_pair_test(BlockPairVariant::lanes4);
-  return lanes4 != nullptr ? lanes4 : block_pair_mask;
+  return best_way<BlockPairTest>(block_pair_test);
 }
 
 }  // namespace tandem

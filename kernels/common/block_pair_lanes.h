@@ -45,10 +45,10 @@ TANDEM_INLINE Lanes<kCount> nodes_of_b(const Lanes4& four) {
   if constexpr (kCount == 4) return four;
 }
 
-template <int kCount>
-class BlockPairLanes {
+/// What the box tests of a block pair take: what depends on one node alone, for four nodes at a time.
+class PosedBlockPair {
  public:
-  TANDEM_INLINE BlockPairLanes(const Block& a, const Block& b, const RelativePose& pose) : pose_(pose) {
+  TANDEM_INLINE PosedBlockPair(const Block& a, const Block& b, const RelativePose& pose) : pose_(pose) {
     Lanes4 center_b[3];
     for (int k = 0; k < 3; ++k) {
       center_a_[k] = load(a.center[k]);
@@ -59,6 +59,16 @@ class BlockPairLanes {
 #pragma GCC unroll 3
     for (int i = 0; i < 3; ++i) posed_b_[i] = box_terms::posed_center(pose, i, center_b);
   }
+
+ protected:
+  const RelativePose& pose_;
+  Lanes4 center_a_[3], half_extent_a_[3], posed_b_[3], half_extent_b_[3];
+};
+
+template <int kCount>
+class BlockPairLanes : PosedBlockPair {
+ public:
+  using PosedBlockPair::PosedBlockPair;
 
   /// block_pair_mask().
   TANDEM_INLINE unsigned mask() const {
@@ -80,28 +90,19 @@ class BlockPairLanes {
     Lanes<kCount> d[3];
 #pragma GCC unroll 3
     for (int i = 0; i < 3; ++i) {
-      d[i] = of_b(posed_b_[i]) - of_a<kPart>(center_a_[i]);
+      d[i] = nodes_of_b<kCount>(posed_b_[i]) - nodes_of_a<kCount, kPart>(center_a_[i]);
       overlaps.require(magnitude(d[i]),
-                       of_a<kPart>(half_extent_a_[i]) + of_b(box_terms::b_on_face(pose_, i, half_extent_b_)));
+                       nodes_of_a<kCount, kPart>(half_extent_a_[i]) +
+                           nodes_of_b<kCount>(box_terms::b_on_face(pose_, i, half_extent_b_)));
     }
 #pragma GCC unroll 3
     for (int j = 0; j < 3; ++j) {
       overlaps.require(magnitude(box_terms::distance_on_face(pose_, j, d)),
-                       of_b(half_extent_b_[j]) + of_a<kPart>(box_terms::a_on_face(pose_, j, half_extent_a_)));
+                       nodes_of_b<kCount>(half_extent_b_[j]) +
+                           nodes_of_a<kCount, kPart>(box_terms::a_on_face(pose_, j, half_extent_a_)));
     }
     return overlaps.mask() << (kCount * kPart);
   }
-
-  template <int kPart>
-  TANDEM_INLINE static Lanes<kCount> of_a(const Lanes4& four) {
-    return nodes_of_a<kCount, kPart>(four);
-  }
-  TANDEM_INLINE static Lanes<kCount> of_b(const Lanes4& four) {
-    return nodes_of_b<kCount>(four);
-  }
-
-  const RelativePose& pose_;
-  Lanes4 center_a_[3], half_extent_a_[3], posed_b_[3], half_extent_b_[3];
 };
 
 }  // namespace

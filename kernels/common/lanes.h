@@ -158,6 +158,18 @@ TANDEM_INLINE Lanes4 load(const float* four) {
   return out;
 }
 
+/// Turns rows into columns, as those of the corners of 4 triangles: lane by lane x, y, z and w.
+TANDEM_INLINE void transpose(Lanes4 (&rows)[4]) {
+  const auto low01 = __builtin_shufflevector(rows[0].v, rows[1].v, 0, 4, 1, 5);
+  const auto high01 = __builtin_shufflevector(rows[0].v, rows[1].v, 2, 6, 3, 7);
+  const auto low23 = __builtin_shufflevector(rows[2].v, rows[3].v, 0, 4, 1, 5);
+  const auto high23 = __builtin_shufflevector(rows[2].v, rows[3].v, 2, 6, 3, 7);
+  rows[0].v = __builtin_shufflevector(low01, low23, 0, 1, 4, 5);
+  rows[1].v = __builtin_shufflevector(low01, low23, 2, 3, 6, 7);
+  rows[2].v = __builtin_shufflevector(high01, high23, 0, 1, 4, 5);
+  rows[3].v = __builtin_shufflevector(high01, high23, 2, 3, 6, 7);
+}
+
 }  // namespace
 }  // namespace tandem
 #endif

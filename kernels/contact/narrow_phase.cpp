@@ -109,6 +109,10 @@ bool are_within(const PairTask& task, const TrianglePair& pair, ContactCounters&
   return decide_exact(pair) == Verdict::contact || exact::are_within(pair, task.within);
 }
 
+bool narrow_phase_scalar(const PairTask& task, ContactSink& sink) {
+  return PairWalk<ScalarMeans>(task, sink).run();
+}
+
 }  // namespace
 
 PairTask pair_task(const PosedTree& a, const PosedTree& b, double within) {
@@ -143,32 +147,12 @@ bool meet(const PairTask& task, std::uint32_t triangle_a, std::uint32_t triangle
   return (exactly ? decide_exact(pair) : verdict) == Verdict::contact;
 }
 
-bool narrow_phase_scalar(const PairTask& task, ContactSink& sink) {
-  return PairWalk<ScalarMeans>(task, sink).run();
-}
-
 bool narrow_phase_by_world_boxes(const PairTask& task, ContactSink& sink) {
   return PairWalk<WorldBoxMeans>(task, sink).run();
 }
 
 NarrowPhase narrow_phase(BlockPairVariant variant) {
-  if (block_pair_test(variant) == nullptr) return nullptr;
-  switch (variant) {
-    case BlockPairVariant::scalar:
-      return narrow_phase_scalar;
-#ifdef TANDEM_HAVE_LANES
-    case BlockPairVariant::lanes4:
-      return narrow_phase_lanes4;
-#ifdef TANDEM_X86_LANES
-    case BlockPairVariant::avx2:
-      return narrow_phase_avx2;
-    case BlockPairVariant::avx512:
-      return narrow_phase_avx512;
-#endif
-#endif
-    default:
-      return nullptr;
-  }
+  return way_of(variant, narrow_phase_scalar, &LaneVariant::narrow_phase);
 }
 
 }  // namespace tandem

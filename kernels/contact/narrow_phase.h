@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "kernels/common/block_pair.h"
-#include "kernels/common/lanes.h"
+#include "kernels/common/lane_variant.h"
 #include "kernels/geometry/frame_distance.h"
 #include "kernels/geometry/relative_pose.h"
 #include "kernels/scene/scene_state.h"
@@ -47,17 +47,6 @@ using NarrowPhase = bool (*)(const PairTask&, ContactSink&);
 /// order, and the same counters. Condition: task.in_frame.
 NarrowPhase narrow_phase(BlockPairVariant variant);
 
-/// The widest way that this machine and this build have. way_of: narrow_phase() or another that takes a
-/// variant.
-template <typename Way>
-Way best_way(Way (*way_of)(BlockPairVariant)) {
-  Way best = nullptr;
-  for (const BlockPairVariant variant : kBlockPairVariants) {
-    if (const Way way = way_of(variant); way != nullptr) best = way;
-  }
-  return best;
-}
-
 /// For pairs that are not in_frame: boxes of nodes in world coordinates, float64. Slow, and right for all
 /// posed points that are finite.
 bool narrow_phase_by_world_boxes(const PairTask& task, ContactSink& sink);
@@ -67,11 +56,5 @@ bool narrow_phase_by_world_boxes(const PairTask& task, ContactSink& sink);
 /// Where task.within is not 0, whether they are within it, in any mode.
 bool meet(const PairTask& task, std::uint32_t triangle_a, std::uint32_t triangle_b,
           ContactCounters& counters);
-
-// Each defined in a file of its own, which is compiled for machines that have the instructions.
-bool narrow_phase_scalar(const PairTask& task, ContactSink& sink);
-bool narrow_phase_lanes4(const PairTask& task, ContactSink& sink);
-bool narrow_phase_avx2(const PairTask& task, ContactSink& sink);
-bool narrow_phase_avx512(const PairTask& task, ContactSink& sink);
 
 }  // namespace tandem

@@ -11,19 +11,12 @@ namespace {
 
 /// The bounds of box_distance.h for all node pairs of a block pair, in the lanes of BlockPairLanes.
 template <int kCount>
-class BlockPairBounds {
+class BlockPairBounds : PosedBlockPair {
  public:
-  TANDEM_INLINE BlockPairBounds(const Block& a, const Block& b, const RelativePose& pose) : pose_(pose) {
-    Lanes4 center_b[3];
-    for (int k = 0; k < 3; ++k) {
-      center_a_[k] = load(a.center[k]);
-      half_extent_a_[k] = load(a.half_extent[k]) + pose.slack_a[k];
-      center_b[k] = load(b.center[k]);
-      half_extent_b_[k] = load(b.half_extent[k]) + pose.slack_b[k];
-    }
+  TANDEM_INLINE BlockPairBounds(const Block& a, const Block& b, const RelativePose& pose)
+      : PosedBlockPair(a, b, pose) {
 #pragma GCC unroll 3
     for (int i = 0; i < 3; ++i) {
-      posed_b_[i] = box_terms::posed_center(pose, i, center_b);
       b_on_a_[i] = box_terms::b_on_face(pose, i, half_extent_b_);
       a_on_b_[i] = box_terms::a_on_face(pose, i, half_extent_a_);
     }
@@ -45,25 +38,16 @@ class BlockPairBounds {
     Lanes<kCount> d[3], radius_on_a[3], radius_on_b[3];
 #pragma GCC unroll 3
     for (int i = 0; i < 3; ++i) {
-      d[i] = of_b(posed_b_[i]) - of_a<kPart>(center_a_[i]);
-      radius_on_a[i] = of_a<kPart>(half_extent_a_[i]) + of_b(b_on_a_[i]);
-      radius_on_b[i] = of_b(half_extent_b_[i]) + of_a<kPart>(a_on_b_[i]);
+      d[i] = nodes_of_b<kCount>(posed_b_[i]) - nodes_of_a<kCount, kPart>(center_a_[i]);
+      radius_on_a[i] = nodes_of_a<kCount, kPart>(half_extent_a_[i]) + nodes_of_b<kCount>(b_on_a_[i]);
+      radius_on_b[i] = nodes_of_b<kCount>(half_extent_b_[i]) + nodes_of_a<kCount, kPart>(a_on_b_[i]);
     }
     const Lanes<kCount> bound = distance::box_bound(pose_, d, radius_on_a, radius_on_b);
     __builtin_memcpy(out + kCount * kPart, &bound, sizeof bound);
     return less(bound, Lanes<kCount>{} + limit).mask() << (kCount * kPart);
   }
 
-  template <int kPart>
-  TANDEM_INLINE static Lanes<kCount> of_a(const Lanes4& four) {
-    return nodes_of_a<kCount, kPart>(four);
-  }
-  TANDEM_INLINE static Lanes<kCount> of_b(const Lanes4& four) {
-    return nodes_of_b<kCount>(four);
-  }
-
-  const RelativePose& pose_;
-  Lanes4 center_a_[3], half_extent_a_[3], posed_b_[3], half_extent_b_[3], b_on_a_[3], a_on_b_[3];
+  Lanes4 b_on_a_[3], a_on_b_[3];
 };
 
 template <int kCount>

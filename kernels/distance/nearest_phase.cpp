@@ -200,6 +200,11 @@ double distance_along_best(const NearestTask& task, const NearCandidate& candida
                                          state.best.point_a, state.best.point_b);
 }
 
+void nearest_phase_scalar(const NearestTask& task, const BoundedBlockPair* from, std::uint32_t count,
+                          NearestSoFar& state) {
+  NearestWalk<NearestScalarMeans>(task, state).run(from, count);
+}
+
 }  // namespace
 
 void settle_candidates(const NearestTask& task, NearestSoFar& state) {
@@ -226,34 +231,13 @@ void settle_candidates(const NearestTask& task, NearestSoFar& state) {
   state.candidates.clear();
 }
 
-void nearest_phase_scalar(const NearestTask& task, const BoundedBlockPair* from, std::uint32_t count,
-                          NearestSoFar& state) {
-  NearestWalk<NearestScalarMeans>(task, state).run(from, count);
-}
-
 void nearest_phase_by_world_boxes(const NearestTask& task, const BoundedBlockPair* from, std::uint32_t count,
                                   NearestSoFar& state) {
   NearestWalk<NearestWorldBoxMeans>(task, state).run(from, count);
 }
 
 NearestPhase nearest_phase(BlockPairVariant variant) {
-  if (block_pair_test(variant) == nullptr) return nullptr;
-  switch (variant) {
-    case BlockPairVariant::scalar:
-      return nearest_phase_scalar;
-#ifdef TANDEM_HAVE_LANES
-    case BlockPairVariant::lanes4:
-      return nearest_phase_lanes4;
-#ifdef TANDEM_X86_LANES
-    case BlockPairVariant::avx2:
-      return nearest_phase_avx2;
-    case BlockPairVariant::avx512:
-      return nearest_phase_avx512;
-#endif
-#endif
-    default:
-      return nullptr;
-  }
+  return way_of(variant, nearest_phase_scalar, &LaneVariant::nearest_phase);
 }
 
 }  // namespace tandem

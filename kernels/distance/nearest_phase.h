@@ -106,10 +106,4 @@ void settle_candidates(const NearestTask& task, NearestSoFar& state);
 /// of memory.
 bool take_over(NearestSoFar& from, NearestSoFar& state);
 
-// Each defined in a file of its own, which is compiled for machines that have the instructions.
-void nearest_phase_scalar(const NearestTask&, const BoundedBlockPair*, std::uint32_t, NearestSoFar&);
-void nearest_phase_lanes4(const NearestTask&, const BoundedBlockPair*, std::uint32_t, NearestSoFar&);
-void nearest_phase_avx2(const NearestTask&, const BoundedBlockPair*, std::uint32_t, NearestSoFar&);
-void nearest_phase_avx512(const NearestTask&, const BoundedBlockPair*, std::uint32_t, NearestSoFar&);
-
 }  // namespace tandem

@@ -279,7 +279,7 @@ TANDEM_HD void CurveFinder<Team>::summarize(const PieceBounds& all) {
 /// boundary: rounding chose another feature there, or a triangle pair is missing.
 template <typename Team>
 TANDEM_HD bool CurveFinder<Team>::connect_by_ends() {
-  if constexpr (HasMeans<Team>) return team_.means().connect_by_ends(bodies_, memory_, summary_.pieces);
+  if constexpr (HasLanes<Team>) return team_.lanes().connect_by_ends(bodies_, memory_, summary_.pieces);
   const std::uint32_t size = 4 * summary_.pieces;
   clear(size);
   int alone = 0;
@@ -304,7 +304,7 @@ TANDEM_HD bool CurveFinder<Team>::connect_by_ends() {
 /// corner on both sides.
 template <typename Team>
 TANDEM_HD_SELDOM void CurveFinder<Team>::connect_by_corners() {
-  if constexpr (HasMeans<Team>) return team_.means().connect_by_corners(bodies_, memory_, summary_.pieces);
+  if constexpr (HasLanes<Team>) return team_.lanes().connect_by_corners(bodies_, memory_, summary_.pieces);
   const std::uint32_t size = PieceMemory::kTableWords * summary_.pieces;
   clear(size);
   for (std::uint32_t i = team_.rank(); i < summary_.pieces; i += team_.size()) {
@@ -359,8 +359,8 @@ TANDEM_HD void CurveFinder<Team>::sort_by_curve(std::uint32_t& next) {
 template <typename Team>
 TANDEM_HD PieceSummary CurveFinder<Team>::find(const Contact* contacts, std::uint32_t count,
                                                std::uint32_t& next) {
-  if constexpr (HasMeans<Team>)
-    return find_among(team_.means().make_pieces(bodies_, memory_, contacts, count), next);
+  if constexpr (HasLanes<Team>)
+    return find_among(team_.lanes().make_pieces(bodies_, memory_, contacts, count), next);
   return find_among(make_pieces(contacts, count), next);
 }
 

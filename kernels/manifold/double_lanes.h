@@ -99,19 +99,8 @@ TANDEM_INLINE Vector3Lanes<kCount> posed(const Pose& pose, const Vector3Lanes<kC
   return {row(0), row(1), row(2)};
 }
 
-/// Rows of four: lane by lane x, y, z and w.
-TANDEM_INLINE void transpose_rows(Lanes4 (&rows)[4]) {
-  const auto low01 = __builtin_shufflevector(rows[0].v, rows[1].v, 0, 4, 1, 5);
-  const auto high01 = __builtin_shufflevector(rows[0].v, rows[1].v, 2, 6, 3, 7);
-  const auto low23 = __builtin_shufflevector(rows[2].v, rows[3].v, 0, 4, 1, 5);
-  const auto high23 = __builtin_shufflevector(rows[2].v, rows[3].v, 2, 6, 3, 7);
-  rows[0].v = __builtin_shufflevector(low01, low23, 0, 1, 4, 5);
-  rows[1].v = __builtin_shufflevector(low01, low23, 2, 3, 6, 7);
-  rows[2].v = __builtin_shufflevector(high01, high23, 0, 1, 4, 5);
-  rows[3].v = __builtin_shufflevector(high01, high23, 2, 3, 6, 7);
-}
-
-TANDEM_INLINE void transpose_rows(DoubleLanes<4> (&rows)[4]) {
+/// transpose() of rows of four float64.
+TANDEM_INLINE void transpose(DoubleLanes<4> (&rows)[4]) {
   const auto a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 2, 6),
              b = __builtin_shufflevector(rows[0], rows[1], 1, 5, 3, 7),
              c = __builtin_shufflevector(rows[2], rows[3], 0, 4, 2, 6),
@@ -127,7 +116,7 @@ TANDEM_INLINE Vector3Lanes<4> posed_corner(const manifold::Body& body, const std
                                            int corner) {
   Lanes4 rows[4];
   for (int i = 0; i < 4; ++i) rows[i] = load(body.shape->triangles[index[i]].corner[corner].position);
-  transpose_rows(rows);
+  transpose(rows);
   return posed<4>(body.pose, {__builtin_convertvector(rows[0].v, DoubleLanes<4>),
                               __builtin_convertvector(rows[1].v, DoubleLanes<4>),
                               __builtin_convertvector(rows[2].v, DoubleLanes<4>)});

@@ -53,6 +53,13 @@ class ManifoldMaker {
   TANDEM_HD void sound_deepest(bool few, DepthMemory& shared);
   TANDEM_HD void look_behind(DepthMemory& shared);
   TANDEM_HD void choose(const RimFinder<Team>& finder, int most_of_rim, bool touch, ChoiceMemory& shared);
+  TANDEM_HD void place_candidates(const RimFinder<Team>& finder, bool touch, ChoiceMemory& shared);
+  TANDEM_HD int much_deeper_inner_point(int most_of_rim, ChoiceMemory& shared) const;
+  TANDEM_HD void keep_apart(int most_of_rim, int inner, ChoiceMemory& shared) const;
+  /// Whether a sounding is one of the first points of the rim.
+  TANDEM_HD bool is_of_rim(int i, int most_of_rim, const ChoiceMemory& shared) const {
+    return !shared.candidate[i].inner && state_.sounding[i].rank < most_of_rim;
+  }
   TANDEM_HD void write_points(const ChoiceMemory& shared, Patch& patch, int count) const;
   TANDEM_HD void write_manifold(const ChoiceMemory& shared, Patch& patch, int count, bool hole,
                                 bool goes_through) const;
@@ -108,7 +115,7 @@ TANDEM_HD void ManifoldMaker<Team>::place_soundings(const RimFinder<Team>& finde
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::walk_lines(LineQuestions& questions, std::uint32_t count,
                                                DepthMemory& shared) {
-  if constexpr (HasMeans<Team>) return questions.answer(team_.means(), count);
+  if constexpr (HasLanes<Team>) return questions.answer(team_.lanes(), count);
   constexpr int kLinesWidth = 8;
   team_.sync();
   team_.template for_each_group<kLinesWidth>(count, [&](const auto& group, std::uint32_t i, bool given) {
@@ -198,10 +205,10 @@ template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::find_extreme_corners(std::uint32_t curve, DepthMemory& shared) {
   const PatchFrame& frame = state_.frame;
   const std::uint32_t begin = memory_.start[curve], end = memory_.start[curve + 1];
-  if constexpr (HasMeans<Team>) {
+  if constexpr (HasLanes<Team>) {
     for (int side = 0; side < 2; ++side)
       shared.extreme[2 + side] =
-          team_.means().extreme_corner(bodies_[side], memory_, begin, end, frame, side);
+          team_.lanes().extreme_corner(bodies_[side], memory_, begin, end, frame, side);
     return;
   }
   Extreme best[2];
@@ -277,9 +284,9 @@ TANDEM_HD void ManifoldMaker<Team>::sound_rim(bool few, std::uint32_t curve, Dep
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::sound_deepest(bool few, DepthMemory& shared) {
   place_prism(shared);
-  if constexpr (HasMeans<Team>) {
+  if constexpr (HasLanes<Team>) {
     for (int side = 0; side < 2; ++side)
-      shared.extreme[side] = team_.means().find_extreme(bodies_[side], shared.prism, side);
+      shared.extreme[side] = team_.lanes().find_extreme(bodies_[side], shared.prism, side);
   } else {
     ExtremeQuestions questions(bodies_, shared.prism, shared.prism_test, shared.extreme);
     for (std::uint32_t side = team_.rank(); side < 2; side += team_.size()) questions.ask(side);
@@ -347,13 +354,10 @@ TANDEM_HD void ManifoldMaker<Team>::look_behind(DepthMemory& shared) {
   team_.sync();
 }
 
-/// The first points of the rim as it is sounded, and the deepest inner point where it lies deeper. Where it
-/// lies little deeper, the rim's point nearest to it has its depth: else depths would jump where a pose
-/// hardly changes, but its rim gets other points. Deeper points come first, then those further out; of points
-/// near each other the first stays.
+/// What may become points: all that was sounded, with its depth.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, int most_of_rim, bool touch,
-                                           ChoiceMemory& shared) {
+TANDEM_HD void ManifoldMaker<Team>::place_candidates(const RimFinder<Team>& finder, bool touch,
+                                                     ChoiceMemory& shared) {
   const int rank = static_cast<int>(team_.rank()), size = static_cast<int>(team_.size());
   for (int i = rank; i < state_.soundings; i += size) {
     const Sounding& s = state_.sounding[i];
@@ -372,55 +376,70 @@ TANDEM_HD void ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, int mo
     }
   }
   team_.sync();
-  if (rank == 0) {
-    int order[kMostSoundings], count = 0, inner = -1;
-    const auto before = [&](int i, int j) {  // in what is chosen
-      const Chosen &x = shared.candidate[i], &y = shared.candidate[j];
-      return x.depth > y.depth || (x.depth == y.depth && x.from_middle > y.from_middle);
-    };
-    const auto insert = [&](int i) {  // stable
-      int j = count++;
-      for (; j > 0 && before(i, order[j - 1]); --j) order[j] = order[j - 1];
-      order[j] = i;
-    };
-    const auto of_rim = [&](int i) {
-      return !shared.candidate[i].inner && state_.sounding[i].rank < most_of_rim;
-    };
-    double deepest_of_rim = 0, of_inner = 0;
-    for (int i = 0; i < state_.soundings; ++i) {
-      const Chosen& c = shared.candidate[i];
-      if (c.inner && c.depth > of_inner) of_inner = c.depth, inner = i;
-      if (of_rim(i)) deepest_of_rim = greater(deepest_of_rim, c.depth);
-    }
-    const double near = kNear * bodies_.smaller_diagonal();
-    const bool much_deeper = of_inner > kDeeper * deepest_of_rim;
-    if (inner >= 0 && !much_deeper) {
-      int nearest = -1;
-      double least = near * near;
-      for (int i = 0; i < state_.soundings; ++i) {
-        const Vector2 apart = shared.candidate[i].at - shared.candidate[inner].at;
-        if (of_rim(i) && dot(apart, apart) < least) least = dot(apart, apart), nearest = i;
-      }
-      if (nearest >= 0) {
-        double& depth = shared.candidate[nearest].depth;
-        if (of_inner > kLittleDeeper * depth && of_inner <= kSomewhatDeeper * depth) depth = of_inner;
-      }
-    }
-    for (int i = 0; i < state_.soundings; ++i) {
-      if (of_rim(i) || (i == inner && much_deeper)) insert(i);
-    }
-    int kept = 0;
-    for (int i = 0; i < count; ++i) {
-      const Chosen& c = shared.candidate[order[i]];
-      bool alone = true;
-      for (int k = 0; k < kept && alone; ++k) {
-        const Vector2 apart = shared.chosen[k].at - c.at;
-        alone = dot(apart, apart) >= near * near;
-      }
-      if (alone) shared.chosen[kept++] = c;
-    }
-    shared.count = static_cast<std::uint32_t>(kept);
+}
+
+/// The deepest inner point where it lies much deeper than the rim; else -1. Where it lies little deeper, the
+/// rim's point nearest to it gets its depth: else depths would jump where a pose hardly changes, but its rim
+/// gets other points.
+template <typename Team>
+TANDEM_HD int ManifoldMaker<Team>::much_deeper_inner_point(int most_of_rim, ChoiceMemory& shared) const {
+  int inner = -1, nearest = -1;
+  double deepest_of_rim = 0, of_inner = 0;
+  for (int i = 0; i < state_.soundings; ++i) {
+    const Chosen& c = shared.candidate[i];
+    if (c.inner && c.depth > of_inner) of_inner = c.depth, inner = i;
+    if (is_of_rim(i, most_of_rim, shared)) deepest_of_rim = greater(deepest_of_rim, c.depth);
   }
+  if (inner < 0 || of_inner > kDeeper * deepest_of_rim) return inner;
+  const double near = kNear * bodies_.smaller_diagonal();
+  double least = near * near;
+  for (int i = 0; i < state_.soundings; ++i) {
+    const Vector2 apart = shared.candidate[i].at - shared.candidate[inner].at;
+    if (is_of_rim(i, most_of_rim, shared) && dot(apart, apart) < least)
+      least = dot(apart, apart), nearest = i;
+  }
+  if (nearest >= 0) {
+    double& depth = shared.candidate[nearest].depth;
+    if (of_inner > kLittleDeeper * depth && of_inner <= kSomewhatDeeper * depth) depth = of_inner;
+  }
+  return -1;
+}
+
+/// Chooses the first points of the rim, and an inner one unless `inner` is -1. Deeper points come first, then
+/// those further out; of points near each other the first stays.
+template <typename Team>
+TANDEM_HD void ManifoldMaker<Team>::keep_apart(int most_of_rim, int inner, ChoiceMemory& shared) const {
+  int order[kMostSoundings], count = 0, kept = 0;
+  const auto before = [&](int i, int j) {
+    const Chosen &x = shared.candidate[i], &y = shared.candidate[j];
+    return x.depth > y.depth || (x.depth == y.depth && x.from_middle > y.from_middle);
+  };
+  for (int i = 0; i < state_.soundings; ++i) {
+    if (!is_of_rim(i, most_of_rim, shared) && i != inner) continue;
+    int j = count++;  // an insertion that is stable
+    for (; j > 0 && before(i, order[j - 1]); --j) order[j] = order[j - 1];
+    order[j] = i;
+  }
+  const double near = kNear * bodies_.smaller_diagonal();
+  for (int i = 0; i < count; ++i) {
+    const Chosen& c = shared.candidate[order[i]];
+    bool alone = true;
+    for (int k = 0; k < kept && alone; ++k) {
+      const Vector2 apart = shared.chosen[k].at - c.at;
+      alone = dot(apart, apart) >= near * near;
+    }
+    if (alone) shared.chosen[kept++] = c;
+  }
+  shared.count = static_cast<std::uint32_t>(kept);
+}
+
+/// Chooses the points of a manifold: the first of the rim as it is sounded, and an inner one that lies much
+/// deeper.
+template <typename Team>
+TANDEM_HD void ManifoldMaker<Team>::choose(const RimFinder<Team>& finder, int most_of_rim, bool touch,
+                                           ChoiceMemory& shared) {
+  place_candidates(finder, touch, shared);
+  if (team_.rank() == 0) keep_apart(most_of_rim, much_deeper_inner_point(most_of_rim, shared), shared);
   team_.sync();
 }
 

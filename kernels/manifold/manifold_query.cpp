@@ -142,7 +142,7 @@ void ManifoldQuery::State::make_patches(std::size_t from, std::size_t to, std::u
   Worker& own = workers[worker];
   Buffer<Patch>& patches = own.made.patches;
 #ifdef TANDEM_HAVE_LANES
-  const MeansThread team = {{}, best_manifold_means()};
+  const MeansThread team = {{}, best_manifold_lanes()};
 #else
   const OneThread team;
 #endif

@@ -1,16 +1,16 @@
 #pragma once
 #include <algorithm>
 
+#include "kernels/manifold/manifold_lanes.h"
 #include "kernels/manifold/manifold_maker.h"
-#include "kernels/manifold/manifold_means.h"
 #include "tandem/kernels/detail/buffer.h"
 
 namespace tandem {
 
-/// A thread that has means to be faster.
+/// A thread that has SIMD lanes to be faster.
 struct MeansThread : manifold::OneThread {
-  const ManifoldMeans& best;
-  const ManifoldMeans& means() const { return best; }
+  const ManifoldLanes& best;
+  const ManifoldLanes& lanes() const { return best; }
 };
 
 /// The patches of pairs of bodies that one thread makes, and the memory that it takes.
@@ -51,11 +51,11 @@ struct alignas(64) PairPatches {
 
  private:
   static constexpr std::uint32_t kTableWords =
-      std::max(manifold::PieceMemory::kTableWords, ManifoldMeans::kTableWords);
+      std::max(manifold::PieceMemory::kTableWords, ManifoldLanes::kTableWords);
 
   bool make_room(std::size_t contacts, manifold::PieceMemory& memory) {
     if (!pieces_.resize(contacts) || !normals_.resize(6 * contacts + 1) ||
-        !words_.resize((3 + kTableWords) * contacts + 1 + ManifoldMeans::kMoreTableWords))
+        !words_.resize((3 + kTableWords) * contacts + 1 + ManifoldLanes::kMoreTableWords))
       return false;
     std::uint32_t* const word = words_.data();
     memory = {pieces_.data(),  normals_.data(),     word,

@@ -56,6 +56,9 @@ class NormalFinder {
   TANDEM_HD bool has_many_directions(int side) const;
   TANDEM_HD LeastPiece least_unmarked(int side, const FloatVector& known) const;
   TANDEM_HD bool gather_directions(int side, bool keep_if_many);
+  TANDEM_HD void find_faces_along(const Vector3& smooth, std::uint32_t (&holder)[2]) const;
+  TANDEM_HD void sum_lengths_on_faces(const FloatVector (&face)[2], const std::uint32_t (&holder)[2],
+                                      ExactSum (&within)[2]) const;
   TANDEM_HD void find_bearing_faces(const Vector3& smooth, double length);
   TANDEM_HD void spread_along(int count) const;
   TANDEM_HD Vector3 face_nearest(const Vector3& smooth, double length);
@@ -71,6 +74,9 @@ class NormalFinder {
   TANDEM_HD Vector3 direction_of(int side, std::uint32_t piece) const {
     const Vector3 n = bodies_[side].triangle(memory_.pieces[piece].triangle[side]).normal;
     return side == 0 ? n : -n;
+  }
+  TANDEM_HD static FloatVector rounded(const Vector3& n) {
+    return {{static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)}};
   }
   TANDEM_HD static bool same_face(const FloatVector& p, const FloatVector& q) {
     return distance_square(p, q) < kSameFace;
@@ -96,8 +102,8 @@ TANDEM_HD CurveMeasure NormalFinder<Team>::measure() {
   const double unit = summary_.unit, one_by_unit = 1 / unit;
   const bool may_be_free = !summary_.degenerate && !(bodies_.a.shape->closed && bodies_.b.shape->closed);
   CurveSums sums;
-  if constexpr (HasMeans<Team>) {
-    team_.means().sum_pieces(memory_, begin_, end_, summary_.origin, one_by_unit, sums);
+  if constexpr (HasLanes<Team>) {
+    team_.lanes().sum_pieces(memory_, begin_, end_, summary_.origin, one_by_unit, sums);
   } else {
     for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size())
       sums.add(memory_, memory_.order[i], summary_.origin, one_by_unit);
@@ -187,7 +193,7 @@ TANDEM_HD bool NormalFinder<Team>::has_many_directions(int side) const {
 /// Marks pieces whose normals are of the face of a known one. Result: the least of those without a mark.
 template <typename Team>
 TANDEM_HD LeastPiece NormalFinder<Team>::least_unmarked(int side, const FloatVector& known) const {
-  if constexpr (HasMeans<Team>) return team_.means().least_unmarked(memory_, begin_, end_, side, known);
+  if constexpr (HasLanes<Team>) return team_.lanes().least_unmarked(memory_, begin_, end_, side, known);
   LeastPiece least;
   for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
     if (mark(i) != 0) continue;
@@ -205,7 +211,7 @@ TANDEM_HD LeastPiece NormalFinder<Team>::least_unmarked(int side, const FloatVec
 /// ones, if they are to be kept. False where there are more. Normals closer than half a milliradian are one.
 template <typename Team>
 TANDEM_HD bool NormalFinder<Team>::gather_directions(int side, bool keep_if_many) {
-  if constexpr (HasMeans<Team>) {  // a team has passed over the pieces as soon
+  if constexpr (HasLanes<Team>) {  // a team has passed over the pieces as soon
     if (!keep_if_many && has_many_directions(side)) return false;
   }
   for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) mark(i) = 0;
@@ -232,17 +238,15 @@ TANDEM_HD bool NormalFinder<Team>::gather_directions(int side, bool keep_if_many
   return all;
 }
 
-/// Of bodies of many faces those that a patch lies on, as where prisms stand on each other: of each body the
-/// face that lies most across the smooth normal, if nearly all of the curve lies in the plane of such a face.
+/// Finds the face of each body that lies most across the smooth normal. holder: the least piece that has it,
+/// or kNoIndex.
 template <typename Team>
-TANDEM_HD void NormalFinder<Team>::find_bearing_faces(const Vector3& smooth, double length) {
-  directions_ = 0;
-  const FloatVector up = {
-      {static_cast<float>(smooth.x), static_cast<float>(smooth.y), static_cast<float>(smooth.z)}};
+TANDEM_HD void NormalFinder<Team>::find_faces_along(const Vector3& smooth, std::uint32_t (&holder)[2]) const {
+  const FloatVector up = rounded(smooth);
   FaceAlong most[2];
-  if constexpr (HasMeans<Team>) {
+  if constexpr (HasLanes<Team>) {
     for (int side = 0; side < 2; ++side)
-      team_.means().find_face_along(memory_, begin_, end_, side, up, most[side]);
+      team_.lanes().find_face_along(memory_, begin_, end_, side, up, most[side]);
   } else {
     for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
       const std::uint32_t at = memory_.order[i];
@@ -255,7 +259,6 @@ TANDEM_HD void NormalFinder<Team>::find_bearing_faces(const Vector3& smooth, dou
   float greatest[2] = {most[0].along, most[1].along};
   team_.greatest_ones(greatest);
   std::uint64_t key[2];
-  std::uint32_t holder[2];
   for (int side = 0; side < 2; ++side) {
     if (most[side].along != greatest[side]) most[side].least = {};
     key[side] = most[side].least.key;
@@ -264,22 +267,17 @@ TANDEM_HD void NormalFinder<Team>::find_bearing_faces(const Vector3& smooth, dou
   for (int side = 0; side < 2; ++side)
     holder[side] = most[side].least.key == key[side] ? most[side].least.piece : kNoIndex;
   team_.least_ones(holder);
-  Vector3 n[2];
-  FloatVector face[2] = {};
-  bool any = false;
-  for (int side = 0; side < 2; ++side) {
-    if (holder[side] == kNoIndex) continue;
-    any = true;
-    n[side] = direction_of(side, holder[side]);
-    face[side] = {
-        {static_cast<float>(n[side].x), static_cast<float>(n[side].y), static_cast<float>(n[side].z)}};
-  }
-  if (!any) return;
-  ExactSum within[2];
-  if constexpr (HasMeans<Team>) {
+}
+
+/// Adds up how much of the curve lies in the plane of each body's face. holder: kNoIndex of a body without.
+template <typename Team>
+TANDEM_HD void NormalFinder<Team>::sum_lengths_on_faces(const FloatVector (&face)[2],
+                                                        const std::uint32_t (&holder)[2],
+                                                        ExactSum (&within)[2]) const {
+  if constexpr (HasLanes<Team>) {
     for (int side = 0; side < 2; ++side) {
       if (holder[side] == kNoIndex) continue;
-      team_.means().sum_length_on_face(memory_, begin_, end_, face[side], 1 / summary_.unit, within[side]);
+      team_.lanes().sum_length_on_face(memory_, begin_, end_, face[side], 1 / summary_.unit, within[side]);
     }
   } else {
     for_each_piece([&](const Piece& piece, const float* normals) {
@@ -293,6 +291,25 @@ TANDEM_HD void NormalFinder<Team>::find_bearing_faces(const Vector3& smooth, dou
     });
   }
   add_up(team_, within[0], within[1]);
+}
+
+/// Of bodies of many faces those that a patch lies on, as where prisms stand on each other: of each body the
+/// face that lies most across the smooth normal, if nearly all of the curve lies in the plane of such a face.
+template <typename Team>
+TANDEM_HD void NormalFinder<Team>::find_bearing_faces(const Vector3& smooth, double length) {
+  directions_ = 0;
+  std::uint32_t holder[2];
+  find_faces_along(smooth, holder);
+  if (holder[0] == kNoIndex && holder[1] == kNoIndex) return;
+  Vector3 n[2];
+  FloatVector face[2] = {};
+  for (int side = 0; side < 2; ++side) {
+    if (holder[side] == kNoIndex) continue;
+    n[side] = direction_of(side, holder[side]);
+    face[side] = rounded(n[side]);
+  }
+  ExactSum within[2];
+  sum_lengths_on_faces(face, holder, within);
   for (int side = 0; side < 2; ++side) {
     if (holder[side] == kNoIndex || !(within[side].value(summary_.unit) >= kBearing * length)) continue;
     if (team_.rank() == 0) shared_.direction[directions_] = {n[side], holder[side]};
@@ -305,8 +322,8 @@ TANDEM_HD void NormalFinder<Team>::find_bearing_faces(const Vector3& smooth, dou
 /// highest corner and b's lowest.
 template <typename Team>
 TANDEM_HD void NormalFinder<Team>::spread_along(int count) const {
-  if constexpr (HasMeans<Team>) {
-    return team_.means().spread_along(bodies_, memory_, begin_, end_, summary_.origin, shared_.tried, count,
+  if constexpr (HasLanes<Team>) {
+    return team_.lanes().spread_along(bodies_, memory_, begin_, end_, summary_.origin, shared_.tried, count,
                                       shared_.spread);
   }
   constexpr int kAtOnce = 4;  // so that they stay in registers

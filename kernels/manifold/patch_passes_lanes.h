@@ -5,7 +5,7 @@
 #include "kernels/manifold/double_lanes.h"
 
 #ifdef TANDEM_HAVE_LANES
-#include "kernels/manifold/manifold_means.h"
+#include "kernels/manifold/manifold_lanes.h"
 
 // What patch_normal.h, patch_rim.h and manifold_maker.h ask of all pieces of a curve, four pieces at a time.
 namespace tandem {
@@ -72,7 +72,7 @@ struct FourPieces {
       __builtin_memcpy(&low[k], &piece[k]->end[0].x, sizeof(D));
       __builtin_memcpy(&high[k], &piece[k]->end[0].z, sizeof(D));
     }
-    transpose_rows(low), transpose_rows(high);
+    transpose(low), transpose(high);
     from = {low[0], low[1], low[2]};
     to = {low[3], high[2], high[3]};
   }
@@ -125,7 +125,7 @@ struct FourNormals {
   TANDEM_INLINE FourNormals(const manifold::PieceMemory& memory, const FourPieces& four, int side) {
     Lanes4 rows[4];
     for (int k = 0; k < 4; ++k) rows[k] = load(memory.normals + 6 * std::size_t{four.at[k]} + 3 * side);
-    transpose_rows(rows);
+    transpose(rows);
     x = rows[0], y = rows[1], z = rows[2];
   }
   TANDEM_INLINE LaneMask<4> of_face(const manifold::FloatVector& n) const {

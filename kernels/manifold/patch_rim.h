@@ -74,9 +74,9 @@ TANDEM_HD void RimFinder<Team>::gather(bool each_end_twice, std::uint32_t& next)
     moments_.x.add(area_in_units * three_middles.x, one_by_unit);
     moments_.y.add(area_in_units * three_middles.y, one_by_unit);
   };
-  if constexpr (HasMeans<Team>) {
+  if constexpr (HasLanes<Team>) {
     if (!summary_.degenerate) {  // there are no polygons
-      count_ = team_.means().gather_rim(memory_, begin_, end_, frame_, one_by_unit, each_end_twice ? 1 : 2,
+      count_ = team_.lanes().gather_rim(memory_, begin_, end_, frame_, one_by_unit, each_end_twice ? 1 : 2,
                                         candidates(), moments_);
       return;
     }
@@ -129,8 +129,8 @@ TANDEM_HD bool RimFinder<Team>::middle_of_area(Vector2& middle) const {
 template <typename Team>
 template <int kWanted>
 TANDEM_HD void RimFinder<Team>::furthest(const RimValue (&values)[kWanted], Furthest (&best)[kWanted]) const {
-  if constexpr (HasMeans<Team>)
-    return team_.means().furthest(memory_, candidates(), count_, values, kWanted, best);
+  if constexpr (HasLanes<Team>)
+    return team_.lanes().furthest(memory_, candidates(), count_, values, kWanted, best);
   for (std::uint32_t i = team_.rank(); i < count_; i += team_.size()) {
     const Candidate& c = candidates()[i];
     for (int k = 0; k < kWanted; ++k) best[k].take(memory_, values[k](c), c.reference);
@@ -253,10 +253,10 @@ TANDEM_HD void RimFinder<Team>::name_points(Chosen* points, int count, double di
                    : FloatPoint{NAN, NAN};
   }
   const auto square = static_cast<float>(distance * distance);
-  if constexpr (HasMeans<Team>) {
+  if constexpr (HasLanes<Team>) {
     for (int k = 0; k < count; ++k) {
       const auto next = [&](std::uint32_t from) {
-        return team_.means().next_near(candidates(), from, count_, at[k], square);
+        return team_.lanes().next_near(candidates(), from, count_, at[k], square);
       };
       if (points[k].inner) continue;
       for (std::uint32_t i = next(0); i < count_; i = next(i + 1))

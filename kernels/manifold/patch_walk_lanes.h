@@ -5,7 +5,7 @@
 #include <bit>
 #include <cmath>
 
-#include "kernels/manifold/manifold_means.h"
+#include "kernels/manifold/manifold_lanes.h"
 
 // The questions of surface_line.h, answered by one thread: all lines of a patch walk a tree at once, and four
 // boxes or triangles are looked at at a time.
@@ -222,7 +222,7 @@ class LineWalk {
   int count_;
   manifold::FloatVector origin_, direction_, size_, u_, v_;
   float slack_;
-  Line line_[ManifoldMeans::kMostLines];
+  Line line_[ManifoldLanes::kMostLines];
 };
 
 /// ExtremeQuestions, of one body.

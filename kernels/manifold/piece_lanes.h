@@ -2,7 +2,7 @@
 #include "kernels/manifold/double_lanes.h"
 
 #ifdef TANDEM_HAVE_LANES
-#include "kernels/manifold/manifold_means.h"
+#include "kernels/manifold/manifold_lanes.h"
 
 // The pieces of contact_curves.h, four contacts at a time.
 namespace tandem {
@@ -166,7 +166,7 @@ class PieceMaker {
     }
     for (unsigned rest = special; rest != 0; rest &= rest - 1) {
       const int i = std::countr_zero(rest);
-      ManifoldMeans::add_piece(memory_, contacts[i], a.lane(i), b.lane(i), tolerance_, found_);
+      ManifoldLanes::add_piece(memory_, contacts[i], a.lane(i), b.lane(i), tolerance_, found_);
     }
   }
 
@@ -203,8 +203,8 @@ class PieceMaker {
     DoubleLanes<4> ends[4] = {from.x, from.y, from.z, to.x}, rest[4] = {to.y, to.z, to.y, to.z};
     Lanes4 normals[4] = {floats(normal_a.x), floats(normal_a.y), floats(normal_a.z), floats(normal_b.x)},
            more[4] = {floats(normal_b.y), floats(normal_b.z), floats(normal_b.y), floats(normal_b.z)};
-    transpose_rows(head), transpose_rows(ends), transpose_rows(rest);
-    transpose_rows(normals), transpose_rows(more);
+    transpose(head), transpose(ends), transpose(rest);
+    transpose(normals), transpose(more);
 #pragma GCC unroll 4
     for (unsigned i = 0; i < 4; ++i) {
       if ((whole >> i & 1u) == 0) continue;

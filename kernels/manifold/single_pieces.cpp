@@ -1,6 +1,6 @@
 #include <cstring>
 
-#include "kernels/manifold/manifold_means.h"
+#include "kernels/manifold/manifold_lanes.h"
 
 // What CurveFinder does with single pieces, by one thread. Keys lie beside the references, so that nothing is
 // computed again where two are compared.
@@ -61,7 +61,7 @@ class PieceJoiner {
 
 }  // namespace
 
-void ManifoldMeans::add_piece(const PieceMemory& memory, const Contact& contact,
+void ManifoldLanes::add_piece(const PieceMemory& memory, const Contact& contact,
                               const manifold::WorldTriangle& a, const manifold::WorldTriangle& b,
                               double tolerance, manifold::PieceBounds& bounds) {
   manifold::Meeting meeting;
@@ -71,7 +71,7 @@ void ManifoldMeans::add_piece(const PieceMemory& memory, const Contact& contact,
   bounds.add(meeting);
 }
 
-bool ManifoldMeans::connect_by_ends(const BodyPair& bodies, const PieceMemory& memory, std::uint32_t pieces) {
+bool ManifoldLanes::connect_by_ends(const BodyPair& bodies, const PieceMemory& memory, std::uint32_t pieces) {
   PieceJoiner joiner(memory, pieces, 3 * pieces);
   const TriangleTopology* const topology[2] = {bodies.a.shape->topology, bodies.b.shape->topology};
   std::int64_t alone = 0;
@@ -96,7 +96,7 @@ bool ManifoldMeans::connect_by_ends(const BodyPair& bodies, const PieceMemory& m
   return alone == 0 && !many;
 }
 
-void ManifoldMeans::connect_by_corners(const BodyPair& bodies, const PieceMemory& memory,
+void ManifoldLanes::connect_by_corners(const BodyPair& bodies, const PieceMemory& memory,
                                        std::uint32_t pieces) {
   PieceJoiner joiner(memory, pieces, 9 * pieces + 1);
   for (std::uint32_t i = 0; i < pieces; ++i) {

@@ -225,15 +225,15 @@ class LineQuestions {
   }
 
   /// Answers the first `count` questions; those of no side were not asked.
-  template <typename Means>
-  void answer(const Means& means, std::uint32_t count) {
+  template <typename Lanes>
+  void answer(const Lanes& lanes, std::uint32_t count) {
     for (int side = 0; side < 2; ++side) {
-      LineQuestion* asked[Means::kMostLines];
+      LineQuestion* asked[Lanes::kMostLines];
       int lines = 0;
       for (std::uint32_t i = 0; i < count; ++i) {
         if (questions_[i].side == side) asked[lines++] = &questions_[i];
       }
-      if (lines > 0) means.answer_lines(bodies_[side], frame_, asked, lines);
+      if (lines > 0) lanes.answer_lines(bodies_[side], frame_, asked, lines);
     }
   }
 

@@ -71,11 +71,11 @@ struct OneThread {
   }
 };
 
-/// A thread of a CPU that has instructions for several things at a time: means() has other ways to the same
-/// answers (kernels/manifold/manifold_means.h).
+/// A thread of a CPU that has instructions for several things at a time: lanes() has other ways to the same
+/// answers (kernels/manifold/manifold_lanes.h).
 template <typename Team>
-concept HasMeans = requires(const Team& team) {
-  team.means();
+concept HasLanes = requires(const Team& team) {
+  team.lanes();
 };
 
 }  // namespace tandem::manifold

@@ -56,10 +56,6 @@ bool meet(const WorldBox& a, const WorldBox& b) {
   return meet;
 }
 
-bool comes_before(const ObjectPair& x, const ObjectPair& y) {
-  return x.a != y.a ? x.a < y.a : x.b < y.b;
-}
-
 template <typename Entry>
 const Entry* data_or_null(const Buffer<Entry>& entries) {
   return entries.size() != 0 ? entries.data() : nullptr;
@@ -375,8 +371,7 @@ Status SceneState::search_by_device() {
   for (std::uint32_t i = 0; found_of_.self_pairs && i < boxes.size() && status == Status::kOk; ++i) {
     if (is_body(i) && asked.looks_at(i, i) && !fresh_.push({i, i})) status = Status::kOutOfMemory;
   }
-  if (status == Status::kOk && found_of_.self_pairs)
-    std::sort(fresh_.data(), fresh_.data() + fresh_.size(), comes_before);
+  if (status == Status::kOk && found_of_.self_pairs) std::sort(fresh_.data(), fresh_.data() + fresh_.size());
   std::swap(found_, fresh_);
   return status;
 }
@@ -429,9 +424,9 @@ Status SceneState::search_changed() {
   if (fresh_.size() >= kNoIndex) return Status::kTooManyPairs;
   ObjectPair* const begin = fresh_.data();
   ObjectPair* const end = begin + fresh_.size();
-  std::sort(begin + kept, end, comes_before);
+  std::sort(begin + kept, end);
   if (!found_.resize(fresh_.size())) return Status::kOutOfMemory;
-  std::merge(begin, begin + kept, begin + kept, end, found_.data(), comes_before);
+  std::merge(begin, begin + kept, begin + kept, end, found_.data());
   return Status::kOk;
 }
 

@@ -11,7 +11,7 @@ using Eigen::Vector3d;
 class NoContacts : public ContactFinder {
  public:
   const std::vector<ContactPoint>& find(std::span<const BodyPose>, std::span<const std::uint8_t>,
-                                        std::span<const BodyPair>) override {
+                                        std::span<const ObjectPair>) override {
     return none_;
   }
 
@@ -38,7 +38,7 @@ class BoxesOnPlane : public ContactFinder {
   BoxesOnPlane(const Vector3d& normal, const Vector3d& size) : normal_(normal), half_(0.5 * size) {}
 
   const std::vector<ContactPoint>& find(std::span<const BodyPose> bodies, std::span<const std::uint8_t>,
-                                        std::span<const BodyPair>) override {
+                                        std::span<const ObjectPair>) override {
     points_.clear();
     for (std::uint32_t i = 1; i < bodies.size(); ++i) on_plane(i, bodies[i].pose);
     for (std::uint32_t i = 1; i + 1 < bodies.size(); ++i) on_box(i, bodies[i].pose, bodies[i + 1].pose);
@@ -78,7 +78,7 @@ class BallsOnPlane : public ContactFinder {
   BallsOnPlane(const Vector3d& normal, double radius) : normal_(normal), radius_(radius) {}
 
   const std::vector<ContactPoint>& find(std::span<const BodyPose> bodies, std::span<const std::uint8_t>,
-                                        std::span<const BodyPair>) override {
+                                        std::span<const ObjectPair>) override {
     points_.clear();
     for (std::uint32_t i = 1; i < bodies.size(); ++i) {
       const Vector3d center = to_world(bodies[i].pose, Vector3d::Zero());

@@ -234,7 +234,7 @@ TEST(WarmStart, ImpulsesFollowFeaturesThenPlacesAndTheRestIsSharedOut) {
 class FlickeringContacts : public ContactFinder {
  public:
   const std::vector<ContactPoint>& find(std::span<const BodyPose> bodies, std::span<const std::uint8_t> idle,
-                                        std::span<const BodyPair> unmoved) override {
+                                        std::span<const ObjectPair> unmoved) override {
     points_ = corners_->find(bodies, idle, unmoved);
     for (ContactPoint& point : points_) point.depth += kJump * static_cast<double>(++calls_ % 3);
     return points_;

@@ -25,7 +25,7 @@ std::vector<simulation::ContactPoint> ContactScene::points(const Isometry3d& mot
   simulation::ContactGenerator generator;
   generator.set_shapes(assets_.views());
   const std::vector<simulation::ContactPoint> points =
-      generator.generate(found_, instances, left_out_, {.threads = threads_});
+      generator.generate(found_, instances, left_out_, threads_);
   statistics_ = generator.statistics();
   return points;
 }

@@ -24,7 +24,7 @@ class ContactScene {
 
   void use_threads(std::uint32_t threads) { threads_ = threads; }
   /// Pairs that points() makes no points of, ascending.
-  void leave_out(std::vector<simulation::BodyPair> pairs) { left_out_ = std::move(pairs); }
+  void leave_out(std::vector<ObjectPair> pairs) { left_out_ = std::move(pairs); }
 
   const simulation::ContactStatistics& statistics() const { return statistics_; }
   std::size_t triangle_pairs() const { return found_.triangles.size(); }
@@ -34,7 +34,7 @@ class ContactScene {
   std::vector<std::pair<std::uint32_t, Eigen::Isometry3d>> bodies_;
   ContactList found_;
   simulation::ContactStatistics statistics_;
-  std::vector<simulation::BodyPair> left_out_;
+  std::vector<ObjectPair> left_out_;
   std::uint32_t threads_ = 1;
 };
 

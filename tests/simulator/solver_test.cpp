@@ -136,9 +136,9 @@ TEST(Newton, ATowersContactsCarryWhatStandsOnThem) {
   OneStep step(Tower({1, 10, 1000}, kSlop));
   for (std::uint32_t i = 0; i < 3; ++i) step.touch_by_four(i, i + 1, i);
   IslandProblem problem = step.problem();
-  const NewtonReport report = solve_newton_step(problem, step.input(), step.options);
-  ASSERT_TRUE(report.converged);
-  EXPECT_LT(report.residual.largest, 1e-5);
+  const std::optional<Residual> residual = solve_newton_step(problem, step.input(), step.options);
+  ASSERT_TRUE(residual);
+  EXPECT_LT(residual->largest, 1e-5);
   const double carried[] = {1011, 1010, 1000};
   for (std::size_t i = 0; i < 3; ++i) {
     double sum = 0;
@@ -153,7 +153,7 @@ TEST(Newton, FrictionOfASlidingBlockHasCoulombsSizeAndOpposesTheSlip) {
   step.states[1].velocity = {3, 4, 0};
   step.touch_by_four(0, 1, 0);
   IslandProblem problem = step.problem();
-  ASSERT_TRUE(solve_newton_step(problem, step.input(), step.options).converged);
+  ASSERT_TRUE(solve_newton_step(problem, step.input(), step.options));
   Vector3d sum = Vector3d::Zero();
   for (std::size_t i = 0; i < 4; ++i) {
     const Vector3d& impulse = problem.impulse[i];
@@ -181,7 +181,7 @@ TEST(Newton, WhatDoesNotConvergeLeavesTheProblemAsItWas) {
   OneStep step = pressed_box();
   IslandProblem problem = step.problem();
   const IslandProblem before = problem;
-  EXPECT_FALSE(solve_newton_step(problem, step.input(), step.options).converged);
+  EXPECT_FALSE(solve_newton_step(problem, step.input(), step.options));
   EXPECT_EQ(problem.velocity, before.velocity);
   EXPECT_EQ(problem.displacement, before.displacement);
   EXPECT_EQ(problem.impulse, before.impulse);
@@ -229,7 +229,7 @@ TEST(RollingResistance, TwoBodiesSlowEachOthersTurningAndKeepTheirAngularMomentu
     for (Vector6& gravity : problem.gravity) gravity.setZero();
     const Vector3d before = angular_momentum_of(problem, step);
     if (by_newton) {
-      ASSERT_TRUE(solve_newton_step(problem, step.input(), step.options).converged);
+      ASSERT_TRUE(solve_newton_step(problem, step.input(), step.options));
     } else {
       solve_soft_step(problem, step.input(), step.options);
     }

@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <filesystem>
 #include <thread>
 
 #include "bvhbench/engines/registry.h"
 #include "bvhbench/scenes/hdf5_file.h"
-#include "bvhbench/scenes/make_scene_parts.h"
+#include "bvhbench/scenes/make_scene.h"
 
 namespace tandem::bench {
 namespace {
@@ -125,9 +124,7 @@ void refuse_engine(const std::string& path, const LoadedScene& scene) {
 
 std::vector<std::string> files_of(const std::string& path, const LoadedScene& scene) {
   std::vector<std::string> files = {path};
-  for (const std::string& asset : scene.description.assets) {
-    files.push_back((std::filesystem::path(path).parent_path() / asset).string());
-  }
+  for (const std::string& asset : scene.description.assets) files.push_back(beside(path, asset));
   return files;
 }
 

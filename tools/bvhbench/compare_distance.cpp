@@ -64,13 +64,7 @@ DistanceComparison compare_distances(const std::string& path, double reach, unsi
   auto engines = make_peers(DistanceOptions());
   if (triangles_of_pairs(scene, pairs.pairs) > kMostReferenceTriangles)
     std::erase_if(engines, [](const auto& engine) { return engine->is_reference(); });
-  for (const auto& engine : engines) {
-    DistancePeer& peer = out.peers.emplace_back();
-    peer.name = engine->label();
-    peer.settings = engine->settings();
-    peer.build_seconds = seconds_of([&] { engine->set_shapes(views); });
-    engine->update(scene.description.instances);
-  }
+  out.peers = prepared<DistancePeer>(engines, views, scene.description.instances);
   std::vector<double> distances;
   race(
       engines, repeats, out.peers, [&](Engine& engine) { engine.find_distances(pairs.pairs, distances); },

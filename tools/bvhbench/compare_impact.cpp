@@ -135,14 +135,8 @@ ImpactComparison compare_impacts(const std::string& path, double duration, unsig
     out.in_contact += contact != 0 && std::isfinite(contact);
   }
   const auto engines = make_peers(ImpactOptions());
-  for (const auto& engine : engines) {
-    ImpactPeer& peer = out.peers.emplace_back();
-    peer.name = engine->label();
-    peer.settings = engine->settings();
-    peer.build_seconds = seconds_of([&] { engine->set_shapes(views); });
-    engine->set_motion(motions, duration);
-    peer.update_seconds = seconds_of([&] { engine->update(scene.description.instances); });
-  }
+  for (const auto& engine : engines) engine->set_motion(motions, duration);
+  out.peers = prepared<ImpactPeer>(engines, views, scene.description.instances);
   std::vector<double> times;
   race(
       engines, repeats, out.peers, [&](Engine& engine) { engine.find_impacts(pairs, times); },

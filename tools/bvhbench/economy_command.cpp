@@ -2,7 +2,6 @@
 
 #include <charconv>
 #include <cmath>
-#include <filesystem>
 
 #include "bvhbench/economy/choice.h"
 #include "bvhbench/scenes/hdf5_file.h"
@@ -113,8 +112,7 @@ EconomyResult measure(const EconomyArguments& arguments, LevelMeasurer& measurer
 void write_at_levels(const EconomyArguments& arguments, const LevelMeasurer& measurer,
                      const SceneMotion& motion, const Levels& levels) {
   SceneDescription scene = measurer.scene().description;
-  const auto folder = std::filesystem::path(arguments.scene).parent_path();
-  for (std::string& asset : scene.assets) asset = seen_from(arguments.output, (folder / asset).string());
+  for (std::string& asset : scene.assets) asset = seen_from(arguments.output, beside(arguments.scene, asset));
   scene.level.clear();
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     scene.instances[i].asset = measurer.asset_of()[i];

@@ -1,5 +1,4 @@
 #include <cstdio>
-#include <filesystem>
 
 #include "bvhbench/simulator/run_file.h"
 #include "command.h"
@@ -17,10 +16,8 @@ ExitCode run(const FrameArguments& arguments) {
   keep_inputs(arguments.output, {arguments.run});
   const simulation::StoredFrame frame = simulation::read_frame(arguments.run, arguments.frame);
   SceneDescription scene;
-  for (const std::string& asset : frame.assets) {
-    const auto path = std::filesystem::path(arguments.run).parent_path() / asset;
-    scene.assets.push_back(seen_from(arguments.output, path.string()));
-  }
+  for (const std::string& asset : frame.assets)
+    scene.assets.push_back(seen_from(arguments.output, beside(arguments.run, asset)));
   scene.instances = frame.poses;
   scene.level = frame.level;
   write_scene(arguments.output, scene);

@@ -1,5 +1,4 @@
 #include <cmath>
-#include <filesystem>
 
 #include "bvhbench/scenes/hdf5_file.h"
 #include "command.h"
@@ -111,7 +110,7 @@ std::string second_of(const PosesArguments& arguments, const SceneDescription& s
     return {};
   }
   if (!arguments.with.empty()) return arguments.with;
-  return (std::filesystem::path(arguments.poses).parent_path() / scene.assets[1]).string();
+  return beside(arguments.poses, scene.assets[1]);
 }
 
 // A scene file, with what each tree did beside it.

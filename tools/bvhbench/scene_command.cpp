@@ -2,7 +2,6 @@
 #include <cstdio>
 
 #include "bvhbench/scenes/make_scene.h"
-#include "bvhbench/scenes/make_scene_parts.h"
 #include "command.h"
 #include "common/number_words.h"
 

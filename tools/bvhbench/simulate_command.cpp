@@ -6,7 +6,7 @@
 
 #include "bvhbench/engines/registry.h"
 #include "bvhbench/scenes/hdf5_file.h"
-#include "bvhbench/scenes/make_scene_parts.h"
+#include "bvhbench/scenes/make_scene.h"
 #include "bvhbench/simulator/preparation.h"
 #include "bvhbench/simulator/run.h"
 #include "command.h"
@@ -25,7 +25,6 @@ struct SimulateArguments : CommonArguments {
   std::uint64_t seed = 1;
   bool fast = false, cold = false, continuous = false;
   SimulatorOptions simulator;
-  ContactPointOptions contacts;
   RunOptions run;
 };
 
@@ -94,9 +93,8 @@ void set_up_slide(const SimulateArguments& arguments, Start& start) {
 
 void set_up_scene(const SimulateArguments& arguments, Start& start) {
   start.scene = read_scene(arguments.scene);
-  for (const std::string& asset : start.scene.description.assets) {
-    start.paths.push_back((fs::path(arguments.scene).parent_path() / asset).string());
-  }
+  for (const std::string& asset : start.scene.description.assets)
+    start.paths.push_back(beside(arguments.scene, asset));
   if (start.paths.empty()) throw FileError(arguments.scene + ": /assets: there is none");
   start.bodies = prepare_scene(arguments.scene, start.scene, arguments.density);
 }
@@ -110,7 +108,7 @@ Json options_of(const char* kind, const SimulateArguments& arguments, const Star
           {"seed", arguments.seed},
           {"engine", arguments.engine},
           {"mode", arguments.fast ? "fast" : "exact"},
-          {"points_per_patch", arguments.contacts.points_per_patch},
+          {"points_per_patch", kMostManifoldPoints},
           {"dt", simulator.dt},
           {"solver", name_of(solver.kind, kSolvers)},
           {"substeps", solver.substeps},
@@ -221,14 +219,13 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
     return kDone;
   }
   const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, options.threads);
-  arguments.contacts.threads = options.threads;
   auto engine = make_engine(arguments.engine,
                             ContactOptions{.mode = arguments.fast ? QueryMode::fast : QueryMode::exact});
   std::unique_ptr<ContinuousMotion> continuous;
   if (arguments.continuous) continuous = std::make_unique<ContinuousMotion>(start.shapes(), options.threads);
   Simulator simulator(start.bodies.bodies, start.bodies.states,
-                      make_mesh_contact_finder(std::move(engine), start.shapes(), arguments.contacts),
-                      options, std::move(continuous));
+                      make_mesh_contact_finder(std::move(engine), start.shapes(), options.threads), options,
+                      std::move(continuous));
   const RunResults results = run_simulation(simulator, description, start.reentry, arguments.run);
   print(arguments, report_of(kind, arguments, description, results));
   return kDone;
@@ -286,14 +283,11 @@ void add_solver_options(CLI::App& command, SimulateArguments& arguments) {
 
 void add_run_options(CLI::App& command, SimulateArguments& arguments) {
   RunOptions& run = arguments.run;
-  std::uint32_t& points = arguments.contacts.points_per_patch;
   add_options(
       command,
       {required({"--frames", run.steps, "N", "steps to make", CLI::Range(1, 1'000'000'000)}),
        {"--engine", arguments.engine, "NAME [tandem]", "what finds the triangles that meet", engine_name()},
        {"--fast", arguments.fast, "let the engine decide triangles in float32"},
-       {"--points-per-patch", points, format("N [%u]", points), "contact points, at most",
-        CLI::Range(1u, kMostManifoldPoints)},
        {"--density", arguments.density, "D [1000]", "of the bodies, in kg/m^3", between(1e-12, 1e12)},
        threads_option(arguments, "the results do"),
        {"--trajectory", run.trajectory_every, "K [0]", "keep the state after every K-th step; 0: none"},

@@ -49,6 +49,21 @@ struct PeerTimes {
 
 using Peers = std::span<const std::unique_ptr<Engine>>;
 
+/// Gives the peers shapes and bodies. Result: for each its name and settings, and what that took.
+template <class Result>
+std::vector<Result> prepared(Peers peers, std::span<const AssetView> shapes,
+                             std::span<const Instance> bodies) {
+  std::vector<Result> results;
+  for (const std::unique_ptr<Engine>& peer : peers) {
+    Result& result = results.emplace_back();
+    result.name = peer->label();
+    result.settings = peer->settings();
+    result.build_seconds = seconds_of([&] { peer->set_shapes(shapes); });
+    result.update_seconds = seconds_of([&] { peer->update(bodies); });
+  }
+  return results;
+}
+
 /// Asks the peers in turn, so that a drifting machine drifts for all: calls ask(peer) `repeats` times, once
 /// for one that runs once and has no time yet, and adds what it took to the peer's result. Calls judge(peer,
 /// result) when the result has its first time.

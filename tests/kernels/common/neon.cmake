@@ -20,7 +20,7 @@ endfunction()
 file(MAKE_DIRECTORY ${FOLDER})
 set(sources tests/kernels/common/variant_check.cpp formats/src/allocator.cpp formats/src/box.cpp kernels/common/available_memory.cpp
   kernels/common/available_memory_of_machine.cpp kernels/common/block_pair.cpp kernels/variants/lanes4.cpp
-  kernels/manifold/manifold_means.cpp kernels/contact/narrow_phase.cpp kernels/distance/nearest_phase.cpp kernels/manifold/single_pieces.cpp)
+  kernels/contact/narrow_phase.cpp kernels/distance/nearest_phase.cpp kernels/manifold/single_pieces.cpp)
 list(TRANSFORM sources PREPEND ${SOURCE}/)
 execute_process(COMMAND ${COMPILER} -std=c++20 -O1 -ffp-contract=off -static -I${SOURCE}/kernels/include -I${SOURCE}/formats/include
   -I${SOURCE} -I${SOURCE}/tests -I${SOURCE}/tests/kernels ${sources} -o ${FOLDER}/variant_check

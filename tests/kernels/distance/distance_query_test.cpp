@@ -133,7 +133,7 @@ TEST_P(DistanceScenes, EveryVariantDoesTheSame) {
         const NearestTask task = nearest_task(trees[a], trees[b], {});
         if (!task.in_frame) continue;
         DistanceCounters expected, counters;
-        const std::vector<double> answer = walk(nearest_phase_scalar, task, expected);
+        const std::vector<double> answer = walk(nearest_phase(BlockPairVariant::scalar), task, expected);
         for (const BlockPairVariant variant : kBlockPairVariants) {
           if (nearest_phase(variant) == nullptr) continue;
           EXPECT_EQ(walk(nearest_phase(variant), task, counters), answer) << static_cast<int>(variant);

@@ -10,17 +10,9 @@
 namespace tandem::economy {
 namespace {
 
-auto key(const ObjectPair& pair) {
-  return std::pair(pair.a, pair.b);
-}
-
-bool comes_before(const ObjectPair& a, const ObjectPair& b) {
-  return key(a) < key(b);
-}
-
 std::uint64_t count_missing(const std::vector<ObjectPair>& a, const std::vector<ObjectPair>& b) {
   std::vector<ObjectPair> missing;
-  std::set_difference(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(missing), comes_before);
+  std::set_difference(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(missing));
   return missing.size();
 }
 
@@ -92,14 +84,14 @@ class Matches {
 
 std::vector<Patch> by_pair(std::vector<Patch> patches) {
   std::stable_sort(patches.begin(), patches.end(),
-                   [](const Patch& a, const Patch& b) { return comes_before(a.pair, b.pair); });
+                   [](const Patch& a, const Patch& b) { return a.pair < b.pair; });
   return patches;
 }
 
 // Takes the patches of `pair` off the front of `rest`.
 Patches take(Patches& rest, const ObjectPair& pair) {
   std::size_t count = 0;
-  while (count < rest.size() && key(rest[count].pair) == key(pair)) ++count;
+  while (count < rest.size() && rest[count].pair == pair) ++count;
   const Patches taken = rest.first(count);
   rest = rest.subspan(count);
   return taken;
@@ -122,7 +114,7 @@ Difference difference(const Findings& finest, const Findings& coarser) {
   Patches left = sorted, right = sorted_coarser;
   Matches matches;
   while (!left.empty() || !right.empty()) {
-    const bool from_left = right.empty() || (!left.empty() && !comes_before(right[0].pair, left[0].pair));
+    const bool from_left = right.empty() || (!left.empty() && left[0].pair <= right[0].pair);
     const ObjectPair pair = from_left ? left[0].pair : right[0].pair;
     const Patches of_finest = take(left, pair), of_coarser = take(right, pair);
     matches.add(pair, of_finest, of_coarser);

@@ -51,10 +51,9 @@ void sort_manifolds(const std::vector<std::uint32_t>& row, TimedManifolds& made)
 // Brings the pairs into ascending order, and the contacts' rows with them.
 void sort_pairs(TimedAnswer& answer) {
   const std::vector<ObjectPair> pairs = std::move(answer.pairs);
-  const auto key = [&](std::uint32_t i) { return std::tie(pairs[i].a, pairs[i].b); };
   std::vector<std::uint32_t> order(pairs.size()), row(pairs.size());
   std::iota(order.begin(), order.end(), 0u);
-  std::sort(order.begin(), order.end(), [&](auto x, auto y) { return key(x) < key(y); });
+  std::sort(order.begin(), order.end(), [&](auto x, auto y) { return pairs[x] < pairs[y]; });
   answer.pairs.clear();
   for (std::uint32_t i = 0; i < order.size(); ++i) {
     row[order[i]] = i;

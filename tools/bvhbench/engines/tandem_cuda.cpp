@@ -203,9 +203,7 @@ class CudaDistances final : public CudaRows<GpuDistanceQuery> {
 void sort(TimedImpacts& found) {
   std::vector<std::pair<ObjectPair, Impact>> rows;
   for (std::size_t i = 0; i < found.pairs.size(); ++i) rows.emplace_back(found.pairs[i], found.rows[i]);
-  std::sort(rows.begin(), rows.end(), [](const auto& x, const auto& y) {
-    return std::pair(x.first.a, x.first.b) < std::pair(y.first.a, y.first.b);
-  });
+  std::sort(rows.begin(), rows.end(), [](const auto& x, const auto& y) { return x.first < y.first; });
   for (std::size_t i = 0; i < rows.size(); ++i) std::tie(found.pairs[i], found.rows[i]) = rows[i];
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
 
 #include "columns.h"
 
@@ -18,13 +17,11 @@ double area_of(const Manifold& manifold) {
 
 std::vector<ObjectPair> normalised(std::span<const ObjectPair> pairs) {
   std::vector<ObjectPair> sorted(pairs.begin(), pairs.end());
-  const auto key = [](const ObjectPair& pair) { return std::tie(pair.a, pair.b); };
   for (ObjectPair& pair : sorted) {
     if (pair.b < pair.a) std::swap(pair.a, pair.b);
   }
-  std::sort(sorted.begin(), sorted.end(), [&](const auto& x, const auto& y) { return key(x) < key(y); });
-  const auto same = [&](const auto& x, const auto& y) { return key(x) == key(y); };
-  sorted.erase(std::unique(sorted.begin(), sorted.end(), same), sorted.end());
+  std::sort(sorted.begin(), sorted.end());
+  sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
   return sorted;
 }
 

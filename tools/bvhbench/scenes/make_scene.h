@@ -44,6 +44,12 @@ std::vector<Instance> make_coincident(const AssetView& body, std::uint32_t count
 std::vector<Instance> make_field(const AssetView& body, std::uint32_t fixed, std::uint32_t count,
                                  double spacing, const SceneSeed&);
 
+/// Adds the offset to every translation.
+void move(std::vector<Instance>& instances, const Vector& offset);
+
+/// The least n with n^power >= count. Condition: power is 2 or 3.
+std::uint32_t root_above(std::uint32_t count, int power);
+
 /// Finds the instances whose world boxes meet, and that the filter looks at: the object pairs that a query
 /// finds, a < b, sorted. Throws std::bad_alloc, std::runtime_error (coordinates beyond what a query takes).
 std::vector<ObjectPair> find_box_pairs(const std::vector<AssetView>& assets,

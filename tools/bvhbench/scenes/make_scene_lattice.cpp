@@ -3,7 +3,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "make_scene_parts.h"
+#include "make_scene.h"
 
 // Scenes on a cubic lattice: stack, pile, lattice, field, coincident.
 namespace tandem::bench {

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "make_scene_parts.h"
+#include "make_scene.h"
 
 namespace tandem::bench {
 namespace {

@@ -30,13 +30,6 @@ std::vector<Instance> read_instances(const Hdf5Input& file, const std::string& p
   return instances;
 }
 
-std::vector<ObjectPair> read_pairs(const Hdf5Input& file, const char* name) {
-  const auto flat = file.read_u32(name, {2});
-  std::vector<ObjectPair> pairs(flat.size() / 2);
-  for (std::size_t i = 0; i < pairs.size(); ++i) pairs[i] = {flat[2 * i], flat[2 * i + 1]};
-  return pairs;
-}
-
 // An optional number of each instance.
 std::vector<std::uint32_t> read_of_each(const Hdf5Input& file, const std::string& path,
                                         const std::string& name, std::size_t instances) {
@@ -59,7 +52,7 @@ SceneFilter read_filter(const Hdf5Input& file, const std::string& path, std::siz
     }
     filter.motion.push_back(static_cast<Motion>(motion));
   }
-  if (file.has("/excluded")) filter.excluded = read_pairs(file, "/excluded");
+  if (file.has("/excluded")) filter.excluded = read_values<ObjectPair>(file, "/excluded");
   return filter;
 }
 
@@ -74,7 +67,7 @@ SceneDescription read_file(const std::string& path) {
   scene.assets = file.read_strings("/assets");
   scene.instances = read_instances(file, path);
   scene.level = read_of_each(file, path, "/instances/level", scene.instances.size());
-  if (file.has("/pairs")) scene.pairs = read_pairs(file, "/pairs");
+  if (file.has("/pairs")) scene.pairs = read_values<ObjectPair>(file, "/pairs");
   if (file.has("/poses")) scene.poses = read_notes(file);
   scene.filter = read_filter(file, path, scene.instances.size());
   return scene;
@@ -115,7 +108,7 @@ void check_levels(const LoadedScene& scene, const std::string& path) {
 MappedAsset open_asset(const std::string& scene, const std::vector<std::string>& names, std::size_t i) {
   const std::string where = " (asset " + std::to_string(i) + " of " + scene + ")";
   if (names[i].empty()) throw FileError(scene + ": /assets: row " + std::to_string(i) + " is empty");
-  const std::string path = (fs::path(scene).parent_path() / names[i]).string();
+  const std::string path = beside(scene, names[i]);
   MappedAsset asset;
   const Status status = asset.open(path.c_str());
   if (status == Status::kOk) return asset;
@@ -181,6 +174,10 @@ MappedAsset open_mesh(const std::string& path) {
   const Status status = asset.open(path.c_str());
   if (status != Status::kOk) throw FileError(path + ": " + explain(status));
   return asset;
+}
+
+std::string beside(const std::string& file, const std::string& named) {
+  return (fs::path(file).parent_path() / named).string();
 }
 
 std::string seen_from(const std::string& scene, const std::string& mesh) {

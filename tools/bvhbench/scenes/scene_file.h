@@ -80,6 +80,9 @@ void use_levels(LoadedScene& scene, std::span<const std::uint32_t> level);
 /// The .bvh file at a path. Throws FileError.
 MappedAsset open_mesh(const std::string& path);
 
+/// The path from here of what a file calls by its path from the file's own folder.
+std::string beside(const std::string& file, const std::string& named);
+
 /// The path of `mesh` from the scene file's folder, so that both can move together.
 std::string seen_from(const std::string& scene, const std::string& mesh);
 

@@ -7,27 +7,27 @@ namespace {
 
 using Eigen::Vector3d;
 
-BodyPair pair_of(const ContactPoint& contact) {
+ObjectPair pair_of(const ContactPoint& contact) {
   return {contact.body_a, contact.body_b};
 }
 
-BodyPair pair_of(const CachedContact& contact) {
+ObjectPair pair_of(const CachedContact& contact) {
   return contact.pair;
 }
 
 // The contacts of a pair that a list by ascending pair begins with.
 template <typename Contact>
-std::span<const Contact> head_of(std::span<const Contact> contacts, const BodyPair& pair) {
+std::span<const Contact> head_of(std::span<const Contact> contacts, const ObjectPair& pair) {
   std::size_t count = 0;
   while (count < contacts.size() && pair_of(contacts[count]) == pair) ++count;
   return contacts.first(count);
 }
 
-double smaller_radius(const BodyPair& pair, std::span<const BodyProperties> bodies) {
+double smaller_radius(const ObjectPair& pair, std::span<const BodyProperties> bodies) {
   return std::min(bodies[pair.a].radius, bodies[pair.b].radius);
 }
 
-PairPose pair_pose(const BodyPair& pair, std::span<const BodyProperties> bodies,
+PairPose pair_pose(const ObjectPair& pair, std::span<const BodyProperties> bodies,
                    std::span<const BodyState> states) {
   const bool first_is_smaller = bodies[pair.a].radius < bodies[pair.b].radius;
   const BodyState& smaller = states[first_is_smaller ? pair.a : pair.b];
@@ -121,11 +121,11 @@ class PairMatch {
 
 }  // namespace
 
-std::vector<BodyPair> ContactCache::unmoved(std::span<const BodyProperties> bodies,
-                                            std::span<const BodyState> states, double reach) const {
-  std::vector<BodyPair> pairs;
+std::vector<ObjectPair> ContactCache::unmoved(std::span<const BodyProperties> bodies,
+                                              std::span<const BodyState> states, double reach) const {
+  std::vector<ObjectPair> pairs;
   for (std::span<const CachedContact> rest = entries_; !rest.empty();) {
-    const BodyPair pair = pair_of(rest.front());
+    const ObjectPair pair = pair_of(rest.front());
     const PairPose& then = rest.front().found_at;
     const PairPose now = pair_pose(pair, bodies, states);
     // A point's way is at most that of the centre and an arc about it.
@@ -137,7 +137,7 @@ std::vector<BodyPair> ContactCache::unmoved(std::span<const BodyProperties> bodi
   return pairs;
 }
 
-void ContactCache::update(std::span<const ContactPoint> found, std::span<const BodyPair> unmoved,
+void ContactCache::update(std::span<const ContactPoint> found, std::span<const ObjectPair> unmoved,
                           std::span<const BodyProperties> bodies, std::span<const BodyState> states,
                           std::span<const std::uint8_t> idle, double gap) {
   const std::vector<CachedContact> before = std::move(entries_);
@@ -145,9 +145,9 @@ void ContactCache::update(std::span<const ContactPoint> found, std::span<const B
   entries_.clear(), contacts_.clear(), place_.clear();
   std::span<const CachedContact> rest = before;
   while (!rest.empty() || !found.empty()) {
-    const BodyPair pair = rest.empty()    ? pair_of(found.front())
-                          : found.empty() ? pair_of(rest.front())
-                                          : std::min(pair_of(rest.front()), pair_of(found.front()));
+    const ObjectPair pair = rest.empty()    ? pair_of(found.front())
+                            : found.empty() ? pair_of(rest.front())
+                                            : std::min(pair_of(rest.front()), pair_of(found.front()));
     const auto old = head_of(rest, pair);
     const auto fresh = head_of(found, pair);
     rest = rest.subspan(old.size()), found = found.subspan(fresh.size());

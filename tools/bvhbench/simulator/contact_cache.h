@@ -18,7 +18,7 @@ struct PairPose {
 
 /// A contact of a step and its impulse, as the next step needs them.
 struct CachedContact {
-  BodyPair pair;
+  ObjectPair pair;
   std::uint64_t feature;
   ContactAnchor anchor;
   Eigen::Vector3d normal_in_a;  ///< the normal, in a's frame
@@ -36,8 +36,8 @@ class ContactCache {
   /// The pairs whose contacts stay what they are: since these were found no point of the smaller body has
   /// moved against the larger by more than `reach`, >= 0, by the bound of the centre's way and the arc that
   /// the turn makes at the body's radius. Ascending.
-  std::vector<BodyPair> unmoved(std::span<const BodyProperties> bodies, std::span<const BodyState> states,
-                                double reach) const;
+  std::vector<ObjectPair> unmoved(std::span<const BodyProperties> bodies, std::span<const BodyState> states,
+                                  double reach) const;
 
   /// Makes the contacts of a step. Unmoved pairs have those remembered, moved with the bodies; these may have
   /// become gaps. All others have those found, and those just lost: remembered ones that are gaps of at most
@@ -52,7 +52,7 @@ class ContactCache {
   ///
   /// Pairs of two idle bodies stay remembered and are left out. Conditions: found comes by ascending pair;
   /// unmoved is unmoved()'s answer for these states; idle is empty or has an entry for each body; gap >= 0.
-  void update(std::span<const ContactPoint> found, std::span<const BodyPair> unmoved,
+  void update(std::span<const ContactPoint> found, std::span<const ObjectPair> unmoved,
               std::span<const BodyProperties> bodies, std::span<const BodyState> states,
               std::span<const std::uint8_t> idle, double gap);
 

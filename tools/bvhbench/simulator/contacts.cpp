@@ -22,18 +22,18 @@ void throw_unless_ok(Status status, const Scene& scene) {
 
 class MeshContactFinder : public ContactFinder {
  public:
-  MeshContactFinder(std::unique_ptr<Engine> engine, std::span<const AssetView> shapes,
-                    const ContactPointOptions& options)
-      : engine_(std::move(engine)), options_(options) {
+  MeshContactFinder(std::unique_ptr<Engine> engine, std::span<const AssetView> shapes, std::uint32_t threads)
+      : engine_(std::move(engine)), threads_(threads) {
+    engine_->set_threads(threads);
     engine_->set_shapes(shapes);
     generator_.set_shapes(shapes);
   }
 
   const std::vector<ContactPoint>& find(std::span<const BodyPose> bodies, std::span<const std::uint8_t> idle,
-                                        std::span<const BodyPair> unmoved) override {
+                                        std::span<const ObjectPair> unmoved) override {
     engine_->find(bodies, idle, found_);
     Stopwatch stopwatch;
-    const std::vector<ContactPoint>& points = generator_.generate(found_, bodies, unmoved, options_);
+    const std::vector<ContactPoint>& points = generator_.generate(found_, bodies, unmoved, threads_);
     report_ = {engine_->times(), stopwatch.lap(), engine_->counters(), generator_.statistics()};
     return points;
   }
@@ -41,7 +41,7 @@ class MeshContactFinder : public ContactFinder {
  private:
   std::unique_ptr<Engine> engine_;
   ContactGenerator generator_;
-  ContactPointOptions options_;
+  std::uint32_t threads_;
   ContactList found_;
 };
 
@@ -71,20 +71,20 @@ void ContactGenerator::set_shapes(std::span<const AssetView> shapes) {
 
 const std::vector<ContactPoint>& ContactGenerator::generate(const ContactList& found,
                                                             std::span<const BodyPose> bodies,
-                                                            std::span<const BodyPair> left_out,
-                                                            const ContactPointOptions& options) {
+                                                            std::span<const ObjectPair> left_out,
+                                                            std::uint32_t threads) {
   contacts_.clear();
   std::vector<char> is_left_out;
   for (const ObjectPair& pair : found.pairs)
-    is_left_out.push_back(std::binary_search(left_out.begin(), left_out.end(), BodyPair{pair.a, pair.b}));
+    is_left_out.push_back(std::binary_search(left_out.begin(), left_out.end(), pair));
   for (const TriangleContact& c : found.triangles) {
     if (!is_left_out[c.pair]) contacts_.push_back({c.pair, c.triangle_a, c.triangle_b, 0, 0});
   }
   // The solvers remember by themselves what a point did in the step before.
-  const ManifoldOptions manifold_options = {.match_previous = false, .most_points = options.points_per_patch};
-  scene_.set_threads(options.threads);
+  const ManifoldOptions options = {.match_previous = false};
+  scene_.set_threads(threads);
   throw_unless_ok(scene_.place(bodies), scene_);
-  throw_unless_ok(manifolds_.find(scene_, found.pairs, contacts_, manifold_options), scene_);
+  throw_unless_ok(manifolds_.find(scene_, found.pairs, contacts_, options), scene_);
   points_.clear();
   statistics_ = {manifolds_.counters(), 0, 0};
   for (const Manifold& manifold : manifolds_.rows()) {
@@ -101,9 +101,8 @@ const std::vector<ContactPoint>& ContactGenerator::generate(const ContactList& f
 
 std::unique_ptr<ContactFinder> make_mesh_contact_finder(std::unique_ptr<Engine> engine,
                                                         std::span<const AssetView> shapes,
-                                                        const ContactPointOptions& options) {
-  engine->set_threads(options.threads);
-  return std::make_unique<MeshContactFinder>(std::move(engine), shapes, options);
+                                                        std::uint32_t threads) {
+  return std::make_unique<MeshContactFinder>(std::move(engine), shapes, threads);
 }
 
 }  // namespace tandem::simulation

@@ -1,6 +1,5 @@
 #pragma once
 #include <Eigen/Core>
-#include <compare>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -10,13 +9,6 @@
 #include "tandem/kernels/manifold_query.h"
 
 namespace tandem::simulation {
-
-/// Two bodies, a < b.
-struct BodyPair {
-  std::uint32_t a, b;
-
-  friend auto operator<=>(const BodyPair&, const BodyPair&) = default;
-};
 
 /// A point in which two bodies push against each other: what a solver makes one contact of.
 struct ContactPoint {
@@ -51,11 +43,6 @@ struct ContactImpulse {
                                                          ///< of a pair has an equal part
 };
 
-struct ContactPointOptions {
-  std::uint32_t points_per_patch = kMostManifoldPoints;  ///< at most, from 1
-  std::uint32_t threads = 1;
-};
-
 /// What became of a list of triangle pairs.
 struct ContactStatistics {
   ManifoldCounters counters;
@@ -74,8 +61,7 @@ class ContactGenerator {
   /// The points come by ascending pair of bodies, those of the pairs `left_out` not at all. Valid until the
   /// next call. Conditions: `found` is an engine's answer for these bodies; left_out is ascending.
   const std::vector<ContactPoint>& generate(const ContactList& found, std::span<const BodyPose> bodies,
-                                            std::span<const BodyPair> left_out,
-                                            const ContactPointOptions& options = {});
+                                            std::span<const ObjectPair> left_out, std::uint32_t threads = 1);
 
   /// Of the last call.
   const ContactStatistics& statistics() const { return statistics_; }
@@ -106,7 +92,7 @@ class ContactFinder {
   /// for each body; unmoved is ascending.
   virtual const std::vector<ContactPoint>& find(std::span<const BodyPose> bodies,
                                                 std::span<const std::uint8_t> idle,
-                                                std::span<const BodyPair> unmoved) = 0;
+                                                std::span<const ObjectPair> unmoved) = 0;
 
   /// Of the last call.
   const FinderReport& report() const { return report_; }
@@ -119,6 +105,6 @@ class ContactFinder {
 /// the shapes look at must outlive it.
 std::unique_ptr<ContactFinder> make_mesh_contact_finder(std::unique_ptr<Engine> engine,
                                                         std::span<const AssetView> shapes,
-                                                        const ContactPointOptions& options);
+                                                        std::uint32_t threads);
 
 }  // namespace tandem::simulation

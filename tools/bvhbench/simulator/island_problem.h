@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -120,14 +121,6 @@ void apply_solution(const IslandProblem& problem, const StepInput& input, std::s
 /// Results: velocity, displacement, impulse of the problem, and what its last substep leaves undone.
 Residual solve_soft_step(IslandProblem& problem, const StepInput& input, const SolverOptions& options);
 
-/// What Newton's method did.
-struct NewtonReport {
-  bool converged = false;
-  std::uint32_t factorisations = 0;
-  std::uint32_t passes = 0;
-  Residual residual;
-};
-
 /// Solves a step of a whole island to convergence, in passes. Each finds the velocities that make the
 /// function of ConvexContacts least, with the impulses and the bounds of friction that the pass before ended
 /// with; the first starts from those of the step before. At the least, a contact misses its law by R times
@@ -139,8 +132,9 @@ struct NewtonReport {
 /// start and at the end, that bring no contact deeper than the slop and take away the part `correction` of
 /// what is deeper. The mean makes sliding and stopping right to second order.
 ///
-/// Results, if it converged: velocity, displacement and impulse of the problem; else these stay what they
-/// were.
-NewtonReport solve_newton_step(IslandProblem& problem, const StepInput& input, const SolverOptions& options);
+/// Results, if it converged: velocity, displacement and impulse of the problem, and what is left undone; else
+/// nothing, and these stay what they were.
+std::optional<Residual> solve_newton_step(IslandProblem& problem, const StepInput& input,
+                                          const SolverOptions& options);
 
 }  // namespace tandem::simulation

@@ -11,7 +11,7 @@
 namespace tandem::simulation {
 namespace {
 
-/// How the triangles of a mesh hang together: corners at the same stored position share a vertex.
+/// How the triangles of a level hang together, and what is amiss with it.
 struct Surface {
   /// Two vertices that one triangle or more have in common, lower < upper.
   struct Edge {
@@ -19,13 +19,9 @@ struct Surface {
     std::uint32_t triangles;  ///< that have it
   };
 
-  /// The triangles are those of the level, in its order.
-  std::vector<std::array<float, 3>> position;         ///< of each vertex, stored coordinates
-  std::vector<std::array<std::uint32_t, 3>> corner;   ///< vertices of each triangle
-  std::vector<std::array<std::uint32_t, 3>> edge_of;  ///< edges of each triangle; k joins corners k, k + 1
-  std::vector<Edge> edge;
-  std::vector<std::uint8_t> turned;  ///< of each triangle: its winding is against the rest's
-  std::uint32_t components = 0;
+  LevelView level;
+  std::vector<std::array<std::uint32_t, 3>> edge_of = {};  ///< edges of each triangle, by its sides
+  std::vector<Edge> edge = {};
 
   std::uint64_t boundary_edges = 0;  ///< of an odd number of triangles
   std::uint64_t contradicting_edges =
@@ -35,38 +31,26 @@ struct Surface {
   bool orientable = true;               ///< windings agree, once what is marked as turned is
   bool closed = true;                   ///< every edge is run along equally often in both directions, then
 
-  std::uint32_t triangle_count() const { return static_cast<std::uint32_t>(corner.size()); }
+  std::span<const TriangleTopology> triangles() const { return {level.topology, level.triangle_count}; }
 };
-
-void take_vertices(const LevelView& level, Surface& surface) {
-  surface.position.resize(level.vertex_count);
-  for (std::uint32_t t = 0; t < level.triangle_count; ++t) {
-    const TriangleTopology& triangle = level.topology[t];
-    surface.corner.push_back({triangle.vertex[0], triangle.vertex[1], triangle.vertex[2]});
-    surface.turned.push_back(is_turned(triangle.flags));
-    for (int k = 0; k < 3; ++k) {
-      const float* p = level.triangles[t].corner[k].position;
-      surface.position[triangle.vertex[k]] = {p[0] + 0.0f, p[1] + 0.0f, p[2] + 0.0f};  // -0 is 0
-    }
-  }
-}
 
 void find_edges(Surface& surface) {
   struct Side {
     std::uint32_t lower, upper, place;  // place: 3 * triangle + k
   };
   std::vector<Side> sides;
-  sides.reserve(3 * surface.corner.size());
-  for (std::uint32_t t = 0; t < surface.triangle_count(); ++t) {
+  const std::span<const TriangleTopology> triangles = surface.triangles();
+  sides.reserve(3 * triangles.size());
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
     for (std::uint32_t k = 0; k < 3; ++k) {
-      const std::uint32_t u = surface.corner[t][k], v = surface.corner[t][(k + 1) % 3];
+      const std::uint32_t u = triangles[t].vertex[k], v = triangles[t].vertex[(k + 1) % 3];
       sides.push_back({std::min(u, v), std::max(u, v), 3 * t + k});
     }
   }
   std::sort(sides.begin(), sides.end(), [](const Side& x, const Side& y) {
     return std::tie(x.lower, x.upper, x.place) < std::tie(y.lower, y.upper, y.place);
   });
-  surface.edge_of.resize(surface.corner.size());
+  surface.edge_of.resize(triangles.size());
   for (const Side& side : sides) {
     const bool same = !surface.edge.empty() && surface.edge.back().lower == side.lower &&
                       surface.edge.back().upper == side.upper;
@@ -77,39 +61,34 @@ void find_edges(Surface& surface) {
 }
 
 // What is turned: whole components, or triangles beside the rest of their component.
-void count_turned(const LevelView& level, Surface& surface) {
-  UnionFind triangles(surface.triangle_count());  // of each component
+void count_turned(Surface& surface) {
+  const LevelView& level = surface.level;
+  UnionFind triangles(level.triangle_count);  // of each component
   std::vector<std::uint32_t> first(surface.edge.size(), kNoIndex);
-  for (std::uint32_t t = 0; t < surface.triangle_count(); ++t) {
+  for (std::uint32_t t = 0; t < level.triangle_count; ++t) {
     for (const std::uint32_t e : surface.edge_of[t]) {
       if (first[e] == kNoIndex) first[e] = t;
       triangles.join(t, first[e]);
     }
   }
-  std::vector<std::uint32_t> turned(surface.triangle_count(), 0);
-  for (std::uint32_t t = 0; t < surface.triangle_count(); ++t) turned[triangles.find(t)] += surface.turned[t];
+  std::vector<std::uint32_t> turned(level.triangle_count, 0);
+  for (std::uint32_t t = 0; t < level.triangle_count; ++t)
+    turned[triangles.find(t)] += is_turned(level.topology[t].flags);
   for (const SurfaceComponent& component : std::span(level.components, level.component_count)) {
     const std::uint32_t t = component.first_triangle, all = component.triangle_count;
-    const bool most = 2 * turned[t] > all || (2 * turned[t] == all && surface.turned[t] != 0);
+    const bool most = 2 * turned[t] > all || (2 * turned[t] == all && is_turned(level.topology[t].flags));
     surface.turned_components += most;
     surface.turned_triangles += most ? all - turned[t] : turned[t];
   }
 }
 
-// Whether triangle t, as it is marked, runs along its edge k from the lower to the upper vertex.
-bool runs_up(const Surface& surface, std::uint32_t t, std::uint32_t k) {
-  return (surface.corner[t][k] < surface.corner[t][(k + 1) % 3]) != (surface.turned[t] != 0);
-}
-
 // How often each edge is run along upwards less downwards, as triangles are marked or as they are.
 std::vector<int> balance(const Surface& surface, bool as_marked) {
   std::vector<int> sum(surface.edge.size(), 0);
-  for (std::uint32_t t = 0; t < surface.triangle_count(); ++t) {
-    for (std::uint32_t k = 0; k < 3; ++k) {
-      const bool up =
-          as_marked ? runs_up(surface, t, k) : surface.corner[t][k] < surface.corner[t][(k + 1) % 3];
-      sum[surface.edge_of[t][k]] += up ? 1 : -1;
-    }
+  for (std::uint32_t t = 0; t < surface.level.triangle_count; ++t) {
+    TriangleTopology triangle = surface.level.topology[t];
+    if (!as_marked) triangle.flags = 0;
+    for (std::uint32_t k = 0; k < 3; ++k) sum[surface.edge_of[t][k]] += runs_up(triangle, k) ? 1 : -1;
   }
   return sum;
 }
@@ -129,16 +108,13 @@ void count_defects(Surface& surface) {
   }
 }
 
-// The surface of a level with topology, from which come vertices and what is turned. Throws
-// std::runtime_error where the level has none.
+// Throws std::runtime_error where the level has no topology.
 Surface make_surface(const LevelView& level) {
   if (level.topology == nullptr)
     throw std::runtime_error("the asset has no topology: build it without --no-topology");
-  Surface surface;
-  surface.components = level.component_count;
-  take_vertices(level, surface);
+  Surface surface = {level};
   find_edges(surface);
-  count_turned(level, surface);
+  count_turned(surface);
   count_defects(surface);
   return surface;
 }
@@ -211,13 +187,13 @@ Moments integrate(const Surface& surface, const Vector3d& about, const Of& of) {
   Sum<double> zeroth(0);
   Sum<Vector3d> first(Vector3d::Zero());
   Sum<Matrix3d> second(Matrix3d::Zero());
-  for (std::uint32_t t = 0; t < surface.triangle_count(); ++t) {
+  for (std::uint32_t t = 0; t < surface.level.triangle_count; ++t) {
     Vector3d x[3];
     for (int k = 0; k < 3; ++k) {
-      const auto& position = surface.position[surface.corner[t][k]];
+      const float* position = surface.level.triangles[t].corner[k].position;
       x[k] = Vector3d(position[0], position[1], position[2]) - about;
     }
-    if (surface.turned[t] != 0) std::swap(x[1], x[2]);
+    if (is_turned(surface.level.topology[t].flags)) std::swap(x[1], x[2]);
     const Moments part = of(x[0], x[1], x[2]);
     zeroth.add(part.zeroth);
     first.add(part.first);
@@ -252,7 +228,7 @@ void add_findings(const Surface& surface, std::vector<std::string>& findings) {
              : ", and no winding makes them agree"));
   }
   if (surface.turned_components != 0) {
-    findings.push_back(surface.components == 1
+    findings.push_back(surface.level.component_count == 1
                            ? "inside out: taken to be wound the other way"
                            : counted(surface.turned_components, "component is", "components are") +
                                  " inside out and no cavity of another: taken to be wound the other way");
@@ -260,8 +236,8 @@ void add_findings(const Surface& surface, std::vector<std::string>& findings) {
   if (surface.boundary_edges != 0) {
     findings.push_back("open: " + counted(surface.boundary_edges, "boundary edge", "boundary edges"));
   }
-  if (surface.components > 1) {
-    findings.push_back(counted(surface.components, "component", "components") +
+  if (surface.level.component_count > 1) {
+    findings.push_back(counted(surface.level.component_count, "component", "components") +
                        ": their masses are added, where they overlap too");
   }
 }
@@ -273,7 +249,7 @@ MassReport mass_properties(const AssetView& asset) {
   const FileHeader& header = *asset.header;
   const Vector3d about = middle(header);
   const double size = diagonal(header);
-  MassReport report = {{}, MassModel::solid, surface.components, {}};
+  MassReport report = {{}, MassModel::solid, surface.level.component_count, {}};
   add_findings(surface, report.findings);
   if (surface.closed) {
     const Moments moments = integrate(surface, about, solid_moments);

@@ -367,7 +367,7 @@ class ConvexContacts {
   std::vector<Vector3d> turning_, turning_way_;  // of pairs
 };
 
-constexpr std::uint32_t kMostPasses = 30;
+constexpr int kMostPasses = 30;
 constexpr std::uint32_t kMostFactorisations = 100;
 
 class NewtonStep {
@@ -375,12 +375,8 @@ class NewtonStep {
   NewtonStep(const IslandProblem& problem, const StepInput& input, const SolverOptions& options)
       : problem_(problem), input_(input), options_(options), contacts_(problem) {}
 
-  NewtonReport solve() {
-    NewtonReport report;
-    report.converged = solve_velocities(report) && solve_displacement();
-    report.factorisations = kMostFactorisations - left_;
-    return report;
-  }
+  // Result: whether it converged.
+  bool solve() { return solve_velocities() && solve_displacement(); }
 
   // Condition: solve() converged.
   Residual write(IslandProblem& problem) {
@@ -392,15 +388,14 @@ class NewtonStep {
   }
 
  private:
-  bool solve_velocities(NewtonReport& report) {
+  bool solve_velocities() {
     constexpr double kSoftness = 1e-5;
     contacts_.set_softness(kSoftness);
     ConvexGoal goal = goal_of_velocities();
     target_ = goal.target;
     const double solved = least_change();
     end_ = problem_.velocity;
-    while (report.passes < kMostPasses) {
-      ++report.passes;
+    for (int pass = 0; pass < kMostPasses; ++pass) {
       if (!contacts_.minimise(goal, end_, impulse_, left_)) return false;
       if (next_change(goal) <= solved) return true;
       take_impulses(goal, impulse_);
@@ -511,11 +506,11 @@ class NewtonStep {
 
 }  // namespace
 
-NewtonReport solve_newton_step(IslandProblem& problem, const StepInput& input, const SolverOptions& options) {
+std::optional<Residual> solve_newton_step(IslandProblem& problem, const StepInput& input,
+                                          const SolverOptions& options) {
   NewtonStep step(problem, input, options);
-  NewtonReport report = step.solve();
-  if (report.converged) report.residual = step.write(problem);
-  return report;
+  if (!step.solve()) return {};
+  return step.write(problem);
 }
 
 }  // namespace tandem::simulation

@@ -7,7 +7,6 @@
 #include <stdexcept>
 
 #include "bvhbench/scenes/make_scene.h"
-#include "bvhbench/scenes/make_scene_parts.h"
 #include "bvhbench/scenes/scene_motion.h"
 #include "common/random_pose.h"
 #include "tandem/formats/hash.h"

@@ -11,7 +11,7 @@
 #include <filesystem>
 
 #include "bvhbench/scenes/hdf5_file.h"
-#include "bvhbench/scenes/make_scene_parts.h"
+#include "bvhbench/scenes/make_scene.h"
 
 namespace tandem::simulation {
 namespace {

@@ -5,7 +5,35 @@
 #include <type_traits>
 #include <utility>
 
-#include "bvhbench/scenes/hdf5_file.h"
+#include "bvhbench/scenes/columns.h"
+
+namespace tandem::bench {
+
+template <>
+struct Stored<Eigen::Vector3d> {
+  using Number = double;
+  static constexpr std::size_t kWidth = 3;
+  static void append(std::vector<double>& numbers, const Eigen::Vector3d& vector) {
+    numbers.insert(numbers.end(), vector.data(), vector.data() + 3);
+  }
+  static Eigen::Vector3d at(const std::vector<double>& numbers, std::size_t i) {
+    return Eigen::Vector3d(&numbers[3 * i]);
+  }
+};
+
+template <>
+struct Stored<Eigen::Quaterniond> {
+  using Number = double;
+  static constexpr std::size_t kWidth = 4;
+  static void append(std::vector<double>& numbers, const Eigen::Quaterniond& turn) {
+    numbers.insert(numbers.end(), {turn.w(), turn.x(), turn.y(), turn.z()});
+  }
+  static Eigen::Quaterniond at(const std::vector<double>& numbers, std::size_t i) {
+    return {numbers[4 * i], numbers[4 * i + 1], numbers[4 * i + 2], numbers[4 * i + 3]};
+  }
+};
+
+}  // namespace tandem::bench
 
 namespace tandem::simulation {
 namespace {
@@ -13,53 +41,9 @@ namespace {
 using bench::FileError;
 using bench::Hdf5Input;
 using bench::Hdf5Output;
+using bench::Stored;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
-
-// What a value is in a dataset: its type there, and how many numbers.
-template <typename Value>
-struct Stored {
-  using Number = Value;
-  static constexpr std::size_t kWidth = 1;
-  static void append(std::vector<Number>& numbers, const Value& value) { numbers.push_back(value); }
-  static Value at(const std::vector<Number>& numbers, std::size_t i) { return numbers[i]; }
-};
-
-template <>
-struct Stored<Vector3d> {
-  using Number = double;
-  static constexpr std::size_t kWidth = 3;
-  static void append(std::vector<double>& numbers, const Vector3d& vector) {
-    numbers.insert(numbers.end(), vector.data(), vector.data() + 3);
-  }
-  static Vector3d at(const std::vector<double>& numbers, std::size_t i) {
-    return Vector3d(numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]);
-  }
-};
-
-template <>
-struct Stored<Quaterniond> {
-  using Number = double;
-  static constexpr std::size_t kWidth = 4;
-  static void append(std::vector<double>& numbers, const Quaterniond& turn) {
-    numbers.insert(numbers.end(), {turn.w(), turn.x(), turn.y(), turn.z()});
-  }
-  static Quaterniond at(const std::vector<double>& numbers, std::size_t i) {
-    return Quaterniond(numbers[4 * i], numbers[4 * i + 1], numbers[4 * i + 2], numbers[4 * i + 3]);
-  }
-};
-
-template <>
-struct Stored<BodyPair> {
-  using Number = std::uint32_t;
-  static constexpr std::size_t kWidth = 2;
-  static void append(std::vector<std::uint32_t>& numbers, const BodyPair& pair) {
-    numbers.insert(numbers.end(), {pair.a, pair.b});
-  }
-  static BodyPair at(const std::vector<std::uint32_t>& numbers, std::size_t i) {
-    return {numbers[2 * i], numbers[2 * i + 1]};
-  }
-};
 
 // The datasets of a kind of row: calls visit(name, member) for each, one row for each element.
 template <typename Visit>
@@ -132,28 +116,9 @@ void for_each_column(const CachedContact&, const Visit& visit) {
       "/state/contacts/turning_impulse", [](auto& c) -> auto& { return c.impulse.turning; });
 }
 
-template <typename Of>
-bench::Shape row_shape() {
-  return Of::kWidth == 1 ? bench::Shape() : bench::Shape{Of::kWidth};
-}
-
 template <typename Row>
-void write_rows(Hdf5Output& file, const std::vector<Row>& rows) {
-  for_each_column(Row(), [&](const char* name, auto member) {
-    using Of = Stored<std::decay_t<decltype(std::invoke(member, rows[0]))>>;
-    std::vector<typename Of::Number> numbers;
-    for (const Row& row : rows) Of::append(numbers, std::invoke(member, row));
-    bench::Shape shape = row_shape<Of>();
-    shape.insert(shape.begin(), rows.size());
-    file.add(name, shape, numbers);
-  });
-}
-
-template <typename Number>
-std::vector<Number> read_numbers(const Hdf5Input& file, const char* name, const bench::Shape& row) {
-  if constexpr (std::is_same_v<Number, double>) return file.read_f64(name, row);
-  if constexpr (std::is_same_v<Number, std::uint32_t>) return file.read_u32(name, row);
-  if constexpr (std::is_same_v<Number, std::uint64_t>) return file.read_u64(name, row);
+void write_rows(Hdf5Output& file, std::span<const Row> rows) {
+  for_each_column(Row(), [&](const char* name, auto member) { add_column(file, name, rows, member); });
 }
 
 // Reads rows, as many as the first dataset has. Result: whether all have as many.
@@ -161,37 +126,31 @@ template <typename Row>
 bool read_rows(const Hdf5Input& file, std::vector<Row>& rows) {
   bool first = true, alike = true;
   for_each_column(Row(), [&](const char* name, auto member) {
-    using Of = Stored<std::decay_t<decltype(std::invoke(member, rows[0]))>>;
-    const auto numbers = read_numbers<typename Of::Number>(file, name, row_shape<Of>());
-    const std::size_t count = numbers.size() / Of::kWidth;
-    alike = alike && (first || count == rows.size());
-    if (std::exchange(first, false)) rows.resize(count);
-    for (std::size_t i = 0; i < std::min(rows.size(), count); ++i)
-      std::invoke(member, rows[i]) = Of::at(numbers, i);
+    const auto values = bench::read_values<std::decay_t<decltype(std::invoke(member, rows[0]))>>(file, name);
+    alike = alike && (first || values.size() == rows.size());
+    if (std::exchange(first, false)) rows.resize(values.size());
+    for (std::size_t i = 0; i < std::min(rows.size(), values.size()); ++i)
+      std::invoke(member, rows[i]) = values[i];
   });
   return alike;
 }
 
 void write_bodies(Hdf5Output& file, const RunDescription& run) {
-  std::vector<std::uint32_t> asset, level, motion;
-  std::vector<double> mass, center, inertia;
-  for (const BodyProperties& body : run.bodies) {
-    asset.push_back(run.shapes[body.shape].asset);
-    level.push_back(run.shapes[body.shape].level);
-    motion.push_back(static_cast<std::uint32_t>(body.motion));
-    mass.push_back(body.motion == Motion::moving ? body.mass : 0);
-    Stored<Vector3d>::append(center, body.center);
-    inertia.insert(inertia.end(), body.inertia.data(), body.inertia.data() + 9);  // symmetric
-  }
-  const std::size_t count = run.bodies.size();
+  const std::span<const BodyProperties> bodies = run.bodies;
+  const auto asset = [&](const BodyProperties& body) { return run.shapes[body.shape].asset; };
+  const auto level = [&](const BodyProperties& body) { return run.shapes[body.shape].level; };
+  const auto motion = [](const BodyProperties& body) { return static_cast<std::uint32_t>(body.motion); };
+  const auto mass = [](const BodyProperties& body) { return body.motion == Motion::moving ? body.mass : 0; };
   file.add("/assets", run.assets);
-  file.add("/bodies/asset", {count}, asset);
-  if (std::count(level.begin(), level.end(), 0) != static_cast<std::ptrdiff_t>(count))
-    file.add("/bodies/level", {count}, level);
-  file.add("/bodies/motion", {count}, motion);
-  file.add("/bodies/mass", {count}, mass);
-  file.add("/bodies/center_of_mass", {count, 3}, center);
-  file.add("/bodies/inertia", {count, 3, 3}, inertia);
+  add_column(file, "/bodies/asset", bodies, asset);
+  if (std::any_of(bodies.begin(), bodies.end(), level)) add_column(file, "/bodies/level", bodies, level);
+  add_column(file, "/bodies/motion", bodies, motion);
+  add_column(file, "/bodies/mass", bodies, mass);
+  add_column(file, "/bodies/center_of_mass", bodies, &BodyProperties::center);
+  std::vector<double> inertia;
+  for (const BodyProperties& body : bodies)
+    inertia.insert(inertia.end(), body.inertia.data(), body.inertia.data() + 9);  // symmetric
+  file.add("/bodies/inertia", {bodies.size(), 3, 3}, inertia);
 }
 
 void write_trajectory(Hdf5Output& file, const Trajectory& trajectory, std::size_t bodies) {
@@ -218,10 +177,10 @@ void write_state(Hdf5Output& file, const SimulatorState& state) {
   const std::size_t bodies = state.states.size();
   const std::vector<std::uint64_t> step = {state.step};
   file.add("/state/step", {1}, step);
-  write_rows(file, state.states);
+  write_rows(file, std::span(state.states));
   file.add("/state/quiet_seconds", {bodies}, state.quiet);
   file.add("/state/sleeping_group", {bodies}, state.groups);
-  write_rows(file, state.contacts);
+  write_rows(file, std::span(state.contacts));
 }
 
 SimulatorState read_state(const Hdf5Input& file, const std::string& path, std::size_t bodies) {
@@ -287,7 +246,7 @@ void write_run(const std::string& path, const RunDescription& run, const RunResu
   file.attribute("steps", std::uint64_t{results.records.size()});
   file.attribute("triangles", run.triangles);
   write_bodies(file, run);
-  write_rows(file, results.records);
+  write_rows(file, std::span(results.records));
   write_trajectory(file, results.trajectory, run.bodies.size());
   write_state(file, results.state);
   file.write();

@@ -61,7 +61,7 @@ StepRecord Simulator::step_in_arena() {
 void Simulator::find_contacts(StepRecord& record) {
   constexpr double kFall = 2;  // times what gravity lets a body fall in a step
   const std::vector<std::uint8_t> idle = this->idle();
-  const std::vector<BodyPair> unmoved = cache_.unmoved(bodies_, states_, options_.solver.slop);
+  const std::vector<ObjectPair> unmoved = cache_.unmoved(bodies_, states_, options_.solver.slop);
   const std::vector<ContactPoint>& found = finder_->find(poses(), idle, unmoved);
   take(record, finder_->report());
   Stopwatch stopwatch;

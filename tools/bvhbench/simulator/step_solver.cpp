@@ -52,10 +52,10 @@ class IslandSolver final : public StepSolver {
         return;
       }
       IslandProblem problem = make_island_problem(input, i, {states, impulses}, options_, layers, place_);
-      NewtonReport newton;
+      std::optional<Residual> newton;
       if (wants_newton(input.islands, i, layers)) newton = solve_newton_step(problem, input, options_);
-      by_newton += newton.converged ? 1 : 0;
-      residuals[i] = newton.converged ? newton.residual : solve_soft_step(problem, input, options_);
+      by_newton += newton ? 1 : 0;
+      residuals[i] = newton ? *newton : solve_soft_step(problem, input, options_);
       apply_solution(problem, input, states, impulses);
     });
     for (std::uint32_t i = 0; i < states.size(); ++i) {

@@ -1,96 +1,10 @@
 #include "mesh_message.h"
 
-#include <algorithm>
-#include <limits>
-
 namespace tandem::build {
 namespace {
 
 constexpr std::uint64_t kBegin = 0x4873654d6d646e54u;
 constexpr std::uint64_t kEnd = 0x646e456d646e5421u;
-
-/// Writer and MessageReader have the same functions, so that what a message holds is listed once.
-class Writer {
- public:
-  explicit Writer(const MessageSink& sink) : sink_(sink) {}
-
-  bool number(std::uint64_t value) {
-    sink_(&value, sizeof value);
-    return true;
-  }
-  bool flag(bool value) { return number(value); }
-
-  template <class Sequence>
-  bool sequence(const Sequence& items) {
-    number(items.size());
-    if (!items.empty()) sink_(items.data(), items.size() * sizeof(items[0]));
-    return true;
-  }
-
-  template <class Item, class Write>
-  bool list(const std::vector<Item>& items, const Write& write) {
-    number(items.size());
-    return std::all_of(items.begin(), items.end(), write);
-  }
-
- private:
-  const MessageSink& sink_;
-};
-
-class MessageReader {
- public:
-  MessageReader(const MessageSource& source, std::uint64_t most_bytes)
-      : source_(source), bytes_left_(most_bytes) {}
-
-  bool number(std::uint64_t& value) { return source_(&value, sizeof value); }
-  bool flag(bool& value) {
-    std::uint64_t stored = 0;
-    if (!number(stored)) return false;
-    value = stored != 0;
-    return true;
-  }
-
-  bool expect(std::uint64_t wanted) {
-    std::uint64_t value = 0;
-    return number(value) && value == wanted;
-  }
-
-  /// Reserved memory is not yet used memory, so an announcement that nothing follows costs address space
-  /// alone.
-  template <class Sequence>
-  bool sequence(Sequence& items) {
-    using Item = typename Sequence::value_type;
-    std::uint64_t count = 0;
-    if (!number(count) || count > bytes_left_ / sizeof(Item)) return false;
-    bytes_left_ -= count * sizeof(Item);
-    items.clear();
-    items.reserve(count);
-    constexpr std::uint64_t kAtOnce = std::max<std::uint64_t>(1, (1u << 20) / sizeof(Item));
-    while (items.size() < count) {
-      const std::size_t before = items.size();
-      const std::size_t some = std::min(count - before, kAtOnce);
-      items.resize(before + some);
-      if (!source_(items.data() + before, some * sizeof(Item))) return false;
-    }
-    return true;
-  }
-
-  template <class Item, class Read>
-  bool list(std::vector<Item>& items, const Read& read) {
-    std::uint64_t count = 0;
-    if (!number(count)) return false;
-    for (std::uint64_t i = 0; i < count; ++i) {
-      if (bytes_left_ < sizeof(Item)) return false;
-      bytes_left_ -= sizeof(Item);
-      if (!read(items.emplace_back())) return false;
-    }
-    return true;
-  }
-
- private:
-  const MessageSource& source_;
-  std::uint64_t bytes_left_;
-};
 
 bool faces_are_sound(const PolygonMesh& mesh) {
   const auto& begin = mesh.face_begin;
@@ -109,7 +23,7 @@ bool parts_are_sound(const PolygonMesh& mesh) {
   return next == mesh.face_count();
 }
 
-/// Writes or reads a mesh. Stream: a Writer of a constant mesh, or a MessageReader.
+/// Writes or reads a mesh. Stream: a MessageWriter of a constant mesh, or a MessageReader.
 template <class Stream, class Mesh>
 bool pass_mesh(Stream& stream, Mesh& mesh) {
   const auto pass_text = [&](auto& text) { return stream.sequence(text); };
@@ -127,7 +41,7 @@ bool pass_mesh(Stream& stream, Mesh& mesh) {
 }  // namespace
 
 void write_message(const ReadResult& result, const MessageSink& sink) {
-  Writer writer(sink);
+  MessageWriter writer(sink);
   writer.number(kBegin);
   writer.flag(result.ok);
   writer.sequence(result.error);

@@ -1,16 +1,10 @@
 #pragma once
-#include <cstddef>
 #include <cstdint>
-#include <functional>
 
+#include "common/message.h"
 #include "import.h"
 
 namespace tandem::build {
-
-/// Takes bytes of a message.
-using MessageSink = std::function<void(const void* bytes, std::size_t count)>;
-/// Gives exactly `count` bytes of a message; false when there are no more.
-using MessageSource = std::function<bool(void* to, std::size_t count)>;
 
 /// Writes what a child process tells its parent: a mesh, or the reason why there is none, in the byte order
 /// of both processes.

@@ -29,10 +29,9 @@ class SurfaceEdges {
   std::vector<std::uint32_t> edge_, first_, sides_;
 };
 
-/// Whether a side runs from its lower to its upper vertex, once its triangle is turned where it is marked.
+/// runs_up() of a side of these triangles.
 inline bool runs_up(std::span<const TriangleTopology> triangles, std::uint32_t side) {
-  const TriangleTopology& triangle = triangles[side / 3];
-  return (triangle.vertex[side % 3] < triangle.vertex[(side + 1) % 3]) != is_turned(triangle.flags);
+  return tandem::runs_up(triangles[side / 3], side % 3);
 }
 
 /// How the triangles of a level hang together, as it lies in the file.

@@ -35,7 +35,13 @@ TANDEM_HD constexpr bool is_turned(std::uint32_t flags) {
   return (flags & kTurned) != 0;
 }
 
-/// Whether no other triangle has side k's edge. Condition: 0 <= k < 3, here and below.
+/// Whether side k runs from its lower to its upper vertex, once the triangle is turned where it is marked.
+/// Condition: 0 <= k < 3, here and below.
+TANDEM_HD constexpr bool runs_up(const TriangleTopology& triangle, std::uint32_t k) {
+  return (triangle.vertex[k] < triangle.vertex[(k + 1) % 3]) != is_turned(triangle.flags);
+}
+
+/// Whether no other triangle has side k's edge.
 TANDEM_HD constexpr bool is_boundary(std::uint32_t flags, int k) {
   return (flags & kBoundaryEdge0 << k) != 0;
 }

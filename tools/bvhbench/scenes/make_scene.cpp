@@ -1,4 +1,4 @@
-#include "make_scene_parts.h"
+#include "make_scene.h"
 
 #include <new>
 #include <stdexcept>

@@ -1,5 +1,5 @@
 #pragma once
-#include "kernels/common/block_pair.h"
+#include "kernels/common/lane_variant.h"
 #include "kernels/common/lanes.h"
 #include "kernels/manifold/contact_curves.h"
 #include "kernels/manifold/patch.h"
@@ -7,7 +7,7 @@
 // What makes manifolds faster on a machine that has the instructions. All ways give the same bytes.
 namespace tandem {
 
-struct ManifoldMeans {
+struct ManifoldLanes {
   static constexpr int kMostLines = 16;
 
   /// Words of the table that pieces are joined by: so many for each contact, and some more.
@@ -61,13 +61,15 @@ struct ManifoldMeans {
   manifold::Extreme (*find_extreme)(const manifold::Body& body, const manifold::Prism& prism, int side);
 };
 
-/// The named way, or null where this machine or this build lacks it.
-const ManifoldMeans* manifold_means(BlockPairVariant variant);
+/// The named way, or null where this machine or this build lacks it; there is no scalar one.
+inline const ManifoldLanes* manifold_lanes(BlockPairVariant variant) {
+  return way_of<const ManifoldLanes*>(variant, nullptr, &LaneVariant::manifold_lanes);
+}
 
 /// Of the widest vectors that this machine has. Condition: TANDEM_HAVE_LANES.
-const ManifoldMeans& best_manifold_means();
-
-// Each defined in a file of its own, which is compiled for machines that have the instructions.
-extern const ManifoldMeans kManifoldMeansLanes4, kManifoldMeansAvx2, kManifoldMeansAvx512;
+inline const ManifoldLanes& best_manifold_lanes() {
+  static const ManifoldLanes& best = *best_way(manifold_lanes);
+  return best;
+}
 
 }  // namespace tandem

@@ -59,7 +59,7 @@ std::size_t compare_variants(ManifoldScene& scene) {
     const PatchesOfPair plain = patches_of(manifold::OneThread(), bodies, of_pair);
     patches += plain.patches.size();
     for (const BlockPairVariant variant : kBlockPairVariants) {
-      const ManifoldMeans* const means = manifold_means(variant);
+      const ManifoldLanes* const means = manifold_lanes(variant);
       if (means == nullptr) continue;
       SCOPED_TRACE(static_cast<int>(variant));
       expect_same(plain, patches_of(MeansThread{{}, *means}, bodies, of_pair));
@@ -68,7 +68,7 @@ std::size_t compare_variants(ManifoldScene& scene) {
   return patches;
 }
 
-TEST(ManifoldMeans, EveryVariantGivesTheSameBytes) {
+TEST(ManifoldLanes, EveryVariantGivesTheSameBytes) {
   std::size_t patches = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     ManifoldScene scene;
@@ -84,7 +84,7 @@ TEST(ManifoldMeans, EveryVariantGivesTheSameBytes) {
   EXPECT_GT(patches, 500u);
 }
 
-TEST(ManifoldMeans, CornersInPlanesAreTheSameToo) {
+TEST(ManifoldLanes, CornersInPlanesAreTheSameToo) {
   std::size_t patches = 0;
   for (const double far : {0.0, 1e4}) {
     for (const int cells : {1, 3}) {

@@ -6,9 +6,9 @@
 #include "engine.h"
 #include "tandem/formats/gpu_memory.h"
 #include "tandem/formats/gpu_stream.h"
+#include "tandem/kernels/gpu_arrays.h"
 #include "tandem/kernels/gpu_broad_phase.h"
 #include "tandem/kernels/gpu_excluded_pairs.h"
-#include "tandem/kernels/gpu_arrays.h"
 #include "tandem/runtime/upload.h"
 
 namespace tandem {

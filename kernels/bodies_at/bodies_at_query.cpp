@@ -22,7 +22,7 @@ bool is_in_range(const std::array<double, 3>& point) {
 }  // namespace
 
 Status BodiesAtQuery::find(Scene& in, const BodiesAtOptions& options) {
-  forget(Status::kOk);
+  static_cast<void>(forget(Status::kOk));
   SceneState* const scene = in.state();
   if (scene == nullptr) return Status::kOutOfMemory;
   for (std::uint32_t p = 0; p < options.points.size(); ++p) {

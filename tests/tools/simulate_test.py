@@ -13,7 +13,7 @@ import unittest
 
 import numpy as np
 
-from bench_test import BVHBENCH, BenchTest, attributes, datasets
+from bench_test import BVHBENCH, BenchTest, attributes, change, datasets
 from tool_test import SOURCE_DIR, UNREADABLE_INPUT, USAGE
 
 SLAB_OBJ = ("v -30 -30 -5\nv 30 -30 -5\nv 30 30 -5\nv -30 30 -5\nv -30 -30 0\nv 30 -30 0\nv 30 30 0\nv -30 30 0\n"
@@ -174,6 +174,12 @@ class Resuming(SimulateTest):
         self.assertIn("is done", self.stack("--frames", "3", "--resume"))
         self.assertEqual(self.run_file.read_bytes(), before)
 
+    def test_resume_refuses_a_run_whose_datasets_differ_in_length(self):
+        self.stack("--frames", "3")
+        change(self.run_file, frames_contacts=datasets(self.run_file)["frames/contacts"][:2])
+        result = self.bench("simulate", "stack", "--mesh", self.cube, "--count", "27", "--frames", "3", "--resume", "-o", self.run_file)
+        self.assert_fails(result, UNREADABLE_INPUT, "run.h5", "/frames: datasets of different lengths")
+
     def test_resume_refuses_the_part_of_another_run(self):
         process = self.start(*self.OPTIONS)
         part = self.wait_for_part()
@@ -206,6 +212,29 @@ class Frames(SimulateTest):
         self.stack("--frames", "1")
         self.assert_fails(self.bench("frame", self.run_file, "--frame", "0", "-o", scene), UNREADABLE_INPUT,
                           "keeps no trajectory")
+
+    def test_a_run_whose_datasets_have_other_lengths_is_refused_by_name(self):
+        self.stack("--frames", "2", "--trajectory", "1")
+        sound = datasets(self.run_file)
+        scene = self.outputs / "scene.h5"
+        bodies = len(sound["bodies/asset"])
+        for name, rows, words in (("bodies/center_of_mass", 0, ["/bodies/center_of_mass", f"0 rows for {bodies} bodies"]),
+                                  ("bodies/center_of_mass", 1, ["/bodies/center_of_mass", f"1 rows for {bodies} bodies"]),
+                                  ("trajectory/frame", 2, ["/trajectory"]), ("trajectory/position", 1, ["/trajectory"]),
+                                  ("trajectory/orientation", 0, ["/trajectory"]), ("bodies/asset", 1, ["/bodies/center_of_mass", f"{bodies} rows for 1 bodies"])):
+            with self.subTest(name=name, rows=rows):
+                change(self.run_file, **{name.replace("/", "_", 1): sound[name][:rows]})
+                self.assert_fails(self.bench("frame", self.run_file, "--frame", "1", "-o", scene), UNREADABLE_INPUT, "run.h5", *words)
+                self.assertFalse(scene.exists())
+                change(self.run_file, **{name.replace("/", "_", 1): sound[name]})
+
+    def test_a_body_of_an_asset_that_the_run_has_not_is_refused(self):
+        self.stack("--frames", "1", "--trajectory", "1")
+        asset = datasets(self.run_file)["bodies/asset"]
+        asset[3] = 7
+        change(self.run_file, bodies_asset=asset)
+        self.assert_fails(self.bench("frame", self.run_file, "--frame", "1", "-o", self.outputs / "scene.h5"), UNREADABLE_INPUT,
+                          "run.h5", "/bodies/asset", "body 3 is of asset 7 of 1")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 #include "run_file.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <type_traits>
 #include <utility>
@@ -135,6 +136,19 @@ bool read_rows(const Hdf5Input& file, std::vector<Row>& rows) {
   return alike;
 }
 
+// Refuses numbers that are not finite, by dataset and row.
+template <typename Row>
+void require_finite(const std::string& path, std::span<const Row> rows) {
+  for_each_column(Row(), [&](const char* name, auto member) {
+    const auto numbers = bench::column(rows, member);
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      if (std::isfinite(static_cast<double>(numbers[i]))) continue;
+      const std::size_t row = i / (numbers.size() / rows.size());
+      throw FileError(path + ": " + name + ": row " + std::to_string(row) + ": a number is not finite");
+    }
+  });
+}
+
 void write_bodies(Hdf5Output& file, const RunDescription& run) {
   const std::span<const BodyProperties> bodies = run.bodies;
   const auto asset = [&](const BodyProperties& body) { return run.shapes[body.shape].asset; };
@@ -200,6 +214,8 @@ SimulatorState read_state(const Hdf5Input& file, const std::string& path, std::s
   }
   if (!std::ranges::is_sorted(state.contacts, {}, &CachedContact::pair))
     throw FileError(path + ": /state/contacts/pair: not ascending");
+  require_finite(path, std::span<const BodyState>(state.states));
+  require_finite(path, std::span<const CachedContact>(state.contacts));
   state.step = step[0];
   return state;
 }

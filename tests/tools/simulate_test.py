@@ -130,6 +130,13 @@ class Runs(SimulateTest):
         self.assert_fails(self.bench("simulate", "scene", self.scene, "--frames", "2", "--resume", "-o", self.run_file), UNREADABLE_INPUT,
                           "run.h5", "whose start is")
 
+    def test_meshes_of_a_scene_are_not_overwritten(self):
+        self.cubes_over_a_slab([(0, 0, 0.5)])
+        before = self.cube.read_bytes()
+        for command in (["simulate", "scene", self.scene, "--frames", "1", "-o"], ["compare", self.scene, "--out"]):
+            self.assert_fails(self.bench(*command, self.cube), USAGE, "cube.bvh", "is read too")
+            self.assertEqual(self.cube.read_bytes(), before)
+
     def test_given_pairs_are_refused_by_name(self):
         self.cubes_over_a_slab([(0, 0, 0.5)], pairs=np.array([[0, 1]], "u4"))
         self.assert_fails(self.bench("simulate", "scene", self.scene, "--frames", "1", "-o", self.run_file), UNREADABLE_INPUT, "scene.h5", "/pairs")

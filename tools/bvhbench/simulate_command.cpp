@@ -205,6 +205,7 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
   arguments.run.output = arguments.output;
   Start start;
   set_up(arguments, start);
+  keep_inputs(arguments.output, start.paths);
   for (const std::string& finding : start.bodies.findings)
     std::fprintf(stderr, "bvhbench: %s\n", finding.c_str());
   SimulatorOptions& options = arguments.simulator;

@@ -137,6 +137,22 @@ class Runs(SimulateTest):
             self.assert_fails(self.bench(*command, self.cube), USAGE, "cube.bvh", "is read too")
             self.assertEqual(self.cube.read_bytes(), before)
 
+    def test_what_a_run_reads_is_not_its_part_file(self):
+        part = self.outputs / "run.h5.part"
+        self.cubes_over_a_slab([(0, 0, 0.5)])
+        scene = self.scene.rename(part)
+        self.assert_part_file_is_kept(scene, part)
+        part.unlink()
+        self.cube = self.cube.rename(part)
+        self.cubes_over_a_slab([(0, 0, 0.5)])
+        self.assert_part_file_is_kept(self.scene, part)
+
+    def assert_part_file_is_kept(self, scene, part):
+        before = part.read_bytes()
+        result = self.bench("simulate", "scene", scene, "--frames", "3", "--checkpoint", "0", "-o", self.run_file)
+        self.assert_fails(result, USAGE, "run.h5.part", "is read too")
+        self.assertEqual(part.read_bytes(), before)
+
     def test_given_pairs_are_refused_by_name(self):
         self.cubes_over_a_slab([(0, 0, 0.5)], pairs=np.array([[0, 1]], "u4"))
         self.assert_fails(self.bench("simulate", "scene", self.scene, "--frames", "1", "-o", self.run_file), UNREADABLE_INPUT, "scene.h5", "/pairs")

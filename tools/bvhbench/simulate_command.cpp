@@ -206,6 +206,8 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
   Start start;
   set_up(arguments, start);
   keep_inputs(arguments.output, start.paths);
+  keep_inputs(part_file(arguments.output), {arguments.scene});
+  keep_inputs(part_file(arguments.output), start.paths);
   for (const std::string& finding : start.bodies.findings)
     std::fprintf(stderr, "bvhbench: %s\n", finding.c_str());
   SimulatorOptions& options = arguments.simulator;

@@ -155,8 +155,10 @@ CheckResult check_levels(const unsigned char* data, const FileHeader& header,
   return {};
 }
 
+// The lengths of all strings together are bounded, so that a reader which copies them needs no more memory
+// than the file has bytes.
 CheckResult check_parts(const AssetView& asset) {
-  std::uint64_t next_face = 0;
+  std::uint64_t next_face = 0, string_bytes = 0;
   for (std::size_t i = 0; i < asset.parts.size(); ++i) {
     const Part& part = asset.parts[i];
     const bool strings_in_range = part.name_bytes <= asset.strings.size() &&
@@ -165,7 +167,9 @@ CheckResult check_parts(const AssetView& asset) {
                                   part.path_offset <= asset.strings.size() - part.path_bytes;
     const bool faces_follow =
         part.first_face == next_face && part.face_count <= asset.header->source_faces - next_face;
-    if (!strings_in_range || !faces_follow) return {Status::kBadPart, i, {}};
+    string_bytes += std::uint64_t{part.name_bytes} + part.path_bytes;
+    if (!strings_in_range || !faces_follow || string_bytes > asset.strings.size())
+      return {Status::kBadPart, i, {}};
     next_face += part.face_count;
   }
   if (asset.parts.empty()) return {Status::kSectionMissing, 0, {}};

@@ -209,6 +209,20 @@ class TopologyCheck {
     return Status::kOk;
   }
 
+  // Whether no bit is set of a side that belongs to no edge: for_each_edge() does not come by it.
+  Status check_sides_without_edge() {
+    for (std::uint32_t t = 0; t < level_.triangle_count; ++t) {
+      const TriangleTopology& triangle = level_.topology[t];
+      where_ = t;
+      for (int k = 0; k < 3; ++k) {
+        if (triangle.vertex[k] != triangle.vertex[(k + 1) % 3]) continue;
+        if (is_boundary(triangle.flags, k) || has_many_triangles(triangle.flags, k))
+          return Status::kEdgeMismatch;
+      }
+    }
+    return Status::kOk;
+  }
+
   // Calls use(lower vertex, upper vertex, side) with all sides of edges.
   template <typename Use>
   void for_each_side(const Use& use) const {
@@ -258,6 +272,7 @@ class TopologyCheck {
   Status check_edges() {
     open_ = zeros<std::uint8_t>(level_.triangle_count);
     if (open_ == nullptr || !joined_.make(level_.triangle_count)) return Status::kOutOfMemory;
+    if (const Status status = check_sides_without_edge(); status != Status::kOk) return status;
     if (const Status status = sort_sides(); status != Status::kOk) return status;
     return for_each_edge([&](const Side* sides, std::uint32_t count) {
       std::uint32_t up = 0;

@@ -14,13 +14,14 @@ namespace {
 /// ExactSum, a part of it in each lane. The bits of whole_number()'s constant are taken off in the end, as
 /// often as something was added; whole numbers may go round.
 struct ExactSumLanes {
-  DoubleMask<4> upper = {}, lower = {};
+  using Words [[gnu::vector_size(32)]] = std::uint64_t;
+  Words upper = {}, lower = {};
 
   TANDEM_INLINE void add(const DoubleLanes<4>& value, double one_by_unit) {
     const DoubleLanes<4> scaled = value * one_by_unit * 0x1p30;
     const DoubleLanes<4> sum = scaled + kMagic, rest = (scaled - (sum - kMagic)) * 0x1p30 + kMagic;
-    upper += reinterpret_cast<DoubleMask<4>>(sum);
-    lower += reinterpret_cast<DoubleMask<4>>(rest);
+    upper += reinterpret_cast<Words>(sum);
+    lower += reinterpret_cast<Words>(rest);
   }
   TANDEM_INLINE void add_to(manifold::ExactSum& sum, std::uint32_t times) const {
     const std::uint64_t constants = 4 * std::uint64_t{times} * std::bit_cast<std::uint64_t>(kMagic);
@@ -30,9 +31,9 @@ struct ExactSumLanes {
  private:
   static constexpr double kMagic = 0x1.8p52;
 
-  TANDEM_INLINE static std::int64_t whole(const DoubleMask<4>& lanes, std::uint64_t constants) {
+  TANDEM_INLINE static std::int64_t whole(const Words& lanes, std::uint64_t constants) {
     std::uint64_t all = 0;
-    for (int i = 0; i < 4; ++i) all += static_cast<std::uint64_t>(lanes[i]);
+    for (int i = 0; i < 4; ++i) all += lanes[i];
     return static_cast<std::int64_t>(all - constants);
   }
 };

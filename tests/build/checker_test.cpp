@@ -210,6 +210,18 @@ const Attack kLevelAttacks[] = {
        part.name_bytes = 0;
        part.name_offset = static_cast<std::uint32_t>(f.section(SectionKind::strings).bytes) + 1;
      }},
+    {"part name and path that are the whole strings", kBadPart,
+     [](Bytes& f) {
+       Part& part = f.parts()[0];
+       part.name_offset = part.path_offset = 0;
+       part.name_bytes = part.path_bytes = static_cast<std::uint32_t>(f.section(SectionKind::strings).bytes);
+     }},
+    {"strings one byte longer together than the section", kBadPart,
+     [](Bytes& f) {
+       Part& part = f.parts()[1];
+       part.path_offset = 0;
+       ++part.path_bytes;
+     }},
     {"part gap", kBadPart, [](Bytes& f) { f.parts()[1].first_face += 1; }},
     {"part too long", kBadPart, [](Bytes& f) { f.parts()[1].face_count += 1; }},
     {"parts too short", kBadPart, [](Bytes& f) { f.parts()[1].face_count -= 1; }},

@@ -183,6 +183,23 @@ TEST(CheckTopology, MinusZeroIsNoOtherPosition) {
   EXPECT_EQ(file.check_sealed(), kVertexMismatch);
 }
 
+TEST(CheckTopology, ASideThatBelongsToNoEdgeHasNoBits) {
+  Mesh mesh;
+  mesh.add({0, 0, 0}, {1, 0, 0}, {0, 0, 0});
+  Bytes file(make_file(mesh));
+  ASSERT_EQ(file.check_sealed(), kOk);
+  const std::uint32_t(&v)[3] = file.topology()[0].vertex;
+  std::uint32_t side = 0;
+  while (v[side] != v[(side + 1) % 3]) ++side;
+  const std::uint32_t sound = file.topology()[0].flags;
+  for (const std::uint32_t bit : {kBoundaryEdge0, kManyTriangles0}) {
+    file.topology()[0].flags = sound | bit << side;
+    EXPECT_EQ(file.check_sealed(), kEdgeMismatch);
+    file.topology()[0].flags = sound | kTurned | bit << side;
+    EXPECT_EQ(file.check_sealed(), kEdgeMismatch);
+  }
+}
+
 // Any windings of a sheet but those that agree, beside a strip of five triangles that no windings make agree.
 // The triangles lie in no order that helps.
 TEST(CheckTopology, WindingsMayDisagreeOnlyWhereNoneAgree) {

@@ -134,6 +134,42 @@ TEST_F(GltfFile, NamesBuffersThatAreNotThere) {
   EXPECT_EQ(error(file), "buffers[0] has no byteLength");
 }
 
+TEST_F(GltfFile, ReadsBuffersInItsFolderAndBelowAlone) {
+  fs::create_directories(folder_ / "scene/below");
+  const std::string bytes = kSquare + bytes_of<std::uint16_t>({0, 1, 2});
+  write("outside.bin", bytes);
+  write("scene/inside.bin", bytes);
+  fs::create_symlink("../outside.bin", folder_ / "scene/link.bin");
+  fs::create_symlink("..", folder_ / "scene/up");
+  fs::create_symlink("../inside.bin", folder_ / "scene/below/link.bin");
+  ReadLimits anywhere;
+  anywhere.outside_files = true;
+  const auto read_uri = [&](const std::string& uri, const ReadLimits& limits) {
+    Gltf file = square({0, 1, 2});
+    file.buffers = R"({"byteLength": 54, "uri": ")" + uri + "\"}";
+    return read_gltf(file.json(), folder_ / "scene", limits);
+  };
+  for (const std::string uri :
+       {"inside.bin", "./inside.bin", "below/../inside.bin", "below/link.bin", "up/scene/inside.bin"}) {
+    const ReadResult result = read_uri(uri, {});
+    EXPECT_EQ(result.error, "") << uri;
+    ASSERT_EQ(result.files.size(), 1u) << uri;
+    EXPECT_TRUE(fs::equivalent(result.files[0], folder_ / "scene/inside.bin"));
+  }
+  const std::string absolute = (folder_ / "outside.bin").string();
+  for (const std::string& uri : {std::string("../outside.bin"), std::string("%2e%2e/outside.bin"),
+                                 std::string("below/../../outside.bin"), std::string("link.bin"),
+                                 std::string("up/outside.bin"), absolute}) {
+    EXPECT_TRUE(read_uri(uri, {}).error.ends_with(
+        ": lies outside the folder of the file that names it (--allow-outside-files)"))
+        << read_uri(uri, {}).error;
+    EXPECT_EQ(read_uri(uri, anywhere).error, "") << uri;
+  }
+  EXPECT_EQ(
+      read_uri("../none.bin", {}).error,
+      "buffers[0]: '../none.bin': lies outside the folder of the file that names it (--allow-outside-files)");
+}
+
 TEST_F(GltfFile, ReadsNoMoreOfFilesThanTheMemoryLimit) {
   Gltf file = square({0, 1, 2});
   write("a.bin", std::string(60000, 'a'));

@@ -27,7 +27,7 @@ class Usage(ToolTest):
     def test_help_names_every_option_and_exit_code(self):
         for tool, words in ((BVHBUILD, ("MESH", "--output", "--imaginary", "minimal|free|SHARE", "--effort", "fast|default|best", "--strict", "--json",
                                         "--quiet", "--threads", "--reader", "--time-limit", "--memory-limit", "--expansion-limit",
-                                        "--no-topology", "--version", "Exit codes: 0 done")),
+                                        "--no-topology", "--allow-outside-files", "--version", "Exit codes: 0 done")),
                             (BVHINFO, ("FILE", "--json", "--verify", "--version", "Exit codes: 0 all sound"))):
             help_text = self.succeeds(tool, "--help")
             for word in words:
@@ -141,6 +141,37 @@ class UnreadableInput(ToolTest):
         self.assert_fails(result, UNREADABLE_INPUT, path, "0.3 s (--time-limit)")
         self.assert_nothing_written()
 
+    def test_named_files_are_regular_and_beside_the_mesh(self):
+        os.mkfifo(self.inputs / "pipe.mtl")
+        (self.root / "outside.mtl").write_text("newmtl red\n")
+        (self.inputs / "link.mtl").symlink_to(self.root / "outside.mtl")
+        for name in ("pipe.mtl", "../outside.mtl", "link.mtl"):
+            with self.subTest(name=name):
+                path = self.write("a.obj", f"mtllib {name}\nusemtl red\n" + TRIANGLE_OBJ)
+                result = self.build(path, "-o", self.out, "--reader", "assimp", timeout=20)
+                self.assertEqual((result.returncode, result.stderr), (DONE, b""))
+                self.assertEqual(b"--allow-outside-files" in result.stdout, name != "pipe.mtl")
+                self.assertNotIn(b"--allow-outside-files", self.build(path, "-o", self.out, "--reader", "assimp", "--allow-outside-files").stdout)
+
+    def test_buffers_elsewhere_are_refused_without_a_word_of_them(self):
+        secret = self.root / "secret.bin"
+        secret.write_bytes(b"SECRET, SECRET, SECRET, " * 20)
+        (self.inputs / "link.bin").symlink_to(secret)
+        for uri in ("../secret.bin", "%2e%2e/secret.bin", str(secret), "/etc/passwd", "link.bin", "../none"):
+            for reader in ("auto", "tandem", "assimp"):
+                with self.subTest(uri=uri, reader=reader):
+                    path = self.write("a.gltf", json.dumps({
+                        "asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+                        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+                        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+                                      {"bufferView": 0, "componentType": 5125, "count": 3, "type": "SCALAR"}],
+                        "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"byteLength": 36, "uri": uri}]}))
+                    result = self.build(path, "-o", self.out, "--reader", reader)
+                    self.assert_fails(result, UNREADABLE_INPUT, path, *(["--allow-outside-files"] if reader != "assimp" else []))
+                    for word in (b"SECRET", b"1380", b"root:"):
+                        self.assertNotIn(word, result.stderr)
+        self.assert_nothing_written()
+
     def assert_cheaply_refused(self, name, content, *arguments):
         """Exit code 2 with a reason, below 1 GiB and 10 s of processor time."""
         def limit():
@@ -242,6 +273,22 @@ class UnwritableOutput(ToolTest):
         for out in (self.mesh, self.inputs / "link.bvh", self.inputs / "hard.bvh", self.inputs / ".." / "in" / "mesh.obj"):
             self.assert_refused(out, "is the input", code=USAGE)
         self.assertEqual(self.mesh.read_bytes(), before)
+
+    def test_no_file_that_was_read_is_overwritten(self):
+        points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4").tobytes()
+        buffer = self.write("C2.bin", points)
+        gltf = self.write("c2.gltf", json.dumps({
+            "asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+            "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"byteLength": 36, "uri": "C2.bin"}]}))
+        materials = self.write("a.mtl", "newmtl red\nKd 1 0 0\n")
+        obj = self.write("a.obj", "mtllib a.mtl\nusemtl red\n" + TRIANGLE_OBJ)
+        for mesh, other, reader in ((gltf, buffer, "auto"), (gltf, buffer, "assimp"), (obj, materials, "assimp")):
+            with self.subTest(mesh=mesh.name, reader=reader):
+                before = other.read_bytes()
+                self.assert_fails(self.build(mesh, "-o", other, "--reader", reader), USAGE, other, "is read too; it would be overwritten")
+                self.assertEqual(other.read_bytes(), before)
+                self.succeeds(BVHBUILD, mesh, "-o", self.out, "--reader", reader)
 
     def test_a_folder_without_permission_is_told(self):
         options = unprivileged(self)

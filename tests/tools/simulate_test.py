@@ -11,9 +11,10 @@ import subprocess
 import time
 import unittest
 
+import h5py
 import numpy as np
 
-from bench_test import BVHBENCH, BenchTest, attributes, datasets
+from bench_test import BVHBENCH, BenchTest, attributes, change, datasets
 from tool_test import SOURCE_DIR, UNREADABLE_INPUT, USAGE
 
 SLAB_OBJ = ("v -30 -30 -5\nv 30 -30 -5\nv 30 30 -5\nv -30 30 -5\nv -30 -30 0\nv 30 -30 0\nv 30 30 0\nv -30 30 0\n"
@@ -103,6 +104,82 @@ class Runs(SimulateTest):
         self.assertAlmostEqual(moved[1, 0], 2**2 / (2 * 0.25 * 9.81), delta=0.03)
         np.testing.assert_allclose(moved[2], [0, 1.5, 0], atol=1e-12)
 
+    def cubes_over_a_slab(self, places, **datasets):
+        """A scene of a fixed slab, whose top is z = 0, and of cubes of half a metre's reach at these places."""
+        slab = self.mesh_of("slab", SLAB_OBJ)
+        self.write_scene([0] + [1] * len(places), [np.eye(3)] * (1 + len(places)), [[0, 0, 0], *places],
+                         [os.fspath(slab), os.fspath(self.cube)], simulation_motion=np.array([1] + [0] * len(places), "u4"), **datasets)
+
+    def test_groups_masks_and_excluded_pairs_are_heeded(self):
+        every, one = 2**32 - 1, np.uint32(1)
+        self.cubes_over_a_slab([(5 * i, 0, 0.5) for i in range(4)], excluded=np.array([[2, 0]], "u4"),
+                               instances_group=np.array([every, every, every, 2, every], "u4"),
+                               instances_mask=np.array([every ^ 2, every, every, every, every ^ one], "u4"))
+        for options in ((), ("--continuous",), ("--engine", "embree-refit"), ("--sleep",)):
+            with self.subTest(options=options):
+                if "embree-refit" in options and b"built without" in self.bench("simulate", "scene", self.scene, "--frames", "1", *options, "-o", self.run_file).stderr:
+                    continue
+                self.simulate("scene", self.scene, "--frames", "60", "--trajectory", "60", *options)
+                fallen = datasets(self.run_file)["trajectory/position"][1, :, 2] < -1
+                self.assertEqual(fallen.tolist(), [False, False, True, True, False])
+
+    def test_resume_tells_runs_with_other_filters_apart(self):
+        self.cubes_over_a_slab([(0, 0, 0.5)])
+        self.simulate("scene", self.scene, "--frames", "2")
+        self.cubes_over_a_slab([(0, 0, 0.5)], excluded=np.array([[0, 1]], "u4"))
+        self.assert_fails(self.bench("simulate", "scene", self.scene, "--frames", "2", "--resume", "-o", self.run_file), UNREADABLE_INPUT,
+                          "run.h5", "whose start is")
+
+    def test_meshes_of_a_scene_are_not_overwritten(self):
+        self.cubes_over_a_slab([(0, 0, 0.5)])
+        before = self.cube.read_bytes()
+        for command in (["simulate", "scene", self.scene, "--frames", "1", "-o"], ["compare", self.scene, "--out"]):
+            self.assert_fails(self.bench(*command, self.cube), USAGE, "cube.bvh", "is read too")
+            self.assertEqual(self.cube.read_bytes(), before)
+
+    def test_what_a_run_reads_is_not_its_part_file(self):
+        part = self.outputs / "run.h5.part"
+        self.cubes_over_a_slab([(0, 0, 0.5)])
+        scene = self.scene.rename(part)
+        self.assert_part_file_is_kept(scene, part)
+        part.unlink()
+        self.cube = self.cube.rename(part)
+        self.cubes_over_a_slab([(0, 0, 0.5)])
+        self.assert_part_file_is_kept(self.scene, part)
+
+    def assert_part_file_is_kept(self, scene, part):
+        before = part.read_bytes()
+        result = self.bench("simulate", "scene", scene, "--frames", "3", "--checkpoint", "0", "-o", self.run_file)
+        self.assert_fails(result, USAGE, "run.h5.part", "is read too")
+        self.assertEqual(part.read_bytes(), before)
+
+    def test_given_pairs_are_refused_by_name(self):
+        self.cubes_over_a_slab([(0, 0, 0.5)], pairs=np.array([[0, 1]], "u4"))
+        self.assert_fails(self.bench("simulate", "scene", self.scene, "--frames", "1", "-o", self.run_file), UNREADABLE_INPUT, "scene.h5", "/pairs")
+        self.assert_nothing_but(self.scene)
+
+    def test_places_that_are_no_numbers_or_too_far_are_refused_by_instance(self):
+        for wrong in (1e308, -1e301, np.inf, np.nan):
+            with self.subTest(wrong=wrong):
+                self.cubes_over_a_slab([(0, 0, 0.5), (0, wrong, 2)])
+                result = self.bench("simulate", "scene", self.scene, "--frames", "2", "-o", self.run_file)
+                self.assert_fails(result, UNREADABLE_INPUT, "scene.h5", "instance 2: a ")
+                self.assert_nothing_but(self.scene)
+
+    def test_speeds_that_overflow_are_told_by_step_and_body(self):
+        for name, options in (("velocity", ()), ("velocity", ("--solver", "sweeps")), ("velocity", ("--continuous",)), ("angular_velocity", ()),
+                              ("angular_velocity", ("--continuous",))):
+            with self.subTest(name=name, options=options):
+                self.cubes_over_a_slab([(0, 0, 0.5), (0, 0, 2)])
+                with h5py.File(self.scene, "a") as file:
+                    file[f"simulation/{name}"] = np.array([(0, 0, 0), (0, 0, 0), (0, 1e308, -1e308)])
+                result = self.bench("simulate", "scene", self.scene, "--frames", "20", *options, "-o", self.run_file)
+                self.assert_fails(result, UNREADABLE_INPUT, "run.h5", "step", "body 2")
+                self.assert_nothing_but(self.scene)
+
+    def assert_nothing_but(self, path):
+        self.assertEqual(os.listdir(self.outputs), [path.name])
+
     def test_continuous_keeps_fast_plates_from_passing_through(self):
         plate = self.mesh_of("plate", re.sub(rb"^v (\S+) (\S+) (\S+)", lambda v: b"v %s %s %f" % (v[1], v[2], 0.01 * float(v[3])),
                                              self.cube_obj, flags=re.M))
@@ -174,6 +251,24 @@ class Resuming(SimulateTest):
         self.assertIn("is done", self.stack("--frames", "3", "--resume"))
         self.assertEqual(self.run_file.read_bytes(), before)
 
+    def test_resume_refuses_a_run_whose_datasets_differ_in_length(self):
+        self.stack("--frames", "3")
+        change(self.run_file, frames_contacts=datasets(self.run_file)["frames/contacts"][:2])
+        result = self.bench("simulate", "stack", "--mesh", self.cube, "--count", "27", "--frames", "3", "--resume", "-o", self.run_file)
+        self.assert_fails(result, UNREADABLE_INPUT, "run.h5", "/frames: datasets of different lengths")
+
+    def test_resume_refuses_a_state_that_is_not_finite_by_row(self):
+        self.stack("--frames", "3")
+        for name, row in (("state/velocity", 5), ("state/position", 2), ("state/contacts/in_a", 1), ("state/contacts/normal_impulse", 0)):
+            with self.subTest(name=name):
+                sound = datasets(self.run_file)[name]
+                wrong = sound.copy()
+                wrong[row] = np.nan
+                change(self.run_file, **{name.replace("/", "_", 1): wrong})
+                result = self.bench("simulate", "stack", "--mesh", self.cube, "--count", "27", "--frames", "3", "--resume", "-o", self.run_file)
+                self.assert_fails(result, UNREADABLE_INPUT, "run.h5", f"/{name}: row {row}: a number is not finite")
+                change(self.run_file, **{name.replace("/", "_", 1): sound})
+
     def test_resume_refuses_the_part_of_another_run(self):
         process = self.start(*self.OPTIONS)
         part = self.wait_for_part()
@@ -206,6 +301,29 @@ class Frames(SimulateTest):
         self.stack("--frames", "1")
         self.assert_fails(self.bench("frame", self.run_file, "--frame", "0", "-o", scene), UNREADABLE_INPUT,
                           "keeps no trajectory")
+
+    def test_a_run_whose_datasets_have_other_lengths_is_refused_by_name(self):
+        self.stack("--frames", "2", "--trajectory", "1")
+        sound = datasets(self.run_file)
+        scene = self.outputs / "scene.h5"
+        bodies = len(sound["bodies/asset"])
+        for name, rows, words in (("bodies/center_of_mass", 0, ["/bodies/center_of_mass", f"0 rows for {bodies} bodies"]),
+                                  ("bodies/center_of_mass", 1, ["/bodies/center_of_mass", f"1 rows for {bodies} bodies"]),
+                                  ("trajectory/frame", 2, ["/trajectory"]), ("trajectory/position", 1, ["/trajectory"]),
+                                  ("trajectory/orientation", 0, ["/trajectory"]), ("bodies/asset", 1, ["/bodies/center_of_mass", f"{bodies} rows for 1 bodies"])):
+            with self.subTest(name=name, rows=rows):
+                change(self.run_file, **{name.replace("/", "_", 1): sound[name][:rows]})
+                self.assert_fails(self.bench("frame", self.run_file, "--frame", "1", "-o", scene), UNREADABLE_INPUT, "run.h5", *words)
+                self.assertFalse(scene.exists())
+                change(self.run_file, **{name.replace("/", "_", 1): sound[name]})
+
+    def test_a_body_of_an_asset_that_the_run_has_not_is_refused(self):
+        self.stack("--frames", "1", "--trajectory", "1")
+        asset = datasets(self.run_file)["bodies/asset"]
+        asset[3] = 7
+        change(self.run_file, bodies_asset=asset)
+        self.assert_fails(self.bench("frame", self.run_file, "--frame", "1", "-o", self.outputs / "scene.h5"), UNREADABLE_INPUT,
+                          "run.h5", "/bodies/asset", "body 3 is of asset 7 of 1")
 
 
 if __name__ == "__main__":

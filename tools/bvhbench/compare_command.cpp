@@ -99,6 +99,11 @@ ExitCode run_compare(const CompareArguments& arguments) {
     });
   }
   check_output(arguments, arguments.scenes);
+  if (!arguments.output.empty()) {
+    for (const std::string& scene : arguments.scenes)
+      for (const std::string& asset : read_description(scene).assets)
+        keep_inputs(arguments.output, {beside(scene, asset)});
+  }
   const char* commit = std::getenv("TANDEM_COMMIT");
   CompareResults results = {processor(), commit == nullptr ? "" : commit, arguments.repeats, {}};
   Json scenes = compare_scenes(arguments, "\n", [&](const std::string& scene) {

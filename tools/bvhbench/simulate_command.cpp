@@ -42,6 +42,8 @@ struct Start {
   std::vector<std::string> paths;
   Preparation bodies;
   std::optional<Reentry> reentry;
+  ExcludedPairTable excluded;
+  PairFilter filter;  // of scene files alone
 
   std::vector<AssetView> shapes() const { return scene.views(); }
 };
@@ -97,6 +99,7 @@ void set_up_scene(const SimulateArguments& arguments, Start& start) {
     start.paths.push_back(beside(arguments.scene, asset));
   if (start.paths.empty()) throw FileError(arguments.scene + ": /assets: there is none");
   start.bodies = prepare_scene(arguments.scene, start.scene, arguments.density);
+  start.filter = start.scene.description.filter.view(start.excluded);
 }
 
 // What decides the results, for the file and for going on with it.
@@ -202,6 +205,9 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
   arguments.run.output = arguments.output;
   Start start;
   set_up(arguments, start);
+  keep_inputs(arguments.output, start.paths);
+  keep_inputs(part_file(arguments.output), {arguments.scene});
+  keep_inputs(part_file(arguments.output), start.paths);
   for (const std::string& finding : start.bodies.findings)
     std::fprintf(stderr, "bvhbench: %s\n", finding.c_str());
   SimulatorOptions& options = arguments.simulator;
@@ -221,8 +227,10 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
   const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, options.threads);
   auto engine = make_engine(arguments.engine,
                             ContactOptions{.mode = arguments.fast ? QueryMode::fast : QueryMode::exact});
+  engine->set_filter(start.filter);
   std::unique_ptr<ContinuousMotion> continuous;
-  if (arguments.continuous) continuous = std::make_unique<ContinuousMotion>(start.shapes(), options.threads);
+  if (arguments.continuous)
+    continuous = std::make_unique<ContinuousMotion>(start.shapes(), options.threads, start.filter);
   Simulator simulator(start.bodies.bodies, start.bodies.states,
                       make_mesh_contact_finder(std::move(engine), start.shapes(), options.threads), options,
                       std::move(continuous));

@@ -77,6 +77,8 @@ void add_options(CLI::App& app, Options& options, double& memory_gib, double& ex
        {"--threads", options.threads, "N [all]", "threads for building; the result does not depend on them",
         CLI::Range(1, 4096)},
        {"--reader", options.import.reader, kReaderNames, "auto|tandem|assimp [auto]", "who reads the mesh"},
+       {"--allow-outside-files", options.import.limits.outside_files,
+        "let MESH name files elsewhere than in its folder and below it, such as buffers of glTF"},
        {"--time-limit", options.import.time_limit_seconds, "S [120]", "seconds that assimp may take",
         between(0.01, 1e6)},
        {"--memory-limit", memory_gib, "GIB [8]", "GiB of memory that reading may take", between(0.1, 1e6)},

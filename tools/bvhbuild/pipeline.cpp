@@ -169,6 +169,11 @@ Outcome run_pipeline(const Options& options) {
   outcome.input = digest_of(options.input);
   outcome.seconds.import = stopwatch.lap();
   if (!imported.ok) return fail(outcome, kUnreadableInput, options.input, imported.error);
+  for (const std::string& file : imported.files) {
+    std::error_code missing;  // then nothing can be overwritten
+    if (fs::equivalent(file, options.output, missing))
+      return fail(outcome, kUsage, options.output, "is read too; it would be overwritten");
+  }
   PolygonMesh& polygons = imported.mesh;
   outcome.reader = polygons.reader;
   outcome.single_precision = polygons.single_precision;

@@ -34,9 +34,11 @@ Rest simulate(const std::string& path, const bench::LoadedScene& scene, const Si
   options.solver.substeps = default_substeps(options.solver.kind);
   options.solver.slop = default_slop(scene.assets[0].view());
   const std::vector<AssetView> shapes = scene.views();
+  ExcludedPairTable excluded;
+  auto engine = make_engine(settings.engine);
+  engine->set_filter(scene.description.filter.view(excluded));
   Simulator simulator(start.bodies, start.states,
-                      make_mesh_contact_finder(make_engine(settings.engine), shapes, settings.threads),
-                      options);
+                      make_mesh_contact_finder(std::move(engine), shapes, settings.threads), options);
   const auto steps = static_cast<std::size_t>(std::max(1.0, std::round(settings.seconds / options.dt)));
   const std::size_t last = std::max<std::size_t>(1, steps / 10);
   Rest rest;

@@ -76,7 +76,8 @@ void Engine::find(std::span<const BodyPose> bodies, std::span<const std::uint8_t
   update(bodies);
   idle_motion_.clear();
   for (const std::uint8_t rests : idle) idle_motion_.push_back(rests != 0 ? Motion::fixed : Motion::moving);
-  set_filter({idle.empty() ? nullptr : idle_motion_.data()});
+  filter_.motion = idle.empty() ? nullptr : idle_motion_.data();
+  set_filter(filter_);
   times_.update = watch.lap();
   const std::span<const ObjectPair> pairs = find_pairs();
   found.pairs.assign(pairs.begin(), pairs.end());

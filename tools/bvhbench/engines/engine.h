@@ -210,7 +210,7 @@ class Engine {
 
   /// What a simulator asks for: update(), find_pairs(), query() and contacts(), in the order of a
   /// ContactList. `idle`: empty, or for each body whether it does not move (1; else 0): pairs of two idle
-  /// bodies are left out of both lists. The filter that there was is forgotten.
+  /// bodies are left out of both lists. They take the place of the filter's motions.
   void find(std::span<const BodyPose> bodies, std::span<const std::uint8_t> idle, ContactList& found);
 
   /// Puts the distance of each pair into `distances`; it is 0 or less where bodies meet.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 
 #include "common/stopwatch.h"
 
@@ -14,6 +15,7 @@ Eigen::Vector3d vector_of(const double (&x)[3]) {
 
 void throw_unless_ok(Status status, const Scene& scene) {
   if (status == Status::kOk) return;
+  if (status == Status::kOutOfMemory) throw std::bad_alloc();
   const std::uint64_t where = scene.where();
   const std::string blamed =
       subject(status) != nullptr ? std::string(subject(status)) + " " + std::to_string(where) + ": " : "";

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
+#include <new>
 
 namespace tandem::simulation {
 namespace {
@@ -47,16 +47,21 @@ Quaterniond turned(const Quaterniond& orientation, const Vector3d& turn) {
   return (Quaterniond(AngleAxisd(angle, turn / angle)) * orientation).normalized();
 }
 
-void require(Status status) {
-  if (status != Status::kOk) throw std::runtime_error(std::string("continuous motion: ") + explain(status));
+void require(Status status, const Scene& scene) {
+  if (status == Status::kOutOfMemory) throw std::bad_alloc();
+  if (status == Status::kOk) return;
+  const std::string blamed = subject(status) == nullptr ? "" : "body " + std::to_string(scene.where()) + ": ";
+  throw EngineError("continuous motion: " + blamed + explain(status), status, scene.where());
 }
 
 }  // namespace
 
-ContinuousMotion::ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads) {
+ContinuousMotion::ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads,
+                                   const PairFilter& filter)
+    : filter_(filter) {
   moving_.set_threads(threads);
-  require(moving_.set_assets(shapes));
-  require(two_.set_assets(shapes));
+  require(moving_.set_assets(shapes), moving_);
+  require(two_.set_assets(shapes), two_);
   for (const AssetView& shape : shapes) inner_radius_.push_back(inner_radius_of(shape));
 }
 
@@ -111,9 +116,9 @@ double ContinuousMotion::depth_at(std::span<const BodyProperties> bodies, std::s
     state.orientation = turned(state.orientation, part * part_[body] * turn_[body]);
     instances[i] = pose_of(bodies[body], state);
   }
-  require(two_.place(instances));
-  require(contacts_.find(two_, pairs, {}));
-  require(manifolds_.find(two_, contacts_, {.match_previous = false}));
+  require(two_.place(instances), two_);
+  require(contacts_.find(two_, pairs, {}), two_);
+  require(manifolds_.find(two_, contacts_, {.match_previous = false}), two_);
   double depth = 0;
   for (const Manifold& manifold : manifolds_.rows())
     depth = std::max(depth, (manifold.flags & kGoesThrough) != 0 ? INFINITY : manifold.depth);
@@ -150,8 +155,9 @@ bool ContinuousMotion::stop(std::span<const BodyProperties> bodies, std::span<co
       motion_[i].center[k] = before[i].position[k];
     }
   }
-  require(moving_.place(instances_, {.motion = fast_.data()}));
-  require(query_.find(moving_, {.motion = motion_, .duration = 1, .tolerance = 1e-8}));
+  filter_.motion = fast_.data();
+  require(moving_.place(instances_, filter_), moving_);
+  require(query_.find(moving_, {.motion = motion_, .duration = 1, .tolerance = 1e-8}), moving_);
   stop_.assign(bodies.size(), 1);
   bool earlier = false;
   for (std::size_t i = 0; i < query_.pairs().size(); ++i) {

@@ -17,11 +17,12 @@ namespace tandem::simulation {
 /// shape: half the least side of its bounds. Steps without a fast body cost next to nothing.
 class ContinuousMotion {
  public:
-  /// What the shapes look at must outlive it. Throws std::runtime_error where a shape cannot be taken.
-  ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads);
+  /// What the shapes and the filter look at must outlive it. The filter names the pairs that may meet; its
+  /// motions are not looked at. Throws EngineError where a shape cannot be taken.
+  ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads, const PairFilter& filter = {});
 
   /// Takes back what of the way from `before` to `after` leads through other bodies. Throws
-  /// std::runtime_error where a query fails.
+  /// EngineError where a query fails.
   void limit(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
              std::span<BodyState> after, double slop);
 
@@ -36,6 +37,7 @@ class ContinuousMotion {
   double depth_at(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
                   const ObjectPair& pair, double part);
 
+  PairFilter filter_;
   Scene moving_, two_;  // all bodies, and two of them
   ImpactQuery query_;
   ContactQuery contacts_;

@@ -206,6 +206,26 @@ Configuration rock_slide(const AssetView& body, const AssetView& ground, std::ui
   return slide;
 }
 
+namespace {
+
+// Refuses what a simulation cannot begin with: poses that no question can be asked about, and given pairs.
+void check_scene(const std::string& path, const bench::LoadedScene& scene) {
+  if (scene.description.pairs) {
+    throw FileError(path + ": /pairs: a simulation finds its pairs by itself; /excluded and " +
+                    "/instances/group leave some out");
+  }
+  Scene bodies;
+  Status status = bodies.set_assets(scene.views());
+  if (status == Status::kOk) status = bodies.place(scene.description.instances);
+  if (status == Status::kOutOfMemory) throw std::bad_alloc();
+  if (status == Status::kOk) return;
+  const char* unit = subject(status);
+  const std::string blamed = unit == nullptr ? "" : unit + (" " + std::to_string(bodies.where())) + ": ";
+  throw FileError(path + ": " + blamed + explain(status));
+}
+
+}  // namespace
+
 Preparation prepare(const Configuration& configuration, std::span<const AssetView> shapes,
                     std::span<const std::string> names, double density) {
   Preparation all;
@@ -220,6 +240,7 @@ Preparation prepare(const Configuration& configuration, std::span<const AssetVie
 
 Preparation prepare_scene(const std::string& path, const bench::LoadedScene& scene, double density) {
   const auto& instances = scene.description.instances;
+  check_scene(path, scene);
   const bench::SceneMotion motion = bench::read_motion(path, instances.size());
   const std::vector<AssetView> shapes = scene.views(), finest = scene.finest_views();
   std::vector<std::string> names;
@@ -227,9 +248,6 @@ Preparation prepare_scene(const std::string& path, const bench::LoadedScene& sce
   Preparation all;
   Shapes bodies(shapes, finest, names);
   for (std::size_t i = 0; i < instances.size(); ++i) {
-    if (!is_rigid(instances[i].pose)) {
-      throw FileError(path + ": instance " + std::to_string(i) + ": " + explain(Status::kPoseNotRigid));
-    }
     const std::uint32_t shape = instances[i].asset;
     const Motion mover = moved_by(scene.description.filter, i);
     const double body_density = motion.density.empty() ? density : motion.density[i];
@@ -268,6 +286,11 @@ std::uint64_t hash_of(std::span<const BodyProperties> bodies, std::span<const Bo
     hash = xxh64(&mesh, sizeof mesh, hash);
     if (level > 0) hash = xxh64(&level, sizeof level, hash);
   }
+  const bench::SceneFilter& filter = scene.description.filter;
+  const auto add = [&hash](std::uint64_t kind, const auto& values) {
+    if (!values.empty()) hash = xxh64(values.data(), values.size() * sizeof values[0], hash + kind);
+  };
+  add(1, filter.group), add(2, filter.mask), add(3, filter.excluded);
   return hash;
 }
 

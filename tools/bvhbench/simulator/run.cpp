@@ -127,6 +127,32 @@ class Checkpoints {
   Clock::time_point last_ = Clock::now();
 };
 
+// Refuses a state that no further step can start from, such as that of a body whose speed has overflowed.
+void check_states(const Simulator& simulator, const std::string& output, std::uint32_t step) {
+  const auto is_usable = [](const BodyState& state) {
+    return state.position.cwiseAbs().maxCoeff<Eigen::PropagateNaN>() <= kLargestWorldCoordinate &&
+           state.orientation.coeffs().allFinite() && state.velocity.allFinite() &&
+           state.angular_velocity.allFinite();
+  };
+  const auto states = simulator.states();
+  const auto lost = std::find_if_not(states.begin(), states.end(), is_usable);
+  if (lost == states.end()) return;
+  throw bench::FileError(output + ": step " + std::to_string(step) + ": body " +
+                         std::to_string(lost - states.begin()) +
+                         ": its place or velocity is no longer a finite number of at most 1e300");
+}
+
+// Makes a step. What an engine refuses is told by the step and the body.
+StepRecord make_step(Simulator& simulator, const std::string& output, std::uint32_t step) {
+  try {
+    StepRecord record = simulator.step();
+    check_states(simulator, output, step);
+    return record;
+  } catch (const EngineError& error) {
+    throw bench::FileError(output + ": step " + std::to_string(step) + ": " + error.what());
+  }
+}
+
 RunResults start(Simulator& simulator, const RunDescription& run, const RunOptions& options) {
   const std::string part = part_file(options.output);
   RunResults results;
@@ -214,8 +240,8 @@ RunResults run_simulation(Simulator& simulator, const RunDescription& run,
     write_run(path, run, results);
   };
   while (results.records.size() < options.steps) {
-    StepRecord record = simulator.step();
     const auto made = static_cast<std::uint32_t>(results.records.size() + 1);
+    StepRecord record = make_step(simulator, options.output, made);
     if (run.triangles > 0) {
       record.contact_ratio = static_cast<double>(record.triangle_pairs) / static_cast<double>(run.triangles);
     }

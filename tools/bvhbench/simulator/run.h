@@ -44,8 +44,9 @@ struct RunOptions {
 
 /// Makes the steps and writes the file. SIGINT, SIGTERM and SIGHUP end the process once the step under way is
 /// made and the part file written; a process killed otherwise leaves the last part file. Shows its progress
-/// where standard error is a terminal. Result: all the run has given. Throws bench::OutputError; with resume
-/// bench::FileError; what the contact finder throws.
+/// where standard error is a terminal. Result: all the run has given. Throws bench::OutputError;
+/// bench::FileError where a step fails, by its number and the body, and of the part file; what the contact
+/// finder throws.
 RunResults run_simulation(Simulator& simulator, const RunDescription& run,
                           const std::optional<Reentry>& reentry, const RunOptions& options);
 

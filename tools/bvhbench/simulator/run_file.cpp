@@ -1,6 +1,7 @@
 #include "run_file.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <type_traits>
 #include <utility>
@@ -135,6 +136,19 @@ bool read_rows(const Hdf5Input& file, std::vector<Row>& rows) {
   return alike;
 }
 
+// Refuses numbers that are not finite, by dataset and row.
+template <typename Row>
+void require_finite(const std::string& path, std::span<const Row> rows) {
+  for_each_column(Row(), [&](const char* name, auto member) {
+    const auto numbers = bench::column(rows, member);
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      if (std::isfinite(static_cast<double>(numbers[i]))) continue;
+      const std::size_t row = i / (numbers.size() / rows.size());
+      throw FileError(path + ": " + name + ": row " + std::to_string(row) + ": a number is not finite");
+    }
+  });
+}
+
 void write_bodies(Hdf5Output& file, const RunDescription& run) {
   const std::span<const BodyProperties> bodies = run.bodies;
   const auto asset = [&](const BodyProperties& body) { return run.shapes[body.shape].asset; };
@@ -200,6 +214,8 @@ SimulatorState read_state(const Hdf5Input& file, const std::string& path, std::s
   }
   if (!std::ranges::is_sorted(state.contacts, {}, &CachedContact::pair))
     throw FileError(path + ": /state/contacts/pair: not ascending");
+  require_finite(path, std::span<const BodyState>(state.states));
+  require_finite(path, std::span<const CachedContact>(state.contacts));
   state.step = step[0];
   return state;
 }
@@ -256,7 +272,7 @@ RunResults read_run(const std::string& path, const RunDescription& expected) {
   const Hdf5Input file(path);
   check_options(file, path, expected.options);
   RunResults results;
-  read_rows(file, results.records);
+  if (!read_rows(file, results.records)) throw FileError(path + ": /frames: datasets of different lengths");
   if (file.has("/trajectory")) results.trajectory = read_trajectory(file, path, expected.bodies.size());
   results.state = read_state(file, path, expected.bodies.size());
   if (results.records.size() != results.state.step) {
@@ -270,6 +286,10 @@ StoredFrame read_frame(const std::string& path, std::uint32_t frame) {
   if (!file.has("/trajectory")) throw FileError(path + ": keeps no trajectory; see simulate --trajectory");
   const auto shape = file.read_u32("/bodies/asset");
   const auto center = file.read_f64("/bodies/center_of_mass", {3});
+  if (center.size() != 3 * shape.size()) {
+    throw FileError(path + ": /bodies/center_of_mass: " + std::to_string(center.size() / 3) + " rows for " +
+                    std::to_string(shape.size()) + " bodies");
+  }
   const Trajectory trajectory = read_trajectory(file, path, shape.size());
   const auto& kept = trajectory.frame;
   const auto found = std::find(kept.begin(), kept.end(), frame);
@@ -282,6 +302,11 @@ StoredFrame read_frame(const std::string& path, std::uint32_t frame) {
   }
   StoredFrame stored;
   stored.assets = file.read_strings("/assets");
+  for (std::size_t i = 0; i < shape.size(); ++i) {
+    if (shape[i] < stored.assets.size()) continue;
+    throw FileError(path + ": /bodies/asset: body " + std::to_string(i) + " is of asset " +
+                    std::to_string(shape[i]) + " of " + std::to_string(stored.assets.size()));
+  }
   if (file.has("/bodies/level")) {
     stored.level = file.read_u32("/bodies/level");
     if (stored.level.size() != shape.size()) throw FileError(path + ": /bodies/level: not of all bodies");

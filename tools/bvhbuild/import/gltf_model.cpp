@@ -58,7 +58,9 @@ std::string read_file(const std::string& name, GltfBufferPlaces& places,
                       std::shared_ptr<const InputFile>& file) {
   const auto opened = std::make_shared<InputFile>();
   if (name.find('\0') != std::string::npos) return "no such file";
-  const std::string wrong = opened->open(places.folder / name);
+  const std::filesystem::path path = places.folder / name;
+  std::string wrong = places.outside_files ? "" : why_not_beside(places.folder, path);
+  if (wrong.empty()) wrong = opened->open(path);
   if (!wrong.empty()) return wrong;
   const auto known = places.files.find(opened->identity());
   if (known != places.files.end()) return file = known->second, std::string();
@@ -66,6 +68,7 @@ std::string read_file(const std::string& name, GltfBufferPlaces& places,
     return "its bytes take more than the memory limit (--memory-limit)";
   places.most_bytes_in_files -= opened->size();
   places.files.emplace(opened->identity(), file = opened);
+  places.paths.push_back(path.string());
   return opened->read_all();
 }
 
@@ -325,6 +328,7 @@ GltfModel read_gltf_model(const GltfObject& root, GltfBufferPlaces places) {
     model.buffers.push_back(read_buffer(buffer_source(item, model.buffers.size()), places));
   });
   for (const auto& [identity, file] : places.files) model.bytes_held += file->size();
+  model.files = std::move(places.paths);
   root.each("bufferViews", [&](const GltfObject& item) { model.views.push_back(view(item)); });
   root.each("accessors", [&](const GltfObject& item) { model.accessors.push_back(accessor(item)); });
   root.each("meshes", [&](const GltfObject& item) { model.meshes.push_back(mesh(item)); });

@@ -27,8 +27,10 @@ struct GltfBufferPlaces {
   bool is_binary = false;               ///< whether this is a GLB file
   std::string_view chunk;               ///< its binary chunk
   std::uint64_t most_bytes_in_files{};  ///< that may still be read; each file that is read lowers it
+  bool outside_files = false;           ///< whether files may lie elsewhere than in the folder or below it
   /// The files that buffers were found in. Each is read once, whatever names the buffers call it by.
-  std::map<InputFile::Identity, std::shared_ptr<const InputFile>> files;
+  std::map<InputFile::Identity, std::shared_ptr<const InputFile>> files{};
+  std::vector<std::string> paths{};  ///< of the files that were read
 };
 
 /// Replaces escapes: "a%20b.bin" becomes "a b.bin". Everything else stays as it is.
@@ -99,6 +101,7 @@ struct GltfModel {
   std::vector<int> roots;            ///< nodes of the scene
   std::uint64_t bytes_held = 0;      ///< by the file and the files of its buffers, each counted once
   std::vector<std::string> remarks;  ///< for the report, at most a few
+  std::vector<std::string> files;    ///< that buffers lie in
 };
 
 /// Reads the model out of a glTF file's JSON, and the buffers from where they are.

@@ -44,6 +44,16 @@ ssize_t read_fully(int descriptor, char* to, std::size_t count, off_t offset) {
 
 }  // namespace
 
+std::string why_not_beside(const std::filesystem::path& folder, const std::filesystem::path& path) {
+  std::error_code error;
+  const auto top = std::filesystem::weakly_canonical(folder.empty() ? "." : folder, error);
+  if (error) return reason(error.value());
+  const auto place = std::filesystem::weakly_canonical(path, error);
+  if (error) return reason(error.value());
+  if (std::mismatch(top.begin(), top.end(), place.begin(), place.end()).first == top.end()) return {};
+  return "lies outside the folder of the file that names it (--allow-outside-files)";
+}
+
 InputFile::~InputFile() {
   if (descriptor_ >= 0) close(descriptor_);
 }

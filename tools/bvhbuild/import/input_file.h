@@ -8,6 +8,10 @@
 
 namespace tandem::build {
 
+/// Why a file that a scene names may not be read: empty where it lies in the scene's folder or below it once
+/// symbolic links are resolved, or where there is none but it would. The file is not opened.
+std::string why_not_beside(const std::filesystem::path& folder, const std::filesystem::path& path);
+
 /// A regular file that is open for reading. Its destructor closes it.
 class InputFile {
  public:

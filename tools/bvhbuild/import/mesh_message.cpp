@@ -38,6 +38,11 @@ bool pass_mesh(Stream& stream, Mesh& mesh) {
          stream.flag(mesh.single_precision);
 }
 
+template <class Stream, class Files>
+bool pass_files(Stream& stream, Files& files) {
+  return stream.list(files, [&](auto& file) { return stream.sequence(file); });
+}
+
 }  // namespace
 
 void write_message(const ReadResult& result, const MessageSink& sink) {
@@ -45,7 +50,7 @@ void write_message(const ReadResult& result, const MessageSink& sink) {
   writer.number(kBegin);
   writer.flag(result.ok);
   writer.sequence(result.error);
-  if (result.ok) pass_mesh(writer, result.mesh);
+  if (result.ok) pass_mesh(writer, result.mesh), pass_files(writer, result.files);
   writer.number(kEnd);
 }
 
@@ -55,8 +60,8 @@ bool read_message(const MessageSource& source, std::uint64_t most_bytes, ReadRes
   bool ok = false;
   if (!reader.expect(kBegin) || !reader.flag(ok) || !reader.sequence(result.error)) return false;
   const PolygonMesh& mesh = result.mesh;
-  if (ok && !(pass_mesh(reader, result.mesh) && mesh.points.size() <= kNoVertex && faces_are_sound(mesh) &&
-              parts_are_sound(mesh)))
+  if (ok && !(pass_mesh(reader, result.mesh) && pass_files(reader, result.files) &&
+              mesh.points.size() <= kNoVertex && faces_are_sound(mesh) && parts_are_sound(mesh)))
     return false;
   result.ok = ok;
   return reader.expect(kEnd);

@@ -6,8 +6,8 @@
 
 namespace tandem::build {
 
-/// Writes what a child process tells its parent: a mesh, or the reason why there is none, in the byte order
-/// of both processes.
+/// Writes what a child process tells its parent: a mesh and the other files that were read for it, or the
+/// reason why there is none, in the byte order of both processes.
 void write_message(const ReadResult& result, const MessageSink& sink);
 
 /// Reads what write_message() wrote, believing nothing: a mesh that comes back has the shape that PolygonMesh

@@ -1,3 +1,4 @@
+#include <assimp/DefaultIOSystem.h>
 #include <assimp/config.h>
 #include <assimp/mesh.h>
 #include <assimp/scene.h>
@@ -9,6 +10,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <new>
 #include <span>
 #include <string>
@@ -18,6 +20,7 @@
 
 #include "common/limited_child.h"
 #include "common/printable.h"
+#include "input_file.h"
 #include "mesh_assembly.h"
 #include "mesh_message.h"
 #include "readers.h"
@@ -141,10 +144,49 @@ ReadResult failure(const Assimp::Importer& importer) {
   return read_failure("assimp: " + (error.empty() ? "failed without a reason" : error));
 }
 
+/// Opens the files that assimp asks for where they are regular ones, since a named pipe would make it wait;
+/// and, unless `limits` say otherwise, where they lie in the folder of the scene or below it.
+class SceneFiles : public Assimp::DefaultIOSystem {
+ public:
+  SceneFiles(const std::filesystem::path& scene, const ReadLimits& limits)
+      : scene_(scene), outside_files_(limits.outside_files) {}
+
+  bool Exists(const char* name) const override { return may_open(name); }
+
+  Assimp::IOStream* Open(const char* name, const char* mode) override {
+    if (!may_open(name)) return nullptr;
+    if (name != scene_.string()) files_.push_back(name);
+    return DefaultIOSystem::Open(name, mode);
+  }
+
+  /// The files that were opened beside the scene.
+  const std::vector<std::string>& files() const { return files_; }
+
+  /// Whether a file was not opened because of where it lies.
+  bool met_outside_file() const { return met_outside_file_; }
+
+ private:
+  bool may_open(const char* name) const {
+    std::error_code none;
+    if (!std::filesystem::is_regular_file(name, none)) return false;
+    if (outside_files_ || name == scene_.string()) return true;
+    if (why_not_beside(scene_.parent_path(), name).empty()) return true;
+    met_outside_file_ = true;
+    return false;
+  }
+
+  std::filesystem::path scene_;
+  bool outside_files_;
+  mutable bool met_outside_file_ = false;
+  std::vector<std::string> files_;
+};
+
 /// Reads a mesh file with assimp, in this process: it may crash, hang, or take all memory.
 ReadResult read_assimp_scene(const std::filesystem::path& path, const ReadLimits& limits) {
   Assimp::Importer importer;
   importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
+  auto* const files = new SceneFiles(path, limits);  // which the importer will own
+  importer.SetIOHandler(files);
   constexpr unsigned kNoPostProcessing = 0;  // faces stay polygons, in order; vertices stay apart
   const aiScene* scene = importer.ReadFile(path.string(), kNoPostProcessing);
   if (scene == nullptr) return failure(importer);
@@ -154,7 +196,12 @@ ReadResult read_assimp_scene(const std::filesystem::path& path, const ReadLimits
     return read_failure("instances of meshes repeat " + std::to_string(repeated) +
                         " vertices and faces, of " + std::to_string(limits.expansion) +
                         " that are allowed (--expansion-limit)");
-  return flatten(*scene, version());
+  ReadResult result = flatten(*scene, version());
+  result.files = files->files();
+  if (files->met_outside_file())
+    result.mesh.remarks.push_back(
+        "names files outside its folder, which are not read (--allow-outside-files)");
+  return result;
 }
 
 std::string short_number(double value) {

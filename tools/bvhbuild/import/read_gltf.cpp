@@ -283,8 +283,8 @@ class SceneReader {
 GltfModel read_model(std::string_view bytes, const std::filesystem::path& folder, const ReadLimits& limits) {
   const GltfContainer file = open_gltf_container(bytes);
   const nlohmann::json json = parse_gltf_json(file.json, limits.memory_bytes);
-  GltfModel model =
-      read_gltf_model(GltfObject(json), {folder, file.is_binary, file.chunk, limits.memory_bytes, {}});
+  GltfModel model = read_gltf_model(
+      GltfObject(json), {folder, file.is_binary, file.chunk, limits.memory_bytes, limits.outside_files});
   model.bytes_held += bytes.size();
   return model;
 }
@@ -293,7 +293,10 @@ GltfModel read_model(std::string_view bytes, const std::filesystem::path& folder
 
 ReadResult read_gltf(std::string_view bytes, const std::filesystem::path& folder, const ReadLimits& limits) {
   try {
-    return SceneReader(read_model(bytes, folder, limits), limits).read();
+    const GltfModel model = read_model(bytes, folder, limits);
+    ReadResult result = SceneReader(model, limits).read();
+    result.files = model.files;
+    return result;
   } catch (const GltfError& error) {
     return read_failure(error.what());
   }

@@ -46,7 +46,8 @@ ReadResult read_stl(std::string_view bytes);
 /// are no numbers.
 ReadResult read_off(std::string_view bytes);
 
-/// Reads a glTF 2 file, text or binary. Buffers in files of their own are looked for in `folder`.
+/// Reads a glTF 2 file, text or binary. Buffers in files of their own are looked for in `folder`; unless
+/// `limits.outside_files` says otherwise, they must lie there or below.
 ///
 /// Result: the default scene, the first one when none is named, or all nodes when there is no scene: the
 /// meshes of all nodes, depth first in the file's order, each instance by itself, with the node transforms

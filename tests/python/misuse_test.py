@@ -46,6 +46,17 @@ CASES = [
     (lambda s: s.place(asset=[0, 2**70]), TypeError, "asset has object"),
     (lambda s: s.place(asset=[0.0, 1.0]), TypeError, "asset has float64"),
     (lambda s: s.place(asset=[[0, 0]]), ValueError, "asset has shape"),
+    # Assets lend their bytes as a buffer, which is no array of numbers.
+    (lambda s: tandem.Scene([BOX], asset=BOX), TypeError, "asset: Asset is given where places in the scene's list of assets, whole numbers, are wanted"),
+    (lambda s: s.place(asset=[BOX, BOX]), TypeError, "asset: Asset is given where places"),
+    (lambda s: s.add(BOX), TypeError, "asset: Asset is given where places"),
+    (lambda s: s.place(translation=BOX), TypeError, "translation: Asset is given where numbers are wanted"),
+    (lambda s: s.move(BOX, translation=np.zeros(3)), TypeError, "bodies: Asset is given where whole numbers"),
+    (lambda s: s.contacts(pairs=BOX), TypeError, "pairs: Asset is given where whole numbers"),
+    (lambda s: s.bodies_at(BOX), TypeError, "points: Asset is given where numbers"),
+    (lambda s: tandem.Filter(motion=BOX), TypeError, "motion: Asset is given where whole numbers"),
+    (lambda s: tandem.build(BOX, BOX_FACES), TypeError, "vertices: Asset is given where numbers"),
+    (lambda s: tandem.build(BOX_VERTICES, BOX), TypeError, "faces: Asset is given where whole numbers"),
     (lambda s: s.place(poses(asset=1)), tandem.Error, "instance 1: .*asset"),
     (lambda s: s.place(poses(rotation=np.diag([1, 1, -1]))), tandem.Error, "instance 1: .*rotation"),
     (lambda s: s.place(poses(translation=np.nan)), tandem.Error, "instance 1"),
@@ -134,6 +145,20 @@ CASES = [
     (lambda s: tandem.build(BOX_VERTICES, BOX_FACES, provenance=5), TypeError, "provenance is int"),
     (lambda s: tandem.build(BOX_VERTICES, BOX_FACES, progress=5), TypeError, "progress is int"),
 ]
+# Flags, each with a call that takes it.
+FLAGS = [
+    ("first_contact_only", lambda s, value: s.contacts(first_contact_only=value)),
+    ("self_pairs", lambda s, value: s.contacts(self_pairs=value)),
+    ("add_error_bounds", lambda s, value: s.contacts(add_error_bounds=value)),
+    ("self_pairs", lambda s, value: s.pairs(self_pairs=value)),
+    ("match_previous", lambda s, value: s.manifolds(match_previous=value)),
+    ("gpu_blocks", lambda s, value: tandem.build(BOX_VERTICES, BOX_FACES, gpu_blocks=value)),
+    ("topology", lambda s, value: tandem.build(BOX_VERTICES, BOX_FACES, topology=value)),
+    ("return_report", lambda s, value: tandem.build(BOX_VERTICES, BOX_FACES, return_report=value)),
+]
+for name, ask in FLAGS:
+    CASES += [(lambda s, ask=ask, value=value: ask(s, value), TypeError, f"^{name} is {type(value).__name__} where True or False is wanted")
+              for value in ("no", 1, None, np.ones(1, bool))]
 # Numbers of calls, each with what is too large for it.
 AMOUNTS = [
     ("within", np.inf, lambda s, value: s.contacts(within=value)),
@@ -159,6 +184,12 @@ def test_misuse(number):
     assert type(caught.value) is kind and re.search(words, str(caught.value)), str(caught.value)
     # The scene works as ever.
     assert len(scene.place(ROWS).contacts().contacts) == 18
+
+
+def test_flags_of_numpy_are_taken():
+    for _, ask in FLAGS:
+        for value in (np.True_, np.False_):
+            ask(tandem.Scene([BOX], ROWS), value)
 
 
 def test_the_largest_amounts_are_taken():

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _tandem
-from ._arrays import floats, number, whole_number, whole_numbers
+from ._arrays import flag, floats, number, whole_number, whole_numbers
 from ._asset import Asset, Part, _choice
 from ._errors import Error, FileError
 
@@ -122,19 +122,20 @@ def build(vertices: npt.ArrayLike, faces: npt.ArrayLike | Sequence[Sequence[int]
         _text(provenance, "provenance")
     if progress is not None and not callable(progress):
         raise TypeError(f"progress is {type(progress).__name__} where a function is wanted")
+    gpu, topological, reported = flag(gpu_blocks, "gpu_blocks"), flag(topology, "topology"), flag(return_report, "return_report")
     strength = _choice("effort", effort, ("default", "fast", "best"))
     if levels is None and face_begin is None:
-        core, report = _tandem.build(points, corners, ids, named, strength, bool(gpu_blocks), bool(topology), workers, share, provenance, progress)
+        core, report = _tandem.build(points, corners, ids, named, strength, gpu, topological, workers, share, provenance, progress)
         asset = Asset._of(core)
     else:
         if face_begin is None:
             face_begin = np.arange(0, 3 * count + 1, 3, dtype=np.uint32)
-        data, report = _mesh_tools().build(points, corners, face_begin, ids, named, strength, bool(gpu_blocks), bool(topology), workers, share,
+        data, report = _mesh_tools().build(points, corners, face_begin, ids, named, strength, gpu, topological, workers, share,
                                            _words(levels), provenance, progress)
         if data is None:
             raise _no_triangle()
         asset = Asset.from_bytes(data)
-    return (asset, BuildReport(*report)) if return_report else asset
+    return (asset, BuildReport(*report)) if reported else asset
 
 
 def read_mesh(path: str | os.PathLike[str]) -> Mesh:

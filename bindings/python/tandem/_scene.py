@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _tandem
-from ._arrays import FARTHEST, FINITE, Rows, amount, floats, instances_of, pairs_of, rows, whole_number, whole_numbers
+from ._arrays import FARTHEST, FINITE, Rows, amount, flag, floats, instances_of, pairs_of, rows, whole_number, whole_numbers
 from ._asset import Asset, _choice
 from ._rows import BODY_AT, CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, INSTANCE, MANIFOLD, MOTION, PAIR, POINT, VERDICT
 
@@ -263,7 +263,7 @@ class Scene:
         >>> scene.place(translation=[[0, 0, 0], [0.5, 0, 0], [3, 0, 0]]).pairs().tolist()
         [(0, 1)]
         """
-        return _frombuffer(self._core.pairs(amount(reach, "reach", np.inf), bool(self_pairs)), PAIR)
+        return _frombuffer(self._core.pairs(amount(reach, "reach", np.inf), flag(self_pairs, "self_pairs")), PAIR)
 
     def contacts(self, *, pairs: npt.ArrayLike | None = None, mode: Literal["exact", "fast", "boxes"] = "exact", first_contact_only: bool = False,
                  self_pairs: bool = False, within: float = 0.0, add_error_bounds: bool = False) -> Contacts:
@@ -282,7 +282,8 @@ class Scene:
         ([(0, 1)], 18, 18)
         """
         found = self._core.contacts(None if pairs is None else pairs_of(pairs), _MODES[mode] if mode in _MODES else _choice("mode", mode, tuple(_MODES)),
-                                    bool(first_contact_only), bool(self_pairs), amount(within, "within", FARTHEST), bool(add_error_bounds))
+                                    flag(first_contact_only, "first_contact_only"), flag(self_pairs, "self_pairs"), amount(within, "within", FARTHEST),
+                                    flag(add_error_bounds, "add_error_bounds"))
         return Contacts(_frombuffer(found[0], PAIR), _frombuffer(found[1], CONTACT), Counters._make(found[2]))
 
     def manifolds(self, *, most_points: int = 7, match_previous: bool = True) -> Manifolds:
@@ -300,7 +301,7 @@ class Scene:
         >>> manifolds["normal"].tolist(), manifolds["depth"].tolist(), len(points)
         ([[0.0, 0.0, 1.0]], [0.25], 4)
         """
-        pairs, manifolds, points = self._core.manifolds(whole_number(most_points, "most_points", 1, 7), bool(match_previous))
+        pairs, manifolds, points = self._core.manifolds(whole_number(most_points, "most_points", 1, 7), flag(match_previous, "match_previous"))
         return Manifolds(_frombuffer(pairs, PAIR), _frombuffer(manifolds, MANIFOLD), _frombuffer(points, POINT))
 
     def contained(self) -> Contained:

@@ -175,6 +175,35 @@ for name, too_large, ask in AMOUNTS:
               for value in (np.nan, -1.0, -np.inf, too_large) if value is not None]
 
 
+TURNED = np.array([[2, -1, 2], [2, 2, -1], [-1, 2, 2]]) / 3
+DEFECTS = [
+    ({"translation": [0, np.nan, 0]}, "its translation is not finite (it has nan)"),
+    ({"translation": [0, 0, -np.inf]}, "its translation is not finite (it has -inf)"),
+    ({"rotation": np.full((3, 3), np.nan)}, "its rotation is not finite (it has nan)"),
+    ({"rotation": 2 * TURNED}, "its rotation is not orthonormal: it scales by 2"),
+    ({"rotation": 1.001 * TURNED}, "its rotation is not orthonormal: it scales by 1.001"),
+    ({"rotation": 1e300 * TURNED}, "its rotation is not orthonormal: it scales by 1e+300"),
+    ({"rotation": np.zeros((3, 3))}, "its rotation is not orthonormal: it scales by 0"),
+    ({"rotation": TURNED * [1, 1, 3]}, "its rotation is not orthonormal: it scales by 1 to 3, depending on the direction"),
+    ({"rotation": -TURNED}, "its rotation is a reflection, with a determinant below 0"),
+    ({"rotation": TURNED * [1, 1, -1]}, "its rotation is a reflection, with a determinant below 0"),
+    ({"rotation": -2 * TURNED}, "its rotation is a reflection, with a determinant below 0, which also scales by 2"),
+    ({"rotation": np.array([[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]], np.float16)}, "its rotation is too coarse: it is 0.0002 from orthonormal, where 1e-06 is allowed (float16 is not enough, float32 is)"),
+]
+
+
+@pytest.mark.parametrize("fields, words", DEFECTS)
+def test_a_pose_is_refused_with_the_reason(fields, words):
+    scene = tandem.Scene([BOX], ROWS)
+    row = {name: np.array(value) for name, value in fields.items()}
+    for place, call in ((0, lambda: scene.add(**row)), (1, lambda: scene.move([0, 1], poses(**fields))), (1, lambda: scene.place(poses(**fields)))):
+        with pytest.raises(tandem.Error) as caught:
+            call()
+        assert str(caught.value) == f"instance {place}: a pose is not a rotation and a translation: {words}"
+        assert (caught.value.name, caught.value.subject, caught.value.where) == ("PoseNotRigid", "instance", place)
+    scene.place(rotation=TURNED.astype(np.float32))
+
+
 @pytest.mark.parametrize("number", range(len(CASES)))
 def test_misuse(number):
     call, kind, words = CASES[number]

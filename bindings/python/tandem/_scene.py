@@ -10,6 +10,8 @@ import numpy.typing as npt
 from . import _tandem
 from ._arrays import FARTHEST, FINITE, Rows, amount, flag, floats, instances_of, pairs_of, rows, whole_number, whole_numbers
 from ._asset import Asset, _choice
+from ._errors import Error
+from ._poses import explained
 from ._rows import BODY_AT, CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, INSTANCE, MANIFOLD, MOTION, PAIR, POINT, VERDICT
 
 __all__ = ["Contacts", "Contained", "Counters", "Distances", "Filter", "Impacts", "Manifolds", "Scene", "Verdicts"]
@@ -202,11 +204,15 @@ class Scene:
             Error: a pose that is not rigid to 1e-6, a number that is not finite or beyond 1e300, an asset that there is not; `where` is the instance. There are
                 no bodies then.
 
-        >>> scene.place(rotation=np.ones((3, 3)))
+        >>> scene.place(rotation=2 * np.eye(3))
         Traceback (most recent call last):
-        tandem._errors.Error: instance 0: a pose is not a rotation and a translation
+        tandem._errors.Error: instance 0: a pose is not a rotation and a translation: its rotation is not orthonormal: it scales by 2
         """
-        self._core.place(instances_of(instances, asset, rotation, translation, transform), _core_of(filter))
+        bodies = instances_of(instances, asset, rotation, translation, transform)
+        try:
+            self._core.place(bodies, _core_of(filter))
+        except Error as error:
+            raise explained(error, bodies) from None
         return self
 
     def add(self, asset: int = 0, *, rotation: npt.ArrayLike | None = None, translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None,
@@ -227,7 +233,10 @@ class Scene:
         if len(body) != 1:
             raise ValueError(f"{len(body)} bodies where one is wanted")
         filter = None if (motion, group, mask) == (0, _MOST, _MOST) else Filter([motion], [group], [mask])
-        return self._core.add(body, _core_of(filter))
+        try:
+            return self._core.add(body, _core_of(filter))
+        except Error as error:
+            raise explained(error, body) from None
 
     def move(self, bodies: npt.ArrayLike, instances: Rows | None = None, *, rotation: npt.ArrayLike | None = None,
              translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None) -> None:
@@ -246,7 +255,10 @@ class Scene:
             if len(poses) != 1:
                 raise ValueError(f"different numbers of rows: bodies {len(numbers)}, poses {len(poses)}")
             poses = np.repeat(poses, len(numbers))
-        self._core.move(numbers, poses)
+        try:
+            self._core.move(numbers, poses)
+        except Error as error:
+            raise explained(error, poses) from None
 
     def set_motion(self, body: int, motion: int) -> None:
         """Changes what moves a body: MOVING, FIXED, KINEMATIC or SLEEPING."""

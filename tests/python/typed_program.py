@@ -38,6 +38,7 @@ def ask(scene: tandem.Scene) -> None:
     contacts: tandem.Contacts = scene.place(rows, filter=filter).contacts(mode="exact", first_contact_only=False, self_pairs=False, within=0.0,
                                                                           add_error_bounds=False)
     work: tandem.Counters = contacts.counters
+    touching: npt.NDArray[np.void] = contacts.touching
     faces: npt.NDArray[np.uint32] = contacts.contacts["face_a"]
     manifolds: tandem.Manifolds = scene.manifolds(most_points=4, match_previous=False)
     contained: tandem.Contained = scene.contained()
@@ -50,7 +51,7 @@ def ask(scene: tandem.Scene) -> None:
     scene.set_motion(body, tandem.MOVING)
     scene.remove(body)
     bodies: npt.NDArray[np.void] = scene.instances
-    print(work.contacts, faces.max(), len(manifolds.manifolds), len(manifolds.points), len(contained.contained), distances.distances["upper"],
+    print(work.contacts, touching["a"], faces.max(), len(manifolds.manifolds), len(manifolds.points), len(contained.contained), distances.distances["upper"],
           impacts.impacts["status"], verdicts.verdicts["verdict"], len(scene.pairs(reach=0.5)), len(bodies))
     try:
         scene.place(transform=np.zeros((2, 4, 4)))

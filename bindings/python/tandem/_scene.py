@@ -40,6 +40,20 @@ class Contacts(NamedTuple):
     contacts: Rows
     counters: Counters
 
+    @property
+    def touching(self) -> Rows:
+        """The pairs that have a contact, array of PAIR in the order of `pairs`. `pairs` are those that were looked at: their world boxes meet, or they were given.
+
+        >>> link = tandem.build([[0, 0, 0], [3, 0, 0], [0, 3, 0]], [[0, 1, 2]])
+        >>> found = tandem.Scene([link], translation=[[0, 0, 0], [1, 1, 0], [2, 2, 0]]).contacts()
+        >>> found.pairs.tolist(), found.touching.tolist()
+        ([(0, 1), (0, 2), (1, 2)], [(0, 1), (1, 2)])
+        """
+        meets = np.zeros(len(self.pairs), bool)
+        meets[self.contacts["pair"]] = True
+        touching: Rows = self.pairs[meets]
+        return touching
+
 
 class Manifolds(NamedTuple):
     """Object pairs; their contact regions, array of MANIFOLD by ascending pair; the points of these, array of POINT, manifold by manifold."""
@@ -157,10 +171,10 @@ class Scene:
 
     >>> scene = tandem.Scene([box], translation=[[0, 0, 0], [2, 0, 0]])
     >>> body = scene.add(translation=[0.5, 0, 0])
-    >>> scene.contacts().pairs.tolist(), scene.distances(pairs=[[1, 2]]).distances["upper"].round(9).tolist()
+    >>> scene.contacts().touching.tolist(), scene.distances(pairs=[[1, 2]]).distances["upper"].round(9).tolist()
     ([(0, 2)], [0.5])
     >>> scene.move(body, translation=[1.5, 0, 0])
-    >>> scene.contacts().pairs.tolist()
+    >>> scene.contacts().touching.tolist()
     [(1, 2)]
     """
 
@@ -288,6 +302,9 @@ class Scene:
             self_pairs: where the scene finds the pairs, also each body with itself.
             within: clearance: triangles at most so far apart count, decided exactly.
             add_error_bounds: a pair without a contact is surely apart at the finest levels too.
+
+        Returns:
+            Contacts: unpacks into pairs, contacts and counters; `touching` are the pairs that have a contact.
 
         >>> pairs, contacts, counters = scene.place(translation=[[0, 0, 0], [0.5, 0.5, 0.5]]).contacts()
         >>> pairs.tolist(), len(contacts), counters.contacts

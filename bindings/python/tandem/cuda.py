@@ -96,7 +96,7 @@ class Rows:
 
 
 # Results, with the fields of the CPU's: `pairs` are rows of PAIR, or what was given.
-#: Rows of CONTACT, in any order unless sorted or grouped, and the work.
+#: Rows of CONTACT, in any order unless sorted or grouped, and the work. There is no `touching`, which would take the GPU another pass.
 Contacts = NamedTuple("Contacts", [("pairs", Any), ("contacts", Rows), ("counters", Counters)])
 #: Rows of MANIFOLD and POINT.
 Manifolds = NamedTuple("Manifolds", [("pairs", Any), ("manifolds", Rows), ("points", Rows)])

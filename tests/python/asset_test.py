@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import tandem
-from meshes import BOX_FACES, BOX_VERTICES, read_obj
+from meshes import BOX_FACES, BOX_VERTICES, check_errors_of_files, read_obj
 
 ASSETS = Path(os.environ["TANDEM_SOURCE_DIR"]) / "assets"
 
@@ -115,6 +115,11 @@ def test_names_the_defect_of_a_file(tmp_path, box):
         tandem.Asset.load("a\0b")
     with pytest.raises(TypeError):
         tandem.Asset()
+
+
+def test_a_file_that_cannot_be_read_raises_what_open_raises(tmp_path):
+    check_errors_of_files(tandem.Asset.load, tmp_path, "a.bvh")
+    check_errors_of_files(lambda path: tandem.Asset.load(path, access="read"), tmp_path, "a.bvh")
 
 
 def test_shows_levels_from_one_on(tmp_path):

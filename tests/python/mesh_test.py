@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import tandem
-from meshes import BOX_FACES, BOX_VERTICES
+from meshes import BOX_FACES, BOX_VERTICES, check_errors_of_files
 
 pytest.importorskip("tandem._bvhbuild")
 ASSETS = Path(os.environ["TANDEM_SOURCE_DIR"]) / "assets"
@@ -62,6 +62,11 @@ def test_formats_of_others_are_read_by_assimp_in_a_child(tmp_path):
     path.write_text("0\nSECTION\n2\nENTITIES\n0\n3DFACE\n8\n0\n10\n0\n20\n0\n30\n0\n11\n1\n21\n0\n31\n0\n12\n0\n22\n1\n32\n0\n13\n0\n23\n1\n33\n0\n0\nENDSEC\n0\nEOF\n")
     mesh = tandem.read_mesh(path)
     assert len(mesh.triangles) >= 1
+
+
+@pytest.mark.parametrize("name", ["a.obj", "a.dae"])
+def test_a_file_that_cannot_be_read_raises_what_open_raises(tmp_path, name):
+    check_errors_of_files(tandem.read_mesh, tmp_path, name)
 
 
 def test_says_what_is_wrong(tmp_path):

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from . import _tandem
 from ._arrays import flag, floats, number, whole_number, whole_numbers
 from ._asset import Asset, Part, _choice
-from ._errors import Error, FileError
+from ._errors import Error, FileError, with_path
 
 __all__ = ["BuildReport", "Mesh", "build", "read_mesh"]
 
@@ -142,7 +142,8 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     """Reads a mesh file as bvhbuild does: OBJ, PLY, STL, OFF, glTF and GLB by its own readers, whatever else assimp reads in a child process.
 
     Raises:
-        FileError: it cannot be read; the text says why, with the line where there is one.
+        FileError: it cannot be read; the text says why, with the line where there is one. It is a FileNotFoundError, PermissionError or IsADirectoryError too
+            where open() raises that.
         ImportError: the mesh tools are not installed.
     """
     tools = _mesh_tools()
@@ -158,10 +159,10 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
                   "marshal.dump(tools.read(sys.argv[2].encode('utf-8', 'surrogateescape'), False), sys.stdout.buffer)")
         done = subprocess.run([sys.executable, "-I", "-S", "-X", "utf8", "-c", script, str(tools.__file__), name], capture_output=True)
         if done.returncode != 0:
-            raise FileError(f"{os.fsdecode(path)}: the reader's process failed: {done.stderr.decode(errors='replace')}")
+            raise with_path(FileError(f"the reader's process failed: {done.stderr.decode(errors='replace')}"), os.fsdecode(path))
         read = marshal.loads(done.stdout)
     if read[0] is None:
-        raise FileError(f"{os.fsdecode(path)}: {read[1].decode(errors='replace')}")
+        raise with_path(FileError(read[1].decode(errors="replace")), os.fsdecode(path))
     points, triangles, faces, parts, remarks = read
     return Mesh(np.frombuffer(bytearray(points), np.float64).reshape(-1, 3), np.frombuffer(bytearray(triangles), np.uint32).reshape(-1, 3),
                 np.frombuffer(bytearray(faces), np.uint32), [Part(name.decode(errors="replace"), path.decode(errors="replace"), first, count)

@@ -93,9 +93,9 @@ def test_names_parts_and_faces():
 
 
 def test_reports_what_was_left_out():
-    faces = np.concatenate([BOX_FACES, [[0, 0, 1], [0, 1, 9], [0, 1, 3]]])
-    _, report = tandem.build(BOX_VERTICES, faces, return_report=True)
-    assert (report.degenerate, report.index_out_of_range, report.duplicate) == (1, 1, 1)
+    faces = np.concatenate([BOX_FACES, [[0, 0, 1], [0, 1, 8], [0, 1, 3]]])
+    _, report = tandem.build([*BOX_VERTICES, [0, 0, np.inf]], faces, return_report=True)
+    assert (report.degenerate, report.not_finite, report.duplicate) == (1, 1, 1) and sum(report) == 3
     with pytest.raises(tandem.Error) as caught:
         tandem.build(BOX_VERTICES, [])
     assert caught.value.name == "NoTriangle"

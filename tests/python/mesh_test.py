@@ -82,7 +82,7 @@ def test_says_what_is_wrong(tmp_path):
     with pytest.raises(tandem.Error) as caught:
         tandem.build(BOX_VERTICES, [[0, 0, 0, 0]])
     assert caught.value.name == "NoTriangle"
-    with pytest.raises(ValueError, match="faces: row 1: row 0 is not from"):
+    with pytest.raises(ValueError, match="faces: row 1 has vertex -1 where 0 to 7 is wanted"):
         tandem.build(BOX_VERTICES, [[0, 1, 2], [-1, 1, 2, 3]])
     with pytest.raises(ValueError, match="parts"):
         tandem.build(BOX_VERTICES, [[0, 1, 3, 2]], parts=[("a", "", 3)])

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _tandem
-from ._arrays import flag, floats, number, whole_number, whole_numbers
+from ._arrays import any_whole_numbers, flag, floats, number, whole_number, whole_numbers
 from ._asset import Asset, Part, _choice
 from ._errors import Error, FileError, with_path
 
@@ -23,7 +23,6 @@ class BuildReport(NamedTuple):
     """What became of the triangles."""
 
     #: Left out, each under the first cause that holds.
-    index_out_of_range: int
     not_finite: int
     too_large: int
     #: Left out: the corners lie on one line.
@@ -81,7 +80,7 @@ def build(vertices: npt.ArrayLike, faces: npt.ArrayLike | Sequence[Sequence[int]
 
     Args:
         vertices: (n, 3), float64.
-        faces: (m, 3), the vertices of each triangle; or polygons, (m, k) or a list of lists, which need the mesh tools.
+        faces: (m, 3), the numbers of each triangle's vertices, from 0; or polygons, (m, k) or a list of lists, which need the mesh tools.
         effort: "fast", "default", or "best", which takes minutes for 100,000 triangles.
         levels: coarser levels of the mesh, each proved to be at most so far from the finest: lengths, or shares of the diagonal such as "1%", ascending; "auto"
             is 0.1 %, 0.3 %, 1 % and 3 %. Needs the mesh tools.
@@ -98,7 +97,7 @@ def build(vertices: npt.ArrayLike, faces: npt.ArrayLike | Sequence[Sequence[int]
 
     Raises:
         Error: no triangle can be used; faces are in no part.
-        ValueError, TypeError: which name the argument and the row.
+        ValueError, TypeError: which name the argument and the row, such as the first face with a vertex that there is not.
         ImportError: the mesh tools are needed and not installed.
 
     >>> tetrahedron = tandem.build([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
@@ -108,7 +107,7 @@ def build(vertices: npt.ArrayLike, faces: npt.ArrayLike | Sequence[Sequence[int]
     points = floats(vertices, "vertices", 3)
     if points.ndim != 2:
         raise ValueError(f"vertices has shape {points.shape} where (n, 3) is wanted")
-    corners, face_begin = _polygons(faces)
+    corners, face_begin = _polygons(faces, len(points))
     count = len(corners) // 3 if face_begin is None else len(face_begin) - 1
     ids = None if face_ids is None else whole_numbers(face_ids, "face_ids", 0xFFFFFFFD)
     if ids is not None and ids.shape != (count,):
@@ -135,7 +134,7 @@ def build(vertices: npt.ArrayLike, faces: npt.ArrayLike | Sequence[Sequence[int]
         if data is None:
             raise _no_triangle()
         asset = Asset.from_bytes(data)
-    return (asset, BuildReport(*report)) if reported else asset
+    return (asset, BuildReport(*report[1:])) if reported else asset
 
 
 def read_mesh(path: str | os.PathLike[str]) -> Mesh:
@@ -170,22 +169,33 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
                 [remark.decode(errors="replace") for remark in remarks])
 
 
-def _polygons(faces: Any) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint32] | None]:
+def _polygons(faces: Any, vertex_count: int) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint32] | None]:
     """Vertices of all faces, one after the other, and where each begins; None for triangles."""
     if not isinstance(faces, np.ndarray) and hasattr(faces, "__len__"):
         lengths = {len(face) for face in faces if hasattr(face, "__len__")}
         if len(lengths) > 1:
-            rows = [whole_numbers(face, f"faces: row {row}") for row, face in enumerate(faces)]
+            rows = [_vertices_of(any_whole_numbers(face, f"faces: row {row}"), vertex_count, row) for row, face in enumerate(faces)]
             begin = np.concatenate([[0], np.cumsum([len(row) for row in rows])])
             return np.concatenate(rows), begin.astype(np.uint32)
-    corners = whole_numbers(faces, "faces")
+    corners = any_whole_numbers(faces, "faces")
     if corners.size == 0:
-        return corners.reshape(-1), None
+        return np.empty(0, np.uint32), None
     if corners.ndim != 2:
         raise ValueError(f"faces has shape {corners.shape} where (m, 3) is wanted")
+    corners = _vertices_of(corners, vertex_count)
     if corners.shape[1] == 3:
         return corners.reshape(-1), None
     return corners.reshape(-1), np.arange(0, corners.size + 1, corners.shape[1], dtype=np.uint32)
+
+
+def _vertices_of(faces: npt.NDArray[Any], count: int, first_row: int = 0) -> npt.NDArray[np.uint32]:
+    """Faces whose vertices are there, one, or (m, k) from row `first_row` on."""
+    bad = (faces < 0) | (faces >= count)
+    if bad.any():
+        first = np.argwhere(bad)[0]
+        row = first_row + (int(first[0]) if faces.ndim > 1 else 0)
+        raise ValueError(f"faces: row {row} has vertex {faces[tuple(first)]} where 0 to {count - 1} is wanted" if count else f"faces: row {row}: there are no vertices")
+    return np.asarray(faces, np.uint32, order="C")
 
 
 def _words(levels: Levels | None) -> str:

@@ -45,6 +45,12 @@ def test_build_makes_the_bytes_of_bvhbuild(tmp_path, name, options, words):
     assert bytes(built) == written.read_bytes()
 
 
+def test_builds_meshes_of_trimesh(box):
+    trimesh = pytest.importorskip("trimesh")
+    mesh = trimesh.Trimesh(BOX_VERTICES + 10, BOX_FACES, process=False)
+    assert bytes(tandem.build(mesh)) == bytes(tandem.build(mesh, topology=True)) == bytes(box)
+
+
 def test_the_bytes_do_not_depend_on_threads():
     vertices, faces = read_obj(ASSETS / "cow_1500.obj")
     assert bytes(tandem.build(vertices, faces, threads=1)) == bytes(tandem.build(vertices, faces, threads=4))

@@ -40,6 +40,18 @@ def test_bodies_that_touch_are_those_with_a_contact(box, scene):
     assert len(asked.pairs) == 2 and len(asked.touching) == 0
 
 
+def test_takes_rotations_of_scipy(box, scene):
+    rotation = pytest.importorskip("scipy.spatial.transform").Rotation
+    turns = rotation.from_euler("z", [0, 30, 60], degrees=True)
+    expected = tandem.instances(rotation=turns.as_matrix(), translation=[1, 0, 0]).tobytes()
+    assert tandem.instances(rotation=turns, translation=[1, 0, 0]).tobytes() == expected
+    assert tandem.Scene([box], rotation=turns, translation=[1, 0, 0]).instances.tobytes() == expected
+    assert scene.place(rotation=turns, translation=[1, 0, 0]).instances.tobytes() == expected
+    scene.move(2, rotation=turns[1], translation=[1, 0, 0])
+    assert scene.add(rotation=turns[2], translation=[1, 0, 0]) == 3
+    assert scene.instances[[0, 1, 3]].tobytes() == expected and scene.instances[2] == scene.instances[1]
+
+
 def test_takes_poses_in_every_form(box, scene):
     turned = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
     rows = np.zeros(2, tandem.INSTANCE)

@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import operator
 import sys
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,16 @@ __all__ = ["Rows", "instances"]
 
 #: An array of rows, such as INSTANCE.
 Rows = npt.NDArray[np.void]
+
+
+class AsMatrix(Protocol):
+    """A rotation, or a stack of them, of a library that has a class for these, such as scipy's Rotation."""
+
+    def as_matrix(self) -> Any: ...
+
+
+#: What `rotation` takes.
+Rotations = npt.ArrayLike | AsMatrix
 
 #: The largest distance that questions take, as coordinates, and the largest number.
 FARTHEST, FINITE = 1e300, sys.float_info.max
@@ -140,13 +150,13 @@ def pairs_of(value: npt.ArrayLike | Rows | None, name: str = "pairs") -> Rows | 
     return array.view(PAIR).reshape(-1)
 
 
-def instances(asset: npt.ArrayLike = 0, rotation: npt.ArrayLike | None = None, translation: npt.ArrayLike | None = None,
+def instances(asset: npt.ArrayLike = 0, rotation: Rotations | None = None, translation: npt.ArrayLike | None = None,
               transform: npt.ArrayLike | None = None) -> Rows:
     """Bodies, posed: one for each row of the longest argument; an argument without rows, or with one, is that of all.
 
     Args:
         asset: place in the scene's list of assets, () or (n,).
-        rotation: (3, 3) or (n, 3, 3); the identity where it is not given.
+        rotation: (3, 3) or (n, 3, 3), or what gives that by `as_matrix()`, such as scipy's Rotation; the identity where it is not given.
         translation: (3,) or (n, 3), in the assets' unit; 0 where it is not given.
         transform: (4, 4) or (n, 4, 4) instead of both; the last row is 0, 0, 0, 1.
 
@@ -170,7 +180,9 @@ def instances(asset: npt.ArrayLike = 0, rotation: npt.ArrayLike | None = None, t
                 raise ValueError(f"transform: the last row of matrix {int(np.flatnonzero(wrong)[0])} is not 0, 0, 0, 1")
         rotations, translations = matrices[..., :3, :3], matrices[..., :3, 3]
     else:
-        rotations = _IDENTITY if rotation is None else floats(rotation, "rotation", 3, 3)
+        as_matrix = getattr(rotation, "as_matrix", None)
+        given: Any = as_matrix() if callable(as_matrix) else rotation
+        rotations = _IDENTITY if given is None else floats(given, "rotation", 3, 3)
         translations = _ORIGIN if translation is None else floats(translation, "translation", 3)
     numbers = whole_numbers(asset, "asset", wanted="places in the scene's list of assets, whole numbers,")
     if numbers.ndim > 1:

@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from types import ModuleType
-from typing import Any, Literal, NamedTuple, overload
+from typing import Any, Literal, NamedTuple, Protocol, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -54,6 +54,17 @@ class Mesh(NamedTuple):
     remarks: list[str]
 
 
+class MeshLike(Protocol):
+    """A mesh of another library, such as a trimesh.Trimesh."""
+
+    @property
+    def vertices(self) -> Any: ...
+    @property
+    def faces(self) -> Any: ...
+
+
+Vertices = npt.ArrayLike | MeshLike
+Faces = npt.ArrayLike | Sequence[Sequence[int]] | None
 Effort = Literal["default", "fast", "best"]
 Levels = Literal["auto"] | Sequence[float | str]
 #: Name, path and, last, number of faces of each.
@@ -62,24 +73,24 @@ Progress = Callable[[float], object]
 
 
 @overload
-def build(vertices: npt.ArrayLike, faces: npt.ArrayLike | Sequence[Sequence[int]], *, effort: Effort = ..., levels: Levels | None = ..., threads: int = ...,
+def build(vertices: Vertices, faces: Faces = ..., *, effort: Effort = ..., levels: Levels | None = ..., threads: int = ...,
           gpu_blocks: bool = ..., topology: bool = ..., imaginary_share: float = ..., face_ids: npt.ArrayLike | None = ..., parts: Parts | None = ...,
           provenance: str | None = ..., progress: Progress | None = ..., return_report: Literal[False] = ...) -> Asset: ...
 
 
 @overload
-def build(vertices: npt.ArrayLike, faces: npt.ArrayLike | Sequence[Sequence[int]], *, effort: Effort = ..., levels: Levels | None = ..., threads: int = ...,
+def build(vertices: Vertices, faces: Faces = ..., *, effort: Effort = ..., levels: Levels | None = ..., threads: int = ...,
           gpu_blocks: bool = ..., topology: bool = ..., imaginary_share: float = ..., face_ids: npt.ArrayLike | None = ..., parts: Parts | None = ...,
           provenance: str | None = ..., progress: Progress | None = ..., return_report: Literal[True]) -> tuple[Asset, BuildReport]: ...
 
 
-def build(vertices: npt.ArrayLike, faces: npt.ArrayLike | Sequence[Sequence[int]], *, effort: Effort = "default", levels: Levels | None = None, threads: int = 0,
+def build(vertices: Vertices, faces: Faces = None, *, effort: Effort = "default", levels: Levels | None = None, threads: int = 0,
           gpu_blocks: bool = True, topology: bool = True, imaginary_share: float = 0.0, face_ids: npt.ArrayLike | None = None, parts: Parts | None = None,
           provenance: str | None = None, progress: Progress | None = None, return_report: bool = False) -> Asset | tuple[Asset, BuildReport]:
     """Builds an asset: the bytes that bvhbuild writes for these faces, but for what they say of their making.
 
     Args:
-        vertices: (n, 3), float64.
+        vertices: (n, 3), float64; or, without faces, a mesh that has `vertices` and `faces`, such as a trimesh.Trimesh.
         faces: (m, 3), the numbers of each triangle's vertices, from 0; or polygons, (m, k) or a list of lists, which need the mesh tools.
         effort: "fast", "default", or "best", which takes minutes for 100,000 triangles.
         levels: coarser levels of the mesh, each proved to be at most so far from the finest: lengths, or shares of the diagonal such as "1%", ascending; "auto"
@@ -104,7 +115,13 @@ def build(vertices: npt.ArrayLike, faces: npt.ArrayLike | Sequence[Sequence[int]
     >>> tetrahedron.levels[0].triangle_count, tetrahedron.levels[0].closed
     (4, True)
     """
-    points = floats(vertices, "vertices", 3)
+    mesh: Any = vertices
+    if faces is None:
+        try:
+            mesh, faces = mesh.vertices, mesh.faces
+        except AttributeError:
+            raise TypeError(f"faces is missing, or {type(mesh).__name__} has no vertices and faces of its own") from None
+    points = floats(mesh, "vertices", 3)
     if points.ndim != 2:
         raise ValueError(f"vertices has shape {points.shape} where (n, 3) is wanted")
     corners, face_begin = _polygons(faces, len(points))

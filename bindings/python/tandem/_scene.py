@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _tandem
-from ._arrays import FARTHEST, FINITE, Rows, amount, flag, floats, instances_of, pairs_of, rows, whole_number, whole_numbers
+from ._arrays import FARTHEST, FINITE, Rotations, Rows, amount, flag, floats, instances_of, pairs_of, rows, whole_number, whole_numbers
 from ._asset import Asset, _choice
 from ._errors import Error
 from ._poses import explained
@@ -181,7 +181,7 @@ class Scene:
     __slots__ = ("_core", "_threads", "__weakref__")
 
     def __init__(self, assets: Iterable[Asset], instances: Rows | None = None, *, threads: int = 1, filter: Filter | None = None,
-                 asset: npt.ArrayLike | None = None, rotation: npt.ArrayLike | None = None, translation: npt.ArrayLike | None = None,
+                 asset: npt.ArrayLike | None = None, rotation: Rotations | None = None, translation: npt.ArrayLike | None = None,
                  transform: npt.ArrayLike | None = None, device: str = "cpu"):
         self._core = _tandem.Scene(cores_of(assets), _device(device))
         self._threads = 1
@@ -206,7 +206,7 @@ class Scene:
         """The bodies by number, a copy, array of INSTANCE. Removed ones have the asset NO_INDEX."""
         return _frombuffer(self._core.instances(), INSTANCE)
 
-    def place(self, instances: Rows | None = None, *, filter: Filter | None = None, asset: npt.ArrayLike | None = None, rotation: npt.ArrayLike | None = None,
+    def place(self, instances: Rows | None = None, *, filter: Filter | None = None, asset: npt.ArrayLike | None = None, rotation: Rotations | None = None,
               translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None) -> Scene:
         """Places all bodies anew; those that stand as before cost next to nothing. Returns the scene.
 
@@ -229,7 +229,7 @@ class Scene:
             raise explained(error, bodies) from None
         return self
 
-    def add(self, asset: int = 0, *, rotation: npt.ArrayLike | None = None, translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None,
+    def add(self, asset: int = 0, *, rotation: Rotations | None = None, translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None,
             motion: int = 0, group: int = _MOST, mask: int = _MOST) -> int:
         """Adds a body and leaves the others alone. Returns its number, the lowest that is free.
 
@@ -252,7 +252,7 @@ class Scene:
         except Error as error:
             raise explained(error, body) from None
 
-    def move(self, bodies: npt.ArrayLike, instances: Rows | None = None, *, rotation: npt.ArrayLike | None = None,
+    def move(self, bodies: npt.ArrayLike, instances: Rows | None = None, *, rotation: Rotations | None = None,
              translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None) -> None:
         """Moves a body, or several, and leaves the others alone.
 

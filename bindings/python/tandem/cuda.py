@@ -172,7 +172,7 @@ class Filter:
     __slots__ = ("_core",)
 
     def __init__(self, motion: Any = None, group: Any = None, mask: Any = None, excluded: npt.ArrayLike | None = None, *, device: int = 0, stream: Any = None):
-        self._core = _cuda.Filter(motion, group, mask, pairs_of(excluded), _stream(stream), device)
+        self._core = _cuda.Filter(motion, group, mask, pairs_of(excluded, "excluded"), _stream(stream), device)
 
 
 class Queued:
@@ -338,7 +338,8 @@ class Query:
             motion: (n, 3, 3) or (n, 9) float64: velocity of the centre, angular velocity, and where the centre is in the world at the start.
         """
         bodies, given, chosen, on = self._about(instances, asset, pose, pairs, filter, stream)
-        found = self._core.impacts(bodies, motion, amount(duration, "duration", FINITE), given, amount(tolerance, "tolerance", FINITE), flag(sorted, "sorted"), chosen, on)
+        found = self._core.impacts(bodies, motion, amount(duration, "duration", FINITE), given, amount(tolerance, "tolerance", FINITE),
+                                   flag(sorted, "sorted"), chosen, on)
         return Impacts(_found(found[0], pairs), Rows(found[1], IMPACT))
 
     def verdicts(self, instances: Instances | None = None, *, tolerance: float, asset: Any = None, pose: Any = None, pairs: Any = None,

@@ -23,7 +23,7 @@ translation = random.uniform(-1.9, 1.9, (60, 3))
 finest = None
 for number, level in enumerate(cow.levels):
     found = tandem.Scene([cow.levels_from(number, 1)], rotation=rotation, translation=translation).contacts()
-    touching = set(map(tuple, found.pairs[np.unique(found.contacts["pair"])].tolist()))
+    touching = set(map(tuple, found.touching.tolist()))
     finest = finest or touching
     print(f"level {number}: {level.triangle_count:6,} triangles, off by at most {100 * level.error_bound / diagonal:.2f} % of the diagonal: "
           f"{len(touching)} pairs touch, {len(touching ^ finest)} of them otherwise than at level 0")

@@ -75,9 +75,31 @@ endif()
 run(${FOLDER}/consumer/contacts_in_c ${FOLDER}/box.bvh)
 require_shown(docs/c.md "" "${output}")
 set(told_in_c "${output}")
+# Half a length apart these do not meet.
+file(WRITE ${FOLDER}/flat.obj "v 0 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n")
+run(${BVHBUILD} ${FOLDER}/flat.obj -o ${FOLDER}/flat.bvh --quiet)
+run(${FOLDER}/consumer/contacts_in_c ${FOLDER}/flat.bvh)
+if(NOT output STREQUAL "0 pairs of triangles meet\n")
+  message(FATAL_ERROR "the program in C says of bodies that do not meet: ${output}")
+endif()
 # The builder in the library makes the same bytes.
 run(${FOLDER}/consumer/build_file ${SOURCE}/assets box_12.obj ${FOLDER}/box.bvh ${FOLDER}/made.bvh 0 0 0 0)
 run(${CMAKE_COMMAND} -E compare_files ${FOLDER}/box.bvh ${FOLDER}/made.bvh)
+
+# As a part of another project Tandem has no parts for GPUs unless these are asked for.
+file(WRITE ${FOLDER}/game/CMakeLists.txt "cmake_minimum_required(VERSION 3.25)
+project(game LANGUAGES CXX)
+set(TANDEM_TOOLS OFF)
+set(TANDEM_TESTS OFF)
+add_subdirectory(${SOURCE} tandem)
+add_executable(game ${SOURCE}/tests/consumer/contacts.cpp)
+target_link_libraries(game PRIVATE tandem::kernels tandem::runtime)
+message(STATUS \"CUDA: \${TANDEM_CUDA}\")
+")
+run(${CMAKE_COMMAND} -S ${FOLDER}/game -B ${FOLDER}/game/build -G ${GENERATOR} -DCMAKE_CXX_COMPILER=${COMPILER} ${no_packages})
+if(NOT output MATCHES "CUDA: OFF")
+  message(FATAL_ERROR "CUDA is not off in a project that has Tandem as a part:\n${output}")
+endif()
 
 # The same program by a C compiler that knows pkg-config alone.
 find_program(PKG_CONFIG NAMES pkg-config pkgconf)

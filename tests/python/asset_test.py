@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import tandem
-from meshes import BOX_FACES, BOX_VERTICES, read_obj
+from meshes import BOX_FACES, BOX_VERTICES, check_errors_of_files, read_obj
 
 ASSETS = Path(os.environ["TANDEM_SOURCE_DIR"]) / "assets"
 
@@ -43,6 +43,12 @@ def test_build_makes_the_bytes_of_bvhbuild(tmp_path, name, options, words):
     part, = by_command.parts
     built = tandem.build(vertices, faces, provenance=by_command._core.provenance().decode(), parts=[(part.name, part.path, part.face_count)], **options)
     assert bytes(built) == written.read_bytes()
+
+
+def test_builds_meshes_of_trimesh(box):
+    trimesh = pytest.importorskip("trimesh")
+    mesh = trimesh.Trimesh(BOX_VERTICES + 10, BOX_FACES, process=False)
+    assert bytes(tandem.build(mesh)) == bytes(tandem.build(mesh, topology=True)) == bytes(box)
 
 
 def test_the_bytes_do_not_depend_on_threads():
@@ -93,9 +99,9 @@ def test_names_parts_and_faces():
 
 
 def test_reports_what_was_left_out():
-    faces = np.concatenate([BOX_FACES, [[0, 0, 1], [0, 1, 9], [0, 1, 3]]])
-    _, report = tandem.build(BOX_VERTICES, faces, return_report=True)
-    assert (report.degenerate, report.index_out_of_range, report.duplicate) == (1, 1, 1)
+    faces = np.concatenate([BOX_FACES, [[0, 0, 1], [0, 1, 8], [0, 1, 3]]])
+    _, report = tandem.build([*BOX_VERTICES, [0, 0, np.inf]], faces, return_report=True)
+    assert (report.degenerate, report.not_finite, report.duplicate) == (1, 1, 1) and sum(report) == 3
     with pytest.raises(tandem.Error) as caught:
         tandem.build(BOX_VERTICES, [])
     assert caught.value.name == "NoTriangle"
@@ -115,6 +121,11 @@ def test_names_the_defect_of_a_file(tmp_path, box):
         tandem.Asset.load("a\0b")
     with pytest.raises(TypeError):
         tandem.Asset()
+
+
+def test_a_file_that_cannot_be_read_raises_what_open_raises(tmp_path):
+    check_errors_of_files(tandem.Asset.load, tmp_path, "a.bvh")
+    check_errors_of_files(lambda path: tandem.Asset.load(path, access="read"), tmp_path, "a.bvh")
 
 
 def test_shows_levels_from_one_on(tmp_path):

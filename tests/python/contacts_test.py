@@ -25,6 +25,33 @@ def test_finds_contacts_of_the_bodies_that_meet(scene):
     assert contacts.dtype == tandem.CONTACT and contacts["face_a"].max() < 12
 
 
+def test_bodies_that_touch_are_those_with_a_contact(box, scene):
+    # A frame, and a body in its hole: their boxes meet, they do not.
+    bars = [BOX_VERTICES * scale + shift for scale, shift in (([5, 1, 1], [0, 0, 0]), ([5, 1, 1], [0, 4, 0]), ([1, 3, 1], [0, 1, 0]), ([1, 3, 1], [4, 1, 0]))]
+    frame = tandem.build(np.concatenate(bars), np.concatenate([BOX_FACES + 8 * bar for bar in range(4)]))
+    places = [[0, 0, 0], [2, 2, 0], [2.5, 2.5, 0.5], [3.5, 2, 0]]
+    found = tandem.Scene([frame, box], asset=[0, 1, 1, 1], translation=places).contacts()
+    assert found.pairs.tolist() == [(0, 1), (0, 2), (0, 3), (1, 2), (2, 3)]
+    assert found.touching.tolist() == [(0, 3), (1, 2), (2, 3)] and found.touching.dtype == tandem.PAIR
+    assert tuple(found) == (found.pairs, found.contacts, found.counters) and found._fields == ("pairs", "contacts", "counters")
+    apart = scene.place(translation=[[0, 0, 0], [3, 0, 0]]).contacts()
+    assert len(apart.pairs) == len(apart.touching) == 0 and apart.touching.dtype == tandem.PAIR
+    asked = scene.contacts(pairs=[[1, 0], [0, 1]])
+    assert len(asked.pairs) == 2 and len(asked.touching) == 0
+
+
+def test_takes_rotations_of_scipy(box, scene):
+    rotation = pytest.importorskip("scipy.spatial.transform").Rotation
+    turns = rotation.from_euler("z", [0, 30, 60], degrees=True)
+    expected = tandem.instances(rotation=turns.as_matrix(), translation=[1, 0, 0]).tobytes()
+    assert tandem.instances(rotation=turns, translation=[1, 0, 0]).tobytes() == expected
+    assert tandem.Scene([box], rotation=turns, translation=[1, 0, 0]).instances.tobytes() == expected
+    assert scene.place(rotation=turns, translation=[1, 0, 0]).instances.tobytes() == expected
+    scene.move(2, rotation=turns[1], translation=[1, 0, 0])
+    assert scene.add(rotation=turns[2], translation=[1, 0, 0]) == 3
+    assert scene.instances[[0, 1, 3]].tobytes() == expected and scene.instances[2] == scene.instances[1]
+
+
 def test_takes_poses_in_every_form(box, scene):
     turned = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
     rows = np.zeros(2, tandem.INSTANCE)

@@ -100,6 +100,14 @@ def test_array_interfaces_are_not_believed_too_far():
             cuda._cuda.Pairs(Interface(**told), stream, 0)
 
 
+def test_a_filter_names_what_is_wrong_with_excluded_pairs():
+    box = tandem.build(BOX_VERTICES, BOX_FACES)
+    for error, words, excluded in ((TypeError, "^excluded: Asset is given", box), (ValueError, "^excluded: row 1 is not", [[0, 1], [0, -1]]),
+                                   (ValueError, r"^excluded has shape \(2,\)", [0, 1])):
+        with pytest.raises(error, match=words):
+            cuda.Filter(excluded=excluded)
+
+
 def test_a_stream_keeps_its_object():
     own = OwnStream(7)
     lives, kept = weakref.ref(own), cuda._stream(own)
@@ -473,6 +481,7 @@ def test_what_is_wrong_is_told(torch, assets):
             (ValueError, "pose is not contiguous", {"pose": torch.cat([at, at], 2)[:, :, :3]}), (TypeError, "asset is int64 where uint32 or int32", {"asset": numbers.long(), "pose": at}),
             (ValueError, r"asset has shape \(59,\) where \(60,\)", {"asset": numbers[1:], "pose": at}), (TypeError, "pose", {}),
             (ValueError, r"pairs has shape \(3,\) where \(m, 2\)", {"pose": at, "pairs": torch.zeros(3, dtype=torch.int32, device="cuda")}),
+            (TypeError, "sorted is int where True or False is wanted", {"pose": at, "sorted": 1}), (TypeError, "first_contact_only is str", {"pose": at, "first_contact_only": "no"}),
             (ValueError, "mode is 'best'", {"pose": at, "mode": "best"}), (TypeError, "stream is str", {"pose": at, "stream": "0"}),
             (ValueError, "pose requires a gradient", {"pose": at.clone().requires_grad_()})):
         with pytest.raises(error, match=words):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import tandem
-from meshes import BOX_FACES, BOX_VERTICES
+from meshes import BOX_FACES, BOX_VERTICES, check_errors_of_files
 
 pytest.importorskip("tandem._bvhbuild")
 ASSETS = Path(os.environ["TANDEM_SOURCE_DIR"]) / "assets"
@@ -64,6 +64,11 @@ def test_formats_of_others_are_read_by_assimp_in_a_child(tmp_path):
     assert len(mesh.triangles) >= 1
 
 
+@pytest.mark.parametrize("name", ["a.obj", "a.dae"])
+def test_a_file_that_cannot_be_read_raises_what_open_raises(tmp_path, name):
+    check_errors_of_files(tandem.read_mesh, tmp_path, name)
+
+
 def test_says_what_is_wrong(tmp_path):
     bad = tmp_path / "bad.obj"
     bad.write_text("v 0 0 0\nv 1 0 x\n")
@@ -77,7 +82,7 @@ def test_says_what_is_wrong(tmp_path):
     with pytest.raises(tandem.Error) as caught:
         tandem.build(BOX_VERTICES, [[0, 0, 0, 0]])
     assert caught.value.name == "NoTriangle"
-    with pytest.raises(ValueError, match="faces: row 1: row 0 is not from"):
+    with pytest.raises(ValueError, match="faces: row 1 has vertex -1 where 0 to 7 is wanted"):
         tandem.build(BOX_VERTICES, [[0, 1, 2], [-1, 1, 2, 3]])
     with pytest.raises(ValueError, match="parts"):
         tandem.build(BOX_VERTICES, [[0, 1, 3, 2]], parts=[("a", "", 3)])

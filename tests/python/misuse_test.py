@@ -46,6 +46,17 @@ CASES = [
     (lambda s: s.place(asset=[0, 2**70]), TypeError, "asset has object"),
     (lambda s: s.place(asset=[0.0, 1.0]), TypeError, "asset has float64"),
     (lambda s: s.place(asset=[[0, 0]]), ValueError, "asset has shape"),
+    # Assets lend their bytes as a buffer, which is no array of numbers.
+    (lambda s: tandem.Scene([BOX], asset=BOX), TypeError, "asset: Asset is given where places in the scene's list of assets, whole numbers, are wanted"),
+    (lambda s: s.place(asset=[BOX, BOX]), TypeError, "asset: Asset is given where places"),
+    (lambda s: s.add(BOX), TypeError, "asset: Asset is given where places"),
+    (lambda s: s.place(translation=BOX), TypeError, "translation: Asset is given where numbers are wanted"),
+    (lambda s: s.move(BOX, translation=np.zeros(3)), TypeError, "bodies: Asset is given where whole numbers"),
+    (lambda s: s.contacts(pairs=BOX), TypeError, "pairs: Asset is given where whole numbers"),
+    (lambda s: s.bodies_at(BOX), TypeError, "points: Asset is given where numbers"),
+    (lambda s: tandem.Filter(motion=BOX), TypeError, "motion: Asset is given where whole numbers"),
+    (lambda s: tandem.build(BOX, BOX_FACES), TypeError, "vertices: Asset is given where numbers"),
+    (lambda s: tandem.build(BOX_VERTICES, BOX), TypeError, "faces: Asset is given where whole numbers"),
     (lambda s: s.place(poses(asset=1)), tandem.Error, "instance 1: .*asset"),
     (lambda s: s.place(poses(rotation=np.diag([1, 1, -1]))), tandem.Error, "instance 1: .*rotation"),
     (lambda s: s.place(poses(translation=np.nan)), tandem.Error, "instance 1"),
@@ -115,9 +126,17 @@ CASES = [
     (lambda s: tandem.build(BOX_VERTICES, BOX_FACES.astype(float)), TypeError, "faces has float64"),
     (lambda s: tandem.build(BOX_VERTICES, -BOX_FACES), ValueError, "faces: row 0"),
     (lambda s: tandem.build(BOX_VERTICES, BOX_FACES.ravel()), ValueError, r"faces has shape \(36,\)"),
-    (lambda s: tandem.build(BOX_VERTICES, BOX_FACES + 8), tandem.Error, "none of the triangles"),
+    (lambda s: tandem.build(BOX_VERTICES, BOX_FACES + 1), ValueError, "^faces: row 2 has vertex 8 where 0 to 7 is wanted"),
+    (lambda s: tandem.build(BOX_VERTICES, BOX_FACES[::-1] - 1, return_report=True), ValueError, "^faces: row 2 has vertex -1 where 0 to 7 is wanted"),
+    (lambda s: tandem.build(BOX_VERTICES, np.array([[0, 1, 2**32 - 1]], np.uint32)), ValueError, "^faces: row 0 has vertex 4294967295 where 0 to 7"),
+    (lambda s: tandem.build(BOX_VERTICES, np.array([[0, 1, 2**64 - 1]], np.uint64)), ValueError, "^faces: row 0 has vertex 18446744073709551615 where 0 to 7"),
+    (lambda s: tandem.build(BOX_VERTICES, [[0, 1, 2], [0, 1, 2, 8]]), ValueError, "^faces: row 1 has vertex 8 where 0 to 7 is wanted"),
+    (lambda s: tandem.build([], BOX_FACES), ValueError, "^faces: row 0: there are no vertices"),
     (lambda s: tandem.build(BOX_VERTICES * np.nan, BOX_FACES), tandem.Error, "none of the triangles"),
     (lambda s: tandem.build([], []), tandem.Error, "none of the triangles"),
+    (lambda s: tandem.build(BOX_VERTICES), TypeError, "^faces is missing, or ndarray has no vertices and faces of its own"),
+    (lambda s: tandem.build("cow.obj"), TypeError, "^faces is missing, or str has no"),
+    (lambda s: tandem.build(BOX_VERTICES, effort="fast"), TypeError, "^faces is missing"),
     (lambda s: tandem.build(BOX_VERTICES, BOX_FACES, effort="max"), ValueError, "effort is 'max'"),
     (lambda s: tandem.build(BOX_VERTICES, BOX_FACES, threads=-1), ValueError, "threads is -1"),
     (lambda s: tandem.build(BOX_VERTICES, BOX_FACES, imaginary_share=np.nan), ValueError, "imaginary_share is nan"),
@@ -134,6 +153,20 @@ CASES = [
     (lambda s: tandem.build(BOX_VERTICES, BOX_FACES, provenance=5), TypeError, "provenance is int"),
     (lambda s: tandem.build(BOX_VERTICES, BOX_FACES, progress=5), TypeError, "progress is int"),
 ]
+# Flags, each with a call that takes it.
+FLAGS = [
+    ("first_contact_only", lambda s, value: s.contacts(first_contact_only=value)),
+    ("self_pairs", lambda s, value: s.contacts(self_pairs=value)),
+    ("add_error_bounds", lambda s, value: s.contacts(add_error_bounds=value)),
+    ("self_pairs", lambda s, value: s.pairs(self_pairs=value)),
+    ("match_previous", lambda s, value: s.manifolds(match_previous=value)),
+    ("gpu_blocks", lambda s, value: tandem.build(BOX_VERTICES, BOX_FACES, gpu_blocks=value)),
+    ("topology", lambda s, value: tandem.build(BOX_VERTICES, BOX_FACES, topology=value)),
+    ("return_report", lambda s, value: tandem.build(BOX_VERTICES, BOX_FACES, return_report=value)),
+]
+for name, ask in FLAGS:
+    CASES += [(lambda s, ask=ask, value=value: ask(s, value), TypeError, f"^{name} is {type(value).__name__} where True or False is wanted")
+              for value in ("no", 1, None, np.ones(1, bool))]
 # Numbers of calls, each with what is too large for it.
 AMOUNTS = [
     ("within", np.inf, lambda s, value: s.contacts(within=value)),
@@ -150,6 +183,35 @@ for name, too_large, ask in AMOUNTS:
               for value in (np.nan, -1.0, -np.inf, too_large) if value is not None]
 
 
+TURNED = np.array([[2, -1, 2], [2, 2, -1], [-1, 2, 2]]) / 3
+DEFECTS = [
+    ({"translation": [0, np.nan, 0]}, "its translation is not finite (it has nan)"),
+    ({"translation": [0, 0, -np.inf]}, "its translation is not finite (it has -inf)"),
+    ({"rotation": np.full((3, 3), np.nan)}, "its rotation is not finite (it has nan)"),
+    ({"rotation": 2 * TURNED}, "its rotation is not orthonormal: it scales by 2"),
+    ({"rotation": 1.001 * TURNED}, "its rotation is not orthonormal: it scales by 1.001"),
+    ({"rotation": 1e300 * TURNED}, "its rotation is not orthonormal: it scales by 1e+300"),
+    ({"rotation": np.zeros((3, 3))}, "its rotation is not orthonormal: it scales by 0"),
+    ({"rotation": TURNED * [1, 1, 3]}, "its rotation is not orthonormal: it scales by 1 to 3, depending on the direction"),
+    ({"rotation": -TURNED}, "its rotation is a reflection, with a determinant below 0"),
+    ({"rotation": TURNED * [1, 1, -1]}, "its rotation is a reflection, with a determinant below 0"),
+    ({"rotation": -2 * TURNED}, "its rotation is a reflection, with a determinant below 0, which also scales by 2"),
+    ({"rotation": np.array([[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]], np.float16)}, "its rotation is too coarse: it is 0.0002 from orthonormal, where 1e-06 is allowed (float16 is not enough, float32 is)"),
+]
+
+
+@pytest.mark.parametrize("fields, words", DEFECTS)
+def test_a_pose_is_refused_with_the_reason(fields, words):
+    scene = tandem.Scene([BOX], ROWS)
+    row = {name: np.array(value) for name, value in fields.items()}
+    for place, call in ((0, lambda: scene.add(**row)), (1, lambda: scene.move([0, 1], poses(**fields))), (1, lambda: scene.place(poses(**fields)))):
+        with pytest.raises(tandem.Error) as caught:
+            call()
+        assert str(caught.value) == f"instance {place}: a pose is not a rotation and a translation: {words}"
+        assert (caught.value.name, caught.value.subject, caught.value.where) == ("PoseNotRigid", "instance", place)
+    scene.place(rotation=TURNED.astype(np.float32))
+
+
 @pytest.mark.parametrize("number", range(len(CASES)))
 def test_misuse(number):
     call, kind, words = CASES[number]
@@ -159,6 +221,12 @@ def test_misuse(number):
     assert type(caught.value) is kind and re.search(words, str(caught.value)), str(caught.value)
     # The scene works as ever.
     assert len(scene.place(ROWS).contacts().contacts) == 18
+
+
+def test_flags_of_numpy_are_taken():
+    for _, ask in FLAGS:
+        for value in (np.True_, np.False_):
+            ask(tandem.Scene([BOX], ROWS), value)
 
 
 def test_the_largest_amounts_are_taken():

@@ -13,11 +13,23 @@ VERTICES: npt.NDArray[np.float64] = np.array([[x, y, z] for x in (0.0, 1.0) for 
 FACES = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
 
 
+class Turn:
+    def as_matrix(self) -> npt.NDArray[np.float64]:
+        return np.eye(3)
+
+
+class Box:
+    vertices = VERTICES
+    faces = FACES
+
+
 def assets(folder: Path) -> list[tandem.Asset]:
     shares: list[float] = []
     made, report = tandem.build(VERTICES, FACES, effort="best", threads=2, gpu_blocks=True, topology=True, imaginary_share=0.5, face_ids=range(12),
                                 parts=[("box", "", 12)], provenance="{}", progress=shares.append, return_report=True)
     count: int = report.degenerate
+    same: tandem.Asset = tandem.build(Box(), effort="fast")
+    print(same)
     assert count == 0
     made.save(folder / "box.bvh")
     loaded: tandem.Asset = tandem.Asset.load(folder / "box.bvh", access="read", check="quick")
@@ -38,6 +50,7 @@ def ask(scene: tandem.Scene) -> None:
     contacts: tandem.Contacts = scene.place(rows, filter=filter).contacts(mode="exact", first_contact_only=False, self_pairs=False, within=0.0,
                                                                           add_error_bounds=False)
     work: tandem.Counters = contacts.counters
+    touching: npt.NDArray[np.void] = contacts.touching
     faces: npt.NDArray[np.uint32] = contacts.contacts["face_a"]
     manifolds: tandem.Manifolds = scene.manifolds(most_points=4, match_previous=False)
     contained: tandem.Contained = scene.contained()
@@ -46,11 +59,12 @@ def ask(scene: tandem.Scene) -> None:
     verdicts: tandem.Verdicts = scene.verdicts(tolerance=0.1, pairs=[[0, 1]])
     body: int = scene.add(1, translation=[0.0, 0.0, 0.25], motion=tandem.KINEMATIC, group=1, mask=1)
     scene.move(body, rotation=np.eye(3))
+    scene.move(body, rotation=Turn())
     scene.move([0, body], rows)
     scene.set_motion(body, tandem.MOVING)
     scene.remove(body)
     bodies: npt.NDArray[np.void] = scene.instances
-    print(work.contacts, faces.max(), len(manifolds.manifolds), len(manifolds.points), len(contained.contained), distances.distances["upper"],
+    print(work.contacts, touching["a"], faces.max(), len(manifolds.manifolds), len(manifolds.points), len(contained.contained), distances.distances["upper"],
           impacts.impacts["status"], verdicts.verdicts["verdict"], len(scene.pairs(reach=0.5)), len(bodies))
     try:
         scene.place(transform=np.zeros((2, 4, 4)))

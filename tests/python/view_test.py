@@ -461,11 +461,41 @@ def test_places_and_scenes_that_cannot_be_shown_are_refused(box, tmp_path):
         tandem.view(tmp_path / "empty.h5", off_screen=True)
     with pytest.raises(OSError):
         tandem.view(tmp_path / "none.h5", off_screen=True)
-    (tmp_path / "garbage.h5").write_bytes(b"no scene" * 99)
-    with pytest.raises(OSError, match="garbage.h5: .*signature"):
-        tandem.view(tmp_path / "garbage.h5", off_screen=True)
+    for name in ("garbage.h5", "mesh.obj"):
+        (tmp_path / name).write_bytes(b"no scene" * 99)
+        with pytest.raises(OSError, match=f"{name}: is neither a scene file nor a run file, which are HDF5, nor a .bvh file by its name; bvhbuild makes"):
+            tandem.view(tmp_path / name, off_screen=True)
     with pytest.raises(ValueError, match="picture.jpg: is not a .png file"):
         tandem.view(box, picture=tmp_path / "picture.jpg")
+
+
+@pytest.mark.parametrize(("name", "shape"), [("instances/translation", (2, 3)), ("instances/translation", (3, 2)), ("instances/rotation", (3, 9)),
+                                             ("instances/level", (2,)), ("simulation/motion", (4,)), ("instances/group", (3, 1))])
+def test_a_scene_file_whose_rows_do_not_fit_is_named(box, tmp_path, name, shape):
+    box.save(tmp_path / "box.bvh")
+    path = tmp_path / "scene.h5"
+    rows = {"instances/asset": np.zeros(3, np.uint32), "instances/rotation": np.tile(np.eye(3), (3, 1, 1)), "instances/translation": np.zeros((3, 3)),
+            name: np.zeros(shape)}
+    with h5py.File(path, "w") as file:
+        file["assets"] = ["box.bvh"]
+        for place, array in rows.items():
+            file[place] = array
+    with pytest.raises(ValueError) as caught:
+        tandem.view(path, off_screen=True)
+    assert str(caught.value).startswith(f"{path}: {name} has shape {shape} where (3,")
+
+
+@pytest.mark.parametrize(("name", "shape"), [("trajectory/position", (2, 2, 3)), ("trajectory/orientation", (1, 1, 4)), ("bodies/center_of_mass", (1, 3)),
+                                             ("bodies/motion", (5,))])
+def test_a_run_file_whose_rows_do_not_fit_is_named(box, tmp_path, name, shape):
+    path = tmp_path / "run.h5"
+    write_run(path, box)
+    with h5py.File(path, "a") as file:
+        del file[name]
+        file[name] = np.zeros(shape)
+    with pytest.raises(ValueError) as caught:
+        tandem.view(path, off_screen=True)
+    assert str(caught.value).startswith(f"{path}: {name} has shape {shape} where (")
 
 
 def test_a_path_of_an_asset_shows_the_asset(cow, tmp_path):
@@ -494,6 +524,8 @@ def test_the_command_says_what_is_wrong(box, tmp_path, monkeypatch):
     (tmp_path / "broken.bvh").write_bytes(b"no asset")
     result = command("view", tmp_path / "broken.bvh", "-o", tmp_path / "a.png")
     assert result.returncode == 2 and result.stderr.startswith("tandem: ") and "broken.bvh" in result.stderr
+    result = command("view", tmp_path / "box.bvh", "-o", tmp_path / "a.png", "--width", "100000")
+    assert result.returncode == 2 and re.fullmatch(r"tandem: size \(100000, 562\): is more than \d+ pixels wide or high, the most that can be drawn here\n", result.stderr)
     assert command("view").returncode == 1 and not (tmp_path / "a.png").exists()
 
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import operator
 import sys
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -15,11 +15,38 @@ __all__ = ["Rows", "instances"]
 #: An array of rows, such as INSTANCE.
 Rows = npt.NDArray[np.void]
 
+
+class AsMatrix(Protocol):
+    """A rotation, or a stack of them, of a library that has a class for these, such as scipy's Rotation."""
+
+    def as_matrix(self) -> Any: ...
+
+
+#: What `rotation` takes.
+Rotations = npt.ArrayLike | AsMatrix
+
 #: The largest distance that questions take, as coordinates, and the largest number.
 FARTHEST, FINITE = 1e300, sys.float_info.max
 _MOST = 0xFFFFFFFF
 _IDENTITY, _ORIGIN = np.eye(3), np.zeros(3)
 _LAST_ROW = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+class NotNumbers:
+    """Base of a class whose objects lend their bytes as a buffer, which NumPy would read as an array of numbers."""
+
+    __slots__ = ()
+
+
+def _array(value: Any, name: str, wanted: str) -> npt.NDArray[Any]:
+    """What NumPy makes of an argument, but for what is no array of anything."""
+    for given in (value, *value[:1]) if isinstance(value, (list, tuple)) else (value,):
+        if isinstance(given, NotNumbers):
+            raise TypeError(f"{name}: {type(given).__name__} is given where {wanted} are wanted")
+    try:
+        return np.asarray(value)
+    except ValueError as error:
+        raise ValueError(f"{name} is no array: {error}") from None
 
 
 def number(value: Any, name: str) -> float:
@@ -34,6 +61,13 @@ def number(value: Any, name: str) -> float:
         raise TypeError(f"{name} is {type(value).__name__} where a number is wanted") from None
     except OverflowError:
         raise ValueError(f"{name} is {value} where a float64 is wanted") from None
+
+
+def flag(value: Any, name: str) -> bool:
+    """True or False, Python's or NumPy's: whatever else has a truth value, such as "no", is refused."""
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    raise TypeError(f"{name} is {type(value).__name__} where True or False is wanted")
 
 
 def amount(value: Any, name: str, most: float) -> float:
@@ -57,13 +91,10 @@ def whole_number(value: Any, name: str, least: int, most: int) -> int:
 
 def floats(value: npt.ArrayLike, name: str, *tail: int) -> npt.NDArray[np.float64]:
     """A contiguous float64 array of shape `tail` or (n, *tail)."""
-    try:
-        array = np.asarray(value)
-        if array.dtype.kind not in "fiu" and array.size:
-            raise TypeError(f"{name} has {array.dtype} where numbers are wanted")
-        array = np.ascontiguousarray(array, dtype=np.float64) if array.ndim else array.astype(np.float64)
-    except ValueError as error:
-        raise ValueError(f"{name} is no array: {error}") from None
+    array = _array(value, name, "numbers")
+    if array.dtype.kind not in "fiu" and array.size:
+        raise TypeError(f"{name} has {array.dtype} where numbers are wanted")
+    array = np.ascontiguousarray(array, dtype=np.float64) if array.ndim else array.astype(np.float64)
     if array.ndim == 1 and not array.size and tail:
         return array.reshape(0, *tail)
     if array.shape != tail and array.shape[1:] != tail:
@@ -71,16 +102,18 @@ def floats(value: npt.ArrayLike, name: str, *tail: int) -> npt.NDArray[np.float6
     return array
 
 
-def whole_numbers(value: npt.ArrayLike, name: str, most: int = _MOST, dtype: npt.DTypeLike = np.uint32) -> npt.NDArray[Any]:
+def any_whole_numbers(value: npt.ArrayLike, name: str, wanted: str = "whole numbers") -> npt.NDArray[Any]:
+    """An array of whole numbers of any size; of any type where it is empty."""
+    array = _array(value, name, wanted)
+    if array.dtype.kind not in "iu" and array.size:
+        raise TypeError(f"{name} has {array.dtype} where whole numbers are wanted")
+    return array
+
+
+def whole_numbers(value: npt.ArrayLike, name: str, most: int = _MOST, dtype: npt.DTypeLike = np.uint32, wanted: str = "whole numbers") -> npt.NDArray[Any]:
     """A contiguous array of whole numbers from 0 to `most`."""
-    try:
-        array = np.asarray(value)
-    except ValueError as error:
-        raise ValueError(f"{name} is no array: {error}") from None
-    if array.dtype.kind not in "iu":
-        if array.size:
-            raise TypeError(f"{name} has {array.dtype} where whole numbers are wanted")
-    elif array.size and array.dtype != dtype:
+    array = any_whole_numbers(value, name, wanted)
+    if array.size and array.dtype != dtype:
         bad = array > most if array.dtype.kind == "u" else (array < 0) | (array > most)
         if bad.any():
             row = int(np.flatnonzero(bad.reshape(len(bad), -1).any(axis=1) if bad.ndim else bad)[0])
@@ -117,13 +150,13 @@ def pairs_of(value: npt.ArrayLike | Rows | None, name: str = "pairs") -> Rows | 
     return array.view(PAIR).reshape(-1)
 
 
-def instances(asset: npt.ArrayLike = 0, rotation: npt.ArrayLike | None = None, translation: npt.ArrayLike | None = None,
+def instances(asset: npt.ArrayLike = 0, rotation: Rotations | None = None, translation: npt.ArrayLike | None = None,
               transform: npt.ArrayLike | None = None) -> Rows:
     """Bodies, posed: one for each row of the longest argument; an argument without rows, or with one, is that of all.
 
     Args:
         asset: place in the scene's list of assets, () or (n,).
-        rotation: (3, 3) or (n, 3, 3); the identity where it is not given.
+        rotation: (3, 3) or (n, 3, 3), or what gives that by `as_matrix()`, such as scipy's Rotation; the identity where it is not given.
         translation: (3,) or (n, 3), in the assets' unit; 0 where it is not given.
         transform: (4, 4) or (n, 4, 4) instead of both; the last row is 0, 0, 0, 1.
 
@@ -147,9 +180,11 @@ def instances(asset: npt.ArrayLike = 0, rotation: npt.ArrayLike | None = None, t
                 raise ValueError(f"transform: the last row of matrix {int(np.flatnonzero(wrong)[0])} is not 0, 0, 0, 1")
         rotations, translations = matrices[..., :3, :3], matrices[..., :3, 3]
     else:
-        rotations = _IDENTITY if rotation is None else floats(rotation, "rotation", 3, 3)
+        as_matrix = getattr(rotation, "as_matrix", None)
+        given: Any = as_matrix() if callable(as_matrix) else rotation
+        rotations = _IDENTITY if given is None else floats(given, "rotation", 3, 3)
         translations = _ORIGIN if translation is None else floats(translation, "translation", 3)
-    numbers = whole_numbers(asset, "asset")
+    numbers = whole_numbers(asset, "asset", wanted="places in the scene's list of assets, whole numbers,")
     if numbers.ndim > 1:
         raise ValueError(f"asset has shape {numbers.shape} where () or (n,) is wanted")
     counts = {name: len(array) for name, array, one in

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _tandem
-from ._arrays import number, whole_number
+from ._arrays import NotNumbers, number, whole_number
 from ._errors import Error, with_path
 
 __all__ = ["Asset", "Level", "Part"]
@@ -76,7 +76,7 @@ class Part(NamedTuple):
     face_count: int
 
 
-class Asset:
+class Asset(NotNumbers):
     """What one .bvh file holds, checked: a mesh and its trees, at one or more levels of detail.
 
     It never changes, and threads may share it. Made by `Asset.load`, `Asset.from_bytes` and `tandem.build`. It pickles, as its bytes.

@@ -6,15 +6,15 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from types import ModuleType
-from typing import Any, Literal, NamedTuple, overload
+from typing import Any, Literal, NamedTuple, Protocol, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _tandem
-from ._arrays import floats, number, whole_number, whole_numbers
+from ._arrays import any_whole_numbers, flag, floats, number, whole_number, whole_numbers
 from ._asset import Asset, Part, _choice
-from ._errors import Error, FileError
+from ._errors import Error, FileError, with_path
 
 __all__ = ["BuildReport", "Mesh", "build", "read_mesh"]
 
@@ -23,7 +23,6 @@ class BuildReport(NamedTuple):
     """What became of the triangles."""
 
     #: Left out, each under the first cause that holds.
-    index_out_of_range: int
     not_finite: int
     too_large: int
     #: Left out: the corners lie on one line.
@@ -55,6 +54,17 @@ class Mesh(NamedTuple):
     remarks: list[str]
 
 
+class MeshLike(Protocol):
+    """A mesh of another library, such as a trimesh.Trimesh."""
+
+    @property
+    def vertices(self) -> Any: ...
+    @property
+    def faces(self) -> Any: ...
+
+
+Vertices = npt.ArrayLike | MeshLike
+Faces = npt.ArrayLike | Sequence[Sequence[int]] | None
 Effort = Literal["default", "fast", "best"]
 Levels = Literal["auto"] | Sequence[float | str]
 #: Name, path and, last, number of faces of each.
@@ -63,25 +73,25 @@ Progress = Callable[[float], object]
 
 
 @overload
-def build(vertices: npt.ArrayLike, faces: npt.ArrayLike | Sequence[Sequence[int]], *, effort: Effort = ..., levels: Levels | None = ..., threads: int = ...,
+def build(vertices: Vertices, faces: Faces = ..., *, effort: Effort = ..., levels: Levels | None = ..., threads: int = ...,
           gpu_blocks: bool = ..., topology: bool = ..., imaginary_share: float = ..., face_ids: npt.ArrayLike | None = ..., parts: Parts | None = ...,
           provenance: str | None = ..., progress: Progress | None = ..., return_report: Literal[False] = ...) -> Asset: ...
 
 
 @overload
-def build(vertices: npt.ArrayLike, faces: npt.ArrayLike | Sequence[Sequence[int]], *, effort: Effort = ..., levels: Levels | None = ..., threads: int = ...,
+def build(vertices: Vertices, faces: Faces = ..., *, effort: Effort = ..., levels: Levels | None = ..., threads: int = ...,
           gpu_blocks: bool = ..., topology: bool = ..., imaginary_share: float = ..., face_ids: npt.ArrayLike | None = ..., parts: Parts | None = ...,
           provenance: str | None = ..., progress: Progress | None = ..., return_report: Literal[True]) -> tuple[Asset, BuildReport]: ...
 
 
-def build(vertices: npt.ArrayLike, faces: npt.ArrayLike | Sequence[Sequence[int]], *, effort: Effort = "default", levels: Levels | None = None, threads: int = 0,
+def build(vertices: Vertices, faces: Faces = None, *, effort: Effort = "default", levels: Levels | None = None, threads: int = 0,
           gpu_blocks: bool = True, topology: bool = True, imaginary_share: float = 0.0, face_ids: npt.ArrayLike | None = None, parts: Parts | None = None,
           provenance: str | None = None, progress: Progress | None = None, return_report: bool = False) -> Asset | tuple[Asset, BuildReport]:
     """Builds an asset: the bytes that bvhbuild writes for these faces, but for what they say of their making.
 
     Args:
-        vertices: (n, 3), float64.
-        faces: (m, 3), the vertices of each triangle; or polygons, (m, k) or a list of lists, which need the mesh tools.
+        vertices: (n, 3), float64; or, without faces, a mesh that has `vertices` and `faces`, such as a trimesh.Trimesh.
+        faces: (m, 3), the numbers of each triangle's vertices, from 0; or polygons, (m, k) or a list of lists, which need the mesh tools.
         effort: "fast", "default", or "best", which takes minutes for 100,000 triangles.
         levels: coarser levels of the mesh, each proved to be at most so far from the finest: lengths, or shares of the diagonal such as "1%", ascending; "auto"
             is 0.1 %, 0.3 %, 1 % and 3 %. Needs the mesh tools.
@@ -98,17 +108,23 @@ def build(vertices: npt.ArrayLike, faces: npt.ArrayLike | Sequence[Sequence[int]
 
     Raises:
         Error: no triangle can be used; faces are in no part.
-        ValueError, TypeError: which name the argument and the row.
+        ValueError, TypeError: which name the argument and the row, such as the first face with a vertex that there is not.
         ImportError: the mesh tools are needed and not installed.
 
     >>> tetrahedron = tandem.build([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
     >>> tetrahedron.levels[0].triangle_count, tetrahedron.levels[0].closed
     (4, True)
     """
-    points = floats(vertices, "vertices", 3)
+    mesh: Any = vertices
+    if faces is None:
+        try:
+            mesh, faces = mesh.vertices, mesh.faces
+        except AttributeError:
+            raise TypeError(f"faces is missing, or {type(mesh).__name__} has no vertices and faces of its own") from None
+    points = floats(mesh, "vertices", 3)
     if points.ndim != 2:
         raise ValueError(f"vertices has shape {points.shape} where (n, 3) is wanted")
-    corners, face_begin = _polygons(faces)
+    corners, face_begin = _polygons(faces, len(points))
     count = len(corners) // 3 if face_begin is None else len(face_begin) - 1
     ids = None if face_ids is None else whole_numbers(face_ids, "face_ids", 0xFFFFFFFD)
     if ids is not None and ids.shape != (count,):
@@ -122,26 +138,28 @@ def build(vertices: npt.ArrayLike, faces: npt.ArrayLike | Sequence[Sequence[int]
         _text(provenance, "provenance")
     if progress is not None and not callable(progress):
         raise TypeError(f"progress is {type(progress).__name__} where a function is wanted")
+    gpu, topological, reported = flag(gpu_blocks, "gpu_blocks"), flag(topology, "topology"), flag(return_report, "return_report")
     strength = _choice("effort", effort, ("default", "fast", "best"))
     if levels is None and face_begin is None:
-        core, report = _tandem.build(points, corners, ids, named, strength, bool(gpu_blocks), bool(topology), workers, share, provenance, progress)
+        core, report = _tandem.build(points, corners, ids, named, strength, gpu, topological, workers, share, provenance, progress)
         asset = Asset._of(core)
     else:
         if face_begin is None:
             face_begin = np.arange(0, 3 * count + 1, 3, dtype=np.uint32)
-        data, report = _mesh_tools().build(points, corners, face_begin, ids, named, strength, bool(gpu_blocks), bool(topology), workers, share,
+        data, report = _mesh_tools().build(points, corners, face_begin, ids, named, strength, gpu, topological, workers, share,
                                            _words(levels), provenance, progress)
         if data is None:
             raise _no_triangle()
         asset = Asset.from_bytes(data)
-    return (asset, BuildReport(*report)) if return_report else asset
+    return (asset, BuildReport(*report[1:])) if reported else asset
 
 
 def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     """Reads a mesh file as bvhbuild does: OBJ, PLY, STL, OFF, glTF and GLB by its own readers, whatever else assimp reads in a child process.
 
     Raises:
-        FileError: it cannot be read; the text says why, with the line where there is one.
+        FileError: it cannot be read; the text says why, with the line where there is one. It is a FileNotFoundError, PermissionError or IsADirectoryError too
+            where open() raises that.
         ImportError: the mesh tools are not installed.
     """
     tools = _mesh_tools()
@@ -157,10 +175,10 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
                   "marshal.dump(tools.read(sys.argv[2].encode('utf-8', 'surrogateescape'), False), sys.stdout.buffer)")
         done = subprocess.run([sys.executable, "-I", "-S", "-X", "utf8", "-c", script, str(tools.__file__), name], capture_output=True)
         if done.returncode != 0:
-            raise FileError(f"{os.fsdecode(path)}: the reader's process failed: {done.stderr.decode(errors='replace')}")
+            raise with_path(FileError(f"the reader's process failed: {done.stderr.decode(errors='replace')}"), os.fsdecode(path))
         read = marshal.loads(done.stdout)
     if read[0] is None:
-        raise FileError(f"{os.fsdecode(path)}: {read[1].decode(errors='replace')}")
+        raise with_path(FileError(read[1].decode(errors="replace")), os.fsdecode(path))
     points, triangles, faces, parts, remarks = read
     return Mesh(np.frombuffer(bytearray(points), np.float64).reshape(-1, 3), np.frombuffer(bytearray(triangles), np.uint32).reshape(-1, 3),
                 np.frombuffer(bytearray(faces), np.uint32), [Part(name.decode(errors="replace"), path.decode(errors="replace"), first, count)
@@ -168,22 +186,33 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
                 [remark.decode(errors="replace") for remark in remarks])
 
 
-def _polygons(faces: Any) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint32] | None]:
+def _polygons(faces: Any, vertex_count: int) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint32] | None]:
     """Vertices of all faces, one after the other, and where each begins; None for triangles."""
     if not isinstance(faces, np.ndarray) and hasattr(faces, "__len__"):
         lengths = {len(face) for face in faces if hasattr(face, "__len__")}
         if len(lengths) > 1:
-            rows = [whole_numbers(face, f"faces: row {row}") for row, face in enumerate(faces)]
+            rows = [_vertices_of(any_whole_numbers(face, f"faces: row {row}"), vertex_count, row) for row, face in enumerate(faces)]
             begin = np.concatenate([[0], np.cumsum([len(row) for row in rows])])
             return np.concatenate(rows), begin.astype(np.uint32)
-    corners = whole_numbers(faces, "faces")
+    corners = any_whole_numbers(faces, "faces")
     if corners.size == 0:
-        return corners.reshape(-1), None
+        return np.empty(0, np.uint32), None
     if corners.ndim != 2:
         raise ValueError(f"faces has shape {corners.shape} where (m, 3) is wanted")
+    corners = _vertices_of(corners, vertex_count)
     if corners.shape[1] == 3:
         return corners.reshape(-1), None
     return corners.reshape(-1), np.arange(0, corners.size + 1, corners.shape[1], dtype=np.uint32)
+
+
+def _vertices_of(faces: npt.NDArray[Any], count: int, first_row: int = 0) -> npt.NDArray[np.uint32]:
+    """Faces whose vertices are there, one, or (m, k) from row `first_row` on."""
+    bad = (faces < 0) | (faces >= count)
+    if bad.any():
+        first = np.argwhere(bad)[0]
+        row = first_row + (int(first[0]) if faces.ndim > 1 else 0)
+        raise ValueError(f"faces: row {row} has vertex {faces[tuple(first)]} where 0 to {count - 1} is wanted" if count else f"faces: row {row}: there are no vertices")
+    return np.asarray(faces, np.uint32, order="C")
 
 
 def _words(levels: Levels | None) -> str:

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import errno
+import os
 
 __all__ = ["Error", "FileError"]
 
@@ -25,7 +26,7 @@ class Error(Exception):
 
 
 class FileError(Error, OSError):
-    """A file cannot be found, opened or read: `filename`. One that is not there is a FileNotFoundError too."""
+    """A file cannot be found, opened or read: `filename`. It is a FileNotFoundError, PermissionError or IsADirectoryError too where Python's open() raises that."""
 
     def __str__(self) -> str:
         return str(self.args[0])
@@ -35,18 +36,41 @@ class _FileNotFound(FileError, FileNotFoundError):
     pass
 
 
+class _NoPermission(FileError, PermissionError):
+    pass
+
+
+class _IsADirectory(FileError, IsADirectoryError):
+    pass
+
+
 _FILE_STATUSES = range(100, 104)  # TANDEM_FILE_NOT_FOUND to TANDEM_CANNOT_READ
 _OUT_OF_MEMORY = 4
 
 
 def with_path(error: Error, path: str) -> Error:
     """The same about the file of a path."""
-    kind = _FileNotFound if error.status == _FILE_STATUSES[0] else type(error)
+    if not isinstance(error, FileError):
+        return type(error)(f"{path}: {error}", error.status, error.name, error.subject, error.where)
+    kind, number = (_FileNotFound, errno.ENOENT) if error.status == _FILE_STATUSES[0] else _kind_of(path)
     told = kind(f"{path}: {error}", error.status, error.name, error.subject, error.where)
-    if isinstance(told, FileError):
-        told.filename = path
-        told.errno = errno.ENOENT if isinstance(told, FileNotFoundError) else None
+    told.filename, told.errno = path, number
     return told
+
+
+def _kind_of(path: str) -> tuple[type[FileError], int | None]:
+    """What FileError a file that cannot be read is, and its errno: opening it once more tells."""
+    try:
+        if os.path.isdir(path):
+            return _IsADirectory, errno.EISDIR
+        os.close(os.open(path, os.O_RDONLY | os.O_NONBLOCK))  # which does not wait for the other end of a pipe
+    except FileNotFoundError as error:
+        return _FileNotFound, error.errno
+    except PermissionError as error:
+        return _NoPermission, error.errno
+    except OSError as error:
+        return FileError, error.errno
+    return FileError, None
 
 
 def from_status(status: int, name: str, sentence: str, subject: str | None, where: int) -> BaseException:

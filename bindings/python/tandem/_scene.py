@@ -8,8 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _tandem
-from ._arrays import FARTHEST, FINITE, Rows, amount, floats, instances_of, pairs_of, rows, whole_number, whole_numbers
+from ._arrays import FARTHEST, FINITE, Rotations, Rows, amount, flag, floats, instances_of, pairs_of, rows, whole_number, whole_numbers
 from ._asset import Asset, _choice
+from ._errors import Error
+from ._poses import explained
 from ._rows import BODY_AT, CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, INSTANCE, MANIFOLD, MOTION, PAIR, POINT, VERDICT
 
 __all__ = ["Contacts", "Contained", "Counters", "Distances", "Filter", "Impacts", "Manifolds", "Scene", "Verdicts"]
@@ -37,6 +39,20 @@ class Contacts(NamedTuple):
     pairs: Rows
     contacts: Rows
     counters: Counters
+
+    @property
+    def touching(self) -> Rows:
+        """The pairs that have a contact, array of PAIR in the order of `pairs`. `pairs` are those that were looked at: their world boxes meet, or they were given.
+
+        >>> link = tandem.build([[0, 0, 0], [3, 0, 0], [0, 3, 0]], [[0, 1, 2]])
+        >>> found = tandem.Scene([link], translation=[[0, 0, 0], [1, 1, 0], [2, 2, 0]]).contacts()
+        >>> found.pairs.tolist(), found.touching.tolist()
+        ([(0, 1), (0, 2), (1, 2)], [(0, 1), (1, 2)])
+        """
+        meets = np.zeros(len(self.pairs), bool)
+        meets[self.contacts["pair"]] = True
+        touching: Rows = self.pairs[meets]
+        return touching
 
 
 class Manifolds(NamedTuple):
@@ -155,17 +171,17 @@ class Scene:
 
     >>> scene = tandem.Scene([box], translation=[[0, 0, 0], [2, 0, 0]])
     >>> body = scene.add(translation=[0.5, 0, 0])
-    >>> scene.contacts().pairs.tolist(), scene.distances(pairs=[[1, 2]]).distances["upper"].round(9).tolist()
+    >>> scene.contacts().touching.tolist(), scene.distances(pairs=[[1, 2]]).distances["upper"].round(9).tolist()
     ([(0, 2)], [0.5])
     >>> scene.move(body, translation=[1.5, 0, 0])
-    >>> scene.contacts().pairs.tolist()
+    >>> scene.contacts().touching.tolist()
     [(1, 2)]
     """
 
     __slots__ = ("_core", "_threads", "__weakref__")
 
     def __init__(self, assets: Iterable[Asset], instances: Rows | None = None, *, threads: int = 1, filter: Filter | None = None,
-                 asset: npt.ArrayLike | None = None, rotation: npt.ArrayLike | None = None, translation: npt.ArrayLike | None = None,
+                 asset: npt.ArrayLike | None = None, rotation: Rotations | None = None, translation: npt.ArrayLike | None = None,
                  transform: npt.ArrayLike | None = None, device: str = "cpu"):
         self._core = _tandem.Scene(cores_of(assets), _device(device))
         self._threads = 1
@@ -190,7 +206,7 @@ class Scene:
         """The bodies by number, a copy, array of INSTANCE. Removed ones have the asset NO_INDEX."""
         return _frombuffer(self._core.instances(), INSTANCE)
 
-    def place(self, instances: Rows | None = None, *, filter: Filter | None = None, asset: npt.ArrayLike | None = None, rotation: npt.ArrayLike | None = None,
+    def place(self, instances: Rows | None = None, *, filter: Filter | None = None, asset: npt.ArrayLike | None = None, rotation: Rotations | None = None,
               translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None) -> Scene:
         """Places all bodies anew; those that stand as before cost next to nothing. Returns the scene.
 
@@ -202,14 +218,18 @@ class Scene:
             Error: a pose that is not rigid to 1e-6, a number that is not finite or beyond 1e300, an asset that there is not; `where` is the instance. There are
                 no bodies then.
 
-        >>> scene.place(rotation=np.ones((3, 3)))
+        >>> scene.place(rotation=2 * np.eye(3))
         Traceback (most recent call last):
-        tandem._errors.Error: instance 0: a pose is not a rotation and a translation
+        tandem._errors.Error: instance 0: a pose is not a rotation and a translation: its rotation is not orthonormal: it scales by 2
         """
-        self._core.place(instances_of(instances, asset, rotation, translation, transform), _core_of(filter))
+        bodies = instances_of(instances, asset, rotation, translation, transform)
+        try:
+            self._core.place(bodies, _core_of(filter))
+        except Error as error:
+            raise explained(error, bodies) from None
         return self
 
-    def add(self, asset: int = 0, *, rotation: npt.ArrayLike | None = None, translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None,
+    def add(self, asset: int = 0, *, rotation: Rotations | None = None, translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None,
             motion: int = 0, group: int = _MOST, mask: int = _MOST) -> int:
         """Adds a body and leaves the others alone. Returns its number, the lowest that is free.
 
@@ -227,9 +247,12 @@ class Scene:
         if len(body) != 1:
             raise ValueError(f"{len(body)} bodies where one is wanted")
         filter = None if (motion, group, mask) == (0, _MOST, _MOST) else Filter([motion], [group], [mask])
-        return self._core.add(body, _core_of(filter))
+        try:
+            return self._core.add(body, _core_of(filter))
+        except Error as error:
+            raise explained(error, body) from None
 
-    def move(self, bodies: npt.ArrayLike, instances: Rows | None = None, *, rotation: npt.ArrayLike | None = None,
+    def move(self, bodies: npt.ArrayLike, instances: Rows | None = None, *, rotation: Rotations | None = None,
              translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None) -> None:
         """Moves a body, or several, and leaves the others alone.
 
@@ -246,7 +269,10 @@ class Scene:
             if len(poses) != 1:
                 raise ValueError(f"different numbers of rows: bodies {len(numbers)}, poses {len(poses)}")
             poses = np.repeat(poses, len(numbers))
-        self._core.move(numbers, poses)
+        try:
+            self._core.move(numbers, poses)
+        except Error as error:
+            raise explained(error, poses) from None
 
     def set_motion(self, body: int, motion: int) -> None:
         """Changes what moves a body: MOVING, FIXED, KINEMATIC or SLEEPING."""
@@ -263,7 +289,7 @@ class Scene:
         >>> scene.place(translation=[[0, 0, 0], [0.5, 0, 0], [3, 0, 0]]).pairs().tolist()
         [(0, 1)]
         """
-        return _frombuffer(self._core.pairs(amount(reach, "reach", np.inf), bool(self_pairs)), PAIR)
+        return _frombuffer(self._core.pairs(amount(reach, "reach", np.inf), flag(self_pairs, "self_pairs")), PAIR)
 
     def contacts(self, *, pairs: npt.ArrayLike | None = None, mode: Literal["exact", "fast", "boxes"] = "exact", first_contact_only: bool = False,
                  self_pairs: bool = False, within: float = 0.0, add_error_bounds: bool = False) -> Contacts:
@@ -277,12 +303,16 @@ class Scene:
             within: clearance: triangles at most so far apart count, decided exactly.
             add_error_bounds: a pair without a contact is surely apart at the finest levels too.
 
+        Returns:
+            Contacts: unpacks into pairs, contacts and counters; `touching` are the pairs that have a contact.
+
         >>> pairs, contacts, counters = scene.place(translation=[[0, 0, 0], [0.5, 0.5, 0.5]]).contacts()
         >>> pairs.tolist(), len(contacts), counters.contacts
         ([(0, 1)], 18, 18)
         """
         found = self._core.contacts(None if pairs is None else pairs_of(pairs), _MODES[mode] if mode in _MODES else _choice("mode", mode, tuple(_MODES)),
-                                    bool(first_contact_only), bool(self_pairs), amount(within, "within", FARTHEST), bool(add_error_bounds))
+                                    flag(first_contact_only, "first_contact_only"), flag(self_pairs, "self_pairs"), amount(within, "within", FARTHEST),
+                                    flag(add_error_bounds, "add_error_bounds"))
         return Contacts(_frombuffer(found[0], PAIR), _frombuffer(found[1], CONTACT), Counters._make(found[2]))
 
     def manifolds(self, *, most_points: int = 7, match_previous: bool = True) -> Manifolds:
@@ -300,7 +330,7 @@ class Scene:
         >>> manifolds["normal"].tolist(), manifolds["depth"].tolist(), len(points)
         ([[0.0, 0.0, 1.0]], [0.25], 4)
         """
-        pairs, manifolds, points = self._core.manifolds(whole_number(most_points, "most_points", 1, 7), bool(match_previous))
+        pairs, manifolds, points = self._core.manifolds(whole_number(most_points, "most_points", 1, 7), flag(match_previous, "match_previous"))
         return Manifolds(_frombuffer(pairs, PAIR), _frombuffer(manifolds, MANIFOLD), _frombuffer(points, POINT))
 
     def contained(self) -> Contained:

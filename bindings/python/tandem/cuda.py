@@ -15,7 +15,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ._arrays import FARTHEST, FINITE, amount, pairs_of
+from ._arrays import FARTHEST, FINITE, amount, flag, pairs_of
 from ._asset import Asset, _choice
 from ._errors import Error
 from ._rows import CONTACT, CONTAINMENT, DISTANCE, IMPACT, MANIFOLD, PAIR, POINT, VERDICT
@@ -96,7 +96,7 @@ class Rows:
 
 
 # Results, with the fields of the CPU's: `pairs` are rows of PAIR, or what was given.
-#: Rows of CONTACT, in any order unless sorted or grouped, and the work.
+#: Rows of CONTACT, in any order unless sorted or grouped, and the work. There is no `touching`, which would take the GPU another pass.
 Contacts = NamedTuple("Contacts", [("pairs", Any), ("contacts", Rows), ("counters", Counters)])
 #: Rows of MANIFOLD and POINT.
 Manifolds = NamedTuple("Manifolds", [("pairs", Any), ("manifolds", Rows), ("points", Rows)])
@@ -172,7 +172,7 @@ class Filter:
     __slots__ = ("_core",)
 
     def __init__(self, motion: Any = None, group: Any = None, mask: Any = None, excluded: npt.ArrayLike | None = None, *, device: int = 0, stream: Any = None):
-        self._core = _cuda.Filter(motion, group, mask, pairs_of(excluded), _stream(stream), device)
+        self._core = _cuda.Filter(motion, group, mask, pairs_of(excluded, "excluded"), _stream(stream), device)
 
 
 class Queued:
@@ -297,8 +297,9 @@ class Query:
         The others: as of `tandem.Scene.contacts`.
         """
         bodies, given, chosen, on = self._about(instances, asset, pose, pairs, filter, stream)
-        found = self._core.contacts(bodies, given, _choice("mode", mode, _MODES), first_contact_only, amount(within, "within", FARTHEST), add_error_bounds,
-                                    sorted, grouped, chosen, on)
+        found = self._core.contacts(bodies, given, _choice("mode", mode, _MODES), flag(first_contact_only, "first_contact_only"),
+                                    amount(within, "within", FARTHEST), flag(add_error_bounds, "add_error_bounds"), flag(sorted, "sorted"),
+                                    flag(grouped, "grouped"), chosen, on)
         self._given = pairs
         return Contacts(_found(found[0], pairs), Rows(found[1], CONTACT), Counters._make(found[2]))
 
@@ -306,14 +307,14 @@ class Query:
               filter: Filter | None = None, stream: Any = None) -> Rows:
         """The object pairs whose world boxes meet, rows of PAIR: a < b."""
         bodies, _, chosen, on = self._about(instances, asset, pose, None, filter, stream)
-        return Rows(self._core.pairs(bodies, sorted, amount(within, "within", FARTHEST), chosen, on), PAIR)
+        return Rows(self._core.pairs(bodies, flag(sorted, "sorted"), amount(within, "within", FARTHEST), chosen, on), PAIR)
 
     def manifolds(self, *, most_points: int = 7, match_previous: bool = True) -> Manifolds:
         """Makes contact manifolds of the last `contacts(..., grouped=True)` of this query, whose arrays must be as they were, on its stream: where that was sorted
         too, the rows of the CPU, byte for byte. They are copied within the GPU, since the query keeps its own to find the points again in the next step."""
         if not 1 <= most_points <= 7:
             raise ValueError(f"most_points is {most_points} where 1 to 7 is wanted")
-        pairs, manifolds, points = self._core.manifolds(most_points, match_previous)
+        pairs, manifolds, points = self._core.manifolds(most_points, flag(match_previous, "match_previous"))
         return Manifolds(_found(pairs, self._given), Rows(manifolds, MANIFOLD), Rows(points, POINT))
 
     def contained(self) -> Contained:
@@ -337,7 +338,8 @@ class Query:
             motion: (n, 3, 3) or (n, 9) float64: velocity of the centre, angular velocity, and where the centre is in the world at the start.
         """
         bodies, given, chosen, on = self._about(instances, asset, pose, pairs, filter, stream)
-        found = self._core.impacts(bodies, motion, amount(duration, "duration", FINITE), given, amount(tolerance, "tolerance", FINITE), sorted, chosen, on)
+        found = self._core.impacts(bodies, motion, amount(duration, "duration", FINITE), given, amount(tolerance, "tolerance", FINITE),
+                                   flag(sorted, "sorted"), chosen, on)
         return Impacts(_found(found[0], pairs), Rows(found[1], IMPACT))
 
     def verdicts(self, instances: Instances | None = None, *, tolerance: float, asset: Any = None, pose: Any = None, pairs: Any = None,
@@ -355,7 +357,8 @@ class Query:
             undecided: candidates that are not decided quickly; None: as many as contacts.
         """
         self._step = _cuda.Step(self._assets, instances, pairs, contacts, contacts if undecided is None else undecided, _choice("mode", mode, _MODES),
-                                first_contact_only, amount(within, "within", FARTHEST), add_error_bounds, sorted, grouped)
+                                flag(first_contact_only, "first_contact_only"), amount(within, "within", FARTHEST), flag(add_error_bounds, "add_error_bounds"),
+                                flag(sorted, "sorted"), flag(grouped, "grouped"))
 
     def enqueue(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, pairs: Any = None, filter: Filter | None = None,
                 stream: Any = None) -> Queued:

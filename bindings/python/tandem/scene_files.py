@@ -51,7 +51,7 @@ def read(path: str | os.PathLike[str]) -> Scene:
     """Reads a scene file, or a run file with its states, and the assets that it names.
 
     Raises OSError where a file is not there or is no HDF5 file, tandem.Error where an asset is broken, and ValueError,
-    with the path, where something is missing.
+    with the path, where something is missing or has another shape.
     """
     import h5py  # type: ignore[import-untyped,import-not-found,unused-ignore]
 
@@ -59,6 +59,9 @@ def read(path: str | os.PathLike[str]) -> Scene:
     try:
         opened = h5py.File(path)
     except OSError as error:
+        if path.is_file() and os.access(path, os.R_OK) and not h5py.is_hdf5(path):
+            raise OSError(f"{path}: is neither a scene file nor a run file, which are HDF5, nor a .bvh file by its "
+                          "name; bvhbuild makes a .bvh file of a mesh") from None
         if os.fspath(path) in str(error):
             raise
         raise OSError(f"{path}: {error}") from error
@@ -71,35 +74,51 @@ def read(path: str | os.PathLike[str]) -> Scene:
 
 def _read(path: pathlib.Path, file: Any) -> Scene:
     is_run = "bodies" in file
-    group = file["bodies" if is_run else "instances"]
-    asset = group["asset"][:].astype(np.uint32)
-    level = group["level"][:].astype(np.uint32) if "level" in group else np.zeros_like(asset)
+    group = "bodies" if is_run else "instances"
+    asset = file[f"{group}/asset"][:].astype(np.uint32)
+    count = len(asset)
+    level = np.zeros_like(asset)
+    if f"{group}/level" in file:
+        level[:] = _dataset(path, file, f"{group}/level", count)
     names = [os.fsdecode(name) for name in file["assets"][:]]
     if len(asset) and asset.max() >= len(names):
         raise ValueError(f"{path}: a body has asset {asset.max()} of {len(names)}")
     assets = [tandem.Asset.load(path.parent / name) for name in names]
-    motion = np.zeros(len(asset), np.uint8)
-    if is_run:
-        motion[:] = group["motion"][:]
-        steps, rotation, translation = _states(path, file)
-    else:
-        if "simulation/motion" in file:
-            motion[:] = file["simulation/motion"][:]
-        steps = np.zeros(1, np.int64)
-        rotation, translation = group["rotation"][:][None], group["translation"][:][None]
-    limits = {name: file[f"instances/{name}"][:] for name in ("group", "mask") if f"instances/{name}" in file}
+    motion = np.zeros(count, np.uint8)
+    moved_by = "bodies/motion" if is_run else "simulation/motion"
+    if is_run or moved_by in file:
+        motion[:] = _dataset(path, file, moved_by, count)
+    steps, rotation, translation = (_states if is_run else _state)(path, file, count)
+    limits = {name: _dataset(path, file, f"instances/{name}", count) for name in ("group", "mask")
+              if f"instances/{name}" in file}
     if "excluded" in file:
         limits["excluded"] = file["excluded"][:]
     return Scene(assets, asset, level, motion, steps, rotation.astype(float), translation.astype(float),
                  file["pairs"][:] if "pairs" in file else None, tandem.Filter(motion=motion, **limits))
 
 
-def _states(path: pathlib.Path, file: Any) -> tuple[NDArray[np.int64], NDArray[Any], NDArray[Any]]:
+def _dataset(path: pathlib.Path, file: Any, name: str, *shape: int) -> NDArray[Any]:
+    """A dataset of this very shape."""
+    array: NDArray[Any] = file[name][()]
+    if array.shape != shape:
+        raise ValueError(f"{path}: {name} has shape {array.shape} where {shape} is wanted")
+    return array
+
+
+def _state(path: pathlib.Path, file: Any, count: int) -> tuple[NDArray[np.int64], NDArray[Any], NDArray[Any]]:
+    rotation = _dataset(path, file, "instances/rotation", count, 3, 3)
+    translation = _dataset(path, file, "instances/translation", count, 3)
+    return np.zeros(1, np.int64), rotation[None], translation[None]
+
+
+def _states(path: pathlib.Path, file: Any, count: int) -> tuple[NDArray[np.int64], NDArray[Any], NDArray[Any]]:
     if "trajectory" not in file:
         raise ValueError(f"{path}: keeps no state: simulate with --trajectory")
-    rotation = _of_quaternions(file["trajectory/orientation"][:])
-    moved = np.einsum("knij,nj->kni", rotation, file["bodies/center_of_mass"][:])
-    return file["trajectory/frame"][:].astype(np.int64), rotation, file["trajectory/position"][:] - moved
+    steps = file["trajectory/frame"][:].astype(np.int64)
+    rotation = _of_quaternions(_dataset(path, file, "trajectory/orientation", len(steps), count, 4))
+    center = _dataset(path, file, "bodies/center_of_mass", count, 3)
+    position = _dataset(path, file, "trajectory/position", len(steps), count, 3)
+    return steps, rotation, position - np.einsum("knij,nj->kni", rotation, center)
 
 
 def _of_quaternions(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:

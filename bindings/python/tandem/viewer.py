@@ -32,6 +32,7 @@ TRANSLUCENT = 0.35
 POINT_PIXELS = 12
 VIEW_ANGLE = 24  # degrees, from the lower edge to the upper
 MARGIN = 0.03  # of the picture, on either side
+SUPERSAMPLING = 5**0.5  # vtkSSAAPass draws a picture so many times as wide and as high
 BAR = 0.12  # of the picture, for a bar of colours and its numbers
 NORMAL_LENGTH = 0.15  # of the median diagonal of the bodies
 COLORS = ("body", "asset", "level")
@@ -83,7 +84,7 @@ class View:
     tree_depth: the boxes of the tree's nodes at this depth, from 0 (tandem.tree.boxes()). In a window a slider chooses.
     color: "body", "asset" or "level", with a legend: what has one of its own. Fixed bodies are grey but for "level".
     opacity: of the bodies, 0 to 1; 1, or 0.35 where there is something to see inside.
-    size: width and height in pixels.
+    size: width and height in pixels; of a picture at most what VTK can draw, such as 7,327 each.
     azimuth, elevation: degrees. From where one looks: 0 from +x, 90 from +y; above the horizon, z is up.
 
     Raises TypeError and ValueError for arguments that do not fit, or not together, RuntimeError where there is nothing
@@ -413,6 +414,11 @@ def _plotter(off_screen: bool, size: tuple[int, int]) -> Any:
             if not window.GetInitialized():
                 raise RuntimeError("VTK finds nothing to draw with: neither EGL (Debian: libegl1 libgl1-mesa-dri) nor "
                                    "OSMesa")
+            most = int(vtk.vtkTextureObject.GetMaximumTextureSize(window) / SUPERSAMPLING)
+            if max(size) > most:
+                plotter.close()
+                raise ValueError(f"size {tuple(size)}: is more than {most} pixels wide or high, the most that can be "
+                                 "drawn here")
         elif not plotter.notebook and window.GetClassName() in ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow"):
             raise RuntimeError("there is no display for a window; picture= and off_screen=True draw without one")
     finally:

@@ -106,7 +106,7 @@ class OrientedWalk {
     return Status::kOk;
   }
 
-  // Whether the box of a node holds the triangles from `first` to `end`, in real arithmetic.
+  // Returns whether the box of a node holds the triangles from `first` to `end`, in real arithmetic.
   //
   // Proof. Let S be the scaled rotation, n the squared length of its quaternion, v a vertex and c, h of the
   // box. v lies in the box along axis k if |p - n c| <= n h with p = sum over i of S_ik v_i. Products of two

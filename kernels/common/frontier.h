@@ -55,7 +55,7 @@ cudaError_t launch_rounds(const Grid& grid, void (*kernel)(Args, std::uint32_t),
   return error;
 }
 
-/// How many entries are stored. Condition: kernels that append have ended.
+/// Returns how many entries are stored. Condition: kernels that append have ended.
 template <typename Entry>
 __device__ inline std::uint32_t stored_in(const AppendList<Entry>& list) {
   const Counter count = *list.count;

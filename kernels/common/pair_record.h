@@ -112,7 +112,7 @@ __device__ inline Pose stored_pose(const Args& args, std::uint32_t instance) {
   return stored_pose(args.instances, args.assets, instance);
 }
 
-/// How many of the given object pairs a query looks at: those that there are and that have room.
+/// Returns how many of the given object pairs a query looks at: those that there are and that have room.
 template <typename Args>
 __device__ inline std::uint32_t pair_count(const Args& args) {
   const std::uint32_t count = *args.given.count;

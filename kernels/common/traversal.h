@@ -128,7 +128,7 @@ TANDEM_HD constexpr Descent descent_by_size(float size_a, float size_b, float ti
 /// (docs/decisions/0014).
 inline constexpr float kTimesLarger = 4;
 
-/// Whether it is that much larger. The other of the two is an internal block.
+/// Returns whether it is that much larger. The other of the two is an internal block.
 TANDEM_HD constexpr bool worth_planes(bool leaf_a, float size_a, float size_b) {
   return descent_by_size(size_a, size_b, kTimesLarger) == (leaf_a ? Descent::a_alone : Descent::b_alone);
 }

@@ -257,7 +257,7 @@ __device__ void clear_counters(QueryState& state) {
   state.block_pairs = state.candidates = state.decided_by_float64 = 0;
 }
 
-/// Whether the block comes here last, all others being done. word: in shared memory.
+/// Returns whether the block comes here last, all others being done. word: in shared memory.
 __device__ bool ends_last(const QueryArgs& args, std::uint32_t& word) {
   __threadfence();
   __syncthreads();

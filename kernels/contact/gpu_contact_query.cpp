@@ -133,7 +133,7 @@ struct HostOf<GpuContactReport> : GpuHost<QueryState, GpuContactReport> {
             options.sorted ? nullptr : contacts.data()};
   }
 
-  // Why a query with these options cannot be queued.
+  // Returns why a query with these options cannot be queued.
   Status refusal(const GpuContactOptions& options) const {
     const bool oriented = walked_kind(options.mode) == BlockKind::oriented;
     if (oriented && !assets.all.oriented) return Status::kNoOrientedBlocks;

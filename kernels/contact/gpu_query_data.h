@@ -129,7 +129,7 @@ constexpr std::uint64_t with_spare(std::uint64_t undecided) {
   return undecided + undecided / 2 + 1024;
 }
 
-/// Which blocks a query of this mode walks.
+/// Returns which blocks a query of this mode walks.
 TANDEM_HD constexpr BlockKind walked_kind(QueryMode mode) {
   return mode == QueryMode::exact ? BlockKind::oriented : BlockKind::axis_aligned;
 }
@@ -159,8 +159,8 @@ __device__ inline bool failed(const QueryArgs& args) {
   return *static_cast<volatile Counter*>(&args.state->error) != 0;
 }
 
-/// How near triangles of two instances have to be in a query of clearance. In files that are compiled without
-/// fused operations, so that it has the CPU's bits.
+/// Returns how near triangles of two instances have to be in a query of clearance. In files that are compiled
+/// without fused operations, so that it has the CPU's bits.
 __device__ inline double clearance_of(const QueryArgs& args, std::uint32_t a, std::uint32_t b) {
   if (!args.adds_errors || a == b) return args.within;
   const auto error = [&](std::uint32_t instance) {
@@ -170,7 +170,7 @@ __device__ inline double clearance_of(const QueryArgs& args, std::uint32_t a, st
   return clearance_of_levels(args.within, error(a), error(b));
 }
 
-/// Whether the contact counts: where only the first is asked for, the first of its pair.
+/// Returns whether the contact counts: where only the first is asked for, the first of its pair.
 __device__ inline bool is_wanted(const QueryArgs& args, std::uint32_t pair) {
   if (!args.first_contact_only) return true;
   // Looked at before it is written: many contacts of few pairs would queue up at them.

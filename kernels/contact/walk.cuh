@@ -82,8 +82,8 @@ class Walk {
 
   __device__ std::uint32_t warps() const { return gridDim.x * args_.shape.warps; }
 
-  /// How many object pairs each warp takes where there are so many. Without sharing, few are spread over all
-  /// warps.
+  /// Returns how many object pairs each warp takes where there are so many. Without sharing, few are spread
+  /// over all warps.
   __device__ std::uint32_t share_of(std::uint32_t pairs) const {
     const std::uint32_t share =
         kShares ? max(pairs / warps(), kFewestPairsAtOnce) : (pairs + warps() - 1) / warps();

@@ -31,8 +31,8 @@ constexpr std::uint32_t stack_reserve(std::uint32_t depth) {
 /// it gets a gift, 31 lie there and 32 come on. With more entries, more lanes have work when room is short.
 inline constexpr std::uint32_t kEntries = 208, kFewestEntries = 80;
 
-/// How many block pairs a warp's next step takes off its stack, of those that wait. room: entries that are
-/// free.
+/// Returns how many block pairs a warp's next step takes off its stack, of those that wait. room: entries
+/// that are free.
 ///
 /// A step puts on one entry at most for each block pair that it takes off, so it takes no more than there is
 /// room for beyond the reserve: it leaves the reserve free. Where no more than the reserve is free, a step
@@ -63,7 +63,7 @@ struct WalkShape {
   }
 };
 
-/// How many entries the stack of each warp can have.
+/// Returns how many entries the stack of each warp can have.
 constexpr std::uint32_t entries_that_fit(std::uint32_t shared_bytes, std::uint32_t warps) {
   const std::uint32_t words = (shared_bytes / 4 - kBlockWords) / warps;
   return words < kWarpWords ? 0 : (words - kWarpWords) / kEntryWords;

@@ -117,7 +117,7 @@ TANDEM_HD constexpr std::uint32_t told(std::uint32_t mailbox, std::uint32_t turn
   return mailbox >> 8 > turn ? kHome : 0;
 }
 
-/// Whether the owner of a turn is done with its mailbox.
+/// Returns whether the owner of a turn is done with its mailbox.
 TANDEM_HD constexpr bool is_free_after(std::uint32_t mailbox, std::uint32_t turn) {
   return mailbox == mailbox_word(turn, kHome) || mailbox == mailbox_word(turn, kGivenBack);
 }
@@ -133,7 +133,7 @@ class WorkSharing {
     if (warp_.is_first()) warp_.add(word_of(1, 0, 0));
   }
 
-  /// How many gifts, at most so many, there were tickets for at the last look.
+  /// Returns how many gifts, at most so many, there were tickets for at the last look.
   TANDEM_WARP_CODE std::uint32_t gifts_wanted(std::uint32_t most) const {
     const Counts seen = counts_of(warp_.seen());
     if (seen.waiting <= 0 || seen.given >= warp_.tickets_end()) return 0;

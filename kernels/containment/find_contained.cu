@@ -21,7 +21,7 @@ constexpr std::uint32_t kBlocksAtOnce = 32 / kNodesPerBlock;
 constexpr std::uint32_t kStackSize = 32 * (kMaxDepth - 1);
 static_assert(kStackSize * 4 * kWarps <= 48 * 1024);
 
-/// Whether the ray from p crosses the closed components an odd number of times. By a warp.
+/// Returns whether the ray from p crosses the closed components an odd number of times. By a warp.
 template <typename AnyBlock>
 __device__ bool is_inside(const PosedSurface& body, const AnyBlock* blocks, const double* p,
                           std::uint32_t* stack) {
@@ -53,7 +53,7 @@ __device__ bool is_inside(const PosedSurface& body, const AnyBlock* blocks, cons
   return crossings % 2 != 0;
 }
 
-/// Whether a contact among those from `first` to `end` is of a component. By a warp.
+/// Returns whether a contact among those from `first` to `end` is of a component. By a warp.
 __device__ bool touches(const ContainmentArgs& args, std::uint32_t first, std::uint32_t end,
                         std::uint32_t inner, const std::uint32_t* labels, std::uint32_t component) {
   for (std::uint32_t i = first; i < end; i += 32) {
@@ -73,7 +73,7 @@ __device__ PosedSurface posed(const ContainmentArgs& args, std::uint32_t instanc
   return {&surface, for_stored_coordinates(args.instances.pose[instance], surface.origin)};
 }
 
-/// Whether one of the bodies may have something to report. By a thread.
+/// Returns whether one of the bodies may have something to report. By a thread.
 __device__ bool is_worth_a_look(const ContainmentArgs& args, std::uint32_t index) {
   const ObjectPair pair = args.pairs.pairs[index];
   if (pair.a == pair.b) return false;

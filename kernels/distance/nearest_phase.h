@@ -80,7 +80,7 @@ void nearest_phase_by_world_boxes(const NearestTask& task, const BoundedBlockPai
 
 // What variants call, and what is compiled once for any machine.
 
-/// How near a pair must be to count: nearer than this. What may touch counts, whatever the tolerance.
+/// Returns how near a pair must be to count: nearer than this. What may touch counts, whatever the tolerance.
 double nearness(const NearestTask& task, const NearestSoFar& state);
 
 /// limit_of() and distance_of() of box_distance.h.

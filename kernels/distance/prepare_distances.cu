@@ -33,7 +33,7 @@ __device__ DistanceRecord make_record(const ObjectPair& pair, const LevelView& a
   return record;
 }
 
-/// Whether any nodes of the root blocks are within reach.
+/// Returns whether any nodes of the root blocks are within reach.
 __device__ bool has_near_roots(const DistanceRecord& record, const DistanceFrame& frame, float limit) {
   const Block &a = record.pair.blocks_a[0], &b = record.pair.blocks_b[0];
 #pragma unroll 1
@@ -56,7 +56,7 @@ __device__ NearState fresh_state(const DistanceArgs& args) {
   return state;
 }
 
-/// How far apart anything of two trees can be, up to rounding.
+/// Returns how far apart anything of two trees can be, up to rounding.
 __device__ double farthest_of(const Pose& pose_a, const TreeExtent& a, const Pose& pose_b,
                               const TreeExtent& b) {
   double sum = 0;

@@ -58,8 +58,8 @@ __global__ void __launch_bounds__(kThreads) settle_first(const __grid_constant__
   }
 }
 
-/// Whether triangles that float32 leaves are to be settled too: not those that are as far along the direction
-/// of the first. Most share their nearest edge or corner with these, and so all but the distance.
+/// Returns whether triangles that float32 leaves are to be settled too: not those that are as far along the
+/// direction of the first. Most share their nearest edge or corner with these, and so all but the distance.
 __device__ bool is_left(const DistanceArgs& args, const TrianglePairEntry& entry, const FrameBounds& bounds) {
   NearState& state = args.near_states[entry.pair];
   if (state.best == 0 || triangles_as_number(entry.a, entry.b) == state.first) return false;
@@ -110,7 +110,7 @@ __global__ void __launch_bounds__(kThreads) choose_best(const __grid_constant__ 
   }
 }
 
-/// Whether the first triangles of a pair are its nearest.
+/// Returns whether the first triangles of a pair are its nearest.
 __device__ bool is_first_best(const DistanceArgs& args, std::uint32_t pair) {
   const NearState& state = args.near_states[pair];
   if (state.first == kNoTriangles || state.best_of_rest == kNoTriangles)
@@ -189,7 +189,7 @@ __device__ void write_report(const DistanceArgs& args) {
   *args.host_report = report;
 }
 
-/// Whether the block comes here last, all others being done.
+/// Returns whether the block comes here last, all others being done.
 __device__ bool ends_last(const DistanceArgs& args) {
   __shared__ bool last;
   __threadfence();

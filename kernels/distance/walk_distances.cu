@@ -133,8 +133,8 @@ class Round {
     }
   }
 
-  /// Whether an entry is among the `width_` of its pair that have the least bounds. Of those in the step
-  /// where the room ends a part is taken, any, but the same on every run.
+  /// Returns whether an entry is among the `width_` of its pair that have the least bounds. Of those in the
+  /// step where the room ends a part is taken, any, but the same on every run.
   __device__ bool is_wanted(const BlockPairEntry& entry) const {
     if (!kNarrow) return true;
     const std::uint32_t(&steps)[kSteps] = args_.narrowings[entry.pair].steps[number_ % 3];
@@ -206,7 +206,7 @@ class Round {
     return static_cast<std::uint32_t>(step);
   }
 
-  /// Whether the direction of the nearest triangles so far tells that these are no nearer.
+  /// Returns whether the direction of the nearest triangles so far tells that these are no nearer.
   __device__ static bool is_far(const DistanceRecord& record, const NearState& state, const Visit& found) {
     if (record.pair.in_frame == 0) return false;
     return distance::is_far_along(

@@ -123,7 +123,7 @@ TANDEM_HD inline float limit_of(const DistanceFrame& frame, double distance) {
   return square < 0x1p120 ? static_cast<float>(square) : INFINITY;
 }
 
-/// How far apart, in the world, what is in boxes with this bound is at least.
+/// Returns how far apart, in the world, what is in boxes with this bound is at least.
 TANDEM_HD inline double distance_of(const DistanceFrame& frame, float bound) {
   const double square = static_cast<double>(bound) - kSquareSpare;
   return square > 0 ? std::sqrt(square * frame.square_to_world) * (1 - 0x1p-50) : 0;

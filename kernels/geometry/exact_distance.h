@@ -336,8 +336,8 @@ TANDEM_HD inline detail::ExponentRange exponents_of(const TrianglePair& t, doubl
 template <int kWords>
 class ClearanceDecision {
  public:
-  /// Whether the distance of triangles that do not meet is at most d. Condition: d >= 0, finite; range:
-  /// exponents_of() these, of at most kWords words.
+  /// Returns whether the distance of triangles that do not meet is at most d. Condition: d >= 0, finite;
+  /// range: exponents_of() these, of at most kWords words.
   TANDEM_HD bool are_within(const TrianglePair& t, double d, const detail::ExponentRange& range) {
     within_.assign(d, range);
     features_.assign(t, range);
@@ -349,7 +349,7 @@ class ClearanceDecision {
   Features<kWords> features_;
 };
 
-/// Whether the distance of triangles that do not meet is at most d. Condition: d >= 0, finite.
+/// Returns whether the distance of triangles that do not meet is at most d. Condition: d >= 0, finite.
 TANDEM_OUT_OF_LINE TANDEM_HD inline bool are_within(const TrianglePair& t, double d) {
   ClearanceDecision<detail::kMaxWords> decision;
   return decision.are_within(t, d, exponents_of(t, d));

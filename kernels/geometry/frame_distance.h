@@ -65,8 +65,8 @@ TANDEM_HD inline Value greatest_of(const Value& x, const Value& y, const Value& 
   return larger(larger(x, y), z);
 }
 
-/// Whether the posed triangles are at least as far apart as frame_direction() was asked for, along that
-/// direction: what the proof says of `lower`, with |n| <= 1. a: corners as stored, b: posed() ones.
+/// Returns whether the posed triangles are at least as far apart as frame_direction() was asked for, along
+/// that direction: what the proof says of `lower`, with |n| <= 1. a: corners as stored, b: posed() ones.
 template <typename Value>
 TANDEM_HD inline auto is_far_along(const Point<Value> (&corner_a)[3], const Point<Value> (&corner_b)[3],
                                    const FrameDirection& along) {
@@ -125,8 +125,9 @@ TANDEM_HD inline FrameClearance frame_clearance(const DistanceFrame& frame, doub
           within > 0 ? within < 0x1p100 ? static_cast<float>(within) : 0x1p100f : -1.0f, frame.error};
 }
 
-/// Whether two triangles lie more than a length apart along n or against it: the proof above, with 9.2 u for
-/// its 9.1, and 8 u for |n| as computed. M: `largest`. A direction that underflow could touch tells nothing.
+/// Returns whether two triangles lie more than a length apart along n or against it: the proof above, with
+/// 9.2 u for its 9.1, and 8 u for |n| as computed. M: `largest`. A direction that underflow could touch tells
+/// nothing.
 template <typename Value>
 TANDEM_HD inline auto is_beyond_along(const Point<Value>& n, const Point<Value> (&a)[3],
                                       const Point<Value> (&b)[3], const Value& largest, float length) {

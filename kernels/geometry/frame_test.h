@@ -183,9 +183,9 @@ TANDEM_HD inline BoxInFrame<Value> posed(const RelativePose& b_in_a, const BoxIn
   return out;
 }
 
-/// Whether boxes lie strictly on one side of a plane, with all corners of triangles within them: then none of
-/// these triangles meets the one that the plane was made of. The boxes hold stored corners of a, where the
-/// plane is b's, or are posed() and hold images of b's corners, where it is a's.
+/// Returns whether boxes lie strictly on one side of a plane, with all corners of triangles within them: then
+/// none of these triangles meets the one that the plane was made of. The boxes hold stored corners of a,
+/// where the plane is b's, or are posed() and hold images of b's corners, where it is a's.
 ///
 /// **Proof.** The volume of a corner in a box, whose centre is at w, is off by at most what the proof above
 /// says of a difference bounded by |w| + h; that of the centre is computed, and the box reaches sum |n_k| h_k

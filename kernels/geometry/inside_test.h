@@ -26,13 +26,13 @@
 /// z and x are right-handed. The volume is 0 only where p is on the triangle.
 namespace tandem::containment {
 
-/// Whether the ray may cross a triangle all of whose corners lie in this box: else all are above or none is,
-/// all edges that pass the height are to the right or none is, or all that is crossed lies behind p.
+/// Returns whether the ray may cross a triangle all of whose corners lie in this box: else all are above or
+/// none is, all edges that pass the height are to the right or none is, or all that is crossed lies behind p.
 TANDEM_HD inline bool ray_may_cross(const WorldBox& box, const double* p) {
   return box.hi[0] > p[0] && box.lo[1] <= p[1] && box.hi[1] > p[1] && box.lo[2] <= p[2] && box.hi[2] > p[2];
 }
 
-/// Whether the ray crosses the triangle. Finite coordinates.
+/// Returns whether the ray crosses the triangle. Finite coordinates.
 TANDEM_HD inline bool ray_crosses(const double (*t)[3], const double* p) {
   using detail::ExactSigns;
   bool within = false;
@@ -108,14 +108,14 @@ TANDEM_HD inline std::uint32_t below(const OrientedBlock& block, int node) {
   return (block.first_below & ~OrientedBlock::kIsLeafBlock) + static_cast<std::uint32_t>(node);
 }
 
-/// Whether the ray may cross something below the node.
+/// Returns whether the ray may cross something below the node.
 template <typename AnyBlock>
 TANDEM_HD inline bool ray_may_cross(const PosedSurface& body, const AnyBlock& block, int node,
                                     const double* p) {
   return is_real(block, node) && ray_may_cross(node_box(body, block, node), p);
 }
 
-/// Whether the ray crosses this triangle of a body, and its component is closed.
+/// Returns whether the ray crosses this triangle of a body, and its component is closed.
 TANDEM_HD inline bool ray_crosses(const PosedSurface& body, std::uint32_t triangle, const double* p) {
   const Surface& surface = *body.surface;
   if (surface.labels != nullptr && (surface.labels[triangle] & kOfOpenComponent) != 0) return false;

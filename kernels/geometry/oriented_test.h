@@ -120,7 +120,7 @@ TANDEM_HD inline float b_in_a(const OrientedPose& pose, int i, const float (&cen
   return ((pose.translation[i] + m[i][0] * center[0]) + m[i][1] * center[1]) + m[i][2] * center[2];
 }
 
-/// How far b reaches along a's axis i, slack included.
+/// Returns how far b reaches along a's axis i, slack included.
 TANDEM_HD inline float b_along_a(const OrientedPose& pose, int i, const float (&half_extent)[3]) {
   const auto& m = pose.rotation;
   return ((pose.slack + std::fabs(m[i][0]) * half_extent[0]) + std::fabs(m[i][1]) * half_extent[1]) +
@@ -133,7 +133,7 @@ TANDEM_HD inline float a_in_b(const OrientedPose& pose, int j, const float (&cen
   return ((pose.back_translation[j] + m[0][j] * center[0]) + m[1][j] * center[1]) + m[2][j] * center[2];
 }
 
-/// How far a reaches along b's axis j, slack included.
+/// Returns how far a reaches along b's axis j, slack included.
 TANDEM_HD inline float a_along_b(const OrientedPose& pose, int j, const float (&half_extent)[3]) {
   const auto& m = pose.rotation;
   return ((pose.slack + std::fabs(m[0][j]) * half_extent[0]) + std::fabs(m[1][j]) * half_extent[1]) +
@@ -142,8 +142,8 @@ TANDEM_HD inline float a_along_b(const OrientedPose& pose, int j, const float (&
 
 }  // namespace oriented_terms
 
-/// Whether no face normal of either box separates them: if it says no, no posed triangles in the boxes meet,
-/// in exact arithmetic, as docs/box_test.md says.
+/// Returns whether no face normal of either box separates them: if it says no, no posed triangles in the
+/// boxes meet, in exact arithmetic, as docs/box_test.md says.
 inline bool overlap_oriented(const Box& a, const Box& b, const OrientedPose& pose) {
   bool overlap = true;
   for (int k = 0; k < 3; ++k) {

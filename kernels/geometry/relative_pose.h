@@ -56,7 +56,7 @@ TANDEM_HD inline void invert(const double (&r)[3][3], double (&out)[3][3]) {
   }
 }
 
-/// How far apply() may be from real arithmetic in row i, over the points of a tree.
+/// Returns how far apply() may be from real arithmetic in row i, over the points of a tree.
 TANDEM_HD inline double posing_error(const Pose& pose, const TreeExtent& tree, int i) {
   double size = 0;
   for (int k = 0; k < 3; ++k) size += std::fabs(pose.rotation[i][k]) * tree.reach[k];

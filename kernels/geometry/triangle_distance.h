@@ -44,7 +44,7 @@ struct LocalPair {
   Point<double> a[3], b[3];
   double largest;  ///< M of the proof
 
-  /// Whether the proof's conditions on M hold.
+  /// Returns whether the proof's conditions on M hold.
   TANDEM_HD bool in_range() const { return largest >= 0x1p-200 && largest <= 0x1p200; }
 };
 

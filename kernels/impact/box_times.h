@@ -172,8 +172,8 @@ TANDEM_HD inline void raise_margins(const FrameMotion& frame, const MovingNodes<
   }
 }
 
-/// How long real nodes i and j surely stay apart by the margin from now on, at most `most`; 0 where they are
-/// nearer now.
+/// Returns how long real nodes i and j surely stay apart by the margin from now on, at most `most`; 0 where
+/// they are nearer now.
 template <int kNodes>
 TANDEM_HD inline double time_apart(const PairFrames& frames, const FrameNodes<kNodes>& in_a,
                                    const FrameNodes<kNodes>& in_b, int i, int j, double most) {
@@ -207,8 +207,8 @@ TANDEM_HD inline double time_apart(const PairFrames& frames, const FrameNodes<kN
   return lasts || !(time < most) ? most : time;
 }
 
-/// How long node i of a and node j of b, both real, surely stay apart from now on: `most` where that is so
-/// for all of it.
+/// Returns how long node i of a and node j of b, both real, surely stay apart from now on: `most` where that
+/// is so for all of it.
 TANDEM_HD inline double node_pair_time(const PairFrames& frames, const Block& a, int i, const Block& b, int j,
                                        double most) {
   FrameNodes<1> in_a, in_b;

@@ -142,7 +142,8 @@ cudaError_t write_impacts(const ImpactArgs& args, cudaStream_t stream);
 
 #ifdef __CUDACC__
 
-/// Whether there are pairs to walk: nothing was wrong with instances or pairs, and all contacts had room.
+/// Returns whether there are pairs to walk: nothing was wrong with instances or pairs, and all contacts had
+/// room.
 __device__ inline bool can_walk(const ImpactArgs& args) {
   return args.state->error == 0 && args.query->status == Status::kOk && args.query->complete != 0 &&
          *args.given.count <= args.capacity.pairs;

@@ -25,7 +25,7 @@ __global__ void __launch_bounds__(kThreads) list_pairs(const __grid_constant__ I
     list_pair(args, left.entries[i]);
 }
 
-/// How many samples each pair has: what there is room for in any query that has room for all pairs.
+/// Returns how many samples each pair has: what there is room for in any query that has room for all pairs.
 __device__ std::uint32_t samples_of_pair(const ImpactArgs& args) {
   const Counter pairs = *args.given.count, all = kImpactSamplesPerPair * pairs + kFewestImpactSamples,
                 room = all < args.most_samples ? all : args.most_samples;

@@ -24,7 +24,7 @@ struct Span {
   double begin, end;
 };
 
-/// How many pieces of equal length the step has.
+/// Returns how many pieces of equal length the step has.
 TANDEM_HD inline double pieces_of(const PairMotion& pair) {
   const double turns = manifold::greater(pair.a->angle, pair.b->angle) / kMostTurnOfPiece;
   return manifold::greater(1.0, std::ceil(turns));
@@ -47,7 +47,7 @@ TANDEM_HD inline double largest_acceleration(const PairMotion& pair) {
   return pair.a->angle * pair.a->fastest + pair.b->angle * pair.b->fastest;
 }
 
-/// Whether a part with this number and length is halved for two blocks, whose sizes are size_of().
+/// Returns whether a part with this number and length is halved for two blocks, whose sizes are size_of().
 TANDEM_HD inline bool worth_halving(double acceleration, std::uint32_t number, double length, float size_a,
                                     float size_b) {
   constexpr double kOfSize = 0.125;

@@ -56,7 +56,7 @@ class ManifoldMaker {
   TANDEM_HD void place_candidates(const RimFinder<Team>& finder, bool touch, ChoiceMemory& shared);
   TANDEM_HD int much_deeper_inner_point(int most_of_rim, ChoiceMemory& shared) const;
   TANDEM_HD void keep_apart(int most_of_rim, int inner, ChoiceMemory& shared) const;
-  /// Whether a sounding is one of the first points of the rim.
+  /// Returns whether a sounding is one of the first points of the rim.
   TANDEM_HD bool is_of_rim(int i, int most_of_rim, const ChoiceMemory& shared) const {
     return !shared.candidate[i].inner && state_.sounding[i].rank < most_of_rim;
   }

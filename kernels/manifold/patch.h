@@ -180,7 +180,7 @@ struct Sounding {
   TANDEM_HD double overlap() const {
     return surface[0].found() && surface[1].found() ? surface[0].height - surface[1].height : 0;
   }
-  /// Whether the line runs within both, as far as it was looked at.
+  /// Returns whether the line runs within both, as far as it was looked at.
   TANDEM_HD bool within() const {
     if (!(overlap() > 0)) return false;
     if (!looked_behind) return true;
@@ -188,7 +188,7 @@ struct Sounding {
     const double end = std::fmin(surface[0].height, behind[1].found() ? behind[1].height : INFINITY);
     return begin < end;
   }
-  /// Whether one body ends within the other. Condition: looked_behind, within().
+  /// Returns whether one body ends within the other. Condition: looked_behind, within().
   TANDEM_HD bool goes_through() const { return behind[0].found() || behind[1].found(); }
 };
 

@@ -169,9 +169,9 @@ TANDEM_HD_SELDOM Vector3 NormalFinder<Team>::sheet_normal() const {
   return sum.value(unit);
 }
 
-/// Whether a sample of pieces proves that gather_directions() is false: of more than kMostDirections normals
-/// each is more than twice as far from the others as normals of one direction are from it, so no direction
-/// has two of them.
+/// Returns whether a sample of pieces proves that gather_directions() is false: of more than kMostDirections
+/// normals each is more than twice as far from the others as normals of one direction are from it, so no
+/// direction has two of them.
 template <typename Team>
 TANDEM_HD bool NormalFinder<Team>::has_many_directions(int side) const {
   constexpr std::uint32_t kSample = 32;

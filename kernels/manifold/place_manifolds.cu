@@ -22,7 +22,7 @@ __device__ std::uint32_t pair_count(const ManifoldArgs& args) {
   return *args.pairs.count < args.capacity.pairs ? *args.pairs.count : args.capacity.pairs;
 }
 
-/// Whether all had room: the same for all threads of all kernels behind make_patches().
+/// Returns whether all had room: the same for all threads of all kernels behind make_patches().
 __device__ bool is_complete(const ManifoldArgs& args) {
   const ManifoldState& state = *args.state;
   return args.query->status == Status::kOk && args.query->complete != 0 &&

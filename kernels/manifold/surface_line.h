@@ -55,7 +55,7 @@ TANDEM_HD inline FloatVector point_in_mesh(const Body& body, const Vector3& poin
   return in_mesh(body, point - Vector3{t[0], t[1], t[2]});
 }
 
-/// How much float32 may be off for boxes of this body near a point of stored coordinates.
+/// Returns how much float32 may be off for boxes of this body near a point of stored coordinates.
 TANDEM_HD inline float slack_near(const Body& body, const FloatVector& point) {
   const Shape& shape = *body.shape;
   const double far = std::fabs(shape.center.x) + std::fabs(shape.center.y) + std::fabs(shape.center.z) +

@@ -66,7 +66,7 @@ OptionRow ground_option(std::string& ground, const std::string& what);
 OptionRow count_option(std::uint32_t& count, std::uint32_t usual);
 OptionRow seed_option(std::uint64_t& seed, const std::string& what);
 
-/// Whether this program was built with CUDA.
+/// Returns whether this program was built with CUDA.
 bool has_cuda();
 
 /// Prints the report as it was asked for.

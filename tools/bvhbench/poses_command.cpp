@@ -74,7 +74,7 @@ Poses make(const PosesArguments& arguments, const Bodies& bodies) {
   return poses;
 }
 
-// Whether the scene is one that write() below makes.
+// Returns whether the scene is one that write() below makes.
 bool is_of_poses(const SceneDescription& scene) {
   const std::size_t count = scene.instances.size(), assets = scene.assets.size();
   if (!scene.poses || !scene.pairs || !scene.level.empty() || count < 2 || assets < 1 || assets > 2)

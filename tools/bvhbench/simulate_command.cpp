@@ -191,7 +191,7 @@ Report report_of(const char* kind, const SimulateArguments& arguments, const Run
   return report;
 }
 
-// Whether the run is there already: with --resume there is nothing left to do.
+// Returns whether the run is there already: with --resume there is nothing left to do.
 bool is_done(const SimulateArguments& arguments, const RunDescription& run) {
   if (!arguments.run.resume || !fs::exists(arguments.run.output)) return false;
   return read_run(arguments.run.output, run).records.size() == arguments.run.steps;

@@ -63,7 +63,7 @@ std::string instead_of_faces(const Outcome& outcome, const LeftOut& left_out) {
   return "it has no faces and no vertices";
 }
 
-/// Why a mesh has no triangle: its faces and what became of them, or what it has instead of faces.
+/// Returns why a mesh has no triangle: its faces and what became of them, or what it has instead of faces.
 std::string why_no_triangle(const Outcome& outcome, const LeftOut& left_out) {
   std::vector<std::string> causes;
   if (outcome.clean.faces == 0) causes.push_back(instead_of_faces(outcome, left_out));

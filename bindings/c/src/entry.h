@@ -98,7 +98,7 @@ tandem_status guarded(Of* handle, const Body& body) noexcept {
   }
 }
 
-/// Whether a list is where it must be.
+/// Returns whether a list is where it must be.
 inline bool is_there(const void* list, size_t count) {
   return list != nullptr || count == 0;
 }

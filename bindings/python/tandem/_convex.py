@@ -83,7 +83,7 @@ class Solid:
         return inside
 
     def nearest(self, points: Array) -> int:
-        """Which of the points (n, 3) is the deepest inside, or the least far outside of a face's plane."""
+        """Returns which of the points (n, 3) is the deepest inside, or the least far outside of a face's plane."""
         return int(self._heights(points).argmin())
 
 

@@ -121,7 +121,7 @@ class CollisionManager:
         (self._ignored.add if ignored else self._ignored.discard)(_pair(name_a, name_b))
 
     def is_pair_ignored(self, name_a: Hashable, name_b: Hashable) -> bool:
-        """Whether a pair is ignored, its names in either order."""
+        """Returns whether a pair is ignored, its names in either order."""
         return _pair(name_a, name_b) in self._ignored
 
     def clear_ignored_pairs(self) -> None:

@@ -49,7 +49,7 @@ class LevelMeasurer {
   /// Of each instance.
   const std::vector<std::uint32_t>& asset_of() const { return asset_of_; }
 
-  /// How many levels each asset has; 1 of an asset that the scene has no instance of.
+  /// Returns how many levels each asset has; 1 of an asset that the scene has no instance of.
   std::vector<std::uint32_t> level_counts() const;
 
   /// Measured once, then remembered; the finest levels first. Throws bench::FileError, EngineError, GpuError.
@@ -58,8 +58,8 @@ class LevelMeasurer {
   /// Of the GPU, once something was measured on one.
   const std::string& gpu() const { return gpu_; }
 
-  /// How far from each other the finest levels leave bodies that start kNudge diagonals apart: what a chaotic
-  /// scene makes of next to nothing.
+  /// Returns how far from each other the finest levels leave bodies that start kNudge diagonals apart: what a
+  /// chaotic scene makes of next to nothing.
   const Spread& end_distance_of_a_nudge();
   static constexpr double kNudge = 1e-6;
 

@@ -28,7 +28,7 @@ struct Rest {
 /// Simulates a scene at its shapes' levels. Throws bench::FileError, and what the engine throws.
 Rest simulate(const std::string& path, const bench::LoadedScene& scene, const SimulationSettings& settings);
 
-/// How far from each other two runs leave each moving body. Condition: they are of the same scene.
+/// Returns how far from each other two runs leave each moving body. Condition: they are of the same scene.
 Spread end_distance(const Rest& a, const Rest& b);
 
 }  // namespace tandem::economy

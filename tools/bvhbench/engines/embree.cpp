@@ -41,8 +41,8 @@ struct Float64Signs {
   }
 };
 
-/// Whether two posed triangles meet by plain float64: Guigue and Devillers' test with all its ties, signs
-/// taken as they come out. What a careful user of a library that finds candidates only would write.
+/// Returns whether two posed triangles meet by plain float64: Guigue and Devillers' test with all its ties,
+/// signs taken as they come out. What a careful user of a library that finds candidates only would write.
 bool meet_in_float64(const PosedTriangle& a, const PosedTriangle& b) {
   return detail::CompleteTest<Float64Signs>::meet(a.corner, b.corner);
 }

@@ -158,10 +158,10 @@ class Engine {
   /// The data structure, the precision and whatever else the figures depend on, in a line.
   virtual std::string settings() const { return {}; }
 
-  /// Whether the answer is exact, found without Tandem's own code.
+  /// Returns whether the answer is exact, found without Tandem's own code.
   virtual bool is_reference() const { return false; }
 
-  /// Whether the engine is so slow that it is asked once and not raced.
+  /// Returns whether the engine is so slow that it is asked once and not raced.
   virtual bool runs_once() const { return is_reference(); }
 
   /// Sets how many threads questions may use, where the engine can use more than one; at first 1. No answer
@@ -218,8 +218,8 @@ class Engine {
     cannot("find distances");
   }
 
-  /// How many pairs of the last find_distances() have an exact distance that is not in [lower, upper], as
-  /// exact arithmetic decides. Condition: is_reference().
+  /// Returns how many pairs of the last find_distances() have an exact distance that is not in [lower,
+  /// upper], as exact arithmetic decides. Condition: is_reference().
   virtual std::uint64_t outside(std::span<const double> /*lower*/, std::span<const double> /*upper*/) const {
     cannot("judge distances");
   }

@@ -6,9 +6,9 @@
 #include "engine.h"
 #include "tandem/formats/gpu_memory.h"
 #include "tandem/formats/gpu_stream.h"
+#include "tandem/kernels/gpu_arrays.h"
 #include "tandem/kernels/gpu_broad_phase.h"
 #include "tandem/kernels/gpu_excluded_pairs.h"
-#include "tandem/kernels/gpu_arrays.h"
 #include "tandem/runtime/upload.h"
 
 namespace tandem {
@@ -79,13 +79,13 @@ class GpuEngine : public Engine {
   /// The pairs that were found, and how many there are.
   GpuPairs pairs_found() const { return broad_phase_.pairs(); }
   std::uint32_t count_found() const { return broad_phase_.report().count; }
-  /// Whether these are all that find_pairs() found, which lie on the GPU already.
+  /// Returns whether these are all that find_pairs() found, which lie on the GPU already.
   bool are_on_gpu(std::span<const ObjectPair> pairs) const;
 
   /// Queues the copy of pairs.
   GpuPairs upload(std::span<const ObjectPair> pairs);
 
-  /// Whether the broad phase finds the pairs that the question is about.
+  /// Returns whether the broad phase finds the pairs that the question is about.
   bool has_broad_phase(const TimedQuery& asked) const {
     return asked.given == nullptr && !needs_.finds_pairs;
   }

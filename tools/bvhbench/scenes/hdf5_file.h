@@ -34,7 +34,7 @@ class Hdf5Input {
   Hdf5Input(const Hdf5Input&) = delete;
   Hdf5Input& operator=(const Hdf5Input&) = delete;
 
-  /// Whether there is anything of this name. `name`: from the root, "/instances/asset".
+  /// Returns whether there is anything of this name. `name`: from the root, "/instances/asset".
   bool has(const std::string& name) const;
 
   /// A dataset of integers of any type whose values fit, n rows of shape `row`, in row-major order.

@@ -146,8 +146,8 @@ class Ground {
   double pitch_[2];
 };
 
-// How far the ground lies below a body, turned and with its centre at height 0, vertically: the height that
-// its centre must not sink below is minus that. radius: no vertex is further from the centre.
+// Returns how far the ground lies below a body, turned and with its centre at height 0, vertically: the
+// height that its centre must not sink below is minus that. radius: no vertex is further from the centre.
 double clearance(const std::vector<Vector>& vertices, const Rotation& rotation, const Ground& ground,
                  const Vector& at, double radius) {
   const double bound = ground.bound(at[0], at[1], radius);
@@ -201,7 +201,7 @@ double distance(const std::array<double, 2>& point, const Footprint& to) {
   return std::sqrt(x * x + y * y);
 }
 
-// Whether the segments cross, within both.
+// Returns whether the segments cross, within both.
 bool cross(const Footprint& a, const Footprint& b) {
   const auto side = [](const Footprint& of, const std::array<double, 2>& point) {
     const auto& [p, q] = of.ends;

@@ -54,7 +54,7 @@ ContactPoint moved_with_bodies(const CachedContact& entry, std::span<const BodyS
   return moved;
 }
 
-// Whether it is a gap that may close again.
+// Returns whether it is a gap that may close again.
 bool is_just_lost(const CachedContact& entry, const ContactPoint& moved, std::span<const BodyState> states,
                   double gap, double near) {
   constexpr std::uint32_t kLife = 8;  // steps; boxes side by side would keep all that ever touched

@@ -59,7 +59,7 @@ class ContactCache {
   /// Of the step that update() was last called for, by ascending pair.
   std::span<const ContactPoint> contacts() const { return contacts_; }
 
-  /// Whether no contact had been remembered before.
+  /// Returns whether no contact had been remembered before.
   bool is_cold() const { return is_cold_; }
 
   /// What the contacts start with.

@@ -81,8 +81,8 @@ bool ContinuousMotion::find_fast(std::span<const BodyProperties> bodies, std::sp
   return any;
 }
 
-// Which part of their ways two bodies go until they are a slop deep in each other, or a little beyond where
-// they barely touch. reach: how much farther they may go, a length.
+// Returns which part of their ways two bodies go until they are a slop deep in each other, or a little beyond
+// where they barely touch. reach: how much farther they may go, a length.
 double ContinuousMotion::stop_of(const Impact& impact, const ObjectPair& pair, double reach,
                                  double slop) const {
   const Vector3d at_a(impact.point_a), at_b(impact.point_b);
@@ -120,7 +120,7 @@ double ContinuousMotion::depth_at(std::span<const BodyProperties> bodies, std::s
   return depth;
 }
 
-// Which part of their ways two bodies go that touch already.
+// Returns which part of their ways two bodies go that touch already.
 double ContinuousMotion::stop_of_touching(std::span<const BodyProperties> bodies,
                                           std::span<const BodyState> before, const ObjectPair& pair,
                                           double reach, double slop) {

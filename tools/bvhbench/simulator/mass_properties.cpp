@@ -82,7 +82,7 @@ void count_turned(Surface& surface) {
   }
 }
 
-// How often each edge is run along upwards less downwards, as triangles are marked or as they are.
+// Returns how often each edge is run along upwards less downwards, as triangles are marked or as they are.
 std::vector<int> balance(const Surface& surface, bool as_marked) {
   std::vector<int> sum(surface.edge.size(), 0);
   for (std::uint32_t t = 0; t < surface.level.triangle_count; ++t) {

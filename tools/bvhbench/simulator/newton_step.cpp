@@ -217,7 +217,7 @@ class ConvexContacts {
   }
 
  private:
-  // Which gradient is zero but for rounding: that of the impulses is about 1e-16 |w| / R.
+  // Returns which gradient is zero but for rounding: that of the impulses is about 1e-16 |w| / R.
   double flat_below(const ConvexGoal& goal, const std::vector<Vector6>& y) const {
     constexpr double kFlat = 3e-9;
     double squares = 0;

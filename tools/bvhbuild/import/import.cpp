@@ -43,7 +43,7 @@ ReadBytes own_reader(const std::string& extension, std::string_view head) {
   return reader_by_content(head);
 }
 
-/// Why a file that is something else than a mesh is refused; empty when it may be one.
+/// Returns why a file that is something else than a mesh is refused; empty when it may be one.
 std::string refusal(const std::string& extension, std::string_view head) {
   if (head.starts_with("\x89"
                        "BVH"))

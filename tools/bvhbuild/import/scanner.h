@@ -125,7 +125,7 @@ class TextScanner {
 /// `text` without blanks at its ends.
 std::string_view trimmed(std::string_view text);
 
-/// Whether `word` is `lower_case` in any mixture of upper and lower case.
+/// Returns whether `word` is `lower_case` in any mixture of upper and lower case.
 bool equals_ignoring_case(std::string_view word, std::string_view lower_case);
 
 }  // namespace tandem::build

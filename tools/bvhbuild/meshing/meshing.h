@@ -49,9 +49,9 @@ struct TriangleMesh {
   std::vector<std::uint32_t> face;  ///< of each triangle: the face of the file that it is a piece of
 };
 
-/// Whether a face can be split into triangles: its indices are in range, it has three corners or more, and
-/// their coordinates are finite and at most kMaxCoordinate in magnitude. Else it is counted, under the first
-/// of these that fails.
+/// Returns whether a face can be split into triangles: its indices are in range, it has three corners or
+/// more, and their coordinates are finite and at most kMaxCoordinate in magnitude. Else it is counted, under
+/// the first of these that fails.
 bool is_usable(std::span<const Point> points, std::span<const std::uint32_t> corners, CleanReport& report);
 
 /// Of so many points: those that none of the corners names.

@@ -89,9 +89,9 @@ class TriangleSplitter {
   std::vector<std::uint8_t> goes_left_;  // by triangle
 };
 
-/// Whether a group of n triangles at this depth must be split evenly from here on, so that the tree ends
-/// above kMaxDepth. Even splits at least halve a group, give or take the few positions to the nearest legal
-/// one, at each level.
+/// Returns whether a group of n triangles at this depth must be split evenly from here on, so that the tree
+/// ends above kMaxDepth. Even splits at least halve a group, give or take the few positions to the nearest
+/// legal one, at each level.
 constexpr bool must_split_evenly(std::uint32_t depth, std::uint32_t n) {
   constexpr std::uint32_t kReserve = 4;
   return depth + static_cast<std::uint32_t>(std::bit_width(n)) + kReserve >= kMaxDepth;

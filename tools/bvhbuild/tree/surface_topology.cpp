@@ -70,7 +70,7 @@ Sign triple_product(const Vector& a, const Vector& b, const Vector& c) {
   return {value, std::abs(value) > 16 * 0x1p-53 * magnitude};
 }
 
-// Whether a ray from the point meets a box, or might but for roundings.
+// Returns whether a ray from the point meets a box, or might but for roundings.
 bool may_meet(const Block& block, int node, const Vector& from, const Vector& direction) {
   double first = 0, last = HUGE_VAL;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -328,8 +328,8 @@ class Members {
   std::vector<std::uint32_t> first_, triangles_;
 };
 
-// Whether a component lies within others. A corner of each of its triangles is tried until one is far enough
-// from all of them.
+// Returns whether a component lies within others. A corner of each of its triangles is tried until one is far
+// enough from all of them.
 bool is_cavity(const Corners& corners, const Enclosure& others, std::uint32_t own,
                std::span<const std::uint32_t> members) {
   constexpr std::size_t kTries = 16;

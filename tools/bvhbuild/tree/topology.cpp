@@ -287,8 +287,8 @@ Replacement replacement_of(const WorkingTree& tree, const Region& region, std::s
   return replacement;
 }
 
-// How many blocks a tree over n triangles has at most if no more than `share` of its nodes are imaginary: of
-// B blocks' 4 B nodes, n + B - 1 are not.
+// Returns how many blocks a tree over n triangles has at most if no more than `share` of its nodes are
+// imaginary: of B blocks' 4 B nodes, n + B - 1 are not.
 std::int64_t blocks_within(std::size_t triangles, double share) {
   const auto n = static_cast<double>(triangles);
   return static_cast<std::int64_t>(3 - 4 * share > 0.1 ? (n - 1) / (3 - 4 * share) : 10 * n);

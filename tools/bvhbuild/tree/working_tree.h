@@ -52,8 +52,8 @@ class WorkingTree {
     return child.is_triangle ? triangle_parent_[child.index] : blocks_[child.index].parent;
   }
 
-  /// How much more the blocks from `block` up to, but without, `top` would cost if its child `out` were
-  /// replaced by something of bounds `in`. `out` may be kNoIndex, and `in` empty.
+  /// Returns how much more the blocks from `block` up to, but without, `top` would cost if its child `out`
+  /// were replaced by something of bounds `in`. `out` may be kNoIndex, and `in` empty.
   double cost_change(std::uint32_t block, std::uint32_t out, const Bounds& in, std::uint32_t top) const;
 
   /// Makes the change; boxes and heights follow, up to the block `top`, below which both parents lie.

@@ -64,7 +64,7 @@ dlpack::DataType type_named(const std::string& name) {
   return {code, static_cast<std::uint8_t>(bits), 1};
 }
 
-// Whether it is a tensor of PyTorch.
+// Returns whether it is a tensor of PyTorch.
 bool is_torch(nb::handle object) {
   const nb::object module = object.type().attr("__module__");
   return PyUnicode_CompareWithASCIIString(module.ptr(), "torch") == 0;

@@ -29,13 +29,14 @@ Box enclose(const Position& lo, const Position& hi);
 /// come from enclose() (see kMaxCoordinate).
 Box enclose(const Block& block);
 
-/// Whether [c - h, c + h] on every axis contains the point, in real arithmetic: no rounding decides it.
+/// Returns whether [c - h, c + h] on every axis contains the point, in real arithmetic: no rounding decides
+/// it.
 bool contains(const Box& box, const Position& point);
 
-/// Whether `outer` contains `inner`, in real arithmetic: |c_i - c_o| + h_i <= h_o on every axis.
+/// Returns whether `outer` contains `inner`, in real arithmetic: |c_i - c_o| + h_i <= h_o on every axis.
 bool contains(const Box& outer, const Box& inner);
 
-/// Whether it is the box of an imaginary node, bit by bit.
+/// Returns whether it is the box of an imaginary node, bit by bit.
 bool is_imaginary_box(const Box& box);
 
 TANDEM_HD inline Box box_of(const Block& block, int node) {

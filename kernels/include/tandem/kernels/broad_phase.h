@@ -59,7 +59,7 @@ class BroadPhase {
   /// The pairs of the last call that returned kOk; valid until the next call.
   std::span<const ObjectPair> pairs() const { return pairs_.view(); }
 
-  /// How many pairs of groups the last call looked at: its work, independent of the machine.
+  /// Returns how many pairs of groups the last call looked at: its work, independent of the machine.
   std::uint64_t group_pairs() const { return group_pairs_; }
 
  private:

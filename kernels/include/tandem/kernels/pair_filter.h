@@ -14,15 +14,15 @@ enum class Motion : std::uint8_t {
   sleeping,   ///< nothing until the caller wakes it: the caller's flag
 };
 
-/// Whether a pair is looked at: where one of them moves, or a kinematic one meets a sleeping one, which its
-/// caller may want to wake. Nothing comes of the others: none of the two gives way.
+/// Returns whether a pair is looked at: where one of them moves, or a kinematic one meets a sleeping one,
+/// which its caller may want to wake. Nothing comes of the others: none of the two gives way.
 TANDEM_HD inline bool motions_meet(Motion a, Motion b) {
   // Bit b of row a, in four bits each: sleeping, kinematic, fixed, moving.
   constexpr std::uint32_t kRows = 0b0101'1001'0001'1111;
   return (kRows >> (4 * (static_cast<std::uint32_t>(a) & 3) + (static_cast<std::uint32_t>(b) & 3)) & 1) != 0;
 }
 
-/// Whether each of the two is in a group that the other's mask names.
+/// Returns whether each of the two is in a group that the other's mask names.
 TANDEM_HD inline bool groups_meet(std::uint32_t group_a, std::uint32_t mask_a, std::uint32_t group_b,
                                   std::uint32_t mask_b) {
   return (group_a & mask_b) != 0 && (group_b & mask_a) != 0;

@@ -58,7 +58,7 @@ TANDEM_HD inline Pose for_stored_coordinates(const Pose& pose, const double* ori
   return stored;
 }
 
-/// Whether all entries are finite and the rotation is one, to kRigidTolerance. NaN is not rigid.
+/// Returns whether all entries are finite and the rotation is one, to kRigidTolerance. NaN is not rigid.
 TANDEM_HD inline bool is_rigid(const Pose& pose) {
   const auto& r = pose.rotation;
   bool rigid = true;

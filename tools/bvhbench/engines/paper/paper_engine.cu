@@ -45,7 +45,7 @@ struct PaperEngine::State {
   PaperReport report;
   cudaError_t error = cudaSuccess;
 
-  /// Whether all went well so far; keeps the first error.
+  /// Returns whether all went well so far; keeps the first error.
   bool ok(cudaError_t result) {
     if (error == cudaSuccess && result != cudaSuccess) {
       error = result;

@@ -36,7 +36,7 @@ struct Flags {
     }
   }
 
-  /// Whether it is set; if so, its number among those that are.
+  /// Returns whether it is set; if so, its number among those that are.
   __device__ static bool read(const std::uint32_t* flags, const std::uint32_t* sums, std::uint64_t thread,
                               std::uint32_t& number) {
     if constexpr (kKind == PaperFlags::bits) {

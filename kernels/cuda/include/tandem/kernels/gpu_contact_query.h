@@ -34,7 +34,7 @@ struct GpuContactOptions {
   /// Levels of detail: as ContactOptions::add_error_bounds says. Object pairs are found as without.
   bool add_error_bounds = false;
 
-  /// Whether distances are asked for at all, which takes other kernels, and more memory.
+  /// Returns whether distances are asked for at all, which takes other kernels, and more memory.
   constexpr bool of_clearance() const { return within > 0 || add_error_bounds; }
 };
 

@@ -28,8 +28,8 @@ TANDEM_HD inline bool is_narrow(const DistanceInterval& interval, const Distance
   return interval.upper - interval.lower <= allowed_width(tolerance, interval.upper);
 }
 
-/// How near a pair must be to count beside an upper bound: nearer than this. What may touch counts, whatever
-/// the tolerance.
+/// Returns how near a pair must be to count beside an upper bound: nearer than this. What may touch counts,
+/// whatever the tolerance.
 TANDEM_HD inline double nearness_below(const DistanceTolerance& tolerance, double upper) {
   constexpr double kLeast = 0x1p-1074;
   const double near = upper - allowed_width(tolerance, upper);

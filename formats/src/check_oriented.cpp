@@ -18,7 +18,7 @@ bool is_legal(const BlockRotation& rotation) {
   return !all_zero;
 }
 
-// The same number of two triangles.
+// The same quantity of two triangles, side by side.
 typedef double Two __attribute__((vector_size(16)));
 
 // Walks the blocks as they lie, which is depth first, with the number of each one's oriented block.
@@ -119,7 +119,7 @@ class OrientedWalk {
              std::uint32_t end) const {
     if (depth_ == CheckDepth::quick) return true;
     const OrientedBlock& oriented = level_.oriented_blocks[number];
-    // In the mesh's own axes boxes within boxes do, as check_tree() showed.
+    // In the mesh's own axes it suffices that boxes lie within boxes, as check_tree() showed.
     if (oriented.rotation == kNoRotation && contains(box_of(oriented, node), box_of(block, node)))
       return true;
     const ScaledRotation rotation = scaled_rotation(oriented.rotation);

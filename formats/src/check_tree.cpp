@@ -125,7 +125,8 @@ class TreeWalk {
     return true;
   }
 
-  // Why block b, or the end of the blocks, is not the child that is awaited. Called once, when it is not.
+  // Returns why block b, or the end of the blocks, is not the child that is awaited. It is called once, when
+  // it is not.
   Status name_misplaced(std::uint32_t b) {
     if (ancestor_count_ == 0) return Status::kBlockUnreachable;
     const std::uint32_t child = awaited_child();

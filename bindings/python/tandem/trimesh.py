@@ -32,7 +32,7 @@ EXTERNAL = "__external"  # the name of the object that the methods *_single() ar
 
 
 class CollisionObject:
-    """What add_object() returns: an object of a manager. It stands where its manager's set_transform() puts it."""
+    """An object of a manager, which add_object() returns. It stands where its manager's set_transform() puts it."""
 
     __slots__ = ("_place", "_shape")
 

@@ -93,7 +93,7 @@ Read<GpuImpactOptions> read_options(const tandem_gpu_impact_options* given) {
   return {status, options};
 }
 
-// What every call is given.
+// The arguments of every call.
 struct Asked {
   const tandem_gpu_instances* instances;
   const tandem_gpu_pairs* pairs;

@@ -12,7 +12,7 @@ struct Box {
   float half_extent[3];
 };
 
-/// One corner point of a triangle, or any other stored position.
+/// A corner point of a triangle, or any other stored position.
 using Position = float[3];
 
 /// The largest magnitude of a stored coordinate. It is 2^-12 below the largest float, so that no box
@@ -44,7 +44,7 @@ TANDEM_HD inline Box box_of(const Block& block, int node) {
           {block.half_extent[0][node], block.half_extent[1][node], block.half_extent[2][node]}};
 }
 
-/// How far all boxes of a tree reach. Every box lies in a box of the root block, so the root block tells.
+/// The extent of all boxes of a tree. Every box lies in a box of the root block, so the root block gives it.
 struct TreeExtent {
   double reach[3];        ///< >= |center| + half_extent
   double half_extent[3];  ///< >= half_extent

@@ -3,9 +3,9 @@
 
 namespace tandem {
 
-/// What can be wrong with a .bvh file, with loading it, or with a query: one name per defect.
-/// The checker tests for the defects in this order; the first that it finds is returned. Numbers are those of
-/// tandem.h, which never change; those that a GPU finds are below 256.
+/// Says what is wrong with a .bvh file, with loading it, or with a query: one name per defect. The checker
+/// tests for the defects in this order; the first that it finds is returned. Numbers are those of tandem.h,
+/// which never change; those that a GPU finds are below 256.
 enum class [[nodiscard]] Status : std::uint32_t{
     kOk = 0,
     // Getting at the bytes.
@@ -89,11 +89,11 @@ enum class [[nodiscard]] Status : std::uint32_t{
 /// The name of a defect as written above without the k, for logs and JSON: "ChildShared".
 const char* name(Status status);
 
-/// One sentence for people, without a full stop: "a block has two parents".
+/// Returns one sentence for people, without a full stop: "a block has two parents".
 const char* explain(Status status);
 
-/// What the number that comes with a defect counts: "section", "level", "part", "block", "byte"; null where
-/// there is no number.
+/// Returns what the number counts that comes with a defect: "section", "level", "part", "block", "byte"; null
+/// where there is no number.
 const char* subject(Status status);
 
 }  // namespace tandem

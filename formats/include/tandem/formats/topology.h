@@ -4,7 +4,7 @@
 
 #include "tandem/formats/platform.h"
 
-/// How the triangles of a level hang together: what contact manifolds need of a mesh beside its triangles.
+/// The topology of a level says which triangles share edges. Contact manifolds need it beside the triangles.
 ///
 /// A triangle has three sides; side k runs from corner k to corner k + 1 (side 2 to corner 0). Sides between
 /// the same two vertices, in either direction, are the sides of one **edge**. A side between corners of the
@@ -60,8 +60,8 @@ struct alignas(16) SurfaceComponent {
 };
 static_assert(sizeof(SurfaceComponent) == 16 && offsetof(SurfaceComponent, flags) == 8);
 
-/// Each edge of the component is run along equally often in both directions once the turned triangles are
-/// turned.
+/// This flag is set where each edge of the component is run along equally often in both directions once the
+/// turned triangles are turned.
 inline constexpr std::uint32_t kClosedComponent = 1;
 
 TANDEM_HD constexpr bool is_closed(const SurfaceComponent& component) {

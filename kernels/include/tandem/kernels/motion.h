@@ -6,8 +6,8 @@
 
 namespace tandem {
 
-/// How an instance moves during a step, in the world: its centre goes straight ahead, and the instance turns
-/// about it, both at constant speed.
+/// The motion of an instance during a step, in the world: its centre goes straight ahead, and the instance
+/// turns about it, both at constant speed.
 ///
 /// **Definition.** Let x be a posed vertex at the start of the step, a float64 point as apply() makes it. At
 /// time t its place is, in real arithmetic on the numbers below,

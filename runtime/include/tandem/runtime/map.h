@@ -6,7 +6,7 @@
 
 namespace tandem {
 
-/// How a file gets into memory.
+/// Says how a file gets into memory.
 enum class Access : std::uint8_t {
   map,   ///< mmap, read-only: pages are shared with every process that maps the file; falls back to read
   read,  ///< one read into memory of its own: for file systems and platforms that cannot map

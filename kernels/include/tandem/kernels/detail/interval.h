@@ -3,8 +3,8 @@
 
 namespace tandem {
 
-/// How wide the interval of a distance may be: upper - lower <= max(absolute, relative * upper). Neither is
-/// negative. A relative one below kFinestRelative counts as that, unless an absolute one is met.
+/// Says how wide the interval of a distance may be: upper - lower <= max(absolute, relative * upper). Neither
+/// is negative. A relative one below kFinestRelative counts as that, unless an absolute one is met.
 struct DistanceTolerance {
   double absolute = 0;  ///< in units of length
   double relative = 1e-6;

@@ -77,7 +77,8 @@ __device__ inline void share_out(std::uint32_t count, std::uint32_t most_turns, 
     visit(static_cast<std::uint32_t>(begin) + lane_id() / kLanes, turns);
 }
 
-/// What the lanes of a warp are about to append, up to kMost entries each: one atomic operation for all.
+/// Collects what the lanes of a warp are about to append, up to kMost entries each, so that one atomic
+/// operation is enough for all.
 template <typename Entry, int kMost>
 class AppendBatch {
  public:

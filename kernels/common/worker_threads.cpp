@@ -20,7 +20,7 @@ std::uint64_t at_work(std::uint64_t state) {
   return state & kLow;
 }
 
-// How often a thread looks before it sleeps, about a tenth of a millisecond: longer than what lies between
+// A thread looks this often before it sleeps, about a tenth of a millisecond: longer than what lies between
 // two phases of a query, and about what waking a thread takes.
 constexpr int kLooks = 512;
 

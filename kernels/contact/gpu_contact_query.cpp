@@ -170,7 +170,7 @@ struct HostOf<GpuContactReport> : GpuHost<QueryState, GpuContactReport> {
     if (result == cudaSuccess) result = cudaStreamIsCapturing(stream, &capture);
     const auto walk = args.mode == QueryMode::exact ? walk_exact : walk_unfused;
     if (result == cudaSuccess) result = queue(args, stream, prepare_pairs, walk, decide_rest);
-    // What is captured has not run: the state is as before.
+    // A captured call has not run: the state is as before.
     if (capture == cudaStreamCaptureStatusNone) state_is_clear = result == cudaSuccess;
     return result;
   }

@@ -10,7 +10,7 @@
 #include "kernels/geometry/clearance.h"
 #include "kernels/geometry/level_error.h"
 
-// What the kernels of a query share, all of it in GPU memory.
+// The kernels of a query share this data, all of it in GPU memory.
 namespace tandem::gpu {
 
 /// The bits that the walk's stack has for the number of a block; all of them set is no block's.
@@ -27,7 +27,7 @@ struct alignas(16) Chunk {
   Counter entry[32][2];
 };
 
-/// How warps share work, see work_sharing.h, and the first object pair that no warp took.
+/// The state of work sharing, see work_sharing.h, and the first object pair that no warp took.
 struct alignas(128) Balance {
   Counter counts;
   Counter beside_counts;  ///< never written: warps look at 16 bytes at once
@@ -58,14 +58,14 @@ TANDEM_HD constexpr std::uint32_t tiles_of(std::uint32_t pairs) {
   return pairs / kPairsPerTile + 1;
 }
 
-/// Where there are few pairs, the counts of their contacts lie apart, a cache line each: atomic operations on
+/// If there are few pairs, the counts of their contacts lie apart, a cache line each: atomic operations on
 /// one line wait for each other.
 inline constexpr std::uint32_t kMostSpreadPairs = 4096, kSpread = 32;
 TANDEM_HD constexpr std::uint32_t spread_of(std::uint32_t pairs) {
   return pairs <= kMostSpreadPairs ? kSpread : 1;
 }
 
-/// What grouping contacts by pair takes; null where it is not asked for.
+/// The arrays that grouping contacts by pair takes; null where it is not asked for.
 struct Grouping {
   std::uint32_t* next;  ///< of each pair, spread_of() apart: its number of contacts, then the next place
   std::uint32_t* first_contact;
@@ -110,7 +110,7 @@ struct QueryArgs {
   WideRoom* wide_rooms;
 };
 
-/// What sorting takes besides args.contacts, which it reads: all of as many contacts.
+/// The room that sorting takes besides args.contacts, which it reads: each array is of as many contacts.
 struct SortingRoom {
   Contact* out;          ///< kContactsForKeys more
   std::uint32_t* order;  ///< twice as many

@@ -23,8 +23,8 @@ constexpr std::uint32_t kRoundsBetweenCounts = 1u << 26;  // a lane counts at mo
 static_assert(kBlockWords == kPositionWords &&
               kWarpWords == ContactOutput::kSharedWords + SharingWarp::kSharedWords);
 
-/// Where a warp has its shared memory, and the lane. Read back from memory, so that the compiler keeps them
-/// in registers and does not compute them anew.
+/// The place of a warp's shared memory, and the lane. It is read back from memory, so that the compiler keeps
+/// them in registers and does not compute them anew.
 struct WarpPlace {
   std::uint32_t memory, lane;
 };
@@ -145,12 +145,12 @@ class Walk {
     if (++rounds_ >= kRoundsBetweenCounts) add_counters(), rounds_ = 0;
   }
 
-  /// By one lane: false where the first contact is enough, and the pair has one.
+  /// Returns false where the first contact is enough and the pair has one. One lane calls it.
   __device__ bool is_open(std::uint32_t pair) const {
     return !args_.first_contact_only || *static_cast<volatile std::uint32_t*>(&args_.met[pair]) == 0;
   }
 
-  /// What is left to do of a block pair.
+  /// The part of a block pair that is left to do.
   struct Tested {
     uint4 entry;
     bool of_leaves;
@@ -322,7 +322,8 @@ __global__ void __launch_bounds__(32 * kMostWarpsPerBlock, 1) walk(const __grid_
 
 /// Launches a kernel of thread blocks in the shape of a walk.
 inline cudaError_t launch_shaped(void (*kernel)(QueryArgs), const QueryArgs& args, cudaStream_t stream) {
-  // The same for every walk: CUDA keeps it with the kernel, and another thread's walk may need more.
+  // This value is the same for every walk: CUDA keeps it with the kernel, and another thread's walk may need
+  // more.
   const cudaError_t error = cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
                                                  static_cast<int>(most_shared_bytes(args.limits)));
   if (error != cudaSuccess) return error;

@@ -8,7 +8,8 @@
 #include "tandem/formats/block.h"
 #include "tandem/formats/platform.h"
 
-// How a walk is launched on a GPU: how many warps, and the room of a warp's stack.
+// The shape of a walk says how it is launched on a GPU: how many warps there are, and the room of a warp's
+// stack.
 namespace tandem::gpu {
 
 // Shared memory in words of 32 bits: of a thread block beside its warps, of a warp beside its stack, and of
@@ -92,13 +93,13 @@ constexpr WalkShape walk_shape(const DeviceLimits& limits, std::uint32_t depth, 
   return shape;
 }
 
-/// As many mailboxes as any walk on this GPU has: none has more warps than with one block for each
+/// Returns the most mailboxes that any walk on this GPU has: none has more warps than with one block for each
 /// multiprocessor and no shortage of shared memory.
 constexpr std::uint32_t most_mailboxes(const DeviceLimits& limits) {
   return std::min(kMostMailboxes, 1u << mailbox_bits_of(kMostWarpsPerBlock * limits.processors));
 }
 
-/// At least the shared memory of any walk on this GPU.
+/// Returns at least the shared memory of any walk on this GPU.
 constexpr std::uint32_t most_shared_bytes(const DeviceLimits& limits) {
   const WalkShape largest = {kMostWarpsPerBlock, 0, stack_reserve(kMaxDepth) + kEntries, 0, 0, true};
   return std::min(limits.shared_bytes, largest.shared_bytes());

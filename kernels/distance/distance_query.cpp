@@ -15,8 +15,8 @@ constexpr std::size_t kMostPairsAtOnce = 16;
 // Pairs of bodies with more triangles than this, together, are spread over all threads, one after the other.
 constexpr std::uint64_t kSpreadFrom = std::uint64_t{1} << 18;
 
-// Of such a pair: how many pairs of blocks one walk visits before it leaves the rest to others; and how many
-// walks make a round, in which none knows what the others find. Threads take them as they come.
+// A walk of such a pair visits so many pairs of blocks before it leaves the rest to others; and so many walks
+// make a round, in which none knows what the others find. Threads take them as they come.
 constexpr std::uint64_t kVisitsAlone = 2048, kVisitsInRound = 512;
 constexpr std::size_t kWalksInRound = 64;
 
@@ -38,7 +38,7 @@ struct DistanceQuery::State : Allocated {
   PerWorker<NearestSoFar> slots;  // one for each worker, or for each walk of a round
   Buffer<BoundedBlockPair> walks;
 
-  // Of the call.
+  // These belong to the call.
   SceneState* scene = nullptr;
   DistanceOptions options;
   std::span<const ObjectPair> pairs;

@@ -1,7 +1,7 @@
 #include "kernels/distance/distance_data.h"
 
-// What the walk leaves, by float64 on the posed vertices, and exactly where that is not enough; and the
-// report. Compiled without fused operations: posed points are those of the CPU.
+// These kernels decide what the walk leaves, by float64 on the posed vertices, and exactly where that is not
+// enough; then they make the report. Compiled without fused operations: posed points are those of the CPU.
 namespace tandem::gpu {
 namespace {
 
@@ -136,7 +136,7 @@ __device__ void finish_row(const DistanceArgs& args, std::uint32_t pair, bool fo
   count(args.state->touching, out.upper == 0);
 }
 
-/// What other blocks made of it.
+/// Returns what other blocks made of a counter.
 __device__ Counter now(const Counter& counter) {
   return *static_cast<const volatile Counter*>(&counter);
 }
@@ -149,7 +149,7 @@ __device__ Counter shuffled(Counter x, int bit) {
   return __shfl_xor_sync(kAllLanes, x, bit);
 }
 
-/// By a warp.
+/// Writes the report; a warp calls it.
 __device__ void write_report(const DistanceArgs& args) {
   const DistanceState& state = *args.state;
   GpuDistanceReport report = {};

@@ -74,7 +74,7 @@ TANDEM_HD inline Value distance_on_edge(const RelativePose& pose, int i, int j, 
 
 namespace detail {
 
-/// What all axes share: distance of the centres in a's frame, half-extents with their slack.
+/// The numbers that all axes share: distance of the centres in a's frame, half-extents with their slack.
 struct BoxDistance {
   float d[3];
   float half_extent_a[3], half_extent_b[3];

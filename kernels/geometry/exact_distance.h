@@ -223,7 +223,7 @@ class Features {
   }
 
   Vector<1> edge_a_[3], edge_b_[3], offset_[3][3];
-  // Of the feature that is visited.
+  // These are of the feature that is visited.
   Vector<2> normal_, across_;
   Number<2> length_, along_, term2_;
   Number<3> volume_, term3_;
@@ -278,7 +278,7 @@ class NearestFeatures {
   int unit_;
 };
 
-/// Whether a distance is at most d, decided without rounding.
+/// Decides without rounding whether a distance is at most d.
 template <int kWords>
 class IsWithin {
  public:

@@ -32,7 +32,7 @@ struct FrameDirection {
   float relative;  ///< these, for each unit of M in the proof
 };
 
-/// Where `along` is too short to tell its direction, nothing counts as far.
+/// If `along` is too short to tell its direction, nothing counts as far.
 TANDEM_HD inline FrameDirection frame_direction(const DistanceFrame& frame, const float (&along)[3],
                                                 double at_least) {
   double square = 0, sum = 0;
@@ -111,7 +111,7 @@ TANDEM_HD inline FrameInterval<Value> frame_interval(const Point<Value> (&corner
   return out;
 }
 
-/// What clearance asks of a pair of instances: a distance in the world, as lengths in a's frame.
+/// The clearance that is asked of a pair of instances: a distance in the world, as lengths in a's frame.
 struct FrameClearance {
   float apart_from;  ///< what is farther apart than this is farther apart than asked, in the world
   float within_to;   ///< what is no farther apart than this is within what is asked
@@ -142,7 +142,7 @@ TANDEM_HD inline auto is_beyond_along(const Point<Value>& n, const Point<Value> 
          less(needed, larger(above, below));
 }
 
-/// What is quickly told of clearance: surely farther apart than asked, by the triangles' boxes in a's frame
+/// The quick answers about clearance: surely farther apart than asked, by the triangles' boxes in a's frame
 /// or by the plane of either, or surely within it, by two of their corners or because they meet.
 template <typename Mask>
 struct Sifted {
@@ -192,8 +192,8 @@ TANDEM_HD inline auto sift(const Point<Value> (&corner_a)[3], const Point<Value>
   return out;
 }
 
-/// What frame_interval() knows of clearance, and of triangles that meet, whose features may be apart, the
-/// contact test: `contact` where the posed triangles are surely within it.
+/// Returns what frame_interval() knows of clearance; triangles that meet have features that may be apart, so
+/// the contact test decides about them: `contact` where the posed triangles are surely within it.
 template <typename Value>
 TANDEM_HD inline auto decide_within(const Point<Value> (&a)[3], const Point<Value> (&b)[3],
                                     const FrameClearance& clearance) {

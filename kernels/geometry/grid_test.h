@@ -45,7 +45,8 @@ TANDEM_HD inline double unit_of(double x) {
   return std::fabs(x - rest);
 }
 
-/// Of numbers that are not NaN. (std::fmin and std::fmax are calls where NaN matters.)
+/// Returns the smaller of two numbers that are not NaN. (std::fmin and std::fmax are calls where NaN
+/// matters.)
 TANDEM_HD inline double smaller(double x, double y) {
   return y < x ? y : x;
 }

@@ -6,8 +6,8 @@
 #include "tandem/formats/view.h"
 #include "tandem/kernels/world_box.h"
 
-/// Whether a point lies inside a closed posed surface, decided exactly: it does where a ray from it crosses
-/// the surface an odd number of times. The ray from p goes along the x axis of the world.
+/// This test decides exactly whether a point lies inside a closed posed surface: it does where a ray from it
+/// crosses the surface an odd number of times. The ray from p goes along the x axis of the world.
 ///
 /// **What crosses.** Let p' = p + (0, d, e) with infinitesimals d > 0 and e > 0, e infinitely smaller than d,
 /// and look along x. An edge is no more than a point at height z of p', or passes that height at a y that is
@@ -52,7 +52,7 @@ TANDEM_HD inline bool ray_crosses(const double (*t)[3], const double* p) {
 inline constexpr std::uint32_t kOfOpenComponent = std::uint32_t{1} << 31;
 static_assert(kMostTopologyTriangles <= kOfOpenComponent);
 
-/// What the tests need to know of a level of an asset. Pointers are of the CPU or of the GPU.
+/// The surface of a level of an asset, as the tests need it. Pointers are of the CPU or of the GPU.
 struct Surface {
   const Triangle* triangles;
   const Block* blocks;  ///< or null: then the oriented blocks are walked
@@ -100,7 +100,7 @@ TANDEM_HD inline bool is_real(const OrientedBlock& block, int node) {
   return block.half_extent[0][node] >= 0;
 }
 
-/// What lies below a node: a block, or the triangle of a leaf.
+/// Returns what lies below a node: a block, or the triangle of a leaf.
 TANDEM_HD inline std::uint32_t below(const Block& block, int node) {
   return block.index[node];
 }

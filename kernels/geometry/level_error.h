@@ -2,7 +2,7 @@
 #include "kernels/geometry/relative_pose.h"
 #include "tandem/formats/view.h"
 
-/// What queries at a level of detail know of the finest level, for CPU and GPU.
+/// Queries at a level of detail know this of the finest level, on CPU and GPU.
 namespace tandem {
 
 /// Returns how far a posed level may be from the posed finest level, in the world: no point of the one

@@ -4,9 +4,9 @@
 #include "kernels/geometry/expansion.h"
 #include "kernels/geometry/wide_integer.h"
 
-/// On which side of a plane or of a line a point lies: float32 and float64 with a proven error bound, and
-/// exact. All of them are signs of volume(p, q, r, s) = det(q - p, r - p, s - p), the scalar triple product,
-/// and of area(p, q, r) along an axis, a component of (q - p) x (r - p).
+/// These functions decide on which side of a plane or of a line a point lies: float32 and float64 with a
+/// proven error bound, and exact. All of them are signs of volume(p, q, r, s) = det(q - p, r - p, s - p), the
+/// scalar triple product, and of area(p, q, r) along an axis, a component of (q - p) x (r - p).
 namespace tandem::detail {
 
 /// Error bounds of determinants evaluated in Real, whose unit roundoff is u.

@@ -40,7 +40,8 @@ TANDEM_HD inline BlockFrame frame_of(const BlockRotation& rotation) {
   return frame;
 }
 
-/// How block b's frame lies in block a's, for tests by intervals: b's boxes in a's frame, a's boxes in b's.
+/// The pose of block b's frame in block a's, for tests by intervals: b's boxes in a's frame, a's boxes in
+/// b's.
 struct OrientedPose {
   float rotation[3][3];  ///< x_a = rotation * x_b + translation
   float translation[3];
@@ -80,8 +81,8 @@ TANDEM_HD inline float oriented_slack(const RelativePose& b_in_a, const TreeExte
   return static_cast<float>(d::kSafety * (mu * error + std::sqrt(lack_size) + rounding) + d::kLeastSlack);
 }
 
-/// How two blocks lie. rotation, translation: of the RelativePose of their trees; slack: oriented_slack().
-/// The proof allows sums in any order, and fused operations.
+/// Returns how two blocks lie to each other. rotation, translation: those of the RelativePose of their trees;
+/// slack: oriented_slack(). The proof allows sums in any order, and fused operations.
 TANDEM_HD inline OrientedPose oriented_pose(const float (&rotation)[3][3], const float (&translation)[3],
                                             float slack, const BlockFrame& a, const BlockFrame& b) {
   OrientedPose out;

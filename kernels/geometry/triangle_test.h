@@ -4,9 +4,10 @@
 
 #include "kernels/geometry/orientation.h"
 
-/// Whether two triangles meet, for CPU and GPU. Triangles are closed: touching counts. A flat triangle is the
-/// hull of its corners, a segment or a point. The corners are float64 points, and the answer is that of exact
-/// arithmetic on them, for all finite points; host code must be compiled with -ffp-contract=off.
+/// This test decides whether two triangles meet, on CPU and GPU. Triangles are closed: touching counts. A
+/// flat triangle is the hull of its corners, a segment or a point. The corners are float64 points, and the
+/// answer is that of exact arithmetic on them, for all finite points; host code must be compiled with
+/// -ffp-contract=off.
 ///
 /// A cascade: decide_float64 decides what its error bound allows, decide_exact the rest. In a query the
 /// float32 stage of frame_test.h comes before them and leaves them little.
@@ -19,7 +20,7 @@ struct TrianglePair {
 
 enum class Verdict : std::uint8_t { apart, contact, undecided };
 
-/// What the cascade found, and whether it took the last stage.
+/// The outcome of the cascade, and whether it took the last stage.
 struct Decision {
   Verdict verdict;
   bool exactly;

@@ -9,7 +9,8 @@
 #include "kernels/impact/step_parts.h"
 #include "tandem/kernels/gpu_impact_query.h"
 
-// What the kernels that find times of impact share, all of it in GPU memory. Times are parts of the step.
+// The kernels that find times of impact share this data, all of it in GPU memory. Times are parts of the
+// step.
 //
 // A query takes these stages:
 //  1. Bodies: motions in terms of the step, and swept boxes, of which the broad phase makes pairs.

@@ -5,7 +5,7 @@
 
 namespace tandem::impact {
 
-/// What stops a pair.
+/// The triangles that stop a pair, and when.
 struct PairStop {
   double time;  ///< a part of the step; 1: nothing does
   std::uint32_t triangle_a = kNoIndex, triangle_b = kNoIndex;
@@ -31,7 +31,7 @@ class ImpactWalk {
   };
   class SortedPairs;
 
-  /// Where the bodies are when a part of the piece begins.
+  /// The places of the bodies when a part of the piece begins.
   struct Part {
     std::uint64_t piece = 0;  ///< that it is of, in the order of all
     Span time;

@@ -138,7 +138,7 @@ TANDEM_HD inline double acceleration_along(const PairMotion& pair, const Vector3
          (norm(cross(pair.a->turn, n)) * fastest_a + norm(cross(pair.b->turn, n)) * fastest_b);
 }
 
-/// Where the two are at some time.
+/// The places of the two bodies at some time.
 struct PairPlace {
   Matrix3 turn_a, turn_b;  ///< Q of each
   Vector3 offset;          ///< from a's centre to b's

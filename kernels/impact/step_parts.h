@@ -13,7 +13,7 @@ namespace tandem::impact {
 
 inline constexpr double kMostTurnOfPiece = 0.5;
 
-/// How often a piece may be halved.
+/// A piece may be halved this often.
 inline constexpr std::uint32_t kHalvings = 6;
 
 /// Parts of a piece have numbers: 1 is the whole piece, 2 p and 2 p + 1 are the halves of part p.

@@ -9,7 +9,7 @@
 #include "kernels/manifold/patch.h"
 #include "tandem/kernels/gpu_manifold_query.h"
 
-// What the kernels that make manifolds share, all of it in GPU memory.
+// The kernels that make manifolds share this data, all of it in GPU memory.
 namespace tandem::gpu {
 
 using Counter = unsigned long long;

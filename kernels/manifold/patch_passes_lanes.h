@@ -7,7 +7,8 @@
 #ifdef TANDEM_HAVE_LANES
 #include "kernels/manifold/manifold_lanes.h"
 
-// What patch_normal.h, patch_rim.h and manifold_maker.h ask of all pieces of a curve, four pieces at a time.
+// These are the passes of patch_normal.h, patch_rim.h and manifold_maker.h over all pieces of a curve, four
+// pieces at a time.
 namespace tandem {
 namespace {
 
@@ -162,7 +163,7 @@ manifold::LeastPiece least_unmarked(const manifold::PieceMemory& memory, std::ui
   return least;
 }
 
-/// Of NormalFinder::find_bearing_faces().
+/// This is a pass of NormalFinder::find_bearing_faces().
 void find_face_along(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end, int side,
                      const manifold::FloatVector& up, manifold::FaceAlong& best) {
   const float sign = side == 0 ? 1 : -1;
@@ -178,7 +179,7 @@ void find_face_along(const manifold::PieceMemory& memory, std::uint32_t begin, s
   }
 }
 
-/// Of NormalFinder::find_bearing_faces().
+/// This is a pass of NormalFinder::find_bearing_faces().
 void sum_length_on_face(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
                         const manifold::FloatVector& face, double one_by_unit, manifold::ExactSum& sum) {
   const manifold::FloatVector turned = {{-face.x[0], -face.x[1], -face.x[2]}};

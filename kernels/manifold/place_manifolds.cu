@@ -3,8 +3,8 @@
 #include "kernels/manifold/manifold_data.h"
 #include "kernels/manifold/manifold_team.cuh"
 
-// Where manifolds and points go: by ascending pair, and within a pair by their least pieces. Compiled without
-// fused operations, as what makes them.
+// These kernels place manifolds and points by ascending pair, and within a pair by their least pieces. They
+// are compiled without fused operations, as those that make them.
 namespace tandem::gpu {
 namespace {
 
@@ -65,7 +65,7 @@ __device__ void write_report(const ManifoldArgs& args, std::uint32_t manifolds, 
   }
   state.report = report;
   *args.host_report = report;
-  // What did not fit is not remembered, and what was remembered before it stays.
+  // Manifolds that did not fit are not remembered; those that were remembered before stay.
   state.last_manifolds = report.manifolds;
   state.last_points = report.points;
   state.has_last = complete && args.match_previous ? 1 : 0;

@@ -18,7 +18,7 @@ struct ChildLimits {
 /// address space.
 bool limits_memory();
 
-/// How a child came to its end.
+/// Says how a child came to its end.
 enum class ChildEnd {
   finished,       ///< returned from its work
   out_of_time,    ///< was still running at the deadline

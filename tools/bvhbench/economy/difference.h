@@ -15,7 +15,7 @@ struct Patch {
   double depth;
 };
 
-/// What a query finds in a scene.
+/// The findings of a query in a scene.
 struct Findings {
   std::uint64_t object_pairs = 0, contacts = 0;
   std::vector<ObjectPair> touching;  ///< pairs with a contact; a < b, sorted, each once
@@ -30,13 +30,13 @@ struct Spread {
 /// 0 of no numbers.
 Spread spread_of(std::vector<double> numbers);
 
-/// By how much the depth of a manifold differs; of one without a match its whole depth.
+/// The difference of the depth of a manifold; for one without a match, its whole depth.
 struct DepthChange {
   ObjectPair pair;
   double by;
 };
 
-/// What a coarser level changes.
+/// The changes that a coarser level makes.
 struct Difference {
   std::uint64_t touching_pairs = 0;                 ///< at the finest
   std::uint64_t lost_pairs = 0, new_pairs = 0;      ///< touching at the finest alone; at the coarser alone

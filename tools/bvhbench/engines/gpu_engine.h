@@ -31,7 +31,7 @@ struct StagedArray {
   }
 };
 
-/// What a question on a GPU takes of a scene.
+/// Says what a question on a GPU takes of a scene.
 struct GpuNeeds {
   Contents contents = Contents::all;  ///< of the shapes
   bool all_levels = false;            ///< of each shape, not its first alone

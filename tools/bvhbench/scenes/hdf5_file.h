@@ -42,7 +42,7 @@ class Hdf5Input {
 
   std::vector<std::uint64_t> read_u64(const std::string& name, const Shape& row = {}) const;
 
-  /// The same of numbers that float64 holds without loss.
+  /// Reads a dataset of numbers that float64 holds without loss.
   std::vector<double> read_f64(const std::string& name, const Shape& row = {}) const;
 
   /// A dataset of n strings, of fixed or variable length.

@@ -46,7 +46,7 @@ CachedContact cached(const ContactPoint& contact, const PairPose& found_at,
           {}};
 }
 
-// Where the bodies have carried a contact since it was found.
+// Returns the contact where the bodies have carried it since it was found.
 ContactPoint moved_with_bodies(const CachedContact& entry, std::span<const BodyState> states) {
   const Vector3d normal = (states[entry.pair.a].orientation * entry.normal_in_a).normalized();
   ContactPoint moved = {entry.pair.a, entry.pair.b, {}, normal, 0, entry.feature};

@@ -15,7 +15,7 @@ using Eigen::Vector3d;
 // radius.
 constexpr double kBeyond = 0.25;
 
-// How often the depth of a pair that touches is measured on its way, at most: each time that its points may
+// The depth of a pair that touches is measured at most this often on its way: each time that its points may
 // have moved by kBeyond inner radii. It goes no farther.
 constexpr double kMostSamples = 256;
 
@@ -98,8 +98,8 @@ double ContinuousMotion::stop_of(const Impact& impact, const ObjectPair& pair, d
   return std::min(1.0, impact.t_safe + beyond);
 }
 
-// How deep two bodies are in each other when they have gone this part of what they go; infinite where one
-// goes through the other.
+// Returns how deep two bodies are in each other when they have gone this part of their ways; infinite where
+// one goes through the other.
 double ContinuousMotion::depth_at(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
                                   const ObjectPair& pair, double part) {
   const ObjectPair pairs[] = {{0, 1}};

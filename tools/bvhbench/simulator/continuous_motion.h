@@ -17,7 +17,8 @@ namespace tandem::simulation {
 /// shape: half the least side of its bounds. Steps without a fast body cost next to nothing.
 class ContinuousMotion {
  public:
-  /// What the shapes look at must outlive it. Throws std::runtime_error where a shape cannot be taken.
+  /// The data that the shapes look at must outlive this. Throws std::runtime_error where a shape cannot be
+  /// taken.
   ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads);
 
   /// Takes back what of the way from `before` to `after` leads through other bodies. Throws

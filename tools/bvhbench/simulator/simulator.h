@@ -13,8 +13,8 @@
 
 namespace tandem::simulation {
 
-/// What a step found and did. The contacts are those of the state before the step; energies, momenta and
-/// speeds are those of the state after it, over all dynamic bodies.
+/// The record of what a step found and did. The contacts are those of the state before the step; energies,
+/// momenta and speeds are those of the state after it, over all dynamic bodies.
 struct StepRecord {
   double time = 0;  ///< at the end of the step
 

@@ -25,7 +25,7 @@ struct Mover : Velocities {
   Matrix3d inverse_inertia;  // in the world
 };
 
-// One direction of a contact: w = direction . (v_b - v_a) + arm_b . spin_b - arm_a . spin_a.
+// A direction of a contact: w = direction . (v_b - v_a) + arm_b . spin_b - arm_a . spin_a.
 struct Row {
   Vector3d direction, arm_a, arm_b;
   Vector3d turn_a, turn_b;        // what an impulse of 1 adds to the spins, less the sign of a
@@ -42,7 +42,7 @@ struct Joint {
   double push_impulse;  // that of the correction
 };
 
-// Which bodies of a contact an impulse moves: shock propagation holds the lower one.
+// Says which bodies of a contact an impulse moves: shock propagation holds the lower one.
 struct Held {
   double a = 1, b = 1;
 };
@@ -68,7 +68,7 @@ double mobility(const Row& row, const Held& held) {
   return held.a * row.mobility_a + held.b * row.mobility_b;
 }
 
-// What w is to be, as far as the bounds of the impulse let it.
+// The w that a row is to have, as far as the bounds of the impulse let it.
 struct Law {
   double target, lower, upper;
 
@@ -173,7 +173,7 @@ void warm_start(Joint& joint, const ContactImpulse& impulse, double friction, st
   }
 }
 
-// What a visit would change, in metres per second.
+// Returns what a visit would change, in metres per second.
 double residual_of(const Row& row, const Law& law, const Mover& a, const Mover& b) {
   const double moves = mobility(row, {});
   return std::fabs(law.impulse(row, moves, a, b) - row.impulse) * moves;

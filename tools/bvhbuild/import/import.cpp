@@ -26,7 +26,7 @@ std::string_view first_line(std::string_view head) {
   return head.substr(0, head.find_first_of("\r\n"));
 }
 
-/// Of a file whose ending says nothing.
+/// Returns the reader of a file whose ending says nothing, or null.
 ReadBytes reader_by_content(std::string_view head) {
   const std::string_view line = first_line(head);
   if (line == "ply") return read_ply;

@@ -10,7 +10,7 @@ namespace tandem::build {
 
 enum class Reader { automatic, tandem, assimp };
 
-/// How much memory a file may take to read, and how much larger than its file a scene may be.
+/// Says how much memory a file may take to read, and how much larger than its file a scene may be.
 struct ReadLimits {
   /// The most address space that the child process which runs assimp may take; the largest file for our own
   /// readers, and the most that the buffers of a glTF file and its triangles may take.
@@ -27,7 +27,7 @@ struct ImportOptions {
   ReadLimits limits;
 };
 
-/// What reading a mesh gives: the polygons, or the reason why there are none.
+/// The result of reading a mesh: the polygons, or the reason why there are none.
 struct ReadResult {
   bool ok = false;
   PolygonMesh mesh;

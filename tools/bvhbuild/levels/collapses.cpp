@@ -62,8 +62,8 @@ class Frame {
   int exponent_ = 0;
 };
 
-// Where an edge shrinks to: the point with the least sum of squared distances from the planes of the
-// triangles that it stands for, and a fixed end where there is one.
+// The place to which an edge shrinks: the point with the least sum of squared distances from the planes of
+// the triangles that it stands for, and a fixed end where there is one.
 struct Placement {
   const Quadrics* quadrics;
   const std::vector<bool>* fixed;
@@ -105,7 +105,7 @@ class Guard {
     }
   }
 
-  // Where a vertex is now.
+  // Returns where a vertex is now.
   const std::array<float, 3>& position(std::uint32_t vertex) const { return positions_[vertex]; }
 
   // Returns whether the collapse leaves everything near. If so, keep() may follow.
@@ -233,7 +233,7 @@ class Guard {
   std::vector<std::uint32_t> near_;  // of each vertex: a triangle of the finest level
   std::vector<levels::Point> samples_;
   std::vector<std::uint32_t> next_, first_;  // samples of a triangle: a list
-  // Of the collapse that is being looked at:
+  // These are of the collapse that is being looked at:
   std::array<float, 3> point_ = {};
   std::uint32_t near_of_moved_ = 0;
   std::vector<std::uint32_t> star_;

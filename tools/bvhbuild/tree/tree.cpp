@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kBlocksAtOnce = 1 << 12;
 
-// Where a block of the topology comes to lie, and its children.
+// The place where a block of the topology comes to lie, and its children.
 struct Place {
   std::uint32_t block;           // of the topology
   std::uint32_t first_triangle;  // of a leaf block: where its triangles start in the file

@@ -99,13 +99,12 @@ class ExchangeSearch {
  public:
   explicit ExchangeSearch(WorkingTree& tree) : tree_(tree), marks_(tree.size()) {}
 
-  /// For each child in turn, makes the exchange with another one below the region's root that saves most;
-  /// ends early where searches take far longer than they do on ordinary meshes.
-  /// Result: how many were made.
+  /// Makes for each child in turn the exchange with another one below the region's root that saves most; ends
+  /// early where searches take far longer than they do on ordinary meshes. Result: how many were made.
   std::uint32_t pass(const Region& region);
 
-  /// How the cost of the tree changes by an exchange; infinity where it is not possible: both have the same
-  /// parent, one lies below the other, the tree would become too deep, or a block empty.
+  /// Returns how the cost of the tree changes by an exchange; infinity where it is not possible: both have
+  /// the same parent, one lies below the other, the tree would become too deep, or a block empty.
   double cost_change(const Exchange& exchange, const Region& region);
 
  private:

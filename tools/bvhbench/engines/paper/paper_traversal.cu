@@ -22,7 +22,7 @@ constexpr auto kLeafKind = static_cast<std::uint32_t>(NodeKind::leaf);
 
 using gpu::pose_of;
 
-/// Where a thread's two flags are.
+/// The place of a thread's two flags.
 template <PaperFlags kKind>
 struct Flags {
   __device__ static void write(std::uint32_t* flags, std::uint64_t thread, std::uint64_t threads, bool flag) {

@@ -230,8 +230,8 @@ struct InFrame {
     }
   }
 
-  /// In mode fast, whose candidates are the CPU's. Oriented boxes of leaves are nearly as thin as their
-  /// planes: exact queries are faster without (docs/decisions/0047).
+  /// Planes are tried in mode fast, whose candidates are the CPU's. Oriented boxes of leaves are nearly as
+  /// thin as their planes: exact queries are faster without (docs/decisions/0047).
   static constexpr bool kTriesPlanes = kMode == QueryMode::fast;
   __device__ __noinline__ static std::uint32_t drop_beyond_planes(const PairRecord& record, std::uint32_t a,
                                                                   std::uint32_t b, std::uint32_t hits) {

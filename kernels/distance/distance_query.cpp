@@ -68,7 +68,7 @@ NearestTask DistanceQuery::State::task_of(const ObjectPair& pair) const {
   return nearest_task(scene->bodies[pair.a], scene->bodies[pair.b], options.tolerance);
 }
 
-// Nothing is known but what the former nearest triangles tell.
+// Begins with nothing known but what the former nearest triangles tell.
 void DistanceQuery::State::begin(const NearestTask& task, const ObjectPair& pair, NearestSoFar& state) const {
   state.reset(options.reach);
   const auto comes_before = [](const FormerNearest& x, const ObjectPair& y) {
@@ -86,7 +86,8 @@ void DistanceQuery::State::finish(std::size_t pair, const NearestTask& task, Nea
   ObjectDistance& out = distances[pair];
   out = {};
   out.triangle_a = out.triangle_b = out.face_a = out.face_b = kNoIndex;
-  // What did not count is not nearer than the upper bound of then, or is beyond reach.
+  // Pairs of triangles that did not count are not nearer than the upper bound of then, or are beyond
+  // reach.
   out.lower = std::min(state.floor, state.upper);
   out.upper = INFINITY;
   if (state.triangle_a == kNoIndex || out.lower > options.reach) return;

@@ -47,7 +47,7 @@ __device__ bool has_near_roots(const DistanceRecord& record, const DistanceFrame
   return false;
 }
 
-/// Nothing is known.
+/// Returns the state in which nothing is known.
 __device__ NearState fresh_state(const DistanceArgs& args) {
   NearState state = {};
   state.near = state.open_near = args.beyond_reach;

@@ -357,9 +357,9 @@ struct Intervals {
   Volume<Value> lower, upper;
 };
 
-/// Of triangles whose corners lie on both sides of the other's plane. Only b's corners q and r are exchanged,
-/// where one of the two orders asks for it, and a's orientation turns the signs instead. (Inlined by force,
-/// as vectors go through memory to a call.)
+/// Returns the intervals of triangles whose corners lie on both sides of the other's plane. Only b's corners
+/// q and r are exchanged, where one of the two orders asks for it, and a's orientation turns the signs
+/// instead. (Inlined by force, as vectors go through memory to a call.)
 template <bool kBounded, typename Value, typename Mask>
 [[gnu::always_inline]] TANDEM_HD inline Intervals<Value> intervals(const Point<Value> (&a)[3],
                                                                    const Point<Value> (&b)[3],

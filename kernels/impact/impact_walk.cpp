@@ -39,7 +39,7 @@ void ImpactWalk::visit(const WaitingPair& pair) {
   const Block &a = a_->blocks[pair.a], &b = b_->blocks[pair.b];
   const double most = std::min(now.time.end, stop_.time) - now.time.begin;
   NodeTimes times;
-  // What is below a node is apart for as long as the node is.
+  // The boxes below a node are apart for as long as the node is.
   node_times(now.frames, a, b, pair.mask, std::max(0.0, pair.apart - now.time.begin), most, times);
   ++counters_->block_pairs;
   if (times.hits == 0) return;

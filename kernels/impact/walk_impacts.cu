@@ -241,7 +241,7 @@ __device__ bool visit(const ImpactArgs& args, bool mine, ImpactBlockPair entry, 
     const double most = manifold::lesser(part.time.end, sought) - part.time.begin;
     if (a.half_extent[0][i] >= 0 && b.half_extent[0][j] >= 0) {
       const double time = node_pair_time(part.frames, a, i, b, j, most);
-      // What is below a node is apart for as long as the node is.
+      // The boxes below a node are apart for as long as the node is.
       if (time < most) apart = manifold::greater(part.time.begin + time, entry.apart);
     }
   }

@@ -323,7 +323,7 @@ class Search:
         reach = None
         if self._pair_count > FEW_PAIRS:
             pair = self._nearest_boxes(lows, highs)
-            # Where one body is asked about with many, the reach takes all that can be as near as the one whose box is the nearest.
+            # If one body is asked about with many, the reach takes all that can be as near as the one whose box is the nearest.
             reach = extent / 256 if pair is None else float(scene.distances(pairs=[pair]).distances["upper"][0])
         while True:
             found = scene.distances(reach=reach, relative_tolerance=PRECISION)

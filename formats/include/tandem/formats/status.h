@@ -11,7 +11,7 @@ enum class [[nodiscard]] Status : std::uint32_t{
     // Getting at the bytes.
     kFileNotFound = 100, kNotARegularFile, kCannotOpen, kCannotRead, kOutOfMemory = 4,
     kMisaligned = 104,  ///< bytes in memory must start at a multiple of 128
-    // What kind of file it is.
+    // These say what kind of file it is.
     kBiovisionMotionCapture,  ///< the other .bvh: starts with HIERARCHY
     kNotTandem,
     kDamagedByTextTransfer,  ///< ours, but line ends were rewritten on the way
@@ -78,7 +78,7 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kNoAxisAlignedBlocks,  ///< the other modes of queries on a GPU need them, and the asset was given without
     kNoTopology,           ///< contact manifolds need it, and the file has none
     kNoFinestLevel,        ///< queries by tolerance need it, and the view leaves it out
-    // On a GPU; status_of() of gpu_status.h names CUDA's errors.
+    // These are of a GPU; status_of() of gpu_status.h names CUDA's errors.
     kNoGpu = 300,      ///< none here, none that this process may use, or no driver
     kDriverTooOld,     ///< for the CUDA version that the program was built with
     kGpuNotSupported,  ///< the program holds no code for a GPU of this kind

@@ -73,7 +73,7 @@ __device__ void tell(Counter* words, std::uint32_t tile, Counter word) {
   *static_cast<volatile Counter*>(&words[tile]) = word;
 }
 
-/// The sum of all tiles before this one. By a warp.
+/// The sum of all tiles before this one. A warp calls it.
 __device__ Counter sum_before(const Counter* words, std::uint32_t tile) {
   Counter sum = 0;
   for (std::uint32_t end = tile;; end -= 32) {

@@ -95,7 +95,8 @@ class PairWalk {
 
  private:
   /// Adds those of the first `count` candidates that are surely within, and keeps those that may be. False:
-  /// the pair is done with. Not inlined, as settle_near(), not to crowd the walk that is for contacts.
+  /// the pair is done with. It is not inlined, as settle_near() is not, so as not to crowd the walk that is
+  /// for contacts.
   [[gnu::noinline]] bool sift(std::uint32_t count) {
     const std::uint32_t given = (2u << (count - 1)) - 1;
     const BatchSifted sifted = means_.sift(candidates_);

@@ -156,7 +156,7 @@ class Walk {
     bool of_leaves;
   };
 
-  /// Tests the block pair that a lane took off. By one lane.
+  /// Tests the block pair that a lane took off. One lane calls it.
   __device__ Tested test(const Taken& taken) const {
     const PairRecord& record = args_.pairs[taken.entry.x];
     const Below now = below_of<typename Means::Blocks>(record, taken.entry, taken.bit);
@@ -179,7 +179,7 @@ class Walk {
   }
 
   /// The entry of a block pair whose node pairs in `hits` meet, but for the bits above the numbers of blocks,
-  /// which numbers of triangles may need. By one lane.
+  /// which numbers of triangles may need. One lane calls it.
   __device__ static uint4 entry_of(const Taken& taken, std::uint32_t hits, Descent goes_on, const Below& now,
                                    const Side& side_a, const Side& side_b) {
     std::uint32_t left = hits;

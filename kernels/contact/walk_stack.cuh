@@ -13,8 +13,8 @@
 //   z   |   -   | s |         family of b                |    s: both are of one instance
 //   w   |          hits          |   still to be taken   |    16 bits each
 //
-// A family is the children of a block, by a number that the means of the walk understand (walk_lane.cuh). Of
-// a pair of leaf blocks y and z are the numbers of the first triangles, in 32 bits. `how` the pair goes on
+// A family is the children of a block, by a number that the means of the walk understand (walk_lane.cuh). For
+// a pair of leaf blocks, y and z are the numbers of the first triangles, in 32 bits. `how` the pair goes on
 // (Descent) says what a bit stands for:
 //
 //   both      bit 4 i + j: child i of y, or triangle y + i, against child, or triangle, j of z

@@ -3,9 +3,9 @@
 #include "kernels/common/traversal.h"
 #include "kernels/distance/distance_data.h"
 
-// Before the walk: what is wrong with instances and pairs, how the two of a pair lie, and which pairs have
-// anything within reach. Compiled without fused operations, so that poses, and what is proved of frames, are
-// those of the CPU.
+// Before the walk, these kernels find what is wrong with instances and pairs, how the two of a pair lie, and
+// which pairs have anything within reach. They are compiled without fused operations, so that poses, and what
+// is proved of frames, are those of the CPU.
 namespace tandem::gpu {
 namespace {
 

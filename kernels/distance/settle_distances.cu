@@ -1,7 +1,8 @@
 #include "kernels/distance/distance_data.h"
 
 // These kernels decide what the walk leaves, by float64 on the posed vertices, and exactly where that is not
-// enough; then they make the report. Compiled without fused operations: posed points are those of the CPU.
+// enough; then they make the report. They are compiled without fused operations: posed points are those of
+// the CPU.
 namespace tandem::gpu {
 namespace {
 

@@ -133,8 +133,8 @@ class Round {
     }
   }
 
-  /// Returns whether an entry is among the `width_` of its pair that have the least bounds. Of those in the
-  /// step where the room ends a part is taken, any, but the same on every run.
+  /// Returns whether an entry is among the `width_` of its pair that have the least bounds. In the step where
+  /// the room ends, a part of the entries is taken: any part, but the same on every run.
   __device__ bool is_wanted(const BlockPairEntry& entry) const {
     if (!kNarrow) return true;
     const std::uint32_t(&steps)[kSteps] = args_.narrowings[entry.pair].steps[number_ % 3];

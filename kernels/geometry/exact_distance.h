@@ -10,9 +10,9 @@
 ///
 /// **Which distances count.** The distance of two triangles, flat or not, that do not meet is that of two
 /// points, each in the relative interior of a corner, an edge or the face; as the distance has a minimum
-/// there, their difference is normal to both of these. Of two corners, nothing more is to be known. Of a
-/// corner and an edge, the edge has a length, and the corner's foot lies on it. Of two edges that are not
-/// parallel, and of a corner and a face that is not flat, the feet are the one solution of linear equations.
+/// there, their difference is normal to both of these. For two corners, nothing more is to be known. For a
+/// corner and an edge, the edge has a length, and the corner's foot lies on it. For two edges that are not
+/// parallel, and for a corner and a face that is not flat, the feet are the one solution of linear equations.
 /// What is left is spared: from a pair of nearest points on parallel edges, on an edge and a parallel face,
 /// or on two parallel faces, both points can move alike, at the same distance, until one of them comes to the
 /// end of its feature. (A flat face is a union of its edges.) So the least of the distances of corners, and

@@ -9,10 +9,10 @@
 /// **Proof.** E of frame_test.h bounds, coordinate by coordinate, how far the image of a corner of a is from
 /// the corner as stored, and that of one of b from posed() of it, both together. So for points p and q of the
 /// posed triangles, N (p - q) differs from the difference of the same points of the float32 triangles by at
-/// most E a coordinate, and their distance in the frame by sqrt(3) E < 1.7321 E. Of the float32 triangles the
-/// proof in triangle_distance.h holds with u = 2^-24: both bounds are relative to a[0] and to M there. The
-/// difference of the two points, `apart`, is made of offsets with parameters from 0 to 1 there too: an offset
-/// of two corners (4 u M), two edges times a parameter (6 u M each) and two sums (8 u M) are 24 u M a
+/// most E a coordinate, and their distance in the frame by sqrt(3) E < 1.7321 E. For the float32 triangles
+/// the proof in triangle_distance.h holds with u = 2^-24: both bounds are relative to a[0] and to M there.
+/// The difference of the two points, `apart`, is made of offsets with parameters from 0 to 1 there too: an
+/// offset of two corners (4 u M), two edges times a parameter (6 u M each) and two sums (8 u M) are 24 u M a
 /// coordinate, below the 40 u M that it has. Directions too short to be sure of, where |n|_1 < 2^-40, give 0;
 /// from there on underflow, a few times 2^-126, is below 2^-104 < 0.09 u |n|_1 M, as M >= |n|_1 / 6.
 namespace tandem::distance {

@@ -132,7 +132,7 @@ TANDEM_HD inline auto is_nonzero(const Value (&x)[3]) {
 }
 
 /// A triangle seen along the first axis along which it is not flat, counterclockwise. Condition: it is not
-/// flat. Of triangles in one plane all are seen along the same axis.
+/// flat. Triangles in one plane are all seen along the same axis.
 template <typename Value>
 struct PlanarTriangle {
   Value x[3], y[3];

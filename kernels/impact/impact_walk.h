@@ -12,7 +12,7 @@ struct PairStop {
 };
 
 /// A depth-first walk of two trees through a piece of the step at a time, the nodes that may meet soonest
-/// first. Large; to be kept.
+/// first. It is large, so keep it from call to call.
 class ImpactWalk {
  public:
   /// Until when two trees stay apart. tolerance: in units of length. Adds to the counters.

@@ -1,7 +1,7 @@
 #include "kernels/impact/impact_data.h"
 
-// Pairs posed at some times of the step. Compiled without fused operations, as all that makes records of
-// pairs.
+// These kernels pose pairs at some times of the step. They are compiled without fused operations, as all that
+// makes records of pairs.
 namespace tandem::gpu {
 namespace {
 

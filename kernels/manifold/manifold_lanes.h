@@ -17,8 +17,8 @@ struct ManifoldLanes {
   manifold::PieceBounds (*make_pieces)(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory,
                                        const Contact* contacts, std::uint32_t count);
 
-  /// Adds what two triangles have in common, if that is something. Not inlined, so that no inline function
-  /// that is compiled for one machine is linked into code for another.
+  /// Adds what two triangles have in common, if that is something. It is not inlined, so that no inline
+  /// function that is compiled for one machine is linked into code for another.
   static void add_piece(const manifold::PieceMemory& memory, const Contact& contact,
                         const manifold::WorldTriangle& a, const manifold::WorldTriangle& b, double tolerance,
                         manifold::PieceBounds& bounds);

@@ -31,7 +31,8 @@ __device__ bool is_complete(const ManifoldArgs& args) {
          state.needed_points <= args.capacity.points;
 }
 
-/// The sum of all tiles before this one (Merrill and Garland 2016). By one thread: tiles are few.
+/// The sum of all tiles before this one (Merrill and Garland 2016). One thread calls it, because tiles are
+/// few.
 __device__ Counter sum_before(const Counter* words, std::uint32_t tile) {
   Counter sum = 0;
   while (tile-- > 0) {

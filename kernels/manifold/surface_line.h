@@ -182,7 +182,7 @@ struct LineTest {
 
 /// Says which crossing of a line with a surface is asked for: the one nearest in height to `target`, between
 /// lower and upper, of triangles whose outward normals point along the frame's (facing 1) or against it (-1).
-/// Of two as near the triangle that comes first.
+/// Of two as near, the triangle that comes first is taken.
 struct LineQuestion {
   Vector2 at;
   double target, lower, upper;
@@ -367,8 +367,8 @@ struct Extreme {
   TANDEM_HD explicit operator bool() const { return found(); }
 };
 
-/// The highest vertex of a (question 0) and the lowest of b (1) in a prism. Of several the one of the least
-/// number.
+/// The highest vertex of a (question 0) and the lowest of b (1) in a prism. Of several, the one of the least
+/// number is taken.
 class ExtremeQuestions {
  public:
   /// test, extreme: two each, that all of the team see.

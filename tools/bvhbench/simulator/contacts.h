@@ -50,8 +50,8 @@ struct ContactStatistics {
   double depth = 0;  ///< the largest
 };
 
-/// Makes contact points of pairs of triangles that meet, by the library's ManifoldQuery. The same bytes on
-/// every run, for any number of threads. Throws EngineError where it fails.
+/// Makes contact points of pairs of triangles that meet, by the library's ManifoldQuery. The bytes are the
+/// same on every run, for any number of threads. Throws EngineError where it fails.
 class ContactGenerator {
  public:
   /// Names the shapes that bodies refer to, the list given to the engine. What the views look at must outlive

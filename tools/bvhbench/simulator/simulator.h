@@ -58,7 +58,7 @@ struct SimulatorState {
 /// Moves rigid bodies, step by step: contacts where the bodies stand, velocities with gravity, contacts
 /// solved for, positions by the new velocities (semi-implicit Euler). Bodies that have moved against each
 /// other by no more than the slop keep their contacts. With warm start, a step that has no impulse of the
-/// step before makes ten times the sweeps. The same bytes for any number of threads.
+/// step before makes ten times the sweeps. The bytes are the same for any number of threads.
 class Simulator {
  public:
   /// continuous: what keeps fast bodies from passing through others; null: nothing does. Condition: as many

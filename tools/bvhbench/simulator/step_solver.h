@@ -78,7 +78,7 @@ struct Residual {
   }
 };
 
-/// Moves bodies through a step under gravity and contacts. The same bytes for any number of threads.
+/// Moves bodies through a step under gravity and contacts. The bytes are the same for any number of threads.
 class StepSolver {
  public:
   virtual ~StepSolver() = default;

@@ -315,9 +315,9 @@ class FollowedContacts {
 // Penetration beyond the slop is taken away by a second set of velocities, which push along normals alone,
 // move the bodies once, and never become kinetic energy (split impulses).
 //
-// An island is done before all sweeps are made when one changes no velocity by more than 10⁻⁹ of what
-// gravity gives in a step. Islands are solved side by side by the threads of the caller's oneTBB arena. The
-// same bytes for any number of them.
+// An island is done before all sweeps are made when one changes no velocity by more than 10⁻⁹ of what gravity
+// gives in a step. Islands are solved side by side by the threads of the caller's oneTBB arena. The bytes are
+// the same for any number of them.
 //
 // There are as many solutions as substeps. With warm start, a step that has no impulse of the step before
 // makes ten times the sweeps.

@@ -363,7 +363,7 @@ int fit(int first, int second) {
 }
 
 /// Returns whether to cut a quad from corner 0 to 2 (true) or from 1 to 3 (false); nothing when both
-/// diagonals leave it. Of a simple quad at least one diagonal lies inside, and the pieces on its two sides
+/// diagonals leave it. In a simple quad at least one diagonal lies inside, and the pieces on its two sides
 /// then have the same orientation.
 std::optional<bool> inner_diagonal(std::span<const Point> p, int axis) {
   std::array<Point2, 4> q;

@@ -125,8 +125,8 @@ inline void box_along(double lowest, double highest, double farthest, float& cen
 }
 
 /// Returns the size of a block: the edge of the cube with the surface of its largest box. Walks compare it to
-/// decide which of two blocks goes on to its children. The same on every machine: float64 squares of float32
-/// numbers are exact, and the rest is rounded as IEEE 754 says, fused or not.
+/// decide which of two blocks goes on to its children. It is the same on every machine: float64 squares of
+/// float32 numbers are exact, and the rest is rounded as IEEE 754 says, fused or not.
 inline float oriented_size(const OrientedBlock& block) {
   double largest = 0;
   for (int i = 0; i < kNodesPerBlock; ++i) {

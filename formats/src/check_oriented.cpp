@@ -67,7 +67,7 @@ class OrientedWalk {
     return leave_nodes();
   }
 
-  // All but what the boxes hold.
+  // Checks all but what the boxes hold.
   Status check_block(const Block& block, const OrientedBlock& oriented, int real) const {
     const std::uint32_t below =
         block.is_leaf_block() ? OrientedBlock::kIsLeafBlock | next_triangle_ : next_number_;

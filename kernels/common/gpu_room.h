@@ -32,7 +32,7 @@ class ListedArray {
   ListedArray* next_ = nullptr;
 };
 
-/// All arrays of a question. It stays where it is, since arrays and rooms point to it.
+/// Has all arrays of a question. It stays where it is, since arrays and rooms point to it.
 class Memory {
  public:
   Memory() = default;

@@ -162,7 +162,7 @@ struct HostOf<GpuContactReport> : GpuHost<QueryState, GpuContactReport> {
     return args;
   }
 
-  // All kernels of a query but those that group and sort.
+  // Launches all kernels of a query but those that group and sort.
   cudaError_t launch(const QueryArgs& args, cudaStream_t stream) {
     cudaError_t result = cudaSuccess;
     if (!state_is_clear) result = cudaMemsetAsync(args.state, 0, sizeof(QueryState), stream);

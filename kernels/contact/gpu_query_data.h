@@ -123,8 +123,8 @@ struct SortingRoom {
 /// Sorting keeps two rows of 64-bit keys where its result is to come, each row aligned.
 inline constexpr std::size_t kContactsForKeys = 32;
 
-/// More room for candidates than a query needed, because what it looks at before it finds a pair's first
-/// contact differs from run to run.
+/// Returns more room for candidates than a query needed, because what it looks at before it finds a pair's
+/// first contact differs from run to run.
 constexpr std::uint64_t with_spare(std::uint64_t undecided) {
   return undecided + undecided / 2 + 1024;
 }

@@ -249,7 +249,7 @@ class LaneMeans {
     return decide_batch_within<kCount>(task_, candidates);
   }
 
-  // All stages inlined, though clearance calls one of them too.
+  // All stages are inlined, though clearance calls one of them too.
   [[gnu::flatten]] BatchVerdicts decide(Candidates& candidates) const {
     fill_up(candidates);
     if (task_.on_grid) return decide_on_grid<kCount>(task_, candidates);

@@ -238,7 +238,7 @@ class Walk {
     return stack_.put_given([&](auto put_on) { return sharing().receive(put_on); }) != 0;
   }
 
-  /// Over the warp.
+  /// Returns the sum over the warp.
   __device__ static Counter sum_of(std::uint32_t count) {
     const std::uint32_t high = __reduce_add_sync(kAllLanes, count >> 16),
                         low = __reduce_add_sync(kAllLanes, count & 0xFFFFu);
@@ -292,7 +292,7 @@ __device__ inline std::uint32_t sums_of_block(std::uint32_t memory) {
   return memory + 4 * (kBlockWords + ContactOutput::kSharedWords + SharingWarp::kFreeWord);
 }
 
-/// Before a walk of the block.
+/// Prepares shared memory before a walk of the block.
 __device__ inline void prepare_memory(float4* memory) {
   fill_positions(reinterpret_cast<std::uint32_t*>(memory));
   if (threadIdx.x < SharingWarp::kFreeWords)

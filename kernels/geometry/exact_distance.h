@@ -157,7 +157,7 @@ class Features {
     return visit_height(edge_a_[i], offset_[i][j], weights, visitor);
   }
 
-  /// Over an edge whose square is length_.
+  /// Visits a corner over an edge whose square is length_.
   template <class Visitor>
   TANDEM_HD bool visit_height(const Vector<1>& edge, const Vector<1>& offset, const TriangleWeights& weights,
                               Visitor& visitor) {

@@ -74,7 +74,7 @@ TANDEM_HD inline FrameMotion frame_motion(const PairMotion& pair, const TreePlac
   return frame;
 }
 
-/// Both frames of a pair from some time on.
+/// The two frames of a pair from some time on.
 struct PairFrames {
   FrameMotion of_a, of_b;
   double slack;

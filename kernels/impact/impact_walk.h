@@ -15,7 +15,7 @@ struct PairStop {
 /// first. It is large, so keep it from call to call.
 class ImpactWalk {
  public:
-  /// Until when two trees stay apart. tolerance: in units of length. Adds to the counters.
+  /// Finds until when two trees stay apart. tolerance: in units of length. Adds to the counters.
   PairStop find_stop(const PairMotion& pair, const LevelView& a, const LevelView& b, double tolerance,
                      ImpactCounters& counters);
 

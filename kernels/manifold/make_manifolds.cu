@@ -405,7 +405,7 @@ __global__ void __launch_bounds__(kThreads) remember(const __grid_constant__ Man
 }  // namespace
 
 cudaError_t remember_points(const ManifoldArgs& args, cudaStream_t stream) {
-  // After whatever kernel of the user's, and so after all of it.
+  // This runs after whatever kernel of the user's, and so after all of it.
   remember<<<args.limits.processors * 2, kThreads, 0, stream>>>(args);
   return cudaGetLastError();
 }

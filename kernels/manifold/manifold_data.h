@@ -61,7 +61,7 @@ struct ManifoldState {
   Counter needed_points, segments, ambiguous_touches, open_curves;
   std::uint32_t too_many_contacts, finished_blocks;
 
-  // Kept from call to call.
+  // These are kept from call to call.
   std::uint32_t step;      ///< of the table
   std::uint32_t has_last;  ///< the last call made manifolds that the next one is to remember
   std::uint32_t last_manifolds, last_points;

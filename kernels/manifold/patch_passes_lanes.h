@@ -205,7 +205,8 @@ class CurveTriangles {
     for (std::uint32_t& s : seen_) s = kNoIndex;
   }
 
-  /// Up to kMost further ones, a multiple of four: the last one may be there several times. 0: no more.
+  /// Gathers up to kMost further ones, a multiple of four: the last one may be there several times. 0: no
+  /// more.
   std::uint32_t gather(std::uint32_t (&index)[kMost]) {
     std::uint32_t count = 0;
     for (; next_ < end_ && count < kMost; ++next_) {

@@ -47,7 +47,7 @@ class Level(NamedTuple):
     vertex_count: int
     #: Triangles that edges join.
     component_count: int
-    #: All components are.
+    #: Says whether all components are closed.
     closed: bool
 
 

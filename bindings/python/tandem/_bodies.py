@@ -150,7 +150,7 @@ class Bodies:
 
     @staticmethod
     def joined(ours: Bodies, theirs: Bodies, former: Bodies | None) -> Bodies:
-        """Both, ours first. Takes the scene of the former result where that is of the same assets."""
+        """Returns both, ours first. Takes the scene of the former result where that is of the same assets."""
         both = object.__new__(Bodies)
         both.ours = ours
         both.names = ours.names + theirs.names

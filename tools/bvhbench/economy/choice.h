@@ -21,7 +21,7 @@ struct Candidates {
   /// The asset at this level, all others at their finest.
   Levels alone(std::size_t asset, std::uint32_t level) const;
 
-  /// All assets at their coarsest.
+  /// Returns the levels with all assets at their coarsest.
   Levels coarsest() const;
 };
 

@@ -22,7 +22,8 @@ struct Findings {
   std::vector<Patch> patches;        ///< in any order
 };
 
-/// Some numbers that are not negative: half of them are at most `median`, 95 of 100 at most `most`.
+/// The spread of some numbers that are not negative: half of them are at most `median`, 95 of 100 at most
+/// `most`.
 struct Spread {
   double mean = 0, median = 0, most = 0, largest = 0;
 };

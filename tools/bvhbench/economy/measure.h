@@ -52,7 +52,8 @@ class LevelMeasurer {
   /// Returns how many levels each asset has; 1 of an asset that the scene has no instance of.
   std::vector<std::uint32_t> level_counts() const;
 
-  /// Measured once, then remembered; the finest levels first. Throws bench::FileError, EngineError, GpuError.
+  /// Measures levels once and remembers them; the finest come first. Throws bench::FileError, EngineError,
+  /// GpuError.
   const Measures& measure(const Levels& levels);
 
   /// Returns the name of the GPU, once something was measured on one.

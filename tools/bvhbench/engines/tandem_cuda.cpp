@@ -57,7 +57,7 @@ class CudaContacts final : public GpuContactEngine {
     });
   }
 
-  // Both: their contacts are grouped too.
+  // Returns a function that queues both; the contacts are grouped too.
   std::function<void()> repeatable_with_manifolds(const GpuPairs& pairs, OrderOnGpu order,
                                                   const Before& before, const Before& between) override {
     GpuContactOptions with_groups = options(order);

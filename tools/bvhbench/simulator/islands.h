@@ -43,7 +43,7 @@ class Sleep {
  public:
   static constexpr std::uint32_t kAwake = 0xFFFFFFFFu;
 
-  /// All bodies are awake.
+  /// Begins with all bodies awake.
   void start(std::size_t bodies);
 
   /// Bodies that are woken by contacts with bodies that are awake: to be called with the contacts of each

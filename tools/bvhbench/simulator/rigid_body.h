@@ -58,7 +58,7 @@ void advance(const BodyProperties& body, BodyState& state, const Eigen::Vector3d
 
 double kinetic_energy(const BodyProperties& body, const BodyState& state);
 
-/// About the world's origin. It is zero for a body that contacts do not move.
+/// Returns the angular momentum about the world's origin. It is zero for a body that contacts do not move.
 Eigen::Vector3d angular_momentum(const BodyProperties& body, const BodyState& state);
 
 }  // namespace tandem::simulation

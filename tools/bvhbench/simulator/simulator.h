@@ -46,7 +46,7 @@ struct SimulatorOptions {
   std::uint32_t threads = 1;  ///< at most; oneTBB starts no more than its max_allowed_parallelism
 };
 
-/// All that the next steps depend on, beside bodies and options.
+/// The state has all that the next steps depend on, beside bodies and options.
 struct SimulatorState {
   std::uint64_t step = 0;
   std::vector<BodyState> states;

@@ -60,8 +60,8 @@ class Annealing {
   }
 
  private:
-  // Some blocks up from the child's parent, then down again to a block of its kind, which is often where the
-  // child fits well.
+  // Chooses by going some blocks up from the child's parent, then down again to a block of its kind, which is
+  // often where the child fits well.
   bool choose_partner(Exchange& exchange) {
     std::uint32_t block = exchange.first_parent;
     for (int up = 0; up < kMostUp && block != region_.root && (up == 0 || random_.below(4) != 0); ++up) {

@@ -10,8 +10,8 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// Below a block with a frame of its own. Above, none is worth it (docs/decisions/0039), and the checker would
-// have to look at all triangles once more for each level.
+// A block has a frame of its own if at most this many triangles are below it. Above, none is worth it
+// (docs/decisions/0039), and the checker would have to look at all triangles once more for each level.
 constexpr std::uint32_t kMostTriangles = 4096;
 
 constexpr std::size_t kBlocksAtOnce = 64;
@@ -117,7 +117,7 @@ class Fit {
         farthest_(farthest),
         effort_(search_effort(effort)) {}
 
-  // All but first_below.
+  // Makes all of a block but first_below.
   OrientedBlock make(std::uint32_t at) {
     const Block& block = tree_.blocks[at];
     begin(block);
@@ -166,7 +166,7 @@ class Fit {
     return geometry_.points[geometry_.triangles[tree_.order[triangle]][c]];
   }
 
-  // Some of the corners of each node, each point once.
+  // Gathers some of the corners of each node, each point once.
   void gather() {
     points_.clear();
     for (int node = 0; node < nodes_; ++node) {
@@ -274,7 +274,7 @@ class Fit {
     return best.rotation();
   }
 
-  // Along an edge of a triangle and its normal.
+  // Returns the axes along an edge of a triangle and its normal.
   BlockRotation axes_of(std::uint32_t triangle, std::uint32_t edge) const {
     const Vector& from = corner(triangle, edge);
     const Vector along = times(scale_, difference(corner(triangle, (edge + 1) % 3), from));

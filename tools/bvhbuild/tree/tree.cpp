@@ -20,7 +20,7 @@ struct Place {
   std::uint32_t child[kNodesPerBlock];
 };
 
-// All blocks, each after its parent, those below a node before those below the next one.
+// Places all blocks, each after its parent, those below a node before those below the next one.
 class DepthFirst {
  public:
   explicit DepthFirst(const Topology& topology) : topology_(topology) {

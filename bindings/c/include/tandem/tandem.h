@@ -405,7 +405,7 @@ TANDEM_API tandem_status tandem_scene_set_motion(tandem_scene* scene, uint32_t b
 /// Removes a body: no question finds it any more. Result: TANDEM_UNKNOWN_INSTANCE.
 TANDEM_API tandem_status tandem_scene_remove(tandem_scene* scene, uint32_t body);
 
-/// All bodies by number, valid until bodies are placed, added or removed.
+/// Returns all bodies by number, valid until bodies are placed, added or removed.
 TANDEM_API const tandem_instance* tandem_scene_instances(const tandem_scene* scene, size_t* count);
 
 /// The asset, body, pair or contact that is to blame for the last call's error; 0 after TANDEM_OK.
@@ -621,7 +621,7 @@ typedef struct tandem_impact_options {
 
 enum { TANDEM_NO_IMPACT = 0, TANDEM_IMPACT = 1, TANDEM_IMPACT_AT_START = 2 };
 
-/// Until when two moving bodies surely do not meet (docs/impact.md).
+/// Says until when two moving bodies surely do not meet (docs/impact.md).
 typedef struct tandem_impact {
   double t_safe;  ///< no triangles of the two meet before; the whole step where there is no impact
   double gap;     ///< of the two triangles then

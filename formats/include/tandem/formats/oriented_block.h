@@ -62,7 +62,7 @@ struct ScaledRotation {
   float squared_length;  ///< of the quaternion; below 2^24
 };
 
-/// Part 0 to 3 of a quaternion: w, x, y, z.
+/// Returns part 0 to 3 of a quaternion: w, x, y, z.
 TANDEM_HD inline float quaternion_part(const BlockRotation& rotation, int part) {
   const std::uint32_t word = part < 2 ? rotation.wx : rotation.yz;
 #ifdef __CUDA_ARCH__

@@ -97,7 +97,7 @@ class Scene {
   /// the scene or question about it.
   std::span<const ObjectPair> pairs() const;
 
-  /// All bodies by number; a removed one has asset kNoIndex. Valid until bodies are placed or added.
+  /// Returns all bodies by number; a removed one has asset kNoIndex. Valid until bodies are placed or added.
   std::span<const Instance> instances() const;
 
   /// The asset, instance, pair or contact that is to blame for the last error of this scene or of a question

@@ -39,10 +39,10 @@ struct BuildOptions {
 /// Lets somebody look on while a tree is optimised, and end it.
 class OptimisationWatch {
  public:
-  /// Called now and then, by one thread at a time, with the share that is done. What it throws ends the
-  /// build.
+  /// The builder calls this now and then, by one thread at a time, with the share that is done. What it
+  /// throws ends the build.
   std::function<void(double share)> progress = [](double) {};
-  /// Once set, optimisation ends within a second or so, with the best tree so far.
+  /// Once this is set, optimisation ends within a second or so, with the best tree so far.
   std::atomic<bool> stop = false;
 
   /// The optimiser says how many units of work there are, and that some more are done.

@@ -38,8 +38,8 @@ struct Finding {
   std::string sentence() const { return what + "; " + fate; }
 };
 
-/// All findings in a fixed order, those with count 0 included: the text report, --json and --strict share
-/// this list.
+/// Returns all findings in a fixed order, those with count 0 included: the text report, --json and --strict
+/// share this list.
 std::vector<Finding> findings(const CleanReport& report);
 
 }  // namespace tandem::build

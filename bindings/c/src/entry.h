@@ -7,7 +7,7 @@
 #include "tandem/formats/status.h"
 #include "tandem/tandem.h"
 
-/// The functions of the interface begin and end by these.
+/// Functions of the interface begin and end with these.
 namespace tandem::c {
 
 /// Statuses of the libraries have the numbers of tandem.h, which scripts/write_interface compares.

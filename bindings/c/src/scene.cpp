@@ -18,7 +18,7 @@ struct Asked {
   bool found = false;
 };
 
-// Says which contacts of the bodies as they stand there are, of which manifolds and contained bodies can be
+// Says whether there are contacts of the bodies as they stand, of which manifolds and contained bodies are
 // made.
 enum class Standing { none, some, all };
 

@@ -6,7 +6,7 @@
 namespace tandem {
 namespace {
 
-// In front of memory that was given out.
+// This stands in front of memory that was given out.
 struct Origin {
   Allocator allocator;
   std::size_t bytes;  // with this

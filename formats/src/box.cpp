@@ -44,10 +44,10 @@ int sign_of_sum(const TwoSum& p, const TwoSum& q) {
   return 0;
 }
 
-// Whether [c_i - h_i, c_i + h_i] lies within [c_o - h_o, c_o + h_o], in real arithmetic: |c_i - c_o| + h_i <=
-// h_o. If the distance is exact, only one rounding is left, and rounding is monotone: a sum that rounds to
-// less than the double h_o is less than h_o, one that rounds to more is more. Only a tie needs the exact
-// sign.
+// Returns whether [c_i - h_i, c_i + h_i] lies within [c_o - h_o, c_o + h_o], in real arithmetic: |c_i - c_o|
+// + h_i <= h_o. If the distance is exact, only one rounding is left, and rounding is monotone: a sum that
+// rounds to less than the double h_o is less than h_o, one that rounds to more is more. Only a tie needs the
+// exact sign.
 inline bool within(float c_i, float h_i, float c_o, float h_o) {
   const TwoSum distance(std::max(c_i, c_o), -static_cast<double>(std::min(c_i, c_o)));
   if (distance.error == 0) {

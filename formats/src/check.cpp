@@ -120,7 +120,7 @@ std::span<const Section> sections_of(const unsigned char* data) {
   return {reinterpret_cast<const Section*>(data + sizeof(FileHeader)), header.section_count};
 }
 
-// Whether the counts of a level's topology agree, or all say that there is none.
+// Returns whether the counts of a level's topology agree, or all say that there is none.
 bool has_sound_topology(const Level& level, std::span<const TriangleTopology> topology,
                         std::span<const SurfaceComponent> components) {
   if (topology.data() == nullptr)

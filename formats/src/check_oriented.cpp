@@ -18,7 +18,7 @@ bool is_legal(const BlockRotation& rotation) {
   return !all_zero;
 }
 
-// The same number of two triangles.
+// The same quantity of two triangles, side by side.
 typedef double Two __attribute__((vector_size(16)));
 
 // Walks the blocks as they lie, which is depth first, with the number of each one's oriented block.
@@ -67,7 +67,7 @@ class OrientedWalk {
     return leave_nodes();
   }
 
-  // All but what the boxes hold.
+  // Checks all but what the boxes hold.
   Status check_block(const Block& block, const OrientedBlock& oriented, int real) const {
     const std::uint32_t below =
         block.is_leaf_block() ? OrientedBlock::kIsLeafBlock | next_triangle_ : next_number_;
@@ -106,7 +106,7 @@ class OrientedWalk {
     return Status::kOk;
   }
 
-  // Whether the box of a node holds the triangles from `first` to `end`, in real arithmetic.
+  // Returns whether the box of a node holds the triangles from `first` to `end`, in real arithmetic.
   //
   // Proof. Let S be the scaled rotation, n the squared length of its quaternion, v a vertex and c, h of the
   // box. v lies in the box along axis k if |p - n c| <= n h with p = sum over i of S_ik v_i. Products of two
@@ -119,7 +119,7 @@ class OrientedWalk {
              std::uint32_t end) const {
     if (depth_ == CheckDepth::quick) return true;
     const OrientedBlock& oriented = level_.oriented_blocks[number];
-    // In the mesh's own axes boxes within boxes do, as check_tree() showed.
+    // In the mesh's own axes it suffices that boxes lie within boxes, as check_tree() showed.
     if (oriented.rotation == kNoRotation && contains(box_of(oriented, node), box_of(block, node)))
       return true;
     const ScaledRotation rotation = scaled_rotation(oriented.rotation);

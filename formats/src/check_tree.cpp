@@ -113,7 +113,7 @@ class TreeWalk {
   Ancestor& parent() { return ancestors_[ancestor_count_ - 1]; }
   std::uint32_t awaited_child() { return level_.blocks[parent().block].index[parent().next]; }
 
-  // Whether the node whose turn it is contains the nodes of its child; the next node's turn comes.
+  // Returns whether the node whose turn it is contains the nodes of its child; the next node's turn comes.
   bool fits_in_its_node(const Block& child, int real) {
     const Box box = box_of(level_.blocks[parent().block], parent().next++);
     for (int i = 0; i < real; ++i) {
@@ -125,7 +125,8 @@ class TreeWalk {
     return true;
   }
 
-  // Why block b, or the end of the blocks, is not the child that is awaited. Called once, when it is not.
+  // Returns why block b, or the end of the blocks, is not the child that is awaited. It is called once, when
+  // it is not.
   Status name_misplaced(std::uint32_t b) {
     if (ancestor_count_ == 0) return Status::kBlockUnreachable;
     const std::uint32_t child = awaited_child();
@@ -138,8 +139,8 @@ class TreeWalk {
     return is_named_above(b) ? Status::kBlockOrder : Status::kBlockUnreachable;
   }
 
-  // Whether a node whose turn is yet to come names block b. No other block before b does: what the nodes
-  // before these name are the blocks 1 to b - 1.
+  // Returns whether a node whose turn is yet to come names block b. No other block before b does: what the
+  // nodes before these name are the blocks 1 to b - 1.
   bool is_named_above(std::uint32_t b) const {
     for (std::uint32_t a = 0; a < ancestor_count_; ++a) {
       const Ancestor& ancestor = ancestors_[a];

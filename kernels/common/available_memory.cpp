@@ -45,7 +45,7 @@ struct FileText {
   }
 };
 
-/// What a version of control groups calls its files, and where they are.
+/// The names that a version of control groups has for its files, and where they are.
 struct GroupFiles {
   const char *folder, *limit, *usage, *reclaimable;
 };
@@ -59,7 +59,7 @@ std::uint64_t number_in(const char* folder, const char* file, const char* key = 
   return FileText(path).number(key);
 }
 
-/// What is left of the limit of one group. Pages of files that were not used lately can be had back.
+/// Returns what is left of the limit of one group. Pages of files that were not used lately can be had back.
 std::uint64_t left_in(const char* folder, const GroupFiles& files) {
   const std::uint64_t limit = number_in(folder, files.limit), usage = number_in(folder, files.usage);
   if (limit == kUnknown || usage == kUnknown) return kUnknown;
@@ -68,7 +68,7 @@ std::uint64_t left_in(const char* folder, const GroupFiles& files) {
   return limit - std::min(limit, used);
 }
 
-/// Of a group and of all above it.
+/// Returns the least that is left of the limits of a group and of all groups above it.
 std::uint64_t left_up_from(const char* root, const GroupFiles& files, const char* group, int length) {
   char folder[4096];
   std::snprintf(folder, sizeof folder, "%s%s%.*s", root, files.folder, length, group);
@@ -82,7 +82,8 @@ std::uint64_t left_up_from(const char* root, const GroupFiles& files, const char
   }
 }
 
-/// Of the groups that the process is in: lines such as "4:memory:/a/b" (version 1) and "0::/a/b" (version 2).
+/// Returns the least that is left of the limits of the groups that the process is in: lines such as
+/// "4:memory:/a/b" (version 1) and "0::/a/b" (version 2).
 std::uint64_t left_of_groups(const char* root) {
   char path[4096];
   std::snprintf(path, sizeof path, "%s/proc/self/cgroup", root);

@@ -1,6 +1,6 @@
 #include "tandem/kernels/detail/available_memory.h"
 
-// In a file of its own, so that a test can have an available_memory() of its own.
+// This function has a file of its own, so that a test can have an available_memory() of its own.
 namespace tandem {
 
 std::uint64_t available_memory() {

@@ -45,7 +45,7 @@ TANDEM_INLINE Lanes<kCount> nodes_of_b(const Lanes4& four) {
   if constexpr (kCount == 4) return four;
 }
 
-/// What the box tests of a block pair take: what depends on one node alone, for four nodes at a time.
+/// The operands of the box tests of a block pair: what depends on one node alone, for four nodes at a time.
 class PosedBlockPair {
  public:
   TANDEM_INLINE PosedBlockPair(const Block& a, const Block& b, const RelativePose& pose) : pose_(pose) {

@@ -55,7 +55,7 @@ cudaError_t launch_rounds(const Grid& grid, void (*kernel)(Args, std::uint32_t),
   return error;
 }
 
-/// How many entries are stored. Condition: kernels that append have ended.
+/// Returns how many entries are stored. Condition: kernels that append have ended.
 template <typename Entry>
 __device__ inline std::uint32_t stored_in(const AppendList<Entry>& list) {
   const Counter count = *list.count;
@@ -77,7 +77,8 @@ __device__ inline void share_out(std::uint32_t count, std::uint32_t most_turns, 
     visit(static_cast<std::uint32_t>(begin) + lane_id() / kLanes, turns);
 }
 
-/// What the lanes of a warp are about to append, up to kMost entries each: one atomic operation for all.
+/// Collects what the lanes of a warp are about to append, up to kMost entries each, so that one atomic
+/// operation is enough for all.
 template <typename Entry, int kMost>
 class AppendBatch {
  public:

@@ -11,7 +11,7 @@
 // The CPU's side of a question on a GPU, as far as it is the same for all of them.
 namespace tandem::gpu {
 
-/// What the assets of a list have, all together.
+/// Says what the assets of a list have, all together.
 struct AssetSummary {
   std::uint32_t depth = 1;                    ///< of the deepest tree
   std::uint32_t blocks = 0, triangles = 0;    ///< of the largest
@@ -137,8 +137,8 @@ Status find_until_complete(Host& host, Capacity wanted, const Options& options, 
   }
 }
 
-/// As above, of what is made of a contact query that has ended: where that is not complete, more room does
-/// not help.
+/// Enqueues, as find_until_complete() does, what is made of a contact query that has ended. If that query is
+/// not complete, more room does not help.
 template <typename Host, typename Capacity, typename Options, typename Query, typename Enqueue>
 Status find_behind(const Query& query, Host& host, const Capacity& wanted, const Options& options,
                    cudaStream_t stream, const Enqueue& enqueue) {

@@ -32,7 +32,7 @@ class ListedArray {
   ListedArray* next_ = nullptr;
 };
 
-/// All arrays of a question. It stays where it is, since arrays and rooms point to it.
+/// Has all arrays of a question. It stays where it is, since arrays and rooms point to it.
 class Memory {
  public:
   Memory() = default;
@@ -125,7 +125,7 @@ class Room {
   bool is_made_ = false;  // room for nothing may take some memory too
 };
 
-/// How many elements an array has for so many of what its room counts.
+/// Returns how many elements an array has for so many of what its room counts.
 using ElementsFor = std::uint64_t (*)(std::uint64_t count);
 inline std::uint64_t one_for_each(std::uint64_t count) {
   return count;
@@ -135,7 +135,7 @@ std::uint64_t times(std::uint64_t count) {
   return kTimes * count;
 }
 
-/// What becomes of an array's elements where its room grows.
+/// Says what becomes of an array's elements when its room grows.
 enum class Growth { forgets, keeps };
 
 /// An array of a question, in GPU memory.

@@ -5,7 +5,7 @@
 #include "tandem/kernels/broad_phase.h"
 #include "tandem/kernels/world_box.h"
 
-/// What queries refuse of instances and object pairs, and what they make of the others.
+/// These functions say which instances and object pairs queries refuse, and what they make of the others.
 namespace tandem {
 
 /// Poses an instance. `assets` is an array whose elements have origin, lower and upper, as a file's header

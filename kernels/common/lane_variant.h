@@ -12,7 +12,7 @@ struct BoundedBlockPair;
 struct NearestSoFar;
 struct ManifoldLanes;
 
-/// What is compiled once for each width of vectors.
+/// The functions that are compiled once for each width of vectors.
 struct LaneVariant {
   BlockPairTest block_pair_test;
   bool (*narrow_phase)(const PairTask&, ContactSink&);

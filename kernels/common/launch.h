@@ -16,7 +16,7 @@ namespace tandem::gpu {
 /// Code for GPUs from this one on waits where wait_for_kernel_before() says so; a value of __CUDA_ARCH__.
 inline constexpr int kFirstThatWaits = 900;
 
-/// What there is of the current device. Result: an error also where the program holds no code for it.
+/// Finds the limits of the current device. Result: an error also where the program holds no code for it.
 cudaError_t limits_of_device(DeviceLimits& out);
 
 struct Grid {

@@ -11,12 +11,13 @@
 #include "kernels/geometry/relative_pose.h"
 #include "tandem/kernels/gpu_contact_query.h"
 
-// What every engine on the GPU keeps of assets and object pairs, and how its lanes share an array.
+// Every engine on the GPU keeps these records of assets and object pairs, and its lanes share arrays in this
+// way.
 namespace tandem::gpu {
 
 using Counter = unsigned long long;  // what atomicAdd takes
 
-/// What the walk needs to know of an object pair, in whole float4.
+/// The record of an object pair that the walk needs, in whole float4.
 struct alignas(16) PairRecord {
   float4 rotation[3];      ///< of RelativePose; w: translation
   float4 abs_rotation[3];  ///< w: slack_a
@@ -37,10 +38,10 @@ struct alignas(16) PairRecord {
 };
 static_assert(sizeof(PairRecord) == 160);
 
-/// Which blocks of a tree are walked.
+/// Says which blocks of a tree are walked.
 enum class BlockKind : std::uint8_t { axis_aligned, oriented };
 
-/// What an error is about, in the order of the CPU's checks.
+/// Says what an error is about, in the order of the CPU's checks.
 enum class Subject : Counter { instance, pair, reach };
 
 /// An error as one number, of which the largest wins: that of the first subject, and of those the first.
@@ -74,8 +75,8 @@ __device__ inline Counter place_for(bool wanted, Counter* counter) {
   return __shfl_sync(kAllLanes, first, 0) + __popc(lanes & lanes_below());
 }
 
-/// By plain loads: a kernel that is launched early may be there while the records are made, and what __ldg()
-/// loads must not change while a kernel runs.
+/// Returns the pose by plain loads: a kernel that is launched early may be there while the records are made,
+/// and what __ldg() loads must not change while a kernel runs.
 __device__ inline RelativePose pose_of(const PairRecord& record) {
   RelativePose pose;
 #pragma unroll
@@ -91,7 +92,7 @@ __device__ inline RelativePose pose_of(const PairRecord& record) {
   return pose;
 }
 
-/// What pose_of() gives back.
+/// Stores the pose that pose_of() gives back.
 __device__ inline void set_pose(const RelativePose& pose, PairRecord& record) {
   for (int i = 0; i < 3; ++i) {
     const auto &r = pose.rotation[i], &m = pose.abs_rotation[i];
@@ -112,7 +113,7 @@ __device__ inline Pose stored_pose(const Args& args, std::uint32_t instance) {
   return stored_pose(args.instances, args.assets, instance);
 }
 
-/// How many of the given object pairs a query looks at: those that there are and that have room.
+/// Returns how many of the given object pairs a query looks at: those that there are and that have room.
 template <typename Args>
 __device__ inline std::uint32_t pair_count(const Args& args) {
   const std::uint32_t count = *args.given.count;
@@ -166,14 +167,14 @@ __device__ inline PairRecord make_record(const ObjectPair& pair, const GpuAsset&
   return record;
 }
 
-/// The same of contacts.
+/// Makes the record of a pair whose contacts are asked for.
 __device__ inline PairRecord make_record(const ObjectPair& pair, const GpuAsset& a, const Pose& pose_a,
                                          const GpuAsset& b, const Pose& pose_b, BlockKind kind) {
   distance::FrameClearance none;
   return make_record(pair, a, pose_a, b, pose_b, kind, 0, none);
 }
 
-/// The same of instances whose assets there are, where they stand.
+/// Makes the record of a pair of instances, whose assets must exist, at the poses that they have.
 __device__ inline PairRecord make_record(const GpuInstances& instances, const GpuAsset* assets,
                                          const ObjectPair& pair, BlockKind kind, double within,
                                          distance::FrameClearance& clearance) {

@@ -9,7 +9,7 @@
 /// Source: Damkjaer and Erleben 2009, section 2; from a stack instead of level by level.
 namespace tandem {
 
-/// One unit of tandem work: up to 4 x 4 node pairs of two blocks. Bit 4 i + j of `mask` stands for node i of
+/// A unit of tandem work: up to 4 x 4 node pairs of two blocks. Bit 4 i + j of `mask` stands for node i of
 /// block a against node j of block b.
 struct BlockPair {
   std::uint32_t a, b;
@@ -81,7 +81,7 @@ class BlockPairStack {
   std::uint32_t height_ = 0;
 };
 
-/// How large what is in a block may be: the sum of half-extents of the largest node.
+/// Returns how large the contents of a block may be: the sum of half-extents of the largest node.
 TANDEM_HD inline float size_of(const Block& block) {
   float size = 0;  // imaginary nodes have -infinity
   for (int i = 0; i < kNodesPerBlock; ++i) {
@@ -95,18 +95,19 @@ TANDEM_HD inline float size_of(const OrientedBlock& block) {
   return block.size;
 }
 
-/// Which of the two blocks of a pair that hits are replaced by their children.
+/// Says which of the two blocks of a pair that hits are replaced by their children.
 enum class Descent : std::uint32_t { both, b_alone, a_alone };
 
-/// Of a leaf block and an internal one, the internal one descends.
+/// If a leaf block meets an internal one, the internal one descends.
 TANDEM_HD constexpr Descent descent_beside_leaves(bool leaf_a) {
   return leaf_a ? Descent::b_alone : Descent::a_alone;
 }
 
-/// How many times larger one of two internal blocks must be to descend alone. Bodies on a ground: a third of
-/// the block pairs. Any factor from 1.5 to 4 does about as well (docs/decisions/0013).
+/// An internal block must be this many times larger than the other one to descend alone. For bodies on a
+/// ground that leaves a third of the block pairs. Any factor from 1.5 to 4 does about as well
+/// (docs/decisions/0013).
 inline constexpr float kDescendsAlone = 2;
-/// The same by oriented_size() (docs/decisions/0039).
+/// The factor for sizes by oriented_size() (docs/decisions/0039).
 inline constexpr float kOrientedDescendsAlone = 1.75f;
 
 TANDEM_HD constexpr float descends_alone(const Block&) {
@@ -116,19 +117,19 @@ TANDEM_HD constexpr float descends_alone(const OrientedBlock&) {
   return kOrientedDescendsAlone;
 }
 
-/// Of two internal blocks, one that is so many times larger descends alone.
+/// If one of two internal blocks is so many times larger, it descends alone.
 TANDEM_HD constexpr Descent descent_by_size(float size_a, float size_b, float times) {
   if (size_a > times * size_b) return Descent::a_alone;
   return size_b > times * size_a ? Descent::b_alone : Descent::both;
 }
 
-/// How many times larger a leaf block must be than an internal one for its triangles' planes to be tried, see
-/// drop_beyond_planes(). A plane tells more than a box where the other mesh's nodes are much smaller: under
-/// bodies of 24,000 triangles on a ground it spares 40 % of the block pairs and 60 % of the candidates
+/// A leaf block must be this many times larger than an internal one for its triangles' planes to be tried,
+/// see drop_beyond_planes(). A plane tells more than a box where the other mesh's nodes are much smaller:
+/// under bodies of 24,000 triangles on a ground it spares 40 % of the block pairs and 60 % of the candidates
 /// (docs/decisions/0014).
 inline constexpr float kTimesLarger = 4;
 
-/// Whether it is that much larger. The other of the two is an internal block.
+/// Returns whether it is that much larger. The other of the two is an internal block.
 TANDEM_HD constexpr bool worth_planes(bool leaf_a, float size_a, float size_b) {
   return descent_by_size(size_a, size_b, kTimesLarger) == (leaf_a ? Descent::a_alone : Descent::b_alone);
 }

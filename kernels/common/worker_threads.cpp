@@ -20,11 +20,11 @@ std::uint64_t at_work(std::uint64_t state) {
   return state & kLow;
 }
 
-// How often a thread looks before it sleeps, about a tenth of a millisecond: longer than what lies between
+// A thread looks this often before it sleeps, about a tenth of a millisecond: longer than what lies between
 // two phases of a query, and about what waking a thread takes.
 constexpr int kLooks = 512;
 
-// Whether it came true while this thread was awake.
+// Returns whether it came true while this thread was awake.
 template <typename Condition>
 bool comes_soon(const Condition& condition) {
   for (int look = 0; look < kLooks; ++look) {

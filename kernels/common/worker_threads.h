@@ -69,9 +69,9 @@ class WorkerThreads {
   Work work_ = nullptr;
   void* context_ = nullptr;
   Allocator allocator_;  ///< of the caller
-  /// How often there was work, times 2^32; plus the workers that may begin it, the caller's included, times
-  /// 2^16, 0 when none may any longer; plus the other threads at work. In one number, so that no thread
-  /// begins what has ended.
+  /// This is the number of times that there was work, times 2^32; plus the workers that may begin it, the
+  /// caller's included, times 2^16, 0 when none may any longer; plus the other threads at work. All is in one
+  /// number, so that no thread begins what has ended.
   std::atomic<std::uint64_t> state_ = 0;
   bool stopping_ = false;
 };

@@ -119,7 +119,7 @@ Status ContactFinder::collect(SceneState& scene, Buffer<Contact>& contacts, Cont
   return Status::kOk;
 }
 
-// What adds error bounds proves something, so it is decided exactly in mode fast too.
+// A query with error bounds proves something, so it is decided exactly in mode fast too.
 Status ContactFinder::find(SceneState& scene, std::span<const PosedTree> trees,
                            std::span<const ObjectPair> pairs, const ContactOptions& options,
                            Buffer<Contact>& contacts, ContactCounters& counters) {

@@ -2,7 +2,7 @@
 #include "kernels/contact/gpu_query_data.h"
 #include "kernels/contact/walk.cuh"
 
-// What the walk of the records leaves, in one kernel, which ends the query: candidates that float32 cannot
+// One kernel decides what the walk of the records leaves, and ends the query: candidates that float32 cannot
 // decide, and object pairs that float32 cannot take.
 //
 // Candidates are decided by float64 as they lie in the list. What float64 leaves waits in shared memory until
@@ -66,7 +66,7 @@ class Deciding {
   }
 
  private:
-  /// By float64, or as mode fast does.
+  /// Decides by float64, or as mode fast does.
   __device__ void decide(bool mine, std::uint32_t i) {
     const Candidate candidate = args_.undecided[mine ? i : 0];
     const PairRecord& record = args_.pairs[candidate.pair];
@@ -105,8 +105,8 @@ class Deciding {
   Candidate* queue_;
 };
 
-/// The same of clearance: by float32, then float64, then exactly, each stage as soon as the block's threads
-/// all have a candidate. The result is exact in mode fast too.
+/// Decides candidates of clearance by float32, then float64, then exactly, each stage as soon as the block's
+/// threads all have a candidate. The result is exact in mode fast too.
 class NearDeciding {
  public:
   __device__ NearDeciding(const QueryArgs& args, float4* memory)
@@ -188,7 +188,7 @@ class NearDeciding {
     add_contact(args_, record, candidate, contact);
   }
 
-  /// By one thread.
+  /// Stores a candidate; one thread calls it.
   __device__ void put(int stage, const Candidate& candidate) {
     queue_[stage][atomicAdd(&waiting_[stage], 1u)] = candidate;
   }
@@ -209,7 +209,7 @@ class NearDeciding {
   Candidate* queue_[kStages];
 };
 
-/// What other blocks made of it.
+/// Returns what other blocks made of a counter.
 __device__ Counter now(const Counter& counter) {
   return *static_cast<const volatile Counter*>(&counter);
 }
@@ -243,7 +243,8 @@ __device__ void write_report(const QueryArgs& args) {
   *args.host_report = report;
 }
 
-// What makes the state ready for the next query; the report stays. Mailboxes: those that this one used.
+// These functions make the state ready for the next query; the report stays. mailboxes: those that this query
+// used.
 __device__ void clear_mailboxes(Balance& balance, std::uint32_t first, std::uint32_t step,
                                 std::uint32_t mailboxes) {
   for (std::uint32_t i = first; i < mailboxes; i += step) balance.mailbox[i] = 0;
@@ -257,7 +258,7 @@ __device__ void clear_counters(QueryState& state) {
   state.block_pairs = state.candidates = state.decided_by_float64 = 0;
 }
 
-/// Whether the block comes here last, all others being done. word: in shared memory.
+/// Returns whether the block comes here last, all others being done. word: in shared memory.
 __device__ bool ends_last(const QueryArgs& args, std::uint32_t& word) {
   __threadfence();
   __syncthreads();

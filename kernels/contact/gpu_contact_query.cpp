@@ -133,7 +133,7 @@ struct HostOf<GpuContactReport> : GpuHost<QueryState, GpuContactReport> {
             options.sorted ? nullptr : contacts.data()};
   }
 
-  // Why a query with these options cannot be queued.
+  // Returns why a query with these options cannot be queued.
   Status refusal(const GpuContactOptions& options) const {
     const bool oriented = walked_kind(options.mode) == BlockKind::oriented;
     if (oriented && !assets.all.oriented) return Status::kNoOrientedBlocks;
@@ -162,7 +162,7 @@ struct HostOf<GpuContactReport> : GpuHost<QueryState, GpuContactReport> {
     return args;
   }
 
-  // All kernels of a query but those that group and sort.
+  // Launches all kernels of a query but those that group and sort.
   cudaError_t launch(const QueryArgs& args, cudaStream_t stream) {
     cudaError_t result = cudaSuccess;
     if (!state_is_clear) result = cudaMemsetAsync(args.state, 0, sizeof(QueryState), stream);
@@ -170,7 +170,7 @@ struct HostOf<GpuContactReport> : GpuHost<QueryState, GpuContactReport> {
     if (result == cudaSuccess) result = cudaStreamIsCapturing(stream, &capture);
     const auto walk = args.mode == QueryMode::exact ? walk_exact : walk_unfused;
     if (result == cudaSuccess) result = queue(args, stream, prepare_pairs, walk, decide_rest);
-    // What is captured has not run: the state is as before.
+    // A captured call has not run: the state is as before.
     if (capture == cudaStreamCaptureStatusNone) state_is_clear = result == cudaSuccess;
     return result;
   }

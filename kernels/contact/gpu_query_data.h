@@ -10,7 +10,7 @@
 #include "kernels/geometry/clearance.h"
 #include "kernels/geometry/level_error.h"
 
-// What the kernels of a query share, all of it in GPU memory.
+// The kernels of a query share this data, all of it in GPU memory.
 namespace tandem::gpu {
 
 /// The bits that the walk's stack has for the number of a block; all of them set is no block's.
@@ -27,7 +27,7 @@ struct alignas(16) Chunk {
   Counter entry[32][2];
 };
 
-/// How warps share work, see work_sharing.h, and the first object pair that no warp took.
+/// The state of work sharing, see work_sharing.h, and the first object pair that no warp took.
 struct alignas(128) Balance {
   Counter counts;
   Counter beside_counts;  ///< never written: warps look at 16 bytes at once
@@ -58,14 +58,14 @@ TANDEM_HD constexpr std::uint32_t tiles_of(std::uint32_t pairs) {
   return pairs / kPairsPerTile + 1;
 }
 
-/// Where there are few pairs, the counts of their contacts lie apart, a cache line each: atomic operations on
+/// If there are few pairs, the counts of their contacts lie apart, a cache line each: atomic operations on
 /// one line wait for each other.
 inline constexpr std::uint32_t kMostSpreadPairs = 4096, kSpread = 32;
 TANDEM_HD constexpr std::uint32_t spread_of(std::uint32_t pairs) {
   return pairs <= kMostSpreadPairs ? kSpread : 1;
 }
 
-/// What grouping contacts by pair takes; null where it is not asked for.
+/// The arrays that grouping contacts by pair takes; null where it is not asked for.
 struct Grouping {
   std::uint32_t* next;  ///< of each pair, spread_of() apart: its number of contacts, then the next place
   std::uint32_t* first_contact;
@@ -110,7 +110,7 @@ struct QueryArgs {
   WideRoom* wide_rooms;
 };
 
-/// What sorting takes besides args.contacts, which it reads: all of as many contacts.
+/// The room that sorting takes besides args.contacts, which it reads: each array is of as many contacts.
 struct SortingRoom {
   Contact* out;          ///< kContactsForKeys more
   std::uint32_t* order;  ///< twice as many
@@ -123,13 +123,13 @@ struct SortingRoom {
 /// Sorting keeps two rows of 64-bit keys where its result is to come, each row aligned.
 inline constexpr std::size_t kContactsForKeys = 32;
 
-/// More room for candidates than a query needed, because what it looks at before it finds a pair's first
-/// contact differs from run to run.
+/// Returns more room for candidates than a query needed, because what it looks at before it finds a pair's
+/// first contact differs from run to run.
 constexpr std::uint64_t with_spare(std::uint64_t undecided) {
   return undecided + undecided / 2 + 1024;
 }
 
-/// Which blocks a query of this mode walks.
+/// Returns which blocks a query of this mode walks.
 TANDEM_HD constexpr BlockKind walked_kind(QueryMode mode) {
   return mode == QueryMode::exact ? BlockKind::oriented : BlockKind::axis_aligned;
 }
@@ -159,8 +159,8 @@ __device__ inline bool failed(const QueryArgs& args) {
   return *static_cast<volatile Counter*>(&args.state->error) != 0;
 }
 
-/// How near triangles of two instances have to be in a query of clearance. In files that are compiled without
-/// fused operations, so that it has the CPU's bits.
+/// Returns how near triangles of two instances have to be in a query of clearance. In files that are compiled
+/// without fused operations, so that it has the CPU's bits.
 __device__ inline double clearance_of(const QueryArgs& args, std::uint32_t a, std::uint32_t b) {
   if (!args.adds_errors || a == b) return args.within;
   const auto error = [&](std::uint32_t instance) {
@@ -170,7 +170,7 @@ __device__ inline double clearance_of(const QueryArgs& args, std::uint32_t a, st
   return clearance_of_levels(args.within, error(a), error(b));
 }
 
-/// Whether the contact counts: where only the first is asked for, the first of its pair.
+/// Returns whether the contact counts: where only the first is asked for, the first of its pair.
 __device__ inline bool is_wanted(const QueryArgs& args, std::uint32_t pair) {
   if (!args.first_contact_only) return true;
   // Looked at before it is written: many contacts of few pairs would queue up at them.

@@ -52,8 +52,8 @@ __global__ void __launch_bounds__(kThreads) count_contacts(const __grid_constant
 // waits for one that has not begun.
 constexpr Counter kOwnSum = Counter{1} << 62, kSumUpToHere = Counter{2} << 62, kSumBits = kOwnSum - 1;
 
-// In a sum of pairs: those with few contacts count 1, those with more 2^31. reserve() sees to it that neither
-// number reaches 2^31.
+// Sums of pairs count two things at once: those with few contacts count 1, those with more 2^31. reserve()
+// sees to it that neither number reaches 2^31.
 constexpr std::uint32_t kManyShift = 31;
 constexpr Counter kFewBits = (Counter{1} << kManyShift) - 1;
 
@@ -73,7 +73,7 @@ __device__ void tell(Counter* words, std::uint32_t tile, Counter word) {
   *static_cast<volatile Counter*>(&words[tile]) = word;
 }
 
-/// The sum of all tiles before this one. By a warp.
+/// The sum of all tiles before this one. A warp calls it.
 __device__ Counter sum_before(const Counter* words, std::uint32_t tile) {
   Counter sum = 0;
   for (std::uint32_t end = tile;; end -= 32) {
@@ -109,8 +109,8 @@ __device__ Sums sums_before(const Grouping& grouping, std::uint32_t tile, const 
   return {before[0], before[1]};
 }
 
-/// From the counts of a tile's pairs to where their contacts begin, and to lists of those that have some. The
-/// last tile has the place behind the last pair, where all contacts end.
+/// Turns the counts of a tile's pairs into where their contacts begin, and lists the pairs that have some.
+/// The last tile has the place behind the last pair, where all contacts end.
 __device__ void make_ranges_of(const QueryArgs& args, std::uint32_t tile, std::uint32_t pairs) {
   using Scan = cub::BlockScan<Sums, kThreads>;
   __shared__ typename Scan::TempStorage scratch;

@@ -36,7 +36,7 @@ TANDEM_HD inline frame::BoxInFrame<float> stored_box(const Block& block, int nod
   return out;
 }
 
-/// Of a leaf block and an internal one: the hits less those of nodes that lie beyond the plane of the
+/// Returns the hits of a leaf block and an internal one, less those of nodes that lie beyond the plane of the
 /// triangle. A bit of `hits` stands for a node pair, as in BlockPair. triangles_a, triangles_b: of the trees;
 /// error: frame_error().
 TANDEM_HD inline std::uint32_t drop_beyond_planes(const Block& a, const Block& b, std::uint32_t hits,

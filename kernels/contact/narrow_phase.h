@@ -28,10 +28,10 @@ struct PairTask {
   distance::FrameClearance clearance = {};  ///< where that is not 0
 };
 
-/// What is to be known of these two, or of one instance with itself. What else is asked is up to the caller.
+/// Returns the task of these two, or of one instance with itself. The caller sets what else is asked.
 PairTask pair_task(const PosedTree& a, const PosedTree& b, double within = 0);
 
-/// Where contacts go: room that grows.
+/// The room where contacts go, which grows.
 struct ContactSink {
   Contact* next = nullptr;
   Contact* end = nullptr;
@@ -47,13 +47,12 @@ using NarrowPhase = bool (*)(const PairTask&, ContactSink&);
 /// order, and the same counters. Condition: task.in_frame.
 NarrowPhase narrow_phase(BlockPairVariant variant);
 
-/// For pairs that are not in_frame: boxes of nodes in world coordinates, float64. Slow, and right for all
-/// posed points that are finite.
+/// Walks pairs that are not in_frame by the boxes of nodes in world coordinates, float64. It is slow, and
+/// right for all posed points that are finite.
 bool narrow_phase_by_world_boxes(const PairTask& task, ContactSink& sink);
 
-/// What the first stage left: decides on the posed vertices, by float64, then exactly. In fast mode, by
-/// float32 in a's frame.
-/// Where task.within is not 0, whether they are within it, in any mode.
+/// Decides what the first stage left, on the posed vertices, by float64, then exactly. In fast mode, by
+/// float32 in a's frame. Where task.within is not 0, whether they are within it, in any mode.
 bool meet(const PairTask& task, std::uint32_t triangle_a, std::uint32_t triangle_b,
           ContactCounters& counters);
 

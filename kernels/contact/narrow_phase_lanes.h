@@ -75,7 +75,7 @@ TANDEM_INLINE void gather_leaves(const Triangle* triangles, const Block& block,
   for (int corner = 0; corner < 3; ++corner) corners[corner] = gather<4>(triangles, index, corner);
 }
 
-// Not inlined, not to crowd the test of boxes out of registers.
+// This is not inlined, so as not to crowd the test of boxes out of registers.
 [[gnu::noinline]] std::uint32_t without_beyond_planes(const PairTask& task, const Block& a, const Block& b,
                                                       std::uint32_t hits) {
   const bool leaves_a = a.is_leaf_block();
@@ -117,7 +117,7 @@ TANDEM_INLINE BatchVerdicts decide_batch(const PairTask& task, const Candidates&
   return out;
 }
 
-// Not inlined, not to crowd the other stages out of registers.
+// This is not inlined, so as not to crowd the other stages out of registers.
 template <int kCount>
 [[gnu::noinline]] BatchVerdicts decide_on_grid(const PairTask& task, const Candidates& candidates) {
   return decide_batch<kCount, FirstStage::on_grid>(task, candidates);
@@ -249,7 +249,7 @@ class LaneMeans {
     return decide_batch_within<kCount>(task_, candidates);
   }
 
-  // All stages inlined, though clearance calls one of them too.
+  // All stages are inlined, though clearance calls one of them too.
   [[gnu::flatten]] BatchVerdicts decide(Candidates& candidates) const {
     fill_up(candidates);
     if (task_.on_grid) return decide_on_grid<kCount>(task_, candidates);

@@ -32,12 +32,12 @@ struct BatchVerdicts {
   std::uint32_t contact, undecided;
 };
 
-/// The same of the first step of clearance, see distance::sift().
+/// The outcome of the first step of clearance for a batch, see distance::sift().
 struct BatchSifted {
   std::uint32_t beyond, within;
 };
 
-/// What the first stage of the triangle test makes of the candidates of a pair.
+/// Says what the first stage of the triangle test does with the candidates of a pair.
 enum class FirstStage : std::uint8_t {
   bounded,      ///< float32 with an error bound
   as_computed,  ///< float32, rounding ignored: mode fast
@@ -94,8 +94,9 @@ class PairWalk {
   }
 
  private:
-  /// Of the first `count` candidates, adds those that are surely within, and keeps those that may be. False:
-  /// the pair is done with. Not inlined, as settle_near(), not to crowd the walk that is for contacts.
+  /// Adds those of the first `count` candidates that are surely within, and keeps those that may be. False:
+  /// the pair is done with. It is not inlined, as settle_near() is not, so as not to crowd the walk that is
+  /// for contacts.
   [[gnu::noinline]] bool sift(std::uint32_t count) {
     const std::uint32_t given = (2u << (count - 1)) - 1;
     const BatchSifted sifted = means_.sift(candidates_);

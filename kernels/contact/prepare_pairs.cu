@@ -2,8 +2,9 @@
 
 #include "kernels/contact/gpu_query_data.h"
 
-// Before the walk: what is wrong with instances and pairs, and how the two of a pair lie. Compiled without
-// fused operations, so that poses, and masks that follow from them, are those of the CPU.
+// Before the walk, these kernels find what is wrong with instances and pairs, and how the two of a pair lie.
+// They are compiled without fused operations, so that poses, and masks that follow from them, are those of
+// the CPU.
 namespace tandem::gpu {
 namespace {
 

@@ -3,7 +3,7 @@
 #include "kernels/contact/walk_memory.cuh"
 #include "kernels/contact/work_sharing.h"
 
-// What WorkSharing asks of a warp of the GPU.
+// WorkSharing asks this of a warp of the GPU.
 namespace tandem::gpu {
 namespace {
 

@@ -23,8 +23,8 @@ constexpr std::uint32_t kRoundsBetweenCounts = 1u << 26;  // a lane counts at mo
 static_assert(kBlockWords == kPositionWords &&
               kWarpWords == ContactOutput::kSharedWords + SharingWarp::kSharedWords);
 
-/// Where a warp has its shared memory, and the lane. Read back from memory, so that the compiler keeps them
-/// in registers and does not compute them anew.
+/// The place of a warp's shared memory, and the lane. It is read back from memory, so that the compiler keeps
+/// them in registers and does not compute them anew.
 struct WarpPlace {
   std::uint32_t memory, lane;
 };
@@ -82,8 +82,8 @@ class Walk {
 
   __device__ std::uint32_t warps() const { return gridDim.x * args_.shape.warps; }
 
-  /// How many object pairs each warp takes where there are so many. Without sharing, few are spread over all
-  /// warps.
+  /// Returns how many object pairs each warp takes where there are so many. Without sharing, few are spread
+  /// over all warps.
   __device__ std::uint32_t share_of(std::uint32_t pairs) const {
     const std::uint32_t share =
         kShares ? max(pairs / warps(), kFewestPairsAtOnce) : (pairs + warps() - 1) / warps();
@@ -145,18 +145,18 @@ class Walk {
     if (++rounds_ >= kRoundsBetweenCounts) add_counters(), rounds_ = 0;
   }
 
-  /// By one lane: false where the first contact is enough, and the pair has one.
+  /// Returns false where the first contact is enough and the pair has one. One lane calls it.
   __device__ bool is_open(std::uint32_t pair) const {
     return !args_.first_contact_only || *static_cast<volatile std::uint32_t*>(&args_.met[pair]) == 0;
   }
 
-  /// What is left to do of a block pair.
+  /// The part of a block pair that is left to do.
   struct Tested {
     uint4 entry;
     bool of_leaves;
   };
 
-  /// Tests the block pair that a lane took off. By one lane.
+  /// Tests the block pair that a lane took off. One lane calls it.
   __device__ Tested test(const Taken& taken) const {
     const PairRecord& record = args_.pairs[taken.entry.x];
     const Below now = below_of<typename Means::Blocks>(record, taken.entry, taken.bit);
@@ -179,7 +179,7 @@ class Walk {
   }
 
   /// The entry of a block pair whose node pairs in `hits` meet, but for the bits above the numbers of blocks,
-  /// which numbers of triangles may need. By one lane.
+  /// which numbers of triangles may need. One lane calls it.
   __device__ static uint4 entry_of(const Taken& taken, std::uint32_t hits, Descent goes_on, const Below& now,
                                    const Side& side_a, const Side& side_b) {
     std::uint32_t left = hits;
@@ -238,7 +238,7 @@ class Walk {
     return stack_.put_given([&](auto put_on) { return sharing().receive(put_on); }) != 0;
   }
 
-  /// Over the warp.
+  /// Returns the sum over the warp.
   __device__ static Counter sum_of(std::uint32_t count) {
     const std::uint32_t high = __reduce_add_sync(kAllLanes, count >> 16),
                         low = __reduce_add_sync(kAllLanes, count & 0xFFFFu);
@@ -292,7 +292,7 @@ __device__ inline std::uint32_t sums_of_block(std::uint32_t memory) {
   return memory + 4 * (kBlockWords + ContactOutput::kSharedWords + SharingWarp::kFreeWord);
 }
 
-/// Before a walk of the block.
+/// Prepares shared memory before a walk of the block.
 __device__ inline void prepare_memory(float4* memory) {
   fill_positions(reinterpret_cast<std::uint32_t*>(memory));
   if (threadIdx.x < SharingWarp::kFreeWords)
@@ -322,7 +322,8 @@ __global__ void __launch_bounds__(32 * kMostWarpsPerBlock, 1) walk(const __grid_
 
 /// Launches a kernel of thread blocks in the shape of a walk.
 inline cudaError_t launch_shaped(void (*kernel)(QueryArgs), const QueryArgs& args, cudaStream_t stream) {
-  // The same for every walk: CUDA keeps it with the kernel, and another thread's walk may need more.
+  // This value is the same for every walk: CUDA keeps it with the kernel, and another thread's walk may need
+  // more.
   const cudaError_t error = cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
                                                  static_cast<int>(most_shared_bytes(args.limits)));
   if (error != cudaSuccess) return error;

@@ -9,8 +9,8 @@
 #include "kernels/geometry/oriented_test.h"
 #include "kernels/geometry/oriented_world_box.h"
 
-// What one lane of a walk does with a block pair and with a candidate, in the frame of the first of a pair or
-// in world coordinates.
+// One lane of a walk tests a block pair and a candidate by these functions, in the frame of the first of a
+// pair or in world coordinates.
 //
 // Included by files that are compiled with and without fused operations: internal linkage.
 namespace tandem::gpu {
@@ -86,7 +86,7 @@ __device__ inline std::uint32_t mask_of_block_pair(const Block& block_a, const B
   return mask;
 }
 
-/// What a test tells of a block besides.
+/// The facts about a block that a test gives besides the hits.
 struct Side {
   std::uint32_t below;  ///< kIsLeafBlock and the first triangle, or the family of its children
   float size;
@@ -201,7 +201,7 @@ __device__ inline Triangle load_triangle(const Triangle* triangles, std::uint32_
   return out;
 }
 
-/// What a lane holds of a candidate.
+/// The state of a candidate in a lane.
 struct Judged {
   std::uint32_t face_a, face_b;
   bool contact, undecided;
@@ -230,8 +230,8 @@ struct InFrame {
     }
   }
 
-  /// In mode fast, whose candidates are the CPU's. Oriented boxes of leaves are nearly as thin as their
-  /// planes: exact queries are faster without (docs/decisions/0047).
+  /// Planes are tried in mode fast, whose candidates are the CPU's. Oriented boxes of leaves are nearly as
+  /// thin as their planes: exact queries are faster without (docs/decisions/0047).
   static constexpr bool kTriesPlanes = kMode == QueryMode::fast;
   __device__ __noinline__ static std::uint32_t drop_beyond_planes(const PairRecord& record, std::uint32_t a,
                                                                   std::uint32_t b, std::uint32_t hits) {
@@ -254,7 +254,7 @@ struct InFrame {
   }
 };
 
-/// The same of clearance: candidates pass a sieve, and what it leaves is for another kernel, whose threads
+/// Judges candidates of clearance: they pass a sieve, and what it leaves is for another kernel, whose threads
 /// all have one then.
 template <QueryMode kMode>
 struct NearInFrame : InFrame<kMode> {
@@ -292,7 +292,7 @@ __device__ __noinline__ inline bool are_within_in_few_words(const TrianglePair& 
   return decision.are_within(pair, within, range);
 }
 
-/// One thread after the other, of those that share a room.
+/// The threads that share a room take turns.
 __device__ __noinline__ inline bool are_within_in_wide_room(const TrianglePair& pair, double within,
                                                             const detail::ExponentRange& range,
                                                             WideRoom& room) {
@@ -308,7 +308,7 @@ __device__ __noinline__ inline bool are_within_in_wide_room(const TrianglePair& 
   return result;
 }
 
-/// Of clearance.
+/// Decides clearance exactly.
 __device__ __noinline__ inline bool are_within_exactly(const QueryArgs& args, const PairRecord& record,
                                                        const TrianglePair& pair) {
   if (decide_exactly(pair)) return true;

@@ -5,8 +5,8 @@
 
 #include "kernels/common/pair_record.h"
 
-// How the warps of a walk read and write shared memory of their multiprocessor and what they share in the
-// GPU's.
+// The warps of a walk read and write shared memory of their multiprocessor, and what they share in the GPU's,
+// by these functions.
 //
 // Included by files that are compiled with and without fused operations: internal linkage.
 namespace tandem::gpu {

@@ -8,7 +8,8 @@
 #include "tandem/formats/block.h"
 #include "tandem/formats/platform.h"
 
-// How a walk is launched on a GPU: how many warps, and the room of a warp's stack.
+// The shape of a walk says how it is launched on a GPU: how many warps there are, and the room of a warp's
+// stack.
 namespace tandem::gpu {
 
 // Shared memory in words of 32 bits: of a thread block beside its warps, of a warp beside its stack, and of
@@ -31,8 +32,8 @@ constexpr std::uint32_t stack_reserve(std::uint32_t depth) {
 /// it gets a gift, 31 lie there and 32 come on. With more entries, more lanes have work when room is short.
 inline constexpr std::uint32_t kEntries = 208, kFewestEntries = 80;
 
-/// How many block pairs a warp's next step takes off its stack, of those that wait. room: entries that are
-/// free.
+/// Returns how many block pairs a warp's next step takes off its stack, of those that wait. room: entries
+/// that are free.
 ///
 /// A step puts on one entry at most for each block pair that it takes off, so it takes no more than there is
 /// room for beyond the reserve: it leaves the reserve free. Where no more than the reserve is free, a step
@@ -63,7 +64,7 @@ struct WalkShape {
   }
 };
 
-/// How many entries the stack of each warp can have.
+/// Returns how many entries the stack of each warp can have.
 constexpr std::uint32_t entries_that_fit(std::uint32_t shared_bytes, std::uint32_t warps) {
   const std::uint32_t words = (shared_bytes / 4 - kBlockWords) / warps;
   return words < kWarpWords ? 0 : (words - kWarpWords) / kEntryWords;
@@ -92,13 +93,13 @@ constexpr WalkShape walk_shape(const DeviceLimits& limits, std::uint32_t depth, 
   return shape;
 }
 
-/// As many mailboxes as any walk on this GPU has: none has more warps than with one block for each
+/// Returns the most mailboxes that any walk on this GPU has: none has more warps than with one block for each
 /// multiprocessor and no shortage of shared memory.
 constexpr std::uint32_t most_mailboxes(const DeviceLimits& limits) {
   return std::min(kMostMailboxes, 1u << mailbox_bits_of(kMostWarpsPerBlock * limits.processors));
 }
 
-/// At least the shared memory of any walk on this GPU.
+/// Returns at least the shared memory of any walk on this GPU.
 constexpr std::uint32_t most_shared_bytes(const DeviceLimits& limits) {
   const WalkShape largest = {kMostWarpsPerBlock, 0, stack_reserve(kMaxDepth) + kEntries, 0, 0, true};
   return std::min(limits.shared_bytes, largest.shared_bytes());

@@ -3,9 +3,9 @@
 #include "kernels/contact/gpu_query_data.h"
 #include "kernels/contact/walk_memory.cuh"
 
-// What waits in a warp of the walk: entries in shared memory, each with up to 16 bits. From the front grows
-// the stack of tested block pairs whose block pairs below are still to be tested, a bit for each; from the
-// back the pairs of leaf blocks, a bit for each candidate. An entry is
+// The stack has what waits in a warp of the walk: entries in shared memory, each with up to 16 bits. From the
+// front grows the stack of tested block pairs whose block pairs below are still to be tested, a bit for each;
+// from the back the pairs of leaf blocks, a bit for each candidate. An entry is
 //
 //        31  30 29  28                                  0
 //   x   |                  object pair                   |
@@ -13,8 +13,8 @@
 //   z   |   -   | s |         family of b                |    s: both are of one instance
 //   w   |          hits          |   still to be taken   |    16 bits each
 //
-// A family is the children of a block, by a number that the means of the walk understand (walk_lane.cuh). Of
-// a pair of leaf blocks y and z are the numbers of the first triangles, in 32 bits. `how` the pair goes on
+// A family is the children of a block, by a number that the means of the walk understand (walk_lane.cuh). For
+// a pair of leaf blocks, y and z are the numbers of the first triangles, in 32 bits. `how` the pair goes on
 // (Descent) says what a bit stands for:
 //
 //   both      bit 4 i + j: child i of y, or triangle y + i, against child, or triangle, j of z
@@ -53,7 +53,7 @@ __device__ Below below_of(const PairRecord& record, const uint4& entry, std::uin
 
 constexpr std::uint32_t kPositionWords = 256;
 
-/// For each byte the positions of its bits that are set, three bits each, in ascending order.
+/// Fills in for each byte the positions of its bits that are set, three bits each, in ascending order.
 __device__ inline void fill_positions(std::uint32_t* positions) {
   for (std::uint32_t byte = threadIdx.x; byte < kPositionWords; byte += blockDim.x) {
     std::uint32_t word = 0, at = 0;
@@ -72,7 +72,7 @@ __device__ inline std::uint32_t position_of(std::uint32_t positions, std::uint32
   return (word >> 3 * (high ? rank - in_low : rank) & 7u) | (high ? 8 : 0);
 }
 
-/// What a lane takes off.
+/// The entry that a lane takes off.
 struct Taken {
   uint4 entry;
   std::uint32_t bit;

@@ -9,8 +9,9 @@
 #define TANDEM_WARP_CODE
 #endif
 
-// How the warps of a walk share their work. The GPU runs this code through SharingWarp (sharing_warp.cuh);
-// tests/gpu_protocol runs the same code on the CPU, in all orders that weakly ordered memory allows.
+// The warps of a walk share their work by this protocol. The GPU runs this code through SharingWarp
+// (sharing_warp.cuh); tests/gpu_protocol runs the same code on the CPU, in all orders that weakly ordered
+// memory allows.
 //
 // A warp without work takes a **ticket**, the next of 0, 1, 2, ..., and waits at a **mailbox**. A warp that
 // has enough work gives some of it, a **gift**, to the lowest ticket that got none. The warp that goes idle
@@ -98,7 +99,7 @@ TANDEM_HD constexpr Counts counts_of(std::uint64_t word) {
           static_cast<std::uint32_t>((word + (std::uint64_t{1} << 31)) >> 32)};
 }
 
-/// Also what is added to `counts` where fields change by so much.
+/// Returns the word of these fields, which is also what is added to `counts` where fields change by so much.
 TANDEM_HD constexpr std::uint64_t word_of(std::int64_t active, std::int64_t waiting, std::int64_t given) {
   return static_cast<std::uint64_t>(active) + (static_cast<std::uint64_t>(waiting) << 16) +
          (static_cast<std::uint64_t>(given) << 32);
@@ -110,19 +111,20 @@ TANDEM_HD constexpr std::uint32_t mailbox_word(std::uint32_t turn, std::uint32_t
   return turn << 8 | state;
 }
 
-/// What the owner of a turn reads in its mailbox before it has received a gift: the number of entries of one,
-/// kHome, or 0 as long as it has to wait.
+/// Returns what the owner of a turn reads in its mailbox before it has received a gift: the number of entries
+/// of one, kHome, or 0 as long as it has to wait.
 TANDEM_HD constexpr std::uint32_t told(std::uint32_t mailbox, std::uint32_t turn) {
   if (mailbox >> 8 == turn) return mailbox & 0xFFu;
   return mailbox >> 8 > turn ? kHome : 0;
 }
 
-/// Whether the owner of a turn is done with its mailbox.
+/// Returns whether the owner of a turn is done with its mailbox.
 TANDEM_HD constexpr bool is_free_after(std::uint32_t mailbox, std::uint32_t turn) {
   return mailbox == mailbox_word(turn, kHome) || mailbox == mailbox_word(turn, kGivenBack);
 }
 
-/// One warp's part in it. Warp says how a warp reaches the words above; all lanes call each function.
+/// The part of one warp in the protocol. Warp says how a warp reaches the words above; all lanes call each
+/// function.
 template <class Warp>
 class WorkSharing {
  public:
@@ -133,7 +135,7 @@ class WorkSharing {
     if (warp_.is_first()) warp_.add(word_of(1, 0, 0));
   }
 
-  /// How many gifts, at most so many, there were tickets for at the last look.
+  /// Returns how many gifts, at most so many, there were tickets for at the last look.
   TANDEM_WARP_CODE std::uint32_t gifts_wanted(std::uint32_t most) const {
     const Counts seen = counts_of(warp_.seen());
     if (seen.waiting <= 0 || seen.given >= warp_.tickets_end()) return 0;

@@ -8,10 +8,10 @@
 #include "kernels/geometry/inside_test.h"
 #include "tandem/kernels/gpu_containment_query.h"
 
-// What the kernels that find bodies within bodies share, all of it in GPU memory.
+// The kernels that find bodies within bodies share this data, all of it in GPU memory.
 namespace tandem::gpu {
 
-/// Where a row comes among those of its pair.
+/// The place of a row among those of its pair.
 struct FoundContainment {
   Containment row;
   std::uint32_t rank;

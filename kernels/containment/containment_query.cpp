@@ -36,8 +36,8 @@ Surface surface_of(const FileHeader& header, const LevelView& level) {
   return surface;
 }
 
-// Whether the ray from p crosses the closed components an odd number of times. The stack: each block on the
-// way down leaves three beside it, and the lowest gives four.
+// Returns whether the ray from p crosses the closed components an odd number of times. The stack: each block
+// on the way down leaves three beside it, and the lowest gives four.
 bool is_inside(const PosedSurface& body, const double* p) {
   const Block* blocks = body.surface->blocks;
   std::uint32_t stack[3 * kMaxDepth + 1];

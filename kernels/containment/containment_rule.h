@@ -4,14 +4,15 @@
 
 namespace tandem::containment {
 
-/// Whether a point lies in a box, touching included. What encloses a point encloses it in its box too.
+/// Returns whether a point lies in a box, touching included. What encloses a point encloses it in its box
+/// too.
 TANDEM_HD inline bool contains(const WorldBox& box, const double* p) {
   bool within = true;
   for (int k = 0; k < 3; ++k) within = within && box.lo[k] <= p[k] && p[k] <= box.hi[k];
   return within;
 }
 
-/// Whether a body may have a component to report, at a look: find_contained() reports none otherwise.
+/// Returns whether a body may have a component to report, at a look: find_contained() reports none otherwise.
 /// has_contacts: the bodies have contacts; so the component does, where there is one.
 TANDEM_HD inline bool may_have_contained(const PosedSurface& inner, const PosedSurface& outer,
                                          bool has_contacts) {

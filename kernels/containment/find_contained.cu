@@ -1,9 +1,9 @@
 #include "kernels/containment/containment_data.h"
 #include "kernels/containment/containment_rule.h"
 
-// Bodies within bodies. A warp looks at 32 pairs, one a lane; those that may have something to report, which
-// are few, it goes through with all its lanes. Compiled without fused operations: posed points are those of
-// the CPU.
+// These kernels find bodies within bodies. A warp looks at 32 pairs, one a lane; those that may have
+// something to report, which are few, it goes through with all its lanes. The kernels are compiled without
+// fused operations: posed points are those of the CPU.
 namespace tandem::gpu {
 namespace {
 
@@ -21,7 +21,7 @@ constexpr std::uint32_t kBlocksAtOnce = 32 / kNodesPerBlock;
 constexpr std::uint32_t kStackSize = 32 * (kMaxDepth - 1);
 static_assert(kStackSize * 4 * kWarps <= 48 * 1024);
 
-/// Whether the ray from p crosses the closed components an odd number of times. By a warp.
+/// Returns whether the ray from p crosses the closed components an odd number of times. A warp calls it.
 template <typename AnyBlock>
 __device__ bool is_inside(const PosedSurface& body, const AnyBlock* blocks, const double* p,
                           std::uint32_t* stack) {
@@ -53,7 +53,7 @@ __device__ bool is_inside(const PosedSurface& body, const AnyBlock* blocks, cons
   return crossings % 2 != 0;
 }
 
-/// Whether a contact among those from `first` to `end` is of a component. By a warp.
+/// Returns whether a contact among those from `first` to `end` is of a component. A warp calls it.
 __device__ bool touches(const ContainmentArgs& args, std::uint32_t first, std::uint32_t end,
                         std::uint32_t inner, const std::uint32_t* labels, std::uint32_t component) {
   for (std::uint32_t i = first; i < end; i += 32) {
@@ -73,7 +73,7 @@ __device__ PosedSurface posed(const ContainmentArgs& args, std::uint32_t instanc
   return {&surface, for_stored_coordinates(args.instances.pose[instance], surface.origin)};
 }
 
-/// Whether one of the bodies may have something to report. By a thread.
+/// Returns whether one of the bodies may have something to report. A thread calls it.
 __device__ bool is_worth_a_look(const ContainmentArgs& args, std::uint32_t index) {
   const ObjectPair pair = args.pairs.pairs[index];
   if (pair.a == pair.b) return false;
@@ -82,7 +82,7 @@ __device__ bool is_worth_a_look(const ContainmentArgs& args, std::uint32_t index
   return may_have_contained(a, b, has_contacts) || may_have_contained(b, a, has_contacts);
 }
 
-/// Result: how many rows the pair has. By a warp.
+/// Result: how many rows the pair has. A warp calls it.
 __device__ std::uint32_t find_in_pair(const ContainmentArgs& args, std::uint32_t index,
                                       std::uint32_t* stack) {
   const ObjectPair pair = args.pairs.pairs[index];
@@ -139,7 +139,7 @@ __global__ void __launch_bounds__(kThreads) find(const __grid_constant__ Contain
   }
 }
 
-/// The rows of all pairs before this one. By a warp.
+/// The rows of all pairs before this one. A warp calls it.
 __device__ std::uint32_t rows_before(const ContainmentArgs& args, std::uint32_t pair) {
   const std::uint32_t sum = pair / kPairsPerSum;
   std::uint32_t rows = 0;

@@ -9,7 +9,7 @@
 #include "kernels/geometry/triangle_distance.h"
 #include "tandem/kernels/gpu_distance_query.h"
 
-// What the kernels of a distance query share, all of it in GPU memory.
+// The kernels of a distance query share this data, all of it in GPU memory.
 //
 // A query goes through its object pairs together, in steps that are kernels of their own, and what a kernel
 // reads is never written while it runs. So all that is decided is the same on every run, and results are:
@@ -24,7 +24,7 @@
 //     others that the direction of the first does not tell to be as far.
 namespace tandem::gpu {
 
-/// What is to be known of an object pair; see DistanceFrame.
+/// The record of an object pair; see DistanceFrame.
 struct alignas(16) DistanceRecord {
   PairRecord pair;  ///< of axis-aligned blocks
   double square_to_world, least_in_world, most_in_world;
@@ -36,10 +36,11 @@ TANDEM_HD constexpr Counter triangles_as_number(std::uint32_t a, std::uint32_t b
 }
 inline constexpr Counter kNoTriangles = ~Counter{0};
 
-/// What is known of the distance of a pair. Numbers that many threads lessen are the bits of a float64 that
-/// is not negative.
+/// The bounds of the distance of a pair. Numbers that many threads lessen are the bits of a float64 that is
+/// not negative.
 struct alignas(16) NearState {
-  // How near boxes must be to count, with the tolerance and without it: by limit_of(), and in the world.
+  // Boxes must be nearer than these to count, with the tolerance and without it: by limit_of(), and in the
+  // world.
   float limit, open_limit;
   double near, open_near;
   distance::FrameDirection along;  ///< in which the triangles of `seed` are apart
@@ -56,8 +57,8 @@ struct alignas(16) NearState {
 /// the last ends at NearState::top.
 inline constexpr int kSteps = 32;
 
-/// How many entries a round of the narrow walk has, by steps, and the least bound of them: that of this round
-/// and the two after it. Zero, which stands for no bound, two rounds before they are counted.
+/// The number of entries that a round of the narrow walk has, by steps, and the least bound of them: that of
+/// this round and the two after it. Zero, which stands for no bound, two rounds before they are counted.
 struct Narrowing {
   std::uint32_t steps[3][kSteps];
   std::uint32_t least[3];  ///< complement of the bits
@@ -75,7 +76,7 @@ struct TrianglePairEntry {
   std::uint32_t pair, a, b;
 };
 
-/// Of a triangle pair, in a's frame; 0 and infinity where float32 knows nothing.
+/// The bounds of the distance of a triangle pair, in a's frame; 0 and infinity where float32 knows nothing.
 struct FrameBounds {
   float lower, upper;
 };
@@ -146,7 +147,8 @@ __device__ inline DistanceFrame frame_of(const DistanceRecord& record) {
   return frame;
 }
 
-/// What is known of the distance from above; before anything is, what is at least so far is beyond reach.
+/// Returns the upper bound of the distance. Before anything is known, what is at least so far is beyond
+/// reach.
 __device__ inline double upper_in(const DistanceArgs& args, const NearState& state) {
   return fmin(as_double(state.upper), args.beyond_reach);
 }

@@ -15,8 +15,8 @@ constexpr std::size_t kMostPairsAtOnce = 16;
 // Pairs of bodies with more triangles than this, together, are spread over all threads, one after the other.
 constexpr std::uint64_t kSpreadFrom = std::uint64_t{1} << 18;
 
-// Of such a pair: how many pairs of blocks one walk visits before it leaves the rest to others; and how many
-// walks make a round, in which none knows what the others find. Threads take them as they come.
+// A walk of such a pair visits so many pairs of blocks before it leaves the rest to others; and so many walks
+// make a round, in which none knows what the others find. Threads take them as they come.
 constexpr std::uint64_t kVisitsAlone = 2048, kVisitsInRound = 512;
 constexpr std::size_t kWalksInRound = 64;
 
@@ -38,7 +38,7 @@ struct DistanceQuery::State : Allocated {
   PerWorker<NearestSoFar> slots;  // one for each worker, or for each walk of a round
   Buffer<BoundedBlockPair> walks;
 
-  // Of the call.
+  // These belong to the call.
   SceneState* scene = nullptr;
   DistanceOptions options;
   std::span<const ObjectPair> pairs;
@@ -68,7 +68,7 @@ NearestTask DistanceQuery::State::task_of(const ObjectPair& pair) const {
   return nearest_task(scene->bodies[pair.a], scene->bodies[pair.b], options.tolerance);
 }
 
-// Nothing is known but what the former nearest triangles tell.
+// Begins with nothing known but what the former nearest triangles tell.
 void DistanceQuery::State::begin(const NearestTask& task, const ObjectPair& pair, NearestSoFar& state) const {
   state.reset(options.reach);
   const auto comes_before = [](const FormerNearest& x, const ObjectPair& y) {
@@ -86,7 +86,8 @@ void DistanceQuery::State::finish(std::size_t pair, const NearestTask& task, Nea
   ObjectDistance& out = distances[pair];
   out = {};
   out.triangle_a = out.triangle_b = out.face_a = out.face_b = kNoIndex;
-  // What did not count is not nearer than the upper bound of then, or is beyond reach.
+  // Pairs of triangles that did not count are not nearer than the upper bound of then, or are beyond
+  // reach.
   out.lower = std::min(state.floor, state.upper);
   out.upper = INFINITY;
   if (state.triangle_a == kNoIndex || out.lower > options.reach) return;

@@ -19,7 +19,7 @@ static_assert(most_distance_bytes({0, 1, 1, 1, 0}, 0) - most_distance_bytes({}, 
 
 static_assert(sizeof(DistanceState) <= most_distance_bytes({}, 0));
 
-/// What is there before a query tells what it needs.
+/// The room that is there before a query tells what it needs.
 constexpr std::uint32_t kFirstRoom = 1u << 16;
 
 /// The most of anything: threads that share out so many, each a step beyond its last one, still count in 32

@@ -64,7 +64,7 @@ class NearestLaneMeans {
     return BlockPairBounds<kCount>(a, b, task_.frame.b_in_a).write(limit, out);
   }
 
-  // Not inlined, not to crowd the bounds of boxes out of registers.
+  // This is not inlined, so as not to crowd the bounds of boxes out of registers.
   [[gnu::noinline]] std::uint32_t far_along(const NearBatch& batch, const float (&direction)[3],
                                             double at_least) const {
     const distance::FrameDirection along = direction_of(task_, direction, at_least);

@@ -90,7 +90,7 @@ class NearestWorldBoxMeans {
 
   std::uint32_t far_along(const NearBatch&, const float (&)[3], double) const { return 0; }
 
-  /// Nothing is known, so that all are settled.
+  /// Bounds nothing, so that all are settled.
   void bound(const NearBatch&, BoundedBatch& out) const {
     std::fill_n(out.lower, kNearBatch, 0.0);
     std::fill_n(out.upper, kNearBatch, INFINITY);

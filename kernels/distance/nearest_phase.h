@@ -36,7 +36,7 @@ struct NearCandidate {
   std::uint32_t a, b;
 };
 
-/// What is known of the distance of a pair.
+/// The state of the search for the distance of a pair.
 struct NearestSoFar {
   double upper = INFINITY;  ///< of the distance; before one is found, what is at least so far is beyond reach
   bool found = false;       ///< an upper bound
@@ -74,13 +74,13 @@ using NearestPhase = void (*)(const NearestTask&, const BoundedBlockPair* from, 
 /// task.in_frame.
 NearestPhase nearest_phase(BlockPairVariant variant);
 
-/// For pairs that are not in_frame: boxes of nodes in world coordinates, float64.
+/// Walks pairs that are not in_frame by the boxes of nodes in world coordinates, float64.
 void nearest_phase_by_world_boxes(const NearestTask& task, const BoundedBlockPair* from, std::uint32_t count,
                                   NearestSoFar& state);
 
-// What variants call, and what is compiled once for any machine.
+// These functions are compiled once for any machine, and called by the variants.
 
-/// How near a pair must be to count: nearer than this. What may touch counts, whatever the tolerance.
+/// Returns how near a pair must be to count: nearer than this. What may touch counts, whatever the tolerance.
 double nearness(const NearestTask& task, const NearestSoFar& state);
 
 /// limit_of() and distance_of() of box_distance.h.

@@ -18,7 +18,7 @@ struct NearBatch {
   alignas(64) std::uint32_t b[2 * kNearBatch];
   std::uint32_t count = 0;
 
-  /// What is beyond the count, in the first batch, names any triangle: the first.
+  /// Entries beyond the count, in the first batch, name any triangle: the first.
   void fill_up() {
     for (std::uint32_t i = count; i < kNearBatch; ++i) a[i] = b[i] = 0;
   }
@@ -152,7 +152,7 @@ class NearestWalk {
     limit_without_tolerance_ = means_.limit(state_.upper);
   }
 
-  /// What has this bound counts no longer.
+  /// Entries with this bound count no longer.
   void pass_over(Bound bound) {
     if (bound < limit_without_tolerance_) state_.floor = std::min(state_.floor, means_.distance(bound));
   }
@@ -232,7 +232,7 @@ class NearestWalk {
     if (all && state_.found) wait_in_order();
   }
 
-  /// What is on the stack when the first upper bound is known waits from then on.
+  /// Entries that are on the stack when the first upper bound is known wait from then on.
   void wait_in_order() {
     if (waiting_.has_range()) return;
     waiting_.set_range(static_cast<double>(limit_));

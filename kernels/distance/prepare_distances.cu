@@ -3,9 +3,9 @@
 #include "kernels/common/traversal.h"
 #include "kernels/distance/distance_data.h"
 
-// Before the walk: what is wrong with instances and pairs, how the two of a pair lie, and which pairs have
-// anything within reach. Compiled without fused operations, so that poses, and what is proved of frames, are
-// those of the CPU.
+// Before the walk, these kernels find what is wrong with instances and pairs, how the two of a pair lie, and
+// which pairs have anything within reach. They are compiled without fused operations, so that poses, and what
+// is proved of frames, are those of the CPU.
 namespace tandem::gpu {
 namespace {
 
@@ -33,7 +33,7 @@ __device__ DistanceRecord make_record(const ObjectPair& pair, const LevelView& a
   return record;
 }
 
-/// Whether any nodes of the root blocks are within reach.
+/// Returns whether any nodes of the root blocks are within reach.
 __device__ bool has_near_roots(const DistanceRecord& record, const DistanceFrame& frame, float limit) {
   const Block &a = record.pair.blocks_a[0], &b = record.pair.blocks_b[0];
 #pragma unroll 1
@@ -47,7 +47,7 @@ __device__ bool has_near_roots(const DistanceRecord& record, const DistanceFrame
   return false;
 }
 
-/// Nothing is known.
+/// Returns the state in which nothing is known.
 __device__ NearState fresh_state(const DistanceArgs& args) {
   NearState state = {};
   state.near = state.open_near = args.beyond_reach;
@@ -56,7 +56,7 @@ __device__ NearState fresh_state(const DistanceArgs& args) {
   return state;
 }
 
-/// How far apart anything of two trees can be, up to rounding.
+/// Returns how far apart anything of two trees can be, up to rounding.
 __device__ double farthest_of(const Pose& pose_a, const TreeExtent& a, const Pose& pose_b,
                               const TreeExtent& b) {
   double sum = 0;

@@ -1,7 +1,8 @@
 #include "kernels/distance/distance_data.h"
 
-// What the walk leaves, by float64 on the posed vertices, and exactly where that is not enough; and the
-// report. Compiled without fused operations: posed points are those of the CPU.
+// These kernels decide what the walk leaves, by float64 on the posed vertices, and exactly where that is not
+// enough; then they make the report. They are compiled without fused operations: posed points are those of
+// the CPU.
 namespace tandem::gpu {
 namespace {
 
@@ -58,8 +59,8 @@ __global__ void __launch_bounds__(kThreads) settle_first(const __grid_constant__
   }
 }
 
-/// Whether triangles that float32 leaves are to be settled too: not those that are as far along the direction
-/// of the first. Most share their nearest edge or corner with these, and so all but the distance.
+/// Returns whether triangles that float32 leaves are to be settled too: not those that are as far along the
+/// direction of the first. Most share their nearest edge or corner with these, and so all but the distance.
 __device__ bool is_left(const DistanceArgs& args, const TrianglePairEntry& entry, const FrameBounds& bounds) {
   NearState& state = args.near_states[entry.pair];
   if (state.best == 0 || triangles_as_number(entry.a, entry.b) == state.first) return false;
@@ -110,7 +111,7 @@ __global__ void __launch_bounds__(kThreads) choose_best(const __grid_constant__ 
   }
 }
 
-/// Whether the first triangles of a pair are its nearest.
+/// Returns whether the first triangles of a pair are its nearest.
 __device__ bool is_first_best(const DistanceArgs& args, std::uint32_t pair) {
   const NearState& state = args.near_states[pair];
   if (state.first == kNoTriangles || state.best_of_rest == kNoTriangles)
@@ -136,7 +137,7 @@ __device__ void finish_row(const DistanceArgs& args, std::uint32_t pair, bool fo
   count(args.state->touching, out.upper == 0);
 }
 
-/// What other blocks made of it.
+/// Returns what other blocks made of a counter.
 __device__ Counter now(const Counter& counter) {
   return *static_cast<const volatile Counter*>(&counter);
 }
@@ -149,7 +150,7 @@ __device__ Counter shuffled(Counter x, int bit) {
   return __shfl_xor_sync(kAllLanes, x, bit);
 }
 
-/// By a warp.
+/// Writes the report; a warp calls it.
 __device__ void write_report(const DistanceArgs& args) {
   const DistanceState& state = *args.state;
   GpuDistanceReport report = {};
@@ -189,7 +190,7 @@ __device__ void write_report(const DistanceArgs& args) {
   *args.host_report = report;
 }
 
-/// Whether the block comes here last, all others being done.
+/// Returns whether the block comes here last, all others being done.
 __device__ bool ends_last(const DistanceArgs& args) {
   __shared__ bool last;
   __threadfence();

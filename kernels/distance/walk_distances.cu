@@ -12,12 +12,12 @@ constexpr std::uint32_t kThreads = 128, kBlocksPerProcessor = 5;
 constexpr std::uint32_t kLanes = kNodesPerBlock * kNodesPerBlock;
 constexpr int kTurns = 4;  // block pairs of half a warp whose children are appended at once
 
-// How many block pairs a round of the narrow walk has for each pair: as many as the GPU takes at once, spread
-// over the pairs that are walked. From 32 on the bound is the distance, but for few pairs in a hundred
+// A round of the narrow walk has this many block pairs for each pair: as many as the GPU takes at once,
+// spread over the pairs that are walked. From 32 on the bound is the distance, but for few pairs in a hundred
 // (docs/decisions/0062).
 constexpr std::uint32_t kNarrowRound = 1u << 14, kFewestNarrow = 32, kMostNarrow = 1u << 10;
 
-/// What a lane makes of its node pair of a block pair.
+/// The outcome of a lane's node pair of a block pair.
 struct Visit {
   bool has_below, has_triangles;
   BlockPairEntry below;
@@ -32,8 +32,8 @@ __device__ float least_over(float bound, std::uint32_t low_bit) {
   return fminf(bound, __shfl_xor_sync(kAllLanes, bound, low_bit << 1));
 }
 
-/// What follows from the hits of a block pair. hit, bound: of the lane's node pair; infinite where it is
-/// none. All lanes of the warp take part.
+/// Returns what follows from the hits of a block pair. hit, bound: of the lane's node pair; infinite where it
+/// is none. All lanes of the warp take part.
 __device__ Visit follow(const BlockPairEntry& entry, const Block& a, const Block& b, bool hit, float bound) {
   const std::uint32_t lane = lane_id() % kLanes, i = lane / kNodesPerBlock, j = lane % kNodesPerBlock;
   const std::uint32_t hits = __ballot_sync(kAllLanes, hit) >> (lane_id() & kLanes) & kAllNodePairs;
@@ -65,14 +65,14 @@ __device__ Visit follow(const BlockPairEntry& entry, const Block& a, const Block
   return out;
 }
 
-/// The same number for the same blocks on every run, and any number for others.
+/// Returns the same number for the same blocks on every run, and any number for others.
 __device__ std::uint32_t mixed(std::uint32_t a, std::uint32_t b) {
   std::uint32_t x = a * 0x9E3779B1u ^ b * 0x85EBCA77u;
   x = (x ^ x >> 15) * 0x2C1B3C6Du;
   return x ^ x >> 12;
 }
 
-/// One of the two walks' rounds.
+/// A round of one of the two walks.
 template <bool kNarrow>
 class Round {
  public:
@@ -133,8 +133,8 @@ class Round {
     }
   }
 
-  /// Whether an entry is among the `width_` of its pair that have the least bounds. Of those in the step
-  /// where the room ends a part is taken, any, but the same on every run.
+  /// Returns whether an entry is among the `width_` of its pair that have the least bounds. In the step where
+  /// the room ends, a part of the entries is taken: any part, but the same on every run.
   __device__ bool is_wanted(const BlockPairEntry& entry) const {
     if (!kNarrow) return true;
     const std::uint32_t(&steps)[kSteps] = args_.narrowings[entry.pair].steps[number_ % 3];
@@ -206,7 +206,7 @@ class Round {
     return static_cast<std::uint32_t>(step);
   }
 
-  /// Whether the direction of the nearest triangles so far tells that these are no nearer.
+  /// Returns whether the direction of the nearest triangles so far tells that these are no nearer.
   __device__ static bool is_far(const DistanceRecord& record, const NearState& state, const Visit& found) {
     if (record.pair.in_frame == 0) return false;
     return distance::is_far_along(
@@ -287,8 +287,8 @@ __global__ void __launch_bounds__(kThreads) choose_nearest(const __grid_constant
   }
 }
 
-/// What the walk has to know of the triangles that the narrow walk found. Result: whether there is anything
-/// left to be found.
+/// Writes what the walk has to know of the triangles that the narrow walk found. Result: whether there is
+/// anything left to be found.
 __device__ bool aim_at_nearest(const DistanceArgs& args, std::uint32_t pair) {
   const DistanceRecord& record = args.records[pair];
   NearState& state = args.near_states[pair];

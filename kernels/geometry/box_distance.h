@@ -37,7 +37,7 @@
 /// +infinity. Nothing else overflows where frame_error() is finite: coordinates are below 2^33.
 namespace tandem {
 
-/// Where b lies relative to a, and what lengths in a's frame tell of the posed points' distances.
+/// The pose of b in a's frame, and what lengths in that frame tell of the posed points' distances.
 struct DistanceFrame {
   RelativePose b_in_a;
   float error;                           ///< frame_error()
@@ -67,7 +67,7 @@ TANDEM_HD inline double lack_of_orthonormality(const Real (&m)[3][3]) {
 
 }  // namespace distance
 
-/// Of a frame with b_in_a and error, what lengths in it tell. False: float32 cannot take the pair, and the
+/// Finds what lengths in a frame tell that has b_in_a and error. False: float32 cannot take the pair, and the
 /// frame is of no use.
 TANDEM_HD inline bool bound_lengths(const Pose& pose_a, DistanceFrame& frame) {
   double inverse[3][3];
@@ -123,7 +123,7 @@ TANDEM_HD inline float limit_of(const DistanceFrame& frame, double distance) {
   return square < 0x1p120 ? static_cast<float>(square) : INFINITY;
 }
 
-/// How far apart, in the world, what is in boxes with this bound is at least.
+/// Returns how far apart, in the world, what is in boxes with this bound is at least.
 TANDEM_HD inline double distance_of(const DistanceFrame& frame, float bound) {
   const double square = static_cast<double>(bound) - kSquareSpare;
   return square > 0 ? std::sqrt(square * frame.square_to_world) * (1 - 0x1p-50) : 0;

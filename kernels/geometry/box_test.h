@@ -32,14 +32,14 @@ TANDEM_HD inline Value posed_center(const RelativePose& pose, int i, const Value
   return dot(row[0], row[1], row[2], center_b) + pose.translation[i];
 }
 
-/// How far b reaches along a's axis i.
+/// Returns how far b reaches along a's axis i.
 template <typename Value>
 TANDEM_HD inline Value b_on_face(const RelativePose& pose, int i, const Value (&half_extent_b)[3]) {
   const float* row = pose.abs_rotation[i];
   return dot(row[0], row[1], row[2], half_extent_b);
 }
 
-/// How far a reaches along b's axis j.
+/// Returns how far a reaches along b's axis j.
 template <typename Value>
 TANDEM_HD inline Value a_on_face(const RelativePose& pose, int j, const Value (&half_extent_a)[3]) {
   const auto& m = pose.abs_rotation;
@@ -74,7 +74,7 @@ TANDEM_HD inline Value distance_on_edge(const RelativePose& pose, int i, int j, 
 
 namespace detail {
 
-/// What all axes share: distance of the centres in a's frame, half-extents with their slack.
+/// The numbers that all axes share: distance of the centres in a's frame, half-extents with their slack.
 struct BoxDistance {
   float d[3];
   float half_extent_a[3], half_extent_b[3];
@@ -119,12 +119,13 @@ TANDEM_HD inline bool overlap_on_edge_axes(const BoxDistance& s, const RelativeP
 
 }  // namespace detail
 
-/// Whether no face normal of either box separates them: 6 axes. May say yes where overlap_15_axes says no.
+/// Returns whether no face normal of either box separates them: 6 axes. May say yes where overlap_15_axes
+/// says no.
 TANDEM_HD inline bool overlap_6_axes(const Box& a, const Box& b, const RelativePose& b_in_a) {
   return detail::overlap_on_face_axes(detail::distance(a, b, b_in_a), b_in_a);
 }
 
-/// Whether no axis separates the boxes: 6 face normals, then the 9 cross products of edges.
+/// Returns whether no axis separates the boxes: 6 face normals, then the 9 cross products of edges.
 TANDEM_HD inline bool overlap_15_axes(const Box& a, const Box& b, const RelativePose& b_in_a) {
   const detail::BoxDistance s = detail::distance(a, b, b_in_a);
   return detail::overlap_on_face_axes(s, b_in_a) && detail::overlap_on_edge_axes(s, b_in_a);

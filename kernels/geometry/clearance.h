@@ -2,8 +2,8 @@
 #include "kernels/geometry/frame_distance.h"
 #include "kernels/geometry/triangle_distance.h"
 
-/// What makes a query of contacts one of clearance, triangles at most a distance apart, for CPU and GPU. The
-/// float32 stages stand in frame_distance.h.
+/// Clearance asks for triangles at most a distance apart, instead of contacts, on CPU and GPU. The float32
+/// stages stand in frame_distance.h.
 namespace tandem::distance {
 
 /// Widens the tests of a pair by a length in a's frame. What is within it could be moved by no more than
@@ -30,12 +30,12 @@ TANDEM_HD inline bool ask_for_clearance(const Pose& pose_a, double within, Relat
   return widen(clearance.apart_from, b_in_a, frame_error);
 }
 
-/// What float64 knows of two triangles: contact where they are at most so far apart, or meet, apart where
-/// they are farther, surely.
+/// Returns what float64 knows of two triangles: contact where they are at most so far apart, or meet, apart
+/// where they are farther, surely.
 TANDEM_HD inline Verdict decide_within_float64(const TrianglePair& pair, double within) {
   const LocalPair local = local_pair(pair);
   if (local.in_range()) {
-    // What is asked for decides, however wide the interval is.
+    // The clearance that is asked for decides, however wide the interval is.
     TriangleWeights weights;
     const DistanceInterval interval = bounded_distance(local, {}, weights);
     if (interval.upper <= within) return Verdict::contact;

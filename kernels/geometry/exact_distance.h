@@ -10,9 +10,9 @@
 ///
 /// **Which distances count.** The distance of two triangles, flat or not, that do not meet is that of two
 /// points, each in the relative interior of a corner, an edge or the face; as the distance has a minimum
-/// there, their difference is normal to both of these. Of two corners, nothing more is to be known. Of a
-/// corner and an edge, the edge has a length, and the corner's foot lies on it. Of two edges that are not
-/// parallel, and of a corner and a face that is not flat, the feet are the one solution of linear equations.
+/// there, their difference is normal to both of these. For two corners, nothing more is to be known. For a
+/// corner and an edge, the edge has a length, and the corner's foot lies on it. For two edges that are not
+/// parallel, and for a corner and a face that is not flat, the feet are the one solution of linear equations.
 /// What is left is spared: from a pair of nearest points on parallel edges, on an edge and a parallel face,
 /// or on two parallel faces, both points can move alike, at the same distance, until one of them comes to the
 /// end of its feature. (A flat face is a union of its edges.) So the least of the distances of corners, and
@@ -157,7 +157,7 @@ class Features {
     return visit_height(edge_a_[i], offset_[i][j], weights, visitor);
   }
 
-  /// Over an edge whose square is length_.
+  /// Visits a corner over an edge whose square is length_.
   template <class Visitor>
   TANDEM_HD bool visit_height(const Vector<1>& edge, const Vector<1>& offset, const TriangleWeights& weights,
                               Visitor& visitor) {
@@ -223,7 +223,7 @@ class Features {
   }
 
   Vector<1> edge_a_[3], edge_b_[3], offset_[3][3];
-  // Of the feature that is visited.
+  // These are of the feature that is visited.
   Vector<2> normal_, across_;
   Number<2> length_, along_, term2_;
   Number<3> volume_, term3_;
@@ -278,7 +278,7 @@ class NearestFeatures {
   int unit_;
 };
 
-/// Whether a distance is at most d, decided without rounding.
+/// Decides without rounding whether a distance is at most d.
 template <int kWords>
 class IsWithin {
  public:
@@ -336,8 +336,8 @@ TANDEM_HD inline detail::ExponentRange exponents_of(const TrianglePair& t, doubl
 template <int kWords>
 class ClearanceDecision {
  public:
-  /// Whether the distance of triangles that do not meet is at most d. Condition: d >= 0, finite; range:
-  /// exponents_of() these, of at most kWords words.
+  /// Returns whether the distance of triangles that do not meet is at most d. Condition: d >= 0, finite;
+  /// range: exponents_of() these, of at most kWords words.
   TANDEM_HD bool are_within(const TrianglePair& t, double d, const detail::ExponentRange& range) {
     within_.assign(d, range);
     features_.assign(t, range);
@@ -349,7 +349,7 @@ class ClearanceDecision {
   Features<kWords> features_;
 };
 
-/// Whether the distance of triangles that do not meet is at most d. Condition: d >= 0, finite.
+/// Returns whether the distance of triangles that do not meet is at most d. Condition: d >= 0, finite.
 TANDEM_OUT_OF_LINE TANDEM_HD inline bool are_within(const TrianglePair& t, double d) {
   ClearanceDecision<detail::kMaxWords> decision;
   return decision.are_within(t, d, exponents_of(t, d));

@@ -169,8 +169,8 @@ TANDEM_HD inline bool in_range(const double* p) {
   return all;
 }
 
-/// One of the three terms of a determinant: w[k] * (u[i] * v[j] - u[j] * v[i]) with (i, j, k) in cyclic order
-/// and u = q - p, v = r - p, w = s - p. 16 terms in the minor, 4 * 16 in the product.
+/// Assigns one of the three terms of a determinant: w[k] * (u[i] * v[j] - u[j] * v[i]) with (i, j, k) in
+/// cyclic order and u = q - p, v = r - p, w = s - p. 16 terms in the minor, 4 * 16 in the product.
 TANDEM_OUT_OF_LINE TANDEM_HD inline void assign_volume_term(const double* p, const double* q, const double* r,
                                                             const double* s, int k, Expansion<64>& out) {
   const int i = (k + 1) % 3, j = (k + 2) % 3;

@@ -9,10 +9,10 @@
 /// **Proof.** E of frame_test.h bounds, coordinate by coordinate, how far the image of a corner of a is from
 /// the corner as stored, and that of one of b from posed() of it, both together. So for points p and q of the
 /// posed triangles, N (p - q) differs from the difference of the same points of the float32 triangles by at
-/// most E a coordinate, and their distance in the frame by sqrt(3) E < 1.7321 E. Of the float32 triangles the
-/// proof in triangle_distance.h holds with u = 2^-24: both bounds are relative to a[0] and to M there. The
-/// difference of the two points, `apart`, is made of offsets with parameters from 0 to 1 there too: an offset
-/// of two corners (4 u M), two edges times a parameter (6 u M each) and two sums (8 u M) are 24 u M a
+/// most E a coordinate, and their distance in the frame by sqrt(3) E < 1.7321 E. For the float32 triangles
+/// the proof in triangle_distance.h holds with u = 2^-24: both bounds are relative to a[0] and to M there.
+/// The difference of the two points, `apart`, is made of offsets with parameters from 0 to 1 there too: an
+/// offset of two corners (4 u M), two edges times a parameter (6 u M each) and two sums (8 u M) are 24 u M a
 /// coordinate, below the 40 u M that it has. Directions too short to be sure of, where |n|_1 < 2^-40, give 0;
 /// from there on underflow, a few times 2^-126, is below 2^-104 < 0.09 u |n|_1 M, as M >= |n|_1 / 6.
 namespace tandem::distance {
@@ -32,7 +32,7 @@ struct FrameDirection {
   float relative;  ///< these, for each unit of M in the proof
 };
 
-/// Where `along` is too short to tell its direction, nothing counts as far.
+/// If `along` is too short to tell its direction, nothing counts as far.
 TANDEM_HD inline FrameDirection frame_direction(const DistanceFrame& frame, const float (&along)[3],
                                                 double at_least) {
   double square = 0, sum = 0;
@@ -65,8 +65,8 @@ TANDEM_HD inline Value greatest_of(const Value& x, const Value& y, const Value& 
   return larger(larger(x, y), z);
 }
 
-/// Whether the posed triangles are at least as far apart as frame_direction() was asked for, along that
-/// direction: what the proof says of `lower`, with |n| <= 1. a: corners as stored, b: posed() ones.
+/// Returns whether the posed triangles are at least as far apart as frame_direction() was asked for, along
+/// that direction: what the proof says of `lower`, with |n| <= 1. a: corners as stored, b: posed() ones.
 template <typename Value>
 TANDEM_HD inline auto is_far_along(const Point<Value> (&corner_a)[3], const Point<Value> (&corner_b)[3],
                                    const FrameDirection& along) {
@@ -111,7 +111,7 @@ TANDEM_HD inline FrameInterval<Value> frame_interval(const Point<Value> (&corner
   return out;
 }
 
-/// What clearance asks of a pair of instances: a distance in the world, as lengths in a's frame.
+/// The clearance that is asked of a pair of instances: a distance in the world, as lengths in a's frame.
 struct FrameClearance {
   float apart_from;  ///< what is farther apart than this is farther apart than asked, in the world
   float within_to;   ///< what is no farther apart than this is within what is asked
@@ -125,8 +125,9 @@ TANDEM_HD inline FrameClearance frame_clearance(const DistanceFrame& frame, doub
           within > 0 ? within < 0x1p100 ? static_cast<float>(within) : 0x1p100f : -1.0f, frame.error};
 }
 
-/// Whether two triangles lie more than a length apart along n or against it: the proof above, with 9.2 u for
-/// its 9.1, and 8 u for |n| as computed. M: `largest`. A direction that underflow could touch tells nothing.
+/// Returns whether two triangles lie more than a length apart along n or against it: the proof above, with
+/// 9.2 u for its 9.1, and 8 u for |n| as computed. M: `largest`. A direction that underflow could touch tells
+/// nothing.
 template <typename Value>
 TANDEM_HD inline auto is_beyond_along(const Point<Value>& n, const Point<Value> (&a)[3],
                                       const Point<Value> (&b)[3], const Value& largest, float length) {
@@ -141,7 +142,7 @@ TANDEM_HD inline auto is_beyond_along(const Point<Value>& n, const Point<Value> 
          less(needed, larger(above, below));
 }
 
-/// What is quickly told of clearance: surely farther apart than asked, by the triangles' boxes in a's frame
+/// The quick answers about clearance: surely farther apart than asked, by the triangles' boxes in a's frame
 /// or by the plane of either, or surely within it, by two of their corners or because they meet.
 template <typename Mask>
 struct Sifted {
@@ -191,8 +192,8 @@ TANDEM_HD inline auto sift(const Point<Value> (&corner_a)[3], const Point<Value>
   return out;
 }
 
-/// What frame_interval() knows of clearance, and of triangles that meet, whose features may be apart, the
-/// contact test: `contact` where the posed triangles are surely within it.
+/// Returns what frame_interval() knows of clearance; triangles that meet have features that may be apart, so
+/// the contact test decides about them: `contact` where the posed triangles are surely within it.
 template <typename Value>
 TANDEM_HD inline auto decide_within(const Point<Value> (&a)[3], const Point<Value> (&b)[3],
                                     const FrameClearance& clearance) {

@@ -183,9 +183,9 @@ TANDEM_HD inline BoxInFrame<Value> posed(const RelativePose& b_in_a, const BoxIn
   return out;
 }
 
-/// Whether boxes lie strictly on one side of a plane, with all corners of triangles within them: then none of
-/// these triangles meets the one that the plane was made of. The boxes hold stored corners of a, where the
-/// plane is b's, or are posed() and hold images of b's corners, where it is a's.
+/// Returns whether boxes lie strictly on one side of a plane, with all corners of triangles within them: then
+/// none of these triangles meets the one that the plane was made of. The boxes hold stored corners of a,
+/// where the plane is b's, or are posed() and hold images of b's corners, where it is a's.
 ///
 /// **Proof.** The volume of a corner in a box, whose centre is at w, is off by at most what the proof above
 /// says of a difference bounded by |w| + h; that of the centre is computed, and the box reaches sum |n_k| h_k
@@ -210,7 +210,7 @@ TANDEM_HD inline auto beyond(const Plane<Value, true>& plane, const BoxInFrame<V
   return less(1.001f * (reached + bound) + kUnderflow, magnitude((term[0] + term[1]) + term[2]));
 }
 
-/// On which side of a plane the corners of a triangle lie, where that is certain.
+/// Says on which side of a plane the corners of a triangle lie, where that is certain.
 template <typename Mask>
 struct Sides {
   Mask above[3], below[3];
@@ -224,10 +224,10 @@ struct Sides {
   TANDEM_HD Mask all_ties() const {
     return !(above[0] | below[0] | above[1] | below[1] | above[2] | below[2]);
   }
-  /// Of exact sides, neither strictly one nor all ties: the same with ties below where some corner is above,
-  /// and above where none is. Two corners are then on one side, and the third is a detail::lone_corner():
-  /// where some corner is above, it is that one alone, with the others below or in the plane, or it is below
-  /// or in the plane, with the others above; where none is, the same upside down.
+  /// Returns exact sides, which are neither strictly one nor all ties, with ties below where some corner is
+  /// above, and above where none is. Two corners are then on one side, and the third is a
+  /// detail::lone_corner(): where some corner is above, it is that one alone, with the others below or in the
+  /// plane, or it is below or in the plane, with the others above; where none is, the same upside down.
   TANDEM_HD Sides without_ties() const {
     const Mask some_above = above[0] | above[1] | above[2];
     Sides out;
@@ -237,7 +237,7 @@ struct Sides {
     }
     return out;
   }
-  /// Of three certain sides that are not one: whether corner i has one side to itself.
+  /// Returns whether corner i has one side to itself. Condition: the three sides are certain, and not one.
   TANDEM_HD Mask alone(int i) const {
     return (above[i] ^ above[(i + 1) % 3]) & (above[i] ^ above[(i + 2) % 3]);
   }
@@ -357,9 +357,9 @@ struct Intervals {
   Volume<Value> lower, upper;
 };
 
-/// Of triangles whose corners lie on both sides of the other's plane. Only b's corners q and r are exchanged,
-/// where one of the two orders asks for it, and a's orientation turns the signs instead. (Inlined by force,
-/// as vectors go through memory to a call.)
+/// Returns the intervals of triangles whose corners lie on both sides of the other's plane. Only b's corners
+/// q and r are exchanged, where one of the two orders asks for it, and a's orientation turns the signs
+/// instead. (Inlined by force, as vectors go through memory to a call.)
 template <bool kBounded, typename Value, typename Mask>
 [[gnu::always_inline]] TANDEM_HD inline Intervals<Value> intervals(const Point<Value> (&a)[3],
                                                                    const Point<Value> (&b)[3],

@@ -45,7 +45,8 @@ TANDEM_HD inline double unit_of(double x) {
   return std::fabs(x - rest);
 }
 
-/// Of numbers that are not NaN. (std::fmin and std::fmax are calls where NaN matters.)
+/// Returns the smaller of two numbers that are not NaN. (std::fmin and std::fmax are calls where NaN
+/// matters.)
 TANDEM_HD inline double smaller(double x, double y) {
   return y < x ? y : x;
 }
@@ -54,8 +55,8 @@ TANDEM_HD inline double larger(double x, double y) {
   return x < y ? y : x;
 }
 
-/// Whether the conditions on G and M hold. What roundings add or take, also those of a reach, is less than
-/// from one integer to the next.
+/// Returns whether the conditions on G and M hold. What roundings add or take, also those of a reach, is less
+/// than from one integer to the next.
 TANDEM_HD inline bool coarse(double grid, const double (&largest)[3]) {
   if (!(grid >= kFinest && grid <= kCoarsest)) return false;
   double product = 6;
@@ -63,7 +64,7 @@ TANDEM_HD inline bool coarse(double grid, const double (&largest)[3]) {
   return product <= 0x1p24;
 }
 
-/// Whether all entries are 0, 1 or -1.
+/// Returns whether all entries are 0, 1 or -1.
 TANDEM_HD inline bool permutes_axes(const double (&rotation)[3][3]) {
   for (const auto& row : rotation) {
     for (const double x : row) {
@@ -92,8 +93,8 @@ inline double grid_of(const LevelView& tree, const TreeExtent& extent) {
   return grid_detail::coarse(grid, extent.reach) ? grid : 0;
 }
 
-/// Whether the proof's conditions hold for two instances. Their poses are rigid and of stored coordinates;
-/// grid_a, grid_b: grid_of() their meshes.
+/// Returns whether the proof's conditions hold for two instances. Their poses are rigid and of stored
+/// coordinates; grid_a, grid_b: grid_of() their meshes.
 TANDEM_HD inline bool lie_on_grid(const Pose& a, const TreeExtent& tree_a, double grid_a, const Pose& b,
                                   const TreeExtent& tree_b, double grid_b, const RelativePose& b_in_a) {
   namespace g = grid_detail;
@@ -131,7 +132,7 @@ TANDEM_HD inline auto is_nonzero(const Value (&x)[3]) {
 }
 
 /// A triangle seen along the first axis along which it is not flat, counterclockwise. Condition: it is not
-/// flat. Of triangles in one plane all are seen along the same axis.
+/// flat. Triangles in one plane are all seen along the same axis.
 template <typename Value>
 struct PlanarTriangle {
   Value x[3], y[3];
@@ -152,7 +153,7 @@ struct PlanarTriangle {
   }
 };
 
-/// Whether an edge of s has all of t strictly outside.
+/// Returns whether an edge of s has all of t strictly outside.
 template <typename Value>
 TANDEM_HD inline auto edge_separates(const PlanarTriangle<Value>& s, const PlanarTriangle<Value>& t) {
   const auto beyond_edge = [&](int i) {

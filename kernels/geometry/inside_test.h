@@ -6,8 +6,8 @@
 #include "tandem/formats/view.h"
 #include "tandem/kernels/world_box.h"
 
-/// Whether a point lies inside a closed posed surface, decided exactly: it does where a ray from it crosses
-/// the surface an odd number of times. The ray from p goes along the x axis of the world.
+/// This test decides exactly whether a point lies inside a closed posed surface: it does where a ray from it
+/// crosses the surface an odd number of times. The ray from p goes along the x axis of the world.
 ///
 /// **What crosses.** Let p' = p + (0, d, e) with infinitesimals d > 0 and e > 0, e infinitely smaller than d,
 /// and look along x. An edge is no more than a point at height z of p', or passes that height at a y that is
@@ -26,13 +26,13 @@
 /// z and x are right-handed. The volume is 0 only where p is on the triangle.
 namespace tandem::containment {
 
-/// Whether the ray may cross a triangle all of whose corners lie in this box: else all are above or none is,
-/// all edges that pass the height are to the right or none is, or all that is crossed lies behind p.
+/// Returns whether the ray may cross a triangle all of whose corners lie in this box: else all are above or
+/// none is, all edges that pass the height are to the right or none is, or all that is crossed lies behind p.
 TANDEM_HD inline bool ray_may_cross(const WorldBox& box, const double* p) {
   return box.hi[0] > p[0] && box.lo[1] <= p[1] && box.hi[1] > p[1] && box.lo[2] <= p[2] && box.hi[2] > p[2];
 }
 
-/// Whether the ray crosses the triangle. Finite coordinates.
+/// Returns whether the ray crosses the triangle. Finite coordinates.
 TANDEM_HD inline bool ray_crosses(const double (*t)[3], const double* p) {
   using detail::ExactSigns;
   bool within = false;
@@ -52,7 +52,7 @@ TANDEM_HD inline bool ray_crosses(const double (*t)[3], const double* p) {
 inline constexpr std::uint32_t kOfOpenComponent = std::uint32_t{1} << 31;
 static_assert(kMostTopologyTriangles <= kOfOpenComponent);
 
-/// What the tests need to know of a level of an asset. Pointers are of the CPU or of the GPU.
+/// The surface of a level of an asset, as the tests need it. Pointers are of the CPU or of the GPU.
 struct Surface {
   const Triangle* triangles;
   const Block* blocks;  ///< or null: then the oriented blocks are walked
@@ -100,7 +100,7 @@ TANDEM_HD inline bool is_real(const OrientedBlock& block, int node) {
   return block.half_extent[0][node] >= 0;
 }
 
-/// What lies below a node: a block, or the triangle of a leaf.
+/// Returns what lies below a node: a block, or the triangle of a leaf.
 TANDEM_HD inline std::uint32_t below(const Block& block, int node) {
   return block.index[node];
 }
@@ -108,14 +108,14 @@ TANDEM_HD inline std::uint32_t below(const OrientedBlock& block, int node) {
   return (block.first_below & ~OrientedBlock::kIsLeafBlock) + static_cast<std::uint32_t>(node);
 }
 
-/// Whether the ray may cross something below the node.
+/// Returns whether the ray may cross something below the node.
 template <typename AnyBlock>
 TANDEM_HD inline bool ray_may_cross(const PosedSurface& body, const AnyBlock& block, int node,
                                     const double* p) {
   return is_real(block, node) && ray_may_cross(node_box(body, block, node), p);
 }
 
-/// Whether the ray crosses this triangle of a body, and its component is closed.
+/// Returns whether the ray crosses this triangle of a body, and its component is closed.
 TANDEM_HD inline bool ray_crosses(const PosedSurface& body, std::uint32_t triangle, const double* p) {
   const Surface& surface = *body.surface;
   if (surface.labels != nullptr && (surface.labels[triangle] & kOfOpenComponent) != 0) return false;

@@ -2,13 +2,13 @@
 #include "kernels/geometry/relative_pose.h"
 #include "tandem/formats/view.h"
 
-/// What queries at a level of detail know of the finest level, for CPU and GPU.
+/// Queries at a level of detail know this of the finest level, on CPU and GPU.
 namespace tandem {
 
-/// How far a posed level may be from the posed finest level, in the world: no point of the one surface is
-/// farther than this from the other surface, either way; 0 for the finest level itself. The surfaces are
-/// those that queries are about, triangles of the float64 points of apply(). level: of an asset with these
-/// bounds, in stored coordinates; pose: of these, and is_rigid().
+/// Returns how far a posed level may be from the posed finest level, in the world: no point of the one
+/// surface is farther than this from the other surface, either way; 0 for the finest level itself. The
+/// surfaces are those that queries are about, triangles of the float64 points of apply(). level: of an asset
+/// with these bounds, in stored coordinates; pose: of these, and is_rigid().
 ///
 /// **Proof.** Let F be the union of the finest level's stored triangles, L that of the level's, R and t the
 /// pose, and e the error_bound, at least the Hausdorff distance of F and L. Corners of both are within the

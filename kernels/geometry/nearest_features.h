@@ -73,9 +73,10 @@ TANDEM_HD inline Value inverse(const Value& x, const Value& least) {
   return select(defined, value_of<Value>(1) / select(defined, x, value_of<Value>(1)), Value{});
 }
 
-/// Where two triangles are nearest. Features 0 to 8 are edge i of a and edge j of b, 3 i + j, with the points
-/// corner + s edge and corner + t edge; 9 to 11 are a's face and corner j of b; 12 to 14 are b's face and
-/// corner i of a, with the point at corner 0 + s (corner 1 - corner 0) + t (corner 2 - corner 0) of the face.
+/// The place where two triangles are nearest. Features 0 to 8 are edge i of a and edge j of b, 3 i + j, with
+/// the points corner + s edge and corner + t edge; 9 to 11 are a's face and corner j of b; 12 to 14 are b's
+/// face and corner i of a, with the point at corner 0 + s (corner 1 - corner 0) + t (corner 2 - corner 0) of
+/// the face.
 template <typename Value>
 struct Nearest {
   Value square;        ///< of the distance
@@ -100,7 +101,7 @@ struct Nearest {
   }
 };
 
-/// What is known of an edge.
+/// The numbers of an edge.
 template <typename Value>
 struct Edge {
   Point<Value> along;

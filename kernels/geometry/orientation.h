@@ -4,9 +4,9 @@
 #include "kernels/geometry/expansion.h"
 #include "kernels/geometry/wide_integer.h"
 
-/// On which side of a plane or of a line a point lies: float32 and float64 with a proven error bound, and
-/// exact. All of them are signs of volume(p, q, r, s) = det(q - p, r - p, s - p), the scalar triple product,
-/// and of area(p, q, r) along an axis, a component of (q - p) x (r - p).
+/// These functions decide on which side of a plane or of a line a point lies: float32 and float64 with a
+/// proven error bound, and exact. All of them are signs of volume(p, q, r, s) = det(q - p, r - p, s - p), the
+/// scalar triple product, and of area(p, q, r) along an axis, a component of (q - p) x (r - p).
 namespace tandem::detail {
 
 /// Error bounds of determinants evaluated in Real, whose unit roundoff is u.
@@ -118,8 +118,9 @@ TANDEM_HD inline Real area(const double* p, const double* q, const double* r, in
   return ui * vj - uj * vi;
 }
 
-/// Whether each product of volume(p, q, r, s) has a factor that is exactly zero, as where four points have
-/// one coordinate in common. float64 numbers differ exactly when their difference as computed is not zero.
+/// Returns whether each product of volume(p, q, r, s) has a factor that is exactly zero, as where four points
+/// have one coordinate in common. float64 numbers differ exactly when their difference as computed is not
+/// zero.
 TANDEM_HD inline bool vanishes(const double* p, const double* q, const double* r, const double* s) {
   const bool u0 = q[0] != p[0], u1 = q[1] != p[1], u2 = q[2] != p[2];
   const bool v0 = r[0] != p[0], v1 = r[1] != p[1], v2 = r[2] != p[2];

@@ -40,7 +40,8 @@ TANDEM_HD inline BlockFrame frame_of(const BlockRotation& rotation) {
   return frame;
 }
 
-/// How block b's frame lies in block a's, for tests by intervals: b's boxes in a's frame, a's boxes in b's.
+/// The pose of block b's frame in block a's, for tests by intervals: b's boxes in a's frame, a's boxes in
+/// b's.
 struct OrientedPose {
   float rotation[3][3];  ///< x_a = rotation * x_b + translation
   float translation[3];
@@ -80,8 +81,8 @@ TANDEM_HD inline float oriented_slack(const RelativePose& b_in_a, const TreeExte
   return static_cast<float>(d::kSafety * (mu * error + std::sqrt(lack_size) + rounding) + d::kLeastSlack);
 }
 
-/// How two blocks lie. rotation, translation: of the RelativePose of their trees; slack: oriented_slack().
-/// The proof allows sums in any order, and fused operations.
+/// Returns how two blocks lie to each other. rotation, translation: those of the RelativePose of their trees;
+/// slack: oriented_slack(). The proof allows sums in any order, and fused operations.
 TANDEM_HD inline OrientedPose oriented_pose(const float (&rotation)[3][3], const float (&translation)[3],
                                             float slack, const BlockFrame& a, const BlockFrame& b) {
   OrientedPose out;
@@ -120,7 +121,7 @@ TANDEM_HD inline float b_in_a(const OrientedPose& pose, int i, const float (&cen
   return ((pose.translation[i] + m[i][0] * center[0]) + m[i][1] * center[1]) + m[i][2] * center[2];
 }
 
-/// How far b reaches along a's axis i, slack included.
+/// Returns how far b reaches along a's axis i, slack included.
 TANDEM_HD inline float b_along_a(const OrientedPose& pose, int i, const float (&half_extent)[3]) {
   const auto& m = pose.rotation;
   return ((pose.slack + std::fabs(m[i][0]) * half_extent[0]) + std::fabs(m[i][1]) * half_extent[1]) +
@@ -133,7 +134,7 @@ TANDEM_HD inline float a_in_b(const OrientedPose& pose, int j, const float (&cen
   return ((pose.back_translation[j] + m[0][j] * center[0]) + m[1][j] * center[1]) + m[2][j] * center[2];
 }
 
-/// How far a reaches along b's axis j, slack included.
+/// Returns how far a reaches along b's axis j, slack included.
 TANDEM_HD inline float a_along_b(const OrientedPose& pose, int j, const float (&half_extent)[3]) {
   const auto& m = pose.rotation;
   return ((pose.slack + std::fabs(m[0][j]) * half_extent[0]) + std::fabs(m[1][j]) * half_extent[1]) +
@@ -142,8 +143,8 @@ TANDEM_HD inline float a_along_b(const OrientedPose& pose, int j, const float (&
 
 }  // namespace oriented_terms
 
-/// Whether no face normal of either box separates them: if it says no, no posed triangles in the boxes meet,
-/// in exact arithmetic, as docs/box_test.md says.
+/// Returns whether no face normal of either box separates them: if it says no, no posed triangles in the
+/// boxes meet, in exact arithmetic, as docs/box_test.md says.
 inline bool overlap_oriented(const Box& a, const Box& b, const OrientedPose& pose) {
   bool overlap = true;
   for (int k = 0; k < 3; ++k) {

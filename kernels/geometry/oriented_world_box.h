@@ -9,7 +9,7 @@
 /// World boxes of oriented nodes, float64: for pairs of bodies that float32 cannot take.
 namespace tandem {
 
-/// How far the points of a tree lie from the mesh's origin at most, but for roundings of float64.
+/// Returns how far the points of a tree lie from the mesh's origin at most, but for roundings of float64.
 TANDEM_HD inline double farthest_of(const TreeExtent& tree) {
   double squared = 0;
   for (int k = 0; k < 3; ++k) squared += tree.reach[k] * tree.reach[k];

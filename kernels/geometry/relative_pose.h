@@ -4,11 +4,11 @@
 #include "tandem/formats/box.h"
 #include "tandem/kernels/pose.h"
 
-/// How one posed asset lies in the frame of another, float32, with what rounding can do to it: the input of
-/// the box tests.
+/// The relative pose of two assets says how one lies in the frame of the other, in float32, with what
+/// rounding can do to it. It is the input of the box tests.
 namespace tandem {
 
-/// Where b's frame lies in a's: x_a = rotation * x_b + translation. Made by relative_pose().
+/// The place of b's frame in a's: x_a = rotation * x_b + translation. Made by relative_pose().
 struct RelativePose {
   float rotation[3][3];
   float abs_rotation[3][3];  ///< what half-extents are multiplied by: |rotation|, rounded up
@@ -56,7 +56,7 @@ TANDEM_HD inline void invert(const double (&r)[3][3], double (&out)[3][3]) {
   }
 }
 
-/// How far apply() may be from real arithmetic in row i, over the points of a tree.
+/// Returns how far apply() may be from real arithmetic in row i, over the points of a tree.
 TANDEM_HD inline double posing_error(const Pose& pose, const TreeExtent& tree, int i) {
   double size = 0;
   for (int k = 0; k < 3; ++k) size += std::fabs(pose.rotation[i][k]) * tree.reach[k];
@@ -139,9 +139,10 @@ TANDEM_HD inline bool store_slack(double slack, double largest, float& out) {
 
 }  // namespace relative_pose_detail
 
-/// Where b lies relative to a, with the slack that makes the box tests conservative: if overlap_6_axes(),
-/// overlap_15_axes() or block_pair_mask() says no for a box of tree a and a box of tree b, then no two posed
-/// triangles in them meet, in exact arithmetic on the float64 points of apply(). Proof: docs/box_test.md.
+/// Finds where b lies relative to a, with the slack that makes the box tests conservative: if
+/// overlap_6_axes(), overlap_15_axes() or block_pair_mask() says no for a box of tree a and a box of tree b,
+/// then no two posed triangles in them meet, in exact arithmetic on the float64 points of apply(). Proof:
+/// docs/box_test.md.
 ///
 /// The poses are those of stored coordinates (for_stored_coordinates()). They need not be checked: the result
 /// is kOutOfRange, and b_in_a of no use, unless the proof holds. Poses that is_rigid() accepts are in range

@@ -44,7 +44,7 @@ struct LocalPair {
   Point<double> a[3], b[3];
   double largest;  ///< M of the proof
 
-  /// Whether the proof's conditions on M hold.
+  /// Returns whether the proof's conditions on M hold.
   TANDEM_HD bool in_range() const { return largest >= 0x1p-200 && largest <= 0x1p200; }
 };
 
@@ -146,7 +146,8 @@ TANDEM_HD inline Point<double> refined(const LocalPair& pair, const Nearest<doub
   return within_f ? without_part(offset, f) : offset;
 }
 
-/// What float64 knows: always right, and the narrower the farther the triangles are apart for their size.
+/// Returns the interval that float64 knows: it is always right, and the narrower the farther the triangles
+/// are apart for their size.
 TANDEM_HD inline DistanceInterval bounded_distance(const LocalPair& pair, const DistanceTolerance& tolerance,
                                                    TriangleWeights& weights) {
   const Nearest<double> nearest = nearest_features<double>(pair.a, pair.b, 0x1p-480);
@@ -158,7 +159,8 @@ TANDEM_HD inline DistanceInterval bounded_distance(const LocalPair& pair, const 
   return interval;
 }
 
-/// Where edge i of a triangle goes through the plane of a face, as weights of both. False: not as computed.
+/// Finds where edge i of a triangle goes through the plane of a face, as weights of both. False: it does not
+/// as computed.
 TANDEM_HD inline bool pierces(const Point<double> (&face)[3], const Point<double> (&other)[3], int i,
                               double (&on_face)[3], double (&on_other)[3]) {
   const int next = (i + 1) % 3;
@@ -179,8 +181,8 @@ TANDEM_HD inline bool pierces(const Point<double> (&face)[3], const Point<double
   return true;
 }
 
-/// Of triangles that meet: weights of a point that both have, up to rounding: the best of `weights`, the
-/// nearest points of their features, and of the points where edges go through faces.
+/// Finds the weights of a point that two triangles which meet have in common, up to rounding: the best of
+/// `weights`, the nearest points of their features, and of the points where edges go through faces.
 TANDEM_HD inline void find_common_point(const LocalPair& pair, TriangleWeights& weights) {
   double least = distance_at(pair, weights);
   for (int i = 0; i < 6; ++i) {

@@ -4,9 +4,10 @@
 
 #include "kernels/geometry/orientation.h"
 
-/// Whether two triangles meet, for CPU and GPU. Triangles are closed: touching counts. A flat triangle is the
-/// hull of its corners, a segment or a point. The corners are float64 points, and the answer is that of exact
-/// arithmetic on them, for all finite points; host code must be compiled with -ffp-contract=off.
+/// This test decides whether two triangles meet, on CPU and GPU. Triangles are closed: touching counts. A
+/// flat triangle is the hull of its corners, a segment or a point. The corners are float64 points, and the
+/// answer is that of exact arithmetic on them, for all finite points; host code must be compiled with
+/// -ffp-contract=off.
 ///
 /// A cascade: decide_float64 decides what its error bound allows, decide_exact the rest. In a query the
 /// float32 stage of frame_test.h comes before them and leaves them little.
@@ -19,7 +20,7 @@ struct TrianglePair {
 
 enum class Verdict : std::uint8_t { apart, contact, undecided };
 
-/// What the cascade found, and whether it took the last stage.
+/// The outcome of the cascade, and whether it took the last stage.
 struct Decision {
   Verdict verdict;
   bool exactly;
@@ -60,7 +61,8 @@ TANDEM_HD inline Corners lone_first(const double (*t)[3], int lone, bool reverse
   return {t[lone], reversed ? last : next, reversed ? next : last};
 }
 
-/// Whether the lone corner, or, if it is in the plane, the far side of the others, is on the negative side.
+/// Returns whether the lone corner, or, if it is in the plane, the far side of the others, is on the negative
+/// side.
 TANDEM_HD inline bool lone_is_below(const int* side, int lone) {
   return side[lone] != 0 ? side[lone] < 0 : side[(lone + 1) % 3] > 0;
 }
@@ -99,7 +101,7 @@ TANDEM_HD inline double greatest(double x, double y, double z) {
   return larger < z ? z : larger;
 }
 
-/// Whether the bounding boxes are apart; comparisons only, so exact.
+/// Returns whether the bounding boxes are apart; comparisons only, so exact.
 TANDEM_HD inline bool boxes_apart(const double (*a)[3], const double (*b)[3]) {
   bool apart = false;
   for (int k = 0; k < 3; ++k) {
@@ -158,9 +160,9 @@ TANDEM_HD inline Extent extent(const double (*t)[3]) {
 /// The complete test, degenerate cases included, given a source of signs.
 template <class Signs>
 struct CompleteTest {
-  /// Whether a segment meets a triangle that is not flat, given that its ends are not both in the triangle's
-  /// plane and not strictly on one side: it meets the plane in one point x, and volume(p, q, c, d) is the
-  /// orientation of (x, c, d) within the plane times a nonzero factor that all edges share.
+  /// Returns whether a segment meets a triangle that is not flat, given that its ends are not both in the
+  /// triangle's plane and not strictly on one side: it meets the plane in one point x, and volume(p, q, c, d)
+  /// is the orientation of (x, c, d) within the plane times a nonzero factor that all edges share.
   TANDEM_HD static bool crosses(const Extent& s, const double (*t)[3]) {
     int least = 0, greatest = 0;
     for (int i = 0; i < 3; ++i) {
@@ -171,8 +173,8 @@ struct CompleteTest {
     return least * greatest == 0;
   }
 
-  /// Whether an edge of x separates the triangles strictly, seen along axis k; orientation_x is x's own, 0 if
-  /// x is flat, when both sides of an edge are outside.
+  /// Returns whether an edge of x separates the triangles strictly, seen along axis k; orientation_x is x's
+  /// own, 0 if x is flat, when both sides of an edge are outside.
   TANDEM_HD static bool edge_separates(const double (*x)[3], const double (*y)[3], int k, int orientation_x) {
     for (int i = 0; i < 3; ++i) {
       const double* p = x[i];
@@ -186,19 +188,19 @@ struct CompleteTest {
     return false;
   }
 
-  /// Whether a, flat or not, meets b, which is not flat and lies in the same plane, along axis k, in which b
-  /// is not flat either: then the projection is one to one. The points of b less the points of a are a
-  /// polygon with an interior, each side of it parallel to an edge of a or b; the origin is outside iff it is
-  /// strictly beyond a side, that is, iff an edge of a or b separates the two.
+  /// Returns whether a, flat or not, meets b, which is not flat and lies in the same plane, along axis k, in
+  /// which b is not flat either: then the projection is one to one. The points of b less the points of a are
+  /// a polygon with an interior, each side of it parallel to an edge of a or b; the origin is outside iff it
+  /// is strictly beyond a side, that is, iff an edge of a or b separates the two.
   TANDEM_HD static bool meet_in_plane(const double (*a)[3], const double (*b)[3], int k, int orientation_b) {
     const int orientation_a = Signs::area(a[0], a[1], a[2], k);
     return !edge_separates(b, a, k, orientation_b) && !edge_separates(a, b, k, orientation_a);
   }
 
-  /// Whether two segments or points meet whose bounding boxes do. Four points that span a volume are on two
-  /// skew lines. In one plane but not on one line, some triple has an area along some axis, and seen along it
-  /// segments meet iff each has the ends of the other on both sides or on it. On one line, a gap between them
-  /// would part the boxes along every axis along which the line moves.
+  /// Returns whether two segments or points meet whose bounding boxes do. Four points that span a volume are
+  /// on two skew lines. In one plane but not on one line, some triple has an area along some axis, and seen
+  /// along it segments meet iff each has the ends of the other on both sides or on it. On one line, a gap
+  /// between them would part the boxes along every axis along which the line moves.
   TANDEM_HD static bool segments_meet(const Extent& s, const Extent& t) {
     if (Signs::volume(s.p, s.q, t.p, t.q) != 0) return false;
     for (int k = 0; k < 3; ++k) {
@@ -260,8 +262,8 @@ TANDEM_HD inline double power_of_two_below(double x) {
   return x;
 }
 
-/// Whether all corners lie on a grid so coarse that float64 computes every volume and area of them without
-/// rounding: coordinates are multiples of G / 2, G a power of two, and differ by less than 2^15 G. A
+/// Returns whether all corners lie on a grid so coarse that float64 computes every volume and area of them
+/// without rounding: coordinates are multiples of G / 2, G a power of two, and differ by less than 2^15 G. A
 /// difference is then exact, a product of two is below 2^32 (G / 2)^2, one of three below 2^48 (G / 2)^3, and
 /// a sum of six of these a multiple of (G / 2)^3 below 2^51 of it. x is a multiple of G / 2 where adding 1.5
 /// * 2^52 G and taking it away changes nothing: from 2^52 G on every float64 number is one; below, the sum is
@@ -287,7 +289,7 @@ TANDEM_HD inline bool on_coarse_grid(const TrianglePair& t) {
   return true;
 }
 
-/// Whether a corner of a and one of b are the same point: then the triangles meet, flat or not.
+/// Returns whether a corner of a and one of b are the same point: then the triangles meet, flat or not.
 TANDEM_HD inline bool share_corner(const TrianglePair& t) {
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {

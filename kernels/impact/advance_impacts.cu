@@ -68,7 +68,7 @@ __global__ void __launch_bounds__(kThreads) advance_triangles(const __grid_const
   }
 }
 
-/// Of the triangles that stop a pair first, the least.
+/// Chooses the least of the triangles that stop a pair first.
 __global__ void __launch_bounds__(kThreads) choose_triangles(const __grid_constant__ ImpactArgs args) {
   wait_for_kernel_before();
   const std::uint32_t count = stored_in(args.advanced);
@@ -97,8 +97,8 @@ __device__ double scale_of(const impact::TrianglesAt& t) {
   return largest > 0 ? exp2(-floor(log2(largest))) : 1;
 }
 
-/// What the two triangles tell at a time: an upper bound of their gap in float64, and where it is. As above,
-/// lengths are scaled by a power of two where the bound's proof asks for it.
+/// Writes what the two triangles tell at a time: an upper bound of their gap in float64, and where it is. As
+/// above, lengths are scaled by a power of two where the bound's proof asks for it.
 __device__ void tell(const ImpactPair& pair, double time, bool in_contact, Impact& out) {
   const Triangle &of_a = pair.triangles_a[out.triangle_a], &of_b = pair.triangles_b[out.triangle_b];
   const impact::TrianglesAt t =
@@ -126,7 +126,7 @@ __device__ void tell(const ImpactPair& pair, double time, bool in_contact, Impac
 }
 
 __device__ Impact impact_of(const ImpactArgs& args, std::uint32_t index) {
-  // What was not sought is not promised: where there is no impact, all of the step was.
+  // A time that was not sought is not promised. If there is no impact, all of the step was sought.
   const double sought = args.sought[index];
   Impact out = {
       sought * args.duration, INFINITY, {0, 0, 0}, {0, 0, 0}, kNoIndex, kNoIndex, kNoIndex, kNoIndex,
@@ -147,7 +147,7 @@ __device__ std::uint32_t limited(Counter count) {
   return static_cast<std::uint32_t>(count < kNoIndex ? count : kNoIndex);
 }
 
-/// By a warp. rounds: that had block pairs.
+/// Returns the room that is needed; a warp calls it. rounds: those that had block pairs.
 __device__ GpuImpactCapacity needed_by(const ImpactArgs& args, std::uint32_t& rounds) {
   const ImpactState& state = *args.state;
   GpuImpactCapacity needed = {args.instances.count,         *args.given.count,    args.query->needed.contacts,
@@ -170,7 +170,7 @@ __device__ bool is_complete(const ImpactArgs& args, const GpuImpactCapacity& nee
          needed.triangle_pairs <= room.triangle_pairs;
 }
 
-/// By a warp.
+/// Returns the report; a warp calls it.
 __device__ GpuImpactReport make_report(const ImpactArgs& args) {
   const ImpactState& state = *args.state;
   GpuImpactReport report = {};

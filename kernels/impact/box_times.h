@@ -4,7 +4,7 @@
 #include "tandem/formats/block.h"
 #include "tandem/formats/view.h"
 
-/// How long the boxes of two moving trees stay apart.
+/// These functions find how long the boxes of two moving trees stay apart.
 ///
 /// **Along one axis.** Take a time u of the step, a direction n of length at most 1.00001 that does not move,
 /// and a point of a tree's box at place p at that time. After s more its place along n is
@@ -74,7 +74,7 @@ TANDEM_HD inline FrameMotion frame_motion(const PairMotion& pair, const TreePlac
   return frame;
 }
 
-/// Both frames of a pair from some time on.
+/// The two frames of a pair from some time on.
 struct PairFrames {
   FrameMotion of_a, of_b;
   double slack;
@@ -99,14 +99,14 @@ TANDEM_HD inline double row_times(const double* row, const float (&v)[3][kNodesP
          row[2] * static_cast<double>(v[2][node]);
 }
 
-/// The same with the magnitudes of the row.
+/// Returns the product with the magnitudes of the row.
 TANDEM_HD inline double sizes_times(const double* row, const float (&v)[3][kNodesPerBlock], int node) {
   return std::fabs(row[0]) * static_cast<double>(v[0][node]) +
          std::fabs(row[1]) * static_cast<double>(v[1][node]) +
          std::fabs(row[2]) * static_cast<double>(v[2][node]);
 }
 
-/// Of the frame's own tree: nodes of the block from `first` on.
+/// Places nodes of the frame's own tree: those of the block from `first` on.
 template <int kNodes>
 TANDEM_HD inline void own_nodes(const FrameMotion& frame, const Block& block, int first,
                                 MovingNodes<kNodes>& out) {
@@ -120,7 +120,7 @@ TANDEM_HD inline void own_nodes(const FrameMotion& frame, const Block& block, in
   }
 }
 
-/// Of the other tree.
+/// Places nodes of the other tree.
 template <int kNodes>
 TANDEM_HD inline void other_nodes(const FrameMotion& frame, const Block& block, int first,
                                   MovingNodes<kNodes>& out) {
@@ -142,7 +142,7 @@ struct FrameNodes {
   MovingNodes<kNodes> own, other;
 };
 
-/// One axis of (1): distance, velocity, radius with slack, and how fast the radius grows within `most`.
+/// An axis of (1): distance, velocity, radius with slack, and how fast the radius grows within `most`.
 struct AxisMotion {
   double distance, velocity, radius, growth;
 };
@@ -172,8 +172,8 @@ TANDEM_HD inline void raise_margins(const FrameMotion& frame, const MovingNodes<
   }
 }
 
-/// How long real nodes i and j surely stay apart by the margin from now on, at most `most`; 0 where they are
-/// nearer now.
+/// Returns how long real nodes i and j surely stay apart by the margin from now on, at most `most`; 0 where
+/// they are nearer now.
 template <int kNodes>
 TANDEM_HD inline double time_apart(const PairFrames& frames, const FrameNodes<kNodes>& in_a,
                                    const FrameNodes<kNodes>& in_b, int i, int j, double most) {
@@ -189,8 +189,8 @@ TANDEM_HD inline double time_apart(const PairFrames& frames, const FrameNodes<kN
     start[2 * axis + 1] = -m.distance - (m.radius + frames.margin);
     slope[2 * axis + 1] = -m.velocity - m.growth;
   }
-  // Those that hold now do until they fall to 0, the last of them for the time ahead / fall; compared by
-  // products, of which one may be taken that is shorter by rounding.
+  // The axes that hold now do so until they fall to 0, the last of them for the time ahead / fall; compared
+  // by products, of which one may be taken that is shorter by rounding.
   double ahead = 0, fall = 1;
   bool lasts = false;
   for (int k = 0; k < 12; ++k) {
@@ -202,13 +202,13 @@ TANDEM_HD inline double time_apart(const PairFrames& frames, const FrameNodes<kN
     }
   }
   const double time = ahead / fall * (1 - 0x1p-50);
-  // One that holds then and does not fall holds for the rest.
+  // An axis that holds then and does not fall holds for the rest.
   for (int k = 0; k < 12; ++k) lasts = lasts || (!(slope[k] < 0) && start[k] + time * slope[k] > 0);
   return lasts || !(time < most) ? most : time;
 }
 
-/// How long node i of a and node j of b, both real, surely stay apart from now on: `most` where that is so
-/// for all of it.
+/// Returns how long node i of a and node j of b, both real, surely stay apart from now on: `most` where that
+/// is so for all of it.
 TANDEM_HD inline double node_pair_time(const PairFrames& frames, const Block& a, int i, const Block& b, int j,
                                        double most) {
   FrameNodes<1> in_a, in_b;
@@ -238,7 +238,8 @@ struct NodeTimes {
   double apart[16];
 };
 
-/// Of those in `mask`, which are apart until `known` from now on, the node pairs that may meet before `most`.
+/// Finds the node pairs that may meet before `most` among those in `mask`, which are apart until `known` from
+/// now on.
 TANDEM_HD inline void node_times(const PairFrames& frames, const Block& a, const Block& b, std::uint32_t mask,
                                  double known, double most, NodeTimes& out) {
   out.hits = 0;

@@ -19,7 +19,7 @@ constexpr std::uint32_t kMostPairs = (kNoIndex - 1 - kFewestImpactSamples) / kIm
 // Trees with fewer levels have few block pairs whatever is looked for.
 constexpr std::uint32_t kFewestLevelsToSample = 4;
 
-// What most_impact_bytes() counts with; a hash table has fewer than four places for each part.
+// most_impact_bytes() counts with these; a hash table has fewer than four places for each part.
 static_assert(sizeof(impact::MovingBody) + sizeof(WorldBox) == 264);
 static_assert(sizeof(ImpactPair) + sizeof(Impact) + 3 * sizeof(double) + 2 * sizeof(std::uint32_t) == 240);
 static_assert(sizeof(PairRecord) + 2 * sizeof(std::uint32_t) == 168);

@@ -9,7 +9,8 @@
 #include "kernels/impact/step_parts.h"
 #include "tandem/kernels/gpu_impact_query.h"
 
-// What the kernels that find times of impact share, all of it in GPU memory. Times are parts of the step.
+// The kernels that find times of impact share this data, all of it in GPU memory. Times are parts of the
+// step.
 //
 // A query takes these stages:
 //  1. Bodies: motions in terms of the step, and swept boxes, of which the broad phase makes pairs.
@@ -142,7 +143,8 @@ cudaError_t write_impacts(const ImpactArgs& args, cudaStream_t stream);
 
 #ifdef __CUDACC__
 
-/// Whether there are pairs to walk: nothing was wrong with instances or pairs, and all contacts had room.
+/// Returns whether there are pairs to walk: nothing was wrong with instances or pairs, and all contacts had
+/// room.
 __device__ inline bool can_walk(const ImpactArgs& args) {
   return args.state->error == 0 && args.query->status == Status::kOk && args.query->complete != 0 &&
          *args.given.count <= args.capacity.pairs;

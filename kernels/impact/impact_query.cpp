@@ -19,7 +19,7 @@ using manifold::Vector3;
 // Boxes that a worker looks at, and pairs that it walks, at a time.
 constexpr std::size_t kBoxesAtOnce = 64, kPairsAtOnce = 4;
 
-// What a worker did; each pair's impact has its own place.
+// Counts what a worker did; each pair's impact has its own place.
 struct Worker {
   ImpactCounters counters;
   impact::ImpactWalk walk;
@@ -46,7 +46,7 @@ void write(const Vector3& x, double (&out)[3]) {
   out[2] = x.z;
 }
 
-// What two triangles of a pair tell at a time, a part of the step.
+// Writes what two triangles of a pair tell at a time, a part of the step.
 void tell(const PairMotion& pair, const LevelView& a, const LevelView& b, double time, Impact& out) {
   const Triangle &of_a = a.triangles[out.triangle_a], &of_b = b.triangles[out.triangle_b];
   const impact::TrianglesAt triangles =

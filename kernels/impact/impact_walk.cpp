@@ -7,7 +7,7 @@
 
 namespace tandem::impact {
 
-// Up to 16 of them, the soonest last.
+// Sorts up to 16 waiting pairs, the soonest last.
 class ImpactWalk::SortedPairs {
  public:
   void insert(const WaitingPair& pair) {
@@ -23,7 +23,7 @@ class ImpactWalk::SortedPairs {
   std::uint32_t count_ = 0;
 };
 
-// Made where it is first asked for in a piece.
+// Returns a part, which is made where it is first asked for in a piece.
 const ImpactWalk::Part& ImpactWalk::part(std::uint32_t number) {
   Part& part = parts_[number];
   if (part.piece == piece_) return part;
@@ -39,7 +39,7 @@ void ImpactWalk::visit(const WaitingPair& pair) {
   const Block &a = a_->blocks[pair.a], &b = b_->blocks[pair.b];
   const double most = std::min(now.time.end, stop_.time) - now.time.begin;
   NodeTimes times;
-  // What is below a node is apart for as long as the node is.
+  // The boxes below a node are apart for as long as the node is.
   node_times(now.frames, a, b, pair.mask, std::max(0.0, pair.apart - now.time.begin), most, times);
   ++counters_->block_pairs;
   if (times.hits == 0) return;
@@ -109,7 +109,7 @@ void ImpactWalk::advance_pair(const WaitingPair& leaf, const Part& part) {
   stop_ = {stop.time, leaf.a, leaf.b};
 }
 
-// Through the piece.
+// Walks through the piece.
 void ImpactWalk::walk() {
   ++piece_;
   ++counters_->walks;

@@ -5,17 +5,17 @@
 
 namespace tandem::impact {
 
-/// What stops a pair.
+/// The triangles that stop a pair, and when.
 struct PairStop {
   double time;  ///< a part of the step; 1: nothing does
   std::uint32_t triangle_a = kNoIndex, triangle_b = kNoIndex;
 };
 
 /// A depth-first walk of two trees through a piece of the step at a time, the nodes that may meet soonest
-/// first. Large; to be kept.
+/// first. It is large, so keep it from call to call.
 class ImpactWalk {
  public:
-  /// Until when two trees stay apart. tolerance: in units of length. Adds to the counters.
+  /// Finds until when two trees stay apart. tolerance: in units of length. Adds to the counters.
   PairStop find_stop(const PairMotion& pair, const LevelView& a, const LevelView& b, double tolerance,
                      ImpactCounters& counters);
 
@@ -31,7 +31,7 @@ class ImpactWalk {
   };
   class SortedPairs;
 
-  /// Where the bodies are when a part of the piece begins.
+  /// The places of the bodies when a part of the piece begins.
   struct Part {
     std::uint64_t piece = 0;  ///< that it is of, in the order of all
     Span time;

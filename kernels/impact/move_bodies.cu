@@ -1,6 +1,7 @@
 #include "kernels/impact/impact_data.h"
 
-// Bodies that move. Compiled without fused operations: swept boxes have the bits of the CPU's.
+// These kernels move bodies. They are compiled without fused operations: swept boxes have the bits of the
+// CPU's.
 namespace tandem::gpu {
 namespace {
 

@@ -118,10 +118,10 @@ TANDEM_HD inline PairMotion pair_motion(const MovingBody& a, const MovingBody& b
   return pair;
 }
 
-/// Whether the balls about the bodies' centres that hold them stay apart for the whole step. A turn changes
-/// no distance from the centre, and the centres' offset goes straight ahead: it is least at one time, which
-/// is computed with an error of 4 w |offset| / |displacement|, and so errs by that many |displacement|, which
-/// slack is for.
+/// Returns whether the balls about the bodies' centres that hold them stay apart for the whole step. A turn
+/// changes no distance from the centre, and the centres' offset goes straight ahead: it is least at one time,
+/// which is computed with an error of 4 w |offset| / |displacement|, and so errs by that many |displacement|,
+/// which slack is for.
 TANDEM_HD inline bool balls_stay_apart(const PairMotion& pair) {
   const double squared = dot(pair.displacement, pair.displacement);
   const double nearest = squared > 0 ? -dot(pair.offset, pair.displacement) / squared : 0;
@@ -138,7 +138,7 @@ TANDEM_HD inline double acceleration_along(const PairMotion& pair, const Vector3
          (norm(cross(pair.a->turn, n)) * fastest_a + norm(cross(pair.b->turn, n)) * fastest_b);
 }
 
-/// Where the two are at some time.
+/// The places of the two bodies at some time.
 struct PairPlace {
   Matrix3 turn_a, turn_b;  ///< Q of each
   Vector3 offset;          ///< from a's centre to b's

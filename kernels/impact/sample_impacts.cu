@@ -1,7 +1,7 @@
 #include "kernels/impact/impact_data.h"
 
-// Pairs posed at some times of the step. Compiled without fused operations, as all that makes records of
-// pairs.
+// These kernels pose pairs at some times of the step. They are compiled without fused operations, as all that
+// makes records of pairs.
 namespace tandem::gpu {
 namespace {
 
@@ -25,7 +25,7 @@ __global__ void __launch_bounds__(kThreads) list_pairs(const __grid_constant__ I
     list_pair(args, left.entries[i]);
 }
 
-/// How many samples each pair has: what there is room for in any query that has room for all pairs.
+/// Returns how many samples each pair has: what there is room for in any query that has room for all pairs.
 __device__ std::uint32_t samples_of_pair(const ImpactArgs& args) {
   const Counter pairs = *args.given.count, all = kImpactSamplesPerPair * pairs + kFewestImpactSamples,
                 room = all < args.most_samples ? all : args.most_samples;

@@ -13,7 +13,7 @@ namespace tandem::impact {
 
 inline constexpr double kMostTurnOfPiece = 0.5;
 
-/// How often a piece may be halved.
+/// A piece may be halved this often.
 inline constexpr std::uint32_t kHalvings = 6;
 
 /// Parts of a piece have numbers: 1 is the whole piece, 2 p and 2 p + 1 are the halves of part p.
@@ -24,7 +24,7 @@ struct Span {
   double begin, end;
 };
 
-/// How many pieces of equal length the step has.
+/// Returns how many pieces of equal length the step has.
 TANDEM_HD inline double pieces_of(const PairMotion& pair) {
   const double turns = manifold::greater(pair.a->angle, pair.b->angle) / kMostTurnOfPiece;
   return manifold::greater(1.0, std::ceil(turns));
@@ -47,7 +47,7 @@ TANDEM_HD inline double largest_acceleration(const PairMotion& pair) {
   return pair.a->angle * pair.a->fastest + pair.b->angle * pair.b->fastest;
 }
 
-/// Whether a part with this number and length is halved for two blocks, whose sizes are size_of().
+/// Returns whether a part with this number and length is halved for two blocks, whose sizes are size_of().
 TANDEM_HD inline bool worth_halving(double acceleration, std::uint32_t number, double length, float size_a,
                                     float size_b) {
   constexpr double kOfSize = 0.125;

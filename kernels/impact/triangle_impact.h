@@ -5,7 +5,7 @@
 #include "kernels/impact/pair_motion.h"
 #include "tandem/formats/file.h"
 
-/// How long two moving triangles stay apart: conservative advancement.
+/// Conservative advancement finds how long two moving triangles stay apart.
 ///
 /// At some time of the step, a plane's normal n, not 0, tells the triangles apart where g = n.q - n.p > 0 for
 /// each corner p of a and q of b. After s more the difference of their places is at least
@@ -90,7 +90,7 @@ TANDEM_HD inline double first_root(double g, double rate, double bend) {
   return bend > 0 ? (rate + root) / bend * (1 - 0x1p-48) : INFINITY;
 }
 
-/// How a direction keeps triangles apart for some time from now on.
+/// Says how a direction keeps triangles apart for some time from now on.
 struct Apart {
   bool throughout = false;  ///< for all of it; the rest is not told then
   double nearly = 0;  ///< until they may be `margin` apart along the direction; 0 where they are nearer now
@@ -169,7 +169,7 @@ TANDEM_HD inline Vector3 normal_towards(const Vector3 (&t)[3], const Vector3 (&o
   return side < 0 ? -n : n;
 }
 
-/// From a to b where they are nearest, as computed.
+/// Returns the direction from a to b where they are nearest, as computed.
 TANDEM_HD inline Vector3 nearest_direction(const TrianglesAt& t) {
   const distance::LocalPair local = distance::local_pair(triangle_pair(t));
   const auto nearest = distance::nearest_features<double>(local.a, local.b, 0x1p-480);
@@ -182,7 +182,7 @@ TANDEM_HD inline Apart longer(const Apart& x, const Apart& y) {
           manifold::greater(x.gap, y.gap)};
 }
 
-/// As long as either face's normal keeps the triangles apart.
+/// Returns how long either face's normal keeps the triangles apart.
 TANDEM_HD inline Apart apart_by_faces(const PairMotion& pair, const TrianglesAt& t, double left,
                                       double margin) {
   const Apart by_a = apart_along(pair, t, normal_towards(t.a, t.b), left, margin);
@@ -201,7 +201,7 @@ TANDEM_HD inline double time_to_advance_from(const PairMotion& pair, const Movin
   return manifold::greater(begin + by_faces.nearly, apart);
 }
 
-/// Where triangles stop: until `time`, in parts of the step, they are surely apart.
+/// The time when triangles stop: until `time`, in parts of the step, they are surely apart.
 struct TriangleStop {
   double time;
   std::uint32_t steps;

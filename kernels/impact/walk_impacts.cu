@@ -110,7 +110,7 @@ __global__ void __launch_bounds__(kThreads) begin(const __grid_constant__ Impact
   }
 }
 
-/// What the other lane of two has.
+/// Returns what the other lane of two has.
 __device__ impact::TreePlace of_other_lane(const impact::TreePlace& mine) {
   constexpr int kNumbers = sizeof(impact::TreePlace) / sizeof(double);
   static_assert(sizeof(impact::TreePlace) == kNumbers * sizeof(double));
@@ -223,7 +223,8 @@ __device__ void follow(const ImpactArgs& args, const ImpactBlockPair& entry, con
     following.block_pairs.put(0, {entry.part, entry.a, b.index[j], column * 0xFu, soonest_in_column});
 }
 
-/// By a warp, kLanes lanes for each block pair. Result: whether the lane's was tested.
+/// Tests block pairs; a warp calls it, with kLanes lanes for each block pair. Result: whether the lane's was
+/// tested.
 __device__ bool visit(const ImpactArgs& args, bool mine, ImpactBlockPair entry, Following& following) {
   entry.part = part_named(args, entry.part);
   mine = mine && entry.part != kNoIndex;
@@ -240,7 +241,7 @@ __device__ bool visit(const ImpactArgs& args, bool mine, ImpactBlockPair entry, 
     const double most = manifold::lesser(part.time.end, sought) - part.time.begin;
     if (a.half_extent[0][i] >= 0 && b.half_extent[0][j] >= 0) {
       const double time = node_pair_time(part.frames, a, i, b, j, most);
-      // What is below a node is apart for as long as the node is.
+      // The boxes below a node are apart for as long as the node is.
       if (time < most) apart = manifold::greater(part.time.begin + time, entry.apart);
     }
   }

@@ -8,7 +8,7 @@
 
 namespace tandem::manifold {
 
-/// What manifolds need to know of an asset. Pointers are of the CPU or of the GPU.
+/// The shape of an asset, as manifolds need it. Pointers are of the CPU or of the GPU.
 struct Shape {
   const Triangle* triangles = nullptr;
   const TriangleTopology* topology = nullptr;
@@ -20,7 +20,7 @@ struct Shape {
   bool closed = false;
 };
 
-/// One of the two bodies of a pair, posed.
+/// A body of a pair, posed.
 struct Body {
   const Shape* shape;
   Pose pose;       ///< of stored coordinates

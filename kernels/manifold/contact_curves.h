@@ -13,8 +13,8 @@ namespace tandem::manifold {
 /// The most contacts of a pair of bodies: pieces are numbered in 28 bits, and table entries in 32.
 inline constexpr std::uint32_t kMostContactsOfPair = std::uint32_t{1} << 27;
 
-/// What a pair of triangles has in common, in short. Corners of polygons are computed again where they are
-/// asked for.
+/// The short form of what a pair of triangles has in common. Corners of polygons are computed again where
+/// they are asked for.
 struct alignas(16) Piece {
   std::uint32_t triangle[2];  ///< of a, of b
   std::uint32_t info;         ///< kind, facing, weights, features, and whether an end is free
@@ -53,7 +53,7 @@ struct PieceMemory {
   std::uint32_t* start;  ///< of each curve in `order`; contacts + 1 entries
   std::uint32_t* table;  ///< kTableWords each
 
-  // Of a GPU: nearer memory, used for keys instead of `table` where it suffices.
+  // On a GPU, this is nearer memory, used for keys instead of `table` where it suffices.
   std::uint32_t* near_table = nullptr;
   std::uint32_t near_words = 0;
 
@@ -73,12 +73,12 @@ TANDEM_HD inline std::uint64_t edge_key(const TriangleTopology& t, int k) {
   return u < v ? std::uint64_t{u} << 32 | v : std::uint64_t{v} << 32 | u;
 }
 
-/// What the triangles of a piece have in common, once more.
+/// Computes once more what the triangles of a piece have in common.
 TANDEM_HD_SELDOM inline void meet_again(const BodyPair& bodies, const Piece& piece, Meeting& out) {
   meet(bodies.a.triangle(piece.triangle[0]), bodies.b.triangle(piece.triangle[1]), bodies.tolerance(), out);
 }
 
-/// What is known of all pieces together.
+/// The facts about all pieces together.
 struct PieceSummary {
   std::uint32_t pieces = 0, segments = 0, curves = 0;
   bool degenerate =
@@ -87,7 +87,7 @@ struct PieceSummary {
   double unit = 1;  ///< a power of two, at least their distance from it along each axis
 };
 
-/// What pieces amount to: how many there are, and where.
+/// Says how many pieces there are, and where.
 struct PieceBounds {
   std::uint32_t pieces = 0, segments = 0;
   bool degenerate = false;
@@ -145,7 +145,7 @@ class CurveFinder {
   /// of the team see, for its use. Condition: a team of one.
   TANDEM_HD PieceSummary find(const Contact* contacts, std::uint32_t count, std::uint32_t& next);
 
-  /// The same of pieces that are written down already, from what all of them amount to.
+  /// Finds the curves of pieces that are written down already, from what all of them amount to.
   TANDEM_HD PieceSummary find_among(const PieceBounds& all, std::uint32_t& next);
 
  private:
@@ -300,8 +300,8 @@ TANDEM_HD bool CurveFinder<Team>::connect_by_ends() {
   return team_.sum(alone) == 0 && !team_.any(many);
 }
 
-/// Where corners lie in planes the ends are ambiguous: then pieces hang together whose triangles share a
-/// corner on both sides.
+/// If corners lie in planes, the ends are ambiguous: then pieces hang together whose triangles share a corner
+/// on both sides.
 template <typename Team>
 TANDEM_HD_SELDOM void CurveFinder<Team>::connect_by_corners() {
   if constexpr (HasLanes<Team>) return team_.lanes().connect_by_corners(bodies_, memory_, summary_.pieces);
@@ -330,7 +330,7 @@ TANDEM_HD void CurveFinder<Team>::sort_by_curve(std::uint32_t& next) {
     team_.sync();
     return;
   }
-  // In the table: the number of each curve by its first piece; of each piece the first of its curve; where
+  // The table has the number of each curve by its first piece; for each piece the first of its curve; where
   // the curves begin.
   static_assert(PieceMemory::kTableWords >= 4);
   std::uint32_t *number = table_, *first = table_ + pieces, *begin = table_ + 2 * std::size_t{pieces};

@@ -2,8 +2,8 @@
 #include "kernels/manifold/patch_rim.h"
 #include "kernels/manifold/team.h"
 
-/// What is done once all patches of a pair of bodies are known: holes are taken off, and points get names
-/// that last.
+/// These steps are done once all patches of a pair of bodies are known: holes are taken off, and points get
+/// names that last.
 namespace tandem::manifold {
 
 /// A point is the one of the step before if it has moved, on either body, by less than this part of the
@@ -85,7 +85,8 @@ class PointMatcher {
     const double x = p[0] - q[0], y = p[1] - q[1], z = p[2] - q[2];
     return x * x + y * y + z * z;
   }
-  /// Of the points of another step that push in about the same direction. Of two as near the first.
+  /// Returns the nearest of the points of another step that push in about the same direction; of two as near,
+  /// the first.
   TANDEM_HD std::uint32_t nearest(const ManifoldPoint& point, const Manifold& manifold,
                                   const ManifoldPoint* others, const Manifold* of_others, std::uint32_t first,
                                   std::uint32_t count) const {

@@ -4,8 +4,8 @@
 #include "kernels/manifold/manifold_maker.h"
 #include "kernels/manifold/manifold_team.cuh"
 
-// From contacts to patches, step by step. Compiled without fused operations: the arithmetic is that of the
-// CPU, bit by bit.
+// These kernels go from contacts to patches, step by step. They are compiled without fused operations: the
+// arithmetic is that of the CPU, bit by bit.
 namespace tandem::gpu {
 namespace {
 
@@ -21,7 +21,7 @@ using manifold::PieceSummary;
 constexpr std::uint32_t kThreads = 128, kWarps = kThreads / 32, kFinders = 512, kFindingWarps = kFinders / 32;
 using LargeTeam = BlockTeam<kThreads>;
 
-/// What teams share, without contents at first.
+/// Memory that teams share, without contents at first.
 template <typename T>
 struct Raw {
   alignas(16) unsigned char bytes[sizeof(T)];
@@ -214,7 +214,7 @@ __global__ void __launch_bounds__(kFinders, 2) find_curves(const __grid_constant
   share_out<kFinders>(groups.counts->many, state.next_many, groups.counts->few, state.next_few, of);
 }
 
-// What a team that makes a patch shares.
+// The memory that a team shares while it makes a patch.
 struct MakerMemory {
   Raw<BodyPair> bodies;
   Raw<PieceSummary> summary;
@@ -374,7 +374,7 @@ __global__ void __launch_bounds__(kThreads) remember(const __grid_constant__ Man
   for (std::uint32_t i = first; i < args.capacity.pairs / kManifoldTile + 1; i += step) args.tile_sums[i] = 0;
   if (args.match_previous && state.has_last != 0) {
     const std::uint32_t table_step = step_after(state.step);
-    // As words, so that the copies are even.
+    // The sizes are in words, so that the copies are even.
     constexpr std::uint32_t kManifoldWords = sizeof(Manifold) / 8, kPointWords = sizeof(ManifoldPoint) / 8;
     const auto copy = [&](const void* from, void* to, std::uint64_t words) {
       for (std::uint64_t i = first; i < words; i += step)
@@ -405,7 +405,7 @@ __global__ void __launch_bounds__(kThreads) remember(const __grid_constant__ Man
 }  // namespace
 
 cudaError_t remember_points(const ManifoldArgs& args, cudaStream_t stream) {
-  // After whatever kernel of the user's, and so after all of it.
+  // This runs after whatever kernel of the user's, and so after all of it.
   remember<<<args.limits.processors * 2, kThreads, 0, stream>>>(args);
   return cudaGetLastError();
 }

@@ -9,7 +9,7 @@
 #include "kernels/manifold/patch.h"
 #include "tandem/kernels/gpu_manifold_query.h"
 
-// What the kernels that make manifolds share, all of it in GPU memory.
+// The kernels that make manifolds share this data, all of it in GPU memory.
 namespace tandem::gpu {
 
 using Counter = unsigned long long;
@@ -61,7 +61,7 @@ struct ManifoldState {
   Counter needed_points, segments, ambiguous_touches, open_curves;
   std::uint32_t too_many_contacts, finished_blocks;
 
-  // Kept from call to call.
+  // These are kept from call to call.
   std::uint32_t step;      ///< of the table
   std::uint32_t has_last;  ///< the last call made manifolds that the next one is to remember
   std::uint32_t last_manifolds, last_points;

@@ -4,7 +4,7 @@
 #include "kernels/manifold/contact_curves.h"
 #include "kernels/manifold/patch.h"
 
-// What makes manifolds faster on a machine that has the instructions. All ways give the same bytes.
+// These functions make manifolds faster on a machine that has the instructions. All ways give the same bytes.
 namespace tandem {
 
 struct ManifoldLanes {
@@ -13,12 +13,12 @@ struct ManifoldLanes {
   /// Words of the table that pieces are joined by: so many for each contact, and some more.
   static constexpr std::uint32_t kTableWords = 36, kMoreTableWords = 4;
 
-  /// Of what comes later, one float beyond the pieces' normals is read.
+  /// The function reads one float beyond the pieces' normals, of what comes later.
   manifold::PieceBounds (*make_pieces)(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory,
                                        const Contact* contacts, std::uint32_t count);
 
-  /// Adds what two triangles have in common, if that is something. Not inlined, so that no inline function
-  /// that is compiled for one machine is linked into code for another.
+  /// Adds what two triangles have in common, if that is something. It is not inlined, so that no inline
+  /// function that is compiled for one machine is linked into code for another.
   static void add_piece(const manifold::PieceMemory& memory, const Contact& contact,
                         const manifold::WorldTriangle& a, const manifold::WorldTriangle& b, double tolerance,
                         manifold::PieceBounds& bounds);
@@ -27,7 +27,7 @@ struct ManifoldLanes {
   static void connect_by_corners(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory,
                                  std::uint32_t pieces);
 
-  // Each as the function of the name in the headers, of pieces order[begin] to order[end - 1].
+  // Each does what the function of its name in the headers does, with pieces order[begin] to order[end - 1].
   void (*sum_pieces)(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
                      const manifold::Vector3& origin, double one_by_unit, manifold::CurveSums& out);
   manifold::LeastPiece (*least_unmarked)(const manifold::PieceMemory& memory, std::uint32_t begin,
@@ -42,7 +42,8 @@ struct ManifoldLanes {
   manifold::Extreme (*extreme_corner)(const manifold::Body& body, const manifold::PieceMemory& memory,
                                       std::uint32_t begin, std::uint32_t end,
                                       const manifold::PatchFrame& frame, int side);
-  /// Where there are no polygons. ends: of each piece, 1 or 2. Result: how many candidates.
+  /// Gathers the rim where there are no polygons. ends: those of each piece, 1 or 2. Result: how many
+  /// candidates there are.
   std::uint32_t (*gather_rim)(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
                               const manifold::PatchFrame& frame, double one_by_unit, int ends,
                               manifold::Candidate* candidates, manifold::RimMoments& moments);
@@ -66,7 +67,7 @@ inline const ManifoldLanes* manifold_lanes(BlockPairVariant variant) {
   return way_of<const ManifoldLanes*>(variant, nullptr, &LaneVariant::manifold_lanes);
 }
 
-/// Of the widest vectors that this machine has. Condition: TANDEM_HAVE_LANES.
+/// Returns the functions for the widest vectors that this machine has. Condition: TANDEM_HAVE_LANES.
 inline const ManifoldLanes& best_manifold_lanes() {
   static const ManifoldLanes& best = *best_way(manifold_lanes);
   return best;

@@ -5,8 +5,8 @@
 /// The rule by which contacts become manifolds (docs/contacts.md), for CPU and GPU alike.
 namespace tandem::manifold {
 
-/// How far a line that sounds the depth at the rim is moved inwards, as a part of the way to the middle, so
-/// that it does not run along a wall that made the rim.
+/// A line that sounds the depth at the rim is moved inwards by this part of the way to the middle, so that it
+/// does not run along a wall that made the rim.
 inline constexpr double kInwards = 0.02;
 
 /// Points of a manifold closer than this part of the smaller body's diagonal are one.
@@ -19,7 +19,7 @@ inline constexpr double kDeeper = 1.25;
 /// less is rounding and the lean of the surface beside the point, more is another place.
 inline constexpr double kLittleDeeper = 1.01, kSomewhatDeeper = 1.1;
 
-/// In patches of so few pieces the corners of their triangles are looked at for the deepest point.
+/// If a patch has so few pieces, the corners of their triangles are looked at for the deepest point.
 inline constexpr std::uint32_t kFewPieces = 64;
 
 /// Makes the patch of a curve that CurveFinder found, whose summary this is, in three steps. A patch's state
@@ -56,7 +56,7 @@ class ManifoldMaker {
   TANDEM_HD void place_candidates(const RimFinder<Team>& finder, bool touch, ChoiceMemory& shared);
   TANDEM_HD int much_deeper_inner_point(int most_of_rim, ChoiceMemory& shared) const;
   TANDEM_HD void keep_apart(int most_of_rim, int inner, ChoiceMemory& shared) const;
-  /// Whether a sounding is one of the first points of the rim.
+  /// Returns whether a sounding is one of the first points of the rim.
   TANDEM_HD bool is_of_rim(int i, int most_of_rim, const ChoiceMemory& shared) const {
     return !shared.candidate[i].inner && state_.sounding[i].rank < most_of_rim;
   }
@@ -354,7 +354,7 @@ TANDEM_HD void ManifoldMaker<Team>::look_behind(DepthMemory& shared) {
   team_.sync();
 }
 
-/// What may become points: all that was sounded, with its depth.
+/// Keeps what may become points: all that was sounded, with its depth.
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::place_candidates(const RimFinder<Team>& finder, bool touch,
                                                      ChoiceMemory& shared) {
@@ -516,7 +516,7 @@ TANDEM_HD bool ManifoldMaker<Team>::begin(std::uint32_t curve, OutlineMemory& sh
   team_.sync();
   RimFinder<Team> rim_finder(team_, bodies_, memory_, summary_, curve, state_.frame);
   rim_finder.gather(measure.closed && !summary_.degenerate, shared.next);
-  // One is left for an inner point.
+  // One point is left for an inner one.
   const int most_of_rim = kMostManifoldPoints - (normal.touch ? 0 : 1);
   rim_finder.find(most_of_rim, state_.frame.flat(measure.middle), shared.rim);
   if (shared.rim.rim.points == 0) return false;
@@ -555,7 +555,7 @@ TANDEM_HD void ManifoldMaker<Team>::finish(std::uint32_t curve, int most_points,
     if (goes_through && dot(state_.area, bodies_.apart()) < 0) return;
   }
   const RimFinder<Team> rim_finder(team_, bodies_, memory_, summary_, curve, state_.frame, state_.candidates);
-  // What the patch is does not depend on how many points it may have.
+  // The kind of the patch does not depend on how many points it may have.
   choose(rim_finder, state_.touch || most_points == 1 ? most_points : most_points - 1, state_.touch || hole,
          shared);
   const int found = static_cast<int>(shared.count), count = found < most_points ? found : most_points;

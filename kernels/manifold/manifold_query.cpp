@@ -45,7 +45,7 @@ std::uint64_t bodies_of(const ObjectPair& pair) {
 }  // namespace
 
 struct ManifoldQuery::State : Allocated {
-  // Where the manifolds of a call and their points go.
+  // The manifolds of a call and their points.
   struct Found {
     Manifold* manifolds;
     ManifoldPoint* points;
@@ -217,7 +217,7 @@ void ManifoldQuery::State::finish(Row& row, const SceneState& scene, const Objec
                 {manifolds_before.data(), points_before.data(), before->first, before->count});
 }
 
-// What the next call looks for its points in.
+// Keeps the manifolds and points in which the next call looks for its points.
 bool ManifoldQuery::State::remember_step(std::span<const ObjectPair> pairs) {
   pair_points_before.clear();
   for (std::size_t i = 0; i < rows.size(); ++i) {

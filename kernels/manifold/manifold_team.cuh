@@ -8,7 +8,7 @@
 // Teams of a GPU, see manifold/team.h: a warp, and a thread block.
 namespace tandem::gpu {
 
-/// What both have in common: numbers in memory that the team shares.
+/// The base of both teams: numbers in memory that the team shares.
 struct SharedNumbers {
   __device__ static std::uint32_t load(const std::uint32_t& at) {
     return *static_cast<const volatile std::uint32_t*>(&at);
@@ -27,7 +27,7 @@ struct SharedNumbers {
   }
 };
 
-/// What the groups of a warp need for walks through trees.
+/// The memory that the groups of a warp need for walks through trees.
 struct WarpWalks {
   std::uint32_t waiting[1024];  ///< blocks
   std::uint32_t triangles[32];  ///< of leaves just found
@@ -61,7 +61,7 @@ struct LaneGroup {
  private:
   static constexpr std::uint32_t kWarp = 0xFFFFFFFFu;
 
-  /// What the lane has whose number differs in one bit.
+  /// Returns what the lane has whose number differs in one bit.
   template <typename T>
   __device__ static T exchanged(const T& own, std::uint32_t bit) {
     constexpr int kWords = sizeof(T) / 4;
@@ -160,7 +160,7 @@ __device__ T over_warp(T value, Of of) {
   return value;
 }
 
-/// Of each of several values what `of` makes of those of all lanes.
+/// Returns for each of several values what `of` makes of those of all lanes.
 template <typename T, int kCount, typename Of>
 __device__ __forceinline__ void over_warp(T (&values)[kCount], Of of) {
 #pragma unroll

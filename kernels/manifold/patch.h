@@ -5,7 +5,7 @@
 #include "kernels/manifold/surface_line.h"
 #include "tandem/kernels/manifold.h"
 
-/// What the steps from a curve of pieces to a manifold pass on to each other.
+/// The steps from a curve of pieces to a manifold pass this data on to each other.
 namespace tandem::manifold {
 
 /// A manifold before it has its place.
@@ -45,7 +45,7 @@ struct CurveSums {
   }
 };
 
-/// What all pieces of a curve amount to.
+/// The sums over all pieces of a curve.
 struct CurveMeasure {
   Vector3 area;    ///< half the sum of r x dr, and polygons: from a towards b
   Vector3 middle;  ///< of the pieces
@@ -87,7 +87,7 @@ struct Direction {
   std::uint32_t piece;  ///< one whose triangle has it
 };
 
-/// What a team shares while it looks for a normal.
+/// The memory that a team shares while it looks for a normal.
 struct NormalMemory {
   Direction direction[kMostTried];  ///< of faces of a, then of b
   Vector3 tried[kMostTried];
@@ -113,8 +113,8 @@ struct FloatPoint {
   float x, y;
 };
 
-/// What a candidate is to have most of: distance from p, or distance beyond the line from p to q, times its
-/// length.
+/// The value that a candidate is to have most of: distance from p, or distance beyond the line from p to q,
+/// times its length.
 struct RimValue {
   FloatPoint p, q;
   bool distance;
@@ -134,7 +134,7 @@ struct Furthest {
     const Piece& p = memory.pieces[reference / 8];
     return std::uint64_t{p.triangle[0]} << 33 | std::uint64_t{p.triangle[1]} << 3 | (reference & 7u);
   }
-  /// Of several the one whose triangles come first.
+  /// Takes the candidate if its value is greater; of equal ones, the one whose triangles come first.
   TANDEM_HD void take(const PieceMemory& memory, float of_c, std::uint32_t of) {
     if (!(of_c >= value)) return;
     if (of_c == value && (reference == kNoIndex || key(memory, of) >= key(memory, reference))) return;
@@ -155,7 +155,7 @@ struct Rim {
   int points;
 };
 
-/// What a team shares while it looks for a rim.
+/// The memory that a team shares while it looks for a rim.
 struct RimMemory {
   Rim rim;
   Furthest of_side[kMostManifoldPoints];  ///< beyond the side from point i to the next: what it would add
@@ -180,7 +180,7 @@ struct Sounding {
   TANDEM_HD double overlap() const {
     return surface[0].found() && surface[1].found() ? surface[0].height - surface[1].height : 0;
   }
-  /// Whether the line runs within both, as far as it was looked at.
+  /// Returns whether the line runs within both, as far as it was looked at.
   TANDEM_HD bool within() const {
     if (!(overlap() > 0)) return false;
     if (!looked_behind) return true;
@@ -188,7 +188,7 @@ struct Sounding {
     const double end = std::fmin(surface[0].height, behind[1].found() ? behind[1].height : INFINITY);
     return begin < end;
   }
-  /// Whether one body ends within the other. Condition: looked_behind, within().
+  /// Returns whether one body ends within the other. Condition: looked_behind, within().
   TANDEM_HD bool goes_through() const { return behind[0].found() || behind[1].found(); }
 };
 
@@ -204,7 +204,7 @@ struct Chosen {
   bool inner;
 };
 
-/// What is known of a patch from one step to the next.
+/// The state of a patch from one step to the next.
 struct PatchState {
   Sounding sounding[kMostSoundings];  ///< of the rim, of the middle, of vertices
   int rim_points, soundings;
@@ -218,14 +218,14 @@ struct PatchState {
   std::uint32_t candidates;
 };
 
-/// What a team shares while it finds a patch's normal and rim.
+/// The memory that a team shares while it finds a patch's normal and rim.
 struct OutlineMemory {
   NormalMemory normal;
   RimMemory rim;
   std::uint32_t next;
 };
 
-/// What a team shares while it measures a patch's depths.
+/// The memory that a team shares while it measures a patch's depths.
 struct DepthMemory {
   LineQuestion line[2 * kMostSoundings];
   Prism prism;
@@ -233,7 +233,7 @@ struct DepthMemory {
   Extreme extreme[4];
 };
 
-/// What a team shares while it chooses a patch's points.
+/// The memory that a team shares while it chooses a patch's points.
 struct ChoiceMemory {
   Chosen candidate[kMostSoundings], chosen[kMostSoundings];
   Patch* patch;

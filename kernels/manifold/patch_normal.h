@@ -65,7 +65,7 @@ class NormalFinder {
   TANDEM_HD_SELDOM bool find_for_touch(Vector3& n);
   TANDEM_HD_SELDOM bool find_crossing_edges(Vector3& n) const;
   TANDEM_HD Vector3 crossing_edges(const Piece& piece, int number) const;
-  /// From a towards b.
+  /// Returns the normal that points from a towards b.
   TANDEM_HD static FloatVector turned_normal(const float* normals, int side) {
     const float sign = side == 0 ? 1.0f : -1.0f;
     return {{sign * normals[3 * side], sign * normals[3 * side + 1], sign * normals[3 * side + 2]}};
@@ -141,7 +141,7 @@ TANDEM_HD_SELDOM bool NormalFinder<Team>::has_free_end() const {
   return team_.any(is_free);
 }
 
-/// Of pieces without length, from the origin on.
+/// Returns the middle of pieces without length, from the origin on.
 template <typename Team>
 TANDEM_HD_SELDOM Vector3 NormalFinder<Team>::plain_middle() const {
   ExactVectorSum sum;
@@ -169,9 +169,9 @@ TANDEM_HD_SELDOM Vector3 NormalFinder<Team>::sheet_normal() const {
   return sum.value(unit);
 }
 
-/// Whether a sample of pieces proves that gather_directions() is false: of more than kMostDirections normals
-/// each is more than twice as far from the others as normals of one direction are from it, so no direction
-/// has two of them.
+/// Returns whether a sample of pieces proves that gather_directions() is false: of more than kMostDirections
+/// normals each is more than twice as far from the others as normals of one direction are from it, so no
+/// direction has two of them.
 template <typename Team>
 TANDEM_HD bool NormalFinder<Team>::has_many_directions(int side) const {
   constexpr std::uint32_t kSample = 32;
@@ -293,8 +293,9 @@ TANDEM_HD void NormalFinder<Team>::sum_lengths_on_faces(const FloatVector (&face
   add_up(team_, within[0], within[1]);
 }
 
-/// Of bodies of many faces those that a patch lies on, as where prisms stand on each other: of each body the
-/// face that lies most across the smooth normal, if nearly all of the curve lies in the plane of such a face.
+/// Finds the faces of bodies of many faces that a patch lies on, as where prisms stand on each other: of each
+/// body the face that lies most across the smooth normal, if nearly all of the curve lies in the plane of
+/// such a face.
 template <typename Team>
 TANDEM_HD void NormalFinder<Team>::find_bearing_faces(const Vector3& smooth, double length) {
   directions_ = 0;
@@ -356,7 +357,7 @@ TANDEM_HD void NormalFinder<Team>::spread_along(int count) const {
   team_.sync();
 }
 
-/// Where few flat faces meet, as boxes do, the curve's own normal leans a little, by depth over length: along
+/// If few flat faces meet, as boxes do, the curve's own normal leans a little, by depth over length. Along
 /// the face normal that separates the patch's triangles soonest they stay upright. How far b must move until
 /// a plane lies between all of the triangles counts, not how deep the overlap is: the tip of a pyramid in the
 /// ground is narrower than it is deep, yet the ground goes on. A body whose triangles in the patch all face
@@ -438,7 +439,7 @@ TANDEM_HD_SELDOM bool NormalFinder<Team>::find_crossing_edges(Vector3& n) const 
   }
   key = team_.least(key);
   if (!team_.any(found)) return false;
-  // Of the least piece the first direction counts, if no other piece has another one.
+  // The first direction of the least piece counts, if no other piece has another one.
   std::uint32_t first = kDirections;
   for (std::uint32_t at = team_.rank(); at < tries; at += team_.size()) {
     const Piece& piece = memory_.pieces[memory_.order[begin_ + at / kDirections]];

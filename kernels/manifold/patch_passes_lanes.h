@@ -7,7 +7,8 @@
 #ifdef TANDEM_HAVE_LANES
 #include "kernels/manifold/manifold_lanes.h"
 
-// What patch_normal.h, patch_rim.h and manifold_maker.h ask of all pieces of a curve, four pieces at a time.
+// These are the passes of patch_normal.h, patch_rim.h and manifold_maker.h over all pieces of a curve, four
+// pieces at a time.
 namespace tandem {
 namespace {
 
@@ -163,7 +164,7 @@ manifold::LeastPiece least_unmarked(const manifold::PieceMemory& memory, std::ui
   return least;
 }
 
-/// Of NormalFinder::find_bearing_faces().
+/// This is a pass of NormalFinder::find_bearing_faces().
 void find_face_along(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end, int side,
                      const manifold::FloatVector& up, manifold::FaceAlong& best) {
   const float sign = side == 0 ? 1 : -1;
@@ -179,7 +180,7 @@ void find_face_along(const manifold::PieceMemory& memory, std::uint32_t begin, s
   }
 }
 
-/// Of NormalFinder::find_bearing_faces().
+/// This is a pass of NormalFinder::find_bearing_faces().
 void sum_length_on_face(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
                         const manifold::FloatVector& face, double one_by_unit, manifold::ExactSum& sum) {
   const manifold::FloatVector turned = {{-face.x[0], -face.x[1], -face.x[2]}};
@@ -205,7 +206,8 @@ class CurveTriangles {
     for (std::uint32_t& s : seen_) s = kNoIndex;
   }
 
-  /// Up to kMost further ones, a multiple of four: the last one may be there several times. 0: no more.
+  /// Gathers up to kMost further ones, a multiple of four: the last one may be there several times. 0: no
+  /// more.
   std::uint32_t gather(std::uint32_t (&index)[kMost]) {
     std::uint32_t count = 0;
     for (; next_ < end_ && count < kMost; ++next_) {

@@ -124,8 +124,8 @@ TANDEM_HD bool RimFinder<Team>::middle_of_area(Vector2& middle) const {
   return true;
 }
 
-/// For each value the candidate that has the greatest one, if it is greater than what is given; of several
-/// the one whose triangles come first.
+/// Finds for each value the candidate that has the greatest one, if it is greater than what is given; of
+/// several, the one whose triangles come first.
 template <typename Team>
 template <int kWanted>
 TANDEM_HD void RimFinder<Team>::furthest(const RimValue (&values)[kWanted], Furthest (&best)[kWanted]) const {
@@ -156,7 +156,7 @@ template <typename Team>
 TANDEM_HD void RimFinder<Team>::find(int most, const Vector2& middle, RimMemory& shared) const {
   Rim& rim = shared.rim;
   float limit = 0, area = 0;
-  // What is shared is written by the first of the team, after all have found the furthest together.
+  // The first of the team writes what is shared, after all have found the furthest together.
   const bool is_first = team_.rank() == 0;
   if (is_first) rim.points = 0, shared.first = 0, shared.second = 1, shared.complete = false;
   team_.sync();
@@ -224,7 +224,7 @@ TANDEM_HD inline std::uint64_t feature_hash(std::uint64_t x, std::uint64_t y) {
   return hash == 0 ? 1 : hash;
 }
 
-/// What a candidate is called: by the edge or vertex of one body and the triangle of the other that meet
+/// Returns the name of a candidate: by the edge or vertex of one body and the triangle of the other that meet
 /// there.
 template <typename Team>
 TANDEM_HD std::uint64_t RimFinder<Team>::feature(std::uint32_t reference) const {

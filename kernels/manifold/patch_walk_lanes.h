@@ -144,8 +144,8 @@ class LineWalk {
     if (fetched != nullptr) visit(*fetched, lines_of_fetched);
   }
 
-  /// As LineTest::passes(), for four boxes and several lines. What depends on the line alone or the box alone
-  /// is computed once: each is projected across the direction.
+  /// Tests four boxes and several lines, as LineTest::passes() does. What depends on the line alone or the
+  /// box alone is computed once: each is projected across the direction.
   TANDEM_INLINE unsigned lines_that_meet(const Block& block, unsigned lines,
                                          unsigned (&below)[kNodesPerBlock]) const {
     const BoxCoordinates box(block, origin_);
@@ -272,7 +272,7 @@ class ExtremeWalk {
   }
 
  private:
-  /// As PrismTest::passes(), for four boxes.
+  /// Tests four boxes, as PrismTest::passes() does.
   TANDEM_INLINE unsigned nodes_that_reach(const Block& block) const {
     const BoxCoordinates box(block, origin_);
     const Lanes4(&x)[3] = box.center, (&h)[3] = box.half_extent;

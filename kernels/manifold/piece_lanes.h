@@ -70,7 +70,7 @@ struct StretchLanes {
   TANDEM_INLINE StretchLanes(const WorldTriangleLanes& t, const HeightsLanes& heights,
                              const Vector3Lanes<4>& line, const Vector3Lanes<4>& origin) {
     const auto& h = heights.height;
-    // Of edges 0, 1 and 2 the two that end at the lone corner.
+    // These are the two of edges 0, 1 and 2 that end at the lone corner.
     const DoubleMask<4> last = heights.alone[2], middle = heights.alone[1];
     const auto cut = [](const Vector3Lanes<4>& x, const Vector3Lanes<4>& y, const DoubleLanes<4>& of_x,
                         const DoubleLanes<4>& of_y) {
@@ -138,7 +138,7 @@ class PieceMaker {
     const WorldTriangleLanes a(bodies_.a, index_a), b(bodies_.b, index_b);
     const HeightsLanes of_a(a, b, tolerance_), of_b(b, a, tolerance_);
     const unsigned all = (1u << lanes) - 1;
-    // Of a flat triangle all heights are 0 as well.
+    // The heights of a flat triangle are all 0 as well.
     const unsigned special = bits_of_mask(of_a.in_plane | of_b.in_plane) & all;
     const Vector3Lanes<4> across = cross(a.normal, b.normal);
     const D sine = square_root(dot(across, across));
@@ -153,7 +153,7 @@ class PieceMaker {
       const Mask is_point = end <= begin + tolerance_;
       const Vector3Lanes<4> from = either(begins_in_a, in_a.point[0], in_b.point[0]),
                             to = either(ends_in_a, in_a.point[1], in_b.point[1]);
-      // As bits_of() has features: of_b, then the edge's number.
+      // The features are as bits_of() has them: of_b, then the edge's number.
       const Mask feature_from = begins_in_a ? in_a.edge[0] << 2 : in_b.edge[0] << 2 | 1,
                  feature_to = ends_in_a ? in_a.edge[1] << 2 : in_b.edge[1] << 2 | 1;
       const Mask kind = is_point ? Mask{} + static_cast<std::int64_t>(manifold::MeetingKind::point)

@@ -3,8 +3,8 @@
 #include "kernels/manifold/manifold_data.h"
 #include "kernels/manifold/manifold_team.cuh"
 
-// Where manifolds and points go: by ascending pair, and within a pair by their least pieces. Compiled without
-// fused operations, as what makes them.
+// These kernels place manifolds and points by ascending pair, and within a pair by their least pieces. They
+// are compiled without fused operations, as those that make them.
 namespace tandem::gpu {
 namespace {
 
@@ -22,7 +22,7 @@ __device__ std::uint32_t pair_count(const ManifoldArgs& args) {
   return *args.pairs.count < args.capacity.pairs ? *args.pairs.count : args.capacity.pairs;
 }
 
-/// Whether all had room: the same for all threads of all kernels behind make_patches().
+/// Returns whether all had room: the same for all threads of all kernels behind make_patches().
 __device__ bool is_complete(const ManifoldArgs& args) {
   const ManifoldState& state = *args.state;
   return args.query->status == Status::kOk && args.query->complete != 0 &&
@@ -31,7 +31,8 @@ __device__ bool is_complete(const ManifoldArgs& args) {
          state.needed_points <= args.capacity.points;
 }
 
-/// The sum of all tiles before this one (Merrill and Garland 2016). By one thread: tiles are few.
+/// The sum of all tiles before this one (Merrill and Garland 2016). One thread calls it, because tiles are
+/// few.
 __device__ Counter sum_before(const Counter* words, std::uint32_t tile) {
   Counter sum = 0;
   while (tile-- > 0) {
@@ -65,7 +66,7 @@ __device__ void write_report(const ManifoldArgs& args, std::uint32_t manifolds, 
   }
   state.report = report;
   *args.host_report = report;
-  // What did not fit is not remembered, and what was remembered before it stays.
+  // Manifolds that did not fit are not remembered; those that were remembered before stay.
   state.last_manifolds = report.manifolds;
   state.last_points = report.points;
   state.has_last = complete && args.match_previous ? 1 : 0;

@@ -12,7 +12,7 @@ inline void set_bounds(const float (&lower)[3], const float (&upper)[3], const d
   shape.diagonal = norm(to - from);
 }
 
-/// What manifolds need to know of a level of an asset. Condition: it has topology.
+/// Returns what manifolds need to know of a level of an asset. Condition: it has topology.
 inline Shape shape_of(const FileHeader& header, const LevelView& level) {
   Shape shape;
   shape.triangles = level.triangles;

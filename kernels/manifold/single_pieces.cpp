@@ -2,7 +2,7 @@
 
 #include "kernels/manifold/manifold_lanes.h"
 
-// What CurveFinder does with single pieces, by one thread. Keys lie beside the references, so that nothing is
+// One thread does this for CurveFinder with single pieces. Keys lie beside the references, so that nothing is
 // computed again where two are compared.
 namespace tandem {
 namespace {

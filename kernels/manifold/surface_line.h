@@ -55,7 +55,7 @@ TANDEM_HD inline FloatVector point_in_mesh(const Body& body, const Vector3& poin
   return in_mesh(body, point - Vector3{t[0], t[1], t[2]});
 }
 
-/// How much float32 may be off for boxes of this body near a point of stored coordinates.
+/// Returns how much float32 may be off for boxes of this body near a point of stored coordinates.
 TANDEM_HD inline float slack_near(const Body& body, const FloatVector& point) {
   const Shape& shape = *body.shape;
   const double far = std::fabs(shape.center.x) + std::fabs(shape.center.y) + std::fabs(shape.center.z) +
@@ -95,7 +95,7 @@ TANDEM_HD inline unsigned nodes_that_pass(const AnyBlock& block, const Test& tes
   return mask;
 }
 
-/// What lies below those nodes of a block that pass a test.
+/// The blocks or triangles below those nodes of a block that pass a test.
 struct Below {
   unsigned mask = 0;  ///< these nodes
   bool leaves = false;
@@ -147,7 +147,7 @@ TANDEM_HD inline void walk_surface(const OneThreadGroup&, Questions& questions, 
   }
 }
 
-/// Where a line along a patch's normal meets a surface.
+/// The place where a line along a patch's normal meets a surface.
 struct Crossing {
   double height = 0;
   std::uint32_t triangle = kNoIndex;
@@ -180,9 +180,9 @@ struct LineTest {
   }
 };
 
-/// Which crossing of a line with a surface is asked for: the one nearest in height to `target`, between lower
-/// and upper, of triangles whose outward normals point along the frame's (facing 1) or against it (-1). Of
-/// two as near the triangle that comes first.
+/// Says which crossing of a line with a surface is asked for: the one nearest in height to `target`, between
+/// lower and upper, of triangles whose outward normals point along the frame's (facing 1) or against it (-1).
+/// Of two as near, the triangle that comes first is taken.
 struct LineQuestion {
   Vector2 at;
   double target, lower, upper;
@@ -237,8 +237,8 @@ class LineQuestions {
     }
   }
 
-  /// Where nothing lies as near as expected, it has to be looked for further away. Not all boxes there were
-  /// looked at, so what was found there need not be the nearest.
+  /// If nothing lies as near as expected, the walk has to look further away. Not all boxes there were looked
+  /// at, so what was found there need not be the nearest.
   TANDEM_HD void look_further(std::uint32_t question) {
     look_within(questions_[question], questions_[question].nearest);
   }
@@ -367,8 +367,8 @@ struct Extreme {
   TANDEM_HD explicit operator bool() const { return found(); }
 };
 
-/// The highest vertex of a (question 0) and the lowest of b (1) in a prism. Of several the one of the least
-/// number.
+/// The highest vertex of a (question 0) and the lowest of b (1) in a prism. Of several, the one of the least
+/// number is taken.
 class ExtremeQuestions {
  public:
   /// test, extreme: two each, that all of the team see.

@@ -11,14 +11,14 @@ struct OneThreadGroup {
   TANDEM_HD static void sync() {}
 };
 
-/// Those who make the manifolds of an object pair together: one thread of a CPU here, a warp or a thread
-/// block on a GPU (kernels/manifold/manifold_team.cuh). Each takes every size()-th thing from rank() on. What
-/// they find together must not depend on how many they are nor on who comes first.
+/// A team makes the manifolds of an object pair together: one thread of a CPU here, a warp or a thread block
+/// on a GPU (kernels/manifold/manifold_team.cuh). Each takes every size()-th thing from rank() on. What they
+/// find together must not depend on how many they are nor on who comes first.
 struct OneThread {
   TANDEM_HD static std::uint32_t rank() { return 0; }
   TANDEM_HD static std::uint32_t size() { return 1; }
 
-  /// What all have written to memory is seen by all.
+  /// Lets all see what all have written to memory.
   TANDEM_HD static void sync() {}
 
   template <typename T>
@@ -33,7 +33,7 @@ struct OneThread {
   TANDEM_HD static T greatest(T value) {
     return value;
   }
-  /// The same of each of several values: sooner than one after the other.
+  /// These functions do so for each of several values, sooner than one after the other.
   template <typename T, int kCount>
   TANDEM_HD static void sums(T (&)[kCount]) {}
   template <typename T, int kCount>
@@ -49,13 +49,13 @@ struct OneThread {
   TANDEM_HD static void for_each_group(std::uint32_t count, const Of& of) {
     for (std::uint32_t i = 0; i < count; ++i) of(OneThreadGroup(), i, true);
   }
-  /// As many as are worth while for each of two questions.
+  /// The team splits into halves of this size when it answers two questions at once.
   static constexpr int kHalf = 1;
 
-  /// On memory that all see.
+  /// These work on memory that all see.
   TANDEM_HD static std::uint32_t load(const std::uint32_t& at) { return at; }
   TANDEM_HD static void store(std::uint32_t& at, std::uint32_t value) { at = value; }
-  /// The same while others may write there.
+  /// Loads a number that others may be writing.
   TANDEM_HD static std::uint32_t concurrent_load(std::uint32_t& at) { return at; }
   TANDEM_HD static void concurrent_store(std::uint32_t& at, std::uint32_t value) { at = value; }
   TANDEM_HD static std::uint32_t add(std::uint32_t& at, std::uint32_t value) {

@@ -11,7 +11,7 @@ struct WorldTriangle {
   Vector3 normal;  ///< unit, outward; 0 of a flat triangle
 };
 
-/// What part of a triangle a point lies on: edge k joins corners k and k + 1.
+/// The part of a triangle that a point lies on: edge k joins corners k and k + 1.
 struct TriangleFeature {
   std::uint8_t of_b;       ///< of triangle b, in the inside of a; else the other way round
   std::uint8_t is_corner;  ///< corner k, else edge k
@@ -23,18 +23,18 @@ enum class MeetingKind : std::uint8_t { none, point, segment, polygon };
 /// The most corners that two triangles of one plane have in common.
 inline constexpr int kMostCorners = 6;
 
-/// What two triangles have in common.
+/// The segment or polygon that two triangles have in common.
 struct Meeting {
   MeetingKind kind = MeetingKind::none;
   bool degenerate = false;  ///< a corner lies in the other's plane
   Vector3 end[2];           ///< of a segment, run along as normal_a x normal_b points; of a point, twice
   TriangleFeature feature[2] = {};
 
-  /// Whether the segment is an edge of a; of b. Then it counts half, and half again: neighbours that share
-  /// the edge, or a body that only touches there, have the rest.
+  /// Says whether the segment is an edge of a, and of b. Then it counts half, and half again: neighbours that
+  /// share the edge, or a body that only touches there, have the rest.
   bool along_edge[2] = {};
 
-  // Of a polygon: triangles in one plane.
+  // These describe a polygon: the triangles lie in one plane.
   int corners = 0;
   Vector3 corner[kMostCorners];
   double area = 0;
@@ -43,7 +43,7 @@ struct Meeting {
 
 namespace meeting {
 
-/// Where the corners of a triangle lie beside the other's plane.
+/// The heights of a triangle's corners beside the other's plane.
 struct Heights {
   double height[3];
   int sign[3];
@@ -114,7 +114,7 @@ TANDEM_HD inline int cut(const Vector2* polygon, int count, const Vector2& p, co
   return kept;
 }
 
-/// What two triangles in one plane have in common.
+/// Finds what two triangles in one plane have in common.
 TANDEM_HD inline void meet_in_plane(const WorldTriangle& a, const WorldTriangle& b, double tolerance,
                                     Meeting& out) {
   out.degenerate = true;

@@ -15,7 +15,7 @@ static_assert(sizeof(ToleranceState) <=
 static_assert(sizeof(PairVerdict) == 3);
 static_assert(sizeof(levels::LevelRange) == 8);
 
-// Whether two levels in a row of a list are of one asset, the one behind the other.
+// Returns whether two levels in a row of a list are of one asset, the one behind the other.
 bool follows(const GpuAsset& finer, const GpuAsset& coarser) {
   return coarser.tree.number == finer.tree.number + 1 && coarser.source_faces == finer.source_faces &&
          std::equal(coarser.origin, coarser.origin + 3, finer.origin) &&

@@ -3,8 +3,8 @@
 
 #include "kernels/tolerance/tolerance_data.h"
 
-// What is around the contact query of a query by tolerance. Compiled without fused operations, so that levels
-// are those that the CPU chooses.
+// These kernels run before and behind the contact query of a query by tolerance. They are compiled without
+// fused operations, so that levels are those that the CPU chooses.
 namespace tandem::gpu {
 namespace {
 

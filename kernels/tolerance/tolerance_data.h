@@ -8,8 +8,8 @@
 #include "kernels/tolerance/tolerance_rule.h"
 #include "tandem/kernels/gpu_tolerance_query.h"
 
-// What the kernels of a query by tolerance share, all of it in GPU memory: one before a contact query, and
-// one behind it.
+// The kernels of a query by tolerance, one before a contact query and one behind it, share this data, all of
+// it in GPU memory.
 namespace tandem::gpu {
 
 /// Zero when a query begins, up to the report.

@@ -14,7 +14,7 @@
 /// blocks of a tree tell apart what a coarser level could (docs/decisions/0068).
 namespace tandem::levels {
 
-/// Where the levels of an asset lie in the list of those of all assets, from the finest on.
+/// The place of an asset's levels in the list of those of all assets, from the finest on.
 struct LevelRange {
   std::uint32_t first, count;
 };

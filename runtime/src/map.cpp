@@ -52,7 +52,7 @@ Bytes read_all(std::FILE* file) {
 }
 
 #if TANDEM_HAS_MMAP
-// Without blocking: a pipe must be refused, not waited for.
+// Opens without blocking, because a pipe must be refused, not waited for.
 int open_descriptor(const char* path) {
   return ::open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
 }
@@ -98,7 +98,7 @@ void unmap(void* data, std::size_t size) {
   ::munmap(data, size);
 }
 
-// Where the system takes this advice, pages come back, from the file's cache, as they are touched.
+// If the system takes this advice, pages come back from the file's cache as they are touched.
 void give_back_pages(void* data, std::size_t size) {
   (void)::madvise(data, size, MADV_DONTNEED);
 }

@@ -9,10 +9,10 @@
 #include "common/option_helpers.h"
 #include "common/report.h"
 
-/// What the subcommands of bvhbench share, and their list.
+/// This header has the list of bvhbench's subcommands and what they share.
 namespace tandem::bench {
 
-/// What a parsed command line asks for; main() runs it. Throws UsageError, FileError, OutputError.
+/// The action that a parsed command line asks for; main() runs it. Throws UsageError, FileError, OutputError.
 using Run = std::function<ExitCode()>;
 
 // Each subcommand is a line here and in main().
@@ -38,7 +38,7 @@ std::pair<CLI::App&, Arguments&> add_command(CLI::App& app, Run& run_later, cons
   return {*command, *arguments};
 }
 
-/// What the options say that most commands have.
+/// The values of the options that most commands have.
 struct CommonArguments {
   std::string scene, output, backend = "cpu";
   std::optional<std::uint32_t> told_threads;
@@ -46,7 +46,7 @@ struct CommonArguments {
   bool json = false;
 
   bool on_gpu() const { return backend == "cuda"; }
-  /// Of the CPU: as many as told, or as the machine has.
+  /// Returns the threads of the CPU: as many as told, or as the machine has.
   std::uint32_t threads() const;
 };
 
@@ -66,7 +66,7 @@ OptionRow ground_option(std::string& ground, const std::string& what);
 OptionRow count_option(std::uint32_t& count, std::uint32_t usual);
 OptionRow seed_option(std::uint64_t& seed, const std::string& what);
 
-/// Whether this program was built with CUDA.
+/// Returns whether this program was built with CUDA.
 bool has_cuda();
 
 /// Prints the report as it was asked for.
@@ -82,7 +82,7 @@ void check_output(const CommonArguments& arguments, const std::vector<std::strin
 /// Throws what the error of an engine or a GPU calls for that is being handled, and other errors as they are.
 [[noreturn]] void refuse_engine(const std::string& path, const LoadedScene& scene);
 
-/// What `ask` finds in a scene with engines, whose errors end the command as refuse_engine() says.
+/// Returns what `ask` finds in a scene with engines, whose errors end the command as refuse_engine() says.
 template <typename Ask>
 auto answer_of(const std::string& path, const LoadedScene& scene, const Ask& ask) {
   try {
@@ -95,7 +95,7 @@ auto answer_of(const std::string& path, const LoadedScene& scene, const Ask& ask
 /// The scene file and its assets, as paths from here.
 std::vector<std::string> files_of(const std::string& path, const LoadedScene& scene);
 
-/// Of all instances together.
+/// Returns the number of triangles of all instances together.
 std::uint64_t triangles_of(const LoadedScene& scene);
 
 /// Refuses what is no cube of a whole number.

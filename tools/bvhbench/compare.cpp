@@ -92,7 +92,7 @@ Contacts answer_of(Engine& peer, const Frame& frame, PeerResult& result) {
   return contacts;
 }
 
-// In a, and not in b.
+// Counts the contacts that are in a and not in b.
 std::uint64_t count_missing(const std::vector<TriangleContact>& a, const std::vector<TriangleContact>& b) {
   std::vector<TriangleContact> difference;
   std::set_difference(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(difference));

@@ -8,7 +8,7 @@
 
 namespace tandem::bench {
 
-/// What one peer did on one scene. Its update time is the best of up to three.
+/// The results of one peer on one scene. Its update time is the best of up to three.
 struct PeerResult : PeerTimes {
   std::uint64_t memory_bytes = 0;  ///< held after build and update: heap growth, and what malloc does not see
   std::uint64_t work_bytes = 0;    ///< by which the first query made it grow: queues, results
@@ -18,7 +18,7 @@ struct PeerResult : PeerTimes {
   std::vector<Counter> counters;
 };
 
-/// One scene through all peers, same object pairs, one thread, one process, side by side.
+/// The results of all peers on one scene: same object pairs, one thread, one process, side by side.
 struct SceneComparison {
   std::string name;  ///< of the scene file, without folder and ending
   std::uint64_t instances = 0;

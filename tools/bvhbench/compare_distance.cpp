@@ -40,7 +40,7 @@ double worst_error(const CertifiedPairs& pairs, const std::vector<double>& dista
   return worst;
 }
 
-// Of both bodies of every pair.
+// Returns the number of triangles of both bodies of every pair.
 std::uint64_t triangles_of_pairs(const LoadedScene& scene, const std::vector<ObjectPair>& pairs) {
   std::uint64_t sum = 0;
   for (const auto& [a, b] : pairs) {

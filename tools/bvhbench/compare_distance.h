@@ -13,7 +13,7 @@ namespace tandem::bench {
 /// hours.
 inline constexpr std::uint64_t kMostReferenceTriangles = 10'000'000;
 
-/// What one library did for the distances of a scene.
+/// The results of one library for the distances of a scene.
 struct DistancePeer : PeerTimes {
   double worst_error = 0;  ///< how far beyond the certified interval, relative to it, in the worst pair
   std::optional<std::uint64_t> outside;  ///< of the reference: intervals that do not hold its exact distance
@@ -32,7 +32,7 @@ struct DistanceComparison {
 /// Throws FileError of a scene that cannot be compared, std::runtime_error of a library.
 DistanceComparison compare_distances(const std::string& path, double reach, unsigned repeats);
 
-/// In the text a line for each library.
+/// Makes the report, whose text has a line for each library.
 Report report_of(const DistanceComparison& comparison);
 
 }  // namespace tandem::bench

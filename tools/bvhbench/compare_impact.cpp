@@ -12,14 +12,15 @@
 namespace tandem::bench {
 namespace {
 
-/// What is known of a pair: no contact before `safe`, and one at `contact`, in seconds; infinite where none
-/// is in the step, or none was found.
+/// The times that are known of a pair: no contact before `safe`, and one at `contact`, in seconds; infinite
+/// where none is in the step, or none was found.
 struct KnownImpact {
   ObjectPair pair;
   double safe, contact;
 };
 
-// In radians: from half a turn on the shortest rotation to the end of the step is another one.
+// The most that a body may turn, in radians: from half a turn on, the shortest rotation to the end of the
+// step is another one.
 constexpr double kMostTurn = 3.14;
 
 void check_turns(const std::string& path, const std::vector<RigidMotion>& motions, double duration) {

@@ -8,14 +8,14 @@
 
 namespace tandem::bench {
 
-/// What one library did for the times of impact of a scene. Judged by what Tandem certifies, no contact until
-/// then, and by contacts that its exact query finds later in the step.
+/// The results of one library for the times of impact of a scene. They are judged by what Tandem certifies,
+/// no contact until then, and by contacts that its exact query finds later in the step.
 struct ImpactPeer : PeerTimes {
   std::uint64_t found = 0;     ///< pairs with a time of impact
   std::uint64_t invented = 0;  ///< of them, those that surely have no contact in the step
   std::uint64_t missed = 0;    ///< pairs without one, though a contact was found
   std::uint64_t late = 0;      ///< pairs whose time is after that of a contact that was found
-  /// Of pairs with a time that is sure to be early or late: how much, in parts of the step.
+  /// How early or late times are, of pairs whose time is sure to be early or late, in parts of the step.
   double median_early = 0, most_early = 0, most_late = 0;
 };
 
@@ -35,7 +35,7 @@ struct ImpactComparison {
 /// cannot be compared, std::runtime_error of a library.
 ImpactComparison compare_impacts(const std::string& path, double duration, unsigned repeats);
 
-/// In the text a line for each library.
+/// Makes the report, whose text has a line for each library.
 Report report_of(const ImpactComparison& comparison);
 
 }  // namespace tandem::bench

@@ -32,7 +32,7 @@ std::string count_or_dash(const std::optional<std::uint64_t>& count) {
   return count ? with_commas(*count) : "-";
 }
 
-// What JSON says of a peer as a number of HDF5: NaN for null.
+// Returns a peer's number in JSON as a number of HDF5: NaN for null.
 double number_of(const Json& value) {
   return value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>();
 }

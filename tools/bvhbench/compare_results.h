@@ -7,7 +7,7 @@
 
 namespace tandem::bench {
 
-/// What `bvhbench compare` found, and where.
+/// The results of `bvhbench compare`, and where they were found.
 struct CompareResults {
   std::string machine;  ///< the processor's name
   std::string commit;   ///< $TANDEM_COMMIT, or empty
@@ -15,7 +15,7 @@ struct CompareResults {
   std::vector<SceneComparison> scenes;
 };
 
-/// In JSON the stable keys of docs/comparison.md, in the text a table for people.
+/// Makes the report: its JSON has the stable keys of docs/comparison.md, its text is a table for people.
 Report report_of(const SceneComparison& comparison);
 
 /// Writes the HDF5 file of docs/comparison.md, whole or not at all. Throws OutputError.

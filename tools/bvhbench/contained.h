@@ -34,7 +34,7 @@ TimedContainments find_contained(const LoadedScene& scene, std::span<const Objec
                                  std::span<const TriangleContact> contacts, std::uint32_t threads,
                                  std::uint32_t repeats);
 
-/// How many of them are inside; the others are in the box of a body that is open.
+/// Returns how many of them are inside; the others are in the box of a body that is open.
 std::uint64_t count_inside(std::span<const Containment> rows);
 
 }  // namespace tandem::bench

@@ -124,7 +124,7 @@ void write_at_levels(const EconomyArguments& arguments, const LevelMeasurer& mea
   file.write();
 }
 
-// What is wrong with a budget that even the cheapest levels exceed.
+// Says what is wrong with a budget that even the cheapest levels exceed.
 std::string excess_of(const EconomyArguments& arguments, const Measures& cheapest) {
   const std::string text = arguments.bytes
                                ? "--memory " + with_commas(*arguments.bytes) + ": the cheapest levels take " +

@@ -87,7 +87,7 @@ std::string half_and_most(const Spread& spread) {
   return format("%.2g (%.2g)", spread.median, spread.most);
 }
 
-// The same in per cent of a length.
+// Returns the same words in per cent of a length.
 std::string half_and_most(const Spread& spread, double length) {
   return half_and_most({0, 100 * spread.median / length, 100 * spread.most / length, 0});
 }

@@ -8,7 +8,7 @@
 
 namespace tandem::bench {
 
-/// What `bvhbench economy` was asked: one of the three limits.
+/// The arguments of `bvhbench economy`: one of the three limits.
 struct EconomyArguments : CommonArguments {
   EconomyArguments() { repeats = 3; }
 
@@ -19,7 +19,7 @@ struct EconomyArguments : CommonArguments {
   double simulated_seconds = 0;        ///< 0: nothing is simulated
 };
 
-/// What was found of one asset.
+/// The findings about one asset.
 struct AssetEconomy {
   std::string name;
   double diagonal = 0;
@@ -38,13 +38,13 @@ struct EconomyResult {
   std::optional<economy::Spread> nudged;
 };
 
-/// Of query and manifolds; of a simulated step where there is one.
+/// Returns the seconds of query and manifolds, or of a simulated step where there is one.
 double seconds_of(const economy::Measures& measures);
 
-/// Of the query on the GPU, or else of the levels.
+/// Returns the memory of the query on the GPU, or else of the levels.
 std::uint64_t memory_of(const economy::Measures& measures);
 
-/// In the text a table of each asset, and what is recommended and lost by it.
+/// Makes the report, whose text has a table for each asset, and says what is recommended and lost by it.
 Report report_of(const EconomyArguments& arguments, const EconomyResult& result);
 
 }  // namespace tandem::bench

@@ -55,7 +55,7 @@ std::uint32_t narrowed(std::uint64_t counter) {
   return static_cast<std::uint32_t>(counter);
 }
 
-// Of sorted values.
+// Returns a quantile of sorted values.
 double quantile(const std::vector<std::uint32_t>& sorted, double part) {
   const double at = part * static_cast<double>(sorted.size() - 1);
   const auto below = static_cast<std::size_t>(at);
@@ -69,7 +69,7 @@ double mean_of(std::span<const std::uint32_t> values) {
   return sum / static_cast<double>(values.size());
 }
 
-// Of a mean, from the squares of what its values lack to theirs.
+// Returns the standard error of a mean from the sum of the squares of its values' residuals.
 double standard_error(double squares, std::size_t count) {
   const auto n = static_cast<double>(count);
   return count > 1 ? std::sqrt(squares / (n - 1) / n) : NAN;

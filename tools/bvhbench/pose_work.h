@@ -16,10 +16,11 @@ struct NamedAsset {
   AssetView view;
 };
 
-/// What queries did in each pose.
+/// Counts what queries did in each pose.
 struct PoseWork {
   std::vector<std::uint32_t> block_pairs, candidates, contacts;
-  /// Those of a GPU (statistics/oriented_work.h). Empty where it has nothing to walk in one of the poses.
+  /// The counts of a GPU (statistics/oriented_work.h). Empty where it has nothing to walk in one of the
+  /// poses.
   std::vector<std::uint32_t> oriented_block_pairs, oriented_candidates;
 
   friend bool operator==(const PoseWork&, const PoseWork&) = default;

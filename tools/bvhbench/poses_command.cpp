@@ -20,7 +20,7 @@ struct PosesArguments : CommonArguments {
   PoseSet set = PoseSet::validation;
 };
 
-// What is counted in each pose.
+// A counter of each pose.
 struct PoseCounter {
   const char *key, *label;  // label: in the text; null: it is in JSON alone
   std::vector<std::uint32_t> PoseWork::*column;
@@ -49,7 +49,7 @@ struct Bodies {
   const NamedAsset& second(const NamedAsset& tree) const { return with ? *with : tree; }
 };
 
-// What is measured: poses of the second body, and their notes.
+// The poses of the second body that are measured, and their notes.
 struct Poses {
   std::vector<Pose> of_b;
   PoseNotes notes;
@@ -74,7 +74,7 @@ Poses make(const PosesArguments& arguments, const Bodies& bodies) {
   return poses;
 }
 
-// Whether the scene is one that write() below makes.
+// Returns whether the scene is one that write() below makes.
 bool is_of_poses(const SceneDescription& scene) {
   const std::size_t count = scene.instances.size(), assets = scene.assets.size();
   if (!scene.poses || !scene.pairs || !scene.level.empty() || count < 2 || assets < 1 || assets > 2)

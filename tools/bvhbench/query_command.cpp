@@ -198,7 +198,7 @@ void check_options(const QueryArguments& arguments) {
     throw UsageError("--self is for the backend cpu; /pairs of a scene may name an instance twice");
 }
 
-// What it prints and writes is all about pairs of bodies, so options of contacts do not go with it.
+// The command prints and writes rows about pairs of bodies here, so options of contacts do not go with it.
 ExitCode run_by_tolerance(const QueryArguments& arguments) {
   if (arguments.mode != QueryMode::exact || arguments.first_contact || arguments.within > 0 ||
       arguments.self_pairs || arguments.takes_all_contacts() || arguments.is_for_gpu()) {

@@ -22,7 +22,7 @@ TimedVerdicts decide(const CommonArguments& arguments, double tolerance, const L
                     [](Engine& engine, const TimedQuery& asked) { return engine.time_verdicts(asked); });
 }
 
-// How many pairs the levels of their bodies decided, by those of a and of b.
+// Returns how many pairs the levels of their bodies decided, by those of a and of b.
 Json levels_of(const TimedVerdicts& decided) {
   std::map<std::pair<int, int>, std::uint64_t> counted;
   for (const PairVerdict& verdict : decided.rows) ++counted[{verdict.level_a, verdict.level_b}];

@@ -3,8 +3,8 @@
 #include "bvhbench/scenes/hdf5_file.h"
 #include "command.h"
 
-/// What the commands share that ask one question about the pairs of bodies of a scene: they open the scene,
-/// let a query of the CPU or of a GPU answer, fill a report, and end with finish().
+/// Commands that ask one question about the pairs of bodies of a scene share these functions: they open the
+/// scene, let a query of the CPU or of a GPU answer, fill a report, and end with finish().
 namespace tandem::bench {
 
 /// Reads the scene. Throws where the options contradict each other, and where the file that is to be written
@@ -18,7 +18,7 @@ class ScenePairs {
   ScenePairs(const ScenePairs&) = delete;
   ScenePairs& operator=(const ScenePairs&) = delete;
 
-  /// Null where the query is to find the pairs.
+  /// Returns the pairs, or null where the query is to find them.
   const std::vector<ObjectPair>* given() const { return given_ ? &*given_ : nullptr; }
   const PairFilter& filter() const { return filter_; }
 

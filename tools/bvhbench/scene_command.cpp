@@ -21,7 +21,7 @@ struct SceneArguments : CommonArguments {
 
 using Assets = std::vector<AssetView>;
 
-// What is made of the arguments.
+// The bodies that are made of the arguments.
 struct Bodies {
   std::vector<Instance> instances;
   std::vector<Motion> motion = {};
@@ -36,7 +36,7 @@ AssetView body_of(const SceneArguments& arguments, const AssetView& mesh) {
                    ", so there is no level " + std::to_string(arguments.level));
 }
 
-// Of each instance; none where all are at level 0.
+// Returns the level of each instance; none where all are at level 0.
 std::vector<std::uint32_t> levels_of(const SceneArguments& arguments,
                                      const std::vector<Instance>& instances) {
   std::vector<std::uint32_t> levels;

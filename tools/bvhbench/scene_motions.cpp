@@ -15,7 +15,7 @@ class MassCenters {
  public:
   explicit MassCenters(const LoadedScene& scene) : scene_(scene), centers_(scene.shapes.size()) {}
 
-  // In the file's coordinates.
+  // Returns the centre of mass of a shape, in the file's coordinates.
   const Eigen::Vector3d& of(std::uint32_t shape) {
     if (!centers_[shape]) centers_[shape] = compute(shape);
     return *centers_[shape];

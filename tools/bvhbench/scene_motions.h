@@ -7,8 +7,8 @@
 
 namespace tandem::bench {
 
-/// How the instances of a scene move, as its file says: fixed ones stay where they are, and the others turn
-/// about their centre of mass, where the file gives none. Throws FileError.
+/// Returns how the instances of a scene move, as its file says: fixed ones stay where they are, and the
+/// others turn about their centre of mass, where the file gives none. Throws FileError.
 std::vector<RigidMotion> motions_of(const std::string& path, const LoadedScene& scene);
 
 }  // namespace tandem::bench

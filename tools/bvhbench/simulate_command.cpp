@@ -48,7 +48,7 @@ struct Start {
   std::vector<AssetView> shapes() const { return scene.views(); }
 };
 
-// How a kind of configuration is set up.
+// Sets up a kind of configuration.
 using SetUp = std::function<void(const SimulateArguments&, Start&)>;
 
 void open(Start& start, const std::vector<std::string>& paths) {
@@ -102,7 +102,7 @@ void set_up_scene(const SimulateArguments& arguments, Start& start) {
   start.filter = start.scene.description.filter.view(start.excluded);
 }
 
-// What decides the results, for the file and for going on with it.
+// Returns the options that decide the results, for the file and for going on with it.
 Json options_of(const char* kind, const SimulateArguments& arguments, const Start& start) {
   const SimulatorOptions& simulator = arguments.simulator;
   const SolverOptions& solver = simulator.solver;
@@ -142,7 +142,7 @@ RunDescription describe(const char* kind, const SimulateArguments& arguments, co
   return run;
 }
 
-// Of all steps.
+// Returns the mean over all steps.
 template <typename Value>
 double mean_of(const std::vector<StepRecord>& records, const Value& value) {
   double mean = 0;
@@ -194,7 +194,7 @@ Report report_of(const char* kind, const SimulateArguments& arguments, const Run
   return report;
 }
 
-// Whether the run is there already: with --resume there is nothing left to do.
+// Returns whether the run is there already: with --resume there is nothing left to do.
 bool is_done(const SimulateArguments& arguments, const RunDescription& run) {
   if (!arguments.run.resume || !fs::exists(arguments.run.output)) return false;
   return read_run(arguments.run.output, run).records.size() == arguments.run.steps;
@@ -307,7 +307,7 @@ void add_run_options(CLI::App& command, SimulateArguments& arguments) {
            output_option(arguments, "the run file to write; appears whole or not at all", "-o,--output"))});
 }
 
-// What the paper's configurations have and scene files have not.
+// Adds the options that the paper's configurations have and scene files have not.
 void add_configuration(CLI::App& command, SimulateArguments& arguments) {
   add_options(command, {mesh_option(arguments.mesh), count_option(arguments.count, 1000),
                         seed_option(arguments.seed, "another start of the kind; and of --order shuffled")});

@@ -22,15 +22,15 @@ class SavedFloatingPoint {
   std::fenv_t saved_;
 };
 
-/// That the calling thread has computed.
+/// Returns the seconds that the calling thread has computed.
 inline double thread_seconds() {
   timespec time;
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-/// Of a call of a library: seconds that this thread computed, so that other work on the machine counts
-/// little.
+/// Returns the seconds that this thread computed in a call of a library, so that other work on the machine
+/// counts little.
 template <class Work>
 double seconds_of(const Work& work) {
   const SavedFloatingPoint saved;
@@ -39,7 +39,7 @@ double seconds_of(const Work& work) {
   return thread_seconds() - start;
 }
 
-/// What every comparison tells of a peer.
+/// The times that every comparison tells of a peer.
 struct PeerTimes {
   std::string name, settings;
   double build_seconds = 0;   ///< once

@@ -16,7 +16,7 @@ struct BuiltLevel : LevelParts {
   std::vector<std::uint32_t> face;
   double error_bound = 0;
 
-  /// What the file gets of it.
+  /// Returns what the file gets of the level.
   AssetLevel row(const Options& options) const;
 };
 
@@ -24,7 +24,8 @@ struct BuiltLevel : LevelParts {
 /// must outlive the result.
 BuiltLevel build_level(const Geometry& geometry, const Options& options, OptimisationWatch& watch);
 
-/// What is wrong with the errors that were asked for, now that the mesh is known; empty where nothing is.
+/// Says what is wrong with the errors that were asked for, now that the mesh is known; empty where nothing
+/// is.
 std::string level_errors_defect(const Options& options, const StoredMesh& mesh);
 
 /// Adds the levels that were asked for to the finest one, and says in `outcome` which there are not.

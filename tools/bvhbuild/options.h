@@ -24,7 +24,7 @@ struct Options : BuildOptions {
 /// Parses the command line. Nothing to run: prints help, the version or what is wrong, and sets `exit_code`.
 std::optional<Options> parse_options(int argc, char** argv, ExitCode& exit_code);
 
-/// As on the command line: "minimal", "free" or a number; "fast", "default" or "best".
+/// Return the names that the command line has: "minimal", "free" or a number; "fast", "default" or "best".
 std::string name(Imaginary imaginary);
 std::string name(Effort effort);
 

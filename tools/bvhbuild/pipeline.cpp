@@ -28,7 +28,7 @@ Outcome& fail(Outcome& outcome, ExitCode code, const fs::path& file, const std::
   return outcome;
 }
 
-// What can be known to be wrong with the output before hours of work go into it.
+// Returns what is known to be wrong with the output before hours of work go into it.
 std::string output_defect(const Options& options, ExitCode& code) {
   std::error_code error;
   code = kUsage;
@@ -47,7 +47,7 @@ std::string joined(const std::vector<std::string>& texts) {
   return all;
 }
 
-/// What --strict takes for an error; empty where there is nothing.
+/// Returns what --strict takes for an error; empty where there is nothing.
 std::string all_defects(const Outcome& outcome) {
   std::vector<std::string> defects = outcome.remarks;
   for (const Finding& finding : findings(outcome.clean))
@@ -63,7 +63,7 @@ std::string instead_of_faces(const Outcome& outcome, const LeftOut& left_out) {
   return "it has no faces and no vertices";
 }
 
-/// Why a mesh has no triangle: its faces and what became of them, or what it has instead of faces.
+/// Returns why a mesh has no triangle: its faces and what became of them, or what it has instead of faces.
 std::string why_no_triangle(const Outcome& outcome, const LeftOut& left_out) {
   std::vector<std::string> causes;
   if (outcome.clean.faces == 0) causes.push_back(instead_of_faces(outcome, left_out));

@@ -18,7 +18,7 @@ struct InputDigest {
   std::uint64_t hash = 0;
 };
 
-/// One level of the file that was written.
+/// A level of the file that was written.
 struct LevelOutcome {
   std::optional<LevelError> wanted;  ///< what was asked for; none for the finest
   TreeStatistics tree;

@@ -52,7 +52,7 @@ Json levels_json(const Outcome& outcome) {
   return levels;
 }
 
-// What there is where the build succeeded.
+// Adds what there is where the build succeeded.
 void add_results(const Outcome& outcome, Report& report) {
   report.add({{"parts", outcome.parts},
               {"origin", outcome.origin},

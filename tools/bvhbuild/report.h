@@ -4,7 +4,7 @@
 
 namespace tandem::build {
 
-/// What bvhbuild prints: its text, on success, is a few lines for people; its JSON, on success and on
+/// Makes what bvhbuild prints: its text, on success, is a few lines for people; its JSON, on success and on
 /// failure, has the keys of docs/json.md.
 Report report_of(const Options& options, const Outcome& outcome);
 

@@ -6,7 +6,7 @@
 
 namespace tandem::build {
 
-/// One line on a terminal that says what is going on: "bvhbuild: build cow.obj ...". Prints nothing where
+/// A line on a terminal that says what is going on: "bvhbuild: build cow.obj ...". Prints nothing where
 /// standard error is no terminal. Starts no thread, because import may fork.
 class Progress {
  public:

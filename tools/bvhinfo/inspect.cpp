@@ -7,8 +7,8 @@ namespace tandem {
 
 namespace {
 
-// Null where it is no JSON. What is nested deeper than any tool would write is left out: a file may bring
-// brackets by the million, and everything that walks such a value does so recursively.
+// Returns the provenance, null where it is no JSON. What is nested deeper than any tool would write is left
+// out: a file may bring brackets by the million, and everything that walks such a value does so recursively.
 Json parse_provenance(std::string_view text) {
   constexpr int kDeepest = 16;
   const auto keep = [](int depth, Json::parse_event_t, const Json&) { return depth <= kDeepest; };

@@ -11,7 +11,7 @@
 
 namespace tandem {
 
-/// One file and everything that bvhinfo knows of it.
+/// A file and everything that bvhinfo knows of it.
 struct Inspection {
   std::string path;
   MappedAsset asset;
@@ -29,7 +29,7 @@ struct Inspection {
   bool is_sound() const { return status == Status::kOk && wrong_level() == nullptr; }
 };
 
-/// What to look at.
+/// Says what to look at.
 enum class InspectionDepth : std::uint8_t { everything, verify, verify_levels };
 
 /// Opens and checks the file, and measures the tree or verifies the error bounds of its levels, if asked to.

@@ -65,7 +65,7 @@ Json work_json(const ExpectedWork& work) {
           {"expected_oriented_candidates", oriented ? Json(oriented->candidates) : Json()}};
 }
 
-/// Of the bounds of level 0.
+/// Returns the diagonal of the bounds of level 0.
 double diagonal(const FileHeader& header) {
   double square = 0;
   for (int k = 0; k < 3; ++k) {

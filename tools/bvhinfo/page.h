@@ -7,8 +7,8 @@
 
 namespace tandem {
 
-/// One file: its text is a page for people, its JSON has the keys of docs/json.md. Condition: the inspection
-/// is complete.
+/// Makes the report of one file: its text is a page for people, its JSON has the keys of docs/json.md.
+/// Condition: the inspection is complete.
 Report report_of(const Inspection& inspection);
 
 /// Two or more files side by side, each figure with its ratio to the first file's.

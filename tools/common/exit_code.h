@@ -2,7 +2,7 @@
 
 namespace tandem {
 
-/// What the tools return to the shell. Stable.
+/// The tools return these codes to the shell. They never change.
 enum ExitCode : int {
   kDone = 0,
   kUsage = 1,             ///< the command line is wrong, or asks for what cannot be had

@@ -18,7 +18,7 @@ Json or_null(const std::optional<Value>& value) {
   return value ? Json(*value) : Json();
 }
 
-/// Null of an empty text.
+/// Returns the text, or null where it is empty.
 inline Json or_null(const std::string& text) {
   return text.empty() ? Json() : Json(text);
 }

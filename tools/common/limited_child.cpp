@@ -54,7 +54,7 @@ std::uint64_t address_space_taken() {
 void limit_resources(const ChildLimits& limits) {
   limit(RLIMIT_CORE, 0);
   limit(RLIMIT_FSIZE, 0);  // of files; a pipe has no size
-  // Only a second line of defence behind the parent's clock, for a parent that is stopped.
+  // This is only a second line of defence behind the parent's clock, for a parent that is stopped.
   limit(RLIMIT_CPU, static_cast<rlim_t>(std::ceil(std::clamp(limits.seconds, 0.0, 1e9))) + 1);
   constexpr std::uint64_t kLeast = 1 << 20;  // less leaves no room for the stack to say so
   constexpr std::uint64_t kMost = INT64_MAX / 2;

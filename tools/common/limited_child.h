@@ -14,11 +14,11 @@ struct ChildLimits {
   std::uint64_t memory_bytes = std::uint64_t{8} << 30;  ///< of address space, beyond what the parent has
 };
 
-/// Whether the memory limit holds in this build. Not under sanitizers, which reserve terabytes of address
-/// space.
+/// Returns whether the memory limit holds in this build. It does not hold under sanitizers, which reserve
+/// terabytes of address space.
 bool limits_memory();
 
-/// How a child came to its end.
+/// Says how a child came to its end.
 enum class ChildEnd {
   finished,       ///< returned from its work
   out_of_time,    ///< was still running at the deadline

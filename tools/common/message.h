@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
-/// What a child process tells its parent through a pipe. Writer and reader have the same functions, so that
-/// what a message holds is listed once.
+/// A child process tells its parent messages through a pipe. Writer and reader have the same functions, so
+/// that what a message holds is listed once.
 namespace tandem {
 
 using MessageSink = std::function<void(const void* bytes, std::size_t count)>;
@@ -50,7 +50,7 @@ class MessageWriter {
   const MessageSink& sink_;
 };
 
-/// Each function is false where the message ends before, or promises more than most_bytes in all.
+/// Each function returns false where the message ends before, or promises more than most_bytes in all.
 class MessageReader {
  public:
   MessageReader(const MessageSource& source, std::uint64_t most_bytes)

@@ -17,7 +17,7 @@ std::string human_bytes(std::uint64_t bytes);
 /// "1 thread", "4 threads".
 std::string threads_words(std::uint64_t threads);
 
-/// What printf() would print.
+/// Returns what printf() would print.
 [[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...);
 
 }  // namespace tandem

@@ -47,7 +47,7 @@ std::string joined(const std::vector<std::string>& words) {
   return text;
 }
 
-/// What is wrong with a command line. CLI11 speaks of what is missing first, which hides an option or a
+/// Says what is wrong with a command line. CLI11 speaks of what is missing first, which hides an option or a
 /// command that was misspelt, and names surplus arguments backwards.
 std::string usage_defect(const CLI::App& app, const CLI::ParseError& error) {
   const std::vector<std::string> surplus = app.remaining(true);

@@ -11,7 +11,7 @@
 
 #include "exit_code.h"
 
-/// What the command lines of the tools share.
+/// The command lines of the tools share this.
 namespace tandem {
 
 /// Something wrong with the command line that shows only once a file is read.

@@ -80,7 +80,7 @@ std::string temporary_beside(const fs::path& target) {
   return (target.parent_path() / (stem + ".tmp" + std::to_string(::getpid()))).string();
 }
 
-// Where a chain of symbolic links ends, whether or not anything is there.
+// Returns where a chain of symbolic links ends, whether or not anything is there.
 fs::path follow_links(fs::path path) {
   constexpr int kLongestChain = 40;
   std::error_code error;

@@ -14,8 +14,8 @@ namespace tandem {
 /// is removed. Result: empty, or the reason of the failure.
 std::string write_whole_file(const std::filesystem::path& path, std::span<const std::byte> bytes);
 
-/// Whether write_whole_file() may do so, for those who work long before they write: empty, or the reason why
-/// not. Leaves the file, or its absence, as it is.
+/// Returns whether write_whole_file() may do so, for those who work long before they write: empty, or the
+/// reason why not. Leaves the file, or its absence, as it is.
 std::string try_whole_file(const std::filesystem::path& path);
 
 }  // namespace tandem

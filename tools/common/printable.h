@@ -12,7 +12,7 @@ namespace tandem {
 /// the rest is left out and "..." stands for it.
 std::string printable(std::string_view bytes, std::size_t most_bytes = std::string::npos);
 
-/// The same in quotes, short enough for a message.
+/// Returns printable bytes in quotes, short enough for a message.
 std::string in_quotes(std::string_view bytes);
 
 }  // namespace tandem

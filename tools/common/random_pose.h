@@ -28,14 +28,14 @@ class Random {
   std::uint64_t state_;
 };
 
-/// Of a unit quaternion, uniformly distributed: a point of the unit ball of four dimensions, found by
-/// rejection.
+/// Returns the rotation of a unit quaternion, uniformly distributed: a point of the unit ball of four
+/// dimensions, found by rejection.
 Rotation random_rotation(Random& random);
 
 /// A unit vector, uniformly distributed, found likewise.
 Vector random_direction(Random& random);
 
-/// Of the quaternion (w, x, y, z) of any length but 0.
+/// Returns the rotation of the quaternion (w, x, y, z) of any length but 0.
 Rotation rotation_of(double w, double x, double y, double z);
 
 Rotation multiply(const Rotation& a, const Rotation& b);

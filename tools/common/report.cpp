@@ -25,7 +25,7 @@ std::string words_of(const Json& value, Unit unit) {
   return {};
 }
 
-// What follows the best of the seconds of repeats.
+// Returns what follows the best of the seconds of repeats.
 std::string repeats_of(const Json& times) {
   return format("  best of %zu, median %.3f", times["all"].size(), 1e3 * times["median"].get<double>());
 }

@@ -10,7 +10,7 @@
 
 namespace tandem {
 
-/// How a value stands in a text.
+/// Says how a value stands in a text.
 enum class Unit : std::uint8_t {
   words,         ///< as it is, from the left
   count,         ///< "5,804"
@@ -27,7 +27,7 @@ struct CounterRow {
   std::uint64_t Counters::*member;
 };
 
-/// What a command has found, entry by entry. Its text, its JSON object and the attributes of its HDF5 file
+/// The findings of a command, entry by entry. Its text, its JSON object and the attributes of its HDF5 file
 /// are written from it: JSON and attributes in the order of the entries, the text in the order in which they
 /// were given rows.
 class Report {
@@ -90,7 +90,7 @@ class Report {
   const std::vector<Entry>& entries() const { return entries_; }
   Json json() const;
   std::string text() const;
-  /// What a command prints: JSON where it is asked for, or else the text. Ends with a new line.
+  /// Returns what a command prints: JSON where it is asked for, or else the text. It ends with a new line.
   std::string words(bool as_json) const { return as_json ? pretty(json()) + "\n" : text(); }
 
  private:

@@ -31,7 +31,7 @@ struct Farthest {
   }
 };
 
-/// What is known of the corners of one surface: how far they are from the other.
+/// The distances of the corners of one surface: how far they are from the other.
 struct CornerDistances {
   std::vector<double> distance;
   std::vector<std::uint32_t> nearest;
@@ -87,8 +87,8 @@ class Search {
  public:
   Search(const LevelView& a, const LevelView& b, const HausdorffOptions& options)
       : from_{a, b}, to_{b, a}, options_(options) {
-    // Of the corners, not of boxes: the same for any tree, so that a bound that one tree led to is proved
-    // with another as well.
+    // The largest coordinate is that of the corners, not of boxes: it is the same for any tree, so that a
+    // bound that one tree led to is proved with another as well.
     for (const LevelView& level : from_) largest_ = std::max(largest_, largest_coordinate(level));
     slack_ = rounding_slack(largest_);
   }
@@ -109,7 +109,7 @@ class Search {
   }
 
  private:
-  /// What became of some pieces.
+  /// Says what became of some pieces.
   struct Outcome {
     Farthest farthest;
     double settled = 0;  ///< the largest bound of pieces that are done with

@@ -45,8 +45,8 @@ int longest_edge(const Piece& piece) {
   return longest;
 }
 
-/// How far the corners are beyond the plane through edge e of the triangle that is normal to the triangle.
-/// False: the triangle is flat.
+/// Finds how far the corners are beyond the plane through edge e of the triangle that is normal to the
+/// triangle. False: the triangle is flat.
 bool excursions(const Piece& piece, const Triangle& triangle, int e, Row& beyond) {
   const Point from = corner_of(triangle, e), along = minus(corner_of(triangle, (e + 1) % 3), from);
   const Point inward = distance::without_part(minus(corner_of(triangle, (e + 2) % 3), from), along);

@@ -31,8 +31,8 @@ inline constexpr int kMostParts = 3;
 /// Pieces are cut so often at most.
 inline constexpr int kDeepest = 100;
 
-/// What rounding adds at most to a bound of a piece's points, where no coordinate of either surface is
-/// larger: 2^-42 of that. The proof is in docs/level_error.md.
+/// Returns the most that rounding adds to a bound of a piece's points, where no coordinate of either surface
+/// is larger: 2^-42 of that. The proof is in docs/level_error.md.
 inline double rounding_slack(double largest_coordinate) {
   return 0x1p-42 * largest_coordinate;
 }
@@ -45,17 +45,17 @@ void tighten(const LevelView& other, std::span<const std::uint32_t> triangles, d
 /// thin triangles would be cut into fans of thinner ones.
 void flatten(Piece& piece, double tolerance);
 
-/// How a piece is cut: at points of its edges. An edge runs from corner `edge` to corner `edge + 1`, and the
-/// point is at `along` of it. A segment has edge 0 alone.
+/// Says how a piece is cut: at points of its edges. An edge runs from corner `edge` to corner `edge + 1`, and
+/// the point is at `along` of it. A segment has edge 0 alone.
 struct Cut {
   int edges;  ///< 1 or 2
   int edge[2];
   double along[2];
 };
 
-/// Where to cut a piece whose middle is nearest to this triangle: where the triangle ends, if the piece is
-/// not much larger, or in the middle of its longest edge. Excursions over the triangle's end of less than
-/// `negligible` don't count.
+/// Chooses where to cut a piece whose middle is nearest to this triangle: where the triangle ends, if the
+/// piece is not much larger, or in the middle of its longest edge. Excursions over the triangle's end of less
+/// than `negligible` don't count.
 Cut choose_cut(const Piece& piece, const Triangle& nearest, double negligible);
 
 /// The point of a cut.

@@ -14,7 +14,7 @@ namespace {
 
 using Spare = std::atomic<std::size_t>;
 
-// How many more threads may be at work on what this thread asks for; null: those of the process.
+// The number of further threads that may work on what this thread asks for; null: those of the process.
 thread_local Spare* limit_here = nullptr;
 
 Spare& spare_here() {
@@ -46,8 +46,8 @@ class Team {
     leave();
   }
 
-  // Who has done its part makes room for others, but for the last one: in its place, the thread that asked
-  // for the work goes on. So waiting threads do not count.
+  // A thread that has done its part makes room for others, but for the last one: in its place, the thread
+  // that asked for the work goes on. So waiting threads do not count.
   void leave() {
     if (working_.fetch_sub(1, std::memory_order_relaxed) > 1) ++spare_;
   }

@@ -10,7 +10,7 @@
 /// of several exceptions, any one.
 namespace tandem::parallel {
 
-/// How many threads the process may use, at least 1.
+/// Returns how many threads the process may use, at least 1.
 unsigned usable_threads();
 
 /// While it lives, at most so many threads, this one included, are at work at a time on what this thread

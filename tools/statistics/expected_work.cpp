@@ -11,7 +11,7 @@
 namespace tandem {
 namespace {
 
-// What a sample may cost, half a second or so, in block pairs: a mesh whose triangles all lie in one place
+// A sample may cost this many block pairs, half a second or so: a mesh whose triangles all lie in one place
 // would take their number squared. A triangle test takes as long as a few block pairs.
 constexpr std::uint64_t kMostWork = 20'000'000, kWorkOfTriangleTest = 8;
 // Pairs of oriented blocks are tested without SIMD, one box after the other.
@@ -84,7 +84,7 @@ class BudgetedQuery {
   std::uint64_t budget_ = kMostWork;
 };
 
-// What is expected of the oriented blocks.
+// The sample of the oriented blocks.
 class OrientedSample {
  public:
   OrientedSample(const AssetView& asset, std::uint32_t poses) : walk_(asset, asset), poses_(poses) {}

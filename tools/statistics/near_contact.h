@@ -17,14 +17,14 @@ struct NearContactPose {
   double depth;  ///< how far b was pushed on from first contact, in radii of the smaller body
 };
 
-/// Whether a, at the identity, and b in this pose have a point in common.
+/// Says whether a, at the identity, and b in this pose have a point in common.
 using Touching = std::function<bool(const Pose& b)>;
 
 /// The poses of a pair of bodies. A pose depends on the bounds, the seed, the set and its number, and on
 /// where the surfaces meet; not on trees, as long as `touching` is exact.
 class NearContactPoses {
  public:
-  /// How far a body is pushed on at most, in radii: half diagonals of bounds.
+  /// A body is pushed on at most this far, in radii: half diagonals of bounds.
   static constexpr double kLargestDepth = 0.05;
 
   NearContactPoses(const Bounds& a, const Bounds& b, std::uint64_t seed, PoseSet set);

@@ -10,7 +10,7 @@
 /// The walk of oriented blocks, on a CPU and counted only: what exact queries on a GPU do.
 namespace tandem {
 
-/// What a walk of two trees comes to.
+/// Counts the work of a walk of two trees.
 struct WalkWork {
   std::uint64_t block_pairs = 0;  ///< units of 4 x 4 box tests
   std::uint64_t candidates = 0;   ///< leaf pairs whose boxes overlap
@@ -24,10 +24,10 @@ class OrientedWork {
   /// Condition: checked assets, which outlive this.
   OrientedWork(const AssetView& a, const AssetView& b);
 
-  /// What a GPU walks with b in this pose: by the same functions and rules, though it fuses operations, so
-  /// that a box pair which touches by a rounding may count here and not there. Result: nothing where a body
-  /// has no oriented blocks, where the pose is beyond the range of float32 box tests, or where there are more
-  /// than `most_block_pairs`.
+  /// Counts what a GPU walks with b in this pose, by the same functions and rules, though it fuses
+  /// operations, so that a box pair which touches by a rounding may count here and not there. Result: nothing
+  /// where a body has no oriented blocks, where the pose is beyond the range of float32 box tests, or where
+  /// there are more than `most_block_pairs`.
   std::optional<WalkWork> count(const Pose& b, std::uint64_t most_block_pairs = kAny) const;
 
  private:

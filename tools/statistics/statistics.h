@@ -7,7 +7,7 @@
 
 namespace tandem {
 
-/// What is worth knowing of a tree before it is queried. Meanings in docs/json.md.
+/// Figures of a tree before it is queried. docs/json.md has their meanings.
 struct TreeStatistics {
   std::uint64_t triangles = 0;
   std::uint64_t nodes = 0;  ///< of all kinds
@@ -32,7 +32,7 @@ struct ExpectedWork {
   double candidates = 0;    ///< leaf pairs whose boxes overlap
   std::uint32_t poses = 0;  ///< 0: no figures; a mesh overlaps itself so much that sampling was given up, or
                             ///< its coordinates are too large for float32 box tests
-  /// The same of oriented blocks, as a GPU walks them; none where there are none or sampling was given up.
+  /// The work for oriented blocks, as a GPU walks them; none where there are none or sampling was given up.
   struct Oriented {
     double block_pairs = 0, candidates = 0;
   };
@@ -42,7 +42,7 @@ struct ExpectedWork {
 /// Samples the first validation poses of seed 1 (near_contact.h). The same mesh always gets the same poses.
 ExpectedWork sample_expected_work(const AssetView& asset, std::uint32_t poses = 64);
 
-/// What the topology of a level says.
+/// Counts what the topology of a level says.
 struct SurfaceCounts {
   std::uint64_t vertices = 0, components = 0, closed_components = 0;
   std::uint64_t turned_triangles = 0;

@@ -7,7 +7,7 @@
 #include "tandem/formats/status.h"
 #include "tandem/tandem.h"
 
-/// How functions of the interface begin and end.
+/// Functions of the interface begin and end with these.
 namespace tandem::c {
 
 /// Statuses of the libraries have the numbers of tandem.h, which scripts/write_interface compares.
@@ -98,7 +98,7 @@ tandem_status guarded(Of* handle, const Body& body) noexcept {
   }
 }
 
-/// Whether a list is where it must be.
+/// Returns whether a list is where it must be.
 inline bool is_there(const void* list, size_t count) {
   return list != nullptr || count == 0;
 }

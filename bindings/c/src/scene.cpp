@@ -18,7 +18,8 @@ struct Asked {
   bool found = false;
 };
 
-// What manifolds and contained bodies can be made of: the contacts of the bodies as they stand.
+// Says whether there are contacts of the bodies as they stand, of which manifolds and contained bodies are
+// made.
 enum class Standing { none, some, all };
 
 }  // namespace
@@ -84,7 +85,7 @@ tandem_status set_assets(tandem_scene& self, tandem_asset* const* assets, size_t
   for (size_t i = 0; i < count && status == TANDEM_OK; ++i) {
     if (assets[i] == nullptr) status = self.fail(TANDEM_NULL_ARGUMENT, i);
   }
-  // Those that come are taken before others go: they may be the same.
+  // New assets are taken before old ones are released, because they may be the same.
   Buffer<tandem_asset*> taken;
   Buffer<AssetView> views;
   if (status == TANDEM_OK && (!taken.resize(count) || !views.resize(count))) status = TANDEM_OUT_OF_MEMORY;

@@ -6,7 +6,7 @@ using tandem::Status;
 
 namespace {
 
-// What this interface adds to the statuses of the libraries.
+// The statuses that this interface adds to those of the libraries.
 struct Entry {
   tandem_status status;
   const char *name, *subject, *sentence;

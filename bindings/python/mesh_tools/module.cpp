@@ -64,7 +64,7 @@ std::string provenance_of(const Options& options, const Outcome& outcome) {
   return json.dump();
 }
 
-// In the order of tandem.BuildReport.
+// Returns the counts in the order of tandem.BuildReport.
 nb::tuple to_tuple(const CleanReport& of) {
   return nb::make_tuple(of.faces_index_out_of_range, of.faces_not_finite, of.faces_too_large,
                         of.triangles_degenerate, of.triangles_duplicate, of.triangles_duplicate_reversed,

@@ -50,7 +50,7 @@ tandem_level level_of(const Asset& asset, std::uint32_t level) {
   return result;
 }
 
-// In the order of tandem._asset.Info.
+// Returns the fields of tandem._asset.Info in their order.
 nb::tuple info(const Asset& asset) {
   auto of = sized<tandem_asset_info>();
   check(tandem_asset_get_info(asset.get(), &of));
@@ -60,7 +60,7 @@ nb::tuple info(const Asset& asset) {
                         three(of.upper));
 }
 
-// In the order of tandem.Level.
+// Returns the fields of tandem.Level in their order.
 nb::tuple level(const Asset& asset, std::uint32_t number) {
   const tandem_level of = level_of(asset, number);
   return nb::make_tuple(of.triangle_count, of.block_count, of.leaf_block_count, of.depth, of.error_bound,

@@ -23,7 +23,7 @@ std::uint32_t note(void* user, double share) {
   return 0;
 }
 
-// In the order of tandem.BuildReport.
+// Returns the counts in the order of tandem.BuildReport.
 nb::tuple to_tuple(const tandem_build_report& of) {
   return nb::make_tuple(of.index_out_of_range, of.not_finite, of.too_large, of.degenerate, of.duplicate,
                         of.duplicate_reversed, of.flattened, of.vertices_unreferenced, of.vertices_welded);

@@ -1,6 +1,6 @@
 #pragma once
-/// What the parts of the extension share. The extension takes and gives raw rows; the package's Python files
-/// check what the caller gave, and name the arguments.
+/// The parts of the extension share this header. The extension takes and gives raw rows; the package's Python
+/// files check what the caller gave, and name the arguments.
 #include <nanobind/nanobind.h>
 
 #include <atomic>
@@ -54,14 +54,14 @@ class Asset {
   tandem_asset* asset_;
 };
 
-/// Which pairs a scene looks at; has copies of what it was made of, and never changes.
+/// Says which pairs a scene looks at. It has copies of what it was made of, and never changes.
 class Filter {
  public:
   Filter(nb::object motion, nb::object group, nb::object mask, nb::object excluded);
   ~Filter() { tandem_excluded_pairs_destroy(excluded_); }
   Filter(const Filter&) = delete;
   Filter& operator=(const Filter&) = delete;
-  /// Null for none.
+  /// Returns the filter of C, null for none.
   static const tandem_pair_filter* of(const Filter* filter) {
     return filter != nullptr ? &filter->filter_ : nullptr;
   }
@@ -73,11 +73,11 @@ class Filter {
   tandem_pair_filter filter_ = {};
 };
 
-/// In the order of tandem.Counters.
+/// Returns the counters in the order of tandem.Counters.
 nb::tuple counters_of(const tandem_contact_counters& counters);
 
-/// What bvhinfo measures: the version of the file, its tree, of each level its bytes and the work to expect,
-/// and the surface of the first, or None.
+/// Returns what bvhinfo measures: the version of the file, its tree, of each level its bytes and the work to
+/// expect, and the surface of the first, or None.
 nb::tuple statistics(const Asset& asset);
 
 void add_assets(nb::module_& module);

@@ -11,13 +11,13 @@
 
 namespace tandem::python {
 
-/// What long work and the thread that waits for it tell each other.
+/// Long work and the thread that waits for it talk to each other through this.
 struct Watch {
   std::atomic<double> share = 0;   ///< that is done
   std::atomic<bool> stop = false;  ///< the work is to end soon
 };
 
-/// What work throws that heeds Watch::stop. Nobody catches it: what made the work stop is thrown in its
+/// Work that heeds Watch::stop throws this. Nobody catches it: what made the work stop is thrown in its
 /// place.
 struct Stopped {};
 

@@ -18,7 +18,7 @@ from ._errors import Error, FileError
 from ._rows import BODY_AT, CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, INSTANCE, MANIFOLD, MOTION, NO_INDEX, PAIR, POINT, VERDICT
 from ._scene import Contacts, Contained, Counters, Distances, Filter, Impacts, Manifolds, Scene, Verdicts
 
-#: What moves a body (Filter): forces; nothing; the caller; nothing until the caller wakes it.
+#: Says what moves a body (Filter): forces; nothing; the caller; nothing until the caller wakes it.
 MOVING, FIXED, KINEMATIC, SLEEPING = range(4)
 #: Flags of manifolds: without overlap; the curve in which the surfaces cross does not close; one body goes through the other.
 TOUCHING, OPEN_CURVE, GOES_THROUGH = 1, 2, 4

@@ -17,12 +17,12 @@ from ._errors import Error, with_path
 __all__ = ["Asset", "Level", "Part"]
 
 _MOST = 0xFFFFFFFF
-# Of a .bvh file, version 1 (formats/FORMAT.md).
+# The section table of a .bvh file, version 1 (formats/FORMAT.md).
 _SECTION = np.dtype([("kind", "<u4"), ("level", "<u4"), ("offset", "<u8"), ("bytes", "<u8"), ("count", "<u8")])
 _SECTION_COUNT, _SECTION_TABLE = 96, 128
 _SECTION_KINDS = ("levels", "blocks", "triangles", "parts", "strings", "provenance", "oriented_blocks", "topology", "components")
 _CORNER = np.dtype([("position", "<f4", 3), ("w", "<u4")])  # of tandem.h
-# What statistics() tells, in the order of the extension's numbers.
+# The figures of statistics(), in the order of the extension's numbers.
 _TREE = ("triangles", "nodes", "leaf_nodes", "internal_nodes", "imaginary_nodes", "imaginary_minimum", "imaginary_fraction", "leaf_blocks", "internal_blocks",
          "partial_leaf_blocks", "depth", "leaf_fill", "sah_cost", "leaf_blocks_at_depth", "blocks_with_fill")
 _SURFACE = ("vertices", "components", "closed_components", "turned_triangles", "boundary_edges", "sides_at_edges_of_many")
@@ -35,7 +35,7 @@ class Level(NamedTuple):
     triangle_count: int
     block_count: int
     leaf_block_count: int
-    #: Of the tree, in blocks.
+    #: The depth of the tree, in blocks.
     depth: int
     #: No point of this surface or of the file's finest is farther from the other.
     error_bound: float
@@ -47,12 +47,12 @@ class Level(NamedTuple):
     vertex_count: int
     #: Triangles that edges join.
     component_count: int
-    #: All components are.
+    #: Says whether all components are closed.
     closed: bool
 
 
 class Info(NamedTuple):
-    """What Asset says of itself."""
+    """The facts that Asset tells about itself."""
 
     level_count: int
     first_level: int
@@ -70,14 +70,14 @@ class Part(NamedTuple):
     """A run of faces that the mesh file gives a name."""
 
     name: str
-    #: Of scene nodes, joined by "/".
+    #: The names of scene nodes, joined by "/".
     path: str
     first_face: int
     face_count: int
 
 
 class Asset(NotNumbers):
-    """What one .bvh file holds, checked: a mesh and its trees, at one or more levels of detail.
+    """The checked contents of one .bvh file: a mesh and its trees, at one or more levels of detail.
 
     It never changes, and threads may share it. Made by `Asset.load`, `Asset.from_bytes` and `tandem.build`. It pickles, as its bytes.
     """
@@ -191,7 +191,7 @@ class Asset(NotNumbers):
         return self._corners(level)["position"] + self.origin
 
     def faces(self, level: int = 0) -> npt.NDArray[np.uint32]:
-        """Of each triangle of a level, the face of the mesh file that it comes from, (n,).
+        """Returns for each triangle of a level the face of the mesh file that it comes from, (n,).
 
         >>> box.triangles().shape, sorted(box.faces().tolist()) == list(range(12))
         ((12, 3, 3), True)
@@ -208,22 +208,22 @@ class Asset(NotNumbers):
 
     @property
     def origin(self) -> npt.NDArray[np.float64]:
-        """What is added to stored coordinates, (3,)."""
+        """The point that is added to stored coordinates, (3,)."""
         return np.array(self._info.origin)
 
     @property
     def rounding_error(self) -> float:
-        """How far a stored coordinate is from that of the mesh file, at most."""
+        """The most that a stored coordinate differs from that of the mesh file."""
         return self._info.rounding_error
 
     @property
     def hash(self) -> str:
-        """Of the content, as bvhinfo prints it."""
+        """The hash of the content, as bvhinfo prints it."""
         return f"{self._info.hash:016x}"
 
     @property
     def file_bytes(self) -> int:
-        """Of the file, with all levels."""
+        """The size of the file, with all levels."""
         return self._info.file_bytes
 
     @property
@@ -239,15 +239,15 @@ class Asset(NotNumbers):
 
     @property
     def provenance(self) -> Any:
-        """How the file was made: what its JSON says, None where it is no JSON."""
+        """The file's JSON on how it was made, None where it is no JSON."""
         try:
             return json.loads(self._core.provenance())
         except (ValueError, RecursionError):
             return None
 
     def statistics(self) -> dict[str, Any]:
-        """What `bvhinfo --json` tells, under its keys (docs/json.md), but for "file": figures of the trees, and the work that queries are expected to do, which
-        is sampled and takes a while."""
+        """Returns what `bvhinfo --json` tells, under its keys (docs/json.md), but for "file": figures of the trees, and the work that queries are expected to
+        do, which is sampled and takes a while."""
         (major, minor), tree, measured, surface = self._core.statistics()
         lower, upper = self._info.lower, self._info.upper
         diagonal = math.sqrt(sum((high - low) * (high - low) for low, high in zip(lower, upper)))

@@ -26,7 +26,7 @@ CONTACTS_AT_A_TIME = 1 << 16
 
 @dataclass(slots=True)
 class Contact:
-    """What trimesh's ContactData takes: bodies a and b, in either order, their faces b1 and b2, and where, along what and how deep they meet. The normal
+    """The arguments of trimesh's ContactData: bodies a and b, in either order, their faces b1 and b2, and where, along what and how deep they meet. The normal
     points from a to b."""
 
     a: int
@@ -40,7 +40,7 @@ class Contact:
 
 @dataclass(slots=True)
 class Nearest:
-    """What trimesh's DistanceData takes: bodies a and b, how far apart they are, their nearest points, and the faces these are on."""
+    """The arguments of trimesh's DistanceData: bodies a and b, how far apart they are, their nearest points, and the faces these are on."""
 
     a: int
     b: int
@@ -51,14 +51,14 @@ class Nearest:
 
 
 class Shape:
-    """What a mesh is to scenes: an asset, and whether it is solid."""
+    """The shape of a mesh in scenes: an asset, and whether it is solid."""
 
     def __init__(self, vertices: Array, faces: Array, is_convex: bool) -> None:
         self.faces = faces
         self.is_convex = is_convex
         # Starting threads takes longer than to build a small tree.
         self.asset: Asset = build(vertices, faces, effort="fast", gpu_blocks=False, threads=1 if len(faces) < SMALL else 0)
-        # As the asset has them.
+        # The asset holds these coordinates.
         self.vertices: Array = (vertices - self.asset.origin).astype(np.float32) + self.asset.origin
         low, high = self.asset.bounds
         self.middle, self.half = (low + high) / 2, (high - low) / 2
@@ -67,7 +67,7 @@ class Shape:
         self._last_stretched: Shape | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """For a mesh that is pickled. Stretched shapes stay behind: weak references cannot be."""
+        """Returns the state of a mesh that is pickled. Stretched shapes stay behind: weak references cannot be."""
         return {name: value for name, value in vars(self).items() if name not in ("_stretched", "_last_stretched")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -115,7 +115,7 @@ def _rotation_and_stretch(matrix: Array) -> tuple[Array, Array | None]:
     return rotation, np.round(stretch / unit, 12) * unit + 0.0  # not -0
 
 
-#: Which pairs are asked about, see Search: first_side, alone and ignored.
+#: The pairs that are asked about, see Search: first_side, alone and ignored.
 Asked = tuple[int | None, int | None, tuple[tuple[int, int], ...]]
 
 
@@ -150,7 +150,7 @@ class Bodies:
 
     @staticmethod
     def joined(ours: Bodies, theirs: Bodies, former: Bodies | None) -> Bodies:
-        """Both, ours first. Takes the scene of the former result where that is of the same assets."""
+        """Returns both, ours first. Takes the scene of the former result where that is of the same assets."""
         both = object.__new__(Bodies)
         both.ours = ours
         both.names = ours.names + theirs.names
@@ -272,7 +272,7 @@ class Search:
         return self.bodies.scene(self._asked, self._threads)
 
     def any_collision(self) -> bool:
-        """Whether there is one."""
+        """Returns whether there is one."""
         if self._pair_count == 0:
             return False
         found = self._scene().contacts(first_contact_only=True)
@@ -323,13 +323,13 @@ class Search:
         reach = None
         if self._pair_count > FEW_PAIRS:
             pair = self._nearest_boxes(lows, highs)
-            # Of one body and many, all that can be as near as the one whose box is the nearest.
+            # If one body is asked about with many, the reach takes all that can be as near as the one whose box is the nearest.
             reach = extent / 256 if pair is None else float(scene.distances(pairs=[pair]).distances["upper"][0])
         while True:
             found = scene.distances(reach=reach, relative_tolerance=PRECISION)
             distances = found.distances["upper"].copy()
             distances[found.distances["triangle_a"] == NO_INDEX] = np.inf
-            # What is not in the list, or has no points, is farther away than the reach.
+            # A pair that is not in the list, or has no points, is farther apart than the reach.
             if len(distances) and distances.min() <= (np.inf if reach is None else reach):
                 first = int(distances.argmin())
                 return _nearest(found.pairs[first], found.distances[first])
@@ -337,7 +337,7 @@ class Search:
             reach = 4 * reach if reach < extent else None
 
     def _nearest_boxes(self, lows: Array, highs: Array) -> tuple[int, int] | None:
-        """Where one body is asked about with others, it and that of these whose box is the nearest to its own; else None."""
+        """Returns one body and, of the others that it is asked about with, the one whose box is the nearest; else None."""
         first_side, body, ignored = self._asked
         if first_side == len(lows) - 1:
             body = first_side
@@ -350,7 +350,7 @@ class Search:
         return min(body, other), max(body, other)
 
     def _deepest(self, pairs: Array) -> Nearest:
-        """Of pairs (n, 2) that collide the one that is the deepest, the first of equals."""
+        """Returns the deepest of the pairs (n, 2) that collide, the first of equals."""
         lows, highs = self.bodies.boxes()
         a, b = pairs.T
         # No two convex bodies are deeper than their boxes, others have no depth; of a convex body and another each has to be looked at.
@@ -369,7 +369,7 @@ class Search:
         return deepest
 
     def _enclosed_pairs(self, apart: Array) -> set[tuple[int, int]]:
-        """Of pairs (n, 2) whose surfaces do not meet, those with a component of one body inside the other, which is convex."""
+        """Returns those of pairs (n, 2), whose surfaces do not meet, that have a component of one body inside the other, convex body."""
         if not self.bodies.convex.any():
             return set()
         apart = apart[self.bodies.convex[apart].any(axis=1)]
@@ -416,8 +416,8 @@ class Search:
         return Contact(a, b, *self._faces(a, b, found), found.normal, found.middle, found.depth)
 
     def _face_contacts(self, a: int, b: int, meeting: Array) -> Iterator[Contact]:
-        """Of a convex body and another: the other's faces that meet its surface, then those inside. As in python-fcl, normals point from the other to the
-        convex one, whichever is a."""
+        """Yields the contacts of a convex body and another: the other's faces that meet its surface, then those inside. As in python-fcl, normals point from
+        the other to the convex one, whichever is a."""
         a_is_solid = bool(self.bodies.convex[a])
         body, other = (a, b) if a_is_solid else (b, a)
         solid_column, face_column = ("face_a", "face_b") if a_is_solid else ("face_b", "face_a")
@@ -447,8 +447,8 @@ class Search:
         return np.array([found[int(plane)] for plane in planes], np.intp)
 
     def _surface_contacts(self, pairs: Array, meeting: Array) -> Iterator[Contact]:
-        """Of bodies that are not convex. Normal and depth are those of the contact region that is the nearest; where there is none, of which the surfaces
-        touch in a point, the normal is that of a's face."""
+        """Yields the contacts of bodies that are not convex. Normal and depth are those of the contact region that is the nearest; where there is none, of
+        which the surfaces touch in a point, the normal is that of a's face."""
         if len(meeting) == 0:
             return
         a, b = pairs[meeting["pair"]].T
@@ -504,7 +504,7 @@ def meeting_points(a: Array, b: Array) -> Array:
         origin, u, v = other[:, 0], other[:, 1] - other[:, 0], other[:, 2] - other[:, 0]
         normal = cross(u, v)
         square = np.maximum((normal * normal).sum(axis=1), np.finfo(float).tiny)[:, None]
-        # Of a point origin + s u + t v of the plane: s and t.
+        # These give s and t of a point origin + s u + t v of the plane.
         to_s, to_t = cross(v, normal) / square, cross(normal, u) / square
         heights = np.einsum("nij,nj->ni", edges - origin[:, None], normal)
         ends, heights_of_ends = np.roll(edges, -1, axis=1), np.roll(heights, -1, axis=1)

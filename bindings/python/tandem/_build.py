@@ -20,7 +20,7 @@ __all__ = ["BuildReport", "Mesh", "build", "read_mesh"]
 
 
 class BuildReport(NamedTuple):
-    """What became of the triangles."""
+    """Counts what became of the triangles."""
 
     #: Left out, each under the first cause that holds.
     not_finite: int
@@ -29,18 +29,18 @@ class BuildReport(NamedTuple):
     degenerate: int
     #: Kept: the three places of an earlier one.
     duplicate: int
-    #: Of these, wound otherwise.
+    #: Those of the duplicates that are wound otherwise.
     duplicate_reversed: int
-    #: On one line only once rounded to float32.
+    #: Triangles whose corners are on one line only once they are rounded to float32.
     flattened: int
     #: Named by no triangle.
     vertices_unreferenced: int
-    #: At the place of an earlier one.
+    #: Vertices at the place of an earlier one.
     vertices_welded: int
 
 
 class Mesh(NamedTuple):
-    """What a mesh file holds: `tandem.build(mesh.vertices, mesh.triangles, face_ids=mesh.face_ids, parts=mesh.parts)` is what bvhbuild makes of it."""
+    """The contents of a mesh file: `tandem.build(mesh.vertices, mesh.triangles, face_ids=mesh.face_ids, parts=mesh.parts)` is what bvhbuild makes of it."""
 
     #: (n, 3), as the file has them.
     vertices: npt.NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""How deep convex bodies overlap, for `tandem.trimesh`. Needs SciPy, as trimesh does to tell that a mesh is convex."""
+"""Finds how deep convex bodies overlap, for `tandem.trimesh`. Needs SciPy, as trimesh does to tell that a mesh is convex."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def cross(u: Array, v: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Overlap:
-    """How two bodies are parted by the shortest way. Lengths are in the bodies' unit."""
+    """The shortest way to part two bodies. Lengths are in the bodies' unit."""
 
     depth: float  #: length of that way
     normal: Array  #: (3,) its unit vector, along which b goes
@@ -83,7 +83,7 @@ class Solid:
         return inside
 
     def nearest(self, points: Array) -> int:
-        """Which of the points (n, 3) is the deepest inside, or the least far outside of a face's plane."""
+        """Returns which of the points (n, 3) is the deepest inside, or the least far outside of a face's plane."""
         return int(self._heights(points).argmin())
 
 
@@ -182,8 +182,8 @@ def _deepest_point(a: Solid, b: Solid, depth: float, normal: Array, tolerance: f
 
 
 def face_overlaps(solid: Solid, corners: Array) -> tuple[Array, Array, Array]:
-    """How triangles (n, 3, 3) that meet a solid are parted from it along the normal of one of its faces, or their own: of these ways the shortest. That is
-    the shortest way of all unless one across two edges is shorter.
+    """Finds how triangles (n, 3, 3) that meet a solid are parted from it along the normal of one of its faces, or their own: of these ways the shortest. That
+    is the shortest way of all unless one across two edges is shorter.
 
     Returns depths (n,), normals (n, 3), along which the triangle goes, and (n,) which plane of the solid is the nearest along it.
     """

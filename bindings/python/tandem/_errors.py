@@ -1,4 +1,4 @@
-"""What goes wrong, as exceptions."""
+"""The exceptions of the package."""
 from __future__ import annotations
 
 import errno
@@ -49,7 +49,7 @@ _OUT_OF_MEMORY = 4
 
 
 def with_path(error: Error, path: str) -> Error:
-    """The same about the file of a path."""
+    """Returns the same error, about the file of a path."""
     if not isinstance(error, FileError):
         return type(error)(f"{path}: {error}", error.status, error.name, error.subject, error.where)
     kind, number = (_FileNotFound, errno.ENOENT) if error.status == _FILE_STATUSES[0] else _kind_of(path)

@@ -6,7 +6,7 @@ __all__ = ["BODY_AT", "CONTACT", "CONTAINMENT", "DISTANCE", "FORMER", "IMPACT", 
 
 #: What is not there: a triangle, a face, a former point, the asset of a removed body.
 NO_INDEX = 0xFFFFFFFF
-#: An asset as a body. Where a body stands: world = rotation x + translation, x in the mesh file's coordinates; rows of the rotation are consecutive.
+#: An asset as a body. The place of a body: world = rotation x + translation, x in the mesh file's coordinates; rows of the rotation are consecutive.
 #: Rigid to 1e-6, else TANDEM_POSE_NOT_RIGID.
 INSTANCE = np.dtype([("asset", "<u4"), ("reserved", "<u4"), ("rotation", "<f8", (3, 3)), ("translation", "<f8", (3,))])
 #: Two bodies.
@@ -21,17 +21,17 @@ POINT = np.dtype([("position", "<f8", (3,)), ("in_a", "<f8", (3,)), ("in_b", "<f
         ("face_b", "<u4"), ("previous", "<u4"), ("manifold", "<u4")])
 #: A component of a body that meets nothing of another and lies within it.
 CONTAINMENT = np.dtype([("pair", "<u4"), ("inner", "<u4"), ("component", "<u4"), ("flags", "<u4")])
-#: How near the surfaces of two bodies are (docs/distance.md).
+#: The distance of the surfaces of two bodies (docs/distance.md).
 DISTANCE = np.dtype([("lower", "<f8"), ("upper", "<f8"), ("point_a", "<f8", (3,)), ("point_b", "<f8", (3,)), ("triangle_a", "<u4"), ("triangle_b",
         "<u4"), ("face_a", "<u4"), ("face_b", "<u4")])
 #: Triangles of a pair of bodies that were nearest a step ago.
 FORMER = np.dtype([("a", "<u4"), ("b", "<u4"), ("triangle_a", "<u4"), ("triangle_b", "<u4")])
 #: The centre goes straight ahead and the body turns about it, both at constant speed.
 MOTION = np.dtype([("velocity", "<f8", (3,)), ("angular_velocity", "<f8", (3,)), ("center", "<f8", (3,))])
-#: Until when two moving bodies surely do not meet (docs/impact.md).
+#: Says until when two moving bodies surely do not meet (docs/impact.md).
 IMPACT = np.dtype([("t_safe", "<f8"), ("gap", "<f8"), ("point_a", "<f8", (3,)), ("point_b", "<f8", (3,)), ("triangle_a", "<u4"), ("triangle_b",
         "<u4"), ("face_a", "<u4"), ("face_b", "<u4"), ("status", "u1"), ("reserved", "u1", (7,))])
-#: Whether two bodies meet (docs/levels.md).
+#: Says whether two bodies meet (docs/levels.md).
 VERDICT = np.dtype([("verdict", "u1"), ("level_a", "u1"), ("level_b", "u1")])
 #: A body whose world box contains a point.
 BODY_AT = np.dtype([("point", "<u4"), ("body", "<u4")])

@@ -1,4 +1,4 @@
-"""What the adapters for solvers share: which pairs a scene is asked about, and where bodies come near each other."""
+"""The adapters for solvers share this: which pairs a scene is asked about, and where bodies come near each other."""
 
 from __future__ import annotations
 

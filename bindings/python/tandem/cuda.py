@@ -41,7 +41,7 @@ _REPORT = np.dtype([("status", "<u4"), ("complete", "<u4"), ("where", "<u8"), ("
 
 
 def _columns(dtype: np.dtype[Any]) -> dict[str, tuple[int, int, int, int]]:
-    """Of each field what Rows.column() takes: offset, kind, bits and how many; 0: one."""
+    """Returns for each field what Rows.column() takes: offset, kind, bits and how many; 0: one."""
     columns = {}
     for name in dtype.names or ():
         field, offset = dtype.fields[name][:2]  # type: ignore[index]
@@ -74,7 +74,7 @@ class Rows:
 
     @property
     def words(self) -> Array:
-        """All of it as whole numbers, contiguous, (n, k): uint32, or uint8 where a row is no multiple of 4 bytes."""
+        """Returns all of it as whole numbers, contiguous, (n, k): uint32, or uint8 where a row is no multiple of 4 bytes."""
         return self._core.words(8 if self.dtype.itemsize % 4 else 32)
 
     def numpy(self) -> npt.NDArray[Any]:
@@ -152,7 +152,7 @@ class Instances:
 
     def __init__(self, core: _cuda.Instances, asset: Any, pose: Any):
         self._core: _cuda.Instances = core
-        #: As they were given.
+        #: These are kept as they were given.
         self.asset = asset
         self.pose = pose
 
@@ -161,7 +161,8 @@ class Instances:
 
 
 class Filter:
-    """Which pairs a query looks at, of all whose world boxes meet; as the CPU's Filter, but its arrays lie in GPU memory and are read there in every call.
+    """Says which pairs a query looks at, of all whose world boxes meet, as the CPU's Filter does; but its arrays lie in GPU memory and are read there in every
+    call.
 
     Args:
         motion: (n,) uint8, of each instance MOVING, FIXED, KINEMATIC or SLEEPING.
@@ -210,7 +211,7 @@ class Queued:
 
     @property
     def first_contact(self) -> Array:
-        """Of grouped contacts: those of pair p are first_contact[p] up to first_contact[p + 1]; uint32."""
+        """Where the contacts of each pair begin, if they are grouped: those of pair p are first_contact[p] up to first_contact[p + 1]; uint32."""
         return self._core.first_contact()
 
     @property
@@ -275,7 +276,7 @@ class Query:
 
     def _about(self, instances: Instances | None, asset: Any, pose: Any, pairs: Any, filter: Filter | None, stream: Any
                ) -> tuple[_cuda.Instances, _cuda.Pairs | None, _cuda.Filter | None, _cuda.Stream]:
-        """What a call is about: bodies, pairs and filter, and its stream."""
+        """Returns what a call is about: bodies, pairs and filter, and its stream."""
         on = _stream(stream)
         if instances is not None and (asset is not None or pose is not None):
             raise TypeError("instances stand instead of asset and pose, not beside them")

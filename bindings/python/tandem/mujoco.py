@@ -158,7 +158,7 @@ class MeshContacts:
         data.ncon = len(keep)
 
     def _reach(self) -> float:
-        """Of margin and gap together, the largest of any pair, 0 at least."""
+        """Returns the largest sum of margin and gap of any pair, 0 at least."""
         model = self.model
         pairs = list(self._explicit.values())
         if model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_OVERRIDE:
@@ -173,7 +173,7 @@ class MeshContacts:
         return np.asarray(contact["includemargin"] + contact["gap"])
 
     def _parameters(self, geom: NDArray[np.intp]) -> dict[str, Any]:
-        """What MuJoCo combines of the properties of two geoms (n, 2), or takes from the <pair> that they are, by the names of MjContact; and `gap`."""
+        """Returns what MuJoCo combines of the properties of two geoms (n, 2), or takes from the <pair> that they are, by the names of MjContact; and `gap`."""
         model = self.model
         priority, mix = model.geom_priority[geom], model.geom_solmix[geom]
         is_small = mix < _LEAST_MIX
@@ -258,7 +258,7 @@ def _frames(normal: _Array) -> _Array:
 
 
 def _surface_velocity(model: mujoco.MjModel, data: mujoco.MjData, geom: NDArray[np.intp], position: _Array, frame: _Array) -> _Array:
-    """Of geom[:, 1] against geom[:, 0] at the contacts, along both tangents, and spin about the normal: (n, 3)."""
+    """Returns the surface velocity of geom[:, 1] against geom[:, 0] at the contacts, along both tangents, and spin about the normal: (n, 3)."""
     if not model.geom_surfacevel.any():
         return np.zeros((len(geom), 3))
     rotation, axes = data.geom_xmat.reshape(-1, 3, 3)[geom], frame.reshape(-1, 3, 3)

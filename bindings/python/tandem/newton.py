@@ -110,14 +110,14 @@ class CollisionPipeline:
 
 
 def _rotations(transforms: _Array) -> _Array:
-    """Of transforms x, y, z and quaternion x, y, z, w, whose length float32 has rounded: orthonormal to float64."""
+    """Returns the rotations of transforms x, y, z and quaternion x, y, z, w, whose length float32 has rounded: orthonormal to float64."""
     x, y, z, w = (transforms[:, 3:] / np.linalg.norm(transforms[:, 3:], axis=1, keepdims=True)).T
     return np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), 2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
                      2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], axis=1).reshape(-1, 3, 3)
 
 
 def _assets_of(model: newton.Model, shapes: npt.NDArray[np.intp], effort: _Effort) -> tuple[list[tandem.Asset], list[int]]:
-    """Of each mesh and scale that the shapes have, an asset; and of each shape, which it has."""
+    """Returns an asset for each mesh and scale that the shapes have, and for each shape which asset it has."""
     scale_of: Any = model.shape_scale
     scales = scale_of.numpy().astype(np.float64)[shapes]
     places: dict[tuple[int, ...], int] = {}

@@ -32,7 +32,7 @@ EXTERNAL = "__external"  # the name of the object that the methods *_single() ar
 
 
 class CollisionObject:
-    """What add_object() returns: an object of a manager. It stands where its manager's set_transform() puts it."""
+    """An object of a manager, which add_object() returns. It stands where its manager's set_transform() puts it."""
 
     __slots__ = ("_place", "_shape")
 
@@ -121,7 +121,7 @@ class CollisionManager:
         (self._ignored.add if ignored else self._ignored.discard)(_pair(name_a, name_b))
 
     def is_pair_ignored(self, name_a: Hashable, name_b: Hashable) -> bool:
-        """Whether a pair is ignored, its names in either order."""
+        """Returns whether a pair is ignored, its names in either order."""
         return _pair(name_a, name_b) in self._ignored
 
     def clear_ignored_pairs(self) -> None:

@@ -203,7 +203,7 @@ class View:
         self.origin = self._centres(len(self.scene.steps) - 1)[self._subject].mean(axis=0)
 
     def _centres(self, state: int) -> Points:
-        """Where the middles of the bodies' meshes are, (n, 3), in the world."""
+        """Returns the middles of the bodies' meshes, (n, 3), in the world."""
         centres: Points = np.einsum("nij,nj->ni", self.scene.rotation[state], self._middle[self._asset])
         centres += self.scene.translation[state]
         return centres
@@ -402,7 +402,7 @@ def _of_each(name: str, given: ArrayLike, count: int, most: int) -> NDArray[Any]
 
 
 def _plotter(off_screen: bool, size: tuple[int, int]) -> Any:
-    """With its window made. VTK looks for a display first, then for what draws without, and says on stderr what it
+    """Makes a plotter with its window. VTK looks for a display first, then for what draws without, and says on stderr what it
     misses."""
     told = vtk.vtkLogger.GetCurrentVerbosityCutoff()
     vtk.vtkLogger.SetStderrVerbosity(vtk.vtkLogger.VERBOSITY_ERROR)
@@ -427,12 +427,12 @@ def _plotter(off_screen: bool, size: tuple[int, int]) -> Any:
 
 
 def _surface(triangles: Points) -> Mesh:
-    """Of corners (n, 3, 3); without joined vertices, so that faces look flat."""
+    """Makes a surface of corners (n, 3, 3), without joined vertices, so that faces look flat."""
     return pyvista.PolyData.from_regular_faces(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3))
 
 
 def _corners(boxes: Points) -> Points:
-    """Of boxes (n, 2, 3), (n, 8, 3): corner i is upper along axis k where bit k of i is set."""
+    """Returns the corners of boxes (n, 2, 3), as (n, 8, 3): corner i is upper along axis k where bit k of i is set."""
     high = np.array([[i >> k & 1 for k in range(3)] for i in range(8)], bool)
     return np.where(high, boxes[:, 1, None], boxes[:, 0, None])
 
@@ -459,7 +459,7 @@ def _quaternions(rotation: Points) -> Points:
 
 
 def _level_colours(count: int) -> NDArray[np.uint8]:
-    """Of the finest first, (count, 3)."""
+    """Returns the colours of the levels, that of the finest first, (count, 3)."""
     colours: NDArray[np.uint8] = matplotlib.colormaps["viridis"](np.linspace(0, 1, count), bytes=True)[:, :3]
     return colours
 
@@ -473,6 +473,6 @@ def _from_zero(values: Points) -> tuple[float, float]:
 
 
 def _bar(title: str, column: int) -> dict[str, Any]:
-    """Of colours, in a column from the right."""
+    """Returns the arguments of a bar of colours, in a column from the right."""
     return {"title": title, "vertical": True, "position_x": 0.89 - BAR * column, "position_y": 0.15, "height": 0.7,
             "width": 0.05, "color": "black", "fmt": "%.2g"}

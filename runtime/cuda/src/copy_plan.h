@@ -6,8 +6,8 @@
 #include "tandem/formats/view.h"
 #include "tandem/runtime/contents.h"
 
-// What is copied of files, where it lies in one copy of them all, and who copies it. Measured:
-// docs/decisions/0049.
+// The plan of a copy: what is copied of files, where it lies in one copy of them all, and who copies it.
+// Measured: docs/decisions/0049.
 namespace tandem {
 
 /// Bytes in CPU memory and their place in the copy.

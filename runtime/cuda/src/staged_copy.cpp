@@ -11,8 +11,8 @@
 namespace tandem {
 namespace {
 
-// One copy. Threads share next_ and error_, which are atomic, and what is constant. Pinned memory and events
-// belong to the thread that made them. CUDA's functions may be called from any thread.
+// The state of one copy. Threads share next_ and error_, which are atomic, and what is constant. Pinned
+// memory and events belong to the thread that made them. CUDA's functions may be called from any thread.
 class StagedCopy {
  public:
   StagedCopy(std::span<const Piece> pieces, std::uint64_t bytes, std::uint64_t chunk_bytes, unsigned char* to,
@@ -66,7 +66,7 @@ class StagedCopy {
     succeeds(cudaMemcpyAsync(to_ + begin, chunk, end - begin, cudaMemcpyHostToDevice, stream_));
   }
 
-  // What no thread took, which is all where none was asked for.
+  // Copies what no thread took, which is all where none was asked for.
   void copy_rest() {
     for_each_part(pieces_, next_, bytes_,
                   [&](const unsigned char* from, std::uint64_t size, std::uint64_t at) {

@@ -10,7 +10,7 @@
 namespace tandem {
 namespace {
 
-// The same place of the copy; null where no piece has it.
+// Returns the same place in the copy, null where no piece has it.
 template <typename Element>
 const Element* relocate(const Element* element, std::span<const Piece> pieces, const unsigned char* copy) {
   const auto at = reinterpret_cast<std::uintptr_t>(element);
@@ -40,7 +40,7 @@ std::unique_ptr<Element[]> array_of(std::size_t count) {
   return std::unique_ptr<Element[]>(new (std::nothrow) Element[count]);
 }
 
-// One allocation for all.
+// Makes one allocation for all pieces and copies them to it.
 cudaError_t copy_to(GpuArray<unsigned char>& data, std::span<Piece> pieces, cudaStream_t stream) {
   const std::uint64_t bytes = place(pieces);
   const cudaError_t error = data.reserve(bytes);

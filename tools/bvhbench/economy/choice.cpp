@@ -15,8 +15,8 @@ struct Change {
 
 using Tolerances = std::vector<double>;
 
-// Of each asset, whether it is at a coarser level and more than half of the depths of pairs with it change by
-// more than they may.
+// Returns for each asset whether it is at a coarser level and more than half of the depths of pairs with it
+// change by more than they may.
 std::vector<bool> broken(const Candidates& candidates, const Levels& levels, const Tolerances& tolerance) {
   std::vector<std::size_t> all(candidates.assets()), within(candidates.assets());
   for (const auto& [pair, by] : candidates.measure(levels).change.depths) {

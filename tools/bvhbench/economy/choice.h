@@ -4,13 +4,13 @@
 
 #include "measure.h"
 
-/// Which levels are enough.
+/// These functions choose levels that are enough.
 namespace tandem::economy {
 
-/// What is measured of a scene at some levels.
+/// Measures a scene at some levels.
 using Measure = std::function<const Measures&(const Levels&)>;
 
-/// What a choice is made from.
+/// The data from which a choice is made.
 struct Candidates {
   std::vector<std::vector<double>> error_bounds;  ///< [asset][level], ascending, lengths
   std::vector<std::uint32_t> asset_of;            ///< of each instance
@@ -21,20 +21,20 @@ struct Candidates {
   /// The asset at this level, all others at their finest.
   Levels alone(std::size_t asset, std::uint32_t level) const;
 
-  /// All assets at their coarsest.
+  /// Returns the levels with all assets at their coarsest.
   Levels coarsest() const;
 };
 
-/// For each asset that part of its diagonal, but at most of the smallest diagonal of those that move: what is
-/// large, as a ground, is judged by what lies on it.
+/// Returns for each asset that part of its diagonal, but at most of the smallest diagonal of those that move:
+/// a large asset, such as a ground, is judged by what lies on it.
 std::vector<double> tolerances_of(double part, const std::vector<double>& diagonals,
                                   const std::vector<bool>& moves);
 
-/// For each asset the coarsest level whose error bound is at most the asset's tolerance, a length, and that
-/// alone keeps half of the depths of the object pairs with the asset within the smaller tolerance of the
-/// pair's two assets. Then as many finer levels, always at the asset whose error bound is the largest part of
-/// its tolerance among those that break this and those that they meet, as it takes until each keeps it at the
-/// levels of all together.
+/// Returns for each asset the coarsest level whose error bound is at most the asset's tolerance, a length,
+/// and that alone keeps half of the depths of the object pairs with the asset within the smaller tolerance of
+/// the pair's two assets. Then as many finer levels, always at the asset whose error bound is the largest
+/// part of its tolerance among those that break this and those that they meet, as it takes until each keeps
+/// it at the levels of all together.
 Levels within_tolerance(const Candidates& candidates, const std::vector<double>& tolerance);
 
 /// Levels whose cost is at most the budget, or the cheapest if none is so cheap: from the finest on always

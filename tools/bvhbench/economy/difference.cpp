@@ -22,7 +22,8 @@ double squared_distance(const std::array<double, 3>& a, const std::array<double,
   return sum;
 }
 
-// Of unit vectors, in degrees. By the arc's chord: the cosine of a small angle has no digits of it.
+// Returns the angle between unit vectors, in degrees, by the arc's chord: the cosine of a small angle has no
+// digits of it.
 double angle_between(const std::array<double, 3>& a, const std::array<double, 3>& b) {
   const double chord = std::sqrt(squared_distance(a, b));
   return 2 * std::asin(std::min(1.0, 0.5 * chord)) * 180 / std::numbers::pi;

@@ -15,14 +15,15 @@ struct Patch {
   double depth;
 };
 
-/// What a query finds in a scene.
+/// The findings of a query in a scene.
 struct Findings {
   std::uint64_t object_pairs = 0, contacts = 0;
   std::vector<ObjectPair> touching;  ///< pairs with a contact; a < b, sorted, each once
   std::vector<Patch> patches;        ///< in any order
 };
 
-/// Some numbers that are not negative: half of them are at most `median`, 95 of 100 at most `most`.
+/// The spread of some numbers that are not negative: half of them are at most `median`, 95 of 100 at most
+/// `most`.
 struct Spread {
   double mean = 0, median = 0, most = 0, largest = 0;
 };
@@ -30,13 +31,13 @@ struct Spread {
 /// 0 of no numbers.
 Spread spread_of(std::vector<double> numbers);
 
-/// By how much the depth of a manifold differs; of one without a match its whole depth.
+/// The difference of the depth of a manifold; for one without a match, its whole depth.
 struct DepthChange {
   ObjectPair pair;
   double by;
 };
 
-/// What a coarser level changes.
+/// The changes that a coarser level makes.
 struct Difference {
   std::uint64_t touching_pairs = 0;                 ///< at the finest
   std::uint64_t lost_pairs = 0, new_pairs = 0;      ///< touching at the finest alone; at the coarser alone

@@ -18,14 +18,14 @@ struct MeasureSettings {
   double simulated_seconds = 0;  ///< 0: nothing is simulated
 };
 
-/// What a simulation says of levels.
+/// The measures that a simulation gives of levels.
 struct RestMeasures {
   double step_seconds = 0;  ///< of computing, mean
   double speed = 0;         ///< Rest::speed
   Spread end_distance;      ///< from where the finest levels leave the bodies
 };
 
-/// What a scene costs with its assets at some levels, and what these change against the finest. Assets
+/// The costs of a scene with its assets at some levels, and what these change against the finest. Assets
 /// without instances are left out.
 struct Measures {
   Levels levels;
@@ -46,20 +46,21 @@ class LevelMeasurer {
   /// Its instances are of rows of `shapes`, the assets that have instances.
   const bench::LoadedScene& scene() const { return scene_; }
 
-  /// Of each instance.
+  /// Returns the asset of each instance.
   const std::vector<std::uint32_t>& asset_of() const { return asset_of_; }
 
-  /// How many levels each asset has; 1 of an asset that the scene has no instance of.
+  /// Returns how many levels each asset has; 1 of an asset that the scene has no instance of.
   std::vector<std::uint32_t> level_counts() const;
 
-  /// Measured once, then remembered; the finest levels first. Throws bench::FileError, EngineError, GpuError.
+  /// Measures levels once and remembers them; the finest come first. Throws bench::FileError, EngineError,
+  /// GpuError.
   const Measures& measure(const Levels& levels);
 
-  /// Of the GPU, once something was measured on one.
+  /// Returns the name of the GPU, once something was measured on one.
   const std::string& gpu() const { return gpu_; }
 
-  /// How far from each other the finest levels leave bodies that start kNudge diagonals apart: what a chaotic
-  /// scene makes of next to nothing.
+  /// Returns how far from each other the finest levels leave bodies that start kNudge diagonals apart: what a
+  /// chaotic scene makes of next to nothing.
   const Spread& end_distance_of_a_nudge();
   static constexpr double kNudge = 1e-6;
 

@@ -9,7 +9,7 @@
 
 namespace tandem::economy {
 
-/// How a scene is simulated: by default settings of `bvhbench simulate`.
+/// The settings of a simulation: by default those of `bvhbench simulate`.
 struct SimulationSettings {
   std::string engine = "tandem";
   double seconds = 0;
@@ -18,7 +18,7 @@ struct SimulationSettings {
   std::uint32_t threads = 1;
 };
 
-/// Where the moving bodies of a scene come to rest.
+/// The places where the moving bodies of a scene come to rest.
 struct Rest {
   double step_seconds = 0;                 ///< of computing, mean over the steps
   double speed = 0;                        ///< of the fastest body, mean over the last tenth of the steps
@@ -28,7 +28,7 @@ struct Rest {
 /// Simulates a scene at its shapes' levels. Throws bench::FileError, and what the engine throws.
 Rest simulate(const std::string& path, const bench::LoadedScene& scene, const SimulationSettings& settings);
 
-/// How far from each other two runs leave each moving body. Condition: they are of the same scene.
+/// Returns how far from each other two runs leave each moving body. Condition: they are of the same scene.
 Spread end_distance(const Rest& a, const Rest& b);
 
 }  // namespace tandem::economy

@@ -231,8 +231,8 @@ Constructions::FT squared_distance(const Triangles& a, const Triangles& b) {
   return least;
 }
 
-/// What other distances are held against: the least of the squares of the distances of triangles, in exact
-/// arithmetic.
+/// Finds what other distances are held against: the least of the squares of the distances of triangles, in
+/// exact arithmetic.
 class CgalDistances final : public EngineWith<LevelView> {
  public:
   using EngineWith::EngineWith;

@@ -41,13 +41,13 @@ struct Float64Signs {
   }
 };
 
-/// Whether two posed triangles meet by plain float64: Guigue and Devillers' test with all its ties, signs
-/// taken as they come out. What a careful user of a library that finds candidates only would write.
+/// Returns whether two posed triangles meet by plain float64: Guigue and Devillers' test with all its ties,
+/// signs taken as they come out. What a careful user of a library that finds candidates only would write.
 bool meet_in_float64(const PosedTriangle& a, const PosedTriangle& b) {
   return detail::CompleteTest<Float64Signs>::meet(a.corner, b.corner);
 }
 
-/// What one body's scene is made of. Embree holds its address.
+/// The data of one body's scene. Embree holds its address.
 struct EmbreeBody {
   const IndexedMesh* mesh = nullptr;
   std::vector<std::array<double, 3>> vertices;  ///< posed
@@ -84,7 +84,7 @@ void bounds(const RTCBoundsFunctionArguments* arguments) {
   out.upper_x = most(0), out.upper_y = most(1), out.upper_z = most(2);
 }
 
-/// What rtcCollide's callback works on.
+/// The data that rtcCollide's callback works on.
 struct Collision {
   const EmbreeBody *a, *b;
   std::uint32_t pair;
@@ -104,7 +104,7 @@ void decide(void* user, RTCCollision* found, unsigned count) {
   }
 }
 
-/// How the trees follow the bodies: made anew each frame, or their boxes fitted again.
+/// Says how the trees follow the bodies: made anew each frame, or their boxes fitted again.
 enum class Following { rebuild, refit };
 
 class EmbreeEngine final : public EngineWith<IndexedMesh> {

@@ -9,8 +9,8 @@
 namespace tandem {
 namespace {
 
-// By digits of the three numbers, packed as tightly as they allow: with 1,000 cows in half the time, or less,
-// that sorting each body pair's by comparison takes.
+// Sorts by digits of the three numbers, packed as tightly as they allow: with 1,000 cows in half the time, or
+// less, that sorting each body pair's by comparison takes.
 void sort_contacts(std::vector<TriangleContact>& contacts) {
   TriangleContact largest = {0, 0, 0};
   for (const TriangleContact& c : contacts) {

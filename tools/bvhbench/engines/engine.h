@@ -20,8 +20,7 @@
 
 namespace tandem {
 
-/// What an engine is made to answer, with the options of that question: contacts, distances, impacts or
-/// verdicts.
+/// The question that an engine is made to answer, with its options: contacts, distances, impacts or verdicts.
 using Question = std::variant<ContactOptions, DistanceOptions, ImpactOptions, ToleranceOptions>;
 
 /// A body: its shape, by place in the list given to set_shapes(), and where it stands. The pose speaks of the
@@ -36,7 +35,8 @@ struct TriangleContact {
   friend auto operator<=>(const TriangleContact&, const TriangleContact&) = default;
 };
 
-/// What a step of a simulation asks for. Every exact engine gives the same list, whatever its threads.
+/// The contacts that a step of a simulation asks for. Every exact engine gives the same list, whatever its
+/// threads.
 struct ContactList {
   std::vector<ObjectPair> pairs;           ///< bodies whose world boxes meet, a < b, sorted
   std::vector<TriangleContact> triangles;  ///< sorted, each once
@@ -56,7 +56,7 @@ struct EngineTimes {
 /// The order of contacts in GPU memory: any, pair by pair, or, of pairs too, as a contacts file has it.
 enum class OrderOnGpu : std::uint8_t { any, grouped, sorted };
 
-/// How a question is asked when it is timed.
+/// Says how a question is asked when it is timed.
 struct TimedQuery {
   const std::vector<ObjectPair>* given = nullptr;  ///< normalised; null: the engine finds the pairs
   std::uint32_t repeats = 1;
@@ -67,7 +67,7 @@ struct TimedQuery {
   bool manifolds = false;              ///< contact manifolds are made of what each repeat finds, and timed
 };
 
-/// What an engine takes of a GPU.
+/// The resources that an engine takes of a GPU.
 struct GpuUse {
   std::string name;  ///< of the device
   double upload =
@@ -149,7 +149,7 @@ class Engine {
   Engine& operator=(const Engine&) = delete;
   virtual ~Engine() = default;
 
-  /// Such as "embree-refit", as make_engine() knows it.
+  /// Returns the name by which make_engine() knows the engine, such as "embree-refit".
   std::string_view name() const { return name_; }
 
   /// The name for tables, with the mode: "Embree refit", "Tandem exact".
@@ -158,10 +158,10 @@ class Engine {
   /// The data structure, the precision and whatever else the figures depend on, in a line.
   virtual std::string settings() const { return {}; }
 
-  /// Whether the answer is exact, found without Tandem's own code.
+  /// Returns whether the answer is exact, found without Tandem's own code.
   virtual bool is_reference() const { return false; }
 
-  /// Whether the engine is so slow that it is asked once and not raced.
+  /// Returns whether the engine is so slow that it is asked once and not raced.
   virtual bool runs_once() const { return is_reference(); }
 
   /// Sets how many threads questions may use, where the engine can use more than one; at first 1. No answer
@@ -176,9 +176,9 @@ class Engine {
   /// something for each body then start anew. `bodies` must stay until the next call.
   virtual void update(std::span<const BodyPose> bodies) = 0;
 
-  /// How the bodies of the next update() move in a step of `duration` seconds, for impacts. `motion` must
-  /// stay as long as they. Conditions: there is one for each of them; duration > 0; for engines that are not
-  /// Tandem's, no body turns by half a turn or more.
+  /// Says how the bodies of the next update() move in a step of `duration` seconds, for impacts. `motion`
+  /// must stay as long as they. Conditions: there is one for each of them; duration > 0; for engines that are
+  /// not Tandem's, no body turns by half a turn or more.
   void set_motion(std::span<const RigidMotion> motion, double duration) {
     motion_ = motion;
     duration_ = duration;
@@ -208,7 +208,7 @@ class Engine {
   /// them.
   virtual TimedAnswer time_query(const TimedQuery& asked);
 
-  /// What a simulator asks for: update(), find_pairs(), query() and contacts(), in the order of a
+  /// Finds what a simulator asks for: update(), find_pairs(), query() and contacts(), in the order of a
   /// ContactList. `idle`: empty, or for each body whether it does not move (1; else 0): pairs of two idle
   /// bodies are left out of both lists. They take the place of the filter's motions.
   void find(std::span<const BodyPose> bodies, std::span<const std::uint8_t> idle, ContactList& found);
@@ -218,8 +218,8 @@ class Engine {
     cannot("find distances");
   }
 
-  /// How many pairs of the last find_distances() have an exact distance that is not in [lower, upper], as
-  /// exact arithmetic decides. Condition: is_reference().
+  /// Returns how many pairs of the last find_distances() have an exact distance that is not in [lower,
+  /// upper], as exact arithmetic decides. Condition: is_reference().
   virtual std::uint64_t outside(std::span<const double> /*lower*/, std::span<const double> /*upper*/) const {
     cannot("judge distances");
   }
@@ -237,14 +237,14 @@ class Engine {
   virtual TimedImpacts time_impacts(const TimedQuery& /*asked*/) { cannot("time impacts"); }
   virtual TimedVerdicts time_verdicts(const TimedQuery& /*asked*/) { cannot("time verdicts"); }
 
-  /// What the phases of the last find() took.
+  /// Returns the times that the phases of the last find() took.
   const EngineTimes& times() const { return times_; }
 
-  /// What the last query for contacts counted. Counts that an engine does not keep as Tandem does are 0;
-  /// after find(), object_pairs and contacts are always there.
+  /// Returns what the last query for contacts counted. Counts that an engine does not keep as Tandem does are
+  /// 0; after find(), object_pairs and contacts are always there.
   const ContactCounters& counters() const { return counters_; }
 
-  /// What the engine counted in the last query, by names of its own.
+  /// Returns what the engine counted in the last query, by names of its own.
   virtual std::vector<Counter> named_counters() const { return {}; }
 
   /// Memory held that malloc knows nothing of: mapped files, pages from the operating system.

@@ -81,7 +81,7 @@ struct BodyTrees {
   BvhMesh<Fcl, fcl::RSSd> swept;
 };
 
-/// What is the same for all of FCL's ways to find impacts.
+/// The base of all of FCL's ways to find impacts.
 class FclImpacts : public EngineWith<BodyTrees> {
  public:
   using EngineWith::EngineWith;

@@ -19,7 +19,7 @@ OrderOnGpu order_of_query(const TimedQuery& asked) {
   return asked.manifolds && asked.order == OrderOnGpu::any ? OrderOnGpu::grouped : asked.order;
 }
 
-// Of what the GPU was to group or sort.
+// Checks the order of what the GPU was to group or sort.
 void check_order(const std::vector<Contact>& contacts, OrderOnGpu order) {
   if (order == OrderOnGpu::any) return;
   const auto key = [](const Contact& c) {

@@ -24,23 +24,24 @@ class GpuContactEngine : public GpuEngine {
   /// Finds the contacts of these pairs, of instances(), and waits for them.
   virtual void ask(const GpuPairs& pairs, OrderOnGpu order) = 0;
 
-  /// What the last ask(), or repeat of it, found; sets counters_.
+  /// Returns what the last ask(), or repeat of it, found, and sets counters_.
   virtual GpuContacts found() = 0;
 
   /// Queues on stream() what comes before a query: the pairs, and an event that is recorded with these flags.
   using Before = std::function<void(unsigned event_flags)>;
 
-  /// What queues `before` and the query of these pairs once more. Conditions: ask() of the same went well;
-  /// what `before` looks at stays.
+  /// Returns a function that queues `before` and the query of these pairs once more. Conditions: ask() of the
+  /// same went well; what `before` looks at stays.
   virtual std::function<void()> repeatable(const GpuPairs& pairs, OrderOnGpu order, const Before& before) = 0;
 
-  /// What queues the same with contact manifolds of what the query finds, behind `between`.
+  /// Returns a function that queues the same with contact manifolds of what the query finds, behind
+  /// `between`.
   virtual std::function<void()> repeatable_with_manifolds(const GpuPairs&, OrderOnGpu, const Before&,
                                                           const Before&) {
     cannot("make manifolds");
   }
 
-  /// What the last repeat of these made, their rows those of the GPU's pairs.
+  /// Takes the manifolds that the last repeat made; their rows are those of the GPU's pairs.
   virtual void take_manifolds(TimedManifolds&) {}
 
   /// Times the walk of the trees alone.

@@ -105,7 +105,7 @@ void GpuEngine::keep_fixed() {
   check(status, broad_phase_, "broad phase");
 }
 
-// Where the copy lies; null where there is nothing of each body to copy.
+// Returns where the copy lies, null where there is nothing of each body to copy.
 template <typename Element>
 const Element* GpuEngine::upload_of_each(const Element* of_each, StagedArray<Element>& array) {
   if (of_each == nullptr) return nullptr;

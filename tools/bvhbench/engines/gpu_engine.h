@@ -31,7 +31,7 @@ struct StagedArray {
   }
 };
 
-/// What a question on a GPU takes of a scene.
+/// Says what a question on a GPU takes of a scene.
 struct GpuNeeds {
   Contents contents = Contents::all;  ///< of the shapes
   bool all_levels = false;            ///< of each shape, not its first alone
@@ -79,13 +79,13 @@ class GpuEngine : public Engine {
   /// The pairs that were found, and how many there are.
   GpuPairs pairs_found() const { return broad_phase_.pairs(); }
   std::uint32_t count_found() const { return broad_phase_.report().count; }
-  /// Whether these are all that find_pairs() found, which lie on the GPU already.
+  /// Returns whether these are all that find_pairs() found, which lie on the GPU already.
   bool are_on_gpu(std::span<const ObjectPair> pairs) const;
 
   /// Queues the copy of pairs.
   GpuPairs upload(std::span<const ObjectPair> pairs);
 
-  /// Whether the broad phase finds the pairs that the question is about.
+  /// Returns whether the broad phase finds the pairs that the question is about.
   bool has_broad_phase(const TimedQuery& asked) const {
     return asked.given == nullptr && !needs_.finds_pairs;
   }

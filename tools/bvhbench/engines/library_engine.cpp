@@ -77,7 +77,7 @@ Pose LibraryEngine::end_of_step(std::uint32_t body) const {
                                 shapes_[at_start.asset].header->origin);
 }
 
-// From the poses of the files' coordinates.
+// Makes the poses of stored coordinates from those of the files' coordinates.
 std::vector<Pose> LibraryEngine::stored_poses(std::span<const BodyPose> bodies) const {
   std::vector<Pose> poses;
   poses.reserve(bodies.size());

@@ -58,13 +58,13 @@ class LibraryEngine : public Engine {
   /// The distance of bodies a and b, 0 or less where they meet.
   virtual double distance(std::uint32_t /*a*/, std::uint32_t /*b*/) { cannot("find distances"); }
 
-  /// When bodies a and b meet, in seconds; infinite where they do not.
+  /// Returns when bodies a and b meet, in seconds; infinite where they do not.
   virtual double impact(std::uint32_t /*a*/, std::uint32_t /*b*/) { cannot("find impacts"); }
 
   /// The shape of each body.
   std::span<const std::uint32_t> shape_of() const { return shape_of_; }
 
-  /// Where a body is at the end of the step; the pose speaks of stored coordinates.
+  /// Returns where a body is at the end of the step; the pose speaks of stored coordinates.
   Pose end_of_step(std::uint32_t body) const;
 
   void add_contact(std::uint32_t pair, std::uint64_t triangle_a, std::uint64_t triangle_b) {

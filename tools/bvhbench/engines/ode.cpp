@@ -7,7 +7,7 @@
 namespace tandem {
 namespace {
 
-/// One initialisation of ODE for as long as an engine lives.
+/// Keeps ODE initialised for as long as an engine lives.
 struct OdeLibrary {
   OdeLibrary() {
     if (dInitODE2(0) == 0) throw std::runtime_error("ODE: cannot be initialised");

@@ -5,7 +5,7 @@
 namespace tandem {
 
 using Maker = std::unique_ptr<Engine>(std::string_view name, const Question& question);
-// Each in a file of its own.
+// Each maker is in a file of its own.
 Maker make_tandem, make_tandem_cuda, make_paper, make_fcl, make_coal, make_embree, make_bullet, make_ode,
     make_cgal;
 
@@ -14,7 +14,8 @@ namespace {
 // Questions that an engine answers: bits by the place of their options in Question.
 enum : unsigned { kContacts = 1, kDistances = 2, kImpacts = 4, kVerdicts = 8, kAll = 15 };
 
-// What compare does not run has no library. Those that simulate tell all contacts, and right.
+// An engine that compare does not run has no library. Engines that simulate find all contacts, and the right
+// ones.
 enum class Use : std::uint8_t { compares, simulates };
 
 struct Entry {

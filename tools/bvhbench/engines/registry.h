@@ -12,7 +12,7 @@ namespace tandem {
 /// embree, embree-refit.
 std::vector<std::string_view> engine_names();
 
-/// Whether this program has the engine.
+/// Returns whether this program has the engine.
 bool is_built_in(std::string_view name);
 
 /// Makes an engine that answers the question. Throws std::runtime_error: no engine of this name, one that is

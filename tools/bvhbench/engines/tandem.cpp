@@ -9,7 +9,7 @@
 namespace tandem {
 namespace {
 
-/// What Tandem's questions share on the CPU: the scene has the shapes and the bodies, and the query is asked
+/// The base of Tandem's questions on the CPU: the scene has the shapes and the bodies, and the query is asked
 /// of it as often as wanted.
 template <typename Query>
 class TandemEngine : public Engine {
@@ -29,7 +29,7 @@ class TandemEngine : public Engine {
  protected:
   void check(Status status) const { require(status, scene_.where()); }
 
-  // Not in update(): the filter may be told after it.
+  // The bodies are not placed in update(), because the filter may be set after it.
   Status place() {
     scene_.set_threads(threads_);
     placed_ = true;

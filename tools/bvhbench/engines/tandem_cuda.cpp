@@ -57,7 +57,7 @@ class CudaContacts final : public GpuContactEngine {
     });
   }
 
-  // Both: their contacts are grouped too.
+  // Returns a function that queues both; the contacts are grouped too.
   std::function<void()> repeatable_with_manifolds(const GpuPairs& pairs, OrderOnGpu order,
                                                   const Before& before, const Before& between) override {
     GpuContactOptions with_groups = options(order);
@@ -136,7 +136,7 @@ class CudaRows : public GpuEngine {
   /// Makes room for what a repeat may need beyond the first run.
   virtual void make_room_for_repeats() {}
 
-  /// What the rule of the query says that it takes of the GPU at most.
+  /// Returns the most GPU memory that the query may take by its own rule.
   virtual std::size_t most_bytes() const = 0;
 
   /// The pairs that were found, in GPU memory.
@@ -199,7 +199,7 @@ class CudaDistances final : public CudaRows<GpuDistanceQuery> {
   const GpuDistanceOptions options_;
 };
 
-// By a, then b. On the CPU, as contacts are sorted there: it is no part of a step.
+// Sorts by a, then b. The CPU does it, as it sorts contacts: it is no part of a step.
 void sort(TimedImpacts& found) {
   std::vector<std::pair<ObjectPair, Impact>> rows;
   for (std::size_t i = 0; i < found.pairs.size(); ++i) rows.emplace_back(found.pairs[i], found.rows[i]);
@@ -260,7 +260,7 @@ class CudaVerdicts final : public CudaRows<GpuToleranceQuery> {
   Status enqueue(const GpuPairs& pairs) override {
     return query_.enqueue(instances(), pairs, tolerance_, stream());
   }
-  // What is looked at before a pair's first contact is found differs from run to run.
+  // The work before a pair's first contact is found differs from run to run.
   void make_room_for_repeats() override {
     GpuToleranceCapacity room = query_.report().needed;
     room.undecided += room.undecided / 2 + 1024;

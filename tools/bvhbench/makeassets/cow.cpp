@@ -105,7 +105,8 @@ class Marcher {
     const auto next = static_cast<std::uint32_t>(mesh_.points.size());
     const auto [entry, is_new] = vertex_.try_emplace(index(from) * 8 + direction, next);
     if (is_new) {
-      // Kept away from the corners, where neighbouring crossings would coincide and make flat triangles.
+      // The point is kept away from the corners, where neighbouring crossings would coincide and make flat
+      // triangles.
       const double at = std::clamp(value(from) / (value(from) - value(to)), 0.05, 0.95);
       mesh_.points.push_back(position(from) + at * (position(to) - position(from)));
     }

@@ -54,7 +54,7 @@ double value_noise(const Point& p, std::uint64_t seed) {
   return sum;
 }
 
-// How far the surface lies from the centre in a direction, in radii: between 0.69 and 1.31.
+// Returns how far the surface lies from the centre in a direction, in radii: between 0.69 and 1.31.
 double radius_along(const Point& direction, std::uint64_t seed) {
   constexpr int kOctaves = 6;
   double radius = 1, amplitude = 0.2, frequency = 1.5;

@@ -62,8 +62,8 @@ int write_all(const std::filesystem::path& folder) {
   return write(terrain({100, 100}, 60, 1), kTerrainComment, folder / "ground.obj");
 }
 
-// Of any shape, a sheet of so many triangles has fewer than 2^32 vertices: (x + 1) * (y + 1) <= triangles
-// + 2.
+// Whatever its shape, a sheet of so many triangles has fewer than 2^32 vertices: (x + 1) * (y + 1) <=
+// triangles + 2.
 constexpr std::uint64_t kMaxTriangles = 2'000'000'000;
 
 struct TerrainOptions {

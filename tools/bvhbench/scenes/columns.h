@@ -11,7 +11,7 @@
 /// Rows of structs as HDF5 files have them: a dataset for each member.
 namespace tandem::bench {
 
-/// How a value stands in a dataset: the type of its numbers, and how many they are. A number is itself.
+/// Says how a value stands in a dataset: the type of its numbers, and how many they are. A number is itself.
 template <typename Value>
 struct Stored {
   using Number = Value;
@@ -52,7 +52,7 @@ struct Stored<ObjectPair> {
   }
 };
 
-/// How a member, or a function, of a row stands in a dataset.
+/// Says how a member, or a function, of a row stands in a dataset.
 template <typename Row, typename Member>
 using StoredMember = Stored<std::remove_cvref_t<std::invoke_result_t<Member, const Row&>>>;
 
@@ -62,7 +62,7 @@ Shape row_shape() {
   return Of::kWidth == 1 ? Shape() : Shape{Of::kWidth};
 }
 
-/// What a member, or a function, says of each row: numbers, those of one row after the other.
+/// Returns what a member, or a function, says of each row: numbers, those of one row after the other.
 template <typename Row, typename Member>
 auto column(std::span<const Row> rows, const Member& member) {
   using Of = StoredMember<Row, Member>;

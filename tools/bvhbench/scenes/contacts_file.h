@@ -20,7 +20,7 @@ struct ContactTable {
   std::vector<std::uint32_t> face_b;  ///< then face_b; of an instance with itself face_a <= face_b
 };
 
-/// Each pair once, a <= b, sorted.
+/// Returns each pair once, a <= b, sorted.
 std::vector<ObjectPair> normalised(std::span<const ObjectPair> pairs);
 
 /// Source faces that meet, of the instances in row `pair` of the object pairs.

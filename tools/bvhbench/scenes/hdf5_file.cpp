@@ -34,7 +34,7 @@ class Handle {
   herr_t (*close_)(hid_t);
 };
 
-// What HDF5 says of the call that failed last; its innermost message tells most.
+// Returns what HDF5 says of the call that failed last; its innermost message tells most.
 std::string last_reason() {
   std::string reason;
   const auto take_first = [](unsigned, const H5E_error2_t* error, void* text) -> herr_t {

@@ -34,7 +34,7 @@ class Hdf5Input {
   Hdf5Input(const Hdf5Input&) = delete;
   Hdf5Input& operator=(const Hdf5Input&) = delete;
 
-  /// Whether there is anything of this name. `name`: from the root, "/instances/asset".
+  /// Returns whether there is anything of this name. `name`: from the root, "/instances/asset".
   bool has(const std::string& name) const;
 
   /// A dataset of integers of any type whose values fit, n rows of shape `row`, in row-major order.
@@ -42,7 +42,7 @@ class Hdf5Input {
 
   std::vector<std::uint64_t> read_u64(const std::string& name, const Shape& row = {}) const;
 
-  /// The same of numbers that float64 holds without loss.
+  /// Reads a dataset of numbers that float64 holds without loss.
   std::vector<double> read_f64(const std::string& name, const Shape& row = {}) const;
 
   /// A dataset of n strings, of fixed or variable length.

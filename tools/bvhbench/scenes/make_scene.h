@@ -9,7 +9,7 @@
 /// describes the scenes.
 namespace tandem::bench {
 
-/// What every scene is told. The mesh is asset 0.
+/// The arguments of every scene. The mesh is asset 0.
 struct SceneSeed {
   std::uint64_t seed = 1;
   Vector offset = {};  ///< added to every translation

@@ -14,7 +14,7 @@ Vector cell(std::uint32_t i, std::uint32_t n) {
   return {static_cast<double>(i % n), static_cast<double>(i / n % n), static_cast<double>(i / n / n)};
 }
 
-// Where a coordinate of the mesh comes to lie under an identity rotation: as apply() computes it.
+// Returns where a coordinate of the mesh comes to lie under an identity rotation: as apply() computes it.
 double posed(double x, double origin, double translation) {
   return x + (origin + translation);
 }

@@ -13,7 +13,7 @@ Vector position_of(const AssetView& asset, const Triangle::Corner& corner) {
   return position;
 }
 
-// Each vertex of the mesh once, seen from the centre.
+// Returns each vertex of the mesh once, seen from the centre.
 std::vector<Vector> vertices_of(const AssetView& asset, const Vector& centre) {
   const LevelView level = asset.level();
   std::vector<Vector> vertices;
@@ -42,7 +42,7 @@ class HeightField {
     }
   }
 
-  // Of the highest triangle above (x, y); -infinity where there is none.
+  // Returns the height of the highest triangle above (x, y); -infinity where there is none.
   double at(double x, double y) const {
     double highest = -HUGE_VAL;
     if (x < bounds_.lower[0] || x > bounds_.upper[0] || y < bounds_.lower[1] || y > bounds_.upper[1]) {
@@ -90,7 +90,7 @@ class HeightField {
         squares_[std::size_t{j} * side_ + i].push_back(triangle);
       }
     }
-    // Of a sheet a triangle covers a few squares, or few triangles cover many.
+    // A triangle of a sheet covers a few squares, or few triangles cover many.
     entries_ += std::uint64_t{index(x1, 0) - index(x0, 0) + 1} * (index(y1, 1) - index(y0, 1) + 1);
     if (entries_ > 30 * squares_.size())
       throw std::runtime_error("the ground is no sheet: it lies upon itself");
@@ -128,7 +128,7 @@ class Ground {
 
   double height(double x, double y) const { return field_.at(in_sheet(x, 0), in_sheet(y, 1)); }
 
-  // As HeightField::bound(), of a neighbourhood that may reach into other sheets.
+  // Returns the bound, as HeightField::bound() does, of a neighbourhood that may reach into other sheets.
   double bound(double x, double y, double radius) const {
     const double u = in_sheet(x, 0), v = in_sheet(y, 1);
     const Bounds& bounds = field_.bounds();
@@ -146,8 +146,8 @@ class Ground {
   double pitch_[2];
 };
 
-// How far the ground lies below a body, turned and with its centre at height 0, vertically: the height that
-// its centre must not sink below is minus that. radius: no vertex is further from the centre.
+// Returns how far the ground lies below a body, turned and with its centre at height 0, vertically: the
+// height that its centre must not sink below is minus that. radius: no vertex is further from the centre.
 double clearance(const std::vector<Vector>& vertices, const Rotation& rotation, const Ground& ground,
                  const Vector& at, double radius) {
   const double bound = ground.bound(at[0], at[1], radius);
@@ -201,7 +201,7 @@ double distance(const std::array<double, 2>& point, const Footprint& to) {
   return std::sqrt(x * x + y * y);
 }
 
-// Whether the segments cross, within both.
+// Returns whether the segments cross, within both.
 bool cross(const Footprint& a, const Footprint& b) {
   const auto side = [](const Footprint& of, const std::array<double, 2>& point) {
     const auto& [p, q] = of.ends;
@@ -210,7 +210,8 @@ bool cross(const Footprint& a, const Footprint& b) {
   return side(a, b.ends[0]) != side(a, b.ends[1]) && side(b, a.ends[0]) != side(b, a.ends[1]);
 }
 
-// How deep two footprints lie in each other, in their common radius; negative: how far apart.
+// Returns how deep two footprints lie in each other, in their common radius; negative: how far apart they
+// are.
 double depth(const Footprint& a, const Footprint& b) {
   if (cross(a, b)) return 2;
   const double apart = std::min(
@@ -230,7 +231,7 @@ Footprint footprint(const Bounds& body, const Rotation& stance, const Vector& ce
   return print;
 }
 
-// Where sheets and bodies lie before the tilt: each body near the middle of a square cell of its own.
+// The layout of sheets and bodies before the tilt: each body near the middle of a square cell of its own.
 class Layout {
  public:
   Layout(const Ground& ground, const Bounds& body, std::uint32_t count)

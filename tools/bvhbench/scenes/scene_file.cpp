@@ -73,7 +73,7 @@ SceneDescription read_file(const std::string& path) {
   return scene;
 }
 
-// What refers to something that the file has not got.
+// Refuses indices of something that the file has not got.
 void check_indices(const SceneDescription& scene, const std::string& path) {
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     if (scene.instances[i].asset < scene.assets.size()) continue;

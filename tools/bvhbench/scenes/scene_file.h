@@ -17,25 +17,25 @@ struct FileError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// What a file of poses tells of them beyond its scene (docs/poses.md).
+/// The notes about poses that a file has beside its scene (docs/poses.md).
 struct PoseNotes {
   std::vector<std::string> geometry;  ///< of each asset: geometry_hash() in hexadecimal
   std::vector<std::string> stream;    ///< the set, "training" or "validation", and the seed
   std::vector<double> depth;          ///< of each pose, see NearContactPose
 };
 
-/// What a scene file tells of the pairs that a query is to find. Arrays have an entry for each instance, or
+/// The filter of a scene file: which pairs a query is to find. Arrays have an entry for each instance, or
 /// none where the file has no such dataset.
 struct SceneFilter {
   std::vector<Motion> motion;
   std::vector<std::uint32_t> group, mask;
   std::vector<ObjectPair> excluded;
 
-  /// As queries take it. `table` is made to own the excluded pairs. Throws std::bad_alloc.
+  /// Returns the filter as queries take it. `table` is made to own the excluded pairs. Throws std::bad_alloc.
   PairFilter view(ExcludedPairTable& table) const;
 };
 
-/// What a scene file holds (docs/scenes.md).
+/// The contents of a scene file (docs/scenes.md).
 struct SceneDescription {
   std::vector<std::string> assets;  ///< .bvh paths, relative to the scene file
   std::vector<Instance> instances;
@@ -45,7 +45,7 @@ struct SceneDescription {
   SceneFilter filter;
 };
 
-/// What instances of a scene are posed copies of.
+/// A shape, of which instances of a scene are posed copies.
 struct SceneShape {
   std::uint32_t asset;
   std::uint32_t level = 0;  ///< of detail
@@ -62,14 +62,14 @@ struct LoadedScene {
   /// Adds an asset, and its finest level to the shapes.
   void add(MappedAsset asset);
 
-  /// Of a shape: its level, which is level 0 of the view, and no other.
+  /// Returns the view of a shape. Its level is level 0 of the view, which has no other.
   AssetView view(std::uint32_t shape) const;
   std::vector<AssetView> views() const;
 
   /// The assets of the shapes, with all levels.
   std::vector<AssetView> finest_views() const;
 
-  /// What the file calls the asset of a shape.
+  /// Returns the file's name of the asset of a shape.
   const std::string& name_of(std::uint64_t shape) const;
 };
 

@@ -4,8 +4,8 @@
 
 namespace tandem::bench {
 
-/// What /simulation of a scene file says of its instances (docs/scenes.md): numbers of each, three for a
-/// vector; empty where the file is silent.
+/// The contents of /simulation of a scene file (docs/scenes.md), which are about its instances: numbers of
+/// each, three for a vector; empty where the file is silent.
 struct SceneMotion {
   std::vector<double> density, velocity, angular_velocity, centre;
 };

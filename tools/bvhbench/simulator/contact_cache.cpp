@@ -46,7 +46,7 @@ CachedContact cached(const ContactPoint& contact, const PairPose& found_at,
           {}};
 }
 
-// Where the bodies have carried a contact since it was found.
+// Returns the contact where the bodies have carried it since it was found.
 ContactPoint moved_with_bodies(const CachedContact& entry, std::span<const BodyState> states) {
   const Vector3d normal = (states[entry.pair.a].orientation * entry.normal_in_a).normalized();
   ContactPoint moved = {entry.pair.a, entry.pair.b, {}, normal, 0, entry.feature};
@@ -54,7 +54,7 @@ ContactPoint moved_with_bodies(const CachedContact& entry, std::span<const BodyS
   return moved;
 }
 
-// Whether it is a gap that may close again.
+// Returns whether it is a gap that may close again.
 bool is_just_lost(const CachedContact& entry, const ContactPoint& moved, std::span<const BodyState> states,
                   double gap, double near) {
   constexpr std::uint32_t kLife = 8;  // steps; boxes side by side would keep all that ever touched

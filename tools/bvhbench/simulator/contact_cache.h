@@ -10,7 +10,7 @@
 
 namespace tandem::simulation {
 
-/// How the smaller of two bodies stands in the frame of the larger, about their centres of mass.
+/// The pose of the smaller of two bodies in the frame of the larger, about their centres of mass.
 struct PairPose {
   Eigen::Vector3d translation;
   Eigen::Quaterniond rotation;
@@ -56,13 +56,13 @@ class ContactCache {
               std::span<const BodyProperties> bodies, std::span<const BodyState> states,
               std::span<const std::uint8_t> idle, double gap);
 
-  /// Of the step that update() was last called for, by ascending pair.
+  /// Returns the contacts of the step that update() was last called for, by ascending pair.
   std::span<const ContactPoint> contacts() const { return contacts_; }
 
-  /// Whether no contact had been remembered before.
+  /// Returns whether no contact had been remembered before.
   bool is_cold() const { return is_cold_; }
 
-  /// What the contacts start with.
+  /// Returns the impulses that the contacts start with.
   std::vector<ContactImpulse> impulses() const;
 
   /// Takes what the contacts did. Condition: one for each.
@@ -72,7 +72,7 @@ class ContactCache {
   void restore(std::vector<CachedContact> entries) { entries_ = std::move(entries); }
 
  private:
-  // Of a pair that moved: makes its contacts of those found and those just lost.
+  // Makes the contacts of a pair that moved of those found and those just lost.
   void renew(std::span<const CachedContact> old, std::span<const ContactPoint> found, const PairPose& now,
              std::span<const BodyState> states, double gap, double radius);
   void add(const CachedContact& entry, const ContactPoint& contact);

@@ -20,7 +20,7 @@ struct ContactPoint {
                                  ///< matched by position
 };
 
-/// Where a contact's point lies in its bodies' frames about their centres of mass, which carry it along.
+/// The place of a contact's point in its bodies' frames about their centres of mass, which carry it along.
 struct ContactAnchor {
   Eigen::Vector3d in_a, in_b;
   double depth;  ///< when the contact was found
@@ -35,7 +35,7 @@ void carry(ContactPoint& contact, const ContactAnchor& anchor, std::span<const B
 /// A unit vector across the normal, the same for the same normal.
 Eigen::Vector3d across(const Eigen::Vector3d& normal);
 
-/// What a contact did in a step: an impulse on b, the opposite one on a.
+/// The impulse of a contact in a step: an impulse on b, the opposite one on a.
 struct ContactImpulse {
   double normal = 0;                                     ///< along the contact's normal, >= 0
   Eigen::Vector3d tangential = Eigen::Vector3d::Zero();  ///< across it, in the world
@@ -43,15 +43,15 @@ struct ContactImpulse {
                                                          ///< of a pair has an equal part
 };
 
-/// What became of a list of triangle pairs.
+/// Counts what became of a list of triangle pairs.
 struct ContactStatistics {
   ManifoldCounters counters;
   double area = 0;   ///< of all manifolds, seen along their normals
   double depth = 0;  ///< the largest
 };
 
-/// Makes contact points of pairs of triangles that meet, by the library's ManifoldQuery. The same bytes on
-/// every run, for any number of threads. Throws EngineError where it fails.
+/// Makes contact points of pairs of triangles that meet, by the library's ManifoldQuery. The bytes are the
+/// same on every run, for any number of threads. Throws EngineError where it fails.
 class ContactGenerator {
  public:
   /// Names the shapes that bodies refer to, the list given to the engine. What the views look at must outlive
@@ -63,7 +63,7 @@ class ContactGenerator {
   const std::vector<ContactPoint>& generate(const ContactList& found, std::span<const BodyPose> bodies,
                                             std::span<const ObjectPair> left_out, std::uint32_t threads = 1);
 
-  /// Of the last call.
+  /// Returns the statistics of the last call.
   const ContactStatistics& statistics() const { return statistics_; }
 
  private:
@@ -74,7 +74,7 @@ class ContactGenerator {
   ContactStatistics statistics_;
 };
 
-/// How contacts were found.
+/// Says how contacts were found.
 struct FinderReport {
   EngineTimes engine;
   double generation = 0;  ///< seconds for making points of triangle pairs
@@ -82,7 +82,7 @@ struct FinderReport {
   ContactStatistics contacts;
 };
 
-/// Where a simulator has its contacts from.
+/// A simulator has its contacts from one of these.
 class ContactFinder {
  public:
   virtual ~ContactFinder() = default;
@@ -94,7 +94,7 @@ class ContactFinder {
                                                 std::span<const std::uint8_t> idle,
                                                 std::span<const ObjectPair> unmoved) = 0;
 
-  /// Of the last call.
+  /// Returns the report of the last call.
   const FinderReport& report() const { return report_; }
 
  protected:

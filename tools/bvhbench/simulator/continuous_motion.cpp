@@ -15,7 +15,7 @@ using Eigen::Vector3d;
 // radius.
 constexpr double kBeyond = 0.25;
 
-// How often the depth of a pair that touches is measured on its way, at most: each time that its points may
+// The depth of a pair that touches is measured at most this often on its way: each time that its points may
 // have moved by kBeyond inner radii. It goes no farther.
 constexpr double kMostSamples = 256;
 
@@ -86,8 +86,8 @@ bool ContinuousMotion::find_fast(std::span<const BodyProperties> bodies, std::sp
   return any;
 }
 
-// Which part of their ways two bodies go until they are a slop deep in each other, or a little beyond where
-// they barely touch. reach: how much farther they may go, a length.
+// Returns which part of their ways two bodies go until they are a slop deep in each other, or a little beyond
+// where they barely touch. reach: how much farther they may go, a length.
 double ContinuousMotion::stop_of(const Impact& impact, const ObjectPair& pair, double reach,
                                  double slop) const {
   const Vector3d at_a(impact.point_a), at_b(impact.point_b);
@@ -103,8 +103,8 @@ double ContinuousMotion::stop_of(const Impact& impact, const ObjectPair& pair, d
   return std::min(1.0, impact.t_safe + beyond);
 }
 
-// How deep two bodies are in each other when they have gone this part of what they go; infinite where one
-// goes through the other.
+// Returns how deep two bodies are in each other when they have gone this part of their ways; infinite where
+// one goes through the other.
 double ContinuousMotion::depth_at(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
                                   const ObjectPair& pair, double part) {
   const ObjectPair pairs[] = {{0, 1}};
@@ -125,7 +125,7 @@ double ContinuousMotion::depth_at(std::span<const BodyProperties> bodies, std::s
   return depth;
 }
 
-// Which part of their ways two bodies go that touch already.
+// Returns which part of their ways two bodies go that touch already.
 double ContinuousMotion::stop_of_touching(std::span<const BodyProperties> bodies,
                                           std::span<const BodyState> before, const ObjectPair& pair,
                                           double reach, double slop) {

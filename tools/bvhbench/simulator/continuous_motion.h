@@ -17,8 +17,8 @@ namespace tandem::simulation {
 /// shape: half the least side of its bounds. Steps without a fast body cost next to nothing.
 class ContinuousMotion {
  public:
-  /// What the shapes and the filter look at must outlive it. The filter names the pairs that may meet; its
-  /// motions are not looked at. Throws EngineError where a shape cannot be taken.
+  /// The data that the shapes and the filter look at must outlive this. The filter names the pairs that may
+  /// meet; its motions are not looked at. Throws EngineError where a shape cannot be taken.
   ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads, const PairFilter& filter = {});
 
   /// Takes back what of the way from `before` to `after` leads through other bodies. Throws

@@ -14,12 +14,12 @@ namespace tandem::simulation {
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-/// One direction of a contact as two gradients: w = a . y_a + b . y_b + drive. An impulse of 1 adds a to y_a
+/// A direction of a contact as two gradients: w = a . y_a + b . y_b + drive. An impulse of 1 adds a to y_a
 /// and b to y_b.
 struct ContactRow {
   Vector6 a, b;
 
-  /// By how much an impulse of 1 changes w.
+  /// Returns by how much an impulse of 1 changes w.
   double mobility() const { return a.squaredNorm() + b.squaredNorm(); }
 };
 
@@ -38,7 +38,7 @@ struct TouchingPair {
   double mobility;                 ///< an impulse of 1 about any axis changes turn by no more
   Eigen::Vector3d impulse;         ///< against turning, as a whole step would need it
 
-  /// What the impulse adds to the y of its bodies.
+  /// Return what the impulse adds to the y of its bodies.
   Vector6 change_of_a(const Eigen::Vector3d& by) const {
     return by.x() * turn[0].a + by.y() * turn[1].a + by.z() * turn[2].a;
   }
@@ -70,16 +70,16 @@ struct IslandProblem {
   double along(const ContactRow& row, std::size_t contact, const std::vector<Vector6>& y) const {
     return row.a.dot(y[a[contact]]) + row.b.dot(y[b[contact]]);
   }
-  /// By how much b of a pair turns against a, but for what drives them.
+  /// Returns by how much b of a pair turns against a, but for what drives them.
   Eigen::Vector3d turning(const TouchingPair& pair, const std::vector<Vector6>& y) const {
     return {along(pair.turn[0], pair.begin, y), along(pair.turn[1], pair.begin, y),
             along(pair.turn[2], pair.begin, y)};
   }
-  /// One for both directions, or friction would not oppose the slip.
+  /// Returns one mobility for both directions, or friction would not oppose the slip.
   double friction_mobility(std::size_t contact) const {
     return std::max(first[contact].mobility(), second[contact].mobility());
   }
-  /// What a contact's impulse adds to the y of its bodies.
+  /// Return what a contact's impulse adds to the y of its bodies.
   Vector6 change_of_a(std::size_t contact, const Eigen::Vector3d& by) const {
     return by.x() * normal[contact].a + by.y() * first[contact].a + by.z() * second[contact].a;
   }

@@ -95,7 +95,7 @@ void Sleep::wake_touched(std::span<const BodyProperties> bodies, std::span<const
   for (const ContactPoint& contact : contacts) {
     const bool a = sleeps(contact.body_a), b = sleeps(contact.body_b);
     if (a == b) continue;
-    // What is fixed wakes nobody.
+    // A fixed body wakes nobody.
     const std::uint32_t other = a ? contact.body_b : contact.body_a;
     if (bodies[other].motion != Motion::fixed) touched.push_back(a ? contact.body_a : contact.body_b);
   }

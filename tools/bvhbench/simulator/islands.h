@@ -26,8 +26,8 @@ struct Islands {
 /// first body) come in ascending order. Contacts between bodies that nothing can move are in none.
 Islands find_islands(std::span<const BodyProperties> bodies, std::span<const ContactPoint> contacts);
 
-/// For each body the fewest contacts between it and one that nothing can move: 0 for such a body, and the
-/// largest number for a body that hangs on none.
+/// Returns for each body the fewest contacts between it and one that nothing can move: 0 for such a body, and
+/// the largest number for a body that hangs on none.
 std::vector<std::uint32_t> find_layers(std::span<const BodyProperties> bodies,
                                        std::span<const ContactPoint> contacts);
 
@@ -37,13 +37,13 @@ struct SleepOptions {
   double delay = 0.5;   ///< seconds that all of an island must have been quiet
 };
 
-/// Which bodies sleep. An island falls asleep as a whole, and wakes as a whole in the step after a body that
-/// is awake has touched it; until then it is like a fixed one.
+/// Decides which bodies sleep. An island falls asleep as a whole, and wakes as a whole in the step after a
+/// body that is awake has touched it; until then it is like a fixed one.
 class Sleep {
  public:
   static constexpr std::uint32_t kAwake = 0xFFFFFFFFu;
 
-  /// All bodies are awake.
+  /// Begins with all bodies awake.
   void start(std::size_t bodies);
 
   /// Bodies that are woken by contacts with bodies that are awake: to be called with the contacts of each
@@ -60,7 +60,7 @@ class Sleep {
   bool sleeps(std::uint32_t body) const { return group_[body] != kAwake; }
   std::size_t count() const;
 
-  /// For each body, to be kept and given back.
+  /// Returns how long each body has been quiet, to be kept and given back.
   std::span<const double> quiet() const { return quiet_; }
   std::span<const std::uint32_t> groups() const { return group_; }
   void restore(std::vector<double> quiet, std::vector<std::uint32_t> groups);

@@ -11,7 +11,7 @@
 namespace tandem::simulation {
 namespace {
 
-/// How the triangles of a level hang together, and what is amiss with it.
+/// The surface of a level: how its triangles hang together, and what is amiss with it.
 struct Surface {
   /// Two vertices that one triangle or more have in common, lower < upper.
   struct Edge {
@@ -60,7 +60,7 @@ void find_edges(Surface& surface) {
   }
 }
 
-// What is turned: whole components, or triangles beside the rest of their component.
+// Counts what is turned: whole components, or triangles beside the rest of their component.
 void count_turned(Surface& surface) {
   const LevelView& level = surface.level;
   UnionFind triangles(level.triangle_count);  // of each component
@@ -82,7 +82,7 @@ void count_turned(Surface& surface) {
   }
 }
 
-// How often each edge is run along upwards less downwards, as triangles are marked or as they are.
+// Returns how often each edge is run along upwards less downwards, as triangles are marked or as they are.
 std::vector<int> balance(const Surface& surface, bool as_marked) {
   std::vector<int> sum(surface.edge.size(), 0);
   for (std::uint32_t t = 0; t < surface.level.triangle_count; ++t) {
@@ -154,15 +154,16 @@ Matrix3d product(const Vector3d& x) {
   return x * x.transpose();
 }
 
-// Of the tetrahedron between the origin and a triangle: exact, since a polynomial of degree 2 over a simplex
-// is a mean over its corners and their sum (Eberly 2002, "Polyhedral mass properties", gives the same).
+// Returns the moments of the tetrahedron between the origin and a triangle. They are exact, since a
+// polynomial of degree 2 over a simplex is a mean over its corners and their sum (Eberly 2002, "Polyhedral
+// mass properties", gives the same).
 Moments solid_moments(const Vector3d& p, const Vector3d& q, const Vector3d& r) {
   const double volume = p.dot(q.cross(r)) / 6;
   const Vector3d sum = p + q + r;
   return {volume, volume / 4 * sum, volume / 20 * (product(p) + product(q) + product(r) + product(sum))};
 }
 
-// Of the triangle itself.
+// Returns the moments of the triangle itself.
 Moments shell_moments(const Vector3d& p, const Vector3d& q, const Vector3d& r) {
   const double area = (q - p).cross(r - p).norm() / 2;
   const Vector3d sum = p + q + r;

@@ -9,14 +9,14 @@
 
 namespace tandem::simulation {
 
-/// What a body of density 1 weighs and how that is spread, in the coordinates of the mesh file.
+/// The mass of a body of density 1, and how it is spread, in the coordinates of the mesh file.
 struct MassProperties {
   double volume;                        ///< mass per density
   Eigen::Vector3d center;               ///< of mass
   Eigen::Matrix3d inertia_per_density;  ///< about the centre of mass, along the file's axes
 };
 
-/// What the mass of a mesh is taken to be.
+/// Says what the mass of a mesh is taken to be.
 enum class MassModel : std::uint8_t {
   solid,  ///< what the surface encloses
   shell,  ///< the surface itself, as thick as kShellThickness: of meshes that enclose nothing

@@ -141,13 +141,13 @@ Vector shortened_change(const Vector& wanted, double bound, const Vector& change
   return (bound / size) * (change - along.dot(change) * along);
 }
 
-// What contacts do, and what resists turning of the pairs.
+// The impulses of contacts, and those that resist turning of the pairs.
 struct IslandImpulses {
   std::vector<Vector3d> contact;  // along normal, first and second
   std::vector<Vector3d> turning;  // of each pair, about the axes of the world
 };
 
-// What the least of the convex function depends on beside the rows.
+// The numbers that the least of the convex function depends on beside the rows.
 struct ConvexGoal {
   std::vector<Vector6> free;          // y*: velocities without contacts
   std::vector<double> target;         // of w along the normal
@@ -217,7 +217,7 @@ class ConvexContacts {
   }
 
  private:
-  // Which gradient is zero but for rounding: that of the impulses is about 1e-16 |w| / R.
+  // Returns which gradient is zero but for rounding: that of the impulses is about 1e-16 |w| / R.
   double flat_below(const ConvexGoal& goal, const std::vector<Vector6>& y) const {
     constexpr double kFlat = 3e-9;
     double squares = 0;
@@ -334,7 +334,7 @@ class ConvexContacts {
     return shortened(wanted_turning(goal, i, w), goal.turning_bound[i]);
   }
 
-  // As impulse_slope().
+  // Returns the slope of a turning impulse, as impulse_slope() does of an impulse.
   Vector3d turning_slope(const ConvexGoal& goal, std::size_t i, const Vector3d& w,
                          const Vector3d& change) const {
     return shortened_change<Vector3d>(wanted_turning(goal, i, w), goal.turning_bound[i],
@@ -447,7 +447,7 @@ class NewtonStep {
     return kOfGravity * input_.dt * input_.gravity.norm() + kOfApproach * approach;
   }
 
-  // By how much another pass would change velocities of contacts.
+  // Returns by how much another pass would change velocities of contacts.
   double next_change(const ConvexGoal& goal) const {
     double change = 0;
     for (std::size_t i = 0; i < problem_.contact_count(); ++i) {
@@ -462,7 +462,8 @@ class NewtonStep {
     return std::max(change, next_change_of_turning(goal));
   }
 
-  // The same of pairs that turn, as velocities at an arm about as long as that of a contact.
+  // Returns by how much another pass would change pairs that turn, as velocities at an arm about as long as
+  // that of a contact.
   double next_change_of_turning(const ConvexGoal& goal) const {
     double change = 0;
     for (std::size_t i = 0; i < problem_.pairs.size(); ++i) {

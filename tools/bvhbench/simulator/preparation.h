@@ -55,8 +55,8 @@ Preparation prepare_scene(const std::string& path, const bench::LoadedScene& sce
 /// Penetration that a solver leaves alone unless it is told otherwise: 1/4000 of the first mesh's diagonal.
 double default_slop(const AssetView& first);
 
-/// What decides a configuration's start: the hash of all instances, of the meshes, and of the scene's coarser
-/// levels.
+/// Returns what decides a configuration's start: the hash of all instances, of the meshes, and of the scene's
+/// coarser levels.
 std::uint64_t hash_of(std::span<const BodyProperties> bodies, std::span<const BodyState> states,
                       const bench::LoadedScene& scene);
 

@@ -8,7 +8,7 @@
 
 namespace tandem::simulation {
 
-/// What a body is, apart from where it is.
+/// The properties of a body, apart from where it is.
 struct BodyProperties {
   std::uint32_t shape = 0;                           ///< by place in the list given to the engine
   Motion motion = Motion::moving;                    ///< never sleeping; a kinematic one keeps its velocities
@@ -19,7 +19,7 @@ struct BodyProperties {
   Eigen::Matrix3d inverse_inertia = Eigen::Matrix3d::Identity();
 };
 
-/// Where a body is and how it moves, in the world.
+/// The state of a body: where it is and how it moves, in the world.
 struct BodyState {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< of the centre of mass
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
@@ -38,7 +38,7 @@ inline Eigen::Vector3d into_world(const BodyState& state, const Eigen::Vector3d&
 /// Properties of a dynamic body of a mesh with this mass. radius is left as it is.
 BodyProperties body_properties(std::uint32_t shape, const MassProperties& mesh, double density);
 
-/// Where the engine is to see the body: x_world = rotation * x_file + translation.
+/// Returns where the engine is to see the body: x_world = rotation * x_file + translation.
 BodyPose pose_of(const BodyProperties& body, const BodyState& state);
 
 /// The state in which pose_of() gives this pose, to rounding; at rest. Condition: the pose is rigid.
@@ -58,7 +58,7 @@ void advance(const BodyProperties& body, BodyState& state, const Eigen::Vector3d
 
 double kinetic_energy(const BodyProperties& body, const BodyState& state);
 
-/// About the world's origin. Of a body that contacts do not move: zero.
+/// Returns the angular momentum about the world's origin. It is zero for a body that contacts do not move.
 Eigen::Vector3d angular_momentum(const BodyProperties& body, const BodyState& state);
 
 }  // namespace tandem::simulation

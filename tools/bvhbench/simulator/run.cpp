@@ -74,7 +74,7 @@ class SignalNotes {
   std::array<struct sigaction, kSignals.size()> previous_{};
 };
 
-// One line on a terminal.
+// A line on a terminal.
 class ProgressLine {
  public:
   ProgressLine(std::string what, std::uint32_t steps) : what_(std::move(what)), steps_(steps) {}
@@ -107,7 +107,7 @@ class ProgressLine {
   Clock::time_point start_ = Clock::now(), shown_ = start_;
 };
 
-// When to write next: writing takes at most a twentieth of the time.
+// Decides when to write next: writing takes at most a twentieth of the time.
 class Checkpoints {
  public:
   explicit Checkpoints(double interval) : interval_(interval) {}

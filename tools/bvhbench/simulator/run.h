@@ -31,7 +31,8 @@ class Reentry {
   std::uint64_t seed_;
 };
 
-/// What a run writes while it is under way: OUTPUT.part, which becomes OUTPUT when all steps are made.
+/// Returns the file that a run writes while it is under way: OUTPUT.part, which becomes OUTPUT when all steps
+/// are made.
 std::string part_file(const std::string& output);
 
 struct RunOptions {

@@ -19,14 +19,14 @@ struct Trajectory {
   void keep(std::uint32_t step, std::span<const BodyState> states);
 };
 
-/// What a run has given so far; docs/simulation.md describes the file.
+/// The results of a run so far; docs/simulation.md describes the file.
 struct RunResults {
   std::vector<StepRecord> records;
   Trajectory trajectory;
   SimulatorState state;
 };
 
-/// What a run is, apart from its results.
+/// The description of a run, apart from its results.
 struct RunDescription {
   Json options;                           ///< name: value; what they say decides the results
   std::vector<std::string> assets;        ///< .bvh paths, relative to the run file
@@ -38,9 +38,8 @@ struct RunDescription {
 /// Makes the file at the path hold the run, or leaves it as it was. Throws bench::OutputError.
 void write_run(const std::string& path, const RunDescription& run, const RunResults& results);
 
-/// Of a run that is to go on.
-/// Throws bench::FileError: no such file, damaged, or of a run with other bodies or options; it names the
-/// option.
+/// Reads the results of a run that is to go on. Throws bench::FileError: no such file, damaged, or of a run
+/// with other bodies or options; it names the option.
 RunResults read_run(const std::string& path, const RunDescription& expected);
 
 /// A body's asset and pose in a kept state, as the engine saw them.

@@ -13,8 +13,8 @@
 
 namespace tandem::simulation {
 
-/// What a step found and did. The contacts are those of the state before the step; energies, momenta and
-/// speeds are those of the state after it, over all dynamic bodies.
+/// The record of what a step found and did. The contacts are those of the state before the step; energies,
+/// momenta and speeds are those of the state after it, over all dynamic bodies.
 struct StepRecord {
   double time = 0;  ///< at the end of the step
 
@@ -46,7 +46,7 @@ struct SimulatorOptions {
   std::uint32_t threads = 1;  ///< at most; oneTBB starts no more than its max_allowed_parallelism
 };
 
-/// All that the next steps depend on, beside bodies and options.
+/// The state has all that the next steps depend on, beside bodies and options.
 struct SimulatorState {
   std::uint64_t step = 0;
   std::vector<BodyState> states;
@@ -58,7 +58,7 @@ struct SimulatorState {
 /// Moves rigid bodies, step by step: contacts where the bodies stand, velocities with gravity, contacts
 /// solved for, positions by the new velocities (semi-implicit Euler). Bodies that have moved against each
 /// other by no more than the slop keep their contacts. With warm start, a step that has no impulse of the
-/// step before makes ten times the sweeps. The same bytes for any number of threads.
+/// step before makes ten times the sweeps. The bytes are the same for any number of threads.
 class Simulator {
  public:
   /// continuous: what keeps fast bodies from passing through others; null: nothing does. Condition: as many

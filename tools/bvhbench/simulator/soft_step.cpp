@@ -8,7 +8,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-// What a soft row asks for where bodies are too deep in each other.
+// The numbers of a soft row, where bodies are too deep in each other.
 struct Softness {
   double bias_rate, mass_scale, impulse_scale;
 };
@@ -113,7 +113,7 @@ class SoftStep {
   }
 
   void add(const ContactRow& row, std::size_t i, double impulse) {
-    // What is not moved has a gradient of zero, so that place 0 stays 0.
+    // A body that is not moved has a gradient of zero, so that place 0 stays 0.
     p_.velocity[p_.a[i]] += impulse * row.a;
     p_.velocity[p_.b[i]] += impulse * row.b;
   }

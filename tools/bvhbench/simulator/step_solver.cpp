@@ -18,9 +18,9 @@ void fly(const StepInput& input, std::uint32_t body, std::span<BodyState> states
   advance(input.bodies[body], states[body], Vector3d::Zero(), Vector3d::Zero(), input.dt);
 }
 
-// Whether factorising the island's matrix costs no more than what Newton's method has to do for each contact:
-// with bodies by layer the matrix is a band, and eliminating w bodies that hang together with as many of the
-// next layer takes about (6 w)^3 multiplications.
+// Returns whether factorising the island's matrix costs no more than what Newton's method has to do for each
+// contact: with bodies by layer the matrix is a band, and eliminating w bodies that hang together with as
+// many of the next layer takes about (6 w)^3 multiplications.
 bool is_slender(const Islands& islands, std::size_t island, std::span<const std::uint32_t> layers) {
   constexpr double kForAContact = 3000;
   std::vector<std::uint32_t> layer;

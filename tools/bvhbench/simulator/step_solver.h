@@ -9,7 +9,7 @@
 
 namespace tandem::simulation {
 
-/// How a step is solved.
+/// Says how a step is solved.
 enum class SolverKind : std::uint8_t {
   automatic,  ///< for each island Newton where that is the cheaper, else soft
   soft,       ///< substeps of one sweep over soft contacts and two that relax them
@@ -17,7 +17,7 @@ enum class SolverKind : std::uint8_t {
   sweeps,     ///< projected Gauss-Seidel
 };
 
-/// In which order sweeps visit contacts.
+/// Says in which order sweeps visit contacts.
 enum class ContactOrder : std::uint8_t {
   found,     ///< by ascending pair of bodies, sweeps forwards and backwards in turn
   shuffled,  ///< anew in each step, from the seed
@@ -35,7 +35,7 @@ struct SolverOptions {
                                      ///< to this times the force that pushes them apart; not of sweeps
   bool warm_start = true;
 
-  // Of sweeps alone.
+  // These are for sweeps alone.
   std::uint32_t iterations = 30;           ///< sweeps over the contacts for velocities, at most
   std::uint32_t position_iterations = 30;  ///< the same for the correction of penetration
   double correction = 0.2;  ///< part of the rest that one step takes away, 0 to 1; Newton's too
@@ -47,7 +47,7 @@ struct SolverOptions {
 /// The parts of a step where options say nothing: 1 for sweeps, 16 for the others.
 std::uint32_t default_substeps(SolverKind kind);
 
-/// What a solver makes a step of.
+/// The data of which a solver makes a step.
 struct StepInput {
   std::span<const BodyProperties> bodies;
   std::span<const ContactPoint> contacts;
@@ -58,8 +58,8 @@ struct StepInput {
   bool is_cold;          ///< there are no impulses of a step before
 };
 
-/// What a solution leaves undone: the natural map of the complementarity problem, row by row the velocity by
-/// which another visit would change a contact. Metres per second.
+/// Says what a solution leaves undone: the natural map of the complementarity problem, row by row the
+/// velocity by which another visit would change a contact. Metres per second.
 struct SolverStatistics {
   double residual = 0;      ///< the largest
   double residual_rms = 0;  ///< root of the mean square over all rows
@@ -68,7 +68,7 @@ struct SolverStatistics {
   std::uint64_t contacts = 0;        ///< of which at least one body is dynamic
 };
 
-/// What rows leave undone.
+/// Says what rows leave undone.
 struct Residual {
   double largest = 0, squares = 0;
 
@@ -78,7 +78,7 @@ struct Residual {
   }
 };
 
-/// Moves bodies through a step under gravity and contacts. The same bytes for any number of threads.
+/// Moves bodies through a step under gravity and contacts. The bytes are the same for any number of threads.
 class StepSolver {
  public:
   virtual ~StepSolver() = default;
@@ -88,7 +88,7 @@ class StepSolver {
   virtual void step(const StepInput& input, std::span<BodyState> states,
                     std::span<ContactImpulse> impulses) = 0;
 
-  /// Of the last step.
+  /// Returns the statistics of the last step.
   const SolverStatistics& statistics() const { return statistics_; }
 
  protected:

@@ -25,7 +25,7 @@ struct Mover : Velocities {
   Matrix3d inverse_inertia;  // in the world
 };
 
-// One direction of a contact: w = direction . (v_b - v_a) + arm_b . spin_b - arm_a . spin_a.
+// A direction of a contact: w = direction . (v_b - v_a) + arm_b . spin_b - arm_a . spin_a.
 struct Row {
   Vector3d direction, arm_a, arm_b;
   Vector3d turn_a, turn_b;        // what an impulse of 1 adds to the spins, less the sign of a
@@ -42,7 +42,7 @@ struct Joint {
   double push_impulse;  // that of the correction
 };
 
-// Which bodies of a contact an impulse moves: shock propagation holds the lower one.
+// Says which bodies of a contact an impulse moves: shock propagation holds the lower one.
 struct Held {
   double a = 1, b = 1;
 };
@@ -68,7 +68,7 @@ double mobility(const Row& row, const Held& held) {
   return held.a * row.mobility_a + held.b * row.mobility_b;
 }
 
-// What w is to be, as far as the bounds of the impulse let it.
+// The w that a row is to have, as far as the bounds of the impulse let it.
 struct Law {
   double target, lower, upper;
 
@@ -173,7 +173,7 @@ void warm_start(Joint& joint, const ContactImpulse& impulse, double friction, st
   }
 }
 
-// What a visit would change, in metres per second.
+// Returns what a visit would change, in metres per second.
 double residual_of(const Row& row, const Law& law, const Mover& a, const Mover& b) {
   const double moves = mobility(row, {});
   return std::fabs(law.impulse(row, moves, a, b) - row.impulse) * moves;
@@ -315,9 +315,9 @@ class FollowedContacts {
 // Penetration beyond the slop is taken away by a second set of velocities, which push along normals alone,
 // move the bodies once, and never become kinetic energy (split impulses).
 //
-// An island is done before all sweeps are made when one changes no velocity by more than 10⁻⁹ of what
-// gravity gives in a step. Islands are solved side by side by the threads of the caller's oneTBB arena. The
-// same bytes for any number of them.
+// An island is done before all sweeps are made when one changes no velocity by more than 10⁻⁹ of what gravity
+// gives in a step. Islands are solved side by side by the threads of the caller's oneTBB arena. The bytes are
+// the same for any number of them.
 //
 // There are as many solutions as substeps. With warm start, a step that has no impulse of the step before
 // makes ten times the sweeps.

@@ -26,7 +26,7 @@ std::string_view first_line(std::string_view head) {
   return head.substr(0, head.find_first_of("\r\n"));
 }
 
-/// Of a file whose ending says nothing.
+/// Returns the reader of a file whose ending says nothing, or null.
 ReadBytes reader_by_content(std::string_view head) {
   const std::string_view line = first_line(head);
   if (line == "ply") return read_ply;
@@ -43,7 +43,7 @@ ReadBytes own_reader(const std::string& extension, std::string_view head) {
   return reader_by_content(head);
 }
 
-/// Why a file that is something else than a mesh is refused; empty when it may be one.
+/// Returns why a file that is something else than a mesh is refused; empty when it may be one.
 std::string refusal(const std::string& extension, std::string_view head) {
   if (head.starts_with("\x89"
                        "BVH"))

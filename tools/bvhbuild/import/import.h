@@ -11,8 +11,8 @@ namespace tandem::build {
 
 enum class Reader { automatic, tandem, assimp };
 
-/// How much memory a file may take to read, how much larger than its file a scene may be, and which other
-/// files it may name.
+/// Says how much memory a file may take to read, how much larger than its file a scene may be, and which
+/// other files it may name.
 struct ReadLimits {
   /// The most address space that the child process which runs assimp may take; the largest file for our own
   /// readers, and the most that the buffers of a glTF file and its triangles may take.
@@ -31,7 +31,7 @@ struct ImportOptions {
   ReadLimits limits;
 };
 
-/// What reading a mesh gives: the polygons, or the reason why there are none.
+/// The result of reading a mesh: the polygons, or the reason why there are none.
 struct ReadResult {
   bool ok = false;
   PolygonMesh mesh;

@@ -69,8 +69,8 @@ class MeshAssembly {
   void leave_out_strip_turn() { mesh_.left_out.strip_turns = true; }
 
   void remark(std::string text) { mesh_.remarks.push_back(std::move(text)); }
-  /// Whether one more remark about a vertex index is welcome: the first few show what is wrong, a million
-  /// would not.
+  /// Returns whether one more remark about a vertex index is welcome: the first few show what is wrong, a
+  /// million would not.
   bool wants_index_remark() const { return index_remarks_ < kMostIndexRemarks; }
   void remark_index(std::string_view place, std::int64_t index, std::size_t vertices);
   void remark_index(std::string text);

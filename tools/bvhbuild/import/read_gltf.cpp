@@ -27,7 +27,7 @@ std::string name_or_number(const std::string& name, const char* list, std::size_
   return name.empty() ? numbered(list, index) : name.substr(0, kLongEnough);
 }
 
-/// Where a node stands. Below a long path, nodes share it.
+/// The place of a node. Below a long path, nodes share it.
 struct Place {
   Affine world = kIdentity;
   std::shared_ptr<const std::string> path = std::make_shared<std::string>();
@@ -78,7 +78,7 @@ void walk(const GltfModel& model, const Visit& visit) {
   }
 }
 
-/// What a mesh adds to the result each time that a node shows it.
+/// The counts that a mesh adds to the result each time that a node shows it.
 struct Size {
   std::uint64_t points = 0;
   std::uint64_t triangles = 0;   ///< at most
@@ -184,7 +184,7 @@ class SceneReader {
     const std::uint64_t count = model_.accessors[primitive.positions].count;
     const std::uint64_t vertices =
         primitive.indices == -1 ? count : model_.accessors[primitive.indices].count;
-    // Each alone is bounded here, so that no sum of theirs overflows before check_total() sees it.
+    // Each count alone is bounded here, so that no sum of theirs overflows before check_total() sees it.
     if (count > kMostCorners || vertices > kMostCorners)
       throw GltfError("it has more than 4294967294 vertices");
     if (points.emplace(primitive.positions, count).second) size.points += count;

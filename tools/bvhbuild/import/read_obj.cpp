@@ -28,7 +28,7 @@ class ObjReader {
     const char* place;
     std::int64_t written;  // as the file writes it: from 1, or negative to count back
 
-    // What may still come is the less likely to come, the larger it is; the others never come.
+    // An index that may still come is the less likely to come, the larger it is; the others never come.
     std::int64_t doubt() const { return written > 0 ? written : INT64_MAX; }
   };
 

@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kNumberBytes = 4;  // of a binary file: 32-bit integers and floats, big endian
 
-// What the letters before "OFF" say of a vertex.
+// The letters before "OFF" say this of a vertex.
 struct OffKind {
   bool colour = false, normal = false, texture = false;
 

@@ -38,7 +38,7 @@ struct PlyElement {
   std::vector<PlyProperty> properties;
 };
 
-/// What a PLY file says of itself before its data. The names look into the file's bytes.
+/// The header of a PLY file. The names look into the file's bytes.
 struct PlyHeader {
   PlyFormat format = PlyFormat::ascii;
   std::vector<PlyElement> elements;
@@ -201,8 +201,8 @@ std::string read_ply_header(std::string_view bytes, PlyHeader& header) {
   return HeaderReader(bytes, header).read();
 }
 
-/// How reading the values of a PLY file stands. Once it is not `good` it stays so, and all further values are
-/// zero.
+/// The state of reading the values of a PLY file. Once it is not `good` it stays so, and all further values
+/// are zero.
 enum class PlyState { good, ended, bad };
 
 /// An index that is no integer, or too large for one: it names no vertex.
@@ -290,7 +290,7 @@ class PlyBinaryValues {
   PlyState state_ = PlyState::good;
 };
 
-/// The same for a PLY file in text, where every record of an element has a line of its own.
+/// Reads the values of a PLY file in text, where every record of an element has a line of its own.
 class PlyTextValues {
  public:
   PlyTextValues(std::string_view bytes, std::size_t data_begin) : text_(bytes) {
@@ -359,7 +359,7 @@ class PlyTextValues {
   std::string reason_;
 };
 
-// What a property is to a mesh.
+// Says what a property is to a mesh.
 enum class Role { none, x, y, z, corners };
 
 enum class ElementKind { vertex, face, strips, other };

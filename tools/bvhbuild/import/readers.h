@@ -4,7 +4,7 @@
 
 #include "import.h"
 
-/// A reader for each format, in a file of its own. Those of text and binary formats take a file that is
+/// A reader for each format, in a file of its own. Readers of text and binary formats take a file that is
 /// already in memory.
 namespace tandem::build {
 

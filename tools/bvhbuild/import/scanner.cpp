@@ -23,8 +23,8 @@ bool starts_with_ignoring_case(const char* first, const char* last, std::string_
                     [](char a, char b) { return a == lower(b); });
 }
 
-// What the C library of Visual C++ before 2015 printed: "1.#INF", "1.#IND", "1.#QNAN", "1.#SNAN", padded with
-// digits to the asked precision ("1.#IND00").
+// Reads what the C library of Visual C++ before 2015 printed: "1.#INF", "1.#IND", "1.#QNAN", "1.#SNAN",
+// padded with digits to the asked precision ("1.#IND00").
 const char* parse_windows_special(const char* first, const char* last, double& value) {
   if (!starts_with_ignoring_case(first, last, "1.#")) return nullptr;
   first += 3;

@@ -97,7 +97,7 @@ class TextScanner {
   /// Reads the number at the cursor; false, with the cursor unmoved, where none stands there or it has a tail
   /// ("3x").
   bool read_real(double& value) { return advance(parse_real(cursor_, end_, value)); }
-  /// The same for an integer; `end_mark` may follow it directly, as '/' follows the first index of "7/8/9".
+  /// Reads an integer; `end_mark` may follow it directly, as '/' follows the first index of "7/8/9".
   bool read_integer(std::int64_t& value, char end_mark = '#') {
     return advance(parse_integer(cursor_, end_, value), end_mark);
   }
@@ -125,7 +125,7 @@ class TextScanner {
 /// `text` without blanks at its ends.
 std::string_view trimmed(std::string_view text);
 
-/// Whether `word` is `lower_case` in any mixture of upper and lower case.
+/// Returns whether `word` is `lower_case` in any mixture of upper and lower case.
 bool equals_ignoring_case(std::string_view word, std::string_view lower_case);
 
 }  // namespace tandem::build

@@ -62,8 +62,8 @@ class Frame {
   int exponent_ = 0;
 };
 
-// Where an edge shrinks to: the point with the least sum of squared distances from the planes of the
-// triangles that it stands for, and a fixed end where there is one.
+// The place to which an edge shrinks: the point with the least sum of squared distances from the planes of
+// the triangles that it stands for, and a fixed end where there is one.
 struct Placement {
   const Quadrics* quadrics;
   const std::vector<bool>* fixed;
@@ -105,10 +105,10 @@ class Guard {
     }
   }
 
-  // Where a vertex is now.
+  // Returns where a vertex is now.
   const std::array<float, 3>& position(std::uint32_t vertex) const { return positions_[vertex]; }
 
-  // Whether the collapse leaves everything near. If so, keep() may follow.
+  // Returns whether the collapse leaves everything near. If so, keep() may follow.
   bool allows(const Mesh& mesh, std::uint32_t v0, std::uint32_t v1, const std::array<float, 3>& point) {
     point_ = point;
     collect_star(mesh, v0, v1);
@@ -185,7 +185,7 @@ class Guard {
     }
   }
 
-  // Whether points of a triangle around the moved vertex are near the finest level.
+  // Returns whether points of a triangle around the moved vertex are near the finest level.
   bool lies_near(const Triangle& triangle) const {
     const levels::Point a = levels::corner_of(triangle, 0), b = levels::corner_of(triangle, 1),
                         c = levels::corner_of(triangle, 2);
@@ -198,7 +198,8 @@ class Guard {
                        [&](const auto& place) { return is_near(mix(place[0], place[1]), hint); });
   }
 
-  // Whether a point is near the finest level. `hint`: a triangle that may be, and after that one that is.
+  // Returns whether a point is near the finest level. `hint`: a triangle that may be, and after that one that
+  // is.
   bool is_near(const levels::Point& point, std::uint32_t& hint) const {
     if (levels::square_distance(point, finest_.triangles[hint]) <= square_) return true;
     const levels::NearestTriangle nearest = levels::nearest_triangle(finest_, point, hint);
@@ -232,7 +233,7 @@ class Guard {
   std::vector<std::uint32_t> near_;  // of each vertex: a triangle of the finest level
   std::vector<levels::Point> samples_;
   std::vector<std::uint32_t> next_, first_;  // samples of a triangle: a list
-  // Of the collapse that is being looked at:
+  // These are of the collapse that is being looked at:
   std::array<float, 3> point_ = {};
   std::uint32_t near_of_moved_ = 0;
   std::vector<std::uint32_t> star_;
@@ -332,8 +333,8 @@ bool is_segment(const TriangleTopology& triangle) {
   return v[0] == v[1] || v[1] == v[2] || v[2] == v[0];
 }
 
-// Whether the corners go round as 0, 1, 2 do, once a turned triangle is turned, 1 or -1: the same number for
-// triangles with the same corners means the same winding.
+// Returns whether the corners go round as 0, 1, 2 do, once a turned triangle is turned, 1 or -1: the same
+// number for triangles with the same corners means the same winding.
 std::int32_t winding(const TriangleTopology& triangle) {
   const std::uint32_t(&v)[3] = triangle.vertex;
   const bool ascends = (v[0] < v[1]) + (v[1] < v[2]) + (v[2] < v[0]) == 2;

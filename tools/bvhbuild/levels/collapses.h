@@ -27,7 +27,8 @@ struct OpenedMesh {
   std::vector<bool> fixed;                              ///< of each point
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< wound as level 0's topology says
   std::vector<std::uint32_t> was;                       ///< of each triangle, in leaf order of level 0
-  /// How often each triangle is there, those the other way round counted as less than none; empty: each once.
+  /// The number of times that each triangle is there, those the other way round counted as less than none;
+  /// empty: each once.
   std::vector<std::int32_t> copies;
   std::uint64_t fixed_vertices = 0;  ///< positions that points along the cuts have
 };

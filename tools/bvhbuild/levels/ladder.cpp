@@ -66,8 +66,8 @@ class LaidLevel {
   std::uint32_t vertex_count_ = 0;
 };
 
-// What part of the wanted error the simplifier may use, at first and where it turns out to be too much: the
-// surface is farther off between the points that it looks at than in them.
+// The simplifier may use these parts of the wanted error, at first and where that turns out to be too much:
+// the surface is farther off between the points that it looks at than in them.
 constexpr double kFirstShare = 0.85, kNextShare = 0.97, kUsedUp = 0.88;
 constexpr int kTries = 3;
 // Counts of triangles this close are the same to a search.

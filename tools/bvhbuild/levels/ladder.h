@@ -9,8 +9,8 @@
 
 namespace tandem::build {
 
-/// How far a level may be from the finest: a length in the unit of the file, or a share of the diagonal of
-/// the finest's bounds.
+/// Says how far a level may be from the finest: a length in the unit of the file, or a share of the diagonal
+/// of the finest's bounds.
 struct LevelError {
   double value = 0;
   bool of_diagonal = false;  ///< `value` is a share, not a length
@@ -24,7 +24,7 @@ struct LevelError {
 /// them; those of one kind ascend.
 std::string parse_level_errors(const std::string& text, std::vector<LevelError>& errors);
 
-/// As parse_level_errors() reads it: "0.3%", "2".
+/// Returns the error as parse_level_errors() reads it: "0.3%", "2".
 std::string name(const LevelError& error);
 
 /// A level beyond the finest, without the tree that it will get.
@@ -42,7 +42,7 @@ struct FinestLevel {
   const SurfaceTopology& topology;
 };
 
-/// Why there is no level for an error.
+/// Says why there is no level for an error.
 enum class NoLevel : std::uint8_t {
   no_coarser,   ///< it would have as many triangles as the one before, or more
   spared,       ///< a later level is coarser and nearer to the finest

@@ -23,8 +23,8 @@ struct Range {
     }
   }
 
-  // Whether a node's box may have a point of it. What is computed of the gap is off by less than 2^-51 of the
-  // magnitudes.
+  // Returns whether a node's box may have a point of it. What is computed of the gap is off by less than
+  // 2^-51 of the magnitudes.
   bool may_meet(const Block& block, int node) const {
     for (int k = 0; k < 3; ++k) {
       const double center = block.center[k][node], half_extent = block.half_extent[k][node];
@@ -46,7 +46,8 @@ bool meet_apart_from_corners(const Triangle& a, const Triangle& b) {
   return !detail::share_corner(pair) && decide(pair).verdict == Verdict::contact;
 }
 
-// How many triangles after this one, in leaf order, it meets; may stop where that is more than `most`.
+// Returns how many triangles after this one, in leaf order, it meets; may stop where that is more than
+// `most`.
 std::uint64_t count_later(const LevelView& level, std::uint32_t triangle, std::uint64_t most) {
   const Triangle& own = level.triangles[triangle];
   const Range range(own);

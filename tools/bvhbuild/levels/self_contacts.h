@@ -9,9 +9,9 @@ namespace tandem::build {
 /// Self-contacts are counted up to here.
 inline constexpr std::uint64_t kMostSelfContacts = 1'000'000;
 
-/// How many pairs of triangles of a level meet without having a corner's position in common: the surface goes
-/// through or touches itself there. As exact arithmetic on the stored coordinates finds it. None where there
-/// are more than `most`. Keeps no pair in memory.
+/// Returns how many pairs of triangles of a level meet without having a corner's position in common: the
+/// surface goes through or touches itself there. As exact arithmetic on the stored coordinates finds it. None
+/// where there are more than `most`. Keeps no pair in memory.
 std::optional<std::uint64_t> count_self_contacts(const LevelView& level,
                                                  std::uint64_t most = kMostSelfContacts);
 

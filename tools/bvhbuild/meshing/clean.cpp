@@ -30,7 +30,7 @@ void for_each_prefetched(std::size_t count, const IndexTable& table, const Hash&
   }
 }
 
-/// The same place with one spelling of zero, so that equal places are equal bit by bit.
+/// Returns the same place with one spelling of zero, so that equal places are equal bit by bit.
 Point normalised(const Point& p) {
   return {p[0] + 0.0, p[1] + 0.0, p[2] + 0.0};
 }
@@ -40,7 +40,7 @@ std::uint64_t hash_place(const Point& p) {
                     std::bit_cast<std::uint64_t>(p[2]));
 }
 
-/// For each point: 0 when a triangle uses it, else kNoVertex.
+/// Returns for each point 0 when a triangle uses it, else kNoVertex.
 std::vector<std::uint32_t> mark_used(const TriangleMesh& mesh) {
   std::vector<std::uint32_t> mark(mesh.points.size(), kNoVertex);
   for (const TriangleIndices& triangle : mesh.triangles)

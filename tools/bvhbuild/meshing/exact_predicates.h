@@ -35,7 +35,7 @@ inline int orientation(const Point2& a, const Point2& b, const Point2& c) {
   return detail::ExactSigns::area(p.data(), q.data(), r.data(), 2);
 }
 
-/// Whether a, b and c lie exactly on one line (or on one point). Exact for all finite coordinates.
+/// Returns whether a, b and c lie exactly on one line (or on one point). Exact for all finite coordinates.
 inline bool collinear(const Point& a, const Point& b, const Point& c) {
   // One projection with an area settles it; nearly every triangle leaves here.
   for (int u = 0, v = 1; u < 3; ++u, v = (v + 1) % 3)

@@ -14,13 +14,13 @@ namespace tandem::build {
 /// be represented (negative, 0 in an OBJ file, beyond 2^32 - 2).
 inline constexpr std::uint32_t kNoVertex = 0xFFFFFFFFu;
 
-/// What a file holds instead of faces. Readers leave it out.
+/// Counts what a file holds instead of faces. Readers leave it out.
 struct LeftOut {
   bool points = false, lines = false;
   bool strip_turns = false;  ///< triangles of a strip that name a vertex twice: they only lead it elsewhere
 };
 
-/// What a reader hands over: the polygons of a file, in the file's order, with the file's float64
+/// The mesh that a reader hands over: the polygons of a file, in the file's order, with the file's float64
 /// coordinates. Nothing in it is checked but its shape: indices may be out of range, coordinates not finite,
 /// polygons degenerate. Points and lines of formats that tell them from faces are left out. Whatever the file
 /// calls a face counts, also one of fewer than three corners: face f is the f-th that the modeller wrote.
@@ -49,16 +49,16 @@ struct TriangleMesh {
   std::vector<std::uint32_t> face;  ///< of each triangle: the face of the file that it is a piece of
 };
 
-/// Whether a face can be split into triangles: its indices are in range, it has three corners or more, and
-/// their coordinates are finite and at most kMaxCoordinate in magnitude. Else it is counted, under the first
-/// of these that fails.
+/// Returns whether a face can be split into triangles: its indices are in range, it has three corners or
+/// more, and their coordinates are finite and at most kMaxCoordinate in magnitude. Else it is counted, under
+/// the first of these that fails.
 bool is_usable(std::span<const Point> points, std::span<const std::uint32_t> corners, CleanReport& report);
 
-/// Of so many points: those that none of the corners names.
+/// Counts those of so many points that none of the corners names.
 std::uint64_t count_unreferenced(std::size_t points, std::span<const std::uint32_t> corners);
 
-/// What triangulate() makes of a mesh whose faces are triangles: those that are usable, in their order, the
-/// others counted. face: of each triangle; empty: triangle i is face i.
+/// Returns what triangulate() makes of a mesh whose faces are triangles: those that are usable, in their
+/// order, the others counted. face: of each triangle; empty: triangle i is face i.
 TriangleMesh take_triangles(std::span<const Point> points, std::span<const TriangleIndices> triangles,
                             std::span<const std::uint32_t> face, CleanReport& report);
 

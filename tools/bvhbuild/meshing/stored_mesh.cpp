@@ -40,8 +40,8 @@ Box bounding_box(const TriangleMesh& mesh) {
   return box;
 }
 
-/// Where to move the origin along one axis. H = `longest`, the half extent of the longest axis; c = the
-/// centre.
+/// Returns where to move the origin along one axis. H = `longest`, the half extent of the longest axis; c =
+/// the centre.
 ///
 /// |c| <= H: coordinates are at most 2H in magnitude and would still be about H after a move; one bit at
 /// best, so stay.

@@ -81,7 +81,7 @@ class PolygonCdt {
   }
 
  private:
-  /// What coincides in the projection is one thing if the coordinate that was left out differs by rounding
+  /// Corners that coincide in the projection are one if the coordinate that was left out differs by rounding
   /// only, else two that must not be mixed up: a millionth of the polygon's extent tells them apart.
   void begin(std::span<const Point> polygon, int projection_axis) {
     cdt_.clear();
@@ -172,8 +172,8 @@ class PolygonCdt {
     return pay_for(from, to);
   }
 
-  /// Of a simple polygon, all edges together look at about 6 edges a corner. An outline that runs along
-  /// itself again and again would take quadratic time; false when it has used up its share.
+  /// All edges of a simple polygon look together at about 6 edges a corner. An outline that runs along itself
+  /// again and again would take quadratic time; false when it has used up its share.
   bool pay_for(Cdt::Vertex_handle from, Cdt::Vertex_handle to) {
     while (from != to) {
       const std::uint64_t looks = cdt_.degree(from);
@@ -213,7 +213,7 @@ class PolygonCdt {
 
   std::size_t after(std::size_t corner) const { return corner + 1 < vertices_.size() ? corner + 1 : 0; }
 
-  /// Of a vertex on the edge in the projection.
+  /// Returns whether a vertex lies on the edge. Condition: it does in the projection.
   bool lies_on(const VertexInfo& vertex, const VertexInfo& from, const VertexInfo& to) const {
     const Point& p = corners_[vertex.corner];
     const Point& a = corners_[from.corner];
@@ -270,9 +270,9 @@ class PolygonCdt {
     } while (begin != first);
   }
 
-  /// Of the angle at `vertex` between two edges of the outline, each given with the face inside the angle.
-  /// The outline leaves the corner along one and reaches it along the other; one that passes without a corner
-  /// here, or an edge walked so more than once, does not tell.
+  /// Returns the corner of the angle at `vertex` between two edges of the outline, each given with the face
+  /// inside the angle. The outline leaves the corner along one and reaches it along the other; one that
+  /// passes without a corner here, or an edge walked so more than once, does not tell.
   std::uint32_t corner_between(Cdt::Vertex_handle vertex, const Cdt::Edge& right,
                                const Cdt::Edge& left) const {
     const bool counter_clockwise = right.first->info().winding > 0;
@@ -355,16 +355,16 @@ double squared_distance(const Point& a, const Point& b) {
   return x * x + y * y + z * z;
 }
 
-/// How well two triangles fit side by side: 2 both face the same way, 1 one of them is flat, 0 they overlap
-/// or are flat.
+/// Returns how well two triangles fit side by side: 2 both face the same way, 1 one of them is flat, 0 they
+/// overlap or are flat.
 int fit(int first, int second) {
   if (first == 0 && second == 0) return 0;
   return first * second + 1;
 }
 
-/// Whether to cut a quad from corner 0 to 2 (true) or from 1 to 3 (false); nothing when both diagonals leave
-/// it. Of a simple quad at least one diagonal lies inside, and the pieces on its two sides then have the same
-/// orientation.
+/// Returns whether to cut a quad from corner 0 to 2 (true) or from 1 to 3 (false); nothing when both
+/// diagonals leave it. In a simple quad at least one diagonal lies inside, and the pieces on its two sides
+/// then have the same orientation.
 std::optional<bool> inner_diagonal(std::span<const Point> p, int axis) {
   std::array<Point2, 4> q;
   for (int i = 0; i < 4; ++i) q[i] = {p[i][(axis + 1) % 3], p[i][(axis + 2) % 3]};

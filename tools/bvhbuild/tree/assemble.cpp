@@ -95,7 +95,8 @@ Plan plan_sections(const PartTable& table, const AssetSource& source, std::span<
   Plan plan(2 * levels.size() + optional + 4);
   plan.add(SectionKind::levels, 0, levels.size(), sizeof(Level));
   for (std::uint32_t i = 0; i < levels.size(); ++i) {
-    // What exact queries on a GPU need lies together, for one copy, and behind it what manifolds need too.
+    // The sections that exact queries on a GPU need lie together, for one copy, and behind it what manifolds
+    // need too.
     plan.add(SectionKind::blocks, i, levels[i].tree->blocks.size(), sizeof(Block));
     plan.add(SectionKind::triangles, i, levels[i].geometry.triangles.size(), sizeof(Triangle));
     if (!levels[i].oriented_blocks.empty())

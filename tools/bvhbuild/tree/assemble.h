@@ -15,7 +15,7 @@
 
 namespace tandem::build {
 
-/// One level of detail to be written: the triangles with the source face of each, and the tree over them.
+/// A level of detail to be written: the triangles with the source face of each, and the tree over them.
 struct AssetLevel {
   Geometry geometry;
   std::span<const std::uint32_t> face;

@@ -21,11 +21,11 @@ struct alignas(16) Bounds {
     }
   }
 
-  /// What a block over these bounds costs in tandem queries: its surface to the power 3/4. Visits grow more
-  /// slowly than surfaces, since a block meets others of its own size; of the powers tried this one led to
-  /// the fewest block pairs (docs/decisions/0034). A trace of the edge lengths and a constant are added to
-  /// the surface, so that flat, thin and point-like sets are still told apart and no cost is zero. Made of
-  /// square roots, which every machine rounds alike. Condition: coordinates are scaled to about 1
+  /// Returns what a block over these bounds costs in tandem queries: its surface to the power 3/4. Visits
+  /// grow more slowly than surfaces, since a block meets others of its own size; of the powers tried this one
+  /// led to the fewest block pairs (docs/decisions/0034). A trace of the edge lengths and a constant are
+  /// added to the surface, so that flat, thin and point-like sets are still told apart and no cost is zero.
+  /// Made of square roots, which every machine rounds alike. Condition: coordinates are scaled to about 1
   /// (normalized_bounds()).
   float visit_cost() const {
     const float x = hi[0] - lo[0], y = hi[1] - lo[1], z = hi[2] - lo[2];

@@ -35,8 +35,8 @@ class LegalSplits {
         leaf_blocks_(leaf_blocks_for(n)),
         internal_blocks_(internal_blocks_for(leaf_blocks_, slots)) {}
 
-  /// How many slots the first `left` triangles should take, 0 if the split is not legal. Where several
-  /// numbers are legal: the one that shares slots most nearly as leaf blocks are shared.
+  /// Returns how many slots the first `left` triangles should take, 0 if the split is not legal. Where
+  /// several numbers are legal: the one that shares slots most nearly as leaf blocks are shared.
   constexpr std::uint32_t left_slots(std::uint32_t left) const {
     const std::uint32_t l = leaf_blocks_for(left), r = leaf_blocks_for(n_ - left);
     if (l + r != leaf_blocks_) return 0;

@@ -50,7 +50,7 @@ class Annealing {
         region_(region),
         random_(region.blocks.size() + region.children.size()) {}
 
-  // One random exchange, made unless it costs more than about `temperature`.
+  // Makes one random exchange unless it costs more than about `temperature`.
   void trial(double temperature) {
     const Child child = region_.children[random_.below(static_cast<std::uint32_t>(region_.children.size()))];
     Exchange exchange{child, {}, tree_.parent_of(child), 0};
@@ -60,8 +60,8 @@ class Annealing {
   }
 
  private:
-  // Some blocks up from the child's parent, then down again to a block of its kind, which is often where the
-  // child fits well.
+  // Chooses by going some blocks up from the child's parent, then down again to a block of its kind, which is
+  // often where the child fits well.
   bool choose_partner(Exchange& exchange) {
     std::uint32_t block = exchange.first_parent;
     for (int up = 0; up < kMostUp && block != region_.root && (up == 0 || random_.below(4) != 0); ++up) {
@@ -146,8 +146,8 @@ class Optimiser {
   Optimiser(const Topology& topology, std::span<const Bounds> bounds, OptimisationWatch& watch)
       : tree_(topology, bounds), search_(tree_), watch_(watch) {}
 
-  // One pass over each region, then over the blocks above them. is_all: nothing comes after it; else it is
-  // too short for a share of its own.
+  // Makes one pass over each region, then one over the blocks above them. is_all: nothing comes after it;
+  // else it is too short for a share of its own.
   void exchange_in_regions(bool is_all) {
     const std::vector<Region> regions = cut_into_regions(tree_, kRegionTriangles);
     if (is_all) watch_.expect(children_of(regions));

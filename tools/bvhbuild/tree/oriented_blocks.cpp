@@ -10,8 +10,8 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// Below a block with a frame of its own. Above, none is worth it (docs/decisions/0039), and the checker would
-// have to look at all triangles once more for each level.
+// A block has a frame of its own if at most this many triangles are below it. Above, none is worth it
+// (docs/decisions/0039), and the checker would have to look at all triangles once more for each level.
 constexpr std::uint32_t kMostTriangles = 4096;
 
 constexpr std::size_t kBlocksAtOnce = 64;
@@ -47,7 +47,7 @@ Vector times(float s, const Vector& a) {
   return {s * a[0], s * a[1], s * a[2]};
 }
 
-// Of the rotation whose columns are the axes.
+// Returns the rotation whose columns are the axes.
 BlockRotation rotation_of(const Vector (&axis)[3]) {
   const float m00 = axis[0][0], m11 = axis[1][1], m22 = axis[2][2];
   const float m10 = axis[0][1], m20 = axis[0][2], m01 = axis[1][0], m21 = axis[1][2], m02 = axis[2][0],
@@ -92,7 +92,7 @@ struct Point {
   Lanes x, y, z;  // the same in all lanes
 };
 
-// Which triangles of the file lie below each block: from first[b] to end[b].
+// Says which triangles of the file lie below each block: from first[b] to end[b].
 struct Ranges {
   std::vector<std::uint32_t> first, end;
 
@@ -117,7 +117,7 @@ class Fit {
         farthest_(farthest),
         effort_(search_effort(effort)) {}
 
-  // All but first_below.
+  // Makes all of a block but first_below.
   OrientedBlock make(std::uint32_t at) {
     const Block& block = tree_.blocks[at];
     begin(block);
@@ -166,7 +166,7 @@ class Fit {
     return geometry_.points[geometry_.triangles[tree_.order[triangle]][c]];
   }
 
-  // Some of the corners of each node, each point once.
+  // Gathers some of the corners of each node, each point once.
   void gather() {
     points_.clear();
     for (int node = 0; node < nodes_; ++node) {
@@ -186,8 +186,8 @@ class Fit {
     }
   }
 
-  // What a frame is judged by: the volumes of its boxes, each with a rim, so that flat and thin ones count
-  // too. half_extent: times scale_.
+  // Return what a frame is judged by: the volumes of its boxes, each with a rim, so that flat and thin ones
+  // count too. half_extent: times scale_.
   float cost_of_box(const float (&half_extent)[3]) const {
     return (half_extent[0] + rim_) * (half_extent[1] + rim_) * (half_extent[2] + rim_);
   }
@@ -201,7 +201,7 @@ class Fit {
     return cost;
   }
 
-  // By the points gathered.
+  // Returns the costs of rotations by the points gathered.
   Lanes costs_of(const BlockRotation (&rotations)[kLanes]) const {
     Lanes m[3][3];
     for (int l = 0; l < kLanes; ++l) {
@@ -240,7 +240,7 @@ class Fit {
       waiting_[count_++] = rotation;
       if (count_ == kLanes) judge();
     }
-    // Of all considered so far.
+    // Returns the best of all rotations considered so far.
     const BlockRotation& rotation() {
       if (count_ > 0) judge();
       return rotation_;
@@ -263,7 +263,8 @@ class Fit {
     float cost_ = kInfinity;
   };
 
-  // Of a leaf block: the mesh's axes, or along an edge of a triangle and its normal.
+  // Returns the best rotation of a leaf block: the mesh's axes, or along an edge of a triangle and its
+  // normal.
   BlockRotation best_of_triangles() const {
     Best best(*this);
     best.consider(kNoRotation);
@@ -273,7 +274,7 @@ class Fit {
     return best.rotation();
   }
 
-  // Along an edge of a triangle and its normal.
+  // Returns the axes along an edge of a triangle and its normal.
   BlockRotation axes_of(std::uint32_t triangle, std::uint32_t edge) const {
     const Vector& from = corner(triangle, edge);
     const Vector along = times(scale_, difference(corner(triangle, (edge + 1) % 3), from));
@@ -325,8 +326,8 @@ class Fit {
     }
   }
 
-  // What the checker asks for. Boxes of meshes smaller than 1e-40 may reach farther, whose coordinates
-  // float32 rounds to a few bits.
+  // Returns whether the block reaches no farther than the checker allows. Boxes of meshes smaller than 1e-40
+  // may reach farther, whose coordinates float32 rounds to a few bits.
   bool reaches_no_farther(const OrientedBlock& block) const {
     bool near = true;
     for (int node = 0; node < nodes_; ++node) {
@@ -356,7 +357,7 @@ class Fit {
 
 std::vector<OrientedBlock> orient_blocks(const Geometry& geometry, const Tree& tree, Effort effort) {
   std::vector<OrientedBlock> out(tree.blocks.size());
-  // Of each block its number, and of its first child, or of its first triangle.
+  // These are the number of each block, and that of its first child, or of its first triangle.
   std::vector<std::uint32_t> number(tree.blocks.size()), first_below(tree.blocks.size());
   std::uint32_t next = 1;
   for (std::size_t b = 0; b < tree.blocks.size(); ++b) {

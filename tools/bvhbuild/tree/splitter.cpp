@@ -25,7 +25,7 @@ void for_each_axis(Range range, const Body& body) {
 constexpr int kBins = 32;
 constexpr std::size_t kGrain = 1 << 15;
 
-// How centres along one axis fall into bins.
+// Says how centres along one axis fall into bins.
 struct Binning {
   float lo = 0, scale = 0;
 
@@ -144,7 +144,7 @@ Split TriangleSplitter::even_split(Range range, const IsLegal& is_legal) const {
   return split;
 }
 
-// One axis, all splits: costs of right sides from the right, then left sides from the left.
+// Tries all splits along one axis: costs of right sides from the right, then of left sides from the left.
 Split TriangleSplitter::sweep(int axis, Range range, const IsLegal& is_legal) {
   const std::uint32_t n = range.size();
   const std::uint32_t* order = order_[axis].data() + range.begin;

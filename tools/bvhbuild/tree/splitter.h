@@ -18,7 +18,7 @@ struct Range {
   std::uint32_t size() const { return end - begin; }
 };
 
-/// Where a group is cut: its first `left` triangles by box centre along `axis` (ties by index) go left.
+/// Says where a group is cut: its first `left` triangles by box centre along `axis` (ties by index) go left.
 struct Split {
   int axis = 0;
   std::uint32_t left = 0;  ///< 0: no split was found
@@ -81,17 +81,17 @@ class TriangleSplitter {
   void partition(int axis, Range range, std::uint32_t left);
 
   std::span<const Bounds> bounds_;
-  // Of a group up to kSweepSize: its triangles by centre along x, y and z. Of a larger one: the first alone,
-  // by index, so that going through it goes through memory in order.
+  // A group up to kSweepSize has its triangles by centre along x, y and z. A larger one has the first order
+  // alone, by index, so that going through it goes through memory in order.
   std::vector<std::uint32_t> order_[3];
   std::vector<std::uint32_t>
       scratch_[3];  // bits of the right sides' costs; one side's triangles while partitioning
   std::vector<std::uint8_t> goes_left_;  // by triangle
 };
 
-/// Whether a group of n triangles at this depth must be split evenly from here on, so that the tree ends
-/// above kMaxDepth. Even splits at least halve a group, give or take the few positions to the nearest legal
-/// one, at each level.
+/// Returns whether a group of n triangles at this depth must be split evenly from here on, so that the tree
+/// ends above kMaxDepth. Even splits at least halve a group, give or take the few positions to the nearest
+/// legal one, at each level.
 constexpr bool must_split_evenly(std::uint32_t depth, std::uint32_t n) {
   constexpr std::uint32_t kReserve = 4;
   return depth + static_cast<std::uint32_t>(std::bit_width(n)) + kReserve >= kMaxDepth;

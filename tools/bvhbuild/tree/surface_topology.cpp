@@ -47,7 +47,8 @@ namespace {
 
 using Vector = std::array<double, 3>;
 
-// Of no special slope, since meshes love axes, diagonals and symmetric shapes. All parts are positive.
+// These directions have no special slope, since meshes love axes, diagonals and symmetric shapes. All parts
+// are positive.
 constexpr Vector kDirections[] = {{0.7548776662, 0.5698402910, 0.3247179572},
                                   {0.2955977425, 0.8191725134, 0.4914180613},
                                   {0.4422495703, 0.1442249570, 0.8851680193},
@@ -70,7 +71,7 @@ Sign triple_product(const Vector& a, const Vector& b, const Vector& c) {
   return {value, std::abs(value) > 16 * 0x1p-53 * magnitude};
 }
 
-// Whether a ray from the point meets a box, or might but for roundings.
+// Returns whether a ray from the point meets a box, or might but for roundings.
 bool may_meet(const Block& block, int node, const Vector& from, const Vector& direction) {
   double first = 0, last = HUGE_VAL;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -84,7 +85,7 @@ bool may_meet(const Block& block, int node, const Vector& from, const Vector& di
 
 enum class Crossing : std::uint8_t { none, in, out, unsure };
 
-// How a ray from 0 crosses a triangle.
+// Returns how a ray from 0 crosses a triangle.
 Crossing crossing(const std::array<Vector, 3>& corner, const Vector& direction) {
   int positive = 0, negative = 0;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -98,7 +99,7 @@ Crossing crossing(const std::array<Vector, 3>& corner, const Vector& direction) 
   return positive > 0 ? Crossing::out : Crossing::in;
 }
 
-// How often a surface winds around a point, by the triangles that a ray from it crosses.
+// Finds how often a surface winds around a point, by the triangles that a ray from it crosses.
 class Enclosure {
  public:
   // component: of each triangle in leaf order. weight: of each, 1 where its corners go round against the
@@ -208,7 +209,7 @@ class Flood {
   }
 
  private:
-  // Each edge once, since any number of triangles may have it.
+  // Looks at each edge once, since any number of triangles may have it.
   void cross_edges_of(std::uint32_t triangle) {
     for (std::uint32_t side = 3 * triangle; side < 3 * triangle + 3; ++side) {
       const std::uint32_t edge = edges_.edge_of(side);
@@ -294,7 +295,7 @@ class Corners {
   const Tree& tree_;
 };
 
-// Of each component: closed, and inside out.
+// Returns for each component whether it is closed and inside out.
 std::vector<std::uint8_t> inside_out(const Corners& corners, const Components& component,
                                      const SurfaceTopology& surface) {
   std::vector<EnclosedVolume> volumes;
@@ -328,8 +329,8 @@ class Members {
   std::vector<std::uint32_t> first_, triangles_;
 };
 
-// Whether a component lies within others. A corner of each of its triangles is tried until one is far enough
-// from all of them.
+// Returns whether a component lies within others. A corner of each of its triangles is tried until one is far
+// enough from all of them.
 bool is_cavity(const Corners& corners, const Enclosure& others, std::uint32_t own,
                std::span<const std::uint32_t> members) {
   constexpr std::size_t kTries = 16;

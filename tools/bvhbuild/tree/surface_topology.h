@@ -34,7 +34,7 @@ inline bool runs_up(std::span<const TriangleTopology> triangles, std::uint32_t s
   return tandem::runs_up(triangles[side / 3], side % 3);
 }
 
-/// How the triangles of a level hang together, as it lies in the file.
+/// The topology of a level, as it lies in the file: how its triangles hang together.
 struct SurfaceTopology {
   std::vector<TriangleTopology> triangles;   ///< in leaf order
   std::vector<SurfaceComponent> components;  ///< by first triangle

@@ -287,8 +287,8 @@ Replacement replacement_of(const WorkingTree& tree, const Region& region, std::s
   return replacement;
 }
 
-// How many blocks a tree over n triangles has at most if no more than `share` of its nodes are imaginary: of
-// B blocks' 4 B nodes, n + B - 1 are not.
+// Returns how many blocks a tree over n triangles has at most if no more than `share` of its nodes are
+// imaginary: of B blocks' 4 B nodes, n + B - 1 are not.
 std::int64_t blocks_within(std::size_t triangles, double share) {
   const auto n = static_cast<double>(triangles);
   return static_cast<std::int64_t>(3 - 4 * share > 0.1 ? (n - 1) / (3 - 4 * share) : 10 * n);
@@ -322,7 +322,7 @@ class Splice {
   Topology result_;
 };
 
-// Which subtrees are replaced; none lies in another.
+// The subtrees that are replaced; none lies in another.
 class Replaced {
  public:
   explicit Replaced(const WorkingTree& tree)
@@ -360,7 +360,7 @@ void add_replacements(const WorkingTree& tree, std::span<const Bounds> bounds, s
       count, [&](std::size_t i) { all[first + i] = replacement_of(tree, regions[i], bounds, build); });
 }
 
-// Those that fit, the most worth first.
+// Keeps the replacements that fit, sorted by their worth, the most first.
 void sort_by_worth(std::vector<Replacement>& replacements) {
   std::erase_if(replacements, [](const Replacement& replacement) { return !replacement.fits; });
   std::sort(replacements.begin(), replacements.end(), [](const Replacement& a, const Replacement& b) {

@@ -10,7 +10,7 @@
 
 namespace tandem::build {
 
-/// Which children a block has, before boxes and places in memory are known.
+/// The children of a block, before boxes and places in memory are known.
 struct TopologyBlock {
   std::array<std::uint32_t, kNodesPerBlock> child{};  ///< triangles of the input, or blocks; `count` of them
   std::uint8_t count = 0;

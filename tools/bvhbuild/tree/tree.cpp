@@ -13,14 +13,14 @@ namespace {
 
 constexpr std::size_t kBlocksAtOnce = 1 << 12;
 
-// Where a block of the topology comes to lie, and its children.
+// The place where a block of the topology comes to lie, and its children.
 struct Place {
   std::uint32_t block;           // of the topology
   std::uint32_t first_triangle;  // of a leaf block: where its triangles start in the file
   std::uint32_t child[kNodesPerBlock];
 };
 
-// All blocks, each after its parent, those below a node before those below the next one.
+// Places all blocks, each after its parent, those below a node before those below the next one.
 class DepthFirst {
  public:
   explicit DepthFirst(const Topology& topology) : topology_(topology) {

@@ -12,7 +12,7 @@ bool same(const Bounds& a, const Bounds& b) {
   return true;
 }
 
-// All blocks of the topology, parents first.
+// Returns all blocks of the topology, parents first.
 std::vector<std::uint32_t> parents_first(const Topology& topology) {
   std::vector<std::uint32_t> order = {0};
   order.reserve(topology.size());

@@ -52,8 +52,8 @@ class WorkingTree {
     return child.is_triangle ? triangle_parent_[child.index] : blocks_[child.index].parent;
   }
 
-  /// How much more the blocks from `block` up to, but without, `top` would cost if its child `out` were
-  /// replaced by something of bounds `in`. `out` may be kNoIndex, and `in` empty.
+  /// Returns how much more the blocks from `block` up to, but without, `top` would cost if its child `out`
+  /// were replaced by something of bounds `in`. `out` may be kNoIndex, and `in` empty.
   double cost_change(std::uint32_t block, std::uint32_t out, const Bounds& in, std::uint32_t top) const;
 
   /// Makes the change; boxes and heights follow, up to the block `top`, below which both parents lie.
@@ -99,13 +99,12 @@ class ExchangeSearch {
  public:
   explicit ExchangeSearch(WorkingTree& tree) : tree_(tree), marks_(tree.size()) {}
 
-  /// For each child in turn, makes the exchange with another one below the region's root that saves most;
-  /// ends early where searches take far longer than they do on ordinary meshes.
-  /// Result: how many were made.
+  /// Makes for each child in turn the exchange with another one below the region's root that saves most; ends
+  /// early where searches take far longer than they do on ordinary meshes. Result: how many were made.
   std::uint32_t pass(const Region& region);
 
-  /// How the cost of the tree changes by an exchange; infinity where it is not possible: both have the same
-  /// parent, one lies below the other, the tree would become too deep, or a block empty.
+  /// Returns how the cost of the tree changes by an exchange; infinity where it is not possible: both have
+  /// the same parent, one lies below the other, the tree would become too deep, or a block empty.
   double cost_change(const Exchange& exchange, const Region& region);
 
  private:

@@ -61,13 +61,14 @@ struct GivenAssets : Allocated {
   ~GivenAssets() { tandem_gpu_assets_release(assets); }
 };
 
-/// What every handle of a query has.
+/// The base of every handle of a query.
 template <typename Query>
 struct GpuHandle : GivenAssets {
   GpuArray<uint32_t> given_count;  ///< of pairs whose number the caller has in CPU memory
   Query query;
 
-  /// What a handle hides that keeps in mind what its last call found: a call begins, a call has ended.
+  /// A handle that remembers what its last call found hides these: forget() when a call begins, note() when
+  /// it has ended.
   void forget() {}
   template <typename Options>
   void note(const Options&, Status) {}
@@ -126,7 +127,7 @@ tandem_status reserve(Of* handle, const Capacity* capacity, const Body& body) no
   });
 }
 
-/// The same where a query has no options that reserve() needs to know. Room: the query's capacity.
+/// Reserves room where a query has no options that reserve() needs to know. Room: the query's capacity.
 template <typename Room, typename Of, typename Capacity>
 tandem_status reserve(Of* handle, const Capacity* capacity) noexcept {
   return reserve(handle, capacity, [&](Of& self) {
@@ -134,7 +135,7 @@ tandem_status reserve(Of* handle, const Capacity* capacity) noexcept {
   });
 }
 
-/// What a handle's query has, or `none` before it has assets.
+/// Returns what a handle's query has, or `none` before it has assets.
 template <typename Of, typename Result, typename Get>
 Result of_query(const Of* handle, Result none, const Get& get) {
   return handle != nullptr && handle->assets != nullptr ? std::invoke(get, handle->query) : none;
@@ -147,7 +148,7 @@ const Row* rows_of(const Of* handle, const Get& get) {
   return of_query(handle, static_cast<const Row*>(nullptr), rows);
 }
 
-/// What the GPU found: fills the caller's report, where there is one.
+/// Fills the caller's report, where there is one, with what the GPU found.
 template <typename Of, typename Report>
 tandem_status get_report(const Of* handle, Report* report) {
   if (report != nullptr) *report = {};

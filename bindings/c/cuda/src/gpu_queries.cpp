@@ -9,7 +9,7 @@ struct tandem_gpu_contact_query : GpuHandle<GpuContactQuery> {
   bool grouped = false;       // the contacts of the last call are
   bool all_contacts = false;  // and are all there are, without distance
 
-  // Whether what follows from contacts may be asked of it by a handle with these assets.
+  // Returns whether what follows from contacts may be asked of it by a handle with these assets.
   tandem_status serves(const tandem_gpu_assets* with, bool needs_all) const {
     if (assets != with) return TANDEM_ASSETS_MISSING;
     return grouped && (all_contacts || !needs_all) ? TANDEM_OK : TANDEM_CONTACTS_MISSING;
@@ -93,7 +93,7 @@ Read<GpuImpactOptions> read_options(const tandem_gpu_impact_options* given) {
   return {status, options};
 }
 
-// What every call is given.
+// The arguments of every call.
 struct Asked {
   const tandem_gpu_instances* instances;
   const tandem_gpu_pairs* pairs;

@@ -41,7 +41,7 @@ extern "C" {
 /// The version of the library, as 10000 major + 100 minor + patch.
 TANDEM_API uint32_t tandem_version(void);
 
-/// What can be wrong. Numbers keep their meaning; later versions may add some.
+/// Says what is wrong. Numbers keep their meaning; later versions may add some.
 typedef uint32_t tandem_status;
 
 enum {
@@ -61,7 +61,7 @@ enum {
   TANDEM_TOO_MANY_TRIANGLES = 12,  ///< there are 2^32 - 1 triangles or more
   TANDEM_ASSETS_MISSING = 13,  ///< a handle of tandem_cuda.h was given no assets, or others than the query
                                ///< whose contacts it takes
-  // A file, or bytes of one. Of the defects that are there, the first in this order.
+  // A file, or bytes of one. If a file has several defects, the first in this order is returned.
   // clang-format off
   TANDEM_FILE_NOT_FOUND = 100, TANDEM_NOT_A_REGULAR_FILE = 101, TANDEM_CANNOT_OPEN = 102,
   TANDEM_CANNOT_READ = 103, TANDEM_MISALIGNED = 104, TANDEM_BIOVISION_MOTION_CAPTURE = 105,
@@ -98,19 +98,20 @@ enum {
 /// The name of a status, for logs: "ChildShared" of TANDEM_CHILD_SHARED. Never null.
 TANDEM_API const char* tandem_status_name(tandem_status status);
 
-/// One sentence for people, without a full stop: "a block has two parents". Never null.
+/// Returns one sentence for people, without a full stop: "a block has two parents". Never null.
 TANDEM_API const char* tandem_status_explain(tandem_status status);
 
-/// What the number counts that `where` gives: "instance", "pair", "section", "block"; null where there is no
-/// such number.
+/// Returns what the number counts that `where` gives: "instance", "pair", "section", "block"; null where
+/// there is no such number.
 TANDEM_API const char* tandem_status_subject(tandem_status status);
 
 /// ---- Memory
 
-/// Where memory comes from. A handle keeps a copy of it and takes all of its memory there, results included;
-/// what `user` points to outlives the handle. Both functions may be called by several threads at a time, also
-/// by those that scenes start. The library's own are only what the C++ runtime and the system take to start
-/// a thread. Null pointers to allocators stand for the C library's memory.
+/// The functions that memory comes from. A handle keeps a copy of the struct and takes all of its memory
+/// there, results included; what `user` points to outlives the handle. Both functions may be called by
+/// several threads at a time, also by those that scenes start. The library's own are only what the C++
+/// runtime and the system take to start a thread. Null pointers to allocators stand for the C library's
+/// memory.
 typedef struct tandem_allocator {
   uint32_t struct_size;
   uint32_t reserved;
@@ -123,9 +124,9 @@ typedef struct tandem_allocator {
 
 /// ---- Assets
 
-/// What one .bvh file holds, checked. It never changes, and its references are counted: whoever has it from a
-/// function below has one, and a scene has one of each of its assets. The count may be changed by several
-/// threads at a time.
+/// The checked contents of one .bvh file. It never changes, and its references are counted: whoever has it
+/// from a function below has one, and a scene has one of each of its assets. The count may be changed by
+/// several threads at a time.
 typedef struct tandem_asset tandem_asset;
 
 enum { TANDEM_ACCESS_MAP = 0, TANDEM_ACCESS_READ = 1 };
@@ -187,7 +188,7 @@ typedef struct tandem_mesh {
 
 enum { TANDEM_EFFORT_DEFAULT = 0, TANDEM_EFFORT_FAST = 1, TANDEM_EFFORT_BEST = 2 };
 
-/// As bvhbuild's options.
+/// The options of bvhbuild.
 typedef struct tandem_build_options {
   uint32_t struct_size;
   uint32_t effort;         ///< TANDEM_EFFORT_DEFAULT, ...; the best takes minutes for 100,000 triangles
@@ -197,13 +198,13 @@ typedef struct tandem_build_options {
   uint32_t reserved;
   double imaginary_share;  ///< padding nodes: 0: the proven fewest; to 1: as many as a free tree has
   const char* provenance;  ///< JSON that the file says of its making, or null: options and findings
-  /// Or null: called now and then, by one thread at a time, with the share of the optimisation that is done;
-  /// where it returns 1, optimisation ends soon, with the best tree so far.
+  /// Null, or a function that is called now and then, by one thread at a time, with the share of the
+  /// optimisation that is done; where it returns 1, optimisation ends soon, with the best tree so far.
   uint32_t (*progress)(void* user, double share);
   void* user;
 } tandem_build_options;
 
-/// What became of the triangles; faces are triangles here.
+/// Counts what became of the triangles; faces are triangles here.
 typedef struct tandem_build_report {
   uint32_t struct_size;
   uint32_t reserved;
@@ -300,7 +301,7 @@ TANDEM_API const char* tandem_asset_provenance(const tandem_asset* asset, size_t
 
 /// ---- Bodies
 
-/// Where a body stands: world = rotation x + translation, x in the mesh file's coordinates; rows of the
+/// The place of a body: world = rotation x + translation, x in the mesh file's coordinates; rows of the
 /// rotation are consecutive. Rigid to 1e-6, else TANDEM_POSE_NOT_RIGID.
 typedef struct tandem_pose {
   double rotation[3][3];
@@ -319,10 +320,10 @@ typedef struct tandem_object_pair {
   uint32_t a, b;
 } tandem_object_pair;
 
-/// What is not there: a triangle, a face, a former point, the asset of a removed body.
+/// The index of what does not exist: a triangle, a face, a former point, the asset of a removed body.
 #define TANDEM_NO_INDEX 0xFFFFFFFFu
 
-/// What moves a body: forces; nothing; the caller; nothing until the caller wakes it.
+/// Says what moves a body: forces; nothing; the caller; nothing until the caller wakes it.
 enum { TANDEM_MOVING = 0, TANDEM_FIXED = 1, TANDEM_KINEMATIC = 2, TANDEM_SLEEPING = 3 };
 
 /// A set of pairs of bodies, which scenes do not look at. A scene that was given it keeps it.
@@ -333,10 +334,10 @@ typedef struct tandem_excluded_pairs tandem_excluded_pairs;
 TANDEM_API tandem_status tandem_excluded_pairs_create(const tandem_object_pair* pairs, size_t count,
                                                       const tandem_allocator* allocator,
                                                       tandem_excluded_pairs** excluded);
-/// Null does nothing.
+/// Destroys the handle; null does nothing.
 TANDEM_API void tandem_excluded_pairs_destroy(tandem_excluded_pairs* excluded);
 
-/// Which pairs a scene looks at (docs/queries.md). Arrays have `count` entries, one for each body
+/// Says which pairs a scene looks at (docs/queries.md). Arrays have `count` entries, one for each body
 /// (TANDEM_FILTER_MISMATCH where there are others), or are null. The scene copies them.
 typedef struct tandem_pair_filter {
   uint32_t struct_size;
@@ -357,7 +358,7 @@ typedef struct tandem_scene tandem_scene;
 
 TANDEM_API tandem_status tandem_scene_create(const tandem_allocator* allocator, tandem_scene** scene);
 
-/// What answers the questions of a scene in place of the CPU: tandem_gpu_device_create() makes one.
+/// A device that answers the questions of a scene in place of the CPU: tandem_gpu_device_create() makes one.
 typedef struct tandem_device tandem_device;
 /// Makes a scene whose questions a device answers, and which owns the device; after an error the device is
 /// destroyed. Result: also TANDEM_UNSUPPORTED_VERSION, where the two libraries are not of one version.
@@ -404,7 +405,7 @@ TANDEM_API tandem_status tandem_scene_set_motion(tandem_scene* scene, uint32_t b
 /// Removes a body: no question finds it any more. Result: TANDEM_UNKNOWN_INSTANCE.
 TANDEM_API tandem_status tandem_scene_remove(tandem_scene* scene, uint32_t body);
 
-/// All bodies by number, valid until bodies are placed, added or removed.
+/// Returns all bodies by number, valid until bodies are placed, added or removed.
 TANDEM_API const tandem_instance* tandem_scene_instances(const tandem_scene* scene, size_t* count);
 
 /// The asset, body, pair or contact that is to blame for the last call's error; 0 after TANDEM_OK.
@@ -477,7 +478,8 @@ typedef struct tandem_contact_counters {
 /// it. Result: TANDEM_OUT_OF_RANGE where `within` is no distance.
 TANDEM_API tandem_status tandem_scene_find_contacts(tandem_scene* scene,
                                                     const tandem_contact_options* options);
-/// By ascending pair; within a pair in an order that is the same on every run and machine.
+/// Returns the contacts by ascending pair, and within a pair in an order that is the same on every run and
+/// machine.
 TANDEM_API const tandem_contact* tandem_scene_contacts(const tandem_scene* scene, size_t* count);
 
 /// ---- Manifolds
@@ -527,7 +529,8 @@ typedef struct tandem_manifold_counters {
 /// the asset. After an error the next call finds no points before it.
 TANDEM_API tandem_status tandem_scene_find_manifolds(tandem_scene* scene,
                                                      const tandem_manifold_options* options);
-/// By ascending pair; their points, manifold by manifold. They go when contacts are found again.
+/// Return the manifolds by ascending pair, and their points, manifold by manifold. Both are gone when
+/// contacts are found again.
 TANDEM_API const tandem_manifold* tandem_scene_manifolds(const tandem_scene* scene, size_t* count);
 TANDEM_API const tandem_manifold_point* tandem_scene_points(const tandem_scene* scene, size_t* count);
 
@@ -574,7 +577,7 @@ typedef struct tandem_distance_options {
   size_t pair_count;
 } tandem_distance_options;
 
-/// How near the surfaces of two bodies are (docs/distance.md).
+/// The distance of the surfaces of two bodies (docs/distance.md).
 typedef struct tandem_distance {
   double lower, upper;              ///< lower <= distance <= upper; 0, 0 exactly where triangles meet
   double point_a[3], point_b[3];    ///< the nearest points that were found
@@ -592,7 +595,7 @@ typedef struct tandem_distance_counters {
 /// TANDEM_OUT_OF_RANGE where a tolerance or the reach is negative or NaN.
 TANDEM_API tandem_status tandem_scene_find_distances(tandem_scene* scene,
                                                      const tandem_distance_options* options);
-/// One for each pair.
+/// Returns the distance of each pair.
 TANDEM_API const tandem_distance* tandem_scene_distances(const tandem_scene* scene, size_t* count);
 
 /// ---- Times of impact
@@ -618,7 +621,7 @@ typedef struct tandem_impact_options {
 
 enum { TANDEM_NO_IMPACT = 0, TANDEM_IMPACT = 1, TANDEM_IMPACT_AT_START = 2 };
 
-/// Until when two moving bodies surely do not meet (docs/impact.md).
+/// Says until when two moving bodies surely do not meet (docs/impact.md).
 typedef struct tandem_impact {
   double t_safe;  ///< no triangles of the two meet before; the whole step where there is no impact
   double gap;     ///< of the two triangles then
@@ -638,7 +641,7 @@ typedef struct tandem_impact_counters {
 /// Finds when object pairs meet in a step; the scene finds those whose boxes, swept by the motions, meet.
 /// Result: TANDEM_OUT_OF_RANGE of motions, the duration and the tolerance.
 TANDEM_API tandem_status tandem_scene_find_impacts(tandem_scene* scene, const tandem_impact_options* options);
-/// One for each pair.
+/// Returns the impact of each pair.
 TANDEM_API const tandem_impact* tandem_scene_impacts(const tandem_scene* scene, size_t* count);
 
 /// The pose at time t of what stands at `start` at time 0; t_safe holds for it too.
@@ -657,7 +660,7 @@ typedef struct tandem_tolerance_options {
 
 enum { TANDEM_APART = 0, TANDEM_TOUCH = 1, TANDEM_WITHIN_TOLERANCE = 2 };
 
-/// Whether two bodies meet (docs/levels.md).
+/// Says whether two bodies meet (docs/levels.md).
 typedef struct tandem_verdict {
   uint8_t verdict;           ///< TANDEM_APART: the finest surfaces do not meet, TANDEM_TOUCH: they do, ...
   uint8_t level_a, level_b;  ///< of the bodies, that it was asked of
@@ -674,7 +677,7 @@ typedef struct tandem_tolerance_counters {
 /// where the tolerance is no distance.
 TANDEM_API tandem_status tandem_scene_find_verdicts(tandem_scene* scene,
                                                     const tandem_tolerance_options* options);
-/// One for each pair.
+/// Returns the verdict of each pair.
 TANDEM_API const tandem_verdict* tandem_scene_verdicts(const tandem_scene* scene, size_t* count);
 
 /// ---- Bodies at points
@@ -699,7 +702,7 @@ TANDEM_API const tandem_body_at* tandem_scene_bodies_at(const tandem_scene* scen
 
 /// ---- Several questions
 
-/// What tandem_scene_find() asks. Null: the question is not asked.
+/// The questions that tandem_scene_find() asks. Null: the question is not asked.
 typedef struct tandem_questions {
   uint32_t struct_size;
   uint32_t contained;  ///< 1: bodies within others
@@ -716,8 +719,8 @@ typedef struct tandem_questions {
 /// one fails. Result: that of the one that fails.
 TANDEM_API tandem_status tandem_scene_find(tandem_scene* scene, const tandem_questions* questions);
 
-/// What the questions did. Counters depend neither on the number of threads nor on the machine; those of a
-/// question that has no results are 0.
+/// Counts what the questions did. Counters depend neither on the number of threads nor on the machine; those
+/// of a question that has no results are 0.
 typedef struct tandem_counters {
   uint32_t struct_size;
   uint32_t reserved;

@@ -16,7 +16,7 @@ constexpr const char* kUsedCapsule = "used_dltensor";
 constexpr const char* kNotContiguous = " is not contiguous, and nothing is copied";
 const cudaStream_t kLegacy = cudaStreamLegacy;
 
-// What a capsule keeps until its consumer, or nobody, has taken it.
+// The tensor that a capsule keeps until its consumer, or nobody, has taken it.
 struct Exported {
   dlpack::ManagedTensor managed;
   std::shared_ptr<const void> owner;
@@ -52,7 +52,7 @@ bool is_default(cudaStream_t stream) {
   return stream == nullptr || stream == kLegacy;
 }
 
-// Of a name such as "float64"; others than numbers of 8 bits and more are nothing that is wanted anywhere.
+// Returns the type of a name such as "float64". Only numbers of 8 bits and more are wanted anywhere.
 dlpack::DataType type_named(const std::string& name) {
   const std::size_t digits = name.find_first_of("0123456789");
   const std::string kind = name.substr(0, digits);
@@ -64,7 +64,7 @@ dlpack::DataType type_named(const std::string& name) {
   return {code, static_cast<std::uint8_t>(bits), 1};
 }
 
-// Whether it is a tensor of PyTorch.
+// Returns whether it is a tensor of PyTorch.
 bool is_torch(nb::handle object) {
   const nb::object module = object.type().attr("__module__");
   return PyUnicode_CompareWithASCIIString(module.ptr(), "torch") == 0;
@@ -97,7 +97,7 @@ void check_whole(tandem_status status) {
 
 OnDevice::OnDevice(int device) {
   int current = -1;
-  // Where there is no such GPU, the call that follows says so.
+  // If there is no such GPU, the call that follows says so.
   if (cudaGetDevice(&current) != cudaSuccess || (current != device && cudaSetDevice(device) != cudaSuccess))
     static_cast<void>(cudaGetLastError());
   else if (current != device)
@@ -139,7 +139,7 @@ void Array::wait_on(cudaStream_t consumer) const {
 }
 
 nb::object Array::dlpack(nb::handle stream) const {
-  // None: the default stream; -1: the consumer takes care.
+  // None is the default stream; with -1 the consumer takes care.
   const long long number = stream.is_none() ? 1 : nb::cast<long long>(stream);
   if (number != -1) wait_on(stream_of(static_cast<std::uintptr_t>(number)));
   auto exported = std::make_unique<Exported>();

@@ -18,7 +18,7 @@ inline constexpr dlpack::DataType kU8 = {dlpack::kUInt, 8, 1}, kU32 = {dlpack::k
 /// Throws the exception of an error of CUDA's.
 void check_cuda(cudaError_t error);
 
-/// As check(), of a status that comes without the number of what is to blame.
+/// Checks a status that comes without the number of what is to blame, as check() does.
 void check_whole(tandem_status status);
 
 /// While it lives, the device is the current one.
@@ -49,7 +49,7 @@ class Stream {
   nb::object kept_;
 };
 
-/// Where memory lies, what keeps it, and whether its contents may still be on their way on a stream.
+/// GPU memory: where it lies, what keeps it, and whether its contents may still be on their way on a stream.
 struct Memory {
   std::shared_ptr<const void> owner;
   int device = 0;
@@ -95,9 +95,9 @@ class Rows {
         row_bytes_(row_bytes) {}
 
   std::size_t count() const { return count_; }
-  /// All of a row as whole numbers of so many bits.
+  /// Returns whole rows as whole numbers of so many bits.
   Array words(unsigned bits) const;
-  /// One field of each row: `width` numbers, or one where it is 0.
+  /// Returns one field of each row: `width` numbers, or one where it is 0.
   Array column(std::size_t offset, std::uint8_t code, std::uint8_t bits, std::int64_t width) const;
   /// A copy in CPU memory, behind what the stream holds.
   nb::object to_cpu() const;
@@ -108,7 +108,7 @@ class Rows {
   std::size_t count_, row_bytes_;
 };
 
-/// What somebody else's array is, which lives as long as this.
+/// Somebody else's array, which lives as long as this.
 class GivenArray {
  public:
   GivenArray() = default;

@@ -35,7 +35,7 @@ class Pool<create, destroy, set_assets, get_report> {
     return all_.back();
   }
 
-  /// One that is not in the pool.
+  /// Makes a query that is not in the pool.
   static Pointer make(const Assets& assets, const Stream& stream) {
     Of* handle = nullptr;
     check_whole(create(nullptr, &handle));
@@ -111,7 +111,7 @@ class Query {
   const Assets& assets() const { return assets_; }
 
  private:
-  // What manifolds and contained bodies follow from.
+  // The last call, from which manifolds and contained bodies follow.
   struct Last {
     nb::object instances, given;
     FoundPairs pairs;

@@ -31,8 +31,8 @@ class Assets {
   int device() const { return device_; }
   std::size_t bytes() const { return tandem_gpu_assets_bytes(assets_); }
 
-  /// So many zeros in GPU memory, the numbers of instances that are all of asset 0. Allocates, and waits for
-  /// the device, where there were never as many.
+  /// Returns so many zeros in GPU memory, the numbers of instances that are all of asset 0. Allocates, and
+  /// waits for the device, where there were never as many.
   std::shared_ptr<Buffer> zeros(std::size_t count) const;
 
  private:
@@ -71,7 +71,7 @@ class Pairs {
   tandem_gpu_pairs pairs_ = {};
 };
 
-/// Which pairs a query looks at; its arrays are read where they are.
+/// Says which pairs a query looks at. Its arrays are read where they are.
 class GpuFilter {
  public:
   GpuFilter(nb::handle motion, nb::handle group, nb::handle mask, nb::handle excluded, const Stream& stream,
@@ -79,7 +79,8 @@ class GpuFilter {
   ~GpuFilter() { tandem_gpu_excluded_pairs_destroy(excluded_); }
   GpuFilter(const GpuFilter&) = delete;
   GpuFilter& operator=(const GpuFilter&) = delete;
-  /// Null for none; throws ValueError where it is of another number of instances, or lies on another GPU.
+  /// Returns the filter of C, null for none. Throws ValueError where it is of another number of instances, or
+  /// lies on another GPU.
   static const tandem_gpu_pair_filter* of(const GpuFilter* filter, const Instances& bodies);
 
  private:

@@ -4,8 +4,8 @@
 
 namespace tandem {
 
-/// Where the CPU code of formats/, runtime/ and kernels/ takes memory from. Both functions may be called by
-/// several threads at a time, and throw nothing.
+/// The functions that the CPU code of formats/, runtime/ and kernels/ takes memory from. Both may be called
+/// by several threads at a time, and throw nothing.
 struct Allocator {
   void* user = nullptr;  ///< handed to both functions
   /// Memory of so many bytes at a multiple of `alignment`, a power of two; null where there is none.

@@ -7,7 +7,7 @@
 
 namespace tandem {
 
-/// What a node is. A block holds leaves and imaginary nodes only (leaf block), or internal and imaginary
+/// The kind of a node. A block holds leaves and imaginary nodes only (leaf block), or internal and imaginary
 /// nodes only (internal block); a mix is called a partial leaf block and does not exist.
 enum class NodeKind : std::uint32_t {
   internal = 0,   ///< index is the child block

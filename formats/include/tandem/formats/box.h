@@ -12,7 +12,7 @@ struct Box {
   float half_extent[3];
 };
 
-/// One corner point of a triangle, or any other stored position.
+/// A corner point of a triangle, or any other stored position.
 using Position = float[3];
 
 /// The largest magnitude of a stored coordinate. It is 2^-12 below the largest float, so that no box
@@ -29,13 +29,14 @@ Box enclose(const Position& lo, const Position& hi);
 /// come from enclose() (see kMaxCoordinate).
 Box enclose(const Block& block);
 
-/// Whether [c - h, c + h] on every axis contains the point, in real arithmetic: no rounding decides it.
+/// Returns whether [c - h, c + h] on every axis contains the point, in real arithmetic: no rounding decides
+/// it.
 bool contains(const Box& box, const Position& point);
 
-/// Whether `outer` contains `inner`, in real arithmetic: |c_i - c_o| + h_i <= h_o on every axis.
+/// Returns whether `outer` contains `inner`, in real arithmetic: |c_i - c_o| + h_i <= h_o on every axis.
 bool contains(const Box& outer, const Box& inner);
 
-/// Whether it is the box of an imaginary node, bit by bit.
+/// Returns whether it is the box of an imaginary node, bit by bit.
 bool is_imaginary_box(const Box& box);
 
 TANDEM_HD inline Box box_of(const Block& block, int node) {
@@ -43,7 +44,7 @@ TANDEM_HD inline Box box_of(const Block& block, int node) {
           {block.half_extent[0][node], block.half_extent[1][node], block.half_extent[2][node]}};
 }
 
-/// How far all boxes of a tree reach. Every box lies in a box of the root block, so the root block tells.
+/// The extent of all boxes of a tree. Every box lies in a box of the root block, so the root block gives it.
 struct TreeExtent {
   double reach[3];        ///< >= |center| + half_extent
   double half_extent[3];  ///< >= half_extent

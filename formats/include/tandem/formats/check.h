@@ -14,7 +14,7 @@ struct CheckResult {
   AssetView asset;  ///< valid only when the status is kOk
 };
 
-/// How much check() proves.
+/// Says how much check() proves.
 enum class CheckDepth : std::uint8_t {
   full,
   quick,  ///< it believes what oriented boxes hold and what topology says; what this spares:
@@ -38,8 +38,8 @@ enum class CheckDepth : std::uint8_t {
 /// stay after a failure.
 CheckResult check(const void* data, std::size_t bytes, CheckDepth depth = CheckDepth::full);
 
-/// What check() returns of the same bytes, at once. Condition: it found them sound, and they are as they
-/// were.
+/// Returns the view that check() returns of the same bytes, without checking them. Condition: check() found
+/// them sound, and they have not changed.
 AssetView view_of_checked(const void* data);
 
 /// Writes the content hash into the header, the last step of writing a file.

@@ -30,7 +30,8 @@ class EnclosedVolume {
     ++triangles_;
   }
 
-  /// Whether the triangles go round clockwise as seen from outside; false where roundings would decide.
+  /// Returns whether the triangles go round clockwise as seen from outside; false where roundings would
+  /// decide.
   bool is_inside_out() const { return sum_ < -(3 * triangles_ + 6) * 0x1p-52 * magnitude_; }
 
  private:

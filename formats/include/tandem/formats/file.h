@@ -73,7 +73,7 @@ struct Level {
 };
 static_assert(sizeof(Level) == 32);
 
-/// All components of the level are closed.
+/// This flag is set where all components of the level are closed.
 inline constexpr std::uint32_t kClosedLevel = 1;
 
 /// A triangle, three float4, relative to the asset's origin. Triangles lie in leaf order, so those below a

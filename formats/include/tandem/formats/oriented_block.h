@@ -62,7 +62,7 @@ struct ScaledRotation {
   float squared_length;  ///< of the quaternion; below 2^24
 };
 
-/// Part 0 to 3 of a quaternion: w, x, y, z.
+/// Returns part 0 to 3 of a quaternion: w, x, y, z.
 TANDEM_HD inline float quaternion_part(const BlockRotation& rotation, int part) {
   const std::uint32_t word = part < 2 ? rotation.wx : rotation.yz;
 #ifdef __CUDA_ARCH__
@@ -124,9 +124,9 @@ inline void box_along(double lowest, double highest, double farthest, float& cen
     half_extent = std::nextafter(half_extent, std::numeric_limits<float>::infinity());
 }
 
-/// How large a block is: the edge of the cube with the surface of its largest box. Walks compare it to decide
-/// which of two blocks goes on to its children. The same on every machine: float64 squares of float32 numbers
-/// are exact, and the rest is rounded as IEEE 754 says, fused or not.
+/// Returns the size of a block: the edge of the cube with the surface of its largest box. Walks compare it to
+/// decide which of two blocks goes on to its children. It is the same on every machine: float64 squares of
+/// float32 numbers are exact, and the rest is rounded as IEEE 754 says, fused or not.
 inline float oriented_size(const OrientedBlock& block) {
   double largest = 0;
   for (int i = 0; i < kNodesPerBlock; ++i) {

@@ -3,15 +3,15 @@
 
 namespace tandem {
 
-/// What can be wrong with a .bvh file, with loading it, or with a query: one name per defect.
-/// The checker tests for the defects in this order; the first that it finds is returned. Numbers are those of
-/// tandem.h, which never change; those that a GPU finds are below 256.
+/// Says what is wrong with a .bvh file, with loading it, or with a query: one name per defect. The checker
+/// tests for the defects in this order; the first that it finds is returned. Numbers are those of tandem.h,
+/// which never change; those that a GPU finds are below 256.
 enum class [[nodiscard]] Status : std::uint32_t{
     kOk = 0,
     // Getting at the bytes.
     kFileNotFound = 100, kNotARegularFile, kCannotOpen, kCannotRead, kOutOfMemory = 4,
     kMisaligned = 104,  ///< bytes in memory must start at a multiple of 128
-    // What kind of file it is.
+    // These say what kind of file it is.
     kBiovisionMotionCapture,  ///< the other .bvh: starts with HIERARCHY
     kNotTandem,
     kDamagedByTextTransfer,  ///< ours, but line ends were rewritten on the way
@@ -78,7 +78,7 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kNoAxisAlignedBlocks,  ///< the other modes of queries on a GPU need them, and the asset was given without
     kNoTopology,           ///< contact manifolds need it, and the file has none
     kNoFinestLevel,        ///< queries by tolerance need it, and the view leaves it out
-    // On a GPU; status_of() of gpu_status.h names CUDA's errors.
+    // These are of a GPU; status_of() of gpu_status.h names CUDA's errors.
     kNoGpu = 300,      ///< none here, none that this process may use, or no driver
     kDriverTooOld,     ///< for the CUDA version that the program was built with
     kGpuNotSupported,  ///< the program holds no code for a GPU of this kind
@@ -89,11 +89,11 @@ enum class [[nodiscard]] Status : std::uint32_t{
 /// The name of a defect as written above without the k, for logs and JSON: "ChildShared".
 const char* name(Status status);
 
-/// One sentence for people, without a full stop: "a block has two parents".
+/// Returns one sentence for people, without a full stop: "a block has two parents".
 const char* explain(Status status);
 
-/// What the number that comes with a defect counts: "section", "level", "part", "block", "byte"; null where
-/// there is no number.
+/// Returns what the number counts that comes with a defect: "section", "level", "part", "block", "byte"; null
+/// where there is no number.
 const char* subject(Status status);
 
 }  // namespace tandem

@@ -4,7 +4,7 @@
 
 #include "tandem/formats/platform.h"
 
-/// How the triangles of a level hang together: what contact manifolds need of a mesh beside its triangles.
+/// The topology of a level says which triangles share edges. Contact manifolds need it beside the triangles.
 ///
 /// A triangle has three sides; side k runs from corner k to corner k + 1 (side 2 to corner 0). Sides between
 /// the same two vertices, in either direction, are the sides of one **edge**. A side between corners of the
@@ -30,23 +30,23 @@ inline constexpr std::uint32_t kBoundaryEdge0 = 2;    ///< << k: the edge of sid
 inline constexpr std::uint32_t kManyTriangles0 = 16;  ///< << k: the edge of side k has more than two sides
 inline constexpr std::uint32_t kTopologyFlags = kTurned | 7 * kBoundaryEdge0 | 7 * kManyTriangles0;
 
-/// Whether corners 0, 2, 1 go round against the clock as seen from outside, instead of 0, 1, 2.
+/// Returns whether corners 0, 2, 1 go round against the clock as seen from outside, instead of 0, 1, 2.
 TANDEM_HD constexpr bool is_turned(std::uint32_t flags) {
   return (flags & kTurned) != 0;
 }
 
-/// Whether side k runs from its lower to its upper vertex, once the triangle is turned where it is marked.
-/// Condition: 0 <= k < 3, here and below.
+/// Returns whether side k runs from its lower to its upper vertex, once the triangle is turned where it is
+/// marked. Condition: 0 <= k < 3, here and below.
 TANDEM_HD constexpr bool runs_up(const TriangleTopology& triangle, std::uint32_t k) {
   return (triangle.vertex[k] < triangle.vertex[(k + 1) % 3]) != is_turned(triangle.flags);
 }
 
-/// Whether no other triangle has side k's edge.
+/// Returns whether no other triangle has side k's edge.
 TANDEM_HD constexpr bool is_boundary(std::uint32_t flags, int k) {
   return (flags & kBoundaryEdge0 << k) != 0;
 }
 
-/// Whether side k's edge has more than two sides.
+/// Returns whether side k's edge has more than two sides.
 TANDEM_HD constexpr bool has_many_triangles(std::uint32_t flags, int k) {
   return (flags & kManyTriangles0 << k) != 0;
 }
@@ -60,8 +60,8 @@ struct alignas(16) SurfaceComponent {
 };
 static_assert(sizeof(SurfaceComponent) == 16 && offsetof(SurfaceComponent, flags) == 8);
 
-/// Each edge of the component is run along equally often in both directions once the turned triangles are
-/// turned.
+/// This flag is set where each edge of the component is run along equally often in both directions once the
+/// turned triangles are turned.
 inline constexpr std::uint32_t kClosedComponent = 1;
 
 TANDEM_HD constexpr bool is_closed(const SurfaceComponent& component) {

@@ -30,9 +30,8 @@ class BroadPhase {
   /// where fixed boxes are kept of another number of boxes.
   Status find_pairs(std::span<const WorldBox> boxes, const PairFilter& filter = {});
 
-  /// The same with the threads of a query, which are there for so many workers; neither the pairs nor
-  /// group_pairs() depend on their number. self_pairs: each box with itself is a pair too, where the filter
-  /// looks at it.
+  /// Finds the pairs with the threads of a query, for `workers` workers. Neither the pairs nor group_pairs()
+  /// depend on their number. self_pairs: each box with itself is a pair too, where the filter looks at it.
   Status find_pairs(std::span<const WorldBox> boxes, const PairFilter& filter, bool self_pairs,
                     WorkerThreads& threads, std::uint32_t workers);
 
@@ -46,7 +45,7 @@ class BroadPhase {
 
   void forget_fixed();
 
-  /// Of how many boxes fixed ones are kept; 0: none are.
+  /// Returns the number of boxes whose fixed ones are kept, 0 where none are.
   std::size_t kept_of() const { return kept_of_; }
 
   /// The boxes that a call looks at: all but those that are kept, ascending. count: of all boxes. Condition:
@@ -59,7 +58,7 @@ class BroadPhase {
   /// The pairs of the last call that returned kOk; valid until the next call.
   std::span<const ObjectPair> pairs() const { return pairs_.view(); }
 
-  /// How many pairs of groups the last call looked at: its work, independent of the machine.
+  /// Returns how many pairs of groups the last call looked at: its work, independent of the machine.
   std::uint64_t group_pairs() const { return group_pairs_; }
 
  private:
@@ -108,7 +107,7 @@ class BroadPhase {
     int level;
   };
 
-  /// What a worker found.
+  /// The pairs that a worker found.
   struct alignas(64) Finder : Allocated {
     Buffer<ObjectPair> pairs;
     std::uint64_t group_pairs = 0;

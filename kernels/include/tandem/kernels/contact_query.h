@@ -6,7 +6,7 @@
 
 namespace tandem {
 
-/// What a query decides on.
+/// Says what a query decides on.
 enum class QueryMode : std::uint8_t {
   exact,  ///< contact pairs, as exact arithmetic on the posed vertices finds them
   fast,   ///< contact pairs by float32 in the first instance's frame, which may err where rounding does
@@ -39,7 +39,7 @@ struct ContactOptions {
   bool add_error_bounds = false;
 };
 
-/// What a query did. The counters depend neither on the number of threads nor on the machine.
+/// Counts what a query did. The counters depend neither on the number of threads nor on the machine.
 struct ContactCounters {
   std::uint64_t object_pairs = 0;
   std::uint64_t block_pairs = 0;  ///< 16 box tests each

@@ -28,12 +28,13 @@ struct DistanceOptions {
   DistanceTolerance tolerance = {};
   /// Pairs that are surely farther apart than this have no nearest points: lower >= reach, upper is infinite.
   double reach = std::numeric_limits<double>::infinity();
-  /// By ascending a, then b: where to begin to look. Those of pairs or triangles that there are not are
-  /// passed over. Results are as certified as without, and come sooner.
+  /// The nearest triangles of a former step, with which the search of a pair begins, by ascending a, then b.
+  /// Pairs and triangles that do not exist are passed over. Results are as certified as without, and come
+  /// sooner.
   std::span<const FormerNearest> former = {};
 };
 
-/// What a query did. The counters depend neither on the number of threads nor on the machine.
+/// Counts what a query did. The counters depend neither on the number of threads nor on the machine.
 struct DistanceCounters {
   std::uint64_t object_pairs = 0;
   std::uint64_t block_pairs = 0;  ///< 16 bounds of boxes each

@@ -13,8 +13,8 @@ enum class ImpactStatus : std::uint8_t {
   at_start = 2,  ///< the instances are in contact at the start, as the exact contact query says
 };
 
-/// When the two instances of a pair meet. Where there is none in this step the triangles and faces are
-/// kNoIndex, the gap is infinite, and the points are 0.
+/// The impact of a pair: when its two instances meet. If they do not meet in this step, the triangles and
+/// faces are kNoIndex, the gap is infinite, and the points are 0.
 struct Impact {
   double t_safe;  ///< seconds; the whole step where there is none, 0 where they are in contact at the start
   double gap;     ///< of the two triangles at t_safe; other triangles of the pair may be nearer, but recede
@@ -28,11 +28,11 @@ struct ImpactOptions {
   std::span<const RigidMotion> motion =
       {};               ///< of each instance, from where it stands; a removed one's is not looked at
   double duration = 0;  ///< of the step, in seconds
-  /// How near triangles come before they stop a pair: a part of the diagonal of the smaller body's bounds.
+  /// Triangles that come this near stop a pair. It is a part of the diagonal of the smaller body's bounds.
   double tolerance = 1e-6;
 };
 
-/// What a query did. The counters depend neither on the number of threads nor on the machine.
+/// Counts what a query did. The counters depend neither on the number of threads nor on the machine.
 struct ImpactCounters {
   std::uint64_t object_pairs = 0;
   std::uint64_t at_start = 0, found = 0;  ///< of them

@@ -21,7 +21,7 @@ struct ManifoldPoint {
 };
 static_assert(sizeof(ManifoldPoint) == 104);
 
-/// How the surfaces of a manifold meet.
+/// Says how the surfaces of a manifold meet.
 enum ManifoldFlags : std::uint32_t {
   kTouching = 1,     ///< without overlap: depth 0
   kOpenCurve = 2,    ///< the curve in which the surfaces cross does not close: an open mesh, or mode fast
@@ -40,7 +40,7 @@ struct Manifold {
 };
 static_assert(sizeof(Manifold) == 96);
 
-/// What became of a list of contacts.
+/// Counts what became of a list of contacts.
 struct ManifoldCounters {
   std::uint64_t contacts = 0;
   std::uint64_t segments = 0;  ///< contacts whose triangles share a line

@@ -6,8 +6,8 @@
 
 namespace tandem {
 
-/// How an instance moves during a step, in the world: its centre goes straight ahead, and the instance turns
-/// about it, both at constant speed.
+/// The motion of an instance during a step, in the world: its centre goes straight ahead, and the instance
+/// turns about it, both at constant speed.
 ///
 /// **Definition.** Let x be a posed vertex at the start of the step, a float64 point as apply() makes it. At
 /// time t its place is, in real arithmetic on the numbers below,
@@ -76,9 +76,9 @@ TANDEM_HD inline Pose pose_at(const Pose& start, const RigidMotion& motion, doub
   return pose;
 }
 
-/// How far a point that apply() makes with pose_at() may be from where the motion takes it, at any time of a
-/// step: a posed vertex at `reach` from the coordinates' origin at most. displacement, turn: the velocities
-/// times the length of the step. Condition: the rotation is rigid.
+/// Returns how far a point that apply() makes with pose_at() may be from where the motion takes it, at any
+/// time of a step: a posed vertex at `reach` from the coordinates' origin at most. displacement, turn: the
+/// velocities times the length of the step. Condition: the rotation is rigid.
 ///
 /// Proof. Let w = 2^-53, x = R p + t + e the posed vertex, |e| <= w |t| + 8 w |p|. The rotation of pose_at()
 /// errs by what rotation_by() says and 10 w for the product with R, which moves p and t - c by (2^-45 (1 +

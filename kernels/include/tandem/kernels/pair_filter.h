@@ -3,10 +3,10 @@
 
 #include "tandem/formats/platform.h"
 
-/// Which pairs of instances a broad phase looks at: one rule for CPU and GPU.
+/// The filter says which pairs of instances a broad phase looks at, by one rule for CPU and GPU.
 namespace tandem {
 
-/// What moves an instance. The numbers are those of /simulation/motion in a scene file.
+/// Says what moves an instance. The numbers are those of /simulation/motion in a scene file.
 enum class Motion : std::uint8_t {
   moving,     ///< forces and contacts
   fixed,      ///< nothing
@@ -14,15 +14,15 @@ enum class Motion : std::uint8_t {
   sleeping,   ///< nothing until the caller wakes it: the caller's flag
 };
 
-/// Whether a pair is looked at: where one of them moves, or a kinematic one meets a sleeping one, which its
-/// caller may want to wake. Nothing comes of the others: none of the two gives way.
+/// Returns whether a pair is looked at: where one of them moves, or a kinematic one meets a sleeping one,
+/// which its caller may want to wake. Nothing comes of the others: none of the two gives way.
 TANDEM_HD inline bool motions_meet(Motion a, Motion b) {
   // Bit b of row a, in four bits each: sleeping, kinematic, fixed, moving.
   constexpr std::uint32_t kRows = 0b0101'1001'0001'1111;
   return (kRows >> (4 * (static_cast<std::uint32_t>(a) & 3) + (static_cast<std::uint32_t>(b) & 3)) & 1) != 0;
 }
 
-/// Whether each of the two is in a group that the other's mask names.
+/// Returns whether each of the two is in a group that the other's mask names.
 TANDEM_HD inline bool groups_meet(std::uint32_t group_a, std::uint32_t mask_a, std::uint32_t group_b,
                                   std::uint32_t mask_b) {
   return (group_a & mask_b) != 0 && (group_b & mask_a) != 0;
@@ -38,12 +38,13 @@ struct ExcludedPairs {
   std::uint32_t instances = 0;           ///< every pair names instances below this number
   std::uint64_t row = 0;                 ///< of the pair that names the last of them
 
-  /// The same for both orders of a and b. No pair of instances has the key kEmpty, as kNoIndex is none.
+  /// Returns the key of a pair, the same for both orders of a and b. No pair of instances has the key kEmpty,
+  /// as kNoIndex is none.
   TANDEM_HD static std::uint64_t key(std::uint32_t a, std::uint32_t b) {
     return a < b ? std::uint64_t{a} << 32 | b : std::uint64_t{b} << 32 | a;
   }
 
-  /// Where a key's slots begin. Source: Stafford's variant 13 of the finalizer of MurmurHash3.
+  /// Returns where a key's slots begin. Source: Stafford's variant 13 of the finalizer of MurmurHash3.
   TANDEM_HD std::uint64_t home(std::uint64_t key) const {
     key = (key ^ key >> 30) * 0xBF58476D1CE4E5B9u;
     key = (key ^ key >> 27) * 0x94D049BB133111EBu;
@@ -61,7 +62,7 @@ struct ExcludedPairs {
   }
 };
 
-/// Which pairs a broad phase looks at, of all whose world boxes meet. Each array has an entry for each
+/// Says which pairs a broad phase looks at, of all whose world boxes meet. Each array has an entry for each
 /// instance, or is null; without any, all pairs are. Owns nothing; for a broad phase on a GPU all lies in GPU
 /// memory.
 struct PairFilter {

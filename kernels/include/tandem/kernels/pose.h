@@ -5,22 +5,22 @@
 
 namespace tandem {
 
-/// Where an instance of an asset stands: x_world = rotation * x + translation, float64. Rigid to
+/// The place of an instance of an asset: x_world = rotation * x + translation, float64. Rigid to
 /// kRigidTolerance.
 struct Pose {
   double rotation[3][3];
   double translation[3];
 };
 
-/// How far rotation^T * rotation may be from the identity, entry by entry, and the determinant from 1.
+/// The most that rotation^T * rotation may be off the identity, entry by entry, and the determinant off 1.
 inline constexpr double kRigidTolerance = 1e-6;
 
 inline constexpr Pose kIdentityPose = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0, 0, 0}};
 
 namespace detail {
 
-// Each operation rounded to float64 by itself, never contracted into a fused one: host code is compiled with
-// -ffp-contract=off.
+// These operations are rounded to float64 one by one, and never contracted into a fused one: host code is
+// compiled with -ffp-contract=off.
 TANDEM_HD inline double times(double a, double b) {
 #ifdef __CUDA_ARCH__
   return __dmul_rn(a, b);
@@ -58,7 +58,7 @@ TANDEM_HD inline Pose for_stored_coordinates(const Pose& pose, const double* ori
   return stored;
 }
 
-/// Whether all entries are finite and the rotation is one, to kRigidTolerance. NaN is not rigid.
+/// Returns whether all entries are finite and the rotation is one, to kRigidTolerance. NaN is not rigid.
 TANDEM_HD inline bool is_rigid(const Pose& pose) {
   const auto& r = pose.rotation;
   bool rigid = true;

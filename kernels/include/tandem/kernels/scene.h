@@ -12,14 +12,14 @@
 
 namespace tandem {
 
-/// Where a body stands. The asset is known by its place in the list given to Scene::set_assets(); the pose
+/// A body and its place. The asset is known by its place in the list given to Scene::set_assets(); the pose
 /// applies to the file's coordinates.
 struct Instance {
   std::uint32_t asset;
   Pose pose;
 };
 
-/// One body's entries in the arrays of a PairFilter.
+/// The entries of one body in the arrays of a PairFilter.
 struct BodyFilter {
   Motion motion = Motion::moving;
   std::uint32_t group = ~std::uint32_t{0}, mask = ~std::uint32_t{0};
@@ -29,7 +29,7 @@ inline constexpr std::uint32_t kMostSceneThreads = 1024;
 
 struct SceneState;
 
-/// What answers the questions of a scene in place of the CPU; see GpuScene.
+/// A device that answers the questions of a scene in place of the CPU; see GpuScene.
 class SceneDevice;
 
 /// Destroys a device that no scene owns; null too.
@@ -97,7 +97,7 @@ class Scene {
   /// the scene or question about it.
   std::span<const ObjectPair> pairs() const;
 
-  /// All bodies by number; a removed one has asset kNoIndex. Valid until bodies are placed or added.
+  /// Returns all bodies by number; a removed one has asset kNoIndex. Valid until bodies are placed or added.
   std::span<const Instance> instances() const;
 
   /// The asset, instance, pair or contact that is to blame for the last error of this scene or of a question

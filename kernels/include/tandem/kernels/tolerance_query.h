@@ -6,7 +6,7 @@
 
 namespace tandem {
 
-/// What is certain of the finest surfaces of an object pair.
+/// Says what is certain about the finest surfaces of an object pair.
 enum class ToleranceVerdict : std::uint8_t {
   apart,             ///< they do not meet
   touching,          ///< they meet
@@ -22,12 +22,12 @@ struct PairVerdict {
 };
 
 struct ToleranceOptions {
-  /// What need not be told apart from touching, in units of length. With 0 all pairs are decided. From 0 to
-  /// kLargestWorldCoordinate, else kOutOfRange.
+  /// The distance that need not be told apart from touching, in units of length. With 0 all pairs are
+  /// decided. From 0 to kLargestWorldCoordinate, else kOutOfRange.
   double tolerance = 0;
 };
 
-/// What a query did. The counters depend neither on the number of threads nor on the machine.
+/// Counts what a query did. The counters depend neither on the number of threads nor on the machine.
 struct ToleranceCounters {
   std::uint64_t apart = 0, touching = 0, within_tolerance = 0;  ///< object pairs
   ContactCounters work;                                         ///< of the contact query at these levels

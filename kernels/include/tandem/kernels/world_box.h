@@ -36,7 +36,7 @@ TANDEM_HD inline WorldBox world_box(const Pose& pose, const Real* lower, const R
 /// The largest coordinate of a world box that queries take.
 inline constexpr double kLargestWorldCoordinate = 1e300;
 
-/// Whether queries take this box; NaN is not in range.
+/// Returns whether queries take this box; NaN is not in range.
 TANDEM_HD inline bool in_range(const WorldBox& box) {
   bool in_range = true;
   for (int k = 0; k < 3; ++k) {
@@ -46,7 +46,7 @@ TANDEM_HD inline bool in_range(const WorldBox& box) {
   return in_range;
 }
 
-/// Whether two world boxes meet, touching included.
+/// Returns whether two world boxes meet, touching included.
 TANDEM_HD inline bool overlap(const WorldBox& a, const WorldBox& b) {
   bool overlap = true;
   for (int k = 0; k < 3; ++k) overlap = overlap && a.lo[k] <= b.hi[k] && b.lo[k] <= a.hi[k];
@@ -65,7 +65,7 @@ TANDEM_HD inline double distance_between(const WorldBox& a, const WorldBox& b) {
   return gap * (1 - 0x1p-52);
 }
 
-/// Whether along each axis no gap as computed is larger than `reach`; with 0, whether they meet.
+/// Returns whether along each axis no gap as computed is larger than `reach`; with 0, whether they meet.
 TANDEM_HD inline bool are_near(const WorldBox& a, const WorldBox& b, double reach) {
   bool near = true;
   for (int k = 0; k < 3; ++k) near = near && a.lo[k] - b.hi[k] <= reach && b.lo[k] - a.hi[k] <= reach;

@@ -6,7 +6,7 @@
 
 namespace tandem {
 
-/// How a file gets into memory.
+/// Says how a file gets into memory.
 enum class Access : std::uint8_t {
   map,   ///< mmap, read-only: pages are shared with every process that maps the file; falls back to read
   read,  ///< one read into memory of its own: for file systems and platforms that cannot map
@@ -16,9 +16,9 @@ enum class Access : std::uint8_t {
 /// nothing.
 ///
 /// open() looks at every byte, of all levels of detail, since nothing of a file is believed unseen. Mapping
-/// copies nothing: pages are the system's, which takes them back when memory is scarce. Of a file of several
-/// levels open() gives them back itself (on Linux), so that of the process's memory the asset takes the pages
-/// of those levels alone that are used.
+/// copies nothing: pages are the system's, which takes them back when memory is scarce. If a file has several
+/// levels, open() gives them back itself (on Linux), so that the asset takes memory of the process only for
+/// the pages of the levels that are used.
 ///
 /// While an asset is mapped, nobody may write into its file or cut it short: what was checked would no longer
 /// hold, and reading a page that is gone ends a process. Tools that replace a file by a rename, as bvhbuild

@@ -1,8 +1,8 @@
 #include "kernels/contact/candidate.h"
 #include "paper_engine_data.h"
 
-// What comes before the traversal, and the last stages of the triangle test. Compiled without fused
-// operations, which their float64 arithmetic relies on.
+// These kernels do what comes before the traversal, and the last stages of the triangle test. They are
+// compiled without fused operations, which their float64 arithmetic relies on.
 namespace tandem::bench::paper {
 namespace {
 

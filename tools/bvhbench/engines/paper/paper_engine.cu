@@ -16,7 +16,7 @@ using paper::kLeaf;
 
 namespace {
 
-/// What the CPU reads, in memory that the GPU copies to.
+/// The answers that the CPU reads, in memory that the GPU copies to.
 struct Answers {
   paper::Outcome outcome;
   std::uint32_t pair_count;
@@ -45,7 +45,7 @@ struct PaperEngine::State {
   PaperReport report;
   cudaError_t error = cudaSuccess;
 
-  /// Whether all went well so far; keeps the first error.
+  /// Returns whether all went well so far; keeps the first error.
   bool ok(cudaError_t result) {
     if (error == cudaSuccess && result != cudaSuccess) {
       error = result;
@@ -111,7 +111,7 @@ Status PaperEngine::State::prepare(paper::QueryArgs& args, cudaStream_t stream) 
   return gpu::status_in(answers->outcome.error);
 }
 
-/// One iteration of the paper's loop but for the collection: flags, their prefix sums, and the totals.
+/// Makes one iteration of the paper's loop but for the collection: flags, their prefix sums, and the totals.
 bool PaperEngine::State::test_level(paper::Level& level, PaperFlags kind, cudaStream_t stream) {
   const std::size_t count = paper::sum_count(kind, level.count);
   for (const auto array : {kCollision, kLeaf}) {
@@ -157,7 +157,7 @@ Status PaperEngine::State::traverse(PaperFlags kind, cudaStream_t stream) {
   return Status::kOk;
 }
 
-/// In the room that there was last time; once more where that was too little.
+/// Tests in the room that there was last time, and once more where that was too little.
 bool PaperEngine::State::test_triangles(const paper::QueryArgs& args, QueryMode mode, cudaStream_t stream) {
   answers->outcome = {};
   if (candidate_count == 0) return true;

@@ -10,7 +10,7 @@
 
 namespace tandem::bench {
 
-/// How the two flag arrays of a level are stored.
+/// Says how the two flag arrays of a level are stored.
 enum class PaperFlags : std::uint8_t {
   words,  ///< 32 bits a flag, as the paper's
   bits,   ///< 1 bit, and a prefix sum over the 32 flags of a warp rather than over single ones: the paper's
@@ -22,7 +22,7 @@ struct PaperOptions {
   PaperFlags flags = PaperFlags::words;
 };
 
-/// What a query did, and how long it took on the GPU, waits for the CPU included.
+/// Counts what a query did, and says how long it took on the GPU, waits for the CPU included.
 struct PaperReport {
   std::uint64_t where = 0;  ///< the instance or pair that is to blame for an error
   ContactCounters counters;
@@ -58,7 +58,7 @@ class PaperEngine {
   Status find_contacts(const GpuInstances& instances, const GpuPairs& pairs, const PaperOptions& options,
                        cudaStream_t stream);
 
-  /// In GPU memory: report().counters.contacts of them, in no order.
+  /// Returns report().counters.contacts contacts, in GPU memory, in no order.
   const Contact* contacts() const;
   const PaperReport& report() const;
   std::size_t bytes() const;  ///< GPU memory held, the assets' own excepted

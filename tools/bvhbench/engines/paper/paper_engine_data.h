@@ -8,7 +8,7 @@
 #include "kernels/contact/candidate.h"
 #include "paper_engine.h"
 
-// What the kernels of the paper's engine share, all of it in GPU memory.
+// The kernels of the paper's engine share this data, all of it in GPU memory.
 namespace tandem::bench::paper {
 
 using gpu::Counter;

@@ -22,7 +22,7 @@ constexpr auto kLeafKind = static_cast<std::uint32_t>(NodeKind::leaf);
 
 using gpu::pose_of;
 
-/// Where a thread's two flags are.
+/// The place of a thread's two flags.
 template <PaperFlags kKind>
 struct Flags {
   __device__ static void write(std::uint32_t* flags, std::uint64_t thread, std::uint64_t threads, bool flag) {
@@ -36,7 +36,7 @@ struct Flags {
     }
   }
 
-  /// Whether it is set; if so, its number among those that are.
+  /// Returns whether it is set; if so, its number among those that are.
   __device__ static bool read(const std::uint32_t* flags, const std::uint32_t* sums, std::uint64_t thread,
                               std::uint32_t& number) {
     if constexpr (kKind == PaperFlags::bits) {

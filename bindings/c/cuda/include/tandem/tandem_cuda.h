@@ -99,15 +99,16 @@ typedef struct tandem_gpu_pairs {
 /// A table of pairs that a filter excludes, in GPU memory.
 typedef struct tandem_gpu_excluded_pairs tandem_gpu_excluded_pairs;
 
-/// As tandem_excluded_pairs_create(): `pairs` in CPU memory. Waits for the stream.
+/// Makes a table on the GPU, as tandem_excluded_pairs_create() does; `pairs` lie in CPU memory. Waits for the
+/// stream.
 TANDEM_API tandem_status tandem_gpu_excluded_pairs_create(const tandem_object_pair* pairs, size_t count,
                                                           tandem_stream stream,
                                                           const tandem_allocator* allocator,
                                                           tandem_gpu_excluded_pairs** excluded);
 TANDEM_API void tandem_gpu_excluded_pairs_destroy(tandem_gpu_excluded_pairs* excluded);
 
-/// As tandem_pair_filter, with arrays in GPU memory that have an entry for each instance, or are null. All
-/// stay, with the table, until the stream has passed the call.
+/// Says which pairs a call looks at, as tandem_pair_filter does. Its arrays lie in GPU memory and have an
+/// entry for each instance, or are null. All stay, with the table, until the stream has passed the call.
 typedef struct tandem_gpu_pair_filter {
   uint32_t struct_size;
   uint32_t reserved;
@@ -169,7 +170,8 @@ TANDEM_API tandem_status tandem_gpu_broad_phase_find(tandem_gpu_broad_phase* bro
                                                      const tandem_gpu_instances* instances,
                                                      const tandem_gpu_broad_phase_options* options,
                                                      tandem_stream stream);
-/// Where the pairs lie, for the queries below: a < b. The result's arrays are null before assets are set.
+/// Returns where the pairs lie, for the queries below: a < b. The result's arrays are null before assets are
+/// set.
 TANDEM_API tandem_gpu_pairs tandem_gpu_broad_phase_pairs(const tandem_gpu_broad_phase* broad_phase);
 TANDEM_API const tandem_gpu_broad_phase_report* tandem_gpu_broad_phase_device_report(
     const tandem_gpu_broad_phase* broad_phase);
@@ -218,7 +220,7 @@ typedef struct tandem_gpu_group_counts {
   uint32_t few, many;
 } tandem_gpu_group_counts;
 
-/// Where grouped contacts lie, in GPU memory.
+/// The arrays in GPU memory that say where the contacts of each pair lie.
 typedef struct tandem_gpu_contact_groups {
   const tandem_contact* contacts;
   const uint32_t*
@@ -251,10 +253,12 @@ TANDEM_API tandem_status tandem_gpu_contact_query_find(tandem_gpu_contact_query*
                                                        const tandem_gpu_pairs* pairs,
                                                        const tandem_gpu_query_options* options,
                                                        tandem_stream stream);
-/// In GPU memory: as many as the report says. Null before assets are set, as all results.
+/// Returns the contacts, in GPU memory, as many as the report says. All results are null before assets are
+/// set.
 TANDEM_API const tandem_contact* tandem_gpu_contact_query_contacts(const tandem_gpu_contact_query* query);
 TANDEM_API tandem_gpu_contact_groups tandem_gpu_contact_query_groups(const tandem_gpu_contact_query* query);
-/// Of each pair whether it has a contact, not 0 where it has; of a complete query with first_contact_only.
+/// Returns a number for each pair, not 0 where the pair has a contact. It is valid behind a complete query
+/// with first_contact_only.
 TANDEM_API const uint32_t* tandem_gpu_contact_query_met(const tandem_gpu_contact_query* query);
 TANDEM_API const tandem_gpu_query_report* tandem_gpu_contact_query_device_report(
     const tandem_gpu_contact_query* query);
@@ -290,12 +294,12 @@ TANDEM_API tandem_status tandem_gpu_manifolds_set_assets(tandem_gpu_manifolds* m
                                                          tandem_gpu_assets* assets, tandem_stream stream);
 TANDEM_API tandem_status tandem_gpu_manifolds_reserve(tandem_gpu_manifolds* manifolds,
                                                       const tandem_gpu_manifold_capacity* capacity);
-/// Behind a call of `query`, with its instances and pairs. Result: TANDEM_CONTACTS_MISSING where its last
-/// call did not group contacts.
+/// Queues manifolds behind a call of `query`, with that call's instances and pairs. Result:
+/// TANDEM_CONTACTS_MISSING where its last call did not group contacts.
 TANDEM_API tandem_status tandem_gpu_manifolds_enqueue(
     tandem_gpu_manifolds* manifolds, const tandem_gpu_instances* instances, const tandem_gpu_pairs* pairs,
     const tandem_gpu_contact_query* query, const tandem_manifold_options* options, tandem_stream stream);
-/// Behind a query that has ended and is complete.
+/// Makes manifolds of a query that has ended and is complete, and waits for them.
 TANDEM_API tandem_status tandem_gpu_manifolds_find(
     tandem_gpu_manifolds* manifolds, const tandem_gpu_instances* instances, const tandem_gpu_pairs* pairs,
     const tandem_gpu_contact_query* query, const tandem_manifold_options* options, tandem_stream stream);
@@ -332,7 +336,8 @@ TANDEM_API tandem_status tandem_gpu_containment_query_set_assets(tandem_gpu_cont
                                                                  tandem_stream stream);
 TANDEM_API tandem_status tandem_gpu_containment_query_reserve(
     tandem_gpu_containment_query* query, const tandem_gpu_containment_capacity* capacity);
-/// As of manifolds; TANDEM_CONTACTS_MISSING also where the query's call was not in mode TANDEM_EXACT, of
+/// Queues the question behind a call of `query`, with that call's instances and pairs. Result:
+/// TANDEM_CONTACTS_MISSING where that call did not group contacts, was not in mode TANDEM_EXACT, was of
 /// clearance, or found the first contacts only.
 TANDEM_API tandem_status tandem_gpu_containment_query_enqueue(tandem_gpu_containment_query* query,
                                                               const tandem_gpu_instances* instances,
@@ -364,7 +369,7 @@ typedef struct tandem_gpu_distance_options {
   double reach;
   double absolute_tolerance;  ///< upper - lower <= max(absolute, relative * upper)
   double relative_tolerance;  ///< 0: 1e-6; at the finest 2^-48
-  /// Or null: of each pair what it was a step ago, in GPU memory; the query's own distances will do.
+  /// The distance of each pair a step ago, in GPU memory, or null; the query's own distances will do.
   const tandem_distance* former;
 } tandem_gpu_distance_options;
 
@@ -406,7 +411,7 @@ TANDEM_API tandem_status tandem_gpu_distance_query_find(tandem_gpu_distance_quer
                                                         const tandem_gpu_pairs* pairs,
                                                         const tandem_gpu_distance_options* options,
                                                         tandem_stream stream);
-/// One for each pair.
+/// Returns the distance of each pair, in GPU memory.
 TANDEM_API const tandem_distance* tandem_gpu_distance_query_distances(const tandem_gpu_distance_query* query);
 TANDEM_API const tandem_gpu_distance_report* tandem_gpu_distance_query_device_report(
     const tandem_gpu_distance_query* query);
@@ -457,9 +462,9 @@ TANDEM_API tandem_status tandem_gpu_impact_query_set_assets(tandem_gpu_impact_qu
 TANDEM_API tandem_status tandem_gpu_impact_query_reserve(tandem_gpu_impact_query* query,
                                                          const tandem_gpu_impact_capacity* capacity,
                                                          const tandem_gpu_impact_options* options);
-/// Of the pairs whose boxes, swept by the motions of a step of `duration`, meet; or of given pairs. motion:
-/// of each instance, in GPU memory. pairs: or null. Result: TANDEM_OUT_OF_RANGE of the duration and the
-/// tolerance, or for more instances than reserved; as of tandem_gpu_broad_phase_enqueue().
+/// Queues a query of the given pairs, or of those whose boxes, swept by the motions of a step of `duration`,
+/// meet. motion: that of each instance, in GPU memory. pairs: or null. Result: TANDEM_OUT_OF_RANGE of the
+/// duration and the tolerance, or for more instances than reserved; as of tandem_gpu_broad_phase_enqueue().
 TANDEM_API tandem_status tandem_gpu_impact_query_enqueue(tandem_gpu_impact_query* query,
                                                          const tandem_gpu_instances* instances,
                                                          const tandem_motion* motion, double duration,
@@ -472,9 +477,9 @@ TANDEM_API tandem_status tandem_gpu_impact_query_find(tandem_gpu_impact_query* q
                                                       const tandem_gpu_pairs* pairs,
                                                       const tandem_gpu_impact_options* options,
                                                       tandem_stream stream);
-/// Those that it found.
+/// Returns the pairs that the query found.
 TANDEM_API tandem_gpu_pairs tandem_gpu_impact_query_pairs(const tandem_gpu_impact_query* query);
-/// One for each pair, as many as the report says.
+/// Returns the impact of each pair, as many as the report says.
 TANDEM_API const tandem_impact* tandem_gpu_impact_query_impacts(const tandem_gpu_impact_query* query);
 TANDEM_API const tandem_gpu_impact_report* tandem_gpu_impact_query_device_report(
     const tandem_gpu_impact_query* query);
@@ -520,7 +525,7 @@ TANDEM_API tandem_status tandem_gpu_tolerance_query_find(tandem_gpu_tolerance_qu
                                                          const tandem_gpu_instances* instances,
                                                          const tandem_gpu_pairs* pairs, double tolerance,
                                                          tandem_stream stream);
-/// One for each pair.
+/// Returns the verdict of each pair, in GPU memory.
 TANDEM_API const tandem_verdict* tandem_gpu_tolerance_query_verdicts(const tandem_gpu_tolerance_query* query);
 TANDEM_API const tandem_gpu_tolerance_report* tandem_gpu_tolerance_query_device_report(
     const tandem_gpu_tolerance_query* query);

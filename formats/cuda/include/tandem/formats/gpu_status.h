@@ -31,7 +31,7 @@ inline Status status_of(cudaError_t error, int driver_version) {
   }
 }
 
-/// The same, with the version of the driver that is here.
+/// Returns the status of an error, given the version of the driver that is here.
 inline Status status_of(cudaError_t error) {
   int driver_version = 0;
   if (error == cudaErrorInsufficientDriver) static_cast<void>(cudaDriverGetVersion(&driver_version));

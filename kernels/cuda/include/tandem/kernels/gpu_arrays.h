@@ -29,8 +29,7 @@ inline GpuAsset gpu_asset(const LevelView& on_gpu, const AssetView& file, std::u
   return asset;
 }
 
-/// What a broad phase needs to know of an asset: its bounds in stored coordinates, as the file's header has
-/// them.
+/// The bounds of an asset, which a broad phase needs, in stored coordinates, as the file's header has them.
 struct AssetBounds {
   double origin[3];
   float lower[3], upper[3];

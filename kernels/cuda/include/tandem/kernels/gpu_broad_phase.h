@@ -14,8 +14,8 @@ struct GpuBroadPhaseOptions {
   /// run; of many boxes, pairs that are neighbours in space come close to each other.
   bool sorted = false;
 
-  /// Which pairs are looked at; its arrays lie in GPU memory and must stay until the call is done. enqueue()
-  /// alone looks at it.
+  /// Says which pairs are looked at. Its arrays lie in GPU memory and must stay until the call is done.
+  /// enqueue() alone looks at it.
   PairFilter filter = {};
 
   /// Pairs of boxes that are so far apart are found too, as BroadPhase finds those of grown() boxes: each is
@@ -23,7 +23,7 @@ struct GpuBroadPhaseOptions {
   double within = 0;
 };
 
-/// How many boxes and pairs there is room for.
+/// The number of boxes and of pairs that there is room for.
 struct GpuBroadPhaseCapacity {
   std::uint32_t boxes = 0;  ///< or instances
   std::uint32_t pairs = 0;

@@ -34,18 +34,18 @@ struct GpuContactOptions {
   /// Levels of detail: as ContactOptions::add_error_bounds says. Object pairs are found as without.
   bool add_error_bounds = false;
 
-  /// Whether distances are asked for at all, which takes other kernels, and more memory.
+  /// Returns whether distances are asked for at all, which takes other kernels, and more memory.
   constexpr bool of_clearance() const { return within > 0 || add_error_bounds; }
 };
 
-/// How many of each a query has room for, or needs room for.
+/// The number of each that a query has room for, or needs room for.
 struct GpuContactCapacity {
   std::uint32_t pairs = 0;
   std::uint64_t contacts = 0;
   std::uint64_t undecided = 0;  ///< candidates that float32 cannot decide; of clearance, not quickly
 };
 
-/// What exact decisions of clearance take of it at most.
+/// The most GPU memory that exact decisions of clearance take, in bytes.
 inline constexpr std::size_t kMostWideBytes = std::size_t{2} << 20;
 
 /// GPU memory that a query of so many assets with room for so much holds at most: the bound of
@@ -70,8 +70,8 @@ struct GpuGroupCounts {
   std::uint32_t few, many;  ///< pairs with few contacts, and with more
 };
 
-/// Where grouped contacts lie; arrays in GPU memory, valid behind the query. Where not all contacts had room,
-/// they tell of those that are stored; after an error no pair has any.
+/// Arrays in GPU memory that say where the contacts of each pair lie. They are valid behind the query. If not
+/// all contacts had room, they are about those that are stored; after an error no pair has any.
 struct GpuContactGroups {
   const Contact* contacts;
   const std::uint32_t*
@@ -118,8 +118,8 @@ class GpuContactQuery : public GpuAssetQuestion<GpuContactCapacity, GpuContactRe
   /// Condition: set_assets(), and reserve() for grouped contacts.
   GpuContactGroups groups() const;
 
-  /// Of each pair whether it has a contact, not 0 where it has; valid behind a query with first_contact_only
-  /// whose report is kOk and complete. Condition: reserve().
+  /// Returns a number for each pair, not 0 where the pair has a contact. It is valid behind a query with
+  /// first_contact_only whose report is kOk and complete. Condition: reserve().
   const std::uint32_t* met() const;
 
  private:

@@ -7,7 +7,7 @@
 
 namespace tandem {
 
-/// How many of each there is room for, or how many there have to be.
+/// The number of each that there is room for, or that needs room.
 struct GpuContainmentCapacity {
   std::uint32_t pairs = 0;      ///< object pairs of the query
   std::uint32_t contained = 0;  ///< components that lie within the other body

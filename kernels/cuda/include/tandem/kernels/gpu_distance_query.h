@@ -12,13 +12,13 @@ struct GpuDistanceOptions {
   DistanceTolerance tolerance = {};
   /// Pairs that are surely farther apart than this have no nearest points: lower >= reach, upper is infinite.
   double reach = std::numeric_limits<double>::infinity();
-  /// Of each pair what it was a step ago, in GPU memory; distances() of this query will do. The walk begins
-  /// with the triangles that were nearest; kNoIndex: with none. Results are as certified as without. Those of
-  /// triangles that there are not are passed over. Null: nothing is known.
+  /// The distance of each pair a step ago, in GPU memory, or null; distances() of this query will do. The
+  /// walk of a pair begins with the triangles that were nearest, or with none where they are kNoIndex.
+  /// Results are as certified as without. Triangles that do not exist are passed over.
   const ObjectDistance* former = nullptr;
 };
 
-/// How many of each a query has room for, or needs room for.
+/// The number of each that a query has room for, or needs room for.
 struct GpuDistanceCapacity {
   std::uint32_t pairs = 0;           ///< object pairs
   std::uint32_t block_pairs = 0;     ///< that one round of the walk has

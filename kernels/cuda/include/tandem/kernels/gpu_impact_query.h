@@ -9,17 +9,17 @@
 namespace tandem {
 
 struct GpuImpactOptions {
-  /// How near triangles come before they stop a pair: a part of the diagonal of the smaller body's bounds.
+  /// Triangles that come this near stop a pair. It is a part of the diagonal of the smaller body's bounds.
   double tolerance = 1e-6;
   /// Pairs that the query finds are sorted by a, then b; without it their order may differ from run to run.
   bool sorted = false;
-  /// Where the query finds the pairs: those that it looks at. Its arrays lie in GPU memory.
+  /// If the query finds the pairs, the filter says which ones it looks at. Its arrays lie in GPU memory.
   PairFilter filter = {};
-  /// As of GpuContactOptions, for the walks that look for contacts.
+  /// The option of GpuContactOptions, for the walks that look for contacts.
   std::uint32_t most_blocks = 0;
 };
 
-/// How many of each a query has room for, or needs room for.
+/// The number of each that a query has room for, or needs room for.
 struct GpuImpactCapacity {
   std::uint32_t instances = 0;
   std::uint32_t pairs = 0;

@@ -8,12 +8,12 @@
 namespace tandem {
 
 struct GpuManifoldOptions {
-  /// As in ManifoldOptions.
+  /// See ManifoldOptions.
   bool match_previous = true;
   std::uint32_t most_points = kMostManifoldPoints;
 };
 
-/// How many of each there is room for, or how many there have to be.
+/// The number of each that there is room for, or that needs room.
 struct GpuManifoldCapacity {
   std::uint32_t pairs = 0;      ///< object pairs of the query
   std::uint64_t contacts = 0;   ///< of the query
@@ -60,8 +60,8 @@ class GpuManifoldQuery : public GpuAssetQuestion<GpuManifoldCapacity, GpuManifol
   Status make(const GpuInstances& instances, const GpuPairs& pairs, const GpuContactQuery& query,
               const GpuManifoldOptions& options, cudaStream_t stream);
 
-  /// In the order of ManifoldQuery where the pairs are in its order; report().manifolds and report().points
-  /// of them.
+  /// Return report().manifolds manifolds and report().points points. They are in the order of ManifoldQuery
+  /// if the pairs are in its order.
   const Manifold* manifolds() const;
   const ManifoldPoint* points() const;
 

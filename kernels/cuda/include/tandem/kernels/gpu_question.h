@@ -18,9 +18,9 @@ struct HostOf;  // the memory of the question that has this report
 /// The options of a question whose room does not depend on any.
 struct GpuNoOptions {};
 
-/// What all questions on a GPU have in common. Each of them adds functions that queue a call (enqueue) and
-/// that repeat it until there is room for all of its results (find), and its rows, which lie in GPU memory
-/// and are valid until the next reserve().
+/// The base of all questions on a GPU. Each of them adds functions that queue a call (enqueue) and that
+/// repeat it until there is room for all of its results (find), and its rows, which lie in GPU memory and are
+/// valid until the next reserve().
 ///
 /// enqueue() neither waits for the GPU nor allocates, and may be captured into a graph; the arrays that it is
 /// given must stay until the call is done. Its Result tells what the CPU finds wrong: kOk, kCudaFailed, or
@@ -52,7 +52,7 @@ class GpuQuestion {
 
   const Report* device_report() const;  ///< in GPU memory, where it is written when the call ends
 
-  /// In CPU memory. Condition: the stream has come to the end of the call.
+  /// Returns the report, in CPU memory. Condition: the stream has come to the end of the call.
   const Report& report() const;
 
   Capacity capacity() const;

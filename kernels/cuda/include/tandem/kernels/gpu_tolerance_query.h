@@ -7,14 +7,14 @@
 
 namespace tandem {
 
-/// How many of each a query has room for, or needs room for.
+/// The number of each that a query has room for, or needs room for.
 struct GpuToleranceCapacity {
   std::uint32_t instances = 0;
   std::uint32_t pairs = 0;
   std::uint64_t undecided = 0;  ///< candidates that are not decided quickly
 };
 
-/// What it asks of a contact query.
+/// The options with which it asks a contact query.
 inline constexpr GpuContactOptions kToleranceOptions = {.first_contact_only = true, .add_error_bounds = true};
 
 /// GPU memory that a query of so many levels of assets, all together, with room for so much holds at most:

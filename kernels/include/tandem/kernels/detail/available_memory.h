@@ -9,7 +9,7 @@ namespace tandem {
 /// other systems. Reads files; allocates nothing.
 std::uint64_t available_memory();
 
-/// The same with another root folder of the files, for tests.
+/// Returns the available memory according to the files below another root folder, for tests.
 std::uint64_t available_memory_under(const char* root);
 
 }  // namespace tandem

@@ -3,8 +3,8 @@
 
 namespace tandem {
 
-/// How wide the interval of a distance may be: upper - lower <= max(absolute, relative * upper). Neither is
-/// negative. A relative one below kFinestRelative counts as that, unless an absolute one is met.
+/// Says how wide the interval of a distance may be: upper - lower <= max(absolute, relative * upper). Neither
+/// is negative. A relative one below kFinestRelative counts as that, unless an absolute one is met.
 struct DistanceTolerance {
   double absolute = 0;  ///< in units of length
   double relative = 1e-6;
@@ -28,8 +28,8 @@ TANDEM_HD inline bool is_narrow(const DistanceInterval& interval, const Distance
   return interval.upper - interval.lower <= allowed_width(tolerance, interval.upper);
 }
 
-/// How near a pair must be to count beside an upper bound: nearer than this. What may touch counts, whatever
-/// the tolerance.
+/// Returns how near a pair must be to count beside an upper bound: nearer than this. What may touch counts,
+/// whatever the tolerance.
 TANDEM_HD inline double nearness_below(const DistanceTolerance& tolerance, double upper) {
   constexpr double kLeast = 0x1p-1074;
   const double near = upper - allowed_width(tolerance, upper);

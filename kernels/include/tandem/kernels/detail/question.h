@@ -10,13 +10,13 @@
 
 namespace tandem {
 
-/// What a question keeps from call to call on a device that answers it in place of the CPU.
+/// The memory that a question keeps from call to call on a device that answers it in place of the CPU.
 struct DeviceMemory : Allocated {
   std::uint64_t assets_id = 0;  ///< that of the scene's assets
   virtual ~DeviceMemory() = default;
 };
 
-/// Where a device leaves what it finds; `pairs` is what it is asked about.
+/// The members of an answer that a device fills; `pairs` are those that it is asked about.
 template <typename Row, typename Counters>
 struct DeviceAnswer {
   Buffer<ObjectPair>& pairs;
@@ -25,7 +25,7 @@ struct DeviceAnswer {
   std::unique_ptr<DeviceMemory>& memory;
 };
 
-/// What a question found: the object pairs that it was about, rows, and counters. All are valid until the
+/// The answer to a question: the object pairs that it was about, rows, and counters. All are valid until the
 /// question is asked again. After an error there is nothing.
 template <typename Row, typename Counters>
 class Answer {

@@ -15,8 +15,8 @@
 /// -ffp-contract=off and device code with --fmad=false, so that both give the same bits.
 namespace tandem::manifold {
 
-/// One instruction each, where fmin() and fmax() of a C library may be calls. Of NaN and a number the result
-/// is the second.
+/// Return the smaller and the larger number. Each is one instruction, where fmin() and fmax() of a C library
+/// may be calls. If one is NaN, the result is the second.
 template <typename T>
 TANDEM_HD inline T lesser(T x, T y) {
   return x < y ? x : y;
@@ -49,7 +49,8 @@ TANDEM_HD inline double norm(const Vector3& p) {
   return std::sqrt(dot(p, p));
 }
 
-/// Of length 1. Condition: p is not 0, and its square neither overflows nor vanishes.
+/// Returns the vector of length 1 in the direction of p. Condition: p is not 0, and its square neither
+/// overflows nor vanishes.
 TANDEM_HD inline Vector3 normalized(const Vector3& p) {
   return (1 / norm(p)) * p;
 }

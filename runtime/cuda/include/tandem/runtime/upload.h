@@ -24,12 +24,12 @@ class DeviceAssets {
 
   /// Allocates on the current device, copies on `stream`, and returns when all is there and `stream` is done
   /// with what it held; what was uploaded before is freed. From 128 MiB on it copies by up to eight threads
-  /// of its own, which pin 4 MiB of CPU memory each meanwhile. Of a file it copies the sections that are
+  /// of its own, which pin 4 MiB of CPU memory each meanwhile. It copies those sections of a file that are
   /// wanted of the levels that its view shows (AssetView::levels_from()); Contents::all of all levels is the
-  /// whole file.
-  /// Result: kOk, kOutOfGpuMemory, kOutOfMemory, or another that status_of() of gpu_status.h names: kNoGpu,
-  /// kDriverTooOld, kGpuNotSupported, kCudaFailed; then nothing is held, and cuda_error() tells more.
-  /// Condition: the assets are checked ones. Their bytes may be pageable (mapped files), and need not stay.
+  /// whole file. Result: kOk, kOutOfGpuMemory, kOutOfMemory, or another that status_of() of gpu_status.h
+  /// names: kNoGpu, kDriverTooOld, kGpuNotSupported, kCudaFailed; then nothing is held, and cuda_error()
+  /// tells more. Condition: the assets are checked ones. Their bytes may be pageable (mapped files), and need
+  /// not stay.
   Status upload(std::span<const AssetView> assets, Contents contents, cudaStream_t stream);
 
   void free();

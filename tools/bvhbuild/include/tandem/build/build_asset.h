@@ -27,8 +27,8 @@ struct BuiltAsset {
   CleanReport clean;
 };
 
-/// What a file says of its making where the caller says nothing: JSON, without what depends on the machine.
-/// interrupted: the watch ended the optimisation.
+/// Returns what a file says about how it was made if the caller says nothing: JSON, without anything that
+/// depends on the machine. interrupted: the watch ended the optimisation.
 std::string usual_provenance(const BuildOptions& options, const CleanReport& report, bool interrupted);
 
 /// Cleans, builds, assembles and checks. The same

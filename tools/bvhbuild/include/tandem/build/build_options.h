@@ -6,11 +6,11 @@
 
 namespace tandem::build {
 
-/// How many imaginary nodes a tree may have.
+/// Says how many imaginary nodes a tree may have.
 struct Imaginary {
-  /// Of all nodes, beyond the minimum. 0: the proven minimum, minimal_imaginary_nodes(). 1: wherever the
-  /// cheapest collapse of a free binary tree puts them, about a fifth. Between: where a given number of them
-  /// saves most.
+  /// The share of all nodes that may be imaginary beyond the minimum. 0: the proven minimum,
+  /// minimal_imaginary_nodes(). 1: wherever the cheapest collapse of a free binary tree puts them, about a
+  /// fifth. Between: where a given number of them saves most.
   double share = 0;
 
   static const Imaginary minimal, free;
@@ -19,15 +19,15 @@ struct Imaginary {
 
 inline constexpr Imaginary Imaginary::minimal{0}, Imaginary::free{1};
 
-/// How much time goes into making a tree cheap to query.
+/// Says how much time goes into making a tree cheap to query.
 enum class Effort : std::uint8_t {
   fast,      ///< greedy splits only
   standard,  ///< then one pass of exchanges: at most twice as long again
   best,      ///< then simulated annealing: minutes for 10^5 triangles
 };
 
-/// What a .bvh file is to hold beside its triangles, and how long to look for a good tree, by how many
-/// threads.
+/// Says what a .bvh file is to hold beside its triangles, and how long, by how many threads, a good tree is
+/// looked for.
 struct BuildOptions {
   Imaginary imaginary = Imaginary::minimal;
   Effort effort = Effort::standard;
@@ -39,16 +39,16 @@ struct BuildOptions {
 /// Lets somebody look on while a tree is optimised, and end it.
 class OptimisationWatch {
  public:
-  /// Called now and then, by one thread at a time, with the share that is done. What it throws ends the
-  /// build.
+  /// The builder calls this now and then, by one thread at a time, with the share that is done. What it
+  /// throws ends the build.
   std::function<void(double share)> progress = [](double) {};
-  /// Once set, optimisation ends within a second or so, with the best tree so far.
+  /// Once this is set, optimisation ends within a second or so, with the best tree so far.
   std::atomic<bool> stop = false;
 
-  /// For the optimiser: how many units of work there are, and that some more are done.
+  /// The optimiser says how many units of work there are, and that some more are done.
   void expect(std::uint64_t units) { expected_ = units; }
   void count(std::uint64_t units);
-  /// For the builder: between two of its steps.
+  /// The builder calls this between two of its steps.
   void look() { count(0); }
 
  private:

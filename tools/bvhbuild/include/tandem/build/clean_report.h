@@ -5,8 +5,8 @@
 
 namespace tandem::build {
 
-/// What triangulate(), clean() and to_single_precision() met. Counts only; 0 means that there was nothing of
-/// the kind.
+/// Counts what triangulate(), clean() and to_single_precision() met; 0 means that there was nothing of the
+/// kind.
 struct CleanReport {
   std::uint64_t faces = 0;     ///< of the file
   std::uint64_t vertices = 0;  ///< of the file
@@ -26,7 +26,7 @@ struct CleanReport {
   std::uint64_t triangles_flattened = 0;           ///< kept: on one line only once rounded to float32
 };
 
-/// One line of a report.
+/// A line of a report.
 struct Finding {
   const char* key;      ///< stable; for JSON
   std::uint64_t count;  ///< may be 0
@@ -38,8 +38,8 @@ struct Finding {
   std::string sentence() const { return what + "; " + fate; }
 };
 
-/// All findings in a fixed order, those with count 0 included: the text report, --json and --strict share
-/// this list.
+/// Returns all findings in a fixed order, those with count 0 included: the text report, --json and --strict
+/// share this list.
 std::vector<Finding> findings(const CleanReport& report);
 
 }  // namespace tandem::build

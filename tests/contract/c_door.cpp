@@ -182,12 +182,23 @@ class CDoor final : public Door {
       found.rows = objects_of(rows_of(tandem_scene_impacts, scene_));
       return read_counters(), found.counters = object_of(counters.impacts), found;
     }
-    auto chosen = sized<tandem_tolerance_options>();
-    chosen.tolerance = number(options, "tolerance", 0);
-    about(chosen);
-    Found found = shown(tandem_scene_find_verdicts(scene_, &chosen), TANDEM_VERDICTS);
-    found.rows = objects_of(rows_of(tandem_scene_verdicts, scene_));
-    return read_counters(), found.counters = object_of(counters.verdicts), found;
+    if (question == "verdicts") {
+      auto chosen = sized<tandem_tolerance_options>();
+      chosen.tolerance = number(options, "tolerance", 0);
+      about(chosen);
+      Found found = shown(tandem_scene_find_verdicts(scene_, &chosen), TANDEM_VERDICTS);
+      found.rows = objects_of(rows_of(tandem_scene_verdicts, scene_));
+      return read_counters(), found.counters = object_of(counters.verdicts), found;
+    }
+    if (question == "bodies_at") {
+      auto chosen = sized<tandem_bodies_at_options>();
+      const std::vector<std::array<double, 3>> points = points_of(options);
+      chosen.points = points.empty() ? nullptr : points[0].data();
+      chosen.point_count = points.size();
+      const Outcome outcome = told(tandem_scene_find_bodies_at(scene_, &chosen));
+      return {outcome, {}, objects_of(rows_of(tandem_scene_bodies_at, scene_)), {}, {}};
+    }
+    return {{"no question " + question}, {}, {}, {}, {}};
   }
 
  private:

@@ -140,6 +140,15 @@ class ContractTest(unittest.TestCase):
                         print(f"left out: {name}: {why}: {json.dumps(step)[:150]}")
         self.assertGreater(asked, 80)
 
+    def test_bodies_at_a_point(self):
+        with tempfile.TemporaryDirectory() as folder:
+            door = Door(["cube"], Path(folder))
+            door.change({"place": [[0, 0, 0], [0.75, 0, 0], [3, 0, 0]]})
+            door.write({})
+            command = [os.environ["TANDEM_BVHBENCH"], "query", door.scene, "--at", "0.375", "0", "0"]
+            self.assertEqual(json.loads(subprocess.run([*command, "--json"], capture_output=True, check=True).stdout)["bodies_at"], [0, 1])
+            self.assertRegex(subprocess.run(command, capture_output=True, check=True, text=True).stdout, "bodies there +2")
+
     def take(self, door, step):
         """Result: whether a question was asked."""
         expected = step.get("expect", {})

@@ -1,4 +1,5 @@
 #include "contract/door.h"
+#include "tandem/kernels/bodies_at_query.h"
 #include "tandem/kernels/containment_query.h"
 #include "tandem/kernels/distance_query.h"
 #include "tandem/kernels/excluded_pairs.h"
@@ -77,6 +78,8 @@ class CppDoor final : public Door {
     if (question == "distances") return distances(options);
     if (question == "impacts") return impacts(options);
     if (question == "verdicts") return about_pairs(verdicts_, options, {number(options, "tolerance", 0)});
+    if (question == "bodies_at")
+      return shown(bodies_at_, bodies_at_.find(*scene_, {.points = points_of(options)}));
     return {{"no question " + question}, {}, {}, {}, {}};
   }
 
@@ -147,6 +150,7 @@ class CppDoor final : public Door {
   DistanceQuery distances_;
   ImpactQuery impacts_;
   ToleranceQuery verdicts_;
+  BodiesAtQuery bodies_at_;
 };
 
 }  // namespace

@@ -1,6 +1,7 @@
 #pragma once
 #include <tandem/tandem.h>
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -81,6 +82,13 @@ inline std::vector<ObjectPair> pairs_of(const Json& list) {
   return pairs;
 }
 
+inline std::vector<std::array<double, 3>> points_of(const Json& options) {
+  std::vector<std::array<double, 3>> points;
+  for (const Json& point : options["points"])
+    points.push_back({number(point[0]), number(point[1]), number(point[2])});
+  return points;
+}
+
 /// Motions of the table: rows of a velocity and, where they have nine numbers, an angular velocity and a
 /// centre; "none": all of `bodies` bodies rest.
 inline std::vector<RigidMotion> motions_of(const Json& list, std::size_t bodies) {
@@ -110,7 +118,7 @@ Json object_of(const Row& row) {
 // clang-format off
 #define TANDEM_FIELD(field) \
   if constexpr (requires { row.field; }) object[#field] = plain(row.field);
-  TANDEM_FIELD(pair) TANDEM_FIELD(triangle_a) TANDEM_FIELD(triangle_b) TANDEM_FIELD(face_a)
+  TANDEM_FIELD(point) TANDEM_FIELD(body) TANDEM_FIELD(pair) TANDEM_FIELD(triangle_a) TANDEM_FIELD(triangle_b) TANDEM_FIELD(face_a)
   TANDEM_FIELD(face_b) TANDEM_FIELD(normal) TANDEM_FIELD(area_vector) TANDEM_FIELD(centre)
   TANDEM_FIELD(depth) TANDEM_FIELD(first_point) TANDEM_FIELD(point_count) TANDEM_FIELD(flags)
   TANDEM_FIELD(position) TANDEM_FIELD(in_a) TANDEM_FIELD(in_b) TANDEM_FIELD(id) TANDEM_FIELD(previous)

@@ -49,6 +49,8 @@ class Door:
             options["motion"] = motions_of(step["motion"], len(scene.instances)).view(tandem.MOTION)[:, 0]
         if "former" in step:
             options["former"] = self.former()
+        if "points" in step:
+            options["points"] = np.array(step["points"], np.float64).reshape(-1, 3)
         found = self.found[step["ask"]] = getattr(scene, step["ask"])(**options)
         return found
 
@@ -68,6 +70,8 @@ def columns_of(rows):
 def expect_found(question, found, expected):
     if question == "pairs":
         pairs = rows = found
+    elif question == "bodies_at":
+        pairs, rows = np.zeros(0), found
     else:
         pairs, rows = found.pairs, getattr(found, question)
     if question == "contacts":

@@ -61,7 +61,7 @@ enum {
   TANDEM_TOO_MANY_TRIANGLES = 12,  ///< there are 2^32 - 1 triangles or more
   TANDEM_ASSETS_MISSING = 13,  ///< a handle of tandem_cuda.h was given no assets, or others than the query
                                ///< whose contacts it takes
-  // A file, or bytes of one. If a file has several defects, the first in this order is returned.
+  // A file, or bytes of one. Of a file with several defects one is returned.
   // clang-format off
   TANDEM_FILE_NOT_FOUND = 100, TANDEM_NOT_A_REGULAR_FILE = 101, TANDEM_CANNOT_OPEN = 102,
   TANDEM_CANNOT_READ = 103, TANDEM_MISALIGNED = 104, TANDEM_BIOVISION_MOTION_CAPTURE = 105,

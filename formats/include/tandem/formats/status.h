@@ -3,8 +3,8 @@
 
 namespace tandem {
 
-/// Says what is wrong with a .bvh file, with loading it, or with a query: one name per defect. The checker
-/// tests for the defects in this order; the first that it finds is returned. Numbers are those of tandem.h,
+/// Says what is wrong with a .bvh file, with loading it, or with a query: one name per defect. Of a
+/// file with several defects the checker returns one. Numbers are those of tandem.h,
 /// which never change; those that a GPU finds are below 256.
 enum class [[nodiscard]] Status : std::uint32_t{
     kOk = 0,

@@ -23,7 +23,7 @@ namespace {
 
 constexpr cudaStream_t kStream = nullptr;
 
-/// What a question of a scene keeps on the GPU.
+/// The memory that a question of a scene keeps on the GPU.
 template <typename Query>
 struct QueryMemory : DeviceMemory {
   Query query;
@@ -340,7 +340,7 @@ class Gpu final : public SceneDevice {
   Buffer<GpuAsset> assets_, levels_;  // the first level of each, and all
   GpuArray<AssetBounds> bounds_;
 
-  // What is copied, and the copies.
+  // The arrays that are copied, and their copies.
   Buffer<std::uint32_t> asset_, group_, mask_;
   Buffer<Pose> pose_;
   Buffer<RigidMotion> motions_;

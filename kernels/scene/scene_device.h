@@ -11,8 +11,8 @@
 
 namespace tandem {
 
-/// What answers the questions of a scene in place of the CPU. The scene keeps the bodies, checks what it is
-/// given, and asks. Result of each function: kOk, or the status of what failed, with where() of the scene.
+/// A device answers the questions of a scene in place of the CPU. The scene keeps the bodies, checks what it
+/// is given, and asks. Result of each function: kOk, or the status of what failed, with where() of the scene.
 class SceneDevice : public Allocated {
  public:
   virtual ~SceneDevice() = default;
@@ -35,14 +35,14 @@ class SceneDevice : public Allocated {
   virtual Status find(SceneState& scene, const ImpactOptions& options, bool finds_pairs,
                       const DeviceAnswer<Impact, ImpactCounters>& found) = 0;
 
-  /// Of contacts that this device found of the same pairs.
+  /// contacts: those that this device found of the same pairs.
   virtual Status find(SceneState& scene, const ManifoldOptions& options, const DeviceMemory& contacts,
                       Buffer<ManifoldPoint>& points,
                       const DeviceAnswer<Manifold, ManifoldCounters>& found) = 0;
   virtual Status find(SceneState& scene, const DeviceMemory& contacts,
                       const DeviceAnswer<Containment, ContainmentCounters>& found) = 0;
 
-  /// Where it takes CPU memory from, in a library that may have another current_allocator().
+  /// The allocator of the caller. The device's library may have another current_allocator().
   Allocator allocator;
 
   /// The size of SceneState as the device's library knows it.

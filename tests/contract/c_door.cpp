@@ -119,8 +119,6 @@ class CDoor final : public Door {
       chosen.pairs = reinterpret_cast<const tandem_object_pair*>(given.data());
       chosen.pair_count = given.size() - 1;
     };
-    auto counters = sized<tandem_counters>();
-    const auto read_counters = [&] { EXPECT_EQ(tandem_scene_get_counters(scene_, &counters), TANDEM_OK); };
     if (question == "pairs") {
       auto chosen = sized<tandem_pair_options>();
       chosen.reach = number(options, "reach", 0);
@@ -138,23 +136,21 @@ class CDoor final : public Door {
       chosen.add_error_bounds = flag(options, "add_error_bounds");
       chosen.within = number(options, "within", 0);
       about(chosen);
-      Found found = shown(tandem_scene_find_contacts(scene_, &chosen), TANDEM_CONTACTS);
-      found.rows = objects_of(rows_of(tandem_scene_contacts, scene_));
-      return read_counters(), found.counters = object_of(counters.contacts), found;
+      return answered(tandem_scene_find_contacts(scene_, &chosen), TANDEM_CONTACTS, tandem_scene_contacts,
+                      &tandem_counters::contacts);
     }
     if (question == "manifolds") {
       auto chosen = sized<tandem_manifold_options>();
       chosen.most_points = options.value("most_points", 0u);
       chosen.ignore_previous = !flag(options, "match_previous", true);
-      Found found = shown(tandem_scene_find_manifolds(scene_, &chosen), TANDEM_CONTACTS);
-      found.rows = objects_of(rows_of(tandem_scene_manifolds, scene_));
+      Found found = answered(tandem_scene_find_manifolds(scene_, &chosen), TANDEM_CONTACTS,
+                             tandem_scene_manifolds, &tandem_counters::manifolds);
       found.points = objects_of(rows_of(tandem_scene_points, scene_));
-      return read_counters(), found.counters = object_of(counters.manifolds), found;
+      return found;
     }
     if (question == "contained") {
-      Found found = shown(tandem_scene_find_contained(scene_), TANDEM_CONTACTS);
-      found.rows = objects_of(rows_of(tandem_scene_contained, scene_));
-      return read_counters(), found.counters = object_of(counters.contained), found;
+      return answered(tandem_scene_find_contained(scene_), TANDEM_CONTACTS, tandem_scene_contained,
+                      &tandem_counters::contained);
     }
     if (question == "distances") {
       auto chosen = sized<tandem_distance_options>();
@@ -166,9 +162,8 @@ class CDoor final : public Door {
       chosen.former = former.data();
       chosen.former_count = former.size();
       about(chosen);
-      Found found = shown(tandem_scene_find_distances(scene_, &chosen), TANDEM_DISTANCES);
-      found.rows = objects_of(rows_of(tandem_scene_distances, scene_));
-      return read_counters(), found.counters = object_of(counters.distances), found;
+      return answered(tandem_scene_find_distances(scene_, &chosen), TANDEM_DISTANCES, tandem_scene_distances,
+                      &tandem_counters::distances);
     }
     if (question == "impacts") {
       auto chosen = sized<tandem_impact_options>();
@@ -178,17 +173,15 @@ class CDoor final : public Door {
       chosen.motion = reinterpret_cast<const tandem_motion*>(motion.data());
       chosen.motion_count = motion.size();
       about(chosen);
-      Found found = shown(tandem_scene_find_impacts(scene_, &chosen), TANDEM_IMPACTS);
-      found.rows = objects_of(rows_of(tandem_scene_impacts, scene_));
-      return read_counters(), found.counters = object_of(counters.impacts), found;
+      return answered(tandem_scene_find_impacts(scene_, &chosen), TANDEM_IMPACTS, tandem_scene_impacts,
+                      &tandem_counters::impacts);
     }
     if (question == "verdicts") {
       auto chosen = sized<tandem_tolerance_options>();
       chosen.tolerance = number(options, "tolerance", 0);
       about(chosen);
-      Found found = shown(tandem_scene_find_verdicts(scene_, &chosen), TANDEM_VERDICTS);
-      found.rows = objects_of(rows_of(tandem_scene_verdicts, scene_));
-      return read_counters(), found.counters = object_of(counters.verdicts), found;
+      return answered(tandem_scene_find_verdicts(scene_, &chosen), TANDEM_VERDICTS, tandem_scene_verdicts,
+                      &tandem_counters::verdicts);
     }
     if (question == "bodies_at") {
       auto chosen = sized<tandem_bodies_at_options>();
@@ -210,6 +203,18 @@ class CDoor final : public Door {
     std::size_t count = 0;
     const auto* pairs = reinterpret_cast<const ObjectPair*>(tandem_scene_pairs(scene_, question, &count));
     return {told(status), {pairs, pairs + count}, {}, {}, {}};
+  }
+
+  /// Reads the rows and the counters of a question that has been asked.
+  template <typename Row, typename Counters>
+  Found answered(tandem_status status, std::uint32_t question,
+                 const Row* (*get)(const tandem_scene*, std::size_t*), Counters tandem_counters::*of) const {
+    Found found = shown(status, question);
+    found.rows = objects_of(rows_of(get, scene_));
+    auto counters = sized<tandem_counters>();
+    EXPECT_EQ(tandem_scene_get_counters(scene_, &counters), TANDEM_OK);
+    found.counters = object_of(counters.*of);
+    return found;
   }
 
   template <typename Call>

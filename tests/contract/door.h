@@ -25,13 +25,13 @@ struct Bodies {
   std::vector<ObjectPair> excluded;
 };
 
-/// What a call answered: the name of its status, and the row to blame.
+/// The answer of a call: the name of its status, and the row to blame.
 struct Outcome {
   std::string status = "Ok";
   std::uint64_t where = 0;
 };
 
-/// What a question answered. Rows, points and counters are objects with the fields' names, which C++ and C
+/// The answer of a question. Rows, points and counters are objects with the fields' names, which C++ and C
 /// spell alike.
 struct Found : Outcome {
   std::vector<ObjectPair> pairs;

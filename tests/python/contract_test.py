@@ -15,7 +15,7 @@ MESHES = Path(os.environ["TANDEM_CONTRACT_MESHES"])
 ON_DEVICE = {"device": os.environ["TANDEM_DEVICE"]} if "TANDEM_DEVICE" in os.environ else {}
 OPTIONS = ("pairs", "reach", "mode", "first_contact_only", "self_pairs", "within", "add_error_bounds", "most_points", "match_previous", "absolute_tolerance",
            "relative_tolerance", "tolerance", "duration")
-# What the package says by ValueError, because it checks arguments itself.
+# The package says these by ValueError, because it checks arguments itself.
 REFUSED_AS_ARGUMENT = {"OutOfRange", "BadOption", "MotionMismatch"}
 
 

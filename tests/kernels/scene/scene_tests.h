@@ -316,7 +316,7 @@ TYPED_TEST_P(SceneOn, AnswersManyQuestionsAboutTheSameBodies) {
       contacts += here.contacts.rows().size();
     }
     EXPECT_GT(contacts, 1000u);
-    // Of contacts that are given as a list, the CPU makes the same manifolds.
+    // The CPU makes the same manifolds of contacts that are given as a list.
     ManifoldQuery of_list;
     ASSERT_EQ(here.manifolds.find(scene, here.contacts, {.match_previous = false}), Status::kOk);
     ASSERT_EQ(of_list.find(scene, here.contacts.pairs(), here.contacts.rows(), {.match_previous = false}),

@@ -11,13 +11,10 @@
 namespace tandem::bench {
 namespace {
 
-CLI::Validator backend_name() {
-  const auto defect = [](const std::string& word) -> std::string {
-    if (word == "cpu" || (has_cuda() && word == "cuda")) return {};
-    return word == "cuda" ? "this bvhbench was built without CUDA, so it has no GPU"
-                          : word + " is neither cpu nor cuda";
-  };
-  return CLI::Validator(defect, "");
+std::string backend_defect(const std::string& word) {
+  if (word == "cpu" || (has_cuda() && word == "cuda")) return {};
+  return word == "cuda" ? "this bvhbench was built without CUDA, so it has no GPU"
+                        : word + " is neither cpu nor cuda";
 }
 
 // Ends the command where the GPU refused a scene or cannot be used.
@@ -54,17 +51,17 @@ OptionRow scene_argument(CommonArguments& arguments, const std::string& what) {
 
 OptionRow backend_option(CommonArguments& arguments) {
   return {"--backend", arguments.backend, has_cuda() ? "cpu|cuda [cpu]" : "cpu [cpu]",
-          "what the query runs on", backend_name()};
+          "what the query runs on", backend_defect};
 }
 
 OptionRow threads_option(CommonArguments& arguments, const std::string& what) {
   return {"--threads", arguments.told_threads, "N [all]", "threads; " + what + " not depend on them",
-          CLI::Range(1u, kMostSceneThreads)};
+          between(1, kMostSceneThreads)};
 }
 
 OptionRow repeat_option(CommonArguments& arguments, const std::string& what) {
   return {"--repeat", arguments.repeats, "N [" + std::to_string(arguments.repeats) + "]",
-          "times to run " + what + ", for its timing", CLI::Range(1, 1000000)};
+          "times to run " + what + ", for its timing", between(1, 1000000)};
 }
 
 OptionRow output_option(CommonArguments& arguments, const std::string& what, const char* name) {
@@ -85,11 +82,11 @@ OptionRow ground_option(std::string& ground, const std::string& what) {
 
 OptionRow count_option(std::uint32_t& count, std::uint32_t usual) {
   count = usual;
-  return {"--count", count, "N [" + std::to_string(usual) + "]", "how many", CLI::Range(1, 10'000'000)};
+  return {"--count", count, "N [" + std::to_string(usual) + "]", "how many", between(1, 10'000'000)};
 }
 
 OptionRow seed_option(std::uint64_t& seed, const std::string& what) {
-  return {"--seed", seed, "N [1]", what, CLI::NonNegativeNumber};
+  return {"--seed", seed, "N [1]", what, between(0, 1.8e19)};
 }
 
 void print(const CommonArguments& arguments, const Report& report) {
@@ -136,16 +133,13 @@ std::uint64_t triangles_of(const LoadedScene& scene) {
   return triangles;
 }
 
-CLI::Validator cube_of_a_whole_number() {
-  const auto defect = [](const std::string& text) -> std::string {
-    std::uint32_t count = 0;
-    if (!CLI::detail::lexical_cast(text, count)) return {};  // told by its type
-    const std::uint32_t side = root_above(count, 3);
-    if (side * side * side == count) return {};
-    return text + " is no cube of a whole number; " + std::to_string((side - 1) * (side - 1) * (side - 1)) +
-           " and " + std::to_string(side * side * side) + " are";
-  };
-  return CLI::Validator(defect, "");
+std::string cube_defect(const std::string& text) {
+  const double count = number_in(text).value_or(0);
+  if (!(count >= 1 && count <= 1e9)) return {};  // told by its type and by the option's own limits
+  const std::uint32_t side = root_above(static_cast<std::uint32_t>(count), 3);
+  if (side * side * side == count) return {};
+  return text + " is no cube of a whole number; " + std::to_string((side - 1) * (side - 1) * (side - 1)) +
+         " and " + std::to_string(side * side * side) + " are";
 }
 
 }  // namespace tandem::bench

@@ -5,8 +5,8 @@
 
 #include "bvhbench/engines/engine.h"
 #include "bvhbench/scenes/scene_file.h"
+#include "common/command_line.h"
 #include "common/exit_code.h"
-#include "common/option_helpers.h"
 #include "common/report.h"
 
 /// This header has the list of bvhbench's subcommands and what they share.
@@ -16,26 +16,24 @@ namespace tandem::bench {
 using Run = std::function<ExitCode()>;
 
 // Each subcommand is a line here and in main().
-void add_scene(CLI::App& app, Run& run_later);
-void add_query(CLI::App& app, Run& run_later);
-void add_impact(CLI::App& app, Run& run_later);
-void add_distance(CLI::App& app, Run& run_later);
-void add_compare(CLI::App& app, Run& run_later);
-void add_simulate(CLI::App& app, Run& run_later);
-void add_economy(CLI::App& app, Run& run_later);
-void add_frame(CLI::App& app, Run& run_later);
-void add_poses(CLI::App& app, Run& run_later);
+void add_scene(Command tool, Run& run_later);
+void add_query(Command tool, Run& run_later);
+void add_impact(Command tool, Run& run_later);
+void add_distance(Command tool, Run& run_later);
+void add_compare(Command tool, Run& run_later);
+void add_simulate(Command tool, Run& run_later);
+void add_economy(Command tool, Run& run_later);
+void add_frame(Command tool, Run& run_later);
+void add_poses(Command tool, Run& run_later);
 
 /// Adds a subcommand that runs with the arguments that its command line fills. Result: the subcommand, which
 /// has no options yet, and the arguments that these are to be bound to.
 template <typename Arguments>
-std::pair<CLI::App&, Arguments&> add_command(CLI::App& app, Run& run_later, const char* name,
-                                             const char* help,
-                                             std::function<ExitCode(const Arguments&)> run) {
-  CLI::App* command = app.add_subcommand(name, help);
+std::pair<Command, Arguments&> add_command(Command tool, Run& run_later, const char* name, const char* help,
+                                           std::function<ExitCode(const Arguments&)> run) {
   const auto arguments = std::make_shared<Arguments>();
-  command->final_callback([=, &run_later] { run_later = [=] { return run(*arguments); }; });
-  return {*command, *arguments};
+  const auto chosen = [=, &run_later] { run_later = [=] { return run(*arguments); }; };
+  return {tool.add_command(name, help, chosen), *arguments};
 }
 
 /// The values of the options that most commands have.
@@ -98,7 +96,7 @@ std::vector<std::string> files_of(const std::string& path, const LoadedScene& sc
 /// Returns the number of triangles of all instances together.
 std::uint64_t triangles_of(const LoadedScene& scene);
 
-/// Refuses what is no cube of a whole number.
-CLI::Validator cube_of_a_whole_number();
+/// A Check: refuses what is no cube of a whole number.
+std::string cube_defect(const std::string& text);
 
 }  // namespace tandem::bench

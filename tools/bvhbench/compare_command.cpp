@@ -121,16 +121,20 @@ ExitCode run_compare(const CompareArguments& arguments) {
   return kDone;
 }
 
+std::string peer_defect(const std::string& name) {
+  const auto names = peer_names();
+  return one_of({names.begin(), names.end()})(name);
+}
+
 }  // namespace
 
-void add_compare(CLI::App& app, Run& run_later) {
+void add_compare(Command tool, Run& run_later) {
   const auto [command, arguments] = add_command<CompareArguments>(
-      app, run_later, "compare", "run scenes through Tandem and other libraries, side by side", run_compare);
-  add_options(command,
-              {required({"SCENE", arguments.scenes, "", "scene files, .h5", file_name()}),
-               {"--peers", arguments.engines, join(peer_names()), "engines, all unless given",
-                CLI::IsMember(peer_names())},
-               {"--repeat", arguments.repeats, "N [5]", "timed queries of each", CLI::Range(1u, 100000u)},
+      tool, run_later, "compare", "run scenes through Tandem and other libraries, side by side", run_compare);
+  command.add({required({"SCENE", arguments.scenes, "", "scene files, .h5", file_name()}),
+               separated_by_commas({"--peers", arguments.engines, join(peer_names()),
+                                    "engines, all unless given", peer_defect}),
+               {"--repeat", arguments.repeats, "N [5]", "timed queries of each", between(1, 100000)},
                output_option(arguments, "write the results here, as HDF5"),
                {"--distance", arguments.distances_within, "D",
                 "compare distances instead, of pairs that are apart and within D",
@@ -138,9 +142,8 @@ void add_compare(CLI::App& app, Run& run_later) {
                {"--impact", arguments.impacts_within, "T",
                 "compare times of impact instead, of the scene's motions for T seconds", between(1e-9, 1e9)},
                {"--json", arguments.json, "print JSON"}});
-  command.get_option("--peers")->delimiter(',');
-  command.get_option("--impact")->excludes(command.get_option("--distance"));
-  command.footer("Times are of one thread. docs/comparison.md says what is compared, and how.");
+  command.exclude("--impact", "--distance");
+  command.end_help("Times are of one thread. docs/comparison.md says what is compared, and how.");
 }
 
 }  // namespace tandem::bench

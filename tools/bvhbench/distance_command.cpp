@@ -85,21 +85,21 @@ ExitCode run(const DistanceArguments& arguments) {
 
 }  // namespace
 
-void add_distance(CLI::App& app, Run& run_later) {
+void add_distance(Command tool, Run& run_later) {
   const auto [command, arguments] = add_command<DistanceArguments>(
-      app, run_later, "distance", "find how near the bodies of a scene are", run);
-  add_options(command, {scene_argument(arguments),
-                        backend_option(arguments),
-                        {"--reach", arguments.reach, "D [no limit]",
-                         "pairs farther apart than this are only told to be so", between(0, kInfinity)},
-                        {"--tolerance", arguments.tolerance.relative, "R [1e-6]",
-                         "how wide the interval of a distance may be, relative to it", between(0, 1)},
-                        {"--absolute", arguments.tolerance.absolute, "A [0]",
-                         "or how wide in units of length, if that is more", between(0, kInfinity)},
-                        threads_option(arguments, "the distances do"),
-                        repeat_option(arguments),
-                        output_option(arguments, "the distances file to write; appears whole or not at all"),
-                        json_option(arguments)});
+      tool, run_later, "distance", "find how near the bodies of a scene are", run);
+  command.add({scene_argument(arguments),
+               backend_option(arguments),
+               {"--reach", arguments.reach, "D [no limit]",
+                "pairs farther apart than this are only told to be so", between(0, kInfinity)},
+               {"--tolerance", arguments.tolerance.relative, "R [1e-6]",
+                "how wide the interval of a distance may be, relative to it", between(0, 1)},
+               {"--absolute", arguments.tolerance.absolute, "A [0]",
+                "or how wide in units of length, if that is more", between(0, kInfinity)},
+               threads_option(arguments, "the distances do"),
+               repeat_option(arguments),
+               output_option(arguments, "the distances file to write; appears whole or not at all"),
+               json_option(arguments)});
 }
 
 }  // namespace tandem::bench

@@ -18,15 +18,20 @@ using economy::LevelMeasurer;
 using economy::Levels;
 using economy::Measures;
 
-// "0.01" or "1%".
-void parse_tolerance(const std::string& text, EconomyArguments& arguments) {
+// The number of "0.01" or "1%".
+std::optional<double> tolerance_in(const std::string& text) {
+  const std::optional<double> number =
+      number_in(text.ends_with('%') ? text.substr(0, text.size() - 1) : text);
+  return number && std::isfinite(*number) && *number >= 0 ? number : std::nullopt;
+}
+
+std::string tolerance_defect(const std::string& text) {
+  return tolerance_in(text) ? "" : text + " is neither a length nor per cent of the diagonal";
+}
+
+void take_tolerance(const std::string& text, EconomyArguments& arguments) {
   arguments.relative = text.ends_with('%');
-  double number = 0;
-  const char* end = text.data() + text.size() - (arguments.relative ? 1 : 0);
-  const auto [read, error] = std::from_chars(text.data(), end, number);
-  if (error != std::errc() || read != end || !std::isfinite(number) || number < 0)
-    throw CLI::ValidationError("--tolerance", text + " is neither a length nor per cent of the diagonal");
-  arguments.tolerance = arguments.relative ? number / 100 : number;
+  arguments.tolerance = *tolerance_in(text) / (arguments.relative ? 100 : 1);
 }
 
 Candidates candidates_of(LevelMeasurer& measurer) {
@@ -156,22 +161,19 @@ ExitCode run(const EconomyArguments& arguments) {
 
 }  // namespace
 
-void add_economy(CLI::App& app, Run& run_later) {
+void add_economy(Command tool, Run& run_later) {
   const auto [command, arguments] = add_command<EconomyArguments>(
-      app, run_later, "economy", "find out which levels of detail are enough for a scene", run);
-  add_options(command, {scene_argument(arguments)});
-  CLI::Option_group* limit = command.add_option_group("limit");
-  limit->require_option(1);
-  add_options(*limit,
-              {{"--tolerance", [&told = arguments](const std::string& text) { parse_tolerance(text, told); },
-                "LENGTH|PERCENT%", "by how much surfaces may be off, proved, and depths, measured"},
-               {"--time", arguments.milliseconds, "MS", "for query and manifolds, or with --simulate a step",
-                between(0, 1e9)},
-               {"--memory", arguments.bytes, "BYTES",
-                "for the levels of all assets, or all that a GPU query takes"}});
-  limit->get_option("--memory")->transform(CLI::AsSizeValue(false));
-  add_options(command,
-              {{"--simulate", arguments.simulated_seconds, "SECONDS [0]",
+      tool, run_later, "economy", "find out which levels of detail are enough for a scene", run);
+  command.add({scene_argument(arguments)});
+  const Command limit = command.add_choice("limit");
+  limit.add(
+      {{"--tolerance", [&told = arguments](const std::string& text) { take_tolerance(text, told); },
+        "LENGTH|PERCENT%", "by how much surfaces may be off, proved, and depths, measured", tolerance_defect},
+       {"--time", arguments.milliseconds, "MS", "for query and manifolds, or with --simulate a step",
+        between(0, 1e9)},
+       in_bytes({"--memory", arguments.bytes, "BYTES",
+                 "for the levels of all assets, or all that a GPU query takes"})});
+  command.add({{"--simulate", arguments.simulated_seconds, "SECONDS [0]",
                 "also let bodies move, so long, and compare where they end", between(0, 1e6)},
                backend_option(arguments),
                threads_option(arguments, "what is found does"),

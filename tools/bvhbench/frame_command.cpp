@@ -28,11 +28,10 @@ ExitCode run(const FrameArguments& arguments) {
 
 }  // namespace
 
-void add_frame(CLI::App& app, Run& run_later) {
+void add_frame(Command tool, Run& run_later) {
   const auto [command, arguments] = add_command<FrameArguments>(
-      app, run_later, "frame", "save a kept state of a simulation as a scene file", run);
-  add_options(command,
-              {required({"RUN", arguments.run, "", "file of a simulation with a trajectory", file_name()}),
+      tool, run_later, "frame", "save a kept state of a simulation as a scene file", run);
+  command.add({required({"RUN", arguments.run, "", "file of a simulation with a trajectory", file_name()}),
                required({"--frame", arguments.frame, "K", "steps made before the state; 0: the start"}),
                required(output_option(arguments, "the scene file to write; appears whole or not at all",
                                       "-o,--output"))});

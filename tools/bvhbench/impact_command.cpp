@@ -96,19 +96,19 @@ ExitCode run(const ImpactArguments& arguments) {
 
 }  // namespace
 
-void add_impact(CLI::App& app, Run& run_later) {
+void add_impact(Command tool, Run& run_later) {
   const auto [command, arguments] = add_command<ImpactArguments>(
-      app, run_later, "impact", "find when the moving instances of a scene meet", run);
-  add_options(command, {scene_argument(arguments, "scene file (HDF5) with /simulation/velocity"),
-                        required({"--dt", arguments.duration, "T", "the step in which they move, in seconds",
-                                  between(0, 1e9)}),
-                        backend_option(arguments),
-                        {"--tolerance", arguments.tolerance, "R [1e-6]",
-                         "how near triangles stop, as a part of the smaller body's diagonal", between(0, 1)},
-                        threads_option(arguments, "the impacts do"),
-                        repeat_option(arguments),
-                        output_option(arguments, "the file to write; appears whole or not at all"),
-                        json_option(arguments)});
+      tool, run_later, "impact", "find when the moving instances of a scene meet", run);
+  command.add({scene_argument(arguments, "scene file (HDF5) with /simulation/velocity"),
+               required({"--dt", arguments.duration, "T", "the step in which they move, in seconds",
+                         between(0, 1e9)}),
+               backend_option(arguments),
+               {"--tolerance", arguments.tolerance, "R [1e-6]",
+                "how near triangles stop, as a part of the smaller body's diagonal", between(0, 1)},
+               threads_option(arguments, "the impacts do"),
+               repeat_option(arguments),
+               output_option(arguments, "the file to write; appears whole or not at all"),
+               json_option(arguments)});
 }
 
 }  // namespace tandem::bench

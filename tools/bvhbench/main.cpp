@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
 #include <new>
@@ -6,7 +5,7 @@
 #include "bvhbench/engines/engine.h"
 #include "bvhbench/scenes/hdf5_file.h"
 #include "command.h"
-#include "common/option_helpers.h"
+#include "common/command_line.h"
 #include "common/printable.h"
 
 namespace {
@@ -47,20 +46,20 @@ ExitCode run_and_report(const Run& run) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Makes scenes of posed meshes, finds their contacts, and lets them move.", "bvhbench");
-  app.set_version_flag("--version", "bvhbench " TANDEM_VERSION);
-  app.footer(kFooter);
-  app.require_subcommand(1);
+  const Tool tool("bvhbench", "Makes scenes of posed meshes, finds their contacts, and lets them move.",
+                  TANDEM_VERSION);
+  tool.end_help(kFooter);
+  tool.require_command();
   Run run;
-  add_scene(app, run);
-  add_query(app, run);
-  add_impact(app, run);
-  add_distance(app, run);
-  add_compare(app, run);
-  add_simulate(app, run);
-  add_economy(app, run);
-  add_frame(app, run);
-  add_poses(app, run);
+  add_scene(tool, run);
+  add_query(tool, run);
+  add_impact(tool, run);
+  add_distance(tool, run);
+  add_compare(tool, run);
+  add_simulate(tool, run);
+  add_economy(tool, run);
+  add_frame(tool, run);
+  add_poses(tool, run);
   ExitCode exit_code = kDone;
-  return parse_command_line(app, argc, argv, exit_code) ? run_and_report(run) : exit_code;
+  return tool.parse(argc, argv, exit_code) ? run_and_report(run) : exit_code;
 }

@@ -234,16 +234,15 @@ ExitCode run(const PosesArguments& arguments) {
 
 }  // namespace
 
-void add_poses(CLI::App& app, Run& run_later) {
+void add_poses(Command tool, Run& run_later) {
   const auto [command, arguments] = add_command<PosesArguments>(
-      app, run_later, "poses", "measure trees by the work of queries in random poses near contact", run);
-  add_options(
-      command,
+      tool, run_later, "poses", "measure trees by the work of queries in random poses near contact", run);
+  command.add(
       {required({"TREE", arguments.trees, "", ".bvh files over one mesh, measured in the same poses",
                  file_name()}),
        {"--with", arguments.with, "", ".bvh file of the second body [the tree itself]", file_name()},
        {"--poses", arguments.poses, "", "take the poses of this file, which -o wrote", file_name()},
-       {"--count", arguments.count, "N [1000]", "poses", CLI::Range(1, 1'000'000)},
+       {"--count", arguments.count, "N [1000]", "poses", between(1, 1'000'000)},
        seed_option(arguments.seed, "other poses"),
        {"--set", arguments.set, kSets, "training|validation [validation]",
         "which of two streams, with nothing in common"},
@@ -252,8 +251,7 @@ void add_poses(CLI::App& app, Run& run_later) {
                      "write the poses and each one's figures: a scene file; appears whole or not at all",
                      "-o,--output"),
        json_option(arguments, "the figures")});
-  for (const char* made : {"--count", "--seed", "--set"})
-    command.get_option(made)->excludes(command.get_option("--poses"));
+  for (const char* made : {"--count", "--seed", "--set"}) command.exclude(made, "--poses");
 }
 
 }  // namespace tandem::bench

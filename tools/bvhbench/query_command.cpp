@@ -218,26 +218,24 @@ ExitCode run(const QueryArguments& arguments) {
   return finish(arguments, report, [&](Hdf5Output& file) { add_datasets(file, arguments, answer); });
 }
 
-void add_gpu_options(CLI::App& command, QueryArguments& arguments) {
-  add_options(command,
-              {{"--engine", arguments.gpu_engine, kGpuEngines, "tandem|paper|paper-bits [tandem]",
+void add_gpu_options(Command command, QueryArguments& arguments) {
+  command.add({{"--engine", arguments.gpu_engine, kGpuEngines, "tandem|paper|paper-bits [tandem]",
                 "on a GPU: Tandem's, or the paper's scheme, the yardstick"},
                {"--grouped", arguments.grouped, "on a GPU: group contacts by pair there, and time that too"},
                {"--sorted", arguments.sorted, "on a GPU: sort pairs and contacts there, and time that too"},
                {"--traversal", arguments.traversal,
                 "on a GPU: also time the trees' walk alone, without triangle tests"}});
-  command.get_option("--sorted")->excludes(command.get_option("--grouped"));
+  command.exclude("--sorted", "--grouped");
 }
 
 }  // namespace
 
-void add_query(CLI::App& app, Run& run_later) {
+void add_query(Command tool, Run& run_later) {
   const auto [command, arguments] = add_command<QueryArguments>(
-      app, run_later, "query", "find every pair of triangles that meet in a scene", run);
-  add_options(command, {scene_argument(arguments), backend_option(arguments)});
+      tool, run_later, "query", "find every pair of triangles that meet in a scene", run);
+  command.add({scene_argument(arguments), backend_option(arguments)});
   if (has_cuda()) add_gpu_options(command, arguments);
-  add_options(command,
-              {{"--mode", arguments.mode, kModes, "exact|fast|boxes [exact]",
+  command.add({{"--mode", arguments.mode, kModes, "exact|fast|boxes [exact]",
                 "'exact' contacts, 'fast' ones by float32, or 'boxes': candidates"},
                {"--first-contact", arguments.first_contact, "one contact for each object pair at most"},
                {"--within", arguments.within, "D [0]",

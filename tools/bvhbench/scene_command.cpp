@@ -75,21 +75,19 @@ ExitCode run(const SceneArguments& arguments, const Maker& make) {
 }
 
 // A subcommand for a kind of scene, with the options that all kinds have.
-std::pair<CLI::App&, SceneArguments&> add_kind(CLI::App& scene, Run& run_later, const char* kind,
-                                               const char* help, std::uint32_t count, const Maker& make) {
+std::pair<Command, SceneArguments&> add_kind(Command scene, Run& run_later, const char* kind,
+                                             const char* help, std::uint32_t count, const Maker& make) {
   const auto [command, arguments] = add_command<SceneArguments>(
       scene, run_later, kind, help, [=](const SceneArguments& told) { return run(told, make); });
-  add_options(
-      command,
+  command.add(
       {mesh_option(arguments.mesh),
        count_option(arguments.count, count),
-       {"--level", arguments.level, "N [0]", "of detail of the bodies; 0: the finest",
-        CLI::NonNegativeNumber},
+       {"--level", arguments.level, "N [0]", "of detail of the bodies; 0: the finest", between(0, 1.8e19)},
        seed_option(arguments.seed, "another scene of the kind"),
        {"--offset", arguments.offset, "X Y Z [0 0 0]", "added to every translation", between(-1e300, 1e300)},
        required(
            output_option(arguments, "the scene file to write; appears whole or not at all", "-o,--output"))});
-  command.get_option("--offset")->expected(3);
+  command.take_values("--offset", 3);
   return {command, arguments};
 }
 
@@ -101,36 +99,36 @@ OptionRow spacing_option(SceneArguments& arguments) {
 
 }  // namespace
 
-void add_scene(CLI::App& app, Run& run_later) {
-  CLI::App* scene = app.add_subcommand("scene", "make a scene file of many posed meshes");
-  scene->require_subcommand(1);
+void add_scene(Command tool, Run& run_later) {
+  const Command scene = tool.add_command("scene", "make a scene file of many posed meshes");
+  scene.require_command();
   const auto add = [&](const char* kind, const char* help, std::uint32_t count, const Maker& make) {
-    return add_kind(*scene, run_later, kind, help, count, make);
+    return add_kind(scene, run_later, kind, help, count, make);
   };
 
   const auto [stack, stacked] =
       add("stack", "a cube of boxes, face to face", 1000, [](const auto& a, const Assets& assets) {
         return Bodies{make_stack(assets[0], root_above(a.count, 3), a.exact ? 0 : a.jitter, a.scene_seed())};
       });
-  stack.get_option("--count")->check(cube_of_a_whole_number());
-  add_options(stack, {{"--jitter", stacked.jitter, "J [0.001]",
-                       "how far boxes are moved at most, in box lengths", between(0, 0.5)},
-                      {"--exact", stacked.exact, "faces coincide exactly"}});
-  stack.get_option("--exact")->excludes(stack.get_option("--jitter"));
+  stack.check("--count", cube_defect);
+  stack.add({{"--jitter", stacked.jitter, "J [0.001]", "how far boxes are moved at most, in box lengths",
+              between(0, 0.5)},
+             {"--exact", stacked.exact, "faces coincide exactly"}});
+  stack.exclude("--exact", "--jitter");
 
   const auto [pile, piled] = add("pile", "bodies at random rotations, close together", 1000,
                                  [](const auto& a, const Assets& assets) {
                                    return Bodies{make_pile(assets[0], a.count, a.neighbours, a.scene_seed())};
                                  });
-  add_options(pile, {{"--neighbours", piled.neighbours, "N [6.5]",
-                      "bodies whose world box meets that of a body, on average", between(0.01, 1000)}});
+  pile.add({{"--neighbours", piled.neighbours, "N [6.5]",
+             "bodies whose world box meets that of a body, on average", between(0.01, 1000)}});
 
   const auto [lattice, placed] =
       add("lattice", "bodies at random rotations on a lattice of a given spacing", 1000,
           [](const auto& a, const Assets& assets) {
             return Bodies{make_lattice(assets[0], a.count, a.spacing, a.scene_seed())};
           });
-  add_options(lattice, {spacing_option(placed)});
+  lattice.add({spacing_option(placed)});
   const auto [field, heaped] =
       add("field", "a heap of moving bodies on a layer of fixed ones", 1000,
           [](const auto& a, const Assets& assets) {
@@ -139,17 +137,15 @@ void add_scene(CLI::App& app, Run& run_later) {
             std::fill_n(bodies.motion.begin(), a.fixed, Motion::fixed);
             return bodies;
           });
-  add_options(field,
-              {{"--fixed", heaped.fixed, "N [100000]", "how many fixed ones", CLI::Range(0, 10'000'000)},
-               spacing_option(heaped)});
+  field.add({{"--fixed", heaped.fixed, "N [100000]", "how many fixed ones", between(0, 10'000'000)},
+             spacing_option(heaped)});
 
   const auto [slide, sliding] = add(
       "slide", "bodies strewn on a tilted sheet of ground", 2500, [](const auto& a, const Assets& assets) {
         return Bodies{make_slide(assets[0], assets[1], a.count, a.tilt, a.scene_seed())};
       });
-  add_options(slide,
-              {ground_option(sliding.ground, "sheet"),
-               {"--tilt", sliding.tilt, "DEGREES [20]", "slope of the ground along x", between(-90, 90)}});
+  slide.add({ground_option(sliding.ground, "sheet"),
+             {"--tilt", sliding.tilt, "DEGREES [20]", "slope of the ground along x", between(-90, 90)}});
 
   add("coincident", "pairs of bodies in exactly the same pose", 50, [](const auto& a, const Assets& assets) {
     return Bodies{make_coincident(assets[0], a.count, a.scene_seed())};

@@ -239,33 +239,25 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
   return kDone;
 }
 
-CLI::Validator engine_name() {
-  const auto defect = [](const std::string& name) -> std::string {
-    const auto names = engine_names();
-    if (std::find(names.begin(), names.end(), name) == names.end()) {
-      std::string known;
-      for (const std::string_view one : names) known += (known.empty() ? "" : ", ") + std::string(one);
-      return name + " is none of " + known;
-    }
-    return is_built_in(name) ? std::string() : "this bvhbench was built without " + name;
-  };
-  return CLI::Validator(defect, "");
+std::string engine_defect(const std::string& name) {
+  const auto names = engine_names();
+  const std::string unknown = one_of({names.begin(), names.end()})(name);
+  return unknown.empty() && !is_built_in(name) ? "this bvhbench was built without " + name : unknown;
 }
 
-void add_solver_options(CLI::App& command, SimulateArguments& arguments) {
+void add_solver_options(Command command, SimulateArguments& arguments) {
   SimulatorOptions& simulator = arguments.simulator;
   SolverOptions& solver = simulator.solver;
-  add_options(
-      command,
+  command.add(
       {{"--solver", solver.kind, kSolvers, "auto|soft|newton|sweeps [auto]",
         "how a step is solved: 'soft' or 'newton', 'auto' of these two, or 'sweeps'"},
        {"--dt", simulator.dt, "SECONDS [1/60]", "seconds of a step", between(1e-9, 1e3)},
        {"--substeps", solver.substeps, "N [16, with sweeps 1]", "parts of a step that share its contacts",
-        CLI::Range(1, 10'000)},
+        between(1, 10'000)},
        {"--iterations", solver.iterations, "N [30]", "sweeps for velocities in each part of a step",
-        CLI::Range(0, 1'000'000)},
+        between(0, 1'000'000)},
        {"--position-iterations", solver.position_iterations, "N [30]",
-        "sweeps for the correction of penetration in each part", CLI::Range(0, 1'000'000)},
+        "sweeps for the correction of penetration in each part", between(0, 1'000'000)},
        {"--gravity", arguments.gravity, "G [9.81]", "along -z, in m/s^2", between(-1e6, 1e6)},
        {"--friction", solver.friction, format("MU [%g]", solver.friction), "coefficient of friction",
         between(0, 1e6)},
@@ -289,12 +281,11 @@ void add_solver_options(CLI::App& command, SimulateArguments& arguments) {
         between(0, 1e6)}});
 }
 
-void add_run_options(CLI::App& command, SimulateArguments& arguments) {
+void add_run_options(Command command, SimulateArguments& arguments) {
   RunOptions& run = arguments.run;
-  add_options(
-      command,
-      {required({"--frames", run.steps, "N", "steps to make", CLI::Range(1, 1'000'000'000)}),
-       {"--engine", arguments.engine, "NAME [tandem]", "what finds the triangles that meet", engine_name()},
+  command.add(
+      {required({"--frames", run.steps, "N", "steps to make", between(1, 1'000'000'000)}),
+       {"--engine", arguments.engine, "NAME [tandem]", "what finds the triangles that meet", engine_defect},
        {"--fast", arguments.fast, "let the engine decide triangles in float32"},
        {"--density", arguments.density, "D [1000]", "of the bodies, in kg/m^3", between(1e-12, 1e12)},
        threads_option(arguments, "the results do"),
@@ -308,19 +299,19 @@ void add_run_options(CLI::App& command, SimulateArguments& arguments) {
 }
 
 // Adds the options that the paper's configurations have and scene files have not.
-void add_configuration(CLI::App& command, SimulateArguments& arguments) {
-  add_options(command, {mesh_option(arguments.mesh), count_option(arguments.count, 1000),
-                        seed_option(arguments.seed, "another start of the kind; and of --order shuffled")});
+void add_configuration(Command command, SimulateArguments& arguments) {
+  command.add({mesh_option(arguments.mesh), count_option(arguments.count, 1000),
+               seed_option(arguments.seed, "another start of the kind; and of --order shuffled")});
 }
 
 }  // namespace
 
-void add_simulate(CLI::App& app, Run& run_later) {
-  CLI::App* simulate = app.add_subcommand("simulate", "let bodies move, and keep what that takes");
-  simulate->require_subcommand(1);
+void add_simulate(Command tool, Run& run_later) {
+  const Command simulate = tool.add_command("simulate", "let bodies move, and keep what that takes");
+  simulate.require_command();
   const auto add = [&](const char* kind, const char* help, const SetUp& set_up, double friction = 0.5) {
     const auto added = add_command<SimulateArguments>(
-        *simulate, run_later, kind, help,
+        simulate, run_later, kind, help,
         [=](const SimulateArguments& told) { return run(kind, told, set_up); });
     added.second.simulator.solver.friction = friction;
     add_solver_options(added.first, added.second);
@@ -331,22 +322,21 @@ void add_simulate(CLI::App& app, Run& run_later) {
   const auto [slide, sliding] =
       add("slide", "rocks that slide down a tilted ground, again and again", set_up_slide, 0.4);
   add_configuration(slide, sliding);
-  add_options(slide,
-              {ground_option(sliding.ground, "ground, which is fixed"),
-               {"--tilt", sliding.tilt, "DEGREES [30]", "slope of the ground along x", between(0, 80)}});
+  slide.add({ground_option(sliding.ground, "ground, which is fixed"),
+             {"--tilt", sliding.tilt, "DEGREES [30]", "slope of the ground along x", between(0, 80)}});
 
   const auto [pile, falling] = add("pile", "bodies that fall on the ground and on each other", set_up_pile);
   add_configuration(pile, falling);
-  add_options(pile, {ground_option(falling.ground, "ground, which is fixed")});
+  pile.add({ground_option(falling.ground, "ground, which is fixed")});
 
   const auto [stack, standing] = add("stack", "a cube of boxes on a floor of boxes", set_up_stack);
   add_configuration(stack, standing);
-  stack.get_option("--count")->check(cube_of_a_whole_number());
-  add_options(stack, {{"--jitter", standing.jitter, "J [0.0005]",
-                       "how far boxes are moved along x and y at most, in box lengths", between(0, 0.1)}});
+  stack.check("--count", cube_defect);
+  stack.add({{"--jitter", standing.jitter, "J [0.0005]",
+              "how far boxes are moved along x and y at most, in box lengths", between(0, 0.1)}});
 
   const auto [scene, any] = add("scene", "the bodies of a scene file", set_up_scene);
-  add_options(scene, {scene_argument(any), seed_option(any.seed, "of --order shuffled")});
+  scene.add({scene_argument(any), seed_option(any.seed, "of --order shuffled")});
 }
 
 }  // namespace tandem::bench

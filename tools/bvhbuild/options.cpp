@@ -1,10 +1,10 @@
 #include "options.h"
 
-#include <CLI/CLI.hpp>
 #include <map>
 #include <string>
 
-#include "common/option_helpers.h"
+#include "common/command_line.h"
+#include "common/number_words.h"
 
 namespace tandem::build {
 namespace {
@@ -27,30 +27,22 @@ bool parse_imaginary(const std::string& text, Imaginary& imaginary) {
     imaginary = text == "free" ? Imaginary::free : Imaginary::minimal;
     return true;
   }
-  return CLI::detail::lexical_cast(text, imaginary.share) && imaginary.share >= 0 && imaginary.share <= 1;
+  imaginary.share = number_in(text).value_or(-1);
+  return imaginary.share >= 0 && imaginary.share <= 1;
 }
 
-CLI::Validator imaginary_share() {
-  return CLI::Validator(
-      [](const std::string& text) {
-        Imaginary imaginary;
-        return parse_imaginary(text, imaginary) ? "" : text + " is not minimal, free or a number from 0 to 1";
-      },
-      "");
+std::string imaginary_defect(const std::string& text) {
+  Imaginary imaginary;
+  return parse_imaginary(text, imaginary) ? "" : text + " is not minimal, free or a number from 0 to 1";
 }
 
-CLI::Validator level_errors() {
-  return CLI::Validator(
-      [](const std::string& text) {
-        std::vector<LevelError> errors;
-        return parse_level_errors(text, errors);
-      },
-      "");
+std::string level_errors_defect(const std::string& text) {
+  std::vector<LevelError> errors;
+  return parse_level_errors(text, errors);
 }
 
-void add_options(CLI::App& app, Options& options, double& memory_gib, double& expansion) {
-  tandem::add_options(
-      app,
+void add_options(const Tool& tool, Options& options, double& memory_gib, double& expansion) {
+  tool.add(
       {required({"MESH", options.input, "",
                  "mesh file: OBJ, PLY, STL, OFF, glTF/GLB, DAE and what else assimp reads", file_name()}),
        required({"-o,--output", options.output, "", "the .bvh file to write; appears whole or not at all",
@@ -58,7 +50,7 @@ void add_options(CLI::App& app, Options& options, double& memory_gib, double& ex
        {"--imaginary", [&options](const std::string& text) { parse_imaginary(text, options.imaginary); },
         "minimal|free|SHARE [minimal]",
         "padding nodes: 'minimal' (the proven fewest), 'free', or at most a share of all nodes",
-        imaginary_share()},
+        imaginary_defect},
        {"--effort", options.effort, kEffortNames, "fast|default|best [default]",
         "time that goes into a tree that is cheap to query; 'best' takes minutes for 100,000 triangles, and "
         "Ctrl-C ends it with the best tree so far"},
@@ -70,12 +62,12 @@ void add_options(CLI::App& app, Options& options, double& memory_gib, double& ex
         "E1,E2,...|auto",
         "coarser levels of the mesh, each proved to be at most so far from the finest: lengths, or with % of "
         "the diagonal of its bounds, ascending; 'auto' is 0.1%,0.3%,1%,3%",
-        level_errors()},
+        level_errors_defect},
        {"--strict", options.strict, "take anything dropped or found amiss in the mesh for an error"},
        {"--json", options.json, "print the report as JSON"},
        {"-q,--quiet", options.quiet, "print nothing but errors"},
        {"--threads", options.threads, "N [all]", "threads for building; the result does not depend on them",
-        CLI::Range(1, 4096)},
+        between(1, 4096)},
        {"--reader", options.import.reader, kReaderNames, "auto|tandem|assimp [auto]", "who reads the mesh"},
        {"--allow-outside-files", options.import.limits.outside_files,
         "let MESH name files elsewhere than in its folder and below it, such as buffers of glTF"},
@@ -86,20 +78,21 @@ void add_options(CLI::App& app, Options& options, double& memory_gib, double& ex
         "vertices and faces that a scene may have beyond what the bytes of its file can hold: instances "
         "repeat meshes, and counts may promise what is not there",
         between(0, 1e15)}});
-  app.set_version_flag("--version", "bvhbuild " TANDEM_VERSION);
-  app.footer(kFooter);
+  tool.end_help(kFooter);
 }
 
 }  // namespace
 
 std::optional<Options> parse_options(int argc, char** argv, ExitCode& exit_code) {
-  CLI::App app("Turns a mesh into an optimised 4-ary blocked AABB tree for exact tandem collision queries.",
-               "bvhbuild");
+  const Tool tool(
+      "bvhbuild",
+      "Turns a mesh into an optimised 4-ary blocked AABB tree for exact tandem collision queries.",
+      TANDEM_VERSION);
   Options options;
   double memory_gib = static_cast<double>(options.import.limits.memory_bytes) / 0x1p30;
   auto expansion = static_cast<double>(options.import.limits.expansion);
-  add_options(app, options, memory_gib, expansion);
-  if (!parse_command_line(app, argc, argv, exit_code)) return std::nullopt;
+  add_options(tool, options, memory_gib, expansion);
+  if (!tool.parse(argc, argv, exit_code)) return std::nullopt;
   options.import.limits.memory_bytes = static_cast<std::uint64_t>(memory_gib * 0x1p30);
   options.import.limits.expansion = static_cast<std::uint64_t>(expansion);
   return options;
@@ -107,7 +100,7 @@ std::optional<Options> parse_options(int argc, char** argv, ExitCode& exit_code)
 
 std::string name(Imaginary imaginary) {
   if (imaginary == Imaginary::minimal) return "minimal";
-  return imaginary == Imaginary::free ? "free" : CLI::detail::to_string(imaginary.share);
+  return imaginary == Imaginary::free ? "free" : format("%g", imaginary.share);
 }
 
 std::string name(Effort effort) {

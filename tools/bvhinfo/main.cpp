@@ -1,13 +1,12 @@
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "common/command_line.h"
 #include "common/exit_code.h"
 #include "common/number_words.h"
-#include "common/option_helpers.h"
 #include "common/printable.h"
 #include "page.h"
 
@@ -103,19 +102,19 @@ ExitCode run(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Shows what is in a Tandem .bvh file. Two or more files are set side by side.", "bvhinfo");
+  const Tool tool("bvhinfo", "Shows what is in a Tandem .bvh file. Two or more files are set side by side.",
+                  TANDEM_VERSION);
   Options options;
-  add_options(app, {required({"FILE", options.files, "", ".bvh files"}),
-                    {"--json", options.json, "print JSON: an object for one file, an array for several"},
-                    {"--verify", options.verify, "only check the files and say whether they are sound"},
-                    {"--levels", options.levels, "prove the error bounds of levels of detail anew"}});
-  app.get_option("--levels")->needs(app.get_option("--verify"));
-  app.set_version_flag("--version", "bvhinfo " TANDEM_VERSION);
-  app.footer(
+  tool.add({required({"FILE", options.files, "", ".bvh files"}),
+            {"--json", options.json, "print JSON: an object for one file, an array for several"},
+            {"--verify", options.verify, "only check the files and say whether they are sound"},
+            {"--levels", options.levels, "prove the error bounds of levels of detail anew"}});
+  tool.need("--levels", "--verify");
+  tool.end_help(
       "Every file is checked in full before anything else is read.\nExit codes: 0 all sound, 1 usage, 2 a "
       "file is not, 4 the output could not be written, 5 internal error.");
   ExitCode exit_code = kDone;
-  if (!parse_command_line(app, argc, argv, exit_code)) return exit_code;
+  if (!tool.parse(argc, argv, exit_code)) return exit_code;
   try {
     return run(options);
   } catch (const std::exception& defect) {

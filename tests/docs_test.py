@@ -57,7 +57,7 @@ class TablesTest(unittest.TestCase):
         self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "", ""), "run scripts/write_tables")
 
     def test_a_changed_figure_fails(self):
-        for file, before, after in (("gpu.md", "| stack 12 | 2,955 |", "| stack 12 | 2,956 |"),
+        for file, before, after in (("results/gpu_tables.md", "| stack 12 | 2,955 |", "| stack 12 | 2,956 |"),
                                     ("results/cpu/compare.csv", "stack_12,FCL,3", "stack_12,FCL,4"),
                                     ("results/h100/paper.csv", ",fcl,", ",tandem,"),
                                     ("decisions/0001-block-layout.md", "*holds*", "*superseded by [0002](0002-checking.md)*")):
@@ -123,6 +123,15 @@ class LinksTest(unittest.TestCase):
         shown = re.search(r"^## Filters$.*?^```cpp\n(.*?)^```$", (ROOT / "docs/queries.md").read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)[1]
         test = (ROOT / "tests/kernels/scene/pair_filter_test.cpp").read_text(encoding="utf-8")
         self.assertIn("".join(f"  {line}\n" for line in shown.splitlines()), test)
+
+
+    def test_excerpts_are_those_of_their_programs(self):
+        for page, start, program in (("docs/gpu.md", "for (int step = 0", "tests/gpu/example_contacts.cu"),
+                                     ("docs/contacts.md", "manifolds.rows()", "tests/consumer/game_loop.cpp")):
+            shown = [block for block in re.findall(r"^```cpp\n(.*?)^```$", (ROOT / page).read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL) if start in block]
+            self.assertEqual(len(shown), 1, page)
+            lines = "\n".join(line.strip() for line in (ROOT / program).read_text(encoding="utf-8").splitlines())
+            self.assertIn("\n".join(line.strip() for line in shown[0].splitlines()), lines)
 
 
 class IncludesTest(unittest.TestCase):

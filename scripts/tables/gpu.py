@@ -62,6 +62,13 @@ def scenes(results):
     return markdown(heads, [[cells[head] for head in heads] for cells in (scene_cells(*item) for item in results.items())])
 
 
+def chosen(results):
+    """The few scenes and columns that docs/gpu.md shows."""
+    heads = ["scene", "object pairs", "contacts", "whole", "one CPU core", "16 CPU threads"]
+    rows = [scene_cells(scene, results[scene]) for scene in ("stack_12", "pile_1500", "pile_24000", "pile_1500_x100000", "lattice_46_070")]
+    return markdown(heads, [[cells[head] for head in heads] for cells in rows])
+
+
 def large_cells(scene, rows):
     exact = find(rows, "cuda")
     cells = figures(rows) | {"scene": LARGE[scene]}

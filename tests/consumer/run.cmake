@@ -25,9 +25,6 @@ file(READ ${SOURCE}/tests/consumer/contacts.cpp program)
 require_shown(docs/queries.md cpp "${program}")
 file(READ ${SOURCE}/tests/consumer/distances.cpp program)
 require_shown(docs/distance.md cpp "${program}")
-file(READ ${SOURCE}/tests/consumer/game_loop.cpp program)
-require_shown(docs/contacts.md cpp "${program}")
-
 file(READ ${SOURCE}/tests/consumer/impact.cpp program)
 require_shown(docs/impact.md cpp "${program}")
 

@@ -10,8 +10,8 @@ namespace tandem {
 
 /// Bit 4 i + j is set when node i of a and node j of b may overlap: 6 axes each, conservative as
 /// relative_pose() says. Imaginary nodes never do. The other 9 axes would spare a ninth of the block pairs
-/// and an eighth of the candidates, and cost more than that (docs/decisions/0012). This one works node by
-/// node; block_pair_test() has faster ones with the same results.
+/// and an eighth of the candidates, and cost more than that (docs/decisions/box-tests.md). This one works
+/// node by node; block_pair_test() has faster ones with the same results.
 inline std::uint16_t block_pair_mask(const Block& a, const Block& b, const RelativePose& b_in_a) {
   unsigned mask = 0;
   for (int i = 0; i < kNodesPerBlock; ++i) {

@@ -83,7 +83,7 @@ class BlockPairLanes : PosedBlockPair {
  private:
   // What depends on one node alone is worked out for four nodes and spread over the lanes after that. No exit
   // after some axes: 70 to 90 % of block pairs in a traversal have a node pair that passes all of them, and
-  // exits cost more than they save (docs/decisions/0010).
+  // exits cost more than they save (docs/decisions/box-tests.md).
   template <int kPart>
   TANDEM_INLINE unsigned part() const {
     LaneMask<kCount> overlaps = LaneMask<kCount>::all();

@@ -26,7 +26,7 @@ TANDEM_HD constexpr std::uint32_t own_node_pairs(bool leaf_block) {
 }
 
 /// Block pairs that are taken off the stack together: their tests do not wait for each other, so a processor
-/// overlaps them. 4 take 11 % less time than 1, and 8 no less than 4 (docs/decisions/0012).
+/// overlaps them. 4 take 11 % less time than 1, and 8 no less than 4 (docs/decisions/box-tests.md).
 inline constexpr std::uint32_t kTakenAtOnce = 4;
 
 /// The most entries that a traversal's stack ever holds.
@@ -105,9 +105,9 @@ TANDEM_HD constexpr Descent descent_beside_leaves(bool leaf_a) {
 
 /// An internal block must be this many times larger than the other one to descend alone. For bodies on a
 /// ground that leaves a third of the block pairs. Any factor from 1.5 to 4 does about as well
-/// (docs/decisions/0013).
+/// (docs/decisions/box-tests.md).
 inline constexpr float kDescendsAlone = 2;
-/// The factor for sizes by oriented_size() (docs/decisions/0039).
+/// The factor for sizes by oriented_size() (docs/decisions/gpu-blocks.md).
 inline constexpr float kOrientedDescendsAlone = 1.75f;
 
 TANDEM_HD constexpr float descends_alone(const Block&) {
@@ -126,7 +126,7 @@ TANDEM_HD constexpr Descent descent_by_size(float size_a, float size_b, float ti
 /// A leaf block must be this many times larger than an internal one for its triangles' planes to be tried,
 /// see drop_beyond_planes(). A plane tells more than a box where the other mesh's nodes are much smaller:
 /// under bodies of 24,000 triangles on a ground it spares 40 % of the block pairs and 60 % of the candidates
-/// (docs/decisions/0014).
+/// (docs/decisions/box-tests.md).
 inline constexpr float kTimesLarger = 4;
 
 /// Returns whether it is that much larger. The other of the two is an internal block.

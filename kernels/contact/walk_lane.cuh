@@ -231,7 +231,7 @@ struct InFrame {
   }
 
   /// Planes are tried in mode fast, whose candidates are the CPU's. Oriented boxes of leaves are nearly as
-  /// thin as their planes: exact queries are faster without (docs/decisions/0047).
+  /// thin as their planes: exact queries are faster without (docs/decisions/gpu-blocks.md).
   static constexpr bool kTriesPlanes = kMode == QueryMode::fast;
   __device__ __noinline__ static std::uint32_t drop_beyond_planes(const PairRecord& record, std::uint32_t a,
                                                                   std::uint32_t b, std::uint32_t hits) {

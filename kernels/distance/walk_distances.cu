@@ -14,7 +14,7 @@ constexpr int kTurns = 4;  // block pairs of half a warp whose children are appe
 
 // A round of the narrow walk has this many block pairs for each pair: as many as the GPU takes at once,
 // spread over the pairs that are walked. From 32 on the bound is the distance, but for few pairs in a hundred
-// (docs/decisions/0062).
+// (docs/decisions/distances.md).
 constexpr std::uint32_t kNarrowRound = 1u << 14, kFewestNarrow = 32, kMostNarrow = 1u << 10;
 
 /// The outcome of a lane's node pair of a block pair.

@@ -20,7 +20,7 @@
 //  4. Before a round of blocks that are small already, the pairs that are left are posed at some times of the
 //     step, and the contact query's walk looks for contacts there: no impact is later than one of these, so
 //     the rounds to come look at the time before it alone. Without it, bodies that meet early and go through
-//     each other take thirty times the block pairs (docs/decisions/0064).
+//     each other take thirty times the block pairs (docs/decisions/impacts.md).
 //  5. Triangle pairs are told apart by their planes or advanced, each by a thread, and the first that stops
 //     stops the pair.
 namespace tandem::gpu {

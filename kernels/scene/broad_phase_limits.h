@@ -1,7 +1,7 @@
 #pragma once
 #include <cstdint>
 
-// How a broad phase on the GPU is done, by the number of boxes. Measured: docs/decisions/0018 and 0038.
+// How a broad phase on the GPU is done, by the number of boxes: docs/decisions/broad-phase.md, gpu-walk.md.
 namespace tandem {
 
 /// Up to so many boxes are tested each against each. 8,000 take 42 us numbered by chance and 27 along a

@@ -11,7 +11,7 @@
 /// `within_tolerance`. Where both are the finest levels, it was the contact query: `touching`.
 ///
 /// Coarser levels first, for the pairs alone that these leave open, cost more than they spare: the upper
-/// blocks of a tree tell apart what a coarser level could (docs/decisions/0068).
+/// blocks of a tree tell apart what a coarser level could (docs/decisions/levels.md).
 namespace tandem::levels {
 
 /// The place of an asset's levels in the list of those of all assets, from the finest on.

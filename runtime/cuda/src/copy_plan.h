@@ -7,7 +7,7 @@
 #include "tandem/runtime/contents.h"
 
 // The plan of a copy: what is copied of files, where it lies in one copy of them all, and who copies it.
-// Measured: docs/decisions/0049.
+// Measured: docs/decisions/gpu-blocks.md.
 namespace tandem {
 
 /// Bytes in CPU memory and their place in the copy.

@@ -23,7 +23,7 @@ struct alignas(16) Bounds {
 
   /// Returns what a block over these bounds costs in tandem queries: its surface to the power 3/4. Visits
   /// grow more slowly than surfaces, since a block meets others of its own size; of the powers tried this one
-  /// led to the fewest block pairs (docs/decisions/0034). A trace of the edge lengths and a constant are
+  /// led to the fewest block pairs (docs/decisions/trees.md). A trace of the edge lengths and a constant are
   /// added to the surface, so that flat, thin and point-like sets are still told apart and no cost is zero.
   /// Made of square roots, which every machine rounds alike. Condition: coordinates are scaled to about 1
   /// (normalized_bounds()).

@@ -219,7 +219,7 @@ std::uint32_t ExchangeSearch::pass(const Region& region) {
 
 // Branch and bound after Bittner, Hapala and Havran 2013, for an exchange instead of an insertion: what is
 // saved is at most what the child's absence saves, plus what its partner's does; the latter is left out of
-// the bound, which loses little (docs/decisions/0033) and keeps searches short.
+// the bound, which loses little (docs/decisions/trees.md) and keeps searches short.
 bool ExchangeSearch::improve(Child child, const Region& region) {
   const std::uint32_t parent = tree_.parent_of(child);
   if (tree_[parent].count < 2) return false;

@@ -11,7 +11,8 @@ namespace {
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 // A block has a frame of its own if at most this many triangles are below it. Above, none is worth it
-// (docs/decisions/0039), and the checker would have to look at all triangles once more for each level.
+// (docs/decisions/gpu-blocks.md), and the checker would have to look at all triangles once more for each
+// level.
 constexpr std::uint32_t kMostTriangles = 4096;
 
 constexpr std::size_t kBlocksAtOnce = 64;

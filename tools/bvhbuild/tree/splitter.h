@@ -28,7 +28,7 @@ struct Split {
 /// Groups below this size are worked on by one thread.
 inline constexpr std::uint32_t kSerialSize = 8192;
 
-/// Groups up to this size are swept, larger ones binned (docs/decisions/0004 has the measurement).
+/// Groups up to this size are swept, larger ones binned (docs/decisions/trees.md has the measurement).
 inline constexpr std::uint32_t kSweepSize = 1 << 12;
 
 /// A trace of a penalty for uneven splits. It decides where costs are equal, as among coincident triangles,

@@ -18,7 +18,7 @@ struct CheckResult {
 enum class CheckDepth : std::uint8_t {
   full,
   quick,  ///< it believes what oriented boxes hold and what topology says; what this spares:
-          ///< docs/decisions/0047 and 0052
+          ///< docs/decisions/gpu-blocks.md and 0052
 };
 
 /// Proves that the bytes are a sound .bvh file: hash, sizes, sections, tree, boxes, triangles. After kOk

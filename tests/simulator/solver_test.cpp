@@ -13,9 +13,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kGravity = 9.81;
-const Vector3d kCube = {1, 1, 1};
-
 // Boxes of these masses on each other on the plane, each as deep in the next as the slop, and askew by
 // `jitter`.
 struct Tower {

@@ -204,7 +204,9 @@ class Scene:
     @property
     def instances(self) -> Rows:
         """The bodies by number, a copy, array of INSTANCE. Removed ones have the asset NO_INDEX."""
-        return _frombuffer(self._core.instances(), INSTANCE)
+        bodies = _frombuffer(self._core.instances(), INSTANCE)
+        bodies["reserved"] = 0  # padding in C++, which holds whatever was in memory
+        return bodies
 
     def place(self, instances: Rows | None = None, *, filter: Filter | None = None, asset: npt.ArrayLike | None = None, rotation: Rotations | None = None,
               translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None) -> Scene:

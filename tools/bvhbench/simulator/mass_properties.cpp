@@ -123,7 +123,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 // A volume below this part of the diagonal's cube is rounding.
-constexpr double kFlat = 1e-13;
+constexpr double kFlatVolume = 1e-13;
 
 // Adds and keeps what each addition rounds off, to add it in the end: Knuth's two-sum, entry by entry.
 template <typename Value>
@@ -254,7 +254,7 @@ MassReport mass_properties(const AssetView& asset) {
   add_findings(surface, report.findings);
   if (surface.closed) {
     const Moments moments = integrate(surface, about, solid_moments);
-    if (moments.zeroth > kFlat * size * size * size) {
+    if (moments.zeroth > kFlatVolume * size * size * size) {
       report.properties = properties_of(moments, about, header.origin, 1);
       return report;
     }

@@ -52,10 +52,10 @@ void tell(const PairMotion& pair, const LevelView& a, const LevelView& b, double
   const impact::TrianglesAt triangles =
       triangles_at(pair, impact::moving_triangles(pair, of_a, of_b), impact::place_at(pair, time));
   const TriangleDistance distance = triangle_distance(impact::triangle_pair(triangles));
-  const Vector3 center = pair.a->center + time * pair.a->displacement;
+  const Vector3 centre = pair.a->centre + time * pair.a->displacement;
   out.gap = distance.interval.upper;
-  write(center + impact::vector_of(distance.point_a), out.point_a);
-  write(center + impact::vector_of(distance.point_b), out.point_b);
+  write(centre + impact::vector_of(distance.point_a), out.point_a);
+  write(centre + impact::vector_of(distance.point_b), out.point_b);
   out.face_a = of_a.source_face();
   out.face_b = of_b.source_face();
 }

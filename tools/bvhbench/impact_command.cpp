@@ -83,7 +83,7 @@ void add_datasets(Hdf5Output& file, const TimedImpacts& found, std::span<const R
   });
   add_column(file, "/motion/velocity", motion, &RigidMotion::velocity);
   add_column(file, "/motion/angular_velocity", motion, &RigidMotion::angular_velocity);
-  add_column(file, "/motion/centre", motion, &RigidMotion::center);
+  add_column(file, "/motion/centre", motion, &RigidMotion::centre);
 }
 
 ExitCode run_impact(const ImpactArguments& arguments) {

@@ -375,7 +375,7 @@ class Scene:
         >>> motion = np.zeros(2, tandem.MOTION)
         >>> motion["velocity"][1] = [-1, 0, 0]
         >>> motion["angular_velocity"][1] = [1, 0, 0]
-        >>> motion["center"] = translation = [[0, 0, 0], [1.5, 0, 0]]
+        >>> motion["centre"] = translation = [[0, 0, 0], [1.5, 0, 0]]
         >>> scene.place(translation=translation).impacts(motion, 2.0).impacts["t_safe"].round(3).tolist()
         [0.5]
         """

@@ -116,9 +116,9 @@ def _states(path: pathlib.Path, file: Any, count: int) -> tuple[NDArray[np.int64
         raise ValueError(f"{path}: keeps no state: simulate with --trajectory")
     steps = file["trajectory/frame"][:].astype(np.int64)
     rotation = _of_quaternions(_dataset(path, file, "trajectory/orientation", len(steps), count, 4))
-    center = _dataset(path, file, "bodies/center_of_mass", count, 3)
+    centre = _dataset(path, file, "bodies/centre_of_mass", count, 3)
     position = _dataset(path, file, "trajectory/position", len(steps), count, 3)
-    return steps, rotation, position - np.einsum("knij,nj->kni", rotation, center)
+    return steps, rotation, position - np.einsum("knij,nj->kni", rotation, centre)
 
 
 def _of_quaternions(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:

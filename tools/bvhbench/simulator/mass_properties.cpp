@@ -206,11 +206,11 @@ Moments integrate(const Surface& surface, const Vector3d& about, const Of& of) {
 // thickness: what a mass per area is multiplied by; 1 of solids.
 MassProperties properties_of(const Moments& moments, const Vector3d& about, const double* origin,
                              double thickness) {
-  const Vector3d center = moments.first / moments.zeroth;
-  const Matrix3d spread = thickness * (moments.second - moments.zeroth * product(center));
+  const Vector3d centre = moments.first / moments.zeroth;
+  const Matrix3d spread = thickness * (moments.second - moments.zeroth * product(centre));
   MassProperties properties;
   properties.volume = thickness * moments.zeroth;
-  properties.center = Vector3d(origin[0], origin[1], origin[2]) + (about + center);
+  properties.centre = Vector3d(origin[0], origin[1], origin[2]) + (about + centre);
   properties.inertia_per_density = spread.trace() * Matrix3d::Identity() - spread;
   return properties;
 }

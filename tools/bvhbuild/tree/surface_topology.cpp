@@ -75,7 +75,7 @@ Sign triple_product(const Double3& a, const Double3& b, const Double3& c) {
 bool may_meet(const Block& block, int node, const Double3& from, const Double3& direction) {
   double first = 0, last = HUGE_VAL;
   for (std::size_t k = 0; k < 3; ++k) {
-    const double c = block.center[k][node], h = block.half_extent[k][node];
+    const double c = block.centre[k][node], h = block.half_extent[k][node];
     const double slack = 0x1p-40 * (std::abs(c) + h + std::abs(from[k]));
     first = std::max(first, ((c - from[k]) - h - slack) / direction[k]);
     last = std::min(last, ((c - from[k]) + h + slack) / direction[k]);

@@ -1,4 +1,4 @@
-"""The tables of docs/python_trimesh.md: what `compare_python_fcl` and `python_peers` measured."""
+"""Tables of docs/python_trimesh.md and docs/results/python_tables.md: what `compare_python_fcl` and `python_peers` measured."""
 from common.tabular import markdown, three_digits, whole
 
 
@@ -10,6 +10,15 @@ def errors(rows):
     counts = [[sum(int(row[name]) for name in names) for names in columns] for row in rows]
     lines = [[row["kind"], *map(whole, line)] for row, line in zip(rows, counts)] + [["all", *map(whole, map(sum, zip(*counts)))]]
     return markdown(heads, lines)
+
+
+def managers(rows):
+    """One row for each pile: milliseconds of a frame by both collision managers."""
+    peers = {"tandem.trimesh, names": "`tandem.trimesh`, names", "trimesh + python-fcl, names": "python-fcl, names",
+             "tandem.trimesh, data": "`tandem.trimesh`, data", "trimesh + python-fcl, data": "python-fcl, data"}
+    found = {(int(row["bodies"]), row["peer"]): float(row["frame_ms"]) for row in rows}
+    lines = [[whole(bodies), *(three_digits(found[bodies, peer]) for peer in peers)] for bodies in dict.fromkeys(bodies for bodies, _ in found)]
+    return markdown(["cows", *peers.values()], lines, "r")
 
 
 def speed(rows):

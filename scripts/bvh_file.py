@@ -11,11 +11,11 @@ HEADER = struct.Struct("<8sQIHHQ3d3f3fQdII24s")
 SECTION = struct.Struct("<IIQQQ")
 LEVEL = np.dtype([("triangles", "<u4"), ("blocks", "<u4"), ("leaf_blocks", "<u4"), ("depth", "<u4"),
                   ("error_bound", "<f8"), ("vertices", "<u4"), ("flags", "<u4")])
-BLOCK = np.dtype([("center", "<f4", (3, 4)), ("half_extent", "<f4", (3, 4)), ("index", "<u4", 4), ("kind", "<u4", 4)])
+BLOCK = np.dtype([("centre", "<f4", (3, 4)), ("half_extent", "<f4", (3, 4)), ("index", "<u4", 4), ("kind", "<u4", 4)])
 TRIANGLE = np.dtype([("corner", [("position", "<f4", 3), ("w", "<u4")], 3)])
 PART = np.dtype([("name_offset", "<u4"), ("name_bytes", "<u4"), ("path_offset", "<u4"), ("path_bytes", "<u4"),
                  ("first_face", "<u8"), ("face_count", "<u8")])
-ORIENTED_BLOCK = np.dtype([("center", "<f4", (3, 4)), ("half_extent", "<f4", (3, 4)), ("first_below", "<u4"),
+ORIENTED_BLOCK = np.dtype([("centre", "<f4", (3, 4)), ("half_extent", "<f4", (3, 4)), ("first_below", "<u4"),
                            ("size", "<f4"), ("quaternion", "<u2", 4)])
 TOPOLOGY = np.dtype([("vertex", "<u4", 3), ("flags", "<u4")])
 COMPONENT = np.dtype([("first_triangle", "<u4"), ("triangles", "<u4"), ("flags", "<u4"), ("reserved", "<u4")])
@@ -152,8 +152,8 @@ def xxh64(data, seed=0):
 
 
 def interval(block, node, axis):
-    center, half = (Fraction(float(block[key][axis, node])) for key in ("center", "half_extent"))
-    return center - half, center + half
+    centre, half = (Fraction(float(block[key][axis, node])) for key in ("centre", "half_extent"))
+    return centre - half, centre + half
 
 
 def walk(file):
@@ -187,7 +187,7 @@ def defects_of_tree(file):
         for node, kind in enumerate(kinds):
             if kind == LEAF:
                 reached.append(int(block["index"][node]))
-            empty = (block["half_extent"][:, node] == -np.inf).all() and (block["center"][:, node] == 0).all()
+            empty = (block["half_extent"][:, node] == -np.inf).all() and (block["centre"][:, node] == 0).all()
             if (kind == IMAGINARY) != bool(empty and block["index"][node] == NO_INDEX):
                 defects.append(f"block {index}, node {node}: an imaginary node and the empty box go together")
     if reached != list(range(len(file.triangles))):
@@ -244,13 +244,13 @@ def holds(oriented, node, points, farthest):
     """Whether an oriented box holds the points, whole multiples of 2^-149, and reaches no farther than it may, which is
     `farthest`, squared, of the points' distances from the origin, and a 2^20th more along each axis."""
     rotation, length = rotation_of(oriented)
-    center, half = (whole(oriented[key][:, node]) for key in ("center", "half_extent"))
-    sound = all((abs(c) + h) ** 2 << 40 <= farthest * (((1 << 20) + 1) ** 2 + 1) for c, h in zip(center, half))
+    centre, half = (whole(oriented[key][:, node]) for key in ("centre", "half_extent"))
+    sound = all((abs(c) + h) ** 2 << 40 <= farthest * (((1 << 20) + 1) ** 2 + 1) for c, h in zip(centre, half))
     for axis in range(3):
         a, b, c = (rotation[i][axis] for i in range(3))
         along = [a * x + b * y + c * z for x, y, z in points]
-        sound = sound and length * (center[axis] - half[axis]) <= min(along)
-        sound = sound and max(along) <= length * (center[axis] + half[axis])
+        sound = sound and length * (centre[axis] - half[axis]) <= min(along)
+        sound = sound and max(along) <= length * (centre[axis] + half[axis])
     return sound
 
 
@@ -281,7 +281,7 @@ def defects_of_oriented_blocks(file):
         for node, kind in enumerate(block["kind"]):
             below = int(block["index"][node])
             if kind == IMAGINARY:
-                box = oriented["center"][:, node].tobytes(), oriented["half_extent"][:, node]
+                box = oriented["centre"][:, node].tobytes(), oriented["half_extent"][:, node]
                 if box[0] != bytes(12) or not (box[1] == -np.inf).all():
                     defects.append(f"oriented block of block {index}, node {node}: imaginary and empty go together")
                 continue

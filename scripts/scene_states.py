@@ -80,7 +80,7 @@ def read_run(path, file, wanted):
             raise ValueError(f"does not keep the state after step {frame}, but every {kept[1] - kept[0]}th "
                              f"up to {kept[-1]}" if len(kept) > 1 else "keeps the start alone")
     (shapes, asset), fixed = read_shapes(path, file, "bodies"), file["bodies/motion"][:] == 1
-    centre = file["bodies/center_of_mass"][:]
+    centre = file["bodies/centre_of_mass"][:]
     states = []
     for row in [kept.index(frame) for frame in wanted or kept[-1:]]:
         w_last = np.roll(file["trajectory/orientation"][row], -1, axis=1)

@@ -78,7 +78,7 @@ Box enclose(const Position& lo, const Position& hi) {
   Box box;
   for (int k = 0; k < 3; ++k) {
     const float c = midpoint(lo[k], hi[k]);
-    box.center[k] = c;
+    box.centre[k] = c;
     box.half_extent[k] = widen(c, widen(c, 0, lo[k], 0), hi[k], 0);
   }
   return box;
@@ -87,20 +87,20 @@ Box enclose(const Position& lo, const Position& hi) {
 Box enclose(const Block& block) {
   Box box;
   for (int k = 0; k < 3; ++k) {
-    const float* center = block.center[k];
+    const float* centre = block.centre[k];
     const float* half_extent = block.half_extent[k];
     double lo = std::numeric_limits<double>::infinity(), hi = -lo;
     for (int i = 0; i < kNodesPerBlock;
          ++i) {  // an imaginary node changes neither: its interval is [+inf, -inf]
-      lo = std::min(lo, static_cast<double>(center[i]) - half_extent[i]);
-      hi = std::max(hi, static_cast<double>(center[i]) + half_extent[i]);
+      lo = std::min(lo, static_cast<double>(centre[i]) - half_extent[i]);
+      hi = std::max(hi, static_cast<double>(centre[i]) + half_extent[i]);
     }
     const float c = midpoint(lo, hi);
     float h = 0;
     for (int i = 0; i < kNodesPerBlock && block.kind[i] != NodeKind::imaginary; ++i) {
-      h = widen(c, h, center[i], half_extent[i]);
+      h = widen(c, h, centre[i], half_extent[i]);
     }
-    box.center[k] = c;
+    box.centre[k] = c;
     box.half_extent[k] = h;
   }
   return box;
@@ -108,14 +108,14 @@ Box enclose(const Block& block) {
 
 bool contains(const Box& box, const Position& point) {
   for (int k = 0; k < 3; ++k) {
-    if (!within(point[k], 0, box.center[k], box.half_extent[k])) return false;
+    if (!within(point[k], 0, box.centre[k], box.half_extent[k])) return false;
   }
   return true;
 }
 
 bool contains(const Box& outer, const Box& inner) {
   for (int k = 0; k < 3; ++k) {
-    if (!within(inner.center[k], inner.half_extent[k], outer.center[k], outer.half_extent[k])) return false;
+    if (!within(inner.centre[k], inner.half_extent[k], outer.centre[k], outer.half_extent[k])) return false;
   }
   return true;
 }
@@ -123,7 +123,7 @@ bool contains(const Box& outer, const Box& inner) {
 bool is_imaginary_box(const Box& box) {
   bool imaginary = true;
   for (int k = 0; k < 3; ++k) {
-    imaginary = imaginary && box.center[k] == 0 && !std::signbit(box.center[k]) &&
+    imaginary = imaginary && box.centre[k] == 0 && !std::signbit(box.centre[k]) &&
                 box.half_extent[k] == kImaginaryHalfExtent;
   }
   return imaginary;

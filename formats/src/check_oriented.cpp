@@ -85,7 +85,7 @@ class OrientedWalk {
     bool sound = true;
     for (int k = 0; k < 3; ++k) {
       sound = sound && box.half_extent[k] >= 0 && std::isfinite(box.half_extent[k]) &&
-              std::abs(double{box.center[k]}) + double{box.half_extent[k]} <= farthest_ * (1 + 0x1p-20);
+              std::abs(double{box.centre[k]}) + double{box.half_extent[k]} <= farthest_ * (1 + 0x1p-20);
     }
     return sound;
   }
@@ -144,7 +144,7 @@ class OrientedWalk {
     const double n = rotation.squared_length, margin = 0x1p-50 * n * farthest_;
     bool inside = true;
     for (int k = 0; k < 3; ++k) {
-      const double c = n * double{oriented.center[k][node]}, h = n * double{oriented.half_extent[k][node]};
+      const double c = n * double{oriented.centre[k][node]}, h = n * double{oriented.half_extent[k][node]};
       for (int i = 0; i < 2; ++i)
         inside = inside && lowest[k][i] - margin >= c - h && highest[k][i] + margin <= c + h;
     }

@@ -11,7 +11,7 @@ bool is_real_box(const Box& box) {
   bool sound = true;
   for (int k = 0; k < 3; ++k) {
     sound =
-        sound && std::isfinite(box.center[k]) && std::isfinite(box.half_extent[k]) && box.half_extent[k] >= 0;
+        sound && std::isfinite(box.centre[k]) && std::isfinite(box.half_extent[k]) && box.half_extent[k] >= 0;
   }
   return sound;
 }

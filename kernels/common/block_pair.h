@@ -29,9 +29,9 @@ inline std::uint16_t block_pair_mask(const Block& a, const Block& b, const Relat
 TANDEM_HD inline WorldBox node_world_box(const Pose& pose, const Block& block, int node) {
   double lower[3], upper[3];
   for (int k = 0; k < 3; ++k) {
-    const double center = block.center[k][node], half_extent = block.half_extent[k][node];
-    lower[k] = center - half_extent;
-    upper[k] = center + half_extent;
+    const double centre = block.centre[k][node], half_extent = block.half_extent[k][node];
+    lower[k] = centre - half_extent;
+    upper[k] = centre + half_extent;
   }
   return world_box(pose, lower, upper);
 }

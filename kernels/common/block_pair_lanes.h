@@ -49,20 +49,20 @@ TANDEM_INLINE Lanes<kCount> nodes_of_b(const Lanes4& four) {
 class PosedBlockPair {
  public:
   TANDEM_INLINE PosedBlockPair(const Block& a, const Block& b, const RelativePose& pose) : pose_(pose) {
-    Lanes4 center_b[3];
+    Lanes4 centre_b[3];
     for (int k = 0; k < 3; ++k) {
-      center_a_[k] = load(a.center[k]);
+      centre_a_[k] = load(a.centre[k]);
       half_extent_a_[k] = load(a.half_extent[k]) + pose.slack_a[k];
-      center_b[k] = load(b.center[k]);
+      centre_b[k] = load(b.centre[k]);
       half_extent_b_[k] = load(b.half_extent[k]) + pose.slack_b[k];
     }
 #pragma GCC unroll 3
-    for (int i = 0; i < 3; ++i) posed_b_[i] = box_terms::posed_center(pose, i, center_b);
+    for (int i = 0; i < 3; ++i) posed_b_[i] = box_terms::posed_centre(pose, i, centre_b);
   }
 
  protected:
   const RelativePose& pose_;
-  Lanes4 center_a_[3], half_extent_a_[3], posed_b_[3], half_extent_b_[3];
+  Lanes4 centre_a_[3], half_extent_a_[3], posed_b_[3], half_extent_b_[3];
 };
 
 template <int kCount>
@@ -90,7 +90,7 @@ class BlockPairLanes : PosedBlockPair {
     Lanes<kCount> d[3];
 #pragma GCC unroll 3
     for (int i = 0; i < 3; ++i) {
-      d[i] = nodes_of_b<kCount>(posed_b_[i]) - nodes_of_a<kCount, kPart>(center_a_[i]);
+      d[i] = nodes_of_b<kCount>(posed_b_[i]) - nodes_of_a<kCount, kPart>(centre_a_[i]);
       overlaps.require(magnitude(d[i]),
                        nodes_of_a<kCount, kPart>(half_extent_a_[i]) +
                            nodes_of_b<kCount>(box_terms::b_on_face(pose_, i, half_extent_b_)));

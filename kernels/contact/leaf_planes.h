@@ -30,7 +30,7 @@ TANDEM_HD inline TriangleInFrame posed_triangle(const RelativePose& b_in_a, cons
 TANDEM_HD inline frame::BoxInFrame<float> stored_box(const Block& block, int node) {
   frame::BoxInFrame<float> out;
   for (int k = 0; k < 3; ++k) {
-    out.center[k] = block.center[k][node];
+    out.centre[k] = block.centre[k][node];
     out.half_extent[k] = block.half_extent[k][node];
   }
   return out;

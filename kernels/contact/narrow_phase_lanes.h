@@ -60,7 +60,7 @@ TANDEM_INLINE frame::Plane<Lanes4, true> spread(const frame::Plane<Lanes4, true>
 TANDEM_INLINE frame::BoxInFrame<Lanes4> four_boxes(const Block& block) {
   frame::BoxInFrame<Lanes4> out;
   for (int k = 0; k < 3; ++k) {
-    out.center[k] = load(block.center[k]);
+    out.centre[k] = load(block.centre[k]);
     out.half_extent[k] = load(block.half_extent[k]);
   }
   return out;

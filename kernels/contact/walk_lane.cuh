@@ -45,12 +45,12 @@ __device__ inline std::uint32_t mask_of_block_pair(const Block& block_a, const B
     size_b = size_of(h);
 #pragma unroll
     for (int j = 0; j < 4; ++j) {
-      const float center[3] = {c[0].v[j], c[1].v[j], c[2].v[j]};
+      const float centre[3] = {c[0].v[j], c[1].v[j], c[2].v[j]};
 #pragma unroll
       for (int k = 0; k < 3; ++k) half_b[j][k] = h[k].v[j] + pose.slack_b[k];
 #pragma unroll
       for (int i = 0; i < 3; ++i) {
-        posed_b[j][i] = box_terms::posed_center(pose, i, center);
+        posed_b[j][i] = box_terms::posed_centre(pose, i, centre);
         radius_b[j][i] = box_terms::b_on_face(pose, i, half_b[j]);
       }
     }
@@ -156,23 +156,23 @@ __device__ inline std::uint32_t oriented_mask(const PairRecord& record, const Or
   float posed[4][3], reach[4][3];
 #pragma unroll
   for (int j = 0; j < 4; ++j) {
-    const float center[3] = {cb[0].v[j], cb[1].v[j], cb[2].v[j]};
+    const float centre[3] = {cb[0].v[j], cb[1].v[j], cb[2].v[j]};
     const float half[3] = {hb[0].v[j], hb[1].v[j], hb[2].v[j]};
 #pragma unroll
     for (int k = 0; k < 3; ++k) {
-      posed[j][k] = oriented_terms::b_in_a(pose, k, center);
+      posed[j][k] = oriented_terms::b_in_a(pose, k, centre);
       reach[j][k] = oriented_terms::b_along_a(pose, k, half);
     }
   }
   std::uint32_t mask = 0;
 #pragma unroll
   for (int i = 0; i < 4; ++i) {
-    const float center[3] = {ca[0].v[i], ca[1].v[i], ca[2].v[i]};
+    const float centre[3] = {ca[0].v[i], ca[1].v[i], ca[2].v[i]};
     const float half[3] = {ha[0].v[i], ha[1].v[i], ha[2].v[i]};
     float in_b[3], along_b[3];
 #pragma unroll
     for (int k = 0; k < 3; ++k) {
-      in_b[k] = oriented_terms::a_in_b(pose, k, center);
+      in_b[k] = oriented_terms::a_in_b(pose, k, centre);
       along_b[k] = oriented_terms::a_along_b(pose, k, half);
     }
 #pragma unroll
@@ -180,7 +180,7 @@ __device__ inline std::uint32_t oriented_mask(const PairRecord& record, const Or
       bool overlap = true;
 #pragma unroll
       for (int k = 0; k < 3; ++k) {
-        overlap = overlap & (fabsf(posed[j][k] - center[k]) <= half[k] + reach[j][k]) &
+        overlap = overlap & (fabsf(posed[j][k] - centre[k]) <= half[k] + reach[j][k]) &
                   (fabsf(in_b[k] - cb[k].v[j]) <= hb[k].v[j] + along_b[k]);
       }
       if (overlap) mask |= 1u << (4 * i + j);

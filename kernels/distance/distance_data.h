@@ -34,7 +34,6 @@ struct alignas(16) DistanceRecord {
 TANDEM_HD constexpr Counter triangles_as_number(std::uint32_t a, std::uint32_t b) {
   return static_cast<Counter>(a) << 32 | b;
 }
-inline constexpr Counter kNoTriangles = ~Counter{0};
 
 /// The bounds of the distance of a pair. Numbers that many threads lessen are the bits of a float64 that is
 /// not negative.

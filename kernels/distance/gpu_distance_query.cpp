@@ -27,7 +27,7 @@ constexpr std::uint32_t kFirstRoom = 1u << 16;
 constexpr std::uint32_t kMostRoom = kNoIndex - (1u << 24);
 
 // Room that is too small hides what would have followed from what it has no room for.
-std::uint32_t with_spare(std::uint32_t needed, std::uint32_t present) {
+std::uint32_t with_growth(std::uint32_t needed, std::uint32_t present) {
   if (needed <= present || needed > kMostRoom) return std::max(needed, present);
   return static_cast<std::uint32_t>(std::min<std::uint64_t>(std::uint64_t{needed} + needed / 2, kMostRoom));
 }
@@ -129,9 +129,9 @@ Status GpuDistanceQuery::find_distances(const GpuInstances& instances, const Gpu
         if (needed.pairs > pairs.capacity) return Status::kOutOfRange;
         // The rows of the step before are lost, and these are of a query that was not complete.
         if (own.former == distances()) own.former = nullptr;
-        wanted = {needed.pairs, gpu::with_spare(needed.block_pairs, present.block_pairs),
-                  gpu::with_spare(needed.triangle_pairs, present.triangle_pairs),
-                  gpu::with_spare(needed.settled, present.settled), needed.words};
+        wanted = {needed.pairs, gpu::with_growth(needed.block_pairs, present.block_pairs),
+                  gpu::with_growth(needed.triangle_pairs, present.triangle_pairs),
+                  gpu::with_growth(needed.settled, present.settled), needed.words};
         return Status::kOk;
       });
 }

@@ -38,7 +38,7 @@ class BlockPairBounds : PosedBlockPair {
     Lanes<kCount> d[3], radius_on_a[3], radius_on_b[3];
 #pragma GCC unroll 3
     for (int i = 0; i < 3; ++i) {
-      d[i] = nodes_of_b<kCount>(posed_b_[i]) - nodes_of_a<kCount, kPart>(center_a_[i]);
+      d[i] = nodes_of_b<kCount>(posed_b_[i]) - nodes_of_a<kCount, kPart>(centre_a_[i]);
       radius_on_a[i] = nodes_of_a<kCount, kPart>(half_extent_a_[i]) + nodes_of_b<kCount>(b_on_a_[i]);
       radius_on_b[i] = nodes_of_b<kCount>(half_extent_b_[i]) + nodes_of_a<kCount, kPart>(a_on_b_[i]);
     }

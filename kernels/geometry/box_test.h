@@ -27,9 +27,9 @@ TANDEM_HD inline Value dot(float x, float y, float z, const Value (&v)[3]) {
 
 /// Coordinate i of b's centre in a's frame.
 template <typename Value>
-TANDEM_HD inline Value posed_center(const RelativePose& pose, int i, const Value (&center_b)[3]) {
+TANDEM_HD inline Value posed_centre(const RelativePose& pose, int i, const Value (&centre_b)[3]) {
   const float* row = pose.rotation[i];
-  return dot(row[0], row[1], row[2], center_b) + pose.translation[i];
+  return dot(row[0], row[1], row[2], centre_b) + pose.translation[i];
 }
 
 /// Returns how far b reaches along a's axis i.
@@ -83,7 +83,7 @@ struct BoxDistance {
 TANDEM_HD inline BoxDistance distance(const Box& a, const Box& b, const RelativePose& b_in_a) {
   BoxDistance out;
   for (int i = 0; i < 3; ++i) {
-    out.d[i] = box_terms::posed_center(b_in_a, i, b.center) - a.center[i];
+    out.d[i] = box_terms::posed_centre(b_in_a, i, b.centre) - a.centre[i];
     out.half_extent_a[i] = a.half_extent[i] + b_in_a.slack_a[i];
     out.half_extent_b[i] = b.half_extent[i] + b_in_a.slack_b[i];
   }

@@ -16,7 +16,7 @@
 /// poses, so a volume of posed points has the sign of the volume of their images. The slack along a's axes,
 /// 1.001 (s_i + epsilon_i + 4.1 u tau_i) + 2^-88 in docs/box_test.md, has s_i, which bounds how far the image
 /// of a corner of a is from the corner as stored, plus how far that of one of b is from posed exactly by what
-/// float32 keeps of the pose; epsilon_i, which bounds how far box_terms::posed_center() is from that; and a
+/// float32 keeps of the pose; epsilon_i, which bounds how far box_terms::posed_centre() is from that; and a
 /// part for boxes alone. Let E be the largest of the three without that part, with 1.001 and 2^-88 to spare.
 ///
 /// Let u = 2^-24 and ~ mark what is computed. A difference x~ of two corners of one mesh is off by at most e
@@ -100,8 +100,8 @@ struct Point {
 /// The image in a's frame of a point of b as stored.
 template <typename Value>
 TANDEM_HD inline Point<Value> posed(const RelativePose& b_in_a, const Point<Value>& stored) {
-  return {{box_terms::posed_center(b_in_a, 0, stored.x), box_terms::posed_center(b_in_a, 1, stored.x),
-           box_terms::posed_center(b_in_a, 2, stored.x)}};
+  return {{box_terms::posed_centre(b_in_a, 0, stored.x), box_terms::posed_centre(b_in_a, 1, stored.x),
+           box_terms::posed_centre(b_in_a, 2, stored.x)}};
 }
 
 template <typename Value, typename Mask>
@@ -169,7 +169,7 @@ struct Plane {
 /// A box for each lane, in a's frame.
 template <typename Value>
 struct BoxInFrame {
-  Value center[3], half_extent[3];
+  Value centre[3], half_extent[3];
 };
 
 /// The box in a's frame around the image of a box of b as stored.
@@ -177,7 +177,7 @@ template <typename Value>
 TANDEM_HD inline BoxInFrame<Value> posed(const RelativePose& b_in_a, const BoxInFrame<Value>& stored) {
   BoxInFrame<Value> out;
   for (int k = 0; k < 3; ++k) {
-    out.center[k] = box_terms::posed_center(b_in_a, k, stored.center);
+    out.centre[k] = box_terms::posed_centre(b_in_a, k, stored.centre);
     out.half_extent[k] = box_terms::b_on_face(b_in_a, k, stored.half_extent);
   }
   return out;
@@ -195,11 +195,11 @@ TANDEM_HD inline BoxInFrame<Value> posed(const RelativePose& b_in_a, const BoxIn
 /// times as much, and the 2^-88 that E has to spare, which the bound multiplies with |n|_1 too, is more.
 template <typename Value>
 TANDEM_HD inline auto beyond(const Plane<Value, true>& plane, const BoxInFrame<Value>& box, float error) {
-  const auto &center = box.center, &half_extent = box.half_extent;
+  const auto &centre = box.centre, &half_extent = box.half_extent;
   constexpr float kU = 0x1p-24f, kUnderflow = 0x1p-80f;
   Value w[3], term[3], reach[3];
   for (int k = 0; k < 3; ++k) {
-    w[k] = center[k] - plane.origin.x[k];
+    w[k] = centre[k] - plane.origin.x[k];
     term[k] = w[k] * plane.normal[k];
     reach[k] = magnitude(plane.normal[k]) * half_extent[k];
   }
@@ -391,7 +391,7 @@ struct Verdicts {
 };
 
 /// Decides what the error bound allows. a: corners as stored. b: images of the corners in a's frame by
-/// box_terms::posed_center(). error: frame_error(). The method is that of detail::decide_bounded() in
+/// box_terms::posed_centre(). error: frame_error(). The method is that of detail::decide_bounded() in
 /// triangle_test.h. Without kBounded signs are taken as computed, and what is undecided are ties.
 template <bool kBounded, typename Value>
 TANDEM_HD inline auto decide(const Point<Value> (&a)[3], const Point<Value> (&b)[3], float error) {

@@ -84,7 +84,7 @@ struct PosedSurface {
 TANDEM_HD inline WorldBox node_box(const PosedSurface& body, const Block& block, int node) {
   double lower[3], upper[3];
   for (int k = 0; k < 3; ++k) {
-    const double c = block.center[k][node], h = block.half_extent[k][node];
+    const double c = block.centre[k][node], h = block.half_extent[k][node];
     lower[k] = c - h, upper[k] = c + h;
   }
   return world_box(body.pose, lower, upper);

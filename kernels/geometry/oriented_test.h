@@ -116,9 +116,9 @@ TANDEM_HD inline OrientedPose oriented_pose(const float (&rotation)[3][3], const
 namespace oriented_terms {
 
 /// Coordinate i of b's centre in a's frame.
-TANDEM_HD inline float b_in_a(const OrientedPose& pose, int i, const float (&center)[3]) {
+TANDEM_HD inline float b_in_a(const OrientedPose& pose, int i, const float (&centre)[3]) {
   const auto& m = pose.rotation;
-  return ((pose.translation[i] + m[i][0] * center[0]) + m[i][1] * center[1]) + m[i][2] * center[2];
+  return ((pose.translation[i] + m[i][0] * centre[0]) + m[i][1] * centre[1]) + m[i][2] * centre[2];
 }
 
 /// Returns how far b reaches along a's axis i, slack included.
@@ -129,9 +129,9 @@ TANDEM_HD inline float b_along_a(const OrientedPose& pose, int i, const float (&
 }
 
 /// Coordinate j of a's centre in b's frame.
-TANDEM_HD inline float a_in_b(const OrientedPose& pose, int j, const float (&center)[3]) {
+TANDEM_HD inline float a_in_b(const OrientedPose& pose, int j, const float (&centre)[3]) {
   const auto& m = pose.rotation;
-  return ((pose.back_translation[j] + m[0][j] * center[0]) + m[1][j] * center[1]) + m[2][j] * center[2];
+  return ((pose.back_translation[j] + m[0][j] * centre[0]) + m[1][j] * centre[1]) + m[2][j] * centre[2];
 }
 
 /// Returns how far a reaches along b's axis j, slack included.
@@ -148,8 +148,8 @@ TANDEM_HD inline float a_along_b(const OrientedPose& pose, int j, const float (&
 inline bool overlap_oriented(const Box& a, const Box& b, const OrientedPose& pose) {
   bool overlap = true;
   for (int k = 0; k < 3; ++k) {
-    const float in_a = oriented_terms::b_in_a(pose, k, b.center) - a.center[k];
-    const float in_b = oriented_terms::a_in_b(pose, k, a.center) - b.center[k];
+    const float in_a = oriented_terms::b_in_a(pose, k, b.centre) - a.centre[k];
+    const float in_b = oriented_terms::a_in_b(pose, k, a.centre) - b.centre[k];
     overlap = overlap &&
               std::fabs(in_a) <= a.half_extent[k] + oriented_terms::b_along_a(pose, k, b.half_extent) &&
               std::fabs(in_b) <= b.half_extent[k] + oriented_terms::a_along_b(pose, k, a.half_extent);

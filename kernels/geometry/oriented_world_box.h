@@ -47,18 +47,18 @@ TANDEM_HD inline WorldBox node_world_box(const Pose& pose, const OrientedBlock& 
   WorldBox box;
   for (int i = 0; i < 3; ++i) {
     const double* row = pose.rotation[i];
-    double center = 0, radius = 0, size = 0;
+    double centre = 0, radius = 0, size = 0;
     for (int j = 0; j < 3; ++j) {
       double turned = 0;  // R S
       for (int k = 0; k < 3; ++k) turned += row[k] * static_cast<double>(rotation.scaled[k][j]);
-      center += turned * static_cast<double>(block.center[j][node]);
+      centre += turned * static_cast<double>(block.centre[j][node]);
       radius += std::fabs(turned) * static_cast<double>(block.half_extent[j][node]);
       size += std::fabs(row[j]);
     }
-    center /= length;
+    centre /= length;
     radius = radius / length + 0x1p-48 * size * farthest;
-    box.lo[i] = detail::plus(center - radius, pose.translation[i]);
-    box.hi[i] = detail::plus(center + radius, pose.translation[i]);
+    box.lo[i] = detail::plus(centre - radius, pose.translation[i]);
+    box.hi[i] = detail::plus(centre + radius, pose.translation[i]);
   }
   return box;
 }

@@ -170,9 +170,9 @@ TANDEM_HD inline RelativePoseStatus relative_pose(const Pose& a, const TreeExten
       size += std::fabs(static_cast<double>(b_in_a.rotation[i][j])) * tree_b.reach[j];
       farthest += static_cast<double>(b_in_a.abs_rotation[i][j]) * half_extent_b[j];
     }
-    const double centers =
+    const double centres =
         4.01 * d::kU * size + d::kU * std::fabs(static_cast<double>(b_in_a.translation[i]));
-    const double slack = d::kSafety * (s[i] + centers + 4.1 * d::kU * farthest) + d::kLeastSlack;
+    const double slack = d::kSafety * (s[i] + centres + 4.1 * d::kU * farthest) + d::kLeastSlack;
     const bool fits = d::store_slack(slack, kLargestReach, b_in_a.slack_a[i]);
     in_range = in_range && fits;
   }

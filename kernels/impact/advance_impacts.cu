@@ -117,10 +117,10 @@ __device__ void tell(const ImpactPair& pair, double time, bool in_contact, Impac
   found.interval = distance::bounded_distance(from_corner, {}, weights);
   if (in_contact) distance::find_common_point(from_corner, weights);
   distance::write_points(local, weights, found);
-  const Vector3 center = pair.motion.a->center + time * pair.motion.a->displacement;
+  const Vector3 centre = pair.motion.a->centre + time * pair.motion.a->displacement;
   out.gap = in_contact ? 0 : found.interval.upper / scale;
-  store(center + impact::vector_of(found.point_a), out.point_a);
-  store(center + impact::vector_of(found.point_b), out.point_b);
+  store(centre + impact::vector_of(found.point_a), out.point_a);
+  store(centre + impact::vector_of(found.point_b), out.point_b);
   out.face_a = of_a.source_face();
   out.face_b = of_b.source_face();
 }

@@ -52,7 +52,7 @@ TANDEM_HD inline TreePlace tree_place(const MovingBody& body, const Matrix3& tur
   place.matrix = turned * start;
   relative_pose_detail::invert(place.matrix.row, place.inverse.row);
   place.spin = cross(body.turn, place.matrix);
-  place.arm = turned * (vector_of(body.start.translation) - body.center);
+  place.arm = turned * (vector_of(body.start.translation) - body.centre);
   place.drift = manifold::cross(body.turn, place.arm);
   return place;
 }
@@ -90,7 +90,7 @@ TANDEM_HD inline PairFrames pair_frames(const PairMotion& pair, const PairPlace&
 /// Nodes of a block along the axes of a frame: centres, their velocities, and the radii of both.
 template <int kNodes>
 struct MovingNodes {
-  double center[3][kNodes], velocity[3][kNodes];
+  double centre[3][kNodes], velocity[3][kNodes];
   double radius[3][kNodes], spread[3][kNodes];
 };
 
@@ -112,9 +112,9 @@ TANDEM_HD inline void own_nodes(const FrameMotion& frame, const Block& block, in
                                 MovingNodes<kNodes>& out) {
   for (int k = 0; k < 3; ++k) {
     for (int i = 0; i < kNodes; ++i) {
-      out.center[k][i] = static_cast<double>(block.center[k][first + i]);
+      out.centre[k][i] = static_cast<double>(block.centre[k][first + i]);
       out.radius[k][i] = static_cast<double>(block.half_extent[k][first + i]);
-      out.velocity[k][i] = row_times(frame.own_spin.row[k], block.center, first + i);
+      out.velocity[k][i] = row_times(frame.own_spin.row[k], block.centre, first + i);
       out.spread[k][i] = sizes_times(frame.own_spin.row[k], block.half_extent, first + i);
     }
   }
@@ -128,9 +128,9 @@ TANDEM_HD inline void other_nodes(const FrameMotion& frame, const Block& block, 
   const double drift[3] = {frame.drift.x, frame.drift.y, frame.drift.z};
   for (int k = 0; k < 3; ++k) {
     for (int i = 0; i < kNodes; ++i) {
-      out.center[k][i] = row_times(frame.rotation.row[k], block.center, first + i) + t[k];
+      out.centre[k][i] = row_times(frame.rotation.row[k], block.centre, first + i) + t[k];
       out.radius[k][i] = sizes_times(frame.rotation.row[k], block.half_extent, first + i);
-      out.velocity[k][i] = row_times(frame.spin.row[k], block.center, first + i) + drift[k];
+      out.velocity[k][i] = row_times(frame.spin.row[k], block.centre, first + i) + drift[k];
       out.spread[k][i] = sizes_times(frame.spin.row[k], block.half_extent, first + i);
     }
   }
@@ -150,7 +150,7 @@ struct AxisMotion {
 template <int kNodes>
 TANDEM_HD inline AxisMotion axis_motion(const MovingNodes<kNodes>& x, int i, const MovingNodes<kNodes>& y,
                                         int j, int k, double slack, double acceleration, double most) {
-  return {y.center[k][j] - x.center[k][i], y.velocity[k][j] - x.velocity[k][i],
+  return {y.centre[k][j] - x.centre[k][i], y.velocity[k][j] - x.velocity[k][i],
           y.radius[k][j] + x.radius[k][i] + slack,
           y.spread[k][j] + x.spread[k][i] + 0.5 * acceleration * most};
 }

@@ -125,8 +125,6 @@ struct ImpactArgs {
   DeviceLimits limits;
 };
 
-inline constexpr Counter kNoTriangles = ~Counter{0};
-
 /// 1: bodies and boxes.
 cudaError_t move_bodies(const ImpactArgs& args, cudaStream_t stream);
 /// 2: what the contact query found, and the pieces of the other pairs.

@@ -17,10 +17,10 @@ using impact::PairStop;
 using manifold::Vector3;
 
 // Boxes that a worker looks at, and pairs that it walks, at a time.
-constexpr std::size_t kBoxesAtOnce = 64, kPairsAtOnce = 4;
+constexpr std::size_t kSweptBoxesAtOnce = 64, kMovesAtOnce = 4;
 
 // Counts what a worker did; each pair's impact has its own place.
-struct Worker {
+struct ImpactWorker {
   ImpactCounters counters;
   impact::ImpactWalk walk;
 };
@@ -52,10 +52,10 @@ void tell(const PairMotion& pair, const LevelView& a, const LevelView& b, double
   const impact::TrianglesAt triangles =
       triangles_at(pair, impact::moving_triangles(pair, of_a, of_b), impact::place_at(pair, time));
   const TriangleDistance distance = triangle_distance(impact::triangle_pair(triangles));
-  const Vector3 center = pair.a->center + time * pair.a->displacement;
+  const Vector3 centre = pair.a->centre + time * pair.a->displacement;
   out.gap = distance.interval.upper;
-  write(center + impact::vector_of(distance.point_a), out.point_a);
-  write(center + impact::vector_of(distance.point_b), out.point_b);
+  write(centre + impact::vector_of(distance.point_a), out.point_a);
+  write(centre + impact::vector_of(distance.point_b), out.point_b);
   out.face_a = of_a.source_face();
   out.face_b = of_b.source_face();
 }
@@ -74,13 +74,13 @@ struct ImpactQuery::State : Allocated {
   ContactFinder finder;
   Buffer<Contact> contacts;          // at the start, one of each pair that has any
   Buffer<std::uint32_t> contact_of;  // each pair's row of the contacts, or kNoIndex
-  PerWorker<Worker> workers;
+  PerWorker<ImpactWorker> workers;
 
   Status move(SceneState& scene, const ImpactOptions& options);
   Status find_pairs(SceneState& scene, Buffer<ObjectPair>& pairs);
   Status find_contacts_at_start(SceneState& scene, std::span<const ObjectPair> pairs);
   Impact impact_of(std::size_t row, const ObjectPair& pair, const SceneState& scene,
-                   const ImpactOptions& options, Worker& worker) const;
+                   const ImpactOptions& options, ImpactWorker& worker) const;
 };
 
 // Removed bodies stay where they are, nowhere.
@@ -101,7 +101,7 @@ Status ImpactQuery::State::move(SceneState& scene, const ImpactOptions& options)
 }
 
 Status ImpactQuery::State::find_pairs(SceneState& scene, Buffer<ObjectPair>& pairs) {
-  const std::uint32_t wanted = scene.workers_for(boxes.size(), kBoxesAtOnce);
+  const std::uint32_t wanted = scene.workers_for(boxes.size(), kSweptBoxesAtOnce);
   if (!scene.threads.provide(wanted)) return scene.fail(Status::kCannotStartThread, 0);
   const Status status = broad_phase.find_pairs(boxes.view(), scene.filter(), false, scene.threads, wanted);
   if (status != Status::kOk) return scene.fail(status, 0);
@@ -120,7 +120,7 @@ Status ImpactQuery::State::find_contacts_at_start(SceneState& scene, std::span<c
 }
 
 Impact ImpactQuery::State::impact_of(std::size_t row, const ObjectPair& pair, const SceneState& scene,
-                                     const ImpactOptions& options, Worker& worker) const {
+                                     const ImpactOptions& options, ImpactWorker& worker) const {
   const SceneAsset &a = scene.asset_of(pair.a), &b = scene.asset_of(pair.b);
   const PairMotion motion = impact::pair_motion(bodies[pair.a], bodies[pair.b]);
   Impact impact = none_in(options.duration);
@@ -160,13 +160,13 @@ Status ImpactQuery::answer(SceneState& scene, const std::span<const ObjectPair>*
   if (status == Status::kOk && given == nullptr) status = state->find_pairs(scene, pairs_);
   if (status == Status::kOk) status = state->find_contacts_at_start(scene, pairs_.view());
   if (status != Status::kOk) return status;
-  const std::uint32_t workers = scene.workers_for(pairs_.size(), kPairsAtOnce);
+  const std::uint32_t workers = scene.workers_for(pairs_.size(), kMovesAtOnce);
   if (!scene.threads.provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
   if (!state->workers.provide(workers) || !rows_.resize(pairs_.size()))
     return scene.fail(Status::kOutOfMemory, 0);
   for (std::uint32_t i = 0; i < workers; ++i) state->workers[i].counters = {};
   scene.threads.for_parts(
-      workers, pairs_.size(), kPairsAtOnce, [&](std::size_t i, std::size_t end, std::uint32_t worker) {
+      workers, pairs_.size(), kMovesAtOnce, [&](std::size_t i, std::size_t end, std::uint32_t worker) {
         for (; i < end; ++i)
           rows_[i] = state->impact_of(i, pairs_[i], scene, options, state->workers[worker]);
       });

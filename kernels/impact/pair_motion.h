@@ -49,13 +49,13 @@ TANDEM_HD inline Matrix3 cross(const Vector3& w, const Matrix3& m) {
 /// An instance that moves, in terms of the step.
 struct MovingBody {
   Pose start;            ///< of stored coordinates
-  Vector3 center;        ///< at the start
+  Vector3 centre;        ///< at the start
   Vector3 displacement;  ///< of the centre in the whole step
   Vector3 turn;          ///< angular velocity times the length of the step
   double angle;          ///< |turn|
   double fastest;        ///< fastest_turn()
   double reach;          ///< of the tree: no stored point is farther from the stored origin
-  double size;           ///< >= |translation - center| + reach
+  double size;           ///< >= |translation - centre| + reach
   double radius;         ///< no posed vertex is farther from the centre, as it is rounded, at any time
   double error;          ///< pose_error()
 };
@@ -67,23 +67,23 @@ TANDEM_HD inline Status moving_body(const Pose& stored, const RigidMotion& motio
                                     MovingBody& body) {
   const auto& w = motion.angular_velocity;
   body.start = stored;
-  body.center = vector_of(motion.center);
+  body.centre = vector_of(motion.centre);
   body.displacement = duration * vector_of(motion.velocity);
   body.turn = duration * vector_of(w);
   bool fits = true;
   for (int k = 0; k < 3; ++k) {
-    fits = fits && std::fabs(motion.center[k]) <= kLargestMovingCoordinate &&
+    fits = fits && std::fabs(motion.centre[k]) <= kLargestMovingCoordinate &&
            std::fabs(duration * motion.velocity[k]) <= kLargestMovingCoordinate &&
            std::fabs(stored.translation[k]) <= kLargestMovingCoordinate &&
            std::fabs(duration * w[k]) <= kLargestTurn;
   }
   body.angle = norm(body.turn);
   if (!(fits && body.angle <= kLargestTurn)) return Status::kOutOfRange;
-  body.fastest = fastest_turn(stored, lower, upper, motion.center, body.turn);
+  body.fastest = fastest_turn(stored, lower, upper, motion.centre, body.turn);
   body.reach = norm(vector_of(tree.reach));
-  body.size = norm(vector_of(stored.translation) - body.center) + body.reach;
-  body.radius = farthest_from_center(stored, lower, upper, motion.center);
-  body.error = pose_error(stored, body.reach, motion.center, body.displacement, body.turn);
+  body.size = norm(vector_of(stored.translation) - body.centre) + body.reach;
+  body.radius = farthest_from_centre(stored, lower, upper, motion.centre);
+  body.error = pose_error(stored, body.reach, motion.centre, body.displacement, body.turn);
   return Status::kOk;
 }
 
@@ -111,7 +111,7 @@ TANDEM_HD inline PairMotion pair_motion(const MovingBody& a, const MovingBody& b
   PairMotion pair;
   pair.a = &a;
   pair.b = &b;
-  pair.offset = b.center - a.center;
+  pair.offset = b.centre - a.centre;
   pair.displacement = b.displacement - a.displacement;
   const double size = a.size + b.size + norm(pair.offset) + norm(a.displacement) + norm(b.displacement);
   pair.slack = 0x1p-42 * (1 + manifold::greater(a.angle, b.angle)) * size + 1.01 * (a.error + b.error);

@@ -51,7 +51,7 @@ __device__ double time_of_sample(std::uint32_t i, std::uint32_t met, std::uint32
 }
 
 __device__ Pose pose_of_sample(const impact::MovingBody& body, double time) {
-  const manifold::Vector3 &v = body.displacement, &w = body.turn, &c = body.center;
+  const manifold::Vector3 &v = body.displacement, &w = body.turn, &c = body.centre;
   return pose_at(body.start, {{v.x, v.y, v.z}, {w.x, w.y, w.z}, {c.x, c.y, c.z}}, time);
 }
 

@@ -42,7 +42,7 @@ TANDEM_HD inline double corners_of(const MovingBody& body, const Triangle& trian
     const float* p = triangle.corner[c].position;
     double x[3];
     apply(body.start, p[0], p[1], p[2], x);
-    out[c] = vector_of(x) - body.center;
+    out[c] = vector_of(x) - body.centre;
     fastest = manifold::greater(
         fastest, norm(manifold::cross(body.turn, out[c])) + 0x1p-49 * body.angle * norm(out[c]));
   }

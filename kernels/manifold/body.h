@@ -15,7 +15,7 @@ struct Shape {
   const Block* blocks = nullptr;                   ///< or null: then the oriented blocks are walked
   const OrientedBlock* oriented_blocks = nullptr;  ///< looked at where there are no others
   double origin[3] = {};
-  Vector3 center;       ///< of the bounds, stored coordinates
+  Vector3 centre;       ///< of the bounds, stored coordinates
   double diagonal = 0;  ///< of the bounds
   bool closed = false;
 };
@@ -24,14 +24,14 @@ struct Shape {
 struct Body {
   const Shape* shape;
   Pose pose;       ///< of stored coordinates
-  Vector3 center;  ///< of the bounds, in the world
+  Vector3 centre;  ///< of the bounds, in the world
   double reach;    ///< the largest coordinate of the posed bounds
 
   TANDEM_HD Body(const Shape& of, const Pose& of_file)
       : shape(&of), pose(for_stored_coordinates(of_file, of.origin)) {
-    center = posed(of.center);
+    centre = posed(of.centre);
     reach =
-        std::fmax(std::fmax(std::fabs(center.x), std::fabs(center.y)), std::fabs(center.z)) + of.diagonal / 2;
+        std::fmax(std::fmax(std::fabs(centre.x), std::fabs(centre.y)), std::fabs(centre.z)) + of.diagonal / 2;
   }
 
   TANDEM_HD Vector3 posed(const Vector3& x) const {
@@ -72,7 +72,7 @@ struct BodyPair {
   TANDEM_HD const Body& operator[](int side) const { return side == 0 ? a : b; }
   TANDEM_HD double reach() const { return std::fmax(a.reach, b.reach); }
   TANDEM_HD double smaller_diagonal() const { return std::fmin(a.shape->diagonal, b.shape->diagonal); }
-  TANDEM_HD Vector3 apart() const { return b.center - a.center; }
+  TANDEM_HD Vector3 apart() const { return b.centre - a.centre; }
   /// Points so far beside a plane count as in it: some hundred times what rounding of posed points and of
   /// their distance amounts to.
   TANDEM_HD double tolerance() const { return 0x1p-44 * reach(); }

@@ -16,7 +16,7 @@ using manifold::Patch;
 using manifold::Shape;
 
 // Pairs with contacts that a thread takes at a time.
-constexpr std::size_t kPairsAtOnce = 16;
+constexpr std::size_t kRowsAtOnce = 16;
 
 // A pair that has contacts: where its patches lie, and where its manifolds and points go.
 struct Row {
@@ -33,7 +33,7 @@ struct PairPoints {
   std::uint32_t first, count;
 };
 
-struct Worker {
+struct ManifoldWorker {
   PairPatches made;
   bool enough_memory = true;
 };
@@ -56,7 +56,7 @@ struct ManifoldQuery::State : Allocated {
   Buffer<std::uint32_t> begin;  // of each pair's contacts
   Buffer<Contact> grouped;
   Buffer<Row> rows;
-  PerWorker<Worker> workers;
+  PerWorker<ManifoldWorker> workers;
   Buffer<Manifold> manifolds_before;
   Buffer<ManifoldPoint> points_before;
   Buffer<PairPoints> pair_points_before;
@@ -139,7 +139,7 @@ Status ManifoldQuery::State::group(SceneState& scene, std::size_t pairs, std::sp
 void ManifoldQuery::State::make_patches(std::size_t from, std::size_t to, std::uint32_t worker,
                                         const SceneState& scene, std::span<const ObjectPair> pairs,
                                         std::span<const Contact> contacts, int most_points) {
-  Worker& own = workers[worker];
+  ManifoldWorker& own = workers[worker];
   Buffer<Patch>& patches = own.made.patches;
 #ifdef TANDEM_HAVE_LANES
   const MeansThread team = {{}, best_manifold_lanes()};
@@ -239,14 +239,14 @@ Status ManifoldQuery::answer(SceneState& scene, State& state, std::span<const Co
   if (status == Status::kOk) status = state.group(scene, pairs.size(), contacts);
   if (status != Status::kOk) return status;
   const auto most_points = static_cast<int>(std::clamp(options.most_points, 1u, kMostManifoldPoints));
-  const std::uint32_t workers = scene.workers_for(state.rows.size(), kPairsAtOnce);
+  const std::uint32_t workers = scene.workers_for(state.rows.size(), kRowsAtOnce);
   if (!scene.threads.provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
   if (!state.workers.provide(workers)) return scene.fail(Status::kOutOfMemory, 0);
   for (std::uint32_t i = 0; i < workers; ++i) {
     state.workers[i].made.clear();
     state.workers[i].enough_memory = true;
   }
-  scene.threads.for_parts(workers, state.rows.size(), kPairsAtOnce,
+  scene.threads.for_parts(workers, state.rows.size(), kRowsAtOnce,
                           [&](std::size_t from, std::size_t to, std::uint32_t worker) {
                             state.make_patches(from, to, worker, scene, pairs, contacts, most_points);
                           });
@@ -257,7 +257,7 @@ Status ManifoldQuery::answer(SceneState& scene, State& state, std::span<const Co
     counters_.ambiguous_touches += state.workers[i].made.ambiguous_touches;
   }
   if ((status = state.place_rows(scene, rows_, points_)) != Status::kOk) return status;
-  scene.threads.for_parts(workers, state.rows.size(), kPairsAtOnce,
+  scene.threads.for_parts(workers, state.rows.size(), kRowsAtOnce,
                           [&](std::size_t from, std::size_t to, std::uint32_t) {
                             for (std::size_t i = from; i < to; ++i) {
                               state.finish(state.rows[i], scene, pairs[state.rows[i].pair],

@@ -98,7 +98,7 @@ __device__ __noinline__ void walk_surface(const LaneGroup<kWidth>& group, Questi
       const std::uint32_t index = group.waiting[waiting - 1 - group.rank() / 4];
       const auto passes = [&](const auto& block, const auto& test) {
         return test.passes(
-            {{block.center[0][node], block.center[1][node], block.center[2][node]}},
+            {{block.centre[0][node], block.centre[1][node], block.centre[2][node]}},
             {{block.half_extent[0][node], block.half_extent[1][node], block.half_extent[2][node]}});
       };
       if (shape.blocks != nullptr) {

@@ -34,11 +34,11 @@ TANDEM_INLINE void fetch_leaves(const manifold::Body& body, const Block& block) 
 }
 
 struct BoxCoordinates {
-  Lanes4 center[3], half_extent[3];
+  Lanes4 centre[3], half_extent[3];
 
   TANDEM_INLINE BoxCoordinates(const Block& block, const manifold::FloatVector& origin) {
     for (int k = 0; k < 3; ++k) {
-      center[k] = load(block.center[k]) + -origin.x[k];
+      centre[k] = load(block.centre[k]) + -origin.x[k];
       half_extent[k] = load(block.half_extent[k]);
     }
   }
@@ -149,7 +149,7 @@ class LineWalk {
   TANDEM_INLINE unsigned lines_that_meet(const Block& block, unsigned lines,
                                          unsigned (&below)[kNodesPerBlock]) const {
     const BoxCoordinates box(block, origin_);
-    const Lanes4 &x = box.center[0], &y = box.center[1], &z = box.center[2];
+    const Lanes4 &x = box.centre[0], &y = box.centre[1], &z = box.centre[2];
     const Lanes4(&h)[3] = box.half_extent;
     const float(&d)[3] = direction_.x, (&s)[3] = size_.x;
     const Lanes4 across[3] = {d[2] * y - d[1] * z, d[0] * z - d[2] * x, d[1] * x - d[0] * y};
@@ -275,7 +275,7 @@ class ExtremeWalk {
   /// Tests four boxes, as PrismTest::passes() does.
   TANDEM_INLINE unsigned nodes_that_reach(const Block& block) const {
     const BoxCoordinates box(block, origin_);
-    const Lanes4(&x)[3] = box.center, (&h)[3] = box.half_extent;
+    const Lanes4(&x)[3] = box.centre, (&h)[3] = box.half_extent;
     typename Vector<4>::Bits passes = h[0].v >= 0.0f;
     for (int k = 0; k < 3; ++k) {
       const float(&e)[3] = axis_[k].x;

@@ -8,7 +8,7 @@ inline void set_bounds(const float (&lower)[3], const float (&upper)[3], const d
                        Shape& shape) {
   const Vector3 from = {lower[0], lower[1], lower[2]}, to = {upper[0], upper[1], upper[2]};
   for (int k = 0; k < 3; ++k) shape.origin[k] = origin[k];
-  shape.center = 0.5 * (from + to);
+  shape.centre = 0.5 * (from + to);
   shape.diagonal = norm(to - from);
 }
 

@@ -58,7 +58,7 @@ TANDEM_HD inline FloatVector point_in_mesh(const Body& body, const Vector3& poin
 /// Returns how much float32 may be off for boxes of this body near a point of stored coordinates.
 TANDEM_HD inline float slack_near(const Body& body, const FloatVector& point) {
   const Shape& shape = *body.shape;
-  const double far = std::fabs(shape.center.x) + std::fabs(shape.center.y) + std::fabs(shape.center.z) +
+  const double far = std::fabs(shape.centre.x) + std::fabs(shape.centre.y) + std::fabs(shape.centre.z) +
                      shape.diagonal + std::fabs(point.x[0]) + std::fabs(point.x[1]) + std::fabs(point.x[2]);
   return static_cast<float>(far) * kBoxSlack + static_cast<float>(body.reach) * 0x1p-42f;
 }
@@ -88,9 +88,9 @@ TANDEM_HD inline unsigned nodes_that_pass(const AnyBlock& block, const Test& tes
 #pragma unroll
 #endif
   for (int i = 0; i < kNodesPerBlock; ++i) {
-    const FloatVector center = {{block.center[0][i], block.center[1][i], block.center[2][i]}};
+    const FloatVector centre = {{block.centre[0][i], block.centre[1][i], block.centre[2][i]}};
     const FloatVector half = {{block.half_extent[0][i], block.half_extent[1][i], block.half_extent[2][i]}};
-    mask |= test.passes(center, half) ? 1u << i : 0u;
+    mask |= test.passes(centre, half) ? 1u << i : 0u;
   }
   return mask;
 }
@@ -123,7 +123,7 @@ TANDEM_HD inline Below look_below(const Shape& shape, std::uint32_t index, const
 
 /// Answers a question about a posed body, by one thread. A GPU has a way of its own (manifold_team.cuh).
 /// asked: of a group that has no question false.
-/// Questions: body(question) says which body is walked; test(question) has passes(center, half_extent), and
+/// Questions: body(question) says which body is walked; test(question) has passes(centre, half_extent), and
 /// turned(axes), the same test for boxes along these axes; visit(question, triangle, found) looks at a
 /// triangle; better(question, found, other) is the better of two, whatever their order; merge(question,
 /// found) keeps what is better than what is known. A Found is true where there is something.

@@ -71,7 +71,7 @@ bool BroadPhase::take(std::span<const WorldBox> boxes, const std::uint32_t* numb
                              const std::size_t b = numbers == nullptr ? i : numbers[i];
                              in = in && in_range(boxes[b]);
                              for (int k = 0; k < 3; ++k)
-                               items[i].center[k] = 0.5 * boxes[b].lo[k] + 0.5 * boxes[b].hi[k];
+                               items[i].centre[k] = 0.5 * boxes[b].lo[k] + 0.5 * boxes[b].hi[k];
                              items[i].box = static_cast<std::uint32_t>(b);
                            }
                            if (!in) all_in_range.store(false, std::memory_order_relaxed);
@@ -93,7 +93,7 @@ bool BroadPhase::halve(Item* all, Range& range, Range& right) {
   double lo[3] = {kInfinity, kInfinity, kInfinity}, hi[3] = {-kInfinity, -kInfinity, -kInfinity};
   for (std::size_t i = 0; i < count; ++i) {
     for (int k = 0; k < 3; ++k) {
-      const double c = items[i].center[k];
+      const double c = items[i].centre[k];
       lo[k] = c < lo[k] ? c : lo[k];
       hi[k] = c > hi[k] ? c : hi[k];
     }
@@ -104,7 +104,7 @@ bool BroadPhase::halve(Item* all, Range& range, Range& right) {
   }
   const std::size_t left_units = (range.units + 1) / 2, left = left_units * range.unit;
   std::nth_element(items, items + left, items + count,
-                   [axis](const Item& x, const Item& y) { return x.center[axis] < y.center[axis]; });
+                   [axis](const Item& x, const Item& y) { return x.centre[axis] < y.centre[axis]; });
   right = {range.begin + left, count - left, range.unit, range.units - left_units};
   range = {range.begin, left, range.unit, left_units};
   return true;

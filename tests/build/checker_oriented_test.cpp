@@ -87,9 +87,9 @@ const Attack kBlockAttacks[] = {
     {"another size", kBadOrientedBox, [](Bytes& f) { root(f).size *= 1.0000002f; }},
     {"size NaN", kBadOrientedBox, [](Bytes& f) { root(f).size = std::nanf(""); }},
     {"a negative size", kBadOrientedBox, [](Bytes& f) { leaf_block(f).size *= -1; }},
-    {"centre NaN", kBadOrientedBox, in_block(root, [](OrientedBlock& b) { b.center[1][0] = std::nanf(""); })},
+    {"centre NaN", kBadOrientedBox, in_block(root, [](OrientedBlock& b) { b.centre[1][0] = std::nanf(""); })},
     {"centre infinite", kBadOrientedBox,
-     in_block(leaf_block, [](OrientedBlock& b) { b.center[2][0] = -kInfinity; })},
+     in_block(leaf_block, [](OrientedBlock& b) { b.centre[2][0] = -kInfinity; })},
     {"half-extent infinite", kBadOrientedBox,
      in_block(root, [](OrientedBlock& b) { b.half_extent[0][1] = kInfinity; })},
     {"half-extent NaN", kBadOrientedBox,
@@ -99,11 +99,11 @@ const Attack kBlockAttacks[] = {
     {"half-extents that reach too far", kBadOrientedBox,
      in_block(root, [](OrientedBlock& b) { b.half_extent[0][0] = 3; })},
     {"a centre too far", kBadOrientedBox,
-     in_block(leaf_block, [](OrientedBlock& b) { b.center[0][0] = -3; })},
+     in_block(leaf_block, [](OrientedBlock& b) { b.centre[0][0] = -3; })},
     {"a real node made imaginary", kBadOrientedBox,
      in_block(root,
               [](OrientedBlock& b) {
-                for (int k = 0; k < 3; ++k) b.center[k][0] = 0, b.half_extent[k][0] = kImaginaryHalfExtent;
+                for (int k = 0; k < 3; ++k) b.centre[k][0] = 0, b.half_extent[k][0] = kImaginaryHalfExtent;
               })},
     {"an imaginary node made real", kBadOrientedBox,
      in_block(block_with_imaginary_node,
@@ -113,13 +113,13 @@ const Attack kBlockAttacks[] = {
     {"imaginary along two axes", kBadOrientedBox,
      in_block(block_with_imaginary_node, [](OrientedBlock& b) { b.half_extent[1][3] = 1; })},
     {"imaginary with a centre", kBadOrientedBox,
-     in_block(block_with_imaginary_node, [](OrientedBlock& b) { b.center[0][3] = 1; })},
+     in_block(block_with_imaginary_node, [](OrientedBlock& b) { b.centre[0][3] = 1; })},
     {"imaginary with a centre of -0", kBadOrientedBox,
-     in_block(block_with_imaginary_node, [](OrientedBlock& b) { b.center[0][3] = -0.0f; })},
+     in_block(block_with_imaginary_node, [](OrientedBlock& b) { b.centre[0][3] = -0.0f; })},
     {"imaginary with NaN", kBadOrientedBox,
      in_block(block_with_imaginary_node, [](OrientedBlock& b) { b.half_extent[2][3] = std::nanf(""); })},
     {"a box of another node", kTriangleOutsideOrientedBox,
-     in_block(root, [](OrientedBlock& b) { std::swap(b.center[0][0], b.center[0][1]); })},
+     in_block(root, [](OrientedBlock& b) { std::swap(b.centre[0][0], b.centre[0][1]); })},
     {"an empty box", kTriangleOutsideOrientedBox,
      in_block(leaf_block, [](OrientedBlock& b) { b.half_extent[0][0] = 0; })},
 };
@@ -272,8 +272,8 @@ TEST(CheckOriented, ABoxMayBeTightButNoUnitTighter) {
     const OrientedBlock original = block;
     ++(block.is_leaf_block() ? of_leaves : of_internal);
     for (int k = 0; k < 3; ++k) {
-      const auto expect = [&](float center, float half_extent, Status status) {
-        block.center[k][below.node] = center;
+      const auto expect = [&](float centre, float half_extent, Status status) {
+        block.centre[k][below.node] = centre;
         block.half_extent[k][below.node] = half_extent;
         block.size = oriented_size(block);
         EXPECT_EQ(file.check_sealed(), status) << below.block << ", node " << below.node << ", axis " << k;
@@ -286,12 +286,12 @@ TEST(CheckOriented, ABoxMayBeTightButNoUnitTighter) {
       // checker's margin is less than 2^-48 of the mesh, and a unit of these half-extents is more.
       const Range range = range_of(level, below, k);
       const auto middle = static_cast<float>((range.lowest + range.highest) / 2);
-      for (const float center :
+      for (const float centre :
            {middle, std::nextafter(middle, kInfinity), std::nextafter(middle, -kInfinity)}) {
-        const long double c = center;
+        const long double c = centre;
         const float least = above(std::fmax(range.highest - c, c - range.lowest) + 0x1p-48L);
-        expect(center, least, kOk);
-        expect(center, std::nextafter(std::nextafter(least, 0.0f), 0.0f), kTriangleOutsideOrientedBox);
+        expect(centre, least, kOk);
+        expect(centre, std::nextafter(std::nextafter(least, 0.0f), 0.0f), kTriangleOutsideOrientedBox);
       }
     }
   }
@@ -318,9 +318,9 @@ TEST(CheckOriented, NoRoundingDecides) {
     long double off = 0;
     for (int axis = 0; axis < 3; ++axis) {
       const long double at = range_of(level, {0, 0, 1, 0}, axis).lowest;
-      block.center[axis][0] = static_cast<float>(at);
+      block.centre[axis][0] = static_cast<float>(at);
       block.half_extent[axis][0] = 0x1p-20f;
-      if (axis == k) off = std::fabs(at - static_cast<long double>(block.center[k][0]));
+      if (axis == k) off = std::fabs(at - static_cast<long double>(block.centre[k][0]));
     }
     float& half_extent = block.half_extent[k][0];
     half_extent = std::nextafter(static_cast<float>(off), 0.0f);
@@ -343,7 +343,7 @@ TEST(CheckOriented, TheBoxesOfABlockDoInTheAxesOfTheMesh) {
     while (!block->is_leaf_block() || block->index[0] != 0) ++block;
     OrientedBlock* oriented = file.oriented_blocks();
     while (oriented->first_below != OrientedBlock::kIsLeafBlock) ++oriented;
-    std::memcpy(oriented->center, block->center, sizeof block->center);
+    std::memcpy(oriented->centre, block->centre, sizeof block->centre);
     std::memcpy(oriented->half_extent, block->half_extent, sizeof block->half_extent);
     oriented->rotation = kNoRotation;
     oriented->size = oriented_size(*oriented);
@@ -366,7 +366,7 @@ TEST(CheckOriented, ACentreMayNotBeMoved) {
     for (int k = 0; k < 3; ++k) {
       for (const float way : {-1.0f, 1.0f}) {
         const float spare = 0x1p-18f * block.half_extent[k][below.node] + 0x1p-20f;
-        block.center[k][below.node] += way * spare;
+        block.centre[k][below.node] += way * spare;
         EXPECT_EQ(file.check_sealed(), kTriangleOutsideOrientedBox);
         block = original;
       }

@@ -140,9 +140,9 @@ TEST(Check, RejectsTrailingBytes) {
   EXPECT_EQ(Bytes(longer.data(), longer.size()).check().status, kTrailingBytes);
 }
 
-void set_box(Block& block, int node, float center, float half_extent) {
+void set_box(Block& block, int node, float centre, float half_extent) {
   for (int k = 0; k < 3; ++k) {
-    block.center[k][node] = center;
+    block.centre[k][node] = centre;
     block.half_extent[k][node] = half_extent;
   }
 }
@@ -239,11 +239,11 @@ const Attack kTreeAttacks[] = {
      [](Bytes& f) { f.blocks()[0].kind[1] = NodeKind::leaf; }},
     {"imaginary with a box", kBadImaginaryNode, [](Bytes& f) { imaginary_leaf(f).half_extent[1][3] = 1; }},
     {"imaginary with NaN", kBadImaginaryNode,
-     [](Bytes& f) { imaginary_leaf(f).center[0][3] = std::nanf(""); }},
+     [](Bytes& f) { imaginary_leaf(f).centre[0][3] = std::nanf(""); }},
     {"imaginary with a centre of -0", kBadImaginaryNode,
-     [](Bytes& f) { imaginary_leaf(f).center[2][3] = -0.0F; }},
+     [](Bytes& f) { imaginary_leaf(f).centre[2][3] = -0.0F; }},
     {"imaginary with an index", kBadImaginaryNode, [](Bytes& f) { imaginary_leaf(f).index[3] = 0; }},
-    {"box NaN", kBadBox, [](Bytes& f) { f.blocks()[0].center[0][0] = std::nanf(""); }},
+    {"box NaN", kBadBox, [](Bytes& f) { f.blocks()[0].centre[0][0] = std::nanf(""); }},
     {"box infinite", kBadBox,
      [](Bytes& f) { f.blocks()[0].half_extent[0][0] = std::numeric_limits<float>::infinity(); }},
     {"negative half-extent", kBadBox, [](Bytes& f) { f.blocks()[0].half_extent[2][0] *= -1; }},
@@ -293,7 +293,7 @@ const Attack kTreeAttacks[] = {
     {"triangle outside its leaf by one float", kTriangleOutsideLeafBox,
      [](Bytes& f) {
        const Box box = box_of(leaf_block(f), 0);
-       f.triangles()[0].corner[0].position[0] = std::nextafter(box.center[0] + box.half_extent[0], 10.0f);
+       f.triangles()[0].corner[0].position[0] = std::nextafter(box.centre[0] + box.half_extent[0], 10.0f);
      }},
     {"child outside its parent", kChildOutsideParentBox,
      [](Bytes& f) { set_box(leaf_block(f), 0, 0.5f, 2); }},

@@ -205,7 +205,7 @@ inline bool holds(const LevelView& level, const OrientedBlock& block, int node, 
         Real at = 0;
         for (int i = 0; i < 3; ++i)
           at += static_cast<Real>(rotation.matrix[i][k]) * static_cast<Real>(corner.position[i]);
-        const Real n = static_cast<Real>(rotation.length), c = n * static_cast<Real>(block.center[k][node]),
+        const Real n = static_cast<Real>(rotation.length), c = n * static_cast<Real>(block.centre[k][node]),
                    h = n * static_cast<Real>(block.half_extent[k][node]);
         if (!(at >= c - h && at <= c + h)) return false;
       }
@@ -217,7 +217,7 @@ inline bool holds(const LevelView& level, const OrientedBlock& block, int node, 
 inline bool is_finite_box(const OrientedBlock& block, int node) {
   bool finite = true;
   for (int k = 0; k < 3; ++k) {
-    finite = finite && std::isfinite(block.center[k][node]) && std::isfinite(block.half_extent[k][node]) &&
+    finite = finite && std::isfinite(block.centre[k][node]) && std::isfinite(block.half_extent[k][node]) &&
              block.half_extent[k][node] >= 0;
   }
   return finite;
@@ -226,7 +226,7 @@ inline bool is_finite_box(const OrientedBlock& block, int node) {
 inline bool is_empty_box(const OrientedBlock& block, int node) {
   bool empty = true;
   for (int k = 0; k < 3; ++k) {
-    empty = empty && block.center[k][node] == 0 && !std::signbit(block.center[k][node]) &&
+    empty = empty && block.centre[k][node] == 0 && !std::signbit(block.centre[k][node]) &&
             block.half_extent[k][node] == kImaginaryHalfExtent;
   }
   return empty;

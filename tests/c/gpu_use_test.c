@@ -357,7 +357,7 @@ static void test_distances_and_impacts(void) {
     for (int k = 0; k < 3; ++k) {
       motion[i].velocity[k] = 4 * random_number() - 2;
       motion[i].angular_velocity[k] = 2 * random_number() - 1;
-      motion[i].center[k] = bodies[i].pose.translation[k];
+      motion[i].centre[k] = bodies[i].pose.translation[k];
     }
   GpuScene scene = scene_to_gpu(bodies, kBodies);
   tandem_scene* expected = cpu_scene(bodies);

@@ -16,7 +16,7 @@ int main(int, char** argv) {
   tandem::Instance bodies[] = {{0, tandem::kIdentityPose}, {0, tandem::kIdentityPose}};
   bodies[1].pose.translation[0] = 3;
   tandem::RigidMotion motion[] = {tandem::kAtRest, tandem::kAtRest};
-  for (int k = 0; k < 3; ++k) motion[1].center[k] = bodies[1].pose.translation[k];
+  for (int k = 0; k < 3; ++k) motion[1].centre[k] = bodies[1].pose.translation[k];
   motion[1].velocity[0] = -400;
   const double step = 1.0 / 60;
   tandem::Status status = scene.place(bodies);

@@ -1,5 +1,6 @@
-# Installs the libraries with every package of the tools out of reach, builds the consumer against the installation and
-# runs it on a file that bvhbuild writes. Variables: SOURCE, FOLDER (to work in), COMPILER, GENERATOR, BVHBUILD.
+# Installs the libraries of a build, builds the consumer against the installation and runs it on a file that bvhbuild writes.
+# Configures the libraries where none of the packages of the tools is found.
+# Variables: SOURCE, BUILD (of the libraries), FOLDER (to work in), COMPILER, GENERATOR, BVHBUILD.
 cmake_minimum_required(VERSION 3.25)
 
 function(run)
@@ -32,14 +33,10 @@ file(READ ${SOURCE}/tests/consumer/contacts.c program)
 require_shown(docs/c.md c "${program}")
 
 file(REMOVE_RECURSE ${FOLDER})
-foreach(package assimp CGAL CLI11 CUDAToolkit GTest HDF5 nlohmann_json TBB)
+run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${FOLDER}/prefix)
+foreach(package assimp CGAL CLI11 GTest HDF5 nlohmann_json TBB)
   list(APPEND no_packages -DCMAKE_DISABLE_FIND_PACKAGE_${package}=ON)
 endforeach()
-run(${CMAKE_COMMAND} -S ${SOURCE} -B ${FOLDER}/build -G ${GENERATOR} -DCMAKE_CXX_COMPILER=${COMPILER} ${no_packages}
-  -DTANDEM_TOOLS=OFF -DTANDEM_TESTS=OFF -DTANDEM_CUDA=OFF -DTANDEM_WARNINGS_AS_ERRORS=ON)
-run(${CMAKE_COMMAND} --build ${FOLDER}/build)
-run(${CMAKE_COMMAND} --install ${FOLDER}/build --prefix ${FOLDER}/prefix)
-
 run(${CMAKE_COMMAND} -S ${SOURCE}/tests/consumer -B ${FOLDER}/consumer -G ${GENERATOR} -DCMAKE_CXX_COMPILER=${COMPILER} ${no_packages}
   -DCMAKE_PREFIX_PATH=${FOLDER}/prefix)
 run(${CMAKE_COMMAND} --build ${FOLDER}/consumer)
@@ -93,7 +90,8 @@ add_executable(game ${SOURCE}/tests/consumer/contacts.cpp)
 target_link_libraries(game PRIVATE tandem::kernels tandem::runtime)
 message(STATUS \"CUDA: \${TANDEM_CUDA}\")
 ")
-run(${CMAKE_COMMAND} -S ${FOLDER}/game -B ${FOLDER}/game/build -G ${GENERATOR} -DCMAKE_CXX_COMPILER=${COMPILER} ${no_packages})
+run(${CMAKE_COMMAND} -S ${FOLDER}/game -B ${FOLDER}/game/build -G ${GENERATOR} -DCMAKE_CXX_COMPILER=${COMPILER} ${no_packages}
+  -DCMAKE_DISABLE_FIND_PACKAGE_CUDAToolkit=ON)
 if(NOT output MATCHES "CUDA: OFF")
   message(FATAL_ERROR "CUDA is not off in a project that has Tandem as a part:\n${output}")
 endif()

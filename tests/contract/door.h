@@ -96,7 +96,7 @@ inline std::vector<RigidMotion> motions_of(const Json& list, std::size_t bodies)
   std::vector<RigidMotion> motions;
   for (const Json& row : list) {
     RigidMotion& motion = motions.emplace_back(RigidMotion{});
-    double* const parts[3] = {motion.velocity, motion.angular_velocity, motion.center};
+    double* const parts[3] = {motion.velocity, motion.angular_velocity, motion.centre};
     for (std::size_t i = 0; i < row.size(); ++i) parts[i / 3][i % 3] = number(row[i]);
   }
   return motions;

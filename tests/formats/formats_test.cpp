@@ -44,7 +44,7 @@ Box any_box(std::mt19937_64& random) {
   if (random() % 8 == 0) return imaginary_box();
   Box box;
   for (int k = 0; k < 3; ++k) {
-    box.center[k] = pick(random);
+    box.centre[k] = pick(random);
     box.half_extent[k] = pick(random);
   }
   return box;
@@ -96,8 +96,8 @@ TEST(ImaginaryNode, IsRejectedOnEachAxisAlone) {
 
 TEST(ImaginaryNode, IsTheNeutralElementOfAUnion) {
   const Box box = imaginary_box();
-  EXPECT_EQ(std::min(1.0f, box.center[0] - box.half_extent[0]), 1.0f);
-  EXPECT_EQ(std::max(-1.0f, box.center[0] + box.half_extent[0]), -1.0f);
+  EXPECT_EQ(std::min(1.0f, box.centre[0] - box.half_extent[0]), 1.0f);
+  EXPECT_EQ(std::max(-1.0f, box.centre[0] + box.half_extent[0]), -1.0f);
 }
 
 // The tests above would pass if nothing ever overlapped.
@@ -217,7 +217,7 @@ TEST(Enclose, ContainsBothPointsAndNoSmallerFloatWould) {
     float a = any_float(random), b = any_float(random);
     if (a > b) std::swap(a, b);
     const Box box = enclose({a, a, a}, {b, b, b});
-    const float c = box.center[1], h = box.half_extent[1];
+    const float c = box.centre[1], h = box.half_extent[1];
     ASSERT_TRUE(std::isfinite(c) && std::isfinite(h));
     ASSERT_TRUE(within(a, 0, c, h) && within(b, 0, c, h)) << a << " " << b;
     if (h > 0) {
@@ -239,13 +239,13 @@ TEST(Enclose, ABlocksBoxContainsItsNodesAndNoSmallerFloatWould) {
       if (n >= real) set_imaginary(block, n);
     }
     const Box box = enclose(block);
-    const float c = box.center[2], h = box.half_extent[2];
+    const float c = box.centre[2], h = box.half_extent[2];
     ASSERT_TRUE(std::isfinite(h));
     bool smaller_would_do = h > 0;
     for (int n = 0; n < real; ++n) {
-      ASSERT_TRUE(within(block.center[2][n], block.half_extent[2][n], c, h)) << i;
+      ASSERT_TRUE(within(block.centre[2][n], block.half_extent[2][n], c, h)) << i;
       smaller_would_do =
-          smaller_would_do && within(block.center[2][n], block.half_extent[2][n], c, std::nextafter(h, 0.0f));
+          smaller_would_do && within(block.centre[2][n], block.half_extent[2][n], c, std::nextafter(h, 0.0f));
     }
     ASSERT_FALSE(smaller_would_do) << i;
   }

@@ -21,7 +21,7 @@ __global__ void place_bodies(std::uint32_t* asset, tandem::Pose* pose, tandem::R
   pose[i].translation[1] = 2 * size * (i / 10 % 10);
   pose[i].translation[2] = 5 * size * side;
   motion[i] = {{0, 0, -10 * size * side / kStep}, {0, side * i, 0}, {}};
-  for (int k = 0; k < 3; ++k) motion[i].center[k] = pose[i].translation[k];
+  for (int k = 0; k < 3; ++k) motion[i].centre[k] = pose[i].translation[k];
 }
 
 // Carries bodies to where they meet the first other one, or to the end of the step: one thread for all.

@@ -63,7 +63,7 @@ __global__ void move_bodies(int step) {
   for (int k = 0; k < 3; ++k) {  // the inertia of a cube is a sixth of its mass about every axis
     move.velocity[k] += 0x1p-40 * static_cast<long long>(pushes[i][k]) - (k == 2 ? 9.81 * kStep : 0);
     move.angular_velocity[k] += 6 * 0x1p-40 * static_cast<long long>(pushes[i][3 + k]);
-    move.center[k] = poses[i].translation[k], pushes[i][k] = pushes[i][3 + k] = 0;
+    move.centre[k] = poses[i].translation[k], pushes[i][k] = pushes[i][3 + k] = 0;
   }
   const double speed = norm(of(move.velocity)) + norm(of(move.angular_velocity));
   calm_steps[i] = speed < kSlow ? calm_steps[i] + 1 : 0;

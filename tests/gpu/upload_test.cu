@@ -262,7 +262,7 @@ struct Trial {
 __global__ void test_imaginary(const Trial* trials, int count, unsigned* accepted) {
   const int i = blockIdx.x * blockDim.x + threadIdx.x;
   if (i >= count) return;
-  const Box imaginary = {{kImaginaryCenter, kImaginaryCenter, kImaginaryCenter},
+  const Box imaginary = {{kImaginaryCentre, kImaginaryCentre, kImaginaryCentre},
                          {kImaginaryHalfExtent, kImaginaryHalfExtent, kImaginaryHalfExtent}};
   const Trial& t = trials[i];
   const bool any = overlap_6_axes(imaginary, t.other, t.pose) || overlap_6_axes(t.other, imaginary, t.pose) ||
@@ -282,7 +282,7 @@ TEST_F(Gpu, ImaginaryNodesAreRejectedAgainstEveryOtherBox) {
   for (Trial& trial : trials) {
     const bool aligned = random() % 3 == 0;
     for (int i = 0; i < 3; ++i) {
-      trial.other.center[i] = pick();
+      trial.other.centre[i] = pick();
       trial.other.half_extent[i] = pick();
       trial.pose.translation[i] = pick();
       trial.pose.slack_a[i] = random() % 2 == 0 ? 0 : pick();

@@ -366,10 +366,10 @@ const std::vector<SceneFamily>& scene_families() {
 Mesh soup(RandomPoses& random, std::uint32_t triangles, double size) {
   Mesh mesh;
   for (std::uint32_t t = 0; t < triangles; ++t) {
-    const double center[3] = {random.symmetric(1), random.symmetric(1), random.symmetric(1)};
+    const double centre[3] = {random.symmetric(1), random.symmetric(1), random.symmetric(1)};
     const auto corner = [&] {
       std::array<float, 3> point;
-      for (std::size_t k = 0; k < 3; ++k) point[k] = to_stored(center[k] + random.symmetric(size));
+      for (std::size_t k = 0; k < 3; ++k) point[k] = to_stored(centre[k] + random.symmetric(size));
       return point;
     };
     const auto a = corner(), b = corner();
@@ -479,13 +479,13 @@ double radius_of(const AssetView& asset) {
 
 Pose centred_at(const AssetView& asset, Pose pose, const double (&place)[3]) {
   const FileHeader& header = *asset.header;
-  double center[3], moved[3];
+  double centre[3], moved[3];
   for (int k = 0; k < 3; ++k) {
-    center[k] = header.origin[k] +
+    centre[k] = header.origin[k] +
                 0.5 * (static_cast<double>(header.lower[k]) + static_cast<double>(header.upper[k]));
     pose.translation[k] = 0;
   }
-  apply(pose, center[0], center[1], center[2], moved);
+  apply(pose, centre[0], centre[1], centre[2], moved);
   for (int k = 0; k < 3; ++k) pose.translation[k] = place[k] - moved[k];
   return pose;
 }

@@ -12,7 +12,7 @@ namespace tandem::test {
 /// How large the numbers of one trial are.
 struct Scale {
   double size = 1;         ///< of boxes
-  double center = 1;       ///< of their centres
+  double centre = 1;       ///< of their centres
   double translation = 1;  ///< of poses
   double deviation = 0;    ///< of rotations from rigid ones, entry by entry
   double turn = 4;         ///< angle between rotations and axis-parallel ones, radians
@@ -57,7 +57,7 @@ class RandomPoses {
   /// Corner points of a box, and what a node stores of it.
   Box box(const Scale& scale, Position& lo, Position& hi) {
     for (int k = 0; k < 3; ++k) {
-      const double c = symmetric(scale.center);
+      const double c = symmetric(scale.centre);
       const double h = below(8) == 0 ? 0 : uniform(0, scale.size) * (below(4) == 0 ? 1e-3 : 1);
       lo[k] = static_cast<float>(c - h);
       hi[k] = static_cast<float>(c + h);

@@ -241,12 +241,12 @@ double uniform(Random& random, double lowest, double highest) {
 
 TrianglePair generic_pair(Random& random) {
   TrianglePair pair;
-  Corner center;
-  set_random(center, random, -0.7, 0.7);
+  Corner centre;
+  set_random(centre, random, -0.7, 0.7);
   for (Corner& corner : pair.a) set_random(corner, random);
   for (Corner& corner : pair.b) {
     set_random(corner, random);
-    for (int k = 0; k < 3; ++k) corner[k] += center[k];
+    for (int k = 0; k < 3; ++k) corner[k] += centre[k];
   }
   return pair;
 }

@@ -52,6 +52,30 @@ def test_takes_rotations_of_scipy(box, scene):
     assert scene.instances[[0, 1, 3]].tobytes() == expected and scene.instances[2] == scene.instances[1]
 
 
+def test_takes_quaternions_in_both_orders(box):
+    rotation = pytest.importorskip("scipy.spatial.transform").Rotation
+    turns = rotation.random(20, random_state=7)
+    xyzw = turns.as_quat()
+    for given in (xyzw, -xyzw, 3e-200 * xyzw, 1e300 * xyzw):
+        np.testing.assert_allclose(tandem.rotations(xyzw=given), turns.as_matrix(), atol=1e-15)
+        np.testing.assert_array_equal(tandem.rotations(wxyz=given[:, [3, 0, 1, 2]]), tandem.rotations(xyzw=given))
+    np.testing.assert_array_equal(tandem.rotations(xyzw=xyzw[3]), tandem.rotations(xyzw=xyzw)[3])
+    assert tandem.rotations(xyzw=[]).shape == (0, 3, 3)
+    assert len(tandem.Scene([box], rotation=tandem.rotations(xyzw=xyzw)).instances) == 20
+    for bad in ([0, 0, 0, 0], [0, 0, 1, np.nan], [np.inf, 0, 0, 1]):
+        with pytest.raises(ValueError, match="xyzw: it is no rotation"):
+            tandem.rotations(xyzw=bad)
+        with pytest.raises(ValueError, match="wxyz: row 1 is no rotation"):
+            tandem.rotations(wxyz=[[1, 0, 0, 0], bad])
+    for both in ({}, {"xyzw": xyzw, "wxyz": xyzw}):
+        with pytest.raises(TypeError, match="as xyzw or as wxyz"):
+            tandem.rotations(**both)
+    with pytest.raises(ValueError, match=r"xyzw has shape \(3,\)"):
+        tandem.rotations(xyzw=[0, 0, 1])
+    with pytest.raises(ValueError, match=r"shape \(20, 4\) .* tandem.rotations makes these of quaternions"):
+        tandem.instances(rotation=xyzw)
+
+
 def test_takes_poses_in_every_form(box, scene):
     turned = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
     rows = np.zeros(2, tandem.INSTANCE)

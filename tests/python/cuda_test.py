@@ -277,7 +277,7 @@ def test_distances_impacts_and_verdicts(torch, assets):
 
     motion = np.zeros(COUNT, tandem.MOTION)
     motion["velocity"] = np.random.default_rng(3).normal(size=(COUNT, 3))
-    motion["center"] = pose[:, 3]
+    motion["centre"] = pose[:, 3]
     theirs = on_cpu.place(instances).impacts(motion, 0.1)
     found = query.impacts(bodies, motion=torch.from_numpy(motion.view("<f8").reshape(COUNT, 9)).cuda(), duration=0.1)
     assert np.array_equal(found.pairs.numpy(), theirs.pairs)

@@ -121,7 +121,7 @@ def write_run(path, box):
     with h5py.File(path, "w") as file:
         file["assets"] = ["box.bvh"]
         file["bodies/asset"], file["bodies/motion"] = np.zeros(2, "u4"), np.zeros(2, "u4")
-        file["bodies/center_of_mass"] = np.full((2, 3), 0.5)
+        file["bodies/centre_of_mass"] = np.full((2, 3), 0.5)
         file["trajectory/frame"] = np.array([0, 5, 10], "u4")
         file["trajectory/position"] = np.array([[[0, 0, 0], [0, 0.9 + k, 0]] for k in range(3)], float)
         half = np.sqrt(0.5)
@@ -485,7 +485,7 @@ def test_a_scene_file_whose_rows_do_not_fit_is_named(box, tmp_path, name, shape)
     assert str(caught.value).startswith(f"{path}: {name} has shape {shape} where (3,")
 
 
-@pytest.mark.parametrize(("name", "shape"), [("trajectory/position", (2, 2, 3)), ("trajectory/orientation", (1, 1, 4)), ("bodies/center_of_mass", (1, 3)),
+@pytest.mark.parametrize(("name", "shape"), [("trajectory/position", (2, 2, 3)), ("trajectory/orientation", (1, 1, 4)), ("bodies/centre_of_mass", (1, 3)),
                                              ("bodies/motion", (5,))])
 def test_a_run_file_whose_rows_do_not_fit_is_named(box, tmp_path, name, shape):
     path = tmp_path / "run.h5"

@@ -247,7 +247,7 @@ TEST_P(Map, NamesWhatCannotBeOpened) {
 TEST_P(Map, ADefectClosesTheFileAndSaysWhere) {
   build::Image image = make_file(random_mesh(100, 1));
   const auto blocks = check(image.data(), image.size()).asset.level().blocks;
-  const_cast<Block*>(blocks)[3].center[0][0] = 1e30f;
+  const_cast<Block*>(blocks)[3].centre[0][0] = 1e30f;
   seal(image.data(), image.size());
   MappedAsset asset;
   EXPECT_EQ(asset.open(write("bad.bvh", image.data(), image.size()).c_str(), GetParam()),

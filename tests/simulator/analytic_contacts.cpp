@@ -81,9 +81,9 @@ class BallsOnPlane : public ContactFinder {
                                         std::span<const ObjectPair>) override {
     points_.clear();
     for (std::uint32_t i = 1; i < bodies.size(); ++i) {
-      const Vector3d center = to_world(bodies[i].pose, Vector3d::Zero());
-      const double depth = radius_ - normal_.dot(center);
-      if (depth >= 0) points_.push_back({0, i, center - radius_ * normal_, normal_, depth, 1});
+      const Vector3d centre = to_world(bodies[i].pose, Vector3d::Zero());
+      const double depth = radius_ - normal_.dot(centre);
+      if (depth >= 0) points_.push_back({0, i, centre - radius_ * normal_, normal_, depth, 1});
     }
     return points_;
   }

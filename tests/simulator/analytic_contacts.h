@@ -6,6 +6,10 @@
 /// Contacts by formula, for tests of the simulator without meshes.
 namespace tandem::simulation {
 
+inline constexpr double kGravity = 9.81;
+/// The size of the boxes that most tests stack.
+inline const Eigen::Vector3d kCube = {1, 1, 1};
+
 /// A box of this mass with its centre at the origin of its frame.
 BodyProperties box_body(const Eigen::Vector3d& size, double mass);
 

@@ -40,7 +40,7 @@ void turn(Mesh& mesh) {
 TEST(MassProperties, OfABoxAreItsClosedForm) {
   const MassReport report = report_of(moved(box(2, 3, 0.5f), 1, -2, 4));
   EXPECT_NEAR(report.properties.volume, 3, 1e-14);
-  EXPECT_LT((report.properties.center - Vector3d(1, -2, 4)).norm(), 1e-14);
+  EXPECT_LT((report.properties.centre - Vector3d(1, -2, 4)).norm(), 1e-14);
   EXPECT_LT((report.properties.inertia_per_density - box_inertia(2, 3, 0.5)).norm(), 1e-13);
   EXPECT_EQ(report.model, MassModel::solid);
   EXPECT_TRUE(report.findings.empty());
@@ -55,7 +55,7 @@ TEST(MassProperties, OfATetrahedronAreItsClosedForm) {
   mesh.add({1, 0, 0}, {0, 1, 0}, {0, 0, 1});
   const MassProperties properties = report_of(mesh).properties;
   EXPECT_NEAR(properties.volume, 1.0 / 6, 1e-16);
-  EXPECT_LT((properties.center - Vector3d::Constant(0.25)).norm(), 1e-15);
+  EXPECT_LT((properties.centre - Vector3d::Constant(0.25)).norm(), 1e-15);
   // About the origin: the integral of x^2 is 1/60, of xy 1/120. Moved to the centre: 1/60 - 1/96 and 1/120 -
   // 1/96.
   const double square = 1.0 / 60 - 1.0 / 96, mixed = 1.0 / 120 - 1.0 / 96;
@@ -72,7 +72,7 @@ TEST(MassProperties, OfFinerSpheresComeCloserToTheBall) {
     const double error = std::fabs(properties.volume / volume - 1);
     EXPECT_LT(error, last / 3) << splits;
     EXPECT_NEAR(properties.inertia_per_density(0, 0) / inertia, 1, 2 * error);
-    EXPECT_LT(properties.center.norm(), 1e-7);
+    EXPECT_LT(properties.centre.norm(), 1e-7);
     last = error;
   }
 }
@@ -83,7 +83,7 @@ TEST(MassProperties, KeepTheirAccuracyFarFromZero) {
   const MassProperties far = report_of(mesh, {5811430.0, 1e9, -3e8}).properties;
   EXPECT_DOUBLE_EQ(far.volume, here.volume);
   EXPECT_EQ(far.inertia_per_density, here.inertia_per_density);
-  EXPECT_LT((far.center - here.center - Vector3d(5811430.0, 1e9, -3e8)).norm(), 2e-7);
+  EXPECT_LT((far.centre - here.centre - Vector3d(5811430.0, 1e9, -3e8)).norm(), 2e-7);
   // Stored coordinates far from zero too: a box whose corners float32 holds exactly.
   const MassProperties box_far = report_of(moved(box(2, 2, 2), 4e6f, -4e6f, 4e6f)).properties;
   EXPECT_NEAR(box_far.volume, 8, 1e-14);
@@ -119,9 +119,9 @@ MassProperties by_lines(const Mesh& mesh, double cell) {
     }
   }
   const double part = cell * cell;
-  const Vector3d center = first / volume;
-  const Matrix3d spread = part * (second - volume * center * center.transpose());
-  return {part * volume, center, spread.trace() * Matrix3d::Identity() - spread};
+  const Vector3d centre = first / volume;
+  const Matrix3d spread = part * (second - volume * centre * centre.transpose());
+  return {part * volume, centre, spread.trace() * Matrix3d::Identity() - spread};
 }
 
 TEST(MassProperties, OfTheCowAreWhatLinesThroughItFind) {
@@ -130,7 +130,7 @@ TEST(MassProperties, OfTheCowAreWhatLinesThroughItFind) {
   EXPECT_TRUE(report.findings.empty());
   const MassProperties reference = by_lines(cow, 0.01);
   EXPECT_NEAR(report.properties.volume / reference.volume, 1, 0.005);
-  EXPECT_LT((report.properties.center - reference.center).norm(), 0.002);
+  EXPECT_LT((report.properties.centre - reference.centre).norm(), 0.002);
   EXPECT_LT((report.properties.inertia_per_density - reference.inertia_per_density).norm(),
             0.01 * reference.inertia_per_density.norm());
   // The finer cow is the same surface.

@@ -12,9 +12,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kGravity = 9.81;
-const Vector3d kCube = {1, 1, 1};
-
 // Boxes on top of each other on the plane, each as deep in the next as the slop.
 std::vector<BodyState> tower(int boxes, double height, double slop) {
   std::vector<BodyState> states(static_cast<std::size_t>(boxes) + 1);

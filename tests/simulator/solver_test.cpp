@@ -13,9 +13,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kGravity = 9.81;
-const Vector3d kCube = {1, 1, 1};
-
 // Boxes of these masses on each other on the plane, each as deep in the next as the slop, and askew by
 // `jitter`.
 struct Tower {
@@ -348,7 +345,7 @@ TEST(RigidBody, PosesAreRigidAfterManySteps) {
 
 TEST(RigidBody, StateOfAPoseGivesThePose) {
   BodyProperties body = box_body({1, 2, 3}, 1);
-  body.center = {0.25, -0.5, 4};
+  body.centre = {0.25, -0.5, 4};
   BodyState state = tumbling();
   state.orientation = Eigen::Quaterniond(0.1, -0.7, 0.3, 0.5).normalized();
   const Pose pose = pose_of(body, state).pose, again = pose_of(body, state_of(body, pose)).pose;

@@ -159,7 +159,7 @@ class SimulatedLevels(LevelsBenchTest):
         coarser = datasets(self.run_of("coarser.h5"))
         self.assertEqual([coarser[f"bodies/{name}"].tolist() for name in ("level", "asset")], [[0, 2, 1], [0, 0, 0]])
         self.assertEqual(len(coarser["assets"]), 1)
-        for name in ("bodies/mass", "bodies/inertia", "bodies/center_of_mass"):
+        for name in ("bodies/mass", "bodies/inertia", "bodies/centre_of_mass"):
             self.assertTrue((coarser[name] == finest[name]).all(), name)
 
     def test_a_frame_keeps_the_levels(self):

@@ -307,10 +307,10 @@ class Frames(SimulateTest):
         sound = datasets(self.run_file)
         scene = self.outputs / "scene.h5"
         bodies = len(sound["bodies/asset"])
-        for name, rows, words in (("bodies/center_of_mass", 0, ["/bodies/center_of_mass", f"0 rows for {bodies} bodies"]),
-                                  ("bodies/center_of_mass", 1, ["/bodies/center_of_mass", f"1 rows for {bodies} bodies"]),
+        for name, rows, words in (("bodies/centre_of_mass", 0, ["/bodies/centre_of_mass", f"0 rows for {bodies} bodies"]),
+                                  ("bodies/centre_of_mass", 1, ["/bodies/centre_of_mass", f"1 rows for {bodies} bodies"]),
                                   ("trajectory/frame", 2, ["/trajectory"]), ("trajectory/position", 1, ["/trajectory"]),
-                                  ("trajectory/orientation", 0, ["/trajectory"]), ("bodies/asset", 1, ["/bodies/center_of_mass", f"{bodies} rows for 1 bodies"])):
+                                  ("trajectory/orientation", 0, ["/trajectory"]), ("bodies/asset", 1, ["/bodies/centre_of_mass", f"{bodies} rows for 1 bodies"])):
             with self.subTest(name=name, rows=rows):
                 change(self.run_file, **{name.replace("/", "_", 1): sound[name][:rows]})
                 self.assert_fails(self.bench("frame", self.run_file, "--frame", "1", "-o", scene), UNREADABLE_INPUT, "run.h5", *words)

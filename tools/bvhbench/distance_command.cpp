@@ -13,7 +13,7 @@ struct DistanceArguments : CommonArguments {
   double reach = kInfinity;
 };
 
-constexpr CounterRow<DistanceCounters> kCounters[] = {
+constexpr CounterRow<DistanceCounters> kDistanceCounters[] = {
     {"touching", "  touching", &DistanceCounters::touching},
     {"block_pairs", "block pairs", &DistanceCounters::block_pairs},
     {"by_float32", "triangle pairs", &DistanceCounters::by_float32},
@@ -50,7 +50,7 @@ Report report_of(const DistanceArguments& arguments, const LoadedScene& scene, c
   add_setting(report, arguments, scene);
   report["triangles"].row("triangles");
   add_object_pairs(report, found.counters.object_pairs, scene);
-  report.add(kCounters, found.counters);
+  report.add(kDistanceCounters, found.counters);
   report.add_json("least", least_upper(found.rows));
   add_outcome(report, hash_of(found), found.whole);
   if (arguments.on_gpu()) {
@@ -76,7 +76,7 @@ void add_datasets(Hdf5Output& file, const TimedDistances& found) {
   add_column(file, "/distance/face_b", distances, &ObjectDistance::face_b);
 }
 
-ExitCode run(const DistanceArguments& arguments) {
+ExitCode run_distance(const DistanceArguments& arguments) {
   const LoadedScene scene = open_scene(arguments);
   const TimedDistances found = find(arguments, scene);
   Report report = report_of(arguments, scene, found);
@@ -87,7 +87,7 @@ ExitCode run(const DistanceArguments& arguments) {
 
 void add_distance(Command tool, Run& run_later) {
   const auto [command, arguments] = add_command<DistanceArguments>(
-      tool, run_later, "distance", "find how near the bodies of a scene are", run);
+      tool, run_later, "distance", "find how near the bodies of a scene are", run_distance);
   command.add({scene_argument(arguments),
                backend_option(arguments),
                {"--reach", arguments.reach, "D [no limit]",

@@ -139,7 +139,7 @@ std::string excess_of(const EconomyArguments& arguments, const Measures& cheapes
   return text + (arguments.output.empty() ? "" : "; " + arguments.output + " is not written");
 }
 
-ExitCode run(const EconomyArguments& arguments) {
+ExitCode run_economy(const EconomyArguments& arguments) {
   const economy::MeasureSettings settings = {arguments.on_gpu() ? "tandem-cuda" : "tandem",
                                              arguments.threads(), arguments.repeats,
                                              arguments.simulated_seconds};
@@ -163,7 +163,7 @@ ExitCode run(const EconomyArguments& arguments) {
 
 void add_economy(Command tool, Run& run_later) {
   const auto [command, arguments] = add_command<EconomyArguments>(
-      tool, run_later, "economy", "find out which levels of detail are enough for a scene", run);
+      tool, run_later, "economy", "find out which levels of detail are enough for a scene", run_economy);
   command.add({scene_argument(arguments)});
   const Command limit = command.add_choice("limit");
   limit.add(

@@ -8,9 +8,8 @@ namespace tandem::bench {
 namespace {
 
 using economy::Measures;
-using economy::Spread;
 
-Json to_json(const Spread& spread) {
+Json to_json(const economy::Spread& spread) {
   return {
       {"mean", spread.mean}, {"median", spread.median}, {"most", spread.most}, {"largest", spread.largest}};
 }
@@ -83,12 +82,12 @@ double largest_diagonal(const EconomyResult& result) {
 }
 
 // "0.12 (1.5)": half of the numbers are at most so large, and 95 of 100.
-std::string half_and_most(const Spread& spread) {
+std::string half_and_most(const economy::Spread& spread) {
   return format("%.2g (%.2g)", spread.median, spread.most);
 }
 
 // Returns the same words in per cent of a length.
-std::string half_and_most(const Spread& spread, double length) {
+std::string half_and_most(const economy::Spread& spread, double length) {
   return half_and_most({0, 100 * spread.median / length, 100 * spread.most / length, 0});
 }
 
@@ -151,7 +150,7 @@ void add_losses(Report& report, const EconomyResult& result) {
               with_commas(change.matched + change.lost_patches) + " manifolds have no match, and " +
               with_commas(change.new_patches) + " are new");
   if (!chosen.rest) return;
-  const Spread& apart = chosen.rest->end_distance;
+  const economy::Spread& apart = chosen.rest->end_distance;
   report.line(
       format("  half of the bodies end within %.3g of where they do at the finest levels, 95 in 100 "
              "within %.3g",

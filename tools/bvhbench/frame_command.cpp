@@ -12,7 +12,7 @@ struct FrameArguments : CommonArguments {
   std::uint32_t frame = 0;
 };
 
-ExitCode run(const FrameArguments& arguments) {
+ExitCode run_frame(const FrameArguments& arguments) {
   keep_inputs(arguments.output, {arguments.run});
   const simulation::StoredFrame frame = simulation::read_frame(arguments.run, arguments.frame);
   SceneDescription scene;
@@ -30,7 +30,7 @@ ExitCode run(const FrameArguments& arguments) {
 
 void add_frame(Command tool, Run& run_later) {
   const auto [command, arguments] = add_command<FrameArguments>(
-      tool, run_later, "frame", "save a kept state of a simulation as a scene file", run);
+      tool, run_later, "frame", "save a kept state of a simulation as a scene file", run_frame);
   command.add({required({"RUN", arguments.run, "", "file of a simulation with a trajectory", file_name()}),
                required({"--frame", arguments.frame, "K", "steps made before the state; 0: the start"}),
                required(output_option(arguments, "the scene file to write; appears whole or not at all",

@@ -11,7 +11,7 @@ struct ImpactArguments : CommonArguments {
   double tolerance = ImpactOptions().tolerance;
 };
 
-constexpr CounterRow<ImpactCounters> kCounters[] = {
+constexpr CounterRow<ImpactCounters> kImpactCounters[] = {
     {"object_pairs", "object pairs", &ImpactCounters::object_pairs},
     {"at_start", "  touch already", &ImpactCounters::at_start},
     {"found", "  meet", &ImpactCounters::found},
@@ -64,7 +64,7 @@ Report report_of(const ImpactArguments& arguments, const LoadedScene& scene, con
   report.add_json("given_pairs", scene.description.pairs.has_value());
   add_threads(report, arguments);
   report.add_json("instances", scene.description.instances.size()).row("instances");
-  report.add(kCounters, found.counters);
+  report.add(kImpactCounters, found.counters);
   add_outcome(report, hash_of(found), found.whole);
   if (arguments.on_gpu()) {
     report.add_json("rounds", found.rounds).row("rounds");
@@ -83,10 +83,10 @@ void add_datasets(Hdf5Output& file, const TimedImpacts& found, std::span<const R
   });
   add_column(file, "/motion/velocity", motion, &RigidMotion::velocity);
   add_column(file, "/motion/angular_velocity", motion, &RigidMotion::angular_velocity);
-  add_column(file, "/motion/centre", motion, &RigidMotion::center);
+  add_column(file, "/motion/centre", motion, &RigidMotion::centre);
 }
 
-ExitCode run(const ImpactArguments& arguments) {
+ExitCode run_impact(const ImpactArguments& arguments) {
   const LoadedScene scene = open_scene(arguments);
   const std::vector<RigidMotion> motion = motions_of(arguments.scene, scene);
   const TimedImpacts found = find(arguments, scene, motion);
@@ -98,7 +98,7 @@ ExitCode run(const ImpactArguments& arguments) {
 
 void add_impact(Command tool, Run& run_later) {
   const auto [command, arguments] = add_command<ImpactArguments>(
-      tool, run_later, "impact", "find when the moving instances of a scene meet", run);
+      tool, run_later, "impact", "find when the moving instances of a scene meet", run_impact);
   command.add({scene_argument(arguments, "scene file (HDF5) with /simulation/velocity"),
                required({"--dt", arguments.duration, "T", "the step in which they move, in seconds",
                          between(0, 1e9)}),

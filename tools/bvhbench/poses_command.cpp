@@ -26,7 +26,7 @@ struct PoseCounter {
   std::vector<std::uint32_t> PoseWork::*column;
   double unit;  // by which the column is multiplied
 };
-constexpr PoseCounter kCounters[] = {
+constexpr PoseCounter kPoseCounters[] = {
     {"block_pairs", "block pairs", &PoseWork::block_pairs, 1},
     {"box_tests", nullptr, &PoseWork::block_pairs, kNodesPerBlock* kNodesPerBlock},
     {"candidates", "candidates", &PoseWork::candidates, 1},
@@ -36,7 +36,7 @@ constexpr PoseCounter kCounters[] = {
 };
 
 // The trees in the order given, and the second body, if it is not the tree itself.
-struct Bodies {
+struct Trees {
   std::vector<MappedAsset> files;
   std::vector<NamedAsset> trees;
   std::optional<NamedAsset> with;
@@ -60,7 +60,7 @@ void check_geometry(const NamedAsset& asset, const std::string& expected, const 
   throw FileError(asset.path + ": holds other triangles than the mesh that " + from + " is for");
 }
 
-Poses make(const PosesArguments& arguments, const Bodies& bodies) {
+Poses make(const PosesArguments& arguments, const Trees& bodies) {
   const NamedAsset& a = bodies.trees[0];
   Poses poses;
   for (const NearContactPose& pose :
@@ -114,7 +114,7 @@ std::string second_of(const PosesArguments& arguments, const SceneDescription& s
 }
 
 // A scene file, with what each tree did beside it.
-void write(const std::string& path, const Bodies& bodies, const Poses& poses,
+void write(const std::string& path, const Trees& bodies, const Poses& poses,
            const std::vector<PoseWork>& work) {
   SceneDescription scene;
   scene.assets = {seen_from(path, bodies.trees[0].path)};
@@ -133,7 +133,7 @@ void write(const std::string& path, const Bodies& bodies, const Poses& poses,
   std::vector<std::string> names;
   for (const NamedAsset& tree : bodies.trees) names.push_back(seen_from(path, tree.path));
   file.add("/counts/trees", names);
-  for (const auto& [key, label, column, unit] : kCounters) {
+  for (const auto& [key, label, column, unit] : kPoseCounters) {
     if (label == nullptr) continue;
     std::vector<std::uint32_t> all;
     for (const PoseWork& of_tree : work) {
@@ -168,7 +168,7 @@ std::string to_text(const char* label, const std::vector<std::uint32_t>& values,
   return text + format("   x%.3f  %.3f", ratio.value, ratio.standard_error);
 }
 
-Report report_of(const PosesArguments& arguments, const Bodies& bodies, const Poses& poses,
+Report report_of(const PosesArguments& arguments, const Trees& bodies, const Poses& poses,
                  const std::vector<PoseWork>& work) {
   const std::string &set = poses.notes.stream[0], &seed = poses.notes.stream[1];
   Report report;
@@ -189,7 +189,7 @@ Report report_of(const PosesArguments& arguments, const Bodies& bodies, const Po
     Json& tree = trees.emplace_back(
         Json{{"file", bodies.trees[i].path}, {"triangles", bodies.trees[i].view.level().triangle_count}});
     report.line(bodies.trees[i].path);
-    for (const auto& [key, label, column, unit] : kCounters) {
+    for (const auto& [key, label, column, unit] : kPoseCounters) {
       const std::vector<std::uint32_t>&values = work[i].*column, &base = work[0].*column;
       tree[key] = to_json(values, base, unit);
       if (label != nullptr) report.line("  " + to_text(label, values, base));
@@ -199,8 +199,8 @@ Report report_of(const PosesArguments& arguments, const Bodies& bodies, const Po
   return report;
 }
 
-ExitCode run(const PosesArguments& arguments) {
-  Bodies bodies;
+ExitCode run_poses(const PosesArguments& arguments) {
+  Trees bodies;
   SceneDescription stored;
   std::string with = arguments.with;
   if (!arguments.poses.empty()) {
@@ -236,7 +236,8 @@ ExitCode run(const PosesArguments& arguments) {
 
 void add_poses(Command tool, Run& run_later) {
   const auto [command, arguments] = add_command<PosesArguments>(
-      tool, run_later, "poses", "measure trees by the work of queries in random poses near contact", run);
+      tool, run_later, "poses", "measure trees by the work of queries in random poses near contact",
+      run_poses);
   command.add(
       {required({"TREE", arguments.trees, "", ".bvh files over one mesh, measured in the same poses",
                  file_name()}),

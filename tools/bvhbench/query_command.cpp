@@ -207,7 +207,7 @@ ExitCode run_by_tolerance(const QueryArguments& arguments) {
   return run_tolerance(arguments, *arguments.tolerance);
 }
 
-ExitCode run(const QueryArguments& arguments) {
+ExitCode run_query(const QueryArguments& arguments) {
   if (arguments.tolerance) return run_by_tolerance(arguments);
   check_options(arguments);
   const LoadedScene scene = open_scene(arguments);
@@ -232,7 +232,7 @@ void add_gpu_options(Command command, QueryArguments& arguments) {
 
 void add_query(Command tool, Run& run_later) {
   const auto [command, arguments] = add_command<QueryArguments>(
-      tool, run_later, "query", "find every pair of triangles that meet in a scene", run);
+      tool, run_later, "query", "find every pair of triangles that meet in a scene", run_query);
   command.add({scene_argument(arguments), backend_option(arguments)});
   if (has_cuda()) add_gpu_options(command, arguments);
   command.add({{"--mode", arguments.mode, kModes, "exact|fast|boxes [exact]",

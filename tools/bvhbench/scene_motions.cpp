@@ -11,27 +11,27 @@ namespace tandem::bench {
 namespace {
 
 // Centres of mass of the shapes, those of their assets' finest level, computed where they are asked for.
-class MassCenters {
+class MassCentres {
  public:
-  explicit MassCenters(const LoadedScene& scene) : scene_(scene), centers_(scene.shapes.size()) {}
+  explicit MassCentres(const LoadedScene& scene) : scene_(scene), centres_(scene.shapes.size()) {}
 
   // Returns the centre of mass of a shape, in the file's coordinates.
   const Eigen::Vector3d& of(std::uint32_t shape) {
-    if (!centers_[shape]) centers_[shape] = compute(shape);
-    return *centers_[shape];
+    if (!centres_[shape]) centres_[shape] = compute(shape);
+    return *centres_[shape];
   }
 
  private:
   Eigen::Vector3d compute(std::uint32_t shape) const {
     try {
-      return simulation::mass_properties(scene_.assets[scene_.shapes[shape].asset].view()).properties.center;
+      return simulation::mass_properties(scene_.assets[scene_.shapes[shape].asset].view()).properties.centre;
     } catch (const std::runtime_error& impossible) {
       throw FileError(scene_.name_of(shape) + ": " + impossible.what());
     }
   }
 
   const LoadedScene& scene_;
-  std::vector<std::optional<Eigen::Vector3d>> centers_;
+  std::vector<std::optional<Eigen::Vector3d>> centres_;
 };
 
 }  // namespace
@@ -40,7 +40,7 @@ std::vector<RigidMotion> motions_of(const std::string& path, const LoadedScene& 
   const auto& instances = scene.description.instances;
   const auto& movers = scene.description.filter.motion;
   const SceneMotion told = read_motion(path, instances.size());
-  MassCenters centers(scene);
+  MassCentres centres(scene);
   std::vector<RigidMotion> all(instances.size(), kAtRest);
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (!movers.empty() && movers[i] == Motion::fixed) continue;
@@ -49,10 +49,10 @@ std::vector<RigidMotion> motions_of(const std::string& path, const LoadedScene& 
     if (!told.angular_velocity.empty())
       std::copy_n(&told.angular_velocity[3 * i], 3, motion.angular_velocity);
     if (!told.centre.empty()) {
-      std::copy_n(&told.centre[3 * i], 3, motion.center);
+      std::copy_n(&told.centre[3 * i], 3, motion.centre);
     } else if (!told.angular_velocity.empty()) {
-      const Eigen::Vector3d& center = centers.of(instances[i].asset);
-      apply(instances[i].pose, center[0], center[1], center[2], motion.center);
+      const Eigen::Vector3d& centre = centres.of(instances[i].asset);
+      apply(instances[i].pose, centre[0], centre[1], centre[2], motion.centre);
     }
   }
   return all;

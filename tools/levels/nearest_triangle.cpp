@@ -12,7 +12,7 @@ void square_distances(const Block& block, const Point& p, double (&square)[kNode
   for (int k = 0; k < 3; ++k) {
     for (int node = 0; node < kNodesPerBlock; ++node) {
       const double beyond =
-          std::fabs(p.x[k] - double{block.center[k][node]}) - double{block.half_extent[k][node]};
+          std::fabs(p.x[k] - double{block.centre[k][node]}) - double{block.half_extent[k][node]};
       const double gap = beyond > 0 ? beyond : 0;
       square[node] += gap * gap;
     }

@@ -309,7 +309,7 @@ public unsafe struct tandem_distance_counters {
 public unsafe struct tandem_motion {
   public fixed double velocity[3];
   public fixed double angular_velocity[3];
-  public fixed double center[3];
+  public fixed double centre[3];
 }
 
 [StructLayout(LayoutKind.Sequential)]

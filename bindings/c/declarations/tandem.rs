@@ -480,7 +480,7 @@ pub struct tandem_distance_counters {
 pub struct tandem_motion {
     pub velocity: [f64; 3],
     pub angular_velocity: [f64; 3],
-    pub center: [f64; 3],
+    pub centre: [f64; 3],
 }
 
 #[repr(C)]

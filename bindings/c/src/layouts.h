@@ -30,7 +30,7 @@ struct Same_tandem_distance { using Ours = ObjectDistance; using Theirs = tandem
 struct Same_tandem_distance_counters { using Ours = DistanceCounters; using Theirs = tandem_distance_counters; TANDEM_SAME_SIZE();
   TANDEM_SAME(object_pairs); TANDEM_SAME(block_pairs); TANDEM_SAME(by_float32); TANDEM_SAME(by_float64); TANDEM_SAME(touching); };
 struct Same_tandem_motion { using Ours = RigidMotion; using Theirs = tandem_motion; TANDEM_SAME_SIZE(); TANDEM_SAME(velocity);
-  TANDEM_SAME(angular_velocity); TANDEM_SAME(center); };
+  TANDEM_SAME(angular_velocity); TANDEM_SAME(centre); };
 struct Same_tandem_impact { using Ours = Impact; using Theirs = tandem_impact; TANDEM_SAME_SIZE(); TANDEM_SAME(t_safe); TANDEM_SAME(gap);
   TANDEM_SAME(point_a); TANDEM_SAME(point_b); TANDEM_SAME(triangle_a); TANDEM_SAME(triangle_b); TANDEM_SAME(face_a); TANDEM_SAME(face_b);
   TANDEM_SAME(status); };

@@ -11,7 +11,7 @@ True
 from typing import Any as _Any
 
 from . import _tandem
-from ._arrays import instances
+from ._arrays import instances, rotations
 from ._asset import Asset, Level, Part
 from ._build import BuildReport, Mesh, build, read_mesh
 from ._errors import Error, FileError
@@ -50,5 +50,5 @@ __all__ = [
     "APART", "CONTACT", "CONTAINMENT", "DISTANCE", "FIXED", "FORMER", "GOES_THROUGH", "IMPACT", "IMPACT_AT_START", "IMPACT_IN_STEP", "INSIDE", "INSTANCE",
     "KINEMATIC", "MANIFOLD", "MOTION", "MOVING", "NO_IMPACT", "NO_INDEX", "OPEN_CURVE", "OUTER_OPEN", "PAIR", "POINT", "SLEEPING", "TOUCH", "TOUCHING", "VERDICT",
     "WITHIN_TOLERANCE", "Asset", "BuildReport", "Contacts", "Contained", "Counters", "Distances", "Error", "FileError", "Filter", "Impacts", "Level", "Manifolds", "Mesh",
-    "Part", "Scene", "Verdicts", "build", "instances", "read_mesh", "view",
+    "Part", "Scene", "Verdicts", "build", "instances", "read_mesh", "rotations", "view",
 ]

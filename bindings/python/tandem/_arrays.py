@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from ._rows import INSTANCE, PAIR
 
-__all__ = ["Rows", "instances"]
+__all__ = ["Rows", "instances", "rotations"]
 
 #: An array of rows, such as INSTANCE.
 Rows = npt.NDArray[np.void]
@@ -150,13 +150,47 @@ def pairs_of(value: npt.ArrayLike | Rows | None, name: str = "pairs") -> Rows | 
     return array.view(PAIR).reshape(-1)
 
 
+def rotations(*, xyzw: npt.ArrayLike | None = None, wxyz: npt.ArrayLike | None = None) -> npt.NDArray[np.float64]:
+    """Rotation matrices of quaternions, whose length does not matter. Libraries order their four numbers in two ways, so the call says which.
+
+    Args:
+        xyzw: (4,) or (n, 4), the real part last, as in SciPy, ROS, glTF, Bullet and Newton.
+        wxyz: (4,) or (n, 4), the real part first, as in MuJoCo, Eigen's constructor and trimesh. One of the two is given.
+
+    Returns:
+        (3, 3) or (n, 3, 3), as `rotation` takes them.
+
+    Raises:
+        ValueError: a quaternion that is zero or not finite.
+
+    >>> tandem.rotations(xyzw=[0, 0, 1, 1]).round(9).tolist()
+    [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    """
+    if (xyzw is None) == (wxyz is None):
+        raise TypeError("quaternions are given as xyzw or as wxyz")
+    name, value = ("xyzw", xyzw) if wxyz is None else ("wxyz", wxyz)
+    given = floats(np.empty(0) if value is None else value, name, 4)
+    largest = np.abs(given).max(axis=-1, keepdims=True, initial=0)  # first, so that no square overflows
+    bad = ~np.isfinite(given).all(axis=-1) | (largest[..., 0] == 0)
+    if bad.any():
+        where = f"row {int(np.flatnonzero(bad)[0])}" if bad.ndim else "it"
+        raise ValueError(f"{name}: {where} is no rotation: zero, or not finite")
+    scaled = (given if wxyz is None else given[..., [1, 2, 3, 0]]) / largest
+    x, y, z, w = np.moveaxis(scaled / np.linalg.norm(scaled, axis=-1, keepdims=True), -1, 0)
+    rows = [[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
 def instances(asset: npt.ArrayLike = 0, rotation: Rotations | None = None, translation: npt.ArrayLike | None = None,
               transform: npt.ArrayLike | None = None) -> Rows:
     """Bodies, posed: one for each row of the longest argument; an argument without rows, or with one, is that of all.
 
     Args:
         asset: place in the scene's list of assets, () or (n,).
-        rotation: (3, 3) or (n, 3, 3), or what gives that by `as_matrix()`, such as scipy's Rotation; the identity where it is not given.
+        rotation: (3, 3) or (n, 3, 3), or what gives that by `as_matrix()`, such as scipy's Rotation; the identity where it is not given. `tandem.rotations`
+            makes it of quaternions.
         translation: (3,) or (n, 3), in the assets' unit; 0 where it is not given.
         transform: (4, 4) or (n, 4, 4) instead of both; the last row is 0, 0, 0, 1.
 
@@ -178,23 +212,25 @@ def instances(asset: npt.ArrayLike = 0, rotation: Rotations | None = None, trans
             wrong = ~(np.abs(last - _LAST_ROW).max(axis=-1) <= 1e-6)
             if wrong.any():
                 raise ValueError(f"transform: the last row of matrix {int(np.flatnonzero(wrong)[0])} is not 0, 0, 0, 1")
-        rotations, translations = matrices[..., :3, :3], matrices[..., :3, 3]
+        matrices, translations = matrices[..., :3, :3], matrices[..., :3, 3]
     else:
         as_matrix = getattr(rotation, "as_matrix", None)
         given: Any = as_matrix() if callable(as_matrix) else rotation
-        rotations = _IDENTITY if given is None else floats(given, "rotation", 3, 3)
+        if given is not None and (shape := _array(given, "rotation", "numbers").shape)[-1:] == (4,):
+            raise ValueError(f"rotation has shape {shape} where (3, 3) or (n, 3, 3) is wanted; tandem.rotations makes these of quaternions")
+        matrices = _IDENTITY if given is None else floats(given, "rotation", 3, 3)
         translations = _ORIGIN if translation is None else floats(translation, "translation", 3)
     numbers = whole_numbers(asset, "asset", wanted="places in the scene's list of assets, whole numbers,")
     if numbers.ndim > 1:
         raise ValueError(f"asset has shape {numbers.shape} where () or (n,) is wanted")
     counts = {name: len(array) for name, array, one in
-              (("asset", numbers, 0), ("transform" if transform is not None else "rotation", rotations, 2), ("translation", translations, 1))
+              (("asset", numbers, 0), ("transform" if transform is not None else "rotation", matrices, 2), ("translation", translations, 1))
               if array.ndim > one and len(array) != 1}
     if len(set(counts.values())) > 1:
         raise ValueError("different numbers of rows: " + ", ".join(f"{name} {count}" for name, count in counts.items()))
     made = np.zeros(next(iter(counts.values()), 1), INSTANCE)
     made["asset"] = numbers
-    made["rotation"] = rotations
+    made["rotation"] = matrices
     made["translation"] = translations
     return made
 

@@ -27,7 +27,7 @@ DISTANCE = np.dtype([("lower", "<f8"), ("upper", "<f8"), ("point_a", "<f8", (3,)
 #: Triangles of a pair of bodies that were nearest a step ago.
 FORMER = np.dtype([("a", "<u4"), ("b", "<u4"), ("triangle_a", "<u4"), ("triangle_b", "<u4")])
 #: The centre goes straight ahead and the body turns about it, both at constant speed.
-MOTION = np.dtype([("velocity", "<f8", (3,)), ("angular_velocity", "<f8", (3,)), ("center", "<f8", (3,))])
+MOTION = np.dtype([("velocity", "<f8", (3,)), ("angular_velocity", "<f8", (3,)), ("centre", "<f8", (3,))])
 #: Says until when two moving bodies surely do not meet (docs/impact.md).
 IMPACT = np.dtype([("t_safe", "<f8"), ("gap", "<f8"), ("point_a", "<f8", (3,)), ("point_b", "<f8", (3,)), ("triangle_a", "<u4"), ("triangle_b",
         "<u4"), ("face_a", "<u4"), ("face_b", "<u4"), ("status", "u1"), ("reserved", "u1", (7,))])

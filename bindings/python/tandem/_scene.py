@@ -204,7 +204,9 @@ class Scene:
     @property
     def instances(self) -> Rows:
         """The bodies by number, a copy, array of INSTANCE. Removed ones have the asset NO_INDEX."""
-        return _frombuffer(self._core.instances(), INSTANCE)
+        bodies = _frombuffer(self._core.instances(), INSTANCE)
+        bodies["reserved"] = 0  # padding in C++, which holds whatever was in memory
+        return bodies
 
     def place(self, instances: Rows | None = None, *, filter: Filter | None = None, asset: npt.ArrayLike | None = None, rotation: Rotations | None = None,
               translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None) -> Scene:
@@ -373,7 +375,7 @@ class Scene:
         >>> motion = np.zeros(2, tandem.MOTION)
         >>> motion["velocity"][1] = [-1, 0, 0]
         >>> motion["angular_velocity"][1] = [1, 0, 0]
-        >>> motion["center"] = translation = [[0, 0, 0], [1.5, 0, 0]]
+        >>> motion["centre"] = translation = [[0, 0, 0], [1.5, 0, 0]]
         >>> scene.place(translation=translation).impacts(motion, 2.0).impacts["t_safe"].round(3).tolist()
         [0.5]
         """

@@ -63,7 +63,7 @@ class CollisionPipeline:
         body = values("shape_body")[self.shapes]
         self._body, self._is_static = np.maximum(body, 0), body < 0
         transform = values("shape_transform").astype(np.float64)[self.shapes]
-        self._in_body = _rotations(transform), transform[:, :3]
+        self._in_body = tandem.rotations(xyzw=transform[:, 3:]), transform[:, :3]
         self._margin = values("shape_margin").astype(np.float64)[self.shapes]
         self.assets, asset = _assets_of(model, self.shapes, effort)  #: of the meshes that these shapes have, at their scales
         self.instances = np.zeros(len(self.shapes), tandem.INSTANCE)  #: the shapes, posed as in the last call
@@ -92,7 +92,7 @@ class CollisionPipeline:
         poses: Any = state.body_q
         body = poses.numpy().astype(np.float64)[self._body]
         body[self._is_static] = 0, 0, 0, 0, 0, 0, 1
-        rotation, inner = _rotations(body), self._in_body
+        rotation, inner = tandem.rotations(xyzw=body[:, 3:]), self._in_body
         self.instances["rotation"] = rotation @ inner[0]
         self.instances["translation"] = np.einsum("nij,nj->ni", rotation, inner[1]) + body[:, :3]
         touches = Touches(self._scene, self.instances, self.most_points, self._asked)
@@ -107,13 +107,6 @@ class CollisionPipeline:
             sides.append((self.shapes[i][near], point[near], offset[near], margin[near]))
         _append(contacts, sides, touches.normal[near])
         return int(near.sum())
-
-
-def _rotations(transforms: _Array) -> _Array:
-    """Returns the rotations of transforms x, y, z and quaternion x, y, z, w, whose length float32 has rounded: orthonormal to float64."""
-    x, y, z, w = (transforms[:, 3:] / np.linalg.norm(transforms[:, 3:], axis=1, keepdims=True)).T
-    return np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), 2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
-                     2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], axis=1).reshape(-1, 3, 3)
 
 
 def _assets_of(model: newton.Model, shapes: npt.NDArray[np.intp], effort: _Effort) -> tuple[list[tandem.Asset], list[int]]:

@@ -115,15 +115,8 @@ def _states(path: pathlib.Path, file: Any, count: int) -> tuple[NDArray[np.int64
     if "trajectory" not in file:
         raise ValueError(f"{path}: keeps no state: simulate with --trajectory")
     steps = file["trajectory/frame"][:].astype(np.int64)
-    rotation = _of_quaternions(_dataset(path, file, "trajectory/orientation", len(steps), count, 4))
-    center = _dataset(path, file, "bodies/center_of_mass", count, 3)
+    quaternions = _dataset(path, file, "trajectory/orientation", len(steps), count, 4)
+    rotation = tandem.rotations(wxyz=quaternions.reshape(-1, 4)).reshape(len(steps), count, 3, 3)
+    centre = _dataset(path, file, "bodies/centre_of_mass", count, 3)
     position = _dataset(path, file, "trajectory/position", len(steps), count, 3)
-    return steps, rotation, position - np.einsum("knij,nj->kni", rotation, center)
-
-
-def _of_quaternions(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
-    w, x, y, z = np.moveaxis(quaternions, -1, 0)
-    rows = [[w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z]]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+    return steps, rotation, position - np.einsum("knij,nj->kni", rotation, centre)

@@ -20,7 +20,7 @@ inline RelativePose without_slack(const double (&rotation)[3][3], const double (
 TANDEM_HD inline bool overlap_aligned(const Box& a, const Box& b) {
   bool overlap = true;
   for (int k = 0; k < 3; ++k) {
-    overlap = overlap && std::fabs(a.center[k] - b.center[k]) <= a.half_extent[k] + b.half_extent[k];
+    overlap = overlap && std::fabs(a.centre[k] - b.centre[k]) <= a.half_extent[k] + b.half_extent[k];
   }
   return overlap;
 }

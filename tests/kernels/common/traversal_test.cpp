@@ -238,8 +238,8 @@ TEST(BlockPair, EveryWayGivesTheSameMask) {
     ASSERT_EQ(relative_pose(random.pose(scale), extent_of(a), random.pose(scale), extent_of(b), pose),
               RelativePoseStatus::kOk);
     if (i % 4 == 0) {  // what no checked file holds, too
-      spoil(random, &a.center[0][0], 24);
-      spoil(random, &b.center[0][0], 24);
+      spoil(random, &a.centre[0][0], 24);
+      spoil(random, &b.centre[0][0], 24);
       spoil(random, &pose.rotation[0][0], sizeof pose / sizeof(float));
     }
     const unsigned expected = block_pair_mask(a, b, pose);

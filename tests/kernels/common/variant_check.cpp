@@ -29,7 +29,7 @@ class SmallTree {
     const std::uint64_t leaf_blocks = 1 + random.below(kNodesPerBlock);
     blocks_.resize(1 + leaf_blocks);
     double middle[3];
-    for (double& x : middle) x = random.symmetric(scale.center);
+    for (double& x : middle) x = random.symmetric(scale.centre);
     for (std::uint32_t block = 1; block <= leaf_blocks; ++block) {
       const std::uint64_t leaves = block < leaf_blocks ? kNodesPerBlock : 1 + random.below(kNodesPerBlock);
       for (int node = 0; node < kNodesPerBlock; ++node) {

@@ -59,7 +59,7 @@ bool place(RandomPoses& random, const Side& a, Side& b, int which, double gap) {
   const Real length = std::sqrt(along[0] * along[0] + along[1] * along[1] + along[2] * along[2]);
   if (length < 1e-12L) return false;
   Real reach = 0, aside_along = 0;
-  Direction aside{}, center_a{}, center_b{};
+  Direction aside{}, centre_a{}, centre_b{};
   for (Real& x : along) x /= length;
   for (int j = 0; j < 3; ++j) {
     const Direction of_a = column(a.pose, j), of_b = column(b.pose, j);
@@ -69,8 +69,8 @@ bool place(RandomPoses& random, const Side& a, Side& b, int which, double gap) {
     for (int k = 0; k < 3; ++k) {
       on_a += along[k] * of_a[k];
       on_b += along[k] * of_b[k];
-      center_a[k] += of_a[k] * 0.5L * (static_cast<Real>(a.hi[j]) + a.lo[j]);
-      center_b[k] += of_b[k] * 0.5L * (static_cast<Real>(b.hi[j]) + b.lo[j]);
+      centre_a[k] += of_a[k] * 0.5L * (static_cast<Real>(a.hi[j]) + a.lo[j]);
+      centre_b[k] += of_b[k] * 0.5L * (static_cast<Real>(b.hi[j]) + b.lo[j]);
       aside[k] += of_a[k] * half_a * random.symmetric(0.4) + of_b[k] * half_b * random.symmetric(0.4);
     }
     reach += half_a * std::fabs(on_a) + half_b * std::fabs(on_b);
@@ -78,7 +78,7 @@ bool place(RandomPoses& random, const Side& a, Side& b, int which, double gap) {
   for (int k = 0; k < 3; ++k) aside_along += aside[k] * along[k];
   for (int k = 0; k < 3; ++k) {
     const Real moved = along[k] * (reach + gap - aside_along) + aside[k];
-    b.pose.translation[k] = static_cast<double>(a.pose.translation[k] + center_a[k] + moved - center_b[k]);
+    b.pose.translation[k] = static_cast<double>(a.pose.translation[k] + centre_a[k] + moved - centre_b[k]);
   }
   return true;
 }
@@ -150,7 +150,7 @@ bool make_contact(RandomPoses& random, const Scale& scale, Trial& trial) {
   const auto which = static_cast<int>(random.below(8));
   const Point p = a.corner(which);
   for (double& t : b.pose.translation) t = 0;
-  for (int k = 0; k < 3; ++k) b.pose.translation[k] = p[k] + random.symmetric(scale.size + scale.center);
+  for (int k = 0; k < 3; ++k) b.pose.translation[k] = p[k] + random.symmetric(scale.size + scale.centre);
   Position middle;
   double ulp = 0;
   for (int k = 0; k < 3; ++k) {

@@ -80,7 +80,7 @@ struct Framed {
     error = in_range ? frame_error(b_in_a, extent_a, extent_b) : INFINITY;
     for (int i = 0; i < 3; ++i) {
       std::copy_n(s.a[i], 3, a[i].x);
-      for (int k = 0; k < 3; ++k) b[i].x[k] = box_terms::posed_center(b_in_a, k, s.b[i]);
+      for (int k = 0; k < 3; ++k) b[i].x[k] = box_terms::posed_centre(b_in_a, k, s.b[i]);
       apply(s.pose_a, s.a[i][0], s.a[i][1], s.a[i][2], posed.a[i]);
       apply(s.pose_b, s.b[i][0], s.b[i][1], s.b[i][2], posed.b[i]);
     }

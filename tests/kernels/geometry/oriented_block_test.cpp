@@ -125,8 +125,8 @@ Real length(const float (&vertex)[3]) {
                    static_cast<Real>(vertex[2]) * vertex[2]);
 }
 
-void random_vertex(RandomPoses& random, const Scale& scale, const Direction& center, float (&vertex)[3]) {
-  for (int i = 0; i < 3; ++i) vertex[i] = static_cast<float>(center[i] + random.symmetric(scale.size));
+void random_vertex(RandomPoses& random, const Scale& scale, const Direction& centre, float (&vertex)[3]) {
+  for (int i = 0; i < 3; ++i) vertex[i] = static_cast<float>(centre[i] + random.symmetric(scale.size));
 }
 
 TEST(BlockBox, ContainsItsVerticesAndReachesNoFartherThanTheProofSays) {
@@ -137,15 +137,15 @@ TEST(BlockBox, ContainsItsVerticesAndReachesNoFartherThanTheProofSays) {
     const BlockRotation rotation = packed(random_quaternion(random));
     const ScaledRotation scaled = scaled_rotation(rotation);
     const BlockFrame frame = any_frame_of(rotation, random);
-    Direction center;
-    for (Real& x : center) x = random.symmetric(scale.center);
+    Direction centre;
+    for (Real& x : centre) x = random.symmetric(scale.centre);
     float vertex[4][3];
     const auto count = 1 + random.below(4);
     Real farthest = 0;
     const Direction axis = axes_of(frame)[0];
     const Real on_axis = random.below(4) == 0 ? random.symmetric(scale.size) : 0;  // reaches farthest
     for (std::uint64_t v = 0; v < count; ++v) {
-      random_vertex(random, scale, center, vertex[v]);
+      random_vertex(random, scale, centre, vertex[v]);
       for (int i = 0; i < 3 && on_axis != 0; ++i) vertex[v][i] = static_cast<float>(axis[i] * on_axis);
       farthest = std::max(farthest, length(vertex[v]));
     }
@@ -185,12 +185,12 @@ bool relate(RandomPoses& random, const Scale& scale, Poses& out) {
   for (TreeExtent* extent : {&out.a, &out.b}) {
     for (int k = 0; k < 3; ++k) {
       extent->half_extent[k] = random.uniform(0, scale.size);
-      extent->reach[k] = extent->half_extent[k] + random.uniform(0, scale.center);
+      extent->reach[k] = extent->half_extent[k] + random.uniform(0, scale.centre);
     }
   }
   Pose a = random.pose(scale), b = random.pose(scale);
   for (int k = 0; k < 3; ++k)
-    b.translation[k] = a.translation[k] + random.symmetric(2 * (scale.size + scale.center));
+    b.translation[k] = a.translation[k] + random.symmetric(2 * (scale.size + scale.centre));
   return relative_pose(a, out.a, b, out.b, out.b_in_a) == RelativePoseStatus::kOk;
 }
 
@@ -277,7 +277,7 @@ TEST(OrientedSlack, IsSomeMillionthsOfTheReachAtOrdinaryPoses) {
   for (int i = 0; i < 100'000; ++i) {
     Scale scale;
     scale.size = std::exp2(random.uniform(-40, 40));
-    scale.center = scale.translation = scale.size;
+    scale.centre = scale.translation = scale.size;
     Poses poses;
     ASSERT_TRUE(relate(random, scale, poses));
     double reach_a = 0, reach_b = 0, t = 0;
@@ -296,7 +296,7 @@ TEST(OrientedSlack, IsSomeMillionthsOfTheReachAtOrdinaryPoses) {
 }
 
 TEST(OrientedBlocks, ImaginaryOnesOverlapNothing) {
-  constexpr Box kImaginary = {{kImaginaryCenter, kImaginaryCenter, kImaginaryCenter},
+  constexpr Box kImaginary = {{kImaginaryCentre, kImaginaryCentre, kImaginaryCentre},
                               {kImaginaryHalfExtent, kImaginaryHalfExtent, kImaginaryHalfExtent}};
   RandomPoses random(7);
   std::uint64_t with_zeros = 0;

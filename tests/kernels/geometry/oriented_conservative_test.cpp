@@ -79,7 +79,7 @@ void enclose_vertices(RandomPoses& random, Body& body) {
       const double at = along_axis(body.rotation, k, x);
       lowest = std::min(lowest, at), highest = std::max(highest, at);
     }
-    box_along(lowest, highest, std::sqrt(squared), body.box.center[k], body.box.half_extent[k]);
+    box_along(lowest, highest, std::sqrt(squared), body.box.centre[k], body.box.half_extent[k]);
   }
 }
 
@@ -123,19 +123,19 @@ bool overlap(const Trial& trial) {
 
 // Vertices at the two corners of a box that lie farthest along a direction of the world, and some within.
 void fill(RandomPoses& random, const Scale& scale, const Direction& along, Body& body) {
-  Direction center, half, corner[2];
+  Direction centre, half, corner[2];
   for (int k = 0; k < 3; ++k) {
-    center[k] = random.symmetric(scale.center);
+    centre[k] = random.symmetric(scale.centre);
     half[k] = random.below(8) == 0 ? 0 : random.uniform(0, scale.size) * (random.below(4) == 0 ? 1e-3 : 1);
     const Real to = dot(body.posed_axis(k), along) < 0 ? -half[k] : half[k];
-    corner[0][k] = center[k] - to;
-    corner[1][k] = center[k] + to;
+    corner[0][k] = centre[k] - to;
+    corner[1][k] = centre[k] + to;
   }
   add_vertex(body, corner[0]);
   add_vertex(body, corner[1]);
   for (auto more = random.below(3); more > 0; --more) {
     Direction inner;
-    for (int k = 0; k < 3; ++k) inner[k] = center[k] + half[k] * random.symmetric(1);
+    for (int k = 0; k < 3; ++k) inner[k] = centre[k] + half[k] * random.symmetric(1);
     add_vertex(body, inner);
   }
   enclose_vertices(random, body);
@@ -223,7 +223,7 @@ bool make_contact(RandomPoses& random, const Scale& scale, int which, Trial& tri
   const Point& p = points_a[1];  // the farthest of a
   for (int k = 0; k < 3; ++k)
     b.pose.translation[k] =
-        p[k] + random.symmetric(random.below(2) == 0 ? scale.size : scale.size + scale.center);
+        p[k] + random.symmetric(random.below(2) == 0 ? scale.size : scale.size + scale.centre);
   std::array<double, 3> middle;
   double ulp = 0;
   for (int k = 0; k < 3; ++k) {

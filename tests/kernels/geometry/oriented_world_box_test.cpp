@@ -21,7 +21,7 @@ struct OrientedBody {
 
 void set_imaginary(OrientedBlock& block, int node) {
   for (int k = 0; k < 3; ++k) {
-    block.center[k][node] = kImaginaryCenter;
+    block.centre[k][node] = kImaginaryCentre;
     block.half_extent[k][node] = kImaginaryHalfExtent;
   }
 }
@@ -50,7 +50,7 @@ void enclose_vertices(OrientedBody& body, const BlockRotation& rotation) {
       const double at = along_axis(scaled, k, x);
       lowest = std::min(lowest, at), highest = std::max(highest, at);
     }
-    box_along(lowest, highest, std::sqrt(squared), body.block.center[k][0], body.block.half_extent[k][0]);
+    box_along(lowest, highest, std::sqrt(squared), body.block.centre[k][0], body.block.half_extent[k][0]);
   }
   body.block.rotation = rotation;
   body.block.size = oriented_size(body.block);
@@ -68,12 +68,12 @@ BlockRotation any_rotation(RandomPoses& random) {
 
 OrientedBody any_body(RandomPoses& random, const Scale& scale) {
   OrientedBody body;
-  std::array<double, 3> center;
-  for (double& x : center) x = random.symmetric(scale.center);
+  std::array<double, 3> centre;
+  for (double& x : centre) x = random.symmetric(scale.centre);
   for (auto count = 1 + random.below(4); count > 0; --count) {
     auto& vertex = body.vertices.emplace_back();
     for (std::size_t k = 0; k < 3; ++k)
-      vertex[k] = static_cast<float>(center[k] + (random.below(4) == 0 ? 0 : random.symmetric(scale.size)));
+      vertex[k] = static_cast<float>(centre[k] + (random.below(4) == 0 ? 0 : random.symmetric(scale.size)));
   }
   enclose_vertices(body, any_rotation(random));
   return body;
@@ -111,7 +111,7 @@ TEST(OrientedWorldBox, NeedsItsMarginAndNoMore) {
     for (int k = 0; k < 3; ++k) {
       const double size = std::exp2(random.uniform(-3, 3));
       const double c = std::floor(random.symmetric(0x1p10 * size)), h = std::floor(random.uniform(0, 0x1p10));
-      block.center[k][0] = static_cast<float>(c);
+      block.centre[k][0] = static_cast<float>(c);
       block.half_extent[k][0] = static_cast<float>(h);
       corner[k] = random.below(2) == 0 ? c - h : c + h;
       squared += (std::fabs(c) + h) * (std::fabs(c) + h);

@@ -90,7 +90,7 @@ TEST_F(Impacts, ASpinningPlateStrikesWhereItsCircleMeetsTheWall) {
   EXPECT_NEAR(found.t_safe, std::asin(0.9) / 2, 1e-5);
 }
 
-TEST_F(Impacts, TurningAboutACenterElsewhereIsAnOrbit) {
+TEST_F(Impacts, TurningAboutACentreElsewhereIsAnOrbit) {
   // A cube at x = 2 goes round the origin; another one is a quarter of a turn ahead.
   const Pose ahead = at(0, 2, 0);
   const double quarter = std::numbers::pi / 2;
@@ -228,7 +228,7 @@ TEST_P(ImpactFamilies, NothingTouchesUntilTSafeAndThenTheGapIsWhatIsTold) {
     ImpactChecker(moves).check(impact, random, test::trials(100, 10));
     found += impact.status == ImpactStatus::found;
     none += impact.status == ImpactStatus::none;
-    const double far = std::fabs(impact.point_a[0]) + std::fabs(moves.motion[0].center[0]);
+    const double far = std::fabs(impact.point_a[0]) + std::fabs(moves.motion[0].centre[0]);
     near += impact.status == ImpactStatus::found && impact.gap <= 1.1e-6 * moves.diagonal() + 1e-14 * far;
     if (HasFailure()) ADD_FAILURE() << "motion " << i << "\n" << text(moves.scene);
   }

@@ -72,7 +72,7 @@ inline MovingScene moving_crowd(std::uint64_t seed, int count) {
     for (int k = 0; k < 3; ++k) {
       motion.velocity[k] = random.symmetric(3);
       motion.angular_velocity[k] = random.symmetric(4);
-      motion.center[k] = instance.pose.translation[k] + random.symmetric(0.5);
+      motion.centre[k] = instance.pose.translation[k] + random.symmetric(0.5);
     }
     moves.motion.push_back(motion);
   }
@@ -130,7 +130,7 @@ class ImpactChecker {
     double size = 0, apart = 0;
     for (int k = 0; k < 3; ++k) {
       size += std::fabs(found.point_a[k]) + std::fabs(first.velocity[k] * moves_.duration) +
-              std::fabs(first.center[k]) + moves_.diagonal();
+              std::fabs(first.centre[k]) + moves_.diagonal();
       apart += std::pow(found.point_a[k] - found.point_b[k], 2);
     }
     const double rounding = 1e-11 * size;
@@ -177,7 +177,7 @@ inline RigidMotion random_motion(RandomPoses& random, const Pose& pose, double s
   for (int k = 0; k < 3; ++k) {
     motion.velocity[k] = random.symmetric(speed);
     motion.angular_velocity[k] = random.symmetric(spin);
-    motion.center[k] = pose.translation[k] + random.symmetric(arm);
+    motion.centre[k] = pose.translation[k] + random.symmetric(arm);
   }
   return motion;
 }
@@ -249,7 +249,7 @@ inline const MotionFamily kMotionFamilies[] = {
        for (std::size_t i = 0; i < 2; ++i) {
          for (int k = 0; k < 3; ++k) {
            moves.scene.instances[i].pose.translation[k] += far;
-           moves.motion[i].center[k] += far;
+           moves.motion[i].centre[k] += far;
          }
        }
        return moves;
@@ -286,7 +286,7 @@ inline const MotionFamily kMotionFamilies[] = {
        for (std::size_t i = 0; i < 2; ++i) {
          for (int k = 0; k < 3; ++k) {
            moves.scene.instances[i].pose.translation[k] *= size;
-           moves.motion[i].center[k] *= size;
+           moves.motion[i].centre[k] *= size;
            moves.motion[i].velocity[k] *= size / moves.duration;
            moves.motion[i].angular_velocity[k] /= moves.duration;
          }

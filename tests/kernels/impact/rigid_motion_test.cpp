@@ -23,7 +23,7 @@ std::array<long double, 3> moved(const Pose& start, const RigidMotion& motion, c
   long double axis[3], arm[3], angle = 0, along = 0;
   for (int k = 0; k < 3; ++k) {
     axis[k] = t * motion.angular_velocity[k];
-    arm[k] = static_cast<long double>(x[k]) - motion.center[k];
+    arm[k] = static_cast<long double>(x[k]) - motion.centre[k];
     angle += axis[k] * axis[k];
   }
   angle = std::sqrt(angle);
@@ -31,7 +31,7 @@ std::array<long double, 3> moved(const Pose& start, const RigidMotion& motion, c
   std::array<long double, 3> out;
   for (int k = 0; k < 3; ++k) {
     const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
-    out[k] = motion.center[k] + t * motion.velocity[k] + std::cos(angle) * arm[k] +
+    out[k] = motion.centre[k] + t * motion.velocity[k] + std::cos(angle) * arm[k] +
              std::sin(angle) * (axis[k1] * arm[k2] - axis[k2] * arm[k1]) +
              (1 - std::cos(angle)) * along * axis[k];
   }
@@ -47,7 +47,7 @@ TEST(RigidMotions, PosesAreWhereTheMotionTakesThem) {
     double reach = 0, p[3];
     for (int k = 0; k < 3; ++k) {
       start.translation[k] = random.symmetric(far);
-      motion.center[k] = start.translation[k] + random.symmetric(2);
+      motion.centre[k] = start.translation[k] + random.symmetric(2);
       motion.velocity[k] = random.symmetric(far);
       motion.angular_velocity[k] = random.symmetric(turn / 2);
       p[k] = random.symmetric(1);
@@ -64,7 +64,7 @@ TEST(RigidMotions, PosesAreWhereTheMotionTakesThem) {
                             turned = {motion.angular_velocity[0], motion.angular_velocity[1],
                                       motion.angular_velocity[2]};
     EXPECT_LE(static_cast<double>(std::sqrt(error)),
-              pose_error(start, std::sqrt(reach), motion.center, displacement, turned));
+              pose_error(start, std::sqrt(reach), motion.centre, displacement, turned));
   }
 }
 
@@ -76,15 +76,15 @@ TEST(RigidMotions, NoPointLeavesTheSweptBox) {
     RigidMotion motion;
     const double spin = std::pow(10, random.uniform(-3, 1.5));
     for (int k = 0; k < 3; ++k) {
-      motion.center[k] = start.translation[k] + random.symmetric(2);
+      motion.centre[k] = start.translation[k] + random.symmetric(2);
       motion.velocity[k] = random.symmetric(5);
       motion.angular_velocity[k] = random.below(3) == 0 ? 0 : random.symmetric(spin);
     }
     const auto vector = [](const double* x) { return manifold::Vector3{x[0], x[1], x[2]}; };
     const auto turn = vector(motion.angular_velocity), displacement = vector(motion.velocity);
-    const double fastest = fastest_turn(start, lower, upper, motion.center, turn);
+    const double fastest = fastest_turn(start, lower, upper, motion.centre, turn);
     const WorldBox swept = swept_box(world_box(start, lower, upper), displacement, turn, fastest,
-                                     pose_error(start, 4, motion.center, displacement, turn));
+                                     pose_error(start, 4, motion.centre, displacement, turn));
     for (int step = 0; step <= 20; ++step) {
       for (int corner = 0; corner < 8; ++corner) {
         double x[3];
@@ -140,7 +140,7 @@ MovingTriangle triangle_above(RandomPoses& random, const double (&n)[3], double 
   }
   for (int k = 0; k < 3; ++k) {
     out.motion.angular_velocity[k] = bends ? spin[k] - along * n[k] : spin[k];
-    out.motion.center[k] = out.pose.translation[k] - (bends ? arm * n[k] : random.symmetric(1));
+    out.motion.centre[k] = out.pose.translation[k] - (bends ? arm * n[k] : random.symmetric(1));
   }
   const double size = std::pow(10, random.uniform(-4, 0));
   for (int c = 0; c < 3; ++c) {

@@ -199,8 +199,9 @@ TEST(BodyOnTwoFeet, TheFootThatHardlyTouchesIsNoDeeperThanRounding) {
           const Vector3 from_middle = vector_of(m.centre) - apply(motion, Vector3{0, 0, top});
           if (dot(of_second, from_middle) < 0) continue;
           EXPECT_LT(m.depth, 1.01 * depth + kRounding) << depth;
-          if (m.depth > kRounding)
+          if (m.depth > kRounding) {
             EXPECT_LT(angle_between(vector_of(m.normal), rotate(motion, {0, 0, 1})), 1 * kDegree) << depth;
+          }
           with_depth += m.depth > 0;
         }
       }

@@ -50,7 +50,7 @@ struct Questions {
     for (std::size_t i = 0; i < motion.size(); ++i) {
       for (double& x : motion[i].velocity) x = random.symmetric(0.5);
       for (double& x : motion[i].angular_velocity) x = random.symmetric(1);
-      std::copy_n(scene.instances()[i].pose.translation, 3, motion[i].center);
+      std::copy_n(scene.instances()[i].pose.translation, 3, motion[i].centre);
     }
     ASSERT_EQ(verdicts.find(scene, {.tolerance = 0.1}), Status::kOk);
     ASSERT_EQ(impacts.find(scene, {.motion = motion, .duration = 0.2}), Status::kOk);

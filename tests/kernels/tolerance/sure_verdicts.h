@@ -71,12 +71,12 @@ inline bool surely_inside(const Point& p, const std::array<Point, 4>& tetrahedro
 
 inline Scale any_scale(RandomPoses& random) {
   constexpr double kSizes[] = {1, 1, 1, 1e-3, 1e3, 0x1p-60, 0x1p60, 0x1p-100, 0x1p-140, 0x1p110};
-  constexpr double kCenters[] = {0, 1, 1, 10, 1e3};
+  constexpr double kCentres[] = {0, 1, 1, 10, 1e3};
   constexpr double kTranslations[] = {0, 1, 1, 1e4, 1e7, 1e12};
   constexpr double kTurns[] = {4, 4, 0, 1e-9, 1e-7, 1e-5, 1e-3};
   Scale scale;
   scale.size = kSizes[random.below(std::size(kSizes))];
-  scale.center = scale.size * kCenters[random.below(std::size(kCenters))];
+  scale.centre = scale.size * kCentres[random.below(std::size(kCentres))];
   scale.translation = scale.size * kTranslations[random.below(std::size(kTranslations))];
   scale.turn = kTurns[random.below(std::size(kTurns))];
   scale.deviation = random.below(3) == 0 ? 1.2e-7 : 0;

@@ -68,9 +68,9 @@ using FclMotion = fcl::InterpMotion<double>;
 /// itself where it turns by less than half a turn.
 std::unique_ptr<FclMotion> fcl_motion(const Pose& start, const Pose& end, const RigidMotion& motion) {
   const fcl::Transform3d from = Fcl::transform(start), to = Fcl::transform(end);
-  const fcl::Vector3d center = from.inverse(Eigen::Isometry) * fcl::Vector3d(motion.center);
+  const fcl::Vector3d centre = from.inverse(Eigen::Isometry) * fcl::Vector3d(motion.centre);
   return std::make_unique<FclMotion>(from.linear(), from.translation(), to.linear(), to.translation(),
-                                     center);
+                                     centre);
 }
 
 /// The trees of a shape, one of them of rectangles swept by spheres.

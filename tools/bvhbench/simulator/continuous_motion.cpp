@@ -93,7 +93,7 @@ double ContinuousMotion::stop_of(const Impact& impact, const ObjectPair& pair, d
   const Vector3d at_a(impact.point_a), at_b(impact.point_b);
   const auto velocity = [&](std::uint32_t body, const Vector3d& at) {
     const RigidMotion& motion = motion_[body];
-    const Vector3d v(motion.velocity), w(motion.angular_velocity), c(motion.center);
+    const Vector3d v(motion.velocity), w(motion.angular_velocity), c(motion.centre);
     return Vector3d(v + w.cross(at - (c + impact.t_safe * v)));
   };
   const Vector3d approach = velocity(pair.a, at_a) - velocity(pair.b, at_b), apart = at_b - at_a;
@@ -152,7 +152,7 @@ bool ContinuousMotion::stop(std::span<const BodyProperties> bodies, std::span<co
     for (int k = 0; k < 3; ++k) {
       motion_[i].velocity[k] = way[k];
       motion_[i].angular_velocity[k] = turn[k];
-      motion_[i].center[k] = before[i].position[k];
+      motion_[i].centre[k] = before[i].position[k];
     }
   }
   filter_.motion = fast_.data();

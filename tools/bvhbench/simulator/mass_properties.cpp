@@ -123,7 +123,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 // A volume below this part of the diagonal's cube is rounding.
-constexpr double kFlat = 1e-13;
+constexpr double kFlatVolume = 1e-13;
 
 // Adds and keeps what each addition rounds off, to add it in the end: Knuth's two-sum, entry by entry.
 template <typename Value>
@@ -206,11 +206,11 @@ Moments integrate(const Surface& surface, const Vector3d& about, const Of& of) {
 // thickness: what a mass per area is multiplied by; 1 of solids.
 MassProperties properties_of(const Moments& moments, const Vector3d& about, const double* origin,
                              double thickness) {
-  const Vector3d center = moments.first / moments.zeroth;
-  const Matrix3d spread = thickness * (moments.second - moments.zeroth * product(center));
+  const Vector3d centre = moments.first / moments.zeroth;
+  const Matrix3d spread = thickness * (moments.second - moments.zeroth * product(centre));
   MassProperties properties;
   properties.volume = thickness * moments.zeroth;
-  properties.center = Vector3d(origin[0], origin[1], origin[2]) + (about + center);
+  properties.centre = Vector3d(origin[0], origin[1], origin[2]) + (about + centre);
   properties.inertia_per_density = spread.trace() * Matrix3d::Identity() - spread;
   return properties;
 }
@@ -254,7 +254,7 @@ MassReport mass_properties(const AssetView& asset) {
   add_findings(surface, report.findings);
   if (surface.closed) {
     const Moments moments = integrate(surface, about, solid_moments);
-    if (moments.zeroth > kFlat * size * size * size) {
+    if (moments.zeroth > kFlatVolume * size * size * size) {
       report.properties = properties_of(moments, about, header.origin, 1);
       return report;
     }

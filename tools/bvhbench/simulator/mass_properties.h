@@ -12,7 +12,7 @@ namespace tandem::simulation {
 /// The mass of a body of density 1, and how it is spread, in the coordinates of the mesh file.
 struct MassProperties {
   double volume;                        ///< mass per density
-  Eigen::Vector3d center;               ///< of mass
+  Eigen::Vector3d centre;               ///< of mass
   Eigen::Matrix3d inertia_per_density;  ///< about the centre of mass, along the file's axes
 };
 

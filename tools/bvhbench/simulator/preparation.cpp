@@ -73,14 +73,14 @@ using bench::FileError;
 using Eigen::Vector3d;
 
 // The distance of the farthest vertex.
-double radius_about(const Vector3d& center, const AssetView& shape) {
+double radius_about(const Vector3d& centre, const AssetView& shape) {
   const LevelView level = shape.level();
   double squared = 0;
   for (const Triangle& triangle : std::span(level.triangles, level.triangle_count)) {
     for (const Triangle::Corner& corner : triangle.corner) {
       Vector3d at;
       for (int k = 0; k < 3; ++k) at[k] = corner.position[k] + shape.header->origin[k];
-      squared = std::max(squared, (at - center).squaredNorm());
+      squared = std::max(squared, (at - centre).squaredNorm());
     }
   }
   return std::sqrt(squared);
@@ -118,7 +118,7 @@ class Shapes {
     BodyProperties body;
     body.shape = shape;
     body.motion = Motion::fixed;
-    body.radius = radius_about(body.center, shapes_[shape]);
+    body.radius = radius_about(body.centre, shapes_[shape]);
     return body;
   }
 
@@ -127,7 +127,7 @@ class Shapes {
       const MassReport report = mass_properties(finest_[shape]);
       for (const std::string& finding : report.findings) findings.push_back(names_[shape] + ": " + finding);
       BodyProperties body = body_properties(shape, report.properties, 1);
-      body.radius = radius_about(body.center, shapes_[shape]);
+      body.radius = radius_about(body.centre, shapes_[shape]);
       return body;
     } catch (const std::runtime_error& impossible) {
       throw FileError(names_[shape] + ": " + impossible.what());

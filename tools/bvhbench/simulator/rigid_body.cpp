@@ -54,7 +54,7 @@ BodyProperties body_properties(std::uint32_t shape, const MassProperties& mesh, 
   BodyProperties body;
   body.shape = shape;
   body.mass = density * mesh.volume;
-  body.center = mesh.center;
+  body.centre = mesh.centre;
   body.inertia = density * mesh.inertia_per_density;
   body.inverse_inertia = body.inertia.inverse();
   return body;
@@ -62,7 +62,7 @@ BodyProperties body_properties(std::uint32_t shape, const MassProperties& mesh, 
 
 BodyPose pose_of(const BodyProperties& body, const BodyState& state) {
   const Matrix3d rotation = state.orientation.toRotationMatrix();
-  const Vector3d translation = state.position - rotation * body.center;
+  const Vector3d translation = state.position - rotation * body.centre;
   BodyPose pose{body.shape, kIdentityPose};
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) pose.pose.rotation[i][j] = rotation(i, j);
@@ -79,7 +79,7 @@ BodyState state_of(const BodyProperties& body, const Pose& pose) {
   BodyState state;
   state.orientation = Quaterniond(rotation).normalized();
   const Vector3d translation(pose.translation[0], pose.translation[1], pose.translation[2]);
-  state.position = translation + state.orientation.toRotationMatrix() * body.center;
+  state.position = translation + state.orientation.toRotationMatrix() * body.centre;
   return state;
 }
 

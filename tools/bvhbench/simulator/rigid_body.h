@@ -14,7 +14,7 @@ struct BodyProperties {
   Motion motion = Motion::moving;                    ///< never sleeping; a kinematic one keeps its velocities
   double mass = 1;                                   ///< kg; that of a fixed body is not looked at
   double radius = 1;                                 ///< of the shape, about the centre of mass
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< of mass, in the file's coordinates
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< of mass, in the file's coordinates
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Identity();  ///< about the centre, along the file's axes
   Eigen::Matrix3d inverse_inertia = Eigen::Matrix3d::Identity();
 };

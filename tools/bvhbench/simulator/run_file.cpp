@@ -160,7 +160,7 @@ void write_bodies(Hdf5Output& file, const RunDescription& run) {
   if (std::any_of(bodies.begin(), bodies.end(), level)) add_column(file, "/bodies/level", bodies, level);
   add_column(file, "/bodies/motion", bodies, motion);
   add_column(file, "/bodies/mass", bodies, mass);
-  add_column(file, "/bodies/center_of_mass", bodies, &BodyProperties::center);
+  add_column(file, "/bodies/centre_of_mass", bodies, &BodyProperties::centre);
   std::vector<double> inertia;
   for (const BodyProperties& body : bodies)
     inertia.insert(inertia.end(), body.inertia.data(), body.inertia.data() + 9);  // symmetric
@@ -285,9 +285,9 @@ StoredFrame read_frame(const std::string& path, std::uint32_t frame) {
   const Hdf5Input file(path);
   if (!file.has("/trajectory")) throw FileError(path + ": keeps no trajectory; see simulate --trajectory");
   const auto shape = file.read_u32("/bodies/asset");
-  const auto center = file.read_f64("/bodies/center_of_mass", {3});
-  if (center.size() != 3 * shape.size()) {
-    throw FileError(path + ": /bodies/center_of_mass: " + std::to_string(center.size() / 3) + " rows for " +
+  const auto centre = file.read_f64("/bodies/centre_of_mass", {3});
+  if (centre.size() != 3 * shape.size()) {
+    throw FileError(path + ": /bodies/centre_of_mass: " + std::to_string(centre.size() / 3) + " rows for " +
                     std::to_string(shape.size()) + " bodies");
   }
   const Trajectory trajectory = read_trajectory(file, path, shape.size());
@@ -315,7 +315,7 @@ StoredFrame read_frame(const std::string& path, std::uint32_t frame) {
     const std::size_t at = static_cast<std::size_t>(found - kept.begin()) * shape.size() + i;
     BodyProperties body;
     body.shape = shape[i];
-    body.center = Stored<Vector3d>::at(center, i);
+    body.centre = Stored<Vector3d>::at(centre, i);
     BodyState state;
     state.position = Stored<Vector3d>::at(trajectory.position, at);
     state.orientation = Stored<Quaterniond>::at(trajectory.orientation, at);

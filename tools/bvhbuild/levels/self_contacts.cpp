@@ -27,10 +27,10 @@ struct Range {
   // 2^-51 of the magnitudes.
   bool may_meet(const Block& block, int node) const {
     for (int k = 0; k < 3; ++k) {
-      const double center = block.center[k][node], half_extent = block.half_extent[k][node];
-      const double gap = std::max(lower[k] - center, center - upper[k]) - half_extent;
+      const double centre = block.centre[k][node], half_extent = block.half_extent[k][node];
+      const double gap = std::max(lower[k] - centre, centre - upper[k]) - half_extent;
       const double magnitude =
-          std::max(std::fabs(lower[k]), std::fabs(upper[k])) + std::fabs(center) + half_extent;
+          std::max(std::fabs(lower[k]), std::fabs(upper[k])) + std::fabs(centre) + half_extent;
       if (gap > 0x1p-50 * magnitude) return false;
     }
     return true;

@@ -157,7 +157,7 @@ class Fit {
 
   OrientedBlock along_mesh(const Block& block) const {
     OrientedBlock out = {};
-    std::copy_n(&block.center[0][0], 3 * kNodesPerBlock, &out.center[0][0]);
+    std::copy_n(&block.centre[0][0], 3 * kNodesPerBlock, &out.centre[0][0]);
     std::copy_n(&block.half_extent[0][0], 3 * kNodesPerBlock, &out.half_extent[0][0]);
     out.rotation = kNoRotation;
     return out;
@@ -323,7 +323,7 @@ class Fit {
         }
       }
       for (int k = 0; k < 3; ++k)
-        box_along(lowest[k], highest[k], farthest_, out.center[k][node], out.half_extent[k][node]);
+        box_along(lowest[k], highest[k], farthest_, out.centre[k][node], out.half_extent[k][node]);
     }
   }
 
@@ -333,7 +333,7 @@ class Fit {
     bool near = true;
     for (int node = 0; node < nodes_; ++node) {
       for (int k = 0; k < 3; ++k) {
-        near = near && std::abs(double{block.center[k][node]}) + double{block.half_extent[k][node]} <=
+        near = near && std::abs(double{block.centre[k][node]}) + double{block.half_extent[k][node]} <=
                            farthest_ * (1 + 0x1p-20);
       }
     }

@@ -30,8 +30,8 @@ struct Binning {
   float lo = 0, scale = 0;
 
   // Bounds that nearly coincide or lie too far apart for float32 give no finite place; then there is one bin.
-  int bin(float center) const {
-    const float place = (center - lo) * scale;
+  int bin(float centre) const {
+    const float place = (centre - lo) * scale;
     return std::isfinite(place) ? std::clamp(static_cast<int>(place), 0, kBins - 1) : 0;
   }
 };
@@ -113,7 +113,7 @@ void TriangleSplitter::sort(Range range) {
   for_each_axis(range, [&](int axis) {
     std::vector<std::pair<float, std::uint32_t>> keys;
     keys.reserve(triangles.size());
-    for (const std::uint32_t t : triangles) keys.emplace_back(center(t, axis), t);
+    for (const std::uint32_t t : triangles) keys.emplace_back(centre(t, axis), t);
     std::sort(keys.begin(), keys.end());
     std::uint32_t* order = order_[axis].data() + range.begin;
     for (const auto& key : keys) *order++ = key.second;
@@ -179,7 +179,7 @@ void TriangleSplitter::mark_left_side(Range range, const Split& split) {
   }
   std::vector<std::pair<float, std::uint32_t>> keys;
   keys.reserve(range.size());
-  for (const std::uint32_t t : order(range)) keys.emplace_back(center(t, split.axis), t);
+  for (const std::uint32_t t : order(range)) keys.emplace_back(centre(t, split.axis), t);
   std::nth_element(keys.begin(), keys.begin() + split.left, keys.end());
   for (std::uint32_t i = 0; i < range.size(); ++i) goes_left_[keys[i].second] = i < split.left;
 }
@@ -218,12 +218,12 @@ void TriangleSplitter::apply(Range range, const Split& split) {
 // Unions and sums in any order give the same bits, so threads may share the work without changing the result.
 Split TriangleSplitter::best_binned_split(Range range, const IsLegal& is_legal) const {
   const auto triangles = order(range);
-  const Bounds centers = parallel::reduce(
+  const Bounds centres = parallel::reduce(
       triangles.size(), kGrain, Bounds(),
       [&](Bounds& bounds, std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i != end; ++i) {
           for (int k = 0; k < 3; ++k) {
-            const float c = center(triangles[i], k);
+            const float c = centre(triangles[i], k);
             bounds.lo[k] = std::min(bounds.lo[k], c);
             bounds.hi[k] = std::max(bounds.hi[k], c);
           }
@@ -232,15 +232,15 @@ Split TriangleSplitter::best_binned_split(Range range, const IsLegal& is_legal) 
       [](Bounds& sum, const Bounds& other) { sum.grow(other); });
   Binning binning[3];
   for (int k = 0; k < 3; ++k) {
-    const float length = centers.hi[k] - centers.lo[k];
-    binning[k] = {centers.lo[k], length > 0 ? static_cast<float>(kBins) / length : 0};
+    const float length = centres.hi[k] - centres.lo[k];
+    binning[k] = {centres.lo[k], length > 0 ? static_cast<float>(kBins) / length : 0};
   }
   const Bins bins = parallel::reduce(
       triangles.size(), kGrain, Bins(),
       [&](Bins& partial, std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i != end; ++i) {
           for (int k = 0; k < 3; ++k) {
-            Bin& bin = partial[k][binning[k].bin(center(triangles[i], k))];
+            Bin& bin = partial[k][binning[k].bin(centre(triangles[i], k))];
             bin.bounds.grow(bounds_[triangles[i]]);
             ++bin.count;
           }

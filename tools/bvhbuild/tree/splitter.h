@@ -71,7 +71,7 @@ class TriangleSplitter {
   void apply(Range range, const Split& split);
 
  private:
-  float center(std::uint32_t triangle, int axis) const {
+  float centre(std::uint32_t triangle, int axis) const {
     return bounds_[triangle].lo[axis] + bounds_[triangle].hi[axis];
   }
   void sort(Range range);

@@ -45,14 +45,14 @@ SurfaceEdges::SurfaceEdges(std::span<const TriangleTopology> triangles) : edge_(
 
 namespace {
 
-using Vector = std::array<double, 3>;
+using Double3 = std::array<double, 3>;
 
 // These directions have no special slope, since meshes love axes, diagonals and symmetric shapes. All parts
 // are positive.
-constexpr Vector kDirections[] = {{0.7548776662, 0.5698402910, 0.3247179572},
-                                  {0.2955977425, 0.8191725134, 0.4914180613},
-                                  {0.4422495703, 0.1442249570, 0.8851680193},
-                                  {0.5436890127, 0.6477988713, 0.5330099681}};
+constexpr Double3 kDirections[] = {{0.7548776662, 0.5698402910, 0.3247179572},
+                                   {0.2955977425, 0.8191725134, 0.4914180613},
+                                   {0.4422495703, 0.1442249570, 0.8851680193},
+                                   {0.5436890127, 0.6477988713, 0.5330099681}};
 
 // A triple product and whether its sign is that of the exact one.
 struct Sign {
@@ -61,7 +61,7 @@ struct Sign {
 };
 
 // Each product meets seven roundings at most, differences of the corners included, and the sum five more.
-Sign triple_product(const Vector& a, const Vector& b, const Vector& c) {
+Sign triple_product(const Double3& a, const Double3& b, const Double3& c) {
   double value = 0, magnitude = 0;
   for (std::size_t k = 0; k < 3; ++k) {
     const std::size_t l = (k + 1) % 3, m = (k + 2) % 3;
@@ -72,10 +72,10 @@ Sign triple_product(const Vector& a, const Vector& b, const Vector& c) {
 }
 
 // Returns whether a ray from the point meets a box, or might but for roundings.
-bool may_meet(const Block& block, int node, const Vector& from, const Vector& direction) {
+bool may_meet(const Block& block, int node, const Double3& from, const Double3& direction) {
   double first = 0, last = HUGE_VAL;
   for (std::size_t k = 0; k < 3; ++k) {
-    const double c = block.center[k][node], h = block.half_extent[k][node];
+    const double c = block.centre[k][node], h = block.half_extent[k][node];
     const double slack = 0x1p-40 * (std::abs(c) + h + std::abs(from[k]));
     first = std::max(first, ((c - from[k]) - h - slack) / direction[k]);
     last = std::min(last, ((c - from[k]) + h + slack) / direction[k]);
@@ -86,7 +86,7 @@ bool may_meet(const Block& block, int node, const Vector& from, const Vector& di
 enum class Crossing : std::uint8_t { none, in, out, unsure };
 
 // Returns how a ray from 0 crosses a triangle.
-Crossing crossing(const std::array<Vector, 3>& corner, const Vector& direction) {
+Crossing crossing(const std::array<Double3, 3>& corner, const Double3& direction) {
   int positive = 0, negative = 0;
   for (std::size_t k = 0; k < 3; ++k) {
     const Sign side = triple_product(corner[k], corner[(k + 1) % 3], direction);
@@ -112,9 +112,9 @@ class Enclosure {
   // The winding number of the triangles that count around a point, those of the component `own` left out;
   // nothing where the point is so near to a triangle, or rays to edges, that roundings would decide.
   std::optional<int> around(const std::array<float, 3>& point, std::uint32_t own) const {
-    const Vector from = {point[0], point[1], point[2]};
+    const Double3 from = {point[0], point[1], point[2]};
     const auto corners_of = [&](std::uint32_t t) {
-      std::array<Vector, 3> corner;
+      std::array<Double3, 3> corner;
       for (std::size_t i = 0; i < 3; ++i) {
         const auto& p = geometry_.points[geometry_.triangles[tree_.order[t]][i]];
         for (std::size_t k = 0; k < 3; ++k) corner[i][k] = double{p[k]} - from[k];
@@ -122,7 +122,7 @@ class Enclosure {
       return corner;
     };
     std::vector<std::uint32_t> pending;
-    for (const Vector& direction : kDirections) {
+    for (const Double3& direction : kDirections) {
       int winding = 0;
       bool sure = true;
       pending.assign(1, 0);

@@ -11,7 +11,7 @@
 namespace tandem::build {
 namespace {
 
-constexpr std::size_t kBlocksAtOnce = 1 << 12;
+constexpr std::size_t kEmittedAtOnce = 1 << 12;
 
 // The place where a block of the topology comes to lie, and its children.
 struct Place {
@@ -108,7 +108,7 @@ Tree emit(const Geometry& geometry, const Topology& topology) {
   tree.depth = numbering.depth();
   tree.blocks.resize(places.size());
   tree.order.resize(geometry.triangles.size());
-  parallel::for_parts(places.size(), kBlocksAtOnce, [&](std::size_t begin, std::size_t end) {
+  parallel::for_parts(places.size(), kEmittedAtOnce, [&](std::size_t begin, std::size_t end) {
     for (std::size_t b = begin; b != end; ++b) {
       const TopologyBlock& from = topology[places[b].block];
       for (int i = from.count; i < kNodesPerBlock; ++i) set_imaginary(tree.blocks[b], i);

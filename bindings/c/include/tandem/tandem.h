@@ -604,7 +604,7 @@ TANDEM_API const tandem_distance* tandem_scene_distances(const tandem_scene* sce
 typedef struct tandem_motion {
   double velocity[3];          ///< of the centre
   double angular_velocity[3];  ///< radians a second
-  double center[3];            ///< in the world, at the start
+  double centre[3];            ///< in the world, at the start
 } tandem_motion;
 
 typedef struct tandem_impact_options {

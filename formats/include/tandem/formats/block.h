@@ -28,14 +28,14 @@ inline constexpr std::uint32_t kMaxDepth = 64;
 ///     byte 0    16   32   48   64   80   96   112   128
 ///          | cx | cy | cz | hx | hy | hz | index | kind |     each four lanes: node 0, 1, 2, 3
 ///
-/// Node i has the box [center - half_extent, center + half_extent], in real arithmetic, relative to the
+/// Node i has the box [centre - half_extent, centre + half_extent], in real arithmetic, relative to the
 /// asset's origin. Imaginary nodes come last.
 ///
 /// The blocks of a tree lie depth first: the first child of block b is block b + 1, each further child begins
 /// where the subtree of the one before it ends. So the blocks of a subtree are consecutive, and so are the
 /// triangles below a block or a node.
 struct alignas(128) Block {
-  float center[3][kNodesPerBlock];
+  float centre[3][kNodesPerBlock];
   float half_extent[3][kNodesPerBlock];
   std::uint32_t index[kNodesPerBlock];
   NodeKind kind[kNodesPerBlock];
@@ -62,7 +62,7 @@ static_assert(offsetof(Block, half_extent) == 48 && offsetof(Block, index) == 96
 /// the other interval is [-inf, +inf], and c - h and c + h cannot both overflow for finite c and h. A test
 /// must therefore never be written as "separated if |d| > r, else overlapping": NaN would pass it. The same
 /// values make an imaginary box the neutral element of the union of boxes by min and max.
-inline constexpr float kImaginaryCenter = 0.0f;
+inline constexpr float kImaginaryCentre = 0.0f;
 inline constexpr float kImaginaryHalfExtent = -std::numeric_limits<float>::infinity();
 
 /// The fewest imaginary nodes that a tree of `triangles` leaves can have without partial leaf blocks. With L

@@ -5,10 +5,10 @@
 
 namespace tandem {
 
-/// An axis-aligned box as a node stores it: the set [center - half_extent, center + half_extent] in real
+/// An axis-aligned box as a node stores it: the set [centre - half_extent, centre + half_extent] in real
 /// arithmetic.
 struct Box {
-  float center[3];
+  float centre[3];
   float half_extent[3];
 };
 
@@ -40,13 +40,13 @@ bool contains(const Box& outer, const Box& inner);
 bool is_imaginary_box(const Box& box);
 
 TANDEM_HD inline Box box_of(const Block& block, int node) {
-  return {{block.center[0][node], block.center[1][node], block.center[2][node]},
+  return {{block.centre[0][node], block.centre[1][node], block.centre[2][node]},
           {block.half_extent[0][node], block.half_extent[1][node], block.half_extent[2][node]}};
 }
 
 /// The extent of all boxes of a tree. Every box lies in a box of the root block, so the root block gives it.
 struct TreeExtent {
-  double reach[3];        ///< >= |center| + half_extent
+  double reach[3];        ///< >= |centre| + half_extent
   double half_extent[3];  ///< >= half_extent
 };
 
@@ -58,7 +58,7 @@ TANDEM_HD inline TreeExtent extent_of(const Block& root) {
       if (root.kind[node] == NodeKind::imaginary) continue;
       const double h = root.half_extent[k][node];
       // Rounded to nearest, twice: the factor makes up for both.
-      const double reach = (std::fabs(static_cast<double>(root.center[k][node])) + h) * (1 + 0x1p-50);
+      const double reach = (std::fabs(static_cast<double>(root.centre[k][node])) + h) * (1 + 0x1p-50);
       if (reach > extent.reach[k]) extent.reach[k] = reach;
       if (h > extent.half_extent[k]) extent.half_extent[k] = h;
     }
@@ -69,7 +69,7 @@ TANDEM_HD inline TreeExtent extent_of(const Block& root) {
 /// Writes a real node; `index` is a child block or a triangle.
 inline void set_node(Block& block, int node, const Box& box, std::uint32_t index, NodeKind kind) {
   for (int k = 0; k < 3; ++k) {
-    block.center[k][node] = box.center[k];
+    block.centre[k][node] = box.centre[k];
     block.half_extent[k][node] = box.half_extent[k];
   }
   block.index[node] = index;
@@ -79,7 +79,7 @@ inline void set_node(Block& block, int node, const Box& box, std::uint32_t index
 /// Writes an imaginary node.
 inline void set_imaginary(Block& block, int node) {
   set_node(block, node,
-           {{kImaginaryCenter, kImaginaryCenter, kImaginaryCenter},
+           {{kImaginaryCentre, kImaginaryCentre, kImaginaryCentre},
             {kImaginaryHalfExtent, kImaginaryHalfExtent, kImaginaryHalfExtent}},
            kNoIndex, NodeKind::imaginary);
 }

@@ -35,7 +35,7 @@ inline constexpr std::uint32_t kQuaternionOffset = 2048;
 /// 112 bytes, an odd number of float4: where the lanes of a warp read the same component of several blocks,
 /// the L1 cache serves them from several banks, which it cannot where blocks are 128 bytes apart.
 struct alignas(16) OrientedBlock {
-  float center[3][kNodesPerBlock];
+  float centre[3][kNodesPerBlock];
   float half_extent[3][kNodesPerBlock];
   std::uint32_t first_below;  ///< oriented block below node 0, or kIsLeafBlock and the triangle of node 0
   float size;                 ///< oriented_size() of the boxes
@@ -49,7 +49,7 @@ static_assert(sizeof(OrientedBlock) == 112 && offsetof(OrientedBlock, half_exten
               offsetof(OrientedBlock, first_below) == 96 && offsetof(OrientedBlock, rotation) == 104);
 
 TANDEM_HD inline Box box_of(const OrientedBlock& block, int node) {
-  return {{block.center[0][node], block.center[1][node], block.center[2][node]},
+  return {{block.centre[0][node], block.centre[1][node], block.centre[2][node]},
           {block.half_extent[0][node], block.half_extent[1][node], block.half_extent[2][node]}};
 }
 
@@ -115,9 +115,9 @@ inline double along_axis(const ScaledRotation& rotation, int k, const float (&ve
 /// Centre and half-extent along an axis of a box that holds, in real arithmetic, what lies from `lowest` to
 /// `highest`, both of along_axis(), `farthest` being at least the distance of each vertex from the origin.
 /// The margin is what the checker asks for and more (formats/src/check_oriented.cpp).
-inline void box_along(double lowest, double highest, double farthest, float& center, float& half_extent) {
-  center = static_cast<float>(0.5 * (lowest + highest));
-  const double above = highest - double{center}, below = double{center} - lowest;
+inline void box_along(double lowest, double highest, double farthest, float& centre, float& half_extent) {
+  centre = static_cast<float>(0.5 * (lowest + highest));
+  const double above = highest - double{centre}, below = double{centre} - lowest;
   const double half = (std::fmax(above, below) + 0x1p-48 * farthest) * (1 + 0x1p-22);
   half_extent = static_cast<float>(half);
   if (double{half_extent} < half)

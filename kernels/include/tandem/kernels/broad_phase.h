@@ -66,7 +66,7 @@ class BroadPhase {
 
   /// A box on its way to its place in the tree.
   struct Item {
-    double center[3];
+    double centre[3];
     std::uint32_t box;
   };
 

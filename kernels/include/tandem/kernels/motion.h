@@ -19,7 +19,7 @@ namespace tandem {
 struct RigidMotion {
   double velocity[3];          ///< of the centre, units of length a second
   double angular_velocity[3];  ///< radians a second
-  double center[3];            ///< where the centre is at the start
+  double centre[3];            ///< where the centre is at the start
 };
 
 inline constexpr RigidMotion kAtRest = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
@@ -69,9 +69,9 @@ TANDEM_HD inline Pose pose_at(const Pose& start, const RigidMotion& motion, doub
     for (int j = 0; j < 3; ++j) {
       pose.rotation[i][j] =
           q[i][0] * start.rotation[0][j] + q[i][1] * start.rotation[1][j] + q[i][2] * start.rotation[2][j];
-      turned += q[i][j] * (start.translation[j] - motion.center[j]);
+      turned += q[i][j] * (start.translation[j] - motion.centre[j]);
     }
-    pose.translation[i] = turned + (motion.center[i] + t * motion.velocity[i]);
+    pose.translation[i] = turned + (motion.centre[i] + t * motion.velocity[i]);
   }
   return pose;
 }
@@ -86,27 +86,27 @@ TANDEM_HD inline Pose pose_at(const Pose& start, const RigidMotion& motion, doub
 /// contribute 20 w (|p| + |t - c|), and Q e those of |e|. Numbers of the size of the centre's place round
 /// four times: the displacement, its sum with c, the translation, and apply()'s last sum: 4.1 w (|c| + |t
 /// v|). |t| is at most |c| + |t - c|.
-TANDEM_HD inline double pose_error(const Pose& start, double reach, const double (&center)[3],
+TANDEM_HD inline double pose_error(const Pose& start, double reach, const double (&centre)[3],
                                    const manifold::Vector3& displacement, const manifold::Vector3& turn) {
-  const manifold::Vector3 c = {center[0], center[1], center[2]};
+  const manifold::Vector3 c = {centre[0], centre[1], centre[2]};
   const auto& t = start.translation;
   const double arm = norm(manifold::Vector3{t[0], t[1], t[2]} - c);
   return 0x1p-50 * (norm(c) + norm(displacement)) + 0x1p-44 * (1 + norm(turn)) * (arm + reach);
 }
 
-/// The largest |turn x (x - center)| of the posed points of an asset with these bounds, or more: how fast the
+/// The largest |turn x (x - centre)| of the posed points of an asset with these bounds, or more: how fast the
 /// fastest of them turns, and its greatest acceleration divided by |turn|. pose: of stored coordinates.
 ///
 /// A convex function of the point, so a corner of the bounds has the largest value; the last term is for
 /// roundings, also those that posed vertices have.
 TANDEM_HD inline double fastest_turn(const Pose& pose, const float* lower, const float* upper,
-                                     const double (&center)[3], const manifold::Vector3& turn) {
+                                     const double (&centre)[3], const manifold::Vector3& turn) {
   double most = 0, size = 0;
   for (int corner = 0; corner < 8; ++corner) {
     double x[3];
     apply(pose, corner & 1 ? upper[0] : lower[0], corner & 2 ? upper[1] : lower[1],
           corner & 4 ? upper[2] : lower[2], x);
-    const manifold::Vector3 arm = {x[0] - center[0], x[1] - center[1], x[2] - center[2]};
+    const manifold::Vector3 arm = {x[0] - centre[0], x[1] - centre[1], x[2] - centre[2]};
     most = manifold::greater(most, norm(cross(turn, arm)));
     size = manifold::greater(size, norm(arm));
   }
@@ -117,15 +117,15 @@ TANDEM_HD inline double fastest_turn(const Pose& pose, const float* lower, const
 
 /// The largest distance from the centre of the posed points of an asset with these bounds, or more, also of
 /// posed vertices as they are rounded. A corner of the bounds has it, as above.
-TANDEM_HD inline double farthest_from_center(const Pose& pose, const float* lower, const float* upper,
-                                             const double (&center)[3]) {
+TANDEM_HD inline double farthest_from_centre(const Pose& pose, const float* lower, const float* upper,
+                                             const double (&centre)[3]) {
   double most = 0;
   for (int corner = 0; corner < 8; ++corner) {
     double x[3];
     apply(pose, corner & 1 ? upper[0] : lower[0], corner & 2 ? upper[1] : lower[1],
           corner & 4 ? upper[2] : lower[2], x);
     most = manifold::greater(most,
-                             norm(manifold::Vector3{x[0] - center[0], x[1] - center[1], x[2] - center[2]}));
+                             norm(manifold::Vector3{x[0] - centre[0], x[1] - centre[1], x[2] - centre[2]}));
   }
   const auto& t = pose.translation;
   return most * (1 + 0x1p-40) + 0x1p-45 * (std::fabs(t[0]) + std::fabs(t[1]) + std::fabs(t[2]));

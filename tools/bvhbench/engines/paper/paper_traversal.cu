@@ -74,8 +74,8 @@ __global__ void __launch_bounds__(kThreads) collide_level(const __grid_constant_
   const std::uint32_t i = lane / 4, j = lane % 4;
   Box box_a, box_b;
   for (std::uint32_t k = 0; k < 3; ++k) {
-    box_a.center[k] = a[4 * k + i], box_a.half_extent[k] = a[kHalfExtent + 4 * k + i];
-    box_b.center[k] = b[4 * k + j], box_b.half_extent[k] = b[kHalfExtent + 4 * k + j];
+    box_a.centre[k] = a[4 * k + i], box_a.half_extent[k] = a[kHalfExtent + 4 * k + i];
+    box_b.centre[k] = b[4 * k + j], box_b.half_extent[k] = b[kHalfExtent + 4 * k + j];
   }
   const bool leaf_a = __float_as_uint(a[kKind0]) == kLeafKind,
              leaf_b = __float_as_uint(b[kKind0]) == kLeafKind;

@@ -327,7 +327,7 @@ TEST_F(GpuImpacts, ErrorsAreNamedAndLeaveNothing) {
   };
   refused(moves.motion[1].velocity[0], NAN);
   refused(moves.motion[1].velocity[1], 1e101);
-  refused(moves.motion[1].center[2], INFINITY);
+  refused(moves.motion[1].centre[2], INFINITY);
   refused(moves.motion[1].angular_velocity[0], 1.001 * kLargestTurn);
   moves.scene.instances[1].pose.rotation[0][0] = 2;
   EXPECT_EQ(ask(), Status::kPoseNotRigid);

@@ -53,6 +53,33 @@ def wrong(rows):
     return peer_table(rows, wrong_cell)
 
 
+# What makes a scene hard, by a part of its name.
+HARD = {"exact": "faces coincide", "coincident": "bodies coincide", "_at_": "far from the origin"}
+
+
+def group_of(scene):
+    return next((words for part, words in HARD.items() if part in scene), "ordinary")
+
+
+def wrong_by_group(rows):
+    """A row for each group of scenes, a column for each peer that is judged by CGAL: the most contact pairs of a scene, and the most that are missed and invented."""
+    told = [row for row in rows if row["missed"] is not None]
+    peers = [peer for peer in dict.fromkeys(row["peer"] for row in told) if peer != "CGAL"]
+    lines = []
+    for group in ("ordinary", *HARD.values()):
+        some = [row for row in told if group_of(row["scene"]) == group]
+        most = [{name: max(row[name] for row in some if row["peer"] == peer) for name in ("missed", "invented")} for peer in peers]
+        contact_pairs = max(row["contacts"] for row in some if row["peer"] == "CGAL")
+        lines.append([group, whole(contact_pairs), *map(wrong_cell, most)])
+    return markdown(["scenes", "contacts", *peers], lines)
+
+
+def frame_costs(rows, scene):
+    """A row for each peer: its update in every frame and its memory in a scene. Tandem has one, as its modes do not differ in them."""
+    some = [row for row in rows if row["scene"] == scene and row["peer"] not in ("Tandem fast", "Tandem boxes")]
+    return markdown(["peer", "update, ms", "memory"], [[row["peer"], three_digits(row["update_ms"]), size(row["memory_bytes"])] for row in some])
+
+
 def update(rows):
     return peer_table(rows, lambda row: three_digits(row["update_ms"]))
 

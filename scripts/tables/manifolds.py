@@ -7,10 +7,27 @@ def shown(text, least):
     return f"< {least:g}" if float(text) < least else three_digits(float(text))
 
 
+def spread(texts):
+    """The smallest and the largest of some figures."""
+    least, most = min(texts, key=float), max(texts, key=float)
+    return least if least == most else f"{least} to {most}"
+
+
+def error(rows, name, least):
+    """The largest median of some kinds of bodies, and the largest error of all."""
+    median, largest = (shown(max((row[column] for row in rows), key=float), least) for column in (name, f"{name}_largest"))
+    return median if median == largest else f"{median} ({largest})"
+
+
+def cells(rows):
+    return [error(rows, "normal_degrees", 1e-3), error(rows, "depth_percent", 1e-2), spread([row["time_ratio"] for row in rows])]
+
+
 def peers(rows):
-    """One row for each kind of bodies and peer."""
-    heads = ["bodies", "peer", "missed", "invented", "points", "points upright, %", "normal off by, degrees", "at most", "depth off by, %", "at most", "time over Tandem's"]
-    lines = [[row["bodies"], row["peer"], row["missed"], row["invented"], row["points"], row["points_upright_percent"],
-              shown(row["normal_degrees"], 1e-3), shown(row["normal_degrees_largest"], 1e-3),
-              shown(row["depth_percent"], 1e-2), shown(row["depth_percent_largest"], 1e-2), row["time_ratio"]] for row in rows]
-    return markdown(heads, lines, "ll")
+    """One row for each peer; columns for boxes on boxes, where side faces meet too, and for bodies that reach into a block."""
+    heads = ["peer"] + [f"{group}: {what}" for group in ("boxes", "block") for what in ("normal off, °", "depth off, %", "time")]
+    lines = []
+    for peer in dict.fromkeys(row["peer"] for row in rows):
+        groups = [[row for row in rows if row["peer"] == peer and row["bodies"].endswith(end)] for end in ("box", "block")]
+        lines.append([peer, *(cell for group in groups for cell in cells(group))])
+    return markdown(heads, lines)

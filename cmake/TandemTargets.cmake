@@ -2,14 +2,6 @@ include(GNUInstallDirs)
 # Components of the installation: dev, but for shared libraries (libs, cuda), commands (tools) and the Python package (python).
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME dev)
 
-# What follows in this folder is compiled with -O1 where TANDEM_ONLY_TESTED says that only tests run it.
-macro(tandem_compile_fast_for_tests)
-  if(TANDEM_ONLY_TESTED)
-    string(REPLACE -O3 -O1 CMAKE_CXX_FLAGS_RELEASE "${CMAKE_CXX_FLAGS_RELEASE}")
-    string(REPLACE -O3 -O1 CMAKE_CUDA_FLAGS_RELEASE "${CMAKE_CUDA_FLAGS_RELEASE}")
-  endif()
-endmacro()
-
 # Flags that every target of the project is compiled with. -ffp-contract=off: promised results must not depend
 # on whether a compiler fuses a multiply and an add. Headers that are not installed are spelled from the project's
 # root on, such as "kernels/geometry/triangle_test.h".

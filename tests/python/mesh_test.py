@@ -1,6 +1,8 @@
 """Mesh files, polygons and levels of detail: what bvhbuild makes of them."""
+import json
 import os
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +53,62 @@ def test_quads_by_array():
     assert sorted(set(named.faces().tolist())) == [7, 8, 9]
     named = tandem.build(BOX_VERTICES, quads, face_ids=[2**32 - 3] * 6)
     assert set(named.faces().tolist()) == {2**32 - 3}
+
+
+def test_simple_files_are_read_alike_without_the_mesh_tools(tmp_path, monkeypatch):
+    quads = tmp_path / "quads.obj"
+    quads.write_text("o box\n" + "".join(f"v {x} {y} {z}\n" for x, y, z in BOX_VERTICES) + "f 1 2 4 3\nf 5 7 8 6\nf 1 2 99\n")
+    off = tmp_path / "box.off"
+    off.write_text(f"OFF {len(BOX_VERTICES)} {len(BOX_FACES)} 0\n" + "".join(f"{x} {y} {z}\n" for x, y, z in BOX_VERTICES) +
+                   "".join(f"3 {a} {b} {c}\n" for a, b, c in BOX_FACES))
+    stl = tmp_path / "box.stl"
+    corners = np.zeros(len(BOX_FACES), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("colour", "<u2")])
+    corners["corners"] = np.asarray(BOX_VERTICES)[np.asarray(BOX_FACES)]
+    stl.write_bytes(bytes(80) + np.uint32(len(BOX_FACES)).tobytes() + corners.tobytes())
+    ply = tmp_path / "box.ply"
+    ply.write_text("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
+                   "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    polygon = tmp_path / "polygon.obj"
+    polygon.write_text("v 0 0 0\nv 1 0 0\nv 2 1 0\nv 1 2 0\nv 0 2 0\nf 1 2 3 4 5\n")
+    scene = tmp_path / "scene.gltf"
+    scene.write_text('{"asset": {"version": "2.0"}}')
+    broken = tmp_path / "broken.obj"
+    broken.write_text("v 0 0 x\n")
+    files = [ASSETS / "cow_1500.obj", quads, off, stl, ply]
+    expected = [tandem.read_mesh(path) for path in files]
+    with pytest.raises(tandem.FileError, match="broken.obj: line 1") as refused:
+        tandem.read_mesh(broken)
+    monkeypatch.setitem(sys.modules, "tandem._bvhbuild", None)
+    monkeypatch.delattr(tandem, "_bvhbuild", raising=False)
+    for path, mesh in zip(files, expected):
+        alike = tandem.read_mesh(path)
+        for name in ("vertices", "triangles", "face_ids"):
+            assert getattr(alike, name).tobytes() == getattr(mesh, name).tobytes(), path
+        assert (alike.parts, alike.remarks) == (mesh.parts, mesh.remarks)
+    for path, reason in ((polygon, "face 0 has more than four corners"), (scene, "it is no OBJ, PLY, STL or OFF file")):
+        with pytest.raises(ImportError, match=f"{path.name}: {reason}, and .* without its mesh tools"):
+            tandem.read_mesh(path)
+    with pytest.raises(tandem.FileError) as refused_too:
+        tandem.read_mesh(broken)
+    assert str(refused_too.value) == str(refused.value)
+    with pytest.raises(FileNotFoundError):
+        tandem.read_mesh(tmp_path / "gone.obj")
+
+
+def test_a_gltf_file_names_others_outside_its_folder_where_it_is_told_to(tmp_path):
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    (tmp_path / "corners.bin").write_bytes(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32).tobytes())
+    path = inner / "one.gltf"
+    path.write_text(json.dumps({"asset": {"version": "2.0"}, "buffers": [{"uri": "../corners.bin", "byteLength": 36}],
+                                "bufferViews": [{"buffer": 0, "byteLength": 36}],
+                                "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]}],
+                                "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}], "nodes": [{"mesh": 0}]}))
+    with pytest.raises(tandem.FileError, match="corners.bin"):
+        tandem.read_mesh(path)
+    assert len(tandem.read_mesh(path, outside_files=True).triangles) == 1
+    with pytest.raises(TypeError, match="outside_files is str"):
+        tandem.read_mesh(path, outside_files="no")
 
 
 def test_formats_of_others_are_read_by_assimp_in_a_child(tmp_path):

@@ -8,8 +8,8 @@
 #include <tuple>
 #include <vector>
 
-#include "bindings/python/src/bytes.h"
 #include "bindings/python/src/patience.h"
+#include "bindings/python/src/read_mesh.h"
 #include "bvhbuild/import/import.h"
 #include "bvhbuild/level_pipeline.h"
 #include "bvhbuild/meshing/meshing.h"
@@ -25,19 +25,11 @@ using Part = std::tuple<std::string, std::string, std::uint64_t>;
 
 using python::copy_rows;
 
-template <typename Row>
-nb::object to_bytes(const std::vector<Row>& rows) {
-  return python::to_python(rows.data(), rows.size());
-}
-
-nb::bytes to_bytes(const std::string& text) {
-  return nb::bytes(text.data(), text.size());
-}
-
-// Points, corners of triangles, the face of each, parts, remarks. own_readers: without assimp, which is run
-// in a child process and needs a process with one thread.
-nb::tuple read(const nb::bytes& path, bool own_readers) {
+// As python::rows_of(). own_readers: without assimp, which is run in a child process and needs a process with
+// one thread. outside_files: see ReadLimits.
+nb::tuple read(const nb::bytes& path, bool own_readers, bool outside_files) {
   ImportOptions options;
+  options.limits.outside_files = outside_files;
   options.reader = own_readers ? Reader::tandem : Reader::automatic;
   const std::string name = path.c_str();
   ImportResult imported;
@@ -48,14 +40,8 @@ nb::tuple read(const nb::bytes& path, bool own_readers) {
     CleanReport report;
     if (imported.ok) triangles = triangulate(imported.mesh, report);
   }
-  if (!imported.ok) return nb::make_tuple(nb::none(), to_bytes(imported.error));
-  nb::list parts, remarks;
-  for (const SourcePart& part : imported.mesh.parts)
-    parts.append(
-        nb::make_tuple(to_bytes(part.name), to_bytes(part.node_path), part.first_face, part.face_count));
-  for (const std::string& remark : imported.mesh.remarks) remarks.append(to_bytes(remark));
-  return nb::make_tuple(to_bytes(triangles.points), to_bytes(triangles.triangles), to_bytes(triangles.face),
-                        parts, remarks);
+  if (!imported.ok) return nb::make_tuple(nb::none(), python::to_bytes(imported.error), false);
+  return python::rows_of(imported.mesh, triangles);
 }
 
 std::string provenance_of(const Options& options, const Outcome& outcome) {

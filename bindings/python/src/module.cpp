@@ -12,5 +12,6 @@ NB_MODULE(_tandem, module) {
   tandem::python::add_assets(module);
   tandem::python::add_builder(module);
   tandem::python::add_filters(module);
+  tandem::python::add_readers(module);
   tandem::python::add_scenes(module);
 }

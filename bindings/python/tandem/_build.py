@@ -154,26 +154,37 @@ def build(vertices: Vertices, faces: Faces = None, *, effort: Effort = "default"
     return (asset, BuildReport(*report[1:])) if reported else asset
 
 
-def read_mesh(path: str | os.PathLike[str]) -> Mesh:
+def read_mesh(path: str | os.PathLike[str], *, outside_files: bool = False) -> Mesh:
     """Reads a mesh file as bvhbuild does: OBJ, PLY, STL, OFF, glTF and GLB by its own readers, whatever else assimp reads in a child process.
+
+    Args:
+        outside_files: lets a glTF file name buffers elsewhere than in its folder or below it.
 
     Raises:
         FileError: it cannot be read; the text says why, with the line where there is one. It is a FileNotFoundError, PermissionError or IsADirectoryError too
             where open() raises that.
-        ImportError: the mesh tools are not installed.
+        ImportError: the mesh tools are not installed, and it is no OBJ, PLY, STL or OFF file of triangles and quads.
     """
-    tools = _mesh_tools()
     name = os.fsencode(path)
     if b"\0" in name:
         raise ValueError("path has a zero byte")
-    read = tools.read(name, True)
-    if read[0] is None:
+    outside = flag(outside_files, "outside_files")
+    tools = None
+    try:
+        tools = _mesh_tools()
+    except ImportError as error:
+        read = _tandem.read(name)
+        if read[0] is None and read[2]:
+            raise ImportError(f"{os.fsdecode(path)}: {read[1].decode(errors='replace')}, and {error}") from None
+    if tools is not None:
+        read = tools.read(name, True, outside)
+    if tools is not None and read[0] is None:
         # assimp is run by a fork, which a process with threads must not do: a fresh interpreter can.
         import subprocess  # here, and not for every import of the package
         script = ("import importlib.util, marshal, sys; spec = importlib.util.spec_from_file_location('_bvhbuild', sys.argv[1]); "
                   "tools = importlib.util.module_from_spec(spec); spec.loader.exec_module(tools); "
-                  "marshal.dump(tools.read(sys.argv[2].encode('utf-8', 'surrogateescape'), False), sys.stdout.buffer)")
-        done = subprocess.run([sys.executable, "-I", "-S", "-X", "utf8", "-c", script, str(tools.__file__), name], capture_output=True)
+                  "marshal.dump(tools.read(sys.argv[2].encode('utf-8', 'surrogateescape'), False, sys.argv[3] == 'True'), sys.stdout.buffer)")
+        done = subprocess.run([sys.executable, "-I", "-S", "-X", "utf8", "-c", script, str(tools.__file__), name, str(outside)], capture_output=True)
         if done.returncode != 0:
             raise with_path(FileError(f"the reader's process failed: {done.stderr.decode(errors='replace')}"), os.fsdecode(path))
         read = marshal.loads(done.stdout)

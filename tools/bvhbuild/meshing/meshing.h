@@ -1,6 +1,8 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -82,6 +84,19 @@ TriangleMesh take_triangles(std::span<const Point> points, std::span<const Trian
 /// the outline has it, and its orientation stays. An outline that crosses itself makes a fan. The same input
 /// gives the same triangles.
 TriangleMesh triangulate(PolygonMesh& mesh, CleanReport& report);
+
+/// Splits a polygon of five corners or more in its projection along a coordinate axis.
+///
+/// Effect: on success appends triangles to `out`, as indices into the corners, oriented as the polygon goes.
+/// Result: whether it could.
+using SplitPolygon = std::function<bool(std::span<const Point> polygon, int projection_axis,
+                                        std::vector<TriangleIndices>& out)>;
+
+/// Does the same with another way to split polygons of five corners or more. Takes no package.
+TriangleMesh triangulate(PolygonMesh& mesh, CleanReport& report, const SplitPolygon& split);
+
+/// Returns the first face of more than four corners, which triangulate() needs `split` for.
+std::optional<std::size_t> first_face_beyond_quads(const PolygonMesh& mesh);
 
 /// Welds, drops and counts; moves and rounds nothing.
 ///

@@ -100,10 +100,11 @@ def documented_keys(command, split="$^"):
             for part in re.split(split, section)]
 
 
-def documented_types(section, names):
-    """The types of datasets as a section of docs/scenes.md has them: by name, type and shape of a row."""
+def documented_types(names):
+    """The types of the datasets that docs/scenes.md lists: by name, type and shape of a row. names: a regular expression of what they start with."""
     kinds = {"u8": "uint8", "u32": "uint32", "u64": "uint64", "f64": "float64"}
-    rows = re.findall(rf"^\| (`/{names}.*?) \| ([uf]\d+) \[\w\+?1?(,\d)?\]", section, re.M)
+    page = (SOURCE_DIR / "docs/scenes.md").read_text(encoding="utf-8")
+    rows = re.findall(rf"^- (`/{names}.*?) \(([uf]\d+) \[\w\+?1?(,\d)?\]\)", page, re.M)
     return {name: (kinds[kind], (int(width[1]),) if width else ()) for row, kind, width in rows for name in re.findall(r"`/([\w/]+)`", row)}
 
 

@@ -4,11 +4,12 @@
 set(CPACK_PACKAGE_NAME tandem)
 set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
 # Whoever makes packages is their maintainer: DEBFULLNAME and DEBEMAIL, as Debian's own tools take them.
+set(packager "The Tandem authors <tandem@localhost>")
 if(DEFINED ENV{DEBFULLNAME} AND DEFINED ENV{DEBEMAIL})
-  set(CPACK_PACKAGE_CONTACT "$ENV{DEBFULLNAME} <$ENV{DEBEMAIL}>")
-else()
-  set(CPACK_PACKAGE_CONTACT "The Tandem authors <tandem@localhost>")
+  set(packager "$ENV{DEBFULLNAME} <$ENV{DEBEMAIL}>")
 endif()
+set(TANDEM_PACKAGER "${packager}" CACHE STRING "Maintainer of the packages that cpack makes: NAME <ADDRESS>")
+set(CPACK_PACKAGE_CONTACT "${TANDEM_PACKAGER}")
 set(CPACK_GENERATOR DEB)
 # What was configured for another prefix than /usr is packed for it, so that its paths hold.
 file(CONFIGURE OUTPUT packages/prefix.cmake @ONLY CONTENT "if(CPACK_GENERATOR STREQUAL \"DEB\")

@@ -16,6 +16,10 @@ SKY_ABOVE, SKY_BELOW = "e4eaef", "fbfaf7"
 SUN, SUN_FROM = 0.88, (-0.62, 0.66, 0.52)  # its strength, and its direction: right, up and towards the eye
 AMBIENT = 0.56
 OUTLINE = 0.45  # the share of the light that is left along the outline of a body
+CONTACT = "c00018"  # of triangles that meet others; bodies and ground are then pale, and the backdrop is white
+GLOW = 0.85  # the light on these triangles that no shadow takes away
+SHINE = 0.92  # the share of their colour that shines through a body that hides them closely
+PALE_BODY, PALE_GROUND, PALENESS = "f4f5f6", "ffffff", 0.5
 SHADOW_PIXELS = 2048
 
 
@@ -30,12 +34,15 @@ def colours(bodies):
     random = np.random.default_rng(7)
     count = len(bodies.asset)
     chosen = palette[random.integers(len(palette), size=count)] * random.uniform(0.85, 1.1, size=(count, 1))
-    return np.where(bodies.fixed[:, None], of_colour(GROUND), np.minimum(chosen, 1))
+    ground = GROUND
+    if bodies.contacts is not None:
+        chosen, ground = PALENESS * of_colour(PALE_BODY) + (1 - PALENESS) * chosen, PALE_GROUND
+    return np.where(bodies.fixed[:, None], of_colour(ground), np.minimum(chosen, 1))
 
 
 def posed(bodies):
-    """All triangles in the world, the body of each, and whether it is of a closed shape."""
-    found, body, closed = [np.zeros((0, 3, 3))], [np.zeros(0, int)], [np.zeros(0, bool)]
+    """All triangles in the world, the body of each, whether it is of a closed shape, and whether it meets others; of the ground none does."""
+    found, body, closed, meets = [np.zeros((0, 3, 3))], [np.zeros(0, int)], [np.zeros(0, bool)], [np.zeros(0, bool)]
     for asset, shape in enumerate(bodies.shapes):
         rows = np.nonzero(bodies.asset == asset)[0]
         triangles = np.einsum("nij,tkj->ntki", bodies.rotation[rows], shape.triangles, optimize=True)
@@ -43,7 +50,9 @@ def posed(bodies):
         found.append(triangles.reshape(-1, 3, 3))
         body.append(np.repeat(rows, len(shape.triangles)))
         closed.append(np.full(len(body[-1]), shape.closed))
-    return np.concatenate(found), np.concatenate(body), np.concatenate(closed)
+        meets.append(np.zeros(len(body[-1]), bool) if bodies.contacts is None else bodies.contacts[rows][:, shape.face].ravel())
+    body, meets = np.concatenate(body), np.concatenate(meets)
+    return np.concatenate(found), body, np.concatenate(closed), meets & bodies.subject[body]
 
 
 def box_corners(bodies):
@@ -110,6 +119,7 @@ class Samples:
     distance: np.ndarray  # along the camera's axis
     point: np.ndarray
     normal: np.ndarray  # towards the eye
+    triangle: np.ndarray
     body: np.ndarray
 
 
@@ -125,7 +135,7 @@ def take_samples(triangles, body, closed, camera):
     normals = unit(area_vectors(triangles[kept]))
     normals *= np.where(np.einsum("ni,ni->n", normals, camera.eye - triangles[kept, 0]) < 0, -1, 1)[:, None]
     chosen = nearest[covered]
-    return Samples(covered, row, column, distance, point, normals.astype(np.float32)[chosen], body[kept][chosen])
+    return Samples(covered, row, column, distance, point, normals.astype(np.float32)[chosen], kept[chosen], body[kept][chosen])
 
 
 def lit(samples, casters, bounds, light):
@@ -176,17 +186,32 @@ def openness(samples, reach, camera):
     return 1 - hidden / directions
 
 
-def outlines(samples):
-    """Samples whose right or lower neighbour shows another body."""
+def outlines(samples, contact):
+    """Samples whose right or lower neighbour shows another body, or another triangle that meets others."""
     shown = np.full(samples.covered.shape, -1)
-    shown[samples.covered] = samples.body
+    shown[samples.covered] = np.where(contact >= 0, samples.body.max(initial=0) + 1 + contact, samples.body)
     ends = np.zeros(shown.shape, bool)
     ends[:, :-1] |= shown[:, :-1] != shown[:, 1:]
     ends[:-1] |= shown[:-1] != shown[1:]
     return ends[samples.covered]
 
 
-def backdrop(size):
+def shown_contacts(samples, triangles, meets, reach, camera):
+    """How strongly the samples show a triangle that meets others, and which (-1: none): in full one that is seen, less one that is hidden, the farther
+    behind it lies."""
+    found = np.nonzero(meets)[0]
+    depth, nearest = render.rasterise(camera.project(triangles[found]), camera.size)
+    depth, nearest = depth[samples.covered], nearest[samples.covered]
+    with np.errstate(divide="ignore"):
+        strength = np.where(nearest >= 0, SHINE * np.clip(2 - 2 * (1 / depth - samples.distance) / reach, 0, 1), 0)
+    hidden = np.where(strength > 0, np.append(found, -1)[nearest], -1)
+    seen = meets[samples.triangle]
+    return np.where(seen, 1, strength), np.where(seen, samples.triangle, hidden)
+
+
+def backdrop(size, white):
+    if white:
+        return np.ones((size[1], size[0], 3))
     down = np.linspace(0, 1, size[1])[:, None]
     rows = (1 - down) * of_colour(SKY_ABOVE) + down * of_colour(SKY_BELOW)
     return np.repeat(rows[:, None], size[0], axis=1)
@@ -194,15 +219,19 @@ def backdrop(size):
 
 def picture(bodies, camera):
     """sRGB in 0 to 1, [height, width, 3], of the camera's size divided by SUPERSAMPLING."""
-    triangles, body, closed = posed(bodies)
+    triangles, body, closed, meets = posed(bodies)
     samples = take_samples(triangles, body, closed, camera)
     light = unit(np.array(SUN_FROM) @ camera.axes)
     subject = bodies.subject
+    diagonal = np.median(bodies.diagonals[subject])
     sun = SUN * np.clip(samples.normal @ light, 0, 1) * lit(samples, triangles[subject[body]], box_corners(bodies), light)
     sky = AMBIENT * (0.75 + 0.25 * samples.normal[:, 2])
-    sky *= openness(samples, 0.4 * np.median(bodies.diagonals[subject]), camera)
+    sky *= openness(samples, 0.4 * diagonal, camera)
     light_here = sun[:, None] * [1.05, 1.0, 0.93] + sky[:, None] * [0.95, 1.0, 1.07]
-    image = backdrop(camera.size)
-    image[samples.covered] = colours(bodies)[samples.body] * light_here
-    image[samples.covered] *= np.where(outlines(samples), OUTLINE, 1)[:, None]
+    strength, contact = shown_contacts(samples, triangles, meets, diagonal, camera)
+    strength = strength[:, None]
+    reflected = (1 - strength) * colours(bodies)[samples.body] + strength * of_colour(CONTACT)
+    image = backdrop(camera.size, bodies.contacts is not None)
+    image[samples.covered] = reflected * (light_here + GLOW * strength * (1 - light_here))
+    image[samples.covered] *= np.where(outlines(samples, contact), OUTLINE, 1)[:, None]
     return render.shrink(np.clip(image, 0, 1), SUPERSAMPLING) ** (1 / 2.2)

@@ -1,4 +1,4 @@
-"""Reads what stands where from scene files and from the states that runs of bvhbench simulate keep."""
+"""Reads what stands where from scene files and from the states that runs of bvhbench simulate keep, and which triangles meet from contacts files."""
 import dataclasses
 import struct
 
@@ -17,6 +17,7 @@ class Bodies:
     fixed: np.ndarray
     rotation: np.ndarray
     translation: np.ndarray
+    contacts: np.ndarray | None = None  # bool [body, source face]: which triangles meet others; None: not asked for
 
     @property
     def diagonals(self):
@@ -33,6 +34,7 @@ class Bodies:
 class Shape:
     triangles: np.ndarray  # [t,3,3]
     closed: bool
+    face: np.ndarray  # [t]: of the source file
 
     @property
     def box(self):
@@ -55,10 +57,11 @@ def is_closed(triangles):
 
 def read_shape(path, level):
     try:
-        triangles = bvh_file.read(path, level).world
+        file = bvh_file.read(path, level)
+        triangles, face = file.world, file.source_face
     except (AssertionError, KeyError, struct.error) as error:
         raise ValueError(f"{path}: not a .bvh file that can be read") from error
-    return Shape(triangles, is_closed(triangles))
+    return Shape(triangles, is_closed(triangles), face)
 
 
 def read_shapes(path, file, group):
@@ -109,3 +112,15 @@ def read(path, wanted):
         if wanted:
             raise ValueError("is a scene, which has no frames")
         return read_scene(path, file)
+
+
+def read_contacts(path, bodies):
+    """The bodies with the contacts that `bvhbench query --out` found of their scene file."""
+    with h5py.File(path) as file:
+        pair = file["pairs"][:][file["contacts/pair"][:]].astype(int)
+        face = np.stack([file["contacts/face_a"][:], file["contacts/face_b"][:]], 1).astype(int)
+    contacts = np.zeros((len(bodies.asset), max(int(shape.face.max()) for shape in bodies.shapes) + 1), bool)
+    if pair.size and (pair.max() >= contacts.shape[0] or face.max() >= contacts.shape[1]):
+        raise ValueError(f"{path}: holds the contacts of another scene")
+    contacts[pair, face] = True
+    return dataclasses.replace(bodies, contacts=contacts)

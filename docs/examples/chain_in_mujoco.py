@@ -7,6 +7,8 @@ except ImportError:
     print("needs the package mujoco")
     sys.exit(77)
 
+import numpy as np
+
 import tandem.mujoco
 from shapes import torus
 
@@ -23,10 +25,19 @@ contacts = tandem.mujoco.MeshContacts(model)
 while data.time < 2:
     mujoco.mj_step(model, alone)
     contacts.step(data)
+    if alone.time < 0.1:
+        thrown = alone.geom_xpos.copy(), alone.geom_xmat.reshape(-1, 3, 3).copy()
 
 for i in range(1, LINKS):
     below, below_alone = (2 - state.body(f"link {i}").xpos[2] for state in (data, alone))
     print(f"link {i} hangs {below:.2f} m below the first" + (", alone MuJoCo has lost it" if below_alone > 5 else ""))
 
 if "--picture" in sys.argv:
-    tandem.view(contacts.assets, contacts.instances, contacts=True, picture="chain_in_mujoco.png", size=(640, 400), azimuth=30, elevation=10)
+    from tandem.viewer import View
+
+    both = np.concatenate([contacts.instances, contacts.instances])
+    both["translation"][LINKS:], both["rotation"][LINKS:] = thrown[0] + [-0.35, 0.6, 0], thrown[1]
+    shown = View(contacts.assets, both, contacts=True, off_screen=True, size=(640, 480), azimuth=30, elevation=10)
+    shown.plotter.add_text("contacts of\nthe meshes,\nafter 2 s", position=(30, 360), font_size=11)
+    shown.plotter.add_text("MuJoCo\nalone, after\n0.1 s", position=(490, 360), font_size=11)
+    shown.picture("chain_in_mujoco.png")

@@ -36,5 +36,12 @@ for verdict, meaning in ((tandem.APART, "surely apart"), (tandem.TOUCH, "surely 
     print(f"{len(rows):4} pairs {meaning}, of which {np.count_nonzero(rows['level_a'])} were decided at a coarser level")
 
 if "--picture" in sys.argv:
-    side_by_side = tandem.instances(np.zeros(len(cow.levels), int), translation=[[1.7 * k, 0, 0] for k in range(len(cow.levels))])
-    tandem.view([cow], side_by_side, levels=np.arange(len(cow.levels)), color="level", picture="how_fine.png", size=(640, 240), azimuth=-80, elevation=12)
+    from tandem.viewer import View
+
+    places = np.array([[1.6 * (k % 3), 0, -1.4 * (k // 3)] for k in range(len(cow.levels))])
+    side_by_side = tandem.instances(np.zeros(len(places), int), translation=places)
+    shown = View([cow], side_by_side, levels=np.arange(len(places)), color="asset", off_screen=True, size=(640, 420), azimuth=-90, elevation=5)
+    told = [f"{level.triangle_count:,} triangles\n{100 * level.error_bound / diagonal:.2f} % off at most" for level in cow.levels]
+    shown.plotter.add_point_labels(places - shown.origin + [0, 0, -0.1], told, font_size=15, bold=False, shape=None, show_points=False,
+                                   always_visible=True, justification_horizontal="center", justification_vertical="top")
+    shown.picture("how_fine.png")

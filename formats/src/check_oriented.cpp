@@ -80,7 +80,7 @@ class OrientedWalk {
     return oriented.size == oriented_size(oriented) ? Status::kOk : Status::kBadOrientedBox;
   }
 
-  // Finite, and no farther from the origin than the slack of the tests allows: docs/box_test.md, section 5.
+  // Finite, and no farther from the origin than the slack of the tests allows: docs/oriented_box_test.md.
   bool is_real_box(const Box& box) const {
     bool sound = true;
     for (int k = 0; k < 3; ++k) {

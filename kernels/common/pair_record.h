@@ -15,7 +15,7 @@
 // way.
 namespace tandem::gpu {
 
-using Counter = unsigned long long;  // what atomicAdd takes
+using Counter = unsigned long long;                   // what atomicAdd takes
 inline constexpr Counter kNoTriangles = ~Counter{0};  // where two triangles are kept as one number
 
 /// The record of an object pair that the walk needs, in whole float4.

@@ -50,7 +50,7 @@ struct OrientedPose {
 };
 
 /// The slack of the tests of all blocks of two trees, from the pose that relative_pose() made of them, such
-/// that what overlap_oriented() calls apart is apart. Proof: docs/box_test.md, section 5. Condition: the pose
+/// that what overlap_oriented() calls apart is apart. Proof: docs/oriented_box_test.md. Condition: the pose
 /// is in range. length: in a's frame; what is apart is then farther apart than that.
 TANDEM_HD inline float oriented_slack(const RelativePose& b_in_a, const TreeExtent& tree_a,
                                       const TreeExtent& tree_b, float length = 0) {
@@ -144,7 +144,7 @@ TANDEM_HD inline float a_along_b(const OrientedPose& pose, int j, const float (&
 }  // namespace oriented_terms
 
 /// Returns whether no face normal of either box separates them: if it says no, no posed triangles in the
-/// boxes meet, in exact arithmetic, as docs/box_test.md says.
+/// boxes meet, in exact arithmetic, as docs/oriented_box_test.md says.
 inline bool overlap_oriented(const Box& a, const Box& b, const OrientedPose& pose) {
   bool overlap = true;
   for (int k = 0; k < 3; ++k) {

@@ -55,7 +55,7 @@ def save(figure, out, legend=None, across=4, note=""):
     top = 0.25 * bool(note) / figure.get_figheight()
     figure.set_layout_engine("constrained", rect=(0, bottom, 1, 1 - bottom - top))
     if legend:
-        figure.legend(legend.values(), legend.keys(), loc="lower centre", ncol=across, columnspacing=1.5, handletextpad=0.5, borderaxespad=0.2)
+        figure.legend(legend.values(), legend.keys(), loc="lower center", ncol=across, columnspacing=1.5, handletextpad=0.5, borderaxespad=0.2)
     if note:
         figure.text(0.01, 0.99, note, va="top")
     pixels = io.BytesIO()

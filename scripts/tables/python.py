@@ -1,4 +1,4 @@
-"""The tables of docs/python_trimesh.md: what `compare_python_fcl` and `python_peers` measured."""
+"""Tables of docs/python_trimesh.md and docs/results/python_tables.md: what `compare_python_fcl` and `python_peers` measured."""
 from common.tabular import markdown, three_digits, whole
 
 
@@ -12,6 +12,15 @@ def errors(rows):
     return markdown(heads, lines)
 
 
+def managers(rows):
+    """One row for each pile: milliseconds of a frame by both collision managers."""
+    peers = {"tandem.trimesh, names": "`tandem.trimesh`, names", "trimesh + python-fcl, names": "python-fcl, names",
+             "tandem.trimesh, data": "`tandem.trimesh`, data", "trimesh + python-fcl, data": "python-fcl, data"}
+    found = {(int(row["bodies"]), row["peer"]): float(row["frame_ms"]) for row in rows}
+    lines = [[whole(bodies), *(three_digits(found[bodies, peer]) for peer in peers)] for bodies in dict.fromkeys(bodies for bodies, _ in found)]
+    return markdown(["cows", *peers.values()], lines, "r")
+
+
 def speed(rows):
     """One row for each peer, three columns for each scene."""
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
@@ -23,10 +32,3 @@ def speed(rows):
         lines.append([peer] + [text for row in cells for text in (three_digits(float(row["set_up_ms"])), three_digits(float(row["frame_ms"])),
                                                                   whole(int(row["missed"]) + int(row["invented"])))])
     return markdown(heads, lines)
-
-
-def on_a_gpu(rows):
-    """One row for each scene."""
-    return markdown(["scene", "peer", "set up", "frame", "contacts", "wrong"],
-                    [[row["scene"], row["peer"], three_digits(float(row["set_up_ms"])), three_digits(float(row["frame_ms"])), whole(int(row["contacts"])),
-                      whole(int(row["missed"]) + int(row["invented"]))] for row in rows], "ll")

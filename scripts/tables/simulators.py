@@ -1,11 +1,5 @@
-"""Tables of scripts/simulator_peers: contacts in random poses, and what becomes of bodies."""
+"""Tables of scripts/simulator_peers: what becomes of bodies."""
 from common import tabular
-
-
-def pairs(rows):
-    header = ["bodies", "peer", "poses that touch", "missed", "poses apart", "invented"]
-    cells = [[row["case"], _name(row), row["touch"], row["missed"], row["apart"], row["invented"]] for row in rows if row["touch"]]
-    return tabular.markdown(header, cells, "ll")
 
 
 def scenes(rows):

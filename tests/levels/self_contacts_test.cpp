@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 
 #include "kernels/asked.h"
@@ -62,6 +63,20 @@ TEST(SelfContacts, AreThoseOfTheContactQuery) {
 
 TEST(SelfContacts, OfASolidThereAreNone) {
   EXPECT_EQ(count_self_contacts(StoredLevel(sphere(1, 4)).view(), 0), 0u);
+}
+
+TEST(SelfContacts, AreNotCountedWhereAllTrianglesShareAnEdge) {
+  const auto fan = [](std::uint32_t count) {
+    Mesh mesh;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const double angle = 6.28 * i / count;
+      mesh.add({0, 0, 0}, {0, 0, 1},
+               {static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)), 0.5f});
+    }
+    return mesh;
+  };
+  EXPECT_EQ(count_self_contacts(StoredLevel(fan(3000)).view()), 0u);
+  EXPECT_EQ(count_self_contacts(StoredLevel(fan(20'000)).view()), std::nullopt);
 }
 
 }  // namespace

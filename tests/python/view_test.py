@@ -185,6 +185,22 @@ def test_opacity_is_what_was_asked_for(shown, box):
     np.testing.assert_allclose(colour[1], 0.75 * colour[0] + 0.25 * colour[2], atol=3)
 
 
+def test_translucent_bodies_have_dark_outlines(shown, box, monkeypatch):
+    def pictures(opacity):
+        for most in (viewer.OUTLINED, 23):  # both boxes together have 24 triangles
+            monkeypatch.setattr(viewer, "OUTLINED", most)
+            yield shown([box], tandem.instances([0, 0], translation=[[0, 0, 0], [0, 3, 0]]), azimuth=0, elevation=0, opacity=opacity).picture().astype(int)
+        monkeypatch.undo()
+
+    with_lines, without = pictures(0.35)
+    darker = (without - with_lines).max(axis=2)
+    lines, bodies = darker > 20, ~is_backdrop(without)
+    assert darker.min() > -20 and 0.02 < lines.sum() / bodies.sum() < 0.2 and not (lines & ~grown(bodies)).any()
+    assert (grown(lines) | inner(bodies) | ~bodies).all()  # all around the bodies
+    for opacity in (0, 1):
+        assert np.array_equal(*pictures(opacity))
+
+
 # ---- What queries find
 
 def test_triangles_that_meet_are_red_and_no_others(shown, box):
@@ -325,7 +341,7 @@ def test_levels_are_those_asked_for(shown, levelled):
     view = shown([asset], instances, levels=[0, coarsest], color="level")
     assets = [asset, asset.levels_from(coarsest)]
     expected = body_of_pixels(view, assets, tandem.instances([0, 1], translation=instances["translation"]))
-    colours = matplotlib.colormaps["viridis"]([0.0, 1.0], bytes=True)[:, :3]
+    colours = matplotlib.colormaps["viridis"]([0.0, 0.8], bytes=True)[:, :3]
     picture = view.picture()
     for body in (0, 1):
         where = (expected == body) & inner(expected)

@@ -112,6 +112,35 @@ class RenderedScenes(RenderTest):
         self.assertEqual(self.render(self.scene, *FROM_X, name="b.png")[1].read_bytes(), first)
 
 
+class RenderedContacts(RenderTest):
+    def picture_of_contacts(self, translations):
+        self.write_scene(translations)
+        self.passes("query", self.scene, "--out", self.contacts)
+        return self.picture(self.scene, "--contacts", self.contacts, *FROM_X)
+
+    def redness(self, picture):
+        return picture[..., 0] - picture[..., 1:].max(axis=-1)
+
+    def test_triangles_that_meet_are_red_and_no_others(self):
+        red = self.redness(self.picture_of_contacts([[0, 0, 0], [0, 0.5, 0.5], [0, 3, 0]])) > 0.4
+        self.assertGreater(red[:, :60].mean(), 0.05)
+        self.assertFalse(red[:, 80:].any())
+        self.assertFalse((self.redness(self.picture(self.scene, *FROM_X)) > 0.4).any())
+
+    def test_a_body_that_hides_them_lets_them_shine_through(self):
+        met = self.picture_of_contacts([[0, 0, 0], [0.2, 0.1, 0.1], [1.3, 0.05, 0.05]])
+        apart = self.picture_of_contacts([[0, 0, 0], [0, 5, 0], [1.3, 0.05, 0.05]])
+        self.assertGreater(self.redness(met[30, 55:65]).min(), 0.1)
+        self.assertLess(self.redness(apart).max(), 0.1)
+
+    def test_contacts_of_another_scene_are_refused(self):
+        self.picture_of_contacts([[0, 0, 0], [0, 0.5, 0.5], [0, 3, 0]])
+        self.write_scene([[0, 0, 0]])
+        result, _ = self.render(self.scene, "--contacts", self.contacts)
+        self.assertEqual(result.returncode, UNREADABLE_INPUT)
+        self.assertIn(b"holds the contacts of another scene", result.stderr)
+
+
 class RenderedRuns(RenderTest):
     def test_a_state_of_a_run_looks_as_the_scene_made_of_it(self):
         run = self.pile()

@@ -2,7 +2,6 @@
 
 #include <sys/resource.h>
 
-#include "bvhbuild/levels/self_contacts.h"
 #include "common/number_words.h"
 #include "common/printable.h"
 #include "statistics/statistics_json.h"
@@ -84,8 +83,7 @@ std::string level_words(const Outcome& outcome, std::size_t i) {
                     100 * level.error_bound_relative);
   }
   if (level.closed) words += *level.closed ? ", closed" : ", not closed";
-  if (!level.self_contacts)
-    return words + ", meets itself at more than " + with_commas(kMostSelfContacts) + " pairs of triangles";
+  if (!level.self_contacts) return words + ", meets itself too often to be counted";
   if (*level.self_contacts == 0) return words;
   return words + ", meets itself at " +
          number_of(*level.self_contacts, "pair of triangles", "pairs of triangles");

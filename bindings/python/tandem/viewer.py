@@ -15,21 +15,25 @@ from tandem.scene_files import Scene, at_levels, read
 
 # matplotlib and vtk have no types, and what pyvista's decorators make of its own says nothing to mypy.
 matplotlib: Any = importlib.import_module("matplotlib")
+importlib.import_module("matplotlib.colors")
 pyvista: Any = importlib.import_module("pyvista")
 vtk: Any = importlib.import_module("vtk")
 
 Points = NDArray[np.float64]
 Mesh = Any  # pyvista.PolyData
 
-BODY_COLOURS = ("bf826e", "d4ad7a", "9da985", "789997", "8294ac", "9f8aa3", "c69da1", "bcb693", "90a7b8", "a88673",
-                "decaa5", "838da2")
+# None is near the red of contacts.
+BODY_COLOURS = ("d9982b", "8f6b3d", "98933a", "7f5fb0", "cdb06c", "3a68b0", "2f8f86", "5b7d9c", "4aa3d4", "44548c",
+                "6f9e3e", "a890cc")
 FIXED_COLOUR = "cbc6b9"
 CONTACT_COLOUR = "d1202f"
 NORMAL_COLOUR = "1b1b1b"
 TREE_COLOUR = "2a4d8f"
-BACKGROUND = ("fbfaf7", "e4eaef")  # below, above
+OUTLINE_COLOUR = "202020"
+OUTLINED = 500_000  # triangles of translucent bodies up to which these have outlines, found anew for each picture
+BACKGROUND = ("ffffff", "eef2f6")  # below, above
 TRANSLUCENT = 0.35
-POINT_PIXELS = 12
+POINT_PIXELS = 16
 VIEW_ANGLE = 24  # degrees, from the lower edge to the upper
 MARGIN = 0.03  # of the picture, on either side
 SUPERSAMPLING = 5**0.5  # vtkSSAAPass draws a picture so many times as wide and as high
@@ -83,7 +87,8 @@ class View:
         window a slider chooses.
     tree_depth: the boxes of the tree's nodes at this depth, from 0 (tandem.tree.boxes()). In a window a slider chooses.
     color: "body", "asset" or "level", with a legend: what has one of its own. Fixed bodies are grey but for "level".
-    opacity: of the bodies, 0 to 1; 1, or 0.35 where there is something to see inside.
+    opacity: of the bodies, 0 to 1; 1, or 0.35 where there is something to see inside. Translucent bodies have dark outlines, but
+        not where they have too many triangles together for that, half a million.
     size: width and height in pixels; of a picture at most what VTK can draw, such as 7,327 each.
     azimuth, elevation: degrees. From where one looks: 0 from +x, 90 from +y; above the horizon, z is up.
 
@@ -269,6 +274,7 @@ class View:
 
     def _draw(self) -> None:
         self._draw_bodies()
+        self._draw_outlines()
         self._draw_found()
         self._draw_tree()
         self.plotter.renderer.ResetCameraClippingRange()
@@ -283,6 +289,35 @@ class View:
             points["orientation"] = _quaternions(self.scene.rotation[self.state][of_it]).astype(np.float32)
             points["colour"] = colour[of_it]
             mapper.SetInputData(points)
+
+    def _draw_outlines(self) -> None:
+        """Translucent bodies hide no edge of each other, and have a dark line where they turn away from the eye."""
+        count = sum(len(self._triangles[row]) for row in self._asset)
+        if not 0 < self.opacity < 1 or count > OUTLINED:
+            return
+        points, corners, first = [], [], 0
+        for row, triangles in enumerate(self._triangles):
+            joined = _surface(triangles).clean()  # edges have two sides where triangles share their vertices
+            body = np.flatnonzero(self._asset == row)
+            posed = self._posed(body, np.tile(joined.points, (len(body), 1, 1))).reshape(-1, 3)
+            offset = first + len(joined.points) * np.arange(len(body))
+            corners.append((joined.regular_faces + offset[:, None, None]).reshape(-1, 3))
+            points.append(posed)
+            first += len(posed)
+        found = vtk.vtkPolyDataSilhouette()
+        found.SetInputData(pyvista.PolyData.from_regular_faces(np.concatenate(points), np.concatenate(corners)))
+        found.SetCamera(self.plotter.camera)
+        found.SetEnableFeatureAngle(False)
+        found.SetBorderEdges(True)
+        mapper = vtk.vtkPolyDataMapper()
+        mapper.SetInputConnection(found.GetOutputPort())
+        actor = vtk.vtkActor()
+        actor.SetMapper(mapper)
+        actor.GetProperty().SetColor([part / 255 for part in _rgb(OUTLINE_COLOUR)])
+        actor.GetProperty().SetOpacity(0.7)
+        actor.GetProperty().SetLineWidth(1.5)
+        actor.GetProperty().SetLighting(False)
+        self.plotter.add_actor(actor, name="outlines", reset_camera=False, render=False)
 
     def body_colours(self) -> NDArray[np.uint8]:
         """The colour of each body, sRGB, (n, 3)."""
@@ -341,7 +376,7 @@ class View:
             ends = np.stack([near["point_a"], near["point_b"]], 1) - self.origin
             lines = pyvista.line_segments_from_points(ends.reshape(-1, 3))
             lines.cell_data["distance"] = near["upper"]
-        self._put("distances", lines, scalars="distance", cmap="viridis", clim=_from_zero(near["upper"]), line_width=4,
+        self._put("distances", lines, scalars="distance", cmap=_dark_viridis(), clim=_from_zero(near["upper"]), line_width=4,
                   scalar_bar_args=_bar("distance", 0 if self._manifolds is False else 1))
 
     def _draw_tree(self) -> None:
@@ -366,6 +401,8 @@ class View:
             self.plotter.remove_actor(name, reset_camera=False, render=False)
             return
         actor = self.plotter.add_mesh(mesh, name=name, reset_camera=False, render=False, **options)
+        if title:
+            self.plotter.scalar_bars[title].SetVerticalTitleSeparation(8)
         actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()  # what is on a body is seen on it
         actor.mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(-2, -2)
         actor.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-2, -2)
@@ -458,9 +495,14 @@ def _quaternions(rotation: Points) -> Points:
     return found
 
 
+def _dark_viridis() -> Any:
+    """The colour map without its yellow, which is faint on white."""
+    return matplotlib.colors.ListedColormap(matplotlib.colormaps["viridis"](np.linspace(0, 0.8, 256)))
+
+
 def _level_colours(count: int) -> NDArray[np.uint8]:
     """Returns the colours of the levels, that of the finest first, (count, 3)."""
-    colours: NDArray[np.uint8] = matplotlib.colormaps["viridis"](np.linspace(0, 1, count), bytes=True)[:, :3]
+    colours: NDArray[np.uint8] = _dark_viridis()(np.linspace(0, 1, count), bytes=True)[:, :3]
     return colours
 
 

@@ -1,4 +1,4 @@
-// Blocks in frames of their own: what the proof in docs/box_test.md, section 5, says of each step.
+// Blocks in frames of their own: what the proof in docs/oriented_box_test.md says of each step.
 #include "tandem/formats/oriented_block.h"
 
 #include <gtest/gtest.h>

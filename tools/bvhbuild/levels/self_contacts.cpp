@@ -11,6 +11,9 @@
 namespace tandem::build {
 namespace {
 
+// Surfaces have some 10 to 30 triangles whose boxes meet that of a triangle; a fan round one edge has all.
+constexpr std::uint64_t kMostLooks = 16'000'000, kMostLooksPerTriangle = 64;
+
 // The bounds of a triangle.
 struct Range {
   double lower[3], upper[3];
@@ -46,38 +49,50 @@ bool meet_apart_from_corners(const Triangle& a, const Triangle& b) {
   return !detail::share_corner(pair) && decide(pair).verdict == Verdict::contact;
 }
 
-// Returns how many triangles after this one, in leaf order, it meets; may stop where that is more than
+// Pairs of triangles that were looked at, and those of them that meet.
+struct PairCounts {
+  std::uint64_t looks = 0, contacts = 0;
+};
+
+// Counts the pairs of this triangle with those after it in leaf order; may stop where that is more than
 // `most`.
-std::uint64_t count_later(const LevelView& level, std::uint32_t triangle, std::uint64_t most) {
+PairCounts count_later(const LevelView& level, std::uint32_t triangle, const PairCounts& most) {
   const Triangle& own = level.triangles[triangle];
   const Range range(own);
   // A block leaves at most three of its four children behind, on each of at most kMaxDepth levels.
   std::uint32_t stack[3 * kMaxDepth + 1] = {0};
-  std::uint64_t count = 0;
-  for (int size = 1; size > 0 && count <= most;) {
+  PairCounts counts;
+  for (int size = 1; size > 0 && counts.contacts <= most.contacts && counts.looks <= most.looks;) {
     const Block& block = level.blocks[stack[--size]];
     for (int node = 0; node < kNodesPerBlock; ++node) {
       const std::uint32_t index = block.index[node];
       if (block.kind[node] == NodeKind::imaginary || !range.may_meet(block, node)) continue;
-      if (block.kind[node] == NodeKind::internal)
+      if (block.kind[node] == NodeKind::internal) {
         stack[size++] = index;
-      else if (index > triangle)
-        count += meet_apart_from_corners(own, level.triangles[index]) ? 1 : 0;
+      } else if (index > triangle) {
+        ++counts.looks;
+        counts.contacts += meet_apart_from_corners(own, level.triangles[index]);
+      }
     }
   }
-  return count;
+  return counts;
 }
 
 }  // namespace
 
 std::optional<std::uint64_t> count_self_contacts(const LevelView& level, std::uint64_t most) {
-  std::atomic<std::uint64_t> count = 0;
+  const PairCounts limit = {kMostLooks + kMostLooksPerTriangle * level.triangle_count, most};
+  std::atomic<std::uint64_t> looks = 0, contacts = 0;
+  const auto too_many = [&] { return looks > limit.looks || contacts > limit.contacts; };
   parallel::for_parts(level.triangle_count, 64, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t triangle = begin; triangle < end && count <= most; ++triangle)
-      count += count_later(level, static_cast<std::uint32_t>(triangle), most);
+    for (std::size_t triangle = begin; triangle < end && !too_many(); ++triangle) {
+      const PairCounts counts = count_later(level, static_cast<std::uint32_t>(triangle), limit);
+      looks += counts.looks;
+      contacts += counts.contacts;
+    }
   });
-  if (count > most) return std::nullopt;
-  return count;
+  if (too_many()) return std::nullopt;
+  return contacts;
 }
 
 }  // namespace tandem::build

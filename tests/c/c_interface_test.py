@@ -146,7 +146,7 @@ class CInterfaceTest(unittest.TestCase):
 
     @unittest.skipIf(shutil.which("rustc") is None, "no rustc")
     def test_the_program_in_rust_says_what_the_one_in_c_says(self):
-        self.in_rust(re.search(r"^```rust\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)[1])
+        self.in_rust((ROOT / "tests/c/contacts.rs").read_text(encoding="utf-8"))
         subprocess.run([os.environ["TANDEM_BVHBUILD"], ROOT / "assets/box_12.obj", "-o", self.folder / "box.bvh", "--quiet"], check=True)
         told = subprocess.run([self.folder / "main", self.folder / "box.bvh"], capture_output=True, text=True, env=os.environ | {"LD_LIBRARY_PATH": str(LIBRARY.parent)})
         self.assertEqual((told.returncode, told.stderr), (0, ""))

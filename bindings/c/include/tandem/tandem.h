@@ -47,20 +47,20 @@ typedef uint32_t tandem_status;
 enum {
   TANDEM_OK = 0,
   // The use of this interface, and what the system refuses.
-  TANDEM_NULL_ARGUMENT = 1,    ///< a pointer or a list that is not empty is null; where: its place in a list
+  TANDEM_NULL_ARGUMENT = 1,    ///< a pointer that must be there is null; where: its place in a list
   TANDEM_BAD_STRUCT_SIZE = 2,  ///< struct_size was not set, or a field is set that this version does not know
   TANDEM_BAD_OPTION = 3,       ///< a number names no choice, or a reserved field is not zero
   TANDEM_OUT_OF_MEMORY = 4,    ///< the allocator, or the machine, has not enough memory
   TANDEM_CANNOT_START_THREAD = 5,  ///< the system refuses to start a thread
   TANDEM_INTERNAL_ERROR = 6,       ///< a defect of the library
   TANDEM_UNKNOWN_LEVEL = 7,        ///< the asset does not have the level or part
-  TANDEM_FILTER_MISMATCH = 8,      ///< a filter is of another number of bodies
-  TANDEM_CONTACTS_MISSING = 9,  ///< manifolds or contained bodies are asked for, and the contacts that they
-                                ///< need were not found of the bodies as they stand
-  TANDEM_NO_TRIANGLE = 11,      ///< none of the triangles can be used
+  TANDEM_FILTER_MISMATCH = 8,      ///< a filter's arrays do not have one entry for each body
+  TANDEM_CONTACTS_MISSING = 9,     ///< manifolds or contained bodies need contacts that were not found, or
+                                   ///< bodies have moved since
+  TANDEM_NO_TRIANGLE = 11,         ///< none of the triangles can be used
   TANDEM_TOO_MANY_TRIANGLES = 12,  ///< there are 2^32 - 1 triangles or more
-  TANDEM_ASSETS_MISSING = 13,  ///< a handle of tandem_cuda.h was given no assets, or others than the query
-                               ///< whose contacts it takes
+  TANDEM_ASSETS_MISSING = 13,  ///< a handle of tandem_cuda.h has no assets, or others than the query whose
+                               ///< contacts it takes
   // A file, or bytes of one. Of a file with several defects one is returned.
   // clang-format off
   TANDEM_FILE_NOT_FOUND = 100, TANDEM_NOT_A_REGULAR_FILE = 101, TANDEM_CANNOT_OPEN = 102,

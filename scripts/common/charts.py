@@ -5,6 +5,8 @@ import math
 import matplotlib
 import PIL.Image
 
+from .colours import BLACK, BLUE, FAINT, GREEN, ORANGE, PURPLE, SKY, VERMILION  # noqa: F401  (for those who draw charts)
+
 matplotlib.use("Agg")
 matplotlib.rcParams.update({
     "svg.hashsalt": "tandem", "font.size": 9, "axes.titlesize": 9.5, "legend.fontsize": 9, "xtick.labelsize": 8.5, "ytick.labelsize": 8.5,
@@ -13,10 +15,6 @@ matplotlib.rcParams.update({
 import matplotlib.pyplot as plt  # noqa: E402  (after the choice of backend)
 
 WIDTH = 8  # inches. Pages show charts about 800 pixels wide, where 9 points are 12 pixels.
-# Of Okabe and Ito's palette (Color Universal Design), which people with any of the usual colour blindnesses tell apart; without its yellow, which is too
-# faint on white. Some are alike in grey, so markers and dashes differ too.
-BLACK, BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY = "#000000", "#0072b2", "#d55e00", "#009e73", "#e69f00", "#cc79a7", "#56b4e9"
-FAINT = "#d0d0d0"
 
 
 def panels(rows, columns, height, **options):

@@ -379,6 +379,21 @@ class Signals(ToolTest):
                 os.close(reading)
                 self.assert_nothing_written()
 
+    def test_a_file_that_is_cut_short_while_it_is_read_is_told(self):
+        self.assertEqual(self.build(self.write("large.ply", grid_ply(300)), "-o", self.out, "--effort", "fast", "--quiet").returncode, DONE)
+        whole, gone, told = self.out.read_bytes(), "a file was cut short, or its disk failed, while it was read\n", set()
+        for delay in (k % 60 for k in range(600)):  # where the file is cut before it is mapped it is only too short
+            self.out.write_bytes(whole)
+            process = subprocess.Popen([BVHINFO, "--verify", self.out], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+            time.sleep(0.001 * delay)
+            os.truncate(self.out, 4096)
+            message = process.communicate(timeout=20)[1].decode()
+            self.assertIn(process.returncode, (DONE, UNREADABLE_INPUT), message)
+            told.add(message.partition(": ")[2])
+            if gone in told:
+                break
+        self.assertIn(gone, told)
+
     def test_a_signal_during_writing_leaves_no_part_of_a_file(self):
         mesh = self.write("large.ply", grid_ply(400))
         killed = 0

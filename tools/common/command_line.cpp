@@ -1,10 +1,15 @@
 #include "command_line.h"
 
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <array>
 #include <charconv>
+#include <csignal>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <filesystem>
 
 #include "number_words.h"
@@ -166,8 +171,23 @@ void Command::end_help(const std::string& text) const {
   app_->footer(text);
 }
 
+namespace {
+
+char g_file_is_gone[128] = "";
+
+// A page of a mapped file cannot be read. What is called here may be called in a signal handler.
+[[noreturn]] void tell_that_a_file_is_gone(int) {
+  const ssize_t written = ::write(STDERR_FILENO, g_file_is_gone, std::strlen(g_file_is_gone));
+  ::_exit(written < 0 ? kInternal : kUnreadableInput);
+}
+
+}  // namespace
+
 Tool::Tool(const char* name, const char* help, const char* version) : Command(new CLI::App(help, name)) {
   app_->set_version_flag("--version", std::string(name) + " " + version);
+  std::snprintf(g_file_is_gone, sizeof g_file_is_gone,
+                "%s: a file was cut short, or its disk failed, while it was read\n", name);
+  std::signal(SIGBUS, tell_that_a_file_is_gone);
 }
 
 Tool::~Tool() {

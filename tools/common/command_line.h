@@ -140,6 +140,7 @@ class Command {
 class Tool : public Command {
  public:
   /// version: what --version prints.
+  /// Effect: a mapped file that is cut short ends the process with a message and kUnreadableInput.
   Tool(const char* name, const char* help, const char* version);
   ~Tool();
   Tool(const Tool&) = delete;

@@ -2,6 +2,16 @@ include(GNUInstallDirs)
 # Components of the installation: dev, but for shared libraries (libs, cuda), commands (tools) and the Python package (python).
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME dev)
 
+# Compiles what follows in this folder with -O1 where TANDEM_ONLY_TESTED says that only tests run it. Not for what cost_test counts: of
+# a template that two sources instantiate, the linker may choose either copy.
+macro(tandem_compile_fast_for_tests)
+  if(TANDEM_ONLY_TESTED)
+    foreach(language CXX CUDA)
+      string(REPLACE -O3 -O1 CMAKE_${language}_FLAGS_RELEASE "${CMAKE_${language}_FLAGS_RELEASE}")
+    endforeach()
+  endif()
+endmacro()
+
 # Flags that every target of the project is compiled with. -ffp-contract=off: promised results must not depend
 # on whether a compiler fuses a multiply and an add. Headers that are not installed are spelled from the project's
 # root on, such as "kernels/geometry/triangle_test.h".

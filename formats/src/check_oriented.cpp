@@ -18,7 +18,7 @@ bool is_legal(const BlockRotation& rotation) {
   return !all_zero;
 }
 
-// The same quantity of two triangles, side by side.
+// Holds a quantity of two triangles side by side.
 typedef double Two __attribute__((vector_size(16)));
 
 // Walks the blocks as they lie, which is depth first, with the number of each one's oriented block.

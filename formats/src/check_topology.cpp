@@ -38,7 +38,7 @@ bool same_position(const float* p, const float* q) {
   return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
 }
 
-// Of positions that are the same, -0 being 0, the same number.
+// Returns a number that is the same for the same positions; -0 counts as 0.
 std::uint64_t hash(const float* position, std::uint64_t seed) {
   for (int k = 0; k < 3; ++k) {
     seed = (seed ^ std::bit_cast<std::uint32_t>(position[k] + 0.0f)) * 0x9e3779b97f4a7c15u;
@@ -70,7 +70,8 @@ class Joined {
   Array<std::uint32_t> below_;
 };
 
-// The same with a relation: whether a triangle and the lowest one must change their windings, or neither.
+// Joins triangles too, and keeps for each whether it and the lowest one must change their windings, or
+// neither.
 class JoinedWindings {
  public:
   bool make(std::uint32_t count) {

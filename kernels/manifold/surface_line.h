@@ -182,7 +182,7 @@ struct LineTest {
 
 /// Says which crossing of a line with a surface is asked for: the one nearest in height to `target`, between
 /// lower and upper, of triangles whose outward normals point along the frame's (facing 1) or against it (-1).
-/// Of two as near, the triangle that comes first is taken.
+/// If two are as near, the triangle that comes first is taken.
 struct LineQuestion {
   Vector2 at;
   double target, lower, upper;

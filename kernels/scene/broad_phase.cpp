@@ -115,8 +115,8 @@ void BroadPhase::split(Item* all, Range range) {
   for (Range right; halve(all, range, right);) split(all, right);
 }
 
-// The same by workers: the ranges do not depend on who splits them, nor when. Each round halves all that
-// there are, until there are enough.
+// Lets the workers split a range: the ranges do not depend on who splits them, nor when. Each round halves
+// all that there are, until there are enough.
 void BroadPhase::split(Item* all, Range range, Team team) {
   Range ranges[kMostRanges] = {range};
   const std::size_t enough = team.workers == 1 ? 1 : std::min(kMostRanges, kRangesForEach * team.workers);
@@ -187,8 +187,8 @@ std::uint32_t BroadPhase::meeting(const Group& a, const Group& b) {
   return mask;
 }
 
-// As above, of a pair of groups; each pair of boxes of a group with itself once. On levels that one tree has
-// not got, its root is child 0 of itself, which meets whatever one of its boxes meets.
+// Finds what meets of a pair of groups; each pair of boxes of a group with itself once. On levels that one
+// tree has not got, its root is child 0 of itself, which meets whatever one of its boxes meets.
 std::uint32_t BroadPhase::meeting(const TreePair& trees, const GroupPair& pair) {
   if (trees.same()) {
     const Group* const groups = trees.a.level(pair.level);

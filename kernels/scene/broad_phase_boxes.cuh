@@ -13,7 +13,7 @@ struct GivenBoxes {
   static constexpr bool kPosed = false;
   const WorldBox* boxes;
 
-  // The same, or grown ones, where they lie once they have been taken.
+  // Returns these boxes, or grown ones, where they lie once they have been taken.
   GivenBoxes lying_at(const WorldBox* taken) const { return {taken}; }
 
   __device__ std::uint32_t number(std::uint32_t i) const { return i; }

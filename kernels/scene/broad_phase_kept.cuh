@@ -21,7 +21,7 @@ class KeptWalk {
                       const Output& output, unsigned long long* waiting)
       : tree_(tree), scale_(scale), boxes_(boxes), rule_(rule), output_(output), waiting_(waiting) {}
 
-  // The same box in every lane.
+  // Runs with the same box in every lane.
   __device__ void run(const WorldBox& box, std::uint32_t number) {
     begin(box, number);
     int level = tree_.top;

@@ -69,7 +69,7 @@ class Walk {
  private:
   __device__ Node leaf(std::uint32_t i) const { return i < tree_.count[0] ? tree_.level(0)[i] : nothing(); }
 
-  // Of 32 nodes of a level: those that the group may meet, and that are not wholly before it.
+  // Returns which of 32 nodes of a level the group may meet and are not wholly before it.
   __device__ std::uint32_t children_hit(int level, std::uint32_t first) const {
     const std::uint32_t i = first + lane_index();
     const bool hit = i < tree_.count[level] && i >= group_ >> kFanOutBits * (level - 1) &&

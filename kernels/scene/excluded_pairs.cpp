@@ -5,7 +5,7 @@
 
 namespace tandem {
 
-// Of twice as many slots as pairs at least half are empty.
+// There are at least twice as many slots as pairs, so at least half are empty.
 Status ExcludedPairTable::set(std::span<const ObjectPair> pairs) {
   view_ = {};
   slots_.clear();

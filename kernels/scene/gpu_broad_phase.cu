@@ -242,8 +242,8 @@ struct gpu::HostOf<GpuBroadPhaseReport> : gpu::GpuHost<Outcome, GpuBroadPhaseRep
            ok(kept_nodes.reserve(nodes_over(fixed)));
   }
 
-  // As much as sorting up to the capacity takes: CUB asks for a part that does not depend on the number, and
-  // one that grows with it.
+  // Reserves what sorting up to the capacity takes: CUB asks for a part that does not depend on the number,
+  // and one that grows with it.
   bool reserve_sorting() {
     std::size_t bytes = 0, pair_bytes = 0;
     cub::DoubleBuffer<Key> key(keys.data(), other_keys.data());

@@ -314,7 +314,7 @@ TEST(Check, NamesHostileHeadersSectionsLevelsPartsAndTrees) {
     expect_all_named(sample(), attacks);
 }
 
-// Of all orders in which children come after their parents, one is right.
+// One of all orders in which children come after their parents is right.
 TEST(Check, AcceptsBlocksInDepthFirstOrderOnly) {
   std::mt19937 random(1);
   const Bytes original(make_file(random_mesh(24, 1)));  // 8 blocks

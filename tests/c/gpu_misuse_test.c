@@ -41,7 +41,7 @@ static void test_an_upload(tandem_asset* cube) {
 static const tandem_gpu_instances bodies = {NULL, NULL, 0, 0};
 static const tandem_gpu_pairs pairs = {NULL, NULL, 0, 0};
 
-// Of a kind of query: without a handle, without an allocator that gives, without assets.
+// Tests a kind of query without a handle, without an allocator that gives, and without assets.
 #define TEST_HANDLE(kind, use, room, result)                                  \
   do {                                                                        \
     kind* handle = NULL;                                                      \

@@ -130,7 +130,7 @@ static tandem_gpu_query_options grouped_contacts(void) {
   return options;
 }
 
-/// The same bodies for the CPU.
+/// Returns a scene of the same bodies on the CPU.
 static tandem_scene* cpu_scene(const tandem_instance* bodies) {
   tandem_scene* scene = scene_of(assets, 3, NULL);
   CHECK_STATUS(tandem_scene_place(scene, bodies, kBodies, NULL), TANDEM_OK);

@@ -64,7 +64,7 @@ class EngineContract : public testing::TestWithParam<std::string_view> {
     reference_->set_shapes(pile_.assets.views());
   }
 
-  /// The same contacts as Tandem on the CPU. Result: these.
+  /// Expects the same contacts as Tandem finds on the CPU, and returns them.
   ContactList expect_same(std::span<const std::uint8_t> idle = {}) {
     const ContactList list = found_by(*engine_, pile_, idle), expected = found_by(*reference_, pile_, idle);
     EXPECT_TRUE(same(list, expected)) << list.triangles.size() << " of " << expected.triangles.size();

@@ -151,7 +151,8 @@ TEST_F(PaperContacts, OfALargeBodyAndASmallOneAreThoseOfTheCpu) {
   expect_contacts_of(scene, all_pairs(scene.instances, true, random));
 }
 
-// The same candidates, each once, as every node pair of the leaves says: no flag is lost and none is double.
+// Candidates are those that every node pair of the leaves says, each once: no flag is lost and none is
+// double.
 TEST_F(PaperContacts, OfRepeatedTrianglesAreAllPairs) {
   BodyScene scene;
   test::Mesh mesh;

@@ -260,7 +260,7 @@ struct AskedContacts : AskedOnGpu<GpuContactQuery> {
   Status find(const GpuContactOptions& options = {}, cudaStream_t stream = nullptr) {
     return query.find_contacts(scene.instances(), scene.pairs(), options, stream);
   }
-  /// As they lie in GPU memory.
+  /// Returns the contacts as they lie in GPU memory.
   std::vector<Contact> stored() const { return download(query.contacts(), report().contacts); }
   std::vector<Contact> contacts() const { return sorted(stored()); }
 };

@@ -286,7 +286,7 @@ class WalkModel {
     out.push_back(std::move(state));
   }
 
-  /// The same for states that differ by the order of the warps alone.
+  /// Returns a key that is the same for states that differ by the order of the warps alone.
   static std::uint64_t key_of(const State& state) {
     const auto mix = [](std::uint64_t& hash, std::uint64_t value) {
       hash = (hash ^ value) * 0x9E3779B97F4A7C15u;

@@ -28,7 +28,7 @@ class DistanceOracle {
 double oracle_volume_error(const double* p, const double* q, const double* r, const double* s,
                            double computed);
 
-/// The same for component k of (q - p) x (r - p).
+/// Returns the error of a computed component k of (q - p) x (r - p).
 double oracle_area_error(const double* p, const double* q, const double* r, int k, double computed);
 
 /// The sign of det(q - p, r - p, s - p), by rational numbers.

@@ -236,7 +236,8 @@ Mesh cubes_of_a_grid(float step, std::uint64_t seed) {
   return mesh;
 }
 
-/// The same surface where all triangles lie in planes of two axes and have edges along both.
+/// Divides the triangles, without a change of the surface if all lie in planes of two axes and have edges
+/// along both.
 Mesh divided(const Mesh& mesh) {
   Mesh parts;
   for (const auto& triangle : mesh.triangles) {

@@ -19,7 +19,7 @@ class StoredLevel {
   const AssetView& asset() const { return asset_; }
   const LevelView& view() const { return view_; }
 
-  /// The same without topology.
+  /// Returns the level without topology.
   LevelView triangles_only() const {
     LevelView view = view_;
     view.topology = nullptr;

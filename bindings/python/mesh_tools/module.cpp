@@ -25,8 +25,8 @@ using Part = std::tuple<std::string, std::string, std::uint64_t>;
 
 using python::copy_rows;
 
-// As python::rows_of(). own_readers: without assimp, which is run in a child process and needs a process with
-// one thread. outside_files: see ReadLimits.
+// Returns what python::rows_of() does. own_readers: without assimp, which is run in a child process and needs
+// a process with one thread. outside_files: see ReadLimits.
 nb::tuple read(const nb::bytes& path, bool own_readers, bool outside_files) {
   ImportOptions options;
   options.limits.outside_files = outside_files;

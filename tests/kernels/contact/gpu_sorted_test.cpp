@@ -21,7 +21,7 @@ std::vector<Contact> expected_of(const BodyScene& scene, const std::vector<Objec
   return contacts;
 }
 
-/// As if several triangles were cut of one face, as in a mesh of polygons.
+/// Numbers faces as if several triangles were cut of one, as in a mesh of polygons.
 void share_faces(const BodyScene& scene) {
   for (const AssetView& view : scene.assets.views()) {
     const LevelView level = view.level();

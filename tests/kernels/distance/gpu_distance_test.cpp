@@ -135,7 +135,7 @@ TEST_F(GpuDistances, OfManyPairsAreCertified) {
   const Distances distances = found.distances();
   for (std::size_t i = 0; i < pairs.size() && !HasFailure(); ++i)
     expect_certified(scene, pairs[i], distances[i], truth[i], {}, INFINITY);
-  // Those of a step ago lead to the same.
+  // Distances of a step ago lead to the same.
   ASSERT_EQ(found.find({.former = found.query.distances()}), Status::kOk);
   const Distances again = found.distances();
   for (std::size_t i = 0; i < pairs.size() && !HasFailure(); ++i)

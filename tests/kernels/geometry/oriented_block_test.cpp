@@ -180,7 +180,7 @@ struct Poses {
   TreeExtent a, b;
 };
 
-// Of trees that reach as far as `scale` says. False: out of range.
+// Makes poses of trees that reach as far as `scale` says. Returns false if they are out of range.
 bool relate(RandomPoses& random, const Scale& scale, Poses& out) {
   for (TreeExtent* extent : {&out.a, &out.b}) {
     for (int k = 0; k < 3; ++k) {

@@ -21,7 +21,7 @@ using test::on_gpu;
 using Impacts = std::vector<Impact>;
 using Pairs = std::vector<ObjectPair>;
 
-/// As test::gpu_options() has it.
+/// Returns the options that test::gpu_options() has, for impacts.
 GpuImpactOptions gpu_options(bool sorted = false) {
   GpuImpactOptions options;
   options.sorted = sorted;
@@ -120,7 +120,7 @@ TEST_P(GpuImpactFamilies, NothingTouchesUntilTSafeAndThenTheGapIsWhatIsTold) {
   RecordProperty("other_time", later);
   EXPECT_GT(found, count / 20);
   EXPECT_GT(none, 0);
-  // Those that come as near as the tolerance without meeting may stop or not.
+  // Bodies that come as near as the tolerance without meeting may stop or not.
   EXPECT_LE(other_status, count / 20);
   EXPECT_LE(later, count / 20);
 }

@@ -200,7 +200,7 @@ bool any_like(const std::vector<Seen>& all, const Seen& wanted, double tolerance
   });
 }
 
-// The same, and the depth, the centre and all points, in whatever order.
+// Returns whether one of them has the same depth, centre and points too, in whatever order.
 bool any_same(const std::vector<Seen>& all, const Seen& wanted, double tolerance) {
   return std::any_of(all.begin(), all.end(), [&](const Seen& s) {
     const auto has = [&](const Vector3& x) {

@@ -42,7 +42,7 @@ void expect_same(const PatchesOfPair& x, const PatchesOfPair& y) {
   }
 }
 
-// Of all pairs of a scene, by every variant that this machine has. Result: how many patches there are.
+// Compares all pairs of a scene by every variant that this machine has. Returns how many patches there are.
 std::size_t compare_variants(ManifoldScene& scene) {
   scene.find();
   std::vector<manifold::Shape> shapes;

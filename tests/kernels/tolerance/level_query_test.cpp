@@ -211,7 +211,7 @@ TEST(LevelQuery, TheSlackCoversRotationsThatAreNotQuiteRigidAndRounding) {
                               : scene.assets.mesh(0).points[8][2];
     const double aways[] = {0, 1, 1e7, 1e12};
     const double away = aways[random.below(4)];
-    // As large as is_rigid() lets pass, most often.
+    // Its scale is mostly as large as is_rigid() lets pass.
     Pose pose = random.pose({1, 1, 0, 0, 4});
     const double factor = random.below(3) == 0 ? 1 : 1 + 0.4999 * kRigidTolerance;
     for (auto& row : pose.rotation) {

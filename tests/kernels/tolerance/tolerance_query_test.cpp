@@ -89,7 +89,7 @@ TEST(ToleranceQuery, VerdictsAreThoseOfTheFinestLevelsWhereTheyAreCertain) {
     ASSERT_EQ(threaded.find(scene.instances, {.tolerance = tolerance}), Status::kOk);
     EXPECT_TRUE(std::ranges::equal(query.rows(), threaded.rows()));
     EXPECT_EQ(query.counters(), threaded.counters());
-    // The same pairs, given.
+    // These pairs are given now.
     std::vector<ObjectPair> pairs(query.pairs().begin(), query.pairs().end());
     const std::vector<PairVerdict> verdicts(query.rows().begin(), query.rows().end());
     for (ObjectPair& pair : pairs) std::swap(pair.a, pair.b);

@@ -101,7 +101,7 @@ bool is_index_type(int type) {
   return type == kUint8 || type == kUint16 || type == kUint32;
 }
 
-/// Of an accessor that is there and of a type with a meaning.
+/// Lays out an accessor that is there and of a type with a meaning.
 Layout lay_out(const GltfModel& model, int index) {
   const GltfAccessor& accessor = model.accessors[index];
   const std::string name = numbered("accessors", index);

@@ -93,7 +93,7 @@ class Kept {
 };
 
 /// A question about the object pairs of a scene: those that the scene finds, or those that the caller gives.
-/// Of: the question, which has answer(scene, given pairs or null, options).
+/// `Of` is the question, which has answer(scene, given pairs or null, options).
 template <typename Of, typename Row, typename Counters, typename OptionsOf>
 class PairQuestion : public Answer<Row, Counters> {
  public:

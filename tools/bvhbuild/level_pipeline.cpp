@@ -49,12 +49,14 @@ void add_levels(const Options& options, const StoredMesh& mesh, OptimisationWatc
                 std::vector<BuiltLevel>& levels, Outcome& outcome) {
   Stopwatch stopwatch;
   const FinestLevel finest = {levels[0].geometry, levels[0].tree, *levels[0].topology};
+  watch.begin_part(0.3, 0.9);
   Ladder ladder = make_ladder(finest, wanted_lengths(options, mesh), watch);
   outcome.fixed_vertices = ladder.fixed_vertices;
   outcome.levels.emplace_back();
   for (const LeftOutError& error : ladder.left_out)
     outcome.levels_left_out.push_back({options.levels[error.wanted], error.why});
   levels.reserve(1 + ladder.levels.size());
+  watch.begin_part(0.9, 0.95);
   for (LadderLevel& coarse : ladder.levels) {
     outcome.levels.emplace_back().wanted = options.levels[coarse.wanted];
     BuiltLevel& level =
@@ -70,17 +72,20 @@ CheckedImage build_file(const Options& options, const StoredMesh& mesh, AssetSou
                         const std::function<std::string()>& provenance, OptimisationWatch& watch,
                         Outcome& outcome) {
   std::vector<BuiltLevel> levels;
+  if (!options.levels.empty()) watch.begin_part(0, 0.3);
   levels.push_back(build_level({mesh.points, mesh.triangles}, options, watch));
   levels[0].face = mesh.face;
   if (!options.levels.empty()) add_levels(options, mesh, watch, levels, outcome);
-  watch.look();
   outcome.interrupted = watch.stop;
   source.origin = mesh.origin;
   source.rounding_error = mesh.largest_rounding_error;
   source.provenance = provenance();
   std::vector<AssetLevel> rows;
   for (const BuiltLevel& level : levels) rows.push_back(level.row(options));
-  return assemble_checked(source, rows);
+  CheckedImage file = assemble_checked(source, rows);
+  watch.begin_part(0, 1);
+  watch.reach(1);
+  return file;
 }
 
 void describe_levels(const AssetView& asset, Outcome& outcome) {

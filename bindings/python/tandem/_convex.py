@@ -79,7 +79,11 @@ class Solid:
 
     def contains(self, points: Array, margin: float = 0.0) -> Array:
         """(n,) whether each of the points (n, 3) is inside or no farther than `margin` outside of all faces' planes."""
-        inside: Array = self._heights(points) <= margin
+        if margin > 0:
+            return np.asarray(self._heights(points) <= margin)
+        room = 1e-6 * self.size  # for rounding: what is outside of the box needs no look at the planes
+        inside: Array = ((points >= self.vertices.min(axis=0) - room) & (points <= self.vertices.max(axis=0) + room)).all(axis=1)
+        inside[inside] = self._heights(points[inside]) <= margin
         return inside
 
     def nearest(self, points: Array) -> int:

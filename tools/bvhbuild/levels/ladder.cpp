@@ -206,8 +206,7 @@ std::string name(const LevelError& error) {
   return std::string(text, static_cast<std::size_t>(digits)) + (error.of_diagonal ? "%" : "");
 }
 
-Ladder make_ladder(const FinestLevel& finest, std::span<const double> wanted,
-                   const OptimisationWatch& watch) {
+Ladder make_ladder(const FinestLevel& finest, std::span<const double> wanted, OptimisationWatch& watch) {
   Ladder ladder;
   const OpenedMesh opened = cut_open(finest.geometry, finest.tree, finest.topology);
   ladder.fixed_vertices = opened.fixed_vertices;
@@ -218,7 +217,7 @@ Ladder make_ladder(const FinestLevel& finest, std::span<const double> wanted,
   const Search search(finest, opened, watch.stop);
   std::size_t triangles = finest.geometry.triangles.size();
   for (std::size_t i = 0; i < wanted.size(); ++i) {
-    watch.progress(static_cast<double>(i) / static_cast<double>(wanted.size()));
+    watch.reach(static_cast<double>(i) / static_cast<double>(wanted.size()));
     Candidate candidate = search.level(wanted[i]);
     if (candidate.mesh.triangles.empty() || candidate.mesh.triangles.size() >= triangles) {
       ladder.left_out.push_back({i, watch.stop ? NoLevel::interrupted : NoLevel::no_coarser});

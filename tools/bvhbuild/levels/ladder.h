@@ -66,6 +66,6 @@ struct Ladder {
 /// coordinates, ascending. watch: its progress is told the share that is done; once its stop is set, no
 /// further mesh is made, and what was found and proved until then stays. Condition: fewer than
 /// kMostTopologyTriangles.
-Ladder make_ladder(const FinestLevel& finest, std::span<const double> wanted, const OptimisationWatch& watch);
+Ladder make_ladder(const FinestLevel& finest, std::span<const double> wanted, OptimisationWatch& watch);
 
 }  // namespace tandem::build

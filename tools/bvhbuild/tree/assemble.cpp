@@ -205,12 +205,14 @@ Image assemble(const AssetSource& source, std::span<const AssetLevel> levels) {
 LevelParts build_parts(const Geometry& geometry, const BuildOptions& options, OptimisationWatch& watch) {
   LevelParts parts;
   parts.tree = build_tree(geometry, options.imaginary, options.effort, watch);
-  watch.look();
+  const BuildShares shares = build_shares(options.effort);
+  watch.reach(shares.emitted);
   if (options.gpu_blocks && geometry.triangles.size() < kMostOrientedTriangles)
     parts.oriented_blocks = orient_blocks(geometry, parts.tree, options.effort);
-  watch.look();
+  watch.reach(shares.oriented);
   if (options.topology && geometry.triangles.size() < kMostTopologyTriangles)
     parts.topology = make_topology(geometry, parts.tree);
+  watch.reach(shares.topology);
   return parts;
 }
 

@@ -57,13 +57,13 @@ BuiltAsset build_asset(const TriangleSource& given, const BuildOptions& options,
   source.parts = given.parts.empty() ? std::span(&whole, 1) : given.parts;
   const Geometry geometry{mesh.points, mesh.triangles};
   const LevelParts parts = build_parts(geometry, options, watch);
-  watch.look();
   source.provenance =
       provenance.empty() ? usual_provenance(options, built.clean, watch.stop) : std::move(provenance);
   const AssetLevel level = {geometry,    mesh.face,
                             &parts.tree, parts.oriented_blocks,
                             0,           parts.topology ? &*parts.topology : nullptr};
   built.file = assemble_checked(source, {&level, 1});
+  watch.reach(1);
   return built;
 }
 

@@ -313,7 +313,18 @@ double ExchangeSearch::change_by(const Exchange& exchange, double limit) const {
 void OptimisationWatch::count(std::uint64_t units) {
   const std::lock_guard lock(mutex_);
   done_ += units;
-  progress(std::min(1.0, static_cast<double>(done_) / static_cast<double>(expected_)));
+  tell(optimised_.at(std::min(1.0, static_cast<double>(done_) / static_cast<double>(expected_))));
+}
+
+void OptimisationWatch::reach(double share) {
+  const std::lock_guard lock(mutex_);
+  done_ = 0;
+  tell(share);
+}
+
+void OptimisationWatch::tell(double share_of_part) {
+  told_ = std::max(told_, part_.at(share_of_part));
+  progress(told_);
 }
 
 void optimise(Topology& topology, std::span<const Bounds> bounds, Effort effort, OptimisationWatch& watch) {

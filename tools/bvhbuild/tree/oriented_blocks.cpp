@@ -17,20 +17,18 @@ constexpr std::uint32_t kMostTriangles = 4096;
 
 constexpr std::size_t kBlocksAtOnce = 64;
 
-// Corners of a node that frames are judged by.
-constexpr std::uint32_t kMostPoints = 128;
-
 // A search for a frame turns the best one so far about some axes at once, one way or the other, by steps that
 // become smaller from round to round.
 struct SearchEffort {
+  std::uint32_t most_points;  // corners of a node that frames are judged by
   int axes_at_once, rounds;
   float next_step;  // times the one before
 };
 constexpr float kFirstStep = 0.276f;  // 3 such steps reach all frames of a cube
 
 constexpr SearchEffort search_effort(Effort effort) {
-  if (effort == Effort::fast) return {1, 12, 0.7f};
-  return effort == Effort::standard ? SearchEffort{2, 8, 0.58f} : SearchEffort{3, 14, 0.75f};
+  if (effort == Effort::fast) return {16, 1, 5, 0.5f};
+  return effort == Effort::standard ? SearchEffort{48, 2, 8, 0.58f} : SearchEffort{128, 3, 14, 0.75f};
 }
 
 using Vector = std::array<float, 3>;
@@ -172,7 +170,7 @@ class Fit {
     points_.clear();
     for (int node = 0; node < nodes_; ++node) {
       const std::uint32_t corners = 3 * (first_[node + 1] - first_[node]);
-      std::uint32_t stride = (corners + 3 * kMostPoints - 1) / (3 * kMostPoints);
+      std::uint32_t stride = (corners + 3 * effort_.most_points - 1) / (3 * effort_.most_points);
       if (stride % 3 == 0) ++stride;  // else of each triangle the same corner
       vertices_.clear();
       for (std::uint32_t at = 0; at < corners; at += stride)

@@ -132,12 +132,14 @@ Tree build_tree(const Geometry& geometry, Imaginary imaginary, Effort effort) {
 }
 
 Tree build_tree(const Geometry& geometry, Imaginary imaginary, Effort effort, OptimisationWatch& watch) {
+  const BuildShares shares = build_shares(effort);
   const std::vector<Bounds> bounds = normalized_bounds(geometry);
-  watch.look();
+  watch.reach(0.1 * shares.split);
   Topology topology = build_topology(bounds, imaginary);
-  watch.look();
+  watch.reach(shares.split);
+  watch.optimise_between(shares.split, shares.optimised);
   optimise(topology, bounds, effort, watch);
-  watch.look();
+  watch.reach(shares.optimised);
   return emit(geometry, topology);
 }
 

@@ -36,11 +36,11 @@ struct BuildOptions {
   unsigned threads = 0;    ///< that build, at most; 0: as many as the process may use
 };
 
-/// Lets somebody look on while a tree is optimised, and end it.
+/// Lets somebody look on while a file is built, and end the optimisation.
 class OptimisationWatch {
  public:
-  /// The builder calls this now and then, by one thread at a time, with the share that is done. What it
-  /// throws ends the build.
+  /// The builder calls this now and then, by one thread at a time, with the share of the whole time that is
+  /// done, roughly; it never falls. What it throws ends the build.
   std::function<void(double share)> progress = [](double) {};
   /// Once this is set, optimisation ends within a second or so, with the best tree so far.
   std::atomic<bool> stop = false;
@@ -48,13 +48,25 @@ class OptimisationWatch {
   /// The optimiser says how many units of work there are, and that some more are done.
   void expect(std::uint64_t units) { expected_ = units; }
   void count(std::uint64_t units);
-  /// The builder calls this between two of its steps.
-  void look() { count(0); }
+  /// The builder calls this after a step, with the share of the part under way that is done then.
+  void reach(double share);
+  /// The units of the optimiser lie between these shares of the part under way.
+  void optimise_between(double begin, double end) { optimised_ = {begin, end}; }
+  /// What comes next is this part of the whole.
+  void begin_part(double begin, double end) { part_ = {begin, end}; }
 
  private:
+  struct Span {
+    double begin, end;
+    double at(double share) const { return begin + (end - begin) * share; }
+  };
+  void tell(double share_of_part);
+
   std::uint64_t expected_ = 1;
   std::mutex mutex_;
   std::uint64_t done_ = 0;
+  Span part_ = {0, 1}, optimised_ = {0, 1};
+  double told_ = 0;
 };
 
 }  // namespace tandem::build

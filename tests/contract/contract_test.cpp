@@ -9,40 +9,11 @@
 #include <fstream>
 #include <functional>
 
-#include "contract/door.h"
+#include "contract/doors.h"
 #include "tandem/formats/hash.h"
-#ifdef TANDEM_ON_GPU
-#include <tandem/tandem_cuda.h>
-
-#include "tandem/kernels/gpu_scene.h"
-#endif
 
 namespace tandem::test {
 namespace {
-
-struct NamedDoor {
-  const char *name, *interface;  // `interface`: as "except" of the table spells it
-  std::function<std::unique_ptr<Door>()> open;
-};
-
-#ifdef TANDEM_ON_GPU
-bool is_here() {
-  GpuScene scene;
-  return scene.set_assets({}) == Status::kOk;
-}
-const NamedDoor kDoors[] = {
-    {"gpu", "cpp", [] { return cpp_door(std::make_shared<GpuScene>()); }},
-    {"c_gpu", "c", [] { return c_door(tandem_gpu_scene_create); }},
-};
-#else
-bool is_here() {
-  return true;
-}
-const NamedDoor kDoors[] = {
-    {"cpp", "cpp", [] { return cpp_door(std::make_shared<Scene>()); }},
-    {"c", "c", [] { return c_door(tandem_scene_create); }},
-};
-#endif
 
 /// A folder that is elsewhere where the program runs than where it was built.
 std::string folder(const char* variable, const char* built) {
@@ -238,14 +209,10 @@ void take_step(Door& door, const Json& step) {
 
 using Parameter = std::tuple<NamedDoor, Json>;
 
-void PrintTo(const NamedDoor& door, std::ostream* out) {
-  *out << door.name;
-}
-
 class Contract : public testing::TestWithParam<Parameter> {
  protected:
   void SetUp() override {
-    if (!is_here()) GTEST_SKIP() << "no GPU here";
+    if (!doors_are_usable()) GTEST_SKIP() << "no GPU here";
   }
 };
 
@@ -267,7 +234,7 @@ TEST_P(Contract, Holds) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Doors, Contract,
-                         testing::Combine(testing::ValuesIn(kDoors), testing::ValuesIn(table()["scenes"])),
+                         testing::Combine(testing::ValuesIn(doors()), testing::ValuesIn(table()["scenes"])),
                          [](const auto& test) {
                            return std::string(std::get<0>(test.param).name) + "_" +
                                   std::get<1>(test.param)["name"].template get<std::string>();

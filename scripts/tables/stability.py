@@ -48,16 +48,3 @@ def failures(rows):
     lines = [[f"`{case}`" if case != "all" else case, *(f"{sum(found[solver])} of {len(found[solver])}" if solver in found else "–" for solver in SOLVERS)]
              for case, found in cases.items()]
     return markdown(["case", *(f"`{solver}`" for solver in SOLVERS)], lines)
-
-
-def peers(rows):
-    """Other engines, a row for each case."""
-    engines = list(dict.fromkeys(row["engine"] for row in rows))
-    cells = {(row["case"], row["variant"], row["engine"]): row for row in rows}
-
-    def shown(row):
-        return f"**fails**, {row['value']}" if row["verdict"] == "fails" else row["value"]
-
-    lines = [[label or f"{case}, {variant}", *(shown(cells[case, variant, engine]) if (case, variant, engine) in cells else "–" for engine in engines)]
-             for (case, variant), label in dict.fromkeys(((row["case"], row["variant"]), "plates, m/s" if row["case"] == "tunnelling" else "") for row in rows)]
-    return markdown(["largest drift, box lengths", *(f"{engine} {next(row['version'] for row in rows if row['engine'] == engine)}" for engine in engines)], lines)

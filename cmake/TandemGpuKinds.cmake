@@ -3,7 +3,7 @@
 # The least kind: warps add up by __reduce_add_sync().
 set(TANDEM_LEAST_GPU_KIND 80)
 
-# What runs on each kind from the least one on where nobody says more: machine code for 9.0, and code that the driver
+# These run on each kind from the least one on where nobody says more: machine code for 9.0, and code that the driver
 # compiles when a program first uses it, for later kinds and for earlier ones.
 set(TANDEM_USUAL_GPU_KINDS 80-virtual 90)
 

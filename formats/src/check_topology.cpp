@@ -128,7 +128,7 @@ class TopologyCheck {
   }
 
  private:
-  // What a reader needs in order not to leave its arrays.
+  // Checks what a reader needs in order not to leave its arrays.
   Status check_ranges() {
     for (where_ = 0; where_ < level_.triangle_count; ++where_) {
       const TriangleTopology& triangle = level_.topology[where_];

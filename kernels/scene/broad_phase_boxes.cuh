@@ -3,8 +3,8 @@
 #include "kernels/common/launch.h"
 #include "kernels/scene/broad_phase_tree.cuh"
 
-// Where the world boxes of a broad phase come from, by place among those that it looks at; number() is the
-// box's or instance's own. Compiled without fused operations, so that is_rigid() is the CPU's too.
+// A broad phase gets its world boxes from these, by place among those that it looks at; number() is the box's
+// or instance's own. They are compiled without fused operations, so that is_rigid() is the CPU's too.
 namespace tandem {
 namespace {
 

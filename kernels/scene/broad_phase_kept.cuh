@@ -67,7 +67,8 @@ class KeptWalk {
   }
 
  private:
-  // In the tree's own float32 coordinates: one monotone function for both, as broad_phase_tree.cuh needs it.
+  // Takes a box to the tree's own float32 coordinates. broad_phase_tree.cuh needs one monotone function for
+  // it and the tree's boxes.
   __device__ void begin(const WorldBox& box, std::uint32_t number) {
     box_ = box;
     number_ = number;

@@ -3,7 +3,7 @@
 
 #include "kernels/scene/broad_phase_boxes.cuh"
 
-// What the broad phase sorts boxes by.
+// Makes the keys that the broad phase sorts boxes by.
 namespace tandem {
 namespace {
 

@@ -2,11 +2,11 @@
 #include "kernels/scene/broad_phase_tree.cuh"
 #include "tandem/kernels/gpu_broad_phase.h"
 
-// What a broad phase writes.
+// Writes the pairs and the report of a broad phase.
 namespace tandem {
 namespace {
 
-// Which of the pairs whose boxes meet are written.
+// A rule says which of the pairs whose boxes meet are written.
 struct EveryPair {
   __device__ bool operator()(std::uint32_t, std::uint32_t) const { return true; }
 };

@@ -5,7 +5,7 @@
 #include "tandem/formats/status.h"
 #include "tandem/kernels/world_box.h"
 
-// What the kernels of the broad phase share: boxes in float32, the tree of them, what is handed on.
+// The kernels of the broad phase share this: boxes in float32, a tree of them, and what kernels hand on.
 namespace tandem {
 namespace {
 
@@ -14,8 +14,8 @@ constexpr std::uint32_t kFanOutBits = 5;
 constexpr int kMostLevels = 8;  // 32^7 > 2^32 boxes
 constexpr std::uint32_t kAllLanes = 0xFFFFFFFFu;
 
-// What boxes are sorted by, from the highest bit down: class of size, then position on the curve; the lowest
-// bits are the box's index instead.
+// Boxes are sorted by this. From the highest bit down it has the class of size and the position on the curve,
+// and the box's index takes the place of the lowest bits.
 using Key = std::uint64_t;
 constexpr int kAxisBits = 16, kClassBits = 4;
 constexpr int kUnusedBits = 64 - kClassBits - 3 * kAxisBits;
@@ -112,7 +112,7 @@ std::size_t nodes_of(const Tree& tree) {
 }
 
 // ---------------------------------------------------------------------------------------------------------
-// What kernels hand to each other, in GPU memory.
+// Kernels hand these to each other in GPU memory.
 
 struct Counters {
   unsigned long long found;
@@ -121,7 +121,7 @@ struct Counters {
 
 constexpr Counters kFreshCounters = {0, kNoError};
 
-// Where the boxes are and how large, by a sample of them: outliers don't move it.
+// Tells where the boxes are and how large they are, by a sample of them. Outliers don't move it.
 struct Survey {
   double median[3];  // of centres
   double reach[3];   // most centres are as close to the median

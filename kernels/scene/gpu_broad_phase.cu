@@ -135,8 +135,8 @@ bool is_none(const PairFilter& filter) {
          filter.excluded.slots == nullptr;
 }
 
-// What a call is about: numbers of boxes or instances, where their boxes lie once they have been taken, where
-// those of them lie that are kept, and how pairs are to be written.
+// Says what a call is about: the number of boxes or instances, where their boxes lie once they have been
+// taken, where those of them lie that are kept, and how pairs are to be written.
 struct Call {
   std::uint32_t numbers;
   const WorldBox* boxes;
@@ -145,9 +145,9 @@ struct Call {
   cudaStream_t stream;
 };
 
-// What is kept of fixed boxes.
+// Says what is kept of fixed boxes.
 struct Kept {
-  // In place of the number of boxes, where those that were kept are lost: no call is of so many.
+  // Stands for the number of boxes once those that were kept are lost; no call has so many boxes.
   static constexpr std::uint32_t kLost = kNoIndex;
 
   std::uint32_t of = 0;  // so many boxes or instances; 0: nothing is kept
@@ -156,7 +156,7 @@ struct Kept {
   Tree tree = {};
 };
 
-// What the kernels write at their end, apart from each other.
+// The kernels write these at their end. Each lies in cache lines of its own.
 struct Outcome {
   Counters counters;
   alignas(128) GpuBroadPhaseReport report;

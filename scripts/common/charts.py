@@ -28,6 +28,12 @@ def thousands(axis):
     axis.set_minor_formatter(matplotlib.ticker.NullFormatter())
 
 
+def ones_twos_fives(axis):
+    """Ticks at 1, 2 and 5 times each power of ten, for a logarithmic axis of a few powers."""
+    axis.set_major_locator(matplotlib.ticker.LogLocator(subs=(1, 2, 5)))
+    thousands(axis)
+
+
 def best(points):
     """Of (time, error, ...) those that no other undercuts in both."""
     front = []

@@ -53,7 +53,7 @@ def wrong(rows):
     return peer_table(rows, wrong_cell)
 
 
-# What makes a scene hard, by a part of its name.
+# A part of a scene's name tells what makes the scene hard.
 HARD = {"exact": "faces coincide", "coincident": "bodies coincide", "_at_": "far from the origin"}
 
 

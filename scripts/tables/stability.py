@@ -3,7 +3,7 @@ from common import tabular
 from common.tabular import markdown
 
 SOLVERS = ("auto", "soft", "newton", "sweeps")
-# What the table of verdicts asks: words for it with the unit of its error, case, variant, quantity.
+# The table of verdicts asks these. Each has its words, with the unit of its error, and its case, variant and quantity.
 ASKED = (("steepest slope on which a block sticks, relative", "sticking", "default, mu 0.5", "angle"),
          ("way of a pushed block, relative", "sliding", "pushed, default, 4 m/s, mu 0.4", "stopping distance"),
          ("speed of a cow at rest, m/s", "rest", "cow_1500", "speed, rms"),

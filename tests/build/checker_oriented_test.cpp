@@ -1,4 +1,4 @@
-// What the checker says of oriented blocks.
+// Tests what the checker says of oriented blocks.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -231,7 +231,7 @@ std::uint32_t add_below(const LevelView& level, std::uint32_t number, std::vecto
   return end;
 }
 
-// Where the triangles lie along an axis of a block.
+// The triangles lie in this range along an axis of a block.
 struct Range {
   long double lowest = HUGE_VALL, highest = -HUGE_VALL;
 };
@@ -335,7 +335,7 @@ TEST(CheckOriented, NoRoundingDecides) {
   EXPECT_GT(close, 100);
 }
 
-// In the mesh's own axes the file's boxes do, and none that is smaller.
+// In the mesh's own axes the block's own boxes are large enough, and no smaller ones are.
 TEST(CheckOriented, TheBoxesOfABlockDoInTheAxesOfTheMesh) {
   for (int k = 0; k < 3; ++k) {
     Bytes file = sample();

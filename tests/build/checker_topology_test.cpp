@@ -1,4 +1,4 @@
-// What the checker says of topology.
+// Tests what the checker says of topology.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -8,7 +8,7 @@
 
 namespace tandem::test {
 
-/// What a hostile writer may do to a file, and the defect that must be named. Its hash is right.
+/// Says what a hostile writer does to a file, and which defect must be named. The file's hash is right.
 struct Attack {
   const char* what;
   Status expected;

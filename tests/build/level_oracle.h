@@ -8,9 +8,9 @@
 
 #include "tandem/formats/view.h"
 
-/// What the checker promises of a level, found out in another way. Topology: with maps of positions and
-/// edges, and by walking from triangle to triangle. Oriented blocks: by rotations from quaternions as
-/// textbooks write them, numbers of blocks by a queue, and boxes in long double.
+/// Finds out in another way whether a level is as the checker promises. For topology it uses maps of
+/// positions and edges, and walks from triangle to triangle. For oriented blocks it takes rotations from
+/// quaternions as textbooks write them, numbers the blocks with a queue, and computes boxes in long double.
 namespace tandem::test {
 namespace topology_oracle_detail {
 
@@ -151,7 +151,8 @@ inline const char* defect_of_windings(const LevelView& level, const Edges& edges
 
 }  // namespace topology_oracle_detail
 
-/// What is wrong with the topology of a level whose triangles are sound, or null. Slow: small meshes.
+/// Says what is wrong with the topology of a level whose triangles are sound, or null. It is slow: use small
+/// meshes.
 inline const char* defect_of_topology(const LevelView& level) {
   using namespace topology_oracle_detail;
   if (const char* defect = defect_of_vertices(level)) return defect;
@@ -246,7 +247,7 @@ inline bool has_right_size(const OrientedBlock& block) {
 
 }  // namespace oriented_oracle_detail
 
-/// What is wrong with the oriented blocks of a level whose blocks are sound, or null.
+/// Says what is wrong with the oriented blocks of a level whose blocks are sound, or null.
 inline const char* defect_of_oriented_blocks(const LevelView& level) {
   using namespace oriented_oracle_detail;
   // Triangles below each block. Children come after their parents.
@@ -285,7 +286,7 @@ inline const char* defect_of_oriented_blocks(const LevelView& level) {
   return next == level.block_count ? nullptr : "there are as many oriented blocks as blocks";
 }
 
-/// What is wrong with a level that has oriented blocks and topology, or null.
+/// Says what is wrong with a level that has oriented blocks and topology, or null.
 inline const char* defect_of(const LevelView& level) {
   if (level.oriented_blocks == nullptr || level.topology == nullptr) return "a level has both";
   const char* defect = defect_of_oriented_blocks(level);

@@ -1,4 +1,4 @@
-/// What the C programs here share: checks, and a mesh of an OBJ file. C99.
+/// The C programs here share these checks, and the mesh of an OBJ file. C99.
 #ifndef TANDEM_TESTS_C_TEST_H
 #define TANDEM_TESTS_C_TEST_H
 #include <stdio.h>

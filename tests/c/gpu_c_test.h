@@ -1,4 +1,4 @@
-/// What the C programs with a GPU share: its memory, and scenes in it. C99.
+/// The C programs with a GPU share this: its memory, and scenes in it. C99.
 #ifndef TANDEM_TESTS_C_GPU_C_TEST_H
 #define TANDEM_TESTS_C_GPU_C_TEST_H
 #include <cuda_runtime_api.h>

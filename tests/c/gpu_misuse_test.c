@@ -1,4 +1,4 @@
-// What the C interface to a GPU answers to calls that are wrong, and where there is no GPU: run with
+// Tests what the C interface to a GPU answers to calls that are wrong, and where there is no GPU. Run it with
 // CUDA_VISIBLE_DEVICES set to nothing. C99. Usage: gpu_misuse_test ASSETS_FOLDER
 #include <tandem/tandem_cuda.h>
 

@@ -1,4 +1,4 @@
-// What the C interface answers to calls that are wrong. C99. Usage: misuse_test ASSETS_FOLDER
+// Tests what the C interface answers to calls that are wrong. C99. Usage: misuse_test ASSETS_FOLDER
 #define _POSIX_C_SOURCE 200112L
 #include "c_test.h"
 

@@ -235,8 +235,8 @@ static void test_building(void) {
   free_mesh(&cow);
 }
 
-// What tests/contract/ does not ask: rows that are given back to the scene that has them, options that are
-// null, several questions in one call, and poses in between. The memory of all is the allocator's.
+// Tests what tests/contract/ does not ask: rows that are given back to the scene that has them, options that
+// are null, several questions in one call, and poses in between. The memory of all is the allocator's.
 static void test_rows_and_calls(const tandem_allocator* allocator) {
   tandem_asset* cube = build_obj(assets_folder, "box_12.obj", allocator);
   tandem_scene* scene = scene_of(&cube, 1, allocator);

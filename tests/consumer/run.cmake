@@ -96,7 +96,7 @@ if(NOT output MATCHES "CUDA: OFF")
   message(FATAL_ERROR "CUDA is not off in a project that has Tandem as a part:\n${output}")
 endif()
 
-# The same program by a C compiler that knows pkg-config alone.
+# A C compiler that knows pkg-config alone builds the same program.
 find_program(PKG_CONFIG NAMES pkg-config pkgconf)
 find_program(C_COMPILER NAMES cc gcc clang)
 if(PKG_CONFIG AND C_COMPILER)

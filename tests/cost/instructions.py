@@ -23,7 +23,7 @@ SKIPPED = 77
 SOURCE = Path(__file__).resolve().parents[2]
 FILE = Path(__file__).with_name("instructions.csv")
 COLUMNS = ["name", "instructions", "commit", "compiler", "valgrind"]
-# What a step calls: bodies are placed, and contacts asked for.
+# A step calls these: it places the bodies and asks for contacts.
 QUERY = ("tandem::Scene::place(", "tandem::ContactQuery::answer(")
 
 
@@ -33,7 +33,7 @@ def skip(reason):
 
 
 def output_of(command, **options):
-    # Without the caller's environment, whose size moves the stack.
+    # The command does not get the caller's environment, whose size moves the stack.
     result = subprocess.run(command, env={"PATH": os.defpath}, text=True, capture_output=True, check=False, **options)
     if result.returncode != 0:
         sys.exit(f"{' '.join(map(str, command))}: exit code {result.returncode}\n{result.stdout}{result.stderr}")

@@ -53,7 +53,7 @@ inline bool same(const ContactList& x, const ContactList& y) {
 /// Why this program cannot test the engine here; empty: it can. Each program says for itself.
 std::string why_not(std::string_view name);
 
-/// What every engine that simulates does, whatever it runs on.
+/// Tests what every engine that simulates must do, whatever it runs on.
 class EngineContract : public testing::TestWithParam<std::string_view> {
  protected:
   void SetUp() override {

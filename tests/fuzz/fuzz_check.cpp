@@ -117,7 +117,7 @@ void examine(const CheckResult& result) {
   read_text(asset.provenance);
 }
 
-// What a quick check believes.
+// Tells whether a quick check leaves this defect out.
 bool is_believed(Status status) {
   return status == Status::kTriangleOutsideOrientedBox || status == Status::kVertexOrder ||
          status == Status::kVertexMismatch || status == Status::kEdgeMismatch ||

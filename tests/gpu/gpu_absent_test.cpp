@@ -1,6 +1,6 @@
-// What is said where no GPU can be used. ctest hides the GPUs, or puts a driver that is too old in the way
-// (old_driver.cpp): environment variable TANDEM_EXPECTED_STATUS, a name of Status. Compiled for other kinds
-// of GPU than the one that is there, this program expects GpuNotSupported.
+// Tests what is said where no GPU can be used. ctest hides the GPUs, or puts a driver that is too old in the
+// way (old_driver.cpp). The environment variable TANDEM_EXPECTED_STATUS has the name of the Status that is
+// expected: GpuNotSupported where this program is compiled for other kinds of GPU than the one that is there.
 #include <gtest/gtest.h>
 
 #include <cstdlib>

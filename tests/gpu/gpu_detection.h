@@ -14,7 +14,7 @@
 
 namespace tandem::test {
 
-/// What CpuDetection does, all of it on the GPU. Functions throw std::runtime_error where a call fails.
+/// Does on the GPU all that CpuDetection does. Functions throw std::runtime_error where a call fails.
 class GpuDetection {
  public:
   explicit GpuDetection(std::span<const AssetView> meshes) {

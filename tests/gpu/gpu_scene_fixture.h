@@ -17,7 +17,7 @@
 #include "tandem/kernels/gpu_contact_query.h"
 #include "tandem/runtime/upload.h"
 
-/// What tests of queries on a GPU share.
+/// Tests of queries on a GPU share these.
 namespace tandem::test {
 
 inline bool no_gpu() {
@@ -41,7 +41,7 @@ using GpuTestOf = NeedsGpu<testing::TestWithParam<Parameter>>;
 
 inline constexpr QueryMode kModes[] = {QueryMode::exact, QueryMode::fast, QueryMode::boxes};
 
-/// With TANDEM_GPU_BLOCKS=N, queries take N blocks at most: for tools that are slow where warps wait.
+/// With TANDEM_GPU_BLOCKS=N, queries take N blocks at most, for tools that are slow where warps wait.
 inline GpuContactOptions gpu_options(QueryMode mode, bool first_contact_only = false) {
   const char* blocks = std::getenv("TANDEM_GPU_BLOCKS");
   GpuContactOptions options = {mode, first_contact_only};
@@ -198,7 +198,7 @@ class GraphStream {
   GpuGraph graph_;
 };
 
-/// What a contact query told; contacts are sorted.
+/// Holds what a contact query told, with the contacts sorted.
 struct ContactAnswer {
   Status status;
   std::uint64_t where;

@@ -54,7 +54,7 @@ struct Operation {
   auto operator<=>(const Operation&) const = default;
 };
 
-/// What a warp has between rounds of its walk.
+/// Holds what a warp has between rounds of its walk.
 struct Local {
   std::vector<int> units;
   std::uint32_t kept_ticket = ~0u;
@@ -66,7 +66,7 @@ struct Fault {
   std::string what;
 };
 
-/// What WorkSharing asks of a warp. Operations get the recorded answers; the first without one is thrown.
+/// Has what WorkSharing asks of a warp. Operations get the recorded answers; the first without one is thrown.
 template <int kWordsOfEntry>
 class ModelWarp {
  public:
@@ -185,7 +185,7 @@ class ModelWarp {
     return 1 + mailboxes() + (place % mailboxes() * run_->scenario.lanes + lane) * kEntryWords +
            static_cast<std::size_t>(word);
   }
-  /// What a mailbox would hold if it were free for the ticket that is given.
+  /// Returns what a mailbox would hold if it were free for the ticket that is given.
   std::uint32_t free_word() const {
     return gpu::mailbox_word((run_->ticket >> mailbox_bits()) - 1, gpu::kGivenBack);
   }
@@ -244,8 +244,8 @@ void run_round(const Scenario& scenario, Local& local, const Warp& warp) {
   }
 }
 
-/// Where a warp's code stands: a round, and the answers it has got in it. Code that was run once is
-/// remembered.
+/// Knows the places where a warp's code may stand: a round, and the answers it has got in it. Code that was
+/// run once is remembered.
 template <int kWordsOfEntry>
 class Program {
  public:
@@ -269,7 +269,7 @@ class Program {
   }
   const Place& operator[](int place) const { return places_[place]; }
 
-  /// Where the warp comes with that answer.
+  /// Returns where the warp gets to with that answer.
   int after(int place, std::uint64_t answer) {
     const auto found = places_[place].after.find(answer);
     if (found != places_[place].after.end()) return found->second;

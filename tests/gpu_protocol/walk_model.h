@@ -250,7 +250,7 @@ class WalkModel {
     return word;
   }
 
-  /// What a look may see, told apart only by what follows from it.
+  /// Adds a state for each word that a look may see, where words from which the same follows are one.
   void add_looks(const State& state, std::size_t warp, std::vector<State>& out) {
     std::vector<std::uint64_t> seen;
     const bool any = scenario_.left_out == LeftOut::own_change_in_look;

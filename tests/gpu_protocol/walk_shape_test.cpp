@@ -72,7 +72,7 @@ struct Entry {
   std::uint32_t level, bits;
 };
 
-/// What a test of a block pair of some level leaves: an entry, of leaf blocks or not; 0 bits: nothing.
+/// A test of a block pair of some level leaves this: an entry, of leaf blocks or not, or nothing with 0 bits.
 struct Left {
   bool of_leaves;
   std::uint32_t bits;

@@ -1,4 +1,4 @@
-// What a glTF file is made of: JSON, containers, buffers.
+// Tests what a glTF file is made of: JSON, containers, buffers.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 

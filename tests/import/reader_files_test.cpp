@@ -39,7 +39,7 @@ struct Expected {
   std::size_t points;
 };
 
-// What a test calls its parameter.
+// Prints what a test calls its parameter.
 void PrintTo(const Expected& expected, std::ostream* stream) {
   *stream << expected.file;
 }

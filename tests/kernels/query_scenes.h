@@ -17,7 +17,7 @@
 /// Seeded scenes of small meshes, from harmless to hostile, and their contacts by brute force.
 namespace tandem::test {
 
-/// With TANDEM_LONG=1, `factor` times as many trials.
+/// Returns the number of trials: `usual`, and with TANDEM_LONG=1 `factor` times as many.
 int trials(int usual, int factor);
 
 /// Assets in memory. Source face i of an asset is triangle i of its mesh.
@@ -53,7 +53,7 @@ inline std::ostream& operator<<(std::ostream& out, const SceneFamily& family) {
 
 const std::vector<SceneFamily>& scene_families();
 
-// What scenes are made of.
+// Scenes are made of these.
 
 /// Triangles of one size at random places in [-1, 1].
 Mesh soup(RandomPoses& random, std::uint32_t triangles, double size);
@@ -71,7 +71,7 @@ Pose any_rotation(RandomPoses& random);
 
 /// Half the diagonal of the box about an asset.
 double radius_of(const AssetView& asset);
-/// With this rotation, and the centre of the asset at a place.
+/// Returns a pose with this rotation that puts the centre of the asset at a place.
 Pose centred_at(const AssetView& asset, Pose pose, const double (&place)[3]);
 
 /// A distance to ask about: any size beside the scene's; whole numbers, so that grids have ties, among them.
@@ -87,7 +87,7 @@ struct FaceContact {
 std::ostream& operator<<(std::ostream& out, const FaceContact& contact);
 using FaceContacts = std::vector<FaceContact>;  // sorted
 
-/// What the last call found; a contact that was reported twice is there twice.
+/// Returns what the last call found; a contact that was reported twice is there twice.
 FaceContacts found_contacts(const test::Asked<ContactQuery>& query);
 
 using PosedTriangle = std::array<std::array<double, 3>, 3>;

@@ -27,7 +27,7 @@ RandomScene random_scene(std::span<const AssetView> meshes, std::uint64_t seed);
 /// Closed and open meshes, one far from its origin, and triangles that cross, coincide or are flat.
 SampleAssets sample_meshes();
 
-/// What a step finds.
+/// Holds what a step finds.
 struct Detected {
   std::vector<ObjectPair> pairs;
   std::vector<Contact> contacts;  ///< sorted
@@ -58,11 +58,11 @@ class CpuDetection {
   ContainmentQuery containment_;
 };
 
-/// Which list first differs, in a byte, and where; empty where none does.
+/// Says which list first differs, in a byte, and where. The text is empty where none does.
 std::string first_difference(const Detected& x, const Detected& y);
 
-/// What of docs/contacts.md does not hold of a step; empty where all does. before: the step before, or
-/// nothing.
+/// Says what of docs/contacts.md does not hold of a step. The text is empty where all of it holds. before:
+/// the step before, or nothing.
 std::string first_defect(std::span<const Instance> instances, const Detected& found, const Detected& before);
 
 }  // namespace tandem::test

@@ -16,7 +16,7 @@ Mesh sphere(double radius, int splits);
 /// A closed box about the origin.
 Mesh box(float x, float y, float z);
 
-/// What a convex polygon of the xy plane, counter-clockwise, sweeps from z = -height / 2 to height / 2.
+/// Makes what a counter-clockwise convex polygon of the xy plane sweeps from z = -height / 2 to height / 2.
 Mesh prism(const std::vector<std::array<float, 2>>& polygon, float height);
 
 /// A regular prism.

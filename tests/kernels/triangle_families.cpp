@@ -44,7 +44,7 @@ double nudged(Random& random, double x, int n) {
   return x;
 }
 
-/// With some chance moves one coordinate by one last bit.
+/// Moves one coordinate by one last bit with some chance.
 void nudge_one(TrianglePair& pair, Random& random) {
   if (uniform(random, 0, 2) != 0) return;
   double& x = pair.b[uniform(random, 0, 2)][uniform(random, 0, 2)];

@@ -31,7 +31,7 @@ struct Farthest {
   }
 };
 
-/// Where a triangle's samples end, if all have as many as their areas ask for.
+/// Returns for each triangle the sum of the areas up to it, by which samples are shared out.
 std::vector<double> cumulative_areas(const LevelView& level) {
   std::vector<double> areas;
   double sum = 0;

@@ -277,7 +277,7 @@ def test_the_normal_points_to_the_mesh_or_the_other_manager():
             assert len(contacts) > 0
             assert all(contact.normal[0] > 0.6 for contact in contacts)
             assert all(0 < contact.depth < 0.16 for contact in contacts)
-    # Of a convex body and another the normal points to the convex one, in trimesh too.
+    # Between a convex body and another the normal points to the convex one, in trimesh too.
     for made in MANAGERS.values():
         for first, second, sign in ((BOX, RING, -1), (RING, BOX, 1)):
             contacts = filled(made(), a=first).in_collision_single(second, at(1.75, 0, 0), return_data=True)[1]

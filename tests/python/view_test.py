@@ -475,8 +475,10 @@ def test_places_and_scenes_that_cannot_be_shown_are_refused(box, tmp_path):
         with h5py.File(tmp_path / "empty.h5", "w"):
             pass
         tandem.view(tmp_path / "empty.h5", off_screen=True)
-    with pytest.raises(OSError):
-        tandem.view(tmp_path / "none.h5", off_screen=True)
+    for path, kind, reason in ((tmp_path / "none.h5", FileNotFoundError, "no such file or directory"), (tmp_path, IsADirectoryError, "is a directory")):
+        with pytest.raises(kind) as caught:
+            tandem.view(path, off_screen=True)
+        assert str(caught.value) == f"{path}: {reason}"
     for name in ("garbage.h5", "mesh.obj"):
         (tmp_path / name).write_bytes(b"no scene" * 99)
         with pytest.raises(OSError, match=f"{name}: is neither a scene file nor a run file, which are HDF5, nor a .bvh file by its name; bvhbuild makes"):
@@ -540,6 +542,8 @@ def test_the_command_says_what_is_wrong(box, tmp_path, monkeypatch):
     (tmp_path / "broken.bvh").write_bytes(b"no asset")
     result = command("view", tmp_path / "broken.bvh", "-o", tmp_path / "a.png")
     assert result.returncode == 2 and result.stderr.startswith("tandem: ") and "broken.bvh" in result.stderr
+    result = command("view", tmp_path / "none.h5")
+    assert (result.returncode, result.stderr) == (2, f"tandem: {tmp_path / 'none.h5'}: no such file or directory\n")
     result = command("view", tmp_path / "box.bvh", "-o", tmp_path / "a.png", "--width", "100000")
     assert result.returncode == 2 and re.fullmatch(r"tandem: size \(100000, 562\): is more than \d+ pixels wide or high, the most that can be drawn here\n", result.stderr)
     assert command("view").returncode == 1 and not (tmp_path / "a.png").exists()

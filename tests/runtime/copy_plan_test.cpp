@@ -1,4 +1,4 @@
-// Where bytes of many files lie in one copy of them, in which chunks they are copied, and by how many
+// Tests where bytes of many files lie in one copy of them, in which chunks they are copied, and by how many
 // threads.
 #include "copy_plan.h"
 

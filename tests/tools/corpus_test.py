@@ -24,7 +24,7 @@ SKIPPED = 77
 MOST_SECONDS = 10
 MOST_BYTES = 1 << 30
 
-# What must come out of the meshes: triangles of the tree (-1: it cannot be read), what the message says where there is no tree, counts that the report
+# This must come out of the meshes: triangles of the tree (-1: it cannot be read), what the message says where there is no tree, counts that the report
 # must show, and why the triangles are not those of the index, where they are not.
 with open(SOURCE_DIR / "tests/meshing/shared_meshes.csv", encoding="utf-8", newline="") as table:
     EXPECTED = {row["file"]: row | {"triangles": int(row["triangles"])} for row in csv.DictReader(table)}

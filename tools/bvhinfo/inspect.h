@@ -33,7 +33,7 @@ struct Inspection {
 enum class InspectionDepth : std::uint8_t { everything, verify, verify_levels };
 
 /// Opens and checks the file, and measures the tree or verifies the error bounds of its levels, if asked to.
-/// What the checker refuses has a status and nothing else.
+/// The result has a status and nothing else if the checker refuses the file.
 Inspection inspect(const std::string& path, InspectionDepth depth);
 
 /// "cow.bvh: a block has two parents (ChildShared, block 17)". Condition: the file is not sound.

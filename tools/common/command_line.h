@@ -122,7 +122,7 @@ class Command {
   /// Adds these options, in the order of the help.
   void add(std::initializer_list<OptionRow> rows) const;
 
-  // What else holds of an option that was added.
+  // These say what else holds of an option that was added.
   void check(const char* option, const Check& check) const;
   void take_values(const char* option, int count) const;
   void exclude(const char* option, const char* other) const;

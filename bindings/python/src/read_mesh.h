@@ -7,7 +7,7 @@
 #include "bvhbuild/import/import.h"
 #include "bvhbuild/meshing/meshing.h"
 
-/// What the readers of both extensions hand the package's Python files.
+/// The readers of both extensions use these to hand meshes to the package's Python files.
 namespace tandem::python {
 
 inline nanobind::bytes to_bytes(const std::string& text) {

@@ -62,8 +62,8 @@ def read(path: str | os.PathLike[str]) -> Scene:
         if path.is_file() and os.access(path, os.R_OK) and not h5py.is_hdf5(path):
             raise OSError(f"{path}: is neither a scene file nor a run file, which are HDF5, nor a .bvh file by its "
                           "name; bvhbuild makes a .bvh file of a mesh") from None
-        if os.fspath(path) in str(error):
-            raise
+        if error.errno is not None:  # h5py's own text tells of the inner life of HDF5
+            raise type(error)(f"{path}: {os.strerror(error.errno).lower()}") from None
         raise OSError(f"{path}: {error}") from error
     with opened as file:
         try:

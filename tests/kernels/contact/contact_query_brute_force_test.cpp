@@ -188,7 +188,7 @@ TEST_P(Scenes, HaveAFirstContactWhereTheyHaveAny) {
       if (expected.empty() || expected.back().pair != contact.pair) expected.push_back(contact);
     }
     const std::vector<Contact> found(first.rows().begin(), first.rows().end());
-    // In the order of discovery, so the first of all.
+    // Both queries find contacts in the same order, so the one that is reported is the first of all.
     EXPECT_EQ(found, expected);
     EXPECT_EQ(first.counters().contacts, expected.size());
     EXPECT_LE(first.counters().candidates, all.counters().candidates);
@@ -271,7 +271,7 @@ TEST_P(Scenes, GiveTheSameBitsInEveryVariant) {
   EXPECT_GT(compared + out_of_frame, 0);
 }
 
-/// What goes through narrow_phase_by_world_boxes() only out of range, everywhere.
+/// Here every pair goes through narrow_phase_by_world_boxes(), which a query uses only out of range.
 TEST_P(Scenes, HaveTheSameContactsByWorldBoxes) {
   for_scenes(test::trials(60, 100), [&](const BodyScene& scene, int) {
     std::vector<PosedTree> trees;

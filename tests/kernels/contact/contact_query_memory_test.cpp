@@ -1,4 +1,4 @@
-// What a query allocates, and what it does when memory or threads are not to be had. This program's own
+// Tests what a query allocates, and what it does when memory or threads are not to be had. This program's own
 // malloc() and pthread_create() count and refuse, so it is built without sanitizers, on glibc alone.
 #include <gtest/gtest.h>
 #include <pthread.h>
@@ -72,7 +72,7 @@ int pthread_create(pthread_t* thread, const pthread_attr_t* attributes, void* (*
 }
 
 namespace {
-/// What the machine is said to have.
+/// The machine is said to have so many bytes.
 std::atomic<std::uint64_t> memory_of_machine{UINT64_MAX};
 }  // namespace
 

@@ -36,7 +36,7 @@ fs::path mesh_folder() {
   return fs::path(TANDEM_SOURCE_DIR) / ".." / "shared" / "meshes";
 }
 
-/// What continuous integration has time for.
+/// Continuous integration has time for meshes of so many triangles.
 std::size_t most_triangles() {
   return std::getenv("TANDEM_LONG") != nullptr ? 1'000'000 : 20'000;
 }

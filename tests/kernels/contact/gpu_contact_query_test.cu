@@ -125,7 +125,7 @@ TEST_F(GpuContacts, FirstOnesAreOfThePairsThatHaveAny) {
   }
 }
 
-// For tools that are too slow for more.
+// This scene is for tools that are too slow for larger ones.
 TEST_F(GpuContacts, OfASmallSceneInEveryMode) {
   RandomPoses random(15);
   const BodyScene scene = pile(10, 150, 0.7, 15);

@@ -10,7 +10,7 @@ using test::AskedContacts;
 using test::BodyScene;
 using test::download;
 
-/// What groups() tells, in CPU memory.
+/// Holds in CPU memory what groups() tells.
 struct Groups {
   explicit Groups(const AskedContacts& asked) : Groups(asked.query) {}
   explicit Groups(const GpuContactQuery& query)

@@ -91,7 +91,7 @@ inline bool is_inside(const std::vector<PosedTriangle>& body, const std::vector<
   return odd;
 }
 
-/// What find() has to find: the last vertex of each part says where it is, not the first.
+/// Returns what find() has to find. The last vertex of each part says where the part is, not the first.
 inline std::vector<Containment> all_contained(const PartedScene& parted,
                                               const std::vector<ObjectPair>& pairs) {
   std::vector<Containment> out;

@@ -107,7 +107,7 @@ TEST_P(DistanceScenes, TouchingPairsAreThoseWithContacts) {
   });
 }
 
-/// What each variant makes of one pair, without the query around it.
+/// Returns what one variant makes of a pair, without the query around it.
 std::vector<double> walk(NearestPhase phase, const NearestTask& task, DistanceCounters& counters) {
   NearestSoFar state;
   state.reset(INFINITY);

@@ -162,7 +162,7 @@ TEST_F(GpuClearance, FirstOnesAreOfThePairsThatHaveAny) {
   }
 }
 
-// For tools that are too slow for more.
+// This scene is for tools that are too slow for larger ones.
 TEST_F(GpuClearance, OfASmallSceneInEveryMode) {
   RandomPoses random(15);
   BodyScene scene;

@@ -297,8 +297,8 @@ TEST(RelativePose, HoldsBoxesApartAtAnyDistanceInRange) {
 
 // Climbs to touches that need as much of the box tests' slack as any can: the reserve in it is kSafety alone.
 
-/// What two boxes that touch are made of along one axis of a: a vertex of either, which are one point as
-/// posed, and how far each box extends away from it.
+/// Describes two boxes that touch along one axis of a: a vertex of each, which are one point as posed, and
+/// how far each box extends away from it.
 struct AlongAxis {
   float at_a, at_b, extent_a, extent_b;
 };
@@ -385,7 +385,7 @@ bool overlap_with(const Posed& posed, RelativePose pose, double share_of_slack) 
   return overlap_6_axes(posed.a, posed.b, pose);
 }
 
-/// What kSafety leaves of a slack whose every term is used up, and a little for how it is rounded.
+/// No touch needs more than this share of the slack: kSafety reserves the rest, but for a little rounding.
 constexpr double kMostNeeded = 0.9991;
 static_assert(kMostNeeded > 1 / relative_pose_detail::kSafety);
 

@@ -66,7 +66,7 @@ TreeExtent extent_around(const float (&t)[3][3]) {
 
 using Corners = frame::Point<float>[3];
 
-/// What the stage is given, made as a query makes it of trees that hold these triangles alone.
+/// Holds what the stage is given, made as a query makes it of trees that hold these triangles alone.
 struct Framed {
   RelativePose b_in_a;
   float error;
@@ -475,7 +475,7 @@ INSTANTIATE_TEST_SUITE_P(All, FrameBound,
                                          Kind::corners_of_a),
                          testing::PrintToStringParamName());
 
-/// Where posing rounds by as much as it can: corners of a go up by half a last bit, one of b down by as much,
+/// Posing rounds by as much as it can: corners of a go up by half a last bit, one of b goes down by as much,
 /// and what is apart as stored touches as posed. The bound has next to nothing to spare there.
 TEST(FrameTest, BoundIsReachedWherePosingRoundsMost) {
   const float half = 0x1p-17f * (1 - 0x1p-10f);
@@ -493,7 +493,7 @@ TEST(FrameTest, BoundIsReachedWherePosingRoundsMost) {
   EXPECT_TRUE(frame::decide<true>(framed.a, framed.b, framed.error).undecided);
 }
 
-/// Without an uphill walk: many more inputs.
+/// This does without an uphill walk, so it has time for many more inputs.
 TEST(FrameTest, BoundHoldsForPairsThatNearlyTouchAndForAllFamilies) {
   RandomPoses random(16);
   double largest = 0;

@@ -22,7 +22,7 @@ struct Integers {
   Pose pose_a, pose_b;
 };
 
-/// What the stage is given, made as a query makes it of trees that hold these triangles alone.
+/// Holds what the stage is given, made as a query makes it of trees that hold these triangles alone.
 struct OnGrid {
   frame::Point<float> a[3], b[3];
   TrianglePair posed;

@@ -270,7 +270,7 @@ TEST(OrientedPose, IsWithinTheBoundsOfTheProof) {
   EXPECT_GT(worst.row, 0.1);  // else the poses are not hard
 }
 
-// Where trees may meet, that is not far apart.
+// This holds where trees may meet, that is where they are not far apart.
 TEST(OrientedSlack, IsSomeMillionthsOfTheReachAtOrdinaryPoses) {
   RandomPoses random(6);
   double largest = 0;

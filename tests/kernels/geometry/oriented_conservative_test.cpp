@@ -94,7 +94,7 @@ bool surely_apart(const Body& a, const Body& b) {
   for (int which = 0; which < 6; ++which) {
     if (plane_separates(points_a, points_b, axis(a, b, which))) return true;
   }
-  // What the test looks along where b is sheared: its axes as they are posed.
+  // Where b is sheared, the test looks along its axes as they are posed.
   for (int k = 0; k < 3; ++k) {
     if (plane_separates(points_a, points_b, b.posed_axis(k))) return true;
   }

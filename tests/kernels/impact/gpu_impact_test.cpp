@@ -65,7 +65,7 @@ ImpactOptions step_of(const MovingScene& moves, double tolerance = 1e-6) {
 
 class GpuImpacts : public test::GpuTest {
  protected:
-  /// What the CPU finds with the same pairs.
+  /// Returns what the CPU finds with the same pairs.
   Impacts of_cpu(const MovingScene& moves, const Pairs& pairs, double tolerance = 1e-6) {
     EXPECT_EQ(cpu_.set_assets(moves.scene.assets.views()), Status::kOk);
     EXPECT_EQ(cpu_.find(moves.scene.instances, pairs, step_of(moves, tolerance)), Status::kOk);

@@ -1,4 +1,4 @@
-// Where the motion of a step takes points and triangles, in long double.
+// Tests where the motion of a step takes points and triangles, in long double.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace {
 
 using test::RandomPoses;
 
-// Where a stored point is at time t, by the definition of RigidMotion in long double.
+// Returns where a stored point is at time t, by the definition of RigidMotion in long double.
 template <typename Number>
 std::array<long double, 3> moved(const Pose& start, const RigidMotion& motion, const Number (&p)[3],
                                  long double t) {

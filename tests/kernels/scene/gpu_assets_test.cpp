@@ -1,4 +1,5 @@
-// What of its assets a query on a GPU needs: blocks of the kind that its mode walks, of any level and shape.
+// Tests what a query on a GPU needs of its assets: blocks of the kind that its mode walks, of any level and
+// shape.
 #include <gtest/gtest.h>
 
 #include <vector>

@@ -8,7 +8,7 @@
 #include "kernels/scene/broad_phase_limits.h"
 #include "tandem/kernels/gpu_broad_phase.h"
 
-/// What tests of a broad phase on a GPU share.
+/// Tests of a broad phase on a GPU share these.
 namespace tandem::test {
 
 using Boxes = std::vector<WorldBox>;
@@ -36,7 +36,7 @@ inline Pairs of_cpu(const Boxes& boxes, const PairFilter& filter = {}) {
   return {broad_phase.pairs().begin(), broad_phase.pairs().end()};
 }
 
-/// What the last call stored.
+/// Returns what the last call stored.
 inline Pairs stored(const GpuBroadPhase& broad_phase) {
   const GpuPairs pairs = broad_phase.pairs();
   return download(pairs.pairs, std::min(download(pairs.count, 1)[0], pairs.capacity));

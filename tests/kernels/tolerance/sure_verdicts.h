@@ -9,7 +9,7 @@
 
 #include "kernels/random_pose.h"
 
-/// What tests of the box tests' promise judge by: points that are apart, or in contact, for sure; and the
+/// Tests of the box tests' promise judge by these: points that are apart, or in contact, for sure; and the
 /// scales that they are tried at.
 namespace tandem::test {
 

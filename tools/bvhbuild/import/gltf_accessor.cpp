@@ -92,7 +92,7 @@ Run locate(const GltfModel& model, const Need& need) {
   return {bytes.data() + need.offset, stride};
 }
 
-/// Where an accessor's elements lie. `indices` and `values` belong to its sparse part.
+/// Says where an accessor's elements lie. `indices` and `values` belong to its sparse part.
 struct Layout {
   Run base, indices, values;
 };

@@ -62,13 +62,13 @@ class GltfObject {
 /// what is made of them may take more than `most_bytes` bytes.
 nlohmann::json parse_gltf_json(std::string_view text, std::uint64_t most_bytes);
 
-/// What a file of glTF 1 is refused with.
+/// A file of glTF 1 is refused with these words.
 inline constexpr const char* kGltf1Error = "is glTF 1; Tandem reads glTF 2";
 
 /// Throws a GltfError for another version than 2.
 void check_gltf_version(const std::string& version);
 
-/// Where the parts of a glTF file lie, which is either JSON text or a binary container (GLB).
+/// Says where the parts of a glTF file lie, which is either JSON text or a binary container (GLB).
 struct GltfContainer {
   bool is_binary = false;
   std::string_view json;

@@ -21,7 +21,7 @@ struct GltfBuffer {
   std::string_view bytes;                 ///< of `decoded`, of `file`, or of the container
 };
 
-/// Where the bytes of buffers may lie.
+/// Says where the bytes of buffers may lie.
 struct GltfBufferPlaces {
   std::filesystem::path folder;         ///< that file names are relative to
   bool is_binary = false;               ///< whether this is a GLB file

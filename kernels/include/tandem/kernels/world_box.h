@@ -11,7 +11,7 @@ struct WorldBox {
 /// The box around an instance: contains every posed vertex of an asset with these bounds (stored
 /// coordinates), and so every posed triangle.
 ///
-/// Without any slack, because rounding is monotone. apply() computes fl(fl(fl(fl(r0 x) + fl(r1 y)) + fl(r2
+/// It needs no slack, because rounding is monotone. apply() computes fl(fl(fl(fl(r0 x) + fl(r1 y)) + fl(r2
 /// z)) + t). Each product is at least the smaller and at most the larger of its values at the two ends of x,
 /// y or z; each rounded sum of smaller terms is not larger. So the same formula over the smaller products
 /// gives a float64 number that no posed vertex lies below, and over the larger ones above. pose: of stored

@@ -52,7 +52,7 @@ class OptimisationWatch {
   void reach(double share);
   /// The units of the optimiser lie between these shares of the part under way.
   void optimise_between(double begin, double end) { optimised_ = {begin, end}; }
-  /// What comes next is this part of the whole.
+  /// The steps that come next are this part of the whole.
   void begin_part(double begin, double end) { part_ = {begin, end}; }
 
  private:

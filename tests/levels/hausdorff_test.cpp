@@ -224,6 +224,40 @@ TEST(Hausdorff, HoldsWhenPiecesRunOutAndSaysSo) {
   EXPECT_LT(wide.upper, 2);
 }
 
+/// Triangles round an edge, whose boxes all hold the points near it.
+Mesh spokes(int count) {
+  Mesh mesh;
+  for (int i = 0; i < count; ++i) {
+    const double turn = 2 * 3.14159265358979 * i / count;
+    const auto x = static_cast<float>(2 * std::cos(turn)), y = static_cast<float>(2 * std::sin(turn));
+    mesh.add({0, 0, -5}, {0, 0, 5}, {x, y, 0});
+  }
+  return mesh;
+}
+
+/// A point of the ball is about as near to many spokes.
+TEST(Hausdorff, OfABallInAFanTakesLooksInProportionToItsTriangles) {
+  for (const int count : {1000, 8000}) {
+    const Mesh fan = spokes(count);
+    HausdorffOptions options;
+    options.most_looks = 100u * static_cast<unsigned>(count);
+    const HausdorffBound found = bound(joined(fan, sphere(1, 4)), fan, options);
+    EXPECT_LE(found.looks, 1200u * static_cast<unsigned>(count)) << count;
+    EXPECT_FALSE(found.narrow);
+    EXPECT_GT(found.upper, found.lower);
+  }
+}
+
+TEST(Hausdorff, HoldsWhenLooksRunOutAndSaysSo) {
+  const Mesh coarse = sphere(1, 0), fine = sphere(1, 4);
+  HausdorffOptions options;
+  options.most_looks = 0;
+  const HausdorffBound wide = bound(coarse, fine, options);
+  EXPECT_FALSE(wide.narrow);
+  EXPECT_EQ(wide.pieces, 0u);
+  EXPECT_GT(wide.upper, bound(coarse, fine).upper);
+}
+
 /// Cubes of a grid whose coordinates are rounded, so that boxes of different trees end differently.
 Mesh cubes_of_a_grid(float step, std::uint64_t seed) {
   std::mt19937_64 random(seed);

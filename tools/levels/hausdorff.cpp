@@ -100,9 +100,10 @@ class Search {
     }
     const std::uint64_t triangles = std::uint64_t{from_[0].triangle_count} + from_[1].triangle_count;
     const std::uint64_t most = options_.most_pieces.value_or((1 << 20) + 64 * triangles);
+    const std::uint64_t most_looks = options_.most_looks.value_or((1 << 20) + 1024 * triangles);
     const std::uint64_t most_waiting = (1 << 20) + 2 * triangles;
     for (int round = 0; !pool_.empty() && !is_refuted(); ++round) {
-      if (pieces_ >= most || pool_.size() > most_waiting) break;
+      if (pieces_ >= most || looks_ >= most_looks || pool_.size() > most_waiting) break;
       refine_some(round);
     }
     return result();
@@ -114,7 +115,7 @@ class Search {
     Farthest farthest;
     double settled = 0;  ///< the largest bound of pieces that are done with
     std::vector<Piece> left;
-    std::uint64_t pieces = 0;
+    std::uint64_t pieces = 0, looks = 0;
     bool too_deep = false;
   };
 
@@ -126,9 +127,15 @@ class Search {
 
   bool is_refuted() const { return options_.wanted && farthest_.distance - slack_ > *options_.wanted; }
 
-  Corner measure(int side, const Point& point, std::uint32_t hint) const {
-    const NearestTriangle nearest = nearest_triangle(to_[side], point, hint);
-    return {point, std::sqrt(nearest.square), nearest.triangle};
+  /// The point and a triangle near it, and offers it as the farthest if there surely is no nearer one.
+  Corner measure(int side, const Point& point, std::uint32_t hint, Farthest& farthest,
+                 std::uint64_t& looks) const {
+    const double near = 0x1p-48 * largest_;
+    const NearestTriangle nearest = nearest_triangle(to_[side], point, hint, {near * near});
+    const Corner corner = {point, std::sqrt(nearest.square), nearest.triangle};
+    if (nearest.certain) farthest.offer(corner, side);
+    looks += nearest.looks;
+    return corner;
   }
 
   void measure_corners(int side) {
@@ -137,17 +144,19 @@ class Search {
     known.distance.resize(corners.size());
     known.nearest.resize(corners.size());
     std::vector<Farthest> farthest(corners.size() / kCornersAtOnce + 1);
+    std::vector<std::uint64_t> looks(farthest.size(), 0);
     for_parts(corners.size(), kCornersAtOnce, [&](std::size_t part, std::size_t begin, std::size_t end) {
       std::uint32_t hint = 0;
       for (std::size_t i = begin; i < end; ++i) {
         const Triangle& triangle = from_[side].triangles[corners[i] / 3];
-        const Corner corner = measure(side, corner_of(triangle, static_cast<int>(corners[i] % 3)), hint);
+        const Point point = corner_of(triangle, static_cast<int>(corners[i] % 3));
+        const Corner corner = measure(side, point, hint, farthest[part], looks[part]);
         known.distance[i] = corner.distance;
         known.nearest[i] = hint = corner.nearest;
-        farthest[part].offer(corner, side);
       }
     });
     for (const Farthest& point : farthest) farthest_.offer(point);
+    for (const std::uint64_t some : looks) looks_ += some;
   }
 
   /// The pieces that are whole triangles, as far as they are not settled.
@@ -183,6 +192,7 @@ class Search {
     settled_ = std::max(settled_, outcome.settled);
     pool_.insert(pool_.end(), outcome.left.begin(), outcome.left.end());
     pieces_ += outcome.pieces;
+    looks_ += outcome.looks;
     too_deep_ = too_deep_ || outcome.too_deep;
   }
 
@@ -227,9 +237,7 @@ class Search {
     const LevelView& to = to_[piece.side];
     if (!piece.is_segment) flatten(piece, (limit + slack_ - outcome.farthest.distance) / 4);
     const auto measured = [&](const Point& point, std::uint32_t hint) {
-      const Corner corner = measure(piece.side, point, hint);
-      outcome.farthest.offer(corner, piece.side);
-      return corner;
+      return measure(piece.side, point, hint, outcome.farthest, outcome.looks);
     };
     const Point middle =
         scaled(1.0 / 3, plus(plus(piece.corner[0].point, piece.corner[1].point), piece.corner[2].point));
@@ -279,6 +287,7 @@ class Search {
     for (int k = 0; k < 3; ++k) bound.point[k] = farthest_.point.x[k];
     bound.point_on_a = farthest_.side == 0;
     bound.pieces = pieces_;
+    bound.looks = looks_;
     return bound;
   }
 
@@ -289,7 +298,7 @@ class Search {
   Farthest farthest_;
   double settled_ = 0;
   std::vector<Piece> pool_;
-  std::uint64_t pieces_ = 0;
+  std::uint64_t pieces_ = 0, looks_ = 0;
   bool too_deep_ = false;
 };
 

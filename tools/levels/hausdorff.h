@@ -18,6 +18,10 @@ struct HausdorffOptions {
   /// wide, but hold, as they do where 2^20 pieces and two for each triangle wait, for their memory. Without
   /// it: 2^20 and 64 for each triangle of both surfaces.
   std::optional<std::uint64_t> most_pieces = {};
+  /// The same of blocks of trees that are looked into for nearest triangles: ordinary surfaces take 10 to 80
+  /// for each triangle, fans thousands. Without it: 2^20 and 1,024 for each triangle of both surfaces. Who
+  /// makes a level takes less, so that others can prove its bound with other trees.
+  std::optional<std::uint64_t> most_looks = {};
 };
 
 /// lower <= the Hausdorff distance of two surfaces <= upper: the largest distance of a point of either from
@@ -29,6 +33,7 @@ struct HausdorffBound {
   double point[3] = {};  ///< on one surface, up to rounding, and as far as `lower` from the other
   bool point_on_a = true;
   std::uint64_t pieces = 0;  ///< that were looked into
+  std::uint64_t looks = 0;   ///< into blocks of trees
 };
 
 /// Bounds the distance of two levels in the stored coordinates of one file. The surfaces are the unions of

@@ -20,9 +20,10 @@ void square_distances(const Block& block, const Point& p, double (&square)[kNode
 }
 
 /// Calls visit(triangle) for the triangles of all leaves whose boxes are nearer than the root of reach(),
-/// which visit may lower: near ones first.
-template <class Visit, class Reach>
-void walk_near(const LevelView& level, const Point& p, const Visit& visit, const Reach& reach) {
+/// which visit may lower: near ones first. Calls enter() before it looks into a block.
+template <class Visit, class Enter, class Reach>
+void walk_near(const LevelView& level, const Point& p, const Visit& visit, const Enter& enter,
+               const Reach& reach) {
   struct Entry {
     double square;
     std::uint32_t block;
@@ -34,6 +35,7 @@ void walk_near(const LevelView& level, const Point& p, const Visit& visit, const
   while (size > 0) {
     const Entry entry = stack[--size];
     if (!(entry.square < reach())) continue;
+    enter();
     const Block& block = level.blocks[entry.block];
     double square[kNodesPerBlock];
     square_distances(block, p, square);
@@ -56,13 +58,16 @@ void walk_near(const LevelView& level, const Point& p, const Visit& visit, const
 
 }  // namespace
 
-NearestTriangle nearest_triangle(const LevelView& level, const Point& p, std::uint32_t hint) {
+NearestTriangle nearest_triangle(const LevelView& level, const Point& p, std::uint32_t hint,
+                                 const NearEnough& enough) {
   NearestTriangle nearest = {square_distance(p, level.triangles[hint]), hint};
   const auto visit = [&](std::uint32_t triangle) {
     const double square = square_distance(p, level.triangles[triangle]);
-    if (square < nearest.square) nearest = {square, triangle};
+    if (square < nearest.square) nearest.square = square, nearest.triangle = triangle;
   };
-  walk_near(level, p, visit, [&] { return nearest.square; });
+  const auto enter = [&] { nearest.certain = ++nearest.looks < enough.most_looks; };
+  const auto reach = [&] { return nearest.certain && nearest.square > enough.square ? nearest.square : 0.0; };
+  walk_near(level, p, visit, enter, reach);
   return nearest;
 }
 
@@ -89,10 +94,12 @@ double proved_distance(const LevelView& level, const Point& p, std::uint32_t hin
   };
   visit(hint);
   // Boxes are farther away than the root of what is computed less sqrt(3) 2^-51 of the largest coordinate.
-  walk_near(level, p, visit, [&] {
-    const double reach = least + 0x1p-49 * largest;
-    return reach * reach * (1 + 0x1p-49);
-  });
+  const auto reach = [&] {
+    const double root = least + 0x1p-49 * largest;
+    return root * root * (1 + 0x1p-49);
+  };
+  walk_near(
+      level, p, visit, [] {}, reach);
   return least;
 }
 

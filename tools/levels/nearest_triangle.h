@@ -88,11 +88,22 @@ inline double square_distance(const Point& p, const Triangle& triangle) {
 struct NearestTriangle {
   double square;  ///< of the distance, as computed
   std::uint32_t triangle;
+  bool certain = true;      ///< there is no nearer one, or this one is near enough
+  std::uint32_t looks = 0;  ///< blocks that were looked into
+};
+
+/// Says when a search for the nearest triangle may end early.
+struct NearEnough {
+  double square = 0;  ///< with any triangle whose square distance is at most this
+  /// After so many blocks, with the nearest of the triangles seen so far. Ordinary surfaces take some 20
+  /// blocks; all boxes of a fan hold the points near its middle.
+  std::uint32_t most_looks = 1024;
 };
 
 /// The triangle of the level that is nearest to p, up to rounding. The search begins with the triangle
 /// `hint`.
-NearestTriangle nearest_triangle(const LevelView& level, const Point& p, std::uint32_t hint);
+NearestTriangle nearest_triangle(const LevelView& level, const Point& p, std::uint32_t hint,
+                                 const NearEnough& enough = {});
 
 /// A number that p's distance from the level's surface is surely not below; near it where nothing is amiss
 /// with float64. `hint`: a triangle that is near.

@@ -27,6 +27,10 @@ using Vector = Kernel::Vector_3;
 using Mesh = CGAL::Surface_mesh<Point>;
 using Quadrics = simplification::GarlandHeckbert_plane_policies<Mesh, Kernel>;
 
+// A vertex has at most so many triangles: each collapse looks anew at all edges around the vertices beside
+// it, with all triangles around their ends, which is cubic in this number.
+constexpr std::uint32_t kMostAround = 64;
+
 // Takes stored coordinates to a box of edge 1 to 2 around zero and back. Only the centre can round.
 class Frame {
  public:
@@ -112,6 +116,7 @@ class Guard {
   bool allows(const Mesh& mesh, std::uint32_t v0, std::uint32_t v1, const std::array<float, 3>& point) {
     point_ = point;
     collect_star(mesh, v0, v1);
+    if (left_.size() > kMostAround) return false;
     places_.clear();
     for (const std::uint32_t face : star_) {
       for (std::uint32_t sample = first_[face]; sample != kNone; sample = next_[sample]) {
@@ -202,7 +207,7 @@ class Guard {
   // is.
   bool is_near(const levels::Point& point, std::uint32_t& hint) const {
     if (levels::square_distance(point, finest_.triangles[hint]) <= square_) return true;
-    const levels::NearestTriangle nearest = levels::nearest_triangle(finest_, point, hint);
+    const levels::NearestTriangle nearest = levels::nearest_triangle(finest_, point, hint, {square_});
     hint = nearest.triangle;
     return nearest.square <= square_;
   }
@@ -384,19 +389,31 @@ std::vector<TriangleTopology> wound(std::span<const TriangleTopology> triangles,
   return result;
 }
 
-// Joins the corners that stay one vertex and marks the vertices along the cuts.
+// Joins the corners that stay one vertex and marks the vertices along the cuts. A fan of more than
+// kMostAround triangles is cut into several.
 void join_corners(std::span<const TriangleTopology> triangles, UnionFind& corners,
                   std::vector<bool>& on_cut) {
   const auto next = [](std::uint32_t side) { return side % 3 == 2 ? side - 2 : side + 1; };
   const auto vertex = [&](std::uint32_t corner) { return triangles[corner / 3].vertex[corner % 3]; };
   const SurfaceEdges edges(triangles);
+  std::vector<std::uint32_t> around(3 * triangles.size(), 1);  // the first of joined corners: how many
+  const auto together = [&](std::uint32_t a, std::uint32_t b) {
+    const std::uint32_t first = corners.find(a), second = corners.find(b);
+    return around[first] + (first == second ? 0 : around[second]);
+  };
+  const auto join = [&](std::uint32_t a, std::uint32_t b) {
+    const std::uint32_t all = together(a, b);
+    corners.join(a, b);
+    around[corners.find(a)] = all;
+  };
   for (std::uint32_t e = 0; e < edges.count(); ++e) {
     const auto sides = edges.sides_of(e);
     if (sides.size() == 1) continue;
     const std::uint32_t s = sides[0], t = sides[1];
-    if (sides.size() == 2 && runs_up(triangles, s) != runs_up(triangles, t)) {
-      corners.join(s, next(t));
-      corners.join(next(s), t);
+    if (sides.size() == 2 && runs_up(triangles, s) != runs_up(triangles, t) &&
+        std::max(together(s, next(t)), together(next(s), t)) <= kMostAround) {
+      join(s, next(t));
+      join(next(s), t);
     } else {
       on_cut[vertex(s)] = on_cut[vertex(next(s))] = true;
     }

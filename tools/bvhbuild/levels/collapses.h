@@ -20,8 +20,9 @@ struct LevelMesh {
 
 /// A mesh whose edges have one side or two that run in opposite directions, and whose triangles around each
 /// vertex follow each other over such edges: what simplifiers ask for. It is the surface of a level, cut open
-/// where more than two triangles meet at an edge, where windings disagree, and where surfaces touch in a
-/// vertex. Vertices along the cuts are fixed, so that what was joined stays joined.
+/// where more than two triangles meet at an edge, where windings disagree, where surfaces touch in a vertex,
+/// and where one vertex has more than 64 triangles, for which simplifying would take cubic time. Vertices
+/// along the cuts are fixed, so that what was joined stays joined.
 struct OpenedMesh {
   std::vector<std::array<float, 3>> points;
   std::vector<bool> fixed;                              ///< of each point

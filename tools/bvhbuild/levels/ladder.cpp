@@ -165,6 +165,7 @@ class Search {
     const Tree tree = build_tree(geometry, Imaginary::minimal, Effort::fast);
     HausdorffOptions options;
     options.wanted = wanted;
+    options.most_looks = (1 << 18) + 256 * (finest_.view().triangle_count + mesh.triangles.size());
     return hausdorff_bound(finest_.view(), LaidLevel(geometry, tree).view(), options);
   }
 

@@ -17,19 +17,6 @@ bool drop(std::uint64_t& count) {
   return false;
 }
 
-/// Calls visit(i, hash(i)) in order for all i below `count`, with the table's slots on their way from memory:
-/// welding is bound by cache misses, and a batch waits for them together.
-template <class Hash, class Visit>
-void for_each_prefetched(std::size_t count, const IndexTable& table, const Hash& hash, const Visit& visit) {
-  constexpr std::size_t kBatch = 32;
-  std::array<std::uint64_t, kBatch> hashes;
-  for (std::size_t first = 0; first < count; first += kBatch) {
-    const std::size_t batch = std::min(kBatch, count - first);
-    for (std::size_t i = 0; i < batch; ++i) table.prefetch(hashes[i] = hash(first + i));
-    for (std::size_t i = 0; i < batch; ++i) visit(static_cast<std::uint32_t>(first + i), hashes[i]);
-  }
-}
-
 /// Returns the same place with one spelling of zero, so that equal places are equal bit by bit.
 Point normalised(const Point& p) {
   return {p[0] + 0.0, p[1] + 0.0, p[2] + 0.0};

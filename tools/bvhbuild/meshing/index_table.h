@@ -1,4 +1,6 @@
 #pragma once
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -50,5 +52,18 @@ class IndexTable {
 
   std::vector<std::uint32_t> slots_;
 };
+
+/// Calls visit(i, hash(i)) in order for all i below `count`, with the table's slots on their way from memory:
+/// welding is bound by cache misses, and a batch waits for them together.
+template <class Hash, class Visit>
+void for_each_prefetched(std::size_t count, const IndexTable& table, const Hash& hash, const Visit& visit) {
+  constexpr std::size_t kBatch = 32;
+  std::array<std::uint64_t, kBatch> hashes;
+  for (std::size_t first = 0; first < count; first += kBatch) {
+    const std::size_t batch = std::min(kBatch, count - first);
+    for (std::size_t i = 0; i < batch; ++i) table.prefetch(hashes[i] = hash(first + i));
+    for (std::size_t i = 0; i < batch; ++i) visit(static_cast<std::uint32_t>(first + i), hashes[i]);
+  }
+}
 
 }  // namespace tandem::build

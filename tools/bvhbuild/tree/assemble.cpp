@@ -8,11 +8,15 @@
 #include <utility>
 #include <vector>
 
+#include "bvhbuild/meshing/meshing.h"
+#include "parallel/parallel.h"
 #include "tandem/formats/allocator.h"
 #include "tandem/formats/check.h"
 
 namespace tandem::build {
 namespace {
+
+constexpr std::size_t kBytesAtOnce = 1 << 20;
 
 std::uint64_t align_up(std::uint64_t offset) {
   return (offset + kSectionAlignment - 1) / kSectionAlignment * kSectionAlignment;
@@ -76,16 +80,19 @@ std::uint32_t part_of(std::span<const Part> parts, std::uint32_t face) {
 }
 
 void write_triangles(const AssetLevel& level, std::span<const Part> parts, Triangle* out) {
-  for (const std::uint32_t source : level.tree->order) {
-    Triangle triangle{};
-    for (int i = 0; i < 3; ++i) {
-      const auto& point = level.geometry.points[level.geometry.triangles[source][i]];
-      std::copy(point.begin(), point.end(), triangle.corner[i].position);
+  const std::vector<std::uint32_t>& order = level.tree->order;
+  parallel::for_parts(order.size(), kTrianglesAtOnce, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t != end; ++t) {
+      Triangle triangle{};
+      for (int i = 0; i < 3; ++i) {
+        const auto& point = level.geometry.points[level.geometry.triangles[order[t]][i]];
+        std::copy(point.begin(), point.end(), triangle.corner[i].position);
+      }
+      triangle.corner[0].w = level.face[order[t]];
+      triangle.corner[1].w = part_of(parts, level.face[order[t]]);
+      out[t] = triangle;
     }
-    triangle.corner[0].w = level.face[source];
-    triangle.corner[1].w = part_of(parts, level.face[source]);
-    *out++ = triangle;
-  }
+  });
 }
 
 Plan plan_sections(const PartTable& table, const AssetSource& source, std::span<const AssetLevel> levels) {
@@ -183,7 +190,9 @@ void write_section(const Section& section, const AssetSource& source, std::span<
 
 Image::Image(std::size_t bytes) : data_(static_cast<std::byte*>(allocate(bytes))), size_(bytes) {
   if (data_ == nullptr) throw std::bad_alloc();
-  std::memset(data_.get(), 0, bytes);
+  parallel::for_parts(bytes, kBytesAtOnce, [&](std::size_t begin, std::size_t end) {
+    std::memset(data_.get() + begin, 0, end - begin);
+  });
 }
 
 void Image::Delete::operator()(std::byte* data) const {
@@ -197,7 +206,8 @@ Image assemble(const AssetSource& source, std::span<const AssetLevel> levels) {
   const FileHeader header = make_header(source, levels, plan);
   std::memcpy(image.data(), &header, sizeof header);
   std::memcpy(image.data() + sizeof header, plan.sections().data(), plan.sections().size() * sizeof(Section));
-  for (const Section& section : plan.sections()) write_section(section, source, levels, table, image);
+  parallel::for_each(plan.sections().size(),
+                     [&](std::size_t i) { write_section(plan.sections()[i], source, levels, table, image); });
   seal(image.data(), image.size());
   return image;
 }
@@ -205,14 +215,18 @@ Image assemble(const AssetSource& source, std::span<const AssetLevel> levels) {
 LevelParts build_parts(const Geometry& geometry, const BuildOptions& options, OptimisationWatch& watch) {
   LevelParts parts;
   parts.tree = build_tree(geometry, options.imaginary, options.effort, watch);
-  const BuildShares shares = build_shares(options.effort);
-  watch.reach(shares.emitted);
-  if (options.gpu_blocks && geometry.triangles.size() < kMostOrientedTriangles)
-    parts.oriented_blocks = orient_blocks(geometry, parts.tree, options.effort);
-  watch.reach(shares.oriented);
-  if (options.topology && geometry.triangles.size() < kMostTopologyTriangles)
-    parts.topology = make_topology(geometry, parts.tree);
-  watch.reach(shares.topology);
+  watch.reach(build_shares(options.effort).emitted);
+  const std::size_t triangles = geometry.triangles.size();
+  parallel::invoke(  // topology takes one thread, about as long as a fast search
+      [&] {
+        if (options.topology && triangles < kMostTopologyTriangles)
+          parts.topology = make_topology(geometry, parts.tree);
+      },
+      [&] {
+        if (options.gpu_blocks && triangles < kMostOrientedTriangles)
+          parts.oriented_blocks = orient_blocks(geometry, parts.tree, options.effort);
+      });
+  watch.reach(build_shares(options.effort).topology);
   return parts;
 }
 

@@ -35,6 +35,9 @@ class LegalSplits {
         leaf_blocks_(leaf_blocks_for(n)),
         internal_blocks_(internal_blocks_for(leaf_blocks_, slots)) {}
 
+  /// Returns a number of which all legal splits are multiples: full leaf blocks stay full.
+  constexpr std::uint32_t step() const { return n_ % 4 == 0 ? 4 : 1; }
+
   /// Returns how many slots the first `left` triangles should take, 0 if the split is not legal. Where
   /// several numbers are legal: the one that shares slots most nearly as leaf blocks are shared.
   constexpr std::uint32_t left_slots(std::uint32_t left) const {

@@ -10,25 +10,25 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// A block has a frame of its own if at most this many triangles are below it. Above, none is worth it
-// (docs/decisions/gpu-blocks.md), and the checker would have to look at all triangles once more for each
-// level.
-constexpr std::uint32_t kMostTriangles = 4096;
+constexpr std::size_t kBlocksAtOnce = 512;
 
-constexpr std::size_t kBlocksAtOnce = 64;
-
-// A search for a frame turns the best one so far about some axes at once, one way or the other, by steps that
-// become smaller from round to round.
+// A search begins with the best frame of the block's children and turns the best one so far about some axes
+// at once, one way or the other, by steps that become smaller from round to round.
 struct SearchEffort {
-  std::uint32_t most_points;  // corners of a node that frames are judged by
+  // A block has a frame of its own if at most this many triangles are below it. Above, none is worth it
+  // (docs/decisions/gpu-blocks.md), and the checker would have to look at all triangles once more for each
+  // level.
+  std::uint32_t most_triangles;
+  std::uint32_t leaf_triangles;  // whose edges a leaf block tries
+  std::uint32_t most_points;     // corners of a node that frames are judged by
   int axes_at_once, rounds;
-  float next_step;  // times the one before
+  float first_step, next_step;  // the next one: times the one before
 };
-constexpr float kFirstStep = 0.276f;  // 3 such steps reach all frames of a cube
 
 constexpr SearchEffort search_effort(Effort effort) {
-  if (effort == Effort::fast) return {16, 1, 5, 0.5f};
-  return effort == Effort::standard ? SearchEffort{48, 2, 8, 0.58f} : SearchEffort{128, 3, 14, 0.75f};
+  if (effort == Effort::fast) return {256, 2, 8, 1, 1, 0.1f, 1};
+  if (effort == Effort::standard) return {4096, 4, 48, 2, 4, 0.2f, 0.5f};
+  return {4096, 4, 128, 3, 14, 0.276f, 0.75f};  // 3 first steps reach all frames of a cube
 }
 
 using Vector = std::array<float, 3>;
@@ -116,15 +116,17 @@ class Fit {
         farthest_(farthest),
         effort_(search_effort(effort)) {}
 
-  // Makes all of a block but first_below.
-  OrientedBlock make(std::uint32_t at) {
+  // Makes all of a block but first_below. children: the oriented blocks of its children, as far as they are
+  // known.
+  OrientedBlock make(std::uint32_t at, std::span<const OrientedBlock> children) {
     const Block& block = tree_.blocks[at];
     begin(block);
     OrientedBlock out = along_mesh(block);
-    if (ranges_.end[at] - ranges_.first[at] <= kMostTriangles) {
+    if (ranges_.end[at] - ranges_.first[at] <= effort_.most_triangles) {
+      copy_corners(ranges_.first[at], ranges_.end[at]);
       gather();
       OrientedBlock fitted = out;
-      fitted.rotation = block.is_leaf_block() ? best_of_triangles() : search();
+      fitted.rotation = block.is_leaf_block() ? best_of_triangles() : search(children);
       if (!(fitted.rotation == kNoRotation)) {
         fill_boxes(fitted);
         if (cost_of(fitted) < cost_of(out) && reaches_no_farther(fitted)) out = fitted;
@@ -162,7 +164,18 @@ class Fit {
   }
 
   const Vector& corner(std::uint32_t triangle, std::uint32_t c) const {
-    return geometry_.points[geometry_.triangles[tree_.order[triangle]][c]];
+    return corners_[3 * (triangle - corners_first_) + c];
+  }
+
+  // Copies the corners of triangles of the file side by side, if they are not yet among those copied last.
+  void copy_corners(std::uint32_t first, std::uint32_t end) {
+    if (corners_first_ <= first && end <= corners_first_ + corners_.size() / 3) return;
+    corners_first_ = first;
+    corners_.resize(3 * std::size_t{end - first});
+    for (std::uint32_t t = first; t < end; ++t) {
+      for (std::uint32_t c = 0; c < 3; ++c)
+        corners_[3 * (t - first) + c] = geometry_.points[geometry_.triangles[tree_.order[t]][c]];
+    }
   }
 
   // Gathers some of the corners of each node, each point once.
@@ -267,7 +280,8 @@ class Fit {
   BlockRotation best_of_triangles() const {
     Best best(*this);
     best.consider(kNoRotation);
-    for (std::uint32_t t = first_[0]; t < first_[nodes_]; ++t) {
+    const std::uint32_t end = std::min(first_[nodes_], first_[0] + effort_.leaf_triangles);
+    for (std::uint32_t t = first_[0]; t < end; ++t) {
       for (std::uint32_t edge = 0; edge < 3; ++edge) best.consider(axes_of(t, edge));
     }
     return best.rotation();
@@ -288,10 +302,11 @@ class Fit {
     return rotation_of(axis);
   }
 
-  BlockRotation search() const {
+  BlockRotation search(std::span<const OrientedBlock> children) const {
     Best best(*this);
     best.consider(kNoRotation);
-    float step = kFirstStep;
+    for (const OrientedBlock& child : children) best.consider(child.rotation);
+    float step = effort_.first_step;
     for (int round = 0; round < effort_.rounds; ++round, step *= effort_.next_step) {
       const BlockRotation from = best.rotation();
       for (int turn = 0; turn < 27; ++turn) {
@@ -315,13 +330,16 @@ class Fit {
           float vertex[3];
           std::copy_n(corner(t, c).begin(), 3, vertex);
           for (int k = 0; k < 3; ++k) {
-            const double at = along_axis(rotation, k, vertex);
+            const double at = scaled_along_axis(rotation, k, vertex);
             lowest[k] = std::min(lowest[k], at), highest[k] = std::max(highest[k], at);
           }
         }
       }
-      for (int k = 0; k < 3; ++k)
-        box_along(lowest[k], highest[k], farthest_, out.centre[k][node], out.half_extent[k][node]);
+      const double scale = rotation.squared_length;  // quotients ascend as numbers do
+      for (int k = 0; k < 3; ++k) {
+        box_along(lowest[k] / scale, highest[k] / scale, farthest_, out.centre[k][node],
+                  out.half_extent[k][node]);
+      }
     }
   }
 
@@ -347,6 +365,8 @@ class Fit {
   std::uint32_t first_[kNodesPerBlock + 1] = {};  // triangle of each node, and their end
   float scale_ = 1;                               // makes the block's size 1
   float rim_ = 0;
+  std::vector<Vector> corners_;  // of the triangles of the file from corners_first_ on
+  std::uint32_t corners_first_ = 0;
   std::vector<std::uint32_t> vertices_;
   std::vector<Point> points_;
   std::size_t points_end_[kNodesPerBlock] = {};
@@ -371,9 +391,14 @@ std::vector<OrientedBlock> orient_blocks(const Geometry& geometry, const Tree& t
   const Ranges ranges(tree);
   parallel::for_parts(tree.blocks.size(), kBlocksAtOnce, [&](std::size_t begin, std::size_t end) {
     Fit fit(geometry, tree, ranges, farthest, effort);
-    for (std::size_t b = begin; b != end; ++b) {
+    for (std::size_t b = end; b-- > begin;) {
+      const Block& from = tree.blocks[b];
+      int known = 0;  // children that are in this part come later in it, and were made before
+      while (known < kNodesPerBlock && from.kind[known] == NodeKind::internal && from.index[known] < end)
+        ++known;
+      const auto children = std::span(out).subspan(known > 0 ? first_below[b] : 0, known);
       OrientedBlock& block = out[number[b]];
-      block = fit.make(static_cast<std::uint32_t>(b));
+      block = fit.make(static_cast<std::uint32_t>(b), children);
       block.first_below = first_below[b];
     }
   });

@@ -5,7 +5,6 @@
 #include <bit>
 #include <cmath>
 #include <numeric>
-#include <utility>
 
 #include "parallel/parallel.h"
 
@@ -49,6 +48,33 @@ void merge(Bins& into, const Bins& from) {
       into[axis][b].bounds.grow(from[axis][b].bounds);
       into[axis][b].count += from[axis][b].count;
     }
+  }
+}
+
+// Keys ascend by centre, then by triangle.
+std::uint64_t key_of(float centre, std::uint32_t triangle) {
+  const auto bits = std::bit_cast<std::uint32_t>(centre + 0.0f);  // -0 is 0
+  const std::uint32_t ascending = bits ^ (bits >> 31 != 0 ? 0xffffffffu : 0x80000000u);
+  return std::uint64_t{ascending} << 32 | triangle;
+}
+std::uint32_t triangle_of(std::uint64_t key) {
+  return static_cast<std::uint32_t>(key);
+}
+
+// Sorts keys whose triangles ascend: three passes over the centres' bits, 11 of them at a time, each of which
+// leaves equal ones in their order.
+void sort_by_centre(std::vector<std::uint64_t>& keys, std::vector<std::uint64_t>& scratch) {
+  constexpr std::size_t kFew = 256;  // std::sort takes less time for so many
+  constexpr int kBits = 11;
+  if (keys.size() <= kFew) return std::sort(keys.begin(), keys.end());
+  scratch.resize(keys.size());
+  for (int shift = 32; shift < 64; shift += kBits) {
+    const auto digit = [&](std::uint64_t key) { return (key >> shift) & ((1u << kBits) - 1); };
+    std::array<std::uint32_t, 1 << kBits> first = {};
+    for (const std::uint64_t key : keys) ++first[digit(key)];
+    std::exclusive_scan(first.begin(), first.end(), first.begin(), 0u);
+    for (const std::uint64_t key : keys) scratch[first[digit(key)]++] = key;
+    keys.swap(scratch);
   }
 }
 
@@ -111,12 +137,12 @@ TriangleSplitter::TriangleSplitter(std::span<const Bounds> bounds) : bounds_(bou
 void TriangleSplitter::sort(Range range) {
   const std::vector<std::uint32_t> triangles(order_[0].begin() + range.begin, order_[0].begin() + range.end);
   for_each_axis(range, [&](int axis) {
-    std::vector<std::pair<float, std::uint32_t>> keys;
+    std::vector<std::uint64_t> keys, scratch;
     keys.reserve(triangles.size());
-    for (const std::uint32_t t : triangles) keys.emplace_back(centre(t, axis), t);
-    std::sort(keys.begin(), keys.end());
+    for (const std::uint32_t t : triangles) keys.push_back(key_of(centre(t, axis), t));
+    sort_by_centre(keys, scratch);
     std::uint32_t* order = order_[axis].data() + range.begin;
-    for (const auto& key : keys) *order++ = key.second;
+    for (const std::uint64_t key : keys) *order++ = triangle_of(key);
   });
 }
 
@@ -149,22 +175,24 @@ Split TriangleSplitter::sweep(int axis, Range range, const IsLegal& is_legal) {
   const std::uint32_t n = range.size();
   const std::uint32_t* order = order_[axis].data() + range.begin;
   std::uint32_t* right_cost = scratch_[axis].data() + range.begin;
+  const std::uint32_t step = is_legal.step;
   Bounds right;
-  for (std::uint32_t i = n - 1; i > 0; --i) {
-    right.grow(bounds_[order[i]]);
-    right_cost[i] = std::bit_cast<std::uint32_t>(right.visit_cost() * static_cast<float>(n - i));
+  for (std::uint32_t i = n, legal = (n - 1) / step * step; legal > 0; legal -= step) {
+    while (i > legal) right.grow(bounds_[order[--i]]);
+    right_cost[legal] = std::bit_cast<std::uint32_t>(right.visit_cost() * static_cast<float>(n - legal));
   }
   Split best;
   best.axis = axis;
   Bounds left;
   const UnevenPenalty penalty(n);
-  for (std::uint32_t i = 1; i < n; ++i) {
-    left.grow(bounds_[order[i - 1]]);
-    const float total = left.visit_cost() * static_cast<float>(i) + std::bit_cast<float>(right_cost[i]);
-    const float cost = total * penalty.factor(i);
-    if (cost < best.cost && is_legal(i)) {
+  for (std::uint32_t i = 0, legal = step; legal < n; legal += step) {
+    while (i < legal) left.grow(bounds_[order[i++]]);
+    const float total =
+        left.visit_cost() * static_cast<float>(legal) + std::bit_cast<float>(right_cost[legal]);
+    const float cost = total * penalty.factor(legal);
+    if (cost < best.cost && is_legal(legal)) {
       best.cost = cost;
-      best.left = i;
+      best.left = legal;
     }
   }
   return best;
@@ -177,11 +205,12 @@ void TriangleSplitter::mark_left_side(Range range, const Split& split) {
     for (std::uint32_t i = 0; i < range.size(); ++i) goes_left_[sorted[i]] = i < split.left;
     return;
   }
-  std::vector<std::pair<float, std::uint32_t>> keys;
+  std::vector<std::uint64_t> keys;
   keys.reserve(range.size());
-  for (const std::uint32_t t : order(range)) keys.emplace_back(centre(t, split.axis), t);
+  for (const std::uint32_t t : order(range)) keys.push_back(key_of(centre(t, split.axis), t));
   std::nth_element(keys.begin(), keys.begin() + split.left, keys.end());
-  for (std::uint32_t i = 0; i < range.size(); ++i) goes_left_[keys[i].second] = i < split.left;
+  const std::uint64_t first_right = keys[split.left];
+  for (const std::uint32_t t : order(range)) goes_left_[t] = key_of(centre(t, split.axis), t) < first_right;
 }
 
 // Brings the left side's triangles to the front, keeping the order on both sides.

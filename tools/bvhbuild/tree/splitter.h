@@ -47,7 +47,12 @@ class UnevenPenalty {
 class TriangleSplitter {
  public:
   /// Says whether a group may be cut behind so many triangles. Called from several threads.
-  using IsLegal = std::function<bool(std::uint32_t left)>;
+  struct IsLegal {
+    std::function<bool(std::uint32_t left)> test;
+    std::uint32_t step = 1;  ///< only multiples of it may be legal
+
+    bool operator()(std::uint32_t left) const { return left % step == 0 && test(left); }
+  };
 
   /// `bounds`: of each triangle, normalized_bounds(); they must outlive the splitter.
   explicit TriangleSplitter(std::span<const Bounds> bounds);
@@ -84,8 +89,8 @@ class TriangleSplitter {
   // A group up to kSweepSize has its triangles by centre along x, y and z. A larger one has the first order
   // alone, by index, so that going through it goes through memory in order.
   std::vector<std::uint32_t> order_[3];
-  std::vector<std::uint32_t>
-      scratch_[3];  // bits of the right sides' costs; one side's triangles while partitioning
+  // Bits of the right sides' costs; one side's triangles while partitioning.
+  std::vector<std::uint32_t> scratch_[3];
   std::vector<std::uint8_t> goes_left_;  // by triangle
 };
 

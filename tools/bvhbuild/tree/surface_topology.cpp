@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <vector>
 
@@ -13,34 +14,64 @@
 namespace tandem::build {
 namespace {
 
+constexpr std::size_t kVerticesAtOnce = 1 << 14;
+
+// A side of a triangle, without its lower vertex.
 struct Side {
-  std::uint32_t lower, upper, side;
+  std::uint32_t upper, side;
 
   bool operator<(const Side& other) const {
-    if (lower != other.lower) return lower < other.lower;
     return upper != other.upper ? upper < other.upper : side < other.side;
+  }
+};
+
+// The sides of all triangles but those from a vertex to itself, by lower vertex, upper vertex and number.
+struct SortedSides {
+  std::vector<std::uint32_t> first;  // of each lower vertex, and the end
+  std::vector<Side> sides;
+
+  explicit SortedSides(std::span<const TriangleTopology> triangles) {
+    std::uint32_t vertices = 0;
+    for (const TriangleTopology& triangle : triangles)
+      vertices =
+          std::max(vertices, 1 + std::max({triangle.vertex[0], triangle.vertex[1], triangle.vertex[2]}));
+    first.assign(vertices + 1, 0);
+    for_each_side(triangles, [&](std::uint32_t lower, const Side&) { ++first[lower]; });
+    std::inclusive_scan(first.begin(), first.end(), first.begin());
+    sides.resize(first.back());
+    for_each_side(triangles, [&](std::uint32_t lower, const Side& side) { sides[--first[lower]] = side; });
+    parallel::for_parts(vertices, kVerticesAtOnce, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t v = begin; v != end; ++v)
+        std::sort(sides.begin() + first[v], sides.begin() + first[v + 1]);
+    });
+  }
+
+ private:
+  template <typename Visit>
+  static void for_each_side(std::span<const TriangleTopology> triangles, const Visit& visit) {
+    for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+      for (std::uint32_t k = 0; k < 3; ++k) {
+        const std::uint32_t u = triangles[t].vertex[k], v = triangles[t].vertex[(k + 1) % 3];
+        if (u != v) visit(std::min(u, v), {std::max(u, v), 3 * t + k});
+      }
+    }
   }
 };
 
 }  // namespace
 
 SurfaceEdges::SurfaceEdges(std::span<const TriangleTopology> triangles) : edge_(3 * triangles.size(), kNone) {
-  std::vector<Side> sides;
-  sides.reserve(edge_.size());
-  for (std::uint32_t side = 0; side < edge_.size(); ++side) {
-    const auto& vertex = triangles[side / 3].vertex;
-    const std::uint32_t u = vertex[side % 3], v = vertex[(side + 1) % 3];
-    if (u != v) sides.push_back({std::min(u, v), std::max(u, v), side});
+  const SortedSides sorted(triangles);
+  sides_.reserve(sorted.sides.size());
+  for (std::size_t vertex = 0; vertex + 1 < sorted.first.size(); ++vertex) {
+    for (std::uint32_t i = sorted.first[vertex]; i < sorted.first[vertex + 1]; ++i) {
+      if (i == sorted.first[vertex] || sorted.sides[i].upper != sorted.sides[i - 1].upper)
+        first_.push_back(i);
+      edge_[sorted.sides[i].side] = static_cast<std::uint32_t>(first_.size() - 1);
+      sides_.push_back(sorted.sides[i].side);
+    }
   }
-  parallel::sort(sides.begin(), sides.end(), 1 << 15);
-  sides_.reserve(sides.size());
-  for (std::size_t i = 0; i < sides.size(); ++i) {
-    if (i == 0 || sides[i].lower != sides[i - 1].lower || sides[i].upper != sides[i - 1].upper)
-      first_.push_back(static_cast<std::uint32_t>(i));
-    edge_[sides[i].side] = static_cast<std::uint32_t>(first_.size() - 1);
-    sides_.push_back(sides[i].side);
-  }
-  first_.push_back(static_cast<std::uint32_t>(sides.size()));
+  first_.push_back(static_cast<std::uint32_t>(sides_.size()));
 }
 
 namespace {
@@ -158,11 +189,13 @@ std::vector<std::uint32_t> first_at_position(std::span<const std::array<float, 3
   const auto bits = [](float x) { return std::uint64_t{std::bit_cast<std::uint32_t>(x + 0.0f)}; };  // -0 is 0
   IndexTable table(points.size());
   std::vector<std::uint32_t> first(points.size());
-  for (std::uint32_t i = 0; i < points.size(); ++i) {
-    const auto& p = points[i];
-    first[i] = table.find_or_insert(hash_words(bits(p[0]), bits(p[1]), bits(p[2])), i,
-                                    [&](std::uint32_t other) { return points[other] == p; });
-  }
+  const auto hash = [&](std::size_t i) {
+    return hash_words(bits(points[i][0]), bits(points[i][1]), bits(points[i][2]));
+  };
+  for_each_prefetched(points.size(), table, hash, [&](std::uint32_t i, std::uint64_t hash_i) {
+    first[i] =
+        table.find_or_insert(hash_i, i, [&](std::uint32_t other) { return points[other] == points[i]; });
+  });
   return first;
 }
 

@@ -68,7 +68,8 @@ class MinimalTree {
   Groups split(Range range, std::uint32_t slots, std::uint32_t depth) {
     if (slots == 1 || range.size() <= kNodesPerBlock) return {{range}, 1};
     const LegalSplits legal(range.size(), slots);
-    const auto is_legal = [&](std::uint32_t left) { return legal.left_slots(left) != 0; };
+    const TriangleSplitter::IsLegal is_legal = {
+        [&](std::uint32_t left) { return legal.left_slots(left) != 0; }, legal.step()};
     Split best;
     if (!must_split_evenly(depth, range.size())) best = splitter_.best_split(range, is_legal);
     if (best.left == 0) best = splitter_.even_split(range, is_legal);
@@ -142,7 +143,7 @@ class BinaryTree {
   }
 
   Split choose(Range range, std::uint32_t depth) {
-    const auto any = [](std::uint32_t) { return true; };
+    const TriangleSplitter::IsLegal any = {[](std::uint32_t) { return true; }};
     Split best;
     if (!must_split_evenly(depth, range.size())) best = splitter_.best_split(range, any);
     return best.left != 0 ? best : splitter_.even_split(range, any);

@@ -74,6 +74,13 @@ void emit_leaf_block(const Geometry& geometry, const TopologyBlock& from, const 
   }
 }
 
+void emit_internal_block(const TopologyBlock& from, const Place& place, const Tree& tree, Block& block) {
+  for (int i = 0; i < from.count; ++i) {
+    const std::uint32_t child = place.child[i];
+    set_node(block, i, enclose(tree.blocks[child]), child, NodeKind::internal);
+  }
+}
+
 Topology build_topology(std::span<const Bounds> bounds, Imaginary imaginary) {
   if (imaginary == Imaginary::minimal) return build_minimal_tree(bounds);
   if (imaginary == Imaginary::free) return build_free_tree(bounds);
@@ -108,20 +115,25 @@ Tree emit(const Geometry& geometry, const Topology& topology) {
   tree.depth = numbering.depth();
   tree.blocks.resize(places.size());
   tree.order.resize(geometry.triangles.size());
+  // Children come before parents, whose boxes enclose them. A block with a child in another part waits.
+  std::vector<std::uint8_t> waits(places.size(), 0);
   parallel::for_parts(places.size(), kEmittedAtOnce, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t b = begin; b != end; ++b) {
+    for (std::size_t b = end; b-- > begin;) {
       const TopologyBlock& from = topology[places[b].block];
       for (int i = from.count; i < kNodesPerBlock; ++i) set_imaginary(tree.blocks[b], i);
-      if (from.is_leaf_block) emit_leaf_block(geometry, from, places[b], tree, tree.blocks[b]);
+      if (from.is_leaf_block) {
+        emit_leaf_block(geometry, from, places[b], tree, tree.blocks[b]);
+        continue;
+      }
+      for (int i = 0; i < from.count; ++i)
+        waits[b] |= static_cast<std::uint8_t>(places[b].child[i] >= end || waits[places[b].child[i]] != 0);
+      if (waits[b] == 0) emit_internal_block(from, places[b], tree, tree.blocks[b]);
     }
   });
-  for (std::size_t b = places.size(); b-- > 0;) {  // children before parents, whose boxes enclose them
+  for (std::size_t b = places.size(); b-- > 0;) {
     const TopologyBlock& from = topology[places[b].block];
     tree.leaf_block_count += from.is_leaf_block;
-    for (int i = 0; i < from.count && !from.is_leaf_block; ++i) {
-      const std::uint32_t child = places[b].child[i];
-      set_node(tree.blocks[b], i, enclose(tree.blocks[child]), child, NodeKind::internal);
-    }
+    if (waits[b] != 0) emit_internal_block(from, places[b], tree, tree.blocks[b]);
   }
   return tree;
 }

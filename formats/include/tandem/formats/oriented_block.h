@@ -91,10 +91,11 @@ TANDEM_HD inline ScaledRotation scaled_rotation(const BlockRotation& rotation) {
 inline BlockRotation rotation_near(float w, float x, float y, float z) {
   const float part[4] = {w, x, y, z};
   float largest = 0;
-  for (const float p : part) largest = std::fmax(largest, std::fabs(p));
+  for (const float p : part) largest = std::fabs(p) > largest ? std::fabs(p) : largest;
+  constexpr float kToWhole = 0x1.8p23f;  // a sum with it is rounded to a whole number, to an even one of two
   std::uint32_t word[4];
   for (int i = 0; i < 4; ++i) {
-    const float n = std::rint(part[i] / largest * static_cast<float>(kLargestQuaternionPart));
+    const float n = (part[i] / largest * static_cast<float>(kLargestQuaternionPart) + kToWhole) - kToWhole;
     word[i] = static_cast<std::uint32_t>(static_cast<int>(n) + static_cast<int>(kQuaternionOffset));
   }
   return {word[0] | word[1] << 16, word[2] | word[3] << 16};
@@ -105,11 +106,15 @@ inline constexpr BlockRotation kNoRotation = {
     kQuaternionOffset << 16 | (kQuaternionOffset + kLargestQuaternionPart),
     kQuaternionOffset << 16 | kQuaternionOffset};
 
-/// The coordinate of a vertex along axis k of a block's frame, off by at most 2^-51 of the vertex's distance
-/// from the origin.
-inline double along_axis(const ScaledRotation& rotation, int k, const float (&vertex)[3]) {
+/// The coordinate of a vertex along axis k of a block's frame, times rotation.squared_length.
+inline double scaled_along_axis(const ScaledRotation& rotation, int k, const float (&vertex)[3]) {
   const auto at = [&](int i) { return double{rotation.scaled[i][k]} * double{vertex[i]}; };  // exact
-  return ((at(0) + at(1)) + at(2)) / double{rotation.squared_length};
+  return (at(0) + at(1)) + at(2);
+}
+
+/// The coordinate itself, off by at most 2^-51 of the vertex's distance from the origin.
+inline double along_axis(const ScaledRotation& rotation, int k, const float (&vertex)[3]) {
+  return scaled_along_axis(rotation, k, vertex) / double{rotation.squared_length};
 }
 
 /// Centre and half-extent along an axis of a box that holds, in real arithmetic, what lies from `lowest` to

@@ -127,7 +127,7 @@ class Search {
 
   bool is_refuted() const { return options_.wanted && farthest_.distance - slack_ > *options_.wanted; }
 
-  /// The point and a triangle near it, and offers it as the farthest if there surely is no nearer one.
+  /// Returns the point with a triangle near it, and offers it as the farthest if no triangle is nearer.
   Corner measure(int side, const Point& point, std::uint32_t hint, Farthest& farthest,
                  std::uint64_t& looks) const {
     const double near = 0x1p-48 * largest_;

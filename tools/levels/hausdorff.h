@@ -18,9 +18,9 @@ struct HausdorffOptions {
   /// wide, but hold, as they do where 2^20 pieces and two for each triangle wait, for their memory. Without
   /// it: 2^20 and 64 for each triangle of both surfaces.
   std::optional<std::uint64_t> most_pieces = {};
-  /// The same of blocks of trees that are looked into for nearest triangles: ordinary surfaces take 10 to 80
-  /// for each triangle, fans thousands. Without it: 2^20 and 1,024 for each triangle of both surfaces. Who
-  /// makes a level takes less, so that others can prove its bound with other trees.
+  /// The search ends too when it has looked into so many blocks of trees for nearest triangles. Ordinary
+  /// surfaces take 10 to 80 for each triangle, fans thousands. Without it: 2^20 and 1,024 for each triangle
+  /// of both surfaces. bvhbuild sets less, so that others can prove its bound with other trees.
   std::optional<std::uint64_t> most_looks = {};
 };
 

@@ -35,7 +35,7 @@ struct CornerBounds {
 
 CornerBounds corner_bounds(const Geometry& geometry);
 
-/// The shares of a build's time that are done after each of its steps, as measured for a million triangles.
+/// Estimates which shares of the time of a build of a million triangles are done after each of its steps.
 struct BuildShares {
   double split, optimised, emitted, topology;
 };

@@ -72,7 +72,6 @@ struct BodyPair {
   TANDEM_HD const Body& operator[](int side) const { return side == 0 ? a : b; }
   TANDEM_HD double reach() const { return std::fmax(a.reach, b.reach); }
   TANDEM_HD double smaller_diagonal() const { return std::fmin(a.shape->diagonal, b.shape->diagonal); }
-  TANDEM_HD Vector3 apart() const { return b.centre - a.centre; }
   /// Points so far beside a plane count as in it: some hundred times what rounding of posed points and of
   /// their distance amounts to.
   TANDEM_HD double tolerance() const { return 0x1p-44 * reach(); }

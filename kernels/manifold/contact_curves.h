@@ -18,8 +18,8 @@ inline constexpr std::uint32_t kMostContactsOfPair = std::uint32_t{1} << 27;
 struct alignas(16) Piece {
   std::uint32_t triangle[2];  ///< of a, of b
   std::uint32_t info;         ///< kind, facing, weights, features, and whether an end is free
-  std::uint32_t unused;
-  Vector3 end[2];  ///< of a polygon: a corner, and its share of the area vector
+  std::uint32_t joined;       ///< 1: of a region that several curves bound (region_finder.h)
+  Vector3 end[2];             ///< of a polygon: a corner, and its share of the area vector
 
   TANDEM_HD MeetingKind kind() const { return static_cast<MeetingKind>(info & 3u); }
   TANDEM_HD bool facing() const { return (info & kFacing) != 0; }
@@ -32,6 +32,16 @@ struct alignas(16) Piece {
             static_cast<std::uint8_t>(bits >> 2 & 3u)};
   }
   TANDEM_HD std::uint64_t key() const { return std::uint64_t{triangle[0]} << 32 | triangle[1]; }
+  /// A key whose order stays the same where the bodies are exchanged, but for pairs of the same numbers.
+  TANDEM_HD std::uint64_t symmetric_key() const {
+    static_assert(kMostTopologyTriangles <= std::uint32_t{1} << 30);
+    const std::uint32_t s = triangle[0], t = triangle[1];
+    return (std::uint64_t{lesser(s, t)} << 31 | greater(s, t)) << 1 | (s > t ? 1u : 0u);
+  }
+  /// The middle of a segment; of a polygon a corner.
+  TANDEM_HD Vector3 middle() const {
+    return kind() == MeetingKind::polygon ? end[0] : 0.5 * (end[0] + end[1]);
+  }
 
   static constexpr std::uint32_t kFacing = 4, kHalfOfA = 8, kHalfOfB = 16, kDegenerate = 32;
 };
@@ -40,6 +50,16 @@ static_assert(sizeof(Piece) == 64);
 TANDEM_HD inline std::uint32_t bits_of(const TriangleFeature& f) {
   return std::uint32_t{f.of_b} | std::uint32_t{f.is_corner} << 1 | std::uint32_t{f.number} << 2;
 }
+
+/// The piece of the least key.
+struct LeastPiece {
+  std::uint64_t key = ~std::uint64_t{0};
+  std::uint32_t piece = kNoIndex;
+
+  TANDEM_HD void take(std::uint64_t of, std::uint32_t at) {
+    if (of < key) key = of, piece = at;
+  }
+};
 
 /// Memory for the pieces of a pair of bodies: of `contacts` entries, or so many for each contact.
 struct PieceMemory {
@@ -120,7 +140,7 @@ TANDEM_HD inline void write_piece(const PieceMemory& memory, std::uint32_t at, c
                (meeting.along_edge[1] ? Piece::kHalfOfB : 0u) |
                (meeting.degenerate ? Piece::kDegenerate : 0u) | bits_of(meeting.feature[0]) << 8 |
                bits_of(meeting.feature[1]) << 12;
-  piece.unused = 0;
+  piece.joined = 0;
   piece.end[0] = meeting.end[0];
   piece.end[1] = meeting.end[1];
   if (meeting.kind == MeetingKind::polygon)

@@ -2,39 +2,12 @@
 #include "kernels/manifold/patch_rim.h"
 #include "kernels/manifold/team.h"
 
-/// These steps are done once all patches of a pair of bodies are known: holes are taken off, and points get
-/// names that last.
+/// Once all patches of a pair of bodies are known, their points get names that last.
 namespace tandem::manifold {
 
 /// A point is the one of the step before if it has moved, on either body, by less than this part of the
 /// smaller body's diagonal.
 inline constexpr double kSamePoint = 0.02;
-
-/// Gives the area of a hole to the manifold around it: of those of its pair that push the other way the one
-/// whose centre is nearest. patch(i): a patch of the pair.
-template <typename PatchOf>
-TANDEM_HD inline void take_off_hole(const Patch& hole, std::uint32_t count, const PatchOf& patch) {
-  const auto vector = [](const double(&x)[3]) { return Vector3{x[0], x[1], x[2]}; };
-  const Vector3 centre = vector(hole.manifold.centre), normal = vector(hole.manifold.normal);
-  Patch* nearest = nullptr;
-  double least = INFINITY;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    Patch& other = patch(i);
-    if (other.hole != 0 || !(dot(vector(other.manifold.normal), normal) < 0)) continue;
-    const double distance = norm(vector(other.manifold.centre) - centre);
-    if (distance < least || (distance == least && other.key < nearest->key))
-      nearest = &other, least = distance;
-  }
-  if (nearest == nullptr) return;
-  Manifold& m = nearest->manifold;
-  const double own = norm(vector(m.area_vector)), of_hole = norm(vector(hole.manifold.area_vector));
-  // The middle stays at its height.
-  const Vector3 n = vector(m.normal), apart = vector(m.centre) - centre;
-  const Vector3 across =
-      own > of_hole ? (of_hole / (own - of_hole)) * (apart - dot(n, apart) * n) : Vector3{};
-  m.centre[0] += across.x, m.centre[1] += across.y, m.centre[2] += across.z;
-  for (int k = 0; k < 3; ++k) m.area_vector[k] += hole.manifold.area_vector[k];
-}
 
 /// Finds each point of a pair among those of the step before: of points that are each other's nearest, and
 /// near enough, the new one takes over the old one's id. Ids of the others differ from all that were taken

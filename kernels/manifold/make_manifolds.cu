@@ -3,6 +3,7 @@
 #include "kernels/manifold/manifold_data.h"
 #include "kernels/manifold/manifold_maker.h"
 #include "kernels/manifold/manifold_team.cuh"
+#include "kernels/manifold/region_finder.h"
 
 // These kernels go from contacts to patches, step by step. They are compiled without fused operations: the
 // arithmetic is that of the CPU, bit by bit.
@@ -205,13 +206,41 @@ __global__ void __launch_bounds__(kFinders, 2) find_curves(const __grid_constant
       args.summaries[pair] = summary;
       if (summary.segments > 0) atomicAdd(&state.segments, Counter{summary.segments});
     }
-    for (std::uint32_t curve = team.rank(); curve < summary.curves; curve += team.size()) {
-      const bool many = pieces.start[curve + 1] - pieces.start[curve] > most_of_warp(*groups.counts);
-      const std::uint32_t place = atomicAdd(many ? &state.curves_of_many : &state.curves_of_few, 1u);
-      args.curves[many ? place : args.capacity.contacts - 1 - place] = {pair, curve};
-    }
   };
   share_out<kFinders>(groups.counts->many, state.next_many, groups.counts->few, state.next_few, of);
+}
+
+/// Joins the curves of each pair that bound one region of the overlap, by a warp, and lists the regions.
+__global__ void __launch_bounds__(kThreads, 4) join_regions(const __grid_constant__ ManifoldArgs args) {
+  __shared__ WarpWalks walks[kWarps];
+  __shared__ Raw<BodyPair> shared_bodies[kWarps];
+  __shared__ Raw<PieceSummary> summaries[kWarps];
+  __shared__ Raw<manifold::RegionMemory> regions[kWarps];
+  __shared__ std::uint32_t taken[kWarps];
+  wait_for_kernel_before();
+  if (!has_query(args)) return;
+  const GpuGroupCounts& counts = *args.groups.counts;
+  ManifoldState& state = *args.state;
+  const std::uint32_t own = threadIdx.x / 32;
+  const WarpTeam team(&walks[own]);
+  take_rows(team, counts.many + counts.few, state.next_joined, taken[own], [&](std::uint32_t row) {
+    const std::uint32_t pair = row < counts.many ? args.groups.many[row] : args.groups.few[row - counts.many];
+    const std::uint32_t count = args.of_pair[pair].pieces.pieces;
+    if (count == 0 || count > manifold::kMostContactsOfPair) return;
+    BodyPair& bodies = shared_bodies[own].get();
+    PieceSummary& summary = summaries[own].get();
+    if (team.rank() == 0) bodies = bodies_of(args, args.pairs.pairs[pair]), summary = args.summaries[pair];
+    team.sync();
+    const PieceMemory pieces = memory_of(args, pair);
+    manifold::RegionFinder<WarpTeam> finder(team, bodies, pieces, summary, regions[own].get());
+    const std::uint32_t found = finder.find();
+    if (team.rank() == 0) args.summaries[pair].curves = found;
+    for (std::uint32_t region = team.rank(); region < found; region += team.size()) {
+      const bool many = pieces.start[region + 1] - pieces.start[region] > most_of_warp(counts);
+      const std::uint32_t place = atomicAdd(many ? &state.curves_of_many : &state.curves_of_few, 1u);
+      args.curves[many ? place : args.capacity.contacts - 1 - place] = {pair, region};
+    }
+  });
 }
 
 // The memory that a team shares while it makes a patch.
@@ -253,12 +282,11 @@ __global__ void __launch_bounds__(kThreads, 4) begin_patches(const __grid_consta
     constexpr bool kMany = kIsLarge<std::remove_cvref_t<decltype(team)>>;
     const PairCurve curve = args.curves[kMany ? row : args.capacity.contacts - 1 - row];
     with_maker(args, team, memory[own], curve, [&](auto& maker, const PatchState& made) {
-      const bool known = maker.begin(curve.curve, outline[own].get());
+      maker.begin(curve.curve, outline[own].get());
       std::uint32_t& place = places[own];
       if (team.rank() == 0) {
-        place = known ? atomicAdd(&state.next_patch, 1u) : kNoIndex;
-        if (!known) atomicAdd(&state.ambiguous_touches, Counter{1});
-        if (known && place >= args.capacity.manifolds)
+        place = atomicAdd(&state.next_patch, 1u);
+        if (place >= args.capacity.manifolds)
           atomicAdd(&state.needed_points, static_cast<Counter>(args.most_points));
       }
       team.sync();
@@ -276,6 +304,27 @@ __device__ std::uint32_t patches_begun(const ManifoldArgs& args) {
   return wanted < args.capacity.manifolds ? wanted : args.capacity.manifolds;
 }
 
+/// Begins the patches whose areas give no normal, by a warp each.
+__global__ void __launch_bounds__(kThreads, 2) begin_deep_patches(const __grid_constant__ ManifoldArgs args) {
+  __shared__ WarpWalks walks[kWarps];
+  __shared__ MakerMemory memory[kWarps];
+  __shared__ Raw<manifold::OutlineMemory> outline[kWarps];
+  __shared__ Raw<manifold::SearchMemory> search[kWarps];
+  __shared__ std::uint32_t taken[kWarps];
+  wait_for_kernel_before();
+  if (!has_query(args)) return;
+  const std::uint32_t own = threadIdx.x / 32;
+  const WarpTeam team(&walks[own]);
+  take_rows(team, patches_begun(args), args.state->next_deep, taken[own], [&](std::uint32_t row) {
+    BegunPatch& begun = args.begun[row];
+    if (begun.state.kind != manifold::PatchKind::deep) return;
+    with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState& state) {
+      maker.begin_deep(begun.of.curve, outline[own].get(), search[own].get());
+      copy_state(team, state, begun.state);
+    });
+  });
+}
+
 /// Measures the depths of each patch: by a block, or, where there are enough for all warps, by a warp.
 __global__ void __launch_bounds__(kThreads, 4) measure_depths(const __grid_constant__ ManifoldArgs args) {
   __shared__ BlockScratch<kThreads> scratch;
@@ -288,7 +337,7 @@ __global__ void __launch_bounds__(kThreads, 4) measure_depths(const __grid_const
   const auto measure = [&](const auto& team, std::uint32_t own) {
     take_rows(team, patches_begun(args), args.state->next_measured, taken[own], [&](std::uint32_t row) {
       BegunPatch& begun = args.begun[row];
-      if (begun.state.touch) return;
+      if (begun.state.kind != manifold::PatchKind::overlap) return;
       with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState& state) {
         copy_state(team, begun.state, state);
         maker.measure_depths(begun.of.curve, depths[own].get());
@@ -324,11 +373,10 @@ __global__ void __launch_bounds__(kThreads, 6) finish_patches(const __grid_const
       PairPatches& pair = args.of_pair[begun.of.pair];
       args.next_of_pair[row] = atomicExch(&pair.first, row);
       atomicAdd(&pair.patches, 1u);
-      if (patch->hole != 0) return;
-      atomicAdd(&pair.manifolds, 1u);
       atomicAdd(&pair.points, patch->manifold.point_count);
       atomicAdd(&args.state->needed_points, Counter{patch->manifold.point_count});
       if ((patch->manifold.flags & kOpenCurve) != 0) atomicAdd(&args.state->open_curves, Counter{1});
+      if ((patch->manifold.flags & kAmbiguous) != 0) atomicAdd(&args.state->ambiguous_touches, Counter{1});
     });
   });
 }
@@ -394,7 +442,7 @@ __global__ void __launch_bounds__(kThreads) remember(const __grid_constant__ Man
   if (atomicAdd(&state.finished_blocks, 1u) + 1 != gridDim.x) return;
   state.next_many = state.next_few = state.next_patch = state.tiles_taken = 0;
   state.curves_of_many = state.curves_of_few = state.next_curve_of_many = state.next_curve_of_few = 0;
-  state.next_measured = state.next_finished = 0;
+  state.next_joined = state.next_deep = state.next_measured = state.next_finished = 0;
   state.needed_points = state.segments = state.ambiguous_touches = state.open_curves = 0;
   state.too_many_contacts = state.finished_blocks = 0;
   if (!args.match_previous || state.has_last != 0)
@@ -428,7 +476,9 @@ cudaError_t make_patches(const ManifoldArgs& args, cudaStream_t stream) {
   };
   cudaError_t error = launch_after(grid(3, kThreads, 0), make_pieces, args);
   if (error == cudaSuccess) error = launch_after(grid(2, kFinders, kNearBytes), find_curves, args);
+  if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), join_regions, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), begin_patches, args);
+  if (error == cudaSuccess) error = launch_after(grid(2, kThreads, 0), begin_deep_patches, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), measure_depths, args);
   return error == cudaSuccess ? launch_after(grid(6, kThreads, 0), finish_patches, args) : error;
 }

@@ -28,7 +28,7 @@ struct PairPieces {
 /// The patches of a pair: a list that next_of_pair leads along.
 struct PairPatches {
   std::uint32_t first;  ///< kNoIndex where there is none
-  std::uint32_t patches, manifolds, points;
+  std::uint32_t patches, points;
   std::uint32_t first_manifold, first_point;
   PairPieces pieces;
 };
@@ -57,7 +57,7 @@ struct ManifoldState {
   // Cleared by each call.
   std::uint32_t next_many, next_few, next_patch, tiles_taken;
   std::uint32_t curves_of_many, curves_of_few, next_curve_of_many, next_curve_of_few;
-  std::uint32_t next_measured, next_finished;
+  std::uint32_t next_joined, next_deep, next_measured, next_finished;
   Counter needed_points, segments, ambiguous_touches, open_curves;
   std::uint32_t too_many_contacts, finished_blocks;
 

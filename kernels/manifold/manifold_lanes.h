@@ -39,9 +39,6 @@ struct ManifoldLanes {
   void (*spread_along)(const manifold::BodyPair& bodies, const manifold::PieceMemory& memory,
                        std::uint32_t begin, std::uint32_t end, const manifold::Vector3& origin,
                        const manifold::Vector3* directions, int count, manifold::Spread* spread);
-  manifold::Extreme (*extreme_corner)(const manifold::Body& body, const manifold::PieceMemory& memory,
-                                      std::uint32_t begin, std::uint32_t end,
-                                      const manifold::PatchFrame& frame, int side);
   /// Gathers the rim where there are no polygons. ends: those of each piece, 1 or 2. Result: how many
   /// candidates there are.
   std::uint32_t (*gather_rim)(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
@@ -57,9 +54,6 @@ struct ManifoldLanes {
   /// Answers questions about one body, at most kMostLines.
   void (*answer_lines)(const manifold::Body& body, const manifold::PatchFrame& frame,
                        manifold::LineQuestion* const* lines, int count);
-
-  /// The vertex of a body that reaches furthest in a prism: the highest of a (side 0), the lowest of b (1).
-  manifold::Extreme (*find_extreme)(const manifold::Body& body, const manifold::Prism& prism, int side);
 };
 
 /// The named way, or null where this machine or this build lacks it; there is no scalar one.

@@ -23,7 +23,7 @@ struct Row {
   std::uint32_t pair;
   std::uint32_t worker;
   std::size_t first_patch;
-  std::uint32_t patches, manifolds, points;
+  std::uint32_t patches, points;
   std::uint32_t first_manifold, first_point;
 };
 
@@ -122,7 +122,7 @@ Status ManifoldQuery::State::group(SceneState& scene, std::size_t pairs, std::sp
   }
   rows.clear();
   for (std::size_t i = 0; i < pairs; ++i) {
-    if (begin[i + 1] > 0 && !rows.push({static_cast<std::uint32_t>(i), 0, 0, 0, 0, 0, 0, 0}))
+    if (begin[i + 1] > 0 && !rows.push({static_cast<std::uint32_t>(i), 0, 0, 0, 0, 0, 0}))
       return scene.fail(Status::kOutOfMemory, 0);
     if (begin[i + 1] > manifold::kMostContactsOfPair) return scene.fail(Status::kOutOfRange, i);
     begin[i + 1] += begin[i];
@@ -158,10 +158,7 @@ void ManifoldQuery::State::make_patches(std::size_t from, std::size_t to, std::u
     own.enough_memory = own.made.add(team, bodies, contacts.data() + first, count, most_points);
     row.patches = static_cast<std::uint32_t>(patches.size() - row.first_patch);
     for (std::uint32_t k = 0; k < row.patches; ++k) {
-      const Patch& patch = patches[row.first_patch + k];
-      if (patch.hole != 0) continue;
-      ++row.manifolds;
-      row.points += patch.manifold.point_count;
+      row.points += patches[row.first_patch + k].manifold.point_count;
     }
   }
 }
@@ -172,7 +169,7 @@ Status ManifoldQuery::State::place_rows(SceneState& scene, Buffer<Manifold>& man
   for (std::size_t i = 0; i < rows.size(); ++i) {
     rows[i].first_manifold = static_cast<std::uint32_t>(next_manifold);
     rows[i].first_point = static_cast<std::uint32_t>(next_point);
-    next_manifold += rows[i].manifolds;
+    next_manifold += rows[i].patches;
     next_point += rows[i].points;
   }
   if (next_point >= kNoIndex) return scene.fail(Status::kOutOfRange, 0);
@@ -184,14 +181,9 @@ Status ManifoldQuery::State::place_rows(SceneState& scene, Buffer<Manifold>& man
 void ManifoldQuery::State::finish(Row& row, const SceneState& scene, const ObjectPair& pair, Found found,
                                   bool match) {
   Patch* const patches = workers[row.worker].made.patches.data() + row.first_patch;
-  const auto patch = [&](std::uint32_t i) -> Patch& { return patches[i]; };
   std::sort(patches, patches + row.patches, [](const Patch& x, const Patch& y) { return x.key < y.key; });
-  for (std::uint32_t i = 0; i < row.patches; ++i) {
-    if (patches[i].hole != 0) manifold::take_off_hole(patches[i], row.patches, patch);
-  }
   std::uint32_t next_manifold = row.first_manifold, next_point = row.first_point;
   for (std::uint32_t i = 0; i < row.patches; ++i) {
-    if (patches[i].hole != 0) continue;
     Manifold& out = found.manifolds[next_manifold];
     out = patches[i].manifold;
     out.pair = row.pair;

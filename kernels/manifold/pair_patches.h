@@ -3,6 +3,7 @@
 
 #include "kernels/manifold/manifold_lanes.h"
 #include "kernels/manifold/manifold_maker.h"
+#include "kernels/manifold/region_finder.h"
 #include "tandem/kernels/detail/buffer.h"
 
 namespace tandem {
@@ -30,7 +31,8 @@ struct alignas(64) PairPatches {
     manifold::PieceMemory memory;
     if (!make_room(count, memory)) return false;
     manifold::CurveFinder<Team> finder(team, bodies, memory);
-    const manifold::PieceSummary summary = finder.find(contacts, count, outline_.next);
+    manifold::PieceSummary summary = finder.find(contacts, count, outline_.next);
+    summary.curves = manifold::RegionFinder<Team>(team, bodies, memory, summary, regions_).find();
     segments += summary.segments;
     manifold::ManifoldMaker<Team> maker(team, bodies, memory, summary, state_);
     bool enough_memory = true;
@@ -38,13 +40,12 @@ struct alignas(64) PairPatches {
       enough_memory = enough_memory && patches.push({});
       return enough_memory ? &patches[patches.size() - 1] : nullptr;
     };
-    for (std::uint32_t curve = 0; curve < summary.curves; ++curve) {
-      if (!maker.begin(curve, outline_)) {
-        ++ambiguous_touches;
-        continue;
-      }
-      maker.measure_depths(curve, depths_);
-      maker.finish(curve, most_points, choice_, new_patch);
+    for (std::uint32_t region = 0; region < summary.curves; ++region) {
+      maker.begin(region, outline_);
+      if (state_.kind == manifold::PatchKind::deep) maker.begin_deep(region, outline_, depths_.search);
+      ambiguous_touches += state_.kind == manifold::PatchKind::ambiguous;
+      maker.measure_depths(region, depths_);
+      maker.finish(region, most_points, choice_, new_patch);
     }
     return enough_memory;
   }
@@ -67,6 +68,7 @@ struct alignas(64) PairPatches {
   Buffer<float> normals_;
   Buffer<std::uint32_t> words_;
   manifold::PatchState state_;
+  manifold::RegionMemory regions_;
   manifold::OutlineMemory outline_;
   manifold::DepthMemory depths_;
   manifold::ChoiceMemory choice_;

@@ -2,7 +2,7 @@
 #include <cstdint>
 
 #include "kernels/manifold/contact_curves.h"
-#include "kernels/manifold/surface_line.h"
+#include "kernels/manifold/deepest_line.h"
 #include "tandem/kernels/manifold.h"
 
 /// The steps from a curve of pieces to a manifold pass this data on to each other.
@@ -11,19 +11,8 @@ namespace tandem::manifold {
 /// A manifold before it has its place.
 struct Patch {
   Manifold manifold;
-  std::uint64_t key;   ///< of its least piece: the order within a pair
-  std::uint64_t hole;  ///< 1: what lies within this curve is no contact, but a hole in another manifold's
+  std::uint64_t key;  ///< of its least piece: the order within a pair
   ManifoldPoint point[kMostManifoldPoints];
-};
-
-/// The piece of the least key.
-struct LeastPiece {
-  std::uint64_t key = ~std::uint64_t{0};
-  std::uint32_t piece = kNoIndex;
-
-  TANDEM_HD void take(std::uint64_t of, std::uint32_t at) {
-    if (of < key) key = of, piece = at;
-  }
 };
 
 /// Sums over the pieces of a curve.
@@ -94,12 +83,18 @@ struct NormalMemory {
   Spread spread[kMostTried];
 };
 
+/// Says how a patch pushes.
+enum class PatchKind : std::uint32_t {
+  overlap,    ///< along a normal that its area or its faces give
+  touch,      ///< the surfaces meet without area
+  ambiguous,  ///< corners or edges that touch each other: no direction is better than another
+  deep,       ///< the area gives no normal: the overlap is to be measured along all that come into question
+};
+
 /// The direction in which the bodies of a patch push each other.
 struct PatchNormal {
   Vector3 n;  ///< unit, from a towards b
-  bool known =
-      false;  ///< no: corners or edges that touch each other, where no direction is better than another
-  bool touch = false;  ///< the surfaces meet without area
+  PatchKind kind = PatchKind::ambiguous;
 };
 
 /// A point of a patch where its curve has a corner, as the search for the outermost ones sees it.
@@ -163,37 +158,19 @@ struct RimMemory {
   bool complete;
 };
 
-/// A point that a manifold may have, and the line across the patch that measures the depth there.
+/// A point of the rim, and the line across the patch that measures the depth there.
 struct Sounding {
   Vector2 at, line;         ///< the line runs a little further inside
   double height;            ///< of the point
-  double target[2];         ///< the height near which the line is to meet a's surface, b's
-  std::uint32_t reference;  ///< of a rim point: the candidate. Else kNoIndex
+  std::uint32_t reference;  ///< the candidate
   std::uint64_t feature;
-  int rank = 0;         ///< of a rim point
-  int vertex_of = -1;   ///< the side whose vertex it is; -1: none's
+  int rank;
   Crossing surface[2];  ///< a's, that faces along the normal; b's, that faces against it
-  Crossing behind[2];   ///< where a begins, on the line, if that is above b's surface; where b ends, if that
-                        ///< is below a's
-  bool looked_behind;
 
   TANDEM_HD double overlap() const {
     return surface[0].found() && surface[1].found() ? surface[0].height - surface[1].height : 0;
   }
-  /// Returns whether the line runs within both, as far as it was looked at.
-  TANDEM_HD bool within() const {
-    if (!(overlap() > 0)) return false;
-    if (!looked_behind) return true;
-    const double begin = std::fmax(surface[1].height, behind[0].found() ? behind[0].height : -INFINITY);
-    const double end = std::fmin(surface[0].height, behind[1].found() ? behind[1].height : INFINITY);
-    return begin < end;
-  }
-  /// Returns whether one body ends within the other. Condition: looked_behind, within().
-  TANDEM_HD bool goes_through() const { return behind[0].found() || behind[1].found(); }
 };
-
-/// Rim, the middle, and twice a's highest vertex and b's lowest.
-inline constexpr int kMostSoundings = static_cast<int>(kMostManifoldPoints) + 5;
 
 /// A point that a manifold may have, as those that it has are chosen.
 struct Chosen {
@@ -201,19 +178,26 @@ struct Chosen {
   double height, depth, from_middle;
   std::uint64_t feature;
   std::uint32_t triangle[2];
-  bool inner;
+  bool deepest;  ///< it lies on the deepest line
 };
+
+/// The most points of a rim: one is left for the deepest line, unless the surfaces only touch.
+inline constexpr int kMostRimPoints = static_cast<int>(kMostManifoldPoints);
 
 /// The state of a patch from one step to the next.
 struct PatchState {
-  Sounding sounding[kMostSoundings];  ///< of the rim, of the middle, of vertices
-  int rim_points, soundings;
-  bool touch, closed;
+  Sounding sounding[kMostRimPoints];
+  OverlapLine deepest;  ///< none where the patch has no depth
+  int rim_points;
+  PatchKind kind;
+  bool closed, goes_through;
+  bool deep;  ///< the overlap was measured along many directions
   PatchFrame frame;
   Vector3 area;            ///< CurveMeasure's
+  Vector3 centre;          ///< of the rim
   Vector2 middle;          ///< of the rim
   Vector2 middle_of_area;  ///< that of the rim where there is none
-  double extent;           ///< of the rim, from its middle
+  double reach;            ///< of the rim, from its centre
   std::uint64_t key;
   std::uint32_t candidates;
 };
@@ -221,21 +205,20 @@ struct PatchState {
 /// The memory that a team shares while it finds a patch's normal and rim.
 struct OutlineMemory {
   NormalMemory normal;
+  double known_depth[2 * kMostTried];  ///< along each direction that is tried
   RimMemory rim;
   std::uint32_t next;
 };
 
 /// The memory that a team shares while it measures a patch's depths.
 struct DepthMemory {
-  LineQuestion line[2 * kMostSoundings];
-  Prism prism;
-  PrismTest prism_test[2];
-  Extreme extreme[4];
+  LineQuestion line[2 * kMostRimPoints];
+  SearchMemory search;
 };
 
 /// The memory that a team shares while it chooses a patch's points.
 struct ChoiceMemory {
-  Chosen candidate[kMostSoundings], chosen[kMostSoundings];
+  Chosen candidate[kMostRimPoints + 1], chosen[kMostRimPoints + 1];
   Patch* patch;
   std::uint32_t count;
 };

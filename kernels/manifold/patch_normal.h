@@ -6,11 +6,18 @@ namespace tandem::manifold {
 /// An area vector below this part of length times largest coordinate is rounding: the surfaces only touch.
 inline constexpr double kNoArea = 0x1p-40;
 
+/// The area vector of a region of several curves, or of one whose parts cancel, has a direction if it is more
+/// than this part of the square of the curves' length.
+inline constexpr double kLeastArea = 1e-6;
+
 /// A curve whose ends are apart by less than this part of its length closes.
 inline constexpr double kClosed = 1e-6;
 
 /// Faces in so few directions on both sides make a patch one of flat faces; otherwise it is a smooth one.
 inline constexpr int kMostDirections = 5;
+
+/// Adding this part of a number and taking it off again leaves some 12 bits of a float32.
+inline constexpr double kAbout = 4095;
 
 /// A smooth patch lies on a face if this part of its curve lies in the face's plane.
 inline constexpr double kBearing = 0.9;
@@ -37,6 +44,14 @@ class NormalFinder {
   /// Condition: measure(), whose result this is.
   TANDEM_HD PatchNormal find(const CurveMeasure& curve);
 
+  /// Gathers in NormalMemory::tried the lines along which a deep patch may push, one way or the other: that
+  /// of the area vector, or of the triangles of sheets, and normals of faces of both bodies. Result: how
+  /// many.
+  TANDEM_HD_SELDOM int gather_for_deep(const CurveMeasure& curve);
+
+  /// Returns the distance of the piece's end that is furthest from a point.
+  TANDEM_HD_SELDOM double reach_from(const Vector3& middle) const;
+
  private:
   static constexpr int kMost = kMostTried;
   static_assert(kMost == 2 * kMostDirections + 1);
@@ -56,14 +71,17 @@ class NormalFinder {
   TANDEM_HD bool has_many_directions(int side) const;
   TANDEM_HD LeastPiece least_unmarked(int side, const FloatVector& known) const;
   TANDEM_HD bool gather_directions(int side, bool keep_if_many);
+  TANDEM_HD_SELDOM void gather_longest(int side);
   TANDEM_HD void find_faces_along(const Vector3& smooth, std::uint32_t (&holder)[2]) const;
   TANDEM_HD void sum_lengths_on_faces(const FloatVector (&face)[2], const std::uint32_t (&holder)[2],
                                       ExactSum (&within)[2]) const;
   TANDEM_HD void find_bearing_faces(const Vector3& smooth, double length);
   TANDEM_HD void spread_along(int count) const;
   TANDEM_HD Vector3 face_nearest(const Vector3& smooth, double length);
-  TANDEM_HD_SELDOM bool find_for_touch(Vector3& n);
-  TANDEM_HD_SELDOM bool find_crossing_edges(Vector3& n) const;
+  /// Returns how far b must move along a direction until a plane lies between all triangles of the region.
+  TANDEM_HD_SELDOM double separation_along(const Vector3& n) const;
+  TANDEM_HD_SELDOM int find_for_touch(Vector3& n);
+  TANDEM_HD_SELDOM int find_crossing_edges(Vector3& n) const;
   TANDEM_HD Vector3 crossing_edges(const Piece& piece, int number) const;
   /// Returns the normal that points from a towards b.
   TANDEM_HD static FloatVector turned_normal(const float* normals, int side) {
@@ -375,7 +393,6 @@ TANDEM_HD Vector3 NormalFinder<Team>::face_nearest(const Vector3& smooth, double
     if (!flush) return dot(n, smooth) > 0 ? n : smooth;
   }
   if (of_a == kMost || of_b == kMost) find_bearing_faces(smooth, length);
-  const Vector3 apart = bodies_.apart();
   int count = 0;
   const auto add = [&](const Vector3& n) {
     if (team_.rank() == 0) shared_.tried[count] = n;
@@ -384,9 +401,7 @@ TANDEM_HD Vector3 NormalFinder<Team>::face_nearest(const Vector3& smooth, double
   add(smooth);
   for (int i = 0; i < directions_; ++i) {
     const Vector3 n = shared_.direction[i].n;
-    const double cosine = dot(n, smooth);
-    if (cosine < 0.1 && (cosine < -0.1 || !(dot(n, apart) > 0))) continue;
-    add(n);
+    if (dot(n, smooth) >= 0.1) add(n);
   }
   if (count == 1) return smooth;
   team_.sync();
@@ -401,6 +416,17 @@ TANDEM_HD Vector3 NormalFinder<Team>::face_nearest(const Vector3& smooth, double
 }
 
 template <typename Team>
+TANDEM_HD_SELDOM double NormalFinder<Team>::separation_along(const Vector3& n) const {
+  team_.sync();
+  if (team_.rank() == 0) shared_.tried[0] = n;
+  team_.sync();
+  spread_along(1);
+  const double separation = shared_.spread[0].highest_a - shared_.spread[0].lowest_b;
+  team_.sync();
+  return separation;
+}
+
+template <typename Team>
 TANDEM_HD Vector3 NormalFinder<Team>::crossing_edges(const Piece& piece, int number) const {
   const int i = number / 6, j = number / 2 % 3;
   const Vector3 e = bodies_.a.corner(piece.triangle[0], (i + 1) % 3) - bodies_.a.corner(piece.triangle[0], i),
@@ -411,11 +437,12 @@ TANDEM_HD Vector3 NormalFinder<Team>::crossing_edges(const Piece& piece, int num
   return ((number % 2 == 0 ? 1 : -1) / length) * n;
 }
 
-/// The one direction across an edge of each body that separates all triangles of the patch.
+/// Looks for a direction across an edge of each body that separates all triangles of the patch. Returns how
+/// many there are, as find_for_touch().
 template <typename Team>
-TANDEM_HD_SELDOM bool NormalFinder<Team>::find_crossing_edges(Vector3& n) const {
+TANDEM_HD_SELDOM int NormalFinder<Team>::find_crossing_edges(Vector3& n) const {
   constexpr std::uint32_t kMostPieces = 16, kDirections = 18;  // each of 3 x 3 edges, both ways
-  if (end_ - begin_ > kMostPieces) return false;
+  if (end_ - begin_ > kMostPieces) return 0;
   const double tolerance = kNoArea * bodies_.reach();
   const auto separates = [&](const Vector3& direction, const Vector3& x) {
     for (std::uint32_t i = begin_; i < end_; ++i) {
@@ -438,7 +465,7 @@ TANDEM_HD_SELDOM bool NormalFinder<Team>::find_crossing_edges(Vector3& n) const 
     key = piece.key() < key ? piece.key() : key;
   }
   key = team_.least(key);
-  if (!team_.any(found)) return false;
+  if (!team_.any(found)) return 0;
   // The first direction of the least piece counts, if no other piece has another one.
   std::uint32_t first = kDirections;
   for (std::uint32_t at = team_.rank(); at < tries; at += team_.size()) {
@@ -460,13 +487,14 @@ TANDEM_HD_SELDOM bool NormalFinder<Team>::find_crossing_edges(Vector3& n) const 
     if (dot(direction, direction) == 0 || same_direction(direction, n)) continue;
     other = other || separates(direction, piece.end[0]);
   }
-  return !team_.any(other);
+  return team_.any(other) ? 2 : 1;
 }
 
-/// The one direction, of faces there and else of crossings of edges, that has all of a's triangles there on
-/// one side and b's on the other. Where several do, corners or edges lie on each other: nothing to lean on.
+/// Looks for a direction, of faces there and else of crossings of edges, that has all of a's triangles there
+/// on one side and b's on the other. Returns how many there are: 0, 1 or, of several, 2. Where several do,
+/// corners or edges lie on each other: nothing to lean on.
 template <typename Team>
-TANDEM_HD_SELDOM bool NormalFinder<Team>::find_for_touch(Vector3& n) {
+TANDEM_HD_SELDOM int NormalFinder<Team>::find_for_touch(Vector3& n) {
   directions_ = 0;
   gather_directions(0, true);
   gather_directions(1, true);
@@ -486,7 +514,71 @@ TANDEM_HD_SELDOM bool NormalFinder<Team>::find_for_touch(Vector3& n) {
     if (found == 0) n = tried;
     ++found;
   }
-  return found == 0 ? find_crossing_edges(n) : found == 1;
+  return found == 0 ? find_crossing_edges(n) : lesser(found, 2);
+}
+
+/// Adds the directions of faces of one body that have the longest pieces; of pieces about as long, that of
+/// the least triangles comes first.
+template <typename Team>
+TANDEM_HD_SELDOM void NormalFinder<Team>::gather_longest(int side) {
+  FloatVector known[kMostDirections];
+  int count = 0;
+  for (; count < kMostDirections; ++count) {
+    float longest = -1;
+    LeastPiece own;
+    for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
+      const std::uint32_t at = memory_.order[i];
+      const Piece& piece = memory_.pieces[at];
+      const float* n = memory_.normals + 6 * std::size_t{at} + 3 * side;
+      const FloatVector normal = {{n[0], n[1], n[2]}};
+      bool is_new = true;
+      for (int k = 0; k < count; ++k) is_new = is_new && !same_face(normal, known[k]);
+      if (!is_new) continue;
+      const bool polygon = piece.kind() == MeetingKind::polygon;
+      // Lengths that differ by rounding are to be the same number.
+      const double length = polygon ? 0 : norm(piece.end[1] - piece.end[0]);
+      const float about = static_cast<float>(length + kAbout * length) - static_cast<float>(kAbout * length);
+      if (about > longest) longest = about, own = {};
+      if (about == longest) own.take(piece.key(), at);
+    }
+    if (team_.greatest(longest) != longest) own = {};
+    const std::uint64_t key = team_.least(own.key);
+    if (key == ~std::uint64_t{0}) break;
+    const std::uint32_t holder = team_.least(own.key == key ? own.piece : kNoIndex);
+    const float* n = memory_.normals + 6 * std::size_t{holder} + 3 * side;
+    known[count] = {{n[0], n[1], n[2]}};
+    if (team_.rank() == 0) shared_.direction[directions_ + count] = {direction_of(side, holder), holder};
+  }
+  directions_ += count;
+  team_.sync();
+}
+
+template <typename Team>
+TANDEM_HD_SELDOM int NormalFinder<Team>::gather_for_deep(const CurveMeasure& curve) {
+  directions_ = 0;
+  gather_longest(0);
+  gather_longest(1);
+  const Vector3 own = curve.by_area ? curve.area : curve.sheet_normal;
+  const double size = norm(own);
+  // Areas of two curves that cancel leave rounding.
+  const bool counts = size > kLeastArea * curve.length * (curve.by_area ? curve.length : 1.0);
+  const int first = counts ? 1 : 0;
+  if (team_.rank() == 0) {
+    if (first == 1) shared_.tried[0] = (1 / size) * own;
+    for (int i = 0; i < directions_; ++i) shared_.tried[first + i] = shared_.direction[i].n;
+  }
+  team_.sync();
+  return first + directions_;
+}
+
+template <typename Team>
+TANDEM_HD_SELDOM double NormalFinder<Team>::reach_from(const Vector3& middle) const {
+  double most = 0;
+  for_each_piece([&](const Piece& piece, const float*) {
+    most = greater(norm(piece.end[0] - middle), most);
+    if (piece.kind() != MeetingKind::polygon) most = greater(norm(piece.end[1] - middle), most);
+  });
+  return team_.greatest(most);
 }
 
 template <typename Team>
@@ -494,13 +586,22 @@ TANDEM_HD PatchNormal NormalFinder<Team>::find(const CurveMeasure& curve) {
   PatchNormal out;
   const bool no_area = !(curve.closed ? norm(curve.area) > kNoArea * bodies_.reach() * curve.length
                                       : norm(curve.sheet_normal) > kNoArea * curve.length);
-  out.touch = no_area || curve.point;
-  if (out.touch) out.known = find_for_touch(out.n);
-  if (no_area || out.known) return out;
-  // Points may hide a patch that is smaller than rounding.
-  out.touch = false;
-  out.known = true;
+  if (no_area || curve.point) {
+    const int separating = find_for_touch(out.n);
+    out.kind = separating == 1 ? PatchKind::touch : separating > 1 ? PatchKind::ambiguous : PatchKind::deep;
+    // Points may hide a patch that is smaller than rounding.
+    if (no_area || separating == 1) return out;
+  }
+  const bool joined = memory_.pieces[memory_.order[begin_]].joined != 0;
+  if (joined) {
+    out.kind = PatchKind::deep;
+    return out;
+  }
+  out.kind = PatchKind::overlap;
   out.n = face_nearest(normalized(curve.by_area ? curve.area : curve.sheet_normal), curve.length);
+  // Where faces lie in each other, rounding may leave out a part of the curve, and the area tells nothing.
+  if (summary_.degenerate && separation_along(out.n) > 2 * reach_from(curve.middle))
+    out.kind = PatchKind::deep;
   return out;
 }
 

@@ -300,41 +300,6 @@ void spread_along(const manifold::BodyPair& bodies, const manifold::PieceMemory&
   }
 }
 
-/// ManifoldMaker::extreme_corner().
-manifold::Extreme extreme_corner(const manifold::Body& body, const manifold::PieceMemory& memory,
-                                 std::uint32_t begin, std::uint32_t end, const manifold::PatchFrame& frame,
-                                 int side) {
-  using D = DoubleLanes<4>;
-  manifold::Extreme best;
-  const manifold::Vector3 up = side == 0 ? frame.n : -frame.n;
-  CurveTriangles triangles(memory, begin, end, side);
-  std::uint32_t index[CurveTriangles::kMost];
-  while (const std::uint32_t count = triangles.gather(index)) {
-    D height[3 * CurveTriangles::kMost / 4], most = D{} - INFINITY;
-    std::uint32_t heights = 0;
-    for (std::uint32_t i = 0; i < count; i += 4) {
-      for (int k = 0; k < 3; ++k) {
-        const D h = dot(up, posed_corner(body, index + i, k) - frame.origin);
-        height[heights++] = h, most = larger(most, h);
-      }
-    }
-    const double highest = largest(most);
-    manifold::Extreme here;
-    std::uint32_t triangle = 0, corner = 0;
-    for (std::uint32_t i = 0; i < heights; ++i) {  // a flat face has many that are as high
-      for (unsigned found = bits_of_mask(height[i] == highest); found != 0; found &= found - 1) {
-        const std::uint32_t t = index[i / 3 * 4 + static_cast<std::uint32_t>(std::countr_zero(found))];
-        const std::uint32_t vertex = body.shape->topology[t].vertex[i % 3];
-        if (vertex < here.vertex) here.vertex = vertex, triangle = t, corner = i % 3;
-      }
-    }
-    const manifold::Vector3 x = body.corner(triangle, static_cast<int>(corner));
-    here.at = frame.flat(x), here.height = frame.height(x);
-    if (manifold::ExtremeQuestions::is_further(static_cast<std::uint32_t>(side), here, best)) best = here;
-  }
-  return best;
-}
-
 /// RimFinder::gather(), where there are no polygons.
 std::uint32_t gather_rim(const manifold::PieceMemory& memory, std::uint32_t begin, std::uint32_t end,
                          const manifold::PatchFrame& frame, double one_by_unit, int ends,

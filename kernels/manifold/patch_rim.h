@@ -40,8 +40,7 @@ class RimFinder {
   TANDEM_HD const Piece& piece(std::uint32_t reference) const { return memory_.pieces[reference / 8]; }
 
   /// A point of the rim is called by the least feature of its own and of candidates closer than `distance`.
-  /// An inner one, the middle or a vertex that may be deepest in two patches, is told apart by the patch's
-  /// key. points: that all of the team see.
+  /// That of the deepest line is told apart by the patch's key. points: that all of the team see.
   TANDEM_HD void name_points(Chosen* points, int count, double distance, std::uint64_t patch_key) const;
 
  private:
@@ -246,7 +245,7 @@ TANDEM_HD void RimFinder<Team>::name_points(Chosen* points, int count, double di
   FloatPoint at[kMost] = {};
   std::uint64_t least[kMost];
   for (int k = 0; k < kMost; ++k) {
-    const bool is_rim = k < count && !points[k].inner;
+    const bool is_rim = k < count && !points[k].deepest;
     least[k] = is_rim ? points[k].feature : 0;
     // Nothing is near one that is not a number.
     at[k] = is_rim ? FloatPoint{static_cast<float>(points[k].at.x), static_cast<float>(points[k].at.y)}
@@ -258,7 +257,7 @@ TANDEM_HD void RimFinder<Team>::name_points(Chosen* points, int count, double di
       const auto next = [&](std::uint32_t from) {
         return team_.lanes().next_near(candidates(), from, count_, at[k], square);
       };
-      if (points[k].inner) continue;
+      if (points[k].deepest) continue;
       for (std::uint32_t i = next(0); i < count_; i = next(i + 1))
         least[k] = lesser(least[k], feature(candidates()[i].reference));
     }
@@ -277,7 +276,7 @@ TANDEM_HD void RimFinder<Team>::name_points(Chosen* points, int count, double di
   if (team_.rank() == 0) {
     for (int k = 0; k < count; ++k) {
       std::uint64_t& name = points[k].feature;
-      name = points[k].inner ? feature_hash(name, patch_key) : least[k];
+      name = points[k].deepest ? feature_hash(name, patch_key) : least[k];
       // Far from the origin, where tolerance() is as large as triangles, one feature may be at two places.
       for (int i = 0; i < k; ++i) {
         if (points[i].feature == name) name = feature_hash(name, 10 + static_cast<std::uint64_t>(k));

@@ -193,13 +193,14 @@ class LineWalk {
     for (; lines != 0; lines &= lines - 1) {
       const int i = std::countr_zero(lines);
       manifold::LineQuestion& q = *lines_[i];
-      if ((q.facing > 0 ? up : down) == 0) continue;
+      const unsigned facing = (q.facing >= 0 ? up : 0u) | (q.facing <= 0 ? down : 0u);
+      if (facing == 0) continue;
       D x[3], y[3];
       for (int k = 0; k < 3; ++k) x[k] = u[k] - q.at.x, y[k] = v[k] - q.at.y;
       const D first = (x[1] * y[2] - y[1] * x[2]) / area, second = (x[2] * y[0] - y[2] * x[0]) / area,
               third = (x[0] * y[1] - y[0] * x[1]) / area;
       const DoubleMask<4> within = (first >= -little) & (second >= -little) & (third >= -little);
-      unsigned found = bits_of_mask(within) & (q.facing > 0 ? up : down);
+      unsigned found = bits_of_mask(within) & facing;
       if (found == 0) continue;
       const D height = first * height_of[0] + second * height_of[1] + third * height_of[2];
       for (; found != 0; found &= found - 1)
@@ -225,105 +226,9 @@ class LineWalk {
   Line line_[ManifoldLanes::kMostLines];
 };
 
-/// ExtremeQuestions, of one body.
-class ExtremeWalk {
- public:
-  ExtremeWalk(const manifold::Body& body, const manifold::Prism& prism, int side)
-      : body_(body), prism_(prism), side_(side), up_(side == 0 ? 1 : -1) {
-    using namespace manifold;
-    const PatchFrame& frame = prism.frame;
-    origin_ = point_in_mesh(body, frame.origin);
-    slack_ = slack_near(body, origin_);
-    for (int k = 0; k < 2; ++k) {
-      axis_[k] = in_mesh(body, prism.axis[k].x * frame.u + prism.axis[k].y * frame.v);
-      least_[k] = static_cast<float>(prism.least[k]) - slack_;
-      most_[k] = static_cast<float>(prism.most[k]) + slack_;
-    }
-    axis_[2] = in_mesh(body, side == 0 ? frame.n : -frame.n);
-    least_[2] = greater(static_cast<float>(side == 0 ? prism.lower : -prism.upper),
-                        static_cast<float>(side == 0 ? prism.above_a : -prism.below_b)) -
-                slack_;
-    most_[2] = static_cast<float>(side == 0 ? prism.upper : -prism.lower) + slack_;
-  }
-
-  manifold::Extreme find() {
-    std::uint32_t waiting[kMostWaiting];
-    int count = 0;
-    waiting[count++] = 0;
-    const Block* fetched = nullptr;
-    while (count > 0) {
-      const Block& block = body_.shape->blocks[waiting[--count]];
-      unsigned nodes = nodes_that_reach(block);
-      if (nodes == 0) continue;
-      if (block.is_leaf_block()) {
-        fetch_leaves(body_, block);
-        if (fetched != nullptr) visit(*fetched);
-        fetched = &block;
-        continue;
-      }
-      for (; nodes != 0; nodes &= nodes - 1) {
-        const std::uint32_t next = block.index[std::countr_zero(nodes)];
-        fetch(body_.shape->blocks[next]);
-        waiting[count++] = next;
-      }
-    }
-    if (fetched != nullptr) visit(*fetched);
-    return best_;
-  }
-
- private:
-  /// Tests four boxes, as PrismTest::passes() does.
-  TANDEM_INLINE unsigned nodes_that_reach(const Block& block) const {
-    const BoxCoordinates box(block, origin_);
-    const Lanes4(&x)[3] = box.centre, (&h)[3] = box.half_extent;
-    typename Vector<4>::Bits passes = h[0].v >= 0.0f;
-    for (int k = 0; k < 3; ++k) {
-      const float(&e)[3] = axis_[k].x;
-      const Lanes4 at = e[0] * x[0] + e[1] * x[1] + e[2] * x[2];
-      const Lanes4 extent = std::fabs(e[0]) * h[0] + std::fabs(e[1]) * h[1] + std::fabs(e[2]) * h[2];
-      passes &= ~((at + extent).v < least_[k]) & ~((at - extent).v > most_[k]);
-    }
-    return LaneMask<4>{passes}.mask();
-  }
-
-  TANDEM_INLINE void visit(const Block& block) {
-    std::uint32_t index[kNodesPerBlock];
-    leaves_of(block, index);
-    const manifold::PatchFrame& frame = prism_.frame;
-    for (int k = 0; k < 3; ++k) {
-      const Vector3Lanes<4> x = posed_corner(body_, index, k) - frame.origin;
-      const DoubleLanes<4> height = dot(frame.n, x);
-      const DoubleMask<4> counts = (height >= prism_.lower) & (height <= prism_.upper) &
-                                   (side_ == 0 ? height > prism_.above_a : height < prism_.below_b);
-      unsigned found = bits_of_mask(counts);
-      if (found == 0) continue;
-      const DoubleLanes<4> u = dot(frame.u, x), v = dot(frame.v, x);
-      for (; found != 0; found &= found - 1) {
-        const int i = std::countr_zero(found);
-        const manifold::Extreme here = {{u[i], v[i]}, height[i], body_.shape->topology[index[i]].vertex[k]};
-        const auto side = static_cast<std::uint32_t>(side_);
-        if (!manifold::ExtremeQuestions::is_further(side, here, best_) || !prism_.contains(here.at)) continue;
-        best_ = here;
-        least_[2] = manifold::greater(least_[2], static_cast<float>(up_ * here.height) - slack_);
-      }
-    }
-  }
-
-  const manifold::Body& body_;
-  const manifold::Prism& prism_;
-  int side_, up_;
-  manifold::FloatVector origin_, axis_[3];
-  float least_[3], most_[3], slack_;
-  manifold::Extreme best_;
-};
-
 void answer_lines(const manifold::Body& body, const manifold::PatchFrame& frame,
                   manifold::LineQuestion* const* lines, int count) {
   LineWalk(body, frame, lines, count).answer();
-}
-
-manifold::Extreme find_extreme(const manifold::Body& body, const manifold::Prism& prism, int side) {
-  return ExtremeWalk(body, prism, side).find();
 }
 
 }  // namespace

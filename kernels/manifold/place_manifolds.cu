@@ -79,7 +79,7 @@ __device__ void place_tile(const ManifoldArgs& args, std::uint32_t tile, std::ui
   const std::uint32_t first = tile * kManifoldTile + threadIdx.x * kPairsPerThread;
   Counter sum = 0, own = 0;
   for (std::uint32_t i = first; i < first + kPairsPerThread && i < pairs; ++i)
-    sum += Counter{args.of_pair[i].manifolds} << kManifoldShift | args.of_pair[i].points;
+    sum += Counter{args.of_pair[i].patches} << kManifoldShift | args.of_pair[i].points;
   Scan(scratch).ExclusiveSum(sum, sum, own);
   if (threadIdx.x == 0) {
     volatile Counter* const word = &args.tile_sums[tile];
@@ -98,7 +98,7 @@ __device__ void place_tile(const ManifoldArgs& args, std::uint32_t tile, std::ui
     }
     PairPatches& pair = args.of_pair[i];
     pair.first_manifold = manifolds, pair.first_point = points;
-    sum += Counter{pair.manifolds} << kManifoldShift | pair.points;
+    sum += Counter{pair.patches} << kManifoldShift | pair.points;
   }
   __syncthreads();
 }
@@ -144,18 +144,11 @@ __device__ void write_pair(const ManifoldArgs& args, std::uint32_t row) {
   std::uint32_t *list = args.pieces.curve + first_contact, *sorted = args.pieces.order + first_contact;
   sort_patches(args, pair, list, sorted);
   const auto patch = [&](std::uint32_t i) -> Patch& { return args.patches[sorted[i]]; };
-  if (pair.manifolds != pair.patches && team.rank() == 0) {
-    for (std::uint32_t i = 0; i < pair.patches; ++i) {
-      if (patch(i).hole != 0) manifold::take_off_hole(patch(i), pair.patches, patch);
-    }
-  }
-  team.sync();
   const ObjectPair bodies = args.pairs.pairs[row];
   const std::uint64_t both = std::uint64_t{bodies.a} << 32 | bodies.b;
   std::uint32_t next_manifold = pair.first_manifold, next_point = pair.first_point;
   for (std::uint32_t i = 0; i < pair.patches; ++i) {
     const Patch& from = patch(i);
-    if (from.hole != 0) continue;
     const std::uint32_t points = from.manifold.point_count;
     if (team.rank() == 0) {
       Manifold out = from.manifold;

@@ -5,10 +5,10 @@
 #include "kernels/manifold/body.h"
 #include "kernels/manifold/team.h"
 
-/// Questions to the trees of posed bodies: where a line meets its surface, and which of its vertices reaches
-/// furthest. Boxes are tested in float32 with slack; triangles and vertices decide in float64. So the answers
-/// do not depend on which blocks are walked, nor in which order. Imaginary boxes are told by their extent,
-/// and where a product is too large for float32, so that comparisons fail, a box passes.
+/// Questions to the tree of a posed body: where a line meets its surface. Boxes are tested in float32 with
+/// slack; triangles decide in float64. So the answers do not depend on which blocks are walked, nor in which
+/// order. Imaginary boxes are told by their extent, and where a product is too large for float32, so that
+/// comparisons fail, a box passes.
 namespace tandem::manifold {
 
 /// Float32 rounds coordinates, products and sums to 2^-24 of |box| + |point|; a dozen of them amount to less
@@ -181,8 +181,8 @@ struct LineTest {
 };
 
 /// Says which crossing of a line with a surface is asked for: the one nearest in height to `target`, between
-/// lower and upper, of triangles whose outward normals point along the frame's (facing 1) or against it (-1).
-/// If two are as near, the triangle that comes first is taken.
+/// lower and upper, of triangles whose outward normals point along the frame's (facing 1), against it (-1) or
+/// either way (0). If two are as near, the triangle that comes first is taken.
 struct LineQuestion {
   Vector2 at;
   double target, lower, upper;
@@ -267,7 +267,8 @@ class LineQuestions {
     const Vector3 normal = cross(corner[1] - corner[0], corner[2] - corner[0]);
     const double area = dot(frame_.n, normal), size = norm(normal);
     const bool turned = is_turned(body.shape->topology[t].flags);
-    if ((area > 0) != ((q.facing > 0) != turned) || !(std::fabs(area) > kWall * size)) return;
+    const int facing = (area > 0) != turned ? 1 : -1;
+    if (q.facing * facing < 0 || !(std::fabs(area) > kWall * size)) return;
     Vector2 side[3];
     for (int k = 0; k < 3; ++k) side[k] = Vector2{dot(frame_.u, corner[k]), dot(frame_.v, corner[k])} - q.at;
     // Shares of the corners. What lies on an edge, or beside it by no more than rounding of posed points and
@@ -309,132 +310,24 @@ class LineQuestions {
   LineQuestion* questions_;
 };
 
-/// The part of space across a convex polygon in a patch's plane, between two heights.
-struct Prism {
-  static constexpr int kMostSides = 8;
-
-  PatchFrame frame;
-  Vector2 outward[kMostSides];  // unit normals of the sides
-  double offset[kMostSides];    // inside: outward * x <= offset
-  int sides = 0;
-  Vector2 axis[2];           // unit vectors; a rectangle around the polygon lies along them
-  double least[2], most[2];  // it reaches from least to most along each
-  double lower, upper;
-  double above_a,
-      below_b;  ///< vertices of a that are not above this do not matter, nor those of b not below this
-
-  TANDEM_HD bool contains(const Vector2& x) const {
-    bool inside = true;
-    for (int i = 0; i < sides; ++i) inside = inside && dot(outward[i], x) <= offset[i];
-    return inside;
-  }
-};
-
-/// Boxes that reach into the box around a prism, and further along its last axis than what is known.
-struct PrismTest {
-  FloatVector axis[3], origin;
-  float least[3], most[3], slack;
-
-  TANDEM_HD PrismTest turned(const BlockAxes& axes) const {
-    PrismTest out = *this;
-    for (int k = 0; k < 3; ++k) out.axis[k] = axes(axis[k]);
-    out.origin = axes(origin);
-    return out;
-  }
-  TANDEM_HD bool passes(const FloatVector& c, const FloatVector& h) const {
-    const FloatVector d = {{c.x[0] - origin.x[0], c.x[1] - origin.x[1], c.x[2] - origin.x[2]}};
-    bool all = h.x[0] >= 0;
-#ifdef __CUDA_ARCH__
-#pragma unroll
-#endif
-    for (int k = 0; k < 3; ++k) {
-      const FloatVector& e = axis[k];
-      const float at = dot(e, d), extent = std::fabs(e.x[0]) * h.x[0] + std::fabs(e.x[1]) * h.x[1] +
-                                           std::fabs(e.x[2]) * h.x[2];
-      all = all && !(at + extent < least[k]) && !(at - extent > most[k]);
-    }
-    return all;
-  }
-};
-
-/// A vertex of a triangle.
-struct Extreme {
-  Vector2 at;
-  double height = 0;
-  std::uint32_t vertex = kNoIndex;
-
-  TANDEM_HD bool found() const { return vertex != kNoIndex; }
-  TANDEM_HD explicit operator bool() const { return found(); }
-};
-
-/// The highest vertex of a (question 0) and the lowest of b (1) in a prism. Of several, the one of the least
-/// number is taken.
-class ExtremeQuestions {
- public:
-  /// test, extreme: two each, that all of the team see.
-  TANDEM_HD ExtremeQuestions(const BodyPair& bodies, const Prism& prism, PrismTest* test, Extreme* extreme)
-      : bodies_(bodies), prism_(prism), test_(test), extreme_(extreme) {}
-
-  TANDEM_HD void ask(std::uint32_t question) {
-    const Body& body = bodies_[static_cast<int>(question)];
-    const PatchFrame& frame = prism_.frame;
-    PrismTest& test = test_[question];
-    test.origin = point_in_mesh(body, frame.origin);
-    const float slack = slack_near(body, test.origin);
-    for (int k = 0; k < 2; ++k) {
-      test.axis[k] = in_mesh(body, prism_.axis[k].x * frame.u + prism_.axis[k].y * frame.v);
-      test.least[k] = static_cast<float>(prism_.least[k]) - slack;
-      test.most[k] = static_cast<float>(prism_.most[k]) + slack;
-    }
-    test.axis[2] = in_mesh(body, question == 0 ? frame.n : -frame.n);
-    const double least =
-        question == 0 ? greater(prism_.lower, prism_.above_a) : greater(-prism_.upper, -prism_.below_b);
-    test.least[2] = static_cast<float>(least) - slack;
-    test.most[2] = static_cast<float>(question == 0 ? prism_.upper : -prism_.lower) + slack;
-    test.slack = slack;
-    extreme_[question] = {};
-  }
-
-  using Found = Extreme;
-
-  TANDEM_HD const Body& body(std::uint32_t question) const { return bodies_[static_cast<int>(question)]; }
-  TANDEM_HD const PrismTest& test(std::uint32_t question) const { return test_[question]; }
-  TANDEM_HD void visit(std::uint32_t question, std::uint32_t t, Found& found) const {
-    const Body& of = body(question);
-    const PatchFrame& frame = prism_.frame;
-    const TriangleTopology topology = of.shape->topology[t];
-    const Triangle stored = of.shape->triangles[t];
-    for (int k = 0; k < 3; ++k) {
-      const Vector3 x = of.posed(stored.corner[k]);
-      const double height = frame.height(x);
-      if (!(height >= prism_.lower && height <= prism_.upper)) continue;
-      if (!(question == 0 ? height > prism_.above_a : height < prism_.below_b)) continue;
-      const Extreme here = {frame.flat(x), height, topology.vertex[k]};
-      if (is_further(question, here, found) && prism_.contains(here.at)) found = here;
-    }
-  }
-  TANDEM_HD void merge(std::uint32_t question, const Found& found) {
-    if (!is_further(question, found, extreme_[question])) return;
-    extreme_[question] = found;
-    const double along = question == 0 ? found.height : -found.height;
-    test_[question].least[2] = static_cast<float>(along) - test_[question].slack;
-  }
-  TANDEM_HD static Found better(std::uint32_t question, const Found& x, const Found& y) {
-    return y.found() && is_further(question, y, x) ? y : x;
-  }
-
-  TANDEM_HD static bool is_further(std::uint32_t question, const Extreme& x, const Extreme& than) {
-    if (!than.found()) return true;
-    const double of_x = question == 0 ? x.height : -x.height,
-                 of_than = question == 0 ? than.height : -than.height;
-    return of_x > of_than || (of_x == of_than && x.vertex < than.vertex);
-  }
-
- private:
-  const BodyPair& bodies_;
-  const Prism& prism_;
-  PrismTest* test_;
-  Extreme* extreme_;
-};
+/// Answers the first `count` questions about lines; those of no side are not asked. shared: the questions,
+/// which all of the team see.
+template <typename Team>
+TANDEM_HD void walk_lines(const Team& team, LineQuestions& questions, std::uint32_t count,
+                          const LineQuestion* shared) {
+  if constexpr (HasLanes<Team>) return questions.answer(team.lanes(), count);
+  constexpr int kLinesWidth = 8;
+  team.sync();
+  team.template for_each_group<kLinesWidth>(count, [&](const auto& group, std::uint32_t i, bool given) {
+    const bool asked = given && shared[i].side >= 0;
+    if (asked && group.rank() == 0) questions.prepare(i);
+    walk_surface(group, questions, i, asked);
+    const bool further = asked && questions.has_to_look_further(i);
+    group.sync();
+    if (further && group.rank() == 0) questions.look_further(i);
+    walk_surface(group, questions, i, further);
+  });
+  team.sync();
+}
 
 }  // namespace tandem::manifold

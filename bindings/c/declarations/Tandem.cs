@@ -525,6 +525,7 @@ public static unsafe class Native {
   public const uint TANDEM_TOUCHING = 1;
   public const uint TANDEM_OPEN_CURVE = 2;
   public const uint TANDEM_GOES_THROUGH = 4;
+  public const uint TANDEM_AMBIGUOUS = 8;
   public const uint TANDEM_INSIDE = 1;
   public const uint TANDEM_OUTER_OPEN = 2;
   public const uint TANDEM_NO_IMPACT = 0;

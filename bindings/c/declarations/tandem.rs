@@ -112,6 +112,7 @@ pub const TANDEM_BOXES: u32 = 2;
 pub const TANDEM_TOUCHING: u32 = 1;
 pub const TANDEM_OPEN_CURVE: u32 = 2;
 pub const TANDEM_GOES_THROUGH: u32 = 4;
+pub const TANDEM_AMBIGUOUS: u32 = 8;
 pub const TANDEM_INSIDE: u32 = 1;
 pub const TANDEM_OUTER_OPEN: u32 = 2;
 pub const TANDEM_NO_IMPACT: u32 = 0;

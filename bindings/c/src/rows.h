@@ -26,7 +26,7 @@ static_assert(TANDEM_MOVING == int(Motion::moving) && TANDEM_FIXED == int(Motion
 static_assert(TANDEM_EXACT == int(QueryMode::exact) && TANDEM_FAST == int(QueryMode::fast) &&
               TANDEM_BOXES == int(QueryMode::boxes));
 static_assert(TANDEM_TOUCHING == int(kTouching) && TANDEM_OPEN_CURVE == int(kOpenCurve) &&
-              TANDEM_GOES_THROUGH == int(kGoesThrough));
+              TANDEM_GOES_THROUGH == int(kGoesThrough) && TANDEM_AMBIGUOUS == int(kAmbiguous));
 static_assert(TANDEM_INSIDE == int(kInside) && TANDEM_OUTER_OPEN == int(kOuterOpen));
 static_assert(TANDEM_APART == int(ToleranceVerdict::apart) &&
               TANDEM_TOUCH == int(ToleranceVerdict::touching) &&

@@ -21,7 +21,7 @@ from ._scene import Contacts, Contained, Counters, Distances, Filter, Impacts, M
 #: Says what moves a body (Filter): forces; nothing; the caller; nothing until the caller wakes it.
 MOVING, FIXED, KINEMATIC, SLEEPING = range(4)
 #: Flags of manifolds: without overlap; the curve in which the surfaces cross does not close; one body goes through the other.
-TOUCHING, OPEN_CURVE, GOES_THROUGH = 1, 2, 4
+TOUCHING, OPEN_CURVE, GOES_THROUGH, AMBIGUOUS = 1, 2, 4, 8
 #: Flags of contained components: inside; of an open body there is no inside.
 INSIDE, OUTER_OPEN = 1, 2
 #: Verdicts.
@@ -47,7 +47,7 @@ def view(what: _Any, instances: _Any = None, **options: _Any) -> _Any:
 __version__ = f"{_tandem.version // 10000}.{_tandem.version // 100 % 100}.{_tandem.version % 100}"
 
 __all__ = [
-    "APART", "CONTACT", "CONTAINMENT", "DISTANCE", "FIXED", "FORMER", "GOES_THROUGH", "IMPACT", "IMPACT_AT_START", "IMPACT_IN_STEP", "INSIDE", "INSTANCE",
+    "AMBIGUOUS", "APART", "CONTACT", "CONTAINMENT", "DISTANCE", "FIXED", "FORMER", "GOES_THROUGH", "IMPACT", "IMPACT_AT_START", "IMPACT_IN_STEP", "INSIDE", "INSTANCE",
     "KINEMATIC", "MANIFOLD", "MOTION", "MOVING", "NO_IMPACT", "NO_INDEX", "OPEN_CURVE", "OUTER_OPEN", "PAIR", "POINT", "SLEEPING", "TOUCH", "TOUCHING", "VERDICT",
     "WITHIN_TOLERANCE", "Asset", "BuildReport", "Contacts", "Contained", "Counters", "Distances", "Error", "FileError", "Filter", "Impacts", "Level", "Manifolds", "Mesh",
     "Part", "Scene", "Verdicts", "build", "instances", "read_mesh", "rotations", "view",

@@ -36,7 +36,6 @@ void expect_same(const PatchesOfPair& x, const PatchesOfPair& y) {
   for (std::size_t i = 0; i < x.patches.size(); ++i) {
     const Patch &p = x.patches[i], &q = y.patches[i];
     EXPECT_EQ(p.key, q.key);
-    EXPECT_EQ(p.hole, q.hole);
     EXPECT_EQ(std::memcmp(&p.manifold, &q.manifold, sizeof(Manifold)), 0);
     EXPECT_EQ(std::memcmp(p.point, q.point, p.manifold.point_count * sizeof(ManifoldPoint)), 0);
   }

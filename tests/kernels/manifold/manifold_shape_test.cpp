@@ -55,9 +55,9 @@ struct Reduction {
   // Points that are near each other are merged: patches count that are not small beside the bodies, whose
   // size is about 1, nor narrow.
   void take(const Manifold& m, std::span<const ManifoldPoint> points) {
-    // The tip of a body that leans may lie beside the patch, seen along the normal, and is no part of it.
+    // The tip of a body that leans may lie far beside the patch, seen along the normal, and is no part of it.
     const double whole = std::fabs(dot(vector_of(m.area_vector), vector_of(m.normal)));
-    if (points.size() > 3 && area_of(m, points) > 1.000001 * whole) points = points.subspan(1);
+    if (points.size() > 3 && area_of(m, points) > 1.1 * whole) points = points.subspan(1);
     const std::vector<Vector2> hull = hull_of(m, points);
     double extent = 0;
     Vector2 moment;
@@ -273,7 +273,7 @@ TEST(SolidOnSolid, ACornerBeyondThePatchIsNoPartOfIt) {
                          {0x1.e0b26104a9f69p+0, -0x1.9c511fd9a711bp+2, 0x1.192c3c7bf11c6p+0}});
   scene.find();
   ASSERT_EQ(scene.manifolds().size(), 1u);
-  EXPECT_NEAR(scene.manifolds()[0].depth, 0.00046, 0.00001);
+  EXPECT_NEAR(scene.manifolds()[0].depth, 0.000739, 0.000001);  // as far as b has to move until they part
 }
 
 /// Bodies of many bulges and hollows that come together until they overlap by less than a millimetre.

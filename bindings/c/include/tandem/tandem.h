@@ -491,18 +491,19 @@ typedef struct tandem_manifold_options {
   uint32_t reserved;
 } tandem_manifold_options;
 
-enum { TANDEM_TOUCHING = 1, TANDEM_OPEN_CURVE = 2, TANDEM_GOES_THROUGH = 4 };
+enum { TANDEM_TOUCHING = 1, TANDEM_OPEN_CURVE = 2, TANDEM_GOES_THROUGH = 4, TANDEM_AMBIGUOUS = 8 };
 
 /// A connected region in which the surfaces of two bodies meet (docs/contacts.md).
 typedef struct tandem_manifold {
-  double normal[3];       ///< unit, from a towards b
+  double normal[3];       ///< unit, from a towards b; or 0 (TANDEM_AMBIGUOUS)
   double area_vector[3];  ///< of a's surface inside b
   double centre[3];       ///< of that area, in the world
-  double depth;           ///< the largest that was found
+  double depth;           ///< how far b is to be moved along the normal to end the overlap
   uint32_t pair;          ///< row of the list of object pairs
   uint32_t first_point, point_count;
   uint32_t flags;  ///< TANDEM_TOUCHING: without overlap; TANDEM_OPEN_CURVE: the curve in which the surfaces
-                   ///< cross does not close; TANDEM_GOES_THROUGH: one body goes through the other here
+                   ///< cross does not close; TANDEM_GOES_THROUGH: one body goes through the other here;
+                   ///< TANDEM_AMBIGUOUS: corner on corner or edge along edge, normal 0 and no points
 } tandem_manifold;
 
 /// A point of a manifold.
@@ -521,7 +522,7 @@ typedef struct tandem_manifold_counters {
   uint64_t segments;  ///< contacts whose triangles share a line
   uint64_t manifolds, points;
   uint64_t open_curves;        ///< manifolds with TANDEM_OPEN_CURVE
-  uint64_t ambiguous_touches;  ///< corner on corner or edge along edge, of which there is no manifold
+  uint64_t ambiguous_touches;  ///< manifolds with TANDEM_AMBIGUOUS
 } tandem_manifold_counters;
 
 /// Makes contact manifolds of the contacts, which are those of all bodies as they stand: else

@@ -26,14 +26,16 @@ enum ManifoldFlags : std::uint32_t {
   kTouching = 1,     ///< without overlap: depth 0
   kOpenCurve = 2,    ///< the curve in which the surfaces cross does not close: an open mesh, or mode fast
   kGoesThrough = 4,  ///< one body goes through the other here
+  kAmbiguous = 8,    ///< corner on corner or edge along edge: the bodies touch, but no direction is better than
+                     ///< another. The normal is 0, and there are no points
 };
 
 /// A connected region in which the surfaces of two bodies meet.
 struct Manifold {
-  double normal[3];       ///< unit, from a towards b: moving b along it separates the bodies
+  double normal[3];       ///< unit, from a towards b: moving b along it separates the bodies; or 0 (kAmbiguous)
   double area_vector[3];  ///< of a's surface inside b, bounded by the curve in which the surfaces cross
   double centre[3];       ///< of that area, in the world
-  double depth;           ///< the largest that was found; the deepest point has at least 0.8 of it
+  double depth;           ///< how far b is to be moved along the normal to end the overlap; the first point's
   std::uint32_t pair;     ///< row of the list of object pairs
   std::uint32_t first_point, point_count;
   std::uint32_t flags;  ///< ManifoldFlags
@@ -46,8 +48,7 @@ struct ManifoldCounters {
   std::uint64_t segments = 0;  ///< contacts whose triangles share a line
   std::uint64_t manifolds = 0, points = 0;
   std::uint64_t open_curves = 0;        ///< manifolds with kOpenCurve
-  std::uint64_t ambiguous_touches = 0;  ///< corner on corner or edge along edge: no direction is better than
-                                        ///< another, and there is no manifold
+  std::uint64_t ambiguous_touches = 0;  ///< manifolds with kAmbiguous
 
   friend bool operator==(const ManifoldCounters&, const ManifoldCounters&) = default;
 };

@@ -1,0 +1,173 @@
+#pragma once
+#include "kernels/manifold/overlap_lines.h"
+
+/// Curves that bound one connected region of the overlap are joined: the two rims of a ring that lies on a
+/// plate, or where a rod enters a plate and where it leaves it. A straight line from one curve to the other
+/// that stays within both bodies shows it. Within convex bodies all curves are joined so, because their
+/// overlap is convex.
+namespace tandem::manifold {
+
+/// The memory that a team shares while it joins curves.
+struct RegionMemory {
+  LineQuestion line[2];
+  std::uint32_t curves;
+};
+
+template <typename Team>
+class RegionFinder {
+ public:
+  TANDEM_HD RegionFinder(const Team& team, const BodyPair& bodies, const PieceMemory& memory,
+                         const PieceSummary& summary, RegionMemory& shared)
+      : team_(team), bodies_(bodies), memory_(memory), summary_(summary), shared_(shared) {}
+
+  /// Returns how many regions there are; afterwards `order` and `start` have them instead of curves, and the
+  /// first piece of a region of several curves is marked as joined.
+  TANDEM_HD std::uint32_t find();
+
+ private:
+  /// Each curve is compared with so many of the others, the nearest.
+  static constexpr int kNeighbours = 7;
+  /// Among more curves none are joined.
+  static constexpr std::uint32_t kMostCurves = 256;
+
+  // Words of the table: the curve that each is joined to, a piece of each, where each goes.
+  TANDEM_HD std::uint32_t& joined_to(std::uint32_t curve) const { return memory_.table[curve]; }
+  TANDEM_HD std::uint32_t& piece_of(std::uint32_t curve) const {
+    return memory_.table[summary_.curves + curve];
+  }
+  TANDEM_HD std::uint32_t& place_of(std::uint32_t curve) const {
+    return memory_.table[2 * summary_.curves + curve];
+  }
+  TANDEM_HD std::uint32_t first_of(std::uint32_t curve) const {
+    while (joined_to(curve) != curve) curve = joined_to(curve);
+    return curve;
+  }
+  TANDEM_HD bool is_joined(std::uint32_t i, std::uint32_t j);
+  TANDEM_HD bool line_stays_within(std::uint32_t from, std::uint32_t to);
+  TANDEM_HD std::uint32_t sort_by_region();
+
+  const Team& team_;
+  const BodyPair& bodies_;
+  const PieceMemory& memory_;
+  const PieceSummary& summary_;
+  RegionMemory& shared_;
+};
+
+/// Returns whether a straight line within both bodies leads from beside a piece to beside another one.
+template <typename Team>
+TANDEM_HD bool RegionFinder<Team>::line_stays_within(std::uint32_t from, std::uint32_t to) {
+  const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.line);
+  const double apart = norm(memory_.pieces[to].middle() - memory_.pieces[from].middle());
+  Vector3 begin, end;
+  return lines.go_inside(from, apart, begin) && lines.go_inside(to, apart, end) &&
+         lines.is_free(begin, end, 0, 1);
+}
+
+/// Tries lines from three pieces of the first curve, each to the nearest one of the second.
+template <typename Team>
+TANDEM_HD bool RegionFinder<Team>::is_joined(std::uint32_t i, std::uint32_t j) {
+  const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.line);
+  const auto extreme = [&](std::uint32_t curve, std::uint32_t from, double sign) {
+    const Vector3 middle = memory_.pieces[from].middle();
+    return lines.extreme_piece(memory_.start[curve], memory_.start[curve + 1], &middle, 1, sign);
+  };
+  const std::uint32_t first = piece_of(i);
+  std::uint32_t from = extreme(i, extreme(j, first, 1), 1);
+  for (int attempt = 0; attempt < 3; ++attempt) {
+    if (line_stays_within(from, extreme(j, from, 1))) return true;
+    from = extreme(i, attempt == 0 ? first : from, -1);
+  }
+  return false;
+}
+
+/// Puts the pieces of a region behind each other.
+template <typename Team>
+TANDEM_HD std::uint32_t RegionFinder<Team>::sort_by_region() {
+  const std::uint32_t curves = summary_.curves;
+  if (team_.rank() == 0) {
+    std::uint32_t regions = 0, place = 0;
+    for (std::uint32_t first = 0; first < curves; ++first) {
+      if (joined_to(first) != first) continue;
+      ++regions;
+      for (std::uint32_t c = first; c < curves; ++c) {
+        if (first_of(c) != first) continue;
+        place_of(c) = place;
+        place += memory_.start[c + 1] - memory_.start[c];
+      }
+    }
+    shared_.curves = regions;
+  }
+  team_.sync();
+  for (std::uint32_t c = 0; c < curves; ++c) {
+    const std::uint32_t begin = memory_.start[c], place = place_of(c);
+    for (std::uint32_t i = begin + team_.rank(); i < memory_.start[c + 1]; i += team_.size())
+      memory_.curve[place + i - begin] = memory_.order[i];
+  }
+  team_.sync();
+  for (std::uint32_t i = team_.rank(); i < summary_.pieces; i += team_.size())
+    memory_.order[i] = memory_.curve[i];
+  team_.sync();
+  // The first curve of each region comes first in it, so what it begins with is where the region begins.
+  for (std::uint32_t c = team_.rank(); c < curves; c += team_.size()) {
+    const std::uint32_t first = first_of(c);
+    if (first != c) memory_.pieces[memory_.order[place_of(first)]].joined = 1;
+  }
+  team_.sync();
+  if (team_.rank() == 0) {
+    std::uint32_t regions = 0;
+    for (std::uint32_t c = 0; c < curves; ++c) {
+      if (joined_to(c) == c) memory_.start[regions++] = place_of(c);
+    }
+    memory_.start[regions] = summary_.pieces;
+  }
+  team_.sync();
+  return shared_.curves;
+}
+
+template <typename Team>
+TANDEM_HD std::uint32_t RegionFinder<Team>::find() {
+  const std::uint32_t curves = summary_.curves;
+  if (curves <= 1 || curves > kMostCurves) return curves;
+  for (std::uint32_t c = team_.rank(); c < curves; c += team_.size()) {
+    joined_to(c) = c;
+    LeastPiece least;
+    for (std::uint32_t i = memory_.start[c]; i < memory_.start[c + 1]; ++i)
+      least.take(memory_.pieces[memory_.order[i]].symmetric_key(), memory_.order[i]);
+    piece_of(c) = least.piece;
+  }
+  team_.sync();
+  bool any = false;
+  for (std::uint32_t i = 0; i < curves; ++i) {
+    // The nearest others, as their first pieces lie; of equally near ones that of the least triangles.
+    double last_distance = -1;
+    std::uint64_t last_key = 0;
+    for (int k = 0; k < kNeighbours; ++k) {
+      const Vector3 from = memory_.pieces[piece_of(i)].middle();
+      double least = INFINITY;
+      LeastPiece own;  // the piece is the curve here
+      for (std::uint32_t j = team_.rank(); j < curves; j += team_.size()) {
+        const Vector3 apart = memory_.pieces[piece_of(j)].middle() - from;
+        const double distance = dot(apart, apart);
+        const std::uint64_t key = memory_.pieces[piece_of(j)].symmetric_key();
+        const bool later = distance > last_distance || (distance == last_distance && key > last_key);
+        if (j == i || !later || distance > least) continue;
+        if (distance < least) least = distance, own = {};
+        own.take(key, j);
+      }
+      const double least_of_all = team_.least(least);
+      if (least != least_of_all) own = {};
+      const std::uint64_t key = team_.least(own.key);
+      if (key == ~std::uint64_t{0}) break;
+      const std::uint32_t nearest = team_.least(own.key == key ? own.piece : kNoIndex);
+      last_distance = least_of_all, last_key = key;
+      const std::uint32_t p = first_of(i), q = first_of(nearest);
+      if (p == q || !is_joined(i, nearest)) continue;
+      if (team_.rank() == 0) joined_to(greater(p, q)) = lesser(p, q);
+      team_.sync();
+      any = true;
+    }
+  }
+  return any ? sort_by_region() : curves;
+}
+
+}  // namespace tandem::manifold

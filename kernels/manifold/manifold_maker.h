@@ -15,11 +15,15 @@ inline constexpr double kNear = 0.005;
 /// A point of the rim closer to the deepest one than this part of the rim's reach is that one.
 inline constexpr double kNearDeepest = 0.03;
 
-/// A point of the rim is as deep as the deepest line if it is less deep by no more than this part.
-inline constexpr double kAsDeep = 1e-9;
+/// A point of the rim is as deep as the deepest line if it is less deep by no more than this part; it may be
+/// deeper by kDeepEnough.
+inline constexpr double kAsDeep = 1e-6;
 
 /// A direction is better than another only if the overlap along it is less by more than this part.
 inline constexpr double kShallower = 1e-9;
+
+/// A rim of so few candidates is measured from two points.
+inline constexpr std::uint32_t kFewCandidates = 16;
 
 /// Makes the patch of a region whose pieces are known, in three steps. A patch's state is all that they hand
 /// on to each other.
@@ -149,7 +153,7 @@ TANDEM_HD_SELDOM void ManifoldMaker<Team>::begin_deep(std::uint32_t region, Outl
   const int lines = normal_finder.gather_for_deep(measure);
   const double reach = normal_finder.reach_from(measure.middle);
   DeepestLine<Team> search(team_, bodies_, memory_, summary_, region, depths);
-  search.find_seeds(measure.middle);
+  search.find_seeds(measure.middle, kMostSeeds);
   // The directions along which the known lines are shallowest come first; of others little more is looked at.
   const auto direction = [&](int i) {
     return i % 2 == 0 ? shared.normal.tried[i / 2] : -shared.normal.tried[i / 2];
@@ -186,21 +190,22 @@ TANDEM_HD_SELDOM void ManifoldMaker<Team>::begin_deep(std::uint32_t region, Outl
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::measure_depths(std::uint32_t region, DepthMemory& shared) {
   if (state_.kind != PatchKind::overlap) return;
-  LineQuestions questions(bodies_, state_.frame, shared.line);
+  LineQuestions questions(bodies_, shared.line);
   const auto count = 2 * static_cast<std::uint32_t>(state_.rim_points);
   for (std::uint32_t i = team_.rank(); i < count; i += team_.size()) {
     const Sounding& s = state_.sounding[i / 2];
     const int side = static_cast<int>(i % 2);
-    questions.ask(i, side, side == 0 ? 1 : -1, s.line, s.height, -INFINITY, INFINITY, state_.reach / 4);
+    questions.ask(i, state_.frame, side, side == 0 ? 1 : -1, s.line, s.height, -INFINITY, INFINITY,
+                  state_.reach / 4, kWall);
   }
   team_.sync();
   walk_lines(team_, questions, count, shared.line);
   for (std::uint32_t i = team_.rank(); i < count; i += team_.size())
     state_.sounding[i / 2].surface[i % 2] = shared.line[i].best;
   DeepestLine<Team> search(team_, bodies_, memory_, summary_, region, shared.search);
-  search.find_seeds(state_.centre);
+  search.find_seeds(state_.centre, state_.candidates <= kFewCandidates ? 2 : 4);
   search.find(state_.frame, state_.centre, state_.reach, INFINITY);
-  const bool through = state_.deep && search.goes_through(state_.frame);
+  const bool through = state_.deep && search.goes_through();
   if (team_.rank() == 0) {
     const OverlapLine& best = shared.search.best;
     if (best.found() && best.depth > kNoArea * bodies_.reach()) {
@@ -264,12 +269,12 @@ TANDEM_HD void ManifoldMaker<Team>::place_candidates(const RimFinder<Team>& find
       c.feature = s.feature;
       c.deepest = false;
       // Other surfaces than those of the patch may be nearer to the rim; none of the patch is deeper.
-      if (s.overlap() > 0 && s.overlap() <= deepest * (1 + 1e-9)) {
+      if (s.overlap() > 0 && s.overlap() <= deepest * (1 + kDeepEnough)) {
         double height[2];
         const Vector2 at = reach_to_rim(s, height);
         if (height[0] - height[1] > kNoArea * bodies_.reach()) {
           c.at = at;
-          c.depth = lesser(height[0] - height[1], deepest), c.height = (height[0] + height[1]) / 2;
+          c.depth = height[0] - height[1], c.height = (height[0] + height[1]) / 2;
         }
       }
     }
@@ -369,7 +374,7 @@ TANDEM_HD void ManifoldMaker<Team>::write_manifold(const ChoiceMemory& shared, P
   write(frame.n, manifold.normal);
   write(area, manifold.area_vector);
   write(frame.at(state_.closed && !touch ? state_.middle_of_area : state_.middle, height), manifold.centre);
-  manifold.depth = state_.deepest.depth;
+  manifold.depth = touch ? 0 : greater(state_.deepest.depth, shared.chosen[0].depth);
 }
 
 template <typename Team>

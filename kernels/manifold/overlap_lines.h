@@ -4,13 +4,25 @@
 
 namespace tandem::manifold {
 
+/// A straight line that ends on a surface stays within it if it meets none before this last part: faces of
+/// float32 corners are not quite flat.
+inline constexpr double kNearEnd = 1e-6;
+
+/// Lines that a team follows at once, each in a frame of its own where that is needed.
+struct LineMemory {
+  static constexpr int kMost = 16;
+
+  PatchFrame frame[kMost];
+  LineQuestion line[kMost];
+};
+
 /// Follows straight lines through the overlap of two bodies.
 template <typename Team>
 class OverlapLines {
  public:
-  /// shared: two questions, which all of the team see.
+  /// shared: what all of the team see.
   TANDEM_HD OverlapLines(const Team& team, const BodyPair& bodies, const PieceMemory& memory,
-                         LineQuestion* shared)
+                         LineMemory& shared)
       : team_(team), bodies_(bodies), memory_(memory), shared_(shared) {}
 
   /// Returns the piece of order[begin] to order[end - 1] that is nearest to a point (sign 1) or furthest from
@@ -18,23 +30,31 @@ class OverlapLines {
   TANDEM_HD std::uint32_t extreme_piece(std::uint32_t begin, std::uint32_t end, const Vector3* from,
                                         int points, double sign) const;
 
-  /// Finds a point of the overlap: half-way from the middle of a piece, behind both triangles, to where the
-  /// overlap ends on that line, but no further than `most`. False where the triangles face each other.
-  TANDEM_HD_SELDOM bool go_inside(std::uint32_t piece, double most, Vector3& inside) const;
+  /// Finds a point of the overlap beside each of some pieces, at most LineMemory::kMost / 2: half-way from
+  /// the middle of the piece, behind both triangles, to where the overlap ends on that line, but no further
+  /// than `most`. Result: a bit for each piece; 0 where its triangles face each other.
+  TANDEM_HD_SELDOM std::uint32_t go_inside(const std::uint32_t* piece, int count, double most,
+                                           Vector3* inside) const;
 
-  /// Returns whether a straight line meets the surface of neither body from `first` to `last`: a is 0, b
-  /// is 1. It may begin on a surface.
-  TANDEM_HD_SELDOM bool is_free(const Vector3& from, const Vector3& to, std::uint32_t first,
-                                std::uint32_t last) const;
+  /// Follows a straight line within body 0 and one within body 1, from one point to two others. surface[k]:
+  /// where the line meets the surface of body k first, if it does so before it is there.
+  TANDEM_HD_SELDOM void follow(const Vector3& from, const Vector3 (&to)[2], Crossing (&surface)[2]) const;
+
+  /// Returns whether a straight line stays within both bodies.
+  TANDEM_HD bool is_free(const Vector3& from, const Vector3& to) const {
+    Crossing surface[2];
+    follow(from, {to, to}, surface);
+    return !surface[0].found() && !surface[1].found();
+  }
 
  private:
-  /// Looks for the crossing of each body that is nearest to where the line begins.
-  TANDEM_HD void follow(const PatchFrame& line, double length, std::uint32_t first, std::uint32_t last) const;
+  /// Lines begin so far behind the surface from which they start.
+  TANDEM_HD double behind(double length) const { return greater(bodies_.tolerance(), 1e-9 * length); }
 
   const Team& team_;
   const BodyPair& bodies_;
   const PieceMemory& memory_;
-  LineQuestion* shared_;
+  LineMemory& shared_;
 };
 
 template <typename Team>
@@ -59,57 +79,72 @@ TANDEM_HD std::uint32_t OverlapLines<Team>::extreme_piece(std::uint32_t begin, s
 }
 
 template <typename Team>
-TANDEM_HD void OverlapLines<Team>::follow(const PatchFrame& line, double length, std::uint32_t first,
-                                          std::uint32_t last) const {
-  LineQuestions questions(bodies_, line, shared_);
-  const double begin = greater(bodies_.tolerance(), 1e-9 * length);
+TANDEM_HD_SELDOM std::uint32_t OverlapLines<Team>::go_inside(const std::uint32_t* piece, int count,
+                                                             double most, Vector3* inside) const {
+  LineQuestions questions(bodies_, shared_.line);
   team_.sync();
-  for (std::uint32_t side = team_.rank(); side < 2; side += team_.size()) {
-    shared_[side].side = -1;
-    if (side < first || side > last) continue;
-    questions.ask(side, static_cast<int>(side), 0, {}, begin, begin, length, INFINITY);
+  for (int i = static_cast<int>(team_.rank()); i < count; i += static_cast<int>(team_.size())) {
+    const float* n = memory_.normals + 6 * std::size_t{piece[i]};
+    const Vector3 sum = {-double{n[0]} - double{n[3]}, -double{n[1]} - double{n[4]},
+                         -double{n[2]} - double{n[5]}};
+    const double length = norm(sum);
+    const auto line = 2 * static_cast<std::uint32_t>(i);
+    if (!(length > 1e-3)) {
+      shared_.line[line].frame = shared_.line[line + 1].frame = &shared_.frame[i];
+      shared_.line[line].side = shared_.line[line + 1].side = -1;
+      continue;
+    }
+    const Piece& of = memory_.pieces[piece[i]];
+    Vector3 middle = 0.5 * (of.end[0] + of.end[1]);
+    if (of.kind() == MeetingKind::polygon) {
+      Meeting meeting;
+      meet_again(bodies_, of, meeting);
+      middle = {};
+      for (int k = 0; k < meeting.corners; ++k) middle = middle + (1.0 / meeting.corners) * meeting.corner[k];
+    }
+    shared_.frame[i] = PatchFrame(middle, (1 / length) * sum);
+    const double begin = behind(most);
+    for (std::uint32_t side = 0; side < 2; ++side)
+      questions.ask(line + side, shared_.frame[i], static_cast<int>(side), 0, {}, begin, begin, most,
+                    INFINITY, kGrazes);
   }
   team_.sync();
-  walk_lines(team_, questions, 2, shared_);
+  walk_lines(team_, questions, 2 * static_cast<std::uint32_t>(count), shared_.line);
+  std::uint32_t found = 0;
+  for (int i = 0; i < count; ++i) {
+    if (shared_.line[2 * i].side < 0) continue;
+    double end = most;
+    for (int side = 0; side < 2; ++side) {
+      const Crossing& crossing = shared_.line[2 * i + side].best;
+      if (crossing.found()) end = lesser(crossing.height, end);
+    }
+    inside[i] = shared_.frame[i].at({}, end / 2);
+    found |= 1u << i;
+  }
+  team_.sync();  // all have read the answers
+  return found;
 }
 
 template <typename Team>
-TANDEM_HD_SELDOM bool OverlapLines<Team>::go_inside(std::uint32_t piece, double most, Vector3& inside) const {
-  const float* n = memory_.normals + 6 * std::size_t{piece};
-  const Vector3 sum = {-double{n[0]} - double{n[3]}, -double{n[1]} - double{n[4]},
-                       -double{n[2]} - double{n[5]}};
-  const double length = norm(sum);
-  if (!(length > 1e-3)) return false;
-  const Piece& of = memory_.pieces[piece];
-  Vector3 middle = 0.5 * (of.end[0] + of.end[1]);
-  if (of.kind() == MeetingKind::polygon) {
-    Meeting meeting;
-    meet_again(bodies_, of, meeting);
-    middle = {};
-    for (int k = 0; k < meeting.corners; ++k) middle = middle + (1.0 / meeting.corners) * meeting.corner[k];
+TANDEM_HD_SELDOM void OverlapLines<Team>::follow(const Vector3& from, const Vector3 (&to)[2],
+                                                 Crossing (&surface)[2]) const {
+  LineQuestions questions(bodies_, shared_.line);
+  team_.sync();
+  for (int side = static_cast<int>(team_.rank()); side < 2; side += static_cast<int>(team_.size())) {
+    const auto line = static_cast<std::uint32_t>(side);
+    const double length = norm(to[side] - from), begin = behind(length);
+    shared_.line[line].frame = &shared_.frame[side];
+    shared_.line[line].side = -1;
+    shared_.line[line].best = {};
+    if (!(length > 2 * begin)) continue;
+    shared_.frame[side] = PatchFrame(from, (1 / length) * (to[side] - from));
+    questions.ask(line, shared_.frame[side], side, 0, {}, begin, begin, (1 - kNearEnd) * length, INFINITY,
+                  kGrazes);
   }
-  const PatchFrame line(middle, (1 / length) * sum);
-  follow(line, most, 0, 1);
-  double end = most;
-  for (int side = 0; side < 2; ++side) {
-    const Crossing& crossing = shared_[side].best;
-    if (crossing.found()) end = lesser(crossing.height, end);
-  }
+  team_.sync();
+  walk_lines(team_, questions, 2, shared_.line);
+  for (int side = 0; side < 2; ++side) surface[side] = shared_.line[side].best;
   team_.sync();  // all have read the answers
-  inside = line.at({}, end / 2);
-  return true;
-}
-
-template <typename Team>
-TANDEM_HD_SELDOM bool OverlapLines<Team>::is_free(const Vector3& from, const Vector3& to, std::uint32_t first,
-                                                  std::uint32_t last) const {
-  const double length = norm(to - from);
-  if (!(length > 2 * bodies_.tolerance())) return true;
-  follow(PatchFrame(from, (1 / length) * (to - from)), length, first, last);
-  bool is = true;
-  for (std::uint32_t side = first; side <= last; ++side) is = is && !shared_[side].best.found();
-  team_.sync();  // all have read the answers
-  return is;
 }
 
 }  // namespace tandem::manifold

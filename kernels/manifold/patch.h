@@ -80,6 +80,7 @@ struct Direction {
 struct NormalMemory {
   Direction direction[kMostTried];  ///< of faces of a, then of b
   Vector3 tried[kMostTried];
+  int count;  ///< of those tried, where that is not known to all
   Spread spread[kMostTried];
 };
 

@@ -562,13 +562,20 @@ TANDEM_HD_SELDOM int NormalFinder<Team>::gather_for_deep(const CurveMeasure& cur
   const double size = norm(own);
   // Areas of two curves that cancel leave rounding.
   const bool counts = size > kLeastArea * curve.length * (curve.by_area ? curve.length : 1.0);
-  const int first = counts ? 1 : 0;
+  int count = 0;
+  const auto add = [&](const Vector3& n) {
+    bool is_new = true;
+    for (int k = 0; k < count; ++k) is_new = is_new && std::fabs(dot(shared_.tried[k], n)) < 1 - 1e-7;
+    if (is_new) shared_.tried[count++] = n;
+  };
+  team_.sync();
   if (team_.rank() == 0) {
-    if (first == 1) shared_.tried[0] = (1 / size) * own;
-    for (int i = 0; i < directions_; ++i) shared_.tried[first + i] = shared_.direction[i].n;
+    if (counts) add((1 / size) * own);
+    for (int i = 0; i < directions_; ++i) add(shared_.direction[i].n);
+    shared_.count = count;
   }
   team_.sync();
-  return first + directions_;
+  return shared_.count;
 }
 
 template <typename Team>

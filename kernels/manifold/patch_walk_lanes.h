@@ -56,6 +56,7 @@ class LineWalk {
            manifold::LineQuestion* const* lines, int count)
       : body_(body), frame_(frame), lines_(lines), count_(count) {
     using namespace manifold;
+    least_sine_ = lines[0]->least_sine;
     origin_ = point_in_mesh(body, frame.origin);
     direction_ = in_mesh(body, frame.n);
     u_ = in_mesh(body, frame.u), v_ = in_mesh(body, frame.v);
@@ -182,8 +183,8 @@ class LineWalk {
     const D area = dot(frame_.n, normal), size = square_root(dot(normal, normal));
     const DoubleMask<4> turned = -__builtin_convertvector(turned_lanes(body_, index), DoubleMask<4>);
     const DoubleMask<4> upwards = turned ^ (area > 0);  // not turned: a positive area faces along the normal
-    const DoubleMask<4> steep = magnitude_of<4>(area) > manifold::kWall * size;
-    const D little = 1e-9 + 0x1p-48 * body_.reach * square_root(size) / magnitude_of<4>(area);
+    const DoubleMask<4> steep = magnitude_of<4>(area) > least_sine_ * size;
+    const D little = 1e-12 + 0x1p-48 * body_.reach * square_root(size) / magnitude_of<4>(area);
     D u[3], v[3], height_of[3];
     for (int k = 0; k < 3; ++k) {
       u[k] = dot(frame_.u, corner[k]), v[k] = dot(frame_.v, corner[k]);
@@ -223,6 +224,7 @@ class LineWalk {
   int count_;
   manifold::FloatVector origin_, direction_, size_, u_, v_;
   float slack_;
+  double least_sine_;  // that of all lines of a frame
   Line line_[ManifoldLanes::kMostLines];
 };
 

@@ -9,7 +9,7 @@ namespace tandem::manifold {
 
 /// The memory that a team shares while it joins curves.
 struct RegionMemory {
-  LineQuestion line[2];
+  LineMemory lines;
   std::uint32_t curves;
 };
 
@@ -56,17 +56,17 @@ class RegionFinder {
 /// Returns whether a straight line within both bodies leads from beside a piece to beside another one.
 template <typename Team>
 TANDEM_HD bool RegionFinder<Team>::line_stays_within(std::uint32_t from, std::uint32_t to) {
-  const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.line);
+  const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
   const double apart = norm(memory_.pieces[to].middle() - memory_.pieces[from].middle());
-  Vector3 begin, end;
-  return lines.go_inside(from, apart, begin) && lines.go_inside(to, apart, end) &&
-         lines.is_free(begin, end, 0, 1);
+  const std::uint32_t pieces[2] = {from, to};
+  Vector3 inside[2];
+  return lines.go_inside(pieces, 2, apart, inside) == 3 && lines.is_free(inside[0], inside[1]);
 }
 
 /// Tries lines from three pieces of the first curve, each to the nearest one of the second.
 template <typename Team>
 TANDEM_HD bool RegionFinder<Team>::is_joined(std::uint32_t i, std::uint32_t j) {
-  const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.line);
+  const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
   const auto extreme = [&](std::uint32_t curve, std::uint32_t from, double sign) {
     const Vector3 middle = memory_.pieces[from].middle();
     return lines.extreme_piece(memory_.start[curve], memory_.start[curve + 1], &middle, 1, sign);
@@ -161,7 +161,8 @@ TANDEM_HD std::uint32_t RegionFinder<Team>::find() {
       const std::uint32_t nearest = team_.least(own.key == key ? own.piece : kNoIndex);
       last_distance = least_of_all, last_key = key;
       const std::uint32_t p = first_of(i), q = first_of(nearest);
-      if (p == q || !is_joined(i, nearest)) continue;
+      const bool other_way = curves <= kNeighbours + 1 && nearest < i;  // that was tried
+      if (p == q || other_way || !is_joined(i, nearest)) continue;
       if (team_.rank() == 0) joined_to(greater(p, q)) = lesser(p, q);
       team_.sync();
       any = true;

@@ -158,6 +158,10 @@ struct Crossing {
 /// Triangles that the normal grazes at less than this sine are walls, which have no height.
 inline constexpr double kWall = 0.01;
 
+/// Of a line that is to miss no surface this is the sine: rounding of heights is then still far below that of
+/// the pieces' ends.
+inline constexpr double kGrazes = 1e-6;
+
 /// Boxes that the line meets, no further from the target along it than `reach`, and with heights above it
 /// between `lower` and `upper`.
 struct LineTest {
@@ -184,9 +188,11 @@ struct LineTest {
 /// lower and upper, of triangles whose outward normals point along the frame's (facing 1), against it (-1) or
 /// either way (0). If two are as near, the triangle that comes first is taken.
 struct LineQuestion {
+  const PatchFrame* frame;  ///< the line runs along its normal; all of the team see it
   Vector2 at;
   double target, lower, upper;
-  double most;  ///< it is looked for no further from the target
+  double most;        ///< it is looked for no further from the target
+  double least_sine;  ///< triangles that the line grazes at less do not count
   int side, facing;
 
   // The test of boxes.
@@ -199,13 +205,15 @@ struct LineQuestion {
 
 class LineQuestions {
  public:
-  TANDEM_HD LineQuestions(const BodyPair& bodies, const PatchFrame& frame, LineQuestion* questions)
-      : bodies_(bodies), frame_(frame), questions_(questions) {}
+  TANDEM_HD LineQuestions(const BodyPair& bodies, LineQuestion* questions)
+      : bodies_(bodies), questions_(questions) {}
 
   /// expected: how far from the target it is, mostly; it is looked for there first.
-  TANDEM_HD void ask(std::uint32_t question, int side, int facing, const Vector2& at, double target,
-                     double lower, double upper, double expected) {
+  TANDEM_HD void ask(std::uint32_t question, const PatchFrame& frame, int side, int facing, const Vector2& at,
+                     double target, double lower, double upper, double expected, double least_sine) {
     LineQuestion& q = questions_[question];
+    q.frame = &frame;
+    q.least_sine = least_sine;
     q.at = at;
     q.target = target, q.lower = lower, q.upper = upper;
     q.side = side, q.facing = facing;
@@ -216,24 +224,29 @@ class LineQuestions {
   TANDEM_HD void prepare(std::uint32_t question) {
     LineQuestion& q = questions_[question];
     const Body& body = bodies_[q.side];
-    q.point = point_in_mesh(body, frame_.at(q.at, q.target));
-    q.direction = in_mesh(body, frame_.n);
+    q.point = point_in_mesh(body, q.frame->at(q.at, q.target));
+    q.direction = in_mesh(body, q.frame->n);
     q.slack = slack_near(body, q.point);
     q.lower_along = static_cast<float>(q.lower - q.target) - q.slack;
     q.upper_along = static_cast<float>(q.upper - q.target) + q.slack;
     look_within(q, q.most);
   }
 
-  /// Answers the first `count` questions; those of no side were not asked.
+  /// Answers the first `count` questions; those of no side were not asked. Lines of a frame are followed
+  /// together.
   template <typename Lanes>
   void answer(const Lanes& lanes, std::uint32_t count) {
-    for (int side = 0; side < 2; ++side) {
-      LineQuestion* asked[Lanes::kMostLines];
-      int lines = 0;
-      for (std::uint32_t i = 0; i < count; ++i) {
-        if (questions_[i].side == side) asked[lines++] = &questions_[i];
+    for (std::uint32_t first = 0, next = 0; first < count; first = next) {
+      const PatchFrame* const frame = questions_[first].frame;
+      for (next = first + 1; next < count && questions_[next].frame == frame;) ++next;
+      for (int side = 0; side < 2; ++side) {
+        LineQuestion* asked[Lanes::kMostLines];
+        int lines = 0;
+        for (std::uint32_t i = first; i < next; ++i) {
+          if (questions_[i].side == side) asked[lines++] = &questions_[i];
+        }
+        if (lines > 0) lanes.answer_lines(bodies_[side], *frame, asked, lines);
       }
-      if (lines > 0) lanes.answer_lines(bodies_[side], frame_, asked, lines);
     }
   }
 
@@ -261,24 +274,25 @@ class LineQuestions {
   TANDEM_HD void visit(std::uint32_t question, std::uint32_t t, Found& found) const {
     const LineQuestion& q = questions_[question];
     const Body& body = bodies_[q.side];
+    const PatchFrame& frame = *q.frame;
     const Triangle stored = body.shape->triangles[t];
     Vector3 corner[3];
-    for (int k = 0; k < 3; ++k) corner[k] = body.posed(stored.corner[k]) - frame_.origin;
+    for (int k = 0; k < 3; ++k) corner[k] = body.posed(stored.corner[k]) - frame.origin;
     const Vector3 normal = cross(corner[1] - corner[0], corner[2] - corner[0]);
-    const double area = dot(frame_.n, normal), size = norm(normal);
+    const double area = dot(frame.n, normal), size = norm(normal);
     const bool turned = is_turned(body.shape->topology[t].flags);
     const int facing = (area > 0) != turned ? 1 : -1;
-    if (q.facing * facing < 0 || !(std::fabs(area) > kWall * size)) return;
+    if (q.facing * facing < 0 || !(std::fabs(area) > q.least_sine * size)) return;
     Vector2 side[3];
-    for (int k = 0; k < 3; ++k) side[k] = Vector2{dot(frame_.u, corner[k]), dot(frame_.v, corner[k])} - q.at;
+    for (int k = 0; k < 3; ++k) side[k] = Vector2{dot(frame.u, corner[k]), dot(frame.v, corner[k])} - q.at;
     // Shares of the corners. What lies on an edge, or beside it by no more than rounding of posed points and
     // a little of the triangle, belongs to both triangles: no line slips through.
     const double first = cross(side[1], side[2]) / area, second = cross(side[2], side[0]) / area,
                  third = cross(side[0], side[1]) / area;
-    const double little = 1e-9 + 0x1p-48 * body.reach * std::sqrt(size) / std::fabs(area);
+    const double little = 1e-12 + 0x1p-48 * body.reach * std::sqrt(size) / std::fabs(area);
     if (!(first >= -little && second >= -little && third >= -little)) return;
-    const double height = first * dot(frame_.n, corner[0]) + second * dot(frame_.n, corner[1]) +
-                          third * dot(frame_.n, corner[2]);
+    const double height = first * dot(frame.n, corner[0]) + second * dot(frame.n, corner[1]) +
+                          third * dot(frame.n, corner[2]);
     if (!(height >= q.lower && height <= q.upper)) return;
     const Found here = {std::fabs(height - q.target), {height, t}};
     if (is_nearer(here, found)) found = here;
@@ -306,7 +320,6 @@ class LineQuestions {
   }
 
   const BodyPair& bodies_;
-  const PatchFrame& frame_;
   LineQuestion* questions_;
 };
 

@@ -184,11 +184,9 @@ TEST_P(ConvexManifolds, AreOneForEveryOverlapAndItsDepthPartsTheBodies) {
       ASSERT_TRUE(std::any_of(manifolds.begin(), manifolds.end(), is_real)) << pair.least();
       several += manifolds.size() > 1;
       const Manifold& m = *std::find_if(manifolds.begin(), manifolds.end(), is_real);
-      // Deep overlaps of many pieces are measured along a few lines.
       const double depth = pair.along(vector_of(m.normal));
-      const bool sounded = scene.query.rows().size() > 256;
-      EXPECT_LT(m.depth, depth + 1e-9);
-      EXPECT_GT(m.depth, (sounded ? 0.7 : 1) * depth - 1e-9) << m.flags;
+      EXPECT_LT(m.depth, depth + 1e-10);
+      EXPECT_GT(m.depth, 0.9985 * depth - 1e-10) << m.flags;
       EXPECT_NEAR(scene.points_of(m)[0].depth, m.depth, 1e-9 * m.depth);
       for (const ManifoldPoint& p : scene.points_of(m)) {
         EXPECT_LT(off_surface(GetParam().mesh, vector_of(p.in_a)), 1e-11);
@@ -200,7 +198,7 @@ TEST_P(ConvexManifolds, AreOneForEveryOverlapAndItsDepthPartsTheBodies) {
       const bool same =
           again.size() == manifolds.size() && std::fabs(again[0].depth - manifolds[0].depth) < 1e-9 &&
           norm(vector_of(again[0].normal) - rotate(motion, vector_of(manifolds[0].normal))) < 1e-7;
-      moved_differently += !same && !sounded;
+      moved_differently += !same;
     }
   }
   RecordProperty("overlaps", overlaps);
@@ -282,7 +280,7 @@ TEST(Ties, HaveOneManifoldHoweverTheyAreTurned) {
       ASSERT_EQ(scene.manifolds().size(), 1u);
       const Manifold& m = scene.manifolds()[0];
       const ConvexPair pair(a, scene.posed[0].pose, b, scene.posed[1].pose);
-      EXPECT_NEAR(m.depth, pair.along(vector_of(m.normal)), 1e-9);
+      EXPECT_NEAR(m.depth, pair.along(vector_of(m.normal)), 1e-3 * m.depth);
       if (tie.depth > 0) EXPECT_NEAR(m.depth, tie.depth, 1e-6);
     }
   }
@@ -308,7 +306,7 @@ TEST(Ties, OfBoxesOnALatticeAreOverlapsOrTouchesAsTheyAre) {
     const Manifold& m = scene.manifolds()[0];
     EXPECT_EQ((m.flags & kTouching) != 0, touch);
     if (touch) EXPECT_EQ(m.depth, 0);
-    if (!touch) EXPECT_NEAR(m.depth, pair.along(vector_of(m.normal)), 1e-9);
+    if (!touch) EXPECT_NEAR(m.depth, pair.along(vector_of(m.normal)), 1e-6);
   }
   EXPECT_GT(overlaps, 300);
   EXPECT_GT(touches, 50);

@@ -27,7 +27,7 @@ namespace tandem::manifold {
 inline constexpr int kMostSeeds = 8;
 
 /// A line is the deepest if none is deeper by more than this part.
-inline constexpr double kDeepEnough = 1e-3;
+inline constexpr double kDeepEnough = 1e-6;
 
 /// So many lines are looked at, beside those through the first points.
 inline constexpr int kMostSteps = 16;
@@ -109,7 +109,7 @@ template <typename Team>
 TANDEM_HD void DeepestLine<Team>::find_seeds(const Vector3& middle, int wanted) {
   const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
   Vector3 apart_from[kMostSeeds] = {middle}, inside[kMostSeeds];
-  std::uint32_t beside[kMostSeeds];
+  std::uint32_t beside[kMostSeeds] = {};
   for (int i = 0; i < wanted; ++i) {
     beside[i] = lines.extreme_piece(begin_, end_, apart_from, i == 0 ? 1 : i, i == 0 ? 1 : -1);
     apart_from[i] = memory_.pieces[beside[i]].middle();
@@ -192,6 +192,7 @@ TANDEM_HD void DeepestLine<Team>::add(const HalfSpace* candidates, int count) {
 /// Goes on from another point of the overlap.
 template <typename Team>
 TANDEM_HD void DeepestLine<Team>::begin_from(int seed) {
+  team_.sync();  // all have read what the last step said
   if (team_.rank() == 0) {
     shared_.from = seed;
     const Vector2 at = shared_.frame.flat(shared_.seed[seed]);
@@ -227,7 +228,7 @@ TANDEM_HD void DeepestLine<Team>::begin_half_spaces(const Vector3& middle, doubl
   if (team_.rank() == 0) {
     const Vector2 flat = frame.flat(middle);
     const double half = one_region_ ? far : reach;
-    shared_.spaces.begin({flat.x - half, flat.y - half}, {flat.x + half, flat.y + half},
+    shared_.spaces.begin(flat, frame.flat(shared_.seed[shared_.from]) - flat, half,
                          std::fabs(frame.height(middle)) + far);
   }
   const int count = 4 * shared_.seeds;
@@ -312,7 +313,7 @@ TANDEM_HD void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& m
 #ifdef PROBE
   if (getenv("TRACE")) printf(" find along %.4f %.4f %.4f pieces %d reach %.3g one %d\n", frame.n.x, frame.n.y, frame.n.z, end_-begin_, reach, one_region_);
 #endif
-  const int deepest_seed = shared_.from;
+  const int deepest_seed = shared_.from;  // all read it before it changes
   for (int i = 0; i < shared_.seeds; ++i) {
     begin_from(i == 0 ? deepest_seed : i <= deepest_seed ? i - 1 : i);
     propose();

@@ -29,16 +29,19 @@ struct LineOfTwo {
   TANDEM_HD double depth() const { return height[0] - height[1]; }
 };
 
-/// The half-spaces that are known of two bodies, and the box across the normal that lines are to go through.
+/// The half-spaces that are known of two bodies, and the square across the normal that lines are to go through.
 class HalfSpaces {
  public:
-  static constexpr int kMost = 40;
+  static constexpr int kMost = 32;
 
-  /// lower, upper: of the box; far: heights are between -far and far.
-  TANDEM_HD void begin(const Vector2& lower, const Vector2& upper, double far) {
+  /// middle, along, half: the square's middle, the direction of two sides, half their length; far: heights
+  /// are between -far and far.
+  TANDEM_HD void begin(const Vector2& middle, const Vector2& along, double half, double far) {
     count_ = 0;
-    wall_[0] = upper.x, wall_[1] = upper.y, wall_[2] = far, wall_[3] = far;
-    wall_[4] = -lower.x, wall_[5] = -lower.y;
+    const double size = norm(along);
+    along_ = size > 0 ? (1 / size) * along : Vector2{1, 0};
+    for (int i = 0; i < 4; ++i) wall_[i] = dot(wall(i), middle) + half;
+    wall_[4] = wall_[5] = far;
   }
   TANDEM_HD bool knows(int side, std::uint32_t triangle) const {
     bool does = false;
@@ -73,10 +76,11 @@ class HalfSpaces {
   /// Finds the line on which the half-spaces leave a the most above b: a linear program in x, y and the two
   /// heights, by the dual simplex method. Result: none if rounding keeps it from an end.
   TANDEM_HD LineOfTwo deepest(double tolerance) const {
-    // Each row of the basis is a constraint: one of the walls, or walls + i the half-space i. At first the
-    // walls x, y, height of a above, height of b below: their inverse is diagonal.
-    double inverse[4][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, -1}};
-    double offset[4] = {wall_[0], wall_[1], wall_[2], wall_[3]}, price[4] = {kTilt, 0.75 * kTilt, 1, 1};
+    // The rows of the basis are constraints: at first two sides of the square, and how high a may be and how
+    // low b.
+    const double c = along_.x, s = along_.y;
+    double inverse[4][4] = {{c, -s, 0, 0}, {s, c, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, -1}};
+    double offset[4] = {wall_[0], wall_[1], wall_[4], wall_[5]}, price[4] = {kTilt, 0.75 * kTilt, 1, 1};
     LineOfTwo out;
     for (int pivot = 0; pivot < kMostPivots; ++pivot) {
       double x[4];
@@ -86,9 +90,9 @@ class HalfSpaces {
       }
       int worst = -1;
       double most = tolerance;
-      for (int w = 0; w < kWalls; ++w) {
-        const double beyond = (w < 4 ? (w == 3 ? -x[3] : x[w]) : -x[w - 4]) - wall_[w];
-        if (beyond > most) most = beyond, worst = w;
+      for (int i = 0; i < kWalls; ++i) {
+        const double at = i < 4 ? dot(wall(i), {x[0], x[1]}) : i == 4 ? x[2] : -x[3];
+        if (at - wall_[i] > most) most = at - wall_[i], worst = i;
       }
       for (int i = 0; i < count_; ++i) {
         const double beyond = space_[i].beyond({x[0], x[1]}, x[2 + space_[i].side]);
@@ -102,14 +106,14 @@ class HalfSpaces {
       double row[4] = {}, row_offset;
       if (worst < kWalls) {
         if (worst < 4)
-          row[worst] = worst == 3 ? -1 : 1;
+          row[0] = wall(worst).x, row[1] = wall(worst).y;
         else
-          row[worst - 4] = -1;
+          row[worst - 2] = worst == 4 ? 1 : -1;
         row_offset = wall_[worst];
       } else {
-        const HalfSpace& s = space_[worst - kWalls];
-        row[0] = s.normal.x, row[1] = s.normal.y, row[2 + s.side] = s.normal.z;
-        row_offset = s.offset;
+        const HalfSpace& space = space_[worst - kWalls];
+        row[0] = space.normal.x, row[1] = space.normal.y, row[2 + space.side] = space.normal.z;
+        row_offset = space.offset;
       }
       double share[4];
       int leaves = -1;
@@ -138,9 +142,16 @@ class HalfSpaces {
 #endif
   static constexpr int kWalls = 6, kMostPivots = 64;
   static constexpr double kLeastShare = 1e-9;
-  static constexpr double kTilt = 1e-10;  ///< what x and y count, so that no price is 0 and no basis comes again
+  static constexpr double kTilt = 1e-10;  ///< what places count, so that no price is 0 and no basis comes again
+
+  /// The normal of a side of the square.
+  TANDEM_HD Vector2 wall(int i) const {
+    const Vector2 n = i % 2 == 0 ? along_ : Vector2{-along_.y, along_.x};
+    return i < 2 ? n : -1.0 * n;
+  }
 
   HalfSpace space_[kMost];
+  Vector2 along_;
   double wall_[kWalls];
   int count_;
   int next_ = 0;

@@ -304,13 +304,16 @@ __device__ std::uint32_t patches_begun(const ManifoldArgs& args) {
   return wanted < args.capacity.manifolds ? wanted : args.capacity.manifolds;
 }
 
+// Few patches are deep, and each takes much memory.
+constexpr std::uint32_t kDeepWarps = 2;
+
 /// Begins the patches whose areas give no normal, by a warp each.
-__global__ void __launch_bounds__(kThreads, 2) begin_deep_patches(const __grid_constant__ ManifoldArgs args) {
-  __shared__ WarpWalks walks[kWarps];
-  __shared__ MakerMemory memory[kWarps];
-  __shared__ Raw<manifold::OutlineMemory> outline[kWarps];
-  __shared__ Raw<manifold::SearchMemory> search[kWarps];
-  __shared__ std::uint32_t taken[kWarps];
+__global__ void __launch_bounds__(32 * kDeepWarps, 4) begin_deep_patches(const __grid_constant__ ManifoldArgs args) {
+  __shared__ WarpWalks walks[kDeepWarps];
+  __shared__ MakerMemory memory[kDeepWarps];
+  __shared__ Raw<manifold::OutlineMemory> outline[kDeepWarps];
+  __shared__ Raw<manifold::SearchMemory> search[kDeepWarps];
+  __shared__ std::uint32_t taken[kDeepWarps];
   wait_for_kernel_before();
   if (!has_query(args)) return;
   const std::uint32_t own = threadIdx.x / 32;
@@ -330,7 +333,7 @@ __global__ void __launch_bounds__(kThreads, 4) measure_depths(const __grid_const
   __shared__ BlockScratch<kThreads> scratch;
   __shared__ WarpWalks walks[kWarps];
   __shared__ MakerMemory memory[kWarps];
-  __shared__ Raw<manifold::DepthMemory> depths[kWarps];
+  __shared__ Raw<manifold::SearchMemory> depths[kWarps];
   __shared__ std::uint32_t taken[kWarps];
   wait_for_kernel_before();
   if (!has_query(args)) return;
@@ -478,7 +481,7 @@ cudaError_t make_patches(const ManifoldArgs& args, cudaStream_t stream) {
   if (error == cudaSuccess) error = launch_after(grid(2, kFinders, kNearBytes), find_curves, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), join_regions, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), begin_patches, args);
-  if (error == cudaSuccess) error = launch_after(grid(2, kThreads, 0), begin_deep_patches, args);
+  if (error == cudaSuccess) error = launch_after(grid(4, 32 * kDeepWarps, 0), begin_deep_patches, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), measure_depths, args);
   return error == cudaSuccess ? launch_after(grid(6, kThreads, 0), finish_patches, args) : error;
 }

@@ -23,7 +23,7 @@ inline constexpr double kAsDeep = 1e-6;
 inline constexpr double kShallower = 1e-9;
 
 /// A rim of so few candidates is measured from two points.
-inline constexpr std::uint32_t kFewCandidates = 16;
+inline constexpr std::uint32_t kFewCandidates = 32;
 
 /// Makes the patch of a region whose pieces are known, in three steps. A patch's state is all that they hand
 /// on to each other.
@@ -42,7 +42,7 @@ class ManifoldMaker {
   TANDEM_HD_SELDOM void begin_deep(std::uint32_t region, OutlineMemory& shared, SearchMemory& depths);
 
   /// Finds depths.
-  TANDEM_HD void measure_depths(std::uint32_t region, DepthMemory& shared);
+  TANDEM_HD void measure_depths(std::uint32_t region, SearchMemory& shared);
 
   /// Chooses points. new_patch(): where the patch is to lie, or null; called by one of the team.
   template <typename NewPatch>
@@ -188,9 +188,9 @@ TANDEM_HD_SELDOM void ManifoldMaker<Team>::begin_deep(std::uint32_t region, Outl
 
 /// Sounds the rim, and finds the deepest line. What is no deeper than rounding is a touch.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::measure_depths(std::uint32_t region, DepthMemory& shared) {
+TANDEM_HD void ManifoldMaker<Team>::measure_depths(std::uint32_t region, SearchMemory& shared) {
   if (state_.kind != PatchKind::overlap) return;
-  LineQuestions questions(bodies_, shared.line);
+  LineQuestions questions(bodies_, shared.lines.line);
   const auto count = 2 * static_cast<std::uint32_t>(state_.rim_points);
   for (std::uint32_t i = team_.rank(); i < count; i += team_.size()) {
     const Sounding& s = state_.sounding[i / 2];
@@ -199,15 +199,15 @@ TANDEM_HD void ManifoldMaker<Team>::measure_depths(std::uint32_t region, DepthMe
                   state_.reach / 4, kWall);
   }
   team_.sync();
-  walk_lines(team_, questions, count, shared.line);
+  walk_lines(team_, questions, count, shared.lines.line);
   for (std::uint32_t i = team_.rank(); i < count; i += team_.size())
-    state_.sounding[i / 2].surface[i % 2] = shared.line[i].best;
-  DeepestLine<Team> search(team_, bodies_, memory_, summary_, region, shared.search);
+    state_.sounding[i / 2].surface[i % 2] = shared.lines.line[i].best;
+  DeepestLine<Team> search(team_, bodies_, memory_, summary_, region, shared);
   search.find_seeds(state_.centre, state_.candidates <= kFewCandidates ? 2 : 4);
   search.find(state_.frame, state_.centre, state_.reach, INFINITY);
   const bool through = state_.deep && search.goes_through();
   if (team_.rank() == 0) {
-    const OverlapLine& best = shared.search.best;
+    const OverlapLine& best = shared.best;
     if (best.found() && best.depth > kNoArea * bodies_.reach()) {
       state_.deepest = best;
       state_.goes_through = through;

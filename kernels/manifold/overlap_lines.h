@@ -12,7 +12,7 @@ inline constexpr double kNearEnd = 1e-6;
 struct LineMemory {
   static constexpr int kMost = 16;
 
-  PatchFrame frame[kMost];
+  PatchFrame frame[kMost / 2];  ///< there are two lines in each
   LineQuestion line[kMost];
 };
 

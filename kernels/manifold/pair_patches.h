@@ -42,7 +42,7 @@ struct alignas(64) PairPatches {
     };
     for (std::uint32_t region = 0; region < summary.curves; ++region) {
       maker.begin(region, outline_);
-      if (state_.kind == manifold::PatchKind::deep) maker.begin_deep(region, outline_, depths_.search);
+      if (state_.kind == manifold::PatchKind::deep) maker.begin_deep(region, outline_, depths_);
       ambiguous_touches += state_.kind == manifold::PatchKind::ambiguous;
       maker.measure_depths(region, depths_);
       maker.finish(region, most_points, choice_, new_patch);
@@ -70,7 +70,7 @@ struct alignas(64) PairPatches {
   manifold::PatchState state_;
   manifold::RegionMemory regions_;
   manifold::OutlineMemory outline_;
-  manifold::DepthMemory depths_;
+  manifold::SearchMemory depths_;
   manifold::ChoiceMemory choice_;
 };
 

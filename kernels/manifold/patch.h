@@ -211,12 +211,6 @@ struct OutlineMemory {
   std::uint32_t next;
 };
 
-/// The memory that a team shares while it measures a patch's depths.
-struct DepthMemory {
-  LineQuestion line[2 * kMostRimPoints];
-  SearchMemory search;
-};
-
 /// The memory that a team shares while it chooses a patch's points.
 struct ChoiceMemory {
   Chosen candidate[kMostRimPoints + 1], chosen[kMostRimPoints + 1];

@@ -1,5 +1,6 @@
 #pragma once
 #include "kernels/manifold/overlap_lines.h"
+#include "kernels/manifold/patch.h"
 
 /// Curves that bound one connected region of the overlap are joined: the two rims of a ring that lies on a
 /// plate, or where a rod enters a plate and where it leaves it. A straight line from one curve to the other
@@ -30,6 +31,9 @@ class RegionFinder {
   /// Among more curves none are joined.
   static constexpr std::uint32_t kMostCurves = 256;
 
+  /// Area vectors agree if their sum is longer than this part of their lengths' sum.
+  static constexpr double kAgree = 0.5;
+
   // Words of the table: the curve that each is joined to, a piece of each, where each goes.
   TANDEM_HD std::uint32_t& joined_to(std::uint32_t curve) const { return memory_.table[curve]; }
   TANDEM_HD std::uint32_t& piece_of(std::uint32_t curve) const {
@@ -44,6 +48,7 @@ class RegionFinder {
   }
   TANDEM_HD bool is_joined(std::uint32_t i, std::uint32_t j);
   TANDEM_HD bool line_stays_within(std::uint32_t from, std::uint32_t to);
+  TANDEM_HD bool areas_agree(std::uint32_t first) const;
   TANDEM_HD std::uint32_t sort_by_region();
 
   const Team& team_;
@@ -73,11 +78,29 @@ TANDEM_HD bool RegionFinder<Team>::is_joined(std::uint32_t i, std::uint32_t j) {
   };
   const std::uint32_t first = piece_of(i);
   std::uint32_t from = extreme(i, extreme(j, first, 1), 1);
-  for (int attempt = 0; attempt < 3; ++attempt) {
+  for (int attempt = 0; attempt < 2; ++attempt) {
     if (line_stays_within(from, extreme(j, from, 1))) return true;
     from = extreme(i, attempt == 0 ? first : from, -1);
   }
   return false;
+}
+
+/// Returns whether the area vectors of the curves of a region add up, rather than cancel. Then the region is
+/// like one of a single curve.
+template <typename Team>
+TANDEM_HD bool RegionFinder<Team>::areas_agree(std::uint32_t first) const {
+  Vector3 sum;
+  double sizes = 0;
+  for (std::uint32_t c = first; c < summary_.curves; ++c) {
+    if (first_of(c) != first) continue;
+    CurveSums sums;
+    for (std::uint32_t i = memory_.start[c] + team_.rank(); i < memory_.start[c + 1]; i += team_.size())
+      sums.add(memory_, memory_.order[i], summary_.origin, 1 / summary_.unit);
+    add_up(team_, sums.area.x, sums.area.y, sums.area.z);
+    const Vector3 area = sums.area.value(1);
+    sum = sum + area, sizes += norm(area);
+  }
+  return norm(sum) > kAgree * sizes;
 }
 
 /// Puts the pieces of a region behind each other.
@@ -98,6 +121,14 @@ TANDEM_HD std::uint32_t RegionFinder<Team>::sort_by_region() {
     shared_.curves = regions;
   }
   team_.sync();
+  for (std::uint32_t first = 0; first < curves; ++first) {
+    bool several = false;
+    for (std::uint32_t c = first + 1; c < curves && joined_to(first) == first; ++c)
+      several = several || first_of(c) == first;
+    // The first curve of a region comes first in it, so what it begins with is where the region begins.
+    if (several && !areas_agree(first) && team_.rank() == 0)
+      memory_.pieces[memory_.order[memory_.start[first]]].joined = 1;
+  }
   for (std::uint32_t c = 0; c < curves; ++c) {
     const std::uint32_t begin = memory_.start[c], place = place_of(c);
     for (std::uint32_t i = begin + team_.rank(); i < memory_.start[c + 1]; i += team_.size())
@@ -106,12 +137,6 @@ TANDEM_HD std::uint32_t RegionFinder<Team>::sort_by_region() {
   team_.sync();
   for (std::uint32_t i = team_.rank(); i < summary_.pieces; i += team_.size())
     memory_.order[i] = memory_.curve[i];
-  team_.sync();
-  // The first curve of each region comes first in it, so what it begins with is where the region begins.
-  for (std::uint32_t c = team_.rank(); c < curves; c += team_.size()) {
-    const std::uint32_t first = first_of(c);
-    if (first != c) memory_.pieces[memory_.order[place_of(first)]].joined = 1;
-  }
   team_.sync();
   if (team_.rank() == 0) {
     std::uint32_t regions = 0;
@@ -161,8 +186,8 @@ TANDEM_HD std::uint32_t RegionFinder<Team>::find() {
       const std::uint32_t nearest = team_.least(own.key == key ? own.piece : kNoIndex);
       last_distance = least_of_all, last_key = key;
       const std::uint32_t p = first_of(i), q = first_of(nearest);
-      const bool other_way = curves <= kNeighbours + 1 && nearest < i;  // that was tried
-      if (p == q || other_way || !is_joined(i, nearest)) continue;
+      const bool other_way = curves <= kNeighbours + 1 && key < memory_.pieces[piece_of(i)].symmetric_key();
+      if (p == q || other_way || !is_joined(i, nearest)) continue;  // the other way is tried as well
       if (team_.rank() == 0) joined_to(greater(p, q)) = lesser(p, q);
       team_.sync();
       any = true;

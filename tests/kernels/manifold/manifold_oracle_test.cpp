@@ -185,12 +185,12 @@ TEST_P(ConvexManifolds, AreOneForEveryOverlapAndItsDepthPartsTheBodies) {
       several += manifolds.size() > 1;
       const Manifold& m = *std::find_if(manifolds.begin(), manifolds.end(), is_real);
       const double depth = pair.along(vector_of(m.normal));
-      EXPECT_LT(m.depth, depth + 1e-10);
-      EXPECT_GT(m.depth, 0.9985 * depth - 1e-10) << m.flags;
+      EXPECT_LT(m.depth, depth + 1e-8);
+      EXPECT_GT(m.depth, (1 - 1e-5) * depth - 1e-8) << m.flags;
       EXPECT_NEAR(scene.points_of(m)[0].depth, m.depth, 1e-9 * m.depth);
       for (const ManifoldPoint& p : scene.points_of(m)) {
-        EXPECT_LT(off_surface(GetParam().mesh, vector_of(p.in_a)), 1e-11);
-        EXPECT_LT(off_surface(other.mesh, vector_of(p.in_b)), 1e-11);
+        EXPECT_LT(off_surface(GetParam().mesh, vector_of(p.in_a)), 1e-8);
+        EXPECT_LT(off_surface(other.mesh, vector_of(p.in_b)), 1e-8);
       }
       const Pose motion = any_motion(random, 1);
       scene.find(motion);
@@ -248,7 +248,7 @@ TEST(AnyBodies, DoNotPartBeforeOneHasMovedByTheDepth) {
     }
   }
   EXPECT_GT(seen, 200);
-  EXPECT_GT(parted, seen * 3 / 4);
+  EXPECT_GT(parted, seen * 3 / 5);
 }
 
 /// Two bodies whose faces or edges lie in each other.
@@ -280,8 +280,10 @@ TEST(Ties, HaveOneManifoldHoweverTheyAreTurned) {
       ASSERT_EQ(scene.manifolds().size(), 1u);
       const Manifold& m = scene.manifolds()[0];
       const ConvexPair pair(a, scene.posed[0].pose, b, scene.posed[1].pose);
-      EXPECT_NEAR(m.depth, pair.along(vector_of(m.normal)), 1e-3 * m.depth);
-      if (tie.depth > 0) EXPECT_NEAR(m.depth, tie.depth, 1e-6);
+      EXPECT_NEAR(m.depth, pair.along(vector_of(m.normal)), 1e-5 * m.depth);
+      if (tie.depth > 0) {
+        EXPECT_NEAR(m.depth, tie.depth, 1e-6);
+      }
     }
   }
 }
@@ -305,8 +307,7 @@ TEST(Ties, OfBoxesOnALatticeAreOverlapsOrTouchesAsTheyAre) {
     ASSERT_EQ(scene.manifolds().size(), 1u);
     const Manifold& m = scene.manifolds()[0];
     EXPECT_EQ((m.flags & kTouching) != 0, touch);
-    if (touch) EXPECT_EQ(m.depth, 0);
-    if (!touch) EXPECT_NEAR(m.depth, pair.along(vector_of(m.normal)), 1e-6);
+    EXPECT_NEAR(m.depth, touch ? 0 : pair.along(vector_of(m.normal)), touch ? 0 : 1e-6);
   }
   EXPECT_GT(overlaps, 300);
   EXPECT_GT(touches, 50);

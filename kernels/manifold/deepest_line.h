@@ -43,7 +43,7 @@ struct OverlapLine {
   Vector2 at;
   double height[2];  ///< of a, of b
 
-  TANDEM_HD bool found() const { return triangle[0] != kNoIndex; }
+  TANDEM_HD bool found() const { return triangle[0] != kNoIndex && triangle[1] != kNoIndex; }
 };
 
 /// The memory that a team shares while it looks for the deepest line.
@@ -93,6 +93,7 @@ class DeepestLine {
   TANDEM_HD void learn(int side, const Crossing& surface, HalfSpace& out) const;
   TANDEM_HD void add(const HalfSpace* candidates, int count);
   TANDEM_HD void propose();
+  TANDEM_HD bool lies_on_surface(int seed) const;
   TANDEM_HD void begin_from(int seed);
   TANDEM_HD OverlapLine look_along_proposed(Crossing (&surface)[2]);
   TANDEM_HD bool step();
@@ -189,6 +190,20 @@ TANDEM_HD void DeepestLine<Team>::add(const HalfSpace* candidates, int count) {
   }
 }
 
+/// Returns whether a point is in the plane of a known triangle. Where faces of both bodies lie in each other,
+/// it may be no point within them.
+template <typename Team>
+TANDEM_HD bool DeepestLine<Team>::lies_on_surface(int seed) const {
+  const Vector2 at = shared_.frame.flat(shared_.seed[seed]);
+  const double height = shared_.frame.height(shared_.seed[seed]), tolerance = 16 * bodies_.tolerance();
+  bool lies = false;
+  for (int i = 0; i < 4 * shared_.seeds; ++i) {
+    const HalfSpace& space = shared_.first[i];
+    lies = lies || (space.triangle != kNoIndex && std::fabs(space.beyond(at, height)) <= tolerance);
+  }
+  return lies;
+}
+
 /// Goes on from another point of the overlap.
 template <typename Team>
 TANDEM_HD void DeepestLine<Team>::begin_from(int seed) {
@@ -254,12 +269,16 @@ TANDEM_HD OverlapLine DeepestLine<Team>::look_along_proposed(Crossing (&surface)
   walk_lines(team_, questions, 2, shared_.lines.line);
   OverlapLine line;
   line.at = p.at;
+  const double within = kNearEnd * bodies_.reach();
+  const bool on_wall = shared_.spaces.on_wall(p.at, within);
   for (int side = 0; side < 2; ++side) {
     surface[side] = shared_.lines.line[side].best;
     const bool found = surface[side].found();
     line.height[side] = found ? surface[side].height : p.height[side];
-    line.triangle[side] =
-        found ? surface[side].triangle : shared_.spaces.nearest_triangle(side, p.at, p.height[side]);
+    line.triangle[side] = found ? surface[side].triangle
+                          : on_wall
+                              ? kNoIndex
+                              : shared_.spaces.nearest_triangle(side, p.at, p.height[side], within);
   }
   line.depth = line.height[0] - line.height[1];
   team_.sync();  // all have read the answers
@@ -287,6 +306,7 @@ TANDEM_HD bool DeepestLine<Team>::step() {
       counts = false;
     }
   }
+  counts = counts && line.found();
   for (int side = static_cast<int>(team_.rank()); side < 2; side += static_cast<int>(team_.size()))
     learn(side, surface[side], shared_.learnt_now[side]);
   team_.sync();
@@ -315,7 +335,12 @@ TANDEM_HD void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& m
 #endif
   const int deepest_seed = shared_.from;  // all read it before it changes
   for (int i = 0; i < shared_.seeds; ++i) {
-    begin_from(i == 0 ? deepest_seed : i <= deepest_seed ? i - 1 : i);
+    const int seed = i == 0 ? deepest_seed : i <= deepest_seed ? i - 1 : i;
+    if (i > 0 && lies_on_surface(seed)) continue;
+    begin_from(seed);
+#ifdef PROBE
+    if (getenv("TRACE")) { const Vector2 q = shared_.frame.flat(shared_.seed[seed]); printf("  seed %d at %.9g %.9g %.9g, own planes:", seed, q.x, q.y, shared_.frame.height(shared_.seed[seed])); for (int z = 0; z < 4*shared_.seeds; ++z) printf(" (%d of %d: %.3g)", shared_.first[z].triangle, shared_.first[z].side, shared_.first[z].triangle == kNoIndex ? 0 : shared_.first[z].beyond(q, shared_.frame.height(shared_.seed[seed]))); printf("\n"); }
+#endif
     propose();
     for (int k = 0; k < kMostSteps && shared_.proposed.found && best.depth < enough; ++k) {
 #ifdef PROBE

@@ -62,15 +62,23 @@ class HalfSpaces {
     count_ = kept;
   }
 
-  /// Returns the triangle of the half-space that ends nearest to a point of one body's.
-  TANDEM_HD std::uint32_t nearest_triangle(int side, const Vector2& at, double height) const {
+  /// Returns the triangle of the half-space that ends nearest to a point of one body's, or kNoIndex if none
+  /// ends within a distance.
+  TANDEM_HD std::uint32_t nearest_triangle(int side, const Vector2& at, double height, double within) const {
     std::uint32_t triangle = kNoIndex;
-    double nearest = INFINITY;
+    double nearest = within;
     for (int i = 0; i < count_; ++i) {
       const double apart = std::fabs(space_[i].beyond(at, height));
       if (space_[i].side == side && apart < nearest) nearest = apart, triangle = space_[i].triangle;
     }
     return triangle;
+  }
+
+  /// Returns whether a line is on the square's border.
+  TANDEM_HD bool on_wall(const Vector2& at, double within) const {
+    bool is = false;
+    for (int i = 0; i < 4; ++i) is = is || dot(wall(i), at) > wall_[i] - within;
+    return is;
   }
 
   /// Finds the line on which the half-spaces leave a the most above b: a linear program in x, y and the two

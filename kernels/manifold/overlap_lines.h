@@ -32,7 +32,8 @@ class OverlapLines {
 
   /// Finds a point of the overlap beside each of some pieces, at most LineMemory::kMost / 2: half-way from
   /// the middle of the piece, behind both triangles, to where the overlap ends on that line, but no further
-  /// than `most`. Result: a bit for each piece; 0 where its triangles face each other.
+  /// than `most`. Result: a bit for each piece; 0 where its triangles face each other, or the
+  /// line is not within both bodies.
   TANDEM_HD_SELDOM std::uint32_t go_inside(const std::uint32_t* piece, int count, double most,
                                            Vector3* inside) const;
 
@@ -50,6 +51,10 @@ class OverlapLines {
  private:
   /// Lines begin so far behind the surface from which they start.
   TANDEM_HD double behind(double length) const { return greater(bodies_.tolerance(), 1e-9 * length); }
+
+  TANDEM_HD bool leaves(int side, const Crossing& crossing, const Vector3& direction) const {
+    return dot(bodies_[side].triangle(crossing.triangle).normal, direction) > 0;
+  }
 
   const Team& team_;
   const BodyPair& bodies_;
@@ -105,7 +110,7 @@ TANDEM_HD_SELDOM std::uint32_t OverlapLines<Team>::go_inside(const std::uint32_t
     shared_.frame[i] = PatchFrame(middle, (1 / length) * sum);
     const double begin = behind(most);
     for (std::uint32_t side = 0; side < 2; ++side)
-      questions.ask(line + side, shared_.frame[i], static_cast<int>(side), 0, {}, begin, begin, most,
+      questions.ask(line + side, shared_.frame[i], static_cast<int>(side), 0, {}, begin, begin, INFINITY,
                     INFINITY, kGrazes);
   }
   team_.sync();
@@ -114,12 +119,16 @@ TANDEM_HD_SELDOM std::uint32_t OverlapLines<Team>::go_inside(const std::uint32_t
   for (int i = 0; i < count; ++i) {
     if (shared_.line[2 * i].side < 0) continue;
     double end = most;
+    bool within = true;
     for (int side = 0; side < 2; ++side) {
       const Crossing& crossing = shared_.line[2 * i + side].best;
+      // A line that runs in a flush face does not leave the body there, or comes back into it.
+      within = within && (!bodies_[side].shape->closed ||
+                          (crossing.found() && leaves(side, crossing, shared_.frame[i].n)));
       if (crossing.found()) end = lesser(crossing.height, end);
     }
     inside[i] = shared_.frame[i].at({}, end / 2);
-    found |= 1u << i;
+    found |= within ? 1u << i : 0u;
   }
   team_.sync();  // all have read the answers
   return found;

@@ -374,7 +374,7 @@ TANDEM_HD void ManifoldMaker<Team>::write_manifold(const ChoiceMemory& shared, P
   write(frame.n, manifold.normal);
   write(area, manifold.area_vector);
   write(frame.at(state_.closed && !touch ? state_.middle_of_area : state_.middle, height), manifold.centre);
-  manifold.depth = touch ? 0 : greater(state_.deepest.depth, shared.chosen[0].depth);
+  manifold.depth = touch ? 0 : shared.chosen[0].depth;
 }
 
 template <typename Team>

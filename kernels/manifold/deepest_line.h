@@ -41,7 +41,8 @@ struct OverlapLine {
   double depth = 0;
   std::uint32_t triangle[2] = {kNoIndex, kNoIndex};
   Vector2 at;
-  double height[2];  ///< of a, of b
+  double height[2];       ///< of a, of b
+  bool is_loose = false;  ///< the bodies reach these heights, at least
 
   TANDEM_HD bool found() const { return triangle[0] != kNoIndex && triangle[1] != kNoIndex; }
 };
@@ -53,7 +54,7 @@ struct SearchMemory {
   int seeds, from;  ///< how many, and which of them is on the deepest of their lines
   PatchFrame frame;
   LineMemory lines;
-  HalfSpace first[4 * kMostSeeds], learnt_now[2];
+  HalfSpace first[4 * kMostSeeds], learnt_now[4];
   HalfSpaces spaces;
   LineOfTwo proposed;
   OverlapLine best;
@@ -80,6 +81,13 @@ class DeepestLine {
   /// Returns whether one body ends within the other on the deepest line.
   TANDEM_HD bool goes_through();
 
+  /// Returns the depth of the best line; infinity if there is none.
+  TANDEM_HD double depth() const {
+    const double depth = shared_.best.found() ? shared_.best.depth : INFINITY;
+    team_.sync();  // all have read it
+    return depth;
+  }
+
   /// Finds the deepest of the lines through the seeds.
   TANDEM_HD void begin_with_seeds(const PatchFrame& frame);
 
@@ -95,7 +103,8 @@ class DeepestLine {
   TANDEM_HD void propose();
   TANDEM_HD bool lies_on_surface(int seed) const;
   TANDEM_HD void begin_from(int seed);
-  TANDEM_HD OverlapLine look_along_proposed(Crossing (&surface)[2]);
+  TANDEM_HD void ask_along(const Vector2& at, const double (&from)[2], const double (&limit)[2]);
+  TANDEM_HD void go_to_ends();
   TANDEM_HD bool step();
 
   const Team& team_;
@@ -255,72 +264,119 @@ TANDEM_HD void DeepestLine<Team>::begin_half_spaces(const Vector3& middle, doubl
   team_.sync();
 }
 
-/// Finds where a ends and b begins on the line that is proposed. surface: what the line meets; a body that it
-/// misses, because it runs along an edge, ends where the half-spaces end.
+/// Asks where a ends and b begins on a line. from: heights from which on they are looked for.
 template <typename Team>
-TANDEM_HD OverlapLine DeepestLine<Team>::look_along_proposed(Crossing (&surface)[2]) {
+TANDEM_HD void DeepestLine<Team>::ask_along(const Vector2& at, const double (&from)[2],
+                                            const double (&limit)[2]) {
   LineQuestions questions(bodies_, shared_.lines.line);
-  const LineOfTwo& p = shared_.proposed;
-  const double target = (p.height[0] + p.height[1]) / 2;
   for (std::uint32_t side = team_.rank(); side < 2; side += team_.size())
-    questions.ask(side, shared_.frame, static_cast<int>(side), side == 0 ? 1 : -1, p.at, target, -INFINITY,
-                  INFINITY, INFINITY, kGrazes);
-  team_.sync();
-  walk_lines(team_, questions, 2, shared_.lines.line);
-  OverlapLine line;
-  line.at = p.at;
-  const double within = kNearEnd * bodies_.reach();
-  const bool on_wall = shared_.spaces.on_wall(p.at, within);
-  for (int side = 0; side < 2; ++side) {
-    surface[side] = shared_.lines.line[side].best;
-    const bool found = surface[side].found();
-    line.height[side] = found ? surface[side].height : p.height[side];
-    line.triangle[side] = found ? surface[side].triangle
-                          : on_wall
-                              ? kNoIndex
-                              : shared_.spaces.nearest_triangle(side, p.at, p.height[side], within);
-  }
-  line.depth = line.height[0] - line.height[1];
-  team_.sync();  // all have read the answers
-  return line;
+    questions.ask(side, shared_.frame, static_cast<int>(side), side == 0 ? 1 : -1, at, from[side],
+                  side == 0 ? limit[0] : -INFINITY, side == 0 ? INFINITY : limit[1], INFINITY, kGrazes);
 }
 
-/// Looks at the line that is proposed. False if nothing came of it.
+/// Looks at the line that is proposed, and along straight lines from the point of the overlap to where a would
+/// end and b begin on it. As far as both stay within their bodies, all lines between them count. False if
+/// nothing came of it.
 template <typename Team>
 TANDEM_HD bool DeepestLine<Team>::step() {
   const PatchFrame& frame = shared_.frame;
-  Crossing surface[2];
-  const OverlapLine line = look_along_proposed(surface);
-  bool counts = line.depth > shared_.best.depth;
-  if (counts) {
-    Crossing blocked[2];
-    const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
-    lines.follow(shared_.seed[shared_.from],
-                 {frame.at(line.at, line.height[0]), frame.at(line.at, line.height[1])}, blocked);
-#ifdef PROBE
-  if (getenv("TRACE")) for (int side = 0; side < 2; ++side) printf("   side %d surface %d at %.9g of proposed %.9g, blocked by %d at %.9g of %.9g\n", side, surface[side].triangle, surface[side].height, shared_.proposed.height[side], blocked[side].triangle, blocked[side].height, norm(frame.at(line.at, line.height[side])-shared_.seed[shared_.from]));
-#endif
-    for (int side = 0; side < 2; ++side) {
-      if (!blocked[side].found()) continue;
-      surface[side] = blocked[side];
-      counts = false;
-    }
+  const LineOfTwo& p = shared_.proposed;
+  const Vector3& seed = shared_.seed[shared_.from];
+  const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
+  const double target = (p.height[0] + p.height[1]) / 2;
+  const Vector3 to[2] = {frame.at(p.at, p.height[0]), frame.at(p.at, p.height[1])};
+  team_.sync();
+  ask_along(p.at, {target, target}, {-INFINITY, INFINITY});
+  lines.ask_straight(2, seed, to);
+  team_.sync();
+  LineQuestion* const line = shared_.lines.line;
+  LineQuestions questions(bodies_, line);
+  walk_lines(team_, questions, 4, line);
+  const double within = kNearEnd * bodies_.reach();
+  double part = 1;
+  int first = -1;
+  for (int side = 0; side < 2; ++side) {
+    const Crossing& blocked = line[2 + side].best;
+    const double length = norm(to[side] - seed);
+    if (blocked.found() && blocked.height < part * length) part = blocked.height / length, first = side;
   }
-  counts = counts && line.found();
-  for (int side = static_cast<int>(team_.rank()); side < 2; side += static_cast<int>(team_.size()))
-    learn(side, surface[side], shared_.learnt_now[side]);
+#ifdef PROBE
+  if (getenv("TRACE")) for (int side = 0; side < 2; ++side) printf("   side %d along %d at %.9g proposed %.9g, blocked by %d at %.9g of %.9g\n", side, line[side].best.triangle, line[side].best.height, p.height[side], line[2+side].best.triangle, line[2+side].best.height, norm(to[side]-seed));
+#endif
+  OverlapLine next;
+  next.depth = part * p.depth();
+  const bool deeper = next.depth > shared_.best.depth;
+  if (deeper && first < 0) {
+    const bool on_wall = shared_.spaces.on_wall(p.at, within);
+    next.at = p.at;
+    for (int side = 0; side < 2; ++side) {
+      const Crossing& end = line[side].best;
+      const double sign = side == 0 ? 1 : -1;
+      // A body may go on beyond what the half-spaces say.
+      const bool found = end.found() && sign * (end.height - p.height[side]) > -within;
+      next.height[side] = found ? end.height : p.height[side];
+      next.triangle[side] = found     ? end.triangle
+                            : on_wall ? kNoIndex
+                                      : shared_.spaces.nearest_triangle(side, p.at, p.height[side], within);
+    }
+    next.depth = next.height[0] - next.height[1];
+  } else if (deeper) {
+    const Vector2 at = frame.flat(seed);
+    const double height = frame.height(seed);
+    next.at = at + part * (p.at - at);
+    for (int side = 0; side < 2; ++side) {
+      next.height[side] = height + part * (p.height[side] - height);
+      next.triangle[side] = side == first ? line[2 + side].best.triangle
+                                          : shared_.spaces.nearest_triangle(side, next.at, next.height[side], INFINITY);
+    }
+    next.is_loose = true;
+  }
+  const bool counts = deeper && next.found();
+  for (int i = static_cast<int>(team_.rank()); i < 4; i += static_cast<int>(team_.size())) {
+    const int side = i % 2;
+    if (i < 2)
+      learn(side, line[2 + side].best, shared_.learnt_now[i]);
+    else
+      learn(side, line[side].best, shared_.learnt_now[i]);
+  }
   team_.sync();
   if (team_.rank() == 0) {
     if (counts) {
-      shared_.best = line;
-      const double rounding = 16 * bodies_.tolerance();
-      for (int side = 0; side < 2; ++side)
-        shared_.spaces.drop_before(side, line.at, line.height[side], rounding);
+      shared_.best = next;
+      if (first < 0) {
+        const double rounding = 16 * bodies_.tolerance();
+        for (int side = 0; side < 2; ++side)
+          shared_.spaces.drop_before(side, next.at, next.height[side], rounding);
+      }
     }
-    add(shared_.learnt_now, 2);
+    add(shared_.learnt_now, 4);
   }
   team_.sync();
   return counts || shared_.learnt;
+}
+
+/// Follows the best line to where both bodies end, if that is not known yet.
+template <typename Team>
+TANDEM_HD void DeepestLine<Team>::go_to_ends() {
+  if (!shared_.best.is_loose) return;
+  const double(&height)[2] = shared_.best.height;
+  const double rounding = 16 * bodies_.tolerance();
+  team_.sync();
+  ask_along(shared_.best.at, {height[0], height[1]}, {height[0] - rounding, height[1] + rounding});
+  team_.sync();
+  LineQuestion* const line = shared_.lines.line;
+  LineQuestions questions(bodies_, line);
+  walk_lines(team_, questions, 2, line);
+  if (team_.rank() == 0) {
+    OverlapLine& best = shared_.best;
+    for (int side = 0; side < 2; ++side) {
+      const Crossing& end = line[side].best;
+      if (end.found()) best.height[side] = end.height, best.triangle[side] = end.triangle;
+    }
+    best.depth = best.height[0] - best.height[1];
+    best.is_loose = false;
+  }
+  team_.sync();
 }
 
 template <typename Team>
@@ -336,7 +392,7 @@ TANDEM_HD void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& m
   const int deepest_seed = shared_.from;  // all read it before it changes
   for (int i = 0; i < shared_.seeds; ++i) {
     const int seed = i == 0 ? deepest_seed : i <= deepest_seed ? i - 1 : i;
-    if (i > 0 && lies_on_surface(seed)) continue;
+    if (lies_on_surface(seed)) continue;
     begin_from(seed);
 #ifdef PROBE
     if (getenv("TRACE")) { const Vector2 q = shared_.frame.flat(shared_.seed[seed]); printf("  seed %d at %.9g %.9g %.9g, own planes:", seed, q.x, q.y, shared_.frame.height(shared_.seed[seed])); for (int z = 0; z < 4*shared_.seeds; ++z) printf(" (%d of %d: %.3g)", shared_.first[z].triangle, shared_.first[z].side, shared_.first[z].triangle == kNoIndex ? 0 : shared_.first[z].beyond(q, shared_.frame.height(shared_.seed[seed]))); printf("\n"); }
@@ -350,6 +406,7 @@ TANDEM_HD void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& m
       propose();
     }
   }
+  go_to_ends();
 }
 
 template <typename Team>

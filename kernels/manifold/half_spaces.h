@@ -37,7 +37,7 @@ class HalfSpaces {
   /// middle, along, half: the square's middle, the direction of two sides, half their length; far: heights
   /// are between -far and far.
   TANDEM_HD void begin(const Vector2& middle, const Vector2& along, double half, double far) {
-    count_ = 0;
+    count_ = next_ = 0;
     const double size = norm(along);
     along_ = size > 0 ? (1 / size) * along : Vector2{1, 0};
     for (int i = 0; i < 4; ++i) wall_[i] = dot(wall(i), middle) + half;
@@ -162,7 +162,7 @@ class HalfSpaces {
   Vector2 along_;
   double wall_[kWalls];
   int count_;
-  int next_ = 0;
+  int next_;
 };
 
 }  // namespace tandem::manifold

@@ -206,13 +206,48 @@ __global__ void __launch_bounds__(kFinders, 2) find_curves(const __grid_constant
       args.summaries[pair] = summary;
       if (summary.segments > 0) atomicAdd(&state.segments, Counter{summary.segments});
     }
+    if (!manifold::RegionFinder<AnyTeam>::may_join(summary)) return;
+    const PieceMemory memory = memory_of(args, pair);
+    manifold::RegionFinder<AnyTeam>(team, bodies, memory, summary, nullptr).begin();
+    if (team.rank() == 0) next[own] = atomicAdd(&state.several_curves, summary.curves);
+    team.sync();
+    const std::uint32_t first = next[own];
+    for (std::uint32_t c = team.rank(); c < summary.curves; c += team.size())
+      args.curves[first + c] = {pair, c};
+    team.sync();
   };
   share_out<kFinders>(groups.counts->many, state.next_many, groups.counts->few, state.next_few, of);
 }
 
+/// Tries to join each curve of pairs of several with its neighbours, by a warp each.
+__global__ void __launch_bounds__(kThreads, 4) try_to_join(const __grid_constant__ ManifoldArgs args) {
+  __shared__ WarpWalks walks[kWarps];
+  __shared__ Raw<BodyPair> shared_bodies[kWarps];
+  __shared__ Raw<PieceSummary> summaries[kWarps];
+  __shared__ Raw<manifold::RegionMemory> regions[kWarps];
+  __shared__ std::uint32_t taken[kWarps];
+  wait_for_kernel_before();
+  if (!has_query(args)) return;
+  constexpr std::uint32_t kNeighbours = manifold::RegionFinder<WarpTeam>::kNeighbours;
+  const std::uint32_t own = threadIdx.x / 32, count = args.state->several_curves * kNeighbours;
+  const WarpTeam team(&walks[own]);
+  take_rows(team, count, args.state->next_neighbour, taken[own], [&](std::uint32_t row) {
+    const PairCurve curve = args.curves[row / kNeighbours];
+    BodyPair& bodies = shared_bodies[own].get();
+    PieceSummary& summary = summaries[own].get();
+    if (team.rank() == 0) {
+      bodies = bodies_of(args, args.pairs.pairs[curve.pair]);
+      summary = args.summaries[curve.pair];
+    }
+    team.sync();
+    const PieceMemory pieces = memory_of(args, curve.pair);
+    manifold::RegionFinder<WarpTeam>(team, bodies, pieces, summary, &regions[own].get())
+        .try_to_join(curve.curve, static_cast<int>(row % kNeighbours));
+  });
+}
+
 /// Joins the curves of each pair that bound one region of the overlap, by a warp, and lists the regions.
 __global__ void __launch_bounds__(kThreads, 4) join_regions(const __grid_constant__ ManifoldArgs args) {
-  __shared__ WarpWalks walks[kWarps];
   __shared__ Raw<BodyPair> shared_bodies[kWarps];
   __shared__ Raw<PieceSummary> summaries[kWarps];
   __shared__ Raw<manifold::RegionMemory> regions[kWarps];
@@ -222,7 +257,7 @@ __global__ void __launch_bounds__(kThreads, 4) join_regions(const __grid_constan
   const GpuGroupCounts& counts = *args.groups.counts;
   ManifoldState& state = *args.state;
   const std::uint32_t own = threadIdx.x / 32;
-  const WarpTeam team(&walks[own]);
+  const WarpTeam team(nullptr);
   take_rows(team, counts.many + counts.few, state.next_joined, taken[own], [&](std::uint32_t row) {
     const std::uint32_t pair = row < counts.many ? args.groups.many[row] : args.groups.few[row - counts.many];
     const std::uint32_t count = args.of_pair[pair].pieces.pieces;
@@ -232,8 +267,9 @@ __global__ void __launch_bounds__(kThreads, 4) join_regions(const __grid_constan
     if (team.rank() == 0) bodies = bodies_of(args, args.pairs.pairs[pair]), summary = args.summaries[pair];
     team.sync();
     const PieceMemory pieces = memory_of(args, pair);
-    manifold::RegionFinder<WarpTeam> finder(team, bodies, pieces, summary, regions[own].get());
-    const std::uint32_t found = finder.find();
+    std::uint32_t found = summary.curves;
+    using Finder = manifold::RegionFinder<WarpTeam>;
+    if (Finder::may_join(summary)) found = Finder(team, bodies, pieces, summary, &regions[own].get()).join();
     if (team.rank() == 0) args.summaries[pair].curves = found;
     for (std::uint32_t region = team.rank(); region < found; region += team.size()) {
       const bool many = pieces.start[region + 1] - pieces.start[region] > most_of_warp(counts);
@@ -291,7 +327,11 @@ __global__ void __launch_bounds__(kThreads, 4) begin_patches(const __grid_consta
       }
       team.sync();
       if (place >= args.capacity.manifolds) return;
-      if (team.rank() == 0) args.begun[place].of = curve;
+      if (team.rank() == 0) {
+        args.begun[place].of = curve;
+        if (made.kind == manifold::PatchKind::deep)
+          args.next_of_pair[atomicAdd(&state.deep_patches, 1u)] = place;
+      }
       copy_state(team, made, args.begun[place].state);
     });
   };
@@ -304,56 +344,74 @@ __device__ std::uint32_t patches_begun(const ManifoldArgs& args) {
   return wanted < args.capacity.manifolds ? wanted : args.capacity.manifolds;
 }
 
-// Few patches are deep, and each takes much memory.
-constexpr std::uint32_t kDeepWarps = 2;
+// Each takes so much memory that no more of them have room in a block.
+constexpr std::uint32_t kDirectionWarps = 3;
 
-/// Begins the patches whose areas give no normal, by a warp each.
-__global__ void __launch_bounds__(32 * kDeepWarps, 4) begin_deep_patches(const __grid_constant__ ManifoldArgs args) {
-  __shared__ WarpWalks walks[kDeepWarps];
-  __shared__ MakerMemory memory[kDeepWarps];
-  __shared__ Raw<manifold::OutlineMemory> outline[kDeepWarps];
-  __shared__ Raw<manifold::SearchMemory> search[kDeepWarps];
-  __shared__ std::uint32_t taken[kDeepWarps];
+/// Measures the overlap of the patches whose areas give no normal along each direction, by a warp each.
+__global__ void __launch_bounds__(32 * kDirectionWarps, 4) measure_directions(const __grid_constant__ ManifoldArgs args) {
+  __shared__ WarpWalks walks[kDirectionWarps];
+  __shared__ MakerMemory memory[kDirectionWarps];
+  __shared__ Raw<manifold::NormalMemory> normals[kDirectionWarps];
+  __shared__ Raw<manifold::SearchMemory> searches[kDirectionWarps];
+  __shared__ std::uint32_t taken[kDirectionWarps];
   wait_for_kernel_before();
   if (!has_query(args)) return;
+  constexpr std::uint32_t kDirections = 2 * manifold::kMostTried;
+  ManifoldState& state = *args.state;
   const std::uint32_t own = threadIdx.x / 32;
   const WarpTeam team(&walks[own]);
-  take_rows(team, patches_begun(args), args.state->next_deep, taken[own], [&](std::uint32_t row) {
-    BegunPatch& begun = args.begun[row];
-    if (begun.state.kind != manifold::PatchKind::deep) return;
-    with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState& state) {
-      maker.begin_deep(begun.of.curve, outline[own].get(), search[own].get());
-      copy_state(team, state, begun.state);
+  take_rows(team, state.deep_patches * kDirections, state.next_direction, taken[own], [&](std::uint32_t row) {
+    BegunPatch& begun = args.begun[args.next_of_pair[row / kDirections]];
+    const int direction = static_cast<int>(row % kDirections);
+    with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState&) {
+      const double depth = maker.depth_along_one(begun.of.curve, direction, normals[own].get(),
+                                                 searches[own].get());
+      if (team.rank() == 0) begun.depth[direction] = depth;
     });
   });
 }
 
-/// Measures the depths of each patch: by a block, or, where there are enough for all warps, by a warp.
-__global__ void __launch_bounds__(kThreads, 4) measure_depths(const __grid_constant__ ManifoldArgs args) {
-  __shared__ BlockScratch<kThreads> scratch;
-  __shared__ WarpWalks walks[kWarps];
+/// Begins the patches whose areas give no normal, by a warp each.
+__global__ void __launch_bounds__(kThreads, 4) begin_deep_patches(const __grid_constant__ ManifoldArgs args) {
   __shared__ MakerMemory memory[kWarps];
-  __shared__ Raw<manifold::SearchMemory> depths[kWarps];
+  __shared__ Raw<manifold::OutlineMemory> outline[kWarps];
   __shared__ std::uint32_t taken[kWarps];
   wait_for_kernel_before();
   if (!has_query(args)) return;
-  const auto measure = [&](const auto& team, std::uint32_t own) {
-    take_rows(team, patches_begun(args), args.state->next_measured, taken[own], [&](std::uint32_t row) {
-      BegunPatch& begun = args.begun[row];
-      if (begun.state.kind != manifold::PatchKind::overlap) return;
-      with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState& state) {
-        copy_state(team, begun.state, state);
-        maker.measure_depths(begun.of.curve, depths[own].get());
-        copy_state(team, state, begun.state);
-      });
+  ManifoldState& state = *args.state;
+  const std::uint32_t own = threadIdx.x / 32;
+  const WarpTeam team(nullptr);
+  take_rows(team, state.deep_patches, state.next_deep, taken[own], [&](std::uint32_t row) {
+    BegunPatch& begun = args.begun[args.next_of_pair[row]];
+    with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState& made) {
+      manifold::OutlineMemory& shared = outline[own].get();
+      for (std::uint32_t i = team.rank(); i < 2 * manifold::kMostTried; i += team.size())
+        shared.depth[i] = begun.depth[i];
+      maker.end_deep(begun.of.curve, maker.begin_deep(begun.of.curve, shared.normal), shared);
+      copy_state(team, made, begun.state);
     });
-  };
-  constexpr std::uint32_t kEnough = 12;  // for each processor
-  const std::uint32_t warp = threadIdx.x / 32;
-  if (patches_begun(args) < kEnough * args.limits.processors)
-    measure(LargeTeam(&scratch, walks), 0);
-  else
-    measure(WarpTeam(&walks[warp]), warp);
+  });
+}
+
+/// Measures the depths of each patch, by a warp.
+__global__ void __launch_bounds__(kThreads, 4) measure_depths(const __grid_constant__ ManifoldArgs args) {
+  __shared__ WarpWalks walks[kWarps];
+  __shared__ MakerMemory memory[kWarps];
+  __shared__ Raw<manifold::SearchMemory> searches[kWarps];
+  __shared__ std::uint32_t taken[kWarps];
+  wait_for_kernel_before();
+  if (!has_query(args)) return;
+  const std::uint32_t own = threadIdx.x / 32;
+  const WarpTeam team(&walks[own]);
+  take_rows(team, patches_begun(args), args.state->next_measured, taken[own], [&](std::uint32_t row) {
+    BegunPatch& begun = args.begun[row];
+    if (begun.state.kind != manifold::PatchKind::overlap) return;
+    with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState& state) {
+      copy_state(team, begun.state, state);
+      maker.measure_depths(begun.of.curve, searches[own].get());
+      copy_state(team, state, begun.state);
+    });
+  });
 }
 
 /// Finishes each patch, by a warp.
@@ -445,7 +503,9 @@ __global__ void __launch_bounds__(kThreads) remember(const __grid_constant__ Man
   if (atomicAdd(&state.finished_blocks, 1u) + 1 != gridDim.x) return;
   state.next_many = state.next_few = state.next_patch = state.tiles_taken = 0;
   state.curves_of_many = state.curves_of_few = state.next_curve_of_many = state.next_curve_of_few = 0;
-  state.next_joined = state.next_deep = state.next_measured = state.next_finished = 0;
+  state.several_curves = state.next_neighbour = state.next_joined = 0;
+  state.deep_patches = state.next_direction = state.next_deep = 0;
+  state.next_measured = state.next_finished = 0;
   state.needed_points = state.segments = state.ambiguous_touches = state.open_curves = 0;
   state.too_many_contacts = state.finished_blocks = 0;
   if (!args.match_previous || state.has_last != 0)
@@ -479,9 +539,11 @@ cudaError_t make_patches(const ManifoldArgs& args, cudaStream_t stream) {
   };
   cudaError_t error = launch_after(grid(3, kThreads, 0), make_pieces, args);
   if (error == cudaSuccess) error = launch_after(grid(2, kFinders, kNearBytes), find_curves, args);
+  if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), try_to_join, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), join_regions, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), begin_patches, args);
-  if (error == cudaSuccess) error = launch_after(grid(4, 32 * kDeepWarps, 0), begin_deep_patches, args);
+  if (error == cudaSuccess) error = launch_after(grid(4, 32 * kDirectionWarps, 0), measure_directions, args);
+  if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), begin_deep_patches, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), measure_depths, args);
   return error == cudaSuccess ? launch_after(grid(6, kThreads, 0), finish_patches, args) : error;
 }

@@ -37,6 +37,7 @@ struct PairPatches {
 struct BegunPatch {
   PairCurve of;
   manifold::PatchState state;
+  double depth[2 * manifold::kMostTried];  ///< of a deep one along each direction
 };
 
 /// The place of the points of a pair of bodies.
@@ -57,7 +58,8 @@ struct ManifoldState {
   // Cleared by each call.
   std::uint32_t next_many, next_few, next_patch, tiles_taken;
   std::uint32_t curves_of_many, curves_of_few, next_curve_of_many, next_curve_of_few;
-  std::uint32_t next_joined, next_deep, next_measured, next_finished;
+  std::uint32_t several_curves, next_neighbour, next_joined, deep_patches, next_direction, next_deep;
+  std::uint32_t next_measured, next_finished;
   Counter needed_points, segments, ambiguous_touches, open_curves;
   std::uint32_t too_many_contacts, finished_blocks;
 
@@ -86,10 +88,11 @@ struct ManifoldArgs {
   manifold::PieceMemory pieces;
   BegunPatch* begun;
   manifold::Patch* patches;
-  std::uint32_t* next_of_pair;  ///< of each patch: the next of the same pair
+  std::uint32_t* next_of_pair;  ///< at first the deep patches; then of each patch the next of the same pair
   PairPatches* of_pair;
   manifold::PieceSummary* summaries;  ///< of each pair with contacts
-  PairCurve* curves;                  ///< those of many pieces from the beginning on, others from the end
+  PairCurve* curves;                  ///< at first those of pairs of several curves; then regions: those of many
+                                      ///< pieces from the beginning on, others from the end
   Counter* tile_sums;
 
   Manifold* manifolds;

@@ -34,12 +34,19 @@ class ManifoldMaker {
                           const PieceSummary& summary, PatchState& state)
       : team_(team), bodies_(bodies), memory_(memory), summary_(summary), state_(state) {}
 
-  /// Finds normal and rim. A patch of kind `deep` has neither yet: begin_deep() is to be called.
+  /// Finds normal and rim. A patch of kind `deep` has neither yet: make_deep() is to be called.
   TANDEM_HD void begin(std::uint32_t region, OutlineMemory& shared);
 
   /// Finds the direction in which the overlap of a deep patch is shallowest, and the rim. The patch is
   /// ambiguous if the bodies do not overlap along any direction.
-  TANDEM_HD_SELDOM void begin_deep(std::uint32_t region, OutlineMemory& shared, SearchMemory& depths);
+  TANDEM_HD_SELDOM void make_deep(std::uint32_t region, OutlineMemory& shared, SearchMemory& depths);
+
+  /// These are the steps of make_deep(), for teams that measure all directions at once. Before the last,
+  /// shared.depth has the depth along each.
+  TANDEM_HD_SELDOM double depth_along_one(std::uint32_t region, int direction, NormalMemory& shared,
+                                          SearchMemory& depths);
+  TANDEM_HD_SELDOM DeepPatch begin_deep(std::uint32_t region, NormalMemory& shared);
+  TANDEM_HD_SELDOM void end_deep(std::uint32_t region, const DeepPatch& patch, OutlineMemory& shared);
 
   /// Finds depths.
   TANDEM_HD void measure_depths(std::uint32_t region, SearchMemory& shared);
@@ -145,45 +152,70 @@ TANDEM_HD void ManifoldMaker<Team>::begin(std::uint32_t region, OutlineMemory& s
 }
 
 template <typename Team>
-TANDEM_HD_SELDOM void ManifoldMaker<Team>::begin_deep(std::uint32_t region, OutlineMemory& shared,
-                                                      SearchMemory& depths) {
+TANDEM_HD_SELDOM DeepPatch ManifoldMaker<Team>::begin_deep(std::uint32_t region, NormalMemory& shared) {
   team_.sync();
-  NormalFinder<Team> normal_finder(team_, bodies_, memory_, summary_, region, shared.normal);
-  const CurveMeasure measure = normal_finder.measure();
-  const int lines = normal_finder.gather_for_deep(measure);
-  const double reach = normal_finder.reach_from(measure.middle);
+  NormalFinder<Team> normal_finder(team_, bodies_, memory_, summary_, region, shared);
+  DeepPatch patch;
+  patch.measure = normal_finder.measure();
+  patch.directions = 2 * normal_finder.gather_for_deep(patch.measure);
+  patch.reach = normal_finder.reach_from(patch.measure.middle);
+  return patch;
+}
+
+template <typename Team>
+TANDEM_HD_SELDOM double ManifoldMaker<Team>::depth_along_one(std::uint32_t region, int direction,
+                                                             NormalMemory& shared, SearchMemory& depths) {
+  const DeepPatch patch = begin_deep(region, shared);
+  if (direction >= patch.directions) return INFINITY;
   DeepestLine<Team> search(team_, bodies_, memory_, summary_, region, depths);
-  search.find_seeds(measure.middle, kMostSeeds);
-  // The directions along which the known lines are shallowest come first; of others little more is looked at.
-  const auto direction = [&](int i) {
-    return i % 2 == 0 ? shared.normal.tried[i / 2] : -shared.normal.tried[i / 2];
-  };
-  for (int i = 0; i < 2 * lines; ++i) {
-    search.begin_with_seeds(PatchFrame(summary_.origin, direction(i)));
-    if (team_.rank() == 0) shared.known_depth[i] = depths.best.found() ? depths.best.depth : INFINITY;
-    team_.sync();
-  }
-  PatchNormal normal;
+  search.find_seeds(patch.measure.middle, kMostSeeds);
+  search.find(PatchFrame(summary_.origin, shared.along(direction)), patch.measure.middle, patch.reach,
+              INFINITY);
+  return search.depth();
+}
+
+template <typename Team>
+TANDEM_HD_SELDOM void ManifoldMaker<Team>::end_deep(std::uint32_t region, const DeepPatch& patch,
+                                                    OutlineMemory& shared) {
   double least = INFINITY;
-  std::uint32_t tried = 0;
-  for (int k = 0; k < 2 * lines; ++k) {
-    int next = -1;
-    for (int i = 0; i < 2 * lines; ++i) {
-      if ((tried >> i & 1u) == 0 && (next < 0 || shared.known_depth[i] < shared.known_depth[next])) next = i;
-    }
-    tried |= 1u << next;
-    const double enough = least * (1 - kShallower);
-    search.find(PatchFrame(summary_.origin, direction(next)), measure.middle, reach, enough);
-    const OverlapLine& best = depths.best;
-    if (best.found() && best.depth < enough) {
-      least = best.depth;
-      normal.n = direction(next), normal.kind = PatchKind::overlap;
-    }
-    team_.sync();  // all have read the best
+  for (int i = 0; i < patch.directions; ++i) least = lesser(shared.depth[i], least);
+  PatchNormal normal;
+  for (int i = 0; i < patch.directions && normal.kind != PatchKind::overlap; ++i) {
+    if (shared.depth[i] == INFINITY || !(shared.depth[i] <= least * (1 + kShallower))) continue;
+    normal.n = shared.normal.along(i), normal.kind = PatchKind::overlap;
   }
-  find_rim(region, measure, normal, shared);
+  find_rim(region, patch.measure, normal, shared);
   if (team_.rank() == 0) state_.deep = true;
   team_.sync();
+}
+
+template <typename Team>
+TANDEM_HD_SELDOM void ManifoldMaker<Team>::make_deep(std::uint32_t region, OutlineMemory& shared,
+                                                     SearchMemory& depths) {
+  const DeepPatch patch = begin_deep(region, shared.normal);
+  DeepestLine<Team> search(team_, bodies_, memory_, summary_, region, depths);
+  search.find_seeds(patch.measure.middle, kMostSeeds);
+  // The directions along which the first lines are shallowest come first; of others little more is looked at.
+  double known[2 * kMostTried];
+  for (int i = 0; i < patch.directions; ++i) {
+    search.begin_with_seeds(PatchFrame(summary_.origin, shared.normal.along(i)));
+    known[i] = search.depth();
+  }
+  double enough = INFINITY;
+  for (int k = 0; k < patch.directions; ++k) {
+    int next = -1;
+    for (int i = 0; i < patch.directions; ++i) {
+      if (known[i] >= 0 && (next < 0 || known[i] < known[next])) next = i;
+    }
+    known[next] = -1;
+    search.find(PatchFrame(summary_.origin, shared.normal.along(next)), patch.measure.middle, patch.reach,
+                enough);
+    const double depth = search.depth();
+    if (team_.rank() == 0) shared.depth[next] = depth < enough ? depth : INFINITY;
+    enough = lesser(enough, depth * (1 + 2 * kShallower));
+  }
+  team_.sync();
+  end_deep(region, patch, shared);
 }
 
 /// Sounds the rim, and finds the deepest line. What is no deeper than rounding is a touch.
@@ -203,7 +235,7 @@ TANDEM_HD void ManifoldMaker<Team>::measure_depths(std::uint32_t region, SearchM
   for (std::uint32_t i = team_.rank(); i < count; i += team_.size())
     state_.sounding[i / 2].surface[i % 2] = shared.lines.line[i].best;
   DeepestLine<Team> search(team_, bodies_, memory_, summary_, region, shared);
-  search.find_seeds(state_.centre, state_.candidates <= kFewCandidates ? 2 : 4);
+  search.find_seeds(state_.centre, state_.deep ? kMostSeeds : state_.candidates <= kFewCandidates ? 2 : 4);
   search.find(state_.frame, state_.centre, state_.reach, INFINITY);
   const bool through = state_.deep && search.goes_through();
   if (team_.rank() == 0) {

@@ -18,6 +18,7 @@ struct SharedNumbers {
   }
   __device__ static std::uint32_t concurrent_load(std::uint32_t& at) { return atomicOr(&at, 0u); }
   __device__ static void concurrent_store(std::uint32_t& at, std::uint32_t value) { atomicExch(&at, value); }
+  __device__ static void set_bits(std::uint32_t& at, std::uint32_t bits) { atomicOr(&at, bits); }
   __device__ static std::uint32_t add(std::uint32_t& at, std::uint32_t value) {
     return atomicAdd(&at, value);
   }

@@ -37,16 +37,12 @@ class OverlapLines {
   TANDEM_HD_SELDOM std::uint32_t go_inside(const std::uint32_t* piece, int count, double most,
                                            Vector3* inside) const;
 
-  /// Follows a straight line within body 0 and one within body 1, from one point to two others. surface[k]:
-  /// where the line meets the surface of body k first, if it does so before it is there.
-  TANDEM_HD_SELDOM void follow(const Vector3& from, const Vector3 (&to)[2], Crossing (&surface)[2]) const;
+  /// Asks where a straight line within a, and one within b, from one point to two others meet the surface of
+  /// the body, if they do so before they are there. first: the first of the two questions.
+  TANDEM_HD void ask_straight(std::uint32_t first, const Vector3& from, const Vector3 (&to)[2]) const;
 
   /// Returns whether a straight line stays within both bodies.
-  TANDEM_HD bool is_free(const Vector3& from, const Vector3& to) const {
-    Crossing surface[2];
-    follow(from, {to, to}, surface);
-    return !surface[0].found() && !surface[1].found();
-  }
+  TANDEM_HD_SELDOM bool is_free(const Vector3& from, const Vector3& to) const;
 
  private:
   /// Lines begin so far behind the surface from which they start.
@@ -135,25 +131,32 @@ TANDEM_HD_SELDOM std::uint32_t OverlapLines<Team>::go_inside(const std::uint32_t
 }
 
 template <typename Team>
-TANDEM_HD_SELDOM void OverlapLines<Team>::follow(const Vector3& from, const Vector3 (&to)[2],
-                                                 Crossing (&surface)[2]) const {
+TANDEM_HD void OverlapLines<Team>::ask_straight(std::uint32_t first, const Vector3& from,
+                                                const Vector3 (&to)[2]) const {
   LineQuestions questions(bodies_, shared_.line);
-  team_.sync();
-  for (int side = static_cast<int>(team_.rank()); side < 2; side += static_cast<int>(team_.size())) {
-    const auto line = static_cast<std::uint32_t>(side);
+  for (std::uint32_t side = team_.rank(); side < 2; side += team_.size()) {
     const double length = norm(to[side] - from), begin = behind(length);
-    shared_.line[line].frame = &shared_.frame[side];
-    shared_.line[line].side = -1;
-    shared_.line[line].best = {};
+    LineQuestion& line = shared_.line[first + side];
+    line.frame = &shared_.frame[side];
+    line.side = -1;
+    line.best = {};
     if (!(length > 2 * begin)) continue;
     shared_.frame[side] = PatchFrame(from, (1 / length) * (to[side] - from));
-    questions.ask(line, shared_.frame[side], side, 0, {}, begin, begin, (1 - kNearEnd) * length, INFINITY,
-                  kGrazes);
+    questions.ask(first + side, shared_.frame[side], static_cast<int>(side), 0, {}, begin, begin,
+                  (1 - kNearEnd) * length, INFINITY, kGrazes);
   }
+}
+
+template <typename Team>
+TANDEM_HD_SELDOM bool OverlapLines<Team>::is_free(const Vector3& from, const Vector3& to) const {
   team_.sync();
+  ask_straight(0, from, {to, to});
+  team_.sync();
+  LineQuestions questions(bodies_, shared_.line);
   walk_lines(team_, questions, 2, shared_.line);
-  for (int side = 0; side < 2; ++side) surface[side] = shared_.line[side].best;
+  const bool is = !shared_.line[0].best.found() && !shared_.line[1].best.found();
   team_.sync();  // all have read the answers
+  return is;
 }
 
 }  // namespace tandem::manifold

@@ -32,7 +32,7 @@ struct alignas(64) PairPatches {
     if (!make_room(count, memory)) return false;
     manifold::CurveFinder<Team> finder(team, bodies, memory);
     manifold::PieceSummary summary = finder.find(contacts, count, outline_.next);
-    summary.curves = manifold::RegionFinder<Team>(team, bodies, memory, summary, regions_).find();
+    summary.curves = manifold::RegionFinder<Team>(team, bodies, memory, summary, &regions_).find();
     segments += summary.segments;
     manifold::ManifoldMaker<Team> maker(team, bodies, memory, summary, state_);
     bool enough_memory = true;
@@ -42,7 +42,7 @@ struct alignas(64) PairPatches {
     };
     for (std::uint32_t region = 0; region < summary.curves; ++region) {
       maker.begin(region, outline_);
-      if (state_.kind == manifold::PatchKind::deep) maker.begin_deep(region, outline_, depths_);
+      if (state_.kind == manifold::PatchKind::deep) maker.make_deep(region, outline_, depths_);
       ambiguous_touches += state_.kind == manifold::PatchKind::ambiguous;
       maker.measure_depths(region, depths_);
       maker.finish(region, most_points, choice_, new_patch);

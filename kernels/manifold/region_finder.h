@@ -12,29 +12,41 @@ namespace tandem::manifold {
 struct RegionMemory {
   LineMemory lines;
   std::uint32_t curves;
+  bool any;
 };
 
 template <typename Team>
 class RegionFinder {
  public:
+  /// shared: what all of the team see; begin() needs none.
   TANDEM_HD RegionFinder(const Team& team, const BodyPair& bodies, const PieceMemory& memory,
-                         const PieceSummary& summary, RegionMemory& shared)
+                         const PieceSummary& summary, RegionMemory* shared)
       : team_(team), bodies_(bodies), memory_(memory), summary_(summary), shared_(shared) {}
 
-  /// Returns how many regions there are; afterwards `order` and `start` have them instead of curves, and the
-  /// first piece of a region of several curves is marked as joined.
-  TANDEM_HD std::uint32_t find();
-
- private:
   /// Each curve is compared with so many of the others, the nearest.
   static constexpr int kNeighbours = 7;
-  /// Among more curves none are joined.
-  static constexpr std::uint32_t kMostCurves = 256;
+
+  /// Returns whether there are curves to be joined; not if there are too many.
+  TANDEM_HD static bool may_join(const PieceSummary& summary) {
+    return summary.curves > 1 && summary.curves < 256;  // a partner's number takes a byte
+  }
+
+  /// Returns how many regions there are; afterwards `order` and `start` have them instead of curves, and the
+  /// first piece of a region whose curves cancel each other is marked as joined.
+  TANDEM_HD std::uint32_t find();
+
+  /// These are the steps of find() where curves may be joined. Teams may try all neighbours at once.
+  TANDEM_HD void begin();
+  TANDEM_HD void try_to_join(std::uint32_t curve, int k);
+  TANDEM_HD std::uint32_t join();
+
+ private:
 
   /// Area vectors agree if their sum is longer than this part of their lengths' sum.
   static constexpr double kAgree = 0.5;
 
-  // Words of the table: the curve that each is joined to, a piece of each, where each goes.
+  // Words of the table: the curve that each is joined to, a piece of each, where each goes, and a byte for
+  // each neighbour that it is joined with: the neighbour's number and 1.
   TANDEM_HD std::uint32_t& joined_to(std::uint32_t curve) const { return memory_.table[curve]; }
   TANDEM_HD std::uint32_t& piece_of(std::uint32_t curve) const {
     return memory_.table[summary_.curves + curve];
@@ -42,10 +54,14 @@ class RegionFinder {
   TANDEM_HD std::uint32_t& place_of(std::uint32_t curve) const {
     return memory_.table[2 * summary_.curves + curve];
   }
+  TANDEM_HD std::uint32_t& partners_of(std::uint32_t curve, int word) const {
+    return memory_.table[3 * summary_.curves + 2 * curve + static_cast<std::uint32_t>(word)];
+  }
   TANDEM_HD std::uint32_t first_of(std::uint32_t curve) const {
     while (joined_to(curve) != curve) curve = joined_to(curve);
     return curve;
   }
+  TANDEM_HD std::uint32_t neighbour(std::uint32_t of, int k) const;
   TANDEM_HD bool is_joined(std::uint32_t i, std::uint32_t j);
   TANDEM_HD bool line_stays_within(std::uint32_t from, std::uint32_t to);
   TANDEM_HD bool areas_agree(std::uint32_t first) const;
@@ -55,13 +71,13 @@ class RegionFinder {
   const BodyPair& bodies_;
   const PieceMemory& memory_;
   const PieceSummary& summary_;
-  RegionMemory& shared_;
+  RegionMemory* shared_;
 };
 
 /// Returns whether a straight line within both bodies leads from beside a piece to beside another one.
 template <typename Team>
 TANDEM_HD bool RegionFinder<Team>::line_stays_within(std::uint32_t from, std::uint32_t to) {
-  const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
+  const OverlapLines<Team> lines(team_, bodies_, memory_, shared_->lines);
   const double apart = norm(memory_.pieces[to].middle() - memory_.pieces[from].middle());
   const std::uint32_t pieces[2] = {from, to};
   Vector3 inside[2];
@@ -71,7 +87,7 @@ TANDEM_HD bool RegionFinder<Team>::line_stays_within(std::uint32_t from, std::ui
 /// Tries lines from three pieces of the first curve, each to the nearest one of the second.
 template <typename Team>
 TANDEM_HD bool RegionFinder<Team>::is_joined(std::uint32_t i, std::uint32_t j) {
-  const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
+  const OverlapLines<Team> lines(team_, bodies_, memory_, shared_->lines);
   const auto extreme = [&](std::uint32_t curve, std::uint32_t from, double sign) {
     const Vector3 middle = memory_.pieces[from].middle();
     return lines.extreme_piece(memory_.start[curve], memory_.start[curve + 1], &middle, 1, sign);
@@ -118,7 +134,7 @@ TANDEM_HD std::uint32_t RegionFinder<Team>::sort_by_region() {
         place += memory_.start[c + 1] - memory_.start[c];
       }
     }
-    shared_.curves = regions;
+    shared_->curves = regions;
   }
   team_.sync();
   for (std::uint32_t first = 0; first < curves; ++first) {
@@ -146,54 +162,92 @@ TANDEM_HD std::uint32_t RegionFinder<Team>::sort_by_region() {
     memory_.start[regions] = summary_.pieces;
   }
   team_.sync();
-  return shared_.curves;
+  return shared_->curves;
+}
+
+template <typename Team>
+TANDEM_HD void RegionFinder<Team>::begin() {
+  for (std::uint32_t c = 0; c < summary_.curves; ++c) {
+    LeastPiece own;
+    for (std::uint32_t i = memory_.start[c] + team_.rank(); i < memory_.start[c + 1]; i += team_.size())
+      own.take(memory_.pieces[memory_.order[i]].symmetric_key(), memory_.order[i]);
+    const std::uint64_t key = team_.least(own.key);
+    const std::uint32_t piece = team_.least(own.key == key ? own.piece : kNoIndex);
+    if (team_.rank() != 0) continue;
+    piece_of(c) = piece;
+    partners_of(c, 0) = partners_of(c, 1) = 0;
+  }
+  team_.sync();
+}
+
+/// Returns the curve whose first piece is nearest to that of another one but for k; of equally near ones that
+/// of the least triangles comes first. kNoIndex: there are not so many.
+template <typename Team>
+TANDEM_HD std::uint32_t RegionFinder<Team>::neighbour(std::uint32_t of, int k) const {
+  const Vector3 from = memory_.pieces[piece_of(of)].middle();
+  double last_distance = -1;
+  std::uint64_t last_key = 0;
+  for (;; --k) {
+    double least = INFINITY;
+    LeastPiece own;  // the piece is the curve here
+    for (std::uint32_t j = team_.rank(); j < summary_.curves; j += team_.size()) {
+      const Vector3 apart = memory_.pieces[piece_of(j)].middle() - from;
+      const double distance = dot(apart, apart);
+      const std::uint64_t key = memory_.pieces[piece_of(j)].symmetric_key();
+      const bool later = distance > last_distance || (distance == last_distance && key > last_key);
+      if (j == of || !later || distance > least) continue;
+      if (distance < least) least = distance, own = {};
+      own.take(key, j);
+    }
+    const double least_of_all = team_.least(least);
+    if (least != least_of_all) own = {};
+    const std::uint64_t key = team_.least(own.key);
+    if (key == ~std::uint64_t{0}) return kNoIndex;
+    const std::uint32_t nearest = team_.least(own.key == key ? own.piece : kNoIndex);
+    if (k == 0) return nearest;
+    last_distance = least_of_all, last_key = key;
+  }
+}
+
+template <typename Team>
+TANDEM_HD void RegionFinder<Team>::try_to_join(std::uint32_t curve, int k) {
+  const std::uint32_t other = neighbour(curve, k);
+  if (other == kNoIndex) return;
+  const auto key = [&](std::uint32_t c) { return memory_.pieces[piece_of(c)].symmetric_key(); };
+  // Where all are each other's neighbours, the other way is tried as well.
+  if (summary_.curves <= kNeighbours + 1 && key(other) < key(curve)) return;
+  if (!is_joined(curve, other) || team_.rank() != 0) return;
+  team_.set_bits(partners_of(curve, k / 4), (other + 1) << (8 * (k % 4)));
+}
+
+template <typename Team>
+TANDEM_HD std::uint32_t RegionFinder<Team>::join() {
+  const std::uint32_t curves = summary_.curves;
+  if (team_.rank() == 0) {
+    shared_->any = false;
+    for (std::uint32_t c = 0; c < curves; ++c) joined_to(c) = c;
+    for (std::uint32_t c = 0; c < curves; ++c) {
+      for (int k = 0; k < kNeighbours; ++k) {
+        const std::uint32_t partner = partners_of(c, k / 4) >> (8 * (k % 4)) & 0xFFu;
+        if (partner == 0) continue;
+        const std::uint32_t p = first_of(c), q = first_of(partner - 1);
+        joined_to(greater(p, q)) = lesser(p, q);
+        shared_->any = true;
+      }
+    }
+  }
+  team_.sync();
+  return shared_->any ? sort_by_region() : curves;
 }
 
 template <typename Team>
 TANDEM_HD std::uint32_t RegionFinder<Team>::find() {
-  const std::uint32_t curves = summary_.curves;
-  if (curves <= 1 || curves > kMostCurves) return curves;
-  for (std::uint32_t c = team_.rank(); c < curves; c += team_.size()) {
-    joined_to(c) = c;
-    LeastPiece least;
-    for (std::uint32_t i = memory_.start[c]; i < memory_.start[c + 1]; ++i)
-      least.take(memory_.pieces[memory_.order[i]].symmetric_key(), memory_.order[i]);
-    piece_of(c) = least.piece;
+  if (!may_join(summary_)) return summary_.curves;
+  begin();
+  for (std::uint32_t c = 0; c < summary_.curves; ++c) {
+    for (int k = 0; k < kNeighbours; ++k) try_to_join(c, k);
   }
-  team_.sync();
-  bool any = false;
-  for (std::uint32_t i = 0; i < curves; ++i) {
-    // The nearest others, as their first pieces lie; of equally near ones that of the least triangles.
-    double last_distance = -1;
-    std::uint64_t last_key = 0;
-    for (int k = 0; k < kNeighbours; ++k) {
-      const Vector3 from = memory_.pieces[piece_of(i)].middle();
-      double least = INFINITY;
-      LeastPiece own;  // the piece is the curve here
-      for (std::uint32_t j = team_.rank(); j < curves; j += team_.size()) {
-        const Vector3 apart = memory_.pieces[piece_of(j)].middle() - from;
-        const double distance = dot(apart, apart);
-        const std::uint64_t key = memory_.pieces[piece_of(j)].symmetric_key();
-        const bool later = distance > last_distance || (distance == last_distance && key > last_key);
-        if (j == i || !later || distance > least) continue;
-        if (distance < least) least = distance, own = {};
-        own.take(key, j);
-      }
-      const double least_of_all = team_.least(least);
-      if (least != least_of_all) own = {};
-      const std::uint64_t key = team_.least(own.key);
-      if (key == ~std::uint64_t{0}) break;
-      const std::uint32_t nearest = team_.least(own.key == key ? own.piece : kNoIndex);
-      last_distance = least_of_all, last_key = key;
-      const std::uint32_t p = first_of(i), q = first_of(nearest);
-      const bool other_way = curves <= kNeighbours + 1 && key < memory_.pieces[piece_of(i)].symmetric_key();
-      if (p == q || other_way || !is_joined(i, nearest)) continue;  // the other way is tried as well
-      if (team_.rank() == 0) joined_to(greater(p, q)) = lesser(p, q);
-      team_.sync();
-      any = true;
-    }
-  }
-  return any ? sort_by_region() : curves;
+  return join();
 }
 
 }  // namespace tandem::manifold

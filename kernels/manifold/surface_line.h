@@ -329,9 +329,7 @@ template <typename Team>
 TANDEM_HD void walk_lines(const Team& team, LineQuestions& questions, std::uint32_t count,
                           const LineQuestion* shared) {
   if constexpr (HasLanes<Team>) return questions.answer(team.lanes(), count);
-  constexpr int kLinesWidth = 8;
-  team.sync();
-  team.template for_each_group<kLinesWidth>(count, [&](const auto& group, std::uint32_t i, bool given) {
+  const auto of = [&](const auto& group, std::uint32_t i, bool given) {
     const bool asked = given && shared[i].side >= 0;
     if (asked && group.rank() == 0) questions.prepare(i);
     walk_surface(group, questions, i, asked);
@@ -339,7 +337,13 @@ TANDEM_HD void walk_lines(const Team& team, LineQuestions& questions, std::uint3
     group.sync();
     if (further && group.rank() == 0) questions.look_further(i);
     walk_surface(group, questions, i, further);
-  });
+  };
+  constexpr int kFewWidth = 16, kManyWidth = 8;
+  team.sync();
+  if (count <= 2)
+    team.template for_each_group<kFewWidth>(count, of);
+  else
+    team.template for_each_group<kManyWidth>(count, of);
   team.sync();
 }
 

@@ -58,6 +58,7 @@ struct OneThread {
   /// Loads a number that others may be writing.
   TANDEM_HD static std::uint32_t concurrent_load(std::uint32_t& at) { return at; }
   TANDEM_HD static void concurrent_store(std::uint32_t& at, std::uint32_t value) { at = value; }
+  TANDEM_HD static void set_bits(std::uint32_t& at, std::uint32_t bits) { at |= bits; }
   TANDEM_HD static std::uint32_t add(std::uint32_t& at, std::uint32_t value) {
     const std::uint32_t before = at;
     at += value;

@@ -1,8 +1,4 @@
 #pragma once
-#ifdef PROBE
-#include <cstdio>
-#include <cstdlib>
-#endif
 #include "kernels/manifold/half_spaces.h"
 #include "kernels/manifold/overlap_lines.h"
 
@@ -24,12 +20,12 @@
 namespace tandem::manifold {
 
 /// Lines go through so many points of an overlap at most.
-inline constexpr int kMostSeeds = 8;
+inline constexpr int kMostSeeds = 4;
 
 /// A line is the deepest if none is deeper by more than this part.
 inline constexpr double kDeepEnough = 1e-6;
 
-/// So many lines are looked at, beside those through the first points.
+/// So many lines are looked at at most, beside those through the first points.
 inline constexpr int kMostSteps = 16;
 
 /// A line that is looked at moves this part of the way to a point of the overlap, so that it does not run
@@ -47,18 +43,24 @@ struct OverlapLine {
   TANDEM_HD bool found() const { return triangle[0] != kNoIndex && triangle[1] != kNoIndex; }
 };
 
+/// Points of the overlap, and pieces beside which they are.
+struct Seeds {
+  Vector3 at[kMostSeeds];
+  std::uint32_t beside[kMostSeeds];
+  int count;
+};
+
 /// The memory that a team shares while it looks for the deepest line.
 struct SearchMemory {
-  Vector3 seed[kMostSeeds];  ///< points of the overlap
-  std::uint32_t beside[kMostSeeds];
-  int seeds, from;  ///< how many, and which of them is on the deepest of their lines
+  Seeds seeds;
+  int from;  ///< the seed that is on the deepest of their lines
   PatchFrame frame;
   LineMemory lines;
-  HalfSpace first[4 * kMostSeeds], learnt_now[4];
+  HalfSpace learnt[4];
   HalfSpaces spaces;
   LineOfTwo proposed;
   OverlapLine best;
-  bool learnt;
+  int steps;
 };
 
 /// Looks for the deepest line of the overlap that the pieces order[begin] to order[end - 1] bound.
@@ -75,8 +77,9 @@ class DeepestLine {
         end_(memory.start[region + 1]),
         shared_(shared) {}
 
-  /// Finds points of the overlap beside some pieces, `wanted` at most; find() needs them.
-  TANDEM_HD void find_seeds(const Vector3& middle, int wanted);
+  /// Finds points of the overlap beside some pieces, `wanted` at most; find() needs them. middle, reach: a
+  /// ball around the pieces.
+  TANDEM_HD void find_seeds(const Vector3& middle, double reach, int wanted);
 
   /// Returns whether one body ends within the other on the deepest line.
   TANDEM_HD bool goes_through();
@@ -89,7 +92,7 @@ class DeepestLine {
   }
 
   /// Finds the deepest of the lines through the seeds.
-  TANDEM_HD void begin_with_seeds(const PatchFrame& frame);
+  TANDEM_HD void begin_with_seeds(const PatchFrame& frame, double reach);
 
   /// Finds shared.best; none where the bodies do not overlap along the normal. middle, reach: a ball around
   /// the pieces. If there are several regions, the line goes through it. The search ends as soon as a line is
@@ -99,13 +102,11 @@ class DeepestLine {
  private:
   TANDEM_HD void begin_half_spaces(const Vector3& middle, double reach);
   TANDEM_HD void learn(int side, const Crossing& surface, HalfSpace& out) const;
-  TANDEM_HD void add(const HalfSpace* candidates, int count);
-  TANDEM_HD void propose();
-  TANDEM_HD bool lies_on_surface(int seed) const;
-  TANDEM_HD void begin_from(int seed);
-  TANDEM_HD void ask_along(const Vector2& at, const double (&from)[2], const double (&limit)[2]);
+  TANDEM_HD void propose(int seed);
+  TANDEM_HD void ask_along(const Vector2& at, const double (&from)[2], const double (&limit)[2],
+                           double expected);
   TANDEM_HD void go_to_ends();
-  TANDEM_HD bool step();
+  TANDEM_HD bool step(int seed);
 
   const Team& team_;
   const BodyPair& bodies_;
@@ -116,7 +117,7 @@ class DeepestLine {
 };
 
 template <typename Team>
-TANDEM_HD void DeepestLine<Team>::find_seeds(const Vector3& middle, int wanted) {
+TANDEM_HD void DeepestLine<Team>::find_seeds(const Vector3& middle, double reach, int wanted) {
   const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
   Vector3 apart_from[kMostSeeds] = {middle}, inside[kMostSeeds];
   std::uint32_t beside[kMostSeeds] = {};
@@ -125,38 +126,38 @@ TANDEM_HD void DeepestLine<Team>::find_seeds(const Vector3& middle, int wanted) 
     apart_from[i] = memory_.pieces[beside[i]].middle();
   }
   const double most = greater(bodies_.a.shape->diagonal, bodies_.b.shape->diagonal);
-  const std::uint32_t found = lines.go_inside(beside, wanted, most, inside);
+  const std::uint32_t found = lines.go_inside(beside, wanted, most, reach, inside);
   if (team_.rank() == 0) {
     int count = 0;
     for (int i = 0; i < wanted; ++i) {
       if ((found >> i & 1u) == 0) continue;
-      shared_.seed[count] = inside[i], shared_.beside[count] = beside[i];
+      shared_.seeds.at[count] = inside[i], shared_.seeds.beside[count] = beside[i];
       ++count;
     }
-    shared_.seeds = count;
+    shared_.seeds.count = count;
   }
   team_.sync();
 }
 
 template <typename Team>
-TANDEM_HD void DeepestLine<Team>::begin_with_seeds(const PatchFrame& frame) {
+TANDEM_HD void DeepestLine<Team>::begin_with_seeds(const PatchFrame& frame, double reach) {
   LineQuestion* const line = shared_.lines.line;
   LineQuestions questions(bodies_, line);
-  const auto count = 2 * static_cast<std::uint32_t>(shared_.seeds);
+  const auto count = 2 * static_cast<std::uint32_t>(shared_.seeds.count);
   if (team_.rank() == 0) shared_.frame = frame;
   team_.sync();
   for (std::uint32_t i = team_.rank(); i < count; i += team_.size()) {
-    const Vector3& seed = shared_.seed[i / 2];
+    const Vector3& seed = shared_.seeds.at[i / 2];
     const int side = static_cast<int>(i % 2);
     const double from = frame.height(seed);
     questions.ask(i, shared_.frame, side, side == 0 ? 1 : -1, frame.flat(seed), from,
-                  side == 0 ? from : -INFINITY, side == 0 ? INFINITY : from, INFINITY, kGrazes);
+                  side == 0 ? from : -INFINITY, side == 0 ? INFINITY : from, reach, kGrazes);
   }
   team_.sync();
   if (count > 0) walk_lines(team_, questions, count, line);
   if (team_.rank() == 0) {
     shared_.best = {};
-    for (int i = 0; i < shared_.seeds; ++i) {
+    for (int i = 0; i < shared_.seeds.count; ++i) {
       const Crossing &top = line[2 * i].best, &bottom = line[2 * i + 1].best;
       if (!top.found() || !bottom.found() || !(top.height - bottom.height > shared_.best.depth)) continue;
       shared_.best = {top.height - bottom.height,
@@ -172,7 +173,7 @@ TANDEM_HD void DeepestLine<Team>::begin_with_seeds(const PatchFrame& frame) {
 /// Finds the half-space of a triangle that a line met; none if there is no triangle.
 template <typename Team>
 TANDEM_HD void DeepestLine<Team>::learn(int side, const Crossing& surface, HalfSpace& out) const {
-  out.side = side;
+  out.side = static_cast<std::uint16_t>(side);
   out.triangle = surface.triangle;
   if (!surface.found()) return;
   const WorldTriangle triangle = bodies_[side].triangle(surface.triangle);
@@ -182,61 +183,16 @@ TANDEM_HD void DeepestLine<Team>::learn(int side, const Crossing& surface, HalfS
   out.offset = dot(n, triangle.corner[0] - frame.origin);
 }
 
-/// Adds half-spaces that are not known yet and have the point of the overlap behind them. One of the team
-/// does so.
 template <typename Team>
-TANDEM_HD void DeepestLine<Team>::add(const HalfSpace* candidates, int count) {
-  const Vector3& seed = shared_.seed[shared_.from];
-  const Vector2 at = shared_.frame.flat(seed);
-  const double height = shared_.frame.height(seed);
-  shared_.learnt = false;
-  for (int i = 0; i < count; ++i) {
-    const HalfSpace& space = candidates[i];
-    if (space.triangle == kNoIndex || !(space.beyond(at, height) < 0)) continue;
-    if (shared_.spaces.knows(space.side, space.triangle)) continue;
-    shared_.spaces.add(space);
-    shared_.learnt = true;
-  }
-}
-
-/// Returns whether a point is in the plane of a known triangle. Where faces of both bodies lie in each other,
-/// it may be no point within them.
-template <typename Team>
-TANDEM_HD bool DeepestLine<Team>::lies_on_surface(int seed) const {
-  const Vector2 at = shared_.frame.flat(shared_.seed[seed]);
-  const double height = shared_.frame.height(shared_.seed[seed]), tolerance = 16 * bodies_.tolerance();
-  bool lies = false;
-  for (int i = 0; i < 4 * shared_.seeds; ++i) {
-    const HalfSpace& space = shared_.first[i];
-    lies = lies || (space.triangle != kNoIndex && std::fabs(space.beyond(at, height)) <= tolerance);
-  }
-  return lies;
-}
-
-/// Goes on from another point of the overlap.
-template <typename Team>
-TANDEM_HD void DeepestLine<Team>::begin_from(int seed) {
-  team_.sync();  // all have read what the last step said
-  if (team_.rank() == 0) {
-    shared_.from = seed;
-    const Vector2 at = shared_.frame.flat(shared_.seed[seed]);
-    const double height = shared_.frame.height(shared_.seed[seed]);
-    for (int side = 0; side < 2; ++side) shared_.spaces.drop_before(side, at, height, 0);
-    add(shared_.first, 4 * shared_.seeds);
-  }
-}
-
-template <typename Team>
-TANDEM_HD void DeepestLine<Team>::propose() {
-  if (team_.rank() == 0) {
-    LineOfTwo& p = shared_.proposed;
-    p = shared_.spaces.deepest(8 * bodies_.tolerance());
-    const Vector3& seed = shared_.seed[shared_.from];
-    const double height = shared_.frame.height(seed);
-    p.found = p.found && p.depth() > shared_.best.depth * (1 + kDeepEnough);
-    p.at = p.at + kOffEdge * (shared_.frame.flat(seed) - p.at);
-    for (double& h : p.height) h += kOffEdge * (height - h);
-  }
+TANDEM_HD void DeepestLine<Team>::propose(int seed) {
+  LineOfTwo p = shared_.spaces.deepest(team_, 8 * bodies_.tolerance());
+  p.found = p.found && p.depth() > shared_.best.depth * (1 + kDeepEnough);
+  const Vector3& from = shared_.seeds.at[seed];
+  const double height = shared_.frame.height(from);
+  p.at = p.at + kOffEdge * (shared_.frame.flat(from) - p.at);
+  for (double& h : p.height) h += kOffEdge * (height - h);
+  team_.sync();  // all have read what was proposed before
+  if (team_.rank() == 0) shared_.proposed = p;
   team_.sync();
 }
 
@@ -252,41 +208,49 @@ TANDEM_HD void DeepestLine<Team>::begin_half_spaces(const Vector3& middle, doubl
   if (team_.rank() == 0) {
     const Vector2 flat = frame.flat(middle);
     const double half = one_region_ ? far : reach;
-    shared_.spaces.begin(flat, frame.flat(shared_.seed[shared_.from]) - flat, half,
+    shared_.steps = 0;
+    shared_.spaces.begin(flat, frame.flat(shared_.seeds.at[shared_.from]) - flat, half,
                          std::fabs(frame.height(middle)) + far);
   }
-  const int count = 4 * shared_.seeds;
-  for (int i = static_cast<int>(team_.rank()); i < count; i += static_cast<int>(team_.size())) {
+  static_assert(HalfSpaces::kFirst == 4 * kMostSeeds);
+  const int count = 4 * shared_.seeds.count;
+  for (int i = static_cast<int>(team_.rank()); i < HalfSpaces::kMost; i += static_cast<int>(team_.size())) {
+    HalfSpace& space = shared_.spaces.space[i];
+    if (i >= count) {
+      space.triangle = kNoIndex;
+      continue;
+    }
     const int side = i % 2, seed = i / 4;
-    const Crossing of_piece = {0, memory_.pieces[shared_.beside[seed]].triangle[side]};
-    learn(side, i % 4 < 2 ? shared_.lines.line[2 * seed + side].best : of_piece, shared_.first[i]);
+    const Crossing of_piece = {0, memory_.pieces[shared_.seeds.beside[seed]].triangle[side]};
+    learn(side, i % 4 < 2 ? shared_.lines.line[2 * seed + side].best : of_piece, space);
   }
   team_.sync();
 }
 
-/// Asks where a ends and b begins on a line. from: heights from which on they are looked for.
+/// Asks where a ends and b begins on a line. from: heights from which on they are looked for; expected: how
+/// far away they are, mostly.
 template <typename Team>
 TANDEM_HD void DeepestLine<Team>::ask_along(const Vector2& at, const double (&from)[2],
-                                            const double (&limit)[2]) {
+                                            const double (&limit)[2], double expected) {
   LineQuestions questions(bodies_, shared_.lines.line);
   for (std::uint32_t side = team_.rank(); side < 2; side += team_.size())
     questions.ask(side, shared_.frame, static_cast<int>(side), side == 0 ? 1 : -1, at, from[side],
-                  side == 0 ? limit[0] : -INFINITY, side == 0 ? INFINITY : limit[1], INFINITY, kGrazes);
+                  side == 0 ? limit[0] : -INFINITY, side == 0 ? INFINITY : limit[1], expected, kGrazes);
 }
 
 /// Looks at the line that is proposed, and along straight lines from the point of the overlap to where a would
 /// end and b begin on it. As far as both stay within their bodies, all lines between them count. False if
 /// nothing came of it.
 template <typename Team>
-TANDEM_HD bool DeepestLine<Team>::step() {
+TANDEM_HD bool DeepestLine<Team>::step(int from) {
   const PatchFrame& frame = shared_.frame;
   const LineOfTwo& p = shared_.proposed;
-  const Vector3& seed = shared_.seed[shared_.from];
+  const Vector3& seed = shared_.seeds.at[from];
   const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
   const double target = (p.height[0] + p.height[1]) / 2;
   const Vector3 to[2] = {frame.at(p.at, p.height[0]), frame.at(p.at, p.height[1])};
   team_.sync();
-  ask_along(p.at, {target, target}, {-INFINITY, INFINITY});
+  ask_along(p.at, {target, target}, {-INFINITY, INFINITY}, p.depth());
   lines.ask_straight(2, seed, to);
   team_.sync();
   LineQuestion* const line = shared_.lines.line;
@@ -300,9 +264,6 @@ TANDEM_HD bool DeepestLine<Team>::step() {
     const double length = norm(to[side] - seed);
     if (blocked.found() && blocked.height < part * length) part = blocked.height / length, first = side;
   }
-#ifdef PROBE
-  if (getenv("TRACE")) for (int side = 0; side < 2; ++side) printf("   side %d along %d at %.9g proposed %.9g, blocked by %d at %.9g of %.9g\n", side, line[side].best.triangle, line[side].best.height, p.height[side], line[2+side].best.triangle, line[2+side].best.height, norm(to[side]-seed));
-#endif
   OverlapLine next;
   next.depth = part * p.depth();
   const bool deeper = next.depth > shared_.best.depth;
@@ -334,25 +295,36 @@ TANDEM_HD bool DeepestLine<Team>::step() {
   const bool counts = deeper && next.found();
   for (int i = static_cast<int>(team_.rank()); i < 4; i += static_cast<int>(team_.size())) {
     const int side = i % 2;
-    if (i < 2)
-      learn(side, line[2 + side].best, shared_.learnt_now[i]);
-    else
-      learn(side, line[side].best, shared_.learnt_now[i]);
+    learn(side, i < 2 ? line[2 + side].best : line[side].best, shared_.learnt[i]);
+  }
+  if (counts && first < 0) {
+    const double rounding = 16 * bodies_.tolerance();
+    for (int side = 0; side < 2; ++side)
+      shared_.spaces.drop_before(team_, side, next.at, next.height[side], rounding);
+  }
+  team_.sync();
+  const Vector2 at = frame.flat(seed);
+  const double height = frame.height(seed);
+  unsigned is_new = 0;
+  for (int i = 0; i < 4; ++i) {
+    const HalfSpace& space = shared_.learnt[i];
+    if (space.triangle == kNoIndex || !(space.beyond(at, height) < 0)) continue;
+    is_new |= shared_.spaces.knows(team_, space) ? 0 : 1u << i;
+  }
+  team_.sync();
+  for (int i = static_cast<int>(team_.rank()); i < 4; i += static_cast<int>(team_.size())) {
+    if ((is_new >> i & 1u) == 0) continue;
+    HalfSpace& place = shared_.spaces.space[HalfSpaces::kFirst + (4 * shared_.steps + i) % HalfSpaces::kLearnt];
+    place = shared_.learnt[i];
+    place.counts = true;
   }
   team_.sync();
   if (team_.rank() == 0) {
-    if (counts) {
-      shared_.best = next;
-      if (first < 0) {
-        const double rounding = 16 * bodies_.tolerance();
-        for (int side = 0; side < 2; ++side)
-          shared_.spaces.drop_before(side, next.at, next.height[side], rounding);
-      }
-    }
-    add(shared_.learnt_now, 4);
+    if (counts) shared_.best = next;
+    ++shared_.steps;
   }
   team_.sync();
-  return counts || shared_.learnt;
+  return counts || is_new != 0;
 }
 
 /// Follows the best line to where both bodies end, if that is not known yet.
@@ -362,7 +334,8 @@ TANDEM_HD void DeepestLine<Team>::go_to_ends() {
   const double(&height)[2] = shared_.best.height;
   const double rounding = 16 * bodies_.tolerance();
   team_.sync();
-  ask_along(shared_.best.at, {height[0], height[1]}, {height[0] - rounding, height[1] + rounding});
+  ask_along(shared_.best.at, {height[0], height[1]}, {height[0] - rounding, height[1] + rounding},
+            shared_.best.depth);
   team_.sync();
   LineQuestion* const line = shared_.lines.line;
   LineQuestions questions(bodies_, line);
@@ -382,29 +355,21 @@ TANDEM_HD void DeepestLine<Team>::go_to_ends() {
 template <typename Team>
 TANDEM_HD void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& middle, double reach,
                                        double enough) {
-  begin_with_seeds(frame);
+  begin_with_seeds(frame, reach);
   const OverlapLine& best = shared_.best;
   if (!best.found() || best.depth >= enough) return;
   begin_half_spaces(middle, reach);
-#ifdef PROBE
-  if (getenv("TRACE")) printf(" find along %.4f %.4f %.4f pieces %d reach %.3g one %d\n", frame.n.x, frame.n.y, frame.n.z, end_-begin_, reach, one_region_);
-#endif
-  const int deepest_seed = shared_.from;  // all read it before it changes
-  for (int i = 0; i < shared_.seeds; ++i) {
-    const int seed = i == 0 ? deepest_seed : i <= deepest_seed ? i - 1 : i;
-    if (lies_on_surface(seed)) continue;
-    begin_from(seed);
-#ifdef PROBE
-    if (getenv("TRACE")) { const Vector2 q = shared_.frame.flat(shared_.seed[seed]); printf("  seed %d at %.9g %.9g %.9g, own planes:", seed, q.x, q.y, shared_.frame.height(shared_.seed[seed])); for (int z = 0; z < 4*shared_.seeds; ++z) printf(" (%d of %d: %.3g)", shared_.first[z].triangle, shared_.first[z].side, shared_.first[z].triangle == kNoIndex ? 0 : shared_.first[z].beyond(q, shared_.frame.height(shared_.seed[seed]))); printf("\n"); }
-#endif
-    propose();
-    for (int k = 0; k < kMostSteps && shared_.proposed.found && best.depth < enough; ++k) {
-#ifdef PROBE
-    if (getenv("TRACE")) printf("  seed %d step %d found %d proposed %.6g at %.6g %.6g heights %.6g %.6g best %.6g spaces %d\n", i, k, shared_.proposed.found, shared_.proposed.depth(), shared_.proposed.at.x, shared_.proposed.at.y, shared_.proposed.height[0], shared_.proposed.height[1], best.depth, shared_.spaces.count_);
-#endif
-      if (!step()) break;
-      propose();
-    }
+  const int deepest = shared_.from;
+  for (int i = 0; i < shared_.seeds.count; ++i) {
+    const int seed = i == 0 ? deepest : i <= deepest ? i - 1 : i;
+    const Vector2 at = shared_.frame.flat(shared_.seeds.at[seed]);
+    const double height = shared_.frame.height(shared_.seeds.at[seed]);
+    // Where faces of both bodies lie in each other, it may be no point within them.
+    if (shared_.spaces.in_plane(at, height, 16 * bodies_.tolerance())) continue;
+    shared_.spaces.look_from(team_, at, height);
+    propose(seed);
+    while (shared_.proposed.found && shared_.steps < kMostSteps && best.depth < enough && step(seed))
+      propose(seed);
   }
   go_to_ends();
 }

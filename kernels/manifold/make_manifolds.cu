@@ -344,16 +344,38 @@ __device__ std::uint32_t patches_begun(const ManifoldArgs& args) {
   return wanted < args.capacity.manifolds ? wanted : args.capacity.manifolds;
 }
 
-// Each takes so much memory that no more of them have room in a block.
-constexpr std::uint32_t kDirectionWarps = 3;
+/// What is known of a deep patch lies where its manifold comes to lie.
+__device__ manifold::DeepPatch& deep_patch(const ManifoldArgs& args, std::uint32_t place) {
+  static_assert(sizeof(manifold::DeepPatch) <= sizeof(Patch) && alignof(manifold::DeepPatch) <= alignof(Patch));
+  return *reinterpret_cast<manifold::DeepPatch*>(&args.patches[place]);
+}
 
-/// Measures the overlap of the patches whose areas give no normal along each direction, by a warp each.
-__global__ void __launch_bounds__(32 * kDirectionWarps, 4) measure_directions(const __grid_constant__ ManifoldArgs args) {
-  __shared__ WarpWalks walks[kDirectionWarps];
-  __shared__ MakerMemory memory[kDirectionWarps];
-  __shared__ Raw<manifold::NormalMemory> normals[kDirectionWarps];
-  __shared__ Raw<manifold::SearchMemory> searches[kDirectionWarps];
-  __shared__ std::uint32_t taken[kDirectionWarps];
+/// Finds the directions of the patches whose areas give no normal, by a block each.
+__global__ void __launch_bounds__(kThreads, 4) begin_deep_patches(const __grid_constant__ ManifoldArgs args) {
+  __shared__ BlockScratch<kThreads> scratch;
+  __shared__ WarpWalks walks[kWarps];
+  __shared__ MakerMemory memory;
+  __shared__ Raw<manifold::NormalMemory> normals;
+  __shared__ Raw<manifold::SearchMemory> search;
+  __shared__ std::uint32_t taken;
+  wait_for_kernel_before();
+  if (!has_query(args)) return;
+  const LargeTeam team(&scratch, walks);
+  take_rows(team, args.state->deep_patches, args.state->next_deep, taken, [&](std::uint32_t row) {
+    const std::uint32_t place = args.next_of_pair[row];
+    const PairCurve of = args.begun[place].of;
+    with_maker(args, team, memory, of, [&](auto& maker, PatchState&) {
+      maker.begin_deep(of.curve, normals.get(), search.get(), deep_patch(args, place));
+    });
+  });
+}
+
+/// Measures the overlap of these patches along each direction, by a warp each.
+__global__ void __launch_bounds__(kThreads, 4) measure_directions(const __grid_constant__ ManifoldArgs args) {
+  __shared__ WarpWalks walks[kWarps];
+  __shared__ MakerMemory memory[kWarps];
+  __shared__ Raw<manifold::SearchMemory> searches[kWarps];
+  __shared__ std::uint32_t taken[kWarps];
   wait_for_kernel_before();
   if (!has_query(args)) return;
   constexpr std::uint32_t kDirections = 2 * manifold::kMostTried;
@@ -361,33 +383,32 @@ __global__ void __launch_bounds__(32 * kDirectionWarps, 4) measure_directions(co
   const std::uint32_t own = threadIdx.x / 32;
   const WarpTeam team(&walks[own]);
   take_rows(team, state.deep_patches * kDirections, state.next_direction, taken[own], [&](std::uint32_t row) {
-    BegunPatch& begun = args.begun[args.next_of_pair[row / kDirections]];
+    const std::uint32_t place = args.next_of_pair[row / kDirections];
     const int direction = static_cast<int>(row % kDirections);
-    with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState&) {
-      const double depth = maker.depth_along_one(begun.of.curve, direction, normals[own].get(),
-                                                 searches[own].get());
-      if (team.rank() == 0) begun.depth[direction] = depth;
+    manifold::DeepPatch& patch = deep_patch(args, place);
+    if (direction >= patch.directions) return;
+    const PairCurve of = args.begun[place].of;
+    with_maker(args, team, memory[own], of, [&](auto& maker, PatchState&) {
+      const double depth = maker.depth_along(of.curve, patch, direction, searches[own].get(), INFINITY);
+      if (team.rank() == 0) patch.depth[direction] = depth;
     });
   });
 }
 
-/// Begins the patches whose areas give no normal, by a warp each.
-__global__ void __launch_bounds__(kThreads, 4) begin_deep_patches(const __grid_constant__ ManifoldArgs args) {
-  __shared__ MakerMemory memory[kWarps];
-  __shared__ Raw<manifold::OutlineMemory> outline[kWarps];
-  __shared__ std::uint32_t taken[kWarps];
+/// Finds the rims of these patches, by a block each.
+__global__ void __launch_bounds__(kThreads, 4) end_deep_patches(const __grid_constant__ ManifoldArgs args) {
+  __shared__ BlockScratch<kThreads> scratch;
+  __shared__ MakerMemory memory;
+  __shared__ Raw<manifold::OutlineMemory> outline;
+  __shared__ std::uint32_t taken;
   wait_for_kernel_before();
   if (!has_query(args)) return;
-  ManifoldState& state = *args.state;
-  const std::uint32_t own = threadIdx.x / 32;
-  const WarpTeam team(nullptr);
-  take_rows(team, state.deep_patches, state.next_deep, taken[own], [&](std::uint32_t row) {
-    BegunPatch& begun = args.begun[args.next_of_pair[row]];
-    with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState& made) {
-      manifold::OutlineMemory& shared = outline[own].get();
-      for (std::uint32_t i = team.rank(); i < 2 * manifold::kMostTried; i += team.size())
-        shared.depth[i] = begun.depth[i];
-      maker.end_deep(begun.of.curve, maker.begin_deep(begun.of.curve, shared.normal), shared);
+  const LargeTeam team(&scratch, nullptr);
+  take_rows(team, args.state->deep_patches, args.state->next_ended, taken, [&](std::uint32_t row) {
+    const std::uint32_t place = args.next_of_pair[row];
+    BegunPatch& begun = args.begun[place];
+    with_maker(args, team, memory, begun.of, [&](auto& maker, PatchState& made) {
+      maker.end_deep(begun.of.curve, deep_patch(args, place), outline.get());
       copy_state(team, made, begun.state);
     });
   });
@@ -504,7 +525,7 @@ __global__ void __launch_bounds__(kThreads) remember(const __grid_constant__ Man
   state.next_many = state.next_few = state.next_patch = state.tiles_taken = 0;
   state.curves_of_many = state.curves_of_few = state.next_curve_of_many = state.next_curve_of_few = 0;
   state.several_curves = state.next_neighbour = state.next_joined = 0;
-  state.deep_patches = state.next_direction = state.next_deep = 0;
+  state.deep_patches = state.next_deep = state.next_direction = state.next_ended = 0;
   state.next_measured = state.next_finished = 0;
   state.needed_points = state.segments = state.ambiguous_touches = state.open_curves = 0;
   state.too_many_contacts = state.finished_blocks = 0;
@@ -542,8 +563,9 @@ cudaError_t make_patches(const ManifoldArgs& args, cudaStream_t stream) {
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), try_to_join, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), join_regions, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), begin_patches, args);
-  if (error == cudaSuccess) error = launch_after(grid(4, 32 * kDirectionWarps, 0), measure_directions, args);
-  if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), begin_deep_patches, args);
+  if (error == cudaSuccess) error = launch_after(grid(1, kThreads, 0), begin_deep_patches, args);
+  if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), measure_directions, args);
+  if (error == cudaSuccess) error = launch_after(grid(1, kThreads, 0), end_deep_patches, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), measure_depths, args);
   return error == cudaSuccess ? launch_after(grid(6, kThreads, 0), finish_patches, args) : error;
 }

@@ -37,7 +37,6 @@ struct PairPatches {
 struct BegunPatch {
   PairCurve of;
   manifold::PatchState state;
-  double depth[2 * manifold::kMostTried];  ///< of a deep one along each direction
 };
 
 /// The place of the points of a pair of bodies.
@@ -58,7 +57,8 @@ struct ManifoldState {
   // Cleared by each call.
   std::uint32_t next_many, next_few, next_patch, tiles_taken;
   std::uint32_t curves_of_many, curves_of_few, next_curve_of_many, next_curve_of_few;
-  std::uint32_t several_curves, next_neighbour, next_joined, deep_patches, next_direction, next_deep;
+  std::uint32_t several_curves, next_neighbour, next_joined, deep_patches, next_deep, next_direction,
+      next_ended;
   std::uint32_t next_measured, next_finished;
   Counter needed_points, segments, ambiguous_touches, open_curves;
   std::uint32_t too_many_contacts, finished_blocks;
@@ -87,7 +87,7 @@ struct ManifoldArgs {
   GpuManifoldReport* host_report;  ///< in CPU memory
   manifold::PieceMemory pieces;
   BegunPatch* begun;
-  manifold::Patch* patches;
+  manifold::Patch* patches;  ///< at first the memory of deep ones
   std::uint32_t* next_of_pair;  ///< at first the deep patches; then of each patch the next of the same pair
   PairPatches* of_pair;
   manifold::PieceSummary* summaries;  ///< of each pair with contacts

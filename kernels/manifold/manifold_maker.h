@@ -41,11 +41,12 @@ class ManifoldMaker {
   /// ambiguous if the bodies do not overlap along any direction.
   TANDEM_HD_SELDOM void make_deep(std::uint32_t region, OutlineMemory& shared, SearchMemory& depths);
 
-  /// These are the steps of make_deep(), for teams that measure all directions at once. Before the last,
-  /// shared.depth has the depth along each.
-  TANDEM_HD_SELDOM double depth_along_one(std::uint32_t region, int direction, NormalMemory& shared,
-                                          SearchMemory& depths);
-  TANDEM_HD_SELDOM DeepPatch begin_deep(std::uint32_t region, NormalMemory& shared);
+  /// These are the steps of make_deep(), for teams that measure all directions at once. In between, `patch`
+  /// gets the depth along each. The search ends as soon as that is `enough`.
+  TANDEM_HD_SELDOM void begin_deep(std::uint32_t region, NormalMemory& shared, SearchMemory& depths,
+                                   DeepPatch& patch);
+  TANDEM_HD_SELDOM double depth_along(std::uint32_t region, const DeepPatch& patch, int direction,
+                                      SearchMemory& depths, double enough) const;
   TANDEM_HD_SELDOM void end_deep(std::uint32_t region, const DeepPatch& patch, OutlineMemory& shared);
 
   /// Finds depths.
@@ -152,25 +153,32 @@ TANDEM_HD void ManifoldMaker<Team>::begin(std::uint32_t region, OutlineMemory& s
 }
 
 template <typename Team>
-TANDEM_HD_SELDOM DeepPatch ManifoldMaker<Team>::begin_deep(std::uint32_t region, NormalMemory& shared) {
+TANDEM_HD_SELDOM void ManifoldMaker<Team>::begin_deep(std::uint32_t region, NormalMemory& shared,
+                                                      SearchMemory& depths, DeepPatch& patch) {
   team_.sync();
   NormalFinder<Team> normal_finder(team_, bodies_, memory_, summary_, region, shared);
-  DeepPatch patch;
-  patch.measure = normal_finder.measure();
-  patch.directions = 2 * normal_finder.gather_for_deep(patch.measure);
-  patch.reach = normal_finder.reach_from(patch.measure.middle);
-  return patch;
+  const CurveMeasure measure = normal_finder.measure();
+  const int lines = normal_finder.gather_for_deep(measure);
+  const double reach = normal_finder.reach_from(measure.middle);
+  DeepestLine<Team>(team_, bodies_, memory_, summary_, region, depths).find_seeds(measure.middle, reach, kMostSeeds);
+  if (team_.rank() == 0) {
+    patch.measure = measure, patch.reach = reach, patch.directions = 2 * lines;
+    for (int i = 0; i < lines; ++i) patch.tried[i] = shared.tried[i];
+    for (double& depth : patch.depth) depth = INFINITY;
+    patch.seeds = depths.seeds;
+  }
+  team_.sync();
 }
 
 template <typename Team>
-TANDEM_HD_SELDOM double ManifoldMaker<Team>::depth_along_one(std::uint32_t region, int direction,
-                                                             NormalMemory& shared, SearchMemory& depths) {
-  const DeepPatch patch = begin_deep(region, shared);
-  if (direction >= patch.directions) return INFINITY;
+TANDEM_HD_SELDOM double ManifoldMaker<Team>::depth_along(std::uint32_t region, const DeepPatch& patch,
+                                                         int direction, SearchMemory& depths,
+                                                         double enough) const {
+  team_.sync();
+  if (team_.rank() == 0) depths.seeds = patch.seeds;
+  team_.sync();
   DeepestLine<Team> search(team_, bodies_, memory_, summary_, region, depths);
-  search.find_seeds(patch.measure.middle, kMostSeeds);
-  search.find(PatchFrame(summary_.origin, shared.along(direction)), patch.measure.middle, patch.reach,
-              INFINITY);
+  search.find(PatchFrame(summary_.origin, patch.along(direction)), patch.measure.middle, patch.reach, enough);
   return search.depth();
 }
 
@@ -178,11 +186,11 @@ template <typename Team>
 TANDEM_HD_SELDOM void ManifoldMaker<Team>::end_deep(std::uint32_t region, const DeepPatch& patch,
                                                     OutlineMemory& shared) {
   double least = INFINITY;
-  for (int i = 0; i < patch.directions; ++i) least = lesser(shared.depth[i], least);
+  for (int i = 0; i < patch.directions; ++i) least = lesser(patch.depth[i], least);
   PatchNormal normal;
   for (int i = 0; i < patch.directions && normal.kind != PatchKind::overlap; ++i) {
-    if (shared.depth[i] == INFINITY || !(shared.depth[i] <= least * (1 + kShallower))) continue;
-    normal.n = shared.normal.along(i), normal.kind = PatchKind::overlap;
+    if (patch.depth[i] == INFINITY || !(patch.depth[i] <= least * (1 + kShallower))) continue;
+    normal.n = patch.along(i), normal.kind = PatchKind::overlap;
   }
   find_rim(region, patch.measure, normal, shared);
   if (team_.rank() == 0) state_.deep = true;
@@ -192,15 +200,11 @@ TANDEM_HD_SELDOM void ManifoldMaker<Team>::end_deep(std::uint32_t region, const 
 template <typename Team>
 TANDEM_HD_SELDOM void ManifoldMaker<Team>::make_deep(std::uint32_t region, OutlineMemory& shared,
                                                      SearchMemory& depths) {
-  const DeepPatch patch = begin_deep(region, shared.normal);
-  DeepestLine<Team> search(team_, bodies_, memory_, summary_, region, depths);
-  search.find_seeds(patch.measure.middle, kMostSeeds);
+  DeepPatch patch;
+  begin_deep(region, shared.normal, depths, patch);
   // The directions along which the first lines are shallowest come first; of others little more is looked at.
   double known[2 * kMostTried];
-  for (int i = 0; i < patch.directions; ++i) {
-    search.begin_with_seeds(PatchFrame(summary_.origin, shared.normal.along(i)));
-    known[i] = search.depth();
-  }
+  for (int i = 0; i < patch.directions; ++i) known[i] = depth_along(region, patch, i, depths, 0);
   double enough = INFINITY;
   for (int k = 0; k < patch.directions; ++k) {
     int next = -1;
@@ -208,13 +212,10 @@ TANDEM_HD_SELDOM void ManifoldMaker<Team>::make_deep(std::uint32_t region, Outli
       if (known[i] >= 0 && (next < 0 || known[i] < known[next])) next = i;
     }
     known[next] = -1;
-    search.find(PatchFrame(summary_.origin, shared.normal.along(next)), patch.measure.middle, patch.reach,
-                enough);
-    const double depth = search.depth();
-    if (team_.rank() == 0) shared.depth[next] = depth < enough ? depth : INFINITY;
+    const double depth = depth_along(region, patch, next, depths, enough);
+    if (depth < enough) patch.depth[next] = depth;
     enough = lesser(enough, depth * (1 + 2 * kShallower));
   }
-  team_.sync();
   end_deep(region, patch, shared);
 }
 
@@ -235,7 +236,7 @@ TANDEM_HD void ManifoldMaker<Team>::measure_depths(std::uint32_t region, SearchM
   for (std::uint32_t i = team_.rank(); i < count; i += team_.size())
     state_.sounding[i / 2].surface[i % 2] = shared.lines.line[i].best;
   DeepestLine<Team> search(team_, bodies_, memory_, summary_, region, shared);
-  search.find_seeds(state_.centre, state_.deep ? kMostSeeds : state_.candidates <= kFewCandidates ? 2 : 4);
+  search.find_seeds(state_.centre, state_.reach, state_.candidates <= kFewCandidates ? kMostSeeds / 2 : kMostSeeds);
   search.find(state_.frame, state_.centre, state_.reach, INFINITY);
   const bool through = state_.deep && search.goes_through();
   if (team_.rank() == 0) {

@@ -89,29 +89,32 @@ __device__ __noinline__ void walk_surface(const LaneGroup<kWidth>& group, Questi
   if (asked && group.rank() == 0) group.waiting[0] = 0;
   group.sync();
   const std::uint32_t node = group.rank() % 4, before = (1u << group.rank()) - 1;
+  const manifold::Shape& shape = *questions.body(question).shape;
+  const Block* const blocks = shape.blocks;
+  const OrientedBlock* const oriented_blocks = shape.oriented_blocks;
+  auto test = questions.test(question);
   while (group.any_of_warp(waiting > 0)) {
     const std::uint32_t most = waiting + 3 * kAtOnce + kReserve <= LaneGroup<kWidth>::kRoom ? kAtOnce : 1;
     const std::uint32_t taken = waiting < most ? waiting : most;
     bool inner = false, leaf = false;
     std::uint32_t below = 0;
     if (group.rank() / 4 < taken) {
-      const manifold::Shape& shape = *questions.body(question).shape;
       const std::uint32_t index = group.waiting[waiting - 1 - group.rank() / 4];
-      const auto passes = [&](const auto& block, const auto& test) {
-        return test.passes(
+      const auto passes = [&](const auto& block, const auto& test_of_block) {
+        return test_of_block.passes(
             {{block.centre[0][node], block.centre[1][node], block.centre[2][node]}},
             {{block.half_extent[0][node], block.half_extent[1][node], block.half_extent[2][node]}});
       };
-      if (shape.blocks != nullptr) {
-        const Block& block = shape.blocks[index];
+      if (blocks != nullptr) {
+        const Block& block = blocks[index];
         leaf = block.is_leaf_block();
         below = block.index[node];
-        inner = passes(block, questions.test(question));
+        inner = passes(block, test);
       } else {
-        const OrientedBlock& block = shape.oriented_blocks[index];
+        const OrientedBlock& block = oriented_blocks[index];
         leaf = block.is_leaf_block();
         below = (block.first_below & ~OrientedBlock::kIsLeafBlock) + node;
-        inner = passes(block, questions.test(question).turned(manifold::BlockAxes(block.rotation)));
+        inner = passes(block, test.turned(manifold::BlockAxes(block.rotation)));
       }
       leaf = leaf && inner, inner = inner && !leaf;
     }
@@ -130,6 +133,8 @@ __device__ __noinline__ void walk_surface(const LaneGroup<kWidth>& group, Questi
           group.best(found, [&](const auto& x, const auto& y) { return questions.better(question, x, y); });
       group.sync();  // all are done with the question as it was
       if (found && group.rank() == 0) questions.merge(question, found);
+      group.sync();
+      test = questions.test(question);
     }
     group.sync();
   }

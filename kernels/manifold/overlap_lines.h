@@ -32,10 +32,10 @@ class OverlapLines {
 
   /// Finds a point of the overlap beside each of some pieces, at most LineMemory::kMost / 2: half-way from
   /// the middle of the piece, behind both triangles, to where the overlap ends on that line, but no further
-  /// than `most`. Result: a bit for each piece; 0 where its triangles face each other, or the
+  /// than `most`. expected: how far that is, mostly. Result: a bit for each piece; 0 where its triangles face each other, or the
   /// line is not within both bodies.
   TANDEM_HD_SELDOM std::uint32_t go_inside(const std::uint32_t* piece, int count, double most,
-                                           Vector3* inside) const;
+                                           double expected, Vector3* inside) const;
 
   /// Asks where a straight line within a, and one within b, from one point to two others meet the surface of
   /// the body, if they do so before they are there. first: the first of the two questions.
@@ -81,7 +81,8 @@ TANDEM_HD std::uint32_t OverlapLines<Team>::extreme_piece(std::uint32_t begin, s
 
 template <typename Team>
 TANDEM_HD_SELDOM std::uint32_t OverlapLines<Team>::go_inside(const std::uint32_t* piece, int count,
-                                                             double most, Vector3* inside) const {
+                                                             double most, double expected,
+                                                             Vector3* inside) const {
   LineQuestions questions(bodies_, shared_.line);
   team_.sync();
   for (int i = static_cast<int>(team_.rank()); i < count; i += static_cast<int>(team_.size())) {
@@ -107,7 +108,7 @@ TANDEM_HD_SELDOM std::uint32_t OverlapLines<Team>::go_inside(const std::uint32_t
     const double begin = behind(most);
     for (std::uint32_t side = 0; side < 2; ++side)
       questions.ask(line + side, shared_.frame[i], static_cast<int>(side), 0, {}, begin, begin, INFINITY,
-                    INFINITY, kGrazes);
+                    expected, kGrazes);
   }
   team_.sync();
   walk_lines(team_, questions, 2 * static_cast<std::uint32_t>(count), shared_.line);

@@ -82,9 +82,6 @@ struct NormalMemory {
   Vector3 tried[kMostTried];
   int count;  ///< of those tried, where that is not known to all
   Spread spread[kMostTried];
-
-  /// A direction that is tried: each line one way and the other.
-  TANDEM_HD Vector3 along(int i) const { return i % 2 == 0 ? tried[i / 2] : -tried[i / 2]; }
 };
 
 /// Says how a patch pushes.
@@ -211,12 +208,17 @@ struct DeepPatch {
   CurveMeasure measure;
   double reach;    ///< of the pieces, from their middle
   int directions;  ///< along each line that is tried, both ways
+  Vector3 tried[kMostTried];
+  double depth[2 * kMostTried];  ///< along each direction; infinity where there is none
+  Seeds seeds;
+
+  /// A direction that is tried: each line one way and the other.
+  TANDEM_HD Vector3 along(int i) const { return i % 2 == 0 ? tried[i / 2] : -tried[i / 2]; }
 };
 
 /// The memory that a team shares while it finds a patch's normal and rim.
 struct OutlineMemory {
   NormalMemory normal;
-  double depth[2 * kMostTried];  ///< along each direction that is tried
   RimMemory rim;
   std::uint32_t next;
 };

@@ -81,7 +81,7 @@ TANDEM_HD bool RegionFinder<Team>::line_stays_within(std::uint32_t from, std::ui
   const double apart = norm(memory_.pieces[to].middle() - memory_.pieces[from].middle());
   const std::uint32_t pieces[2] = {from, to};
   Vector3 inside[2];
-  return lines.go_inside(pieces, 2, apart, inside) == 3 && lines.is_free(inside[0], inside[1]);
+  return lines.go_inside(pieces, 2, apart, apart, inside) == 3 && lines.is_free(inside[0], inside[1]);
 }
 
 /// Tries lines from three pieces of the first curve, each to the nearest one of the second.

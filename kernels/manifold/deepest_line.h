@@ -297,11 +297,8 @@ TANDEM_HD bool DeepestLine<Team>::step(int from) {
     const int side = i % 2;
     learn(side, i < 2 ? line[2 + side].best : line[side].best, shared_.learnt[i]);
   }
-  if (counts && first < 0) {
-    const double rounding = 16 * bodies_.tolerance();
-    for (int side = 0; side < 2; ++side)
-      shared_.spaces.drop_before(team_, side, next.at, next.height[side], rounding);
-  }
+  if (counts && first < 0)
+    shared_.spaces.drop_before(team_, next.at, next.height, 16 * bodies_.tolerance());
   team_.sync();
   const Vector2 at = frame.flat(seed);
   const double height = frame.height(seed);

@@ -56,14 +56,22 @@ class HalfSpaces {
   TANDEM_HD void look_from(const Team& team, const Vector2& at, double height) {
     for (int i = first_of(team); i < kMost; i += step_of(team))
       space[i].counts = space[i].triangle != kNoIndex && space[i].beyond(at, height) < 0;
+    if (team.rank() == 0) begin_basis();
+    team.sync();
   }
   /// Forgets those beyond which the body goes on.
   template <typename Team>
-  TANDEM_HD void drop_before(const Team& team, int side, const Vector2& at, double height, double tolerance) {
+  TANDEM_HD void drop_before(const Team& team, const Vector2& at, const double (&height)[2], double tolerance) {
+    bool drops = false;
     for (int i = first_of(team); i < kMost; i += step_of(team)) {
-      if (space[i].triangle == kNoIndex || space[i].side != side) continue;
-      if (space[i].beyond(at, height) > tolerance) space[i].triangle = kNoIndex, space[i].counts = false;
+      HalfSpace& of = space[i];
+      if (of.triangle == kNoIndex || !(of.beyond(at, of.side == 0 ? height[0] : height[1]) > tolerance))
+        continue;
+      drops = drops || of.counts;
+      of.triangle = kNoIndex, of.counts = false;
     }
+    if (team.any(drops) && team.rank() == 0) begin_basis();
+    team.sync();
   }
   /// Returns whether a point is in the plane of one of the first ones.
   TANDEM_HD bool in_plane(const Vector2& at, double height, double tolerance) const {
@@ -93,8 +101,9 @@ class HalfSpaces {
 
   /// Finds the line on which the half-spaces leave a the most above b: a linear program in x, y and the two
   /// heights, by the dual simplex method. Result: none if rounding keeps it from an end.
+  /// The basis of the last program is where it begins, so that few steps are left.
   template <typename Team>
-  TANDEM_HD LineOfTwo deepest(const Team& team, double tolerance) const;
+  TANDEM_HD LineOfTwo deepest(const Team& team, double tolerance);
 
  private:
   static constexpr int kWalls = 6, kMostPivots = 64;
@@ -114,11 +123,62 @@ class HalfSpaces {
     const Vector2 n = i % 2 == 0 ? along_ : Vector2{-along_.y, along_.x};
     return i < 2 ? n : -1.0 * n;
   }
+  /// A constraint of the program: row[0] x + row[1] y + row[2] height of a + row[3] height of b <= offset.
+  struct Constraint {
+    double row[4], offset;
+  };
+  TANDEM_HD Constraint constraint(int i) const {
+    if (i < kWalls) {
+      const Vector2 n = i < 4 ? wall(i) : Vector2{};
+      return {{n.x, n.y, i == 4 ? 1.0 : 0.0, i == 5 ? -1.0 : 0.0}, wall_[i]};
+    }
+    const HalfSpace& of = space[i - kWalls];
+    return {{of.normal.x, of.normal.y, of.side == 0 ? of.normal.z : 0, of.side == 0 ? 0 : of.normal.z},
+            of.offset};
+  }
+  /// Four constraints that hold exactly, and what each counts for the depth. Indices are known when it is
+  /// compiled, so that a GPU keeps it in registers.
+  struct Basis {
+    double inverse[4][4], offset[4], price[4];
+
+    /// Takes a constraint for the one that has to leave; false if none can.
+    TANDEM_HD bool take(const Constraint& entering) {
+      double share[4], least = INFINITY, share_of_leaving = 1;
+      int leaves = -1;
+      for (int k = 0; k < 4; ++k) {
+        share[k] = 0;
+        for (int r = 0; r < 4; ++r) share[k] += entering.row[r] * inverse[r][k];
+        if (share[k] > kLeastShare && price[k] < least * share[k])
+          least = price[k] / share[k], leaves = k, share_of_leaving = share[k];
+      }
+      if (leaves < 0) return false;
+      const double by_share = 1 / share_of_leaving;
+      for (int k = 0; k < 4; ++k) {
+        price[k] = k == leaves ? least : greater(price[k] - least * share[k], 0.0);
+        offset[k] = k == leaves ? entering.offset : offset[k];
+      }
+      for (int r = 0; r < 4; ++r) {
+        double own = 0;
+        for (int k = 0; k < 4; ++k) own = k == leaves ? inverse[r][k] : own;
+        own *= by_share;
+        for (int k = 0; k < 4; ++k) inverse[r][k] = k == leaves ? own : inverse[r][k] - own * share[k];
+      }
+      return true;
+    }
+  };
+  /// Two sides of the square, and how high a may be and how low b.
+  TANDEM_HD void begin_basis() {
+    const double c = along_.x, s = along_.y;
+    basis_ = {{{c, -s, 0, 0}, {s, c, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, -1}},
+              {wall_[0], wall_[1], wall_[4], wall_[5]},
+              {kTilt, 0.75 * kTilt, 1, 1}};
+  }
   template <typename Team>
   TANDEM_HD int most_violated(const Team& team, const double (&x)[4], double tolerance) const;
 
   Vector2 along_;
   double wall_[kWalls];
+  Basis basis_;
 };
 
 /// The constraint beyond which a point lies most: a wall, or kWalls + i the half-space i; -1 if there is none.
@@ -143,55 +203,25 @@ TANDEM_HD int HalfSpaces::most_violated(const Team& team, const double (&x)[4], 
 }
 
 template <typename Team>
-TANDEM_HD LineOfTwo HalfSpaces::deepest(const Team& team, double tolerance) const {
-  // The rows of the basis are constraints: at first two sides of the square, and how high a may be and how
-  // low b.
-  const double c = along_.x, s = along_.y;
-  double inverse[4][4] = {{c, -s, 0, 0}, {s, c, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, -1}};
-  double offset[4] = {wall_[0], wall_[1], wall_[4], wall_[5]}, price[4] = {kTilt, 0.75 * kTilt, 1, 1};
+TANDEM_HD LineOfTwo HalfSpaces::deepest(const Team& team, double tolerance) {
+  Basis basis = basis_;  // of each of the team its own
   LineOfTwo out;
-  for (int pivot = 0; pivot < kMostPivots; ++pivot) {
+  for (int pivot = 0; pivot < kMostPivots && !out.found; ++pivot) {
     double x[4];
     for (int r = 0; r < 4; ++r) {
       x[r] = 0;
-      for (int k = 0; k < 4; ++k) x[r] += inverse[r][k] * offset[k];
+      for (int k = 0; k < 4; ++k) x[r] += basis.inverse[r][k] * basis.offset[k];
     }
     const int worst = most_violated(team, x, tolerance);
     if (worst < 0) {
       out.at = {x[0], x[1]}, out.height[0] = x[2], out.height[1] = x[3];
       out.found = true;
-      return out;
-    }
-    double row[4] = {}, row_offset;
-    if (worst < kWalls) {
-      const Vector2 n = worst < 4 ? wall(worst) : Vector2{};
-      row[0] = n.x, row[1] = n.y, row[2] = worst == 4 ? 1 : 0, row[3] = worst == 5 ? -1 : 0;
-      row_offset = wall_[worst];
-    } else {
-      const HalfSpace& of = space[worst - kWalls];
-      row[0] = of.normal.x, row[1] = of.normal.y;
-      row[2] = of.side == 0 ? of.normal.z : 0, row[3] = of.side == 0 ? 0 : of.normal.z;
-      row_offset = of.offset;
-    }
-    double share[4], least = INFINITY, share_of_leaving = 1;
-    int leaves = -1;
-    for (int k = 0; k < 4; ++k) {
-      share[k] = 0;
-      for (int r = 0; r < 4; ++r) share[k] += row[r] * inverse[r][k];
-      if (share[k] > kLeastShare && price[k] < least * share[k])
-        least = price[k] / share[k], leaves = k, share_of_leaving = share[k];
-    }
-    if (leaves < 0) return out;
-    for (int k = 0; k < 4; ++k) {
-      price[k] = k == leaves ? least : greater(price[k] - least * share[k], 0.0);
-      if (k == leaves) offset[k] = row_offset;
-    }
-    for (int r = 0; r < 4; ++r) {
-      double own = 0;
-      for (int k = 0; k < 4; ++k) own = k == leaves ? inverse[r][k] / share_of_leaving : own;
-      for (int k = 0; k < 4; ++k) inverse[r][k] = k == leaves ? own : inverse[r][k] - own * share[k];
+    } else if (!basis.take(constraint(worst))) {
+      break;
     }
   }
+  team.sync();  // all have read the basis
+  if (team.rank() == 0) basis_ = basis;
   return out;
 }
 

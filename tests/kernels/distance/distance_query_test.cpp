@@ -189,7 +189,7 @@ TEST(DistanceQuery, ThreadsAndFormerNearestDoNotMatter) {
     former.push_back({a, b, expected[i].triangle_a, expected[i].triangle_b});
   }
   for (const std::uint32_t threads : {2u, 3u, 16u}) {
-    query.scene.set_threads(threads);
+    EXPECT_EQ(query.scene.set_threads(threads), Status::kOk);
     ASSERT_EQ(query.find(scene.instances, {.reach = 3}), Status::kOk);
     EXPECT_EQ(distances_of(query), expected) << threads;
     EXPECT_EQ(query.counters(), counters) << threads;
@@ -217,7 +217,7 @@ TEST(DistanceQuery, OneLargePairIsSpreadOverThreadsAlike) {
   EXPECT_GE(expected[1].upper, 2.5);
   EXPECT_EQ(expected[2].upper, 0);
   for (const std::uint32_t threads : {2u, 5u}) {
-    query.scene.set_threads(threads);
+    EXPECT_EQ(query.scene.set_threads(threads), Status::kOk);
     ASSERT_EQ(query.find(scene.instances, pairs, {}), Status::kOk);
     EXPECT_EQ(distances_of(query), expected);
   }

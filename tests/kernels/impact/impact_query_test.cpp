@@ -195,7 +195,7 @@ TEST_F(Impacts, ThreadsChangeNothing) {
   EXPECT_GT(counters.found, 0u);
   EXPECT_GT(counters.at_start, 0u);
   for (const std::uint32_t threads : {2u, 5u, 16u}) {
-    query_.scene.set_threads(threads);
+    EXPECT_EQ(query_.scene.set_threads(threads), Status::kOk);
     for (int i = 0; i < 5; ++i) {
       ASSERT_EQ(ask_of(moves, 1), Status::kOk);
       ASSERT_EQ(query_.rows().size(), alone.size());

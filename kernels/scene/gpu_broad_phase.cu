@@ -5,6 +5,7 @@
 #include <cub/device/device_radix_sort.cuh>
 
 #include "kernels/common/check_options.h"
+#include "kernels/common/cub_code.cuh"
 #include "kernels/common/gpu_host.h"
 #include "kernels/scene/broad_phase_boxes.cuh"
 #include "kernels/scene/broad_phase_direct.cuh"
@@ -246,6 +247,7 @@ struct gpu::HostOf<GpuBroadPhaseReport> : gpu::GpuHost<Outcome, GpuBroadPhaseRep
   // Reserves what sorting up to the capacity takes: CUB asks for a part that does not depend on the number,
   // and one that grows with it.
   bool reserve_sorting() {
+    if (!ok(gpu::load_cub_code())) return false;
     std::size_t bytes = 0, pair_bytes = 0;
     cub::DoubleBuffer<Key> key(keys.data(), other_keys.data());
     if (!ok(cub::DeviceRadixSort::SortKeys(nullptr, bytes, key, of_boxes.count()))) return false;

@@ -135,7 +135,7 @@ Impact ImpactQuery::State::impact_of(std::size_t row, const ObjectPair& pair, co
     ++worker.counters.at_start;
     return impact;
   }
-  if (pair.a == pair.b) return impact;
+  if (pair.a == pair.b || stay_apart(motion, boxes[pair.a], boxes[pair.b])) return impact;
   const double tolerance = options.tolerance * std::min(a.diagonal, b.diagonal);
   const PairStop stop = worker.walk.find_stop(motion, a.tree, b.tree, tolerance, worker.counters);
   if (stop.triangle_a == kNoIndex) return impact;

@@ -156,8 +156,8 @@ TEST(QueryMemory, WhereItEndsIsSaidAndForgotten) {
         bool threw = false, nothing = false;
         test::Asked<ContactQuery> query;
         try {
-          EXPECT_EQ(query.scene.set_threads(threads), Status::kOk);
-          assets_set = query.set_assets(scene.assets.views());
+          assets_set = query.scene.set_threads(threads);
+          if (assets_set == Status::kOk) assets_set = query.set_assets(scene.assets.views());
           if (assets_set == Status::kOk) found = query.find(scene.instances);
         } catch (...) {
           threw = true;

@@ -45,8 +45,7 @@ class WholeGpu {
 // Memory comes back piece by piece, so that at some time there is room for arrays, but not yet for CUB's
 // code.
 TEST(FirstSort, OfAProcessThatMeetsAFullGpuSpoilsNoLaterOne) {
-  int devices = 0;
-  if (cudaGetDeviceCount(&devices) != cudaSuccess || devices == 0) GTEST_SKIP() << "there is no GPU";
+  if (test::no_gpu()) GTEST_SKIP() << "no GPU here";
   Boxes boxes(kMany);
   for (std::uint32_t i = 0; i < kMany; ++i) {
     const double x = i;

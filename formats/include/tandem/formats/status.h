@@ -78,7 +78,7 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kNoAxisAlignedBlocks,  ///< the other modes of queries on a GPU need them, and the asset was given without
     kNoTopology,           ///< contact manifolds need it, and the file has none
     kNoFinestLevel,        ///< queries by tolerance need it, and the view leaves it out
-    // An option that has a value which it cannot have.
+    // These say that an option has a value which it cannot have.
     kBadOption = 3,   ///< a number that names no choice, or a count beyond its limits
     kBadReach = 213,  ///< `reach` or `within` is negative, NaN or larger than the query can take
     kBadTolerance,    ///< a tolerance is negative, NaN or larger than the query can take

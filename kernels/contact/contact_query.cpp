@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "kernels/common/block_pair.h"
+#include "kernels/common/check_options.h"
 #include "kernels/geometry/level_error.h"
 #include "tandem/kernels/contact_query.h"
 
@@ -143,9 +144,9 @@ struct ContactQuery::State : Allocated {
 
 Status ContactQuery::answer(SceneState& scene, const std::span<const ObjectPair>* given,
                             const ContactOptions& options) {
-  if (!(options.within >= 0 && options.within <= kLargestWorldCoordinate))
-    return scene.fail(Status::kOutOfRange, 0);
-  const Status status = scene.take_or_find_pairs(given, options.within, options.self_pairs, pairs_);
+  Status status = check_within(options.within);
+  if (status != Status::kOk) return scene.fail(status, 0);
+  status = scene.take_or_find_pairs(given, options.within, options.self_pairs, pairs_);
   if (status != Status::kOk) return status;
   if (scene.device != nullptr) return scene.ask_device(options, found());
   State* const state = state_.provide();

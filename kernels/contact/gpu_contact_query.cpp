@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "kernels/common/check_options.h"
 #include "kernels/common/gpu_host.h"
 #include "kernels/contact/gpu_query_data.h"
 #include "kernels/contact/only_walk.h"
@@ -135,13 +136,13 @@ struct HostOf<GpuContactReport> : GpuHost<QueryState, GpuContactReport> {
 
   // Returns why a query with these options cannot be queued.
   Status refusal(const GpuContactOptions& options) const {
+    if (const Status status = check_within(options.within); status != Status::kOk) return status;
     const bool oriented = walked_kind(options.mode) == BlockKind::oriented;
     if (oriented && !assets.all.oriented) return Status::kNoOrientedBlocks;
     if (!oriented && !assets.all.axis_aligned) return Status::kNoAxisAlignedBlocks;
     const bool has_room = (!options.sorted || can_sort()) && (!options.grouped || can_group()) &&
                           (!options.of_clearance() || can_clear());
-    const bool is_distance = options.within >= 0 && options.within <= kLargestWorldCoordinate;
-    return has_room && is_distance ? Status::kOk : Status::kOutOfRange;
+    return has_room ? Status::kOk : Status::kOutOfRange;
   }
 
   QueryArgs args(const GpuInstances& instances, const GpuPairs& given, const GpuContactOptions& options) {

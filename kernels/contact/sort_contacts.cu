@@ -2,6 +2,7 @@
 #include <bit>
 #include <cub/device/device_radix_sort.cuh>
 
+#include "kernels/common/cub_code.cuh"
 #include "kernels/contact/gpu_query_data.h"
 
 // Contacts in the order of a contacts file. A radix sort is stable, so three in a row do it: by triangles, by
@@ -94,6 +95,7 @@ cudaError_t sort(const QueryArgs& args, const SortingRoom& room, const Bits& bit
 }  // namespace
 
 cudaError_t sorting_bytes(std::uint64_t contacts, std::size_t& bytes) {
+  if (const cudaError_t error = load_cub_code(); error != cudaSuccess) return error;
   Rows rows = {};
   return cub::DeviceRadixSort::SortPairs(nullptr, bytes, rows.keys, rows.places, contacts);
 }

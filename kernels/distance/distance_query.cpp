@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "kernels/common/check_options.h"
 #include "kernels/common/traversal.h"
 #include "kernels/distance/nearest_phase.h"
 #include "kernels/scene/scene_state.h"
@@ -187,10 +188,9 @@ Status DistanceQuery::State::find_all() {
 
 Status DistanceQuery::answer(SceneState& scene, const std::span<const ObjectPair>* given,
                              const DistanceOptions& options) {
-  const DistanceTolerance& tolerance = options.tolerance;
-  if (!(options.reach >= 0 && tolerance.absolute >= 0 && tolerance.relative >= 0))
-    return scene.fail(Status::kOutOfRange, 0);
-  Status status = scene.take_or_find_pairs(given, options.reach, false, pairs_);
+  Status status = check_distance_options(options.tolerance, options.reach);
+  if (status != Status::kOk) return scene.fail(status, 0);
+  status = scene.take_or_find_pairs(given, options.reach, false, pairs_);
   if (status != Status::kOk) return status;
   if (scene.device != nullptr) return scene.ask_device(options, found());
   State* const state = state_.provide();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "kernels/common/check_options.h"
 #include "kernels/common/gpu_host.h"
 #include "kernels/distance/distance_data.h"
 
@@ -106,8 +107,8 @@ template class GpuAssetQuestion<GpuDistanceCapacity, GpuDistanceReport>;
 
 Status GpuDistanceQuery::enqueue(const GpuInstances& instances, const GpuPairs& pairs,
                                  const GpuDistanceOptions& options, cudaStream_t stream) {
-  const DistanceTolerance& tolerance = options.tolerance;
-  if (!(options.reach >= 0 && tolerance.absolute >= 0 && tolerance.relative >= 0)) return Status::kOutOfRange;
+  const Status status = check_distance_options(options.tolerance, options.reach);
+  if (status != Status::kOk) return status;
   const gpu::DistanceArgs args = host_->args(instances, pairs, options);
   cudaError_t error = cudaMemsetAsync(args.state, 0, offsetof(gpu::DistanceState, report), stream);
   if (error == cudaSuccess)

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 
+#include "kernels/common/check_options.h"
 #include "kernels/common/gpu_host.h"
 #include "kernels/impact/impact_data.h"
 
@@ -20,7 +21,7 @@ constexpr std::uint32_t kMostPairs = (kNoIndex - 1 - kFewestImpactSamples) / kIm
 constexpr std::uint32_t kFewestLevelsToSample = 4;
 
 // most_impact_bytes() counts with these; a hash table has fewer than four places for each part.
-static_assert(sizeof(impact::MovingBody) + sizeof(WorldBox) == 264);
+static_assert(sizeof(impact::MovingBody) + sizeof(WorldBox) == 272);
 static_assert(sizeof(ImpactPair) + sizeof(Impact) + 3 * sizeof(double) + 2 * sizeof(std::uint32_t) == 240);
 static_assert(sizeof(PairRecord) + 2 * sizeof(std::uint32_t) == 168);
 static_assert(sizeof(ImpactPart) + 4 * 2 * sizeof(std::uint32_t) == 656);
@@ -184,10 +185,10 @@ struct HostOf<GpuImpactReport> : GpuHost<ImpactState, GpuImpactReport> {
   // args.given: null where the pairs are to be found.
   Status enqueue(const ImpactArgs& given, const GpuImpactOptions& options, cudaStream_t stream) {
     ImpactArgs args = given;
-    const auto is_size = [](double x) { return x >= 0 && std::isfinite(x); };
-    if (!is_size(args.duration) || !is_size(args.tolerance) || args.instances.count > of_instances.count())
-      return Status::kOutOfRange;
-    Status status = keep(clear(args, stream));
+    Status status = check_impact_options(args.duration, args.tolerance);
+    if (status != Status::kOk) return status;
+    if (args.instances.count > of_instances.count()) return Status::kOutOfRange;
+    status = keep(clear(args, stream));
     if (status == Status::kOk) status = keep(move_bodies(args, stream));
     if (status == Status::kOk && args.given.count == nullptr) {
       status = broad_phase.enqueue(boxes.data(), args.instances.count,

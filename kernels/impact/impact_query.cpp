@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/common/check_options.h"
 #include "kernels/contact/contact_finder.h"
 #include "kernels/impact/impact_walk.h"
 #include "kernels/impact/triangle_impact.h"
@@ -35,9 +36,8 @@ void add_to(ImpactCounters& sum, const ImpactCounters& part) {
 
 Status check(SceneState& scene, const ImpactOptions& options) {
   if (options.motion.size() != scene.bodies.size()) return scene.fail(Status::kMotionMismatch, 0);
-  const bool fits = options.duration >= 0 && std::isfinite(options.duration) && options.tolerance >= 0 &&
-                    std::isfinite(options.tolerance);
-  return fits ? Status::kOk : scene.fail(Status::kOutOfRange, 0);
+  const Status status = check_impact_options(options.duration, options.tolerance);
+  return status == Status::kOk ? status : scene.fail(status, 0);
 }
 
 void write(const Vector3& x, double (&out)[3]) {
@@ -135,7 +135,7 @@ Impact ImpactQuery::State::impact_of(std::size_t row, const ObjectPair& pair, co
     ++worker.counters.at_start;
     return impact;
   }
-  if (pair.a == pair.b) return impact;
+  if (pair.a == pair.b || stay_apart(motion, boxes[pair.a], boxes[pair.b])) return impact;
   const double tolerance = options.tolerance * std::min(a.diagonal, b.diagonal);
   const PairStop stop = worker.walk.find_stop(motion, a.tree, b.tree, tolerance, worker.counters);
   if (stop.triangle_a == kNoIndex) return impact;

@@ -129,7 +129,6 @@ PairStop ImpactWalk::find_stop(const PairMotion& pair, const LevelView& a, const
   tolerance_ = tolerance;
   acceleration_ = largest_acceleration(pair);
   stop_ = {1};
-  if (balls_stay_apart(pair)) return stop_;
   const double pieces = pieces_of(pair);
   for (double i = 0; i < pieces && stop_.triangle_a == kNoIndex; ++i) {
     span_ = piece_of_step(i, pieces);

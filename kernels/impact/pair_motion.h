@@ -58,6 +58,7 @@ struct MovingBody {
   double size;           ///< >= |translation - centre| + reach
   double radius;         ///< no posed vertex is farther from the centre, as it is rounded, at any time
   double error;          ///< pose_error()
+  bool rests;            ///< its points stay where they are, to the bit
 };
 
 /// Motions of a step of `duration` seconds, as they are computed with. The products' roundings are relative:
@@ -84,6 +85,7 @@ TANDEM_HD inline Status moving_body(const Pose& stored, const RigidMotion& motio
   body.size = norm(vector_of(stored.translation) - body.centre) + body.reach;
   body.radius = farthest_from_centre(stored, lower, upper, motion.centre);
   body.error = pose_error(stored, body.reach, motion.centre, body.displacement, body.turn);
+  body.rests = duration == 0 || is_at_rest(motion);
   return Status::kOk;
 }
 
@@ -127,6 +129,13 @@ TANDEM_HD inline bool balls_stay_apart(const PairMotion& pair) {
   const double nearest = squared > 0 ? -dot(pair.offset, pair.displacement) / squared : 0;
   const double time = manifold::lesser(manifold::greater(nearest, 0.0), 1.0);
   return norm(pair.offset + time * pair.displacement) > pair.a->radius + pair.b->radius + pair.slack;
+}
+
+/// Returns whether two bodies that are not in contact at the start surely stay apart, by what is known of
+/// them without their trees. Hence pairs that the broad phase does not find have no impact where they are
+/// given, either. swept_a, swept_b: swept_box() of each.
+TANDEM_HD inline bool stay_apart(const PairMotion& pair, const WorldBox& swept_a, const WorldBox& swept_b) {
+  return (pair.a->rests && pair.b->rests) || !overlap(swept_a, swept_b) || balls_stay_apart(pair);
 }
 
 /// No point of two bodies accelerates more along n, relative to the other. fastest_a, fastest_b: the largest

@@ -59,7 +59,8 @@ __device__ std::uint32_t begin_pair(const ImpactArgs& args, std::uint32_t index)
   args.sought[index] = in_contact ? 0 : 1;
   args.stops[index] = static_cast<Counter>(__double_as_longlong(1.0));
   args.is_sampled[index] = 0;
-  if (in_contact || given.a == given.b || balls_stay_apart(pair.motion)) return 0;
+  if (in_contact || given.a == given.b || stay_apart(pair.motion, args.boxes[given.a], args.boxes[given.b]))
+    return 0;
   return static_cast<std::uint32_t>(impact::pieces_of(pair.motion));
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "kernels/common/check_options.h"
 #include "kernels/common/gpu_host.h"
 #include "kernels/manifold/manifold_data.h"
 #include "kernels/manifold/shape.h"
@@ -122,7 +123,7 @@ struct HostOf<GpuManifoldReport> : GpuHost<ManifoldState, GpuManifoldReport> {
     args.query = query.device_report();
     args.capacity = capacity();
     args.match_previous = options.match_previous;
-    args.most_points = static_cast<int>(std::clamp(options.most_points, 1u, kMostManifoldPoints));
+    args.most_points = static_cast<int>(options.most_points);
     args.pieces = {pieces.data(), normals.data(), curve.data(), order.data(), start.data(), words.data()};
     args.table_size = static_cast<std::uint32_t>(table.room());
     return args;
@@ -139,6 +140,7 @@ template class GpuAssetQuestion<GpuManifoldCapacity, GpuManifoldReport>;
 Status GpuManifoldQuery::enqueue(const GpuInstances& instances, const GpuPairs& pairs,
                                  const GpuContactQuery& query, const GpuManifoldOptions& options,
                                  cudaStream_t stream) {
+  if (const Status status = check_most_points(options.most_points); status != Status::kOk) return status;
   const gpu::ManifoldArgs args = host_->args(instances, pairs, query, options);
   return host_->keep(gpu::queue(args, stream, gpu::remember_points, gpu::make_patches, gpu::place_manifolds));
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "kernels/common/check_options.h"
 #include "kernels/manifold/finish.h"
 #include "kernels/manifold/pair_patches.h"
 #include "kernels/manifold/shape.h"
@@ -230,7 +231,7 @@ Status ManifoldQuery::answer(SceneState& scene, State& state, std::span<const Co
   Status status = state.check(scene, pairs, contacts);
   if (status == Status::kOk) status = state.group(scene, pairs.size(), contacts);
   if (status != Status::kOk) return status;
-  const auto most_points = static_cast<int>(std::clamp(options.most_points, 1u, kMostManifoldPoints));
+  const auto most_points = static_cast<int>(options.most_points);
   const std::uint32_t workers = scene.workers_for(state.rows.size(), kRowsAtOnce);
   if (!scene.threads.provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
   if (!state.workers.provide(workers)) return scene.fail(Status::kOutOfMemory, 0);
@@ -275,7 +276,8 @@ Status ManifoldQuery::ask(Scene& in, std::span<const ObjectPair> pairs, std::spa
     if (!options.match_previous || on_device != nullptr) state->pair_points_before.clear();
     std::swap(rows_, state->manifolds_before);
     std::swap(points_, state->points_before);
-    status = state->name_shapes(*scene);
+    status = check_most_points(options.most_points);
+    status = status == Status::kOk ? state->name_shapes(*scene) : scene->fail(status, 0);
     if (status == Status::kOk) status = scene->take_pairs(pairs, pairs_);
     if (status == Status::kOk) status = state->check_bodies(*scene);
     if (status == Status::kOk) {

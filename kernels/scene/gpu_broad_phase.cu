@@ -4,6 +4,8 @@
 #include <bit>
 #include <cub/device/device_radix_sort.cuh>
 
+#include "kernels/common/check_options.h"
+#include "kernels/common/cub_code.cuh"
 #include "kernels/common/gpu_host.h"
 #include "kernels/scene/broad_phase_boxes.cuh"
 #include "kernels/scene/broad_phase_direct.cuh"
@@ -245,6 +247,7 @@ struct gpu::HostOf<GpuBroadPhaseReport> : gpu::GpuHost<Outcome, GpuBroadPhaseRep
   // Reserves what sorting up to the capacity takes: CUB asks for a part that does not depend on the number,
   // and one that grows with it.
   bool reserve_sorting() {
+    if (!ok(gpu::load_cub_code())) return false;
     std::size_t bytes = 0, pair_bytes = 0;
     cub::DoubleBuffer<Key> key(keys.data(), other_keys.data());
     if (!ok(cub::DeviceRadixSort::SortKeys(nullptr, bytes, key, of_boxes.count()))) return false;
@@ -257,8 +260,9 @@ struct gpu::HostOf<GpuBroadPhaseReport> : gpu::GpuHost<Outcome, GpuBroadPhaseRep
 
   // Why a call cannot be queued.
   Status refusal(std::uint32_t count, bool posed, const GpuBroadPhaseOptions& options) const {
+    if (const Status status = check_reach(options.within); status != Status::kOk) return status;
     if (report.data() == nullptr || count > of_boxes.count() ||
-        (options.sorted && sorted_pairs.room() < of_pairs.count()) || !(options.within >= 0) ||
+        (options.sorted && sorted_pairs.room() < of_pairs.count()) ||
         (options.within > 0 && count > boxes.room()))
       return Status::kOutOfRange;
     if (kept.of != 0 && (kept.of != count || kept.posed != posed)) return Status::kKeptMismatch;

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <utility>
 
+#include "kernels/common/check_options.h"
 #include "kernels/common/instance_check.h"
 #include "kernels/geometry/grid_test.h"
 #include "kernels/geometry/level_error.h"
@@ -309,7 +310,7 @@ Status SceneState::take_or_find_pairs(const std::span<const ObjectPair>* given, 
 }
 
 Status SceneState::find_pairs(double reach, bool self_pairs) {
-  if (!(reach >= 0)) return fail(Status::kOutOfRange, 0);
+  if (const Status status = check_reach(reach); status != Status::kOk) return fail(status, 0);
   const bool same = found_of_.valid && found_of_.reach == reach && found_of_.self_pairs == self_pairs;
   if (same && changed_count_ == 0) return Status::kOk;
   bool any_fixed = false;
@@ -453,8 +454,12 @@ Status Scene::answer_on(SceneDevice* device) {
   return Status::kOk;
 }
 
-void Scene::set_threads(std::uint32_t threads) {
-  if (SceneState* const s = state()) s->most_workers = std::clamp(threads, 1u, kMostSceneThreads);
+Status Scene::set_threads(std::uint32_t threads) {
+  SceneState* const s = state();
+  if (s == nullptr) return Status::kOutOfMemory;
+  if (threads < 1 || threads > kMostSceneThreads) return s->fail(Status::kBadOption, 0);
+  s->most_workers = threads;
+  return Status::kOk;
 }
 
 Status Scene::set_assets(std::span<const AssetView> assets) {

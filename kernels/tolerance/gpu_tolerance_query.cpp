@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "kernels/common/check_options.h"
 #include "kernels/common/gpu_host.h"
 #include "kernels/contact/gpu_query_data.h"
 #include "kernels/tolerance/tolerance_data.h"
@@ -106,8 +107,8 @@ template class GpuAssetQuestion<GpuToleranceCapacity, GpuToleranceReport>;
 
 Status GpuToleranceQuery::enqueue(const GpuInstances& instances, const GpuPairs& pairs, double tolerance,
                                   cudaStream_t stream) {
-  const bool is_one = tolerance >= 0 && tolerance <= kLargestWorldCoordinate;
-  if (!is_one || instances.count > host_->of_instances.count()) return Status::kOutOfRange;
+  if (const Status status = check_level_tolerance(tolerance); status != Status::kOk) return status;
+  if (instances.count > host_->of_instances.count()) return Status::kOutOfRange;
   return host_->enqueue(host_->args(instances, pairs, tolerance), stream);
 }
 

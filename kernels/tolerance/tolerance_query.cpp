@@ -1,5 +1,6 @@
 #include "tandem/kernels/tolerance_query.h"
 
+#include "kernels/common/check_options.h"
 #include "kernels/contact/contact_finder.h"
 #include "kernels/geometry/grid_test.h"
 #include "kernels/scene/scene_state.h"
@@ -79,11 +80,11 @@ bool ToleranceQuery::State::choose_levels(const SceneState& scene, double tolera
 // Contacts come by ascending pair, one of each that has any.
 Status ToleranceQuery::answer(SceneState& scene, const std::span<const ObjectPair>* given,
                               const ToleranceOptions& options) {
-  if (!(options.tolerance >= 0 && options.tolerance <= kLargestWorldCoordinate))
-    return scene.fail(Status::kOutOfRange, 0);
+  Status status = check_level_tolerance(options.tolerance);
+  if (status != Status::kOk) return scene.fail(status, 0);
   State* const state = state_.provide();
   if (state == nullptr) return scene.fail(Status::kOutOfMemory, 0);
-  Status status = state->name_levels(scene);
+  status = state->name_levels(scene);
   if (status == Status::kOk) status = scene.take_or_find_pairs(given, 0, false, pairs_);
   if (status != Status::kOk) return status;
   if (scene.device != nullptr) return scene.ask_device(options, found());

@@ -429,7 +429,7 @@ static void test_distances_and_impacts(void) {
   free(found_impacts);
   CHECK_STATUS(
       tandem_gpu_impact_query_find(impact_query, &scene.instances, gpu_motion, -1, NULL, &sorted, stream),
-      TANDEM_OUT_OF_RANGE);
+      TANDEM_BAD_DURATION);
   CHECK_STATUS(tandem_gpu_impact_query_find(impact_query, &scene.instances, NULL, 1, NULL, &sorted, stream),
                TANDEM_NULL_ARGUMENT);
   tandem_gpu_impact_query_destroy(impact_query);

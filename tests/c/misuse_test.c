@@ -166,6 +166,9 @@ static void test_bad_options(tandem_asset* cube) {
   const tandem_manifold_options many = {sizeof many, 8, 0, 0}, twice = {sizeof twice, 0, 2, 0};
   CHECK_STATUS(tandem_scene_find_contacts(scene, NULL), TANDEM_OK);
   CHECK_STATUS(tandem_scene_find_manifolds(scene, &many), TANDEM_BAD_OPTION);
+  CHECK_STATUS(tandem_scene_set_threads(scene, 1025), TANDEM_BAD_OPTION);
+  CHECK_STATUS(tandem_scene_set_threads(scene, UINT32_MAX), TANDEM_BAD_OPTION);
+  CHECK(tandem_scene_where(scene) == 0 && tandem_status_subject(TANDEM_BAD_OPTION) == NULL);
   CHECK_STATUS(tandem_scene_find_manifolds(scene, &twice), TANDEM_BAD_OPTION);
   tandem_distance_options distances = {sizeof distances, 2, 0, 0, 0, NULL, 0, NULL, 0};
   CHECK_STATUS(tandem_scene_find_distances(scene, &distances), TANDEM_BAD_OPTION);

@@ -76,8 +76,8 @@ class CDoor final : public Door {
     for (tandem_asset* asset : assets) tandem_asset_release(asset);  // the scene has its own references
     return outcome;
   }
-  void set_threads(std::uint32_t threads) override {
-    EXPECT_EQ(tandem_scene_set_threads(scene_, threads), TANDEM_OK);
+  Outcome set_threads(std::uint32_t threads) override {
+    return told(tandem_scene_set_threads(scene_, threads));
   }
 
   Outcome place(const Bodies& bodies) override {

@@ -196,7 +196,7 @@ void take_step(Door& door, const Json& step) {
   } else if (step.contains("remove")) {
     expect_outcome(door.remove(step["remove"]), expected);
   } else if (step.contains("threads")) {
-    door.set_threads(step["threads"]);
+    expect_outcome(door.set_threads(step["threads"]), expected);
   } else if (step.contains("standing")) {
     Json assets = Json::array();
     for (const std::uint32_t asset : door.assets_of_bodies())

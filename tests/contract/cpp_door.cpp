@@ -28,7 +28,7 @@ class CppDoor final : public Door {
     }
     return told(scene_->set_assets(views));
   }
-  void set_threads(std::uint32_t threads) override { scene_->set_threads(threads); }
+  Outcome set_threads(std::uint32_t threads) override { return told(scene_->set_threads(threads)); }
 
   Outcome place(const Bodies& bodies) override {
     if (const Status status = excluded_.set(bodies.excluded); status != Status::kOk) return told(status);

@@ -44,7 +44,7 @@ class Door {
  public:
   virtual ~Door() = default;
   virtual Outcome set_assets(const std::vector<std::string>& files) = 0;
-  virtual void set_threads(std::uint32_t threads) = 0;
+  virtual Outcome set_threads(std::uint32_t threads) = 0;
   virtual Outcome place(const Bodies& bodies) = 0;
   /// Adds the one body that there is; `number` becomes its number.
   virtual Outcome add(const Bodies& body, std::uint32_t& number) = 0;

@@ -309,7 +309,7 @@ SampleAssets sample_meshes() {
 }
 
 CpuDetection::CpuDetection(std::span<const AssetView> meshes, std::uint32_t threads) {
-  scene_.set_threads(threads);
+  require(scene_.set_threads(threads), "threads");
   require(scene_.set_assets(meshes), "assets");
 }
 

@@ -42,7 +42,7 @@ bool has_cuda() {
 }
 
 std::uint32_t CommonArguments::threads() const {
-  return told_threads.value_or(std::max(1u, std::thread::hardware_concurrency()));
+  return told_threads.value_or(std::clamp(std::thread::hardware_concurrency(), 1u, kMostSceneThreads));
 }
 
 OptionRow scene_argument(CommonArguments& arguments, const std::string& what) {

@@ -24,7 +24,7 @@ TimedContainments find_contained(const LoadedScene& scene, std::span<const Objec
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const Contact& x, const Contact& y) { return x.pair < y.pair; });
   PlacedBodies bodies(scene);
-  bodies.scene.set_threads(threads);
+  require(bodies.scene.set_threads(threads));
   ContainmentQuery query;
   TimedContainments found;
   for (std::uint32_t i = 0; i < repeats; ++i) {

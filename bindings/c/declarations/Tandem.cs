@@ -498,6 +498,9 @@ public static unsafe class Native {
   public const uint TANDEM_NO_AXIS_ALIGNED_BLOCKS = 210;
   public const uint TANDEM_NO_TOPOLOGY = 211;
   public const uint TANDEM_NO_FINEST_LEVEL = 212;
+  public const uint TANDEM_BAD_REACH = 213;
+  public const uint TANDEM_BAD_TOLERANCE = 214;
+  public const uint TANDEM_BAD_DURATION = 215;
   public const uint TANDEM_NO_GPU = 300;
   public const uint TANDEM_DRIVER_TOO_OLD = 301;
   public const uint TANDEM_GPU_NOT_SUPPORTED = 302;

@@ -271,8 +271,7 @@ void tandem_scene_destroy(tandem_scene* scene) {
 
 tandem_status tandem_scene_set_threads(tandem_scene* scene, uint32_t threads) {
   return enter(scene, [&](tandem_scene& self) {
-    self.scene.set_threads(threads);
-    return TANDEM_OK;
+    return self.told(self.scene.set_threads(threads != 0 ? threads : 1));
   });
 }
 

@@ -16,8 +16,6 @@ constexpr Entry kEntries[] = {
     {TANDEM_NULL_ARGUMENT, "NullArgument", "place in the list", "a pointer that must be there is null"},
     {TANDEM_BAD_STRUCT_SIZE, "BadStructSize", nullptr,
      "a struct_size that no version had, or bytes of a struct that this version does not know"},
-    {TANDEM_BAD_OPTION, "BadOption", "instance",
-     "a number that names no choice, or a reserved field that is not zero"},
     {TANDEM_INTERNAL_ERROR, "InternalError", nullptr, "a defect of the library"},
     {TANDEM_UNKNOWN_LEVEL, "UnknownLevel", nullptr, "the asset has no such level or part"},
     {TANDEM_FILTER_MISMATCH, "FilterMismatch", nullptr, "a filter is of another number of instances"},

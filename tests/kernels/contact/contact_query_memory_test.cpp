@@ -127,7 +127,7 @@ TEST(QueryMemory, IsNotAllocatedInASteadyState) {
     for (const bool selves : {false, true}) {
       test::Asked<ContactQuery> query;
       ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-      query.scene.set_threads(threads);
+      EXPECT_EQ(query.scene.set_threads(threads), Status::kOk);
       const ContactOptions options = {.self_pairs = selves};
       EXPECT_GT(allocations_of(query, scene, options), 0);
       allocations_of(query, scene, options);
@@ -156,8 +156,8 @@ TEST(QueryMemory, WhereItEndsIsSaidAndForgotten) {
         bool threw = false, nothing = false;
         test::Asked<ContactQuery> query;
         try {
-          query.scene.set_threads(threads);
-          assets_set = query.set_assets(scene.assets.views());
+          assets_set = query.scene.set_threads(threads);
+          if (assets_set == Status::kOk) assets_set = query.set_assets(scene.assets.views());
           if (assets_set == Status::kOk) found = query.find(scene.instances);
         } catch (...) {
           threw = true;
@@ -191,7 +191,7 @@ TEST(QueryMemory, ThatTheMachineDoesNotHaveIsNotTaken) {
   test::Asked<ContactQuery> query;
   ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
   for (const std::uint32_t threads : {1u, 3u}) {
-    query.scene.set_threads(threads);
+    EXPECT_EQ(query.scene.set_threads(threads), Status::kOk);
     const ContactOptions options = {.mode = QueryMode::boxes};
     memory_of_machine = std::uint64_t{70} << 20;
     EXPECT_EQ(query.find(scene.instances, options), Status::kOutOfMemory) << threads;
@@ -208,7 +208,7 @@ TEST(QueryThreads, ThatCannotBeStartedAreNamed) {
   const BodyScene scene = crowd();
   test::Asked<ContactQuery> query;
   ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
-  query.scene.set_threads(4);
+  EXPECT_EQ(query.scene.set_threads(4), Status::kOk);
   for (int left = 0; left < 3; ++left) {
     threads_left = left;
     const Status status = query.find(scene.instances);

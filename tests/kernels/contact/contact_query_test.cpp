@@ -147,7 +147,7 @@ TEST_F(Query, NamesAnOriginThatIsOutOfRange) {
 
 TEST_F(Query, MovesWithItsResultsAndThreads) {
   const BodyScene scene = crowd(3, 20);
-  query_.scene.set_threads(3);
+  EXPECT_EQ(query_.scene.set_threads(3), Status::kOk);
   ask(scene);
   const std::vector<Contact> expected = contacts_of(query_);
   test::Asked<ContactQuery> other = std::move(query_);

@@ -17,13 +17,13 @@ TEST_F(Query, DoesNotDependOnThreads) {
     for (const QueryMode mode : {QueryMode::exact, QueryMode::fast, QueryMode::boxes}) {
       for (const bool first_only : {false, true}) {
         const ContactOptions options = {mode, first_only, true};
-        query_.scene.set_threads(1);
+        EXPECT_EQ(query_.scene.set_threads(1), Status::kOk);
         ask(scene, options);
         const std::vector<Contact> expected = contacts_of(query_);
         const ContactCounters counters = query_.counters();
         EXPECT_GT(counters.object_pairs, 8 * 16u);
-        for (const std::uint32_t threads : {0u, 2u, 3u, 8u, 3u, 40u}) {
-          query_.scene.set_threads(threads);
+        for (const std::uint32_t threads : {2u, 3u, 8u, 3u, 40u}) {
+          EXPECT_EQ(query_.scene.set_threads(threads), Status::kOk);
           ask(scene, options);
           EXPECT_EQ(contacts_of(query_), expected) << threads;
           EXPECT_EQ(query_.counters(), counters) << threads;
@@ -31,6 +31,14 @@ TEST_F(Query, DoesNotDependOnThreads) {
       }
     }
   }
+}
+
+TEST_F(Query, RefusesOtherNumbersOfThreads) {
+  for (const std::uint32_t threads : {0u, kMostSceneThreads + 1, 4000000000u}) {
+    EXPECT_EQ(query_.scene.set_threads(threads), Status::kBadOption) << threads;
+    EXPECT_EQ(query_.scene.where(), 0u);
+  }
+  EXPECT_EQ(query_.scene.set_threads(kMostSceneThreads), Status::kOk);
 }
 
 /// Enough instances for the poses and the broad phase of many threads, few pairs; some in one place, two far
@@ -61,12 +69,12 @@ TEST_F(Query, OfManyInstancesDoesNotDependOnThreads) {
       EXPECT_GT(pairs.size(), static_cast<std::size_t>(instances));
       EXPECT_GT(expected.size(), static_cast<std::size_t>(instances));
       std::reverse(given.begin(), given.end());
-      query_.scene.set_threads(1);
+      EXPECT_EQ(query_.scene.set_threads(1), Status::kOk);
       ask(scene, given, options);
       const std::vector<Contact> reversed = contacts_of(query_);
       EXPECT_EQ(reversed.size(), expected.size());
       for (const std::uint32_t threads : {2u, 3u, 4u, 16u, 5u, 100u}) {
-        query_.scene.set_threads(threads);
+        EXPECT_EQ(query_.scene.set_threads(threads), Status::kOk);
         ask(scene, options);
         EXPECT_EQ(pairs_of(query_), pairs) << threads;
         EXPECT_EQ(contacts_of(query_), expected) << threads;
@@ -93,7 +101,7 @@ TEST_F(Query, NamesTheFirstInstanceThatItRefusesWhateverTheThreads) {
                                                  {{0, at(0, 1e305, 0)}, Status::kOutOfRange}};
   ASSERT_EQ(query_.set_assets(scene.assets.views()), Status::kOk);
   for (const std::uint32_t threads : {1u, 2u, 4u, 16u}) {
-    query_.scene.set_threads(threads);
+    EXPECT_EQ(query_.scene.set_threads(threads), Status::kOk);
     for (std::size_t kind = 0; kind < 3; ++kind) {
       for (const std::size_t first : {0, 63, 64, 700, 1499}) {
         std::vector<Instance> instances = scene.instances;
@@ -116,7 +124,7 @@ TEST_F(Query, TakesMoreThreadsThanPairs) {
     const BodyScene scene = row_of_cubes(cubes);
     for (const bool selves : {false, true}) {
       ContactOptions options;
-      query_.scene.set_threads(8);
+      EXPECT_EQ(query_.scene.set_threads(8), Status::kOk);
       options.self_pairs = selves;
       ask(scene, options);
       EXPECT_EQ(found_contacts(query_), all_contacts(scene, selves));
@@ -131,7 +139,7 @@ TEST_F(Query, ManyObjectsWorkSideBySide) {
   std::vector<test::Asked<ContactQuery>> queries(4);
   for (int round = 0; round < 3; ++round) {
     for (std::size_t i = 0; i < queries.size(); ++i) {
-      queries[i].scene.set_threads(static_cast<std::uint32_t>(i + 1));
+      EXPECT_EQ(queries[i].scene.set_threads(static_cast<std::uint32_t>(i + 1)), Status::kOk);
       ASSERT_EQ(queries[i].set_assets(scene.assets.views()), Status::kOk);
       ASSERT_EQ(queries[i].find(scene.instances), Status::kOk);
     }
@@ -149,7 +157,7 @@ TEST_F(Query, ManyObjectsOfManyThreadsWorkAtOnce) {
       test::Asked<ContactQuery> query;
       EXPECT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
       for (const std::uint32_t more : {0u, 4u, 1u, 9u}) {
-        query.scene.set_threads(first + more);
+        EXPECT_EQ(query.scene.set_threads(first + more), Status::kOk);
         EXPECT_EQ(query.find(scene.instances), Status::kOk);
         EXPECT_EQ(contacts_of(query), expected);
       }

@@ -26,7 +26,7 @@ using Rows = std::vector<Containment>;
 class Containments : public testing::Test {
  protected:
   Rows find(const BodyScene& scene, const std::vector<ObjectPair>& pairs, std::uint32_t threads = 1) {
-    scene_.set_threads(threads);
+    EXPECT_EQ(scene_.set_threads(threads), Status::kOk);
     EXPECT_EQ(scene_.set_assets(scene.assets.views()), Status::kOk);
     EXPECT_EQ(scene_.place(scene.instances), Status::kOk);
     EXPECT_EQ(contacts_.find(scene_, pairs, {}), Status::kOk);

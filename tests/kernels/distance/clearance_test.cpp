@@ -70,7 +70,7 @@ TEST_P(ClearanceScenes, HaveThePairsOfExactArithmeticOnAllTriangles) {
     ContactOptions options;
     options.self_pairs = seed % 3 == 0;
     options.within = d;
-    query.scene.set_threads(1 + static_cast<std::uint32_t>(seed % 2));
+    EXPECT_EQ(query.scene.set_threads(1 + static_cast<std::uint32_t>(seed % 2)), Status::kOk);
     ASSERT_EQ(query.find(scene.instances, options), Status::kOk);
     EXPECT_EQ(found_contacts(query), all_within(scene, d, options.self_pairs)) << d;
     const ContactCounters& c = query.counters();

@@ -189,7 +189,7 @@ TEST(DistanceQuery, ThreadsAndFormerNearestDoNotMatter) {
     former.push_back({a, b, expected[i].triangle_a, expected[i].triangle_b});
   }
   for (const std::uint32_t threads : {2u, 3u, 16u}) {
-    query.scene.set_threads(threads);
+    EXPECT_EQ(query.scene.set_threads(threads), Status::kOk);
     ASSERT_EQ(query.find(scene.instances, {.reach = 3}), Status::kOk);
     EXPECT_EQ(distances_of(query), expected) << threads;
     EXPECT_EQ(query.counters(), counters) << threads;
@@ -217,7 +217,7 @@ TEST(DistanceQuery, OneLargePairIsSpreadOverThreadsAlike) {
   EXPECT_GE(expected[1].upper, 2.5);
   EXPECT_EQ(expected[2].upper, 0);
   for (const std::uint32_t threads : {2u, 5u}) {
-    query.scene.set_threads(threads);
+    EXPECT_EQ(query.scene.set_threads(threads), Status::kOk);
     ASSERT_EQ(query.find(scene.instances, pairs, {}), Status::kOk);
     EXPECT_EQ(distances_of(query), expected);
   }
@@ -232,6 +232,52 @@ TEST(DistanceQuery, OneLargePairIsSpreadOverThreadsAlike) {
     }
   }
   EXPECT_NEAR(expected[0].upper, least, 1e-6 * least);
+}
+
+TEST(NearnessBelow, IsNoFartherBelowThanTheToleranceAllows) {
+  test::RandomPoses random(17);
+  const int count = test::trials(200000, 10);
+  for (int i = 0; i < count; ++i) {
+    const double upper = std::pow(2, random.uniform(-1000, 900));
+    DistanceTolerance tolerance = {0, i % 5 == 0 ? 0 : std::pow(2, random.uniform(-50, -20))};
+    if (i % 3 == 0) tolerance.absolute = upper * std::pow(2, random.uniform(-54, -20));
+    const double near = nearness_below(tolerance, upper);
+    // Such a difference is exact.
+    ASSERT_LE(upper - near, allowed_width(tolerance, upper)) << upper;
+    ASSERT_GE(upper - near, allowed_width(tolerance, upper) - 0x1p-51 * upper) << upper;
+    ASSERT_GT(near, 0);
+  }
+}
+
+// Many pairs of triangles of two blocks that face each other are at the same distance but for rounding, so
+// what the walk passes over is all but as near as the tolerance allows.
+TEST(Distance, IntervalsAreAsNarrowAsAskedWhereTheToleranceIsNearRounding) {
+  test::RandomPoses random(18);
+  BodyScene scene;
+  scene.assets.add(test::cube(0.5f, 3));
+  scene.instances.assign(2, {0, kIdentityPose});
+  test::Asked<DistanceQuery> query;
+  ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+  const int count = test::trials(20000, 10);
+  int wide = 0, wider = 0;
+  for (int i = 0; i < count; ++i) {
+    const Pose turned = test::any_rotation(random);
+    const double apart[3] = {random.symmetric(0.5), random.symmetric(0.5), 1 + random.uniform(0.01, 2)};
+    for (Instance& body : scene.instances) body.pose = turned;
+    for (int k = 0; k < 3; ++k) {
+      scene.instances[1].pose.translation[k] += turned.rotation[k][0] * apart[0] +
+                                                turned.rotation[k][1] * apart[1] +
+                                                turned.rotation[k][2] * apart[2];
+    }
+    const DistanceTolerance tolerance = {0, i % 4 == 0 ? 0 : std::pow(10, random.uniform(-15, -14))};
+    ASSERT_EQ(query.find(scene.instances, {.tolerance = tolerance}), Status::kOk);
+    const ObjectDistance& found = query.rows()[0];
+    const double width = found.upper - found.lower, allowed = allowed_width(tolerance, found.upper);
+    wide += width > 0.9 * allowed;
+    wider += width > allowed;
+  }
+  EXPECT_EQ(wider, 0);
+  RecordProperty("wide", wide);
 }
 
 }  // namespace

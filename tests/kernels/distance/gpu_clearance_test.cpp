@@ -269,7 +269,7 @@ TEST_F(GpuClearance, RefusesWhatIsNoDistance) {
   const BodyScene scene = pile(2, 100, 0.5, 11);
   AskedContacts gpu(scene, {{0, 1}});
   for (const double d : {-1.0, std::nan(""), HUGE_VAL, 1e301})
-    EXPECT_EQ(gpu.find(within(d)), Status::kOutOfRange);
+    EXPECT_EQ(gpu.find(within(d)), Status::kBadReach);
   EXPECT_EQ(gpu.find(within(1e300)), Status::kOk);
   EXPECT_EQ(gpu.report().contacts, of_cpu(scene, {{0, 1}}, 1e300).contacts.size());
 }

@@ -249,8 +249,8 @@ TEST_F(GpuDistances, ErrorsAreNamed) {
   wrong.instances[1] = {0, at(2e300, 0, 0)};
   EXPECT_EQ(status_of(wrong, {{0, 1}}, 1), Status::kOutOfRange);
   Found found(scene, {{0, 1}});
-  EXPECT_EQ(found.find({.reach = -1}), Status::kOutOfRange);
-  EXPECT_EQ(found.find({.tolerance = {0, NAN}}), Status::kOutOfRange);
+  EXPECT_EQ(found.find({.reach = -1}), Status::kBadReach);
+  EXPECT_EQ(found.find({.tolerance = {0, NAN}}), Status::kBadTolerance);
   EXPECT_EQ(found.find(), Status::kOk);
   test::expect_needed<GpuDistanceQuery>(scene, Contents::exact_queries, Status::kNoAxisAlignedBlocks);
 }

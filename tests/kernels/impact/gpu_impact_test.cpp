@@ -89,6 +89,22 @@ Impact impact_of(Moved& moved, double tolerance = 1e-6) {
   return found.empty() ? Impact{} : found[0];
 }
 
+TEST_F(GpuImpacts, OfBodiesAtRestThereAreNone) {
+  RandomPoses random(19);
+  for (int i = 0; i < test::trials(40, 10); ++i) {
+    const double far = i % 2 == 0 ? 0 : std::pow(10, random.uniform(0, 8));
+    MovingScene moves;
+    moves.scene.assets.add(test::cube(0.5f));
+    for (const double z : {0.0, 1 + std::pow(10, random.uniform(-15, -3))}) {
+      moves.add(0, at(far, 0, z), kAtRest);
+      for (double& x : moves.motion.back().centre) x = random.symmetric(far + 10);
+    }
+    Moved moved(moves, {{0, 1}});
+    const bool touch = ImpactChecker(moves).touch_at(0);
+    EXPECT_EQ(impact_of(moved).status, touch ? ImpactStatus::at_start : ImpactStatus::none);
+  }
+}
+
 class GpuImpactFamilies : public test::GpuTestOf<test::MotionFamily> {};
 
 TEST_P(GpuImpactFamilies, NothingTouchesUntilTSafeAndThenTheGapIsWhatIsTold) {
@@ -340,12 +356,12 @@ TEST_F(GpuImpacts, ErrorsAreNamedAndLeaveNothing) {
   Moved moved(moves, {{0, 1}});
   for (const double duration : {-1.0, static_cast<double>(INFINITY), static_cast<double>(NAN)}) {
     moved.duration = duration;
-    EXPECT_EQ(moved.find_given(), Status::kOutOfRange);
+    EXPECT_EQ(moved.find_given(), Status::kBadDuration);
   }
   moved.duration = 1;
   GpuImpactOptions options = gpu_options();
   options.tolerance = NAN;
-  EXPECT_EQ(moved.find_given(options), Status::kOutOfRange);
+  EXPECT_EQ(moved.find_given(options), Status::kBadTolerance);
 }
 
 TEST_F(GpuImpacts, NeedBothKindsOfBlocks) {

@@ -185,6 +185,63 @@ TEST_F(Impacts, PairsThatAreLeftOutDoNotMeet) {
   EXPECT_GT(meet, 20u);
 }
 
+// Bodies that rest stay as they are to the bit, wherever the centre of their motion is.
+TEST_F(Impacts, BodiesAtRestNeverMeetWhetherTheirPairIsFoundOrGiven) {
+  RandomPoses random(19);
+  const int count = test::trials(400, 10);
+  std::size_t given = 0, found = 0, near = 0;
+  for (int i = 0; i < count; ++i) {
+    const double far = i % 2 == 0 ? 0 : std::pow(10, random.uniform(0, 8));
+    const double gap = std::pow(10, random.uniform(-16, -3));
+    Pose low = at(far, random.symmetric(far), 0), high = low;
+    high.translation[0] += random.symmetric(0.5);
+    high.translation[2] = 1 + gap;
+    MovingScene moves = two_cubes(high, kAtRest, kAtRest);
+    moves.scene.instances[0].pose = low;
+    for (RigidMotion& motion : moves.motion) {
+      for (double& x : motion.centre) x = random.symmetric(i % 3 == 0 ? 0 : far + 10);
+    }
+    const ImpactChecker checker(moves);
+    const Impact impact = this->impact(moves);
+    const bool touch = ImpactChecker(moves).touch_at(0);
+    const ImpactStatus expected = touch ? ImpactStatus::at_start : ImpactStatus::none;
+    EXPECT_EQ(impact.status, expected) << "gap " << gap << " far " << far;
+    EXPECT_EQ(ImpactChecker(moves).touch_at(0.7), touch);
+    ++given;
+    ASSERT_EQ(ask_of(moves, moves.duration), Status::kOk);
+    for (const Impact& row : query_.rows()) {
+      ++found;
+      EXPECT_EQ(row.status, impact.status) << "gap " << gap << " far " << far;
+      EXPECT_EQ(row.t_safe, impact.t_safe);
+    }
+    near += !touch;
+  }
+  EXPECT_GT(near, given / 4);
+  EXPECT_GT(found, 0u);
+}
+
+// The scene finds no pair whose boxes, swept by the motions, are apart.
+TEST_F(Impacts, AGivenPairThatTheSceneDoesNotFindDoesNotMeet) {
+  RandomPoses random(20);
+  const int count = test::trials(400, 10);
+  std::size_t left_out = 0;
+  for (int i = 0; i < count; ++i) {
+    const double gap = std::pow(10, random.uniform(-15, -6)), far = std::pow(10, random.uniform(0, 6));
+    MovingScene moves = two_cubes(at(0.3, 0.2, 1 + gap), moving(0, 0, 0), moving(0.1, 0.1, 0));
+    for (RigidMotion& motion : moves.motion) motion.centre[0] = random.symmetric(far);
+    const Impact impact = this->impact(moves);
+    ASSERT_EQ(ask_of(moves, moves.duration), Status::kOk);
+    if (!query_.rows().empty()) {
+      EXPECT_EQ(query_.rows()[0].status, impact.status);
+      EXPECT_EQ(query_.rows()[0].t_safe, impact.t_safe);
+    } else {
+      ++left_out;
+      EXPECT_EQ(impact.status, ImpactStatus::none) << "gap " << gap << " far " << far;
+    }
+  }
+  EXPECT_GT(left_out, 0u);
+}
+
 TEST_F(Impacts, ThreadsChangeNothing) {
   const MovingScene moves = moving_crowd(4, 80);
   ASSERT_EQ(query_.set_assets(moves.scene.assets.views()), Status::kOk);
@@ -195,7 +252,7 @@ TEST_F(Impacts, ThreadsChangeNothing) {
   EXPECT_GT(counters.found, 0u);
   EXPECT_GT(counters.at_start, 0u);
   for (const std::uint32_t threads : {2u, 5u, 16u}) {
-    query_.scene.set_threads(threads);
+    EXPECT_EQ(query_.scene.set_threads(threads), Status::kOk);
     for (int i = 0; i < 5; ++i) {
       ASSERT_EQ(ask_of(moves, 1), Status::kOk);
       ASSERT_EQ(query_.rows().size(), alone.size());
@@ -237,6 +294,61 @@ TEST_P(ImpactFamilies, NothingTouchesUntilTSafeAndThenTheGapIsWhatIsTold) {
   EXPECT_GT(found, count / 20);
   EXPECT_GT(none, 0);
   EXPECT_GE(near, found * 0.99);
+}
+
+/// What float64 may leave between triangles that stop, besides the tolerance: docs/impact.md has this
+/// formula.
+double resolution_of(const MovingScene& moves) {
+  double turn = 0, size = 0, offset = 0;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const Instance& body = moves.scene.instances[i];
+    const RigidMotion& motion = moves.motion[i];
+    const AssetView& asset = moves.scene.assets.views()[body.asset];
+    const Pose stored = for_stored_coordinates(body.pose, asset.header->origin);
+    double farthest = 0;
+    for (std::uint32_t t = 0; t < asset.level().triangle_count; ++t) {
+      for (const auto& corner : asset.level().triangles[t].corner) {
+        const double x = corner.position[0], y = corner.position[1], z = corner.position[2];
+        farthest = std::max(farthest, std::hypot(x, y, z));
+      }
+    }
+    const auto& [v, w, c] = motion;
+    const auto& x = stored.translation;
+    turn = std::max(turn, moves.duration * std::hypot(w[0], w[1], w[2]));
+    size += farthest + std::hypot(x[0] - c[0], x[1] - c[1], x[2] - c[2]) +
+            moves.duration * std::hypot(v[0], v[1], v[2]) + 0x1p-8 * std::hypot(c[0], c[1], c[2]);
+  }
+  const auto &a = moves.motion[0].centre, &b = moves.motion[1].centre;
+  offset = std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+  return 0x1p-41 * (1 + turn) * (size + offset);
+}
+
+TEST_P(ImpactFamilies, TheGapIsAtMostTheToleranceAndTheResolution) {
+  RandomPoses random(8);
+  const int count = test::trials(120, 6);
+  int found = 0;
+  double largest = 0;
+  for (int i = 0; i < count; ++i) {
+    MovingScene moves = GetParam().make(random);
+    if (i % 2 != 0) {  // up to the largest turn
+      const double turns = std::pow(10, random.uniform(0, 3)) / moves.duration;
+      for (RigidMotion& motion : moves.motion) {
+        auto& w = motion.angular_velocity;
+        const double length = std::hypot(w[0], w[1], w[2]);
+        for (int k = 0; k < 3 && length > 0; ++k) w[k] *= turns / length;
+      }
+    }
+    ImpactOptions options;
+    if (i % 3 != 0) options.tolerance = i % 3 == 1 ? 0 : 1e-9;
+    const Impact impact = this->impact(moves, options);
+    if (impact.status != ImpactStatus::found || query_.counters().unconverged != 0) continue;
+    ++found;
+    const double beyond = impact.gap - options.tolerance * moves.diagonal();
+    largest = std::max(largest, beyond / resolution_of(moves));
+    EXPECT_LE(beyond, resolution_of(moves)) << "motion " << i;
+  }
+  EXPECT_GT(found, count / 20);
+  EXPECT_GT(largest, 0.1);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, ImpactFamilies, testing::ValuesIn(test::kMotionFamilies),

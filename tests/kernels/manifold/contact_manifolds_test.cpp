@@ -56,7 +56,7 @@ TEST(ManifoldQuery, ThreadsDoNotChangeAByte) {
       for (double& x : one.bodies[i].pose.translation) x += random.symmetric(1e-3);
       many.bodies[i].pose = one.bodies[i].pose;
     }
-    many.scene.set_threads(threads);
+    EXPECT_EQ(many.scene.set_threads(threads), Status::kOk);
     one.find(kIdentityPose, {});
     many.find(kIdentityPose, {});
     EXPECT_TRUE(same_bytes(one.manifolds(), many.manifolds())) << threads;

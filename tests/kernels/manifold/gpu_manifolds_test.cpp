@@ -252,6 +252,22 @@ TEST_F(GpuManifolds, OfAGraphThatIsReplayed) {
   }
 }
 
+TEST_F(GpuManifolds, HaveFromOneToSevenPoints) {
+  const BodyScene scene = boxes(2, 0.5, 3);
+  BothSides both(scene.assets);
+  const GpuScene on_gpu(std::span<const AssetView>(), scene.instances, {{0, 1}});
+  ASSERT_EQ(
+      both.gpu_query().find_contacts(on_gpu.instances(), on_gpu.pairs(), test::grouped_options(), nullptr),
+      Status::kOk);
+  const auto make = [&](std::uint32_t most_points) {
+    const GpuManifoldOptions options = {.most_points = most_points};
+    return both.gpu().make(on_gpu.instances(), on_gpu.pairs(), both.gpu_query(), options, nullptr);
+  };
+  for (const std::uint32_t bad : {0u, kMostManifoldPoints + 1, 4000000000u})
+    EXPECT_EQ(make(bad), Status::kBadOption) << bad;
+  for (const std::uint32_t good : {1u, kMostManifoldPoints}) EXPECT_EQ(make(good), Status::kOk) << good;
+}
+
 TEST_F(GpuManifolds, NeedTopology) {
   test::expect_needed<GpuManifoldQuery>(boxes(2, 1, 61), Contents::exact_queries, Status::kNoTopology);
 }

@@ -307,7 +307,7 @@ TEST_F(GpuBroadPhaseTest, ADistanceThatIsNoneAndBoxesThatAreNoneAreRefused) {
   GpuBroadPhase broad_phase;
   ASSERT_EQ(broad_phase.reserve({kMany, 8 * kMany}), Status::kOk);
   for (const double within : {-1.0, -std::numeric_limits<double>::denorm_min(), std::nan("")})
-    EXPECT_EQ(broad_phase.enqueue(good.data(), kMany, {.within = within}, nullptr), Status::kOutOfRange);
+    EXPECT_EQ(broad_phase.enqueue(good.data(), kMany, {.within = within}, nullptr), Status::kBadReach);
   EXPECT_EQ(broad_phase.enqueue(good.data(), kMany, {.within = 1e-3}, nullptr), Status::kOutOfRange)
       << "without room for larger boxes";
   boxes[77].hi[2] = std::nan(""), boxes[78].lo[0] = -1.0000001e300;

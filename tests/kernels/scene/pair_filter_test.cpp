@@ -283,8 +283,8 @@ TEST_F(FilteredQuery, FindsTheContactsOfThePairsThatTheFilterLooksAt) {
     ExcludedPairTable table;
     const PairFilter view = filter.view(table);
     for (std::uint32_t threads = 1; threads <= 16; threads += 5) {
-      all.scene.set_threads(threads);
-      some.scene.set_threads(threads);
+      EXPECT_EQ(all.scene.set_threads(threads), Status::kOk);
+      EXPECT_EQ(some.scene.set_threads(threads), Status::kOk);
       const ContactOptions options = {.self_pairs = parts == kAllParts};
       ASSERT_EQ(all.find(scene.instances, options), Status::kOk);
       const std::vector<Contact> expected = left_by(filter, all);

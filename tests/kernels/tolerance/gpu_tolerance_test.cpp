@@ -222,7 +222,7 @@ TEST_F(GpuTolerance, WhatIsWrongIsSaid) {
     EXPECT_EQ(gpu.query.set_assets(of_two, nullptr), Status::kNoFinestLevel);
     ASSERT_EQ(gpu.query.set_assets(levels, nullptr), Status::kOk);
     for (const double bad : {-1.0, std::nan(""), HUGE_VAL, 1e301})
-      EXPECT_EQ(gpu.decide(bad), Status::kOutOfRange);
+      EXPECT_EQ(gpu.decide(bad), Status::kBadTolerance);
     ASSERT_EQ(gpu.decide(1e300), Status::kOk);
   }
   const auto expect = [&](const std::vector<ObjectPair>& given, Status status, std::uint64_t where) {

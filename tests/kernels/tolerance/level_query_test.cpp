@@ -82,7 +82,7 @@ TEST(LevelQuery, NoContactAtAnyLevelMeansApartAtTheFinest) {
         ASSERT_EQ(coarse.set_assets(views.views), Status::kOk);
         for (int trial = 0; trial < 6; ++trial) {
           const auto bodies = at_levels(scene, views, any_levels(scene, random));
-          coarse.scene.set_threads(1 + static_cast<std::uint32_t>(trial % 2));
+          EXPECT_EQ(coarse.scene.set_threads(1 + static_cast<std::uint32_t>(trial % 2)), Status::kOk);
           const ContactOptions options = {
               .first_contact_only = trial % 2 == 0, .within = within, .add_error_bounds = true};
           ASSERT_EQ(trial % 3 == 0 ? coarse.find(bodies, options) : coarse.find(bodies, pairs, options),

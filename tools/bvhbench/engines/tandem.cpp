@@ -31,9 +31,9 @@ class TandemEngine : public Engine {
 
   // The bodies are not placed in update(), because the filter may be set after it.
   Status place() {
-    scene_.set_threads(threads_);
     placed_ = true;
-    return scene_.place(bodies_, filter_);
+    const Status status = scene_.set_threads(threads_);
+    return status == Status::kOk ? scene_.place(bodies_, filter_) : status;
   }
 
   // Asks about the pairs that are given, or those that the scene finds.

@@ -84,7 +84,7 @@ const std::vector<ContactPoint>& ContactGenerator::generate(const ContactList& f
   }
   // The solvers remember by themselves what a point did in the step before.
   const ManifoldOptions options = {.match_previous = false};
-  scene_.set_threads(threads);
+  throw_unless_ok(scene_.set_threads(threads), scene_);
   throw_unless_ok(scene_.place(bodies), scene_);
   throw_unless_ok(manifolds_.find(scene_, found.pairs, contacts_, options), scene_);
   points_.clear();

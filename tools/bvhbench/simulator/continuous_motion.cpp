@@ -59,7 +59,7 @@ void require(Status status, const Scene& scene) {
 ContinuousMotion::ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads,
                                    const PairFilter& filter)
     : filter_(filter) {
-  moving_.set_threads(threads);
+  require(moving_.set_threads(threads), moving_);
   require(moving_.set_assets(shapes), moving_);
   require(two_.set_assets(shapes), two_);
   for (const AssetView& shape : shapes) inner_radius_.push_back(inner_radius_of(shape));

@@ -49,7 +49,7 @@ enum {
   // The use of this interface, and what the system refuses.
   TANDEM_NULL_ARGUMENT = 1,    ///< a pointer that must be there is null; where: its place in a list
   TANDEM_BAD_STRUCT_SIZE = 2,  ///< struct_size was not set, or a field is set that this version does not know
-  TANDEM_BAD_OPTION = 3,       ///< a number names no choice, or a reserved field is not zero
+  TANDEM_BAD_OPTION = 3,       ///< an option cannot have this number, or a reserved field is not zero
   TANDEM_OUT_OF_MEMORY = 4,    ///< the allocator, or the machine, has not enough memory
   TANDEM_CANNOT_START_THREAD = 5,  ///< the system refuses to start a thread
   TANDEM_INTERNAL_ERROR = 6,       ///< a defect of the library
@@ -89,6 +89,7 @@ enum {
   TANDEM_UNKNOWN_CONTACT = 203, TANDEM_POSE_NOT_RIGID = 204, TANDEM_TOO_MANY_INSTANCES = 205,
   TANDEM_TOO_MANY_PAIRS = 206, TANDEM_KEPT_MISMATCH = 207, TANDEM_MOTION_MISMATCH = 208,
   TANDEM_NO_ORIENTED_BLOCKS = 209, TANDEM_NO_AXIS_ALIGNED_BLOCKS = 210, TANDEM_NO_TOPOLOGY = 211, TANDEM_NO_FINEST_LEVEL = 212,
+  TANDEM_BAD_REACH = 213, TANDEM_BAD_TOLERANCE = 214, TANDEM_BAD_DURATION = 215,
   // A GPU (tandem_cuda.h).
   TANDEM_NO_GPU = 300, TANDEM_DRIVER_TOO_OLD = 301, TANDEM_GPU_NOT_SUPPORTED = 302,
   TANDEM_OUT_OF_GPU_MEMORY = 303, TANDEM_CUDA_FAILED = 304
@@ -267,7 +268,8 @@ typedef struct tandem_level {
   uint32_t vertex_count;     ///< different positions of corners; this and the next two: 0 without topology
   uint32_t component_count;  ///< triangles that edges join
   uint32_t closed;           ///< all components are
-  double error_bound;        ///< no point of this surface or of the file's finest is farther from the other
+  double error_bound;        ///< no point of this surface or of the file's finest is farther from the other,
+                             ///< by the file's word
   const tandem_triangle* triangles;  ///< in leaf order, as contacts number them
 } tandem_level;
 
@@ -371,7 +373,7 @@ TANDEM_API void tandem_device_destroy(tandem_device* device);
 TANDEM_API void tandem_scene_destroy(tandem_scene* scene);
 
 /// Sets how many threads a call may use, the caller's included: 1 at first, at most 1,024; 0: 1. No result
-/// depends on it.
+/// depends on it. Result: TANDEM_BAD_OPTION for more, and nothing has changed.
 TANDEM_API tandem_status tandem_scene_set_threads(tandem_scene* scene, uint32_t threads);
 
 /// Names the assets that bodies refer to, and takes a reference to each. Questions look at the first level
@@ -408,7 +410,8 @@ TANDEM_API tandem_status tandem_scene_remove(tandem_scene* scene, uint32_t body)
 /// Returns all bodies by number, valid until bodies are placed, added or removed.
 TANDEM_API const tandem_instance* tandem_scene_instances(const tandem_scene* scene, size_t* count);
 
-/// The asset, body, pair or contact that is to blame for the last call's error; 0 after TANDEM_OK.
+/// The asset, body, pair or contact that is to blame for the last call's error; 0 after TANDEM_OK, and where
+/// the status alone says what is wrong.
 TANDEM_API uint64_t tandem_scene_where(const tandem_scene* scene);
 
 /// ---- Questions
@@ -438,7 +441,7 @@ typedef struct tandem_pair_options {
 } tandem_pair_options;
 
 /// Finds the object pairs whose world boxes overlap, or are within reach of each other, so that the caller
-/// can leave some out before asking about them. Result: TANDEM_OUT_OF_RANGE where reach is negative or NaN.
+/// can leave some out before asking about them. Result: TANDEM_BAD_REACH where reach is negative or NaN.
 TANDEM_API tandem_status tandem_scene_find_pairs(tandem_scene* scene, const tandem_pair_options* options);
 
 /// ---- Contacts
@@ -475,7 +478,7 @@ typedef struct tandem_contact_counters {
 } tandem_contact_counters;
 
 /// Finds every pair of triangles that meet. A given pair of a body with itself asks for the contacts within
-/// it. Result: TANDEM_OUT_OF_RANGE where `within` is no distance.
+/// it. Result: TANDEM_BAD_REACH where `within` is not from 0 to 1e300.
 TANDEM_API tandem_status tandem_scene_find_contacts(tandem_scene* scene,
                                                     const tandem_contact_options* options);
 /// Returns the contacts by ascending pair, and within a pair in an order that is the same on every run and
@@ -486,7 +489,7 @@ TANDEM_API const tandem_contact* tandem_scene_contacts(const tandem_scene* scene
 
 typedef struct tandem_manifold_options {
   uint32_t struct_size;
-  uint32_t most_points;      ///< of a manifold, 1 to 7; 0: 7
+  uint32_t most_points;      ///< of a manifold, 1 to 7, else TANDEM_BAD_OPTION; 0: 7
   uint32_t ignore_previous;  ///< 1: points are not looked for among those of the last call
   uint32_t reserved;
 } tandem_manifold_options;
@@ -593,7 +596,7 @@ typedef struct tandem_distance_counters {
 } tandem_distance_counters;
 
 /// Finds the distances of object pairs; the scene finds those whose world boxes are within reach. Result:
-/// TANDEM_OUT_OF_RANGE where a tolerance or the reach is negative or NaN.
+/// TANDEM_BAD_TOLERANCE or TANDEM_BAD_REACH where a tolerance or the reach is negative or NaN.
 TANDEM_API tandem_status tandem_scene_find_distances(tandem_scene* scene,
                                                      const tandem_distance_options* options);
 /// Returns the distance of each pair.
@@ -640,7 +643,8 @@ typedef struct tandem_impact_counters {
 } tandem_impact_counters;
 
 /// Finds when object pairs meet in a step; the scene finds those whose boxes, swept by the motions, meet.
-/// Result: TANDEM_OUT_OF_RANGE of motions, the duration and the tolerance.
+/// Result: TANDEM_OUT_OF_RANGE of motions, where tandem_scene_where() is the body; TANDEM_BAD_DURATION or
+/// TANDEM_BAD_TOLERANCE where the duration or the tolerance is negative or not finite.
 TANDEM_API tandem_status tandem_scene_find_impacts(tandem_scene* scene, const tandem_impact_options* options);
 /// Returns the impact of each pair.
 TANDEM_API const tandem_impact* tandem_scene_impacts(const tandem_scene* scene, size_t* count);
@@ -674,8 +678,8 @@ typedef struct tandem_tolerance_counters {
 
 /// Tells of object pairs whether they surely do not meet, surely meet, or are within a tolerance. Each body
 /// is looked at at the coarsest of its levels that can tell. Result: TANDEM_NO_FINEST_LEVEL, where
-/// tandem_scene_where() is the asset, where an asset does not show the file's level 0; TANDEM_OUT_OF_RANGE
-/// where the tolerance is no distance.
+/// tandem_scene_where() is the asset, where an asset does not show the file's level 0; TANDEM_BAD_TOLERANCE
+/// where the tolerance is not from 0 to 1e300.
 TANDEM_API tandem_status tandem_scene_find_verdicts(tandem_scene* scene,
                                                     const tandem_tolerance_options* options);
 /// Returns the verdict of each pair.

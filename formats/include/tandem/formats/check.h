@@ -32,6 +32,10 @@ enum class CheckDepth : std::uint8_t {
 /// what oriented boxes hold and what topology says beyond the range of its indices: with a file that lies
 /// there exact queries on a GPU could miss contacts, and manifolds be wrong, but nothing reads out of bounds.
 ///
+/// Error bounds of levels are the writer's word, as the rounding error of the header is: that they are finite
+/// and ascend is checked, not that they hold, which takes as long as making levels. Of a file that lies
+/// there, verdicts and contacts with error bounds may be wrong. bvhinfo --verify --levels proves the bounds.
+///
 /// Reads the bytes twice, and the triangles once for each block above them. Throws nothing. A full check of a
 /// level with topology takes up to 48 bytes a triangle meanwhile, and kOutOfMemory says that they are not
 /// there; else it allocates nothing. `data` must be aligned to 128 bytes (kMisaligned otherwise); it need not

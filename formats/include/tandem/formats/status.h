@@ -78,6 +78,11 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kNoAxisAlignedBlocks,  ///< the other modes of queries on a GPU need them, and the asset was given without
     kNoTopology,           ///< contact manifolds need it, and the file has none
     kNoFinestLevel,        ///< queries by tolerance need it, and the view leaves it out
+    // These say that an option has a value which it cannot have.
+    kBadOption = 3,   ///< a number that names no choice, or a count beyond its limits
+    kBadReach = 213,  ///< `reach` or `within` is negative, NaN or larger than the query can take
+    kBadTolerance,    ///< a tolerance is negative, NaN or larger than the query can take
+    kBadDuration,     ///< a step's length is negative or not finite
     // These are of a GPU; status_of() of gpu_status.h names CUDA's errors.
     kNoGpu = 300,      ///< none here, none that this process may use, or no driver
     kDriverTooOld,     ///< for the CUDA version that the program was built with

@@ -29,7 +29,7 @@ struct ContactOptions {
   bool self_pairs = false;          ///< where the scene finds the pairs: also each instance with itself
   /// Clearance: triangles whose distance is at most this count as contacts, decided exactly, in mode fast
   /// too; candidates are triangles whose boxes are within it. 0: those that meet. From 0 to
-  /// kLargestWorldCoordinate, else kOutOfRange.
+  /// kLargestWorldCoordinate, else kBadReach.
   double within = 0;
   /// Levels of detail: each object pair is asked for a clearance that is larger by what its two levels may
   /// differ from the finest ones (docs/levels.md). The finest surfaces of a pair without a contact, and of

@@ -48,8 +48,8 @@ struct DistanceCounters {
 /// Finds how near the surfaces of two bodies are. The geometry is that of ContactQuery: the posed vertices in
 /// float64. The scene finds the object pairs whose world boxes are within reach of each other, or a little
 /// beyond. There is one row for each pair; an instance has distance 0 to itself. find() takes about 100 KB of
-/// the stack of each thread. Result of find(): as of ContactQuery; kOutOfRange where a tolerance or the reach
-/// is negative or NaN.
+/// the stack of each thread. Result of find(): as of ContactQuery; kBadTolerance or kBadReach where a
+/// tolerance or the reach is negative or NaN.
 class DistanceQuery : public PairQuestion<DistanceQuery, ObjectDistance, DistanceCounters, DistanceOptions> {
  private:
   friend PairQuestion;

@@ -17,7 +17,10 @@ enum class ImpactStatus : std::uint8_t {
 /// faces are kNoIndex, the gap is infinite, and the points are 0.
 struct Impact {
   double t_safe;  ///< seconds; the whole step where there is none, 0 where they are in contact at the start
-  double gap;     ///< of the two triangles at t_safe; other triangles of the pair may be nearer, but recede
+  /// How far the two triangles are apart at t_safe: at most the tolerance and a resolution that grows with
+  /// the turn, 2^-41 (1 + turn) size (docs/impact.md), unless steps ran out, which the counters tell. Other
+  /// triangles of the pair may be nearer, but recede.
+  double gap;
   double point_a[3], point_b[3];         ///< where these are nearest then, in the world
   std::uint32_t triangle_a, triangle_b;  ///< in leaf order
   std::uint32_t face_a, face_b;          ///< of the source files
@@ -51,9 +54,13 @@ struct ImpactCounters {
 /// Finds until when moving instances surely do not meet. The scene finds the object pairs whose boxes, swept
 /// by the motions, meet. There is one row for each pair; an instance and itself do not move relative to each
 /// other. find() takes about 100 KB of the calling thread's stack. Result of find(): as of ContactQuery;
-/// kMotionMismatch where there are not as many motions as instances; kOutOfRange where the duration or the
-/// tolerance is negative or not finite, and where an instance, which where() of the scene names, turns by
-/// more than kLargestTurn, or its centre, place or displacement are beyond kLargestMovingCoordinate.
+/// kMotionMismatch where there are not as many motions as instances; kBadDuration or kBadTolerance where the
+/// duration or the tolerance is negative or not finite; kOutOfRange where an instance, which where() of the
+/// scene names, turns by more than kLargestTurn, or its centre, place or displacement are beyond
+/// kLargestMovingCoordinate.
+///
+/// Two bodies at rest do not meet in the step, and a given pair that the scene would not find does not
+/// either.
 ///
 /// **Guarantee.** Unless a pair is in contact at the start, no triangles of its two instances meet at any
 /// time in [0, t_safe]: neither those that move as RigidMotion defines, nor those that apply() makes of

@@ -11,7 +11,8 @@ struct ManifoldOptions {
   /// Points are looked for among those of the last call: Manifold points then have `previous`, and keep the
   /// ids that they had. Without it ids are those of the features, and the last call does not matter.
   bool match_previous = true;
-  std::uint32_t most_points = kMostManifoldPoints;  ///< of a manifold; less than 1 is 1, more than kMostManifoldPoints that
+  std::uint32_t most_points =
+      kMostManifoldPoints;  ///< of a manifold, from 1 to kMostManifoldPoints, else kBadOption
 };
 
 /// Makes contact manifolds of contacts. Rows are manifolds by ascending pair and, within a pair, by their

@@ -24,6 +24,13 @@ struct RigidMotion {
 
 inline constexpr RigidMotion kAtRest = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
 
+/// Returns whether a body with this motion stays where it is, wherever its centre is.
+TANDEM_HD inline bool is_at_rest(const RigidMotion& motion) {
+  bool rests = true;
+  for (int k = 0; k < 3; ++k) rests = rests && motion.velocity[k] == 0 && motion.angular_velocity[k] == 0;
+  return rests;
+}
+
 /// The largest angle that a body may turn by in a step, in radians, and the largest coordinate, displacement
 /// and centre that motions take.
 inline constexpr double kLargestTurn = 1024;
@@ -57,9 +64,10 @@ TANDEM_HD inline void rotation_by(const manifold::Vector3& turn, double (&out)[3
 }
 
 /// The float64 pose at time t: rotation Q R and translation c + t v + Q (translation - c), of the coordinates
-/// that `start` is of. At t = 0 it is `start`. How far it is from the motion: pose_error().
+/// that `start` is of. At t = 0, and of a body at rest, it is `start`. How far it is from the motion:
+/// pose_error().
 TANDEM_HD inline Pose pose_at(const Pose& start, const RigidMotion& motion, double t) {
-  if (t == 0) return start;
+  if (t == 0 || is_at_rest(motion)) return start;
   const auto& w = motion.angular_velocity;
   double q[3][3];
   rotation_by({t * w[0], t * w[1], t * w[2]}, q);

@@ -53,8 +53,9 @@ class Scene {
   ~Scene();
 
   /// Sets how many threads a call may use, the caller's included, from 1 (the default) to kMostSceneThreads.
-  /// No result depends on it.
-  void set_threads(std::uint32_t threads);
+  /// No result depends on it. Result: kOk; kBadOption for another number, or kOutOfMemory, and nothing has
+  /// changed.
+  Status set_threads(std::uint32_t threads);
 
   /// Names the assets that instances refer to. Questions look at the first level that each view shows
   /// (AssetView::levels_from()); ToleranceQuery looks at all. What the views point to must outlive the
@@ -89,7 +90,7 @@ class Scene {
 
   /// Finds the object pairs whose world boxes overlap, or are within reach of each other or a little beyond,
   /// so that the caller can leave some out before asking a question of them. self_pairs: also each body with
-  /// itself. Result: kOk; kOutOfRange where reach is negative or NaN; kTooManyPairs, kOutOfMemory or
+  /// itself. Result: kOk; kBadReach where reach is negative or NaN; kTooManyPairs, kOutOfMemory or
   /// kCannotStartThread. After an error there are no pairs.
   Status find_pairs(double reach = 0, bool self_pairs = false);
 
@@ -101,7 +102,7 @@ class Scene {
   std::span<const Instance> instances() const;
 
   /// The asset, instance, pair or contact that is to blame for the last error of this scene or of a question
-  /// asked of it.
+  /// asked of it; 0 where the status alone says what is wrong.
   std::uint64_t where() const;
 
   /// Has a device answer the questions, of a scene that has no assets yet. The scene owns the device; after

@@ -23,7 +23,7 @@ struct PairVerdict {
 
 struct ToleranceOptions {
   /// The distance that need not be told apart from touching, in units of length. With 0 all pairs are
-  /// decided. From 0 to kLargestWorldCoordinate, else kOutOfRange.
+  /// decided. From 0 to kLargestWorldCoordinate, else kBadTolerance.
   double tolerance = 0;
 };
 

@@ -15,10 +15,10 @@ enum class Access : std::uint8_t {
 /// Owns the bytes of a .bvh file in CPU memory and hands out views of them. Movable, not copyable. Throws
 /// nothing.
 ///
-/// open() looks at every byte, of all levels of detail, since nothing of a file is believed unseen. Mapping
-/// copies nothing: pages are the system's, which takes them back when memory is scarce. If a file has several
-/// levels, open() gives them back itself (on Linux), so that the asset takes memory of the process only for
-/// the pages of the levels that are used.
+/// open() looks at every byte, of all levels of detail, and believes nothing of a file unseen but the error
+/// bounds that check() names. Mapping copies nothing: pages are the system's, which takes them back when
+/// memory is scarce. If a file has several levels, open() gives them back itself (on Linux), so that the
+/// asset takes memory of the process only for the pages of the levels that are used.
 ///
 /// While an asset is mapped, nobody may write into its file or cut it short: what was checked would no longer
 /// hold, and reading a page that is gone ends a process. Tools that replace a file by a rename, as bvhbuild

@@ -158,8 +158,9 @@ TANDEM_API tandem_status tandem_gpu_broad_phase_reserve(tandem_gpu_broad_phase* 
 TANDEM_API tandem_status tandem_gpu_broad_phase_keep_fixed(tandem_gpu_broad_phase* broad_phase,
                                                            const tandem_gpu_instances* instances,
                                                            const uint8_t* motion, tandem_stream stream);
-/// Result: TANDEM_OUT_OF_RANGE where less was reserved, or without these options, or `within` is negative or
-/// NaN; TANDEM_UNKNOWN_INSTANCE: an excluded pair names one that there is not; TANDEM_KEPT_MISMATCH.
+/// Result: TANDEM_OUT_OF_RANGE where less was reserved, or without these options; TANDEM_BAD_REACH where
+/// `within` is negative or NaN; TANDEM_UNKNOWN_INSTANCE: an excluded pair names one that there is not;
+/// TANDEM_KEPT_MISMATCH.
 TANDEM_API tandem_status tandem_gpu_broad_phase_enqueue(tandem_gpu_broad_phase* broad_phase,
                                                         const tandem_gpu_instances* instances,
                                                         const tandem_gpu_broad_phase_options* options,
@@ -240,7 +241,7 @@ TANDEM_API tandem_status tandem_gpu_contact_query_reserve(tandem_gpu_contact_que
                                                           const tandem_gpu_query_options* options);
 /// A pair of an instance with itself asks for the contacts within it. Result: TANDEM_NO_ORIENTED_BLOCKS or
 /// TANDEM_NO_AXIS_ALIGNED_BLOCKS, where an asset lacks what the mode walks; TANDEM_OUT_OF_RANGE: reserved
-/// without these options, or `within` is no distance.
+/// without these options; TANDEM_BAD_REACH: `within` is not from 0 to 1e300.
 TANDEM_API tandem_status tandem_gpu_contact_query_enqueue(tandem_gpu_contact_query* query,
                                                           const tandem_gpu_instances* instances,
                                                           const tandem_gpu_pairs* pairs,
@@ -400,7 +401,7 @@ TANDEM_API tandem_status tandem_gpu_distance_query_set_assets(tandem_gpu_distanc
                                                               tandem_stream stream);
 TANDEM_API tandem_status tandem_gpu_distance_query_reserve(tandem_gpu_distance_query* query,
                                                            const tandem_gpu_distance_capacity* capacity);
-/// Result: TANDEM_OUT_OF_RANGE for a tolerance or reach that is negative or NaN.
+/// Result: TANDEM_BAD_TOLERANCE or TANDEM_BAD_REACH where it is negative or NaN.
 TANDEM_API tandem_status tandem_gpu_distance_query_enqueue(tandem_gpu_distance_query* query,
                                                            const tandem_gpu_instances* instances,
                                                            const tandem_gpu_pairs* pairs,
@@ -463,8 +464,9 @@ TANDEM_API tandem_status tandem_gpu_impact_query_reserve(tandem_gpu_impact_query
                                                          const tandem_gpu_impact_capacity* capacity,
                                                          const tandem_gpu_impact_options* options);
 /// Queues a query of the given pairs, or of those whose boxes, swept by the motions of a step of `duration`,
-/// meet. motion: that of each instance, in GPU memory. pairs: or null. Result: TANDEM_OUT_OF_RANGE of the
-/// duration and the tolerance, or for more instances than reserved; as of tandem_gpu_broad_phase_enqueue().
+/// meet. motion: that of each instance, in GPU memory. pairs: or null. Result:
+/// TANDEM_BAD_DURATION or TANDEM_BAD_TOLERANCE where it is negative or not finite; TANDEM_OUT_OF_RANGE for
+/// more instances than reserved; as of tandem_gpu_broad_phase_enqueue().
 TANDEM_API tandem_status tandem_gpu_impact_query_enqueue(tandem_gpu_impact_query* query,
                                                          const tandem_gpu_instances* instances,
                                                          const tandem_motion* motion, double duration,
@@ -515,8 +517,8 @@ TANDEM_API tandem_status tandem_gpu_tolerance_query_set_assets(tandem_gpu_tolera
                                                                tandem_stream stream);
 TANDEM_API tandem_status tandem_gpu_tolerance_query_reserve(tandem_gpu_tolerance_query* query,
                                                             const tandem_gpu_tolerance_capacity* capacity);
-/// tolerance: what need not be told apart from touching. Result: TANDEM_OUT_OF_RANGE where it is none, or for
-/// more instances than reserved.
+/// tolerance: what need not be told apart from touching. Result: TANDEM_BAD_TOLERANCE where it is not from 0
+/// to 1e300; TANDEM_OUT_OF_RANGE for more instances than reserved.
 TANDEM_API tandem_status tandem_gpu_tolerance_query_enqueue(tandem_gpu_tolerance_query* query,
                                                             const tandem_gpu_instances* instances,
                                                             const tandem_gpu_pairs* pairs, double tolerance,

@@ -78,10 +78,10 @@ class GpuBroadPhase : public GpuQuestion<GpuBroadPhaseCapacity, GpuBroadPhaseRep
                     std::span<const Motion> motion, cudaStream_t stream);
 
   /// Queues a broad phase of the boxes behind what `stream` holds. They lie in GPU memory at a multiple of 16
-  /// bytes. Result: also kMisaligned, kOutOfRange (more than reserved for; `within` negative or NaN),
-  /// kUnknownInstance (the filter excludes a pair of boxes that there are not), kKeptMismatch (fixed ones are
-  /// kept of another number of boxes, or of instances). The report's status may be kOutOfRange: a coordinate
-  /// that is NaN or beyond kLargestWorldCoordinate. Condition: reserve() with these options.
+  /// bytes. Result: also kMisaligned, kOutOfRange (more than reserved for), kBadReach (`within` negative or
+  /// NaN), kUnknownInstance (the filter excludes a pair of boxes that there are not), kKeptMismatch (fixed
+  /// ones are kept of another number of boxes, or of instances). The report's status may be kOutOfRange: a
+  /// coordinate that is NaN or beyond kLargestWorldCoordinate. Condition: reserve() with these options.
   Status enqueue(const WorldBox* boxes, std::uint32_t count, const GpuBroadPhaseOptions& options,
                  cudaStream_t stream);
 

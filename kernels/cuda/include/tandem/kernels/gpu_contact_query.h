@@ -105,7 +105,7 @@ class GpuContactQuery : public GpuAssetQuestion<GpuContactCapacity, GpuContactRe
   /// Queues a query behind what `stream` holds. A pair of an instance with itself asks for the contacts
   /// within it. Mode exact walks oriented blocks, the others axis-aligned ones. Result: also
   /// kNoOrientedBlocks or kNoAxisAlignedBlocks (an asset lacks them), kOutOfRange (sorted, grouped or of
-  /// clearance, and reserved without; a distance that is none). Condition: set_assets() and reserve().
+  /// clearance, and reserved without), kBadReach (`within`). Condition: set_assets() and reserve().
   Status enqueue(const GpuInstances& instances, const GpuPairs& pairs, const GpuContactOptions& options,
                  cudaStream_t stream);
 

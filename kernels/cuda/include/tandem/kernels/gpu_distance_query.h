@@ -62,7 +62,7 @@ extern template class GpuAssetQuestion<GpuDistanceCapacity, GpuDistanceReport>;
 class GpuDistanceQuery : public GpuAssetQuestion<GpuDistanceCapacity, GpuDistanceReport> {
  public:
   /// Queues a query behind what `stream` holds. Pairs may be in either order of a and b; an instance is at
-  /// distance 0 from itself. Result: also kOutOfRange (a tolerance or reach that is negative or NaN).
+  /// distance 0 from itself. Result: also kBadTolerance or kBadReach, where it is negative or NaN.
   /// Condition: set_assets() and reserve().
   Status enqueue(const GpuInstances& instances, const GpuPairs& pairs, const GpuDistanceOptions& options,
                  cudaStream_t stream);

@@ -38,7 +38,7 @@ inline constexpr std::uint32_t kImpactSamplesPerPair = 2, kFewestImpactSamples =
 /// GpuImpactQuery::bytes(). sorted: whether any of its calls sorts pairs.
 constexpr std::size_t most_impact_bytes(const GpuImpactCapacity& capacity, std::size_t assets, bool sorted) {
   const std::size_t samples = kImpactSamplesPerPair * std::size_t{capacity.pairs} + kFewestImpactSamples;
-  return (std::size_t{9} << 20) + sizeof(GpuAsset) * assets + 264 * std::size_t{capacity.instances} +
+  return (std::size_t{9} << 20) + sizeof(GpuAsset) * assets + 272 * std::size_t{capacity.instances} +
          240 * std::size_t{capacity.pairs} + 168 * samples + 656 * std::size_t{capacity.parts} +
          48 * std::size_t{capacity.block_pairs} + 56 * std::size_t{capacity.triangle_pairs} +
          most_query_bytes({capacity.pairs, capacity.contacts, capacity.undecided}, {}, assets) +
@@ -72,9 +72,9 @@ class GpuImpactQuery : public GpuAssetQuestion<GpuImpactCapacity, GpuImpactRepor
  public:
   /// Queues a query behind what `stream` holds. It finds the object pairs whose boxes, swept by their motions
   /// of a step of `duration` seconds, meet, and when each of them does. motion: of each instance, in GPU
-  /// memory. Result: also kOutOfRange, where the duration or the tolerance is negative or not finite, or
-  /// there are more instances than reserved for; kUnknownInstance as of GpuBroadPhase::enqueue(). Condition:
-  /// set_assets() and reserve() with these options.
+  /// memory. Result: also kBadDuration or kBadTolerance, where it is negative or not finite; kOutOfRange
+  /// where there are more instances than reserved for; kUnknownInstance as of GpuBroadPhase::enqueue().
+  /// Condition: set_assets() and reserve() with these options.
   Status enqueue(const GpuInstances& instances, const RigidMotion* motion, double duration,
                  const GpuImpactOptions& options, cudaStream_t stream);
 

@@ -51,7 +51,7 @@ extern template class GpuAssetQuestion<GpuManifoldCapacity, GpuManifoldReport>;
 class GpuManifoldQuery : public GpuAssetQuestion<GpuManifoldCapacity, GpuManifoldReport> {
  public:
   /// Queues the making of manifolds behind what `stream` holds, the contact query among it, whose contacts
-  /// are grouped. Condition: set_assets() and reserve().
+  /// are grouped. Result: also kBadOption (most_points). Condition: set_assets() and reserve().
   Status enqueue(const GpuInstances& instances, const GpuPairs& pairs, const GpuContactQuery& query,
                  const GpuManifoldOptions& options, cudaStream_t stream);
 

@@ -51,8 +51,8 @@ extern template class GpuAssetQuestion<GpuToleranceCapacity, GpuToleranceReport>
 class GpuToleranceQuery : public GpuAssetQuestion<GpuToleranceCapacity, GpuToleranceReport> {
  public:
   /// Queues a query behind what `stream` holds. Pairs may be in either order of a and b; an instance touches
-  /// itself. tolerance: as of ToleranceOptions. Result: also kOutOfRange (more instances than reserved for, a
-  /// tolerance that is none). Condition: set_assets() and reserve().
+  /// itself. tolerance: as of ToleranceOptions. Result: also kBadTolerance, or kOutOfRange (more instances
+  /// than reserved for). Condition: set_assets() and reserve().
   Status enqueue(const GpuInstances& instances, const GpuPairs& pairs, double tolerance, cudaStream_t stream);
 
   /// Comes to all verdicts, and waits for them.

@@ -133,19 +133,23 @@ class NearestWalk {
   void run(const BoundedBlockPair* from, std::uint32_t count) {
     take_limits();
     if (state_.found) wait_in_order();
-    for (std::uint32_t i = 0; i < count && goes_on(); ++i) {
-      stack_[height_++] = from[i];
-      while (goes_on() && visits_ < state_.most_visits && (height_ > 0 || take_nearest()))
-        visit(stack_[--height_]);
+    std::uint32_t next = 0;
+    while (next < count && goes_on() && is_within_limits()) {
+      stack_[height_++] = from[next++];
+      while (goes_on() && is_within_limits() && (height_ > 0 || take_nearest())) visit(stack_[--height_]);
     }
     if (goes_on()) bound_triangles(true);
     while (goes_on() && (height_ > 0 || take_nearest())) leave(stack_[--height_], state_);
+    for (; next < count && goes_on(); ++next) leave(from[next], state_);
   }
 
  private:
   using Bound = typename Means::Bound;
 
   bool goes_on() const { return !state_.touches() && state_.enough_memory; }
+  bool is_within_limits() const {
+    return visits_ < state_.most_visits && state_.bounded < state_.most_bounded;
+  }
 
   void take_limits() {
     limit_ = means_.limit(nearness(task_, state_));
@@ -173,6 +177,8 @@ class NearestWalk {
       else
         pass_over(bound[bit]);
     }
+    if (hits != 0 && state_.heights != nullptr) [[unlikely]]
+      hits = drop_by_heights(task_, pair.a, pair.b, hits, state_);
     if (hits == 0) return;
     const bool leaves_a = a.is_leaf_block(), leaves_b = b.is_leaf_block();
     if (leaves_a && leaves_b) return take_leaves(a, b, hits);
@@ -250,6 +256,7 @@ class NearestWalk {
     BoundedBatch found;
     means_.bound(near_, found);
     state_.counters.by_float32 += count;
+    state_.bounded += count;
     std::uint32_t nearest = kNearBatch;
     for (std::uint32_t i = 0; i < count; ++i) {
       if (!(found.upper[i] < state_.upper)) continue;
@@ -265,8 +272,10 @@ class NearestWalk {
     for (std::uint32_t i = 0; i < count && goes_on(); ++i) {
       if (!(found.lower[i] < near) && i != nearest)
         state_.floor = std::min(state_.floor, found.lower[i]);
-      else if (found.lower[i] == 0)
+      else if (found.lower[i] == 0 && i == nearest)
         settle(task_, near_.a[i], near_.b[i], state_);
+      else if (found.lower[i] == 0)
+        settle_if_near(task_, near_.a[i], near_.b[i], 0, state_);
       else
         add_candidate({found.lower[i], found.upper[i], near_.a[i], near_.b[i]}, state_);
     }

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <span>
 
-#include "kernels/contact/narrow_phase.h"
+#include "kernels/contact/first_within.h"
 #include "kernels/scene/scene_state.h"
 
 namespace tandem {
@@ -29,6 +29,7 @@ class ContactFinder {
 
   struct Worker {
     Buffer<Contact> contacts;
+    Buffer<NearBlockPair> waiting;
     std::uint32_t workers = 1;  // of this call
     ContactCounters counters;
     bool enough_memory = true;

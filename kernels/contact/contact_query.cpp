@@ -54,6 +54,9 @@ PairTask ContactFinder::task_of(std::uint32_t pair) const {
   task.pair = pair;
   task.mode = options_.mode;
   task.first_contact_only = options_.first_contact_only;
+  if (task.first_contact_only && task.in_frame && !task.self && task.within > 0)
+    task.most_candidates =
+        std::max(kLeastBeforeGivingUp, std::uint64_t{a.tree.triangle_count} + b.tree.triangle_count);
   return task;
 }
 
@@ -73,7 +76,9 @@ void ContactFinder::work(std::uint32_t worker) {
     const std::size_t end = std::min(pairs_.size(), first + pairs_in_chunk_);
     for (std::size_t pair = first; pair < end && self.enough_memory; ++pair) {
       const PairTask task = task_of(static_cast<std::uint32_t>(pair));
+      sink.gave_up = false;
       self.enough_memory = (task.in_frame ? narrow_phase_ : narrow_phase_by_world_boxes)(task, sink);
+      if (sink.gave_up) self.enough_memory = find_first_within(task, sink, self.waiting);
     }
     chunks_[chunk] = {worker, begin, used(), 0};
   }

@@ -25,7 +25,8 @@ struct PairTask {
   float frame_error = 0;  ///< see frame_test.h; with what is within reach too
   bool on_grid = false;   ///< lie_on_grid()
   double within = 0;      ///< triangles at most so far apart count; 0: those that meet
-  distance::FrameClearance clearance = {};  ///< where that is not 0
+  distance::FrameClearance clearance = {};            ///< where that is not 0
+  std::uint64_t most_candidates = ~std::uint64_t{0};  ///< of clearance: the walk gives up after so many
 };
 
 /// Returns the task of these two, or of one instance with itself. The caller sets what else is asked.
@@ -37,6 +38,7 @@ struct ContactSink {
   Contact* end = nullptr;
   void* owner = nullptr;
   bool (*grow)(ContactSink&) = nullptr;  ///< makes room for at least one; false: out of memory
+  bool gave_up = false;                  ///< the last walk did, so it does not know all contacts
   ContactCounters counters;
 };
 

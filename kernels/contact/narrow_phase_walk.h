@@ -113,7 +113,16 @@ class PairWalk {
       near_.b[near_.count++] = candidates_.b[i];
     }
     drop_batch(candidates_);
+    sifted_ += count;
+    if (sifted_ >= task_.most_candidates && !done_) give_up();
     return !done_ && (near_.count < kBatch || settle_near(kBatch));
+  }
+
+  /// Ends the walk, and leaves what may be within to the next.
+  void give_up() {
+    sink_.counters.candidates -= near_.count;
+    near_.count = 0;
+    sink_.gave_up = done_ = true;
   }
 
   /// Decides the first `count` that may be within. False: the pair is done with.
@@ -192,6 +201,7 @@ class PairWalk {
   const Means means_;
   Candidates candidates_;
   Candidates near_;  ///< of clearance, what may be within
+  std::uint64_t sifted_ = 0;
   bool done_ = false, enough_memory_ = true;
 };
 

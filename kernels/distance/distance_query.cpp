@@ -16,6 +16,10 @@ constexpr std::size_t kMostPairsAtOnce = 16;
 // Pairs of bodies with more triangles than this, together, are spread over all threads, one after the other.
 constexpr std::uint64_t kSpreadFrom = std::uint64_t{1} << 18;
 
+// A walk of a pair ends, so that heights may be found, when it has bounded as many pairs of triangles as this
+// part of the triangles, but not before it has bounded so many.
+constexpr std::uint64_t kPartBounded = 4, kLeastBounded = 1024;
+
 // A walk of such a pair visits so many pairs of blocks before it leaves the rest to others; and so many walks
 // make a round, in which none knows what the others find. Threads take them as they come.
 constexpr std::uint64_t kVisitsAlone = 2048, kVisitsInRound = 512;
@@ -35,9 +39,16 @@ bool is_near_first(const BoundedBlockPair& x, const BoundedBlockPair& y) {
 }  // namespace
 
 struct DistanceQuery::State : Allocated {
+  // The search for a pair's distance, or one walk of a round.
+  struct Search {
+    NearestSoFar found;
+    NodeHeights heights;
+    Buffer<BoundedBlockPair> walks;
+  };
+
   NearestPhase nearest_phase = best_way(tandem::nearest_phase);
-  PerWorker<NearestSoFar> slots;  // one for each worker, or for each walk of a round
-  Buffer<BoundedBlockPair> walks;
+  PerWorker<Search> slots;  // one for each worker, or for each walk of a round
+  Search spread;
 
   // These belong to the call.
   SceneState* scene = nullptr;
@@ -49,11 +60,13 @@ struct DistanceQuery::State : Allocated {
   bool is_spread(const ObjectPair& pair) const;
   NearestTask task_of(const ObjectPair& pair) const;
   void begin(const NearestTask& task, const ObjectPair& pair, NearestSoFar& state) const;
+  static void find_heights(const NearestTask& task, Search& search);
+  static void take_left(Search& search);
   NearestPhase phase_of(const NearestTask& task) const {
     return task.in_frame ? nearest_phase : nearest_phase_by_world_boxes;
   }
-  void find_one(std::size_t pair, NearestSoFar& state);
-  bool walk_round(const NearestTask& task, std::size_t first, NearestSoFar& state);
+  void find_one(std::size_t pair, Search& search);
+  bool walk_round(const NearestTask& task, std::size_t first, Search& whole);
   bool find_spread(std::size_t pair);
   void finish(std::size_t pair, const NearestTask& task, NearestSoFar& state);
   Status find_all();
@@ -72,6 +85,9 @@ NearestTask DistanceQuery::State::task_of(const ObjectPair& pair) const {
 // Begins with nothing known but what the former nearest triangles tell.
 void DistanceQuery::State::begin(const NearestTask& task, const ObjectPair& pair, NearestSoFar& state) const {
   state.reset(options.reach);
+  state.most_bounded =
+      std::max(kLeastBounded,
+               (std::uint64_t{task.a->tree.triangle_count} + task.b->tree.triangle_count) / kPartBounded);
   const auto comes_before = [](const FormerNearest& x, const ObjectPair& y) {
     return x.a != y.a ? x.a < y.a : x.b < y.b;
   };
@@ -79,6 +95,25 @@ void DistanceQuery::State::begin(const NearestTask& task, const ObjectPair& pair
   if (former == options.former.end() || former->a != pair.a || former->b != pair.b) return;
   if (former->triangle_a < task.a->tree.triangle_count && former->triangle_b < task.b->tree.triangle_count)
     settle(task, former->triangle_a, former->triangle_b, state);
+}
+
+// Finds heights along the direction of the best, for the rest of the walk, and lets it go on for four times
+// as long before that is done again for a better one.
+void DistanceQuery::State::find_heights(const NearestTask& task, Search& search) {
+  NearestSoFar& state = search.found;
+  state.most_bounded = 4 * state.bounded;
+  settle_nearest(task, state);
+  if (state.touches() || state.triangle_a == kNoIndex) return;
+  find_direction(task, state);
+  state.enough_memory = search.heights.make(task, state.along);
+  state.heights = &search.heights;
+}
+
+// Makes what was left the next walks, the nearest first.
+void DistanceQuery::State::take_left(Search& search) {
+  std::swap(search.walks, search.found.left);
+  search.found.left.clear();
+  std::sort(search.walks.data(), search.walks.data() + search.walks.size(), is_near_first);
 }
 
 // The pair's row, of what is left when all candidates are settled.
@@ -101,8 +136,9 @@ void DistanceQuery::State::finish(std::size_t pair, const NearestTask& task, Nea
   out.face_b = task.b->tree.triangles[out.triangle_b].source_face();
 }
 
-void DistanceQuery::State::find_one(std::size_t pair, NearestSoFar& state) {
+void DistanceQuery::State::find_one(std::size_t pair, Search& search) {
   const NearestTask task = task_of(pairs[pair]);
+  NearestSoFar& state = search.found;
   if (pairs[pair].a == pairs[pair].b) {
     state.reset(options.reach);
     settle(task, 0, 0, state);
@@ -110,17 +146,24 @@ void DistanceQuery::State::find_one(std::size_t pair, NearestSoFar& state) {
     begin(task, pairs[pair], state);
     const BoundedBlockPair roots = {0, 0, 0, kAllNodePairs};
     phase_of(task)(task, &roots, 1, state);
+    while (state.left.size() > 0 && !state.touches() && state.enough_memory) {
+      find_heights(task, search);
+      take_left(search);
+      if (state.enough_memory)
+        phase_of(task)(task, search.walks.data(), static_cast<std::uint32_t>(search.walks.size()), state);
+    }
   }
   finish(pair, task, state);
 }
 
 // Walks of which none knows what the others find, whoever takes them; what they found and left, in their
 // order.
-bool DistanceQuery::State::walk_round(const NearestTask& task, std::size_t first, NearestSoFar& state) {
-  const std::size_t count = std::min(walks.size() - first, kWalksInRound);
+bool DistanceQuery::State::walk_round(const NearestTask& task, std::size_t first, Search& whole) {
+  NearestSoFar& state = whole.found;
+  const std::size_t count = std::min(whole.walks.size() - first, kWalksInRound);
   const auto walk = [&](std::size_t i, std::size_t end, std::uint32_t) {
     for (; i < end; ++i) {
-      NearestSoFar& own = slots[i];
+      NearestSoFar& own = slots[i].found;
       own.reset(INFINITY);
       own.counters = {};
       own.upper = state.upper;
@@ -128,29 +171,31 @@ bool DistanceQuery::State::walk_round(const NearestTask& task, std::size_t first
       own.has_direction = state.has_direction;
       std::copy_n(state.direction, 3, own.direction);
       own.most_visits = kVisitsInRound;
-      phase_of(task)(task, &walks[first + i], 1, own);
+      own.heights = state.heights;
+      phase_of(task)(task, &whole.walks[first + i], 1, own);
     }
   };
   scene->threads.for_parts(scene->workers_for(count, 1), count, 1, walk);
   for (std::size_t i = 0; i < count; ++i) {
-    if (!take_over(slots[i], state)) return false;
+    if (!take_over(slots[i].found, state)) return false;
   }
   return true;
 }
 
 bool DistanceQuery::State::find_spread(std::size_t pair) {
-  NearestSoFar whole;
+  NearestSoFar& whole = spread.found;
+  whole.counters = {};
+  whole.enough_memory = true;
   const NearestTask task = task_of(pairs[pair]);
   begin(task, pairs[pair], whole);
   whole.most_visits = kVisitsAlone;
   const BoundedBlockPair roots = {0, 0, 0, kAllNodePairs};
   phase_of(task)(task, &roots, 1, whole);
   while (whole.left.size() > 0 && !whole.touches() && whole.enough_memory) {
-    std::swap(walks, whole.left);
-    whole.left.clear();
-    std::sort(walks.data(), walks.data() + walks.size(), is_near_first);
-    for (std::size_t first = 0; first < walks.size() && !whole.touches(); first += kWalksInRound) {
-      if (!walk_round(task, first, whole)) return false;
+    take_left(spread);
+    for (std::size_t first = 0; first < spread.walks.size() && !whole.touches(); first += kWalksInRound) {
+      if (whole.bounded >= whole.most_bounded) find_heights(task, spread);
+      if (!whole.enough_memory || !walk_round(task, first, spread)) return false;
     }
   }
   finish(pair, task, whole);
@@ -166,9 +211,9 @@ Status DistanceQuery::State::find_all() {
     return scene->fail(Status::kOutOfMemory, 0);
   if (!scene->threads.provide(most)) return scene->fail(Status::kCannotStartThread, 0);
   for (std::size_t i = 0; i < slots.size(); ++i) {
-    slots[i].counters = {};
-    slots[i].enough_memory = true;
-    slots[i].most_visits = ~std::uint64_t{0};
+    slots[i].found.counters = {};
+    slots[i].found.enough_memory = true;
+    slots[i].found.most_visits = ~std::uint64_t{0};
   }
   scene->threads.for_parts(workers, pairs.size(), at_once,
                            [&](std::size_t i, std::size_t end, std::uint32_t worker) {
@@ -177,8 +222,8 @@ Status DistanceQuery::State::find_all() {
                              }
                            });
   for (std::size_t i = 0; i < slots.size(); ++i) {
-    if (!slots[i].enough_memory) return scene->fail(Status::kOutOfMemory, 0);
-    add_to(*counters, slots[i].counters);
+    if (!slots[i].found.enough_memory) return scene->fail(Status::kOutOfMemory, 0);
+    add_to(*counters, slots[i].found.counters);
   }
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     if (is_spread(pairs[i]) && !find_spread(i)) return scene->fail(Status::kOutOfMemory, 0);

@@ -127,6 +127,60 @@ distance::FrameDirection direction_of(const NearestTask& task, const float (&dir
   return distance::frame_direction(task.frame, direction, at_least);
 }
 
+namespace {
+
+// Joins of each node what of() tells of its triangles, by join(). What is below a block has higher numbers.
+template <typename Of, typename Join>
+bool join_nodes(const PosedTree& body, double of_none, const Of& of, const Join& join, Buffer<double>& out) {
+  const LevelView& tree = body.tree;
+  if (!out.resize(std::size_t{tree.block_count} * kNodesPerBlock)) return false;
+  for (std::size_t b = tree.block_count; b-- > 0;) {
+    const Block& block = tree.blocks[b];
+    for (std::size_t i = 0; i < kNodesPerBlock; ++i) {
+      double& node = out[b * kNodesPerBlock + i];
+      node = of_none;
+      if (block.kind[i] == NodeKind::imaginary) continue;
+      if (block.is_leaf_block()) {
+        double corner[3][3];
+        for (int c = 0; c < 3; ++c) {
+          const float* const p = tree.triangles[block.index[i]].corner[c].position;
+          apply(body.pose, p[0], p[1], p[2], corner[c]);
+        }
+        node = of(corner);
+        continue;
+      }
+      for (std::size_t k = 0; k < kNodesPerBlock; ++k)
+        node = join(node, out[block.index[i] * std::size_t{kNodesPerBlock} + k]);
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+bool NodeHeights::make(const NearestTask& task, const distance::Direction& along) {
+  along_ = along;
+  const auto low = [&](const double(&x)[3][3]) { return distance::height_along(along.n, x, along.c).low; };
+  const auto high = [&](const double(&x)[3][3]) { return distance::height_along(along.n, x, along.c).high; };
+  const auto lower = [](double x, double y) { return std::min(x, y); };
+  const auto higher = [](double x, double y) { return std::max(x, y); };
+  return join_nodes(*task.a, INFINITY, low, lower, of_a_) &&
+         join_nodes(*task.b, -INFINITY, high, higher, of_b_);
+}
+
+std::uint32_t drop_by_heights(const NearestTask& task, std::uint32_t a, std::uint32_t b, std::uint32_t hits,
+                              NearestSoFar& state) {
+  const double near = nearness(task, state);
+  for (std::uint32_t left = hits; left != 0; left &= left - 1) {
+    const int bit = lowest_bit(left);
+    const double apart = state.heights->apart(a, bit / 4, b, bit % 4);
+    if (apart < near) continue;
+    hits &= ~(1u << bit);
+    state.floor = std::min(state.floor, apart);
+  }
+  return hits;
+}
+
 bool add_candidate(const NearCandidate& candidate, NearestSoFar& state) {
   state.enough_memory = state.candidates.push(candidate);
   return state.enough_memory;
@@ -149,6 +203,7 @@ void keep_nearer(const TriangleDistance& found, std::uint32_t triangle_a, std::u
   state.best = found;
   state.triangle_a = triangle_a;
   state.triangle_b = triangle_b;
+  state.has_along = false;
 }
 
 }  // namespace
@@ -167,6 +222,30 @@ void settle(const NearestTask& task, std::uint32_t triangle_a, std::uint32_t tri
   keep_nearer(found, triangle_a, triangle_b, state);
 }
 
+// An axis of either body does where it tells the best apart as far as the tolerance asks for: it is right for
+// whole faces, while the normal of a needle errs as much as its width is short.
+void find_direction(const NearestTask& task, NearestSoFar& state) {
+  if (state.has_along) return;
+  state.has_along = true;
+  const TrianglePair pair = posed_pair(task.a->pose, task.a->tree.triangles[state.triangle_a], task.b->pose,
+                                       task.b->tree.triangles[state.triangle_b]);
+  double length;
+  state.along = distance::best_direction(pair, length);
+  const double enough = std::min(length, nearness(task, state));
+  for (const PosedTree* body : {task.a, task.b}) {
+    for (int k = 0; k < 3; ++k) {
+      const auto& r = body->pose.rotation;
+      for (const double side : {1.0, -1.0}) {
+        const distance::Direction axis =
+            distance::direction_along({{side * r[0][k], side * r[1][k], side * r[2][k]}}, pair.b[0]);
+        if (!(length > 0 && distance::distance_across(axis, pair) >= enough)) continue;
+        state.along = axis;
+        return;
+      }
+    }
+  }
+}
+
 bool take_over(NearestSoFar& from, NearestSoFar& state) {
   if (!from.enough_memory) return false;
   state.counters.block_pairs += from.counters.block_pairs;
@@ -180,6 +259,7 @@ bool take_over(NearestSoFar& from, NearestSoFar& state) {
     std::copy_n(from.direction, 3, state.direction);
   }
   keep_nearer(from.best, from.triangle_a, from.triangle_b, state);
+  state.bounded += from.bounded;
   for (const NearCandidate& candidate : from.candidates.view()) {
     if (!add_candidate(candidate, state)) return false;
   }
@@ -191,13 +271,19 @@ bool take_over(NearestSoFar& from, NearestSoFar& state) {
 
 namespace {
 
-// A lower bound: how far apart a candidate's triangles are along the direction of the best. Most of those
-// that are left have their nearest corner or edge in common with it, and so all but the same distance.
-double distance_along_best(const NearestTask& task, const NearCandidate& candidate,
-                           const NearestSoFar& state) {
-  return distance::distance_along_points(posed_pair(task.a->pose, task.a->tree.triangles[candidate.a],
-                                                    task.b->pose, task.b->tree.triangles[candidate.b]),
-                                         state.best.point_a, state.best.point_b);
+// Raises a lower bound to how far apart triangles are along the direction of the best, until that is too far
+// to count: by float64, then nearly exactly. Most of those that are left have their nearest corner, edge or
+// plane in common with the best, and so all but the same distance.
+double raised_along_best(const NearestTask& task, std::uint32_t triangle_a, std::uint32_t triangle_b,
+                         double lower, NearestSoFar& state) {
+  if (state.triangle_a == kNoIndex) return lower;
+  const double near = nearness(task, state);
+  const TrianglePair pair = posed_pair(task.a->pose, task.a->tree.triangles[triangle_a], task.b->pose,
+                                       task.b->tree.triangles[triangle_b]);
+  lower = std::max(lower, distance::distance_along_points(pair, state.best.point_a, state.best.point_b));
+  if (!(lower < near)) return lower;
+  find_direction(task, state);
+  return std::max(lower, distance::distance_across(state.along, pair));
 }
 
 void nearest_phase_scalar(const NearestTask& task, const BoundedBlockPair* from, std::uint32_t count,
@@ -207,12 +293,27 @@ void nearest_phase_scalar(const NearestTask& task, const BoundedBlockPair* from,
 
 }  // namespace
 
-void settle_candidates(const NearestTask& task, NearestSoFar& state) {
-  NearCandidate* const begin = state.candidates.data();
-  NearCandidate* const end = begin + state.candidates.size();
+void settle_if_near(const NearestTask& task, std::uint32_t triangle_a, std::uint32_t triangle_b, double lower,
+                    NearestSoFar& state) {
+  if (lower < nearness(task, state)) lower = raised_along_best(task, triangle_a, triangle_b, lower, state);
+  if (lower < nearness(task, state))
+    settle(task, triangle_a, triangle_b, state);
+  else
+    state.floor = std::min(state.floor, lower);
+}
+
+void settle_nearest(const NearestTask& task, NearestSoFar& state) {
+  const NearCandidate* const begin = state.candidates.data();
+  const NearCandidate* const end = begin + state.candidates.size();
   const auto* const first = std::min_element(
       begin, end, [](const NearCandidate& x, const NearCandidate& y) { return x.upper < y.upper; });
   if (first != end && first->upper < state.best.interval.upper) settle(task, first->a, first->b, state);
+}
+
+void settle_candidates(const NearestTask& task, NearestSoFar& state) {
+  settle_nearest(task, state);
+  NearCandidate* const begin = state.candidates.data();
+  NearCandidate* const end = begin + state.candidates.size();
   const auto near = [&](const NearCandidate& candidate) { return candidate.lower < nearness(task, state); };
   NearCandidate* const far = std::partition(begin, end, near);
   for (const NearCandidate* at = far; at < end; ++at) state.floor = std::min(state.floor, at->lower);
@@ -222,11 +323,7 @@ void settle_candidates(const NearestTask& task, NearestSoFar& state) {
   });
   for (const NearCandidate* at = begin; at < far && !state.touches(); ++at) {
     if (at->a == state.triangle_a && at->b == state.triangle_b) continue;
-    const double lower = near(*at) ? distance_along_best(task, *at, state) : at->lower;
-    if (lower < nearness(task, state))
-      settle(task, at->a, at->b, state);
-    else
-      state.floor = std::min(state.floor, lower);
+    settle_if_near(task, at->a, at->b, at->lower, state);
   }
   state.candidates.clear();
 }

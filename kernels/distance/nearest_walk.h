@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "kernels/common/traversal.h"
-#include "kernels/contact/narrow_phase_walk.h"
+#include "kernels/contact/pairs_below.h"
 #include "kernels/distance/nearest_phase.h"
 
 // The walk that all variants of the nearest phase share. Included by files that are compiled for different
@@ -88,38 +88,6 @@ class WaitingPairs {
   BoundedBlockPair pairs_[kMost];
 };
 
-/// Hands on the pairs of blocks below a pair that is not of two leaf blocks: emit(bound, child of a, child of
-/// b, mask), where no child means that this side stays.
-template <typename Bound, typename Emit>
-void each_pair_below(const Block& a, const Block& b, std::uint32_t hits, const Bound* bound,
-                     const Emit& emit) {
-  const bool leaves_a = a.is_leaf_block(), leaves_b = b.is_leaf_block();
-  const Descent descent = leaves_a != leaves_b ? descent_beside_leaves(leaves_a)
-                                               : descent_by_size(size_of(a), size_of(b), descends_alone(a));
-  if (descent == Descent::both) {
-    for (; hits != 0; hits &= hits - 1) {
-      const int bit = lowest_bit(hits);
-      emit(bound[bit], &a.index[bit / 4], &b.index[bit % 4], kAllNodePairs);
-    }
-    return;
-  }
-  const bool a_alone = descent == Descent::a_alone;
-  for (int i = 0; i < kNodesPerBlock; ++i) {
-    const std::uint32_t own =
-        hits & (a_alone ? row(0xF, i) : column(0xF, i));  // hits of the node that descends
-    if (own == 0) continue;
-    Bound least = bound[lowest_bit(own)];
-    for (std::uint32_t bits = own & (own - 1); bits != 0; bits &= bits - 1) {
-      const Bound next = bound[lowest_bit(bits)];
-      if (next < least) least = next;
-    }
-    if (a_alone)
-      emit(least, &a.index[i], nullptr, (own >> 4 * i) * 0x1111u);
-    else
-      emit(least, nullptr, &b.index[i], (own >> i) * 0xFu);
-  }
-}
-
 /// The means of a variant are made of a task and bring: Bound, a number type; bounds(a, b, limit, out): the
 /// bounds of all node pairs, and the mask of those below the limit, imaginary nodes never; limit(distance),
 /// distance(bound), see box_distance.h; far_along(batch, direction, distance): which of the first kNearBatch
@@ -133,19 +101,23 @@ class NearestWalk {
   void run(const BoundedBlockPair* from, std::uint32_t count) {
     take_limits();
     if (state_.found) wait_in_order();
-    for (std::uint32_t i = 0; i < count && goes_on(); ++i) {
-      stack_[height_++] = from[i];
-      while (goes_on() && visits_ < state_.most_visits && (height_ > 0 || take_nearest()))
-        visit(stack_[--height_]);
+    std::uint32_t next = 0;
+    while (next < count && goes_on() && is_within_limits()) {
+      stack_[height_++] = from[next++];
+      while (goes_on() && is_within_limits() && (height_ > 0 || take_nearest())) visit(stack_[--height_]);
     }
     if (goes_on()) bound_triangles(true);
     while (goes_on() && (height_ > 0 || take_nearest())) leave(stack_[--height_], state_);
+    for (; next < count && goes_on(); ++next) leave(from[next], state_);
   }
 
  private:
   using Bound = typename Means::Bound;
 
   bool goes_on() const { return !state_.touches() && state_.enough_memory; }
+  bool is_within_limits() const {
+    return visits_ < state_.most_visits && state_.bounded < state_.most_bounded;
+  }
 
   void take_limits() {
     limit_ = means_.limit(nearness(task_, state_));
@@ -173,6 +145,8 @@ class NearestWalk {
       else
         pass_over(bound[bit]);
     }
+    if (hits != 0 && state_.heights != nullptr) [[unlikely]]
+      hits = drop_by_heights(task_, pair.a, pair.b, hits, state_);
     if (hits == 0) return;
     const bool leaves_a = a.is_leaf_block(), leaves_b = b.is_leaf_block();
     if (leaves_a && leaves_b) return take_leaves(a, b, hits);
@@ -250,6 +224,7 @@ class NearestWalk {
     BoundedBatch found;
     means_.bound(near_, found);
     state_.counters.by_float32 += count;
+    state_.bounded += count;
     std::uint32_t nearest = kNearBatch;
     for (std::uint32_t i = 0; i < count; ++i) {
       if (!(found.upper[i] < state_.upper)) continue;
@@ -265,8 +240,10 @@ class NearestWalk {
     for (std::uint32_t i = 0; i < count && goes_on(); ++i) {
       if (!(found.lower[i] < near) && i != nearest)
         state_.floor = std::min(state_.floor, found.lower[i]);
-      else if (found.lower[i] == 0)
+      else if (found.lower[i] == 0 && i == nearest)
         settle(task_, near_.a[i], near_.b[i], state_);
+      else if (found.lower[i] == 0)
+        settle_if_near(task_, near_.a[i], near_.b[i], 0, state_);
       else
         add_candidate({found.lower[i], found.upper[i], near_.a[i], near_.b[i]}, state_);
     }

@@ -6,6 +6,19 @@
 #include "kernels/impact/triangle_impact.h"
 
 namespace tandem::impact {
+namespace {
+
+// Shells are found when the walk has looked at so many pairs of blocks and triangles: as many as this part of
+// the triangles, but not fewer than that. Pairs of bodies that meet or pass by take less.
+constexpr std::uint64_t kPartLookedAt = 4, kLeastLookedAt = 1024;
+
+constexpr std::uint64_t kNever = ~std::uint64_t{0};
+
+std::uint64_t work_of(const ImpactCounters& counters) {
+  return counters.block_pairs + counters.triangle_pairs;
+}
+
+}  // namespace
 
 // Sorts up to 16 waiting pairs, the soonest last.
 class ImpactWalk::SortedPairs {
@@ -34,13 +47,67 @@ const ImpactWalk::Part& ImpactWalk::part(std::uint32_t number) {
   return part;
 }
 
+// False: out of memory. What is below a block has higher numbers.
+bool ImpactWalk::make_shells(const MovingBody& body, const LevelView& tree, const Vector3& centre,
+                             double from_a, Buffer<Shell>& out) const {
+  if (!out.resize(std::size_t{tree.block_count} * kNodesPerBlock)) return false;
+  for (std::size_t b = tree.block_count; b-- > 0;) {
+    const Block& block = tree.blocks[b];
+    for (std::size_t i = 0; i < kNodesPerBlock; ++i) {
+      Shell& shell = out[b * kNodesPerBlock + i];
+      shell = kNoShell;
+      if (block.kind[i] == NodeKind::imaginary) continue;
+      if (block.is_leaf_block()) {
+        Vector3 x[3];
+        for (int c = 0; c < 3; ++c) {
+          const float* const p = tree.triangles[block.index[i]].corner[c].position;
+          double posed[3];
+          apply(body.start, p[0], p[1], p[2], posed);
+          x[c] = vector_of(posed) - centre;
+        }
+        shell = shell_of(axes_.axis, x, from_a);
+        continue;
+      }
+      for (std::size_t k = 0; k < kNodesPerBlock; ++k)
+        shell = joined(shell, out[block.index[i] * std::size_t{kNodesPerBlock} + k]);
+    }
+  }
+  return true;
+}
+
+// Without memory for them the walk goes on as before.
+void ImpactWalk::find_shells() {
+  shells_at_ = kNever;
+  axes_ = shell_axes(*pair_);
+  has_shells_ = make_shells(*pair_->a, *a_, axes_.centre_a, 0, shells_a_) &&
+                make_shells(*pair_->b, *b_, axes_.centre_b, dot(axes_.axis, axes_.offset), shells_b_);
+  gaps_ = shell_gaps(*pair_, axes_, span_.end, tolerance_);
+}
+
+std::uint32_t ImpactWalk::without_apart(const WaitingPair& pair) const {
+  std::uint32_t mask = pair.mask;
+  const Shell* const a = &shells_a_[pair.a * std::size_t{kNodesPerBlock}];
+  const Shell* const b = &shells_b_[pair.b * std::size_t{kNodesPerBlock}];
+  for (std::uint32_t left = mask; left != 0; left &= left - 1) {
+    const int bit = lowest_bit(left);
+    if (stay_apart(a[bit / 4], b[bit % 4], gaps_)) mask &= ~(1u << bit);
+  }
+  return mask;
+}
+
 void ImpactWalk::visit(const WaitingPair& pair) {
+  if (work_of(*counters_) >= shells_at_) find_shells();
+  const std::uint32_t mask = has_shells_ ? without_apart(pair) : pair.mask;
+  if (mask == 0) {
+    ++counters_->block_pairs;
+    return;
+  }
   const Part& now = part(pair.part);
   const Block &a = a_->blocks[pair.a], &b = b_->blocks[pair.b];
   const double most = std::min(now.time.end, stop_.time) - now.time.begin;
   NodeTimes times;
   // The boxes below a node are apart for as long as the node is.
-  node_times(now.frames, a, b, pair.mask, std::max(0.0, pair.apart - now.time.begin), most, times);
+  node_times(now.frames, a, b, mask, std::max(0.0, pair.apart - now.time.begin), most, times);
   ++counters_->block_pairs;
   if (times.hits == 0) return;
   const double length = now.time.end - now.time.begin;
@@ -113,6 +180,7 @@ void ImpactWalk::advance_pair(const WaitingPair& leaf, const Part& part) {
 void ImpactWalk::walk() {
   ++piece_;
   ++counters_->walks;
+  if (has_shells_) gaps_ = shell_gaps(*pair_, axes_, span_.end, tolerance_);
   push({0, 0, kAllNodePairs, 1, span_.begin});
   while (height_ > 0) {
     const WaitingPair pair = stack_[--height_];
@@ -129,6 +197,11 @@ PairStop ImpactWalk::find_stop(const PairMotion& pair, const LevelView& a, const
   tolerance_ = tolerance;
   acceleration_ = largest_acceleration(pair);
   stop_ = {1};
+  const std::uint64_t triangles = std::uint64_t{a.triangle_count} + b.triangle_count;
+  has_shells_ = false;
+  shells_at_ = pair.a->angle > 0 || pair.b->angle > 0
+                   ? work_of(counters) + std::max(kLeastLookedAt, triangles / kPartLookedAt)
+                   : kNever;
   const double pieces = pieces_of(pair);
   for (double i = 0; i < pieces && stop_.triangle_a == kNoIndex; ++i) {
     span_ = piece_of_step(i, pieces);

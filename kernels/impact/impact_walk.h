@@ -1,6 +1,8 @@
 #pragma once
 #include "kernels/impact/box_times.h"
 #include "kernels/impact/step_parts.h"
+#include "kernels/impact/turn_shells.h"
+#include "tandem/kernels/detail/buffer.h"
 #include "tandem/kernels/impact_query.h"
 
 namespace tandem::impact {
@@ -12,7 +14,8 @@ struct PairStop {
 };
 
 /// A depth-first walk of two trees through a piece of the step at a time, the nodes that may meet soonest
-/// first. It is large, so keep it from call to call.
+/// first. When it has taken long enough to look at a part of all triangles, it looks at all of them once, for
+/// the shells that nodes turn in. It is large, so keep it from call to call.
 class ImpactWalk {
  public:
   /// Finds until when two trees stay apart. tolerance: in units of length. Adds to the counters.
@@ -41,6 +44,10 @@ class ImpactWalk {
 
   const Part& part(std::uint32_t number);
   void walk();
+  void find_shells();
+  bool make_shells(const MovingBody& body, const LevelView& tree, const Vector3& centre, double from_a,
+                   Buffer<Shell>& out) const;
+  std::uint32_t without_apart(const WaitingPair& pair) const;
   void visit(const WaitingPair& pair);
   void descend(const WaitingPair& pair, const NodeTimes& times, double begin);
   void advance_leaves(const WaitingPair& pair, const NodeTimes& times, const Part& part);
@@ -51,6 +58,12 @@ class ImpactWalk {
   const LevelView *a_ = nullptr, *b_ = nullptr;
   ImpactCounters* counters_ = nullptr;
   double tolerance_ = 0, acceleration_ = 0;
+
+  std::uint64_t shells_at_ = 0;  // so much work of all pairs
+  bool has_shells_ = false;
+  ShellAxes axes_;
+  ShellGaps gaps_;                     // in the piece
+  Buffer<Shell> shells_a_, shells_b_;  // of all nodes
 
   std::uint64_t piece_ = 0;
   Span span_ = {0, 0};  // of the piece

@@ -33,16 +33,34 @@ std::uint32_t next_of(std::uint32_t& value, std::uint32_t workers) {
   return workers == 1 ? value++ : std::atomic_ref(value).fetch_add(1, std::memory_order_relaxed);
 }
 
+bool tells_apart(const PairFilter& filter) {
+  return filter.motion != nullptr || filter.group != nullptr || filter.mask != nullptr;
+}
+
+// The motions that meet one; a bit for each.
+std::uint32_t motions_that_meet(Motion one) {
+  std::uint32_t met = 0;
+  for (std::uint32_t m = 0; m < 4; ++m)
+    met |= static_cast<std::uint32_t>(motions_meet(one, static_cast<Motion>(m))) << m;
+  return met;
+}
+
 }  // namespace
 
-bool BroadPhase::Tree::reserve(std::size_t boxes) {
+bool BroadPhase::Tree::reserve(std::size_t boxes, const PairFilter& filter) {
   std::size_t total = 0;
   levels = 0;
   for (std::size_t below = boxes; levels == 0 || below > 1; below = groups_over(below)) {
     level_begin[levels++] = total;
     total += groups_over(below);
   }
-  return items.resize(boxes) && groups.resize(total);
+  return items.resize(boxes) && groups.resize(total) && kinds.resize(tells_apart(filter) ? total : 0);
+}
+
+BroadPhase::Kind BroadPhase::kind_of(const PairFilter& filter, std::size_t box) {
+  const Motion motion = filter.motion != nullptr ? filter.motion[box] : Motion::moving;
+  return {filter.group != nullptr ? filter.group[box] : ~0u, filter.mask != nullptr ? filter.mask[box] : ~0u,
+          1u << (static_cast<std::uint32_t>(motion) & 3), motions_that_meet(motion)};
 }
 
 // One for each worker, with nothing found.
@@ -79,9 +97,9 @@ bool BroadPhase::take(std::span<const WorldBox> boxes, const std::uint32_t* numb
   return all_in_range;
 }
 
-// Splits a range at the median along its longest extent: `range` keeps the left half. False: there is nothing
-// to split.
-bool BroadPhase::halve(Item* all, Range& range, Range& right) {
+// Splits a range at the median along its longest extent: `range` keeps the left half. Where all centres are
+// one, instances that the filter treats alike stay together. False: there is nothing to split.
+bool BroadPhase::halve(Item* all, const PairFilter& filter, Range& range, Range& right) {
   if (range.count <= 1) return false;
   while (range.units == 1) {
     if (range.unit == 1) return false;
@@ -103,46 +121,54 @@ bool BroadPhase::halve(Item* all, Range& range, Range& right) {
     if (hi[k] - lo[k] > hi[axis] - lo[axis]) axis = k;
   }
   const std::size_t left_units = (range.units + 1) / 2, left = left_units * range.unit;
-  std::nth_element(items, items + left, items + count,
-                   [axis](const Item& x, const Item& y) { return x.centre[axis] < y.centre[axis]; });
+  if (tells_apart(filter) && !(hi[axis] > lo[axis])) {
+    std::nth_element(items, items + left, items + count, [&](const Item& x, const Item& y) {
+      return kind_of(filter, x.box) < kind_of(filter, y.box);
+    });
+  } else {
+    std::nth_element(items, items + left, items + count,
+                     [axis](const Item& x, const Item& y) { return x.centre[axis] < y.centre[axis]; });
+  }
   right = {range.begin + left, count - left, range.unit, range.units - left_units};
   range = {range.begin, left, range.unit, left_units};
   return true;
 }
 
 // Brings items into the order of the tree.
-void BroadPhase::split(Item* all, Range range) {
-  for (Range right; halve(all, range, right);) split(all, right);
+void BroadPhase::split(Item* all, const PairFilter& filter, Range range) {
+  for (Range right; halve(all, filter, range, right);) split(all, filter, right);
 }
 
 // Lets the workers split a range: the ranges do not depend on who splits them, nor when. Each round halves
 // all that there are, until there are enough.
-void BroadPhase::split(Item* all, Range range, Team team) {
+void BroadPhase::split(Item* all, const PairFilter& filter, Range range, Team team) {
   Range ranges[kMostRanges] = {range};
   const std::size_t enough = team.workers == 1 ? 1 : std::min(kMostRanges, kRangesForEach * team.workers);
   std::size_t count = 1;
   for (; count < enough && range.count / count >= 2 * kFewestItems; count *= 2) {
     team.threads.for_parts(team.workers, count, 1, [&](std::size_t begin, std::size_t end, std::uint32_t) {
       for (std::size_t i = begin; i < end; ++i) {
-        if (!halve(all, ranges[i], ranges[count + i])) ranges[count + i] = {};
+        if (!halve(all, filter, ranges[i], ranges[count + i])) ranges[count + i] = {};
       }
     });
   }
   team.threads.for_parts(team.workers, count, 1, [&](std::size_t begin, std::size_t end, std::uint32_t) {
-    for (std::size_t i = begin; i < end; ++i) split(all, ranges[i]);
+    for (std::size_t i = begin; i < end; ++i) split(all, filter, ranges[i]);
   });
 }
 
 // Boxes in the order of the tree, then the groups over them, level by level: group g of a level holds
 // the boxes of 4 g to 4 g + 3 of the level below.
-void BroadPhase::build(std::span<const WorldBox> boxes, Tree& tree, Team team) {
+void BroadPhase::build(std::span<const WorldBox> boxes, const PairFilter& filter, Tree& tree, Team team) {
   const std::size_t count = tree.items.size();
   std::size_t unit = 1;
   while (unit * kGroup < count) unit *= kGroup;
-  split(tree.items.data(), {0, count, unit, (count + unit - 1) / unit}, team);
+  split(tree.items.data(), filter, {0, count, unit, (count + unit - 1) / unit}, team);
   std::size_t below = count;
-  for (int level = 0; level < tree.levels; ++level, below = groups_over(below))
+  for (int level = 0; level < tree.levels; ++level, below = groups_over(below)) {
     build_level(level, below, boxes, tree, team);
+    if (tree.kinds.size() > 0) build_kinds(level, below, filter, tree, team);
+  }
 }
 
 void BroadPhase::build_level(int level, std::size_t below, std::span<const WorldBox> boxes, Tree& tree,
@@ -166,6 +192,25 @@ void BroadPhase::build_level(int level, std::size_t below, std::span<const World
           hi = child.hi[k][c] > hi ? child.hi[k][c] : hi;
         }
       }
+    }
+  };
+  team.threads.for_parts(team.workers, groups_over(below), kGroupsAtOnce, fill);
+}
+
+void BroadPhase::build_kinds(int level, std::size_t below, const PairFilter& filter, Tree& tree, Team team) {
+  const auto fill = [&](std::size_t first, std::size_t last, std::uint32_t) {
+    for (std::size_t i = first * kGroup; i < last * kGroup; ++i) {
+      Kind kind;
+      if (i < below && level == 0) kind = kind_of(filter, tree.items[i].box);
+      if (i < below && level > 0) {
+        for (const Kind& child : tree.kinds[tree.level_begin[level - 1] + i].of) {
+          kind.group |= child.group;
+          kind.mask |= child.mask;
+          kind.motions |= child.motions;
+          kind.met |= child.met;
+        }
+      }
+      tree.kinds[tree.level_begin[level] + i / kGroup].of[i % kGroup] = kind;
     }
   };
   team.threads.for_parts(team.workers, groups_over(below), kGroupsAtOnce, fill);
@@ -203,6 +248,23 @@ std::uint32_t BroadPhase::meeting(const TreePair& trees, const GroupPair& pair) 
   return mask;
 }
 
+// Finds what meets of a pair of groups, where the filter may look at a pair below: if it looks at x and y, it
+// does at anything that has all of their groups, masks and motions, and more. Of kept boxes no more is known
+// than that they are fixed, as the filter may differ from call to call. Pairs of boxes are asked about by
+// themselves.
+std::uint32_t BroadPhase::may_look(const TreePair& trees, const GroupPair& pair) {
+  std::uint32_t mask = meeting(trees, pair);
+  constexpr Kind kFixed = {~0u, ~0u, 1u << static_cast<std::uint32_t>(Motion::fixed), 0};
+  if (pair.level == 0 || trees.a.kinds.size() == 0 || pair.level > trees.a.top()) return mask;
+  const Kinds* const kinds = trees.a.kinds.data() + trees.a.level_begin[pair.level];
+  for (std::uint32_t left = mask; left != 0; left &= left - 1) {
+    const int bit = lowest_bit(left);
+    const Kind &a = kinds[pair.a].of[bit / 4], &b = trees.same() ? kinds[pair.b].of[bit % 4] : kFixed;
+    if ((a.met & b.motions) == 0 || !groups_meet(a.group, a.mask, b.group, b.mask)) mask &= ~(1u << bit);
+  }
+  return mask;
+}
+
 // A tree against itself or another, from one pair of groups on. Each pair taken off puts at most 16 of the
 // level below on, of which at most 15 wait while the last one's are worked on: 15 for each level above the
 // leaves, and one. owners: the workers that may be doing the same.
@@ -215,7 +277,7 @@ void BroadPhase::collect(const TreePair& trees, GroupPair from, const PairFilter
   while (height > 0) {
     const GroupPair pair = stack[--height];
     ++looked_at;
-    for (std::uint32_t mask = meeting(trees, pair); mask != 0; mask &= mask - 1) {
+    for (std::uint32_t mask = may_look(trees, pair); mask != 0; mask &= mask - 1) {
       const auto bit = static_cast<std::uint32_t>(lowest_bit(mask));
       const std::uint32_t a = pair.a * kGroup + bit / 4, b = pair.b * kGroup + bit % 4;
       if (pair.level > 0) {
@@ -240,7 +302,7 @@ bool BroadPhase::collect(const TreePair& trees, const PairFilter& filter, Team t
   std::size_t taken = 0;
   for (; taken < starts_.size() && starts_.size() - taken < enough && starts_[taken].level > 0; ++taken) {
     const GroupPair pair = starts_[taken];
-    for (std::uint32_t mask = meeting(trees, pair); mask != 0; mask &= mask - 1) {
+    for (std::uint32_t mask = may_look(trees, pair); mask != 0; mask &= mask - 1) {
       const auto bit = static_cast<std::uint32_t>(lowest_bit(mask));
       if (!starts_.push({pair.a * kGroup + bit / 4, pair.b * kGroup + bit % 4, pair.level - 1})) return false;
     }
@@ -331,10 +393,10 @@ Status BroadPhase::find_pairs(std::span<const WorldBox> boxes, const PairFilter&
   if (kept_of_ != 0 && kept_of_ != boxes.size()) return Status::kKeptMismatch;
   if (filter.excluded.instances > boxes.size()) return Status::kUnknownInstance;
   const std::size_t count = free_count(boxes.size());
-  if (!tree_.reserve(count) || !provide_finders(workers)) return Status::kOutOfMemory;
+  if (!tree_.reserve(count, filter) || !provide_finders(workers)) return Status::kOutOfMemory;
   if (!take(boxes, kept_of_ != 0 ? free_.data() : nullptr, tree_, team)) return Status::kOutOfRange;
   if (count == 0) return Status::kOk;
-  build(boxes, tree_, team);
+  build(boxes, filter, tree_, team);
   if (!collect({tree_, tree_}, filter, team)) return Status::kOutOfMemory;
   if (kept_of_ != 0 && !collect({tree_, kept_}, filter, team)) return Status::kOutOfMemory;
   if (self_pairs && !collect_selves(filter)) return Status::kOutOfMemory;
@@ -356,7 +418,7 @@ Status BroadPhase::keep_fixed(std::span<const WorldBox> boxes, std::span<const M
   if (boxes.size() >= kNoIndex) return Status::kTooManyInstances;
   if (boxes.size() != motion.size()) return Status::kKeptMismatch;
   const auto fixed = static_cast<std::size_t>(std::count(motion.begin(), motion.end(), Motion::fixed));
-  if (!free_.resize(boxes.size() - fixed) || !fixed_.resize(fixed) || !kept_.reserve(fixed))
+  if (!free_.resize(boxes.size() - fixed) || !fixed_.resize(fixed) || !kept_.reserve(fixed, {}))
     return Status::kOutOfMemory;
   std::size_t free_now = 0, fixed_now = 0;
   for (std::uint32_t b = 0; b < boxes.size(); ++b) {
@@ -368,7 +430,7 @@ Status BroadPhase::keep_fixed(std::span<const WorldBox> boxes, std::span<const M
   }
   if (!take(boxes, fixed_.data(), kept_, team)) return Status::kOutOfRange;
   if (fixed == 0) return Status::kOk;
-  build(boxes, kept_, team);
+  build(boxes, {}, kept_, team);
   kept_of_ = boxes.size();
   return Status::kOk;
 }

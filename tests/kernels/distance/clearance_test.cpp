@@ -14,6 +14,7 @@
 #include "kernels/contact/narrow_phase.h"
 #include "kernels/geometry/grid_test.h"
 #include "kernels/geometry/triangle_distance.h"
+#include "tandem/kernels/distance_query.h"
 
 namespace tandem {
 namespace {
@@ -194,6 +195,68 @@ TEST(Clearance, TiesAtPythagoreanDistances) {
   EXPECT_FALSE(query.rows().empty());
   ASSERT_EQ(query.find(scene.instances, {.within = std::nextafter(7, 0)}), Status::kOk);
   EXPECT_TRUE(query.rows().empty());
+}
+
+// Bodies that face each other across a corner: boxes that are widened by the distance along each axis meet
+// where the triangles in them are not within it.
+TEST(Clearance, TheFirstPairIsFoundAmongFewAtAnyDistance) {
+  BodyScene scene;
+  scene.assets.add(test::cube(1, 12));  // 1,728 triangles
+  scene.instances = {{0, kIdentityPose}, {0, at(32, 32, 32)}};
+  const double distance = 30 * std::sqrt(3.0);
+  test::Asked<ContactQuery> query;
+  ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+  for (const double part : {0.75, 0.99, 1 - 1e-9, 1 - 1e-15, 1 + 1e-15, 1 + 1e-9, 1.01, 1.5}) {
+    ASSERT_EQ(query.find(scene.instances, {.first_contact_only = true, .within = part * distance}),
+              Status::kOk);
+    EXPECT_EQ(query.rows().size(), part > 1 ? 1u : 0u) << part;
+    const ContactCounters& c = query.counters();
+    EXPECT_LT(c.candidates, 5000u) << part;  // all: 2,985,984
+    EXPECT_LT(c.block_pairs, 1000u) << part;
+    if (part < 1) {
+      EXPECT_EQ(c.candidates, c.decided_by_float32 + c.decided_by_float64 + c.decided_exactly);
+    }
+  }
+  // A corner that is 3, 6 and 2 from the other, exactly.
+  scene.instances[1].pose = at(5, 8, 4);
+  for (const double within : {std::nextafter(7, 0), 7.0}) {
+    ASSERT_EQ(query.find(scene.instances, {.first_contact_only = true, .within = within}), Status::kOk);
+    EXPECT_EQ(query.rows().size(), within == 7 ? 1u : 0u);
+    EXPECT_LT(query.counters().candidates, 5000u);
+  }
+}
+
+// Pairs in which the walk for all gives up find a contact where the distance says so.
+TEST(Clearance, FirstPairsOfManyTriangles) {
+  RandomPoses random(12);
+  BodyScene scene;
+  scene.assets.add(test::soup(random, 1500, 0.1));
+  scene.assets.add(test::cube(0.75f, 10));
+  for (int i = 0; i < 24; ++i) {
+    Pose pose = any_rotation(random);
+    for (double& x : pose.translation) x = random.symmetric(2.5);
+    scene.instances.push_back({static_cast<std::uint32_t>(i % 2), pose});
+  }
+  test::Asked<DistanceQuery> distances;
+  test::Asked<ContactQuery> first;
+  ASSERT_EQ(distances.set_assets(scene.assets.views()), Status::kOk);
+  ASSERT_EQ(first.set_assets(scene.assets.views()), Status::kOk);
+  for (const double within : {0.05, 0.4, 1.0, 2.0, 3.0}) {
+    ASSERT_EQ(distances.find(scene.instances, {.reach = within}), Status::kOk);
+    ASSERT_EQ(first.find(scene.instances, {.first_contact_only = true, .within = within}), Status::kOk);
+    ASSERT_EQ(first.pairs().size(), distances.pairs().size());
+    std::size_t next = 0;
+    for (std::uint32_t i = 0; i < distances.pairs().size(); ++i) {
+      const bool found = next < first.rows().size() && first.rows()[next].pair == i;
+      EXPECT_EQ(found, distances.rows()[i].upper <= within) << within << " " << i;
+      if (!found) continue;
+      const Contact& contact = first.rows()[next++];
+      const std::uint32_t a = first.pairs()[i].a, b = first.pairs()[i].b;
+      EXPECT_TRUE(are_within(posed_triangles(scene, a)[contact.face_a],
+                             posed_triangles(scene, b)[contact.face_b], within));
+    }
+    EXPECT_EQ(next, first.rows().size());
+  }
 }
 
 TEST(Clearance, KeptInstancesAreFoundWithinAnyDistance) {

@@ -5,12 +5,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <vector>
 
 #include "kernels/distance/distance_scenes.h"
 #include "kernels/distance/nearest_phase.h"
 #include "kernels/geometry/triangle_distance.h"
+#include "kernels/solid_meshes.h"
 
 // Whole distance queries against all pairs of triangles, and every way to compute them against the others.
 namespace tandem {
@@ -278,6 +280,95 @@ TEST(Distance, IntervalsAreAsNarrowAsAskedWhereTheToleranceIsNearRounding) {
   }
   EXPECT_EQ(wider, 0);
   RecordProperty("wide", wide);
+}
+
+/// A cylinder whose caps are cut from their centres.
+test::Mesh centre_fans(int sectors, float height) {
+  test::Mesh mesh;
+  const auto point = [&](int i, float z) {
+    const double angle = 2 * std::numbers::pi * (i % sectors) / sectors;
+    return std::array<float, 3>{static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)), z};
+  };
+  const float top = height / 2;
+  for (int i = 0; i < sectors; ++i) {
+    mesh.add(point(i, -top), point(i + 1, -top), point(i + 1, top));
+    mesh.add(point(i, -top), point(i + 1, top), point(i, top));
+    mesh.add({0, 0, top}, point(i, top), point(i + 1, top));
+    mesh.add({0, 0, -top}, point(i + 1, -top), point(i, -top));
+  }
+  return mesh;
+}
+
+/// The second of two bodies of one mesh, turned about z and moved.
+Pose turned(double angle, double x, double z) {
+  Pose pose = at(x, 0, z);
+  pose.rotation[0][0] = pose.rotation[1][1] = std::cos(angle);
+  pose.rotation[0][1] = -(pose.rotation[1][0] = std::sin(angle));
+  return pose;
+}
+
+/// The same scene turned somehow as a whole.
+BodyScene& turn(BodyScene& scene) {
+  RandomPoses random(1);
+  const Pose whole = any_rotation(random);
+  for (Instance& instance : scene.instances) {
+    const Pose own = instance.pose;
+    for (int i = 0; i < 3; ++i) {
+      const double* const r = whole.rotation[i];
+      for (int j = 0; j < 3; ++j)
+        instance.pose.rotation[i][j] =
+            r[0] * own.rotation[0][j] + r[1] * own.rotation[1][j] + r[2] * own.rotation[2][j];
+      instance.pose.translation[i] =
+          r[0] * own.translation[0] + r[1] * own.translation[1] + r[2] * own.translation[2];
+    }
+  }
+  return scene;
+}
+
+// A million pairs of triangles are the nearest: each looks at few.
+TEST(DistanceQuery, StackedCylindersLookAtFewPairsHoweverTheirCapsAreCut) {
+  test::Asked<DistanceQuery> query;
+  for (const bool from_the_centre : {true, false}) {
+    for (const double gap : {0x1p-40, 0x1p-30, 0x1p-10, 0.125}) {
+      for (const double angle : {0.0, 0.3}) {
+        BodyScene scene;
+        scene.assets.add(from_the_centre ? centre_fans(1024, 2) : test::regular_prism(1024, 1, 2));
+        scene.instances = {{0, kIdentityPose}, {0, turned(angle, 0, 2 + gap)}};
+        for (const bool anyhow : {false, true}) {
+          if (anyhow && gap < 0x1p-30) continue;  // posed vertices are rounded by more than the tolerance
+          ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+          ASSERT_EQ(query.find(anyhow ? turn(scene).instances : scene.instances), Status::kOk);
+          const ObjectDistance& found = query.rows()[0];
+          EXPECT_NEAR(found.upper, gap, (anyhow ? 1e-15 : 0) + 1e-6 * gap);
+          EXPECT_LE(found.upper - found.lower, 1e-6 * found.upper);
+          EXPECT_LT(query.counters().block_pairs, 1000u) << from_the_centre << gap << angle;
+          EXPECT_LT(query.counters().by_float32, 5000u) << from_the_centre << gap << angle;
+          EXPECT_LT(query.counters().by_float64, 100u) << from_the_centre << gap << angle;
+        }
+      }
+    }
+  }
+}
+
+TEST(DistanceQuery, FlushPlatesLookAtFewPairsHoweverNearTheyAre) {
+  test::Asked<DistanceQuery> query;
+  for (const int cells : {100, 260}) {  // the larger ones are spread over threads
+    for (const double gap : {0x1p-40, 0x1p-30, 0x1p-10, 0.125}) {
+      BodyScene scene;
+      scene.assets.add(test::sheet(2, cells));
+      scene.instances = {{0, kIdentityPose}, {0, turned(0.3, 0.01, gap)}};
+      ASSERT_EQ(query.scene.set_threads(2), Status::kOk);
+      ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+      ASSERT_EQ(query.find(scene.instances), Status::kOk);
+      const ObjectDistance& found = query.rows()[0];
+      EXPECT_LE(found.lower, gap);
+      EXPECT_GE(found.upper, gap);
+      EXPECT_LE(found.upper - found.lower, 1e-6 * found.upper);
+      const std::uint64_t triangles = 4 * cells * cells;
+      EXPECT_LT(query.counters().by_float32, triangles) << cells << gap;
+      EXPECT_LT(query.counters().by_float64, 200u) << cells << gap;
+    }
+  }
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -266,6 +267,63 @@ TEST_F(Impacts, ThreadsChangeNothing) {
         EXPECT_TRUE(std::equal(x.point_a, x.point_a + 3, y.point_a));
         EXPECT_TRUE(std::equal(x.point_b, x.point_b + 3, y.point_b));
       }
+    }
+  }
+}
+
+/// One body that turns within another, about an axis that is turned somehow.
+MovingScene one_within_another(const Mesh& inner, const Mesh& outer, double turn_inner, double turn_outer,
+                               const std::array<double, 3>& along) {
+  RandomPoses random(3);
+  const Pose whole = test::any_rotation(random);
+  MovingScene moves;
+  moves.scene.assets.add(inner);
+  moves.scene.assets.add(outer);
+  for (const double turn : {turn_inner, turn_outer}) {
+    RigidMotion motion = kAtRest;
+    const bool first = moves.motion.empty();
+    for (int k = 0; k < 3; ++k) {
+      motion.angular_velocity[k] = turn * whole.rotation[k][2];
+      for (int j = 0; j < 3 && first; ++j) motion.velocity[k] += whole.rotation[k][j] * along[j];
+    }
+    moves.add(first ? 0 : 1, whole, motion);
+  }
+  return moves;
+}
+
+// Most triangles of each are near one of the other in every piece of the step.
+TEST_F(Impacts, OneBodyThatTurnsWithinAnotherLooksAtFewPairsHoweverFarItTurns) {
+  const Mesh ball = test::sphere(1, 4), socket = test::sphere(1.01, 4);
+  const Mesh shaft = test::regular_prism(512, 1, 1), bearing = test::pipe(512, 1.01, 1.25, 2);
+  const MovingScene scenes[] = {one_within_another(ball, socket, 16, 0, {0, 0, 0}),
+                                one_within_another(ball, socket, 16, 0, {0.001, -0.001, 0.002}),
+                                one_within_another(ball, socket, 0, 16, {0, 0, 0}),
+                                one_within_another(ball, socket, 16, -5, {0, 0, 0}),
+                                one_within_another(shaft, bearing, 16, 0, {0, 0, 0.25}),
+                                one_within_another(shaft, bearing, 16, -32, {0, 0.002, 0.25})};
+  for (const MovingScene& moves : scenes) {
+    EXPECT_EQ(impact(moves).status, ImpactStatus::none);
+    EXPECT_LT(query_.counters().block_pairs + query_.counters().triangle_pairs, 10'000u);
+  }
+}
+
+// Fins beside the ball and the socket meet when they would without these.
+TEST_F(Impacts, WhatTurnsWithinAnotherStopsWhereOtherPartsMeet) {
+  const Mesh fin = test::moved(test::box(0.25f, 0.25f, 0.25f), 3, 0, 0),
+             other = test::moved(test::box(0.25f, 0.25f, 0.25f), -1.5f, 2.5f, 0.125f);
+  const Mesh inner = test::joined(test::sphere(1, 4), fin),
+             outer = test::joined(test::sphere(1.01, 4), other);
+  RandomPoses random(4);
+  for (const double turn : {16.0, -16.0}) {
+    for (const double turn_outer : {0.0, 3.0}) {
+      const MovingScene alone = one_within_another(fin, other, turn, turn_outer, {0, 0, 0.01});
+      const MovingScene moves = one_within_another(inner, outer, turn, turn_outer, {0, 0, 0.0001});
+      const Impact expected = impact(alone), found = impact(moves);
+      EXPECT_EQ(expected.status, ImpactStatus::found);
+      EXPECT_EQ(found.status, ImpactStatus::found);
+      EXPECT_NEAR(found.t_safe, expected.t_safe, 1e-4);
+      EXPECT_LT(query_.counters().block_pairs + query_.counters().triangle_pairs, 20'000u);
+      ImpactChecker(moves).check(found, random, 20);
     }
   }
 }

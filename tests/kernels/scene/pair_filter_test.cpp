@@ -191,6 +191,32 @@ TEST(BroadPhaseFilter, KeptTreesMayBeHigherOrLowerThanTheOthers) {
   }
 }
 
+// Bodies in one place: each filter admits no pair, and the walk ends where the groups below tell that.
+TEST(BroadPhaseFilter, EndsTheWalkAboveBoxesOfWhichItAdmitsNoPair) {
+  BroadPhase broad_phase;
+  constexpr std::uint32_t kCount = 4096;
+  const Boxes boxes(kCount, {{0, 0, 0}, {1, 1, 1}});
+  FilterArrays no_group, other_group, one_way, at_rest;
+  for (std::uint32_t i = 0; i < kCount; ++i) {
+    no_group.mask.push_back(0);
+    other_group.group.push_back(1u << i % 16);
+    other_group.mask.push_back(0x10000u << i % 16);
+    one_way.group.push_back(1 + i % 2);
+    one_way.mask.push_back(2 + 2 * (i % 2));
+    at_rest.motion.push_back(i % 3 == 0 ? Motion::kinematic : Motion::fixed);
+  }
+  ExcludedPairTable table;
+  for (const FilterArrays* filter : {&no_group, &other_group, &one_way, &at_rest}) {
+    ASSERT_EQ(broad_phase.find_pairs(boxes, filter->view(table)), Status::kOk);
+    EXPECT_TRUE(broad_phase.pairs().empty());
+    EXPECT_LT(broad_phase.group_pairs(), 100u);  // all: 524,800 and those above
+  }
+  at_rest.motion[1000] = Motion::moving;
+  ASSERT_EQ(broad_phase.find_pairs(boxes, at_rest.view(table)), Status::kOk);
+  EXPECT_EQ(broad_phase.pairs().size(), kCount - 1);
+  EXPECT_LT(broad_phase.group_pairs(), kCount);
+}
+
 TEST(BroadPhaseFilter, LooksAtNoKeptBoxAgain) {
   BroadPhase broad_phase;
   const std::uint32_t count = 1000;
@@ -222,9 +248,10 @@ TEST(BroadPhaseFilter, KeptBoxesThatNothingMeetsCostNextToNothing) {
   }
   PairFilter filter;
   filter.motion = motion.data();
+  ASSERT_EQ(broad_phase.find_pairs(boxes), Status::kOk);
+  EXPECT_GT(broad_phase.group_pairs(), 20 * alone);
   ASSERT_EQ(broad_phase.find_pairs(boxes, filter), Status::kOk);
   const Pairs expected = pairs_of(broad_phase);
-  EXPECT_GT(broad_phase.group_pairs(), 20 * alone);
   ASSERT_EQ(broad_phase.keep_fixed(boxes, motion), Status::kOk);
   ASSERT_EQ(broad_phase.find_pairs(boxes, filter), Status::kOk);
   EXPECT_EQ(pairs_of(broad_phase), expected);

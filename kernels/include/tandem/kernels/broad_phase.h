@@ -1,4 +1,5 @@
 #pragma once
+#include <compare>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -19,8 +20,10 @@ class WorkerThreads;
 /// Boxes are split into four again and again, at medians along the longest extent, which makes a complete
 /// tree of groups of four; it is traversed in tandem with itself. O(n log n) for boxes of bounded overlap,
 /// whatever their distribution: one that is far from all others costs no more than the rest. All in float64,
-/// so that the tree's answer is exact. Boxes of fixed instances may be kept in a tree of their own: then a
-/// call makes one of the others, and traverses that in tandem with itself and with the kept one.
+/// so that the tree's answer is exact. Where the filter tells instances apart, each group knows the groups,
+/// masks and motions that are in it, so a pair of groups of which the filter looks at no pair ends the walk,
+/// and boxes in one place are split by these. Boxes of fixed instances may be kept in a tree of their own:
+/// then a call makes one of the others, and traverses that in tandem with itself and with the kept one.
 class BroadPhase {
  public:
   /// Result: kOk; kOutOfMemory; kOutOfRange where a coordinate is NaN or beyond kLargestWorldCoordinate;
@@ -75,6 +78,17 @@ class BroadPhase {
     double lo[3][kGroup], hi[3][kGroup];
   };
 
+  /// What a filter says of a box, or of all boxes of a group together: their groups and masks, and a bit for
+  /// each of their motions and for each that meets one of these.
+  struct Kind {
+    std::uint32_t group = 0, mask = 0, motions = 0, met = 0;
+
+    auto operator<=>(const Kind&) const = default;
+  };
+  struct Kinds {
+    Kind of[kGroup];
+  };
+
   /// Items that make `units` runs of `unit` items, the last of which may be shorter. A unit is a power of
   /// four.
   struct Range {
@@ -85,10 +99,11 @@ class BroadPhase {
   struct Tree {
     Buffer<Item> items;                // in the order of the tree
     Buffer<Group> groups;              // level by level
+    Buffer<Kinds> kinds;               // of the groups, where the filter tells instances apart; else none
     std::size_t level_begin[17] = {};  // where each level of groups begins
     int levels = 0;
 
-    bool reserve(std::size_t boxes);
+    bool reserve(std::size_t boxes, const PairFilter& filter);
     int top() const { return levels - 1; }
     const Group* level(int i) const { return groups.data() + level_begin[i]; }
   };
@@ -122,13 +137,16 @@ class BroadPhase {
   bool provide_finders(std::uint32_t workers);
   static std::uint32_t meeting(const Group& a, const Group& b);
   static std::uint32_t meeting(const TreePair& trees, const GroupPair& pair);
+  static Kind kind_of(const PairFilter& filter, std::size_t box);
+  static std::uint32_t may_look(const TreePair& trees, const GroupPair& pair);
   bool take(std::span<const WorldBox> boxes, const std::uint32_t* numbers, Tree& tree, Team team);
-  static bool halve(Item* all, Range& range, Range& right);
-  static void split(Item* all, Range range);
-  static void split(Item* all, Range range, Team team);
-  static void build(std::span<const WorldBox> boxes, Tree& tree, Team team);
+  static bool halve(Item* all, const PairFilter& filter, Range& range, Range& right);
+  static void split(Item* all, const PairFilter& filter, Range range);
+  static void split(Item* all, const PairFilter& filter, Range range, Team team);
+  static void build(std::span<const WorldBox> boxes, const PairFilter& filter, Tree& tree, Team team);
   static void build_level(int level, std::size_t below, std::span<const WorldBox> boxes, Tree& tree,
                           Team team);
+  static void build_kinds(int level, std::size_t below, const PairFilter& filter, Tree& tree, Team team);
   static void collect(const TreePair& trees, GroupPair from, const PairFilter& filter, std::uint32_t owners,
                       Finder& finder);
   bool collect(const TreePair& trees, const PairFilter& filter, Team team);

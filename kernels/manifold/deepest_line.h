@@ -56,7 +56,7 @@ struct SearchMemory {
   int from;  ///< the seed that is on the deepest of their lines
   PatchFrame frame;
   LineMemory lines;
-  HalfSpace learnt[4];
+  HalfSpace learnt[4];  ///< by the lines of a step
   HalfSpaces spaces;
   LineOfTwo proposed;
   OverlapLine best;
@@ -106,11 +106,15 @@ class DeepestLine {
   TANDEM_HD void ask_along(const Vector2& at, const double (&from)[2], const double (&limit)[2],
                            double expected);
   TANDEM_HD void go_to_ends();
-  TANDEM_HD bool step(int seed);
+  TANDEM_HD OverlapLine line_that_counts(int from) const;
+  TANDEM_HD bool learn_from_lines(int from);
+  TANDEM_HD bool step(int from);
 
   const Team& team_;
   const BodyPair& bodies_;
   const PieceMemory& memory_;
+  static constexpr int kLines = 4;  ///< of a step: along the proposed line, and straight to its ends
+
   bool one_region_;
   std::uint32_t begin_, end_;
   SearchMemory& shared_;
@@ -238,90 +242,100 @@ TANDEM_HD void DeepestLine<Team>::ask_along(const Vector2& at, const double (&fr
                   side == 0 ? limit[0] : -INFINITY, side == 0 ? INFINITY : limit[1], expected, kGrazes);
 }
 
-/// Looks at the line that is proposed, and along straight lines from the point of the overlap to where a would
-/// end and b begin on it. As far as both stay within their bodies, all lines between them count. False if
-/// nothing came of it.
+/// Returns the line that counts of what was found along the proposed one, and along straight lines to its
+/// ends; none where that is no deeper than the best. As far as both of those stay within their bodies, all
+/// lines between them count.
 template <typename Team>
-TANDEM_HD bool DeepestLine<Team>::step(int from) {
-  const PatchFrame& frame = shared_.frame;
+TANDEM_HD OverlapLine DeepestLine<Team>::line_that_counts(int from) const {
+  const LineQuestion* const line = shared_.lines.line;
   const LineOfTwo& p = shared_.proposed;
-  const Vector3& seed = shared_.seeds.at[from];
-  const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
-  const double target = (p.height[0] + p.height[1]) / 2;
-  const Vector3 to[2] = {frame.at(p.at, p.height[0]), frame.at(p.at, p.height[1])};
-  team_.sync();
-  ask_along(p.at, {target, target}, {-INFINITY, INFINITY}, p.depth());
-  lines.ask_straight(2, seed, to);
-  team_.sync();
-  LineQuestion* const line = shared_.lines.line;
-  LineQuestions questions(bodies_, line);
-  walk_lines(team_, questions, 4, line);
   const double within = kNearEnd * bodies_.reach();
   double part = 1;
-  int first = -1;
+  int blocked = -1;
   for (int side = 0; side < 2; ++side) {
-    const Crossing& blocked = line[2 + side].best;
-    const double length = norm(to[side] - seed);
-    if (blocked.found() && blocked.height < part * length) part = blocked.height / length, first = side;
+    const Crossing& surface = line[2 + side].best;
+    if (surface.found() && surface.height < part * line[2 + side].length)
+      part = surface.height / line[2 + side].length, blocked = side;
   }
-  OverlapLine next;
-  next.depth = part * p.depth();
-  const bool deeper = next.depth > shared_.best.depth;
-  if (deeper && first < 0) {
+  OverlapLine out;
+  if (!(part * p.depth() > shared_.best.depth)) return out;
+  if (blocked >= 0) {
+    const Vector2 at = shared_.frame.flat(shared_.seeds.at[from]);
+    const double height = shared_.frame.height(shared_.seeds.at[from]);
+    out.at = at + part * (p.at - at);
+    for (int side = 0; side < 2; ++side) {
+      out.height[side] = height + part * (p.height[side] - height);
+      out.triangle[side] = side == blocked ? line[2 + side].best.triangle
+                                           : shared_.spaces.nearest_triangle(side, out.at, out.height[side]);
+    }
+    out.is_loose = true;
+  } else {
     const bool on_wall = shared_.spaces.on_wall(p.at, within);
-    next.at = p.at;
+    out.at = p.at;
     for (int side = 0; side < 2; ++side) {
       const Crossing& end = line[side].best;
-      const double sign = side == 0 ? 1 : -1;
-      // A body may go on beyond what the half-spaces say.
-      const bool found = end.found() && sign * (end.height - p.height[side]) > -within;
-      next.height[side] = found ? end.height : p.height[side];
-      next.triangle[side] = found     ? end.triangle
-                            : on_wall ? kNoIndex
-                                      : shared_.spaces.nearest_triangle(side, p.at, p.height[side], within);
+      const double further = side == 0 ? end.height - p.height[0] : p.height[1] - end.height;
+      // A body may go on beyond what the half-spaces say. A line along an edge may miss it.
+      const bool found = end.found() && further > -within;
+      out.height[side] = found ? end.height : p.height[side];
+      out.triangle[side] = found     ? end.triangle
+                           : on_wall ? kNoIndex
+                                     : shared_.spaces.nearest_triangle(side, p.at, p.height[side], within);
     }
-    next.depth = next.height[0] - next.height[1];
-  } else if (deeper) {
-    const Vector2 at = frame.flat(seed);
-    const double height = frame.height(seed);
-    next.at = at + part * (p.at - at);
-    for (int side = 0; side < 2; ++side) {
-      next.height[side] = height + part * (p.height[side] - height);
-      next.triangle[side] = side == first ? line[2 + side].best.triangle
-                                          : shared_.spaces.nearest_triangle(side, next.at, next.height[side], INFINITY);
-    }
-    next.is_loose = true;
   }
-  const bool counts = deeper && next.found();
-  for (int i = static_cast<int>(team_.rank()); i < 4; i += static_cast<int>(team_.size())) {
-    const int side = i % 2;
-    learn(side, i < 2 ? line[2 + side].best : line[side].best, shared_.learnt[i]);
-  }
-  if (counts && first < 0)
-    shared_.spaces.drop_before(team_, next.at, next.height, 16 * bodies_.tolerance());
+  out.depth = out.height[0] - out.height[1];
+  return out;
+}
+
+/// Adds the half-spaces of what the lines met; false if all were known.
+template <typename Team>
+TANDEM_HD bool DeepestLine<Team>::learn_from_lines(int from) {
+  const LineQuestion* const line = shared_.lines.line;
+  for (int i = static_cast<int>(team_.rank()); i < kLines; i += static_cast<int>(team_.size()))
+    learn(i % 2, line[i].best, shared_.learnt[i]);
   team_.sync();
-  const Vector2 at = frame.flat(seed);
-  const double height = frame.height(seed);
+  const Vector2 at = shared_.frame.flat(shared_.seeds.at[from]);
+  const double height = shared_.frame.height(shared_.seeds.at[from]);
   unsigned is_new = 0;
-  for (int i = 0; i < 4; ++i) {
+  for (int i = 0; i < kLines; ++i) {
     const HalfSpace& space = shared_.learnt[i];
     if (space.triangle == kNoIndex || !(space.beyond(at, height) < 0)) continue;
     is_new |= shared_.spaces.knows(team_, space) ? 0 : 1u << i;
   }
-  team_.sync();
-  for (int i = static_cast<int>(team_.rank()); i < 4; i += static_cast<int>(team_.size())) {
+  team_.sync();  // all have seen what is known
+  for (int i = static_cast<int>(team_.rank()); i < kLines; i += static_cast<int>(team_.size())) {
     if ((is_new >> i & 1u) == 0) continue;
-    HalfSpace& place = shared_.spaces.space[HalfSpaces::kFirst + (4 * shared_.steps + i) % HalfSpaces::kLearnt];
+    HalfSpace& place = shared_.spaces.learnt(kLines * shared_.steps + i);
     place = shared_.learnt[i];
     place.counts = true;
   }
   team_.sync();
+  return is_new != 0;
+}
+
+/// Looks at the line that is proposed. False if nothing came of it.
+template <typename Team>
+TANDEM_HD bool DeepestLine<Team>::step(int from) {
+  const LineOfTwo& p = shared_.proposed;
+  const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
+  LineQuestions questions(bodies_, shared_.lines.line);
+  const double target = (p.height[0] + p.height[1]) / 2;
+  team_.sync();
+  ask_along(p.at, {target, target}, {-INFINITY, INFINITY}, p.depth());
+  lines.ask_straight(2, shared_.seeds.at[from],
+                     {shared_.frame.at(p.at, p.height[0]), shared_.frame.at(p.at, p.height[1])});
+  team_.sync();
+  walk_lines(team_, questions, kLines, shared_.lines.line);
+  const OverlapLine next = line_that_counts(from);
+  if (next.found() && !next.is_loose)
+    shared_.spaces.drop_before(team_, next.at, next.height, 16 * bodies_.tolerance());
+  const bool learns = learn_from_lines(from);
   if (team_.rank() == 0) {
-    if (counts) shared_.best = next;
+    if (next.found()) shared_.best = next;
     ++shared_.steps;
   }
   team_.sync();
-  return counts || is_new != 0;
+  return next.found() || learns;
 }
 
 /// Follows the best line to where both bodies end, if that is not known yet.

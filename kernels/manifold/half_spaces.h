@@ -34,6 +34,8 @@ class HalfSpaces {
   static constexpr int kFirst = 16, kLearnt = 24, kMost = kFirst + kLearnt;
 
   HalfSpace space[kMost];
+  /// The place of one that is learnt; those of long before give way.
+  TANDEM_HD HalfSpace& learnt(int i) { return space[kFirst + i % kLearnt]; }
 
   /// One of the team begins. middle, along, half: the square's middle, the direction of two sides, half their
   /// length; far: heights are between -far and far.
@@ -61,7 +63,8 @@ class HalfSpaces {
   }
   /// Forgets those beyond which the body goes on.
   template <typename Team>
-  TANDEM_HD void drop_before(const Team& team, const Vector2& at, const double (&height)[2], double tolerance) {
+  TANDEM_HD void drop_before(const Team& team, const Vector2& at, const double (&height)[2],
+                             double tolerance) {
     bool drops = false;
     for (int i = first_of(team); i < kMost; i += step_of(team)) {
       HalfSpace& of = space[i];
@@ -82,7 +85,8 @@ class HalfSpaces {
   }
   /// Returns the triangle of the half-space that ends nearest to a point of one body's, or kNoIndex if none
   /// ends within a distance.
-  TANDEM_HD std::uint32_t nearest_triangle(int side, const Vector2& at, double height, double within) const {
+  TANDEM_HD std::uint32_t nearest_triangle(int side, const Vector2& at, double height,
+                                           double within = INFINITY) const {
     std::uint32_t triangle = kNoIndex;
     double nearest = within;
     for (int i = 0; i < kMost; ++i) {
@@ -108,7 +112,8 @@ class HalfSpaces {
  private:
   static constexpr int kWalls = 6, kMostPivots = 64;
   static constexpr double kLeastShare = 1e-9;
-  static constexpr double kTilt = 1e-10;  ///< what places count, so that no price is 0 and no basis comes again
+  static constexpr double kTilt =
+      1e-10;  ///< what places count, so that no price is 0 and no basis comes again
 
   template <typename Team>
   TANDEM_HD static int first_of(const Team& team) {
@@ -181,7 +186,8 @@ class HalfSpaces {
   Basis basis_;
 };
 
-/// The constraint beyond which a point lies most: a wall, or kWalls + i the half-space i; -1 if there is none.
+/// The constraint beyond which a point lies most: a wall, or kWalls + i the half-space i; -1 if there is
+/// none.
 template <typename Team>
 TANDEM_HD int HalfSpaces::most_violated(const Team& team, const double (&x)[4], double tolerance) const {
   int worst = -1;

@@ -346,7 +346,8 @@ __device__ std::uint32_t patches_begun(const ManifoldArgs& args) {
 
 /// What is known of a deep patch lies where its manifold comes to lie.
 __device__ manifold::DeepPatch& deep_patch(const ManifoldArgs& args, std::uint32_t place) {
-  static_assert(sizeof(manifold::DeepPatch) <= sizeof(Patch) && alignof(manifold::DeepPatch) <= alignof(Patch));
+  static_assert(sizeof(manifold::DeepPatch) <= sizeof(Patch) &&
+                alignof(manifold::DeepPatch) <= alignof(Patch));
   return *reinterpret_cast<manifold::DeepPatch*>(&args.patches[place]);
 }
 

@@ -87,12 +87,12 @@ struct ManifoldArgs {
   GpuManifoldReport* host_report;  ///< in CPU memory
   manifold::PieceMemory pieces;
   BegunPatch* begun;
-  manifold::Patch* patches;  ///< at first the memory of deep ones
+  manifold::Patch* patches;     ///< at first the memory of deep ones
   std::uint32_t* next_of_pair;  ///< at first the deep patches; then of each patch the next of the same pair
   PairPatches* of_pair;
   manifold::PieceSummary* summaries;  ///< of each pair with contacts
-  PairCurve* curves;                  ///< at first those of pairs of several curves; then regions: those of many
-                                      ///< pieces from the beginning on, others from the end
+  PairCurve* curves;  ///< at first those of pairs of several curves; then regions: those of many
+                      ///< pieces from the beginning on, others from the end
   Counter* tile_sums;
 
   Manifold* manifolds;

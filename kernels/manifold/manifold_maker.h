@@ -160,7 +160,8 @@ TANDEM_HD_SELDOM void ManifoldMaker<Team>::begin_deep(std::uint32_t region, Norm
   const CurveMeasure measure = normal_finder.measure();
   const int lines = normal_finder.gather_for_deep(measure);
   const double reach = normal_finder.reach_from(measure.middle);
-  DeepestLine<Team>(team_, bodies_, memory_, summary_, region, depths).find_seeds(measure.middle, reach, kMostSeeds);
+  DeepestLine<Team>(team_, bodies_, memory_, summary_, region, depths)
+      .find_seeds(measure.middle, reach, kMostSeeds);
   if (team_.rank() == 0) {
     patch.measure = measure, patch.reach = reach, patch.directions = 2 * lines;
     for (int i = 0; i < lines; ++i) patch.tried[i] = shared.tried[i];
@@ -236,7 +237,8 @@ TANDEM_HD void ManifoldMaker<Team>::measure_depths(std::uint32_t region, SearchM
   for (std::uint32_t i = team_.rank(); i < count; i += team_.size())
     state_.sounding[i / 2].surface[i % 2] = shared.lines.line[i].best;
   DeepestLine<Team> search(team_, bodies_, memory_, summary_, region, shared);
-  search.find_seeds(state_.centre, state_.reach, state_.candidates <= kFewCandidates ? kMostSeeds / 2 : kMostSeeds);
+  search.find_seeds(state_.centre, state_.reach,
+                    state_.candidates <= kFewCandidates ? kMostSeeds / 2 : kMostSeeds);
   search.find(state_.frame, state_.centre, state_.reach, INFINITY);
   const bool through = state_.deep && search.goes_through();
   if (team_.rank() == 0) {

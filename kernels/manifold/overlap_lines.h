@@ -32,8 +32,8 @@ class OverlapLines {
 
   /// Finds a point of the overlap beside each of some pieces, at most LineMemory::kMost / 2: half-way from
   /// the middle of the piece, behind both triangles, to where the overlap ends on that line, but no further
-  /// than `most`. expected: how far that is, mostly. Result: a bit for each piece; 0 where its triangles face each other, or the
-  /// line is not within both bodies.
+  /// than `most`. expected: how far that is, mostly. Result: a bit for each piece; 0 where its triangles face
+  /// each other, or the line is not within both bodies.
   TANDEM_HD_SELDOM std::uint32_t go_inside(const std::uint32_t* piece, int count, double most,
                                            double expected, Vector3* inside) const;
 
@@ -140,6 +140,7 @@ TANDEM_HD void OverlapLines<Team>::ask_straight(std::uint32_t first, const Vecto
     LineQuestion& line = shared_.line[first + side];
     line.frame = &shared_.frame[side];
     line.side = -1;
+    line.length = length;
     line.best = {};
     if (!(length > 2 * begin)) continue;
     shared_.frame[side] = PatchFrame(from, (1 / length) * (to[side] - from));

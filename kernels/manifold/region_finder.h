@@ -41,7 +41,6 @@ class RegionFinder {
   TANDEM_HD std::uint32_t join();
 
  private:
-
   /// Area vectors agree if their sum is longer than this part of their lengths' sum.
   static constexpr double kAgree = 0.5;
 

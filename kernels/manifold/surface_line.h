@@ -193,6 +193,7 @@ struct LineQuestion {
   double target, lower, upper;
   double most;        ///< it is looked for no further from the target
   double least_sine;  ///< triangles that the line grazes at less do not count
+  double length;      ///< of a straight line from one point to another
   int side, facing;
 
   // The test of boxes.
@@ -291,8 +292,8 @@ class LineQuestions {
                  third = cross(side[0], side[1]) / area;
     const double little = 1e-12 + 0x1p-48 * body.reach * std::sqrt(size) / std::fabs(area);
     if (!(first >= -little && second >= -little && third >= -little)) return;
-    const double height = first * dot(frame.n, corner[0]) + second * dot(frame.n, corner[1]) +
-                          third * dot(frame.n, corner[2]);
+    const double height =
+        first * dot(frame.n, corner[0]) + second * dot(frame.n, corner[1]) + third * dot(frame.n, corner[2]);
     if (!(height >= q.lower && height <= q.upper)) return;
     const Found here = {std::fabs(height - q.target), {height, t}};
     if (is_nearer(here, found)) found = here;

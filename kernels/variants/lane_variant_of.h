@@ -27,8 +27,8 @@ void nearest_phase_of_lanes(const NearestTask& task, const BoundedBlockPair* fro
 }
 
 constexpr ManifoldLanes kManifoldLanes = {make_pieces,        sum_pieces,   least_unmarked, find_face_along,
-                                          sum_length_on_face, spread_along, gather_rim,
-                                          furthest,           next_near,    answer_lines};
+                                          sum_length_on_face, spread_along, gather_rim,     furthest,
+                                          next_near,          answer_lines};
 
 template <int kCount>
 constexpr LaneVariant kLaneVariantOf = {block_pair_mask_of_lanes<kCount>, narrow_phase_of_lanes<kCount>,

@@ -135,7 +135,7 @@ TEST(ManifoldQuery, PointsHaveDifferentIdsWhereRoundingIsAsLargeAsTriangles) {
     EXPECT_EQ(std::adjacent_find(ids.begin(), ids.end()), ids.end()) << trial;
     points += ids.size();
   }
-  EXPECT_GT(points, 500u);
+  EXPECT_GT(points, 1000u);
 }
 
 TEST(ManifoldQuery, FewerPointsMayBeAskedFor) {
@@ -240,7 +240,7 @@ TEST(ManifoldQuery, MoveWithTheBodies) {
   }
   EXPECT_GT(seen, 30u);
   // Rounding decides between points that are equally far out.
-  EXPECT_GE(same, seen - seen / 15);
+  EXPECT_GE(same, seen - seen / 20);
 }
 
 TEST(ManifoldQuery, TurnRoundWhereTheBodiesAreExchanged) {
@@ -267,7 +267,7 @@ TEST(ManifoldQuery, TurnRoundWhereTheBodiesAreExchanged) {
   }
   EXPECT_GT(seen, 30u);
   // Rounding decides between points that are equally far out.
-  EXPECT_GE(same, seen - seen / 15);
+  EXPECT_GE(same, seen - seen / 20);
 }
 
 struct Slide {
@@ -326,7 +326,7 @@ TEST_P(SlidingBody, ChangesItsManifoldsBySmallStepsAndKeepsTheNamesOfItsPoints) 
       "%.2f steps, depths by %.3f\n",
       slide.name, 100 * part, points, most_turn, most_shift, most_deeper);
   RecordProperty("kept_percent", std::to_string(100 * part));
-  EXPECT_GE(part, 0.94);
+  EXPECT_GE(part, 0.95);
   if (!slide.one_patch) return;
   EXPECT_LT(most_turn, 0.05);
   EXPECT_LT(most_shift, 5);

@@ -26,13 +26,13 @@ enum ManifoldFlags : std::uint32_t {
   kTouching = 1,     ///< without overlap: depth 0
   kOpenCurve = 2,    ///< the curve in which the surfaces cross does not close: an open mesh, or mode fast
   kGoesThrough = 4,  ///< one body goes through the other here
-  kAmbiguous = 8,    ///< corner on corner or edge along edge: the bodies touch, but no direction is better than
-                     ///< another. The normal is 0, and there are no points
+  kAmbiguous = 8,  ///< corner on corner or edge along edge: the bodies touch, but no direction is better than
+                   ///< another. The normal is 0, and there are no points
 };
 
 /// A connected region in which the surfaces of two bodies meet.
 struct Manifold {
-  double normal[3];       ///< unit, from a towards b: moving b along it separates the bodies; or 0 (kAmbiguous)
+  double normal[3];  ///< unit, from a towards b: moving b along it separates the bodies; or 0 (kAmbiguous)
   double area_vector[3];  ///< of a's surface inside b, bounded by the curve in which the surfaces cross
   double centre[3];       ///< of that area, in the world
   double depth;           ///< how far b is to be moved along the normal to end the overlap; the first point's

@@ -360,8 +360,9 @@ class View:
         if len(found.points):
             points = pyvista.PolyData(found.points["position"] - self.origin)
             points["depth"] = found.points["depth"]
-            arrows = pyvista.PolyData(found.manifolds["centre"] - self.origin)
-            arrows["normal"] = found.manifolds["normal"]
+            pushing = found.manifolds[found.manifolds["point_count"] > 0]  # others have no normal
+            arrows = pyvista.PolyData(pushing["centre"] - self.origin)
+            arrows["normal"] = pushing["normal"]
             normals = arrows.glyph(orient="normal", scale=False, factor=NORMAL_LENGTH * self._length,
                                    geom=pyvista.Arrow(tip_radius=0.07, tip_length=0.3, shaft_radius=0.022))
         self._put("points", points, scalars="depth", cmap="plasma", clim=_from_zero(found.points["depth"]),

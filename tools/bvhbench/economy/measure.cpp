@@ -20,6 +20,7 @@ Findings findings_of(const TimedAnswer& answer) {
     if (touches[i]) found.touching.push_back(answer.pairs[i]);
   }
   for (const Manifold& manifold : answer.manifolds.manifolds) {
+    if ((manifold.flags & kAmbiguous) != 0) continue;  // it has no direction
     Patch patch = {answer.pairs[manifold.pair], {}, {}, manifold.depth};
     std::copy_n(manifold.normal, 3, patch.normal.begin());
     std::copy_n(manifold.centre, 3, patch.centre.begin());

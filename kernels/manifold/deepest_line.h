@@ -102,6 +102,10 @@ class DeepestLine {
  private:
   TANDEM_HD void begin_half_spaces(const Vector3& middle, double reach);
   TANDEM_HD void learn(int side, const Crossing& surface, HalfSpace& out) const;
+  /// Forgets half-spaces beyond which the bodies go on, up to these heights on a line.
+  TANDEM_HD void go_beyond(const Vector2& at, const double (&height)[2]) {
+    shared_.spaces.drop_before(team_, at, height, 16 * bodies_.tolerance());
+  }
   TANDEM_HD void propose(int seed);
   TANDEM_HD void ask_along(const Vector2& at, const double (&from)[2], const double (&limit)[2],
                            double expected);
@@ -227,8 +231,13 @@ TANDEM_HD void DeepestLine<Team>::begin_half_spaces(const Vector3& middle, doubl
     const int side = i % 2, seed = i / 4;
     const Crossing of_piece = {0, memory_.pieces[shared_.seeds.beside[seed]].triangle[side]};
     learn(side, i % 4 < 2 ? shared_.lines.line[2 * seed + side].best : of_piece, space);
+    space.counts = false;
   }
   team_.sync();
+  for (int i = 0; i < shared_.seeds.count; ++i) {
+    const LineQuestion &top = shared_.lines.line[2 * i], &bottom = shared_.lines.line[2 * i + 1];
+    if (top.best.found() && bottom.best.found()) go_beyond(top.at, {top.best.height, bottom.best.height});
+  }
 }
 
 /// Asks where a ends and b begins on a line. from: heights from which on they are looked for; expected: how
@@ -327,8 +336,7 @@ TANDEM_HD bool DeepestLine<Team>::step(int from) {
   team_.sync();
   walk_lines(team_, questions, kLines, shared_.lines.line);
   const OverlapLine next = line_that_counts(from);
-  if (next.found() && !next.is_loose)
-    shared_.spaces.drop_before(team_, next.at, next.height, 16 * bodies_.tolerance());
+  if (next.found()) go_beyond(next.at, next.height);
   const bool learns = learn_from_lines(from);
   if (team_.rank() == 0) {
     if (next.found()) shared_.best = next;

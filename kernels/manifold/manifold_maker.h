@@ -19,6 +19,9 @@ inline constexpr double kNearDeepest = 0.03;
 /// deeper by kDeepEnough.
 inline constexpr double kAsDeep = 1e-6;
 
+/// A point is outside a triangle if its share of a corner is further below 0 than this.
+inline constexpr double kOutside = 1e-12;
+
 /// A direction is better than another only if the overlap along it is less by more than this part.
 inline constexpr double kShallower = 1e-9;
 
@@ -123,6 +126,7 @@ TANDEM_HD void ManifoldMaker<Team>::find_rim(std::uint32_t region, const CurveMe
   if (team_.rank() == 0) {
     state_.kind = normal.kind;
     state_.deep = false;
+    state_.has_area = !touch;
     state_.closed = measure.closed || (touch && measure.point);
     state_.goes_through = false;
     state_.deepest = {};
@@ -270,7 +274,7 @@ TANDEM_HD Vector2 ManifoldMaker<Team>::reach_to_rim(const Sounding& s, double (&
       const int p = (k + 1) % 3, q = (k + 2) % 3;
       share[side][k] = cross(at[p], at[q]) / area;
       change[side][k] = cross(from_line[p], from_line[q]) / area - share[side][k];
-      if (share[side][k] < 0 && change[side][k] > 0)
+      if (share[side][k] < -kOutside && change[side][k] > 0)
         part = greater(lesser(-share[side][k] / change[side][k], 1.0), part);
     }
   }
@@ -405,10 +409,10 @@ TANDEM_HD void ManifoldMaker<Team>::write_manifold(const ChoiceMemory& shared, P
     }
     area = (std::fabs(twice) / 2) * frame.n;
   }
-  if (touch) area = {};
+  if (!state_.has_area) area = {};
   write(frame.n, manifold.normal);
   write(area, manifold.area_vector);
-  write(frame.at(state_.closed && !touch ? state_.middle_of_area : state_.middle, height), manifold.centre);
+  write(frame.at(state_.closed && state_.has_area ? state_.middle_of_area : state_.middle, height), manifold.centre);
   manifold.depth = touch ? 0 : shared.chosen[0].depth;
 }
 

@@ -192,7 +192,8 @@ struct PatchState {
   int rim_points;
   PatchKind kind;
   bool closed, goes_through;
-  bool deep;  ///< the overlap was measured along many directions
+  bool deep;      ///< the overlap was measured along many directions
+  bool has_area;  ///< else the surfaces touch in points or along lines
   PatchFrame frame;
   Vector3 area;            ///< CurveMeasure's
   Vector3 centre;          ///< of the rim

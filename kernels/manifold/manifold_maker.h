@@ -412,7 +412,8 @@ TANDEM_HD void ManifoldMaker<Team>::write_manifold(const ChoiceMemory& shared, P
   if (!state_.has_area) area = {};
   write(frame.n, manifold.normal);
   write(area, manifold.area_vector);
-  write(frame.at(state_.closed && state_.has_area ? state_.middle_of_area : state_.middle, height), manifold.centre);
+  write(frame.at(state_.closed && state_.has_area ? state_.middle_of_area : state_.middle, height),
+        manifold.centre);
   manifold.depth = touch ? 0 : shared.chosen[0].depth;
 }
 

@@ -180,7 +180,7 @@ static void test_bad_options(tandem_asset* cube) {
   const tandem_questions questions = {.struct_size = sizeof questions, .contained = 2};
   CHECK_STATUS(tandem_scene_find(scene, &questions), TANDEM_BAD_OPTION);
   CHECK(tandem_scene_pairs(scene, 5, NULL) == NULL && tandem_scene_pairs(scene, ~0u, NULL) == NULL);
-  CHECK_STATUS(tandem_scene_set_motion(scene, 0, 4), TANDEM_BAD_OPTION);
+  CHECK_STATUS(tandem_scene_set_motion(scene, 0, 4), TANDEM_BAD_MOTION);
   tandem_open_options opening = {sizeof opening, 2, 0, 0};
   tandem_asset* asset = NULL;
   CHECK_STATUS(tandem_asset_open("x", &opening, NULL, &asset, NULL), TANDEM_BAD_OPTION);
@@ -197,11 +197,11 @@ static void test_bad_options(tandem_asset* cube) {
   CHECK_STATUS(tandem_scene_place(scene, bodies, 2, &filter), TANDEM_FILTER_MISMATCH);
   filter.count = 2;
   CHECK_STATUS(tandem_scene_add(scene, bodies, &filter, &number), TANDEM_FILTER_MISMATCH);
-  CHECK_STATUS(tandem_scene_place(scene, bodies, 2, &filter), TANDEM_BAD_OPTION);
+  CHECK_STATUS(tandem_scene_place(scene, bodies, 2, &filter), TANDEM_BAD_MOTION);
   CHECK(tandem_scene_where(scene) == 1);
   filter.motion = motion + 1;
   filter.count = 1;
-  CHECK_STATUS(tandem_scene_add(scene, bodies, &filter, &number), TANDEM_BAD_OPTION);
+  CHECK_STATUS(tandem_scene_add(scene, bodies, &filter, &number), TANDEM_BAD_MOTION);
   const tandem_object_pair joint = {0, 1};
   CHECK_STATUS(tandem_excluded_pairs_create(&joint, 1, NULL, (tandem_excluded_pairs**)&filter.excluded),
                TANDEM_OK);

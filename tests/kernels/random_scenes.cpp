@@ -225,7 +225,9 @@ bool finite(const double (&x)[3]) {
 std::string defect_of(const Manifold& m, std::uint32_t first_point, std::uint32_t pair) {
   if (!finite(m.normal) || !finite(m.area_vector) || !finite(m.centre) || !std::isfinite(m.depth))
     return "is not finite";
-  if (std::fabs(std::hypot(m.normal[0], m.normal[1], m.normal[2]) - 1) > 1e-12) return "has no unit normal";
+  const double length = std::hypot(m.normal[0], m.normal[1], m.normal[2]);
+  if ((m.flags & kAmbiguous) != 0) return length == 0 && m.point_count == 0 ? "" : "is ambiguous and pushes";
+  if (std::fabs(length - 1) > 1e-12) return "has no unit normal";
   if (m.depth < 0) return "has a negative depth";
   if (m.point_count < 1 || m.point_count > kMostManifoldPoints) return "has no points or too many";
   if (m.first_point != first_point) return "does not begin where the one before ends";

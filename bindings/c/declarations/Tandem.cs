@@ -426,6 +426,7 @@ public static unsafe class Native {
   public const uint TANDEM_UNKNOWN_LEVEL = 7;
   public const uint TANDEM_FILTER_MISMATCH = 8;
   public const uint TANDEM_CONTACTS_MISSING = 9;
+  public const uint TANDEM_BAD_MOTION = 10;
   public const uint TANDEM_NO_TRIANGLE = 11;
   public const uint TANDEM_TOO_MANY_TRIANGLES = 12;
   public const uint TANDEM_ASSETS_MISSING = 13;

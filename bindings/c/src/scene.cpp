@@ -105,7 +105,7 @@ tandem_status set_assets(tandem_scene& self, tandem_asset* const* assets, size_t
 }
 
 // The filter of so many bodies, which is zeros where none is given. Result: TANDEM_OK,
-// TANDEM_BAD_STRUCT_SIZE, TANDEM_BAD_OPTION, where `where` is the body with a motion that there is not, or
+// TANDEM_BAD_STRUCT_SIZE, TANDEM_BAD_OPTION, TANDEM_BAD_MOTION, where `where` is the body, or
 // TANDEM_FILTER_MISMATCH.
 tandem_status read_filter(const tandem_pair_filter* given, size_t bodies, tandem_pair_filter& read,
                           uint64_t& where) {
@@ -116,7 +116,7 @@ tandem_status read_filter(const tandem_pair_filter* given, size_t bodies, tandem
   const size_t unknown = read.motion != nullptr ? first_unknown_motion(read.motion, bodies) : bodies;
   if (unknown == bodies) return TANDEM_OK;
   where = unknown;
-  return TANDEM_BAD_OPTION;
+  return TANDEM_BAD_MOTION;
 }
 
 tandem_status place(tandem_scene& self, const tandem_instance* instances, size_t count,
@@ -335,8 +335,9 @@ tandem_status tandem_scene_move(tandem_scene* scene, const uint32_t* bodies, con
 
 tandem_status tandem_scene_set_motion(tandem_scene* scene, uint32_t body, uint32_t motion) {
   return enter(scene, [&](tandem_scene& self) {
-    return motion <= TANDEM_SLEEPING ? self.told(self.scene.set_motion(body, static_cast<Motion>(motion)))
-                                     : tandem_status{TANDEM_BAD_OPTION};
+    if (motion <= TANDEM_SLEEPING) return self.told(self.scene.set_motion(body, static_cast<Motion>(motion)));
+    self.where = body;
+    return tandem_status{TANDEM_BAD_MOTION};
   });
 }
 

@@ -21,6 +21,7 @@ constexpr Entry kEntries[] = {
     {TANDEM_FILTER_MISMATCH, "FilterMismatch", nullptr, "a filter is of another number of instances"},
     {TANDEM_CONTACTS_MISSING, "ContactsMissing", nullptr,
      "the contacts that manifolds or contained bodies need were not found of the bodies as they stand"},
+    {TANDEM_BAD_MOTION, "BadMotion", "instance", "a motion is a number that names none"},
     {TANDEM_NO_TRIANGLE, "NoTriangle", nullptr, "none of the triangles can be used"},
     {TANDEM_ASSETS_MISSING, "AssetsMissing", nullptr,
      "a handle was given no assets, or others than the query whose contacts it takes"},

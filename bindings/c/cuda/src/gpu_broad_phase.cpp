@@ -59,7 +59,7 @@ tandem_status tandem_gpu_broad_phase_keep_fixed(tandem_gpu_broad_phase* broad_ph
     GpuInstances read;
     if (const tandem_status status = read_instances(instances, read); status != TANDEM_OK) return status;
     if (!is_there(motion, read.count)) return TANDEM_NULL_ARGUMENT;
-    if (first_unknown_motion(motion, read.count) != read.count) return TANDEM_BAD_OPTION;
+    if (first_unknown_motion(motion, read.count) != read.count) return TANDEM_BAD_MOTION;
     return told(
         self.query.keep_fixed(read, self.assets->bounds_of_all(), rows<Motion>(motion, read.count), stream),
         self.query);

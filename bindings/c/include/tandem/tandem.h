@@ -57,6 +57,7 @@ enum {
   TANDEM_FILTER_MISMATCH = 8,      ///< a filter's arrays do not have one entry for each body
   TANDEM_CONTACTS_MISSING = 9,     ///< manifolds or contained bodies need contacts that were not found, or
                                    ///< bodies have moved since
+  TANDEM_BAD_MOTION = 10,          ///< a body's motion is none of tandem_motion's
   TANDEM_NO_TRIANGLE = 11,         ///< none of the triangles can be used
   TANDEM_TOO_MANY_TRIANGLES = 12,  ///< there are 2^32 - 1 triangles or more
   TANDEM_ASSETS_MISSING = 13,  ///< a handle of tandem_cuda.h has no assets, or others than the query whose
@@ -384,7 +385,7 @@ TANDEM_API tandem_status tandem_scene_set_assets(tandem_scene* scene, tandem_ass
 
 /// Places all bodies anew; those that stand as before cost next to nothing. filter: or null. Result:
 /// TANDEM_OK, or, where tandem_scene_where() is the body: TANDEM_UNKNOWN_ASSET, TANDEM_POSE_NOT_RIGID,
-/// TANDEM_OUT_OF_RANGE (beyond 1e300), TANDEM_BAD_OPTION (its motion); TANDEM_UNKNOWN_INSTANCE, where it is
+/// TANDEM_OUT_OF_RANGE (beyond 1e300), TANDEM_BAD_MOTION; TANDEM_UNKNOWN_INSTANCE, where it is
 /// the filter's excluded pair; TANDEM_FILTER_MISMATCH, TANDEM_TOO_MANY_INSTANCES, TANDEM_OUT_OF_MEMORY,
 /// TANDEM_CANNOT_START_THREAD. After an error there are no bodies.
 TANDEM_API tandem_status tandem_scene_place(tandem_scene* scene, const tandem_instance* instances,
@@ -401,7 +402,7 @@ TANDEM_API tandem_status tandem_scene_add(tandem_scene* scene, const tandem_inst
 TANDEM_API tandem_status tandem_scene_move(tandem_scene* scene, const uint32_t* bodies,
                                            const tandem_pose* poses, size_t count);
 
-/// Changes what moves a body. Result: TANDEM_UNKNOWN_INSTANCE, TANDEM_BAD_OPTION, TANDEM_OUT_OF_MEMORY.
+/// Changes what moves a body. Result: TANDEM_UNKNOWN_INSTANCE, TANDEM_BAD_MOTION, TANDEM_OUT_OF_MEMORY.
 TANDEM_API tandem_status tandem_scene_set_motion(tandem_scene* scene, uint32_t body, uint32_t motion);
 
 /// Removes a body: no question finds it any more. Result: TANDEM_UNKNOWN_INSTANCE.

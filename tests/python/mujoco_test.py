@@ -55,7 +55,8 @@ def test_ball_falls_into_cup():
     alone, with_tandem = both(model, 2)
     assert alone.body("ball").xpos[2] > 0.3  # lies on the lid that the cup does not have
     assert with_tandem.body("ball").xpos[2] == pytest.approx(0.14, abs=0.003)
-    assert np.abs(with_tandem.qvel).max() < 0.05
+    assert np.abs(with_tandem.qvel[:6]).max() < 0.01
+    assert np.abs(with_tandem.qvel[6:9]).max() < 0.05  # it still rolls from facet to facet
 
 
 def test_ring_slides_down_a_peg():

@@ -85,8 +85,9 @@ class SceneLevels(LevelsBenchTest):
         self.assertEqual(found["triangles"], sum(self.triangles[i] for i in self.LEVELS))
         self.take_files_of_one_level()
         alone = self.query("--manifolds")
-        for key in ("triangles", "object_pairs", "contacts", "manifolds", "points", "segments"):
+        for key in ("triangles", "object_pairs", "contacts", "manifolds", "segments"):
             self.assertEqual(found[key], alone[key], key)
+        self.assertAlmostEqual(found["points"], alone["points"], delta=3)  # ties go by the numbers of triangles
         self.assertGreater(found["contacts"], 100)
         self.assertLess(table_of(self.contacts)["contacts/face_a"].max(), 1500)  # faces are of the source file, at any level
 

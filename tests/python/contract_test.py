@@ -16,7 +16,7 @@ ON_DEVICE = {"device": os.environ["TANDEM_DEVICE"]} if "TANDEM_DEVICE" in os.env
 OPTIONS = ("pairs", "reach", "mode", "first_contact_only", "self_pairs", "within", "add_error_bounds", "most_points", "match_previous", "absolute_tolerance",
            "relative_tolerance", "tolerance", "duration")
 # The package says these by ValueError, because it checks arguments itself.
-REFUSED_AS_ARGUMENT = {"OutOfRange", "BadOption", "BadReach", "BadTolerance", "BadDuration", "MotionMismatch"}
+REFUSED_AS_ARGUMENT = {"OutOfRange", "BadMotion", "BadOption", "BadReach", "BadTolerance", "BadDuration", "MotionMismatch"}
 
 
 class Door:

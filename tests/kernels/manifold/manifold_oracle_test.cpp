@@ -251,6 +251,21 @@ TEST(AnyBodies, DoNotPartBeforeOneHasMovedByTheDepth) {
   EXPECT_GT(parted, seen * 3 / 5);
 }
 
+/// The tubes of two links are saddles where they meet: neither lies behind the planes of its triangles.
+TEST(AnyBodies, LinksOfAChainPartAfterTheDepth) {
+  ManifoldScene scene;
+  scene.add_body(scene.add_shape(ring(48, 1, 24, 0.25f)), kIdentityPose);
+  scene.add_body(0, kIdentityPose);
+  for (const double overlap : {0.01, 0.05, 0.1, 0.2}) {
+    SCOPED_TRACE(overlap);
+    scene.bodies[1].pose = after(shift(1.5 + overlap, 0, 0), turn(0, 1.57079632679489662));
+    scene.find();
+    ASSERT_EQ(scene.manifolds().size(), 1u);
+    EXPECT_LT(scene.manifolds()[0].normal[0], -1 + 1e-6);
+    EXPECT_NEAR(scene.manifolds()[0].depth, overlap, 1e-5 * overlap);
+  }
+}
+
 /// Two bodies whose faces or edges lie in each other.
 struct Tie {
   const char* name;

@@ -80,7 +80,7 @@ class FirstWithin {
     ++counters_.contacts;
   }
 
-  // By the steps of narrow_phase_walk.h.
+  // Pairs are decided by the steps of narrow_phase_walk.h.
   bool are_within(std::uint32_t a, std::uint32_t b) {
     const TriangleInFrame x = stored_triangle(task_.a->tree.triangles[a]),
                           y = posed_triangle(frame_.b_in_a, task_.b->tree.triangles[b]);

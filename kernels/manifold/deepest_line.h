@@ -25,7 +25,7 @@ inline constexpr int kMostSeeds = 4;
 /// A line is the deepest if none is deeper by more than this part.
 inline constexpr double kDeepEnough = 1e-6;
 
-/// So many lines are looked at at most, beside those through the first points.
+/// The search looks at no more lines than this, beside those through the first points.
 inline constexpr int kMostSteps = 16;
 
 /// A line that is looked at moves this part of the way to a point of the overlap, so that it does not run

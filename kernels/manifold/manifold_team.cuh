@@ -209,7 +209,6 @@ struct WarpTeam : SharedNumbers {
   }
   __device__ static bool any(bool value) { return __any_sync(0xFFFFFFFFu, value) != 0; }
 
-  static constexpr int kHalf = 16;
   template <int kWidth, typename Of>
   __device__ void for_each_group(std::uint32_t count, const Of& of) const {
     constexpr std::uint32_t kGroups = 32 / kWidth;
@@ -272,7 +271,6 @@ struct BlockTeam : SharedNumbers {
     over_block(values, Greatest());
   }
 
-  static constexpr int kHalf = 32;
   template <int kWidth, typename Of>
   __device__ void for_each_group(std::uint32_t count, const Of& of) const {
     constexpr std::uint32_t kGroups = kThreads / kWidth;

@@ -158,8 +158,8 @@ struct Crossing {
 /// Triangles that the normal grazes at less than this sine are walls, which have no height.
 inline constexpr double kWall = 0.01;
 
-/// Of a line that is to miss no surface this is the sine: rounding of heights is then still far below that of
-/// the pieces' ends.
+/// A line that is to miss no surface meets triangles down to this sine. Where it grazes one so, rounding
+/// moves the place by up to some 10^-10 of the coordinates.
 inline constexpr double kGrazes = 1e-6;
 
 /// Boxes that the line meets, no further from the target along it than `reach`, and with heights above it

@@ -49,8 +49,6 @@ struct OneThread {
   TANDEM_HD static void for_each_group(std::uint32_t count, const Of& of) {
     for (std::uint32_t i = 0; i < count; ++i) of(OneThreadGroup(), i, true);
   }
-  /// The team splits into halves of this size when it answers two questions at once.
-  static constexpr int kHalf = 1;
 
   /// These work on memory that all see.
   TANDEM_HD static std::uint32_t load(const std::uint32_t& at) { return at; }

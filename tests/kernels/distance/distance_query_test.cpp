@@ -307,7 +307,7 @@ Pose turned(double angle, double x, double z) {
   return pose;
 }
 
-/// The same scene turned somehow as a whole.
+/// Turns a scene as a whole, and returns it.
 BodyScene& turn(BodyScene& scene) {
   RandomPoses random(1);
   const Pose whole = any_rotation(random);

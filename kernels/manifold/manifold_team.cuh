@@ -28,116 +28,125 @@ struct SharedNumbers {
   }
 };
 
-/// The memory that the groups of a warp need for walks through trees.
+/// The memory that a warp needs for walks through trees.
 struct WarpWalks {
-  std::uint32_t waiting[1024];  ///< blocks
-  std::uint32_t triangles[32];  ///< of leaves just found
+  static constexpr std::uint32_t kRoom = 1024, kMostLeaves = 64;
+
+  std::uint32_t block[kRoom], triangle[kMostLeaves];  ///< that wait to be looked at
+  std::uint8_t asks[kRoom], asks_triangle[kMostLeaves];  ///< the question that asks for each
 };
 
-/// Some lanes of a warp, see manifold/team.h. All groups of a warp run in step.
-template <std::uint32_t kWidth>
-struct LaneGroup {
-  static constexpr std::uint32_t kRoom = 1024 * kWidth / 32;
-  std::uint32_t *waiting, *triangles;
+/// Answers questions first, first + step, ... of at most 32 by a warp. Blocks of all of them wait on one
+/// stack: four lanes take one of them, a node each. Triangles are looked at when there are enough for all
+/// lanes, or no blocks are left.
+class LineWalks {
+ public:
+  __device__ LineWalks(WarpWalks& walks, manifold::LineQuestions& questions)
+      : walks_(walks), questions_(questions) {}
 
-  __device__ explicit LaneGroup(WarpWalks& walks)
-      : waiting(walks.waiting + threadIdx.x % 32 / kWidth * kRoom),
-        triangles(walks.triangles + threadIdx.x % 32 / kWidth * kWidth) {}
-
-  __device__ static std::uint32_t rank() { return threadIdx.x % kWidth; }
-  __device__ static void sync() { __syncwarp(); }
-  __device__ static bool any_of_warp(bool value) { return __any_sync(kWarp, value) != 0; }
-  /// A bit for each of the group.
-  __device__ static std::uint32_t ballot(bool value) {
-    const std::uint32_t all = __ballot_sync(kWarp, value);
-    if constexpr (kWidth == 32) return all;
-    return all >> (threadIdx.x % 32 / kWidth * kWidth) & ((1u << kWidth % 32) - 1);
-  }
-  template <typename Found, typename Better>
-  __device__ static Found best(Found found, const Better& better) {
-    for (std::uint32_t bit = kWidth / 2; bit > 0; bit /= 2) found = better(found, exchanged(found, bit));
-    return found;
+  __device__ void walk(std::uint32_t questions) {
+    const std::uint32_t lane = threadIdx.x % 32;
+    blocks_ = __popc(questions);
+    if ((questions >> lane & 1u) != 0) {
+      const std::uint32_t place = __popc(questions & ((1u << lane) - 1));
+      walks_.block[place] = 0, walks_.asks[place] = static_cast<std::uint8_t>(lane);
+    }
+    __syncwarp();
+    std::uint32_t leaves = 0;
+    do {
+      while (blocks_ > 0 && leaves < 32) leaves = look_at_blocks(leaves);
+      leaves = visit(leaves);
+    } while (blocks_ > 0 || leaves > 0);
   }
 
  private:
-  static constexpr std::uint32_t kWarp = 0xFFFFFFFFu;
-
-  /// Returns what the lane has whose number differs in one bit.
-  template <typename T>
-  __device__ static T exchanged(const T& own, std::uint32_t bit) {
-    constexpr int kWords = sizeof(T) / 4;
-    static_assert(sizeof(T) % 4 == 0);
-    std::uint32_t word[kWords];
-    memcpy(word, &own, sizeof(T));
-    for (int i = 0; i < kWords; ++i) word[i] = __shfl_xor_sync(kWarp, word[i], bit, kWidth);
-    T out;
-    memcpy(&out, word, sizeof(T));
-    return out;
-  }
-};
-
-/// Answers a question about a posed body by a group, as manifold::walk_surface() does by one thread: each of
-/// it takes a node of a block, later a triangle. Groups that run in step come here together.
-template <std::uint32_t kWidth, typename Questions>
-__device__ __noinline__ void walk_surface(const LaneGroup<kWidth>& group, Questions& questions,
-                                          std::uint32_t question, bool asked) {
-  static_assert(kNodesPerBlock == 4);
-  // With so many blocks left a group looks at one at a time, which never takes more.
-  constexpr std::uint32_t kReserve = 3 * kMaxDepth + 4, kAtOnce = kWidth / 4;
-  static_assert(LaneGroup<kWidth>::kRoom > kReserve + 3 * kAtOnce);
-  std::uint32_t waiting = asked ? 1 : 0;
-  if (asked && group.rank() == 0) group.waiting[0] = 0;
-  group.sync();
-  const std::uint32_t node = group.rank() % 4, before = (1u << group.rank()) - 1;
-  const manifold::Shape& shape = *questions.body(question).shape;
-  const Block* const blocks = shape.blocks;
-  const OrientedBlock* const oriented_blocks = shape.oriented_blocks;
-  auto test = questions.test(question);
-  while (group.any_of_warp(waiting > 0)) {
-    const std::uint32_t most = waiting + 3 * kAtOnce + kReserve <= LaneGroup<kWidth>::kRoom ? kAtOnce : 1;
-    const std::uint32_t taken = waiting < most ? waiting : most;
-    bool inner = false, leaf = false;
+  /// Takes some blocks off the stack, and puts there what is below the nodes that pass. Result: how many
+  /// triangles wait.
+  __device__ std::uint32_t look_at_blocks(std::uint32_t leaves) {
+    static_assert(kNodesPerBlock == 4);
+    // With so many blocks left they are taken one by one, depth first, and need no more room than this.
+    constexpr std::uint32_t kReserve = 3 * kMaxDepth + 4, kAtOnce = 8;
+    static_assert(WarpWalks::kRoom > kReserve + 32 + 4 * kAtOnce);
+    const std::uint32_t lane = threadIdx.x % 32, node = lane % 4, before = (1u << lane) - 1;
+    const std::uint32_t most = blocks_ + 3 * kAtOnce + kReserve <= WarpWalks::kRoom ? kAtOnce : 1;
+    const std::uint32_t taken = blocks_ < most ? blocks_ : most;
+    bool passes = false, is_leaf = false;
     std::uint32_t below = 0;
-    if (group.rank() / 4 < taken) {
-      const std::uint32_t index = group.waiting[waiting - 1 - group.rank() / 4];
-      const auto passes = [&](const auto& block, const auto& test_of_block) {
-        return test_of_block.passes(
+    std::uint8_t question = 0;
+    if (lane / 4 < taken) {
+      const std::uint32_t place = blocks_ - 1 - lane / 4, index = walks_.block[place];
+      question = walks_.asks[place];
+      const manifold::LineTest test = questions_.test(question);
+      const manifold::Shape& shape = *questions_.body(question).shape;
+      const auto look = [&](const auto& block, const manifold::LineTest& along_axes) {
+        is_leaf = block.is_leaf_block();
+        passes = along_axes.passes(
             {{block.centre[0][node], block.centre[1][node], block.centre[2][node]}},
             {{block.half_extent[0][node], block.half_extent[1][node], block.half_extent[2][node]}});
       };
-      if (blocks != nullptr) {
-        const Block& block = blocks[index];
-        leaf = block.is_leaf_block();
+      if (shape.blocks != nullptr) {
+        const Block& block = shape.blocks[index];
         below = block.index[node];
-        inner = passes(block, test);
+        look(block, test);
       } else {
-        const OrientedBlock& block = oriented_blocks[index];
-        leaf = block.is_leaf_block();
+        const OrientedBlock& block = shape.oriented_blocks[index];
         below = (block.first_below & ~OrientedBlock::kIsLeafBlock) + node;
-        inner = passes(block, test.turned(manifold::BlockAxes(block.rotation)));
+        look(block, test.turned(manifold::BlockAxes(block.rotation)));
       }
-      leaf = leaf && inner, inner = inner && !leaf;
     }
-    const std::uint32_t inners = group.ballot(inner), leaves = group.ballot(leaf);
-    group.sync();  // all have taken theirs
-    waiting -= taken;
-    if (inner) group.waiting[waiting + __popc(inners & before)] = below;
-    if (leaf) group.triangles[__popc(leaves & before)] = below;
-    waiting += __popc(inners);
-    group.sync();
-    if (!group.any_of_warp(leaves != 0)) continue;
-    typename Questions::Found found;
-    if (group.rank() < __popc(leaves)) questions.visit(question, group.triangles[group.rank()], found);
-    if (group.any_of_warp(static_cast<bool>(found))) {
-      found =
-          group.best(found, [&](const auto& x, const auto& y) { return questions.better(question, x, y); });
-      group.sync();  // all are done with the question as it was
-      if (found && group.rank() == 0) questions.merge(question, found);
-      group.sync();
-      test = questions.test(question);
+    const std::uint32_t inner = __ballot_sync(kWarp, passes && !is_leaf),
+                        leaf = __ballot_sync(kWarp, passes && is_leaf);  // all have taken theirs
+    blocks_ -= taken;
+    if (passes && is_leaf) {
+      const std::uint32_t place = leaves + __popc(leaf & before);
+      walks_.triangle[place] = below, walks_.asks_triangle[place] = question;
+    } else if (passes) {
+      const std::uint32_t place = blocks_ + __popc(inner & before);
+      walks_.block[place] = below, walks_.asks[place] = question;
     }
-    group.sync();
+    blocks_ += __popc(inner);
+    __syncwarp();
+    return leaves + __popc(leaf);
   }
+
+  /// Looks at triangles, one of each lane. Result: how many are left.
+  __device__ std::uint32_t visit(std::uint32_t leaves) {
+    const std::uint32_t lane = threadIdx.x % 32;
+    manifold::Crossing crossing;
+    std::uint8_t question = 0;
+    if (lane < leaves) {
+      const std::uint32_t place = leaves - 1 - lane;
+      question = walks_.asks_triangle[place];
+      crossing = questions_.visit(question, walks_.triangle[place]);
+    }
+    for (std::uint32_t found = __ballot_sync(kWarp, crossing.found()); found != 0; found &= found - 1) {
+      if (lane + 1 == static_cast<std::uint32_t>(__ffs(static_cast<int>(found))))
+        questions_.take(question, crossing);
+      __syncwarp();
+    }
+    return leaves < 32 ? 0 : leaves - 32;
+  }
+
+  static constexpr std::uint32_t kWarp = 0xFFFFFFFFu;
+
+  WarpWalks& walks_;
+  manifold::LineQuestions& questions_;
+  std::uint32_t blocks_ = 0;
+};
+
+/// Answers questions about lines by several warps, the number `warp` here.
+__device__ __noinline__ void walk_lines(WarpWalks& walks, manifold::LineQuestions& questions,
+                                        std::uint32_t count, const manifold::LineQuestion* shared,
+                                        std::uint32_t warp, std::uint32_t warps) {
+  static_assert(manifold::LineMemory::kMost <= 32);
+  const std::uint32_t lane = threadIdx.x % 32;
+  const bool asked = lane < count && lane % warps == warp && shared[lane].side >= 0;
+  if (asked) questions.prepare(lane);
+  LineWalks all(walks, questions);
+  all.walk(__ballot_sync(0xFFFFFFFFu, asked));
+  const bool further = asked && questions.has_to_look_further(lane);
+  if (further) questions.look_further(lane);
+  all.walk(__ballot_sync(0xFFFFFFFFu, further));
 }
 
 struct Sum {
@@ -209,14 +218,12 @@ struct WarpTeam : SharedNumbers {
   }
   __device__ static bool any(bool value) { return __any_sync(0xFFFFFFFFu, value) != 0; }
 
-  template <int kWidth, typename Of>
-  __device__ void for_each_group(std::uint32_t count, const Of& of) const {
-    constexpr std::uint32_t kGroups = 32 / kWidth;
-    const LaneGroup<kWidth> group(*walks);
-    for (std::uint32_t first = 0; first < count; first += kGroups) {
-      const std::uint32_t i = first + rank() / kWidth;
-      of(group, i, i < count);
-    }
+  static constexpr bool kWalksTogether = true;
+  __device__ void walk_lines(manifold::LineQuestions& questions, std::uint32_t count,
+                             const manifold::LineQuestion* shared) const {
+    sync();
+    gpu::walk_lines(*walks, questions, count, shared, 0, 1);
+    sync();
   }
 };
 
@@ -271,14 +278,13 @@ struct BlockTeam : SharedNumbers {
     over_block(values, Greatest());
   }
 
-  template <int kWidth, typename Of>
-  __device__ void for_each_group(std::uint32_t count, const Of& of) const {
-    constexpr std::uint32_t kGroups = kThreads / kWidth;
-    const LaneGroup<kWidth> group(walks[threadIdx.x / 32]);
-    for (std::uint32_t first = 0; first < count; first += kGroups) {
-      const std::uint32_t i = first + threadIdx.x / kWidth;
-      of(group, i, i < count);
-    }
+  static constexpr bool kWalksTogether = true;
+  __device__ void walk_lines(manifold::LineQuestions& questions, std::uint32_t count,
+                             const manifold::LineQuestion* shared) const {
+    sync();
+    const std::uint32_t warp = threadIdx.x / 32;
+    gpu::walk_lines(walks[warp], questions, count, shared, warp, kThreads / 32);
+    sync();
   }
 
  private:

@@ -50,6 +50,11 @@ TANDEM_INLINE void leaves_of(const Block& block, std::uint32_t (&index)[kNodesPe
     index[i] = block.kind[i] == NodeKind::leaf ? block.index[i] : block.index[0];
 }
 
+template <int kCount>
+TANDEM_INLINE DoubleLanes<kCount> extent(const Vector3Lanes<kCount>& x) {
+  return magnitude_of<kCount>(x.x) + magnitude_of<kCount>(x.y) + magnitude_of<kCount>(x.z);
+}
+
 class LineWalk {
  public:
   LineWalk(const manifold::Body& body, const manifold::PatchFrame& frame,
@@ -179,12 +184,14 @@ class LineWalk {
     leaves_of(block, index);
     Vector3Lanes<4> corner[3];
     for (int k = 0; k < 3; ++k) corner[k] = posed_corner(body_, index, k) - frame_.origin;
-    const Vector3Lanes<4> normal = cross(corner[1] - corner[0], corner[2] - corner[0]);
-    const D area = dot(frame_.n, normal), size = square_root(dot(normal, normal));
+    const Vector3Lanes<4> first_edge = corner[1] - corner[0], second_edge = corner[2] - corner[0];
+    const Vector3Lanes<4> normal = cross(first_edge, second_edge);
+    const D area = dot(frame_.n, normal), size = magnitude_of<4>(area);
     const DoubleMask<4> turned = -__builtin_convertvector(turned_lanes(body_, index), DoubleMask<4>);
     const DoubleMask<4> upwards = turned ^ (area > 0);  // not turned: a positive area faces along the normal
-    const DoubleMask<4> steep = magnitude_of<4>(area) > least_sine_ * size;
-    const D little = 1e-12 + 0x1p-48 * body_.reach * square_root(size) / magnitude_of<4>(area);
+    const DoubleMask<4> steep = area * area > (least_sine_ * least_sine_) * dot(normal, normal);
+    const D little = 1e-12 * size + 0x1p-48 * body_.reach * (extent(first_edge) + extent(second_edge));
+    const D sign = area > 0 ? D{} + 1.0 : D{} - 1.0;
     D u[3], v[3], height_of[3];
     for (int k = 0; k < 3; ++k) {
       u[k] = dot(frame_.u, corner[k]), v[k] = dot(frame_.v, corner[k]);
@@ -198,12 +205,13 @@ class LineWalk {
       if (facing == 0) continue;
       D x[3], y[3];
       for (int k = 0; k < 3; ++k) x[k] = u[k] - q.at.x, y[k] = v[k] - q.at.y;
-      const D first = (x[1] * y[2] - y[1] * x[2]) / area, second = (x[2] * y[0] - y[2] * x[0]) / area,
-              third = (x[0] * y[1] - y[0] * x[1]) / area;
-      const DoubleMask<4> within = (first >= -little) & (second >= -little) & (third >= -little);
+      const D first = x[1] * y[2] - y[1] * x[2], second = x[2] * y[0] - y[2] * x[0],
+              third = x[0] * y[1] - y[0] * x[1];
+      const DoubleMask<4> within =
+          (sign * first >= -little) & (sign * second >= -little) & (sign * third >= -little);
       unsigned found = bits_of_mask(within) & facing;
       if (found == 0) continue;
-      const D height = first * height_of[0] + second * height_of[1] + third * height_of[2];
+      const D height = (first * height_of[0] + second * height_of[1] + third * height_of[2]) / area;
       for (; found != 0; found &= found - 1)
         take(i, height[std::countr_zero(found)], index[std::countr_zero(found)]);
     }

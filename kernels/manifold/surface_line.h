@@ -121,32 +121,6 @@ TANDEM_HD inline Below look_below(const Shape& shape, std::uint32_t index, const
   return out;
 }
 
-/// Answers a question about a posed body, by one thread. A GPU has a way of its own (manifold_team.cuh).
-/// asked: of a group that has no question false.
-/// Questions: body(question) says which body is walked; test(question) has passes(centre, half_extent), and
-/// turned(axes), the same test for boxes along these axes; visit(question, triangle, found) looks at a
-/// triangle; better(question, found, other) is the better of two, whatever their order; merge(question,
-/// found) keeps what is better than what is known. A Found is true where there is something.
-template <typename Questions>
-TANDEM_HD inline void walk_surface(const OneThreadGroup&, Questions& questions, std::uint32_t question,
-                                   bool asked) {
-  if (!asked) return;
-  std::uint32_t waiting[3 * kMaxDepth + 1] = {0};
-  for (int count = 1; count > 0;) {
-    const Below below =
-        look_below(*questions.body(question).shape, waiting[--count], questions.test(question));
-    typename Questions::Found found;
-    for (int i = 0; i < kNodesPerBlock; ++i) {
-      if ((below.mask >> i & 1u) == 0) continue;
-      if (below.leaves)
-        questions.visit(question, below.index[i], found);
-      else
-        waiting[count++] = below.index[i];
-    }
-    if (found) questions.merge(question, found);
-  }
-}
-
 /// The place where a line along a patch's normal meets a surface.
 struct Crossing {
   double height = 0;
@@ -261,58 +235,55 @@ class LineQuestions {
     return q.nearest > q.most && q.most != INFINITY;
   }
 
-  struct Found {
-    double distance = INFINITY;
-    Crossing crossing;
-    TANDEM_HD explicit operator bool() const { return crossing.found(); }
-  };
-
   TANDEM_HD const Body& body(std::uint32_t question) const { return bodies_[questions_[question].side]; }
   TANDEM_HD LineTest test(std::uint32_t question) const {
     const LineQuestion& q = questions_[question];
     return {q.point, q.direction, q.lower_along, q.upper_along, q.slack, q.reach};
   }
-  TANDEM_HD void visit(std::uint32_t question, std::uint32_t t, Found& found) const {
+  /// Returns where the line meets a triangle, if that is no further from the target than what was found.
+  TANDEM_HD Crossing visit(std::uint32_t question, std::uint32_t t) const {
     const LineQuestion& q = questions_[question];
     const Body& body = bodies_[q.side];
     const PatchFrame& frame = *q.frame;
     const Triangle stored = body.shape->triangles[t];
     Vector3 corner[3];
     for (int k = 0; k < 3; ++k) corner[k] = body.posed(stored.corner[k]) - frame.origin;
-    const Vector3 normal = cross(corner[1] - corner[0], corner[2] - corner[0]);
-    const double area = dot(frame.n, normal), size = norm(normal);
+    const Vector3 first_edge = corner[1] - corner[0], second_edge = corner[2] - corner[0];
+    const Vector3 normal = cross(first_edge, second_edge);
+    const double area = dot(frame.n, normal), size = std::fabs(area);
     const bool turned = is_turned(body.shape->topology[t].flags);
     const int facing = (area > 0) != turned ? 1 : -1;
-    if (q.facing * facing < 0 || !(std::fabs(area) > q.least_sine * size)) return;
+    if (q.facing * facing < 0 || !(area * area > (q.least_sine * q.least_sine) * dot(normal, normal)))
+      return {};
     Vector2 side[3];
     for (int k = 0; k < 3; ++k) side[k] = Vector2{dot(frame.u, corner[k]), dot(frame.v, corner[k])} - q.at;
-    // Shares of the corners. What lies on an edge, or beside it by no more than rounding of posed points and
-    // a little of the triangle, belongs to both triangles: no line slips through.
-    const double first = cross(side[1], side[2]) / area, second = cross(side[2], side[0]) / area,
-                 third = cross(side[0], side[1]) / area;
-    const double little = 1e-12 + 0x1p-48 * body.reach * std::sqrt(size) / std::fabs(area);
-    if (!(first >= -little && second >= -little && third >= -little)) return;
-    const double height =
-        first * dot(frame.n, corner[0]) + second * dot(frame.n, corner[1]) + third * dot(frame.n, corner[2]);
-    if (!(height >= q.lower && height <= q.upper)) return;
-    const Found here = {std::fabs(height - q.target), {height, t}};
-    if (is_nearer(here, found)) found = here;
+    // Shares of the corners, times the area. What lies on an edge, or beside it by no more than rounding of
+    // posed points and a little of the triangle, belongs to both triangles: no line slips through.
+    const double first = cross(side[1], side[2]), second = cross(side[2], side[0]),
+                 third = cross(side[0], side[1]);
+    const double little = 1e-12 * size + 0x1p-48 * body.reach * (extent(first_edge) + extent(second_edge));
+    const double sign = area > 0 ? 1 : -1;
+    if (!(sign * first >= -little && sign * second >= -little && sign * third >= -little)) return {};
+    const double height = (first * dot(frame.n, corner[0]) + second * dot(frame.n, corner[1]) +
+                           third * dot(frame.n, corner[2])) /
+                          area;
+    const bool is_asked = height >= q.lower && height <= q.upper && is_nearer(q, {height, t});
+    return is_asked ? Crossing{height, t} : Crossing{};
   }
-  TANDEM_HD static bool is_nearer(const Found& x, const Found& than) {
-    return x.distance < than.distance ||
-           (x.distance == than.distance && x.crossing.triangle < than.crossing.triangle);
-  }
-  TANDEM_HD static Found better(std::uint32_t, const Found& x, const Found& y) {
-    return is_nearer(y, x) ? y : x;
-  }
-  TANDEM_HD void merge(std::uint32_t question, const Found& found) {
+  /// Takes a crossing if it is nearer than what was found; of two as near, the triangle that comes first.
+  TANDEM_HD void take(std::uint32_t question, const Crossing& crossing) {
     LineQuestion& q = questions_[question];
-    if (!is_nearer(found, {q.nearest, q.best})) return;
-    q.nearest = found.distance, q.best = found.crossing;
-    q.reach = lesser(q.reach, static_cast<float>(found.distance) + q.slack);
+    if (!is_nearer(q, crossing)) return;
+    q.nearest = std::fabs(crossing.height - q.target), q.best = crossing;
+    q.reach = lesser(q.reach, static_cast<float>(q.nearest) + q.slack);
   }
 
  private:
+  TANDEM_HD static double extent(const Vector3& x) { return std::fabs(x.x) + std::fabs(x.y) + std::fabs(x.z); }
+  TANDEM_HD static bool is_nearer(const LineQuestion& q, const Crossing& crossing) {
+    const double distance = std::fabs(crossing.height - q.target);
+    return distance < q.nearest || (distance == q.nearest && crossing.triangle < q.best.triangle);
+  }
   TANDEM_HD static void look_within(LineQuestion& q, double most) {
     q.most = most;
     q.reach = static_cast<float>(most) + q.slack;
@@ -324,28 +295,39 @@ class LineQuestions {
   LineQuestion* questions_;
 };
 
+/// Looks for what a question asks for in the tree of its body, by one thread.
+TANDEM_HD inline void walk_line(LineQuestions& questions, std::uint32_t question) {
+  std::uint32_t waiting[3 * kMaxDepth + 1] = {0};
+  for (int count = 1; count > 0;) {
+    const Below below =
+        look_below(*questions.body(question).shape, waiting[--count], questions.test(question));
+    for (int i = 0; i < kNodesPerBlock; ++i) {
+      if ((below.mask >> i & 1u) == 0) continue;
+      if (!below.leaves) {
+        waiting[count++] = below.index[i];
+        continue;
+      }
+      const Crossing crossing = questions.visit(question, below.index[i]);
+      if (crossing.found()) questions.take(question, crossing);
+    }
+  }
+}
+
 /// Answers the first `count` questions about lines; those of no side are not asked. shared: the questions,
 /// which all of the team see.
 template <typename Team>
 TANDEM_HD void walk_lines(const Team& team, LineQuestions& questions, std::uint32_t count,
                           const LineQuestion* shared) {
   if constexpr (HasLanes<Team>) return questions.answer(team.lanes(), count);
-  const auto of = [&](const auto& group, std::uint32_t i, bool given) {
-    const bool asked = given && shared[i].side >= 0;
-    if (asked && group.rank() == 0) questions.prepare(i);
-    walk_surface(group, questions, i, asked);
-    const bool further = asked && questions.has_to_look_further(i);
-    group.sync();
-    if (further && group.rank() == 0) questions.look_further(i);
-    walk_surface(group, questions, i, further);
-  };
-  constexpr int kFewWidth = 16, kManyWidth = 8;
-  team.sync();
-  if (count <= 2)
-    team.template for_each_group<kFewWidth>(count, of);
-  else
-    team.template for_each_group<kManyWidth>(count, of);
-  team.sync();
+  if constexpr (WalksTogether<Team>) return team.walk_lines(questions, count, shared);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (shared[i].side < 0) continue;
+    questions.prepare(i);
+    walk_line(questions, i);
+    if (!questions.has_to_look_further(i)) continue;
+    questions.look_further(i);
+    walk_line(questions, i);
+  }
 }
 
 }  // namespace tandem::manifold

@@ -5,12 +5,6 @@
 
 namespace tandem::manifold {
 
-/// A group of one thread: those who walk through a tree together.
-struct OneThreadGroup {
-  TANDEM_HD static std::uint32_t rank() { return 0; }
-  TANDEM_HD static void sync() {}
-};
-
 /// A team makes the manifolds of an object pair together: one thread of a CPU here, a warp or a thread block
 /// on a GPU (kernels/manifold/manifold_team.cuh). Each takes every size()-th thing from rank() on. What they
 /// find together must not depend on how many they are nor on who comes first.
@@ -42,14 +36,6 @@ struct OneThread {
   TANDEM_HD static void greatest_ones(T (&)[kCount]) {}
   TANDEM_HD static bool any(bool value) { return value; }
 
-  /// Calls of(group, i, true) for all i below `count`, each by one group of the team: those who walk a tree
-  /// together. Groups that run in step with others and have none call of(group, i, false). kWidth: how many
-  /// a group of a GPU has.
-  template <int kWidth, typename Of>
-  TANDEM_HD static void for_each_group(std::uint32_t count, const Of& of) {
-    for (std::uint32_t i = 0; i < count; ++i) of(OneThreadGroup(), i, true);
-  }
-
   /// These work on memory that all see.
   TANDEM_HD static std::uint32_t load(const std::uint32_t& at) { return at; }
   TANDEM_HD static void store(std::uint32_t& at, std::uint32_t value) { at = value; }
@@ -76,5 +62,9 @@ template <typename Team>
 concept HasLanes = requires(const Team& team) {
   team.lanes();
 };
+
+/// A team of a GPU, which walks trees in a way of its own.
+template <typename Team>
+concept WalksTogether = Team::kWalksTogether;
 
 }  // namespace tandem::manifold

@@ -97,7 +97,7 @@ class DeepestLine {
   /// Finds shared.best; none where the bodies do not overlap along the normal. middle, reach: a ball around
   /// the pieces. If there are several regions, the line goes through it. The search ends as soon as a line is
   /// as deep as `enough`.
-  TANDEM_HD void find(const PatchFrame& frame, const Vector3& middle, double reach, double enough);
+  TANDEM_HD_SELDOM void find(const PatchFrame& frame, const Vector3& middle, double reach, double enough);
 
  private:
   TANDEM_HD void begin_half_spaces(const Vector3& middle, double reach);
@@ -372,7 +372,7 @@ TANDEM_HD void DeepestLine<Team>::go_to_ends() {
 }
 
 template <typename Team>
-TANDEM_HD void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& middle, double reach,
+TANDEM_HD_SELDOM void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& middle, double reach,
                                        double enough) {
   begin_with_seeds(frame, reach);
   const OverlapLine& best = shared_.best;

@@ -44,17 +44,17 @@ __device__ void take_rows(const AnyTeam& team, std::uint32_t rows, std::uint32_t
 }
 
 /// Calls of(team, row, 0) for rows below `many`, by blocks, then of(team, row, warp) for rows below `few`, by
-/// warps.
+/// warps. walks: of each warp, where teams walk trees.
 template <std::uint32_t kSize, typename Of>
 __device__ void share_out(std::uint32_t many, std::uint32_t& next_many, std::uint32_t few,
-                          std::uint32_t& next_few, const Of& of) {
+                          std::uint32_t& next_few, const Of& of, WarpWalks* walks = nullptr) {
   __shared__ BlockScratch<kSize> scratch;
   __shared__ std::uint32_t taken[kSize / 32];
-  const BlockTeam<kSize> block(&scratch, nullptr);
+  const BlockTeam<kSize> block(&scratch, walks);
   take_rows(block, many, next_many, taken[0], [&](std::uint32_t row) { of(block, row, 0u); });
   __syncthreads();
   const std::uint32_t own = threadIdx.x / 32;
-  const WarpTeam warp(nullptr);
+  const WarpTeam warp(walks == nullptr ? nullptr : &walks[own]);
   take_rows(warp, few, next_few, taken[own], [&](std::uint32_t row) { of(warp, row, own); });
 }
 
@@ -351,46 +351,66 @@ __device__ manifold::DeepPatch& deep_patch(const ManifoldArgs& args, std::uint32
   return *reinterpret_cast<manifold::DeepPatch*>(&args.patches[place]);
 }
 
-/// Finds the directions of the patches whose areas give no normal, by a block each.
-__global__ void __launch_bounds__(kThreads, 4) begin_deep_patches(const __grid_constant__ ManifoldArgs args) {
-  __shared__ BlockScratch<kThreads> scratch;
-  __shared__ WarpWalks walks[kWarps];
-  __shared__ MakerMemory memory;
-  __shared__ Raw<manifold::NormalMemory> normals;
-  __shared__ Raw<manifold::SearchMemory> search;
-  __shared__ std::uint32_t taken;
-  wait_for_kernel_before();
-  if (!has_query(args)) return;
-  const LargeTeam team(&scratch, walks);
-  take_rows(team, args.state->deep_patches, args.state->next_deep, taken, [&](std::uint32_t row) {
-    const std::uint32_t place = args.next_of_pair[row];
-    const PairCurve of = args.begun[place].of;
-    with_maker(args, team, memory, of, [&](auto& maker, PatchState&) {
-      maker.begin_deep(of.curve, normals.get(), search.get(), deep_patch(args, place));
-    });
+/// Measures the depths of a patch that was begun.
+__device__ void measure(const ManifoldArgs& args, const WarpTeam& team, MakerMemory& shared,
+                        Raw<manifold::SearchMemory>& search, BegunPatch& begun) {
+  with_maker(args, team, shared, begun.of, [&](auto& maker, PatchState& state) {
+    copy_state(team, begun.state, state);
+    maker.measure_depths(begun.of.curve, search.get());
+    copy_state(team, state, begun.state);
   });
 }
 
-/// Measures the overlap of these patches along each direction, by a warp each.
-__global__ void __launch_bounds__(kThreads, 4) measure_directions(const __grid_constant__ ManifoldArgs args) {
+/// Finds the directions of the patches whose areas give no normal, by a block each, and measures the depths
+/// of the others, by a warp each.
+__global__ void __launch_bounds__(kThreads, 4) measure_depths(const __grid_constant__ ManifoldArgs args) {
+  __shared__ WarpWalks walks[kWarps];
+  __shared__ MakerMemory memory[kWarps];
+  __shared__ Raw<manifold::NormalMemory> normals;
+  __shared__ Raw<manifold::SearchMemory> searches[kWarps];
+  wait_for_kernel_before();
+  if (!has_query(args)) return;
+  ManifoldState& state = *args.state;
+  const auto of = [&](const auto& team, std::uint32_t row, std::uint32_t own) {
+    if constexpr (kIsLarge<std::remove_cvref_t<decltype(team)>>) {
+      const std::uint32_t place = args.next_of_pair[row];
+      const PairCurve of_curve = args.begun[place].of;
+      with_maker(args, team, memory[own], of_curve, [&](auto& maker, PatchState&) {
+        maker.begin_deep(of_curve.curve, normals.get(), searches[own].get(), deep_patch(args, place));
+      });
+    } else if (BegunPatch& begun = args.begun[row]; begun.state.kind == manifold::PatchKind::overlap) {
+      measure(args, team, memory[own], searches[own], begun);
+    }
+  };
+  share_out<kThreads>(state.deep_patches, state.next_deep, patches_begun(args), state.next_measured, of,
+                      walks);
+}
+
+/// Measures the overlap of the patches whose areas give no normal along each direction, and later on, when
+/// they have one, their depths, by a warp each.
+__global__ void __launch_bounds__(kThreads, 4)
+    measure_deep_patches(const __grid_constant__ ManifoldArgs args, bool have_normals) {
   __shared__ WarpWalks walks[kWarps];
   __shared__ MakerMemory memory[kWarps];
   __shared__ Raw<manifold::SearchMemory> searches[kWarps];
   __shared__ std::uint32_t taken[kWarps];
   wait_for_kernel_before();
   if (!has_query(args)) return;
-  constexpr std::uint32_t kDirections = 2 * manifold::kMostTried;
+  const std::uint32_t directions = have_normals ? 1 : 2 * manifold::kMostTried;
   ManifoldState& state = *args.state;
   const std::uint32_t own = threadIdx.x / 32;
   const WarpTeam team(&walks[own]);
-  take_rows(team, state.deep_patches * kDirections, state.next_direction, taken[own], [&](std::uint32_t row) {
-    const std::uint32_t place = args.next_of_pair[row / kDirections];
-    const int direction = static_cast<int>(row % kDirections);
+  std::uint32_t& next = have_normals ? state.next_measured_deep : state.next_direction;
+  take_rows(team, state.deep_patches * directions, next, taken[own], [&](std::uint32_t row) {
+    const std::uint32_t place = args.next_of_pair[row / directions];
+    BegunPatch& begun = args.begun[place];
+    if (have_normals) return measure(args, team, memory[own], searches[own], begun);
+    const int direction = static_cast<int>(row % directions);
     manifold::DeepPatch& patch = deep_patch(args, place);
     if (direction >= patch.directions) return;
-    const PairCurve of = args.begun[place].of;
-    with_maker(args, team, memory[own], of, [&](auto& maker, PatchState&) {
-      const double depth = maker.depth_along(of.curve, patch, direction, searches[own].get(), INFINITY);
+    with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState&) {
+      const double depth =
+          maker.depth_along(begun.of.curve, patch, direction, searches[own].get(), INFINITY);
       if (team.rank() == 0) patch.depth[direction] = depth;
     });
   });
@@ -411,27 +431,6 @@ __global__ void __launch_bounds__(kThreads, 4) end_deep_patches(const __grid_con
     with_maker(args, team, memory, begun.of, [&](auto& maker, PatchState& made) {
       maker.end_deep(begun.of.curve, deep_patch(args, place), outline.get());
       copy_state(team, made, begun.state);
-    });
-  });
-}
-
-/// Measures the depths of each patch, by a warp.
-__global__ void __launch_bounds__(kThreads, 4) measure_depths(const __grid_constant__ ManifoldArgs args) {
-  __shared__ WarpWalks walks[kWarps];
-  __shared__ MakerMemory memory[kWarps];
-  __shared__ Raw<manifold::SearchMemory> searches[kWarps];
-  __shared__ std::uint32_t taken[kWarps];
-  wait_for_kernel_before();
-  if (!has_query(args)) return;
-  const std::uint32_t own = threadIdx.x / 32;
-  const WarpTeam team(&walks[own]);
-  take_rows(team, patches_begun(args), args.state->next_measured, taken[own], [&](std::uint32_t row) {
-    BegunPatch& begun = args.begun[row];
-    if (begun.state.kind != manifold::PatchKind::overlap) return;
-    with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState& state) {
-      copy_state(team, begun.state, state);
-      maker.measure_depths(begun.of.curve, searches[own].get());
-      copy_state(team, state, begun.state);
     });
   });
 }
@@ -527,7 +526,7 @@ __global__ void __launch_bounds__(kThreads) remember(const __grid_constant__ Man
   state.curves_of_many = state.curves_of_few = state.next_curve_of_many = state.next_curve_of_few = 0;
   state.several_curves = state.next_neighbour = state.next_joined = 0;
   state.deep_patches = state.next_deep = state.next_direction = state.next_ended = 0;
-  state.next_measured = state.next_finished = 0;
+  state.next_measured = state.next_measured_deep = state.next_finished = 0;
   state.needed_points = state.segments = state.ambiguous_touches = state.open_curves = 0;
   state.too_many_contacts = state.finished_blocks = 0;
   if (!args.match_previous || state.has_last != 0)
@@ -564,10 +563,10 @@ cudaError_t make_patches(const ManifoldArgs& args, cudaStream_t stream) {
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), try_to_join, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), join_regions, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), begin_patches, args);
-  if (error == cudaSuccess) error = launch_after(grid(1, kThreads, 0), begin_deep_patches, args);
-  if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), measure_directions, args);
-  if (error == cudaSuccess) error = launch_after(grid(1, kThreads, 0), end_deep_patches, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), measure_depths, args);
+  if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), measure_deep_patches, args, false);
+  if (error == cudaSuccess) error = launch_after(grid(1, kThreads, 0), end_deep_patches, args);
+  if (error == cudaSuccess) error = launch_after(grid(1, kThreads, 0), measure_deep_patches, args, true);
   return error == cudaSuccess ? launch_after(grid(6, kThreads, 0), finish_patches, args) : error;
 }
 

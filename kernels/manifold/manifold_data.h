@@ -59,7 +59,7 @@ struct ManifoldState {
   std::uint32_t curves_of_many, curves_of_few, next_curve_of_many, next_curve_of_few;
   std::uint32_t several_curves, next_neighbour, next_joined, deep_patches, next_deep, next_direction,
       next_ended;
-  std::uint32_t next_measured, next_finished;
+  std::uint32_t next_measured, next_measured_deep, next_finished;
   Counter needed_points, segments, ambiguous_touches, open_curves;
   std::uint32_t too_many_contacts, finished_blocks;
 

@@ -8,8 +8,22 @@
 // Teams of a GPU, see manifold/team.h: a warp, and a thread block.
 namespace tandem::gpu {
 
-/// The base of both teams: numbers in memory that the team shares.
-struct SharedNumbers {
+/// The base of both teams: numbers in memory that the team shares, and what the lanes of a warp tell each
+/// other.
+struct TeamOfWarps {
+  static constexpr bool kHasWarps = true;
+
+  __device__ static std::uint32_t lane() { return threadIdx.x % 32; }
+  /// A bit for each lane.
+  __device__ static std::uint32_t ballot(bool value) { return __ballot_sync(0xFFFFFFFFu, value); }
+  __device__ static std::uint32_t first_bit(std::uint32_t bits) {
+    return static_cast<std::uint32_t>(__ffs(static_cast<int>(bits)) - 1);
+  }
+  template <typename T>
+  __device__ static T from_lane(T value, std::uint32_t lane) {
+    return __shfl_sync(0xFFFFFFFFu, value, static_cast<int>(lane));
+  }
+
   __device__ static std::uint32_t load(const std::uint32_t& at) {
     return *static_cast<const volatile std::uint32_t*>(&at);
   }
@@ -30,7 +44,7 @@ struct SharedNumbers {
 
 /// The memory that a warp needs for walks through trees.
 struct WarpWalks {
-  static constexpr std::uint32_t kRoom = 1024, kMostLeaves = 64;
+  static constexpr std::uint32_t kRoom = 512, kMostLeaves = 64;
 
   std::uint32_t block[kRoom], triangle[kMostLeaves];  ///< that wait to be looked at
   std::uint8_t asks[kRoom], asks_triangle[kMostLeaves];  ///< the question that asks for each
@@ -135,7 +149,7 @@ class LineWalks {
 };
 
 /// Answers questions about lines by several warps, the number `warp` here.
-__device__ __noinline__ void walk_lines(WarpWalks& walks, manifold::LineQuestions& questions,
+inline __device__ __noinline__ void walk_lines(WarpWalks& walks, manifold::LineQuestions& questions,
                                         std::uint32_t count, const manifold::LineQuestion* shared,
                                         std::uint32_t warp, std::uint32_t warps) {
   static_assert(manifold::LineMemory::kMost <= 32);
@@ -182,7 +196,7 @@ __device__ __forceinline__ void over_warp(T (&values)[kCount], Of of) {
   for (int i = 0; i < kCount; ++i) values[i] = over_warp(values[i], of);
 }
 
-struct WarpTeam : SharedNumbers {
+struct WarpTeam : TeamOfWarps {
   WarpWalks* walks;
 
   __device__ explicit WarpTeam(WarpWalks* of_warp) : walks(of_warp) {}
@@ -218,7 +232,6 @@ struct WarpTeam : SharedNumbers {
   }
   __device__ static bool any(bool value) { return __any_sync(0xFFFFFFFFu, value) != 0; }
 
-  static constexpr bool kWalksTogether = true;
   __device__ void walk_lines(manifold::LineQuestions& questions, std::uint32_t count,
                              const manifold::LineQuestion* shared) const {
     sync();
@@ -235,7 +248,7 @@ struct BlockScratch {
 };
 
 template <std::uint32_t kThreads>
-struct BlockTeam : SharedNumbers {
+struct BlockTeam : TeamOfWarps {
   BlockScratch<kThreads>* scratch;
   WarpWalks* walks;  ///< of each warp
 
@@ -278,7 +291,6 @@ struct BlockTeam : SharedNumbers {
     over_block(values, Greatest());
   }
 
-  static constexpr bool kWalksTogether = true;
   __device__ void walk_lines(manifold::LineQuestions& questions, std::uint32_t count,
                              const manifold::LineQuestion* shared) const {
     sync();

@@ -54,6 +54,7 @@ class NormalFinder {
 
  private:
   static constexpr int kMost = kMostTried;
+  static constexpr float kApart = 4.1f * kSameFace;
   static_assert(kMost == 2 * kMostDirections + 1);
 
   template <typename Visit>
@@ -194,17 +195,33 @@ template <typename Team>
 TANDEM_HD bool NormalFinder<Team>::has_many_directions(int side) const {
   constexpr std::uint32_t kSample = 32;
   const std::uint32_t step = (end_ - begin_ + kSample - 1) / kSample;
-  FloatVector known[kMostDirections];
-  int count = 0;
-  for (std::uint32_t i = begin_; i < end_; i += step) {
-    const float* n = memory_.normals + 6 * std::size_t{memory_.order[i]} + 3 * side;
-    const FloatVector normal = {{n[0], n[1], n[2]}};
-    bool apart = true;
-    for (int k = 0; k < count; ++k) apart = apart && distance_square(normal, known[k]) > 4.1f * kSameFace;
-    if (!apart) continue;
-    if (count == kMostDirections) return true;
-    known[count++] = normal;
+  if constexpr (HasWarps<Team>) {
+    // Each warp does it alone, each of its lanes with one piece.
+    const std::uint32_t own = begin_ + team_.lane() * step;
+    const float* n = memory_.normals + 6 * std::size_t{memory_.order[own < end_ ? own : begin_]} + 3 * side;
+    std::uint32_t left = team_.ballot(own < end_);
+    for (int count = 0; left != 0; ++count) {
+      if (count == kMostDirections) return true;
+      const std::uint32_t first = team_.first_bit(left);
+      const FloatVector known = {{team_.from_lane(n[0], first), team_.from_lane(n[1], first),
+                                  team_.from_lane(n[2], first)}};
+      left &= team_.ballot(distance_square({{n[0], n[1], n[2]}}, known) > kApart);
+    }
+    return false;
+  } else {
+    FloatVector known[kMostDirections];
+    int count = 0;
+    for (std::uint32_t i = begin_; i < end_; i += step) {
+      const float* n = memory_.normals + 6 * std::size_t{memory_.order[i]} + 3 * side;
+      const FloatVector normal = {{n[0], n[1], n[2]}};
+      bool apart = true;
+      for (int k = 0; k < count; ++k) apart = apart && distance_square(normal, known[k]) > kApart;
+      if (!apart) continue;
+      if (count == kMostDirections) return true;
+      known[count++] = normal;
+    
   }
+}
   return false;
 }
 
@@ -229,9 +246,7 @@ TANDEM_HD LeastPiece NormalFinder<Team>::least_unmarked(int side, const FloatVec
 /// ones, if they are to be kept. False where there are more. Normals closer than half a milliradian are one.
 template <typename Team>
 TANDEM_HD bool NormalFinder<Team>::gather_directions(int side, bool keep_if_many) {
-  if constexpr (HasLanes<Team>) {  // a team has passed over the pieces as soon
-    if (!keep_if_many && has_many_directions(side)) return false;
-  }
+  if (!keep_if_many && has_many_directions(side)) return false;
   for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) mark(i) = 0;
   LeastPiece own = least_;
   int found = 0;

@@ -318,15 +318,19 @@ TANDEM_HD inline void walk_line(LineQuestions& questions, std::uint32_t question
 template <typename Team>
 TANDEM_HD void walk_lines(const Team& team, LineQuestions& questions, std::uint32_t count,
                           const LineQuestion* shared) {
-  if constexpr (HasLanes<Team>) return questions.answer(team.lanes(), count);
-  if constexpr (WalksTogether<Team>) return team.walk_lines(questions, count, shared);
-  for (std::uint32_t i = 0; i < count; ++i) {
-    if (shared[i].side < 0) continue;
-    questions.prepare(i);
-    walk_line(questions, i);
-    if (!questions.has_to_look_further(i)) continue;
-    questions.look_further(i);
-    walk_line(questions, i);
+  if constexpr (HasLanes<Team>) {
+    questions.answer(team.lanes(), count);
+  } else if constexpr (HasWarps<Team>) {
+    team.walk_lines(questions, count, shared);
+  } else {
+    for (std::uint32_t i = 0; i < count; ++i) {
+      if (shared[i].side < 0) continue;
+      questions.prepare(i);
+      walk_line(questions, i);
+      if (!questions.has_to_look_further(i)) continue;
+      questions.look_further(i);
+      walk_line(questions, i);
+    }
   }
 }
 

@@ -63,8 +63,10 @@ concept HasLanes = requires(const Team& team) {
   team.lanes();
 };
 
-/// A team of a GPU, which walks trees in a way of its own.
+/// A team of warps of a GPU. Each has the functions of the warp: lane(), ballot(), first_bit(),
+/// from_lane(); and
+/// walk_lines(), its own way to walk trees.
 template <typename Team>
-concept WalksTogether = Team::kWalksTogether;
+concept HasWarps = Team::kHasWarps;
 
 }  // namespace tandem::manifold

@@ -373,7 +373,7 @@ TANDEM_HD void DeepestLine<Team>::go_to_ends() {
 
 template <typename Team>
 TANDEM_HD_SELDOM void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& middle, double reach,
-                                       double enough) {
+                                              double enough) {
   begin_with_seeds(frame, reach);
   const OverlapLine& best = shared_.best;
   if (!best.found() || best.depth >= enough) return;

@@ -409,8 +409,7 @@ __global__ void __launch_bounds__(kThreads, 4)
     manifold::DeepPatch& patch = deep_patch(args, place);
     if (direction >= patch.directions) return;
     with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState&) {
-      const double depth =
-          maker.depth_along(begun.of.curve, patch, direction, searches[own].get(), INFINITY);
+      const double depth = maker.depth_along(begun.of.curve, patch, direction, searches[own].get(), INFINITY);
       if (team.rank() == 0) patch.depth[direction] = depth;
     });
   });

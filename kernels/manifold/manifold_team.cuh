@@ -46,7 +46,7 @@ struct TeamOfWarps {
 struct WarpWalks {
   static constexpr std::uint32_t kRoom = 512, kMostLeaves = 64;
 
-  std::uint32_t block[kRoom], triangle[kMostLeaves];  ///< that wait to be looked at
+  std::uint32_t block[kRoom], triangle[kMostLeaves];     ///< that wait to be looked at
   std::uint8_t asks[kRoom], asks_triangle[kMostLeaves];  ///< the question that asks for each
 };
 
@@ -150,8 +150,8 @@ class LineWalks {
 
 /// Answers questions about lines by several warps, the number `warp` here.
 inline __device__ __noinline__ void walk_lines(WarpWalks& walks, manifold::LineQuestions& questions,
-                                        std::uint32_t count, const manifold::LineQuestion* shared,
-                                        std::uint32_t warp, std::uint32_t warps) {
+                                               std::uint32_t count, const manifold::LineQuestion* shared,
+                                               std::uint32_t warp, std::uint32_t warps) {
   static_assert(manifold::LineMemory::kMost <= 32);
   const std::uint32_t lane = threadIdx.x % 32;
   const bool asked = lane < count && lane % warps == warp && shared[lane].side >= 0;

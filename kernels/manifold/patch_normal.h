@@ -203,8 +203,8 @@ TANDEM_HD bool NormalFinder<Team>::has_many_directions(int side) const {
     for (int count = 0; left != 0; ++count) {
       if (count == kMostDirections) return true;
       const std::uint32_t first = team_.first_bit(left);
-      const FloatVector known = {{team_.from_lane(n[0], first), team_.from_lane(n[1], first),
-                                  team_.from_lane(n[2], first)}};
+      const FloatVector known = {
+          {team_.from_lane(n[0], first), team_.from_lane(n[1], first), team_.from_lane(n[2], first)}};
       left &= team_.ballot(distance_square({{n[0], n[1], n[2]}}, known) > kApart);
     }
     return false;
@@ -219,9 +219,8 @@ TANDEM_HD bool NormalFinder<Team>::has_many_directions(int side) const {
       if (!apart) continue;
       if (count == kMostDirections) return true;
       known[count++] = normal;
-    
+    }
   }
-}
   return false;
 }
 

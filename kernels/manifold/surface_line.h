@@ -279,7 +279,9 @@ class LineQuestions {
   }
 
  private:
-  TANDEM_HD static double extent(const Vector3& x) { return std::fabs(x.x) + std::fabs(x.y) + std::fabs(x.z); }
+  TANDEM_HD static double extent(const Vector3& x) {
+    return std::fabs(x.x) + std::fabs(x.y) + std::fabs(x.z);
+  }
   TANDEM_HD static bool is_nearer(const LineQuestion& q, const Crossing& crossing) {
     const double distance = std::fabs(crossing.height - q.target);
     return distance < q.nearest || (distance == q.nearest && crossing.triangle < q.best.triangle);

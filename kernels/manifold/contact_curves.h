@@ -94,7 +94,7 @@ TANDEM_HD inline std::uint64_t edge_key(const TriangleTopology& t, int k) {
 }
 
 /// Computes once more what the triangles of a piece have in common.
-TANDEM_HD_SELDOM inline void meet_again(const BodyPair& bodies, const Piece& piece, Meeting& out) {
+TANDEM_HD_CALLED inline void meet_again(const BodyPair& bodies, const Piece& piece, Meeting& out) {
   meet(bodies.a.triangle(piece.triangle[0]), bodies.b.triangle(piece.triangle[1]), bodies.tolerance(), out);
 }
 
@@ -245,7 +245,7 @@ class CurveFinder {
   TANDEM_HD PieceBounds make_pieces(const Contact* contacts, std::uint32_t count);
   TANDEM_HD void summarize(const PieceBounds& all);
   TANDEM_HD bool connect_by_ends();
-  TANDEM_HD_SELDOM void connect_by_corners();
+  TANDEM_HD_CALLED void connect_by_corners();
   TANDEM_HD void sort_by_curve(std::uint32_t& next);
 
   const Team& team_;
@@ -323,7 +323,7 @@ TANDEM_HD bool CurveFinder<Team>::connect_by_ends() {
 /// If corners lie in planes, the ends are ambiguous: then pieces hang together whose triangles share a corner
 /// on both sides.
 template <typename Team>
-TANDEM_HD_SELDOM void CurveFinder<Team>::connect_by_corners() {
+TANDEM_HD_CALLED void CurveFinder<Team>::connect_by_corners() {
   if constexpr (HasLanes<Team>) return team_.lanes().connect_by_corners(bodies_, memory_, summary_.pieces);
   const std::uint32_t size = PieceMemory::kTableWords * summary_.pieces;
   clear(size);

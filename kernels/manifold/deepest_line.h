@@ -97,11 +97,11 @@ class DeepestLine {
   /// Finds shared.best; none where the bodies do not overlap along the normal. middle, reach: a ball around
   /// the pieces. If there are several regions, the line goes through it. The search ends as soon as a line is
   /// as deep as `enough`.
-  TANDEM_HD_SELDOM void find(const PatchFrame& frame, const Vector3& middle, double reach, double enough);
+  TANDEM_HD_CALLED void find(const PatchFrame& frame, const Vector3& middle, double reach, double enough);
 
  private:
   TANDEM_HD void begin_half_spaces(const Vector3& middle, double reach);
-  TANDEM_HD void learn(int side, const Crossing& surface, HalfSpace& out) const;
+  TANDEM_HD_CALLED void learn(int side, const Crossing& surface, HalfSpace& out) const;
   /// Forgets half-spaces beyond which the bodies go on, up to these heights on a line.
   TANDEM_HD void go_beyond(const Vector2& at, const double (&height)[2]) {
     shared_.spaces.drop_before(team_, at, height, 16 * bodies_.tolerance());
@@ -109,7 +109,7 @@ class DeepestLine {
   TANDEM_HD void propose(int seed);
   TANDEM_HD void ask_along(const Vector2& at, const double (&from)[2], const double (&limit)[2],
                            double expected);
-  TANDEM_HD void go_to_ends();
+  TANDEM_HD_CALLED void go_to_ends();
   TANDEM_HD OverlapLine line_that_counts(int from) const;
   TANDEM_HD bool learn_from_lines(int from);
   TANDEM_HD bool step(int from);
@@ -180,7 +180,7 @@ TANDEM_HD void DeepestLine<Team>::begin_with_seeds(const PatchFrame& frame, doub
 
 /// Finds the half-space of a triangle that a line met; none if there is no triangle.
 template <typename Team>
-TANDEM_HD void DeepestLine<Team>::learn(int side, const Crossing& surface, HalfSpace& out) const {
+TANDEM_HD_CALLED void DeepestLine<Team>::learn(int side, const Crossing& surface, HalfSpace& out) const {
   out.side = static_cast<std::uint16_t>(side);
   out.triangle = surface.triangle;
   if (!surface.found()) return;
@@ -274,8 +274,9 @@ TANDEM_HD OverlapLine DeepestLine<Team>::line_that_counts(int from) const {
     out.at = at + part * (p.at - at);
     for (int side = 0; side < 2; ++side) {
       out.height[side] = height + part * (p.height[side] - height);
-      out.triangle[side] = side == blocked ? line[2 + side].best.triangle
-                                           : shared_.spaces.nearest_triangle(side, out.at, out.height[side]);
+      out.triangle[side] = side == blocked
+                               ? line[2 + side].best.triangle
+                               : shared_.spaces.nearest_triangle(team_, side, out.at, out.height[side]);
     }
     out.is_loose = true;
   } else {
@@ -287,9 +288,10 @@ TANDEM_HD OverlapLine DeepestLine<Team>::line_that_counts(int from) const {
       // A body may go on beyond what the half-spaces say. A line along an edge may miss it.
       const bool found = end.found() && further > -within;
       out.height[side] = found ? end.height : p.height[side];
-      out.triangle[side] = found     ? end.triangle
-                           : on_wall ? kNoIndex
-                                     : shared_.spaces.nearest_triangle(side, p.at, p.height[side], within);
+      out.triangle[side] = found ? end.triangle
+                           : on_wall
+                               ? kNoIndex
+                               : shared_.spaces.nearest_triangle(team_, side, p.at, p.height[side], within);
     }
   }
   out.depth = out.height[0] - out.height[1];
@@ -308,9 +310,9 @@ TANDEM_HD bool DeepestLine<Team>::learn_from_lines(int from) {
   unsigned is_new = 0;
   for (int i = 0; i < kLines; ++i) {
     const HalfSpace& space = shared_.learnt[i];
-    if (space.triangle == kNoIndex || !(space.beyond(at, height) < 0)) continue;
-    is_new |= shared_.spaces.knows(team_, space) ? 0 : 1u << i;
+    is_new |= space.triangle != kNoIndex && space.beyond(at, height) < 0 ? 1u << i : 0u;
   }
+  is_new &= ~shared_.spaces.known(team_, shared_.learnt);
   team_.sync();  // all have seen what is known
   for (int i = static_cast<int>(team_.rank()); i < kLines; i += static_cast<int>(team_.size())) {
     if ((is_new >> i & 1u) == 0) continue;
@@ -348,7 +350,7 @@ TANDEM_HD bool DeepestLine<Team>::step(int from) {
 
 /// Follows the best line to where both bodies end, if that is not known yet.
 template <typename Team>
-TANDEM_HD void DeepestLine<Team>::go_to_ends() {
+TANDEM_HD_CALLED void DeepestLine<Team>::go_to_ends() {
   if (!shared_.best.is_loose) return;
   const double(&height)[2] = shared_.best.height;
   const double rounding = 16 * bodies_.tolerance();
@@ -372,7 +374,7 @@ TANDEM_HD void DeepestLine<Team>::go_to_ends() {
 }
 
 template <typename Team>
-TANDEM_HD_SELDOM void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& middle, double reach,
+TANDEM_HD_CALLED void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& middle, double reach,
                                               double enough) {
   begin_with_seeds(frame, reach);
   const OverlapLine& best = shared_.best;
@@ -384,11 +386,11 @@ TANDEM_HD_SELDOM void DeepestLine<Team>::find(const PatchFrame& frame, const Vec
     const Vector2 at = shared_.frame.flat(shared_.seeds.at[seed]);
     const double height = shared_.frame.height(shared_.seeds.at[seed]);
     // Where faces of both bodies lie in each other, it may be no point within them.
-    if (shared_.spaces.in_plane(at, height, 16 * bodies_.tolerance())) continue;
+    if (shared_.spaces.in_plane(team_, at, height, 16 * bodies_.tolerance())) continue;
     shared_.spaces.look_from(team_, at, height);
-    propose(seed);
-    while (shared_.proposed.found && shared_.steps < kMostSteps && best.depth < enough && step(seed))
+    do {
       propose(seed);
+    } while (shared_.proposed.found && shared_.steps < kMostSteps && best.depth < enough && step(seed));
   }
   go_to_ends();
 }

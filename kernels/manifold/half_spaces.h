@@ -44,57 +44,70 @@ class HalfSpaces {
     along_ = size > 0 ? (1 / size) * along : Vector2{1, 0};
     for (int i = 0; i < 4; ++i) wall_[i] = dot(wall(i), middle) + half;
     wall_[4] = wall_[5] = far;
+    begin_basis();
   }
 
-  template <typename Team>
-  TANDEM_HD bool knows(const Team& team, const HalfSpace& wanted) const {
-    bool does = false;
-    for (int i = first_of(team); i < kMost; i += step_of(team))
-      does = does || (space[i].triangle == wanted.triangle && space[i].side == wanted.side);
-    return team.any(does);
+  /// Returns which of some half-spaces are known, a bit for each.
+  template <typename Team, int kCount>
+  TANDEM_HD unsigned known(const Team& team, const HalfSpace (&wanted)[kCount]) const {
+    unsigned own = 0, out = 0;
+    for (int i = first_of(team); i < kMost; i += step_of(team)) {
+      for (int k = 0; k < kCount; ++k)
+        own |= space[i].triangle == wanted[k].triangle && space[i].side == wanted[k].side ? 1u << k : 0u;
+    }
+    for (int k = 0; k < kCount; ++k) out |= team.any((own >> k & 1u) != 0) ? 1u << k : 0u;
+    return out;
   }
   /// From now on, those count that have a point of both bodies behind them.
   template <typename Team>
   TANDEM_HD void look_from(const Team& team, const Vector2& at, double height) {
-    for (int i = first_of(team); i < kMost; i += step_of(team))
-      space[i].counts = space[i].triangle != kNoIndex && space[i].beyond(at, height) < 0;
-    if (team.rank() == 0) begin_basis();
+    bool drops = false;
+    for (int i = first_of(team); i < kMost; i += step_of(team)) {
+      const bool counts = space[i].triangle != kNoIndex && space[i].beyond(at, height) < 0;
+      drops = drops || (!counts && basis_.has(kWalls + i));
+      space[i].counts = counts;
+    }
+    if (team.any(drops) && team.rank() == 0) begin_basis();
     team.sync();
   }
   /// Forgets those beyond which the body goes on.
   template <typename Team>
-  TANDEM_HD void drop_before(const Team& team, const Vector2& at, const double (&height)[2],
-                             double tolerance) {
+  TANDEM_HD_CALLED void drop_before(const Team& team, const Vector2& at, const double (&height)[2],
+                                    double tolerance) {
     bool drops = false;
     for (int i = first_of(team); i < kMost; i += step_of(team)) {
       HalfSpace& of = space[i];
       if (of.triangle == kNoIndex || !(of.beyond(at, of.side == 0 ? height[0] : height[1]) > tolerance))
         continue;
-      drops = drops || of.counts;
+      drops = drops || basis_.has(kWalls + i);
       of.triangle = kNoIndex, of.counts = false;
     }
     if (team.any(drops) && team.rank() == 0) begin_basis();
     team.sync();
   }
   /// Returns whether a point is in the plane of one of the first ones.
-  TANDEM_HD bool in_plane(const Vector2& at, double height, double tolerance) const {
+  template <typename Team>
+  TANDEM_HD bool in_plane(const Team& team, const Vector2& at, double height, double tolerance) const {
     bool is = false;
-    for (int i = 0; i < kFirst; ++i)
+    for (int i = first_of(team); i < kFirst; i += step_of(team))
       is = is || (space[i].triangle != kNoIndex && std::fabs(space[i].beyond(at, height)) <= tolerance);
-    return is;
+    return team.any(is);
   }
   /// Returns the triangle of the half-space that ends nearest to a point of one body's, or kNoIndex if none
   /// ends within a distance.
-  TANDEM_HD std::uint32_t nearest_triangle(int side, const Vector2& at, double height,
-                                           double within = INFINITY) const {
-    std::uint32_t triangle = kNoIndex;
+  template <typename Team>
+  TANDEM_HD_CALLED std::uint32_t nearest_triangle(const Team& team, int side, const Vector2& at,
+                                                  double height, double within = INFINITY) const {
+    int own = kMost;
     double nearest = within;
-    for (int i = 0; i < kMost; ++i) {
+    for (int i = first_of(team); i < kMost; i += step_of(team)) {
       if (!space[i].counts || space[i].side != side) continue;
       const double apart = std::fabs(space[i].beyond(at, height));
-      if (apart < nearest) nearest = apart, triangle = space[i].triangle;
+      if (apart < nearest) nearest = apart, own = i;
     }
-    return triangle;
+    const double least = team.least(nearest);
+    const int place = team.least(nearest == least ? own : kMost);
+    return place < kMost ? space[place].triangle : kNoIndex;
   }
   /// Returns whether a line is on the square's border.
   TANDEM_HD bool on_wall(const Vector2& at, double within) const {
@@ -145,22 +158,29 @@ class HalfSpaces {
   /// compiled, so that a GPU keeps it in registers.
   struct Basis {
     double inverse[4][4], offset[4], price[4];
+    int number[4];  ///< of each
 
+    TANDEM_HD bool has(int i) const {
+      return number[0] == i || number[1] == i || number[2] == i || number[3] == i;
+    }
     /// Takes a constraint for the one that has to leave; false if none can.
-    TANDEM_HD bool take(const Constraint& entering) {
-      double share[4], least = INFINITY, share_of_leaving = 1;
+    TANDEM_HD bool take(const Constraint& entering, int number_of_entering) {
+      double share[4], price_of_leaving = 0, share_of_leaving = 0;
       int leaves = -1;
       for (int k = 0; k < 4; ++k) {
         share[k] = 0;
         for (int r = 0; r < 4; ++r) share[k] += entering.row[r] * inverse[r][k];
-        if (share[k] > kLeastShare && price[k] < least * share[k])
-          least = price[k] / share[k], leaves = k, share_of_leaving = share[k];
+        // The one whose price counts least for its share.
+        if (share[k] > kLeastShare &&
+            (leaves < 0 || price[k] * share_of_leaving < price_of_leaving * share[k]))
+          leaves = k, price_of_leaving = price[k], share_of_leaving = share[k];
       }
       if (leaves < 0) return false;
-      const double by_share = 1 / share_of_leaving;
+      const double by_share = 1 / share_of_leaving, least = price_of_leaving * by_share;
       for (int k = 0; k < 4; ++k) {
         price[k] = k == leaves ? least : greater(price[k] - least * share[k], 0.0);
         offset[k] = k == leaves ? entering.offset : offset[k];
+        number[k] = k == leaves ? number_of_entering : number[k];
       }
       for (int r = 0; r < 4; ++r) {
         double own = 0;
@@ -176,7 +196,8 @@ class HalfSpaces {
     const double c = along_.x, s = along_.y;
     basis_ = {{{c, -s, 0, 0}, {s, c, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, -1}},
               {wall_[0], wall_[1], wall_[4], wall_[5]},
-              {kTilt, 0.75 * kTilt, 1, 1}};
+              {kTilt, 0.75 * kTilt, 1, 1},
+              {0, 1, 4, 5}};
   }
   template <typename Team>
   TANDEM_HD int most_violated(const Team& team, const double (&x)[4], double tolerance) const;
@@ -190,22 +211,21 @@ class HalfSpaces {
 /// none.
 template <typename Team>
 TANDEM_HD int HalfSpaces::most_violated(const Team& team, const double (&x)[4], double tolerance) const {
-  int worst = -1;
+  const Vector2 at = {x[0], x[1]};
+  int own = kWalls + kMost;
   double most = tolerance;
-  for (int i = 0; i < kWalls; ++i) {
-    const double at = i < 4 ? dot(wall(i), {x[0], x[1]}) : i == 4 ? x[2] : -x[3];
-    if (at - wall_[i] > most) most = at - wall_[i], worst = i;
+  for (int i = first_of(team); i < kWalls + kMost; i += step_of(team)) {
+    double beyond = 0;
+    if (i < kWalls) {
+      beyond = (i < 4 ? dot(wall(i), at) : i == 4 ? x[2] : -x[3]) - wall_[i];
+    } else {
+      const HalfSpace& of = space[i - kWalls];
+      beyond = of.counts ? of.beyond(at, of.side == 0 ? x[2] : x[3]) : 0;
+    }
+    if (beyond > most) most = beyond, own = i;
   }
-  int own = kMost;
-  double own_most = most;
-  for (int i = first_of(team); i < kMost; i += step_of(team)) {
-    if (!space[i].counts) continue;
-    const double beyond = space[i].beyond({x[0], x[1]}, space[i].side == 0 ? x[2] : x[3]);
-    if (beyond > own_most) own_most = beyond, own = i;
-  }
-  const double greatest = team.greatest(own_most);
-  if (!(greatest > most)) return worst;
-  return kWalls + team.least(own_most == greatest ? own : kMost);
+  const double greatest = team.greatest(most);
+  return greatest > tolerance ? team.least(most == greatest ? own : kWalls + kMost) : -1;
 }
 
 template <typename Team>
@@ -222,7 +242,7 @@ TANDEM_HD LineOfTwo HalfSpaces::deepest(const Team& team, double tolerance) {
     if (worst < 0) {
       out.at = {x[0], x[1]}, out.height[0] = x[2], out.height[1] = x[3];
       out.found = true;
-    } else if (!basis.take(constraint(worst))) {
+    } else if (!basis.take(constraint(worst), worst)) {
       break;
     }
   }

@@ -42,15 +42,15 @@ class ManifoldMaker {
 
   /// Finds the direction in which the overlap of a deep patch is shallowest, and the rim. The patch is
   /// ambiguous if the bodies do not overlap along any direction.
-  TANDEM_HD_SELDOM void make_deep(std::uint32_t region, OutlineMemory& shared, SearchMemory& depths);
+  TANDEM_HD_CALLED void make_deep(std::uint32_t region, OutlineMemory& shared, SearchMemory& depths);
 
   /// These are the steps of make_deep(), for teams that measure all directions at once. In between, `patch`
   /// gets the depth along each. The search ends as soon as that is `enough`.
-  TANDEM_HD_SELDOM void begin_deep(std::uint32_t region, NormalMemory& shared, SearchMemory& depths,
+  TANDEM_HD_CALLED void begin_deep(std::uint32_t region, NormalMemory& shared, SearchMemory& depths,
                                    DeepPatch& patch);
-  TANDEM_HD_SELDOM double depth_along(std::uint32_t region, const DeepPatch& patch, int direction,
+  TANDEM_HD_CALLED double depth_along(std::uint32_t region, const DeepPatch& patch, int direction,
                                       SearchMemory& depths, double enough) const;
-  TANDEM_HD_SELDOM void end_deep(std::uint32_t region, const DeepPatch& patch, OutlineMemory& shared);
+  TANDEM_HD_CALLED void end_deep(std::uint32_t region, const DeepPatch& patch, OutlineMemory& shared);
 
   /// Finds depths.
   TANDEM_HD void measure_depths(std::uint32_t region, SearchMemory& shared);
@@ -157,7 +157,7 @@ TANDEM_HD void ManifoldMaker<Team>::begin(std::uint32_t region, OutlineMemory& s
 }
 
 template <typename Team>
-TANDEM_HD_SELDOM void ManifoldMaker<Team>::begin_deep(std::uint32_t region, NormalMemory& shared,
+TANDEM_HD_CALLED void ManifoldMaker<Team>::begin_deep(std::uint32_t region, NormalMemory& shared,
                                                       SearchMemory& depths, DeepPatch& patch) {
   team_.sync();
   NormalFinder<Team> normal_finder(team_, bodies_, memory_, summary_, region, shared);
@@ -176,7 +176,7 @@ TANDEM_HD_SELDOM void ManifoldMaker<Team>::begin_deep(std::uint32_t region, Norm
 }
 
 template <typename Team>
-TANDEM_HD_SELDOM double ManifoldMaker<Team>::depth_along(std::uint32_t region, const DeepPatch& patch,
+TANDEM_HD_CALLED double ManifoldMaker<Team>::depth_along(std::uint32_t region, const DeepPatch& patch,
                                                          int direction, SearchMemory& depths,
                                                          double enough) const {
   team_.sync();
@@ -188,7 +188,7 @@ TANDEM_HD_SELDOM double ManifoldMaker<Team>::depth_along(std::uint32_t region, c
 }
 
 template <typename Team>
-TANDEM_HD_SELDOM void ManifoldMaker<Team>::end_deep(std::uint32_t region, const DeepPatch& patch,
+TANDEM_HD_CALLED void ManifoldMaker<Team>::end_deep(std::uint32_t region, const DeepPatch& patch,
                                                     OutlineMemory& shared) {
   double least = INFINITY;
   for (int i = 0; i < patch.directions; ++i) least = lesser(patch.depth[i], least);
@@ -203,7 +203,7 @@ TANDEM_HD_SELDOM void ManifoldMaker<Team>::end_deep(std::uint32_t region, const 
 }
 
 template <typename Team>
-TANDEM_HD_SELDOM void ManifoldMaker<Team>::make_deep(std::uint32_t region, OutlineMemory& shared,
+TANDEM_HD_CALLED void ManifoldMaker<Team>::make_deep(std::uint32_t region, OutlineMemory& shared,
                                                      SearchMemory& depths) {
   DeepPatch patch;
   begin_deep(region, shared.normal, depths, patch);

@@ -105,7 +105,7 @@ class LineWalks {
       } else {
         const OrientedBlock& block = shape.oriented_blocks[index];
         below = (block.first_below & ~OrientedBlock::kIsLeafBlock) + node;
-        look(block, test.turned(manifold::BlockAxes(block.rotation)));
+        look(block, test.turned(manifold::ToBlock(block.rotation)));
       }
     }
     const std::uint32_t inner = __ballot_sync(kWarp, passes && !is_leaf),
@@ -154,13 +154,15 @@ inline __device__ __noinline__ void walk_lines(WarpWalks& walks, manifold::LineQ
                                                std::uint32_t warp, std::uint32_t warps) {
   static_assert(manifold::LineMemory::kMost <= 32);
   const std::uint32_t lane = threadIdx.x % 32;
-  const bool asked = lane < count && lane % warps == warp && shared[lane].side >= 0;
+  bool asked = lane < count && lane % warps == warp && shared[lane].side >= 0;
   if (asked) questions.prepare(lane);
   LineWalks all(walks, questions);
-  all.walk(__ballot_sync(0xFFFFFFFFu, asked));
-  const bool further = asked && questions.has_to_look_further(lane);
-  if (further) questions.look_further(lane);
-  all.walk(__ballot_sync(0xFFFFFFFFu, further));
+#pragma unroll 1
+  for (std::uint32_t left = TeamOfWarps::ballot(asked); left != 0; left = TeamOfWarps::ballot(asked)) {
+    all.walk(left);
+    asked = asked && questions.has_to_look_further(lane);
+    if (asked) questions.look_further(lane);
+  }
 }
 
 struct Sum {

@@ -34,7 +34,7 @@ class OverlapLines {
   /// the middle of the piece, behind both triangles, to where the overlap ends on that line, but no further
   /// than `most`. expected: how far that is, mostly. Result: a bit for each piece; 0 where its triangles face
   /// each other, or the line is not within both bodies.
-  TANDEM_HD_SELDOM std::uint32_t go_inside(const std::uint32_t* piece, int count, double most,
+  TANDEM_HD_CALLED std::uint32_t go_inside(const std::uint32_t* piece, int count, double most,
                                            double expected, Vector3* inside) const;
 
   /// Asks where a straight line within a, and one within b, from one point to two others meet the surface of
@@ -42,7 +42,7 @@ class OverlapLines {
   TANDEM_HD void ask_straight(std::uint32_t first, const Vector3& from, const Vector3 (&to)[2]) const;
 
   /// Returns whether a straight line stays within both bodies.
-  TANDEM_HD_SELDOM bool is_free(const Vector3& from, const Vector3& to) const;
+  TANDEM_HD_CALLED bool is_free(const Vector3& from, const Vector3& to) const;
 
  private:
   /// Lines begin so far behind the surface from which they start.
@@ -80,7 +80,7 @@ TANDEM_HD std::uint32_t OverlapLines<Team>::extreme_piece(std::uint32_t begin, s
 }
 
 template <typename Team>
-TANDEM_HD_SELDOM std::uint32_t OverlapLines<Team>::go_inside(const std::uint32_t* piece, int count,
+TANDEM_HD_CALLED std::uint32_t OverlapLines<Team>::go_inside(const std::uint32_t* piece, int count,
                                                              double most, double expected,
                                                              Vector3* inside) const {
   LineQuestions questions(bodies_, shared_.line);
@@ -150,7 +150,7 @@ TANDEM_HD void OverlapLines<Team>::ask_straight(std::uint32_t first, const Vecto
 }
 
 template <typename Team>
-TANDEM_HD_SELDOM bool OverlapLines<Team>::is_free(const Vector3& from, const Vector3& to) const {
+TANDEM_HD_CALLED bool OverlapLines<Team>::is_free(const Vector3& from, const Vector3& to) const {
   team_.sync();
   ask_straight(0, from, {to, to});
   team_.sync();

@@ -47,10 +47,10 @@ class NormalFinder {
   /// Gathers in NormalMemory::tried the lines along which a deep patch may push, one way or the other: that
   /// of the area vector, or of the triangles of sheets, and normals of faces of both bodies. Result: how
   /// many.
-  TANDEM_HD_SELDOM int gather_for_deep(const CurveMeasure& curve);
+  TANDEM_HD_CALLED int gather_for_deep(const CurveMeasure& curve);
 
   /// Returns the distance of the piece's end that is furthest from a point.
-  TANDEM_HD_SELDOM double reach_from(const Vector3& middle) const;
+  TANDEM_HD_CALLED double reach_from(const Vector3& middle) const;
 
  private:
   static constexpr int kMost = kMostTried;
@@ -66,13 +66,13 @@ class NormalFinder {
   }
   /// Marks that pieces have for the time being. Each is seen by one of the team alone.
   TANDEM_HD std::uint32_t& mark(std::uint32_t i) const { return memory_.curve[i]; }
-  TANDEM_HD_SELDOM bool has_free_end() const;
-  TANDEM_HD_SELDOM Vector3 plain_middle() const;
-  TANDEM_HD_SELDOM Vector3 sheet_normal() const;
+  TANDEM_HD_CALLED bool has_free_end() const;
+  TANDEM_HD_CALLED Vector3 plain_middle() const;
+  TANDEM_HD_CALLED Vector3 sheet_normal() const;
   TANDEM_HD bool has_many_directions(int side) const;
   TANDEM_HD LeastPiece least_unmarked(int side, const FloatVector& known) const;
   TANDEM_HD bool gather_directions(int side, bool keep_if_many);
-  TANDEM_HD_SELDOM void gather_longest(int side);
+  TANDEM_HD_CALLED void gather_longest(int side);
   TANDEM_HD void find_faces_along(const Vector3& smooth, std::uint32_t (&holder)[2]) const;
   TANDEM_HD void sum_lengths_on_faces(const FloatVector (&face)[2], const std::uint32_t (&holder)[2],
                                       ExactSum (&within)[2]) const;
@@ -80,9 +80,9 @@ class NormalFinder {
   TANDEM_HD void spread_along(int count) const;
   TANDEM_HD Vector3 face_nearest(const Vector3& smooth, double length);
   /// Returns how far b must move along a direction until a plane lies between all triangles of the region.
-  TANDEM_HD_SELDOM double separation_along(const Vector3& n) const;
-  TANDEM_HD_SELDOM int find_for_touch(Vector3& n);
-  TANDEM_HD_SELDOM int find_crossing_edges(Vector3& n) const;
+  TANDEM_HD_CALLED double separation_along(const Vector3& n) const;
+  TANDEM_HD_CALLED int find_for_touch(Vector3& n);
+  TANDEM_HD_CALLED int find_crossing_edges(Vector3& n) const;
   TANDEM_HD Vector3 crossing_edges(const Piece& piece, int number) const;
   /// Returns the normal that points from a towards b.
   TANDEM_HD static FloatVector turned_normal(const float* normals, int side) {
@@ -147,7 +147,7 @@ TANDEM_HD CurveMeasure NormalFinder<Team>::measure() {
 }
 
 template <typename Team>
-TANDEM_HD_SELDOM bool NormalFinder<Team>::has_free_end() const {
+TANDEM_HD_CALLED bool NormalFinder<Team>::has_free_end() const {
   bool is_free = false;
   for_each_piece([&](const Piece& piece, const float*) {
     if (piece.kind() == MeetingKind::polygon) return;
@@ -162,7 +162,7 @@ TANDEM_HD_SELDOM bool NormalFinder<Team>::has_free_end() const {
 
 /// Returns the middle of pieces without length, from the origin on.
 template <typename Team>
-TANDEM_HD_SELDOM Vector3 NormalFinder<Team>::plain_middle() const {
+TANDEM_HD_CALLED Vector3 NormalFinder<Team>::plain_middle() const {
   ExactVectorSum sum;
   for_each_piece([&](const Piece& piece, const float*) {
     const Vector3 from = piece.end[0] - summary_.origin;
@@ -174,7 +174,7 @@ TANDEM_HD_SELDOM Vector3 NormalFinder<Team>::plain_middle() const {
 }
 
 template <typename Team>
-TANDEM_HD_SELDOM Vector3 NormalFinder<Team>::sheet_normal() const {
+TANDEM_HD_CALLED Vector3 NormalFinder<Team>::sheet_normal() const {
   const bool sheet_a = !bodies_.a.shape->closed, sheet_b = !bodies_.b.shape->closed;
   const double unit = summary_.unit, one_by_unit = 1 / unit;
   ExactVectorSum sum;
@@ -430,7 +430,7 @@ TANDEM_HD Vector3 NormalFinder<Team>::face_nearest(const Vector3& smooth, double
 }
 
 template <typename Team>
-TANDEM_HD_SELDOM double NormalFinder<Team>::separation_along(const Vector3& n) const {
+TANDEM_HD_CALLED double NormalFinder<Team>::separation_along(const Vector3& n) const {
   team_.sync();
   if (team_.rank() == 0) shared_.tried[0] = n;
   team_.sync();
@@ -454,7 +454,7 @@ TANDEM_HD Vector3 NormalFinder<Team>::crossing_edges(const Piece& piece, int num
 /// Looks for a direction across an edge of each body that separates all triangles of the patch. Returns how
 /// many there are, as find_for_touch().
 template <typename Team>
-TANDEM_HD_SELDOM int NormalFinder<Team>::find_crossing_edges(Vector3& n) const {
+TANDEM_HD_CALLED int NormalFinder<Team>::find_crossing_edges(Vector3& n) const {
   constexpr std::uint32_t kMostPieces = 16, kDirections = 18;  // each of 3 x 3 edges, both ways
   if (end_ - begin_ > kMostPieces) return 0;
   const double tolerance = kNoArea * bodies_.reach();
@@ -508,7 +508,7 @@ TANDEM_HD_SELDOM int NormalFinder<Team>::find_crossing_edges(Vector3& n) const {
 /// on one side and b's on the other. Returns how many there are: 0, 1 or, of several, 2. Where several do,
 /// corners or edges lie on each other: nothing to lean on.
 template <typename Team>
-TANDEM_HD_SELDOM int NormalFinder<Team>::find_for_touch(Vector3& n) {
+TANDEM_HD_CALLED int NormalFinder<Team>::find_for_touch(Vector3& n) {
   directions_ = 0;
   gather_directions(0, true);
   gather_directions(1, true);
@@ -534,7 +534,7 @@ TANDEM_HD_SELDOM int NormalFinder<Team>::find_for_touch(Vector3& n) {
 /// Adds the directions of faces of one body that have the longest pieces; of pieces about as long, that of
 /// the least triangles comes first.
 template <typename Team>
-TANDEM_HD_SELDOM void NormalFinder<Team>::gather_longest(int side) {
+TANDEM_HD_CALLED void NormalFinder<Team>::gather_longest(int side) {
   FloatVector known[kMostDirections];
   int count = 0;
   for (; count < kMostDirections; ++count) {
@@ -568,7 +568,7 @@ TANDEM_HD_SELDOM void NormalFinder<Team>::gather_longest(int side) {
 }
 
 template <typename Team>
-TANDEM_HD_SELDOM int NormalFinder<Team>::gather_for_deep(const CurveMeasure& curve) {
+TANDEM_HD_CALLED int NormalFinder<Team>::gather_for_deep(const CurveMeasure& curve) {
   directions_ = 0;
   gather_longest(0);
   gather_longest(1);
@@ -593,7 +593,7 @@ TANDEM_HD_SELDOM int NormalFinder<Team>::gather_for_deep(const CurveMeasure& cur
 }
 
 template <typename Team>
-TANDEM_HD_SELDOM double NormalFinder<Team>::reach_from(const Vector3& middle) const {
+TANDEM_HD_CALLED double NormalFinder<Team>::reach_from(const Vector3& middle) const {
   double most = 0;
   for_each_piece([&](const Piece& piece, const float*) {
     most = greater(norm(piece.end[0] - middle), most);

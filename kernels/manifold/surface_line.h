@@ -63,20 +63,31 @@ TANDEM_HD inline float slack_near(const Body& body, const FloatVector& point) {
   return static_cast<float>(far) * kBoxSlack + static_cast<float>(body.reach) * 0x1p-42f;
 }
 
-/// The axes of a block's frame, as rows, along those of the mesh.
-struct BlockAxes {
-  FloatVector axis[3];
+/// A rotation from the axes of the mesh to those of a block's frame. Its rounding, some twenty units of the
+/// vector's, is within kBoxSlack.
+class ToBlock {
+ public:
+  TANDEM_HD explicit ToBlock(const BlockRotation& rotation)
+      : w_(quaternion_part(rotation, 0)),
+        v_{{quaternion_part(rotation, 1), quaternion_part(rotation, 2), quaternion_part(rotation, 3)}},
+        two_by_square_(2 / (w_ * w_ + dot(v_, v_))) {}
 
-  TANDEM_HD explicit BlockAxes(const BlockRotation& rotation) {
-    const ScaledRotation r = scaled_rotation(rotation);
-    const float by_length = 1 / r.squared_length;
-    for (int k = 0; k < 3; ++k) {
-      for (int i = 0; i < 3; ++i) axis[k].x[i] = r.scaled[i][k] * by_length;
-    }
-  }
   TANDEM_HD FloatVector operator()(const FloatVector& p) const {
-    return {{dot(axis[0], p), dot(axis[1], p), dot(axis[2], p)}};
+    const FloatVector across = cross(v_, p), twice = cross(v_, across);
+    FloatVector out;
+    for (int k = 0; k < 3; ++k) out.x[k] = p.x[k] + two_by_square_ * (twice.x[k] - w_ * across.x[k]);
+    return out;
   }
+
+ private:
+  TANDEM_HD static FloatVector cross(const FloatVector& p, const FloatVector& q) {
+    return {{p.x[1] * q.x[2] - p.x[2] * q.x[1], p.x[2] * q.x[0] - p.x[0] * q.x[2],
+             p.x[0] * q.x[1] - p.x[1] * q.x[0]}};
+  }
+
+  float w_;
+  FloatVector v_;
+  float two_by_square_;
 };
 
 /// The nodes of a block whose boxes pass a test, a bit each. The block is read as a whole: float4 loads on a
@@ -113,7 +124,7 @@ TANDEM_HD inline Below look_below(const Shape& shape, std::uint32_t index, const
     for (int i = 0; i < kNodesPerBlock; ++i) out.index[i] = block.index[i];
   } else {
     const OrientedBlock block = shape.oriented_blocks[index];
-    out.mask = nodes_that_pass(block, test.turned(BlockAxes(block.rotation)));
+    out.mask = nodes_that_pass(block, test.turned(ToBlock(block.rotation)));
     out.leaves = (block.first_below & OrientedBlock::kIsLeafBlock) != 0;
     const std::uint32_t first = block.first_below & ~OrientedBlock::kIsLeafBlock;
     for (int i = 0; i < kNodesPerBlock; ++i) out.index[i] = first + static_cast<std::uint32_t>(i);
@@ -142,8 +153,8 @@ struct LineTest {
   FloatVector point, direction;  // at the target's height
   float lower, upper, slack, reach;
 
-  TANDEM_HD LineTest turned(const BlockAxes& axes) const {
-    return {axes(point), axes(direction), lower, upper, slack, reach};
+  TANDEM_HD LineTest turned(const ToBlock& to_block) const {
+    return {to_block(point), to_block(direction), lower, upper, slack, reach};
   }
   TANDEM_HD bool passes(const FloatVector& c, const FloatVector& h) const {
     const float x = c.x[0] - point.x[0], y = c.x[1] - point.x[1], z = c.x[2] - point.x[2];

@@ -3,12 +3,12 @@
 
 #include "tandem/formats/platform.h"
 
-/// A function that is seldom called. It is not copied to where it is called from, whose registers on a GPU
-/// then suffice for what is done often.
+/// A function that a GPU calls instead of copying it to where it is called from: code that warps share stays
+/// in their cache, and what is seldom done takes no registers.
 #if defined(__CUDACC__)
-#define TANDEM_HD_SELDOM __host__ __device__ __noinline__
+#define TANDEM_HD_CALLED __host__ __device__ __noinline__
 #else
-#define TANDEM_HD_SELDOM
+#define TANDEM_HD_CALLED
 #endif
 
 /// Vectors of float64 for contact manifolds. Every operation is rounded by itself: host code is compiled with

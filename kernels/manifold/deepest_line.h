@@ -34,13 +34,12 @@ inline constexpr double kOffEdge = 1e-10;
 
 /// A line on which a triangle of a lies above one of b.
 struct OverlapLine {
-  double depth = 0;
   std::uint32_t triangle[2] = {kNoIndex, kNoIndex};
   Vector2 at;
-  double height[2];       ///< of a, of b
-  bool is_loose = false;  ///< the bodies reach these heights, at least
+  double height[2] = {0, 0};  ///< of a, of b
 
   TANDEM_HD bool found() const { return triangle[0] != kNoIndex && triangle[1] != kNoIndex; }
+  TANDEM_HD double depth() const { return height[0] - height[1]; }
 };
 
 /// Points of the overlap, and pieces beside which they are.
@@ -60,6 +59,7 @@ struct SearchMemory {
   HalfSpaces spaces;
   LineOfTwo proposed;
   OverlapLine best;
+  bool is_loose;  ///< the bodies reach the heights of the best line, at least
   int steps;
 };
 
@@ -81,14 +81,11 @@ class DeepestLine {
   /// ball around the pieces.
   TANDEM_HD void find_seeds(const Vector3& middle, double reach, int wanted);
 
-  /// Returns whether one body ends within the other on the deepest line.
-  TANDEM_HD bool goes_through();
-
-  /// Returns the depth of the best line; infinity if there is none.
-  TANDEM_HD double depth() const {
-    const double depth = shared_.best.found() ? shared_.best.depth : INFINITY;
+  /// Returns what find() found.
+  TANDEM_HD OverlapLine best() const {
+    const OverlapLine best = shared_.best;
     team_.sync();  // all have read it
-    return depth;
+    return best;
   }
 
   /// Finds the deepest of the lines through the seeds.
@@ -110,7 +107,7 @@ class DeepestLine {
   TANDEM_HD void ask_along(const Vector2& at, const double (&from)[2], const double (&limit)[2],
                            double expected);
   TANDEM_HD_CALLED void go_to_ends();
-  TANDEM_HD OverlapLine line_that_counts(int from) const;
+  TANDEM_HD OverlapLine line_that_counts(int from, bool& is_loose) const;
   TANDEM_HD bool learn_from_lines(int from);
   TANDEM_HD bool step(int from);
 
@@ -165,13 +162,11 @@ TANDEM_HD void DeepestLine<Team>::begin_with_seeds(const PatchFrame& frame, doub
   if (count > 0) walk_lines(team_, questions, count, line);
   if (team_.rank() == 0) {
     shared_.best = {};
+    shared_.is_loose = false;
     for (int i = 0; i < shared_.seeds.count; ++i) {
       const Crossing &top = line[2 * i].best, &bottom = line[2 * i + 1].best;
-      if (!top.found() || !bottom.found() || !(top.height - bottom.height > shared_.best.depth)) continue;
-      shared_.best = {top.height - bottom.height,
-                      {top.triangle, bottom.triangle},
-                      line[2 * i].at,
-                      {top.height, bottom.height}};
+      if (!top.found() || !bottom.found() || !(top.height - bottom.height > shared_.best.depth())) continue;
+      shared_.best = {{top.triangle, bottom.triangle}, line[2 * i].at, {top.height, bottom.height}};
       shared_.from = i;
     }
   }
@@ -194,7 +189,7 @@ TANDEM_HD_CALLED void DeepestLine<Team>::learn(int side, const Crossing& surface
 template <typename Team>
 TANDEM_HD void DeepestLine<Team>::propose(int seed) {
   LineOfTwo p = shared_.spaces.deepest(team_, 8 * bodies_.tolerance());
-  p.found = p.found && p.depth() > shared_.best.depth * (1 + kDeepEnough);
+  p.found = p.found && p.depth() > shared_.best.depth() * (1 + kDeepEnough);
   const Vector3& from = shared_.seeds.at[seed];
   const double height = shared_.frame.height(from);
   p.at = p.at + kOffEdge * (shared_.frame.flat(from) - p.at);
@@ -255,7 +250,7 @@ TANDEM_HD void DeepestLine<Team>::ask_along(const Vector2& at, const double (&fr
 /// ends; none where that is no deeper than the best. As far as both of those stay within their bodies, all
 /// lines between them count.
 template <typename Team>
-TANDEM_HD OverlapLine DeepestLine<Team>::line_that_counts(int from) const {
+TANDEM_HD OverlapLine DeepestLine<Team>::line_that_counts(int from, bool& is_loose) const {
   const LineQuestion* const line = shared_.lines.line;
   const LineOfTwo& p = shared_.proposed;
   const double within = kNearEnd * bodies_.reach();
@@ -267,7 +262,7 @@ TANDEM_HD OverlapLine DeepestLine<Team>::line_that_counts(int from) const {
       part = surface.height / line[2 + side].length, blocked = side;
   }
   OverlapLine out;
-  if (!(part * p.depth() > shared_.best.depth)) return out;
+  if (!(part * p.depth() > shared_.best.depth())) return out;
   if (blocked >= 0) {
     const Vector2 at = shared_.frame.flat(shared_.seeds.at[from]);
     const double height = shared_.frame.height(shared_.seeds.at[from]);
@@ -278,7 +273,7 @@ TANDEM_HD OverlapLine DeepestLine<Team>::line_that_counts(int from) const {
                                ? line[2 + side].best.triangle
                                : shared_.spaces.nearest_triangle(team_, side, out.at, out.height[side]);
     }
-    out.is_loose = true;
+    is_loose = true;
   } else {
     const bool on_wall = shared_.spaces.on_wall(p.at, within);
     out.at = p.at;
@@ -294,7 +289,6 @@ TANDEM_HD OverlapLine DeepestLine<Team>::line_that_counts(int from) const {
                                : shared_.spaces.nearest_triangle(team_, side, p.at, p.height[side], within);
     }
   }
-  out.depth = out.height[0] - out.height[1];
   return out;
 }
 
@@ -337,11 +331,12 @@ TANDEM_HD bool DeepestLine<Team>::step(int from) {
                      {shared_.frame.at(p.at, p.height[0]), shared_.frame.at(p.at, p.height[1])});
   team_.sync();
   walk_lines(team_, questions, kLines, shared_.lines.line);
-  const OverlapLine next = line_that_counts(from);
+  bool is_loose = false;
+  const OverlapLine next = line_that_counts(from, is_loose);
   if (next.found()) go_beyond(next.at, next.height);
   const bool learns = learn_from_lines(from);
   if (team_.rank() == 0) {
-    if (next.found()) shared_.best = next;
+    if (next.found()) shared_.best = next, shared_.is_loose = is_loose;
     ++shared_.steps;
   }
   team_.sync();
@@ -351,12 +346,12 @@ TANDEM_HD bool DeepestLine<Team>::step(int from) {
 /// Follows the best line to where both bodies end, if that is not known yet.
 template <typename Team>
 TANDEM_HD_CALLED void DeepestLine<Team>::go_to_ends() {
-  if (!shared_.best.is_loose) return;
+  if (!shared_.is_loose) return;
   const double(&height)[2] = shared_.best.height;
   const double rounding = 16 * bodies_.tolerance();
   team_.sync();
   ask_along(shared_.best.at, {height[0], height[1]}, {height[0] - rounding, height[1] + rounding},
-            shared_.best.depth);
+            shared_.best.depth());
   team_.sync();
   LineQuestion* const line = shared_.lines.line;
   LineQuestions questions(bodies_, line);
@@ -367,8 +362,6 @@ TANDEM_HD_CALLED void DeepestLine<Team>::go_to_ends() {
       const Crossing& end = line[side].best;
       if (end.found()) best.height[side] = end.height, best.triangle[side] = end.triangle;
     }
-    best.depth = best.height[0] - best.height[1];
-    best.is_loose = false;
   }
   team_.sync();
 }
@@ -378,7 +371,7 @@ TANDEM_HD_CALLED void DeepestLine<Team>::find(const PatchFrame& frame, const Vec
                                               double enough) {
   begin_with_seeds(frame, reach);
   const OverlapLine& best = shared_.best;
-  if (!best.found() || best.depth >= enough) return;
+  if (!best.found() || best.depth() >= enough) return;
   begin_half_spaces(middle, reach);
   const int deepest = shared_.from;
   for (int i = 0; i < shared_.seeds.count; ++i) {
@@ -390,30 +383,9 @@ TANDEM_HD_CALLED void DeepestLine<Team>::find(const PatchFrame& frame, const Vec
     shared_.spaces.look_from(team_, at, height);
     do {
       propose(seed);
-    } while (shared_.proposed.found && shared_.steps < kMostSteps && best.depth < enough && step(seed));
+    } while (shared_.proposed.found && shared_.steps < kMostSteps && best.depth() < enough && step(seed));
   }
   go_to_ends();
-}
-
-template <typename Team>
-TANDEM_HD bool DeepestLine<Team>::goes_through() {
-  const OverlapLine& line = shared_.best;
-  if (!line.found()) return false;
-  const double tolerance = bodies_.tolerance();
-  LineQuestions questions(bodies_, shared_.lines.line);
-  for (std::uint32_t side = team_.rank(); side < 2; side += team_.size()) {
-    const double from = line.height[side];
-    questions.ask(side, shared_.frame, static_cast<int>(side), side == 0 ? -1 : 1, line.at, from,
-                  side == 0 ? -INFINITY : from + tolerance, side == 0 ? from - tolerance : INFINITY, INFINITY,
-                  kGrazes);
-  }
-  team_.sync();
-  walk_lines(team_, questions, 2, shared_.lines.line);
-  const Crossing &begin_a = shared_.lines.line[0].best, &end_b = shared_.lines.line[1].best;
-  const bool goes = (begin_a.found() && begin_a.height > line.height[1]) ||
-                    (end_b.found() && end_b.height < line.height[0]);
-  team_.sync();  // all have read the answers
-  return goes;
 }
 
 }  // namespace tandem::manifold

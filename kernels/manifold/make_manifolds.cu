@@ -306,8 +306,24 @@ __device__ void copy_state(const AnyTeam& team, const PatchState& from, PatchSta
   team.sync();
 }
 
-/// Begins the patch of each curve.
+/// What is known of a deep patch lies where its manifold comes to lie.
+__device__ manifold::DeepPatch& deep_patch(const ManifoldArgs& args, std::uint32_t place) {
+  static_assert(sizeof(manifold::DeepPatch) <= sizeof(Patch) &&
+                alignof(manifold::DeepPatch) <= alignof(Patch));
+  return *reinterpret_cast<manifold::DeepPatch*>(&args.patches[place]);
+}
+
+/// The lines along its directions lie where its state comes to lie.
+__device__ manifold::DeepLines& deep_lines(BegunPatch& begun) {
+  static_assert(sizeof(manifold::DeepLines) <= sizeof(PatchState) &&
+                alignof(manifold::DeepLines) <= alignof(PatchState));
+  return *reinterpret_cast<manifold::DeepLines*>(&begun.state);
+}
+
+/// Begins the patch of each curve, and finds directions where the area gives no normal.
 __global__ void __launch_bounds__(kThreads, 4) begin_patches(const __grid_constant__ ManifoldArgs args) {
+  __shared__ WarpWalks walks[kWarps];
+  __shared__ Raw<manifold::SearchMemory> searches[kWarps];
   __shared__ MakerMemory memory[kWarps];
   __shared__ Raw<manifold::OutlineMemory> outline[kWarps];
   __shared__ std::uint32_t places[kWarps];
@@ -327,16 +343,20 @@ __global__ void __launch_bounds__(kThreads, 4) begin_patches(const __grid_consta
       }
       team.sync();
       if (place >= args.capacity.manifolds) return;
+      const bool is_deep = made.kind == manifold::PatchKind::deep;
       if (team.rank() == 0) {
-        args.begun[place].of = curve;
-        if (made.kind == manifold::PatchKind::deep)
-          args.next_of_pair[atomicAdd(&state.deep_patches, 1u)] = place;
+        args.begun[place].of = curve, args.begun[place].is_deep = is_deep;
+        if (is_deep) args.next_of_pair[atomicAdd(&state.deep_patches, 1u)] = place;
       }
-      copy_state(team, made, args.begun[place].state);
+      if (is_deep)
+        maker.begin_deep(curve.curve, outline[own].get().normal, searches[own].get(),
+                         deep_patch(args, place));
+      else
+        copy_state(team, made, args.begun[place].state);
     });
   };
   share_out<kThreads>(state.curves_of_many, state.next_curve_of_many, state.curves_of_few,
-                      state.next_curve_of_few, of);
+                      state.next_curve_of_few, of, walks);
 }
 
 __device__ std::uint32_t patches_begun(const ManifoldArgs& args) {
@@ -344,91 +364,59 @@ __device__ std::uint32_t patches_begun(const ManifoldArgs& args) {
   return wanted < args.capacity.manifolds ? wanted : args.capacity.manifolds;
 }
 
-/// What is known of a deep patch lies where its manifold comes to lie.
-__device__ manifold::DeepPatch& deep_patch(const ManifoldArgs& args, std::uint32_t place) {
-  static_assert(sizeof(manifold::DeepPatch) <= sizeof(Patch) &&
-                alignof(manifold::DeepPatch) <= alignof(Patch));
-  return *reinterpret_cast<manifold::DeepPatch*>(&args.patches[place]);
-}
-
-/// Measures the depths of a patch that was begun.
-__device__ void measure(const ManifoldArgs& args, const WarpTeam& team, MakerMemory& shared,
-                        Raw<manifold::SearchMemory>& search, BegunPatch& begun) {
-  with_maker(args, team, shared, begun.of, [&](auto& maker, PatchState& state) {
-    copy_state(team, begun.state, state);
-    maker.measure_depths(begun.of.curve, search.get());
-    copy_state(team, state, begun.state);
-  });
-}
-
-/// Finds the directions of the patches whose areas give no normal, by a block each, and measures the depths
-/// of the others, by a warp each.
+/// Finds the deepest line of deep patches along each direction, and measures the depths of the others, by a
+/// warp each.
 __global__ void __launch_bounds__(kThreads, 4) measure_depths(const __grid_constant__ ManifoldArgs args) {
-  __shared__ WarpWalks walks[kWarps];
-  __shared__ MakerMemory memory[kWarps];
-  __shared__ Raw<manifold::NormalMemory> normals;
-  __shared__ Raw<manifold::SearchMemory> searches[kWarps];
-  wait_for_kernel_before();
-  if (!has_query(args)) return;
-  ManifoldState& state = *args.state;
-  const auto of = [&](const auto& team, std::uint32_t row, std::uint32_t own) {
-    if constexpr (kIsLarge<std::remove_cvref_t<decltype(team)>>) {
-      const std::uint32_t place = args.next_of_pair[row];
-      const PairCurve of_curve = args.begun[place].of;
-      with_maker(args, team, memory[own], of_curve, [&](auto& maker, PatchState&) {
-        maker.begin_deep(of_curve.curve, normals.get(), searches[own].get(), deep_patch(args, place));
-      });
-    } else if (BegunPatch& begun = args.begun[row]; begun.state.kind == manifold::PatchKind::overlap) {
-      measure(args, team, memory[own], searches[own], begun);
-    }
-  };
-  share_out<kThreads>(state.deep_patches, state.next_deep, patches_begun(args), state.next_measured, of,
-                      walks);
-}
-
-/// Measures the overlap of the patches whose areas give no normal along each direction, and later on, when
-/// they have one, their depths, by a warp each.
-__global__ void __launch_bounds__(kThreads, 4)
-    measure_deep_patches(const __grid_constant__ ManifoldArgs args, bool have_normals) {
   __shared__ WarpWalks walks[kWarps];
   __shared__ MakerMemory memory[kWarps];
   __shared__ Raw<manifold::SearchMemory> searches[kWarps];
   __shared__ std::uint32_t taken[kWarps];
   wait_for_kernel_before();
   if (!has_query(args)) return;
-  const std::uint32_t directions = have_normals ? 1 : 2 * manifold::kMostTried;
-  ManifoldState& state = *args.state;
-  const std::uint32_t own = threadIdx.x / 32;
+  constexpr std::uint32_t kDirections = 2 * manifold::kMostTried;
+  const std::uint32_t own = threadIdx.x / 32, directions = args.state->deep_patches * kDirections;
   const WarpTeam team(&walks[own]);
-  std::uint32_t& next = have_normals ? state.next_measured_deep : state.next_direction;
-  take_rows(team, state.deep_patches * directions, next, taken[own], [&](std::uint32_t row) {
-    const std::uint32_t place = args.next_of_pair[row / directions];
+  manifold::SearchMemory& search = searches[own].get();
+  const auto along_direction = [&](std::uint32_t place, std::uint32_t direction) {
+    const manifold::DeepPatch& patch = deep_patch(args, place);
+    if (direction >= static_cast<std::uint32_t>(patch.directions)) return;
     BegunPatch& begun = args.begun[place];
-    if (have_normals) return measure(args, team, memory[own], searches[own], begun);
-    const int direction = static_cast<int>(row % directions);
-    manifold::DeepPatch& patch = deep_patch(args, place);
-    if (direction >= patch.directions) return;
     with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState&) {
-      const double depth = maker.depth_along(begun.of.curve, patch, direction, searches[own].get(), INFINITY);
-      if (team.rank() == 0) patch.depth[direction] = depth;
+      const manifold::OverlapLine line =
+          maker.line_along(begun.of.curve, patch, static_cast<int>(direction), search, INFINITY);
+      if (team.rank() == 0) deep_lines(begun).along[direction] = line;
     });
-  });
+  };
+  take_rows(team, directions + patches_begun(args), args.state->next_measured, taken[own],
+            [&](std::uint32_t row) {
+              if (row < directions)
+                return along_direction(args.next_of_pair[row / kDirections], row % kDirections);
+              BegunPatch& begun = args.begun[row - directions];
+              if (begun.is_deep || begun.state.kind != manifold::PatchKind::overlap) return;
+              with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState& state) {
+                copy_state(team, begun.state, state);
+                maker.measure_depths(begun.of.curve, search);
+                copy_state(team, state, begun.state);
+              });
+            });
 }
 
-/// Finds the rims of these patches, by a block each.
+/// Finds the normals, rims and depths of deep patches, by a block each.
 __global__ void __launch_bounds__(kThreads, 4) end_deep_patches(const __grid_constant__ ManifoldArgs args) {
   __shared__ BlockScratch<kThreads> scratch;
+  __shared__ WarpWalks walks[kWarps];
   __shared__ MakerMemory memory;
   __shared__ Raw<manifold::OutlineMemory> outline;
+  __shared__ Raw<manifold::LineMemory> lines;
   __shared__ std::uint32_t taken;
   wait_for_kernel_before();
   if (!has_query(args)) return;
-  const LargeTeam team(&scratch, nullptr);
+  const LargeTeam team(&scratch, walks);
   take_rows(team, args.state->deep_patches, args.state->next_ended, taken, [&](std::uint32_t row) {
     const std::uint32_t place = args.next_of_pair[row];
     BegunPatch& begun = args.begun[place];
     with_maker(args, team, memory, begun.of, [&](auto& maker, PatchState& made) {
-      maker.end_deep(begun.of.curve, deep_patch(args, place), outline.get());
+      maker.end_deep(begun.of.curve, deep_patch(args, place), deep_lines(begun), outline.get(), lines.get());
       copy_state(team, made, begun.state);
     });
   });
@@ -524,8 +512,8 @@ __global__ void __launch_bounds__(kThreads) remember(const __grid_constant__ Man
   state.next_many = state.next_few = state.next_patch = state.tiles_taken = 0;
   state.curves_of_many = state.curves_of_few = state.next_curve_of_many = state.next_curve_of_few = 0;
   state.several_curves = state.next_neighbour = state.next_joined = 0;
-  state.deep_patches = state.next_deep = state.next_direction = state.next_ended = 0;
-  state.next_measured = state.next_measured_deep = state.next_finished = 0;
+  state.deep_patches = state.next_ended = 0;
+  state.next_measured = state.next_finished = 0;
   state.needed_points = state.segments = state.ambiguous_touches = state.open_curves = 0;
   state.too_many_contacts = state.finished_blocks = 0;
   if (!args.match_previous || state.has_last != 0)
@@ -563,9 +551,7 @@ cudaError_t make_patches(const ManifoldArgs& args, cudaStream_t stream) {
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), join_regions, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), begin_patches, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), measure_depths, args);
-  if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), measure_deep_patches, args, false);
   if (error == cudaSuccess) error = launch_after(grid(1, kThreads, 0), end_deep_patches, args);
-  if (error == cudaSuccess) error = launch_after(grid(1, kThreads, 0), measure_deep_patches, args, true);
   return error == cudaSuccess ? launch_after(grid(6, kThreads, 0), finish_patches, args) : error;
 }
 

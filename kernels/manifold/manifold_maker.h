@@ -40,20 +40,21 @@ class ManifoldMaker {
   /// Finds normal and rim. A patch of kind `deep` has neither yet: make_deep() is to be called.
   TANDEM_HD void begin(std::uint32_t region, OutlineMemory& shared);
 
-  /// Finds the direction in which the overlap of a deep patch is shallowest, and the rim. The patch is
+  /// Finds the depths of a patch that is not deep.
+  TANDEM_HD void measure_depths(std::uint32_t region, SearchMemory& shared);
+
+  /// Finds the direction in which the overlap of a deep patch is shallowest, the rim and depths. The patch is
   /// ambiguous if the bodies do not overlap along any direction.
   TANDEM_HD_CALLED void make_deep(std::uint32_t region, OutlineMemory& shared, SearchMemory& depths);
 
-  /// These are the steps of make_deep(), for teams that measure all directions at once. In between, `patch`
-  /// gets the depth along each. The search ends as soon as that is `enough`.
+  /// These are the steps of make_deep(), for teams that measure all directions at once: in between they find
+  /// the deepest line along each. The search for it ends as soon as one is as deep as `enough`.
   TANDEM_HD_CALLED void begin_deep(std::uint32_t region, NormalMemory& shared, SearchMemory& depths,
                                    DeepPatch& patch);
-  TANDEM_HD_CALLED double depth_along(std::uint32_t region, const DeepPatch& patch, int direction,
-                                      SearchMemory& depths, double enough) const;
-  TANDEM_HD_CALLED void end_deep(std::uint32_t region, const DeepPatch& patch, OutlineMemory& shared);
-
-  /// Finds depths.
-  TANDEM_HD void measure_depths(std::uint32_t region, SearchMemory& shared);
+  TANDEM_HD_CALLED OverlapLine line_along(std::uint32_t region, const DeepPatch& patch, int direction,
+                                          SearchMemory& depths, double enough) const;
+  TANDEM_HD_CALLED void end_deep(std::uint32_t region, const DeepPatch& patch, const DeepLines& found,
+                                 OutlineMemory& shared, LineMemory& lines);
 
   /// Chooses points. new_patch(): where the patch is to lie, or null; called by one of the team.
   template <typename NewPatch>
@@ -64,6 +65,9 @@ class ManifoldMaker {
   TANDEM_HD void find_rim(std::uint32_t region, const CurveMeasure& measure, const PatchNormal& normal,
                           OutlineMemory& shared);
   TANDEM_HD void place_soundings(const RimFinder<Team>& finder, const Rim& rim);
+  TANDEM_HD void sound_rim(LineMemory& lines);
+  TANDEM_HD bool goes_through(const OverlapLine& line, LineMemory& lines) const;
+  TANDEM_HD void take_deepest(const OverlapLine& line, bool goes_through);
   TANDEM_HD Vector2 reach_to_rim(const Sounding& s, double (&height)[2]) const;
   TANDEM_HD void place_candidates(const RimFinder<Team>& finder, ChoiceMemory& shared) const;
   TANDEM_HD void keep_apart(int most_of_rim, ChoiceMemory& shared) const;
@@ -125,7 +129,6 @@ TANDEM_HD void ManifoldMaker<Team>::find_rim(std::uint32_t region, const CurveMe
   const bool touch = normal.kind == PatchKind::touch;
   if (team_.rank() == 0) {
     state_.kind = normal.kind;
-    state_.deep = false;
     state_.has_area = !touch;
     state_.closed = measure.closed || (touch && measure.point);
     state_.goes_through = false;
@@ -169,47 +172,54 @@ TANDEM_HD_CALLED void ManifoldMaker<Team>::begin_deep(std::uint32_t region, Norm
   if (team_.rank() == 0) {
     patch.measure = measure, patch.reach = reach, patch.directions = 2 * lines;
     for (int i = 0; i < lines; ++i) patch.tried[i] = shared.tried[i];
-    for (double& depth : patch.depth) depth = INFINITY;
     patch.seeds = depths.seeds;
   }
   team_.sync();
 }
 
 template <typename Team>
-TANDEM_HD_CALLED double ManifoldMaker<Team>::depth_along(std::uint32_t region, const DeepPatch& patch,
-                                                         int direction, SearchMemory& depths,
-                                                         double enough) const {
+TANDEM_HD_CALLED OverlapLine ManifoldMaker<Team>::line_along(std::uint32_t region, const DeepPatch& patch,
+                                                             int direction, SearchMemory& depths,
+                                                             double enough) const {
   team_.sync();
   if (team_.rank() == 0) depths.seeds = patch.seeds;
   team_.sync();
   DeepestLine<Team> search(team_, bodies_, memory_, summary_, region, depths);
   search.find(PatchFrame(summary_.origin, patch.along(direction)), patch.measure.middle, patch.reach, enough);
-  return search.depth();
+  return search.best();
 }
 
 template <typename Team>
 TANDEM_HD_CALLED void ManifoldMaker<Team>::end_deep(std::uint32_t region, const DeepPatch& patch,
-                                                    OutlineMemory& shared) {
+                                                    const DeepLines& found, OutlineMemory& shared,
+                                                    LineMemory& lines) {
   double least = INFINITY;
-  for (int i = 0; i < patch.directions; ++i) least = lesser(patch.depth[i], least);
+  for (int i = 0; i < patch.directions; ++i) {
+    if (found.along[i].found()) least = lesser(found.along[i].depth(), least);
+  }
   PatchNormal normal;
+  OverlapLine deepest;
   for (int i = 0; i < patch.directions && normal.kind != PatchKind::overlap; ++i) {
-    if (patch.depth[i] == INFINITY || !(patch.depth[i] <= least * (1 + kShallower))) continue;
+    if (!found.along[i].found() || !(found.along[i].depth() <= least * (1 + kShallower))) continue;
     normal.n = patch.along(i), normal.kind = PatchKind::overlap;
+    deepest = found.along[i];
   }
   find_rim(region, patch.measure, normal, shared);
-  if (team_.rank() == 0) state_.deep = true;
-  team_.sync();
+  if (state_.kind != PatchKind::overlap) return;
+  sound_rim(lines);
+  take_deepest(deepest, goes_through(deepest, lines));
 }
 
 template <typename Team>
 TANDEM_HD_CALLED void ManifoldMaker<Team>::make_deep(std::uint32_t region, OutlineMemory& shared,
                                                      SearchMemory& depths) {
   DeepPatch patch;
+  DeepLines found;
   begin_deep(region, shared.normal, depths, patch);
   // The directions along which the first lines are shallowest come first; of others little more is looked at.
   double known[2 * kMostTried];
-  for (int i = 0; i < patch.directions; ++i) known[i] = depth_along(region, patch, i, depths, 0);
+  const auto depth_of = [](const OverlapLine& line) { return line.found() ? line.depth() : INFINITY; };
+  for (int i = 0; i < patch.directions; ++i) known[i] = depth_of(line_along(region, patch, i, depths, 0));
   double enough = INFINITY;
   for (int k = 0; k < patch.directions; ++k) {
     int next = -1;
@@ -217,19 +227,20 @@ TANDEM_HD_CALLED void ManifoldMaker<Team>::make_deep(std::uint32_t region, Outli
       if (known[i] >= 0 && (next < 0 || known[i] < known[next])) next = i;
     }
     known[next] = -1;
-    const double depth = depth_along(region, patch, next, depths, enough);
-    if (depth < enough) patch.depth[next] = depth;
+    const OverlapLine line = line_along(region, patch, next, depths, enough);
+    const double depth = depth_of(line);
+    if (depth < enough) found.along[next] = line;
     enough = lesser(enough, depth * (1 + 2 * kShallower));
   }
-  end_deep(region, patch, shared);
+  end_deep(region, patch, found, shared, depths.lines);
 }
 
-/// Sounds the rim, and finds the deepest line. What is no deeper than rounding is a touch.
+/// Finds the surfaces beside each point of the rim.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::measure_depths(std::uint32_t region, SearchMemory& shared) {
-  if (state_.kind != PatchKind::overlap) return;
-  LineQuestions questions(bodies_, shared.lines.line);
+TANDEM_HD void ManifoldMaker<Team>::sound_rim(LineMemory& lines) {
+  LineQuestions questions(bodies_, lines.line);
   const auto count = 2 * static_cast<std::uint32_t>(state_.rim_points);
+  team_.sync();
   for (std::uint32_t i = team_.rank(); i < count; i += team_.size()) {
     const Sounding& s = state_.sounding[i / 2];
     const int side = static_cast<int>(i % 2);
@@ -237,24 +248,55 @@ TANDEM_HD void ManifoldMaker<Team>::measure_depths(std::uint32_t region, SearchM
                   state_.reach / 4, kWall);
   }
   team_.sync();
-  walk_lines(team_, questions, count, shared.lines.line);
+  walk_lines(team_, questions, count, lines.line);
   for (std::uint32_t i = team_.rank(); i < count; i += team_.size())
-    state_.sounding[i / 2].surface[i % 2] = shared.lines.line[i].best;
-  DeepestLine<Team> search(team_, bodies_, memory_, summary_, region, shared);
-  search.find_seeds(state_.centre, state_.reach,
-                    state_.candidates <= kFewCandidates ? kMostSeeds / 2 : kMostSeeds);
-  search.find(state_.frame, state_.centre, state_.reach, INFINITY);
-  const bool through = state_.deep && search.goes_through();
+    state_.sounding[i / 2].surface[i % 2] = lines.line[i].best;
+  team_.sync();
+}
+
+/// Returns whether one body ends within the other on a line.
+template <typename Team>
+TANDEM_HD bool ManifoldMaker<Team>::goes_through(const OverlapLine& line, LineMemory& lines) const {
+  const double tolerance = bodies_.tolerance();
+  LineQuestions questions(bodies_, lines.line);
+  for (std::uint32_t side = team_.rank(); side < 2; side += team_.size()) {
+    const double from = line.height[side];
+    questions.ask(side, state_.frame, static_cast<int>(side), side == 0 ? -1 : 1, line.at, from,
+                  side == 0 ? -INFINITY : from + tolerance, side == 0 ? from - tolerance : INFINITY, INFINITY,
+                  kGrazes);
+  }
+  team_.sync();
+  walk_lines(team_, questions, 2, lines.line);
+  const Crossing &begin_a = lines.line[0].best, &end_b = lines.line[1].best;
+  const bool goes = (begin_a.found() && begin_a.height > line.height[1]) ||
+                    (end_b.found() && end_b.height < line.height[0]);
+  team_.sync();  // all have read the answers
+  return goes;
+}
+
+/// Takes the deepest line. What is no deeper than rounding is a touch.
+template <typename Team>
+TANDEM_HD void ManifoldMaker<Team>::take_deepest(const OverlapLine& line, bool goes_through) {
   if (team_.rank() == 0) {
-    const OverlapLine& best = shared.best;
-    if (best.found() && best.depth > kNoArea * bodies_.reach()) {
-      state_.deepest = best;
-      state_.goes_through = through;
+    if (line.found() && line.depth() > kNoArea * bodies_.reach()) {
+      state_.deepest = line;
+      state_.goes_through = goes_through;
     } else {
       state_.kind = PatchKind::touch;
     }
   }
   team_.sync();
+}
+
+template <typename Team>
+TANDEM_HD void ManifoldMaker<Team>::measure_depths(std::uint32_t region, SearchMemory& shared) {
+  if (state_.kind != PatchKind::overlap) return;
+  sound_rim(shared.lines);
+  DeepestLine<Team> search(team_, bodies_, memory_, summary_, region, shared);
+  search.find_seeds(state_.centre, state_.reach,
+                    state_.candidates <= kFewCandidates ? kMostSeeds / 2 : kMostSeeds);
+  search.find(state_.frame, state_.centre, state_.reach, INFINITY);
+  take_deepest(search.best(), false);
 }
 
 /// Returns the place nearest to the point of the rim, on the way to the sounding's line, to which the
@@ -291,12 +333,12 @@ template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::place_candidates(const RimFinder<Team>& finder,
                                                      ChoiceMemory& shared) const {
   const int rank = static_cast<int>(team_.rank()), size = static_cast<int>(team_.size());
-  const double deepest = state_.deepest.depth;
+  const double deepest = state_.deepest.depth();
   for (int i = rank; i <= state_.rim_points; i += size) {
     Chosen& c = shared.candidate[i];
     if (i == state_.rim_points) {
       const OverlapLine& line = state_.deepest;
-      c.at = line.at, c.depth = line.depth, c.height = (line.height[0] + line.height[1]) / 2;
+      c.at = line.at, c.depth = line.depth(), c.height = (line.height[0] + line.height[1]) / 2;
       c.triangle[0] = line.triangle[0], c.triangle[1] = line.triangle[1];
       c.feature = feature_hash(0, 4);
       c.deepest = true;
@@ -335,7 +377,7 @@ TANDEM_HD void ManifoldMaker<Team>::keep_apart(int most_of_rim, ChoiceMemory& sh
   int deepest = state_.deepest.found() ? state_.rim_points : -1;
   for (int i = 0; i < state_.rim_points; ++i) {
     if (state_.sounding[i].rank >= most_of_rim) continue;
-    if (shared.candidate[i].depth >= state_.deepest.depth * (1 - kAsDeep)) deepest = -1;
+    if (shared.candidate[i].depth >= state_.deepest.depth() * (1 - kAsDeep)) deepest = -1;
     int j = count++;  // an insertion that is stable
     for (; j > 0 && before(i, order[j - 1]); --j) order[j] = order[j - 1];
     order[j] = i;

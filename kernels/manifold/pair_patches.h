@@ -42,9 +42,11 @@ struct alignas(64) PairPatches {
     };
     for (std::uint32_t region = 0; region < summary.curves; ++region) {
       maker.begin(region, outline_);
-      if (state_.kind == manifold::PatchKind::deep) maker.make_deep(region, outline_, depths_);
+      if (state_.kind == manifold::PatchKind::deep)
+        maker.make_deep(region, outline_, depths_);
+      else
+        maker.measure_depths(region, depths_);
       ambiguous_touches += state_.kind == manifold::PatchKind::ambiguous;
-      maker.measure_depths(region, depths_);
       maker.finish(region, most_points, choice_, new_patch);
     }
     return enough_memory;

@@ -192,7 +192,6 @@ struct PatchState {
   int rim_points;
   PatchKind kind;
   bool closed, goes_through;
-  bool deep;      ///< the overlap was measured along many directions
   bool has_area;  ///< else the surfaces touch in points or along lines
   PatchFrame frame;
   Vector3 area;            ///< CurveMeasure's
@@ -210,11 +209,15 @@ struct DeepPatch {
   double reach;    ///< of the pieces, from their middle
   int directions;  ///< along each line that is tried, both ways
   Vector3 tried[kMostTried];
-  double depth[2 * kMostTried];  ///< along each direction; infinity where there is none
   Seeds seeds;
 
   /// A direction that is tried: each line one way and the other.
   TANDEM_HD Vector3 along(int i) const { return i % 2 == 0 ? tried[i / 2] : -tried[i / 2]; }
+};
+
+/// The deepest line along each direction of a deep patch; none where that is not known to be the shallowest.
+struct DeepLines {
+  OverlapLine along[2 * kMostTried];
 };
 
 /// The memory that a team shares while it finds a patch's normal and rim.

@@ -77,9 +77,9 @@ class DeepestLine {
         end_(memory.start[region + 1]),
         shared_(shared) {}
 
-  /// Finds points of the overlap beside some pieces, `wanted` at most; find() needs them. middle, reach: a
-  /// ball around the pieces.
-  TANDEM_HD void find_seeds(const Vector3& middle, double reach, int wanted);
+  /// Finds points of the overlap beside some pieces, `wanted` at most; find() needs them. middle: of the
+  /// pieces. The first questions, `asked`, are others', and are answered too.
+  TANDEM_HD void find_seeds(const Vector3& middle, int wanted, std::uint32_t asked = 0);
 
   /// Returns what find() found.
   TANDEM_HD OverlapLine best() const {
@@ -122,7 +122,7 @@ class DeepestLine {
 };
 
 template <typename Team>
-TANDEM_HD void DeepestLine<Team>::find_seeds(const Vector3& middle, double reach, int wanted) {
+TANDEM_HD void DeepestLine<Team>::find_seeds(const Vector3& middle, int wanted, std::uint32_t asked) {
   const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
   Vector3 apart_from[kMostSeeds] = {middle}, inside[kMostSeeds];
   std::uint32_t beside[kMostSeeds] = {};
@@ -131,7 +131,7 @@ TANDEM_HD void DeepestLine<Team>::find_seeds(const Vector3& middle, double reach
     apart_from[i] = memory_.pieces[beside[i]].middle();
   }
   const double most = greater(bodies_.a.shape->diagonal, bodies_.b.shape->diagonal);
-  const std::uint32_t found = lines.go_inside(beside, wanted, most, reach, inside);
+  const std::uint32_t found = lines.go_inside(beside, wanted, most, inside, asked);
   if (team_.rank() == 0) {
     int count = 0;
     for (int i = 0; i < wanted; ++i) {

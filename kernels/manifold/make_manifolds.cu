@@ -349,8 +349,7 @@ __global__ void __launch_bounds__(kThreads, 4) begin_patches(const __grid_consta
         if (is_deep) args.next_of_pair[atomicAdd(&state.deep_patches, 1u)] = place;
       }
       if (is_deep)
-        maker.begin_deep(curve.curve, outline[own].get().normal, searches[own].get(),
-                         deep_patch(args, place));
+        maker.begin_deep(curve.curve, outline[own].get(), searches[own].get(), deep_patch(args, place));
       else
         copy_state(team, made, args.begun[place].state);
     });

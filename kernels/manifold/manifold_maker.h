@@ -49,7 +49,7 @@ class ManifoldMaker {
 
   /// These are the steps of make_deep(), for teams that measure all directions at once: in between they find
   /// the deepest line along each. The search for it ends as soon as one is as deep as `enough`.
-  TANDEM_HD_CALLED void begin_deep(std::uint32_t region, NormalMemory& shared, SearchMemory& depths,
+  TANDEM_HD_CALLED void begin_deep(std::uint32_t region, OutlineMemory& shared, SearchMemory& depths,
                                    DeepPatch& patch);
   TANDEM_HD_CALLED OverlapLine line_along(std::uint32_t region, const DeepPatch& patch, int direction,
                                           SearchMemory& depths, double enough) const;
@@ -65,7 +65,8 @@ class ManifoldMaker {
   TANDEM_HD void find_rim(std::uint32_t region, const CurveMeasure& measure, const PatchNormal& normal,
                           OutlineMemory& shared);
   TANDEM_HD void place_soundings(const RimFinder<Team>& finder, const Rim& rim);
-  TANDEM_HD void sound_rim(LineMemory& lines);
+  TANDEM_HD std::uint32_t ask_at_rim(LineMemory& lines) const;
+  TANDEM_HD void take_rim(const LineMemory& lines);
   TANDEM_HD bool goes_through(const OverlapLine& line, LineMemory& lines) const;
   TANDEM_HD void take_deepest(const OverlapLine& line, bool goes_through);
   TANDEM_HD Vector2 reach_to_rim(const Sounding& s, double (&height)[2]) const;
@@ -156,22 +157,22 @@ TANDEM_HD void ManifoldMaker<Team>::begin(std::uint32_t region, OutlineMemory& s
   team_.sync();  // all are done with what the last region left
   NormalFinder<Team> normal_finder(team_, bodies_, memory_, summary_, region, shared.normal);
   const CurveMeasure measure = normal_finder.measure();
+  if (team_.rank() == 0) shared.measure = measure;
   find_rim(region, measure, normal_finder.find(measure), shared);
 }
 
 template <typename Team>
-TANDEM_HD_CALLED void ManifoldMaker<Team>::begin_deep(std::uint32_t region, NormalMemory& shared,
+TANDEM_HD_CALLED void ManifoldMaker<Team>::begin_deep(std::uint32_t region, OutlineMemory& shared,
                                                       SearchMemory& depths, DeepPatch& patch) {
   team_.sync();
-  NormalFinder<Team> normal_finder(team_, bodies_, memory_, summary_, region, shared);
-  const CurveMeasure measure = normal_finder.measure();
+  NormalFinder<Team> normal_finder(team_, bodies_, memory_, summary_, region, shared.normal);
+  const CurveMeasure& measure = shared.measure;
   const int lines = normal_finder.gather_for_deep(measure);
   const double reach = normal_finder.reach_from(measure.middle);
-  DeepestLine<Team>(team_, bodies_, memory_, summary_, region, depths)
-      .find_seeds(measure.middle, reach, kMostSeeds);
+  DeepestLine<Team>(team_, bodies_, memory_, summary_, region, depths).find_seeds(measure.middle, kMostSeeds);
   if (team_.rank() == 0) {
     patch.measure = measure, patch.reach = reach, patch.directions = 2 * lines;
-    for (int i = 0; i < lines; ++i) patch.tried[i] = shared.tried[i];
+    for (int i = 0; i < lines; ++i) patch.tried[i] = shared.normal.tried[i];
     patch.seeds = depths.seeds;
   }
   team_.sync();
@@ -206,7 +207,11 @@ TANDEM_HD_CALLED void ManifoldMaker<Team>::end_deep(std::uint32_t region, const 
   }
   find_rim(region, patch.measure, normal, shared);
   if (state_.kind != PatchKind::overlap) return;
-  sound_rim(lines);
+  const std::uint32_t asked = ask_at_rim(lines);
+  LineQuestions questions(bodies_, lines.line);
+  team_.sync();
+  walk_lines(team_, questions, asked, lines.line);
+  take_rim(lines);
   take_deepest(deepest, goes_through(deepest, lines));
 }
 
@@ -215,7 +220,7 @@ TANDEM_HD_CALLED void ManifoldMaker<Team>::make_deep(std::uint32_t region, Outli
                                                      SearchMemory& depths) {
   DeepPatch patch;
   DeepLines found;
-  begin_deep(region, shared.normal, depths, patch);
+  begin_deep(region, shared, depths, patch);
   // The directions along which the first lines are shallowest come first; of others little more is looked at.
   double known[2 * kMostTried];
   const auto depth_of = [](const OverlapLine& line) { return line.found() ? line.depth() : INFINITY; };
@@ -235,9 +240,9 @@ TANDEM_HD_CALLED void ManifoldMaker<Team>::make_deep(std::uint32_t region, Outli
   end_deep(region, patch, found, shared, depths.lines);
 }
 
-/// Finds the surfaces beside each point of the rim.
+/// Asks for the surfaces beside each point of the rim. Result: how many questions these are, the first ones.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::sound_rim(LineMemory& lines) {
+TANDEM_HD std::uint32_t ManifoldMaker<Team>::ask_at_rim(LineMemory& lines) const {
   LineQuestions questions(bodies_, lines.line);
   const auto count = 2 * static_cast<std::uint32_t>(state_.rim_points);
   team_.sync();
@@ -247,8 +252,12 @@ TANDEM_HD void ManifoldMaker<Team>::sound_rim(LineMemory& lines) {
     questions.ask(i, state_.frame, side, side == 0 ? 1 : -1, s.line, s.height, -INFINITY, INFINITY,
                   state_.reach / 4, kWall);
   }
-  team_.sync();
-  walk_lines(team_, questions, count, lines.line);
+  return count;
+}
+
+template <typename Team>
+TANDEM_HD void ManifoldMaker<Team>::take_rim(const LineMemory& lines) {
+  const auto count = 2 * static_cast<std::uint32_t>(state_.rim_points);
   for (std::uint32_t i = team_.rank(); i < count; i += team_.size())
     state_.sounding[i / 2].surface[i % 2] = lines.line[i].best;
   team_.sync();
@@ -291,10 +300,10 @@ TANDEM_HD void ManifoldMaker<Team>::take_deepest(const OverlapLine& line, bool g
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::measure_depths(std::uint32_t region, SearchMemory& shared) {
   if (state_.kind != PatchKind::overlap) return;
-  sound_rim(shared.lines);
   DeepestLine<Team> search(team_, bodies_, memory_, summary_, region, shared);
-  search.find_seeds(state_.centre, state_.reach,
-                    state_.candidates <= kFewCandidates ? kMostSeeds / 2 : kMostSeeds);
+  const int wanted = state_.candidates <= kFewCandidates ? kMostSeeds / 2 : kMostSeeds;
+  search.find_seeds(state_.centre, wanted, ask_at_rim(shared.lines));
+  take_rim(shared.lines);
   search.find(state_.frame, state_.centre, state_.reach, INFINITY);
   take_deepest(search.best(), false);
 }

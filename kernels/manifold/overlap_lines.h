@@ -10,7 +10,7 @@ inline constexpr double kNearEnd = 1e-6;
 
 /// Lines that a team follows at once, each in a frame of its own where that is needed.
 struct LineMemory {
-  static constexpr int kMost = 16;
+  static constexpr int kMost = 20;
 
   PatchFrame frame[kMost / 2];  ///< there are two lines in each
   LineQuestion line[kMost];
@@ -30,19 +30,20 @@ class OverlapLines {
   TANDEM_HD std::uint32_t extreme_piece(std::uint32_t begin, std::uint32_t end, const Vector3* from,
                                         int points, double sign) const;
 
-  /// Finds a point of the overlap beside each of some pieces, at most LineMemory::kMost / 2: half-way from
+  /// Finds a point of the overlap beside each of some pieces: half-way from
   /// the middle of the piece, behind both triangles, to where the overlap ends on that line, but no further
-  /// than `most`. expected: how far that is, mostly. Result: a bit for each piece; 0 where its triangles face
-  /// each other, or the line is not within both bodies.
+  /// than `most`. Result: a bit for each piece; 0 where its triangles face each other, or the line is not
+  /// within both bodies. The first questions, `asked`, are others'; with them there are at most
+  /// LineMemory::kMost.
   TANDEM_HD_CALLED std::uint32_t go_inside(const std::uint32_t* piece, int count, double most,
-                                           double expected, Vector3* inside) const;
+                                           Vector3* inside, std::uint32_t asked = 0) const;
 
   /// Asks where a straight line within a, and one within b, from one point to two others meet the surface of
   /// the body, if they do so before they are there. first: the first of the two questions.
   TANDEM_HD void ask_straight(std::uint32_t first, const Vector3& from, const Vector3 (&to)[2]) const;
 
-  /// Returns whether a straight line stays within both bodies.
-  TANDEM_HD_CALLED bool is_free(const Vector3& from, const Vector3& to) const;
+  /// Returns whether one of some straight lines stays within both bodies. ends: two of each.
+  TANDEM_HD_CALLED bool any_is_free(const Vector3 (*ends)[2], int count) const;
 
  private:
   /// Lines begin so far behind the surface from which they start.
@@ -81,8 +82,8 @@ TANDEM_HD std::uint32_t OverlapLines<Team>::extreme_piece(std::uint32_t begin, s
 
 template <typename Team>
 TANDEM_HD_CALLED std::uint32_t OverlapLines<Team>::go_inside(const std::uint32_t* piece, int count,
-                                                             double most, double expected,
-                                                             Vector3* inside) const {
+                                                             double most, Vector3* inside,
+                                                             std::uint32_t asked) const {
   LineQuestions questions(bodies_, shared_.line);
   team_.sync();
   for (int i = static_cast<int>(team_.rank()); i < count; i += static_cast<int>(team_.size())) {
@@ -90,9 +91,10 @@ TANDEM_HD_CALLED std::uint32_t OverlapLines<Team>::go_inside(const std::uint32_t
     const Vector3 sum = {-double{n[0]} - double{n[3]}, -double{n[1]} - double{n[4]},
                          -double{n[2]} - double{n[5]}};
     const double length = norm(sum);
-    const auto line = 2 * static_cast<std::uint32_t>(i);
+    const auto line = asked + 2 * static_cast<std::uint32_t>(i);
+    PatchFrame& frame = shared_.frame[line / 2];
     if (!(length > 1e-3)) {
-      shared_.line[line].frame = shared_.line[line + 1].frame = &shared_.frame[i];
+      shared_.line[line].frame = shared_.line[line + 1].frame = &frame;
       shared_.line[line].side = shared_.line[line + 1].side = -1;
       continue;
     }
@@ -104,27 +106,28 @@ TANDEM_HD_CALLED std::uint32_t OverlapLines<Team>::go_inside(const std::uint32_t
       middle = {};
       for (int k = 0; k < meeting.corners; ++k) middle = middle + (1.0 / meeting.corners) * meeting.corner[k];
     }
-    shared_.frame[i] = PatchFrame(middle, (1 / length) * sum);
+    frame = PatchFrame(middle, (1 / length) * sum);
     const double begin = behind(most);
     for (std::uint32_t side = 0; side < 2; ++side)
-      questions.ask(line + side, shared_.frame[i], static_cast<int>(side), 0, {}, begin, begin, INFINITY,
-                    expected, kGrazes);
+      questions.ask(line + side, frame, static_cast<int>(side), 0, {}, begin, begin, INFINITY, INFINITY,
+                    kGrazes);
   }
   team_.sync();
-  walk_lines(team_, questions, 2 * static_cast<std::uint32_t>(count), shared_.line);
+  walk_lines(team_, questions, asked + 2 * static_cast<std::uint32_t>(count), shared_.line);
   std::uint32_t found = 0;
   for (int i = 0; i < count; ++i) {
-    if (shared_.line[2 * i].side < 0) continue;
+    const LineQuestion* const line = shared_.line + asked + 2 * i;
+    if (line->side < 0) continue;
     double end = most;
     bool within = true;
     for (int side = 0; side < 2; ++side) {
-      const Crossing& crossing = shared_.line[2 * i + side].best;
+      const Crossing& crossing = line[side].best;
       // A line that runs in a flush face does not leave the body there, or comes back into it.
-      within = within && (!bodies_[side].shape->closed ||
-                          (crossing.found() && leaves(side, crossing, shared_.frame[i].n)));
+      within = within &&
+               (!bodies_[side].shape->closed || (crossing.found() && leaves(side, crossing, line->frame->n)));
       if (crossing.found()) end = lesser(crossing.height, end);
     }
-    inside[i] = shared_.frame[i].at({}, end / 2);
+    inside[i] = line->frame->at({}, end / 2);
     found |= within ? 1u << i : 0u;
   }
   team_.sync();  // all have read the answers
@@ -138,27 +141,30 @@ TANDEM_HD void OverlapLines<Team>::ask_straight(std::uint32_t first, const Vecto
   for (std::uint32_t side = team_.rank(); side < 2; side += team_.size()) {
     const double length = norm(to[side] - from), begin = behind(length);
     LineQuestion& line = shared_.line[first + side];
-    line.frame = &shared_.frame[side];
+    line.frame = &shared_.frame[first + side];
     line.side = -1;
     line.length = length;
     line.best = {};
     if (!(length > 2 * begin)) continue;
-    shared_.frame[side] = PatchFrame(from, (1 / length) * (to[side] - from));
-    questions.ask(first + side, shared_.frame[side], static_cast<int>(side), 0, {}, begin, begin,
+    shared_.frame[first + side] = PatchFrame(from, (1 / length) * (to[side] - from));
+    questions.ask(first + side, shared_.frame[first + side], static_cast<int>(side), 0, {}, begin, begin,
                   (1 - kNearEnd) * length, INFINITY, kGrazes);
   }
 }
 
 template <typename Team>
-TANDEM_HD_CALLED bool OverlapLines<Team>::is_free(const Vector3& from, const Vector3& to) const {
+TANDEM_HD_CALLED bool OverlapLines<Team>::any_is_free(const Vector3 (*ends)[2], int count) const {
   team_.sync();
-  ask_straight(0, from, {to, to});
+  for (int i = 0; i < count; ++i)
+    ask_straight(2 * static_cast<std::uint32_t>(i), ends[i][0], {ends[i][1], ends[i][1]});
   team_.sync();
   LineQuestions questions(bodies_, shared_.line);
-  walk_lines(team_, questions, 2, shared_.line);
-  const bool is = !shared_.line[0].best.found() && !shared_.line[1].best.found();
+  walk_lines(team_, questions, 2 * static_cast<std::uint32_t>(count), shared_.line);
+  bool any = false;
+  for (int i = 0; i < count; ++i)
+    any = any || (!shared_.line[2 * i].best.found() && !shared_.line[2 * i + 1].best.found());
   team_.sync();  // all have read the answers
-  return is;
+  return any;
 }
 
 }  // namespace tandem::manifold

@@ -222,6 +222,7 @@ struct DeepLines {
 
 /// The memory that a team shares while it finds a patch's normal and rim.
 struct OutlineMemory {
+  CurveMeasure measure;
   NormalMemory normal;
   RimMemory rim;
   std::uint32_t next;

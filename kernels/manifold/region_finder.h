@@ -12,7 +12,6 @@ namespace tandem::manifold {
 struct RegionMemory {
   LineMemory lines;
   std::uint32_t curves;
-  bool any;
 };
 
 template <typename Team>
@@ -62,7 +61,6 @@ class RegionFinder {
   }
   TANDEM_HD std::uint32_t neighbour(std::uint32_t of, int k) const;
   TANDEM_HD bool is_joined(std::uint32_t i, std::uint32_t j);
-  TANDEM_HD bool line_stays_within(std::uint32_t from, std::uint32_t to);
   TANDEM_HD bool areas_agree(std::uint32_t first) const;
   TANDEM_HD std::uint32_t sort_by_region();
 
@@ -73,17 +71,8 @@ class RegionFinder {
   RegionMemory* shared_;
 };
 
-/// Returns whether a straight line within both bodies leads from beside a piece to beside another one.
-template <typename Team>
-TANDEM_HD bool RegionFinder<Team>::line_stays_within(std::uint32_t from, std::uint32_t to) {
-  const OverlapLines<Team> lines(team_, bodies_, memory_, shared_->lines);
-  const double apart = norm(memory_.pieces[to].middle() - memory_.pieces[from].middle());
-  const std::uint32_t pieces[2] = {from, to};
-  Vector3 inside[2];
-  return lines.go_inside(pieces, 2, apart, apart, inside) == 3 && lines.is_free(inside[0], inside[1]);
-}
-
-/// Tries lines from three pieces of the first curve, each to the nearest one of the second.
+/// Tries lines from two pieces of the first curve, each to the nearest one of the second. They lead from
+/// beside a piece to beside another one.
 template <typename Team>
 TANDEM_HD bool RegionFinder<Team>::is_joined(std::uint32_t i, std::uint32_t j) {
   const OverlapLines<Team> lines(team_, bodies_, memory_, shared_->lines);
@@ -91,13 +80,26 @@ TANDEM_HD bool RegionFinder<Team>::is_joined(std::uint32_t i, std::uint32_t j) {
     const Vector3 middle = memory_.pieces[from].middle();
     return lines.extreme_piece(memory_.start[curve], memory_.start[curve + 1], &middle, 1, sign);
   };
+  constexpr int kAttempts = 2;
   const std::uint32_t first = piece_of(i);
-  std::uint32_t from = extreme(i, extreme(j, first, 1), 1);
-  for (int attempt = 0; attempt < 2; ++attempt) {
-    if (line_stays_within(from, extreme(j, from, 1))) return true;
-    from = extreme(i, attempt == 0 ? first : from, -1);
+  std::uint32_t piece[2 * kAttempts];
+  double most = 0;
+  for (int k = 0; k < kAttempts; ++k) {
+    std::uint32_t* const ends = piece + 2 * k;
+    ends[0] = k == 0 ? extreme(i, extreme(j, first, 1), 1) : extreme(i, first, -1);
+    ends[1] = extreme(j, ends[0], 1);
+    const double apart = norm(memory_.pieces[ends[1]].middle() - memory_.pieces[ends[0]].middle());
+    most = greater(apart, most);
   }
-  return false;
+  Vector3 inside[kAttempts][2];
+  const std::uint32_t found = lines.go_inside(piece, 2 * kAttempts, most, inside[0]);
+  int count = 0;
+  for (int k = 0; k < kAttempts; ++k) {
+    if ((found >> (2 * k) & 3u) != 3) continue;
+    for (int end = 0; end < 2; ++end) inside[count][end] = inside[k][end];
+    ++count;
+  }
+  return count > 0 && lines.any_is_free(inside, count);
 }
 
 /// Returns whether the area vectors of the curves of a region add up, rather than cancel. Then the region is
@@ -107,7 +109,7 @@ TANDEM_HD bool RegionFinder<Team>::areas_agree(std::uint32_t first) const {
   Vector3 sum;
   double sizes = 0;
   for (std::uint32_t c = first; c < summary_.curves; ++c) {
-    if (first_of(c) != first) continue;
+    if (joined_to(c) != first) continue;
     CurveSums sums;
     for (std::uint32_t i = memory_.start[c] + team_.rank(); i < memory_.start[c + 1]; i += team_.size())
       sums.add(memory_, memory_.order[i], summary_.origin, 1 / summary_.unit);
@@ -122,24 +124,26 @@ TANDEM_HD bool RegionFinder<Team>::areas_agree(std::uint32_t first) const {
 template <typename Team>
 TANDEM_HD std::uint32_t RegionFinder<Team>::sort_by_region() {
   const std::uint32_t curves = summary_.curves;
-  if (team_.rank() == 0) {
-    std::uint32_t regions = 0, place = 0;
-    for (std::uint32_t first = 0; first < curves; ++first) {
-      if (joined_to(first) != first) continue;
-      ++regions;
-      for (std::uint32_t c = first; c < curves; ++c) {
-        if (first_of(c) != first) continue;
-        place_of(c) = place;
-        place += memory_.start[c + 1] - memory_.start[c];
-      }
+  // Each finds its first curve while none changes, and then where its pieces go: behind those of regions that
+  // begin before, and of earlier curves of its own.
+  for (std::uint32_t c = team_.rank(); c < curves; c += team_.size()) place_of(c) = first_of(c);
+  team_.sync();
+  for (std::uint32_t c = team_.rank(); c < curves; c += team_.size()) joined_to(c) = place_of(c);
+  team_.sync();
+  for (std::uint32_t c = team_.rank(); c < curves; c += team_.size()) {
+    std::uint32_t place = 0;
+    for (std::uint32_t d = 0; d < curves; ++d) {
+      const bool before = joined_to(d) < joined_to(c) || (joined_to(d) == joined_to(c) && d < c);
+      place += before ? memory_.start[d + 1] - memory_.start[d] : 0;
     }
-    shared_->curves = regions;
+    place_of(c) = place;
   }
   team_.sync();
   for (std::uint32_t first = 0; first < curves; ++first) {
     bool several = false;
-    for (std::uint32_t c = first + 1; c < curves && joined_to(first) == first; ++c)
-      several = several || first_of(c) == first;
+    for (std::uint32_t c = first + 1 + team_.rank(); c < curves; c += team_.size())
+      several = several || joined_to(c) == first;
+    several = team_.any(several);
     // The first curve of a region comes first in it, so what it begins with is where the region begins.
     if (several && !areas_agree(first) && team_.rank() == 0)
       memory_.pieces[memory_.order[memory_.start[first]]].joined = 1;
@@ -159,6 +163,7 @@ TANDEM_HD std::uint32_t RegionFinder<Team>::sort_by_region() {
       if (joined_to(c) == c) memory_.start[regions++] = place_of(c);
     }
     memory_.start[regions] = summary_.pieces;
+    shared_->curves = regions;
   }
   team_.sync();
   return shared_->curves;
@@ -210,6 +215,7 @@ TANDEM_HD std::uint32_t RegionFinder<Team>::neighbour(std::uint32_t of, int k) c
 
 template <typename Team>
 TANDEM_HD void RegionFinder<Team>::try_to_join(std::uint32_t curve, int k) {
+  if (static_cast<std::uint32_t>(k) + 1 >= summary_.curves) return;
   const std::uint32_t other = neighbour(curve, k);
   if (other == kNoIndex) return;
   const auto key = [&](std::uint32_t c) { return memory_.pieces[piece_of(c)].symmetric_key(); };
@@ -222,21 +228,26 @@ TANDEM_HD void RegionFinder<Team>::try_to_join(std::uint32_t curve, int k) {
 template <typename Team>
 TANDEM_HD std::uint32_t RegionFinder<Team>::join() {
   const std::uint32_t curves = summary_.curves;
+  bool any = false;
+  for (std::uint32_t c = team_.rank(); c < curves; c += team_.size()) {
+    joined_to(c) = c;
+    any = any || (partners_of(c, 0) | partners_of(c, 1)) != 0;
+  }
+  if (!team_.any(any)) return curves;
+  team_.sync();
   if (team_.rank() == 0) {
-    shared_->any = false;
-    for (std::uint32_t c = 0; c < curves; ++c) joined_to(c) = c;
     for (std::uint32_t c = 0; c < curves; ++c) {
-      for (int k = 0; k < kNeighbours; ++k) {
-        const std::uint32_t partner = partners_of(c, k / 4) >> (8 * (k % 4)) & 0xFFu;
-        if (partner == 0) continue;
-        const std::uint32_t p = first_of(c), q = first_of(partner - 1);
-        joined_to(greater(p, q)) = lesser(p, q);
-        shared_->any = true;
+      for (std::uint32_t word = 0; word < 2; ++word) {
+        for (std::uint32_t partners = partners_of(c, static_cast<int>(word)); partners != 0; partners >>= 8) {
+          if ((partners & 0xFFu) == 0) continue;
+          const std::uint32_t p = first_of(c), q = first_of((partners & 0xFFu) - 1);
+          joined_to(greater(p, q)) = lesser(p, q);
+        }
       }
     }
   }
   team_.sync();
-  return shared_->any ? sort_by_region() : curves;
+  return sort_by_region();
 }
 
 template <typename Team>

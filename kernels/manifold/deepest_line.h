@@ -61,6 +61,7 @@ struct SearchMemory {
   OverlapLine best;
   bool is_loose;  ///< the bodies reach the heights of the best line, at least
   int steps;
+  double enough;  ///< as it was last seen
 };
 
 /// Looks for the deepest line of the overlap that the pieces order[begin] to order[end - 1] bound.
@@ -93,8 +94,9 @@ class DeepestLine {
 
   /// Finds shared.best; none where the bodies do not overlap along the normal. middle, reach: a ball around
   /// the pieces. If there are several regions, the line goes through it. The search ends as soon as a line is
-  /// as deep as `enough`.
-  TANDEM_HD_CALLED void find(const PatchFrame& frame, const Vector3& middle, double reach, double enough);
+  /// as deep as `enough`, which others may lower meanwhile.
+  TANDEM_HD_CALLED void find(const PatchFrame& frame, const Vector3& middle, double reach,
+                             const double& enough);
 
  private:
   TANDEM_HD void begin_half_spaces(const Vector3& middle, double reach);
@@ -104,6 +106,9 @@ class DeepestLine {
     shared_.spaces.drop_before(team_, at, height, 16 * bodies_.tolerance());
   }
   TANDEM_HD void propose(int seed);
+  /// Looks how deep is enough. It is called by one of the team.
+  TANDEM_HD void see(const double& enough) { shared_.enough = *static_cast<const volatile double*>(&enough); }
+  TANDEM_HD bool is_deep_enough() const { return shared_.best.depth() >= shared_.enough; }
   TANDEM_HD void ask_along(const Vector2& at, const double (&from)[2], const double (&limit)[2],
                            double expected);
   TANDEM_HD_CALLED void go_to_ends();
@@ -368,13 +373,13 @@ TANDEM_HD_CALLED void DeepestLine<Team>::go_to_ends() {
 
 template <typename Team>
 TANDEM_HD_CALLED void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& middle, double reach,
-                                              double enough) {
+                                              const double& enough) {
+  if (team_.rank() == 0) see(enough);
   begin_with_seeds(frame, reach);
-  const OverlapLine& best = shared_.best;
-  if (!best.found() || best.depth() >= enough) return;
+  if (!shared_.best.found() || is_deep_enough()) return;
   begin_half_spaces(middle, reach);
   const int deepest = shared_.from;
-  for (int i = 0; i < shared_.seeds.count; ++i) {
+  for (int i = 0; i < shared_.seeds.count && !is_deep_enough(); ++i) {
     const int seed = i == 0 ? deepest : i <= deepest ? i - 1 : i;
     const Vector2 at = shared_.frame.flat(shared_.seeds.at[seed]);
     const double height = shared_.frame.height(shared_.seeds.at[seed]);
@@ -383,7 +388,9 @@ TANDEM_HD_CALLED void DeepestLine<Team>::find(const PatchFrame& frame, const Vec
     shared_.spaces.look_from(team_, at, height);
     do {
       propose(seed);
-    } while (shared_.proposed.found && shared_.steps < kMostSteps && best.depth() < enough && step(seed));
+      if (team_.rank() == 0) see(enough);
+      team_.sync();
+    } while (shared_.proposed.found && shared_.steps < kMostSteps && !is_deep_enough() && step(seed));
   }
   go_to_ends();
 }

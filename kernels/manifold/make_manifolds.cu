@@ -377,13 +377,17 @@ __global__ void __launch_bounds__(kThreads, 4) measure_depths(const __grid_const
   const WarpTeam team(&walks[own]);
   manifold::SearchMemory& search = searches[own].get();
   const auto along_direction = [&](std::uint32_t place, std::uint32_t direction) {
-    const manifold::DeepPatch& patch = deep_patch(args, place);
+    manifold::DeepPatch& patch = deep_patch(args, place);
     if (direction >= static_cast<std::uint32_t>(patch.directions)) return;
     BegunPatch& begun = args.begun[place];
     with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState&) {
       const manifold::OverlapLine line =
-          maker.line_along(begun.of.curve, patch, static_cast<int>(direction), search, INFINITY);
-      if (team.rank() == 0) deep_lines(begun).along[direction] = line;
+          maker.line_along(begun.of.curve, patch, static_cast<int>(direction), search, patch.enough);
+      if (team.rank() != 0) return;
+      deep_lines(begun).along[direction] = line;
+      // Numbers above 0 are in the order of their bits.
+      atomicMin(reinterpret_cast<Counter*>(&patch.enough),
+                static_cast<Counter>(__double_as_longlong(maker.enough_for_others(line))));
     });
   };
   take_rows(team, directions + patches_begun(args), args.state->next_measured, taken[own],

@@ -48,11 +48,15 @@ class ManifoldMaker {
   TANDEM_HD_CALLED void make_deep(std::uint32_t region, OutlineMemory& shared, SearchMemory& depths);
 
   /// These are the steps of make_deep(), for teams that measure all directions at once: in between they find
-  /// the deepest line along each. The search for it ends as soon as one is as deep as `enough`.
+  /// the deepest line along each. The search for it ends as soon as one is as deep as `enough`: that is for
+  /// the others what enough_for_others() says of a line that was found.
   TANDEM_HD_CALLED void begin_deep(std::uint32_t region, OutlineMemory& shared, SearchMemory& depths,
                                    DeepPatch& patch);
   TANDEM_HD_CALLED OverlapLine line_along(std::uint32_t region, const DeepPatch& patch, int direction,
-                                          SearchMemory& depths, double enough) const;
+                                          SearchMemory& depths, const double& enough) const;
+  TANDEM_HD static double enough_for_others(const OverlapLine& line) {
+    return line.found() ? line.depth() * (1 + 2 * kShallower) : INFINITY;
+  }
   TANDEM_HD_CALLED void end_deep(std::uint32_t region, const DeepPatch& patch, const DeepLines& found,
                                  OutlineMemory& shared, LineMemory& lines);
 
@@ -172,6 +176,7 @@ TANDEM_HD_CALLED void ManifoldMaker<Team>::begin_deep(std::uint32_t region, Outl
   DeepestLine<Team>(team_, bodies_, memory_, summary_, region, depths).find_seeds(measure.middle, kMostSeeds);
   if (team_.rank() == 0) {
     patch.measure = measure, patch.reach = reach, patch.directions = 2 * lines;
+    patch.enough = INFINITY;
     for (int i = 0; i < lines; ++i) patch.tried[i] = shared.normal.tried[i];
     patch.seeds = depths.seeds;
   }
@@ -181,7 +186,7 @@ TANDEM_HD_CALLED void ManifoldMaker<Team>::begin_deep(std::uint32_t region, Outl
 template <typename Team>
 TANDEM_HD_CALLED OverlapLine ManifoldMaker<Team>::line_along(std::uint32_t region, const DeepPatch& patch,
                                                              int direction, SearchMemory& depths,
-                                                             double enough) const {
+                                                             const double& enough) const {
   team_.sync();
   if (team_.rank() == 0) depths.seeds = patch.seeds;
   team_.sync();
@@ -223,8 +228,9 @@ TANDEM_HD_CALLED void ManifoldMaker<Team>::make_deep(std::uint32_t region, Outli
   begin_deep(region, shared, depths, patch);
   // The directions along which the first lines are shallowest come first; of others little more is looked at.
   double known[2 * kMostTried];
-  const auto depth_of = [](const OverlapLine& line) { return line.found() ? line.depth() : INFINITY; };
-  for (int i = 0; i < patch.directions; ++i) known[i] = depth_of(line_along(region, patch, i, depths, 0));
+  const double none = 0;
+  for (int i = 0; i < patch.directions; ++i)
+    known[i] = enough_for_others(line_along(region, patch, i, depths, none));
   double enough = INFINITY;
   for (int k = 0; k < patch.directions; ++k) {
     int next = -1;
@@ -232,10 +238,8 @@ TANDEM_HD_CALLED void ManifoldMaker<Team>::make_deep(std::uint32_t region, Outli
       if (known[i] >= 0 && (next < 0 || known[i] < known[next])) next = i;
     }
     known[next] = -1;
-    const OverlapLine line = line_along(region, patch, next, depths, enough);
-    const double depth = depth_of(line);
-    if (depth < enough) found.along[next] = line;
-    enough = lesser(enough, depth * (1 + 2 * kShallower));
+    found.along[next] = line_along(region, patch, next, depths, enough);
+    enough = lesser(enough, enough_for_others(found.along[next]));
   }
   end_deep(region, patch, found, shared, depths.lines);
 }
@@ -304,7 +308,8 @@ TANDEM_HD void ManifoldMaker<Team>::measure_depths(std::uint32_t region, SearchM
   const int wanted = state_.candidates <= kFewCandidates ? kMostSeeds / 2 : kMostSeeds;
   search.find_seeds(state_.centre, wanted, ask_at_rim(shared.lines));
   take_rim(shared.lines);
-  search.find(state_.frame, state_.centre, state_.reach, INFINITY);
+  const double enough = INFINITY;
+  search.find(state_.frame, state_.centre, state_.reach, enough);
   take_deepest(search.best(), false);
 }
 

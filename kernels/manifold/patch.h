@@ -208,6 +208,7 @@ struct DeepPatch {
   CurveMeasure measure;
   double reach;    ///< of the pieces, from their middle
   int directions;  ///< along each line that is tried, both ways
+  double enough;   ///< for the lines along other directions, where several are looked for at once
   Vector3 tried[kMostTried];
   Seeds seeds;
 

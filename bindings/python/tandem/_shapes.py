@@ -14,7 +14,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Shapes", "box", "height_field", "slab"]
+__all__ = ["PRIMITIVES", "Shapes", "height_field", "slab"]
+
+PRIMITIVES = ("box", "sphere", "ellipsoid", "capsule", "cylinder", "cone")
 
 Solid = tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]  # vertices (n, 3), faces (m, 3), outwards
 
@@ -113,29 +115,24 @@ class Shapes:
     def _prism(self) -> tuple[int, float]:
         return self._fewest(_nearest_of_prism)
 
-    def ellipsoid(self, x: float, y: float, z: float) -> Solid:
-        """Of three semi-axes; a sphere where they are equal."""
-        sides, scale = self._ball
-        vertices, faces = _capsule(sides, scale, 0.0)
-        return vertices * (x, y, z), faces
-
-    def capsule(self, radius: float, half_length: float) -> Solid:
-        """half_length: of the part that is a cylinder, more than 0."""
-        sides, scale = self._ball
-        return _capsule(sides, scale * radius, half_length)
-
-    def cylinder(self, radius: float, half_length: float) -> Solid:
+    def of(self, kind: str, x: float, y: float, z: float) -> Solid:
+        """The mesh of one of PRIMITIVES. x, y, z: half sizes of a box, semi-axes of an ellipsoid; else x is the radius and y half the length, of a capsule that
+        of its straight part. A cone points up, and is about the middle of its height."""
+        if kind == "box":
+            return _box(x, y, z)
+        if kind in ("sphere", "ellipsoid"):
+            sides, scale = self._ball
+            vertices, faces = _capsule(sides, scale, 0.0)
+            return vertices * (x if kind == "sphere" else (x, y, z)), faces
+        if kind == "capsule":
+            sides, scale = self._ball
+            return _capsule(sides, scale * x, y)
         sides, scale = self._prism
-        return _stack([(0.0, half_length, 1), (scale * radius, half_length, 4 * sides), (scale * radius, -half_length, 4 * sides), (0.0, -half_length, 1)])
-
-    def cone(self, radius: float, half_length: float) -> Solid:
-        """Upright, about the middle of its height."""
-        sides, scale = self._prism
-        return _stack([(0.0, half_length, 1), (scale * radius, -half_length, 4 * sides), (0.0, -half_length, 1)])
+        rings = [(scale * x, y, 4 * sides)] if kind == "cylinder" else []
+        return _stack([(0.0, y, 1), *rings, (scale * x, -y, 4 * sides), (0.0, -y, 1)])
 
 
-def box(x: float, y: float, z: float) -> Solid:
-    """From -x, -y, -z to x, y, z."""
+def _box(x: float, y: float, z: float) -> Solid:
     vertices = np.array([[i, j, k] for i in (-x, x) for j in (-y, y) for k in (-z, z)])
     faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
     return vertices, np.array(faces)
@@ -143,7 +140,7 @@ def box(x: float, y: float, z: float) -> Solid:
 
 def slab(half_width: float) -> Solid:
     """Its upper side is square, in the plane z = 0; it is as thick as half of that."""
-    vertices, faces = box(half_width, half_width, 0.5 * half_width)
+    vertices, faces = _box(half_width, half_width, 0.5 * half_width)
     return vertices - (0, 0, 0.5 * half_width), faces
 
 

@@ -28,8 +28,9 @@ __all__ = ["MeshContacts"]
 
 _Effort = Literal["default", "fast", "best"]
 _Type = mujoco.mjtGeom
-_SHAPES = (_Type.mjGEOM_PLANE, _Type.mjGEOM_HFIELD, _Type.mjGEOM_SPHERE, _Type.mjGEOM_CAPSULE, _Type.mjGEOM_ELLIPSOID, _Type.mjGEOM_CYLINDER, _Type.mjGEOM_BOX,
-           _Type.mjGEOM_MESH)  # in the order in which a contact names its two geoms
+_PRIMITIVES = {_Type.mjGEOM_SPHERE: "sphere", _Type.mjGEOM_CAPSULE: "capsule", _Type.mjGEOM_ELLIPSOID: "ellipsoid", _Type.mjGEOM_CYLINDER: "cylinder",
+               _Type.mjGEOM_BOX: "box"}
+_SHAPES = [_Type.mjGEOM_PLANE, _Type.mjGEOM_HFIELD, *_PRIMITIVES, _Type.mjGEOM_MESH]  # in the order in which a contact names its two geoms
 _INTEGRATORS_THAT_COLLIDE = {mujoco.mjtIntegrator.mjINT_RK4: "RK4", mujoco.mjtIntegrator.mjINT_DISCRETE: "discrete"}
 _FLAGS_THAT_COLLIDE = {flag: name for name in ("sleep", "speculative") if (flag := mujoco.mjtEnableBit.__members__.get(f"mjENBL_{name.upper()}"))}
 _NO_CONTACTS = int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT)
@@ -205,16 +206,8 @@ def _shape_of(model: mujoco.MjModel, geom: int) -> tuple[float, ...]:
 
 def _solid_of(model: mujoco.MjModel, shapes: _shapes.Shapes, shape: tuple[float, ...]) -> _shapes.Solid:
     kind, (x, y, z) = shape[0], (*shape[1:], 0, 0)[:3]
-    if kind == _Type.mjGEOM_SPHERE:
-        return shapes.ellipsoid(x, x, x)
-    if kind == _Type.mjGEOM_CAPSULE:
-        return shapes.capsule(x, y)
-    if kind == _Type.mjGEOM_ELLIPSOID:
-        return shapes.ellipsoid(x, y, z)
-    if kind == _Type.mjGEOM_CYLINDER:
-        return shapes.cylinder(x, y)
-    if kind == _Type.mjGEOM_BOX:
-        return _shapes.box(x, y, z)
+    if kind in _PRIMITIVES:
+        return shapes.of(_PRIMITIVES[kind], x, y, z)
     place = int(shape[1])
     if kind == _Type.mjGEOM_HFIELD:
         (x, y, z, base), rows, columns, first = (values[place] for values in (model.hfield_size, model.hfield_nrow, model.hfield_ncol, model.hfield_adr))

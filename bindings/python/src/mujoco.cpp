@@ -105,8 +105,7 @@ Parameters combined(const Model& model, std::size_t i, std::size_t j) {
   const auto choose = [&](auto u, auto v, auto both) { return priority > 0 ? u : priority < 0 ? v : both; };
   Parameters made;
   made.dim = choose(geom.dim[i][0], geom.dim[j][0], std::max(geom.dim[i][0], geom.dim[j][0]));
-  made.adhesion =
-      choose(geom.adhesion[i][0], geom.adhesion[j][0], geom.adhesion[i][0] + geom.adhesion[j][0]);
+  made.adhesion = choose(geom.adhesion[i][0], geom.adhesion[j][0], geom.adhesion[i][0] + geom.adhesion[j][0]);
   constexpr int kKind[5] = {0, 0, 1, 2, 2};  // sliding twice, turning, rolling twice
   for (int k = 0; k < 5; ++k) {
     const double u = model.friction[i][kKind[k]], v = model.friction[j][kKind[k]];
@@ -202,8 +201,8 @@ struct Slabs {
 
 class MujocoContacts {
  public:
-  // geom, radius: of each body, which stand in the order of the types of their geoms. explicit_pairs: triples of
-  // bodies a < b and their row among the <pair>s, sorted. plane_pairs: bodies, the plane first, sorted.
+  // geom, radius: of each body, which stand in the order of the types of their geoms. explicit_pairs: triples
+  // of bodies a < b and their row among the <pair>s, sorted. plane_pairs: bodies, the plane first, sorted.
   MujocoContacts(nb::list assets, nb::handle asset, nb::handle pairs, nb::object filter,
                  std::uint32_t threads, std::uint32_t most_points, nb::object model, nb::handle geom,
                  nb::handle radius, nb::handle explicit_pairs, nb::handle plane_pairs, nb::tuple slabs,
@@ -362,8 +361,8 @@ class MujocoContacts {
 
   bool is_mesh(std::int32_t geom) const { return model_.type[geom][0] == kMesh; }
 
-  // A plane has no hollows, so that MuJoCo's contact of a hull with it is right where Tandem finds none: where
-  // the whole mesh is below.
+  // A plane has no hollows, so that MuJoCo's contact of a hull with it is right where Tandem finds none:
+  // where the whole mesh is below.
   bool is_replaced(const std::int32_t (&geom)[2]) const {
     if (geom[0] < 0 || geom[1] < 0 || !is_ours_[geom[0]] || !is_ours_[geom[1]]) return false;
     if (!is_mesh(geom[0]) && !is_mesh(geom[1])) return false;

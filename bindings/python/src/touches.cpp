@@ -21,16 +21,29 @@ std::vector<tandem_asset*> handles_of(nb::list assets) {
   return handles;
 }
 
-double dot(const double (&u)[3], const double (&v)[3]) { return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]; }
+double dot(const double (&u)[3], const double (&v)[3]) {
+  return u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
+}
 
-void copy(const double (&from)[3], double (&to)[3]) { std::copy(from, from + 3, to); }
+void copy(const double (&from)[3], double (&to)[3]) {
+  std::copy(from, from + 3, to);
+}
 
-// The point of the world in the coordinates of an asset that stands at the pose.
-void to_local(const tandem_pose& pose, const double (&point)[3], double (&local)[3]) {
-  for (int i = 0; i < 3; ++i) {
-    local[i] = 0;
-    for (int j = 0; j < 3; ++j) local[i] += pose.rotation[j][i] * (point[j] - pose.translation[j]);
-  }
+// A solver that pushes by the depth needs the push to act through the middle of the overlap. Where a body is
+// round, as a rod that lies on a floor is, the points of the rim are hardly deep, and the deepest point,
+// which is to carry the load, may be anywhere along the rod: the body would rock from end to end. The
+// manifold's centre moves gently with the bodies. So there the first point is moved to it, at its own depth;
+// the more, the less deep the second deepest point is, and not at all where that is half as deep.
+void move_to_centre(const tandem_manifold& manifold, std::span<const tandem_manifold_point> points,
+                    Touch& touch) {
+  if (!(manifold.depth > 0)) return;
+  double second = 0;
+  for (const tandem_manifold_point& point : points.subspan(1)) second = std::max(second, point.depth);
+  const double share = std::max(0.0, 1 - 2 * second / manifold.depth);
+  double way[3];
+  for (int i = 0; i < 3; ++i) way[i] = share * (manifold.centre[i] - touch.position[i]);
+  const double along = dot(way, touch.normal);
+  for (int i = 0; i < 3; ++i) touch.position[i] += way[i] - along * touch.normal[i];
 }
 
 }  // namespace
@@ -62,17 +75,18 @@ void Touches::Scene::find_manifolds(const std::vector<tandem_object_pair>* asked
   manifolds.ignore_previous = 1;
   expect(tandem_scene_find_manifolds(scene_.get(), &manifolds));
   std::size_t count;
-  const tandem_manifold* made = tandem_scene_manifolds(scene_.get(), &count);
-  const tandem_manifold_point* point = tandem_scene_points(scene_.get(), &count);
-  for (const tandem_manifold_point* end = point + count; point != end; ++point) {
-    const tandem_manifold& manifold = made[point->manifold];
+  const tandem_manifold_point* const points = tandem_scene_points(scene_.get(), &count);
+  const tandem_manifold* const made = tandem_scene_manifolds(scene_.get(), &count);
+  for (const tandem_manifold& manifold : std::span(made, count)) {
+    const std::span of_manifold(points + manifold.first_point, manifold.point_count);
     const tandem_object_pair pair = pairs(TANDEM_CONTACTS)[manifold.pair];
-    Touch touch{.a = pair.a, .b = pair.b, .gap = -point->depth};
-    copy(manifold.normal, touch.normal);
-    copy(point->position, touch.position);
-    copy(point->in_a, touch.in_a);
-    copy(point->in_b, touch.in_b);
-    add(manifold.pair, touch);
+    for (const tandem_manifold_point& point : of_manifold) {
+      Touch touch{.a = pair.a, .b = pair.b, .gap = -point.depth};
+      copy(manifold.normal, touch.normal);
+      copy(point.position, touch.position);
+      if (&point == &of_manifold.front()) move_to_centre(manifold, of_manifold, touch);
+      add(manifold.pair, touch);
+    }
   }
 }
 
@@ -161,18 +175,14 @@ void Touches::add_near() {
     for (int i = 0; i < 3; ++i) touch.position[i] += 0.5 * near.reach * near.way[i];
     rows_.push_back(touch);
   });
-  for (const Near& near : near_)
-    if (!near.has_manifold) rows_.push_back(nearest(near));
-}
-
-Touch Touches::nearest(const Near& near) const {
-  const tandem_distance& distance = *near.distance;
-  Touch touch{.a = near.pair.a, .b = near.pair.b, .gap = near.gap};
-  copy(near.way, touch.normal);
-  for (int i = 0; i < 3; ++i) touch.position[i] = 0.5 * (distance.point_a[i] + distance.point_b[i]);
-  to_local(bodies_[near.pair.a].pose, distance.point_a, touch.in_a);
-  to_local(bodies_[near.pair.b].pose, distance.point_b, touch.in_b);
-  return touch;
+  for (const Near& near : near_) {
+    if (near.has_manifold) continue;
+    Touch touch{.a = near.pair.a, .b = near.pair.b, .gap = near.gap};
+    copy(near.way, touch.normal);
+    for (int i = 0; i < 3; ++i)
+      touch.position[i] = 0.5 * (near.distance->point_a[i] + near.distance->point_b[i]);
+    rows_.push_back(touch);
+  }
 }
 
 namespace {

@@ -12,10 +12,9 @@ namespace tandem::python {
 /// A contact point of two bodies a < b.
 struct Touch {
   std::uint32_t a, b;
-  double normal[3] = {};                ///< unit, from a towards b
-  double position[3] = {};              ///< in the world, half-way between the surfaces
-  double in_a[3] = {}, in_b[3] = {};    ///< on the surfaces, in the coordinates of the assets
-  double gap;  ///< how far the surfaces are apart; less than 0: they overlap
+  double normal[3] = {};    ///< unit, from a towards b
+  double position[3] = {};  ///< in the world, half-way between the surfaces
+  double gap;               ///< how far the surfaces are apart; less than 0: they overlap
 };
 
 /// Says up to which gap two bodies a < b have contact points.
@@ -72,7 +71,6 @@ class Touches {
 
   void find_near(const Reach& reach, double largest);
   void add_near();
-  Touch nearest(const Near& near) const;
 
   std::vector<tandem_instance> bodies_, moved_;
   std::vector<tandem_object_pair> pairs_, moved_pairs_;

@@ -27,8 +27,7 @@ __all__ = ["CollisionPipeline"]
 _Array = npt.NDArray[np.float64]
 _Effort = Literal["default", "fast", "best"]
 _MESH, _SHAPES = newton.GeoType.MESH, {newton.GeoType[name.upper()]: name for name in _shapes.PRIMITIVES}
-_TOUCH = np.dtype([("a", "<u4"), ("b", "<u4"), ("normal", "<f8", (3,)), ("position", "<f8", (3,)), ("in_a", "<f8", (3,)), ("in_b", "<f8", (3,)),
-                   ("gap", "<f8")])  # struct Touch of the extension
+_TOUCH = np.dtype([("a", "<u4"), ("b", "<u4"), ("normal", "<f8", (3,)), ("position", "<f8", (3,)), ("gap", "<f8")])  # struct Touch of the extension
 _NOT_TAKEN = {"broad_phase": "which pairs there are is decided here", "shape_pairs_filtered": "which pairs there are is decided here",
               "contact_matching": "points of meshes have no match", "contact_report": "points of meshes have no match",
               "body_pair_reduction": "points of meshes are few", "speculative_contact_gap_max": "points of meshes are where surfaces are now"}
@@ -111,11 +110,11 @@ class CollisionPipeline:
             raise explained(error, self.instances) from None
         touches = touches[touches["gap"] <= self._margin[touches["a"]] + self._margin[touches["b"]]]
         sides = []
-        for body_of, place_of, sign in (("a", "in_a", 1.0), ("b", "in_b", -1.0)):
-            i, place = touches[body_of], touches[place_of]
+        for name, sign in (("a", 1.0), ("b", -1.0)):
+            i, out = touches[name], sign * touches["normal"]
+            place = touches["position"] - 0.5 * touches["gap"][:, None] * out - body[i, :3]  # on the surface
             margin = self._margin[i]
-            point = np.einsum("nij,nj->ni", inner[0][i], place) + inner[1][i]
-            offset = np.einsum("nji,nj->ni", rotation[i], (sign * margin)[:, None] * touches["normal"])
+            point, offset = (np.einsum("nji,nj->ni", rotation[i], vector) for vector in (place, margin[:, None] * out))
             sides.append((self.shapes[i], point, offset, margin))
         _append(contacts, sides, touches["normal"])
         return len(touches)

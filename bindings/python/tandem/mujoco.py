@@ -223,7 +223,7 @@ def _pairs_that_may_collide(model: mujoco.MjModel) -> tuple[NDArray[np.intp], ND
     is_mesh, is_ours = model.geom_type == _Type.mjGEOM_MESH, np.isin(model.geom_type, _SHAPES)
 
     def has_mesh(i: NDArray[np.intp], j: NDArray[np.intp]) -> NDArray[np.bool_]:
-        return (is_mesh[i] | is_mesh[j]) & is_ours[i] & is_ours[j]
+        return np.asarray((is_mesh[i] | is_mesh[j]) & is_ours[i] & is_ours[j])
 
     rows = np.flatnonzero(has_mesh(model.pair_geom1, model.pair_geom2)) if model.npair else np.empty(0, np.intp)
     named = np.sort(np.stack([model.pair_geom1[rows], model.pair_geom2[rows]], axis=1).astype(np.intp), axis=1).reshape(-1, 2)

@@ -65,7 +65,9 @@ class CollisionPipeline:
             return np.asarray(getattr(model, name).numpy())
 
         pairs, kind = values("shape_contact_pairs").reshape(-1, 2).astype(np.intp), values("shape_type")
-        is_ours = (kind[pairs] == _MESH).any(axis=1) & np.isin(kind[pairs], [_MESH, *_SHAPES]).all(axis=1)
+        is_barrel = (kind == newton.GeoType.CYLINDER) & (values("shape_scale")[:, 2] != 0)
+        is_known = np.isin(kind, [_MESH, *_SHAPES]) & ~is_barrel
+        is_ours = (kind[pairs] == _MESH).any(axis=1) & is_known[pairs].all(axis=1)
         others: Any = wp.array(pairs[~is_ours].astype(np.int32), dtype=wp.vec2i, device=model.device)
         self.others = newton.CollisionPipeline(model, broad_phase="explicit", shape_pairs_filtered=others, **options)
         self.shapes = np.unique(pairs[is_ours])  #: those that Tandem looks at, ascending

@@ -135,7 +135,7 @@ Parameters of_pair(const Model& model, std::size_t pair) {
   return made;
 }
 
-// Where mjContact has its members, from its first one, `dist`, on.
+// Where mjContact has its members, from its first one, `dist`, on, and how many bytes it has.
 struct Layout {
   explicit Layout(const nb::dict& offsets) {
     const auto at = [&](const char* name) { return nb::cast<std::size_t>(offsets[name]); };
@@ -143,30 +143,30 @@ struct Layout {
     friction = at("friction"), solref = at("solref"), solreffriction = at("solreffriction");
     solimp = at("solimp"), adhesion = at("adhesion"), dim = at("dim"), geom1 = at("geom1");
     geom2 = at("geom2"), geom = at("geom"), flex = at("flex"), elem = at("elem"), vert = at("vert");
-    exclude = at("exclude"), efc_address = at("efc_address");
+    exclude = at("exclude"), efc_address = at("efc_address"), size = at("size");
     if (offsets.contains("surfacevel")) surfacevel = at("surfacevel");
   }
   std::size_t dist, pos, frame, includemargin, friction, solref, solreffriction, solimp, adhesion, dim, geom1,
-      geom2, geom, flex, elem, vert, exclude, efc_address;
+      geom2, geom, flex, elem, vert, exclude, efc_address, size;
   std::optional<std::size_t> surfacevel;
 };
 
-// An MjData's list of contacts, as the member `dist` of each.
+// An MjData's list of contacts, known by the member `dist` of each.
 class ContactList {
  public:
-  explicit ContactList(nb::handle dist) {
+  ContactList(nb::handle dist, std::size_t size) : size_(size) {
     if (PyObject_GetBuffer(dist.ptr(), &view_, PyBUF_STRIDES | PyBUF_WRITABLE) != 0) throw nb::python_error();
   }
   ~ContactList() { PyBuffer_Release(&view_); }
   ContactList(const ContactList&) = delete;
   ContactList& operator=(const ContactList&) = delete;
   std::byte* operator[](std::size_t contact) const {
-    return static_cast<std::byte*>(view_.buf) + contact * stride();
+    return static_cast<std::byte*>(view_.buf) + contact * size_;
   }
-  std::size_t stride() const { return static_cast<std::size_t>(view_.strides[0]); }
   std::size_t count() const { return static_cast<std::size_t>(view_.shape[0]); }
 
  private:
+  const std::size_t size_;
   Py_buffer view_;
 };
 
@@ -248,13 +248,13 @@ class MujocoContacts {
 
   // Takes the contacts of the bodies' hulls out of MuJoCo's; returns how many are left, which come first.
   std::size_t drop_hulls(nb::handle dist) {
-    const ContactList contacts(dist);
+    const ContactList contacts(dist, layout_.size);
     std::size_t kept = 0;
     for (std::size_t contact = 0; contact < contacts.count(); ++contact) {
       std::int32_t geom[2];
       std::memcpy(geom, contacts[contact] + layout_.geom, sizeof geom);
       if (is_replaced(geom)) continue;
-      if (kept != contact) std::memcpy(contacts[kept], contacts[contact], contacts.stride());
+      if (kept != contact) std::memcpy(contacts[kept], contacts[contact], layout_.size);
       ++kept;
     }
     return kept;
@@ -262,10 +262,10 @@ class MujocoContacts {
 
   // Writes the contacts that find() found over the last of MuJoCo's.
   void write(nb::handle dist) const {
-    const ContactList contacts(dist);
+    const ContactList contacts(dist, layout_.size);
     if (contacts.count() < rows_.size()) throw_broken_rows();
     for (std::size_t row = 0; row < rows_.size(); ++row)
-      write_row(rows_[row], contacts[contacts.count() - rows_.size() + row], contacts.stride());
+      write_row(rows_[row], contacts[contacts.count() - rows_.size() + row]);
   }
 
   nb::object instances() const { return to_python(touches_.bodies().data(), touches_.bodies().size()); }
@@ -410,12 +410,12 @@ class MujocoContacts {
     }
   }
 
-  void write_row(const Row& row, std::byte* contact, std::size_t size) const {
+  void write_row(const Row& row, std::byte* contact) const {
     const auto put = [&](std::size_t offset, const auto& value) {
       std::memcpy(contact + offset, &value, sizeof value);
     };
     const Parameters& of = row.parameters;
-    std::memset(contact, 0, size);
+    std::memset(contact, 0, layout_.size);
     put(layout_.dist, row.dist);
     put(layout_.pos, row.pos);
     put(layout_.frame, row.frame);

@@ -183,13 +183,14 @@ _BLANK = mujoco.MjContact()
 
 @functools.cache
 def _contact_layout() -> dict[str, int]:
-    """Returns where mjContact has its members, in bytes from `dist` on."""
+    """Returns where mjContact has its members, in bytes from `dist` on, and its `size`."""
     model = mujoco.MjModel.from_xml_string("<mujoco/>")
     data = mujoco.MjData(model)
-    mujoco.mj_addContact(model, data, _BLANK)
+    for _ in range(2):
+        mujoco.mj_addContact(model, data, _BLANK)
     contact = data.contact
     places = {name: getattr(contact, name).__array_interface__["data"][0] for name in dir(contact) if not name.startswith("_")}
-    return {name: place - places["dist"] for name, place in places.items()}
+    return {name: place - places["dist"] for name, place in places.items()} | {"size": contact.dist.strides[0]}
 
 
 def _sorted_rows(rows: NDArray[np.intp]) -> NDArray[np.uint32]:

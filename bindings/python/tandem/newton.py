@@ -124,8 +124,9 @@ class CollisionPipeline:
 
 def _assets_of(model: newton.Model, shapes: npt.NDArray[np.intp], solids: _shapes.Shapes, effort: _Effort) -> tuple[list[tandem.Asset], list[int]]:
     """Returns an asset for each mesh or type, and scale, that the shapes have, and for each shape which asset it has."""
-    kinds, scale_of = model.shape_type.numpy()[shapes], model.shape_scale
-    scales = scale_of.numpy().astype(np.float64)[shapes]
+    kind_of: Any = model.shape_type
+    scale_of: Any = model.shape_scale
+    kinds, scales = kind_of.numpy()[shapes], scale_of.numpy().astype(np.float64)[shapes]
     places: dict[tuple[int, ...], int] = {}
     assets: list[tandem.Asset] = []
     asset: list[int] = []

@@ -427,6 +427,13 @@ def test_what_cannot_be_done_is_said():
             tandem.mujoco.MeshContacts(model).step(mujoco.MjData(model))
 
 
+def test_data_of_another_model_are_refused():
+    shapes = {"ball": solids.ball(0.1), "floor": solids.box(1, 1, 0.1)}
+    contacts = tandem.mujoco.MeshContacts(model_of("<geom mesh='floor'/>" + free("ball", "0 0 0.199"), **shapes))
+    with pytest.raises(ValueError, match="another number of geoms"):
+        contacts.collide(mujoco.MjData(model_of("<geom mesh='floor'/>", **shapes)))
+
+
 def test_no_contact_is_dropped_where_there_is_no_room():
     model = model_of("<geom mesh='floor'/>" + "".join(f"<body pos='{0.21 * i - 0.9} 0 0.199'><freejoint/><geom mesh='box'/></body>" for i in range(9)),
                      memory="20K", floor=solids.box(1, 1, 0.1), box=solids.box(0.1, 0.1, 0.1))

@@ -227,6 +227,9 @@ class MujocoContacts {
   std::size_t find(nb::handle places, nb::handle rotations, nb::handle override_margin) {
     const Turn turn(busy_, "another thread is in a call of these contacts");
     const Bytes place(places), rotation(rotations);
+    if (place.size() != model_.type.count() * sizeof *place_ ||
+        rotation.size() != model_.type.count() * sizeof *rotation_)
+      throw nb::value_error("the data are not the model's: they have another number of geoms");
     place_ = static_cast<const double(*)[3]>(place.data());
     rotation_ = static_cast<const double(*)[3][3]>(rotation.data());
     is_overridden_ = !override_margin.is_none();

@@ -39,7 +39,8 @@ class OverlapLines {
                                            Vector3* inside, std::uint32_t asked = 0) const;
 
   /// Asks where a straight line within a, and one within b, from one point to two others meet the surface of
-  /// the body, if they do so before they are there. first: the first of the two questions.
+  /// the body, if they do so before they are there. The point is within both, perhaps hardly: a line that
+  /// began further on could begin outside. first: the first of the two questions.
   TANDEM_HD void ask_straight(std::uint32_t first, const Vector3& from, const Vector3 (&to)[2]) const;
 
   /// Returns whether one of some straight lines stays within both bodies. ends: two of each.
@@ -139,7 +140,7 @@ TANDEM_HD void OverlapLines<Team>::ask_straight(std::uint32_t first, const Vecto
                                                 const Vector3 (&to)[2]) const {
   LineQuestions questions(bodies_, shared_.line);
   for (std::uint32_t side = team_.rank(); side < 2; side += team_.size()) {
-    const double length = norm(to[side] - from), begin = behind(length);
+    const double length = norm(to[side] - from), begin = bodies_.tolerance();
     LineQuestion& line = shared_.line[first + side];
     line.frame = &shared_.frame[first + side];
     line.side = -1;

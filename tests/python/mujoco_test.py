@@ -41,6 +41,14 @@ def run(model, seconds, step):
     return data
 
 
+def shown(model):
+    """The data of the model as it stands, with the contacts that Tandem finds, and how many these are."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    return data, tandem.mujoco.MeshContacts(model).collide(data)
+
+
 def both(model, seconds):
     """The state after some seconds, by MuJoCo alone and with Tandem's contacts."""
     return run(model, seconds, lambda data: mujoco.mj_step(model, data)), run(model, seconds, tandem.mujoco.MeshContacts(model).step)
@@ -83,11 +91,149 @@ def test_chain_hangs():
     assert max(abs(2 - alone.body(f"link{i}").xpos[2] - 0.16 * i) for i in range(1, count)) > 0.1
 
 
+# ---- Meshes meet primitives
+
+
+def test_mug_hangs_on_a_hook():
+    """By its handle; MuJoCo's hulls fill the handle, so that it is thrown off."""
+    handle = "<geom mesh='handle' pos='0.15 0 0.125' euler='90 0 0'/>"
+    model = model_of("<geom type='capsule' size='0.01 0.15' pos='0.2 0 1' euler='75 0 0'/>"
+                     f"<body name='cup' pos='0 0 0.83'><freejoint/><geom mesh='cup'/>{handle}</body>",
+                     cup=solids.cup(0.08, 0.09, 0.01, 0.25), handle=solids.chain_link(0.08, 0.015))
+    alone, with_tandem = both(model, 3)
+    assert alone.body("cup").xpos[2] < -1
+    contacts = with_tandem.contact
+    assert {tuple(geom) for geom in contacts.geom.tolist()} == {(0, 2)}  # hook and handle
+    assert with_tandem.body("cup").xpos[2] > 0.6  # it swings
+
+
+def test_sphere_falls_into_cup():
+    model = model_of("<geom type='plane' size='2 2 0.1'/>" + free("cup", "0 0 0") + "<body name='ball' pos='0.01 0 0.4'><freejoint/><geom type='sphere' size='0.1'/></body>",
+                     cup=solids.cup(0.15, 0.18, 0.04, 0.25))
+    alone, with_tandem = both(model, 2)
+    assert alone.body("ball").xpos[2] > 0.3
+    assert with_tandem.body("ball").xpos[2] == pytest.approx(0.14, abs=0.001)
+
+
+def test_box_stands_on_a_plane():
+    """A tilted one, with its name and number; however far away, and beside another body that is far away."""
+    plane = "<geom type='plane' size='1 1 0.1' pos='0 0 1' euler='0 30 0'/>"
+    half = np.sqrt(3) / 2
+    model = model_of(plane + "".join(f"<body pos='{0.099 * 0.5 + x * half} {y} {1 + 0.099 * half - 0.5 * x}' euler='0 30 0'><freejoint/><geom mesh='box'/></body>"
+                                     for x, y in ((0, 0), (70, -3), (-4000, 900))), box=solids.box(0.1, 0.05, 0.1))
+    data, count = shown(model)
+    assert count == 12 == data.ncon
+    assert data.contact.geom.tolist() == [[0, body] for body in (1, 2, 3) for _ in range(4)]
+    np.testing.assert_allclose(data.contact.dist, -0.001, atol=1e-8)
+    np.testing.assert_allclose(data.contact.frame[:, :3], np.tile([0.5, 0, half], (12, 1)), atol=1e-9)
+    model = model_of("<geom type='plane' size='1 1 0.1'/>" + free("box", "0 0 0.11"), box=solids.box(0.1, 0.05, 0.1))
+    data = run(model, 1, tandem.mujoco.MeshContacts(model).step)
+    assert data.qpos[2] == pytest.approx(0.1, abs=2e-4) and np.abs(data.qvel).max() < 1e-9
+
+
+def test_what_is_wholly_below_a_plane_comes_up():
+    model = model_of("<geom type='plane' size='1 1 0.1'/>" + free("box", "0 0 -0.3"), box=solids.box(0.1, 0.05, 0.1))
+    data, count = shown(model)
+    assert count == 0 and data.ncon > 0 and data.contact.dist.min() == pytest.approx(-0.4, abs=1e-6)
+    assert run(model, 2, tandem.mujoco.MeshContacts(model).step).qpos[2] > 0
+
+
+def test_contacts_do_not_depend_on_the_steps_before():
+    model = model_of("<geom type='plane' size='1 1 0.1'/>" + free("box", "0 0 0.11") + free("ball", "0.5 0 0.11"), box=solids.box(0.1, 0.05, 0.1), ball=solids.ball(0.1))
+    contacts = tandem.mujoco.MeshContacts(model)
+    data = mujoco.MjData(model)
+    for place in (0, 30, 3000, 0.4):
+        data.qpos[:3] = place, 2 * place, 0.0999
+        mujoco.mj_kinematics(model, data)
+        rows = []
+        for either in (contacts, tandem.mujoco.MeshContacts(model)):
+            assert either.collide(data) > 0
+            rows.append([getattr(data.contact, name).tolist() for name in ("geom", "dist", "pos", "frame")])
+        assert rows[0] == rows[1]
+
+
+SHAPES = {"sphere": "0.1", "capsule": "0.1 0.2", "ellipsoid": "0.1 0.2 0.3", "cylinder": "0.1 0.2", "box": "0.1 0.2 0.3"}
+
+
+@pytest.mark.parametrize("kind", SHAPES)
+def test_overlap_with_a_primitive_is_right_to_the_tolerance(kind):
+    """It lies in the plane of a floor, at many angles: how deep its lowest point is, is known."""
+    random = np.random.default_rng(3)
+    floor = solids.box(2, 2, 0.5)
+    for _ in range(20):
+        turn = random.normal(size=4)
+        model = model_of(f"<geom mesh='floor' pos='0 0 -0.5'/><body pos='0 0 1' quat='{' '.join(map(str, turn / np.linalg.norm(turn)))}'><freejoint/>"
+                         f"<geom type='{kind}' size='{SHAPES[kind]}'/></body>", floor=floor)
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        up = data.geom_xmat[1].reshape(3, 3)[2]
+        size = model.geom_size[1]
+        low = {"sphere": lambda: size[0], "capsule": lambda: size[0] + size[1] * abs(up[2]), "ellipsoid": lambda: np.linalg.norm(size * up),
+               "cylinder": lambda: size[0] * np.hypot(*up[:2]) + size[1] * abs(up[2]), "box": lambda: np.abs(size * up).sum()}[kind]()
+        data.qpos[2] = low - 0.01
+        mujoco.mj_kinematics(model, data)
+        contacts = tandem.mujoco.MeshContacts(model, tolerance=0.003)
+        assert contacts.collide(data) > 0
+        assert data.contact.dist.min() == pytest.approx(-0.01, abs=1e-7 if kind == "box" else 0.0031 * np.linalg.norm(size))
+        assert data.contact.frame[data.contact.dist.argmin(), 2] == pytest.approx(-1, abs=1e-9)  # from the primitive to the mesh, as MuJoCo has it
+
+
+def test_height_field_is_that_of_mujoco():
+    """Its surface is where MuJoCo's rays meet it, cell by cell, and a box lies on it."""
+    random = np.random.default_rng(5)
+    heights = " ".join(map(str, random.uniform(size=30)))
+    model = mujoco.MjModel.from_xml_string(
+        f"<mujoco><asset><hfield name='hills' nrow='5' ncol='6' size='1 0.8 0.3 0.1' elevation='{heights}'/>{mesh_xml('box', solids.box(.1, .1, .1))}</asset>"
+        "<worldbody><geom type='hfield' hfield='hills'/><body pos='0 0 0.6'><freejoint/><geom type='mesh' mesh='box' density='500'/></body></worldbody></mujoco>")
+    data, contacts = mujoco.MjData(model), tandem.mujoco.MeshContacts(model)
+    mujoco.mj_forward(model, data)
+    a, b, c = contacts.assets[0].triangles().astype(float).transpose(1, 0, 2)
+    assert contacts.assets[0].triangles()[..., 2].min() == pytest.approx(-0.1)
+    geom = np.zeros(1, np.int32)
+    for x, y in random.uniform((-1, -0.8), (1, 0.8), (200, 2)):
+        distance = mujoco.mj_ray(model, data, np.array([x, y, 2.0]), np.array([0, 0, -1.0]), None, 1, 1, geom)
+        normal = np.cross(b - a, c - a)
+        inside = np.ones(len(a), bool)
+        for start, end in ((a, b), (b, c), (c, a)):
+            inside &= (end - start)[:, 0] * (y - start[:, 1]) - (end - start)[:, 1] * (x - start[:, 0]) >= 0
+        top = inside & (normal[:, 2] > 0)
+        height = (a[:, 2] + ((a[:, 0] - x) * normal[:, 0] + (a[:, 1] - y) * normal[:, 1]) / np.where(top, normal[:, 2], 1))[top].max()
+        assert height == pytest.approx(2 - distance, abs=1e-6)
+    data = run(model, 5, contacts.step)
+    assert 0.1 < data.qpos[2] < 0.5 and np.abs(data.qvel).max() < 0.01
+
+
+# ---- What holds
+
+
+@pytest.mark.parametrize("kind", ["sphere", "mesh"])
+def test_ball_does_not_fall_through_a_thin_floor(kind):
+    """With MuJoCo's own stiffness, from 0.6 m on 2 mm: a slab, and the bottom of a cup."""
+    ball = {"sphere": "type='sphere' size='0.04'", "mesh": "mesh='ball'"}[kind]
+    thin = solids.cup(0.09, 0.1, 0.002, 0.2)
+    for floor in ("<geom mesh='cup'/>", "<geom mesh='slab' pos='0 0 0.001'/>"):
+        model = model_of(f"{floor}<body name='ball' pos='0.02 0.001 0.642'><freejoint/><geom {ball}/></body>", cup=thin, slab=solids.box(0.3, 0.3, 0.001),
+                         ball=solids.ball(0.04))
+        data = run(model, 1, tandem.mujoco.MeshContacts(model).step)
+        assert data.body("ball").xpos[2] > 0.03
+
+
+@pytest.mark.parametrize("kind, size", [("cylinder", "0.01 0.04"), ("capsule", "0.01 0.04"), ("ellipsoid", "0.04 0.03 0.01")])
+def test_what_lies_on_its_round_side_lies_still(kind, size):
+    """Its weight rests on the middle of the overlap, not on whichever end is deeper."""
+    model = model_of(f"<geom mesh='floor'/><body pos='0 0 0.111' euler='{0 if kind == 'ellipsoid' else 90} 0 0'><freejoint/><geom type='{kind}' size='{size}'/></body>",
+                     floor=solids.box(1, 1, 0.1))
+    data = run(model, 2, tandem.mujoco.MeshContacts(model).step)
+    assert data.qpos[2] == pytest.approx(0.11, abs=0.0005) and np.abs(data.qvel[:3]).max() < 1e-3
+    assert np.hypot(*data.qpos[:2]) < 0.001
+
+
 # ---- What stays MuJoCo's
 
 
 def random_model(random):
-    """Overlapping cubes of random trees of bodies, with random filters and parameters: no hulls are apart, so that contacts tell which pairs may collide."""
+    """Overlapping cubes, boxes and balls of random trees of bodies, with random filters and parameters: no hulls are apart, so that contacts tell which pairs
+    may collide."""
     names = {"body": 0, "geom": 0}
 
     def words(values):
@@ -101,7 +247,8 @@ def random_model(random):
         uniform = random.uniform
         solref = f"{uniform(0.01, 0.03)} {uniform(0.5, 2)}" if random.random() < 0.7 else f"{-uniform(100, 900)} {-uniform(1, 9)}"
         solimp = f"{uniform(.5, .9)} {uniform(.9, .99)} {uniform(.001, .1)} {uniform(.2, .8)} {uniform(1, 4)}"
-        return (f"<geom name='{take('geom')}' mesh='cube' pos='{words(uniform(-.3, .3, 3))}' euler='{words(uniform(0, 90, 3))}' margin='{uniform(0, .01)}' "
+        shape = random.choice(["mesh='cube'", "mesh='cube'", "type='box' size='.5 .4 .5'", "type='sphere' size='.5'"])
+        return (f"<geom name='{take('geom')}' {shape} pos='{words(uniform(-.3, .3, 3))}' euler='{words(uniform(0, 90, 3))}' margin='{uniform(0, .01)}' "
                 f"friction='{words(uniform(0, (1, .1, .1)))}' solref='{solref}' solimp='{solimp}' condim='{random.choice([1, 3, 4, 6])}' "
                 f"gap='{random.choice([0, .002])}' solmix='{random.choice([0, 1, uniform()])}' priority='{random.choice([0, 0, 1])}' adhesion='{uniform()}' "
                 f"contype='{random.integers(4)}' conaffinity='{random.integers(4)}' surfacevel='{words(uniform(size=6))}'/>")
@@ -125,7 +272,7 @@ def random_model(random):
 
 
 def by_pair(data):
-    return {tuple(sorted(pair)): {name: getattr(data.contact, name)[i].copy() for name in PARAMETERS} for i, pair in enumerate(data.contact.geom.tolist())}
+    return {tuple(pair): {name: getattr(data.contact, name)[i].copy() for name in PARAMETERS} for i, pair in enumerate(data.contact.geom.tolist())}
 
 
 def test_filters_and_parameters_are_those_of_mujoco():
@@ -136,12 +283,12 @@ def test_filters_and_parameters_are_those_of_mujoco():
         mujoco.mj_forward(model, data)
         theirs = by_pair(data)
         if not theirs:
-            with pytest.raises(ValueError, match="no two mesh geoms"):
+            with pytest.raises(ValueError, match="no mesh geom"):
                 tandem.mujoco.MeshContacts(model)
             continue
-        tandem.mujoco.MeshContacts(model).collide(data)
+        tandem.mujoco.MeshContacts(model, tolerance=0.02).collide(data)
         ours = by_pair(data)
-        assert ours.keys() <= theirs.keys()  # of cubes inside each other none touches
+        assert ours.keys() <= theirs.keys()  # of bodies inside each other none touches
         for pair, values in ours.items():
             compared += 1
             for name, value in values.items():
@@ -165,12 +312,12 @@ def test_surface_velocity_is_that_of_mujoco():
 
 
 WITHOUT_TOUCHING_MESHES = """
-<geom type='plane' size='5 5 0.1'/><geom mesh='box' pos='9 0 0'/>
+<geom type='plane' size='5 5 0.1'/><geom mesh='box' pos='9 0 9'/>
 <body name='cart' pos='0 0 1'><joint name='slide' type='slide' axis='1 0 0' damping='0.1' range='-1 1' limited='true'/><geom type='box' size='0.1 0.1 0.1'/>
   <body pos='0 0 -0.2'><joint name='swing' axis='0 1 0' frictionloss='0.01'/><geom type='capsule' size='0.03 0.2' pos='0 0 -0.2'/>
     <site name='tip' pos='0 0 -0.4'/></body></body>
-<body pos='1 0 0.2'><freejoint/><geom mesh='box' priority='1'/><site name='site'/></body>
-<body pos='1.1 0.1 0.9'><freejoint/><geom type='sphere' size='0.1'/></body>"""
+<body pos='1 0 3'><freejoint/><geom mesh='box' priority='1'/><site name='site'/></body>
+<body pos='1.1 0.1 0.4'><freejoint/><geom type='sphere' size='0.1'/></body>"""
 WITH_ALL_ELSE = """
 <tendon><spatial name='rope' stiffness='3' springlength='0.5'><site site='tip'/><site site='site'/></spatial></tendon>
 <equality><joint joint1='swing' polycoef='0.1 0 0 0 0' active='true'/></equality>
@@ -200,10 +347,10 @@ def test_contacts_with_other_geoms_stay():
                      cup=solids.cup(0.15, 0.18, 0.04, 0.25), ball=solids.ball(0.1))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    def others(): return [(geom, dist) for geom, dist in zip(data.contact.geom.tolist(), data.contact.dist.tolist()) if 0 in geom]
+    def others(): return [(geom, dist) for geom, dist in zip(data.contact.geom.tolist(), data.contact.dist.tolist()) if geom == [0, 3]]
     theirs = others()
     added = tandem.mujoco.MeshContacts(model).collide(data)
-    assert len(theirs) >= 3 and others() == theirs and added == data.ncon - len(theirs) > 0
+    assert len(theirs) == 1 and others() == theirs and added == data.ncon - 1 > 0
 
 
 # ---- Margins
@@ -266,15 +413,25 @@ def test_the_program_of_the_page_runs():
 def test_what_cannot_be_done_is_said():
     shapes = {"ball": solids.ball(0.1), "floor": solids.box(1, 1, 0.1)}
     scene = "<geom mesh='floor'/>" + free("ball", "0 0 0.199")
-    with pytest.raises(ValueError, match="no two mesh geoms"):
+    with pytest.raises(ValueError, match="no mesh geom of the model may collide"):
         tandem.mujoco.MeshContacts(model_of(free("ball", "0 0 0"), ball=shapes["ball"]))
     for count in (0, 8):
         with pytest.raises(ValueError, match=f"most_points {count}: is not from 1 to 7"):
             tandem.mujoco.MeshContacts(model_of(scene, **shapes), most_points=count)
+    for tolerance in (0, 0.6, np.nan):
+        with pytest.raises(ValueError, match=f"tolerance {tolerance}: is not from 1e-6 to 0.5"):
+            tandem.mujoco.MeshContacts(model_of(scene, **shapes), tolerance=tolerance)
     for option, extra, message in (("integrator='RK4'", "", "RK4"), ("", "<option><flag sleep='enable'/></option>", "sleep")):
         model = model_of(scene, option, extra, **shapes)
         with pytest.raises(ValueError, match=message):
             tandem.mujoco.MeshContacts(model).step(mujoco.MjData(model))
+
+
+def test_data_of_another_model_are_refused():
+    shapes = {"ball": solids.ball(0.1), "floor": solids.box(1, 1, 0.1)}
+    contacts = tandem.mujoco.MeshContacts(model_of("<geom mesh='floor'/>" + free("ball", "0 0 0.199"), **shapes))
+    with pytest.raises(ValueError, match="another number of geoms"):
+        contacts.collide(mujoco.MjData(model_of("<geom mesh='floor'/>", **shapes)))
 
 
 def test_no_contact_is_dropped_where_there_is_no_room():

@@ -123,7 +123,47 @@ def test_rows_are_manifolds_in_the_frames_of_bodies():
     newton.eval_rigid_contact_kinematics(model, state, contacts, out_distance=distance, out_point0_world=point0, out_point1_world=point1)
     count = len(made.points)
     np.testing.assert_allclose(distance.numpy()[:count], -made.points["depth"], atol=2e-6)
-    np.testing.assert_allclose(0.5 * (point0.numpy() + point1.numpy())[:count], made.points["position"], atol=2e-6)
+    # The deepest point, alone deep in the ball's round overlap, acts across from it in the middle.
+    first, middle, up = made.points["position"][0], made.manifolds["centre"][0], made.manifolds["normal"][0]
+    second = made.points["depth"][1:].max() / made.points["depth"][0]
+    assert 0 <= second < 0.5
+    expected = made.points["position"].copy()
+    expected[0] += (1 - 2 * second) * (middle - first - (middle - first) @ up * up)
+    np.testing.assert_allclose(0.5 * (point0.numpy() + point1.numpy())[:count], expected, atol=2e-6)
+
+
+SHAPES = {"sphere": {"radius": 0.1}, "ellipsoid": {"rx": 0.1, "ry": 0.2, "rz": 0.3}, "capsule": {"radius": 0.1, "half_height": 0.2},
+          "cylinder": {"radius": 0.1, "half_height": 0.2}, "cone": {"radius": 0.1, "half_height": 0.2}, "box": {"hx": 0.1, "hy": 0.2, "hz": 0.3}}
+LOWEST = {"sphere": 0.1, "ellipsoid": 0.3, "capsule": 0.3, "cylinder": 0.2, "cone": 0.2, "box": 0.3}  # below its middle
+
+
+@pytest.mark.parametrize("kind", SHAPES)
+def test_round_shapes_and_boxes_meet_meshes(kind):
+    """Upright on a floor that is a mesh: one millimetre deep, to the tolerance; another such shape beside it, which it meets, stays Newton's."""
+    builder = builder_of((solids.box(1, 1, 0.1),), gap=0.0)
+    for x in (0, 0.15):
+        body = builder.add_body(xform=wp.transform((x, 0, 0.1 + LOWEST[kind] - 0.001), UPRIGHT))
+        getattr(builder, f"add_shape_{kind}")(body, **SHAPES[kind])
+    pipeline = tandem.newton.CollisionPipeline(builder.finalize(), tolerance=0.002)
+    contacts, state = pipeline.contacts(), pipeline.model.state()
+    count = pipeline.collide(state, contacts)
+    pairs = np.stack([rows(contacts, "shape0"), rows(contacts, "shape1")], axis=1)
+    assert count > 1 and {tuple(pair) for pair in pairs[-count:].tolist()} == {(0, 1), (0, 2)}
+    assert len(pairs) > count and {tuple(sorted(pair)) for pair in pairs[:-count].tolist()} == {(1, 2)}
+    distance = wp.zeros(contacts.rigid_contact_max, dtype=float)
+    newton.eval_rigid_contact_kinematics(pipeline.model, state, contacts, out_distance=distance)
+    deepest = distance.numpy()[len(pairs) - count:len(pairs)].min()
+    assert deepest == pytest.approx(-0.001, abs=1e-6 + (0 if kind in ("box", "cylinder", "cone") else 0.002 * LOWEST[kind]))
+    np.testing.assert_allclose(rows(contacts, "normal")[-count:], np.tile([0, 0, 1], (count, 1)), atol=1e-5)
+
+
+def test_ring_hangs_on_a_capsule():
+    builder = newton.ModelBuilder()
+    builder.add_shape_capsule(-1, xform=wp.transform((0, 0, 1), turn((0, 1, 0), np.pi / 2)), radius=0.015, half_height=0.2)
+    builder.add_shape_mesh(builder.add_body(xform=wp.transform((0, 0, 0.94), turn((0, 1, 0), np.pi / 2))), mesh=mesh_of(solids.chain_link(0.08, 0.015)))
+    model = builder.finalize()
+    state = run(model, tandem.newton.CollisionPipeline(model), newton.solvers.SolverXPBD(model, iterations=10), 1, 500)
+    assert state.body_q.numpy()[0, 2] == pytest.approx(1 + 0.015 - 0.065, abs=0.005)
 
 
 def test_worlds_at_one_place_do_not_meet():
@@ -156,7 +196,7 @@ def test_within_margins_there_are_points():
             assert rows(contacts, "point0")[k, 2] == pytest.approx(0.1, abs=1e-6)
         if expected:
             deepest = distance.numpy()[:count].argmin()
-            assert distance.numpy()[deepest] == pytest.approx(height - 0.2 - 0.02, abs=1e-6) and distance.numpy()[:count].max() <= 0
+            assert distance.numpy()[deepest] == pytest.approx(height - 0.2 - 0.02, abs=1e-6) and distance.numpy()[:count].max() <= 1e-6
             np.testing.assert_allclose(rows(contacts, "point1")[deepest], [0, 0, -0.1], atol=1e-5)
 
 

@@ -83,7 +83,9 @@ nb::tuple statistics(const Asset& asset);
 void add_assets(nb::module_& module);
 void add_builder(nb::module_& module);
 void add_filters(nb::module_& module);
+void add_mujoco(nb::module_& module);
 void add_readers(nb::module_& module);
 void add_scenes(nb::module_& module);
+void add_touches(nb::module_& module);
 
 }  // namespace tandem::python

@@ -12,6 +12,8 @@ NB_MODULE(_tandem, module) {
   tandem::python::add_assets(module);
   tandem::python::add_builder(module);
   tandem::python::add_filters(module);
+  tandem::python::add_mujoco(module);
   tandem::python::add_readers(module);
   tandem::python::add_scenes(module);
+  tandem::python::add_touches(module);
 }

@@ -11,6 +11,7 @@ Needs the package `mujoco`; tried with 3.17 and 4.0.
 
 from __future__ import annotations
 
+import functools
 from typing import Any, Literal
 
 import mujoco  # type: ignore[import-untyped,import-not-found,unused-ignore]
@@ -18,58 +19,92 @@ import numpy as np
 from numpy.typing import NDArray
 
 import tandem
-from tandem._solver_pairs import Touches, asked_pairs
+from tandem import _shapes, _tandem
+from tandem._poses import explained
+from tandem._scene import cores_of
+from tandem._solver_pairs import asked_pairs
 
 __all__ = ["MeshContacts"]
 
-_Array = NDArray[np.float64]
-# Contacts have a surface velocity, and may be speculative, from MuJoCo 4 on.
-_CONTACT_FIELDS = [name for name in dir(mujoco.MjContact) if not name.startswith("_")]
+_Effort = Literal["default", "fast", "best"]
+_Type = mujoco.mjtGeom
+_PRIMITIVES = {_Type.mjGEOM_SPHERE: "sphere", _Type.mjGEOM_CAPSULE: "capsule", _Type.mjGEOM_ELLIPSOID: "ellipsoid", _Type.mjGEOM_CYLINDER: "cylinder",
+               _Type.mjGEOM_BOX: "box"}
+_SHAPES = [_Type.mjGEOM_PLANE, _Type.mjGEOM_HFIELD, *_PRIMITIVES, _Type.mjGEOM_MESH]  # in the order in which a contact names its two geoms
 _INTEGRATORS_THAT_COLLIDE = {mujoco.mjtIntegrator.mjINT_RK4: "RK4", mujoco.mjtIntegrator.mjINT_DISCRETE: "discrete"}
 _FLAGS_THAT_COLLIDE = {flag: name for name in ("sleep", "speculative") if (flag := mujoco.mjtEnableBit.__members__.get(f"mjENBL_{name.upper()}"))}
-_LEAST_FRICTION = 1e-5  # mjMINMU
-_LEAST_MIX = 1e-15  # mjMINVAL
+_NO_CONTACTS = int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT)
+_OVERRIDE = int(mujoco.mjtEnableBit.mjENBL_OVERRIDE)
+_SLABS = 16  # widths of a plane's slab, each four times that of the one before: the last is 10^9 times as wide as a mesh
 
 
 class MeshContacts:
-    """Finds the contacts between mesh geoms of a model by Tandem, and leaves all others to MuJoCo.
+    """Finds the contacts of a model's mesh geoms by Tandem, and leaves those of two other geoms to MuJoCo.
 
-    The meshes are those of the model, with all their faces; their hulls play no part. A pair of geoms has the points of its manifolds, each with
-    the manifold's normal and its depth; where it is apart by less than its margin and gap, the points that are, found along the way from one to the
-    other. Which pairs may collide is MuJoCo's rule (contype and conaffinity, weld and parent bodies, <exclude>, <pair>), taken from the model when
-    this is made; the callback mjcb_contactfilter is not asked. Margin, gap, condim, friction, solref, solimp and what else a contact has are combined
-    as MuJoCo does, from the model as it is in each call. A mesh that is wholly within another does not touch it.
+    The meshes are those of the model, with all their faces; their hulls play no part. What they meet are meshes too: boxes and height fields as they are, planes
+    as slabs that reach beyond all that could touch them, and meshes of spheres, capsules, ellipsoids and cylinders whose faces lie between the shape scaled by
+    1 - tolerance and by 1 + tolerance. A pair of geoms has the points of its manifolds, each with the manifold's normal and its depth; the deepest, where it
+    alone is deep, acts through the manifold's centre. Where a pair is apart by less than its margin and gap, it has the points that are, found along the way from
+    one to the other. Which pairs may collide is MuJoCo's rule (contype and conaffinity,
+    weld and parent bodies, <exclude>, <pair>); it, meshes, sizes and height fields are taken from the model when this is made, and the callback
+    mjcb_contactfilter is not asked. Margin, gap, condim, friction, solref, solimp and what else a contact has are combined as MuJoCo does, from the model as it is
+    in each call. A geom that is wholly within another does not touch it; a mesh wholly below a plane has MuJoCo's contacts. Geoms of type sdf, and flexes, are
+    MuJoCo's.
 
     One call at a time; for threads that each have an MjData, make one for each.
 
     Args:
         model: not changed.
+        tolerance: 1e-6 to 0.5, the error of round shapes as a part of their size.
         most_points: of a manifold, 1 to 7.
         threads: of a scene.
         effort: as of tandem.build().
 
     Raises:
-        ValueError: no two mesh geoms of the model may collide, or most_points is not 1 to 7.
+        ValueError: no mesh geom of the model may collide, or tolerance or most_points is out of range.
     """
 
-    def __init__(self, model: mujoco.MjModel, *, most_points: int = 7, threads: int = 1, effort: Literal["default", "fast", "best"] = "default") -> None:
+    def __init__(self, model: mujoco.MjModel, *, tolerance: float = 0.002, most_points: int = 7, threads: int = 1, effort: _Effort = "default") -> None:
         if not 1 <= most_points <= 7:
             raise ValueError(f"most_points {most_points}: is not from 1 to 7")
-        self.model, self.most_points, self.threads = model, most_points, threads
+        shapes = _shapes.Shapes(tolerance)
+        self.model, self.tolerance, self.most_points, self.threads = model, tolerance, most_points, threads
+        self._option = model.opt
         geom_pairs, explicit = _pairs_that_may_collide(model)
         if len(geom_pairs) == 0:
-            raise ValueError("no two mesh geoms of the model may collide")
-        self.geoms = np.unique(geom_pairs)  #: the geoms that Tandem looks at, ascending
-        self._is_ours = np.zeros(model.ngeom, bool)
-        self._is_ours[self.geoms] = True
-        meshes, asset = np.unique(model.geom_dataid[self.geoms], return_inverse=True)
-        self.assets = [_asset_of(model, mesh, effort) for mesh in meshes]  #: of the meshes that these geoms have
-        self.instances = np.zeros(len(self.geoms), tandem.INSTANCE)  #: the geoms, posed as in the last call
-        self.instances["asset"] = asset
-        self._scene = tandem.Scene(self.assets, threads=threads)
-        rows = np.searchsorted(self.geoms, geom_pairs)
-        self._asked = asked_pairs(len(self.geoms), rows)
-        self._explicit = {(int(a), int(b)): int(pair) for (a, b), pair in zip(geom_pairs, explicit) if pair >= 0}
+            raise ValueError("no mesh geom of the model may collide")
+        geoms = np.unique(geom_pairs)
+        kind = model.geom_type[geoms]
+        self.geoms = geoms[np.argsort(kind, kind="stable")]  #: those that Tandem looks at, by type and number
+        body_of = np.zeros(model.ngeom, np.intp)
+        body_of[self.geoms] = np.arange(len(self.geoms))
+        pairs = np.sort(body_of[geom_pairs], axis=1)
+        is_mesh, is_plane = (np.sort(kind) == shape for shape in (_Type.mjGEOM_MESH, _Type.mjGEOM_PLANE))
+        radius = np.zeros(len(self.geoms))
+        asset = np.zeros(len(self.geoms), np.uint32)
+        places: dict[tuple[float, ...], tuple[int, float]] = {}  # of each shape, its asset and its radius
+        self.assets: list[tandem.Asset] = []  #: of the shapes that these geoms have
+        for body in np.flatnonzero(~is_plane):
+            shape = _shape_of(model, self.geoms[body])
+            if shape not in places:
+                vertices, faces = _solid_of(model, shapes, shape)
+                places[shape] = len(self.assets), float(np.linalg.norm(vertices, axis=1).max())
+                self.assets.append(tandem.build(vertices, faces, effort=effort))
+            asset[body], radius[body] = places[shape]
+        width = 2.0 ** np.ceil(np.log2(4 * radius[is_mesh].max()))
+        slabs = len(self.assets), _SLABS, width
+        if is_plane.any():
+            self.assets += [tandem.build(*_shapes.slab(width * 4.0**k), effort="fast") for k in range(_SLABS)]
+        explicit_pairs = np.column_stack([pairs, explicit])[explicit >= 0]
+        asked, filter = asked_pairs(pairs, is_mesh)
+        self._native = _tandem.MujocoContacts(
+            cores_of(self.assets), asset, asked, filter, threads, most_points, model, self.geoms.astype(np.uint32), radius,
+            _sorted_rows(explicit_pairs), _sorted_rows(pairs[is_plane[pairs[:, 0]]]), slabs, _contact_layout())
+
+    @property
+    def instances(self) -> NDArray[np.void]:
+        """The geoms, posed as in the last call, array of tandem.INSTANCE."""
+        return np.frombuffer(self._native.instances(), tandem.INSTANCE)
 
     def step(self, data: mujoco.MjData, count: int = 1) -> None:
         """Does what mj_step(model, data, count) does, with Tandem's contacts.
@@ -79,7 +114,7 @@ class MeshContacts:
                 MuJoCo does not open to others.
             MemoryError, tandem.Error: as of collide().
         """
-        model, option = self.model, self.model.opt
+        model, option = self.model, self._option
         if option.integrator in _INTEGRATORS_THAT_COLLIDE:
             raise ValueError(f"the integrator {_INTEGRATORS_THAT_COLLIDE[option.integrator]} looks for contacts by itself; "
                              "take Euler, implicit or implicitfast")
@@ -97,7 +132,7 @@ class MeshContacts:
 
     def forward(self, data: mujoco.MjData) -> None:
         """Does what mj_forward(model, data) does, with Tandem's contacts. Raises what step() raises, whatever the integrator."""
-        model, flags = self.model, self.model.opt.enableflags
+        model, flags = self.model, self._option.enableflags
         for flag, name in _FLAGS_THAT_COLLIDE.items():
             if flags & flag:
                 raise ValueError(f"the flag {name} looks for contacts by itself; disable it")
@@ -124,116 +159,82 @@ class MeshContacts:
             MemoryError: data has no room for all contacts (<size memory="..."/>); data.contact then has MuJoCo's other contacts alone.
             tandem.Error: a geom's pose is not a number.
         """
-        mujoco.mj_collision(self.model, data)
-        if self.model.opt.disableflags & (mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT):
+        model, option = self.model, self._option
+        mujoco.mj_collision(model, data)
+        if option.disableflags & _NO_CONTACTS:
             return 0
-        self._drop_hull_contacts(data)
-        self.instances["rotation"] = data.geom_xmat[self.geoms].reshape(-1, 3, 3)
-        self.instances["translation"] = data.geom_xpos[self.geoms]
-        touches = Touches(self._scene, self.instances, self.most_points, self._asked)
-        if (reach := self._reach()) > 0:
-            touches.add_near(self._reach_of, reach)
-        geom = np.stack([self.geoms[touches.a], self.geoms[touches.b]], axis=1)
-        contact = self._parameters(geom)
-        contact |= {"dist": touches.gap, "pos": touches.position, "frame": _frames(touches.normal)}
-        if "surfacevel" in _CONTACT_FIELDS:
-            contact["surfacevel"] = _surface_velocity(self.model, data, geom, touches.position, contact["frame"])
-        contact["exclude"] = touches.gap >= contact["includemargin"]  # in the gap
-        near = touches.gap <= contact["includemargin"] + contact.pop("gap")
-        if not near.all():
-            contact = {name: values[near] for name, values in contact.items()}
-        _append(self.model, data, contact)
-        return len(contact["dist"])
-
-    def _drop_hull_contacts(self, data: mujoco.MjData) -> None:
-        geom = data.contact.geom
-        keep = np.flatnonzero(~((geom >= 0) & self._is_ours[geom]).all(axis=1))
-        if len(keep) == len(geom):
-            return
-        if len(keep) > 0 and keep[-1] >= len(keep):
-            contact = data.contact
-            for name in _CONTACT_FIELDS:
-                values = getattr(contact, name)
-                values[:len(keep)] = values[keep]
-        data.ncon = len(keep)
-
-    def _reach(self) -> float:
-        """Returns the largest sum of margin and gap of any pair, 0 at least."""
-        model = self.model
-        pairs = list(self._explicit.values())
-        if model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_OVERRIDE:
-            margin = max(model.opt.o_margin, 0.0)
-            gap = np.concatenate([model.geom_gap[self.geoms] * 2, model.pair_gap[pairs]])
-            return float(margin + gap.max(initial=0))
-        one = (model.geom_margin + model.geom_gap)[self.geoms]
-        return float(np.concatenate([2 * one, (model.pair_margin + model.pair_gap)[pairs]]).max(initial=0))
-
-    def _reach_of(self, a: NDArray[np.intp], b: NDArray[np.intp]) -> _Array:
-        contact = self._parameters(np.stack([self.geoms[a], self.geoms[b]], axis=1))
-        return np.asarray(contact["includemargin"] + contact["gap"])
-
-    def _parameters(self, geom: NDArray[np.intp]) -> dict[str, Any]:
-        """Returns what MuJoCo combines of the properties of two geoms (n, 2), or takes from the <pair> that they are, by the names of MjContact; and `gap`."""
-        model = self.model
-        priority, mix = model.geom_priority[geom], model.geom_solmix[geom]
-        is_small = mix < _LEAST_MIX
-        mix = np.where(is_small.all(axis=1, keepdims=True), 1.0, np.where(is_small, 0.0, mix))
-        share = mix[:, 0] / mix.sum(axis=1)
-        first, second = priority[:, 0] > priority[:, 1], priority[:, 0] < priority[:, 1]
-        share = np.where(first, 1.0, np.where(second, 0.0, share))[:, None]
-
-        def mixed(values: NDArray[Any]) -> NDArray[Any]:
-            both = values[geom]
-            return np.asarray(share * both[:, 0] + (1 - share) * both[:, 1])
-
-        def combined(values: NDArray[Any], rule: Any) -> NDArray[Any]:
-            both, shape = values[geom], (-1,) + (1,) * (values.ndim - 1)
-            return np.where(first.reshape(shape), both[:, 0], np.where(second.reshape(shape), both[:, 1], rule(both[:, 0], both[:, 1])))
-
-        solref = model.geom_solref[geom]
-        is_standard = ((solref[:, :, 0] > 0).all(axis=1) | first | second)[:, None]
-        friction = combined(model.geom_friction, np.maximum)[:, [0, 0, 1, 2, 2]]
-        result = {
-            "geom": geom, "dim": combined(model.geom_condim, np.maximum), "friction": friction, "adhesion": combined(model.geom_adhesion, np.add),
-            "solref": np.where(is_standard, mixed(model.geom_solref), solref.min(axis=1)), "solreffriction": np.zeros((len(geom), mujoco.mjNREF)),
-            "solimp": mixed(model.geom_solimp), "includemargin": model.geom_margin[geom].sum(axis=1), "gap": model.geom_gap[geom].sum(axis=1),
-        }
-        self._apply_explicit(geom, result)
-        if model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_OVERRIDE:
-            option = model.opt
-            for name, value in (("friction", option.o_friction), ("solref", option.o_solref), ("solreffriction", option.o_solref),
-                                ("solimp", option.o_solimp), ("includemargin", option.o_margin)):
-                result[name][:] = value
-        np.maximum(result["friction"], _LEAST_FRICTION, out=result["friction"])
-        return result | {"geom1": geom[:, 0], "geom2": geom[:, 1]}
-
-    def _apply_explicit(self, geom: NDArray[np.intp], result: dict[str, Any]) -> None:
-        if not self._explicit:
-            return
-        pair = np.array([self._explicit.get((int(a), int(b)), -1) for a, b in geom], np.intp)
-        rows, pair = np.flatnonzero(pair >= 0), pair[pair >= 0]
-        for name, field in (("dim", "dim"), ("friction", "friction"), ("solref", "solref"), ("solreffriction", "solreffriction"), ("solimp", "solimp"),
-                            ("includemargin", "margin"), ("gap", "gap"), ("adhesion", "adhesion")):
-            result[name][rows] = getattr(self.model, f"pair_{field}")[pair]
+        try:
+            count = self._native.find(data.geom_xpos, data.geom_xmat, option.o_margin if option.enableflags & _OVERRIDE else None)
+        except tandem.Error as error:
+            raise explained(error, self.instances) from None
+        before = data.ncon
+        kept = self._native.drop_hulls(data.contact.dist) if before else 0
+        for _ in range(kept + count - before):
+            if mujoco.mj_addContact(model, data, _BLANK):
+                data.ncon = kept
+                raise MemoryError(f"{count} contacts of meshes have no room in MjData: give the model <size memory=\"...\"/> more")
+        data.ncon = kept + count
+        if count:
+            self._native.write(data.contact.dist)
+        return int(count)
 
 
-def _asset_of(model: mujoco.MjModel, mesh: int, effort: Literal["default", "fast", "best"]) -> tandem.Asset:
-    vertex, face = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
-    vertices = model.mesh_vert[vertex:vertex + model.mesh_vertnum[mesh]].astype(np.float64)
-    return tandem.build(vertices, model.mesh_face[face:face + model.mesh_facenum[mesh]], effort=effort)
+_BLANK = mujoco.MjContact()
+
+
+@functools.cache
+def _contact_layout() -> dict[str, int]:
+    """Returns where mjContact has its members, in bytes from `dist` on, and its `size`."""
+    model = mujoco.MjModel.from_xml_string("<mujoco/>")
+    data = mujoco.MjData(model)
+    for _ in range(2):
+        mujoco.mj_addContact(model, data, _BLANK)
+    contact = data.contact
+    places = {name: getattr(contact, name).__array_interface__["data"][0] for name in dir(contact) if not name.startswith("_")}
+    return {name: place - places["dist"] for name, place in places.items()} | {"size": contact.dist.strides[0]}
+
+
+def _sorted_rows(rows: NDArray[np.intp]) -> NDArray[np.uint32]:
+    return np.unique(rows.astype(np.uint32), axis=0)
+
+
+def _shape_of(model: mujoco.MjModel, geom: int) -> tuple[float, ...]:
+    """Returns the type of a geom, and its mesh, its height field or its size: the same for the same shape."""
+    kind = int(model.geom_type[geom])
+    if kind in (_Type.mjGEOM_MESH, _Type.mjGEOM_HFIELD):
+        return kind, int(model.geom_dataid[geom])
+    return kind, *model.geom_size[geom].tolist()
+
+
+def _solid_of(model: mujoco.MjModel, shapes: _shapes.Shapes, shape: tuple[float, ...]) -> _shapes.Solid:
+    kind, (x, y, z) = shape[0], (*shape[1:], 0, 0)[:3]
+    if kind in _PRIMITIVES:
+        return shapes.of(_PRIMITIVES[kind], x, y, z)
+    place = int(shape[1])
+    if kind == _Type.mjGEOM_HFIELD:
+        (x, y, z, base), rows, columns, first = (values[place] for values in (model.hfield_size, model.hfield_nrow, model.hfield_ncol, model.hfield_adr))
+        heights = model.hfield_data[first:first + rows * columns].reshape(rows, columns).astype(float)
+        return _shapes.height_field(x, y, base, z * heights)
+    vertex, face = model.mesh_vertadr[place], model.mesh_faceadr[place]
+    vertices = model.mesh_vert[vertex:vertex + model.mesh_vertnum[place]].astype(np.float64)
+    return vertices, model.mesh_face[face:face + model.mesh_facenum[place]]
 
 
 def _pairs_that_may_collide(model: mujoco.MjModel) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Pairs of mesh geoms, (m, 2), the lower one first, and of each its row among the model's <pair>s, or -1."""
-    is_mesh = model.geom_type == mujoco.mjtGeom.mjGEOM_MESH
-    rows = np.flatnonzero(is_mesh[model.pair_geom1] & is_mesh[model.pair_geom2]) if model.npair else np.empty(0, np.intp)
+    """Pairs of geoms, a mesh among them, (m, 2), the lower one first, and of each its row among the model's <pair>s, or -1."""
+    is_mesh, is_ours = model.geom_type == _Type.mjGEOM_MESH, np.isin(model.geom_type, _SHAPES)
+
+    def has_mesh(i: NDArray[np.intp], j: NDArray[np.intp]) -> NDArray[np.bool_]:
+        return np.asarray((is_mesh[i] | is_mesh[j]) & is_ours[i] & is_ours[j])
+
+    rows = np.flatnonzero(has_mesh(model.pair_geom1, model.pair_geom2)) if model.npair else np.empty(0, np.intp)
     named = np.sort(np.stack([model.pair_geom1[rows], model.pair_geom2[rows]], axis=1).astype(np.intp), axis=1).reshape(-1, 2)
-    geoms = np.flatnonzero(is_mesh & ((model.geom_contype != 0) | (model.geom_conaffinity != 0)))
+    geoms = np.flatnonzero(is_ours & ((model.geom_contype != 0) | (model.geom_conaffinity != 0)))
     i, j = (geoms[index] for index in np.triu_indices(len(geoms), 1))
     body = model.geom_bodyid
     weld = model.body_weldid[body]
     parent = model.body_weldid[model.body_parentid[weld]]
-    may = (model.geom_contype[i] & model.geom_conaffinity[j] | model.geom_contype[j] & model.geom_conaffinity[i]) != 0
+    may = has_mesh(i, j) & ((model.geom_contype[i] & model.geom_conaffinity[j] | model.geom_contype[j] & model.geom_conaffinity[i]) != 0)
     may &= weld[i] != weld[j]
     if not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT:
         may &= (weld[i] == 0) | (weld[j] == 0) | (weld[i] != parent[j]) & (weld[j] != parent[i])
@@ -242,41 +243,3 @@ def _pairs_that_may_collide(model: mujoco.MjModel) -> tuple[NDArray[np.intp], ND
     may &= ~np.isin(i * model.ngeom + j, named[:, 0] * model.ngeom + named[:, 1])
     pairs = np.concatenate([np.stack([i[may], j[may]], axis=1), named])
     return pairs, np.concatenate([np.full(int(may.sum()), -1, np.intp), rows])
-
-
-def _frames(normal: _Array) -> _Array:
-    """Normal and two tangents, (n, 9), chosen as mju_makeFrame() does."""
-    row = np.arange(len(normal))
-    axis = np.where(np.abs(normal[:, 1]) < 0.5, 1, 2)
-    tangent = -normal[row, axis][:, None] * normal
-    tangent[row, axis] += 1
-    tangent /= np.sqrt(np.einsum("ni,ni->n", tangent, tangent))[:, None]
-    frames = np.empty((len(normal), 9))
-    frames[:, :3], frames[:, 3:6] = normal, tangent
-    frames[:, 6:] = normal[:, (1, 2, 0)] * tangent[:, (2, 0, 1)] - normal[:, (2, 0, 1)] * tangent[:, (1, 2, 0)]
-    return frames
-
-
-def _surface_velocity(model: mujoco.MjModel, data: mujoco.MjData, geom: NDArray[np.intp], position: _Array, frame: _Array) -> _Array:
-    """Returns the surface velocity of geom[:, 1] against geom[:, 0] at the contacts, along both tangents, and spin about the normal: (n, 3)."""
-    if not model.geom_surfacevel.any():
-        return np.zeros((len(geom), 3))
-    rotation, axes = data.geom_xmat.reshape(-1, 3, 3)[geom], frame.reshape(-1, 3, 3)
-    linear, spin = (np.einsum("nsij,nsj->nsi", rotation, model.geom_surfacevel[geom][:, :, part]) for part in (slice(0, 3), slice(3, 6)))
-    linear += np.cross(spin, position[:, None] - data.geom_xpos[geom])
-    along = np.einsum("nij,nj->ni", axes[:, 1:], linear[:, 1] - linear[:, 0])
-    return np.column_stack([along, np.einsum("ni,ni->n", axes[:, 0], spin[:, 1] - spin[:, 0])])
-
-
-def _append(model: mujoco.MjModel, data: mujoco.MjData, contact: dict[str, Any]) -> None:
-    """Adds the contacts, whose fields have a row for each, to data.contact."""
-    before = data.ncon
-    blank = mujoco.MjContact()
-    blank.flex[:], blank.elem[:], blank.vert[:], blank.efc_address = -1, -1, -1, -1
-    for _ in range(len(contact["dist"])):
-        if mujoco.mj_addContact(model, data, blank):
-            data.ncon = before
-            raise MemoryError(f"{len(contact['dist'])} contacts of meshes have no room in MjData: give the model <size memory=\"...\"/> more")
-    added = data.contact
-    for name, values in contact.items():
-        getattr(added, name)[before:] = values

@@ -17,60 +17,72 @@ import numpy.typing as npt
 import warp as wp  # type: ignore[import-untyped,import-not-found,unused-ignore]
 
 import tandem
-from tandem._solver_pairs import Touches, asked_pairs
+from tandem import _shapes, _tandem
+from tandem._poses import explained
+from tandem._scene import cores_of
+from tandem._solver_pairs import asked_pairs
 
 __all__ = ["CollisionPipeline"]
 
 _Array = npt.NDArray[np.float64]
 _Effort = Literal["default", "fast", "best"]
+_MESH, _SHAPES = newton.GeoType.MESH, {newton.GeoType[name.upper()]: name for name in _shapes.PRIMITIVES}
+_TOUCH = np.dtype([("a", "<u4"), ("b", "<u4"), ("normal", "<f8", (3,)), ("position", "<f8", (3,)), ("gap", "<f8")])  # struct Touch of the extension
 _NOT_TAKEN = {"broad_phase": "which pairs there are is decided here", "shape_pairs_filtered": "which pairs there are is decided here",
               "contact_matching": "points of meshes have no match", "contact_report": "points of meshes have no match",
               "body_pair_reduction": "points of meshes are few", "speculative_contact_gap_max": "points of meshes are where surfaces are now"}
 
 
 class CollisionPipeline:
-    """Newton's collision pipeline, but that Tandem finds the contacts between meshes.
+    """Newton's collision pipeline, but that Tandem finds the contacts of meshes with meshes, boxes and round shapes.
 
-    Pairs of mesh shapes have the points of their manifolds, each with the manifold's normal and the points of both surfaces; where shapes have margins
-    and the surfaces are apart by less than both, the points that are, found along the way from one to the other. Gaps, by which Newton looks for
-    contacts before there are any, play no part between meshes: collide in every substep. All other pairs, particles and soft contacts are Newton's.
-    Which pairs may collide is told by model.shape_contact_pairs, as it is when this is made. Meshes of a model on a GPU are looked at by the CPU, and
-    collide() waits for the GPU.
+    These pairs have the points of their manifolds, each with the manifold's normal and the places of both surfaces along it; the deepest, where it alone is
+    deep, acts through the manifold's centre. Where shapes have margins and the surfaces are apart by less than both, they have the points that are, found along
+    the way from one to the other. Boxes are meshes as they are. So are spheres,
+    capsules, ellipsoids, cylinders and cones, with faces between the shape scaled by 1 - tolerance and by 1 + tolerance. Gaps, by which Newton looks for
+    contacts before there are any, play no part here: collide in every substep. All other pairs, such as those with planes and height fields, particles and
+    soft contacts are Newton's. Which pairs may collide is told by model.shape_contact_pairs; it and the shapes are as they are when this is made. Shapes of a
+    model on a GPU are looked at by the CPU, and collide() waits for the GPU.
 
-    A mesh that is wholly within another does not touch it.
+    A shape that is wholly within another does not touch it.
 
     Args:
         model: of any number of worlds.
+        tolerance: 1e-6 to 0.5, the error of round shapes as a part of their size.
         most_points: of a manifold, 1 to 7.
         threads: of a scene.
         effort: as of tandem.build().
         options: of newton.CollisionPipeline, such as rigid_contact_max, the room for contacts, of which Newton has an estimate.
     """
 
-    def __init__(self, model: newton.Model, *, most_points: int = 7, threads: int = 1, effort: _Effort = "default", **options: Any):
+    def __init__(self, model: newton.Model, *, tolerance: float = 0.002, most_points: int = 7, threads: int = 1, effort: _Effort = "default", **options: Any):
         for name in options.keys() & _NOT_TAKEN.keys():
             raise ValueError(f"{name} is not taken: {_NOT_TAKEN[name]}")
-        self.model, self.most_points = model, most_points
+        if not 1 <= most_points <= 7:
+            raise ValueError(f"most_points {most_points}: is not from 1 to 7")
+        self.model, self.tolerance, self.most_points = model, tolerance, most_points
 
         def values(name: str) -> npt.NDArray[Any]:
             return np.asarray(getattr(model, name).numpy())
 
-        pairs = values("shape_contact_pairs").reshape(-1, 2).astype(np.intp)
-        is_ours = (values("shape_type")[pairs] == newton.GeoType.MESH).all(axis=1)
+        pairs, kind = values("shape_contact_pairs").reshape(-1, 2).astype(np.intp), values("shape_type")
+        is_barrel = (kind == newton.GeoType.CYLINDER) & (values("shape_scale")[:, 2] != 0)
+        is_known = np.isin(kind, [_MESH, *_SHAPES]) & ~is_barrel
+        is_ours = (kind[pairs] == _MESH).any(axis=1) & is_known[pairs].all(axis=1)
         others: Any = wp.array(pairs[~is_ours].astype(np.int32), dtype=wp.vec2i, device=model.device)
         self.others = newton.CollisionPipeline(model, broad_phase="explicit", shape_pairs_filtered=others, **options)
-        self.shapes = np.unique(pairs[is_ours])  #: the mesh shapes that Tandem looks at, ascending
+        self.shapes = np.unique(pairs[is_ours])  #: those that Tandem looks at, ascending
         body = values("shape_body")[self.shapes]
         self._body, self._is_static = np.maximum(body, 0), body < 0
         transform = values("shape_transform").astype(np.float64)[self.shapes]
         self._in_body = tandem.rotations(xyzw=transform[:, 3:]), transform[:, :3]
         self._margin = values("shape_margin").astype(np.float64)[self.shapes]
-        self.assets, asset = _assets_of(model, self.shapes, effort)  #: of the meshes that these shapes have, at their scales
+        self.assets, asset = _assets_of(model, self.shapes, _shapes.Shapes(tolerance), effort)  #: of these shapes, at their scales
         self.instances = np.zeros(len(self.shapes), tandem.INSTANCE)  #: the shapes, posed as in the last call
         self.instances["asset"] = asset
         if len(self.shapes):
-            self._asked = asked_pairs(len(self.shapes), np.searchsorted(self.shapes, np.sort(pairs[is_ours], axis=1)))
-            self._scene = tandem.Scene(self.assets, threads=threads)
+            asked, filter = asked_pairs(np.searchsorted(self.shapes, np.sort(pairs[is_ours], axis=1)), kind[self.shapes] == _MESH)
+            self._touches = _tandem.Touches(cores_of(self.assets), np.array(asset, np.uint32), asked, filter, self._margin, threads, most_points)
 
     def contacts(self) -> newton.Contacts:
         """Room for the contacts of collide()."""
@@ -95,33 +107,38 @@ class CollisionPipeline:
         rotation, inner = tandem.rotations(xyzw=body[:, 3:]), self._in_body
         self.instances["rotation"] = rotation @ inner[0]
         self.instances["translation"] = np.einsum("nij,nj->ni", rotation, inner[1]) + body[:, :3]
-        touches = Touches(self._scene, self.instances, self.most_points, self._asked)
-        if self._margin.max() > 0:
-            touches.add_near(lambda a, b: self._margin[a] + self._margin[b], 2 * float(self._margin.max()))
-        margins = self._margin[touches.a], self._margin[touches.b]
-        near = touches.gap <= margins[0] + margins[1]
+        try:
+            touches = np.frombuffer(self._touches.find(self.instances), _TOUCH)
+        except tandem.Error as error:
+            raise explained(error, self.instances) from None
+        touches = touches[touches["gap"] <= self._margin[touches["a"]] + self._margin[touches["b"]]]
         sides = []
-        for i, place, margin, sign in ((touches.a, touches.in_a, margins[0], 1.0), (touches.b, touches.in_b, margins[1], -1.0)):
-            point = np.einsum("nij,nj->ni", inner[0][i], place) + inner[1][i]
-            offset = np.einsum("nji,nj->ni", rotation[i], (sign * margin)[:, None] * touches.normal)
-            sides.append((self.shapes[i][near], point[near], offset[near], margin[near]))
-        _append(contacts, sides, touches.normal[near])
-        return int(near.sum())
+        for name, sign in (("a", 1.0), ("b", -1.0)):
+            i, out = touches[name], sign * touches["normal"]
+            place = touches["position"] - 0.5 * touches["gap"][:, None] * out - body[i, :3]  # on the surface
+            margin = self._margin[i]
+            point, offset = (np.einsum("nji,nj->ni", rotation[i], vector) for vector in (place, margin[:, None] * out))
+            sides.append((self.shapes[i], point, offset, margin))
+        _append(contacts, sides, touches["normal"])
+        return len(touches)
 
 
-def _assets_of(model: newton.Model, shapes: npt.NDArray[np.intp], effort: _Effort) -> tuple[list[tandem.Asset], list[int]]:
-    """Returns an asset for each mesh and scale that the shapes have, and for each shape which asset it has."""
+def _assets_of(model: newton.Model, shapes: npt.NDArray[np.intp], solids: _shapes.Shapes, effort: _Effort) -> tuple[list[tandem.Asset], list[int]]:
+    """Returns an asset for each mesh or type, and scale, that the shapes have, and for each shape which asset it has."""
+    kind_of: Any = model.shape_type
     scale_of: Any = model.shape_scale
-    scales = scale_of.numpy().astype(np.float64)[shapes]
+    kinds, scales = kind_of.numpy()[shapes], scale_of.numpy().astype(np.float64)[shapes]
     places: dict[tuple[int, ...], int] = {}
     assets: list[tandem.Asset] = []
     asset: list[int] = []
-    for shape, scale in zip(shapes, scales):
+    for shape, kind, scale in zip(shapes, kinds, scales):
         mesh: Any = model.shape_source[shape]
-        key = (id(mesh), *scale.view(np.int64))
+        key = (kind, id(mesh) if kind == _MESH else 0, *scale.view(np.int64))
         if key not in places:
             places[key] = len(assets)
-            assets.append(tandem.build(np.asarray(mesh.vertices, np.float64).reshape(-1, 3) * scale, np.asarray(mesh.indices).reshape(-1, 3), effort=effort))
+            vertices, faces = solids.of(_SHAPES[kind], *scale) if kind != _MESH else (
+                np.asarray(mesh.vertices, np.float64).reshape(-1, 3) * scale, np.asarray(mesh.indices).reshape(-1, 3))
+            assets.append(tandem.build(vertices, faces, effort=effort))
         asset.append(places[key])
     return assets, asset
 

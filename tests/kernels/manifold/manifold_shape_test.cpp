@@ -511,6 +511,29 @@ TEST(LinksOfAChain, OverlapByNoMoreThanTheyWerePulled) {
   }
 }
 
+// A line from a point that is 3e-10 within a link began 5e-10 further on, outside of it, and met nothing.
+TEST(LinksOfAChain, OverlapByHardlyMoreThanTheyWerePulledWhereTheyHardlyTouch) {
+  RandomPoses random(8);
+  ManifoldScene scene;
+  const std::uint32_t link = scene.add_shape(ring(24, 0.1, 8, 0.02));
+  scene.add_body(link, {{{9.9999999633466830e-01, -7.3561028126816979e-05, 4.3811397271103822e-05},
+                         {4.3832081177517951e-05, 2.8120216035187884e-04, -9.9999995950204601e-01},
+                         {7.3548705288185176e-05, 9.9999995775705919e-01, 2.8120538365405956e-04}},
+                        {-2.7544207114260644e-05, 4.9879312427947298e-05, 1.6799660921096802e+00}});
+  scene.add_body(link, {{{2.3604573058166878e-05, 3.1589613094462621e-05, 9.9999999922246019e-01},
+                         {9.9999999714212451e-01, -7.1823967515038944e-05, -2.3602304117742445e-05},
+                         {7.1823221871436527e-05, 9.9999999692170705e-01, -3.1591308378375871e-05}},
+                        {-2.4195354853873141e-05, 3.3127696951851249e-05, 1.5199580192565918e+00}});
+  const Pose hanging = scene.bodies[1].pose;
+  for (int trial = 0; trial < trials(300, 5); ++trial) {
+    const double way = std::pow(10, random.uniform(-9, -5));
+    scene.bodies[1].pose =
+        after(shift(random.symmetric(way), random.symmetric(way), random.symmetric(way)), hanging);
+    scene.find();
+    for (const Manifold& m : scene.manifolds()) EXPECT_LT(m.depth, 1e-4) << trial;
+  }
+}
+
 class PipeOnPlane : public testing::TestWithParam<NamedMesh> {};
 
 TEST_P(PipeOnPlane, IsOneManifoldOfTheAreaOfTheRing) {

@@ -127,19 +127,27 @@ class DeepestLine {
 template <typename Team>
 TANDEM_HD void DeepestLine<Team>::find_seeds(const Vector3& middle, double reach, int wanted) {
   const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
-  Vector3 apart_from[kMostSeeds] = {middle}, inside[kMostSeeds];
-  std::uint32_t beside[kMostSeeds] = {};
-  for (int i = 0; i < wanted; ++i) {
-    beside[i] = lines.extreme_piece(begin_, end_, apart_from, i == 0 ? 1 : i, i == 0 ? 1 : -1);
-    apart_from[i] = memory_.pieces[beside[i]].middle();
+  // The nearest to the middle, the furthest from that, and the furthest off the line of these on either side.
+  Place place[kMostSeeds];
+  Vector3 inside[kMostSeeds], along, across;
+  place[0] = lines.nearest_place(begin_, end_, middle, reach);
+  for (int i = 1; i < wanted; ++i) {
+    if (i == 2) along = place[1].at - place[0].at;
+    if (i == 3) across = cross(cross(along, place[2].at - place[0].at), along);
+    place[i] = lines.furthest_place(begin_, end_, reach, [&](const Vector3& x) {
+      const Vector3 from = x - place[0].at;
+      if (i == 1) return dot(from, from);
+      const Vector3 off = cross(along, from);
+      return i == 2 ? dot(off, off) : -dot(across, from);
+    });
   }
   const double most = greater(bodies_.a.shape->diagonal, bodies_.b.shape->diagonal);
-  const std::uint32_t found = lines.go_inside(beside, wanted, most, reach, inside);
+  const std::uint32_t found = lines.go_inside(place, wanted, most, reach, inside);
   if (team_.rank() == 0) {
     int count = 0;
     for (int i = 0; i < wanted; ++i) {
       if ((found >> i & 1u) == 0) continue;
-      shared_.seeds.at[count] = inside[i], shared_.seeds.beside[count] = beside[i];
+      shared_.seeds.at[count] = inside[i], shared_.seeds.beside[count] = place[i].piece;
       ++count;
     }
     shared_.seeds.count = count;

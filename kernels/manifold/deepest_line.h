@@ -25,6 +25,10 @@ inline constexpr int kMostSeeds = 4;
 /// A line is the deepest if none is deeper by more than this part.
 inline constexpr double kDeepEnough = 1e-6;
 
+/// If the deepest line through the first points is deeper than this part of the patch's reach, the overlap is
+/// no flat one, and may have several places where it is deep. Lines go through more points then.
+inline constexpr double kNotFlat = 0.1;
+
 /// The search looks at no more lines than this, beside those through the first points.
 inline constexpr int kMostSteps = 16;
 
@@ -95,11 +99,14 @@ class DeepestLine {
   TANDEM_HD void begin_with_seeds(const PatchFrame& frame, double reach);
 
   /// Finds shared.best; none where the bodies do not overlap along the normal. middle, reach: a ball around
-  /// the pieces. If there are several regions, the line goes through it. The search ends as soon as a line is
-  /// as deep as `enough`.
-  TANDEM_HD void find(const PatchFrame& frame, const Vector3& middle, double reach, double enough);
+  /// the pieces. If there are several regions, the line goes through it. looks_around: whether an overlap
+  /// that is not flat is looked through. The search ends as soon as a line is as deep as `enough`.
+  TANDEM_HD void find(const PatchFrame& frame, const Vector3& middle, double reach, double enough,
+                      bool looks_around);
 
  private:
+  TANDEM_HD int follow_lines_through(const Vector3* points, int count, double reach, double& depth);
+  TANDEM_HD_SELDOM void look_around(const Vector3& middle, double reach);
   TANDEM_HD void begin_half_spaces(const Vector3& middle, double reach);
   TANDEM_HD void learn(int side, const Crossing& surface, HalfSpace& out) const;
   /// Forgets half-spaces beyond which the bodies go on, up to these heights on a line.
@@ -155,33 +162,98 @@ TANDEM_HD void DeepestLine<Team>::find_seeds(const Vector3& middle, double reach
   team_.sync();
 }
 
+/// Follows the lines along the normal through points of the overlap, LineMemory::kMost / 2 at most. Result:
+/// the point on whose line the bodies overlap most, -1 if they overlap on none. depth: how much that is.
 template <typename Team>
-TANDEM_HD void DeepestLine<Team>::begin_with_seeds(const PatchFrame& frame, double reach) {
+TANDEM_HD int DeepestLine<Team>::follow_lines_through(const Vector3* points, int count, double reach,
+                                                      double& depth) {
   LineQuestion* const line = shared_.lines.line;
   LineQuestions questions(bodies_, line);
-  const auto count = 2 * static_cast<std::uint32_t>(shared_.seeds.count);
-  if (team_.rank() == 0) shared_.frame = frame;
-  team_.sync();
-  for (std::uint32_t i = team_.rank(); i < count; i += team_.size()) {
-    const Vector3& seed = shared_.seeds.at[i / 2];
-    const int side = static_cast<int>(i % 2);
-    const double from = frame.height(seed);
-    questions.ask(i, shared_.frame, side, side == 0 ? 1 : -1, frame.flat(seed), from,
-                  side == 0 ? from : -INFINITY, side == 0 ? INFINITY : from, reach, kGrazes);
+  team_.sync();  // all have read the answers before
+  for (int i = static_cast<int>(team_.rank()); i < 2 * count; i += static_cast<int>(team_.size())) {
+    const Vector3& point = points[i / 2];
+    const int side = i % 2;
+    const double from = shared_.frame.height(point);
+    questions.ask(static_cast<std::uint32_t>(i), shared_.frame, side, side == 0 ? 1 : -1,
+                  shared_.frame.flat(point), from, side == 0 ? from : -INFINITY,
+                  side == 0 ? INFINITY : from, reach, kGrazes);
   }
   team_.sync();
-  if (count > 0) walk_lines(team_, questions, count, line);
+  if (count > 0) walk_lines(team_, questions, 2 * static_cast<std::uint32_t>(count), line);
+  int deepest = -1;
+  depth = 0;
+  for (int i = 0; i < count; ++i) {
+    const Crossing &top = line[2 * i].best, &bottom = line[2 * i + 1].best;
+    if (top.found() && bottom.found() && top.height - bottom.height > depth)
+      depth = top.height - bottom.height, deepest = i;
+  }
+  return deepest;
+}
+
+template <typename Team>
+TANDEM_HD void DeepestLine<Team>::begin_with_seeds(const PatchFrame& frame, double reach) {
+  team_.sync();
+  if (team_.rank() == 0) shared_.frame = frame;
+  team_.sync();
+  double depth;
+  const int from = follow_lines_through(shared_.seeds.at, shared_.seeds.count, reach, depth);
   if (team_.rank() == 0) {
     shared_.best = {};
-    for (int i = 0; i < shared_.seeds.count; ++i) {
-      const Crossing &top = line[2 * i].best, &bottom = line[2 * i + 1].best;
-      if (!top.found() || !bottom.found() || !(top.height - bottom.height > shared_.best.depth)) continue;
-      shared_.best = {top.height - bottom.height,
-                      {top.triangle, bottom.triangle},
-                      line[2 * i].at,
-                      {top.height, bottom.height}};
-      shared_.from = i;
+    if (from >= 0) {
+      const LineQuestion &top = shared_.lines.line[2 * from], &bottom = shared_.lines.line[2 * from + 1];
+      shared_.best = {depth,
+                      {top.best.triangle, bottom.best.triangle},
+                      top.at,
+                      {top.best.height, bottom.best.height}};
+      shared_.from = from;
     }
+  }
+  team_.sync();
+}
+
+/// Follows the lines through more points of the overlap: those between the outermost places of the curve and
+/// what is opposite within both bodies. If one is deeper than the seeds', its point becomes a seed.
+template <typename Team>
+TANDEM_HD_SELDOM void DeepestLine<Team>::look_around(const Vector3& middle, double reach) {
+  constexpr int kPlaces = LineMemory::kMost / 2, kPoints = 4;
+  const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
+  const Vector3 n = shared_.frame.n;
+  const auto furthest_along = [&](const Vector3& direction) {
+    return lines.furthest_place(begin_, end_, reach,
+                                [&](const Vector3& x) { return dot(x - middle, direction); });
+  };
+  Vector3 along = lines.furthest_place(begin_, end_, reach, [&](const Vector3& x) {
+                         return dot(x - middle, x - middle);
+                       }).at - middle;
+  along = along - dot(along, n) * n;
+  const Vector3 across = cross(n, along);
+  Place place[kPlaces];
+  Vector3 inside[kPlaces], point[kPlaces], deepest;
+  constexpr int kStep[kPlaces] = {1, 1, 0, -1, -1, -1, 0, 1};  // eighths of a turn
+  for (int i = 0; i < kPlaces; ++i) {
+    const double x = kStep[i], y = kStep[(i + 6) % kPlaces];
+    place[i] = furthest_along(x * along + y * across);
+  }
+  const double most = greater(bodies_.a.shape->diagonal, bodies_.b.shape->diagonal);
+  const std::uint32_t found = lines.go_inside(place, kPlaces, most, reach, inside);
+  double most_depth = shared_.best.depth;
+  int best = -1;
+  for (int k = 0; k < kPoints; ++k) {
+    int count = 0, from[kPlaces];
+    for (int i = 0; i < kPlaces; ++i) {
+      if ((found >> i & 1u) == 0) continue;
+      point[count] = place[i].at + (0.1 + 0.6 * k) * (inside[i] - place[i].at);
+      from[count++] = i;
+    }
+    double depth;
+    const int here = follow_lines_through(point, count, reach, depth);
+    if (here >= 0 && depth > most_depth) most_depth = depth, deepest = point[here], best = from[here];
+  }
+  team_.sync();  // all have read the best line
+  if (team_.rank() == 0 && best >= 0) {
+    Seeds& seeds = shared_.seeds;
+    const int last = kMostSeeds - 1, at = seeds.count <= last ? seeds.count++ : shared_.from == last ? last - 1 : last;
+    seeds.at[at] = deepest, seeds.beside[at] = place[best].piece;
   }
   team_.sync();
 }
@@ -381,8 +453,12 @@ TANDEM_HD void DeepestLine<Team>::go_to_ends() {
 
 template <typename Team>
 TANDEM_HD void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& middle, double reach,
-                                       double enough) {
+                                       double enough, bool looks_around) {
   begin_with_seeds(frame, reach);
+  if (looks_around && shared_.best.found() && shared_.best.depth > kNotFlat * reach) {
+    look_around(middle, reach);
+    begin_with_seeds(frame, reach);
+  }
   const OverlapLine& best = shared_.best;
   if (!best.found() || best.depth >= enough) return;
   begin_half_spaces(middle, reach);

@@ -183,7 +183,8 @@ TANDEM_HD_SELDOM double ManifoldMaker<Team>::depth_along(std::uint32_t region, c
   if (team_.rank() == 0) depths.seeds = patch.seeds;
   team_.sync();
   DeepestLine<Team> search(team_, bodies_, memory_, summary_, region, depths);
-  search.find(PatchFrame(summary_.origin, patch.along(direction)), patch.measure.middle, patch.reach, enough);
+  search.find(PatchFrame(summary_.origin, patch.along(direction)), patch.measure.middle, patch.reach, enough,
+              false);
   return search.depth();
 }
 
@@ -243,7 +244,7 @@ TANDEM_HD void ManifoldMaker<Team>::measure_depths(std::uint32_t region, SearchM
   DeepestLine<Team> search(team_, bodies_, memory_, summary_, region, shared);
   search.find_seeds(state_.centre, state_.reach,
                     state_.candidates <= kFewCandidates ? kMostSeeds / 2 : kMostSeeds);
-  search.find(state_.frame, state_.centre, state_.reach, INFINITY);
+  search.find(state_.frame, state_.centre, state_.reach, INFINITY, true);
   const bool through = state_.deep && search.goes_through();
   if (team_.rank() == 0) {
     const OverlapLine& best = shared.best;
